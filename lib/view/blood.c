@@ -41,6 +41,9 @@ struct drop {
 	struct ground_metric metric; /* at its place */
 	double age_s;
 	double way_mm; /* since it last left film */
+	double ran_mm; /* since it left its source */
+	double clings; /* factor of its hold: drops and skin differ */
+	double wet;    /* of the skin ahead, 0 … 1 */
 	int source;    /* that feeds it, or -1 */
 
 	/*
@@ -53,6 +56,7 @@ struct drop {
 struct drops {
 	struct film *film;
 	uint32_t key;	  /* of the skin's roughness */
+	uint64_t drawn;	  /* drops so far */
 	double viscosity; /* mN s/mm² */
 	struct drop drop[DROPS_MAX];
 };
@@ -80,13 +84,22 @@ struct drops {
 #define FILM_LEAST_MM 0.06
 #define FILM_MOST_MM 0.22
 #define FILM_WIDTH 0.8
+/* Its width varies with the skin, over such lengths. */
+#define FILM_UNEVEN 0.35
+#define FILM_UNEVEN_MM 6.0
 /* A spot of it for each such part of its radius. */
 #define FILM_EACH 0.3
 /* Blood thins by shear: in a slow film it is more viscous than in the drop. */
 #define FILM_THICKER 1.7
+/* The hold of drops is between these times that, at random; on wet skin a drop keeps its shape less. */
+#define CLINGS_LEAST 0.45
+#define CLINGS_MOST 1.9
+/* A drop on wet skin leaves a film so many times thicker, and sinks into it when pinned. */
+#define WET_THICKER 1.6
+#define WET_SINK 0.03
 /* Length of the skin's roughness; effect on the heading, and its maximum (tangent). */
-#define ROUGH_MM 2.6
-#define ROUGH 0.55
+#define ROUGH_MM 4.5
+#define ROUGH 0.42
 #define TURN_MOST 0.9
 /* Wetter skin to one side attracts it: tangent. */
 #define DRAWN 0.5
@@ -198,8 +211,11 @@ static void drops_show(struct drops *drops, struct drop *drop,
 	bool other = false;
 
 	if (drop->source < 0) {
-		other = nearer(&is.before, 0.8);
-		other = nearer(&is.behind, 0.9 + 1.6 * fast) || other;
+		/* On wet skin it is a swelling of the film, not a bead. */
+		other = nearer(&is.before, 0.8 + 1.3 * drop->wet);
+		other = nearer(&is.behind, 0.9 + fmin(1.6 * fast + 2.8 * drop->wet,
+						      0.8 * drop->ran_mm / radius)) ||
+			other;
 		other = nearer(&is.beside, 0.9 - 0.25 * fast) || other;
 		for (int i = 0; i < 2 && drop->speed_mm_s > 0; i++)
 			is.axis_px[i] = drop->heading[0] * ground->down_px[i] +
@@ -263,6 +279,10 @@ static int drops_new(struct drops *drops, const double px[2], const double along
 			.px = {px[0], px[1]},
 			.heading = {1, 0},
 			.source = source,
+			.clings =
+				CLINGS_LEAST +
+				(CLINGS_MOST - CLINGS_LEAST) *
+					incise_random_uniform(drops->key, drops->drawn++),
 			.metric = ground.metric,
 			.axis_px = {along_px[0], along_px[1]},
 			.before = DROP_HANGS_ALONG,
@@ -301,7 +321,7 @@ static void steer(struct drops *drops, struct drop *drop, const struct ground *g
 	       mm_y = drop->px[1] * ground->metric.c;
 	double rough = noise_smooth(drops->key, (float)(mm_x / ROUGH_MM),
 				    (float)(mm_y / ROUGH_MM)) +
-		       0.5 * noise_smooth(drops->key + 1, (float)(mm_x / ROUGH_MM * 2.7),
+		       0.3 * noise_smooth(drops->key + 1, (float)(mm_x / ROUGH_MM * 2.7),
 					  (float)(mm_y / ROUGH_MM * 2.7));
 	double right = wet_at(drops, drop, ground, 1.1 * radius, 1.2 * radius);
 	double left = wet_at(drops, drop, ground, 1.1 * radius, -1.2 * radius);
@@ -334,10 +354,12 @@ static void accelerate(struct drops *drops, struct drop *drop,
 {
 	double ahead = wet_at(drops, drop, ground, 1.15 * radius, 0);
 	double volume = (double)drop->units * BLOOD_UNIT_UL;
-	double held = TENSION * HYSTERESIS * 2 * radius * (1 - (1 - WET) * ahead);
+	double held = TENSION * HYSTERESIS * 2 * radius * (1 - (1 - WET) * ahead) *
+		      drop->clings;
 	double clot = 1 + drop->age_s * drop->age_s / (CLOT_S * CLOT_S);
 	double drives, to;
 
+	drop->wet += (ahead - drop->wet) * (STEP_S / RELAX_S);
 	if (drop->speed_mm_s > 0)
 		held *= MOVING;
 	/* Clotting increases the hold of the edge more than the drag. */
@@ -357,13 +379,21 @@ static void leave_film(struct drops *drops, struct drop *drop, double radius)
 {
 	double capillary = drops->viscosity * drop->speed_mm_s / TENSION;
 	double thick = 0.94 * CAPILLARY_MM * cbrt(capillary * capillary);
-	double width = FILM_WIDTH * radius, share;
+	const struct ground_metric *m = &drop->metric;
+	double width =
+		FILM_WIDTH * radius *
+		(1 + FILM_UNEVEN *
+			     noise_smooth(drops->key + 2,
+					  (float)(drop->px[0] * m->a / FILM_UNEVEN_MM),
+					  (float)(drop->px[1] * m->c / FILM_UNEVEN_MM)));
+	double share;
 
 	if (drop->way_mm < FILM_EACH * width)
 		return;
 	share = 1 - exp(-drop->way_mm / (0.4 * width));
 	drop->way_mm = 0;
-	thick = fmin(fmax(FILM_THICKER * thick, FILM_LEAST_MM), FILM_MOST_MM);
+	thick = fmin(fmax(FILM_THICKER * thick, FILM_LEAST_MM), FILM_MOST_MM) *
+		(1 + (WET_THICKER - 1) * drop->wet);
 	drop->units -=
 		film_level(drops->film, drop->px, width, thick, share, drop->units);
 }
@@ -374,6 +404,7 @@ static void run(struct drops *drops, struct drop *drop, const struct ground *gro
 	double way = drop->speed_mm_s * STEP_S;
 
 	drop->way_mm += way;
+	drop->ran_mm += way;
 	leave_film(drops, drop, radius);
 	for (int i = 0; i < 2; i++)
 		drop->px[i] += way * (drop->heading[0] * ground->down_px[i] +
@@ -407,8 +438,10 @@ static void step_drop(struct drops *drops, struct drop *drop)
 	if (drop->speed_mm_s > 0) {
 		steer(drops, drop, &ground, radius);
 		run(drops, drop, &ground, radius);
-	} else if (drop->source < 0 && drop->age_s > PINNED_S) {
-		sink(drops, drop, radius, (int64_t)((double)drop->units * SINK));
+	} else if (drop->source < 0 && (drop->wet > 0.5 || drop->age_s > PINNED_S)) {
+		sink(drops, drop, radius,
+		     (int64_t)((double)drop->units *
+			       (drop->wet > 0.5 ? WET_SINK : SINK)));
 	}
 	if (drop->source < 0 && drop->units < LEAST_UNITS)
 		sink(drops, drop, radius, drop->units);
@@ -476,11 +509,42 @@ static void drops_step(struct drops *drops)
 	merge_all(drops);
 }
 
+/* --- Colour --- */
+
+/*
+ * Colour, by thickness and dryness. Light that passes through blood and back is absorbed by Beer
+ * and Lambert: a film is translucent, a drop opaque. Alpha is 1 - exp(-h / h0), the colour goes
+ * from light to dark red, and with drying to brown, first at thin edges.
+ *
+ * The height of a drop is added to that of the film below it, and goes smoothly to zero: there is
+ * no seam between a drop and its trail.
+ */
+
+/* At this thickness, mm, a film hides two thirds of the skin. */
+#define HIDES_MM 0.013f
+/* Thickness of half of the change from a thin film's colour to a thick one's. */
+#define DARK_MM 0.16f
+/* Thinner blood is invisible, mm. */
+#define NOTHING_MM 0.0004f
+
+/* Opacity by thickness, in steps up to where it is full. */
+#define HIDE_STEPS 1024
+#define HIDE_MOST_MM 0.064f
+#define HIDE_FULL 0.985f
+
+static void make_hides(float hides[HIDE_STEPS + 1])
+{
+	for (int i = 0; i <= HIDE_STEPS; i++)
+		hides[i] =
+			fminf(1 - expf(-HIDE_MOST_MM / HIDE_STEPS * (float)i / HIDES_MM),
+			      HIDE_FULL);
+}
+
 /* --- Sources --- */
 
 /* A source represents a stretch of a cut of random length between these, mm. */
-#define SPAN_LEAST_MM 2.5
-#define SPAN_MOST_MM 8.0
+#define SPAN_LEAST_MM 4.0
+#define SPAN_MOST_MM 15.0
 /* The wound is wetted first, to this thickness, by spots of this radius. */
 #define WETS_MM 0.16
 #define SPOT_MM 0.55
@@ -511,7 +575,8 @@ struct blood {
 	double ul_s_mm2;
 	uint64_t key, drawn; /* of random numbers, and their count */
 	int64_t emitted;
-	int n, last; /* sources; the growing one, or -1 */
+	float hides[HIDE_STEPS + 1]; /* opacity by thickness */
+	int n, last;		     /* sources; the growing one, or -1 */
 	struct source source[BLOOD_SOURCES_MAX];
 };
 
@@ -534,6 +599,7 @@ struct blood *blood_new(const struct uv_map *map,
 	blood->key = incise_random_bits(0x626c6f6f64, (uint64_t)(int64_t)picture->seed);
 	blood->ul_s_mm2 = picture->blood_ul_s_mm2;
 	blood->last = -1;
+	make_hides(blood->hides);
 	drops_init(&blood->drops, &blood->film, picture, (uint32_t)blood->key);
 	return blood;
 }
@@ -741,53 +807,23 @@ bool blood_drop(const struct blood *blood, int index, double px[2], double *ul)
 	return true;
 }
 
-/*
- * Colour, by thickness and dryness. Light that passes through blood and back is absorbed by Beer
- * and Lambert: a film is translucent, a drop opaque. Alpha is 1 - exp(-h / h0), the colour goes
- * from light to dark red, and with drying to brown, first at thin edges.
- *
- * The height of a drop is added to that of the film below it, and goes smoothly to zero: there is
- * no seam between a drop and its trail.
- */
-
-/* At this thickness, mm, a film hides two thirds of the skin. */
-#define HIDES_MM 0.013f
-/* Thickness of half of the change from a thin film's colour to a thick one's. */
-#define DARK_MM 0.16f
-/* Thinner blood is invisible, mm. */
-#define NOTHING_MM 0.0004f
-
-struct wet_texel {
-	float thick, light; /* mm; of a highlight, 0 … 1 */
-};
-
-static void add_texel(struct wet_texel *to, int x, int y, const struct shape *shape)
+/* A drop's height at (dx, dy) texels from its middle; @rough: of its edge there, -1 … 1. */
+static float height(const struct shape *shape, float dx, float dy, float rough)
 {
-	float dx = (float)x + 0.5f - shape->x, dy = (float)y + 0.5f - shape->y;
 	float u = shape->metric.a * dx + shape->metric.b * dy, v = shape->metric.c * dy;
 	float along = u * shape->axis[0] + v * shape->axis[1];
 	float across = (v * shape->axis[0] - u * shape->axis[1]) * shape->beside;
-	float r2, cap, lit;
+	float r2, cap;
 
 	along *= along > 0 ? shape->before : shape->behind;
-	r2 = along * along + across * across;
-	if (r2 >= 1.6f)
-		return;
-	r2 *= 1 + FILM_ROUGH * noise_smooth(FILM_ROUGH_KEY, (float)x * shape->grain,
-					    (float)y * shape->grain);
+	r2 = (along * along + across * across) * (1 + FILM_ROUGH * rough);
 	if (r2 >= 1)
-		return;
+		return 0;
 	cap = 1 - r2;
-	to->thick += shape->high_mm * cap * sqrtf(cap);
-	/* Highlight of a window, off the middle. */
-	u = u * shape->beside + 0.3f;
-	v = v * shape->beside + 0.34f;
-	lit = 1 - (u * u + v * v) * 16;
-	if (lit > to->light)
-		to->light = lit;
+	return shape->high_mm * cap * sqrtf(cap);
 }
 
-static void add_shape(struct wet_texel *tile, int x0, int y0, const struct shape *shape)
+static void add_shape(float *tile, int x0, int y0, const struct shape *shape)
 {
 	int left = shape->from_px[0] > x0 ? shape->from_px[0] : x0;
 	int right =
@@ -795,10 +831,17 @@ static void add_shape(struct wet_texel *tile, int x0, int y0, const struct shape
 	int top = shape->from_px[1] > y0 ? shape->from_px[1] : y0;
 	int bottom =
 		shape->to_px[1] < y0 + CANVAS_TILE ? shape->to_px[1] : y0 + CANVAS_TILE;
+	float rough[CANVAS_TILE];
 
-	for (int y = top; y < bottom; y++)
+	for (int y = top; y < bottom; y++) {
+		float *row = tile + (y - y0) * CANVAS_TILE - x0;
+
+		noise_smooth_row(FILM_ROUGH_KEY, shape->grain, left,
+				 (float)y * shape->grain, right - left, rough);
 		for (int x = left; x < right; x++)
-			add_texel(&tile[(y - y0) * CANVAS_TILE + x - x0], x, y, shape);
+			row[x] += height(shape, (float)x + 0.5f - shape->x,
+					 (float)y + 0.5f - shape->y, rough[x - left]);
+	}
 }
 
 static float mix(float a, float b, float t)
@@ -806,56 +849,109 @@ static float mix(float a, float b, float t)
 	return a + (b - a) * t;
 }
 
-static void colour(const struct wet_texel *texel, float dry, uint8_t rgba[4])
+static float hides(const float table[HIDE_STEPS + 1], float thick)
 {
-	float thick = texel->thick;
-	float alpha = 1 - expf(-thick / HIDES_MM);
+	float at = thick * (HIDE_STEPS / HIDE_MOST_MM) + 0.5f;
+
+	return thick > NOTHING_MM ? table[at < HIDE_STEPS ? (int)at : HIDE_STEPS] : 0;
+}
+
+static void colour(float thick, float alpha, float dry, uint8_t rgba[4])
+{
+	const float brown[3] = {0.27f, 0.055f, 0.035f};
 	float dark = thick / (thick + DARK_MM);
-	float light = texel->light > 0 ? texel->light * texel->light * 0.14f *
-						 fminf(thick / 0.3f, 1)
-				       : 0;
 	float rgb[3] = {
 		mix(0.56f, 0.36f, dark),
-		mix(0.025f, 0.01f, dark),
-		mix(0.03f, 0.012f, dark),
+		mix(0.015f, 0.004f, dark),
+		mix(0.02f, 0.006f, dark),
 	};
-	const float brown[3] = {0.27f, 0.055f, 0.035f};
 
-	alpha = fminf(alpha, 0.985f);
 	for (int i = 0; i < 3; i++) {
 		rgb[i] = mix(rgb[i], brown[i], dry * 0.75f);
-		rgb[i] = mix(rgb[i], 1, light);
 		rgba[i] = (uint8_t)(rgb[i] * alpha * 255 + 0.5f);
 	}
 	rgba[3] = (uint8_t)(alpha * 255 + 0.5f);
 }
 
+/* Thickness of film and drops on a tile, mm; false: there is nothing. */
+static bool fill_tile(const struct film *film, float unit, const struct shape *shapes,
+		      int n, int x0, int y0, float tile[FILM_TEXELS])
+{
+	const uint32_t *volume = film->volume + film_index(film, x0, y0);
+	uint32_t any = 0;
+
+	for (int i = 0; i < FILM_TEXELS; i++) {
+		any |= volume[i];
+		tile[i] = (float)volume[i] * unit;
+	}
+	for (int i = 0; i < n; i++) {
+		const struct shape *shape = &shapes[i];
+
+		if (shape->to_px[0] <= x0 || shape->from_px[0] >= x0 + CANVAS_TILE ||
+		    shape->to_px[1] <= y0 || shape->from_px[1] >= y0 + CANVAS_TILE)
+			continue;
+		any = 1;
+		add_shape(tile, x0, y0, shape);
+	}
+	return any;
+}
+
+/*
+ * Opacity of a tile's texels, each with a share of its neighbours' in the tile: soft edges. At the
+ * border of a tile an edge is sharper, which one texel does not show.
+ */
+static void soften(const float table[HIDE_STEPS + 1], const float tile[FILM_TEXELS],
+		   float alpha[FILM_TEXELS])
+{
+	enum { SIDE = CANVAS_TILE, LAST = CANVAS_TILE - 1 };
+	float row[FILM_TEXELS], hard[SIDE + 2];
+
+	for (int j = 0; j < SIDE; j++) {
+		for (int i = 0; i < SIDE; i++)
+			hard[i + 1] = hides(table, tile[j * SIDE + i]);
+		hard[0] = hard[1];
+		hard[SIDE + 1] = hard[SIDE];
+		for (int i = 0; i < SIDE; i++)
+			row[j * SIDE + i] =
+				0.25f * (hard[i] + 2 * hard[i + 1] + hard[i + 2]);
+	}
+	for (int j = 0; j < SIDE; j++) {
+		const float *at = row + j * SIDE, *above = at - (j > 0 ? SIDE : 0),
+			    *below = at + (j < LAST ? SIDE : 0);
+
+		for (int i = 0; i < SIDE; i++)
+			alpha[j * SIDE + i] = 0.25f * (above[i] + 2 * at[i] + below[i]);
+	}
+}
+
 /* Returns whether a texel changed. */
-static bool paint_tile(struct film *film, const struct shape *shapes, int n, int number,
-		       uint8_t *rgba)
+static bool paint_tile(struct film *film, const float table[HIDE_STEPS + 1],
+		       const struct shape *shapes, int n, int number, uint8_t *rgba)
 {
 	int x0 = number % film->tiles.side * CANVAS_TILE,
 	    y0 = number / film->tiles.side * CANVAS_TILE;
-	const struct film_tile *tile = film_tile(film, x0, y0);
-	size_t first = (size_t)number * FILM_TEXELS;
-	struct wet_texel texels[FILM_TEXELS];
-	bool changed = false;
-	float unit = (float)(BLOOD_UNIT_UL / tile->area_mm2);
+	const uint8_t *dry = film->dry + (size_t)number * FILM_TEXELS;
+	float unit = (float)(BLOOD_UNIT_UL / film_tile(film, x0, y0)->area_mm2);
+	float thick[FILM_TEXELS], alpha[FILM_TEXELS];
+	bool changed = false, any = fill_tile(film, unit, shapes, n, x0, y0, thick);
 
-	for (int i = 0; i < FILM_TEXELS; i++)
-		texels[i] = (struct wet_texel){(float)film->volume[first + i] * unit, 0};
-	for (int i = 0; i < n; i++)
-		add_shape(texels, x0, y0, &shapes[i]);
-	for (int i = 0; i < FILM_TEXELS; i++) {
-		uint8_t *to = rgba + ((size_t)(y0 + i / CANVAS_TILE) * film->size + x0 +
-				      i % CANVAS_TILE) *
-					     4;
-		uint8_t is[4] = {0};
+	if (any)
+		soften(table, thick, alpha);
+	for (int y = 0; y < CANVAS_TILE; y++) {
+		uint8_t is[CANVAS_TILE][4] = {0},
+			*to = rgba + ((size_t)(y0 + y) * film->size + x0) * 4;
 
-		if (texels[i].thick > NOTHING_MM)
-			colour(&texels[i], film->dry[first + i] * (1.0f / FILM_DRY), is);
-		changed |= memcmp(to, is, sizeof(is)) != 0;
+		for (int x = 0; any && x < CANVAS_TILE; x++) {
+			int i = y * CANVAS_TILE + x;
+
+			if (alpha[i] > 0)
+				colour(thick[i], alpha[i], dry[i] * (1.0f / FILM_DRY),
+				       is[x]);
+		}
+		if (!memcmp(to, is, sizeof(is)))
+			continue;
 		memcpy(to, is, sizeof(is));
+		changed = true;
 	}
 	return changed;
 }
@@ -874,6 +970,6 @@ void blood_paint(struct blood *blood, struct incise_canvas *canvas, int layer)
 		     drop_shape(film, &blood->drops.drop[i], &shapes[n]);
 	for (int i = 0; (i = canvas_tiles_next(&film->tiles, i)) >= 0;)
 		/* Drying and draining mostly change a colour by less than a step. */
-		if (paint_tile(film, shapes, n, i, rgba))
+		if (paint_tile(film, blood->hides, shapes, n, i, rgba))
 			incise_canvas_dirty(canvas, canvas_tile_rect(&film->tiles, i));
 }

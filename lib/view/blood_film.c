@@ -21,14 +21,6 @@ static bool film_inside(const struct film *film, int x, int y)
 	return x >= 0 && y >= 0 && x < film->size && y < film->size;
 }
 
-/* The place of a texel, tile after tile. */
-static size_t film_index(const struct film *film, int x, int y)
-{
-	return ((size_t)(y / CANVAS_TILE) * film->tiles.side + x / CANVAS_TILE) *
-		       FILM_TEXELS +
-	       y % CANVAS_TILE * CANVAS_TILE + x % CANVAS_TILE;
-}
-
 bool film_init(struct film *film, const struct uv_map *map,
 	       const struct incise_scene_picture *picture)
 {
@@ -295,9 +287,9 @@ void film_add(struct film *film, const double px[2], double radius_mm, int64_t u
 #define VISITS_MOST 24
 /* A texel gives at most this part of itself per visit: the scheme is explicit. */
 #define FLOW_MOST 0.4
-/* Flow per round for visits in each round, and in every fourth. */
-#define FLOW_MUCH 0.05
-#define FLOW_SOME 0.012
+/* Flow per round for visits in each round, and in every fourth: no more than FLOW_MOST in a visit. */
+#define FLOW_MUCH 0.1
+#define FLOW_SOME 0.04
 /* Slower flow is invisible. */
 #define FLOW_LEAST 0.0002
 /* The target may become this many times thicker than the source. */
@@ -419,40 +411,49 @@ struct visit {
 	bool changed;
 };
 
+/* From a texel to its neighbours, @ax of it along the row. Returns whether it changed. */
+static bool spill(struct film *film, const float down[2], int x, int y, size_t at,
+		  double part, double thick)
+{
+	float ax = fabsf(down[0]) / (fabsf(down[0]) + fabsf(down[1]));
+	bool changed;
+
+	changed = flow(film, at, down[0] > 0 ? x + 1 : x - 1, y, part * ax);
+	changed |= flow(film, at, x, down[1] > 0 ? y + 1 : y - 1, part * (1 - ax));
+	if (thick < LEVELS_MM)
+		return changed;
+	if (ax < 0.5f) {
+		changed |= level(film, at, x + 1, y);
+		changed |= level(film, at, x - 1, y);
+	} else {
+		changed |= level(film, at, x, y + 1);
+		changed |= level(film, at, x, y - 1);
+	}
+	return changed;
+}
+
 static void drain_texel(struct visit *visit, int x, int y, size_t at)
 {
 	struct film *film = visit->film;
 	float u = ((float)(x % CANVAS_TILE) + 0.5f) / CANVAS_TILE;
 	float v = ((float)(y % CANVAS_TILE) + 0.5f) / CANVAS_TILE;
-	float dx, dy, ax, ay;
+	float down[2];
 	double thick, speed, part, clot;
 
 	if (film->dry[at] >= FILM_CLOT)
 		return;
-	dx = between(visit->fall.x, u, v);
-	dy = between(visit->fall.y, u, v);
-	ax = fabsf(dx);
-	ay = fabsf(dy);
+	down[0] = between(visit->fall.x, u, v);
+	down[1] = between(visit->fall.y, u, v);
 	thick = film->volume[at] * BLOOD_UNIT_UL / visit->tile->area_mm2;
 	clot = 1 - (double)film->dry[at] / FILM_CLOT;
-	speed = film->drain * thick * thick * clot * clot * sqrtf(dx * dx + dy * dy);
+	speed = film->drain * thick * thick * clot * clot *
+		sqrtf(down[0] * down[0] + down[1] * down[1]);
 	part = fmin(speed * ROUND_S / visit->tile->texel_mm, 1);
-	if (!(part > FLOW_LEAST) || !(ax + ay > 0))
+	if (!(part > FLOW_LEAST))
 		return;
 	part = fmin(part * visit->rounds, FLOW_MOST) * film->volume[at];
-	ax /= ax + ay;
-	visit->changed |= flow(film, at, dx > 0 ? x + 1 : x - 1, y, part * ax);
-	visit->changed |= flow(film, at, x, dy > 0 ? y + 1 : y - 1, part * (1 - ax));
-	visit->fastest = fmax(visit->fastest, part / (film->volume[at] + part + 1));
-	if (thick < LEVELS_MM)
-		return;
-	if (ax < 0.5f) {
-		visit->changed |= level(film, at, x + 1, y);
-		visit->changed |= level(film, at, x - 1, y);
-	} else {
-		visit->changed |= level(film, at, x, y + 1);
-		visit->changed |= level(film, at, x, y - 1);
-	}
+	visit->fastest = fmax(visit->fastest, part / (film->volume[at] + 1));
+	visit->changed |= spill(film, down, x, y, at, part, thick);
 }
 
 /* Returns whether a texel is still drying. times: 0.8 s each. */

@@ -30,8 +30,8 @@
 
 /* Edges of drops and films follow the skin's roughness: its length, and the effect. */
 #define FILM_ROUGH_KEY 0x736b696e
-#define FILM_ROUGH_MM 0.8f
-#define FILM_ROUGH 0.28f
+#define FILM_ROUGH_MM 2.4f
+#define FILM_ROUGH 0.2f
 
 /* Values of a tile's middle, for all of its texels. */
 struct film_tile {
@@ -64,6 +64,14 @@ void film_free(struct film *film);
 
 /* The tile of a texel; never NULL within the texture. */
 const struct film_tile *film_tile(struct film *film, int x, int y);
+
+/* The place of a texel, tile after tile. */
+static inline size_t film_index(const struct film *film, int x, int y)
+{
+	return ((size_t)(y / CANVAS_TILE) * film->tiles.side + x / CANVAS_TILE) *
+		       FILM_TEXELS +
+	       y % CANVAS_TILE * CANVAS_TILE + x % CANVAS_TILE;
+}
 
 /* Thickness, mm; 0 outside of the texture. */
 double film_thickness_mm(struct film *film, double x, double y);
