@@ -20,28 +20,47 @@ struct key {
 #define BLADE INCISE_TOOL_BLADE
 #define HANDLE INCISE_TOOL_HANDLE
 #define TUBE INCISE_TOOL_TUBE
+/* Depth of the tube's end where its flange meets the skin over the cartilages. */
+#define SEATED_MM 17.5
+#define TURNED M_PI_2 /* the edge lies across the neck */
+
+/*
+ * The neck lies along x, with the cricothyroid membrane below the top. Its incisions are those of
+ * an open cricothyroidotomy: vertical through the skin in the midline, 30 mm (LearnEM,
+ * "Cricothyrotomy", has 3 cm; WikEM, "Surgical airway", 3.5 cm), then horizontal through the
+ * membrane, 15 mm, which a handle of 10 mm fits into.
+ */
+#define SKIN_MM 15.0	/* half of the vertical incision */
+#define MEMBRANE_MM 7.5 /* half of the horizontal one */
 
 static const struct key keys[] = {
-	{0.0, {-15, 0, 25}, 0, 0, BLADE},
-	{0.7, {-15, 0, 3}, 0, 0, BLADE},
-	{1.0, {-15, 0, -3}, 0, 0, BLADE},
-	{3.0, {15, 0, -3}, 0, 0, BLADE},
-	{3.3, {16, 0, 4}, 0, 0, BLADE},
-	{4.0, {45, -10, 40}, 0, 0, BLADE},
+	{0.0, {-SKIN_MM, 0, 25}, 0, 0, BLADE},
+	{0.6, {-SKIN_MM, 0, 3}, 0, 0, BLADE},
+	{1.0, {-SKIN_MM, 0, -4}, 0, 0, BLADE},
+	{2.6, {SKIN_MM, 0, -4}, 0, 0, BLADE},
+	{2.9, {SKIN_MM + 1, 0, 4}, 0, 0, BLADE},
+	{3.6, {0, -MEMBRANE_MM, 6}, 0, TURNED, BLADE},
+	{4.1, {0, -MEMBRANE_MM, -9}, 0, TURNED, BLADE},
+	{5.2, {0, MEMBRANE_MM, -9}, 0, TURNED, BLADE},
+	{5.5, {0, MEMBRANE_MM + 1, 5}, 0, TURNED, BLADE},
+	{6.2, {45, -10, 40}, 0, 0, BLADE},
 	{9.0, {45, -10, 40}, 0, 0, BLADE},
 	/* Turned over high above, where it touches nothing. */
-	{9.8, {30, 0, 60}, 1, 0, HANDLE},
-	{10.6, {0, 0, 6}, 1, 0, HANDLE},
-	{11.2, {0, 0, -7}, 1, 0, HANDLE},
-	{12.0, {-4, 0, -8}, 1, 0.9, HANDLE},
-	{13.2, {4, 0, -8}, 1, -0.9, HANDLE},
-	{13.8, {0, 0, -6}, 1, 0, HANDLE},
+	{9.8, {30, 0, 60}, 1, TURNED, HANDLE},
+	{10.6, {0, 0, 6}, 1, TURNED, HANDLE},
+	{11.2, {0, 0, -9}, 1, TURNED, HANDLE},
+	/* In the horizontal incision; turned, it spreads it. */
+	{12.0, {0, 0, -10}, 1, 0, HANDLE},
+	{12.6, {0, 1.5, -10}, 1, 0.2, HANDLE},
+	{13.2, {0, -1.5, -10}, 1, -0.2, HANDLE},
+	{13.8, {0, 0, -8}, 1, 0, HANDLE},
 	{14.2, {0, 0, 12}, 1, 0, HANDLE},
 	{15.0, {20, -20, 90}, 1, 0, HANDLE},
 	{15.1, {20, -20, 90}, 0, 0, TUBE},
 	{16.2, {0, 0, 8}, 0, 0, TUBE},
-	{17.5, {0, 0, -12}, 0, 0, TUBE},
-	{PROCEDURE_S, {0, 0, -12}, 0, 0, TUBE},
+	/* Down to its flange. */
+	{18.0, {0, 0, -SEATED_MM}, 0, 0, TUBE},
+	{PROCEDURE_S, {0, 0, -SEATED_MM}, 0, 0, TUBE},
 };
 #define KEYS (int)(sizeof(keys) / sizeof(*keys))
 

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * Paper 2's procedure as a script for the scalpel of sim:mouse, at the top of a surface: cut,
- * let it bleed, enlarge the cut with the handle, insert a tube. As poses, and as ticks that a
- * benchmark keeps in memory.
+ * Paper 2's procedure as a script for the scalpel of sim:mouse, at the top of a surface: cut along
+ * and across, let it bleed, enlarge the cut with the handle, insert a tube. As poses, and as ticks
+ * that a benchmark keeps in memory.
  *
- *     blade  ╲___30 mm___╱        handle  ║ ↻        tube  ║
- *   0 s     1 s         3 s   4 … 9 s    11 s   14 s      17 s … 22 s
+ *     blade  ╲__30 mm__╱   ╲_15 mm_╱         handle  ║ ↻        tube  ║
+ *   0 s     1 s       2.6 s  4.1 s 5.2 s … 9 s      11 s   14 s      18 s … 22 s
  */
 #ifndef INCISE_PROCEDURE_H
 #define INCISE_PROCEDURE_H
