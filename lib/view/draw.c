@@ -454,9 +454,6 @@ static unsigned texture_image(unsigned image, const uint8_t *bgra, int w, int h)
 
 #define DRAW_SLOTS 4
 
-/* Diameter of the tube. */
-#define DRAW_TUBE_MM 7.0
-
 static const double draw_key_way[3] = UV_MAP_LAMP;
 
 struct incise_draw {
@@ -495,12 +492,12 @@ static int failed(struct incise_error *err)
 static int put_instruments(struct incise_draw *draw, struct incise_error *err)
 {
 	struct instrument_mesh mesh;
-	int rc = instrument_scalpel(draw->tool.handle_mm, &mesh);
+	int rc = instrument_scalpel(&draw->tool, &mesh);
 
 	if (!rc) {
 		solid_instrument(&draw->scalpel, &mesh);
 		instrument_free(&mesh);
-		rc = instrument_tube(DRAW_TUBE_MM, &mesh);
+		rc = instrument_tube(draw->tool.tube_mm, &mesh);
 	}
 	if (rc)
 		return incise_error_set(err, -rc, "picture: no memory");
@@ -688,10 +685,10 @@ static void set_casters(const struct incise_draw *draw,
 	/* Along x and z, and radius: blade, handle; a tube, its flange, its connector. */
 	const double scalpel[][3] = {
 		{0, 0, 0.3}, {0.2, fmin(28, h / 4), 2.2}, {0, h, 3.2}};
-	static const double tube[][3] = {{0, 0, DRAW_TUBE_MM / 2},
-					 {0, INSTRUMENT_FLANGE_MM - 1, DRAW_TUBE_MM / 2},
-					 {0, INSTRUMENT_FLANGE_MM + 1, 12},
-					 {0, INSTRUMENT_FLANGE_MM + 24, 7.5}};
+	const double tube[][3] = {{0, 0, draw->tool.tube_mm / 2},
+				  {0, INSTRUMENT_FLANGE_MM - 1, draw->tool.tube_mm / 2},
+				  {0, INSTRUMENT_FLANGE_MM + 1, 12},
+				  {0, INSTRUMENT_FLANGE_MM + 24, 7.5}};
 	const double(*line)[3] = place && place->tube ? tube : scalpel;
 	int n = !place ? 0 : place->tube ? 3 : 2;
 	float from[SHADERS_CASTERS][4], to[SHADERS_CASTERS][4];

@@ -30,13 +30,15 @@ static int add_layer(struct incise_injury *injury, int *layer, struct incise_err
 
 /* Add the parts that the scene requests. */
 static int add(struct incise_injury *injury, const struct incise_scene_picture *picture,
-	       const struct uv_map *map, struct incise_error *err)
+	       const struct incise_scene_scalpel *scalpel,
+	       struct incise_incision *incision, const struct uv_map *map,
+	       struct incise_error *err)
 {
 	int rc;
 
 	if (!picture->wound)
 		return 0;
-	injury->wound = wound_new(map, err);
+	injury->wound = wound_new(map, scalpel, incision, err);
 	if (!injury->wound)
 		return -ENOMEM;
 	rc = add_layer(injury, &injury->skin_layer, err);
@@ -49,6 +51,8 @@ static int add(struct incise_injury *injury, const struct incise_scene_picture *
 }
 
 struct incise_injury *incise_injury_new(const struct incise_scene_picture *picture,
+					const struct incise_scene_scalpel *scalpel,
+					struct incise_incision *incision,
 					const struct uv_map *map,
 					struct incise_canvas *canvas,
 					struct incise_error *err)
@@ -67,7 +71,7 @@ struct incise_injury *incise_injury_new(const struct incise_scene_picture *pictu
 		return NULL;
 	}
 	injury->canvas = canvas;
-	if (add(injury, picture, map, err)) {
+	if (add(injury, picture, scalpel, incision, map, err)) {
 		incise_injury_free(injury);
 		return NULL;
 	}

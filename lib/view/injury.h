@@ -19,6 +19,7 @@
 
 #include <stdint.h>
 #include <incise/error.h>
+#include <incise/incision.h>
 #include <incise/plan.h>
 #include <incise/scene.h>
 #include <incise/view.h>
@@ -32,10 +33,13 @@
 struct incise_injury;
 
 /*
- * map and canvas must live longer, and have the same size; layers are added to the canvas.
+ * map, canvas and incision must live longer. Map and canvas have the same size; layers are added to
+ * the canvas. The incision, or NULL, is fed with the ticks.
  * Returns NULL with errno EINVAL, ENOMEM, ENOSPC.
  */
 struct incise_injury *incise_injury_new(const struct incise_scene_picture *picture,
+					const struct incise_scene_scalpel *scalpel,
+					struct incise_incision *incision,
 					const struct uv_map *map,
 					struct incise_canvas *canvas,
 					struct incise_error *err);

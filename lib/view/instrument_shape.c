@@ -148,7 +148,8 @@ static void paint(struct ring *ring, const float rgb[3], float metal)
 	ring->metal = metal;
 }
 
-int instrument_scalpel(double handle_mm, struct instrument_mesh *mesh)
+int instrument_scalpel(const struct incise_scene_scalpel *scalpel,
+		       struct instrument_mesh *mesh)
 {
 	/*
 	 * A blade with a belly in a handle, mm of one that is 120 mm long: height, left
@@ -168,6 +169,10 @@ int instrument_scalpel(double handle_mm, struct instrument_mesh *mesh)
 	};
 	enum { RINGS = sizeof(shape) / sizeof(shape[0]) };
 	struct ring ring[RINGS] = {0};
+	const double handle_mm = scalpel->handle_mm;
+	/* The flat end is as wide and thick as the scene says; the table's is 9.2 by 4.4. */
+	const double wide = scalpel->handle_width_mm / 9.2;
+	const double thick = scalpel->handle_thickness_mm / 4.4;
 	/* A longer scalpel has a longer handle; a shorter one is scaled down. */
 	double small = fmin(handle_mm / 120, 1), longer = fmax(handle_mm - 120, 0);
 
@@ -176,9 +181,9 @@ int instrument_scalpel(double handle_mm, struct instrument_mesh *mesh)
 
 		ring[i].centre[2] = s[0] * small + (s[0] > 50 ? longer : 0);
 		ring[i].across[0] = ring[i].over[1] = 1;
-		ring[i].left = s[1] * small;
-		ring[i].right = s[2] * small;
-		ring[i].thick = s[3] * small;
+		ring[i].left = s[1] * (s[0] > 50 ? wide : small);
+		ring[i].right = s[2] * (s[0] > 50 ? wide : small);
+		ring[i].thick = s[3] * (s[0] > 50 ? thick : small);
 		ring[i].round = s[4];
 		ring[i].edge = s[5];
 		paint(&ring[i], s[6] > 0 ? steel : handle, (float)s[6]);

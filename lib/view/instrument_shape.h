@@ -31,7 +31,8 @@ struct instrument_mesh {
 #define INSTRUMENT_FLANGE_MM 20.0
 
 /* A few hundred triangles; to be freed. 0, -ENOMEM with an empty mesh. */
-int instrument_scalpel(double handle_mm, struct instrument_mesh *mesh);
+int instrument_scalpel(const struct incise_scene_scalpel *scalpel,
+		       struct instrument_mesh *mesh);
 
 /* tube_mm: diameter of the inserted part, up to that of the connector, 15 mm. */
 int instrument_tube(double tube_mm, struct instrument_mesh *mesh);

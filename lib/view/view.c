@@ -10,6 +10,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <incise/incision.h>
 #include <incise/view.h>
 #include "../base/monotonic.h"
 #include "../base/vector.h"
@@ -40,6 +41,7 @@ struct incise_view {
 	uint8_t *base; /* the canvas's, size² texels */
 	struct uv_map *map;
 	struct incise_canvas *canvas;
+	struct incise_incision *incision; /* or NULL */
 	struct incise_injury *injury;
 	struct incise_draw *draw;
 	struct incise_overlay *overlay;
@@ -91,7 +93,8 @@ static int make_texture(struct incise_view *view, uint8_t **normals,
 	view->canvas = incise_canvas_new(view->map->size, view->base, err);
 	if (!view->canvas)
 		return -errno;
-	view->injury = incise_injury_new(&view->picture, view->map, view->canvas, err);
+	view->injury = incise_injury_new(&view->picture, &view->scalpel, view->incision,
+					 view->map, view->canvas, err);
 	return view->injury ? 0 : -errno;
 }
 
@@ -177,7 +180,10 @@ struct incise_view *incise_view_new(const struct incise_scene *scene,
 	view->width = setup->width;
 	view->height = setup->height;
 	view->panel = true;
-	rc = make_parts(view, plan, setup, err);
+	if (view->picture.wound)
+		view->incision = incise_incision_new(scene, err);
+	rc = view->picture.wound && !view->incision ? -ENOMEM
+						    : make_parts(view, plan, setup, err);
 	if (rc) {
 		incise_view_free(view);
 		errno = -rc;
@@ -200,6 +206,7 @@ void incise_view_free(struct incise_view *view)
 		incise_draw_free(view->draw);
 	incise_overlay_free(view->overlay);
 	incise_injury_free(view->injury);
+	incise_incision_free(view->incision);
 	incise_canvas_free(view->canvas);
 	uv_map_free(view->map);
 	free(view->base);

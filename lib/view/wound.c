@@ -376,6 +376,7 @@ static void field_colour(const struct field_texel *tile, int x, int y, float tex
 /* A point of the line. */
 struct wound_point {
 	float px[2];
+	float mm[3]; /* on the surface */
 	float depth_mm;
 	float half_mm;	/* half-width at rest, if never opened */
 	float open_mm;	/* present opening */
@@ -389,7 +390,9 @@ struct wound_point {
 
 struct wound {
 	const struct uv_map *map;
-	int size; /* texels */
+	struct incise_scene_scalpel scalpel;
+	struct incise_incision *incision; /* or NULL */
+	int size;			  /* texels */
 	float texel_mm;
 	float lamp[2];		   /* unit, towards it, mm along rows and across */
 	struct field_texel *field; /* tile after tile */
@@ -524,11 +527,6 @@ static bool line_loose(const struct wound_point *p)
 /* A prick without length bleeds like this much of a cut. */
 #define PRICK_MM 0.3
 
-/* Half-widths of a scalpel's handle and a tube. */
-#define HANDLE_WIDE_MM 5.0
-#define HANDLE_THICK_MM 1.5
-#define TUBE_HALF_MM 3.5
-
 /* A vector of space in the surface, mm along the rows of the texture and across. */
 static void in_surface(const struct uv_map *map, const double px[2], const double v[3],
 		       double to[2])
@@ -541,7 +539,9 @@ static void in_surface(const struct uv_map *map, const double px[2], const doubl
 	to[1] = v3_unit(down, down, 0) ? v3_dot(v, down) : 0;
 }
 
-struct wound *wound_new(const struct uv_map *map, struct incise_error *err)
+struct wound *wound_new(const struct uv_map *map,
+			const struct incise_scene_scalpel *scalpel,
+			struct incise_incision *incision, struct incise_error *err)
 {
 	const double middle[2] = {map->size * 0.5, map->size * 0.5}, key[3] = UV_MAP_LAMP;
 	struct wound *wound = calloc(1, sizeof(*wound));
@@ -555,6 +555,8 @@ struct wound *wound_new(const struct uv_map *map, struct incise_error *err)
 	for (int i = 0; i < 2; i++)
 		wound->lamp[i] = (float)(lamp[i] / length);
 	wound->map = map;
+	wound->scalpel = *scalpel;
+	wound->incision = incision;
 	wound->size = map->size;
 	wound->texel_mm = 0.1f;
 	if (ground_metric(map, middle, &metric))
@@ -714,6 +716,8 @@ static void place(struct wound *wound, const struct blade *blade)
 	tip->metric = blade->metric;
 	tip->depth_mm = fmaxf(tip->depth_mm, (float)blade->depth_mm);
 	tip->half_mm = half_mm(tip->depth_mm);
+	for (int i = 0; i < 3; i++)
+		tip->mm[i] = (float)blade->point_mm[i];
 	v3_copy(wound->tip_mm, blade->point_mm);
 	wound->tip_ns = blade->t_ns;
 }
@@ -743,6 +747,8 @@ static void push_way(struct wound *wound, double since_mm, struct wound_stroke *
 		wound->tip.joined = true;
 		for (int k = 0; k < 2; k++)
 			wound->tip.px[k] = from.px[k] + t * (to.px[k] - from.px[k]);
+		for (int k = 0; k < 3; k++)
+			wound->tip.mm[k] = from.mm[k] + t * (to.mm[k] - from.mm[k]);
 		wound->tip.depth_mm = from.depth_mm + t * (to.depth_mm - from.depth_mm);
 		wound->tip.half_mm = half_mm(wound->tip.depth_mm);
 		wound->tip.arc_mm = from.arc_mm + t * (to.arc_mm - from.arc_mm);
@@ -808,17 +814,18 @@ static bool read_blade(const struct wound *wound, const struct incise_tick *tick
 static void insert(struct wound *wound, const struct incise_tick *tick)
 {
 	bool tube = tick->tool == INCISE_TOOL_TUBE;
-	const double side[3] = {0, 1, 0};
+	const struct incise_scene_scalpel *scalpel = &wound->scalpel;
 	double flat[3], across[2], length;
 
 	wound->inserted = v3_finite(tick->proxy_mm) && isfinite(tick->depth_mm) &&
 			  uv_map_px(wound->map, tick->proxy_mm, wound->tool_px);
 	if (!wound->inserted)
 		return;
-	wound->tool_wide_mm = tube ? TUBE_HALF_MM : HANDLE_WIDE_MM;
-	wound->tool_thick_mm = tube ? TUBE_HALF_MM : HANDLE_THICK_MM;
+	wound->tool_wide_mm = 0.5 * (tube ? scalpel->tube_mm : scalpel->handle_width_mm);
+	wound->tool_thick_mm =
+		0.5 * (tube ? scalpel->tube_mm : scalpel->handle_thickness_mm);
 	wound->tool_depth_mm = fmin(fmax(tick->depth_mm, 0), DEPTH_MAX_MM);
-	v3_rotate(flat, tick->quaternion, side);
+	v3_rotate(flat, tick->quaternion, scalpel->side);
 	in_surface(wound->map, wound->tool_px, flat, across);
 	length = hypot(across[0], across[1]);
 	/* A handle that lies on its flat side, or has no attitude, is as wide as it can be. */
@@ -836,6 +843,8 @@ bool wound_tick(struct wound *wound, const struct incise_tick *tick,
 	struct blade blade;
 
 	wound->inserted = false;
+	if (wound->incision)
+		incise_incision_tick(wound->incision, tick);
 	if (in && tick->phase == INCISE_PHASE_INSERTION)
 		insert(wound, tick);
 	if (in && tick->phase == INCISE_PHASE_CUTTING &&
@@ -848,13 +857,18 @@ bool wound_tick(struct wound *wound, const struct incise_tick *tick,
 
 /* A tool that is farther from the line is not in it. */
 #define BESIDE_MM 3.0
+/* A cut is a point's own within this distance of its line, and 30° of its direction: cosine. */
+#define OWN_MM 1.5
+#define OWN_ALONG 0.866
 /* Reach of the opening along the cut: half-widths, and mm more. */
 #define SHOULDER_HALVES 3.0
 #define SHOULDER_MM 2.0
 /* Length over which a slit opens from its corner. */
 #define CORNER_MM 9.0f
-/* Half of what is elastic of an opening: tissue.stretch_mm. */
-#define STRETCH_HALF_MM 1.0f
+/* Opening per length from the corner, which stays one. */
+#define CORNER 0.7f
+/* An insertion changes no opening farther away than a cut is long. */
+#define FAR_MM 70.0
 /* Part of the way per step: opened in 60 ms, closed to 2 % in 1 s. */
 #define OPENING 0.15f
 #define CLOSING 0.036f
@@ -907,6 +921,39 @@ static float required_mm(const struct wound *wound, uint64_t number, float end_m
 	return (float)(half * off * fmax(corner * (2 - corner), 0));
 }
 
+static double tool_off_mm(const struct wound *wound, const struct wound_point *p)
+{
+	return ground_length_mm(&p->metric, wound->tool_px[0] - p->px[0],
+				wound->tool_px[1] - p->px[1]);
+}
+
+/* The opening of a point's cut that stays, mm; 0: the point is on none. */
+static float stays_mm(const struct wound *wound, uint64_t number, float end_mm)
+{
+	const struct wound_point *p = line_point(wound, number), *other;
+	double mm[3] = {p->mm[0], p->mm[1], p->mm[2]}, way[3], open_mm = 0;
+	int cuts = wound->incision ? incise_incision_cuts(wound->incision) : 0;
+
+	other = p->joined && number > wound->first ? line_point(wound, number - 1)
+						   : line_point(wound, number + 1);
+	for (int i = 0; i < 3; i++)
+		way[i] = p->mm[i] - other->mm[i];
+	for (int i = 0; i < cuts; i++) {
+		const struct incise_cut *cut = incise_incision_cut(wound->incision, i);
+		double off[3], along_mm;
+
+		v3_sub(off, mm, cut->at_mm);
+		along_mm = v3_dot(off, cut->along);
+		if (fabs(v3_dot(off, cut->side)) > OWN_MM ||
+		    along_mm < cut->from_mm - OWN_MM || along_mm > cut->to_mm + OWN_MM ||
+		    fabs(v3_dot(way, cut->along)) < OWN_ALONG * v3_length(way))
+			continue;
+		open_mm = fmax(open_mm, cut->place[incise_cut_place(along_mm)].open_mm);
+	}
+	return least(0.5f * (float)open_mm,
+		     CORNER * fmaxf(least(p->arc_mm, end_mm - p->arc_mm), 0));
+}
+
 /* The stretches on both sides of a point are to be painted. */
 static void mark_point(struct wound *wound, uint64_t number)
 {
@@ -924,16 +971,19 @@ static void mark_point(struct wound *wound, uint64_t number)
 static void step_point(struct wound *wound, uint64_t number, float end_mm)
 {
 	struct wound_point *p = line_point(wound, number);
-	float to = fmaxf(required_mm(wound, number, end_mm) - p->half_mm, p->wider_mm);
-	float was = p->open_mm;
+	float to, was = p->open_mm;
 
+	if (wound->inserted && tool_off_mm(wound, p) < FAR_MM)
+		p->wider_mm =
+			fmaxf(p->wider_mm, stays_mm(wound, number, end_mm) - p->half_mm);
+	to = fmaxf(required_mm(wound, number, end_mm) - p->half_mm, p->wider_mm);
 	if (to == was)
 		return;
 	mark_point(wound, number);
 	p->open_mm += (to - was) * (to > was ? OPENING : CLOSING);
 	if (fabsf(to - p->open_mm) < AT_REST_MM)
 		p->open_mm = to;
-	p->wider_mm = fmaxf(p->wider_mm, p->open_mm - STRETCH_HALF_MM);
+
 	mark_point(wound, number);
 }
 

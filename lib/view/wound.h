@@ -17,8 +17,8 @@
  * match at their edges.) Colour is a function of the fields.
  *
  * Handle and tube open the cut where they are inserted: points move apart by up to half the tool's
- * extent across the cut, less with the distance along it; afterwards they close as far as tissue is
- * elastic, and the rest stays. Moving
+ * extent across the cut, less with the distance along it; afterwards they close to the opening that
+ * the incision, shared with the forces, says stays. Moving
  * stretches, and the tapering end behind the blade, are drawn over the fields at each painting.
  *
  * Memory: the fields, 8 bytes a texel, only where there are wounds; and the newest WOUND_POINTS
@@ -33,6 +33,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <incise/error.h>
+#include <incise/incision.h>
 #include <incise/plan.h>
 #include "canvas.h"
 #include "uv_map.h"
@@ -50,7 +51,13 @@ struct wound_stroke {
 
 struct wound;
 
-struct wound *wound_new(const struct uv_map *map, struct incise_error *err);
+/*
+ * map        must live longer
+ * incision   is fed with the ticks, and says how wide cuts stay open; NULL: they close
+ */
+struct wound *wound_new(const struct uv_map *map,
+			const struct incise_scene_scalpel *scalpel,
+			struct incise_incision *incision, struct incise_error *err);
 
 /* Returns whether a stretch of line was added, and which. */
 bool wound_tick(struct wound *wound, const struct incise_tick *tick,

@@ -262,7 +262,7 @@ static void test_instrument_is_where_its_pose_says(void **state)
 			assert_true(differs((int)px[0], (int)px[1]));
 	}
 	/* Its shadow around it makes nothing lighter. */
-	assert_int_equal(instrument_scalpel(120, &mesh), 0);
+	assert_int_equal(instrument_scalpel(&scalpel, &mesh), 0);
 	for (int i = 0; i < mesh.n_vertices; i++) {
 		double p[3], px[2];
 

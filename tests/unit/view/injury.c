@@ -16,6 +16,8 @@
 #define SIDE 128
 #define TEXELS (SIDE * SIDE * 4)
 
+static const struct incise_scene_scalpel tools = {{0, 0, 1}, {0, 1, 0}, 120, 10, 3, 7};
+
 struct scene {
 	struct incise_canvas *canvas;
 	struct incise_injury *injury;
@@ -30,7 +32,8 @@ static void scene_new(struct scene *s, const struct field *field)
 	s->canvas = incise_canvas_new(SIDE, s->base, NULL);
 	assert_non_null(s->canvas);
 	s->memory = allocated;
-	s->injury = incise_injury_new(&field->picture, field->map, s->canvas, NULL);
+	s->injury = incise_injury_new(&field->picture, &tools, NULL, field->map,
+				      s->canvas, NULL);
 	s->memory = allocated - s->memory;
 	assert_non_null(s->injury);
 }
@@ -339,7 +342,8 @@ static void test_refused(void **state)
 
 	field_new(&field, SIDE, 0);
 	canvas = incise_canvas_new(32, base, NULL);
-	assert_null(incise_injury_new(&field.picture, field.map, canvas, &err));
+	assert_null(
+		incise_injury_new(&field.picture, &tools, NULL, field.map, canvas, &err));
 	assert_int_equal(err.code, EINVAL);
 	incise_canvas_free(canvas);
 	incise_injury_free(NULL);

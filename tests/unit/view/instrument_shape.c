@@ -64,9 +64,11 @@ static void test_scalpel(void **state)
 	double low[3], high[3];
 
 	for (int i = 0; i < 4; i++) {
+		struct incise_scene_scalpel tool = scalpel;
 		double h = lengths[i];
 
-		assert_int_equal(instrument_scalpel(h, &mesh), 0);
+		tool.handle_mm = h;
+		assert_int_equal(instrument_scalpel(&tool, &mesh), 0);
 		check(&mesh, low, high);
 		/* From the tip to the handle's end; floats. */
 		assert_true(fabs(low[2]) < 1e-5 && fabs(high[2] - h) < 1e-3);

@@ -11,10 +11,14 @@
 #include <stdlib.h>
 #include "allocated.h"
 #include "ground.h"
+#include "../../../lib/tissue/incision.h"
 #include "../../../lib/view/wound.h"
 
 #define SIDE 512
 #define PI_2 (2 * M_PI)
+#define STRETCH_MM 2.0
+
+static const struct incise_scene_scalpel tools = {{0, 0, 1}, {0, 1, 0}, 120, 10, 3, 7};
 
 /* A curved way, mm from the middle: 40 mm long or so, at u = 0 … 1. */
 static void way(double u, double *x, double *y)
@@ -68,7 +72,7 @@ static void test_no_gap(void **state)
 
 	field_new(&field, SIDE, 0);
 	for (size_t c = 0; c < sizeof(cases) / sizeof(*cases); c++) {
-		struct wound *wound = wound_new(field.map, NULL);
+		struct wound *wound = wound_new(field.map, &tools, NULL, NULL);
 		double rate = cases[c].rate_hz, off = 0, x, y;
 		int n = (int)(cases[c].s * rate);
 		double sum;
@@ -114,8 +118,8 @@ static void test_union(void **state)
 	struct wound *wound, *both;
 
 	field_new(&field, SIDE, 0);
-	wound = wound_new(field.map, NULL);
-	both = wound_new(field.map, NULL);
+	wound = wound_new(field.map, &tools, NULL, NULL);
+	both = wound_new(field.map, &tools, NULL, NULL);
 	cut(wound, &field, 1, 1000, 4);
 	cut(both, &field, 1, 1000, 4);
 	cut(both, &field, 1, 1000, 1);
@@ -129,6 +133,7 @@ static void test_union(void **state)
 }
 
 struct painted {
+	struct incise_incision *incision;
 	struct wound *wound;
 	struct incise_canvas *canvas;
 	uint8_t *base;
@@ -136,18 +141,29 @@ struct painted {
 
 static void painted_new(struct painted *p, const struct field *field)
 {
+	const struct incise_incision_setup setup = {.cut_from_mm = 0.5,
+						    .stretch_mm = STRETCH_MM,
+						    .cuts_most = 8,
+						    .side = {0, 1, 0},
+						    .handle_width_mm = 10,
+						    .handle_thickness_mm = 3,
+						    .tube_mm = 7};
+
+	p->incision = incise_incision_make(&setup, NULL);
+	assert_non_null(p->incision);
 	p->base = calloc(SIDE * SIDE, 4);
 	p->canvas = incise_canvas_new(SIDE, p->base, NULL);
 	assert_non_null(p->canvas);
 	assert_int_equal(incise_canvas_add_layer(p->canvas), 0);
 	assert_int_equal(incise_canvas_add_layer(p->canvas), 1);
-	p->wound = wound_new(field->map, NULL);
+	p->wound = wound_new(field->map, &tools, p->incision, NULL);
 	assert_non_null(p->wound);
 }
 
 static void painted_free(struct painted *p)
 {
 	wound_free(p->wound);
+	incise_incision_free(p->incision);
 	incise_canvas_free(p->canvas);
 	free(p->base);
 }
@@ -208,8 +224,8 @@ static void test_opens_and_closes(void **state)
 	} cases[] = {{INCISE_TOOL_HANDLE, 0, 3},
 		     {INCISE_TOOL_HANDLE, M_PI_2, 10},
 		     {INCISE_TOOL_TUBE, 0, 7}};
-	/* Of opening; lips are drawn with a rough edge, on both sides. */
-	const double stretch_mm = 2, edge_mm = 0.2;
+	/* Lips are drawn with a rough edge, on both sides. */
+	const double edge_mm = 0.2;
 	struct field field;
 
 	field_new(&field, SIDE, 0);
@@ -229,10 +245,10 @@ static void test_opens_and_closes(void **state)
 		assert_true(open_mm(&p, &field, 3) > rest);
 		assert_true(open_mm(&p, &field, 14.5) < rest + close);
 		hold(&p, &field, &t, 0.1, cases[c].tool, 0, false, false);
-		assert_true(open_mm(&p, &field, 0) > fmax(wide - stretch_mm, rest));
+		assert_true(open_mm(&p, &field, 0) > fmax(wide - STRETCH_MM, rest));
 		hold(&p, &field, &t, 2.0, cases[c].tool, 0, false, false);
 		shut = open_mm(&p, &field, 0);
-		assert_true(fabs(shut - fmax(wide - stretch_mm, rest)) < close);
+		assert_true(fabs(shut - fmax(wide - STRETCH_MM, rest)) < close);
 		hold(&p, &field, &t, 1.0, cases[c].tool, 0, false, false);
 		assert_true(open_mm(&p, &field, 0) == shut);
 		painted_free(&p);
@@ -288,7 +304,7 @@ static void test_endless(void **state)
 	size_t memory;
 
 	field_new(&field, SIDE, 0);
-	wound = wound_new(field.map, NULL);
+	wound = wound_new(field.map, &tools, NULL, NULL);
 	memory = allocated;
 	cut(wound, &field, 1, 1000, 3);
 	for (int i = 0; i < 3 * WOUND_POINTS; i++) {
@@ -318,7 +334,7 @@ static void test_no_cut(void **state)
 	struct wound *wound;
 
 	field_new(&field, SIDE, 0);
-	wound = wound_new(field.map, NULL);
+	wound = wound_new(field.map, &tools, NULL, NULL);
 	for (int k = 0; k < 15; k++)
 		for (int i = 0; i < 4; i++) {
 			struct incise_tick tick = tick_at(
@@ -388,7 +404,7 @@ static void test_jumps(void **state)
 
 	field_new(&field, SIDE, 0);
 	for (int i = 0; i < 5; i++) {
-		struct wound *wound = wound_new(field.map, NULL);
+		struct wound *wound = wound_new(field.map, &tools, NULL, NULL);
 		struct incise_tick tick =
 			tick_at(&field, 1, INCISE_TOOL_BLADE, -20, 0, 3);
 		struct wound_stroke stroke;
