@@ -113,6 +113,7 @@ struct drops {
 #define LEAST_UNITS (int64_t)(0.03 / BLOOD_UNIT_UL)
 /* The shape of each drop is updated every so many steps, in turns. */
 #define SHOWN_EACH 3
+#define SHOWN_EACH_WET 6
 
 /* A hanging drop lies along its cut; in radii of a round one. */
 #define DROP_HANGS_ALONG 1.7
@@ -127,9 +128,10 @@ struct shape {
 	int from_px[2], to_px[2]; /* to_px is exclusive */
 };
 
-/* Visible changes: mm, and radii. */
+/* Visible changes: mm, and radii; those of a swelling of wet skin are so many times that. */
 #define SEEN_MM 0.04
 #define SEEN 0.03
+#define SEEN_WET 30
 /* 1 / sqrt(1 - FILM_ROUGH), rounded up. */
 #define ROUGHEST 1.2
 /* Part of the way that a shape changes per update. */
@@ -188,9 +190,9 @@ static void drops_mark(struct drops *drops, const struct drop *drop)
 					 shape.to_px[1] - 1);
 }
 
-static bool nearer(double *value, double to)
+static bool nearer(double *value, double to, double seen)
 {
-	if (fabs(*value - to) < SEEN)
+	if (fabs(*value - to) < seen)
 		return false;
 	*value += (to - *value) * TURNS_INTO;
 	return true;
@@ -208,20 +210,26 @@ static void drops_show(struct drops *drops, struct drop *drop,
 					drop->px[1] - drop->drawn_px[1]);
 	double fast = fmin(drop->speed_mm_s / 15, 1);
 	struct drop is = *drop;
+	/* Large changes of what is hardly seen are followed at once, small ones not at all. */
+	double blurs = drop->source < 0 ? 1 + (SEEN_WET - 1) * drop->wet * drop->wet : 1;
+	double seen = SEEN * fmin(blurs, 4);
 	bool other = false;
 
 	if (drop->source < 0) {
 		/* On wet skin it is a swelling of the film, not a bead. */
-		other = nearer(&is.before, 0.8 + 1.3 * drop->wet);
-		other = nearer(&is.behind, 0.9 + fmin(1.6 * fast + 2.8 * drop->wet,
-						      0.8 * drop->ran_mm / radius)) ||
+		other = nearer(&is.before, 0.8 + 1.3 * drop->wet, seen);
+		other = nearer(&is.behind,
+			       0.9 + fmin(1.6 * fast + 2.8 * drop->wet,
+					  0.8 * drop->ran_mm / radius),
+			       seen) ||
 			other;
-		other = nearer(&is.beside, 0.9 - 0.25 * fast) || other;
+		other = nearer(&is.beside, 0.9 - 0.25 * fast, seen) || other;
 		for (int i = 0; i < 2 && drop->speed_mm_s > 0; i++)
 			is.axis_px[i] = drop->heading[0] * ground->down_px[i] +
 					drop->heading[1] * ground->across_px[i];
 	}
-	if (!other && fabs(radius - drop->drawn_mm) < SEEN_MM && moved < SEEN_MM)
+	if (!other && fabs(radius - drop->drawn_mm) < SEEN_MM * fmin(blurs, 4) &&
+	    moved < SEEN_MM * blurs)
 		return;
 	drops_mark(drops, drop);
 	*drop = is;
@@ -445,8 +453,8 @@ static void step_drop(struct drops *drops, struct drop *drop)
 	}
 	if (drop->source < 0 && drop->units < LEAST_UNITS)
 		sink(drops, drop, radius, drop->units);
-	if (drop->units &&
-	    (drops->film->step + (uint64_t)(drop - drops->drop)) % SHOWN_EACH)
+	if (drop->units && (drops->film->step + (uint64_t)(drop - drops->drop)) %
+				   (drop->wet > 0.5 ? SHOWN_EACH_WET : SHOWN_EACH))
 		return;
 	if (drop->units)
 		drops_show(drops, drop, &ground);

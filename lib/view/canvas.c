@@ -163,6 +163,7 @@ static inline unsigned int times(unsigned int a, unsigned int b)
 	return (v + (v >> 8)) >> 8;
 }
 
+/* Over opaque texels; texels of 4 bytes are mostly clear, or mostly opaque. */
 static void blend(uint8_t *to, const uint8_t *over, int n)
 {
 	for (int i = 0; i < n; i++, to += 4, over += 4) {
@@ -171,7 +172,7 @@ static void blend(uint8_t *to, const uint8_t *over, int n)
 		if (clear == 255)
 			continue;
 		if (!clear) {
-			memcpy(to, over, 3);
+			memcpy(to, over, 4);
 			continue;
 		}
 		for (int c = 0; c < 3; c++) {
@@ -180,6 +181,19 @@ static void blend(uint8_t *to, const uint8_t *over, int n)
 			to[c] = v > 255 ? 255 : (uint8_t)v;
 		}
 	}
+}
+
+/* Whether a row of a layer is clear; from calloc(), or painted with nothing. */
+static bool is_clear(const uint8_t *row, int n)
+{
+	uint64_t any = 0, eight;
+
+	/* Two texels each: rectangles consist of tiles. */
+	for (int i = 0; i < n; i += 2) {
+		memcpy(&eight, row + 4 * i, sizeof(eight));
+		any |= eight;
+	}
+	return !any;
 }
 
 static void compose_rect(struct incise_canvas *canvas, const struct incise_rect *rect)
@@ -192,7 +206,8 @@ static void compose_rect(struct incise_canvas *canvas, const struct incise_rect 
 		for (int i = 0; i < rect->w; i++)
 			to[4 * i + 3] = 255;
 		for (int i = 0; i < canvas->n_layers; i++)
-			blend(to, canvas->layer[i] + at, rect->w);
+			if (!is_clear(canvas->layer[i] + at, rect->w))
+				blend(to, canvas->layer[i] + at, rect->w);
 	}
 }
 

@@ -131,7 +131,7 @@ static void raise_texel(struct field_texel *texel, const struct field_stretch *s
 			float v)
 {
 	float t = (u * s->along[0] + v * s->along[1]) * s->inverse_mm2;
-	float half, depth, inside, out, off2;
+	float half, depth, inside, off, off2, red;
 
 	t = t > 0 ? t < 1 ? t : 1 : 0;
 	u -= t * s->along[0];
@@ -141,7 +141,8 @@ static void raise_texel(struct field_texel *texel, const struct field_stretch *s
 		return;
 	half = s->half_mm + t * s->half_more_mm;
 	depth = s->depth_mm + t * s->depth_more_mm;
-	inside = half - sqrtf(off2);
+	off = sqrtf(off2);
+	inside = half - off;
 	if (inside > FIELD_INSIDE_MIN_MM &&
 	    raise_to(&texel->inside,
 		     (least(inside, FIELD_INSIDE_MAX_MM) + FIELD_BIAS_MM) *
@@ -150,17 +151,20 @@ static void raise_texel(struct field_texel *texel, const struct field_stretch *s
 		float lit = u * s->lamp[0] + v * s->lamp[1];
 
 		texel->half = (uint8_t)(least(half, FIELD_INSIDE_MAX_MM) * HALF_STEPS_MM);
-		texel->lean = (int8_t)(-127 * lit / (sqrtf(off2) + 0.05f));
+		texel->lean = (int8_t)(-127 * lit / (off + 0.05f));
 	}
+	red = least(depth * (1 / 1.5f), 1) * 65535;
 	if (inside > 0) {
-		float off = 1 - inside / half; /* 0 in the middle, 1 at the lips */
-
+		off /= half; /* 0 in the middle, 1 at the lips */
 		raise_to(&texel->depth, least(depth, FIELD_DEPTH_MAX_MM) *
 						(1 - off * off) * FIELD_STEPS_MM);
+		raise_to(&texel->halo, red);
+	} else {
+		float out = 1 + inside / halo_mm(depth);
+
+		if (out > 0)
+			raise_to(&texel->halo, out * out * red);
 	}
-	out = 1 + least(inside, 0) / halo_mm(depth);
-	if (out > 0)
-		raise_to(&texel->halo, out * out * least(depth / 1.5f, 1) * 65535);
 }
 
 /* The texels of a row, at left … right, where low <= from + step * i <= high. */
@@ -987,21 +991,38 @@ static void step_point(struct wound *wound, uint64_t number, float end_mm)
 	mark_point(wound, number);
 }
 
-/* Longest stretch that is drawn as one, in parts of its opening and mm; largest turn, tangent. */
+/* Longest stretch that is drawn as one, in parts of its opening and mm; points aside of it, mm. */
 #define TOGETHER 0.6f
 #define TOGETHER_MM 0.75f
-#define STRAIGHT 0.1f
+#define STRAIGHT_MM 0.12f
 
-/* Whether the line is straight at a point. */
-static bool straight(const struct wound *wound, uint64_t number)
+/* From one point of the line to another, mm along rows and across. */
+static void way(const struct wound *wound, uint64_t from, uint64_t to, float mm[2])
 {
-	const float *a = line_point(wound, number - 1)->px;
-	const float *b = line_point(wound, number)->px;
-	const float *c = line_point(wound, number + 1)->px;
-	float x = b[0] - a[0], y = b[1] - a[1], u = c[0] - b[0], v = c[1] - b[1];
-	float along = x * u + y * v, across = x * v - y * u;
+	const struct wound_point *a = line_point(wound, from), *b = line_point(wound, to);
+	float x = b->px[0] - a->px[0], y = b->px[1] - a->px[1];
 
-	return along > 0 && fabsf(across) < STRAIGHT * along;
+	mm[0] = b->metric.a * x + b->metric.b * y;
+	mm[1] = b->metric.c * y;
+}
+
+/* Whether the line is straight from one point to another. */
+static bool straight(const struct wound *wound, uint64_t from, uint64_t to)
+{
+	float all[2], length;
+
+	way(wound, from, to, all);
+	length = sqrtf(all[0] * all[0] + all[1] * all[1]);
+	for (uint64_t i = from + 1; i < to; i++) {
+		float part[2], along, aside;
+
+		way(wound, from, i, part);
+		along = part[0] * all[0] + part[1] * all[1];
+		aside = part[0] * all[1] - part[1] * all[0];
+		if (!(along > 0 && fabsf(aside) < STRAIGHT_MM * length))
+			return false;
+	}
+	return true;
 }
 
 /*
@@ -1015,70 +1036,95 @@ static uint64_t together(const struct wound *wound, uint64_t from)
 
 	if (!before || !line_point(wound, from)->joined)
 		return to;
-	while (to + 1 < wound->settled && straight(wound, to)) {
-		const struct wound_point *p = line_point(wound, to), *next = p;
-		float open_mm = fmaxf(p->open_mm, p->wider_mm);
+	for (; to + 1 < wound->settled; to++) {
+		const struct wound_point *p = line_point(wound, to);
+		const struct wound_point *next = line_point(wound, to + 1);
 
-		next = line_point(wound, to + 1);
 		if (!next->joined || !line_loose(p) || !line_loose(next) ||
 		    next->arc_mm - before->arc_mm >
-			    fmaxf(TOGETHER * open_mm, TOGETHER_MM))
+			    fmaxf(TOGETHER * fmaxf(p->open_mm, p->wider_mm),
+				  TOGETHER_MM) ||
+		    !straight(wound, from - 1, to + 1))
 			break;
-		to++;
 	}
 	return to;
+}
+
+/* The texels of a clipped stretch: those of a rectangle around it, if they are fewer. */
+static void bound_stretch(struct field_stretch *s)
+{
+	const float along_mm = 1 / sqrtf(s->inverse_mm2), reach = s->reach_mm / along_mm;
+	const float ends[2] = {most(s->first, -reach), least(s->last, 1 + reach)};
+	float low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+
+	for (int i = 0; i < 4; i++) {
+		float t = ends[i / 2], aside = i % 2 ? reach : -reach;
+		float u = t * s->along[0] - aside * s->along[1];
+		float y = (t * s->along[1] + aside * s->along[0]) / s->metric.c;
+		float px[2] = {s->x + (u - s->metric.b * y) / s->metric.a, s->y + y};
+
+		for (int k = 0; k < 2; k++) {
+			low[k] = least(low[k], px[k]);
+			high[k] = most(high[k], px[k]);
+		}
+	}
+	for (int k = 0; k < 2; k++) {
+		s->from_px[k] = (int)most((float)s->from_px[k], floorf(low[k]) - 1);
+		s->to_px[k] = (int)least((float)s->to_px[k], ceilf(high[k]) + 1);
+	}
 }
 
 /* Clipped stretches overlap by so much, mm. */
 #define OVERLAP_MM 0.05f
 
+/* A walk along loose lips: points of the last stretch, and the number to go on from. */
+struct loose_walk {
+	uint64_t from, to, next;
+};
+
 /*
  * A stretch ends where the next loose one begins, which does its own beginning, round the joint as
  * far as the line turns there: a wide cut is not painted over and over.
  */
-static void clip_stretch(const struct wound *wound, uint64_t first, uint64_t last,
-			 struct field_stretch *s)
+static void clip_stretch(const struct wound *wound, const struct loose_walk *before,
+			 const struct loose_walk *walk, struct field_stretch *s)
 {
-	const struct wound_point *p = line_point(wound, last), *before, *start;
-	float x, y, u, v, length, turn, along_mm;
+	float last[2], length, turn, along_mm = 1 / sqrtf(s->inverse_mm2);
 
-	if (last + 1 < wound->settled && line_point(wound, last + 1)->joined &&
-	    line_loose(p))
+	if (walk->to + 1 < wound->settled && line_point(wound, walk->to + 1)->joined &&
+	    line_loose(line_point(wound, walk->to)))
 		s->last = 1;
-	if (!(s->inverse_mm2 > 0) || first < wound->first + 2)
+	/* Before it there is none that was drawn. */
+	if (before->to != walk->from || before->from == before->to)
 		return;
-	start = line_point(wound, first - 1);
-	before = line_point(wound, first - 2);
-	/* Before it there is another one, that is drawn. */
-	if (!line_point(wound, first)->joined || !start->joined || !line_loose(start))
+	way(wound, before->from, before->to, last);
+	length = sqrtf(last[0] * last[0] + last[1] * last[1]);
+	if (!(last[0] * s->along[0] + last[1] * s->along[1] > 0.5f * length * along_mm))
 		return;
-	x = start->px[0] - before->px[0];
-	y = start->px[1] - before->px[1];
-	u = s->metric.a * x + s->metric.b * y;
-	v = s->metric.c * y;
-	length = sqrtf(u * u + v * v);
-	along_mm = 1 / sqrtf(s->inverse_mm2);
-	if (!(u * s->along[0] + v * s->along[1] > 0.5f * length * along_mm))
-		return;
-	turn = fabsf(u * s->along[1] - v * s->along[0]) / (length * along_mm);
+	turn = fabsf(last[0] * s->along[1] - last[1] * s->along[0]) / (length * along_mm);
 	s->first = -(turn * s->reach_mm + OVERLAP_MM) / along_mm;
 }
 
-/* The next stretch of loose lips that ends at @number or later, below @wound->settled. */
-static bool loose_stretch(const struct wound *wound, uint64_t *number,
+/* The next stretch of loose lips. */
+static bool loose_stretch(const struct wound *wound, struct loose_walk *walk,
 			  struct field_stretch *stretch)
 {
-	for (; *number < wound->settled; ++*number) {
-		const struct wound_point *p = line_point(wound, *number);
-		const struct wound_point *before = line_before(wound, *number);
-		uint64_t first = *number;
+	for (; walk->next < wound->settled; walk->next++) {
+		const struct loose_walk last = *walk;
+		const struct wound_point *p = line_point(wound, last.next);
+		const struct wound_point *before = line_before(wound, last.next);
 
 		if (!line_loose(p) && !(p->joined && before && line_loose(before)))
 			continue;
-		*number = together(wound, *number);
-		if (!line_stretch(wound, before, line_point(wound, *number), 0, stretch))
+		walk->to = walk->next = together(wound, last.next);
+		walk->from = p->joined && before ? last.next - 1 : walk->to;
+		if (!line_stretch(wound, before, line_point(wound, walk->to), 0, stretch))
 			continue;
-		clip_stretch(wound, first, *number, stretch);
+		if (stretch->inverse_mm2 > 0) {
+			clip_stretch(wound, &last, walk, stretch);
+			bound_stretch(stretch);
+		}
+		walk->next++;
 		return true;
 	}
 	return false;
@@ -1087,9 +1133,10 @@ static bool loose_stretch(const struct wound *wound, uint64_t *number,
 /* Lips that are at rest are put into the fields. */
 static void keep_open(struct wound *wound)
 {
+	struct loose_walk walk = {UINT64_MAX, UINT64_MAX, wound->first};
 	struct field_stretch stretch;
 
-	for (uint64_t i = wound->first; loose_stretch(wound, &i, &stretch); i++)
+	while (loose_stretch(wound, &walk, &stretch))
 		line_raise(wound, &stretch);
 	for (uint64_t i = wound->first; i < wound->settled; i++) {
 		struct wound_point *p = line_point(wound, i);
@@ -1140,10 +1187,10 @@ static void paint_tile(struct wound *wound, const struct field_stretch *over, in
 /* Loose lips, and the stretches behind the blade. Returns their number. */
 static int laid_over(const struct wound *wound, struct field_stretch *over)
 {
+	struct loose_walk walk = {UINT64_MAX, UINT64_MAX, wound->first};
 	int n = 0;
 
-	for (uint64_t i = wound->first;
-	     wound->loose && loose_stretch(wound, &i, &over[n]); i++)
+	while (wound->loose && loose_stretch(wound, &walk, &over[n]))
 		n++;
 	for (uint64_t i = wound->settled; i < wound->end; i++)
 		n += line_stretch(wound, line_before(wound, i), line_point(wound, i),

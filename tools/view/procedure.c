@@ -30,8 +30,9 @@ struct key {
  * "Cricothyrotomy", has 3 cm; WikEM, "Surgical airway", 3.5 cm), then horizontal through the
  * membrane, 15 mm, which a handle of 10 mm fits into.
  */
-#define SKIN_MM 15.0	/* half of the vertical incision */
-#define MEMBRANE_MM 7.5 /* half of the horizontal one */
+#define SKIN_MM 15.0 /* half of the vertical incision */
+#define MEMBRANE_MM \
+	6.2 /* half of the horizontal one, 9 mm below the skin of a round neck */
 
 static const struct key keys[] = {
 	{0.0, {-SKIN_MM, 0, 25}, 0, 0, BLADE},
@@ -40,8 +41,8 @@ static const struct key keys[] = {
 	{2.6, {SKIN_MM, 0, -4}, 0, 0, BLADE},
 	{2.9, {SKIN_MM + 1, 0, 4}, 0, 0, BLADE},
 	{3.6, {0, -MEMBRANE_MM, 6}, 0, TURNED, BLADE},
-	{4.1, {0, -MEMBRANE_MM, -9}, 0, TURNED, BLADE},
-	{5.2, {0, MEMBRANE_MM, -9}, 0, TURNED, BLADE},
+	{4.1, {0, -MEMBRANE_MM, -9.4}, 0, TURNED, BLADE},
+	{5.2, {0, MEMBRANE_MM, -9.4}, 0, TURNED, BLADE},
 	{5.5, {0, MEMBRANE_MM + 1, 5}, 0, TURNED, BLADE},
 	{6.2, {45, -10, 40}, 0, 0, BLADE},
 	{9.0, {45, -10, 40}, 0, 0, BLADE},
