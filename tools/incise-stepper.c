@@ -22,6 +22,7 @@ struct job {
 	bool follow, by, unhomed, hold, json;
 	double seconds; /* 0: until Ctrl-C */
 	int repeat;	/* 0: not given */
+	int axis;	/* from 1 on */
 };
 
 struct subcommand {
@@ -36,6 +37,8 @@ struct subcommand {
 
 static const struct cli_option options[] = {
 	{CLI_RIG_OPTION(struct job, rig)},
+	{0, "axis", "N", "which of the rig's actuators, 1 to 3 (default: 1)",
+	 CLI_INTEGER(struct job, axis, 1, INCISE_RIG_AXES_MAX)},
 	{'f', "follow", NULL, "status: a line at each change, until Ctrl-C",
 	 CLI_FLAG(struct job, follow)},
 	{0, "by", NULL, "move: by MM from where it stands, not to MM",
@@ -531,10 +534,11 @@ static void parse(struct job *job, int argc, char **argv)
 int main(int argc, char **argv)
 {
 	struct stepper_drive drive;
-	struct job job = {0};
+	struct job job = {.axis = 1};
 
 	parse(&job, argc, argv);
-	stepper_drive_open(&drive, job.rig, job.subcommand->watch ? INCISE_RIG_WATCH : 0,
+	stepper_drive_open(&drive, job.rig, job.axis,
+			   job.subcommand->watch ? INCISE_RIG_WATCH : 0,
 			   job.subcommand->name);
 	job.subcommand->run(&job, &drive);
 	/* Status prints all counters; a motion only those of trouble on the way. */

@@ -45,6 +45,8 @@ static const struct number numbers[] = {
 	NUMBER("home_mm_s", 0.001, 10000, 1, home_mm_s, DOUBLE),
 	NUMBER("home_mm", -1000, 1000, 1, home_mm, DOUBLE),
 	NUMBER("origin_mm", -1e6, 1e6, 1, origin_mm, DOUBLE),
+	NUMBER("rest_mm", 0, 1000, 1, rest_mm, DOUBLE),
+	NUMBER("late_ms", 0, 1000, 1e-3, late_s, DOUBLE),
 };
 
 static int read_numbers(void *to, const struct number *numbers, size_t n,
@@ -417,6 +419,13 @@ static int check(const struct incise_actuator *actuator, const config_setting_t 
 			"the travel below 0 to its end, found %g; correct it",
 			path, line_of(group, "home_mm"), -actuator->travel_mm / 4,
 			actuator->travel_mm, actuator->home_mm);
+	if (actuator->rest_mm > actuator->travel_mm)
+		return incise_error_set(
+			err, EINVAL,
+			"%.200s:%d: actuator.rest_mm: expected at most travel_mm, %g, found "
+			"%g; correct it",
+			path, line_of(group, "rest_mm"), actuator->travel_mm,
+			actuator->rest_mm);
 	return 0;
 }
 
@@ -442,6 +451,9 @@ int incise_actuator_read(struct incise_actuator *actuator, const config_setting_
 					   "home_mm_s",
 					   "home_mm",
 					   "origin_mm",
+					   "rest_mm",
+					   "late_ms",
+					   "direction",
 					   "invert",
 					   "lines",
 					   "can",
@@ -472,6 +484,9 @@ int incise_actuator_read(struct incise_actuator *actuator, const config_setting_
 	if (!rc)
 		rc = incise_conf_integer(group, path, "microsteps", 1, 1024,
 					 &actuator->microsteps, err);
+	if (!rc)
+		rc = incise_conf_direction(group, path, "direction", actuator->direction,
+					   err);
 	if (!rc)
 		rc = incise_conf_bool(group, path, "invert", &actuator->invert, err);
 	if (!rc)

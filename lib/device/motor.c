@@ -308,6 +308,8 @@ static void motor_info(const struct incise_stepper *stepper,
 		.can_home = motor->lines &
 			    (INCISE_STEPPER_LINE_HOME | INCISE_STEPPER_LINE_LIMIT_MIN),
 		.origin_mm = actuator->origin_mm,
+		.rest_mm = actuator->rest_mm,
+		.late_s = actuator->late_s,
 		.inputs = motor->lines & ((1U << INCISE_STEPPER_INPUTS) - 1),
 	};
 	snprintf(info->name, sizeof(info->name), "%s", motor->name);
@@ -391,6 +393,7 @@ void incise_motor_config(const struct incise_actuator *actuator, unsigned int in
 		.late_max = LATE_MAX,
 		.jerk = limits.jerk,
 		.position_max = limits.position_max,
+		.safe_position = incise_actuator_steps(actuator, actuator->rest_mm),
 		.deadman_ns = (__u64)llround(actuator->deadman_s * INCISE_NS_PER_S),
 		.high_ns = actuator->high_ns,
 		.low_ns = actuator->low_ns,

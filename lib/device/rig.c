@@ -16,21 +16,23 @@
 
 struct incise_rig {
 	char *spec;
-	struct incise_loaded loaded[N_KINDS]; /* modules of real devices */
+	struct incise_loaded loaded[N_SLOTS]; /* modules of real devices */
 	struct incise_clock *clock;
 	struct incise_sim *sim;
 	struct incise_tracker *tracker;
 	struct incise_force *force;
 	struct incise_camera *camera;
-	struct incise_stepper *stepper;
+	struct incise_stepper *stepper[INCISE_RIG_AXES_MAX];
+	double direction[INCISE_RIG_AXES_MAX][3];
+	int n_axes; /* that are open */
 	double point_mm[3], normal[3];
 	struct incise_vision_setup vision;
 	bool has_vision;
 };
 
-static void *rig_open_sim(struct incise_rig *rig, int kind)
+static void *rig_open_sim(struct incise_rig *rig, int slot)
 {
-	switch (kind) {
+	switch (slot) {
 	case KIND_TRACKER:
 		return rig->tracker = incise_sim_tracker_new(rig->sim);
 	case KIND_FORCE:
@@ -38,31 +40,48 @@ static void *rig_open_sim(struct incise_rig *rig, int kind)
 	case KIND_CAMERA:
 		return rig->camera = incise_sim_camera_new(rig->sim);
 	default:
-		return rig->stepper = incise_sim_stepper_new(rig->sim);
+		rig->stepper[rig->n_axes] =
+			incise_sim_stepper_new(rig->sim, slot - KIND_STEPPER);
+		return rig->stepper[rig->n_axes] ? rig->stepper[rig->n_axes++] : NULL;
 	}
 }
 
-static int rig_open_real(struct incise_rig *rig, const struct incise_rig_plan *plan,
-			 int kind, struct incise_error *err)
+/* Those opened before by the same backend; how many. */
+static int siblings(const struct incise_rig *rig, int slot, struct incise_stepper **to)
 {
-	const struct rig_real *real = &plan->real[kind];
+	int n = 0;
+
+	for (int i = KIND_STEPPER; i < slot; i++)
+		if (rig->loaded[i].backend == rig->loaded[slot].backend)
+			to[n++] = rig->stepper[i - KIND_STEPPER];
+	return n;
+}
+
+static int rig_open_real(struct incise_rig *rig, const struct incise_rig_plan *plan,
+			 int slot, struct incise_error *err)
+{
+	int kind = slot_kind(slot), axis = kind == KIND_STEPPER ? slot - kind : 0;
+	struct incise_stepper *others[INCISE_RIG_AXES_MAX];
+	const struct rig_real *real = &plan->real[slot];
 	struct incise_backend_request request = {
 		.arguments = real->arguments,
 		.where = real->where,
 		.clock = rig->clock,
 		.watch = plan->watch,
-		.actuator = &plan->actuator,
+		.actuator = &plan->actuator[axis],
 		.tracker = &plan->tracker,
 		.force = &plan->force,
 		.camera = &plan->camera,
+		.siblings = others,
 	};
 	void *device;
-	int rc = incise_backend_find(&rig->loaded[kind], incise_kind_name[kind],
+	int rc = incise_backend_find(&rig->loaded[slot], incise_kind_name[kind],
 				     real->name, real->where, err);
 
 	if (rc)
 		return rc;
-	device = rig->loaded[kind].backend->open(&request, err);
+	request.n_siblings = siblings(rig, slot, others);
+	device = rig->loaded[slot].backend->open(&request, err);
 	if (!device)
 		return errno ? -errno : -EIO;
 	if (kind == KIND_TRACKER)
@@ -72,7 +91,7 @@ static int rig_open_real(struct incise_rig *rig, const struct incise_rig_plan *p
 	else if (kind == KIND_CAMERA)
 		rig->camera = device;
 	else
-		rig->stepper = device;
+		rig->stepper[rig->n_axes++] = device;
 	return 0;
 }
 
@@ -81,12 +100,12 @@ static int rig_devices(struct incise_rig *rig, const struct incise_rig_plan *pla
 {
 	int rc = 0;
 
-	for (int kind = 0; kind < N_KINDS && !rc; kind++) {
-		if (!(plan->devices & kind_bit(kind)))
+	for (int slot = 0; slot < KIND_STEPPER + plan->n_axes && !rc; slot++) {
+		if (!(plan->devices & kind_bit(slot_kind(slot))))
 			continue;
-		if (plan->real[kind].name)
-			rc = rig_open_real(rig, plan, kind, err);
-		else if (!rig_open_sim(rig, kind))
+		if (plan->real[slot].name)
+			rc = rig_open_real(rig, plan, slot, err);
+		else if (!rig_open_sim(rig, slot))
 			rc = incise_error_set(err, ENOMEM, "%.200s: %s; free some memory",
 					      rig->spec, strerror(ENOMEM));
 	}
@@ -103,6 +122,7 @@ static struct incise_rig *rig_new(const struct incise_rig_plan *plan, const char
 		goto no_memory;
 	memcpy(rig->point_mm, plan->point_mm, sizeof(rig->point_mm));
 	memcpy(rig->normal, plan->normal, sizeof(rig->normal));
+	memcpy(rig->direction, plan->direction, sizeof(rig->direction));
 	rig->vision = plan->vision;
 	rig->has_vision = plan->has_vision;
 	rig->spec = strdup(spec);
@@ -161,10 +181,10 @@ void incise_rig_close(struct incise_rig *rig)
 		rig->force->ops->close(rig->force);
 	if (rig->camera)
 		rig->camera->ops->close(rig->camera);
-	if (rig->stepper)
-		rig->stepper->ops->close(rig->stepper);
-	for (int kind = 0; kind < N_KINDS; kind++)
-		incise_backend_unload(&rig->loaded[kind]);
+	for (int i = 0; i < rig->n_axes; i++)
+		rig->stepper[i]->ops->close(rig->stepper[i]);
+	for (int slot = 0; slot < N_SLOTS; slot++)
+		incise_backend_unload(&rig->loaded[slot]);
 	incise_sim_free(rig->sim);
 	incise_clock_free(rig->clock);
 	free(rig->spec);
@@ -198,7 +218,16 @@ struct incise_camera *incise_rig_camera(struct incise_rig *rig)
 
 struct incise_stepper *incise_rig_stepper(struct incise_rig *rig)
 {
-	return rig->stepper;
+	return rig->stepper[0];
+}
+
+struct incise_stepper *incise_rig_axis(struct incise_rig *rig, int i, double direction[3])
+{
+	if (i < 0 || i >= rig->n_axes)
+		return NULL;
+	if (direction)
+		memcpy(direction, rig->direction[i], sizeof(rig->direction[i]));
+	return rig->stepper[i];
 }
 
 struct incise_sim *incise_rig_sim(struct incise_rig *rig)

@@ -13,7 +13,9 @@
 #include "../base/conf.h"
 #include "../sim/sim.h"
 #include "../sim/surgeon.h"
+#include "../base/vector.h"
 #include "actuator.h"
+#include "axes.h"
 #include "rig_plan.h"
 
 /* --- groups tracker_setup, force_setup, camera_setup and vision --- */
@@ -298,19 +300,19 @@ const char *const incise_kind_name[N_KINDS] = {"tracker", "force", "camera", "st
 /* --- devices, clock and the group sim --- */
 
 /* A real device needs more than its string. */
-static int plan_real(struct incise_rig_plan *plan, int kind, const char *path, int line,
-		     const char *device, size_t length, struct incise_error *err)
+static int plan_real(struct incise_rig_plan *plan, int slot, const char *path, int line,
+		     const char *name, const char *device, size_t length,
+		     struct incise_error *err)
 {
-	struct rig_real *real = &plan->real[kind];
+	struct rig_real *real = &plan->real[slot];
 
-	snprintf(real->where, sizeof(real->where), "%.200s:%d: %s", path, line,
-		 incise_kind_name[kind]);
+	snprintf(real->where, sizeof(real->where), "%.200s:%d: %.20s", path, line, name);
 	if (plan->simulated)
 		return incise_error_set(err, EINVAL,
 					"%s: only the virtual rig can follow a simulated "
 					"clock; write clock = \"real\"",
 					real->where);
-	if (kind == KIND_STEPPER && !plan->has_actuator)
+	if (slot == KIND_STEPPER && !plan->n_actuators)
 		return incise_error_set(
 			err, EINVAL,
 			"%s: \"%.40s\" needs the group actuator; add actuator = { "
@@ -324,30 +326,21 @@ static int plan_real(struct incise_rig_plan *plan, int kind, const char *path, i
 	return 0;
 }
 
+static bool is_virtual(const char *device)
+{
+	return !strcmp(device, SIM_BACKEND ":");
+}
+
 /*
  * A device's string. Only a device that will be opened must have a backend here: one
  * rig.conf may serve machines with different modules.
  */
-static int plan_device(struct incise_rig_plan *plan, int kind, bool wanted,
-		       const config_setting_t *root, const char *path,
+static int plan_string(struct incise_rig_plan *plan, int slot, bool wanted, int line,
+		       const char *name, const char *device, const char *path,
 		       struct incise_error *err)
 {
-	const char *name = incise_kind_name[kind], *device = NULL;
-	size_t length;
-	int rc, line;
+	size_t length = strcspn(device, ":");
 
-	rc = incise_conf_string(root, path, name, &device, err);
-	if (rc)
-		return rc;
-	if (!device && wanted)
-		return incise_error_set(err, ENODEV,
-					"%.200s: %s: not named, but needed; add `%s = "
-					"\"" SIM_BACKEND ":\";` or another backend",
-					path, name, name);
-	if (!device)
-		return 0;
-	line = config_setting_source_line(config_setting_get_member(root, name));
-	length = strcspn(device, ":");
 	if (!device[length])
 		return incise_error_set(
 			err, EINVAL,
@@ -355,7 +348,8 @@ static int plan_device(struct incise_rig_plan *plan, int kind, bool wanted,
 			"\"" SIM_BACKEND ":\", found \"%.40s\"; correct it",
 			path, line, name, device);
 	if (length != strlen(SIM_BACKEND) || strncmp(device, SIM_BACKEND, length))
-		return wanted ? plan_real(plan, kind, path, line, device, length, err)
+		return wanted ? plan_real(plan, slot, path, line, name, device, length,
+					  err)
 			      : 0;
 	plan->sim = true;
 	if (device[length + 1])
@@ -366,6 +360,191 @@ static int plan_device(struct incise_rig_plan *plan, int kind, bool wanted,
 			"the virtual rig belong in the group `sim`",
 			path, line, name, device);
 	return 0;
+}
+
+static int plan_device(struct incise_rig_plan *plan, int kind, bool wanted,
+		       const config_setting_t *root, const char *path,
+		       struct incise_error *err)
+{
+	const char *name = incise_kind_name[kind], *device = NULL;
+	const config_setting_t *setting = config_setting_get_member(root, name);
+	int rc = incise_conf_string(root, path, name, &device, err);
+
+	if (rc)
+		return rc;
+	if (!device && wanted)
+		return incise_error_set(err, ENODEV,
+					"%.200s: %s: not named, but needed; add `%s = "
+					"\"" SIM_BACKEND ":\";` or another backend",
+					path, name, name);
+	if (!device)
+		return 0;
+	return plan_string(plan, kind, wanted, config_setting_source_line(setting), name,
+			   device, path, err);
+}
+
+/* --- one to three actuators: stepper = "…", or [ "…", "…" ], and as many groups --- */
+
+static int read_actuators(struct incise_rig_plan *plan, const config_setting_t *root,
+			  const char *path, struct incise_error *err)
+{
+	const config_setting_t *all = config_setting_get_member(root, "actuator");
+	int n = all && config_setting_is_list(all) ? config_setting_length(all) : !!all;
+	int rc = 0;
+
+	if (all && (n < 1 || n > INCISE_RIG_AXES_MAX))
+		return incise_error_set(
+			err, EINVAL,
+			"%.200s:%d: actuator: expected a group { key = value; }, or 1 to %d "
+			"of them in ( ), one for each stepper, found %d; correct it",
+			path, config_setting_source_line(all), INCISE_RIG_AXES_MAX, n);
+	for (int i = 0; i < n && !rc; i++) {
+		const config_setting_t *one = config_setting_is_list(all)
+						      ? config_setting_get_elem(all, i)
+						      : all;
+
+		if (one != all && !config_setting_is_group(one))
+			return incise_error_set(
+				err, EINVAL,
+				"%.200s:%d: actuator: expected groups { key = value; } in "
+				"the list; correct it",
+				path, config_setting_source_line(one));
+		rc = incise_actuator_read(&plan->actuator[i], one, path, err);
+	}
+	plan->n_actuators = n;
+	return rc;
+}
+
+/* In which each actuator pushes: by its group, by default out of the surface. */
+static void set_directions(struct incise_rig_plan *plan)
+{
+	for (int i = 0; i < plan->n_axes; i++) {
+		const double *own = plan->actuator[i].direction;
+
+		v3_copy(plan->direction[i], v3_length(own) > 0 ? own : plan->normal);
+	}
+}
+
+/*
+ * Actuators closer to each other's directions would push against each other with more than
+ * twice the force that is felt: 1 / sin 30° = 2.
+ */
+#define APART_DEG 30
+#define DEG (M_PI / 180)
+#define ROUNDING 1e-9 /* of unit vectors, so that 30 degrees are enough */
+
+static int check_pair(const struct incise_rig_plan *plan, int i, int k, const char *where,
+		      struct incise_error *err)
+{
+	double across[3], apart_deg;
+
+	v3_cross(across, plan->direction[i], plan->direction[k]);
+	apart_deg = atan2(v3_length(across),
+			  fabs(v3_dot(plan->direction[i], plan->direction[k]))) /
+		    DEG;
+	if (apart_deg >= APART_DEG - ROUNDING)
+		return 0;
+	return incise_error_set(
+		err, EINVAL,
+		"%s: the directions of actuators %d and %d lie within %.3g degrees of one "
+		"line: expected %d or more; give each actuator a direction = [x, y, z] of "
+		"its own",
+		where, i + 1, k + 1, apart_deg, APART_DEG);
+}
+
+static int check_directions(const struct incise_rig_plan *plan, const char *where,
+			    struct incise_error *err)
+{
+	double dual[INCISE_RIG_AXES_MAX][3], apart_deg;
+
+	for (int i = 0; i < plan->n_axes; i++)
+		for (int k = i + 1; k < plan->n_axes; k++)
+			if (check_pair(plan, i, k, where, err))
+				return -EINVAL;
+	incise_axes_dual(plan->n_axes, plan->direction, dual);
+	for (int i = 0; i < plan->n_axes; i++) {
+		apart_deg = asin(fmin(1, 1 / v3_length(dual[i]))) / DEG;
+		/* Not a number: in the plane of the others. */
+		if (!(apart_deg >= APART_DEG - ROUNDING))
+			return incise_error_set(
+				err, EINVAL,
+				"%s: the direction of actuator %d lies within %.3g degrees "
+				"of the plane of the other two: expected %d or more; "
+				"correct one",
+				where, i + 1, isnan(apart_deg) ? 0 : apart_deg,
+				APART_DEG);
+	}
+	return 0;
+}
+
+/* Several steppers; each has its own string and its own group. */
+static int plan_list(struct incise_rig_plan *plan, bool wanted,
+		     const config_setting_t *list, const char *path,
+		     struct incise_error *err)
+{
+	int n = config_setting_length(list), line = config_setting_source_line(list);
+	int rc = 0;
+
+	for (int i = 0; i < n && i < INCISE_RIG_AXES_MAX && !rc; i++) {
+		const config_setting_t *one = config_setting_get_elem(list, i);
+		const char *device = config_setting_get_string(one);
+		char name[20];
+
+		snprintf(name, sizeof(name), n > 1 ? "stepper %d" : "stepper", i + 1);
+		if (!device || is_virtual(device))
+			return incise_error_set(
+				err, EINVAL,
+				"%.200s:%d: %s: expected text in quotes, the BACKEND:ARGUMENTS "
+				"of a real one; the virtual rig's are all named by stepper = "
+				"\"" SIM_BACKEND ":\", and sim.axes counts them",
+				path, config_setting_source_line(one), name);
+		rc = plan_string(plan, KIND_STEPPER + i, wanted,
+				 config_setting_source_line(one), name, device, path,
+				 err);
+	}
+	if (rc)
+		return rc;
+	if (n < 1 || n > INCISE_RIG_AXES_MAX || n != plan->n_actuators)
+		return incise_error_set(
+			err, EINVAL,
+			"%.200s:%d: stepper: expected 1 to %d, each with its group in "
+			"actuator = ( { … }, { … } ), found %d and %d groups; correct them",
+			path, line, INCISE_RIG_AXES_MAX, n, plan->n_actuators);
+	plan->n_axes = n;
+	return 0;
+}
+
+static int plan_steppers(struct incise_rig_plan *plan, const config_setting_t *root,
+			 const char *path, struct incise_error *err)
+{
+	bool wanted = plan->devices & kind_bit(KIND_STEPPER);
+	const config_setting_t *setting = config_setting_get_member(root, "stepper");
+	const char *device = setting ? config_setting_get_string(setting) : NULL;
+	char where[240];
+	int rc;
+
+	if (!setting || !config_setting_is_aggregate(setting) ||
+	    config_setting_is_group(setting))
+		rc = plan_device(plan, KIND_STEPPER, wanted, root, path, err);
+	else
+		rc = plan_list(plan, wanted, setting, path, err);
+	if (rc || !setting)
+		return rc;
+	snprintf(where, sizeof(where), "%.200s:%d", path,
+		 config_setting_source_line(setting));
+	if (device && is_virtual(device)) {
+		plan->n_axes = incise_sim_directions(&plan->config, plan->normal,
+						     plan->direction);
+		return check_directions(plan, where, err);
+	}
+	if (device && plan->n_actuators > 1)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: stepper: one is named, but actuator has %d groups; name as "
+			"many in [ ], or keep one group",
+			where, plan->n_actuators);
+	set_directions(plan);
+	return check_directions(plan, where, err);
 }
 
 /* A key of the group sim; a message of config.c gets file and line in front. */
@@ -505,7 +684,7 @@ static bool virtual_camera(const config_setting_t *root)
 
 	return config_setting_lookup_string(root, incise_kind_name[KIND_CAMERA],
 					    &device) &&
-	       !strcmp(device, SIM_BACKEND ":");
+	       is_virtual(device);
 }
 
 static int plan_root(struct incise_rig_plan *plan, const config_setting_t *root,
@@ -516,7 +695,6 @@ static int plan_root(struct incise_rig_plan *plan, const config_setting_t *root,
 					   "sim",	  "actuator",	  "tracker_setup",
 					   "force_setup", "camera_setup", "vision",
 					   NULL};
-	const config_setting_t *actuator;
 	const char *clock = NULL;
 	char where[240];
 	int rc;
@@ -534,11 +712,8 @@ static int plan_root(struct incise_rig_plan *plan, const config_setting_t *root,
 		rc = incise_conf_surface(root, path, plan->point_mm, plan->normal, err);
 	if (!rc)
 		rc = plan_sim(plan, root, path, err);
-	actuator = rc ? NULL : config_setting_get_member(root, "actuator");
-	if (actuator) {
-		rc = incise_actuator_read(&plan->actuator, actuator, path, err);
-		plan->has_actuator = true;
-	}
+	if (!rc)
+		rc = read_actuators(plan, root, path, err);
 	if (!rc)
 		rc = read_tracker_setup(&plan->tracker, root, path, err);
 	if (!rc)
@@ -550,9 +725,11 @@ static int plan_root(struct incise_rig_plan *plan, const config_setting_t *root,
 	if (plan->devices & INCISE_RIG_IF_NAMED &&
 	    !config_setting_get_member(root, "camera"))
 		plan->devices &= ~INCISE_RIG_CAMERA;
-	for (int kind = 0; kind < N_KINDS && !rc; kind++)
+	for (int kind = 0; kind < KIND_STEPPER && !rc; kind++)
 		rc = plan_device(plan, kind, plan->devices & kind_bit(kind), root, path,
 				 err);
+	if (!rc)
+		rc = plan_steppers(plan, root, path, err);
 	if (!rc && !plan->has_vision && virtual_camera(root))
 		plan_virtual_vision(plan);
 	return rc;
@@ -617,9 +794,12 @@ static int plan_shorthand(struct incise_rig_plan *plan, const char *spec,
 	while (!rc && *words && (word = strsep(&rest, ",")))
 		rc = plan_word(plan, word, err);
 	free(words);
-	if (!rc)
-		plan_virtual_vision(plan);
-	return rc;
+	if (rc)
+		return rc;
+	plan_virtual_vision(plan);
+	plan->n_axes =
+		incise_sim_directions(&plan->config, plan->normal, plan->direction);
+	return 0;
 }
 
 int incise_rig_plan_read(struct incise_rig_plan *plan, const char *spec,
@@ -629,6 +809,7 @@ int incise_rig_plan_read(struct incise_rig_plan *plan, const char *spec,
 		.normal = {0, 0, 1},
 		.watch = devices & INCISE_RIG_WATCH,
 		.devices = devices,
+		.n_axes = 1,
 	};
 	incise_sim_config_init(&plan->config);
 	if (!strncmp(spec, SIM_BACKEND ":", strlen(SIM_BACKEND ":")))
@@ -638,8 +819,8 @@ int incise_rig_plan_read(struct incise_rig_plan *plan, const char *spec,
 
 void incise_rig_plan_free(struct incise_rig_plan *plan)
 {
-	for (int kind = 0; kind < N_KINDS; kind++) {
-		free(plan->real[kind].name);
-		free(plan->real[kind].arguments);
+	for (int slot = 0; slot < N_SLOTS; slot++) {
+		free(plan->real[slot].name);
+		free(plan->real[slot].arguments);
 	}
 }

@@ -10,6 +10,7 @@
 #include <incise/camera.h>
 #include <incise/error.h>
 #include <incise/force.h>
+#include <incise/rig.h>
 #include <incise/sim.h>
 #include <incise/tracker.h>
 #include <incise/vision.h>
@@ -17,7 +18,15 @@
 /* The kinds of devices; their order is that of the incise_rig_device bits. */
 enum { KIND_TRACKER, KIND_FORCE, KIND_CAMERA, KIND_STEPPER, N_KINDS };
 
+/* A slot for each device: the actuators' are the last ones. */
+#define N_SLOTS (KIND_STEPPER + INCISE_RIG_AXES_MAX)
+
 extern const char *const incise_kind_name[N_KINDS];
+
+static inline int slot_kind(int slot)
+{
+	return slot < KIND_STEPPER ? slot : KIND_STEPPER;
+}
 
 static inline unsigned int kind_bit(int kind)
 {
@@ -36,9 +45,11 @@ struct incise_rig_plan {
 	bool sim;	      /* one of the devices stands on the virtual rig */
 	bool watch;	      /* the stepper */
 	unsigned int devices; /* incise_rig_device bits of what is to be opened */
-	struct rig_real real[N_KINDS];
-	struct incise_actuator actuator;
-	bool has_actuator;
+	struct rig_real real[N_SLOTS];
+	int n_axes; /* actuators to be opened */
+	double direction[INCISE_RIG_AXES_MAX][3];
+	struct incise_actuator actuator[INCISE_RIG_AXES_MAX];
+	int n_actuators; /* groups of that name */
 	struct incise_tracker_setup tracker;
 	struct incise_force_setup force;
 	struct incise_camera_setup camera;

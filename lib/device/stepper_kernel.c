@@ -104,6 +104,15 @@ static void kernel_close(struct incise_motor *motor)
 	free(k);
 }
 
+static const struct incise_motor_ops kernel_ops = {
+	.enable = kernel_enable,
+	.disable = kernel_disable,
+	.clear = kernel_clear,
+	.origin = kernel_origin,
+	.close = kernel_close,
+	.now = kernel_now,
+};
+
 /* PATH or PATH:MOTOR. */
 static int parse(struct kernel_stepper *k, const struct incise_backend_request *asked,
 		 struct incise_error *err)
@@ -130,14 +139,45 @@ static int parse(struct kernel_stepper *k, const struct incise_backend_request *
 	return 0;
 }
 
+/*
+ * A controller has one owner, who drives all of its motors: another motor of a device that this
+ * rig has opened already goes through the same open file. Returns 1 without one.
+ */
+static int join_sibling(struct kernel_stepper *k,
+			const struct incise_backend_request *asked,
+			struct incise_error *err)
+{
+	for (int i = 0; i < asked->n_siblings; i++) {
+		const struct kernel_stepper *other =
+			(const struct kernel_stepper *)asked->siblings[i];
+
+		if (strcmp(other->path, k->path))
+			continue;
+		if (other->index == k->index)
+			return incise_error_set(
+				err, EINVAL,
+				"%s: motor %u of %.200s is an actuator of this rig already; "
+				"name another",
+				asked->where, k->index, k->path);
+		k->fd = fcntl(other->fd, F_DUPFD_CLOEXEC, 0);
+		return k->fd >= 0
+			       ? 0
+			       : incise_error_set(err, errno, "%s: %.200s: %s",
+						  asked->where, k->path, strerror(errno));
+	}
+	return 1;
+}
+
 static int open_device(struct kernel_stepper *k,
 		       const struct incise_backend_request *asked,
 		       struct incise_error *err)
 {
 	const char *todo;
-
 	struct stat status;
+	int rc = join_sibling(k, asked, err);
 
+	if (rc <= 0)
+		return rc;
 	/* O_NONBLOCK: to open a pipe would wait for a writer. */
 	k->fd = open(k->path,
 		     (asked->watch ? O_RDONLY : O_RDWR) | O_CLOEXEC | O_NONBLOCK);
@@ -329,14 +369,6 @@ static int set_up(struct kernel_stepper *k, const struct incise_backend_request 
 static void *kernel_open(const struct incise_backend_request *asked,
 			 struct incise_error *err)
 {
-	static const struct incise_motor_ops ops = {
-		.enable = kernel_enable,
-		.disable = kernel_disable,
-		.clear = kernel_clear,
-		.origin = kernel_origin,
-		.close = kernel_close,
-		.now = kernel_now,
-	};
 	struct kernel_stepper *k = calloc(1, sizeof(*k));
 	int rc;
 
@@ -346,7 +378,7 @@ static void *kernel_open(const struct incise_backend_request *asked,
 	}
 	k->fd = -1;
 	k->page = (size_t)sysconf(_SC_PAGESIZE);
-	k->motor.ops = &ops;
+	k->motor.ops = &kernel_ops;
 	k->motor.actuator = *asked->actuator;
 	k->motor.watches = asked->watch;
 	incise_motor_init(&k->motor);

@@ -72,6 +72,7 @@ static const struct key keys[] = {
 	KEY(KEY_DOUBLE, camera_hz, 50, 1, 500),
 	/* The lower limit keeps the whole scalpel in the frame; see sim_camera.c. */
 	KEY(KEY_DOUBLE, camera_mm_px, 47.5 / 400, 0.118, 1),
+	KEY(KEY_INT, axes, 1, 1, 3),
 	KEY(KEY_DOUBLE, spring_N_mm, 2, 0.001, 1000),
 	KEY(KEY_DOUBLE, lead_mm, 2, 0.1, 100),
 	KEY(KEY_INT, steps_per_turn, 3200, 4, 1000000),

@@ -37,7 +37,15 @@ void incise_sim_truth(struct incise_sim *sim, struct incise_sim_truth *truth);
 struct incise_tracker *incise_sim_tracker_new(struct incise_sim *sim);
 struct incise_force *incise_sim_force_new(struct incise_sim *sim);
 struct incise_camera *incise_sim_camera_new(struct incise_sim *sim);
-struct incise_stepper *incise_sim_stepper_new(struct incise_sim *sim);
+/* @axis: 0 … config.axes - 1 */
+struct incise_stepper *incise_sim_stepper_new(struct incise_sim *sim, int axis);
+
+/*
+ * Directions of the actuators: out of the surface, whose normal is @normal; across the blade,
+ * along y; along the cut, x. Returns how many there are.
+ */
+int incise_sim_directions(const struct incise_sim_config *config, const double normal[3],
+			  double direction[][3]);
 
 /*
  * Set a key of the configuration from a number; arrays (depth_mm, times) take an index:

@@ -17,6 +17,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include "../base/vector.h"
 #include "sim.h"
 #include "world.h"
 
@@ -30,17 +31,22 @@
 struct sim_stepper {
 	struct incise_stepper stepper;
 	struct incise_sim *sim;
+	int axis;
 	int64_t t_ns;	/* script time that has been reached: a whole tick */
 	int64_t set_ns; /* of the last target */
 	unsigned int faults;
 	bool watched; /* by the deadman: from the first target on */
 	double step_mm;
 	long steps_max; /* whole microsteps in the travel */
+	double rest_mm; /* of the nut, where the hand and the spring are at rest */
 	double target_mm, nut_mm, nut_mm_s;
 	double handle_mm, handle_mm_s;
 	double limit_mm_s; /* of the nut: that of the screw, or of a jog */
 	struct incise_bench bench;
 };
+
+/* In the names of the actuators. */
+static const char *const of_axis[] = {"", ", across the blade", ", along the cut"};
 
 static struct sim_stepper *of_stepper(const struct incise_stepper *stepper)
 {
@@ -91,7 +97,7 @@ static void move_handle(struct sim_stepper *s, double nut_mm)
 	double mass = config->handle_kg / 1000; /* N s²/mm */
 	double stiffness = config->spring_N_mm + config->hand_N_mm;
 	double push = 2 * mass / TICK_S * s->handle_mm_s - stiffness * s->handle_mm +
-		      config->spring_N_mm * nut_mm;
+		      config->spring_N_mm * nut_mm + config->hand_N_mm * s->rest_mm;
 	double middle;
 
 	if (fabs(push) <= config->handle_friction_N) {
@@ -144,11 +150,11 @@ static void advance(struct sim_stepper *s, int64_t now)
 		double before = nut_held(s);
 
 		if (s->watched && s->t_ns - s->set_ns >= DEADMAN_NS) {
-			s->target_mm = 0;
+			s->target_mm = s->rest_mm;
 			s->faults |= INCISE_STEPPER_FAULT_DEADMAN;
 		}
 		move_nut(s);
-		if (s->sim->config.bench)
+		if (s->sim->config.bench && !s->axis)
 			incise_bench_follow(&s->bench, &s->sim->config, nut_held(s),
 					    s->nut_mm_s);
 		else
@@ -235,7 +241,7 @@ static int sim_stepper_disable(struct incise_stepper *stepper, struct incise_err
 	struct sim_stepper *s = of_stepper(stepper);
 
 	(void)err;
-	sim_stepper_set(stepper, 0);
+	sim_stepper_set(stepper, s->rest_mm);
 	s->watched = false;
 	return 0;
 }
@@ -269,7 +275,7 @@ static INCISE_REALTIME int sim_stepper_status(struct incise_stepper *stepper,
 	advance(s, script_now(s));
 	nut = nut_held(s);
 	/* On the bench no hand holds it, and only the force channel measures its force. */
-	if (s->sim->config.bench)
+	if (s->sim->config.bench && !s->axis)
 		s->handle_mm = 0;
 	*status = (struct incise_stepper_status){
 		.t_ns = s->sim->start_ns + s->t_ns,
@@ -299,8 +305,10 @@ static void sim_stepper_info(const struct incise_stepper *stepper,
 		.acceleration_mm_s2 = config->screw_mm_s2,
 		.deadman_s = DEADMAN_NS * NS,
 		.measures_handle = true,
+		.rest_mm = s->rest_mm,
 	};
-	snprintf(info->name, sizeof(info->name), "virtual haptic scalpel");
+	snprintf(info->name, sizeof(info->name), "virtual haptic scalpel%s",
+		 of_axis[s->axis]);
 }
 
 static void sim_stepper_close(struct incise_stepper *stepper)
@@ -325,7 +333,18 @@ static const struct incise_stepper_ops ops = {
 	.close = sim_stepper_close,
 };
 
-struct incise_stepper *incise_sim_stepper_new(struct incise_sim *sim)
+int incise_sim_directions(const struct incise_sim_config *config, const double normal[3],
+			  double direction[][3])
+{
+	static const double across[3] = {0, 1, 0}, along[3] = {1, 0, 0};
+	const double *const all[] = {normal, across, along};
+
+	for (int i = 0; i < config->axes; i++)
+		v3_copy(direction[i], all[i]);
+	return config->axes;
+}
+
+struct incise_stepper *incise_sim_stepper_new(struct incise_sim *sim, int axis)
 {
 	const struct incise_sim_config *config = &sim->config;
 	struct sim_stepper *s = calloc(1, sizeof(*s));
@@ -336,11 +355,17 @@ struct incise_stepper *incise_sim_stepper_new(struct incise_sim *sim)
 	}
 	s->stepper.ops = &ops;
 	s->sim = sim;
+	s->axis = axis;
 	s->step_mm = config->lead_mm / config->steps_per_turn;
 	s->limit_mm_s = config->screw_mm_s;
 	/* A travel of whole steps must not lose one to the rounding of the division. */
 	s->steps_max = (long)(config->travel_mm / s->step_mm * (1 + 1e-12));
 	s->t_ns = script_now(s) / INCISE_SIM_TICK_NS * INCISE_SIM_TICK_NS;
+	if (axis) {
+		s->rest_mm = (double)(s->steps_max / 2) * s->step_mm;
+		s->target_mm = s->nut_mm = s->handle_mm = s->rest_mm;
+		return &s->stepper;
+	}
 	sim->press_N = press_N;
 	sim->stepper = &s->stepper;
 	return &s->stepper;

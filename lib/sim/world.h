@@ -81,7 +81,7 @@ struct incise_sim {
 	double load_N; /* weight on the sensor; NAN: the blade is on it */
 	/* Force on the sensor on the bench, at a script time; or NULL. */
 	double (*press_N)(struct incise_stepper *stepper, int64_t t_ns) INCISE_REALTIME;
-	struct incise_stepper *stepper;
+	struct incise_stepper *stepper; /* the first one */
 };
 
 /* Add a stream from the present tick on; its t_ns must not be earlier. */

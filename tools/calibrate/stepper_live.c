@@ -28,7 +28,7 @@ void stepper_live_open(struct stepper_live *live, const char *rig)
 {
 	const struct incise_stepper_info *info = &live->drive.info;
 
-	stepper_drive_open(&live->drive, rig, INCISE_RIG_FORCE, "strokes");
+	stepper_drive_open(&live->drive, rig, 1, INCISE_RIG_FORCE, "strokes");
 	live->force = incise_rig_force(live->drive.rig);
 	incise_force_info(live->force, &live->channel);
 	live->creep_mm_s = fmin(CREEP_MM_S, 0.1 * info->velocity_mm_s);

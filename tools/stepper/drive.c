@@ -20,13 +20,16 @@
 #define SHOW_NS 100000000      /* between progress */
 #define STOPPING_NS 2000000000 /* for it to come to rest by a fault */
 
-void stepper_drive_open(struct stepper_drive *drive, const char *rig,
+void stepper_drive_open(struct stepper_drive *drive, const char *rig, int axis,
 			unsigned int devices, const char *doing)
 {
 	*drive = (struct stepper_drive){.doing = doing};
 	drive->rig = cli_open_rig(rig, INCISE_RIG_STEPPER | devices);
 	drive->clock = incise_rig_clock(drive->rig);
-	drive->stepper = incise_rig_stepper(drive->rig);
+	drive->stepper = incise_rig_axis(drive->rig, axis - 1, NULL);
+	if (!drive->stepper)
+		stepper_drive_fail(drive, "--axis %d: the rig has no such actuator",
+				   axis);
 	incise_stepper_info(drive->stepper, &drive->info);
 	drive->period_ns = (int64_t)fmax(
 		LEAST_PERIOD_NS, fmin(PERIOD_NS, drive->info.deadman_s * INCISE_NS_PER_S /

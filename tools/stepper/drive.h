@@ -31,8 +31,11 @@ struct stepper_drive {
 
 /* All of these end the program with 1 and one line when they fail. */
 
-/* Open the rig's stepper; @devices: others of the rig, or INCISE_RIG_WATCH. */
-void stepper_drive_open(struct stepper_drive *drive, const char *rig,
+/*
+ * Open the rig's stepper. @axis: its number in rig.conf, from 1 on; @devices: others of the rig,
+ * or INCISE_RIG_WATCH.
+ */
+void stepper_drive_open(struct stepper_drive *drive, const char *rig, int axis,
 			unsigned int devices, const char *doing);
 
 /* Power it; from here on signals set cli_stop. */

@@ -216,13 +216,15 @@ struct incise_actuator {
 	double velocity_mm_s, acceleration_mm_s2;
 	double jerk_mm_s3; /**< 0: not limited */
 	double deadman_s;
-	bool retract; /**< on a deadman, go to 0 before power goes away */
+	bool retract; /**< on a deadman, go to rest_mm before power goes away */
 	uint32_t tick_ns;
 	uint32_t high_ns, low_ns; /**< 0: not given, the shortest of the machine */
 	uint32_t setup_ns, hold_ns;
 	uint64_t enable_ns;
 	double home_mm_s, home_mm;
 	double origin_mm;	 /**< see struct incise_stepper_info */
+	double rest_mm, late_s;	 /**< see struct incise_stepper_info */
+	double direction[3];	 /**< in which it pushes, unit; 0 0 0: not given */
 	bool has_lines;		 /**< the group `lines` is there */
 	int line[INCISE_LINES];	 /**< offsets; -1: not wired */
 	unsigned int active_low; /**< bits 1 << incise_actuator_line */
@@ -230,7 +232,7 @@ struct incise_actuator {
 };
 
 /** Changes when a struct or value that backends use does. */
-#define INCISE_BACKEND_ABI 6
+#define INCISE_BACKEND_ABI 7
 
 /** Settings of rig.conf for a backend. */
 struct incise_backend_request {
@@ -244,6 +246,10 @@ struct incise_backend_request {
 	const struct incise_force_setup *force;
 	const struct incise_camera_setup *camera;
 	const struct incise_vision_setup *vision; /**< to be checked */
+	/** Of a stepper: those of the rig that this backend opened before it, which may be
+	 * motors of the same device. */
+	struct incise_stepper *const *siblings;
+	int n_siblings;
 };
 
 /**

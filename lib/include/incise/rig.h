@@ -8,7 +8,7 @@
  *     tracker = "sim:";
  *     force   = "sim:";
  *     camera  = "sim:";
- *     stepper = "sim:";
+ *     stepper = "sim:";          # or up to three: [ "…", "…" ], each with its direction
  *     surface = { point_mm = [0.0, 0.0, 0.0]; normal = [0.0, 0.0, 1.0]; };
  *     sim     = { seed = 1; };   # see incise/sim.h
  */
@@ -26,6 +26,9 @@
 
 INCISE_BEGIN_DECLS
 
+/** Actuators of a rig at most. */
+#define INCISE_RIG_AXES_MAX 3
+
 struct incise_rig;
 struct incise_sim;
 
@@ -34,8 +37,9 @@ enum incise_rig_device {
 	INCISE_RIG_TRACKER = 1,
 	INCISE_RIG_FORCE = 2,
 	INCISE_RIG_CAMERA = 4,
+	/** All of its actuators. */
 	INCISE_RIG_STEPPER = 8,
-	/** With STEPPER: only watch it, while another program drives it. */
+	/** With STEPPER: only watch them, while another program drives them. */
 	INCISE_RIG_WATCH = 16,
 	/** With CAMERA: only if a rig.conf names one; a "sim:KEY=VALUE,…" names none. */
 	INCISE_RIG_IF_NAMED = 32,
@@ -74,8 +78,20 @@ INCISE_API struct incise_tracker *incise_rig_tracker(struct incise_rig *rig);
 INCISE_API struct incise_force *incise_rig_force(struct incise_rig *rig);
 /** @see incise_rig_tracker() */
 INCISE_API struct incise_camera *incise_rig_camera(struct incise_rig *rig);
-/** @see incise_rig_tracker() */
+/** The first actuator. @see incise_rig_tracker() */
 INCISE_API struct incise_stepper *incise_rig_stepper(struct incise_rig *rig);
+
+/**
+ * An actuator, and the direction in which it pushes the handle.
+ *
+ * @param i         0 …
+ * @param direction unit vector in the tracker's frame; unchanged without an actuator; may
+ *                  be NULL
+ * @return the actuator, owned by the rig; NULL from the first index that is not there, or
+ *         was not opened
+ */
+INCISE_API struct incise_stepper *incise_rig_axis(struct incise_rig *rig, int i,
+						  double direction[3]);
 
 /** The virtual rig behind the `sim:` devices, or NULL. */
 INCISE_API struct incise_sim *incise_rig_sim(struct incise_rig *rig);

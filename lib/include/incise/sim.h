@@ -81,7 +81,12 @@ struct incise_sim_config {
 	double camera_hz;    /**< 50 */
 	double camera_mm_px; /**< 0.11875 = 47.5 mm / 400 px */
 
-	/* Actuator: see incise/stepper.h. */
+	/*
+	 * Actuators: see incise/stepper.h. They push out of the surface; across the blade, along
+	 * y; and along the cut, x. The hand grips the handle along each of them. Out of the
+	 * surface the nut rests at 0; the others push both ways, and rest half way.
+	 */
+	int axes;		  /**< 1; how many, 1 … 3 */
 	double spring_N_mm;	  /**< 2 */
 	double lead_mm;		  /**< 2; per turn */
 	int steps_per_turn;	  /**< 3200; microsteps */

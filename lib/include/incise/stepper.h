@@ -45,6 +45,8 @@ struct incise_stepper_info {
 	double origin_mm;     /**< without measures_handle: where handle_mm is 0, along
 					the actuator's axis in the tracker's frame */
 	unsigned int inputs;  /**< incise_stepper_line bits that are wired */
+	double rest_mm; /**< of the nut: without force on a handle that was let go */
+	double late_s;	/**< from a target to its force, by rig.conf; 0: not known */
 };
 
 /** Where it stands. */
@@ -66,8 +68,8 @@ struct incise_stepper;
 /**
  * Give a new target. It moves the nut only when powered; the virtual rig's always is.
  * Without a target for the deadman time the nut comes to rest and power goes away (after
- * going back to 0, which is no force, where `retract` says so in rig.conf, and in the
- * virtual rig).
+ * going back to info.rest_mm, which is no force, where `retract` says so in rig.conf, and
+ * in the virtual rig).
  *
  * @param position_mm target of the nut; clamped to the travel
  * @return 0; -EDOM (not finite; the last target stands), -EIO (not powered, or a fault is

@@ -255,7 +255,7 @@ static void every_case_on_the_virtual_rig(void **state)
 
 		incise_sim_config_init(&config);
 		sim = incise_sim_new(&config, v.clock, NULL);
-		c.stepper = incise_sim_stepper_new(sim);
+		c.stepper = incise_sim_stepper_new(sim, 0);
 		incise_stepper_info(c.stepper, &c.info);
 		conformance[i].run(&c);
 		c.stepper->ops->close(c.stepper);

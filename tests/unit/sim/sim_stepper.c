@@ -30,7 +30,7 @@ static struct rig rig_new(const struct incise_sim_config *config)
 
 	rig.sim = incise_sim_new(config, rig.clock, NULL);
 	assert_non_null(rig.sim);
-	rig.stepper = incise_sim_stepper_new(rig.sim);
+	rig.stepper = incise_sim_stepper_new(rig.sim, 0);
 	return rig;
 }
 
@@ -469,7 +469,7 @@ static void force_channel_shows_the_bench(void **state)
 	config.backlash_mm = 0.1;
 	sim = incise_sim_new(&config, clock, NULL);
 	force = incise_sim_force_new(sim);
-	stepper = incise_sim_stepper_new(sim);
+	stepper = incise_sim_stepper_new(sim, 0);
 	for (int i = 1; i < 20; i++) {
 		assert_int_equal(stepper->ops->set(stepper, 1), 0);
 		incise_clock_wait_until(clock, i * 20000000);
@@ -506,7 +506,7 @@ static void jog_is_for_the_bench_only(void **state)
 
 	incise_sim_config_init(&config);
 	sim = incise_sim_new(&config, clock, NULL);
-	stepper = incise_sim_stepper_new(sim);
+	stepper = incise_sim_stepper_new(sim, 0);
 	assert_int_equal(stepper->ops->jog(stepper, 1), -EOPNOTSUPP);
 	stepper->ops->close(stepper);
 	incise_sim_free(sim);
