@@ -44,10 +44,10 @@ static const struct cli_option options[] = {
 	 CLI_CHOICE(struct job, haptic.tool, tools, "auto, blade, handle, tube")},
 	{0, "duration", "TIME", "stop after this time, e.g. 10s (default: at SIGINT)",
 	 CLI_DURATION(struct job, duration, 0.01, 86400)},
-	{0, "home", NULL, "find the actuator's 0 first, unless it is known",
+	{0, "home", NULL, "find each actuator's 0 first, unless it is known",
 	 CLI_FLAG(struct job, home)},
 	{0, "recover", NULL,
-	 "clear first what a program that died left latched in the actuator",
+	 "clear first what a program that died left latched in an actuator",
 	 CLI_FLAG(struct job, recover)},
 	{0, "policy", "POLICY", "fifo or deadline (default: fifo)",
 	 CLI_CHOICE(struct job, realtime.policy, policies, "fifo, deadline")},
@@ -266,7 +266,7 @@ static void finish(struct job *job)
 	free(haptic->loop.log);
 }
 
-/* --- the actuator ---------------------------------------------------------------------- */
+/* --- the actuators --------------------------------------------------------------------- */
 
 /* Faults of the program before, not of the machine. */
 #define LEFT_BEHIND                                                  \
@@ -315,19 +315,13 @@ static int recover_it(struct incise_stepper *stepper, const char *name,
 }
 
 /*
- * Power the actuator. A target needs its 0: that of a real machine must be found, if it has a
- * switch for that. The first tick must follow within the deadman's time.
- *
- * @home    find the 0, unless it is known
- * @recover clear first only what a program that died or a machine that slept left latched: a
- *          fault with its cause in the machine waits for a person
- *
- * Returns 0 or a negative errno.
+ * Make an actuator ready for power: a target needs its 0, and that of a real machine must be
+ * found, if it has a switch for that. Returns 0 or a negative errno.
  */
-static int take_hold(struct incise_rig *rig, bool home, bool recover,
-		     struct incise_error *err)
+static int make_ready(struct incise_rig *rig, int axis, bool home, bool recover,
+		      struct incise_error *err)
 {
-	struct incise_stepper *stepper = incise_rig_stepper(rig);
+	struct incise_stepper *stepper = incise_rig_axis(rig, axis, NULL);
 	struct incise_stepper_status status;
 	struct incise_stepper_info info;
 	char cause[300];
@@ -349,81 +343,147 @@ static int take_hold(struct incise_rig *rig, bool home, bool recover,
 		if (info.can_home)
 			return incise_error_set(
 				err, EPERM,
-				"%s is not homed; run `incise stepper home --rig %s`, or "
+				"%s is not homed; run `incise stepper home --rig %s%s`, or "
 				"give --home",
-				info.name, incise_rig_spec(rig));
+				info.name, incise_rig_spec(rig),
+				axis == 0   ? ""
+				: axis == 1 ? " --axis 2"
+					    : " --axis 3");
 		cli_warn("%s cannot be homed: its 0 is where it stands", info.name);
 	}
-	if (!status.homed && home)
-		rc = home_it(stepper, err);
-	if (!rc)
-		drop_poses(incise_rig_tracker(rig));
-	return rc ? rc : incise_stepper_enable(stepper, err);
+	return !status.homed && home ? home_it(stepper, err) : 0;
 }
 
 /*
- * Move to where there is no force, then power off. Returns 0; -EIO if it stopped by itself
- * meanwhile, or a negative errno if its power cannot be taken away.
+ * Power the actuators: all, or none. The first tick must follow within their deadman's time.
+ *
+ * @home    find their 0, unless it is known
+ * @recover clear first only what a program that died or a machine that slept left latched: a
+ *          fault with its cause in the machine waits for a person
+ *
+ * Returns 0 or a negative errno.
  */
-static int let_go(struct incise_rig *rig, struct incise_error *err)
+static int take_hold(struct incise_rig *rig, bool home, bool recover,
+		     struct incise_error *err)
 {
-	struct incise_stepper *stepper = incise_rig_stepper(rig);
-	struct incise_clock *clock = incise_rig_clock(rig);
+	struct incise_stepper *stepper;
+	int rc = 0, n;
+
+	for (n = 0; !rc && incise_rig_axis(rig, n, NULL); n++)
+		rc = make_ready(rig, n, home, recover, err);
+	if (rc)
+		return rc;
+	drop_poses(incise_rig_tracker(rig));
+	for (n = 0; !rc && (stepper = incise_rig_axis(rig, n, NULL)); n++)
+		rc = incise_stepper_enable(stepper, err);
+	while (rc && n-- > 0)
+		incise_stepper_disable(incise_rig_axis(rig, n, NULL), NULL);
+	return rc;
+}
+
+/* Whether an actuator is still on its way to where there is no force. */
+static bool returns(struct incise_stepper *stepper, int64_t gone_ns)
+{
 	struct incise_stepper_status status;
 	struct incise_stepper_info info;
-	int64_t now = incise_clock_now(clock), end;
-	char cause[300];
-	int rc;
 
 	incise_stepper_info(stepper, &info);
 	/* The virtual one goes there by itself. */
-	end = info.measures_handle
-		      ? now
-		      : now + (int64_t)((1 + info.travel_mm / info.velocity_mm_s) *
-					INCISE_NS_PER_S);
-	while (now < end && !incise_stepper_set(stepper, 0) &&
+	return !info.measures_handle &&
+	       gone_ns < (int64_t)((1 + info.travel_mm / info.velocity_mm_s) *
+				   INCISE_NS_PER_S) &&
+	       !incise_stepper_set(stepper, info.rest_mm) &&
 	       !incise_stepper_status(stepper, &status) &&
-	       (status.position_mm > info.step_mm / 2 ||
-		status.state == INCISE_STEPPER_STATE_MOVING)) {
-		incise_clock_wait_until(clock, now + 2000000);
-		now = incise_clock_now(clock);
-	}
-	rc = incise_stepper_disable(stepper, err);
+	       (fabs(status.position_mm - info.rest_mm) > info.step_mm / 2 ||
+		status.state == INCISE_STEPPER_STATE_MOVING);
+}
+
+static int power_off(struct incise_rig *rig, int axis, struct incise_error *err)
+{
+	struct incise_stepper *stepper = incise_rig_axis(rig, axis, NULL);
+	struct incise_stepper_status status;
+	struct incise_stepper_info info;
+	int rc = incise_stepper_disable(stepper, err);
+	char cause[300];
+
 	if (rc || incise_stepper_status(stepper, &status) ||
 	    !(status.faults & ~(unsigned int)INCISE_STEPPER_FAULT_TRAVEL))
 		return rc;
+	incise_stepper_info(stepper, &info);
 	incise_stepper_cause(stepper, cause, sizeof(cause));
-	return incise_error_set(err, EIO, "the actuator stopped by itself: %s", cause);
+	return incise_error_set(
+		err, EIO, "%s stopped by itself: %s",
+		incise_rig_axis(rig, 1, NULL) ? info.name : "the actuator", cause);
+}
+
+/*
+ * Move to where there is no force, then power off; all actuators at once. Returns 0; -EIO if one
+ * stopped by itself meanwhile, or a negative errno if its power cannot be taken away: the first.
+ */
+static int let_go(struct incise_rig *rig, struct incise_error *err)
+{
+	struct incise_clock *clock = incise_rig_clock(rig);
+	int64_t begin = incise_clock_now(clock), now = begin;
+	struct incise_stepper *stepper;
+	int rc = 0;
+
+	for (bool moving = true; moving;) {
+		moving = false;
+		for (int i = 0; (stepper = incise_rig_axis(rig, i, NULL)); i++)
+			moving |= returns(stepper, now - begin);
+		if (moving)
+			incise_clock_wait_until(clock, now + 2000000);
+		now = incise_clock_now(clock);
+	}
+	for (int i = 0; incise_rig_axis(rig, i, NULL); i++) {
+		struct incise_error own = {0};
+		int failed = power_off(rig, i, &own);
+
+		if (failed && !rc) {
+			rc = failed;
+			*err = own;
+		}
+	}
+	return rc;
 }
 
 /* --- log and report -------------------------------------------------------------------- */
 
 static const char *const phases[] = {"free", "cutting", "insertion"};
 
-/* Write them as CSV, under the file's final name; 0 or a negative errno. */
+/* Write them as CSV, with more columns for more than one actuator, under the file's final name; 0 or a negative errno. */
 static int write_log(struct incise_outfile *file, const struct incise_tick *ticks,
-		     size_t n, struct incise_error *err)
+		     size_t n, int axes, struct incise_error *err)
 {
 	char flags[INCISE_TICK_FLAGS + 1];
 	FILE *out;
 
 	out = incise_outfile_stream(file);
 	fputs("t_s,x_mm,y_mm,z_mm,depth_mm,velocity_mm_s,command_N,rendered_N,flags,phase,"
-	      "command_x_N,command_y_N,command_z_N\n",
+	      "command_x_N,command_y_N,command_z_N",
 	      out);
+	for (int i = 1; i < axes; i++)
+		fprintf(out, ",rendered_%d_N", i + 1);
+	fputs(axes > 1 ? ",unfelt_N\n" : "\n", out);
 	for (size_t i = 0; i < n; i++) {
 		const struct incise_tick *t = &ticks[i];
 
 		fprintf(out,
-			"%.6f,%.4f,%.4f,%.4f,%.4f,%.3f,%.5f,%.5f,%s,%s,%.5f,%.5f,%.5f\n",
+			"%.6f,%.4f,%.4f,%.4f,%.4f,%.3f,%.5f,%.5f,%s,%s,%.5f,%.5f,%.5f",
 			(t->t_ns - ticks[0].t_ns) * 1e-9, t->position_mm[0],
 			t->position_mm[1], t->position_mm[2], t->depth_mm,
 			t->velocity_mm_s,
 			sqrt(t->command_N[0] * t->command_N[0] +
 			     t->command_N[1] * t->command_N[1] +
 			     t->command_N[2] * t->command_N[2]),
-			t->rendered_N, loop_flags_text(t->flags, flags), phases[t->phase],
-			t->command_N[0], t->command_N[1], t->command_N[2]);
+			t->rendered_N[0], loop_flags_text(t->flags, flags),
+			phases[t->phase], t->command_N[0], t->command_N[1],
+			t->command_N[2]);
+		for (int k = 1; k < axes; k++)
+			fprintf(out, ",%.5f", t->rendered_N[k]);
+		if (axes > 1)
+			fprintf(out, ",%.5f", t->unfelt_N);
+		fputc('\n', out);
 	}
 	return incise_outfile_commit(file, err);
 }
@@ -446,7 +506,7 @@ static void make_log(double duration_s, struct incise_loop_options *loop)
 	memset(loop->log, 0xff, loop->log_size * sizeof(*loop->log));
 }
 
-/* The actuator's force against the command of the tick before, rms. */
+/* The actuators' force against the command of the tick before, rms. */
 static double render_error(const struct haptic *haptic)
 {
 	const struct incise_loop_stats *stats = haptic->stats;
@@ -454,6 +514,25 @@ static double render_error(const struct haptic *haptic)
 	return incise_rig_stepper(haptic->rig) && stats->ticks > 1
 		       ? sqrt(stats->rendered_off2 / (stats->ticks - 1))
 		       : NAN;
+}
+
+/* What of the force cannot be felt on this rig, rms. */
+static double unfelt_rms(const struct haptic *haptic)
+{
+	const struct incise_loop_stats *stats = haptic->stats;
+
+	return incise_rig_stepper(haptic->rig) && stats->ticks
+		       ? sqrt(stats->unfelt2 / stats->ticks)
+		       : NAN;
+}
+
+static int count_axes(struct incise_rig *rig)
+{
+	int n = 0;
+
+	while (incise_rig_axis(rig, n, NULL))
+		n++;
+	return n;
 }
 
 static bool is_real(const struct haptic *haptic)
@@ -483,6 +562,23 @@ static json_t *counts_json(const struct incise_realtime_counts *counts)
 			 (json_int_t)counts->involuntary);
 }
 
+static json_t *axes_json(struct incise_rig *rig)
+{
+	struct incise_stepper *stepper;
+	struct incise_stepper_info info;
+	json_t *axes = json_array();
+	double direction[3];
+
+	for (int i = 0; (stepper = incise_rig_axis(rig, i, direction)); i++) {
+		incise_stepper_info(stepper, &info);
+		json_array_append_new(
+			axes, json_pack("{ss so so}", "name", info.name, "direction",
+					json_numbers(direction, 3), "counters",
+					stepper_counters_json(stepper)));
+	}
+	return axes;
+}
+
 static void report_json(const struct haptic *haptic)
 {
 	struct incise_stepper *stepper = incise_rig_stepper(haptic->rig);
@@ -494,10 +590,10 @@ static void report_json(const struct haptic *haptic)
 		json_array_append_new(stages,
 				      json_string(incise_plan_stage(haptic->plan, i)));
 	json_print(json_pack(
-		"{sI sI sI sf so so sI sI sI sI so so sf so so ss so so so}", "ticks",
-		(json_int_t)s->ticks, "skipped", (json_int_t)s->skipped, "overruns",
-		(json_int_t)s->overruns, "rate_hz", haptic->loop.rate_hz, "lateness_us",
-		real ? loop_lateness_json(s) : json_null(), "tick_ns",
+		"{sI sI sI sf so so sI sI sI sI so so sf so so so so so ss so so so}",
+		"ticks", (json_int_t)s->ticks, "skipped", (json_int_t)s->skipped,
+		"overruns", (json_int_t)s->overruns, "rate_hz", haptic->loop.rate_hz,
+		"lateness_us", real ? loop_lateness_json(s) : json_null(), "tick_ns",
 		real ? cost_json(s) : json_null(), "contact",
 		(json_int_t)ticks_with(s, INCISE_TICK_CONTACT), "extrapolated",
 		(json_int_t)ticks_with(s, INCISE_TICK_EXTRAPOLATED), "stale",
@@ -505,10 +601,25 @@ static void report_json(const struct haptic *haptic)
 		(json_int_t)s->limited, "flags", loop_flags_json(s->flagged), "poses",
 		pose_json(&s->poses), "force_max_N", s->force_max_N,
 		"rendered_rms_error_N", json_number(render_error(haptic)), "actuator",
-		stepper ? stepper_counters_json(stepper) : json_null(), "scheduling",
-		haptic->scheduling, "thread", counts_json(&haptic->counts), "stages",
-		stages, "stopped_by",
+		stepper ? stepper_counters_json(stepper) : json_null(), "actuators",
+		axes_json(haptic->rig), "unfelt_rms_N", json_number(unfelt_rms(haptic)),
+		"unfelt_max_N", stepper ? json_real(s->unfelt_max_N) : json_null(),
+		"scheduling", haptic->scheduling, "thread", counts_json(&haptic->counts),
+		"stages", stages, "stopped_by",
 		cli_stop ? json_string(strsignal(cli_stop)) : json_null()));
+}
+
+/* Directions that can be felt, and the part of the force that cannot. */
+static void felt_line(const struct haptic *haptic)
+{
+	double direction[3];
+
+	printf("\nfelt      ");
+	for (int i = 0; incise_rig_axis(haptic->rig, i, direction); i++)
+		printf("%s along (%.4g, %.4g, %.4g)", i ? "," : "", direction[0],
+		       direction[1], direction[2]);
+	printf("; not felt: %.4f N rms, at most %.3f N", unfelt_rms(haptic),
+	       haptic->stats->unfelt_max_N);
 }
 
 static void report_text(const struct haptic *haptic)
@@ -540,6 +651,8 @@ static void report_text(const struct haptic *haptic)
 	printf("force      largest %.3f N", s->force_max_N);
 	if (!isnan(rms_N))
 		printf(", actuator off by %.4f N rms", rms_N);
+	if (stepper)
+		felt_line(haptic);
 	printf("\nticks      %llu in contact, %llu outside the model's support, %llu without a "
 	       "fresh pose, %llu limited\n",
 	       (unsigned long long)ticks_with(s, INCISE_TICK_CONTACT),
@@ -554,7 +667,7 @@ static void report_text(const struct haptic *haptic)
 	       (unsigned long long)ticks_with(s, INCISE_TICK_SLEWED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_TRAVEL),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_STARTING));
-	if (stepper)
+	for (int i = 0; (stepper = incise_rig_axis(haptic->rig, i, NULL)); i++)
 		stepper_counters_line(stepper);
 }
 
@@ -606,7 +719,8 @@ int main(int argc, char **argv)
 				    : "");
 	incise_state_free(haptic->state);
 	if (job.log)
-		write_log(file, haptic->loop.log, stats.logged, &log_err);
+		write_log(file, haptic->loop.log, stats.logged, count_axes(haptic->rig),
+			  &log_err);
 	if (job.json)
 		report_json(haptic);
 	else if (!job.log || strcmp(job.log, "-"))

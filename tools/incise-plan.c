@@ -94,8 +94,29 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 			 d->period_s, "delay_ticks", d->delay_ticks);
 }
 
+/* The rig's actuators: direction, and stability of a wall along it. */
+static json_t *axes_json(struct incise_rig *rig, const struct incise_plan_stability *s)
+{
+	struct incise_stepper *stepper;
+	struct incise_stepper_info info;
+	json_t *axes = json_array();
+	double direction[3];
+
+	for (int i = 0; rig && (stepper = incise_rig_axis(rig, i, direction)); i++) {
+		incise_stepper_info(stepper, &info);
+		json_array_append_new(
+			axes,
+			json_pack("{ss so so so si}", "name", info.name, "direction",
+				  json_numbers(direction, 3), "stiffness_N_mm",
+				  json_number(s->axis[i].stiffness_N_mm), "limit_N_mm",
+				  json_number(s->axis[i].limit_N_mm), "late_ticks",
+				  s->axis[i].late_ticks));
+	}
+	return axes;
+}
+
 static void report_json(const struct job *job, const struct incise_plan *plan,
-			const struct tick_cost *cost)
+			struct incise_rig *rig, const struct tick_cost *cost)
 {
 	json_t *kept = json_array(), *stages = json_array(), *left = json_array();
 	json_t *mapped = mapped_libraries(0), *object;
@@ -128,6 +149,7 @@ static void report_json(const struct job *job, const struct incise_plan *plan,
 			 : json_pack("[ssss]", "tracker", "stepper", "force", "camera"),
 		"libraries", mapped, "unmapped_libraries", unmapped_libraries(mapped));
 	json_object_update_new(object, stability_json(&stability));
+	json_object_set_new(object, "axes", axes_json(rig, &stability));
 	json_print(object);
 }
 
@@ -182,12 +204,57 @@ static void print_stability(const struct incise_plan *plan)
 		print_model(&s);
 }
 
+/* For a person: at right angles to both, with -0 as 0. */
+static void cross(double to[3], const double a[3], const double b[3])
+{
+	double length;
+
+	for (int i = 0; i < 3; i++)
+		to[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+	length = sqrt(to[0] * to[0] + to[1] * to[1] + to[2] * to[2]);
+	for (int i = 0; i < 3; i++)
+		to[i] = to[i] / length + 0.0;
+}
+
+static void print_direction(const char *before, const double d[3])
+{
+	printf("%s(%.4g, %.4g, %.4g)", before, d[0], d[1], d[2]);
+}
+
+/* Directions of force that can be felt on the rig, and how stable a wall along each is. */
+static void print_axes(struct incise_rig *rig, const struct incise_plan_stability *s)
+{
+	double direction[INCISE_RIG_AXES_MAX][3], other[3];
+	struct incise_stepper *stepper;
+	struct incise_stepper_info info;
+	int n = 0;
+
+	for (; (stepper = incise_rig_axis(rig, n, direction[n])); n++) {
+		incise_stepper_info(stepper, &info);
+		print_direction(n ? "            along " : "felt        along ",
+				direction[n]);
+		printf(": %s, %.4g N/mm of at most %.4g N/mm, %d ticks late\n", info.name,
+		       s->axis[n].stiffness_N_mm, s->axis[n].limit_N_mm,
+		       s->axis[n].late_ticks);
+		if (n + 1 == INCISE_RIG_AXES_MAX)
+			break;
+	}
+	if (n == 1)
+		printf("            not felt: forces across it\n");
+	if (n == 2) {
+		cross(other, direction[0], direction[1]);
+		print_direction("            not felt: forces along ", other);
+		putchar('\n');
+	}
+}
+
 static void report_text(const struct job *job, const struct incise_plan *plan,
-			const struct tick_cost *cost)
+			struct incise_rig *rig, const struct tick_cost *cost)
 {
 	json_t *mapped = mapped_libraries(0), *absent = unmapped_libraries(mapped);
 	const char *name, *why;
 	double bound_N = incise_plan_bound(plan, REACH_MM);
+	struct incise_plan_stability stability;
 
 	if (cost->ticks)
 		printf("%s: %.0f ns a tick (99.9 %% below %.0f), ", job->scene.path,
@@ -220,6 +287,9 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 		printf(", reaction and plane within %.3g mN, certified", bound_N * 1e3);
 	putchar('\n');
 	print_stability(plan);
+	incise_plan_stability(plan, &stability);
+	if (rig)
+		print_axes(rig, &stability);
 }
 
 /* Only watch the actuator if it can be watched: a loop may run on it. */
@@ -256,9 +326,9 @@ int main(int argc, char **argv)
 	tick_cost(scene, rig ? &tracker : NULL, 0, MEASURED_S, &cost);
 	cli_progress_end();
 	if (job.json)
-		report_json(&job, plan, &cost);
+		report_json(&job, plan, rig, &cost);
 	else
-		report_text(&job, plan, &cost);
+		report_text(&job, plan, rig, &cost);
 	cli_finish();
 	incise_plan_free(plan);
 	incise_rig_close(rig);

@@ -40,15 +40,21 @@ static void count(uint64_t *histogram, int64_t value)
 
 static void count_tick(struct incise_loop_stats *stats, const struct incise_tick *tick)
 {
-	double force = 0, off = tick->rendered_N - stats->actuated_N;
+	double force = 0;
 
 	for (int i = 0; i < 3; i++)
 		force += tick->command_N[i] * tick->command_N[i];
-	/* The actuator's reading in a tick answers the command of the tick before. */
-	if (stats->ticks)
-		stats->rendered_off2 += off * off;
+	for (int i = 0; i < INCISE_RIG_AXES_MAX; i++) {
+		double off = tick->rendered_N[i] - stats->actuated_N[i];
+
+		/* A reading in a tick answers the command of the tick before. */
+		if (stats->ticks)
+			stats->rendered_off2 += off * off;
+		stats->actuated_N[i] = tick->actuated_N[i];
+	}
 	stats->force_N = sqrt(force);
-	stats->actuated_N = tick->actuated_N;
+	stats->unfelt2 += tick->unfelt_N * tick->unfelt_N;
+	stats->unfelt_max_N = fmax(stats->unfelt_max_N, tick->unfelt_N);
 	stats->force_max_N = fmax(stats->force_max_N, stats->force_N);
 	stats->ticks++;
 	for (int i = 0; i < INCISE_TICK_FLAGS; i++)

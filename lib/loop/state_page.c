@@ -85,13 +85,13 @@ double incise_state_quantile(const struct incise_state_histogram *histogram, dou
 		(to)->depth_mm = (from)->depth_mm;                   \
 		(to)->velocity_mm_s = (from)->velocity_mm_s;         \
 		v3_copy((to)->command_N, (from)->command_N);         \
-		(to)->actuated_N = (from)->actuated_N;               \
-		(to)->rendered_N = (from)->rendered_N;               \
 	} while (0)
 
 void incise_state_pack(struct state_tick *to, const struct incise_tick *from)
 {
 	COPY_TICK(to, from);
+	to->actuated_N = from->actuated_N[0];
+	to->rendered_N = from->rendered_N[0];
 	to->flags = from->flags;
 	to->phase = (uint16_t)from->phase;
 	to->tool = (uint16_t)from->tool;
@@ -102,6 +102,11 @@ int incise_state_unpack(struct incise_tick *to, const struct state_tick *from)
 	if (from->phase > INCISE_PHASE_INSERTION || from->tool > INCISE_TOOL_TUBE)
 		return -EIO;
 	COPY_TICK(to, from);
+	to->unfelt_N = 0;
+	for (int i = 0; i < INCISE_RIG_AXES_MAX; i++) {
+		to->actuated_N[i] = i ? 0 : from->actuated_N;
+		to->rendered_N[i] = i ? 0 : from->rendered_N;
+	}
 	to->flags = from->flags & ((1u << INCISE_TICK_FLAGS) - 1);
 	to->phase = (enum incise_phase)from->phase;
 	to->tool = (enum incise_tool)from->tool;

@@ -65,7 +65,7 @@ struct state_tick {
 	double position_mm[3], tool_mm[3], proxy_mm[3], normal[3];
 	double quaternion[4];
 	double depth_mm, velocity_mm_s;
-	double command_N[3], actuated_N, rendered_N;
+	double command_N[3], actuated_N, rendered_N; /* of the first actuator */
 	uint32_t flags;
 	uint16_t phase, tool;
 };

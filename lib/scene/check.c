@@ -9,8 +9,9 @@
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
-#include "../model/slope.h"
+#include "../base/vector.h"
 #include "../control/pose_loop.h"
+#include "../model/slope.h"
 #include "rest.h"
 
 /*
@@ -88,7 +89,7 @@ static void set_delay(struct incise_plan *plan, const struct incise_tracker_info
 							: (int)fmin(ticks, INT_MAX);
 }
 
-static struct incise_pose_loop pose_loop(const struct incise_plan *plan,
+static struct incise_pose_loop pose_loop(const struct incise_plan *plan, int late_ticks,
 					 double damping_N_s_mm,
 					 const struct incise_hand_impedance *hand)
 {
@@ -96,15 +97,17 @@ static struct incise_pose_loop pose_loop(const struct incise_plan *plan,
 		.device = &plan->stability.device,
 		.predict = &plan->predict,
 		.damping_N_s_mm = damping_N_s_mm,
-		.late_ticks = plan->scene->device.late_ticks,
+		.late_ticks = late_ticks,
 		.hand = hand,
 	};
 }
 
 /* Of the bare device, which is the worst. */
-static double limit_N_mm(const struct incise_plan *plan, double damping_N_s_mm)
+static double limit_N_mm(const struct incise_plan *plan, int late_ticks,
+			 double damping_N_s_mm)
 {
-	const struct incise_pose_loop loop = pose_loop(plan, damping_N_s_mm, NULL);
+	const struct incise_pose_loop loop =
+		pose_loop(plan, late_ticks, damping_N_s_mm, NULL);
 
 	if (plan->stability.own_delay)
 		return incise_stability_limit(loop.device, damping_N_s_mm);
@@ -117,10 +120,10 @@ static double limit_N_mm(const struct incise_plan *plan, double damping_N_s_mm)
  */
 #define RESERVE 0.05
 
-static bool holds(const struct incise_plan *plan, double stiffness_N_mm,
+static bool holds(const struct incise_plan *plan, int late_ticks, double stiffness_N_mm,
 		  double damping_N_s_mm)
 {
-	double most = limit_N_mm(plan, damping_N_s_mm);
+	double most = limit_N_mm(plan, late_ticks, damping_N_s_mm);
 
 	/* A limit of 0 is that of a loop which its damper alone makes unstable. */
 	if (!(most > 0) && damping_N_s_mm > 0)
@@ -129,13 +132,13 @@ static bool holds(const struct incise_plan *plan, double stiffness_N_mm,
 }
 
 /* In each hand that may hold the device, which is no part of a delay that the scene gives. */
-static bool hands_hold(const struct incise_plan *plan, double share)
+static bool hands_hold(const struct incise_plan *plan, int late_ticks, double share)
 {
 	const struct incise_plan_stability *s = &plan->stability;
 
 	for (int i = 0; i < INCISE_HANDS && !s->own_delay; i++) {
-		const struct incise_pose_loop loop =
-			pose_loop(plan, share * s->damping_N_s_mm, &incise_hands[i]);
+		const struct incise_pose_loop loop = pose_loop(
+			plan, late_ticks, share * s->damping_N_s_mm, &incise_hands[i]);
 
 		if (!incise_pose_loop_holds(&loop,
 					    share * (1 + RESERVE) * s->stiffness_N_mm))
@@ -144,12 +147,83 @@ static bool hands_hold(const struct incise_plan *plan, double share)
 	return true;
 }
 
-static bool stable(const struct incise_plan *plan, double share)
+static bool stable_along(const struct incise_plan *plan, int late_ticks, double share)
 {
 	const struct incise_plan_stability *s = &plan->stability;
 
-	return holds(plan, share * s->stiffness_N_mm, share * s->damping_N_s_mm) &&
-	       hands_hold(plan, share);
+	return holds(plan, late_ticks, share * s->stiffness_N_mm,
+		     share * s->damping_N_s_mm) &&
+	       hands_hold(plan, late_ticks, share);
+}
+
+/*
+ * Of the scene's forces, how much an actuator may have to push along its direction: all, and
+ * more where it works against others that are not at right angles.
+ */
+static double pushed(const struct incise_plan *plan, int i)
+{
+	return plan->axes.n > 1 ? fmax(1, v3_length(plan->axes.axis[i].dual)) : 1;
+}
+
+static bool stable(const struct incise_plan *plan, double share)
+{
+	const struct incise_plan_stability *s = &plan->stability;
+	bool all = s->n_axes || stable_along(plan, s->late_ticks, share);
+
+	for (int i = 0; i < s->n_axes && all; i++)
+		all = stable_along(plan, s->axis[i].late_ticks, share * pushed(plan, i));
+	return all;
+}
+
+static bool all_hands_hold(const struct incise_plan *plan)
+{
+	const struct incise_plan_stability *s = &plan->stability;
+	bool all = s->n_axes || hands_hold(plan, s->late_ticks, 1);
+
+	for (int i = 0; i < s->n_axes && all; i++)
+		all = hands_hold(plan, s->axis[i].late_ticks, pushed(plan, i));
+	return all;
+}
+
+/* How late each actuator is: as the scene says, or as rig.conf does of this one. */
+static int set_lateness(struct incise_plan *plan, struct incise_error *err)
+{
+	struct incise_plan_stability *s = &plan->stability;
+
+	s->late_ticks = plan->scene->device.late_ticks;
+	s->n_axes = plan->axes.n;
+	for (int i = 0; i < s->n_axes; i++) {
+		const struct incise_stepper_info *info = &plan->axes.axis[i].info;
+		double ticks = ceil(info->late_s / s->device.period_s - 1e-9);
+
+		if (ticks > INCISE_POSE_LOOP_LATE_MAX)
+			return incise_error_set(
+				err, EDOM,
+				"%s: %s: actuator.late_ms of rig.conf is %g, %.0f ticks: "
+				"stability can be checked up to %d",
+				plan->scene->path, info->name, info->late_s * 1e3, ticks,
+				INCISE_POSE_LOOP_LATE_MAX);
+		s->axis[i].late_ticks = (int)fmax(plan->scene->device.late_ticks, ticks);
+		s->late_ticks = (int)fmax(s->late_ticks, s->axis[i].late_ticks);
+	}
+	return 0;
+}
+
+/* The limit of each actuator; the scene's is that of the worst, for its own stiffness. */
+static void set_limits(struct incise_plan *plan)
+{
+	struct incise_plan_stability *s = &plan->stability;
+
+	s->limit_N_mm =
+		s->n_axes ? INFINITY : limit_N_mm(plan, s->late_ticks, s->damping_N_s_mm);
+	for (int i = 0; i < s->n_axes; i++) {
+		double share = pushed(plan, i);
+
+		s->axis[i].stiffness_N_mm = share * s->stiffness_N_mm;
+		s->axis[i].limit_N_mm = limit_N_mm(plan, s->axis[i].late_ticks,
+						   share * s->damping_N_s_mm);
+		s->limit_N_mm = fmin(s->limit_N_mm, s->axis[i].limit_N_mm / share);
+	}
 }
 
 /* The largest gain that is stable; damping goes with it, so that the limit moves. */
@@ -157,7 +231,7 @@ static double largest_gain(const struct incise_plan *plan)
 {
 	double low = 0, high = 1;
 
-	if (!(plan->stability.damping_N_s_mm > 0) && hands_hold(plan, 1))
+	if (!(plan->stability.damping_N_s_mm > 0) && all_hands_hold(plan))
 		return plan->gain * plan->stability.limit_N_mm / (1 + RESERVE) /
 		       plan->stability.stiffness_N_mm;
 	while (high - low > 1e-4) {
@@ -246,12 +320,13 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 		.period_s = 1 / scene->rate_hz,
 	};
 	set_delay(plan, tracker);
-	s->late_ticks = scene->device.late_ticks;
 	s->certified = true;
+	if (set_lateness(plan, err))
+		return -EDOM;
 	if ((plan->model || plan->fixed) && survey_model(plan, &model_N_mm))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
 	add_up(plan, model_N_mm);
-	s->limit_N_mm = limit_N_mm(plan, s->damping_N_s_mm);
+	set_limits(plan);
 	if (stable(plan, 1))
 		return 0;
 	name_delay(s, tracker, delay);

@@ -125,7 +125,7 @@ void incise_plan_choose(struct incise_plan *plan)
 								     : all[i].run});
 	}
 	/* A device that is not there cannot be kept. */
-	if (plan->stepper)
+	if (plan->axes.n)
 		keep(plan, (struct incise_stage){.name = "actuate",
 						 .always = true,
 						 .run = incise_stage_actuate});

@@ -63,7 +63,6 @@ static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
 {
 	if (rig) {
 		plan->tracker = incise_rig_tracker(rig);
-		plan->stepper = incise_rig_stepper(rig);
 		if (!plan->tracker)
 			return incise_error_set(
 				err, ENODEV,
@@ -71,14 +70,12 @@ static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
 				plan->scene->path);
 		incise_tracker_info(plan->tracker, tracker);
 		incise_rig_surface(rig, place.point_mm, place.normal);
+		incise_axes_take(&plan->axes, rig);
 	}
-	v3_copy(plan->axis, place.normal);
-	if (plan->stepper)
-		incise_stepper_info(plan->stepper, &plan->actuator);
 	plan->surface = plan->scene->surface;
 	if (!plan->surface)
 		plan->surface = plan->own_surface =
-			incise_surface_new_plane(place.point_mm, plan->axis, err);
+			incise_surface_new_plane(place.point_mm, place.normal, err);
 	return plan->surface ? 0 : -errno;
 }
 
@@ -379,30 +376,21 @@ int64_t incise_plan_fade_ns(const struct incise_plan *plan)
 
 int incise_plan_release(struct incise_plan *plan)
 {
-	struct incise_stepper_status status = {0};
-	int rc = plan->stepper ? incise_stepper_set(plan->stepper, 0) : 0;
-
 	/* What ended the ticks stays the cause. */
-	if (!rc || plan->fault)
-		return rc;
-	incise_stepper_status(plan->stepper, &status);
-	incise_stage_refused(plan, &status, rc);
-	plan->fault = rc;
+	int rc = incise_axes_release(&plan->axes, plan->fault);
+
+	if (!plan->fault)
+		plan->fault = rc;
 	return rc;
 }
 
 const char *incise_plan_fault(const struct incise_plan *plan)
 {
-	unsigned int faults = plan->actuator_faults;
+	const char *fault = incise_axes_fault(&plan->axes);
 
 	if (!plan->fault)
 		return NULL;
-	if (faults)
-		return incise_stepper_fault_text(
-			(enum incise_stepper_fault)(faults & -faults));
-	if (plan->actuator_off)
-		return "the actuator has no power: enable it";
-	return strerror(-plan->fault);
+	return fault ? fault : strerror(-plan->fault);
 }
 
 void incise_plan_poses(const struct incise_plan *plan, struct incise_pose_counts *counts)
@@ -438,11 +426,10 @@ int incise_plan_cause(const struct incise_plan *plan, char *text, size_t size)
 	if (plan->fault && plan->blind)
 		return blind_cause(plan, text, size);
 	/* Only of an actuator that has one: else a tracker's failure would go under. */
-	if (plan->fault && plan->actuator_faults)
-		length = incise_stepper_cause(plan->stepper, text, size);
-	else if (plan->fault && !plan->actuator_off && plan->tracker)
+	if (plan->fault)
+		length = incise_axes_cause(&plan->axes, plan->fault, text, size);
+	if (plan->fault && length <= 0 && plan->tracker)
 		length = incise_tracker_cause(plan->tracker, text, size);
-	/* It may have been cleared since, by someone else. */
 	return length > 0 ? length : snprintf(text, size, "%s", fault ? fault : "");
 }
 
@@ -452,7 +439,8 @@ static int fail(struct incise_plan *plan, struct incise_tick *tick, int rc)
 	plan->fault = rc;
 	incise_limit_zero(&plan->limit);
 	memset(tick->command_N, 0, sizeof(tick->command_N));
-	tick->actuated_N = 0;
+	memset(tick->actuated_N, 0, sizeof(tick->actuated_N));
+	tick->unfelt_N = 0;
 	tick->flags |= INCISE_TICK_FAULT;
 	incise_plan_release(plan);
 	return rc;

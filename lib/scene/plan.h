@@ -16,6 +16,7 @@
 #include "../tissue/incision.h"
 #include "../tissue/instrument.h"
 #include "../tissue/line.h"
+#include "actuate.h"
 #include "scene.h"
 
 /* Poses taken at one tick; more than a tracker sends in a period, even after a stall. */
@@ -115,15 +116,7 @@ struct incise_plan {
 	struct incise_limit limit;
 	int64_t last_ns; /* of the last tick; 0: none */
 
-	/* actuate */
-	struct incise_stepper *stepper; /* or NULL */
-	struct incise_stepper_info actuator;
-	double axis[3];	  /* along which it pushes: out of the rig's surface */
-	double handle_mm; /* where the handle was when last asked */
-	bool handle_seen; /* by a pose */
-	unsigned int
-		actuator_faults; /* why it does not move; incise_stepper_fault bits */
-	bool actuator_off;	 /* it has no power */
+	struct incise_axes axes; /* none: nothing is rendered */
 };
 
 /* --- stages, but for the forces, which are in forces.h --- */
@@ -142,11 +135,6 @@ incise_stage_fn incise_stage_membrane;
 incise_stage_fn incise_stage_start;
 incise_stage_fn incise_stage_limit;
 incise_stage_fn incise_stage_actuate;
-
-/* An actuator that does not move any more: keep why. Returns @rc. */
-int incise_stage_refused(struct incise_plan *plan,
-			 const struct incise_stepper_status *status,
-			 int rc) INCISE_REALTIME;
 
 /* --- plan --- */
 

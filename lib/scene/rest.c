@@ -97,7 +97,7 @@ static void set_plans(struct search *s, const struct incise_plan *plan,
 	own->surface = s->plane;
 	incise_proxy_init(&own->proxy, s->plane, plan->proxy.leave_mm);
 	own->tracker = NULL;
-	own->stepper = NULL;
+	own->axes.n = 0;
 	own->fed = s->fed;
 	own->n_fed = 0;
 	if (plan->handle)
@@ -139,11 +139,14 @@ static void set_loop(struct search *s, const struct incise_plan *plan,
 	s->latency_s = (double)tracker->latency_ns / INCISE_NS_PER_S;
 	s->pose_s = fmax(1 / tracker->rate_hz, fmax(s->latency_s / (POSES_MOST - 2),
 						    s->tick_s / (INCISE_PLAN_POSES - 1)));
-	s->late = plan->scene->device.late_ticks;
+	s->late = plan->stability.late_ticks;
 	s->slew_N = INFINITY;
-	if (plan->stepper)
-		s->slew_N = plan->actuator.spring_N_mm * plan->actuator.velocity_mm_s *
-			    s->tick_s;
+	for (int i = 0; i < plan->axes.n; i++) {
+		const struct incise_stepper_info *info = &plan->axes.axis[i].info;
+
+		s->slew_N = fmin(s->slew_N,
+				 info->spring_N_mm * info->velocity_mm_s * s->tick_s);
+	}
 	if (plan->stability.own_delay) {
 		/* The scene says how late all of the loop is, poses and all. */
 		s->late = plan->scene->device.delay_ticks;

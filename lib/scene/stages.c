@@ -306,71 +306,7 @@ int incise_stage_limit(struct incise_plan *plan, struct incise_tick *tick)
 	return 0;
 }
 
-int incise_stage_refused(struct incise_plan *plan,
-			 const struct incise_stepper_status *status, int rc)
-{
-	plan->actuator_faults =
-		status->faults & ~(unsigned int)INCISE_STEPPER_FAULT_TRAVEL;
-	plan->actuator_off = rc == -EIO && status->state == INCISE_STEPPER_STATE_DISABLED;
-	return rc;
-}
-
-/*
- * Where the handle is: as the actuator measures it, else what the hand holds is the
- * handle, and the tracker's pose of it says where along the axis it is. Without a fresh
- * pose it is where it was; before the first one, where the spring is at rest.
- */
-static void find_handle(struct incise_plan *plan, const struct incise_tick *tick,
-			const struct incise_stepper_status *status)
-{
-	double mm = status->handle_mm;
-
-	if (!plan->actuator.measures_handle) {
-		if (!(tick->flags & INCISE_TICK_STALE))
-			mm = v3_dot(tick->tool_mm, plan->axis) - plan->actuator.origin_mm;
-		else if (!plan->handle_seen)
-			mm = status->position_mm;
-	}
-	if (!isfinite(mm))
-		return;
-	plan->handle_mm = mm;
-	plan->handle_seen |= !(tick->flags & INCISE_TICK_STALE);
-}
-
-static double rendered(const struct incise_plan *plan,
-		       const struct incise_stepper_status *status)
-{
-	double force_N = status->force_N;
-
-	if (!plan->actuator.measures_handle)
-		force_N = plan->actuator.spring_N_mm *
-			  (status->position_mm - plan->handle_mm);
-	return isfinite(force_N) ? force_N : 0;
-}
-
-/*
- * The actuator renders a force through its spring: the nut goes where the spring would
- * push with that force on the handle where it was at the last tick. It has one axis; what
- * of the force is across it is not felt.
- */
 int incise_stage_actuate(struct incise_plan *plan, struct incise_tick *tick)
 {
-	double along_N = v3_dot(plan->limit.last_N, plan->axis), target_mm, held_mm;
-	struct incise_stepper_status status = {0};
-	int rc = incise_stepper_status(plan->stepper, &status);
-
-	if (rc)
-		return incise_stage_refused(plan, &status, rc);
-	tick->actuated_N = along_N;
-	find_handle(plan, tick, &status);
-	tick->rendered_N = rendered(plan, &status);
-	target_mm = plan->handle_mm + along_N / plan->actuator.spring_N_mm;
-	held_mm = fmax(0, fmin(plan->actuator.travel_mm, target_mm));
-	/* Less than a step beyond is where its position is read to. */
-	if (fabs(target_mm - held_mm) > plan->actuator.step_mm)
-		tick->flags |= INCISE_TICK_TRAVEL;
-	rc = incise_stepper_set(plan->stepper, held_mm);
-	if (rc)
-		incise_stepper_status(plan->stepper, &status);
-	return rc ? incise_stage_refused(plan, &status, rc) : 0;
+	return incise_axes_render(&plan->axes, plan->limit.last_N, tick);
 }

@@ -153,7 +153,7 @@ static void compare(struct kept *k, const struct incise_tick *tick)
 					 fabs(k->command_N[i] - tick->command_N[i]));
 	}
 	day.rendered_off_N =
-		fmax(day.rendered_off_N, fabs(k->rendered_N - tick->rendered_N));
+		fmax(day.rendered_off_N, fabs(k->rendered_N - tick->rendered_N[0]));
 }
 
 static int ticked(void *context, const struct incise_tick *tick)
@@ -179,7 +179,7 @@ static int ticked(void *context, const struct incise_tick *tick)
 	} else if (number == 1) {
 		memcpy(k->position_mm, tick->position_mm, sizeof(k->position_mm));
 		memcpy(k->command_N, tick->command_N, sizeof(k->command_N));
-		k->rendered_N = tick->rendered_N;
+		k->rendered_N = tick->rendered_N[0];
 		k->flags = tick->flags;
 	}
 	day.ticks++;

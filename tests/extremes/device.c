@@ -130,8 +130,8 @@ static void prepare(bool nonsense)
 static bool finite_tick(const struct incise_tick *t, double limit_N)
 {
 	return v3_finite(t->position_mm) && v3_finite(t->tool_mm) &&
-	       v3_length(t->command_N) <= limit_N && isfinite(t->rendered_N) &&
-	       isfinite(t->actuated_N) && isfinite(t->depth_mm);
+	       v3_length(t->command_N) <= limit_N && isfinite(t->rendered_N[0]) &&
+	       isfinite(t->actuated_N[0]) && isfinite(t->depth_mm);
 }
 
 /* @failed: what a tick before returned. */
@@ -181,7 +181,7 @@ static void run(struct extremes_row *row, const struct incise_scene *scene, bool
 			row, is_right(plan, rc, failed, &tick),
 			"tick %d: %d after %d, force " V3 ", rendered %a, target %a, "
 			"flags %#x, fault '%s'; failure %d with %d and faults %#x, of %s",
-			k, rc, failed, V3_OF(tick.command_N), tick.rendered_N,
+			k, rc, failed, V3_OF(tick.command_N), tick.rendered_N[0],
 			hostile.target_mm, tick.flags, incise_plan_fault(plan) ?: "",
 			hostile.what, hostile.rc, hostile.faults, spec);
 		failed = rc;

@@ -38,7 +38,7 @@ static bool is_finite(const struct incise_tick *t)
 	return v3_finite(t->position_mm) && v3_finite(t->tool_mm) &&
 	       v3_finite(t->proxy_mm) && v3_finite(t->normal) &&
 	       v3_finite(t->command_N) && isfinite(t->depth_mm) &&
-	       isfinite(t->velocity_mm_s) && isfinite(t->rendered_N);
+	       isfinite(t->velocity_mm_s) && isfinite(t->rendered_N[0]);
 }
 
 static bool is_within_limits(const struct incise_tick *t, const struct incise_tick *was)

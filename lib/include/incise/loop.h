@@ -62,12 +62,14 @@ struct incise_loop_stats {
 	size_t logged;
 	uint64_t lateness_us[INCISE_LOOP_BINS]; /**< of the wake-up */
 	int64_t lateness_max_ns;
-	int64_t tick_max_ns;		       /**< cost of the plan */
-	uint64_t tick_100ns[INCISE_LOOP_BINS]; /**< cost of the plan, bins of 100 ns */
-	double force_N;			       /**< commanded at the last tick */
-	double force_max_N;		       /**< largest commanded */
-	double actuated_N;		       /**< of that along the actuator's axis */
-	double rendered_off2; /**< Σ (rendered - actuated a tick before)², N² */
+	int64_t tick_max_ns;			/**< cost of the plan */
+	uint64_t tick_100ns[INCISE_LOOP_BINS];	/**< cost of the plan, bins of 100 ns */
+	double force_N;				/**< commanded at the last tick */
+	double force_max_N;			/**< largest commanded */
+	double actuated_N[INCISE_RIG_AXES_MAX]; /**< of that along each actuator's axis */
+	double rendered_off2; /**< Σ (rendered - actuated a tick before)² of each, N² */
+	double unfelt2;	      /**< Σ of the squares of what no actuator can push, N² */
+	double unfelt_max_N;  /**< largest of that */
 	struct incise_pose_counts poses; /**< at the end of the run */
 };
 

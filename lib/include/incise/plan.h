@@ -106,7 +106,16 @@ struct incise_plan_stability {
 	 * that of the loop with the tracker's rate and latency, and with the predictor.
 	 */
 	double limit_N_mm;
-	int late_ticks; /**< of the actuator, on top of the tracker's loop */
+	int late_ticks; /**< of the latest actuator, on top of the tracker's loop */
+	int n_axes;	/**< actuators of the rig; 0 without */
+	/** Of each actuator: the wall that is felt along it. */
+	struct {
+		/** The scene's largest, of any direction; more where the directions are not
+		 * at right angles, as actuators then push against each other. */
+		double stiffness_N_mm;
+		double limit_N_mm; /**< that the device holds with this actuator's lateness */
+		int late_ticks; /**< the scene's, or the actuator's own where that is more */
+	} axis[INCISE_RIG_AXES_MAX];
 	/** Largest slope of the model's force by the speed, either way; 0 without one. */
 	double speed_slope_N_s_mm;
 	double slope_N_mm; /**< largest by the depth; 0 without a model */
@@ -184,9 +193,12 @@ struct incise_tick {
 	double depth_mm;
 	double velocity_mm_s; /**< speed of the tip */
 	double command_N[3];  /**< force asked for, in the tracker's frame */
-	double actuated_N;    /**< its part along the actuator's axis, 0 without one */
-	double rendered_N;    /**< force of the actuator on the hand, 0 without one */
-	unsigned int flags;   /**< incise_tick_flag bits */
+	/** Along each actuator's direction; together the part that can be felt. 0 without one. */
+	double actuated_N[INCISE_RIG_AXES_MAX];
+	/** Force of each actuator on the hand, 0 without one. */
+	double rendered_N[INCISE_RIG_AXES_MAX];
+	double unfelt_N;    /**< size of the rest of command_N, 0 without an actuator */
+	unsigned int flags; /**< incise_tick_flag bits */
 	enum incise_phase phase;
 	enum incise_tool tool; /**< never AUTO */
 };

@@ -193,16 +193,16 @@ static int look(void *context, const struct incise_tick *tick)
 		fail_msg("record %llu, spell %d: %g N, %.1f ms after the last good pose",
 			 (unsigned long long)sender.k, sender.spell, force_N,
 			 (double)since_ns * 1e-6);
-	if (!(fabs(tick->rendered_N) <= (since_ns > seen->most_ns + SETTLE_NS
-						 ? seen->rest_N
-						 : FORCE_N + seen->step_N)))
+	if (!(fabs(tick->rendered_N[0]) <= (since_ns > seen->most_ns + SETTLE_NS
+						    ? seen->rest_N
+						    : FORCE_N + seen->step_N)))
 		fail_msg(
 			"record %llu: the actuator pushes with %g N, %.1f ms after the last "
 			"good pose",
-			(unsigned long long)sender.k, tick->rendered_N,
+			(unsigned long long)sender.k, tick->rendered_N[0],
 			(double)since_ns * 1e-6);
-	seen->rendered_max_N = fmax(seen->rendered_max_N, fabs(tick->rendered_N));
-	seen->actuated_max_N = fmax(seen->actuated_max_N, fabs(tick->actuated_N));
+	seen->rendered_max_N = fmax(seen->rendered_max_N, fabs(tick->rendered_N[0]));
+	seen->actuated_max_N = fmax(seen->actuated_max_N, fabs(tick->actuated_N[0]));
 	seen->felt += force_N > 0;
 	seen->faded += late && !seen->late;
 	seen->without += late;

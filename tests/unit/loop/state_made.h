@@ -65,8 +65,8 @@ static inline struct incise_tick made_tick(int64_t n)
 		.depth_mm = x + 16,
 		.velocity_mm_s = x + 17,
 		.command_N = {0, 0, x + 18},
-		.actuated_N = x + 19,
-		.rendered_N = x + 20,
+		.actuated_N = {x + 19},
+		.rendered_N = {x + 20},
 		.flags = (unsigned int)n % (1u << INCISE_TICK_FLAGS),
 		.phase = (enum incise_phase)(n % 3),
 		.tool = (enum incise_tool)(1 + n % 3),
@@ -84,8 +84,9 @@ static inline int made_same(const struct incise_tick *a, const struct incise_tic
 	       !memcmp(a->normal, b->normal, sizeof(a->normal)) &&
 	       a->depth_mm == b->depth_mm && a->velocity_mm_s == b->velocity_mm_s &&
 	       !memcmp(a->command_N, b->command_N, sizeof(a->command_N)) &&
-	       a->actuated_N == b->actuated_N && a->rendered_N == b->rendered_N &&
-	       a->flags == b->flags && a->phase == b->phase && a->tool == b->tool;
+	       a->actuated_N[0] == b->actuated_N[0] &&
+	       a->rendered_N[0] == b->rendered_N[0] && a->flags == b->flags &&
+	       a->phase == b->phase && a->tool == b->tool;
 }
 
 static inline void made_ticks(struct incise_state_writer *writer, int64_t from,

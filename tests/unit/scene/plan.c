@@ -134,7 +134,7 @@ static void test_against_truth(void **state)
 				continue;
 			assert_false(t.flags & INCISE_TICK_STALE);
 			depth += pow(t.depth_mm - truth.depth_mm, 2) / 9400;
-			render += pow(t.rendered_N - last_N, 2) / 9400;
+			render += pow(t.rendered_N[0] - last_N, 2) / 9400;
 			last_N = size(t.command_N);
 			limited += !!(t.flags & LIMITED);
 			began = t.flags & INCISE_TICK_CONTACT && !touched;
@@ -231,7 +231,7 @@ static void test_any_pose_gives_a_force_within_limits(void **state)
 			assert_true(isfinite(force) && force <= FELT_LIMIT_N);
 			assert_true(fabs(force - last) <= FELT_SLEW_N_S / 1000 + 1e-12);
 			assert_true(isfinite(t.depth_mm) && isfinite(t.velocity_mm_s));
-			assert_true(isfinite(t.rendered_N));
+			assert_true(isfinite(t.rendered_N[0]));
 			last = force;
 			contacts += t.flags & INCISE_TICK_CONTACT;
 		}
