@@ -463,8 +463,9 @@ static int check_directions(const struct incise_rig_plan *plan, const char *wher
 				return -EINVAL;
 	incise_axes_dual(plan->n_axes, plan->direction, dual);
 	for (int i = 0; i < plan->n_axes; i++) {
-		apart_deg = asin(fmin(1, 1 / v3_length(dual[i]))) / DEG;
-		/* Not a number: in the plane of the others. */
+		/* Not a number: in the plane of the others. By rounding 1 may be passed. */
+		apart_deg = 1 / v3_length(dual[i]);
+		apart_deg = apart_deg >= 1 ? 90 : asin(apart_deg) / DEG;
 		if (!(apart_deg >= APART_DEG - ROUNDING))
 			return incise_error_set(
 				err, EINVAL,

@@ -277,6 +277,150 @@ static void real_steppers_are_refused_with_a_line(void **state)
 	}
 }
 
+/* --- several actuators --- */
+
+#define MOTOR "spring_N_mm = 2.0; travel_mm = 9.0; lead_mm = 2.0; "
+#define TWO "stepper = [\"kernel:/dev/x:0\", \"kernel:/dev/x:1\"];"
+#define THREE "stepper = [\"kernel:/dev/x:0\", \"kernel:/dev/x:1\", \"kernel:/dev/x:2\"];"
+
+static int read_steppers(const char *text, struct incise_rig_plan *all,
+			 struct incise_error *err)
+{
+	struct temp_file file = temp_file_new("rig.conf", text);
+	int rc = incise_rig_plan_read(all, file.path, INCISE_RIG_STEPPER, err);
+
+	incise_rig_plan_free(all);
+	temp_file_free(&file);
+	return rc;
+}
+
+static void each_stepper_has_its_group(void **state)
+{
+	struct incise_error err = {0};
+	struct incise_rig_plan all;
+
+	if (read_steppers("surface = { normal = [0.0, 0.0, 2.0]; };" TWO
+			  "actuator = ( {" MOTOR "late_ms = 2; }, {" MOTOR
+			  "direction = [0.0, -3.0, 0.0]; rest_mm = 4.5; } );",
+			  &all, &err))
+		fail_msg("%s", err.text);
+	assert_int_equal(all.n_axes, 2);
+	/* By default out of the surface. */
+	assert_true(all.direction[0][2] == 1 && all.direction[0][0] == 0);
+	assert_true(all.direction[1][1] == -1);
+	assert_true(all.actuator[0].rest_mm == 0 && all.actuator[1].rest_mm == 4.5);
+	assert_true(all.actuator[0].late_s == 2e-3 && all.actuator[1].late_s == 0);
+	/* One as ever, alone or in a list. */
+	for (int i = 0; i < 2; i++) {
+		assert_int_equal(
+			read_steppers(i ? "stepper = \"kernel:/dev/x\"; actuator = "
+					  "{" MOTOR "};"
+					: "stepper = [\"kernel:/dev/x\"]; actuator "
+					  "= ( {" MOTOR "} );",
+				      &all, &err),
+			0);
+		assert_int_equal(all.n_axes, 1);
+		assert_true(all.direction[0][2] == 1);
+	}
+	/* 30 degrees are enough. */
+	assert_int_equal(read_steppers(TWO
+				       "actuator = ( {" MOTOR "}, {" MOTOR
+				       "direction = [0.5, 0.0, 0.8660254037844386]; } );",
+				       &all, &err),
+			 0);
+}
+
+static void the_virtual_rig_has_up_to_three(void **state)
+{
+	for (int n = 1; n <= 3; n++) {
+		char spec[] = "sim:clock=simulated,axes=1";
+		double direction[3] = {9, 9, 9};
+		struct incise_rig *rig;
+
+		spec[sizeof(spec) - 2] = (char)('0' + n);
+		rig = incise_rig_open(spec, INCISE_RIG_STEPPER, NULL);
+		assert_non_null(rig);
+		for (int i = 0; i < n; i++) {
+			assert_non_null(incise_rig_axis(rig, i, direction));
+			/* Normal, across the blade, along the cut. */
+			for (int k = 0; k < 3; k++)
+				assert_true(direction[k] == (k == 2 - i));
+		}
+		assert_ptr_equal(incise_rig_axis(rig, 0, NULL), incise_rig_stepper(rig));
+		direction[0] = 7;
+		assert_null(incise_rig_axis(rig, n, direction));
+		assert_null(incise_rig_axis(rig, -1, NULL));
+		assert_true(direction[0] == 7);
+		incise_rig_close(rig);
+	}
+}
+
+static void several_steppers_are_refused_with_a_line(void **state)
+{
+	static const struct {
+		const char *text, *says;
+	} row[] = {
+		{TWO "\nactuator = {" MOTOR "};",
+		 ":1: stepper: expected 1 to 3, each with its "
+		 "group in actuator = ( { … }, { … } ), "
+		 "found 2 and 1 groups"},
+		{"stepper = \"kernel:/dev/x\";\nactuator = ( {" MOTOR "}, {" MOTOR "} );",
+		 ":1: stepper: one is named, but actuator has 2 groups"},
+		{"actuator = ();",
+		 ":1: actuator: expected a group { key = value; }, or 1 to 3"},
+		{"actuator = ( {" MOTOR "}, {" MOTOR "}, {" MOTOR "}, {" MOTOR "} );",
+		 "found 4"},
+		{"actuator = ( 3 );", ":1: actuator: expected groups { key = value; }"},
+		{"stepper = [\"sim:\", \"sim:\"];",
+		 ":1: stepper 1: expected text in quotes"},
+		{"stepper = [];", "found 0 and 0 groups"},
+		{"stepper = [\"kernel:x\", \"kernel\"]; actuator = ( {" MOTOR "}, {" MOTOR
+		 "} );",
+		 ":1: stepper 2: expected BACKEND:ARGUMENTS"},
+		/* Directions. */
+		{TWO "actuator = ( {" MOTOR "}, {" MOTOR "} );",
+		 ":1: the directions of actuators 1 and 2 lie within 0 degrees of one line: "
+		 "expected 30 or more; give each actuator a direction"},
+		{TWO "actuator = ( {" MOTOR "}, {" MOTOR
+		     "direction = [0.0, 0.1, -1.0]; } );",
+		 "actuators 1 and 2 lie within 5.71 degrees of one line"},
+		{TWO "actuator = ( {" MOTOR "}, {" MOTOR
+		     "direction = [0.499, 0.0, 0.8666]; } );",
+		 "within 29.9 degrees"},
+		{THREE "actuator = ( {" MOTOR "}, {" MOTOR
+		       "direction = [0.0, 1.0, 0.0]; }, {" MOTOR
+		       "direction = [0.0, 1.0, 0.4]; } );",
+		 "actuators 2 and 3 lie within 21.8 degrees of one line"},
+		{THREE "actuator = ( {" MOTOR "}, {" MOTOR
+		       "direction = [0.0, 1.0, 0.0]; }, {" MOTOR
+		       "direction = [0.0, 1.0, 1.0]; } );",
+		 "the direction of actuator 1 lies within 0 degrees of the plane of the other "
+		 "two: expected 30 or more"},
+		{THREE "actuator = ( {" MOTOR "}, {" MOTOR
+		       "direction = [0.0, 1.0, 0.0]; }, {" MOTOR
+		       "direction = [0.5, 1.0, 1.0]; } );",
+		 "of the plane of the other two"},
+		{"actuator = {" MOTOR "direction = [0.0, 0.0, 0.0]; };",
+		 ":1: actuator.direction: expected a direction"},
+		{"actuator = {" MOTOR "rest_mm = 9.5; };",
+		 ":1: actuator.rest_mm: expected at most travel_mm, 9, found 9.5"},
+		{"stepper = \"sim:\"; sim = { axes = 4; };",
+		 ":1: sim.axes: expected a whole number from 1 to 3, found 4"},
+		{"stepper = \"sim:\"; sim = { axes = 2; }; surface = { normal = [0.0, 1.0, "
+		 "0.0]; };",
+		 ":1: the directions of actuators 1 and 2 lie within 0 degrees"},
+	};
+
+	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
+		struct incise_error err = {0};
+		struct incise_rig_plan all;
+
+		if (read_steppers(row[i].text, &all, &err) != -EINVAL ||
+		    !strstr(err.text, row[i].says))
+			fail_msg("row %zu: %d, \"%s\"", i, err.code, err.text);
+	}
+}
+
 /* Its text is checked whole, whatever is opened of it. */
 static void the_example_is_a_good_one(void **state)
 {
@@ -456,6 +600,9 @@ int main(void)
 		cmocka_unit_test(empty_file_is_a_rig_without_devices),
 		cmocka_unit_test(file_refuses),
 		cmocka_unit_test(real_steppers_are_refused_with_a_line),
+		cmocka_unit_test(each_stepper_has_its_group),
+		cmocka_unit_test(the_virtual_rig_has_up_to_three),
+		cmocka_unit_test(several_steppers_are_refused_with_a_line),
 		cmocka_unit_test(the_example_is_a_good_one),
 		cmocka_unit_test(without_groups_all_is_by_default),
 		cmocka_unit_test(an_empty_vision_is_of_a_black_handle),
