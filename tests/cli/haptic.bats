@@ -365,3 +365,48 @@ beside_the_model() {
 	run --separate-stderr incise haptic inc.scene --rig sim:
 	failed_with "inc.scene:2: " "@include"
 }
+
+# A blade that is turned towards its way, so that its plane constraint pulls aside.
+turned_blade() {
+	cat >side.scene <<-END
+		tissue = { reaction_N_mm = 0.1; plane_N_mm = 0.05; };
+		tool = { side = [0.6, 0.8, 0.0]; };
+	END
+	cut=sim:clock=simulated,depth_mm=10,times=1,pause_s=0.5,cut_s=2,tracker_noise_mm=0
+}
+
+# Rms of an expression of awk over the ticks of a log.
+rms() { awk -F, "NR > 1 { sum += ($2) ^ 2 } END { printf \"%.9f\", sqrt(sum / (NR - 1)) }" "$1"; }
+
+@test "two axes feel the plane constraint, and one counts it as not felt" {
+	turned_blade
+	for n in 1 2 3; do
+		incise haptic side.scene --rig $cut,axes=$n --duration 2s --json --log $n.csv >$n.json
+		[ "$(key $n.json "actuators[#-1].direction")" = "$(key $n.json "actuators[$((n - 1))].direction")" ]
+	done
+	[ "$(key 3.json "actuators[0].direction")" = "[0.0,0.0,1.0]" ]
+	[ "$(key 3.json "actuators[1].direction")" = "[0.0,1.0,0.0]" ]
+	[ "$(key 3.json "actuators[2].direction")" = "[1.0,0.0,0.0]" ]
+	# $11 to $13 are the command's parts, with five decimals
+	holds "$(rms 1.csv '$12') > 0.2"
+	holds "($(key 1.json unfelt_rms_N) - $(rms 1.csv 'sqrt($11^2 + $12^2)'))^2 < 1e-10"
+	holds "($(key 2.json unfelt_rms_N) - $(rms 2.csv '$11'))^2 < 1e-10"
+	holds "($(key 2.json unfelt_rms_N) - $(rms 2.csv '$15'))^2 < 1e-10"
+	holds "$(key 3.json unfelt_max_N) < 1e-12"
+	[ "$(head -n 1 2.csv)" = "$(head -n 1 1.csv),rendered_2_N,unfelt_N" ]
+	[ "$(head -n 1 3.csv)" = "$(head -n 1 1.csv),rendered_2_N,rendered_3_N,unfelt_N" ]
+	# the hand is pushed aside by what was asked a tick before, within a tenth
+	awk -F, '$10 == "cutting" && before { off += ($14 - last)^2; sum += last^2 }
+		{ last = $12; before = $10 == "cutting" }
+		END { exit !(sum > 0 && off < 0.01 * sum) }' 2.csv
+	# the first axis is as if it were alone
+	for n in 2 3; do
+		cut -d, -f1-13 $n.csv | cmp - 1.csv
+	done
+}
+
+@test "the report names what is felt and what is not" {
+	turned_blade
+	run -0 --separate-stderr incise haptic side.scene --rig $cut,axes=2 --duration 2s
+	[[ "$output" =~ felt\ +along\ \(0,\ 0,\ 1\),\ along\ \(0,\ 1,\ 0\)\;\ not\ felt:\ 0\.[0-9]*[1-9] ]]
+}

@@ -174,3 +174,23 @@ setup() {
 	run -1 --separate-stderr bash -c "incise plan wall.scene >/dev/full"
 	[ "${#stderr_lines[@]}" -eq 1 ]
 }
+
+@test "plan says which directions are felt on a rig, and how stable each is" {
+	rig=sim:clock=simulated
+	for n in 1 2 3; do
+		incise plan wall.scene --rig $rig,axes=$n >$n.txt
+		[ "$(grep -cE '^(felt|   ) +along \(' $n.txt)" = $n ]
+	done
+	grep -q "^ *not felt: forces across it$" 1.txt
+	grep -qE "^ *not felt: forces along \(-?1, 0, 0\)$" 2.txt
+	! grep -q "not felt" 3.txt
+	incise plan wall.scene --rig $rig,axes=2 --json >two.json
+	[ "$(key two.json axes[0].direction)" = "[0.0,0.0,1.0]" ]
+	[ "$(key two.json axes[#-1].direction)" = "[0.0,1.0,0.0]" ]
+	for i in 0 1; do
+		[ "$(key two.json axes[$i].limit_N_mm)" = "$(key two.json limit_N_mm)" ]
+		[ "$(key two.json axes[$i].stiffness_N_mm)" = "$(key two.json stiffness_N_mm)" ]
+	done
+	incise plan wall.scene --json >none.json
+	[ "$(key none.json axes)" = '[]' ]
+}

@@ -244,3 +244,12 @@ until_it_says() {
 	run --separate-stderr incise info ./stepper # a file of that name
 	failed_with ./stepper
 }
+
+@test "--axis chooses one of the rig's actuators" {
+	run -0 --separate-stderr incise stepper status --rig $quick,axes=2 --axis 2
+	# it pushes both ways, and rests half way
+	[ "${lines[0]}" = "virtual haptic scalpel, across the blade: ready at 10.0000 mm (step 16000), homed" ]
+	run --separate-stderr incise stepper status --rig $quick,axes=2 --axis 3
+	failed_with "--axis 3: the rig has no such actuator"
+	run -2 --separate-stderr incise stepper status --rig $quick --axis 4
+}
