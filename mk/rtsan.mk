@@ -36,7 +36,7 @@ $(O)/lib/libincise-rtsan.a: $(call objects,incise) $(rtsan_objects)
 rtsan_units := $(filter-out $(if $(has_libmnl),,can/can_stepper),\
 	can/can_stepper device/motor device/stepper_gpio device/stepper_kernel loop/loop \
 	loop/loop_control loop/state_page \
-	scene/extreme scene/plan scene/procedure sim/sim_stepper)
+	scene/actuate scene/extreme scene/felt_axes scene/plan scene/procedure sim/sim_stepper)
 rtsan_programs := $(patsubst tests/rtsan/%.c,$(O)/tests/rtsan/%,$(wildcard tests/rtsan/*.c))
 rtsan_unit_programs := $(addprefix $(O)/again/tests/unit/,$(rtsan_units))
 

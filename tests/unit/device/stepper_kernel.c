@@ -272,6 +272,34 @@ static void every_case(void **state)
 	}
 }
 
+/* Two motors through one open file are asked of the real module, in tests/vm. */
+static void a_motor_is_one_actuator_of_a_rig(void **state)
+{
+	struct incise_error err = {0};
+	struct incise_stepper *owner;
+	struct incise_backend_request request = {
+		.arguments = "/dev/incise-stepper0:2",
+		.where = "rig.conf:3: stepper 2",
+		.actuator = &actuator,
+		.siblings = &owner,
+		.n_siblings = 1,
+	};
+
+	module_load();
+	owner = open_stepper("/dev/incise-stepper0:2", false, &actuator, NULL);
+	assert_non_null(owner);
+	assert_null(incise_stepper_kernel.open(&request, &err));
+	assert_int_equal(errno, EINVAL);
+	assert_string_equal(err.text, "rig.conf:3: stepper 2: motor 2 of "
+				      "/dev/incise-stepper0 is an actuator of this rig "
+				      "already; name another");
+	/* The first one goes on. */
+	assert_int_equal(module.opened, 1);
+	assert_int_equal(incise_stepper_enable(owner, NULL), 0);
+	owner->ops->close(owner);
+	assert_int_equal(module.opened, 0);
+}
+
 static void a_watcher_only_looks(void **state)
 {
 	struct incise_stepper_status status;
@@ -447,6 +475,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(every_case),
+		cmocka_unit_test(a_motor_is_one_actuator_of_a_rig),
 		cmocka_unit_test(a_watcher_only_looks),
 		cmocka_unit_test(why_it_does_not_open_is_said),
 		cmocka_unit_test(what_the_last_owner_left_is_waited_for),
