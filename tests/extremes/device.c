@@ -21,6 +21,7 @@
 #define TICKS 250
 #define MS INT64_C(1000000)
 #define TRAVEL_mm 20
+#define ROUNDING 1e-15 /* of a sum of squares, and its root */
 
 enum failure { FAILS_READ, FAILS_SET, FAILS_STATUS, FAILS_FAULT, FAILS_NEVER };
 
@@ -28,6 +29,7 @@ enum failure { FAILS_READ, FAILS_SET, FAILS_STATUS, FAILS_FAULT, FAILS_NEVER };
 static struct hostile {
 	const struct incise_tracker_ops *tracker;
 	const struct incise_stepper_ops *stepper;
+	int axes, axis; /* of the rig; the one that fails */
 	struct incise_tracker_ops tracker_ops;
 	struct incise_stepper_ops stepper_ops;
 	int fails_at; /* ticks until it fails; below 0: never */
@@ -95,6 +97,7 @@ static void take_devices(struct incise_rig *rig)
 	struct incise_tracker *tracker = incise_rig_tracker(rig);
 	struct incise_stepper *stepper = incise_rig_stepper(rig);
 
+	/* The virtual actuators' functions are the same. */
 	hostile.tracker = tracker->ops;
 	hostile.tracker_ops = *tracker->ops;
 	hostile.tracker_ops.read = hostile_read;
@@ -103,13 +106,16 @@ static void take_devices(struct incise_rig *rig)
 	hostile.stepper_ops = *stepper->ops;
 	hostile.stepper_ops.set = hostile_set;
 	hostile.stepper_ops.status = hostile_status;
-	stepper->ops = &hostile.stepper_ops;
+	for (int i = 0; i < hostile.axes; i++)
+		if (i == hostile.axis || hostile.nonsense)
+			incise_rig_axis(rig, i, NULL)->ops = &hostile.stepper_ops;
 }
 
 static void give_back_devices(struct incise_rig *rig)
 {
 	incise_rig_tracker(rig)->ops = hostile.tracker;
-	incise_rig_stepper(rig)->ops = hostile.stepper;
+	for (int i = 0; i < hostile.axes; i++)
+		incise_rig_axis(rig, i, NULL)->ops = hostile.stepper;
 }
 
 static void prepare(bool nonsense)
@@ -130,8 +136,9 @@ static void prepare(bool nonsense)
 static bool finite_tick(const struct incise_tick *t, double limit_N)
 {
 	return v3_finite(t->position_mm) && v3_finite(t->tool_mm) &&
-	       v3_length(t->command_N) <= limit_N && isfinite(t->rendered_N[0]) &&
-	       isfinite(t->actuated_N[0]) && isfinite(t->depth_mm);
+	       v3_length(t->command_N) <= limit_N && v3_finite(t->rendered_N) &&
+	       v3_length(t->actuated_N) <= limit_N * (1 + ROUNDING) &&
+	       t->unfelt_N <= limit_N * (1 + ROUNDING) && isfinite(t->depth_mm);
 }
 
 /* @failed: what a tick before returned. */
@@ -161,8 +168,11 @@ static void run(struct extremes_row *row, const struct incise_scene *scene, bool
 	struct incise_rig *rig;
 	int failed = 0;
 
-	snprintf(spec, sizeof(spec), "sim:clock=simulated,seed=%u,pause_s=0.1,cut_s=1",
-		 1 + below(1000));
+	hostile.axes = 1 + (int)below(INCISE_RIG_AXES_MAX);
+	hostile.axis = (int)below((unsigned int)hostile.axes);
+	snprintf(spec, sizeof(spec),
+		 "sim:clock=simulated,seed=%u,pause_s=0.1,cut_s=1,axes=%d",
+		 1 + below(1000), hostile.axes);
 	rig = incise_rig_open(spec, INCISE_RIG_TRACKER | INCISE_RIG_STEPPER, &err);
 	if (!rig)
 		cli_fail_with(&err);
@@ -179,9 +189,9 @@ static void run(struct extremes_row *row, const struct incise_scene *scene, bool
 		rc = incise_plan_tick(plan, incise_clock_now(clock), &tick);
 		extremes_check(
 			row, is_right(plan, rc, failed, &tick),
-			"tick %d: %d after %d, force " V3 ", rendered %a, target %a, "
+			"tick %d: %d after %d, force " V3 ", rendered " V3 ", target %a, "
 			"flags %#x, fault '%s'; failure %d with %d and faults %#x, of %s",
-			k, rc, failed, V3_OF(tick.command_N), tick.rendered_N[0],
+			k, rc, failed, V3_OF(tick.command_N), V3_OF(tick.rendered_N),
 			hostile.target_mm, tick.flags, incise_plan_fault(plan) ?: "",
 			hostile.what, hostile.rc, hostile.faults, spec);
 		failed = rc;
@@ -213,12 +223,12 @@ static void try_devices(struct extremes_row *row, const struct property *propert
 
 const struct property device_properties[] = {
 	{"device_fault",
-	 "a tracker or an actuator of the virtual rig fails, or latches a fault, at any "
-	 "tick of a cut: that tick and all after it tell it with its reason, and ask for "
+	 "a tracker or one of one to three actuators of the virtual rig fails, or latches a "
+	 "fault, at any tick of a cut: that tick and all after it tell it with its reason, and ask for "
 	 "no force",
 	 RUNS, .all = try_devices, .kind = false},
 	{"device_nonsense",
-	 "both tell numbers that cannot be: forces within the limit, and targets within "
+	 "all of them tell numbers that cannot be: forces within the limit, and targets within "
 	 "the travel",
 	 RUNS, .all = try_devices, .kind = true},
 	{0},
