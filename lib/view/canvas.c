@@ -59,6 +59,23 @@ int canvas_tiles_next(struct canvas_tiles *tiles, int number)
 	return number;
 }
 
+void canvas_clip_row(float from, float step, float low, float high, int *left, int *right)
+{
+	float a, b;
+
+	if (fabsf(step) < 1e-9f) {
+		if (from < low || from > high)
+			*right = *left;
+		return;
+	}
+	a = ((step > 0 ? low : high) - from) / step;
+	b = ((step > 0 ? high : low) - from) / step;
+	if (a > (float)*left)
+		*left = a < (float)*right ? (int)ceilf(a) : *right;
+	if (b < (float)*right - 1)
+		*right = b >= (float)*left ? (int)floorf(b) + 1 : *left;
+}
+
 static void make_tables(struct incise_canvas *canvas)
 {
 	for (int i = 0; i < 256; i++) {

@@ -59,6 +59,13 @@ static inline struct incise_rect canvas_tile_rect(const struct canvas_tiles *til
 				    CANVAS_TILE};
 }
 
+/*
+ * Narrow the texels of a row, @left up to before @right, to those i where
+ * low <= from + step * i <= high.
+ */
+void canvas_clip_row(float from, float step, float low, float high, int *left,
+		     int *right);
+
 /* A rectangle of a level that has changed; in texels of that level. */
 struct incise_upload {
 	int level;

@@ -47,7 +47,7 @@ static const char surface_vs[] = HEAD
 	"	float fall = 1.0 / (1.0 + dot(off, off));\n"
 	"	p -= n * (dent_mm * fall * fall);\n"
 	"	n = normalize(n - (4.0 * dent_mm / dent.w * fall * fall * fall) * off);\n"
-	"	t = normalize(t - dot(t, n) * n);\n"
+	"	t -= dot(t, n) * n;\n"
 	"	vec3 b = in_2.w * cross(n, t);\n"
 	"	vec3 h = normalize(normalize(camera - p) + key);\n"
 	"	float dark = 0.0;\n"
@@ -67,7 +67,7 @@ static const char surface_vs[] = HEAD
  * Only wet surfaces are deep red. The texture's alpha is the slope towards the lamp, see draw.c.
  *
  * A surgical drape lies round a neck and hides the border of its texture. Blood runs below it, and
- * soaks its edge: the stain is the texture, blurred by its smaller levels.
+ * soaks its edge.
  */
 static const char surface_fs[] = HEAD
 	"in vec2 uv;\n"
@@ -82,13 +82,13 @@ static const char surface_fs[] = HEAD
 	"	vec2 in_from = min(uv, 1.0 - uv);\n"
 	"	float edge = min(in_from.x, in_from.y) - cloth;\n"
 	"	float skin = clamp(edge * 400.0, 0.0, 1.0);\n"
-	"	vec4 c = texture(base, uv, edge < 0.0 ? 4.0 : 0.0);\n"
+	"	vec4 c = texture(base, uv);\n"
 	"	float wet = clamp(3.0 * c.r - 7.0 * c.g, 0.0, 1.0);\n"
 	"	float s = c.a * (255.0 / 127.0) - 128.0 / 127.0;\n"
 	"	vec3 n = vec3(way * s, 1.0 - 0.5 * s * s);\n"
 	"	n.xy *= skin;\n"
 	"	float below = clamp(edge * 60.0 + 0.55, 0.55, 1.0);\n"
-	"	float soaked = clamp(1.9 - 2.6 * c.g / c.r, 0.0, 1.0) * clamp(1.0 + edge * 30.0, 0.0, 1.0);\n"
+	"	float soaked = wet * clamp(1.0 + edge * 40.0, 0.0, 1.0);\n"
 	"	vec3 cloth_rgb = mix(vec3(0.045, 0.17, 0.18), vec3(0.075, 0.012, 0.014), soaked);\n"
 	"	vec3 albedo = mix(cloth_rgb, c.rgb * c.rgb * below, skin);\n"
 	"	wet = max(wet, moist) * skin;\n"

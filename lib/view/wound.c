@@ -167,24 +167,6 @@ static void raise_texel(struct field_texel *texel, const struct field_stretch *s
 	}
 }
 
-/* The texels of a row, at left … right, where low <= from + step * i <= high. */
-static void clip_row(float from, float step, float low, float high, int *left, int *right)
-{
-	float a, b;
-
-	if (fabsf(step) < 1e-9f) {
-		if (from < low || from > high)
-			*right = *left;
-		return;
-	}
-	a = ((step > 0 ? low : high) - from) / step;
-	b = ((step > 0 ? high : low) - from) / step;
-	if (a > (float)*left)
-		*left = a < (float)*right ? (int)ceilf(a) : *right;
-	if (b < (float)*right - 1)
-		*right = b >= (float)*left ? (int)floorf(b) + 1 : *left;
-}
-
 /* Raise the fields of the tile that starts at this texel, where the stretch is. */
 static void field_raise(struct field_texel *tile, int x, int y,
 			const struct field_stretch *s)
@@ -202,9 +184,10 @@ static void field_raise(struct field_texel *tile, int x, int y,
 		int from = left, to = right;
 
 		if (s->inverse_mm2 > 0)
-			clip_row((u * s->along[0] + v * s->along[1]) * s->inverse_mm2,
-				 s->metric.a * s->along[0] * s->inverse_mm2, s->first,
-				 s->last, &from, &to);
+			canvas_clip_row((u * s->along[0] + v * s->along[1]) *
+						s->inverse_mm2,
+					s->metric.a * s->along[0] * s->inverse_mm2,
+					s->first, s->last, &from, &to);
 		for (int i = from; i < to; i++) {
 			float dx = (float)i + 0.5f - s->x;
 
