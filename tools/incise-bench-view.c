@@ -16,7 +16,7 @@
 #include "cli/scene_argument.h"
 #include "cli/stopwatch.h"
 #include "view/live.h"
-#include "view/procedure.h"
+#include "view/script.h"
 #include "bench/bench.h"
 #include "bench/wakeup.h"
 

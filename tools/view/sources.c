@@ -10,9 +10,9 @@
 #include <incise/replay.h>
 #include <incise/sim.h>
 #include "../cli/cli.h"
+#include "../cli/procedure.h"
 #include "../cli/recording.h"
 #include "../status/pages.h"
-#include "procedure.h"
 #include "view.h"
 
 /* The plan of the job's scene, on its rig if there is one. */
@@ -111,7 +111,7 @@ struct run {
 		period_ns; /* of the simulated clock; first 0: no tick yet */
 	int64_t wall_ns;   /* CLOCK_MONOTONIC of first_ns, for a window */
 	bool ended;
-	struct incise_touch top;
+	struct procedure procedure; /* with --procedure */
 };
 
 static struct run run_of(struct view_job *job)
@@ -152,16 +152,9 @@ static int show_tick(struct run *run, const struct incise_tick *tick)
 static int procedure_tick(void *context, const struct incise_tick *tick)
 {
 	struct run *run = context;
-	struct view_job *job = run->job;
-	struct procedure_pose pose;
 	int rc = show_tick(run, tick);
-	double t_s = (double)(tick->t_ns - run->first_ns) / INCISE_NS_PER_S;
 
-	procedure_at(&run->top, incise_scene_handle_mm(job->scene), t_s, &pose);
-	incise_sim_hold(incise_rig_sim(job->own_rig), pose.position_mm,
-			pose.velocity_mm_s, pose.quaternion);
-	incise_plan_set_tool(job->plan, pose.tool == INCISE_TOOL_TUBE ? INCISE_TOOL_TUBE
-								      : INCISE_TOOL_AUTO);
+	procedure_ticked(&run->procedure, tick);
 	return rc;
 }
 
@@ -171,18 +164,13 @@ void view_procedure(struct view_job *job)
 	struct incise_loop_options loop = {
 		.rate_hz = job->rate_hz, .ticked = procedure_tick, .context = &run};
 	static struct incise_loop_stats stats;
-	struct procedure_pose pose;
 	struct incise_error err = {0};
 	double end_s = job->duration_s ? job->duration_s : PROCEDURE_S;
 
-	job->own_rig = cli_open_rig("sim:mouse,clock=simulated,tracker_noise_mm=0",
-				    INCISE_RIG_TRACKER);
+	job->own_rig = cli_open_rig(PROCEDURE_RIG, INCISE_RIG_TRACKER);
 	make_plan(job);
-	incise_plan_top(job->plan, &run.top);
 	view_job_view(job);
-	procedure_at(&run.top, incise_scene_handle_mm(job->scene), 0, &pose);
-	incise_sim_hold(incise_rig_sim(job->own_rig), pose.position_mm,
-			pose.velocity_mm_s, pose.quaternion);
+	procedure_begin(&run.procedure, job->own_rig, job->plan, job->scene);
 	loop.duration_ns = (int64_t)(end_s * INCISE_NS_PER_S);
 	if (incise_loop_run(job->plan, incise_rig_clock(job->own_rig), &loop, &stats,
 			    &err) < 0)

@@ -1,31 +1,14 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * Paper 2's procedure as a script for the scalpel of sim:mouse, at the top of a surface: cut along
- * and across, let it bleed, enlarge the cut with the handle, insert a tube. As poses, and as ticks
- * that a benchmark keeps in memory.
- *
- *     blade  ╲__30 mm__╱   ╲_15 mm_╱         handle  ║ ↻        tube  ║
- *   0 s     1 s       2.6 s  4.1 s 5.2 s … 9 s      11 s   14 s      18 s … 22 s
+ * Ticks of the scripted procedure that are kept in memory, and views without a screen that get
+ * them: drawing is measured without the loop.
  */
-#ifndef INCISE_PROCEDURE_H
-#define INCISE_PROCEDURE_H
+#ifndef INCISE_VIEW_SCRIPT_H
+#define INCISE_VIEW_SCRIPT_H
 
 #include <incise/plan.h>
 #include <incise/scene.h>
 #include <incise/view.h>
-
-#define PROCEDURE_S 22.0
-
-struct procedure_pose {
-	double position_mm[3]; /* of the scalpel's tip */
-	double velocity_mm_s[3];
-	double quaternion[4];
-	enum incise_tool tool;
-};
-
-/* @handle_mm: length of the scalpel. @t_s: below 0 is the start, above PROCEDURE_S the end. */
-void procedure_at(const struct incise_touch *top, double handle_mm, double t_s,
-		  struct procedure_pose *pose);
 
 /* Ticks of the procedure, from a loop in simulated time. */
 struct view_script {
