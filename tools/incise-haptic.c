@@ -15,6 +15,7 @@
 #include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/loop_report.h"
+#include "cli/procedure.h"
 #include "cli/state_folder.h"
 #include "cli/stream_report.h"
 #include "haptic/haptic.h"
@@ -25,7 +26,8 @@ struct job {
 	struct incise_realtime_setup realtime;
 	const char *rig, *log, *calibration, *state;
 	double duration;
-	bool json, home, recover, no_rt, verbose;
+	bool json, home, recover, no_rt, verbose, scripted;
+	struct procedure procedure; /* scripted */
 };
 
 static const char *const tools[] = {"auto", "blade", "handle", "tube", NULL};
@@ -42,6 +44,10 @@ static const struct cli_option options[] = {
 	 "what the hand holds: auto (blade or handle, by the scalpel's turn), blade,\n"
 	 "handle or tube (default: auto)",
 	 CLI_CHOICE(struct job, haptic.tool, tools, "auto, blade, handle, tube")},
+	{0, "procedure", NULL,
+	 "on the virtual rig, in simulated time: a script cuts, enlarges the cut and\n"
+	 "inserts a tube",
+	 CLI_FLAG(struct job, scripted)},
 	{0, "duration", "TIME", "stop after this time, e.g. 10s (default: at SIGINT)",
 	 CLI_DURATION(struct job, duration, 0.01, 86400)},
 	{0, "home", NULL, "find each actuator's 0 first, unless it is known",
@@ -95,6 +101,11 @@ static void parse(struct job *job, int argc, char **argv)
 	if (job->verbose)
 		cli_be_verbose();
 	scene_argument_operand(&job->haptic.argument, argc, argv, optind);
+	if (job->scripted && (job->rig || job->haptic.tool != INCISE_TOOL_AUTO))
+		cli_usage("--procedure has a rig and tools of its own: leave out %s",
+			  job->rig ? "--rig" : "--tool");
+	if (job->scripted && !job->duration)
+		job->duration = PROCEDURE_S;
 	if (job->log && !job->duration)
 		cli_usage("--log keeps all ticks in memory: it needs --duration");
 	if (job->json && job->log && !strcmp(job->log, "-"))
@@ -225,11 +236,27 @@ static bool has_real_clock(const char *spec)
 	return real;
 }
 
+static int script_ticked(void *context, const struct incise_tick *tick)
+{
+	procedure_ticked(context, tick);
+	return 0;
+}
+
+/* The hand follows the script, between ticks of simulated time. */
+static void set_script(struct job *job)
+{
+	struct haptic *haptic = &job->haptic;
+
+	procedure_begin(&job->procedure, haptic->rig, haptic->plan, haptic->scene);
+	haptic->loop.ticked = script_ticked;
+	haptic->loop.context = &job->procedure;
+}
+
 /* Everything but power: scene, real time, devices, plan, self-test. */
 static void set_up(struct job *job)
 {
 	struct haptic *haptic = &job->haptic;
-	const char *spec = cli_rig(job->rig);
+	const char *spec = job->scripted ? PROCEDURE_RIG : cli_rig(job->rig);
 	struct incise_error err = {0};
 	struct self_test test;
 	bool real;
@@ -246,6 +273,8 @@ static void set_up(struct job *job)
 	if (haptic_self_test(haptic->scene, incise_rig_tracker(haptic->rig), &test, &err))
 		cli_fail("%s: %s", haptic->argument.path, err.text);
 	haptic->plan = cli_require(haptic_plan(haptic, haptic->scene, &err), &err);
+	if (job->scripted)
+		set_script(job);
 	open_state(job, real);
 	if (haptic->realtime)
 		advise(&job->realtime);

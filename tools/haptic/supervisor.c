@@ -248,6 +248,9 @@ static void start_reload(struct supervisor *s)
 	int rc = 0;
 
 	reload_asked = 0;
+	/* A script has the plan that it moves. */
+	if (s->haptic->loop.ticked)
+		return;
 	/* One at a time; a later request is kept. */
 	if (s->next_plan || s->stopping) {
 		reload_asked = !s->stopping;
