@@ -207,6 +207,8 @@ static int run_ticks(struct run *run, int *ended)
 			tick = &options->log[stats->logged++];
 		rc = run_tick(run, tick, now_ns);
 		run->due_ns += run->period_ns;
+		if (!rc && options->control)
+			incise_loop_control_tick(options->control, tick);
 		if (!rc && options->ticked)
 			*ended = options->ticked(options->context, tick);
 	}

@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <stdatomic.h>
 #include <stdlib.h>
+#include <string.h>
 #include "../base/ring.h"
 #include "loop_control.h"
 
@@ -15,6 +16,7 @@ struct incise_loop_control {
 	_Atomic(struct incise_plan *) offered, retired;
 	_Atomic uint64_t ticks;
 	struct incise_ring events;
+	struct incise_ring kept; /* ticks; without memory where nobody wants them */
 };
 
 struct incise_loop_control *incise_loop_control_new(void)
@@ -38,6 +40,7 @@ void incise_loop_control_free(struct incise_loop_control *control)
 	if (!control)
 		return;
 	incise_ring_free(&control->events);
+	incise_ring_free(&control->kept);
 	free(control);
 }
 
@@ -103,4 +106,37 @@ void incise_loop_control_event(struct incise_loop_control *control,
 void incise_loop_control_ticked(struct incise_loop_control *control, uint64_t ticks)
 {
 	atomic_store_explicit(&control->ticks, ticks, memory_order_relaxed);
+}
+
+int incise_loop_control_keep(struct incise_loop_control *control, size_t n)
+{
+	int rc;
+
+	if (control->kept.records)
+		return -EEXIST;
+	rc = incise_ring_init(&control->kept, sizeof(struct incise_tick), n);
+	/* A page fault in the loop is a late tick. */
+	if (!rc)
+		memset(control->kept.records, 0xff,
+		       control->kept.size * control->kept.capacity);
+	return rc;
+}
+
+int incise_loop_control_take(struct incise_loop_control *control,
+			     struct incise_tick *ticks, int n, uint64_t *lost)
+{
+	int taken = control->kept.records ? incise_ring_take(&control->kept, ticks, n)
+					  : 0;
+
+	/* Behind the ticks: those lost since then follow them. */
+	if (lost)
+		*lost = incise_ring_dropped(&control->kept);
+	return taken;
+}
+
+void incise_loop_control_tick(struct incise_loop_control *control,
+			      const struct incise_tick *tick)
+{
+	if (control->kept.records)
+		incise_ring_put(&control->kept, tick);
 }

@@ -25,4 +25,8 @@ uint64_t incise_loop_control_events_lost(const struct incise_loop_control *contr
 void incise_loop_control_ticked(struct incise_loop_control *control,
 				uint64_t ticks) INCISE_REALTIME;
 
+/* Keep a tick, where incise_loop_control_keep() has made room. */
+void incise_loop_control_tick(struct incise_loop_control *control,
+			      const struct incise_tick *tick) INCISE_REALTIME;
+
 #endif

@@ -7,6 +7,7 @@
  *     offer(new plan) ──▶ [ one place ] ──▶   fades its force out, then ticks the new plan,
  *     retired()  ◀──────  [ one place ]  ◀──  which starts like any other: without a force
  *     events()   ◀──────  [   ring    ]  ◀──  until it requests a small one
+ *     take()     ◀──────  [   ring    ]  ◀──  each tick, where keep() made a ring for them
  *     ticks()    ◀──────  [  counter  ]
  *
  * Unless stated otherwise, functions belong to one thread, which is not the loop's; none waits.
@@ -14,6 +15,7 @@
 #ifndef INCISE_LOOP_CONTROL_H
 #define INCISE_LOOP_CONTROL_H
 
+#include <stddef.h>
 #include <stdint.h>
 #include <incise/export.h>
 #include <incise/plan.h>
@@ -73,6 +75,25 @@ struct incise_loop_event {
 /** Take events, oldest first. @return their number, at most @n. */
 INCISE_API int incise_loop_control_events(struct incise_loop_control *control,
 					  struct incise_loop_event *events, int n);
+
+/**
+ * Keep ticks for incise_loop_control_take(), before the loop runs: the memory is allocated and
+ * touched here.
+ *
+ * @param n how many wait at least; one that finds no place is lost
+ * @return 0; -EINVAL (0, or more than memory can hold), -EEXIST (they are kept already), -ENOMEM
+ */
+INCISE_API int incise_loop_control_keep(struct incise_loop_control *control, size_t n);
+
+/**
+ * Take the ticks that are kept, each once and oldest first; all but one that a device failed in.
+ *
+ * @param n    capacity of @ticks
+ * @param lost set to the number of ticks that found no place so far; or NULL
+ * @return how many ticks. Never waits.
+ */
+INCISE_API int incise_loop_control_take(struct incise_loop_control *control,
+					struct incise_tick *ticks, int n, uint64_t *lost);
 
 INCISE_END_DECLS
 #endif

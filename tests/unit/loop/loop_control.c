@@ -67,6 +67,34 @@ static void test_events(void **state)
 	incise_loop_control_free(control);
 }
 
+static void test_ticks(void **state)
+{
+	struct incise_loop_control *control = incise_loop_control_new();
+	struct incise_tick ticks[100];
+	uint64_t seen = 0, lost = 1;
+	int n;
+
+	/* Nobody wants them. */
+	incise_loop_control_tick(control, &(struct incise_tick){.t_ns = 1});
+	assert_int_equal(incise_loop_control_take(control, ticks, 100, &lost), 0);
+	assert_int_equal(lost, 0);
+	assert_int_equal(incise_loop_control_keep(control, 0), -EINVAL);
+	assert_int_equal(incise_loop_control_keep(control, 256), 0);
+	assert_int_equal(incise_loop_control_keep(control, 256), -EEXIST);
+	for (int64_t i = 0; i < 1000; i++)
+		incise_loop_control_tick(control, &(struct incise_tick){.t_ns = i});
+	while ((n = incise_loop_control_take(control, ticks, 100, &lost)) > 0)
+		for (int i = 0; i < n; i++)
+			assert_int_equal(ticks[i].t_ns, seen++);
+	assert_true(seen >= 256);
+	assert_int_equal(lost, 1000 - seen);
+	/* A loop goes on after a loss. */
+	incise_loop_control_tick(control, &(struct incise_tick){.t_ns = 1000});
+	assert_int_equal(incise_loop_control_take(control, ticks, 100, NULL), 1);
+	assert_int_equal(ticks[0].t_ns, 1000);
+	incise_loop_control_free(control);
+}
+
 /* A loop that only changes plans. */
 struct changer {
 	struct incise_loop_control *control;
@@ -131,6 +159,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_one_place),
 		cmocka_unit_test(test_events),
+		cmocka_unit_test(test_ticks),
 		cmocka_unit_test(test_two_threads),
 	};
 
