@@ -125,8 +125,8 @@ int incise_loop_control_keep(struct incise_loop_control *control, size_t n)
 int incise_loop_control_take(struct incise_loop_control *control,
 			     struct incise_tick *ticks, int n, uint64_t *lost)
 {
-	int taken = control->kept.records ? incise_ring_take(&control->kept, ticks, n)
-					  : 0;
+	int taken =
+		control->kept.records ? incise_ring_take(&control->kept, ticks, n) : 0;
 
 	/* Behind the ticks: those lost since then follow them. */
 	if (lost)

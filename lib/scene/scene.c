@@ -8,13 +8,16 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <incise/infile.h>
 #include "../base/conf.h"
+#include "../base/crc32c.h"
 #include "../base/vector.h"
 #include "../control/pose_loop.h"
 #include "../tissue/incision.h"
 #include "scene.h"
 
-#define PARALLEL_COS 0.985 /* cos 10 degrees */
+#define PARALLEL_COS 0.985     /* cos 10 degrees */
+#define FILE_MOST (1ULL << 30) /* more than a mesh of 4 million triangles has */
 /* Of the largest group, tissue: seven keys and the numbers of all forces. */
 #define KEYS_MAX (7 + INCISE_FORCES_MAX * INCISE_FORCE_NUMBERS)
 
@@ -463,6 +466,90 @@ static int read_membrane(struct incise_scene *scene, const config_setting_t *roo
 		scene->membrane.thickness_mm);
 }
 
+/* The keys of `criteria`: two numbers, a largest one, or true and false. */
+static const struct {
+	const char *key;
+	enum { RANGE, MOST, SWITCH } form;
+	double max;
+} criteria[INCISE_CRITERIA] = {
+	[INCISE_CRITERION_CUT_LENGTH] = {"cut_length_mm", RANGE, 1000},
+	[INCISE_CRITERION_CUT_DEPTH] = {"cut_depth_mm", RANGE, 1000},
+	[INCISE_CRITERION_OFF_TARGET] = {"off_target_mm", MOST, 1000},
+	[INCISE_CRITERION_INCISIONS] = {"incisions_most", MOST, 1024},
+	[INCISE_CRITERION_MEMBRANE] = {"membrane", SWITCH, 1},
+	[INCISE_CRITERION_INSERTION] = {"insertion_depth_mm", RANGE, 1000},
+	[INCISE_CRITERION_BACK_WALL] = {"back_wall", SWITCH, 1},
+	[INCISE_CRITERION_FORCE] = {"force_most_N", MOST, 1000},
+	[INCISE_CRITERION_TIME] = {"time_most_s", MOST, 86400},
+};
+
+const char *incise_criterion_name(int criterion)
+{
+	return criterion >= 0 && criterion < INCISE_CRITERIA ? criteria[criterion].key
+							     : NULL;
+}
+
+static int read_range(const struct incise_scene *scene, const config_setting_t *group,
+		      int i, struct incise_scene_criterion *to, struct incise_error *err)
+{
+	double ends[2];
+	int n, rc = incise_conf_numbers(group, scene->path, criteria[i].key, ends, 2, &n,
+					err);
+
+	if (rc)
+		return rc;
+	if (n != 2 || !(ends[0] >= 0 && ends[0] <= ends[1] && ends[1] <= criteria[i].max))
+		return incise_error_set(
+			err, EINVAL,
+			"%s:%u: criteria.%s: expected two numbers [least, largest] from "
+			"0 to %g; correct it",
+			scene->path,
+			config_setting_source_line(
+				config_setting_get_member(group, criteria[i].key)),
+			criteria[i].key, criteria[i].max);
+	to->min = ends[0];
+	to->max = ends[1];
+	return 0;
+}
+
+static int read_criterion(struct incise_scene *scene, const config_setting_t *group,
+			  int i, struct incise_error *err)
+{
+	struct incise_scene_criterion *to = &scene->criteria[i];
+	const char *key = criteria[i].key;
+	bool on = false;
+	int rc;
+
+	to->asked = config_setting_get_member(group, key);
+	if (!to->asked)
+		return 0;
+	if (criteria[i].form == RANGE)
+		return read_range(scene, group, i, to, err);
+	if (criteria[i].form == MOST)
+		return incise_conf_number(group, scene->path, key, 0, criteria[i].max,
+					  &to->max, err);
+	rc = incise_conf_bool(group, scene->path, key, &on, err);
+	to->min = to->max = on;
+	return rc;
+}
+
+static int read_criteria(struct incise_scene *scene, const config_setting_t *root,
+			 struct incise_error *err)
+{
+	const config_setting_t *group = config_setting_get_member(root, "criteria");
+	const char *keys[INCISE_CRITERIA + 1] = {NULL};
+	int rc;
+
+	if (!group)
+		return 0;
+	for (int i = 0; i < INCISE_CRITERIA; i++)
+		keys[i] = criteria[i].key;
+	rc = incise_conf_known(group, scene->path, keys, err);
+	for (int i = 0; i < INCISE_CRITERIA && !rc; i++)
+		rc = read_criterion(scene, group, i, err);
+	return rc;
+}
+
 static int read_tissue(struct incise_scene *scene, const config_setting_t *root,
 		       struct incise_error *err)
 {
@@ -591,7 +678,8 @@ static int read_scene(struct incise_scene *scene, const config_setting_t *root,
 {
 	static const char *const keys[] = {"rate_hz", "model",	 "arithmetic", "surface",
 					   "tissue",  "effects", "tool",       "device",
-					   "limits",  "picture", "membrane",   NULL};
+					   "limits",  "picture", "membrane",   "criteria",
+					   NULL};
 	const config_setting_t *group;
 	const char *arithmetic = NULL;
 	int rc = incise_conf_known(root, scene->path, keys, err);
@@ -610,6 +698,8 @@ static int read_scene(struct incise_scene *scene, const config_setting_t *root,
 		rc = read_group(scene, root, "limits", limits, NULL, &group, err);
 	if (!rc)
 		rc = read_membrane(scene, root, err);
+	if (!rc)
+		rc = read_criteria(scene, root, err);
 	if (!rc)
 		rc = read_switches(scene, root, err);
 	if (!rc)
@@ -752,6 +842,33 @@ bool incise_scene_membrane(const struct incise_scene *scene,
 {
 	*membrane = scene->membrane;
 	return membrane->thickness_mm > 0;
+}
+
+void incise_scene_criteria(const struct incise_scene *scene,
+			   struct incise_scene_criterion to[INCISE_CRITERIA])
+{
+	memcpy(to, scene->criteria, sizeof(scene->criteria));
+}
+
+int incise_scene_checksum(const struct incise_scene *scene, uint32_t *crc32c,
+			  struct incise_error *err)
+{
+	static const struct incise_infile_kind kind = {.name = "a file of a scene",
+						       .size_max = FILE_MOST};
+	uint32_t crc = 0;
+	const char *path;
+
+	for (int i = 0; (path = incise_scene_file(scene, i)); i++) {
+		size_t n;
+		char *bytes = incise_infile_read(path, &kind, &n, err);
+
+		if (!bytes)
+			return -errno;
+		crc = incise_crc32c(crc, bytes, n);
+		free(bytes);
+	}
+	*crc32c = crc;
+	return 0;
 }
 
 struct incise_incision *incise_incision_new(const struct incise_scene *scene,

@@ -43,6 +43,7 @@ struct incise_scene {
 		int late_ticks;	 /* of the actuator, after a tracker's loop */
 	} device;
 	struct incise_scene_limits limits;
+	struct incise_scene_criterion criteria[INCISE_CRITERIA];
 	struct incise_scene_picture picture;
 };
 

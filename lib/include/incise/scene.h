@@ -19,6 +19,7 @@
 #define INCISE_SCENE_H
 
 #include <stdbool.h>
+#include <stdint.h>
 #include <incise/error.h>
 #include <incise/export.h>
 
@@ -132,6 +133,44 @@ struct incise_scene_membrane {
 /** Get the group `membrane` of the scene. @return whether it has one */
 INCISE_API bool incise_scene_membrane(const struct incise_scene *scene,
 				      struct incise_scene_membrane *membrane);
+
+/** The criteria of a session that a scene can have, in its group `criteria`. */
+enum incise_criterion {
+	INCISE_CRITERION_CUT_LENGTH, /**< of the longest incision, mm */
+	INCISE_CRITERION_CUT_DEPTH,  /**< largest one of it, mm */
+	INCISE_CRITERION_OFF_TARGET, /**< of it from the membrane's axis, mm */
+	INCISE_CRITERION_INCISIONS,  /**< their number */
+	INCISE_CRITERION_MEMBRANE,   /**< 1: a tool went through it; 0: none did */
+	INCISE_CRITERION_INSERTION,  /**< depth of the tube at the end, mm */
+	INCISE_CRITERION_BACK_WALL,  /**< 1: it was touched; 0: it was not */
+	INCISE_CRITERION_FORCE,	     /**< largest one, N */
+	INCISE_CRITERION_TIME, /**< from the first contact until the tube is in place, s */
+};
+#define INCISE_CRITERIA 9 /**< how many there are */
+
+/** Values of a criterion that meet it. */
+struct incise_scene_criterion {
+	bool asked;	 /**< the scene has it; else the rest is 0 */
+	double min, max; /**< both meet it */
+};
+
+/** Its key in a scene: "cut_length_mm", … NULL: there is none of this number. */
+INCISE_API const char *incise_criterion_name(int criterion);
+
+/** Get the group `criteria` of the scene, by enum incise_criterion. */
+INCISE_API void incise_scene_criteria(
+	const struct incise_scene *scene,
+	struct incise_scene_criterion criteria[INCISE_CRITERIA]);
+
+/**
+ * A checksum over the bytes of all files of a scene, in the order of incise_scene_file(), as they
+ * are now.
+ *
+ * @param crc32c of Castagnoli's polynomial
+ * @return 0, or a negative errno of incise_infile_read()
+ */
+INCISE_API int incise_scene_checksum(const struct incise_scene *scene, uint32_t *crc32c,
+				     struct incise_error *err);
 
 /** Get the group `limits` of the scene, with defaults filled in. */
 INCISE_API void incise_scene_limits(const struct incise_scene *scene,

@@ -391,6 +391,75 @@ static void test_membrane(void **state)
 	incise_scene_free(scene);
 }
 
+#define CRITERIA(text)                          \
+	"tissue = { insertion_N_mm = 0.1; };\n" \
+	"criteria = { " text " };\n"
+
+static void test_criteria(void **state)
+{
+	static const struct {
+		const char *text, *says;
+	} cases[] = {
+		{CRITERIA(""), NULL},
+		{CRITERIA("cut_length_mm = [20, 40];"), NULL},
+		{CRITERIA("cut_length_mm = [20.0, 20.0];"), NULL},
+		{CRITERIA("cut_length_mm = [40.0, 20.0];"), "cut_length_mm"},
+		{CRITERIA("cut_length_mm = [20.0];"), "cut_length_mm"},
+		{CRITERIA("cut_length_mm = 20.0;"), "cut_length_mm"},
+		{CRITERIA("cut_depth_mm = [-1.0, 20.0];"), "cut_depth_mm"},
+		{CRITERIA("insertion_depth_mm = [1.0, 2000.0];"), "1000"},
+		{CRITERIA("force_most_N = -1.0;"), "force_most_N"},
+		{CRITERIA("membrane = 1;"), "membrane"},
+		{CRITERIA("back_wal = false;"), "back_wal"},
+	};
+	struct incise_scene_criterion to[INCISE_CRITERIA];
+	struct incise_scene *scene;
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_error err = {0};
+
+		scene = load(cases[i].text, NULL, &err);
+		if (!scene != !!cases[i].says ||
+		    (!scene && (err.code != EINVAL || !strstr(err.text, "a.scene:2") ||
+				!strstr(err.text, cases[i].says))))
+			fail_msg("case %zu: %s", i, err.text);
+		incise_scene_free(scene);
+	}
+	scene = load(CRITERIA("cut_depth_mm = [1.0, 9.0]; back_wall = false; "
+			      "membrane = true; incisions_most = 1;"),
+		     NULL, NULL);
+	incise_scene_criteria(scene, to);
+	for (int i = 0; i < INCISE_CRITERIA; i++)
+		assert_true(to[i].asked == (i == INCISE_CRITERION_CUT_DEPTH ||
+					    i == INCISE_CRITERION_BACK_WALL ||
+					    i == INCISE_CRITERION_MEMBRANE ||
+					    i == INCISE_CRITERION_INCISIONS));
+	assert_true(to[INCISE_CRITERION_CUT_DEPTH].min == 1);
+	assert_true(to[INCISE_CRITERION_CUT_DEPTH].max == 9);
+	assert_true(to[INCISE_CRITERION_BACK_WALL].max == 0);
+	assert_true(to[INCISE_CRITERION_MEMBRANE].min == 1);
+	assert_true(to[INCISE_CRITERION_INCISIONS].max == 1);
+	assert_null(incise_criterion_name(INCISE_CRITERIA));
+	assert_string_equal(incise_criterion_name(INCISE_CRITERION_TIME), "time_most_s");
+	incise_scene_free(scene);
+}
+
+/* Every byte of every file counts. */
+static void test_checksum(void **state)
+{
+	uint32_t one, same, other;
+	struct incise_scene *scene = load(CRITERIA(""), NULL, NULL);
+
+	assert_int_equal(incise_scene_checksum(scene, &one, NULL), 0);
+	assert_int_equal(incise_scene_checksum(scene, &same, NULL), 0);
+	incise_scene_free(scene);
+	scene = load(CRITERIA(" "), NULL, NULL);
+	assert_int_equal(incise_scene_checksum(scene, &other, NULL), 0);
+	assert_int_equal(one, same);
+	assert_int_not_equal(one, other);
+	incise_scene_free(scene);
+}
+
 /* One reaction, of the model or of a constant, and any force at all. */
 static void test_forces(void **state)
 {
@@ -554,6 +623,8 @@ int main(void)
 		cmocka_unit_test(test_unknown_keys),
 		cmocka_unit_test(test_groups),
 		cmocka_unit_test(test_membrane),
+		cmocka_unit_test(test_criteria),
+		cmocka_unit_test(test_checksum),
 		cmocka_unit_test(test_forces),
 		cmocka_unit_test(test_set_arithmetic),
 		cmocka_unit_test(test_other_model),
