@@ -592,7 +592,7 @@ static void measure_absorbed(const char *scene, double seconds, struct absorbed 
 		double due_us;
 
 		sweep(&c, a->seconds);
-		if (view_live_take(c.live, c.view, &status, &err) < 0 ||
+		if (view_live_take(c.live, c.view, NULL, &status, &err) < 0 ||
 		    incise_view_frame(c.view, &status, &err))
 			cli_fail_with(&err);
 		a->frames++;

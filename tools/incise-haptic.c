@@ -25,6 +25,7 @@ struct job {
 	struct haptic haptic;
 	struct incise_realtime_setup realtime;
 	const char *rig, *log, *calibration, *state;
+	struct session_options session;
 	double duration;
 	bool json, home, recover, no_rt, verbose, scripted;
 	struct procedure procedure; /* scripted */
@@ -72,6 +73,7 @@ static const struct cli_option options[] = {
 	 CLI_TEXT(struct job, state)},
 	{0, "log", "FILE", "write every tick as CSV at the end; needs --duration",
 	 CLI_OUTPUT(struct job, log)},
+	SESSION_OPTIONS(struct job, session),
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{'v', "verbose", NULL, "say on stderr what happens meanwhile",
 	 CLI_FLAG(struct job, verbose)},
@@ -106,6 +108,7 @@ static void parse(struct job *job, int argc, char **argv)
 			  job->rig ? "--rig" : "--tool");
 	if (job->scripted && !job->duration)
 		job->duration = PROCEDURE_S;
+	session_options_check(&job->session);
 	if (job->log && !job->duration)
 		cli_usage("--log keeps all ticks in memory: it needs --duration");
 	if (job->json && job->log && !strcmp(job->log, "-"))
@@ -700,11 +703,48 @@ static void report_text(const struct haptic *haptic)
 		stepper_counters_line(stepper);
 }
 
+/* --- the session ----------------------------------------------------------------------- */
+
+static int tick_session(void *context, const struct incise_tick *tick)
+{
+	session_log_tick(context, tick);
+	return 0;
+}
+
+/* Simulated time runs ahead of the supervisor: there the loop's thread gives the ticks. */
+static void open_session(struct job *job)
+{
+	struct haptic *haptic = &job->haptic;
+	const struct session_start start = {.program = "haptic",
+					    .source = incise_rig_spec(haptic->rig),
+					    .scene = haptic->scene,
+					    .scene_path = haptic->argument.path,
+					    .real = is_real(haptic)};
+
+	haptic->session = session_log_begin(&job->session, &start);
+	if (!haptic->session || start.real)
+		return;
+	haptic->loop.ticked = tick_session;
+	haptic->loop.context = haptic->session;
+}
+
+static int end_session(struct haptic *haptic, int rc, const struct incise_error *cause,
+		       struct incise_error *err)
+{
+	const char *why = rc ? cause->text : cli_stop ? strsignal(cli_stop) : "";
+
+	return session_log_end(haptic->session,
+			       rc	  ? "fault"
+			       : cli_stop ? "signal"
+					  : "asked",
+			       why, err);
+}
+
 int main(int argc, char **argv)
 {
 	static struct incise_loop_stats stats;
 	struct incise_outfile *file = NULL;
-	struct incise_error err = {0}, left = {0}, log_err = {0};
+	struct incise_error err = {0}, left = {0}, log_err = {0}, session_err = {0};
 	struct haptic *haptic;
 	struct job job = {0};
 	int rc, released;
@@ -723,6 +763,7 @@ int main(int argc, char **argv)
 			fail(&job, &err);
 		make_log(job.duration, &haptic->loop);
 	}
+	open_session(&job);
 	cli_catch_signals();
 	haptic_catch_reload();
 	if (take_hold(haptic->rig, job.home, job.recover, &err)) {
@@ -750,6 +791,7 @@ int main(int argc, char **argv)
 	if (job.log)
 		write_log(file, haptic->loop.log, stats.logged, count_axes(haptic->rig),
 			  &log_err);
+	end_session(haptic, rc, &err, &session_err);
 	if (job.json)
 		report_json(haptic);
 	else if (!job.log || strcmp(job.log, "-"))
@@ -759,9 +801,13 @@ int main(int argc, char **argv)
 	/* The run cannot be repeated: its summary comes first, with or without its log. */
 	if (rc && log_err.code)
 		cli_warn("%s", log_err.text);
+	if ((rc || log_err.code) && session_err.code)
+		cli_warn("%s", session_err.text);
 	if (rc)
 		cli_fail("%s: %s", haptic->argument.path, err.text);
 	if (log_err.code)
 		cli_fail_with(&log_err);
+	if (session_err.code)
+		cli_fail_with(&session_err);
 	return 0;
 }

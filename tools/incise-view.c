@@ -9,6 +9,7 @@
  */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 #include <incise/clock.h>
 #include "cli/cli.h"
 #include "cli/json.h"
@@ -85,6 +86,7 @@ static const struct cli_option options[] = {
 	{0, "no-panel", NULL, "the tissue alone, without graphs",
 	 CLI_FLAG(struct view_job, no_panel)},
 	SCENE_ARGUMENT_OPTIONS(struct view_job, argument),
+	SESSION_OPTIONS(struct view_job, session),
 	{0, "json", NULL, "report what was drawn, as JSON, at the end",
 	 CLI_FLAG(struct view_job, json)},
 	{0},
@@ -113,6 +115,7 @@ static void parse(struct view_job *job, int argc, char **argv)
 	*job = (struct view_job){.output = {.width = 1280, .height = 720, .fps = 60}};
 	cli_parse(&command, argc, argv, job);
 	scene_argument_operand(&job->argument, argc, argv, optind);
+	session_options_check(&job->session);
 	if (!!job->rig + !!job->from + job->procedure > 1)
 		cli_usage(
 			"--rig, --from and --procedure are three sources: one at a time");
@@ -158,6 +161,31 @@ static void print_rate(const struct view_job *job)
 	       job->output.width, job->output.height, report.texture_px, report.renderer);
 }
 
+static void begin_session(struct view_job *job)
+{
+	const struct session_start start = {
+		.program = "view",
+		.source = job->rig	   ? job->rig
+			  : job->procedure ? "procedure"
+			  : job->from	   ? job->from
+					   : "running loop",
+		.scene = job->scene,
+		.scene_path = job->argument.path,
+		.real = !job->procedure && !job->from,
+	};
+
+	job->log = session_log_begin(&job->session, &start);
+}
+
+static void end_session(struct view_job *job)
+{
+	struct incise_error err = {0};
+
+	if (session_log_end(job->log, cli_stop ? "signal" : "asked",
+			    cli_stop ? strsignal(cli_stop) : "", &err))
+		cli_fail_with(&err);
+}
+
 int main(int argc, char **argv)
 {
 	struct view_job job;
@@ -166,6 +194,7 @@ int main(int argc, char **argv)
 	job.scene = scene_argument_load(&job.argument);
 	job.rate_hz = incise_scene_rate_hz(job.scene);
 	view_output_begin(&job.output);
+	begin_session(&job);
 	cli_catch_signals();
 	if (job.rig)
 		view_rig(&job);
@@ -176,6 +205,7 @@ int main(int argc, char **argv)
 	else
 		view_running(&job);
 	cli_progress_end();
+	end_session(&job);
 	view_output_end(&job.output);
 	if (job.json)
 		report(&job);

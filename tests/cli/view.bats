@@ -40,7 +40,6 @@ teardown() {
 
 @test "a scene shows what it says, and counts it" {
 	incise view neck --procedure --frames f --fps 2 --duration 8s --json $small >r.json
-	# 30 mm by script, less what the threshold of a depth leaves out at its ends
 	# 30 mm, and across them 15 mm, half of which the blade goes twice
 	holds "$(key r.json cut_mm) > 50 && $(key r.json cut_mm) < 58"
 	holds "$(key r.json blood_ul) > 0"

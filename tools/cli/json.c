@@ -81,8 +81,7 @@ void json_print(json_t *object)
 	cli_finish();
 }
 
-static json_t *parse(const char *text, size_t n, const char *path,
-		     struct incise_error *err)
+json_t *json_parse(const char *text, size_t n, const char *path, struct incise_error *err)
 {
 	json_error_t wrong;
 	json_t *report = json_loadb(text, n, JSON_REJECT_DUPLICATES, &wrong);
@@ -117,7 +116,7 @@ json_t *json_read_from(FILE *file, const char *path, struct incise_error *err)
 		incise_error_set(err, EFBIG, "%s: larger than %d MiB, the limit of %s",
 				 path, READ_MOST >> 20, report_kind.name);
 	else
-		report = parse(text, n, path, err);
+		report = json_parse(text, n, path, err);
 	free(text);
 	return report;
 }
@@ -126,7 +125,7 @@ json_t *json_read(const char *path, struct incise_error *err)
 {
 	size_t n;
 	char *text = incise_infile_read(path, &report_kind, &n, err);
-	json_t *report = text ? parse(text, n, path, err) : NULL;
+	json_t *report = text ? json_parse(text, n, path, err) : NULL;
 
 	free(text);
 	return report;

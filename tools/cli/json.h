@@ -27,6 +27,10 @@ void json_set_integer(json_t *object, const char *key, json_int_t value);
 /* Print one object to standard output and release it. */
 void json_print(json_t *object);
 
+/* Read JSON text, which may hold anything; @name: for messages; NULL and the reason. */
+json_t *json_parse(const char *text, size_t n, const char *name,
+		   struct incise_error *err);
+
 /* Read a report from a file, which may hold anything; NULL and the reason. */
 json_t *json_read(const char *path, struct incise_error *err);
 

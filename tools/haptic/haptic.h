@@ -10,6 +10,7 @@
 #include <incise/rig.h>
 #include <incise/state.h>
 #include "../cli/scene_argument.h"
+#include "../session/log.h"
 
 struct haptic {
 	struct scene_argument argument;
@@ -24,6 +25,7 @@ struct haptic {
 	struct incise_realtime *realtime;  /* or NULL */
 	const char *scheduling;		   /* "SCHED_FIFO 80" */
 	struct incise_state_writer *state; /* or NULL */
+	struct session_log *session;	   /* or NULL */
 	struct incise_realtime_counts
 		counts; /* of the loop's thread, from the first tick */
 };

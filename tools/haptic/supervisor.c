@@ -103,6 +103,7 @@ static int64_t notify_watchdog_ns(void)
 /* --- the supervisor -------------------------------------------------------------------- */
 
 #define LOOK_MS 100
+#define KEPT_S 4 /* of ticks that wait for the session: 17 MB at 20 kHz */
 #define REPORT_NS INCISE_NS_PER_S
 
 static volatile sig_atomic_t reload_asked;
@@ -225,6 +226,10 @@ static int prepare_next(struct supervisor *s, struct incise_error *err)
 	double rate_hz;
 	int rc;
 
+	if (haptic->session)
+		return incise_error_set(err, EBUSY,
+					"--session is of one scene: end it, and start "
+					"another with the scene as it is now");
 	s->next_scene = scene_argument_read(&haptic->argument, err);
 	if (!s->next_scene)
 		return -errno;
@@ -342,6 +347,23 @@ static void handle_events(struct supervisor *s)
 			}
 }
 
+/* Ticks for the session; in simulated time the loop's thread gives them itself. */
+static void take_session(struct supervisor *s)
+{
+	struct incise_tick ticks[128];
+	uint64_t lost = 0;
+	int n;
+
+	if (!s->haptic->session || s->haptic->loop.ticked)
+		return;
+	do {
+		n = incise_loop_control_take(s->haptic->loop.control, ticks, 128, &lost);
+		for (int i = 0; i < n; i++)
+			session_log_tick(s->haptic->session, &ticks[i]);
+	} while (n == 128);
+	session_log_lost(s->haptic->session, lost);
+}
+
 /* Once a second: overruns since the last line, and the rate. */
 static void report(struct supervisor *s, uint64_t ticks, int64_t now_ns)
 {
@@ -374,6 +396,7 @@ static void look(struct supervisor *s)
 	int64_t now_ns = incise_clock_now(s->time);
 
 	handle_events(s);
+	take_session(s);
 	if (!s->ready && ticks) {
 		s->ready = true;
 		incise_state_run(s->haptic->state, INCISE_RUN_RUNNING, "");
@@ -407,6 +430,7 @@ static void look(struct supervisor *s)
 static void settle(struct supervisor *s)
 {
 	handle_events(s);
+	take_session(s);
 	end_reload(s);
 	if (s->next_plan)
 		incise_loop_control_withdraw(s->haptic->loop.control);
@@ -429,6 +453,18 @@ static int supervise(struct supervisor *s, struct incise_error *err)
 	return s->rc;
 }
 
+/* Room for the longest time that the supervisor is at other work. 0 or -1 with errno. */
+static int keep_ticks(const struct haptic *haptic)
+{
+	int rc = 0;
+
+	if (haptic->session && !haptic->loop.ticked)
+		rc = incise_loop_control_keep(haptic->loop.control,
+					      (size_t)(haptic->loop.rate_hz * KEPT_S));
+	errno = -rc;
+	return rc ? -1 : 0;
+}
+
 int haptic_supervise(struct haptic *haptic, struct incise_error *err)
 {
 	struct supervisor s = {.haptic = haptic,
@@ -438,7 +474,7 @@ int haptic_supervise(struct haptic *haptic, struct incise_error *err)
 	int rc;
 
 	haptic->loop.control = incise_loop_control_new();
-	if (!haptic->loop.control || !s.time || s.ended_fd < 0) {
+	if (!haptic->loop.control || !s.time || s.ended_fd < 0 || keep_ticks(haptic)) {
 		rc = incise_error_set(err, errno, "the loop cannot be looked after: %s",
 				      strerror(errno));
 	} else {

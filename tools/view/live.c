@@ -150,7 +150,8 @@ static void set_status(const struct view_live *live, struct incise_view_status *
 }
 
 int view_live_take(struct view_live *live, struct incise_view *view,
-		   struct incise_view_status *status, struct incise_error *err)
+		   struct session_log *log, struct incise_view_status *status,
+		   struct incise_error *err)
 {
 	int n = BATCH, rc = incise_state_read(live->state, &live->now);
 
@@ -168,7 +169,10 @@ int view_live_take(struct view_live *live, struct incise_view *view,
 						"the loop's page cannot be read: %s",
 						strerror(-n));
 		incise_view_ticks(view, live->ticks, n);
+		for (int i = 0; i < n; i++)
+			session_log_tick(log, &live->ticks[i]);
 	}
+	session_log_lost(log, live->lost);
 	set_status(live, status);
 	if (live->own && atomic_load(&live->ended)) {
 		rc = atomic_load(&live->rc);

@@ -11,6 +11,7 @@
 #include <incise/rig.h>
 #include <incise/state.h>
 #include <incise/view.h>
+#include "../session/log.h"
 
 struct view_live;
 
@@ -29,11 +30,12 @@ struct view_live *view_live_begin(struct incise_plan *plan, struct incise_rig *r
 void view_live_tool(struct view_live *live, enum incise_tool tool);
 
 /*
- * Feed the ticks since the last time to the view, and set the loop's status. 0; 1 when it has
- * ended; a negative errno with @err.
+ * Feed the ticks since the last time to the view and to a session, if @log is not NULL, and set the
+ * loop's status. 0; 1 when it has ended; a negative errno with @err.
  */
 int view_live_take(struct view_live *live, struct incise_view *view,
-		   struct incise_view_status *status, struct incise_error *err);
+		   struct session_log *log, struct incise_view_status *status,
+		   struct incise_error *err);
 
 void view_live_close(struct view_live *live);
 

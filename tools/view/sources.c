@@ -23,6 +23,19 @@ static void make_plan(struct view_job *job)
 	job->plan = cli_require(incise_plan_new(job->scene, job->own_rig, &err), &err);
 }
 
+/* End in a failure, of a file if @path is not NULL, with the session up to here. */
+static _Noreturn void fail(struct view_job *job, const char *path,
+			   const struct incise_error *err)
+{
+	struct incise_error session_err = {0};
+
+	if (session_log_end(job->log, "fault", err->text, &session_err))
+		cli_warn("%s", session_err.text);
+	if (path)
+		cli_fail("%s: %s", path, err->text);
+	cli_fail_with(err);
+}
+
 /* --- in real time ---------------------------------------------------------------------- */
 
 static void run_live(struct view_job *job, struct view_live *live, struct view_hand *hand)
@@ -39,9 +52,9 @@ static void run_live(struct view_job *job, struct view_live *live, struct view_h
 		if (hand)
 			view_hand_move(hand, (double)(now - last) / INCISE_NS_PER_S);
 		last = now;
-		rc = view_live_take(live, job->view, &status, &err);
+		rc = view_live_take(live, job->view, job->log, &status, &err);
 		if (rc < 0)
-			cli_fail_with(&err);
+			fail(job, NULL, &err);
 		view_job_draw(job, &status, (double)(now - begin) / INCISE_NS_PER_S);
 		job->lost = status.lost;
 		/* With vertical synchronization this does not wait. */
@@ -130,6 +143,7 @@ static int show_tick(struct run *run, const struct incise_tick *tick)
 		run->wall_ns = view_wall();
 	}
 	incise_view_ticks(job->view, tick, 1);
+	session_log_tick(job->log, tick);
 	if (tick->t_ns < run->next_ns)
 		return 0;
 	t_s = (double)(tick->t_ns - run->first_ns) / INCISE_NS_PER_S;
@@ -174,7 +188,7 @@ void view_procedure(struct view_job *job)
 	loop.duration_ns = (int64_t)(end_s * INCISE_NS_PER_S);
 	if (incise_loop_run(job->plan, incise_rig_clock(job->own_rig), &loop, &stats,
 			    &err) < 0)
-		cli_fail_with(&err);
+		fail(job, NULL, &err);
 }
 
 static int replay_tick(void *context, const struct incise_replay_tick *tick,
@@ -202,6 +216,6 @@ void view_recording(struct view_job *job)
 	view_job_view(job);
 	if (incise_replay(recording, job->scene, &replay, &stats, &report, &err) &&
 	    !run.ended)
-		cli_fail("%s: %s", job->from, err.text);
+		fail(job, job->from, &err);
 	incise_recording_close(recording);
 }

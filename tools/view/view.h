@@ -15,6 +15,7 @@
 #include <incise/sim.h>
 #include <incise/view.h>
 #include "../cli/scene_argument.h"
+#include "../session/log.h"
 #include "live.h"
 
 #define VIEW_STRIP_MAX 12
@@ -39,6 +40,8 @@ struct view_job {
 	double camera[3];
 	double duration_s;
 	struct view_output output;
+	struct session_options session;
+	struct session_log *log; /* or NULL */
 
 	struct incise_scene *scene;
 	double rate_hz;

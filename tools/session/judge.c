@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * A session against the criteria of its scene; see session.h.
+ */
+#include <math.h>
+#include <stdio.h>
+#include "session.h"
+
+enum form { RANGE, MOST, SWITCH };
+
+static const struct {
+	const char *label, *unit;
+	enum form form;
+	int digits;
+	bool of_membrane; /* a scene without one has no value */
+} criteria[INCISE_CRITERIA] = {
+	[INCISE_CRITERION_CUT_LENGTH] = {"length of the incision", "mm", RANGE, 1},
+	[INCISE_CRITERION_CUT_DEPTH] = {"depth of the incision", "mm", RANGE, 1},
+	[INCISE_CRITERION_OFF_TARGET] = {"off the target", "mm", MOST, 1, true},
+	[INCISE_CRITERION_INCISIONS] = {"incisions", "", MOST, 0},
+	[INCISE_CRITERION_MEMBRANE] = {"through the membrane", "", SWITCH, 0, true},
+	[INCISE_CRITERION_INSERTION] = {"depth of the tube", "mm", RANGE, 1},
+	[INCISE_CRITERION_BACK_WALL] = {"back wall touched", "", SWITCH, 0, true},
+	[INCISE_CRITERION_FORCE] = {"largest force", "N", MOST, 2},
+	[INCISE_CRITERION_TIME] = {"time needed", "s", MOST, 1},
+};
+
+const char *session_criterion_label(int criterion)
+{
+	return criteria[criterion].label;
+}
+
+const char *session_criterion_unit(int criterion)
+{
+	return criteria[criterion].unit;
+}
+
+void session_criterion_value(int criterion, double value, char *text, size_t size)
+{
+	if (isnan(value))
+		snprintf(text, size, "–");
+	else if (criteria[criterion].form == SWITCH)
+		snprintf(text, size, "%s", value != 0 ? "yes" : "no");
+	else
+		snprintf(text, size, "%.*f", criteria[criterion].digits, value);
+}
+
+void session_criterion_asked(int criterion, const struct incise_scene_criterion *asked,
+			     char *text, size_t size)
+{
+	enum form form = criteria[criterion].form;
+
+	if (!asked->asked)
+		snprintf(text, size, "–");
+	else if (form == SWITCH)
+		snprintf(text, size, "%s", asked->max != 0 ? "yes" : "no");
+	else if (form == MOST)
+		snprintf(text, size, "at most %g", asked->max);
+	else
+		snprintf(text, size, "%g to %g", asked->min, asked->max);
+}
+
+/* Of the longest incision: its number is that of its first cut; -1: there is none. */
+static int longest(const struct session *session, double *length_mm, int *n)
+{
+	double sum_mm[SESSION_CUTS_MAX] = {0};
+	int best = -1;
+
+	*n = 0;
+	for (int i = 0; i < session->n_cuts; i++)
+		sum_mm[session->cut[i].incision] += session->cut[i].length_mm;
+	for (int i = 0; i < session->n_cuts; i++) {
+		if (session->cut[i].incision != i)
+			continue;
+		++*n;
+		if (best < 0 || sum_mm[i] > sum_mm[best])
+			best = i;
+	}
+	*length_mm = best < 0 ? 0 : sum_mm[best];
+	return best;
+}
+
+static void see_incisions(const struct session *session,
+			  struct session_verdict verdicts[INCISE_CRITERIA])
+{
+	double length_mm, depth_mm = 0, off_mm = NAN;
+	int n, best = longest(session, &length_mm, &n);
+
+	for (int i = 0; i < session->n_cuts; i++)
+		if (session->cut[i].incision == best) {
+			depth_mm = fmax(depth_mm, session->cut[i].depth_mm);
+			off_mm = fmin(off_mm, session->cut[i].off_target_mm);
+		}
+	verdicts[INCISE_CRITERION_CUT_LENGTH].value = length_mm;
+	verdicts[INCISE_CRITERION_CUT_DEPTH].value = depth_mm;
+	verdicts[INCISE_CRITERION_OFF_TARGET].value = off_mm;
+	verdicts[INCISE_CRITERION_INCISIONS].value = n;
+}
+
+void session_judge(const struct session *session,
+		   struct session_verdict verdicts[INCISE_CRITERIA])
+{
+	see_incisions(session, verdicts);
+	verdicts[INCISE_CRITERION_MEMBRANE].value = session->target.punctured;
+	verdicts[INCISE_CRITERION_INSERTION].value = session->insertion.seated_mm;
+	verdicts[INCISE_CRITERION_BACK_WALL].value = session->back_wall.touched > 0;
+	verdicts[INCISE_CRITERION_FORCE].value = session->force.largest_N;
+	verdicts[INCISE_CRITERION_TIME].value = session->needed_s;
+	for (int i = 0; i < INCISE_CRITERIA; i++) {
+		struct session_verdict *verdict = &verdicts[i];
+		const struct incise_scene_criterion *asked = &session->criteria[i];
+		bool there = session->has_membrane || !criteria[i].of_membrane;
+
+		if (!there)
+			verdict->value = NAN;
+		verdict->judged = asked->asked && there;
+		verdict->met = verdict->judged && verdict->value >= asked->min &&
+			       verdict->value <= asked->max;
+	}
+}
