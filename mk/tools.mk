@@ -20,9 +20,9 @@ $(O)/obj/tools/bench/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst "
 has_jpeg := $(shell $(CC) -E -x c -include stdio.h -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes)
 $(O)/obj/tools/bench/bench_capture.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
 
-# The report of incise bench all as HTML.
+# Reports as HTML.
 has_cmark := $(shell $(PKG_CONFIG) --exists libcmark-gfm && echo yes)
-$(O)/obj/tools/bench/report_html.o: cppflags += $(if $(has_cmark),-DHAVE_CMARK)
+$(O)/obj/tools/cli/document.o: cppflags += $(if $(has_cmark),-DHAVE_CMARK)
 
 # Image files: those that depth is calibrated from, and frames of a view.
 has_png := $(shell $(CC) -E -x c -include png.h /dev/null >/dev/null 2>&1 && echo yes)
@@ -31,13 +31,13 @@ $(O)/obj/tools/cli/image.o: cppflags += $(if $(has_png),-DHAVE_PNG)
 # The parts of all programs. The linker takes of them, and of the libraries, what a program
 # uses: a new part, command or benchmark is found by its place.
 tool_parts := $(O)/obj/tools/parts.a
-tool_texts := $(wildcard tools/bench/*.md tools/bench/*.css tools/bench/plots/*.gp)
+tool_texts := $(wildcard tools/bench/*.md tools/cli/*.css tools/bench/plots/*.gp)
 $(tool_parts): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tools/*/*.c)) $(tool_texts:%=$(O)/obj/%.o)
 	@rm -f $@
 	$(call step,AR)
 	$(Q)$(AR) rcs $@ $^
 
-# A text that benchmarks print from: report.md becomes the string text_report_md.
+# A text that reports are made of: report.md becomes the string text_report_md.
 $(tool_texts:%=$(O)/obj/%.o): $(O)/obj/%.o: %
 	@mkdir -p $(@D)
 	$(call step,CC)
@@ -82,7 +82,7 @@ $(filter $(O)/bin/incise-bench%,$(programs)): tool_inside = $(extremes) $(O)/lib
 $(filter $(O)/bin/incise-bench%,$(programs)): $(extremes) $(O)/lib/libincise-tests.a
 tool_libs := $(patsubst %,-l%,$(libraries))
 tool_more_libs := $(if $(has_png),-lpng) $(if $(has_jpeg),-ljpeg) -lm
-$(O)/bin/incise-bench-all: tool_more_libs += $(if $(has_cmark),$(shell $(PKG_CONFIG) --libs libcmark-gfm))
+$(O)/bin/incise-bench-all $(O)/bin/incise-assess: tool_more_libs += $(if $(has_cmark),$(shell $(PKG_CONFIG) --libs libcmark-gfm))
 
 $(programs): $(O)/bin/%: $(O)/obj/tools/%.o $(tool_parts) $(foreach lib,$(libraries),$(O)/lib/lib$(lib).so)
 	@mkdir -p $(@D)

@@ -24,6 +24,7 @@
 #include "bench/metrics.h"
 #include "bench/machine.h"
 #include "bench/report.h"
+#include "cli/document.h"
 #include "cli/child.h"
 #include "cli/cli.h"
 #include "cli/file.h"
@@ -300,7 +301,7 @@ static int write_html(const char *path, const char *markdown, struct incise_erro
 
 	if (!file)
 		return -errno;
-	rc = report_html(markdown, path, incise_outfile_stream(file), err);
+	rc = document_html(markdown, path, incise_outfile_stream(file), err);
 	if (!rc)
 		return incise_outfile_commit(file, err);
 	incise_outfile_abort(file);

@@ -24,6 +24,8 @@
 #include <string.h>
 #include <unistd.h>
 #include "../../lib/base/ascending.h"
+#include "../cli/control_character.h"
+#include "../cli/document.h"
 #include "bench.h"
 #include "report.h"
 
@@ -74,61 +76,11 @@ struct report {
 
 /* --- Markdown --- */
 
-/* Bytes of UTF-8 of a control character of ASCII or Latin-1; 0: none is. */
-static int control(const char *text)
-{
-	const unsigned char *c = (const unsigned char *)text;
-
-	if (*c == 0xc2 && c[1] >= 0x80 && c[1] < 0xa0)
-		return 2;
-	return (*c && *c < ' ') || *c == 0x7f;
-}
-
-/* An underscore in a word is none to Markdown, and names are full of them. */
-static bool in_word(const char *text, const char *at)
-{
-	return at > text && isalnum((unsigned char)at[-1]) &&
-	       isalnum((unsigned char)at[1]);
-}
-
-/* Text that is shown as it is, even at the start of a line. */
-static void put_text(FILE *out, const char *text)
-{
-	size_t digits = strspn(text, "0123456789");
-
-	if (*text && strchr("#+-=~", *text))
-		fputc('\\', out);
-	for (const char *c = text; *c; c++) {
-		if (control(c)) {
-			fputc(' ', out);
-			c += control(c) - 1;
-			continue;
-		}
-		if ((*c == '_' && !in_word(text, c)) || strchr("\\`*[]<>|&", *c) ||
-		    (digits && c == text + digits && strchr(".)", *c) &&
-		     strchr(" ", c[1])))
-			fputc('\\', out);
-		fputc(*c, out);
-	}
-}
-
 /* One line, which cannot end the fence that it stands in. */
 static void put_command(FILE *out, const char *text)
 {
 	for (; *text; text++)
-		fputc(*text == '`' ? '\'' : control(text) ? ' ' : *text, out);
-}
-
-void report_anchor(const char *title, char *anchor, size_t size)
-{
-	size_t n = 0;
-
-	for (const char *c = title; *c && n + 1 < size; c++)
-		if (isalnum((unsigned char)*c) || *c == '-' || *c == '_')
-			anchor[n++] = (char)tolower((unsigned char)*c);
-		else if (*c == ' ')
-			anchor[n++] = '-';
-	anchor[n] = 0;
+		fputc(*text == '`' ? '\'' : control_character(text) ? ' ' : *text, out);
 }
 
 /* An empty line in front of a block, but not between list items. */
@@ -472,10 +424,10 @@ static void put_link(struct report *r, const char *word)
 	while (*s->word && strcmp(s->word, word))
 		s++;
 	if (!*s->word || !json_object_get(json_object_get(r->report, "words"), word)) {
-		put_text(r->out, word);
+		document_text(r->out, word);
 		return;
 	}
-	report_anchor(s->title, anchor, sizeof(anchor));
+	document_anchor(s->title, anchor, sizeof(anchor));
 	fprintf(r->out, "[%s](#%s)", word, anchor);
 }
 
@@ -602,7 +554,7 @@ static void put_paragraph(struct report *r, struct block block, const struct row
 			fputc(' ', r->out);
 		else
 			start_block(r, item);
-		put_line(r, row, line, put_text);
+		put_line(r, row, line, document_text);
 		if (i + 1 == block.n || !strncmp(block.line[i + 1], "- ", 2))
 			fputc('\n', r->out);
 	}
@@ -698,7 +650,7 @@ static void put_facts(struct report *r, struct block block)
 		size_t size;
 
 		inner.out = open_memstream(&row, &size);
-		if (put_line(&inner, NULL, block.line[i], put_text)) {
+		if (put_line(&inner, NULL, block.line[i], document_text)) {
 			if (!any)
 				put_head(r, &t, *block.line);
 			any = true;
@@ -732,7 +684,7 @@ static void put_reason(struct report *r, const struct table *t, const struct row
 		return;
 	snprintf(line + strlen(line), sizeof(line) - strlen(line), ". Why: %s", why);
 	start_block(r, false);
-	put_text(r->out, line);
+	document_text(r->out, line);
 	fputc('\n', r->out);
 }
 
@@ -757,7 +709,7 @@ static void put_table(struct report *r, struct block block, const char *caption,
 			if (!strcmp(t.column[k].key, "to"))
 				put_link(r, rows->row[i].name);
 			else
-				put_text(r->out, text);
+				document_text(r->out, text);
 			fputc(' ', r->out);
 		}
 		fputs("|\n", r->out);
@@ -871,7 +823,7 @@ static void put_contents(FILE *out, const char *body)
 			continue;
 		snprintf(title, sizeof(title), "%.*s", (int)strcspn(line + 3, "\n"),
 			 line + 3);
-		report_anchor(title, anchor, sizeof(anchor));
+		document_anchor(title, anchor, sizeof(anchor));
 		fprintf(out, "- [%s](#%s)\n", title, anchor);
 	}
 }

@@ -9,7 +9,6 @@
 #include <jansson.h>
 #include <stdbool.h>
 #include <stdio.h>
-#include <incise/error.h>
 
 /* A benchmark's section of the template. */
 struct report_section {
@@ -28,15 +27,6 @@ void report_markdown(const json_t *report, const char *folder, FILE *out);
 /* A number for people: 0.0123, 45678, 1.3×10⁻¹⁵; "–" where there is none. */
 void report_number(double value, int digits, char *text, size_t size);
 
-/* Markdown as one file of HTML, with the plots of the folder in it. Returns 0 or a negative
- * errno, with err; -EOPNOTSUPP in a build without libcmark-gfm. */
-int report_html(const char *markdown, const char *folder, FILE *out,
-		struct incise_error *err);
-
-/* The end of a link to a section, as GitHub makes it of a title: "What it costs" is
- * "what-it-costs". */
-void report_anchor(const char *title, char *anchor, size_t size);
-
-extern const char text_report_md[], text_report_css[];
+extern const char text_report_md[];
 
 #endif

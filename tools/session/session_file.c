@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/infile.h>
+#include "../cli/control_character.h"
 #include "../cli/json.h"
 #include "session.h"
 
@@ -215,25 +216,14 @@ static json_t *vector(const double v[3])
 	return list;
 }
 
-/* Bytes of UTF-8 of a control character of ASCII or Latin-1; 0: none is. */
-static int control(const char *text)
-{
-	const unsigned char *c = (const unsigned char *)text;
-
-	if (*c == 0xc2 && c[1] >= 0x80 && c[1] < 0xa0)
-		return 2;
-	return (*c && *c < ' ') || *c == 0x7f;
-}
-
 static json_t *clean(const char *text)
 {
 	char *copy = strdup(text);
 	json_t *json;
 
 	for (char *c = copy; c && *c; c++)
-		if (control(c)) {
-			memset(c, '?', (size_t)control(c));
-		}
+		if (control_character(c))
+			memset(c, '?', (size_t)control_character(c));
 	json = copy ? json_text(copy) : NULL;
 	free(copy);
 	return json;
@@ -386,7 +376,7 @@ static int take_vector(const struct reader *reader, const struct member *member,
 static bool is_clean(const char *text, size_t n)
 {
 	for (size_t i = 0; i < n; i++)
-		if (!text[i] || control(text + i))
+		if (!text[i] || control_character(text + i))
 			return false;
 	return true;
 }

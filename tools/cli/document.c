@@ -1,20 +1,63 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The report's Markdown as one file of HTML, rendered by libcmark-gfm. This file adds the
+ * Markdown as one file of HTML, rendered by libcmark-gfm; see document.h. This file adds the
  * outline: sections that links lead to, a box that scrolls around each table and plot, and the
  * plots themselves.
  */
+#include <ctype.h>
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include "../cli/cli.h"
-#include "report.h"
+#include "cli.h"
+#include "control_character.h"
+#include "document.h"
+
+/* An underscore in a word is none to Markdown, and names are full of them. */
+static bool in_word(const char *text, const char *at)
+{
+	return at > text && isalnum((unsigned char)at[-1]) &&
+	       isalnum((unsigned char)at[1]);
+}
+
+void document_text(FILE *out, const char *text)
+{
+	size_t digits = strspn(text, "0123456789");
+
+	if (*text && strchr("#+-=~", *text))
+		fputc('\\', out);
+	for (const char *c = text; *c; c++) {
+		if (control_character(c)) {
+			fputc(' ', out);
+			c += control_character(c) - 1;
+			continue;
+		}
+		if ((*c == '_' && !in_word(text, c)) || strchr("\\`*[]<>|&", *c) ||
+		    (digits && c == text + digits && strchr(".)", *c) &&
+		     strchr(" ", c[1])))
+			fputc('\\', out);
+		fputc(*c, out);
+	}
+}
+
+void document_anchor(const char *title, char *anchor, size_t size)
+{
+	size_t n = 0;
+
+	for (const char *c = title; *c && n + 1 < size; c++)
+		if (isalnum((unsigned char)*c) || *c == '-' || *c == '_')
+			anchor[n++] = (char)tolower((unsigned char)*c);
+		else if (*c == ' ')
+			anchor[n++] = '-';
+	anchor[n] = 0;
+}
 
 #ifdef HAVE_CMARK
 #include <cmark-gfm.h>
 #include <cmark-gfm-core-extensions.h>
 #include <cmark-gfm-extension_api.h>
+
+extern const char text_document_css[];
 
 /* Text of so many bytes takes several lines of its column. */
 #define LONG 30
@@ -62,7 +105,7 @@ static char *text_of(cmark_node *node)
 }
 
 /* In an element or an attribute. */
-static void put_text(FILE *out, const char *text)
+static void put_escaped(FILE *out, const char *text)
 {
 	static const char *const escaped[128] = {
 		['&'] = "&amp;", ['<'] = "&lt;", ['>'] = "&gt;", ['"'] = "&quot;"};
@@ -77,7 +120,7 @@ static void put_text(FILE *out, const char *text)
 static void put_box(FILE *out, const char *class, const char *label)
 {
 	fprintf(out, "<div%s role=\"region\" tabindex=\"0\" aria-label=\"", class);
-	put_text(out, label);
+	put_escaped(out, label);
 	fputs("\">", out);
 }
 
@@ -112,7 +155,7 @@ static void put_table(const struct page *page, cmark_node *table, const char *ca
 	html = html_of(page, table);
 	put_box(page->out, " class=\"scroll\"", caption);
 	fputs("\n<table>\n<caption><span>", page->out);
-	put_text(page->out, caption);
+	put_escaped(page->out, caption);
 	fprintf(page->out, "</span></caption>\n%s</div>\n", strchr(html, '\n') + 1);
 	free(html);
 }
@@ -179,11 +222,11 @@ static int put_plot(const struct page *page, cmark_node *image, const char *capt
 	fputs("<figure>\n", page->out);
 	put_box(page->out, "", caption);
 	fputs("<img alt=\"", page->out);
-	put_text(page->out, instead);
+	put_escaped(page->out, instead);
 	fputs("\" src=\"", page->out);
 	rc = put_data(page, cmark_node_get_url(image));
 	fputs("\"></div>\n<figcaption>", page->out);
-	put_text(page->out, caption);
+	put_escaped(page->out, caption);
 	fputs("</figcaption>\n</figure>\n", page->out);
 	free(instead);
 	return rc;
@@ -193,7 +236,7 @@ static void begin_section(const struct page *page, cmark_node *heading, bool fir
 {
 	char *title = text_of(heading), anchor[200];
 
-	report_anchor(title, anchor, sizeof(anchor));
+	document_anchor(title, anchor, sizeof(anchor));
 	fprintf(page->out, "%s<section id=\"%s\">\n", first ? "</nav>\n" : "</section>\n",
 		anchor);
 	put_node(page, heading);
@@ -230,8 +273,8 @@ static cmark_node *put_block(const struct page *page, cmark_node *node, bool *se
 	return next;
 }
 
-int report_html(const char *markdown, const char *folder, FILE *out,
-		struct incise_error *err)
+int document_html(const char *markdown, const char *folder, FILE *out,
+		  struct incise_error *err)
 {
 	cmark_parser *parser = cmark_parser_new(CMARK_OPT_DEFAULT);
 	struct page page = {parser, folder, out, err};
@@ -251,11 +294,11 @@ int report_html(const char *markdown, const char *folder, FILE *out,
 	      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
 	      "<title>",
 	      out);
-	put_text(out, title);
+	put_escaped(out, title);
 	fprintf(out,
 		"</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n%s</style>\n"
 		"</head>\n<body>\n<main>\n",
-		text_report_css);
+		text_document_css);
 	while (node)
 		node = put_block(&page, node, &section, &rc);
 	fputs("</section>\n</main>\n</body>\n</html>\n", out);
@@ -267,8 +310,8 @@ int report_html(const char *markdown, const char *folder, FILE *out,
 
 #else
 
-int report_html(const char *markdown, const char *folder, FILE *out,
-		struct incise_error *err)
+int document_html(const char *markdown, const char *folder, FILE *out,
+		  struct incise_error *err)
 {
 	(void)markdown;
 	(void)folder;
