@@ -34,6 +34,7 @@ static const struct {
 	{"haptic", "run the real-time loop of a scene"},
 	{"status", "say what the loops on this machine do, or did last"},
 	{"view", "show a scene: tissue, wound, blood, instrument"},
+	{"assess", "report what happened in sessions, against criteria"},
 	{"replay", "run the loop on a recording, predicted beside measured"},
 	{"stepper", "look at the actuator and move it by hand"},
 	{"bench", "measure error against run time"},

@@ -6,12 +6,25 @@ load cli
 setup_file() {
 	export XDG_RUNTIME_DIR="$BATS_FILE_TMPDIR/run"
 	mkdir -p "$XDG_RUNTIME_DIR"
+	cd "$BATS_FILE_TMPDIR"
+	cp "$BATS_TEST_DIRNAME"/../../scenes/neck.scene .
+	# one cut along the skin of the virtual surgeon; what is asked is met, then not
+	rig=sim:clock=simulated,depth_mm=6,times=1,pause_s=1,cut_s=4
+	sed -i '/^criteria = {/,/^};/d' neck.scene
+	echo 'criteria = { cut_length_mm = [10.0, 200.0]; incisions_most = 8; force_most_N = 4.0;
+		back_wall = false; };' | cat neck.scene - >easy.scene
+	echo 'criteria = { cut_length_mm = [10.0, 11.0]; insertion_depth_mm = [5.0, 9.0];
+		force_most_N = 0.1; time_most_s = 100.0; };' | cat neck.scene - >hard.scene
+	for scene in easy hard; do
+		"$INCISE_BUILD/bin/incise" haptic $scene.scene --rig $rig --duration 8s \
+			--session $scene.session --code S-$scene >/dev/null
+	done
 }
 
 setup() {
 	work_folder
 	cp "$root"/scenes/neck.scene .
-	# one cut along the skin of the virtual surgeon: 1.2 s to 5.6 s
+	cp "$BATS_FILE_TMPDIR"/*.session .
 	quick=sim:clock=simulated,depth_mm=6,times=1,pause_s=1,cut_s=4
 }
 
@@ -126,4 +139,185 @@ until_it_runs() {
 		bad_usage "is no code"
 	done
 	[ ! -e b.session ]
+}
+
+# Cell of a CSV file by the name of its column: cell FILE ROW NAME.
+cell() {
+	python3 -c 'import csv, sys
+row = list(csv.DictReader(open(sys.argv[1], newline="")))[int(sys.argv[2])]
+print(row[sys.argv[3]])' "$@"
+}
+
+@test "criteria that are met and that are not, each with its value" {
+	run -0 --separate-stderr incise assess easy.session
+	[ -z "$stderr" ]
+	[[ "${lines[0]}" == "easy.session: easy.scene, code S-easy, 8.0 s, 8000 ticks, ended as asked" ]]
+	[[ "$output" =~ length\ of\ the\ incision\ +[0-9.]+\ mm\ +10\ to\ 200\ +yes ]]
+	# no membrane, no value and no judgement
+	[[ "$output" =~ back\ wall\ touched\ +-\ +no\ +- ]]
+	[ "${lines[-1]}" = "3 of 3 criteria met" ]
+	incise assess easy.session --json >e.json
+	holds "$(key e.json 'sessions[0].criteria.cut_length_mm.value') > 10"
+	[ "$(key e.json 'sessions[0].criteria.cut_length_mm.met')" = 1 ]
+	[ -z "$(key e.json 'sessions[0].criteria.back_wall.met')" ]
+	[ -z "$(key e.json 'sessions[0].criteria.time_most_s.met')" ]
+	[ "$(key e.json 'sessions[0].judged')" = 3 ]
+	[ -z "$(key e.json reference)" ]
+
+	incise assess hard.session --json >h.json
+	[ "$(key h.json 'sessions[0].judged')" = 4 ]
+	[ "$(key h.json 'sessions[0].met')" = 1 ]
+	[ "$(key h.json 'sessions[0].criteria.cut_length_mm.met')" = 0 ]
+	[ "$(key h.json 'sessions[0].criteria.insertion_depth_mm.value')" = 0.0 ]
+	[ "$(key h.json 'sessions[0].criteria.time_most_s.met')" = 1 ]
+	# criteria change no value
+	[ "$(key h.json 'sessions[0].criteria.cut_length_mm.value')" = \
+		"$(key e.json 'sessions[0].criteria.cut_length_mm.value')" ]
+	# the file's own list says as much: the longest incision is the largest sum of its cuts
+	longest=$(sqlite3 :memory: "SELECT max(l) FROM (SELECT sum(value->>'length_mm') l
+		FROM json_each(readfile('easy.session'), '\$.cuts') GROUP BY value->>'incision')")
+	holds "($(key e.json 'sessions[0].criteria.cut_length_mm.value') - $longest)^2 < 1e-12"
+}
+
+@test "a reference has a column and the differences; against itself there are none" {
+	run -0 --separate-stderr incise assess hard.session --reference easy.session
+	[ "${#stderr_lines[@]}" -eq 1 ]
+	[[ "$stderr" == *"hard.session: its scene is not that of easy.session" ]]
+	[[ "$output" == *"reference difference"* ]]
+	sed 's/"largest_N": [0-9.]*/"largest_N": 0.5/' easy.session >expert.session
+	incise assess easy.session --reference expert.session --json >r.json
+	largest=$(key r.json 'sessions[0].criteria.force_most_N.value')
+	holds "($(key r.json 'sessions[0].difference.force_most_N') - ($largest - 0.5))^2 < 1e-12"
+	[ "$(key r.json reference.file)" = expert.session ]
+	run -0 --separate-stderr incise assess easy.session --reference easy.session --json
+	[ -z "$stderr" ]
+	echo "$output" >r.json
+	[ "$(sqlite3 :memory: "SELECT count(*) FROM json_each(readfile('r.json'),
+		'\$.sessions[0].difference') WHERE value != 0")" = 0 ]
+}
+
+@test "a row for each of many, as table and CSV" {
+	run -0 --separate-stderr incise assess easy.session hard.session --csv all.csv
+	[ "${lines[1]%% *}" = easy.session ]
+	[[ "${lines[2]}" == hard.session*"!"*" 1 of 4" ]]
+	[ "${lines[-1]}" = all.csv ]
+	[ "$(wc -l <all.csv)" -eq 3 ]
+	[ "$(cell all.csv 1 file)" = hard.session ]
+	[ "$(cell all.csv 1 code)" = S-hard ]
+	[ "$(cell all.csv 1 met)" = 1 ]
+	[ "$(cell all.csv 1 cut_length_mm_met)" = no ]
+	[ "$(cell all.csv 0 cut_length_mm_met)" = yes ]
+	[ -z "$(cell all.csv 0 off_target_mm)" ]
+	holds "($(cell all.csv 0 force_most_N) - $(key easy.session force.largest_N))^2 < 1e-12"
+	incise assess easy.session --reference hard.session --csv - 2>/dev/null >r.csv
+	[ "$(cell r.csv 1 role)" = reference ]
+	cp easy.session 'a,"b.session'
+	incise assess 'a,"b.session' --csv q.csv >/dev/null
+	[ "$(cell q.csv 0 file)" = 'a,"b.session' ]
+}
+
+@test "a page holds all of it, with figures, and nothing from elsewhere" {
+	command -v gnuplot || skip "no gnuplot"
+	mkdir t
+	export TMPDIR=$PWD/t
+	incise assess easy.session hard.session --reference easy.session -o p.html 2>why >out ||
+		{ grep -q "without libcmark-gfm" why && skip "$(cat why)"; false; }
+	[ "$(tail -n 1 out)" = p.html ]
+	# two figures each
+	[ "$(grep -o 'src="data:image/svg+xml;base64,' p.html | wc -l)" -eq 4 ]
+	run ! grep -qE '(src|href)="(https?:|//|/)' p.html
+	grep -q 'S-hard' p.html
+	grep -q '<strong>no</strong>' p.html
+	# what is in the folder for figures is gone
+	[ -z "$(ls -A t)" ]
+	python3 - p.html <<-'END'
+		import base64, re, sys, xml.dom.minidom
+		for figure in re.findall('base64,([A-Za-z0-9+/=]+)', open(sys.argv[1]).read()):
+		    xml.dom.minidom.parseString(base64.b64decode(figure))
+	END
+	# what a file says is shown as it is
+	sed -E 's|"path": "easy.scene"|"path": "<script>alert(1)</script> **a** \| b"|' easy.session >x.session
+	incise assess x.session -o x.html >/dev/null
+	run ! grep -q '<script>' x.html
+	grep -qF '&lt;script&gt;alert(1)&lt;/script&gt; **a** | b' x.html
+	run --separate-stderr incise assess easy.session -o p.html
+	failed_with "p.html: exists"
+	run --separate-stderr incise assess easy.session -o easy.session --overwrite
+	failed_with easy.session
+}
+
+@test "a session without a tick, or without a contact, is reported too" {
+	incise haptic neck --rig $quick --duration 0.5s --session a.session >/dev/null
+	[ -z "$(key a.session first_contact_s)" ]
+	run -0 --separate-stderr incise assess a.session
+	[ -z "$stderr" ]
+	[[ "$output" =~ time\ needed\ +-\ s\ +at\ most\ 40\ +no ]]
+	incise assess a.session -o a.html >/dev/null 2>why || grep -qE "gnuplot|cmark" why
+	python3 - <<-'END'
+		import json
+		s = json.load(open('a.session'))
+		s['trace']['rows'] = []
+		s['ticks'] = 0
+		s['ticks_lost'] = 5
+		json.dump(s, open('b.session', 'w'))
+	END
+	run -0 --separate-stderr incise assess b.session
+	[ -z "$stderr" ]
+	[[ "$output" == *"5 of 5 ticks were lost"* ]]
+	incise assess b.session -o b.html >/dev/null 2>why || grep -qE "gnuplot|cmark" why
+}
+
+# refused TEXT…: bad.session is, in one line.
+refused() {
+	run --separate-stderr incise assess easy.session bad.session
+	failed_with bad.session "$@" || return
+	[ -z "$output" ] || complain "printed: $output"
+}
+
+@test "damaged files are refused in one line that says where" {
+	head -c 1000 easy.session >bad.session
+	refused "no JSON"
+	: >bad.session
+	refused "no JSON"
+	echo '[]' >bad.session
+	refused incise_session
+	sed 's/"incise_session": 1/"incise_session": 7/' easy.session >bad.session
+	refused "form 7" "form 1"
+	sed 's/"ticks": 8000/"ticks": "8000"/' easy.session >bad.session
+	refused "ticks: expected a whole number"
+	sed 's/"duration_s": [0-9.]*/"duration_s": 1e300/' easy.session >bad.session
+	refused "duration_s: expected a number from 0 to"
+	sed 's/"tool": "blade"/"tool": "spade"/' easy.session >bad.session
+	refused "tool: expected"
+	sed 's/"path": "easy.scene"/"path": "\\u001b[2J"/' easy.session >bad.session
+	refused "scene.path"
+	python3 -c 'print("[" * 100000)' >bad.session
+	refused "no JSON"
+	head -c 20000000 /dev/zero | tr '\0' ' ' >bad.session
+	refused "8"
+	cp "$root/scenes/neck.scene" bad.session
+	refused "no JSON"
+	rm bad.session
+	refused "No such file"
+	mkdir bad.session
+	refused directory
+	run --separate-stderr incise assess
+	bad_usage "expected a session"
+	run --separate-stderr incise assess easy.session --reference none.session
+	failed_with none.session
+	run --separate-stderr incise assess easy.session --json --csv -
+	bad_usage "standard output"
+}
+
+@test "a view's session is that of the ticks that it shows" {
+	[ -x "$INCISE_BUILD/bin/incise-view" ] ||
+		skip "incise view was not built: SDL2, epoxy, cairo or EGL were absent"
+	small="--size 160x120 --no-panel --fps 1 --duration 4s"
+	incise view neck --procedure --frames f --session a.session $small 2>why || skip "no OpenGL here: $(cat why)"
+	incise view neck --procedure --frames f --session b.session --overwrite --json $small >r.json
+	cmp a.session b.session
+	[ "$(key a.session source)" = procedure ]
+	# the picture's cuts are the session's, but for a place, 0.5 mm, at each end
+	holds "($(key r.json cut_mm) - $(key a.session 'cuts[0].length_mm'))^2 < 1"
+	[ -z "$(key a.session start_unix_s)" ]
 }

@@ -44,7 +44,8 @@ bool session_is_code(const char *text)
 	size_t n = strspn(text, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
 				"0123456789-_");
 
-	return n > 0 && n <= SESSION_CODE_MAX && !text[n];
+	/* At its start '-' would be an option, and a formula of a spreadsheet. */
+	return n > 0 && n <= SESSION_CODE_MAX && !text[n] && *text != '-';
 }
 
 struct session_digest *session_digest_new(const struct incise_scene *scene,

@@ -38,7 +38,7 @@ const char *session_criterion_unit(int criterion)
 void session_criterion_value(int criterion, double value, char *text, size_t size)
 {
 	if (isnan(value))
-		snprintf(text, size, "–");
+		snprintf(text, size, "-");
 	else if (criteria[criterion].form == SWITCH)
 		snprintf(text, size, "%s", value != 0 ? "yes" : "no");
 	else
@@ -51,7 +51,7 @@ void session_criterion_asked(int criterion, const struct incise_scene_criterion 
 	enum form form = criteria[criterion].form;
 
 	if (!asked->asked)
-		snprintf(text, size, "–");
+		snprintf(text, size, "-");
 	else if (form == SWITCH)
 		snprintf(text, size, "%s", asked->max != 0 ? "yes" : "no");
 	else if (form == MOST)

@@ -120,7 +120,7 @@ struct session {
 /* "auto", "blade", "handle", "tube". */
 extern const char *const session_tools[4];
 
-/* Letters, digits, '-' and '_', at most SESSION_CODE_MAX: a code, and no name of a person. */
+/* Letters, digits, '-' and '_', at most SESSION_CODE_MAX, no '-' first: a code, no name of a person. */
 bool session_is_code(const char *text);
 
 /* --- ticks to a session --- */
@@ -175,7 +175,7 @@ const char *session_criterion_unit(int criterion);
 void session_criterion_asked(int criterion, const struct incise_scene_criterion *asked,
 			     char *text, size_t size);
 
-/* "29.6", "yes", "–" where there is none. */
+/* "29.6", "yes", "-" where there is none. */
 void session_criterion_value(int criterion, double value, char *text, size_t size);
 
 #endif

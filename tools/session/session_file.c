@@ -553,6 +553,11 @@ static int take_trace(struct reader *reader, const json_t *json, struct session 
 static int check(struct reader *reader, struct session *session)
 {
 	reader->place[0] = 0;
+	if (strspn(session->scene.crc32c, "0123456789abcdef") != 8)
+		return expected(reader, "scene.crc32c", "eight hexadecimal digits");
+	if (strcmp(session->end.kind, "asked") && strcmp(session->end.kind, "signal") &&
+	    strcmp(session->end.kind, "fault"))
+		return expected(reader, "end.kind", "asked, signal or fault");
 	if (*session->code && !session_is_code(session->code))
 		return expected(reader, "code", "letters, digits, - and _");
 	if (session->has_membrane &&

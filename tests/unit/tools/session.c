@@ -322,9 +322,12 @@ static void test_unusable(void **state)
 
 static char *written(struct session *session)
 {
-	json_t *json = session_json(session);
-	char *dumped = json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(15));
+	json_t *json;
+	char *dumped;
 
+	strcpy(session->scene.crc32c, "01234567");
+	json = session_json(session);
+	dumped = json_dumps(json, JSON_INDENT(1) | JSON_REAL_PRECISION(15));
 	json_decref(json);
 	assert_non_null(dumped);
 	return dumped;
@@ -342,7 +345,6 @@ static void test_file(void **state)
 	s = session_digest_now(hand.digest);
 	strcpy(s->code, "P07");
 	strcpy(s->scene.path, "a\nb\xff");
-	strcpy(s->scene.crc32c, "01234567");
 	s->lost = 12;
 	first = written(s);
 	read = session_parse(first, strlen(first), "a.session", &err);
@@ -378,6 +380,10 @@ static void test_damaged(void **state)
 		{"\"ticks\": 10000", "\"ticks\": 1.5", "whole number", EINVAL},
 		{"\"ticks\": 10000", "\"ticks\": true", "whole number", EINVAL},
 		{"\"code\": \"\"", "\"code\": \"A B\"", "code", EINVAL},
+		{"\"code\": \"\"", "\"code\": \"-A\"", "code", EINVAL},
+		{"\"01234567\"", "\"=1234567\"", "scene.crc32c", EINVAL},
+		{"\"01234567\"", "\"0123456\"", "scene.crc32c", EINVAL},
+		{"\"kind\": \"asked\"", "\"kind\": \"lost\"", "end.kind", EINVAL},
 		{"\"code\": \"\"", "\"code\": \"ABCDEFGHIJKLMNOPQ\"", "code", EINVAL},
 		{"\"code\": \"\"", "\"code\": \"\\u001b\"", "code", EINVAL},
 		{"\"program\": \"\"", "\"program\": \"a\\u009b\"", "program", EINVAL},

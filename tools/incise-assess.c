@@ -1,0 +1,958 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise assess NAME.session …: what happened in sessions, against the criteria of their scene and
+ * an expert's session; as text, JSON, CSV, and a page with figures.
+ */
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "cli/cli.h"
+#include "cli/document.h"
+#include "cli/file.h"
+#include "cli/folder.h"
+#include "cli/json.h"
+#include "cli/plot.h"
+#include "session/session.h"
+
+struct job {
+	const char *reference_path, *page, *csv;
+	bool json;
+
+	int n;
+	struct assessed *session;   /* n, and the reference behind them */
+	struct assessed *reference; /* or NULL */
+};
+
+/* A session with its judgement. */
+struct assessed {
+	const char *path;
+	struct session *session;
+	struct session_verdict verdict[INCISE_CRITERIA];
+	int judged, met;
+};
+
+static const struct cli_option options[] = {
+	{0, "reference", "FILE", "an expert's session, to compare with",
+	 CLI_INPUT(struct job, reference_path)},
+	{'o', "output", "FILE.html", "write a page with figures: the path, the force",
+	 CLI_OUTPUT(struct job, page)},
+	{0, "csv", "FILE", "write a row for each session", CLI_OUTPUT(struct job, csv)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
+	{0},
+};
+
+static const struct cli_command command = {
+	.name = "assess",
+	.synopsis = "NAME.session... [OPTIONS]",
+	.summary =
+		"Report what happened in sessions of incise haptic or incise view, against the\n"
+		"criteria of their scene.",
+	.options = options,
+	.notes =
+		"Example:\n  incise assess p07.session --reference expert.session -o p07.html\n\n"
+		"Exit: 0 reported, whether criteria are met or not, 1 failed, 2 bad usage.\n"
+		"See incise-assess(1).",
+};
+
+/* Values beside those of criteria. */
+static const struct metric {
+	const char *key, *label, *unit;
+	int digits;
+	size_t offset;
+} metrics[] = {
+#define METRIC(key, label, unit, digits, member)                           \
+	{                                                                  \
+		key, label, unit, digits, offsetof(struct session, member) \
+	}
+	METRIC("enlarging_force_N", "force of the handle", "N", 2, enlarging.force_N),
+	METRIC("opening_mm", "opening of the cut", "mm", 1, enlarging.open_mm),
+	METRIC("turns", "turns of the handle", "", 0, enlarging.turns),
+	METRIC("tube_force_N", "force of the tube", "N", 2, insertion.force_N),
+	METRIC("tube_deepest_mm", "largest depth of the tube", "mm", 1,
+	       insertion.depth_mm),
+	METRIC("off_axis_mm", "way beside the membrane's axis", "mm", 1,
+	       target.off_axis_mm),
+	METRIC("missed", "ways that missed the membrane", "", 0, target.missed),
+	METRIC("duration_s", "whole session", "s", 1, duration_s),
+#undef METRIC
+};
+#define METRICS (int)(sizeof(metrics) / sizeof(*metrics))
+
+static double metric_of(const struct assessed *a, int i)
+{
+	return *(const double *)((const char *)a->session + metrics[i].offset);
+}
+
+/* Without "-0.0". */
+static double tidy(double value, int digits)
+{
+	double factor = pow(10, digits);
+
+	return round(value * factor) / factor + 0.0;
+}
+
+static void number_text(double value, int digits, char *text, size_t size)
+{
+	snprintf(text, size, isnan(value) ? "-" : "%.*f", digits, tidy(value, digits));
+}
+
+/* --- reading --------------------------------------------------------------------------- */
+
+static void parse(struct job *job, int argc, char **argv)
+{
+	cli_parse(&command, argc, argv, job);
+	job->n = argc - optind;
+	if (job->n < 1)
+		cli_usage("expected a session at least");
+	if (job->json && ((job->page && !strcmp(job->page, "-")) ||
+			  (job->csv && !strcmp(job->csv, "-"))))
+		cli_usage("--json and '-' would both write to standard output");
+	if (job->page && job->csv && !strcmp(job->page, "-") && !strcmp(job->csv, "-"))
+		cli_usage("-o - and --csv - would both write to standard output");
+}
+
+static void load(struct assessed *a, const char *path)
+{
+	struct incise_error err = {0};
+
+	a->path = path;
+	a->session = cli_require(session_read(path, &err), &err);
+	session_judge(a->session, a->verdict);
+	for (int i = 0; i < INCISE_CRITERIA; i++) {
+		a->judged += a->verdict[i].judged;
+		a->met += a->verdict[i].met;
+	}
+}
+
+static void load_all(struct job *job, char **paths)
+{
+	job->session = cli_alloc((size_t)job->n + 1, sizeof(*job->session));
+	for (int i = 0; i < job->n; i++)
+		load(&job->session[i], paths[i]);
+	if (!job->reference_path)
+		return;
+	job->reference = &job->session[job->n];
+	load(job->reference, job->reference_path);
+	for (int i = 0; i < job->n; i++)
+		if (strcmp(job->session[i].session->scene.crc32c,
+			   job->reference->session->scene.crc32c))
+			cli_warn("%s: its scene is not that of %s", paths[i],
+				 job->reference_path);
+}
+
+/* Sessions, and the reference if there is one. */
+static int rows(const struct job *job)
+{
+	return job->n + !!job->reference;
+}
+
+/* --- words that all forms share -------------------------------------------------------- */
+
+static const char *yes_no(bool yes)
+{
+	return yes ? "yes" : "no";
+}
+
+static const char *met_text(const struct session_verdict *verdict)
+{
+	return verdict->judged ? yes_no(verdict->met) : "-";
+}
+
+/* Value, asked, met, and of a reference its value and the difference. */
+struct line {
+	char value[32], asked[48], reference[32], difference[32];
+	const char *label, *unit, *met;
+};
+
+/* "+1.5" of "1.5". */
+static void sign(double difference, char *text, size_t size)
+{
+	size_t n = strlen(text);
+
+	if (!(difference > 0) || n + 2 > size)
+		return;
+	memmove(text + 1, text, n + 1);
+	*text = '+';
+}
+
+static struct line criterion_line(const struct assessed *a,
+				  const struct assessed *reference, int i)
+{
+	const struct session_verdict *verdict = &a->verdict[i];
+	struct line line = {.label = session_criterion_label(i),
+			    .unit = session_criterion_unit(i),
+			    .met = met_text(verdict)};
+	double difference;
+
+	session_criterion_value(i, verdict->value, line.value, sizeof(line.value));
+	session_criterion_asked(i, &a->session->criteria[i], line.asked,
+				sizeof(line.asked));
+	if (!reference)
+		return line;
+	session_criterion_value(i, reference->verdict[i].value, line.reference,
+				sizeof(line.reference));
+	/* Of yes and no there is none. */
+	strcpy(line.difference, "-");
+	if (i == INCISE_CRITERION_MEMBRANE || i == INCISE_CRITERION_BACK_WALL)
+		return line;
+	difference = verdict->value - reference->verdict[i].value;
+	session_criterion_value(i, difference, line.difference, sizeof(line.difference));
+	sign(difference, line.difference, sizeof(line.difference));
+	return line;
+}
+
+static struct line metric_line(const struct assessed *a, const struct assessed *reference,
+			       int i)
+{
+	struct line line = {.label = metrics[i].label,
+			    .unit = metrics[i].unit,
+			    .asked = "-",
+			    .met = "-"};
+	double difference;
+
+	number_text(metric_of(a, i), metrics[i].digits, line.value, sizeof(line.value));
+	if (!reference)
+		return line;
+	number_text(metric_of(reference, i), metrics[i].digits, line.reference,
+		    sizeof(line.reference));
+	difference = metric_of(a, i) - metric_of(reference, i);
+	number_text(difference, metrics[i].digits, line.difference,
+		    sizeof(line.difference));
+	sign(difference, line.difference, sizeof(line.difference));
+	return line;
+}
+
+static struct line line_of(const struct assessed *a, const struct assessed *reference,
+			   int i)
+{
+	return i < INCISE_CRITERIA ? criterion_line(a, reference, i)
+				   : metric_line(a, reference, i - INCISE_CRITERIA);
+}
+#define LINES (INCISE_CRITERIA + METRICS)
+
+static const char *ended(const struct session *s)
+{
+	if (!strcmp(s->end.kind, "asked"))
+		return "ended as asked";
+	return !strcmp(s->end.kind, "fault") ? "ended by a fault" : "ended by a signal";
+}
+
+/* Reasons why a session may not be all that happened. */
+static void put_doubts(FILE *out, const struct session *s, const char *before,
+		       const char *behind)
+{
+	if (!strcmp(s->end.kind, "fault"))
+		fprintf(out, "%s%s%s", before, s->end.why, behind);
+	if (s->lost > 0)
+		fprintf(out, "%s%.0f of %.0f ticks were lost: there may have been more%s",
+			before, s->lost, s->lost + s->ticks, behind);
+	if (s->unusable > 0)
+		fprintf(out, "%s%.0f ticks were no numbers, or of the past%s", before,
+			s->unusable, behind);
+	if (s->cuts_full)
+		fprintf(out, "%sthe blade was to cut beyond tissue.cuts_most%s", before,
+			behind);
+	if (s->phases_left_out > 0)
+		fprintf(out, "%s%.0f phases are left out%s", before, s->phases_left_out,
+			behind);
+}
+
+/* A cut as it is shown. */
+struct cut_text {
+	char from[64], to[64], length[16], direction[16], depth[16], median[16], open[16],
+		off[16];
+};
+
+static void place_text(const double at_mm[3], char *text, size_t size)
+{
+	snprintf(text, size, "%.1f, %.1f, %.1f", tidy(at_mm[0], 1), tidy(at_mm[1], 1),
+		 tidy(at_mm[2], 1));
+}
+
+static struct cut_text cut_text(const struct session_cut *cut)
+{
+	struct cut_text text;
+
+	place_text(cut->from_mm, text.from, sizeof(text.from));
+	place_text(cut->to_mm, text.to, sizeof(text.to));
+	number_text(cut->length_mm, 1, text.length, sizeof(text.length));
+	number_text(cut->direction_deg, 0, text.direction, sizeof(text.direction));
+	number_text(cut->depth_mm, 1, text.depth, sizeof(text.depth));
+	number_text(cut->depth_median_mm, 1, text.median, sizeof(text.median));
+	number_text(cut->open_mm, 1, text.open, sizeof(text.open));
+	number_text(cut->off_target_mm, 1, text.off, sizeof(text.off));
+	return text;
+}
+
+/* --- as text --------------------------------------------------------------------------- */
+
+static void print_lines(const struct assessed *a, const struct assessed *reference)
+{
+	printf("\n%-31s %8s %-3s %-12s %-4s", "", "value", "", "asked", "met");
+	printf(reference ? " %10s %10s\n" : "\n", "reference", "difference");
+	for (int i = 0; i < LINES; i++) {
+		struct line line = line_of(a, reference, i);
+
+		printf("%-31s %8s %-3s %-12s %-4s", line.label, line.value, line.unit,
+		       line.asked, line.met);
+		printf(reference ? " %10s %10s\n" : "\n", line.reference,
+		       line.difference);
+	}
+}
+
+static void print_cuts(const struct session *s)
+{
+	for (int i = 0; i < s->n_cuts; i++) {
+		struct cut_text cut = cut_text(&s->cut[i]);
+
+		printf("%scut %d, incision %d: (%s) to (%s), %s mm, direction %s degrees, "
+		       "depth %s mm (median %s), open %s mm, off the target %s mm\n",
+		       i ? "" : "\n", i + 1, s->cut[i].incision + 1, cut.from, cut.to,
+		       cut.length, cut.direction, cut.depth, cut.median, cut.open,
+		       cut.off);
+	}
+}
+
+static void print_phases(const struct session *s)
+{
+	for (int i = 0; i < s->n_phases; i++) {
+		const struct session_phase *phase = &s->phase[i];
+
+		printf("%s%-6s %7.2f to %7.2f s, depth %.1f mm, force %.2f N\n",
+		       i ? "" : "\n", session_tools[phase->tool], phase->from_s,
+		       phase->to_s, phase->depth_mm, phase->force_N);
+	}
+}
+
+static void print_one(const struct assessed *a, const struct assessed *reference)
+{
+	const struct session *s = a->session;
+
+	printf("%s: %s%s%s, %.1f s, %.0f ticks, %s", a->path, s->scene.path,
+	       *s->code ? ", code " : "", s->code, s->duration_s, s->ticks, ended(s));
+	put_doubts(stdout, s, "\n  ", "");
+	putchar('\n');
+	print_lines(a, reference);
+	print_cuts(s);
+	print_phases(s);
+	printf("\n%d of %d criteria met\n", a->met, a->judged);
+}
+
+/* Of many sessions: the criteria as columns. */
+static const struct {
+	const char *head;
+	int criterion;
+} columns[] = {
+	{"length_mm", INCISE_CRITERION_CUT_LENGTH},
+	{"depth_mm", INCISE_CRITERION_CUT_DEPTH},
+	{"off_mm", INCISE_CRITERION_OFF_TARGET},
+	{"incisions", INCISE_CRITERION_INCISIONS},
+	{"membrane", INCISE_CRITERION_MEMBRANE},
+	{"tube_mm", INCISE_CRITERION_INSERTION},
+	{"back_wall", INCISE_CRITERION_BACK_WALL},
+	{"force_N", INCISE_CRITERION_FORCE},
+	{"time_s", INCISE_CRITERION_TIME},
+};
+#define COLUMNS (int)(sizeof(columns) / sizeof(*columns))
+
+/* "29.6", and with a mark where the criterion is not met. */
+static void cell_text(const struct assessed *a, int column, char *text, size_t size)
+{
+	const struct session_verdict *verdict = &a->verdict[columns[column].criterion];
+	size_t n;
+
+	session_criterion_value(columns[column].criterion, verdict->value, text, size);
+	n = strlen(text);
+	if (verdict->judged && !verdict->met)
+		snprintf(text + n, size - n, "!");
+}
+
+static void print_table(const struct job *job)
+{
+	int width = (int)strlen("session");
+	char text[40];
+
+	for (int i = 0; i < rows(job); i++)
+		width = (int)fmax(width, (double)strlen(job->session[i].path));
+	printf("%-*s %-16s", width, "session", "code");
+	for (int k = 0; k < COLUMNS; k++)
+		printf(" %9s", columns[k].head);
+	puts("    met");
+	for (int i = 0; i < rows(job); i++) {
+		const struct assessed *a = &job->session[i];
+
+		printf("%-*s %-16s", width, a->path,
+		       *a->session->code ? a->session->code : "-");
+		for (int k = 0; k < COLUMNS; k++) {
+			cell_text(a, k, text, sizeof(text));
+			printf(" %9s", text);
+		}
+		printf(" %2d of %d%s\n", a->met, a->judged,
+		       a == job->reference ? ", reference" : "");
+	}
+	puts("'!' is a criterion that is not met.");
+	for (int i = 0; i < rows(job); i++) {
+		char before[300];
+
+		snprintf(before, sizeof(before), "%.280s: ", job->session[i].path);
+		put_doubts(stdout, job->session[i].session, before, "\n");
+	}
+}
+
+/* --- as JSON and CSV ------------------------------------------------------------------- */
+
+static json_t *criteria_json(const struct assessed *a)
+{
+	json_t *object = json_object();
+
+	for (int i = 0; i < INCISE_CRITERIA; i++) {
+		const struct incise_scene_criterion *asked = &a->session->criteria[i];
+		const struct session_verdict *verdict = &a->verdict[i];
+
+		json_object_set_new(
+			object, incise_criterion_name(i),
+			json_pack("{so so so so}", "value", json_number(verdict->value),
+				  "least",
+				  asked->asked ? json_number(asked->min) : json_null(),
+				  "largest",
+				  asked->asked ? json_number(asked->max) : json_null(),
+				  "met",
+				  verdict->judged ? json_boolean(verdict->met)
+						  : json_null()));
+	}
+	return object;
+}
+
+static json_t *figures_json(const struct assessed *a)
+{
+	json_t *object = json_object();
+
+	for (int i = 0; i < METRICS; i++)
+		json_set_number(object, metrics[i].key, metric_of(a, i));
+	return object;
+}
+
+static json_t *difference_json(const struct assessed *a, const struct assessed *reference)
+{
+	json_t *object = json_object();
+
+	for (int i = 0; i < INCISE_CRITERIA; i++)
+		json_set_number(object, incise_criterion_name(i),
+				a->verdict[i].value - reference->verdict[i].value);
+	for (int i = 0; i < METRICS; i++)
+		json_set_number(object, metrics[i].key,
+				metric_of(a, i) - metric_of(reference, i));
+	return object;
+}
+
+static json_t *session_report(const struct assessed *a, const struct assessed *reference)
+{
+	const struct session *s = a->session;
+
+	return json_pack("{so so so so ss so so si si so so so}", "file",
+			 json_text(a->path), "code", json_text(s->code), "scene",
+			 json_text(s->scene.path), "scene_crc32c",
+			 json_text(s->scene.crc32c), "ended", s->end.kind, "start_unix_s",
+			 json_number(s->start_unix_s), "ticks_lost",
+			 json_integer((json_int_t)s->lost), "judged", a->judged, "met",
+			 a->met, "criteria", criteria_json(a), "figures", figures_json(a),
+			 "difference",
+			 reference ? difference_json(a, reference) : json_null());
+}
+
+static void print_json(const struct job *job)
+{
+	json_t *list = json_array();
+
+	for (int i = 0; i < job->n; i++)
+		json_array_append_new(list,
+				      session_report(&job->session[i], job->reference));
+	json_print(json_pack("{so so}", "sessions", list, "reference",
+			     job->reference ? session_report(job->reference, NULL)
+					    : json_null()));
+}
+
+/* A text in quotes. */
+static void put_quoted(FILE *out, const char *text)
+{
+	fputc('"', out);
+	for (; *text; text++)
+		fprintf(out, *text == '"' ? "\"\"" : "%c", *text);
+	fputc('"', out);
+}
+
+static void put_value(FILE *out, double value)
+{
+	if (isnan(value))
+		fputc(',', out);
+	else
+		fprintf(out, ",%.4f", value);
+}
+
+static void put_csv_row(FILE *out, const struct assessed *a, bool reference)
+{
+	const struct session *s = a->session;
+
+	put_quoted(out, a->path);
+	fprintf(out, ",%s,%s,%s,%s,%.0f,%d,%d", reference ? "reference" : "session",
+		s->code, s->scene.crc32c, s->end.kind, s->lost, a->judged, a->met);
+	for (int i = 0; i < INCISE_CRITERIA; i++) {
+		const struct session_verdict *verdict = &a->verdict[i];
+
+		put_value(out, verdict->value);
+		fprintf(out, ",%s", verdict->judged ? yes_no(verdict->met) : "");
+	}
+	for (int i = 0; i < METRICS; i++)
+		put_value(out, metric_of(a, i));
+	fputc('\n', out);
+}
+
+static void write_csv(const struct job *job)
+{
+	struct incise_outfile *file;
+	FILE *out = whole_file_begin(job->csv, &file);
+
+	fputs("file,role,code,scene_crc32c,ended,ticks_lost,judged,met", out);
+	for (int i = 0; i < INCISE_CRITERIA; i++)
+		fprintf(out, ",%s,%s_met", incise_criterion_name(i),
+			incise_criterion_name(i));
+	for (int i = 0; i < METRICS; i++)
+		fprintf(out, ",%s", metrics[i].key);
+	fputc('\n', out);
+	for (int i = 0; i < rows(job); i++)
+		put_csv_row(out, &job->session[i], &job->session[i] == job->reference);
+	whole_file_end(file);
+}
+
+/* --- figures --------------------------------------------------------------------------- */
+
+static char folder[4096]; /* of figures, for a while */
+
+static void remove_folder(void)
+{
+	folder_remove(folder);
+}
+
+#define MARGIN_MM 10.0
+#define SHAPE 0.75 /* height of a path's plot, of its width */
+#define CIRCLE 72  /* corners of the membrane's */
+
+static const char *const colours[] = {"#888888", "#1b6ca8", "#2e8b57", "#8e44ad"};
+
+struct range {
+	double low[2], high[2];
+};
+
+static void widen(struct range *range, const double at_mm[3])
+{
+	for (int i = 0; i < 2; i++) {
+		range->low[i] = fmin(range->low[i], at_mm[i] - MARGIN_MM);
+		range->high[i] = fmax(range->high[i], at_mm[i] + MARGIN_MM);
+	}
+}
+
+/* Lengths are the same on both axes: show more where the plot has place for it. */
+static void fill_plot(struct range *range)
+{
+	double size[2] = {range->high[0] - range->low[0], range->high[1] - range->low[1]};
+	int i = size[1] < SHAPE * size[0];
+	double more = i ? SHAPE * size[0] - size[1] : size[1] / SHAPE - size[0];
+
+	range->low[i] -= more / 2;
+	range->high[i] += more / 2;
+}
+
+/* Of all that is shown but the way through the air. */
+static struct range range_of(const struct session *s)
+{
+	struct range range = {{NAN, NAN}, {NAN, NAN}};
+
+	for (int i = 0; i < s->n_trace; i++)
+		if (s->trace[i].tool != INCISE_TOOL_AUTO)
+			widen(&range, s->trace[i].tool_mm);
+	for (int i = 0; i < s->n_cuts; i++) {
+		widen(&range, s->cut[i].from_mm);
+		widen(&range, s->cut[i].to_mm);
+	}
+	if (s->has_membrane)
+		widen(&range, s->membrane.point_mm);
+	if (isnan(range.low[0]))
+		widen(&range, s->trace[0].tool_mm);
+	fill_plot(&range);
+	return range;
+}
+
+/* Data of gnuplot: the path of one tool, with gaps where another one is in the tissue. */
+static int put_path(FILE *script, const char *name, const struct session *s,
+		    enum incise_tool tool)
+{
+	int n = 0;
+
+	fprintf(script, "$%s << END\n", name);
+	for (int i = 0; i < s->n_trace; i++) {
+		const struct session_sample *sample = &s->trace[i];
+
+		if (sample->tool == tool)
+			fprintf(script, "%.4f %.4f\n", sample->tool_mm[0],
+				sample->tool_mm[1]);
+		else if (i && s->trace[i - 1].tool == tool)
+			fputc('\n', script);
+		n += sample->tool == tool;
+	}
+	fputs("END\n", script);
+	return n;
+}
+
+static int put_cuts(FILE *script, const char *name, const struct session *s)
+{
+	fprintf(script, "$%s << END\n", name);
+	for (int i = 0; i < s->n_cuts; i++)
+		fprintf(script, "%.4f %.4f\n%.4f %.4f\n\n", s->cut[i].from_mm[0],
+			s->cut[i].from_mm[1], s->cut[i].to_mm[0], s->cut[i].to_mm[1]);
+	fputs("END\n", script);
+	return s->n_cuts;
+}
+
+/* As seen from above, wherever its normal leads. */
+static void put_membrane(FILE *script, const struct incise_scene_membrane *membrane)
+{
+	const double *n = membrane->normal;
+	/* Two directions across the normal: the first one across z, or x where that is it. */
+	double across = hypot(n[0], n[1]);
+	double u[2] = {1, 0}, v[2] = {0, n[2]};
+
+	if (across > 1e-6) {
+		u[0] = -n[1] / across;
+		u[1] = n[0] / across;
+		v[0] = -n[2] * n[0] / across;
+		v[1] = -n[2] * n[1] / across;
+	}
+	fputs("$membrane << END\n", script);
+	for (int i = 0; i <= CIRCLE; i++) {
+		double a = 2 * M_PI * i / CIRCLE, c = membrane->radius_mm * cos(a),
+		       d = membrane->radius_mm * sin(a);
+
+		fprintf(script, "%.4f %.4f\n",
+			membrane->point_mm[0] + c * u[0] + d * v[0],
+			membrane->point_mm[1] + c * u[1] + d * v[1]);
+	}
+	fputs("END\n", script);
+}
+
+static FILE *begin_path(const struct session *s, const char *name)
+{
+	struct range range = range_of(s);
+	FILE *script = plot_begin(folder, name, 900, 560);
+
+	fprintf(script,
+		"set size ratio -1\nset xlabel 'x, mm'\nset ylabel 'y, mm'\n"
+		"set xrange [%.4f:%.4f]\nset yrange [%.4f:%.4f]\n"
+		"set key outside right top\n",
+		range.low[0], range.high[0], range.low[1], range.high[1]);
+	return script;
+}
+
+static void draw_path(const struct session *s, const struct session *reference,
+		      const char *name)
+{
+	FILE *script = begin_path(s, name);
+	int there[4], cuts = put_cuts(script, "cuts", s);
+	int expert = reference ? put_cuts(script, "expert", reference) : 0;
+
+	for (int tool = 0; tool <= INCISE_TOOL_TUBE; tool++)
+		there[tool] =
+			put_path(script, session_tools[tool], s, (enum incise_tool)tool);
+	if (s->has_membrane)
+		put_membrane(script, &s->membrane);
+	/* A plot of nothing is an error of gnuplot. */
+	fputs("plot NaN notitle", script);
+	if (cuts)
+		fputs(", $cuts with lines lw 6 lc rgb '#e59a90' title 'cut'", script);
+	for (int tool = 0; tool <= INCISE_TOOL_TUBE; tool++)
+		if (there[tool])
+			fprintf(script, ", $%s with lines lw %s lc rgb '%s' title '%s'",
+				session_tools[tool], tool ? "2" : "0.7", colours[tool],
+				tool ? session_tools[tool] : "in the air");
+	if (expert)
+		fputs(", $expert with lines lw 2 dt 2 lc rgb 'black' title 'cut, "
+		      "reference'",
+		      script);
+	if (s->has_membrane)
+		fputs(", $membrane with lines lw 2 lc rgb '#d68910' title 'membrane'",
+		      script);
+	plot_draw_or_fail(script, folder, name);
+}
+
+static void put_force(FILE *script, const char *name, const struct session *s,
+		      double later_s)
+{
+	fprintf(script, "$%s << END\n", name);
+	for (int i = 0; i < s->n_trace; i++)
+		fprintf(script, "%.4f %.4f\n", s->trace[i].t_s + later_s,
+			s->trace[i].force_N);
+	fputs("END\n", script);
+}
+
+static void put_phases(FILE *script, const struct session *s)
+{
+	for (int i = 0; i < s->n_phases; i++)
+		fprintf(script,
+			"set object %d rectangle from %.4f, graph 0 to %.4f, graph 1 "
+			"fc rgb '%s' fs solid 0.15 noborder behind\n",
+			i + 1, s->phase[i].from_s, s->phase[i].to_s,
+			colours[s->phase[i].tool]);
+}
+
+/* Of the reference from its first contact on, as of this session. */
+static void draw_force(const struct session *s, const struct session *reference,
+		       const char *name)
+{
+	const struct incise_scene_criterion *asked = &s->criteria[INCISE_CRITERION_FORCE];
+	FILE *script = plot_begin(folder, name, 900, 420);
+	double later_s = reference ? s->first_s - reference->first_s : NAN;
+
+	fprintf(script,
+		"set xlabel 'time, s'\nset ylabel 'force, N'\nset yrange [0:*]\n"
+		"set xrange [0:%.4f]\nset key outside right top\n",
+		fmax(s->duration_s, 0.001));
+	put_phases(script, s);
+	put_force(script, "force", s, 0);
+	if (!isnan(later_s))
+		put_force(script, "expert", reference, later_s);
+	fputs("plot $force with lines ls 2 title 'force'", script);
+	if (!isnan(later_s))
+		fputs(", $expert with lines lw 1 dt 2 lc rgb 'black' title 'reference'",
+		      script);
+	if (asked->asked)
+		fprintf(script, ", %.4f with lines dt 3 lc rgb '#d68910' title 'at most'",
+			asked->max);
+	for (int tool = 1; tool <= INCISE_TOOL_TUBE; tool++)
+		fprintf(script,
+			", NaN with boxes fs solid 0.15 noborder lc rgb '%s' title '%s'",
+			colours[tool], session_tools[tool]);
+	plot_draw_or_fail(script, folder, name);
+}
+
+/* --- the page -------------------------------------------------------------------------- */
+
+static void put_overview(FILE *out, const struct job *job)
+{
+	char text[40];
+
+	fputs("\n## All sessions\n\nValues; **bold** is a criterion that is not met.\n\n"
+	      "| session | code |",
+	      out);
+	for (int k = 0; k < COLUMNS; k++)
+		fprintf(out, " %s |", columns[k].head);
+	fputs(" met |\n|---|---|", out);
+	for (int k = 0; k < COLUMNS; k++)
+		fputs("---:|", out);
+	fputs("---:|\n", out);
+	for (int i = 0; i < rows(job); i++) {
+		const struct assessed *a = &job->session[i];
+
+		fputs("| ", out);
+		document_text(out, a->path);
+		fprintf(out, "%s | ", a == job->reference ? " (reference)" : "");
+		document_text(out, *a->session->code ? a->session->code : "-");
+		for (int k = 0; k < COLUMNS; k++) {
+			const struct session_verdict *verdict =
+				&a->verdict[columns[k].criterion];
+			const char *mark = verdict->judged && !verdict->met ? "**" : "";
+
+			session_criterion_value(columns[k].criterion, verdict->value,
+						text, sizeof(text));
+			fprintf(out, " | %s%s%s", mark, text, mark);
+		}
+		fprintf(out, " | %d of %d |\n", a->met, a->judged);
+	}
+}
+
+static void put_lines(FILE *out, const struct assessed *a,
+		      const struct assessed *reference)
+{
+	fprintf(out,
+		"\nCriteria of the scene, and other values: %d of %d criteria met.\n\n"
+		"| | value | | asked | met |%s\n|---|---:|---|---|---|%s\n",
+		a->met, a->judged, reference ? " reference | difference |" : "",
+		reference ? "---:|---:|" : "");
+	for (int i = 0; i < LINES; i++) {
+		struct line line = line_of(a, reference, i);
+		const char *mark = !strcmp(line.met, "no") ? "**" : "";
+
+		fprintf(out, "| %s | %s%s%s | %s | %s | %s%s%s |", line.label, mark,
+			line.value, mark, line.unit, line.asked, mark, line.met, mark);
+		if (reference)
+			fprintf(out, " %s | %s |", line.reference, line.difference);
+		fputc('\n', out);
+	}
+}
+
+static void put_cuts_table(FILE *out, const struct session *s)
+{
+	if (!s->n_cuts)
+		return;
+	fputs("\nCuts; those with one number of an incision are joined.\n\n"
+	      "| cut | incision | from, mm | to, mm | length, mm | direction, ° | depth, mm "
+	      "| median, mm | open, mm | off target, mm |\n"
+	      "|---:|---:|---|---|---:|---:|---:|---:|---:|---:|\n",
+	      out);
+	for (int i = 0; i < s->n_cuts; i++) {
+		struct cut_text cut = cut_text(&s->cut[i]);
+
+		fprintf(out, "| %d | %d | %s | %s | %s | %s | %s | %s | %s | %s |\n",
+			i + 1, s->cut[i].incision + 1, cut.from, cut.to, cut.length,
+			cut.direction, cut.depth, cut.median, cut.open, cut.off);
+	}
+}
+
+static void put_phases_table(FILE *out, const struct session *s)
+{
+	if (!s->n_phases)
+		return;
+	fputs("\nPhases: times in which one tool was in the tissue.\n\n"
+	      "| tool | from, s | to, s | depth, mm | force, N |\n"
+	      "|---|---:|---:|---:|---:|\n",
+	      out);
+	for (int i = 0; i < s->n_phases; i++)
+		fprintf(out, "| %s | %.2f | %.2f | %.1f | %.2f |\n",
+			session_tools[s->phase[i].tool], s->phase[i].from_s,
+			s->phase[i].to_s, s->phase[i].depth_mm, s->phase[i].force_N);
+}
+
+static void put_figures(FILE *out, const struct assessed *a,
+			const struct assessed *reference, int number)
+{
+	const struct session *s = a->session,
+			     *expert = reference ? reference->session : NULL;
+	char path[20], force[20];
+
+	/* A session that ended before its first tick has none. */
+	if (!s->n_trace)
+		return;
+	snprintf(path, sizeof(path), "path-%d", number);
+	snprintf(force, sizeof(force), "force-%d", number);
+	draw_path(s, expert, path);
+	draw_force(s, expert, force);
+	fprintf(out,
+		"\n![The tool's way from above](%s.svg)\n\n"
+		"The tool's way from above, the cuts%s.\n"
+		"\n![Force over time](%s.svg)\n\n"
+		"Largest force in each interval over time; shaded where a tool was in the "
+		"tissue.\n",
+		path, s->has_membrane ? ", and the membrane" : "", force);
+}
+
+static const char *base_name(const char *path)
+{
+	const char *slash = strrchr(path, '/');
+
+	return slash ? slash + 1 : path;
+}
+
+static void put_session(FILE *out, const struct assessed *a,
+			const struct assessed *reference, int number)
+{
+	const struct session *s = a->session;
+	char *doubts = NULL;
+	size_t size;
+	FILE *line = open_memstream(&doubts, &size);
+
+	if (!line)
+		cli_fail("no memory");
+	fprintf(line, "%s%s%s, %.1f s, %.0f ticks, %s", s->scene.path,
+		*s->code ? ", code " : "", s->code, s->duration_s, s->ticks, ended(s));
+	put_doubts(line, s, "; ", "");
+	fputc('.', line);
+	fclose(line);
+	fprintf(out, "\n## %d. ", number);
+	document_text(out, base_name(a->path));
+	fputs("\n\n", out);
+	document_text(out, doubts);
+	fputc('\n', out);
+	free(doubts);
+	put_lines(out, a, reference);
+	put_figures(out, a, reference, number);
+	put_cuts_table(out, s);
+	put_phases_table(out, s);
+}
+
+static void put_contents(FILE *out, const struct job *job)
+{
+	fputs("# Sessions\n\nEach session against the criteria of its scene. incise is not "
+	      "a medical device.\n\n- [All sessions](#all-sessions)\n",
+	      out);
+	for (int i = 0; i < job->n; i++) {
+		char *title = cli_text("%d. %s", i + 1, base_name(job->session[i].path));
+		char anchor[200];
+
+		document_anchor(title, anchor, sizeof(anchor));
+		fprintf(out, "- [%d\\. ", i + 1);
+		document_text(out, base_name(job->session[i].path));
+		fprintf(out, "](#%s)\n", anchor);
+		free(title);
+	}
+}
+
+static void write_page(const struct job *job)
+{
+	struct incise_error err = {0};
+	struct incise_outfile *file;
+	char *markdown = NULL;
+	size_t size;
+	FILE *page, *out;
+	int rc;
+
+	page = whole_file_begin(job->page, &file);
+	folder_make(folder, sizeof(folder), "for the figures");
+	atexit(remove_folder);
+	plot_folder(folder);
+	out = open_memstream(&markdown, &size);
+	if (!out)
+		cli_fail("no memory");
+	put_contents(out, job);
+	put_overview(out, job);
+	for (int i = 0; i < job->n; i++) {
+		cli_progress("figures %d of %d", i + 1, job->n);
+		put_session(out, &job->session[i], job->reference, i + 1);
+	}
+	fclose(out);
+	cli_progress_end();
+	rc = document_html(markdown, folder, page, &err);
+	free(markdown);
+	if (rc)
+		cli_fail("%s: %s", job->page, err.text);
+	whole_file_end(file);
+}
+
+int main(int argc, char **argv)
+{
+	struct job job = {0};
+	bool quiet;
+
+	parse(&job, argc, argv);
+	load_all(&job, argv + optind);
+	if (job.csv)
+		write_csv(&job);
+	if (job.page)
+		write_page(&job);
+	quiet = (job.csv && !strcmp(job.csv, "-")) ||
+		(job.page && !strcmp(job.page, "-"));
+	if (job.json)
+		print_json(&job);
+	else if (!quiet && job.n == 1)
+		print_one(&job.session[0], job.reference);
+	else if (!quiet)
+		print_table(&job);
+	if (!job.json && !quiet && job.csv)
+		puts(job.csv);
+	if (!job.json && !quiet && job.page)
+		puts(job.page);
+	cli_finish();
+	for (int i = 0; i < rows(&job); i++)
+		free(job.session[i].session);
+	free(job.session);
+	return 0;
+}
