@@ -239,22 +239,6 @@ static bool has_real_clock(const char *spec)
 	return real;
 }
 
-static int script_ticked(void *context, const struct incise_tick *tick)
-{
-	procedure_ticked(context, tick);
-	return 0;
-}
-
-/* The hand follows the script, between ticks of simulated time. */
-static void set_script(struct job *job)
-{
-	struct haptic *haptic = &job->haptic;
-
-	procedure_begin(&job->procedure, haptic->rig, haptic->plan, haptic->scene);
-	haptic->loop.ticked = script_ticked;
-	haptic->loop.context = &job->procedure;
-}
-
 /* Everything but power: scene, real time, devices, plan, self-test. */
 static void set_up(struct job *job)
 {
@@ -277,7 +261,8 @@ static void set_up(struct job *job)
 		cli_fail("%s: %s", haptic->argument.path, err.text);
 	haptic->plan = cli_require(haptic_plan(haptic, haptic->scene, &err), &err);
 	if (job->scripted)
-		set_script(job);
+		procedure_begin(&job->procedure, haptic->rig, haptic->plan,
+				haptic->scene);
 	open_state(job, real);
 	if (haptic->realtime)
 		advise(&job->realtime);
@@ -705,9 +690,15 @@ static void report_text(const struct haptic *haptic)
 
 /* --- the session ----------------------------------------------------------------------- */
 
-static int tick_session(void *context, const struct incise_tick *tick)
+/* Between two ticks of simulated time. */
+static int ticked(void *context, const struct incise_tick *tick)
 {
-	session_log_tick(context, tick);
+	struct job *job = context;
+
+	if (job->haptic.session)
+		session_log_tick(job->haptic.session, tick);
+	if (job->scripted)
+		procedure_ticked(&job->procedure, tick);
 	return 0;
 }
 
@@ -722,10 +713,10 @@ static void open_session(struct job *job)
 					    .real = is_real(haptic)};
 
 	haptic->session = session_log_begin(&job->session, &start);
-	if (!haptic->session || start.real)
+	if (start.real || (!haptic->session && !job->scripted))
 		return;
-	haptic->loop.ticked = tick_session;
-	haptic->loop.context = haptic->session;
+	haptic->loop.ticked = ticked;
+	haptic->loop.context = job;
 }
 
 static int end_session(struct haptic *haptic, int rc, const struct incise_error *cause,

@@ -226,10 +226,11 @@ static int prepare_next(struct supervisor *s, struct incise_error *err)
 	double rate_hz;
 	int rc;
 
-	if (haptic->session)
-		return incise_error_set(err, EBUSY,
-					"--session is of one scene: end it, and start "
-					"another with the scene as it is now");
+	if (haptic->session || haptic->loop.ticked)
+		return incise_error_set(
+			err, EBUSY,
+			"--session and --procedure are of one scene: end it, "
+			"and start another with the scene as it is now");
 	s->next_scene = scene_argument_read(&haptic->argument, err);
 	if (!s->next_scene)
 		return -errno;
@@ -253,9 +254,6 @@ static void start_reload(struct supervisor *s)
 	int rc = 0;
 
 	reload_asked = 0;
-	/* A script has the plan that it moves. */
-	if (s->haptic->loop.ticked)
-		return;
 	/* One at a time; a later request is kept. */
 	if (s->next_plan || s->stopping) {
 		reload_asked = !s->stopping;
