@@ -372,45 +372,84 @@ static double needed_mm(const struct incise_incision *incision, enum incise_tool
 	       setup->stretch_mm;
 }
 
+/* Distance aside of the nearest cut within reach, and how many there are. */
+static double nearest_mm(const struct incise_incision *incision, const double at_mm[3],
+			 double reach_mm, int *found)
+{
+	double best_mm = INFINITY;
+
+	*found = 0;
+	for (int i = 0; i < incision->n; i++) {
+		double aside_mm = fabs(across(&incision->cut[i], at_mm));
+		struct local at;
+
+		/* Most are far aside: the rest is not looked at. */
+		if (aside_mm > reach_mm)
+			continue;
+		at = localize(&incision->cut[i], at_mm);
+		if (!reaches(&incision->cut[i], &at, reach_mm))
+			continue;
+		++*found;
+		best_mm = fmin(best_mm, aside_mm);
+	}
+	return best_mm;
+}
+
+static double place_along(const struct incise_cut *cut, const double at_mm[3])
+{
+	return fmax(cut->from_mm, fmin(localize(cut, at_mm).along_mm, cut->to_mm));
+}
+
+/* Of those that are as near, within the width of a line: where cuts cross, a tool goes into it. */
+static int deepest(const struct incise_incision *incision, const double at_mm[3],
+		   double reach_mm)
+{
+	int found, best = -1;
+	double most_mm = nearest_mm(incision, at_mm, reach_mm, &found);
+	float depth_mm = -1;
+
+	for (int i = 0; found && i < incision->n; i++) {
+		const struct incise_cut *cut = &incision->cut[i];
+		struct local at;
+		float here_mm;
+
+		if (fabs(across(cut, at_mm)) > most_mm + INCISE_CUT_BESIDE_MM)
+			continue;
+		at = localize(cut, at_mm);
+		if (!reaches(cut, &at, reach_mm))
+			continue;
+		here_mm = cut->place[incise_cut_place(place_along(cut, at_mm))].depth_mm;
+		if (here_mm > depth_mm) {
+			best = i;
+			depth_mm = here_mm;
+		}
+	}
+	return best;
+}
+
 void incise_incision_opening(const struct incise_incision *incision,
 			     enum incise_tool tool, const double at_mm[3],
 			     struct incise_opening *opening)
 {
 	const struct incise_incision_setup *setup = &incision->setup;
-	double reach_mm =
-		(tool == INCISE_TOOL_TUBE ? setup->tube_mm : setup->handle_width_mm) / 2;
-	double best_mm = INFINITY;
-	struct local at, best;
-	int nearest = -1, place;
+	double width_mm =
+		tool == INCISE_TOOL_TUBE ? setup->tube_mm : setup->handle_width_mm;
+	int in = deepest(incision, at_mm, width_mm / 2), place;
 
 	*opening = (struct incise_opening){0};
-	for (int i = 0; i < incision->n; i++) {
-		double across_mm = fabs(across(&incision->cut[i], at_mm));
-
-		/* Most are far aside: the rest is not looked at. */
-		if (across_mm > reach_mm || across_mm >= best_mm)
-			continue;
-		at = localize(&incision->cut[i], at_mm);
-		if (reaches(&incision->cut[i], &at, reach_mm)) {
-			nearest = i;
-			best = at;
-			best_mm = across_mm;
-		}
-	}
-	if (nearest < 0)
+	if (in < 0)
 		return;
 	opening->length_mm =
-		incise_incision_length_mm(incision, incision->cut[nearest].incision);
+		incise_incision_length_mm(incision, incision->cut[in].incision);
 	opening->in = opening->length_mm >= needed_mm(incision, tool);
 	if (!opening->in)
 		return;
-	opening->cut = nearest;
-	opening->at_mm = fmax(incision->cut[nearest].from_mm,
-			      fmin(best.along_mm, incision->cut[nearest].to_mm));
+	opening->cut = in;
+	opening->at_mm = place_along(&incision->cut[in], at_mm);
 	place = incise_cut_place(opening->at_mm);
-	opening->depth_mm = incision->cut[nearest].place[place].depth_mm;
-	opening->open_mm = incision->cut[nearest].place[place].open_mm;
-	v3_copy(opening->along, incision->cut[nearest].along);
+	opening->depth_mm = incision->cut[in].place[place].depth_mm;
+	opening->open_mm = incision->cut[in].place[place].open_mm;
+	v3_copy(opening->along, incision->cut[in].along);
 }
 
 /* A handle or tube at this tick opens the cut that it is in. */

@@ -295,6 +295,20 @@ static void test_too_short_for_the_tool(void **state)
 	assert_false(opening(INCISE_TOOL_HANDLE, 16.2, 60).in);
 }
 
+/* Where cuts cross a tool goes into the deeper one, wherever it is within a line's width. */
+static void test_the_deeper_of_two(void **state)
+{
+	assert_true(cut(-15, 0, 15, 0, 4));
+	assert_true(cut(0, -15, 0, 15, 9));
+	for (int i = -9; i <= 9; i++) {
+		assert_int_equal(opening(INCISE_TOOL_HANDLE, 0.1 * i, 0).cut, 1);
+		assert_int_equal(opening(INCISE_TOOL_HANDLE, 0, 0.1 * i).cut, 1);
+	}
+	/* Farther along the first one it is that. */
+	assert_int_equal(opening(INCISE_TOOL_HANDLE, 4, 0).cut, 0);
+	assert_true(opening(INCISE_TOOL_HANDLE, 4, 0).depth_mm == 4);
+}
+
 /* A touch, or a whole cut elsewhere, leaves an opening as it was, to the bit. */
 static void test_elsewhere_changes_nothing(void **state)
 {
@@ -391,6 +405,7 @@ int main(void)
 		TEST(test_opened_by_handle_and_tube),
 		TEST(test_tightness),
 		TEST(test_too_short_for_the_tool),
+		TEST(test_the_deeper_of_two),
 		TEST(test_elsewhere_changes_nothing),
 		TEST(test_impossible_ticks),
 		TEST(test_grows_only),
