@@ -306,7 +306,7 @@ static void unrolled_metric(const struct uv_map *map, const double px[2],
  *      │ ╱│ ╱
  *      ●──◌
  */
-#define CELLS 64
+#define CELLS 100
 #define SIDE (CELLS + 1)
 
 /* Halvings of a cell on the way to the border: less than a thousandth of a texel. */
