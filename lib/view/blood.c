@@ -113,7 +113,7 @@ struct drops {
 #define LEAST_UNITS (int64_t)(0.03 / BLOOD_UNIT_UL)
 /* The shape of each drop is updated every so many steps, in turns. */
 #define SHOWN_EACH 3
-#define SHOWN_EACH_WET 6
+#define SHOWN_EACH_WET 9
 
 /* A hanging drop lies along its cut; in radii of a round one. */
 #define DROP_HANGS_ALONG 1.7

@@ -284,7 +284,7 @@ void film_add(struct film *film, const double px[2], double radius_mm, int64_t u
 #define ROUND_S (FILM_ROUND_STEPS * 0.01)
 #define ROUNDS_MOST 10
 /* Per step, which bounds its time for any amount of blood. */
-#define VISITS_MOST 24
+#define VISITS_MOST 14
 /* A texel gives at most this part of itself per visit: the scheme is explicit. */
 #define FLOW_MOST 0.4
 /* Flow per round for visits in each round, and in every fourth: no more than FLOW_MOST in a visit. */

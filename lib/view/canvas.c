@@ -213,15 +213,30 @@ static bool is_clear(const uint8_t *row, int n)
 	return !any;
 }
 
+/* Whole tiles, eight texels at a time. */
+static void copy_opaque(uint8_t *to, const uint8_t *from, int n)
+{
+	static const uint8_t opaque[32] = {
+		[3] = 255,  [7] = 255,	[11] = 255, [15] = 255,
+		[19] = 255, [23] = 255, [27] = 255, [31] = 255};
+
+	for (int i = 0; i < 4 * n; i += 32) {
+		uint8_t eight[32];
+
+		memcpy(eight, from + i, sizeof(eight));
+		for (int k = 0; k < 32; k++)
+			eight[k] |= opaque[k];
+		memcpy(to + i, eight, sizeof(eight));
+	}
+}
+
 static void compose_rect(struct incise_canvas *canvas, const struct incise_rect *rect)
 {
 	for (int y = rect->y; y < rect->y + rect->h; y++) {
 		size_t at = ((size_t)y * canvas->size + rect->x) * 4;
 		uint8_t *to = canvas->level[0] + at;
 
-		memcpy(to, canvas->base + at, (size_t)rect->w * 4);
-		for (int i = 0; i < rect->w; i++)
-			to[4 * i + 3] = 255;
+		copy_opaque(to, canvas->base + at, rect->w);
 		for (int i = 0; i < canvas->n_layers; i++)
 			if (!is_clear(canvas->layer[i] + at, rect->w))
 				blend(to, canvas->layer[i] + at, rect->w);

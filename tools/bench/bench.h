@@ -125,8 +125,8 @@ struct bench_plot {
 extern const char text_extremes_gp[], text_loop_rates_gp[], text_loop_wakeups_gp[],
 	text_pose_gp[], text_precision_gp[], text_scenes_gp[], text_stability_guard_gp[],
 	text_stability_integrators_gp[], text_stability_map_gp[],
-	text_stability_rest_gp[], text_timeline_gp[], text_training_gp[], text_view_gp[], text_view_frames_gp[],
-	text_vision_gp[];
+	text_stability_rest_gp[], text_timeline_gp[], text_training_gp[], text_view_gp[],
+	text_view_frames_gp[], text_vision_gp[];
 
 struct bench_run;
 
