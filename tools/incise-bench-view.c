@@ -618,8 +618,8 @@ static void measure_absorbed(const char *scene, double seconds, struct absorbed 
 	}
 	incise_view_report(c.view, &a->view);
 	/* What is made at the first frame, and compiled at the second, is not of a frame. */
-	if (a->frames > 10)
-		a->whole = times_of(ms + 5, (a->frames < most ? a->frames : most) - 5);
+	if (a->frames > 2)
+		a->whole = times_of(ms + 2, (a->frames < most ? a->frames : most) - 2);
 	free(ms);
 	a->lost = status.lost;
 	a->realtime = c.realtime;

@@ -25,8 +25,8 @@ static const char surface_vs[] = HEAD
 	"uniform float texel;\n"
 	"uniform int casters;\n"
 	"uniform vec4 from[4], to[4];\n" /* mm; w: radius */
-	"uniform vec4 dent;\n"		  /* where the instrument presses, mm; w: radius */
-	"uniform float dent_mm;\n"	  /* depth there */
+	"uniform vec4 dent;\n"		 /* where the instrument presses, mm; w: radius */
+	"uniform float dent_mm;\n"	 /* depth there */
 	"out vec2 uv;\n"
 	"out vec4 light;\n" /* w: not in the shadow */
 	"out vec3 half_way, up;\n"
