@@ -783,6 +783,10 @@ int main(int argc, char **argv)
 		write_log(file, haptic->loop.log, stats.logged, count_axes(haptic->rig),
 			  &log_err);
 	end_session(haptic, rc, &err, &session_err);
+	if (ticks_with(&stats, INCISE_TICK_FULL))
+		cli_warn("the blade left no cut in %llu ticks: as many as "
+			 "tissue.cuts_most were there; raise it",
+			 (unsigned long long)ticks_with(&stats, INCISE_TICK_FULL));
 	if (job.json)
 		report_json(haptic);
 	else if (!job.log || strcmp(job.log, "-"))
