@@ -27,7 +27,7 @@ struct incise_loop_control *incise_loop_control_new(void)
 
 	if (!control)
 		return NULL;
-	*control = (struct incise_loop_control){0};
+	*control = (struct incise_loop_control){.ticks = 0};
 	if (!incise_ring_init(&control->events, sizeof(struct incise_loop_event), EVENTS))
 		return control;
 	free(control);

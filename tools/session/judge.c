@@ -14,15 +14,15 @@ static const struct {
 	int digits;
 	bool of_membrane; /* a scene without one has no value */
 } criteria[INCISE_CRITERIA] = {
-	[INCISE_CRITERION_CUT_LENGTH] = {"length of the incision", "mm", RANGE, 1},
-	[INCISE_CRITERION_CUT_DEPTH] = {"depth of the incision", "mm", RANGE, 1},
+	[INCISE_CRITERION_CUT_LENGTH] = {"length of the incision", "mm", RANGE, 1, false},
+	[INCISE_CRITERION_CUT_DEPTH] = {"depth of the incision", "mm", RANGE, 1, false},
 	[INCISE_CRITERION_OFF_TARGET] = {"off the target", "mm", MOST, 1, true},
-	[INCISE_CRITERION_INCISIONS] = {"incisions", "", MOST, 0},
+	[INCISE_CRITERION_INCISIONS] = {"incisions", "", MOST, 0, false},
 	[INCISE_CRITERION_MEMBRANE] = {"through the membrane", "", SWITCH, 0, true},
-	[INCISE_CRITERION_INSERTION] = {"depth of the tube", "mm", RANGE, 1},
+	[INCISE_CRITERION_INSERTION] = {"depth of the tube", "mm", RANGE, 1, false},
 	[INCISE_CRITERION_BACK_WALL] = {"back wall touched", "", SWITCH, 0, true},
-	[INCISE_CRITERION_FORCE] = {"largest force", "N", MOST, 2},
-	[INCISE_CRITERION_TIME] = {"time needed", "s", MOST, 1},
+	[INCISE_CRITERION_FORCE] = {"largest force", "N", MOST, 2, false},
+	[INCISE_CRITERION_TIME] = {"time needed", "s", MOST, 1, false},
 };
 
 const char *session_criterion_label(int criterion)

@@ -353,8 +353,11 @@ static int take_number(const struct reader *reader, const struct member *member,
 
 	*value = json_number_value(json);
 	if ((whole_only ? json_is_integer(json) : json_is_number(json)) &&
-	    *value >= member->min && *value <= member->max)
+	    *value >= member->min && *value <= member->max) {
+		/* As it is written. */
+		*value = whole_only ? *value : round(*value * ROUND) / ROUND + 0.0;
 		return 0;
+	}
 	snprintf(what, sizeof(what), "a %s from %g to %g",
 		 whole_only ? "whole number" : "number", member->min, member->max);
 	return expected(reader, member->key, what);
