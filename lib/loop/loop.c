@@ -22,13 +22,14 @@ struct run {
 	struct incise_loop_stats *stats;
 	int64_t period_ns, due_ns, end_ns;
 	bool fading;
-	int64_t fade_end_ns; /* latest end of the fade that stops it */
-	int64_t lag_ns;	     /* of this tick */
-	uint64_t skipped;    /* before this tick */
-	unsigned int in_row; /* consecutive overruns */
-	unsigned int flags;  /* of the last tick */
-	char pose_flag;	     /* of poses, as last reported */
-	int64_t stale_ns;    /* time of the first tick without a fresh pose */
+	int64_t fade_end_ns;   /* latest end of the fade that stops it */
+	int64_t lag_ns;	       /* of this tick */
+	uint64_t skipped;      /* before this tick */
+	unsigned int in_row;   /* consecutive overruns */
+	unsigned int flags;    /* of the last tick */
+	char pose_flag;	       /* of poses, as last reported */
+	enum incise_tool tool; /* of the last tick */
+	int64_t stale_ns;      /* time of the first tick without a fresh pose */
 };
 
 static void count(uint64_t *histogram, int64_t value)
@@ -91,6 +92,10 @@ static void report_changes(struct run *run, const struct incise_tick *tick)
 		send_event(run, INCISE_LOOP_FLAGGED, tick->t_ns, flag);
 		run->pose_flag = flag;
 	}
+	/* At the first tick nothing has changed. */
+	if (tick->tool != run->tool && run->stats->ticks > 1)
+		send_event(run, INCISE_LOOP_TOOL, tick->t_ns, tick->tool);
+	run->tool = tick->tool;
 	run->flags = tick->flags;
 }
 
@@ -109,7 +114,8 @@ static INCISE_REALTIME int run_tick(struct run *run, struct incise_tick *tick,
 	report_changes(run, tick);
 	incise_state_tick(options->state, tick, run->lag_ns, cost_ns, run->skipped);
 	if (options->control)
-		incise_loop_control_ticked(options->control, run->stats->ticks);
+		incise_loop_control_ticked(options->control, run->stats->ticks,
+					   tick->tool);
 	return rc;
 }
 
@@ -174,6 +180,16 @@ static INCISE_REALTIME void change_plan(struct run *run, int64_t now_ns)
 	send_event(run, INCISE_LOOP_PLAN, now_ns, 0);
 }
 
+/* At each tick, as the plan may be another. */
+static INCISE_REALTIME void take_tool(struct run *run)
+{
+	enum incise_tool tool;
+
+	if (run->options->control &&
+	    incise_loop_control_wanted_tool(run->options->control, &tool))
+		incise_plan_set_tool(run->plan, tool);
+}
+
 static INCISE_REALTIME void count_lateness(struct run *run, int64_t now_ns)
 {
 	int64_t lag_ns = now_ns - run->due_ns + incise_clock_lag_ns(run->clock);
@@ -203,6 +219,7 @@ static int run_ticks(struct run *run, int *ended)
 		if (rc || run->due_ns >= run->end_ns)
 			break;
 		change_plan(run, now_ns);
+		take_tool(run);
 		if (stats->logged < options->log_size)
 			tick = &options->log[stats->logged++];
 		rc = run_tick(run, tick, now_ns);

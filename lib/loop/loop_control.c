@@ -15,6 +15,8 @@
 struct incise_loop_control {
 	_Atomic(struct incise_plan *) offered, retired;
 	_Atomic uint64_t ticks;
+	_Atomic int tool;   /* at the last tick */
+	_Atomic int wanted; /* tool that was set, + 1; 0: none was */
 	struct incise_ring events;
 	struct incise_ring kept; /* ticks; without memory where nobody wants them */
 };
@@ -71,6 +73,21 @@ uint64_t incise_loop_control_ticks(const struct incise_loop_control *control)
 	return atomic_load_explicit(&control->ticks, memory_order_relaxed);
 }
 
+int incise_loop_control_set_tool(struct incise_loop_control *control,
+				 enum incise_tool tool)
+{
+	if ((unsigned int)tool > INCISE_TOOL_TUBE)
+		return -EINVAL;
+	atomic_store_explicit(&control->wanted, (int)tool + 1, memory_order_relaxed);
+	return 0;
+}
+
+enum incise_tool incise_loop_control_tool(const struct incise_loop_control *control)
+{
+	return (enum incise_tool)atomic_load_explicit(&control->tool,
+						      memory_order_relaxed);
+}
+
 int incise_loop_control_events(struct incise_loop_control *control,
 			       struct incise_loop_event *events, int n)
 {
@@ -103,8 +120,10 @@ void incise_loop_control_event(struct incise_loop_control *control,
 	incise_ring_put(&control->events, event);
 }
 
-void incise_loop_control_ticked(struct incise_loop_control *control, uint64_t ticks)
+void incise_loop_control_ticked(struct incise_loop_control *control, uint64_t ticks,
+				enum incise_tool tool)
 {
+	atomic_store_explicit(&control->tool, (int)tool, memory_order_relaxed);
 	atomic_store_explicit(&control->ticks, ticks, memory_order_relaxed);
 }
 
@@ -139,4 +158,14 @@ void incise_loop_control_tick(struct incise_loop_control *control,
 {
 	if (control->kept.records)
 		incise_ring_put(&control->kept, tick);
+}
+
+bool incise_loop_control_wanted_tool(const struct incise_loop_control *control,
+				     enum incise_tool *tool)
+{
+	int wanted = atomic_load_explicit(&control->wanted, memory_order_relaxed);
+
+	if (wanted)
+		*tool = (enum incise_tool)(wanted - 1);
+	return wanted;
 }

@@ -22,8 +22,12 @@ void incise_loop_control_event(struct incise_loop_control *control,
 /* Events that were dropped because nobody took the ones before. Any thread's. */
 uint64_t incise_loop_control_events_lost(const struct incise_loop_control *control);
 
-void incise_loop_control_ticked(struct incise_loop_control *control,
-				uint64_t ticks) INCISE_REALTIME;
+void incise_loop_control_ticked(struct incise_loop_control *control, uint64_t ticks,
+				enum incise_tool tool) INCISE_REALTIME;
+
+/* The tool that was set; false: none was. */
+bool incise_loop_control_wanted_tool(const struct incise_loop_control *control,
+				     enum incise_tool *tool) INCISE_REALTIME;
 
 /* Keep a tick, where incise_loop_control_keep() has made room. */
 void incise_loop_control_tick(struct incise_loop_control *control,

@@ -340,6 +340,7 @@ static void handle_events(struct supervisor *s)
 			case INCISE_LOOP_FLAGGED:
 				report_flag(s, (char)events[i].value);
 				break;
+			case INCISE_LOOP_TOOL:
 			case INCISE_LOOP_PLAN:
 				break;
 			}

@@ -8,7 +8,8 @@
  *     retired()  ◀──────  [ one place ]  ◀──  which starts like any other: without a force
  *     events()   ◀──────  [   ring    ]  ◀──  until it requests a small one
  *     take()     ◀──────  [   ring    ]  ◀──  each tick, where keep() made a ring for them
- *     ticks()    ◀──────  [  counter  ]
+ *     ticks(), tool()  ◀──  [ counters  ]
+ *     set_tool() ──────▶  [ one place ] ──▶   takes it at its next tick
  *
  * Unless stated otherwise, functions belong to one thread, which is not the loop's; none waits.
  */
@@ -54,6 +55,20 @@ INCISE_API struct incise_plan *incise_loop_control_retired(
 /** Number of ticks so far: a living loop raises it. For any thread. */
 INCISE_API uint64_t incise_loop_control_ticks(const struct incise_loop_control *control);
 
+/**
+ * Set the tool that the hand holds, as with incise_plan_set_tool(): the loop takes it at its next
+ * tick, for its plan and for each that replaces it. The last one counts. Without this call each
+ * plan keeps its own. For any thread; never waits.
+ *
+ * @return 0, -EINVAL
+ */
+INCISE_API int incise_loop_control_set_tool(struct incise_loop_control *control,
+					    enum incise_tool tool) INCISE_REALTIME;
+
+/** The tool held at the last tick; INCISE_TOOL_AUTO before the first. For any thread. */
+INCISE_API enum incise_tool incise_loop_control_tool(
+	const struct incise_loop_control *control);
+
 /** Kinds of events, and the meaning of their value. */
 enum incise_loop_event_kind {
 	INCISE_LOOP_OVERRUN,	/**< late by a period or more: value ticks were skipped */
@@ -62,6 +77,7 @@ enum incise_loop_event_kind {
 	INCISE_LOOP_NOT_FINITE, /**< forces from here on were not finite, and are set to 0 */
 	INCISE_LOOP_PLAN,	/**< the offered plan is in force */
 	INCISE_LOOP_FLAGGED, /**< the tracker flags poses: value is another character */
+	INCISE_LOOP_TOOL, /**< another tool is held from here on: value is enum incise_tool */
 };
 
 /** An event for the log. */

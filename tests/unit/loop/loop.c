@@ -506,6 +506,94 @@ static void test_another_plan(void **state)
 	felt_end(&f);
 }
 
+/* Set the tool at a tick, another plan some ticks later; the force before each change. */
+struct tool_seen {
+	struct seen seen;
+	int tool_at;
+	enum incise_tool tool;
+	double last_N[2]; /* of the last two ticks */
+	int changes;
+	double at_change_N[8];
+};
+
+static int look_at_tool(void *context, const struct incise_tick *tick)
+{
+	struct tool_seen *own = context;
+	int rc = look(&own->seen, tick);
+
+	own->last_N[0] = own->last_N[1];
+	own->last_N[1] = own->seen.last_N;
+	if (own->seen.n > 1 && tick->tool != own->tool && own->changes < 8)
+		own->at_change_N[own->changes++] = own->last_N[0];
+	own->tool = tick->tool;
+	if (own->seen.n == own->tool_at)
+		assert_int_equal(incise_loop_control_set_tool(own->seen.control,
+							      INCISE_TOOL_TUBE),
+				 0);
+	return rc;
+}
+
+/* The same scene, with insertion. */
+static void let_insert(struct felt *f)
+{
+	FILE *out = fopen(f->scene_path, "a");
+
+	fputs("tissue = { insertion_N_mm = 0.28; };\n", out);
+	fclose(out);
+	incise_plan_free(f->plan);
+	incise_scene_free(f->scene);
+	f->scene = incise_scene_load(f->scene_path, NULL, NULL);
+	assert_non_null(f->scene);
+	f->plan = incise_plan_new(f->scene, f->rig, NULL);
+	assert_non_null(f->plan);
+}
+
+/*
+ * A tool that is set in the tissue is held once the force has faded, comes back with a ramp, and
+ * stays the tool of a plan that takes over.
+ */
+static void test_another_tool(void **state)
+{
+	struct tool_seen own = {.seen = {.offer_at = 1400}, .tool_at = 600};
+	struct incise_loop_options options = {.rate_hz = 1000,
+					      .duration_ns = 2 * INCISE_NS_PER_S,
+					      .ticked = look_at_tool,
+					      .context = &own};
+	struct incise_loop_event events[20];
+	struct incise_tracker_ops ops;
+	int tools = 0, n;
+	struct felt f;
+
+	held_start(&f, &ops, &own.seen);
+	let_insert(&f);
+	own.seen.control = options.control = incise_loop_control_new();
+	own.seen.next = incise_plan_new(f.scene, f.rig, NULL);
+	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
+					 &stats, NULL),
+			 0);
+	assert_true(own.seen.changed);
+	assert_int_equal(own.changes, 1);
+	assert_true(own.at_change_N[0] == 0);
+	/* It had come back when the other plan was offered. */
+	assert_true(own.seen.at_stop_N > 0.5);
+	assert_true(own.seen.most_change_N <= own.seen.slew_N * (1 + 1e-9));
+	assert_int_equal(own.tool, INCISE_TOOL_TUBE);
+	assert_int_equal(incise_loop_control_tool(options.control), INCISE_TOOL_TUBE);
+	n = incise_loop_control_events(options.control, events, 20);
+	for (int i = 0; i < n; i++) {
+		if (events[i].kind != INCISE_LOOP_TOOL)
+			continue;
+		tools++;
+		assert_true(events[i].value == INCISE_TOOL_TUBE);
+		assert_in_range(events[i].tick, 600,
+				601 + incise_plan_fade_ns(own.seen.next) / 1000000 + 1);
+	}
+	assert_int_equal(tools, 1);
+	incise_plan_free(own.seen.next);
+	incise_loop_control_free(options.control);
+	felt_end(&f);
+}
+
 /* A plan that is withdrawn during the fade leaves the old plan, and its force returns. */
 static struct incise_loop_control *withdrawn_from;
 
@@ -682,6 +770,7 @@ int main(void)
 		cmocka_unit_test(test_quantile),
 		cmocka_unit_test(test_stop_fades),
 		cmocka_unit_test(test_another_plan),
+		cmocka_unit_test(test_another_tool),
 		cmocka_unit_test(test_a_plan_withdrawn),
 		cmocka_unit_test(test_events),
 		cmocka_unit_test(test_too_many_overruns),

@@ -95,6 +95,32 @@ static void test_ticks(void **state)
 	incise_loop_control_free(control);
 }
 
+/* The last one that was set counts, for any number of ticks; none that is no tool. */
+static void test_tool(void **state)
+{
+	struct incise_loop_control *control = incise_loop_control_new();
+	enum incise_tool tool = INCISE_TOOL_HANDLE;
+
+	assert_false(incise_loop_control_wanted_tool(control, &tool));
+	assert_int_equal(tool, INCISE_TOOL_HANDLE);
+	assert_int_equal(incise_loop_control_tool(control), INCISE_TOOL_AUTO);
+	for (int i = INCISE_TOOL_AUTO; i <= INCISE_TOOL_TUBE; i++) {
+		assert_int_equal(
+			incise_loop_control_set_tool(control, (enum incise_tool)i), 0);
+		assert_int_equal(incise_loop_control_set_tool(
+					 control,
+					 (enum incise_tool)(INCISE_TOOL_TUBE + 1 + i)),
+				 -EINVAL);
+		for (int k = 0; k < 2; k++) {
+			assert_true(incise_loop_control_wanted_tool(control, &tool));
+			assert_int_equal(tool, i);
+		}
+	}
+	incise_loop_control_ticked(control, 1, INCISE_TOOL_HANDLE);
+	assert_int_equal(incise_loop_control_tool(control), INCISE_TOOL_HANDLE);
+	incise_loop_control_free(control);
+}
+
 /* A loop that only changes plans. */
 struct changer {
 	struct incise_loop_control *control;
@@ -116,7 +142,8 @@ static void *change(void *argument)
 			now = next;
 			changer->swaps++;
 		}
-		incise_loop_control_ticked(changer->control, (uint64_t)changer->swaps);
+		incise_loop_control_ticked(changer->control, (uint64_t)changer->swaps,
+					   INCISE_TOOL_BLADE);
 	}
 	return now;
 }
@@ -160,6 +187,7 @@ int main(void)
 		cmocka_unit_test(test_one_place),
 		cmocka_unit_test(test_events),
 		cmocka_unit_test(test_ticks),
+		cmocka_unit_test(test_tool),
 		cmocka_unit_test(test_two_threads),
 	};
 
