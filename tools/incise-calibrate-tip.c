@@ -254,6 +254,7 @@ static void record_poses(const struct options *options, struct list *list,
 			;
 	}
 	incise_tracker_info(incise_rig_tracker(rig), &info);
+	station = info.scalpel_station;
 	snprintf(device, 64, "%s", info.name);
 	clock = incise_rig_clock(rig);
 	now = incise_clock_now(clock);

@@ -97,12 +97,37 @@ static int read_stations(struct incise_tracker_setup *setup,
 		path, config_setting_source_line(list));
 }
 
+/* tube_station = 2: of the stations, but not the first, which is the scalpel's. */
+static int read_tube_station(struct incise_tracker_setup *setup,
+			     const config_setting_t *group, const char *path,
+			     struct incise_error *err)
+{
+	const config_setting_t *setting =
+		config_setting_get_member(group, "tube_station");
+	int station = 0;
+	int rc = incise_conf_integer(group, path, "tube_station", 1, 4, &station, err);
+
+	if (rc || !setting)
+		return rc;
+	setup->tube_station = (uint8_t)station;
+	for (int i = 1; i < setup->n_stations; i++)
+		if (setup->stations[i] == station)
+			return 0;
+	return incise_error_set(
+		err, EINVAL,
+		"%.200s:%d: tracker_setup.tube_station: expected one of "
+		"tracker_setup.stations, and not the first, which is the scalpel's, found "
+		"%d; correct it",
+		path, config_setting_source_line(setting), station);
+}
+
 static int read_tracker_setup(struct incise_tracker_setup *setup,
 			      const config_setting_t *root, const char *path,
 			      struct incise_error *err)
 {
-	static const char *const keys[] = {"stations",	"hemisphere", "sync",
-					   "offset_mm", "repeat_ms",  NULL};
+	static const char *const keys[] = {"stations", "tube_station", "hemisphere",
+					   "sync",     "offset_mm",    "repeat_ms",
+					   NULL};
 	static const char *const syncs[] = {"internal", "external", "video", NULL};
 	const config_setting_t *group;
 	int sync = INCISE_TRACKER_INTERNAL;
@@ -115,6 +140,8 @@ static int read_tracker_setup(struct incise_tracker_setup *setup,
 	if (rc || !group)
 		return rc;
 	rc = read_stations(setup, group, path, err);
+	if (!rc)
+		rc = read_tube_station(setup, group, path, err);
 	if (!rc)
 		rc = incise_conf_direction(group, path, "hemisphere", setup->hemisphere,
 					   err);

@@ -18,6 +18,11 @@ void incise_tracker_info(const struct incise_tracker *tracker,
 	tracker->ops->info(tracker, info);
 }
 
+double incise_tracker_station_hz(const struct incise_tracker_info *info)
+{
+	return info->stations > 1 ? info->rate_hz / info->stations : info->rate_hz;
+}
+
 uint64_t incise_tracker_lost(const struct incise_tracker *tracker)
 {
 	return tracker->ops->lost(tracker);

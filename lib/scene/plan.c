@@ -79,6 +79,15 @@ static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
 	return plan->surface ? 0 : -errno;
 }
 
+/* From here on @tracker is that of one station: it has a part of the rate. */
+static void take_stations(struct incise_plan *plan, struct incise_tracker_info *tracker)
+{
+	plan->scalpel_station = tracker->scalpel_station;
+	plan->tube_station = tracker->tube_station;
+	tracker->rate_hz = incise_tracker_station_hz(tracker);
+	tracker->stations = 1;
+}
+
 static void take_tissue(struct incise_plan *plan)
 {
 	const struct incise_scene *scene = plan->scene;
@@ -180,21 +189,26 @@ static int equip(struct incise_plan *plan, const struct incise_tracker_info *tra
 		 struct incise_error *err)
 {
 	bool handle = keeps(plan, "tool"), average = keeps(plan, "normal");
-	bool cuts = keeps(plan, "incision");
+	bool cuts = keeps(plan, "incision"), tube = handle && plan->tube_station;
 
 	if (!plan->tracker)
 		plan->fed = calloc(INCISE_PLAN_POSES, sizeof(*plan->fed));
 	if (handle)
 		plan->handle = calloc(1, sizeof(*plan->handle));
+	if (tube)
+		plan->tube = calloc(1, sizeof(*plan->tube));
 	if (average)
 		plan->average = calloc(1, sizeof(*plan->average));
 	if (cuts)
 		plan->incision = incise_incision_new(plan->scene, NULL);
 	if ((!plan->tracker && !plan->fed) || (handle && !plan->handle) ||
-	    (average && !plan->average) || (cuts && !plan->incision))
+	    (tube && !plan->tube) || (average && !plan->average) ||
+	    (cuts && !plan->incision))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
 	if (handle)
 		incise_predict_init(plan->handle, tracker, 0);
+	if (tube)
+		incise_predict_init(plan->tube, tracker, 0);
 	if (average)
 		incise_average_init(plan->average, plan->average_ticks);
 	return 0;
@@ -230,6 +244,7 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 	}
 	plan->scene = scene;
 	rc = take_rig(plan, rig, &tracker, *place, err);
+	take_stations(plan, &tracker);
 	if (!rc)
 		rc = check_age(plan, &tracker, err);
 	if (!rc)
@@ -321,6 +336,7 @@ void incise_plan_free(struct incise_plan *plan)
 	incise_surface_free(plan->own_surface);
 	free(plan->fed);
 	free(plan->handle);
+	free(plan->tube);
 	free(plan->average);
 	incise_incision_free(plan->incision);
 	free(plan);
@@ -515,6 +531,7 @@ size_t incise_plan_memory(const struct incise_plan *plan)
 
 	size += plan->fed ? INCISE_PLAN_POSES * sizeof(*plan->fed) : 0;
 	size += plan->handle ? sizeof(*plan->handle) : 0;
+	size += plan->tube ? sizeof(*plan->tube) : 0;
 	size += plan->average ? sizeof(*plan->average) : 0;
 	size += plan->incision ? incise_incision_memory(plan->incision) : 0;
 	if (plan->fixed)

@@ -62,11 +62,13 @@ struct incise_plan {
 	struct incise_predict predict;
 	int64_t pose_age_ns;
 	struct incise_pose_counts poses;
-	char pose_flag;		 /* of the newest pose; ' ' or 0: none */
-	bool unusable;		 /* the newest pose is */
-	int64_t unusable_ns;	 /* tick of the first of them since a usable one */
-	bool blind;		 /* they lasted for INCISE_PLAN_BLIND_NS */
-	double velocity_mm_s[3]; /* of what is held: of the tip, or the handle's end */
+	char pose_flag; /* of the scalpel's newest pose; ' ' or 0: none */
+	uint8_t scalpel_station, tube_station; /* of the tracker; 0: any, none */
+	bool unusable, tube_unusable;	       /* the newest pose of that station is */
+	bool none_usable;	 /* the newest pose of all is unusable … */
+	int64_t unusable_ns;	 /* … since the tick of the first of them … */
+	bool blind;		 /* … which was INCISE_PLAN_BLIND_NS ago */
+	double velocity_mm_s[3]; /* of the end of what is held */
 	double attitude[4];
 	double tip_mm[3]; /* of the blade in the frame of the tracker's poses */
 
@@ -75,6 +77,7 @@ struct incise_plan {
 	bool inserts;		       /* handle and tube can be held */
 	char no_tool[128];	       /* the reason why not */
 	struct incise_predict *handle; /* its end's position; with stage tool */
+	struct incise_predict *tube;   /* the same, if it has a station */
 	const struct incise_surface *surface;
 	struct incise_surface *own_surface; /* the rig's plane, when it is that */
 	double up[3];			    /* normal of the surface's top */
@@ -154,7 +157,7 @@ void incise_plan_fade(struct incise_plan *plan, bool fading) INCISE_REALTIME;
 /* Whether a force that fades has reached zero. Real-time safe. */
 bool incise_plan_faded(const struct incise_plan *plan) INCISE_REALTIME;
 
-/* The flag of the newest pose; ' ' or 0: none. Real-time safe. */
+/* The flag of the scalpel's newest pose; ' ' or 0: none. Real-time safe. */
 char incise_plan_pose_flag(const struct incise_plan *plan) INCISE_REALTIME;
 
 /* The reason of a fault in a few words, without what the device says; NULL: no fault. */

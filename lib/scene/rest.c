@@ -105,6 +105,7 @@ static void set_plans(struct search *s, const struct incise_plan *plan,
 	if (plan->average)
 		s->parts.average = *plan->average;
 	own->handle = plan->handle ? &s->parts.handle : NULL;
+	own->tube = NULL;
 	own->average = plan->average ? &s->parts.average : NULL;
 	for (int i = 0; i < own->n_stages; i++) {
 		/* Only handle and tube ask for the cuts. */

@@ -28,38 +28,69 @@ static void take_handle(struct incise_plan *plan, struct incise_tracker_sample s
 	incise_predict_add(plan->handle, &sample);
 }
 
+static bool is_tube(const struct incise_plan *plan, uint8_t station)
+{
+	return plan->tube_station && station == plan->tube_station;
+}
+
+/* Station 0 is not known: a tracker, or a program that feeds poses, with only one. */
+static bool is_scalpel(const struct incise_plan *plan, uint8_t station)
+{
+	return !is_tube(plan, station) &&
+	       (!plan->scalpel_station || !station || station == plan->scalpel_station);
+}
+
 /*
  * Whether a pose is used, by its flag. One that is not is left out as if it had not come, so
  * that the last one ages.
  */
-static bool is_usable(struct incise_plan *plan, char status, int64_t now_ns)
+static bool is_usable(struct incise_plan *plan,
+		      const struct incise_tracker_sample *sample, int64_t now_ns)
 {
-	bool usable = incise_pose_count(&plan->poses, status);
+	bool usable = incise_pose_count(&plan->poses, sample->status);
 
-	plan->pose_flag = status;
-	if (!usable && !plan->unusable)
+	if (!usable && !plan->none_usable)
 		plan->unusable_ns = now_ns;
+	plan->none_usable = !usable;
+	if (is_tube(plan, sample->station)) {
+		plan->tube_unusable = !usable;
+		return usable;
+	}
+	plan->pose_flag = sample->status;
 	plan->unusable = !usable;
 	return usable;
+}
+
+static void take_scalpel(struct incise_plan *plan, struct incise_tracker_sample *sample)
+{
+	double arm_mm[3];
+
+	v3_rotate(arm_mm, sample->quaternion, plan->tip_mm);
+	v3_add(sample->position_mm, sample->position_mm, 1, arm_mm);
+	incise_predict_add(&plan->predict, sample);
+	if (plan->inserts)
+		take_handle(plan, *sample);
 }
 
 static void take(struct incise_plan *plan, struct incise_tracker_sample *samples, int n,
 		 struct incise_tick *tick)
 {
 	int64_t now_ns = tick->t_ns;
-	double arm_mm[3];
 
 	for (int i = 0; i < n; i++) {
-		if (!is_usable(plan, samples[i].status, now_ns))
+		bool tube = is_tube(plan, samples[i].station);
+
+		if (!tube && !is_scalpel(plan, samples[i].station))
+			continue;
+		if (!is_usable(plan, &samples[i], now_ns))
 			continue;
 		/* A timestamp from the future would keep all later poses out. */
 		if (samples[i].t_ns > now_ns)
 			samples[i].t_ns = now_ns;
-		v3_rotate(arm_mm, samples[i].quaternion, plan->tip_mm);
-		v3_add(samples[i].position_mm, samples[i].position_mm, 1, arm_mm);
-		incise_predict_add(&plan->predict, &samples[i]);
-		if (plan->inserts)
-			take_handle(plan, samples[i]);
+		if (!tube)
+			take_scalpel(plan, &samples[i]);
+		else if (plan->tube)
+			incise_predict_add(plan->tube, &samples[i]);
 	}
 	if (plan->unusable)
 		tick->flags |= INCISE_TICK_UNUSABLE;
@@ -71,7 +102,7 @@ int incise_stage_pose(struct incise_plan *plan, struct incise_tick *tick)
 	int n = incise_tracker_read(plan->tracker, samples, INCISE_PLAN_POSES);
 
 	take(plan, samples, n, tick);
-	plan->blind = n > 0 && plan->unusable &&
+	plan->blind = n > 0 && plan->none_usable &&
 		      tick->t_ns - plan->unusable_ns >= INCISE_PLAN_BLIND_NS;
 	if (plan->blind)
 		return -ENODEV;
@@ -107,9 +138,67 @@ static bool keeps_tool(struct incise_plan *plan)
 	return plan->proxy.touching && !(plan->changing && faded);
 }
 
+/* From here on the tube counts as nearer; a tracker's noise and a tremor are far less. */
+#define NEARER_MM 5
+
+static double above_mm(const struct incise_plan *plan, const double end_mm[3])
+{
+	struct incise_touch touch;
+
+	incise_surface_nearest(plan->surface, end_mm, &touch);
+	return -touch.depth_mm;
+}
+
+static bool is_tube_nearer(const struct incise_plan *plan, const struct incise_tick *tick)
+{
+	double handle_mm[3], tube_mm[3], speed_mm_s[3], attitude[4], scalpel, tube;
+
+	incise_predict_at(plan->handle, tick->t_ns, handle_mm, speed_mm_s, attitude);
+	incise_predict_at(plan->tube, tick->t_ns, tube_mm, speed_mm_s, attitude);
+	scalpel = fmin(above_mm(plan, tick->position_mm), above_mm(plan, handle_mm));
+	tube = above_mm(plan, tube_mm);
+	return plan->instrument.held == INCISE_TOOL_TUBE ? tube <= scalpel + NEARER_MM
+							 : tube + NEARER_MM < scalpel;
+}
+
+static bool is_tube_stale(const struct incise_plan *plan, const struct incise_tick *tick)
+{
+	return incise_predict_age(plan->tube, tick->t_ns) > plan->pose_age_ns;
+}
+
+/*
+ * Find out whether the tube is nearer. One of the two that is silent is far away, also in the
+ * tissue; of two that are not, the held one stays there.
+ */
+static bool find_tube(struct incise_plan *plan, const struct incise_tick *tick)
+{
+	struct incise_instrument *instrument = &plan->instrument;
+	bool keeps;
+
+	if (is_tube_stale(plan, tick))
+		instrument->tube_nearer = false;
+	else if (tick->flags & INCISE_TICK_STALE)
+		instrument->tube_nearer = true;
+	keeps = keeps_tool(plan);
+	if (!keeps && !is_tube_stale(plan, tick) && !(tick->flags & INCISE_TICK_STALE))
+		instrument->tube_nearer = is_tube_nearer(plan, tick);
+	return keeps;
+}
+
+/* The flags of the tube's station take the place of the scalpel's. */
+static void flag_tube(const struct incise_plan *plan, struct incise_tick *tick)
+{
+	tick->flags &= ~(unsigned int)(INCISE_TICK_STALE | INCISE_TICK_UNUSABLE);
+	if (is_tube_stale(plan, tick))
+		tick->flags |= INCISE_TICK_STALE;
+	if (plan->tube_unusable)
+		tick->flags |= INCISE_TICK_UNUSABLE;
+}
+
 int incise_stage_tool(struct incise_plan *plan, struct incise_tick *tick)
 {
-	bool keeps = keeps_tool(plan);
+	bool keeps = plan->tube ? find_tube(plan, tick) : keeps_tool(plan);
+	double attitude[4];
 
 	/* The way from the end of one to that of the other is no motion. */
 	if (incise_instrument_choose(&plan->instrument, plan->attitude, plan->up,
@@ -122,6 +211,12 @@ int incise_stage_tool(struct incise_plan *plan, struct incise_tick *tick)
 	if (plan->instrument.held == INCISE_TOOL_HANDLE)
 		incise_predict_at(plan->handle, tick->t_ns, tick->tool_mm,
 				  plan->velocity_mm_s, plan->attitude);
+	if (plan->instrument.held == INCISE_TOOL_TUBE && plan->tube) {
+		/* The attitude stays the scalpel's. */
+		incise_predict_at(plan->tube, tick->t_ns, tick->tool_mm,
+				  plan->velocity_mm_s, attitude);
+		flag_tube(plan, tick);
+	}
 	return 0;
 }
 

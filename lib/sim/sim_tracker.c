@@ -6,7 +6,8 @@
  *   acquisition   |           |           |        every 1 / (hz · (1 + drift))
  *   arrival       '-latency-|~|           '-latency-|~~|   + a jitter ≥ 0
  *
- * A record carries the time of its arrival and is readable from then on.
+ * A record carries the time of its arrival and is readable from then on. With a tube every other
+ * record is of its station, so that the two share the rate.
  */
 #include <errno.h>
 #include <math.h>
@@ -19,6 +20,8 @@
 
 /* Attitude noise, rad: FASTRAK's 0.025° static accuracy (paper 1, §2). */
 #define ATTITUDE_NOISE (0.025 * M_PI / 180)
+
+enum { SCALPEL = 1, TUBE }; /* stations */
 
 #define DRAWS 8 /* random numbers per record: 3 position, 3 attitude, jitter, a spare */
 
@@ -54,6 +57,33 @@ static void turn(double q[4], const double r[3])
 		q[i] /= norm;
 }
 
+/* The tube's end, upright: a cosine from above to below and back. */
+static void place_tube(const struct incise_sim_config *config, int64_t t_ns,
+		       double position_mm[3])
+{
+	double turn = 2 * M_PI * (double)t_ns / INCISE_NS_PER_S / config->tube_s;
+	double down = (1 - cos(turn)) / 2;
+
+	position_mm[0] = config->tube_x_mm;
+	position_mm[1] = config->tube_y_mm;
+	position_mm[2] = config->tube_above_mm -
+			 down * (config->tube_above_mm + config->tube_below_mm);
+}
+
+static void place_scalpel(const struct incise_sim *sim, int64_t t_ns,
+			  struct incise_tracker_sample *sample)
+{
+	const struct incise_sim_config *config = &sim->config;
+	const double tip_mm[3] = {config->tip_x_mm, config->tip_y_mm, config->tip_z_mm};
+	struct incise_blade blade;
+	double arm_mm[3];
+
+	incise_surgeon_blade(&sim->surgeon, t_ns, &blade);
+	incise_surgeon_grip(&sim->surgeon, t_ns, sample->quaternion);
+	v3_rotate(arm_mm, sample->quaternion, tip_mm);
+	v3_sub(sample->position_mm, blade.position_mm, arm_mm);
+}
+
 static INCISE_REALTIME void sim_tracker_sample(struct incise_sim_stream *stream,
 					       const struct incise_sim *sim)
 {
@@ -61,19 +91,20 @@ static INCISE_REALTIME void sim_tracker_sample(struct incise_sim_stream *stream,
 		(struct sim_tracker *)((char *)stream -
 				       offsetof(struct sim_tracker, stream));
 	const struct incise_sim_config *config = &sim->config;
-	struct incise_tracker_sample sample = {.status = ' ', .station = 1};
-	struct incise_blade blade;
-	const double tip_mm[3] = {config->tip_x_mm, config->tip_y_mm, config->tip_z_mm};
-	double draw[7], shake[3], arm_mm[3], delay_ms;
+	struct incise_tracker_sample sample = {
+		.status = ' ', .station = SCALPEL, .quaternion = {1}};
+	double draw[7], shake[3], delay_ms;
 
 	for (int i = 0; i < 7; i++)
 		draw[i] = incise_random_normal(t->key, t->n * DRAWS + i);
-	incise_surgeon_blade(&sim->surgeon, stream->t_ns, &blade);
-	incise_surgeon_grip(&sim->surgeon, stream->t_ns, sample.quaternion);
-	v3_rotate(arm_mm, sample.quaternion, tip_mm);
+	if (config->tube_s > 0 && t->n % 2)
+		sample.station = TUBE;
+	if (sample.station == TUBE)
+		place_tube(config, stream->t_ns, sample.position_mm);
+	else
+		place_scalpel(sim, stream->t_ns, &sample);
 	for (int i = 0; i < 3; i++) {
-		sample.position_mm[i] = blade.position_mm[i] - arm_mm[i] +
-					config->tracker_noise_mm * draw[i];
+		sample.position_mm[i] += config->tracker_noise_mm * draw[i];
 		shake[i] = ATTITUDE_NOISE * draw[3 + i];
 	}
 	turn(sample.quaternion, shake);
@@ -113,7 +144,9 @@ static void sim_tracker_info(const struct incise_tracker *tracker,
 
 	*info = (struct incise_tracker_info){
 		.rate_hz = config->tracker_hz,
-		.stations = 1,
+		.stations = config->tube_s > 0 ? 2 : 1,
+		.scalpel_station = SCALPEL,
+		.tube_station = config->tube_s > 0 ? TUBE : 0,
 		.latency_ns = llround(config->tracker_latency_ms * 1e6),
 	};
 	snprintf(info->name, sizeof(info->name), "virtual tracker");

@@ -11,11 +11,13 @@
  */
 #define UNDECIDED 0.2
 
-static enum incise_tool by_turn(const struct incise_instrument *instrument,
-				const double attitude[4], const double normal[3])
+static enum incise_tool by_place(const struct incise_instrument *instrument,
+				 const double attitude[4], const double normal[3])
 {
 	double axis[3], up;
 
+	if (instrument->tube_nearer)
+		return INCISE_TOOL_TUBE;
 	v3_rotate(axis, attitude, instrument->axis);
 	up = v3_dot(axis, normal);
 	if (up > UNDECIDED)
@@ -35,7 +37,7 @@ bool incise_instrument_choose(struct incise_instrument *instrument,
 	if (touching)
 		return false;
 	instrument->held = instrument->wanted == INCISE_TOOL_AUTO
-				   ? by_turn(instrument, attitude, normal)
+				   ? by_place(instrument, attitude, normal)
 				   : instrument->wanted;
 	return instrument->held != before;
 }
@@ -43,7 +45,7 @@ bool incise_instrument_choose(struct incise_instrument *instrument,
 bool incise_instrument_waits(const struct incise_instrument *instrument)
 {
 	if (instrument->wanted == INCISE_TOOL_AUTO)
-		return instrument->held == INCISE_TOOL_TUBE;
+		return (instrument->held == INCISE_TOOL_TUBE) != instrument->tube_nearer;
 	return instrument->wanted != instrument->held;
 }
 

@@ -9,6 +9,9 @@
  *             │  ║ handle      ║
  *             ○ tip            ○ tip + handle_mm · axis
  *      ───────────────────────────────── surface
+ *
+ * A tube that has a station of the tracker is held while its end is nearer to the surface than both
+ * ends of the scalpel.
  */
 #ifndef INCISE_INSTRUMENT_H
 #define INCISE_INSTRUMENT_H
@@ -24,6 +27,7 @@ struct incise_instrument {
 	double handle_mm;
 	enum incise_tool wanted; /* INCISE_TOOL_AUTO: by its turn */
 	enum incise_tool held;	 /* never AUTO */
+	bool tube_nearer;	 /* of a tube with a station; else false */
 };
 
 /*
@@ -35,7 +39,7 @@ bool incise_instrument_choose(struct incise_instrument *instrument,
 			      const double attitude[4], const double normal[3],
 			      bool touching) INCISE_REALTIME;
 
-/* Whether another one is wanted than the held one, without a look at its turn. */
+/* Whether another one is wanted than the held one, without a look at the scalpel's turn. */
 bool incise_instrument_waits(const struct incise_instrument *instrument) INCISE_REALTIME;
 
 /* Where the end of the held one is, mm. */

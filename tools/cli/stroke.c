@@ -35,7 +35,7 @@ void stroke_begin(struct stroke *stroke, const struct incise_plan *plan,
 void stroke_pose(const struct stroke *stroke, int64_t pose,
 		 struct incise_tracker_sample *sample)
 {
-	double t = (double)pose / stroke->tracker->rate_hz;
+	double t = (double)pose / incise_tracker_station_hz(stroke->tracker);
 	double down = fmin(t / STROKE_DOWN_S, 1);
 	double above = ABOVE_MM - (ABOVE_MM + DEPTH_MM) * down;
 	double off = REACH_MM * sin(2 * M_PI * STROKE_HZ * t);

@@ -157,6 +157,8 @@ static void tracker_info(const struct incise_tracker *tracker,
 	*info = (struct incise_tracker_info){
 		.rate_hz = polhemus_family_hz(layout->family, n),
 		.stations = n,
+		.scalpel_station = t->stream.setup.stations[0],
+		.tube_station = t->stream.setup.tube_station,
 		.external_sync = !t->stream.gaps.period_ns,
 		.latency_ns =
 			polhemus_family_latency_ns(layout->family) +
@@ -203,6 +205,7 @@ static int check(const struct incise_tracker_setup *setup, const char *where,
 		 struct incise_error *err)
 {
 	const double *h = setup->hemisphere, *offset = setup->offset_mm;
+	bool tube = !setup->tube_station;
 	bool good = setup->n_stations >= 1 && setup->n_stations <= POLHEMUS_STATIONS &&
 		    setup->sync >= INCISE_TRACKER_INTERNAL &&
 		    setup->sync <= INCISE_TRACKER_VIDEO &&
@@ -213,12 +216,15 @@ static int check(const struct incise_tracker_setup *setup, const char *where,
 		good = setup->stations[i] >= 1 &&
 		       setup->stations[i] <= POLHEMUS_STATIONS &&
 		       (!i || setup->stations[i] > setup->stations[i - 1]);
-	return good ? 0
-		    : incise_error_set(err, EINVAL,
-				       "%s: tracker_setup: expected stations 1 to 4, "
-				       "ascending, a hemisphere of length 1 and numbers; "
-				       "correct it",
-				       where);
+	for (int i = 1; good && i < setup->n_stations; i++)
+		tube |= setup->stations[i] == setup->tube_station;
+	return good && tube ? 0
+			    : incise_error_set(
+				      err, EINVAL,
+				      "%s: tracker_setup: expected stations 1 to 4, "
+				      "ascending, the tube's not the first of them, a "
+				      "hemisphere of length 1 and numbers; correct it",
+				      where);
 }
 
 static int begin(struct polhemus_tracker *t, const struct incise_tracker_setup *setup,

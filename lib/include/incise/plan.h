@@ -152,7 +152,8 @@ INCISE_API void incise_plan_stability(const struct incise_plan *plan,
 INCISE_API double incise_plan_bound(const struct incise_plan *plan, double reach_mm);
 
 /**
- * Give poses to a plan without a rig, before its tick; as from a tracker.
+ * Give poses to a plan without a rig, before its tick; as from a tracker: those of stations that
+ * are neither the scalpel's nor the tube's are left out. Station 0 is the scalpel's.
  *
  * @param n at most 32 are kept until the next tick
  * @return how many were taken; -EINVAL when the plan has a rig. Real-time safe.
@@ -163,7 +164,8 @@ INCISE_API int incise_plan_feed(struct incise_plan *plan,
 
 /**
  * Say where the tip of the blade is in the frame of what the tracker's poses are of: the
- * calibration's tip_mm; by default 0 0 0. Before the first tick.
+ * calibration's tip_mm; by default 0 0 0. Before the first tick. It is the scalpel's alone: the
+ * end of a tube with a station of its own is where the tracker measures.
  *
  * @return 0, -EINVAL (not finite, or more than 1e6 mm)
  */
@@ -207,7 +209,8 @@ struct incise_tick {
 enum incise_tick_flag {
 	INCISE_TICK_CONTACT = 1,      /**< the tool is in the tissue */
 	INCISE_TICK_EXTRAPOLATED = 2, /**< the model was asked outside its support */
-	INCISE_TICK_STALE = 4,	 /**< no pose younger than pose_age_ms: the force fades */
+	/** no pose of the held tool's station younger than pose_age_ms: the force fades */
+	INCISE_TICK_STALE = 4,
 	INCISE_TICK_CLAMPED = 8, /**< the force was held at force_N */
 	INCISE_TICK_FAULT = 16,	 /**< a device failed: no force from here on */
 	INCISE_TICK_SLEWED = 32, /**< the change of force was held at slew_N_s */
@@ -226,7 +229,7 @@ enum incise_tick_flag {
 };
 #define INCISE_TICK_FLAGS 16 /**< how many there are */
 
-/** Poses that the plan was given so far. Real-time safe; in the thread that ticks. */
+/** Poses of scalpel and tube that the plan was given so far. Real-time safe; in the thread that ticks. */
 INCISE_API void incise_plan_poses(const struct incise_plan *plan,
 				  struct incise_pose_counts *counts) INCISE_REALTIME;
 

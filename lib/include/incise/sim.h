@@ -63,13 +63,22 @@ struct incise_sim_config {
 	int withdrawal;	       /**< 0 dissipative; 1 paper: F in both directions */
 
 	/* Tracker. */
-	double tracker_hz;	   /**< 120 */
+	double tracker_hz;	   /**< 120; of all its stations together */
 	double tracker_noise_mm;   /**< 0.02; sd per axis */
 	double tracker_latency_ms; /**< 4.2 */
 	double tracker_jitter_ms;  /**< 0.2; sd of extra latency, never negative */
 	double tracker_drift_ppm;  /**< 50; its clock runs this much fast */
 	/** 0 0 0; of the true tip from the tracker's, in the scalpel's frame */
 	double tip_x_mm, tip_y_mm, tip_z_mm;
+
+	/*
+	 * A second station, 2, at the end of a tube that goes down and up again without rest. It
+	 * is felt by nothing in the virtual rig.
+	 */
+	double tube_s; /**< 0; once down and up, from above; 0: there is none */
+	double tube_x_mm, tube_y_mm; /**< 20 0; where */
+	double tube_above_mm;	     /**< 200; highest, of its end above the surface */
+	double tube_below_mm;	     /**< 10; lowest, below it */
 
 	/* Force channel. */
 	double force_hz;       /**< 10000 */

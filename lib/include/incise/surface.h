@@ -44,7 +44,8 @@ INCISE_API void incise_surface_top(const struct incise_surface *surface,
  *              are equally near, as in the middle of a sphere, does it look at all these.
  */
 INCISE_API void incise_surface_nearest(const struct incise_surface *surface,
-				       const double p[3], struct incise_touch *touch);
+				       const double p[3],
+				       struct incise_touch *touch) INCISE_REALTIME;
 
 /**
  * Where a straight way from outside enters the tissue first. Ends beyond 1e9 count as there.

@@ -12,10 +12,14 @@
 
 /** The tool in the hand. */
 enum incise_tool {
-	INCISE_TOOL_AUTO, /**< blade or handle, whichever end of the scalpel is down */
+	/**
+	 * Blade or handle, whichever end of the scalpel is down; or the tube, where it has a
+	 * station of the tracker, while that is nearer to the tissue than both of them.
+	 */
+	INCISE_TOOL_AUTO,
 	INCISE_TOOL_BLADE,
 	INCISE_TOOL_HANDLE, /**< the scalpel's other end */
-	INCISE_TOOL_TUBE,   /**< round; its end is where the tip was */
+	INCISE_TOOL_TUBE, /**< round; its end is at its own station, else where the tip was */
 };
 
 /** Phases of a procedure; paper 2, §2.2 and §2.3. */

@@ -38,7 +38,8 @@ struct incise_tracker_setup {
 	uint8_t stations[4];  /**< 1 … 4, ascending; default {1} */
 	double hemisphere[3]; /**< unit vector towards the sensor; default +x */
 	enum incise_tracker_sync sync;
-	double offset_mm[3]; /**< the tracked point in the sensor's frame; default 0 */
+	uint8_t tube_station; /**< see struct incise_tracker_info; default 0 */
+	double offset_mm[3];  /**< the tracked point in the sensor's frame; default 0 */
 	/**
 	 * A tracker that sends one and the same pose for longer, to the last digit, measures
 	 * nothing: its noise is larger than that. Its poses get the flag '=' then, which is
@@ -50,12 +51,16 @@ struct incise_tracker_setup {
 /** Properties of a tracker. */
 struct incise_tracker_info {
 	char name[64];
-	double rate_hz;	    /**< nominal */
+	/** Nominal, of the records of all stations together; incise_tracker_station_hz() */
+	double rate_hz;
 	int64_t latency_ns; /**< nominal, acquisition to arrival */
 	int stations;	    /**< sensors that send records; seq counts all of them */
 	bool external_sync; /**< measures by pulses from outside: rate_hz is its highest
 				 rate, and the records have no period */
 	int64_t grain_ns;   /**< grid of arrival times: 1000000 for USB; 0: none */
+	/** Station on the scalpel: the first one; 0: every station but the tube's */
+	uint8_t scalpel_station;
+	uint8_t tube_station; /**< station at the end of the tube; 0: it has none */
 };
 
 /** Poses, and their flags. */
@@ -113,6 +118,10 @@ INCISE_API int incise_tracker_read(struct incise_tracker *tracker,
 /** Properties of the tracker. */
 INCISE_API void incise_tracker_info(const struct incise_tracker *tracker,
 				    struct incise_tracker_info *info);
+
+/** Records of one station per second: rate_hz is shared by all of them. Real-time safe. */
+INCISE_API double incise_tracker_station_hz(const struct incise_tracker_info *info)
+	INCISE_REALTIME;
 
 /** Records lost so far, in the device or in full buffers. */
 INCISE_API uint64_t incise_tracker_lost(const struct incise_tracker *tracker);

@@ -41,7 +41,8 @@ static double length4(const double q[4])
 
 static struct incise_predict start(void)
 {
-	struct incise_tracker_info info = {"test", 120, LATENCY_NS, 1, false, 0};
+	struct incise_tracker_info info = {
+		.name = "test", .rate_hz = 120, .latency_ns = LATENCY_NS};
 	struct incise_predict p;
 
 	incise_predict_init(&p, &info, 0);
@@ -99,8 +100,9 @@ static void test_gains_are_kalmans(void **state)
 
 	for (int i = 0; i < 5; i++) {
 		for (int n = 0; n < 3; n++) {
-			struct incise_tracker_info info = {"test", hz[i], LATENCY_NS,
-							   1,	   false, 0};
+			struct incise_tracker_info info = {.name = "test",
+							   .rate_hz = hz[i],
+							   .latency_ns = LATENCY_NS};
 			struct incise_predict p;
 			double k[3];
 
@@ -374,7 +376,8 @@ static void test_never_further_ahead_than_a_gap(void **state)
 /* 12 ms are more than five periods of 1000 Hz, and are made up for all the same. */
 static void test_latency_of_many_periods(void **state)
 {
-	struct incise_tracker_info info = {"test", 1000, 12000000, 1, false, 0};
+	struct incise_tracker_info info = {
+		.name = "test", .rate_hz = 1000, .latency_ns = 12000000};
 	struct incise_tracker_sample s = {.quaternion = {1}};
 	struct incise_predict p;
 
@@ -419,8 +422,8 @@ static void test_only_numbers(void **state)
 	uint64_t seed = 7;
 
 	for (int run = 0; run < 45; run++) {
-		struct incise_tracker_info info = {"", hz[run % 9], latency[run % 5],
-						   1,  false,	    0};
+		struct incise_tracker_info info = {.rate_hz = hz[run % 9],
+						   .latency_ns = latency[run % 5]};
 		struct incise_predict p;
 		int64_t t_ns = 0;
 

@@ -120,8 +120,8 @@ struct result {
  */
 static struct result run(int rate)
 {
-	struct incise_tracker_info info = {"test", rate,  REFERENCE_LATENCY_NS,
-					   1,	   false, 0};
+	struct incise_tracker_info info = {
+		.name = "test", .rate_hz = rate, .latency_ns = REFERENCE_LATENCY_NS};
 	struct incise_predict p;
 	struct constant_velocity c;
 	struct result sum = {0};
@@ -229,7 +229,7 @@ static void test_velocity_from_quantised_position(void **state)
 	static const struct {
 		double step_mm, filtered, difference;
 	} cases[] = {{0.030, 0.049, 0.44}, {0.005, 0.017, 0.075}, {0.001, 0.007, 0.017}};
-	struct incise_tracker_info info = {"encoder", 1000, 0, 1, false, 0};
+	struct incise_tracker_info info = {.name = "encoder", .rate_hz = 1000};
 
 	for (int i = 0; i < 3; i++) {
 		double step = cases[i].step_mm, last = 0, filtered = 0, difference = 0;

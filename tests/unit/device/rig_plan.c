@@ -456,6 +456,7 @@ static void without_groups_all_is_by_default(void **state)
 	assert_int_equal(read_all("", &all, &err), 0);
 	assert_int_equal(all.tracker.n_stations, 1);
 	assert_int_equal(all.tracker.stations[0], 1);
+	assert_int_equal(all.tracker.tube_station, 0);
 	assert_true(all.tracker.hemisphere[0] == 1 && all.tracker.offset_mm[2] == 0);
 	assert_true(all.tracker.repeat_ms == 100);
 	assert_int_equal(all.tracker.sync, INCISE_TRACKER_INTERNAL);
@@ -486,7 +487,7 @@ static void all_keys_are_read(void **state)
 	struct incise_rig_plan all;
 
 	if (read_all(
-		    "tracker_setup = { stations = [2, 4]; hemisphere = [0.0, 0.0, -2.0];"
+		    "tracker_setup = { stations = [2, 4]; tube_station = 4; hemisphere = [0.0, 0.0, -2.0];"
 		    " sync = \"external\"; offset_mm = [1.0, 2.0, 3.5]; repeat_ms = 0; };"
 		    "force_setup = { rate_hz = 5000; channel = 3; full_scale_V = 5.0;"
 		    " trigger = \"my trigger\"; };"
@@ -499,6 +500,7 @@ static void all_keys_are_read(void **state)
 		fail_msg("%s", err.text);
 	assert_int_equal(all.tracker.n_stations, 2);
 	assert_int_equal(all.tracker.stations[1], 4);
+	assert_int_equal(all.tracker.tube_station, 4);
 	assert_true(all.tracker.hemisphere[2] == -1 && all.tracker.offset_mm[2] == 3.5);
 	assert_int_equal(all.tracker.sync, INCISE_TRACKER_EXTERNAL);
 	assert_true(all.tracker.repeat_ms == 0);
@@ -534,6 +536,16 @@ static void what_is_wrong_is_said(void **state)
 		{"tracker_setup = { stations = [1, 2, 3, 4, 4]; };", "numbers of 1 to 4"},
 		{"tracker_setup = { stations = 1; };", "numbers of 1 to 4"},
 		{"tracker_setup = { stations = [\"1\"]; };", "numbers of 1 to 4"},
+		{"tracker_setup = { tube_station = 1; };", "and not the first"},
+		{"tracker_setup = { stations = [2, 3]; tube_station = 2; };",
+		 "and not the first, which is the scalpel's, found 2"},
+		{"tracker_setup = { stations = [1, 2]; tube_station = 3; };",
+		 "rig.conf:1: tracker_setup.tube_station: expected one of "
+		 "tracker_setup.stations"},
+		{"tracker_setup = { stations = [1, 2]; tube_station = 0; };",
+		 "tube_station"},
+		{"tracker_setup = { stations = [1, 2]; tube_station = 258; };",
+		 "tube_station"},
 		{"tracker_setup = { hemisphere = [0.0, 0.0, 0.0]; };", "hemisphere"},
 		{"tracker_setup = { sync = \"slow\"; };",
 		 "expected one of internal, external, video, found \"slow\""},

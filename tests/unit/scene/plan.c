@@ -565,15 +565,17 @@ static void test_getters(void **state)
 /* A faster tracker holds more; what is no tracker is refused. */
 static void test_fed_tracker(void **state)
 {
-	static const struct incise_tracker_info fast = {"fast", 240,   2000000,
-							1,	false, 0};
+	static const struct incise_tracker_info fast = {
+		.name = "fast", .rate_hz = 240, .latency_ns = 2000000};
 	static const struct incise_tracker_info none[] = {
-		{"", 0, 0, 1, false, 0},    {"", -1, 0, 1, false, 0},
-		{"", NAN, 0, 1, false, 0},  {"", INFINITY, 0, 1, false, 0},
-		{"", 120, -1, 1, false, 0},
+		{.rate_hz = 0},
+		{.rate_hz = -1},
+		{.rate_hz = NAN},
+		{.rate_hz = INFINITY},
+		{.rate_hz = 120, .latency_ns = -1},
 	};
-	static const struct incise_tracker_info late = {"late", 100,   50000000,
-							1,	false, 0};
+	static const struct incise_tracker_info late = {
+		.name = "late", .rate_hz = 100, .latency_ns = 50000000};
 	struct fed usual = fed_start("scenes/neck.scene", true);
 	struct incise_plan_stability by_usual, by_fast, by_slow;
 	struct incise_plan *plan, *slow;

@@ -57,6 +57,52 @@ static void test_poses_of_the_future_are_of_now(void **state)
 	assert_int_equal(incise_stage_pose(&plan, &tick), -ENODEV);
 }
 
+/* Stations of the records of told_stations(), and their flags. */
+static char station_flag[2];
+
+static int told_stations(struct incise_tracker *tracker,
+			 struct incise_tracker_sample *samples, int n)
+{
+	for (int i = 0; i < 2; i++)
+		samples[i] = (struct incise_tracker_sample){
+			.t_ns = 1,
+			.quaternion = {1},
+			.status = station_flag[i],
+			.station = (uint8_t)(i + 1),
+		};
+	return 2;
+}
+
+/* A scalpel that is put away unusable for long is no failure while the tube is seen. */
+static void test_blind_is_every_station(void **state)
+{
+	static const struct incise_tracker_ops both = {.read = told_stations};
+	static const struct {
+		char flag[2];
+		unsigned int flags;
+		int rc;
+	} cases[] = {{{' ', ' '}, 0, 0},
+		     {{'x', ' '}, INCISE_TICK_UNUSABLE, 0},
+		     {{' ', 'x'}, 0, 0},
+		     {{'x', 'x'}, INCISE_TICK_UNUSABLE, -ENODEV}};
+	struct incise_tracker tracker = {.ops = &both};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_plan plan = {
+			.tracker = &tracker, .scalpel_station = 1, .tube_station = 2};
+		struct incise_tick tick = {.t_ns = INCISE_NS_PER_S};
+
+		incise_predict_init(&plan.predict, &info, 0);
+		memcpy(station_flag, cases[i].flag, 2);
+		assert_int_equal(incise_stage_pose(&plan, &tick), 0);
+		assert_int_equal(tick.flags, cases[i].flags);
+		assert_int_equal(plan.pose_flag, cases[i].flag[0]);
+		assert_int_equal(plan.poses.poses, 2);
+		tick.t_ns += INCISE_PLAN_BLIND_NS;
+		assert_int_equal(incise_stage_pose(&plan, &tick), cases[i].rc);
+	}
+}
+
 /* A quarter turn about x takes the tip's y to z. */
 static void test_tip_of_the_calibration(void **state)
 {
@@ -244,6 +290,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_poses_of_the_future_are_of_now),
+		cmocka_unit_test(test_blind_is_every_station),
 		cmocka_unit_test(test_tip_of_the_calibration),
 		cmocka_unit_test(test_a_cut_from_its_begin_to_its_end),
 		cmocka_unit_test(test_an_instrument_leaves_no_cut),

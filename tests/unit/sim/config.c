@@ -38,6 +38,8 @@ static void defaults_are_those_of_the_header(void **state)
 	assert_true(c.travel_mm == 20 && c.screw_mm_s == 30 && c.screw_mm_s2 == 3000);
 	assert_true(c.handle_kg == 0.05 && c.handle_friction_N == 0.01);
 	assert_true(c.hand_N_mm == 1 && c.hand_N_s_mm == 0.01);
+	assert_true(c.tube_s == 0 && c.tube_x_mm == 20 && c.tube_y_mm == 0);
+	assert_true(c.tube_above_mm == 200 && c.tube_below_mm == 10);
 	assert_int_equal(incise_sim_config_check(&c, NULL), 0);
 }
 

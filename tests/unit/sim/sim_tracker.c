@@ -8,6 +8,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <math.h>
+#include <string.h>
 #include "../../../lib/sim/sim.h"
 #include "../../../lib/sim/world.h"
 
@@ -190,6 +191,57 @@ static void info_is_nominal(void **state)
 	rig_free(&rig);
 }
 
+/*
+ * With a tube the two stations take turns at the same rate. The tube goes down from above to below
+ * and back; the scalpel is where it is without it.
+ */
+static void tube_is_the_second_station(void **state)
+{
+	static struct incise_tracker_sample alone[MAX];
+	struct incise_sim_config config;
+	struct incise_tracker_info info;
+	double least = INFINITY, most = -INFINITY;
+	struct rig rig;
+	int n;
+
+	incise_sim_config_init(&config);
+	config.tracker_noise_mm = 0;
+	rig = rig_new(&config);
+	n = rig_read(&rig, 20);
+	memcpy(alone, sample, (size_t)n * sizeof(*alone));
+	incise_tracker_info(rig.tracker, &info);
+	assert_true(info.stations == 1 && info.scalpel_station == 1);
+	assert_int_equal(info.tube_station, 0);
+	rig_free(&rig);
+
+	config.tube_s = 10;
+	rig = rig_new(&config);
+	assert_int_equal(rig_read(&rig, 20), n);
+	incise_tracker_info(rig.tracker, &info);
+	assert_true(info.stations == 2 && info.scalpel_station == 1);
+	assert_int_equal(info.tube_station, 2);
+	assert_true(info.rate_hz == 120 && incise_tracker_station_hz(&info) == 60);
+	for (int i = 0; i < n; i++) {
+		assert_int_equal(sample[i].seq, i);
+		assert_int_equal(sample[i].station, 1 + i % 2);
+		assert_int_equal(sample[i].t_ns, alone[i].t_ns);
+		if (sample[i].station == 1) {
+			assert_memory_equal(&sample[i].position_mm, &alone[i].position_mm,
+					    sizeof(alone[i].position_mm));
+			continue;
+		}
+		assert_true(sample[i].position_mm[0] == 20 &&
+			    sample[i].position_mm[1] == 0);
+		least = fmin(least, sample[i].position_mm[2]);
+		most = fmax(most, sample[i].position_mm[2]);
+	}
+	/* Within half a period of 60 Hz of its ends: 210 mm * (pi/10 * 1/120)^2, less than
+	 * 2 um, and two runs of it. */
+	assert_true(least >= -10 && least < -10 + 2e-3);
+	assert_true(most <= 200 && most > 200 - 2e-3);
+	rig_free(&rig);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -198,6 +250,7 @@ int main(void)
 		cmocka_unit_test(records_come_when_they_arrive_and_in_order),
 		cmocka_unit_test(noise_is_as_configured),
 		cmocka_unit_test(info_is_nominal),
+		cmocka_unit_test(tube_is_the_second_station),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

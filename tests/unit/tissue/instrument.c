@@ -101,6 +101,36 @@ static void test_by_name(void **state)
 	}
 }
 
+/* A tube that has a station is held while it is nearer, whatever the scalpel's turn. */
+static void test_nearer_tube(void **state)
+{
+	static const enum incise_tool tools[] = {BLADE, HANDLE, TUBE};
+
+	for (int held = 0; held < 3; held++) {
+		for (double z = -1; z <= 1; z++) {
+			struct incise_instrument s = scalpel(AUTO, tools[held]);
+			const double normal[3] = {0, sqrt(1 - z * z), z};
+
+			s.tube_nearer = true;
+			assert_int_equal(incise_instrument_waits(&s),
+					 tools[held] != TUBE);
+			incise_instrument_choose(&s, none, normal, false);
+			assert_int_equal(s.held, TUBE);
+			assert_false(incise_instrument_waits(&s));
+			s.tube_nearer = false;
+			assert_true(incise_instrument_waits(&s));
+			incise_instrument_choose(&s, none, normal, false);
+			assert_int_equal(s.held, z < 0 ? HANDLE : BLADE);
+			/* By name it does not matter. */
+			s.wanted = tools[held];
+			s.tube_nearer = true;
+			incise_instrument_choose(&s, none, normal, false);
+			assert_int_equal(s.held, tools[held]);
+			assert_false(incise_instrument_waits(&s));
+		}
+	}
+}
+
 /* A hand that trembles by less than the 12° to either side of level changes nothing. */
 static void test_tremor_does_not_switch(void **state)
 {
@@ -151,6 +181,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_turn),
 		cmocka_unit_test(test_by_name),
+		cmocka_unit_test(test_nearer_tube),
 		cmocka_unit_test(test_tremor_does_not_switch),
 		cmocka_unit_test(test_end),
 	};

@@ -1,0 +1,459 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Changes of the tool: by word at any time, and by a tube with a station of its own; poses of two
+ * stations that share a tracker's rate. The plans are fed, and each tick keeps the slew.
+ *
+ *     z ▲    scalpel, station 1      tube, station 2
+ *       │          │ tip                  ○ end
+ *     0 ┼──────────┴──────────────────────┴───── plane, or the highest line of a capsule
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <errno.h>
+#include "../../../lib/base/random.h"
+#include "fed.h"
+
+#define SLEW_N 0.4	 /* in a tick */
+#define ROUNDING_N 1e-14 /* of some sums of 4 N */
+#define MS INT64_C(1000000)
+#define POSE_AGE_MS 50
+#define NEARER_MM 5 /* the hysteresis */
+
+enum { SCALPEL = 1, TUBE, OTHER };
+
+static const struct incise_tracker_info two = {
+	.rate_hz = 120,
+	.latency_ns = FED_LATENCY_NS,
+	.stations = 2,
+	.scalpel_station = SCALPEL,
+	.tube_station = TUBE,
+};
+
+#define TISSUE                                                                                              \
+	"tissue = { reaction_N_mm = 0.14; plane_N_mm = 0.05; insertion_N_mm = 0.2; spread_N_mm = 0.2; };\n" \
+	"limits = { force_N = 4.0; slew_N_s = 400.0; pose_age_ms = 50.0; };\n"
+
+/* Two stations of 60 Hz hold less than one of 120 Hz: softer than the neck that is shipped. */
+static const char plane[] = TISSUE;
+static const char capsule[] =
+	TISSUE "surface = { kind = \"capsule\"; from_mm = [-60.0, 0.0, -55.0]; "
+	       "to_mm = [60.0, 0.0, -55.0]; radius_mm = 55.0; };\n";
+
+/* Two hands, and what they hold. */
+struct room {
+	struct fed_folder folder;
+	struct incise_scene *scene;
+	struct incise_plan *plan;
+	int64_t t_ns, record;
+	double scalpel_mm[3], tube_mm[3], turn;
+	bool scalpel_silent, tube_silent;
+	struct incise_tick tick;
+};
+
+static double size(const double v[3])
+{
+	return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+static void enter(struct room *room, const char *text, const char *arithmetic,
+		  const struct incise_tracker_info *tracker)
+{
+	struct incise_error err = {0};
+
+	*room = (struct room){.scalpel_mm = {0, 0, 60}, .tube_mm = {20, 0, 100}};
+	fed_folder_make(&room->folder);
+	room->scene = fed_scene(&room->folder, text, &err);
+	if (!room->scene)
+		fail_msg("%s", err.text);
+	assert_int_equal(incise_scene_set_arithmetic(room->scene, arithmetic, NULL), 0);
+	room->plan = incise_plan_new_fed(room->scene, tracker, &err);
+	if (!room->plan)
+		fail_msg("%s", err.text);
+}
+
+static void leave(struct room *room)
+{
+	incise_plan_free(room->plan);
+	incise_scene_free(room->scene);
+	fed_folder_remove(&room->folder);
+}
+
+/* The stations take turns. */
+static void feed(struct room *room, int64_t arrival_ns)
+{
+	struct incise_tracker_sample pose = {.t_ns = arrival_ns, .quaternion = {1}};
+	bool tube = room->record++ % 2;
+
+	pose.station = tube ? TUBE : SCALPEL;
+	if (tube ? room->tube_silent : room->scalpel_silent)
+		return;
+	if (!tube)
+		fed_attitude(pose.quaternion, room->turn, 0);
+	memcpy(pose.position_mm, tube ? room->tube_mm : room->scalpel_mm,
+	       sizeof(pose.position_mm));
+	assert_int_equal(incise_plan_feed(room->plan, &pose, 1), 1);
+}
+
+/* A tick, 1 ms after the last. The force never changes by more than the slew. */
+static void step(struct room *room)
+{
+	struct incise_tick was = room->tick;
+	int64_t arrival_ns;
+	double change_N[3];
+
+	room->t_ns += MS;
+	arrival_ns = room->t_ns / FED_PERIOD_NS * FED_PERIOD_NS;
+	if (room->t_ns - arrival_ns < MS)
+		feed(room, arrival_ns);
+	assert_int_equal(incise_plan_tick(room->plan, room->t_ns, &room->tick), 0);
+	for (int i = 0; i < 3; i++)
+		change_N[i] = room->tick.command_N[i] - was.command_N[i];
+	assert_true(size(change_N) <= SLEW_N + ROUNDING_N);
+}
+
+static void steps(struct room *room, int n)
+{
+	for (int i = 0; i < n; i++)
+		step(room);
+}
+
+/* --- stations --------------------------------------------------------------------------- */
+
+/* Two stations that share 120 Hz are as a tracker of 60 Hz with one. */
+static void test_stations_share_the_rate(void **state)
+{
+	struct incise_tracker_info shared = two, one = two;
+	struct incise_plan_stability a, b;
+	struct incise_error err = {0};
+	struct incise_scene *scene;
+	struct room room;
+
+	one.stations = 1;
+	one.rate_hz = 60;
+	assert_true(incise_tracker_station_hz(&two) == 60);
+	assert_true(incise_tracker_station_hz(&one) == 60);
+	one.stations = 0;
+	assert_true(incise_tracker_station_hz(&one) == 60);
+	enter(&room, plane, "double", &two);
+	incise_plan_stability(room.plan, &a);
+	incise_plan_free(room.plan);
+	room.plan = incise_plan_new_fed(room.scene, &one, NULL);
+	incise_plan_stability(room.plan, &b);
+	assert_int_equal(a.device.delay_ticks, b.device.delay_ticks);
+	assert_true(a.limit_N_mm == b.limit_N_mm);
+	/* 4.2 + 16.7 ms is too old, 4.2 + 8.3 ms is not. */
+	scene = fed_scene(&room.folder,
+			  "tissue = { reaction_N_mm = 0.1; }; "
+			  "limits = { pose_age_ms = 20.0; };\n",
+			  NULL);
+	assert_non_null(scene);
+	assert_null(incise_plan_new_fed(scene, &shared, &err));
+	assert_int_equal(err.code, EDOM);
+	shared.stations = 1;
+	incise_plan_free(room.plan);
+	room.plan = incise_plan_new_fed(scene, &shared, NULL);
+	assert_non_null(room.plan);
+	incise_plan_free(room.plan);
+	room.plan = NULL;
+	incise_scene_free(scene);
+	leave(&room);
+}
+
+/* Poses of a station that is neither scalpel nor tube move nothing, and are not counted. */
+static void test_other_stations(void **state)
+{
+	struct incise_tracker_sample deep = {
+		.position_mm = {0, 0, -10}, .quaternion = {1}, .station = OTHER};
+	struct incise_pose_counts counts;
+	struct room room;
+
+	enter(&room, plane, "double", &two);
+	for (int i = 0; i < 500; i++) {
+		deep.t_ns = room.t_ns + MS;
+		assert_int_equal(incise_plan_feed(room.plan, &deep, 1), 1);
+		step(&room);
+		assert_false(room.tick.flags & INCISE_TICK_CONTACT);
+	}
+	assert_true(room.tick.position_mm[2] == 60);
+	incise_plan_poses(room.plan, &counts);
+	/* Half a second of 120 Hz. */
+	assert_in_range(counts.poses, 59, 60);
+	leave(&room);
+}
+
+/* Without insertion there is no tube: its poses are not the blade's. */
+static void test_no_tube_without_insertion(void **state)
+{
+	struct room room;
+
+	enter(&room, "tissue = { plane_N_mm = 0.17; };\n", "double", &two);
+	room.tube_mm[2] = -10;
+	steps(&room, 500);
+	assert_false(room.tick.flags & INCISE_TICK_CONTACT);
+	assert_true(room.tick.position_mm[2] == 60);
+	assert_int_equal(room.tick.tool, INCISE_TOOL_BLADE);
+	leave(&room);
+}
+
+/* The tip of the calibration is the scalpel's alone. */
+static void test_tip_is_the_scalpels(void **state)
+{
+	static const double tip_mm[3] = {1, 2, 3};
+	struct room room;
+
+	enter(&room, plane, "double", &two);
+	assert_int_equal(incise_plan_set_tip(room.plan, tip_mm), 0);
+	incise_plan_set_tool(room.plan, INCISE_TOOL_TUBE);
+	steps(&room, 100);
+	for (int i = 0; i < 3; i++) {
+		assert_true(room.tick.position_mm[i] == room.scalpel_mm[i] + tip_mm[i]);
+		assert_true(room.tick.tool_mm[i] == room.tube_mm[i]);
+	}
+	leave(&room);
+}
+
+/* --- the tube by its station ------------------------------------------------------------ */
+
+/*
+ * Go there along a cosine in 2 s and rest for 1 s: of 200 mm on the way a filter with a memory of
+ * 10 poses, 0.17 s, makes less than 1 mm of error, and of that e^-6 are left at the end.
+ */
+static enum incise_tool held_at(struct room *room, double scalpel_mm, double tube_mm)
+{
+	double scalpel = room->scalpel_mm[2], tube = room->tube_mm[2];
+
+	for (int i = 1; i <= 2000; i++) {
+		double share = (1 - cos(M_PI * i / 2000)) / 2;
+
+		room->scalpel_mm[2] = scalpel + share * (scalpel_mm - scalpel);
+		room->tube_mm[2] = tube + share * (tube_mm - tube);
+		step(room);
+	}
+	steps(room, 1000);
+	return room->tick.tool;
+}
+
+static void test_nearer_tool(void **state)
+{
+	const double more = NEARER_MM + 0.01, less = NEARER_MM - 0.01;
+	struct room room;
+
+	for (int kind = 0; kind < 2; kind++) {
+		enter(&room, kind ? capsule : plane, "double", &two);
+		/* Over the same place, where the capsule is as high as the plane. */
+		room.tube_mm[0] = 0;
+		assert_int_equal(held_at(&room, 60, 100), INCISE_TOOL_BLADE);
+		assert_int_equal(held_at(&room, 60, 60 - less), INCISE_TOOL_BLADE);
+		assert_int_equal(held_at(&room, 60, 60 - more), INCISE_TOOL_TUBE);
+		assert_int_equal(held_at(&room, 60, 60 + less), INCISE_TOOL_TUBE);
+		assert_int_equal(held_at(&room, 60, 60 + more), INCISE_TOOL_BLADE);
+		/* The scalpel's other end counts as well. */
+		room.turn = M_PI;
+		assert_int_equal(held_at(&room, 150, 30 - less), INCISE_TOOL_HANDLE);
+		assert_int_equal(held_at(&room, 150, 30 - more), INCISE_TOOL_TUBE);
+		leave(&room);
+	}
+}
+
+/* A tool that is asked for by name is held wherever the other one is. */
+static void test_by_name(void **state)
+{
+	struct room room;
+
+	enter(&room, plane, "double", &two);
+	incise_plan_set_tool(room.plan, INCISE_TOOL_BLADE);
+	assert_int_equal(held_at(&room, 60, 10), INCISE_TOOL_BLADE);
+	incise_plan_set_tool(room.plan, INCISE_TOOL_HANDLE);
+	assert_int_equal(held_at(&room, 60, 10), INCISE_TOOL_HANDLE);
+	incise_plan_set_tool(room.plan, INCISE_TOOL_TUBE);
+	assert_int_equal(held_at(&room, 10, 60), INCISE_TOOL_TUBE);
+	incise_plan_set_tool(room.plan, INCISE_TOOL_AUTO);
+	assert_int_equal(held_at(&room, 10, 60), INCISE_TOOL_BLADE);
+	leave(&room);
+}
+
+/* In the tissue the held one stays, however near the other comes. */
+static void test_no_change_in_the_tissue(void **state)
+{
+	struct room room;
+
+	enter(&room, plane, "double", &two);
+	assert_int_equal(held_at(&room, 60, 100), INCISE_TOOL_BLADE);
+	assert_int_equal(held_at(&room, -3, 100), INCISE_TOOL_BLADE);
+	assert_true(room.tick.flags & INCISE_TICK_CONTACT);
+	assert_int_equal(held_at(&room, -3, -20), INCISE_TOOL_BLADE);
+	/* Out, the tube is there. */
+	assert_int_equal(held_at(&room, 60, -20), INCISE_TOOL_TUBE);
+	assert_int_equal(room.tick.phase, INCISE_PHASE_INSERTION);
+	assert_true(size(room.tick.command_N) > 1);
+	assert_int_equal(held_at(&room, -40, -20), INCISE_TOOL_TUBE);
+	leave(&room);
+}
+
+/* A silent station takes its own tool away, and not the other's. */
+static void test_silence(void **state)
+{
+	struct room room;
+
+	enter(&room, plane, "double", &two);
+	assert_int_equal(held_at(&room, 60, 10), INCISE_TOOL_TUBE);
+	room.tube_silent = true;
+	assert_int_equal(held_at(&room, 60, 10), INCISE_TOOL_BLADE);
+	assert_false(room.tick.flags & INCISE_TICK_STALE);
+	room.tube_silent = false;
+	assert_int_equal(held_at(&room, 60, 10), INCISE_TOOL_TUBE);
+	assert_int_equal(held_at(&room, 60, -8), INCISE_TOOL_TUBE);
+	assert_true(size(room.tick.command_N) > 1);
+	/* The scalpel's silence does not matter to the tube … */
+	room.scalpel_silent = true;
+	assert_int_equal(held_at(&room, 60, -8), INCISE_TOOL_TUBE);
+	assert_false(room.tick.flags & INCISE_TICK_STALE);
+	assert_true(size(room.tick.command_N) > 1);
+	/* … and without either there is no force. */
+	room.tube_silent = true;
+	held_at(&room, 60, -8);
+	assert_true(room.tick.flags & INCISE_TICK_STALE);
+	assert_true(size(room.tick.command_N) == 0);
+	/* A tube by name waits for its station. */
+	room.scalpel_silent = false;
+	incise_plan_set_tool(room.plan, INCISE_TOOL_TUBE);
+	assert_int_equal(held_at(&room, -3, -8), INCISE_TOOL_TUBE);
+	assert_true(room.tick.flags & INCISE_TICK_STALE);
+	assert_true(size(room.tick.command_N) == 0);
+	leave(&room);
+}
+
+/* A blade that goes silent in the tissue, with the tube at hand: the tube. */
+static void test_silence_in_the_tissue(void **state)
+{
+	struct room room;
+
+	enter(&room, plane, "double", &two);
+	held_at(&room, 60, 100);
+	assert_int_equal(held_at(&room, -5, 100), INCISE_TOOL_BLADE);
+	assert_true(size(room.tick.command_N) > 0.5);
+	room.scalpel_silent = true;
+	assert_int_equal(held_at(&room, -5, 100), INCISE_TOOL_TUBE);
+	assert_false(room.tick.flags & INCISE_TICK_STALE);
+	room.scalpel_silent = false;
+	assert_int_equal(held_at(&room, -5, 100), INCISE_TOOL_BLADE);
+	assert_true(size(room.tick.command_N) > 0.5);
+	leave(&room);
+}
+
+/* --- continuity -------------------------------------------------------------------------- */
+
+struct seen {
+	int changes, in_tissue, held[INCISE_TOOL_TUBE + 1], loaded[INCISE_TOOL_TUBE + 1];
+};
+
+static double draw(uint64_t *random, double least, double most)
+{
+	return least + (most - least) * (incise_random_symmetric(random) + 1) / 2;
+}
+
+/* Sums of sines with phases of their own: in and out of the tissue, turned round now and then. */
+static void move(struct room *room, const double phase[8])
+{
+	double t = (double)room->t_ns * 1e-9;
+
+	room->scalpel_mm[0] = 15 * sin(0.7 * t + phase[0]);
+	room->scalpel_mm[1] = 8 * sin(1.1 * t + phase[1]);
+	room->scalpel_mm[2] = 4 + 9 * sin(1.9 * t + phase[2]) + 6 * sin(5 * t + phase[3]);
+	room->turn = M_PI / 2 * (1 + tanh(4 * sin(0.4 * t + phase[4])));
+	/* Turned round, the handle's end is where the tip was. */
+	room->scalpel_mm[1] += 120 * sin(room->turn / 2) * sin(room->turn);
+	room->scalpel_mm[2] += 60 * (1 - cos(room->turn));
+	room->tube_mm[0] = 10 * sin(0.5 * t + phase[5]);
+	room->tube_mm[1] = 5 * sin(0.9 * t + phase[6]);
+	room->tube_mm[2] = 12 + 22 * sin(0.8 * t + phase[7]);
+}
+
+static void watch(const struct incise_tick *was, const struct incise_tick *tick,
+		  struct seen *seen)
+{
+	bool changed = was->tool != tick->tool;
+
+	seen->held[tick->tool]++;
+	seen->loaded[tick->tool] += size(tick->command_N) > 0.5;
+	if (!changed)
+		return;
+	seen->changes++;
+	if (was->phase == INCISE_PHASE_FREE && !(was->flags & INCISE_TICK_STALE))
+		return;
+	/* It was in the tissue, or may have been when the poses ended. */
+	seen->in_tissue += was->phase != INCISE_PHASE_FREE;
+	assert_true(size(was->command_N) == 0);
+}
+
+/* Words, silences and places at random; a second run with a tube that has no station. */
+static void run_at_random(const char *scene, const char *arithmetic, bool station,
+			  uint64_t random, struct seen *seen)
+{
+	struct incise_tracker_info tracker = two;
+	double phase[8];
+	struct room room;
+
+	if (!station)
+		tracker.tube_station = 0;
+	enter(&room, scene, arithmetic, &tracker);
+	for (int i = 0; i < 8; i++)
+		phase[i] = draw(&random, 0, 2 * M_PI);
+	for (int i = 0; i < 40000; i++) {
+		struct incise_tick was = room.tick;
+
+		if (draw(&random, 0, 300) < 1)
+			incise_plan_set_tool(room.plan,
+					     (enum incise_tool)draw(&random, 0, 4));
+		if (draw(&random, 0, 1500) < 1)
+			room.tube_silent = !room.tube_silent;
+		if (draw(&random, 0, room.scalpel_silent ? 200 : 3000) < 1)
+			room.scalpel_silent = !room.scalpel_silent;
+		move(&room, phase);
+		step(&room);
+		if (i)
+			watch(&was, &room.tick, seen);
+	}
+	leave(&room);
+}
+
+static void test_continuous(void **state)
+{
+	static const char *const scenes[] = {plane, capsule};
+	static const char *const arithmetics[] = {"fixed", "double"};
+
+	for (int i = 0; i < 8; i++) {
+		struct seen seen = {0};
+
+		run_at_random(scenes[i & 1], arithmetics[i >> 1 & 1], i & 4,
+			      (uint64_t)i + 1, &seen);
+		/* It was about something. */
+		assert_true(seen.changes > 20 && seen.in_tissue > 5);
+		for (int tool = INCISE_TOOL_BLADE; tool <= INCISE_TOOL_TUBE; tool++)
+			if (seen.held[tool] < 1000 || seen.loaded[tool] < 100)
+				fail_msg(
+					"run %d: tool %d for %d ticks, %d of them in tissue",
+					i, tool, seen.held[tool], seen.loaded[tool]);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_stations_share_the_rate),
+		cmocka_unit_test(test_other_stations),
+		cmocka_unit_test(test_no_tube_without_insertion),
+		cmocka_unit_test(test_tip_is_the_scalpels),
+		cmocka_unit_test(test_nearer_tool),
+		cmocka_unit_test(test_by_name),
+		cmocka_unit_test(test_no_change_in_the_tissue),
+		cmocka_unit_test(test_silence),
+		cmocka_unit_test(test_silence_in_the_tissue),
+		cmocka_unit_test(test_continuous),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
