@@ -10,7 +10,8 @@ import sys
 
 NAME = re.compile(r'[a-zA-Z_:][a-zA-Z0-9_:]*')
 LABEL = re.compile(r'([a-zA-Z_][a-zA-Z0-9_]*)="((?:[^"\\\n]|\\[\\"n])*)"')
-UNITS = ('_seconds', '_hertz', '_newtons', '_joules', '_total', '_info', '_alive', '_state')
+UNITS = ('_seconds', '_hertz', '_newtons', '_joules', '_total', '_info', '_alive', '_state',
+         '_tool')
 TYPES = ('counter', 'gauge', 'histogram')
 
 

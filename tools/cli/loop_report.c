@@ -7,6 +7,8 @@
 #include <string.h>
 #include "loop_report.h"
 
+const char *const loop_tool_names[] = {"auto", "blade", "handle", "tube", NULL};
+
 const char *const loop_flag_names[INCISE_TICK_FLAGS] = {
 	"contact",  "extrapolated", "stale",	 "clamped",    "fault",	   "slewed",
 	"travel",   NULL,	    "starting",	 "not_finite", "unusable", "in_cut",

@@ -9,6 +9,9 @@
 #include "json.h"
 
 /* As JSON names them, from the lowest bit on. */
+/* By enum incise_tool; ends with NULL. */
+extern const char *const loop_tool_names[];
+
 extern const char *const loop_flag_names[INCISE_TICK_FLAGS]; /* NULL: never set */
 
 /*

@@ -77,6 +77,14 @@ static void put_state(FILE *out, loop *l, const char *metric)
 	put_count(out, l, metric, "state", "dead", !strcmp(word, "dead"));
 }
 
+/* Before the first tick none is held. */
+static void put_tool(FILE *out, loop *l, const char *metric)
+{
+	for (int i = INCISE_TOOL_BLADE; loop_tool_names[i]; i++)
+		put_count(out, l, metric, "tool", loop_tool_names[i],
+			  l->now->ticks && (int)l->now->tick.tool == i);
+}
+
 static void put_info(FILE *out, loop *l, const char *metric)
 {
 	fprintf(out, "%s{", metric);
@@ -169,6 +177,8 @@ static const struct {
 	 .put = put_alive},
 	{"incise_loop_state", "gauge", "1 for the state that the loop is in.",
 	 .put = put_state},
+	{"incise_loop_tool", "gauge", "1 for the tool that the hand holds.",
+	 .put = put_tool},
 	{"incise_loop_start_time_seconds", "gauge",
 	 "When the loop was started, UNIX time.", .put = put_start},
 	{"incise_loop_rate_hertz", "gauge", "Rate asked for.", .kind = REAL,

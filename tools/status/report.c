@@ -205,6 +205,7 @@ static void ticks(FILE *out, const struct state_look *look)
 	times(out, "lateness", &now->lateness, now->lateness_max_ns);
 	times(out, "tick", &now->cost, now->cost_max_ns);
 	flags(out, now);
+	fprintf(out, "tool       %s\n", loop_tool_names[now->tick.tool]);
 	fprintf(out,
 		"force      %.3f N now, %.3f N at most, limited in %" PRIu64 " ticks\n",
 		now->force_N, now->force_max_N, now->limited);
@@ -241,10 +242,11 @@ void state_report_line(FILE *out, const struct state_look *look)
 	fprintf(out,
 		", %" PRIu64 " ticks, %" PRIu64
 		" skipped, late 99.9 %% %.3g max %.1f us, "
-		"%.3f N, %.2f mm, %s",
+		"%.3f N, %.2f mm, %s, %s",
 		now->ticks, now->skipped,
 		quantile_us(&now->lateness, 0.999, now->lateness_max_ns),
 		(double)now->lateness_max_ns * 1e-3, now->force_N, now->tick.depth_mm,
+		loop_tool_names[now->tick.tool],
 		loop_flags_text(now->tick.flags, letters));
 	fprintf(out, "%s%s\n", *now->reason ? ": " : "", now->reason);
 }
@@ -303,6 +305,9 @@ static void add_tick_json(json_t *report, const struct incise_state_now *now)
 				       now->lateness_max_ns));
 	json_object_set_new(report, "tick_us",
 			    times_json(&now->cost, now->cost_sum_ns, now->cost_max_ns));
+	json_object_set_new(report, "tool",
+			    now->ticks ? json_string(loop_tool_names[now->tick.tool])
+				       : json_null());
 	json_set_number(report, "force_N", now->force_N);
 	json_set_number(report, "force_max_N", now->force_max_N);
 	json_set_number(report, "depth_mm", now->tick.depth_mm);
