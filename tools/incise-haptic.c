@@ -31,7 +31,6 @@ struct job {
 	struct procedure procedure; /* scripted */
 };
 
-static const char *const tools[] = {"auto", "blade", "handle", "tube", NULL};
 static const char *const policies[] = {"fifo", "deadline", NULL};
 
 static const struct cli_option options[] = {
@@ -42,9 +41,11 @@ static const struct cli_option options[] = {
 	 CLI_INPUT(struct job, calibration)},
 	SCENE_ARGUMENT_OPTIONS(struct job, haptic.argument),
 	{0, "tool", "KIND",
-	 "what the hand holds: auto (blade or handle, by the scalpel's turn), blade,\n"
-	 "handle or tube (default: auto)",
-	 CLI_CHOICE(struct job, haptic.tool, tools, "auto, blade, handle, tube")},
+	 "what the hand holds at first: auto (blade or handle, by the scalpel's turn, or\n"
+	 "a tube with a station of its own), blade, handle or tube (default: auto); on a\n"
+	 "terminal the keys a, b, h, t change it",
+	 CLI_CHOICE(struct job, haptic.tool, loop_tool_names,
+		    "auto, blade, handle, tube")},
 	{0, "procedure", NULL,
 	 "on the virtual rig, in simulated time: a script cuts, enlarges the cut and\n"
 	 "inserts a tube",
@@ -176,7 +177,7 @@ static void open_state(struct job *job, bool real)
 	if (!haptic->state)
 		fail(job, &err);
 	haptic->loop.state = haptic->state;
-	free(path);
+	haptic->page = path;
 	incise_state_scene(haptic->state, haptic->argument.path, haptic->plan);
 }
 
@@ -281,6 +282,7 @@ static void finish(struct job *job)
 	incise_scene_free(haptic->scene);
 	incise_realtime_free(haptic->realtime);
 	free(haptic->loop.log);
+	free(haptic->page);
 }
 
 /* --- the actuators --------------------------------------------------------------------- */

@@ -100,6 +100,10 @@ _incise()
 	else
 		((COMP_CWORD > 2)) || words=$(_incise_words "$program" "$verb")
 		[[ $verb != status ]] || words="FILE $(_incise_loops)"
+		if [[ $verb == tool ]]; then
+			words="FILE $(_incise_loops)"
+			((COMP_CWORD == 2)) || words="blade handle tube auto"
+		fi
 		[[ $words != *FILE* ]] || _incise_files "$word"
 		mapfile -t -O "${#COMPREPLY[@]}" COMPREPLY < <(compgen -W \
 			"${words//FILE/}" -- "$word")

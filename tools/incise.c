@@ -33,6 +33,7 @@ static const struct {
 	{"plan", "show what a scene runs and what it leaves out"},
 	{"haptic", "run the real-time loop of a scene"},
 	{"status", "say what the loops on this machine do, or did last"},
+	{"tool", "set or print the tool in the hand of a running loop"},
 	{"view", "show a scene: tissue, wound, blood, instrument"},
 	{"assess", "report what happened in sessions, against criteria"},
 	{"replay", "run the loop on a recording, predicted beside measured"},

@@ -23,7 +23,7 @@ complete_words() {
 
 @test "verbs are completed" {
 	complete_words incise ""
-	for verb in capture verify export train eval info haptic status view assess replay bench demo help; do
+	for verb in capture verify export train eval info haptic status tool view assess replay bench demo help; do
 		[[ " ${COMPREPLY[*]} " == *" $verb "* ]]
 	done
 	complete_words incise tr
@@ -39,7 +39,7 @@ complete_words() {
 	[ "${COMPREPLY[*]}" = "--mf --mf-type" ]
 	complete_words incise haptic --lo
 	[ "${COMPREPLY[*]}" = --log ]
-	for verb in capture verify export train eval info haptic status assess replay stepper bench demo; do
+	for verb in capture verify export train eval info haptic status tool assess replay stepper bench demo; do
 		complete_words incise "$verb" --
 		for option in "${COMPREPLY[@]}"; do
 			"incise-$verb" --help | grep -qE -- "^ .*$option( |\$)"
@@ -73,6 +73,12 @@ complete_words() {
 	export XDG_RUNTIME_DIR=$PWD/run
 	complete_words incise status ne
 	[ "${COMPREPLY[*]}" = "nest.state neck" ]
+	complete_words incise tool ne
+	[ "${COMPREPLY[*]}" = "nest.state neck" ]
+	complete_words incise tool neck ""
+	[ "${COMPREPLY[*]}" = "blade handle tube auto" ]
+	complete_words incise tool neck tu
+	[ "${COMPREPLY[*]}" = tube ]
 }
 
 @test "what bench measures is completed" {

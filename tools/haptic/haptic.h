@@ -26,6 +26,7 @@ struct haptic {
 	const char *scheduling;		   /* "SCHED_FIFO 80" */
 	struct incise_state_writer *state; /* or NULL */
 	struct session_log *session;	   /* or NULL */
+	char *page;			   /* its path; or NULL */
 	struct incise_realtime_counts
 		counts; /* of the loop's thread, from the first tick */
 };

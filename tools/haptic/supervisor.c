@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * The loop's thread, and the supervisor of a normal priority: log, state page, service manager,
- * watchdog, another scene at SIGHUP.
+ * watchdog, another scene at SIGHUP, another tool.
  *
  *   loop      tick tick tick tick …          (real time; no lock, no file, no log)
  *               │ control: events, ticks, plans        │ state page
  *   supervisor  └─▶ log, sd_notify, watchdog, reload   └─▶ incise status, incise view …
+ *       ▲
+ *       └── control socket, keys: the tool
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -26,7 +28,10 @@
 #include <unistd.h>
 #include <incise/export.h>
 #include "../cli/cli.h"
+#include "../cli/loop_report.h"
+#include "control.h"
 #include "haptic.h"
+#include "keys.h"
 
 /*
  * --- the service manager ---------------------------------------------------------------
@@ -122,6 +127,9 @@ struct supervisor {
 	struct incise_scene *next_scene;
 	struct incise_plan *next_plan;
 
+	struct control *control; /* or NULL */
+	bool keys;		 /* are read from the terminal */
+
 	bool ready, stopping;
 	uint64_t fed_ticks; /* when the watchdog was last fed */
 	uint64_t reported_ticks;
@@ -130,7 +138,7 @@ struct supervisor {
 	bool stale;
 	bool flags_reported[256]; /* of poses */
 	char refused[530];	  /* reason of the last refused reload, or "" */
-	int64_t report_ns, feed_ns, watchdog_ns;
+	int64_t look_ns, report_ns, feed_ns, watchdog_ns;
 };
 
 /* --- the loop's thread ------------------------------------------------------------------ */
@@ -171,8 +179,13 @@ static int start_thread(struct supervisor *s, struct incise_error *err)
 	sigset_t all, before;
 	int rc;
 
-	/* The supervisor handles signals: in the loop they would make ticks late. */
+	/*
+	 * The supervisor handles signals: in the loop they would make ticks late. Those of a
+	 * fault it cannot: blocked, they kill without a handler, which restores the terminal.
+	 */
 	sigfillset(&all);
+	for (const int *fault = keys_faults; *fault; fault++)
+		sigdelset(&all, *fault);
 	pthread_sigmask(SIG_SETMASK, &all, &before);
 	rc = pthread_create(&s->thread, NULL, run_loop, s);
 	pthread_sigmask(SIG_SETMASK, &before, NULL);
@@ -294,6 +307,80 @@ static void end_reload(struct supervisor *s)
 	notify_send("READY=1");
 }
 
+/* --- the tool ---------------------------------------------------------------------------- */
+
+/* The reason why the scene has only the blade; NULL: it has every tool. */
+static const char *only_blade(const struct haptic *haptic)
+{
+	const char *why = NULL, *stage;
+
+	for (int i = 0; (stage = incise_plan_left_out(haptic->plan, i, &why)); i++)
+		if (!strcmp(stage, "tool"))
+			return why;
+	return NULL;
+}
+
+/* Returns the reason why not; NULL: the loop takes it at its next tick. */
+static const char *order_tool(struct supervisor *s, enum incise_tool tool)
+{
+	const char *why = only_blade(s->haptic);
+
+	if (why && tool != INCISE_TOOL_AUTO && tool != INCISE_TOOL_BLADE)
+		return why;
+	/* For a plan that is read later, too. */
+	s->haptic->tool = tool;
+	incise_loop_control_set_tool(s->haptic->loop.control, tool);
+	return NULL;
+}
+
+/* "tool", or "tool NAME". */
+static void answer(void *context, const char *request, char reply[CONTROL_LINE])
+{
+	struct supervisor *s = context;
+	const char *name = request + strlen("tool"), *why = NULL;
+	int tool = 0;
+
+	if (strncmp(request, "tool", strlen("tool")) || (*name && *name != ' ')) {
+		snprintf(
+			reply, CONTROL_LINE,
+			"error unknown request; expected: tool [blade|handle|tube|auto]");
+		return;
+	}
+	while (*name && loop_tool_names[tool] && strcmp(name + 1, loop_tool_names[tool]))
+		tool++;
+	if (!loop_tool_names[tool]) {
+		snprintf(reply, CONTROL_LINE,
+			 "error unknown tool; expected blade, handle, tube or auto");
+		return;
+	}
+	if (*name)
+		why = order_tool(s, (enum incise_tool)tool);
+	if (why)
+		snprintf(reply, CONTROL_LINE, "error the scene has only the blade: %s",
+			 why);
+	else
+		snprintf(reply, CONTROL_LINE, "ok held=%s wanted=%s",
+			 loop_tool_names[incise_loop_control_tool(
+				 s->haptic->loop.control)],
+			 loop_tool_names[s->haptic->tool]);
+}
+
+static void take_key(struct supervisor *s)
+{
+	int tool = keys_read();
+	const char *why;
+
+	if (tool < 0)
+		return;
+	why = order_tool(s, (enum incise_tool)tool);
+	if (why) {
+		cli_warn("the scene has only the blade: %s", why);
+		return;
+	}
+	cli_progress_end();
+	fprintf(stderr, "tool: %s\n", loop_tool_names[tool]);
+}
+
 /* --- log and status --------------------------------------------------------------------- */
 
 /* Once for each flag: a tracker may set one and take it back many times a second. */
@@ -341,6 +428,9 @@ static void handle_events(struct supervisor *s)
 				report_flag(s, (char)events[i].value);
 				break;
 			case INCISE_LOOP_TOOL:
+				cli_note("the hand holds the %s",
+					 loop_tool_names[(int)events[i].value]);
+				break;
 			case INCISE_LOOP_PLAN:
 				break;
 			}
@@ -411,6 +501,9 @@ static void look(struct supervisor *s)
 	}
 	if (cli_stop && !s->stopping) {
 		s->stopping = true;
+		/* A second signal kills. */
+		keys_close();
+		s->keys = false;
 		incise_state_run(s->haptic->state, INCISE_RUN_STOPPING,
 				 strsignal(cli_stop));
 		notify_send("STOPPING=1\nSTATUS=the force fades");
@@ -436,15 +529,63 @@ static void settle(struct supervisor *s)
 	free_next(s);
 }
 
+/*
+ * Wait for the loop's end, an order, or the time to look. Orders come in between, and however many
+ * there are, look() goes on. Returns false when the loop has ended.
+ */
+static bool wait_for_orders(struct supervisor *s)
+{
+	struct pollfd polled[2 + CONTROL_POLLED] = {
+		{.fd = s->ended_fd, .events = POLLIN},
+		/* One that is negative is passed over. */
+		{.fd = s->keys && keys_here() ? STDIN_FILENO : -1, .events = POLLIN},
+	};
+	int n = 2, ready;
+
+	if (s->control)
+		n += control_polled(s->control, polled + n);
+	ready = poll(polled, (nfds_t)n, LOOK_MS);
+	if (ready > 0 && polled[0].revents)
+		return false;
+	if (ready > 0 && s->control)
+		control_serve(s->control, polled + 2, answer, s);
+	if (ready > 0 && polled[1].revents)
+		take_key(s);
+	if (ready <= 0 || incise_clock_now(s->time) >= s->look_ns) {
+		look(s);
+		s->look_ns = incise_clock_now(s->time) + LOOK_MS * 1000000LL;
+	}
+	return true;
+}
+
+static void open_orders(struct supervisor *s)
+{
+	struct incise_error err = {0};
+
+	s->keys = keys_open();
+	if (!s->haptic->page)
+		return;
+	s->control = control_new(s->haptic->page, &err);
+	if (!s->control)
+		cli_warn("there is no control socket: %s", err.text);
+}
+
+static void close_orders(struct supervisor *s)
+{
+	keys_close();
+	control_free(s->control);
+}
+
 static int supervise(struct supervisor *s, struct incise_error *err)
 {
-	struct pollfd ended = {.fd = s->ended_fd, .events = POLLIN};
 	int rc = start_thread(s, err);
 
 	if (rc)
 		return rc;
-	while (poll(&ended, 1, LOOK_MS) <= 0)
-		look(s);
+	open_orders(s);
+	while (wait_for_orders(s))
+		continue;
+	close_orders(s);
 	pthread_join(s->thread, NULL);
 	settle(s);
 	if (s->rc)

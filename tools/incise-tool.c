@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise tool: the tool of a running loop, by its control socket; see haptic/control.h.
+ */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <time.h>
+#include <unistd.h>
+#include "cli/cli.h"
+#include "cli/json.h"
+#include "haptic/control.h"
+#include "status/pages.h"
+
+struct job {
+	bool json;
+};
+
+static const struct cli_option options[] = {
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
+	{0},
+};
+
+static const struct cli_command command = {
+	.name = "tool",
+	.synopsis = "LOOP [blade|handle|tube|auto] [OPTIONS]",
+	.summary =
+		"Set the tool that the hand holds in a running haptic loop, or print it. The force\n"
+		"fades out before a tool in the tissue changes, and comes back with a ramp.",
+	.options = options,
+	.notes =
+		"LOOP is the name of a scene, or the file of a state page, as for incise status.\n"
+		"auto is blade or handle by the scalpel's turn, and a tube with a station of its\n"
+		"own while it is nearer to the tissue.\n\n"
+		"Example:\n  incise tool neck tube\n\n"
+		"Exit: 0 the loop took it, 1 failed, 2 bad usage. See incise-tool(1).",
+};
+
+static bool is_tool(const char *name)
+{
+	static const char *const tools[] = {"blade", "handle", "tube", "auto"};
+
+	for (size_t i = 0; i < sizeof(tools) / sizeof(*tools); i++)
+		if (!strcmp(name, tools[i]))
+			return true;
+	return false;
+}
+
+/* A loop that lives answers at its next look, within 0.1 s. */
+#define PATIENCE_S 2
+
+/* Longest wait for the tool to be in the hand: the force fades before. */
+#define FADE_LOOKS 50
+#define LOOK_NS 20000000
+
+static struct {
+	const char *name, *user;
+	char *path;
+	int fd;
+} loop;
+
+static _Noreturn void fail_to_connect(int code)
+{
+	switch (code) {
+	case ENOENT:
+		cli_fail("%s: its loop has no control socket: %s is missing; start it "
+			 "again",
+			 loop.name, loop.path);
+	case ECONNREFUSED:
+		cli_fail("%s: nobody listens at %s: its loop has just ended; start it "
+			 "again",
+			 loop.name, loop.path);
+	case EACCES:
+	case EPERM:
+		cli_fail("%s: %s is for user %s, and in /run/incise for the group "
+			 "incise: run as one of them",
+			 loop.name, loop.path, loop.user);
+	default:
+		cli_fail("%s: %s: %s", loop.name, loop.path, strerror(code));
+	}
+}
+
+static void open_socket(void)
+{
+	const struct timeval patience = {.tv_sec = PATIENCE_S};
+	struct sockaddr_un address = {.sun_family = AF_UNIX};
+
+	if (strlen(loop.path) >= sizeof(address.sun_path))
+		fail_to_connect(ENAMETOOLONG);
+	strcpy(address.sun_path, loop.path);
+	loop.fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
+	if (loop.fd < 0)
+		fail_to_connect(errno);
+	setsockopt(loop.fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+	setsockopt(loop.fd, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof(patience));
+	if (connect(loop.fd, (struct sockaddr *)&address, sizeof(address)))
+		fail_to_connect(errno);
+}
+
+/* Send a request, and take the tool that is held and the one that is wanted. */
+static void ask(const char *request, char held[CONTROL_LINE], char wanted[CONTROL_LINE])
+{
+	char reply[CONTROL_LINE + 1];
+	ssize_t n = -1;
+
+	if (send(loop.fd, request, strlen(request), MSG_NOSIGNAL) >= 0)
+		n = recv(loop.fd, reply, CONTROL_LINE, 0);
+	if (n < 0 && errno != EAGAIN)
+		cli_fail("%s: %s: %s", loop.name, loop.path, strerror(errno));
+	if (n <= 0)
+		cli_fail("%s: its loop does not answer%s", loop.name,
+			 n ? "" : ": it has ended, or too many programs ask it at once");
+	reply[n] = 0;
+	reply[strcspn(reply, "\n")] = 0;
+	if (!strncmp(reply, "error ", strlen("error ")))
+		cli_fail("%s: %s", loop.name, reply + strlen("error "));
+	/* Both arrays are as long as a reply. */
+	if (sscanf(reply, "ok held=%255[a-z] wanted=%255[a-z]", held, wanted) != 2)
+		cli_fail("%s: its loop answers '%s': it is of another version of incise",
+			 loop.name, reply);
+}
+
+/* Find the loop as incise status does: it must live. */
+static void find_loop(struct state_pages *pages, const char *name)
+{
+	struct incise_state_now *now = cli_alloc(1, sizeof(*now));
+
+	state_pages_open(pages, name);
+	state_pages_look(pages->page, now);
+	loop.name = pages->page->name;
+	loop.user = pages->page->user;
+	loop.path = control_path(pages->page->path);
+	if (!now->alive)
+		cli_fail("%s: no loop of that name runs; 'incise status %s' says how it "
+			 "ended",
+			 loop.name, name);
+	free(now);
+}
+
+static void set_tool(const char *tool, char held[CONTROL_LINE], char wanted[CONTROL_LINE])
+{
+	const struct timespec pause = {.tv_nsec = LOOK_NS};
+	char *request = cli_text("tool %s", tool);
+
+	ask(request, held, wanted);
+	free(request);
+	/* The loop takes it at its next tick, and for auto that is all. */
+	for (int i = 0; i < FADE_LOOKS; i++) {
+		nanosleep(&pause, NULL);
+		ask("tool", held, wanted);
+		if (!strcmp(wanted, "auto") || !strcmp(held, wanted))
+			break;
+	}
+}
+
+int main(int argc, char **argv)
+{
+	char held[CONTROL_LINE], wanted[CONTROL_LINE];
+	struct state_pages pages;
+	struct job job = {0};
+	int n;
+
+	cli_parse(&command, argc, argv, &job);
+	n = argc - optind;
+	if (n < 1 || n > 2)
+		cli_usage("expected the name of a loop, and a tool or none, got %d", n);
+	if (n == 2 && !is_tool(argv[optind + 1]))
+		cli_usage("'%s' is no tool: expected blade, handle, tube or auto",
+			  argv[optind + 1]);
+	find_loop(&pages, argv[optind]);
+	open_socket();
+	if (n == 2)
+		set_tool(argv[optind + 1], held, wanted);
+	else
+		ask("tool", held, wanted);
+	if (job.json)
+		json_print(json_pack("{ss ss ss}", "loop", loop.name, "tool", held,
+				     "wanted", wanted));
+	else if (!strcmp(held, wanted))
+		printf("%s: %s\n", loop.name, held);
+	else
+		printf("%s: %s (%s)\n", loop.name, held, wanted);
+	close(loop.fd);
+	free(loop.path);
+	state_pages_close(&pages);
+	cli_finish();
+	return 0;
+}
