@@ -28,6 +28,8 @@ struct incise_rig {
 	double point_mm[3], normal[3];
 	struct incise_vision_setup vision;
 	bool has_vision;
+	struct incise_foot_switch_setup foot_switch;
+	bool has_foot_switch;
 };
 
 static void *rig_open_sim(struct incise_rig *rig, int slot)
@@ -125,6 +127,8 @@ static struct incise_rig *rig_new(const struct incise_rig_plan *plan, const char
 	memcpy(rig->direction, plan->direction, sizeof(rig->direction));
 	rig->vision = plan->vision;
 	rig->has_vision = plan->has_vision;
+	rig->foot_switch = plan->foot_switch;
+	rig->has_foot_switch = plan->has_foot_switch;
 	rig->spec = strdup(spec);
 	rig->clock = plan->simulated ? incise_clock_new_simulated(SIM_START_NS)
 				     : incise_clock_new_real();
@@ -247,5 +251,14 @@ int incise_rig_vision(const struct incise_rig *rig, struct incise_vision_setup *
 	if (!rig->has_vision)
 		return -ENOENT;
 	*setup = rig->vision;
+	return 0;
+}
+
+int incise_rig_foot_switch(const struct incise_rig *rig,
+			   struct incise_foot_switch_setup *setup)
+{
+	if (!rig->has_foot_switch)
+		return -ENOENT;
+	*setup = rig->foot_switch;
 	return 0;
 }

@@ -320,6 +320,42 @@ static int read_vision_setup(struct incise_vision_setup *setup, bool *given,
 	return rc ? rc : read_roi(group, path, &setup->roi, err);
 }
 
+/* Both keys must be there: no device is meant by default. */
+static int read_foot_switch(struct incise_rig_plan *plan, const config_setting_t *root,
+			    const char *path, struct incise_error *err)
+{
+	static const char *const keys[] = {"device", "key", NULL};
+	struct incise_foot_switch_setup *setup = &plan->foot_switch;
+	const char *device = NULL, *key = NULL;
+	const config_setting_t *group;
+	int rc = group_of(root, "foot_switch", path, keys, &group, err), code;
+
+	if (rc || !group)
+		return rc;
+	rc = incise_conf_string(group, path, "device", &device, err);
+	if (!rc)
+		rc = incise_conf_string(group, path, "key", &key, err);
+	if (rc)
+		return rc;
+	if (!device || *device != '/' || strlen(device) >= sizeof(setup->device))
+		return incise_error_set(
+			err, EINVAL,
+			"%.200s:%d: foot_switch.device: expected the path of an input "
+			"device, such as \"/dev/input/by-id/…-event-kbd\"; correct it",
+			path, config_setting_source_line(group));
+	code = key ? incise_foot_switch_key(key) : -EINVAL;
+	if (code < 0)
+		return incise_error_set(
+			err, EINVAL,
+			"%.200s:%d: foot_switch.key: expected the name of a key, such as "
+			"\"b\"; rig.conf(5) lists them",
+			path, config_setting_source_line(group));
+	strcpy(setup->device, device);
+	setup->key = (uint16_t)code;
+	plan->has_foot_switch = true;
+	return 0;
+}
+
 #define SIM_BACKEND "sim"
 
 const char *const incise_kind_name[N_KINDS] = {"tracker", "force", "camera", "stepper"};
@@ -718,11 +754,11 @@ static bool virtual_camera(const config_setting_t *root)
 static int plan_root(struct incise_rig_plan *plan, const config_setting_t *root,
 		     const char *path, struct incise_error *err)
 {
-	static const char *const keys[] = {"clock",	  "tracker",	  "force",
-					   "camera",	  "stepper",	  "surface",
-					   "sim",	  "actuator",	  "tracker_setup",
-					   "force_setup", "camera_setup", "vision",
-					   NULL};
+	static const char *const keys[] = {
+		"clock",	 "tracker",	"force",	"camera",
+		"stepper",	 "surface",	"sim",		"actuator",
+		"tracker_setup", "force_setup", "camera_setup", "vision",
+		"foot_switch",	 NULL};
 	const char *clock = NULL;
 	char where[240];
 	int rc;
@@ -750,6 +786,8 @@ static int plan_root(struct incise_rig_plan *plan, const config_setting_t *root,
 		rc = read_camera_setup(&plan->camera, root, path, err);
 	if (!rc)
 		rc = read_vision_setup(&plan->vision, &plan->has_vision, root, path, err);
+	if (!rc)
+		rc = read_foot_switch(plan, root, path, err);
 	if (plan->devices & INCISE_RIG_IF_NAMED &&
 	    !config_setting_get_member(root, "camera"))
 		plan->devices &= ~INCISE_RIG_CAMERA;

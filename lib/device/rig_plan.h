@@ -9,6 +9,7 @@
 #include <incise/backend.h>
 #include <incise/camera.h>
 #include <incise/error.h>
+#include <incise/foot_switch.h>
 #include <incise/force.h>
 #include <incise/rig.h>
 #include <incise/sim.h>
@@ -55,6 +56,8 @@ struct incise_rig_plan {
 	struct incise_camera_setup camera;
 	struct incise_vision_setup vision;
 	bool has_vision; /* rig.conf has it, or the camera is the virtual one */
+	struct incise_foot_switch_setup foot_switch;
+	bool has_foot_switch;
 	struct incise_sim_config config;
 	double point_mm[3], normal[3];
 };

@@ -7,7 +7,7 @@
  *               │ control: events, ticks, plans        │ state page
  *   supervisor  └─▶ log, sd_notify, watchdog, reload   └─▶ incise status, incise view …
  *       ▲
- *       └── control socket, keys: the tool
+ *       └── control socket, keys, foot switch: the tool
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -27,6 +27,7 @@
 #include <time.h>
 #include <unistd.h>
 #include <incise/export.h>
+#include <incise/foot_switch.h>
 #include "../cli/cli.h"
 #include "../cli/loop_report.h"
 #include "control.h"
@@ -110,6 +111,7 @@ static int64_t notify_watchdog_ns(void)
 #define LOOK_MS 100
 #define KEPT_S 4 /* of ticks that wait for the session: 17 MB at 20 kHz */
 #define REPORT_NS INCISE_NS_PER_S
+#define FOOT_NS INCISE_NS_PER_S /* between tries to open the foot switch */
 
 static volatile sig_atomic_t reload_asked;
 
@@ -127,8 +129,11 @@ struct supervisor {
 	struct incise_scene *next_scene;
 	struct incise_plan *next_plan;
 
-	struct control *control; /* or NULL */
-	bool keys;		 /* are read from the terminal */
+	struct control *control;	 /* or NULL */
+	bool keys;			 /* are read from the terminal */
+	struct incise_foot_switch *foot; /* or NULL */
+	bool has_foot, foot_missed;	 /* the rig has one; which is not there */
+	int64_t foot_ns;		 /* next try to open it */
 
 	bool ready, stopping;
 	uint64_t fed_ticks; /* when the watchdog was last fed */
@@ -381,6 +386,52 @@ static void take_key(struct supervisor *s)
 	fprintf(stderr, "tool: %s\n", loop_tool_names[tool]);
 }
 
+/* Warn once; from then on it is looked for. */
+static void miss_foot(struct supervisor *s, const char *why)
+{
+	incise_foot_switch_close(s->foot);
+	s->foot = NULL;
+	if (!s->foot_missed)
+		cli_warn("there is no foot switch until it is back: %s", why);
+	s->foot_missed = true;
+}
+
+static void look_for_foot(struct supervisor *s, int64_t now_ns)
+{
+	struct incise_foot_switch_setup setup;
+	struct incise_error err = {0};
+
+	if (!s->has_foot || s->foot || now_ns < s->foot_ns)
+		return;
+	s->foot_ns = now_ns + FOOT_NS;
+	incise_rig_foot_switch(s->haptic->rig, &setup);
+	s->foot = incise_foot_switch_open(&setup, &err);
+	if (!s->foot) {
+		miss_foot(s, err.text);
+		return;
+	}
+	cli_note("foot switch: %s%s", setup.device, s->foot_missed ? " is back" : "");
+	s->foot_missed = false;
+}
+
+/* Each press: the tube, or auto again. */
+static void take_foot(struct supervisor *s)
+{
+	int presses = incise_foot_switch_read(s->foot);
+	const char *why;
+
+	if (presses < 0)
+		miss_foot(s, strerror(-presses));
+	if (presses <= 0 || presses % 2 == 0)
+		return;
+	why = order_tool(s, s->haptic->tool == INCISE_TOOL_TUBE ? INCISE_TOOL_AUTO
+								: INCISE_TOOL_TUBE);
+	if (why)
+		cli_warn("the scene has only the blade: %s", why);
+	else
+		cli_note("foot switch: %s", loop_tool_names[s->haptic->tool]);
+}
+
 /* --- log and status --------------------------------------------------------------------- */
 
 /* Once for each flag: a tracker may set one and take it back many times a second. */
@@ -509,6 +560,7 @@ static void look(struct supervisor *s)
 		notify_send("STOPPING=1\nSTATUS=the force fades");
 		cli_note("%s: the force fades", strsignal(cli_stop));
 	}
+	look_for_foot(s, now_ns);
 	end_reload(s);
 	if (reload_asked && s->ready)
 		start_reload(s);
@@ -535,22 +587,25 @@ static void settle(struct supervisor *s)
  */
 static bool wait_for_orders(struct supervisor *s)
 {
-	struct pollfd polled[2 + CONTROL_POLLED] = {
+	struct pollfd polled[3 + CONTROL_POLLED] = {
 		{.fd = s->ended_fd, .events = POLLIN},
 		/* One that is negative is passed over. */
 		{.fd = s->keys && keys_here() ? STDIN_FILENO : -1, .events = POLLIN},
+		{.fd = s->foot ? incise_foot_switch_fd(s->foot) : -1, .events = POLLIN},
 	};
-	int n = 2, ready;
+	int n = 3, clients = 0, ready;
 
 	if (s->control)
-		n += control_polled(s->control, polled + n);
-	ready = poll(polled, (nfds_t)n, LOOK_MS);
+		clients = control_polled(s->control, polled + n);
+	ready = poll(polled, (nfds_t)(n + clients), LOOK_MS);
 	if (ready > 0 && polled[0].revents)
 		return false;
 	if (ready > 0 && s->control)
-		control_serve(s->control, polled + 2, answer, s);
+		control_serve(s->control, polled + n, answer, s);
 	if (ready > 0 && polled[1].revents)
 		take_key(s);
+	if (ready > 0 && polled[2].revents)
+		take_foot(s);
 	if (ready <= 0 || incise_clock_now(s->time) >= s->look_ns) {
 		look(s);
 		s->look_ns = incise_clock_now(s->time) + LOOK_MS * 1000000LL;
@@ -560,9 +615,11 @@ static bool wait_for_orders(struct supervisor *s)
 
 static void open_orders(struct supervisor *s)
 {
+	struct incise_foot_switch_setup setup;
 	struct incise_error err = {0};
 
 	s->keys = keys_open();
+	s->has_foot = !incise_rig_foot_switch(s->haptic->rig, &setup);
 	if (!s->haptic->page)
 		return;
 	s->control = control_new(s->haptic->page, &err);
@@ -573,6 +630,7 @@ static void open_orders(struct supervisor *s)
 static void close_orders(struct supervisor *s)
 {
 	keys_close();
+	incise_foot_switch_close(s->foot);
 	control_free(s->control);
 }
 

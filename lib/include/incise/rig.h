@@ -19,6 +19,7 @@
 #include <incise/clock.h>
 #include <incise/error.h>
 #include <incise/export.h>
+#include <incise/foot_switch.h>
 #include <incise/force.h>
 #include <incise/stepper.h>
 #include <incise/tracker.h>
@@ -110,6 +111,14 @@ INCISE_API void incise_rig_surface(const struct incise_rig *rig, double point_mm
  */
 INCISE_API int incise_rig_vision(const struct incise_rig *rig,
 				 struct incise_vision_setup *setup);
+
+/**
+ * The group `foot_switch` of rig.conf, for incise_foot_switch_open(): the rig does not open it.
+ *
+ * @return 0; -ENOENT (there is no such group): *setup is unchanged
+ */
+INCISE_API int incise_rig_foot_switch(const struct incise_rig *rig,
+				      struct incise_foot_switch_setup *setup);
 
 INCISE_END_DECLS
 #endif

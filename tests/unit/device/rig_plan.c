@@ -171,7 +171,7 @@ static void file_refuses(void **state)
 		{"tracer = \"sim:\";", EINVAL,
 		 ":1: tracer: unknown key; expected one of clock, tracker, force, camera, "
 		 "stepper, surface, sim, actuator, "
-		 "tracker_setup, force_setup, camera_setup, vision"},
+		 "tracker_setup, force_setup, camera_setup, vision, foot_switch"},
 		{"sim = 1;", EINVAL,
 		 ":1: sim: expected a group { key = value; }; correct it"},
 		{"sim = {\n\nsede = 1; };", EINVAL,
@@ -457,6 +457,7 @@ static void without_groups_all_is_by_default(void **state)
 	assert_int_equal(all.tracker.n_stations, 1);
 	assert_int_equal(all.tracker.stations[0], 1);
 	assert_int_equal(all.tracker.tube_station, 0);
+	assert_false(all.has_foot_switch);
 	assert_true(all.tracker.hemisphere[0] == 1 && all.tracker.offset_mm[2] == 0);
 	assert_true(all.tracker.repeat_ms == 100);
 	assert_int_equal(all.tracker.sync, INCISE_TRACKER_INTERNAL);
@@ -495,7 +496,8 @@ static void all_keys_are_read(void **state)
 		    " format = \"grey\"; exposure_ms = 4.5; gain = 10;"
 		    " white_balance_K = 5000; focus = 7; };"
 		    "vision = { hue = [170, 10]; saturation = [80, 255]; value = [9, 9];"
-		    " full_px = 400.5; roi = [8192, 0, 16, 8192]; };",
+		    " full_px = 400.5; roi = [8192, 0, 16, 8192]; };"
+		    "foot_switch = { device = \"/dev/input/by-id/x-event-kbd\"; key = \"f2\"; };",
 		    &all, &err))
 		fail_msg("%s", err.text);
 	assert_int_equal(all.tracker.n_stations, 2);
@@ -517,6 +519,9 @@ static void all_keys_are_read(void **state)
 	assert_true(all.vision.saturation[0] == 80 && all.vision.saturation[1] == 255);
 	assert_true(all.vision.value[0] == 9 && all.vision.value[1] == 9);
 	assert_true(all.vision.full_px == 400.5 && all.vision.depth_mm_px == 0);
+	assert_true(all.has_foot_switch);
+	assert_string_equal(all.foot_switch.device, "/dev/input/by-id/x-event-kbd");
+	assert_int_equal(all.foot_switch.key, 60); /* KEY_F2 */
 	assert_true(all.vision.roi.x == 8192 && all.vision.roi.y == 0 &&
 		    all.vision.roi.width == 16 && all.vision.roi.height == 8192);
 }
@@ -564,6 +569,19 @@ static void what_is_wrong_is_said(void **state)
 		{"camera_setup = { format = \"h264\"; };", "rgb, grey, yuyv, mjpeg"},
 		{"camera_setup = { exposure_ms = 0; };", "exposure_ms"},
 		{"camera_setup = { zoom = 1; };", "zoom"},
+		{"foot_switch = \"b\";", "expected a group"},
+		{"foot_switch = { };",
+		 "rig.conf:1: foot_switch.device: expected the path"},
+		{"foot_switch = { device = \"event0\"; key = \"b\"; };",
+		 "foot_switch.device: expected the path"},
+		{"foot_switch = { device = \"/dev/input/event0\"; };",
+		 "rig.conf:1: foot_switch.key: expected the name of a key"},
+		{"foot_switch = { device = \"/dev/input/event0\"; key = \"pedal\"; };",
+		 "foot_switch.key: expected the name of a key"},
+		{"foot_switch = { device = \"/dev/input/event0\"; key = 48; };",
+		 "foot_switch.key"},
+		{"foot_switch = { device = \"/dev/x\"; key = \"b\"; grab = true; };",
+		 "grab"},
 		{"vision = 3;", "rig.conf:1: vision: expected a group"},
 		{"vision = { depth_mm_px = 0.1; };", "depth_mm_px"},
 		{"\nvision = { hue = [0, 180]; };",
