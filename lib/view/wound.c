@@ -661,9 +661,12 @@ static bool lift(struct wound *wound, struct wound_stroke *stroke)
 	return added;
 }
 
+/* Skin is under tension: a cut gapes, the deeper the wider, as far as skin is loose from what is below. */
+#define GAPES_TO_MM 6.0
+
 static float half_mm(double depth_mm)
 {
-	return (float)(0.20 + 0.13 * depth_mm);
+	return (float)(0.20 + 0.13 * fmin(depth_mm, GAPES_TO_MM));
 }
 
 /* The blade is in the tissue at this place. */
