@@ -184,10 +184,8 @@ static void test_two_threads(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_one_place),
-		cmocka_unit_test(test_events),
-		cmocka_unit_test(test_ticks),
-		cmocka_unit_test(test_tool),
+		cmocka_unit_test(test_one_place),   cmocka_unit_test(test_events),
+		cmocka_unit_test(test_ticks),	    cmocka_unit_test(test_tool),
 		cmocka_unit_test(test_two_threads),
 	};
 
