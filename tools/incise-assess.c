@@ -278,7 +278,9 @@ static struct cut_text cut_text(const struct session_cut *cut)
 	place_text(cut->from_mm, text.from, sizeof(text.from));
 	place_text(cut->to_mm, text.to, sizeof(text.to));
 	number_text(cut->length_mm, 1, text.length, sizeof(text.length));
-	number_text(cut->direction_deg, 0, text.direction, sizeof(text.direction));
+	/* The same line. */
+	number_text(cut->direction_deg < -89.5 ? 90 : cut->direction_deg, 0,
+		    text.direction, sizeof(text.direction));
 	number_text(cut->depth_mm, 1, text.depth, sizeof(text.depth));
 	number_text(cut->depth_median_mm, 1, text.median, sizeof(text.median));
 	number_text(cut->open_mm, 1, text.open, sizeof(text.open));

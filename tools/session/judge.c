@@ -60,23 +60,52 @@ void session_criterion_asked(int criterion, const struct incise_scene_criterion 
 		snprintf(text, size, "%g to %g", asked->min, asked->max);
 }
 
-/* Of the longest incision: its number is that of its first cut; -1: there is none. */
+static double apart_mm(const double a[3], const double b[3])
+{
+	return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
+		    (a[2] - b[2]) * (a[2] - b[2]));
+}
+
+/* Largest distance of an end of one cut from an end of the other one, or of its own. */
+static double reach_mm(const struct session_cut *a, const struct session_cut *b)
+{
+	return fmax(fmax(apart_mm(a->from_mm, b->from_mm),
+			 apart_mm(a->from_mm, b->to_mm)),
+		    fmax(apart_mm(a->to_mm, b->from_mm), apart_mm(a->to_mm, b->to_mm)));
+}
+
+/* From end to end, whatever crosses it. @first: number of its first cut */
+static double length_of(const struct session *session, int first)
+{
+	const struct session_cut *cut = session->cut;
+	double length_mm = 0;
+
+	for (int i = first; i < session->n_cuts; i++)
+		for (int k = i; cut[i].incision == first && k < session->n_cuts; k++)
+			if (cut[k].incision == first)
+				length_mm = fmax(length_mm, reach_mm(&cut[i], &cut[k]));
+	return length_mm;
+}
+
+/* The longest incision, by the number of its first cut; -1: there is none. @n: how many there are */
 static int longest(const struct session *session, double *length_mm, int *n)
 {
-	double sum_mm[SESSION_CUTS_MAX] = {0};
 	int best = -1;
 
 	*n = 0;
-	for (int i = 0; i < session->n_cuts; i++)
-		sum_mm[session->cut[i].incision] += session->cut[i].length_mm;
+	*length_mm = 0;
 	for (int i = 0; i < session->n_cuts; i++) {
+		double here_mm;
+
 		if (session->cut[i].incision != i)
 			continue;
 		++*n;
-		if (best < 0 || sum_mm[i] > sum_mm[best])
-			best = i;
+		here_mm = length_of(session, i);
+		if (best >= 0 && here_mm <= *length_mm)
+			continue;
+		best = i;
+		*length_mm = here_mm;
 	}
-	*length_mm = best < 0 ? 0 : sum_mm[best];
 	return best;
 }
 

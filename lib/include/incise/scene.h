@@ -136,7 +136,7 @@ INCISE_API bool incise_scene_membrane(const struct incise_scene *scene,
 
 /** The criteria of a session that a scene can have, in its group `criteria`. */
 enum incise_criterion {
-	INCISE_CRITERION_CUT_LENGTH, /**< of the longest incision, mm */
+	INCISE_CRITERION_CUT_LENGTH, /**< of the longest incision, from end to end, mm */
 	INCISE_CRITERION_CUT_DEPTH,  /**< largest one of it, mm */
 	INCISE_CRITERION_OFF_TARGET, /**< of it from the membrane's axis, mm */
 	INCISE_CRITERION_INCISIONS,  /**< their number */

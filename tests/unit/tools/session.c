@@ -217,13 +217,48 @@ static void test_mistakes(void **state)
 	assert_true(s->insertion.depth_mm == 23 && s->insertion.seated_mm == 0);
 	assert_true(verdicts[INCISE_CRITERION_INCISIONS].value == 2);
 	assert_false(verdicts[INCISE_CRITERION_INCISIONS].met);
-	/* Both cuts of the first one, less a step each. */
-	assert_float_equal(verdicts[INCISE_CRITERION_CUT_LENGTH].value, 24, 0.1);
-	assert_true(verdicts[INCISE_CRITERION_CUT_LENGTH].met);
+	/* From end to end, less a step of each cut. */
+	assert_float_equal(verdicts[INCISE_CRITERION_CUT_LENGTH].value, hypot(12, 12),
+			   0.1);
+	assert_false(verdicts[INCISE_CRITERION_CUT_LENGTH].met);
 	assert_true(verdicts[INCISE_CRITERION_BACK_WALL].judged);
 	assert_false(verdicts[INCISE_CRITERION_BACK_WALL].met);
 	assert_true(verdicts[INCISE_CRITERION_MEMBRANE].met);
 	assert_false(verdicts[INCISE_CRITERION_FORCE].judged);
+	session_digest_free(hand.digest);
+}
+
+/* A cut across another one: one incision, as long as before. */
+static void test_cross(void **state)
+{
+	struct session_verdict verdicts[INCISE_CRITERIA];
+	struct hand hand = begin(text);
+	struct session *s;
+
+	hand.tool = INCISE_TOOL_BLADE;
+	hand.depth_mm = 3;
+	go(&hand, 30, 0, 3, HZ);
+	lift(&hand, INCISE_TOOL_BLADE);
+	hand.x_mm = 15;
+	hand.y_mm = -6;
+	hand.depth_mm = 3;
+	hand.turn_deg = 90;
+	go(&hand, 15, 6, 3, HZ);
+	lift(&hand, INCISE_TOOL_HANDLE);
+	/* Over the crossing, where the nearest cut is now this one and now that. */
+	for (int i = 0; i < 2 * HZ; i++) {
+		hand.x_mm = 15 + 0.1 * sin(2 * M_PI * i / 7.0);
+		hand.y_mm = 0.1 * cos(2 * M_PI * i / 11.0);
+		hand.depth_mm = 5;
+		hand.turn_deg = 90 + 40 * sin(2 * M_PI * i / (2.0 * HZ));
+		tick(&hand);
+	}
+	s = session_digest_now(hand.digest);
+	assert_true(s->enlarging.turns == 3);
+	session_judge(s, verdicts);
+	assert_true(verdicts[INCISE_CRITERION_INCISIONS].value == 1);
+	assert_float_equal(verdicts[INCISE_CRITERION_CUT_LENGTH].value, 30 - 0.03, 1e-9);
+	assert_true(verdicts[INCISE_CRITERION_CUT_LENGTH].met);
 	session_digest_free(hand.digest);
 }
 
@@ -437,11 +472,11 @@ static void test_codes(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_procedure),     cmocka_unit_test(test_mistakes),
-		cmocka_unit_test(test_no_membrane),   cmocka_unit_test(test_bounded),
-		cmocka_unit_test(test_joined_phases), cmocka_unit_test(test_unusable),
-		cmocka_unit_test(test_file),	      cmocka_unit_test(test_damaged),
-		cmocka_unit_test(test_codes),
+		cmocka_unit_test(test_procedure), cmocka_unit_test(test_mistakes),
+		cmocka_unit_test(test_cross),	  cmocka_unit_test(test_no_membrane),
+		cmocka_unit_test(test_bounded),	  cmocka_unit_test(test_joined_phases),
+		cmocka_unit_test(test_unusable),  cmocka_unit_test(test_file),
+		cmocka_unit_test(test_damaged),	  cmocka_unit_test(test_codes),
 	};
 	int fd = mkstemp(path), rc;
 
