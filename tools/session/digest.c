@@ -449,6 +449,11 @@ void session_digest_tick(struct session_digest *digest, const struct incise_tick
 	add_sample(digest, tick, t_s, force_N);
 }
 
+void session_digest_lost(struct session_digest *digest, uint64_t lost)
+{
+	digest->session.lost = (double)lost;
+}
+
 /* --- the end --------------------------------------------------------------------------- */
 
 /* Distance of the membrane's axis from the line between two places, seen along it. */

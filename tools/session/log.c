@@ -87,7 +87,7 @@ void session_log_tick(struct session_log *log, const struct incise_tick *tick)
 void session_log_lost(struct session_log *log, uint64_t lost)
 {
 	if (log)
-		session_digest_now(log->digest)->lost = (double)lost;
+		session_digest_lost(log->digest, lost);
 }
 
 int session_log_end(struct session_log *log, const char *kind, const char *why,

@@ -137,6 +137,9 @@ struct session_digest *session_digest_new(const struct incise_scene *scene,
 /* Add a tick, each once and in order. One that is not finite or of the past is counted only. */
 void session_digest_tick(struct session_digest *digest, const struct incise_tick *tick);
 
+/* Ticks that never came, in total. */
+void session_digest_lost(struct session_digest *digest, uint64_t lost);
+
 /* What the ticks so far come to; valid, and for the caller to complete, until the next one. */
 struct session *session_digest_now(struct session_digest *digest);
 
