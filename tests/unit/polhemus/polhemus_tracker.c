@@ -17,7 +17,7 @@
 #define PATIENCE_NS INT64_C(20000000000)
 
 static const struct incise_tracker_setup two = {
-	.n_stations = 2, .stations = {1, 3}, .hemisphere = {1, 0, 0}};
+	.n_stations = 2, .stations = {1, 3}, .tube_station = 3, .hemisphere = {1, 0, 0}};
 static struct pty pty;
 
 static int begin(void **state)
@@ -84,6 +84,8 @@ static void through_the_door(void **state)
 	incise_tracker_info(tracker, &info);
 	assert_string_equal(info.name, "FASTRAK 3.02 OutputCompensat CPG2030-003-10");
 	assert_true(info.rate_hz == 120 && info.stations == 2);
+	assert_true(incise_tracker_station_hz(&info) == 60);
+	assert_true(info.scalpel_station == 1 && info.tube_station == 3);
 	/* 4 ms of the device, and 34 bytes of 10 bits at 115200. */
 	assert_in_range(info.latency_ns, 6950000, 6952000);
 	assert_int_equal(read_some(tracker, &next, 12), 0);
@@ -261,6 +263,14 @@ static void refuses(void **state)
 		{.n_stations = 5, .stations = {1, 2, 3, 4}, .hemisphere = {1, 0, 0}},
 		{.n_stations = 2, .stations = {2, 1}, .hemisphere = {1, 0, 0}},
 		{.n_stations = 1, .stations = {5}, .hemisphere = {1, 0, 0}},
+		{.n_stations = 1,
+		 .stations = {1},
+		 .hemisphere = {1, 0, 0},
+		 .tube_station = 1},
+		{.n_stations = 2,
+		 .stations = {1, 3},
+		 .hemisphere = {1, 0, 0},
+		 .tube_station = 2},
 		{.n_stations = 1, .stations = {1}, .hemisphere = {0, 0, 0}},
 		{.n_stations = 1, .stations = {1}, .hemisphere = {1, 0, 0}, .sync = 3},
 		{.n_stations = 1,

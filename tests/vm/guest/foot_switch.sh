@@ -14,7 +14,7 @@ in_virtual_time "the loop's foot switch"
 plug_in() {
 	rm -f /run/foot /run/node
 	mkfifo /run/foot
-	"$program" pedal </run/foot >/run/node &
+	"$program" pedal </run/foot >/run/node 3>&- &
 	exec 3>/run/foot
 	until [ -s /run/node ]; do sleep 0.05; done
 	ln -sf "$(cat /run/node)" /run/pedal
@@ -49,7 +49,7 @@ stepper = "sim:";
 foot_switch = { device = "/run/pedal"; key = "b"; };
 END
 "$INCISE_BUILD/bin/incise" haptic scenes/neck.scene --rig /run/rig.conf --state /run/neck.state \
-	--verbose --no-rt --overruns 0 >/run/out 2>/run/err &
+	--verbose --no-rt --overruns 0 >/run/out 2>/run/err 3>&- &
 loop=$!
 check "the loop finds it" until_it "foot switch: /run/pedal"
 check "it starts with the blade" holds "blade (auto)"
