@@ -158,7 +158,7 @@ static void measure_size(const struct view_script *script, double until_s,
 	struct incise_view_report report;
 	struct fed_view fed;
 
-	fed_view_open(&fed, script, row->texture_px, row->width, row->height);
+	fed_view_open(&fed, script, row->texture_px, row->width, row->height, true);
 	draw_frames(&fed, bursts, &got);
 	incise_view_report(fed.view, &report);
 	if (cli_stop)
@@ -398,10 +398,10 @@ static void open_views(struct compared *c, const struct view_script *script, int
 	*c = (struct compared){.textures = textures,
 			       .rgb = cli_alloc(WIDTH * HEIGHT, 3),
 			       .exact_rgb = cli_alloc(WIDTH * HEIGHT, 3)};
-	fed_view_open(&c->exact, script, textures_px[textures - 1], WIDTH, HEIGHT);
+	fed_view_open(&c->exact, script, textures_px[textures - 1], WIDTH, HEIGHT, false);
 	incise_view_panel(c->exact.view, false, false);
 	for (int i = 0; i < textures; i++) {
-		fed_view_open(&c->shown[i], script, textures_px[i], WIDTH, HEIGHT);
+		fed_view_open(&c->shown[i], script, textures_px[i], WIDTH, HEIGHT, false);
 		incise_view_panel(c->shown[i].view, false, false);
 	}
 }
@@ -555,7 +555,8 @@ static void sweep(const struct cutting *c, double t_s)
 
 static void open_cutting(struct cutting *c, const char *path)
 {
-	const struct incise_view_setup setup = {.width = 1280, .height = 720};
+	const struct incise_view_setup setup = {
+		.width = 1280, .height = 720, .live = true};
 	struct incise_error err = {0};
 
 	c->scene = cli_require(incise_scene_load(path, NULL, &err), &err);

@@ -3,6 +3,7 @@
  * The texture as drawn: its layers blended, its levels, and its dirty tiles; see canvas.h.
  */
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -23,6 +24,7 @@ struct incise_canvas {
 	uint8_t *layer[CANVAS_LAYERS_MAX];
 	uint8_t *level[LEVELS_MAX];
 	struct canvas_tiles tiles;
+	int next;		 /* tile, from which the next call looks for dirty ones */
 	uint16_t linear[256];	 /* of an sRGB value, 65535 is white */
 	uint8_t srgb[SUM_STEPS]; /* of the sum of four of them >> SUM_SHIFT */
 };
@@ -313,9 +315,10 @@ static bool take_row(struct incise_canvas *canvas, int x, int y, int w)
 
 /*
  * Take a rectangle of dirty tiles that starts at one: as far to the right as they reach, and as far
- * down as the whole width does.
+ * down as the whole width does, up to so many texels.
  */
-static struct incise_rect take_rect(struct incise_canvas *canvas, int x, int y)
+static struct incise_rect take_rect(struct incise_canvas *canvas, int x, int y,
+				    int texels_most)
 {
 	const uint8_t *row = canvas->tiles.dirty + (size_t)y * canvas->tiles.side;
 	int w = 1, h = 1;
@@ -323,7 +326,8 @@ static struct incise_rect take_rect(struct incise_canvas *canvas, int x, int y)
 	while (x + w < canvas->tiles.side && row[x + w])
 		w++;
 	take_row(canvas, x, y, w);
-	while (y + h < canvas->tiles.side && take_row(canvas, x, y + h, w))
+	while (w * h * CANVAS_TILE * CANVAS_TILE < texels_most &&
+	       y + h < canvas->tiles.side && take_row(canvas, x, y + h, w))
 		h++;
 	return (struct incise_rect){x * CANVAS_TILE, y * CANVAS_TILE, w * CANVAS_TILE,
 				    h * CANVAS_TILE};
@@ -346,21 +350,28 @@ static int do_rect(struct incise_canvas *canvas, struct incise_rect rect,
 }
 
 int incise_canvas_compose(struct incise_canvas *canvas, struct incise_upload *uploads,
-			  int n)
+			  int n, int texels_most)
 {
+	int done = 0, texels = 0, tiles = canvas->tiles.side * canvas->tiles.side;
 	struct incise_rect all = {0};
-	int done = 0, at = 0;
 
 	if (n < CANVAS_UPLOADS_MIN)
 		return -EINVAL;
+	if (texels_most <= 0)
+		texels_most = INT_MAX;
 	n -= LEVELS_MAX - LEVEL_SMALL; /* kept for the small levels */
-	for (; canvas->tiles.n_dirty && done + LEVEL_SMALL <= n; at++) {
+	while (canvas->tiles.n_dirty && done + LEVEL_SMALL <= n && texels < texels_most) {
+		int at = canvas->next;
 		struct incise_rect rect;
 
+		canvas->next = (at + 1) % tiles;
 		if (!canvas->tiles.dirty[at])
 			continue;
-		rect = take_rect(canvas, at % canvas->tiles.side,
-				 at / canvas->tiles.side);
+		rect = take_rect(canvas, at % canvas->tiles.side, at / canvas->tiles.side,
+				 texels_most - texels);
+		/* Behind all of it, though parts may be dirty again by the next call. */
+		canvas->next = (at + rect.w / CANVAS_TILE) % tiles;
+		texels += rect.w * rect.h;
 		enclose(&all, &rect);
 		done += do_rect(canvas, rect, uploads + done);
 	}

@@ -104,11 +104,13 @@ void incise_canvas_dirty(struct incise_canvas *canvas, struct incise_rect rect);
  *
  * uploads, n   capacity, at least CANVAS_UPLOADS_MIN; if that is too small the rest stays dirty:
  *              call again until it returns 0
+ * texels_most  no further rectangle is begun from so many texels on; 0: all. The next call goes on
+ *              behind the last one, so that no tile waits longer than once round
  * Returns their number; -EINVAL.
  */
 #define CANVAS_UPLOADS_MIN 32
 int incise_canvas_compose(struct incise_canvas *canvas, struct incise_upload *uploads,
-			  int n);
+			  int n, int texels_most);
 
 int incise_canvas_size(const struct incise_canvas *canvas);
 int incise_canvas_levels(const struct incise_canvas *canvas);

@@ -32,6 +32,12 @@ enum { SLOT_PANEL, SLOT_KEYS };
 
 #define VIEW_UPLOADS 256 /* per call */
 
+/*
+ * Texels of a live frame: more take so long to compose and send that frames would come late. The rest
+ * follows with the next frames.
+ */
+#define LIVE_TEXELS (64 * CANVAS_TILE * CANVAS_TILE)
+
 struct incise_view {
 	const struct incise_surface *surface;
 	struct incise_scene_picture picture;
@@ -47,7 +53,7 @@ struct incise_view {
 	struct incise_overlay *overlay;
 	struct view_orbit orbit;
 	struct incise_tick tick; /* the last one with a valid place */
-	bool ticked, drawn, panel, keys;
+	bool ticked, drawn, panel, keys, live;
 	int width, height;		  /* of frames */
 	struct incise_view_report report; /* counts and times */
 };
@@ -112,7 +118,7 @@ static int make_draw(struct incise_view *view, const uint8_t *normals, int sampl
 	};
 
 	/* incise_draw_new() sends all of it, so no tile need be dirty. */
-	while (incise_canvas_compose(view->canvas, uploads, VIEW_UPLOADS) > 0)
+	while (incise_canvas_compose(view->canvas, uploads, VIEW_UPLOADS, 0) > 0)
 		;
 	view->draw = incise_draw_new(&setup, err);
 	return view->draw ? 0 : -errno;
@@ -139,6 +145,8 @@ static int make_parts(struct incise_view *view, const struct incise_plan *plan,
 {
 	uint8_t *normals = NULL;
 	int rc = make_context(view, setup, err);
+
+	view->live = setup->live;
 
 	if (!rc)
 		rc = make_texture(view, &normals, err);
@@ -253,15 +261,21 @@ static void lift(const struct incise_view *view, struct incise_tick *tick)
 static void send(struct incise_view *view)
 {
 	struct incise_upload uploads[VIEW_UPLOADS];
-	int n;
+	int n, left = view->live ? LIVE_TEXELS : 0;
 
 	incise_injury_paint(view->injury);
-	while ((n = incise_canvas_compose(view->canvas, uploads, VIEW_UPLOADS)) > 0) {
+	while ((n = incise_canvas_compose(view->canvas, uploads, VIEW_UPLOADS, left)) >
+	       0) {
 		incise_draw_upload(view->draw, view->canvas, uploads, n);
 		view->report.uploads += (uint64_t)n;
-		for (int i = 0; i < n; i++)
-			view->report.uploaded_texels +=
-				(uint64_t)uploads[i].rect.w * (uint64_t)uploads[i].rect.h;
+		for (int i = 0; i < n; i++) {
+			int texels = uploads[i].rect.w * uploads[i].rect.h;
+
+			view->report.uploaded_texels += (uint64_t)texels;
+			left -= uploads[i].level ? 0 : texels;
+		}
+		if (view->live && left <= 0)
+			break;
 	}
 }
 

@@ -346,6 +346,7 @@ void view_job_view(struct view_job *job)
 	struct incise_view_setup setup = {.width = job->output.width,
 					  .height = job->output.height,
 					  .window = window,
+					  .live = !view_output_wanted(&job->output),
 					  .title = job->argument.path};
 	struct incise_view_camera camera;
 	struct incise_error err = {0};

@@ -67,9 +67,10 @@ void view_script_end(struct view_script *script)
 }
 
 void fed_view_open(struct fed_view *fed, const struct view_script *script, int texture_px,
-		   int width, int height)
+		   int width, int height, bool live)
 {
-	const struct incise_view_setup setup = {.width = width, .height = height};
+	const struct incise_view_setup setup = {
+		.width = width, .height = height, .live = live};
 	struct incise_error err = {0};
 
 	*fed = (struct fed_view){.script = script,

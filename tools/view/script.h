@@ -30,9 +30,12 @@ struct fed_view {
 	int fed; /* ticks so far */
 };
 
-/* @texture_px: of the texture, or 0 for the scene's own. Fails the program. */
+/*
+ * @texture_px: of the texture, or 0 for the scene's own. @live: as of struct incise_view_setup. Fails
+ * the program.
+ */
 void fed_view_open(struct fed_view *fed, const struct view_script *script, int texture_px,
-		   int width, int height);
+		   int width, int height, bool live);
 
 /* Give the view all ticks up to a time since the first; times ascend. */
 void fed_view_until(struct fed_view *fed, double t_s);

@@ -35,6 +35,12 @@ struct incise_view_setup {
 	const char *title; /**< of the window; or NULL */
 	/** Per pixel: 1, or 4 for smooth edges; 0: 4 by a card, 1 by a CPU. */
 	int samples;
+	/**
+	 * Frames in time matter more than that each shows the state after the last tick: large
+	 * changes of the texture come with this and the next frames. A frame then depends on those
+	 * before.
+	 */
+	bool live;
 };
 
 /**

@@ -322,12 +322,12 @@ static void test_dries(void **state)
 	for (int i = 0; i < 36000; i++)
 		blood_step(p.blood);
 	blood_paint(p.blood, p.canvas, 0);
-	while (incise_canvas_compose(p.canvas, uploads, 256) > 0)
+	while (incise_canvas_compose(p.canvas, uploads, 256, 0) > 0)
 		;
 	for (int i = 0; i < 300; i++)
 		blood_step(p.blood);
 	blood_paint(p.blood, p.canvas, 0);
-	assert_int_equal(incise_canvas_compose(p.canvas, uploads, 256), 0);
+	assert_int_equal(incise_canvas_compose(p.canvas, uploads, 256, 0), 0);
 	assert_balance(p.blood);
 	blood_free(p.blood);
 	incise_canvas_free(p.canvas);

@@ -43,7 +43,7 @@ static void compose_all(struct incise_canvas *canvas, int capacity)
 	struct incise_upload uploads[UPLOADS];
 	int n, calls = 0;
 
-	while ((n = incise_canvas_compose(canvas, uploads, capacity)) > 0)
+	while ((n = incise_canvas_compose(canvas, uploads, capacity, 0)) > 0)
 		assert_true(n <= capacity && ++calls < 10000);
 	assert_int_equal(n, 0);
 }
@@ -124,7 +124,7 @@ static void test_uploads_tell_all(void **state)
 		scribble(canvas, 0,
 			 (struct incise_rect){rand() % SIDE, rand() % SIDE, rand() % 50,
 					      rand() % 50});
-		while ((n = incise_canvas_compose(canvas, uploads, UPLOADS)) > 0)
+		while ((n = incise_canvas_compose(canvas, uploads, UPLOADS, 0)) > 0)
 			for (int k = 0; k < n; k++) {
 				const struct incise_rect *r = &uploads[k].rect;
 				int stride;
@@ -161,13 +161,13 @@ static void test_small_stays_small(void **state)
 
 	compose_all(canvas, UPLOADS);
 	scribble(canvas, 0, (struct incise_rect){70, 70, 5, 5});
-	n = incise_canvas_compose(canvas, uploads, UPLOADS);
+	n = incise_canvas_compose(canvas, uploads, UPLOADS, 0);
 	assert_int_equal(n, 9);
 	for (int i = 0; i < n; i++)
 		texels += uploads[i].rect.w * uploads[i].rect.h;
 	/* 32² and a third of it, and some levels of one texel. */
 	assert_true(texels <= 1024 + 342 + 5);
-	assert_int_equal(incise_canvas_compose(canvas, uploads, UPLOADS), 0);
+	assert_int_equal(incise_canvas_compose(canvas, uploads, UPLOADS, 0), 0);
 	incise_canvas_free(canvas);
 	free(base);
 }
@@ -251,21 +251,62 @@ static void test_refused(void **state)
 	assert_null(incise_canvas_layer(canvas, CANVAS_LAYERS_MAX));
 	assert_null(incise_canvas_layer(canvas, -1));
 	assert_null(incise_canvas_pixels(canvas, 6, NULL));
-	assert_int_equal(incise_canvas_compose(canvas, uploads, CANVAS_UPLOADS_MIN - 1),
+	assert_int_equal(incise_canvas_compose(canvas, uploads, CANVAS_UPLOADS_MIN - 1,
+					       0),
 			 -EINVAL);
 	compose_all(canvas, UPLOADS);
 	incise_canvas_dirty(canvas, (struct incise_rect){INT_MAX, INT_MAX, INT_MAX, 1});
 	incise_canvas_dirty(canvas, (struct incise_rect){-5, -5, 5, 5});
 	incise_canvas_dirty(canvas, (struct incise_rect){0, 0, 0, 9});
 	incise_canvas_dirty(canvas, (struct incise_rect){0, 0, INT_MIN, INT_MIN});
-	assert_int_equal(incise_canvas_compose(canvas, uploads, CANVAS_UPLOADS_MIN), 0);
+	assert_int_equal(incise_canvas_compose(canvas, uploads, CANVAS_UPLOADS_MIN, 0),
+			 0);
 	incise_canvas_dirty(canvas,
 			    (struct incise_rect){INT_MIN, INT_MIN, INT_MAX, INT_MAX});
-	assert_int_equal(incise_canvas_compose(canvas, uploads, CANVAS_UPLOADS_MIN), 0);
+	assert_int_equal(incise_canvas_compose(canvas, uploads, CANVAS_UPLOADS_MIN, 0),
+			 0);
 	incise_canvas_dirty(canvas, (struct incise_rect){-9, -9, INT_MAX, INT_MAX});
-	assert_true(incise_canvas_compose(canvas, uploads, CANVAS_UPLOADS_MIN) > 0);
+	assert_true(incise_canvas_compose(canvas, uploads, CANVAS_UPLOADS_MIN, 0) > 0);
 	incise_canvas_free(canvas);
 	incise_canvas_free(NULL);
+}
+
+/*
+ * With few texels a call all tiles come in turn: none waits longer than once round, however often the
+ * first ones change again. In the end it is as if composed at once.
+ */
+static void test_few_texels_a_call(void **state)
+{
+	const int tiles = SIDE / CANVAS_TILE, few = 4 * CANVAS_TILE * CANVAS_TILE;
+	const int rounds = tiles * tiles / 4;
+	uint8_t *base = any_base(SIDE);
+	struct incise_canvas *canvas = canvas_of(SIDE, base, 1),
+			     *whole = canvas_of(SIDE, base, 1);
+	struct incise_upload uploads[UPLOADS];
+	const struct incise_rect all = {0, 0, SIDE, SIDE}, first = {0, 0, SIDE, 40};
+
+	compose_all(canvas, UPLOADS);
+	scribble(canvas, 0, all);
+	memcpy(incise_canvas_layer(whole, 0), incise_canvas_layer(canvas, 0),
+	       (size_t)SIDE * SIDE * 4);
+	compose_all(whole, UPLOADS);
+	incise_canvas_dirty(canvas, all);
+	for (int i = 0; i < rounds; i++) {
+		int texels = 0, n = incise_canvas_compose(canvas, uploads, UPLOADS, few);
+
+		for (int k = 0; k < n; k++)
+			if (!uploads[k].level)
+				texels += uploads[k].rect.w * uploads[k].rect.h;
+		/* The last rectangle may be a row of tiles too much. */
+		assert_true(texels <= few + SIDE * CANVAS_TILE);
+		incise_canvas_dirty(canvas, first);
+	}
+	assert_memory_equal(incise_canvas_pixels(canvas, 0, NULL),
+			    incise_canvas_pixels(whole, 0, NULL),
+			    (size_t)SIDE * SIDE * 4);
+	incise_canvas_free(canvas);
+	incise_canvas_free(whole);
+	free(base);
 }
 
 int main(void)
@@ -277,6 +318,7 @@ int main(void)
 		cmocka_unit_test(test_over),
 		cmocka_unit_test(test_levels),
 		cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_few_texels_a_call),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

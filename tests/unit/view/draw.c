@@ -95,7 +95,7 @@ static struct incise_canvas *canvas_new(void)
 			p[3] = (uint8_t)(255 * in);
 		}
 	incise_canvas_dirty(canvas, (struct incise_rect){0, 0, SIZE, SIZE});
-	while (incise_canvas_compose(canvas, uploads, CANVAS_UPLOADS_MIN) > 0)
+	while (incise_canvas_compose(canvas, uploads, CANVAS_UPLOADS_MIN, 0) > 0)
 		;
 	return canvas;
 }
@@ -313,7 +313,7 @@ static void test_dirty_rectangle(void **state)
 		for (int x = rect.x; x < rect.x + rect.w; x++)
 			memcpy(layer + 4 * ((size_t)y * SIZE + x), "\x78\x06\x06\xff", 4);
 	incise_canvas_dirty(canvas, rect);
-	while ((n = incise_canvas_compose(canvas, uploads, CANVAS_UPLOADS_MIN)) > 0)
+	while ((n = incise_canvas_compose(canvas, uploads, CANVAS_UPLOADS_MIN, 0)) > 0)
 		incise_draw_upload(draw, canvas, uploads, n);
 	frame(draw, &aside, NULL, two);
 

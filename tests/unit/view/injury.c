@@ -50,7 +50,7 @@ static void paint(struct scene *s)
 	struct incise_upload uploads[64];
 
 	incise_injury_paint(s->injury);
-	while (incise_canvas_compose(s->canvas, uploads, 64) > 0)
+	while (incise_canvas_compose(s->canvas, uploads, 64, 0) > 0)
 		;
 }
 
