@@ -13,6 +13,7 @@
 #include "cli/file.h"
 #include "cli/folder.h"
 #include "cli/json.h"
+#include "cli/loop_report.h"
 #include "cli/plot.h"
 #include "session/session.h"
 
@@ -323,7 +324,7 @@ static void print_phases(const struct session *s)
 		const struct session_phase *phase = &s->phase[i];
 
 		printf("%s%-6s %7.2f to %7.2f s, depth %.1f mm, force %.2f N\n",
-		       i ? "" : "\n", session_tools[phase->tool], phase->from_s,
+		       i ? "" : "\n", loop_tool_names[phase->tool], phase->from_s,
 		       phase->to_s, phase->depth_mm, phase->force_N);
 	}
 }
@@ -664,8 +665,8 @@ static void draw_path(const struct session *s, const struct session *reference,
 	int expert = reference ? put_cuts(script, "expert", reference) : 0;
 
 	for (int tool = 0; tool <= INCISE_TOOL_TUBE; tool++)
-		there[tool] =
-			put_path(script, session_tools[tool], s, (enum incise_tool)tool);
+		there[tool] = put_path(script, loop_tool_names[tool], s,
+				       (enum incise_tool)tool);
 	if (s->has_membrane)
 		put_membrane(script, &s->membrane);
 	/* A plot of nothing is an error of gnuplot. */
@@ -675,8 +676,8 @@ static void draw_path(const struct session *s, const struct session *reference,
 	for (int tool = 0; tool <= INCISE_TOOL_TUBE; tool++)
 		if (there[tool])
 			fprintf(script, ", $%s with lines lw %s lc rgb '%s' title '%s'",
-				session_tools[tool], tool ? "2" : "0.7", colours[tool],
-				tool ? session_tools[tool] : "in the air");
+				loop_tool_names[tool], tool ? "2" : "0.7", colours[tool],
+				tool ? loop_tool_names[tool] : "in the air");
 	if (expert)
 		fputs(", $expert with lines lw 2 dt 2 lc rgb 'black' title 'cut, "
 		      "reference'",
@@ -733,7 +734,7 @@ static void draw_force(const struct session *s, const struct session *reference,
 	for (int tool = 1; tool <= INCISE_TOOL_TUBE; tool++)
 		fprintf(script,
 			", NaN with boxes fs solid 0.15 noborder lc rgb '%s' title '%s'",
-			colours[tool], session_tools[tool]);
+			colours[tool], loop_tool_names[tool]);
 	plot_draw_or_fail(script, folder, name);
 }
 
@@ -820,7 +821,7 @@ static void put_phases_table(FILE *out, const struct session *s)
 	      out);
 	for (int i = 0; i < s->n_phases; i++)
 		fprintf(out, "| %s | %.2f | %.2f | %.1f | %.2f |\n",
-			session_tools[s->phase[i].tool], s->phase[i].from_s,
+			loop_tool_names[s->phase[i].tool], s->phase[i].from_s,
 			s->phase[i].to_s, s->phase[i].depth_mm, s->phase[i].force_N);
 }
 

@@ -479,7 +479,7 @@ static int write_log(struct incise_outfile *file, const struct incise_tick *tick
 
 	out = incise_outfile_stream(file);
 	fputs("t_s,x_mm,y_mm,z_mm,depth_mm,velocity_mm_s,command_N,rendered_N,flags,phase,"
-	      "command_x_N,command_y_N,command_z_N",
+	      "command_x_N,command_y_N,command_z_N,tool",
 	      out);
 	for (int i = 1; i < axes; i++)
 		fprintf(out, ",rendered_%d_N", i + 1);
@@ -488,7 +488,7 @@ static int write_log(struct incise_outfile *file, const struct incise_tick *tick
 		const struct incise_tick *t = &ticks[i];
 
 		fprintf(out,
-			"%.6f,%.4f,%.4f,%.4f,%.4f,%.3f,%.5f,%.5f,%s,%s,%.5f,%.5f,%.5f",
+			"%.6f,%.4f,%.4f,%.4f,%.4f,%.3f,%.5f,%.5f,%s,%s,%.5f,%.5f,%.5f,%s",
 			(t->t_ns - ticks[0].t_ns) * 1e-9, t->position_mm[0],
 			t->position_mm[1], t->position_mm[2], t->depth_mm,
 			t->velocity_mm_s,
@@ -497,7 +497,7 @@ static int write_log(struct incise_outfile *file, const struct incise_tick *tick
 			     t->command_N[2] * t->command_N[2]),
 			t->rendered_N[0], loop_flags_text(t->flags, flags),
 			phases[t->phase], t->command_N[0], t->command_N[1],
-			t->command_N[2]);
+			t->command_N[2], loop_tool_names[t->tool]);
 		for (int k = 1; k < axes; k++)
 			fprintf(out, ",%.5f", t->rendered_N[k]);
 		if (axes > 1)

@@ -26,7 +26,6 @@ struct job {
 };
 
 static const char *const times[] = {"arrival", "acquisition", NULL};
-static const char *const tools[] = {"auto", "blade", "handle", "tube", NULL};
 
 static const struct cli_option options[] = {
 	{0, "csv", "FILE",
@@ -47,7 +46,7 @@ static const struct cli_option options[] = {
 	SCENE_ARGUMENT_OPTIONS(struct job, scene),
 	{0, "tool", "KIND",
 	 "what the hand held: auto, blade, handle or tube (default: auto)",
-	 CLI_CHOICE(struct job, how.tool, tools, NULL)},
+	 CLI_CHOICE(struct job, how.tool, loop_tool_names, NULL)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{0},
 };

@@ -74,8 +74,6 @@ static void turn(double to[3], const double q[4], const double v[3])
 	add(to, to, 1, u);
 }
 
-const char *const session_tools[4] = {"auto", "blade", "handle", "tube"};
-
 bool session_is_code(const char *text)
 {
 	size_t n = strspn(text, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"

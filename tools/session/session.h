@@ -117,9 +117,6 @@ struct session {
 	struct session_sample trace[SESSION_TRACE_MAX];
 };
 
-/* "auto", "blade", "handle", "tube". */
-extern const char *const session_tools[4];
-
 /* Letters, digits, '-' and '_', at most SESSION_CODE_MAX, no '-' first: a code, no name of a person. */
 bool session_is_code(const char *text);
 

@@ -11,6 +11,7 @@
 #include <incise/infile.h>
 #include "../cli/control_character.h"
 #include "../cli/json.h"
+#include "../cli/loop_report.h"
 #include "session.h"
 
 #define FILE_MOST (8 << 20) /* with a full trace it has 2 */
@@ -248,7 +249,7 @@ static json_t *put_member(const struct member *member, const void *object)
 	case FLAG:
 		return json_boolean(*(const bool *)at);
 	case TOOL:
-		return json_string(session_tools[*(const enum incise_tool *)at]);
+		return json_string(loop_tool_names[*(const enum incise_tool *)at]);
 	}
 	return NULL;
 }
@@ -404,7 +405,7 @@ static int take_tool(const struct reader *reader, const struct member *member,
 		     const json_t *json, enum incise_tool *to)
 {
 	for (int i = 0; i <= INCISE_TOOL_TUBE && json_is_string(json); i++)
-		if (!strcmp(json_string_value(json), session_tools[i])) {
+		if (!strcmp(json_string_value(json), loop_tool_names[i])) {
 			*to = (enum incise_tool)i;
 			return 0;
 		}
