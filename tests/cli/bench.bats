@@ -487,9 +487,9 @@ rate() {
 		[ "$(of guards_stiffest 'count(*)' "guard = '$guard'")" = 4 ]
 		holds "$(of guards_ns ns "guard = '$guard'") > 0"
 	done
-	# scenes rest at their own gain without a guard, and not at twice the largest
+	# scenes rest at their own gain without a guard, and most do not at twice the largest
 	holds "$(of guards rest_share "guard = 'none' AND own") == 1"
-	holds "$(of guards rest_share "guard = 'none' AND gain = 2") < 0.5"
+	holds "$(of guards rest_share "guard = 'none' AND gain = 2") <= 0.5"
 	# a coupling makes that rest by another force; below its limit it does nothing
 	holds "$(of guards rests "guard = 'coupling' AND gain = 2") > $(of guards rests "guard = 'none' AND gain = 2")"
 	holds "$(of guards error_share "guard = 'coupling' AND gain = 2") > 0.07"
@@ -522,7 +522,7 @@ rate() {
 	# the liver takes work, a wall gives back what it took
 	holds "$(of work median_N_mm "scene = 'liver'") > 0.1"
 	holds "$(of work 'abs(median_N_mm)' "scene = 'wall'") < 1e-3"
-	[ "$(of work 'count(*)' "scene = 'neck'")" = 3 ]
+	[ "$(of work 'count(*)' "scene = 'neck'")" = 4 ]
 }
 
 @test "bench stability: paper 2's forces, their error and time" {

@@ -172,7 +172,7 @@ beside_the_model() {
 	incise haptic liver.scene --rig $quick --duration 2s --log a.csv
 	incise haptic deep.scene --rig $quick --duration 2s --log b.csv
 	# 2 mm lower: where it is touched, depth is 2 mm less, to the printed 0.1 um
-	paste -d, a.csv b.csv | awk -F, '$22 ~ /^c/ && $18 > 0 { n++; if (($5 - $18 - 2)^2 > 4.1e-8) exit 1 }
+	paste -d, a.csv b.csv | awk -F, '$23 ~ /^c/ && $19 > 0 { n++; if (($5 - $19 - 2)^2 > 4.1e-8) exit 1 }
 		END { exit n < 500 }'
 }
 

@@ -258,6 +258,11 @@ static void add_shipped(struct scenes *s)
 	"radius_mm = 50.0; };\n"
 #define DOUBLE "arithmetic = \"double\";\n"
 #define REACTION "tissue = { reaction_N_mm = 0.14; };\n"
+/* All that is no force: the membrane lies below the sphere's top and the sheet's waves. */
+#define EFFECTS                                                        \
+	"effects = { average_ticks = 8; };\n"                          \
+	"membrane = { point_mm = [0.0, 0.0, -6.0]; radius_mm = 5.0;\n" \
+	"  thickness_mm = 5.0; puncture_N = 0.8; back_wall_mm = 14.0; };\n"
 #define MESH "surface = { kind = \"mesh\"; file = \"%s\"; };\n"
 
 /* From the plainest to one with all that there is. */
@@ -290,7 +295,7 @@ static void add_made(struct scenes *s)
 		fprintf(file[0].file, made[i].text, file[1].path);
 		fputs(tissue, file[0].file);
 		if (made[i].all)
-			fputs("effects = { average_ticks = 8; };\n", file[0].file);
+			fputs(EFFECTS, file[0].file);
 		memory_file_written(&file[0]);
 		add(s, made[i].name, strlen(made[i].name), file[0].path)->kept =
 			made[i].kept;

@@ -252,10 +252,18 @@ static void *move_hand(void *argument)
 {
 	struct moved *moved = argument;
 
-	/* Three times during a look at most: one that is disturbed again and again gives up. */
-	for (int i = 1; !moved->end; i++) {
-		while (i > 3 * (moved->looks + 1) && !moved->end)
+	int looks = 0, moves = 0;
+
+	/*
+	 * Three times between two looks at most: one that is disturbed again and again gives up.
+	 * Moves that the thread did not make while it was suspended are not made up for.
+	 */
+	for (int i = 1; !moved->end; i++, moves++) {
+		while (moves >= 3 && moved->looks == looks && !moved->end)
 			sched_yield();
+		if (moved->looks != looks)
+			moves = 0;
+		looks = moved->looks;
 		const double p[] = {i, i, i}, v[] = {i, i, i}, q[] = {i, i, i, i};
 
 		incise_hand_move(&moved->hand, p, v, q);
