@@ -391,17 +391,17 @@ rms() { awk -F, "NR > 1 { sum += ($2) ^ 2 } END { printf \"%.9f\", sqrt(sum / (N
 	holds "$(rms 1.csv '$12') > 0.2"
 	holds "($(key 1.json unfelt_rms_N) - $(rms 1.csv 'sqrt($11^2 + $12^2)'))^2 < 1e-10"
 	holds "($(key 2.json unfelt_rms_N) - $(rms 2.csv '$11'))^2 < 1e-10"
-	holds "($(key 2.json unfelt_rms_N) - $(rms 2.csv '$15'))^2 < 1e-10"
+	holds "($(key 2.json unfelt_rms_N) - $(rms 2.csv '$16'))^2 < 1e-10"
 	holds "$(key 3.json unfelt_max_N) < 1e-12"
 	[ "$(head -n 1 2.csv)" = "$(head -n 1 1.csv),rendered_2_N,unfelt_N" ]
 	[ "$(head -n 1 3.csv)" = "$(head -n 1 1.csv),rendered_2_N,rendered_3_N,unfelt_N" ]
 	# the hand is pushed aside by what was asked a tick before, within a tenth
-	awk -F, '$10 == "cutting" && before { off += ($14 - last)^2; sum += last^2 }
+	awk -F, '$10 == "cutting" && before { off += ($15 - last)^2; sum += last^2 }
 		{ last = $12; before = $10 == "cutting" }
 		END { exit !(sum > 0 && off < 0.01 * sum) }' 2.csv
 	# the first axis is as if it were alone
 	for n in 2 3; do
-		cut -d, -f1-13 $n.csv | cmp - 1.csv
+		cut -d, -f1-14 $n.csv | cmp - 1.csv
 	done
 }
 

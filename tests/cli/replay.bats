@@ -61,8 +61,8 @@ teardown() {
 	incise replay liver.rec liver.scene --csv replay.csv >/dev/null
 	# the log begins with the first tick, as the recording's ticks do; it is rounded to 0.01 mN
 	paste -d, <(sed 1d live.csv) <(sed 1d replay.csv) | head -n 2999 | awk -F, '
-		{ e = $13 - $18; if (e < 0) e = -e; if (e > 0.6e-5 || $9 != $21) { print; exit 1 }
-		  if ($18 > m) m = $18 }
+		{ e = $13 - $19; if (e < 0) e = -e; if (e > 0.6e-5 || $9 != $22) { print; exit 1 }
+		  if ($19 > m) m = $19 }
 		END { exit !(NR == 2999 && m > 0.3) }'
 }
 
