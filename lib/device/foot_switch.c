@@ -217,7 +217,7 @@ int incise_foot_switch_read(struct incise_foot_switch *foot_switch)
 
 		if (n < 0 && (errno == EAGAIN || errno == EINTR))
 			return presses;
-		/* What was pressed before it went away counts. */
+		/* Presses before it went away count. */
 		if (n <= 0 && presses)
 			return presses;
 		if (n <= 0)

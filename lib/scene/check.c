@@ -185,7 +185,7 @@ static bool all_hands_hold(const struct incise_plan *plan)
 	return all;
 }
 
-/* How late each actuator is: as the scene says, or as rig.conf does of this one. */
+/* Lateness of each actuator: as the scene says, or as rig.conf does of this one. */
 static int set_lateness(struct incise_plan *plan, struct incise_error *err)
 {
 	struct incise_plan_stability *s = &plan->stability;

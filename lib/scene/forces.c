@@ -214,7 +214,7 @@ static void damping(struct incise_plan *plan, struct incise_tick *tick,
 }
 
 /*
- * How far a handle is turned out of the cut, 0 … 1: a flat instrument goes in easily when its flat
+ * Turn of a handle out of the cut, 0 … 1: a flat instrument goes in easily when its flat
  * lies along the cut. The flat's normal across the cut's direction then gives 0.
  */
 static double turned_across(const struct incise_plan *plan)
