@@ -133,7 +133,7 @@ static void time_of(const double *whole_ms, int n, struct harness_time *time)
 
 static void draw_frames(struct fed_view *fed, int bursts, struct samples *got)
 {
-	/* What is made at the first frame, and compiled at the second, is not of a frame. */
+	/* Textures of the first frame, and shaders compiled at the second, are not of a frame. */
 	for (int i = 0; i < 5; i++) {
 		fed_view_until(fed, (FRAMES_FROM_S - 1.0 / FPS) * i / 5);
 		fed_view_frame(fed);
@@ -618,7 +618,7 @@ static void measure_absorbed(const char *scene, double seconds, struct absorbed 
 		a->seconds = (stopwatch_ns() - begin) * 1e-9;
 	}
 	incise_view_report(c.view, &a->view);
-	/* What is made at the first frame, and compiled at the second, is not of a frame. */
+	/* Textures of the first frame, and shaders compiled at the second, are not of a frame. */
 	if (a->frames > 2)
 		a->whole = times_of(ms + 2, (a->frames < most ? a->frames : most) - 2);
 	free(ms);

@@ -535,7 +535,7 @@ static double render_error(const struct haptic *haptic)
 		       : NAN;
 }
 
-/* What of the force cannot be felt on this rig, rms. */
+/* The part of the force that cannot be felt on this rig, rms. */
 static double unfelt_rms(const struct haptic *haptic)
 {
 	const struct incise_loop_stats *stats = haptic->stats;

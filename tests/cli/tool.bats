@@ -125,7 +125,7 @@ packets() {
 @test "one who may not write to the socket is told who may" {
 	[ "$(id -u)" = 0 ] || skip "needs root, to be somebody else"
 	command -v setpriv >/dev/null || skip "needs setpriv"
-	# That of bats is for its user alone.
+	# The temporary folder of bats is for its user alone.
 	outside=$(mktemp -d /tmp/incise-tool-XXXXXX)
 	page=$outside/neck.state control=$outside/neck.control
 	chmod 755 "$outside"

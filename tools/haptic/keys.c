@@ -79,7 +79,7 @@ int keys_read(void)
 	char key[32];
 	ssize_t n = read(STDIN_FILENO, key, sizeof(key));
 
-	/* What begins with it is an arrow or the like, sent at once. The last key counts. */
+	/* An arrow or the like begins with it, and is sent at once. The last key counts. */
 	if (n <= 0 || key[0] == ESCAPE)
 		return -1;
 	switch (key[n - 1]) {

@@ -137,7 +137,7 @@ void session_digest_tick(struct session_digest *digest, const struct incise_tick
 /* Ticks that never came, in total. */
 void session_digest_lost(struct session_digest *digest, uint64_t lost);
 
-/* What the ticks so far come to; valid, and for the caller to complete, until the next one. */
+/* The result of the ticks so far; valid, and for the caller to complete, until the next one. */
 struct session *session_digest_now(struct session_digest *digest);
 
 /* NULL is accepted. */

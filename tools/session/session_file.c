@@ -553,7 +553,7 @@ static int take_trace(struct reader *reader, const json_t *json, struct session 
 	return rc;
 }
 
-/* What tables do not say. */
+/* Checks beyond those of the tables. */
 static int check(struct reader *reader, struct session *session)
 {
 	reader->place[0] = 0;

@@ -21,7 +21,7 @@
 
 #define LONG_BITS (8 * sizeof(long))
 
-/* What the device says; an errno for its ioctls. */
+/* Answers of the device; an errno for its ioctls. */
 static struct {
 	int key, pressed, grabs;
 	int no_input, grab;

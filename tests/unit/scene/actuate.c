@@ -82,7 +82,7 @@ static void test_the_nut_goes_where_its_spring_gives_the_force(void **state)
 		{5, {0, 0, 0}, 5, false},
 		{5, {0, 0, 3}, 6.5, false},
 		{5, {0, 0, -3}, 3.5, false},
-		/* What is across the axis is not felt. */
+		/* The part across the axis is not felt. */
 		{5, {4, -4, 1}, 5.5, false},
 		/* The ends of the travel, and less than a step beyond them. */
 		{19, {0, 0, 2}, 20, false},
@@ -344,14 +344,14 @@ static void test_forces_are_the_least_squares_solution(void **state)
 			assert_true(fabs(2 * (reported[i].target_mm - 10) - f[i]) <
 				    ROUNDING_N);
 			v3_add(felt_N, felt_N, tick.actuated_N[i], direction[i]);
-			/* What each motor gives the hand that moves along it. */
+			/* Force of each motor on the hand that moves along it. */
 			power += tick.actuated_N[i] * v3_dot(direction[i], v);
 		}
 		for (int i = n; i < 3; i++)
 			assert_true(tick.actuated_N[i] == 0 && tick.rendered_N[i] == 0);
 		/* The motors' power is that of the felt force; 100 mm/s. */
 		assert_true(fabs(power - v3_dot(felt_N, v)) < 100 * ROUNDING_N);
-		/* What is left is at right angles to all that can be felt. */
+		/* The rest is at right angles to all that can be felt. */
 		v3_sub(rest_N, force_N, felt_N);
 		for (int i = 0; i < n; i++)
 			assert_true(fabs(v3_dot(rest_N, direction[i])) < ROUNDING_N);

@@ -19,7 +19,7 @@
 #define DEVICES (INCISE_RIG_TRACKER | INCISE_RIG_STEPPER)
 #define SOFT_N_mm 0.01
 
-/* What the second actuator's rig.conf would say of it. */
+/* The second actuator, as rig.conf would describe it. */
 static double late_s;
 static const struct incise_stepper_ops *real_ops;
 

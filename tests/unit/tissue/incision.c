@@ -249,7 +249,7 @@ static void test_opened_by_handle_and_tube(void **state)
 	assert_true(incise_incision_cut(incision, 0)->place[0].open_mm == 0);
 }
 
-/* How tight: 1 in a cut that is not opened, for a handle; nothing when it is wide enough. */
+/* Tightness of a handle is 1 in a cut that is not opened, and 0 in one that is wide enough. */
 static void test_tightness(void **state)
 {
 	static const struct {

@@ -45,7 +45,7 @@ static void test_direction(void **state)
 		{{0.6, 0, 0.8}, {0.6, 0, 0.8}, ANY},
 		{{C30, 0.5, 0}, {-C30, -0.5, 0}, ANY},
 		{{0, 0, 1}, {0, S05, 1}, ANY},
-		/* What a broken rig may say. */
+		/* Places as a broken rig may give them. */
 		{{0, 0, 1}, {0, 0, 0}, ANY},
 		{{0, 0, 1}, {NAN, 0, 0}, ANY},
 	};

@@ -97,7 +97,7 @@ static void test_tube(void **state)
 	assert_true(high[1] > 25 && fabs(high[1] + low[1]) < 1e-3);
 	assert_true(high[0] > 8 && high[0] < 12 && fabs(high[0] + low[0]) < 1e-3);
 	assert_true(high[2] > INSTRUMENT_FLANGE_MM + 15);
-	/* What is inserted is as thick as it is said; floats. */
+	/* An inserted tool is as thick as it is said; floats. */
 	for (int i = 0; i < mesh.n_vertices; i++) {
 		const float *p = mesh.vertices[i].position_mm;
 
