@@ -65,6 +65,21 @@ static inline bool v3_unit(double to[3], const double a[3], double least)
 	return true;
 }
 
+/* Any direction at right angles to a unit vector: across the axis that is least along it. */
+static inline void v3_any_across(double to[3], const double unit[3])
+{
+	double axis[3] = {0}, across[3];
+	int least = 0;
+
+	for (int i = 1; i < 3; i++)
+		if (fabs(unit[i]) < fabs(unit[least]))
+			least = i;
+	axis[least] = 1;
+	v3_cross(across, axis, unit);
+	/* Longer than √(2/3). */
+	v3_unit(to, across, 0);
+}
+
 /* Turn by a unit quaternion, w first; to is not v. */
 static inline void v3_rotate(double to[3], const double q[4], const double v[3])
 {

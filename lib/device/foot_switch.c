@@ -2,9 +2,9 @@
 /*
  * A foot switch; see incise/foot_switch.h. By the kernel's own interface, <linux/input.h>: of
  * libevdev it would take one call to know the key, one to grab the device and one to read, which
- * are an ioctl and a read here, and would be another library in a process locked in memory. What
- * libevdev is there for, the state of many keys and slots over a buffer that ran over, a count of
- * presses has not:
+ * are an ioctl and a read here, and would be another library in a process locked in memory. It
+ * keeps the state of many keys and slots over a buffer that ran over, and a count of presses has no
+ * such state:
  *
  *   EV_KEY key 1    pressed          counts
  *   EV_KEY key 2    repeated         does not

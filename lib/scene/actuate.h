@@ -4,8 +4,8 @@
  *
  *   force ─▶ f[i] = dual[i] · force ─▶ nut[i] = handle[i] + f[i] / spring[i]
  *
- *   felt = Σ f[i] direction[i]: the force's projection on what the directions span. What is
- *   left of the force, force - felt, cannot be felt on this rig.
+ *   felt = Σ f[i] direction[i]: the force's projection on what the directions span. The rest,
+ *   force - felt, cannot be felt on this rig.
  *
  * A device that fails ends the ticks: then all nuts go to rest, and the reason names the one that
  * failed.

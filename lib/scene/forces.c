@@ -135,7 +135,7 @@ static double advance_mm(struct incise_plan *plan, struct incise_acting_force *o
 			 bool *fresh)
 {
 	struct incise_front *cut = &own->state.front.cut;
-	const double *side = plan->line.side;
+	const double *side = plan->side;
 
 	*fresh =
 		plan->proxy.began && incise_front_enter(cut, plan->p0_mm, plan->sn, side);
@@ -191,8 +191,8 @@ static void plane(struct incise_plan *plan, struct incise_tick *tick,
 	double off[3];
 
 	v3_sub(off, tick->tool_mm, plan->p0_mm);
-	v3_add(plan->force_N, plan->force_N,
-	       -own->number[0] * v3_dot(off, plan->line.side), plan->line.side);
+	v3_add(plan->force_N, plan->force_N, -own->number[0] * v3_dot(off, plan->side),
+	       plan->side);
 }
 
 static void plane_fixed(struct incise_plan *plan, struct incise_tick *tick,
@@ -202,7 +202,7 @@ static void plane_fixed(struct incise_plan *plan, struct incise_tick *tick,
 
 	if (plan->proxy.began)
 		incise_fixed_spring_set(&own->state.spring, own->number[0], origin,
-					plan->line.side);
+					plan->side);
 	add_fixed(plan->force_N, &own->state.spring, tick->tool_mm, plan->p0_mm, false);
 }
 
@@ -254,7 +254,8 @@ static void insertion(struct incise_plan *plan, struct incise_tick *tick,
 	double cut_mm = opening->in ? fmin(plan->depth_mm, opening->depth_mm) : 0;
 	double size_mm = plan->depth_mm - cut_mm;
 
-	if (opening->in && plan->printed_orientation)
+	/* A tube is round: the paper's product is of the handle's flat side. */
+	if (opening->in && plan->printed_orientation && tick->tool == INCISE_TOOL_HANDLE)
 		size_mm = plan->depth_mm * printed(plan);
 	else if (opening->in)
 		size_mm += cut_mm * eased(plan, tick->tool, own->number[1]);

@@ -15,7 +15,6 @@
 #include "../surface/surface.h"
 #include "../tissue/incision.h"
 #include "../tissue/instrument.h"
-#include "../tissue/line.h"
 #include "actuate.h"
 #include "scene.h"
 
@@ -86,7 +85,7 @@ struct incise_plan {
 	double normal[3];	 /* the one that forces go along: Sn, or its average */
 	double depth_mm;	 /* ≥ 0; of the tissue in front of a membrane */
 	double p0_mm[3];	 /* where the contact began */
-	struct incise_line line; /* of the blade, from there on */
+	double side[3];		 /* of the blade then: Sx(0) */
 	struct incise_incision *incision; /* with its stage */
 	struct incise_opening opening;	  /* that handle or tube went into … */
 	double tightness; /* … and how tight it was; incise_incision_tightness() */

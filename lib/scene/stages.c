@@ -223,14 +223,11 @@ int incise_stage_tool(struct incise_plan *plan, struct incise_tick *tick)
 static void contact_begins(struct incise_plan *plan)
 {
 	const struct incise_touch *first = &plan->proxy.first;
-	double side[3];
 
 	v3_copy(plan->p0_mm, first->point_mm);
 	v3_copy(plan->sn, first->normal);
-	if (plan->instrument.held == INCISE_TOOL_BLADE) {
-		v3_rotate(side, plan->attitude, plan->instrument.side);
-		incise_line_begin(&plan->line, first->point_mm, first->normal, side);
-	}
+	if (plan->instrument.held == INCISE_TOOL_BLADE)
+		v3_rotate(plan->side, plan->attitude, plan->instrument.side);
 	if (plan->average)
 		incise_average_reset(plan->average);
 }
@@ -266,8 +263,6 @@ int incise_stage_contact(struct incise_plan *plan, struct incise_tick *tick)
 		contact_begins(plan);
 	find_normal(plan, tick->tool_mm);
 	plan->depth_mm = fmax(proxy->touch.depth_mm, 0);
-	if (plan->instrument.held == INCISE_TOOL_BLADE)
-		incise_line_extend(&plan->line, proxy->touch.point_mm);
 	tick->flags |= INCISE_TICK_CONTACT;
 	tick->phase = plan->instrument.held == INCISE_TOOL_BLADE ? INCISE_PHASE_CUTTING
 								 : INCISE_PHASE_INSERTION;
@@ -350,6 +345,9 @@ int incise_stage_membrane(struct incise_plan *plan, struct incise_tick *tick)
 
 	v3_sub(off_mm, tick->tool_mm, membrane->point_mm);
 	beyond_mm = -v3_dot(off_mm, membrane->normal);
+	/* Another tool did not come there the way that the last one did. */
+	if (plan->proxy.began)
+		plan->membrane.met = plan->membrane.hit = false;
 	if (tick->phase == INCISE_PHASE_FREE || !(beyond_mm > 0)) {
 		plan->membrane.met = plan->membrane.hit = false;
 		return 0;

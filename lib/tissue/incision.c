@@ -35,6 +35,7 @@ struct incise_incision {
 	int current;
 	double at_mm[3], depth_mm; /* of the last tick */
 	double checked_mm[3];	   /* up to here, for other cuts that it meets */
+	double behind_mm[3];	   /* the place before that: a way that is no noise */
 	struct incise_opening met; /* of handle or tube at this tick */
 	int n;
 	struct incise_cut cut[]; /* setup.cuts_most */
@@ -110,9 +111,10 @@ static struct local localize(const struct incise_cut *cut, const double at_mm[3]
 
 static double across(const struct incise_cut *cut, const double at_mm[3])
 {
-	return (at_mm[0] - cut->at_mm[0]) * cut->side[0] +
-	       (at_mm[1] - cut->at_mm[1]) * cut->side[1] +
-	       (at_mm[2] - cut->at_mm[2]) * cut->side[2];
+	double off[3];
+
+	v3_sub(off, at_mm, cut->at_mm);
+	return v3_dot(off, cut->side);
 }
 
 /* Whether a place is within @reach_mm of the cut, as seen along its normal. */
@@ -160,25 +162,19 @@ static void check_others(struct incise_incision *incision, const double to_mm[3]
 		if (incision->cut[i].incision != incision->cut[own].incision &&
 		    meets(&incision->cut[i], incision->checked_mm, to_mm))
 			join(incision, own, i);
+	v3_copy(incision->behind_mm, incision->checked_mm);
 	v3_copy(incision->checked_mm, to_mm);
 }
 
 /* The part of @way in the surface; else any direction there. Never fails for a unit normal. */
 static void set_frame(struct incise_cut *cut, const double way[3], const double normal[3])
 {
-	double along[3], axis[3] = {0};
-	int least = 0;
+	double along[3];
 
 	v3_copy(cut->normal, normal);
 	v3_add(along, way, -v3_dot(way, normal), normal);
-	if (!v3_unit(cut->along, along, 1e-3)) {
-		for (int i = 1; i < 3; i++)
-			if (fabs(normal[i]) < fabs(normal[least]))
-				least = i;
-		axis[least] = 1;
-		v3_cross(along, axis, normal);
-		v3_unit(cut->along, along, 1e-3);
-	}
+	if (!v3_unit(cut->along, along, 1e-3))
+		v3_any_across(cut->along, normal);
 	v3_cross(cut->side, normal, cut->along);
 }
 
@@ -196,6 +192,7 @@ static bool begin(struct incise_incision *incision, const double at_mm[3],
 	incision->current = incision->n++;
 	v3_copy(incision->at_mm, at_mm);
 	v3_copy(incision->checked_mm, at_mm);
+	v3_copy(incision->behind_mm, at_mm);
 	return true;
 }
 
@@ -259,6 +256,7 @@ static bool enter(struct incise_incision *incision, const double at_mm[3],
 		return false;
 	v3_copy(incision->at_mm, at_mm);
 	v3_copy(incision->checked_mm, at_mm);
+	v3_copy(incision->behind_mm, at_mm);
 	incision->depth_mm = depth_mm;
 	incision->cutting = true;
 	if (there < 0)
@@ -275,7 +273,8 @@ static bool turn(struct incise_incision *incision, const double at_mm[3],
 	int there;
 
 	v3_copy(from_mm, incision->at_mm);
-	v3_sub(way, at_mm, from_mm);
+	/* Since the last tick it went less than what a tracker's noise is. */
+	v3_sub(way, at_mm, incision->behind_mm);
 	there = find(incision, at_mm, way, normal);
 	if (there >= 0)
 		incision->current = there;
@@ -372,13 +371,12 @@ static double needed_mm(const struct incise_incision *incision, enum incise_tool
 	       setup->stretch_mm;
 }
 
-/* Distance aside of the nearest cut within reach, and how many there are. */
+/* Distance aside of the nearest cut within reach; infinite: there is none. */
 static double nearest_mm(const struct incise_incision *incision, const double at_mm[3],
-			 double reach_mm, int *found)
+			 double reach_mm)
 {
 	double best_mm = INFINITY;
 
-	*found = 0;
 	for (int i = 0; i < incision->n; i++) {
 		double aside_mm = fabs(across(&incision->cut[i], at_mm));
 		struct local at;
@@ -389,7 +387,6 @@ static double nearest_mm(const struct incise_incision *incision, const double at
 		at = localize(&incision->cut[i], at_mm);
 		if (!reaches(&incision->cut[i], &at, reach_mm))
 			continue;
-		++*found;
 		best_mm = fmin(best_mm, aside_mm);
 	}
 	return best_mm;
@@ -404,11 +401,11 @@ static double place_along(const struct incise_cut *cut, const double at_mm[3])
 static int deepest(const struct incise_incision *incision, const double at_mm[3],
 		   double reach_mm)
 {
-	int found, best = -1;
-	double most_mm = nearest_mm(incision, at_mm, reach_mm, &found);
+	double most_mm = nearest_mm(incision, at_mm, reach_mm);
 	float depth_mm = -1;
+	int best = -1;
 
-	for (int i = 0; found && i < incision->n; i++) {
+	for (int i = 0; isfinite(most_mm) && i < incision->n; i++) {
 		const struct incise_cut *cut = &incision->cut[i];
 		struct local at;
 		float here_mm;

@@ -11,22 +11,14 @@
 void incise_line_begin(struct incise_line *line, const double at_mm[3],
 		       const double normal[3], const double side[3])
 {
-	double along[3], axis[3] = {0};
-	int least = 0;
+	double along[3];
 
 	*line = (struct incise_line){.there = true, .along = {1, 0, 0}};
 	v3_copy(line->at_mm, at_mm);
 	v3_copy(line->side, side);
 	v3_cross(along, side, normal);
-	if (v3_unit(line->along, along, FLAT))
-		return;
-	/* Any direction in the surface: across the axis that is least along the normal. */
-	for (int i = 1; i < 3; i++)
-		if (fabs(normal[i]) < fabs(normal[least]))
-			least = i;
-	axis[least] = 1;
-	v3_cross(along, axis, normal);
-	v3_unit(line->along, along, FLAT);
+	if (!v3_unit(line->along, along, FLAT))
+		v3_any_across(line->along, normal);
 }
 
 static double along_mm(const struct incise_line *line, const double at_mm[3])

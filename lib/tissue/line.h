@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * A straight line in the surface: where the blade began, its direction there, and how far it
- * went. The front of a cut follows one, and each cut of an incision lies on one.
+ * went. The front of a cut follows one.
  *
  *              side = Sx(0)
  *                 ▲

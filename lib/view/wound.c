@@ -924,8 +924,11 @@ static float stays_mm(const struct wound *wound, uint64_t number, float end_mm)
 	double mm[3] = {p->mm[0], p->mm[1], p->mm[2]}, way[3], open_mm = 0;
 	int cuts = wound->incision ? incise_incision_cuts(wound->incision) : 0;
 
-	other = p->joined && number > wound->first ? line_point(wound, number - 1)
-						   : line_point(wound, number + 1);
+	other = p;
+	if (p->joined && number > wound->first)
+		other = line_point(wound, number - 1);
+	else if (number + 1 < wound->end && line_point(wound, number + 1)->joined)
+		other = line_point(wound, number + 1);
 	for (int i = 0; i < 3; i++)
 		way[i] = p->mm[i] - other->mm[i];
 	for (int i = 0; i < cuts; i++) {

@@ -59,7 +59,7 @@ struct incise_cut {
 	} place[INCISE_CUT_PLACES]; /**< see incise_cut_place() */
 };
 
-/** Where a handle or tube is in an incision. */
+/** The place of a handle or tube in an incision. */
 struct incise_opening {
 	bool in;	 /**< in a cut, which is long enough for it; else the rest is 0 */
 	int cut;	 /**< its number */

@@ -87,7 +87,7 @@ static void plane(double force[3], double k_N_mm, const double p[3], const doubl
 	struct incise_plan plan = plan_with_forces();
 
 	v3_copy(plan.p0_mm, p0);
-	v3_copy(plan.line.side, side);
+	v3_copy(plan.side, side);
 	effect(force, &plan, p, "plane", k_N_mm);
 }
 
@@ -414,7 +414,7 @@ static struct incise_plan plan_in_tissue(void)
 	plan.normal[2] = 1;
 	plan.depth_mm = 2;
 	plan.velocity_mm_s[0] = 10;
-	plan.instrument.side[1] = plan.line.side[1] = 1;
+	plan.instrument.side[1] = plan.side[1] = 1;
 	plan.proxy.began = true;
 	plan.opening =
 		(struct incise_opening){.in = true, .depth_mm = 2, .along = {1, 0, 0}};
@@ -554,7 +554,7 @@ static void test_fixed_is_within_its_bound(void **state)
 
 		if (!v3_unit(plan.normal, n, 0.1))
 			continue;
-		v3_unit(plan.line.side, n, 0.1);
+		v3_unit(plan.side, n, 0.1);
 		for (int k = 0; k < 3; k++) {
 			/* Far away, too: only the difference has to fit. */
 			plan.p0_mm[k] = some(&seed, 1e5);

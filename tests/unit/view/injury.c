@@ -201,7 +201,7 @@ static void test_only_what_is_asked_for(void **state)
 	}
 	assert_true(memory[0] < 200 && memory[1] == memory[0]);
 	/* Fields of 8 bytes a texel, films of 5 more; layers of 4 each. */
-	assert_true(memory[2] > (6 + 4) * SIDE * SIDE &&
+	assert_true(memory[2] > (8 + 2 * 4) * SIDE * SIDE &&
 		    memory[3] > memory[2] + (5 + 4) * SIDE * SIDE);
 	field_free(&field);
 }

@@ -16,7 +16,10 @@ plug_in() {
 	mkfifo /run/foot
 	"$program" pedal </run/foot >/run/node 3>&- &
 	exec 3>/run/foot
-	until [ -s /run/node ]; do sleep 0.05; done
+	for i in $(seq 400); do
+		[ ! -s /run/node ] || break
+		sleep 0.05
+	done
 	ln -sf "$(cat /run/node)" /run/pedal
 }
 pull_out() { exec 3>&-; }
