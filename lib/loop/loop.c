@@ -170,12 +170,13 @@ static INCISE_REALTIME void change_plan(struct run *run, int64_t now_ns)
 	incise_plan_fade(run->plan, waits);
 	if (!waits || !incise_plan_faded(run->plan))
 		return;
-	/* Once it is retired, others may free it. */
-	incise_plan_poses(run->plan, &poses);
-	next = incise_loop_control_swap(run->options->control, run->plan);
+	next = incise_loop_control_next(run->options->control);
 	if (!next)
 		return;
+	incise_plan_poses(run->plan, &poses);
 	incise_pose_counts_add(&run->stats->poses, &poses);
+	incise_plan_take_over(next, run->plan);
+	incise_loop_control_retire(run->options->control, run->plan);
 	run->plan = next;
 	send_event(run, INCISE_LOOP_PLAN, now_ns, 0);
 }

@@ -99,19 +99,21 @@ uint64_t incise_loop_control_events_lost(const struct incise_loop_control *contr
 	return incise_ring_dropped(&control->events);
 }
 
-struct incise_plan *incise_loop_control_waiting(const struct incise_loop_control *control)
+bool incise_loop_control_waiting(const struct incise_loop_control *control)
 {
-	return atomic_load_explicit(&control->offered, memory_order_acquire);
+	return atomic_load_explicit(&control->offered, memory_order_acquire) &&
+	       !atomic_load_explicit(&control->retired, memory_order_acquire);
 }
 
-struct incise_plan *incise_loop_control_swap(struct incise_loop_control *control,
-					     struct incise_plan *old)
+struct incise_plan *incise_loop_control_next(struct incise_loop_control *control)
 {
-	struct incise_plan *plan = atomic_exchange(&control->offered, NULL);
+	return atomic_exchange(&control->offered, NULL);
+}
 
-	if (plan)
-		atomic_store_explicit(&control->retired, old, memory_order_release);
-	return plan;
+void incise_loop_control_retire(struct incise_loop_control *control,
+				struct incise_plan *old)
+{
+	atomic_store_explicit(&control->retired, old, memory_order_release);
 }
 
 void incise_loop_control_event(struct incise_loop_control *control,

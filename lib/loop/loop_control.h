@@ -8,13 +8,17 @@
 
 #include <incise/loop_control.h>
 
-/* The plan that waits, which stays there; NULL for none. */
-struct incise_plan *incise_loop_control_waiting(const struct incise_loop_control *control)
+/* Whether a plan waits, which stays there, and the place of the retired one is free. */
+bool incise_loop_control_waiting(const struct incise_loop_control *control)
 	INCISE_REALTIME;
 
-/* Take the waiting plan and retire @old. NULL, without effect, if it was withdrawn meanwhile. */
-struct incise_plan *incise_loop_control_swap(struct incise_loop_control *control,
-					     struct incise_plan *old) INCISE_REALTIME;
+/* Take the waiting plan: it is the loop's from now on. NULL if it was withdrawn meanwhile. */
+struct incise_plan *incise_loop_control_next(struct incise_loop_control *control)
+	INCISE_REALTIME;
+
+/* Hand the replaced plan back; others may free it from now on. */
+void incise_loop_control_retire(struct incise_loop_control *control,
+				struct incise_plan *old) INCISE_REALTIME;
 
 void incise_loop_control_event(struct incise_loop_control *control,
 			       const struct incise_loop_event *event) INCISE_REALTIME;

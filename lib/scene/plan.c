@@ -167,13 +167,18 @@ static int check_membrane(const struct incise_plan *plan, struct incise_error *e
 		return 0;
 	incise_proxy_init(&proxy, plan->surface, 0);
 	incise_proxy_move(&proxy, membrane->point_mm);
-	if (proxy.touching)
-		return 0;
-	return incise_error_set(
-		err, EINVAL,
-		"%s: membrane.point_mm lies outside of the tissue; place it "
-		"below the surface",
-		plan->scene->path);
+	if (!proxy.touching)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: membrane.point_mm lies outside of the tissue; place it "
+			"below the surface",
+			plan->scene->path);
+	if (!(v3_dot(membrane->normal, proxy.touch.normal) > 0))
+		return incise_error_set(
+			err, EINVAL,
+			"%s: membrane.normal points into the tissue; turn it round",
+			plan->scene->path);
+	return 0;
 }
 
 static bool keeps(const struct incise_plan *plan, const char *stage)
@@ -326,6 +331,13 @@ void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 	copy->beyond_N_mm *= gain;
 	for (int i = 0; i < incise_n_tissue_forces; i++)
 		copy->acting[i].number[0] *= gain;
+}
+
+void incise_plan_take_over(struct incise_plan *plan, const struct incise_plan *before)
+{
+	plan->membrane.punctured = before->membrane.punctured;
+	if (plan->incision && before->incision)
+		incise_incision_copy(plan->incision, before->incision);
 }
 
 void incise_plan_free(struct incise_plan *plan)

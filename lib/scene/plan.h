@@ -43,6 +43,14 @@ _Static_assert(INCISE_PLAN_OTHER_STAGES + INCISE_FORCES_MAX <= INCISE_PLAN_STAGE
 /* A tracker that gives only unusable poses for so long has failed, as one that is unplugged. */
 #define INCISE_PLAN_BLIND_NS (10 * INCISE_NS_PER_S)
 
+/* The height of an end above the surface, when that was last searched for it. */
+struct incise_above {
+	bool known;
+	double end_mm[3], above_mm;
+};
+
+enum { INCISE_PLAN_TIP, INCISE_PLAN_HANDLE, INCISE_PLAN_TUBE, INCISE_PLAN_ENDS };
+
 struct incise_plan {
 	const struct incise_scene *scene;
 	struct incise_stage stage[INCISE_PLAN_STAGES_MAX];
@@ -77,6 +85,7 @@ struct incise_plan {
 	char no_tool[128];	       /* the reason why not */
 	struct incise_predict *handle; /* its end's position; with stage tool */
 	struct incise_predict *tube;   /* the same, if it has a station */
+	struct incise_above above[INCISE_PLAN_ENDS]; /* with a tube's station */
 	const struct incise_surface *surface;
 	struct incise_surface *own_surface; /* the rig's plane, when it is that */
 	double up[3];			    /* normal of the surface's top */
@@ -149,6 +158,13 @@ void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 
 /* Fill in the stages that the scene and the rig need, and why the others are left out. */
 void incise_plan_choose(struct incise_plan *plan);
+
+/*
+ * The tissue of a plan that it replaces: its cuts, as many as it has room for, and whether the membrane
+ * is open. Real-time safe; some 10 us for 64 cuts.
+ */
+void incise_plan_take_over(struct incise_plan *plan,
+			   const struct incise_plan *before) INCISE_REALTIME;
 
 /* Ramp the force to zero, or let it return. The plan goes on. Real-time safe. */
 void incise_plan_fade(struct incise_plan *plan, bool fading) INCISE_REALTIME;

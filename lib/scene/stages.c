@@ -141,24 +141,64 @@ static bool keeps_tool(struct incise_plan *plan)
 /* From here on the tube counts as nearer; a tracker's noise and a tremor are far less. */
 #define NEARER_MM 5
 
-static double above_mm(const struct incise_plan *plan, const double end_mm[3])
+/* A height above the surface, between two numbers. */
+struct height {
+	double low_mm, high_mm;
+};
+
+/* Since the surface was searched a height changed by no more than the end went. */
+static struct height height_of(const struct incise_above *above, const double end_mm[3])
+{
+	double way_mm[3], went_mm = INFINITY;
+
+	v3_sub(way_mm, end_mm, above->end_mm);
+	if (above->known)
+		went_mm = v3_length(way_mm);
+	return (struct height){above->above_mm - went_mm, above->above_mm + went_mm};
+}
+
+static void search(const struct incise_plan *plan, struct incise_above *above,
+		   const double end_mm[3])
 {
 	struct incise_touch touch;
 
 	incise_surface_nearest(plan->surface, end_mm, &touch);
-	return -touch.depth_mm;
+	*above = (struct incise_above){.known = true, .above_mm = -touch.depth_mm};
+	v3_copy(above->end_mm, end_mm);
 }
 
-static bool is_tube_nearer(const struct incise_plan *plan, const struct incise_tick *tick)
+/* The surface is only searched where what is known of the heights does not decide it. */
+static bool is_tube_nearer(struct incise_plan *plan, const struct incise_tick *tick)
 {
-	double handle_mm[3], tube_mm[3], speed_mm_s[3], attitude[4], scalpel, tube;
+	bool tube_held = plan->instrument.held == INCISE_TOOL_TUBE, searched = false;
+	double end_mm[INCISE_PLAN_ENDS][3], speed_mm_s[3], attitude[4];
+	/* Of how much a tube that is nearer stays below the scalpel. */
+	double less_mm = tube_held ? -NEARER_MM : NEARER_MM;
 
-	incise_predict_at(plan->handle, tick->t_ns, handle_mm, speed_mm_s, attitude);
-	incise_predict_at(plan->tube, tick->t_ns, tube_mm, speed_mm_s, attitude);
-	scalpel = fmin(above_mm(plan, tick->position_mm), above_mm(plan, handle_mm));
-	tube = above_mm(plan, tube_mm);
-	return plan->instrument.held == INCISE_TOOL_TUBE ? tube <= scalpel + NEARER_MM
-							 : tube + NEARER_MM < scalpel;
+	v3_copy(end_mm[INCISE_PLAN_TIP], tick->position_mm);
+	incise_predict_at(plan->handle, tick->t_ns, end_mm[INCISE_PLAN_HANDLE],
+			  speed_mm_s, attitude);
+	incise_predict_at(plan->tube, tick->t_ns, end_mm[INCISE_PLAN_TUBE], speed_mm_s,
+			  attitude);
+	for (;;) {
+		struct height h[INCISE_PLAN_ENDS], scalpel, tube;
+
+		for (int i = 0; i < INCISE_PLAN_ENDS; i++)
+			h[i] = height_of(&plan->above[i], end_mm[i]);
+		scalpel.low_mm =
+			fmin(h[INCISE_PLAN_TIP].low_mm, h[INCISE_PLAN_HANDLE].low_mm);
+		scalpel.high_mm =
+			fmin(h[INCISE_PLAN_TIP].high_mm, h[INCISE_PLAN_HANDLE].high_mm);
+		tube = h[INCISE_PLAN_TUBE];
+		if (tube.high_mm + less_mm < scalpel.low_mm)
+			return true;
+		if (tube.low_mm + less_mm > scalpel.high_mm || searched)
+			return tube_held && searched &&
+			       tube.low_mm + less_mm <= scalpel.high_mm;
+		for (int i = 0; i < INCISE_PLAN_ENDS; i++)
+			search(plan, &plan->above[i], end_mm[i]);
+		searched = true;
+	}
 }
 
 static bool is_tube_stale(const struct incise_plan *plan, const struct incise_tick *tick)
@@ -180,7 +220,8 @@ static bool find_tube(struct incise_plan *plan, const struct incise_tick *tick)
 	else if (tick->flags & INCISE_TICK_STALE)
 		instrument->tube_nearer = true;
 	keeps = keeps_tool(plan);
-	if (!keeps && !is_tube_stale(plan, tick) && !(tick->flags & INCISE_TICK_STALE))
+	if (!keeps && instrument->wanted == INCISE_TOOL_AUTO &&
+	    !is_tube_stale(plan, tick) && !(tick->flags & INCISE_TICK_STALE))
 		instrument->tube_nearer = is_tube_nearer(plan, tick);
 	return keeps;
 }

@@ -66,6 +66,16 @@ void incise_incision_free(struct incise_incision *incision)
 	free(incision);
 }
 
+void incise_incision_copy(struct incise_incision *to, const struct incise_incision *from)
+{
+	int most = to->setup.cuts_most;
+
+	to->n = from->n < most ? from->n : most;
+	for (int i = 0; i < to->n; i++)
+		to->cut[i] = from->cut[i];
+	to->cutting = to->met.in = false;
+}
+
 size_t incise_incision_memory(const struct incise_incision *incision)
 {
 	return sizeof(*incision) +

@@ -23,6 +23,13 @@ struct incise_incision *incise_incision_make(const struct incise_incision_setup 
 /* Memory that it holds, bytes. */
 size_t incise_incision_memory(const struct incise_incision *incision);
 
+/*
+ * The cuts of another one, as many as there is room for, the first ones first; its own are forgotten,
+ * and no tool is in it.
+ */
+void incise_incision_copy(struct incise_incision *to,
+			  const struct incise_incision *from) INCISE_REALTIME;
+
 /* The opening that a handle or tube met at the last tick, before that widened it. */
 const struct incise_opening *incise_incision_met(const struct incise_incision *incision)
 	INCISE_REALTIME;

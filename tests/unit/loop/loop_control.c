@@ -25,25 +25,33 @@ static void test_one_place(void **state)
 {
 	struct incise_loop_control *control = incise_loop_control_new();
 
-	assert_null(incise_loop_control_waiting(control));
+	assert_false(incise_loop_control_waiting(control));
 	assert_null(incise_loop_control_withdraw(control));
-	assert_null(incise_loop_control_swap(control, plan(0)));
+	assert_null(incise_loop_control_next(control));
 	assert_null(incise_loop_control_retired(control));
 
 	assert_int_equal(incise_loop_control_offer(control, plan(1)), 0);
 	assert_int_equal(incise_loop_control_offer(control, plan(2)), -EBUSY);
-	assert_ptr_equal(incise_loop_control_waiting(control), plan(1));
+	assert_true(incise_loop_control_waiting(control));
 	assert_ptr_equal(incise_loop_control_withdraw(control), plan(1));
-	assert_null(incise_loop_control_swap(control, plan(0)));
+	assert_null(incise_loop_control_next(control));
 
 	assert_int_equal(incise_loop_control_offer(control, plan(1)), 0);
-	assert_ptr_equal(incise_loop_control_swap(control, plan(0)), plan(1));
+	assert_ptr_equal(incise_loop_control_next(control), plan(1));
+	incise_loop_control_retire(control, plan(0));
 	/* The place of the old one is not free yet. */
 	assert_int_equal(incise_loop_control_offer(control, plan(2)), -EBUSY);
 	assert_null(incise_loop_control_withdraw(control));
 	assert_ptr_equal(incise_loop_control_retired(control), plan(0));
 	assert_null(incise_loop_control_retired(control));
 	assert_int_equal(incise_loop_control_offer(control, plan(2)), 0);
+	/* One that was offered between taking and retiring waits for that place. */
+	assert_ptr_equal(incise_loop_control_next(control), plan(2));
+	assert_int_equal(incise_loop_control_offer(control, plan(0)), 0);
+	incise_loop_control_retire(control, plan(1));
+	assert_false(incise_loop_control_waiting(control));
+	assert_ptr_equal(incise_loop_control_retired(control), plan(1));
+	assert_true(incise_loop_control_waiting(control));
 	incise_loop_control_free(control);
 	incise_loop_control_free(NULL);
 }
@@ -137,8 +145,9 @@ static void *change(void *argument)
 		struct incise_plan *next = NULL;
 
 		if (incise_loop_control_waiting(changer->control))
-			next = incise_loop_control_swap(changer->control, now);
+			next = incise_loop_control_next(changer->control);
 		if (next) {
+			incise_loop_control_retire(changer->control, now);
 			now = next;
 			changer->swaps++;
 		}

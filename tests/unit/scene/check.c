@@ -222,6 +222,43 @@ static void test_refusal_names_a_gain(void **state)
 }
 
 /* A delay of its own is that of a wall without a predictor. */
+/* Tissue and a membrane that lies aslant push at once, and one below a plane in turn. */
+static void test_membrane_aslant(void **state)
+{
+	static const struct {
+		const char *normal;
+		double want_N_mm;
+	} cases[] = {{"[0.0, 0.0, 1.0]", 0.12},
+		     {"[0.04, 0.0, 1.0]", 0.12}, /* 0.4 mm */
+		     {"[0.06, 0.0, 1.0]", 0.22}, /* 0.6 mm */
+		     {"[0.0, 1.0, 1.0]", 0.22}};
+
+	for (size_t i = 0; i < N(cases); i++) {
+		struct incise_plan_stability stability;
+		FILE *out = fopen(path, "w");
+		struct incise_scene *scene;
+		struct incise_plan *plan;
+
+		fprintf(out,
+			"surface = { kind = \"plane\"; point_mm = [0.0, 0.0, 0.0]; };\n"
+			"tissue = { reaction_N_mm = 0.12; insertion_N_mm = 0.12; };\n"
+			"membrane = { point_mm = [0.0, 0.0, -8.0]; normal = %s; "
+			"radius_mm = 5.0; thickness_mm = 5.0; puncture_N = 0.5; "
+			"back_wall_mm = 14.0; };\n",
+			cases[i].normal);
+		fclose(out);
+		scene = incise_scene_load(path, NULL, NULL);
+		assert_non_null(scene);
+		plan = incise_plan_new(scene, NULL, NULL);
+		assert_non_null(plan);
+		incise_plan_stability(plan, &stability);
+		if (!(fabs(stability.stiffness_N_mm - cases[i].want_N_mm) < 1e-12))
+			fail_msg("case %zu: %g N/mm", i, stability.stiffness_N_mm);
+		incise_plan_free(plan);
+		incise_scene_free(scene);
+	}
+}
+
 static void test_own_delay(void **state)
 {
 	struct wall wall = {.mass_kg = 0.05, .b = 0.01, .delay_ticks = 5};
@@ -281,6 +318,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_limit_is_that_of_the_loop),
 		cmocka_unit_test(test_refusal_names_a_gain),
+		cmocka_unit_test(test_membrane_aslant),
 		cmocka_unit_test(test_own_delay),
 		cmocka_unit_test(test_rests_below_the_limit),
 		cmocka_unit_test(test_shipped_scenes),

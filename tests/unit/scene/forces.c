@@ -515,6 +515,9 @@ static void test_insertion_by_turn_and_opening(void **state)
 		/* The product as printed resists along the cut. */
 		{as_is, INCISE_TOOL_HANDLE, true, true, 0.5, 2},
 		{across, INCISE_TOOL_HANDLE, true, true, 0.5, 0},
+		/* … of a handle; a tube has no flat side. */
+		{as_is, INCISE_TOOL_TUBE, true, true, 0.5, 0.5 + 1.5 * 0.6},
+		{across, INCISE_TOOL_TUBE, true, true, 0.5, 0.5 + 1.5 * 0.6},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {

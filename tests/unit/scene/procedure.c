@@ -15,6 +15,7 @@
 #include <stdint.h>
 #include <setjmp.h>
 #include <cmocka.h>
+#include "../../../lib/scene/plan.h"
 #include "fed.h"
 
 /* The shipped scene; tests run in the repository's root. */
@@ -550,6 +551,31 @@ static void test_stopped_like_skin(void **state)
 	}
 }
 
+/* A plan that replaces another one has its cuts, and its open membrane. */
+static void test_another_plan(void **state)
+{
+	struct incise_plan *next;
+	struct theatre th;
+
+	cut_at(&th, 50, 6);
+	enlarge_at(&th, 50);
+	take_tube(&th, 50);
+	go(&th, 50, 0, -14, 1.5);
+	go(&th, 50, 0, 15, 1.5);
+	next = incise_plan_new(th.scene, NULL, NULL);
+	assert_non_null(next);
+	incise_plan_take_over(next, th.plan);
+	incise_plan_free(th.plan);
+	th.plan = next;
+	assert_int_equal(incise_plan_set_tool(th.plan, INCISE_TOOL_TUBE), 0);
+	/* The first pose, and the start's ramp. */
+	go(&th, 50, 0, 15, 0.3);
+	go(&th, 50, 0, -12, 1.5);
+	assert_true(th.tick.flags & INCISE_TICK_LUMEN);
+	assert_force(&th, (double[]){0, 0, tube_N(ALIGNED, 6, MEMBRANE_MM, 0)});
+	end(&th);
+}
+
 /*
  * A blade that touches the skin elsewhere, or cuts there, changes nothing for a tube in the first
  * cut, to the bit. No poses come for 0.1 s after it, so that the
@@ -799,6 +825,7 @@ int main(void)
 		cmocka_unit_test(test_change_is_no_work),
 		cmocka_unit_test(test_tube_where_and_after_what),
 		cmocka_unit_test(test_through_the_membrane),
+		cmocka_unit_test(test_another_plan),
 		cmocka_unit_test(test_stopped_like_skin),
 		cmocka_unit_test(test_touch_elsewhere),
 		cmocka_unit_test(test_leaning_the_handle),

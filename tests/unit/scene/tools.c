@@ -293,6 +293,30 @@ static void test_no_change_in_the_tissue(void **state)
 	leave(&room);
 }
 
+/* A tube that is taken in hand far off the membrane is not in it because the blade was. */
+static void test_membrane_is_of_one_tool(void **state)
+{
+	static const char airway[] = TISSUE
+		"membrane = { point_mm = [0.0, 0.0, -8.0]; normal = [0.0, 0.0, 1.0]; "
+		"radius_mm = 5.0; thickness_mm = 5.0; puncture_N = 0.5; "
+		"back_wall_mm = 14.0; };\n";
+	struct room room;
+
+	for (int blade = 0; blade < 2; blade++) {
+		enter(&room, airway, "double", &two);
+		room.tube_mm[0] = 60;
+		assert_int_equal(held_at(&room, 60, 100), INCISE_TOOL_BLADE);
+		held_at(&room, blade ? -15 : 60, 100);
+		assert_true(!!(room.tick.flags & INCISE_TICK_LUMEN) == blade);
+		incise_plan_set_tool(room.plan, INCISE_TOOL_TUBE);
+		assert_int_equal(held_at(&room, blade ? -15 : 60, -12), INCISE_TOOL_TUBE);
+		assert_false(room.tick.flags &
+			     (INCISE_TICK_LUMEN | INCISE_TICK_MEMBRANE));
+		assert_true(fabs(room.tick.command_N[2] - 0.2 * 12) < 1e-6);
+		leave(&room);
+	}
+}
+
 /* A silent station takes its own tool away, and not the other's. */
 static void test_silence(void **state)
 {
@@ -450,6 +474,7 @@ int main(void)
 		cmocka_unit_test(test_nearer_tool),
 		cmocka_unit_test(test_by_name),
 		cmocka_unit_test(test_no_change_in_the_tissue),
+		cmocka_unit_test(test_membrane_is_of_one_tool),
 		cmocka_unit_test(test_silence),
 		cmocka_unit_test(test_silence_in_the_tissue),
 		cmocka_unit_test(test_continuous),
