@@ -86,17 +86,10 @@ static double metric_of(const struct assessed *a, int i)
 	return *(const double *)((const char *)a->session + metrics[i].offset);
 }
 
-/* Without "-0.0". */
-static double tidy(double value, int digits)
-{
-	double factor = pow(10, digits);
-
-	return round(value * factor) / factor + 0.0;
-}
-
 static void number_text(double value, int digits, char *text, size_t size)
 {
-	snprintf(text, size, isnan(value) ? "-" : "%.*f", digits, tidy(value, digits));
+	snprintf(text, size, isnan(value) ? "-" : "%.*f", digits,
+		 session_rounded(value, digits));
 }
 
 /* --- reading --------------------------------------------------------------------------- */
@@ -194,11 +187,8 @@ static struct line criterion_line(const struct assessed *a,
 		return line;
 	session_criterion_value(i, reference->verdict[i].value, line.reference,
 				sizeof(line.reference));
-	/* Of yes and no there is none. */
-	strcpy(line.difference, "-");
-	if (i == INCISE_CRITERION_MEMBRANE || i == INCISE_CRITERION_BACK_WALL)
-		return line;
-	difference = verdict->value - reference->verdict[i].value;
+	difference = session_criterion_difference(i, verdict->value,
+						  reference->verdict[i].value);
 	session_criterion_value(i, difference, line.difference, sizeof(line.difference));
 	sign(difference, line.difference, sizeof(line.difference));
 	return line;
@@ -218,7 +208,8 @@ static struct line metric_line(const struct assessed *a, const struct assessed *
 		return line;
 	number_text(metric_of(reference, i), metrics[i].digits, line.reference,
 		    sizeof(line.reference));
-	difference = metric_of(a, i) - metric_of(reference, i);
+	difference = session_rounded(metric_of(a, i) - metric_of(reference, i),
+				     metrics[i].digits);
 	number_text(difference, metrics[i].digits, line.difference,
 		    sizeof(line.difference));
 	sign(difference, line.difference, sizeof(line.difference));
@@ -268,8 +259,8 @@ struct cut_text {
 
 static void place_text(const double at_mm[3], char *text, size_t size)
 {
-	snprintf(text, size, "%.1f, %.1f, %.1f", tidy(at_mm[0], 1), tidy(at_mm[1], 1),
-		 tidy(at_mm[2], 1));
+	snprintf(text, size, "%.1f, %.1f, %.1f", session_rounded(at_mm[0], 1),
+		 session_rounded(at_mm[1], 1), session_rounded(at_mm[2], 1));
 }
 
 static struct cut_text cut_text(const struct session_cut *cut)
@@ -343,30 +334,13 @@ static void print_one(const struct assessed *a, const struct assessed *reference
 	printf("\n%d of %d criteria met\n", a->met, a->judged);
 }
 
-/* Of many sessions: the criteria as columns. */
-static const struct {
-	const char *head;
-	int criterion;
-} columns[] = {
-	{"length_mm", INCISE_CRITERION_CUT_LENGTH},
-	{"depth_mm", INCISE_CRITERION_CUT_DEPTH},
-	{"off_mm", INCISE_CRITERION_OFF_TARGET},
-	{"incisions", INCISE_CRITERION_INCISIONS},
-	{"membrane", INCISE_CRITERION_MEMBRANE},
-	{"tube_mm", INCISE_CRITERION_INSERTION},
-	{"back_wall", INCISE_CRITERION_BACK_WALL},
-	{"force_N", INCISE_CRITERION_FORCE},
-	{"time_s", INCISE_CRITERION_TIME},
-};
-#define COLUMNS (int)(sizeof(columns) / sizeof(*columns))
-
 /* "29.6", and with a mark where the criterion is not met. */
-static void cell_text(const struct assessed *a, int column, char *text, size_t size)
+static void cell_text(const struct assessed *a, int criterion, char *text, size_t size)
 {
-	const struct session_verdict *verdict = &a->verdict[columns[column].criterion];
+	const struct session_verdict *verdict = &a->verdict[criterion];
 	size_t n;
 
-	session_criterion_value(columns[column].criterion, verdict->value, text, size);
+	session_criterion_value(criterion, verdict->value, text, size);
 	n = strlen(text);
 	if (verdict->judged && !verdict->met)
 		snprintf(text + n, size - n, "!");
@@ -380,15 +354,15 @@ static void print_table(const struct job *job)
 	for (int i = 0; i < rows(job); i++)
 		width = (int)fmax(width, (double)strlen(job->session[i].path));
 	printf("%-*s %-16s", width, "session", "code");
-	for (int k = 0; k < COLUMNS; k++)
-		printf(" %9s", columns[k].head);
+	for (int k = 0; k < INCISE_CRITERIA; k++)
+		printf(" %9s", session_criterion_head(k));
 	puts("    met");
 	for (int i = 0; i < rows(job); i++) {
 		const struct assessed *a = &job->session[i];
 
 		printf("%-*s %-16s", width, a->path,
 		       *a->session->code ? a->session->code : "-");
-		for (int k = 0; k < COLUMNS; k++) {
+		for (int k = 0; k < INCISE_CRITERIA; k++) {
 			cell_text(a, k, text, sizeof(text));
 			printf(" %9s", text);
 		}
@@ -442,8 +416,10 @@ static json_t *difference_json(const struct assessed *a, const struct assessed *
 	json_t *object = json_object();
 
 	for (int i = 0; i < INCISE_CRITERIA; i++)
-		json_set_number(object, incise_criterion_name(i),
-				a->verdict[i].value - reference->verdict[i].value);
+		json_set_number(
+			object, incise_criterion_name(i),
+			session_criterion_difference(i, a->verdict[i].value,
+						     reference->verdict[i].value));
 	for (int i = 0; i < METRICS; i++)
 		json_set_number(object, metrics[i].key,
 				metric_of(a, i) - metric_of(reference, i));
@@ -745,14 +721,14 @@ static void put_overview(FILE *out, const struct job *job)
 	char text[40];
 
 	fputs("\n## All sessions\n\nValues; **bold** is a criterion that is not met.\n\n"
-	      "| session | code |",
+	      "| session | code | met |",
 	      out);
-	for (int k = 0; k < COLUMNS; k++)
-		fprintf(out, " %s |", columns[k].head);
-	fputs(" met |\n|---|---|", out);
-	for (int k = 0; k < COLUMNS; k++)
+	for (int k = 0; k < INCISE_CRITERIA; k++)
+		fprintf(out, " %s |", session_criterion_head(k));
+	fputs("\n|---|---|---:|", out);
+	for (int k = 0; k < INCISE_CRITERIA; k++)
 		fputs("---:|", out);
-	fputs("---:|\n", out);
+	fputc('\n', out);
 	for (int i = 0; i < rows(job); i++) {
 		const struct assessed *a = &job->session[i];
 
@@ -760,16 +736,15 @@ static void put_overview(FILE *out, const struct job *job)
 		document_text(out, a->path);
 		fprintf(out, "%s | ", a == job->reference ? " (reference)" : "");
 		document_text(out, *a->session->code ? a->session->code : "-");
-		for (int k = 0; k < COLUMNS; k++) {
-			const struct session_verdict *verdict =
-				&a->verdict[columns[k].criterion];
+		fprintf(out, " | %d of %d", a->met, a->judged);
+		for (int k = 0; k < INCISE_CRITERIA; k++) {
+			const struct session_verdict *verdict = &a->verdict[k];
 			const char *mark = verdict->judged && !verdict->met ? "**" : "";
 
-			session_criterion_value(columns[k].criterion, verdict->value,
-						text, sizeof(text));
+			session_criterion_value(k, verdict->value, text, sizeof(text));
 			fprintf(out, " | %s%s%s", mark, text, mark);
 		}
-		fprintf(out, " | %d of %d |\n", a->met, a->judged);
+		fputs(" |\n", out);
 	}
 }
 
@@ -911,6 +886,7 @@ static void write_page(const struct job *job)
 	page = whole_file_begin(job->page, &file);
 	folder_make(folder, sizeof(folder), "for the figures");
 	atexit(remove_folder);
+	cli_catch_signals();
 	plot_folder(folder);
 	out = open_memstream(&markdown, &size);
 	if (!out)
@@ -918,6 +894,8 @@ static void write_page(const struct job *job)
 	put_contents(out, job);
 	put_overview(out, job);
 	for (int i = 0; i < job->n; i++) {
+		if (cli_stop)
+			cli_fail("%s: %s is as it was", strsignal(cli_stop), job->page);
 		cli_progress("figures %d of %d", i + 1, job->n);
 		put_session(out, &job->session[i], job->reference, i + 1);
 	}

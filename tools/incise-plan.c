@@ -229,20 +229,21 @@ static void print_axes(struct incise_rig *rig, const struct incise_plan_stabilit
 	struct incise_stepper_info info;
 	int n = 0;
 
-	for (; (stepper = incise_rig_axis(rig, n, direction[n])); n++) {
+	for (;
+	     n < INCISE_RIG_AXES_MAX && (stepper = incise_rig_axis(rig, n, direction[n]));
+	     n++) {
 		incise_stepper_info(stepper, &info);
 		print_direction(n ? "            along " : "felt        along ",
 				direction[n]);
 		printf(": %s, %.4g N/mm of at most %.4g N/mm, %d ticks late\n", info.name,
 		       s->axis[n].stiffness_N_mm, s->axis[n].limit_N_mm,
 		       s->axis[n].late_ticks);
-		if (n + 1 == INCISE_RIG_AXES_MAX)
-			break;
 	}
 	if (n == 1)
 		printf("            not felt: forces across it\n");
 	if (n == 2) {
-		cross(other, direction[0], direction[1]);
+		/* Either way round; on a usual rig so that it is positive. */
+		cross(other, direction[1], direction[0]);
 		print_direction("            not felt: forces along ", other);
 		putchar('\n');
 	}

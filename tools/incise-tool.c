@@ -11,7 +11,7 @@
 #include <time.h>
 #include <unistd.h>
 #include "cli/cli.h"
-#include "cli/json.h"
+#include "cli/loop_report.h"
 #include "haptic/control.h"
 #include "status/pages.h"
 
@@ -41,10 +41,8 @@ static const struct cli_command command = {
 
 static bool is_tool(const char *name)
 {
-	static const char *const tools[] = {"blade", "handle", "tube", "auto"};
-
-	for (size_t i = 0; i < sizeof(tools) / sizeof(*tools); i++)
-		if (!strcmp(name, tools[i]))
+	for (const char *const *tool = loop_tool_names; *tool; tool++)
+		if (!strcmp(name, *tool))
 			return true;
 	return false;
 }

@@ -177,12 +177,16 @@ static void begin_session(struct view_job *job)
 	job->log = session_log_begin(&job->session, &start);
 }
 
-static void end_session(struct view_job *job)
+/* A session that cannot be written takes no picture with it, nor the other way round. */
+static void end_files(struct view_job *job)
 {
+	const char *kind = cli_stop ? "signal" : *job->fault ? "fault" : "asked";
 	struct incise_error err = {0};
+	int rc = session_log_end(job->log, kind,
+				 cli_stop ? strsignal(cli_stop) : job->fault, &err);
 
-	if (session_log_end(job->log, cli_stop ? "signal" : "asked",
-			    cli_stop ? strsignal(cli_stop) : "", &err))
+	view_output_end(&job->output);
+	if (rc)
 		cli_fail_with(&err);
 }
 
@@ -205,8 +209,7 @@ int main(int argc, char **argv)
 	else
 		view_running(&job);
 	cli_progress_end();
-	end_session(&job);
-	view_output_end(&job.output);
+	end_files(&job);
 	if (job.json)
 		report(&job);
 	else if (job.no_output)

@@ -487,7 +487,7 @@ rate() {
 		[ "$(of guards_stiffest 'count(*)' "guard = '$guard'")" = 4 ]
 		holds "$(of guards_ns ns "guard = '$guard'") > 0"
 	done
-	# scenes rest at their own gain without a guard, and most do not at twice the largest
+	# scenes rest at their own gain without a guard, and at most half do at twice the largest
 	holds "$(of guards rest_share "guard = 'none' AND own") == 1"
 	holds "$(of guards rest_share "guard = 'none' AND gain = 2") <= 0.5"
 	# a coupling makes that rest by another force; below its limit it does nothing

@@ -254,7 +254,7 @@ print(max(math.dist(p, q) for i, p in ends for k, q in ends if i == k))')
 	run -0 --separate-stderr incise assess a.session
 	[ -z "$stderr" ]
 	[[ "$output" =~ time\ needed\ +-\ s\ +at\ most\ 40\ +no ]]
-	incise assess a.session -o a.html >/dev/null 2>why || grep -qE "gnuplot|cmark" why
+	incise assess a.session -o a.html >/dev/null 2>why || grep -qE "gnuplot is not installed|without libcmark-gfm" why
 	python3 - <<-'END'
 		import json
 		s = json.load(open('a.session'))
@@ -266,7 +266,7 @@ print(max(math.dist(p, q) for i, p in ends for k, q in ends if i == k))')
 	run -0 --separate-stderr incise assess b.session
 	[ -z "$stderr" ]
 	[[ "$output" == *"5 of 5 ticks were lost"* ]]
-	incise assess b.session -o b.html >/dev/null 2>why || grep -qE "gnuplot|cmark" why
+	incise assess b.session -o b.html >/dev/null 2>why || grep -qE "gnuplot is not installed|without libcmark-gfm" why
 }
 
 # refused TEXT…: bad.session is, in one line.
@@ -324,7 +324,7 @@ refused() {
 	[ "$(key b.json 'sessions[0].met')" = 8 ]
 	[ "$(key b.json 'sessions[0].criteria.insertion_depth_mm.met')" = 0 ]
 	# the page has the membrane
-	incise assess a.session -o a.html >/dev/null 2>why || { grep -qE "gnuplot|cmark" why && skip "$(cat why)"; }
+	incise assess a.session -o a.html >/dev/null 2>why || { grep -qE "gnuplot is not installed|without libcmark-gfm" why && skip "$(cat why)"; }
 	python3 - a.html <<-'END'
 		import base64, re, sys
 		figures = re.findall('base64,([A-Za-z0-9+/=]+)', open(sys.argv[1]).read())
@@ -336,7 +336,8 @@ refused() {
 	[ -x "$INCISE_BUILD/bin/incise-view" ] ||
 		skip "incise view was not built: SDL2, epoxy, cairo or EGL were absent"
 	small="--size 160x120 --no-panel --fps 1 --duration 4s"
-	incise view neck --procedure --frames f --session a.session $small 2>why || skip "no OpenGL here: $(cat why)"
+	incise view neck --procedure --frames gl $small 2>why || skip "no OpenGL here: $(cat why)"
+	incise view neck --procedure --frames f --session a.session $small
 	incise view neck --procedure --frames f --session b.session --overwrite --json $small >r.json
 	cmp a.session b.session
 	[ "$(key a.session source)" = procedure ]

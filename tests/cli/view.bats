@@ -111,6 +111,58 @@ teardown() {
 	failed_with "idle-$$" "incise haptic"
 }
 
+# Start a loop of neck.scene, and wait until it has ticked for 3 s.
+begin_loop() {
+	mkdir -p "$XDG_RUNTIME_DIR/incise"
+	# without a terminal, so that SIGHUP reads the scene again
+	setsid incise haptic neck.scene --rig sim: --no-rt --overwrite --overruns 0 \
+		--state "$XDG_RUNTIME_DIR/incise/neck.state" >h.txt 2>err 3>&- </dev/null &
+	pid=$!
+	for ((i = 0; i < 400; i++)); do
+		incise status neck --json >s.json 2>/dev/null &&
+			[ "$(key s.json 'loops[0].ticks')" -gt 3000 ] && return
+		sleep 0.05
+	done
+	false
+}
+
+# Look at it with a session, until it has drawn: $seen.
+begin_view() {
+	rm -rf f
+	incise view neck --frames f --fps 10 --session v.session --overwrite --duration 60s $small \
+		>v.txt 2>why 3>&- &
+	seen=$!
+	for ((i = 0; i < 400; i++)); do
+		[ -e f/frame-000003.png ] && return
+		sleep 0.05
+	done
+	false
+}
+
+@test "a session of a loop that runs begins when it is looked at, and ends as the loop does" {
+	begin_loop
+	# less than the look itself took; the page holds the 3 s before
+	begin=$(date +%s.%N)
+	incise view neck --frames f --fps 10 --session v.session --duration 1s $small
+	holds "$(key v.session duration_s) > 0 && $(key v.session duration_s) < $(date +%s.%N) - $begin"
+	[ "$(key v.session ticks_lost)" = 0 ]
+	[ "$(key v.session end.kind)" = asked ]
+	# another scene is no part of it
+	begin_view
+	kill -HUP $pid
+	status=0
+	wait $seen || status=$?
+	[ "$status" = 1 ]
+	grep -q "another scene" why
+	[ "$(key v.session end.kind)" = fault ]
+	begin_view
+	kill -9 $pid
+	wait $seen
+	[ "$(key v.session end.kind)" = fault ]
+	[ "$(key v.session end.why)" = "the loop ended without a word" ]
+	pid=
+}
+
 @test "a recording is seen through its loop" {
 	incise capture -o r.rec --rig sim:seed=1,clock=simulated,depth_mm=5,times=1 2>/dev/null
 	sed -i 's/skin = "liver"/& ; texture_px = 512/' liver.scene

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * Reports of the commands that run the loop: the flags of ticks, and how late ticks were.
+ * Reports of the commands that run the loop: names of tools, flags of ticks, lateness of ticks.
  */
 #ifndef INCISE_LOOP_REPORT_H
 #define INCISE_LOOP_REPORT_H
@@ -8,10 +8,10 @@
 #include <incise/loop.h>
 #include "json.h"
 
-/* As JSON names them, from the lowest bit on. */
 /* By enum incise_tool; ends with NULL. */
 extern const char *const loop_tool_names[];
 
+/* As JSON names them, from the lowest bit on. */
 extern const char *const loop_flag_names[INCISE_TICK_FLAGS]; /* NULL: never set */
 
 /*

@@ -56,7 +56,7 @@ static void cut_pose(const struct stroke *stroke, int cut, int cuts, double t_s,
 /* The blade makes cuts next to each other. */
 static void make_cuts(struct tick_stroke *timed, int cuts)
 {
-	double pose_s = 1 / timed->tracker->rate_hz, next_s = 0;
+	double pose_s = 1 / incise_tracker_station_hz(timed->tracker), next_s = 0;
 	struct incise_tracker_sample sample = {.quaternion = {1}, .status = ' '};
 	struct incise_tick tick;
 
@@ -92,7 +92,8 @@ struct tick_stroke *tick_stroke_new(const struct incise_scene *scene,
 	if (cuts)
 		make_cuts(timed, cuts);
 	incise_plan_set_tool(timed->plan, tool);
-	timed->pose = (int64_t)((double)timed->t_ns * 1e-9 * timed->tracker->rate_hz);
+	timed->pose = (int64_t)((double)timed->t_ns * 1e-9 *
+				incise_tracker_station_hz(timed->tracker));
 	stroke_pose(&timed->stroke, timed->pose, &timed->sample);
 	return timed;
 }

@@ -9,20 +9,25 @@
 enum form { RANGE, MOST, SWITCH };
 
 static const struct {
-	const char *label, *unit;
+	const char *label, *head, *unit;
 	enum form form;
 	int digits;
 	bool of_membrane; /* a scene without one has no value */
 } criteria[INCISE_CRITERIA] = {
-	[INCISE_CRITERION_CUT_LENGTH] = {"length of the incision", "mm", RANGE, 1, false},
-	[INCISE_CRITERION_CUT_DEPTH] = {"depth of the incision", "mm", RANGE, 1, false},
-	[INCISE_CRITERION_OFF_TARGET] = {"off the target", "mm", MOST, 1, true},
-	[INCISE_CRITERION_INCISIONS] = {"incisions", "", MOST, 0, false},
-	[INCISE_CRITERION_MEMBRANE] = {"through the membrane", "", SWITCH, 0, true},
-	[INCISE_CRITERION_INSERTION] = {"depth of the tube", "mm", RANGE, 1, false},
-	[INCISE_CRITERION_BACK_WALL] = {"back wall touched", "", SWITCH, 0, true},
-	[INCISE_CRITERION_FORCE] = {"largest force", "N", MOST, 2, false},
-	[INCISE_CRITERION_TIME] = {"time needed", "s", MOST, 1, false},
+	[INCISE_CRITERION_CUT_LENGTH] = {"length of the incision", "length_mm", "mm",
+					 RANGE, 1, false},
+	[INCISE_CRITERION_CUT_DEPTH] = {"depth of the incision", "depth_mm", "mm", RANGE,
+					1, false},
+	[INCISE_CRITERION_OFF_TARGET] = {"off the target", "off_mm", "mm", MOST, 1, true},
+	[INCISE_CRITERION_INCISIONS] = {"incisions", "incisions", "", MOST, 0, false},
+	[INCISE_CRITERION_MEMBRANE] = {"through the membrane", "membrane", "", SWITCH, 0,
+				       true},
+	[INCISE_CRITERION_INSERTION] = {"depth of the tube", "tube_mm", "mm", RANGE, 1,
+					false},
+	[INCISE_CRITERION_BACK_WALL] = {"back wall touched", "back_wall", "", SWITCH, 0,
+					true},
+	[INCISE_CRITERION_FORCE] = {"largest force", "force_N", "N", MOST, 2, false},
+	[INCISE_CRITERION_TIME] = {"time needed", "time_s", "s", MOST, 1, false},
 };
 
 const char *session_criterion_label(int criterion)
@@ -30,9 +35,28 @@ const char *session_criterion_label(int criterion)
 	return criteria[criterion].label;
 }
 
+const char *session_criterion_head(int criterion)
+{
+	return criteria[criterion].head;
+}
+
 const char *session_criterion_unit(int criterion)
 {
 	return criteria[criterion].unit;
+}
+
+double session_rounded(double value, int digits)
+{
+	double factor = pow(10, digits);
+
+	return round(value * factor) / factor + 0.0;
+}
+
+double session_criterion_difference(int criterion, double value, double reference)
+{
+	if (criteria[criterion].form == SWITCH)
+		return NAN;
+	return session_rounded(value - reference, criteria[criterion].digits);
 }
 
 void session_criterion_value(int criterion, double value, char *text, size_t size)
@@ -42,7 +66,8 @@ void session_criterion_value(int criterion, double value, char *text, size_t siz
 	else if (criteria[criterion].form == SWITCH)
 		snprintf(text, size, "%s", value != 0 ? "yes" : "no");
 	else
-		snprintf(text, size, "%.*f", criteria[criterion].digits, value);
+		snprintf(text, size, "%.*f", criteria[criterion].digits,
+			 session_rounded(value, criteria[criterion].digits));
 }
 
 void session_criterion_asked(int criterion, const struct incise_scene_criterion *asked,

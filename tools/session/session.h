@@ -171,9 +171,16 @@ void session_judge(const struct session *session,
 
 /* "length of the incision", its unit, and "20 to 40", "at most 5", "yes". */
 const char *session_criterion_label(int criterion);
+const char *session_criterion_head(int criterion); /* of a column */
 const char *session_criterion_unit(int criterion);
 void session_criterion_asked(int criterion, const struct incise_scene_criterion *asked,
 			     char *text, size_t size);
+
+/* To so many digits, and without a negative 0. */
+double session_rounded(double value, int digits);
+
+/* As a value is shown; NAN: of yes and no there is none. */
+double session_criterion_difference(int criterion, double value, double reference);
 
 /* "29.6", "yes", "-" where there is none. */
 void session_criterion_value(int criterion, double value, char *text, size_t size);

@@ -113,10 +113,15 @@ void view_output_end(struct view_output *output)
 
 	if (incise_film_close(output->film, &err))
 		cli_fail_with(&err);
+	if (output->strip_path && !output->stripped)
+		cli_fail(
+			"%s: it is not written: the run ends before its first picture, at "
+			"%g s; give an earlier --at",
+			output->strip_path, *output->strip_s);
 	if (output->strip_path && output->stripped < output->n_strip)
 		cli_warn("%s: ends before its picture %d, at %g s", output->strip_path,
 			 output->stripped + 1, output->strip_s[output->stripped]);
-	if (output->strip_path && output->stripped &&
+	if (output->strip_path &&
 	    image_write_png(output->strip_path, output->strip,
 			    output->width * output->n_strip, output->height, &err))
 		cli_fail_with(&err);

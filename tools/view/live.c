@@ -23,6 +23,9 @@ struct view_live {
 
 	/* A loop of this program. */
 	bool own, started;
+	bool looked;	      /* the page was, once */
+	uint64_t lost_before; /* ticks, up to the first look */
+	uint64_t reloads;     /* then */
 	char page[64];
 	pthread_t thread;
 	struct incise_plan *plan;
@@ -169,11 +172,22 @@ int view_live_take(struct view_live *live, struct incise_view *view,
 						"the loop's page cannot be read: %s",
 						strerror(-n));
 		incise_view_ticks(view, live->ticks, n);
-		for (int i = 0; i < n; i++)
+		for (int i = 0; i < n && (live->own || live->looked); i++)
 			session_log_tick(log, &live->ticks[i]);
 	}
-	session_log_lost(log, live->lost);
+	/* The picture has what the page still holds, a session what came since. */
+	if (!live->own && !live->looked) {
+		live->lost_before = live->lost;
+		live->reloads = live->now.reloads;
+	}
+	live->looked = true;
+	session_log_lost(log, live->lost - live->lost_before);
 	set_status(live, status);
+	if (log && live->now.reloads != live->reloads)
+		return incise_error_set(
+			err, EBUSY,
+			"the loop began another scene, and a session is of "
+			"one: begin it again");
 	if (live->own && atomic_load(&live->ended)) {
 		rc = atomic_load(&live->rc);
 		if (rc)
@@ -181,6 +195,16 @@ int view_live_take(struct view_live *live, struct incise_view *view,
 		return rc ? rc : 1;
 	}
 	return !live->own && !live->now.alive;
+}
+
+const char *view_live_fault(const struct view_live *live)
+{
+	if (live->own || live->now.alive)
+		return NULL;
+	if (live->now.run == INCISE_RUN_FAULT)
+		return live->now.reason;
+	return live->now.run == INCISE_RUN_STOPPED ? NULL
+						   : "the loop ended without a word";
 }
 
 void view_live_close(struct view_live *live)

@@ -37,6 +37,9 @@ int view_live_take(struct view_live *live, struct incise_view *view,
 		   struct session_log *log, struct incise_view_status *status,
 		   struct incise_error *err);
 
+/* The reason why another program's loop ended by a fault, or without a word; NULL: it did not. */
+const char *view_live_fault(const struct view_live *live);
+
 void view_live_close(struct view_live *live);
 
 #endif

@@ -84,6 +84,8 @@ void view_running(struct view_job *job)
 	state_pages_close(&pages);
 	view_job_view(job);
 	run_live(job, live, NULL);
+	if (view_live_fault(live))
+		snprintf(job->fault, sizeof(job->fault), "%s", view_live_fault(live));
 	view_live_close(live);
 }
 

@@ -42,6 +42,7 @@ struct view_job {
 	struct view_output output;
 	struct session_options session;
 	struct session_log *log; /* or NULL */
+	char fault[320];	 /* of the loop that was looked at; "": none */
 
 	struct incise_scene *scene;
 	double rate_hz;
