@@ -176,7 +176,8 @@ static struct line criterion_line(const struct assessed *a,
 {
 	const struct session_verdict *verdict = &a->verdict[i];
 	struct line line = {.label = session_criterion_label(i),
-			    .unit = session_criterion_unit(i),
+			    .unit = isnan(verdict->value) ? ""
+							  : session_criterion_unit(i),
 			    .met = met_text(verdict)};
 	double difference;
 
@@ -198,7 +199,7 @@ static struct line metric_line(const struct assessed *a, const struct assessed *
 			       int i)
 {
 	struct line line = {.label = metrics[i].label,
-			    .unit = metrics[i].unit,
+			    .unit = isnan(metric_of(a, i)) ? "" : metrics[i].unit,
 			    .asked = "-",
 			    .met = "-"};
 	double difference;
@@ -691,11 +692,14 @@ static void draw_force(const struct session *s, const struct session *reference,
 	const struct incise_scene_criterion *asked = &s->criteria[INCISE_CRITERION_FORCE];
 	FILE *script = plot_begin(folder, name, 900, 420);
 	double later_s = reference ? s->first_s - reference->first_s : NAN;
+	double most_N = fmax(s->force.largest_N, asked->asked ? asked->max : 0);
 
+	if (reference)
+		most_N = fmax(most_N, reference->force.largest_N);
 	fprintf(script,
-		"set xlabel 'time, s'\nset ylabel 'force, N'\nset yrange [0:*]\n"
+		"set xlabel 'time, s'\nset ylabel 'force, N'\nset yrange [0:%.4f]\n"
 		"set xrange [0:%.4f]\nset key outside right top\n",
-		fmax(s->duration_s, 0.001));
+		fmax(1.1 * most_N, 0.1), fmax(s->duration_s, 0.001));
 	put_phases(script, s);
 	put_force(script, "force", s, 0);
 	if (!isnan(later_s))
@@ -705,7 +709,8 @@ static void draw_force(const struct session *s, const struct session *reference,
 		fputs(", $expert with lines lw 1 dt 2 lc rgb 'black' title 'reference'",
 		      script);
 	if (asked->asked)
-		fprintf(script, ", %.4f with lines dt 3 lc rgb '#d68910' title 'at most'",
+		fprintf(script,
+			", %.4f with lines lw 2 dt 3 lc rgb '#b03a2e' title 'at most'",
 			asked->max);
 	for (int tool = 1; tool <= INCISE_TOOL_TUBE; tool++)
 		fprintf(script,

@@ -259,7 +259,7 @@ static void set_up(struct job *job)
 		enter_real_time(job);
 	haptic->rig = cli_open_rig(spec, INCISE_RIG_TRACKER | INCISE_RIG_STEPPER);
 	if (haptic_self_test(haptic->scene, incise_rig_tracker(haptic->rig), &test, &err))
-		cli_fail("%s: %s", haptic->argument.path, err.text);
+		cli_fail_with(&err);
 	haptic->plan = cli_require(haptic_plan(haptic, haptic->scene, &err), &err);
 	if (job->scripted)
 		procedure_begin(&job->procedure, haptic->rig, haptic->plan,

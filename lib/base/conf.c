@@ -217,10 +217,10 @@ int incise_conf_known(const config_setting_t *group, const char *path,
 		setting_name(setting, NULL, name, sizeof(name));
 		if (meant)
 			return incise_error_set(
-				err, EINVAL,
-				"%.100s:%d: %s: unknown key; expected %s, in that unit",
+				err, EINVAL, "%.100s:%d: %s: unknown key; expected %s%s",
 				file_of(setting, path),
-				config_setting_source_line(setting), name, meant);
+				config_setting_source_line(setting), name, meant,
+				config_setting_is_group(setting) ? "" : ", in that unit");
 		return incise_error_set(err, EINVAL,
 					"%.100s:%d: %s: unknown key; expected one of %s",
 					file_of(setting, path),
@@ -375,7 +375,7 @@ int incise_conf_direction(const config_setting_t *group, const char *path,
 	/* Shorter than this, its direction is more rounding than intent. */
 	if (!rc && config_setting_get_member(group, key) && !v3_unit(value, asked, 1e-6))
 		rc = setting_error(config_setting_get_member(group, key), path, EINVAL,
-				   err, "a direction [x, y, z] longer than 1e-6");
+				   err, "a direction [x, y, z] that is not 0");
 	return rc;
 }
 

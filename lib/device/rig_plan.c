@@ -348,8 +348,8 @@ static int read_foot_switch(struct incise_rig_plan *plan, const config_setting_t
 		return incise_error_set(
 			err, EINVAL,
 			"%.200s:%d: foot_switch.key: expected the name of a key, such as "
-			"\"b\"; rig.conf(5) lists them",
-			path, config_setting_source_line(group));
+			"\"b\", found \"%.40s\"; rig.conf(5) lists them",
+			path, config_setting_source_line(group), key ? key : "");
 	strcpy(setup->device, device);
 	setup->key = (uint16_t)code;
 	plan->has_foot_switch = true;

@@ -90,11 +90,11 @@ struct incise_plan {
 	struct incise_surface *own_surface; /* the rig's plane, when it is that */
 	double up[3];			    /* normal of the surface's top */
 	struct incise_proxy proxy;
-	double sn[3];		 /* the paper's Sn of this tick */
-	double normal[3];	 /* the one that forces go along: Sn, or its average */
-	double depth_mm;	 /* ≥ 0; of the tissue in front of a membrane */
-	double p0_mm[3];	 /* where the contact began */
-	double side[3];		 /* of the blade then: Sx(0) */
+	double sn[3];	  /* the paper's Sn of this tick */
+	double normal[3]; /* the one that forces go along: Sn, or its average */
+	double depth_mm;  /* ≥ 0; of the tissue in front of a membrane */
+	double p0_mm[3];  /* where the contact began */
+	double side[3];	  /* of the blade then: Sx(0) */
 	struct incise_incision *incision; /* with its stage */
 	struct incise_opening opening;	  /* that handle or tube went into … */
 	double tightness; /* … and how tight it was; incise_incision_tightness() */

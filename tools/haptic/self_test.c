@@ -90,6 +90,7 @@ int haptic_self_test(const struct incise_scene *scene, struct incise_tracker *tr
 	struct incise_scene_limits limits;
 	struct incise_tracker_info info;
 	struct trajectory trajectory = {0};
+	struct incise_error why = {0};
 	int rc;
 
 	*test = (struct self_test){0};
@@ -105,7 +106,9 @@ int haptic_self_test(const struct incise_scene *scene, struct incise_tracker *tr
 	test->silent_max_ms = limits.pose_age_ms +
 			      (double)incise_plan_fade_ns(trajectory.plan) * 1e-6 +
 			      2e-6 * (double)trajectory.period_ns;
-	rc = run(&trajectory, limits.force_N, test, err);
+	rc = run(&trajectory, limits.force_N, test, &why);
 	incise_plan_free(trajectory.plan);
-	return rc;
+	return rc ? incise_error_set(err, -rc, "%s: %s", incise_scene_file(scene, 0),
+				     why.text)
+		  : 0;
 }

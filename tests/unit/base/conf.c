@@ -111,7 +111,7 @@ static void refused_with_file_line_and_cause(void **state)
 		 ":1: surface.point_mm: expected three numbers [x, y, z] of at most 1e6, "
 		 "found 3 values; correct it"},
 		{"surface = {\n normal = [0, 0, 0]; };", -EINVAL,
-		 ":2: surface.normal: expected a direction [x, y, z] longer than 1e-6, found 3 "
+		 ":2: surface.normal: expected a direction [x, y, z] that is not 0, found 3 "
 		 "values; correct it"},
 		{"surface = { up = [0, 0, 1]; };", -EINVAL,
 		 ":1: surface.up: unknown key; expected one of point_mm, normal"},

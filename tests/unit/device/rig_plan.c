@@ -213,7 +213,7 @@ static void file_refuses(void **state)
 		 ":1: sim: expected depth_mm and times with as many values each, 1 to 8; "
 		 "correct them"},
 		{"surface = { normal = [0, 0, 0]; };", EINVAL,
-		 ":1: surface.normal: expected a direction [x, y, z] longer than 1e-6, found 3 "
+		 ":1: surface.normal: expected a direction [x, y, z] that is not 0, found 3 "
 		 "values; correct it"},
 	};
 
