@@ -258,10 +258,13 @@ static void add_shipped(struct scenes *s)
 	"radius_mm = 50.0; };\n"
 #define DOUBLE "arithmetic = \"double\";\n"
 #define REACTION "tissue = { reaction_N_mm = 0.14; };\n"
-/* All that is no force: the membrane lies below the sphere's top and the sheet's waves. */
+/*
+ * All that is no force: the membrane lies below the sphere's top and the sheet's waves, and is so small
+ * that the depth below these hardly changes round it, as for one that lies aslant the limit is lower.
+ */
 #define EFFECTS                                                        \
 	"effects = { average_ticks = 8; };\n"                          \
-	"membrane = { point_mm = [0.0, 0.0, -6.0]; radius_mm = 5.0;\n" \
+	"membrane = { point_mm = [0.0, 0.0, -6.0]; radius_mm = 0.2;\n" \
 	"  thickness_mm = 5.0; puncture_N = 0.8; back_wall_mm = 14.0; };\n"
 #define MESH "surface = { kind = \"mesh\"; file = \"%s\"; };\n"
 
