@@ -80,17 +80,21 @@ static double to_mm(const struct incise_motor *motor, int64_t steps)
 }
 
 /*
- * Whether a status with power is older than the deadman: its writer was stopped with this
+ * How old a status with power is if that is older than the deadman, else 0: its writer was stopped with this
  * program, and stops the motor as soon as it runs again. Found here, so that nothing depends
  * on which of the two threads runs first.
  */
-static bool stood_still(struct incise_motor *motor)
+static int64_t stood_still(struct incise_motor *motor)
 {
-	return motor->in_process && !motor->watches &&
-	       motor->last.state != INCISE_STEPPER_STATE_DISABLED &&
-	       motor->last.state != INCISE_STEPPER_STATE_FAULT &&
-	       (double)(motor->ops->now(motor) - motor->last.t_ns) >
-		       (motor->actuator.deadman_s + TICK_MOST_S) * INCISE_NS_PER_S;
+	double most_ns = (motor->actuator.deadman_s + TICK_MOST_S) * INCISE_NS_PER_S;
+	int64_t age_ns;
+
+	if (!motor->in_process || motor->watches ||
+	    motor->last.state == INCISE_STEPPER_STATE_DISABLED ||
+	    motor->last.state == INCISE_STEPPER_STATE_FAULT)
+		return 0;
+	age_ns = motor->ops->now(motor) - motor->last.t_ns;
+	return (double)age_ns > most_ns ? age_ns : 0;
 }
 
 /*
@@ -103,7 +107,8 @@ static int look(struct incise_motor *motor)
 
 	if (rc != -EAGAIN) {
 		motor->unread = 0;
-		if (!rc && stood_still(motor)) {
+		motor->still_ns = rc ? 0 : stood_still(motor);
+		if (motor->still_ns) {
 			motor->last.faults |= INCISE_STEPPER_FAULT_DEADMAN;
 			motor->last.state = INCISE_STEPPER_STATE_STOPPING;
 		}

@@ -68,6 +68,7 @@ struct incise_motor {
 	struct incise_stepper_motor_status last; /* last status that could be read */
 	unsigned int unread;			 /* failed reads since then */
 	bool beyond;				 /* the last target was clamped */
+	int64_t still_ns; /* of the last look: for how long this program stood still */
 };
 
 /* Set stepper.ops; the backend sets the other fields above "private". */

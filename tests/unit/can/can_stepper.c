@@ -273,6 +273,8 @@ static void a_program_that_stood_still_does_not_go_on(void **state)
 	/* Whoever reads the status need not wait for the thread. */
 	s = can_rig_look(&rig);
 	assert_true(s.faults & INCISE_STEPPER_FAULT_DEADMAN);
+	assert_true(incise_stepper_cause(rig.stepper, cause, sizeof(cause)) > 0);
+	assert_non_null(strstr(cause, "this program stood still for 300"));
 	assert_int_equal(incise_stepper_set(rig.stepper, 15), -EIO);
 	can_rig_hold(&rig, 15, 2000 * MS);
 	s = can_rig_look(&rig);

@@ -697,6 +697,14 @@ void can_axis_disable(struct can_axis *axis)
 	}
 }
 
+int can_axis_still_text(int64_t still_ns, char *text, size_t size)
+{
+	return snprintf(text, size,
+			"this program stood still for %lld ms, longer than deadman_ms: "
+			"see who stopped it, or what kept the machine busy, then clear",
+			(long long)(still_ns / MS));
+}
+
 int can_axis_cause_text(const struct can_axis *axis, char *text, size_t size)
 {
 	long long a = axis->cause_a, b = axis->cause_b;
@@ -791,12 +799,7 @@ int can_axis_cause_text(const struct can_axis *axis, char *text, size_t size)
 			"travel: see its brake, and home it",
 			(double)a * axis->setup.step_mm);
 	case CAN_AXIS_STOOD_STILL:
-		return snprintf(
-			text, size,
-			"this program stood still for %lld ms, longer than "
-			"deadman_ms: see who stopped it, or what kept the machine "
-			"busy, then clear",
-			a);
+		return can_axis_still_text(a * MS, text, size);
 	case CAN_AXIS_NO_STOP:
 		return snprintf(text, size,
 				"it did not say that it stopped, and was last in %s: "

@@ -148,6 +148,9 @@ void can_axis_inputs(struct can_axis *axis, uint32_t inputs);
 /* Convert counts, rounded. */
 int64_t can_axis_steps(const struct can_axis *axis, int32_t counts);
 
+/* Write that this program stood still for @still_ns, and what to do; returns the length. */
+int can_axis_still_text(int64_t still_ns, char *text, size_t size);
+
 /* Write the cause of a stop and what to do; returns the length, 0 without a cause. */
 int can_axis_cause_text(const struct can_axis *axis, char *text, size_t size);
 

@@ -350,8 +350,12 @@ static int stepper_cause(struct incise_stepper *stepper, char *text, size_t size
 	char why[300];
 
 	stepper->ops->status(stepper, &status);
-	if (!(status.faults & ~INCISE_STEPPER_FAULT_TRAVEL) ||
-	    !can_axis_cause_text(&c->session.axis, why, sizeof(why)))
+	if (!(status.faults & ~INCISE_STEPPER_FAULT_TRAVEL))
+		return 0;
+	/* After a standstill the caller may run before the drive's thread does. */
+	if (!can_axis_cause_text(&c->session.axis, why, sizeof(why)) &&
+	    !(c->motor.still_ns &&
+	      can_axis_still_text(c->motor.still_ns, why, sizeof(why))))
 		return 0;
 	return snprintf(text, size, "%s: %s", c->motor.name, why);
 }
