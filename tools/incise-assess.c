@@ -160,12 +160,12 @@ struct line {
 	const char *label, *unit, *met;
 };
 
-/* "+1.5" of "1.5". */
-static void sign(double difference, char *text, size_t size)
+/* "+1.5" of "1.5", and "0.0" as it is. */
+static void sign(char *text, size_t size)
 {
 	size_t n = strlen(text);
 
-	if (!(difference > 0) || n + 2 > size)
+	if (!(strtod(text, NULL) > 0) || n + 2 > size)
 		return;
 	memmove(text + 1, text, n + 1);
 	*text = '+';
@@ -191,7 +191,7 @@ static struct line criterion_line(const struct assessed *a,
 	difference = session_criterion_difference(i, verdict->value,
 						  reference->verdict[i].value);
 	session_criterion_value(i, difference, line.difference, sizeof(line.difference));
-	sign(difference, line.difference, sizeof(line.difference));
+	sign(line.difference, sizeof(line.difference));
 	return line;
 }
 
@@ -202,18 +202,15 @@ static struct line metric_line(const struct assessed *a, const struct assessed *
 			    .unit = isnan(metric_of(a, i)) ? "" : metrics[i].unit,
 			    .asked = "-",
 			    .met = "-"};
-	double difference;
 
 	number_text(metric_of(a, i), metrics[i].digits, line.value, sizeof(line.value));
 	if (!reference)
 		return line;
 	number_text(metric_of(reference, i), metrics[i].digits, line.reference,
 		    sizeof(line.reference));
-	difference = session_rounded(metric_of(a, i) - metric_of(reference, i),
-				     metrics[i].digits);
-	number_text(difference, metrics[i].digits, line.difference,
-		    sizeof(line.difference));
-	sign(difference, line.difference, sizeof(line.difference));
+	number_text(metric_of(a, i) - metric_of(reference, i), metrics[i].digits,
+		    line.difference, sizeof(line.difference));
+	sign(line.difference, sizeof(line.difference));
 	return line;
 }
 

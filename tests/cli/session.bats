@@ -253,7 +253,7 @@ print(max(math.dist(p, q) for i, p in ends for k, q in ends if i == k))')
 	[ -z "$(key a.session first_contact_s)" ]
 	run -0 --separate-stderr incise assess a.session
 	[ -z "$stderr" ]
-	[[ "$output" =~ time\ needed\ +-\ s\ +at\ most\ 40\ +no ]]
+	[[ "$output" =~ time\ needed\ +-\ +at\ most\ 40\ +no ]]
 	incise assess a.session -o a.html >/dev/null 2>why || grep -qE "gnuplot is not installed|without libcmark-gfm" why
 	python3 - <<-'END'
 		import json

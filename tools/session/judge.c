@@ -56,7 +56,7 @@ double session_criterion_difference(int criterion, double value, double referenc
 {
 	if (criteria[criterion].form == SWITCH)
 		return NAN;
-	return session_rounded(value - reference, criteria[criterion].digits);
+	return value - reference;
 }
 
 void session_criterion_value(int criterion, double value, char *text, size_t size)

@@ -179,7 +179,7 @@ void session_criterion_asked(int criterion, const struct incise_scene_criterion 
 /* To so many digits, and without a negative 0. */
 double session_rounded(double value, int digits);
 
-/* As a value is shown; NAN: of yes and no there is none. */
+/* NAN: of yes and no there is none. */
 double session_criterion_difference(int criterion, double value, double reference);
 
 /* "29.6", "yes", "-" where there is none. */
