@@ -325,7 +325,8 @@ until_ticks() {
 # until_lines FILE N: the file has so many.
 until_lines() {
 	for ((i = 0; i < 3000; i++)); do
-		[ "$(wc -l <"$1")" -lt "$2" ] || return 0
+		# It may not be there yet.
+		! { [ -e "$1" ] && [ "$(wc -l <"$1")" -ge "$2" ]; } || return 0
 		sleep 0.02
 	done
 	complain "no $2 lines within 60 s: $(cat "$1")"
