@@ -36,8 +36,9 @@ static double model_N(const struct incise_plan *plan, double depth_mm)
 /* The model's support, its slope there, and the stiffness with which its tissue unloads. */
 static void set_tissue(struct incise_plan *plan, double steepest_N_mm)
 {
-	double support_mm = plan->fixed ? plan->fixed->input[0].max / INCISE_FIXED_ONE
-					: incise_model_info(plan->model)->input[0].max;
+	double support_mm = plan->fixed
+				    ? plan->fixed->input[0].max / (double)INCISE_FIXED_ONE
+				    : incise_model_info(plan->model)->input[0].max;
 	double edge_mm = EDGE * support_mm, slope;
 	double own = plan->scene->tissue.force[0][INCISE_REACTION_UNLOADING];
 

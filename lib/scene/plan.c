@@ -578,7 +578,8 @@ double incise_plan_bound(const struct incise_plan *plan, double reach_mm)
 		bound_N = incise_fixed_front_bound(
 			plan->unloading_N_mm,
 			plan->acting[0].number[INCISE_REACTION_FRICTION],
-			plan->unloading_N_mm * reach_mm, bound_N + 1 / INCISE_FIXED_ONE);
+			plan->unloading_N_mm * reach_mm,
+			bound_N + 1.0 / INCISE_FIXED_ONE);
 
 	for (int i = 0; plan->scene->fixed && i < incise_n_tissue_forces; i++) {
 		const struct incise_acting_force *own = &plan->acting[i];

@@ -313,6 +313,30 @@ static void test_shipped_scenes(void **state)
 	}
 }
 
+/* The depth from which the force goes on with a slope of its own is the model's, compiled or not. */
+static void test_support_is_the_models(void **state)
+{
+	static const char *const arithmetics[] = {"double", "fixed"};
+	struct incise_plan_stability s[2];
+
+	for (size_t i = 0; i < N(arithmetics); i++) {
+		struct incise_scene *scene =
+			incise_scene_load("scenes/liver.scene", NULL, NULL);
+		struct incise_plan *plan;
+
+		assert_int_equal(incise_scene_set_arithmetic(scene, arithmetics[i], NULL),
+				 0);
+		plan = incise_plan_new(scene, NULL, NULL);
+		assert_non_null(plan);
+		incise_plan_stability(plan, &s[i]);
+		incise_plan_free(plan);
+		incise_scene_free(scene);
+	}
+	/* An LSB of the support, and the certified error over the part that gives the slope: 1 mm. */
+	assert_true(fabs(s[0].support_mm - s[1].support_mm) <= 1.0 / 65536);
+	assert_true(fabs(s[0].beyond_N_mm - s[1].beyond_N_mm) < 2 * 1e-4);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -322,6 +346,7 @@ int main(void)
 		cmocka_unit_test(test_own_delay),
 		cmocka_unit_test(test_rests_below_the_limit),
 		cmocka_unit_test(test_shipped_scenes),
+		cmocka_unit_test(test_support_is_the_models),
 	};
 
 	return cmocka_run_group_tests(tests, set_up, tear_down);
