@@ -4,14 +4,15 @@
  * programs is uapi/incise_stepper.h.
  *
  *   page ──▶ motor ──▶ profile ──▶ edges ──▶ lines      a hard timer per motor
- *              ▲                                 │
+ *    └▶ plan ─▶┤                                 │
  *   file ──────┘◀── inputs: limits, e-stop … ◀───┘      hard interrupts
  *     ▲                │
  *     └── events ◀─────┘
  *
  * Locks, outer first: stepper.mutex (set-up, owner, unbind), motor.lock (raw; all
- * that moves), events.lock (raw). sync.lock is on its own. No memory of a user is
- * touched under any of them: mmap() comes with the user's memory locked already.
+ * that moves), plan.lock (raw; samples of a source, stops), events.lock (raw). Those of a
+ * source's subsystem come after stepper.mutex. sync.lock is on its own. No memory of a user
+ * is touched under any of them: mmap() comes with the user's memory locked already.
  */
 #ifndef INCISE_DRIVER_STEPPER_H
 #define INCISE_DRIVER_STEPPER_H
@@ -38,7 +39,9 @@ struct file;
 struct fwnode_handle;
 struct gpio_desc;
 struct platform_device;
+struct seq_file;
 struct stepper;
+struct stepper_plan;
 
 /* Bins of a histogram: [0, 1), [1, 2), [2, 4) … µs; the last one is open. */
 #define STEPPER_BINS 24
@@ -83,6 +86,7 @@ struct stepper_lines {
 
 /* The next action of the timer. */
 enum stepper_next {
+	STEPPER_NEXT_PLAN,  /* a tick of the plan that this motor leads */
 	STEPPER_NEXT_TICK,  /* read the set-point, run the profile */
 	STEPPER_NEXT_DIR,   /* change of direction */
 	STEPPER_NEXT_LEAD,  /* leading edge: a step */
@@ -118,6 +122,12 @@ struct stepper_motor {
 	bool asked;			  /* the profile does not know target yet */
 	s64 seen_ns;			  /* the last sign of life */
 
+	/* Plan: written without power only, stepper.mutex held too */
+	struct stepper_plan *plan; /* NULL: there is none */
+	unsigned int axis;	   /* its number in the plan; 0 leads */
+	bool following;		   /* its set-point says mode POSE */
+	u32 stops;		   /* of the plan, when it began to follow */
+
 	/* Motion */
 	struct incise_profile profile;
 	struct incise_profile_slot slot;
@@ -136,6 +146,7 @@ struct stepper_motor {
 
 	/* Evidence */
 	struct stepper_histogram lateness, cost;
+	struct stepper_histogram tick_cost; /* of its ticks alone */
 	u64 edges;
 };
 
@@ -168,6 +179,8 @@ struct stepper {
 	bool closing; /* reboot: no power any more */
 	bool gone;
 
+	struct stepper_plan *plan; /* NULL: there is none */
+
 	struct incise_stepper_controller info;
 	struct incise_stepper_setpoint *setpoints;  /* page 0: untrusted */
 	struct incise_stepper_motor_status *status; /* page 1 */
@@ -192,6 +205,44 @@ struct stepper {
 void stepper_motor_init(struct stepper_motor *motor);
 void stepper_motor_start(struct stepper_motor *motor); /* motor->lock held */
 void stepper_motor_end(struct stepper_motor *motor);
+void stepper_motor_take(struct stepper_motor *motor, s64 now, s64 due);
+void stepper_motor_want(struct stepper_motor *motor, s64 target);
+
+/* stepper_stop.c: motor->lock held */
+void stepper_stop_off(struct stepper_motor *motor, s64 now);
+void stepper_stop_halt(struct stepper_motor *motor, s64 now);
+void stepper_stop_fault(struct stepper_motor *motor, u32 fault, s64 now);
+void stepper_stop_disable(struct stepper_motor *motor, s64 now);
+
+/* stepper_plan.c, stepper_plan_load.c; without them there is never a plan */
+#if IS_ENABLED(CONFIG_INCISE_STEPPER_PLAN)
+#define STEPPER_PLAN_CAPABILITY INCISE_STEPPER_CAP_PLAN
+int stepper_plan_make(struct stepper *stepper, const struct incise_stepper_plan *load,
+		      struct stepper_plan **made);
+void stepper_plan_free(struct stepper_plan *plan);
+/* stepper.mutex held */
+int stepper_plan_install(struct stepper *stepper, const struct incise_stepper_plan *load,
+			 struct stepper_plan **plan);
+void stepper_plan_take_out(struct stepper *stepper);
+void stepper_plan_new_owner(struct stepper *stepper);
+void stepper_plan_sweep(struct stepper *stepper);
+u32 stepper_plan_let_go(struct stepper *stepper, u32 reason);
+bool stepper_plan_leaving(const struct stepper *stepper);
+void stepper_plan_wait(struct stepper *stepper, unsigned int most_ms);
+void stepper_plan_disabled(struct stepper *stepper, u32 motors);
+void stepper_plan_show(struct stepper *stepper, struct seq_file *file);
+void stepper_plan_reset(struct stepper *stepper);
+/* motor->lock held */
+s64 stepper_plan_due(const struct stepper_motor *motor);
+void stepper_plan_pose(struct stepper_motor *motor, s64 now, s64 due);
+void stepper_plan_tick(struct stepper_motor *motor, s64 now);
+bool stepper_plan_reads(const struct stepper_motor *motor);
+void stepper_plan_follow(struct stepper_motor *motor, s64 now);
+void stepper_plan_fault(struct stepper_motor *motor, u32 fault);
+void stepper_plan_end(struct stepper_motor *motor, s64 now);
+#else
+#include "stepper_no_plan.h"
+#endif
 
 /* stepper_setup.c: take motor->lock themselves */
 int stepper_setup_ready(struct stepper_motor *motor);
@@ -208,12 +259,6 @@ int stepper_setup_position(struct stepper_motor *motor,
 void stepper_setup_fault(struct stepper_motor *motor, u32 fault);
 bool stepper_setup_any_powered(struct stepper *stepper);
 void stepper_setup_halt(struct stepper_motor *motor);
-
-/* stepper_stop.c: motor->lock held */
-void stepper_stop_off(struct stepper_motor *motor, s64 now);
-void stepper_stop_halt(struct stepper_motor *motor, s64 now);
-void stepper_stop_fault(struct stepper_motor *motor, u32 fault, s64 now);
-void stepper_stop_disable(struct stepper_motor *motor, s64 now);
 
 /* stepper_inputs.c: motor->lock held */
 void stepper_inputs_sample(struct stepper_motor *motor, s64 now);

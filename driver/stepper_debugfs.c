@@ -4,8 +4,11 @@
  *
  *   lateness   text: how late firings were, µs in bins that double
  *   cost       text: how long they took; ns only, no counter of instructions
+ *   tick_cost  text: how long ticks of the motors took, without edges
+ *   plan       text: how late ticks of the plan were and how long they took, in the same
+ *              bins, and what one cost when it was loaded; empty without a plan
  *   counters   text: "name=number" per motor
- *   reset      write anything: lateness and cost restart
+ *   reset      write anything: all but counters restart
  */
 #include <linux/debugfs.h>
 #include <linux/math64.h>
@@ -70,6 +73,23 @@ static int cost_show(struct seq_file *file, void *data)
 }
 DEFINE_SHOW_ATTRIBUTE(cost);
 
+static int tick_cost_show(struct seq_file *file, void *data)
+{
+	return stepper_debugfs_histogram(file, offsetof(struct stepper_motor, tick_cost));
+}
+DEFINE_SHOW_ATTRIBUTE(tick_cost);
+
+static int plan_show(struct seq_file *file, void *data)
+{
+	struct stepper *stepper = file->private;
+
+	mutex_lock(&stepper->mutex);
+	stepper_plan_show(stepper, file);
+	mutex_unlock(&stepper->mutex);
+	return 0;
+}
+DEFINE_SHOW_ATTRIBUTE(plan);
+
 static int counters_show(struct seq_file *file, void *data)
 {
 	struct stepper *stepper = file->private;
@@ -111,8 +131,12 @@ static ssize_t reset_write(struct file *file, const char __user *from, size_t n,
 		raw_spin_lock_irqsave(&motor->lock, flags);
 		memset(&motor->lateness, 0, sizeof(motor->lateness));
 		memset(&motor->cost, 0, sizeof(motor->cost));
+		memset(&motor->tick_cost, 0, sizeof(motor->tick_cost));
 		raw_spin_unlock_irqrestore(&motor->lock, flags);
 	}
+	mutex_lock(&stepper->mutex);
+	stepper_plan_reset(stepper);
+	mutex_unlock(&stepper->mutex);
 	return n;
 }
 
@@ -130,6 +154,9 @@ void stepper_debugfs_add(struct stepper *stepper)
 	dir = debugfs_create_dir(dev_name(&stepper->dev), stepper_debugfs_root);
 	debugfs_create_file("lateness", 0444, dir, stepper, &lateness_fops);
 	debugfs_create_file("cost", 0444, dir, stepper, &cost_fops);
+	debugfs_create_file("tick_cost", 0444, dir, stepper, &tick_cost_fops);
+	if (STEPPER_PLAN_CAPABILITY)
+		debugfs_create_file("plan", 0444, dir, stepper, &plan_fops);
 	debugfs_create_file("counters", 0444, dir, stepper, &counters_fops);
 	debugfs_create_file("reset", 0200, dir, stepper, &reset_fops);
 	stepper->debugfs = dir;

@@ -79,6 +79,8 @@ struct stepper *stepper_device_new(struct device *parent, unsigned int n_motors)
 	BUILD_BUG_ON(sizeof(struct incise_stepper_config) != 128);
 	BUILD_BUG_ON(sizeof(struct incise_stepper_origin) != 16);
 	BUILD_BUG_ON(sizeof(struct incise_stepper_sync) != 64);
+	BUILD_BUG_ON(sizeof(struct incise_stepper_plan) != 128);
+	BUILD_BUG_ON(sizeof(struct incise_stepper_plan_status) != 384);
 
 	id = ida_alloc_max(&stepper_ids, MINORS - 1, GFP_KERNEL);
 	if (id < 0)
@@ -92,6 +94,7 @@ struct stepper *stepper_device_new(struct device *parent, unsigned int n_motors)
 	stepper->parent = parent;
 	stepper->n_motors = n_motors;
 	stepper->info.n_motors = n_motors;
+	stepper->info.capabilities = STEPPER_PLAN_CAPABILITY;
 	mutex_init(&stepper->mutex);
 	stepper_event_init(stepper);
 	stepper_sync_init(stepper);

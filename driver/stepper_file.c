@@ -5,7 +5,7 @@
  * and poll shows HUP; pages that are mapped stay memory.
  *
  * A user's memory is never touched under stepper.mutex: a page fault there could wait
- * for a mapping that waits for the mutex.
+ * for a mapping that waits for the mutex. So a plan is copied before.
  */
 #include <linux/fs.h>
 #include <linux/io.h>
@@ -47,6 +47,7 @@ static int stepper_file_open(struct inode *inode, struct file *file)
 		/* Nobody maps it: a mapping would hold the last owner's file. */
 		memset(stepper->setpoints, 0, PAGE_SIZE);
 		stepper->owner = file;
+		stepper_plan_new_owner(stepper);
 	}
 	mutex_unlock(&stepper->mutex);
 	if (ret) {
@@ -64,12 +65,16 @@ static int stepper_file_release(struct inode *inode, struct file *file)
 	struct stepper_file *opened = file->private_data;
 	struct stepper *stepper = opened->stepper;
 	unsigned int i;
+	u32 fade;
 
 	if (opened->owner) {
 		mutex_lock(&stepper->mutex);
+		/* Those get the same fault when there is no force any more. */
+		fade = stepper_plan_let_go(stepper, INCISE_STEPPER_PLAN_LEFT);
 		for (i = 0; !stepper->gone && i < stepper->n_motors; i++)
-			stepper_setup_fault(&stepper->motor[i],
-					    INCISE_STEPPER_FAULT_OWNER);
+			if (!(fade & BIT(i)))
+				stepper_setup_fault(&stepper->motor[i],
+						    INCISE_STEPPER_FAULT_OWNER);
 		stepper->owner = NULL;
 		mutex_unlock(&stepper->mutex);
 	}
@@ -88,6 +93,8 @@ static int stepper_file_enable(struct stepper *stepper, u32 mask)
 
 	if (stepper->closing)
 		return -ESHUTDOWN;
+	if (stepper_plan_leaving(stepper))
+		return -EBUSY;
 	for (i = 0; i < stepper->n_motors; i++) {
 		if (!(mask & BIT(i)))
 			continue;
@@ -145,6 +152,7 @@ static int stepper_file_mask(struct stepper *stepper, unsigned int command, u32 
 		for (i = 0; i < stepper->n_motors; i++)
 			if (mask & BIT(i))
 				stepper_setup_disable(&stepper->motor[i]);
+		stepper_plan_disabled(stepper, mask);
 		return 0;
 	}
 }
@@ -156,16 +164,20 @@ union stepper_argument {
 	struct incise_stepper_config config;
 	struct incise_stepper_origin origin;
 	struct incise_stepper_sync sync;
+	struct incise_stepper_plan plan;
 };
 
 /* stepper.mutex held, the device there, the caller allowed to. */
 static int stepper_file_command(struct stepper *stepper, unsigned int command,
-				union stepper_argument *arg)
+				union stepper_argument *arg, struct stepper_plan **plan)
 {
 	unsigned int motor;
 	int ret;
 
+	stepper_plan_sweep(stepper);
 	switch (command) {
+	case INCISE_STEPPER_LOAD_PLAN:
+		return stepper_plan_install(stepper, &arg->plan, plan);
 	case INCISE_STEPPER_GET_INFO:
 		arg->info = stepper->info;
 		return 0;
@@ -219,6 +231,7 @@ static bool stepper_file_known(unsigned int command)
 	case INCISE_STEPPER_SET_POSITION:
 	case INCISE_STEPPER_SET_SYNC:
 	case INCISE_STEPPER_GET_SYNC:
+	case INCISE_STEPPER_LOAD_PLAN:
 		return true;
 	default:
 		return false;
@@ -230,6 +243,7 @@ static long stepper_file_ioctl(struct file *file, unsigned int command, unsigned
 	struct stepper_file *opened = file->private_data;
 	struct stepper *stepper = opened->stepper;
 	void __user *user = (void __user *)to;
+	struct stepper_plan *plan = NULL;
 	union stepper_argument arg;
 	int ret;
 
@@ -243,9 +257,16 @@ static long stepper_file_ioctl(struct file *file, unsigned int command, unsigned
 	    copy_from_user(&arg, user, _IOC_SIZE(command)))
 		return -EFAULT;
 
+	ret = 0;
+	if (command == INCISE_STEPPER_LOAD_PLAN)
+		ret = stepper_plan_make(stepper, &arg.plan, &plan);
+	if (ret)
+		return ret;
 	mutex_lock(&stepper->mutex);
-	ret = stepper->gone ? -ENODEV : stepper_file_command(stepper, command, &arg);
+	ret = stepper->gone ? -ENODEV
+			    : stepper_file_command(stepper, command, &arg, &plan);
 	mutex_unlock(&stepper->mutex);
+	stepper_plan_free(plan);
 	if (ret)
 		return ret;
 	if (_IOC_DIR(command) & _IOC_READ && copy_to_user(user, &arg, _IOC_SIZE(command)))

@@ -34,6 +34,7 @@ static void stepper_latency_look(struct work_struct *work)
 	struct stepper *stepper = container_of(work, struct stepper, look);
 
 	mutex_lock(&stepper->mutex);
+	stepper_plan_sweep(stepper);
 	if (!stepper_setup_any_powered(stepper))
 		stepper_latency_release(stepper);
 	mutex_unlock(&stepper->mutex);

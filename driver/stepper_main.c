@@ -2,9 +2,10 @@
 /*
  * incise_stepper.ko: the platform driver, and every way in which a machine stops:
  *
- *   unbind    no new file, brake, power off, no interrupts, ENODEV to who is left
- *   suspend   brake, power off, fault SUSPEND; nothing moves after resume by itself. SYNC
- *             stops, as its chip may sleep already, and goes on in its beat
+ *   unbind    no new file, the force of a plan fades, brake, power off, no interrupts, ENODEV
+ *             to who is left
+ *   suspend   the force fades, brake, power off, fault SUSPEND; nothing moves after resume by
+ *             itself. SYNC stops, as its chip may sleep already, and goes on in its beat
  *   reboot    the same, before anything else is taken down
  *   panic     power off, at once, without a lock that somebody may hold
  *
@@ -33,6 +34,8 @@ static void stepper_main_rest(struct stepper *stepper, u32 fault)
 {
 	unsigned int i, waited;
 
+	if (stepper_plan_let_go(stepper, INCISE_STEPPER_PLAN_AWAY))
+		stepper_plan_wait(stepper, BRAKE_MS);
 	for (i = 0; i < stepper->n_motors; i++)
 		stepper_setup_fault(&stepper->motor[i], fault);
 	for (waited = 0; waited < BRAKE_MS && stepper_setup_any_powered(stepper);
@@ -164,6 +167,7 @@ static void stepper_main_remove(struct platform_device *pdev)
 
 	mutex_lock(&stepper->mutex);
 	stepper_main_rest(stepper, INCISE_STEPPER_FAULT_GONE);
+	stepper_plan_take_out(stepper);
 	stepper_sync_off(stepper);
 	WRITE_ONCE(stepper->gone, true);
 	mutex_unlock(&stepper->mutex);

@@ -34,7 +34,7 @@
 /* The next action and its time: only from the state of the motor, so that it may be asked
  * for as often as one likes, after whatever has come between.
  */
-static enum stepper_next stepper_motor_plan(const struct stepper_motor *motor, s64 *due,
+static enum stepper_next stepper_motor_move(const struct stepper_motor *motor, s64 *due,
 					    s64 *want)
 {
 	const struct incise_stepper_config *config = &motor->config;
@@ -65,6 +65,19 @@ static enum stepper_next stepper_motor_plan(const struct stepper_motor *motor, s
 	*due = max3(*want, motor->lead_ns + gap, motor->trail_ns + config->low_ns);
 	*due = max3(*due, motor->dir_ns + config->setup_ns, motor->powered_ns);
 	return STEPPER_NEXT_LEAD;
+}
+
+/* The same, with the ticks of a plan between: one that is due with a tick comes before it. */
+static enum stepper_next stepper_motor_next(const struct stepper_motor *motor, s64 *due,
+					    s64 *want)
+{
+	enum stepper_next next = stepper_motor_move(motor, due, want);
+	s64 plan = stepper_plan_due(motor);
+
+	if (next == STEPPER_NEXT_NONE || plan > *due)
+		return next;
+	*due = plan;
+	return STEPPER_NEXT_PLAN;
 }
 
 static s64 stepper_motor_write(struct stepper_motor *motor, enum stepper_output output,
@@ -149,21 +162,31 @@ static void stepper_motor_dir(struct stepper_motor *motor, s64 due)
 					    up != invert, due);
 }
 
-/* Take a new set-point, if there is one and it is still asked for. */
-static void stepper_motor_listen(struct stepper_motor *motor, s64 now)
+/* Go there, within the limits; motor->setpoint says in which mode. */
+void stepper_motor_want(struct stepper_motor *motor, s64 target)
+{
+	motor->setpoint.target = target;
+	motor->target = stepper_page_clamp(&motor->setpoint, &motor->config);
+	motor->flags &= ~INCISE_STEPPER_FLAG_HELD;
+	if (motor->target != target)
+		motor->flags |= INCISE_STEPPER_FLAG_HELD;
+	motor->asked = true;
+}
+
+/* Take a new set-point, if there is one. @due: of the tick that does. */
+void stepper_motor_take(struct stepper_motor *motor, s64 now, s64 due)
 {
 	struct stepper *stepper = motor->stepper;
 
-	if (motor->disabling)
-		return;
 	switch (stepper_page_take(&stepper->setpoints[motor->index], &motor->setpoint)) {
 	case STEPPER_PAGE_TAKEN:
+		if (motor->setpoint.mode == INCISE_STEPPER_MODE_POSE) {
+			stepper_plan_pose(motor, now, due);
+			break;
+		}
+		stepper_plan_end(motor, now);
 		motor->seen_ns = now;
-		motor->target = stepper_page_clamp(&motor->setpoint, &motor->config);
-		motor->flags &= ~INCISE_STEPPER_FLAG_HELD;
-		if (motor->target != motor->setpoint.target)
-			motor->flags |= INCISE_STEPPER_FLAG_HELD;
-		motor->asked = true;
+		stepper_motor_want(motor, motor->setpoint.target);
 		break;
 	case STEPPER_PAGE_GARBAGE:
 		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_SETPOINT, now);
@@ -171,6 +194,16 @@ static void stepper_motor_listen(struct stepper_motor *motor, s64 now)
 	case STEPPER_PAGE_NOTHING:
 		break;
 	}
+}
+
+/* A set-point, of the owner or of the plan, where it is still asked for. */
+static void stepper_motor_listen(struct stepper_motor *motor, s64 now, s64 due)
+{
+	if (motor->disabling)
+		return;
+	if (!stepper_plan_reads(motor))
+		stepper_motor_take(motor, now, due);
+	stepper_plan_follow(motor, now);
 	if (now - motor->seen_ns > (s64)motor->config.deadman_ns)
 		stepper_stop_fault(motor, INCISE_STEPPER_FAULT_DEADMAN, now);
 }
@@ -194,7 +227,7 @@ static void stepper_motor_tick(struct stepper_motor *motor, s64 now, s64 due)
 
 	stepper_inputs_sample(motor, now);
 	if (motor->powered)
-		stepper_motor_listen(motor, now);
+		stepper_motor_listen(motor, now, due);
 	if (!motor->powered)
 		return;
 
@@ -232,12 +265,16 @@ static enum hrtimer_restart stepper_motor_fire(struct hrtimer *timer)
 
 	raw_spin_lock_irqsave(&motor->lock, flags);
 	/* An interrupt may have halted the motor: ask again what is due. */
-	next = stepper_motor_plan(motor, &due, &want);
+	next = stepper_motor_next(motor, &due, &want);
 	if (next != STEPPER_NEXT_NONE && due <= now) {
 		stepper_histogram_add(&motor->lateness, now - due);
 		switch (next) {
+		case STEPPER_NEXT_PLAN:
+			stepper_plan_tick(motor, now);
+			break;
 		case STEPPER_NEXT_TICK:
 			stepper_motor_tick(motor, now, due);
+			stepper_histogram_add(&motor->tick_cost, ktime_get_ns() - now);
 			break;
 		case STEPPER_NEXT_DIR:
 			stepper_motor_dir(motor, due);
@@ -251,7 +288,7 @@ static enum hrtimer_restart stepper_motor_fire(struct hrtimer *timer)
 		case STEPPER_NEXT_NONE:
 			break;
 		}
-		next = stepper_motor_plan(motor, &due, &want);
+		next = stepper_motor_next(motor, &due, &want);
 	}
 	if (next == STEPPER_NEXT_NONE) {
 		motor->timing = false;
@@ -269,7 +306,7 @@ void stepper_motor_start(struct stepper_motor *motor)
 {
 	s64 due, want;
 
-	if (motor->timing || stepper_motor_plan(motor, &due, &want) == STEPPER_NEXT_NONE)
+	if (motor->timing || stepper_motor_next(motor, &due, &want) == STEPPER_NEXT_NONE)
 		return;
 	motor->timing = true;
 	hrtimer_start(&motor->timer, ns_to_ktime(due), HRTIMER_MODE_ABS_PINNED_HARD);

@@ -25,6 +25,7 @@
 #define smp_rmb() __atomic_thread_fence(__ATOMIC_ACQUIRE) /* loads before loads */
 #endif
 
+#include <incise/tool.h>
 #include "../lib/fixed/profile.h"
 
 #define SLOT_WORDS (sizeof(struct incise_stepper_setpoint) / sizeof(__u64))
@@ -34,6 +35,22 @@ union slot_copy {
 	__u64 word[SLOT_WORDS];
 	struct incise_stepper_setpoint setpoint;
 };
+
+/* Everything but a target, or everything but a pose and its time: zero. */
+static bool stepper_page_good(const struct incise_stepper_setpoint *copy)
+{
+	const __u32 known = INCISE_STEPPER_POSE_TOOL | INCISE_STEPPER_POSE_FADE;
+	unsigned int i;
+
+	if (copy->mode == INCISE_STEPPER_MODE_POSE)
+		return !copy->reserved0 && !copy->target && !copy->pose.reserved &&
+		       !(copy->pose.tool & ~known) &&
+		       (copy->pose.tool & INCISE_STEPPER_POSE_TOOL) <= INCISE_TOOL_TUBE;
+	for (i = 0; i < ARRAY_SIZE(copy->reserved); i++)
+		if (copy->reserved[i])
+			return false;
+	return copy->mode <= INCISE_STEPPER_MODE_VELOCITY && !copy->reserved0;
+}
 
 /**
  * stepper_page_take() - look for a new set-point
@@ -61,14 +78,12 @@ enum stepper_page_answer stepper_page_take(const struct incise_stepper_setpoint 
 		return STEPPER_PAGE_NOTHING;
 
 	setpoint->seq = seq;
-	if (copy.setpoint.mode > INCISE_STEPPER_MODE_VELOCITY || copy.setpoint.reserved0)
+	if (!stepper_page_good(&copy.setpoint))
 		return STEPPER_PAGE_GARBAGE;
-	for (i = 0; i < ARRAY_SIZE(copy.setpoint.reserved); i++)
-		if (copy.setpoint.reserved[i])
-			return STEPPER_PAGE_GARBAGE;
 	setpoint->mode = copy.setpoint.mode;
 	setpoint->target = copy.setpoint.target;
 	setpoint->t_ns = copy.setpoint.t_ns;
+	setpoint->pose = copy.setpoint.pose;
 	return STEPPER_PAGE_TAKEN;
 }
 

@@ -22,6 +22,7 @@ struct stepper_setpoint {
 	__u16 mode;
 	__s64 target; /* not clamped */
 	__s64 t_ns;
+	struct incise_stepper_pose pose; /* in mode POSE */
 };
 
 enum stepper_page_answer {

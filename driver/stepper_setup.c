@@ -170,7 +170,7 @@ void stepper_setup_clear(struct stepper_motor *motor)
  * @motor:	the motor
  * @config:	one that stepper_page_config() let pass
  *
- * Return: 0; -EBUSY the motor has power; -ERANGE a jerk that the profile cannot
+ * Return: 0; -EBUSY the motor has power, or a plan; -ERANGE a jerk that the profile cannot
  * hold.
  */
 int stepper_setup_config(struct stepper_motor *motor,
@@ -181,7 +181,7 @@ int stepper_setup_config(struct stepper_motor *motor,
 	int ret;
 
 	raw_spin_lock_irqsave(&motor->lock, flags);
-	if (motor->powered) {
+	if (motor->powered || motor->plan) {
 		ret = -EBUSY;
 	} else {
 		/* Refused before anything is changed. */
@@ -224,7 +224,8 @@ int stepper_setup_position(struct stepper_motor *motor,
 	if (origin->position < motor->config.position_min ||
 	    origin->position > motor->config.position_max) {
 		ret = -EINVAL;
-	} else if (motor->powered && (motor->disabling || motor->given < motor->slot.n ||
+	} else if (motor->powered && (motor->disabling || motor->following ||
+				      motor->given < motor->slot.n ||
 				      !incise_profile_resting(&motor->profile))) {
 		ret = -EBUSY;
 	} else {

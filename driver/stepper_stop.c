@@ -5,7 +5,7 @@
  *
  *   at once    limit, e-stop, driver, late, line     no further step, power off
  *   brake      set-point, suspend, gone              within the limits, then power off
- *   retract    deadman, owner                        to safe_position if it is homed and
+ *   retract    deadman, owner, plan                  to safe_position if it is homed and
  *                                                    the config says so, else brake
  *
  *   READY/MOVING ──▶ STOPPING ──▶ FAULT ──(clear)──▶ DISABLED
@@ -21,7 +21,9 @@
 	(INCISE_STEPPER_FAULT_LIMIT_MIN | INCISE_STEPPER_FAULT_LIMIT_MAX | \
 	 INCISE_STEPPER_FAULT_ESTOP | INCISE_STEPPER_FAULT_ALARM |         \
 	 INCISE_STEPPER_FAULT_LATE | INCISE_STEPPER_FAULT_LINE)
-#define RETRACT (INCISE_STEPPER_FAULT_DEADMAN | INCISE_STEPPER_FAULT_OWNER)
+#define RETRACT                                                      \
+	(INCISE_STEPPER_FAULT_DEADMAN | INCISE_STEPPER_FAULT_OWNER | \
+	 INCISE_STEPPER_FAULT_PLAN)
 
 /* Take power away. A pulse that is out is ended by the timer, at its time. */
 void stepper_stop_off(struct stepper_motor *motor, s64 now)
@@ -43,6 +45,7 @@ void stepper_stop_halt(struct stepper_motor *motor, s64 now)
 {
 	if (motor->given < motor->slot.n || !incise_profile_resting(&motor->profile))
 		motor->flags &= ~INCISE_STEPPER_FLAG_HOMED;
+	stepper_plan_end(motor, now);
 	motor->slot.n = 0;
 	motor->given = 0;
 	incise_profile_halt(&motor->profile, motor->position);
@@ -59,6 +62,7 @@ static void stepper_stop_gently(struct stepper_motor *motor, u32 fault, s64 now)
 	/* Who retracts already goes on to do so, but a machine that sleeps will not wait. */
 	if (motor->disabling && fault & RETRACT)
 		return;
+	stepper_plan_end(motor, now);
 	motor->disabling = true;
 	if (retract) {
 		motor->target = motor->config.safe_position;
@@ -94,6 +98,7 @@ void stepper_stop_fault(struct stepper_motor *motor, u32 fault, s64 now)
 		trace_incise_stepper_fault(motor->stepper->id, motor->index, event.value,
 					   motor->position, now);
 	}
+	stepper_plan_fault(motor, fault);
 	if (fault & AT_ONCE)
 		stepper_stop_halt(motor, now);
 	else

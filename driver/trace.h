@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: GPL-2.0-only */
 /*
  * Tracepoints incise_stepper:incise_stepper_edge, for every change of an output that a
- * motor or SYNC makes, and incise_stepper:incise_stepper_fault. Times in ns of
- * CLOCK_MONOTONIC; actual is taken after the write.
+ * motor or SYNC makes, incise_stepper:incise_stepper_fault, and
+ * incise_stepper:incise_stepper_plan for every tick of a plan. Times in ns of
+ * CLOCK_MONOTONIC; an edge's actual is taken after the write, a tick's before it began.
  */
 #undef TRACE_SYSTEM
 #define TRACE_SYSTEM incise_stepper
@@ -61,6 +62,28 @@ TRACE_EVENT(incise_stepper_fault,
 	    TP_printk("controller=%d motor=%u faults=%#x position=%lld t_ns=%lld",
 		      __entry->controller, __entry->motor, __entry->faults,
 		      __entry->position, __entry->t_ns)
+);
+
+TRACE_EVENT(incise_stepper_plan,
+	    TP_PROTO(int controller, u64 tick, s64 due_ns, s64 actual_ns, u32 cost_ns),
+	    TP_ARGS(controller, tick, due_ns, actual_ns, cost_ns),
+	    TP_STRUCT__entry(
+		    __field(u64, tick)
+		    __field(s64, due_ns)
+		    __field(s64, actual_ns)
+		    __field(int, controller)
+		    __field(u32, cost_ns)
+	    ),
+	    TP_fast_assign(
+		    __entry->tick = tick;
+		    __entry->due_ns = due_ns;
+		    __entry->actual_ns = actual_ns;
+		    __entry->controller = controller;
+		    __entry->cost_ns = cost_ns;
+	    ),
+	    TP_printk("controller=%d tick=%llu due_ns=%lld actual_ns=%lld cost_ns=%u",
+		      __entry->controller, __entry->tick, __entry->due_ns,
+		      __entry->actual_ns, __entry->cost_ns)
 );
 
 /* clang-format on */

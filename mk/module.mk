@@ -4,6 +4,7 @@
 #
 #   KDIR=DIR         headers of another kernel than the running one
 #   INCISE_SIM=m     incise_sim.ko too, the simulated chip that tests use
+#   INCISE_PLAN=n    without plans: no LOAD_PLAN, no mode POSE, no incise_source.ko
 #   W=1 C=2          as in the kernel
 
 KDIR ?= /lib/modules/$(shell uname -r)/build
@@ -39,7 +40,7 @@ module_install: module ## install the module for that kernel, below $(DESTDIR)$(
 	$(depmod)
 
 module_uninstall: module_headers ## remove what module_install installed
-	rm -f $(module_installed)/incise_stepper.ko*
+	rm -f $(module_installed)/incise_stepper.ko* $(module_installed)/incise_source.ko*
 	$(depmod)
 
 # A source tree for dkms, which then builds the module for each kernel that is installed.
@@ -48,8 +49,9 @@ srcdir ?= $(prefix)/src
 dkms_dir = $(srcdir)/incise-$(version)
 dkms_sources = $(addprefix driver/,Kbuild Makefile compat/probe) \
 	$(filter-out %.mod.c,$(wildcard $(addprefix driver/,*.[ch] uapi/*.h compat/*.c))) \
-	$(wildcard $(addprefix lib/fixed/,profile.[ch] ramp.[ch] integers.h)) $(shell grep -l __KERNEL__ lib/include/incise/*.h) \
-	$(addprefix lib/include/incise/,export.h stepper_state.h)
+	$(wildcard driver/source/*) $(filter-out %/trial.h,$(wildcard lib/fixed/*.[ch])) \
+	$(shell grep -l __KERNEL__ lib/include/incise/*.h) \
+	$(addprefix lib/include/incise/,export.h stepper_state.h tick_flags.h tool.h)
 
 dkms_install: ## install the module's sources for dkms in $(DESTDIR)$(srcdir)
 	$(INSTALL) -d $(addprefix $(DESTDIR)$(dkms_dir)/,$(sort $(dir $(dkms_sources))))

@@ -24,6 +24,12 @@ int stepper_setup_config(struct stepper_motor *motor,
 	return 0;
 }
 
+#if IS_ENABLED(CONFIG_INCISE_STEPPER_PLAN)
+void stepper_plan_sweep(struct stepper *stepper)
+{
+}
+#endif
+
 bool stepper_setup_any_powered(struct stepper *stepper)
 {
 	return false;

@@ -16,7 +16,9 @@
  */
 #include <linux/device.h>
 #include <linux/iio/buffer.h>
+#include <linux/iio/driver.h>
 #include <linux/iio/iio.h>
+#include <linux/iio/machine.h>
 #include <linux/iio/trigger.h>
 #include <linux/iio/trigger_consumer.h>
 #include <linux/iio/triggered_buffer.h>
@@ -38,6 +40,7 @@ static const struct iio_chan_spec sim_adc_channels[] = {
 		.type = IIO_VOLTAGE,
 		.indexed = 1,
 		.channel = 0,
+		.datasheet_name = "voltage0",
 		.info_mask_separate = BIT(IIO_CHAN_INFO_RAW) | BIT(IIO_CHAN_INFO_SCALE) |
 				      BIT(IIO_CHAN_INFO_OFFSET),
 		.info_mask_shared_by_all = BIT(IIO_CHAN_INFO_SAMP_FREQ),
@@ -249,7 +252,14 @@ static void sim_trigger_remove(struct sim_adc *adc)
 	iio_trigger_free(adc->trigger);
 }
 
-int sim_adc_add(struct sim_adc *adc, struct device *parent)
+/* The controller whose plans may have the channel as their source; "": none. */
+static int sim_adc_map(struct sim_adc *adc, const char *controller)
+{
+	adc->map[0] = (struct iio_map)IIO_MAP("voltage0", controller, "position");
+	return *controller ? iio_map_array_register(adc->iio, adc->map) : 0;
+}
+
+int sim_adc_add(struct sim_adc *adc, struct device *parent, const char *controller)
 {
 	struct iio_dev *iio;
 	int ret;
@@ -274,11 +284,16 @@ int sim_adc_add(struct sim_adc *adc, struct device *parent)
 					 &sim_adc_setup_ops);
 	if (ret)
 		goto out_remove_trigger;
-	ret = iio_device_register(iio);
+	ret = sim_adc_map(adc, controller);
 	if (ret)
 		goto out_cleanup_buffer;
+	ret = iio_device_register(iio);
+	if (ret)
+		goto out_unmap;
 	return 0;
 
+out_unmap:
+	iio_map_array_unregister(iio);
 out_cleanup_buffer:
 	iio_triggered_buffer_cleanup(iio);
 out_remove_trigger:
@@ -291,6 +306,7 @@ out_free_device:
 void sim_adc_remove(struct sim_adc *adc)
 {
 	iio_device_unregister(adc->iio);
+	iio_map_array_unregister(adc->iio);
 	iio_triggered_buffer_cleanup(adc->iio);
 	sim_trigger_remove(adc);
 	iio_device_free(adc->iio);

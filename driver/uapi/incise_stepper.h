@@ -4,7 +4,8 @@
  *
  *   open    O_RDWR makes the owner; there is one (EBUSY). O_RDONLY watches.
  *   mmap    page 0: set-points, written by the owner; page 1: status, read-only. A slot
- *           per motor in each. In the loop nothing else is needed: no system call.
+ *           per motor in each, and one for the plan behind them. In the loop nothing else is
+ *           needed: no system call.
  *   ioctl   what is set up while the motors stand.
  *   read    events, whole structs; poll shows when there is one. Each open file has a
  *           place of its own in the ring of events; a gap in seq shows what it missed.
@@ -21,6 +22,18 @@
  * new even seq for deadman_ns is brought to rest and disabled, and so is one whose owner
  * closes the file or dies. Every fault is latched until CLEAR, and nothing moves by itself
  * after it: CLEAR leaves the motor disabled.
+ *
+ * With a plan, the controller renders a scene's force by itself: the owner stores poses of the
+ * tracker in place of targets, and each tick of the plan makes the targets of its motors.
+ *
+ *   page ── pose ──▶ plan: contact, force, start, fade, limit ── target ──▶ profile of each motor
+ *
+ * A plan only takes the place of a target: position limits, profile, e-stop and deadman are
+ * below it, and hold whatever it asks for. The force goes on while the owner's scene is stopped,
+ * late or dead, as long as somebody who has the file stores poses. It is no stiffer for it: with
+ * a tracker of 120 Hz, the age of its poses decides that. Without poses the force fades.
+ *
+ *   EMPTY ─ LOAD_PLAN ─▶ LOADED ─ ENABLE, a pose ─▶ WAIT ─▶ RISE ─▶ FELT ⇄ FADE ─ deadman ─▶ stop
  */
 #ifndef _UAPI_INCISE_STEPPER_H
 #define _UAPI_INCISE_STEPPER_H
@@ -38,6 +51,33 @@
 /* incise_stepper_setpoint.mode */
 #define INCISE_STEPPER_MODE_POSITION 0 /* target in steps */
 #define INCISE_STEPPER_MODE_VELOCITY 1 /* target in steps/s */
+#define INCISE_STEPPER_MODE_POSE 2     /* target by the plan; 0 here */
+
+/* Of page 0: the slot of the tube's poses, behind those of the motors. */
+#define INCISE_STEPPER_SLOT_TUBE INCISE_STEPPER_MOTORS_MAX
+
+/* incise_stepper_pose.tool */
+#define INCISE_STEPPER_POSE_TOOL 0xffU	   /* enum incise_tool: what the hand holds */
+#define INCISE_STEPPER_POSE_FADE (1U << 9) /* let go of the force, while it is set */
+
+/**
+ * struct incise_stepper_pose - where the tracker saw the scalpel, or the tube
+ * @position: of the sensor, in the scene; 2^-16 mm, within ±16384 mm
+ * @quaternion: of the sensor, w first; 2^-30. All 0: no pose, but a sign of life, of which tool is
+ *              taken; another that is not of length 1 leaves the attitude as it was
+ * @tool: INCISE_STEPPER_POSE_… bits; others are the fault SETPOINT. 0 in the tube's slot
+ * @reserved: zero
+ *
+ * Its time is t_ns of the set-point, of CLOCK_MONOTONIC. One from the future counts as of the tick
+ * that takes it; one that is not newer than the last, or beyond 10000 mm, is left out and counted.
+ * One that is taken is a sign of life, and so is one that is no pose.
+ */
+struct incise_stepper_pose {
+	__s32 position[3];
+	__s32 quaternion[4];
+	__u32 tool;
+	__u64 reserved;
+};
 
 /**
  * struct incise_stepper_setpoint - what the owner wants of a motor; one slot, 64 bytes
@@ -47,10 +87,26 @@
  * @reserved0: zero
  * @target: clamped to the limits in force
  * @t_ns: when the owner made it; only handed back in status
- * @reserved: zero
+ * @pose: in mode POSE
+ * @reserved: zero in the other modes
  *
  * The kernel copies a slot once per tick, and takes the copy when seq was even and the same
  * before and after.
+ *
+ * Mode POSE needs a plan (else SETPOINT). Poses come in the slot of the plan's first motor, and the
+ * tube's in INCISE_STEPPER_SLOT_TUBE, of mode POSE too; tool and FADE of the first motor's slot are
+ * the tube's as well. That slot is only looked at by a plan with a tube's station. The other motors
+ * of the plan follow it from the time on at which their own slots were set to mode POSE; the first
+ * motor's poses are their sign of life, and the pose of their own slots is not looked at.
+ *
+ * The plan starts with the tick of the first motor that finds mode POSE there, after ENABLE or
+ * after another mode: without a pose and a force, which comes when the tool was out of the tissue.
+ * Cuts stay, as tissue does not heal; LOAD_PLAN takes them away.
+ *
+ * A fault of one motor that follows a plan gives the others the fault PLAN, and so does DISABLE of
+ * some of them only. When the owner closes the file or dies, the force fades first, then the fault
+ * OWNER follows; until then ENABLE of the next owner gives EBUSY. Before unbind, suspend and
+ * reboot it fades likewise.
  */
 struct incise_stepper_setpoint {
 	__u32 seq;
@@ -58,7 +114,10 @@ struct incise_stepper_setpoint {
 	__u16 reserved0;
 	__s64 target;
 	__s64 t_ns;
-	__u64 reserved[5];
+	union {
+		struct incise_stepper_pose pose;
+		__u64 reserved[5];
+	};
 };
 
 /* incise_stepper_motor_status.flags */
@@ -109,11 +168,95 @@ struct incise_stepper_motor_status {
 	__u64 reserved[3];
 };
 
+/* Of page 1: the slot of the plan's status, in 128 bytes; it is longer. */
+#define INCISE_STEPPER_SLOT_PLAN INCISE_STEPPER_MOTORS_MAX
+
+/* incise_stepper_plan_status.state and .reasons: enum incise_stepper_plan_state and
+ * incise_stepper_plan_reason of incise/stepper_state.h. Reasons are latched from
+ * the start on.
+ */
+
+/**
+ * struct incise_stepper_plan_status - what the plan renders; one, 384 bytes
+ * @seq: odd while the kernel writes; a reader tries again when it changed meanwhile
+ * @state: INCISE_STEPPER_PLAN_…
+ * @reasons: why the force is or was taken away
+ * @motors: mask of its motors; 0: there is no plan
+ * @plan: CRC-32C of the plan's file, its field crc
+ * @digest: CRC-32C over all ticks since the start, see below
+ * @ticks: since the start
+ * @missed: ticks left out because the timer came too late by one of them; each is an event
+ * @t_ns: of the last tick: when it was due, which is what it computed with
+ * @age_ns: of its pose; at its largest without one
+ * @pose_tick: number of the tick, from 1, at which the last pose was taken
+ * @pose_seq: seq of the last pose taken; with a source, the number of the sample
+ * @tube_seq: of the tube's
+ * @poses: taken since the start, the tube's too
+ * @refused: not taken since the start: older than the last one, too far away, or none
+ * @flags: of the tick; enum incise_tick_flag
+ * @phase: enum incise_phase
+ * @held: enum incise_tool
+ * @tool: end of the tool; 2^-16 mm
+ * @proxy: its place on the surface, in a contact; else 0
+ * @normal: of the surface there; 2^-30
+ * @quaternion: of the scalpel; w first, 2^-30
+ * @depth: in the tissue; 2^-16 mm
+ * @speed: of the tool; 2^-16 mm/s
+ * @command: the force; 2^-16 N
+ * @along: of each motor
+ * @target: of each motor, steps, before its limits
+ * @reserved0: zero
+ * @reserved: zero
+ *
+ * The counts and reasons stay when the plan has stopped, command and along are 0 then.
+ *
+ * A program gets the same digest from the same poses: for each tick the words command[0 … 2],
+ * target[0 … axes - 1] and flags, 32 bits each, little-endian, one after the other through
+ * CRC-32C (Castagnoli, reflected polynomial 0x82f63b78), which begins with ~0 and is inverted at
+ * the end: as of one file of all ticks. Tick n is due at t_ns - (ticks - n) × the plan's tick_ns
+ * where none was missed. A tick takes the pose of the first motor's slot, then the tube's.
+ */
+struct incise_stepper_plan_status {
+	__u32 seq;
+	__u32 state;
+	__u32 reasons;
+	__u32 motors;
+	__u32 plan;
+	__u32 digest;
+	__u64 ticks;
+	__u64 missed;
+	__s64 t_ns;
+	__s64 age_ns;
+	__u64 pose_tick;
+	__u32 pose_seq;
+	__u32 tube_seq;
+	__u64 poses;
+	__u64 refused;
+	__u32 flags;
+	__u16 phase;
+	__u16 held;
+	__s32 tool[3];
+	__s32 proxy[3];
+	__s32 normal[3];
+	__s32 quaternion[4];
+	__s32 depth;
+	__s32 speed;
+	__s32 command[3];
+	__s32 along[3];
+	__s32 target[3];
+	__u32 reserved0;
+	__u64 reserved[23];
+};
+
 /* incise_stepper_event.type */
 #define INCISE_STEPPER_EVENT_STATE 1 /* value: the new state */
 #define INCISE_STEPPER_EVENT_FAULT 2 /* value: the faults that were added */
 #define INCISE_STEPPER_EVENT_INPUT 3 /* value: the inputs after the change */
 #define INCISE_STEPPER_EVENT_SYNC 4  /* position: number of the pulse, from 1; motor: 0 */
+#define INCISE_STEPPER_EVENT_PLAN \
+	5 /* value: the new state; position: number of the tick */
+#define INCISE_STEPPER_EVENT_MISSED \
+	6 /* value: ticks left out before the tick of that number */
 
 /**
  * struct incise_stepper_event - 32 bytes
@@ -134,8 +277,8 @@ struct incise_stepper_event {
 };
 
 /* incise_stepper_controller.capabilities */
-#define INCISE_STEPPER_CAP_SYNC (1ULL << 0)  /* has a SYNC line */
-#define INCISE_STEPPER_CAP_FIXED (1ULL << 1) /* evaluates force models; none does yet */
+#define INCISE_STEPPER_CAP_SYNC (1ULL << 0) /* has a SYNC line */
+#define INCISE_STEPPER_CAP_PLAN (1ULL << 1) /* LOAD_PLAN, mode POSE */
 
 /**
  * struct incise_stepper_controller - what the controller is, 256 bytes
@@ -195,7 +338,9 @@ struct incise_stepper_controller {
  * @setup_ns: from a change of dir to the step after it, 0 … 1000000
  * @hold_ns: from a step's leading edge to a change of dir, 0 … 1000000
  * @enable_ns: from enable to the first step, 0 … 1000000000
- * @late_max: edges in a row, each late by its shortest time, until the fault LATE; 1 … 1000
+ * @late_max: edges in a row, each late by its shortest time, until the fault LATE; 1 … 1000. Of
+ *            a plan's first motor also ticks of the plan in a row, each late by its tick_ns, or
+ *            taking more than half of it
  * @reserved: zero
  *
  * SET_CONFIG gives EBUSY while the motor is enabled, EINVAL for a value out of its range
@@ -264,6 +409,55 @@ struct incise_stepper_sync {
 	__u64 reserved[2];
 };
 
+/* incise_stepper_plan.flags */
+#define INCISE_STEPPER_PLAN_SOURCE \
+	(1U << 0) /* poses come from the controller's own channel */
+
+/**
+ * struct incise_stepper_plan - a plan for motors, 128 bytes
+ * @motors: mask; the plan's first axis is the lowest of them. As many as the plan has axes
+ * @flags: INCISE_STEPPER_PLAN_SOURCE or 0
+ * @data: where the file of `incise compile` is in memory
+ * @size: of it, bytes; 0: the plan of these motors goes, and the rest is 0
+ * @origin: with a source: the sensor's position at 0; 2^-16 mm
+ * @direction: with a source: the way of the sensor, unit; 2^-30
+ * @scale: with a source: mm for one of its units; 2^-32
+ * @quaternion: with a source: of the sensor; w first, 2^-30
+ * @tool: with a source: INCISE_STEPPER_POSE_TOOL, what is held
+ * @reserved0: zero
+ * @reserved: zero
+ *
+ * A controller has one plan. The file is checked in full; after that, a tick takes a bounded time,
+ * and no pose makes it overflow. With a source, of an encoder in the IIO subsystem
+ * (incise_source.ko, which is to be loaded), poses are made in the kernel: the page's slot of the
+ * first motor is set to mode POSE once, and its deadman is kept off by the source. Of the pose in
+ * the page only INCISE_STEPPER_POSE_FADE counts then. A tick takes the newest sample; position =
+ * origin + direction × scale × sample, samples held to ±2^30, scale within ±1 mm.
+ *
+ * EBUSY: a motor of the plan, or of the one before, has power, or still comes to rest. EINVAL: the
+ * file or a field is not good; EOPNOTSUPP: its version is not known here, or there is no source.
+ * ERANGE: a motor's deadman_ns is not longer than the plan's pose age, its fade and the way of its
+ * largest force at its slew, a motor's tick_ns is longer than the plan's, or a tick of the plan
+ * takes more than a quarter of its tick_ns on this machine, the median of 64. EFBIG: more than
+ * 32 MiB. ENOMEM, EFAULT. Nothing has changed then.
+ *
+ * While there is a plan, SET_CONFIG of its motors gives EBUSY. It goes with LOAD_PLAN, with the
+ * device, and at the next open for writing.
+ */
+struct incise_stepper_plan {
+	__u32 motors;
+	__u32 flags;
+	__u64 data;
+	__u64 size;
+	__s32 origin[3];
+	__s32 direction[3];
+	__s64 scale;
+	__s32 quaternion[4];
+	__u32 tool;
+	__u32 reserved0;
+	__u64 reserved[6];
+};
+
 /* Watchers may call the ones that only read; the others need the owner (EPERM). */
 #define INCISE_STEPPER_IOC 0xE8
 #define INCISE_STEPPER_GET_INFO \
@@ -287,5 +481,6 @@ struct incise_stepper_sync {
 /* Both: EOPNOTSUPP without a SYNC line. */
 #define INCISE_STEPPER_SET_SYNC _IOW(INCISE_STEPPER_IOC, 7, struct incise_stepper_sync)
 #define INCISE_STEPPER_GET_SYNC _IOR(INCISE_STEPPER_IOC, 8, struct incise_stepper_sync)
+#define INCISE_STEPPER_LOAD_PLAN _IOW(INCISE_STEPPER_IOC, 9, struct incise_stepper_plan)
 
 #endif

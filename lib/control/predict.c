@@ -28,10 +28,6 @@
 #define HARD_MM_S2 1e5
 
 #define GAP_PERIODS 5
-/* A quick tracker may be late by more than that. A hand's force, and so its acceleration,
- * stays what it is for some hundredths of a second. */
-#define AHEAD_NS 40000000
-
 static double within(double x, double least, double most)
 {
 	return x >= least ? fmin(x, most) : least;
@@ -90,7 +86,8 @@ static void extrapolate(const struct incise_predict *p, int64_t t_ns, double x[3
 			double v[3])
 {
 	int64_t ahead_ns = since(t_ns, p->t_ns),
-		most_ns = p->gap_ns > AHEAD_NS ? p->gap_ns : AHEAD_NS;
+		most_ns = p->gap_ns > INCISE_PREDICT_AHEAD_NS ? p->gap_ns
+							      : INCISE_PREDICT_AHEAD_NS;
 	double dt = (double)(ahead_ns < most_ns ? ahead_ns : most_ns) / INCISE_NS_PER_S;
 
 	for (int i = 0; i < 3; i++) {

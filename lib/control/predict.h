@@ -33,6 +33,12 @@
 /* At 60 Hz a hand that misses a pose by this is faster than 1 m/s. */
 #define INCISE_PREDICT_JUMP_MM 20.0
 
+/*
+ * A quick tracker may be late by more than five periods. A hand's force, and so its acceleration,
+ * stays what it is for some hundredths of a second.
+ */
+#define INCISE_PREDICT_AHEAD_NS 40000000
+
 struct incise_predict {
 	double alpha, beta, gamma; /* of a miss: to x, v · period, a · period² */
 	double period_s;

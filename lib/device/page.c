@@ -6,6 +6,8 @@
 #include <errno.h>
 #include <stdbool.h>
 #include <string.h>
+#include <incise/tick_flags.h>
+#include <incise/tool.h>
 #include "../fixed/profile.h"
 #include "page.h"
 
@@ -14,6 +16,7 @@
 
 #define SETPOINT_WORDS (sizeof(struct incise_stepper_setpoint) / sizeof(uint32_t))
 #define STATUS_WORDS (sizeof(struct incise_stepper_motor_status) / sizeof(uint32_t))
+#define PLAN_WORDS (sizeof(struct incise_stepper_plan_status) / sizeof(uint32_t))
 #define KNOWN_FAULTS ((1U << INCISE_STEPPER_FAULTS) - 1 - INCISE_STEPPER_FAULT_TRAVEL)
 #define KNOWN_INPUTS ((1U << INCISE_STEPPER_INPUTS) - 1)
 
@@ -55,17 +58,31 @@ static bool get(const uint32_t *words, void *to, size_t n)
 	return __atomic_load_n(words, __ATOMIC_RELAXED) == seq;
 }
 
+static INCISE_REALTIME void write_whole(uint32_t *words, const void *from, size_t n)
+{
+	uint32_t seq = __atomic_load_n(words, __ATOMIC_RELAXED) & ~1u;
+
+	begin(words, seq + 1);
+	put(words, from, n);
+	end(words, seq + 2);
+}
+
 void incise_page_put_setpoint(struct incise_stepper_setpoint *slot, unsigned int mode,
 			      int64_t target, int64_t t_ns)
 {
 	struct incise_stepper_setpoint setpoint = {
 		.mode = (__u16)mode, .target = target, .t_ns = t_ns};
-	uint32_t *words = (uint32_t *)slot;
-	uint32_t seq = __atomic_load_n(words, __ATOMIC_RELAXED) & ~1u;
 
-	begin(words, seq + 1);
-	put(words, &setpoint, SETPOINT_WORDS);
-	end(words, seq + 2);
+	write_whole((uint32_t *)slot, &setpoint, SETPOINT_WORDS);
+}
+
+void incise_page_put_pose(struct incise_stepper_setpoint *slot,
+			  const struct incise_stepper_pose *pose, int64_t t_ns)
+{
+	struct incise_stepper_setpoint setpoint = {
+		.mode = INCISE_STEPPER_MODE_POSE, .t_ns = t_ns, .pose = *pose};
+
+	write_whole((uint32_t *)slot, &setpoint, SETPOINT_WORDS);
 }
 
 int incise_page_get_setpoint(const struct incise_stepper_setpoint *slot, uint32_t *seq,
@@ -88,12 +105,7 @@ int incise_page_get_setpoint(const struct incise_stepper_setpoint *slot, uint32_
 void incise_page_put_status(struct incise_stepper_motor_status *slot,
 			    const struct incise_stepper_motor_status *status)
 {
-	uint32_t *words = (uint32_t *)slot;
-	uint32_t seq = __atomic_load_n(words, __ATOMIC_RELAXED) & ~1u;
-
-	begin(words, seq + 1);
-	put(words, status, STATUS_WORDS);
-	end(words, seq + 2);
+	write_whole((uint32_t *)slot, status, STATUS_WORDS);
 }
 
 static bool sensible(const struct incise_stepper_motor_status *status)
@@ -117,6 +129,32 @@ int incise_page_get_status(const struct incise_stepper_motor_status *slot,
 		if (!get((const uint32_t *)slot, &status, STATUS_WORDS))
 			continue;
 		if (!sensible(&status))
+			return -EIO;
+		*copy = status;
+		return 0;
+	}
+	return -EAGAIN;
+}
+
+static bool plan_sensible(const struct incise_stepper_plan_status *status)
+{
+	return status->state < INCISE_STEPPER_PLAN_STATES &&
+	       !(status->reasons >> INCISE_STEPPER_PLAN_REASONS) &&
+	       !(status->motors >> INCISE_STEPPER_MOTORS_MAX) &&
+	       !(status->flags >> INCISE_TICK_FLAGS) &&
+	       status->phase <= INCISE_PHASE_INSERTION &&
+	       status->held <= INCISE_TOOL_TUBE;
+}
+
+int incise_page_get_plan(const struct incise_stepper_plan_status *slot,
+			 struct incise_stepper_plan_status *copy)
+{
+	struct incise_stepper_plan_status status;
+
+	for (int i = 0; i < TRIES; i++) {
+		if (!get((const uint32_t *)slot, &status, PLAN_WORDS))
+			continue;
+		if (!plan_sensible(&status))
 			return -EIO;
 		*copy = status;
 		return 0;

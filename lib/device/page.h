@@ -21,6 +21,11 @@
 void incise_page_put_setpoint(struct incise_stepper_setpoint *slot, unsigned int mode,
 			      int64_t target, int64_t t_ns) INCISE_REALTIME;
 
+/* The same with a pose for the controller's plan. */
+void incise_page_put_pose(struct incise_stepper_setpoint *slot,
+			  const struct incise_stepper_pose *pose,
+			  int64_t t_ns) INCISE_REALTIME;
+
 /*
  * Read a set-point newer than @seq. 1: @copy and @seq are set; 0: none; -EINVAL: an
  * invalid one.
@@ -38,5 +43,9 @@ void incise_page_put_status(struct incise_stepper_motor_status *slot,
  */
 int incise_page_get_status(const struct incise_stepper_motor_status *slot,
 			   struct incise_stepper_motor_status *copy) INCISE_REALTIME;
+
+/* The same of what a plan renders. */
+int incise_page_get_plan(const struct incise_stepper_plan_status *slot,
+			 struct incise_stepper_plan_status *copy) INCISE_REALTIME;
 
 #endif

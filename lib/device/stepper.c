@@ -499,6 +499,81 @@ const char *incise_stepper_fault_text(enum incise_stepper_fault fault)
 	case INCISE_STEPPER_FAULT_FOLLOWING:
 		return "it does not follow its targets: see what blocks it, or give a "
 		       "smaller acceleration_mm_s2, then clear";
+	case INCISE_STEPPER_FAULT_PLAN:
+		return "another motor of the same plan was stopped: see that one, then "
+		       "clear both";
 	}
 	return "unknown fault: see incise/stepper.h of the version in use";
+}
+
+/* --- plans ------------------------------------------------------------------------------ */
+
+int incise_stepper_load_plan(struct incise_stepper *const *steppers, int n,
+			     const void *bytes, size_t size, struct incise_error *err)
+{
+	const struct incise_stepper_plan_ops *plan =
+		n > 0 ? steppers[0]->ops->plan : NULL;
+
+	return plan ? plan->load(steppers, n, bytes, size, err)
+		    : incise_error_set(
+			      err, EOPNOTSUPP,
+			      "the rig has no stepper of the kernel module, which "
+			      "alone runs plans; give its device in rig.conf, such "
+			      "as kernel:/dev/incise-stepper0");
+}
+
+int incise_stepper_follow_plan(struct incise_stepper *stepper)
+{
+	return stepper->ops->plan ? stepper->ops->plan->follow(stepper) : -EOPNOTSUPP;
+}
+
+int incise_stepper_pose(struct incise_stepper *first,
+			const struct incise_stepper_pose_given *pose)
+{
+	return first->ops->plan ? first->ops->plan->pose(first, pose) : -EOPNOTSUPP;
+}
+
+int incise_stepper_rendered(struct incise_stepper *stepper,
+			    struct incise_stepper_rendered *rendered)
+{
+	return stepper->ops->plan ? stepper->ops->plan->rendered(stepper, rendered)
+				  : -EOPNOTSUPP;
+}
+
+const char *incise_stepper_plan_state_name(enum incise_stepper_plan_state state)
+{
+	switch (state) {
+	case INCISE_STEPPER_PLAN_EMPTY:
+		return "no plan";
+	case INCISE_STEPPER_PLAN_LOADED:
+		return "loaded";
+	case INCISE_STEPPER_PLAN_WAIT:
+		return "waits";
+	case INCISE_STEPPER_PLAN_RISE:
+		return "rises";
+	case INCISE_STEPPER_PLAN_FELT:
+		return "felt";
+	case INCISE_STEPPER_PLAN_FADE:
+		return "faded";
+	}
+	return "unknown";
+}
+
+const char *incise_stepper_plan_reason_text(enum incise_stepper_plan_reason reason)
+{
+	switch (reason) {
+	case INCISE_STEPPER_PLAN_SILENT:
+		return "no fresh pose came";
+	case INCISE_STEPPER_PLAN_ASKED:
+		return "its feeder let go of it";
+	case INCISE_STEPPER_PLAN_LEFT:
+		return "its feeder ended";
+	case INCISE_STEPPER_PLAN_AWAY:
+		return "the machine went to sleep, or its device away";
+	case INCISE_STEPPER_PLAN_STOPPED:
+		return "a motor was stopped by a fault";
+	case INCISE_STEPPER_PLAN_REFUSED:
+		return "poses came that are none, or backwards";
+	}
+	return "unknown";
 }

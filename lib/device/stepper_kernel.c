@@ -28,6 +28,7 @@
 
 struct kernel_stepper {
 	struct incise_motor motor;
+	struct incise_stepper_ops ops; /* those of motors, and plans */
 	char path[PATH_MAX];
 	unsigned int index; /* of the motor */
 	int fd;
@@ -112,6 +113,208 @@ static const struct incise_motor_ops kernel_ops = {
 	.close = kernel_close,
 	.now = kernel_now,
 };
+
+/* --- plans ------------------------------------------------------------------------------ */
+
+static const struct kernel_stepper *of_stepper(const struct incise_stepper *stepper)
+{
+	return (const struct kernel_stepper *)stepper;
+}
+
+static bool is_kernel(const struct incise_stepper *stepper);
+
+/* In the order of their numbers, on one controller, opened to drive. */
+static int plan_motors(struct incise_stepper *const *steppers, int n, __u32 *mask,
+		       struct incise_error *err)
+{
+	const struct kernel_stepper *first = of_stepper(steppers[0]);
+	unsigned int least = 0;
+
+	*mask = 0;
+	for (int i = 0; i < n; i++) {
+		const struct kernel_stepper *k = of_stepper(steppers[i]);
+
+		if (!is_kernel(steppers[i]) || strcmp(k->path, first->path))
+			return incise_error_set(
+				err, EINVAL,
+				"a plan has the motors of one controller: %s is not of %s",
+				is_kernel(steppers[i]) ? k->path : "an actuator",
+				first->path);
+		if (i && k->index < least)
+			return incise_error_set(
+				err, EINVAL,
+				"%s: motor %u comes before motor %u: name the actuators "
+				"in rig.conf in the order of their motors",
+				k->path, k->index, least - 1);
+		if (k->motor.watches)
+			return incise_error_set(err, EPERM, "%s: opened to watch",
+						k->path);
+		least = k->index + 1;
+		*mask |= 1u << k->index;
+	}
+	return 0;
+}
+
+static int plan_load(struct incise_stepper *const *steppers, int n, const void *bytes,
+		     size_t size, struct incise_error *err)
+{
+	const struct kernel_stepper *first = of_stepper(steppers[0]);
+	struct incise_stepper_plan plan = {.data = (uintptr_t)bytes, .size = size};
+	int rc = plan_motors(steppers, n, &plan.motors, err);
+
+	if (rc)
+		return rc;
+	rc = request(first, INCISE_STEPPER_LOAD_PLAN, &plan);
+	switch (rc) {
+	case 0:
+		return 0;
+	case -ENOTTY:
+	case -EOPNOTSUPP:
+		return incise_error_set(
+			err, ENOTSUP,
+			"%s: its module runs no plans, or none of this version; load "
+			"that of this version (modinfo incise_stepper)",
+			first->path);
+	case -ERANGE:
+		return incise_error_set(
+			err, ERANGE,
+			"%s: deadman_ms in rig.conf is not longer than the plan's pose "
+			"age and fade, tick_us is longer than a tick of the plan, or this "
+			"machine has no time for it; see `incise info` of both",
+			first->path);
+	case -EBUSY:
+		return incise_error_set(err, EBUSY,
+					"%s: a motor has power, or still comes to rest; "
+					"disable it",
+					first->path);
+	default:
+		return incise_error_set(err, -rc, "%s: refuses the plan: %s", first->path,
+					strerror(-rc));
+	}
+}
+
+static INCISE_REALTIME int plan_drivable(struct incise_stepper *stepper)
+{
+	struct incise_stepper_status status;
+	int rc = stepper->ops->status(stepper, &status);
+
+	if (!rc && ((struct incise_motor *)stepper)->watches)
+		rc = -EPERM;
+	if (!rc && (status.faults & ~INCISE_STEPPER_FAULT_TRAVEL ||
+		    (status.state != INCISE_STEPPER_STATE_READY &&
+		     status.state != INCISE_STEPPER_STATE_MOVING)))
+		rc = -EIO;
+	return rc;
+}
+
+static INCISE_REALTIME int plan_follow(struct incise_stepper *stepper)
+{
+	struct incise_motor *motor = (struct incise_motor *)stepper;
+	int rc = plan_drivable(stepper);
+
+	if (!rc)
+		incise_page_put_setpoint(motor->setpoint, INCISE_STEPPER_MODE_POSE, 0,
+					 motor->ops->now(motor));
+	return rc;
+}
+
+/* To the nearest integer that fits; 0 for what is no number. */
+static INCISE_REALTIME __s32 to_integer(double value, double one)
+{
+	double scaled = value * one;
+
+	if (!isfinite(scaled))
+		return 0;
+	return (__s32)lrint(fmax(INT32_MIN, fmin(INT32_MAX, scaled)));
+}
+
+static INCISE_REALTIME int plan_pose(struct incise_stepper *first,
+				     const struct incise_stepper_pose_given *given)
+{
+	struct kernel_stepper *k = (struct kernel_stepper *)first;
+	const struct incise_tracker_sample *sample = given->sample;
+	struct incise_stepper_pose pose = {0};
+	int rc = plan_drivable(first);
+
+	if (rc)
+		return rc;
+	for (int i = 0; sample && i < 3; i++) {
+		if (!isfinite(sample->position_mm[i]))
+			return -EDOM;
+		pose.position[i] = to_integer(sample->position_mm[i], 65536);
+	}
+	for (int i = 0; sample && i < 4; i++)
+		pose.quaternion[i] = to_integer(sample->quaternion[i], 1073741824);
+	/* None leaves the attitude as it was; 0 is no pose. */
+	pose.quaternion[0] += sample && !pose.quaternion[0];
+	if (!given->tube)
+		pose.tool =
+			(__u32)given->tool | (given->fade ? INCISE_STEPPER_POSE_FADE : 0);
+	incise_page_put_pose(given->tube
+				     ? (struct incise_stepper_setpoint *)k->setpoints +
+					       INCISE_STEPPER_SLOT_TUBE
+				     : k->motor.setpoint,
+			     &pose, sample ? sample->t_ns : k->motor.ops->now(&k->motor));
+	return 0;
+}
+
+static INCISE_REALTIME void to_double(double *to, const __s32 *from, int n, double one)
+{
+	for (int i = 0; i < n; i++)
+		to[i] = from[i] / one;
+}
+
+static INCISE_REALTIME int plan_rendered(struct incise_stepper *stepper,
+					 struct incise_stepper_rendered *to)
+{
+	const struct kernel_stepper *k = of_stepper(stepper);
+	const struct incise_stepper_motor_status *slots = k->status;
+	struct incise_stepper_plan_status from;
+	int rc = incise_page_get_plan(
+		(const struct incise_stepper_plan_status *)(slots +
+							    INCISE_STEPPER_SLOT_PLAN),
+		&from);
+
+	if (rc)
+		return rc;
+	*to = (struct incise_stepper_rendered){
+		.state = (enum incise_stepper_plan_state)from.state,
+		.reasons = from.reasons,
+		.plan = from.plan,
+		.ticks = from.ticks,
+		.missed = from.missed,
+		.poses = from.poses,
+		.refused = from.refused,
+		.t_ns = from.t_ns,
+		.age_ns = from.age_ns,
+		.flags = from.flags,
+		.phase = (enum incise_phase)from.phase,
+		.held = (enum incise_tool)from.held,
+		.depth_mm = from.depth / 65536.0,
+		.speed_mm_s = from.speed / 65536.0,
+	};
+	to_double(to->tool_mm, from.tool, 3, 65536);
+	to_double(to->proxy_mm, from.proxy, 3, 65536);
+	to_double(to->normal, from.normal, 3, 1073741824);
+	to_double(to->quaternion, from.quaternion, 4, 1073741824);
+	to_double(to->command_N, from.command, 3, 65536);
+	to_double(to->along_N, from.along, 3, 65536);
+	return 0;
+}
+
+static const struct incise_stepper_plan_ops plan_ops = {
+	.load = plan_load,
+	.follow = plan_follow,
+	.pose = plan_pose,
+	.rendered = plan_rendered,
+};
+
+static bool is_kernel(const struct incise_stepper *stepper)
+{
+	return stepper->ops->plan == &plan_ops;
+}
+
+/* --- opening ---------------------------------------------------------------------------- */
 
 /* PATH or PATH:MOTOR. */
 static int parse(struct kernel_stepper *k, const struct incise_backend_request *asked,
@@ -382,6 +585,9 @@ static void *kernel_open(const struct incise_backend_request *asked,
 	k->motor.actuator = *asked->actuator;
 	k->motor.watches = asked->watch;
 	incise_motor_init(&k->motor);
+	k->ops = *k->motor.stepper.ops;
+	k->ops.plan = &plan_ops;
+	k->motor.stepper.ops = &k->ops;
 	rc = set_up(k, asked, err);
 	if (!rc)
 		return &k->motor.stepper;

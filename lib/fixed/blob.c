@@ -232,20 +232,19 @@ static int check_data(const struct incise_fixed *fx, const struct incise_fx_head
 	return UNSUPPORTED;
 }
 
-/* A name is text that ends, and zero from there on: it will be printed. */
-static int check_name(const char *name, int size)
+bool incise_fx_is_name(const char *name, int size)
 {
 	int i = 0;
 
 	for (; i < size && name[i]; i++)
 		if ((unsigned char)name[i] < ' ' || name[i] == 0x7f)
-			return BAD;
+			return false;
 	if (i == size)
-		return BAD;
+		return false;
 	for (; i < size; i++)
 		if (name[i])
-			return BAD;
-	return 0;
+			return false;
+	return true;
 }
 
 /* Bytes without a meaning in this version must be zero, so that a later one can use them. */
@@ -300,13 +299,13 @@ int incise_fixed_open(struct incise_fixed *fx, const void *blob, uint32_t size)
 	if (fx->shift_a < 0 || fx->shift_a > 127 || fx->shift_b < 0 || fx->shift_b > 127)
 		return BAD;
 	if (fx->n_inputs < 1 || fx->n_inputs > INCISE_FIXED_INPUTS_MAX || !fx->bound ||
-	    check_unused(head) || check_name(head->name, sizeof(head->name)) ||
-	    check_name(head->output, sizeof(head->output)))
+	    check_unused(head) || !incise_fx_is_name(head->name, sizeof(head->name)) ||
+	    !incise_fx_is_name(head->output, sizeof(head->output)))
 		return BAD;
 	for (int i = 0; i < fx->n_inputs; i++) {
 		const struct incise_fx_input *in = &head->input[i];
 
-		if (check_name(in->name, sizeof(in->name)))
+		if (!incise_fx_is_name(in->name, sizeof(in->name)))
 			return BAD;
 		fx->input[i] = (struct incise_fixed_input){
 			.name = in->name,

@@ -19,6 +19,7 @@
 #define INT64_MAX S64_MAX
 #endif
 #else
+#include <stdbool.h>
 #include <stdint.h>
 
 static inline uint64_t div_u64(uint64_t dividend, uint32_t divisor)

@@ -99,6 +99,9 @@ static inline int64_t incise_fx_int64(int64_t v)
 	return (int64_t)incise_fx_le64((uint64_t)v);
 }
 
+/* Whether a name is text that ends, and zero from there on: it will be printed. */
+bool incise_fx_is_name(const char *name, int size);
+
 /* CRC-32C (Castagnoli) of n bytes. */
 uint32_t incise_fx_crc(const uint8_t *bytes, uint32_t n);
 

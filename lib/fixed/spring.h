@@ -19,9 +19,7 @@
 #define INCISE_FIXED_SPRING_H
 
 #include <incise/export.h>
-#include "integers.h"
-
-#define INCISE_FIXED_UNIT (1 << 30) /* 1.0 as part of a direction */
+#include "vector.h"
 
 /* Any numbers are safe here; only a direction of length 1 is a spring. */
 struct incise_fixed_spring {

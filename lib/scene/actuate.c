@@ -87,14 +87,40 @@ static int set(struct incise_axis *axis, double along_N, struct incise_tick *tic
 	return incise_stepper_set(axis->stepper, held_mm);
 }
 
+void incise_axes_rest(const struct incise_axes *axes, const double force_N[3],
+		      struct incise_tick *tick)
+{
+	double unfelt_N[3];
+
+	v3_copy(unfelt_N, force_N);
+	for (int i = 0; i < axes->n; i++)
+		v3_add(unfelt_N, unfelt_N, -tick->actuated_N[i], axes->axis[i].direction);
+	tick->unfelt_N = v3_length(unfelt_N);
+}
+
+int incise_axes_watch(struct incise_axes *axes, struct incise_tick *tick)
+{
+	for (int i = 0; i < axes->n; i++) {
+		struct incise_stepper_status status = {0};
+		int rc = incise_stepper_status(axes->axis[i].stepper, &status);
+
+		if (!rc && (status.faults & ~(unsigned int)INCISE_STEPPER_FAULT_TRAVEL ||
+			    status.state == INCISE_STEPPER_STATE_DISABLED))
+			rc = -EIO;
+		if (rc)
+			return refused(axes, i, &status, rc);
+		find_handle(&axes->axis[i], tick, &status);
+		tick->rendered_N[i] = rendered(&axes->axis[i], &status);
+	}
+	return 0;
+}
+
 int incise_axes_render(struct incise_axes *axes, const double force_N[3],
 		       struct incise_tick *tick)
 {
 	struct incise_stepper_status status[INCISE_RIG_AXES_MAX] = {0};
-	double unfelt_N[3];
 	int rc = 0;
 
-	v3_copy(unfelt_N, force_N);
 	for (int i = 0; i < axes->n; i++) {
 		rc = incise_stepper_status(axes->axis[i].stepper, &status[i]);
 		if (rc)
@@ -104,7 +130,6 @@ int incise_axes_render(struct incise_axes *axes, const double force_N[3],
 		struct incise_axis *axis = &axes->axis[i];
 
 		tick->actuated_N[i] = v3_dot(force_N, axis->dual);
-		v3_add(unfelt_N, unfelt_N, -tick->actuated_N[i], axis->direction);
 		find_handle(axis, tick, &status[i]);
 		tick->rendered_N[i] = rendered(axis, &status[i]);
 		rc = set(axis, tick->actuated_N[i], tick);
@@ -113,7 +138,7 @@ int incise_axes_render(struct incise_axes *axes, const double force_N[3],
 			refused(axes, i, &status[i], rc);
 		}
 	}
-	tick->unfelt_N = v3_length(unfelt_N);
+	incise_axes_rest(axes, force_N, tick);
 	return rc;
 }
 

@@ -44,6 +44,13 @@ void incise_axes_take(struct incise_axes *axes, struct incise_rig *rig);
 int incise_axes_render(struct incise_axes *axes, const double force_N[3],
 		       struct incise_tick *tick) INCISE_REALTIME;
 
+/* Read all actuators of a plan that the kernel runs, and fill in rendered_N; as incise_axes_render(). */
+int incise_axes_watch(struct incise_axes *axes, struct incise_tick *tick) INCISE_REALTIME;
+
+/* Fill in unfelt_N, from actuated_N. */
+void incise_axes_rest(const struct incise_axes *axes, const double force_N[3],
+		      struct incise_tick *tick) INCISE_REALTIME;
+
 /*
  * Send all nuts to rest, also when some do not go any more. Returns 0 or the negative errno of
  * the first that does not; *axes keeps it as the one that failed, unless @keep.

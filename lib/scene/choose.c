@@ -56,16 +56,22 @@ static const struct {
 	incise_stage_fn *(*how)(const struct incise_plan *plan);
 	const char *(*why_not)(const struct incise_plan *plan); /* NULL: always needed */
 	bool forces;						/* come before it */
+	incise_fixed_stage_fn *integer;
 } all[] = {
-	{"pose", true, NULL, pose, NULL, false},
-	{"predict", true, incise_stage_predict, NULL, NULL, false},
-	{"tool", true, incise_stage_tool, NULL, no_tool, false},
-	{"contact", false, incise_stage_contact, NULL, NULL, false},
-	{"normal", false, incise_stage_normal, NULL, no_normal, false},
-	{"incision", true, incise_stage_incision, NULL, no_tool, false},
-	{"membrane", false, incise_stage_membrane, NULL, no_membrane, false},
-	{"start", true, incise_stage_start, NULL, NULL, true},
-	{"limit", true, incise_stage_limit, NULL, NULL, false},
+	{"pose", true, NULL, pose, NULL, false, NULL},
+	{"predict", true, incise_stage_predict, NULL, NULL, false,
+	 incise_fixed_stage_predict},
+	{"tool", true, incise_stage_tool, NULL, no_tool, false, incise_fixed_stage_tool},
+	{"contact", false, incise_stage_contact, NULL, NULL, false,
+	 incise_fixed_stage_contact},
+	{"normal", false, incise_stage_normal, NULL, no_normal, false,
+	 incise_fixed_stage_normal},
+	{"incision", true, incise_stage_incision, NULL, no_tool, false,
+	 incise_fixed_stage_incision},
+	{"membrane", false, incise_stage_membrane, NULL, no_membrane, false,
+	 incise_fixed_stage_membrane},
+	{"start", true, incise_stage_start, NULL, NULL, true, incise_fixed_stage_start},
+	{"limit", true, incise_stage_limit, NULL, NULL, false, incise_fixed_stage_limit},
 };
 _Static_assert(sizeof(all) / sizeof(*all) + 1 == INCISE_PLAN_OTHER_STAGES,
 	       "with actuate these are INCISE_PLAN_OTHER_STAGES");
@@ -84,11 +90,9 @@ static void keep(struct incise_plan *plan, struct incise_stage stage)
 static incise_force_fn *way(const struct incise_plan *plan,
 			    const struct incise_tissue_force *force)
 {
-	if (force->model && plan->fixed)
-		return plan->dissipates ? force->front_fixed : force->model_fixed;
-	if (force->model && plan->model)
+	if (force->model && (plan->model || plan->fixed))
 		return plan->dissipates ? force->front : force->model;
-	return plan->scene->fixed && force->fixed ? force->fixed : force->run;
+	return force->run;
 }
 
 static void choose_forces(struct incise_plan *plan)
@@ -102,6 +106,7 @@ static void choose_forces(struct incise_plan *plan)
 		else
 			keep(plan, (struct incise_stage){.name = own->force->name,
 							 .add = way(plan, own->force),
+							 .integer = own->force->integer,
 							 .own = own});
 	}
 }
@@ -121,6 +126,7 @@ void incise_plan_choose(struct incise_plan *plan)
 			keep(plan,
 			     (struct incise_stage){.name = all[i].name,
 						   .always = all[i].always,
+						   .integer = all[i].integer,
 						   .run = all[i].how ? all[i].how(plan)
 								     : all[i].run});
 	}

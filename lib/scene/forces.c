@@ -28,50 +28,12 @@
 #include "forces.h"
 #include "plan.h"
 
-static int32_t to_fixed(double x)
-{
-	return (int32_t)lrint(fmax(-32767, fmin(32767, x)) * INCISE_FIXED_ONE);
-}
-
-/* A spring in integers between two points; only their difference has to fit. */
-static void add_fixed(double force[3], const struct incise_fixed_spring *spring,
-		      const double p[3], const double p0[3], bool push)
-{
-	int32_t off[3], f[3] = {0};
-
-	for (int i = 0; i < 3; i++)
-		off[i] = to_fixed(p[i] - p0[i]);
-	if (push)
-		incise_fixed_spring_push(spring, off, f);
-	else
-		incise_fixed_spring_pull(spring, off, f);
-	for (int i = 0; i < 3; i++)
-		force[i] += (double)f[i] / INCISE_FIXED_ONE;
-}
-
-static incise_force_fn reaction, reaction_fixed, reaction_model, reaction_model_fixed,
-	reaction_front, reaction_front_fixed, plane, plane_fixed, damping, insertion,
-	spread;
-
 static void reaction(struct incise_plan *plan, struct incise_tick *tick,
 		     struct incise_acting_force *own)
 {
 	(void)tick;
 	v3_add(plan->force_N, plan->force_N, own->number[0] * plan->depth_mm,
 	       plan->normal);
-}
-
-static void reaction_fixed(struct incise_plan *plan, struct incise_tick *tick,
-			   struct incise_acting_force *own)
-{
-	const double origin[3] = {0};
-	struct incise_fixed_spring spring;
-	double below[3] = {0};
-
-	(void)tick;
-	v3_add(below, below, -plan->depth_mm, plan->normal);
-	if (!incise_fixed_spring_set(&spring, own->number[0], origin, plan->normal))
-		add_fixed(plan->force_N, &spring, below, origin, true);
 }
 
 /*
@@ -89,20 +51,18 @@ static double cutting_N(struct incise_plan *plan, struct incise_tick *tick, doub
 	return fmax(plan->gain * size_N, 0) + plan->beyond_N_mm * beyond_mm;
 }
 
-static double cutting_double(struct incise_plan *plan, struct incise_tick *tick)
+static double cutting(struct incise_plan *plan, struct incise_tick *tick)
 {
 	double x[] = {plan->depth_mm, tick->velocity_mm_s};
 	unsigned int flags = 0;
-	double size_N = incise_model_eval(plan->model, x, &flags);
-
-	return cutting_N(plan, tick, size_N, flags);
-}
-
-static double cutting_fixed(struct incise_plan *plan, struct incise_tick *tick)
-{
-	double x[] = {plan->depth_mm, tick->velocity_mm_s};
 	bool outside = false;
+	double size_N;
 
+	if (plan->model) {
+		size_N = incise_model_eval(plan->model, x, &flags);
+		return cutting_N(plan, tick, size_N, flags);
+	}
+	/* A compiled one, in a search for swings; its ticks are in integers. */
 	for (int i = 0; i < 2; i++)
 		outside |= x[i] * INCISE_FIXED_ONE < plan->fixed->input[i].min ||
 			   x[i] * INCISE_FIXED_ONE > plan->fixed->input[i].max;
@@ -119,22 +79,14 @@ static void reaction_model(struct incise_plan *plan, struct incise_tick *tick,
 {
 	(void)own;
 	if (plan->depth_mm > 0)
-		push(plan, cutting_double(plan, tick));
-}
-
-static void reaction_model_fixed(struct incise_plan *plan, struct incise_tick *tick,
-				 struct incise_acting_force *own)
-{
-	(void)own;
-	if (plan->depth_mm > 0)
-		push(plan, cutting_fixed(plan, tick));
+		push(plan, cutting(plan, tick));
 }
 
 /* New tissue that the blade meets at this tick, mm. */
 static double advance_mm(struct incise_plan *plan, struct incise_acting_force *own,
 			 bool *fresh)
 {
-	struct incise_front *cut = &own->state.front.cut;
+	struct incise_front *cut = &own->front;
 	const double *side = plan->side;
 
 	*fresh =
@@ -150,38 +102,11 @@ static void reaction_front(struct incise_plan *plan, struct incise_tick *tick,
 {
 	bool fresh;
 	double way_mm = advance_mm(plan, own, &fresh);
-	double most_N = plan->depth_mm > 0 ? cutting_double(plan, tick) : 0;
+	double most_N = plan->depth_mm > 0 ? cutting(plan, tick) : 0;
 
-	push(plan, incise_front_force(&own->state.front.cut, plan->unloading_N_mm,
+	push(plan, incise_front_force(&own->front, plan->unloading_N_mm,
 				      own->number[INCISE_REACTION_FRICTION],
 				      plan->depth_mm, way_mm, most_N));
-}
-
-/* Beyond 10 m of new tissue in one cut nothing is added: the integers would not hold it. */
-#define CUT_MOST_MM 1e4
-
-static void reaction_front_fixed(struct incise_plan *plan, struct incise_tick *tick,
-				 struct incise_acting_force *own)
-{
-	struct incise_fixed_front *fixed = &own->state.front.fixed;
-	int32_t before = own->state.front.advance;
-	bool fresh;
-	double way_mm = advance_mm(plan, own, &fresh);
-	double most_N = plan->depth_mm > 0 ? cutting_fixed(plan, tick) : 0;
-
-	if (plan->proxy.began)
-		*fixed = (struct incise_fixed_front){.cut = fresh ? 0 : fixed->cut};
-	if (fresh)
-		own->state.front.advance_mm = before = 0;
-	own->state.front.advance_mm =
-		fmin(own->state.front.advance_mm + way_mm, CUT_MOST_MM);
-	own->state.front.advance = to_fixed(own->state.front.advance_mm);
-	push(plan, (double)incise_fixed_front_force(
-			   fixed, to_fixed(plan->unloading_N_mm),
-			   to_fixed(own->number[INCISE_REACTION_FRICTION]),
-			   to_fixed(plan->depth_mm), own->state.front.advance - before,
-			   to_fixed(most_N)) /
-			   INCISE_FIXED_ONE);
 }
 
 /* The blade stays in the plane of its cut: s is Sx(0), its side when the cut began. */
@@ -193,17 +118,6 @@ static void plane(struct incise_plan *plan, struct incise_tick *tick,
 	v3_sub(off, tick->tool_mm, plan->p0_mm);
 	v3_add(plan->force_N, plan->force_N, -own->number[0] * v3_dot(off, plan->side),
 	       plan->side);
-}
-
-static void plane_fixed(struct incise_plan *plan, struct incise_tick *tick,
-			struct incise_acting_force *own)
-{
-	const double origin[3] = {0};
-
-	if (plan->proxy.began)
-		incise_fixed_spring_set(&own->state.spring, own->number[0], origin,
-					plan->side);
-	add_fixed(plan->force_N, &own->state.spring, tick->tool_mm, plan->p0_mm, false);
 }
 
 static void damping(struct incise_plan *plan, struct incise_tick *tick,
@@ -277,54 +191,61 @@ static void spread(struct incise_plan *plan, struct incise_tick *tick,
 #define INSERTION (1U << INCISE_PHASE_INSERTION)
 
 const struct incise_tissue_force incise_tissue_forces[] = {
-	{
-		.name = "reaction",
-		.phases = CUTTING,
-		.kind = INCISE_SPRING_NORMAL,
-		.number = {{"reaction_N_mm", 1000, 0, 0.14},
-			   {"unloading_N_mm", 1000, 0, 0},
-			   {"friction", 1, 0.1, 0.1}},
-		.zero = "no model, and tissue.reaction_N_mm is 0",
-		.run = reaction,
-		.fixed = reaction_fixed,
-		.model = reaction_model,
-		.model_fixed = reaction_model_fixed,
-		.front = reaction_front,
-		.front_fixed = reaction_front_fixed,
-	},
-	{
-		.name = "plane",
-		.phases = CUTTING,
-		.kind = INCISE_SPRING_SIDE,
-		.number = {{"plane_N_mm", 1000, 0, 0.17}},
-		.zero = "tissue.plane_N_mm is 0",
-		.run = plane,
-		.fixed = plane_fixed,
-	},
-	{
-		.name = "damping",
-		.phases = CUTTING | INSERTION,
-		.kind = INCISE_DAMPER,
-		.number = {{"damping_N_s_mm", 1, 0, 0.0005}},
-		.zero = "tissue.damping_N_s_mm is 0",
-		.run = damping,
-	},
-	{
-		.name = "insertion",
-		.phases = INSERTION,
-		.kind = INCISE_SPRING_NORMAL,
-		.number = {{"insertion_N_mm", 1000, 0, 0.28}, {"aligned", 1, 0.2, 0.2}},
-		.zero = "tissue.insertion_N_mm is 0",
-		.run = insertion,
-	},
-	{
-		.name = "spread",
-		.phases = INSERTION,
-		.kind = INCISE_SPRING_ACROSS,
-		.number = {{"spread_N_mm", 1000, 0, 0.22}},
-		.zero = "tissue.spread_N_mm is 0",
-		.run = spread,
-	},
+	[INCISE_FORCE_REACTION] =
+		{
+			.name = "reaction",
+			.phases = CUTTING,
+			.kind = INCISE_SPRING_NORMAL,
+			.number = {{"reaction_N_mm", 1000, 0, 0.14},
+				   {"unloading_N_mm", 1000, 0, 0},
+				   {"friction", 1, 0.1, 0.1}},
+			.zero = "no model, and tissue.reaction_N_mm is 0",
+			.run = reaction,
+			.integer = incise_fixed_stage_reaction,
+			.model = reaction_model,
+			.front = reaction_front,
+		},
+	[INCISE_FORCE_PLANE] =
+		{
+			.name = "plane",
+			.phases = CUTTING,
+			.kind = INCISE_SPRING_SIDE,
+			.number = {{"plane_N_mm", 1000, 0, 0.17}},
+			.zero = "tissue.plane_N_mm is 0",
+			.run = plane,
+			.integer = incise_fixed_stage_plane,
+		},
+	[INCISE_FORCE_DAMPING] =
+		{
+			.name = "damping",
+			.phases = CUTTING | INSERTION,
+			.kind = INCISE_DAMPER,
+			.number = {{"damping_N_s_mm", 1, 0, 0.0005}},
+			.zero = "tissue.damping_N_s_mm is 0",
+			.run = damping,
+			.integer = incise_fixed_stage_damping,
+		},
+	[INCISE_FORCE_INSERTION] =
+		{
+			.name = "insertion",
+			.phases = INSERTION,
+			.kind = INCISE_SPRING_NORMAL,
+			.number = {{"insertion_N_mm", 1000, 0, 0.28},
+				   {"aligned", 1, 0.2, 0.2}},
+			.zero = "tissue.insertion_N_mm is 0",
+			.run = insertion,
+			.integer = incise_fixed_stage_insertion,
+		},
+	[INCISE_FORCE_SPREAD] =
+		{
+			.name = "spread",
+			.phases = INSERTION,
+			.kind = INCISE_SPRING_ACROSS,
+			.number = {{"spread_N_mm", 1000, 0, 0.22}},
+			.zero = "tissue.spread_N_mm is 0",
+			.run = spread,
+			.integer = incise_fixed_stage_spread,
+		},
 };
 const int incise_n_tissue_forces =
 	sizeof(incise_tissue_forces) / sizeof(*incise_tissue_forces);

@@ -10,8 +10,7 @@
 
 #include <stdbool.h>
 #include <incise/export.h>
-#include "../fixed/front.h"
-#include "../fixed/spring.h"
+#include "../fixed/plan.h"
 #include "../tissue/front.h"
 
 /* A plan keeps at most INCISE_PLAN_STAGES_MAX stages, forces among them. */
@@ -30,7 +29,16 @@ enum incise_force_kind {
 	INCISE_FRICTION,    /* N against the motion */
 };
 
-/* Numbers of the reaction, the first row, besides its stiffness: with a model. */
+/* The rows, in the order in which they run. */
+enum incise_tissue_row {
+	INCISE_FORCE_REACTION,
+	INCISE_FORCE_PLANE,
+	INCISE_FORCE_DAMPING,
+	INCISE_FORCE_INSERTION,
+	INCISE_FORCE_SPREAD,
+};
+
+/* Numbers of the reaction besides its stiffness: with a model. */
 #define INCISE_REACTION_UNLOADING 1
 #define INCISE_REACTION_FRICTION 2
 
@@ -41,23 +49,11 @@ struct incise_force_number {
 	double skin; /* of neck.scene: what tests and benchmarks take */
 };
 
-/* State of a force from tick to tick, in one plan. Zeroed with the plan. */
-union incise_force_state {
-	struct incise_fixed_spring
-		spring; /* plane in fixed point, set when contact starts */
-	struct {
-		struct incise_front cut; /* reaction; in fixed point its place only */
-		struct incise_fixed_front fixed; /* the forces then */
-		double advance_mm; /* in the cut, so that no rounding adds up */
-		int32_t advance;   /* of that, what the integers have had */
-	} front;
-};
-
 /* A force as a plan runs it. */
 struct incise_acting_force {
 	const struct incise_tissue_force *force;
 	double number[INCISE_FORCE_NUMBERS]; /* of the scene; the first times the gain */
-	union incise_force_state state;
+	struct incise_front front;	     /* of the reaction; zeroed with the plan */
 };
 
 /* Adds to plan->force_N. Called in the phases of the force only. */
@@ -72,11 +68,12 @@ struct incise_tissue_force {
 	struct incise_force_number number[INCISE_FORCE_NUMBERS];
 	const char *zero;
 	incise_force_fn *run;
-	incise_force_fn *fixed; /* with arithmetic = "fixed"; NULL: as @run */
 	/* A model takes the place of the first number; NULL: it does not. */
-	incise_force_fn *model, *model_fixed;
+	incise_force_fn *model;
 	/* The same with a tissue that dissipates: tissue.withdrawal. */
-	incise_force_fn *front, *front_fixed;
+	incise_force_fn *front;
+	/* With arithmetic = "fixed". */
+	incise_fixed_stage_fn *integer;
 };
 
 /* In the order in which they run. */

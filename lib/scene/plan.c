@@ -42,10 +42,9 @@ static int take_model(struct incise_plan *plan, struct incise_error *err)
 	plan->fixed = scene->compiled;
 	if (!scene->model)
 		return 0;
-	if (!scene->fixed) {
-		plan->model = scene->model;
+	plan->model = scene->model;
+	if (!scene->fixed)
 		return 0;
-	}
 	plan->fixed = plan->own_fixed = incise_fixed_compile(scene->model, NULL, &why);
 	if (!plan->fixed)
 		return incise_error_set(err, why.code, "%s: its model: %s", scene->path,
@@ -269,6 +268,10 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 	}
 	if (!rc)
 		rc = incise_plan_check_rest(plan, &tracker, err);
+	if (!rc && scene->fixed) {
+		plan->integers = incise_integers_new(plan, err);
+		rc = plan->integers ? 0 : -errno;
+	}
 	if (rc) {
 		incise_plan_free(plan);
 		errno = -rc;
@@ -322,6 +325,7 @@ void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 		      double gain)
 {
 	*copy = *plan;
+	copy->integers = NULL;
 	for (int i = 0; i < copy->n_stages; i++)
 		if (copy->stage[i].own)
 			copy->stage[i].own =
@@ -335,9 +339,31 @@ void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 
 void incise_plan_take_over(struct incise_plan *plan, const struct incise_plan *before)
 {
-	plan->membrane.punctured = before->membrane.punctured;
-	if (plan->incision && before->incision)
-		incise_incision_copy(plan->incision, before->incision);
+	struct incise_cut cut;
+
+	if (plan->integers && before->integers) {
+		incise_integers_take_over(plan->integers, before->integers);
+		return;
+	}
+	plan->membrane.punctured = before->integers
+					   ? before->integers->state.membrane.punctured
+					   : before->membrane.punctured;
+	if (plan->integers)
+		plan->integers->state.membrane.punctured = plan->membrane.punctured;
+	if (!plan->incision || !before->incision)
+		return;
+	incise_incision_clear(plan->incision);
+	if (before->integers)
+		for (int i = 0; incise_integers_cut(before->integers, i, &cut); i++)
+			incise_incision_add(plan->incision, &cut);
+	for (int i = 0; !before->integers && i < incise_incision_cuts(before->incision);
+	     i++)
+		if (plan->integers)
+			incise_integers_add_cut(plan->integers,
+						incise_incision_cut(before->incision, i));
+		else
+			incise_incision_add(plan->incision,
+					    incise_incision_cut(before->incision, i));
 }
 
 void incise_plan_free(struct incise_plan *plan)
@@ -351,6 +377,7 @@ void incise_plan_free(struct incise_plan *plan)
 	free(plan->tube);
 	free(plan->average);
 	incise_incision_free(plan->incision);
+	free(plan->integers);
 	free(plan);
 }
 
@@ -371,7 +398,7 @@ int incise_plan_set_tip(struct incise_plan *plan, const double tip_mm[3])
 	if (!v3_finite(tip_mm) || v3_length(tip_mm) > 1e6)
 		return -EINVAL;
 	v3_copy(plan->tip_mm, tip_mm);
-	return 0;
+	return plan->integers ? incise_integers_set_tip(plan->integers, tip_mm) : 0;
 }
 
 int incise_plan_set_tool(struct incise_plan *plan, enum incise_tool tool)
@@ -380,16 +407,24 @@ int incise_plan_set_tool(struct incise_plan *plan, enum incise_tool tool)
 		return -EINVAL;
 	if (plan->inserts)
 		plan->instrument.wanted = tool;
+	if (plan->integers)
+		incise_integers_hold(plan->integers, tool, plan->fading);
 	return 0;
 }
 
 void incise_plan_fade(struct incise_plan *plan, bool fading)
 {
 	plan->fading = fading;
+	if (plan->integers)
+		incise_integers_hold(plan->integers, plan->instrument.wanted, fading);
 }
 
 bool incise_plan_faded(const struct incise_plan *plan)
 {
+	if (plan->watched)
+		return incise_plan_kernel_faded(plan);
+	if (plan->integers)
+		return plan->fading && incise_integers_faded(plan->integers);
 	/* A gain of 0 asks for nothing; the slew may still be on its way there. */
 	return plan->fading && !(plan->start.gain > 0) &&
 	       v3_length(plan->limit.last_N) == 0;
@@ -405,7 +440,9 @@ int64_t incise_plan_fade_ns(const struct incise_plan *plan)
 int incise_plan_release(struct incise_plan *plan)
 {
 	/* What ended the ticks stays the cause. */
-	int rc = incise_axes_release(&plan->axes, plan->fault);
+	int rc = plan->watched && !plan->feeds
+			 ? 0
+			 : incise_axes_release(&plan->axes, plan->fault);
 
 	if (!plan->fault)
 		plan->fault = rc;
@@ -466,6 +503,8 @@ static int fail(struct incise_plan *plan, struct incise_tick *tick, int rc)
 {
 	plan->fault = rc;
 	incise_limit_zero(&plan->limit);
+	if (plan->integers)
+		incise_integers_zero(plan->integers);
 	memset(tick->command_N, 0, sizeof(tick->command_N));
 	memset(tick->actuated_N, 0, sizeof(tick->actuated_N));
 	tick->unfelt_N = 0;
@@ -483,6 +522,20 @@ static inline void add_force(struct incise_plan *plan, struct incise_tick *tick,
 		stage->add(plan, tick, stage->own);
 }
 
+static inline void run_integer(struct incise_plan *plan, const struct incise_stage *stage,
+			       struct incise_tick *tick)
+{
+	struct incise_integers *integers = plan->integers;
+
+	if (stage->integer == incise_fixed_stage_predict)
+		incise_integers_begin(integers, tick);
+	stage->integer(&integers->plan, &integers->state, &integers->tick);
+	if (stage->integer != incise_fixed_stage_limit)
+		return;
+	incise_integers_end(integers, tick);
+	v3_copy(plan->limit.last_N, tick->command_N);
+}
+
 /* Inlined into both, so that the one without times does not pay for them. */
 static inline __attribute__((always_inline)) int run_stages(struct incise_plan *plan,
 							    int64_t t_ns,
@@ -497,7 +550,9 @@ static inline __attribute__((always_inline)) int run_stages(struct incise_plan *
 		int64_t begin = stage_ns ? incise_monotonic_ns() : 0;
 		int rc = 0;
 
-		if (stage->own)
+		if (plan->integers && stage->integer)
+			run_integer(plan, stage, tick);
+		else if (stage->own)
 			add_force(plan, tick, stage);
 		else if (stage->always || !(tick->flags & INCISE_TICK_STALE))
 			rc = stage->run(plan, tick);
@@ -546,6 +601,7 @@ size_t incise_plan_memory(const struct incise_plan *plan)
 	size += plan->tube ? sizeof(*plan->tube) : 0;
 	size += plan->average ? sizeof(*plan->average) : 0;
 	size += plan->incision ? incise_incision_memory(plan->incision) : 0;
+	size += plan->integers ? sizeof(*plan->integers) : 0;
 	if (plan->fixed)
 		size += sizeof(*plan->fixed) + plan->fixed->size;
 	if (plan->scene->model)
@@ -567,25 +623,4 @@ void incise_plan_stability(const struct incise_plan *plan,
 			   struct incise_plan_stability *stability)
 {
 	*stability = plan->stability;
-}
-
-double incise_plan_bound(const struct incise_plan *plan, double reach_mm)
-{
-	double bound_N = plan->fixed ? plan->gain * incise_fixed_bound(plan->fixed) : 0;
-
-	/* The force is below the unloading from the surface on. */
-	if (plan->fixed && plan->dissipates)
-		bound_N = incise_fixed_front_bound(
-			plan->unloading_N_mm,
-			plan->acting[0].number[INCISE_REACTION_FRICTION],
-			plan->unloading_N_mm * reach_mm,
-			bound_N + 1.0 / INCISE_FIXED_ONE);
-
-	for (int i = 0; plan->scene->fixed && i < incise_n_tissue_forces; i++) {
-		const struct incise_acting_force *own = &plan->acting[i];
-
-		if (own->force->fixed && own->number[0] > 0)
-			bound_N += incise_fixed_spring_bound(own->number[0], reach_mm);
-	}
-	return bound_N;
 }

@@ -8,6 +8,7 @@
 #include <incise/fixed.h>
 #include <incise/model.h>
 #include <incise/plan.h>
+#include <incise/stepper_plan.h>
 #include "../control/limit.h"
 #include "../control/predict.h"
 #include "../control/start.h"
@@ -16,6 +17,7 @@
 #include "../tissue/incision.h"
 #include "../tissue/instrument.h"
 #include "actuate.h"
+#include "integers.h"
 #include "scene.h"
 
 /* Poses taken at one tick; more than a tracker sends in a period, even after a stall. */
@@ -32,6 +34,8 @@ struct incise_stage {
 	incise_stage_fn *run; /* or a force: */
 	incise_force_fn *add;
 	struct incise_acting_force *own;
+	incise_fixed_stage_fn
+		*integer; /* takes their place in integers; NULL: none does */
 };
 
 /* Stages besides forces; those that no loop has are always left out. */
@@ -128,6 +132,16 @@ struct incise_plan {
 	int64_t last_ns; /* of the last tick; 0: none */
 
 	struct incise_axes axes; /* none: nothing is rendered */
+
+	struct incise_integers *integers; /* with arithmetic = "fixed"; else NULL */
+
+	/* The kernel renders: with incise_plan_watch(), and with incise_plan_feed_kernel(). */
+	bool watched, feeds;
+	bool seen;
+	struct incise_stepper_rendered last_seen;
+	int64_t fed_ns;	 /* when a pose, or a sign of life, was given last; 0: none was */
+	int64_t life_ns; /* so often, at least */
+	bool fade_told;	 /* the last one said whether to fade as it is */
 };
 
 /* --- stages, but for the forces, which are in forces.h --- */
@@ -146,6 +160,17 @@ incise_stage_fn incise_stage_membrane;
 incise_stage_fn incise_stage_start;
 incise_stage_fn incise_stage_limit;
 incise_stage_fn incise_stage_actuate;
+
+/* In place of all but poses: what the kernel renders. */
+incise_stage_fn incise_stage_watched;
+
+/* incise_plan_faded() of a plan that the kernel renders. */
+bool incise_plan_kernel_faded(const struct incise_plan *plan) INCISE_REALTIME;
+
+/* Give the kernel a pose; NULL: a sign of life. 0 or a negative errno. */
+int incise_plan_give(struct incise_plan *plan, bool tube,
+		     const struct incise_tracker_sample *sample,
+		     int64_t now_ns) INCISE_REALTIME;
 
 /* --- plan --- */
 

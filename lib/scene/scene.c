@@ -252,6 +252,7 @@ static int read_surface(struct incise_scene *scene, const config_setting_t *root
 		named.file = scene->surface_path;
 	}
 	scene->surface = kind->make(&named, &why);
+	scene->surface_kind = kind->name;
 	if (!scene->surface)
 		return incise_error_set(err, why.code, "%s:%d: its surface: %s",
 					scene->path, config_setting_source_line(group),

@@ -21,6 +21,7 @@ struct incise_scene {
 	struct incise_model *model; /* one of these, or none */
 	struct incise_fixed *compiled;
 	struct incise_surface *surface; /* or NULL: the rig's plane */
+	const char *surface_kind;	/* as the file names it */
 	struct {
 		double gain, leave_mm;
 		bool dissipates;	  /* withdrawal = "dissipative"; else "paper" */

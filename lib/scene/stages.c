@@ -87,7 +87,11 @@ static void take(struct incise_plan *plan, struct incise_tracker_sample *samples
 		/* A timestamp from the future would keep all later poses out. */
 		if (samples[i].t_ns > now_ns)
 			samples[i].t_ns = now_ns;
-		if (!tube)
+		if (plan->feeds)
+			incise_plan_give(plan, tube, &samples[i], now_ns);
+		else if (plan->integers)
+			incise_integers_pose(plan->integers, tube, &samples[i], now_ns);
+		else if (!tube)
 			take_scalpel(plan, &samples[i]);
 		else if (plan->tube)
 			incise_predict_add(plan->tube, &samples[i]);

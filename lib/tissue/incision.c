@@ -66,14 +66,18 @@ void incise_incision_free(struct incise_incision *incision)
 	free(incision);
 }
 
-void incise_incision_copy(struct incise_incision *to, const struct incise_incision *from)
+void incise_incision_clear(struct incise_incision *incision)
 {
-	int most = to->setup.cuts_most;
+	incision->n = 0;
+	incision->cutting = incision->met.in = false;
+}
 
-	to->n = from->n < most ? from->n : most;
-	for (int i = 0; i < to->n; i++)
-		to->cut[i] = from->cut[i];
-	to->cutting = to->met.in = false;
+bool incise_incision_add(struct incise_incision *incision, const struct incise_cut *cut)
+{
+	if (incision->n >= incision->setup.cuts_most)
+		return false;
+	incision->cut[incision->n++] = *cut;
+	return true;
 }
 
 size_t incise_incision_memory(const struct incise_incision *incision)

@@ -23,12 +23,12 @@ struct incise_incision *incise_incision_make(const struct incise_incision_setup 
 /* Memory that it holds, bytes. */
 size_t incise_incision_memory(const struct incise_incision *incision);
 
-/*
- * The cuts of another one, as many as there is room for, the first ones first; its own are forgotten,
- * and no tool is in it.
- */
-void incise_incision_copy(struct incise_incision *to,
-			  const struct incise_incision *from) INCISE_REALTIME;
+/* Forget all cuts; no tool is in it. */
+void incise_incision_clear(struct incise_incision *incision) INCISE_REALTIME;
+
+/* Add a cut of another one. Returns whether there was room. */
+bool incise_incision_add(struct incise_incision *incision,
+			 const struct incise_cut *cut) INCISE_REALTIME;
 
 /* The opening that a handle or tube met at the last tick, before that widened it. */
 const struct incise_opening *incise_incision_met(const struct incise_incision *incision)

@@ -76,7 +76,8 @@ static const char *fault_of(const struct fed_run *run, const struct incise_tick 
 		return "another tool in the tissue before the force had faded";
 	if (contact && t->flags & INCISE_TICK_STALE)
 		return "contact by an old pose";
-	if (contact && !(fabs(v3_length(t->normal) - 1) < 1e-12))
+	/* In integers it has 30 bits. */
+	if (contact && !(fabs(v3_length(t->normal) - 1) < 1e-8))
 		return "normal not of length 1";
 	if (!(t->depth_mm >= 0))
 		return "negative depth";

@@ -37,16 +37,28 @@ struct run {
 	int64_t steps;
 };
 
+/* The same rule once more, by what is wrong. */
+static bool is_garbage(const struct incise_stepper_setpoint *page)
+{
+	uint32_t tool = page->pose.tool;
+	bool garbage = page->mode > INCISE_STEPPER_MODE_POSE || page->reserved0;
+
+	if (page->mode == INCISE_STEPPER_MODE_POSE)
+		return garbage || page->target || page->pose.reserved ||
+		       tool & 0xfffffdfc;
+	for (int i = 0; i < 5; i++)
+		garbage |= !!page->reserved[i];
+	return garbage;
+}
+
 static void check_answer(const struct run *run, const struct stepper_setpoint *before,
 			 enum stepper_page_answer answer)
 {
 	const struct incise_stepper_setpoint *page = &run->page;
 	const struct stepper_setpoint *setpoint = &run->setpoint;
 	bool is_new = !(page->seq & 1) && page->seq != before->seq;
-	bool garbage = page->mode > INCISE_STEPPER_MODE_VELOCITY || page->reserved0;
+	bool garbage = is_garbage(page);
 
-	for (int i = 0; i < 5; i++)
-		garbage |= !!page->reserved[i];
 	if (answer != (!is_new	 ? STEPPER_PAGE_NOTHING
 		       : garbage ? STEPPER_PAGE_GARBAGE
 				 : STEPPER_PAGE_TAKEN))
@@ -54,8 +66,8 @@ static void check_answer(const struct run *run, const struct stepper_setpoint *b
 	if (setpoint->seq != (is_new ? page->seq : before->seq))
 		wrong("not the right seq");
 	if (answer == STEPPER_PAGE_TAKEN)
-		before = &(struct stepper_setpoint){0, page->mode, page->target,
-						    page->t_ns};
+		before = &(struct stepper_setpoint){
+			.mode = page->mode, .target = page->target, .t_ns = page->t_ns};
 	if (setpoint->mode != before->mode || setpoint->target != before->target ||
 	    setpoint->t_ns != before->t_ns)
 		wrong("not the right setpoint");

@@ -42,8 +42,9 @@ tree() {
 	[ ! $ko -nt mark ]
 
 	project -s module_install DESTDIR="$dest"
-	[ "$(cd "$dest" && find . -type f | sed 's/ko\..z.*/ko/')" = \
-		"./lib/modules/$release/updates/incise_stepper.ko" ]
+	[ "$(cd "$dest/lib/modules/$release/updates" && find . -type f | sed 's/ko\..z.*/ko/' | sort)" = \
+		"./incise_source.ko
+./incise_stepper.ko" ]
 	project -s module_uninstall DESTDIR="$dest"
 	[ -z "$(find "$dest" -type f)" ]
 	tree | diff before -

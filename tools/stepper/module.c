@@ -453,9 +453,8 @@ static json_t *module_json(const struct controller *controller)
 			 (json_int_t)info->lateness_ns, "lateness_max_ns",
 			 (json_int_t)info->lateness_max_ns, "resolution_ns",
 			 (json_int_t)info->resolution_ns, "sync", sync_json(controller),
-			 "fixed_point",
-			 (int)!!(info->capabilities & INCISE_STEPPER_CAP_FIXED), "motors",
-			 motors, "no_evidence",
+			 "plan", (int)!!(info->capabilities & INCISE_STEPPER_CAP_PLAN),
+			 "motors", motors, "no_evidence",
 			 controller->no_debugfs ? json_string(controller->no_debugfs)
 						: json_null());
 }

@@ -23,6 +23,7 @@
 #include <incise/force.h>
 #include <incise/scan.h>
 #include <incise/stepper.h>
+#include <incise/stepper_plan.h>
 #include <incise/tracker.h>
 #include <incise/vision.h>
 
@@ -92,6 +93,18 @@ struct incise_stepper_homing {
 	unsigned int home_at; /**< INCISE_STEPPER_LINE_HOME, or _AT_MIN without one */
 };
 
+/** Functions of a stepper whose controller runs plans; see incise/stepper_plan.h. */
+struct incise_stepper_plan_ops {
+	/** Of steppers of this backend, n ≥ 1. */
+	int (*load)(struct incise_stepper *const *steppers, int n, const void *bytes,
+		    size_t size, struct incise_error *err);
+	int (*follow)(struct incise_stepper *stepper) INCISE_REALTIME;
+	int (*pose)(struct incise_stepper *first,
+		    const struct incise_stepper_pose_given *pose) INCISE_REALTIME;
+	int (*rendered)(struct incise_stepper *stepper,
+			struct incise_stepper_rendered *rendered) INCISE_REALTIME;
+};
+
 /**
  * Functions of a stepper. A function that is NULL gives -EOPNOTSUPP. All but set, jog and
  * status may block.
@@ -128,6 +141,8 @@ struct incise_stepper_ops {
 	int (*origin)(struct incise_stepper *stepper, double position_mm, bool homed);
 	/** Wait; 0, or -EINTR. NULL: by the clock of the computer. */
 	int (*wait)(struct incise_stepper *stepper, int64_t ns);
+
+	const struct incise_stepper_plan_ops *plan; /**< NULL: it runs none */
 };
 
 /** A stepper: the first member of its backend's struct. */
@@ -232,7 +247,7 @@ struct incise_actuator {
 };
 
 /** Changes when a struct or value that backends use does. */
-#define INCISE_BACKEND_ABI 7
+#define INCISE_BACKEND_ABI 8
 
 /** Settings of rig.conf for a backend. */
 struct incise_backend_request {

@@ -21,7 +21,9 @@
 #include <incise/rig.h>
 #include <incise/scene.h>
 #include <incise/stability.h>
+#include <incise/stepper_plan.h>
 #include <incise/surface.h>
+#include <incise/tick_flags.h>
 #include <incise/tool.h>
 #include <incise/tracker.h>
 
@@ -144,8 +146,42 @@ INCISE_API void incise_plan_stability(const struct incise_plan *plan,
 				      struct incise_plan_stability *stability);
 
 /**
- * The certified error of what of the force is computed in fixed point: reaction and plane
- * constraint within @reach_mm of where the contact began.
+ * Let a plan's ticks be those that the kernel renders: incise_plan_tick() reads them, and computes
+ * none. The poses, the tool and the end of the force are its feeder's.
+ *
+ * @param plan of incise_plan_new_fed() of the same scene, before its first tick
+ * @param rig with its steppers open to watch; must outlive the plan
+ * @return 0; -ENODEV (no actuator), -EOPNOTSUPP (not of the kernel module)
+ */
+INCISE_API int incise_plan_watch(struct incise_plan *plan, struct incise_rig *rig,
+				 struct incise_error *err);
+
+/**
+ * Let the kernel render a plan, and give it the poses: the plan is put into integers and loaded, and
+ * from now on a tick takes the tracker's poses, hands them on, and reads what is rendered. Without a
+ * tick for the actuators' deadman they stop; a tracker that is silent is no such stop, but the force
+ * fades.
+ *
+ * @param plan of incise_plan_new() with arithmetic "fixed" and @rig, whose actuators have no power
+ * @return 0; as incise_plan_file_new() and incise_stepper_load_plan()
+ */
+INCISE_API int incise_plan_feed_kernel(struct incise_plan *plan, struct incise_rig *rig,
+				       struct incise_error *err);
+
+/** What the last tick of such a plan read. Real-time safe; in the thread that ticks. */
+INCISE_API void incise_plan_rendered(const struct incise_plan *plan,
+				     struct incise_stepper_rendered *rendered)
+	INCISE_REALTIME;
+
+/**
+ * The certified error of a plan with arithmetic = "fixed": the largest difference of its force from
+ * that of the same plan in double, on the same poses, before limits.
+ *
+ * It holds for poses that come a tracker's period apart, of a hand up to 1 m/s; for places within
+ * @reach_mm of where the contact began, no deeper than half of the surface's radius there; for a
+ * blade that enters at 6 degrees to the surface or more; and while both are in the same phase, with
+ * the same tool in the same cut: a tick at which one of them is earlier is no error of a force.
+ * lib/scene/bound.c has its parts. `incise bench` measures the rest.
  *
  * @return N; 0 in double
  */
@@ -204,30 +240,6 @@ struct incise_tick {
 	enum incise_phase phase;
 	enum incise_tool tool; /**< never AUTO */
 };
-
-/** Things worth counting about a tick. */
-enum incise_tick_flag {
-	INCISE_TICK_CONTACT = 1,      /**< the tool is in the tissue */
-	INCISE_TICK_EXTRAPOLATED = 2, /**< the model was asked outside its support */
-	/** no pose of the held tool's station younger than pose_age_ms: the force fades */
-	INCISE_TICK_STALE = 4,
-	INCISE_TICK_CLAMPED = 8, /**< the force was held at force_N */
-	INCISE_TICK_FAULT = 16,	 /**< a device failed: no force from here on */
-	INCISE_TICK_SLEWED = 32, /**< the change of force was held at slew_N_s */
-	INCISE_TICK_TRAVEL = 64, /**< the actuator's target was held within its travel */
-	/* 128 was a guard's, and is never set: pages and logs keep their bits */
-	INCISE_TICK_STARTING = 256,   /**< waiting for a small force, ramping or fading */
-	INCISE_TICK_NOT_FINITE = 512, /**< the force was no number: none was asked for */
-	/** the tracker flags the newest pose: not used, by incise_pose_usable() */
-	INCISE_TICK_UNUSABLE = 1024,
-	INCISE_TICK_IN_CUT = 2048,     /**< handle or tube is in a cut */
-	INCISE_TICK_MEMBRANE = 4096,   /**< the tool is on the membrane, which holds */
-	INCISE_TICK_LUMEN = 8192,      /**< it is through the membrane */
-	INCISE_TICK_BACK_WALL = 16384, /**< it presses on the wall behind */
-	/** the blade leaves no cut: tissue.cuts_most are there */
-	INCISE_TICK_FULL = 32768,
-};
-#define INCISE_TICK_FLAGS 16 /**< how many there are */
 
 /** Poses of scalpel and tube that the plan was given so far. Real-time safe; in the thread that ticks. */
 INCISE_API void incise_plan_poses(const struct incise_plan *plan,

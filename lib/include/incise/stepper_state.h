@@ -20,7 +20,7 @@ enum incise_stepper_state {
 
 /**
  * Faults; bits. All are latched but TRAVEL, and the virtual rig's DEADMAN, which ends with
- * the next target. The kernel module has those up to LINE.
+ * the next target. The kernel module has those up to LINE, and PLAN.
  */
 enum incise_stepper_fault {
 	INCISE_STEPPER_FAULT_DEADMAN = 1 << 0, /**< no new target for the deadman time */
@@ -42,8 +42,10 @@ enum incise_stepper_fault {
 	INCISE_STEPPER_FAULT_FOLLOWING = 1 << 13, /**< it does not follow its targets */
 	INCISE_STEPPER_FAULT_TRAVEL =
 		1 << 14, /**< a target outside of the travel was held */
+	INCISE_STEPPER_FAULT_PLAN =
+		1 << 15, /**< another motor of the same plan was stopped */
 };
-#define INCISE_STEPPER_FAULTS 15 /**< bits of incise_stepper_fault */
+#define INCISE_STEPPER_FAULTS 16 /**< bits of incise_stepper_fault */
 
 /** Lines; bits. The inputs come first. */
 enum incise_stepper_line {
@@ -56,5 +58,29 @@ enum incise_stepper_line {
 	INCISE_STEPPER_LINE_DIR = 1 << 6,    /**< an output; only in info of the module */
 };
 #define INCISE_STEPPER_INPUTS 5 /**< bits of incise_stepper_line that are inputs */
+
+/** States of a plan. */
+enum incise_stepper_plan_state {
+	INCISE_STEPPER_PLAN_EMPTY = 0, /**< there is none */
+	INCISE_STEPPER_PLAN_LOADED =
+		1, /**< its motors have no power, or follow no pose */
+	INCISE_STEPPER_PLAN_WAIT =
+		2, /**< no force until the tool was out of the tissue */
+	INCISE_STEPPER_PLAN_RISE = 3, /**< the force comes */
+	INCISE_STEPPER_PLAN_FELT = 4,
+	INCISE_STEPPER_PLAN_FADE = 5, /**< the force goes, or is gone */
+};
+#define INCISE_STEPPER_PLAN_STATES 6 /**< states of a plan */
+
+/** Reasons of a force that is or was taken away; bits, latched from the start on. */
+enum incise_stepper_plan_reason {
+	INCISE_STEPPER_PLAN_SILENT = 1 << 0,  /**< no pose within the plan's pose age */
+	INCISE_STEPPER_PLAN_ASKED = 1 << 1,   /**< asked for by a pose */
+	INCISE_STEPPER_PLAN_LEFT = 1 << 2,    /**< its owner ended */
+	INCISE_STEPPER_PLAN_AWAY = 1 << 3,    /**< suspend, unbind or reboot */
+	INCISE_STEPPER_PLAN_STOPPED = 1 << 4, /**< a fault of one of its motors */
+	INCISE_STEPPER_PLAN_REFUSED = 1 << 5, /**< poses that were not taken */
+};
+#define INCISE_STEPPER_PLAN_REASONS 6 /**< bits of incise_stepper_plan_reason */
 
 #endif

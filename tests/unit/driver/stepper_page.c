@@ -137,16 +137,30 @@ static void test_answers(void **state)
 		{{.seq = 6, .target = -7, .t_ns = 8}, STEPPER_PAGE_TAKEN},
 		{{.seq = 2, .target = INT64_MIN}, STEPPER_PAGE_TAKEN}, /* wrapped */
 		{{.seq = 0, .mode = 1}, STEPPER_PAGE_TAKEN},
-		{{.seq = 6, .mode = 2}, STEPPER_PAGE_GARBAGE},
+		{{.seq = 6, .mode = 3}, STEPPER_PAGE_GARBAGE},
 		{{.seq = 6, .mode = 0xffff}, STEPPER_PAGE_GARBAGE},
 		{{.seq = 6, .reserved0 = 1}, STEPPER_PAGE_GARBAGE},
 		{{.seq = 6, .reserved = {1}}, STEPPER_PAGE_GARBAGE},
 		{{.seq = 6, .reserved = {0, 0, 0, 0, 1ull << 63}}, STEPPER_PAGE_GARBAGE},
+		/* A pose: any position, any quaternion, the tools that there are. */
+		{{.seq = 6, .mode = 2, .t_ns = -1}, STEPPER_PAGE_TAKEN},
+		{{.seq = 6,
+		  .mode = 2,
+		  .pose = {{INT32_MIN, 1, INT32_MAX}, {INT32_MIN, 0, 1, 2}, 3 | 1 << 9}},
+		 STEPPER_PAGE_TAKEN},
+		{{.seq = 6, .mode = 2, .pose = {.tool = 4}}, STEPPER_PAGE_GARBAGE},
+		{{.seq = 6, .mode = 2, .pose = {.tool = 1 << 8}}, STEPPER_PAGE_GARBAGE},
+		{{.seq = 6, .mode = 2, .pose = {.tool = 1 << 10}}, STEPPER_PAGE_GARBAGE},
+		{{.seq = 6, .mode = 2, .pose = {.tool = 1u << 31}}, STEPPER_PAGE_GARBAGE},
+		{{.seq = 6, .mode = 2, .pose = {.reserved = 1}}, STEPPER_PAGE_GARBAGE},
+		{{.seq = 6, .mode = 2, .target = 1}, STEPPER_PAGE_GARBAGE},
+		{{.seq = 6, .mode = 2, .reserved0 = 1}, STEPPER_PAGE_GARBAGE},
 	};
 
 	owner.stored = STORES; /* it writes no more */
 	for (size_t i = 0; i < sizeof(rows) / sizeof(*rows); i++) {
-		struct stepper_setpoint setpoint = {4, 1, 123, 456};
+		struct stepper_setpoint setpoint = {
+			.seq = 4, .mode = 1, .target = 123, .t_ns = 456};
 
 		assert_int_equal(stepper_page_take(&rows[i].slot, &setpoint),
 				 rows[i].answer);
@@ -154,6 +168,8 @@ static void test_answers(void **state)
 			assert_int_equal(setpoint.mode, rows[i].slot.mode);
 			assert_int_equal(setpoint.target, rows[i].slot.target);
 			assert_int_equal(setpoint.t_ns, rows[i].slot.t_ns);
+			assert_memory_equal(&setpoint.pose, &rows[i].slot.pose,
+					    sizeof(setpoint.pose));
 		} else {
 			assert_int_equal(setpoint.mode, 1);
 			assert_int_equal(setpoint.target, 123);

@@ -2,8 +2,8 @@
 /*
  * lib/scene/forces.c: each force of paper 2 compared with its formula, written out here by
  * components, and with what the paper's words ask for; where the print cannot be meant, its
- * formula stands here and shows why. Then the phases of each force, fixed point compared with
- * double, and the manual pages.
+ * formula stands here and shows why. Then the phases of each force, and the manual pages. Those in
+ * integers are compared with these in tests/unit/fixed.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -31,14 +31,6 @@ static void run(struct incise_plan *plan, struct incise_tick *tick, const char *
 	struct incise_acting_force *own = acting(plan, name);
 
 	own->force->run(plan, tick, own);
-}
-
-static void run_fixed(struct incise_plan *plan, struct incise_tick *tick,
-		      const char *name)
-{
-	struct incise_acting_force *own = acting(plan, name);
-
-	own->force->fixed(plan, tick, own);
 }
 
 static void give(struct incise_plan *plan, const char *name, double number)
@@ -442,19 +434,16 @@ static void test_each_force_has_its_phases(void **state)
 {
 	static const struct {
 		const char *name;
-		bool fixed;
 		double cutting_N[3], insertion_N[3];
 	} cases[] = {
-		{"reaction", false, {0, 0, 1}, {0}},
-		{"reaction", true, {0, 0, 1}, {0}},
-		{"plane", false, {0, -0.25, 0}, {0}},
-		{"plane", true, {0, -0.25, 0}, {0}},
-		{"damping", false, {-0.1, 0, 0}, {-0.1, 0, 0}},
+		{"reaction", {0, 0, 1}, {0}},
+		{"plane", {0, -0.25, 0}, {0}},
+		{"damping", {-0.1, 0, 0}, {-0.1, 0, 0}},
 		/* The flat side along the cut: aligned. */
-		{"insertion", false, {0}, {0, 0, 0.3}},
-		{"spread", false, {0}, {-0.125, -0.125, 0}},
+		{"insertion", {0}, {0, 0, 0.3}},
+		{"spread", {0}, {-0.125, -0.125, 0}},
 	};
-	bool seen[INCISE_FORCES_MAX] = {0}, seen_fixed[INCISE_FORCES_MAX] = {0};
+	bool seen[INCISE_FORCES_MAX] = {0};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
 		for (int phase = 0; phase < 3; phase++) {
@@ -470,15 +459,15 @@ static void test_each_force_has_its_phases(void **state)
 			const double before[3] = {1, 2, 3};
 			bool acts = want[0] != 0 || want[1] != 0 || want[2] != 0;
 
-			(cases[i].fixed ? seen_fixed : seen)[own - plan.acting] = true;
+			seen[own - plan.acting] = true;
 			/* The plan runs it in just these phases. */
 			assert_int_equal(own->force->phases >> phase & 1, acts);
 			v3_copy(plan.force_N, before);
 			if (!acts)
 				continue;
-			(cases[i].fixed ? run_fixed : run)(&plan, &tick, cases[i].name);
+			run(&plan, &tick, cases[i].name);
 			for (int k = 0; k < 3; k++)
-				/* Numbers that fixed point holds; sums of ulps of 3. */
+				/* Sums of ulps of 3. */
 				if (!(fabs(plan.force_N[k] - before[k] - want[k]) <
 				      1e-15))
 					fail_msg("%s in phase %d: part %d is %.17g",
@@ -486,7 +475,7 @@ static void test_each_force_has_its_phases(void **state)
 						 plan.force_N[k] - before[k]);
 		}
 	for (int i = 0; i < incise_n_tissue_forces; i++)
-		if (!seen[i] || (incise_tissue_forces[i].fixed && !seen_fixed[i]))
+		if (!seen[i])
 			fail_msg("%s has no case", incise_tissue_forces[i].name);
 }
 
@@ -536,53 +525,6 @@ static void test_insertion_by_turn_and_opening(void **state)
 		if (!(fabs(plan.force_N[2] - 0.75 * cases[i].want_mm) < 1e-14))
 			fail_msg("case %zu: %.17g N", i, plan.force_N[2]);
 	}
-}
-
-static double some(unsigned int *seed, double size)
-{
-	return size * (2.0 * rand_r(seed) / RAND_MAX - 1);
-}
-
-/* Springs in integers beside the same in double, within what is certified for them. */
-static void test_fixed_is_within_its_bound(void **state)
-{
-	unsigned int seed = 3;
-	int apart = 0;
-
-	for (int i = 0; i < 100000; i++) {
-		struct incise_plan plan = plan_in_tissue(), fixed;
-		struct incise_tick tick = tick_in(INCISE_PHASE_CUTTING);
-		double n[3] = {some(&seed, 1), some(&seed, 1), some(&seed, 1)};
-		double off[3], bound_N, reaction_N_mm, plane_N_mm;
-
-		if (!v3_unit(plan.normal, n, 0.1))
-			continue;
-		v3_unit(plan.side, n, 0.1);
-		for (int k = 0; k < 3; k++) {
-			/* Far away, too: only the difference has to fit. */
-			plan.p0_mm[k] = some(&seed, 1e5);
-			tick.tool_mm[k] = plan.p0_mm[k] + some(&seed, 10);
-		}
-		plan.depth_mm = fabs(some(&seed, 20));
-		reaction_N_mm = fabs(some(&seed, 2));
-		plane_N_mm = fabs(some(&seed, 2));
-		give(&plan, "reaction", reaction_N_mm);
-		give(&plan, "plane", plane_N_mm);
-		fixed = plan;
-		run(&plan, &tick, "reaction");
-		run(&plan, &tick, "plane");
-		run_fixed(&fixed, &tick, "reaction");
-		run_fixed(&fixed, &tick, "plane");
-		v3_sub(off, plan.force_N, fixed.force_N);
-		/* 20 mm deep, and 10 mm along each axis. */
-		bound_N = incise_fixed_spring_bound(reaction_N_mm, 20) +
-			  incise_fixed_spring_bound(plane_N_mm, 10 * sqrt(3));
-		/* Rounding of the double beside it: some ulp of 100 N. */
-		assert_true(v3_length(off) <= bound_N + 1e-13);
-		apart += v3_length(off) > 0;
-	}
-	/* They are two evaluators, not one. */
-	assert_true(apart > 90000);
 }
 
 static void test_tissue_does_not_pull_and_gain_counts(void **state)
@@ -665,7 +607,6 @@ int main(void)
 		cmocka_unit_test(test_printed_depth_on_a_sphere_pulls_in),
 		cmocka_unit_test(test_each_force_has_its_phases),
 		cmocka_unit_test(test_insertion_by_turn_and_opening),
-		cmocka_unit_test(test_fixed_is_within_its_bound),
 		cmocka_unit_test(test_tissue_does_not_pull_and_gain_counts),
 		cmocka_unit_test(test_manual_has_each_force),
 	};

@@ -520,7 +520,6 @@ static void test_getters(void **state)
 	struct incise_touch top;
 	const char *name, *why = "none";
 	bool actuate = false;
-	double bound_N;
 	struct felt f;
 
 	/* The highest line of the neck, in the middle of its length. */
@@ -528,10 +527,11 @@ static void test_getters(void **state)
 	assert_true(fabs(top.point_mm[0] - 50) < 1e-9 && fabs(top.point_mm[1]) < 1e-9);
 	assert_true(fabs(top.point_mm[2]) < 1e-9 && fabs(top.normal[2] - 1) < 1e-12);
 
-	/* Two springs of 0.14 and 0.17 N/mm; each is certified in its own test. */
-	bound_N =
-		incise_fixed_spring_bound(0.14, 20) + incise_fixed_spring_bound(0.17, 20);
-	assert_true(fabs(incise_plan_bound(fixed.plan, 20) - bound_N) < 1e-15);
+	/* At least what the two springs of 0.14 and 0.17 N/mm have; that of ticks is in its own test. */
+	assert_true(incise_plan_bound(fixed.plan, 20) >
+		    incise_fixed_spring_bound(0.14, 20) +
+			    incise_fixed_spring_bound(0.17, 20));
+	assert_true(incise_plan_bound(fixed.plan, 20) < 0.01);
 	assert_true(incise_plan_bound(fixed.plan, 40) >
 		    incise_plan_bound(fixed.plan, 20));
 	assert_true(incise_plan_bound(exact.plan, 20) == 0);
@@ -645,8 +645,9 @@ static void test_fed_plane(void **state)
 	}
 	/* what is left of a smoothed way of 4 mm after 0.2 s at rest */
 	assert_true(fabs(tick.depth_mm - 2) < 1e-3);
-	assert_true(fabs(tick.normal[1] - 0.6) < 1e-12 &&
-		    fabs(tick.normal[2] - 0.8) < 1e-12);
+	/* a direction in integers has 30 bits */
+	assert_true(fabs(tick.normal[1] - 0.6) < 1e-8 &&
+		    fabs(tick.normal[2] - 0.8) < 1e-8);
 	assert_true(fabs(tick.command_N[1] - 0.2 * 0.6) < 1e-3);
 	assert_true(fabs(tick.command_N[2] - 0.2 * 0.8) < 1e-3);
 	incise_plan_free(plan);

@@ -3,25 +3,7 @@
 # incise haptic drives a motor through the kernel module: it homes it, renders through it,
 # ends with the fault's name when the e-stop is pressed, and leaves nothing powered.
 . tests/vm/tap
-with_modules "haptic loop" incise_stepper
-stepper=$module
-with_modules "haptic loop" incise_sim
-in_virtual_time "haptic loop"
-[ "$INCISE_VM_KERNEL" != debug ] || skip "haptic loop" "the debug kernel holds no rig's step rate"
-
-config=/sys/kernel/config/incise-stepper
-sim=/sys/kernel/debug/incise_sim
-modprobe -a industrialio kfifo_buf industrialio-triggered-buffer configfs 2>/dev/null
-check "the simulated chip loads" insmod "$module" || exit 0
-check "the module loads" insmod "$stepper" || exit 0
-mkdir -p "$config/bench/motor0"
-for line in step=0 dir=1 enable=2 limit_min=3 limit_max=4 home=5; do
-	echo "incise-sim:${line#*=}" >"$config/bench/motor0/${line%=*}"
-done
-echo incise-sim:7 >"$config/bench/estop"
-echo 1 >"$config/bench/live"
-echo "number=0 step=0 dir=1 enable=2 min=3 max=4 home=5 min_at=-400 max_at=1000000" \
-	"home_at=-2000..0 position=3000" >$sim/carriage
+with_carriage "haptic loop" 3000
 
 # The virtual surgeon's blade goes 5 to 20 mm below the surface.
 cat >/tmp/rig.conf <<END

@@ -9,7 +9,7 @@ with_modules "stepper backends" incise_sim
 in_virtual_time "stepper backends"
 
 config=/sys/kernel/config/incise-stepper
-modprobe -a industrialio kfifo_buf industrialio-triggered-buffer configfs 2>/dev/null
+modprobe -a industrialio kfifo_buf industrialio-triggered-buffer configfs libcrc32c crc32c_generic 2>/dev/null
 check "the simulated chip loads" insmod "$module" || exit 0
 check "the module loads" insmod "$stepper" || exit 0
 

@@ -8,7 +8,7 @@ stepper=$module
 with_modules "the stepper module" incise_sim
 
 config=/sys/kernel/config/incise-stepper
-modprobe -a industrialio kfifo_buf industrialio-triggered-buffer configfs 2>/dev/null
+modprobe -a industrialio kfifo_buf industrialio-triggered-buffer configfs libcrc32c crc32c_generic 2>/dev/null
 check "the simulated chip loads" insmod "$module" || exit 0
 check "the module loads" insmod "$stepper" || exit 0
 

@@ -23,7 +23,7 @@ mkdir -p $work
 
 bind()
 {
-	modprobe -a industrialio kfifo_buf industrialio-triggered-buffer configfs 2>/dev/null
+	modprobe -a industrialio kfifo_buf industrialio-triggered-buffer configfs libcrc32c crc32c_generic 2>/dev/null
 	insmod "$module" && insmod "$stepper" || return
 	mkdir -p $config/motor0
 	for line in step=0 dir=1 enable=2 limit_min=3 limit_max=4 home=5; do

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * The certified error of a plan in integers: how far its force can be from that of the same plan in
+ * double, tick by tick, on the same poses.
+ *
+ *   pose's rounding ─▶ filter: Σ |Aʲ| r ─▶ place of the tool ─ stiffness ─▶ force
+ *                                       ─▶ speed ─ damping ─▶ force
+ *   rounding of numbers, products and the model's table ─────▶ force
+ *
+ * The filter is linear. Its rounding r of each pose passes through A = (I - K C) F for as many poses
+ * as come after, so that Σ |Aʲ| r bounds all that adds up. Stiffness and damping are those of the
+ * stability check, which are the largest of any phase.
+ */
+#include <math.h>
+#include "../base/vector.h"
+#include "../fixed/front.h"
+#include "../fixed/spring.h"
+#include "plan.h"
+
+/* A hand's speed at most, mm/s, and its largest acceleration that the filter lets pass, mm/s². */
+#define SPEED_MM_S 1000
+#define HARD_MM_S2 100000
+
+#define LSB_MM (1.0 / 65536)
+
+/*
+ * A blade enters the tissue at this angle to it at least, sine of 6°: where it enters, a place along
+ * its way is as uncertain as its depth divided by this.
+ */
+#define ENTERS 0.1
+
+/* How often the error of a place counts: in the depth, in the direction to the surface, and the
+ * direction of the surface itself, which turns by no more than that while depths are below half of its
+ * radius. */
+#define PLACES 3
+
+/* Steps of rounding of a tick behind the place of the tool: sums and products of a force. */
+#define ROUNDINGS 24
+
+/* Errors of a filter's state: mm, mm/s, mm/s². */
+struct state_error {
+	double x, v, a;
+};
+
+static void multiply(double to[3][3], double (*a)[3], double (*b)[3])
+{
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 3; k++) {
+			to[i][k] = 0;
+			for (int j = 0; j < 3; j++)
+				to[i][k] += a[i][j] * b[j][k];
+		}
+}
+
+/* What a pose adds, of each component; @in_mm: the rounding of the pose itself. */
+static struct state_error added(const struct incise_predict *p, double in_mm)
+{
+	const double dt = ldexp(1, -30); /* rounding of a time, s */
+	double miss_mm = in_mm + ldexp(1, -25);
+	double per_s = 1 / p->period_s;
+
+	return (struct state_error){
+		3 * ldexp(1, -33) + SPEED_MM_S * dt + p->alpha * miss_mm +
+			ldexp(INCISE_PREDICT_JUMP_MM, -31),
+		2 * ldexp(1, -21) + HARD_MM_S2 * dt + p->beta * per_s * miss_mm +
+			ldexp(INCISE_PREDICT_JUMP_MM, -17),
+		2 * ldexp(1, -17) + p->gamma * per_s * per_s * miss_mm +
+			ldexp(INCISE_PREDICT_JUMP_MM, -13),
+	};
+}
+
+/* Σ |Aʲ| r, of poses that come a period apart. Infinite where it does not settle. */
+static struct state_error settled(const struct incise_predict *p, double in_mm)
+{
+	double T = p->period_s, b = p->beta / T, g = p->gamma / (T * T), al = p->alpha;
+	double f[3][3] = {{1, T, T * T / 2}, {0, 1, T}, {0, 0, 1}};
+	double keep[3][3] = {{1 - al, 0, 0}, {-b, 1, 0}, {-g, 0, 1}};
+	double a[3][3], power[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, next[3][3];
+	const struct state_error r = added(p, in_mm);
+	const double in[3] = {r.x, r.v, r.a};
+	double sum[3] = {0}, last[3];
+
+	multiply(a, keep, f);
+	for (int j = 0; j < 100000; j++) {
+		bool small = true;
+
+		for (int i = 0; i < 3; i++) {
+			last[i] = 0;
+			for (int k = 0; k < 3; k++)
+				last[i] += fabs(power[i][k]) * in[k];
+			sum[i] += last[i];
+			small &= last[i] < 1e-9 * sum[i];
+		}
+		/* The rest of a sum that falls by more than 1/10 in ten steps, as gains make it. */
+		if (small)
+			return (struct state_error){1.001 * sum[0], 1.001 * sum[1],
+						    1.001 * sum[2]};
+		multiply(next, a, power);
+		for (int i = 0; i < 3; i++)
+			v3_copy(power[i], next[i]);
+	}
+	return (struct state_error){INFINITY, INFINITY, INFINITY};
+}
+
+/* Of what is shown so long after a pose, mm and mm/s per component. */
+static struct state_error ahead(const struct state_error *e, double s)
+{
+	return (struct state_error){
+		e->x + e->v * s + e->a * s * s / 2 + SPEED_MM_S * ldexp(1, -30) +
+			2 * ldexp(1, -33),
+		e->v + e->a * s + HARD_MM_S2 * ldexp(1, -30) + 2 * ldexp(1, -21),
+		0,
+	};
+}
+
+/* Place and velocity of the tool, as lengths of vectors. */
+static struct state_error shown(const struct incise_plan *plan)
+{
+	const struct incise_predict *p = &plan->predict;
+	/* Of attitude and arms 2^-27 each, and the rounding of the pose and of two sums. */
+	double arms_mm = v3_length(plan->tip_mm) + plan->instrument.handle_mm;
+	double in_mm = 2 * LSB_MM + ldexp(arms_mm, -27);
+	struct state_error e = settled(p, in_mm);
+	double latency_s = (double)p->latency_ns * 1e-9;
+	/* What is left of the last prediction is blended out: its error, and the filter's then. */
+	struct state_error now = ahead(&e, latency_s + p->period_s),
+			   then = ahead(&e, latency_s);
+
+	return (struct state_error){
+		sqrt(3) * (2 * now.x + then.x + ldexp(1, -25) + LSB_MM / 2),
+		sqrt(3) * (2 * now.v + then.v + ldexp(1, -17)),
+		0,
+	};
+}
+
+/* Rounding of the model's table, of the cut's front, and of each stiffness over its reach. */
+static double tissue_N(const struct incise_plan *plan, double reach_mm)
+{
+	double bound_N = plan->fixed ? plan->gain * incise_fixed_bound(plan->fixed) : 0;
+
+	/* The force is below the unloading from the surface on. */
+	if (plan->fixed && plan->dissipates)
+		bound_N = incise_fixed_front_bound(
+			plan->unloading_N_mm,
+			plan->acting[INCISE_FORCE_REACTION]
+				.number[INCISE_REACTION_FRICTION],
+			plan->unloading_N_mm * reach_mm, bound_N + LSB_MM);
+	for (int i = 0; i < incise_n_tissue_forces; i++)
+		if (plan->acting[i].force && plan->acting[i].number[0] > 0)
+			bound_N += reach_mm * LSB_MM / 2;
+	if (plan->scene->membrane.thickness_mm > 0)
+		bound_N += plan->scene->membrane.thickness_mm * LSB_MM / 2;
+	return bound_N + ROUNDINGS * LSB_MM / 2;
+}
+
+double incise_plan_bound(const struct incise_plan *plan, double reach_mm)
+{
+	const struct incise_plan_stability *s = &plan->stability;
+	double plane_N_mm = plan->acting[INCISE_FORCE_PLANE].number[0];
+	struct state_error e;
+
+	if (!plan->scene->fixed)
+		return 0;
+	e = shown(plan);
+	return tissue_N(plan, reach_mm) +
+	       s->stiffness_N_mm * (PLACES * (e.x + 4 * LSB_MM) + ldexp(reach_mm, -26)) +
+	       plane_N_mm * e.x / ENTERS + s->damping_N_s_mm * e.v +
+	       ldexp(SPEED_MM_S, -29);
+}

@@ -1,0 +1,499 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The stages of a tick in integers: each force compared with its formula, written out here in double;
+ * start, limits and targets; then random plans at work, and numbers at their ends.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../../../lib/fixed/trial_plan.h"
+
+#define CASES 20000
+#define ONE 65536.0
+#define UNIT 1073741824.0
+#define LSB (1 / ONE)
+
+static struct incise_fx_trial trial;
+static struct incise_fixed_state state;
+
+static int32_t fixed(double v)
+{
+	return (int32_t)lrint(v * ONE);
+}
+
+static double any(double least, double most)
+{
+	return least +
+	       (most - least) * (incise_fx_trial_next(&trial.seed) >> 11) * 0x1p-53;
+}
+
+/* A place, and its double to the last bit. */
+static void any_place(int32_t p[3], double p_mm[3], double most)
+{
+	for (int i = 0; i < 3; i++) {
+		p[i] = fixed(any(-most, most));
+		p_mm[i] = p[i] / ONE;
+	}
+}
+
+static void any_unit(int32_t unit[3], double to[3])
+{
+	incise_fx_trial_unit(&trial, unit, 3);
+	for (int i = 0; i < 3; i++)
+		to[i] = unit[i] / UNIT;
+}
+
+static double dot(const double a[3], const double b[3])
+{
+	return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void begin(void **unused)
+{
+	memset(&state, 0, sizeof(state));
+	if (!trial.seed)
+		trial.seed = 1;
+}
+
+/* Run a stage; the force that it adds, N. */
+static void effect(double force[3], const struct incise_fixed_plan *plan,
+		   incise_fixed_stage_fn *stage, struct incise_fixed_tick *tick)
+{
+	int32_t was[3];
+
+	for (int i = 0; i < 3; i++)
+		was[i] = state.force[i] = fixed(any(-4, 4));
+	stage(plan, &state, tick);
+	for (int i = 0; i < 3; i++)
+		force[i] = (state.force[i] - was[i]) / ONE;
+}
+
+static void assert_force(const double got[3], const double want[3], double most)
+{
+	for (int i = 0; i < 3; i++)
+		if (!(fabs(got[i] - want[i]) <= most))
+			fail_msg("part %d is %.9g N, not %.9g: off by %.3g of %.3g N", i,
+				 got[i], want[i], got[i] - want[i], most);
+}
+
+static struct incise_fixed_tick tick_in(enum incise_phase phase)
+{
+	return (struct incise_fixed_tick){.phase = phase};
+}
+
+/* K depth n: the product and each part are rounded once. */
+static void test_reaction(void **unused)
+{
+	begin(unused);
+	for (int k = 0; k < CASES; k++) {
+		struct incise_fixed_plan plan = {.numbers.reaction = fixed(any(0, 5))};
+		struct incise_fixed_tick tick = tick_in(INCISE_PHASE_CUTTING);
+		double n[3], want[3], got[3];
+
+		any_unit(state.normal, n);
+		state.depth = fixed(any(0, 50));
+		effect(got, &plan, incise_fixed_stage_reaction, &tick);
+		for (int i = 0; i < 3; i++)
+			want[i] =
+				plan.numbers.reaction / ONE * (state.depth / ONE) * n[i];
+		assert_force(got, want, LSB);
+	}
+}
+
+/* Against the spring in double, within the bound that is certified for it. */
+static void test_plane(void **unused)
+{
+	begin(unused);
+	for (int k = 0; k < CASES; k++) {
+		double K = any(0, 5), p[3], p0[3], s[3], off[3], want[3], got[3];
+		struct incise_fixed_plan plan = {.numbers.plane = fixed(K)};
+		struct incise_fixed_tick tick = tick_in(INCISE_PHASE_CUTTING);
+
+		any_place(tick.tool, p, 20);
+		any_place(state.p0, p0, 20);
+		any_unit(state.side, s);
+		effect(got, &plan, incise_fixed_stage_plane, &tick);
+		for (int i = 0; i < 3; i++)
+			off[i] = p[i] - p0[i];
+		for (int i = 0; i < 3; i++)
+			want[i] = -K * dot(off, s) * s[i];
+		/* 40 mm along each axis. */
+		assert_force(got, want, incise_fixed_spring_bound(K, 40 * sqrt(3)));
+	}
+}
+
+static void test_damping(void **unused)
+{
+	begin(unused);
+	for (int k = 0; k < CASES; k++) {
+		struct incise_fixed_plan plan = {
+			.numbers.damping = (int32_t)lrint(any(0, 0.01) * 268435456)};
+		struct incise_fixed_tick tick =
+			tick_in(k & 1 ? INCISE_PHASE_CUTTING : INCISE_PHASE_INSERTION);
+		double v[3], want[3], got[3];
+
+		any_place(state.velocity, v, 500);
+		effect(got, &plan, incise_fixed_stage_damping, &tick);
+		for (int i = 0; i < 3; i++)
+			want[i] = -plan.numbers.damping / 268435456.0 * v[i];
+		assert_force(got, want, LSB);
+	}
+}
+
+/* -K (off - (off·n) n): the part along n, the vector across and the product are rounded. */
+static void test_spread(void **unused)
+{
+	begin(unused);
+	for (int k = 0; k < CASES; k++) {
+		struct incise_fixed_plan plan = {.numbers.spread = fixed(any(0, 2))};
+		struct incise_fixed_tick tick = tick_in(INCISE_PHASE_INSERTION);
+		double K = plan.numbers.spread / ONE, p[3], p0[3], n[3], off[3], want[3],
+		       got[3];
+
+		any_place(tick.tool, p, 20);
+		any_place(state.p0, p0, 20);
+		any_unit(state.normal, n);
+		effect(got, &plan, incise_fixed_stage_spread, &tick);
+		for (int i = 0; i < 3; i++)
+			off[i] = p[i] - p0[i];
+		for (int i = 0; i < 3; i++)
+			want[i] = -K * (off[i] - dot(off, n) * n[i]);
+		assert_force(got, want, (K + 0.5) * LSB + 1e-9);
+	}
+}
+
+/* Beside the cut K depth; in it only Fort of that as deep as the cut is; below it K again. */
+static void test_insertion(void **unused)
+{
+	begin(unused);
+	for (int k = 0; k < CASES; k++) {
+		struct incise_fixed_plan plan = {
+			.numbers = {.insertion = fixed(any(0, 2)),
+				    .aligned = fixed(any(0, 1))}};
+		struct incise_fixed_tick tick = tick_in(INCISE_PHASE_INSERTION);
+		double K = plan.numbers.insertion / ONE,
+		       aligned = plan.numbers.aligned / ONE;
+		double n[3], flat[3], along[3], tight, eased, depth, cut, want[3], got[3];
+
+		any_unit(state.normal, n);
+		any_unit(state.flat, flat);
+		any_unit(state.opening.along, along);
+		state.held = k % 3 ? INCISE_TOOL_HANDLE : INCISE_TOOL_TUBE;
+		state.opening.in = k & 1;
+		state.opening.depth = fixed(any(0, 20));
+		state.tightness = fixed(any(0, 1));
+		state.depth = fixed(any(0, 30));
+		tight = state.tightness / ONE;
+		eased = aligned + (1 - aligned) * tight *
+					  (state.held == INCISE_TOOL_TUBE
+						   ? 1
+						   : fabs(dot(flat, along)));
+		depth = state.depth / ONE;
+		cut = state.opening.in ? fmin(depth, state.opening.depth / ONE) : 0;
+		effect(got, &plan, incise_fixed_stage_insertion, &tick);
+		for (int i = 0; i < 3; i++)
+			want[i] = K * (depth - cut + eased * cut) * n[i];
+		/* Fort is off by 2 LSB, times 20 mm and 2 N/mm; the rest by one each. */
+		assert_force(got, want, (2 * 20 * K + K + 1.5) * LSB);
+	}
+}
+
+/* Until it yields a spring, then nothing down to the wall behind. */
+static void test_membrane(void **unused)
+{
+	struct incise_fixed_plan plan = {
+		.numbers.membrane = {.normal = {0, 0, INCISE_FIXED_UNIT},
+				     .radius = 5 << 16,
+				     .thickness = 4 << 16,
+				     .stiffness = 1 << 14,
+				     .back_wall = 14 << 16}};
+	static const struct {
+		double beyond, force;
+		uint32_t flag;
+	} way[] = {
+		{-1, 0, 0},
+		{1, 0.25, INCISE_TICK_MEMBRANE},
+		{3.5, 0.875, INCISE_TICK_MEMBRANE},
+		{4, 0, INCISE_TICK_LUMEN},
+		{2, 0, INCISE_TICK_LUMEN},
+		{14, 0, INCISE_TICK_LUMEN},
+		{16, 0.5, INCISE_TICK_LUMEN | INCISE_TICK_BACK_WALL},
+	};
+
+	begin(unused);
+	for (size_t k = 0; k < sizeof(way) / sizeof(*way); k++) {
+		struct incise_fixed_tick tick = tick_in(INCISE_PHASE_CUTTING);
+		double got[3], want[3] = {0, 0, way[k].force};
+
+		state.depth = fixed(10 + way[k].beyond);
+		tick.tool[2] = -fixed(way[k].beyond);
+		effect(got, &plan, incise_fixed_stage_membrane, &tick);
+		assert_force(got, want, 0);
+		assert_int_equal(tick.flags, way[k].flag);
+		/* The tissue above stays as deep as it was. */
+		if (way[k].beyond > 0)
+			assert_int_equal(state.depth, 10 << 16);
+	}
+}
+
+/* No force acts in a phase that is not its own. */
+static void test_phases(void **unused)
+{
+	static const struct {
+		incise_fixed_stage_fn *stage;
+		bool acts[3];
+	} stages[] = {
+		{incise_fixed_stage_reaction, {false, true, false}},
+		{incise_fixed_stage_plane, {false, true, false}},
+		{incise_fixed_stage_damping, {false, true, true}},
+		{incise_fixed_stage_insertion, {false, false, true}},
+		{incise_fixed_stage_spread, {false, false, true}},
+	};
+	struct incise_fixed_plan plan = {.numbers = {.reaction = 1 << 16,
+						     .plane = 1 << 16,
+						     .damping = 1 << 20,
+						     .insertion = 1 << 16,
+						     .aligned = 1 << 16,
+						     .spread = 1 << 16}};
+
+	begin(unused);
+	for (size_t k = 0; k < sizeof(stages) / sizeof(*stages); k++)
+		for (int phase = 0; phase < 3; phase++) {
+			struct incise_fixed_tick tick = tick_in((enum incise_phase)phase);
+			double got[3];
+
+			state.depth = 3 << 16;
+			state.held = INCISE_TOOL_HANDLE;
+			for (int i = 0; i < 3; i++) {
+				state.normal[i] = state.side[i] =
+					i == 2 ? INCISE_FIXED_UNIT : 0;
+				state.velocity[i] = tick.tool[i] = 5 << 16;
+			}
+			effect(got, &plan, stages[k].stage, &tick);
+			assert_int_equal(got[0] != 0 || got[1] != 0 || got[2] != 0,
+					 stages[k].acts[phase]);
+		}
+}
+
+/* A force waits for a small one, rises in a tenth each tick at most, and goes in fade_ns. */
+static void test_start(void **unused)
+{
+	struct incise_fixed_plan plan = {
+		.numbers = {.small = 1 << 12, .ramp_ns = 20000000, .fade_ns = 50000000}};
+	struct incise_fixed_tick tick;
+	int64_t t_ns = 1000000;
+	int ticks = 0;
+
+	begin(unused);
+	state.force[2] = 1 << 16;
+	for (int k = 0; k < 100; k++, t_ns += 1000000) {
+		tick = (struct incise_fixed_tick){.t_ns = t_ns};
+		incise_fixed_stage_start(&plan, &state, &tick);
+		assert_int_equal(tick.command[2], 0);
+		assert_true(tick.flags & INCISE_TICK_STARTING);
+	}
+	state.force[2] = 1 << 12;
+	do {
+		tick = (struct incise_fixed_tick){.t_ns = t_ns += 1000000};
+		incise_fixed_stage_start(&plan, &state, &tick);
+		state.force[2] = 1 << 16;
+		ticks++;
+	} while (tick.flags & INCISE_TICK_STARTING);
+	/* 20 ticks, and what rounding down of each leaves. */
+	assert_in_range(ticks, 20, 21);
+	assert_int_equal(tick.command[2], 1 << 16);
+	for (ticks = 0; tick.command[2]; ticks++) {
+		tick = (struct incise_fixed_tick){.t_ns = t_ns += 1000000,
+						  .flags = INCISE_TICK_STALE};
+		incise_fixed_stage_start(&plan, &state, &tick);
+	}
+	assert_in_range(ticks, 50, 51);
+	/* A tick that comes late is no reason for a leap. */
+	tick = (struct incise_fixed_tick){.t_ns = t_ns += 1000000000};
+	incise_fixed_stage_start(&plan, &state, &tick);
+	assert_in_range(tick.command[2], 1, (1 << 16) / 10 + 1);
+}
+
+static double length_of(const int32_t v[3])
+{
+	return sqrt((double)v[0] * v[0] + (double)v[1] * v[1] + (double)v[2] * v[2]);
+}
+
+/* The same as in real numbers, but for rounding: towards 0 in each of three steps. */
+static void test_limit(void **unused)
+{
+	begin(unused);
+	for (int k = 0; k < CASES; k++) {
+		struct incise_fixed_plan plan = {
+			.numbers = {.force = 1 + (int32_t)any(0, 1 << 20),
+				    .slew = 1 + (int32_t)any(0, 1 << 18)}};
+		double most = plan.numbers.force, slew = plan.numbers.slew, want[3],
+		       change[3], length, step[3];
+		struct incise_fixed_tick tick = {0};
+		int32_t last[3], moved[3];
+
+		for (int i = 0; i < 3; i++) {
+			last[i] = state.last[i] = (int32_t)any(-most / 2, most / 2);
+			tick.command[i] = (int32_t)any(-2 * most, 2 * most);
+		}
+		length = length_of(tick.command);
+		for (int i = 0; i < 3; i++)
+			change[i] = tick.command[i] * fmin(1, most / length) - last[i];
+		length = sqrt(dot(change, change));
+		for (int i = 0; i < 3; i++)
+			want[i] = last[i] + change[i] * fmin(1, slew / length);
+		incise_fixed_stage_limit(&plan, &state, &tick);
+		for (int i = 0; i < 3; i++) {
+			moved[i] = tick.command[i] - last[i];
+			step[i] = tick.command[i] - want[i];
+			assert_true(fabs(step[i]) <= 4);
+			assert_int_equal(state.last[i], tick.command[i]);
+		}
+		assert_true(length_of(tick.command) <= most);
+		assert_true(length_of(moved) <= slew + 2 * sqrt(3));
+	}
+}
+
+/* The nut goes where the spring pushes with the force along its axis. */
+static void test_targets(void **unused)
+{
+	struct incise_fixed_plan plan = {
+		.numbers = {.n_axes = 1,
+			    .pose_age_ns = 1000000000,
+			    .tick_ns = 1000000,
+			    .average_ticks = 1,
+			    .force = 8 << 16,
+			    .slew = 8 << 16,
+			    .reaction = 1 << 15,
+			    .small = INT32_MAX,
+			    .side = {INCISE_FIXED_UNIT},
+			    .shape = {.normal = {0, 0, INCISE_FIXED_UNIT}},
+			    .filter = {.alpha = INCISE_FIXED_UNIT, .period_ns = 1000000},
+			    .axes = {{.direction = {0, 0, INCISE_FIXED_UNIT},
+				      .dual = {0, 0, 1 << 24},
+				      .compliance = 2 << 20,
+				      .steps_per_mm = 100 << 16,
+				      .origin = -(50 << 16),
+				      .travel = 60 << 16,
+				      .rest = 10 << 16}}}};
+	struct incise_fixed_pose pose = {.quaternion = {INCISE_FIXED_UNIT},
+					 .position = {0, 0, -(6 << 16)}};
+	struct incise_fixed_tick tick;
+
+	begin(unused);
+	incise_fixed_plan_begin(&plan, &state);
+	incise_fixed_plan_tick(&plan, &state, 1000000, &tick);
+	/* Without a pose it is at rest. */
+	assert_int_equal(tick.target[0], 1000);
+	assert_true(tick.flags & INCISE_TICK_STALE);
+	for (int k = 2; k < 40; k++) {
+		pose.t_ns = (int64_t)k * 1000000;
+		assert_int_equal(incise_fixed_plan_pose(&plan, &state, &pose, pose.t_ns),
+				 INCISE_FIXED_POSE_TAKEN);
+		incise_fixed_plan_tick(&plan, &state, pose.t_ns, &tick);
+	}
+	/* 6 mm deep are 3 N, which are 6 mm of the spring: 44 + 6 mm from the origin. */
+	assert_int_equal(tick.command[2], 3 << 16);
+	assert_int_equal(tick.along[0], 3 << 16);
+	assert_int_equal(tick.target[0], 5000);
+	assert_false(tick.flags & INCISE_TICK_TRAVEL);
+	assert_int_equal(incise_fixed_plan_pose(&plan, &state, &pose, pose.t_ns),
+			 INCISE_FIXED_POSE_OLD);
+	pose.t_ns += 1000000;
+	pose.position[0] = INT32_MAX;
+	assert_int_equal(incise_fixed_plan_pose(&plan, &state, &pose, pose.t_ns),
+			 INCISE_FIXED_POSE_FAR);
+	pose.tool = INCISE_FIXED_POSE_TUBE;
+	assert_int_equal(incise_fixed_plan_pose(&plan, &state, &pose, pose.t_ns),
+			 INCISE_FIXED_POSE_UNKNOWN);
+}
+
+/* --- random plans ----------------------------------------------------------------------- */
+
+static uint32_t play(const struct incise_fixed_plan *plan, uint64_t seed, bool hostile,
+		     uint32_t *flags)
+{
+	struct incise_fx_trial_hand hand = {.t.seed = seed, .t_ns = 1000000000};
+	uint32_t digest = 0;
+	int32_t last[3] = {0};
+
+	memset(&state, (int)seed, sizeof(state));
+	incise_fixed_plan_begin(plan, &state);
+	for (int k = 0; k < 400; k++) {
+		struct incise_fixed_tick tick;
+		struct incise_fixed_pose pose;
+		int32_t moved[3];
+
+		incise_fx_trial_hand(&hand, plan, &pose);
+		if (hostile && !(k % 3))
+			for (int i = 0; i < 4; i++) {
+				int32_t end = incise_fx_trial_one_in(&hand.t, 2)
+						      ? INT32_MAX
+						      : INT32_MIN;
+
+				pose.quaternion[i] = end;
+				pose.position[i % 3] = k & 1 ? end : pose.position[i % 3];
+			}
+		incise_fixed_plan_pose(plan, &state, &pose, hand.t_ns);
+		incise_fixed_plan_tick(plan, &state, hand.t_ns, &tick);
+		for (int i = 0; i < 3; i++)
+			moved[i] = tick.command[i] - last[i];
+		incise_fx_copy(last, tick.command);
+		assert_true(length_of(tick.command) <= plan->numbers.force);
+		/* Two roundings of each component. */
+		assert_true(length_of(moved) <= plan->numbers.slew + 2 * sqrt(3));
+		digest ^=
+			incise_fx_crc((const uint8_t *)tick.target, sizeof(tick.target)) +
+			incise_fx_crc((const uint8_t *)tick.command,
+				      sizeof(tick.command)) *
+				(uint32_t)(k + 1);
+		*flags |= tick.flags;
+	}
+	return digest;
+}
+
+/* The same again gives the same bits, and what can happen does. */
+static void test_random_plans(void **unused)
+{
+	uint8_t *bytes = calloc(1, INCISE_FX_TRIAL_PLAN_SIZE);
+	uint32_t flags = 0;
+
+	assert_non_null(bytes);
+	for (uint64_t seed = 1; seed <= 300; seed++) {
+		struct incise_fixed_plan plan;
+		uint32_t size = incise_fx_trial_plan(seed, bytes), first;
+
+		assert_int_equal(incise_fixed_plan_open(&plan, bytes, size), 0);
+		for (int hostile = 0; hostile < 2; hostile++) {
+			first = play(&plan, seed, hostile, &flags);
+			assert_int_equal(play(&plan, seed, hostile, &flags), first);
+		}
+	}
+	assert_int_equal(
+		flags & (INCISE_TICK_CONTACT | INCISE_TICK_EXTRAPOLATED |
+			 INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED | INCISE_TICK_TRAVEL |
+			 INCISE_TICK_STARTING | INCISE_TICK_STALE | INCISE_TICK_IN_CUT),
+		INCISE_TICK_CONTACT | INCISE_TICK_EXTRAPOLATED | INCISE_TICK_CLAMPED |
+			INCISE_TICK_SLEWED | INCISE_TICK_TRAVEL | INCISE_TICK_STARTING |
+			INCISE_TICK_STALE | INCISE_TICK_IN_CUT);
+	free(bytes);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_reaction),     cmocka_unit_test(test_plane),
+		cmocka_unit_test(test_damping),	     cmocka_unit_test(test_spread),
+		cmocka_unit_test(test_insertion),    cmocka_unit_test(test_membrane),
+		cmocka_unit_test(test_phases),	     cmocka_unit_test(test_start),
+		cmocka_unit_test(test_limit),	     cmocka_unit_test(test_targets),
+		cmocka_unit_test(test_random_plans),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
