@@ -26,7 +26,7 @@ installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(addprefix $(udevrulesdir)/,$(notdir $(udev_rules))) \
 	$(addprefix $(sysusersdir)/,$(patsubst %.sysusers,%.conf,$(notdir $(sysusers)))) \
 	$(addprefix $(tmpfilesdir)/,$(patsubst %.tmpfiles,%.conf,$(notdir $(tmpfiles)))) \
-	$(addprefix $(unitdir)/,$(patsubst %.in,%,$(notdir $(units))))
+	$(addprefix $(unitdir)/,$(patsubst %.in,%,$(notdir $(units))) incise-feed@.service)
 
 folders = $(patsubst %/,%,$(sort $(dir $(installed))))
 
@@ -77,6 +77,8 @@ install: all ## install below $(DESTDIR)$(prefix)
 		sed 's|@bindir@|$(bindir)|' $$file \
 			>$(DESTDIR)$(unitdir)/$$(basename $$file .in) || exit 1; \
 	done
+	sed -f udev/incise-feed@.service.sed $(DESTDIR)$(unitdir)/incise-haptic@.service \
+		>$(DESTDIR)$(unitdir)/incise-feed@.service
 
 uninstall: ## remove what install installed
 	@made=$$(sort -ru $(DESTDIR)$(made_folders) 2>/dev/null) || \

@@ -50,7 +50,7 @@ static const struct cli_option options[] = {
 static const struct bench *const benches[] = {
 	&bench_precision, &bench_training, &bench_stability, &bench_loop,
 	&bench_pose,	  &bench_timeline, &bench_vision,    &bench_capture,
-	&bench_scenes,	  &bench_extremes,
+	&bench_scenes,	  &bench_integers, &bench_extremes,
 };
 
 /* --- help --- */

@@ -1,22 +1,27 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise compile MODEL.fis -o MODEL.fx: a model in integers, with a certified bound of
- * its error.
+ * incise compile MODEL.fis -o MODEL.fx, SCENE -o NAME.plan: a model, or all of a scene on a rig, in
+ * integers, with a certified bound of its error.
  */
 #include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <incise/calibration.h>
 #include <incise/fixed.h>
 #include <incise/infile.h>
 #include <incise/model.h>
+#include <incise/plan_file.h>
 #include "cli/cli.h"
 #include "cli/json.h"
+#include "cli/plan_report.h"
+#include "cli/scene_argument.h"
 
 struct job {
-	const char *output, *c_source;
+	const char *output, *c_source, *rig, *calibration;
 	bool json;
 	struct incise_fixed_options options;
+	struct scene_argument scene;
 };
 
 static void parse_budget(void *budget, char *text)
@@ -73,7 +78,8 @@ static void check_c_source(void *c_source, char *path)
 
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
-	 "write the compiled model there (.fx); '-' is standard output",
+	 "write the compiled model (.fx) or plan (.plan) there; '-' is standard\n"
+	 "output",
 	 CLI_OUTPUT(struct job, output)},
 	{0, "budget", "ERROR",
 	 "largest error that may be certified, e.g. 0.1mN, 50uN or\n"
@@ -89,18 +95,29 @@ static const struct cli_option options[] = {
 	 "write it as C for a microcontroller, too; FILE_eval() is the\n"
 	 "function",
 	 CLI_OUTPUT(struct job, c_source), .parse = check_c_source},
+	{0, "model", "FILE", "of a scene: use this model instead of its own",
+	 CLI_INPUT(struct job, scene.model)},
+	{0, "rig", "CONF",
+	 "of a scene: rig.conf of the tracker and the actuators that the plan is for\n"
+	 "(default: a tracker of 120 Hz and no actuator, which no kernel loads)",
+	 CLI_TEXT(struct job, rig)},
+	{'c', "calibration", "FILE", "of a scene: calibration.conf, for where the tip is",
+	 CLI_INPUT(struct job, calibration)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{0},
 };
 
 static const struct cli_command command = {
 	.name = "compile",
-	.synopsis = "MODEL.fis -o MODEL.fx [OPTIONS]",
+	.synopsis = "MODEL.fis|SCENE -o MODEL.fx|NAME.plan [OPTIONS]",
 	.summary =
-		"Compile a model to integers, for the haptic loop and for kernels. The largest\n"
-		"error over the whole support is certified by interval arithmetic.",
+		"Compile a model, or all of a scene on a rig, to integers, for the haptic loop and\n"
+		"for kernels, with a certified bound of the error: a model's over its whole\n"
+		"support by interval arithmetic.",
 	.options = options,
-	.notes = "Example:\n  incise compile liver.fis --budget 0.1mN -o liver.fx\n\n"
+	.notes = "--budget, --arith, --cells and --c-source are of a model.\n\n"
+		 "Examples:\n  incise compile liver.fis --budget 0.1mN -o liver.fx\n"
+		 "  incise compile neck --rig rig.conf -o neck.plan\n\n"
 		 "Exit: 0 compiled, 1 failed, 2 bad usage. See incise-compile(1).",
 };
 
@@ -140,32 +157,103 @@ static void report(const struct incise_fixed *fx, const char *model, const char 
 	       path);
 }
 
+static void compile_model(const struct job *job, const char *path)
+{
+	struct incise_error err = {0};
+	struct incise_model *model = cli_require(incise_model_load(path, &err), &err);
+	struct incise_fixed *fx = incise_fixed_compile(model, &job->options, &err);
+
+	if (!fx)
+		cli_fail("%s: %s", path, err.text);
+	if (incise_fixed_save(fx, job->output, &err))
+		cli_fail_with(&err);
+	if (job->c_source)
+		write_c(fx, job->c_source);
+	report(fx, path, job->output, job->json);
+	incise_fixed_free(fx);
+	incise_model_free(model);
+}
+
+/* --- scenes --------------------------------------------------------------------------- */
+
+/* Only to watch: a loop may drive the actuators. */
+static struct incise_rig *open_rig(const char *spec)
+{
+	return cli_open_rig(spec,
+			    INCISE_RIG_TRACKER | INCISE_RIG_STEPPER | INCISE_RIG_WATCH);
+}
+
+static void compile_scene(const struct job *job)
+{
+	struct incise_rig *rig = job->rig ? open_rig(job->rig) : NULL;
+	struct incise_calibration calibration;
+	struct incise_plan_file_info info;
+	struct incise_error err = {0};
+	struct incise_plan_file *file;
+	struct incise_scene *scene;
+	struct incise_plan *plan;
+
+	incise_calibration_nominal(&calibration);
+	if (job->calibration &&
+	    incise_calibration_load(job->calibration, &calibration, &err))
+		cli_fail_with(&err);
+	scene = scene_argument_load(&job->scene);
+	plan = cli_require(incise_plan_new(scene, rig, &err), &err);
+	if (incise_plan_set_tip(plan, calibration.tip_mm))
+		cli_fail("%s: a tip that far away is none", job->calibration);
+	file = cli_require(incise_plan_file_new(plan, &err), &err);
+	if (incise_plan_file_save(file, job->output, &err))
+		cli_fail_with(&err);
+	incise_plan_file_info(file, &info);
+	if (job->json)
+		json_print(plan_report_json(&info));
+	else if (strcmp(job->output, "-"))
+		plan_report_text(&info);
+	if (!info.n_axes)
+		cli_warn("it is for no actuator: give --rig for a plan that the kernel "
+			 "loads");
+	incise_plan_file_free(file);
+	incise_plan_free(plan);
+	incise_scene_free(scene);
+	incise_rig_close(rig);
+}
+
+static bool is_of_model(const struct job *job)
+{
+	struct incise_fixed_options usual;
+
+	incise_fixed_options_init(&usual);
+	return job->c_source || job->options.budget != usual.budget ||
+	       job->options.arithmetic != usual.arithmetic ||
+	       job->options.cells != usual.cells;
+}
+
 int main(int argc, char **argv)
 {
-	struct job job = {0};
-	struct incise_error err = {0};
-	struct incise_fixed *fx;
-	struct incise_model *model;
+	struct job job = {.scene.arith = "fixed"};
 	const char *path;
 
 	incise_fixed_options_init(&job.options);
 	cli_parse(&command, argc, argv, &job);
-	path = cli_operand(argc, argv, "model");
+	path = cli_operand(argc, argv, "model or scene");
 	if (!job.output || !*job.output)
-		cli_usage("where should the compiled model go? Give -o MODEL.fx");
+		cli_usage(
+			"where should the result go? Give -o MODEL.fx, or -o NAME.plan");
 	if (job.json && !strcmp(job.output, "-"))
 		cli_usage("--json and -o - would both write to standard output");
-	model = cli_require(incise_model_load(path, &err), &err);
-	fx = incise_fixed_compile(model, &job.options, &err);
-	if (!fx)
-		cli_fail("%s: %s", path, err.text);
-	if (incise_fixed_save(fx, job.output, &err))
-		cli_fail_with(&err);
-	if (job.c_source)
-		write_c(fx, job.c_source);
-	report(fx, path, job.output, job.json);
+	if (cli_ends_with(path, ".fis") || !scene_argument_find(&job.scene, path)) {
+		if (job.rig || job.calibration || job.scene.model)
+			cli_usage("%s: --rig, --calibration and --model are of a scene",
+				  path);
+		compile_model(&job, path);
+	} else {
+		if (is_of_model(&job))
+			cli_usage(
+				"%s: --budget, --arith, --cells and --c-source are of a "
+				"model",
+				path);
+		compile_scene(&job);
+	}
 	cli_finish();
-	incise_fixed_free(fx);
-	incise_model_free(model);
 	return 0;
 }

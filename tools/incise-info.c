@@ -16,6 +16,7 @@
 #include <incise/scan.h>
 #include "cli/cli.h"
 #include "cli/json.h"
+#include "cli/plan_report.h"
 #include "cli/stream_report.h"
 #include "cli/model_plot.h"
 #include "cli/plot.h"
@@ -39,11 +40,12 @@ static const struct cli_option options[] = {
 
 static const struct cli_command command = {
 	.name = "info",
-	.synopsis = "MODEL.fis|MODEL.fx|NAME.rec|stepper|/dev/incise-stepperN|can:IFACE|"
-		    "slcan:TTY|devices [OPTIONS]",
+	.synopsis =
+		"MODEL.fis|MODEL.fx|NAME.plan|NAME.rec|stepper|/dev/incise-stepperN|can:IFACE|"
+		"slcan:TTY|devices [OPTIONS]",
 	.summary =
-		"Say what a model, a compiled model or a recording holds, what the kernel's\n"
-		"stepper module found, does and costs, which drives are on a CAN bus, or which\n"
+		"Say what a model, a compiled model, a plan or a recording holds, what the\n"
+		"kernel's stepper module found, does and costs, which drives are on a CAN bus, or which\n"
 		"devices are attached.",
 	.options = options,
 	.notes =
@@ -280,6 +282,23 @@ static void show_compiled(const char *path, bool json)
 	else
 		compiled_text(fx);
 	incise_fixed_free(fx);
+}
+
+/* --- plans ---------------------------------------------------------------------------- */
+
+static void show_plan(const char *path, bool json)
+{
+	struct incise_error err = {0};
+	struct incise_plan_file *file =
+		cli_require(incise_plan_file_load(path, &err), &err);
+	struct incise_plan_file_info info;
+
+	incise_plan_file_info(file, &info);
+	if (json)
+		json_print(plan_report_json(&info));
+	else
+		plan_report_text(&info);
+	incise_plan_file_free(file);
 }
 
 /* --- recordings ---------------------------------------------------------------------- */
@@ -544,22 +563,24 @@ static void check_exists(const char *path)
 	struct stat st;
 
 	if (strcmp(path, "-") && stat(path, &st))
-		cli_fail("%s: %s; give a model (.fis, .fx), a recording (NAME.rec), "
-			 "`stepper` or a bus such as can:can0",
-			 path, strerror(errno));
+		cli_fail(
+			"%s: %s; give a model (.fis, .fx), a plan (.plan), a recording (NAME.rec), "
+			"`stepper` or a bus such as can:can0",
+			path, strerror(errno));
 }
 
 int main(int argc, char **argv)
 {
 	struct job job = {0};
-	bool compiled;
+	bool compiled, plan;
 	char *path;
 
 	cli_parse(&command, argc, argv, &job);
 	path = cli_operand(argc, argv, "file");
 	compiled = cli_ends_with(path, ".fx");
-	if (job.plot &&
-	    (is_recording(path) || compiled || stepper_module_is(path) || is_bus(path)))
+	plan = cli_ends_with(path, ".plan");
+	if (job.plot && (is_recording(path) || compiled || plan ||
+			 stepper_module_is(path) || is_bus(path)))
 		cli_usage("--plot draws a model, MODEL.fis");
 	if (stepper_module_is(path)) {
 		stepper_module_show(path, job.json);
@@ -573,6 +594,8 @@ int main(int argc, char **argv)
 		check_exists(path);
 		if (compiled)
 			show_compiled(path, job.json);
+		else if (plan)
+			show_plan(path, job.json);
 		else
 			show_model(path, job.json, job.plot);
 	}

@@ -6,10 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <time.h>
-#include <unistd.h>
 #include "cli/cli.h"
 #include "cli/loop_report.h"
 #include "haptic/control.h"
@@ -47,9 +44,6 @@ static bool is_tool(const char *name)
 	return false;
 }
 
-/* A loop that lives answers at its next look, within 0.1 s. */
-#define PATIENCE_S 2
-
 /* Longest wait for the tool to be in the hand: the force fades before. */
 #define FADE_LOOKS 50
 #define LOOK_NS 20000000
@@ -57,10 +51,9 @@ static bool is_tool(const char *name)
 static struct {
 	const char *name, *user;
 	char *path;
-	int fd;
 } loop;
 
-static _Noreturn void fail_to_connect(int code)
+static _Noreturn void fail_to_ask(int code)
 {
 	switch (code) {
 	case ENOENT:
@@ -71,6 +64,13 @@ static _Noreturn void fail_to_connect(int code)
 		cli_fail("%s: nobody listens at %s: its loop has just ended; start it "
 			 "again",
 			 loop.name, loop.path);
+	case EAGAIN:
+		cli_fail("%s: its loop does not answer", loop.name);
+	case ECONNRESET:
+		cli_fail(
+			"%s: its loop does not answer: it has ended, or too many programs "
+			"ask it at once",
+			loop.name);
 	case EACCES:
 	case EPERM:
 		cli_fail("%s: %s is for user %s, and in /run/incise for the group "
@@ -81,38 +81,14 @@ static _Noreturn void fail_to_connect(int code)
 	}
 }
 
-static void open_socket(void)
-{
-	const struct timeval patience = {.tv_sec = PATIENCE_S};
-	struct sockaddr_un address = {.sun_family = AF_UNIX};
-
-	if (strlen(loop.path) >= sizeof(address.sun_path))
-		fail_to_connect(ENAMETOOLONG);
-	strcpy(address.sun_path, loop.path);
-	loop.fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
-	if (loop.fd < 0)
-		fail_to_connect(errno);
-	setsockopt(loop.fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
-	setsockopt(loop.fd, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof(patience));
-	if (connect(loop.fd, (struct sockaddr *)&address, sizeof(address)))
-		fail_to_connect(errno);
-}
-
 /* Send a request, and take the tool that is held and the one that is wanted. */
 static void ask(const char *request, char held[CONTROL_LINE], char wanted[CONTROL_LINE])
 {
-	char reply[CONTROL_LINE + 1];
-	ssize_t n = -1;
+	char reply[CONTROL_LINE];
+	int rc = control_ask(loop.path, request, reply);
 
-	if (send(loop.fd, request, strlen(request), MSG_NOSIGNAL) >= 0)
-		n = recv(loop.fd, reply, CONTROL_LINE, 0);
-	if (n < 0 && errno != EAGAIN)
-		cli_fail("%s: %s: %s", loop.name, loop.path, strerror(errno));
-	if (n <= 0)
-		cli_fail("%s: its loop does not answer%s", loop.name,
-			 n ? "" : ": it has ended, or too many programs ask it at once");
-	reply[n] = 0;
-	reply[strcspn(reply, "\n")] = 0;
+	if (rc)
+		fail_to_ask(-rc);
 	if (!strncmp(reply, "error ", strlen("error ")))
 		cli_fail("%s: %s", loop.name, reply + strlen("error "));
 	/* Both arrays are as long as a reply. */
@@ -169,7 +145,6 @@ int main(int argc, char **argv)
 		cli_usage("'%s' is no tool: expected blade, handle, tube or auto",
 			  argv[optind + 1]);
 	find_loop(&pages, argv[optind]);
-	open_socket();
 	if (n == 2)
 		set_tool(argv[optind + 1], held, wanted);
 	else
@@ -181,7 +156,6 @@ int main(int argc, char **argv)
 		printf("%s: %s\n", loop.name, held);
 	else
 		printf("%s: %s (%s)\n", loop.name, held, wanted);
-	close(loop.fd);
 	free(loop.path);
 	state_pages_close(&pages);
 	cli_finish();

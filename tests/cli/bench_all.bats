@@ -20,7 +20,7 @@ setup() {
 	r=$BATS_FILE_TMPDIR/r
 }
 
-words="precision training stability pose timeline loop vision capture view scenes extremes"
+words="precision training stability pose timeline loop vision capture view scenes integers extremes"
 
 # A folder that is a report to incise bench all, of this JSON.
 report_of() {

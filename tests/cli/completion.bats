@@ -84,7 +84,7 @@ complete_words() {
 @test "what bench measures is completed" {
 	touch stale.csv
 	complete_words incise bench ""
-	[ "${COMPREPLY[*]}" = "precision training stability loop pose timeline vision capture scenes extremes view all compare" ]
+	[ "${COMPREPLY[*]}" = "precision training stability loop pose timeline vision capture scenes integers extremes view all compare" ]
 	complete_words incise bench st
 	[ "${COMPREPLY[*]}" = stability ]
 	complete_words incise bench precision st

@@ -10,6 +10,7 @@ setup() {
 		O="$INCISE_BUILD" install DESTDIR="$dest" prefix=/usr
 	units=$dest/usr/lib/systemd/system
 	haptic=$units/incise-haptic@.service
+	feed=$units/incise-feed@.service
 	off=$units/incise-stepper-off@.service
 }
 
@@ -20,9 +21,10 @@ systemd_analyze() {
 
 @test "units are where systemd looks for them, with the folder of the programs" {
 	[ "$(cd "$units" && ls)" = \
-		"$(printf '%s\n' incise-devices.service incise-haptic@.service incise-stepper-off@.service)" ]
+		"$(printf '%s\n' incise-devices.service incise-feed@.service incise-haptic@.service incise-stepper-off@.service)" ]
 	run ! grep -r '@[a-z]*@' "$units"
 	grep -q '^ExecStart=/usr/bin/incise haptic ' "$haptic"
+	grep -q '^ExecStart=/usr/bin/incise feed ' "$feed"
 	grep -q '^ExecStart=/usr/bin/incise stepper disable ' "$off"
 }
 
@@ -33,7 +35,7 @@ systemd_analyze() {
 	for unit in "$units"/*.service; do
 		sed "s|/usr/bin/incise |$INCISE_BUILD/bin/incise |" "$unit" >"try/${unit##*/}"
 	done
-	for unit in incise-devices incise-haptic@neck incise-haptic@neck_2.a incise-stepper-off@neck; do
+	for unit in incise-devices incise-feed@neck incise-haptic@neck incise-haptic@neck_2.a incise-stepper-off@neck; do
 		SYSTEMD_UNIT_PATH="$PWD/try:" run -0 systemd_analyze verify --man=no "$unit.service"
 		[ -z "$output" ]
 	done
@@ -64,18 +66,20 @@ systemd_analyze() {
 }
 
 # Options are words, and the last one wins.
-@test "the service runs what incise haptic understands" {
-	read -ra words < <(sed -n 's/^ExecStart=//p' "$haptic")
-	"${words[0]/#\/usr\/bin/$INCISE_BUILD/bin}" haptic --help >help
-	for word in "${words[@]:2}"; do
-		case $word in
-		--) ;;
-		--*) grep -qE "^ +(-[a-z], )?$word( |\$)" help || complain "no option $word" ;;
-		esac
+@test "the services run what their programs understand" {
+	for name in haptic feed; do
+		read -ra words < <(sed -n 's/^ExecStart=//p' "$units/incise-$name@.service")
+		"${words[0]/#\/usr\/bin/$INCISE_BUILD/bin}" $name --help >help
+		for word in "${words[@]:2}"; do
+			case $word in
+			--) ;;
+			--*) grep -qE "^ +(-[a-z], )?$word( |\$)" help || complain "no option $word" ;;
+			esac
+		done
+		[ "${words[-1]}" = %i ]
+		[ "${words[-2]}" = -- ]
+		[ "${words[-3]}" = "\$${name^^}_OPTIONS" ]
 	done
-	[ "${words[-1]}" = %i ]
-	[ "${words[-2]}" = -- ]
-	[ "${words[-3]}" = '$HAPTIC_OPTIONS' ]
 	read -ra words < <(sed -n 's/^ExecStart=//p' "$off")
 	"${words[0]/#\/usr\/bin/$INCISE_BUILD/bin}" stepper --help >help
 	grep -qE '^ +disable ' help

@@ -10,174 +10,18 @@
 #include <string.h>
 #include <unistd.h>
 #include <incise/plan.h>
-#include "../../lib/base/vector.h"
 #include "../cli/child.h"
 #include "../cli/json.h"
 #include "../cli/mapped_libraries.h"
 #include "../cli/scene_argument.h"
 #include "../cli/stopwatch.h"
-#include "../cli/stroke.h"
 #include "all_forces.h"
 #include "bench.h"
 #include "process_cost.h"
 #include "sheet.h"
+#include "trajectory.h"
 
 #define SCENES_MAX 64
-
-/* --- trajectory: the same work for several plans of a scene ---
- *
- * Strokes over its surface (stroke.h), one after the other, with blade, handle and tube in turn,
- * and the poses of them all made before.
- *
- *     \                  \                  \
- *   ───\──────────────────\──────────────────\────────────── surface
- *       ╰◀── blade ──▶     ╰◀── handle ──▶    ╰◀── tube ──▶
- */
-
-#define NS 1e-9
-#define STROKE_S 1.0
-#define DEEPER_MM 3.0  /* each stroke than the one before … */
-#define DEPTHS 11      /* … up to 30 mm, and then from 0 again */
-#define TURN_RAD 0.7   /* each stroke from the one before */
-#define GAP_EVERY 5    /* strokes */
-#define GAP_FROM_S 0.5 /* of the stroke: without poses for longer than any limit */
-#define GAP_TO_S 0.7
-
-struct trajectory {
-	struct incise_tracker_info tracker;
-	struct incise_tracker_sample *poses; /* times from 0 on */
-	int n_poses, strokes, ticks;
-	int64_t period_ns, stroke_ns;
-};
-
-static const enum incise_tool tools[] = {INCISE_TOOL_BLADE, INCISE_TOOL_HANDLE,
-					 INCISE_TOOL_TUBE};
-
-/* Whether a pose of a stroke does not come. */
-static bool lost(int stroke, double t_s)
-{
-	return stroke % GAP_EVERY == GAP_EVERY - 1 && t_s >= GAP_FROM_S && t_s < GAP_TO_S;
-}
-
-/* The scalpel is turned round, with its handle's end where the tip was. */
-static void turn_round(struct incise_tracker_sample *sample,
-		       const struct incise_scene_scalpel *scalpel)
-{
-	const double *side = scalpel->side,
-		     q[4] = {sample->quaternion[0], sample->quaternion[1],
-			     sample->quaternion[2], sample->quaternion[3]};
-	double along[3];
-
-	/* The product of q and a half turn about the side. */
-	v3_cross(sample->quaternion + 1, q + 1, side);
-	v3_add(sample->quaternion + 1, sample->quaternion + 1, q[0], side);
-	sample->quaternion[0] = -v3_dot(q + 1, side);
-	v3_rotate(along, sample->quaternion, scalpel->axis);
-	v3_add(sample->position_mm, sample->position_mm, -scalpel->handle_mm, along);
-}
-
-static void vary(struct incise_tracker_sample *sample, const struct stroke *stroke,
-		 int number, double t_s)
-{
-	double deeper =
-		DEEPER_MM * (number % DEPTHS) * pow(sin(M_PI * t_s / STROKE_S), 2);
-	double half = TURN_RAD * number / 2;
-
-	v3_add(sample->position_mm, sample->position_mm, -deeper, stroke->top.normal);
-	sample->quaternion[0] = cos(half);
-	sample->quaternion[1 + number / 3 % 3] = sin(half);
-}
-
-/* Plain strokes are 1 mm deep; varied ones are up to 30 mm deeper, the scalpel turns about, and at
- * times no poses come. With @inserts the plan has handle and tube; else it is always the blade. */
-static void make_trajectory(struct trajectory *trajectory,
-			    const struct incise_scene *scene,
-			    const struct incise_plan *plan, int strokes, bool inserts,
-			    bool varied)
-{
-	struct incise_scene_scalpel scalpel;
-	struct stroke stroke;
-	int each;
-
-	*trajectory = (struct trajectory){
-		.tracker = {.name = "usual", .rate_hz = 120, .latency_ns = 4200000},
-		.strokes = strokes,
-		.period_ns = llrint(1e9 / incise_scene_rate_hz(scene)),
-	};
-	trajectory->stroke_ns = llrint(STROKE_S / NS / (double)trajectory->period_ns) *
-				trajectory->period_ns;
-	trajectory->ticks =
-		(int)(trajectory->stroke_ns / trajectory->period_ns) * strokes;
-	each = (int)(STROKE_S * trajectory->tracker.rate_hz);
-	trajectory->poses = cli_alloc((size_t)each * strokes, sizeof(*trajectory->poses));
-	incise_scene_scalpel(scene, &scalpel);
-	stroke_begin(&stroke, plan, &trajectory->tracker);
-	for (int i = 0; i < each * strokes; i++) {
-		struct incise_tracker_sample *sample =
-			&trajectory->poses[trajectory->n_poses];
-		double t_s = i % each / trajectory->tracker.rate_hz;
-
-		stroke_pose(&stroke, i % each, sample);
-		sample->t_ns += i / each * trajectory->stroke_ns;
-		sample->seq = i;
-		if (varied)
-			vary(sample, &stroke, i / each, t_s);
-		if (inserts && tools[i / each % 3] == INCISE_TOOL_HANDLE)
-			turn_round(sample, &scalpel);
-		if (!varied || !lost(i / each, t_s))
-			trajectory->n_poses++;
-	}
-}
-
-/* A plan on its way along it. */
-struct walk {
-	const struct trajectory *trajectory;
-	struct incise_plan *plan;
-	int64_t begin_ns; /* when this time along it began */
-	int tick, pose;	  /* the next ones */
-};
-
-/* Feed the poses of up to the next tick. @return when that is. At its end the trajectory starts
- * again. */
-static int64_t feed(struct walk *walk)
-{
-	const struct trajectory *trajectory = walk->trajectory;
-	int64_t t_ns;
-
-	if (walk->tick == trajectory->ticks) {
-		walk->begin_ns += trajectory->strokes * trajectory->stroke_ns;
-		walk->tick = walk->pose = 0;
-	}
-	t_ns = walk->tick * trajectory->period_ns;
-	if (!(t_ns % trajectory->stroke_ns))
-		incise_plan_set_tool(walk->plan, tools[t_ns / trajectory->stroke_ns % 3]);
-	while (walk->pose < trajectory->n_poses &&
-	       trajectory->poses[walk->pose].t_ns <= t_ns) {
-		struct incise_tracker_sample sample = trajectory->poses[walk->pose++];
-
-		sample.t_ns += walk->begin_ns;
-		incise_plan_feed(walk->plan, &sample, 1);
-	}
-	walk->tick++;
-	return walk->begin_ns + t_ns;
-}
-
-/* Go on along another trajectory, at a later time. */
-static void change(struct walk *walk, const struct trajectory *trajectory)
-{
-	walk->begin_ns += walk->tick * walk->trajectory->period_ns;
-	walk->trajectory = trajectory;
-	walk->tick = walk->pose = 0;
-}
-
-static void run_trajectory(void *context)
-{
-	struct walk *walk = context;
-	struct incise_tick tick;
-
-	for (int i = 0; i < walk->trajectory->ticks; i++)
-		incise_plan_tick(walk->plan, feed(walk), &tick);
-}
 
 /* --- scenes: those that are given, or those that ship and some that are made here --- */
 
@@ -362,7 +206,7 @@ static void open_scene(struct scene *s)
 		return;
 	}
 	s->measured = true;
-	make_trajectory(&s->trajectory, s->few.scene, s->few.plan, TIMED_STROKES,
+	trajectory_make(&s->trajectory, s->few.scene, s->few.plan, TIMED_STROKES,
 			inserts(s), false);
 	for (int i = 0; i < 2; i++)
 		variants[i]->walk = (struct walk){.trajectory = &s->trajectory,
@@ -378,14 +222,14 @@ static void compare(struct scene *s)
 
 	if (strokes > COMPARED_STROKES_MAX)
 		strokes = COMPARED_STROKES_MAX;
-	make_trajectory(&trajectory, s->few.scene, few->plan, strokes, inserts(s), true);
-	change(few, &trajectory);
-	change(full, &trajectory);
+	trajectory_make(&trajectory, s->few.scene, few->plan, strokes, inserts(s), true);
+	walk_change(few, &trajectory);
+	walk_change(full, &trajectory);
 	for (long i = 0; i < trajectory.ticks; i++) {
 		struct incise_tick of_few, of_full;
 
-		incise_plan_tick(few->plan, feed(few), &of_few);
-		incise_plan_tick(full->plan, feed(full), &of_full);
+		incise_plan_tick(few->plan, walk_feed(few), &of_few);
+		incise_plan_tick(full->plan, walk_feed(full), &of_full);
 		s->ticks_compared++;
 		s->ticks_in_contact += !!(of_few.flags & INCISE_TICK_CONTACT);
 		if (memcmp(of_few.command_N, of_full.command_N,
@@ -393,8 +237,8 @@ static void compare(struct scene *s)
 		    s->first_difference < 0)
 			s->first_difference = i;
 	}
-	change(few, &s->trajectory);
-	change(full, &s->trajectory);
+	walk_change(few, &s->trajectory);
+	walk_change(full, &s->trajectory);
 	free(trajectory.poses);
 }
 
@@ -431,7 +275,7 @@ static void time_single(struct variant *v, int runs)
 	struct incise_tick tick;
 
 	for (size_t i = 0; i < n; i++) {
-		int64_t t_ns = feed(&v->walk);
+		int64_t t_ns = walk_feed(&v->walk);
 		double begin = stopwatch_ns();
 
 		incise_plan_tick(v->plan, t_ns, &tick);
@@ -440,7 +284,7 @@ static void time_single(struct variant *v, int runs)
 	for (size_t i = 0; i < n; i++) {
 		int64_t stage_ns[INCISE_PLAN_STAGES_MAX];
 
-		incise_plan_tick_timed(v->plan, feed(&v->walk), &tick, stage_ns);
+		incise_plan_tick_timed(v->plan, walk_feed(&v->walk), &tick, stage_ns);
 		for (int k = 0; k < INCISE_PLAN_STAGES_MAX; k++)
 			times[(k + 1) * n + i] = (double)stage_ns[k];
 	}
@@ -464,7 +308,7 @@ static void time_all(struct scenes *s, bool quick)
 		struct variant *variant = i % 2 ? &scene->full : &scene->few;
 
 		variants[i] = (struct harness_variant){
-			.run = run_trajectory,
+			.run = walk_run,
 			.context = &variant->walk,
 			.units = scene->measured ? scene->trajectory.ticks : 0,
 			.time = &variant->time,
@@ -499,7 +343,7 @@ static bool count(struct variant *v)
 	empty = instructions_now(counter);
 	empty = instructions_now(counter) - empty;
 	for (int i = 0; i < ticks; i++) {
-		int64_t t_ns = feed(&v->walk);
+		int64_t t_ns = walk_feed(&v->walk);
 		uint64_t before = instructions_now(counter);
 
 		incise_plan_tick(v->plan, t_ns, &tick);
@@ -573,7 +417,7 @@ static void profile(const char *name, bool full)
 	if (!scene.measured)
 		cli_fail("%s", scene.failed);
 	callgrind_here();
-	run_trajectory(full ? &scene.full.walk : &scene.few.walk);
+	walk_run(full ? &scene.full.walk : &scene.few.walk);
 }
 
 /* --- report --- */

@@ -10,6 +10,7 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
 #include "../cli/cli.h"
@@ -203,4 +204,42 @@ void control_serve(struct control *control, const struct pollfd *polled,
 			drop(control, i);
 	if (polled[0].revents)
 		take_client(control);
+}
+
+/* --- asking ----------------------------------------------------------------------------- */
+
+/* A loop that lives answers at its next look, within 0.1 s. */
+#define PATIENCE_S 2
+
+static int ask_at(int fd, const char *path, const char *request, char reply[CONTROL_LINE])
+{
+	const struct timeval patience = {.tv_sec = PATIENCE_S};
+	struct sockaddr_un address = {.sun_family = AF_UNIX};
+	ssize_t n;
+
+	if (strlen(path) >= sizeof(address.sun_path))
+		return -ENAMETOOLONG;
+	strcpy(address.sun_path, path);
+	setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+	setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof(patience));
+	if (connect(fd, (struct sockaddr *)&address, sizeof(address)) ||
+	    send(fd, request, strlen(request), MSG_NOSIGNAL) < 0)
+		return -errno;
+	n = recv(fd, reply, CONTROL_LINE - 1, 0);
+	if (n <= 0)
+		return n ? -errno : -ECONNRESET;
+	reply[n] = 0;
+	reply[strcspn(reply, "\n")] = 0;
+	return 0;
+}
+
+int control_ask(const char *path, const char *request, char reply[CONTROL_LINE])
+{
+	int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0), rc;
+
+	if (fd < 0)
+		return -errno;
+	rc = ask_at(fd, path, request, reply);
+	close(fd);
+	return rc;
 }

@@ -11,8 +11,14 @@
 #include <incise/state.h>
 #include "../cli/scene_argument.h"
 #include "../session/log.h"
+#include "feeder.h"
+
+/* Where the ticks are computed; see run.h. */
+enum haptic_mode { HAPTIC_LOOP, HAPTIC_FEED, HAPTIC_WATCH };
 
 struct haptic {
+	enum haptic_mode mode;
+	struct feeder feeder; /* of HAPTIC_WATCH */
 	struct scene_argument argument;
 	enum incise_tool tool;
 	double tip_mm[3];

@@ -220,7 +220,8 @@ struct incise_plan *haptic_plan(const struct haptic *haptic,
 				const struct incise_scene *scene,
 				struct incise_error *err)
 {
-	struct incise_plan *plan = incise_plan_new(scene, haptic->rig, err);
+	struct incise_rig *rig = haptic->mode == HAPTIC_WATCH ? NULL : haptic->rig;
+	struct incise_plan *plan = incise_plan_new(scene, rig, err);
 
 	if (plan) {
 		incise_plan_set_tool(plan, haptic->tool);
@@ -249,6 +250,11 @@ static int prepare_next(struct supervisor *s, struct incise_error *err)
 			err, EBUSY,
 			"--session and --procedure are of one scene: end it, "
 			"and start another with the scene as it is now");
+	if (haptic->mode != HAPTIC_LOOP)
+		return incise_error_set(
+			err, EBUSY,
+			"the kernel keeps its plan for as long as its actuators "
+			"have power: end incise feed, and start it again");
 	s->next_scene = scene_argument_read(&haptic->argument, err);
 	if (!s->next_scene)
 		return -errno;
@@ -328,10 +334,14 @@ static const char *only_blade(const struct haptic *haptic)
 /* Returns the reason why not; NULL: the loop takes it at its next tick. */
 static const char *order_tool(struct supervisor *s, enum incise_tool tool)
 {
+	static struct incise_error err;
 	const char *why = only_blade(s->haptic);
 
 	if (why && tool != INCISE_TOOL_AUTO && tool != INCISE_TOOL_BLADE)
 		return why;
+	if (s->haptic->mode == HAPTIC_WATCH &&
+	    feeder_tool(&s->haptic->feeder, loop_tool_names[tool], &err))
+		return err.text;
 	/* For a plan that is read later, too. */
 	s->haptic->tool = tool;
 	incise_loop_control_set_tool(s->haptic->loop.control, tool);
@@ -619,7 +629,9 @@ static void open_orders(struct supervisor *s)
 	struct incise_error err = {0};
 
 	s->keys = keys_open();
-	s->has_foot = !incise_rig_foot_switch(s->haptic->rig, &setup);
+	/* The feeder has its own eye on it. */
+	s->has_foot = s->haptic->mode != HAPTIC_WATCH &&
+		      !incise_rig_foot_switch(s->haptic->rig, &setup);
 	if (!s->haptic->page)
 		return;
 	s->control = control_new(s->haptic->page, &err);

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The feeder of a scene that the kernel renders; see feeder.h.
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+#include <incise/state.h>
+#include "../cli/cli.h"
+#include "control.h"
+#include "feeder.h"
+
+#define LOOK_NS 20000000
+
+char *feeder_page(const char *loop_page)
+{
+	size_t n = strlen(loop_page);
+
+	n -= cli_ends_with(loop_page, ".state") ? strlen(".state") : 0;
+	return cli_text("%.*s.feed.state", (int)n, loop_page);
+}
+
+bool feeder_lives(const char *page, pid_t *pid)
+{
+	struct incise_error err = {0};
+	struct incise_state *state = incise_state_open(page, &err);
+	struct incise_state_now *now = cli_alloc(1, sizeof(*now));
+	bool lives = state && !incise_state_read(state, now) && now->alive &&
+		     now->run == INCISE_RUN_RUNNING;
+
+	*pid = lives ? (pid_t)now->pid : 0;
+	free(now);
+	incise_state_close(state);
+	return lives;
+}
+
+/* A session of its own: neither a Ctrl-C nor the end of this process is for it. */
+static pid_t start(char **argv)
+{
+	pid_t pid = fork();
+	int null;
+
+	if (pid)
+		return pid;
+	setsid();
+	null = open("/dev/null", O_RDWR | O_CLOEXEC);
+	if (null >= 0) {
+		dup2(null, STDIN_FILENO);
+		dup2(null, STDOUT_FILENO);
+	}
+	execv(argv[0], argv);
+	_exit(127);
+}
+
+/* "…/bin/incise-feed" of "…/bin/incise-haptic". */
+static char *program(void)
+{
+	char own[PATH_MAX];
+	ssize_t n = readlink("/proc/self/exe", own, sizeof(own) - 1);
+
+	own[n > 0 ? n : 0] = 0;
+	n = strrchr(own, '/') ? strrchr(own, '/') - own : 0;
+	return cli_text("%.*s/incise-feed", (int)n, own);
+}
+
+static int await(struct feeder *feeder, struct incise_error *err)
+{
+	const struct timespec pause = {.tv_nsec = LOOK_NS};
+	int status;
+	pid_t pid;
+
+	while (!feeder_lives(feeder->page, &pid) || pid != feeder->pid) {
+		if (waitpid(feeder->pid, &status, WNOHANG) == feeder->pid)
+			return incise_error_set(err, ECHILD,
+						"incise feed ended before it fed");
+		if (cli_stop) {
+			feeder_end(feeder);
+			return incise_error_set(err, EINTR, "%s", strsignal(cli_stop));
+		}
+		nanosleep(&pause, NULL);
+	}
+	return 0;
+}
+
+int feeder_begin(struct feeder *feeder, char **argv, struct incise_error *err)
+{
+	int rc;
+
+	if (feeder_lives(feeder->page, &feeder->pid)) {
+		cli_warn("incise feed runs already, process %d: it feeds on when this "
+			 "program ends; `kill %d` ends it",
+			 (int)feeder->pid, (int)feeder->pid);
+		return 0;
+	}
+	argv[0] = program();
+	feeder->pid = start(argv);
+	feeder->own = true;
+	rc = feeder->pid < 0
+		     ? incise_error_set(err, errno, "%s: %s", argv[0], strerror(errno))
+		     : await(feeder, err);
+	free(argv[0]);
+	return rc;
+}
+
+int feeder_tool(const struct feeder *feeder, const char *tool, struct incise_error *err)
+{
+	char *path = control_path(feeder->page), *request = cli_text("tool %s", tool);
+	char reply[CONTROL_LINE];
+	int rc = control_ask(path, request, reply);
+
+	if (rc)
+		rc = incise_error_set(err, -rc, "the feeder does not answer: %s",
+				      strerror(-rc));
+	else if (!strncmp(reply, "error ", strlen("error ")))
+		rc = incise_error_set(err, EINVAL, "%s", reply + strlen("error "));
+	free(request);
+	free(path);
+	return rc;
+}
+
+void feeder_end(struct feeder *feeder)
+{
+	if (feeder->own && feeder->pid > 0 && !kill(feeder->pid, SIGTERM))
+		waitpid(feeder->pid, NULL, 0);
+	feeder->own = false;
+}

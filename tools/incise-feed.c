@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise feed SCENE: the kernel module renders the scene's force, and this process only hands it the
+ * tracker's poses. It is locked in memory, and needs nobody else.
+ */
+#include <incise/realtime.h>
+#include "cli/cli.h"
+#include "cli/loop_report.h"
+#include "haptic/run.h"
+
+static const struct cli_option options[] = {
+	{CLI_RIG_OPTION(struct haptic_job, rig)},
+	{'c', "calibration", "FILE",
+	 "calibration.conf, for where the tip is (default: where the\n"
+	 "tracker takes it to be)",
+	 CLI_INPUT(struct haptic_job, calibration)},
+	{0, "model", "FILE", "use this model instead of the scene's",
+	 CLI_INPUT(struct haptic_job, haptic.argument.model)},
+	{0, "tool", "KIND",
+	 "what the hand holds at first: auto, blade, handle or tube (default: auto)",
+	 CLI_CHOICE(struct haptic_job, haptic.tool, loop_tool_names,
+		    "auto, blade, handle, tube")},
+	{0, "duration", "TIME", "stop after this time, e.g. 10s (default: at SIGINT)",
+	 CLI_DURATION(struct haptic_job, duration, 0.01, 86400)},
+	{0, "home", NULL, "find each actuator's 0 first, unless it is known",
+	 CLI_FLAG(struct haptic_job, home)},
+	{0, "recover", NULL,
+	 "clear first what a program that died left latched in an actuator",
+	 CLI_FLAG(struct haptic_job, recover)},
+	{0, "no-rt", NULL, "run without real time: poses may be late",
+	 CLI_FLAG(struct haptic_job, no_rt)},
+	{0, "state", "FILE",
+	 "page of the loop beside which its own is, NAME.feed.state for NAME.state,\n"
+	 "none for no page (default: as of incise haptic)",
+	 CLI_TEXT(struct haptic_job, state)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct haptic_job, json)},
+	{'v', "verbose", NULL, "say on stderr what happens meanwhile",
+	 CLI_FLAG(struct haptic_job, verbose)},
+	{0},
+};
+
+static const struct cli_command command = {
+	.name = "feed",
+	.synopsis = "SCENE [OPTIONS]",
+	.summary =
+		"Let the kernel module render a scene's force, and hand it the tracker's poses. The\n"
+		"force goes on while other programs stop, start or die, and fades when this one\n"
+		"does. Not a safety device, not a medical device.",
+	.options = options,
+	.notes = "SCENE is as for incise haptic. Needs steppers of the kernel module\n"
+		 "incise_stepper (incise info stepper).\n\n"
+		 "Example:\n  incise feed neck --rig rig.conf\n\n"
+		 "Exit: 0 ended as asked, 1 failed, 2 bad usage. See incise-feed(1).",
+};
+
+int main(int argc, char **argv)
+{
+	struct haptic_job job = {
+		.haptic.mode = HAPTIC_FEED,
+		.haptic.loop.overruns_most = 0,
+		.realtime = {.priority = INCISE_REALTIME_PRIORITY,
+			     .cpu = INCISE_REALTIME_ANY_CPU},
+	};
+
+	/* Before there is another thread. */
+	incise_realtime_prepare();
+	cli_parse(&command, argc, argv, &job);
+	if (job.verbose)
+		cli_be_verbose();
+	scene_argument_operand(&job.haptic.argument, argc, argv, optind);
+	return haptic_run(&job);
+}
