@@ -25,7 +25,7 @@
 #include "stepper_plan.h"
 #include "trace.h"
 
-/* These stop every motor by themselves: nobody needs to be told. */
+/* These stop every motor by themselves. */
 #define STOPS_ALL                                                    \
 	(INCISE_STEPPER_FAULT_OWNER | INCISE_STEPPER_FAULT_SUSPEND | \
 	 INCISE_STEPPER_FAULT_GONE)
@@ -107,8 +107,11 @@ static void stepper_plan_digest(struct stepper_plan *plan)
 /* The leader's set-point says mode POSE from this tick on. */
 static void stepper_plan_start(struct stepper_plan *plan, s64 due)
 {
-	/* Tissue does not heal: cuts stay until the next load. */
+	s32 punctured = plan->state.membrane.punctured;
+
+	/* Tissue does not heal: cuts, and the way through a membrane, stay until the next load. */
 	memcpy(&plan->state, plan->begin, sizeof(plan->begin));
+	plan->state.membrane.punctured = punctured;
 	incise_fixed_incision_leave(&plan->state.incision);
 	plan->status = (struct incise_stepper_plan_status){
 		.motors = plan->load.motors,
@@ -300,7 +303,11 @@ static void stepper_plan_take_tube(struct stepper_plan *plan, s64 now, s64 due)
 		if (plan->tube.mode != INCISE_STEPPER_MODE_POSE || plan->tube.pose.tool)
 			break;
 		pose = stepper_plan_pose_of(&plan->tube);
-		pose.tool = leader->setpoint.pose.tool | INCISE_FIXED_POSE_TUBE;
+		pose.tool = leader->setpoint.pose.tool;
+		if (plan->source_ops)
+			pose.tool =
+				plan->load.tool | (pose.tool & INCISE_STEPPER_POSE_FADE);
+		pose.tool |= INCISE_FIXED_POSE_TUBE;
 		stepper_plan_give(plan, &pose, plan->tube.seq, now, due);
 		return;
 	case STEPPER_PAGE_NOTHING:

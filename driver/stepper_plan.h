@@ -22,7 +22,7 @@
  * @file:	the copy of the user's file that @view looks into
  * @crc:	of it
  * @view:	checked
- * @cost_ns:	median cost of a tick when it was loaded
+ * @cost_ns:	cost of nine in ten ticks when it was loaded
  * @orphan:	goes when its motors have no power; stepper.mutex
  * @source_ops:	of its source; NULL: poses come by the page
  * @source:	what it opened

@@ -53,8 +53,9 @@ static int stepper_plan_compare(const void *a, const void *b)
 	return x < y ? -1 : x > y;
 }
 
-/* Cost of nine in ten ticks that get a pose, on this machine; some of the rest were interrupted. The
- * state is used up.
+/*
+ * Cost of nine in ten ticks that get a pose, on this machine; some of the rest were interrupted.
+ * The state is used up.
  */
 static u32 stepper_plan_measure(struct stepper_plan *plan)
 {
@@ -131,8 +132,9 @@ int stepper_plan_make(struct stepper *stepper, const struct incise_stepper_plan 
 	struct stepper_plan *plan;
 	int ret, i;
 
-	BUILD_BUG_ON(offsetofend(struct incise_fixed_state, incision) !=
-		     sizeof(struct incise_fixed_state));
+	BUILD_BUG_ON(sizeof(struct incise_fixed_state) -
+			     offsetofend(struct incise_fixed_state, incision) >=
+		     sizeof(u64));
 	*made = NULL;
 	if (!stepper_plan_good(stepper, load))
 		return -EINVAL;

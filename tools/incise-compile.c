@@ -97,10 +97,10 @@ static const struct cli_option options[] = {
 	 CLI_OUTPUT(struct job, c_source), .parse = check_c_source},
 	{0, "model", "FILE", "of a scene: use this model instead of its own",
 	 CLI_INPUT(struct job, scene.model)},
-	{0, "rig", "CONF",
+	{'r', "rig", "RIG",
 	 "of a scene: rig.conf of the tracker and the actuators that the plan is for\n"
 	 "(default: a tracker of 120 Hz and no actuator, which no kernel loads)",
-	 CLI_TEXT(struct job, rig)},
+	 CLI_INPUT(struct job, rig)},
 	{'c', "calibration", "FILE", "of a scene: calibration.conf, for where the tip is",
 	 CLI_INPUT(struct job, calibration)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
@@ -237,11 +237,12 @@ int main(int argc, char **argv)
 	cli_parse(&command, argc, argv, &job);
 	path = cli_operand(argc, argv, "model or scene");
 	if (!job.output || !*job.output)
-		cli_usage(
-			"where should the result go? Give -o MODEL.fx, or -o NAME.plan");
+		cli_usage("-o is missing; give -o MODEL.fx, or -o NAME.plan");
 	if (job.json && !strcmp(job.output, "-"))
 		cli_usage("--json and -o - would both write to standard output");
 	if (cli_ends_with(path, ".fis") || !scene_argument_find(&job.scene, path)) {
+		if (!cli_ends_with(path, ".fis") && cli_ends_with(job.output, ".plan"))
+			cli_fail("%s: there is no file and no scene of that name", path);
 		if (job.rig || job.calibration || job.scene.model)
 			cli_usage("%s: --rig, --calibration and --model are of a scene",
 				  path);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * incise feed SCENE: the kernel module renders the scene's force, and this process only hands it the
- * tracker's poses. It is locked in memory, and needs nobody else.
+ * tracker's poses. It is locked in memory, and needs no other program.
  */
 #include <incise/realtime.h>
 #include "cli/cli.h"

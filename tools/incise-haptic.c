@@ -89,7 +89,14 @@ static void watch_kernel(struct haptic_job *job)
 		cli_usage("--procedure is on the virtual rig: leave out --in-kernel");
 	if (haptic->argument.arith && strcmp(haptic->argument.arith, "fixed"))
 		cli_usage("--arith: the kernel renders in integers: leave it out");
+	if (job->realtime.cpu != INCISE_REALTIME_ANY_CPU || job->realtime.policy ||
+	    job->realtime.priority != INCISE_REALTIME_PRIORITY)
+		cli_usage(
+			"--cpu, --policy and --priority: a program that only watches has "
+			"no real time; give them up, or --in-kernel");
 	haptic->mode = HAPTIC_WATCH;
+	/* A watcher that is late takes no force away. */
+	haptic->loop.overruns_most = 0;
 	job->feeder = arguments;
 	arguments[n++] = cli_text("%s", haptic->argument.path);
 	if (job->rig)

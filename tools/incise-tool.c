@@ -44,6 +44,9 @@ static bool is_tool(const char *name)
 	return false;
 }
 
+/* A loop that lives answers at its next look, within 0.1 s. */
+#define PATIENCE_MS 2000
+
 /* Longest wait for the tool to be in the hand: the force fades before. */
 #define FADE_LOOKS 50
 #define LOOK_NS 20000000
@@ -85,7 +88,7 @@ static _Noreturn void fail_to_ask(int code)
 static void ask(const char *request, char held[CONTROL_LINE], char wanted[CONTROL_LINE])
 {
 	char reply[CONTROL_LINE];
-	int rc = control_ask(loop.path, request, reply);
+	int rc = control_ask(loop.path, request, PATIENCE_MS, reply);
 
 	if (rc)
 		fail_to_ask(-rc);

@@ -11,5 +11,5 @@ s/HAPTIC_OPTIONS/FEED_OPTIONS/
 s/haptic\.env/feed.env/
 s/incise haptic /incise feed /
 s/^After=network\.target$/&\
-# Whoever watches it starts behind it.\
+# Its watcher starts behind it.\
 Before=incise-haptic@%i.service/

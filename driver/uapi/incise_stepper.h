@@ -101,7 +101,7 @@ struct incise_stepper_pose {
  *
  * The plan starts with the tick of the first motor that finds mode POSE there, after ENABLE or
  * after another mode: without a pose and a force, which comes when the tool was out of the tissue.
- * Cuts stay, as tissue does not heal; LOAD_PLAN takes them away.
+ * Cuts and a punctured membrane stay, as tissue does not heal; LOAD_PLAN takes them away.
  *
  * A fault of one motor that follows a plan gives the others the fault PLAN, and so does DISABLE of
  * some of them only. When the owner closes the file or dies, the force fades first, then the fault
@@ -438,8 +438,8 @@ struct incise_stepper_sync {
  * file or a field is not good; EOPNOTSUPP: its version is not known here, or there is no source.
  * ERANGE: a motor's deadman_ns is not longer than the plan's pose age, its fade and the way of its
  * largest force at its slew, a motor's tick_ns is longer than the plan's, or a tick of the plan
- * takes more than a quarter of its tick_ns on this machine, the median of 64. EFBIG: more than
- * 32 MiB. ENOMEM, EFAULT. Nothing has changed then.
+ * takes more than a quarter of its tick_ns on this machine, in more than one of ten. EFBIG: more
+ * than 32 MiB. ENOMEM, EFAULT. Nothing has changed then.
  *
  * While there is a plan, SET_CONFIG of its motors gives EBUSY. It goes with LOAD_PLAN, with the
  * device, and at the next open for writing.

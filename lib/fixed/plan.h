@@ -7,7 +7,7 @@
  *   pose ─▶ predict ─▶ tool ─▶ contact ─▶ normal ─▶ incision ─▶ membrane ─▶ forces ─▶ start ─▶
  *   limit ─▶ targets
  *
- * What a scene does not need is 0 in its plan, and costs a comparison.
+ * Parts that a scene does not need are 0 in its plan, and cost a comparison.
  *
  *   NAME.plan ─▶ incise_fixed_plan_open() ─▶ incise_fixed_plan_begin() ─▶ incise_fixed_plan_tick()
  *
@@ -124,9 +124,10 @@ struct incise_fixed_plan_header {
 struct incise_fixed_surface {
 	void *context;
 	void (*move)(void *context, const int32_t tool[3],
-		     struct incise_fixed_proxy *proxy);
-	int32_t (*above)(void *context, const int32_t place[3]); /* Q16.16 mm */
-	void (*restart)(void *context);
+		     struct incise_fixed_proxy *proxy) INCISE_REALTIME;
+	/* Q16.16 mm */
+	int32_t (*above)(void *context, const int32_t place[3]) INCISE_REALTIME;
+	void (*restart)(void *context) INCISE_REALTIME;
 };
 
 /* A view of a plan that was checked. Its fields may be read. */
@@ -200,7 +201,6 @@ struct incise_fixed_state {
 	int32_t last[3];  /* what was rendered */
 	int32_t place
 		[INCISE_FIXED_AXES_MAX]; /* of the handle along each axis, from its origin */
-	int32_t placed;
 	struct incise_fixed_incision incision;
 };
 

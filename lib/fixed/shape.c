@@ -82,6 +82,9 @@ bool incise_fixed_shape_nearest(const struct incise_fixed_shape *shape,
 	}
 }
 
+/* The normal on a capsule's axis, before there was another one. */
+static const int32_t up[3] = {0, 0, INCISE_FIXED_UNIT};
+
 /* Where the way from outside to inside enters, by false position. */
 static void find_entry(struct incise_fixed_touch *entry,
 		       const struct incise_fixed_shape *shape,
@@ -130,7 +133,6 @@ void incise_fixed_proxy_move(struct incise_fixed_proxy *proxy,
 			     const struct incise_fixed_grid *grid, int32_t leave,
 			     const int32_t tool[3])
 {
-	static const int32_t up[3] = {0, 0, INCISE_FIXED_UNIT};
 	struct incise_fixed_touch touch = proxy->touch;
 	bool there = incise_fixed_shape_nearest(
 		shape, grid, tool, proxy->touching ? proxy->touch.normal : up, &touch);

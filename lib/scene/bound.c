@@ -52,7 +52,7 @@ static void multiply(double to[3][3], double (*a)[3], double (*b)[3])
 		}
 }
 
-/* What a pose adds, of each component; @in_mm: the rounding of the pose itself. */
+/* Rounding that a pose adds, of each component; @in_mm: the rounding of the pose itself. */
 static struct state_error added(const struct incise_predict *p, double in_mm)
 {
 	const double dt = ldexp(1, -30); /* rounding of a time, s */
@@ -122,7 +122,7 @@ static struct state_error shown(const struct incise_plan *plan)
 	double in_mm = 2 * LSB_MM + ldexp(arms_mm, -27);
 	struct state_error e = settled(p, in_mm);
 	double latency_s = (double)p->latency_ns * 1e-9;
-	/* What is left of the last prediction is blended out: its error, and the filter's then. */
+	/* The rest of the last prediction is blended out: its error, and the filter's then. */
 	struct state_error now = ahead(&e, latency_s + p->period_s),
 			   then = ahead(&e, latency_s);
 

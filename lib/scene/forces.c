@@ -28,6 +28,9 @@
 #include "forces.h"
 #include "plan.h"
 
+static incise_force_fn reaction, reaction_model, reaction_front, plane, damping,
+	insertion, spread;
+
 static void reaction(struct incise_plan *plan, struct incise_tick *tick,
 		     struct incise_acting_force *own)
 {

@@ -41,7 +41,7 @@
 /* Rounding of a step, of depth and point, and of the frame's axes along 4 m. */
 #define ROUNDING_MM (6 * LSB)
 
-/* What rounding leaves of the steepest cell. */
+/* The steepest cell, less rounding. */
 #define SLOPE_MOST (INCISE_FIXED_GRID_SLOPE_MAX - 0.02)
 
 #define SHIFT_MIN 8

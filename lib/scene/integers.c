@@ -380,8 +380,8 @@ static void take_touch(struct incise_fixed_touch *to, const struct incise_touch 
 	to->depth = near_integer(touch->depth_mm, ONE);
 }
 
-static void mesh_move(void *context, const int32_t tool[3],
-		      struct incise_fixed_proxy *proxy)
+static INCISE_REALTIME void mesh_move(void *context, const int32_t tool[3],
+				      struct incise_fixed_proxy *proxy)
 {
 	struct incise_integers *integers = context;
 	double tool_mm[3];
@@ -405,7 +405,7 @@ static void mesh_move(void *context, const int32_t tool[3],
 		take_touch(&proxy->touch, &integers->proxy.touch, tool_mm);
 }
 
-static int32_t mesh_above(void *context, const int32_t place[3])
+static INCISE_REALTIME int32_t mesh_above(void *context, const int32_t place[3])
 {
 	const struct incise_integers *integers = context;
 	struct incise_touch touch;
@@ -416,7 +416,7 @@ static int32_t mesh_above(void *context, const int32_t place[3])
 	return near_integer(-touch.depth_mm, ONE);
 }
 
-static void mesh_restart(void *context)
+static INCISE_REALTIME void mesh_restart(void *context)
 {
 	struct incise_integers *integers = context;
 

@@ -141,6 +141,7 @@ struct incise_plan {
 	struct incise_stepper_rendered last_seen;
 	int64_t fed_ns;	 /* when a pose, or a sign of life, was given last; 0: none was */
 	int64_t life_ns; /* so often, at least */
+	bool follow;	 /* all actuators do */
 	bool fade_told;	 /* the last one said whether to fade as it is */
 };
 

@@ -7,6 +7,7 @@
  *      tick ◀── stage kernel ── status page ◀──┘
  */
 #include <errno.h>
+#include <math.h>
 #include <incise/plan_file.h>
 #include <incise/stepper_plan.h>
 #include "../base/vector.h"
@@ -20,6 +21,7 @@ static int take_axes(struct incise_plan *plan, struct incise_rig *rig,
 {
 	struct incise_stepper_rendered rendered;
 	const struct incise_axis *first = &plan->axes.axis[0];
+	double deadman_s = HUGE_VAL;
 
 	incise_axes_take(&plan->axes, rig);
 	if (!plan->axes.n)
@@ -30,7 +32,9 @@ static int take_axes(struct incise_plan *plan, struct incise_rig *rig,
 			"%s: it runs no plan; only steppers of the kernel "
 			"module do",
 			first->info.name);
-	plan->life_ns = (int64_t)(first->info.deadman_s * INCISE_NS_PER_S / LIVES);
+	for (int i = 0; i < plan->axes.n; i++)
+		deadman_s = fmin(deadman_s, plan->axes.axis[i].info.deadman_s);
+	plan->life_ns = (int64_t)(deadman_s * INCISE_NS_PER_S / LIVES);
 	return 0;
 }
 
@@ -102,9 +106,12 @@ int incise_plan_give(struct incise_plan *plan, bool tube,
 /* Without poses, and to fade at once. A fault is found by the look that follows. */
 static void live(struct incise_plan *plan, int64_t now_ns)
 {
-	if (!plan->fed_ns)
+	if (!plan->follow) {
+		plan->follow = true;
 		for (int i = 1; i < plan->axes.n; i++)
-			incise_stepper_follow_plan(plan->axes.axis[i].stepper);
+			plan->follow &=
+				!incise_stepper_follow_plan(plan->axes.axis[i].stepper);
+	}
 	if (!plan->fed_ns || now_ns - plan->fed_ns >= plan->life_ns ||
 	    plan->fade_told != plan->fading)
 		incise_plan_give(plan, false, NULL, now_ns);

@@ -38,9 +38,10 @@
  * The surgeon's angle, 2π · 2 Hz · 86400 s = 1.1e6 rad, is a double good to 1.2e-10 rad; 4
  * such roundings on 5.5 mm are 2.6e-9 mm, and the predictor, which goes on by 13 ms with a
  * speed that it has of them at β/T = 40/s, less than doubles that. A clock that is off by
- * 1 µs makes 1e-4 mm of it, at 107 mm/s.
+ * 1 µs makes 1e-4 mm of it, at 107 mm/s. The place is in integers: where it lies on a rounding it
+ * is its last digit, 15 nm.
  */
-#define POSITION_MM 1e-8
+#define POSITION_MM (1e-8 + 1.01 / INCISE_FIXED_ONE)
 
 /* The force is in fixed point: where that lies on a rounding it is its last digit, 15 µN. */
 #define COMMAND_N (1.01 / INCISE_FIXED_ONE)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# driver/abi: what the kernel module has in configfs and sysfs, as the kernel's
+# driver/abi: what the kernel module has in configfs, sysfs and debugfs, as the kernel's
 # Documentation/ABI has it. The attributes are read out of the module's sources.
 
 load cli
@@ -17,6 +17,8 @@ attributes() {
 		"$root"/driver/stepper_configfs.c
 	sed -nE 's|^static DEVICE_ATTR(_RO\|_RW\|_WO)\((\w+)\);|/sys/class/incise/incise-stepper<N>/\2|p' \
 		"$root"/driver/*.c
+	sed -nE 's|^\t*debugfs_create_file\("(\w+)", .*|/sys/kernel/debug/incise_stepper/<device>/\1|p' \
+		"$root"/driver/stepper_debugfs.c
 }
 
 @test "every attribute of the kernel module stands in driver/abi, and nothing else" {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench integers: the plan in integers, which the kernel runs, beside the same plan in double:
+ * incise bench integers: the plan in integers, which the kernel runs, against the same plan in double:
  * time of a tick, and how far their forces are from each other over time, next to the certified bound.
  *
  * Both walk along the same varied strokes (trajectory.h). Where one of them is in another phase, with
@@ -282,7 +282,7 @@ static void run_integers(struct bench_run *run)
 	}
 	time_all(all, run->quick);
 	bench_text(run,
-		   "a tick in integers beside double, and their forces along the same "
+		   "a tick in integers and in double, and their forces along the same "
 		   "varied strokes\n%s\n\n",
 		   bench_machine(run, NULL));
 	bench_table(run, &table, all->row, all->n);
@@ -305,7 +305,7 @@ static void run_integers(struct bench_run *run)
 const struct bench bench_integers = {
 	.name = "integers",
 	.operands = "[SCENE...]",
-	.summary = "the plan in integers, as the kernel runs it, beside double",
+	.summary = "the plan in integers, as the kernel runs it, against double",
 	.n_operands = SCENES_MAX,
 	.run = run_integers,
 	.plots = {{.script = text_integers_gp,

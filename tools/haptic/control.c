@@ -208,12 +208,11 @@ void control_serve(struct control *control, const struct pollfd *polled,
 
 /* --- asking ----------------------------------------------------------------------------- */
 
-/* A loop that lives answers at its next look, within 0.1 s. */
-#define PATIENCE_S 2
-
-static int ask_at(int fd, const char *path, const char *request, char reply[CONTROL_LINE])
+static int ask_at(int fd, const char *path, const char *request, int wait_ms,
+		  char reply[CONTROL_LINE])
 {
-	const struct timeval patience = {.tv_sec = PATIENCE_S};
+	const struct timeval patience = {.tv_sec = wait_ms / 1000,
+					 .tv_usec = wait_ms % 1000 * 1000};
 	struct sockaddr_un address = {.sun_family = AF_UNIX};
 	ssize_t n;
 
@@ -233,13 +232,14 @@ static int ask_at(int fd, const char *path, const char *request, char reply[CONT
 	return 0;
 }
 
-int control_ask(const char *path, const char *request, char reply[CONTROL_LINE])
+int control_ask(const char *path, const char *request, int wait_ms,
+		char reply[CONTROL_LINE])
 {
 	int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0), rc;
 
 	if (fd < 0)
 		return -errno;
-	rc = ask_at(fd, path, request, reply);
+	rc = ask_at(fd, path, request, wait_ms, reply);
 	close(fd);
 	return rc;
 }

@@ -42,10 +42,11 @@ void control_serve(struct control *control, const struct pollfd *polled,
 
 /*
  * Ask a loop at its socket's path, as another program: one line each way. A loop that lives answers
- * within 0.1 s; 2 s are waited for. Returns 0; -ECONNREFUSED or -ENOENT (no loop listens), -EAGAIN (it
+ * within 0.1 s. Returns 0; -ECONNREFUSED or -ENOENT (no loop listens), -EAGAIN (it
  * does not answer), -ECONNRESET (it has ended meanwhile, or too many ask it), or of connect(2).
  */
-int control_ask(const char *path, const char *request, char reply[CONTROL_LINE]);
+int control_ask(const char *path, const char *request, int wait_ms,
+		char reply[CONTROL_LINE]);
 
 /* Close, and remove the socket. NULL is accepted. */
 void control_free(struct control *control);

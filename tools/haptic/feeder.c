@@ -12,12 +12,22 @@
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
+#include <incise/clock.h>
 #include <incise/state.h>
 #include "../cli/cli.h"
 #include "control.h"
 #include "feeder.h"
 
 #define LOOK_NS 20000000
+
+/* Homing takes its time; a device that hangs does not take longer. */
+#define START_MOST_S 60
+
+/* Of who asks its tool: less than the watchdog of who watches. */
+#define ANSWER_MS 300
+
+/* Fade, and the way back of the nuts; then it is killed, and the module lets the force fade. */
+#define END_MOST_S 10
 
 char *feeder_page(const char *loop_page)
 {
@@ -27,7 +37,8 @@ char *feeder_page(const char *loop_page)
 	return cli_text("%.*s.feed.state", (int)n, loop_page);
 }
 
-bool feeder_lives(const char *page, pid_t *pid)
+/* Whether a feeder lives that has that page, and runs; *pid is its own, *of its scene and rig. */
+static bool feeder_lives(const char *page, pid_t *pid, char **of)
 {
 	struct incise_error err = {0};
 	struct incise_state *state = incise_state_open(page, &err);
@@ -36,6 +47,8 @@ bool feeder_lives(const char *page, pid_t *pid)
 		     now->run == INCISE_RUN_RUNNING;
 
 	*pid = lives ? (pid_t)now->pid : 0;
+	if (of)
+		*of = lives ? cli_text("%s on %s", now->scene, now->rig) : NULL;
 	free(now);
 	incise_state_close(state);
 	return lives;
@@ -73,13 +86,22 @@ static char *program(void)
 static int await(struct feeder *feeder, struct incise_error *err)
 {
 	const struct timespec pause = {.tv_nsec = LOOK_NS};
+	int64_t looks = START_MOST_S * (INCISE_NS_PER_S / LOOK_NS);
 	int status;
 	pid_t pid;
 
-	while (!feeder_lives(feeder->page, &pid) || pid != feeder->pid) {
-		if (waitpid(feeder->pid, &status, WNOHANG) == feeder->pid)
+	while (!feeder_lives(feeder->page, &pid, NULL) || pid != feeder->pid) {
+		if (waitpid(feeder->pid, &status, WNOHANG) == feeder->pid) {
+			feeder->own = false;
 			return incise_error_set(err, ECHILD,
 						"incise feed ended before it fed");
+		}
+		if (!looks--) {
+			feeder_end(feeder);
+			return incise_error_set(err, ETIME,
+						"incise feed does not feed after %d s",
+						START_MOST_S);
+		}
 		if (cli_stop) {
 			feeder_end(feeder);
 			return incise_error_set(err, EINTR, "%s", strsignal(cli_stop));
@@ -91,14 +113,23 @@ static int await(struct feeder *feeder, struct incise_error *err)
 
 int feeder_begin(struct feeder *feeder, char **argv, struct incise_error *err)
 {
+	char *of;
 	int rc;
 
-	if (feeder_lives(feeder->page, &feeder->pid)) {
-		cli_warn("incise feed runs already, process %d: it feeds on when this "
-			 "program ends; `kill %d` ends it",
-			 (int)feeder->pid, (int)feeder->pid);
+	if (feeder_lives(feeder->page, &feeder->pid, &of)) {
+		cli_warn(
+			"incise feed runs already, process %d, of %s: it feeds on when this "
+			"program ends; `kill %d` ends it",
+			(int)feeder->pid, of, (int)feeder->pid);
+		free(of);
 		return 0;
 	}
+	/* One of a service would end with it. */
+	if (getenv("NOTIFY_SOCKET"))
+		return incise_error_set(
+			err, ESRCH,
+			"a service starts no feeder: start incise-feed@.service "
+			"of that scene");
 	argv[0] = program();
 	feeder->pid = start(argv);
 	feeder->own = true;
@@ -113,7 +144,7 @@ int feeder_tool(const struct feeder *feeder, const char *tool, struct incise_err
 {
 	char *path = control_path(feeder->page), *request = cli_text("tool %s", tool);
 	char reply[CONTROL_LINE];
-	int rc = control_ask(path, request, reply);
+	int rc = control_ask(path, request, ANSWER_MS, reply);
 
 	if (rc)
 		rc = incise_error_set(err, -rc, "the feeder does not answer: %s",
@@ -127,7 +158,18 @@ int feeder_tool(const struct feeder *feeder, const char *tool, struct incise_err
 
 void feeder_end(struct feeder *feeder)
 {
-	if (feeder->own && feeder->pid > 0 && !kill(feeder->pid, SIGTERM))
-		waitpid(feeder->pid, NULL, 0);
+	const struct timespec pause = {.tv_nsec = LOOK_NS};
+	int64_t looks = END_MOST_S * (INCISE_NS_PER_S / LOOK_NS);
+
+	if (!feeder->own || feeder->pid <= 0)
+		return;
 	feeder->own = false;
+	kill(feeder->pid, SIGTERM);
+	/* One that was stopped ends as well. */
+	kill(feeder->pid, SIGCONT);
+	while (waitpid(feeder->pid, NULL, WNOHANG) == 0) {
+		if (!looks--)
+			kill(feeder->pid, SIGKILL);
+		nanosleep(&pause, NULL);
+	}
 }

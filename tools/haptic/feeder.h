@@ -22,9 +22,6 @@ struct feeder {
 /* The path of a feeder's page, for that of the loop which watches: free(3). */
 char *feeder_page(const char *loop_page);
 
-/* Whether a feeder lives that has that page, and runs; then *pid is its own. */
-bool feeder_lives(const char *page, pid_t *pid);
-
 /*
  * Take the feeder that lives, or start one with these arguments: argv[0] is set to the program, which
  * is beside this one. Returns when it feeds. 0; -ECHILD (it ended: it has said why), -EINTR (a

@@ -27,7 +27,6 @@
 /* Leave the reason in the state page, too. */
 static _Noreturn void fail(struct haptic_job *job, const struct incise_error *err)
 {
-	feeder_end(&job->haptic.feeder);
 	incise_state_run(job->haptic.state, INCISE_RUN_FAULT, err->text);
 	incise_state_free(job->haptic.state);
 	cli_fail_with(err);
@@ -55,7 +54,7 @@ static char *state_path(const char *scene)
 	else if (i < 0)
 		cli_warn(
 			"there is no state page: %s is another user's, or others may write "
-			"there; give --state FILE, or --state none",
+			"there; give --state FILE",
 			list[STATE_FOLDER_TEMPORARY]);
 	warned = true;
 	state_folders_free(list);
@@ -159,7 +158,16 @@ static bool has_real_clock(const char *spec)
 	return real;
 }
 
-/* The feeder's page: beside the one of this loop. */
+/* The feeder's page is next to the one of this loop. */
+static struct feeder *own_feeder;
+
+/* However this program ends, but by a signal that kills. */
+static void end_own_feeder(void)
+{
+	if (own_feeder)
+		feeder_end(own_feeder);
+}
+
 static void begin_feeder(struct haptic_job *job)
 {
 	struct haptic *haptic = &job->haptic;
@@ -172,8 +180,15 @@ static void begin_feeder(struct haptic_job *job)
 			"--in-kernel needs a state page, by which it finds the feeder: give "
 			"--state FILE");
 	haptic->feeder.page = feeds_at(page);
+	own_feeder = &haptic->feeder;
+	atexit(end_own_feeder);
+	/* From here on a signal ends the feeder, too. */
+	cli_catch_signals();
 	if (feeder_begin(&haptic->feeder, job->feeder, &err))
 		cli_fail("%s: %s", haptic->argument.path, err.text);
+	if (!haptic->feeder.own && haptic->tool != INCISE_TOOL_AUTO &&
+	    feeder_tool(&haptic->feeder, loop_tool_names[haptic->tool], &err))
+		cli_warn("the tool stays as it is: %s", err.text);
 }
 
 static void watch(struct haptic_job *job)
@@ -186,10 +201,8 @@ static void watch(struct haptic_job *job)
 		cli_open_rig(cli_rig(job->rig), INCISE_RIG_STEPPER | INCISE_RIG_WATCH);
 	haptic->scheduling = "in the kernel";
 	haptic->plan = haptic_plan(haptic, haptic->scene, &err);
-	if (!haptic->plan || incise_plan_watch(haptic->plan, haptic->rig, &err)) {
-		feeder_end(&haptic->feeder);
+	if (!haptic->plan || incise_plan_watch(haptic->plan, haptic->rig, &err))
 		cli_fail_with(&err);
-	}
 	open_state(job, true);
 }
 
@@ -409,6 +422,52 @@ static json_t *axes_json(struct incise_rig *rig)
 	return axes;
 }
 
+/* "no fresh pose came, its feeder ended"; "none". */
+static void reasons_text(unsigned int reasons, char *text, size_t size)
+{
+	size_t n = 0;
+
+	snprintf(text, size, "none");
+	for (int i = 0; i < INCISE_STEPPER_PLAN_REASONS && n < size; i++)
+		if (reasons >> i & 1)
+			n += (size_t)snprintf(
+				text + n, size - n, "%s%s", n ? ", " : "",
+				incise_stepper_plan_reason_text(
+					(enum incise_stepper_plan_reason)(1 << i)));
+}
+
+/* The kernel's own words of its plan; null where this process renders. */
+static json_t *kernel_json(const struct haptic *haptic)
+{
+	struct incise_stepper_rendered r;
+	char reasons[400];
+
+	if (haptic->mode == HAPTIC_LOOP)
+		return json_null();
+	incise_plan_rendered(haptic->plan, &r);
+	reasons_text(r.reasons, reasons, sizeof(reasons));
+	return json_pack("{ss ss sI sI sI sI}", "state",
+			 incise_stepper_plan_state_name(r.state), "reasons", reasons,
+			 "ticks", (json_int_t)r.ticks, "missed", (json_int_t)r.missed,
+			 "poses", (json_int_t)r.poses, "refused", (json_int_t)r.refused);
+}
+
+static void kernel_line(const struct haptic *haptic)
+{
+	struct incise_stepper_rendered r;
+	char reasons[400];
+
+	if (haptic->mode == HAPTIC_LOOP)
+		return;
+	incise_plan_rendered(haptic->plan, &r);
+	reasons_text(r.reasons, reasons, sizeof(reasons));
+	printf("kernel     %s; %llu ticks, %llu missed; %llu poses, %llu refused; force was "
+	       "taken away by: %s\n",
+	       incise_stepper_plan_state_name(r.state), (unsigned long long)r.ticks,
+	       (unsigned long long)r.missed, (unsigned long long)r.poses,
+	       (unsigned long long)r.refused, reasons);
+}
+
 static void report_json(const struct haptic *haptic)
 {
 	struct incise_stepper *stepper = incise_rig_stepper(haptic->rig);
@@ -420,7 +479,7 @@ static void report_json(const struct haptic *haptic)
 		json_array_append_new(stages,
 				      json_string(incise_plan_stage(haptic->plan, i)));
 	json_print(json_pack(
-		"{sI sI sI sf so so sI sI sI sI so so sf so so so so so ss so so so}",
+		"{sI sI sI sf so so sI sI sI sI so so sf so so so so so ss so so so so}",
 		"ticks", (json_int_t)s->ticks, "skipped", (json_int_t)s->skipped,
 		"overruns", (json_int_t)s->overruns, "rate_hz", haptic->loop.rate_hz,
 		"lateness_us", real ? loop_lateness_json(s) : json_null(), "tick_ns",
@@ -436,7 +495,8 @@ static void report_json(const struct haptic *haptic)
 		"unfelt_max_N", stepper ? json_real(s->unfelt_max_N) : json_null(),
 		"scheduling", haptic->scheduling, "thread", counts_json(&haptic->counts),
 		"stages", stages, "stopped_by",
-		cli_stop ? json_string(strsignal(cli_stop)) : json_null()));
+		cli_stop ? json_string(strsignal(cli_stop)) : json_null(), "kernel",
+		kernel_json(haptic)));
 }
 
 /* Directions that can be felt, and the part of the force that cannot. */
@@ -497,6 +557,7 @@ static void report_text(const struct haptic *haptic)
 	       (unsigned long long)ticks_with(s, INCISE_TICK_SLEWED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_TRAVEL),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_STARTING));
+	kernel_line(haptic);
 	for (int i = 0; (stepper = incise_rig_axis(haptic->rig, i, NULL)); i++)
 		stepper_counters_line(stepper);
 }

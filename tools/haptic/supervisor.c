@@ -629,7 +629,7 @@ static void open_orders(struct supervisor *s)
 	struct incise_error err = {0};
 
 	s->keys = keys_open();
-	/* The feeder has its own eye on it. */
+	/* The feeder reads it. */
 	s->has_foot = s->haptic->mode != HAPTIC_WATCH &&
 		      !incise_rig_foot_switch(s->haptic->rig, &setup);
 	if (!s->haptic->page)

@@ -440,11 +440,12 @@ static json_t *module_json(const struct controller *controller)
 	const struct incise_stepper_controller *info = &controller->info;
 	json_t *motors = json_array();
 	char name[sizeof(info->name) + 1] = {0};
+	int plan = !!(info->capabilities & INCISE_STEPPER_CAP_PLAN);
 
 	memcpy(name, info->name, sizeof(info->name));
 	for (uint32_t i = 0; i < info->n_motors; i++)
 		json_array_append_new(motors, motor_json(controller, i));
-	return json_pack("{so so s{sI sI sI sI sI sI sI} so sb so so}", "device",
+	return json_pack("{so so s{sI sI sI sI sI sI sI} so sb sb so so}", "device",
 			 json_text(controller->path), "name", json_text(name),
 			 "self_test", "rate_max_steps_s", (json_int_t)info->rate_max,
 			 "pulse_min_ns", (json_int_t)info->pulse_ns, "tick_min_ns",
@@ -453,8 +454,8 @@ static json_t *module_json(const struct controller *controller)
 			 (json_int_t)info->lateness_ns, "lateness_max_ns",
 			 (json_int_t)info->lateness_max_ns, "resolution_ns",
 			 (json_int_t)info->resolution_ns, "sync", sync_json(controller),
-			 "plan", (int)!!(info->capabilities & INCISE_STEPPER_CAP_PLAN),
-			 "motors", motors, "no_evidence",
+			 "fixed_point", plan, "plan", plan, "motors", motors,
+			 "no_evidence",
 			 controller->no_debugfs ? json_string(controller->no_debugfs)
 						: json_null());
 }

@@ -28,7 +28,7 @@ static struct incise_fx_trial trial;
 static void any_place(int32_t p[3], double p_mm[3], int32_t most_mm)
 {
 	for (int i = 0; i < 3; i++) {
-		p[i] = incise_fx_trial_in(&trial, -most_mm << 16, most_mm << 16);
+		p[i] = incise_fx_trial_in(&trial, -most_mm * 65536, most_mm * 65536);
 		p_mm[i] = p[i] / ONE;
 	}
 }

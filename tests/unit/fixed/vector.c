@@ -36,7 +36,7 @@ static void test_rounding(void **state)
 		int shift = 1 + (int)(incise_fx_trial_next(&seed) % 60);
 		int64_t v = any(&seed, 62), got = incise_fx_rounded(v, shift);
 		int64_t mirrored = incise_fx_rounded(-v, shift);
-		__int128 off = ((__int128)got << shift) - v;
+		__int128 off = (__int128)got * ((__int128)1 << shift) - v;
 
 		assert_true((off < 0 ? -off : off) <= (__int128)1 << (shift - 1));
 		assert_int_equal(got, -mirrored);

@@ -2,7 +2,7 @@
 # The largest difference of the force in each second between integers and double, a colour for each
 # scene, and what is certified for it, dashed.
 array colour[3] = ['#1f4e9c', '#c0392b', '#2e8b57']
-set title sprintf("Force in integers beside double, along the same poses\n%s, %s", cpu, kernel) \
+set title sprintf("Force in integers against double, along the same poses\n%s, %s", cpu, kernel) \
 	font ',12'
 set logscale y
 set format y '%g'
