@@ -173,7 +173,9 @@ agreed() {
 	[ "$(ask a.rec 'SELECT count(*) FROM knots WHERE begins')" = 2 ] ||
 		complain "$(ask a.rec "SELECT * FROM knots WHERE begins; SELECT * FROM events")"
 	first=$(ask a.rec 'SELECT max(seq) FROM knots WHERE begins')
-	[ "$(ask a.rec "SELECT $first - max(seq) - 1 FROM tracker WHERE seq < $first")" = \
+	holds "$(ask a.rec "SELECT $first - max(seq) - 1 FROM tracker WHERE seq < $first") > 0"
+	# A busy machine may lose some elsewhere, which are counted as well.
+	[ "$(ask a.rec 'SELECT max(seq) - min(seq) + 1 - count(*) FROM tracker')" = \
 		"$(key report.json tracker_lost)" ]
 	# The least delay of a second is the line's to its jitter, and a few lowest of 120
 	# come within 1 ms: right after it came back as before and as much later.
