@@ -95,6 +95,36 @@ check "SIGINT ends all" ended watch 0
 check "without power" unpowered
 check "and without a feeder" no_feeder
 
+# Two motors of one plan: one that does not follow meets its deadman, and ends it with a fault.
 echo 0 >"$config/bench/live"
+mkdir "$config/bench/motor1"
+for line in step=8 dir=9 enable=10 home=11; do
+	echo "incise-sim:${line#*=}" >"$config/bench/motor1/${line%=*}"
+done
+echo 1 >"$config/bench/live"
+echo "number=0 step=0 dir=1 enable=2 min=3 max=4 home=5 min_at=-400 max_at=1000000 home_at=-2000..0 position=400" >$sim/carriage
+echo "number=1 step=8 dir=9 enable=10 home=11 max_at=1000000 home_at=-2000..0 position=400" >$sim/carriage
+device=kernel:/dev/$(cat $config/bench/cdev)
+limits="travel_mm = 30.0; lead_mm = 4.0; microsteps = 8; velocity_mm_s = 30.0; acceleration_mm_s2 = 2000.0;
+	home_mm_s = 10.0; deadman_ms = 200;"
+cat >/tmp/rig.conf <<END
+tracker = "sim:";
+stepper = [ "$device:0", "$device:1" ];
+actuator = ( { spring_N_mm = 2.0; origin_mm = -22.0; $limits },
+	{ spring_N_mm = 0.5; origin_mm = -15.0; rest_mm = 15.0; direction = [0.0, 1.0, 0.0]; $limits } );
+sim = { depth_mm = [10]; times = [1]; cut_s = 2.0; pause_s = 1.5; tracker_noise_mm = 0.0; };
+END
+cat >/tmp/side.scene <<END
+tissue = { reaction_N_mm = 0.1; plane_N_mm = 0.05; };
+tool = { side = [0.6, 0.8, 0.0]; };
+END
+two() { $incise feed /tmp/side.scene --home --rig /tmp/rig.conf --duration 6s --json >/tmp/out 2>/tmp/err || { cat /tmp/err; return 1; }; }
+check "two motors follow one plan" two
+whole() { grep -q '"missed": 0,' /tmp/out && ! grep -q '"poses": 0,' /tmp/out || { cat /tmp/out; return 1; }; }
+check "poses are taken, and no tick is missed" whole
+both_off() { for line in 2 10; do grep -q "^$line out 0" $sim/inputs || { cat $sim/inputs; return 1; }; done; }
+check "both end without power" both_off
+echo 0 >"$config/bench/live"
+rmdir $config/bench/motor1
 rmdir $config/bench/motor0 $config/bench
 check "the modules go" rmmod incise_stepper incise_sim
