@@ -59,8 +59,8 @@ jobs = $(if $(findstring --jobserver,$(MAKEFLAGS)),,-j$(shell expr $$(nproc) + 1
 check-parts:
 	+@status=0; \
 	$(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,check-style cli-needs) || status=$$?; \
-	$(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,$(parts) cli-tests check-layers check-fuzz \
-		check-rtsan check-deb check-module check-vm) || status=$$?; \
+	$(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,$(parts) cli-tests check-vm check-layers \
+		check-fuzz check-rtsan check-deb check-module) || status=$$?; \
 	exit $$status
 timed-%:
 	+@$(if $(filter $*,cli-tests check-layers check-vm),NEEDS=cli-needs) tests/timed $(times) $* $(MAKE) -k --no-print-directory $*
@@ -78,9 +78,9 @@ check: ## install what is missing, build, and test
 	@echo "left out, and run by make check-all: $$(cat tests/cli/*.bats | grep -c test_tags=slow) slow tests" \
 		"of benches, most unit tests again without sanitizers, most cases of the slowest properties," \
 		"ThreadSanitizer, three of four fuzz runs, full attacks on recordings, the test bed's own tests," \
-		"the boots of the second kernel and of two processors"
+		"the boots of the second kernel and of two processors, long tests of the first one"
 	$(call in_parts,parts=check-unit-once cli_filter="--filter-tags '!slow'" \
-		FUZZ_RUNS=10000 vm_boots="main:deterministic main:service" vm_bed=)
+		FUZZ_RUNS=10000 vm_boots="main:deterministic main:service" vm_bed= INCISE_VM_SHORT=1)
 
 check-all: ## the same with all tests in all builds, on all kernels: an hour
 	$(call in_parts,parts="check-sanitize check-unit check-tsan" ATTACK=full)

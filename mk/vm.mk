@@ -37,7 +37,7 @@ $(system_programs): $(O)/tests/vm/%: tests/vm/system/%.c tests/vm/simulator.c \
 	$(Q)$(CC) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< tests/vm/simulator.c
 
 check-vm: all $(guest_programs) $(guest_model) $(system_programs) $(O)/tests/polhemus/fastrak ## tests of the kernel modules, on Debian's kernels in QEMU
-	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check $(vm_bed) $(vm_boots)
+	+@INCISE_BUILD=$(abspath $(O)) INCISE_VM_SHORT=$(INCISE_VM_SHORT) MAKE="$(MAKE)" tests/vm/check $(vm_bed) $(vm_boots)
 
 check-service: all $(system_programs) $(O)/tests/polhemus/fastrak ## of check-vm the boot of systemd, with our packages and the service
 	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check main:service
