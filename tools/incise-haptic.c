@@ -13,10 +13,7 @@ static const char *const policies[] = {"fifo", "deadline", NULL};
 
 static const struct cli_option options[] = {
 	{CLI_RIG_OPTION(struct haptic_job, rig)},
-	{'c', "calibration", "FILE",
-	 "calibration.conf, for where the tip is (default: where the\n"
-	 "tracker takes it to be)",
-	 CLI_INPUT(struct haptic_job, calibration)},
+	HAPTIC_TIP_OPTION,
 	SCENE_ARGUMENT_OPTIONS(struct haptic_job, haptic.argument),
 	{0, "tool", "KIND",
 	 "what the hand holds at first: auto (blade or handle, by the scalpel's turn, or\n"
@@ -32,13 +29,7 @@ static const struct cli_option options[] = {
 	 "let the kernel module render, and only watch it: the force outlives this\n"
 	 "program; starts incise feed, unless that runs",
 	 CLI_FLAG(struct haptic_job, in_kernel)},
-	{0, "duration", "TIME", "stop after this time, e.g. 10s (default: at SIGINT)",
-	 CLI_DURATION(struct haptic_job, duration, 0.01, 86400)},
-	{0, "home", NULL, "find each actuator's 0 first, unless it is known",
-	 CLI_FLAG(struct haptic_job, home)},
-	{0, "recover", NULL,
-	 "clear first what a program that died left latched in an actuator",
-	 CLI_FLAG(struct haptic_job, recover)},
+	HAPTIC_HOLD_OPTIONS,
 	{0, "policy", "POLICY", "fifo or deadline (default: fifo)",
 	 CLI_CHOICE(struct haptic_job, realtime.policy, policies, "fifo, deadline")},
 	{0, "priority", "N", "of fifo, 1 to 84 (default: 80)",

@@ -12,7 +12,7 @@
  * out, and it hands on no timestamps. Those are the device's where its clock is CLOCK_MONOTONIC
  * (current_timestamp_clock), else the time at which the sample got here.
  *
- * Which trigger, and how fast, is set up as for any other use of the device, before LOAD_PLAN.
+ * The trigger and its rate are set up as for any other use of the device, before LOAD_PLAN.
  */
 #include <linux/err.h>
 #include <linux/iio/buffer_impl.h>

@@ -80,7 +80,7 @@ static double to_mm(const struct incise_motor *motor, int64_t steps)
 }
 
 /*
- * How old a status with power is if that is older than the deadman, else 0: its writer was stopped with this
+ * Age of a status with power that is older than the deadman, else 0: its writer was stopped with this
  * program, and stops the motor as soon as it runs again. Found here, so that nothing depends
  * on which of the two threads runs first.
  */

@@ -79,7 +79,7 @@ void incise_fixed_incision_open(struct incise_fixed_incision *incision,
 /* Neither is in the tissue. */
 void incise_fixed_incision_leave(struct incise_fixed_incision *incision) INCISE_REALTIME;
 
-/* How tight an opening is for a tool, Q16.16: 0 (wide open) … 1. */
+/* Tightness of an opening for a tool, Q16.16: 0 (wide open) … 1. */
 int32_t incise_fixed_incision_tightness(const struct incise_fixed_incision_setup *setup,
 					const struct incise_fixed_opening *opening,
 					enum incise_tool tool) INCISE_REALTIME;

@@ -29,7 +29,7 @@
  */
 #define ENTERS 0.1
 
-/* How often the error of a place counts: in the depth, in the direction to the surface, and the
+/* The error of a place counts so often: in the depth, in the direction to the surface, and the
  * direction of the surface itself, which turns by no more than that while depths are below half of its
  * radius. */
 #define PLACES 3

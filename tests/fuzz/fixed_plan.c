@@ -15,7 +15,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../../lib/fixed/trial_plan.h"
+#include "../unit/fixed/trial_plan.h"
 
 #define TICKS 200
 #define CHANGES_MAX 7

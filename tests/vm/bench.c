@@ -305,6 +305,25 @@ struct incise_stepper_motor_status bench_look(const struct bench *bench,
 	return copy;
 }
 
+bool bench_rest(struct bench *bench, unsigned int motors)
+{
+	const uint32_t at_rest =
+		1U << INCISE_STEPPER_STATE_FAULT | 1U << INCISE_STEPPER_STATE_DISABLED;
+	const uint32_t all = (1U << motors) - 1;
+	int64_t end_ns = bench_now_ns() + INT64_C(60000000000);
+	bool rest;
+
+	do {
+		rest = true;
+		bench_command(bench, INCISE_STEPPER_DISABLE, all);
+		bench_nap(1000000);
+		for (unsigned int i = 0; i < motors; i++)
+			rest &= at_rest >> bench_look(bench, i).state & 1;
+	} while (!rest && bench_now_ns() < end_ns);
+	bench_command(bench, INCISE_STEPPER_CLEAR, all);
+	return rest;
+}
+
 void bench_judge(struct bench *bench)
 {
 	static struct incise_sim_edge edge[AT_ONCE];

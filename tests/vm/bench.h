@@ -79,6 +79,9 @@ void bench_want(struct bench *bench, unsigned int motor, unsigned int mode,
 struct incise_stepper_motor_status bench_look(const struct bench *bench,
 					      unsigned int motor);
 
+/* Disable the first motors until they rest, 60 s at most, and clear them. Returns whether they do. */
+bool bench_rest(struct bench *bench, unsigned int motors);
+
 /* Hands all edges of the ring to the judges. */
 void bench_judge(struct bench *bench);
 

@@ -58,7 +58,7 @@ struct plan_taken {
 	struct incise_fixed_pose pose;
 };
 
-/* What the module said: its digest after so many ticks. */
+/* The module's digest after so many ticks. */
 struct plan_seen {
 	uint64_t ticks;
 	uint32_t digest;

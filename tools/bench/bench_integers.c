@@ -94,7 +94,7 @@ static void open_row(struct row *row)
 /* cos 60°: normals farther apart are of two sides of a tissue, as where it was gone through. */
 #define SAME_SIDE 0.5
 
-/* What both say of a tick, but for the force: on the same side of all that is decided. */
+/* Whether both are on the same side of all that is decided at a tick. */
 static bool decide_alike(const struct incise_tick *a, const struct incise_tick *b)
 {
 	/* Limits follow from the force: they may be reached by one first. */
@@ -122,7 +122,7 @@ static void add_point(struct rows *all, const struct row *row, double t_s, doubl
 	snprintf(point->block, sizeof(point->block), "%.40s", row->name);
 }
 
-/* What is left of a difference that a decision made, as part of the bound. */
+/* Rest of a difference that a decision made, as part of the bound. */
 #define ALIKE 0.1
 
 /*

@@ -168,7 +168,7 @@ INCISE_API int incise_plan_watch(struct incise_plan *plan, struct incise_rig *ri
 INCISE_API int incise_plan_feed_kernel(struct incise_plan *plan, struct incise_rig *rig,
 				       struct incise_error *err);
 
-/** What the last tick of such a plan read. Real-time safe; in the thread that ticks. */
+/** Get what the last tick of such a plan read. Real-time safe; in the thread that ticks. */
 INCISE_API void incise_plan_rendered(const struct incise_plan *plan,
 				     struct incise_stepper_rendered *rendered)
 	INCISE_REALTIME;

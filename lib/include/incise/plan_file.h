@@ -21,7 +21,7 @@
 /** A plan as a file; not changed after it was made. */
 struct incise_plan_file;
 
-/** What a plan as a file holds. */
+/** Contents of a plan as a file. */
 struct incise_plan_file_info {
 	char scene[64];	  /**< the scene's file, without its folder */
 	char surface[32]; /**< what it was in the scene: "plane", "mesh" … */
@@ -73,7 +73,7 @@ INCISE_API struct incise_plan_file *incise_plan_file_load(const char *path,
 INCISE_API int incise_plan_file_save(const struct incise_plan_file *file,
 				     const char *path, struct incise_error *err);
 
-/** What it holds. */
+/** Get its contents. */
 INCISE_API void incise_plan_file_info(const struct incise_plan_file *file,
 				      struct incise_plan_file_info *info);
 

@@ -21,7 +21,7 @@
 #include <incise/tool.h>
 #include <incise/tracker.h>
 
-/** What a controller renders; of its last tick. */
+/** Force and state that a controller rendered at its last tick. */
 struct incise_stepper_rendered {
 	enum incise_stepper_plan_state state;
 	unsigned int reasons; /**< enum incise_stepper_plan_reason */

@@ -13,7 +13,7 @@
 #include <incise/scene.h>
 #include "../../../lib/fixed/incision.h"
 #include "../../../lib/fixed/line.h"
-#include "../../../lib/fixed/trial_plan.h"
+#include "trial_plan.h"
 #include "../../../lib/tissue/front.h"
 #include "../../../lib/tissue/incision.h"
 

@@ -12,7 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../../../lib/fixed/trial_plan.h"
+#include "trial_plan.h"
 
 #define PLANS 400
 

@@ -11,7 +11,7 @@
 #include <cmocka.h>
 #include <math.h>
 #include <stdlib.h>
-#include "../../../lib/fixed/trial_plan.h"
+#include "trial_plan.h"
 #include "../../../lib/surface/surface.h"
 
 #define CASES 100000

@@ -11,7 +11,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../../../lib/fixed/trial_plan.h"
+#include "trial_plan.h"
 
 #define CASES 20000
 #define ONE 65536.0

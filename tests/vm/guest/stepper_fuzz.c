@@ -30,25 +30,6 @@
 
 static struct bench bench;
 
-static const uint32_t at_rest =
-	1U << INCISE_STEPPER_STATE_FAULT | 1U << INCISE_STEPPER_STATE_DISABLED;
-
-static bool all_rest(void)
-{
-	int64_t end_ns = bench_now_ns() + INT64_C(60000000000);
-	bool rest;
-
-	do {
-		rest = true;
-		bench_command(&bench, INCISE_STEPPER_DISABLE, ALL);
-		bench_nap(1000000);
-		for (unsigned int i = 0; i < MOTORS; i++)
-			rest &= at_rest >> bench_look(&bench, i).state & 1;
-	} while (!rest && bench_now_ns() < end_ns);
-	bench_command(&bench, INCISE_STEPPER_CLEAR, ALL);
-	return rest;
-}
-
 static bool ready(void)
 {
 	int ret = 0;
@@ -116,7 +97,7 @@ static void dirty_page(int rounds)
 		bench_nap(3000000);
 		for (unsigned int m = 0; m < MOTORS; m++)
 			faults += bench_look(&bench, m).faults != 0;
-		right &= all_rest();
+		right &= bench_rest(&bench, MOTORS);
 		bench_judge(&bench);
 		for (unsigned int m = 0; m < MOTORS; m++)
 			agree &= bench.log[m].position == bench_look(&bench, m).position;
@@ -257,7 +238,7 @@ static void works(void)
 {
 	bool right;
 
-	all_rest();
+	bench_rest(&bench, MOTORS);
 	/* Whatever the steps were named in between. */
 	simulator_write("edges", "reset");
 	for (unsigned int m = 0; m < MOTORS; m++)
@@ -273,7 +254,8 @@ static void works(void)
 		bench_judge(&bench);
 		right &= bench.log[m].position == target;
 	}
-	check(right && all_rest(), "after all of it the motors go where they are told");
+	check(right && bench_rest(&bench, MOTORS),
+	      "after all of it the motors go where they are told");
 	check(!bench_faulty(&bench), "and no edge breaks a promise");
 }
 

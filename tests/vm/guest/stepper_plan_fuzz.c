@@ -28,25 +28,6 @@ static struct {
 	uint64_t ticks, poses;
 } sum;
 
-static const uint32_t at_rest =
-	1U << INCISE_STEPPER_STATE_FAULT | 1U << INCISE_STEPPER_STATE_DISABLED;
-
-static bool all_rest(void)
-{
-	int64_t end_ns = bench_now_ns() + INT64_C(60000000000);
-	bool rest;
-
-	do {
-		rest = true;
-		bench_command(&bench, INCISE_STEPPER_DISABLE, ALL);
-		bench_nap(1000000);
-		for (unsigned int i = 0; i < MOTORS; i++)
-			rest &= at_rest >> bench_look(&bench, i).state & 1;
-	} while (!rest && bench_now_ns() < end_ns);
-	bench_command(&bench, INCISE_STEPPER_CLEAR, ALL);
-	return rest;
-}
-
 /* Numbers that are not like others. */
 static int32_t odd(int32_t was)
 {
@@ -213,7 +194,7 @@ static bool one(const char *model)
 	if (!ret)
 		run(file, size, motors);
 	free(file);
-	if (!owners_change() || !all_rest())
+	if (!owners_change() || !bench_rest(&bench, MOTORS))
 		return false;
 	bench_judge(&bench);
 	memset((void *)bench.setpoint, 0, PAGE);

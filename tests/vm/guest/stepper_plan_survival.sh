@@ -4,7 +4,7 @@
 # Long: memory that is taken, page by page.
 . tests/vm/tap
 in_virtual_time "a plan survives"
-# What is short of memory takes 8 s of a processor.
+# The shortage of memory takes 8 s of a processor.
 [ "$INCISE_VM_KERNEL" = main ] || skip "a plan survives" "once is enough"
 with_stepper "a plan survives"
 "$INCISE_BUILD/tests/vm/stepper_plan_survival"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
- * Random good plans, and a hand that moves a tool over their surface: the same in a kernel and in a
- * program. A plan has any surface, reaction and membrane, any forces, up to three axes; one in four
+ * Random good plans, and a hand that moves a tool over their surface, for unit tests and a fuzzer:
+ * the same from a seed on each machine. A plan has any surface, reaction and membrane, any forces, up to three axes; one in four
  * has numbers anywhere in their ranges, at the ends of them too.
  *
  *   incise_fx_trial_plan() ─▶ incise_fixed_plan_open() ─▶ _begin()
@@ -10,10 +10,10 @@
 #ifndef INCISE_FX_TRIAL_PLAN_H
 #define INCISE_FX_TRIAL_PLAN_H
 
-#include "layout.h"
-#include "plan.h"
-#include "trial.h"
-#include "vector.h"
+#include "../../../lib/fixed/layout.h"
+#include "../../../lib/fixed/plan.h"
+#include "../../../lib/fixed/trial.h"
+#include "../../../lib/fixed/vector.h"
 
 /* The longest plan: the header, a model of 17 × 17 knots, a grid of 33 × 33. */
 #define INCISE_FX_TRIAL_CELLS 16
