@@ -551,10 +551,10 @@ static void test_stopped_like_skin(void **state)
 	}
 }
 
-/* A plan that replaces another one has its cuts, and its open membrane. */
+/* A plan that replaces another one has its cuts, and its open membrane, in either arithmetic. */
 static void test_another_plan(void **state)
 {
-	struct incise_plan *next;
+	static const char *const arithmetics[] = {"fixed", "double", "double", "fixed"};
 	struct theatre th;
 
 	cut_at(&th, 50, 6);
@@ -562,17 +562,27 @@ static void test_another_plan(void **state)
 	take_tube(&th, 50);
 	go(&th, 50, 0, -14, 1.5);
 	go(&th, 50, 0, 15, 1.5);
-	next = incise_plan_new(th.scene, NULL, NULL);
-	assert_non_null(next);
-	incise_plan_take_over(next, th.plan);
-	incise_plan_free(th.plan);
-	th.plan = next;
-	assert_int_equal(incise_plan_set_tool(th.plan, INCISE_TOOL_TUBE), 0);
-	/* The first pose, and the start's ramp. */
-	go(&th, 50, 0, 15, 0.3);
-	go(&th, 50, 0, -12, 1.5);
-	assert_true(th.tick.flags & INCISE_TICK_LUMEN);
-	assert_force(&th, (double[]){0, 0, tube_N(ALIGNED, 6, MEMBRANE_MM, 0)});
+	for (size_t i = 0; i < sizeof(arithmetics) / sizeof(*arithmetics); i++) {
+		struct incise_scene *scene = incise_scene_load(NECK, NULL, NULL);
+		struct incise_plan *next;
+
+		assert_int_equal(incise_scene_set_arithmetic(scene, arithmetics[i], NULL),
+				 0);
+		next = incise_plan_new(scene, NULL, NULL);
+		assert_non_null(next);
+		incise_plan_take_over(next, th.plan);
+		incise_plan_free(th.plan);
+		incise_scene_free(th.scene);
+		th.plan = next;
+		th.scene = scene;
+		assert_int_equal(incise_plan_set_tool(th.plan, INCISE_TOOL_TUBE), 0);
+		/* The first pose, and the start's ramp. */
+		go(&th, 50, 0, 15, 0.3);
+		go(&th, 50, 0, -12, 1.5);
+		assert_true(th.tick.flags & INCISE_TICK_LUMEN);
+		assert_force(&th, (double[]){0, 0, tube_N(ALIGNED, 6, MEMBRANE_MM, 0)});
+		go(&th, 50, 0, 15, 1.5);
+	}
 	end(&th);
 }
 
