@@ -13,8 +13,8 @@
  * and on nothing else, and a program that is given the same gets the same bits. One that is late by
  * a period or more is left out and counted.
  *
- * Data of the leader's timer alone are under the leader's lock; followers read single words. A motor
- * that stops leaves the run, and by a fault it ends the run for all.
+ * Data of the leader's timer alone are under the leader's lock; followers read single words. A
+ * motor that stops leaves the run, and by a fault it ends the run for all.
  */
 #include <linux/crc32c.h>
 #include <linux/delay.h>
