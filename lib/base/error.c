@@ -94,3 +94,54 @@ const char *incise_version(void)
 {
 	return INCISE_VERSION;
 }
+
+#define NAME_MAX_LETTERS 48
+
+/* Letters to leave out, add, replace or swap with the next to make @b of @a. */
+static size_t edits(const char *a, const char *b)
+{
+	/* The last three rows of the table of all beginnings of a against all of b. */
+	size_t rows[3][NAME_MAX_LETTERS + 1];
+	size_t n = strlen(a), m = strlen(b);
+
+	for (size_t j = 0; j <= m; j++)
+		rows[0][j] = j;
+	for (size_t i = 1; i <= n; i++) {
+		const size_t *before = rows[(i + 1) % 3], *last = rows[(i - 1) % 3];
+		size_t *row = rows[i % 3];
+
+		row[0] = i;
+		for (size_t j = 1; j <= m; j++) {
+			size_t cost = last[j - 1] + (a[i - 1] != b[j - 1]);
+
+			if (last[j] + 1 < cost)
+				cost = last[j] + 1;
+			if (row[j - 1] + 1 < cost)
+				cost = row[j - 1] + 1;
+			if (i > 1 && j > 1 && a[i - 1] == b[j - 2] &&
+			    a[i - 2] == b[j - 1] && before[j - 2] + 1 < cost)
+				cost = before[j - 2] + 1;
+			row[j] = cost;
+		}
+	}
+	return rows[n % 3][m];
+}
+
+const char *incise_nearest_name(const char *name, const char *const *names)
+{
+	size_t length = strlen(name), least = length < 6 ? 2 : length / 3 + 1;
+	const char *nearest = NULL;
+
+	if (length > NAME_MAX_LETTERS)
+		return NULL;
+	for (; *names; names++) {
+		size_t needed =
+			strlen(*names) > NAME_MAX_LETTERS ? least : edits(name, *names);
+
+		if (needed < least) {
+			least = needed;
+			nearest = *names;
+		}
+	}
+	return nearest;
+}

@@ -40,5 +40,15 @@ INCISE_API int incise_error_set(struct incise_error *err, int code, const char *
 INCISE_API int incise_error_library(struct incise_error *err, const char *where,
 				    const char *said);
 
+/**
+ * Find the name that a person meant who typed another one: the fewest letters left out, added,
+ * replaced or swapped, at most a third of those typed, or one.
+ *
+ * @param name  the name as typed
+ * @param names the known names, which end with NULL
+ * @return one of @names, or NULL if none is that near.
+ */
+INCISE_API const char *incise_nearest_name(const char *name, const char *const *names);
+
 INCISE_END_DECLS
 #endif

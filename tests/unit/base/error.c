@@ -99,6 +99,39 @@ static void test_a_missing_library_is_named_with_its_package(void **state)
 	assert_null(strstr(err.text, "apt-get"));
 }
 
+/* The fewest edits win; more than a third of the letters, and nothing is meant. */
+static void test_nearest_name(void **state)
+{
+	static const char *const names[] = {"duration", "rate",	 "output", "overwrite",
+					    "o",	"state", NULL};
+	static const struct {
+		const char *typed, *meant;
+	} cases[] = {
+		{"duraton", "duration"},  {"durration", "duration"},
+		{"druation", "duration"}, {"rates", "rate"},
+		{"rtae", "rate"},	  {"ouput", "output"},
+		{"output", "output"},	  {"over-write", "overwrite"},
+		{"stat", "state"},	  {"", "o"},
+		{"frequency", NULL},	  {"output-model", NULL},
+		{"raaate", "rate"},
+	};
+	static const char *const none[] = {NULL};
+	char longer[100] = {0};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		const char *found = incise_nearest_name(cases[i].typed, names);
+
+		if (cases[i].meant)
+			assert_string_equal(found, cases[i].meant);
+		else
+			assert_null(found);
+	}
+	assert_null(incise_nearest_name("rate", none));
+	memset(longer, 'a', sizeof(longer) - 1);
+	assert_null(incise_nearest_name(longer, names));
+	assert_null(incise_nearest_name("rate", (const char *const[]){longer, NULL}));
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -107,6 +140,7 @@ int main(void)
 		cmocka_unit_test(test_without_a_place_to_leave_it),
 		cmocka_unit_test(test_hostile_text),
 		cmocka_unit_test(test_version),
+		cmocka_unit_test(test_nearest_name),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
