@@ -107,7 +107,7 @@ deps: ## install the packages that building, testing and the demo need
 demo: ## walk paper 1 on the virtual rig; pictures and summary in demo.out/
 	@mk/deps build demo
 	+@$(MAKE) --no-print-directory all
-	$(O)/bin/incise demo -o $(DEMO) --overwrite
+	$(O)/bin/incise demo --report $(DEMO) --overwrite
 
 bench: ## measure everything on this machine; one report in build/bench/
 	@mk/deps build bench

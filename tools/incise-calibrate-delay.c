@@ -31,7 +31,7 @@ static const char *const stream_names[] = {"force", "tracker", "camera", NULL};
 
 struct options {
 	struct calibrate_options common;
-	double time_s, range_ms; /* time_s 0: not given */
+	double time_s, max_delay_ms; /* time_s 0: not given */
 	int reference;
 	bool camera;
 };
@@ -39,15 +39,15 @@ struct options {
 static const struct cli_option option_table[] = {
 	{CLI_RIG_OPTION(struct options, common.rig)},
 	{CALIBRATE_FILE_OPTION(struct options)},
-	{0, "time", "TIME", "record so long (default: 15s)",
+	{0, "duration", "TIME", "record so long (default: 15s)",
 	 CLI_DURATION(struct options, time_s, 8, 600)},
-	{0, "reference", "STREAM",
+	{0, "reference-stream", "STREAM",
 	 "whose delay is right: force (default), tracker, camera",
 	 CLI_CHOICE(struct options, reference, stream_names,
 		    "force, tracker and camera")},
-	{0, "range", "MS", "look for a delay up to so many ms (default: 150)",
-	 CLI_NUMBER(struct options, range_ms, 10, 1000)},
-	{0, "camera", NULL, "of the virtual rig, record its camera too",
+	{0, "max-delay", "MS", "look for a delay up to so many ms (default: 150)",
+	 CLI_NUMBER(struct options, max_delay_ms, 10, 1000)},
+	{0, "with-camera", NULL, "of the virtual rig, record its camera too",
 	 CLI_FLAG(struct options, camera)},
 	{0, "from", "NAME.rec", "take a recording that is there, not a rig",
 	 CLI_INPUT(struct options, common.from)},
@@ -71,7 +71,7 @@ static const struct cli_command command = {
 		"rubber, and\nlift it off again, two or three times a second, unevenly.",
 	.options = option_table,
 	.notes =
-		"Example: incise calibrate delay --rig rig.conf --time 15s --report delay\n"
+		"Example: incise calibrate delay --rig rig.conf --duration 15s --report delay\n"
 		"Exit codes: 0 done and in force, 1 failed or refused, 2 bad usage.",
 };
 
@@ -94,9 +94,9 @@ static void parse(struct options *options, int argc, char **argv)
 	cli_parse(&command, argc, argv, options);
 	cli_no_operands(argc, argv, "a recording goes with --from");
 	if (common->from && options->time_s > 0)
-		cli_usage("--time: a recording has its own");
+		cli_usage("--duration: a recording has its own");
 	if (!common->from && !(options->time_s > 0) && !isatty(STDIN_FILENO))
-		cli_usage("without a terminal, --time or --from is needed");
+		cli_usage("without a terminal, --duration or --from is needed");
 	if (common->keep &&
 	    (strlen(common->keep) < 5 || !cli_ends_with(common->keep, ".rec")))
 		cli_usage("--keep: '%s' is not a name that ends in .rec", common->keep);
@@ -172,7 +172,7 @@ static int poll_for(struct incise_recorder *recorder, struct incise_clock *clock
 
 /*
  * Record the rig for @time_s into @path, which ends in .rec, with its camera if rig.conf names
- * one or --camera is given. 0, or -1 with *err: then a part of it may be left there.
+ * one or --with-camera is given. 0, or -1 with *err: then a part of it may be left there.
  */
 static int record(const struct options *options, double time_s, const char *path,
 		  struct incise_error *err)
@@ -257,7 +257,7 @@ static void fit_pair(const struct options *options, const struct stream *streams
 	if (incise_calibrate_delay(
 		    depth->points, depth->n, streams[other].points, streams[other].n,
 		    other == FORCE ? INCISE_DELAY_FORCE : INCISE_DELAY_ALIKE,
-		    options->range_ms, &pair->fit, &err))
+		    options->max_delay_ms, &pair->fit, &err))
 		cli_fail("tracker and %s: %s", stream_names[other], err.text);
 	pair->known = true;
 	if (fabs(fit->drift_ms) > DRIFT_MAX_MS &&
@@ -434,7 +434,7 @@ int main(int argc, char **argv)
 		.kind = "delay", .low = NAN, .high = NAN, .pass = true};
 	struct stream streams[STREAMS];
 	struct pair pairs[STREAMS] = {0};
-	struct options options = {.range_ms = 150, .reference = FORCE};
+	struct options options = {.max_delay_ms = 150, .reference = FORCE};
 	const char *raw;
 
 	parse(&options, argc, argv);
@@ -444,7 +444,8 @@ int main(int argc, char **argv)
 	else
 		record_now(&options, streams);
 	if (options.reference == CAMERA && !streams[CAMERA].n)
-		cli_fail("--reference camera: the recording has no depth by a camera");
+		cli_fail(
+			"--reference-stream camera: the recording has no depth by a camera");
 	fit_pair(&options, streams, FORCE, &pairs[FORCE]);
 	fit_pair(&options, streams, CAMERA, &pairs[CAMERA]);
 	if (!pairs[FORCE].known && !pairs[CAMERA].known)

@@ -75,7 +75,7 @@ static const struct cli_option option_table[] = {
 	{0, "pixels-u", "PX",
 	 "two-point: standard uncertainty that all have alike\n(default: 0.7 of --pixels, 0.03 by vision)",
 	 CLI_NUMBER(struct options, u_px, 0, 1000)},
-	{0, "pictures", "N",
+	{0, "images", "N",
 	 "take so many of the camera (default: on a terminal 50, of a\nboard 8)",
 	 CLI_INTEGER(struct options, source.pictures, 1, FILES_MAX)},
 	{0, "every", "TIME", "board: time between two pictures, without a terminal",
@@ -97,7 +97,7 @@ static const struct cli_option option_table[] = {
 	 CLI_NUMBER(struct options, u_square, 0, 100)},
 	{0, "plane-u", "LENGTH", "board: how well it lies in the plane (default: 0.1mm)",
 	 CLI_QUANTITY(struct options, u_plane_mm, lengths, 0, 100)},
-	{0, "axis", "X,Y,X,Y",
+	{0, "handle", "X,Y,X,Y",
 	 "board: ends of the handle in the picture (default: upright in\nits middle)",
 	 CLI_TEXT(struct options, axis)},
 	{0, "region", "X,Y,X,Y",
@@ -191,7 +191,7 @@ static void need_schedule(const struct options *options)
 	if (!source->n_paths && !source->guided &&
 	    (!source->pictures ||
 	     (!strcmp(options->way, "board") && !(source->every_s > 0))))
-		cli_usage("without a terminal give --from, or --pictures%s of the camera",
+		cli_usage("without a terminal give --from, or --images%s of the camera",
 			  strcmp(options->way, "board") ? "" : " and --every");
 }
 
@@ -320,7 +320,7 @@ static void by_board(struct options *options, struct depth_result *result,
 		.height = c->height,
 	};
 	if (options->axis)
-		corner_pair("axis", options->axis, views.axis_px, 8192);
+		corner_pair("handle", options->axis, views.axis_px, 8192);
 	for (int k = 0; k < 2; k++) {
 		double low = fmin(views.axis_px[0][k], views.axis_px[1][k]);
 		double high = fmax(views.axis_px[0][k], views.axis_px[1][k]);

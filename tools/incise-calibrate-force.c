@@ -50,12 +50,12 @@ static void parse_range(void *whole, char *text)
 	struct options *options = whole;
 	char *item[2];
 
-	if (cli_list("range", text, item, 2) != 2)
-		cli_usage("--range: expected two voltages in mV such as 0,5000");
-	options->setup.low_mV = cli_number("range", item[0], -1e6, 1e6);
-	options->setup.high_mV = cli_number("range", item[1], -1e6, 1e6);
+	if (cli_list("input-range", text, item, 2) != 2)
+		cli_usage("--input-range: expected two voltages in mV such as 0,5000");
+	options->setup.low_mV = cli_number("input-range", item[0], -1e6, 1e6);
+	options->setup.high_mV = cli_number("input-range", item[1], -1e6, 1e6);
 	if (!(options->setup.low_mV < options->setup.high_mV))
-		cli_usage("--range: the first is to be the lower one");
+		cli_usage("--input-range: the first is to be the lower one");
 	options->ranged = true;
 }
 
@@ -88,7 +88,7 @@ static const struct cli_option option_table[] = {
 	{0, "series", "N",
 	 "times up by all loads, the last one down as well (default: 3)",
 	 CLI_INTEGER(struct options, weights.series, 1, 100)},
-	{0, "time", "TIME", "mean of each reading (default: 2s)",
+	{0, "duration", "TIME", "mean of each reading (default: 2s)",
 	 CLI_DURATION(struct options, weights.mean_s, 0.1, 600)},
 	{0, "timeout", "TIME", "for a load to come and be steady (default: 1min)",
 	 CLI_DURATION(struct options, weights.timeout_s, 2, 3600)},
@@ -105,7 +105,7 @@ static const struct cli_option option_table[] = {
 	 CLI_QUANTITY(struct options, setup.scale_g, grams, 0, 1e4)},
 	{0, "density", "KG_M3", "of the weights (default: 7950)",
 	 CLI_PARSED_BY(parse_density)},
-	{0, "range", "LOW,HIGH",
+	{0, "input-range", "LOW,HIGH",
 	 "ends of the converter in mV (default: those of the rig,\n"
 	 "or not known, with --from)",
 	 CLI_PARSED_BY(parse_range)},

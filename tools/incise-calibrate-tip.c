@@ -35,7 +35,7 @@ struct options {
 static const struct cli_option option_table[] = {
 	{CLI_RIG_OPTION(struct options, common.rig)},
 	{CALIBRATE_FILE_OPTION(struct options)},
-	{0, "time", "TIME",
+	{0, "duration", "TIME",
 	 "turn it for so long at most (default: 20s); it ends earlier\n"
 	 "when the tip is known well enough",
 	 CLI_DURATION(struct options, time_s, 1, 600)},
@@ -60,8 +60,9 @@ static const struct cli_command command = {
 		"Put\nthe tip into a dimple that stays where it is, and turn the tool all "
 		"ways about\nit, by 60 degrees at least from one side to the other.",
 	.options = option_table,
-	.notes = "Example: incise calibrate tip --rig rig.conf --time 20s --report tip\n"
-		 "Exit codes: 0 done and in force, 1 failed or refused, 2 bad usage.",
+	.notes =
+		"Example: incise calibrate tip --rig rig.conf --duration 20s --report tip\n"
+		"Exit codes: 0 done and in force, 1 failed or refused, 2 bad usage.",
 };
 
 /* --- poses -------------------------------------------------------------------------- */
@@ -448,9 +449,9 @@ static void parse(struct options *options, int argc, char **argv)
 	timed = options->time_s > 0;
 	cli_no_operands(argc, argv, "a file goes with --from");
 	if (options->common.from && timed)
-		cli_usage("--time: a file has its own");
+		cli_usage("--duration: a file has its own");
 	if (!options->common.from && !timed && !isatty(STDIN_FILENO))
-		cli_usage("without a terminal, --time or --from is needed");
+		cli_usage("without a terminal, --duration or --from is needed");
 	calibrate_begin(&options->common);
 }
 

@@ -31,7 +31,7 @@ struct options {
 	bool cuts, json;
 };
 
-static const char *const cameras[] = {"auto", "off", "pictures", "depth", NULL};
+static const char *const cameras[] = {"auto", "off", "frames", "depth", NULL};
 
 static void parse_trigger(void *whole, char *text)
 {
@@ -60,10 +60,10 @@ static const struct cli_option option_table[] = {
 	 "on the virtual rig at the end of its cuts)",
 	 CLI_DURATION(struct options, duration_s, 0.01, 1e6)},
 	{0, "camera", "WHAT",
-	 "off; pictures: record them; depth: and find the scalpel in\n"
+	 "off; frames: record them; depth: and find the scalpel in\n"
 	 "them; auto: what rig.conf has (default; a rig of sim:… has\n"
 	 "no camera then)",
-	 CLI_CHOICE(struct options, camera, cameras, "auto, off, pictures and depth")},
+	 CLI_CHOICE(struct options, camera, cameras, "auto, off, frames and depth")},
 	{0, "trigger", "WHAT",
 	 "wait for the stylus's button, or for a force such as 0.2N;\n"
 	 "the second before is recorded too",

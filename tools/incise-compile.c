@@ -52,7 +52,7 @@ static void parse_arithmetic(void *arithmetic, char *text)
 			*(int *)arithmetic = a;
 			return;
 		}
-	cli_usage("--arith: '%s' is none of direct, table and force", text);
+	cli_usage("--method: '%s' is none of direct, table and force", text);
 }
 
 /* "out/pig liver.c" makes pig_liver, a C name of the file's own: free(3). */
@@ -85,7 +85,7 @@ static const struct cli_option options[] = {
 	 "largest error that may be certified, e.g. 0.1mN, 50uN or\n"
 	 "1e-4 in the output's unit (default: 0.1mN)",
 	 CLI_PARSED(struct job, options.budget, parse_budget)},
-	{0, "arith", "KIND",
+	{0, "method", "KIND",
 	 "direct, table or force (default: the cheapest within the\n"
 	 "budget)",
 	 CLI_PARSED(struct job, options.arithmetic, parse_arithmetic)},
@@ -115,7 +115,7 @@ static const struct cli_command command = {
 		"for kernels, with a certified bound of the error: a model's over its whole\n"
 		"support by interval arithmetic.",
 	.options = options,
-	.notes = "--budget, --arith, --cells and --c-source are of a model.\n\n"
+	.notes = "--budget, --method, --cells and --c-source are of a model.\n\n"
 		 "Examples:\n  incise compile liver.fis --budget 0.1mN -o liver.fx\n"
 		 "  incise compile neck --rig rig.conf -o neck.plan\n\n"
 		 "Exit: 0 compiled, 1 failed, 2 bad usage. See incise-compile(1).",
@@ -250,7 +250,7 @@ int main(int argc, char **argv)
 	} else {
 		if (is_of_model(&job))
 			cli_usage(
-				"%s: --budget, --arith, --cells and --c-source are of a "
+				"%s: --budget, --method, --cells and --c-source are of a "
 				"model",
 				path);
 		compile_scene(&job);

@@ -38,16 +38,16 @@ struct options {
 /* Checked here, and handed on to incise haptic as it is. */
 static void parse_loop(void *loop_time, char *text)
 {
-	cli_duration("loop", text, 0.2, 3600);
+	cli_duration("duration", text, 0.2, 3600);
 	*(const char **)loop_time = text;
 }
 
 static const struct cli_option option_table[] = {
-	{'o', "output", "DIR", "folder to leave everything in (default: demo.out)",
+	{0, "report", "DIR", "folder to leave everything in (default: demo.out)",
 	 CLI_OUTPUTS(struct options, demo.folder)},
 	{0, "seed", "N", "of the virtual rig (default: 1)",
 	 CLI_INTEGER(struct options, demo.seed, 0, SEED_MAX)},
-	{0, "loop", "TIME", "length of the haptic loop (default: 10s)",
+	{0, "duration", "TIME", "length of the haptic loop (default: 10s)",
 	 CLI_PARSED(struct options, loop_time, parse_loop)},
 	{0, "scene", "SCENE",
 	 "paper 2 instead: a film and a strip of a procedure on this scene, as neck",
@@ -334,8 +334,8 @@ static void walk(struct demo *demo, const char *loop_time)
 				"--json"));
 	write_scene(demo);
 	json_object_set_new(demo->summary, "replay_new_cut",
-			    RUN(demo, "replay", new_rec, scene, "--at", "acquisition",
-				"--csv", replay, "--json"));
+			    RUN(demo, "replay", new_rec, scene, "--poses", "acquisition",
+				"--log", replay, "--json"));
 	print_step(demo, "Run the haptic loop in real time, in fixed point");
 	json_object_set_new(demo->summary, "haptic",
 			    RUN(demo, "haptic", scene, "--rig", live, "--no-rt",
@@ -376,7 +376,7 @@ static void film_scene(const char *scene, const char *folder)
 		 folder);
 	run_view((char *const[]){"view", (char *)scene, "--procedure", "--strip", strip,
 				 "--at", MOMENTS, "--size", "640x480", "--no-panel",
-				 "--camera", NEAR, "--fps", "10", NULL},
+				 "--viewpoint", NEAR, "--fps", "10", NULL},
 		 folder);
 	end_folder(folder);
 	printf("\n%s\n%s\n", film, strip);

@@ -28,7 +28,7 @@ struct job {
 static const char *const times[] = {"arrival", "acquisition", NULL};
 
 static const struct cli_option options[] = {
-	{0, "csv", "FILE",
+	{0, "log", "FILE",
 	 "write every tick, predicted beside measured force; - is standard\noutput",
 	 CLI_OUTPUT(struct job, csv)},
 	{0, "plot", "NAME",
@@ -36,11 +36,11 @@ static const struct cli_option options[] = {
 	 CLI_OUTPUTS(struct job, plot)},
 	{0, "real-time", NULL, "wait for each tick (default: as fast as it goes)",
 	 CLI_FLAG(struct job, how.real_time)},
-	{0, "at", "WHEN",
+	{0, "poses", "WHEN",
 	 "give poses to the loop at their arrival, as live, or at their\n"
 	 "acquisition (default: arrival)",
 	 CLI_CHOICE(struct job, how.at, times, NULL)},
-	{'c', "calibration", "FILE.conf",
+	{'c', "calibration", "FILE",
 	 "take this calibration of force, not that of the recording",
 	 CLI_INPUT(struct job, calibration)},
 	SCENE_ARGUMENT_OPTIONS(struct job, scene),
@@ -58,7 +58,7 @@ static const struct cli_command command = {
 		"Run the haptic loop of a scene on a recording: the force that it would have\n"
 		"asked for, beside the one that was measured.",
 	.options = options,
-	.notes = "Example: incise replay liver.rec scenes/liver.scene --csv liver.csv\n"
+	.notes = "Example: incise replay liver.rec scenes/liver.scene --log liver.csv\n"
 		 "Exit codes: 0 success, 1 failure, 2 bad usage.",
 };
 
@@ -72,7 +72,7 @@ static void parse(struct job *job, int argc, char **argv)
 	job->recording = argv[optind];
 	scene_argument_operand(&job->scene, argc, argv, optind + 1);
 	if (job->json && job->csv && !strcmp(job->csv, "-"))
-		cli_usage("--json and --csv - would both write to standard output");
+		cli_usage("--json and --log - would both write to standard output");
 }
 
 /* Measured beside predicted force, and depth, over time. */

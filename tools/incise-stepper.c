@@ -47,7 +47,7 @@ static const struct cli_option options[] = {
 	 CLI_FLAG(struct job, unhomed)},
 	{0, "hold", NULL, "move, home: stay powered afterwards, until Ctrl-C",
 	 CLI_FLAG(struct job, hold)},
-	{0, "for", "TIME",
+	{0, "duration", "TIME",
 	 "status --follow, enable, jog, --hold: end after this time, e.g. 2s",
 	 CLI_DURATION(struct job, seconds, 0.001, 86400)},
 	{0, "repeat", "N", "home: N times, and say how well it repeats",
@@ -480,9 +480,9 @@ static void check_options(const struct job *job)
 		char letter;
 		const char *name;
 	} given[] = {
-		{job->follow, 'f', "follow"},	{job->by, 'b', "by"},
-		{job->unhomed, 'u', "unhomed"}, {job->hold, 'h', "hold"},
-		{job->seconds > 0, 't', "for"}, {job->repeat > 0, 'n', "repeat"},
+		{job->follow, 'f', "follow"},	     {job->by, 'b', "by"},
+		{job->unhomed, 'u', "unhomed"},	     {job->hold, 'h', "hold"},
+		{job->seconds > 0, 't', "duration"}, {job->repeat > 0, 'n', "repeat"},
 	};
 
 	for (size_t i = 0; i < sizeof(given) / sizeof(*given); i++)
@@ -492,9 +492,9 @@ static void check_options(const struct job *job)
 	if (job->by && job->unhomed)
 		cli_usage("--by needs no --unhomed: it goes from where it stands");
 	if (job->seconds && strchr(job->subcommand->takes, 'h') && !job->hold)
-		cli_usage("--for is how long to hold it: add --hold");
+		cli_usage("--duration is how long to hold it: add --hold");
 	if (job->seconds && job->subcommand->run == run_status && !job->follow)
-		cli_usage("--for is how long to follow it: add --follow");
+		cli_usage("--duration is how long to follow it: add --follow");
 }
 
 static const struct subcommand *subcommand_named(const char *name)

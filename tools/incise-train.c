@@ -19,7 +19,7 @@ struct options {
 	const char *data, *model, *initial, *history;
 	char *inputs[INCISE_MODEL_INPUTS_MAX];
 	int n_inputs;
-	const char *output, *group;
+	const char *target, *group;
 	double check;
 	int mfs[INCISE_MODEL_INPUTS_MAX];
 	int n_mfs;
@@ -64,13 +64,12 @@ static void parse_type(void *type, char *text)
 }
 
 static const struct cli_option option_table[] = {
-	{'o', "output-model", "FILE",
-	 "write the model there (.fis); '-' is standard output",
+	{'o', "output", "FILE", "write the model there (.fis); '-' is standard output",
 	 CLI_OUTPUT(struct options, model)},
 	{0, "inputs", "A,B", "input columns (default: depth_mm,velocity_mm_s)",
 	 CLI_PARSED_BY(parse_inputs)},
-	{0, "output", "Y", "output column (default: force_N)",
-	 CLI_TEXT(struct options, output)},
+	{0, "target", "COLUMN", "column to learn (default: force_N)",
+	 CLI_TEXT(struct options, target)},
 	{0, "group", "COLUMN", "column naming the cut; data are split by whole cuts",
 	 CLI_TEXT(struct options, group)},
 	{0, "all-rows", NULL,
@@ -133,13 +132,17 @@ static void parse(struct options *options, int argc, char **argv)
 	*options = (struct options){
 		.inputs = {"depth_mm", "velocity_mm_s"},
 		.n_inputs = 2,
-		.output = "force_N",
+		.target = "force_N",
 	};
 	incise_train_options_init(&options->train);
 	cli_parse(&command, argc, argv, options);
 	options->data = cli_operand(argc, argv, "data file");
 	if (!options->model || !*options->model)
-		cli_usage("where should the model go? Give -o MODEL.fis");
+		cli_usage("-o MODEL.fis is missing: the file for the model");
+	if (strcmp(options->model, "-") && !cli_ends_with(options->model, ".fis"))
+		cli_usage("--output %s: a model is a .fis file; name the column to learn "
+			  "with --target",
+			  options->model);
 	if (options->json && !strcmp(options->model, "-"))
 		cli_usage("--json and -o - would both write to standard output");
 	sd = uncertainty_path(options->model);
@@ -281,7 +284,7 @@ static const char *unit_of(const char *column)
 static json_t *error_object(const struct options *options, double rmse, double r2,
 			    size_t pairs)
 {
-	const char *unit = unit_of(options->output);
+	const char *unit = unit_of(options->target);
 	json_t *object = json_object();
 	char key[80];
 
@@ -365,7 +368,7 @@ static void report_json(const struct result *result, json_t *warned)
 	const struct incise_baselines *baselines = &result->baselines;
 	const struct interval *interval = &result->interval;
 	json_t *object = json_object(), *unfired = json_array(), *mfs = json_array();
-	const char *unit = unit_of(options->output);
+	const char *unit = unit_of(options->target);
 	char key[80];
 
 	json_set_integer(object, "pairs", fit->pairs.n + (check ? check->pairs.n : 0));
@@ -459,7 +462,7 @@ static void report_text(const struct result *result)
 	      : printf("\n");
 	print_row("R² of this model", report->train_r2, report->check_r2);
 	printf("  95 %% interval: noise %.4g %s", interval->noise,
-	       unit_of(options->output));
+	       unit_of(options->target));
 	if (check)
 		printf(", holds %.1f %% of the %s", 100 * interval->coverage, unseen);
 	printf("\n");
@@ -485,7 +488,7 @@ int main(int argc, char **argv)
 	parse(&options, argc, argv);
 	for (int i = 0; i < options.n_inputs; i++)
 		columns[i] = options.inputs[i];
-	columns[options.n_inputs] = options.output;
+	columns[options.n_inputs] = options.target;
 	check_writable(options.model);
 	check_writable(options.initial);
 	check_writable(options.history);

@@ -35,12 +35,12 @@ static void parse_camera(void *whole, char *text)
 	struct view_job *job = whole;
 	char *items[3];
 
-	if (cli_list("camera", text, items, 3) != 3)
+	if (cli_list("viewpoint", text, items, 3) != 3)
 		cli_usage(
-			"--camera: expected azimuth, elevation and distance, as 20,35,220");
-	job->camera[0] = cli_number("camera", items[0], -360, 360);
-	job->camera[1] = cli_number("camera", items[1], -89, 89);
-	job->camera[2] = cli_number("camera", items[2], 1, 1e5);
+			"--viewpoint: expected azimuth, elevation and distance, as 20,35,220");
+	job->camera[0] = cli_number("viewpoint", items[0], -360, 360);
+	job->camera[1] = cli_number("viewpoint", items[1], -89, 89);
+	job->camera[2] = cli_number("viewpoint", items[2], 1, 1e5);
 	job->has_camera = true;
 }
 
@@ -81,7 +81,7 @@ static const struct cli_option options[] = {
 	 CLI_INTEGER(struct view_job, output.fps, 1, 240)},
 	{0, "duration", "TIME", "end after this time",
 	 CLI_DURATION(struct view_job, duration_s, 0.01, 86400)},
-	{0, "camera", "A,E,D", "azimuth and elevation in degrees, distance in mm",
+	{0, "viewpoint", "A,E,D", "azimuth and elevation in degrees, distance in mm",
 	 CLI_PARSED_BY(parse_camera)},
 	{0, "no-panel", NULL, "the tissue alone, without graphs",
 	 CLI_FLAG(struct view_job, no_panel)},

@@ -78,7 +78,7 @@ pid_t start(const struct round *round, const char *rig, const char *duration)
 	}
 	if (round->camera) {
 		arguments[n++] = "--camera";
-		arguments[n++] = "pictures";
+		arguments[n++] = "frames";
 	}
 	execv(program, (char *const *)arguments);
 	_exit(127);

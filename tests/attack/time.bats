@@ -63,7 +63,7 @@ pictures_can_be_recorded() {
 stalled_capture() {
 	local camera=off
 	echo "sim = { camera_hz = $1; };" >>rig.conf
-	! pictures_can_be_recorded || camera=pictures
+	! pictures_can_be_recorded || camera=frames
 	LD_PRELOAD=$INCISE_BUILD/tests/attack/stall.so run --separate-stderr incise capture \
 		-o a.rec --camera $camera --duration 6s --json
 	echo "$output" >report.json

@@ -245,7 +245,7 @@ rig() { # ARGUMENTS
 	incise stepper status --json >s.json
 	[ "$(key s.json cause)" = "over-voltage (3210h): see the supply, then clear" ]
 	[ "$(key s.json 'faults[1].fault')" = lost ]
-	run -0 --separate-stderr incise stepper status --follow --for 0.1s
+	run -0 --separate-stderr incise stepper status --follow --duration 0.1s
 	[[ "$output" == *"; over-voltage (3210h): see the supply, then clear" ]]
 	run --separate-stderr incise stepper move 1
 	failed_with "move: drive faulty stopped at " ": over-voltage (3210h): see the supply, then clear"

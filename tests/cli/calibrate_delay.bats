@@ -13,7 +13,7 @@ setup() {
 @test "a tracker's delay that is wrong by 4 ms is found" {
 	for latency in 4.2 11; do
 		echo 'tracker_delay_ms = 1.5;' >calibration.conf
-		incise calibrate delay --rig $rig,tracker_latency_ms=$latency --time 15s \
+		incise calibrate delay --rig $rig,tracker_latency_ms=$latency --duration 15s \
 			--report rep --overwrite --json >r.json </dev/null
 		left=$(key r.json 'values[0].left')
 		u=$(key r.json 'values[0].u')
@@ -30,11 +30,11 @@ setup() {
 }
 
 @test "the camera too, and any of them is the reference" {
-	incise calibrate delay --rig $rig --time 12s --camera --keep k.rec --json --dry-run >r.json </dev/null
+	incise calibrate delay --rig $rig --duration 12s --with-camera --keep k.rec --json --dry-run >r.json </dev/null
 	[ ! -e calibration.conf ]
 	holds "($(key r.json 'values[2].left'))^2 < 0.3^2"
 	[ "$(key r.json 'values[2].key')" = camera_delay_ms ]
-	incise calibrate delay --from k.rec --reference camera --dry-run --json >c.json
+	incise calibrate delay --from k.rec --reference-stream camera --dry-run --json >c.json
 	[ "$(key c.json 'values[0].key')" = force_delay_ms ]
 	[ "$(key c.json 'values[2].key')" = tracker_delay_ms ]
 	holds "($(key c.json 'values[0].left'))^2 < 0.3^2"
@@ -42,21 +42,21 @@ setup() {
 }
 
 @test "what cannot tell a delay is refused, and nothing is changed" {
-	run --separate-stderr incise calibrate delay --rig sim:clock=simulated --time 20s </dev/null
+	run --separate-stderr incise calibrate delay --rig sim:clock=simulated --duration 20s </dev/null
 	failed_with "too little alike"
 	run --separate-stderr incise calibrate delay --rig $rig,tracker_latency_ms=250 \
-		--range 50 --time 12s -c late.conf </dev/null
+		--max-delay 50 --duration 12s -c late.conf </dev/null
 	[ "$status" -eq 0 ] # the device says itself that it is late
 	echo 'tracker_delay_ms = 0.0;' >zero.conf
 	run --separate-stderr incise calibrate delay --rig $rig,tracker_latency_ms=70 \
-		--range 50 --time 12s -c zero.conf </dev/null
+		--max-delay 50 --duration 12s -c zero.conf </dev/null
 	[ "$status" -eq 1 ]
 	[ "$(cat zero.conf)" = 'tracker_delay_ms = 0.0;' ]
 	incise capture -o short.rec --rig $rig --duration 5s
 	run --separate-stderr incise calibrate delay --from short.rec
 	failed_with "in common"
 	run --separate-stderr incise calibrate delay --rig $rig </dev/null
-	bad_usage "--time or --from"
+	bad_usage "--duration or --from"
 	run --separate-stderr incise calibrate delay --from none.rec
 	failed_with "none.rec"
 	[ ! -e calibration.conf ]

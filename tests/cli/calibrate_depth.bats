@@ -76,7 +76,7 @@ pairs() {
 
 @test "two points by vision on the virtual rig" {
 	need_vision
-	run -0 --separate-stderr incise calibrate depth two-point --rig rig.conf --pictures 40 \
+	run -0 --separate-stderr incise calibrate depth two-point --rig rig.conf --images 40 \
 		--keep kept.csv --json </dev/null
 	[ -z "$stderr" ]
 	echo "$output" >report.json
@@ -90,7 +90,7 @@ pairs() {
 	echo "$output" >again.json
 	holds "($(key again.json depth_mm_px) - $(key report.json depth_mm_px))^2 < 1e-16"
 	# thresholds that fit go to rig.conf
-	run -0 incise calibrate depth two-point --rig rig.conf --pictures 5 --dry-run </dev/null
+	run -0 incise calibrate depth two-point --rig rig.conf --images 5 --dry-run </dev/null
 	[[ "$output" == *"for rig.conf:"*"value = ["*"full_px = 365."* ]]
 }
 
@@ -250,7 +250,7 @@ pairs() {
 	usage "how? two-point, line or board"
 	usage "three-point" three-point
 	usage "without a terminal" two-point </dev/null
-	usage "without a terminal" board --pictures 5 </dev/null
+	usage "without a terminal" board --images 5 </dev/null
 	usage "--from pairs.csv" line
 	usage "pictures follow --from" two-point a.png
 	usage "--length" two-point --length 47.5kg --pixels 400

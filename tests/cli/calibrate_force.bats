@@ -84,7 +84,7 @@ made_weights() {
 
 @test "saturated readings are left out and named" {
 	made_weights "if (r > 3000) r = 3000" >w.csv
-	for range in "" "--range 0,3000"; do
+	for range in "" "--input-range 0,3000"; do
 		# shellcheck disable=SC2086
 		run -0 incise calibrate force --from w.csv --dry-run $range
 		[[ "$output" == *"8 saturated, 0 outliers"* ]]
@@ -92,7 +92,7 @@ made_weights() {
 	done
 	# a rig whose converter ends at 3.89 N: 400 g are beyond
 	run -0 --separate-stderr incise calibrate force --rig sim:clock=simulated --dry-run \
-		--weights 100g,200g,300g,400g --time 500ms </dev/null
+		--weights 100g,200g,300g,400g --duration 500ms </dev/null
 	[[ "$output" == *"3 saturated"* ]]
 }
 
@@ -146,7 +146,7 @@ made_weights() {
 	bad_usage "2 weights or more beside the empty pan"
 	run --separate-stderr incise calibrate force --rig sim: --weights 100g,100g,50g
 	bad_usage "100 g is there twice"
-	run --separate-stderr incise calibrate force --range 5,1
+	run --separate-stderr incise calibrate force --input-range 5,1
 	bad_usage "the first is to be the lower one"
 	run --separate-stderr incise calibrate force extra
 	bad_usage "'extra' is too much"

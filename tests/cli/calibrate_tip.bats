@@ -20,7 +20,7 @@ within() {
 }
 
 @test "the tip of the virtual rig is found, with its uncertainty, and kept" {
-	incise calibrate tip --rig $rig --time 20s --keep p.csv --report rep --json >r.json </dev/null
+	incise calibrate tip --rig $rig --duration 20s --keep p.csv --report rep --json >r.json </dev/null
 	within 0 3
 	within 1 -20
 	within 2 60
@@ -43,7 +43,7 @@ within() {
 }
 
 @test "capture, and the loop, take the calibrated tip" {
-	incise calibrate tip --rig $rig --time 20s </dev/null
+	incise calibrate tip --rig $rig --duration 20s </dev/null
 	cut=${rig/motion=1/motion=0}
 	incise capture -o a.rec --rig "$cut" --duration 4s -c calibration.conf
 	incise capture -o b.rec --rig sim:clock=simulated --duration 4s
@@ -73,11 +73,11 @@ within() {
 }
 
 @test "what cannot tell the tip is refused, and nothing is changed" {
-	run --separate-stderr incise calibrate tip --rig "$rig,cone_deg=40" --time 10s </dev/null
+	run --separate-stderr incise calibrate tip --rig "$rig,cone_deg=40" --duration 10s </dev/null
 	failed_with "a cone of" "60 are needed"
-	run --separate-stderr incise calibrate tip --rig sim:clock=simulated --time 10s </dev/null
+	run --separate-stderr incise calibrate tip --rig sim:clock=simulated --duration 10s </dev/null
 	failed_with "one axis only"
-	incise calibrate tip --rig $rig --time 10s --keep p.csv --dry-run </dev/null
+	incise calibrate tip --rig $rig --duration 10s --keep p.csv --dry-run </dev/null
 	head -n 10 p.csv >few.csv
 	run --separate-stderr incise calibrate tip --from few.csv
 	failed_with "too few"
@@ -98,7 +98,7 @@ within() {
 	failed_with "no column 'qz'"
 	[ ! -e calibration.conf ]
 	run --separate-stderr incise calibrate tip --rig $rig </dev/null
-	bad_usage "--time or --from"
+	bad_usage "--duration or --from"
 	# every tenth pose is wrong: found, listed, left out
 	awk -F, -v OFS=, 'NR % 10 == 5 { $3 += 2 } { print }' p.csv >outliers.csv
 	incise calibrate tip --from outliers.csv --json >r.json

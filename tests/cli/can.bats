@@ -160,7 +160,7 @@ ended() {
 	[[ "$output" == *"now at 5.0000 mm"* ]]
 	drive_is "switch-on disabled"
 	[ "$(drive_value shaft)" -eq 64000 ]
-	run -0 --separate-stderr incise stepper jog 10 --for 200ms --rig rig.conf
+	run -0 --separate-stderr incise stepper jog 10 --duration 200ms --rig rig.conf
 	drive_is "switch-on disabled"
 	holds "$(drive_value shaft) > 64000 + 12800 && $(drive_value shaft) < 64000 + 4 * 12800"
 	run -0 --separate-stderr incise stepper home --rig rig.conf
@@ -170,7 +170,7 @@ ended() {
 	run -0 --separate-stderr incise stepper move 2 --rig rig.conf
 	drive_is "switch-on disabled"
 	[ "$(drive_value position)" -eq 25600 ]
-	run -0 --separate-stderr incise stepper enable --for 300ms --rig rig.conf
+	run -0 --separate-stderr incise stepper enable --duration 300ms --rig rig.conf
 	drive_is "switch-on disabled"
 }
 
@@ -184,7 +184,7 @@ ended() {
 			# What ends at Ctrl-C is given an end, and ten times take long.
 			command=${command/--repeat 10/--repeat 2}
 			case $command in
-			*" enable" | *" --follow") command+=" --for 300ms" ;;
+			*" enable" | *" --follow") command+=" --duration 300ms" ;;
 			esac
 			read -ra words <<<"$command"
 			# As in begin(): a drive that the machine held up is another matter.
@@ -237,7 +237,7 @@ under() {
 	)
 	for fault in "${faults[@]}"; do
 		rig --homed
-		{ under stepper enable --for 20s -- "${fault%|*}" && ended "${fault#*|}"; } ||
+		{ under stepper enable --duration 20s -- "${fault%|*}" && ended "${fault#*|}"; } ||
 			failed+=" ${fault%|*};"
 		drive_end
 	done
@@ -277,7 +277,7 @@ under() {
 
 @test "what is no frame, is cut off or belongs to others is counted, and nothing else" {
 	rig --homed
-	begin stepper enable --for 1s --rig rig.conf
+	begin stepper enable --duration 1s --rig rig.conf
 	for line in 74 7431 743138 7431383038313233340d 743139303646460d ffffff0d 0d 07 7a0d \
 		5439393939393939393830313032303330343035303630373038300d; do
 		drive_tell raw $line
@@ -314,29 +314,29 @@ under() {
 @test "a fault is cleared by a person, and only when its cause is gone" {
 	rig --homed
 	drive_tell fault 0x4210 stays
-	run --separate-stderr incise stepper enable --for 100ms --rig rig.conf
+	run --separate-stderr incise stepper enable --duration 100ms --rig rig.conf
 	failed_with "4210h"
 	run --separate-stderr incise stepper clear --rig rig.conf
 	failed_with "4210h"
 	drive_is fault
 	drive_tell calm
-	run --separate-stderr incise stepper enable --for 100ms --rig rig.conf
+	run --separate-stderr incise stepper enable --duration 100ms --rig rig.conf
 	failed_with "clear"
 	drive_is fault
 	run -0 --separate-stderr incise stepper clear --rig rig.conf
 	drive_is "switch-on disabled"
-	run -0 --separate-stderr incise stepper enable --for 100ms --rig rig.conf
+	run -0 --separate-stderr incise stepper enable --duration 100ms --rig rig.conf
 }
 
 @test "a drive that another master left in NMT stopped is fetched from there" {
 	rig --homed
 	drive_tell nmt 4
-	run -0 --separate-stderr incise stepper enable --for 100ms --rig rig.conf
+	run -0 --separate-stderr incise stepper enable --duration 100ms --rig rig.conf
 }
 
 @test "what is printed to a stream that was closed goes nowhere, and least of all onto the bus" {
 	rig --homed
-	run -1 --separate-stderr bash -c "incise stepper enable --for 100ms --rig rig.conf >&-"
+	run -1 --separate-stderr bash -c "incise stepper enable --duration 100ms --rig rig.conf >&-"
 	[[ "$stderr" == "incise stepper: standard output: "* ]]
 	drive_is "switch-on disabled"
 	drive_tell report
@@ -345,7 +345,7 @@ under() {
 
 @test "one program drives it; who looks meanwhile is told or shown" {
 	rig --homed
-	begin stepper enable --for 20s --rig rig.conf
+	begin stepper enable --duration 20s --rig rig.conf
 	run --separate-stderr incise stepper move 1 --rig rig.conf
 	failed_with "another program"
 	run --separate-stderr incise info "$drive"
@@ -479,7 +479,7 @@ frozen() {
 
 @test "kill -STOP: a drive that ignores a lost master is not moved on either" {
 	local verb deadman_ms=1000 freeze_s=3.5 # long: nothing is said here about a busy machine
-	for verb in "move 25" "jog 2" "enable --for 3s" "enable"; do
+	for verb in "move 25" "jog 2" "enable --duration 3s" "enable"; do
 		rig --homed
 		# It shall not be there before it is stopped.
 		sed -i 's/velocity_mm_s = 30.0/velocity_mm_s = 3.0/; s/home_mm_s = 20.0/home_mm_s = 2.0/' rig.conf
@@ -529,7 +529,7 @@ frozen() {
 	local failed= place how
 	local silent="0x1000:0 0x1016:1 0x1400:1 0x1A00:2 0x6007:0 0x6040:0 0x6041:0 0x6060:0"
 	rig --homed
-	run -0 --separate-stderr incise stepper enable --for 100ms --rig rig.conf
+	run -0 --separate-stderr incise stepper enable --duration 100ms --rig rig.conf
 	drive_tell objects
 	printf '%s\n' "$drive_line" | grep -o '"written": \[[^]]*\]' | grep -o '0x[0-9A-F]*:[0-9]*' >written
 	printf '%s\n' "$drive_line" | grep -o '"read": \[[^]]*\]' | grep -o '0x[0-9A-F]*:[0-9]*' >read
@@ -543,7 +543,7 @@ frozen() {
 			for try in 1 2 3; do
 				drive_tell restart
 				code=0
-				timeout 60 incise stepper enable --for 50ms --rig rig.conf >out 2>err 3>&- 7>&- || code=$?
+				timeout 60 incise stepper enable --duration 50ms --rig rig.conf >out 2>err 3>&- 7>&- || code=$?
 				[ "$how" = abort ] && grep -q "no answer when" err || break
 			done
 			drive_stopped || failed+=" $how $place (power);"
@@ -576,7 +576,7 @@ frozen() {
 		write_rig
 		drive_tell ignore "${place%:*}" "${place#*:}"
 		code=0
-		timeout 60 incise stepper enable --for 50ms --rig rig.conf >out 2>err 3>&- 7>&- || code=$?
+		timeout 60 incise stepper enable --duration 50ms --rig rig.conf >out 2>err 3>&- 7>&- || code=$?
 		echo "# $place: $code $(cat err)"
 		[ $code -eq 1 ] || failed+=" $place;"
 		drive_tell report
@@ -589,7 +589,7 @@ frozen() {
 	rig --homed
 	for ((i = 0; i < 3; i++)); do
 		drive_tell restart
-		run -0 --separate-stderr incise stepper enable --for 100ms --rig rig.conf
+		run -0 --separate-stderr incise stepper enable --duration 100ms --rig rig.conf
 		drive_tell report
 		echo "# $(drive_value start_ms) ms" >&3
 		[ "$(drive_value start_ms)" != null ]

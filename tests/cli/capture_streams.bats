@@ -51,7 +51,7 @@ END
 	[ "$(ask a.rec "SELECT count(*) FROM streams WHERE name IN ('force', 'tracker')")" = 2 ]
 	[ "$(ask a.rec "SELECT count(*) FROM streams")" = 2 ]
 	[ ! -e a.rec/camera.mkv ]
-	incise capture -o b.rec --rig $quick --duration 1s --camera pictures >out
+	incise capture -o b.rec --rig $quick --duration 1s --camera frames >out
 	grep -Eq '^b.rec: .* 5[01] pictures, 0 lost' out
 	[ "$(ask b.rec "SELECT rows = (SELECT count(*) FROM frames) FROM streams WHERE name =
 		'camera'")" = 1 ]
@@ -96,7 +96,7 @@ END
 
 @test "a camera that is not there, and a wish that is none" {
 	printf 'clock = "simulated"; tracker = "sim:"; force = "sim:";\n' >rig.conf
-	run -1 --separate-stderr incise capture -o a.rec --duration 1s --camera pictures
+	run -1 --separate-stderr incise capture -o a.rec --duration 1s --camera frames
 	[[ "$stderr" == *"camera: not named, but needed"* ]]
 	incise capture -o a.rec --duration 600ms
 	for wrong in "--camera on" "--trigger 0N" "--trigger knob" "--trigger -1N"; do

@@ -20,7 +20,7 @@ setup() {
 
 @test "a compiled model is within its bound of double" {
 	for kind in direct table force; do
-		incise compile m.fis -o m.fx --overwrite --arith $kind --budget 1mN --json >r.json
+		incise compile m.fis -o m.fx --overwrite --method $kind --budget 1mN --json >r.json
 		[ "$(key r.json arithmetic)" = $kind ]
 		incise eval m.fis --grid 97x89 >double
 		awk 'NF { print $1, $2 }' double >points
@@ -102,7 +102,7 @@ setup() {
 }
 
 @test "compile: bad usage" {
-	for args in "" "m.fis" "m.fis -o" "m.fis -o x.fx --arith float" "m.fis -o x.fx --cells 0" \
+	for args in "" "m.fis" "m.fis -o" "m.fis -o x.fx --method float" "m.fis -o x.fx --cells 0" \
 		"m.fis -o x.fx --budget 0.1kN" "m.fis -o x.fx --budget -1" "m.fis m.fis -o x.fx" \
 		"m.fis -o - --json" "m.fis -o x.fx --cells 5000"; do
 		run -2 --separate-stderr incise compile $args

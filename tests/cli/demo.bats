@@ -7,7 +7,7 @@ setup_file() {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the pictures"
 	cd "$BATS_FILE_TMPDIR"
 	# from a folder of its own, into one whose name is awkward
-	incise demo -o "my demo's" --loop 3s --seed 3 >printed 2>warned
+	incise demo --report "my demo's" --duration 3s --seed 3 >printed 2>warned
 }
 
 setup() {
@@ -93,7 +93,7 @@ pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-latenes
 
 @test "demo does not write into a folder that exists" {
 	before=$(sha256sum <"$demo/summary.json")
-	run --separate-stderr incise demo -o "$demo" --loop 1s
+	run --separate-stderr incise demo --report "$demo" --duration 1s
 	failed_with "my demo's" "File exists" --overwrite
 	[ -z "$output" ]
 	[ "$(sha256sum <"$demo/summary.json")" = "$before" ]
@@ -103,7 +103,7 @@ pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-latenes
 # demo catches it.
 interrupted_in() {
 	local group pid mask
-	env --default-signal=INT setsid incise demo -o part --loop 1h >out 2>err 3>&- &
+	env --default-signal=INT setsid incise demo --report part --duration 1h >out 2>err 3>&- &
 	group=$!
 	for ((i = 0; i < 6000; i++)); do
 		pid=$(awk -v group=$group -v name="(incise-$1)" '$5 == group && $2 == name { print $1 }' \
@@ -129,34 +129,34 @@ interrupted_in() {
 	interrupted_in capture
 	# A folder of something else is none of its own, and one that is whole is no part.
 	mkdir other
-	run --separate-stderr incise demo -o other
+	run --separate-stderr incise demo --report other
 	failed_with other "File exists"
 	[ ! -e "$demo/.unfinished" ]
 }
 
 @test "demo without gnuplot says what to install, and leaves nothing" {
 	mkdir empty
-	run --separate-stderr env PATH="$PWD/empty" "$INCISE_BUILD/bin/incise" demo -o x
+	run --separate-stderr env PATH="$PWD/empty" "$INCISE_BUILD/bin/incise" demo --report x
 	failed_with gnuplot-nox
 	[ ! -e x ]
 }
 
 @test "demo where it cannot write" {
-	run --separate-stderr incise demo -o no/such/folder
+	run --separate-stderr incise demo --report no/such/folder
 	failed_with no/such/folder "No such file"
 	touch file
-	run --separate-stderr incise demo -o file
+	run --separate-stderr incise demo --report file
 	failed_with file
-	run --separate-stderr incise demo -o file --overwrite
+	run --separate-stderr incise demo --report file --overwrite
 	failed_with file
 }
 
 @test "demo: bad usage" {
 	run --separate-stderr incise demo somewhere
 	bad_usage "'somewhere'"
-	for wrong in "--loop 1ms" "--loop long" "--seed -1" "--seed x"; do
+	for wrong in "--duration 1ms" "--duration long" "--seed -1" "--seed x"; do
 		# shellcheck disable=SC2086
-		run --separate-stderr incise demo -o x $wrong
+		run --separate-stderr incise demo --report x $wrong
 		bad_usage "${wrong%% *}"
 	done
 	[ ! -e x ]

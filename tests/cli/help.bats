@@ -105,9 +105,9 @@ options_of_page() {
 
 @test "an option without its argument, and with one it does not take" {
 	run --separate-stderr incise train --mf
-	bad_usage "--mf needs an argument"
+	bad_usage "--mf: the argument N,M is missing"
 	run --separate-stderr incise train d.csv -o
-	bad_usage "-o needs an argument"
+	bad_usage "-o: the argument FILE is missing"
 	run --separate-stderr incise train --json=yes
-	bad_usage "--json=yes"
+	bad_usage "--json: this option takes no argument"
 }

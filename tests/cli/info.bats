@@ -81,7 +81,7 @@ setup() {
 
 @test "info of a compiled model" {
 	for kind in direct table force; do
-		incise compile m.fis -o m.fx --overwrite --arith $kind --budget 10mN --json >c.json
+		incise compile m.fis -o m.fx --overwrite --method $kind --budget 10mN --json >c.json
 		run -0 --separate-stderr incise info m.fx
 		[ -z "$stderr" ]
 		[ "${lines[0]}" = "compiled model incise: 20 rules, 2 inputs, output force_N" ]

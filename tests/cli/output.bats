@@ -16,7 +16,7 @@ setup_file() {
 		'surface = { kind = "mesh"; file = "s.obj"; };' >m.scene
 	printf '%s\n' 'v -50 -50 0' 'v 50 -50 0' 'v 50 50 0' 'v -50 50 0' 'f 1 2 3' 'f 1 3 4' >s.obj
 	incise calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g \
-		--series 3 --time 200ms -c calibration.conf --keep forces.csv >/dev/null
+		--series 3 --duration 200ms -c calibration.conf --keep forces.csv >/dev/null
 	cat >rig.conf <<-END
 		tracker = "sim"; force = "sim"; camera = "sim"; stepper = "sim";
 	END
@@ -60,7 +60,7 @@ spares_inputs() {
 	spares_inputs export d.rec -o d.rec/recording.db
 	spares_inputs export d.rec -o calibration.conf -c calibration.conf
 	for path in d.rec/recording.db m.scene m.fis s.obj calibration.conf; do
-		spares_inputs replay d.rec m.scene -c calibration.conf --csv $path
+		spares_inputs replay d.rec m.scene -c calibration.conf --log $path
 	done
 	for path in m.scene m.fis s.obj calibration.conf; do
 		spares_inputs haptic m.scene --rig $quick --duration 100ms -c calibration.conf --log $path
@@ -77,7 +77,7 @@ spares_inputs() {
 	for path in d.rec/new.csv link.rec/new.csv d.rec/../d.rec/new.csv d.rec/plot/new.csv; do
 		spares_inputs export d.rec -o $path
 		spares_inputs export link.rec -o $path
-		spares_inputs replay d.rec m.scene --csv $path
+		spares_inputs replay d.rec m.scene --log $path
 	done
 	ln -s d.rec/recording.db into.csv
 	spares_inputs export d.rec -o into.csv
@@ -145,25 +145,25 @@ replaces_when_told() {
 	replaces_when_told b.fis.sd train pairs.csv -o b.fis --epochs 2
 	replaces_when_told c.initial train pairs.csv -o c.fis --epochs 2 --initial c.initial
 	replaces_when_told d.history train pairs.csv -o d.fis --epochs 2 --history d.history
-	replaces_when_told r.csv replay d.rec liver.scene --csv r.csv
+	replaces_when_told r.csv replay d.rec liver.scene --log r.csv
 	replaces_when_told l.csv haptic liver.scene --rig $quick --duration 100ms --log l.csv
 	replaces_when_told k.csv calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g \
-		--series 3 --time 200ms -c k.conf --keep k.csv
+		--series 3 --duration 200ms -c k.conf --keep k.csv
 	replaces_when_told report/report.txt calibrate force --from forces.csv -c k.conf --report report
 	replaces_when_told report2/report.json calibrate force --from forces.csv -c k.conf --report report2
 }
 
 @test "a kept recording is replaced with --overwrite only, and by a whole one" {
 	delay="calibrate delay --rig sim:clock=simulated,motion=2 -c k.conf --keep k.rec"
-	incise $delay --time 12s >/dev/null </dev/null
+	incise $delay --duration 12s >/dev/null </dev/null
 	before=$(content)
-	run --separate-stderr incise $delay --time 12s </dev/null
+	run --separate-stderr incise $delay --duration 12s </dev/null
 	failed_with k.rec "exists already" "--overwrite"
-	run --separate-stderr incise $delay --rig none.conf --time 12s --overwrite </dev/null
+	run --separate-stderr incise $delay --rig none.conf --duration 12s --overwrite </dev/null
 	failed_with none.conf
 	incise verify k.rec >/dev/null
 	[ "$(content)" = "$before" ] || complain "$(content)"
-	incise $delay --time 13s --overwrite >/dev/null </dev/null
+	incise $delay --duration 13s --overwrite >/dev/null </dev/null
 	[ "$(content)" != "$before" ]
 	incise verify k.rec >/dev/null
 	# nothing is left beside it, and what is no recording stays

@@ -33,9 +33,9 @@ teardown() {
 }
 
 @test "forces are the same from run to run and at both speeds" {
-	incise replay liver.rec liver.scene --csv a.csv | tail -n 1 >a
-	incise replay liver.rec liver.scene --csv b.csv | tail -n 1 >b
-	incise replay liver.rec liver.scene --csv c.csv --real-time >report
+	incise replay liver.rec liver.scene --log a.csv | tail -n 1 >a
+	incise replay liver.rec liver.scene --log b.csv | tail -n 1 >b
+	incise replay liver.rec liver.scene --log c.csv --real-time >report
 	tail -n 1 report >c
 	cmp a.csv b.csv
 	cmp a.csv c.csv
@@ -46,7 +46,7 @@ teardown() {
 	# and others where they must be
 	incise replay liver.rec liver.scene --arith double | tail -n 1 >d
 	run ! cmp -s a d
-	incise replay liver.rec liver.scene --at acquisition | tail -n 1 >e
+	incise replay liver.rec liver.scene --poses acquisition | tail -n 1 >e
 	run ! cmp -s a e
 }
 
@@ -58,7 +58,7 @@ teardown() {
 
 @test "what is predicted is what the live loop does on the same poses" {
 	incise haptic liver.scene --rig $quick --duration 3s --log live.csv >/dev/null
-	incise replay liver.rec liver.scene --csv replay.csv >/dev/null
+	incise replay liver.rec liver.scene --log replay.csv >/dev/null
 	# the log begins with the first tick, as the recording's ticks do; it is rounded to 0.01 mN
 	paste -d, <(sed 1d live.csv) <(sed 1d replay.csv) | head -n 2999 | awk -F, '
 		{ e = $13 - $19; if (e < 0) e = -e; if (e > 0.6e-5 || $9 != $22) { print; exit 1 }
@@ -67,7 +67,7 @@ teardown() {
 }
 
 @test "the table has every tick, and the report is the table's" {
-	incise replay liver.rec liver.scene --csv t.csv --json >r.json
+	incise replay liver.rec liver.scene --log t.csv --json >r.json
 	[ "$(head -n 1 t.csv)" = \
 		t_s,cut,depth_mm,velocity_mm_s,predicted_N,measured_N,clipped,flags ]
 	[ "$(key r.json ticks)" = "$(($(wc -l <t.csv) - 1))" ]
@@ -95,7 +95,7 @@ teardown() {
 }
 
 @test "measured forces and cuts are those of the export" {
-	incise replay liver.rec liver.scene --csv t.csv >/dev/null
+	incise replay liver.rec liver.scene --log t.csv >/dev/null
 	incise export liver.rec -o e.csv >/dev/null
 	# the samples of a cut, in the millisecond around each tick that lies inside of it
 	awk -F, 'NR == FNR { if (FNR > 1) { k = int($2 * 1000 + 0.5 + 1e-7); s[k] += $5; n[k]++ } next }
@@ -107,18 +107,18 @@ teardown() {
 }
 
 @test "the table to standard output" {
-	run -0 --separate-stderr incise replay liver.rec liver.scene --csv -
+	run -0 --separate-stderr incise replay liver.rec liver.scene --log -
 	[ -z "$stderr" ]
 	[ "${#lines[@]}" -eq 3000 ]
 	[[ "${lines[0]}" == t_s,* ]]
-	run --separate-stderr incise replay liver.rec liver.scene --csv - --json
+	run --separate-stderr incise replay liver.rec liver.scene --log - --json
 	bad_usage "standard output"
 }
 
 @test "another calibration, model and tool" {
 	echo 'force_mV_N = 620.0;' >half.conf
-	incise replay liver.rec liver.scene --csv a.csv >/dev/null
-	incise replay liver.rec liver.scene --csv b.csv -c half.conf >/dev/null
+	incise replay liver.rec liver.scene --log a.csv >/dev/null
+	incise replay liver.rec liver.scene --log b.csv -c half.conf >/dev/null
 	# half the sensitivity: twice the force; six decimals
 	paste -d, a.csv b.csv | awk -F, 'NR > 1 { e = 2 * $6 - $14; if (e * e > 9e-12) exit 1 }
 		NR > 1 && $5 != $13 { exit 1 }'
@@ -144,7 +144,7 @@ teardown() {
 
 @test "a signal ends it, and leaves an older file as it was" {
 	echo old >t.csv
-	incise replay liver.rec liver.scene --real-time --csv t.csv --overwrite >out 2>err &
+	incise replay liver.rec liver.scene --real-time --log t.csv --overwrite >out 2>err &
 	pid=$!
 	# before it is the replay it is a shell
 	for ((i = 0; i < 100; i++)); do
@@ -166,14 +166,14 @@ teardown() {
 }
 
 @test "what cannot be replayed" {
-	run --separate-stderr incise replay none.rec liver.scene --csv t.csv
+	run --separate-stderr incise replay none.rec liver.scene --log t.csv
 	failed_with none.rec "no such recording"
-	run --separate-stderr incise replay liver.rec none.scene --csv t.csv
+	run --separate-stderr incise replay liver.rec none.scene --log t.csv
 	failed_with none.scene
-	run --separate-stderr incise replay liver.rec liver.scene --csv no/folder/t.csv
+	run --separate-stderr incise replay liver.rec liver.scene --log no/folder/t.csv
 	failed_with no/folder
 	sqlite3 liver.rec/recording.db "UPDATE tracker SET x_mm = 'far' WHERE seq = 100"
-	run --separate-stderr incise replay liver.rec liver.scene --csv t.csv
+	run --separate-stderr incise replay liver.rec liver.scene --log t.csv
 	failed_with liver.rec "damaged" "row 100"
 	[ ! -e t.csv ]
 	sqlite3 liver.rec/recording.db "DELETE FROM tracker;
@@ -183,7 +183,7 @@ teardown() {
 }
 
 @test "a full disk" {
-	run --separate-stderr incise replay liver.rec liver.scene --csv /dev/full
+	run --separate-stderr incise replay liver.rec liver.scene --log /dev/full
 	failed_with /dev/full
 }
 
@@ -194,7 +194,7 @@ teardown() {
 	bad_usage "got 1"
 	run --separate-stderr incise replay liver.rec liver.scene more
 	bad_usage "got 3"
-	run --separate-stderr incise replay liver.rec liver.scene --at dawn
+	run --separate-stderr incise replay liver.rec liver.scene --poses dawn
 	bad_usage dawn
 	run --separate-stderr incise replay liver.rec liver.scene --tool spoon
 	bad_usage spoon

@@ -42,10 +42,10 @@ until_it_says() {
 }
 
 @test "status --follow prints what changes, as text or as a line of JSON" {
-	run -0 --separate-stderr incise stepper status --follow --for 1s --rig $quick
+	run -0 --separate-stderr incise stepper status --follow --duration 1s --rig $quick
 	[ "${#lines[@]}" -eq 1 ] # nothing does
 	[[ "$output" == "0.000 s  ready at 0.0000 mm, 0.000 mm/s, homed; inputs none" ]]
-	incise stepper status -f --for 1s --json --rig $quick >s.json
+	incise stepper status -f --duration 1s --json --rig $quick >s.json
 	[ "$(wc -l <s.json)" -eq 1 ]
 	[ "$(key s.json state)" = ready ]
 }
@@ -87,16 +87,16 @@ until_it_says() {
 }
 
 @test "move --hold stays there" {
-	run -0 --separate-stderr incise stepper move 2 --hold --for 3s --rig $quick
+	run -0 --separate-stderr incise stepper move 2 --hold --duration 3s --rig $quick
 	[[ "$output" == "moved 2.0000 mm "* ]]
 	[ "${#lines[@]}" -eq 1 ]
 }
 
 @test "enable holds it and says how long" {
-	run -0 --separate-stderr incise stepper enable --for 2s --rig $quick
+	run -0 --separate-stderr incise stepper enable --duration 2s --rig $quick
 	[ -z "$stderr" ]
 	[[ "$output" == "powered, held at 0.0000 mm; Ctrl-C disables it, "*"100 ms" ]]
-	incise stepper enable --for 2s --rig $quick --json >e.json
+	incise stepper enable --duration 2s --rig $quick --json >e.json
 	# that time passed, and the deadman saw targets all the while
 	holds "$(key e.json t_ns) >= 3e9 && $(key e.json t_ns) < 3.1e9"
 	[ "$(key e.json faults)" = '[]' ]
@@ -155,9 +155,9 @@ until_it_says() {
 	touch reader
 	run -1 --separate-stderr bash -c "set -o pipefail
 		{ while [ -e reader ]; do sleep 0.1; done
-			sleep 0.1; incise stepper move 1 --hold --for 9s --rig $quick; } | rm reader"
+			sleep 0.1; incise stepper move 1 --hold --duration 9s --rig $quick; } | rm reader"
 	[ -z "$stderr" ]
-	run --separate-stderr bash -c "incise stepper enable --for 1s --rig $quick >/dev/full"
+	run --separate-stderr bash -c "incise stepper enable --duration 1s --rig $quick >/dev/full"
 	failed_with "standard output: "
 }
 
@@ -215,14 +215,14 @@ until_it_says() {
 	run --separate-stderr incise stepper jog -x --rig $quick
 	bad_usage "-x"
 	for wrong in "status --by" "enable --hold" "move 1 --repeat 2" "home --unhomed" \
-		"clear --follow" "disable --for 1s"; do
+		"clear --follow" "disable --duration 1s"; do
 		# shellcheck disable=SC2086
 		run --separate-stderr incise stepper $wrong --rig $quick
 		bad_usage "${wrong%% *} does not take --"
 	done
-	run --separate-stderr incise stepper move 1 --for 1s --rig $quick
+	run --separate-stderr incise stepper move 1 --duration 1s --rig $quick
 	bad_usage "add --hold"
-	run --separate-stderr incise stepper status --for 1s --rig $quick
+	run --separate-stderr incise stepper status --duration 1s --rig $quick
 	bad_usage "add --follow"
 	run --separate-stderr incise stepper move 1 --by --unhomed --rig $quick
 	bad_usage "--by needs no --unhomed"

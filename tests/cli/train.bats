@@ -156,14 +156,14 @@ refuses() {
 
 @test "train takes other columns, shapes and kinds" {
 	sed '1s/.*/cut,a,b,torque_mNm/' pairs.csv >other.csv
-	incise train other.csv --inputs b,a --output torque_mNm --mf 2,3 --mf-type gbellmf \
+	incise train other.csv --inputs b,a --target torque_mNm --mf 2,3 --mf-type gbellmf \
 		-o m.fis --json >r.json 2>/dev/null
 	[ "$(key r.json rules)" = 6 ]
 	holds "$(key r.json train.rmse_mNm) > 0"
 	holds "$(key r.json train.mse_mNm2) > 0"
 	[ "$(grep -c gbellmf m.fis)" -eq 5 ]
 	[ "$(sed -n "s/^Name='\(.*\)'/\1/p" m.fis | tail -n 3 | tr '\n' ' ')" = "b a torque_mNm " ]
-	incise train other.csv --inputs a --output torque_mNm -o one.fis 2>/dev/null
+	incise train other.csv --inputs a --target torque_mNm -o one.fis 2>/dev/null
 	[ "$(grep -c gaussmf one.fis)" -eq 3 ]
 }
 

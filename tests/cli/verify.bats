@@ -88,7 +88,7 @@ tampered() {
 
 @test "verify holds the pictures of the camera against their rows" {
 	[ -e "$INCISE_BUILD/lib/incise/frames_mkv.so" ] || skip "frames_mkv.so is not built"
-	incise capture -o c.rec --rig sim:clock=simulated --camera pictures --duration 300ms
+	incise capture -o c.rec --rig sim:clock=simulated --camera frames --duration 300ms
 	n=$(ask c.rec "SELECT count(*) FROM frames")
 	run -0 --separate-stderr incise verify c.rec
 	[[ "${lines[2]}" == "camera   $n expected, $n present, 0 lost, in "*" blocks" ]]
@@ -147,7 +147,7 @@ tampered() {
 
 @test "verify without the module says that pictures are not verified" {
 	[ -e "$INCISE_BUILD/lib/incise/frames_mkv.so" ] || skip "frames_mkv.so is not built"
-	incise capture -o c.rec --rig sim:clock=simulated --camera pictures --duration 200ms
+	incise capture -o c.rec --rig sim:clock=simulated --camera frames --duration 200ms
 	INCISE_MODULE_PATH=$PWD run --separate-stderr incise verify c.rec
 	failed_with "c.rec: not all of it could be verified"
 	[[ "$output" == *"c.rec: camera: the pictures are not verified: "*"no module frames_mkv.so"* ]]

@@ -78,11 +78,11 @@ teardown() {
 @test "the demo leaves a film and a strip of a scene" {
 	[ -e "$INCISE_BUILD/lib/incise/film_mkv.so" ] || skip "film_mkv.so is not built"
 	# a wall neither bleeds nor is cut: that takes the least time
-	incise demo --scene wall -o out >said
+	incise demo --scene wall --report out >said
 	grep -q '^\$ incise view wall --procedure --video out/wall.mkv' said
 	[ "$(head -c 4 out/wall.mkv | od -An -tx1 | tr -d ' \n')" = 1a45dfa3 ]
 	[ "$(head -c 24 out/wall.png | tail -c 8 | od -An -tu1 | tr -s ' \n' ' ')" = " 0 0 10 0 0 0 1 224 " ]
-	run --separate-stderr incise demo --scene wall -o out
+	run --separate-stderr incise demo --scene wall --report out
 	failed_with out --overwrite
 }
 
@@ -180,7 +180,7 @@ begin_view() {
 	for ((i = 0; i < 200; i++)); do [ -s display ] && break; sleep 0.05; done
 	DISPLAY=:$(cat display)
 	export DISPLAY
-	SDL_VIDEODRIVER=x11 incise view neck.scene --rig sim:mouse --size 640x480 --camera 15,45,140 --json \
+	SDL_VIDEODRIVER=x11 incise view neck.scene --rig sim:mouse --size 640x480 --viewpoint 15,45,140 --json \
 		>r.json 2>err 3>&- &
 	pid=$!
 	window=
@@ -222,7 +222,7 @@ begin_view() {
 	run --separate-stderr incise view
 	bad_usage "one scene, got 0"
 	for wrong in "--procedure --rig sim:" "--procedure --from x.rec" "--frames f" "--strip x.png" "--at 1s" \
-		"--size 10x10" "--size big" "--size 640x480x3" "--fps 0" "--camera 1,2" "--procedure --at 2s,1s --strip x" \
+		"--size 10x10" "--size big" "--size 640x480x3" "--fps 0" "--viewpoint 1,2" "--procedure --at 2s,1s --strip x" \
 		"--procedure --video x --size 641x480"; do
 		# shellcheck disable=SC2086
 		run --separate-stderr incise view neck $wrong

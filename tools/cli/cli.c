@@ -81,6 +81,84 @@ static void fill_streams(void)
 		close(fd);
 }
 
+/* Options that had another name up to 0.1, of all commands or of those named. */
+static const struct {
+	const char *command, *old, *now;
+} renamed[] = {
+	{"calibrate delay", "--time", "--duration"},
+	{"calibrate delay", "--range", "--max-delay"},
+	{"calibrate delay", "--camera", "--with-camera"},
+	{"calibrate depth", "--axis", "--handle"},
+	{"calibrate depth", "--pictures", "--images"},
+	{"calibrate force", "--time", "--duration"},
+	{"calibrate force", "--range", "--input-range"},
+	{"calibrate tip", "--time", "--duration"},
+	{"compile", "--arith", "--method"},
+	{"demo", "--loop", "--duration"},
+	{"demo", "--output", "--report"},
+	{"demo", "-o", "--report"},
+	{"export", "-r", "--rate"},
+	{"replay", "--at", "--poses"},
+	{"replay", "--csv", "--log"},
+	{"stepper", "--for", "--duration"},
+	{"train", "--output-model", "--output"},
+	{"view", "--camera", "--viewpoint"},
+};
+
+/* The name of what option @given, "-x" or "--name", takes. */
+static const char *argument_of(const struct cli_command *command, const char *given)
+{
+	for (const struct cli_option *opt = command->options; opt->name; opt++) {
+		char letter = given[strlen(given) - 1];
+
+		if (!strncmp(given, "--", 2)
+			    ? !strncmp(given + 2, opt->name, strlen(given + 2))
+			    : letter == opt->id)
+			return opt->arg ? opt->arg : "none";
+	}
+	return "see --help";
+}
+
+/* Bad usage: option @given, or its letter @letter, is no option of this command. */
+_Noreturn static void refuse(const struct cli_command *command, const char *given,
+			     int letter)
+{
+	const char *names[OPTIONS_MAX + 4] = {0}, *nearest;
+	char *option = cli_text("%.*s", (int)strcspn(given, "="), given);
+	int n = 0;
+
+	if (strncmp(given, "--", 2) && letter)
+		option = cli_text("-%c", letter);
+	for (size_t i = 0; i < sizeof(renamed) / sizeof(*renamed); i++)
+		if (!strcmp(command->name, renamed[i].command) &&
+		    !strcmp(option, renamed[i].old))
+			cli_usage("%s: this option is now called %s", option,
+				  renamed[i].now);
+	if (*option != '-' || option[1] != '-')
+		cli_usage("%s: no such option", option);
+	for (const struct cli_option *opt = command->options; opt->name; opt++)
+		names[n++] = opt->name;
+	names[n++] = "help";
+	names[n++] = "version";
+	if (has_outputs(command))
+		names[n++] = "overwrite";
+	for (int i = 0; i < n; i++) {
+		size_t length = strlen(option + 2);
+
+		if (!strcmp(names[i], option + 2))
+			cli_usage("%s: this option takes no argument", option);
+		/* The beginning of two or more names. */
+		if (length && !strncmp(names[i], option + 2, length))
+			cli_usage("%s: more than one option begins like this, "
+				  "for example --%s",
+				  option, names[i]);
+	}
+	nearest = incise_nearest_name(option + 2, names);
+	if (nearest)
+		cli_usage("%s: no such option; did you mean --%s?", option, nearest);
+	cli_usage("%s: no such option", option);
+}
+
 /* The next option, with its argument in optarg; NULL: none is left. */
 static const struct cli_option *next(const struct cli_command *command, int argc,
 				     char **argv)
@@ -130,13 +208,10 @@ static const struct cli_option *next(const struct cli_command *command, int argc
 		cli_finish();
 		exit(0);
 	case ':':
-		cli_usage("option %s needs an argument", argv[optind - 1]);
+		cli_usage("%s: the argument %s is missing", argv[optind - 1],
+			  argument_of(command, argv[optind - 1]));
 	case '?':
-		if (optopt && optopt < CLI_LONG && !strchr(shorts, optopt))
-			cli_usage("there is no option -%c", optopt);
-		cli_usage(
-			"option %s is not known, or was given an argument it does not take",
-			argv[optind - 1]);
+		refuse(command, argv[optind - 1], optopt);
 	}
 	if (id >= CLI_LONG)
 		return &options[id - CLI_LONG];

@@ -184,7 +184,7 @@ double cli_duration(const char *option, const char *text, double min, double max
 
 /*
  * A quantity such as "10", "10mm", "-500um", in the first of these units, which end with {0};
- * @what: its name in messages, for example "--for".
+ * @what: its name in messages, for example "--range".
  */
 struct cli_unit {
 	const char *name;

@@ -110,7 +110,7 @@ check "it is homed" grep -q '"homed": true' home.json
 
 check "a position" says 0 "now at 1.0000 mm (step 400)" stepper move 1mm
 check "of the machine" [ "$(carriage position)" = 500 ]
-check "jog, for a time" says 0 "moved -" stepper jog -0.5mm/s --for 200ms
+check "jog, for a time" says 0 "moved -" stepper jog -0.5mm/s --duration 200ms
 at=$(carriage position)
 check "it went back, and rests" [ "$at" -lt 500 ] && [ "$at" -gt 100 ]
 check "jog ends at the end of the travel" says 0 "end of the travel" stepper jog -1
