@@ -139,7 +139,9 @@ static void parse(struct options *options, int argc, char **argv)
 	options->data = cli_operand(argc, argv, "data file");
 	if (!options->model || !*options->model)
 		cli_usage("-o MODEL.fis is missing: the file for the model");
-	if (strcmp(options->model, "-") && !cli_ends_with(options->model, ".fis"))
+	/* Neither a file nor a folder is there, nor is one meant: a column, of the old --output. */
+	if (strcmp(options->model, "-") && !strpbrk(options->model, "./") &&
+	    access(options->model, F_OK))
 		cli_usage("--output %s: a model is a .fis file; name the column to learn "
 			  "with --target",
 			  options->model);

@@ -105,6 +105,16 @@ static const struct {
 	{"view", "--camera", "--viewpoint"},
 };
 
+/* Bad usage if @option, "-x" or "--name", is an old name. */
+static void refuse_renamed(const struct cli_command *command, const char *option)
+{
+	for (size_t i = 0; i < sizeof(renamed) / sizeof(*renamed); i++)
+		if (!strcmp(command->name, renamed[i].command) &&
+		    !strcmp(option, renamed[i].old))
+			cli_usage("%s: this option is now called %s", option,
+				  renamed[i].now);
+}
+
 /* The name of what option @given, "-x" or "--name", takes. */
 static const char *argument_of(const struct cli_command *command, const char *given)
 {
@@ -129,11 +139,7 @@ _Noreturn static void refuse(const struct cli_command *command, const char *give
 
 	if (strncmp(given, "--", 2) && letter)
 		option = cli_text("-%c", letter);
-	for (size_t i = 0; i < sizeof(renamed) / sizeof(*renamed); i++)
-		if (!strcmp(command->name, renamed[i].command) &&
-		    !strcmp(option, renamed[i].old))
-			cli_usage("%s: this option is now called %s", option,
-				  renamed[i].now);
+	refuse_renamed(command, option);
 	if (*option != '-' || option[1] != '-')
 		cli_usage("%s: no such option", option);
 	for (const struct cli_option *opt = command->options; opt->name; opt++)
@@ -173,6 +179,10 @@ static const struct cli_option *next(const struct cli_command *command, int argc
 	if (!current)
 		fill_streams();
 	current = command;
+	/* getopt would take an old name that begins a new one for that, such as --time. */
+	for (int i = optind; i < argc && strcmp(argv[i], "--"); i++)
+		if (!strncmp(argv[i], "--", 2))
+			refuse_renamed(command, argv[i]);
 	for (const struct cli_option *opt = options; opt->name; opt++) {
 		if (n == OPTIONS_MAX)
 			abort();
