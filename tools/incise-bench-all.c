@@ -57,7 +57,7 @@ static const struct cli_option options[] = {
 	 CLI_TEXT(struct job, from)},
 	{0, "against", "OLD.json", "say what changed beyond noise since that report.json",
 	 CLI_INPUT(struct job, against)},
-	{0, "only", "WORD,...", "these words only", CLI_PARSED_BY(parse_only)},
+	{0, "only", "LIST", "these benchmarks only", CLI_PARSED_BY(parse_only)},
 	{0, "quick", NULL, "fewer points and repeats: a look, not a measurement",
 	 CLI_FLAG(struct job, quick)},
 	{0, "json", NULL, "print report.json, too", CLI_FLAG(struct job, json)},
@@ -613,13 +613,15 @@ static json_t *measure(const struct job *job)
 static void check_words(const struct job *job)
 {
 	for (int i = 0; i < job->n_only; i++) {
+		const char *names[32] = {0};
 		const struct report_section *s = report_sections();
+		int n = 0;
 
-		while (*s->word && strcmp(s->word, job->only[i]))
-			s++;
+		for (; *s->word && strcmp(s->word, job->only[i]); s++)
+			if (n < 31)
+				names[n++] = s->word;
 		if (!*s->word)
-			cli_usage("--only: '%s' is no word of incise bench",
-				  job->only[i]);
+			cli_unknown("benchmark", job->only[i], names);
 	}
 }
 

@@ -133,8 +133,10 @@ static void allow(const struct bench *bench, bool given, bool taken, const char 
 
 static const struct bench *bench_of(int argc, char **argv)
 {
+	const char *names[N(benches) + 4] = {0};
+
 	if (argc < 1)
-		cli_usage("expected what to measure, such as 'precision'");
+		cli_usage("a benchmark is missing, for example 'precision'");
 	for (int i = 0; i < N(benches); i++) {
 		const struct bench *bench = benches[i];
 
@@ -147,11 +149,15 @@ static const struct bench *bench_of(int argc, char **argv)
 		return bench;
 	}
 	if (!strcmp(argv[0], "view") || !strcmp(argv[0], "all"))
-		cli_usage("'%s' stands right behind 'incise bench'%s", argv[0],
+		cli_usage("'%s' must come directly after 'incise bench'%s", argv[0],
 			  *argv[0] == 'a' ? ""
-					  : ", and is built where SDL2, libepoxy, cairo "
-					    "and EGL are");
-	cli_usage("'%s' is nothing that can be measured", argv[0]);
+					  : "; it needs SDL2, libepoxy, cairo and EGL");
+	for (int i = 0; i < N(benches); i++)
+		names[i] = benches[i]->name;
+	names[N(benches)] = "all";
+	names[N(benches) + 1] = "view";
+	names[N(benches) + 2] = "compare";
+	cli_unknown("benchmark", argv[0], names);
 }
 
 int main(int argc, char **argv)

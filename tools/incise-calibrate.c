@@ -24,8 +24,11 @@ static const struct cli_command command = {
 
 int main(int argc, char **argv)
 {
+	static const char *const names[] = {"force",   "depth", "tip", "delay",
+					    "stepper", "check", NULL};
+
 	cli_parse(&command, argc, argv, NULL);
 	if (optind < argc)
-		cli_usage("there is nothing called '%s' to calibrate", argv[optind]);
-	cli_usage("what? force, depth, tip, delay, stepper or check");
+		cli_unknown("calibration", argv[optind], names);
+	cli_usage("a subcommand is missing: force, depth, tip, delay, stepper or check");
 }

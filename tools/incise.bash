@@ -7,7 +7,7 @@
 _incise_verbs()
 {
 	"$1" --help 2>/dev/null | awk '
-		/^Verbs:/ { list = 1; next }
+		/^Commands:/ { list = 1; next }
 		list && /^  [a-z]/ { print $1; next }
 		{ list = 0 }'
 }

@@ -22,36 +22,40 @@
 static const struct {
 	const char *name, *does;
 } commands[] = {
-	{"calibrate", "measure what turns readings into mm, N and s"},
+	{"calibrate", "measure the scale factors, delays and offsets of a rig"},
 	{"capture", "record the streams of a rig in sync"},
-	{"verify", "prove that a recording is complete"},
-	{"export", "make a dataset of recordings, raw or averaged"},
+	{"verify", "check that a recording is complete"},
+	{"export", "make a dataset from recordings, raw or averaged"},
 	{"train", "learn a fuzzy force model from a dataset"},
-	{"compile", "turn a model or a scene into integers with a certified error"},
+	{"compile", "convert a model or a scene to fixed point with a certified error"},
 	{"eval", "print the force of a model at given depth and velocity"},
-	{"info", "say what a recording, model, plan or stepper module holds"},
-	{"plan", "show what a scene runs and what it leaves out"},
+	{"info", "describe a recording, model, plan or stepper module"},
+	{"plan", "show the stages that a scene runs, and why it leaves out others"},
 	{"haptic", "run the real-time loop of a scene"},
-	{"feed", "let the kernel render a scene, and hand it the poses"},
-	{"status", "say what the loops on this machine do, or did last"},
+	{"feed", "load a scene into the kernel and send it the poses"},
+	{"status", "report the state of the loops on this machine"},
 	{"tool", "set or print the tool in the hand of a running loop"},
 	{"view", "show a scene: tissue, wound, blood, instrument"},
-	{"assess", "report what happened in sessions, against criteria"},
-	{"replay", "run the loop on a recording, predicted beside measured"},
-	{"stepper", "look at the actuator and move it by hand"},
+	{"assess", "evaluate sessions against the criteria of their scene"},
+	{"replay", "run the loop on a recording and compare it with the measured force"},
+	{"stepper", "show the state of the actuator and move it by hand"},
 	{"bench", "measure error against run time"},
-	{"demo", "walk the whole path on the virtual rig"},
+	{"demo", "run the whole path on the simulated rig"},
 };
 
-static void help(void)
+#define COMMANDS (sizeof(commands) / sizeof(*commands))
+
+static void help(FILE *out)
 {
-	printf("Usage: incise VERB [ARGUMENTS]\n\n"
-	       "A toolkit for haptic cutting: record, model and render how tissue resists a "
-	       "scalpel.\n\nVerbs:\n");
-	for (size_t i = 0; i < sizeof(commands) / sizeof(*commands); i++)
-		printf("  %-10s %s\n", commands[i].name, commands[i].does);
-	printf("\n'incise VERB --help' lists a verb's options, 'incise help VERB' opens its "
-	       "manual.\n'incise demo' is a good start.\n");
+	fprintf(out,
+		"Usage: incise COMMAND [ARGUMENTS]\n\n"
+		"A toolkit for haptic cutting: record, model and render how tissue resists a "
+		"scalpel.\n\nCommands:\n");
+	for (size_t i = 0; i < COMMANDS; i++)
+		fprintf(out, "  %-10s %s\n", commands[i].name, commands[i].does);
+	fprintf(out,
+		"\n'incise COMMAND --help' lists the options of a command, 'incise help "
+		"COMMAND' opens its\nmanual. New here? Start with 'incise demo'.\n");
 }
 
 /* Whether PATH leads to a file of this name, runnable or not. */
@@ -73,38 +77,98 @@ static bool on_path(const char *name)
 	return found;
 }
 
-static bool known(const char *command)
+/* One line on stderr about a word that is no command, with the nearest one: 2. */
+static int unknown_command(const char *word)
 {
-	for (size_t i = 0; i < sizeof(commands) / sizeof(*commands); i++)
-		if (!strcmp(command, commands[i].name))
-			return true;
-	return false;
+	const char *names[COMMANDS + 2] = {"help"}, *nearest;
+
+	for (size_t i = 0; i < COMMANDS; i++)
+		names[i + 1] = commands[i].name;
+	nearest = incise_nearest_name(word, names);
+	fprintf(stderr, "incise: '%.64s': no such command; ", word);
+	fprintf(stderr,
+		nearest ? "did you mean 'incise %s'?\n" : "'incise --help' lists them\n",
+		nearest);
+	return 2;
 }
 
-/* The manual page, from the source tree when this runs in a build tree. */
-static int manual(const char *command, const char *subcommand)
-{
-	char folder[PATH_MAX];
-	char *name, *page;
+/* Pages of the manual that are no command's, as people name them. */
+static const struct {
+	const char *name, *page;
+} topics[] = {
+	{"rig.conf", "rig.conf.5"},
+	{"rig", "rig.conf.5"},
+	{"calibration.conf", "calibration.conf.5"},
+	{"calibration", "calibration.conf.5"},
+	{"scene", "incise-scene.5"},
+	{"recording", "incise-recording.5"},
+	{"session", "incise-session.5"},
+	{"state", "incise-state.5"},
+	{"fis", "incise-fis.5"},
+	{"model", "incise-fis.5"},
+	{"fx", "incise-fx.5"},
+	{"sd", "incise-sd.5"},
+	{"library", "libincise.3"},
+	{"libincise", "libincise.3"},
+	{"service", "incise-haptic@.service.8"},
+};
 
-	snprintf(folder, sizeof(folder), "%s", cli_folder());
-	if (command && !known(command)) {
+#define TOPICS (sizeof(topics) / sizeof(*topics))
+
+/* The page "NAME.SECTION" of a topic, or of a command and its subcommand; NULL: there is none. */
+static char *page_of(const char *topic, const char *subcommand)
+{
+	size_t length = strcspn(topic, "-");
+	char *page = NULL;
+
+	if (!strncmp(topic, "incise-", 7))
+		return page_of(topic + 7, subcommand);
+	for (size_t i = 0; i < TOPICS && !subcommand; i++)
+		if (!strcmp(topic, topics[i].name))
+			return strdup(topics[i].page);
+	for (size_t i = 0; i < COMMANDS; i++)
+		if (strlen(commands[i].name) == length &&
+		    !strncmp(topic, commands[i].name, length))
+			return asprintf(&page, "incise-%.64s%s%.64s.1", topic,
+					subcommand ? "-" : "",
+					subcommand ? subcommand : "") < 0
+				       ? NULL
+				       : page;
+	return NULL;
+}
+
+/* The page in the source tree if this runs in a build tree, else the installed one. */
+static int manual(const char *topic, const char *subcommand)
+{
+	char *page = topic ? page_of(topic, subcommand) : strdup("incise.1");
+	char *dot, *path;
+
+	if (!page) {
+		const char *names[COMMANDS + TOPICS + 1] = {0}, *nearest;
+
+		for (size_t i = 0; i < COMMANDS; i++)
+			names[i] = commands[i].name;
+		for (size_t i = 0; i < TOPICS; i++)
+			names[COMMANDS + i] = topics[i].name;
+		nearest = incise_nearest_name(topic, names);
+		fprintf(stderr, "incise: help %.64s: no such command or file format; ",
+			topic);
 		fprintf(stderr,
-			"incise: there is no verb '%.64s'; 'incise --help' lists them\n",
-			command);
+			nearest ? "did you mean 'incise help %s'?\n"
+				: "'incise --help' lists the commands\n",
+			nearest);
 		return 2;
 	}
-	if (asprintf(&name, "incise%s%s%s%.64s", command ? "-" : "",
-		     command ? command : "", subcommand ? "-" : "",
-		     subcommand ? subcommand : "") < 0 ||
-	    asprintf(&page, "%s/../../man/%s.1", folder, name) < 0)
+	if (asprintf(&path, "%s/../../man/%s", cli_folder(), page) < 0)
 		return 1;
-	if (!access(page, R_OK))
-		execlp("man", "man", page, (char *)NULL);
-	else
-		execlp("man", "man", name, (char *)NULL);
-	fprintf(stderr, "incise: man: %s; try 'incise %s --help'\n", strerror(errno),
-		command ? command : "");
+	if (!access(path, R_OK))
+		execlp("man", "man", path, (char *)NULL);
+	dot = strrchr(page, '.');
+	*dot = 0;
+	execlp("man", "man", dot + 1, page, (char *)NULL);
+	fprintf(stderr, "incise: man: %s; install the package man-db%s%.64s%s\n",
+		strerror(errno), topic ? ", or try 'incise " : "", topic ? topic : "",
+		topic ? " --help'" : "");
 	return 1;
 }
 
@@ -140,11 +204,11 @@ int main(int argc, char **argv)
 	char folder[PATH_MAX], program[PATH_MAX + 80];
 
 	if (argc < 2) {
-		fprintf(stderr, "incise: which verb? 'incise --help' lists them\n");
+		help(stderr);
 		return 2;
 	}
 	if (!strcmp(command, "-h") || !strcmp(command, "--help")) {
-		help();
+		help(stdout);
 		return finish();
 	}
 	if (!strcmp(command, "-V") || !strcmp(command, "--version")) {
@@ -154,15 +218,11 @@ int main(int argc, char **argv)
 	if (!strcmp(command, "help")) {
 		if (argc > 2)
 			return manual(argv[2], argv[3]);
-		help();
+		help(stdout);
 		return finish();
 	}
-	if (strchr(command, '/') || *command == '-' || strlen(command) > 64) {
-		fprintf(stderr,
-			"incise: '%.64s' is no verb; 'incise --help' lists them\n",
-			command);
-		return 2;
-	}
+	if (strchr(command, '/') || *command == '-' || strlen(command) > 64)
+		return unknown_command(command);
 	snprintf(folder, sizeof(folder), "%s", cli_folder());
 	if (argc > 2 && argv[2][strspn(argv[2], LETTERS)] == 0 && *argv[2]) {
 		snprintf(program, sizeof(program), "%s/incise-%s-%.64s", folder, command,
@@ -181,12 +241,8 @@ int main(int argc, char **argv)
 	if (errno == ENOENT)
 		execvp(program, argv + 1);
 	/* A folder on PATH that may not be searched makes execvp say EACCES as well. */
-	if (errno == ENOENT || (errno == EACCES && !on_path(program))) {
-		fprintf(stderr,
-			"incise: there is no verb '%s'; 'incise --help' lists them\n",
-			command);
-		return 2;
-	}
+	if (errno == ENOENT || (errno == EACCES && !on_path(program)))
+		return unknown_command(command);
 	fprintf(stderr, "incise: %s: %s\n", program, strerror(errno));
 	return 1;
 }

@@ -258,7 +258,9 @@ setup() {
 	run --separate-stderr incise bench
 	bad_usage "'precision'"
 	run --separate-stderr incise bench nothing
-	bad_usage "'nothing' is nothing that can be measured"
+	bad_usage "unknown benchmark 'nothing'"
+	run --separate-stderr incise bench presision
+	bad_usage "unknown benchmark 'presision'; did you mean 'precision'?"
 	run --separate-stderr incise bench precision a b
 	bad_usage "'precision' takes at most 1 operand, got 2"
 	for name in "" -a - a/ a/.png "a'b" 'a;b' '$(id)' 'a b'; do

@@ -218,7 +218,7 @@ report_of() {
 	run --separate-stderr incise bench all --report a --from b
 	bad_usage "expected --report DIR, or --from DIR"
 	run --separate-stderr incise bench all --report a --only precision,nosuch
-	bad_usage "'nosuch' is no word of incise bench"
+	bad_usage "unknown benchmark 'nosuch'"
 	run --separate-stderr incise bench all --from b --quick
 	bad_usage "--from measures nothing"
 	run --separate-stderr incise bench all --report ""

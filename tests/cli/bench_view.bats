@@ -78,5 +78,5 @@ draws() {
 	run --separate-stderr incise bench view none.scene
 	failed_with none.scene
 	run --separate-stderr incise bench --json view
-	bad_usage "'view' stands right behind"
+	bad_usage "'view' must come directly after"
 }

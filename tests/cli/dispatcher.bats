@@ -54,12 +54,16 @@ setup() {
 	PATH=$INCISE_BUILD/bin:/usr/bin:/bin
 	run -2 --separate-stderr incise
 	[ -z "$output" ]
-	[ "${#stderr_lines[@]}" -eq 1 ]
+	[[ "$stderr" == "Usage: incise COMMAND"*"  demo "* ]]
+	run -2 --separate-stderr incise trian
+	[ "$stderr" = "incise: 'trian': no such command; did you mean 'incise train'?" ]
+	run -2 --separate-stderr incise calibrate forse
+	[ "${stderr_lines[0]}" = "incise calibrate: unknown calibration 'forse'; did you mean 'force'?" ]
 	for word in nosuch --nosuch ../bin/incise-train "" "$(printf 'x%.0s' {1..5000})"; do
 		run -2 --separate-stderr incise "$word"
 		[ -z "$output" ]
 		[ "${#stderr_lines[@]}" -eq 1 ]
-		[[ "$stderr" == *"incise --help"* ]]
+		[[ "$stderr" == *"incise --help"* || "$stderr" == *"did you mean"* ]]
 	done
 }
 
@@ -101,8 +105,23 @@ setup() {
 	mkdir bin
 	printf '#!/bin/sh\necho "man $*"\n' >bin/man
 	chmod +x bin/man
-	PATH=$PWD/bin:$PATH run -0 incise help train
-	[ "$(realpath "${output#man }")" = "$root/man/incise-train.1" ]
+	while read -r words page; do
+		# shellcheck disable=SC2086 # "calibrate,force" is two words
+		PATH=$PWD/bin:$PATH run -0 incise help ${words//,/ }
+		[ "$(realpath "${output#man }")" = "$root/man/$page" ] || complain "$words: $output"
+	done <<-END
+		train incise-train.1
+		calibrate,force incise-calibrate-force.1
+		calibrate-force incise-calibrate-force.1
+		incise-calibrate-force incise-calibrate-force.1
+		rig.conf rig.conf.5
+		scene incise-scene.5
+		incise-scene incise-scene.5
+		library libincise.3
+	END
+	run -2 --separate-stderr incise help rig.con
+	[ "$stderr" = \
+		"incise: help rig.con: no such command or file format; did you mean 'incise help rig.conf'?" ]
 }
 
 @test "help on a full disk says so" {

@@ -4,7 +4,7 @@
 load cli
 
 setup() {
-	verbs=$(incise --help | awk '/^Verbs:/ { on = 1; next } on && !NF { exit } on { print $1 }')
+	verbs=$(incise --help | awk '/^Commands:/ { on = 1; next } on && !NF { exit } on { print $1 }')
 	[ "$(wc -w <<<"$verbs")" -ge 8 ]
 	# "calibrate force": incise-calibrate-force
 	words=$(cd "$INCISE_BUILD/bin" && printf '%s\n' incise-*-* | sed 's/^incise-//; s/-/ /')

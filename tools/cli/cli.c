@@ -416,6 +416,15 @@ void cli_be_verbose(void)
 	verbose = true;
 }
 
+void cli_unknown(const char *what, const char *name, const char *const *names)
+{
+	const char *nearest = incise_nearest_name(name, names);
+
+	if (nearest)
+		cli_usage("unknown %s '%s'; did you mean '%s'?", what, name, nearest);
+	cli_usage("unknown %s '%s'", what, name);
+}
+
 double cli_number(const char *option, const char *text, double min, double max)
 {
 	char *end;

@@ -175,6 +175,9 @@ void cli_warn(const char *fmt, ...) INCISE_PRINTF(1, 2);
 void cli_note(const char *fmt, ...) INCISE_PRINTF(1, 2);
 void cli_be_verbose(void);
 
+/* Bad usage: "unknown WHAT 'NAME'", and the nearest of @names, which end with NULL. */
+_Noreturn void cli_unknown(const char *what, const char *name, const char *const *names);
+
 /* Arguments of options; out of range or malformed is bad usage. */
 double cli_number(const char *option, const char *text, double min, double max);
 long cli_integer(const char *option, const char *text, long min, long max);
