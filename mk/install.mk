@@ -5,7 +5,8 @@ headers := $(wildcard lib/include/incise/*.h)
 man_pages := $(wildcard man/*.[1-8])
 scenes := $(wildcard scenes/*.scene scenes/*.fis)
 examples := $(wildcard doc/*.example)
-documents := doc/tutorial.md doc/device-backend.md CHANGELOG.md
+# All but the main page of the headers' reference, which is in that.
+documents := README.md CHANGELOG.md $(filter-out doc/reference.md,$(wildcard doc/*.md doc/*.svg doc/*.png))
 udev_rules := $(wildcard udev/*.rules)
 sysusers := $(wildcard udev/*.sysusers)
 tmpfiles := $(wildcard udev/*.tmpfiles)

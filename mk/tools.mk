@@ -114,7 +114,7 @@ bench: ## measure everything on this machine; one report in build/bench/
 	+@$(MAKE) --no-print-directory all
 	$(O)/bin/incise bench all --report $(O)/bench --overwrite
 
-readme-figures: ## put the summary of that report, and two of its pictures, into the README
+readme-figures: ## put the summary of that report, and two of its figures, into doc/evidence.md
 	mk/readme-figures $(O)/bench
 
 .PHONY: tools deps demo bench readme-figures

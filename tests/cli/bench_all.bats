@@ -322,9 +322,9 @@ asked() {
 	cp report.pdf "$INCISE_BUILD/artefacts/report.pdf"
 }
 
-@test "README's figures are facts of the report, put there by mk/readme-figures" {
+@test "the figures of doc/evidence.md are facts of the report, put there by mk/readme-figures" {
 	facts=$(grep -o '^| [^|{]* | {' "$root/tools/bench/report.md")
-	figures=$(sed -n '/^<!-- figures: make bench/,/^<!-- end of figures/p' "$root/README.md")
+	figures=$(sed -n '/^<!-- figures: make bench/,/^<!-- end of figures/p' "$root/doc/evidence.md")
 	[ "$(grep -c '^\*\*' <<<"$figures")" = 3 ]
 	n=0
 	while read -r name; do

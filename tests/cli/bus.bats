@@ -331,7 +331,7 @@ rig() { # ARGUMENTS
 	example_in "$root/man/rig.conf.5" can:can0 | sed 's|"can:can0:0x10"|"bench:bus0"|' >rig.conf
 	grep -q 'can = {' rig.conf
 	incise stepper status
-	grep '^actuator = .*can = ' "$root/README.md" >rig.conf
+	grep '^actuator = .*can = ' "$root/doc/can.md" >rig.conf
 	grep -q homing_method rig.conf
 	echo 'stepper = "bench:bus0";' >>rig.conf
 	incise stepper status

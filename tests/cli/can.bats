@@ -175,10 +175,10 @@ ended() {
 }
 
 # The first steps of a new rig, as they are typed: on a drive that was never homed.
-@test "every motor command of tutorial, README and manual page works on a drive" {
+@test "every motor command of the tutorial, doc/can.md and the manual page works on a drive" {
 	local document command failed= n=0 try code deadman_ms=1000
 	local -a words
-	for document in doc/tutorial.md README.md man/incise-stepper.1; do
+	for document in doc/tutorial.md doc/can.md doc/quick-reference.md man/incise-stepper.1; do
 		rig
 		while read -r command; do
 			# What ends at Ctrl-C is given an end, and ten times take long.

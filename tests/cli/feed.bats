@@ -75,7 +75,7 @@ setup() {
 @test "options of a model are not of a scene, and the other way round" {
 	cp "$root/scenes/liver.fis" m.fis
 	run -2 --separate-stderr incise compile neck --budget 1mN -o n.plan
-	[[ "$stderr" == *"--budget, --arith, --cells and --c-source are of a model"* ]]
+	[[ "$stderr" == *"--budget, --method, --cells and --c-source are of a model"* ]]
 	run -2 --separate-stderr incise compile m.fis --rig sim: -o m.fx
 	[[ "$stderr" == *"are of a scene"* ]]
 	[ ! -e n.plan ]

@@ -98,7 +98,7 @@ setup() {
 	for document in "$INCISE_BUILD"/bin/incise*; do
 		"$document" --help >"help/${document##*/}.help"
 	done
-	for document in "$root"/{README,CONTRIBUTING,doc/tutorial,doc/device-backend,tests/can/README}.md \
+	for document in "$root"/{README,CONTRIBUTING,tests/can/README}.md "$root"/doc/*.md \
 		"$root"/man/*.[158] help/*.help; do
 		typed_in "$document" | sed "s|^|${document##*/}\t|"
 	done | grep -v '[…$]' | sort -u -t $'\t' -k 2 >typed

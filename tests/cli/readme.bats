@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# README: short, and its blocks run as typed and print what it shows.
+
+load cli
+load document
+
+setup() {
+	work_folder
+}
+
+@test "README has at most 900 words" {
+	[ "$(wc -w <"$root/README.md")" -le 900 ] || complain "$(wc -w <"$root/README.md") words"
+}
+
+# The numbers of a text with two digits: the last ones depend on the LAPACK that is installed.
+rounded() {
+	awk '{ line = ""
+		while (match($0, /[0-9]+\.[0-9]+(e[-+]?[0-9]+)?/)) {
+			line = line substr($0, 1, RSTART - 1) sprintf("%.2g", substr($0, RSTART, RLENGTH))
+			$0 = substr($0, RSTART + RLENGTH)
+		}
+		print line $0 }'
+}
+
+@test "README's session runs as typed, and prints the lines that are shown" {
+	ln -s "$INCISE_BUILD" build
+	commands_in "$root/README.md" path >session
+	grep -q 'build/bin' session
+	commands_in "$root/README.md" session >>session
+	[ "$(grep -c '^incise ' session)" -ge 8 ]
+	sed -i 's/#.*//' session
+	run -0 bash -euo pipefail session
+	rounded <<<"$output" >printed
+	commands_in "$root/README.md" "output of session" | rounded >shown
+	[ "$(wc -l <shown)" -ge 7 ]
+	while IFS= read -r line; do
+		grep -qxF -- "$line" printed || complain "not printed: $line"
+	done <shown
+	grep -q "9 of 9" printed
+}
+
+@test "the documents that are installed are those of doc/" {
+	cd "$root"
+	for document in doc/*.md doc/*.svg doc/*.png; do
+		case $document in
+		doc/reference.md) continue ;; # part of the reference of the headers
+		esac
+		make -s -n install DESTDIR=/nowhere O="$INCISE_BUILD" 2>/dev/null | grep -q -- "$document" ||
+			complain "$document is not installed"
+	done
+}
+
+@test "CITATION.cff names this version" {
+	grep -qx "version: $(incise --version | cut -d' ' -f2)" "$root/CITATION.cff"
+}
