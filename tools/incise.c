@@ -40,6 +40,8 @@ static const struct {
 	{"replay", "run the loop on a recording and compare it with the measured force"},
 	{"stepper", "show the state of the actuator and move it by hand"},
 	{"bench", "measure error against run time"},
+	{"doctor",
+	 "check this machine and its rig, and print the remedy of each finding"},
 	{"demo", "run the whole path on the simulated rig"},
 };
 

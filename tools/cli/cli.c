@@ -534,17 +534,24 @@ int cli_list(const char *option, char *text, char **items, int max)
 	return n;
 }
 
-const char *cli_rig(const char *given)
+const char *cli_default_rig(void)
 {
 	static const char *const places[] = {"rig.conf", "/etc/incise/rig.conf"};
 
-	if (given)
-		return given;
 	for (size_t i = 0; i < sizeof(places) / sizeof(*places); i++)
-		if (!access(places[i], F_OK)) {
-			cli_input(places[i]);
+		if (!access(places[i], F_OK))
 			return places[i];
-		}
+	return NULL;
+}
+
+const char *cli_rig(const char *given)
+{
+	const char *found = given ? given : cli_default_rig();
+
+	if (found) {
+		cli_input(found);
+		return found;
+	}
 	cli_fail(
 		"there is neither ./rig.conf nor /etc/incise/rig.conf; name the rig with "
 		"--rig FILE, or try the virtual one: --rig sim:");

@@ -209,6 +209,9 @@ int cli_list(const char *option, char *text, char **items, int max);
 /* The rig to use: @given, else ./rig.conf, else /etc/incise/rig.conf, else fail. */
 const char *cli_rig(const char *given);
 
+/* ./rig.conf, else /etc/incise/rig.conf, else NULL. */
+const char *cli_default_rig(void);
+
 /* Open that rig with some devices (INCISE_RIG_TRACKER, …), or fail. */
 struct incise_rig *cli_open_rig(const char *given, unsigned int devices);
 

@@ -1,0 +1,377 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise doctor: checks this machine and its rig for a capture and for the haptic loop, and
+ * prints the command that mends each finding.
+ */
+#include <errno.h>
+#include <grp.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/statvfs.h>
+#include <sys/utsname.h>
+#include <unistd.h>
+#include <incise/realtime.h>
+#include <incise/rig.h>
+#include "cli/child.h"
+#include "cli/cli.h"
+#include "cli/json.h"
+
+#define CHECKS_MAX 40
+#define GIB (1024.0 * 1024 * 1024)
+
+enum state { OK, WARNING, PROBLEM };
+static const char *const state_names[] = {"ok", "warning", "problem"};
+
+struct check {
+	const char *group, *name;
+	enum state state;
+	char *found, *fix;
+};
+
+struct doctor {
+	const char *rig, *calibration;
+	bool json;
+	struct check check[CHECKS_MAX];
+	int n;
+};
+
+static const struct cli_option option_table[] = {
+	{CLI_RIG_OPTION(struct doctor, rig)},
+	{'c', "calibration", "FILE", "calibration to check (default: calibration.conf)",
+	 CLI_INPUT(struct doctor, calibration)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct doctor, json)},
+	{0},
+};
+
+static const struct cli_command command = {
+	.name = "doctor",
+	.synopsis = "[--rig RIG] [-c FILE] [--json]",
+	.summary =
+		"Check this machine and its rig, and print the command that mends each "
+		"finding.",
+	.options = option_table,
+	.notes = "Actuators are only watched: nothing moves.\n\n"
+		 "Exit codes: 0 no problem, 1 at least one problem, 2 bad usage.",
+};
+
+/* @fix: NULL if nothing is to be done. */
+static void INCISE_PRINTF(6, 7)
+	add(struct doctor *doctor, const char *group, const char *name, enum state state,
+	    const char *fix, const char *fmt, ...)
+{
+	struct check *check = &doctor->check[doctor->n];
+	va_list args;
+
+	if (doctor->n == CHECKS_MAX)
+		return;
+	*check = (struct check){group, name, state};
+	va_start(args, fmt);
+	if (vasprintf(&check->found, fmt, args) < 0)
+		cli_fail("no memory");
+	va_end(args);
+	check->fix = cli_text("%s", fix ? fix : "");
+	doctor->n++;
+}
+
+/* Whether this process has the group's rights now, which begin with a login. */
+static bool has_group(gid_t wanted)
+{
+	gid_t groups[256];
+	int n = getgroups(256, groups);
+
+	for (int i = 0; i < n; i++)
+		if (groups[i] == wanted)
+			return true;
+	return getegid() == wanted;
+}
+
+static void check_group(struct doctor *doctor)
+{
+	const struct group *group = getgrnam("incise");
+
+	if (!geteuid())
+		add(doctor, "permissions", "group", OK, NULL,
+		    "root may open every device");
+	else if (!group)
+		add(doctor, "permissions", "group", WARNING,
+		    "sudo systemd-sysusers    # after installing incise",
+		    "the group incise does not exist: only root may open the devices");
+	else if (!has_group(group->gr_gid))
+		add(doctor, "permissions", "group", WARNING,
+		    "sudo usermod -aG incise $USER    # takes effect at the next login",
+		    "this user is not a member of group incise");
+	else
+		add(doctor, "permissions", "group", OK, NULL, "member of group incise");
+}
+
+static void check_realtime(struct doctor *doctor)
+{
+	const struct incise_realtime_setup setup = {
+		.policy = INCISE_REALTIME_FIFO,
+		.priority = INCISE_REALTIME_PRIORITY,
+		.cpu = INCISE_REALTIME_ANY_CPU,
+		.period_ns = 1000000,
+	};
+	static struct incise_realtime_check checks[INCISE_REALTIME_CHECKS];
+	int n = incise_realtime_checks(&setup, checks, INCISE_REALTIME_CHECKS);
+
+	if (n < 0)
+		add(doctor, "real time", "checks", PROBLEM, NULL, "not possible: %s",
+		    strerror(-n));
+	for (int i = 0; i < n && i < INCISE_REALTIME_CHECKS; i++)
+		add(doctor, "real time", checks[i].name,
+		    checks[i].ok       ? OK
+		    : checks[i].needed ? PROBLEM
+				       : WARNING,
+		    *checks[i].keep ? checks[i].keep : checks[i].fix, "%s",
+		    checks[i].found);
+}
+
+static void check_module(struct doctor *doctor)
+{
+	struct utsname kernel;
+
+	if (!access("/sys/module/incise_stepper", F_OK)) {
+		add(doctor, "kernel", "module", OK, NULL, "incise_stepper is loaded");
+		return;
+	}
+	uname(&kernel);
+	add(doctor, "kernel", "module", WARNING,
+	    "sudo modprobe incise_stepper    # after 'make module_install'",
+	    "incise_stepper is not loaded (Linux %s); a rig needs it for a stepper \"kernel:…\"",
+	    kernel.release);
+}
+
+/* Try one kind of device. A rig need not name each. */
+static void check_device(struct doctor *doctor, const char *rig, const char *name,
+			 unsigned int devices)
+{
+	struct incise_error err = {0};
+	struct incise_rig *open = incise_rig_open(rig, devices, &err);
+
+	if (open && devices & INCISE_RIG_CAMERA && !incise_rig_camera(open))
+		add(doctor, "devices", name, OK, NULL, "the rig names none");
+	else if (open)
+		add(doctor, "devices", name, OK, NULL, "opens");
+	else if (err.code == ENODEV && strstr(err.text, "not named"))
+		add(doctor, "devices", name, OK, NULL, "the rig names none");
+	else if (err.code == EBUSY)
+		add(doctor, "devices", name, WARNING, "incise status", "%s", err.text);
+	else
+		add(doctor, "devices", name, PROBLEM,
+		    err.code == EACCES
+			    ? "sudo usermod -aG incise $USER    # takes effect at "
+			      "the next login"
+			    : "incise info devices    # lists what is attached",
+		    "%s", err.text);
+	incise_rig_close(open);
+}
+
+static void check_rig(struct doctor *doctor)
+{
+	static const struct {
+		const char *name;
+		unsigned int devices;
+	} kinds[] = {
+		{"tracker", INCISE_RIG_TRACKER},
+		{"force", INCISE_RIG_FORCE},
+		{"camera", INCISE_RIG_CAMERA | INCISE_RIG_IF_NAMED},
+		{"stepper", INCISE_RIG_STEPPER | INCISE_RIG_WATCH},
+	};
+	const char *rig = doctor->rig ? doctor->rig : cli_default_rig();
+	struct incise_error err = {0};
+	struct incise_rig *open;
+
+	if (!rig) {
+		add(doctor, "devices", "rig", WARNING,
+		    "sudo cp /usr/share/incise/rig.conf.example /etc/incise/rig.conf    # "
+		    "then edit it",
+		    "there is neither ./rig.conf nor /etc/incise/rig.conf");
+		return;
+	}
+	open = incise_rig_open(rig, 0, &err);
+	if (!open) {
+		add(doctor, "devices", "rig", PROBLEM, "incise help rig.conf", "%s",
+		    err.text);
+		return;
+	}
+	add(doctor, "devices", "rig", OK, NULL, "%s", rig);
+	incise_rig_close(open);
+	for (size_t i = 0; i < sizeof(kinds) / sizeof(*kinds); i++)
+		check_device(doctor, rig, kinds[i].name, kinds[i].devices);
+}
+
+static void check_display(struct doctor *doctor)
+{
+	const char *wayland = getenv("WAYLAND_DISPLAY"), *x11 = getenv("DISPLAY");
+
+	if ((wayland && *wayland) || (x11 && *x11))
+		add(doctor, "display", "window", OK, NULL, "%s",
+		    wayland && *wayland ? wayland : x11);
+	else
+		add(doctor, "display", "window", WARNING,
+		    "incise view SCENE --procedure --video FILE.mkv    # needs no display",
+		    "neither DISPLAY nor WAYLAND_DISPLAY is set: incise view has no window");
+}
+
+/* The report of incise calibrate check, or NULL. */
+static json_t *calibration_report(const char *path)
+{
+	char *program = cli_text("%s/incise-calibrate-check", cli_folder());
+	char *argv[] = {program, "-c", (char *)path, "--json", NULL};
+	struct incise_error err = {0};
+	json_t *report = NULL;
+	int ends[2];
+	FILE *file;
+	pid_t pid;
+
+	if (pipe(ends))
+		cli_fail("%s", strerror(errno));
+	pid = child_start(argv, ends[1], -1);
+	close(ends[1]);
+	file = fdopen(ends[0], "r");
+	if (file) {
+		report = json_read_from(file, "calibrate check", &err);
+		fclose(file);
+	}
+	child_end(pid, 5);
+	free(program);
+	return report;
+}
+
+static void check_calibration(struct doctor *doctor)
+{
+	const char *path = doctor->calibration ? doctor->calibration : "calibration.conf";
+	json_t *report, *kind;
+	size_t i;
+
+	if (access(path, F_OK)) {
+		add(doctor, "calibration", "file",
+		    doctor->calibration ? PROBLEM : WARNING, "incise help calibrate",
+		    "%s: %s; nominal values apply", path, strerror(errno));
+		return;
+	}
+	report = calibration_report(path);
+	if (!report) {
+		add(doctor, "calibration", "file", PROBLEM,
+		    "incise calibrate check    # prints the reason", "%s cannot be read",
+		    path);
+		return;
+	}
+	json_array_foreach(json_object_get(report, "kinds"), i, kind)
+	{
+		const char *name = json_string_value(json_object_get(kind, "kind"));
+		const char *why = json_string_value(json_object_get(kind, "why"));
+		double days = json_number_value(json_object_get(kind, "age_days"));
+		bool due = json_is_true(json_object_get(kind, "due"));
+		char *fix = cli_text("incise calibrate %s", name ? name : "");
+
+		/* The names are those of the report, which is released below. */
+		for (size_t k = 0; name && k < 5; k++) {
+			static const char *const names[] = {"force", "depth", "tip",
+							    "delay", "stepper"};
+
+			if (strcmp(name, names[k]))
+				continue;
+			if (due)
+				add(doctor, "calibration", names[k], WARNING, fix, "%s",
+				    why ? why : "due");
+			else
+				add(doctor, "calibration", names[k], OK, NULL,
+				    "%.0f days old", floor(days));
+		}
+		free(fix);
+	}
+	json_decref(report);
+}
+
+static void check_disk(struct doctor *doctor)
+{
+	struct statvfs disk;
+	double free_GiB;
+
+	if (statvfs(".", &disk)) {
+		add(doctor, "disk", "free", WARNING, NULL, "%s", strerror(errno));
+		return;
+	}
+	free_GiB = (double)disk.f_bavail * (double)disk.f_frsize / GIB;
+	add(doctor, "disk", "free", free_GiB < 1 ? WARNING : OK,
+	    free_GiB < 1 ? "df -h .    # record to a disk with more space" : NULL,
+	    "%.1f GiB in the current folder", free_GiB);
+	if (access(".", W_OK))
+		add(doctor, "disk", "folder", WARNING, "cd    # to a folder of yours",
+		    "the current folder may not be written to");
+}
+
+static int count(const struct doctor *doctor, enum state state)
+{
+	int n = 0;
+
+	for (int i = 0; i < doctor->n; i++)
+		n += doctor->check[i].state == state;
+	return n;
+}
+
+static void print(const struct doctor *doctor)
+{
+	const char *group = "";
+
+	for (int i = 0; i < doctor->n; i++) {
+		const struct check *check = &doctor->check[i];
+
+		if (strcmp(group, check->group))
+			printf("%s%s\n", i ? "\n" : "", check->group);
+		group = check->group;
+		printf("  %-8s %-11s %s\n", state_names[check->state], check->name,
+		       check->found);
+		if (check->state != OK && *check->fix)
+			printf("  %21s→ %s\n", "", check->fix);
+	}
+	printf("\n%d problems, %d warnings\n", count(doctor, PROBLEM),
+	       count(doctor, WARNING));
+}
+
+static void print_json(const struct doctor *doctor)
+{
+	json_t *checks = json_array();
+
+	for (int i = 0; i < doctor->n; i++) {
+		const struct check *check = &doctor->check[i];
+
+		json_array_append_new(checks,
+				      json_pack("{s:s, s:s, s:s, s:o, s:o}", "group",
+						check->group, "name", check->name,
+						"state", state_names[check->state],
+						"found", json_text(check->found), "fix",
+						check->state == OK || !*check->fix
+							? json_null()
+							: json_text(check->fix)));
+	}
+	json_print(json_pack("{s:i, s:o, s:i, s:i}", "schema", 1, "checks", checks,
+			     "problems", count(doctor, PROBLEM), "warnings",
+			     count(doctor, WARNING)));
+}
+
+int main(int argc, char **argv)
+{
+	static struct doctor doctor;
+
+	cli_parse(&command, argc, argv, &doctor);
+	cli_no_operands(argc, argv, "a rig is named with --rig");
+	check_group(&doctor);
+	check_realtime(&doctor);
+	check_module(&doctor);
+	check_rig(&doctor);
+	check_display(&doctor);
+	check_calibration(&doctor);
+	check_disk(&doctor);
+	if (doctor.json)
+		print_json(&doctor);
+	else
+		print(&doctor);
+	cli_finish();
+	return count(&doctor, PROBLEM) ? 1 : 0;
+}
