@@ -114,6 +114,7 @@ setup() {
 		calibrate,force incise-calibrate-force.1
 		calibrate-force incise-calibrate-force.1
 		incise-calibrate-force incise-calibrate-force.1
+		bench,precision incise-bench-precision.1
 		rig.conf rig.conf.5
 		scene incise-scene.5
 		incise-scene incise-scene.5

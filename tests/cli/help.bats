@@ -59,7 +59,15 @@ options_of_page() {
 		"$(cd "$INCISE_BUILD/bin" && printf '%s\n' incise-* | sort)" ]
 	for page in "$root"/man/incise-*.1; do
 		name=${page##*/}
-		[ -e "$root/tools/${name%.1}.c" ] || complain "$name is of no program"
+		# benchmarks have pages of their own
+		[ -e "$root/tools/${name%.1}.c" ] || [ -e "$root/tools/bench/bench_$(sed 's/^incise-bench-//; s/\.1$//' <<<"$name").c" ] ||
+			complain "$name is of no program"
+	done
+	# the list of bench's help: name, operands, and what it measures
+	benchmarks=$(incise bench --help | sed -nE '/^Measure/,/^compare/s/^  ([a-z]+)( \[[^]]*\])?  .*/\1/p')
+	[ "$(wc -w <<<"$benchmarks")" -ge 12 ]
+	for benchmark in $benchmarks; do
+		[ -e "$root/man/incise-bench-$benchmark.1" ] || complain "$benchmark has no page"
 	done
 	# incise itself
 	for option in --help -h --version -V; do

@@ -486,7 +486,7 @@ static void run(struct bench_run *run)
 	while (only && n < N(parts) && strcmp(only, parts[n].name))
 		n++;
 	if (n == N(parts))
-		cli_usage("'%s' is no run of capture; see incise-bench(1)", only);
+		cli_usage("'%s' is no run of capture; see incise-bench-capture(1)", only);
 	if (run->seconds > 0)
 		seconds = run->seconds;
 	/* Coding frames takes a second where others are busy. */
