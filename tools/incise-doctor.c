@@ -24,6 +24,7 @@
 
 enum state { OK, WARNING, PROBLEM };
 static const char *const state_names[] = {"ok", "warning", "problem"};
+static const enum cli_colour state_colours[] = {CLI_GREEN, CLI_YELLOW, CLI_RED};
 
 struct check {
 	const char *group, *name;
@@ -325,8 +326,10 @@ static void print(const struct doctor *doctor)
 		if (strcmp(group, check->group))
 			printf("%s%s\n", i ? "\n" : "", check->group);
 		group = check->group;
-		printf("  %-8s %-11s %s\n", state_names[check->state], check->name,
-		       check->found);
+		printf("  %s%-8s%s %-11s %s\n",
+		       cli_colour(stdout, state_colours[check->state]),
+		       state_names[check->state], cli_colour(stdout, CLI_PLAIN),
+		       check->name, check->found);
 		if (check->state != OK && *check->fix)
 			printf("  %21s→ %s\n", "", check->fix);
 	}

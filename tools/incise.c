@@ -87,10 +87,11 @@ static int unknown_command(const char *word)
 	for (size_t i = 0; i < COMMANDS; i++)
 		names[i + 1] = commands[i].name;
 	nearest = incise_nearest_name(word, names);
-	fprintf(stderr, "incise: '%.64s': no such command; ", word);
-	fprintf(stderr,
-		nearest ? "did you mean 'incise %s'?\n" : "'incise --help' lists them\n",
-		nearest);
+	if (nearest)
+		cli_error("'%.64s': no such command; did you mean 'incise %s'?", word,
+			  nearest);
+	else
+		cli_error("'%.64s': no such command; 'incise --help' lists them", word);
 	return 2;
 }
 
@@ -153,12 +154,14 @@ static int manual(const char *topic, const char *subcommand)
 		for (size_t i = 0; i < TOPICS; i++)
 			names[COMMANDS + i] = topics[i].name;
 		nearest = incise_nearest_name(topic, names);
-		fprintf(stderr, "incise: help %.64s: no such command or file format; ",
-			topic);
-		fprintf(stderr,
-			nearest ? "did you mean 'incise help %s'?\n"
-				: "'incise --help' lists the commands\n",
-			nearest);
+		if (nearest)
+			cli_error("help %.64s: no such command or file format; did you "
+				  "mean 'incise help %s'?",
+				  topic, nearest);
+		else
+			cli_error("help %.64s: no such command or file format; "
+				  "'incise --help' lists the commands",
+				  topic);
 		return 2;
 	}
 	if (asprintf(&path, "%s/../../man/%s", cli_folder(), page) < 0)
@@ -168,9 +171,9 @@ static int manual(const char *topic, const char *subcommand)
 	dot = strrchr(page, '.');
 	*dot = 0;
 	execlp("man", "man", dot + 1, page, (char *)NULL);
-	fprintf(stderr, "incise: man: %s; install the package man-db%s%.64s%s\n",
-		strerror(errno), topic ? ", or try 'incise " : "", topic ? topic : "",
-		topic ? " --help'" : "");
+	cli_error("man: %s; install the package man-db%s%.64s%s", strerror(errno),
+		  topic ? ", or try 'incise " : "", topic ? topic : "",
+		  topic ? " --help'" : "");
 	return 1;
 }
 
@@ -178,7 +181,7 @@ static int finish(void)
 {
 	if (!fflush(stdout))
 		return 0;
-	fprintf(stderr, "incise: standard output: %s\n", strerror(errno));
+	cli_error("standard output: %s", strerror(errno));
 	return 1;
 }
 
@@ -245,6 +248,6 @@ int main(int argc, char **argv)
 	/* A folder on PATH that may not be searched makes execvp say EACCES as well. */
 	if (errno == ENOENT || (errno == EACCES && !on_path(program)))
 		return unknown_command(command);
-	fprintf(stderr, "incise: %s: %s\n", program, strerror(errno));
+	cli_error("%s: %s", program, strerror(errno));
 	return 1;
 }

@@ -340,10 +340,29 @@ static bool to_journal(void)
 	       status.st_ino == inode;
 }
 
-/* @level: of syslog(3) */
-static void say(int level, const char *kind, const char *fmt, va_list args)
+const char *cli_colour(FILE *stream, enum cli_colour colour)
 {
+	static const char *const sequences[] = {
+		[CLI_PLAIN] = "\033[0m",  [CLI_BOLD] = "\033[1m",
+		[CLI_RED] = "\033[1;31m", [CLI_YELLOW] = "\033[1;33m",
+		[CLI_GREEN] = "\033[32m",
+	};
+	const char *refused = getenv("NO_COLOR"), *term = getenv("TERM");
+
+	if ((refused && *refused) || !term || !*term || !strcmp(term, "dumb") ||
+	    !isatty(fileno(stream)))
+		return "";
+	return sequences[colour];
+}
+
+/* @level: of syslog(3) */
+static void say(int level, const char *fmt, va_list args)
+{
+	const char *plain = cli_colour(stderr, CLI_PLAIN);
 	char text[700], prefix[8] = "";
+	enum cli_colour colour = level == LOG_ERR	? CLI_RED
+				 : level == LOG_WARNING ? CLI_BOLD
+							: CLI_PLAIN;
 
 	cli_progress_end();
 	vsnprintf(text, sizeof(text), fmt, args);
@@ -354,8 +373,20 @@ static void say(int level, const char *kind, const char *fmt, va_list args)
 	fflush(stdout);
 	if (to_journal())
 		snprintf(prefix, sizeof(prefix), "<%d>", level);
-	fprintf(stderr, "%sincise%s%s: %s%s\n", prefix, current ? " " : "",
-		current ? current->name : "", kind, text);
+	fprintf(stderr, "%s%sincise%s%s:%s ", prefix, cli_colour(stderr, colour),
+		current ? " " : "", current ? current->name : "", plain);
+	if (level == LOG_WARNING)
+		fprintf(stderr, "%swarning:%s ", cli_colour(stderr, CLI_YELLOW), plain);
+	fprintf(stderr, "%s\n", text);
+}
+
+void cli_error(const char *fmt, ...)
+{
+	va_list args;
+
+	va_start(args, fmt);
+	say(LOG_ERR, fmt, args);
+	va_end(args);
 }
 
 void cli_fail(const char *fmt, ...)
@@ -363,7 +394,7 @@ void cli_fail(const char *fmt, ...)
 	va_list args;
 
 	va_start(args, fmt);
-	say(LOG_ERR, "", fmt, args);
+	say(LOG_ERR, fmt, args);
 	va_end(args);
 	exit(1);
 }
@@ -385,7 +416,7 @@ void cli_usage(const char *fmt, ...)
 	va_list args;
 
 	va_start(args, fmt);
-	say(LOG_ERR, "", fmt, args);
+	say(LOG_ERR, fmt, args);
 	va_end(args);
 	fprintf(stderr, "Try 'incise %s --help'.\n", current ? current->name : "");
 	exit(2);
@@ -396,7 +427,7 @@ void cli_warn(const char *fmt, ...)
 	va_list args;
 
 	va_start(args, fmt);
-	say(LOG_WARNING, "warning: ", fmt, args);
+	say(LOG_WARNING, fmt, args);
 	va_end(args);
 }
 
@@ -407,7 +438,7 @@ void cli_note(const char *fmt, ...)
 	if (!verbose)
 		return;
 	va_start(args, fmt);
-	say(LOG_INFO, "", fmt, args);
+	say(LOG_INFO, fmt, args);
 	va_end(args);
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * The conventions of all commands: options and --help from one table, numbers with units,
- * one line per error, progress on a terminal, signals that end a run cleanly.
+ * one line per error, progress and colour on a terminal, signals that end a run cleanly.
  *
  * Exit codes: 0 success, 1 failure, 2 bad usage. If stderr is the journal of systemd, lines
  * begin with a level as of sd-daemon(3).
@@ -13,6 +13,7 @@
 #include <signal.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <incise/error.h>
 #include <incise/export.h>
 
@@ -168,6 +169,9 @@ void *cli_require(void *result, const struct incise_error *err);
 /* Bad usage: one line and a hint to --help; exit 2. */
 _Noreturn void cli_usage(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
+/* The same line as cli_fail(), and the program goes on. */
+void cli_error(const char *fmt, ...) INCISE_PRINTF(1, 2);
+
 /* A line "incise COMMAND: warning: …" on stderr. */
 void cli_warn(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
@@ -240,6 +244,13 @@ void cli_progress_forget(void);
 /* SIGINT, SIGTERM and SIGHUP set cli_stop. A second SIGINT or SIGTERM kills. */
 void cli_catch_signals(void);
 extern volatile sig_atomic_t cli_stop;
+
+/*
+ * The escape sequence that begins a colour, or with CLI_PLAIN ends it; "" unless the stream is a
+ * terminal with colours. NO_COLOR, not empty, turns them off (no-color.org), TERM=dumb as well.
+ */
+enum cli_colour { CLI_PLAIN, CLI_BOLD, CLI_RED, CLI_YELLOW, CLI_GREEN };
+const char *cli_colour(FILE *stream, enum cli_colour colour);
 
 /* Flush standard output; a failed write is exit 1 (a closed pipe is quiet). */
 void cli_finish(void);
