@@ -31,7 +31,7 @@ $(O)/obj/tools/cli/image.o: cppflags += $(if $(has_png),-DHAVE_PNG)
 # The parts of all programs. The linker takes of them, and of the libraries, what a program
 # uses: a new part, command or benchmark is found by its place.
 tool_parts := $(O)/obj/tools/parts.a
-tool_texts := $(wildcard tools/bench/*.md tools/cli/*.css tools/bench/plots/*.gp)
+tool_texts := $(wildcard tools/bench/*.md tools/cli/*.css tools/cli/*.gp tools/bench/plots/*.gp)
 $(tool_parts): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tools/*/*.c)) $(tool_texts:%=$(O)/obj/%.o)
 	@rm -f $@
 	$(call step,AR)

@@ -516,7 +516,7 @@ static void remove_folder(void)
 #define SHAPE 0.75 /* height of a path's plot, of its width */
 #define CIRCLE 72  /* corners of the membrane's */
 
-static const char *const colours[] = {"#888888", "#1b6ca8", "#2e8b57", "#8e44ad"};
+static const char *const colours[] = {"grey", "blue", "green", "purple"};
 
 struct range {
 	double low[2], high[2];
@@ -646,18 +646,18 @@ static void draw_path(const struct session *s, const struct session *reference,
 	/* A plot of nothing is an error of gnuplot. */
 	fputs("plot NaN notitle", script);
 	if (cuts)
-		fputs(", $cuts with lines lw 6 lc rgb '#e59a90' title 'cut'", script);
+		fputs(", $cuts with lines lw 6 lc rgb orange title 'cut'", script);
 	for (int tool = 0; tool <= INCISE_TOOL_TUBE; tool++)
 		if (there[tool])
-			fprintf(script, ", $%s with lines lw %s lc rgb '%s' title '%s'",
+			fprintf(script, ", $%s with lines lw %s lc rgb %s title '%s'",
 				loop_tool_names[tool], tool ? "2" : "0.7", colours[tool],
 				tool ? loop_tool_names[tool] : "in the air");
 	if (expert)
-		fputs(", $expert with lines lw 2 dt 2 lc rgb 'black' title 'cut, "
+		fputs(", $expert with lines lw 2 dt 2 lc rgb ink title 'cut, "
 		      "reference'",
 		      script);
 	if (s->has_membrane)
-		fputs(", $membrane with lines lw 2 lc rgb '#d68910' title 'membrane'",
+		fputs(", $membrane with lines lw 2 lc rgb orange title 'membrane'",
 		      script);
 	plot_draw_or_fail(script, folder, name);
 }
@@ -677,7 +677,7 @@ static void put_phases(FILE *script, const struct session *s)
 	for (int i = 0; i < s->n_phases; i++)
 		fprintf(script,
 			"set object %d rectangle from %.4f, graph 0 to %.4f, graph 1 "
-			"fc rgb '%s' fs solid 0.15 noborder behind\n",
+			"fc rgb %s fs solid 0.15 noborder behind\n",
 			i + 1, s->phase[i].from_s, s->phase[i].to_s,
 			colours[s->phase[i].tool]);
 }
@@ -703,15 +703,15 @@ static void draw_force(const struct session *s, const struct session *reference,
 		put_force(script, "expert", reference, later_s);
 	fputs("plot $force with lines ls 2 title 'force'", script);
 	if (!isnan(later_s))
-		fputs(", $expert with lines lw 1 dt 2 lc rgb 'black' title 'reference'",
+		fputs(", $expert with lines lw 1 dt 2 lc rgb ink title 'reference'",
 		      script);
 	if (asked->asked)
 		fprintf(script,
-			", %.4f with lines lw 2 dt 3 lc rgb '#b03a2e' title 'at most'",
+			", %.4f with lines lw 2 dt 3 lc rgb vermillion title 'at most'",
 			asked->max);
 	for (int tool = 1; tool <= INCISE_TOOL_TUBE; tool++)
 		fprintf(script,
-			", NaN with boxes fs solid 0.15 noborder lc rgb '%s' title '%s'",
+			", NaN with boxes fs solid 0.15 noborder lc rgb %s title '%s'",
 			colours[tool], loop_tool_names[tool]);
 	plot_draw_or_fail(script, folder, name);
 }

@@ -114,10 +114,10 @@ static void draw_plot(struct plot *plot)
 	fprintf(script,
 		"set multiplot layout 2,1\n"
 		"set xlabel 'time / s'\nset key top right\nset ylabel 'force / N'\n"
-		"plot '%s' using 1:2 with lines lc rgb '#999999' title 'measured', \\\n"
+		"plot '%s' using 1:2 with lines lc rgb grey title 'measured', \\\n"
 		"  '' using 1:3 with lines ls 2 title 'predicted'\n"
 		"set ylabel 'depth / mm'\nset yrange [0:*]\n"
-		"plot '%s' using 1:4 with lines lc rgb '#999999' title 'recorded', \\\n"
+		"plot '%s' using 1:4 with lines lc rgb grey title 'recorded', \\\n"
 		"  '' using 1:5 with lines ls 1 title 'in the loop'\n"
 		"unset multiplot\n",
 		plot->file, plot->file);

@@ -303,31 +303,31 @@ static void draw(const struct depth_result *r, const char *folder)
 		fprintf(script,
 			"set xlabel 'exposed length / px'\nset ylabel 'depth / mm'\n"
 			"set key top right\n"
-			"plot 'depth.dat' using 2:($5 > 0 ? $3 : 1/0) pt 7 ps 0.5 lc rgb '#1b6ca8' "
+			"plot 'depth.dat' using 2:($5 > 0 ? $3 : 1/0) pt 7 ps 0.5 lc rgb blue "
 			"title 'pairs', \\\n"
-			"  '' using 2:($5 > 0 ? 1/0 : $3) pt 2 lc rgb '#c0392b' title 'outliers', \\\n"
+			"  '' using 2:($5 > 0 ? 1/0 : $3) pt 2 lc rgb vermillion title 'outliers', \\\n"
 			"  %.12g * (%.12g - x) ls 3 title 'fit'\n",
 			r->fit->mm_px, r->fit->full_px);
 	else if (r->fit)
 		fprintf(script,
 			"set xlabel 'reading'\nset ylabel 'length / px'\nset key top right\n"
-			"plot 'depth.dat' using 1:($5 > 0 ? $2 : 1/0) pt 7 ps 0.7 lc rgb '#1b6ca8' "
+			"plot 'depth.dat' using 1:($5 > 0 ? $2 : 1/0) pt 7 ps 0.7 lc rgb blue "
 			"title 'lengths', \\\n"
-			"  '' using 1:($5 > 0 ? 1/0 : $2) pt 2 lc rgb '#c0392b' title 'outliers', \\\n"
+			"  '' using 1:($5 > 0 ? 1/0 : $2) pt 2 lc rgb vermillion title 'outliers', \\\n"
 			"  %.12g ls 3 title 'mean'\n",
 			r->fit->full_px);
 	else
 		fprintf(script,
 			"set xlabel 'x / px'\nset ylabel 'y / px'\nset yrange [*:*] reverse\n"
 			"set size ratio -1\n"
-			"plot 'depth.dat' using 1:2 pt 1 lc rgb '#1b6ca8'\n");
+			"plot 'depth.dat' using 1:2 pt 1 lc rgb blue\n");
 	plot_draw_or_fail(script, folder, "fit");
 	script = plot_begin(folder, "residuals", 900, 600);
 	if (r->fit)
 		fprintf(script,
 			"set xlabel '%s'\nset ylabel 'residual / mm'\n"
 			"plot 'depth.dat' using %d:($5 > 0 ? $4 : 1/0) pt 7 ps 0.5 lc rgb "
-			"'#1b6ca8', 0 ls 3\n",
+			"blue, 0 ls 3\n",
 			line ? "exposed length / px" : "reading", line ? 2 : 1);
 	else
 		fprintf(script,
@@ -335,7 +335,7 @@ static void draw(const struct depth_result *r, const char *folder)
 			"set title 'corners in the plane, off by, 100 times as large'\n"
 			"set size ratio -1\n"
 			"plot 'depth.dat' using 3:4:($5 * 100):($6 * 100) with vectors lc rgb "
-			"'#1b6ca8'\n");
+			"blue\n");
 	plot_draw_or_fail(script, folder, "residuals");
 }
 

@@ -140,8 +140,7 @@ void model_plot_surface(FILE *script, const struct incise_model *model, const ch
 	put_axis(script, "cb", &info->output);
 	fprintf(script,
 		"set zlabel rotate parallel\nset yrange [*:*]\nset ticslevel 0\n"
-		"set view 55,320\nset palette rgbformulae 33,13,10\n"
-		"set pm3d border lc rgb '#555555' lw 0.3\n"
+		"set view 55,320\n"
 		"splot '%s' with pm3d%s\n",
 		data, more);
 }

@@ -7,9 +7,13 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
+#include <unistd.h>
 #include "cli.h"
+#include "file.h"
 #include "folder.h"
 #include "plot.h"
+
+extern const char text_style_gp[];
 
 #define NAME_CHARACTERS \
 	"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-"
@@ -96,24 +100,30 @@ void plot_data_end(FILE *data, const char *folder)
 			 strerror(errno ? errno : EIO));
 }
 
+/* A style that is there stays, with the changes of whoever made them; --overwrite replaces it. */
+static void write_style(const char *folder)
+{
+	char *path = plot_path(folder, "style", ".gp");
+	struct incise_outfile *file;
+
+	if (access(path, F_OK) || cli_overwrite()) {
+		fputs(text_style_gp, whole_file_begin(path, &file));
+		whole_file_end(file);
+	}
+	free(path);
+}
+
 FILE *plot_begin(const char *folder, const char *name, int width, int height)
 {
 	FILE *script;
 
 	plot_reserve(folder, name);
 	script = open_plot(folder, name, ".gp");
+	write_style(folder);
 	fprintf(script,
 		"# gnuplot -e \"ext='png'\" %s.gp\n"
-		"if (ext eq 'png') { set terminal pngcairo size %d,%d font 'DejaVu Sans,11' } \\\n"
-		"else { set terminal svg size %d,%d font 'DejaVu Sans,11' background 'white' }\n"
-		"set output '../%s.'.ext\n"
-		"set style line 1 lc rgb '#1b6ca8' lw 1.5\n"
-		"set style line 2 lc rgb '#c0392b' lw 1.5\n"
-		"set style line 3 lc rgb '#2e8b57' lw 1.5\n"
-		"set style line 4 lc rgb '#8e44ad' lw 1.5\n"
-		"set style line 5 lc rgb '#d68910' lw 1.5\n"
-		"set termoption noenhanced\nset grid lt 1 lw 1 lc rgb '#dddddd'\nset key noautotitle\n",
-		name, width, height, width, height, name);
+		"width = %d\nheight = %d\nload 'style.gp'\nset output '../%s.'.ext\n",
+		name, width, height, name);
 	return script;
 }
 

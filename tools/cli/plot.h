@@ -1,9 +1,13 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * A plot by gnuplot: script and data in FOLDER/plot/, the result as FOLDER/NAME.png and
- * .svg. The script stays, so that anyone can draw the plot again:
+ * .svg. The script stays, so that anyone can draw the plot again, also as .pdf:
  *
  *     cd FOLDER/plot && gnuplot -e "ext='png'" NAME.gp
+ *
+ * FOLDER/plot/style.gp, which each script loads, is the text of tools/cli/style.gp: colours,
+ * markers, fonts, number formats and the key of every figure. A script names a colour or takes
+ * a line type 1 to 8 of it, and holds none of its own.
  */
 #ifndef INCISE_PLOT_H
 #define INCISE_PLOT_H
@@ -34,7 +38,7 @@ FILE *plot_data(const char *folder, const char *name);
 /* Close it; fails the program when not all of it was written. */
 void plot_data_end(FILE *data, const char *folder);
 
-/* Open the script of a plot of width × height pixels; gnuplot commands follow. */
+/* Open the script of a plot of width × height pixels of 1/96 inch; gnuplot commands follow. */
 FILE *plot_begin(const char *folder, const char *name, int width, int height);
 
 /* Close the script and draw. Returns whether both files were made. */

@@ -275,7 +275,7 @@ static void figure_surface(const struct demo *demo, const struct incise_model *m
 	model_plot_surface(
 		script, model, "surface.dat",
 		"Force of the trained model (as paper 1, fig. 3b); dots: the averaged pairs",
-		", \\\n  'pairs.dat' with points pt 7 ps 0.6 lc rgb 'black'");
+		", \\\n  'pairs.dat' with points pt 7 ps 0.6 lc rgb ink");
 	draw(demo, script, "fig3b-surface");
 }
 
@@ -337,12 +337,12 @@ static void figure_prediction(const struct demo *demo)
 	      "set xlabel 'time in the cut / s'\nset ylabel 'force / N'\nset key top right\n"
 	      "set xrange [0:*]\nset yrange [0:*]\n"
 	      "set title '(a) predicted by the model, and measured'\n"
-	      "plot 'prediction.dat' using 1:2 with lines lc rgb '#999999' title 'measured', \\\n"
+	      "plot 'prediction.dat' using 1:2 with lines lc rgb grey title 'measured', \\\n"
 	      "  '' using 1:3 with lines ls 2 lw 2 title 'predicted'\n"
 	      "set title '(b) rendered by the haptic loop, and recorded'\n"
-	      "plot 'prediction.dat' using 1:2 with lines lc rgb '#999999' title 'recorded', \\\n"
+	      "plot 'prediction.dat' using 1:2 with lines lc rgb grey title 'recorded', \\\n"
 	      "  'rendered.dat' using 1:3 with lines ls 3 lw 2.5 title 'on the hand', \\\n"
-	      "  '' using 1:2 with lines lc rgb 'black' dt 2 title 'commanded'\n"
+	      "  '' using 1:2 with lines lc rgb ink dt 2 title 'commanded'\n"
 	      "unset multiplot\n",
 	      script);
 	draw(demo, script, "fig5-prediction");
@@ -368,7 +368,7 @@ static void figure_lateness(const struct demo *demo, const json_t *haptic)
 	script = plot_begin(demo->folder, "tick-lateness", 1000, 500);
 	fprintf(script,
 		"set title 'Lateness of %g ticks at 1 kHz (this machine, %s): median %s, "
-		"99.9 %% %s, largest %.0f us'\n"
+		"99.9 %% %s, largest %.0f µs'\n"
 		"set xlabel 'lateness / us (the last bin holds all above 20 ms)'\n"
 		"set ylabel 'ticks'\nset logscale xy\nset xrange [0.4:25000]\n"
 		"set yrange [0.7:*]\nset style fill solid 0.6\n"

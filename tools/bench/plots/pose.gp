@@ -3,17 +3,17 @@
 # motion, a colour for each method; the sixth panel is the key.
 rates = suffix eq "rates"
 methods = rates ? 8 : 7 # the exact pose is the last one, and has no cost
-set style line 11 lc rgb '#999999' lw 1.3 pt 7
-set style line 12 lc rgb '#c0392b' lw 1.3 pt 7
-set style line 13 lc rgb '#2e8b57' lw 1.3 pt 7
-set style line 14 lc rgb '#1f4e9c' lw 2.2 pt 7
-set style line 15 lc rgb '#d68910' lw 1.3 pt 7
-set style line 16 lc rgb '#17a2b8' lw 1.3 pt 7
-set style line 17 lc rgb '#8e44ad' lw 1.3 pt 7
-set style line 18 lc rgb 'black' lw 1 dt 3 pt 0
+set style line 11 lc rgb grey lw 1.3 pt 7
+set style line 12 lc rgb vermillion lw 1.3 pt 7
+set style line 13 lc rgb green lw 1.3 pt 7
+set style line 14 lc rgb blue lw 2.2 pt 7
+set style line 15 lc rgb orange lw 1.3 pt 7
+set style line 16 lc rgb sky lw 1.3 pt 7
+set style line 17 lc rgb purple lw 1.3 pt 7
+set style line 18 lc rgb ink lw 1 dt 3 pt 0
 set multiplot layout 2,3 title sprintf("Error of the shown pose over %s: a tracker that is \
 %g ms late, with %g mm of noise and %g %% lost", rates ? "the tracker's rate" : "its cost", \
-	delay_ms, noise_mm, lost * 100) font ',13'
+	delay_ms, noise_mm, lost * 100) font large
 set logscale xy
 set ylabel 'rms error / mm'
 set format y '%g'
@@ -41,7 +41,7 @@ do for [i=1:words(data_panel)] {
 			with xerrorbars ls 10+k ps 0.7, \
 		for [k=1:methods] data index block(k) \
 			using (x(0)):"rms_mm":(number(column("tracker_hz"))) \
-			with labels left offset 0.4,0.4 font ',8'
+			with labels noenhanced left offset 0.4,0.4 font small
 }
 if (!rates) { set label 1 'numbers: Hz of the tracker' at graph 0.1, 0.05 }
 unset logscale
@@ -52,7 +52,7 @@ unset xtics
 unset ytics
 unset border
 unset grid
-set key at graph 0.9, 0.95 top right Left reverse samplen 3 spacing 1.4 font ',12'
+set key at graph 0.9, 0.95 top right Left reverse samplen 3 spacing 1.4 font large
 set xrange [0:1]
 set yrange [0:1]
 plot for [k=1:methods] NaN with linespoints ls 10+k \

@@ -10,7 +10,7 @@ set xrange [STATS_min / 1.5:STATS_max * 3]
 set yrange [*:*] extend
 set offsets 0, 0, graph 0.1, graph 0.05
 set key outside bottom center horizontal
-set style line 6 lc rgb 'black'
+set style line 6 lc rgb ink
 # An error of 0 has no place on a logarithmic axis.
 error(dummy) = column("max_error_N") > 1e-18 ? column("max_error_N") : 1e-18
 plot for [i=1:words(data_kind)] data index word(data_kind, i) \
@@ -20,4 +20,4 @@ plot for [i=1:words(data_kind)] data index word(data_kind, i) \
 		using "ns":(error(0)):"ns_p5":"ns_p95" with xerrorbars ls i pt 7 ps 0.8 \
 		title word(data_kind, i), \
 	for [i=1:words(data_kind)] data index word(data_kind, i) using "ns":(error(0)):"name" \
-		with labels left rotate by 25 offset 0.5,0.3 font ',8'
+		with labels noenhanced left rotate by 25 offset 0.5,0.3 font small

@@ -5,7 +5,7 @@ stats data using "tick_ns" nooutput
 bar = 0.36
 height = 160 + 46 * STATS_records
 set multiplot layout 1,2 title sprintf("A tick of each scene, against the full pipeline\n%s, %s", \
-	cpu, kernel) font ',12'
+	cpu, kernel) font large
 set yrange [STATS_records - 0.4:-0.6]
 set xrange [0:*]
 set offsets 0, graph 0.12, 0, 0
@@ -19,10 +19,10 @@ set rmargin at screen 0.56
 set xlabel 'median time of a tick / ns'
 set style fill solid 1 noborder
 bars(few, full, names) = sprintf("\
-data using (0):($0):(0):'%s':($0-bar):($0)%s with boxxyerror fc rgb '#1b6ca8' title 'only what the scene needs', \
-data using '%s':($0-bar/2):(sprintf('%%.0f', column('%s'))) with labels left offset 0.6,0 font ',9', \
-data using (0):($0):(0):'%s':($0):($0+bar) with boxxyerror fc rgb '#d68910' title 'every stage kept, neutral', \
-data using '%s':($0+bar/2):(sprintf('%%.0f', column('%s'))) with labels left offset 0.6,0 font ',9'", \
+data using (0):($0):(0):'%s':($0-bar):($0)%s with boxxyerror fc rgb blue title 'only what the scene needs', \
+data using '%s':($0-bar/2):(sprintf('%%.0f', column('%s'))) with labels noenhanced left offset 0.6,0 font small, \
+data using (0):($0):(0):'%s':($0):($0+bar) with boxxyerror fc rgb orange title 'every stage kept, neutral', \
+data using '%s':($0+bar/2):(sprintf('%%.0f', column('%s'))) with labels noenhanced left offset 0.6,0 font small", \
 	few, names, few, few, full, full, full)
 eval 'plot '.bars("tick_ns", "full_ns", ":ytic(stringcolumn('name'))")
 unset key

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # Cases that come to rest, and how far the force is off, over the gain.
-set multiplot layout 1,2 title "guards in the real plan, late tracker and late actuator" font ',12'
+set multiplot layout 1,2 title "guards in the real plan, late tracker and late actuator" font large
 set xrange [0.95:2.05]
 set xlabel 'gain / largest that is accepted'
 set key bottom left Left reverse

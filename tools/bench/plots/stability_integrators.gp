@@ -4,11 +4,11 @@ names = "explicit_euler semi_implicit_euler implicit_euler trapezoid rk4 exact_z
 titles = "'explicit Euler' 'semi-implicit Euler' 'implicit Euler' trapezoid RK4 \
 'exact, a matrix (ZOH)' 'exact, plant with events'"
 diverged = 10 # its place on the axis
-set style line 6 lc rgb 'black' lw 1.5
-set style line 7 lc rgb '#888888' lw 1.5
+set style line 6 lc rgb ink lw 1.5
+set style line 7 lc rgb grey lw 1.5
 set multiplot layout 1,3 title "Integrators of a mass on a spring: 50 g, ratio of damping 0.1" \
-	font ',13'
-set termoption enhanced
+	font large
+
 set logscale xy
 set format xy '10^{%L}'
 set yrange [1e-17:diverged * 3]

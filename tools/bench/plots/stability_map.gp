@@ -2,12 +2,12 @@
 # Largest stable stiffness: a panel for each damping of the wall, a curve for each delay.
 least = 1e-4
 set multiplot layout 1,words(data_BT_m) title "Largest stable stiffness of a sampled wall\n\
-lines computed, points simulated in time; stable below; triangle: none is" font ',13'
+lines computed, points simulated in time; stable below; triangle: none is" font large
 set logscale xy
 set xrange [5e-4:20]
 set yrange [least:50]
 set format xy '10^{%L}'
-set termoption enhanced
+
 set xlabel "damping of the device, bT/m"
 set key top left Left reverse
 block(wall, delay) = sprintf("%s %s", wall, word(data_delay, delay))

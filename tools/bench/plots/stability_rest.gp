@@ -16,5 +16,5 @@ set arrow from 3.5, 0.01 to 70, 0.01 nohead dt 2
 set label 'more is a swing' at 3.7, 0.016
 plot for [v in data_blocks] data index v \
 	using (beside(column("damping_N_s_mm"), column("mass_kg"), column("tracker_hz"))):(least(column("swing_mm"))) \
-	with points pt (v eq "accepted" ? 7 : 2) ps 0.7 lc rgb (v eq "accepted" ? '#2e8b57' : '#c0392b') \
+	with points pt (v eq "accepted" ? 7 : 2) ps 0.7 lc rgb (v eq "accepted" ? green : vermillion) \
 	title v

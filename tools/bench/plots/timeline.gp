@@ -2,20 +2,20 @@
 # Error of a sample's time over its cost, or over how much was seen: a panel for each kind of
 # lateness, a colour for each method.
 windows = suffix eq "windows"
-set style line 11 lc rgb '#999999' lw 1.3
-set style line 12 lc rgb '#d68910' lw 1.3
-set style line 13 lc rgb '#c0392b' lw 1.3
-set style line 14 lc rgb '#2e8b57' lw 1.3
-set style line 15 lc rgb '#8e44ad' lw 1.3
-set style line 16 lc rgb '#1f4e9c' lw 2.2
-set style line 17 lc rgb 'black' lw 1
-set style line 18 lc rgb '#17a2b8' lw 2.2
+set style line 11 lc rgb grey lw 1.3
+set style line 12 lc rgb orange lw 1.3
+set style line 13 lc rgb vermillion lw 1.3
+set style line 14 lc rgb green lw 1.3
+set style line 15 lc rgb purple lw 1.3
+set style line 16 lc rgb blue lw 2.2
+set style line 17 lc rgb ink lw 1
+set style line 18 lc rgb sky lw 2.2
 set multiplot layout 1,3 title sprintf("Error of times of acquisition over %s: %d Hz by a clock \
 that is off by %g ppm, up to %d ms late", windows ? "how much was seen" : "their cost", rate_hz, \
-	drift_ppm, late_ms) font ',13'
+	drift_ppm, late_ms) font large
 set logscale xy
-set ylabel 'rms error / us'
-set key bottom left Left reverse samplen 2 spacing 0.95 font ',9'
+set ylabel 'rms error / µs'
+set key bottom left Left reverse samplen 2 spacing 0.95 font small
 set format y '%g'
 if (windows) {
 	set xlabel 'seen / s'
@@ -45,7 +45,7 @@ do for [i=1:words(data_late)] {
 				with xerrorbars ls 10+k pt 7 ps 0.7 title word(data_name, k), \
 			for [k=1:8] data index block(k) \
 				using "ns_per_sample":"rms_us":(number(column("window_s"))) \
-				with labels left offset 0.5,0.4 font ',8'
+				with labels noenhanced left offset 0.5,0.4 font small
 	}
 }
 unset multiplot

@@ -16,4 +16,4 @@ plot for [i=1:words(data_kind)] data index word(data_kind, i) \
 		with yerrorbars ls i pt 7 ps 0.8 title word(data_kind, i), \
 	for [i=1:words(data_kind)] data index word(data_kind, i) \
 		using "seconds":"rmse_unseen_N":"name" \
-		with labels left rotate by 20 offset 0.6,0.3 font ',8'
+		with labels noenhanced left rotate by 20 offset 0.6,0.3 font small

@@ -19,7 +19,7 @@ decade(k) = 10.0**floor(log10(low[k]))
 three(d) = sprintf("%g, %g, %g", d, 2 * d, 5 * d)
 tics(d, end) = d < end ? three(d).(10 * d < end ? ", ".tics(10 * d, end) : "") : ""
 set multiplot layout 1,2 title sprintf("What a screen shows of a cut that bleeds, at 15, 30 and 60 frames a second, against a texture of %d² at that very moment", \
-	word(data_texture_px, words(data_texture_px)) + 0) font ',13'
+	word(data_texture_px, words(data_texture_px)) + 0) font large
 set logscale xy
 set key bottom left
 set xlabel 'run time for a second that is shown / ms'
@@ -36,6 +36,6 @@ do for [k=2:3] {
 			title sprintf("texture %s²", word(data_blocks, i)), \
 		for [i=1:words(data_blocks)] data index word(data_blocks, i) \
 			using "ms_per_s":(error(k)):"fps" \
-			with labels offset 0.6,0.6 left font ',9' notitle
+			with labels noenhanced offset 0.6,0.6 left font small notitle
 }
 unset multiplot

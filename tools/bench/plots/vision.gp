@@ -20,6 +20,6 @@ plot for [i=1:2] data index word(regions, i) \
 	for [i=1:2] data index word(regions, i) using "ms":"rms_px":"ms_p5":"ms_p95" \
 		with xerrorbars ls i pt 7 ps 0.8 title word(titles, i), \
 	data index "whole" using "ms":"rms_px":"name" \
-		with labels left rotate by -20 offset 0.6,-0.3 font ',8', \
+		with labels noenhanced left rotate by -20 offset 0.6,-0.3 font small, \
 	data index "follows" using "ms":"rms_px":"name" \
-		with labels left rotate by 20 offset 0.6,0.3 font ',8'
+		with labels noenhanced left rotate by 20 offset 0.6,0.3 font small
