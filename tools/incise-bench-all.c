@@ -311,15 +311,13 @@ static int write_html(const char *path, const char *markdown, struct incise_erro
 	return 0;
 }
 
-static int write_json(const char *path, const json_t *report, struct incise_error *err)
+static int write_json(const char *path, json_t *report, struct incise_error *err)
 {
 	struct incise_outfile *file = open_part(path, "report.json", err);
 
 	if (!file)
 		return -errno;
-	json_dumpf(report, incise_outfile_stream(file),
-		   JSON_INDENT(1) | JSON_REAL_PRECISION(12));
-	fputc('\n', incise_outfile_stream(file));
+	json_write(incise_outfile_stream(file), report, JSON_INDENT(1));
 	return incise_outfile_commit(file, err);
 }
 
@@ -357,7 +355,7 @@ static int write_texts(const char *path, struct incise_error *err)
  * report.json, and report.md and report.html of it, each of them whole or not at all. They are
  * of what a reader of report.json gets, rounded as it is.
  */
-static int write_report(const char *path, const json_t *report, struct incise_error *err)
+static int write_report(const char *path, json_t *report, struct incise_error *err)
 {
 	int rc = write_json(path, report, err);
 
@@ -551,10 +549,12 @@ static json_t *begin_report(const struct job *job)
 
 	gmtime_r(&now, &utc);
 	strftime(date, sizeof(date), "%Y-%m-%d %H:%M UTC", &utc);
-	return json_pack("{ss ss so sb so so so so so}", "version", incise_version(),
-			 "date", date, "command", command_of(job), "quick", job->quick,
-			 "machine", machine_json(), "runs", json_object(), "failed",
-			 json_array(), "words", json_object(), "figures", json_array());
+	return json_with_schema(
+		json_pack("{ss ss so sb so so so so so}", "version", incise_version(),
+			  "date", date, "command", command_of(job), "quick", job->quick,
+			  "machine", machine_json(), "runs", json_object(), "failed",
+			  json_array(), "words", json_object(), "figures", json_array()),
+		NULL);
 }
 
 /* Of a report of all benchmarks; that of one is itself. */

@@ -13,6 +13,7 @@
 #include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/recording.h"
+#include "cli/uncertainty.h"
 
 /* Kinds of calibration, the nominal values, and their keys. */
 static const struct {
@@ -191,6 +192,7 @@ static void print_status(const struct incise_calibration *calibration, int kind,
 			 const struct status *s)
 {
 	const struct incise_calibration_record *r = s->passed;
+	char text[UNCERTAINTY_TEXT];
 
 	printf("%-8s %s", kinds[kind].name,
 	       s->due ? s->failed ? "FAILED" : "due" : "good");
@@ -204,8 +206,8 @@ static void print_status(const struct incise_calibration *calibration, int kind,
 		const struct incise_calibration_value *v = &r->values[i];
 		double now = incise_calibration_get(calibration, v->key);
 
-		printf("         %-22s %.8g %s, U = %.2g (k = 2)", v->key, v->left,
-		       v->unit, 2 * v->u);
+		printf("         %-22s %s (k = 2)", v->key,
+		       uncertainty_text(v->left, 2 * v->u, v->unit, text));
 		if (now != v->left)
 			printf("; in force: %.8g", now);
 		putchar('\n');
@@ -287,16 +289,18 @@ static void compare(const char *path, struct comparison *c)
 static void print_comparison(const char *path, const struct comparison *c)
 {
 	const struct incise_redundancy *r = &c->redundancy;
+	char text[UNCERTAINTY_TEXT];
 
 	printf("\n%s: camera - tracker, of %d pictures\n", path, r->n);
-	printf("         bias     %+.3f mm, U = %.2g mm\n", r->bias_mm, 2 * r->bias_u_mm);
+	printf("         bias     %s (k = 2)\n",
+	       uncertainty_text(r->bias_mm, 2 * r->bias_u_mm, "mm", text));
 	if (isfinite(r->trend))
-		printf("         trend    %+.2f %% of the depth, U = %.2g %%, over %.1f to "
-		       "%.1f mm\n",
-		       100 * r->trend, 200 * r->trend_u, r->depth_low_mm,
-		       r->depth_high_mm);
-	printf("         places   %.3f mm apart, U = %.2g mm, over %.0f mm\n",
-	       r->place_mm, 2 * r->place_u_mm, r->travel_mm);
+		printf("         trend    %s of the depth (k = 2), over %.1f to %.1f mm\n",
+		       uncertainty_text(100 * r->trend, 200 * r->trend_u, "%", text),
+		       r->depth_low_mm, r->depth_high_mm);
+	printf("         places   %s apart (k = 2), over %.0f mm\n",
+	       uncertainty_text(r->place_mm, 2 * r->place_u_mm, "mm", text),
+	       r->travel_mm);
 	printf("         scatter  sd %.3f mm\n         %s\n", r->scatter_sd_mm,
 	       c->verdict);
 }

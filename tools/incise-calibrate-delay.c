@@ -19,6 +19,7 @@
 #include "cli/json.h"
 #include "cli/plot.h"
 #include "cli/recording.h"
+#include "cli/uncertainty.h"
 
 /* A drift that is this many times its uncertainty is real. */
 #define DRIFT_SIGMAS 4
@@ -401,7 +402,7 @@ static void fill_record(const struct options *options, const struct stream *stre
 	for (int i = 0; i < STREAMS; i++) {
 		struct lateness late;
 		double u, delay = streams[i].about.delay_ms;
-		char key[32];
+		char key[32], text[UNCERTAINTY_TEXT];
 
 		if (i == options->reference || (i != TRACKER && !pairs[i].known))
 			continue;
@@ -413,13 +414,14 @@ static void fill_record(const struct options *options, const struct stream *stre
 		calibrate_value(record, key, "ms", found[i][1], u, 0);
 		if (out)
 			fprintf(out,
-				"\n%s_delay_ms = %.3f ms: %.3f ms of the recording and "
-				"%.3f ms measured; u = %.3f ms, U = %.3f ms (k = 2)\n"
+				"\n%s_delay_ms = %s (k = 2): %.3f ms of the recording and "
+				"%.3f ms measured; u = %.2g ms\n"
 				"  budget            type  u, ms   sensitivity\n"
 				"  fit of the motion A     %.4f  1\n"
 				"  lines of arrivals B     %.4f  1\n",
-				stream_names[i], delay + late.ms, delay, late.ms, u,
-				2 * u, late.fits_u, late.lines_u);
+				stream_names[i],
+				uncertainty_text(delay + late.ms, 2 * u, "ms", text),
+				delay, late.ms, u, late.fits_u, late.lines_u);
 	}
 	if (out)
 		fprintf(out, "\npass\n");

@@ -13,6 +13,7 @@
 #include "calibrate/force.h"
 #include "cli/json.h"
 #include "cli/plot.h"
+#include "cli/uncertainty.h"
 
 struct options {
 	struct calibrate_options common;
@@ -270,14 +271,16 @@ static void print_metric(FILE *out, const char *name, double value, const char *
 static void print_metrics(const struct report *report, FILE *out)
 {
 	const struct incise_calibrate_force *r = report->result;
+	char text[UNCERTAINTY_TEXT];
 
-	fprintf(out, "%-15s %.2f mV/N, U = %.2f mV/N (k = 2), %.3f %%\n", "sensitivity",
-		r->sensitivity_mV_N, 2 * r->sensitivity_u_mV_N,
+	fprintf(out, "%-15s %s (k = 2), %.2g %%\n", "sensitivity",
+		uncertainty_text(r->sensitivity_mV_N, 2 * r->sensitivity_u_mV_N, "mV/N",
+				 text),
 		200 * r->sensitivity_u_mV_N / r->sensitivity_mV_N);
 	fprintf(out, "%-15s %.2f mV/N as found, %+.3f %%\n", "", report->found_mV_N,
 		100 * (r->sensitivity_mV_N / report->found_mV_N - 1));
-	fprintf(out, "%-15s %.2f mV, U = %.2f mV (k = 2)\n", "zero", r->zero_mV,
-		2 * r->zero_u_mV);
+	fprintf(out, "%-15s %s (k = 2)\n", "zero",
+		uncertainty_text(r->zero_mV, 2 * r->zero_u_mV, "mV", text));
 	fprintf(out, "%-15s %.3g mV, scatter of one load %.3g mV\n", "residual sd",
 		r->residual_sd_mV, r->scatter_sd_mV);
 	print_metric(out, "linearity", r->linearity,

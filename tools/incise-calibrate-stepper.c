@@ -12,6 +12,7 @@
 #include "calibrate/stepper.h"
 #include "cli/json.h"
 #include "cli/plot.h"
+#include "cli/uncertainty.h"
 
 struct options {
 	struct calibrate_options common;
@@ -322,26 +323,32 @@ static void report_text(const struct report *report, FILE *out)
 {
 	const struct incise_calibrate_stepper *fit = report->fit;
 	const struct stepper_series *series = report->series;
+	char step[UNCERTAINTY_TEXT], per_mm[UNCERTAINTY_TEXT], backlash[UNCERTAINTY_TEXT],
+		hysteresis[UNCERTAINTY_TEXT], stiction[UNCERTAINTY_TEXT];
 	int listed = 0;
 
 	fprintf(out,
 		"%s: %d strokes, %.4g to %.4g mm, %.3f to %.3f N\n\n"
-		"force per microstep %.6g N, U = %.2g N (k = 2)\n"
-		"  per mm           %.5g N/mm, U = %.2g; a step is %.6g mm\n"
-		"backlash           %.4f mm, U = %.4f; with friction at the sensor, which looks "
-		"the same\n"
-		"hysteresis         %.4f N, U = %.4f; %s\n"
-		"stiction           %.4f N, U = %.4f; the force stands still for %.4f mm, %.0f "
+		"force per microstep %s (k = 2)\n"
+		"  per mm           %s (k = 2); a step is %.6g mm\n"
+		"backlash           %s (k = 2); with friction at the sensor, which looks the "
+		"same\n"
+		"hysteresis         %s (k = 2); %s\n"
+		"stiction           %s (k = 2); the force stands still for %.4f mm, %.0f "
 		"steps\n",
 		report->source, fit->strokes, fit->low_mm, fit->high_mm, fit->low_N,
-		fit->high_N, fit->N_step, 2 * fit->N_step_u, fit->N_mm, 2 * fit->N_mm_u,
-		report->setup->step_mm, fit->backlash_mm, 2 * fit->backlash_u_mm,
-		fit->hysteresis_N, 2 * fit->hysteresis_u_N,
+		fit->high_N, uncertainty_text(fit->N_step, 2 * fit->N_step_u, "N", step),
+		uncertainty_text(fit->N_mm, 2 * fit->N_mm_u, "N/mm", per_mm),
+		report->setup->step_mm,
+		uncertainty_text(fit->backlash_mm, 2 * fit->backlash_u_mm, "mm",
+				 backlash),
+		uncertainty_text(fit->hysteresis_N, 2 * fit->hysteresis_u_N, "N",
+				 hysteresis),
 		fit->rest_N == 0  ? "none to be seen"
 		: fit->rest_N > 0 ? "a loss, between the ways"
 				  : "force comes late after turning round",
-		fit->stiction_N, 2 * fit->stiction_u_N, fit->dead_mm,
-		fit->dead_mm / report->setup->step_mm);
+		uncertainty_text(fit->stiction_N, 2 * fit->stiction_u_N, "N", stiction),
+		fit->dead_mm, fit->dead_mm / report->setup->step_mm);
 	put_rate(report->rate, out);
 	fprintf(out,
 		"linearity          %.2f %% of full scale; points lie %.2g N off their lines; "

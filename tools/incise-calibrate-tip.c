@@ -15,6 +15,7 @@
 #include "cli/json.h"
 #include "cli/plot.h"
 #include "cli/recording.h"
+#include "cli/uncertainty.h"
 
 #define POLL_NS 10000000LL
 #define CHECK_NS 1000000000LL
@@ -361,15 +362,16 @@ static void write_report(const char *folder, const struct list *list, const bool
 	static const char axes[] = "xyz";
 	struct incise_outfile *file;
 	FILE *out = calibrate_report_text(folder, &file);
+	char text[UNCERTAINTY_TEXT];
 	int listed = 0;
 
 	if (!out)
 		return;
 	fprintf(out, "Tip of the blade in the frame of the tracker's sensor\n\n");
 	for (int i = 0; i < 3; i++)
-		fprintf(out, "tip_%c_mm  %10.4f mm  u = %.4f mm  U = %.4f mm (k = 2)\n",
-			axes[i], fit->tip_mm[i], sqrt(fit->covariance[4 * i]),
-			2 * sqrt(fit->covariance[4 * i]));
+		fprintf(out, "tip_%c_mm  %s (k = 2)\n", axes[i],
+			uncertainty_text(fit->tip_mm[i], 2 * sqrt(fit->covariance[4 * i]),
+					 "mm", text));
 	fprintf(out, "\nCovariance, mm²\n");
 	for (int i = 0; i < 3; i++)
 		fprintf(out, "  %12.4e %12.4e %12.4e\n", fit->covariance[3 * i],

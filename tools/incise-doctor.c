@@ -353,9 +353,8 @@ static void print_json(const struct doctor *doctor)
 							? json_null()
 							: json_text(check->fix)));
 	}
-	json_print(json_pack("{s:i, s:o, s:i, s:i}", "schema", 1, "checks", checks,
-			     "problems", count(doctor, PROBLEM), "warnings",
-			     count(doctor, WARNING)));
+	json_print(json_pack("{s:o, s:i, s:i}", "checks", checks, "problems",
+			     count(doctor, PROBLEM), "warnings", count(doctor, WARNING)));
 }
 
 int main(int argc, char **argv)

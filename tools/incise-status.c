@@ -97,8 +97,7 @@ static void show(const struct state_look *look, bool view, bool json)
 	if (json) {
 		json_t *report = state_report_json(look);
 
-		json_dumpf(report, stdout, JSON_COMPACT);
-		putchar('\n');
+		json_write(stdout, report, JSON_COMPACT);
 		json_decref(report);
 	} else if (view) {
 		draw_look(look);

@@ -91,8 +91,7 @@ static json_t *report(const struct job *job, const struct stepper_drive *drive)
 /* Print it at once and release it. Never ends the program: the motor may have power. */
 static void put_json(json_t *object, size_t form)
 {
-	json_dumpf(object, stdout, form | JSON_REAL_PRECISION(12));
-	putchar('\n');
+	json_write(stdout, object, form);
 	fflush(stdout);
 	json_decref(object);
 }

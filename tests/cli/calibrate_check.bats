@@ -90,7 +90,7 @@ today=$(date -u +%Y-%m-%dT00:00:00Z)
 	run -1 incise calibrate check
 	[[ "$output" == *"6 calibrations"* ]]
 	grep -q "^force    good, ${today%T*}, 0 days old" <<<"$output"
-	grep -q 'force_mV_N  *1250 x, U = 1 (k = 2)' <<<"$output"
+	grep -q 'force_mV_N  *1250.0 ± 1.0 x (k = 2)' <<<"$output"
 	grep -q "^depth    due, 2020-01-01, .*: older than 365 days" <<<"$output"
 	grep -q "^delay    FAILED, .*: the last one, of ${today%T*}, failed" <<<"$output"
 	grep -q "^stepper  due, .*: changed by hand since: stepper_N_step = 0.001" <<<"$output"

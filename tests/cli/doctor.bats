@@ -73,7 +73,7 @@ finding() { # GROUP NAME
 	python3 - "$output" <<-'END'
 		import json, sys
 		report = json.loads(sys.argv[1])
-		assert report["schema"] == 1
+		assert report["schema"] == "incise/doctor/1"
 		found = {(c["group"], c["name"]): c for c in report["checks"]}
 		denied = found["real time", "scheduling"]
 		assert denied["state"] == "problem" and denied["fix"], denied

@@ -634,6 +634,8 @@ void bench_fail(struct bench_run *run, const char *fmt, ...)
 
 void bench_measure(struct bench_run *run)
 {
+	char command[40];
+
 	if (run->against) {
 		compare_against(run->against, run->json);
 		run->json = true;
@@ -646,7 +648,10 @@ void bench_measure(struct bench_run *run)
 	run->machine = machine_json();
 	run->metrics = json_array();
 	run->scalars = json_object();
-	run->report = json_pack("{sO sb}", "machine", run->machine, "quick", run->quick);
+	snprintf(command, sizeof(command), "bench %s", run->bench->name);
+	run->report = json_with_schema(json_pack("{sO sb}", "machine", run->machine,
+						 "quick", run->quick),
+				       command);
 	run->bench->run(run);
 	cli_progress_end();
 	json_object_set_new(run->report, "figures", run->metrics);

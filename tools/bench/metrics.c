@@ -657,7 +657,7 @@ void compare_finish(json_t *comparison, bool json)
 	int worse = compare_worse(comparison);
 
 	if (json) {
-		json_print(comparison);
+		json_print(json_with_schema(comparison, "bench compare"));
 	} else {
 		print(comparison);
 		json_decref(comparison);

@@ -10,6 +10,7 @@
 #include <unistd.h>
 #include "../cli/json.h"
 #include "../cli/plot.h"
+#include "../cli/uncertainty.h"
 #include "calibrate.h"
 
 /* Note the files of --report before anything is measured. */
@@ -90,9 +91,8 @@ void calibrate_report_json(const char *folder, json_t *object)
 	struct incise_outfile *file;
 	FILE *out = begin_file(folder, "report.json", &file);
 
-	if (!object || json_dumpf(object, out, JSON_INDENT(2) | JSON_REAL_PRECISION(12)))
+	if (json_write(out, object, JSON_INDENT(2)))
 		cli_fail("%s/report.json: no memory", folder);
-	fputc('\n', out);
 	whole_file_end(file);
 	json_decref(object);
 }
@@ -126,11 +126,13 @@ static json_t *values_json(const struct incise_calibration_record *record)
 
 static void print_values(const struct incise_calibration_record *record)
 {
+	char text[UNCERTAINTY_TEXT];
+
 	for (int i = 0; i < record->n; i++) {
 		const struct incise_calibration_value *value = &record->values[i];
 
-		printf("%-20s %.4f %s, U = %.4f (k = 2)", value->key, value->left,
-		       value->unit, 2 * value->u);
+		printf("%-20s %s (k = 2)", value->key,
+		       uncertainty_text(value->left, 2 * value->u, value->unit, text));
 		if (!isnan(value->found))
 			printf(", was %.4f", value->found);
 		putchar('\n');

@@ -9,6 +9,7 @@
 #include "depth.h"
 #include "../cli/json.h"
 #include "../cli/plot.h"
+#include "../cli/uncertainty.h"
 
 #define OUTLIERS_SHOWN 20
 
@@ -130,9 +131,11 @@ static void vision_text(const struct depth_result *r, FILE *out)
 void depth_report_text(const struct depth_result *r, FILE *out)
 {
 	const struct incise_calibration_value *value = &r->record->values[0];
+	char text[UNCERTAINTY_TEXT];
 
-	fprintf(out, "depth_mm_px    %.7f mm/px, U %.7f (k = 2), %.3f %%\n", value->left,
-		2 * value->u, 200 * value->u / value->left);
+	fprintf(out, "depth_mm_px    %s (k = 2), %.2g %%\n",
+		uncertainty_text(value->left, 2 * value->u, "mm/px", text),
+		200 * value->u / value->left);
 	fprintf(out, "as found       %.7f, changed by %+.3f %%\n", value->found,
 		100 * (value->left / value->found - 1));
 	fprintf(out, "method         %s\n", r->record->method);

@@ -595,6 +595,11 @@ struct incise_rig *cli_open_rig(const char *given, unsigned int devices)
 	return cli_require(incise_rig_open(cli_rig(given), devices, &err), &err);
 }
 
+const char *cli_command_name(void)
+{
+	return current ? current->name : "";
+}
+
 const char *cli_folder(void)
 {
 	static char path[PATH_MAX];

@@ -11,6 +11,9 @@
 #include "cli.h"
 #include "json.h"
 
+/* Of every report; a report whose keys change their meaning gets another. */
+#define SCHEMA_VERSION 1
+
 #define READ_MOST (16 << 20) /* a report of all benches has less than 1 */
 
 static const struct incise_infile_kind report_kind = {
@@ -68,6 +71,38 @@ json_t *json_text(const char *text)
 	return string;
 }
 
+json_t *json_with_schema(json_t *object, const char *command)
+{
+	char name[80];
+	json_t *keys;
+
+	if (!object || json_object_get(object, "schema"))
+		return object;
+	snprintf(name, sizeof(name), "incise/%s/%d",
+		 command ? command : cli_command_name(), SCHEMA_VERSION);
+	for (char *c = name; *c; c++)
+		if (*c == ' ')
+			*c = '/';
+	/* Keys are written in the order in which they were set. */
+	keys = json_copy(object);
+	json_object_clear(object);
+	if (!keys || json_object_set_new(object, "schema", json_string(name)) ||
+	    json_object_update(object, keys))
+		cli_fail("no memory");
+	json_decref(keys);
+	return object;
+}
+
+int json_write(FILE *out, json_t *object, size_t form)
+{
+	/* The digits are in the bits above the indent and the flags. */
+	if (!(form >> 11 & 0x1f))
+		form |= JSON_REAL_PRECISION(12);
+	if (!object || json_dumpf(json_with_schema(object, NULL), out, form))
+		return -1;
+	return putc('\n', out) == EOF ? -1 : 0;
+}
+
 void json_print(json_t *object)
 {
 	/* It is NULL if any part of it could not be made. */
@@ -75,8 +110,7 @@ void json_print(json_t *object)
 		cli_fail(
 			"the report cannot be written as JSON: no memory, or a name that is "
 			"not UTF-8");
-	json_dumpf(object, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(12));
-	putchar('\n');
+	json_write(stdout, object, JSON_INDENT(2));
 	json_decref(object);
 	cli_finish();
 }

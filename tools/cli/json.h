@@ -24,7 +24,21 @@ json_t *json_bits(unsigned int bits, const char *const *names, size_t n);
 void json_set_number(json_t *object, const char *key, double value);
 void json_set_integer(json_t *object, const char *key, json_int_t value);
 
-/* Print one object to standard output and release it. */
+/*
+ * Put "schema": "incise/COMMAND/1" in front of the keys of an object that is a whole report, and
+ * return it; NULL stays NULL. One that has its schema keeps it. @command: for example "bench loop", whose
+ * blanks become slashes, or NULL for the command that runs. schema/COMMAND.json describes it.
+ */
+json_t *json_with_schema(json_t *object, const char *command);
+
+/*
+ * Write one report with its schema, and a newline. @form: JSON_INDENT(n) or JSON_COMPACT, with
+ * JSON_REAL_PRECISION(n) if not 12 digits. Returns 0, or -1 if the object is NULL or cannot be
+ * written.
+ */
+int json_write(FILE *out, json_t *object, size_t form);
+
+/* Print one report with its schema to standard output and release it. */
 void json_print(json_t *object);
 
 /* Read JSON text, which may hold anything; @name: for messages; NULL and the reason. */

@@ -4,9 +4,11 @@
  */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 #include "cli.h"
 #include "json.h"
 #include "stream_report.h"
+#include "uncertainty.h"
 
 const char stream_heading[] =
 	"stream      rate/s       rows   lost   late  jitter ms   drift ppm       offset ms";
@@ -21,28 +23,39 @@ static const char *number(char *text, size_t size, double value, int decimals)
 	return text;
 }
 
-static const char *with_sd(char *text, size_t size, double value, double sd, int decimals)
+/* "0.31±0.12" with the digits of the sd, "0.31±?" without one; padded by columns, not bytes. */
+static void put_with_sd(char *text, size_t size, double value, double sd, int decimals,
+			int width)
 {
-	char a[32], b[32];
+	char pair[UNCERTAINTY_TEXT], known[32];
+	int n = 0;
 
-	if (!isfinite(value))
-		return number(text, size, value, decimals);
-	snprintf(text, size, "%s+-%s", number(a, sizeof(a), value, decimals),
-		 isfinite(sd) ? number(b, sizeof(b), sd, decimals) : "?");
-	return text;
+	if (isfinite(value) && sd > 0 && isfinite(sd)) {
+		uncertainty_text(value, sd, "", pair);
+		for (const char *c = pair; *c; c++)
+			if (*c != ' ')
+				pair[n++] = *c;
+		pair[n] = 0;
+	} else {
+		snprintf(pair, sizeof(pair), "%s%s",
+			 number(known, sizeof(known), value, decimals),
+			 isfinite(value) ? "±?" : "");
+	}
+	/* ± has two bytes. */
+	snprintf(text, size, "%*s", width + (strchr(pair, '\302') != NULL), pair);
 }
 
 int stream_line(const struct incise_stream *s, char *text, size_t size)
 {
 	char rate[32], jitter[32], drift[80], offset[80];
 
-	return snprintf(text, size, "%-8s %9s %10llu %6llu %6llu %10s %11s %15s%s",
-			s->name, number(rate, sizeof(rate), s->rate_hz, 2),
+	put_with_sd(drift, sizeof(drift), s->drift_ppm, s->drift_sd_ppm, 2, 11);
+	put_with_sd(offset, sizeof(offset), s->offset_ms, s->offset_sd_ms, 3, 15);
+	return snprintf(text, size, "%-8s %9s %10llu %6llu %6llu %10s %s %s%s", s->name,
+			number(rate, sizeof(rate), s->rate_hz, 2),
 			(unsigned long long)s->rows, (unsigned long long)s->lost,
 			(unsigned long long)s->late,
-			number(jitter, sizeof(jitter), s->jitter_ms, 3),
-			with_sd(drift, sizeof(drift), s->drift_ppm, s->drift_sd_ppm, 2),
-			with_sd(offset, sizeof(offset), s->offset_ms, s->offset_sd_ms, 3),
+			number(jitter, sizeof(jitter), s->jitter_ms, 3), drift, offset,
 			*s->ended ? "  ENDED" : "");
 }
 

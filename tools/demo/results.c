@@ -511,8 +511,7 @@ void demo_summary_save(const struct demo *demo, double seconds)
 	char *txt = demo_path(demo, "summary.txt");
 	struct incise_outfile *file;
 
-	json_dumpf(demo->summary, whole_file_begin(json, &file),
-		   JSON_INDENT(2) | JSON_REAL_PRECISION(12));
+	json_write(whole_file_begin(json, &file), demo->summary, JSON_INDENT(2));
 	whole_file_end(file);
 	demo_summary_print(demo, whole_file_begin(txt, &file), seconds);
 	whole_file_end(file);

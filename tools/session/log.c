@@ -6,6 +6,7 @@
 #include <string.h>
 #include <time.h>
 #include <incise/outfile.h>
+#include "../cli/json.h"
 #include "log.h"
 
 struct session_log {
@@ -103,9 +104,8 @@ int session_log_end(struct session_log *log, const char *kind, const char *why,
 	snprintf(s->end.kind, sizeof(s->end.kind), "%s", kind);
 	snprintf(s->end.why, sizeof(s->end.why), "%s", why);
 	json = session_json(s);
-	json_dumpf(json, incise_outfile_stream(log->file),
+	json_write(incise_outfile_stream(log->file), json,
 		   JSON_INDENT(1) | JSON_REAL_PRECISION(15));
-	fputc('\n', incise_outfile_stream(log->file));
 	json_decref(json);
 	rc = incise_outfile_commit(log->file, err);
 	session_digest_free(log->digest);

@@ -307,7 +307,9 @@ static json_t *put_trace(const struct session *session)
 
 json_t *session_json(const struct session *session)
 {
-	json_t *object = json_pack("{si}", "incise_session", SESSION_FORM);
+	json_t *object = json_pack("{so si}", "schema",
+				   json_sprintf("incise/session/%d", SESSION_FORM),
+				   "incise_session", SESSION_FORM);
 
 	put_members(whole, session, object);
 	for (size_t i = 0; i < GROUPS; i++)
