@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Reading CSV with named columns; see incise/dataset.h. An error names line and column.
+ * Reading named columns of CSV and of Arrow streams; see incise/dataset.h and incise/arrow.h. An
+ * error names line and column.
  */
 #include <errno.h>
 #include <math.h>
@@ -8,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <incise/arrow.h>
 #include <incise/dataset.h>
 #include "../base/lines.h"
 #include "pairs.h"
@@ -244,6 +246,22 @@ static int read_rows(struct reader *in, const char *const *columns, const char *
 	return rc;
 }
 
+/* Columns that a dataset may have. NULL with errno. */
+static struct incise_dataset *new_dataset(const char *from, int columns,
+					  struct incise_error *err)
+{
+	struct incise_dataset *data = calloc(1, sizeof(*data));
+
+	if (!data || columns < 1 || columns > FIELDS_MAX) {
+		incise_error_set(err, data ? EINVAL : ENOMEM,
+				 "%s: cannot read %d columns", from, columns);
+		free(data);
+		return NULL;
+	}
+	data->columns = columns;
+	return data;
+}
+
 struct incise_dataset *incise_dataset_read_where(const char *path,
 						 const char *const *columns, int n,
 						 const char *group, const char *where,
@@ -255,17 +273,12 @@ struct incise_dataset *incise_dataset_read_where(const char *path,
 		.name = "a CSV file",
 		.advice = "give a CSV file with a header row",
 	};
-	struct incise_dataset *data = calloc(1, sizeof(*data));
+	struct incise_dataset *data = new_dataset(path, n, err);
 	struct reader in;
 	int rc;
 
-	if (!data || n < 1 || n > FIELDS_MAX) {
-		incise_error_set(err, data ? EINVAL : ENOMEM,
-				 "%s: cannot read %d columns", path, n);
-		free(data);
+	if (!data)
 		return NULL;
-	}
-	data->columns = n;
 	*left_out = 0;
 	rc = incise_lines_open(&in.lines, path, &csv, err);
 	if (!rc) {
@@ -287,6 +300,325 @@ struct incise_dataset *incise_dataset_read(const char *path, const char *const *
 	size_t left_out;
 
 	return incise_dataset_read_where(path, columns, n, group, NULL, &left_out, err);
+}
+
+/* --- from an Arrow stream --------------------------------------------------------- */
+
+/* One column of a stream that is read. */
+struct arrow_column {
+	const char *name;
+	int at;				   /* of the stream's columns; -1: none */
+	const char *format, *index_format; /* the latter of a dictionary's numbers */
+};
+
+struct arrow_reader {
+	struct incise_dataset *data;
+	struct arrow_column columns[FIELDS_MAX], group, where;
+	uint64_t row; /* of the stream, from 0 */
+	size_t left_out;
+	struct incise_error *err;
+};
+
+static int arrow_fail(const struct arrow_reader *in, const struct arrow_column *column,
+		      const char *what)
+{
+	return incise_error_set(in->err, EINVAL, "Arrow stream, row %llu, column %s: %s",
+				(unsigned long long)in->row, column->name, what);
+}
+
+static bool is_number(const char *format)
+{
+	return *format && !format[1] && strchr("cCsSiIlLfgb", *format);
+}
+
+static bool is_text(const char *format)
+{
+	return !strcmp(format, "u") || !strcmp(format, "U");
+}
+
+/* Find a column by name. Returns 0, or -EINVAL if it is missing, unless it is optional. */
+static int arrow_find(struct arrow_reader *in, const struct ArrowSchema *schema,
+		      const char *name, bool optional, struct arrow_column *column)
+{
+	char list[300] = "";
+	size_t used = 0;
+
+	*column = (struct arrow_column){.name = name, .at = -1};
+	for (int64_t i = 0; name && i < schema->n_children; i++) {
+		const struct ArrowSchema *child = schema->children[i];
+
+		if (strcmp(child->name ? child->name : "", name))
+			continue;
+		column->at = (int)i;
+		column->format =
+			child->dictionary ? child->dictionary->format : child->format;
+		column->index_format = child->dictionary ? child->format : NULL;
+		return 0;
+	}
+	if (optional)
+		return 0;
+	for (int64_t i = 0; i < schema->n_children && used < sizeof(list); i++)
+		used += snprintf(list + used, sizeof(list) - used, "%s%s", i ? ", " : "",
+				 schema->children[i]->name ? schema->children[i]->name
+							   : "");
+	return incise_error_set(in->err, EINVAL,
+				"Arrow stream: there is no column '%s'; the columns are: "
+				"%s",
+				name, list);
+}
+
+static int arrow_columns(struct arrow_reader *in, const struct ArrowSchema *schema,
+			 const char *const *names, const char *group, const char *where)
+{
+	int rc = 0;
+
+	if (strcmp(schema->format, "+s"))
+		return incise_error_set(in->err, EINVAL,
+					"Arrow stream: is of type '%s', not a table",
+					schema->format);
+	for (int i = 0; i < in->data->columns && !rc; i++) {
+		struct arrow_column *column = &in->columns[i];
+
+		rc = arrow_find(in, schema, names[i], false, column);
+		if (!rc && (column->index_format || !is_number(column->format)))
+			rc = arrow_fail(in, column, "is no column of numbers");
+	}
+	if (!rc)
+		rc = arrow_find(in, schema, group, !group, &in->group);
+	if (!rc && in->group.at >= 0 &&
+	    ((!is_text(in->group.format) && !is_number(in->group.format)) ||
+	     strchr("fg", *in->group.format) ||
+	     (in->group.index_format && !is_number(in->group.index_format))))
+		rc = arrow_fail(in, &in->group, "is neither text nor a whole number");
+	if (!rc)
+		rc = arrow_find(in, schema, where, true, &in->where);
+	if (!rc && in->where.at >= 0 &&
+	    (in->where.index_format || !is_number(in->where.format)))
+		rc = arrow_fail(in, &in->where, "is no column of numbers");
+	return rc;
+}
+
+static bool arrow_bit(const void *bits, int64_t at)
+{
+	return ((const uint8_t *)bits)[at / 8] >> at % 8 & 1;
+}
+
+/* False: it is null. */
+static bool arrow_valid(const struct ArrowArray *array, int64_t at)
+{
+	return !array->null_count || !array->buffers[0] ||
+	       arrow_bit(array->buffers[0], at);
+}
+
+/* A number at an index that has the array's offset. */
+static double arrow_real(const struct ArrowArray *array, char format, int64_t at)
+{
+	const void *values = array->buffers[1];
+
+	switch (format) {
+	case 'c':
+		return ((const int8_t *)values)[at];
+	case 'C':
+		return ((const uint8_t *)values)[at];
+	case 's':
+		return ((const int16_t *)values)[at];
+	case 'S':
+		return ((const uint16_t *)values)[at];
+	case 'i':
+		return ((const int32_t *)values)[at];
+	case 'I':
+		return ((const uint32_t *)values)[at];
+	case 'l':
+		return (double)((const int64_t *)values)[at];
+	case 'L':
+		return (double)((const uint64_t *)values)[at];
+	case 'f':
+		return ((const float *)values)[at];
+	case 'g':
+		return ((const double *)values)[at];
+	default:
+		return arrow_bit(values, at);
+	}
+}
+
+static int arrow_number(const struct arrow_reader *in, const struct ArrowArray *batch,
+			const struct arrow_column *column, int64_t row, double *value)
+{
+	const struct ArrowArray *array = batch->children[column->at];
+	int64_t at = row + array->offset;
+
+	if (!arrow_valid(array, at))
+		return arrow_fail(in, column, "is null; remove the row or mend it");
+	*value = arrow_real(array, *column->format, at);
+	if (!isfinite(*value))
+		return arrow_fail(in, column, "is not finite; remove the row or mend it");
+	return 0;
+}
+
+/* The text of a group, or of its number. */
+static int arrow_group_name(const struct arrow_reader *in, const struct ArrowArray *array,
+			    int64_t at, char *name, size_t size)
+{
+	const struct arrow_column *column = &in->group;
+	int64_t from, to;
+
+	if (!arrow_valid(array, at))
+		return arrow_fail(in, column, "is null");
+	if (column->index_format) {
+		at = (int64_t)arrow_real(array, *column->index_format, at);
+		array = array->dictionary;
+		if (!array || at < 0 || at >= array->length)
+			return arrow_fail(in, column, "is not in its dictionary");
+		at += array->offset;
+		if (!arrow_valid(array, at))
+			return arrow_fail(in, column, "is null");
+	}
+	if (!is_text(column->format)) {
+		snprintf(name, size, "%.17g", arrow_real(array, *column->format, at));
+		return 0;
+	}
+	if (*column->format == 'u') {
+		from = ((const int32_t *)array->buffers[1])[at];
+		to = ((const int32_t *)array->buffers[1])[at + 1];
+	} else {
+		from = ((const int64_t *)array->buffers[1])[at];
+		to = ((const int64_t *)array->buffers[1])[at + 1];
+	}
+	if (from < 0 || to < from || to - from >= (int64_t)size)
+		return arrow_fail(in, column, "is a text of more than 255 bytes");
+	if (to > from)
+		memcpy(name, (const char *)array->buffers[2] + from, (size_t)(to - from));
+	name[to - from] = '\0';
+	return 0;
+}
+
+static int arrow_row(struct arrow_reader *in, const struct ArrowArray *batch, int64_t row)
+{
+	struct incise_dataset *data = in->data;
+	bool grouped = in->group.at >= 0;
+	char name[256];
+	double *values, wanted = 1;
+	int rc = 0;
+
+	if (in->where.at >= 0)
+		rc = arrow_number(in, batch, &in->where, row, &wanted);
+	if (rc)
+		return rc;
+	if (wanted == 0) {
+		in->left_out++;
+		return 0;
+	}
+	if (data->rows == data->capacity && grow(data, grouped))
+		return incise_error_set(in->err, ENOMEM,
+					"Arrow stream: no memory for more than %zu rows",
+					data->rows);
+	values = &data->values[data->rows * data->columns];
+	for (int i = 0; i < data->columns && !rc; i++)
+		rc = arrow_number(in, batch, &in->columns[i], row, &values[i]);
+	if (!rc && grouped) {
+		const struct ArrowArray *array = batch->children[in->group.at];
+
+		rc = arrow_group_name(in, array, row + array->offset, name, sizeof(name));
+		if (!rc) {
+			data->group[data->rows] = find_group(data, name);
+			if (data->group[data->rows] < 0)
+				rc = incise_error_set(in->err, ENOMEM,
+						      "Arrow stream: no memory for more "
+						      "groups");
+		}
+	}
+	data->rows += !rc;
+	return rc;
+}
+
+/* The rows of a batch; those of a struct array have its offset. */
+static int arrow_batch(struct arrow_reader *in, const struct ArrowArray *batch)
+{
+	int rc = 0;
+
+	for (int64_t i = 0; i < batch->length && !rc; i++, in->row++)
+		rc = arrow_valid(batch, i + batch->offset)
+			     ? arrow_row(in, batch, i + batch->offset)
+			     : incise_error_set(in->err, EINVAL,
+						"Arrow stream, row %llu: is null",
+						(unsigned long long)in->row);
+	return rc;
+}
+
+static int arrow_stream_error(const struct arrow_reader *in,
+			      struct ArrowArrayStream *stream, int code)
+{
+	const char *said = stream->get_last_error(stream);
+
+	return incise_error_set(in->err, code, "Arrow stream: %s",
+				said ? said : strerror(code));
+}
+
+static int arrow_rows(struct arrow_reader *in, struct ArrowArrayStream *stream,
+		      int64_t n_children)
+{
+	int rc;
+
+	do {
+		struct ArrowArray batch = {0};
+
+		rc = stream->get_next(stream, &batch);
+		if (rc)
+			return arrow_stream_error(in, stream, rc);
+		if (!batch.release)
+			break;
+		rc = batch.n_children == n_children
+			     ? arrow_batch(in, &batch)
+			     : incise_error_set(in->err, EINVAL,
+						"Arrow stream: a batch has %lld columns, "
+						"its schema %lld",
+						(long long)batch.n_children,
+						(long long)n_children);
+		batch.release(&batch);
+	} while (!rc);
+	if (!rc && !in->data->rows)
+		rc = incise_error_set(in->err, ENODATA,
+				      in->left_out
+					      ? "Arrow stream: all %zu rows have 0 in "
+						"the column '%s'"
+					      : "Arrow stream: has no rows",
+				      in->left_out, in->where.name);
+	return rc;
+}
+
+static int arrow_read(struct arrow_reader *in, struct ArrowArrayStream *stream,
+		      const char *const *columns, const char *group, const char *where)
+{
+	struct ArrowSchema schema = {0};
+	int rc = stream->get_schema(stream, &schema);
+
+	if (rc)
+		return arrow_stream_error(in, stream, rc);
+	rc = arrow_columns(in, &schema, columns, group, where);
+	if (!rc)
+		rc = arrow_rows(in, stream, schema.n_children);
+	schema.release(&schema);
+	return rc;
+}
+
+struct incise_dataset *incise_dataset_from_arrow(struct ArrowArrayStream *stream,
+						 const char *const *columns, int n,
+						 const char *group, const char *where,
+						 size_t *left_out,
+						 struct incise_error *err)
+{
+	struct arrow_reader in = {.data = new_dataset("Arrow stream", n, err),
+				  .err = err};
+	int rc = in.data ? arrow_read(&in, stream, columns, group, where) : -errno;
+
+	stream->release(stream);
+	if (left_out)
+		*left_out = in.left_out;
+	if (!rc)
+		return in.data;
+	incise_dataset_free(in.data);
+	errno = -rc;
+	return NULL;
 }
 
 void incise_dataset_free(struct incise_dataset *data)

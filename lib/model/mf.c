@@ -186,6 +186,47 @@ double incise_mf_log(const struct incise_mf *mf, double x, double *gap)
 	return 0;
 }
 
+static double trapezoid_log_slope(double x, double a, double b, double c, double d)
+{
+	double rise = x >= b ? 1 : (x - a) / (b - a);
+	double fall = x <= c ? 1 : (d - x) / (d - c);
+
+	if (!(fmin(rise, fall) > 0) || rise == fall)
+		return 0;
+	return rise < fall ? 1 / (x - a) : -1 / (d - x);
+}
+
+double incise_mf_log_slope(const struct incise_mf *mf, double x)
+{
+	const double *p = mf->p;
+	double gap, slope = 0;
+
+	switch (mf->type) {
+	case INCISE_MF_GAUSS:
+		slope = -(x - p[1]) / p[0] / p[0];
+		break;
+	case INCISE_MF_GBELL: /* smooth at the centre for b above 1/2 */
+		slope = x == p[2] ? 0
+				  : 2 * p[1] / (x - p[2]) *
+					    expm1(incise_mf_log(mf, x, &gap));
+		break;
+	case INCISE_MF_GAUSS2:
+		slope = (x < p[1] ? -(x - p[1]) / p[0] / p[0] : 0) +
+			(x > p[3] ? -(x - p[3]) / p[2] / p[2] : 0);
+		break;
+	case INCISE_MF_TRI:
+		slope = trapezoid_log_slope(x, p[0], p[1], p[1], p[2]);
+		break;
+	case INCISE_MF_TRAP:
+		slope = trapezoid_log_slope(x, p[0], p[1], p[2], p[3]);
+		break;
+	case INCISE_MF_SIG:
+		slope = -p[0] * expm1(incise_mf_log(mf, x, &gap));
+		break;
+	}
+	return fmax(-DBL_MAX, fmin(DBL_MAX, slope));
+}
+
 double incise_mf_eval(const struct incise_mf *mf, double x)
 {
 	double gap, log = isnan(x) ? MODEL_LOG_MIN : incise_mf_log(mf, x, &gap);

@@ -390,13 +390,11 @@ void incise_model_firing(const struct incise_model *model, const double *x, doub
 	firing(model, in, w);
 }
 
-double incise_model_eval(const struct incise_model *model, const double *x,
-			 unsigned int *flags)
+/* The inputs that count: clamped, or finite. Returns incise_model_flag bits. */
+static unsigned int take_inputs(const struct incise_model *model, const double *x,
+				double *in)
 {
-	double in[INCISE_MODEL_INPUTS_MAX];
-	double w[INCISE_MODEL_RULES_MAX];
 	unsigned int seen = 0;
-	double y = 0;
 
 	for (int i = 0; i < model->info.n_inputs; i++) {
 		const struct incise_variable *v = &model->info.input[i];
@@ -412,22 +410,102 @@ double incise_model_eval(const struct incise_model *model, const double *x,
 		else
 			in[i] = fmax(-DBL_MAX, fmin(DBL_MAX, x[i]));
 	}
-	if (!firing(model, in, w))
-		seen |= INCISE_MODEL_EXTRAPOLATED;
-	for (int r = 0; r < model->info.n_rules; r++) {
-		const double *p = model->rule[r].p;
-		double yr = p[0];
+	return seen;
+}
 
-		for (int i = 0; i < model->info.n_inputs; i++)
-			yr += p[i + 1] * in[i];
-		/* A rule that does not fire adds nothing, not even an overflow. */
+static double rule_output(const struct incise_model *model, int r, const double *in)
+{
+	const double *p = model->rule[r].p;
+	double y = p[0];
+
+	for (int i = 0; i < model->info.n_inputs; i++)
+		y += p[i + 1] * in[i];
+	return y;
+}
+
+/* The output from strengths; a rule that does not fire adds nothing, not even an overflow. */
+static double output(const struct incise_model *model, const double *in, const double *w)
+{
+	double y = 0;
+
+	for (int r = 0; r < model->info.n_rules; r++) {
+		double yr = rule_output(model, r, in);
+
 		if (w[r] > 0)
 			y += w[r] * yr;
 	}
+	/* Only linear extrapolation can overflow, and then there is no right answer. */
+	return isnan(y) ? 0 : fmax(-DBL_MAX, fmin(DBL_MAX, y));
+}
+
+double incise_model_eval(const struct incise_model *model, const double *x,
+			 unsigned int *flags)
+{
+	double in[INCISE_MODEL_INPUTS_MAX], w[INCISE_MODEL_RULES_MAX];
+	unsigned int seen = take_inputs(model, x, in);
+
+	if (!firing(model, in, w))
+		seen |= INCISE_MODEL_EXTRAPOLATED;
 	if (flags)
 		*flags = seen;
-	/* Only linear extrapolation can overflow, and then there is no right answer. */
-	if (isnan(y))
-		return 0;
-	return fmax(-DBL_MAX, fmin(DBL_MAX, y));
+	return output(model, in, w);
+}
+
+/* Whether the log strength of a rule changes with an input. */
+static bool depends_on(const struct incise_model *model, const struct incise_rule *rule,
+		       int input, const double *in)
+{
+	double gap, least;
+
+	if (rule->mf[input] < 0)
+		return false;
+	if (model->info.and_method != INCISE_AND_MIN)
+		return true;
+	least = incise_mf_log(&model->mf[input][rule->mf[input]], in[input], &gap);
+	for (int i = 0; i < model->info.n_inputs; i++) {
+		double log = rule->mf[i] < 0 ? 0
+					     : incise_mf_log(&model->mf[i][rule->mf[i]],
+							     in[i], &gap);
+
+		if (log < least || (log == least && i < input))
+			return false;
+	}
+	return true;
+}
+
+/* ∂y/∂x(i) = Σ w(r) (p(r,i) + (y(r) - y) ∂ log w(r)/∂x(i)), with normalised w. */
+static double slope_by(const struct incise_model *model, int i, const double *in,
+		       const double *w, double y)
+{
+	double sum = 0;
+
+	for (int r = 0; r < model->info.n_rules; r++) {
+		const struct incise_rule *rule = &model->rule[r];
+		double slope = rule->p[i + 1];
+
+		if (!(w[r] > 0))
+			continue;
+		if (depends_on(model, rule, i, in))
+			slope += (rule_output(model, r, in) - y) *
+				 incise_mf_log_slope(&model->mf[i][rule->mf[i]], in[i]);
+		sum += w[r] * slope;
+	}
+	return isnan(sum) ? 0 : fmax(-DBL_MAX, fmin(DBL_MAX, sum));
+}
+
+void incise_model_eval_many(const struct incise_model *model, const double *x, size_t n,
+			    double *y, double *gradient)
+{
+	int inputs = model->info.n_inputs;
+
+	for (size_t k = 0; k < n; k++, x += inputs) {
+		double in[INCISE_MODEL_INPUTS_MAX], w[INCISE_MODEL_RULES_MAX];
+
+		take_inputs(model, x, in);
+		firing(model, in, w);
+		y[k] = output(model, in, w);
+		for (int i = 0; gradient && i < inputs; i++)
+			gradient[k * (size_t)inputs + (size_t)i] =
+				in[i] == x[i] ? slope_by(model, i, in, w, y[k]) : 0;
+	}
 }

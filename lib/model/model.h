@@ -40,6 +40,9 @@ const char *incise_mf_fault(enum incise_mf_type type, const double *p);
  */
 double incise_mf_log(const struct incise_mf *mf, double x, double *gap) INCISE_REALTIME;
 
+/* The slope of that log, finite; 0 at a kink and where the degree is 0. x is finite. */
+double incise_mf_log_slope(const struct incise_mf *mf, double x);
+
 bool incise_mf_type_known(enum incise_mf_type type);
 
 /* The kind that a .fis file names so, or -1. */

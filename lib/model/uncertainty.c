@@ -362,3 +362,12 @@ int incise_uncertainty_save(const struct incise_uncertainty *uncertainty,
 	incise_c_locale_end(locale);
 	return incise_outfile_commit(file, err);
 }
+
+void incise_uncertainty_sd_many(const struct incise_uncertainty *uncertainty,
+				const struct incise_model *model, const double *x,
+				size_t n, double *sd)
+{
+	for (size_t k = 0; k < n; k++)
+		sd[k] = incise_uncertainty_sd(uncertainty, model,
+					      x + k * (size_t)model->info.n_inputs);
+}

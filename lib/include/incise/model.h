@@ -215,6 +215,18 @@ INCISE_API double incise_model_eval(const struct incise_model *model, const doub
 				    unsigned int *flags) INCISE_REALTIME;
 
 /**
+ * Evaluate many points, each as incise_model_eval() does, to the bit, with the gradient.
+ *
+ * @param x        n × n_inputs values, the inputs of one point side by side
+ * @param n        may be 0
+ * @param y        n outputs
+ * @param gradient n × n_inputs slopes ∂y/∂x, output's unit per input's; or NULL. By an input that
+ *                 is clamped, or NaN, it is 0; at a kink, one-sided or 0. Finite. Real-time safe.
+ */
+INCISE_API void incise_model_eval_many(const struct incise_model *model, const double *x,
+				       size_t n, double *y, double *gradient);
+
+/**
  * Normalised firing strengths w(r)/Σw of all rules, as incise_model_eval() weighs them;
  * they add up to 1. Inputs are not clamped to their ranges.
  *

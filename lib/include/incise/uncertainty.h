@@ -16,6 +16,7 @@
 #ifndef INCISE_UNCERTAINTY_H
 #define INCISE_UNCERTAINTY_H
 
+#include <stddef.h>
 #include <incise/error.h>
 #include <incise/export.h>
 #include <incise/model.h>
@@ -77,6 +78,13 @@ INCISE_API double incise_uncertainty_noise(const struct incise_uncertainty *unce
 INCISE_API double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,
 					const struct incise_model *model,
 					const double *x);
+
+/**
+ * The same for many points: sd[k] of the n_inputs values at x + k·n_inputs. Real-time safe.
+ */
+INCISE_API void incise_uncertainty_sd_many(const struct incise_uncertainty *uncertainty,
+					   const struct incise_model *model,
+					   const double *x, size_t n, double *sd);
 
 INCISE_END_DECLS
 #endif

@@ -427,7 +427,7 @@ void incise_export_options_init(struct incise_export_options *options)
 	*options = (struct incise_export_options){.min_count = 50};
 }
 
-static int check_options(const struct incise_export_options *o, struct incise_error *err)
+int incise_export_check(const struct incise_export_options *o, struct incise_error *err)
 {
 	if (!(o->rate_hz >= 0 && o->rate_hz <= 1e9))
 		return incise_error_set(err, EINVAL,
@@ -506,7 +506,7 @@ static int write_resampled(struct pass *pass, struct incise_recording *const *re
 	return rc ? rc : incise_table_finish(pass->table, pass->err);
 }
 
-static int export_table(struct incise_recording *const *recordings, int n,
+int incise_export_table(struct incise_recording *const *recordings, int n,
 			const struct incise_export_options *options,
 			const struct incise_table_format *format, FILE *out,
 			const struct incise_provenance *provenance,
@@ -573,7 +573,7 @@ int incise_export(struct incise_recording *const *recordings, int n,
 	const struct incise_table_format *format = &incise_table_csv;
 	struct incise_provenance provenance = {0};
 	struct incise_outfile *file;
-	int rc = check_options(options, err);
+	int rc = incise_export_check(options, err);
 
 	if (rc)
 		return rc;
@@ -584,15 +584,15 @@ int incise_export(struct incise_recording *const *recordings, int n,
 	file = incise_outfile_open(path, err);
 	if (!file)
 		return -errno;
-	rc = incise_provenance_of(&provenance, recordings, n, options, err);
+	rc = incise_provenance_of(&provenance, recordings, n, options, NULL, err);
 	if (!rc && ends_with(path, ".mcap"))
 		rc = write_mcap(recordings, n, options, incise_outfile_stream(file),
 				&provenance, report, err);
 	else if (!rc)
-		rc = export_table(recordings, n, options, format,
-				  incise_outfile_stream(file),
-				  hdf5 || options->provenance ? &provenance : NULL,
-				  report, err);
+		rc = incise_export_table(recordings, n, options, format,
+					 incise_outfile_stream(file),
+					 hdf5 || options->provenance ? &provenance : NULL,
+					 report, err);
 	incise_provenance_free(&provenance);
 	if (!rc)
 		return incise_outfile_commit(file, err);

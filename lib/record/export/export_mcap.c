@@ -15,6 +15,7 @@
 #include <zlib.h>
 #include <incise/version.h>
 #include "../../base/c_locale.h"
+#include "../../base/utf8.h"
 #include "../read/recording.h"
 #include "../read/rows.h"
 #include "decimal.h"
@@ -479,31 +480,19 @@ static int force_message(struct mcap_export *export, const struct incise_rows *r
 }
 
 /* A text in JSON's quotes; bytes that are not UTF-8 become '?'. */
-static char *add_text(char *to, const char *before, const unsigned char *text)
+static char *add_text(char *to, const char *before, const char *text)
 {
 	to = add(to, before);
 	*to++ = '"';
-	for (; *text; text++) {
-		int more = *text < 0x80	  ? 0
-			   : *text < 0xc2 ? -1
-			   : *text < 0xe0 ? 1
-			   : *text < 0xf0 ? 2
-			   : *text < 0xf5 ? 3
-					  : -1;
+	while (*text) {
+		int length = utf8_printable(text);
 
-		for (int i = 1; i <= more; i++)
-			if ((text[i] & 0xc0) != 0x80)
-				more = -1;
-		if (more >= 2 && ((*text == 0xe0 && text[1] < 0xa0) ||
-				  (*text == 0xed && text[1] > 0x9f) ||
-				  (*text == 0xf0 && text[1] < 0x90) ||
-				  (*text == 0xf4 && text[1] > 0x8f)))
-			more = -1;
 		if (*text == '"' || *text == '\\')
 			*to++ = '\\';
-		*to++ = *text < ' ' || *text == 0x7f || more < 0 ? '?' : *text;
-		for (; more > 0; more--)
-			*to++ = *++text;
+		*to++ = length ? *text : '?';
+		text++;
+		for (int i = 1; i < length; i++)
+			*to++ = *text++;
 	}
 	*to++ = '"';
 	return to;
@@ -542,7 +531,8 @@ static int tracker_message(struct mcap_export *export, const struct incise_rows 
 	for (int i = 0; i < 7; i++)
 		to = add_real(to, before[i], sqlite3_column_double(rows->stmt, 2 + i),
 			      i < 3 ? 4 : 6);
-	to = add_text(to, "},\"status\":", sqlite3_column_text(rows->stmt, 9));
+	to = add_text(to,
+		      "},\"status\":", (const char *)sqlite3_column_text(rows->stmt, 9));
 	return add(to, "}") - export->text;
 }
 
@@ -563,8 +553,8 @@ static int event_message(struct mcap_export *export, const struct incise_rows *r
 
 	if (rc)
 		return rc;
-	to = add_text(to, "{\"kind\":", sqlite3_column_text(rows->stmt, 2));
-	to = add_text(to, ",\"text\":", sqlite3_column_text(rows->stmt, 3));
+	to = add_text(to, "{\"kind\":", (const char *)sqlite3_column_text(rows->stmt, 2));
+	to = add_text(to, ",\"text\":", (const char *)sqlite3_column_text(rows->stmt, 3));
 	return add(to, "}") - export->text;
 }
 

@@ -183,7 +183,7 @@ static int add_options(struct incise_provenance *provenance,
 
 int incise_provenance_of(struct incise_provenance *provenance,
 			 struct incise_recording *const *recordings, int n,
-			 const struct incise_export_options *options,
+			 const struct incise_export_options *options, const char *table,
 			 struct incise_error *err)
 {
 	time_t now = time(NULL);
@@ -199,7 +199,9 @@ int incise_provenance_of(struct incise_provenance *provenance,
 	if (!rc)
 		rc = add_sources(provenance, recordings, n);
 	if (!rc)
-		rc = add_options(provenance, options);
+		rc = table ? incise_provenance_add(provenance, "options",
+						   "rows of table %s", table)
+			   : add_options(provenance, options);
 	if (!rc)
 		rc = add_calibration(provenance, recordings, n, options->calibration);
 	return rc ? incise_error_set(err, -rc, "lineage: %s", strerror(-rc)) : 0;

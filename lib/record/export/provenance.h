@@ -27,12 +27,12 @@ int incise_provenance_add(struct incise_provenance *provenance, const char *key,
 			  const char *fmt, ...) INCISE_PRINTF(3, 4);
 
 /*
- * The provenance of an export: incise, date, sources, options, calibration. Returns 0 or
- * -errno with a message.
+ * The provenance of an export: incise, date, sources, options, calibration; of the rows of a
+ * table if @table is not NULL. Returns 0 or -errno with a message.
  */
 int incise_provenance_of(struct incise_provenance *provenance,
 			 struct incise_recording *const *recordings, int n,
-			 const struct incise_export_options *options,
+			 const struct incise_export_options *options, const char *table,
 			 struct incise_error *err);
 
 void incise_provenance_free(struct incise_provenance *provenance);

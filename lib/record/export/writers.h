@@ -31,6 +31,22 @@ static inline int incise_export_progress(const struct incise_export_options *opt
 			INCISE_COLUMN_FLAG, 0                          \
 	}
 
+/* --- export.c ---------------------------------------------------------------------- */
+
+/* Returns 0 or -EINVAL. */
+int incise_export_check(const struct incise_export_options *options,
+			struct incise_error *err);
+
+/*
+ * Write what incise_export() does as a table of this format; the options were checked.
+ * @provenance and @report may be NULL. Returns 0 or -errno.
+ */
+int incise_export_table(struct incise_recording *const *recordings, int n,
+			const struct incise_export_options *options,
+			const struct incise_table_format *format, FILE *out,
+			const struct incise_provenance *provenance,
+			struct incise_export_report *report, struct incise_error *err);
+
 /* --- resample.c -------------------------------------------------------------------- */
 
 /*

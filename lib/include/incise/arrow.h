@@ -1,0 +1,126 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The Arrow C data and stream interfaces: columns that another library reads in place, without
+ * a copy and without a library between the two. The structs are those of the Arrow
+ * specification; other headers may define the same ones, under the same guards.
+ *
+ *     recording ──► incise_recording_stream() ──► ArrowArrayStream ──► pyarrow, polars, DuckDB …
+ *     ArrowArrayStream ──► incise_dataset_from_arrow() ──► training
+ */
+#ifndef INCISE_ARROW_H
+#define INCISE_ARROW_H
+
+#include <stdint.h>
+#include <incise/error.h>
+#include <incise/export.h>
+
+INCISE_BEGIN_DECLS
+
+#ifndef ARROW_C_DATA_INTERFACE
+#define ARROW_C_DATA_INTERFACE /**< the two structs are defined */
+
+#define ARROW_FLAG_DICTIONARY_ORDERED 1 /**< the order of the dictionary has a meaning */
+#define ARROW_FLAG_NULLABLE 2		/**< the column may have missing values */
+#define ARROW_FLAG_MAP_KEYS_SORTED 4	/**< of a map */
+
+/** Type, name and metadata of a column, or of a table: a struct of columns. */
+struct ArrowSchema {
+	const char *
+		format; /**< type: "l" int64, "g" float64, "b" bool, "u" text, "+s" struct … */
+	const char *name;
+	const char *metadata; /**< pairs of key and text, in the specification's form */
+	int64_t flags;
+	int64_t n_children;
+	struct ArrowSchema **children;
+	struct ArrowSchema *dictionary;
+	void (*release)(struct ArrowSchema *schema); /**< NULL: released */
+	void *private_data;
+};
+
+/** The values of a column, or of some rows of a table. */
+struct ArrowArray {
+	int64_t length;
+	int64_t null_count;
+	int64_t offset;
+	int64_t n_buffers;
+	int64_t n_children;
+	const void **buffers;
+	struct ArrowArray **children;
+	struct ArrowArray *dictionary;
+	void (*release)(struct ArrowArray *array); /**< NULL: released */
+	void *private_data;
+};
+#endif
+
+#ifndef ARROW_C_STREAM_INTERFACE
+#define ARROW_C_STREAM_INTERFACE /**< the struct is defined */
+
+/** A table in batches of rows; get_ functions return 0 or a positive errno. */
+struct ArrowArrayStream {
+	int (*get_schema)(struct ArrowArrayStream *stream, struct ArrowSchema *out);
+	/** At the end out->release is NULL. */
+	int (*get_next)(struct ArrowArrayStream *stream, struct ArrowArray *out);
+	/** One line, valid until the next call; NULL without an error. */
+	const char *(*get_last_error)(struct ArrowArrayStream *stream);
+	void (*release)(struct ArrowArrayStream *stream); /**< NULL: released */
+	void *private_data;
+};
+#endif
+
+struct incise_dataset;
+struct incise_export_options;
+struct incise_recording;
+
+/**
+ * Open a stream of a recording's rows, in order of time, as columns. Part of libincise-record.
+ *
+ * | what | columns |
+ * | --- | --- |
+ * | "force" | seq, t_ns, code, force_N (NaN while the zero is not known), clipped |
+ * | "tracker" | seq, t_ns, arrival_ns, x_mm y_mm z_mm, qw qx qy qz (as received, without the calibrated tip), status, station, button |
+ * | "depth" | seq, t_ns, depth_mm, velocity_mm_s |
+ * | "frames" | seq, t_ns, arrival_ns, pts, bytes, and what vision saw or null: length_px, sd_px, depth_mm, quality |
+ * | "events" | t_ns, kind, text |
+ * | "table" | the columns of incise_export() with these options |
+ *
+ * t_ns is the best time of acquisition, CLOCK_MONOTONIC. Fields have the metadata "unit" and
+ * "description", those that a calibration enters its values too; the table has the provenance of
+ * an export. Memory is that of a few batches of at most 65536 rows, whatever the length.
+ *
+ * The stream reads by a connection of its own: the recording may be closed before, and several
+ * streams of one recording may be read by turns or from several threads, each by one thread at a
+ * time. Of a recording that is being written it has the rows up to the last commit before this
+ * call. A stream that was opened before fork(2) fails in the child with EINVAL.
+ *
+ * @param what    as above
+ * @param options calibration of any stream, and all of "table"; progress is called for "table"
+ *                only, from a thread of the stream; copied. NULL: the defaults
+ * @param stream  result; the caller calls its release. Its get_next() returns EINVAL (an
+ *                impossible row), EIO, ENODATA (no cut), EINTR (stopped by progress), ENOMEM
+ * @return 0; -EINVAL (no such stream, impossible options, a damaged recording), -ENOTSUP (an
+ *         older recording without this stream), -EIO, -ENOMEM, -EAGAIN (no thread).
+ */
+INCISE_API int incise_recording_stream(struct incise_recording *recording,
+				       const char *what,
+				       const struct incise_export_options *options,
+				       struct ArrowArrayStream *stream,
+				       struct incise_error *err);
+
+/**
+ * Read columns of an Arrow stream as a dataset, as incise_dataset_read_where() does of CSV.
+ * Numbers may be integers, float32, float64 or bool; the group may be text (also as a
+ * dictionary) or an integer. Part of libincise-learn.
+ *
+ * @param stream  released in any case
+ * @param where   leave out rows whose value in this column is 0; NULL, or a column that the
+ *                stream does not have: none
+ * @param left_out number of these, or NULL
+ * @return as incise_dataset_read_where(); EINVAL also for a null, a value that is not finite, and
+ *         a column of another type, named with its row; EIO or the stream's errno if it fails.
+ */
+INCISE_API struct incise_dataset *incise_dataset_from_arrow(
+	struct ArrowArrayStream *stream, const char *const *columns, int n,
+	const char *group, const char *where, size_t *left_out, struct incise_error *err);
+
+INCISE_END_DECLS
+#endif

@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * An export as a source of Arrow batches. An export pushes its rows; a stream is pulled: the export
+ * runs in a thread, which hands over a block of rows at a time and waits until it is taken.
+ *
+ *     thread:   rows ──► block ──► array ─┐ waits while the last one is there
+ *     caller:                             └──► get_next()
+ */
+#include <errno.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/recording.h>
+#include "../../device/thread.h"
+#include "../export/table_writer.h"
+#include "../export/writers.h"
+#include "../read/recording.h"
+#include "arrow_batch.h"
+
+struct table_source {
+	struct incise_arrow_source base;
+	struct incise_table_format format; /* table->format is this one */
+	struct incise_recording *recording;
+	struct incise_export_options options, given;
+	struct incise_calibration calibration;
+	struct incise_arrow_field *fields;
+	struct incise_arrow_batch batch;
+	pthread_t thread;
+
+	pthread_mutex_t lock; /* of all that follows */
+	pthread_cond_t changed;
+	struct ArrowArray block; /* release NULL: none */
+	bool started;		 /* the columns are known */
+	bool ended, stop;
+	int rc; /* of the export, once it has ended */
+	struct incise_error err;
+};
+
+static struct table_source *source_of(const struct incise_table *table)
+{
+	return (struct table_source *)((char *)(uintptr_t)table->format -
+				       offsetof(struct table_source, format));
+}
+
+static void signal_state(struct table_source *source, bool *flag)
+{
+	pthread_mutex_lock(&source->lock);
+	*flag = true;
+	pthread_cond_broadcast(&source->changed);
+	pthread_mutex_unlock(&source->lock);
+}
+
+/* --- in the thread ------------------------------------------------------------------- */
+
+static enum incise_arrow_type type_of(enum incise_column_type type)
+{
+	switch (type) {
+	case INCISE_COLUMN_REAL:
+		return INCISE_ARROW_REAL;
+	case INCISE_COLUMN_SINGLE:
+		return INCISE_ARROW_SINGLE;
+	case INCISE_COLUMN_FLAG:
+		return INCISE_ARROW_FLAG;
+	case INCISE_COLUMN_NAME:
+		return INCISE_ARROW_TEXT;
+	default:
+		return INCISE_ARROW_INT64;
+	}
+}
+
+static int table_begin(struct incise_table *table, struct incise_error *err)
+{
+	struct table_source *source = source_of(table);
+
+	source->fields = calloc((size_t)table->n_columns, sizeof(*source->fields));
+	if (!source->fields ||
+	    incise_arrow_batch_open(&source->batch, source->fields, table->n_columns,
+				    INCISE_TABLE_BLOCK))
+		return incise_error_set(err, ENOMEM, "%s: out of memory",
+					source->recording->path);
+	for (int i = 0; i < table->n_columns; i++)
+		source->fields[i] = (struct incise_arrow_field){
+			.name = table->columns[i].name,
+			.unit = table->columns[i].unit,
+			.about = table->columns[i].about,
+			.type = type_of(table->columns[i].type),
+		};
+	source->base.fields = source->fields;
+	source->base.n_fields = table->n_columns;
+	signal_state(source, &source->started);
+	return 0;
+}
+
+static void put_cell(struct table_source *source, const struct incise_table *table,
+		     int column, const union incise_cell *cell)
+{
+	switch (table->columns[column].type) {
+	case INCISE_COLUMN_REAL:
+	case INCISE_COLUMN_SINGLE:
+		incise_arrow_put_real(&source->batch, column, cell->real);
+		break;
+	case INCISE_COLUMN_NAME:
+		incise_arrow_put_text(&source->batch, column,
+				      table->names[cell->integer - 1]);
+		break;
+	default:
+		incise_arrow_put_int(&source->batch, column, cell->integer);
+	}
+}
+
+/* Wait until the last block is taken, and leave this one. Returns 0 or -ECANCELED. */
+static int hand_over(struct table_source *source, struct ArrowArray *block)
+{
+	bool stop;
+
+	pthread_mutex_lock(&source->lock);
+	while (source->block.release && !source->stop)
+		pthread_cond_wait(&source->changed, &source->lock);
+	stop = source->stop;
+	if (!stop) {
+		source->block = *block;
+		pthread_cond_broadcast(&source->changed);
+	}
+	pthread_mutex_unlock(&source->lock);
+	if (stop)
+		block->release(block);
+	return stop ? -ECANCELED : 0;
+}
+
+static int table_rows(struct incise_table *table, struct incise_error *err)
+{
+	struct table_source *source = source_of(table);
+	struct incise_arrow_batch *batch = &source->batch;
+	struct ArrowArray block;
+	int rc = incise_arrow_batch_start(batch);
+
+	for (; !rc && batch->rows < table->filled; batch->rows++)
+		for (int i = 0; i < table->n_columns; i++)
+			put_cell(source, table, i,
+				 &table->block[(size_t)i * INCISE_TABLE_BLOCK +
+					       batch->rows]);
+	if (!rc)
+		rc = incise_arrow_batch_take(batch, &block);
+	if (rc)
+		return incise_error_set(err, -rc, "%s: out of memory",
+					source->recording->path);
+	return hand_over(source, &block);
+}
+
+static int table_end(struct incise_table *table, struct incise_error *err)
+{
+	(void)table, (void)err; /* the format's form */
+	return 0;
+}
+
+static int progress(void *context, double share)
+{
+	struct table_source *source = context;
+	bool stop;
+
+	pthread_mutex_lock(&source->lock);
+	stop = source->stop;
+	pthread_mutex_unlock(&source->lock);
+	return stop || (source->given.progress &&
+			source->given.progress(source->given.context, share));
+}
+
+static void *run(void *argument)
+{
+	struct table_source *source = argument;
+
+	source->rc = incise_export_table(&source->recording, 1, &source->options,
+					 &source->format, NULL, NULL, NULL, &source->err);
+	signal_state(source, &source->ended);
+	return NULL;
+}
+
+/* --- in the caller's thread ---------------------------------------------------------- */
+
+static int table_next(struct incise_arrow_source *base, struct ArrowArray *array,
+		      struct incise_error *err)
+{
+	struct table_source *source = (struct table_source *)base;
+	int rc = 0;
+
+	pthread_mutex_lock(&source->lock);
+	while (!source->block.release && !source->ended)
+		pthread_cond_wait(&source->changed, &source->lock);
+	if (source->block.release) {
+		*array = source->block;
+		source->block.release = NULL;
+		pthread_cond_broadcast(&source->changed);
+	} else {
+		rc = source->rc;
+		*err = source->err;
+	}
+	pthread_mutex_unlock(&source->lock);
+	return rc;
+}
+
+static void table_free(struct table_source *source)
+{
+	incise_arrow_batch_close(&source->batch);
+	free(source->fields);
+	pthread_cond_destroy(&source->changed);
+	pthread_mutex_destroy(&source->lock);
+	incise_recording_close(source->recording);
+	free(source);
+}
+
+static void table_close(struct incise_arrow_source *base)
+{
+	struct table_source *source = (struct table_source *)base;
+
+	signal_state(source, &source->stop);
+	pthread_join(source->thread, NULL);
+	if (source->block.release)
+		source->block.release(&source->block);
+	table_free(source);
+}
+
+/* Wait for the columns, or for the export's error. Returns 0 or -errno. */
+static int wait_for_columns(struct table_source *source, struct incise_error *err)
+{
+	int rc;
+
+	pthread_mutex_lock(&source->lock);
+	while (!source->started && !source->ended)
+		pthread_cond_wait(&source->changed, &source->lock);
+	rc = source->started ? 0 : source->rc;
+	if (rc && err)
+		*err = source->err;
+	pthread_mutex_unlock(&source->lock);
+	return rc;
+}
+
+static int table_open(struct table_source *source,
+		      const struct incise_export_options *options,
+		      struct incise_error *err)
+{
+	int rc = incise_export_check(options, err);
+
+	if (!rc)
+		rc = incise_provenance_of(&source->base.provenance, &source->recording, 1,
+					  options, NULL, err);
+	if (rc)
+		return rc;
+	source->given = source->options = *options;
+	source->options.progress = progress;
+	source->options.context = source;
+	if (options->calibration) {
+		source->calibration = *options->calibration;
+		source->options.calibration = &source->calibration;
+	}
+	rc = incise_thread_start(&source->thread, run, source, NULL);
+	if (rc)
+		return incise_error_set(err, -rc, "%s: no thread to read it: %s",
+					source->recording->path, strerror(-rc));
+	return 0;
+}
+
+struct incise_arrow_source *incise_arrow_table(
+	struct incise_recording *recording, const struct incise_export_options *options,
+	struct incise_error *err)
+{
+	struct table_source *source = calloc(1, sizeof(*source));
+	int rc;
+
+	if (!source) {
+		incise_error_set(err, ENOMEM, "%s: out of memory", recording->path);
+		incise_recording_close(recording);
+		return NULL;
+	}
+	source->base.next = table_next;
+	source->base.close = table_close;
+	source->format = (struct incise_table_format){
+		.abi = INCISE_TABLE_ABI,
+		.begin = table_begin,
+		.rows = table_rows,
+		.end = table_end,
+	};
+	source->recording = recording;
+	pthread_mutex_init(&source->lock, NULL);
+	pthread_cond_init(&source->changed, NULL);
+	rc = table_open(source, options, err);
+	if (rc) {
+		incise_provenance_free(&source->base.provenance);
+		table_free(source);
+		errno = -rc;
+		return NULL;
+	}
+	rc = wait_for_columns(source, err);
+	if (!rc)
+		return &source->base;
+	incise_provenance_free(&source->base.provenance);
+	table_close(&source->base);
+	errno = -rc;
+	return NULL;
+}
