@@ -13,6 +13,8 @@
 #include "conf.h"
 #include "vector.h"
 
+#define UNIT_LETTERS 3 /* of each part, as in mPa_s */
+
 /* "sim.seed": the setting's name with those of the groups around it. */
 static void setting_name(const config_setting_t *setting, const char *key, char *name,
 			 size_t size)
@@ -184,7 +186,47 @@ static size_t other_unit(const char *a, const char *b)
 		return 0;
 	while (a[same] && a[same] == b[same])
 		same++;
-	return same;
+	if (!a[same])
+		return same;
+	/* The parts of a unit are short: "noize_mV" is no unit of "noise_mV". */
+	for (n = same; n && a[n - 1] != '_';)
+		n--;
+	return strcspn(a + n, "_") <= UNIT_LETTERS ? same : 0;
+}
+
+static int unknown_key(const config_setting_t *setting, const char *path,
+		       const char *const *keys, struct incise_error *err)
+{
+	const char *own = config_setting_name(setting);
+	const char *meant = NULL, *nearest = incise_nearest_name(own, keys);
+	char name[120], known[360] = "";
+	size_t length = 0, alike = 0;
+
+	for (const char *const *key = keys; *key && length < sizeof(known); key++) {
+		length += snprintf(known + length, sizeof(known) - length, "%s%s",
+				   key == keys ? "" : ", ", *key);
+		if (other_unit(own, *key) > alike) {
+			alike = other_unit(own, *key);
+			meant = *key;
+		}
+	}
+	setting_name(setting, NULL, name, sizeof(name));
+	if (meant && !config_setting_is_group(setting))
+		return incise_error_set(
+			err, EINVAL,
+			"%.100s:%d: %s: unknown key; expected %s, in that unit",
+			file_of(setting, path), config_setting_source_line(setting), name,
+			meant);
+	if (nearest)
+		return incise_error_set(err, EINVAL,
+					"%.100s:%d: %s: unknown key; did you mean %s?",
+					file_of(setting, path),
+					config_setting_source_line(setting), name,
+					nearest);
+	return incise_error_set(err, EINVAL,
+				"%.100s:%d: %s: unknown key; expected one of %s",
+				file_of(setting, path),
+				config_setting_source_line(setting), name, known);
 }
 
 int incise_conf_known(const config_setting_t *group, const char *path,
@@ -195,36 +237,12 @@ int incise_conf_known(const config_setting_t *group, const char *path,
 				     "a group { KEY = VALUE; … }");
 	for (int i = 0; i < config_setting_length(group); i++) {
 		const config_setting_t *setting = config_setting_get_elem(group, i);
-		const char *own = config_setting_name(setting);
-		char name[120], known[360] = "";
-		size_t length = 0, alike = 0;
-		const char *meant = NULL;
-		int found = 0;
+		const char *const *key = keys;
 
-		for (const char *const *key = keys; *key; key++) {
-			found |= !strcmp(own, *key);
-			length += snprintf(known + length, sizeof(known) - length, "%s%s",
-					   key == keys ? "" : ", ", *key);
-			if (length >= sizeof(known))
-				length = sizeof(known) - 1;
-			if (other_unit(own, *key) > alike) {
-				alike = other_unit(own, *key);
-				meant = *key;
-			}
-		}
-		if (found)
-			continue;
-		setting_name(setting, NULL, name, sizeof(name));
-		if (meant)
-			return incise_error_set(
-				err, EINVAL, "%.100s:%d: %s: unknown key; expected %s%s",
-				file_of(setting, path),
-				config_setting_source_line(setting), name, meant,
-				config_setting_is_group(setting) ? "" : ", in that unit");
-		return incise_error_set(err, EINVAL,
-					"%.100s:%d: %s: unknown key; expected one of %s",
-					file_of(setting, path),
-					config_setting_source_line(setting), name, known);
+		while (*key && strcmp(config_setting_name(setting), *key))
+			key++;
+		if (!*key)
+			return unknown_key(setting, path, keys, err);
 	}
 	return 0;
 }

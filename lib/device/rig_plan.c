@@ -643,6 +643,8 @@ static int plan_sim_setting(struct incise_sim_config *config, const char *path,
 
 	snprintf(where, sizeof(where), "%.200s:%d", path,
 		 config_setting_source_line(setting));
+	if (!incise_sim_config_has(name))
+		return plan_sim_key(config, where, name, 0, err);
 	if (incise_sim_config_has_words(name)) {
 		const char *word = NULL;
 		int rc = incise_conf_string(config_setting_parent(setting), path, name,
@@ -817,6 +819,8 @@ static int plan_file(struct incise_rig_plan *plan, const char *path,
 /* One KEY=VALUE of the shorthand; @word is overwritten. */
 static int plan_word(struct incise_rig_plan *plan, char *word, struct incise_error *err)
 {
+	static const char *const own[] = {"clock", "mouse", NULL};
+	const char *meant;
 	char *value = strchr(word, '=');
 	struct incise_c_locale locale;
 	char where[80], *end;
@@ -827,13 +831,22 @@ static int plan_word(struct incise_rig_plan *plan, char *word, struct incise_err
 		return plan_sim_key(&plan->config, where, "motion", INCISE_SURGEON_HAND,
 				    err);
 	if (!value || value == word || !value[1])
-		return incise_error_set(err, EINVAL, "%s: expected KEY=VALUE; correct it",
+		return incise_error_set(err, EINVAL,
+					"%s: expected KEY=VALUE, for example "
+					"sim:seed=7,clock=simulated; correct it",
 					where);
 	*value++ = '\0';
 	if (!strcmp(word, "clock"))
 		return plan_clock(plan, where, value, err);
 	if (incise_sim_config_has_words(word))
 		return plan_sim_word(&plan->config, where, word, value, err);
+	meant = incise_sim_config_has(word) ? NULL : incise_nearest_name(word, own);
+	if (meant)
+		return incise_error_set(err, EINVAL,
+					"%s: %s: unknown key; did you mean %s?", where,
+					word, meant);
+	if (!incise_sim_config_has(word))
+		return plan_sim_key(&plan->config, where, word, 0, err);
 	locale = incise_c_locale_begin();
 	number = incise_decimal(value, &end);
 	incise_c_locale_end(locale);

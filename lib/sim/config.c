@@ -189,6 +189,26 @@ int incise_sim_config_set_word(struct incise_sim_config *config, const char *nam
 				name, key->words[0], key->words[1], word);
 }
 
+static int unknown_key(const char *name, struct incise_error *err)
+{
+	const char *names[N_KEYS + 1] = {NULL}, *nearest;
+
+	for (size_t i = 0; i < N_KEYS; i++)
+		names[i] = keys[i].name;
+	nearest = incise_nearest_name(name, names);
+	if (nearest)
+		return incise_error_set(err, ENOENT,
+					"sim.%.60s: unknown key; did you mean %s?", name,
+					nearest);
+	return incise_error_set(err, ENOENT,
+				"sim.%.60s: unknown key; rig.conf(5) lists them", name);
+}
+
+bool incise_sim_config_has(const char *name)
+{
+	return key_find(name, strcspn(name, "["));
+}
+
 int incise_sim_config_set(struct incise_sim_config *config, const char *name,
 			  double value, struct incise_error *err)
 {
@@ -198,19 +218,24 @@ int incise_sim_config_set(struct incise_sim_config *config, const char *name,
 	char *end;
 	int rc;
 
-	if (key && name[length]) {
+	if (!key)
+		return unknown_key(name, err);
+	if (name[length]) {
 		long number = strtol(name + length + 1, &end, 10);
 
-		if (!key->length || strcmp(end, "]") || number < 0 ||
-		    number >= key->length)
-			key = NULL;
-		else
-			index = (int)number;
+		if (!key->length)
+			return incise_error_set(err, ENOENT,
+						"sim.%.60s: %s is a single number; "
+						"remove the index",
+						name, key->name);
+		if (strcmp(end, "]") || number < 0 || number >= key->length)
+			return incise_error_set(
+				err, ENOENT,
+				"sim.%.60s: expected an index from [0] to [%d]; "
+				"correct it",
+				name, key->length - 1);
+		index = (int)number;
 	}
-	if (!key)
-		return incise_error_set(err, ENOENT,
-					"sim.%.60s: unknown key; rig.conf(5) lists them",
-					name);
 	rc = key_check(key, value, EINVAL, err);
 	if (rc)
 		return rc;

@@ -55,6 +55,9 @@ int incise_sim_directions(const struct incise_sim_config *config, const double n
 int incise_sim_config_set(struct incise_sim_config *config, const char *key, double value,
 			  struct incise_error *err);
 
+/* Whether there is such a key. */
+bool incise_sim_config_has(const char *key);
+
 /* Whether a key takes a word, as withdrawal does, and no number. */
 bool incise_sim_config_has_words(const char *key);
 

@@ -62,17 +62,24 @@ static void shorthand_ignores_the_locale(void **state)
 	incise_rig_close(rig);
 }
 
+#define PAIRS "expected KEY=VALUE, for example sim:seed=7,clock=simulated; correct it"
+
 static void shorthand_refuses(void **state)
 {
 	static const struct {
 		const char *spec, *text;
 	} row[] = {
 		{"sim:sede=1",
-		 "sim:sede=1: sim.sede: unknown key; rig.conf(5) lists them"},
-		{"sim:seed", "sim:seed: expected KEY=VALUE; correct it"},
-		{"sim:seed=", "sim:seed=: expected KEY=VALUE; correct it"},
-		{"sim:=1", "sim:=1: expected KEY=VALUE; correct it"},
-		{"sim:seed=1,", "sim:: expected KEY=VALUE; correct it"},
+		 "sim:sede=1: sim.sede: unknown key; did you mean seed?"},
+		{"sim:clok=simulated",
+		 "sim:clok=simulated: clok: unknown key; did you mean clock?"},
+		{"sim:mause=1", "sim:mause=1: mause: unknown key; did you mean mouse?"},
+		{"sim:haste=x",
+		 "sim:haste=x: sim.haste: unknown key; rig.conf(5) lists them"},
+		{"sim:seed", "sim:seed: " PAIRS},
+		{"sim:seed=", "sim:seed=: " PAIRS},
+		{"sim:=1", "sim:=1: " PAIRS},
+		{"sim:seed=1,", "sim:: " PAIRS},
 		{"sim:seed=x",
 		 "sim:seed=x: seed: expected a number, found x; correct it"},
 		{"sim:seed=1x",
@@ -169,13 +176,17 @@ static void file_refuses(void **state)
 		{"clock = \"fast\";", EINVAL,
 		 ":1: clock: expected real or simulated, found fast; correct it"},
 		{"tracer = \"sim:\";", EINVAL,
-		 ":1: tracer: unknown key; expected one of clock, tracker, force, camera, "
+		 ":1: tracer: unknown key; did you mean tracker?"},
+		{"voltmeter = \"sim:\";", EINVAL,
+		 ":1: voltmeter: unknown key; expected one of clock, tracker, force, camera, "
 		 "stepper, surface, sim, actuator, "
 		 "tracker_setup, force_setup, camera_setup, vision, foot_switch"},
 		{"sim = 1;", EINVAL,
 		 ":1: sim: expected a group { key = value; }; correct it"},
 		{"sim = {\n\nsede = 1; };", EINVAL,
-		 ":3: sim.sede: unknown key; rig.conf(5) lists them"},
+		 ":3: sim.sede: unknown key; did you mean seed?"},
+		{"sim = { sede = \"a\"; };", EINVAL,
+		 ":1: sim.sede: unknown key; did you mean seed?"},
 		{"sim = {\nseed = -1; };", EINVAL,
 		 ":2: sim.seed: expected a whole number from 0 to 2147483647, found -1; "
 		 "correct it"},

@@ -72,18 +72,18 @@ static void set_refuses(void **state)
 		int rc;
 		const char *text;
 	} row[] = {
-		{"sede", 1, -ENOENT, "sim.sede: unknown key; rig.conf(5) lists them"},
+		{"sede", 1, -ENOENT, "sim.sede: unknown key; did you mean seed?"},
 		{"", 1, -ENOENT, "sim.: unknown key; rig.conf(5) lists them"},
 		{"n_depths", 1, -ENOENT,
 		 "sim.n_depths: unknown key; rig.conf(5) lists them"},
 		{"depth_mm[8]", 5, -ENOENT,
-		 "sim.depth_mm[8]: unknown key; rig.conf(5) lists them"},
+		 "sim.depth_mm[8]: expected an index from [0] to [7]; correct it"},
 		{"depth_mm[-1]", 5, -ENOENT,
-		 "sim.depth_mm[-1]: unknown key; rig.conf(5) lists them"},
+		 "sim.depth_mm[-1]: expected an index from [0] to [7]; correct it"},
 		{"depth_mm[1", 5, -ENOENT,
-		 "sim.depth_mm[1: unknown key; rig.conf(5) lists them"},
+		 "sim.depth_mm[1: expected an index from [0] to [7]; correct it"},
 		{"cut_s[0]", 5, -ENOENT,
-		 "sim.cut_s[0]: unknown key; rig.conf(5) lists them"},
+		 "sim.cut_s[0]: cut_s is a single number; remove the index"},
 		{"cut_s", 0.1, -EINVAL,
 		 "sim.cut_s: expected a number from 0.5 to 3600, found 0.1; correct it"},
 		{"cut_s", NAN, -EINVAL,
