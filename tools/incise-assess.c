@@ -11,6 +11,7 @@
 #include "cli/cli.h"
 #include "cli/document.h"
 #include "cli/file.h"
+#include "cli/file_kind.h"
 #include "cli/folder.h"
 #include "cli/json.h"
 #include "cli/loop_report.h"
@@ -111,6 +112,7 @@ static void load(struct assessed *a, const char *path)
 {
 	struct incise_error err = {0};
 
+	file_expect(path, FILE_SESSION);
 	a->path = path;
 	a->session = cli_require(session_read(path, &err), &err);
 	session_judge(a->session, a->verdict);

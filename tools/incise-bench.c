@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "bench/bench.h"
+#include "cli/file_kind.h"
 #include "cli/json.h"
 
 static void parse_profile(void *profile, char *text)
@@ -114,8 +115,10 @@ static _Noreturn void compare(const struct bench_run *run, int argc, char **argv
 	if (run->plot || run->load || run->profile || run->against || run->quick ||
 	    run->seed || run->seconds > 0)
 		cli_usage("'compare' takes no option but --json");
-	for (int i = 0; i < 2; i++)
+	for (int i = 0; i < 2; i++) {
+		file_expect(argv[1 + i], FILE_REPORT);
 		reports[i] = cli_require(json_read(argv[1 + i], &err), &err);
+	}
 	comparison = cli_require(
 		compare_reports(reports[0], argv[1], reports[1], argv[2], &err), &err);
 	json_decref(reports[0]);

@@ -43,20 +43,15 @@ struct options {
 static void parse_only(void *whole, char *list)
 {
 	struct options *options = whole;
+	const char *names[KINDS + 1] = {NULL};
 	char *items[KINDS];
 	int n = cli_list("only", list, items, KINDS);
 
+	for (int k = 0; k < KINDS; k++)
+		names[k] = kinds[k].name;
 	memset(options->only, 0, sizeof(options->only));
 	for (int i = 0; i < n; i++) {
-		int k = 0;
-
-		while (k < KINDS && strcmp(kinds[k].name, items[i]))
-			k++;
-		if (k == KINDS)
-			cli_usage("--only: there is no '%s': force, depth, tip, delay or "
-				  "stepper",
-				  items[i]);
-		options->only[k] = true;
+		options->only[cli_choice("only", items[i], names)] = true;
 	}
 }
 
@@ -65,7 +60,7 @@ static const struct cli_unit ages[] = {
 
 static const struct cli_option option_table[] = {
 	{'c', "calibration", "FILE", "to look at (default: calibration.conf)",
-	 CLI_TEXT(struct options, calibration)},
+	 CLI_INPUT(struct options, calibration)},
 	{0, "due", "AGE", "a calibration older than this is due (default: 365d)",
 	 CLI_QUANTITY(struct options, due_s, ages, 0, 1e10)},
 	{0, "only", "LIST",
@@ -333,7 +328,7 @@ int main(int argc, char **argv)
 
 	memset(options.only, 1, sizeof(options.only));
 	cli_parse(&command, argc, argv, &options);
-	cli_no_operands(argc, argv, "a recording goes with --recording");
+	cli_no_operands(argc, argv, "--recording");
 	named = options.calibration;
 	if (!named)
 		options.calibration = "calibration.conf";

@@ -44,8 +44,7 @@ static const struct cli_option option_table[] = {
 	 CLI_DURATION(struct options, time_s, 8, 600)},
 	{0, "reference-stream", "STREAM",
 	 "whose delay is right: force (default), tracker, camera",
-	 CLI_CHOICE(struct options, reference, stream_names,
-		    "force, tracker and camera")},
+	 CLI_CHOICE(struct options, reference, stream_names)},
 	{0, "max-delay", "MS", "look for a delay up to so many ms (default: 150)",
 	 CLI_NUMBER(struct options, max_delay_ms, 10, 1000)},
 	{0, "with-camera", NULL, "of the virtual rig, record its camera too",
@@ -93,7 +92,7 @@ static void parse(struct options *options, int argc, char **argv)
 	struct calibrate_options *common = &options->common;
 
 	cli_parse(&command, argc, argv, options);
-	cli_no_operands(argc, argv, "a recording goes with --from");
+	cli_no_operands(argc, argv, "--from");
 	if (common->from && options->time_s > 0)
 		cli_usage("--duration: a recording has its own");
 	if (!common->from && !(options->time_s > 0) && !isatty(STDIN_FILENO))

@@ -158,7 +158,7 @@ static void parse(struct options *options, int argc, char **argv)
 	};
 	cli_parse(&command, argc, argv, options);
 	if (optind == argc)
-		cli_usage("how? two-point, line or board");
+		cli_usage("missing method: two-point, line or board");
 	options->way = argv[optind++];
 	if (strcmp(options->way, "two-point") && strcmp(options->way, "line") &&
 	    strcmp(options->way, "board"))

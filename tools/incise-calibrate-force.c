@@ -138,7 +138,7 @@ static void parse(struct options *options, int argc, char **argv)
 
 	cli_negative_numbers(argc, argv);
 	cli_parse(&command, argc, argv, options);
-	cli_no_operands(argc, argv, "pairs are given with --from");
+	cli_no_operands(argc, argv, "--from");
 	if (common->from && (common->rig || options->weights.n || common->keep))
 		cli_usage("--from takes the place of a rig: leave --rig, --weights and "
 			  "--keep out");

@@ -449,7 +449,7 @@ static void parse(struct options *options, int argc, char **argv)
 
 	cli_parse(&command, argc, argv, options);
 	timed = options->time_s > 0;
-	cli_no_operands(argc, argv, "a file goes with --from");
+	cli_no_operands(argc, argv, "--from");
 	if (options->common.from && timed)
 		cli_usage("--duration: a file has its own");
 	if (!options->common.from && !timed && !isatty(STDIN_FILENO))

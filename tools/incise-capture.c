@@ -63,7 +63,7 @@ static const struct cli_option option_table[] = {
 	 "off; frames: record them; depth: and find the scalpel in\n"
 	 "them; auto: what rig.conf has (default; a rig of sim:… has\n"
 	 "no camera then)",
-	 CLI_CHOICE(struct options, camera, cameras, "auto, off, frames and depth")},
+	 CLI_CHOICE(struct options, camera, cameras)},
 	{0, "trigger", "WHAT",
 	 "wait for the stylus's button, or for a force such as 0.2N;\n"
 	 "the second before is recorded too",
@@ -94,9 +94,9 @@ static void parse(struct options *options, int argc, char **argv)
 	size_t length;
 
 	cli_parse(&command, argc, argv, options);
-	cli_no_operands(argc, argv, "the recording's name goes with -o");
+	cli_no_operands(argc, argv, "-o");
 	if (!options->output)
-		cli_usage("where to? give -o NAME.rec");
+		cli_usage("missing -o NAME.rec (output recording)");
 	output = cli_text("%s", options->output);
 	for (length = strlen(output); length > 1 && output[length - 1] == '/'; length--)
 		output[length - 1] = 0;

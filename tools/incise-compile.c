@@ -13,6 +13,7 @@
 #include <incise/model.h>
 #include <incise/plan_file.h>
 #include "cli/cli.h"
+#include "cli/file_kind.h"
 #include "cli/json.h"
 #include "cli/plan_report.h"
 #include "cli/scene_argument.h"
@@ -24,35 +25,16 @@ struct job {
 	struct scene_argument scene;
 };
 
-static void parse_budget(void *budget, char *text)
-{
-	static const struct {
-		const char *unit;
-		double scale;
-	} units[] = {{"", 1}, {"N", 1}, {"mN", 1e-3}, {"uN", 1e-6}, {"µN", 1e-6}};
-	char *end;
-	double value = incise_decimal(text, &end);
-
-	for (size_t i = 0; i < sizeof(units) / sizeof(*units) && end != text; i++) {
-		if (strcmp(end, units[i].unit))
-			continue;
-		value *= units[i].scale;
-		if (!(value >= 1e-9 && value <= 1e9))
-			cli_usage("--budget: %s is not within 1e-9 to 1e9", text);
-		*(double *)budget = value;
-		return;
-	}
-	cli_usage("--budget: '%s' is not an error such as 0.1mN, 50uN or 1e-4", text);
-}
+static const struct cli_unit newtons[] = {
+	{"N", 1}, {"mN", 1e-3}, {"uN", 1e-6}, {"µN", 1e-6}, {0}};
 
 static void parse_arithmetic(void *arithmetic, char *text)
 {
+	const char *names[INCISE_FIXED_FORCE - INCISE_FIXED_DIRECT + 2] = {NULL};
+
 	for (int a = INCISE_FIXED_DIRECT; a <= INCISE_FIXED_FORCE; a++)
-		if (!strcmp(text, incise_fixed_arithmetic_name(a))) {
-			*(int *)arithmetic = a;
-			return;
-		}
-	cli_usage("--method: '%s' is none of direct, table and force", text);
+		names[a - INCISE_FIXED_DIRECT] = incise_fixed_arithmetic_name(a);
+	*(int *)arithmetic = INCISE_FIXED_DIRECT + cli_choice("method", text, names);
 }
 
 /* "out/pig liver.c" makes pig_liver, a C name of the file's own: free(3). */
@@ -84,7 +66,7 @@ static const struct cli_option options[] = {
 	{0, "budget", "ERROR",
 	 "largest error that may be certified, e.g. 0.1mN, 50uN or\n"
 	 "1e-4 in the output's unit (default: 0.1mN)",
-	 CLI_PARSED(struct job, options.budget, parse_budget)},
+	 CLI_QUANTITY(struct job, options.budget, newtons, 1e-9, 1e9)},
 	{0, "method", "KIND",
 	 "direct, table or force (default: the cheapest within the\n"
 	 "budget)",
@@ -235,11 +217,13 @@ int main(int argc, char **argv)
 
 	incise_fixed_options_init(&job.options);
 	cli_parse(&command, argc, argv, &job);
-	path = cli_operand(argc, argv, "model or scene");
+	path = cli_operand(argc, argv, "MODEL.fis or SCENE", "model or scene to compile");
 	if (!job.output || !*job.output)
-		cli_usage("-o is missing; give -o MODEL.fx, or -o NAME.plan");
+		cli_usage(
+			"missing -o FILE (output: MODEL.fx of a model, NAME.plan of a scene)");
 	if (job.json && !strcmp(job.output, "-"))
 		cli_usage("--json and -o - would both write to standard output");
+	file_expect(path, FILE_MODEL | FILE_SCENE);
 	if (cli_ends_with(path, ".fis") || !scene_argument_find(&job.scene, path)) {
 		if (!cli_ends_with(path, ".fis") && cli_ends_with(job.output, ".plan"))
 			cli_fail("%s: there is no file and no scene of that name", path);

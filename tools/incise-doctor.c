@@ -362,7 +362,7 @@ int main(int argc, char **argv)
 	static struct doctor doctor;
 
 	cli_parse(&command, argc, argv, &doctor);
-	cli_no_operands(argc, argv, "a rig is named with --rig");
+	cli_no_operands(argc, argv, "--rig");
 	check_group(&doctor);
 	check_realtime(&doctor);
 	check_module(&doctor);

@@ -12,6 +12,7 @@
 #include <incise/model.h>
 #include <incise/uncertainty.h>
 #include "cli/cli.h"
+#include "cli/file_kind.h"
 #include "cli/json.h"
 #include "cli/scene_argument.h"
 
@@ -191,9 +192,11 @@ static void open_compiled(struct evaluator *e, const char *path)
 static void open_model(struct evaluator *e, const char *path, const char *arith,
 		       bool clamp)
 {
+	enum file_kind kind = file_kind_of(path);
 	struct incise_error err = {0};
 
-	if (cli_ends_with(path, ".fx")) {
+	file_expect(path, FILE_MODEL | FILE_COMPILED);
+	if (kind ? kind == FILE_COMPILED : cli_ends_with(path, ".fx")) {
 		if (arith && !strcmp(arith, "double"))
 			cli_usage("--arith double: %s is compiled to fixed point", path);
 		if (!clamp)
@@ -233,6 +236,7 @@ static void eval_file(struct evaluator *e, const char *path)
 	char *text;
 	int rc;
 
+	file_expect(path, FILE_TABLE);
 	in = cli_require(incise_infile_open(path, &points, &err), &err);
 	while ((rc = incise_infile_line(in, &text, &err)) > 0) {
 		line++;

@@ -8,6 +8,7 @@
 #include <incise/calibration.h>
 #include <incise/recording.h>
 #include "cli/cli.h"
+#include "cli/file_kind.h"
 #include "cli/json.h"
 #include "cli/recording.h"
 
@@ -43,6 +44,7 @@ static void load_calibration(void *options, char *path)
 	struct incise_error err = {0};
 
 	cli_input(path);
+	file_expect(path, FILE_CALIBRATION);
 	if (incise_calibration_load(path, &job->calibration, &err))
 		cli_fail_with(&err);
 	job->how.calibration = &job->calibration;
@@ -117,6 +119,7 @@ static void export(char **paths, int n, const struct job *job,
 	struct incise_error err = {0};
 
 	for (int i = 0; i < n; i++) {
+		paths[i] = (char *)file_operand(paths[i], FILE_RECORDING);
 		recordings[i] = recording_open(paths[i]);
 		recording_intact(paths[i], job->damaged, &err);
 		if (err.code)
@@ -138,7 +141,7 @@ static void parse(struct job *job, int argc, char **argv)
 	incise_export_options_init(how);
 	cli_parse(&command, argc, argv, job);
 	if (optind == argc)
-		cli_usage("which recording?");
+		cli_usage("missing NAME.rec (recording to export)");
 	if (how->resample && (how->depth_bins || (how->rate_hz > 0 && how->rate_hz < 1)))
 		cli_usage("--resample takes a --rate of 1 or more, and no --average");
 	if (how->rate_hz > 0 && how->depth_bins)

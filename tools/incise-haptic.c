@@ -19,8 +19,7 @@ static const struct cli_option options[] = {
 	 "what the hand holds at first: auto (blade or handle, by the scalpel's turn, or\n"
 	 "a tube with a station of its own), blade, handle or tube (default: auto); on a\n"
 	 "terminal the keys a, b, h, t change it",
-	 CLI_CHOICE(struct haptic_job, haptic.tool, loop_tool_names,
-		    "auto, blade, handle, tube")},
+	 CLI_CHOICE(struct haptic_job, haptic.tool, loop_tool_names)},
 	{0, "procedure", NULL,
 	 "on the virtual rig, in simulated time: a script cuts, enlarges the cut and\n"
 	 "inserts a tube",
@@ -31,7 +30,7 @@ static const struct cli_option options[] = {
 	 CLI_FLAG(struct haptic_job, in_kernel)},
 	HAPTIC_HOLD_OPTIONS,
 	{0, "policy", "POLICY", "fifo or deadline (default: fifo)",
-	 CLI_CHOICE(struct haptic_job, realtime.policy, policies, "fifo, deadline")},
+	 CLI_CHOICE(struct haptic_job, realtime.policy, policies)},
 	{0, "priority", "N", "of fifo, 1 to 84 (default: 80)",
 	 CLI_INTEGER(struct haptic_job, realtime.priority, 1,
 		     INCISE_REALTIME_PRIORITY_MAX)},

@@ -15,6 +15,7 @@
 #include <incise/recording.h>
 #include <incise/scan.h>
 #include "cli/cli.h"
+#include "cli/file_kind.h"
 #include "cli/json.h"
 #include "cli/plan_report.h"
 #include "cli/stream_report.h"
@@ -572,13 +573,18 @@ static void check_exists(const char *path)
 int main(int argc, char **argv)
 {
 	struct job job = {0};
+	enum file_kind kind;
 	bool compiled, plan;
 	char *path;
 
 	cli_parse(&command, argc, argv, &job);
-	path = cli_operand(argc, argv, "file");
-	compiled = cli_ends_with(path, ".fx");
-	plan = cli_ends_with(path, ".plan");
+	path = cli_operand(argc, argv, "FILE", "recording, model or plan; or a device");
+	if (!stepper_module_is(path) && strcmp(path, "devices") && !is_bus(path))
+		file_expect(path,
+			    FILE_RECORDING | FILE_MODEL | FILE_COMPILED | FILE_PLAN);
+	kind = file_kind_of(path);
+	compiled = kind ? kind == FILE_COMPILED : cli_ends_with(path, ".fx");
+	plan = kind ? kind == FILE_PLAN : cli_ends_with(path, ".plan");
 	if (job.plot && (is_recording(path) || compiled || plan ||
 			 stepper_module_is(path) || is_bus(path)))
 		cli_usage("--plot draws a model, MODEL.fis");

@@ -9,6 +9,7 @@
 #include <incise/calibration.h>
 #include <incise/replay.h>
 #include "cli/cli.h"
+#include "cli/file_kind.h"
 #include "cli/json.h"
 #include "cli/loop_report.h"
 #include "cli/plot.h"
@@ -39,14 +40,14 @@ static const struct cli_option options[] = {
 	{0, "poses", "WHEN",
 	 "give poses to the loop at their arrival, as live, or at their\n"
 	 "acquisition (default: arrival)",
-	 CLI_CHOICE(struct job, how.at, times, NULL)},
+	 CLI_CHOICE(struct job, how.at, times)},
 	{'c', "calibration", "FILE",
 	 "take this calibration of force, not that of the recording",
 	 CLI_INPUT(struct job, calibration)},
 	SCENE_ARGUMENT_OPTIONS(struct job, scene),
 	{0, "tool", "KIND",
 	 "what the hand held: auto, blade, handle or tube (default: auto)",
-	 CLI_CHOICE(struct job, how.tool, loop_tool_names, NULL)},
+	 CLI_CHOICE(struct job, how.tool, loop_tool_names)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{0},
 };
@@ -66,10 +67,9 @@ static void parse(struct job *job, int argc, char **argv)
 {
 	*job = (struct job){.how.stop = &cli_stop};
 	cli_parse(&command, argc, argv, job);
-	if (argc - optind != 2)
-		cli_usage("expected a recording and a scene, got %d names",
-			  argc - optind);
-	job->recording = argv[optind];
+	if (optind == argc)
+		cli_usage("missing NAME.rec (recording)");
+	job->recording = file_operand(argv[optind], FILE_RECORDING);
 	scene_argument_operand(&job->scene, argc, argv, optind + 1);
 	if (job->json && job->csv && !strcmp(job->csv, "-"))
 		cli_usage("--json and --log - would both write to standard output");

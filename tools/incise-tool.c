@@ -36,12 +36,12 @@ static const struct cli_command command = {
 		"Exit: 0 the loop took it, 1 failed, 2 bad usage. See incise-tool(1).",
 };
 
-static bool is_tool(const char *name)
+static void check_tool(const char *name)
 {
 	for (const char *const *tool = loop_tool_names; *tool; tool++)
 		if (!strcmp(name, *tool))
-			return true;
-	return false;
+			return;
+	cli_unknown("tool", name, loop_tool_names);
 }
 
 /* A loop that lives answers at its next look, within 0.1 s. */
@@ -142,11 +142,13 @@ int main(int argc, char **argv)
 
 	cli_parse(&command, argc, argv, &job);
 	n = argc - optind;
-	if (n < 1 || n > 2)
-		cli_usage("expected the name of a loop, and a tool or none, got %d", n);
-	if (n == 2 && !is_tool(argv[optind + 1]))
-		cli_usage("'%s' is no tool: expected blade, handle, tube or auto",
-			  argv[optind + 1]);
+	if (n < 1)
+		cli_usage("missing NAME (loop, as 'incise status' lists it)");
+	if (n > 2)
+		cli_usage("unexpected argument '%s'; give a loop and a tool",
+			  argv[optind + 2]);
+	if (n == 2)
+		check_tool(argv[optind + 1]);
 	find_loop(&pages, argv[optind]);
 	if (n == 2)
 		set_tool(argv[optind + 1], held, wanted);

@@ -13,6 +13,7 @@
 #include <incise/train.h>
 #include "cli/cli.h"
 #include "cli/file.h"
+#include "cli/file_kind.h"
 #include "cli/json.h"
 
 struct options {
@@ -54,13 +55,10 @@ static void parse_mfs(void *whole, char *text)
 static void parse_type(void *type, char *text)
 {
 	static const enum incise_mf_type types[] = {INCISE_MF_GAUSS, INCISE_MF_GBELL};
+	const char *const names[] = {incise_mf_type_name(types[0]),
+				     incise_mf_type_name(types[1]), NULL};
 
-	for (size_t i = 0; i < sizeof(types) / sizeof(*types); i++)
-		if (!strcmp(text, incise_mf_type_name(types[i]))) {
-			*(enum incise_mf_type *)type = types[i];
-			return;
-		}
-	cli_usage("--mf-type: '%s' is neither gaussmf nor gbellmf", text);
+	*(enum incise_mf_type *)type = types[cli_choice("mf-type", text, names)];
 }
 
 static const struct cli_option option_table[] = {
@@ -136,9 +134,10 @@ static void parse(struct options *options, int argc, char **argv)
 	};
 	incise_train_options_init(&options->train);
 	cli_parse(&command, argc, argv, options);
-	options->data = cli_operand(argc, argv, "data file");
+	options->data = file_operand(
+		cli_operand(argc, argv, "DATA.csv", "pairs to learn from"), FILE_TABLE);
 	if (!options->model || !*options->model)
-		cli_usage("-o MODEL.fis is missing: the file for the model");
+		cli_usage("missing -o MODEL.fis (output model)");
 	/* Neither a file nor a folder is there, nor is one meant: a column, of the old --output. */
 	if (strcmp(options->model, "-") && !strpbrk(options->model, "./") &&
 	    access(options->model, F_OK))
@@ -152,8 +151,8 @@ static void parse(struct options *options, int argc, char **argv)
 		cli_output_once(sd);
 	free(sd);
 	if (options->n_mfs && options->n_mfs != options->n_inputs)
-		cli_usage("--mf names %d counts for %d inputs", options->n_mfs,
-			  options->n_inputs);
+		cli_usage("--mf: expected %d counts, one for each of --inputs, found %d",
+			  options->n_inputs, options->n_mfs);
 	for (int i = 0; i < options->n_inputs && !options->n_mfs; i++)
 		options->mfs[i] = options->n_inputs == 2 ? 5 - i : 3;
 }

@@ -6,6 +6,7 @@
 #include <string.h>
 #include <incise/verify.h>
 #include "cli/cli.h"
+#include "cli/file_kind.h"
 #include "cli/json.h"
 
 #define FINDINGS_MAX 1000 /* in the JSON object */
@@ -176,10 +177,11 @@ int main(int argc, char **argv)
 
 	cli_parse(&command, argc, argv, &job);
 	if (optind == argc)
-		cli_usage("which recording?");
+		cli_usage("missing NAME.rec (recording to check)");
 	if (optind + 1 < argc)
-		cli_usage("'%s': one recording at a time", argv[optind + 1]);
-	sink.path = argv[optind];
+		cli_usage("unexpected argument '%s'; give one NAME.rec at a time",
+			  argv[optind + 1]);
+	sink.path = file_operand(argv[optind], FILE_RECORDING);
 	sink.list = job.json ? json_array() : NULL;
 	cli_catch_signals();
 	if (incise_verify(sink.path, &watch, &report, &err))

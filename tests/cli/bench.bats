@@ -449,7 +449,7 @@ rate() {
 	run --separate-stderr incise bench loop --plot a/
 	bad_usage "--plot"
 	run --separate-stderr incise bench loop --load much
-	bad_usage "'much' is none of idle, cpu, memory, disk and view"
+	bad_usage "--load: expected idle, cpu, memory, disk or view, found 'much'"
 	run --separate-stderr incise bench training --load cpu
 	bad_usage "--load does not go with 'training'"
 	run --separate-stderr incise bench loop none.scene

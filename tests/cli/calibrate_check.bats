@@ -148,5 +148,5 @@ altered() {
 	run --separate-stderr incise calibrate check --due soon
 	bad_usage "--due"
 	run --separate-stderr incise calibrate check a.rec
-	bad_usage "'a.rec' is too much"
+	bad_usage "unexpected argument 'a.rec'; did you mean --recording a.rec?"
 }

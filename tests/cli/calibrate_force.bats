@@ -149,7 +149,7 @@ made_weights() {
 	run --separate-stderr incise calibrate force --input-range 5,1
 	bad_usage "the first is to be the lower one"
 	run --separate-stderr incise calibrate force extra
-	bad_usage "'extra' is too much"
+	bad_usage "unexpected argument 'extra'; did you mean --from extra?"
 }
 
 @test "stopped in the middle, the old calibration stays" {

@@ -317,9 +317,9 @@ beside_the_model() {
 
 @test "haptic: bad usage" {
 	run --separate-stderr incise haptic
-	bad_usage "one scene, got 0"
+	bad_usage "missing SCENE ("
 	run --separate-stderr incise haptic liver.scene more.scene
-	bad_usage "one scene, got 2"
+	bad_usage "; give one SCENE at a time"
 	run --separate-stderr incise haptic liver.scene --rig $quick --log l.csv
 	bad_usage --duration
 	run --separate-stderr incise haptic liver.scene --rig $quick --duration 1s --json --log -

@@ -133,6 +133,6 @@ readers() {
 	run --separate-stderr incise calibrate force --from hex.csv
 	failed_with "hex.csv:2: mass_g: expected a number, found '0x10'"
 	run --separate-stderr incise train pairs.csv --check 0x1p-2 -o out.fis
-	bad_usage "'0x1p-2' is not a number"
+	bad_usage "--check: expected a number from 0.01 to 0.99, found '0x1p-2'"
 	[ ! -e out.fis ]
 }

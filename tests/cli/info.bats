@@ -220,9 +220,9 @@ setup() {
 
 @test "info: bad usage" {
 	run --separate-stderr incise info
-	bad_usage "one file, got 0"
+	bad_usage "missing FILE ("
 	run --separate-stderr incise info m.fis a.rec
-	bad_usage "one file, got 2"
+	bad_usage "; give one FILE at a time"
 }
 
 @test "info to a full disk" {

@@ -189,11 +189,11 @@ teardown() {
 
 @test "bad usage" {
 	run --separate-stderr incise replay
-	bad_usage "a recording and a scene"
+	bad_usage "missing NAME.rec (recording)"
 	run --separate-stderr incise replay liver.rec
-	bad_usage "got 1"
+	bad_usage "missing SCENE ("
 	run --separate-stderr incise replay liver.rec liver.scene more
-	bad_usage "got 3"
+	bad_usage "; give one SCENE at a time"
 	run --separate-stderr incise replay liver.rec liver.scene --poses dawn
 	bad_usage dawn
 	run --separate-stderr incise replay liver.rec liver.scene --tool spoon

@@ -166,7 +166,7 @@ ended() {
 	run --separate-stderr incise haptic neck --rig sim:clock=simulated --duration 0.1s
 	failed_with neck.scene: syntax
 	run --separate-stderr incise haptic nothing --rig sim:clock=simulated --duration 0.1s
-	failed_with "there is no file nothing, and no nothing.scene in this folder, in /etc/incise/scenes"
+	failed_with "nothing: no such scene; give the path of a file, or one of: "
 }
 
 # Rights that this test takes away; who has none to begin with needs not.

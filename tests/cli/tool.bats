@@ -262,9 +262,9 @@ at_terminal() {
 
 @test "tool refuses bad usage" {
 	run -2 --separate-stderr incise tool
-	[[ "${stderr_lines[0]}" == "incise tool: expected the name of a loop, and a tool or none, got 0" ]]
+	[[ "${stderr_lines[0]}" == "incise tool: missing NAME (loop, as 'incise status' lists it)" ]]
 	run -2 --separate-stderr incise tool neck spoon
-	[[ "${stderr_lines[0]}" == "incise tool: 'spoon' is no tool: expected blade, handle, tube or auto" ]]
+	[[ "${stderr_lines[0]}" == "incise tool: unknown tool 'spoon'; expected auto, blade, handle or tube" ]]
 	run -2 incise tool neck tube more
 }
 

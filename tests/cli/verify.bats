@@ -201,7 +201,7 @@ qw REAL NOT NULL, qx REAL NOT NULL, qy REAL NOT NULL, qz REAL NOT NULL, status T
 	run --separate-stderr incise verify none.rec
 	failed_with "none.rec: there is no such recording"
 	run --separate-stderr incise verify
-	bad_usage "which recording?"
+	bad_usage "missing NAME.rec (recording to check)"
 	run --separate-stderr incise verify a.rec b.rec
 	bad_usage "b.rec"
 	run -1 --separate-stderr bash -c "incise verify a.rec >/dev/full"

@@ -220,7 +220,7 @@ begin_view() {
 
 @test "view: bad usage, and a screen that is not there" {
 	run --separate-stderr incise view
-	bad_usage "one scene, got 0"
+	bad_usage "missing SCENE ("
 	for wrong in "--procedure --rig sim:" "--procedure --from x.rec" "--frames f" "--strip x.png" "--at 1s" \
 		"--size 10x10" "--size big" "--size 640x480x3" "--fps 0" "--viewpoint 1,2" "--procedure --at 2s,1s --strip x" \
 		"--procedure --video x --size 641x480"; do

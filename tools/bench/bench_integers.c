@@ -253,8 +253,7 @@ static void add_scenes(struct rows *all, const struct bench_run *run)
 		struct scene_argument argument = {0};
 
 		if (!scene_argument_find(&argument, run->operands[i]))
-			cli_fail("there is no file %s, and no scene of that name",
-				 run->operands[i]);
+			scene_argument_missing(run->operands[i]);
 		add(all, run->operands[i], strlen(run->operands[i]), argument.path);
 	}
 	if (run->n_operands)

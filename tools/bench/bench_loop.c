@@ -623,8 +623,7 @@ static void run(struct bench_run *run)
 	static struct tick_row ticks[N(own)];
 	static struct wakeups wakeups;
 	enum load_kind only =
-		run->load ? (enum load_kind)cli_choice("load", run->load, load_names,
-						       "idle, cpu, memory, disk and view")
+		run->load ? (enum load_kind)cli_choice("load", run->load, load_names)
 			  : LOADS;
 	const char *scene = run->n_operands ? run->operands[0] : NULL;
 	int n = scene ? 1 : N(own);

@@ -197,7 +197,7 @@ static void open_scene(struct scene *s)
 			variants[i]->instructions = NAN;
 	if (!s->path) {
 		snprintf(s->failed, sizeof(s->failed),
-			 "there is no file %s, and no scene of that name", s->name);
+			 "no file and no scene of that name: %s", s->name);
 		return;
 	}
 	if (!open_variant(&s->few, s->path, s->kept, &err) ||
@@ -410,7 +410,7 @@ static void profile(const char *name, bool full)
 	struct scene scene = {.name = name};
 
 	if (!scene_argument_find(&argument, name))
-		cli_fail("there is no file %s, and no scene of that name", name);
+		scene_argument_missing(name);
 	/* Both plans are made, as the trajectory of the one depends on the other's needs. */
 	scene.path = argument.path;
 	open_scene(&scene);

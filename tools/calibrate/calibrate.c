@@ -8,6 +8,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include "../cli/file_kind.h"
 #include "../cli/json.h"
 #include "../cli/plot.h"
 #include "../cli/uncertainty.h"
@@ -174,6 +175,7 @@ struct incise_infile *calibrate_open(const char *path)
 	};
 	struct incise_error err = {0};
 
+	file_expect(path, FILE_TABLE);
 	return cli_require(incise_infile_open(path, &csv, &err), &err);
 }
 

@@ -14,6 +14,7 @@
 #include <incise/recording.h>
 #include "../cli/cli.h"
 #include "../cli/file.h"
+#include "../cli/file_kind.h"
 #include "../cli/image.h"
 #include "../cli/recording.h"
 #include "depth.h"
@@ -157,10 +158,12 @@ void depth_lengths_read(struct depth_lengths *lengths, const char *path, bool li
 {
 	static const char *const columns[] = {"length_px", "depth_mm"};
 	struct incise_error err = {0};
-	struct incise_dataset *data = cli_require(
-		incise_dataset_read(path, columns, line ? 2 : 1, NULL, &err), &err);
+	struct incise_dataset *data;
 	char name[40];
 
+	file_expect(path, FILE_TABLE);
+	data = cli_require(incise_dataset_read(path, columns, line ? 2 : 1, NULL, &err),
+			   &err);
 	if (incise_dataset_rows(data) > 1000000)
 		cli_fail("%s: more than a million rows", path);
 	for (size_t i = 0; i < incise_dataset_rows(data); i++) {

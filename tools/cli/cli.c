@@ -21,6 +21,7 @@
 #include <incise/rig.h>
 #include <incise/version.h>
 #include "cli.h"
+#include "file_kind.h"
 
 #define OPTIONS_MAX 40
 #define OVERWRITE 1 /* of getopt, no letter */
@@ -280,7 +281,7 @@ static void store(const struct cli_option *opt, void *member)
 			cli_quantity(what, optarg, opt->units, opt->min, opt->max);
 		break;
 	case CLI_KIND_CHOICE:
-		*(int *)member = cli_choice(opt->name, optarg, opt->names, opt->list);
+		*(int *)member = cli_choice(opt->name, optarg, opt->names);
 		break;
 	case CLI_KIND_PARSED:
 		opt->parse(member, optarg);
@@ -302,6 +303,33 @@ static void note_paths(const struct cli_command *command, enum cli_kind kind,
 	}
 }
 
+/* The kind of file that an option names, which is the same in all commands. */
+static void expect(const struct cli_command *command, const void *options)
+{
+	static const struct {
+		const char *name;
+		unsigned int kinds;
+	} named[] = {
+		{"against", FILE_REPORT},
+		{"calibration", FILE_CALIBRATION},
+		{"model", FILE_MODEL | FILE_COMPILED},
+		{"recording", FILE_RECORDING},
+		{"reference", FILE_SESSION},
+		{"rig", FILE_RIG},
+	};
+
+	for (const struct cli_option *opt = command->options; opt->name; opt++) {
+		const char *path = NULL;
+
+		if (opt->kind == CLI_KIND_INPUT)
+			path = *(const char *const *)((const char *)options +
+						      opt->offset);
+		for (size_t i = 0; path && i < sizeof(named) / sizeof(*named); i++)
+			if (!strcmp(opt->name, named[i].name))
+				file_expect(path, named[i].kinds);
+	}
+}
+
 void cli_parse(const struct cli_command *command, int argc, char **argv, void *options)
 {
 	const struct cli_option *opt;
@@ -313,19 +341,24 @@ void cli_parse(const struct cli_command *command, int argc, char **argv, void *o
 		cli_input(argv[i]);
 	note_paths(command, CLI_KIND_INPUT, options, cli_input);
 	note_paths(command, CLI_KIND_OUTPUT, options, cli_output_once);
+	expect(command, options);
 }
 
-char *cli_operand(int argc, char **argv, const char *what)
+char *cli_operand(int argc, char **argv, const char *name, const char *what)
 {
-	if (optind + 1 != argc)
-		cli_usage("expected one %s, got %d", what, argc - optind);
+	if (optind == argc)
+		cli_usage("missing %s (%s)", name, what);
+	if (optind + 1 < argc)
+		cli_usage("unexpected argument '%s'; give one %s at a time",
+			  argv[optind + 1], name);
 	return argv[optind];
 }
 
-void cli_no_operands(int argc, char **argv, const char *hint)
+void cli_no_operands(int argc, char **argv, const char *option)
 {
 	if (optind < argc)
-		cli_usage("'%s' is too much: %s", argv[optind], hint);
+		cli_usage("unexpected argument '%s'; did you mean %s %s?", argv[optind],
+			  option, argv[optind]);
 }
 
 /* Whether stderr is the journal, by the service manager's variable. */
@@ -447,13 +480,27 @@ void cli_be_verbose(void)
 	verbose = true;
 }
 
+/* "a, b or c": free(3). */
+static char *one_of(const char *const *names)
+{
+	char *list = cli_text("%s", *names);
+
+	while (*++names) {
+		char *before = list;
+
+		list = cli_text("%s%s%s", before, names[1] ? ", " : " or ", *names);
+		free(before);
+	}
+	return list;
+}
+
 void cli_unknown(const char *what, const char *name, const char *const *names)
 {
 	const char *nearest = incise_nearest_name(name, names);
 
 	if (nearest)
 		cli_usage("unknown %s '%s'; did you mean '%s'?", what, name, nearest);
-	cli_usage("unknown %s '%s'", what, name);
+	cli_usage("unknown %s '%s'; expected %s", what, name, one_of(names));
 }
 
 double cli_number(const char *option, const char *text, double min, double max)
@@ -461,10 +508,9 @@ double cli_number(const char *option, const char *text, double min, double max)
 	char *end;
 	double value = incise_decimal(text, &end);
 
-	if (end == text || *end || !isfinite(value))
-		cli_usage("--%s: '%s' is not a number", option, text);
-	if (value < min || value > max)
-		cli_usage("--%s: %s is not within %g to %g", option, text, min, max);
+	if (end == text || *end || !(value >= min && value <= max))
+		cli_usage("--%s: expected a number from %.10g to %.10g, found '%s'",
+			  option, min, max, text);
 	return value;
 }
 
@@ -475,10 +521,9 @@ long cli_integer(const char *option, const char *text, long min, long max)
 
 	errno = 0;
 	value = strtol(text, &end, 10);
-	if (end == text || *end)
-		cli_usage("--%s: '%s' is not a whole number", option, text);
-	if (errno || value < min || value > max)
-		cli_usage("--%s: %s is not within %ld to %ld", option, text, min, max);
+	if (end == text || *end || errno || value < min || value > max)
+		cli_usage("--%s: expected a whole number from %ld to %ld, found '%s'",
+			  option, min, max, text);
 	return value;
 }
 
@@ -505,10 +550,13 @@ double cli_duration(const char *option, const char *text, double min, double max
 	double value;
 
 	if (!in_units(text, units, &value))
-		cli_usage("--%s: '%s' is not a duration such as 10s, 500ms, 2min or 1h",
-			  option, text);
+		cli_usage(
+			"--%s: expected a duration, for example 10s, 500ms, 2min or 1h, "
+			"found '%s'",
+			option, text);
 	if (!(value >= min && value <= max))
-		cli_usage("--%s: %s is not within %g s to %g s", option, text, min, max);
+		cli_usage("--%s: expected %g s to %g s, found '%s'", option, min, max,
+			  text);
 	return value;
 }
 
@@ -518,12 +566,12 @@ double cli_quantity(const char *what, const char *text, const struct cli_unit *u
 	double value;
 
 	if (!in_units(text, units, &value))
-		cli_usage("%s: '%s' is not a number, alone or with a unit as in 1%s or "
-			  "1%s",
-			  what, text, units[0].name, units[1].name);
+		cli_usage("%s: expected a number, alone or with a unit, for example 1%s "
+			  "or 1%s, found '%s'",
+			  what, units[0].name, units[1].name, text);
 	if (!(value >= min && value <= max))
-		cli_usage("%s: %s is not within %g %s to %g %s", what, text, min,
-			  units->name, max, units->name);
+		cli_usage("%s: expected %g %s to %g %s, found '%s'", what, min,
+			  units->name, max, units->name, text);
 	return value;
 }
 
@@ -539,15 +587,17 @@ void cli_negative_numbers(int argc, char **argv)
 	}
 }
 
-int cli_choice(const char *option, const char *text, const char *const *names,
-	       const char *list)
+int cli_choice(const char *option, const char *text, const char *const *names)
 {
+	const char *nearest = incise_nearest_name(text, names);
+
 	for (int i = 0; names[i]; i++)
 		if (!strcmp(text, names[i]))
 			return i;
-	if (!list)
-		cli_usage("--%s: '%s' is none that it can be; see --help", option, text);
-	cli_usage("--%s: '%s' is none of %s", option, text, list);
+	if (nearest)
+		cli_usage("--%s: expected %s, found '%s'; did you mean '%s'?", option,
+			  one_of(names), text, nearest);
+	cli_usage("--%s: expected %s, found '%s'", option, one_of(names), text);
 }
 
 int cli_list(const char *option, char *text, char **items, int max)
@@ -557,11 +607,13 @@ int cli_list(const char *option, char *text, char **items, int max)
 	for (char *save, *item = strtok_r(text, ",", &save); item;
 	     item = strtok_r(NULL, ",", &save)) {
 		if (n == max)
-			cli_usage("--%s: more than %d items", option, max);
+			cli_usage("--%s: more than %d items, separated by commas", option,
+				  max);
 		items[n++] = item;
 	}
 	if (!n)
-		cli_usage("--%s: the list is empty", option);
+		cli_usage("--%s: the list is empty; separate its items by commas",
+			  option);
 	return n;
 }
 
@@ -614,7 +666,7 @@ void *cli_alloc(size_t n, size_t size)
 	void *memory = calloc(n ? n : 1, size);
 
 	if (!memory)
-		cli_fail("no memory");
+		cli_fail("out of memory");
 	return memory;
 }
 
@@ -622,7 +674,7 @@ void *cli_resize(void *memory, size_t n, size_t size)
 {
 	memory = reallocarray(memory, n, size);
 	if (!memory)
-		cli_fail("no memory");
+		cli_fail("out of memory");
 	return memory;
 }
 
@@ -633,7 +685,7 @@ char *cli_text(const char *fmt, ...)
 
 	va_start(args, fmt);
 	if (vasprintf(&text, fmt, args) < 0)
-		cli_fail("no memory");
+		cli_fail("out of memory");
 	va_end(args);
 	return text;
 }

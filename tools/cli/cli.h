@@ -49,7 +49,6 @@ struct cli_option {
 	double min, max;
 	const struct cli_unit *units;
 	const char *const *names;
-	const char *list;
 	void (*parse)(void *member, char *text);
 };
 
@@ -94,9 +93,8 @@ struct cli_option {
 	.min = (low), .max = (high)
 
 /* An enum, as of cli_choice(). */
-#define CLI_CHOICE(type, member, of, text)                                      \
-	.kind = CLI_KIND_CHOICE, CLI_MEMBER(type, member, void), .names = (of), \
-	.list = (text)
+#define CLI_CHOICE(type, member, of) \
+	.kind = CLI_KIND_CHOICE, CLI_MEMBER(type, member, void), .names = (of)
 
 /* A function parses it into the member, or into the command's whole struct. */
 #define CLI_PARSED(type, member, function) \
@@ -151,11 +149,11 @@ void cli_output_once(const char *path);
 bool cli_overwrite(void);
 void cli_allow_overwrite(void);
 
-/* The only operand; another number of them is bad usage: "expected one WHAT, got N". */
-char *cli_operand(int argc, char **argv, const char *what);
+/* The only operand; another number of them is bad usage: "missing NAME (WHAT)". */
+char *cli_operand(int argc, char **argv, const char *name, const char *what);
 
-/* An operand is bad usage: "'OPERAND' is too much: HINT". */
-void cli_no_operands(int argc, char **argv, const char *hint);
+/* An operand is bad usage: "unexpected argument 'OPERAND'; did you mean OPTION OPERAND?". */
+void cli_no_operands(int argc, char **argv, const char *option);
 
 /* Fail with one line "incise COMMAND: …": exit 1. */
 _Noreturn void cli_fail(const char *fmt, ...) INCISE_PRINTF(1, 2);
@@ -203,9 +201,8 @@ double cli_quantity(const char *what, const char *text, const struct cli_unit *u
 /* Read "-5" as a number, not as options: for commands whose operands are numbers. */
 void cli_negative_numbers(int argc, char **argv);
 
-/* Index of @text in @names, which end with NULL; @list: all names, for the message, or NULL. */
-int cli_choice(const char *option, const char *text, const char *const *names,
-	       const char *list);
+/* Index of @text in @names, which end with NULL. */
+int cli_choice(const char *option, const char *text, const char *const *names);
 
 /* "a,b,c" to at most max strings; the text is cut in place. Returns how many. */
 int cli_list(const char *option, char *text, char **items, int max);

@@ -13,6 +13,7 @@
 #include <incise/infile.h>
 #include <incise/outfile.h>
 #include "cli.h"
+#include "file_kind.h"
 #include "image.h"
 
 #define SIDE_MAX 8192 /* incise/vision.h */
@@ -159,6 +160,7 @@ void image_read(const char *path, struct incise_camera_frame *frame)
 	uint8_t *data;
 
 	*frame = (struct incise_camera_frame){0};
+	file_expect(path, FILE_IMAGE);
 	data = cli_require(incise_infile_read(path, &image, &frame->size, &err), &err);
 	frame->data = data;
 	if (frame->size > 10 && !memcmp(data, png, sizeof(png)))

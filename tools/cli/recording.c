@@ -13,12 +13,14 @@
 #include <unistd.h>
 #include <incise/verify.h>
 #include "cli.h"
+#include "file_kind.h"
 #include "recording.h"
 
 struct incise_recording *recording_open(const char *path)
 {
 	struct incise_error err = {0};
 
+	file_expect(path, FILE_RECORDING);
 	return cli_require(incise_recording_open(path, &err), &err);
 }
 

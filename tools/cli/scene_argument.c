@@ -8,16 +8,18 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include "file_kind.h"
 #include "scene_argument.h"
 
 void scene_argument_arith(void *arith, char *text)
 {
-	if (strcmp(text, "double") && strcmp(text, "fixed"))
-		cli_usage("--arith: '%s' is neither double nor fixed", text);
-	*(const char **)arith = text;
+	static const char *const names[] = {"double", "fixed", NULL};
+
+	*(const char **)arith = names[cli_choice("arith", text, names)];
 }
 
 #define OF_MACHINE "/etc/incise/scenes"
+#define PLACES 3
 
 const char *scene_argument_shipped(void)
 {
@@ -39,14 +41,14 @@ void scene_argument_list_shipped(glob_t *found)
 
 bool scene_argument_find(struct scene_argument *argument, const char *operand)
 {
-	const char *places[] = {".", OF_MACHINE, scene_argument_shipped()};
+	const char *places[PLACES] = {".", OF_MACHINE, scene_argument_shipped()};
 	char path[PATH_MAX];
 
 	argument->path = operand;
 	if (strchr(operand, '/') || !access(operand, F_OK) || strstr(operand, ".scene"))
 		return true;
 	/* A name is a scene of this folder, of this machine, or a shipped one. */
-	for (size_t i = 0; i < sizeof(places) / sizeof(*places); i++) {
+	for (int i = 0; i < PLACES; i++) {
 		if (snprintf(path, sizeof(path), "%s/%s.scene", places[i], operand) >=
 			    (int)sizeof(path) ||
 		    access(path, F_OK))
@@ -57,6 +59,32 @@ bool scene_argument_find(struct scene_argument *argument, const char *operand)
 		return true;
 	}
 	return false;
+}
+
+void scene_argument_missing(const char *name)
+{
+	const char *places[PLACES] = {".", OF_MACHINE, scene_argument_shipped()};
+	char *all = cli_text("%s", "");
+	const char *nearest, **names;
+	glob_t found = {0};
+
+	for (int i = 0; i < PLACES; i++) {
+		char *pattern = cli_text("%s/*.scene", places[i]);
+
+		glob(pattern, i ? GLOB_APPEND : 0, NULL, &found);
+		free(pattern);
+	}
+	names = cli_alloc(found.gl_pathc + 1, sizeof(*names));
+	for (size_t i = 0; i < found.gl_pathc; i++) {
+		names[i] = scene_argument_name(found.gl_pathv[i]);
+		all = cli_text("%s%s%s", all, i ? ", " : "", names[i]);
+	}
+	/* Of "liver.scen" only "liver". */
+	nearest = incise_nearest_name(cli_text("%.*s", (int)strcspn(name, "."), name),
+				      names);
+	if (nearest)
+		cli_fail("%s: no such scene; did you mean %s?", name, nearest);
+	cli_fail("%s: no such scene; give the path of a file, or one of: %s", name, all);
 }
 
 char *scene_argument_name(const char *path)
@@ -72,12 +100,16 @@ char *scene_argument_name(const char *path)
 void scene_argument_operand(struct scene_argument *argument, int argc, char **argv,
 			    int first)
 {
-	if (first + 1 != argc)
-		cli_usage("expected one scene, got %d", argc - first);
+	if (first >= argc)
+		cli_usage(
+			"missing SCENE (file, or name of an installed scene, for example "
+			"liver)");
+	if (first + 1 < argc)
+		cli_usage("unexpected argument '%s'; give one SCENE at a time",
+			  argv[first + 1]);
 	if (!scene_argument_find(argument, argv[first]))
-		cli_fail(
-			"there is no file %s, and no %s.scene in this folder, in %s or in %s",
-			argv[first], argv[first], OF_MACHINE, scene_argument_shipped());
+		scene_argument_missing(argv[first]);
+	file_expect(argument->path, FILE_SCENE);
 }
 
 struct incise_scene *scene_argument_read(const struct scene_argument *argument,

@@ -39,6 +39,9 @@ void scene_argument_operand(struct scene_argument *argument, int argc, char **ar
 /* The same for one of several operands. Returns false if there is no scene of that name. */
 bool scene_argument_find(struct scene_argument *argument, const char *operand);
 
+/* Fail the program: there is no scene of this name; with the name that is near. */
+_Noreturn void scene_argument_missing(const char *name);
+
 /* "neck" of "scenes/neck.scene": free(3). */
 char *scene_argument_name(const char *path);
 

@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <time.h>
 #include "../cli/cli.h"
+#include "../cli/file_kind.h"
 #include "../cli/scene_argument.h"
 #include "../cli/state_folder.h"
 #include "pages.h"
@@ -149,6 +150,7 @@ void state_pages_open(struct state_pages *pages, const char *asked)
 
 	*pages = (struct state_pages){0};
 	if (asked && !scene && (strchr(asked, '/') || name_length(asked))) {
+		file_expect(asked, FILE_STATE);
 		state = incise_state_open(asked, &err);
 		if (!state)
 			cli_fail_with(&err);
