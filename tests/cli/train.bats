@@ -392,7 +392,7 @@ holds_on_unseen_cuts() {
 	run --separate-stderr incise train pairs.csv
 	bad_usage "-o MODEL.fis"
 	run --separate-stderr incise train -o m.fis
-	bad_usage "one data file"
+	bad_usage "missing DATA.csv (pairs to learn from)"
 	run --separate-stderr incise train pairs.csv more.csv -o m.fis
 	bad_usage "; give one DATA.csv at a time"
 	for wrong in "--check 0" "--check 1" "--check half" "--mf 0,3" "--mf 3" "--mf 3,3,3" \
