@@ -144,7 +144,7 @@ altered() {
 	run --separate-stderr incise calibrate check
 	failed_with "calibration.conf:1: history: expected a list"
 	run --separate-stderr incise calibrate check --only knife
-	bad_usage "there is no 'knife'"
+	bad_usage "--only: expected force, depth, tip, delay or stepper, found 'knife'"
 	run --separate-stderr incise calibrate check --due soon
 	bad_usage "--due"
 	run --separate-stderr incise calibrate check a.rec

@@ -51,7 +51,7 @@ setup() {
 	run -2 --separate-stderr incise train pairs.csv --output force_N
 	[[ "${stderr_lines[0]}" == *"name the column to learn with --target"* ]]
 	run -2 --separate-stderr incise capture --camera pictures
-	[[ "${stderr_lines[0]}" == *"auto, off, frames and depth"* ]]
+	[[ "${stderr_lines[0]}" == *"auto, off, frames or depth"* ]]
 }
 
 @test "a misspelt option names the nearest, or the ambiguous beginning" {

@@ -69,8 +69,7 @@ static void shorthand_refuses(void **state)
 	static const struct {
 		const char *spec, *text;
 	} row[] = {
-		{"sim:sede=1",
-		 "sim:sede=1: sim.sede: unknown key; did you mean seed?"},
+		{"sim:sede=1", "sim:sede=1: sim.sede: unknown key; did you mean seed?"},
 		{"sim:clok=simulated",
 		 "sim:clok=simulated: clok: unknown key; did you mean clock?"},
 		{"sim:mause=1", "sim:mause=1: mause: unknown key; did you mean mouse?"},
