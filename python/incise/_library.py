@@ -1,0 +1,392 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The C libraries by ctypes: finding and loading them, their errors, their structs.
+
+Each library is loaded at its first use, so that importing incise maps none. The structs repeat
+those of the public headers; tests/python/abi compares every field with the compiler's.
+"""
+
+import ctypes
+import errno
+import os
+
+VERSION = "0.1.0"
+SOVERSION = 2
+
+c_double, c_int, c_bool, c_char = ctypes.c_double, ctypes.c_int, ctypes.c_bool, ctypes.c_char
+c_int64, c_uint64, c_void_p, c_char_p = (
+    ctypes.c_int64,
+    ctypes.c_uint64,
+    ctypes.c_void_p,
+    ctypes.c_char_p,
+)
+
+
+class Error(OSError):
+    """A failure of the library: one line that says what, where and what to do.
+
+    ``errno`` is the code of the C library; ``str()`` is the line.
+    """
+
+    def __str__(self):
+        return self.strerror or ""
+
+
+class NotFound(Error, FileNotFoundError):
+    """A file, device or module that is not there."""
+
+
+class Invalid(Error, ValueError):
+    """A value, a file or data that cannot be used."""
+
+
+_kinds = {
+    errno.ENOENT: NotFound,
+    errno.EINVAL: Invalid,
+    errno.ENODATA: Invalid,
+    errno.ERANGE: Invalid,
+    errno.EDOM: Invalid,
+    errno.E2BIG: Invalid,
+    errno.ENOTSUP: Invalid,
+    errno.EBADMSG: Invalid,
+}
+
+
+def make_error(code, text):
+    """The exception for a positive errno and its line."""
+    if code == errno.ENOMEM:
+        return MemoryError(text)
+    return _kinds.get(code, Error)(code, text)
+
+
+class _ErrorStruct(ctypes.Structure):
+    _fields_ = [("code", c_int), ("text", c_char * 500)]
+
+
+class Failure:
+    """An ``incise_error`` for one call."""
+
+    def __init__(self):
+        self.struct = _ErrorStruct()
+        self.ref = ctypes.byref(self.struct)
+
+    def exception(self, code):
+        text = self.struct.text.decode("utf-8", "replace")
+        return make_error(code, text or os.strerror(code))
+
+    def check(self, rc):
+        """Return rc, or raise the error that it stands for."""
+        if rc < 0:
+            raise self.exception(-rc)
+        return rc
+
+    def require(self, pointer):
+        """Return a pointer, or raise."""
+        if not pointer:
+            raise self.exception(self.struct.code or ctypes.get_errno() or errno.EIO)
+        return pointer
+
+
+# --- finding ---------------------------------------------------------------------------
+
+
+def _folders():
+    """Where the libraries may be, in order; None stands for the system's own search."""
+    given = os.environ.get("INCISE_LIBDIR")
+    if given:
+        yield given
+        return
+    here = os.path.dirname(os.path.abspath(__file__))
+    build = os.path.join(here, "..", "..", "build", "lib")
+    if os.path.exists(os.path.join(here, "..", "..", "lib", "libincise.map")):
+        yield os.path.normpath(build)
+    try:
+        from . import _installed  # written by make install
+
+        yield _installed.LIBDIR
+    except ImportError:
+        pass
+    yield None
+
+
+def _load(name):
+    file = f"{name}.so.{SOVERSION}"
+    tried = []
+    for folder in _folders():
+        path = os.path.join(folder, file) if folder else file
+        if folder and not os.path.exists(path):
+            tried.append(path)
+            continue
+        try:
+            return ctypes.CDLL(path, use_errno=True)
+        except OSError as failure:
+            tried.append(str(failure))
+    hint = (
+        "set INCISE_LIBDIR to the folder of the libraries"
+        if "INCISE_LIBDIR" not in os.environ
+        else "mend INCISE_LIBDIR"
+    )
+    raise NotFound(
+        errno.ENOENT,
+        f"{file}: cannot be loaded ({'; '.join(tried)}); install libincise{SOVERSION}, run make "
+        f"in a source tree, or {hint}",
+    )
+
+
+class _Libraries:
+    """The libraries that are loaded; a fork may go on using them."""
+
+    def __init__(self):
+        self.loaded = {}
+
+    def get(self, name):
+        library = self.loaded.get(name)
+        if library is None:
+            if name != "libincise":
+                self.get("libincise")
+            library = _load(name)
+            if name == "libincise":
+                library.incise_version.restype = c_char_p
+                found = library.incise_version().decode()
+                if found != VERSION:
+                    raise Invalid(
+                        errno.EINVAL,
+                        f"python incise {VERSION} needs libincise {VERSION}, and found {found}; "
+                        "install the same version of both",
+                    )
+            self.loaded[name] = library
+        return library
+
+
+_libraries = _Libraries()
+
+# Functions with their library, result and arguments: {name: (library, result, *arguments)}.
+_signatures = {}
+_functions = {}
+
+
+def declare(library, signatures):
+    """Note the functions of a library: {name: (result, *arguments)}; nothing is loaded yet."""
+    for name, signature in signatures.items():
+        _signatures[name] = (library,) + signature
+
+
+def function(name):
+    """A function of the C library, with its types."""
+    found = _functions.get(name)
+    if found is None:
+        library, result, *arguments = _signatures[name]
+        found = getattr(_libraries.get(library), name)
+        found.restype = result
+        found.argtypes = arguments
+        _functions[name] = found
+    return found
+
+
+def path_bytes(path):
+    """A path as the C library takes it."""
+    text = os.fsencode(os.fspath(path))
+    if b"\0" in text:
+        raise Invalid(errno.EINVAL, f"{path!r}: a path has no NUL; give another one")
+    return text
+
+
+# --- structs ----------------------------------------------------------------------------
+
+
+class Stream(ctypes.Structure):
+    """struct incise_stream"""
+
+    _fields_ = [
+        ("name", c_char * 16),
+        ("device", c_char * 64),
+        ("timestamped", c_bool),
+        ("nominal_hz", c_double),
+        ("delay_ms", c_double),
+        ("delay_sd_ms", c_double),
+        ("rows", c_uint64),
+        ("lost", c_uint64),
+        ("late", c_uint64),
+        ("rate_hz", c_double),
+        ("drift_ppm", c_double),
+        ("drift_sd_ppm", c_double),
+        ("jitter_ms", c_double),
+        ("jitter_max_ms", c_double),
+        ("offset_ms", c_double),
+        ("offset_sd_ms", c_double),
+        ("ended", c_char * 200),
+    ]
+    c_name = "struct incise_stream"
+
+
+class RecordingInfo(ctypes.Structure):
+    """struct incise_recording_info"""
+
+    _fields_ = [
+        ("complete", c_bool),
+        ("start_ns", c_int64),
+        ("end_ns", c_int64),
+        ("started", c_char * 32),
+        ("rig", c_char * 256),
+        ("force", c_uint64),
+        ("tracker", c_uint64),
+        ("depth", c_uint64),
+        ("force_lost", c_uint64),
+        ("tracker_lost", c_uint64),
+        ("force_clipped", c_uint64),
+        ("bits", c_int),
+        ("full_scale_V", c_double),
+        ("offset_V", c_double),
+        ("force_mV_N", c_double),
+        ("zero_mV", c_double),
+        ("depth_mm_px", c_double),
+        ("surface_normal", c_double * 3),
+        ("surface_point_mm", c_double * 3),
+        ("tip_mm", c_double * 3),
+        ("cuts", c_int),
+        ("depth_max_mm", c_double),
+        ("force_max_N", c_double),
+        ("streams", Stream * 3),
+        ("n_streams", c_int),
+    ]
+    c_name = "struct incise_recording_info"
+
+
+class CalibrationStruct(ctypes.Structure):
+    """struct incise_calibration"""
+
+    _fields_ = [
+        ("force_mV_N", c_double),
+        ("force_zero_mV", c_double),
+        ("depth_mm_px", c_double),
+        ("force_delay_ms", c_double),
+        ("force_delay_sd_ms", c_double),
+        ("tracker_delay_ms", c_double),
+        ("tracker_delay_sd_ms", c_double),
+        ("camera_delay_ms", c_double),
+        ("camera_delay_sd_ms", c_double),
+        ("tip_mm", c_double * 3),
+        ("stepper_N_step", c_double),
+        ("stepper_backlash_mm", c_double),
+        ("stepper_hysteresis_N", c_double),
+        ("stepper_stiction_N", c_double),
+        ("stepper_steps_s", c_double),
+    ]
+    c_name = "struct incise_calibration"
+
+
+ExportProgress = ctypes.CFUNCTYPE(c_int, c_void_p, c_double)
+
+
+class ExportOptions(ctypes.Structure):
+    """struct incise_export_options"""
+
+    _fields_ = [
+        ("rate_hz", c_double),
+        ("depth_bins", c_int),
+        ("velocity_bins", c_int),
+        ("depth_max_mm", c_double),
+        ("velocity_max_mm_s", c_double),
+        ("by_cut", c_bool),
+        ("min_count", c_int),
+        ("resample", c_bool),
+        ("calibration", ctypes.POINTER(CalibrationStruct)),
+        ("provenance", c_bool),
+        ("progress", ExportProgress),
+        ("context", c_void_p),
+    ]
+    c_name = "struct incise_export_options"
+
+
+class ArrowSchema(ctypes.Structure):
+    """struct ArrowSchema"""
+
+    c_name = "struct ArrowSchema"
+
+
+class ArrowArray(ctypes.Structure):
+    """struct ArrowArray"""
+
+    c_name = "struct ArrowArray"
+
+
+class ArrowArrayStream(ctypes.Structure):
+    """struct ArrowArrayStream"""
+
+    c_name = "struct ArrowArrayStream"
+
+
+ArrowSchema._fields_ = [
+    ("format", c_char_p),
+    ("name", c_char_p),
+    ("metadata", c_void_p),
+    ("flags", c_int64),
+    ("n_children", c_int64),
+    ("children", ctypes.POINTER(ctypes.POINTER(ArrowSchema))),
+    ("dictionary", ctypes.POINTER(ArrowSchema)),
+    ("release", ctypes.CFUNCTYPE(None, ctypes.POINTER(ArrowSchema))),
+    ("private_data", c_void_p),
+]
+ArrowArray._fields_ = [
+    ("length", c_int64),
+    ("null_count", c_int64),
+    ("offset", c_int64),
+    ("n_buffers", c_int64),
+    ("n_children", c_int64),
+    ("buffers", ctypes.POINTER(c_void_p)),
+    ("children", ctypes.POINTER(ctypes.POINTER(ArrowArray))),
+    ("dictionary", ctypes.POINTER(ArrowArray)),
+    ("release", ctypes.CFUNCTYPE(None, ctypes.POINTER(ArrowArray))),
+    ("private_data", c_void_p),
+]
+ArrowArrayStream._fields_ = [
+    (
+        "get_schema",
+        ctypes.CFUNCTYPE(c_int, ctypes.POINTER(ArrowArrayStream), ctypes.POINTER(ArrowSchema)),
+    ),
+    (
+        "get_next",
+        ctypes.CFUNCTYPE(c_int, ctypes.POINTER(ArrowArrayStream), ctypes.POINTER(ArrowArray)),
+    ),
+    ("get_last_error", ctypes.CFUNCTYPE(c_char_p, ctypes.POINTER(ArrowArrayStream))),
+    ("release", ctypes.CFUNCTYPE(None, ctypes.POINTER(ArrowArrayStream))),
+    ("private_data", c_void_p),
+]
+
+
+def text(value):
+    """A text of the C library."""
+    return value.decode("utf-8", "replace")
+
+
+def call_interruptible(call, cancel):
+    """Run a long C call in a thread, so that Ctrl-C works: it calls cancel(), and the call ends.
+
+    Python handles signals between its own instructions only, and has none during a C call.
+    """
+    import threading
+
+    if threading.current_thread() is not threading.main_thread():
+        return call()
+    result = []
+
+    def run():
+        try:
+            result.append((True, call()))
+        except BaseException as failure:  # raised again in the caller
+            result.append((False, failure))
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    try:
+        while thread.is_alive():
+            thread.join(0.1)
+    except KeyboardInterrupt:
+        cancel()
+        thread.join()
+        raise
+    good, value = result[0]
+    if not good:
+        raise value
+    return value
+
+

@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Tables that the C library streams: to Arrow without a copy, to numpy and pandas.
+
+A :class:`Table` names rows; each reading of it starts anew, so it may be read as often as one likes:
+
+    pyarrow.table(rec.force)            polars.DataFrame(rec.force)
+    rec.force.numpy()["force_N"]        rec.force.pandas()
+"""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional
+
+from . import _library
+from ._library import ArrowArray, ArrowArrayStream, ArrowSchema, Invalid, make_error
+
+_ctypes_of = {
+    "l": ctypes.c_int64,
+    "i": ctypes.c_int32,
+    "g": ctypes.c_double,
+    "f": ctypes.c_float,
+}
+_numpy_of = {"l": "i8", "i": "i4", "g": "f8", "f": "f4"}
+
+
+class Field(NamedTuple):
+    """A column: its name, Arrow's format letter, unit, description and other metadata."""
+
+    name: str
+    format: str
+    unit: str
+    description: str
+    metadata: Dict[str, str]
+
+
+def _metadata(address: Optional[int]) -> Dict[str, str]:
+    """Decode the metadata of an ArrowSchema."""
+    pairs: Dict[str, str] = {}
+    if not address:
+        return pairs
+
+    def number(at: int) -> int:
+        return ctypes.c_int32.from_address(at).value
+
+    count, at = number(address), address + 4
+    for _ in range(count):
+        words = []
+        for _ in range(2):
+            length = number(at)
+            words.append(_library.text(ctypes.string_at(at + 4, length)))
+            at += 4 + length
+        pairs[words[0]] = words[1]
+    return pairs
+
+
+def _fields(schema: ArrowSchema) -> List[Field]:
+    fields = []
+    for i in range(schema.n_children):
+        child = schema.children[i].contents
+        metadata = _metadata(child.metadata)
+        fields.append(
+            Field(
+                _library.text(child.name),
+                _library.text(child.format),
+                metadata.pop("unit", "1"),
+                metadata.pop("description", ""),
+                metadata,
+            )
+        )
+    return fields
+
+
+class _Reader:
+    """An open ArrowArrayStream, which it releases."""
+
+    def __init__(self, open_stream: Callable[[ArrowArrayStream], None]):
+        self.stream = ArrowArrayStream()
+        open_stream(self.stream)
+        self.ref = ctypes.byref(self.stream)
+
+    def _check(self, code: int) -> None:
+        if code:
+            said = self.stream.get_last_error(self.ref)
+            raise make_error(code, _library.text(said or b""))
+
+    def schema(self):
+        """The fields and the table's metadata."""
+        schema = ArrowSchema()
+        self._check(self.stream.get_schema(self.ref, ctypes.byref(schema)))
+        try:
+            return _fields(schema), _metadata(schema.metadata)
+        finally:
+            schema.release(ctypes.byref(schema))
+
+    def next(self) -> Optional[ArrowArray]:
+        array = ArrowArray()
+        self._check(self.stream.get_next(self.ref, ctypes.byref(array)))
+        return array if array.release else None
+
+    def close(self) -> None:
+        if self.stream.release:
+            self.stream.release(self.ref)
+
+    def __del__(self):
+        self.close()
+
+
+class Batch:
+    """Some rows of a table. Views of its columns keep it alive; nothing is copied."""
+
+    def __init__(self, array: ArrowArray, fields: List[Field]):
+        self._array = array
+        self.fields = fields
+
+    def __len__(self) -> int:
+        return self._array.length
+
+    def __del__(self, byref=ctypes.byref):
+        array = getattr(self, "_array", None)
+        if array is not None and array.release:
+            array.release(byref(array))
+
+    def _index(self, name: str) -> int:
+        for i, field in enumerate(self.fields):
+            if field.name == name:
+                return i
+        names = ", ".join(field.name for field in self.fields)
+        raise KeyError(f"no column {name!r}; the columns are: {names}")
+
+    def _buffer(self, column: int, buffer: int, kind: Any, count: int) -> Any:
+        child = self._array.children[column].contents
+        address = child.buffers[buffer]
+        view = (kind * count).from_address(address) if address else (kind * 0)()
+        view.batch = self  # the memory is the batch's
+        return view
+
+    def column(self, name: str) -> memoryview:
+        """A column of numbers, without a copy; of flags the bytes of their bits."""
+        i = self._index(name)
+        form = self.fields[i].format
+        if form == "b":
+            return memoryview(self._buffer(i, 1, ctypes.c_uint8, (len(self) + 7) // 8))
+        if form not in _ctypes_of:
+            raise Invalid(errno.EINVAL, f"column {name} is text; take texts({name!r})")
+        view = self._buffer(i, 1, _ctypes_of[form], len(self))
+        return memoryview(view).cast("B").cast({"l": "q", "i": "i", "g": "d", "f": "f"}[form])
+
+    def texts(self, name: str) -> List[str]:
+        """A column of texts."""
+        i = self._index(name)
+        offsets = self._buffer(i, 1, ctypes.c_int32, len(self) + 1)
+        data = bytes(self._buffer(i, 2, ctypes.c_char, offsets[len(self)]))
+        known: Dict[bytes, str] = {}
+        texts = []
+        for k in range(len(self)):
+            word = data[offsets[k] : offsets[k + 1]]
+            text = known.get(word)
+            if text is None:
+                text = known[word] = _library.text(word)
+            texts.append(text)
+        return texts
+
+    def missing(self, name: str) -> Optional[memoryview]:
+        """Bits of a column, 1 where a value is there; None where none is missing."""
+        i = self._index(name)
+        child = self._array.children[i].contents
+        if not child.null_count:
+            return None
+        return memoryview(self._buffer(i, 0, ctypes.c_uint8, (len(self) + 7) // 8))
+
+    def _numpy_column(self, field: Field):
+        import numpy
+
+        if field.format == "u":
+            return numpy.array(self.texts(field.name), dtype=object)
+        view = self.column(field.name)
+        if field.format == "b":
+            bits = numpy.unpackbits(numpy.frombuffer(view, "u1"), bitorder="little")
+            return bits[: len(self)].astype(bool)
+        values = numpy.frombuffer(view, _numpy_of[field.format])
+        missing = self.missing(field.name)
+        if missing is not None:
+            there = numpy.unpackbits(numpy.frombuffer(missing, "u1"), bitorder="little")
+            values = numpy.where(there[: len(self)].astype(bool), values, numpy.nan)
+        return values
+
+    def numpy(self) -> Dict[str, Any]:
+        """The columns as arrays; those of numbers without a copy, unless a value is missing: NaN."""
+        return {field.name: self._numpy_column(field) for field in self.fields}
+
+
+# --- capsules ----------------------------------------------------------------------------
+
+_capsule_name = b"arrow_array_stream"
+_capsules: Dict[int, ArrowArrayStream] = {}  # by address, as long as their capsule
+
+_new = ctypes.pythonapi.PyCapsule_New
+_new.restype = ctypes.py_object
+_new.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
+_pointer = ctypes.pythonapi.PyCapsule_GetPointer
+_pointer.restype = ctypes.c_void_p
+_pointer.argtypes = [ctypes.c_void_p, ctypes.c_char_p]
+
+
+@ctypes.PYFUNCTYPE(None, ctypes.c_void_p)
+def _destroy(capsule, pointer=_pointer, capsules=_capsules, name=_capsule_name, ref=ctypes.byref):
+    """Release a stream that nobody has taken."""
+    stream = capsules.pop(pointer(capsule, name), None)
+    if stream is not None and stream.release:
+        stream.release(ref(stream))
+
+
+# A capsule may outlive this module at the end of the program.
+ctypes.pythonapi.Py_IncRef(ctypes.py_object(_destroy))
+
+
+def _capsule(open_stream: Callable[[ArrowArrayStream], None]):
+    stream = ArrowArrayStream()
+    open_stream(stream)
+    address = ctypes.addressof(stream)
+    _capsules[address] = stream
+    return _new(address, _capsule_name, ctypes.cast(_destroy, ctypes.c_void_p))
+
+
+# --- tables -------------------------------------------------------------------------------
+
+
+class Table:
+    """Rows that can be read again and again, each time in batches and with bounded memory."""
+
+    def __init__(self, open_stream: Callable[[ArrowArrayStream], None], about: str):
+        self._open = open_stream
+        self._about = about
+        self._schema: Any = None
+
+    def __repr__(self) -> str:
+        return f"<incise.Table {self._about}>"
+
+    def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:
+        """A capsule of a new ArrowArrayStream (the Arrow PyCapsule interface)."""
+        return _capsule(self._open)
+
+    def _read_schema(self):
+        if self._schema is None:
+            self._schema = _Reader(self._open).schema()
+        return self._schema
+
+    @property
+    def fields(self) -> List[Field]:
+        """The columns with their units."""
+        return self._read_schema()[0]
+
+    @property
+    def columns(self) -> List[str]:
+        """The names of the columns."""
+        return [field.name for field in self.fields]
+
+    @property
+    def metadata(self) -> Dict[str, str]:
+        """Where the rows come from: sources, date, options, calibration."""
+        return dict(self._read_schema()[1])
+
+    def batches(self) -> Iterator[Batch]:
+        """The rows, some ten thousand at a time; needs no other package."""
+        reader = _Reader(self._open)
+        fields, _ = reader.schema()
+        array = reader.next()
+        while array is not None:
+            yield Batch(array, fields)
+            array = reader.next()
+        reader.close()
+
+    def numpy(self) -> Dict[str, Any]:
+        """All rows as arrays, {column: array}. A missing value is NaN."""
+        import numpy
+
+        parts: Dict[str, List[Any]] = {name: [] for name in self.columns}
+        for batch in self.batches():
+            for name, values in batch.numpy().items():
+                parts[name].append(values)
+        kinds = {**_numpy_of, "b": "?", "u": "O"}
+        return {
+            field.name: numpy.concatenate(parts.pop(field.name))
+            if parts[field.name]
+            else numpy.empty(0, kinds[field.format])
+            for field in self.fields
+        }
+
+    def pandas(self) -> Any:
+        """All rows as a DataFrame; units and provenance are in its ``attrs``."""
+        import pandas
+
+        frame = pandas.DataFrame(self.numpy(), columns=self.columns)
+        frame.attrs["units"] = {field.name: field.unit for field in self.fields}
+        frame.attrs["provenance"] = self.metadata
+        return frame
