@@ -42,6 +42,7 @@ static const struct {
 	{"bench", "measure error against run time"},
 	{"doctor",
 	 "check this machine and its rig, and print the remedy of each finding"},
+	{"rig", "print which rig.conf is used here, and what it resolves to"},
 	{"demo", "run the whole path on the simulated rig"},
 };
 
@@ -100,7 +101,6 @@ static const struct {
 	const char *name, *page;
 } topics[] = {
 	{"rig.conf", "rig.conf.5"},
-	{"rig", "rig.conf.5"},
 	{"calibration.conf", "calibration.conf.5"},
 	{"calibration", "calibration.conf.5"},
 	{"scene", "incise-scene.5"},

@@ -15,6 +15,56 @@
 #define NS_PER_US 1000
 #define COUNT(array) (sizeof(array) / sizeof(*(array)))
 
+/* Lines are in the order of enum incise_actuator_line. */
+const char *const incise_actuator_line_keys[] = {"step",      "dir",	   "enable",
+						 "limit_min", "limit_max", "home",
+						 "estop",     "alarm",	   "active_low",
+						 NULL};
+
+const char *const incise_actuator_can_keys[] = {"mode",
+						"bitrate",
+						"cycle_us",
+						"counts_per_turn",
+						"velocity_per_turn_s",
+						"acceleration_per_turn_s2",
+						"following_mm",
+						"following_ms",
+						"homing_method",
+						"absolute",
+						"position_gain_1_s",
+						"stiffness_permille_mm",
+						"damping_permille_s_mm",
+						"torque_max_permille",
+						"master",
+						NULL};
+
+const char *const incise_actuator_keys[] = {"spring_N_mm",
+					    "travel_mm",
+					    "lead_mm",
+					    "steps_per_turn",
+					    "microsteps",
+					    "velocity_mm_s",
+					    "acceleration_mm_s2",
+					    "jerk_mm_s3",
+					    "deadman_ms",
+					    "retract",
+					    "tick_us",
+					    "high_us",
+					    "low_us",
+					    "setup_us",
+					    "hold_us",
+					    "enable_ms",
+					    "home_mm_s",
+					    "home_mm",
+					    "origin_mm",
+					    "rest_mm",
+					    "late_ms",
+					    "direction",
+					    "invert",
+					    "lines",
+					    "can",
+					    NULL};
+
 /* A key for a number of the struct, which may have another unit. */
 struct number {
 	const char *key;
@@ -83,9 +133,6 @@ static int line_of(const config_setting_t *group, const char *key)
 
 /* --- the group actuator.lines --- */
 
-static const char *const line_keys[] = {"step",	     "dir",  "enable", "limit_min",
-					"limit_max", "home", "estop",  "alarm"};
-
 /* Names in active_low = ["enable", "estop"]; */
 static int read_active_low(struct incise_actuator *actuator,
 			   const config_setting_t *lines, const char *path,
@@ -106,7 +153,8 @@ static int read_active_low(struct incise_actuator *actuator,
 			config_setting_get_string(config_setting_get_elem(names, i));
 		int k = 0;
 
-		while (k < INCISE_LINES && (!name || strcmp(name, line_keys[k])))
+		while (k < INCISE_LINES &&
+		       (!name || strcmp(name, incise_actuator_line_keys[k])))
 			k++;
 		if (k == INCISE_LINES || actuator->line[k] < 0)
 			return incise_error_set(
@@ -123,9 +171,6 @@ static int read_active_low(struct incise_actuator *actuator,
 static int read_lines(struct incise_actuator *actuator, const config_setting_t *group,
 		      const char *path, struct incise_error *err)
 {
-	static const char *const keys[] = {"step",	 "dir",	 "enable", "limit_min",
-					   "limit_max",	 "home", "estop",  "alarm",
-					   "active_low", NULL};
 	const config_setting_t *lines = config_setting_get_member(group, "lines");
 	int rc;
 
@@ -134,10 +179,10 @@ static int read_lines(struct incise_actuator *actuator, const config_setting_t *
 	if (!lines)
 		return 0;
 	actuator->has_lines = true;
-	rc = incise_conf_known(lines, path, keys, err);
+	rc = incise_conf_known(lines, path, incise_actuator_line_keys, err);
 	for (int i = 0; i < INCISE_LINES && !rc; i++) {
-		rc = incise_conf_integer(lines, path, line_keys[i], 0, 1023,
-					 &actuator->line[i], err);
+		rc = incise_conf_integer(lines, path, incise_actuator_line_keys[i], 0,
+					 1023, &actuator->line[i], err);
 		for (int k = 0; k < i && !rc; k++)
 			if (actuator->line[i] >= 0 &&
 			    actuator->line[k] == actuator->line[i])
@@ -146,7 +191,8 @@ static int read_lines(struct incise_actuator *actuator, const config_setting_t *
 					"%.200s:%d: actuator.lines: %s and %s are both "
 					"line %d; correct one",
 					path, config_setting_source_line(lines),
-					line_keys[k], line_keys[i], actuator->line[i]);
+					incise_actuator_line_keys[k],
+					incise_actuator_line_keys[i], actuator->line[i]);
 	}
 	if (!rc)
 		rc = incise_conf_need(lines, path, "step", err);
@@ -295,22 +341,6 @@ int incise_actuator_can_read(struct incise_actuator_can *can, double travel_mm,
 			     const config_setting_t *group, const char *path,
 			     struct incise_error *err)
 {
-	static const char *const keys[] = {"mode",
-					   "bitrate",
-					   "cycle_us",
-					   "counts_per_turn",
-					   "velocity_per_turn_s",
-					   "acceleration_per_turn_s2",
-					   "following_mm",
-					   "following_ms",
-					   "homing_method",
-					   "absolute",
-					   "position_gain_1_s",
-					   "stiffness_permille_mm",
-					   "damping_permille_s_mm",
-					   "torque_max_permille",
-					   "master",
-					   NULL};
 	const config_setting_t *own = config_setting_get_member(group, "can");
 	int rc;
 
@@ -324,7 +354,7 @@ int incise_actuator_can_read(struct incise_actuator_can *can, double travel_mm,
 	};
 	if (!own)
 		return 0;
-	rc = incise_conf_known(own, path, keys, err);
+	rc = incise_conf_known(own, path, incise_actuator_can_keys, err);
 	if (!rc)
 		rc = read_mode(can, own, path, err);
 	if (!rc)
@@ -344,6 +374,32 @@ int incise_actuator_can_read(struct incise_actuator_can *can, double travel_mm,
 	if (!rc)
 		rc = incise_conf_integer(own, path, "master", 1, 127, &can->master, err);
 	return rc ? rc : check_can(can, own, path, err);
+}
+
+static bool number_of(const void *of, const struct number *numbers, size_t n,
+		      const char *key, double *value)
+{
+	for (size_t i = 0; i < n; i++) {
+		const void *field = (const char *)of + numbers[i].offset;
+
+		if (strcmp(numbers[i].key, key))
+			continue;
+		*value = numbers[i].type == DOUBLE ? *(const double *)field
+			 : numbers[i].type == U32  ? *(const uint32_t *)field
+						   : *(const uint64_t *)field;
+		*value /= numbers[i].unit;
+		return true;
+	}
+	return false;
+}
+
+bool incise_actuator_number(const struct incise_actuator *actuator, const char *key,
+			    double *value)
+{
+	if (!strncmp(key, "can.", 4))
+		return number_of(&actuator->can, can_numbers, COUNT(can_numbers), key + 4,
+				 value);
+	return number_of(actuator, numbers, COUNT(numbers), key, value);
 }
 
 /* --- the group actuator --- */
@@ -432,32 +488,6 @@ static int check(const struct incise_actuator *actuator, const config_setting_t 
 int incise_actuator_read(struct incise_actuator *actuator, const config_setting_t *group,
 			 const char *path, struct incise_error *err)
 {
-	static const char *const keys[] = {"spring_N_mm",
-					   "travel_mm",
-					   "lead_mm",
-					   "steps_per_turn",
-					   "microsteps",
-					   "velocity_mm_s",
-					   "acceleration_mm_s2",
-					   "jerk_mm_s3",
-					   "deadman_ms",
-					   "retract",
-					   "tick_us",
-					   "high_us",
-					   "low_us",
-					   "setup_us",
-					   "hold_us",
-					   "enable_ms",
-					   "home_mm_s",
-					   "home_mm",
-					   "origin_mm",
-					   "rest_mm",
-					   "late_ms",
-					   "direction",
-					   "invert",
-					   "lines",
-					   "can",
-					   NULL};
 	static const char *const needed[] = {"spring_N_mm", "travel_mm", "lead_mm"};
 	int rc;
 
@@ -473,7 +503,7 @@ int incise_actuator_read(struct incise_actuator *actuator, const config_setting_
 		.enable_ns = 1000000,
 		.home_mm_s = NAN,
 	};
-	rc = incise_conf_known(group, path, keys, err);
+	rc = incise_conf_known(group, path, incise_actuator_keys, err);
 	for (size_t i = 0; i < sizeof(needed) / sizeof(*needed) && !rc; i++)
 		rc = incise_conf_need(group, path, needed[i], err);
 	if (!rc)

@@ -8,6 +8,15 @@
 #include <incise/backend.h>
 #include "../base/conf.h"
 
+/* Keys of the groups actuator, actuator.can and actuator.lines; they end with NULL. */
+extern const char *const incise_actuator_keys[],
+	*const incise_actuator_can_keys[], *const incise_actuator_line_keys[];
+
+/* The value of a number in the unit of its key, such as "lead_mm" or "can.following_ms"; false:
+ * no number has that key. */
+bool incise_actuator_number(const struct incise_actuator *actuator, const char *key,
+			    double *value);
+
 /* Read and check the group. 0 or -EINVAL; @err names file, line and key. */
 int incise_actuator_read(struct incise_actuator *actuator, const config_setting_t *group,
 			 const char *path, struct incise_error *err);

@@ -18,13 +18,31 @@
 #include "axes.h"
 #include "rig_plan.h"
 
-/* --- groups tracker_setup, force_setup, camera_setup and vision --- */
+/* --- groups tracker_setup, force_setup, camera_setup, vision and foot_switch --- */
+
+const char *const incise_rig_root_keys[] = {
+	"clock",	 "tracker",	"force",	"camera",
+	"stepper",	 "surface",	"sim",		"actuator",
+	"tracker_setup", "force_setup", "camera_setup", "vision",
+	"foot_switch",	 NULL};
+
+const struct incise_rig_group incise_rig_groups[INCISE_RIG_GROUPS] = {
+	{"tracker_setup",
+	 {"stations", "tube_station", "hemisphere", "sync", "offset_mm", "repeat_ms"}},
+	{"force_setup", {"rate_hz", "channel", "full_scale_V", "trigger"}},
+	{"camera_setup",
+	 {"width", "height", "rate_hz", "format", "exposure_ms", "gain",
+	  "white_balance_K", "focus"}},
+	{"vision", {"hue", "saturation", "value", "full_px", "roi"}},
+	{"foot_switch", {"device", "key"}},
+};
 
 /* *group is NULL where the file has none. */
 static int group_of(const config_setting_t *root, const char *name, const char *path,
-		    const char *const *keys, const config_setting_t **group,
-		    struct incise_error *err)
+		    const config_setting_t **group, struct incise_error *err)
 {
+	const struct incise_rig_group *known = incise_rig_groups;
+
 	*group = config_setting_get_member(root, name);
 	if (!*group)
 		return 0;
@@ -34,7 +52,9 @@ static int group_of(const config_setting_t *root, const char *name, const char *
 			"%.200s:%d: %s: expected a group { key = value; }; "
 			"correct it",
 			path, config_setting_source_line(*group), name);
-	return incise_conf_known(*group, path, keys, err);
+	while (strcmp(known->name, name))
+		known++;
+	return incise_conf_known(*group, path, known->keys, err);
 }
 
 /* *value is the index in @words; unchanged where the key is absent. */
@@ -125,13 +145,10 @@ static int read_tracker_setup(struct incise_tracker_setup *setup,
 			      const config_setting_t *root, const char *path,
 			      struct incise_error *err)
 {
-	static const char *const keys[] = {"stations", "tube_station", "hemisphere",
-					   "sync",     "offset_mm",    "repeat_ms",
-					   NULL};
 	static const char *const syncs[] = {"internal", "external", "video", NULL};
 	const config_setting_t *group;
 	int sync = INCISE_TRACKER_INTERNAL;
-	int rc = group_of(root, "tracker_setup", path, keys, &group, err);
+	int rc = group_of(root, "tracker_setup", path, &group, err);
 
 	*setup = (struct incise_tracker_setup){.n_stations = 1,
 					       .stations = {1},
@@ -159,11 +176,9 @@ static int read_force_setup(struct incise_force_setup *setup,
 			    const config_setting_t *root, const char *path,
 			    struct incise_error *err)
 {
-	static const char *const keys[] = {"rate_hz", "channel", "full_scale_V",
-					   "trigger", NULL};
 	const config_setting_t *group;
 	const char *trigger = NULL;
-	int rc = group_of(root, "force_setup", path, keys, &group, err);
+	int rc = group_of(root, "force_setup", path, &group, err);
 
 	*setup = (struct incise_force_setup){.rate_hz = 10000};
 	if (rc || !group)
@@ -196,13 +211,10 @@ static int read_camera_setup(struct incise_camera_setup *setup,
 			     const config_setting_t *root, const char *path,
 			     struct incise_error *err)
 {
-	static const char *const keys[] = {"width",	      "height",	     "rate_hz",
-					   "format",	      "exposure_ms", "gain",
-					   "white_balance_K", "focus",	     NULL};
 	static const char *const formats[] = {"rgb", "grey", "yuyv", "mjpeg", NULL};
 	const config_setting_t *group;
 	int pixels = INCISE_PIXELS_YUYV;
-	int rc = group_of(root, "camera_setup", path, keys, &group, err);
+	int rc = group_of(root, "camera_setup", path, &group, err);
 
 	*setup = (struct incise_camera_setup){.pixels = INCISE_PIXELS_YUYV};
 	if (rc || !group)
@@ -298,10 +310,8 @@ static int read_vision_setup(struct incise_vision_setup *setup, bool *given,
 			     const config_setting_t *root, const char *path,
 			     struct incise_error *err)
 {
-	static const char *const keys[] = {"hue",     "saturation", "value",
-					   "full_px", "roi",	    NULL};
 	const config_setting_t *group;
-	int rc = group_of(root, "vision", path, keys, &group, err);
+	int rc = group_of(root, "vision", path, &group, err);
 
 	*given = group;
 	*setup = (struct incise_vision_setup){
@@ -324,11 +334,10 @@ static int read_vision_setup(struct incise_vision_setup *setup, bool *given,
 static int read_foot_switch(struct incise_rig_plan *plan, const config_setting_t *root,
 			    const char *path, struct incise_error *err)
 {
-	static const char *const keys[] = {"device", "key", NULL};
 	struct incise_foot_switch_setup *setup = &plan->foot_switch;
 	const char *device = NULL, *key = NULL;
 	const config_setting_t *group;
-	int rc = group_of(root, "foot_switch", path, keys, &group, err), code;
+	int rc = group_of(root, "foot_switch", path, &group, err), code;
 
 	if (rc || !group)
 		return rc;
@@ -756,16 +765,11 @@ static bool virtual_camera(const config_setting_t *root)
 static int plan_root(struct incise_rig_plan *plan, const config_setting_t *root,
 		     const char *path, struct incise_error *err)
 {
-	static const char *const keys[] = {
-		"clock",	 "tracker",	"force",	"camera",
-		"stepper",	 "surface",	"sim",		"actuator",
-		"tracker_setup", "force_setup", "camera_setup", "vision",
-		"foot_switch",	 NULL};
 	const char *clock = NULL;
 	char where[240];
 	int rc;
 
-	rc = incise_conf_known(root, path, keys, err);
+	rc = incise_conf_known(root, path, incise_rig_root_keys, err);
 	if (!rc)
 		rc = incise_conf_string(root, path, "clock", &clock, err);
 	if (!rc && clock) {

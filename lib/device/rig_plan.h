@@ -19,6 +19,15 @@
 /* The kinds of devices; their order is that of the incise_rig_device bits. */
 enum { KIND_TRACKER, KIND_FORCE, KIND_CAMERA, KIND_STEPPER, N_KINDS };
 
+/* Keys of rig.conf, and those of its groups of settings; an array ends with NULL. */
+extern const char *const incise_rig_root_keys[];
+#define INCISE_RIG_GROUPS 5
+struct incise_rig_group {
+	const char *name;
+	const char *keys[10];
+};
+extern const struct incise_rig_group incise_rig_groups[INCISE_RIG_GROUPS];
+
 /* A slot for each device: the actuators' are the last ones. */
 #define N_SLOTS (KIND_STEPPER + INCISE_RIG_AXES_MAX)
 

@@ -250,6 +250,22 @@ int incise_sim_config_set(struct incise_sim_config *config, const char *name,
 	return 0;
 }
 
+int incise_sim_config_get(const struct incise_sim_config *config, int i,
+			  const char **name, double values[INCISE_SIM_DEPTHS_MAX],
+			  const char **word)
+{
+	int n;
+
+	if (i < 0 || i >= (int)N_KEYS)
+		return 0;
+	n = keys[i].length ? config->n_depths : 1;
+	*name = keys[i].name;
+	for (int j = 0; j < n; j++)
+		values[j] = key_get(config, &keys[i], j);
+	*word = keys[i].words ? keys[i].words[(int)values[0]] : NULL;
+	return n;
+}
+
 int incise_sim_config_check(const struct incise_sim_config *config,
 			    struct incise_error *err)
 {

@@ -65,6 +65,14 @@ bool incise_sim_config_has_words(const char *key);
 int incise_sim_config_set_word(struct incise_sim_config *config, const char *key,
 			       const char *word, struct incise_error *err);
 
+/*
+ * The name of key @i, in the order of rig.conf(5), with its values, or for a key that takes a
+ * word with *word. Returns how many values, 0 from the first index that is not there.
+ */
+int incise_sim_config_get(const struct incise_sim_config *config, int i,
+			  const char **name, double values[INCISE_SIM_DEPTHS_MAX],
+			  const char **word);
+
 /* Whether every value is within its range. Returns 0 or -EINVAL. */
 int incise_sim_config_check(const struct incise_sim_config *config,
 			    struct incise_error *err);

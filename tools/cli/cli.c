@@ -617,14 +617,29 @@ int cli_list(const char *option, char *text, char **items, int max)
 	return n;
 }
 
+static const char *const rig_places[] = {"rig.conf", "/etc/incise/rig.conf", NULL};
+
 const char *cli_default_rig(void)
 {
-	static const char *const places[] = {"rig.conf", "/etc/incise/rig.conf"};
+	const char *const *place = rig_places;
 
-	for (size_t i = 0; i < sizeof(places) / sizeof(*places); i++)
-		if (!access(places[i], F_OK))
-			return places[i];
-	return NULL;
+	while (*place && access(*place, F_OK))
+		place++;
+	return *place;
+}
+
+const char *cli_rig_passed_over(int i)
+{
+	static char reason[120];
+	const char *used = cli_default_rig();
+
+	if (!rig_places[i] || rig_places[i] == used || (used == rig_places[0]))
+		return NULL;
+	errno = 0;
+	if (!access(rig_places[i], F_OK))
+		return NULL;
+	snprintf(reason, sizeof(reason), "%s: %s", rig_places[i], strerror(errno));
+	return reason;
 }
 
 const char *cli_rig(const char *given)

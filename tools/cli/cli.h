@@ -213,6 +213,9 @@ const char *cli_rig(const char *given);
 /* ./rig.conf, else /etc/incise/rig.conf, else NULL. */
 const char *cli_default_rig(void);
 
+/* The places before that one with the reason, "rig.conf: No such file …"; NULL beyond the last. */
+const char *cli_rig_passed_over(int i);
+
 /* Open that rig with some devices (INCISE_RIG_TRACKER, …), or fail. */
 struct incise_rig *cli_open_rig(const char *given, unsigned int devices);
 

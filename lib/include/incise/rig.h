@@ -15,6 +15,7 @@
 #ifndef INCISE_RIG_H
 #define INCISE_RIG_H
 
+#include <stdbool.h>
 #include <incise/camera.h>
 #include <incise/clock.h>
 #include <incise/error.h>
@@ -119,6 +120,32 @@ INCISE_API int incise_rig_vision(const struct incise_rig *rig,
  */
 INCISE_API int incise_rig_foot_switch(const struct incise_rig *rig,
 				      struct incise_foot_switch_setup *setup);
+
+/** A key of a rig, with the value that applies. */
+struct incise_rig_key {
+	char name[80]; /**< "sim.seed"; "actuator[2].lead_mm" of several, from 1 on */
+	/** as rig.conf has it, which is JSON too: 2.5, true, "text", [0, 0, 1]; empty: none, or up
+	 * to the device */
+	char value[400];
+	bool given; /**< else it is the default */
+	int line;   /**< of the file; 0: it is not from there */
+};
+
+/**
+ * Called for each key. @key is valid until it returns.
+ * @return 0; another value ends the list, and incise_rig_keys() returns it
+ */
+typedef int incise_rig_key_found(void *context, const struct incise_rig_key *key);
+
+/**
+ * List the keys of a rig: those that are given, and with their defaults those of the clock, the
+ * surface and each device that is named. No device is opened.
+ *
+ * @param spec as of incise_rig_open()
+ * @return 0; what @found returned; a negative errno of incise_rig_open() without devices
+ */
+INCISE_API int incise_rig_keys(const char *spec, incise_rig_key_found *found,
+			       void *context, struct incise_error *err);
 
 INCISE_END_DECLS
 #endif
