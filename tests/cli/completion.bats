@@ -23,7 +23,7 @@ complete_words() {
 
 @test "verbs are completed" {
 	complete_words incise ""
-	for verb in capture verify export train eval info haptic status tool view assess replay bench demo help; do
+	for verb in capture verify export train eval info plot haptic status tool view assess replay bench demo help; do
 		[[ " ${COMPREPLY[*]} " == *" $verb "* ]]
 	done
 	complete_words incise tr
@@ -39,7 +39,7 @@ complete_words() {
 	[ "${COMPREPLY[*]}" = "--mf --mf-type" ]
 	complete_words incise haptic --lo
 	[ "${COMPREPLY[*]}" = --log ]
-	for verb in capture verify export train eval info haptic status tool assess replay stepper bench demo; do
+	for verb in capture verify export train eval info plot haptic status tool assess replay stepper bench demo; do
 		complete_words incise "$verb" --
 		for option in "${COMPREPLY[@]}"; do
 			"incise-$verb" --help | grep -qE -- "^ .*$option( |\$)"

@@ -16,35 +16,55 @@ static double between(const struct incise_variable *v, int i, int n)
 	return v->min + (v->max - v->min) * i / n;
 }
 
-/* A name with its unit as a title: 'depth / mm' of depth_mm. */
-static void put_label(FILE *script, const struct incise_variable *v)
-{
-	static const struct {
-		const char *suffix, *unit;
-	} units[] = {{"_mm_s", "(mm/s)"}, {"_mm", "mm"}, {"_N", "N"}, {"_s", "s"}};
-	size_t n = strlen(v->name);
-	const char *unit = NULL;
-
-	for (size_t i = 0; i < sizeof(units) / sizeof(*units) && !unit; i++) {
-		size_t suffix = strlen(units[i].suffix);
-
-		if (n <= suffix || strcmp(v->name + n - suffix, units[i].suffix))
-			continue;
-		unit = units[i].unit;
-		n -= suffix;
-	}
-	/* A name in a file may hold anything, also what would end the string. */
-	fputc('\'', script);
-	for (size_t i = 0; i < n; i++)
-		fputc(strchr("'\\\n\r`", v->name[i]) ? ' ' : v->name[i], script);
-	fprintf(script, unit ? " / %s'" : "'", unit);
-}
-
 static void put_axis(FILE *script, const char *axis, const struct incise_variable *v)
 {
 	fprintf(script, "set %slabel ", axis);
-	put_label(script, v);
+	plot_put_label(script, v->name);
 	fputc('\n', script);
+}
+
+static double eval_model(const void *model, const double *x)
+{
+	return incise_model_eval(model, x, NULL);
+}
+
+static double eval_fixed(const void *fixed, const double *x)
+{
+	return incise_fixed_eval_double(fixed, x);
+}
+
+struct model_surface model_surface_of(const struct incise_model *model)
+{
+	const struct incise_model_info *info = incise_model_info(model);
+	struct model_surface surface = {
+		.n_inputs = info->n_inputs,
+		.output = info->output,
+		.eval = eval_model,
+		.of = model,
+	};
+
+	memcpy(surface.input, info->input, sizeof(surface.input));
+	return surface;
+}
+
+struct model_surface model_surface_of_fixed(const struct incise_fixed *fixed)
+{
+	struct model_surface surface = {
+		.n_inputs = fixed->n_inputs,
+		.eval = eval_fixed,
+		.of = fixed,
+	};
+
+	snprintf(surface.output.name, sizeof(surface.output.name), "%s", fixed->output);
+	for (int i = 0; i < fixed->n_inputs; i++) {
+		const struct incise_fixed_input *from = &fixed->input[i];
+		struct incise_variable *input = &surface.input[i];
+
+		snprintf(input->name, sizeof(input->name), "%s", from->name);
+		input->min = from->min / (double)INCISE_FIXED_ONE;
+		input->max = from->max / (double)INCISE_FIXED_ONE;
+	}
+	return surface;
 }
 
 void model_plot_write_functions(const struct incise_model *model, const char *folder,
@@ -95,54 +115,65 @@ void model_plot_functions(FILE *script, const struct incise_model *model, int in
 		first, first + n - 1, data, first, first);
 }
 
-void model_plot_write_surface(const struct incise_model *model, const char *folder,
+void model_plot_write_surface(const struct model_surface *surface, const char *folder,
 			      const char *data)
 {
-	const struct incise_model_info *info = incise_model_info(model);
-	const struct incise_variable *a = &info->input[0], *b = a;
+	const struct incise_variable *a = &surface->input[0], *b = &surface->input[1];
 	FILE *out = plot_data(folder, data);
 	double x[INCISE_MODEL_INPUTS_MAX];
-	int n = info->n_inputs;
+	int n = surface->n_inputs;
 
 	for (int i = 2; i < n; i++)
-		x[i] = between(&info->input[i], 1, 2);
-	if (n > 1)
-		b = &info->input[1];
+		x[i] = between(&surface->input[i], 1, 2);
 	for (int i = 0; n > 1 && i <= MESH; i++, fputc('\n', out))
 		for (int j = 0; j <= MESH; j++) {
 			x[0] = between(a, i, MESH);
 			x[1] = between(b, j, MESH);
 			fprintf(out, "%g %g %g\n", x[0], x[1],
-				incise_model_eval(model, x, NULL));
+				surface->eval(surface->of, x));
 		}
 	for (int i = 0; n == 1 && i <= SAMPLES; i++) {
 		x[0] = between(a, i, SAMPLES);
-		fprintf(out, "%g %g\n", x[0], incise_model_eval(model, x, NULL));
+		fprintf(out, "%g %g\n", x[0], surface->eval(surface->of, x));
 	}
 	plot_data_end(out, folder);
 }
 
-void model_plot_surface(FILE *script, const struct incise_model *model, const char *data,
-			const char *title, const char *more)
+void model_plot_surface(FILE *script, const struct model_surface *surface,
+			const char *data, const char *title, const char *more)
 {
-	const struct incise_model_info *info = incise_model_info(model);
-
 	fprintf(script, "set title '%s'\n", title);
-	put_axis(script, "x", &info->input[0]);
-	if (info->n_inputs == 1) {
-		put_axis(script, "y", &info->output);
+	put_axis(script, "x", &surface->input[0]);
+	if (surface->n_inputs == 1) {
+		put_axis(script, "y", &surface->output);
 		fprintf(script, "set yrange [*:*]\nplot '%s' with lines ls 1 lw 2%s\n",
 			data, more);
 		return;
 	}
-	put_axis(script, "y", &info->input[1]);
-	put_axis(script, "z", &info->output);
-	put_axis(script, "cb", &info->output);
+	put_axis(script, "y", &surface->input[1]);
+	put_axis(script, "z", &surface->output);
+	put_axis(script, "cb", &surface->output);
 	fprintf(script,
 		"set zlabel rotate parallel\nset yrange [*:*]\nset ticslevel 0\n"
 		"set view 55,320\n"
 		"splot '%s' with pm3d%s\n",
 		data, more);
+}
+
+void model_plot_contours(FILE *script, const struct model_surface *surface,
+			 const char *data, const char *title)
+{
+	fprintf(script, "set title '%s'\n", title);
+	put_axis(script, "x", &surface->input[0]);
+	put_axis(script, "y", &surface->input[1]);
+	put_axis(script, "cb", &surface->output);
+	fprintf(script,
+		"set view map\nset pm3d noborder\nset contour base\n"
+		"set cntrparam levels auto 10\nset cntrlabel onecolor start 20 interval 60\n"
+		"splot '%s' with pm3d nocontour, '' with lines lc rgb 'black' nosurface, \\\n"
+		"  '' with labels font ',9' nosurface\n"
+		"unset contour\n",
+		data);
 }
 
 #define PANEL_WIDTH 600
@@ -156,13 +187,14 @@ void model_plot_draw(const struct incise_model *model, const char *folder,
 	int rows = (n + columns - 1) / columns;
 	int width = 2 * PANEL_WIDTH, height = rows * PANEL_HEIGHT + SURFACE_HEIGHT;
 	double panel = (double)PANEL_HEIGHT / height;
+	struct model_surface of = model_surface_of(model);
 	char *functions, *surface;
 	FILE *script;
 
 	functions = cli_text("%s-functions.dat", name);
 	surface = cli_text("%s-surface.dat", name);
 	model_plot_write_functions(model, folder, functions);
-	model_plot_write_surface(model, folder, surface);
+	model_plot_write_surface(&of, folder, surface);
 	script = plot_begin(folder, name, width, height);
 	fputs("set multiplot\nset key outside right center\n", script);
 	for (int i = 0; i < n; i++) {
@@ -172,7 +204,7 @@ void model_plot_draw(const struct incise_model *model, const char *folder,
 		model_plot_functions(script, model, i, functions, "", NULL);
 	}
 	fprintf(script, "set size 1,%g\nset origin 0,0\nunset key\n", 1 - rows * panel);
-	model_plot_surface(script, model, surface,
+	model_plot_surface(script, &of, surface,
 			   n > 2 ? "the other inputs at the middle of their support" : "",
 			   "");
 	fputs("unset multiplot\n", script);

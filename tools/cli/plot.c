@@ -3,11 +3,14 @@
  * Plots by gnuplot; see plot.h.
  */
 #include <errno.h>
+#include <fcntl.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
+#include "child.h"
 #include "cli.h"
 #include "file.h"
 #include "folder.h"
@@ -60,9 +63,7 @@ void plot_folder(const char *folder)
 {
 	char *plot = cli_text("%s/plot", folder);
 
-	if (!plot_possible())
-		cli_fail("gnuplot is not installed, it draws the pictures: apt-get "
-			 "install gnuplot-nox");
+	plot_require();
 	folder_make_all(plot);
 	free(plot);
 }
@@ -70,6 +71,13 @@ void plot_folder(const char *folder)
 bool plot_possible(void)
 {
 	return !system("command -v gnuplot >/dev/null 2>&1");
+}
+
+void plot_require(void)
+{
+	if (!plot_possible())
+		cli_fail("gnuplot is not installed, it draws the pictures: apt-get "
+			 "install gnuplot-nox");
 }
 
 static FILE *open_plot(const char *folder, const char *name, const char *suffix)
@@ -122,7 +130,9 @@ FILE *plot_begin(const char *folder, const char *name, int width, int height)
 	write_style(folder);
 	fprintf(script,
 		"# gnuplot -e \"ext='png'\" %s.gp\n"
-		"width = %d\nheight = %d\nload 'style.gp'\nset output '../%s.'.ext\n",
+		"width = %d\nheight = %d\nload 'style.gp'\n"
+		"if (strstrt('png svg pdf', ext)) { set output '../%s.'.ext } \\\n"
+		"else { eval 'set terminal '.ext.' size '.width.','.height }\n",
 		name, width, height, name);
 	return script;
 }
@@ -157,4 +167,139 @@ void plot_draw_or_fail(FILE *script, const char *folder, const char *name)
 {
 	if (!plot_draw(script, folder, name))
 		cli_fail("gnuplot could not draw %s/%s", folder, name);
+}
+
+void plot_put_text(FILE *script, const char *text)
+{
+	/* A name in a file may hold anything, also what would end the string. */
+	fputc('\'', script);
+	for (; *text; text++)
+		fputc(strchr("'\\\n\r`", *text) ? ' ' : *text, script);
+	fputc('\'', script);
+}
+
+void plot_put_label(FILE *script, const char *name)
+{
+	static const struct {
+		const char *suffix, *unit;
+	} units[] = {{"_mm_s", "(mm/s)"}, {"_mm", "mm"}, {"_N", "N"}, {"_s", "s"}};
+	size_t n = strlen(name);
+	const char *unit = NULL;
+	char *text;
+
+	for (size_t i = 0; i < sizeof(units) / sizeof(*units) && !unit; i++) {
+		size_t suffix = strlen(units[i].suffix);
+
+		if (n <= suffix || strcmp(name + n - suffix, units[i].suffix))
+			continue;
+		unit = units[i].unit;
+		n -= suffix;
+	}
+	text = cli_text(unit ? "%.*s / %s" : "%.*s", (int)n, name, unit);
+	plot_put_text(script, text);
+	free(text);
+}
+
+/* --- one form of a plot ------------------------------------------------------------------ */
+
+const char *plot_window(void)
+{
+	static const char *const windows[] = {"qt", "wxt", "x11"};
+	char known[4096] = " ";
+	FILE *gnuplot;
+	size_t n;
+
+	/* Only gnuplot's Qt opens windows without X. */
+	gnuplot = popen("gnuplot -e \"set print '-'; print GPVAL_TERMINALS\" 2>/dev/null",
+			"re");
+	if (!gnuplot)
+		return NULL;
+	n = fread(known + 1, 1, sizeof(known) - 3, gnuplot);
+	pclose(gnuplot);
+	known[n + 1] = ' ';
+	for (char *c = known; *c; c++)
+		if (*c == '\n')
+			*c = ' ';
+	for (int i = 0; i < (getenv("DISPLAY") ? 3 : 1); i++) {
+		char *word = cli_text(" %s ", windows[i]);
+		bool is = strstr(known, word);
+
+		free(word);
+		if (is)
+			return windows[i];
+	}
+	return NULL;
+}
+
+/* What gnuplot reported: '"NAME.gp" line 9: …', below the command, or its first line. */
+static void find_report(const char *path, char *report, size_t size)
+{
+	FILE *file = fopen(path, "re");
+	char line[300];
+
+	*report = 0;
+	while (file && fgets(line, sizeof(line), file)) {
+		line[strcspn(line, "\n")] = 0;
+		if (!*report || *line == '"')
+			snprintf(report, size, "%s", line);
+		if (*line == '"')
+			break;
+	}
+	if (file)
+		fclose(file);
+}
+
+/* Returns its status as of waitpid(2); a signal ends it. */
+static int wait_for(pid_t gnuplot)
+{
+	const struct timespec pause = {.tv_nsec = 20000000};
+	int status;
+
+	while (!child_ended(gnuplot, &status)) {
+		if (cli_stop)
+			return child_end(gnuplot, 0);
+		nanosleep(&pause, NULL);
+	}
+	return status;
+}
+
+static void copy_file(const char *from, const char *to)
+{
+	struct incise_outfile *file;
+	FILE *out = whole_file_begin(to, &file), *in = fopen(from, "re");
+	char bytes[65536];
+	size_t n;
+
+	if (!in)
+		cli_fail("%s: gnuplot did not draw it: %s", to, strerror(errno));
+	while ((n = fread(bytes, 1, sizeof(bytes), in)))
+		if (fwrite(bytes, 1, n, out) != n)
+			break;
+	fclose(in);
+	whole_file_end(file);
+}
+
+void plot_draw_form(FILE *script, const char *folder, const char *name, const char *form,
+		    const char *path)
+{
+	char *command = cli_text("cd \"$0/plot\" && exec gnuplot -e \"ext='%s'\" %s.gp",
+				 form, name);
+	char *argv[] = {"sh", "-c", command, (char *)folder, NULL};
+	char *errors = cli_text("%s/errors", folder), *drawn, line[300];
+	int fd = open(errors, O_WRONLY | O_CREAT | O_CLOEXEC, 0600), status;
+
+	fputs(path ? "\nunset output\n" : "\npause mouse close\n", script);
+	if (fd < 0 || fclose(script))
+		cli_fail("%s: %s; make room and run it again", folder, strerror(errno));
+	status = wait_for(child_start(argv, -1, fd));
+	close(fd);
+	if (cli_stop)
+		cli_fail("interrupted%s", path ? "; nothing was written" : "");
+	find_report(errors, line, sizeof(line));
+	if (status)
+		cli_fail("gnuplot could not draw it: %s", *line ? line : "it was killed");
+	drawn = cli_text("%s/%s.%s", folder, name, form);
+	if (path)
+		copy_file(drawn, path);
+	free(drawn), free(errors), free(command);
 }

@@ -32,6 +32,9 @@ void plot_folder(const char *folder);
 /* Whether gnuplot is installed. */
 bool plot_possible(void);
 
+/* Fails the program if it is not. */
+void plot_require(void);
+
 /* Open FOLDER/plot/NAME for writing data; fails the program on an error. */
 FILE *plot_data(const char *folder, const char *name);
 
@@ -46,5 +49,21 @@ bool plot_draw(FILE *script, const char *folder, const char *name);
 
 /* The same; fails the program if they were not. */
 void plot_draw_or_fail(FILE *script, const char *folder, const char *name);
+
+/* A terminal of this gnuplot that opens a window here, or NULL. */
+const char *plot_window(void);
+
+/*
+ * Close the script and draw one form: "png" or "svg" as the file @path, which appears whole, or
+ * in a window, until that is closed. Fails the program.
+ */
+void plot_draw_form(FILE *script, const char *folder, const char *name, const char *form,
+		    const char *path);
+
+/* Write a text, which may hold anything, as a string of a script. */
+void plot_put_text(FILE *script, const char *text);
+
+/* Write the name of a quantity as the title of an axis: 'depth / mm' of depth_mm. */
+void plot_put_label(FILE *script, const char *name);
 
 #endif

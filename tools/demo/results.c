@@ -268,12 +268,13 @@ static void figure_membership(const struct demo *demo, const struct incise_model
 
 static void figure_surface(const struct demo *demo, const struct incise_model *model)
 {
+	struct model_surface surface = model_surface_of(model);
 	FILE *script;
 
-	model_plot_write_surface(model, demo->folder, "surface.dat");
+	model_plot_write_surface(&surface, demo->folder, "surface.dat");
 	script = plot_begin(demo->folder, "fig3b-surface", 1000, 800);
 	model_plot_surface(
-		script, model, "surface.dat",
+		script, &surface, "surface.dat",
 		"Force of the trained model (as paper 1, fig. 3b); dots: the averaged pairs",
 		", \\\n  'pairs.dat' with points pt 7 ps 0.6 lc rgb ink");
 	draw(demo, script, "fig3b-surface");

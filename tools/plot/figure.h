@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * The figure of incise plot: a function for each kind of file writes its data and script, and
+ * incise plot makes a file of it, or a window. See cli/plot.h.
+ */
+#ifndef INCISE_FIGURE_H
+#define INCISE_FIGURE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+
+#define FIGURE_NAME "figure" /* of the script, in the figure's folder */
+#define FIGURE_WIDTH 1200    /* pixels */
+
+struct figure {
+	const char *path; /* the file that is drawn */
+	const char *data; /* of a model: the dataset of its residuals, or NULL */
+	double from_s,
+		to_s; /* of a recording: the time that is drawn; INFINITY: to its end */
+	char folder[4096]; /* of data and script; it is removed at the end */
+};
+
+/* Each returns the script, for plot_draw_form(). Every failure ends the program. */
+FILE *figure_of_model(const struct figure *figure);
+FILE *figure_of_compiled(const struct figure *figure);
+FILE *figure_of_dataset(const struct figure *figure);
+
+/*
+ * Points of a scatter plot, of which those that would fall on a drawn one are left out: as many
+ * are drawn as there are places for them, however many there are.
+ */
+struct scatter {
+	double low[2], high[2]; /* of the axes */
+	uint8_t *taken;		/* places */
+};
+
+/* All places are free. scatter_end(). */
+void scatter_begin(struct scatter *scatter, const double low[2], const double high[2]);
+
+/* Whether the point falls on a free place, which it takes. */
+bool scatter_takes(struct scatter *scatter, double x, double y);
+
+void scatter_end(struct scatter *scatter);
+
+#endif

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The figure of a model: its membership functions, its output as a surface and as contours, and
+ * the residuals of a dataset. See figure.h.
+ *
+ *     ┌─ functions ──┬─ functions ──┐   of a .fis
+ *     ├─ surface ────┼─ contours ───┤
+ *     ├─ residuals ──┼─ quantiles ──┤   with --data
+ *     └──────────────┴──────────────┘
+ */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/dataset.h>
+#include "../cli/cli.h"
+#include "../cli/model_plot.h"
+#include "../cli/plot.h"
+#include "figure.h"
+
+#define FUNCTIONS_HEIGHT 280
+#define SURFACE_HEIGHT 500
+#define RESIDUALS_HEIGHT 400
+
+#define QUANTILES 400
+
+/* Panels in rows, two of them side by side, from the top. */
+struct grid {
+	FILE *script;
+	int height, top; /* pixels */
+};
+
+/* The next row of that height has panels of half the figure's width, or of all of it. */
+static void place(struct grid *grid, int column, int columns, int height)
+{
+	fprintf(grid->script, "set size %g,%g\nset origin %g,%g\n", 1.0 / columns,
+		(double)height / grid->height, (double)column / columns,
+		1 - (double)(grid->top + height) / grid->height);
+	if (column == columns - 1)
+		grid->top += height;
+}
+
+/* --- residuals ------------------------------------------------------------------------- */
+
+struct residuals {
+	size_t n, left_out;
+	double *value, *at; /* measured - model, over the first input */
+	double mean, rms;
+};
+
+static struct residuals residuals_of(const struct model_surface *surface,
+				     const char *path)
+{
+	const char *columns[INCISE_MODEL_INPUTS_MAX + 1];
+	struct residuals r = {0};
+	struct incise_error err = {0};
+	struct incise_dataset *data;
+	int n = surface->n_inputs;
+
+	for (int i = 0; i < n; i++)
+		columns[i] = surface->input[i].name;
+	columns[n] = surface->output.name;
+	/* As incise train: rows where the blade did not advance are not what it learns. */
+	data = cli_require(incise_dataset_read_where(path, columns, n + 1, NULL,
+						     "advancing", &r.left_out, &err),
+			   &err);
+	r.n = incise_dataset_rows(data);
+	r.value = cli_alloc(r.n, sizeof(*r.value));
+	r.at = cli_alloc(r.n, sizeof(*r.at));
+	for (size_t i = 0; i < r.n; i++) {
+		const double *row = incise_dataset_row(data, i);
+
+		r.at[i] = row[0];
+		r.value[i] = row[n] - surface->eval(surface->of, row);
+		r.mean += r.value[i] / (double)r.n;
+		r.rms += r.value[i] * r.value[i] / (double)r.n;
+	}
+	r.rms = sqrt(r.rms);
+	incise_dataset_free(data);
+	return r;
+}
+
+static void widen(double *low, double *high, const double *value, size_t n)
+{
+	*low = *high = value[0];
+	for (size_t i = 1; i < n; i++) {
+		*low = fmin(*low, value[i]);
+		*high = fmax(*high, value[i]);
+	}
+}
+
+static void write_residuals(const struct residuals *r, const char *folder)
+{
+	FILE *data = plot_data(folder, "residuals.dat");
+	double low[2], high[2];
+	struct scatter scatter;
+
+	widen(&low[0], &high[0], r->at, r->n);
+	widen(&low[1], &high[1], r->value, r->n);
+	scatter_begin(&scatter, low, high);
+	for (size_t i = 0; i < r->n; i++)
+		if (scatter_takes(&scatter, r->at[i], r->value[i]))
+			fprintf(data, "%.6g %.6g\n", r->at[i], r->value[i]);
+	scatter_end(&scatter);
+	plot_data_end(data, folder);
+}
+
+static int ascending(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+
+	return (x > y) - (x < y);
+}
+
+/* Shares and quantiles; both ends are there, however many are left out between. */
+static void write_quantiles(struct residuals *r, const char *folder)
+{
+	FILE *data = plot_data(folder, "quantiles.dat");
+	size_t last = r->n - 1, step = r->n / QUANTILES + 1;
+
+	qsort(r->value, r->n, sizeof(*r->value), ascending);
+	for (size_t i = 0; i <= last; i = i < last && i + step > last ? last : i + step)
+		fprintf(data, "%.9g %.6g\n", ((double)i + 0.5) / (double)r->n,
+			r->value[i]);
+	plot_data_end(data, folder);
+}
+
+static void put_residual_label(FILE *script, const struct model_surface *surface)
+{
+	fputs("set ylabel 'residual of '.", script);
+	plot_put_label(script, surface->output.name);
+	fputc('\n', script);
+}
+
+static void put_residuals(struct grid *grid, const struct model_surface *surface,
+			  const struct residuals *r)
+{
+	place(grid, 0, 2, RESIDUALS_HEIGHT);
+	fprintf(grid->script,
+		"unset key\nset xrange [*:*]\nset yrange [*:*]\n"
+		"set title '%zu rows: measured - model, RMSE %.3g, mean %.2g'\n"
+		"set xlabel ",
+		r->n, r->rms, r->mean);
+	plot_put_label(grid->script, surface->input[0].name);
+	fputc('\n', grid->script);
+	put_residual_label(grid->script, surface);
+	fputs("plot 'residuals.dat' with points pt 7 ps 0.4 lc rgb blue, "
+	      "0 with lines lc rgb ink\n",
+	      grid->script);
+	place(grid, 1, 2, RESIDUALS_HEIGHT);
+	fprintf(grid->script,
+		"set title 'quantiles of the residuals; line: normal distribution'\n"
+		"set xlabel 'quantile of the normal distribution / SD'\n"
+		"plot 'quantiles.dat' using (invnorm($1)):2 with points pt 7 ps 0.4 lc rgb "
+		"blue, %g + %g * x with lines lc rgb ink\n",
+		r->mean, sqrt(fmax(0, r->rms * r->rms - r->mean * r->mean)));
+}
+
+/* --- the figure -------------------------------------------------------------------------- */
+
+static void put_surface(struct grid *grid, const struct model_surface *surface)
+{
+	const char *title = surface->n_inputs > 2
+				    ? "the other inputs at the middle of their support"
+				    : "";
+
+	fputs("unset key\nset xrange [*:*]\n", grid->script);
+	if (surface->n_inputs == 1) {
+		place(grid, 0, 1, SURFACE_HEIGHT);
+		model_plot_surface(grid->script, surface, "surface.dat", title, "");
+		return;
+	}
+	place(grid, 0, 2, SURFACE_HEIGHT);
+	model_plot_surface(grid->script, surface, "surface.dat", title, "");
+	place(grid, 1, 2, SURFACE_HEIGHT);
+	model_plot_contours(grid->script, surface, "surface.dat", title);
+}
+
+/* @model NULL: of a compiled one the functions are not known. */
+static FILE *draw(const struct figure *figure, const struct model_surface *surface,
+		  const struct incise_model *model)
+{
+	int n = model ? surface->n_inputs : 0, columns = n > 1 ? 2 : 1;
+	int rows = (n + columns - 1) / columns;
+	struct residuals residuals = {0};
+	struct grid grid = {.height = rows * FUNCTIONS_HEIGHT + SURFACE_HEIGHT};
+
+	if (figure->data) {
+		residuals = residuals_of(surface, figure->data);
+		write_residuals(&residuals, figure->folder);
+		write_quantiles(&residuals, figure->folder);
+		grid.height += RESIDUALS_HEIGHT;
+	}
+	if (model)
+		model_plot_write_functions(model, figure->folder, "functions.dat");
+	model_plot_write_surface(surface, figure->folder, "surface.dat");
+	grid.script = plot_begin(figure->folder, FIGURE_NAME, FIGURE_WIDTH, grid.height);
+	fputs("set multiplot\nset key outside right center\n", grid.script);
+	for (int i = 0; i < n; i++) {
+		place(&grid, i % columns, columns, FUNCTIONS_HEIGHT);
+		model_plot_functions(grid.script, model, i, "functions.dat", "", NULL);
+	}
+	if (n % columns)
+		grid.top += FUNCTIONS_HEIGHT;
+	put_surface(&grid, surface);
+	if (figure->data)
+		put_residuals(&grid, surface, &residuals);
+	fputs("unset multiplot\n", grid.script);
+	free(residuals.at), free(residuals.value);
+	return grid.script;
+}
+
+FILE *figure_of_model(const struct figure *figure)
+{
+	struct incise_error err = {0};
+	struct incise_model *model =
+		cli_require(incise_model_load(figure->path, &err), &err);
+	struct model_surface surface = model_surface_of(model);
+	FILE *script = draw(figure, &surface, model);
+
+	incise_model_free(model);
+	return script;
+}
+
+FILE *figure_of_compiled(const struct figure *figure)
+{
+	struct incise_error err = {0};
+	struct incise_fixed *fixed =
+		cli_require(incise_fixed_load(figure->path, &err), &err);
+	struct model_surface surface = model_surface_of_fixed(fixed);
+	FILE *script = draw(figure, &surface, NULL);
+
+	incise_fixed_free(fixed);
+	return script;
+}
