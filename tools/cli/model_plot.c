@@ -168,11 +168,12 @@ void model_plot_contours(FILE *script, const struct model_surface *surface,
 	put_axis(script, "y", &surface->input[1]);
 	put_axis(script, "cb", &surface->output);
 	fprintf(script,
-		"set view map\nset pm3d noborder\nset contour base\n"
+		"set ylabel offset -2,0\nset view map\nset pm3d noborder\nset contour base\n"
 		"set cntrparam levels auto 10\nset cntrlabel onecolor start 20 interval 60\n"
-		"splot '%s' with pm3d nocontour, '' with lines lc rgb 'black' nosurface, \\\n"
-		"  '' with labels font ',9' nosurface\n"
-		"unset contour\n",
+		"set style textbox opaque noborder\nset autoscale fix\nunset grid\n"
+		"splot '%s' with pm3d nocontour, '' with lines lc rgb ink nosurface, \\\n"
+		"  '' with labels font small boxed nosurface\n"
+		"unset contour\nset ylabel offset 0,0\nset grid\nset autoscale xy\n",
 		data);
 }
 

@@ -282,8 +282,10 @@ FILE *figure_of_dataset(const struct figure *figure)
 			    rows * HEIGHT + TITLE_HEIGHT);
 	put_title(script, &table, figure->path);
 	fprintf(script,
-		"set key top left\nset cblabel 'cut'\nset size %g,%g\nset origin 0,%g\n",
-		velocity ? 0.5 : 1.0, height, (rows - 1) * height);
+		"set key top left\nset cblabel 'cut'\nset cbrange [1:%d]\nset size %g,%g\n"
+		"set origin 0,%g\n",
+		table.n_groups > 1 ? table.n_groups : 2, velocity ? 0.5 : 1.0, height,
+		(rows - 1) * height);
 	put_upper(script, &table, DEPTH, figure);
 	if (velocity) {
 		fprintf(script, "set origin 0.5,%g\n", (rows - 1) * height);

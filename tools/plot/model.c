@@ -169,8 +169,11 @@ static void put_surface(struct grid *grid, const struct model_surface *surface)
 		model_plot_surface(grid->script, surface, "surface.dat", title, "");
 		return;
 	}
+	/* The map's colours are those of the surface. */
+	fputs("unset colorbox\n", grid->script);
 	place(grid, 0, 2, SURFACE_HEIGHT);
 	model_plot_surface(grid->script, surface, "surface.dat", title, "");
+	fputs("set colorbox\n", grid->script);
 	place(grid, 1, 2, SURFACE_HEIGHT);
 	model_plot_contours(grid->script, surface, "surface.dat", title);
 }
