@@ -3,7 +3,6 @@
  * incise plot FILE: draws a file of incise, whose kind is recognized by its content, into a PNG or
  * SVG file or a window.
  */
-#include <ctype.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -11,6 +10,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include "cli/cli.h"
+#include "cli/file_kind.h"
 #include "cli/folder.h"
 #include "cli/plot.h"
 #include "plot/figure.h"
@@ -19,6 +19,9 @@ struct job {
 	struct figure figure;
 	const char *output; /* NULL: a window */
 };
+
+/* Kinds of files, in the help and in errors. */
+#define FILES "a model (.fis, .fx) or a dataset (.csv)"
 
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
@@ -32,9 +35,8 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "plot",
 	.synopsis = "FILE [-o NAME.png|NAME.svg] [OPTIONS]",
-	.summary =
-		"Draw a model (.fis, .fx) or a dataset (.csv). The kind of the file is recognized\n"
-		"by its content.",
+	.summary = "Draw " FILES ".\n"
+		   "The kind of the file is recognized by its content.",
 	.options = options,
 	.notes = "Example:\n  incise plot liver.fis --data pairs.csv -o liver.png\n\n"
 		 "Exit: 0 drawn, 1 failed, 2 bad usage. See incise-plot(1).",
@@ -42,76 +44,32 @@ static const struct cli_command command = {
 
 /* --- kinds of files -------------------------------------------------------------------- */
 
-#define HEAD_MOST 4096
-
-struct kind {
-	const char *name;
-	bool (*is)(const char *head, size_t n);
+static const struct drawn {
+	enum file_kind kind;
 	FILE *(*draw)(const struct figure *figure);
-	bool data; /* takes --data */
+} drawn[] = {
+	{FILE_MODEL, figure_of_model},
+	{FILE_COMPILED, figure_of_compiled},
+	{FILE_TABLE, figure_of_dataset},
 };
 
-static bool is_compiled(const char *head, size_t n)
+#define DRAWN (sizeof(drawn) / sizeof(*drawn))
+#define MODELS (FILE_MODEL | FILE_COMPILED)
+
+static const struct drawn *find_drawn(const char *path)
 {
-	return n >= 8 && !memcmp(head, "INCISEFX", 8);
-}
-
-static bool is_model(const char *head, size_t n)
-{
-	const char *system = strstr(head, "[System]");
-
-	(void)n;
-	return system && (system == head || system[-1] == '\n');
-}
-
-static int commas(const char *line)
-{
-	int n = 0;
-
-	for (; *line && *line != '\n'; line++)
-		n += *line == ',';
-	return n;
-}
-
-/* Below comments a line of names, and one of as many fields. */
-static bool is_dataset(const char *head, size_t n)
-{
-	const char *line = head, *next;
-
-	while (*line == '#' || *line == '\n' || *line == '\r')
-		line += strcspn(line, "\n") + (line[strcspn(line, "\n")] == '\n');
-	next = line + strcspn(line, "\n");
-	return n == strlen(head) &&
-	       isalpha((unsigned char)(*line == '"' ? line[1] : *line)) && commas(line) &&
-	       *next && commas(next + 1) == commas(line);
-}
-
-static const struct kind kinds[] = {
-	{"a compiled model", is_compiled, figure_of_compiled, true},
-	{"a model", is_model, figure_of_model, true},
-	{"a dataset", is_dataset, figure_of_dataset, false},
-};
-
-static const struct kind *kind_of(const char *path)
-{
-	char head[HEAD_MOST + 1];
+	enum file_kind kind = file_kind_of(path);
+	unsigned int all = 0;
 	struct stat st;
-	FILE *file;
-	size_t n;
 
-	if (stat(path, &st))
-		cli_fail("%s: %s; give a model or a dataset", path, strerror(errno));
-	file = S_ISREG(st.st_mode) ? fopen(path, "re") : NULL;
-	if (!file)
-		cli_fail("%s: %s; give a model or a dataset", path,
-			 S_ISREG(st.st_mode) ? strerror(errno) : "is no regular file");
-	n = fread(head, 1, HEAD_MOST, file);
-	fclose(file);
-	head[n] = 0;
-	for (size_t i = 0; i < sizeof(kinds) / sizeof(*kinds); i++)
-		if (kinds[i].is(head, n))
-			return &kinds[i];
-	cli_fail("%s: is neither a model (.fis, .fx) nor a dataset (.csv)", path);
+	for (size_t i = 0; i < DRAWN; i++) {
+		all |= drawn[i].kind;
+		if (kind == drawn[i].kind)
+			return &drawn[i];
+	}
+	file_expect(path, all);
+	cli_fail("%s: %s; give " FILES, path,
+		 stat(path, &st) ? strerror(errno) : "is of no kind that is known");
 }
 
 /* --- the figure as a file or a window ---------------------------------------------------- */
@@ -152,22 +110,23 @@ static const char *window_form(void)
 static void parse(struct job *job, int argc, char **argv)
 {
 	cli_parse(&command, argc, argv, job);
-	job->figure.path = cli_operand(argc, argv, "file");
+	job->figure.path = cli_operand(argc, argv, "FILE", "model or dataset to draw");
 }
 
 int main(int argc, char **argv)
 {
 	struct job job = {0};
-	const struct kind *kind;
+	const struct drawn *kind;
 	const char *form;
 	FILE *script;
 
 	parse(&job, argc, argv);
 	form = job.output ? form_of(job.output) : NULL;
-	kind = kind_of(job.figure.path);
-	if (job.figure.data && !kind->data)
-		cli_usage("--data is for a model, and %s is %s", job.figure.path,
-			  kind->name);
+	kind = find_drawn(job.figure.path);
+	if (job.figure.data && !(kind->kind & MODELS))
+		cli_usage("--data is for a model, and %s is none", job.figure.path);
+	if (job.figure.data)
+		file_expect(job.figure.data, FILE_TABLE);
 	plot_require();
 	if (!form)
 		form = window_form();

@@ -152,12 +152,16 @@ shows() {
 	run --separate-stderr incise plot half.fis -o a.png
 	failed_with half.fis
 	head -c 100 /dev/urandom >noise
+	run --separate-stderr incise plot "$root/scenes/liver.scene" -o a.png
+	failed_with "liver.scene: this is a scene, not" "'incise plan "
+	run --separate-stderr incise plot m.fis --data m.fx -o a.png
+	failed_with "m.fx: this is a compiled model (.fx), not a CSV table"
 	for file in noise "$root/README.md" /dev/null .; do
 		run --separate-stderr incise plot "$file" -o a.png
 		failed_with "$file: "
 	done
 	run -2 --separate-stderr incise plot pairs.csv --data pairs.csv -o a.png
-	bad_usage "--data is for a model, and pairs.csv is a dataset"
+	bad_usage "--data is for a model, and pairs.csv is none"
 	[ ! -e a.png ]
 }
 
