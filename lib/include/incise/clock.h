@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Time. Every device, recording and loop takes its time from a clock, so that the same
- * code runs in real time and, on the virtual rig, in simulated time as fast as it goes.
+ * Clocks. Every device, recording and loop takes its time from a clock, so that the same code
+ * runs in real time and, on the simulated rig, in simulated time as fast as possible.
  *
  *   real:       now() = CLOCK_MONOTONIC        wait_until(t) sleeps
- *   simulated:  now() = what was waited for    wait_until(t) sets the time to t
+ *   simulated:  now() = end of the last wait   wait_until(t) sets the time to t
  *   paced:      the same                       wait_until(t) sleeps first
  */
 #ifndef INCISE_CLOCK_H
@@ -29,7 +29,7 @@ struct incise_clock;
 INCISE_API struct incise_clock *incise_clock_new_real(void);
 
 /**
- * A clock that stands still until someone waits for it.
+ * A clock that advances only when a program waits for it.
  *
  * @param start_ns the first value of incise_clock_now(), ns
  * @return clock, to be freed with incise_clock_free(); NULL with errno ENOMEM.
@@ -37,9 +37,9 @@ INCISE_API struct incise_clock *incise_clock_new_real(void);
 INCISE_API struct incise_clock *incise_clock_new_simulated(int64_t start_ns);
 
 /**
- * A simulated clock that waits as long as it says: time goes on by the very same steps, but
- * no faster than CLOCK_MONOTONIC from the first wait on. After a wait that took too long the
- * next ones are short until it has caught up.
+ * A simulated clock whose waits take real time: it advances by the same steps as a simulated
+ * clock, but no faster than CLOCK_MONOTONIC from the first wait on. After a wait that took too
+ * long, the next waits are shorter until the clock has caught up.
  *
  * @param start_ns as above
  * @return clock, to be freed with incise_clock_free(); NULL with errno ENOMEM.
@@ -56,16 +56,16 @@ INCISE_API int64_t incise_clock_now(const struct incise_clock *clock) INCISE_REA
 INCISE_API bool incise_clock_is_real(const struct incise_clock *clock) INCISE_REALTIME;
 
 /**
- * The time by which a paced clock was behind CLOCK_MONOTONIC when its last wait ended, ns; 0
- * for the others. Real-time safe.
+ * Delay of a paced clock behind CLOCK_MONOTONIC at the end of its last wait, ns; 0 for other
+ * clocks. Real-time safe.
  */
 INCISE_API int64_t incise_clock_lag_ns(const struct incise_clock *clock) INCISE_REALTIME;
 
 /**
- * Wait until an absolute time; a time that has passed returns at once.
+ * Wait until an absolute time; if it has passed, return at once.
  *
- * @return 0, or -EINTR when a signal handler ran. Makes one system call on a real or
- *         paced clock; a paced one that was interrupted has not gone on.
+ * @return 0, or -EINTR when a signal handler ran. Makes one system call on a real or paced
+ *         clock; an interrupted paced clock does not advance.
  */
 INCISE_API int incise_clock_wait_until(struct incise_clock *clock, int64_t t_ns);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * An error as a value: a code for programs and one line for people. The line is made
- * once, where the cause is known, and handed up unchanged.
+ * An error as a value: a code for programs and one line for people. The function that detects
+ * the cause writes the line; its callers pass it on unchanged.
  */
 #ifndef INCISE_ERROR_H
 #define INCISE_ERROR_H
@@ -11,42 +11,42 @@
 
 INCISE_BEGIN_DECLS
 
-/** An error that a person can act on. Set it to {0} before use. */
+/** An error with a line for people. Initialise it with {0}. */
 struct incise_error {
 	int code;	/**< positive errno, 0 for none */
 	char text[500]; /**< one line without a newline: what, where, what to do */
 };
 
 /**
- * Fill in an error and return its code as the callers of the library expect it.
+ * Fill in an error and return its code in the convention of the library.
  *
  * Control characters are replaced by '?', so that text from a file cannot break the line.
  *
- * @param err  where to leave the line, or NULL
+ * @param err  result, or NULL
  * @param code positive errno
- * @return -code; errno is set to code as well, for functions that return pointers.
+ * @return -code; errno is set to code, too, for functions that return pointers.
  */
 INCISE_API int incise_error_set(struct incise_error *err, int code, const char *fmt, ...)
 	INCISE_PRINTF(3, 4);
 
 /**
- * Fill in the error of a shared library or module that cannot be loaded, with the Debian
- * package of the library that is missing.
+ * Fill in the error of a shared library or module that cannot be loaded. The line names the
+ * Debian package of the missing library.
  *
- * @param where the object in front of the line
- * @param said  what dlerror(3) returned
+ * @param where start of the line: the object that is wrong
+ * @param said  result of dlerror(3)
  * @return -ENOEXEC
  */
 INCISE_API int incise_error_library(struct incise_error *err, const char *where,
 				    const char *said);
 
 /**
- * Find the name that a person meant who typed another one: the fewest letters left out, added,
- * replaced or swapped, at most a third of those typed, or one.
+ * Find the known name nearest to a misspelt one: by the smallest number of omitted, added,
+ * replaced or swapped letters, at most a third of the typed letters, or one.
  *
  * @param name  the name as typed
  * @param names the known names, which end with NULL
- * @return one of @names, or NULL if none is that near.
+ * @return one of @names, or NULL if none is near enough.
  */
 INCISE_API const char *incise_nearest_name(const char *name, const char *const *names);
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
- * The fuzzy model in integers, for the 1 kHz loop, a kernel or a microcontroller. A model is compiled to a blob with a certified bound of its
- * error; the blob is the file MODEL.fx, byte for byte. Evaluation uses 64-bit integers
- * only: no float, no libc, no allocation.
+ * The fuzzy model in integers, for the 1 kHz loop, a kernel or a microcontroller. A model is
+ * compiled to a blob with a certified error bound; the file MODEL.fx contains the blob byte
+ * for byte. Evaluation uses 64-bit integers only: no floating point, no libc, no allocation.
  *
  *   model ─▶ incise_fixed_compile() ─▶ blob ─▶ incise_fixed_open() ─▶ incise_fixed_eval()
  *                                       │ ▲
@@ -25,13 +25,13 @@
 
 INCISE_BEGIN_DECLS
 
-/** Inputs of a compiled model. */
+/** Largest number of inputs of a compiled model. */
 #define INCISE_FIXED_INPUTS_MAX 2
-/** Membership functions of one input. */
+/** Largest number of membership functions of one input. */
 #define INCISE_FIXED_MFS_MAX 32
-/** Rules. */
+/** Largest number of rules. */
 #define INCISE_FIXED_RULES_MAX 256
-#define INCISE_FIXED_SIZE_MAX (1 << 22) /**< bytes of a blob */
+#define INCISE_FIXED_SIZE_MAX (1 << 22) /**< largest size of a blob, bytes */
 
 #define INCISE_FIXED_ONE (1 << 16) /**< 1.0 as input or output */
 
@@ -48,30 +48,31 @@ struct incise_fixed_input {
 	int32_t min, max;      /**< support, Q16.16 */
 	int32_t n_mfs;	       /**< membership functions */
 	int32_t cell_shift;    /**< tables: a cell is 2^cell_shift LSB wide */
-	int32_t cells;	       /**< tables: cells; there is one more knot */
+	int32_t cells;	       /**< tables: number of cells; there is one more knot */
 	const int32_t *values; /**< into the blob, little-endian */
 };
 
 /**
- * A view of a validated blob. Its fields may be read; they are set by incise_fixed_open()
- * and the functions that call it, and by nobody else.
+ * A view of a validated blob. Programs may read its fields; only incise_fixed_open() and the
+ * functions that call it set them.
  */
 struct incise_fixed {
 	enum incise_fixed_arithmetic arithmetic;
 	int32_t n_inputs;
 	int32_t n_rules;
-	int32_t shift_a, shift_b; /**< formats, see lib/fixed/layout.h */
-	uint64_t bound;		  /**< certified error, 2^-32 of the output's unit */
+	int32_t shift_a, shift_b; /**< number formats, see lib/fixed/layout.h */
+	uint64_t bound; /**< certified error bound, 2^-32 of the output's unit */
 	struct incise_fixed_input input[INCISE_FIXED_INPUTS_MAX];
-	const char *name, *output; /**< of the model and its output, into the blob */
-	const void *data;	   /**< into the blob: consequents or table */
+	const char *name,
+		*output;  /**< names of the model and its output, into the blob */
+	const void *data; /**< into the blob: consequents or table */
 	const void *blob;
-	uint32_t size; /**< of the blob, bytes */
+	uint32_t size; /**< size of the blob, bytes */
 };
 
 /**
- * Validate a blob in full and make a view of it: magic, version, checksum, sizes, and
- * that no input whatever can make the evaluation read outside of it or overflow. For
+ * Validate a blob completely and make a view of it. Checked are magic, version, checksum,
+ * sizes, and that no input can make an evaluation overflow or read outside of the blob. For
  * blobs from files, and for kernels.
  *
  * @param fx   result
@@ -94,29 +95,32 @@ INCISE_API int32_t incise_fixed_eval(const struct incise_fixed *fx,
 #ifndef __KERNEL__
 struct incise_model;
 
-/** The form to compile to. */
+/** Options of a compilation. */
 struct incise_fixed_options {
-	/** Largest error, output's unit: the cheapest arithmetic within it is taken; 0: none. */
+	/**
+	 * Largest error, output's unit: the cheapest arithmetic within it is selected; 0: no
+	 * limit.
+	 */
 	double budget;
-	int arithmetic; /**< enum incise_fixed_arithmetic to insist on one, or -1 */
-	int cells;	/**< least number of cells per input of tables, or 0 */
+	int arithmetic; /**< a required enum incise_fixed_arithmetic, or -1 */
+	int cells;	/**< smallest number of cells per input of tables, or 0 */
 };
 
-/** Budget 1e-4 (0.1 mN), any arithmetic, any number of cells. */
+/** Set the defaults: budget 1e-4 (0.1 mN), any arithmetic, any number of cells. */
 INCISE_API void incise_fixed_options_init(struct incise_fixed_options *options);
 
 /**
  * Compile a model to fixed point and certify its error.
  *
- * The bound holds for every real input within the support, its rounding to Q16.16
- * included: interval arithmetic over the whole support, not a sample.
+ * The bound is valid for every real input in the support and includes its rounding to Q16.16.
+ * It comes from interval arithmetic over the whole support, not from samples.
  *
- * @param model  full grid of Gaussians over one or two inputs; others are refused by name
+ * @param model  full grid of Gaussians over one or two inputs; others are rejected by name
  * @param options or NULL for the defaults
- * @return compiled model, to be freed with incise_fixed_free(); NULL with errno ENOTSUP
- *         (a kind or shape without a fixed form), E2BIG, ERANGE (support, width or
- *         consequent that no format holds, or a budget that no arithmetic holds; the
- *         message says which), EINVAL, ENOMEM.
+ * @return compiled model, to be freed with incise_fixed_free(); NULL with errno ENOTSUP (a
+ *         kind or shape without a fixed-point form), E2BIG, ERANGE (a support, width or
+ *         consequent outside of all number formats, or a budget below the error of every
+ *         arithmetic; the message names it), EINVAL, ENOMEM.
  */
 INCISE_API struct incise_fixed *incise_fixed_compile(
 	const struct incise_model *model, const struct incise_fixed_options *options,
@@ -131,25 +135,25 @@ INCISE_API struct incise_fixed *incise_fixed_compile(
 INCISE_API struct incise_fixed *incise_fixed_load(const char *path,
 						  struct incise_error *err);
 
-/** Write a MODEL.fx, whole or not at all. @return 0 or as incise_outfile_commit(). */
+/** Write a MODEL.fx, completely or not at all. @return 0 or as incise_outfile_commit(). */
 INCISE_API int incise_fixed_save(const struct incise_fixed *fx, const char *path,
 				 struct incise_error *err);
 
 /**
- * Write a compiled model as a C99 file of its own for a microcontroller: constant tables
- * and `int32_t SYMBOL_eval(const int32_t *x)`, which gives what incise_fixed_eval() does,
- * to the bit. It includes nothing but stdint.h.
+ * Write a compiled model as a C99 file for a microcontroller: constant tables and `int32_t
+ * SYMBOL_eval(const int32_t *x)`, which is bit-exact with incise_fixed_eval(). The file
+ * includes only stdint.h.
  *
- * @param symbol begin of the function's name: letters, digits, '_', no digit first
+ * @param symbol prefix of the function's name: letters, digits, '_', no digit first
  * @return 0, -EINVAL (@symbol), or as incise_outfile_open() and incise_outfile_commit().
  */
 INCISE_API int incise_fixed_write_c(const struct incise_fixed *fx, const char *path,
 				    const char *symbol, struct incise_error *err);
 
-/** Free what incise_fixed_compile() or incise_fixed_load() made. */
+/** Free a model of incise_fixed_compile() or incise_fixed_load(); NULL is accepted. */
 INCISE_API void incise_fixed_free(struct incise_fixed *fx);
 
-/** The certified bound of the error, output's unit. */
+/** The certified error bound, output's unit. */
 INCISE_API double incise_fixed_bound(const struct incise_fixed *fx);
 
 /** "direct", "table" or "force". */
@@ -157,11 +161,11 @@ INCISE_API const char *incise_fixed_arithmetic_name(
 	enum incise_fixed_arithmetic arithmetic);
 
 /**
- * Evaluate many times: y[k] = incise_fixed_eval(fx, x + k·n_inputs), to the bit, and some
- * times as fast where the processor has AVX2 (all but the direct arithmetic).
+ * Evaluate many times: y[k] = incise_fixed_eval(fx, x + k·n_inputs), bit-exact, and several
+ * times as fast on a processor with AVX2 (except the direct arithmetic).
  *
- * @param x n × n_inputs values, Q16.16, one evaluation's inputs side by side
- * @param y n outputs, Q16.16; apart from @x
+ * @param x n × n_inputs values, Q16.16, the inputs of one evaluation next to each other
+ * @param y n outputs, Q16.16; must not overlap @x
  * @param n may be 0. Real-time safe.
  */
 INCISE_API void incise_fixed_eval_batch(const struct incise_fixed *fx, const int32_t *x,

@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The Takagi–Sugeno fuzzy model of paper 1, eq. (1)–(3), in double precision, and its
- * file, MATLAB's .fis.
+ * The Takagi–Sugeno fuzzy model of Song et al. (2006), eq. (1)–(3), in double precision, and
+ * its file, MATLAB's .fis.
  *
  *   rule r:  if x1 is A(1,r) and x2 is A(2,r) then  y = p(r,0) + p(r,1) x1 + p(r,2) x2
  *   output:  Σ w(r) y(r) / Σ w(r),  w(r) = weight(r) · Π A(i,r)(x(i))
  *
- * With the AND method min the least degree takes the place of their product. A rule may
- * leave inputs out, and rules may be any list, not only the full grid.
+ * With the AND method min the smallest membership grade replaces the product. A rule may
+ * exclude inputs, and the rules need not form the full grid.
  *
- * A cutting model has the inputs depth_mm and velocity_mm_s and the output force_N, but
- * nothing here depends on that: units are those of the data it was trained on.
+ * A cutting model has the inputs depth_mm and velocity_mm_s and the output force_N. This
+ * interface does not depend on that: units are those of the training data.
  *
- * The paper writes the Gaussian as exp(-(x-m)²/σ²). Files, and this interface, hold
- * MATLAB's form exp(-(x-c)²/(2 s²)): s = σ/√2.
+ * Song et al. write the Gaussian as exp(-(x-m)²/σ²). Files and this interface use MATLAB's
+ * form exp(-(x-c)²/(2 s²)): s = σ/√2.
  */
 #ifndef INCISE_MODEL_H
 #define INCISE_MODEL_H
@@ -26,17 +26,18 @@
 
 INCISE_BEGIN_DECLS
 
-/** Inputs of a model. */
+/** Largest number of inputs of a model. */
 #define INCISE_MODEL_INPUTS_MAX 8
-#define INCISE_MODEL_MFS_MAX 32 /**< membership functions of one input */
-/** Rules of a model. */
+#define INCISE_MODEL_MFS_MAX \
+	32 /**< largest number of membership functions of one input */
+/** Largest number of rules of a model. */
 #define INCISE_MODEL_RULES_MAX 256
-#define INCISE_MODEL_NAME_MAX 64 /**< bytes, the final NUL included */
+#define INCISE_MODEL_NAME_MAX 64 /**< bytes, including the final NUL */
 
 /**
- * Kinds of membership functions; the name in a .fis file stands behind each. All
- * parameters are finite. Edges may be upright (trimf with a = b or b = c, trapmf with
- * a = b or c = d): the degree is 1 on such an edge.
+ * Kinds of membership functions, each with its name in a .fis file. All parameters are finite.
+ * Edges may be vertical (trimf with a = b or b = c, trapmf with a = b or c = d): the
+ * membership grade is 1 on such an edge.
  */
 enum incise_mf_type {
 	INCISE_MF_GAUSS, /**< gaussmf [s c]: exp(-(x-c)²/(2 s²)), s > 0 */
@@ -48,17 +49,17 @@ enum incise_mf_type {
 	INCISE_MF_GAUSS2,
 	INCISE_MF_TRI, /**< trimf [a b c]: feet a and c, peak b; a ≤ b ≤ c */
 	/**
-	 * trapmf [a b c d]: the lesser of a rise from a to b and a fall from c to d; a ≤ b,
-	 * c ≤ d, a ≤ d. With b > c the slopes cross below 1; then a < d.
+	 * trapmf [a b c d]: the smaller of a rise from a to b and a fall from c to d; a ≤ b, c
+	 * ≤ d, a ≤ d. With b > c the slopes cross below 1; then a < d.
 	 */
 	INCISE_MF_TRAP,
 	INCISE_MF_SIG, /**< sigmf [a c]: 1/(1 + exp(-a(x-c))); a may be negative or 0 */
 };
 
-/** The operation that makes a rule's firing strength of its inputs' degrees. */
+/** The operation that combines the membership grades of a rule into its firing strength. */
 enum incise_and_method {
-	INCISE_AND_PROD, /**< their product */
-	INCISE_AND_MIN,	 /**< the least of them */
+	INCISE_AND_PROD, /**< product of the grades */
+	INCISE_AND_MIN,	 /**< smallest grade */
 };
 
 /** One membership function. Parameters in the order of MATLAB's file. */
@@ -74,12 +75,12 @@ struct incise_variable {
 	double min, max; /**< support; min < max, both finite */
 };
 
-/** A model but for its membership functions and rules. */
+/** A model without its membership functions and rules. */
 struct incise_model_info {
 	char name[INCISE_MODEL_NAME_MAX]; /**< in the .fis file */
 	int n_inputs;			  /**< 1 … INCISE_MODEL_INPUTS_MAX */
 	int n_rules;
-	enum incise_and_method and_method; /**< joins the degrees of a rule */
+	enum incise_and_method and_method; /**< combines the grades of a rule */
 	struct incise_variable input[INCISE_MODEL_INPUTS_MAX], output;
 	int n_mfs[INCISE_MODEL_INPUTS_MAX]; /**< membership functions of each input */
 };
@@ -87,15 +88,16 @@ struct incise_model_info {
 /** One rule; its output is p[0] + p[1] x1 + … */
 struct incise_rule {
 	int8_t mf[INCISE_MODEL_INPUTS_MAX]; /**< function of each input; -1: none */
-	double weight; /**< 0 … 1; one of weight 0 never fires, and at least one is not */
+	/** 0 … 1; a rule of weight 0 never fires, and at least one weight is larger. */
+	double weight;
 	double p[INCISE_MODEL_INPUTS_MAX + 1];
 };
 
 /** Flags of an evaluation. */
 enum incise_model_flag {
 	/**
-	 * An input lay outside its range, or was NaN; or no rule fires there (all firing
-	 * strengths are 0, or too small for a double) and the nearest ones answered.
+	 * An input was outside its range or NaN; or no rule fires there (all firing strengths
+	 * are 0, or too small for a double) and the nearest rules gave the output.
 	 */
 	INCISE_MODEL_EXTRAPOLATED = 1,
 };
@@ -110,7 +112,7 @@ struct incise_model;
  * @param n_inputs  1 … INCISE_MODEL_INPUTS_MAX
  * @param inputs    n_inputs names and ranges
  * @param n_mfs     n_inputs counts, each 1 … INCISE_MODEL_MFS_MAX
- * @param type      kind of all functions; not INCISE_MF_SIG, which has two sides only
+ * @param type      kind of all functions; not INCISE_MF_SIG, which is not a peak
  * @param output    name and range of the output
  * @return model, to be freed with incise_model_free(); NULL with errno EINVAL (a range,
  *         a count, the kind), E2BIG (more than INCISE_MODEL_RULES_MAX rules), ENOMEM.
@@ -124,27 +126,28 @@ INCISE_API struct incise_model *incise_model_new_grid(
  * Read a .fis file: Sugeno, first or zero order, all kinds of incise_mf_type, prod or min,
  * wtaver, rule weights.
  *
- * The content is not trusted: every number is checked, and an error names file and line.
+ * Every number is validated, and an error names file and line.
  *
  * @param path file, or "-" for standard input
- * @return model; NULL with errno of incise_infile_open() or incise_infile_line(), EINVAL
- *         (malformed), ENOTSUP (Mamdani, an unknown membership function or method, 'or' and 'not' in a rule), E2BIG, ENOMEM.
+ * @return model, to be freed with incise_model_free(); NULL with errno of incise_infile_open()
+ *         or incise_infile_line(), EINVAL (malformed), ENOTSUP (Mamdani, an unknown membership
+ *         function or method, 'or' and 'not' in a rule), E2BIG, ENOMEM.
  */
 INCISE_API struct incise_model *incise_model_load(const char *path,
 						  struct incise_error *err);
 
 /**
- * Write a .fis file with 17 significant digits; whole or not at all.
+ * Write a .fis file with 17 significant digits, completely or not at all.
  *
  * @return 0, or a negative errno of incise_outfile_open() and incise_outfile_commit().
  */
 INCISE_API int incise_model_save(const struct incise_model *model, const char *path,
 				 struct incise_error *err);
 
-/** @return a model of its own; NULL with errno ENOMEM. */
+/** @return a copy, to be freed with incise_model_free(); NULL with errno ENOMEM. */
 INCISE_API struct incise_model *incise_model_copy(const struct incise_model *model);
 
-/** Make @to equal to @from, without an allocation. */
+/** Copy @from to @to without an allocation. */
 INCISE_API void incise_model_assign(struct incise_model *to,
 				    const struct incise_model *from);
 /** NULL is accepted. */
@@ -161,8 +164,8 @@ INCISE_API const struct incise_mf *incise_model_mf(const struct incise_model *mo
 /**
  * Replace the parameters of a membership function; kind and name stay.
  *
- * @param p as many as incise_mf_n_params() says
- * @return 0, or -EINVAL if they do not make such a function; see incise_mf_type.
+ * @param p incise_mf_n_params() values
+ * @return 0, or -EINVAL if they are out of range; see incise_mf_type.
  */
 INCISE_API int incise_model_set_mf(struct incise_model *model, int input, int mf,
 				   const double p[4]);
@@ -175,60 +178,60 @@ INCISE_API const struct incise_rule *incise_model_rule(const struct incise_model
  * Replace a consequent.
  *
  * @param p n_inputs+1 coefficients, the constant first
- * @return 0, or -EINVAL when one is not finite.
+ * @return 0, or -EINVAL if one is not finite.
  */
 INCISE_API int incise_model_set_consequent(struct incise_model *model, int rule,
 					   const double *p);
 
 /**
- * Take inputs outside their range as its nearest end (default on). Off, the consequents
- * extrapolate linearly.
+ * Clamp inputs to their range (default on). If off, the consequents extrapolate linearly.
  */
 INCISE_API void incise_model_set_clamp(struct incise_model *model, bool clamp);
 
-/** Degree of membership in [0, 1]; of NaN it is 0. Real-time safe. */
+/** Membership grade in [0, 1]; 0 for NaN. Real-time safe. */
 INCISE_API double incise_mf_eval(const struct incise_mf *mf, double x);
 
 /** Number of parameters in incise_mf.p that a kind uses: 2 to 4. */
 INCISE_API int incise_mf_n_params(enum incise_mf_type type);
 
-/** Name of a kind as .fis files spell it, e.g. "gaussmf". */
+/** Name of a kind in .fis files, for example "gaussmf". */
 INCISE_API const char *incise_mf_type_name(enum incise_mf_type type);
 
 /**
- * Evaluate eq. (3). Firing strengths are normalised in the log domain: where all of them
- * underflow, the rule with the largest one takes over as if it did not.
+ * Evaluate eq. (3). Firing strengths are normalised in the log domain, so that the rule with
+ * the largest one decides even if all of them underflow.
  *
- * A strength can also be exactly 0, outside a triangle or trapezoid. Any rule that is not
- * goes before all that are. Where all are, the nearest answers: the one with the least
- * distance to the feet, in widths (foot to foot), added over the inputs (with min: the
- * largest over the inputs). Rules that are equally near share the answer by the degrees
- * of their other inputs.
+ * Outside a triangle or trapezoid a strength is exactly 0, and any rule with a larger strength
+ * takes precedence. If all strengths are 0, the nearest rule gives the output: the one with
+ * the smallest distance to the feet, in widths (foot to foot), summed over the inputs (with
+ * min: the largest over the inputs). Equally near rules share the output by the grades of
+ * their other inputs.
  *
  * A NaN input counts as the middle of its range.
  *
  * @param x     n_inputs values
- * @param flags where to leave incise_model_flag bits, or NULL
+ * @param flags set to incise_model_flag bits, or NULL
  * @return finite output. Real-time safe.
  */
 INCISE_API double incise_model_eval(const struct incise_model *model, const double *x,
 				    unsigned int *flags) INCISE_REALTIME;
 
 /**
- * Evaluate many points, each as incise_model_eval() does, to the bit, with the gradient.
+ * Evaluate many points, each bit-exact with incise_model_eval(), with the gradient.
  *
- * @param x        n × n_inputs values, the inputs of one point side by side
+ * @param x        n × n_inputs values, the inputs of one point next to each other
  * @param n        may be 0
  * @param y        n outputs
- * @param gradient n × n_inputs slopes ∂y/∂x, output's unit per input's; or NULL. By an input that
- *                 is clamped, or NaN, it is 0; at a kink, one-sided or 0. Finite. Real-time safe.
+ * @param gradient n × n_inputs slopes ∂y/∂x, output's unit per input's; or NULL. For a clamped
+ *                 or NaN input the slope is 0; at a kink it is one-sided or 0. Finite.
+ *                 Real-time safe.
  */
 INCISE_API void incise_model_eval_many(const struct incise_model *model, const double *x,
 				       size_t n, double *y, double *gradient);
 
 /**
- * Normalised firing strengths w(r)/Σw of all rules, as incise_model_eval() weighs them;
- * they add up to 1. Inputs are not clamped to their ranges.
+ * Normalised firing strengths w(r)/Σw of all rules, as in incise_model_eval(); their sum is 1.
+ * Inputs are not clamped to their ranges.
  *
  * @param x n_inputs values; NaN counts as the middle of the range
  * @param w n_rules results

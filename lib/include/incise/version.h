@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The version of the library. The Makefile reads the number from here, so that it
- * stands in one place.
+ * The version of the library. The Makefile reads the number from here.
  */
 #ifndef INCISE_VERSION_H
 #define INCISE_VERSION_H
