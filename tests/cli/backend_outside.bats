@@ -31,7 +31,7 @@ setup() {
 	[ "$(grep -c '^incise' commands)" -eq 3 ]
 	run -0 --separate-stderr bash -e commands
 	[[ "$output" == *"tracker = \"lines:poses:100\";"* ]]
-	[[ "$output" == *"it says that one was lost"* ]]
+	[[ "$output" == *"capture reported a lost sample"* ]]
 	# the loop's last line is 44 mm deep
 	sqlite3 -readonly lines.rec/recording.db >rows \
 		'SELECT count(*), max(seq), min(z_mm), max(z_mm), sum(x_mm = seq) FROM tracker'
