@@ -569,6 +569,33 @@ int incise_plan_tick(struct incise_plan *plan, int64_t t_ns, struct incise_tick 
 	return run_stages(plan, t_ns, tick, NULL);
 }
 
+int64_t incise_plan_run(struct incise_plan *plan,
+			const struct incise_tracker_sample *poses, size_t n,
+			int64_t start_ns, int64_t period_ns, struct incise_tick *ticks,
+			size_t n_ticks)
+{
+	size_t next = 0;
+
+	if (plan->tracker || period_ns <= 0)
+		return -EINVAL;
+	for (size_t i = 1; i < n; i++)
+		if (poses[i].t_ns < poses[i - 1].t_ns)
+			return -EINVAL;
+	for (size_t k = 0; k < n_ticks; k++) {
+		int64_t t_ns = start_ns + (int64_t)k * period_ns;
+		size_t first = next;
+
+		while (next < n && poses[next].t_ns <= t_ns)
+			next++;
+		if (next - first > INCISE_PLAN_POSES)
+			first = next - INCISE_PLAN_POSES;
+		incise_plan_feed(plan, poses + first, (int)(next - first));
+		if (incise_plan_tick(plan, t_ns, &ticks[k]))
+			return (int64_t)k + 1;
+	}
+	return (int64_t)n_ticks;
+}
+
 int incise_plan_tick_timed(struct incise_plan *plan, int64_t t_ns,
 			   struct incise_tick *tick, int64_t *stage_ns)
 {

@@ -276,7 +276,24 @@ INCISE_API int incise_plan_tick(struct incise_plan *plan, int64_t t_ns,
 				struct incise_tick *tick) INCISE_REALTIME;
 
 /**
- * The same, with how long each stage took, by CLOCK_MONOTONIC and with its cost.
+ * Run a plan without a rig over poses: tick k is at start_ns + k·period_ns, and is fed the poses that
+ * have arrived since the one before; where these are more than 32, the newest.
+ *
+ * @param poses     n of them, in order of t_ns, the arrival
+ * @param start_ns  not before the plan's last tick
+ * @param period_ns above 0
+ * @param ticks     n_ticks results
+ * @return number of ticks; fewer than n_ticks when one of them failed, which is the last result;
+ *         -EINVAL (the plan has a rig, a period, poses out of order). Real-time safe.
+ */
+INCISE_API int64_t incise_plan_run(struct incise_plan *plan,
+				   const struct incise_tracker_sample *poses, size_t n,
+				   int64_t start_ns, int64_t period_ns,
+				   struct incise_tick *ticks, size_t n_ticks);
+
+/**
+ * One tick as incise_plan_tick(), with how long each stage took, by CLOCK_MONOTONIC and with its
+ * cost.
  *
  * @param stage_ns array of INCISE_PLAN_STAGES_MAX; 0 for what did not run
  */

@@ -406,6 +406,56 @@ static void test_feed(void **state)
 	felt_end(&f);
 }
 
+/* A whole stroke in one call is the same, to the bit, as feeding and ticking one by one. */
+static void test_run_is_feed_and_tick(void **state)
+{
+	enum { POSES = 240, TICKS = 2000 };
+	struct fed fed = fed_start("scenes/neck.scene", true);
+	struct fed run = fed_start("scenes/neck.scene", true);
+	struct incise_tracker_sample poses[POSES];
+	struct incise_tick *ticks = calloc(TICKS, sizeof(*ticks)), one = {0};
+	int in_contact = 0;
+	size_t next = 0;
+	struct felt f;
+
+	for (int i = 0; i < POSES; i++)
+		poses[i] = (struct incise_tracker_sample){
+			.t_ns = 1000000000 + i * (int64_t)FED_PERIOD_NS,
+			.position_mm = {60, 0, 4 - 8 * sin(i * 0.02)},
+			.quaternion = {1},
+		};
+	assert_int_equal(incise_plan_run(run.plan, poses, POSES, 1000000000, 1000000,
+					 ticks, TICKS),
+			 TICKS);
+	for (int k = 0; k < TICKS; k++) {
+		int64_t t_ns = 1000000000 + k * INT64_C(1000000);
+
+		for (; next < POSES && poses[next].t_ns <= t_ns; next++)
+			incise_plan_feed(fed.plan, &poses[next], 1);
+		memset(&one, 0, sizeof(one));
+		incise_plan_tick(fed.plan, t_ns, &one);
+		assert_memory_equal(&one, &ticks[k], sizeof(one));
+		in_contact += (one.flags & INCISE_TICK_CONTACT) != 0;
+	}
+	assert_true(in_contact > 100 && in_contact < TICKS);
+	/* a tick of more than 32 poses has the newest of them */
+	assert_int_equal(incise_plan_run(run.plan, poses, POSES, 3000000000, 1000000,
+					 ticks, 1),
+			 1);
+	assert_true(fabs(ticks[0].position_mm[2] - poses[POSES - 1].position_mm[2]) < 1);
+	assert_int_equal(incise_plan_run(run.plan, poses, 2, 4000000000, 0, ticks, 1),
+			 -EINVAL);
+	poses[1].t_ns = 0;
+	assert_int_equal(incise_plan_run(run.plan, poses, 2, 4000000000, 1, ticks, 1),
+			 -EINVAL);
+	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+	assert_int_equal(incise_plan_run(f.plan, NULL, 0, 0, 1, ticks, 1), -EINVAL);
+	felt_end(&f);
+	free(ticks);
+	fed_end(&run);
+	fed_end(&fed);
+}
+
 /* The scalpel's attitude is reported with each tick, whichever end of it is held. */
 static void test_attitude(void **state)
 {
@@ -815,6 +865,7 @@ int main(void)
 		cmocka_unit_test(test_stalled_tracker_fades_out),
 		cmocka_unit_test(test_fault_is_zero_force_for_good),
 		cmocka_unit_test(test_feed),
+		cmocka_unit_test(test_run_is_feed_and_tick),
 		cmocka_unit_test(test_attitude),
 		cmocka_unit_test(test_feed_from_the_future),
 		cmocka_unit_test(test_set_tool),
