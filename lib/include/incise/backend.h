@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Backends of devices: a table of functions per backend and kind. A backend embeds the
- * struct of its kind as its first member. Only for writing a backend
- * (doc/device-backend.md has a whole one); to use devices, the header of their kind is
- * enough.
+ * Backends of devices: a table of functions per backend and kind. A backend embeds the struct
+ * of its kind as its first member. Use this header only to write a backend
+ * (doc/device-backend.md has a complete one); to use devices, include the header of their
+ * kind.
  *
  * Rules for every table:
  *
- *  - read() takes samples that have arrived and never waits: 0 is "nothing yet", an errno the
- *    end. A backend that has to wait for its device does so in its own thread.
+ *  - read() takes samples that have arrived and never waits: 0 means "nothing yet", an errno
+ *    ends the stream. A backend that must wait for its device does so in its own thread.
  *  - All functions are called by one thread at a time, between open and close.
- *  - close() frees all that open() made, also the struct. It is called once.
+ *  - close() frees everything that open() allocated, including the struct. It is called once.
  */
 #ifndef INCISE_BACKEND_H
 #define INCISE_BACKEND_H
@@ -38,7 +38,7 @@ struct incise_tracker_ops {
 		     struct incise_tracker_info *info);
 	uint64_t (*lost)(const struct incise_tracker *tracker);
 	void (*close)(struct incise_tracker *tracker);
-	/** Cause of an error of read(); may be NULL. */
+	/** Cause of a read error; may be NULL. */
 	int (*cause)(struct incise_tracker *tracker, char *text, size_t size);
 };
 
@@ -55,7 +55,7 @@ struct incise_force_ops {
 	void (*info)(const struct incise_force *force, struct incise_force_info *info);
 	uint64_t (*lost)(const struct incise_force *force);
 	void (*close)(struct incise_force *force);
-	/** Cause of an error of read(); may be NULL. */
+	/** Cause of a read error; may be NULL. */
 	int (*cause)(struct incise_force *force, char *text, size_t size);
 };
 
@@ -71,7 +71,7 @@ struct incise_camera_ops {
 	void (*info)(const struct incise_camera *camera, struct incise_camera_info *info);
 	uint64_t (*lost)(const struct incise_camera *camera);
 	void (*close)(struct incise_camera *camera);
-	/** Cause of an error of read(); may be NULL. */
+	/** Cause of a read error; may be NULL. */
 	int (*cause)(struct incise_camera *camera, char *text, size_t size);
 };
 
@@ -82,20 +82,20 @@ struct incise_camera {
 
 /** Edge of the home input, or of the limit at 0, in the count of position_mm. */
 struct incise_stepper_edge {
-	bool seen;	    /**< since it was enabled */
-	double position_mm; /**< at the last one */
+	bool seen;	    /**< found since it was enabled */
+	double position_mm; /**< position of the last edge */
 };
 
 /** Parameters of homing. */
 struct incise_stepper_homing {
-	double speed_mm_s;    /**< of the approach; a tenth of it for the edge */
+	double speed_mm_s;    /**< speed of the approach; a tenth of it for the edge */
 	double home_mm;	      /**< position of the edge in the machine */
 	unsigned int home_at; /**< INCISE_STEPPER_LINE_HOME, or _AT_MIN without one */
 };
 
 /** Functions of a stepper whose controller runs plans; see incise/stepper_plan.h. */
 struct incise_stepper_plan_ops {
-	/** Of steppers of this backend, n ≥ 1. */
+	/** n ≥ 1 steppers of this backend. */
 	int (*load)(struct incise_stepper *const *steppers, int n, const void *bytes,
 		    size_t size, struct incise_error *err);
 	int (*follow)(struct incise_stepper *stepper) INCISE_REALTIME;
@@ -106,8 +106,8 @@ struct incise_stepper_plan_ops {
 };
 
 /**
- * Functions of a stepper. A function that is NULL gives -EOPNOTSUPP. All but set, jog and
- * status may block.
+ * Functions of a stepper. NULL stands for a function that returns -EOPNOTSUPP. All except set,
+ * jog and status may block.
  */
 struct incise_stepper_ops {
 	/** See the functions of incise/stepper.h; @err may be NULL. */
@@ -127,22 +127,22 @@ struct incise_stepper_ops {
 	int (*counter)(struct incise_stepper *stepper, int i,
 		       struct incise_stepper_counter *counter);
 
-	/** A drive that homes by itself; else the parts below. */
+	/** For a drive that homes itself; others have the parts below. */
 	int (*home)(struct incise_stepper *stepper, const volatile int *stop,
 		    struct incise_stepper_edge_found *edge, struct incise_error *err);
 
-	/* The parts that incise_stepper_home() is made of. */
+	/* The parts of incise_stepper_home(). */
 
 	/** 0; -EOPNOTSUPP: neither input is wired. */
 	int (*homing)(struct incise_stepper *stepper,
 		      struct incise_stepper_homing *homing);
 	int (*edge)(struct incise_stepper *stepper, struct incise_stepper_edge *edge);
-	/** Define its position at rest. 0, -EBUSY (it moves), -EIO. */
+	/** Set its position count while at rest. 0, -EBUSY (it moves), -EIO. */
 	int (*origin)(struct incise_stepper *stepper, double position_mm, bool homed);
-	/** Wait; 0, or -EINTR. NULL: by the clock of the computer. */
+	/** Wait; 0 or -EINTR. NULL: wait by the clock of the computer. */
 	int (*wait)(struct incise_stepper *stepper, int64_t ns);
 
-	const struct incise_stepper_plan_ops *plan; /**< NULL: it runs none */
+	const struct incise_stepper_plan_ops *plan; /**< NULL: it runs no plans */
 };
 
 /** A stepper: the first member of its backend's struct. */
@@ -150,12 +150,12 @@ struct incise_stepper {
 	const struct incise_stepper_ops *ops;
 };
 
-/** Vision is no device, but comes in a module like one. */
+/** Vision is not a device, but a module like one. */
 struct incise_vision_ops {
 	int (*measure)(struct incise_vision *vision,
 		       const struct incise_camera_frame *frame,
 		       struct incise_vision_result *result);
-	/** Of an object with an empty setup. */
+	/** The object has an empty setup. */
 	int (*learn)(struct incise_vision *vision,
 		     const struct incise_camera_frame *frame,
 		     const struct incise_vision_box *box,
@@ -170,7 +170,7 @@ struct incise_vision {
 
 struct incise_board;
 
-/** Detection of boards, see incise/board.h, likewise; it needs nothing of the request. */
+/** Detection of boards, see incise/board.h, in the same way; it ignores the request. */
 struct incise_board_ops {
 	int (*find)(struct incise_board *board, const struct incise_camera_frame *frame,
 		    int columns, int rows, double *corners, struct incise_error *err);
@@ -193,27 +193,27 @@ enum incise_actuator_line {
 	INCISE_LINE_ESTOP,
 	INCISE_LINE_ALARM,
 };
-#define INCISE_LINES 8	   /**< how many there are */
-#define INCISE_LINES_OUT 3 /**< how many of them are outputs */
+#define INCISE_LINES 8	   /**< number of lines */
+#define INCISE_LINES_OUT 3 /**< number of outputs */
 
 /** Cyclic modes of CiA 402. */
 enum incise_actuator_mode {
 	INCISE_ACTUATOR_CSP, /**< positions; the drive closes all loops */
-	INCISE_ACTUATOR_CSV, /**< velocities; the position loop is closed here */
-	INCISE_ACTUATOR_CST, /**< torques; position and velocity loops are closed here */
+	INCISE_ACTUATOR_CSV, /**< velocities; the backend closes the position loop */
+	INCISE_ACTUATOR_CST, /**< torques; the backend closes both loops */
 };
 
-/** A drive on a CAN bus: the group `can`. A unit of 0: as the drive reports it. */
+/** A drive on a CAN bus: the group `can`. Units that are 0 come from the drive. */
 struct incise_actuator_can {
 	enum incise_actuator_mode mode;
 	uint32_t bitrate;		  /**< 0: that of the interface */
 	uint32_t cycle_ns;		  /**< between SYNCs */
 	double counts_per_turn;		  /**< position units per turn of the screw */
-	double velocity_per_turn_s;	  /**< velocity units of a turn/s: 60 for rpm */
-	double acceleration_per_turn_s2;  /**< acceleration units of a turn/s² */
-	double following_mm, following_s; /**< off its target by that, for so long */
-	int homing_method;		  /**< CiA 402's number; 0: it cannot home */
-	bool absolute;		      /**< its count is the machine's from power-on on */
+	double velocity_per_turn_s;	  /**< velocity units per turn/s: 60 for rpm */
+	double acceleration_per_turn_s2;  /**< acceleration units per turn/s² */
+	double following_mm, following_s; /**< largest following error, longest time */
+	int homing_method;		  /**< number in CiA 402; 0: it cannot home */
+	bool absolute;		      /**< the encoder keeps its count without power */
 	double position_gain_1_s;     /**< csv: mm/s per mm */
 	double stiffness_permille_mm; /**< cst: ‰ of the rated torque */
 	double damping_permille_s_mm;
@@ -224,64 +224,66 @@ struct incise_actuator_can {
 /** The group `actuator` of rig.conf. */
 struct incise_actuator {
 	double spring_N_mm, travel_mm;
-	double lead_mm;	    /**< per turn */
+	double lead_mm;	    /**< travel per turn of the screw */
 	int steps_per_turn; /**< whole steps of the motor */
 	int microsteps;	    /**< per whole step */
-	bool invert;	    /**< a step up is the dir line inactive */
+	bool invert;	    /**< a step up needs the dir line inactive */
 	double velocity_mm_s, acceleration_mm_s2;
-	double jerk_mm_s3; /**< 0: not limited */
+	double jerk_mm_s3; /**< 0: no limit */
 	double deadman_s;
-	bool retract; /**< on a deadman, go to rest_mm before power goes away */
+	bool retract; /**< after the deadman, move to rest_mm before power goes off */
 	uint32_t tick_ns;
-	uint32_t high_ns, low_ns; /**< 0: not given, the shortest of the machine */
+	uint32_t high_ns, low_ns; /**< 0: not given: the shortest of the machine */
 	uint32_t setup_ns, hold_ns;
 	uint64_t enable_ns;
 	double home_mm_s, home_mm;
 	double origin_mm;	 /**< see struct incise_stepper_info */
 	double rest_mm, late_s;	 /**< see struct incise_stepper_info */
-	double direction[3];	 /**< in which it pushes, unit; 0 0 0: not given */
-	bool has_lines;		 /**< the group `lines` is there */
+	double direction[3];	 /**< of its force, unit; 0 0 0: not given */
+	bool has_lines;		 /**< the file has the group `lines` */
 	int line[INCISE_LINES];	 /**< offsets; -1: not wired */
 	unsigned int active_low; /**< bits 1 << incise_actuator_line */
 	struct incise_actuator_can can;
 };
 
-/** Changes when a struct or value that backends use does. */
+/** Version of the structs and values that backends use. */
 #define INCISE_BACKEND_ABI 8
 
 /** Settings of rig.conf for a backend. */
 struct incise_backend_request {
-	const char *arguments;	    /**< behind "NAME:" */
-	const char *where;	    /**< "FILE:LINE: stepper"; messages begin with it */
-	struct incise_clock *clock; /**< real; lives as long as the device */
-	bool watch; /**< only watch: do not move the device, nor disturb its owner */
-	/* Settings for its kind, or defaults; to be copied. */
-	const struct incise_actuator *actuator; /**< of a stepper */
+	const char *arguments;	    /**< text after "NAME:" */
+	const char *where;	    /**< begin of messages: "FILE:LINE: stepper" */
+	struct incise_clock *clock; /**< real; valid as long as the device */
+	bool watch; /**< only read: do not move the device or disturb its owner */
+	/* Settings for its kind, or defaults; copy them. */
+	const struct incise_actuator *actuator; /**< for a stepper */
 	const struct incise_tracker_setup *tracker;
 	const struct incise_force_setup *force;
 	const struct incise_camera_setup *camera;
 	const struct incise_vision_setup *vision; /**< to be checked */
-	/** Of a stepper: those of the rig that this backend opened before it, which may be
-	 * motors of the same device. */
+	/**
+	 * For a stepper: the rig's steppers that this backend opened before; they may be
+	 * motors of the same device.
+	 */
 	struct incise_stepper *const *siblings;
 	int n_siblings;
 };
 
 /**
- * A backend. A module, KIND_NAME.so in the folder incise/ beside libincise.so or in
+ * A backend. A module, KIND_NAME.so in the folder incise/ next to libincise.so or in
  * INCISE_MODULE_PATH, exports one as the symbol `incise_backend`:
  *
  *     const struct incise_backend incise_backend = {
  *             .abi = INCISE_BACKEND_ABI, .kind = "stepper", .name = "mine", .open = f};
  *
- * and is loaded when rig.conf has stepper = "mine:ARGUMENTS".
+ * The library loads it when rig.conf has stepper = "mine:ARGUMENTS".
  */
 struct incise_backend {
 	unsigned int abi; /**< INCISE_BACKEND_ABI */
 	const char *kind; /**< "tracker", "force", "camera", "stepper", … */
-	const char *name; /**< letters a to z, digits, underscores; below 32 */
+	const char *name; /**< fewer than 32 letters a to z, digits, underscores */
 	/**
-	 * Open a device. Its close() must bring a powered device to rest.
+	 * Open a device. close() must bring a powered device to rest.
 	 *
 	 * @return the struct of the kind, for example struct incise_stepper; NULL with
 	 *         errno and a message in @err.
@@ -289,8 +291,8 @@ struct incise_backend {
 	void *(*open)(const struct incise_backend_request *request,
 		      struct incise_error *err);
 	/**
-	 * Search for devices as incise_scan(). NULL: it cannot search.
-	 * @arguments of the device's string, possibly incomplete: "can0"
+	 * Search for devices as incise_scan() does. NULL: not supported.
+	 * @arguments are those of the device's string, possibly incomplete: "can0"
 	 */
 	int (*scan)(const char *arguments, incise_scan_found *found, void *context,
 		    struct incise_error *err);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Inner corners of a chessboard in a frame, for incise_calibrate_depth_board(), by a
- * module on OpenCV, board_opencv.so (incise/backend.h), which the first call maps into
- * the process and which stays there.
+ * Inner corners of a chessboard in a frame, for incise_calibrate_depth_board(). The module
+ * board_opencv.so uses OpenCV (incise/backend.h). The first call maps it into the process,
+ * where it remains.
  *
  *     ■□■□■     a board of 4 × 3 squares has 3 × 2 inner corners; use odd by even or even by
  *     □■□■□     odd, so that its orientation is unique, and leave a square's width of white
@@ -18,9 +18,9 @@
 INCISE_BEGIN_DECLS
 
 /**
- * Find all corners, to some hundredths of a pixel (A. Duda, U. Frese, Accurate detection
- * and localization of checkerboard corners for calibration, BMVC 2018). Takes 0.05 s or
- * more, and some seconds where there is no board.
+ * Find all corners, to some hundredths of a pixel (A. Duda, U. Frese, Accurate detection and
+ * localization of checkerboard corners for calibration, BMVC 2018). Takes 0.05 s or more, and
+ * some seconds if there is no board.
  *
  * @param columns, rows inner corners, 3 to 100 each
  * @param corners array of 2 · columns · rows: x, y of each, row by row; pixel (0, 0) covers

@@ -37,17 +37,16 @@ struct incise_camera_info {
 	double rate_hz;
 	int width, height;
 	enum incise_pixels pixels;
-	int64_t exposure_ns; /**< 0: not known; then t_ns is the timestamp of the device */
+	int64_t exposure_ns; /**< 0: unknown; then t_ns is the device's timestamp */
 	uint64_t
-		damaged; /**< frames with an error, or too short; they count as lost too */
+		damaged; /**< frames that are corrupt or too short; also counted as lost */
 };
 
 /** Settings of a real camera; the group `camera_setup` of rig.conf. 0: not changed. */
 struct incise_camera_setup {
 	int width, height;
 	double rate_hz;
-	enum incise_pixels
-		pixels; /**< default YUYV, which does not smear colour at an edge */
+	enum incise_pixels pixels; /**< default YUYV, which keeps colour edges sharp */
 	double exposure_ms;
 	double gain; /**< units of the driver */
 	double white_balance_K;
@@ -57,12 +56,12 @@ struct incise_camera_setup {
 struct incise_camera;
 
 /**
- * Take the oldest frame, without waiting. Up to 24 are queued for a slow reader; fewer
- * where the driver of a camera has fewer than 32 buffers: three quarters of them, and all
- * but 3 at most. When the queue is full, the oldest frame is lost, and counted.
+ * Take the oldest frame, without waiting. Up to 24 frames are queued for a slow reader; if the
+ * driver has fewer than 32 buffers, three quarters of them, and at most all but 3. When the
+ * queue is full, the oldest frame is lost and counted.
  *
- * @return 1 with a frame, 0 without; -EIO, -ENODEV (unplugged): no frame will come any more,
- *         and incise_camera_cause() gives the cause.
+ * @return 1 with a frame, 0 without; -EIO, -ENODEV (unplugged): no more frames will come, and
+ *         incise_camera_cause() returns the cause.
  */
 INCISE_API int incise_camera_read(struct incise_camera *camera,
 				  struct incise_camera_frame *frame);
@@ -72,10 +71,10 @@ INCISE_API void incise_camera_info(const struct incise_camera *camera,
 				   struct incise_camera_info *info);
 
 /**
- * Take all queued frames and return the newest, to show and not to record. The others do
- * not count as lost.
+ * Take all queued frames and return the newest, for display rather than recording. The others
+ * do not count as lost.
  *
- * @return as incise_camera_read(); -EIO, -ENODEV only where no frame was queued
+ * @return as incise_camera_read(); -EIO, -ENODEV only if no frame was queued
  */
 INCISE_API int incise_camera_newest(struct incise_camera *camera,
 				    struct incise_camera_frame *frame);
@@ -84,7 +83,7 @@ INCISE_API int incise_camera_newest(struct incise_camera *camera,
 INCISE_API uint64_t incise_camera_lost(const struct incise_camera *camera);
 
 /**
- * The cause of an error of read(), in one line with what to do.
+ * Print the cause of a read error in one line that says what to do.
  *
  * @param text empty without an error, or without a known cause
  * @return length of the line, as snprintf(3). Not real-time safe.

@@ -15,7 +15,7 @@ INCISE_BEGIN_DECLS
 
 /** One conversion. */
 struct incise_force_sample {
-	int64_t t_ns; /**< of acquisition */
+	int64_t t_ns; /**< time of acquisition */
 	uint64_t seq; /**< counts from 0; a gap is a lost sample */
 	int32_t code; /**< raw; 0 … 2^bits - 1 */
 };
@@ -26,7 +26,7 @@ struct incise_force_info {
 	double rate_hz;	     /**< nominal */
 	int bits;	     /**< resolution */
 	double full_scale_V; /**< 2^bits codes span this voltage */
-	double offset_V;     /**< voltage of code 0; 0 of a unipolar range */
+	double offset_V;     /**< voltage of code 0; 0 for a unipolar range */
 	uint64_t clipped;    /**< samples at either end of the range so far */
 	uint64_t overflows;  /**< overflows of the device or the kernel so far */
 };
@@ -35,10 +35,10 @@ struct incise_force_info {
 struct incise_force_setup {
 	double rate_hz; /**< 1 … 100000; default 10000 */
 	int channel;	/**< 0 …; default 0 */
-	double full_scale_V; /**< of IIO without a scale, and the range to choose; 0: its own */
-	char trigger
-		[64]; /**< of IIO: its name; empty: hrtimer where the kernel has one, else
-			       the driver's own */
+	/** Range to select, and the scale of an IIO device without one; 0: the device's own. */
+	double full_scale_V;
+	/** IIO: name of the trigger; empty: an hrtimer if the kernel has it, else the driver's. */
+	char trigger[64];
 };
 
 struct incise_force;
@@ -47,7 +47,7 @@ struct incise_force;
  * Take samples that have arrived, without waiting.
  *
  * @param samples array of @n samples, oldest first
- * @return how many were taken, 0 … n; -EIO, -ENODEV (unplugged).
+ * @return number of samples, 0 … n; -EIO, -ENODEV (unplugged).
  */
 INCISE_API int incise_force_read(struct incise_force *force,
 				 struct incise_force_sample *samples, int n);
@@ -60,7 +60,7 @@ INCISE_API void incise_force_info(const struct incise_force *force,
 INCISE_API uint64_t incise_force_lost(const struct incise_force *force);
 
 /**
- * The cause of an error of read(), in one line with what to do.
+ * Print the cause of a read error in one line that says what to do.
  *
  * @param text empty without an error, or without a known cause
  * @return length of the line, as snprintf(3). Not real-time safe.

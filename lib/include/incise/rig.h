@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * A rig: the devices of rig.conf with their common clock. Each device is a string,
- * `BACKEND:ARGUMENTS`; `sim:` is the virtual rig. A backend that is not built in is a
- * module, loaded when it is named (incise/backend.h).
+ * `BACKEND:ARGUMENTS`; `sim:` is the simulated rig. Other backends are modules, loaded when
+ * rig.conf names them (incise/backend.h).
  *
  *     clock   = "real";          # or "simulated"
  *     tracker = "sim:";
@@ -28,7 +28,7 @@
 
 INCISE_BEGIN_DECLS
 
-/** Actuators of a rig at most. */
+/** Largest number of actuators of a rig. */
 #define INCISE_RIG_AXES_MAX 3
 
 struct incise_rig;
@@ -39,42 +39,42 @@ enum incise_rig_device {
 	INCISE_RIG_TRACKER = 1,
 	INCISE_RIG_FORCE = 2,
 	INCISE_RIG_CAMERA = 4,
-	/** All of its actuators. */
+	/** All actuators. */
 	INCISE_RIG_STEPPER = 8,
-	/** With STEPPER: only watch them, while another program drives them. */
+	/** With STEPPER: only read their state, while another program drives them. */
 	INCISE_RIG_WATCH = 16,
-	/** With CAMERA: only if a rig.conf names one; a "sim:KEY=VALUE,…" names none. */
+	/** With CAMERA: only if a rig.conf names one; "sim:KEY=VALUE,…" names none. */
 	INCISE_RIG_IF_NAMED = 32,
 };
 
 /**
  * Open a rig.
  *
- * @param spec    path of a rig.conf, or "sim:KEY=VALUE,…" for a virtual rig with the
- *                scalar keys of the `sim` group and `clock`; "sim:" for its defaults
+ * @param spec    path of a rig.conf, or "sim:KEY=VALUE,…" for a simulated rig with the scalar
+ *                keys of the `sim` group and `clock`; "sim:" for its defaults
  * @param devices incise_rig_device bits to open
  * @return rig, to be closed with incise_rig_close(); NULL with errno of incise_infile_open(),
- *         EINVAL (syntax, unknown key, value out of range; the message has file and line), ENODEV
- *         (a device that the file does not name, or an unknown backend), ENOEXEC (a broken
- *         module), ENOMEM; of a real device also ENOENT, EACCES, EBUSY (another program
- *         drives it), ERANGE (this machine is too slow for its steps; no such range or
+ *         EINVAL (syntax, unknown key, value out of range; the message has file and line),
+ *         ENODEV (a device that the file does not name, or an unknown backend), ENOEXEC (a
+ *         broken module), ENOMEM; for a real device also ENOENT, EACCES, EBUSY (another
+ *         program drives it), ERANGE (this machine is too slow for its steps; no such range or
  *         value), EOPNOTSUPP (it cannot be watched, or lacks a setting), ETIMEDOUT (no
- *         answer), EPROTO (impossible answers of its driver), EIO (it does not accept or
- *         keep a setting), ENOSPC (its bus has no bandwidth left).
+ *         answer), EPROTO (invalid answers of its driver), EIO (it does not accept or keep a
+ *         setting), ENOSPC (its bus has no bandwidth left).
  */
 INCISE_API struct incise_rig *incise_rig_open(const char *spec, unsigned int devices,
 					      struct incise_error *err);
 
-/** Close its devices, the modules behind them and its clock. NULL is accepted. */
+/** Close the devices, unload their modules and free the clock. NULL is accepted. */
 INCISE_API void incise_rig_close(struct incise_rig *rig);
 
-/** The @spec it was opened with. */
+/** The @spec of incise_rig_open(); owned by the rig. */
 INCISE_API const char *incise_rig_spec(const struct incise_rig *rig);
 
-/** The rig's clock; owned by it. */
+/** The rig's clock; owned by the rig. */
 INCISE_API struct incise_clock *incise_rig_clock(struct incise_rig *rig);
 
-/** The device if it was opened, else NULL; owned by the rig. */
+/** The device, or NULL if it was not opened; owned by the rig. */
 INCISE_API struct incise_tracker *incise_rig_tracker(struct incise_rig *rig);
 /** @see incise_rig_tracker() */
 INCISE_API struct incise_force *incise_rig_force(struct incise_rig *rig);
@@ -89,60 +89,62 @@ INCISE_API struct incise_stepper *incise_rig_stepper(struct incise_rig *rig);
  * @param i         0 …
  * @param direction unit vector in the tracker's frame; unchanged without an actuator; may
  *                  be NULL
- * @return the actuator, owned by the rig; NULL from the first index that is not there, or
- *         was not opened
+ * @return the actuator, owned by the rig; NULL if there are at most @i opened actuators
  */
 INCISE_API struct incise_stepper *incise_rig_axis(struct incise_rig *rig, int i,
 						  double direction[3]);
 
-/** The virtual rig behind the `sim:` devices, or NULL. */
+/** The simulated rig of the `sim:` devices, or NULL; owned by the rig. */
 INCISE_API struct incise_sim *incise_rig_sim(struct incise_rig *rig);
 
-/** The tissue's surface: a point on it and the outward unit normal. */
+/** The tissue surface: a point on it and the outward unit normal. */
 INCISE_API void incise_rig_surface(const struct incise_rig *rig, double point_mm[3],
 				   double normal[3]);
 
 /**
- * Settings for incise_vision_new(): the group `vision` of rig.conf, with depth_mm_px 0,
- * to be filled in from calibration.conf where full_px is not 0; without the group, and
- * for a virtual camera, settings for its frames, with their scale. The camera need not be
- * open, and no module is loaded.
+ * Settings for incise_vision_new(): the group `vision` of rig.conf, with depth_mm_px = 0; if
+ * full_px is not 0, the caller sets it from calibration.conf. Without the group, a simulated
+ * camera has known settings with their scale. The camera need not be open, and no module is
+ * loaded.
  *
- * @return 0; -ENOENT (no such group, and no virtual camera): *setup is unchanged
+ * @return 0; -ENOENT (no such group and no simulated camera): *setup is unchanged
  */
 INCISE_API int incise_rig_vision(const struct incise_rig *rig,
 				 struct incise_vision_setup *setup);
 
 /**
- * The group `foot_switch` of rig.conf, for incise_foot_switch_open(): the rig does not open it.
+ * The group `foot_switch` of rig.conf, for incise_foot_switch_open(). The rig does not open
+ * it.
  *
- * @return 0; -ENOENT (there is no such group): *setup is unchanged
+ * @return 0; -ENOENT (no such group): *setup is unchanged
  */
 INCISE_API int incise_rig_foot_switch(const struct incise_rig *rig,
 				      struct incise_foot_switch_setup *setup);
 
-/** A key of a rig, with the value that applies. */
+/** A key of a rig and its value. */
 struct incise_rig_key {
 	char name[80]; /**< "sim.seed"; "actuator[2].lead_mm" of several, from 1 on */
-	/** as rig.conf has it, which is JSON too: 2.5, true, "text", [0, 0, 1]; empty: none, or up
-	 * to the device */
+	/**
+	 * as in rig.conf and JSON: 2.5, true, "text", [0, 0, 1]; empty: none, or the device's
+	 * own
+	 */
 	char value[400];
-	bool given; /**< else it is the default */
-	int line;   /**< of the file; 0: it is not from there */
+	bool given; /**< in the file; else the default */
+	int line;   /**< line in the file; 0: not in the file */
 };
 
 /**
- * Called for each key. @key is valid until it returns.
+ * Called for each key. @key is valid until the function returns.
  * @return 0; another value ends the list, and incise_rig_keys() returns it
  */
 typedef int incise_rig_key_found(void *context, const struct incise_rig_key *key);
 
 /**
- * List the keys of a rig: those that are given, and with their defaults those of the clock, the
- * surface and each device that is named. No device is opened.
+ * List the keys of a rig: the given ones, and the defaults of the clock, the surface and each
+ * named device. No device is opened.
  *
- * @param spec as of incise_rig_open()
- * @return 0; what @found returned; a negative errno of incise_rig_open() without devices
+ * @param spec as for incise_rig_open()
+ * @return 0; the value of @found; a negative errno of incise_rig_open() without devices
  */
 INCISE_API int incise_rig_keys(const char *spec, incise_rig_key_found *found,
 			       void *context, struct incise_error *err);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Search for devices behind a backend, to write a rig.conf: "can:can0" lists the drives
- * on that bus. Nothing is changed, moved or set up.
+ * Search for devices of a backend, to write a rig.conf: "can:can0" lists the drives on that
+ * bus. A search changes, moves and sets up nothing.
  */
 #ifndef INCISE_SCAN_H
 #define INCISE_SCAN_H
@@ -12,19 +12,19 @@
 
 INCISE_BEGIN_DECLS
 
-/** Most properties of a device. */
+/** Largest number of properties of a device. */
 #define INCISE_SCAN_PROPERTIES 24
 
 /** A property of a device. */
 struct incise_scan_property {
-	const char *key; /**< "vendor_id": for JSON, lower snake case, unit as suffix */
-	char text[100];	 /**< for people, and for JSON a string */
+	const char *key; /**< for JSON, lower snake case, unit as suffix: "vendor_id" */
+	char text[100];	 /**< text for people, and a string in JSON */
 };
 
 /** A device. */
 struct incise_scan_device {
 	char device[320]; /**< its name in rig.conf, for example "can:can0:0x10" */
-	char what[240];	  /**< a line: kind of device and its state */
+	char what[240];	  /**< one line: kind of device and its state */
 	bool usable;	  /**< rig.conf may name it */
 	int n;
 	struct incise_scan_property property[INCISE_SCAN_PROPERTIES];
@@ -32,29 +32,29 @@ struct incise_scan_device {
 };
 
 /**
- * Called for each device that is found. @device is valid until it returns.
- * @return 0; another value ends the scan, which returns it
+ * Called for each device. @device is valid until the function returns.
+ * @return 0; another value ends the scan, and incise_scan() returns it
  */
 typedef int incise_scan_found(void *context, const struct incise_scan_device *device);
 
 /**
- * Look for devices. Blocks, for some seconds at most.
+ * Search for devices. Blocks for at most some seconds.
  *
- * @param kind "stepper", "tracker", "force" or "camera"; NULL: any that has that backend
+ * @param kind "stepper", "tracker", "force" or "camera"; NULL: any kind of that backend
  * @param spec "BACKEND:ARGUMENTS", for example "can:can0"; NULL: search all backends that need
- *        no arguments; one that fails is reported as a device that is not usable, with the
- *        reason in its line
- * @return 0, also where none was found; what @found returned; -EINVAL (@spec),
- *         -ENODEV (no such backend, or bus), -EOPNOTSUPP (the backend cannot search),
- *         -EACCES, -EBUSY, -ENETDOWN, -EIO.
+ *             no arguments; a failing backend is reported as an unusable device with the
+ *             reason in its line
+ * @return 0, also if there is none; the value of @found; -EINVAL (@spec), -ENODEV (no such
+ *         backend or bus), -EOPNOTSUPP (the backend cannot search), -EACCES, -EBUSY,
+ *         -ENETDOWN, -EIO.
  */
 INCISE_API int incise_scan(const char *kind, const char *spec, incise_scan_found *found,
 			   void *context, struct incise_error *err);
 
 /**
- * For backends: add a property to @device, its text as printf(3), if there is space.
+ * For backends: add a property to @device if there is space; text as in printf(3).
  *
- * @param key must live as long as @device
+ * @param key must be valid as long as @device
  */
 INCISE_API void incise_scan_tell(struct incise_scan_device *device, const char *key,
 				 const char *format, ...)

@@ -15,21 +15,22 @@ INCISE_BEGIN_DECLS
 
 /** One record of one station. */
 struct incise_tracker_sample {
-	int64_t t_ns; /**< arrival at the host; acquisition is latency_ns earlier */
+	int64_t t_ns; /**< arrival at the host; the acquisition is latency_ns earlier */
 	uint64_t seq; /**< counts from 0; a gap is a lost record */
-	double position_mm[3]; /**< the tracked point, in the tracker's frame */
-	double quaternion[4];  /**< unit, w first; rotates the scalpel's frame into it */
-	char status;	       /**< its flag, see incise_pose_usable(); ' ' or 0: none */
-	uint8_t station; /**< number of the sensor, from 1; the virtual rig's is 1 */
-	bool button;	 /**< of the stylus, pressed; false where there is none */
+	double position_mm[3]; /**< tracked point, in the tracker's frame */
+	/** unit, w first; from the scalpel's to the tracker's frame */
+	double quaternion[4];
+	char status;	 /**< flag, see incise_pose_usable(); ' ' or 0: none */
+	uint8_t station; /**< number of the sensor, from 1; 1 on the simulated rig */
+	bool button;	 /**< button of the stylus is pressed; false without one */
 	bool restarted; /**< first record after an interruption: periods have a new phase */
 };
 
-/** When a tracker measures. */
+/** Trigger of a measurement. */
 enum incise_tracker_sync {
-	INCISE_TRACKER_INTERNAL, /**< by its own clock */
-	INCISE_TRACKER_EXTERNAL, /**< by pulses at its sync input */
-	INCISE_TRACKER_VIDEO,	 /**< by the video sync that it receives */
+	INCISE_TRACKER_INTERNAL, /**< its own clock */
+	INCISE_TRACKER_EXTERNAL, /**< pulses at its sync input */
+	INCISE_TRACKER_VIDEO,	 /**< the video sync that it receives */
 };
 
 /** Settings of a real tracker; the group `tracker_setup` of rig.conf. */
@@ -41,8 +42,8 @@ struct incise_tracker_setup {
 	uint8_t tube_station; /**< see struct incise_tracker_info; default 0 */
 	double offset_mm[3];  /**< the tracked point in the sensor's frame; default 0 */
 	/**
-	 * A tracker that sends one and the same pose for longer, to the last digit, measures
-	 * nothing: its noise is larger than that. Its poses get the flag '=' then, which is
+	 * A tracker that sends the same pose for longer, to the last digit, does not measure,
+	 * because its noise changes each pose. Its poses then get the flag '=', which is
 	 * unusable. 0: never; default 100.
 	 */
 	double repeat_ms;
@@ -51,36 +52,36 @@ struct incise_tracker_setup {
 /** Properties of a tracker. */
 struct incise_tracker_info {
 	char name[64];
-	/** Nominal, of the records of all stations together; incise_tracker_station_hz() */
+	/** nominal rate of all stations together; see incise_tracker_station_hz() */
 	double rate_hz;
-	int64_t latency_ns; /**< nominal, acquisition to arrival */
+	int64_t latency_ns; /**< nominal, from acquisition to arrival */
 	int stations;	    /**< sensors that send records; seq counts all of them */
-	bool external_sync; /**< measures by pulses from outside: rate_hz is its highest
-				 rate, and the records have no period */
-	int64_t grain_ns;   /**< grid of arrival times: 1000000 for USB; 0: none */
+	/** Pulses from outside trigger it: rate_hz is its highest rate; records have no period. */
+	bool external_sync;
+	int64_t grain_ns; /**< grid of arrival times: 1000000 for USB; 0: none */
 	/** Station on the scalpel: the first one; 0: every station but the tube's */
 	uint8_t scalpel_station;
-	uint8_t tube_station; /**< station at the end of the tube; 0: it has none */
+	uint8_t tube_station; /**< station at the end of the tube; 0: none */
 };
 
-/** Poses, and their flags. */
+/** Counts of poses and of their flags. */
 struct incise_pose_counts {
-	uint64_t poses;	       /**< all, with those that follow */
+	uint64_t poses;	       /**< all poses, including the following */
 	uint64_t unusable;     /**< see incise_pose_usable() */
-	uint64_t flagged[128]; /**< by their flag, usable or not; at '?' all others */
+	uint64_t flagged[128]; /**< by flag, usable or not; '?' counts all others */
 };
 
 /**
- * Whether a pose with this flag is a pose. This is the rule for all that use poses: one that is
- * not usable is kept and counted, but moves nothing and gives no depth.
+ * Return whether a pose with this flag is usable. The rule applies to all users of poses: an
+ * unusable pose is kept and counted, but moves nothing and gives no depth.
  *
- * Usable are ' ' and 0, no flag; and the flags of a FASTRAK or LIBERTY that concern something
- * else than this measurement: m and w (its memory), t and u (its correction for metal does not
- * cover this place), v (no video sync). rig.conf(5) lists all of them.
+ * Usable are ' ' and 0 (no flag) and the flags of a FASTRAK or LIBERTY that do not concern the
+ * measurement: m and w (memory), t and u (its correction for metal does not cover this place),
+ * v (no video sync). rig.conf(5) lists all flags.
  */
 INCISE_API bool incise_pose_usable(char status) INCISE_REALTIME;
 
-/** The meaning of a flag in a few words, for people; always a string. */
+/** Meaning of a flag in a few words, for people; never NULL. */
 INCISE_API const char *incise_pose_flag(char status);
 
 /** Count a pose. @return incise_pose_usable() */
@@ -93,7 +94,7 @@ INCISE_API void incise_pose_counts_add(struct incise_pose_counts *counts,
 	INCISE_REALTIME;
 
 /**
- * The flagged poses in one line: "3 of 361 poses were not used: 3 'x' (…)".
+ * Print the flagged poses in one line: "3 of 361 poses were not used: 3 'x' (…)".
  *
  * @param text empty if no pose was flagged
  * @return length of the line, as snprintf(3). Not real-time safe.
@@ -107,9 +108,9 @@ struct incise_tracker;
  * Take records that have arrived, without waiting.
  *
  * @param samples array of @n records, oldest first
- * @return how many were taken, 0 … n; -EIO, -ENODEV (unplugged; a tracker that may
- *         reconnect, see rig.conf(5), returns 0 until it is given up). Real-time safe for the
- *         virtual rig and for trackers of Polhemus; other backends document it.
+ * @return number of records, 0 … n; -EIO, -ENODEV (unplugged; a tracker that may reconnect,
+ *         see rig.conf(5), returns 0 until its time is over). Real-time safe for the simulated
+ *         rig and for Polhemus trackers; other backends document it.
  */
 INCISE_API int incise_tracker_read(struct incise_tracker *tracker,
 				   struct incise_tracker_sample *samples,
@@ -119,7 +120,7 @@ INCISE_API int incise_tracker_read(struct incise_tracker *tracker,
 INCISE_API void incise_tracker_info(const struct incise_tracker *tracker,
 				    struct incise_tracker_info *info);
 
-/** Records of one station per second: rate_hz is shared by all of them. Real-time safe. */
+/** Records of one station per second: all stations share rate_hz. Real-time safe. */
 INCISE_API double incise_tracker_station_hz(const struct incise_tracker_info *info)
 	INCISE_REALTIME;
 
@@ -127,7 +128,7 @@ INCISE_API double incise_tracker_station_hz(const struct incise_tracker_info *in
 INCISE_API uint64_t incise_tracker_lost(const struct incise_tracker *tracker);
 
 /**
- * The cause of an error of read(), in one line with what to do.
+ * Print the cause of a read error in one line that says what to do.
  *
  * @param text empty without an error, or without a known cause
  * @return length of the line, as snprintf(3). Not real-time safe.
