@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# doc/tutorial.md, as a newcomer without a rig follows it: each block for the virtual rig, in
-# order, in an empty folder. What comes out is held against the virtual rig's truth.
+# doc/tutorial.md, as a newcomer without a rig follows it: each block for the simulated rig, in
+# order, in an empty folder. The results are compared with the simulated rig's truth.
 
 load cli
 load document
@@ -14,15 +14,15 @@ setup() {
 	mkdir temporary
 }
 
-@test "every block of the tutorial that is said to run on the virtual rig is run here" {
-	commands_in "$page" "virtual rig" >commands
-	commands_in "$page" "virtual rig with a screen's libraries" >screen
-	[ "$(cat commands screen | grep -cx '# virtual rig')" = "$(grep -cx '# virtual rig' "$page")" ]
-	[ "$(grep -cx '# virtual rig' "$page")" -ge 8 ]
+@test "every block of the tutorial that is said to run on the simulated rig is run here" {
+	commands_in "$page" "simulated rig" >commands
+	commands_in "$page" "simulated rig with view" >screen
+	[ "$(cat commands screen | grep -cx '# simulated rig')" = "$(grep -cx '# simulated rig' "$page")" ]
+	[ "$(grep -cx '# simulated rig' "$page")" -ge 8 ]
 }
 
-@test "the tutorial's commands run in their order, and find the virtual rig's truth" {
-	commands_in "$page" "virtual rig" >commands
+@test "the tutorial's commands run in their order, and find the simulated rig's truth" {
+	commands_in "$page" "simulated rig" >commands
 	if [ -e "$INCISE_BUILD/lib/incise/vision_opencv.so" ] && [ -e "$INCISE_BUILD/lib/incise/frames_mkv.so" ]; then
 		has_pictures=yes
 	else # what looks at pictures was not built
@@ -37,7 +37,7 @@ setup() {
 	read -r force sd < <(echo '5 20' | incise eval liver.fis --sd)
 	# within its own 95 % interval
 	holds "$force - $truth < 2 * $sd && $truth - $force < 2 * $sd"
-	# mV/N, mm/px and ms that the virtual rig has (incise/sim.h)
+	# mV/N, mm/px and ms of the simulated rig (incise/sim.h)
 	force_mV_N=$(sed -n 's/^force_mV_N *= *\([0-9.]*\);.*/\1/p' calibration.conf)
 	holds "$force_mV_N > 1240 - 5 && $force_mV_N < 1240 + 5"
 	grep -q "liver.rec: complete: all is there" out
@@ -49,7 +49,7 @@ setup() {
 	grep -q '"liver.fx"' mine.scene
 	incise plan mine.scene --rig live.conf | grep -q "margin"
 	if [ "${has_pictures-}" ] && [ -x "$INCISE_BUILD/bin/incise-view" ]; then
-		commands_in "$page" "virtual rig with a screen's libraries" >commands
+		commands_in "$page" "simulated rig with view" >commands
 		run bash -euo pipefail commands
 		if [ "$status" -ne 0 ]; then
 			[[ "$output" == *OpenGL* ]] || complain "$output"
