@@ -6,8 +6,9 @@ programs := $(O)/bin/incise $(addprefix $(O)/bin/incise-,$(commands))
 
 $(O)/obj/tools/%.o: pc_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
 
-# incise loads it before incise view, to name a package that is missing.
-$(O)/obj/tools/incise.o: cppflags += -DVIEW_LIBRARY='"libincise-view.so.$(soversion)"'
+# incise loads it before incise view, to name a package that is missing, and both to list features.
+$(O)/obj/tools/incise.o $(O)/obj/tools/cli/features.o: cppflags += -DVIEW_LIBRARY='"libincise-view.so.$(soversion)"' \
+	-DRECORD_LIBRARY='"libincise-record.so.$(soversion)"'
 
 # The kernel module's own interface, for incise info, which looks past the library.
 $(O)/obj/tools/stepper/%.o: cppflags += -Idriver

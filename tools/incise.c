@@ -16,6 +16,7 @@
 #include <incise/error.h>
 #include <incise/version.h>
 #include "cli/cli.h"
+#include "cli/features.h"
 
 #define LETTERS "abcdefghijklmnopqrstuvwxyz"
 
@@ -219,6 +220,7 @@ int main(int argc, char **argv)
 	}
 	if (!strcmp(command, "-V") || !strcmp(command, "--version")) {
 		printf("incise %s\n", incise_version());
+		features_print(stdout);
 		return finish();
 	}
 	if (!strcmp(command, "help")) {

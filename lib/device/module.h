@@ -13,15 +13,13 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <incise/backend.h>
 #include <incise/error.h>
 
 struct incise_module {
 	void *handle;	    /* of dlopen() */
 	const void *symbol; /* exported by it */
 };
-
-/* The folder of the modules. False where its name does not fit. */
-bool incise_module_folder(char *path, size_t size);
 
 /*
  * Load a file and find its symbol. @where starts the message. 0 or -ENOEXEC (it is

@@ -34,7 +34,7 @@ pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-latenes
 @test "demo leaves a summary for programs" {
 	file=summary.json
 	cp "$demo/summary.json" .
-	[ "$(key $file version)" = "$(incise --version | cut -d' ' -f2)" ]
+	[ "$(key $file version)" = "$(incise info --version | cut -d' ' -f2)" ]
 	[ "$(key $file seed)" = 3 ]
 	[ "$(key $file pictures)" = "[\"${pictures// /\",\"}\"]" ]
 	[ "$(key $file train_random_halves.pairs)" = 120 ] # the paper's number

@@ -39,14 +39,40 @@ setup() {
 		"$root/lib/include/incise/version.h")
 	[ -n "$header" ]
 	run -0 --separate-stderr incise --version
-	[ "$output" = "incise $header" ]
+	[ "${lines[0]}" = "incise $header" ]
 	[ -z "$stderr" ]
+	features=$output
 	run -0 incise -V
-	[ "$output" = "incise $header" ]
+	[ "$output" = "$features" ]
 	for program in "$INCISE_BUILD"/bin/incise-*; do
 		run -0 "$program" --version
 		[ "$output" = "incise $header" ]
 	done
+}
+
+@test "--version lists the modules that are there, and why one cannot be loaded" {
+	run -0 --separate-stderr incise --version
+	[ "${lines[-1]}" = "  modules    $INCISE_BUILD/lib/incise" ]
+	[[ "$output" =~ $'\n'"  sqlite     "$(sqlite3 --version | cut -d" " -f1)$'\n' ]]
+	view=no
+	[ ! -e "$INCISE_BUILD/lib/libincise-view.so" ] || view=yes
+	grep -qx "  view       $view" <<<"$output"
+	for module in "$INCISE_BUILD"/lib/incise/*_*.so; do
+		[[ "$module" != */peer_* ]] || continue
+		name=$(basename "$module" .so)
+		grep -qE "^  [a-z]+ +.*\<${name#*_}\>" <<<"$output" || complain "$name is missing"
+	done
+	[ ! -e "$INCISE_BUILD/lib/incise/stepper_gpio.so" ] || [[ "$output" == *"gpio (libgpiod "[12].* ]]
+	# another folder: nothing but what is built in, and a module that is none
+	mkdir modules
+	: >modules/tracker_empty.so
+	INCISE_MODULE_PATH=$PWD/modules run -0 --separate-stderr incise --version
+	grep -qE '^  trackers   empty \(.*tracker_empty.so: file too short' <<<"$output"
+	grep -qx '  cameras    none' <<<"$output"
+	grep -qx '  steppers   kernel' <<<"$output"
+	[ "${lines[-1]}" = "  modules    $PWD/modules" ]
+	run -1 --separate-stderr bash -c "incise --version >/dev/full"
+	[ "${#stderr_lines[@]}" -eq 1 ]
 }
 
 @test "no verb, and words that are none" {

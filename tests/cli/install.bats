@@ -26,7 +26,8 @@ setup() {
 	unset LD_LIBRARY_PATH
 	PATH=/usr/bin:/bin
 	run -0 "$dest/usr/bin/incise" --version
-	[ "$output" = "$("$INCISE_BUILD/bin/incise" --version)" ]
+	[ "$(sed '$d' <<<"$output")" = "$("$INCISE_BUILD/bin/incise" --version | sed '$d')" ]
+	[ "${lines[-1]}" = "  modules    $(realpath "$dest")/usr/lib/incise" ]
 	made_pairs >pairs.csv
 	"$dest/usr/bin/incise" train pairs.csv -o m.fis 2>/dev/null
 	"$dest/usr/bin/incise" info m.fis >/dev/null
@@ -78,7 +79,7 @@ setup() {
 	export PKG_CONFIG_SYSROOT_DIR=$dest PKG_CONFIG_LIBDIR=$dest/usr/lib/pkgconfig
 	# /usr/include is no folder of the system's here
 	export PKG_CONFIG_ALLOW_SYSTEM_CFLAGS=1 PKG_CONFIG_ALLOW_SYSTEM_LIBS=1
-	[ "incise $(pkg-config --modversion incise)" = "$(incise --version)" ]
+	[ "incise $(pkg-config --modversion incise)" = "$(incise info --version)" ]
 	[[ " $(pkg-config --cflags incise) " == *" -I$dest/usr/include "* ]]
 	[[ " $(pkg-config --libs incise) " == *" -L$dest/usr/lib "*"-lincise "* ]]
 	example_in "$root/man/libincise.3" incise_plan_tick >program.c
@@ -145,7 +146,7 @@ setup() {
 @test "dist makes a tarball of the source" {
 	git -C "$root" rev-parse -q --verify HEAD >/dev/null 2>&1 ||
 		skip "the source is no git repository with a commit"
-	version=$(incise --version | cut -d' ' -f2)
+	version=$(incise info --version | cut -d' ' -f2)
 	run -0 project dist
 	[ "${lines[-1]}" = "$INCISE_BUILD/incise-$version.tar.gz" ]
 	tar tzf "${lines[-1]}" >list

@@ -244,5 +244,5 @@ maps() {
 	$CXX -std=c++11 -I"$include" program.cc -o program \
 		-L"$INCISE_BUILD/lib" -Wl,-rpath,"$INCISE_BUILD/lib" -lincise
 	run -0 ./program
-	[ "incise $output" = "$(incise --version)" ]
+	[ "incise $output" = "$(incise info --version)" ]
 }

@@ -51,5 +51,5 @@ rounded() {
 }
 
 @test "CITATION.cff names this version" {
-	grep -qx "version: $(incise --version | cut -d' ' -f2)" "$root/CITATION.cff"
+	grep -qx "version: $(incise info --version | cut -d' ' -f2)" "$root/CITATION.cff"
 }

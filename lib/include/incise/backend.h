@@ -16,6 +16,7 @@
 #define INCISE_BACKEND_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <incise/camera.h>
 #include <incise/clock.h>
@@ -297,6 +298,13 @@ struct incise_backend {
 	int (*scan)(const char *arguments, incise_scan_found *found, void *context,
 		    struct incise_error *err);
 };
+
+/**
+ * The folder of the modules: INCISE_MODULE_PATH, or the folder incise/ beside libincise.so.
+ *
+ * @return whether it is known and its name fits; *path is undefined otherwise
+ */
+INCISE_API bool incise_module_folder(char *path, size_t size);
 
 /** The only symbol that a module exports. */
 INCISE_API extern const struct incise_backend incise_backend;
