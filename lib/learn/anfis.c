@@ -202,7 +202,7 @@ int incise_anfis_run(struct incise_model *model, struct incise_anfis *anfis)
 	anfis->best_epoch = 0;
 	rc = 0;
 	for (int e = 0; e < anfis->epochs && !rc; e++)
-		rc = epoch(s, anfis, e);
+		rc = anfis->stop && *anfis->stop ? -ECANCELED : epoch(s, anfis, e);
 	if (rc)
 		goto out;
 	incise_basis_store(&s->best, model);

@@ -18,12 +18,13 @@ struct incise_anfis {
 	/* Called with the epoch, from 1, and RMSEs; may be NULL. */
 	incise_train_progress progress;
 	void *user;
+	const volatile int *stop; /* as of incise_train_options */
 	/* Results, of the kept epoch: that of the least check (else training) error. */
 	int best_epoch;
 	double train_rmse, check_rmse;
 };
 
-/* Run the epochs. Returns 0, -EDOM, -ENOMEM, -ENOTSUP (not a grid). */
+/* Run the epochs. Returns 0, -EDOM, -ENOMEM, -ECANCELED, -ENOTSUP (not a grid). */
 int incise_anfis_run(struct incise_model *model, struct incise_anfis *anfis);
 
 #endif

@@ -121,6 +121,11 @@ static void add_errors(const struct incise_folds *folds, int f,
 	}
 }
 
+static int go_on(const struct incise_folds *folds)
+{
+	return folds->stop && *folds->stop ? -ECANCELED : 0;
+}
+
 int incise_crossval_ridges(const struct incise_basis *basis,
 			   const struct incise_folds *folds,
 			   const struct incise_ridge *ridges, int n, double *error)
@@ -132,6 +137,7 @@ int incise_crossval_ridges(const struct incise_basis *basis,
 
 	memset(error, 0, (size_t)n * folds->n_units * sizeof(*error));
 	for (int f = 0; f < folds->n && !rc; f++) {
+		rc = go_on(folds);
 		incise_basis_fold(basis, &folds->fit[f], lsq, NULL, 0);
 		for (int i = 0; i < n && !rc; i++) {
 			rc = incise_lsq_solve(lsq, &ridges[i], x);
@@ -229,7 +235,9 @@ int incise_crossval_search(const struct incise_basis *basis,
 					       .user = &search};
 		struct incise_basis trial = *basis;
 
-		rc = incise_varpro_run(&trial, consequents, &varpro);
+		rc = go_on(folds);
+		if (!rc)
+			rc = incise_varpro_run(&trial, consequents, &varpro);
 		if (rc)
 			break;
 		repeat(folds, f, error, varpro.run, epochs, mine);

@@ -23,7 +23,8 @@ struct incise_folds {
 	int n_units;
 	size_t n_held; /* pairs, over all folds */
 	struct incise_pairs fit[CROSSVAL_MAX], held[CROSSVAL_MAX];
-	int *unit[CROSSVAL_MAX]; /* of each held pair */
+	int *unit[CROSSVAL_MAX];  /* of each held pair */
+	const volatile int *stop; /* no further fold once it is not 0; NULL: all */
 };
 
 /* Returns 0 or -ENOMEM; incise_folds_free() in either case. */
@@ -33,7 +34,7 @@ void incise_folds_free(struct incise_folds *folds);
 
 /*
  * Held-out squared errors of n ridges at fixed premises: error[i·n_units + unit] for ridge
- * i. Returns 0, -EDOM, -ENOMEM.
+ * i. Returns 0, -EDOM, -ECANCELED, -ENOMEM.
  */
 int incise_crossval_ridges(const struct incise_basis *basis,
 			   const struct incise_folds *folds,
@@ -42,7 +43,7 @@ int incise_crossval_ridges(const struct incise_basis *basis,
 /*
  * Held-out squared errors while premises are searched (varpro.h), by epoch:
  * error[e·n_units + unit] for epoch e+1. Where a fold's search ends early its last error
- * stands for the epochs left. ratios is NULL, or gets |error|/√(1 + φᵀ(ΦᵀΦ+λ)⁻¹φ) of each
+ * stands for the epochs left. Returns as above. ratios is NULL, or gets |error|/√(1 + φᵀ(ΦᵀΦ+λ)⁻¹φ) of each
  * of the n_held pairs after the last epoch: the error in units of the noise.
  */
 int incise_crossval_search(const struct incise_basis *basis,

@@ -176,6 +176,7 @@ static int run(struct race *race, const struct incise_pairs *pairs,
 	if (!rc)
 		rc = incise_folds_init(&race->folds, &race->sample.pairs,
 				       race->sample.groups, options->seed);
+	race->folds.stop = options->stop;
 	if (rc)
 		return rc;
 	race->errors =
@@ -225,6 +226,8 @@ int incise_choose_grid(const struct incise_pairs *pairs,
 	free(race);
 	if (!rc)
 		return 0;
+	if (rc == -ECANCELED)
+		return incise_error_set(err, ECANCELED, "training was stopped");
 	return incise_error_set(
 		err, -rc,
 		rc == -ENODATA	? "%zu training pairs are too few to compare "

@@ -181,7 +181,7 @@ static bool on_epoch(void *user, int epoch, const struct incise_basis *basis,
 		options->progress(
 			options->user, epoch, rmse_of(l, basis, consequents, l->train),
 			l->check ? rmse_of(l, basis, consequents, l->check) : NAN);
-	return true;
+	return !options->stop || !*options->stop;
 }
 
 /* One QR of all pairs at the premises reached, and which rules they fire. */
@@ -216,6 +216,7 @@ static int train_classic(struct learner *l, struct incise_tuning *tuning)
 		.epochs = l->options->epochs,
 		.progress = l->options->progress,
 		.user = l->options->user,
+		.stop = l->options->stop,
 	};
 	int rc = incise_anfis_run(l->model, &anfis);
 
@@ -246,6 +247,8 @@ static int train_default(struct learner *l, struct incise_tuning *tuning)
 	varpro.epochs = tuning->epochs;
 	l->basis = tuning->basis;
 	rc = incise_varpro_run(&l->basis, l->consequents, &varpro);
+	if (!rc && l->options->stop && *l->options->stop)
+		rc = -ECANCELED;
 	if (rc)
 		return rc;
 	fold_all(l);
@@ -311,6 +314,7 @@ static int learn(struct learner *l)
 	if (!rc && l->tuned.rows)
 		rc = incise_folds_init(&l->folds, &l->tuned.pairs, l->tuned.groups,
 				       l->options->seed);
+	l->folds.stop = l->options->stop;
 	if (!rc)
 		rc = classic ? train_classic(l, &tuning) : train_default(l, &tuning);
 	if (!rc)
@@ -334,7 +338,8 @@ static int fail(struct incise_error *err, int rc)
 {
 	return incise_error_set(
 		err, -rc,
-		rc == -ENOMEM ? "no memory to train"
+		rc == -ENOMEM	   ? "no memory to train"
+		: rc == -ECANCELED ? "training was stopped"
 		: rc == -ENOTSUP
 			? "only models whose rules are the grid of Gaussians or "
 			  "bells, all with weight 1, can be trained"

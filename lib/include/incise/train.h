@@ -60,6 +60,9 @@ struct incise_train_options {
 	void *user;
 	/** Premises to start from: those given, and others near them; default 3. */
 	int starts;
+	/** Training ends soon with -ECANCELED when another thread or a signal handler makes it other
+	 *  than 0; or NULL. */
+	const volatile int *stop;
 	/**
 	 * Gets the predictive standard deviation, to be freed with
 	 * incise_uncertainty_free(), or NULL. On error nothing is left there.
@@ -109,7 +112,8 @@ INCISE_API void incise_train_options_init(struct incise_train_options *options);
  *         has one value only), -ENODATA (fewer pairs than consequent parameters), -ENOTSUP
  *         (the rules are no plain grid, the AND method is min, or another kind of
  *         membership function), -EDOM
- *         (least squares failed), -ENOMEM. On error the model is unchanged.
+ *         (least squares failed), -ECANCELED (options->stop), -ENOMEM. On error the model is
+ *         unchanged.
  */
 INCISE_API int incise_train(struct incise_model *model, const struct incise_pairs *train,
 			    const struct incise_pairs *check,
@@ -176,7 +180,7 @@ INCISE_API void incise_train_side_free(struct incise_train_side *side);
  * @param options groups and seed are used where they are chosen
  * @return model, to be freed with incise_model_free(); NULL with errno EINVAL (a constant
  *         input, a range that no double holds), ENODATA (too few pairs to compare anything),
- *         E2BIG, EDOM, ENOMEM.
+ *         E2BIG, EDOM, ECANCELED, ENOMEM.
  */
 INCISE_API struct incise_model *incise_train_start(
 	const struct incise_pairs *pairs, const char *const *names,

@@ -779,6 +779,57 @@ static void test_report(void **state)
 	incise_model_free(model);
 }
 
+struct stopping {
+	volatile int stop;
+	int epochs;
+};
+
+static void stop_after_two(void *user, int epoch, double train_rmse, double check_rmse)
+{
+	struct stopping *stopping = user;
+
+	stopping->epochs = epoch;
+	stopping->stop = epoch >= 2;
+}
+
+/* Stopped before it begins, or between two epochs, training fails and changes nothing. */
+static void test_training_can_be_stopped(void **state)
+{
+	double rows[200 * 3];
+	const int mfs[] = {4, 3};
+	const double min[] = {0, 0}, max[] = {1, 1};
+	struct incise_pairs train = {rows, 200, 2};
+	struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
+	struct incise_train_options options;
+	struct incise_error err = {0};
+	int chosen[] = {0, 0};
+	static const char *const names[] = {"a", "b", "y"};
+
+	for (int i = 0; i < 200; i++) {
+		rows[3 * i] = i * 37 % 101 / 100.0;
+		rows[3 * i + 1] = i * 53 % 97 / 96.0;
+		rows[3 * i + 2] = sin(9 * rows[3 * i]) + rows[3 * i + 1];
+	}
+	for (int k = 0; k < 4; k++) {
+		struct stopping stopping = {.stop = k < 2};
+
+		incise_train_options_init(&options);
+		options.classic = k % 2;
+		options.stop = &stopping.stop;
+		options.progress = stop_after_two;
+		options.user = &stopping;
+		assert_int_equal(incise_train(model, &train, NULL, &options, NULL, &err),
+				 -ECANCELED);
+		assert_string_equal(err.text, "training was stopped");
+		assert_int_equal(stopping.epochs, k < 2 ? 0 : 2);
+		assert_true(incise_model_rule(model, 0)->p[0] == 0);
+		if (k < 2)
+			assert_null(incise_train_start(&train, names, INCISE_MF_GAUSS,
+						       chosen, &options, &err));
+	}
+	incise_model_free(model);
+}
+
 #define GROUPS 60
 #define PER_GROUP 10
 
@@ -887,6 +938,7 @@ int main(void)
 		cmocka_unit_test(test_extreme_data),
 		cmocka_unit_test(test_too_little_data),
 		cmocka_unit_test(test_report),
+		cmocka_unit_test(test_training_can_be_stopped),
 		cmocka_unit_test(test_new_groups_are_covered),
 		cmocka_unit_test(test_sd_grows_where_data_are_missing),
 	};
