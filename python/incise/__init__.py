@@ -11,22 +11,29 @@ name ends in _ns. Everything is in the C library; this package calls it by ctype
 from ._library import VERSION as __version__
 from ._library import Error, Invalid, NotFound
 from .arrow import Batch, Field, Table
+from .model import CompiledModel, Model, TrainReport, Variable, load, train
 from .recording import Info, Recording, Stream, open
 from .verify import Finding, Report, verify
 
 __all__ = [
     "Batch",
+    "CompiledModel",
     "Error",
     "Field",
     "Finding",
     "Info",
     "Invalid",
+    "Model",
     "NotFound",
     "Recording",
     "Report",
     "Stream",
     "Table",
+    "TrainReport",
+    "Variable",
+    "load",
     "open",
+    "train",
     "verify",
     "__version__",
 ]

@@ -1,0 +1,737 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Fuzzy force models: evaluated, saved, compiled to fixed point, and learnt from data."""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import math
+import os
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
+
+from . import _library
+from ._library import ArrowArrayStream, Failure, Invalid, c_bool, c_char, c_double, c_int, c_void_p
+from ._library import function, text
+from .recording import PathLike, Recording
+
+INPUTS_MAX, RULES_MAX, NAME_MAX = 8, 256, 64
+_doubles = ctypes.POINTER(c_double)
+
+
+class VariableStruct(ctypes.Structure):
+    """struct incise_variable"""
+
+    _fields_ = [("name", c_char * NAME_MAX), ("min", c_double), ("max", c_double)]
+    c_name = "struct incise_variable"
+
+
+class ModelInfoStruct(ctypes.Structure):
+    """struct incise_model_info"""
+
+    _fields_ = [
+        ("name", c_char * NAME_MAX),
+        ("n_inputs", c_int),
+        ("n_rules", c_int),
+        ("and_method", c_int),
+        ("input", VariableStruct * INPUTS_MAX),
+        ("output", VariableStruct),
+        ("n_mfs", c_int * INPUTS_MAX),
+    ]
+    c_name = "struct incise_model_info"
+
+
+class PairsStruct(ctypes.Structure):
+    """struct incise_pairs"""
+
+    _fields_ = [("rows", _doubles), ("n", ctypes.c_size_t), ("n_inputs", c_int)]
+    c_name = "struct incise_pairs"
+
+
+class SideStruct(ctypes.Structure):
+    """struct incise_train_side"""
+
+    _fields_ = [("pairs", PairsStruct), ("groups", ctypes.POINTER(c_int)), ("n_groups", c_int)]
+    c_name = "struct incise_train_side"
+
+
+_Progress = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_double, c_double)
+
+
+class TrainOptionsStruct(ctypes.Structure):
+    """struct incise_train_options"""
+
+    _fields_ = [
+        ("epochs", c_int),
+        ("step", c_double),
+        ("ridge", c_double),
+        ("classic", c_bool),
+        ("groups", ctypes.POINTER(c_int)),
+        ("seed", ctypes.c_uint64),
+        ("progress", _Progress),
+        ("user", c_void_p),
+        ("starts", c_int),
+        ("stop", ctypes.POINTER(c_int)),
+        ("uncertainty", ctypes.POINTER(c_void_p)),
+    ]
+    c_name = "struct incise_train_options"
+
+
+class TrainReportStruct(ctypes.Structure):
+    """struct incise_train_report"""
+
+    _fields_ = [
+        ("epochs", c_int),
+        ("best_epoch", c_int),
+        ("ridge", c_double),
+        ("train_rmse", c_double),
+        ("check_rmse", c_double),
+        ("condition", c_double),
+        ("parameters", c_int),
+        ("rules_unfired", c_int),
+        ("train_r2", c_double),
+        ("check_r2", c_double),
+        ("crossval_rmse", c_double),
+        ("start", c_int),
+        ("pairs_tuned", ctypes.c_size_t),
+        ("unfired", c_bool * RULES_MAX),
+    ]
+    c_name = "struct incise_train_report"
+
+
+class BaselinesStruct(ctypes.Structure):
+    """struct incise_baselines"""
+
+    _fields_ = [("mean", c_double), ("linear", c_double), ("knn", c_double), ("k", c_int)]
+    c_name = "struct incise_baselines"
+
+
+class FixedOptionsStruct(ctypes.Structure):
+    """struct incise_fixed_options"""
+
+    _fields_ = [("budget", c_double), ("arithmetic", c_int), ("cells", c_int)]
+    c_name = "struct incise_fixed_options"
+
+
+class FixedInputStruct(ctypes.Structure):
+    """struct incise_fixed_input"""
+
+    _fields_ = [
+        ("name", ctypes.c_char_p),
+        ("min", ctypes.c_int32),
+        ("max", ctypes.c_int32),
+        ("n_mfs", ctypes.c_int32),
+        ("cell_shift", ctypes.c_int32),
+        ("cells", ctypes.c_int32),
+        ("values", ctypes.POINTER(ctypes.c_int32)),
+    ]
+    c_name = "struct incise_fixed_input"
+
+
+class FixedStruct(ctypes.Structure):
+    """struct incise_fixed"""
+
+    _fields_ = [
+        ("arithmetic", c_int),
+        ("n_inputs", ctypes.c_int32),
+        ("n_rules", ctypes.c_int32),
+        ("shift_a", ctypes.c_int32),
+        ("shift_b", ctypes.c_int32),
+        ("bound", ctypes.c_uint64),
+        ("input", FixedInputStruct * 2),
+        ("name", ctypes.c_char_p),
+        ("output", ctypes.c_char_p),
+        ("data", c_void_p),
+        ("blob", c_void_p),
+        ("size", ctypes.c_uint32),
+    ]
+    c_name = "struct incise_fixed"
+
+
+_path = ctypes.c_char_p
+_library.declare(
+    "libincise",
+    {
+        "incise_model_load": (c_void_p, _path, c_void_p),
+        "incise_model_save": (c_int, c_void_p, _path, c_void_p),
+        "incise_model_free": (None, c_void_p),
+        "incise_model_info": (ctypes.POINTER(ModelInfoStruct), c_void_p),
+        "incise_model_set_clamp": (None, c_void_p, c_bool),
+        "incise_model_eval_many": (None, c_void_p, c_void_p, ctypes.c_size_t, c_void_p, c_void_p),
+        "incise_uncertainty_load": (c_void_p, _path, c_void_p, c_void_p),
+        "incise_uncertainty_save": (c_int, c_void_p, _path, c_void_p),
+        "incise_uncertainty_free": (None, c_void_p),
+        "incise_uncertainty_noise": (c_double, c_void_p),
+        "incise_uncertainty_sd_many": (
+            None,
+            c_void_p,
+            c_void_p,
+            c_void_p,
+            ctypes.c_size_t,
+            c_void_p,
+        ),
+        "incise_fixed_compile": (
+            ctypes.POINTER(FixedStruct),
+            c_void_p,
+            ctypes.POINTER(FixedOptionsStruct),
+            c_void_p,
+        ),
+        "incise_fixed_load": (ctypes.POINTER(FixedStruct), _path, c_void_p),
+        "incise_fixed_save": (c_int, ctypes.POINTER(FixedStruct), _path, c_void_p),
+        "incise_fixed_free": (None, ctypes.POINTER(FixedStruct)),
+        "incise_fixed_bound": (c_double, ctypes.POINTER(FixedStruct)),
+        "incise_fixed_arithmetic_name": (ctypes.c_char_p, c_int),
+        "incise_fixed_options_init": (None, ctypes.POINTER(FixedOptionsStruct)),
+        "incise_fixed_eval_double": (c_double, ctypes.POINTER(FixedStruct), c_void_p),
+        "incise_fixed_eval_batch": (
+            None,
+            ctypes.POINTER(FixedStruct),
+            c_void_p,
+            c_void_p,
+            ctypes.c_size_t,
+        ),
+    },
+)
+_names = ctypes.POINTER(ctypes.c_char_p)
+_library.declare(
+    "libincise-learn",
+    {
+        "incise_dataset_read_where": (
+            c_void_p,
+            _path,
+            _names,
+            c_int,
+            ctypes.c_char_p,
+            ctypes.c_char_p,
+            ctypes.POINTER(ctypes.c_size_t),
+            c_void_p,
+        ),
+        "incise_dataset_from_arrow": (
+            c_void_p,
+            ctypes.POINTER(ArrowArrayStream),
+            _names,
+            c_int,
+            ctypes.c_char_p,
+            ctypes.c_char_p,
+            ctypes.POINTER(ctypes.c_size_t),
+            c_void_p,
+        ),
+        "incise_dataset_free": (None, c_void_p),
+        "incise_dataset_rows": (ctypes.c_size_t, c_void_p),
+        "incise_train_options_init": (None, ctypes.POINTER(TrainOptionsStruct)),
+        "incise_train_split": (
+            c_int,
+            c_void_p,
+            c_double,
+            ctypes.c_uint64,
+            ctypes.POINTER(SideStruct),
+            ctypes.POINTER(SideStruct),
+            c_void_p,
+        ),
+        "incise_train_side_free": (None, ctypes.POINTER(SideStruct)),
+        "incise_train_start": (
+            c_void_p,
+            ctypes.POINTER(PairsStruct),
+            _names,
+            c_int,
+            ctypes.POINTER(c_int),
+            ctypes.POINTER(TrainOptionsStruct),
+            c_void_p,
+        ),
+        "incise_train": (
+            c_int,
+            c_void_p,
+            ctypes.POINTER(PairsStruct),
+            ctypes.POINTER(PairsStruct),
+            ctypes.POINTER(TrainOptionsStruct),
+            ctypes.POINTER(TrainReportStruct),
+            c_void_p,
+        ),
+        "incise_baselines": (
+            c_int,
+            ctypes.POINTER(PairsStruct),
+            ctypes.POINTER(c_int),
+            ctypes.POINTER(PairsStruct),
+            ctypes.POINTER(BaselinesStruct),
+            c_void_p,
+        ),
+    },
+)
+
+
+class Variable(NamedTuple):
+    """An input or the output of a model, with the range that it was trained on."""
+
+    name: str
+    min: float
+    max: float
+
+
+class Points:
+    """Inputs of a model as one block of doubles, in the form that they came in."""
+
+    def __init__(self, x: Any, n_inputs: int):
+        self.array = self._of_numpy(x)
+        if self.array is not None:
+            self._check_shape(self.array.shape, n_inputs)
+            self.shape = self.array.shape[:-1]
+            self.n = math.prod(self.shape)
+            self.address = self.array.ctypes.data
+            return
+        rows, self.shape = self._of_lists(x, n_inputs)
+        self.n = len(rows) // n_inputs
+        self._block = (c_double * max(len(rows), 1))(*rows)
+        self.address = ctypes.addressof(self._block)
+
+    @staticmethod
+    def _of_numpy(x: Any) -> Any:
+        """An array of doubles, or None for plain lists and numbers without numpy."""
+        import sys
+
+        numpy = sys.modules.get("numpy")
+        if numpy is None:
+            if not hasattr(x, "__array__"):
+                return None
+            import numpy
+        elif isinstance(x, (tuple, list)) and x and isinstance(x[0], (int, float)):
+            return None
+        try:
+            return numpy.ascontiguousarray(x, dtype=numpy.float64)
+        except (TypeError, ValueError) as failure:
+            raise Invalid(errno.EINVAL, f"inputs of a model: {failure}") from None
+
+    @staticmethod
+    def _check_shape(shape: Tuple[int, ...], n_inputs: int) -> None:
+        if not shape or shape[-1] != n_inputs:
+            raise Invalid(
+                errno.EINVAL,
+                f"inputs have the shape {tuple(shape)}; the model has {n_inputs} inputs, so the "
+                f"last length must be {n_inputs}",
+            )
+
+    @classmethod
+    def _of_lists(cls, x: Any, n_inputs: int) -> Tuple[List[float], Optional[Tuple[int, ...]]]:
+        try:
+            single = not x or isinstance(x[0], (int, float))
+            rows = [x] if single else list(x)
+            numbers = [float(value) for row in rows for value in row]
+        except (TypeError, ValueError, KeyError) as failure:
+            raise Invalid(errno.EINVAL, f"inputs of a model: {failure}") from None
+        for row in rows:
+            cls._check_shape((len(row),), n_inputs)
+        return numbers, None if single else (len(rows),)
+
+    def results(self, width: int = 1) -> Tuple[Any, int]:
+        """Room for width results a point: (block, its address)."""
+        if self.array is not None:
+            import numpy
+
+            shape = self.shape + ((width,) if width > 1 else ())
+            block = numpy.empty(shape, dtype=numpy.float64)
+            return block, block.ctypes.data
+        block = (c_double * max(self.n * width, 1))()
+        return block, ctypes.addressof(block)
+
+    def finish(self, block: Any, width: int = 1) -> Any:
+        """Results in the form of the inputs: an array, a list, or for one point a number."""
+        if self.array is not None:
+            return block if block.shape else float(block)
+        values: List[Any] = list(block[: self.n * width])
+        if width > 1:
+            values = [values[i : i + width] for i in range(0, len(values), width)]
+        return values if self.shape is not None else values[0]
+
+
+class CompiledModel:
+    """A model in fixed point, with a certified bound of its error: a .fx file."""
+
+    def __init__(self, pointer: Any):
+        self._pointer = pointer
+
+    @classmethod
+    def load(cls, path: PathLike) -> "CompiledModel":
+        """Read a .fx file."""
+        failure = Failure()
+        return cls(
+            failure.require(
+                function("incise_fixed_load")(_library.path_bytes(path), failure.ref)
+            )
+        )
+
+    def __del__(self) -> None:
+        if getattr(self, "_pointer", None):
+            function("incise_fixed_free")(self._pointer)
+
+    @property
+    def bound(self) -> float:
+        """Certified largest error, in the output's unit."""
+        return function("incise_fixed_bound")(self._pointer)
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file."""
+        return self._pointer.contents.size
+
+    @property
+    def arithmetic(self) -> str:
+        """direct, table or force."""
+        return text(function("incise_fixed_arithmetic_name")(self._pointer.contents.arithmetic))
+
+    def __call__(self, x: Any) -> Any:
+        """The output at one point, or at each point of an array (…, inputs)."""
+        points = Points(x, self._pointer.contents.n_inputs)
+        block, address = points.results()
+        one = function("incise_fixed_eval_double")
+        step = 8 * self._pointer.contents.n_inputs
+        out = (c_double * points.n).from_address(address) if points.n else []
+        for k in range(points.n):
+            out[k] = one(self._pointer, points.address + k * step)
+        return points.finish(block)
+
+    def save(self, path: PathLike) -> None:
+        """Write the .fx file, whole or not at all."""
+        failure = Failure()
+        failure.check(
+            function("incise_fixed_save")(self._pointer, _library.path_bytes(path), failure.ref)
+        )
+
+
+class TrainReport(NamedTuple):
+    """Report of :func:`incise.train`; errors in the output's unit, NaN without data."""
+
+    pairs: int  #: trained from
+    check_pairs: int  #: kept back
+    left_out: int  #: rows where the blade did not advance
+    epochs: int
+    ridge: float
+    train_rms_error: float
+    check_rms_error: float
+    crossval_rms_error: float
+    condition: float
+    parameters: int
+    rules_unfired: int
+    train_r2: float
+    check_r2: float
+    baselines: Dict[str, float]  #: rms error of mean, linear, knn on the pairs kept back
+
+
+class Model:
+    """A fuzzy model: call it with inputs in the order of :attr:`inputs`.
+
+    model((5, 20)) is one force; model(x) of an array (…, inputs) an array; with sd=True a pair of
+    these, the output and its standard deviation for a new cut.
+    """
+
+    def __init__(self, pointer: int, uncertainty: Optional[int] = None):
+        self._pointer: Optional[int] = pointer
+        self._uncertainty = uncertainty
+        self.report: Optional[TrainReport] = None  #: of the training, if it was trained here
+
+    @classmethod
+    def load(cls, path: PathLike) -> "Model":
+        """Read a .fis file, and its standard deviation if PATH.sd is there."""
+        failure = Failure()
+        name = _library.path_bytes(path)
+        model = cls(failure.require(function("incise_model_load")(name, failure.ref)))
+        if os.path.exists(name + b".sd"):
+            model._uncertainty = failure.require(
+                function("incise_uncertainty_load")(name + b".sd", model._pointer, failure.ref)
+            )
+        return model
+
+    def __del__(self) -> None:
+        if getattr(self, "_uncertainty", None):
+            function("incise_uncertainty_free")(self._uncertainty)
+        if getattr(self, "_pointer", None):
+            function("incise_model_free")(self._pointer)
+
+    def __repr__(self) -> str:
+        inputs = ", ".join(variable.name for variable in self.inputs)
+        return f"<incise.Model {self.output.name} of {inputs}, {self.n_rules} rules>"
+
+    def _info(self) -> ModelInfoStruct:
+        return function("incise_model_info")(self._pointer).contents
+
+    @property
+    def inputs(self) -> Tuple[Variable, ...]:
+        """Inputs, with their ranges."""
+        info = self._info()
+        return tuple(
+            Variable(text(v.name), v.min, v.max) for v in info.input[: info.n_inputs]
+        )
+
+    @property
+    def output(self) -> Variable:
+        """The output, with the range that it was trained on."""
+        v = self._info().output
+        return Variable(text(v.name), v.min, v.max)
+
+    @property
+    def n_rules(self) -> int:
+        """Rules."""
+        return self._info().n_rules
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of new cuts where data are dense; NaN without a .sd file."""
+        if not self._uncertainty:
+            return math.nan
+        return function("incise_uncertainty_noise")(self._uncertainty)
+
+    def __call__(self, x: Any, sd: bool = False) -> Any:
+        """The output; with sd=True (output, standard deviation)."""
+        points = Points(x, self._info().n_inputs)
+        block, address = points.results()
+        function("incise_model_eval_many")(
+            self._pointer, points.address, points.n, address, None
+        )
+        if not sd:
+            return points.finish(block)
+        if not self._uncertainty:
+            raise Invalid(
+                errno.EINVAL,
+                "the model has no standard deviation; train it here, or load a .fis that has its "
+                ".fis.sd beside it",
+            )
+        spread, spread_address = points.results()
+        function("incise_uncertainty_sd_many")(
+            self._uncertainty, self._pointer, points.address, points.n, spread_address
+        )
+        return points.finish(block), points.finish(spread)
+
+    def gradient(self, x: Any) -> Any:
+        """Slopes of the output by each input, in the last dimension; 0 outside the ranges."""
+        n_inputs = self._info().n_inputs
+        points = Points(x, n_inputs)
+        _, address = values = points.results()
+        block, gradient_address = points.results(n_inputs)
+        function("incise_model_eval_many")(
+            self._pointer, points.address, points.n, address, gradient_address
+        )
+        del values
+        return points.finish(block, n_inputs)
+
+    def save(self, path: PathLike) -> None:
+        """Write the .fis file, and its standard deviation as PATH.sd; each whole or not at all."""
+        failure = Failure()
+        name = _library.path_bytes(path)
+        failure.check(function("incise_model_save")(self._pointer, name, failure.ref))
+        if self._uncertainty:
+            failure.check(
+                function("incise_uncertainty_save")(
+                    self._uncertainty, name + b".sd", failure.ref
+                )
+            )
+
+    def compile(self, budget_mN: float = 0.1) -> CompiledModel:
+        """Compile to fixed point; the certified error is at most budget_mN (0: any)."""
+        options = FixedOptionsStruct()
+        function("incise_fixed_options_init")(ctypes.byref(options))
+        options.budget = budget_mN * 1e-3
+        failure = Failure()
+        return CompiledModel(
+            failure.require(
+                function("incise_fixed_compile")(
+                    self._pointer, ctypes.byref(options), failure.ref
+                )
+            )
+        )
+
+
+def _name_array(names: Sequence[str]) -> Any:
+    return (ctypes.c_char_p * len(names))(*(name.encode() for name in names))
+
+
+def _read_dataset(
+    data: Any, columns: Sequence[str], group: Optional[str], where: Optional[str]
+) -> Tuple[int, int]:
+    """A dataset of a path or a table, and how many rows were left out."""
+    failure, left_out = Failure(), ctypes.c_size_t()
+    rest = (
+        _name_array(columns),
+        len(columns),
+        group.encode() if group else None,
+        where.encode() if where else None,
+        ctypes.byref(left_out),
+        failure.ref,
+    )
+    if isinstance(data, Recording):
+        data = data.pairs(depth_bins=12, velocity_bins=10, by_cut=True)
+    if isinstance(data, (str, bytes, os.PathLike)):
+        name = _library.path_bytes(data)
+        if name.rstrip(b"/").endswith((b".rec", b".part")):
+            return _read_dataset(Recording(os.fsdecode(name)), columns, group, where)
+        dataset = function("incise_dataset_read_where")(name, *rest)
+    else:
+        from ._producer import open_stream
+
+        stream, keep = open_stream(data)
+        dataset = function("incise_dataset_from_arrow")(ctypes.byref(stream), *rest)
+        del keep
+    return failure.require(dataset), left_out.value
+
+
+class _Training:
+    """One training; frees what it holds."""
+
+    def __init__(self, dataset: int, share: float, options: TrainOptionsStruct):
+        self.dataset, self.options = dataset, options
+        self.fit, self.check = SideStruct(), SideStruct()
+        self.stop = c_int(0)
+        self.failure = Failure()
+        self.has_check = share != 0
+        options.stop = ctypes.pointer(self.stop)
+        self.failure.check(
+            function("incise_train_split")(
+                dataset,
+                share,
+                options.seed,
+                ctypes.byref(self.fit),
+                ctypes.byref(self.check),
+                self.failure.ref,
+            )
+        )
+        options.groups = self.fit.groups
+
+    def close(self) -> None:
+        function("incise_train_side_free")(ctypes.byref(self.fit))
+        if self.has_check:
+            function("incise_train_side_free")(ctypes.byref(self.check))
+        function("incise_dataset_free")(self.dataset)
+
+    def start(self, names: Sequence[str], mf_type: int, mf: Any) -> int:
+        return self.failure.require(
+            function("incise_train_start")(
+                ctypes.byref(self.fit.pairs),
+                _name_array(names),
+                mf_type,
+                mf,
+                ctypes.byref(self.options),
+                self.failure.ref,
+            )
+        )
+
+    def run(self, model: Model) -> TrainReportStruct:
+        report, uncertainty = TrainReportStruct(), c_void_p()
+        self.options.uncertainty = ctypes.pointer(uncertainty)
+        self.failure.check(
+            function("incise_train")(
+                model._pointer,
+                ctypes.byref(self.fit.pairs),
+                ctypes.byref(self.check.pairs) if self.has_check else None,
+                ctypes.byref(self.options),
+                ctypes.byref(report),
+                self.failure.ref,
+            )
+        )
+        model._uncertainty = uncertainty.value
+        return report
+
+    def baselines(self) -> Dict[str, float]:
+        if not self.has_check:
+            return {}
+        result = BaselinesStruct()
+        self.failure.check(
+            function("incise_baselines")(
+                ctypes.byref(self.fit.pairs),
+                self.fit.groups,
+                ctypes.byref(self.check.pairs),
+                ctypes.byref(result),
+                self.failure.ref,
+            )
+        )
+        return {"mean": result.mean, "linear": result.linear, "knn": result.knn}
+
+
+_mf_types = {"gaussmf": 0, "gbellmf": 1}
+
+
+def _mf_counts(mf: Union[str, Sequence[int], None], n_inputs: int) -> Any:
+    if mf is None:
+        mf = (5, 4) if n_inputs == 2 else (3,) * n_inputs
+    if isinstance(mf, str):
+        if mf != "auto":
+            raise Invalid(errno.EINVAL, f"mf={mf!r}: give 'auto', or a count for each input")
+        mf = (0,) * n_inputs
+    elif len(mf) != n_inputs or not all(1 <= int(n) <= 32 for n in mf):
+        raise Invalid(
+            errno.EINVAL, f"mf={tuple(mf)!r}: give a count from 1 to 32 for each of {n_inputs} inputs"
+        )
+    return (c_int * INPUTS_MAX)(*(int(n) for n in mf))
+
+
+def train(
+    data: Any,
+    *,
+    inputs: Sequence[str] = ("depth_mm", "velocity_mm_s"),
+    target: str = "force_N",
+    group: Optional[str] = None,
+    check: float = 0,
+    seed: int = 1,
+    mf: Union[str, Sequence[int], None] = None,
+    mf_type: str = "gaussmf",
+    epochs: int = 80,
+    ridge: Optional[float] = None,
+    starts: int = 3,
+    classic: bool = False,
+    all_rows: bool = False,
+) -> Model:
+    """Learn a model as `incise train` does: same data, options and seed give the same model.
+
+    data: a CSV file, a recording (its pairs averaged in 12 × 10 bins, by cut), a table (anything with
+    ``__arrow_c_stream__``), a DataFrame, or {column: values}.
+    group: column that names the cut; cross-validation and check keep whole cuts together.
+    check: share that is kept back, 0 to 1; its error is in ``model.report``.
+    mf: membership functions of each input (default 5, 4; else 3 each), or "auto".
+    all_rows: also take rows whose column ``advancing`` is 0.
+    Ctrl-C ends the training.
+    """
+    if mf_type not in _mf_types:
+        raise Invalid(errno.EINVAL, f"mf_type={mf_type!r}: gaussmf or gbellmf")
+    if not 0 <= check < 1:
+        raise Invalid(errno.EINVAL, f"check={check!r}: a share from 0 to below 1")
+    names = [*inputs, target]
+    counts = _mf_counts(mf, len(inputs))
+    options = TrainOptionsStruct()
+    function("incise_train_options_init")(ctypes.byref(options))
+    options.epochs, options.seed, options.starts = epochs, seed, starts
+    options.classic = classic
+    if ridge is not None:
+        options.ridge = ridge
+    dataset, left_out = _read_dataset(data, names, group, None if all_rows else "advancing")
+    training = _Training(dataset, check, options)
+
+    def learn() -> Model:
+        model = Model(training.start(names, _mf_types[mf_type], counts))
+        report = training.run(model)
+        model.report = TrainReport(
+            training.fit.pairs.n,
+            training.check.pairs.n if training.has_check else 0,
+            left_out,
+            report.epochs,
+            report.ridge,
+            report.train_rmse,
+            report.check_rmse,
+            report.crossval_rmse,
+            report.condition,
+            report.parameters,
+            report.rules_unfired,
+            report.train_r2,
+            report.check_r2,
+            training.baselines(),
+        )
+        return model
+
+    def cancel() -> None:
+        training.stop.value = 1
+
+    try:
+        return _library.call_interruptible(learn, cancel)
+    finally:
+        training.close()
+
+
+def load(path: PathLike) -> Union[Model, CompiledModel]:
+    """Read a model, .fis or .fx."""
+    if os.fspath(path).endswith(".fx"):
+        return CompiledModel.load(path)
+    return Model.load(path)
