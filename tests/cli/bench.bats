@@ -222,7 +222,7 @@ setup() {
 	[ "$(head -c 8 "a folder/b/chart.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
 	grep -q '<svg' "a folder/b/chart.svg"
 	# one text per measured row at least
-	for name in double_libm fixed_table_64 force_table batch; do
+	for name in "double libm" "fixed table 64" "force table" batch; do
 		grep -q ">$name<" "a folder/b/chart.svg"
 	done
 	[ -f "a folder/b/plot/chart.gp" ]
@@ -306,7 +306,7 @@ setup() {
 	run -0 --separate-stderr incise bench training --quick --plot c
 	[ -z "$stderr" ]
 	[[ "$output" == *$'\n'"classic "*$'\n'"default "* ]]
-	grep -q '>default_chosen<' c.svg
+	grep -q '>default chosen<' c.svg
 	run -2 incise bench nothing
 }
 
@@ -577,7 +577,7 @@ rate() {
 		[ "$(head -c 8 "a folder/w-$part.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
 		grep -q '<svg' "a folder/w-$part.svg"
 	done
-	grep -q 'delay 2' "a folder/w-map.svg"
+	grep -q 'delay of 2 ticks' "a folder/w-map.svg"
 	grep -q 'trapezoid' "a folder/w-integrators.svg"
 }
 
@@ -605,7 +605,7 @@ rate() {
 	[ "$(key r.json "rows[0].region") $(key r.json "rows[1].region")" = "follows whole" ]
 	if command -v gnuplot >/dev/null; then
 		incise bench vision --quick --plot x
-		grep -q '>rgb_1280<' x.svg
+		grep -q '>rgb 1280<' x.svg
 	fi
 	run -2 --separate-stderr incise bench capture --plot x
 	bad_usage "--plot does not go with 'capture'"

@@ -169,7 +169,7 @@ at_most() {
 		grep -q '<svg' "a folder/$name.svg"
 	done
 	grep -q 'surgeon: two cuts' "a folder/pose-rates.svg"
-	grep -q 'line_live, stated' "a folder/timeline-windows.svg"
+	grep -q 'line live, stated' "a folder/timeline-windows.svg"
 }
 
 @test "bench pose and timeline: bad usage" {

@@ -63,7 +63,7 @@ draws() {
 	holds "$(key r.json beside.runs[1].frames_hz) > 0"
 	holds "$(key r.json beside.p999_us) > 0 && $(key r.json beside.p999_view_us) > 0"
 	[ "$(head -c 8 "a folder/v.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
-	grep -q 'texture 1024' "a folder/v.svg"
+	grep -q 'texture of 1024' "a folder/v.svg"
 	grep -q '50 Hz' "a folder/v-frames.svg"
 	holds "$(key r.json frames[0].in_20_ms_percent) >= 0 && $(key r.json frames[0].in_20_ms_percent) <= 100"
 	holds "$(key r.json absorbed.whole_median_ms) > 0"

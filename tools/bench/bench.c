@@ -409,7 +409,8 @@ void bench_table(struct bench_run *run, const struct bench_table *table, const v
 
 /* --- plots --- */
 
-#define WIDTH_LEAST 640 /* of a title */
+/* px: of a title; and so all figures are at about the same scale on a page. */
+#define WIDTH_LEAST 900
 
 const struct bench_table bench_points = {
 	.row_bytes = sizeof(struct bench_point),

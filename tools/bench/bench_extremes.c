@@ -445,7 +445,7 @@ const struct bench bench_extremes = {
 	.takes_seed = true,
 	.run = run_extremes,
 	.plots = {{.script = text_extremes_gp,
-		   .width = 1100,
-		   .height = 1300,
+		   .width = 900,
+		   .height = 840,
 		   .data = {&stiff, "path"}}},
 };

@@ -309,6 +309,6 @@ const struct bench bench_integers = {
 	.run = run_integers,
 	.plots = {{.script = text_integers_gp,
 		   .width = 900,
-		   .height = 460,
+		   .height = 480,
 		   .data = {&bench_points, "block"}}},
 };

@@ -512,7 +512,7 @@ const struct bench bench_precision = {
 	.n_operands = 1,
 	.run = run,
 	.plots = {{.script = text_precision_gp,
-		   .width = 1100,
-		   .height = 800,
+		   .width = 1000,
+		   .height = 700,
 		   .data = {&rows_table, "kind", "failed="}}},
 };

@@ -692,7 +692,7 @@ const struct bench bench_scenes = {
 	.takes_profile = true,
 	.run = run_or_profile,
 	.plots = {{.script = text_scenes_gp,
-		   .width = 1150,
+		   .width = 900,
 		   .height = 46,
 		   .down = "name",
 		   .margin = 160,

@@ -502,7 +502,7 @@ const struct bench bench_training = {
 	.summary = "error on unseen cuts over the seconds that training takes",
 	.run = run,
 	.plots = {{.script = text_training_gp,
-		   .width = 1100,
-		   .height = 800,
+		   .width = 1000,
+		   .height = 700,
 		   .data = {&rows_table, "kind", "failed="}}},
 };

@@ -245,7 +245,7 @@ const struct bench bench_vision = {
 	.summary = "error of the exposed length over the time per picture",
 	.run = run,
 	.plots = {{.script = text_vision_gp,
-		   .width = 1100,
-		   .height = 800,
+		   .width = 1000,
+		   .height = 700,
 		   .data = {&rows_table, "region", "failed="}}},
 };

@@ -492,13 +492,13 @@ static void run_both(struct run *run, const char *scene, struct wakeup *row)
 	row->p999 = quantile_of(&row->loop, 0.999);
 	row->tick_max_us = run->stats.tick_max_ns * 1e-3;
 	row->skipped = run->stats.skipped;
-	snprintf(row->title, sizeof(row->title), "99.9 %%: %.0f us", row->loop.p999);
+	snprintf(row->title, sizeof(row->title), "99.9 %%: %.0f µs", row->loop.p999);
 	if (!row->no_cyclictest) {
 		row->cyclictest = lateness_of(c->late_us, c->max_us);
 		row->ratio = row->loop.p999 / row->cyclictest.p999;
 		row->machine = blame(run);
 		snprintf(row->title, sizeof(row->title),
-			 "99.9 %%: %.0f us, cyclictest %.0f us", row->loop.p999,
+			 "99.9 %%: %.0f µs, cyclictest %.0f µs", row->loop.p999,
 			 row->cyclictest.p999);
 	}
 }

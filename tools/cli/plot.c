@@ -130,9 +130,9 @@ FILE *plot_begin(const char *folder, const char *name, int width, int height)
 	write_style(folder);
 	fprintf(script,
 		"# gnuplot -e \"ext='png'\" %s.gp\n"
-		"width = %d\nheight = %d\nload 'style.gp'\n"
+		"figure_width = %d\nfigure_height = %d\nload 'style.gp'\n"
 		"if (strstrt('png svg pdf', ext)) { set output '../%s.'.ext } \\\n"
-		"else { eval 'set terminal '.ext.' size '.width.','.height }\n",
+		"else { eval 'set terminal '.ext.' size '.figure_width.','.figure_height }\n",
 		name, width, height, name);
 	return script;
 }

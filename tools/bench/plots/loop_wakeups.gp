@@ -1,28 +1,36 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# Lateness of the loop and of cyclictest: a row of histograms for each rate.
-set multiplot layout words(data_rate_hz),words(data_load) title sprintf("How late the loop's \
-thread wakes, and cyclictest beside it%s%s, %.3g s each", words(data_load) > 1 ? ": " : "\n", \
-	policy, seconds) font large
+# Lateness of the loop and of cyclictest: a column of histograms for each rate.
+both = strstrt(data_blocks, "cyclictest") > 0
+rows = words(data_load)
+set multiplot layout rows,words(data_rate_hz) columnsfirst margins screen 90.0 / figure_width, \
+	1 - 20.0 / figure_width, (both ? 110.0 : 70.0) / figure_height, 1 - 100.0 / figure_height \
+	spacing screen 40.0 / figure_width, 75.0 / figure_height title sprintf("Lateness of the loop's \
+wake-ups%s\n%s, %.3g s each", both ? ", and of cyclictest next to it" : "", policy, seconds) noenhanced
+stats more using (column("y") > 0 ? column("x") : NaN) nooutput
 set logscale xy
-set xrange [0.9:20000]
+set xrange [STATS_min / 1.5:STATS_max * 2]
 set yrange [least:1]
-set format xy '10^{%L}'
-
-set xlabel 'late / µs'
-set ylabel 'share of wake-ups'
-set style fill solid
-set key top right samplen 2
+set format y power
+if (STATS_max / STATS_min < 1e3) { eval 'set xtics ('.log_tics(STATS_min / 1.5, STATS_max * 2).')' } else { set format x power }
+set ylabel 'share of wake-ups / 1'
+set style fill solid noborder
+set key off
 share(none) = column("y") > 0 ? column("y") : 1e-9
 do for [b=1:words(data_blocks)] {
-	# "1000 idle 99.9 %: 155 us, cyclictest 101 us"
+	# "1000 idle 99.9 %: 155 µs, cyclictest 101 µs"
 	block = word(data_blocks, b)
 	name = word(block, 1).' '.word(block, 2)
-	both = strstrt(block, "cyclictest") > 0
+	peer = strstrt(block, "cyclictest") > 0
+	set xlabel b % rows == 0 ? 'lateness / µs' : ''
+	if (b == rows + 1) { unset ylabel; set format y '' }
 	set title sprintf("%g kHz, %s\n%s", word(block, 1) / 1e3, word(block, 2), \
 		block[strlen(name) + 2:*]) font small
-	plot more index name.' loop' using "x":(share(0)) with fillsteps fc rgb sky \
-			title 'loop', \
-		for [k=1:both] more index name.' cyclictest' using "x":(share(0)) \
-			with steps ls 2 title 'cyclictest'
+	histogram = "more index name.' loop' using 'x':(share(0)) with fillsteps fc rgb sky"
+	peers = "more index name.' cyclictest' using 'x':(share(0)) with steps lt 2"
+	eval 'plot '.histogram.(peer ? ', '.peers : '')
+}
+if (both) {
+	eval key_panel
+	plot NaN with boxes fc rgb sky title 'loop', NaN with lines lt 2 title 'cyclictest'
 }
 unset multiplot

@@ -1,49 +1,52 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # Error of the shown pose over the cost of a tick, or over the tracker's rate: a panel for each
-# motion, a colour for each method; the sixth panel is the key.
+# motion, a colour and marker for each method; the sixth panel is the key.
 rates = suffix eq "rates"
 methods = rates ? 8 : 7 # the exact pose is the last one, and has no cost
-set style line 11 lc rgb grey lw 1.3 pt 7
-set style line 12 lc rgb vermillion lw 1.3 pt 7
-set style line 13 lc rgb green lw 1.3 pt 7
-set style line 14 lc rgb blue lw 2.2 pt 7
-set style line 15 lc rgb orange lw 1.3 pt 7
-set style line 16 lc rgb sky lw 1.3 pt 7
-set style line 17 lc rgb purple lw 1.3 pt 7
-set style line 18 lc rgb ink lw 1 dt 3 pt 0
-set multiplot layout 2,3 title sprintf("Error of the shown pose over %s: a tracker that is \
-%g ms late, with %g mm of noise and %g %% lost", rates ? "the tracker's rate" : "its cost", \
-	delay_ms, noise_mm, lost * 100) font large
+title(k) = word("held line parabola library 'library, 5 µm' 'library, 100 µm' 'library, punctual' \
+'exact, as late as the tracker'", k)
+order = "8 2 3 1 5 6 4 7" # of colours: the library in blue, the held pose in grey
+do for [k=1:8] {
+	c = int(word(order, k))
+	set style line 10+k lc rgb (k == 8 ? ink : colour(c)) lw k == 4 ? 2.5 : 1.2 dt k == 8 ? 3 : 1 \
+		pt int(word('2 5 9 7 11 6 13 0', k))
+}
+stats data using (strcol("name") eq "exact_delayed" && !rates ? NaN : column("rms_mm")) nooutput
+if (!rates) {
+	stats data using "ns_p5" prefix "fast" nooutput
+	stats data using "ns_p95" prefix "slow" nooutput
+}
+set multiplot layout 2,3 margins screen 80.0 / figure_width, 1 - 10.0 / figure_width, \
+	60.0 / figure_height, 1 - 75.0 / figure_height spacing screen 30.0 / figure_width, 80.0 / figure_height \
+	title sprintf("Error of the shown pose over %s: tracker %g ms late, with %g mm of noise and %g %% lost", \
+	rates ? "the tracker's rate" : "its cost", delay_ms, noise_mm, lost * 100) noenhanced
 set logscale xy
-set ylabel 'rms error / mm'
-set format y '%g'
+set yrange [STATS_min / 1.5:STATS_max * 1.5]
 set key off
 if (rates) {
-	set xlabel 'rate of the tracker / Hz'
-	set xrange [50:1200]
 	set xtics (60, 120, 240, 500, 1000)
+	set xrange [50:1200]
 } else {
-	set xlabel 'time per tick / ns (bars: 5 to 95 %)'
-	set xrange [2:400]
-	set yrange [0.01:1]
+	set xrange [fast_min / 1.3:slow_max * 1.3]
 }
 block(k) = panel.' '.word(data_name, k)
-number(hz) = !rates && (hz == 60 || hz == 1000) ? sprintf('%g', hz) : ''
 x(none) = column(rates ? "tracker_hz" : "ns")
 bar(key) = column(rates ? "tracker_hz" : key)
+# In a plot over the cost a larger marker is of a faster tracker.
+size(none) = rates ? 0.7 : 0.35 + 0.3 * log(column("tracker_hz") / 60) / log(2) * 0.6
 do for [i=1:words(data_panel)] {
 	panel = word(data_panel, i)
-	set title panel
-	plot for [k=1:methods] data index block(k) using (x(0)):"rms_mm" \
-			with linespoints ls 10+k ps 0.7, \
-		for [k=1:methods] data index block(k) \
-			using (x(0)):"rms_mm":(bar("ns_p5")):(bar("ns_p95")) \
-			with xerrorbars ls 10+k ps 0.7, \
-		for [k=1:methods] data index block(k) \
-			using (x(0)):"rms_mm":(number(column("tracker_hz"))) \
-			with labels noenhanced left offset 0.4,0.4 font small
+	set title sprintf("(%s) %s", "abcdef"[i:i], panel) font small
+	set ylabel i % 3 == 1 ? 'rms error of the position / mm' : ''
+	set format y i % 3 == 1 ? '%g' : ''
+	set format x '%g'
+	set xlabel i > 2 ? (rates ? 'rate of the tracker / Hz' : 'time per tick / ns') : ''
+	plot for [k=1:methods] data index block(k) using (x(0)):"rms_mm" with lines ls 10+k, \
+		for [k=1:methods-rates] data index block(k) \
+			using (x(0)):"rms_mm":(size(0)) with points ls 10+k ps variable, \
+		for [k=1:(rates ? 0 : methods)] data index block(k) \
+			using (x(0)):"rms_mm":(bar("ns_p5")):(bar("ns_p95")) with xerrorbars ls 10+k lw 0.7 pt 0
 }
-if (!rates) { set label 1 'numbers: Hz of the tracker' at graph 0.1, 0.05 }
 unset logscale
 unset xlabel
 unset ylabel
@@ -52,9 +55,11 @@ unset xtics
 unset ytics
 unset border
 unset grid
-set key at graph 0.9, 0.95 top right Left reverse samplen 3 spacing 1.4 font large
+set key at graph 0.05, 0.9 top left spacing 1.3
 set xrange [0:1]
 set yrange [0:1]
-plot for [k=1:methods] NaN with linespoints ls 10+k \
-	title k < 8 ? word(data_name, k) : "exact, as late as the tracker"
+if (!rates) {
+	set label 1 "bars: 5 to 95 % of the runs\nlarger markers: faster tracker,\n60 to 1000 Hz" at graph 0.06, 0.17 font small
+}
+plot for [k=1:methods] NaN with linespoints ls 10+k ps 0.8 title title(k)
 unset multiplot

@@ -1,23 +1,35 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# Largest error over the time of an evaluation, a colour for each kind of evaluator.
-stats data using "ns" nooutput
-set title sprintf("Error over run time, %d rules\n%s, %s", rules, cpu, kernel)
-set xlabel 'time per evaluation / ns (bars: 5 to 95 % of the runs)'
-set ylabel 'largest error / N (thin lines: up to the certified bound)'
+# Largest error over the time of an evaluation, a colour and marker for each kind of evaluator.
+set title sprintf("Largest error of an evaluator over its run time, model of %d rules\n\
+bars: 5 to 95 %% of the runs; upward: to the certified bound\n%s, %s", rules, cpu, kernel)
+set xlabel 'median time per evaluation / ns'
+set ylabel 'largest error / N'
 set logscale xy
-set format y '%.0e'
-set xrange [STATS_min / 1.5:STATS_max * 3]
-set yrange [*:*] extend
-set offsets 0, 0, graph 0.1, graph 0.05
-set key outside bottom center horizontal
-set style line 6 lc rgb ink
+set format y power
 # An error of 0 has no place on a logarithmic axis.
-error(dummy) = column("max_error_N") > 1e-18 ? column("max_error_N") : 1e-18
+error(key) = column(key) > 1e-17 ? column(key) : 1e-17
+stats data using "ns_p5" prefix "fast" nooutput
+stats data using "ns_p95" prefix "slow" nooutput
+stats data using (error("max_error_N")) prefix "good" nooutput
+stats data using (error("max_error_N")) prefix "bad" nooutput
+stats data using "bound_N" prefix "bound" nooutput
+x0 = fast_min / 1.3
+x1 = slow_max * 1.3
+y0 = good_min / 10
+y1 = (bound_max > bad_max ? bound_max : bad_max) * 10
+eval name_margins
+x(key) = log_place(column(key), x0, x1)
+y(key) = log_place(error(key), y0, y1)
+stats data using (strcol("name") eq "name" ? NaN : name_point(words_of(strcol("name")), x("ns"), \
+	y("max_error_N"), x("ns_p5"), x("ns_p95"), y("max_error_N"), \
+	column("bound_N") > 0 ? y("bound_N") : y("max_error_N"))) nooutput
+eval name_points
+set xrange [x0:x1]
+set yrange [y0:y1]
+eval key_at
 plot for [i=1:words(data_kind)] data index word(data_kind, i) \
-		using "ns":(error(0)):(0):(column("bound_N") - error(0)) \
-		with vectors nohead ls i lw 0.5, \
+		using "ns":(error("max_error_N")):(0):(column("bound_N") - error("max_error_N")) \
+		with vectors nohead lt i lw 0.6, \
 	for [i=1:words(data_kind)] data index word(data_kind, i) \
-		using "ns":(error(0)):"ns_p5":"ns_p95" with xerrorbars ls i pt 7 ps 0.8 \
-		title word(data_kind, i), \
-	for [i=1:words(data_kind)] data index word(data_kind, i) using "ns":(error(0)):"name" \
-		with labels noenhanced left rotate by 25 offset 0.5,0.3 font small
+		using "ns":(error("max_error_N")):"ns_p5":"ns_p95" with xerrorbars lt i lw 1 \
+		title word(data_kind, i)

@@ -2,33 +2,46 @@
 # Time and instructions of a tick, a pair of bars for each scene: its own plan above the full
 # pipeline, each with its value at its end.
 stats data using "tick_ns" nooutput
+rows = STATS_records
+counted = exists("instructions_by")
 bar = 0.36
-height = 160 + 46 * STATS_records
-set multiplot layout 1,2 title sprintf("A tick of each scene, against the full pipeline\n%s, %s", \
-	cpu, kernel) font large
-set yrange [STATS_records - 0.4:-0.6]
-set xrange [0:*]
+few_key(k) = k ? "instructions" : "tick_ns"
+full_key(k) = k ? "full_instructions" : "full_ns"
+bigger(k) = column(few_key(k)) > column(full_key(k)) ? column(few_key(k)) : column(full_key(k))
+set multiplot layout 1,counted ? 2 : 1 title sprintf("A tick of each scene compared with the full pipeline\n%s, %s", \
+	cpu, kernel) noenhanced
+array most[2]
+do for [k=0:counted] {
+	stats data using (bigger(k)) nooutput
+	most[k + 1] = STATS_max
+}
+set yrange [rows - 0.4:-0.6]
 set offsets 0, graph 0.12, 0, 0
 set ytics nomirror scale 0
 set grid noytics
-set border 3
-set key at screen 0.57, screen 18.0 / height center maxrows 1
-set bmargin 5
-set lmargin at screen 0.17
-set rmargin at screen 0.56
-set xlabel 'median time of a tick / ns'
-set style fill solid 1 noborder
-bars(few, full, names) = sprintf("\
-data using (0):($0):(0):'%s':($0-bar):($0)%s with boxxyerror fc rgb blue title 'only what the scene needs', \
-data using '%s':($0-bar/2):(sprintf('%%.0f', column('%s'))) with labels noenhanced left offset 0.6,0 font small, \
-data using (0):($0):(0):'%s':($0):($0+bar) with boxxyerror fc rgb orange title 'every stage kept, neutral', \
-data using '%s':($0+bar/2):(sprintf('%%.0f', column('%s'))) with labels noenhanced left offset 0.6,0 font small", \
-	few, names, few, few, full, full, full)
-eval 'plot '.bars("tick_ns", "full_ns", ":ytic(stringcolumn('name'))")
-unset key
-set format y ''
-set lmargin at screen 0.6
-set rmargin at screen 0.97
-set xlabel 'instructions of a tick'
-if (exists("instructions_by")) { eval 'plot '.bars("instructions", "full_instructions", "") }
+eval key_below
+set tmargin at screen 1 - 60.0 / figure_height
+set lmargin at screen 160.0 / figure_width
+set rmargin at screen counted ? 0.58 : 1 - 20.0 / figure_width
+set style fill solid noborder
+set ytics noenhanced
+names(x) = counted && x ? '' : words_of(strcol("name"))
+do for [k=0:counted] {
+	few = few_key(k)
+	full = full_key(k)
+	set xlabel k ? 'instructions per tick / 1' : 'median time of a tick / ns'
+	set xrange [0:most[k + 1] * 1.15]
+	if (k) {
+		unset key
+		set format y ''
+		set lmargin at screen 0.61
+		set rmargin at screen 0.98
+	}
+	plot data using (0):($0):(0):(column(few)):($0-bar):($0):ytic(names(k)) \
+			with boxxyerror fc rgb blue title k ? '' : 'only the stages needed', \
+		data using (column(few)):($0-bar/2):(sprintf('%.0f', column(few))) with labels left offset 0.5,0 font small, \
+		data using (0):($0):(0):(column(full)):($0):($0+bar) \
+			with boxxyerror fc rgb orange title k ? '' : 'all stages', \
+		data using (column(full)):($0+bar/2):(sprintf('%.0f', column(full))) with labels left offset 0.5,0 font small
+}
 unset multiplot

@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# Cases that come to rest, and how far the force is off, over the gain.
-set multiplot layout 1,2 title "guards in the real plan, late tracker and late actuator" font large
+# Cases that come to rest, and how far the force is off, over the gain. A wide line is seen below
+# a narrow one that runs over it.
+n = words(data_guard)
+wide(k) = 1.2 + 0.9 * (n - k)
+large(k) = 0.8 + 0.18 * (n - k)
+set multiplot layout 1,2 margins screen 70.0 / figure_width, 1 - 20.0 / figure_width, \
+	100.0 / figure_height, 1 - 75.0 / figure_height spacing screen 80.0 / figure_width, 0 \
+	title "Guards in the real plan, with a late tracker and a late actuator" noenhanced
 set xrange [0.95:2.05]
-set xlabel 'gain / largest that is accepted'
-set key bottom left Left reverse
+set xlabel 'gain relative to the largest accepted / 1'
+set key off
 do for [key in "rest_share error_share"] {
-	set title key eq "rest_share" ? "cases that come to rest" : "error of the force in a slow cut"
-	set ylabel key eq "rest_share" ? "share" : "share of the force"
+	rest = key eq "rest_share"
+	set title rest ? "(a) cases that come to rest" : "(b) error of the force in a slow cut"
+	set ylabel rest ? "share of the cases / 1" : "error relative to the force / 1"
 	set yrange [0:*]
-	if (key eq "error_share") { set key top left Left reverse }
-	plot for [g in data_guard] data index g using "gain":(column(key)) \
-		with linespoints pt 7 ps 0.7 title g
+	plot for [k=1:n] data index word(data_guard, k) using "gain":(column(key)) \
+		with linespoints lt k lw wide(k) ps large(k)
 }
+eval key_panel
+plot for [k=1:n] NaN with linespoints lt k lw wide(k) ps large(k) title words_of(word(data_guard, k))
 unset multiplot

@@ -1,26 +1,32 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # Largest stable stiffness: a panel for each damping of the wall, a curve for each delay.
 least = 1e-4
-set multiplot layout 1,words(data_BT_m) title "Largest stable stiffness of a sampled wall\n\
-lines computed, points simulated in time; stable below; triangle: none is" font large
+n = words(data_BT_m)
+set multiplot layout 1,n margins screen 80.0 / figure_width, 1 - 20.0 / figure_width, \
+	100.0 / figure_height, 1 - 95.0 / figure_height spacing screen 25.0 / figure_width, 0 \
+	title "Largest stable stiffness of a sampled wall, stable below\n\
+lines: computed; markers: simulated; triangle downward: no stiffness is stable" noenhanced
 set logscale xy
 set xrange [5e-4:20]
 set yrange [least:50]
-set format xy '10^{%L}'
-
-set xlabel "damping of the device, bT/m"
-set key top left Left reverse
+set format xy power
+set xlabel "device damping bT/m / 1"
+set key off
 block(wall, delay) = sprintf("%s %s", wall, word(data_delay, delay))
 # Nothing is stable: a triangle at the lower edge.
 place(y) = y > least * 1.3 ? y : least * 1.3
-do for [i=1:words(data_BT_m)] {
+marker(d) = int(word('7 5 9 13 6 4', d))
+do for [i=1:n] {
 	w = word(data_BT_m, i)
-	set title sprintf("damping of the wall BT/m = %s", w)
-	set ylabel i == 1 ? "stiffness of the wall, KT^2/m" : ""
-	plot for [d=1:words(data_delay)] more index block(w, d) using "x":"y" \
-			with lines ls d title 'delay '.word(data_delay, d), \
+	set title sprintf("(%s) wall damping BT/m = %s", "abcdefgh"[i:i], w)
+	set ylabel i == 1 ? "wall stiffness KT²/m / 1" : ""
+	plot for [d=1:words(data_delay)] more index block(w, d) using "x":"y" with lines lt d, \
 		for [d=1:words(data_delay)] data index block(w, d) \
-			using "bT_m":(place(column("sim_KT2_m"))):(column("sim_KT2_m") > 0 ? 7 : 11) \
-			with points ls d pt variable ps 0.9
+			using "bT_m":(place(column("sim_KT2_m"))):(column("sim_KT2_m") > 0 ? marker(d) : 11) \
+			with points lt d pt variable ps 0.9
+	set format y ''
 }
+eval key_panel
+plot for [d=1:words(data_delay)] NaN with linespoints lt d pt marker(d) ps 0.9 \
+	title 'delay of '.word(data_delay, d).(word(data_delay, d) eq "1" ? ' tick' : ' ticks')
 unset multiplot

@@ -1,51 +1,56 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # Error of a sample's time over its cost, or over how much was seen: a panel for each kind of
-# lateness, a colour for each method.
+# lateness, a colour and marker for each method.
 windows = suffix eq "windows"
-set style line 11 lc rgb grey lw 1.3
-set style line 12 lc rgb orange lw 1.3
-set style line 13 lc rgb vermillion lw 1.3
-set style line 14 lc rgb green lw 1.3
-set style line 15 lc rgb purple lw 1.3
-set style line 16 lc rgb blue lw 2.2
-set style line 17 lc rgb ink lw 1
-set style line 18 lc rgb sky lw 2.2
-set multiplot layout 1,3 title sprintf("Error of times of acquisition over %s: %d Hz by a clock \
-that is off by %g ppm, up to %d ms late", windows ? "how much was seen" : "their cost", rate_hz, \
-	drift_ppm, late_ms) font large
+order = "8 5 2 3 4 1 7 6" # of colours: the line in blue, the arrival in grey
+do for [k=1:8] {
+	set style line 10+k lc rgb colour(int(word(order, k))) lw k == 6 || k == 8 ? 2.2 : 1.2 \
+		pt int(word('2 11 5 9 13 7 4 6', k))
+}
+set multiplot layout 1,3 margins screen 90.0 / figure_width, 1 - 20.0 / figure_width, \
+	(windows ? 150.0 : 130.0) / figure_height, 1 - 95.0 / figure_height spacing screen 30.0 / figure_width, 0 \
+	title sprintf("Error of acquisition times over %s\n%d Hz by a clock that is off by %g ppm, up to %d ms late%s", \
+	windows ? "the length of the recording" : "their cost", rate_hz, drift_ppm, late_ms, windows ? "" : \
+	"; larger markers: 1 to 120 s seen; bars: 5 to 95 %") noenhanced
+stats data using "rms_us" nooutput
+if (!windows) {
+	stats data using "ns_p5" prefix "fast" nooutput
+	stats data using "ns_p95" prefix "slow" nooutput
+}
 set logscale xy
-set ylabel 'rms error / µs'
-set key bottom left Left reverse samplen 2 spacing 0.95 font small
-set format y '%g'
+set ylabel 'rms error of the time / µs'
+set key off
+set format xy power
+set yrange [STATS_min / 2:STATS_max * 2]
 if (windows) {
-	set xlabel 'seen / s'
+	set xlabel 'length seen / s'
+	set format x '%g'
 	set xrange [0.8:150]
-	set xtics (1, 2, 5, 10, 30, 60, 120)
-	set yrange [1:30000]
+	set xtics (1, 2, 5, 10, 30, 120)
 } else {
-	# Space below for the key.
-	set xlabel 'time per sample / ns (bars: 5 to 95 %)'
-	set xrange [2:2000]
-	set yrange [0.05:30000]
+	set xlabel 'time per sample / ns'
+	set xrange [fast_min / 1.3:slow_max * 1.3]
 }
 block(k) = word(data_late, i).' '.word(data_name, k)
-number(s) = s == 1 || s == 120 ? sprintf('%g s', s) : ''
+size(none) = 0.4 + 0.7 * log(column("window_s")) / log(120)
 do for [i=1:words(data_late)] {
-	set title 'lateness: '.word(data_late, i)
+	set title sprintf("(%s) lateness: %s", "abc"[i:i], word(data_late, i))
 	if (windows) {
 		plot for [k=1:8] data index block(k) using "window_s":"rms_us" \
-				with linespoints ls 10+k pt 7 ps 0.8 title word(data_name, k), \
+				with linespoints ls 10+k ps 0.8, \
 			for [k=6:8] data index block(k) using "window_s":"stated_us" \
-				with lines ls 10+k dt 3 title word(data_name, k).', stated'
+				with lines ls 10+k dt 3
 	} else {
-		plot for [k=1:8] data index block(k) using "ns_per_sample":"rms_us" \
-				with lines ls 10+k, \
+		plot for [k=1:8] data index block(k) using "ns_per_sample":"rms_us" with lines ls 10+k, \
 			for [k=1:8] data index block(k) \
-				using "ns_per_sample":"rms_us":"ns_p5":"ns_p95" \
-				with xerrorbars ls 10+k pt 7 ps 0.7 title word(data_name, k), \
+				using "ns_per_sample":"rms_us":"ns_p5":"ns_p95" with xerrorbars ls 10+k lw 0.7 pt 0, \
 			for [k=1:8] data index block(k) \
-				using "ns_per_sample":"rms_us":(number(column("window_s"))) \
-				with labels noenhanced left offset 0.5,0.4 font small
+				using "ns_per_sample":"rms_us":(size(0)) with points ls 10+k ps variable
 	}
+	unset ylabel
+	set format y ''
 }
+eval key_panel
+plot for [k=1:8] NaN with linespoints ls 10+k ps 0.8 title words_of(word(data_name, k)), \
+	for [k=6:5 + 3 * windows] NaN with lines ls 10+k dt 3 title words_of(word(data_name, k)).', stated'
 unset multiplot

@@ -1,19 +1,28 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# Error on unseen cuts over the time of training, a colour for each kind of method.
-stats data using "seconds" nooutput
-set title sprintf("Error on unseen cuts over the time of training, %d pairs\n%s, %s", \
-	pairs, cpu, kernel)
+# Error on unseen cuts over the time of training, a colour and marker for each kind of method.
+set title sprintf("Error on unseen cuts over the time of training, %d pairs\n\
+bars: 5 to 95 %% of %d data sets\n%s, %s", pairs, seeds, cpu, kernel)
 set xlabel 'time of training / s'
-set ylabel sprintf('rms error on unseen cuts / N (bars: 5 to 95 %% of %d data sets)', seeds)
+set ylabel 'rms error on unseen cuts / N'
 set logscale xy
-set format x '%.0e'
-set format y '%g'
-set yrange [*:*] extend
-set xrange [STATS_min / 2:STATS_max * 6]
-set key outside bottom center horizontal maxcols 2
+set format x power
+stats data using "seconds" prefix "time" nooutput
+stats data using "rmse_unseen_N_p5" prefix "good" nooutput
+stats data using "rmse_unseen_N_p95" prefix "bad" nooutput
+x0 = time_min / 3
+x1 = time_max * 5
+y0 = good_min / 1.2
+y1 = bad_max * 1.2
+eval 'set ytics ('.log_tics(y0, y1).')'
+eval name_margins
+x(key) = log_place(column(key), x0, x1)
+y(key) = log_place(column(key), y0, y1)
+stats data using (strcol("name") eq "name" ? NaN : name_point(words_of(strcol("name")), x("seconds"), \
+	y("rmse_unseen_N"), x("seconds"), x("seconds"), y("rmse_unseen_N_p5"), y("rmse_unseen_N_p95"))) nooutput
+eval name_points
+set xrange [x0:x1]
+set yrange [y0:y1]
+eval key_at
 plot for [i=1:words(data_kind)] data index word(data_kind, i) \
-		using "seconds":"rmse_unseen_N":"rmse_unseen_N_p5":"rmse_unseen_N_p95" \
-		with yerrorbars ls i pt 7 ps 0.8 title word(data_kind, i), \
-	for [i=1:words(data_kind)] data index word(data_kind, i) \
-		using "seconds":"rmse_unseen_N":"name" \
-		with labels noenhanced left rotate by 20 offset 0.6,0.3 font small
+	using "seconds":"rmse_unseen_N":"rmse_unseen_N_p5":"rmse_unseen_N_p95" \
+	with yerrorbars lt i lw 1 title word(data_kind, i)

@@ -1,25 +1,33 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# Error of the exposed length over the time of a picture, a colour for each way to search it.
+# Error of the exposed length over the time of a frame, a colour and marker for each way to search it.
 regions = "whole follows"
-titles = "'the whole picture is searched' 'the region follows'"
+titles = "'search of the whole frame' 'search near the last blade'"
+set title sprintf("Error of the exposed length over run time, by kind of frame\n\
+bars: 5 to 95 %% of the frames; upward: to the largest error\n%s, %s", cpu, kernel)
+set xlabel 'processor time of a frame / ms'
+set ylabel 'rms error of the length / px'
+set logscale xy
 stats data using "ms_p5" nooutput prefix "fast"
 stats data using "ms_p95" nooutput prefix "slow"
 stats data using "rms_px" nooutput prefix "good"
 stats data using "max_px" nooutput prefix "bad"
-set title sprintf("Error of the exposed length over run time\n%s, %s", cpu, kernel)
-set xlabel 'processor time of a picture / ms (bars: 5 to 95 %)'
-set ylabel 'rms error / pixels (thin lines: up to the largest)'
-set logscale xy
-set format xy '%g'
-set xrange [fast_min / 1.2:slow_max * 1.4]
-set yrange [good_min / 1.3:bad_max * 1.3]
-set key outside bottom center horizontal
+x0 = fast_min / 1.3
+x1 = slow_max * 1.3
+y0 = good_min / 1.3
+y1 = bad_max * 1.3
+eval 'set xtics ('.log_tics(x0, x1).')'
+eval 'set ytics ('.log_tics(y0, y1).')'
+eval name_margins
+x(key) = log_place(column(key), x0, x1)
+y(key) = log_place(column(key), y0, y1)
+# Both ways find the same length: one name for the two points next to each other.
+stats data using (strcol("name") eq "name" ? NaN : name_point(strcol("region") eq "whole" ? \
+	words_of(strcol("name")) : '', x("ms"), y("rms_px"), x("ms_p5"), x("ms_p95"), y("rms_px"), y("max_px"))) nooutput
+eval name_points
+set xrange [x0:x1]
+set yrange [y0:y1]
+eval key_at
 plot for [i=1:2] data index word(regions, i) \
-		using "ms":"rms_px":(0):(column("max_px") - column("rms_px")) \
-		with vectors nohead ls i lw 0.5, \
+		using "ms":"rms_px":(0):(column("max_px") - column("rms_px")) with vectors nohead lt i lw 0.6, \
 	for [i=1:2] data index word(regions, i) using "ms":"rms_px":"ms_p5":"ms_p95" \
-		with xerrorbars ls i pt 7 ps 0.8 title word(titles, i), \
-	data index "whole" using "ms":"rms_px":"name" \
-		with labels noenhanced left rotate by -20 offset 0.6,-0.3 font small, \
-	data index "follows" using "ms":"rms_px":"name" \
-		with labels noenhanced left rotate by 20 offset 0.6,0.3 font small
+		with xerrorbars lt i lw 1 title word(titles, i)
