@@ -18,15 +18,40 @@
 struct job {
 	struct figure figure;
 	const char *output; /* NULL: a window */
+	bool range;
 };
 
+/* One of its ends may be missing. */
+static void parse_range(void *whole, char *text)
+{
+	struct job *job = whole;
+	char *dots = strstr(text, "..");
+
+	if (!dots || (dots == text && !dots[2]))
+		cli_usage("--range: expected two times such as 2s..4.5s, got '%.40s'",
+			  text);
+	*dots = 0;
+	if (*text)
+		job->figure.from_s = cli_duration("range", text, 0, 1e9);
+	if (dots[2])
+		job->figure.to_s = cli_duration("range", dots + 2, 0, 1e9);
+	if (!(job->figure.from_s < job->figure.to_s))
+		cli_usage("--range: it ends at %g s, where it begins or before",
+			  job->figure.to_s);
+	job->range = true;
+}
+
 /* Kinds of files, in the help and in errors. */
-#define FILES "a model (.fis, .fx) or a dataset (.csv)"
+#define FILES "a recording (.rec), a model (.fis, .fx) or a dataset (.csv)"
 
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
 	 "the file to write: NAME.png or NAME.svg (default: a window)",
 	 CLI_OUTPUT(struct job, output)},
+	{0, "range", "TIME..TIME",
+	 "of a recording: the part to draw, such as 2s..4.5s, 90s..\n"
+	 "or ..1min; from its first force sample (default: all)",
+	 CLI_PARSED_BY(parse_range)},
 	{0, "data", "DATA.csv", "of a model: also draw the residuals of this dataset",
 	 CLI_INPUT(struct job, figure.data)},
 	{0},
@@ -48,6 +73,7 @@ static const struct drawn {
 	enum file_kind kind;
 	FILE *(*draw)(const struct figure *figure);
 } drawn[] = {
+	{FILE_RECORDING, figure_of_recording},
 	{FILE_MODEL, figure_of_model},
 	{FILE_COMPILED, figure_of_compiled},
 	{FILE_TABLE, figure_of_dataset},
@@ -68,6 +94,10 @@ static const struct drawn *find_drawn(const char *path)
 			return &drawn[i];
 	}
 	file_expect(path, all);
+	/* Of an interrupted one there is only NAME.rec.part, under the name as well. */
+	if (kind == FILE_UNKNOWN &&
+	    file_kind_of(cli_text("%s.part", path)) == FILE_RECORDING)
+		return &drawn[0];
 	cli_fail("%s: %s; give " FILES, path,
 		 stat(path, &st) ? strerror(errno) : "is of no kind that is known");
 }
@@ -115,7 +145,7 @@ static void parse(struct job *job, int argc, char **argv)
 
 int main(int argc, char **argv)
 {
-	struct job job = {0};
+	struct job job = {.figure = {.from_s = -INFINITY, .to_s = INFINITY}};
 	const struct drawn *kind;
 	const char *form;
 	FILE *script;
@@ -125,6 +155,8 @@ int main(int argc, char **argv)
 	kind = find_drawn(job.figure.path);
 	if (job.figure.data && !(kind->kind & MODELS))
 		cli_usage("--data is for a model, and %s is none", job.figure.path);
+	if (job.range && kind->kind != FILE_RECORDING)
+		cli_usage("--range is for a recording, and %s is none", job.figure.path);
 	if (job.figure.data)
 		file_expect(job.figure.data, FILE_TABLE);
 	plot_require();

@@ -189,3 +189,111 @@ shows() {
 	failed_with 'gnuplot could not draw it: "f.gp" line 3: wrong'
 	[ ! -e a.png ]
 }
+
+# A recording of 6 s with a loss of each stream, a marker, and clipped samples; its counts are right.
+made_recording() {
+	incise capture -o a.rec --rig sim:clock=simulated --camera depth --duration 6s >/dev/null
+	sqlite3 a.rec/recording.db "
+		DELETE FROM force WHERE seq BETWEEN 20000 AND 24999;
+		DELETE FROM force WHERE seq = 40000;
+		DELETE FROM tracker WHERE seq BETWEEN 360 AND 419;
+		DELETE FROM depth WHERE seq BETWEEN 360 AND 419;
+		DELETE FROM frames WHERE seq BETWEEN 50 AND 60;
+		UPDATE force SET code = 4095 WHERE seq BETWEEN 50000 AND 50002;
+		INSERT INTO events SELECT t_ns, 'marker', 'the \"skin\"' FROM force WHERE seq = 10000;
+		UPDATE meta SET value = (SELECT count(*) FROM force) WHERE key = 'force_rows';
+		UPDATE meta SET value = (SELECT count(*) FROM tracker) WHERE key = 'tracker_rows';
+		UPDATE meta SET value = (SELECT count(*) FROM depth) WHERE key = 'depth_rows';
+		UPDATE meta SET value = (SELECT count(*) FROM frames) WHERE key = 'frames_rows'"
+}
+
+# The figure of gnuplot's data: a stub keeps the folder that incise plot made.
+keep_data() {
+	mkdir -p bin
+	printf '#!/bin/sh\ncp -r . "%s/kept"\nexec "%s" "$@"\n' "$PWD" "$(command -v gnuplot)" \
+		>bin/gnuplot
+	chmod +x bin/gnuplot
+	rm -rf kept
+	PATH=$PWD/bin:$PATH incise plot "$@" -o figure.svg --overwrite
+}
+
+@test "a recording: all streams on one axis, cuts, losses, frames, markers" {
+	made_recording
+	draws a.rec
+	shows "force / N" "depth / mm" "speed / (mm/s)" "position / mm" "time / s" \
+		tracker camera force events cut lost clipped x y z 1 "the  skin "
+	grep -q '^a.rec, sim:clock=simulated, 6 s from .*, 3 clipped$' texts
+	incise capture -o b.rec --rig sim:clock=simulated --duration 1s >/dev/null
+	draws b.rec
+	shows "force / N" tracker
+	! grep -qxE 'camera|events|lost|clipped|cut' texts
+}
+
+@test "lost samples are gaps in the lines, at their times" {
+	made_recording
+	keep_data a.rec
+	# an empty line in the data ends a line of the figure: after 1.9999 s comes 2.5 s
+	awk 'NF && !before && n { printf "%.2f %.2f\n", last, $1 } NF { last = $1; n++ } { before = NF }' \
+		kept/force.dat >gaps
+	[ "$(head -n 1 gaps)" = "2.00 2.50" ]
+	[ "$(sed -n 2p gaps)" = "4.00 4.00" ]
+	awk 'NF && !before && n { printf "%.1f %.1f\n", last, $1 } NF { last = $1; n++ } { before = NF }' \
+		kept/depth.dat >gaps
+	[ "$(head -n 1 gaps)" = "3.0 3.5" ]
+	# a column of pixels is 3 ms: the loss of one sample is seen as one
+	awk '{ printf "%.2f %.2f\n", $1, $2 }' kept/force-lost.dat >lost
+	[ "$(head -n 1 lost)" = "2.00 2.50" ]
+	[ "$(sed -n 2p lost)" = "4.00 4.00" ]
+	[ "$(wc -l <lost)" = 2 ]
+	[ "$(awk '{ printf "%.1f %.1f\n", $1, $2 }' kept/camera-lost.dat)" = "1.0 1.2" ]
+	# no frame is hidden: at 50 Hz each has columns of its own
+	[ "$(wc -l <kept/camera-present.dat)" = "$(sqlite3 a.rec/recording.db 'SELECT count(*) FROM frames')" ]
+}
+
+@test "no extreme is hidden, and the data do not grow with the recording" {
+	incise capture -o a.rec --rig sim:clock=simulated --duration 30s >/dev/null
+	keep_data a.rec
+	# two points of each of 2000 columns
+	[ "$(grep -c . kept/force.dat)" -le 4001 ]
+	[ "$(grep -c . kept/depth.dat)" -gt 3000 ]
+	incise info a.rec --json >info.json
+	want=$(awk -v n="$(key info.json force_max_N)" 'BEGIN { printf "%.4f", n }')
+	# of all samples, those in cuts and others
+	largest=$(awk '$2 != "NaN" && $2 > most { most = $2 } END { printf "%.4f", most }' kept/force.dat)
+	[ "$largest" = "$want" ] || complain "$largest is not $want"
+}
+
+@test "a part of a recording" {
+	incise capture -o a.rec --rig sim:clock=simulated --duration 6s >/dev/null
+	keep_data a.rec --range 2s..2500ms
+	awk 'NF && $2 != "NaN" && ($1 < 2 || $1 > 2.5) { bad = 1 } END { exit bad }' kept/force.dat
+	# 5000 samples in 2000 columns of pixels
+	[ "$(grep -c . kept/force.dat)" -gt 3000 ]
+	keep_data a.rec --range 5s..
+	[ "$(awk 'NF { print int($1); exit }' kept/force.dat)" = 5 ]
+	keep_data a.rec --range ..1s
+	[ "$(awk 'NF && $2 != "NaN" { last = $1 } END { printf "%.1f", last }' kept/force.dat)" = 1.0 ]
+	run --separate-stderr incise plot a.rec --range 7s..8s -o b.png
+	failed_with "a.rec: lasts from" "--range is beside that"
+	run -2 --separate-stderr incise plot a.rec --range 5s..4s -o b.png
+	bad_usage "--range: it ends at 4 s, where it begins or before"
+	run -2 --separate-stderr incise plot a.rec --range 5s -o b.png
+	bad_usage "--range: expected two times such as 2s..4.5s, got '5s'"
+	run -2 --separate-stderr incise plot m.fis --range 1s..2s -o b.png
+	bad_usage "--range is for a recording, and m.fis is none"
+}
+
+@test "an interrupted recording, and a damaged one" {
+	incise capture -o a.rec --rig sim:clock=simulated --duration 2s >/dev/null
+	sqlite3 a.rec/recording.db "UPDATE meta SET value = 0 WHERE key = 'complete'"
+	mv a.rec a.rec.part
+	draws a.rec
+	grep -q "interrupted$" texts
+	draws a.rec.part
+	sqlite3 a.rec.part/recording.db "UPDATE depth SET depth_mm = 9e999 WHERE seq = 7"
+	run --separate-stderr incise plot a.rec -o b.png
+	failed_with "table depth, row 7"
+	[ ! -e b.png ]
+	run --separate-stderr incise plot a.rec.part -o a.rec.part/b.png
+	failed_with "a.rec.part/b.png: is inside an input"
+}

@@ -24,6 +24,7 @@ struct figure {
 /* Each returns the script, for plot_draw_form(). Every failure ends the program. */
 FILE *figure_of_model(const struct figure *figure);
 FILE *figure_of_compiled(const struct figure *figure);
+FILE *figure_of_recording(const struct figure *figure);
 FILE *figure_of_dataset(const struct figure *figure);
 
 /*

@@ -49,6 +49,11 @@ struct incise_stream {
 
 struct incise_recording;
 
+/** A cut starts above this depth, mm. */
+#define INCISE_CUT_START_MM 0.3
+/** And ends below this one: apart by ten times the tracker's noise, which ends no cut so. */
+#define INCISE_CUT_END_MM 0.1
+
 /** The contents of a recording. */
 struct incise_recording_info {
 	bool complete; /**< closed by its recorder; false: readable up to the last commit */

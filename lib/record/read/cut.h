@@ -19,10 +19,6 @@
 #include "recording.h"
 #include "rows.h"
 
-/* Ten times the tracker's noise apart, so that noise ends no cut. */
-#define INCISE_CUT_START_MM 0.3
-#define INCISE_CUT_END_MM 0.1
-
 /* Hysteresis on depth. Set to {0} before use. */
 struct incise_cut {
 	bool inside;
