@@ -413,13 +413,13 @@ static json_t *details(const struct list *list, const bool *inlier,
 			json_array_append_new(outliers, json_integer(i + 1));
 	return json_pack(
 		"{si si si so so so so so so so so so so}", "poses", fit->n, "inliers",
-		fit->inliers, "blocks", fit->blocks, "rms_mm", json_number(fit->rms_mm),
-		"largest_mm", json_number(fit->largest_mm), "held_out_mm",
-		json_number(fit->held_out_mm), "cone_deg", json_number(fit->cone_deg),
-		"least_deg", json_number(fit->least_deg), "condition",
-		json_number(fit->condition), "moved_mm", json_number(fit->moved_mm),
-		"moved_sd_mm", json_number(fit->moved_sd_mm), "covariance_mm2",
-		json_numbers(fit->covariance, 9), "outliers", outliers);
+		fit->inliers, "blocks", fit->blocks, "rms_error_mm",
+		json_number(fit->rms_mm), "largest_mm", json_number(fit->largest_mm),
+		"held_out_mm", json_number(fit->held_out_mm), "cone_deg",
+		json_number(fit->cone_deg), "least_deg", json_number(fit->least_deg),
+		"condition", json_number(fit->condition), "moved_mm",
+		json_number(fit->moved_mm), "moved_sd_mm", json_number(fit->moved_sd_mm),
+		"covariance_mm2", json_numbers(fit->covariance, 9), "outliers", outliers);
 }
 
 static void fill_record(const struct incise_calibration *found,

@@ -289,6 +289,9 @@ static json_t *error_object(const struct options *options, double rmse, double r
 	json_t *object = json_object();
 	char key[80];
 
+	snprintf(key, sizeof(key), "rms_error%s%s", *unit ? "_" : "", unit);
+	json_set_number(object, key, rmse);
+	/* The name up to 0.1, on which scripts lean. */
 	snprintf(key, sizeof(key), "rmse%s%s", *unit ? "_" : "", unit);
 	json_set_number(object, key, rmse);
 	if (!pairs)
@@ -406,7 +409,7 @@ static void report_json(const struct result *result, json_t *warned)
 	json_object_set_new(object, "mf", mfs);
 	json_set_integer(object, "start", report->start);
 	json_set_integer(object, "pairs_tuned", report->pairs_tuned);
-	snprintf(key, sizeof(key), "crossval_rmse%s%s", *unit ? "_" : "", unit);
+	snprintf(key, sizeof(key), "crossval_rms_error%s%s", *unit ? "_" : "", unit);
 	json_set_number(object, key, report->crossval_rmse);
 	snprintf(key, sizeof(key), "noise%s%s", *unit ? "_" : "", unit);
 	json_set_number(object, key, interval->noise);

@@ -277,25 +277,25 @@ setup() {
 		[ -z "$(row r.json $name failed)" ]
 		holds "$(row r.json $name ms) > 0"
 		holds "$(row r.json $name ms_min) <= $(row r.json $name ms_max)"
-		holds "$(row r.json $name mean_abs_unseen_N) <= $(row r.json $name rmse_unseen_N)"
-		holds "$(row r.json $name rmse_unseen_N) < $(row r.json $name max_unseen_N)"
+		holds "$(row r.json $name mean_abs_error_N) <= $(row r.json $name rms_error_N)"
+		holds "$(row r.json $name rms_error_N) < $(row r.json $name max_error_N)"
 	done
 	[ "$(row r.json classic_1 epochs) $(row r.json classic epochs)" = "1 80" ]
 	# the same on each machine, but for rounding: what is learnt beats the baselines, and the
 	# default the classic way
 	for name in default default_3x3 default_chosen; do
-		holds "$(row r.json $name rmse_unseen_N) < $(row r.json linear rmse_unseen_N) / 2"
-		holds "$(row r.json $name rmse_unseen_N) < $(row r.json knn rmse_unseen_N)"
+		holds "$(row r.json $name rms_error_N) < $(row r.json linear rms_error_N) / 2"
+		holds "$(row r.json $name rms_error_N) < $(row r.json knn rms_error_N)"
 	done
-	holds "$(row r.json default rmse_unseen_N) < $(row r.json classic rmse_unseen_N)"
-	holds "$(row r.json linear rmse_unseen_N) < $(row r.json mean rmse_unseen_N) / 3"
+	holds "$(row r.json default rms_error_N) < $(row r.json classic rms_error_N)"
+	holds "$(row r.json linear rms_error_N) < $(row r.json mean rms_error_N) / 3"
 	for name in gaussian_process neural_network kernel_ridge; do
 		[ "$(row r.json $name peer)" = 1 ]
 		if [ -n "$(row r.json $name failed)" ]; then
 			[[ "$(row r.json $name failed)" == *"not installed"* ]]
-			[ -z "$(row r.json $name rmse_unseen_N)" ]
+			[ -z "$(row r.json $name rms_error_N)" ]
 		else
-			holds "$(row r.json $name rmse_unseen_N) < $(row r.json linear rmse_unseen_N)"
+			holds "$(row r.json $name rms_error_N) < $(row r.json linear rms_error_N)"
 		fi
 	done
 }
@@ -405,19 +405,19 @@ rate() {
 	# of a mean slope T/sqrt(3); the predictor's noise of some 50 uN is beside it
 	for hz in 250 500 1000 2000; do
 		hold=$(rate wall exact $hz hold_N)
-		holds "$(rate wall exact $hz command.rms_N) > 0.99 * $hold"
-		holds "$(rate wall exact $hz command.rms_N) < 1.03 * $hold + 5e-5"
+		holds "$(rate wall exact $hz command.rms_error_N) > 0.99 * $hold"
+		holds "$(rate wall exact $hz command.rms_error_N) < 1.03 * $hold + 5e-5"
 		holds "($(rate wall exact 250 hold_N) * 250 / $hz / $hold - 1) ^ 2 < 1e-18"
 	done
 	for poses in tracker exact; do
 		last=1
 		for hz in 250 500 1000 2000 4000 8000; do
-			holds "$(rate wall $poses $hz command.rms_N) < $last"
-			last=$(rate wall $poses $hz command.rms_N)
+			holds "$(rate wall $poses $hz command.rms_error_N) < $last"
+			last=$(rate wall $poses $hz command.rms_error_N)
 			# of 3.4 N at most
-			holds "$(rate wall $poses $hz command.max_N) < 0.1"
-			holds "$(rate wall $poses $hz rendered.rms_N) > $last"
-			holds "$(rate wall $poses $hz rendered.max_N) < 0.2"
+			holds "$(rate wall $poses $hz command.max_error_N) < 0.1"
+			holds "$(rate wall $poses $hz rendered.rms_error_N) > $last"
+			holds "$(rate wall $poses $hz rendered.max_error_N) < 0.2"
 			holds "$(rate wall $poses $hz command.relative) > $last / 3.5"
 			holds "$(rate wall $poses $hz tick_ns) > 0"
 			[ -z "$(rate wall $poses $hz failed)" ]
@@ -425,7 +425,7 @@ rate() {
 	done
 	for hz in 250 500; do
 		[[ "$(rate stiff exact $hz failed)" == "not stable: "* ]]
-		[ -z "$(rate stiff exact $hz command.rms_N)" ]
+		[ -z "$(rate stiff exact $hz command.rms_error_N)" ]
 	done
 	holds "$(rate stiff exact 1000 limit_N_mm) > $(rate stiff exact 1000 stiffness_N_mm)"
 }
@@ -530,11 +530,11 @@ rate() {
 @test "bench stability: paper 2's forces, their error and time" {
 	quick_report stability
 	# a few roundings; the integers' unit is 15 uN; finer meshes are closer
-	holds "$(of forces largest_N "name = 'sphere, double'") < 1e-13"
-	holds "$(of forces largest_N "name = 'sphere, fixed'") < 1e-4"
+	holds "$(of forces max_error_N "name = 'sphere, double'") < 1e-13"
+	holds "$(of forces max_error_N "name = 'sphere, fixed'") < 1e-4"
 	holds "$(of forces 'count(*)' "name = 'mesh'") >= 3"
-	holds "$(of forces rms_N 'triangles = 528') > 2 * $(of forces rms_N 'triangles = 2208')"
-	holds "$(of forces rms_N 'triangles = 2208') > 2 * $(of forces rms_N 'triangles = 9024')"
+	holds "$(of forces rms_error_N 'triangles = 528') > 2 * $(of forces rms_error_N 'triangles = 2208')"
+	holds "$(of forces rms_error_N 'triangles = 2208') > 2 * $(of forces rms_error_N 'triangles = 9024')"
 	holds "$(of forces 'min(contact)') > 1000"
 	holds "$(of forces 'min(ns)') > 0"
 }
@@ -598,8 +598,8 @@ rate() {
 		holds "$(key r.json "rows[$k].found") >= 7 && $(key r.json "rows[$k].pictures") == 10"
 		holds "$(key r.json "rows[$k].bias_px") < 0.1 && $(key r.json "rows[$k].bias_px") > -0.1"
 		holds "$(key r.json "rows[$k].us") > 0"
-		holds "$(key r.json "rows[$k].rms_px") <= $(key r.json "rows[$k].max_px")"
-		holds "$(key r.json "rows[$k].max_px") < 2"
+		holds "$(key r.json "rows[$k].rms_error_px") <= $(key r.json "rows[$k].max_error_px")"
+		holds "$(key r.json "rows[$k].max_error_px") < 2"
 		holds "$(key r.json "rows[$k].us") <= $(key r.json "rows[$k].us_p99")"
 	done
 	[ "$(key r.json "rows[0].region") $(key r.json "rows[1].region")" = "follows whole" ]

@@ -14,7 +14,7 @@ setup() {
 	python3 - <<-'END'
 		import json
 		rows = json.load(open('r.json'))['rows']
-		assert all(r['holds'] and 0 < r['rms_mN'] < r['most_mN'] <= r['bound_mN'] for r in rows)
+		assert all(r['holds'] and 0 < r['rms_error_N'] < r['max_error_N'] <= r['bound_N'] for r in rows)
 		# much of it in contact, and little apart
 		assert all(r['contact'] > r['ticks'] / 2 and r['apart'] < r['ticks'] / 100 for r in rows)
 		assert all(r['double_ns'] > 0 and r['integers_ns'] > 0 for r in rows)

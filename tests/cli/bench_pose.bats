@@ -13,8 +13,8 @@ setup() {
 	quick_report pose
 	[ "$(of rows 'count(*)')" = $((8 * 5 * 4 * 2)) ]
 	[ "$(of losses 'count(*)')" = $((8 * 5)) ]
-	[ "$(of rows 'count(*)' 'rms_mm IS NULL OR max_mm IS NULL OR rms_mm_s IS NULL')" = 0 ]
-	[ "$(of rows 'count(*)' 'rms_mm > max_mm OR p99_mm > max_mm OR rms_deg > max_deg')" = 0 ]
+	[ "$(of rows 'count(*)' 'rms_error_mm IS NULL OR max_error_mm IS NULL OR rms_error_mm_s IS NULL')" = 0 ]
+	[ "$(of rows 'count(*)' 'rms_error_mm > max_error_mm OR p99_error_mm > max_error_mm OR rms_error_deg > max_error_deg')" = 0 ]
 	[ "$(of rows 'count(*)' "ns IS NULL AND name <> 'exact_delayed'")" = 0 ]
 	holds "$(of rows 'min(ns)') > 0"
 	[ -n "$(key r.json machine.cpu)" ]
@@ -26,23 +26,23 @@ setup() {
 @test "bench pose: a held pose is off by velocity times age" {
 	quick_report pose
 	# exactly so at even speed; ages are the same, the noise is that of some 400 poses
-	of rows 'name, rms_mm, held_theory_mm' "name = 'held' AND motion = 'line'"
-	holds "$(of rows 'max(abs(rms_mm / held_theory_mm - 1))' \
+	of rows 'name, rms_error_mm, held_theory_mm' "name = 'held' AND motion = 'line'"
+	holds "$(of rows 'max(abs(rms_error_mm / held_theory_mm - 1))' \
 		"name = 'held' AND motion = 'line'") < 0.01"
 	# to first order of the age, 21 ms on the mean at most, elsewhere
-	holds "$(of rows 'max(abs(rms_mm / held_theory_mm - 1))' \
+	holds "$(of rows 'max(abs(rms_error_mm / held_theory_mm - 1))' \
 		"name = 'held' AND motion IN ('stroke', 'surgeon')") < 0.03"
 	# and what is exact and late by exactly 4 and 12 ms at 30 mm/s
-	holds "$(of rows 'max(abs(rms_mm - 0.03 * delay_ms))' \
+	holds "$(of rows 'max(abs(rms_error_mm - 0.03 * delay_ms))' \
 		"name = 'exact_delayed' AND motion = 'line'") < 1e-9"
 	# of velocities it knows none: that of the line is missed whole
-	holds "$(of rows 'max(abs(rms_mm_s - 30))' "name = 'held' AND motion = 'line'") < 1e-9"
+	holds "$(of rows 'max(abs(rms_error_mm_s - 30))' "name = 'held' AND motion = 'line'") < 1e-9"
 }
 
 # Of methods, the largest part of one's error in another's, over all other conditions.
 at_most() {
 	sqlite3 :memory: "WITH r AS (SELECT json_extract(value, '\$.name') AS name,
-			json_extract(value, '\$.rms_mm') AS rms, json_extract(value, '\$.jump_mm') AS jump,
+			json_extract(value, '\$.rms_error_mm') AS rms, json_extract(value, '\$.jump_mm') AS jump,
 			json_extract(value, '\$.motion') AS motion,
 			json_extract(value, '\$.tracker_hz') AS hz,
 			json_extract(value, '\$.delay_ms') AS late
@@ -69,7 +69,7 @@ at_most() {
 
 @test "bench pose lists what is worse than no tracker, and why" {
 	quick_report pose
-	[ "$(of rows 'count(*)' '(failed IS NULL) <> (rms_mm <= spread_mm)')" = 0 ]
+	[ "$(of rows 'count(*)' '(failed IS NULL) <> (rms_error_mm <= spread_mm)')" = 0 ]
 	[ "$(of rows 'count(*)' "failed NOT LIKE 'worse than no tracker: off by % mm, where%'")" = 0 ]
 	# two noisy poses a millisecond apart say nothing of a tremor that is 12 ms away
 	[ "$(of rows 'count(*)' "name = 'line' AND motion = 'tremor' AND tracker_hz = 1000
@@ -86,31 +86,31 @@ at_most() {
 	for name in held line library library_100um; do
 		last=0
 		for gap in 25 50 100 200 500; do
-			now=$(of losses rms_mm "name = '$name' AND gap_ms = $gap")
+			now=$(of losses rms_error_mm "name = '$name' AND gap_ms = $gap")
 			holds "$now > $last"
 			last=$now
 		done
 	done
 	# the library goes on for five periods, 42 ms, and stays: 94 mm/s carry it 4 mm, and
 	# the stroke is 40 mm long and 10 deep
-	holds "$(of losses 'max(max_mm)' "name = 'library'") < 42"
+	holds "$(of losses 'max(max_error_mm)' "name = 'library'") < 42"
 	# a parabola goes on
-	holds "$(of losses 'max(max_mm)' "name = 'parabola'") > 42"
+	holds "$(of losses 'max(max_error_mm)' "name = 'parabola'") > 42"
 }
 
 @test "bench timeline has a row for each method, lateness, clock and window" {
 	quick_report timeline
 	[ "$(of rows 'count(*)')" = $((8 * 3 * 3 * 7)) ]
-	[ "$(of rows 'count(*)' 'rms_us IS NULL OR max_us IS NULL OR ns_per_sample IS NULL')" = 0 ]
-	[ "$(of rows 'count(*)' 'rms_us > max_us OR p99_us > max_us OR abs(mean_us) > rms_us')" = 0 ]
+	[ "$(of rows 'count(*)' 'rms_error_us IS NULL OR max_error_us IS NULL OR ns_per_sample IS NULL')" = 0 ]
+	[ "$(of rows 'count(*)' 'rms_error_us > max_error_us OR p99_error_us > max_error_us OR abs(mean_error_us) > rms_error_us')" = 0 ]
 	# none of 20 ms and an interrupt is later than that; the truth is not after the arrival
-	holds "$(of rows 'max(max_us)' "name = 'arrival'") < 20300"
-	holds "$(of rows 'min(mean_us)' "name = 'arrival'") > 0"
+	holds "$(of rows 'max(max_error_us)' "name = 'arrival'") < 20300"
+	holds "$(of rows 'min(mean_error_us)' "name = 'arrival'") > 0"
 	# least squares go through the middle of what is late: by its mean, which is arrivals'
-	holds "$(of rows 'max(abs(mean_us / 10000 - 1))' \
+	holds "$(of rows 'max(abs(mean_error_us / 10000 - 1))' \
 		"name = 'squares' AND late = 'bursts' AND window_s >= 10") < 0.05"
 	# a clock of 200 ppm is off by 24 ms after 2 min, and the nominal rate with it
-	holds "$(of rows 'min(max_us)' \
+	holds "$(of rows 'min(max_error_us)' \
 		"name = 'lowest' AND drift_ppm = -200 AND window_s = 120") > 23000"
 	[ -n "$(key r.json machine.cpu)" ]
 }
@@ -122,15 +122,15 @@ at_most() {
 		holds "$(of rows 'avg(within_2sd)' "name = '$name'") >= 0.95"
 		[ "$(of rows 'count(*)' "name = '$name' AND failed IS NOT NULL")" = 0 ]
 		# by rms it is below the stated one, but at the first
-		holds "$(of rows 'avg(rms_us <= stated_us)' "name = '$name' AND window_s >= 30") >= 0.95"
+		holds "$(of rows 'avg(rms_error_us <= stated_us)' "name = '$name' AND window_s >= 30") >= 0.95"
 		# and by far below arrivals as they are
-		holds "$(of rows 'max(rms_us)' "name = '$name'") < 2500"
-		holds "$(of rows 'max(rms_us)' \
+		holds "$(of rows 'max(rms_error_us)' "name = '$name'") < 2500"
+		holds "$(of rows 'max(rms_error_us)' \
 			"name = '$name' AND late = 'exponential' AND window_s >= 30") < 50"
 	done
 	# the longer it sees a stream the better
-	holds "$(of rows 'avg(rms_us)' "name = 'line_live' AND window_s = 120") < \
-		$(of rows 'avg(rms_us)' "name = 'line_live' AND window_s = 1") / 3"
+	holds "$(of rows 'avg(rms_error_us)' "name = 'line_live' AND window_s = 120") < \
+		$(of rows 'avg(rms_error_us)' "name = 'line_live' AND window_s = 1") / 3"
 }
 
 @test "bench timeline lists who is surer than he may be, and worse than arrivals" {

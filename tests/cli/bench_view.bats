@@ -51,10 +51,10 @@ draws() {
 			WHERE json_extract(value, '\$.texture_px') = $1
 			AND json_extract(value, '\$.fps') IS ${3:-NULL}"
 	}
-	holds "$(exact 512 rms) > 0 && $(exact 512 rms 60) > $(exact 1024 rms 60)"
+	holds "$(exact 512 rms_error) > 0 && $(exact 512 rms_error 60) > $(exact 1024 rms_error 60)"
 	holds "$(exact 512 ssim 60) < $(exact 1024 ssim 60) && $(exact 512 ssim) < 1"
-	holds "$(exact 1024 rms 15) > $(exact 1024 rms 60) && $(exact 1024 rms 60) > 0"
-	holds "$(exact 512 rms 15) > $(exact 512 rms)"
+	holds "$(exact 1024 rms_error 15) > $(exact 1024 rms_error 60) && $(exact 1024 rms_error 60) > 0"
+	holds "$(exact 512 rms_error 15) > $(exact 512 rms_error)"
 	incise bench compare r.json r.json
 	# no cut is lost, however busy the machine
 	[ "$(key r.json absorbed.lost)" = 0 ]

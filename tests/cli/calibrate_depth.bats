@@ -203,7 +203,7 @@ pairs() {
 	holds "($(key report/report.json lens.k1) - $(key "$truth" k1))^2 < 0.03^2"
 	holds "($(key report/report.json tilt_deg) - $(key "$truth" tilt_deg))^2 < 0.25^2"
 	holds "$(key report/report.json tilt_bound_deg) > $(key "$truth" tilt_deg)"
-	holds "$(key report/report.json plane_rms_mm) < 0.02"
+	holds "$(key report/report.json plane_rms_error_mm) < 0.02"
 	for name in fit residuals; do
 		[ "$(head -c 8 report/$name.png | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
 	done

@@ -27,7 +27,7 @@ within() {
 	[ "$(key r.json pass)" = 1 ]
 	holds "$(key r.json details.cone_deg) > 60"
 	# 0.02 mm and 0.025 degrees at 63 mm: hypot(0.02 √3, 0.0275 √2) = 0.052
-	holds "$(key r.json details.rms_mm) > 0.045 && $(key r.json details.rms_mm) < 0.06"
+	holds "$(key r.json details.rms_error_mm) > 0.045 && $(key r.json details.rms_error_mm) < 0.06"
 	grep -q '^tip_mm = \[' calibration.conf
 	[ "$(key rep/report.json 'values[2].left')" = "$(key r.json 'values[2].left')" ]
 	grep -qE '^tip_x_mm .* ± .* mm \(k = 2\)' rep/report.txt

@@ -46,8 +46,8 @@ pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-latenes
 		$(key $file train_unseen_cuts.baselines.mean.rmse_N)"
 	holds "$(key $file fixed_point.max_difference_N) < 1e-3"
 	# the tissue's mean force is known; cuts differ by 10 % of at most 2.7 N
-	holds "$(key $file truth_rmse_N) > 0 && $(key $file truth_rmse_N) < 0.27"
-	holds "$(key $file new_cut_rmse_N) > 0"
+	holds "$(key $file truth_rms_error_N) > 0 && $(key $file truth_rms_error_N) < 0.27"
+	holds "$(key $file new_cut_rms_error_N) > 0"
 	holds "$(key $file haptic.ticks) + $(key $file haptic.skipped) >= 2990"
 	holds "$(key $file haptic.contact) > 0"
 	holds "$(key $file seconds) > 2"

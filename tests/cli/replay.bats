@@ -78,9 +78,9 @@ teardown() {
 		END { print n, sqrt(s / n), m, b - a }' t.csv)
 	[ "$(key r.json compared)" = "$n" ]
 	# six decimals in the table
-	holds "($(key r.json rms_N) - $rms)^2 < 1e-12"
-	holds "($(key r.json max_N) - $most)^2 < 1e-11"
-	holds "($(key r.json nrmse) - $rms / $range)^2 < 1e-11"
+	holds "($(key r.json rms_error_N) - $rms)^2 < 1e-12"
+	holds "($(key r.json max_error_N) - $most)^2 < 1e-11"
+	holds "($(key r.json rms_error_relative) - $rms / $range)^2 < 1e-11"
 	[ "$(key r.json flags.contact)" = "$(cut -d, -f8 t.csv | grep -c ^c)" ]
 	[ "$(key r.json flags.starting)" = "$(cut -d, -f8 t.csv | grep -c '^........r')" ]
 	[ "$(key r.json cuts)" = 1 ]

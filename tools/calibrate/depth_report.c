@@ -194,8 +194,8 @@ static void board_json(const struct depth_result *r, json_t *object)
 	json_object_set_new(object, "homography", json_numbers(b->homography, 9));
 	json_set_integer(object, "views", b->n);
 	json_set_integer(object, "inliers", b->views);
-	json_set_number(object, "rms_px", b->rms_px);
-	json_set_number(object, "plane_rms_mm", b->plane_rms_mm);
+	json_set_number(object, "rms_error_px", b->rms_px);
+	json_set_number(object, "plane_rms_error_mm", b->plane_rms_mm);
 	json_set_number(object, "plane_max_mm", b->plane_largest_mm);
 	json_set_number(object, "tilt_deg", b->tilt_deg);
 	json_set_number(object, "tilt_bound_deg", b->tilt_deg + 2 * b->u_tilt_deg);

@@ -132,7 +132,7 @@ void demo_worth(struct demo *demo, const struct incise_model *model)
 			    json_pack("{sf sf si}", "max_difference_N", difference,
 				      "bound_N", bound, "points",
 				      (GRID + 1) * (GRID + 1)));
-	json_set_number(demo->summary, "truth_rmse_N", truth_error(demo, model));
+	json_set_number(demo->summary, "truth_rms_error_N", truth_error(demo, model));
 }
 
 void demo_interrupted(const char *folder)
@@ -427,8 +427,8 @@ void demo_figures(struct demo *demo, const struct incise_model *model)
 	figure_prediction(demo);
 	figure_lateness(demo, json_object_get(demo->summary, "haptic"));
 	figure_camera(demo);
-	json_set_number(demo->summary, "new_cut_rmse_N",
-			number_of(replay, "rms_N", NULL));
+	json_set_number(demo->summary, "new_cut_rms_error_N",
+			number_of(replay, "rms_error_N", NULL));
 }
 
 /* --- the summary ---------------------------------------------------------------------- */
@@ -489,11 +489,13 @@ void demo_summary_print(const struct demo *demo, FILE *out, double seconds)
 		number_of(capture, "force_clipped", NULL),
 		number_of(halves, "pairs", NULL), number_of(halves, "train", "mse_N2"),
 		number_of(halves, "check", "mse_N2"), PAPER_MSE_TRAIN, PAPER_MSE_CHECK,
-		number_of(unseen, "train", "rmse_N"),
-		number_of(unseen, "check", "rmse_N"), number_of(lines, "mean", "rmse_N"),
-		number_of(lines, "linear", "rmse_N"), number_of(lines, "knn", "rmse_N"),
-		number_of(demo->summary, "truth_rmse_N", NULL),
-		number_of(demo->summary, "new_cut_rmse_N", NULL),
+		number_of(unseen, "train", "rms_error_N"),
+		number_of(unseen, "check", "rms_error_N"),
+		number_of(lines, "mean", "rms_error_N"),
+		number_of(lines, "linear", "rms_error_N"),
+		number_of(lines, "knn", "rms_error_N"),
+		number_of(demo->summary, "truth_rms_error_N", NULL),
+		number_of(demo->summary, "new_cut_rms_error_N", NULL),
 		number_of(demo->summary, "fixed_point", "max_difference_N") * 1e3,
 		(GRID + 1) * (GRID + 1),
 		number_of(demo->summary, "fixed_point", "bound_N") * 1e3,

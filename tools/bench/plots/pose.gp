@@ -11,7 +11,7 @@ do for [k=1:8] {
 	set style line 10+k lc rgb (k == 8 ? ink : colour(c)) lw k == 4 ? 2.5 : 1.2 dt k == 8 ? 3 : 1 \
 		pt int(word('2 5 9 7 11 6 13 0', k))
 }
-stats data using (strcol("name") eq "exact_delayed" && !rates ? NaN : column("rms_mm")) nooutput
+stats data using (strcol("name") eq "exact_delayed" && !rates ? NaN : column("rms_error_mm")) nooutput
 if (!rates) {
 	stats data using "ns_p5" prefix "fast" nooutput
 	stats data using "ns_p95" prefix "slow" nooutput
@@ -41,11 +41,11 @@ do for [i=1:words(data_panel)] {
 	set format y i % 3 == 1 ? '%g' : ''
 	set format x '%g'
 	set xlabel i > 2 ? (rates ? 'rate of the tracker / Hz' : 'time per tick / ns') : ''
-	plot for [k=1:methods] data index block(k) using (x(0)):"rms_mm" with lines ls 10+k, \
+	plot for [k=1:methods] data index block(k) using (x(0)):"rms_error_mm" with lines ls 10+k, \
 		for [k=1:methods-rates] data index block(k) \
-			using (x(0)):"rms_mm":(size(0)) with points ls 10+k ps variable, \
+			using (x(0)):"rms_error_mm":(size(0)) with points ls 10+k ps variable, \
 		for [k=1:(rates ? 0 : methods)] data index block(k) \
-			using (x(0)):"rms_mm":(bar("ns_p5")):(bar("ns_p95")) with xerrorbars ls 10+k lw 0.7 pt 0
+			using (x(0)):"rms_error_mm":(bar("ns_p5")):(bar("ns_p95")) with xerrorbars ls 10+k lw 0.7 pt 0
 }
 unset logscale
 unset xlabel

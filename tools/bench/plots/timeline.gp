@@ -12,7 +12,7 @@ set multiplot layout 1,3 margins screen 90.0 / figure_width, 1 - 20.0 / figure_w
 	title sprintf("Error of acquisition times over %s\n%d Hz by a clock that is off by %g ppm, up to %d ms late%s", \
 	windows ? "the length of the recording" : "their cost", rate_hz, drift_ppm, late_ms, windows ? "" : \
 	"; larger markers: 1 to 120 s seen; bars: 5 to 95 %") noenhanced
-stats data using "rms_us" nooutput
+stats data using "rms_error_us" nooutput
 if (!windows) {
 	stats data using "ns_p5" prefix "fast" nooutput
 	stats data using "ns_p95" prefix "slow" nooutput
@@ -36,16 +36,16 @@ size(none) = 0.4 + 0.7 * log(column("window_s")) / log(120)
 do for [i=1:words(data_late)] {
 	set title sprintf("(%s) lateness: %s", "abc"[i:i], word(data_late, i))
 	if (windows) {
-		plot for [k=1:8] data index block(k) using "window_s":"rms_us" \
+		plot for [k=1:8] data index block(k) using "window_s":"rms_error_us" \
 				with linespoints ls 10+k ps 0.8, \
 			for [k=6:8] data index block(k) using "window_s":"stated_us" \
 				with lines ls 10+k dt 3
 	} else {
-		plot for [k=1:8] data index block(k) using "ns_per_sample":"rms_us" with lines ls 10+k, \
+		plot for [k=1:8] data index block(k) using "ns_per_sample":"rms_error_us" with lines ls 10+k, \
 			for [k=1:8] data index block(k) \
-				using "ns_per_sample":"rms_us":"ns_p5":"ns_p95" with xerrorbars ls 10+k lw 0.7 pt 0, \
+				using "ns_per_sample":"rms_error_us":"ns_p5":"ns_p95" with xerrorbars ls 10+k lw 0.7 pt 0, \
 			for [k=1:8] data index block(k) \
-				using "ns_per_sample":"rms_us":(size(0)) with points ls 10+k ps variable
+				using "ns_per_sample":"rms_error_us":(size(0)) with points ls 10+k ps variable
 	}
 	unset ylabel
 	set format y ''

@@ -7,8 +7,8 @@ set ylabel 'rms error on unseen cuts / N'
 set logscale xy
 set format x power
 stats data using "seconds" prefix "time" nooutput
-stats data using "rmse_unseen_N_p5" prefix "good" nooutput
-stats data using "rmse_unseen_N_p95" prefix "bad" nooutput
+stats data using "rms_error_N_p5" prefix "good" nooutput
+stats data using "rms_error_N_p95" prefix "bad" nooutput
 x0 = time_min / 3
 x1 = time_max * 5
 y0 = good_min / 1.2
@@ -18,11 +18,11 @@ eval name_margins
 x(key) = log_place(column(key), x0, x1)
 y(key) = log_place(column(key), y0, y1)
 stats data using (strcol("name") eq "name" ? NaN : name_point(words_of(strcol("name")), x("seconds"), \
-	y("rmse_unseen_N"), x("seconds"), x("seconds"), y("rmse_unseen_N_p5"), y("rmse_unseen_N_p95"))) nooutput
+	y("rms_error_N"), x("seconds"), x("seconds"), y("rms_error_N_p5"), y("rms_error_N_p95"))) nooutput
 eval name_points
 set xrange [x0:x1]
 set yrange [y0:y1]
 eval key_at
 plot for [i=1:words(data_kind)] data index word(data_kind, i) \
-	using "seconds":"rmse_unseen_N":"rmse_unseen_N_p5":"rmse_unseen_N_p95" \
+	using "seconds":"rms_error_N":"rms_error_N_p5":"rms_error_N_p95" \
 	with yerrorbars lt i lw 1 title word(data_kind, i)

@@ -5,7 +5,7 @@ n = words(data_blocks)
 titles = "'rms error of sRGB values (0 to 255) / 1' '1 − structural similarity / 1'"
 # Where two are the same to the last digit there is no place of 0.
 place(x) = x > 1e-6 ? x : 1e-6
-error(k) = place(k == 1 ? column("rms") : 1 - column("ssim"))
+error(k) = place(k == 1 ? column("rms_error") : 1 - column("ssim"))
 set multiplot layout 1,2 margins screen 80.0 / figure_width, 1 - 20.0 / figure_width, \
 	110.0 / figure_height, 1 - 75.0 / figure_height spacing screen 90.0 / figure_width, 0 \
 	title sprintf("Shown image of a bleeding cut, compared with a texture of %d² drawn at that very moment\n\

@@ -9,8 +9,8 @@ set ylabel 'rms error of the length / px'
 set logscale xy
 stats data using "ms_p5" nooutput prefix "fast"
 stats data using "ms_p95" nooutput prefix "slow"
-stats data using "rms_px" nooutput prefix "good"
-stats data using "max_px" nooutput prefix "bad"
+stats data using "rms_error_px" nooutput prefix "good"
+stats data using "max_error_px" nooutput prefix "bad"
 x0 = fast_min / 1.3
 x1 = slow_max * 1.3
 y0 = good_min / 1.3
@@ -22,12 +22,12 @@ x(key) = log_place(column(key), x0, x1)
 y(key) = log_place(column(key), y0, y1)
 # Both ways find the same length: one name for the two points next to each other.
 stats data using (strcol("name") eq "name" ? NaN : name_point(strcol("region") eq "whole" ? \
-	words_of(strcol("name")) : '', x("ms"), y("rms_px"), x("ms_p5"), x("ms_p95"), y("rms_px"), y("max_px"))) nooutput
+	words_of(strcol("name")) : '', x("ms"), y("rms_error_px"), x("ms_p5"), x("ms_p95"), y("rms_error_px"), y("max_error_px"))) nooutput
 eval name_points
 set xrange [x0:x1]
 set yrange [y0:y1]
 eval key_at
 plot for [i=1:2] data index word(regions, i) \
-		using "ms":"rms_px":(0):(column("max_px") - column("rms_px")) with vectors nohead lt i lw 0.6, \
-	for [i=1:2] data index word(regions, i) using "ms":"rms_px":"ms_p5":"ms_p95" \
+		using "ms":"rms_error_px":(0):(column("max_error_px") - column("rms_error_px")) with vectors nohead lt i lw 0.6, \
+	for [i=1:2] data index word(regions, i) using "ms":"rms_error_px":"ms_p5":"ms_p95" \
 		with xerrorbars lt i lw 1 title word(titles, i)
