@@ -3,6 +3,7 @@
  * incise doctor: checks this machine and its rig for a capture and for the haptic loop, and
  * prints the command that mends each finding.
  */
+#include <dirent.h>
 #include <errno.h>
 #include <grp.h>
 #include <math.h>
@@ -14,12 +15,16 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 #include <incise/realtime.h>
+#include <incise/recorder.h>
 #include <incise/rig.h>
+#include <incise/scan.h>
 #include "cli/child.h"
 #include "cli/cli.h"
+#include "cli/features.h"
 #include "cli/json.h"
 
-#define CHECKS_MAX 40
+#define CHECKS_MAX 120
+#define MINUTES_LEAST 10 /* of recording, below which the disk is a warning */
 #define GIB (1024.0 * 1024 * 1024)
 
 enum state { OK, WARNING, PROBLEM };
@@ -37,6 +42,14 @@ struct doctor {
 	bool json;
 	struct check check[CHECKS_MAX];
 	int n;
+
+	/* Of the rig: its steppers, and the devices that opened. */
+	char steppers[1000]; /* "kernel:… can:can0:0x10 …" */
+	struct incise_tracker_info tracker;
+	struct incise_force_info force;
+	struct incise_camera_info camera;
+	bool has_rig, has_tracker, has_force, has_camera;
+	double recording_min; /* that the disk holds; NAN: not known */
 };
 
 static const struct cli_option option_table[] = {
@@ -140,10 +153,58 @@ static void check_module(struct doctor *doctor)
 		return;
 	}
 	uname(&kernel);
-	add(doctor, "kernel", "module", WARNING,
-	    "sudo modprobe incise_stepper    # after 'make module_install'",
-	    "incise_stepper is not loaded (Linux %s); a rig needs it for a stepper \"kernel:…\"",
-	    kernel.release);
+	if (doctor->has_rig && !strstr(doctor->steppers, "kernel:"))
+		add(doctor, "kernel", "module", OK, NULL,
+		    "incise_stepper is not loaded; the rig has no stepper \"kernel:…\"");
+	else
+		add(doctor, "kernel", "module", WARNING,
+		    "sudo modprobe incise_stepper    # after 'make module_install'",
+		    "incise_stepper is not loaded (Linux %s); a rig needs it for a "
+		    "stepper \"kernel:…\"",
+		    kernel.release);
+}
+
+static void add_module(void *context, const struct feature *feature)
+{
+	const char *fix = strstr(feature->detail, "sudo ");
+	char *name = cli_text("%s_%s", feature->kind, feature->name);
+
+	if (!feature->usable)
+		add(context, "modules", "module", WARNING, fix,
+		    "%s cannot be loaded: %.*s", name,
+		    fix ? (int)strcspn(feature->detail, ";") : -1, feature->detail);
+	free(name);
+}
+
+static void count_module(void *context, const struct feature *feature)
+{
+	*(int *)context += feature->usable;
+}
+
+/* The modules for devices and file formats. */
+static void check_modules(struct doctor *doctor)
+{
+	int n = 0;
+
+	features_each(count_module, &n);
+	add(doctor, "modules", "loadable", n ? OK : WARNING,
+	    "make && sudo make install    # or the package libincise2",
+	    "%d modules of devices and file formats", n);
+	features_each(add_module, doctor);
+}
+
+static void add_opened(struct doctor *doctor, const char *name, struct incise_rig *rig)
+{
+	if (incise_rig_tracker(rig))
+		incise_tracker_info(incise_rig_tracker(rig), &doctor->tracker);
+	if (incise_rig_force(rig))
+		incise_force_info(incise_rig_force(rig), &doctor->force);
+	if (incise_rig_camera(rig))
+		incise_camera_info(incise_rig_camera(rig), &doctor->camera);
+	doctor->has_tracker |= !!incise_rig_tracker(rig);
+	doctor->has_force |= !!incise_rig_force(rig);
+	doctor->has_camera |= !!incise_rig_camera(rig);
+	add(doctor, "devices", name, OK, NULL, "opens");
 }
 
 /* Try one kind of device. A rig need not name each. */
@@ -156,7 +217,7 @@ static void check_device(struct doctor *doctor, const char *rig, const char *nam
 	if (open && devices & INCISE_RIG_CAMERA && !incise_rig_camera(open))
 		add(doctor, "devices", name, OK, NULL, "the rig names none");
 	else if (open)
-		add(doctor, "devices", name, OK, NULL, "opens");
+		add_opened(doctor, name, open);
 	else if (err.code == ENODEV && strstr(err.text, "not named"))
 		add(doctor, "devices", name, OK, NULL, "the rig names none");
 	else if (err.code == EBUSY)
@@ -171,6 +232,26 @@ static void check_device(struct doctor *doctor, const char *rig, const char *nam
 	incise_rig_close(open);
 }
 
+static int keep_stepper(void *context, const struct incise_rig_key *key)
+{
+	struct doctor *doctor = context;
+	size_t used = strlen(doctor->steppers);
+
+	if (!strncmp(key->name, "stepper", 7))
+		snprintf(doctor->steppers + used, sizeof(doctor->steppers) - used, " %s",
+			 key->value);
+	return 0;
+}
+
+/* The steppers of the rig, if there is one without an error. */
+static void read_rig(struct doctor *doctor)
+{
+	if (!doctor->rig)
+		doctor->rig = cli_default_rig();
+	doctor->has_rig =
+		doctor->rig && !incise_rig_keys(doctor->rig, keep_stepper, doctor, NULL);
+}
+
 static void check_rig(struct doctor *doctor)
 {
 	static const struct {
@@ -182,7 +263,7 @@ static void check_rig(struct doctor *doctor)
 		{"camera", INCISE_RIG_CAMERA | INCISE_RIG_IF_NAMED},
 		{"stepper", INCISE_RIG_STEPPER | INCISE_RIG_WATCH},
 	};
-	const char *rig = doctor->rig ? doctor->rig : cli_default_rig();
+	const char *rig = doctor->rig;
 	struct incise_error err = {0};
 	struct incise_rig *open;
 
@@ -203,6 +284,111 @@ static void check_rig(struct doctor *doctor)
 	incise_rig_close(open);
 	for (size_t i = 0; i < sizeof(kinds) / sizeof(*kinds); i++)
 		check_device(doctor, rig, kinds[i].name, kinds[i].devices);
+}
+
+/* --- what is attached, whether the rig names it or not --- */
+
+static int add_attached(void *context, const struct incise_scan_device *device)
+{
+	static const char *const kinds[] = {"tracker", "force", "camera", "stepper"};
+	bool denied = strstr(device->what, strerror(EACCES));
+	size_t kind = 0;
+
+	while (kind < 3 && strcmp(kinds[kind], device->kind))
+		kind++;
+	add(context, "attached", kinds[kind], device->usable ? OK : WARNING,
+	    denied ? "sudo usermod -aG incise $USER    # takes effect at the next login"
+		   : "incise info devices",
+	    "%s: %s", device->device, device->what);
+	return 0;
+}
+
+/* The first line of a file of sysfs without its newline; "" if there is none. */
+static void sysfs_text(char *text, size_t size, const char *folder, const char *device,
+		       const char *name)
+{
+	char *path = cli_text("%s/%s/%s", folder, device, name);
+	FILE *file = fopen(path, "r");
+
+	if (!file || !fgets(text, (int)size, file))
+		*text = '\0';
+	text[strcspn(text, "\n")] = '\0';
+	if (file)
+		fclose(file);
+	free(path);
+}
+
+#define SYSFS_NET "/sys/class/net"
+#define ARPHRD_CAN "280"
+
+/* A CAN interface; others are not listed. */
+static void add_can(struct doctor *doctor, const char *name)
+{
+	char type[16], flags[16], *named = cli_text("can:%s:", name), *fix;
+	bool up, used = strstr(doctor->steppers, named);
+
+	free(named);
+	sysfs_text(type, sizeof(type), SYSFS_NET, name, "type");
+	if (strcmp(type, ARPHRD_CAN))
+		return;
+	sysfs_text(flags, sizeof(flags), SYSFS_NET, name, "flags");
+	up = strtoul(flags, NULL, 16) & 1; /* IFF_UP */
+	fix = cli_text("sudo ip link set %s up type can bitrate 1000000", name);
+	add(doctor, "attached", "can", up || (doctor->has_rig && !used) ? OK : WARNING,
+	    fix, "%s: CAN interface, %s%s", name, up ? "up" : "down",
+	    used	      ? "; the rig has a drive on it"
+	    : doctor->has_rig ? "; the rig does not use it"
+			      : "");
+	free(fix);
+}
+
+#define SYSFS_USB "/sys/bus/usb/devices"
+#define USB_HUB "09"
+
+/* A USB device by its name; hubs and interfaces ("1-1:1.0") are not listed. */
+static void add_usb(struct doctor *doctor, const char *name)
+{
+	char class[8], vendor[8], product[8], maker[80], text[80];
+
+	sysfs_text(class, sizeof(class), SYSFS_USB, name, "bDeviceClass");
+	if (strchr(name, ':') || !*class || !strcmp(class, USB_HUB))
+		return;
+	sysfs_text(vendor, sizeof(vendor), SYSFS_USB, name, "idVendor");
+	sysfs_text(product, sizeof(product), SYSFS_USB, name, "idProduct");
+	sysfs_text(maker, sizeof(maker), SYSFS_USB, name, "manufacturer");
+	sysfs_text(text, sizeof(text), SYSFS_USB, name, "product");
+	add(doctor, "attached", "usb", OK, NULL, "%s:%s at %s: %s%s%s", vendor, product,
+	    name, maker, *maker && *text ? " " : "", *text || *maker ? text : "no name");
+}
+
+static int is_visible(const struct dirent *entry)
+{
+	return entry->d_name[0] != '.';
+}
+
+static void each_entry(struct doctor *doctor, const char *folder,
+		       void (*add_entry)(struct doctor *doctor, const char *name))
+{
+	struct dirent **entries = NULL;
+	int n = scandir(folder, &entries, is_visible, alphasort);
+
+	for (int i = 0; i < n; i++) {
+		add_entry(doctor, entries[i]->d_name);
+		free(entries[i]);
+	}
+	free(entries);
+}
+
+static void check_attached(struct doctor *doctor)
+{
+	int before = doctor->n;
+
+	incise_scan(NULL, NULL, add_attached, doctor, NULL);
+	each_entry(doctor, SYSFS_NET, add_can);
+	each_entry(doctor, SYSFS_USB, add_usb);
+	if (doctor->n == before)
+		add(doctor, "attached", "devices", OK, NULL,
+		    "no tracker, converter, camera, CAN interface or USB device");
 }
 
 static void check_display(struct doctor *doctor)
@@ -292,16 +478,31 @@ static void check_calibration(struct doctor *doctor)
 static void check_disk(struct doctor *doctor)
 {
 	struct statvfs disk;
+	char *space = NULL;
 	double free_GiB;
+	bool little;
 
 	if (statvfs(".", &disk)) {
 		add(doctor, "disk", "free", WARNING, NULL, "%s", strerror(errno));
 		return;
 	}
 	free_GiB = (double)disk.f_bavail * (double)disk.f_frsize / GIB;
-	add(doctor, "disk", "free", free_GiB < 1 ? WARNING : OK,
-	    free_GiB < 1 ? "df -h .    # record to a disk with more space" : NULL,
-	    "%.1f GiB in the current folder", free_GiB);
+	if (doctor->has_tracker || doctor->has_force || doctor->has_camera) {
+		doctor->recording_min =
+			incise_recorder_capacity_s(
+				free_GiB * GIB,
+				doctor->has_tracker ? &doctor->tracker : NULL,
+				doctor->has_force ? &doctor->force : NULL,
+				doctor->has_camera ? &doctor->camera : NULL) /
+			60;
+		space = cli_text(": %.0f min of recording at the rates of this rig",
+				 floor(doctor->recording_min));
+	}
+	little = free_GiB < 1 || doctor->recording_min < MINUTES_LEAST;
+	add(doctor, "disk", "free", little ? WARNING : OK,
+	    "df -h .    # record to a disk with more space", "%.1f GiB here%s", free_GiB,
+	    space ? space : "");
+	free(space);
 	if (access(".", W_OK))
 		add(doctor, "disk", "folder", WARNING, "cd    # to a folder of yours",
 		    "the current folder may not be written to");
@@ -353,20 +554,24 @@ static void print_json(const struct doctor *doctor)
 							? json_null()
 							: json_text(check->fix)));
 	}
-	json_print(json_pack("{s:o, s:i, s:i}", "checks", checks, "problems",
-			     count(doctor, PROBLEM), "warnings", count(doctor, WARNING)));
+	json_print(json_pack("{s:o, s:i, s:i, s:o}", "checks", checks, "problems",
+			     count(doctor, PROBLEM), "warnings", count(doctor, WARNING),
+			     "recording_min", json_number(doctor->recording_min)));
 }
 
 int main(int argc, char **argv)
 {
-	static struct doctor doctor;
+	static struct doctor doctor = {.recording_min = NAN};
 
 	cli_parse(&command, argc, argv, &doctor);
 	cli_no_operands(argc, argv, "--rig");
+	read_rig(&doctor);
 	check_group(&doctor);
 	check_realtime(&doctor);
 	check_module(&doctor);
+	check_modules(&doctor);
 	check_rig(&doctor);
+	check_attached(&doctor);
 	check_display(&doctor);
 	check_calibration(&doctor);
 	check_disk(&doctor);

@@ -25,7 +25,10 @@ finding() { # GROUP NAME
 	[[ "$(finding devices camera)" == "  ok "*"names none" ]]
 	[[ "$(finding display window)" == *warning*"no window"*"--video"* ]]
 	[[ "$(finding calibration file)" == *warning*"calibration.conf: No such file"*"incise help calibrate" ]]
-	[[ "$(finding disk free)" == *GiB* ]]
+	# the disk's space over the bytes of a row (18 of force, 180 of tracker), as incise capture
+	# expects them; the space may change by a minute's worth meanwhile
+	[[ "$(finding disk free)" =~ ok\ +free\ +([0-9.]+)\ GiB\ here:\ ([0-9]+)\ min ]]
+	holds "${BASH_REMATCH[1]} < 2 || (${BASH_REMATCH[2]} / (${BASH_REMATCH[1]} * 1073741824 / (10000 * 18 + 120 * 180) / 60) - 1) ^ 2 < 0.03 ^ 2"
 	[[ "${lines[-1]}" =~ ^[0-9]+\ problems,\ [0-9]+\ warnings$ ]]
 	# scheduling and memory are of this machine
 	problems=$(grep -c "^  problem " <<<"$output" || :)
@@ -49,6 +52,66 @@ finding() { # GROUP NAME
 		run --separate-stderr incise doctor
 		[[ "$(finding devices rig)" == "  warning "*"neither ./rig.conf nor /etc/incise/rig.conf"*"→ "*rig.conf.example* ]]
 	}
+}
+
+# The lines of a group.
+group() {
+	awk -v group="$1" '/^[a-z]/ { inside = $0 == group; next } inside && NF' <<<"$output" | tr -s ' '
+}
+
+@test "doctor lists CAN interfaces and USB devices by name" {
+	unshare -rm true 2>/dev/null || skip "no user namespaces"
+	[ -d /sys/bus/usb/devices ] || mount_usb=no
+	mkdir -p net/{can0,can1,eth0} usb/{usb1,1-1,1-1.2,1-1:1.0}
+	echo 280 | tee net/can0/type >net/can1/type
+	echo 0x40081 >net/can0/flags
+	echo 0x40080 >net/can1/flags
+	echo 1 >net/eth0/type
+	echo 09 | tee usb/usb1/bDeviceClass >usb/1-1/bDeviceClass
+	echo 00 >usb/1-1.2/bDeviceClass
+	echo 0f44 >usb/1-1.2/idVendor
+	echo 0002 >usb/1-1.2/idProduct
+	echo Polhemus >usb/1-1.2/manufacturer
+	echo FASTRAK >usb/1-1.2/product
+	cat >inside <<-'END'
+		mount --bind net /sys/class/net
+		[ ! -d /sys/bus/usb/devices ] || mount --bind usb /sys/bus/usb/devices
+		incise doctor "$@"
+	END
+	run --separate-stderr unshare -rm sh -e inside --rig sim:
+	[[ "$(group attached)" == *" ok can can0: CAN interface, up; the rig does not use it"* ]]
+	[[ "$(group attached)" == *" ok can can1: CAN interface, down; the rig does not use it"* ]]
+	[[ "$(group attached)" != *eth0* ]]
+	[ "${mount_usb:-}" = no ] || [[ "$(group attached)" == *" ok usb 0f44:0002 at 1-1.2: Polhemus FASTRAK"* ]]
+	[ "$(grep -c " usb " <<<"$(group attached)")" -le 1 ]
+	# the rig's own, which is down, and of a machine without a rig
+	printf '%s\n' 'tracker = "sim:"; stepper = "can:can1:0x10";' \
+		'actuator = { spring_N_mm = 2; travel_mm = 20; lead_mm = 4; };' >rig.conf
+	run -1 --separate-stderr unshare -rm sh -e inside
+	[[ "$(group attached)" == *" warning can can1: CAN interface, down; the rig has a drive on it"*"→ sudo ip link set can1 up type can bitrate 1000000"* ]]
+	[[ "$(group attached)" == *" ok can can0: "*"does not use it"* ]]
+}
+
+@test "doctor reports a module that lacks its library, with the package" {
+	[ -e "$INCISE_BUILD/lib/incise/tracker_usb.so" ] || skip "libusb is not installed"
+	mkdir modules
+	cp "$INCISE_BUILD/lib/incise/tracker_tty.so" modules
+	sed 's/libusb-1\.0\.so\.0/libusb-1.0.so.9/g' "$INCISE_BUILD/lib/incise/tracker_usb.so" \
+		>modules/tracker_usb.so
+	export INCISE_MODULE_PATH=$PWD/modules
+	run --separate-stderr incise doctor --rig sim:
+	[[ "$(group modules)" == *" ok loadable 1 modules of devices and file formats"* ]]
+	[[ "$(group modules)" == *" warning module tracker_usb cannot be loaded: libusb-1.0.so.9 is missing"*"→ sudo apt-get install libusb-1.0-9"* ]]
+}
+
+@test "doctor wants the kernel module for a rig that names it" {
+	[ ! -e /sys/module/incise_stepper ] || skip "the module is loaded"
+	run --separate-stderr incise doctor --rig sim:
+	[[ "$(finding kernel module)" == "  ok "*"the rig has no stepper"* ]]
+	printf '%s\n' 'tracker = "sim:"; stepper = "kernel:/dev/incise-stepper0";' \
+		'actuator = { spring_N_mm = 2; travel_mm = 20; lead_mm = 4; };' >rig.conf
+	run --separate-stderr incise doctor
+	[[ "$(finding kernel module)" == "  warning "*"→ sudo modprobe incise_stepper"* ]]
 }
 
 @test "doctor knows the age of each calibration" {
@@ -80,5 +143,6 @@ finding() { # GROUP NAME
 		assert report["problems"] == sum(c["state"] == "problem" for c in report["checks"]) >= 1
 		assert report["warnings"] == sum(c["state"] == "warning" for c in report["checks"])
 		assert all((c["state"] == "ok") <= (c["fix"] is None) for c in report["checks"])
+		assert report["recording_min"] >= 0
 	END
 }

@@ -121,5 +121,18 @@ INCISE_API int incise_recorder_end(struct incise_recorder *recorder,
 INCISE_API int incise_recorder_close(struct incise_recorder *recorder,
 				     struct incise_error *err);
 
+/**
+ * Expected time that a recording of these devices fits on a disk, by their nominal rates. Frames
+ * that are coded, and MJPEG, count with an upper estimate of their size.
+ *
+ * @param free_bytes free on the disk; some are reserved to end the recording
+ * @param tracker, force, camera streams of the recording; NULL: without
+ * @return seconds, 0 or more; INFINITY without a stream. Thread-safe.
+ */
+INCISE_API double incise_recorder_capacity_s(double free_bytes,
+					     const struct incise_tracker_info *tracker,
+					     const struct incise_force_info *force,
+					     const struct incise_camera_info *camera);
+
 INCISE_END_DECLS
 #endif

@@ -159,25 +159,46 @@ static int free_bytes(const struct incise_recorder *rec, double *bytes)
 	return 0;
 }
 
-/* Bytes per second, by the nominal rates of the devices. */
+/* Bytes per second, by the nominal rates of the devices, which may be NULL. */
+static double rate_of(const struct incise_tracker_info *tracker,
+		      const struct incise_force_info *force,
+		      const struct incise_camera_info *camera)
+{
+	double bytes_s = (force ? force->rate_hz * FORCE_BYTES : 0) +
+			 (tracker ? tracker->rate_hz * TRACKER_BYTES : 0);
+	double row =
+		camera ? (double)incise_frames_row(camera->pixels, camera->width) : 0;
+
+	if (camera)
+		bytes_s += camera->rate_hz *
+			   (FRAME_BYTES +
+			    (row > 0 ? row * FFV1_SHARE
+				     : (double)camera->width * JPEG_BYTES_PIXEL) *
+				    camera->height);
+	return isfinite(bytes_s) && bytes_s > 0 ? bytes_s : 0;
+}
+
 static double expected_rate(const struct incise_recorder *rec)
 {
-	const struct incise_camera_info *camera = &rec->camera_info;
-	double bytes_s = rec->force_info.rate_hz * FORCE_BYTES +
-			 rec->tracker_info.rate_hz * TRACKER_BYTES;
-	double pixels = (double)camera->width * camera->height;
-	double row = (double)incise_frames_row(camera->pixels, camera->width);
-
-	if (rec->streams[INCISE_LEDGER_CAMERA].exists)
-		bytes_s += camera->rate_hz *
-			   (FRAME_BYTES + (row > 0 ? row * camera->height * FFV1_SHARE
-						   : pixels * JPEG_BYTES_PIXEL));
-	return isfinite(bytes_s) && bytes_s > 0 ? bytes_s : 0;
+	return rate_of(&rec->tracker_info, &rec->force_info,
+		       rec->streams[INCISE_LEDGER_CAMERA].exists ? &rec->camera_info
+								 : NULL);
 }
 
 static double reserved(double bytes_s)
 {
 	return RESERVED_BYTES + RESERVED_S * bytes_s;
+}
+
+double incise_recorder_capacity_s(double free_bytes,
+				  const struct incise_tracker_info *tracker,
+				  const struct incise_force_info *force,
+				  const struct incise_camera_info *camera)
+{
+	double bytes_s = rate_of(tracker, force, camera);
+
+	return bytes_s > 0 ? fmax(0, (free_bytes - reserved(bytes_s)) / bytes_s)
+			   : INFINITY;
 }
 
 int incise_recorder_check_space(struct incise_recorder *rec, double planned_s,

@@ -1045,6 +1045,36 @@ static void expects_what_it_takes(void **state)
 	}
 }
 
+/* The same rate as that of a recorder on this rig. */
+static void capacity_is_that_of_a_recorder(void **state)
+{
+	struct incise_rig *rig = open_rig(SIM);
+	struct incise_tracker_info tracker;
+	struct incise_force_info force;
+	struct incise_camera_info camera = {
+		.rate_hz = 50, .width = 640, .height = 480, .pixels = INCISE_PIXELS_YUYV};
+	struct incise_recorder *rec = start_recorder("a.rec", rig);
+	struct incise_recorder_stats stats;
+	double reserved, s;
+
+	incise_tracker_info(incise_rig_tracker(rig), &tracker);
+	incise_force_info(incise_rig_force(rig), &force);
+	incise_recorder_stats(rec, &stats);
+	/* bytes are reserved to end it in: what 0 s leaves */
+	s = incise_recorder_capacity_s(1e12, &tracker, &force, NULL);
+	reserved = 1e12 - s * stats.bytes_per_s;
+	assert_true(reserved > 0 && reserved < 100e6);
+	assert_true(incise_recorder_capacity_s(reserved, &tracker, &force, NULL) < 1e-3);
+	assert_true(incise_recorder_capacity_s(0, &tracker, &force, NULL) == 0);
+	/* frames take more: 75 % of 2 bytes per pixel at most, 10 MB/s at least */
+	assert_true(1e12 / incise_recorder_capacity_s(1e12, NULL, NULL, &camera) > 10e6);
+	assert_true(1e12 / incise_recorder_capacity_s(1e12, NULL, NULL, &camera) <
+		    50.0 * 640 * 480 * 2);
+	assert_true(isinf(incise_recorder_capacity_s(1e12, NULL, NULL, NULL)));
+	assert_int_equal(incise_recorder_close(rec, NULL), 0);
+	incise_rig_close(rig);
+}
+
 static void refuses_what_no_disk_holds(void **state)
 {
 	struct incise_rig *rig = open_rig(SIM);
@@ -1094,6 +1124,7 @@ int main(void)
 		IN_FOLDER(copies_of_it_are_whole),
 		cmocka_unit_test(closing_nothing),
 		IN_FOLDER(expects_what_it_takes),
+		IN_FOLDER(capacity_is_that_of_a_recorder),
 		IN_FOLDER(refuses_what_no_disk_holds),
 	};
 
