@@ -1,16 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A scene says what is felt: the surface, the tissue, limits and rate. It compiles to a
- * plan; see incise/plan.h.
+ * A scene: surface, tissue, device, limits and rate. It compiles to a plan; see incise/plan.h.
  *
  * A .scene file (libconfig); incise-scene(5) has every key:
  *
  *     rate_hz = 1000.0;
- *     model = "liver.fis";          # paper 1's force; path relative to the scene's folder
+ *     model = "liver.fis";          # a model's force; path relative to the scene's folder
  *     arithmetic = "fixed";         # or "double"
  *     surface = { kind = "capsule"; from_mm = [0.0, 0.0, -55.0];
  *                 to_mm = [120.0, 0.0, -55.0]; radius_mm = 55.0; };   # or the rig's plane
- *     tissue  = { plane_N_mm = 0.1; damping_N_s_mm = 0.0005; };       # paper 2's constants
+ *     tissue  = { plane_N_mm = 0.1; damping_N_s_mm = 0.0005; };       # Bhasin et al. (2005)
  *     effects = { average_ticks = 8; };
  *     device  = { mass_kg = 0.05; damping_N_s_mm = 0.01; };
  *     limits  = { force_N = 4.0; slew_N_s = 400.0; pose_age_ms = 50.0; };
@@ -28,24 +27,24 @@ INCISE_BEGIN_DECLS
 struct incise_scene;
 
 /**
- * Read a scene, and the model and the surface it names.
+ * Read a scene with its model and its surface.
  *
  * @param path  .scene file
- * @param model path of a model that takes the place of the scene's, or NULL
- * @return scene, to be freed with incise_scene_free(); NULL with errno of incise_infile_open(),
- *         EINVAL (syntax, unknown key, value out of range: file, line and accepted range
- *         are named), or of incise_model_load(), incise_fixed_load(),
- *         incise_surface_load_mesh().
+ * @param model path of a model that replaces the scene's, or NULL
+ * @return scene, to be freed with incise_scene_free(); NULL with errno of
+ *         incise_infile_open(), EINVAL (syntax, unknown key, value out of range; the error
+ *         names file, line and accepted range), or of incise_model_load(),
+ *         incise_fixed_load(), incise_surface_load_mesh().
  */
 INCISE_API struct incise_scene *incise_scene_load(const char *path, const char *model,
 						  struct incise_error *err);
 
-/** Use another arithmetic than the file's: "fixed" or "double". @return 0, -EINVAL. */
+/** Set the arithmetic: "fixed" or "double". @return 0, -EINVAL. */
 INCISE_API int incise_scene_set_arithmetic(struct incise_scene *scene, const char *name,
 					   struct incise_error *err);
 
 /**
- * Use a texture of another size than the file's for the picture.
+ * Set the size of the texture for the image.
  *
  * @param texture_px 256, 512, 1024, 2048 or 4096
  * @return 0, -EINVAL
@@ -53,8 +52,8 @@ INCISE_API int incise_scene_set_arithmetic(struct incise_scene *scene, const cha
 INCISE_API int incise_scene_set_texture(struct incise_scene *scene, int texture_px);
 
 /**
- * Keep every stage in the plan, with what the scene does not ask for set neutral: to
- * measure what leaving out saves. The forces are the same, to the bit.
+ * Keep every stage in the plan, with neutral parameters for those that the scene does not
+ * need: to measure how much pruning saves. The forces are bit-exact.
  */
 INCISE_API void incise_scene_set_full(struct incise_scene *scene, bool full);
 
@@ -62,25 +61,25 @@ INCISE_API void incise_scene_set_full(struct incise_scene *scene, bool full);
 INCISE_API void incise_scene_free(struct incise_scene *scene);
 
 /**
- * A file that the scene was read from, by its number from 0 on: the scene's own, its model,
- * the mesh or heights of its surface. @return path, valid as long as the scene; NULL: no more.
+ * Files of the scene: its own, its model, the mesh or heights of its surface. @return path of
+ * file @i, from 0, valid as long as the scene; NULL: no more files.
  */
 INCISE_API const char *incise_scene_file(const struct incise_scene *scene, int i);
 
-/** Ticks per second that it asks for. */
+/** Ticks per second of the scene. */
 INCISE_API double incise_scene_rate_hz(const struct incise_scene *scene);
 
 /** The scene's group `limits`. */
 struct incise_scene_limits {
 	double force_N;	    /**< largest force */
-	double slew_N_s;    /**< largest change of it in a second */
-	double pose_age_ms; /**< without a younger pose the force fades … */
-	double fade_ms;	    /**< … in this time … */
-	double ramp_ms;	    /**< … and comes back in this */
-	double start_N;	    /**< no force before one as small as this is asked for */
+	double slew_N_s;    /**< largest change per second */
+	double pose_age_ms; /**< without a younger pose the force ramps to 0 … */
+	double fade_ms;	    /**< … within this time … */
+	double ramp_ms;	    /**< … and ramps up again within this */
+	double start_N;	    /**< no force until the tissue force is at most this */
 };
 
-/** From the blade's tip to the other end of the scalpel, mm. */
+/** Distance from the blade's tip to the other end of the scalpel, mm. */
 INCISE_API double incise_scene_handle_mm(const struct incise_scene *scene);
 
 /** The look of the tissue from above. */
@@ -95,10 +94,10 @@ struct incise_scene_picture {
 	bool wound;    /**< cuts are drawn */
 	bool bleeding; /**< they bleed */
 	enum incise_skin skin;
-	bool larynx;	   /**< it shows through; felt is the group membrane */
-	int texture_px;	   /**< side of the texture: 256, 512 … 4096 */
-	double gravity[3]; /**< unit vector: where blood runs, in the tracker's frame */
-	double blood_ul_s_mm2;	/**< for each mm of length and of depth of a fresh cut */
+	bool larynx;		/**< a larynx is visible; the group membrane renders it */
+	int texture_px;		/**< side of the texture: 256, 512 … 4096 */
+	double gravity[3];	/**< unit vector in which blood flows, tracker's frame */
+	double blood_ul_s_mm2;	/**< per mm of length and mm of depth of a fresh cut */
 	double viscosity_mPa_s; /**< of blood */
 	int seed;
 };
@@ -107,12 +106,12 @@ struct incise_scene_picture {
 INCISE_API void incise_scene_picture(const struct incise_scene *scene,
 				     struct incise_scene_picture *picture);
 
-/** The scene's group `tool`: the scalpel, in its own frame, which poses turn. */
+/** The scene's group `tool`: the scalpel in its own frame, which poses rotate. */
 struct incise_scene_scalpel {
 	double axis[3];	  /**< unit, from the tip to the handle's end */
 	double side[3];	  /**< unit, normal of the flat side of blade and handle */
-	double handle_mm; /**< the handle's end from the tip */
-	double handle_width_mm, handle_thickness_mm; /**< of its flat end */
+	double handle_mm; /**< distance of the handle's end from the tip */
+	double handle_width_mm, handle_thickness_mm; /**< of the handle's flat end */
 	double tube_mm;				     /**< diameter of the tube */
 };
 
@@ -120,41 +119,42 @@ struct incise_scene_scalpel {
 INCISE_API void incise_scene_scalpel(const struct incise_scene *scene,
 				     struct incise_scene_scalpel *scalpel);
 
-/** The scene's group `membrane`: over an airway, and the target of a tube. */
+/** The scene's group `membrane`: a membrane over an airway, the target of a tube. */
 struct incise_scene_membrane {
-	double point_mm[3]; /**< its middle */
+	double point_mm[3]; /**< its centre */
 	double normal[3];   /**< unit, out of the tissue */
 	double radius_mm;
-	double thickness_mm; /**< it yields after so much; 0: the scene has none … */
-	double puncture_N;   /**< … with this force, to which it rises evenly */
-	double back_wall_mm; /**< the airway's other side, from the membrane */
+	double thickness_mm; /**< depression at which it opens; 0: the scene has none */
+	double puncture_N;   /**< force at which it opens; rises linearly up to there */
+	double back_wall_mm; /**< distance of the airway's opposite wall */
 };
 
-/** Get the group `membrane` of the scene. @return whether it has one */
+/** Get the group `membrane` of the scene. @return whether the scene has it */
 INCISE_API bool incise_scene_membrane(const struct incise_scene *scene,
 				      struct incise_scene_membrane *membrane);
 
 /** The criteria of a session that a scene can have, in its group `criteria`. */
 enum incise_criterion {
-	INCISE_CRITERION_CUT_LENGTH, /**< of the longest incision, from end to end, mm */
-	INCISE_CRITERION_CUT_DEPTH,  /**< largest one of it, mm */
-	INCISE_CRITERION_OFF_TARGET, /**< of it from the membrane's axis, mm */
-	INCISE_CRITERION_INCISIONS,  /**< their number */
-	INCISE_CRITERION_MEMBRANE,   /**< 1: a tool went through it; 0: none did */
+	/** length of the longest incision, from end to end, mm */
+	INCISE_CRITERION_CUT_LENGTH,
+	INCISE_CRITERION_CUT_DEPTH,  /**< its largest depth, mm */
+	INCISE_CRITERION_OFF_TARGET, /**< its distance from the membrane's axis, mm */
+	INCISE_CRITERION_INCISIONS,  /**< number of incisions */
+	INCISE_CRITERION_MEMBRANE,   /**< 1: a tool went through it; 0: no tool */
 	INCISE_CRITERION_INSERTION,  /**< depth of the tube at the end, mm */
-	INCISE_CRITERION_BACK_WALL,  /**< 1: it was touched; 0: it was not */
-	INCISE_CRITERION_FORCE,	     /**< largest one, N */
-	INCISE_CRITERION_TIME, /**< from the first contact until the tube is in place, s */
+	INCISE_CRITERION_BACK_WALL,  /**< 1: touched; 0: not touched */
+	INCISE_CRITERION_FORCE,	     /**< largest force, N */
+	INCISE_CRITERION_TIME, /**< from first contact until the tube is in place, s */
 };
-#define INCISE_CRITERIA 9 /**< how many there are */
+#define INCISE_CRITERIA 9 /**< number of criteria */
 
-/** Values of a criterion that meet it. */
+/** Values that meet a criterion. */
 struct incise_scene_criterion {
-	bool asked;	 /**< the scene has it; else the rest is 0 */
-	double min, max; /**< both meet it */
+	bool asked;	 /**< the scene has it; otherwise the rest is 0 */
+	double min, max; /**< limits, included */
 };
 
-/** Its key in a scene: "cut_length_mm", … NULL: there is none of this number. */
+/** Key of a criterion in a scene: "cut_length_mm", … NULL: no such criterion. */
 INCISE_API const char *incise_criterion_name(int criterion);
 
 /** Get the group `criteria` of the scene, by enum incise_criterion. */
@@ -163,10 +163,10 @@ INCISE_API void incise_scene_criteria(
 	struct incise_scene_criterion criteria[INCISE_CRITERIA]);
 
 /**
- * A checksum over the bytes of all files of a scene, in the order of incise_scene_file(), as they
- * are now.
+ * Compute a checksum over the current bytes of all files of a scene, in the order of
+ * incise_scene_file().
  *
- * @param crc32c of Castagnoli's polynomial
+ * @param crc32c CRC with Castagnoli's polynomial
  * @return 0, or a negative errno of incise_infile_read()
  */
 INCISE_API int incise_scene_checksum(const struct incise_scene *scene, uint32_t *crc32c,
