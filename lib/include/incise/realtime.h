@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * Real time for a program: the requests of a process and its loop's thread to the kernel, and
- * the command that grants a denied one.
+ * the commands that grant denied ones.
  *
  *   main()  ── prepare ── checks? ── new ── open devices ───────────────────── free
  *                                            │
@@ -20,19 +20,19 @@
 
 INCISE_BEGIN_DECLS
 
-/** Policies of the scheduler that a loop may ask for. */
+/** Scheduling policies of a loop. */
 enum incise_realtime_policy {
 	INCISE_REALTIME_FIFO, /**< SCHED_FIFO: needs RLIMIT_RTPRIO */
 	/**
-	 * SCHED_DEADLINE: at most half of each period, so that a loop that hangs does not block
-	 * a CPU. Needs CAP_SYS_NICE, periods of 0.1 ms to 4 s, and all CPUs to run on.
+	 * SCHED_DEADLINE: at most half of each period, so that a hanging loop does not block a
+	 * CPU. Needs CAP_SYS_NICE, periods of 0.1 ms to 4 s, and all CPUs to run on.
 	 */
 	INCISE_REALTIME_DEADLINE,
 };
 
-/** Threads of devices are at 85: the loop must not delay them. */
+/** Default priority. Threads of devices have 85: the loop must not delay them. */
 #define INCISE_REALTIME_PRIORITY 80
-/** Highest priority: below those of devices. */
+/** Highest priority: below that of devices. */
 #define INCISE_REALTIME_PRIORITY_MAX 84
 /** The loop may run on any CPU. */
 #define INCISE_REALTIME_ANY_CPU (-1)
@@ -40,9 +40,9 @@ enum incise_realtime_policy {
 /** A loop's requests to the kernel. */
 struct incise_realtime_setup {
 	enum incise_realtime_policy policy;
-	int priority;	   /**< 1 … INCISE_REALTIME_PRIORITY_MAX; of SCHED_FIFO */
-	int cpu;	   /**< for the loop alone, or INCISE_REALTIME_ANY_CPU */
-	int64_t period_ns; /**< of the loop; 50000 … 10⁹ (20 kHz … 1 Hz) */
+	int priority;	   /**< 1 … INCISE_REALTIME_PRIORITY_MAX; for SCHED_FIFO */
+	int cpu;	   /**< CPU of the loop, or INCISE_REALTIME_ANY_CPU */
+	int64_t period_ns; /**< period of the loop; 50000 … 10⁹ (20 kHz … 1 Hz) */
 };
 
 /** One check and its result. */
@@ -55,9 +55,9 @@ struct incise_realtime_check {
 	bool needed; /**< without it incise_realtime_new() fails */
 	bool ok;
 	char found[160]; /**< one line */
-	/** When not ok: the command to run in a shell, or empty. */
+	/** If not ok: the shell command that fixes it, or empty. */
 	char fix[240];
-	/** The command that makes the fix permanent, or empty: it is, or there is none. */
+	/** The command that makes the fix permanent, or empty. */
 	char keep[240];
 };
 
@@ -65,16 +65,16 @@ struct incise_realtime_check {
 #define INCISE_REALTIME_CHECKS 9
 
 /**
- * Set small stacks, one heap that never shrinks, and no huge pages: the memory that is locked
- * later is then small and constant. Call it first in main(), before there is another thread.
- * Changes the whole process, needs no right and cannot fail.
+ * Set small stacks, one heap that never shrinks, and no huge pages, so that the locked memory
+ * is small and constant. Call it first in main(), before other threads start. It changes the
+ * whole process, needs no privilege and cannot fail.
  */
 INCISE_API void incise_realtime_prepare(void);
 
 /**
- * Check everything that a loop of this set-up needs, and causes of lateness. The policy and the
- * CPU are tried on a thread that ends at once, the memory on an empty range. The only lasting
- * change: soft limits RLIMIT_RTPRIO and RLIMIT_MEMLOCK are raised to the hard ones.
+ * Check the requirements of a loop with this set-up, and causes of latency. A thread that ends
+ * at once tries the policy and the CPU; an empty range is used to try locking memory. The only
+ * lasting change: soft limits RLIMIT_RTPRIO and RLIMIT_MEMLOCK are raised to the hard ones.
  *
  * @param checks capacity @n; required ones come first
  * @return their number, which may be more than @n; -EINVAL (set-up out of its range), -ENOMEM
@@ -87,23 +87,24 @@ INCISE_API int incise_realtime_checks(const struct incise_realtime_setup *setup,
 struct incise_realtime;
 
 /**
- * Lock the present and future memory of this process, and keep the CPUs out of deep idle states
- * where that is allowed. In a normal thread, before devices are opened. Required rights are
- * checked first; @err then has the commands that grant all of them.
+ * Lock the present and future memory of this process, and keep the CPUs out of deep idle
+ * states if permitted. Call it in a normal thread, before devices are opened. It checks the
+ * required privileges first; if one is missing, @err has the commands that grant them.
  *
- * @return to be freed with incise_realtime_free(); NULL with errno EPERM (denied), EINVAL
- *         (set-up out of its range, or the CPU is not available), EBUSY (SCHED_DEADLINE: others
- *         have reserved the CPUs), ENOTSUP (SCHED_DEADLINE with a CPU), EAGAIN, ENOMEM
+ * @return object, to be freed with incise_realtime_free(); NULL with errno EPERM (denied),
+ *         EINVAL (set-up out of its range, or the CPU is not available), EBUSY
+ *         (SCHED_DEADLINE: the CPUs are reserved by others), ENOTSUP (SCHED_DEADLINE with a
+ *         CPU), EAGAIN, ENOMEM
  */
 INCISE_API struct incise_realtime *incise_realtime_new(
 	const struct incise_realtime_setup *setup, struct incise_error *err);
 
 /**
- * In the loop's thread, before its first tick: touch its stack, move to the CPU, take the policy.
- * The thread must end when this fails. Threads that it starts inherit its CPU: start those of
- * devices elsewhere.
+ * Touch the stack, move to the CPU and set the policy. Call it in the loop's thread before its
+ * first tick. The thread must end if this fails. Threads that it starts inherit its CPU: start
+ * those of devices in another thread.
  *
- * @return 0, or -EPERM, -EINVAL, -EBUSY: as above, for rights that were lost since
+ * @return 0, or -EPERM, -EINVAL, -EBUSY: as above, if privileges were lost since
  */
 INCISE_API int incise_realtime_enter(const struct incise_realtime *realtime,
 				     struct incise_error *err);
@@ -111,15 +112,15 @@ INCISE_API int incise_realtime_enter(const struct incise_realtime *realtime,
 /** Release it after the loop's thread has ended. Unlocks memory. */
 INCISE_API void incise_realtime_free(struct incise_realtime *realtime);
 
-/** Counts of a thread since its start: faults should not increase while a loop runs. */
+/** Counts of a thread since its start. Faults should not increase while a loop runs. */
 struct incise_realtime_counts {
 	uint64_t minor_faults, major_faults; /**< pages mapped, pages read from a disk */
-	/** Waits, one for each tick; and preemptions. */
+	/** Waits, one per tick, and preemptions. */
 	uint64_t voluntary, involuntary;
 };
 
 /**
- * Read them, from /proc/self/task/TID, in another thread.
+ * Read the counts of a thread from /proc/self/task/TID, in another thread.
  *
  * @param tid gettid(2) of a thread of this process
  * @return 0, -ESRCH (no such thread), -EIO (format not as in proc(5))

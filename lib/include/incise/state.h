@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The state of a loop in a page that anybody reads, and for which the loop never waits.
+ * The status file of a loop: any process may read it, and the loop never waits for it.
  *
  *     loop's thread ── tick ──────────▶ live part, histograms, ring ──╮
- *     normal thread ── run, scene … ──▶ run part ─────────────────────┤ page
+ *     normal thread ── run, scene … ──▶ run part ─────────────────────┤ memory
  *                                       the writer's thread, each 5 ms ╰─▶ FILE ──▶ any reader
  *
- * The loop writes memory that nobody else can reach, and a thread of the writer copies it to a
- * file, /run/incise/NAME.state: others may change that file or cut it off, and the loop goes
- * on. A file that was cut off is whole again 5 ms later. Its writer locks it for life, so that
- * readers detect a dead writer, and leaves it in place at the end. The next writer replaces it.
- * incise-state(5) documents the bytes.
+ * The loop writes private memory, and a thread of the writer copies it to a file,
+ * /run/incise/NAME.state. Another process that changes or truncates the file does not disturb
+ * the loop; a truncated file is complete again after 5 ms. The writer holds a lock while it
+ * runs, so that readers detect a dead writer, and leaves the file in place at the end. The
+ * next writer replaces it. incise-state(5) documents the bytes.
  */
 #ifndef INCISE_STATE_H
 #define INCISE_STATE_H
@@ -29,14 +29,14 @@ struct incise_state_writer;
 
 /** Activity of the program around the loop. */
 enum incise_run {
-	INCISE_RUN_STARTING, /**< opens devices, tests itself: no ticks yet */
+	INCISE_RUN_STARTING, /**< opens devices, self-test: no ticks yet */
 	INCISE_RUN_RUNNING,
-	INCISE_RUN_RELOADING, /**< reads another scene, while the old one keeps ticking */
-	INCISE_RUN_STOPPING,  /**< the force fades to zero */
+	INCISE_RUN_RELOADING, /**< reads another scene while the old one runs */
+	INCISE_RUN_STOPPING,  /**< the force ramps to zero */
 	INCISE_RUN_STOPPED,   /**< ended on request */
 	INCISE_RUN_FAULT,     /**< ended by a fault: no force */
 };
-#define INCISE_RUNS 6 /**< how many there are */
+#define INCISE_RUNS 6 /**< number of states */
 
 /** "starting", "running" …; "unknown" for other values. */
 INCISE_API const char *incise_run_name(enum incise_run run);
@@ -51,38 +51,38 @@ struct incise_state_setup {
 };
 
 /**
- * Create a page at a path, in state STARTING, and start the thread that copies it there. Its
- * memory is resident when this returns; the caller locks it with mlockall(2).
+ * Create a status file in state STARTING, and start the thread that writes it. Its memory is
+ * resident afterwards; the caller locks it with mlockall(2).
  *
- * @param path a file in a writable folder; a file that is there must be a page, or empty
- * @return writer, to be freed with incise_state_free(); NULL with errno EBUSY (the writer
- *         of the page that is there lives; @err names its pid), EEXIST (another file is
- *         there), EINVAL (rate not above 0), ENOSPC, ENOMEM, errno of open(2), rename(2),
- *         pthread_create(3).
+ * @param path file in a writable folder; an existing file must be a status file, or empty
+ * @return writer, to be freed with incise_state_free(); NULL with errno EBUSY (the writer of
+ *         the existing file is running; @err names its pid), EEXIST (the existing file is not
+ *         a status file), EINVAL (rate not above 0), ENOSPC, ENOMEM, errno of open(2),
+ *         rename(2), pthread_create(3).
  */
 INCISE_API struct incise_state_writer *incise_state_new(
 	const char *path, const struct incise_state_setup *setup,
 	struct incise_error *err);
 
 /**
- * Publish a change of state; it is in the file when this returns. This and the functions below
- * are for the normal thread; a writer that is NULL does nothing.
+ * Publish a change of state; it is in the file when this returns. Call this and the functions
+ * below in the normal thread; they accept a writer of NULL.
  *
- * @param reason one line, cut at 299 bytes; NULL or "" for none
+ * @param reason one line, truncated to 299 bytes; NULL or "" for none
  */
 INCISE_API void incise_state_run(struct incise_state_writer *writer, enum incise_run run,
 				 const char *reason);
 
 /**
- * Publish the scene: before the first tick, and after each reload, which is counted.
+ * Publish the scene: before the first tick and after each reload, which this counts.
  *
- * @param path of the scene; beyond 511 bytes only the end is kept
- * @param plan its stages, may be ticking; NULL: no stages
+ * @param path path of the scene; only the last 511 bytes are kept
+ * @param plan plan with the stages, may be running; NULL: no stages
  */
 INCISE_API void incise_state_scene(struct incise_state_writer *writer, const char *path,
 				   const struct incise_plan *plan);
 
-/** Count a reload that failed. @param reason replaces the state's */
+/** Count a failed reload. @param reason replaces the state's reason */
 INCISE_API void incise_state_refused(struct incise_state_writer *writer,
 				     const char *reason);
 
@@ -94,8 +94,8 @@ INCISE_API void incise_state_counts(struct incise_state_writer *writer,
 INCISE_API void incise_state_free(struct incise_state_writer *writer);
 
 /**
- * Buckets of durations. Up to 32 ns each has a bucket of its own; above, each octave has 32, so
- * that none is wider than 3.2 %; the last one is open, from 17.2 s on.
+ * Number of buckets of durations. Each duration below 32 ns has its own bucket; above, each
+ * octave has 32, at most 3.2 % wide; the last bucket is open, from 17.2 s on.
  */
 #define INCISE_STATE_BUCKETS 961
 /** Number of durations per bucket. */
@@ -103,36 +103,36 @@ struct incise_state_histogram {
 	uint64_t count[INCISE_STATE_BUCKETS];
 };
 
-/** The longest time of a bucket, ns; INFINITY for the open one. Real-time safe. */
+/** Longest time of a bucket, ns; INFINITY for the open bucket. Real-time safe. */
 INCISE_API double incise_state_edge(int bucket) INCISE_REALTIME;
 
 /** The sum of all counts. */
 INCISE_API uint64_t incise_state_total(const struct incise_state_histogram *histogram);
 
 /**
- * A quantile, ns: the longest time of its bucket, so that it is never too small, and at most
- * 3.2 % too large.
+ * A quantile, ns: the longest time of its bucket, so that it is at most 3.2 % too large and
+ * never too small.
  *
  * @param share 0 … 1
- * @return 0 when nothing was counted; INFINITY in the open bucket
+ * @return 0 without counts; INFINITY in the open bucket
  */
 INCISE_API double incise_state_quantile(const struct incise_state_histogram *histogram,
 					double share);
 
-/** Contents of a page, without the ring. Strings are printable and terminated. */
+/** Contents of a status file, without the ring. Strings are printable and terminated. */
 struct incise_state_now {
-	bool alive; /**< the writer lives; else this is its last state */
-	bool torn;  /**< it died while writing: some of this is older than the rest */
+	bool alive; /**< the writer is running; else this is its last state */
+	bool torn;  /**< the writer died while writing: parts are older than others */
 
-	int64_t pid;		   /**< of the writer */
-	int64_t start_ns;	   /**< CLOCK_MONOTONIC when the page was made */
+	int64_t pid;		   /**< process of the writer */
+	int64_t start_ns;	   /**< CLOCK_MONOTONIC when the file was created */
 	int64_t start_realtime_ns; /**< CLOCK_REALTIME then */
 	double rate_hz;
 	char rig[256];
 	char policy[128];
 
 	enum incise_run run;
-	int64_t since_ns; /**< CLOCK_MONOTONIC of the change to it; a reload does not end it */
+	int64_t since_ns; /**< CLOCK_MONOTONIC of the last change; reloads are ignored */
 	char reason[300];
 	char scene[512];
 	int n_stages;
@@ -142,43 +142,44 @@ struct incise_state_now {
 	uint64_t refused;      /**< failed reloads */
 	uint64_t minor_faults; /**< pages mapped, by the loop's thread */
 	uint64_t major_faults; /**< pages read from a disk */
-	uint64_t voluntary;    /**< waits: one for each tick */
+	uint64_t voluntary;    /**< waits: one per tick */
 	uint64_t involuntary;  /**< preemptions */
 
 	uint64_t ticks;
-	uint64_t skipped;		     /**< ticks left out */
+	uint64_t skipped;		     /**< skipped ticks */
 	uint64_t overruns;		     /**< gaps of one or more skipped ticks */
 	uint64_t flagged[INCISE_TICK_FLAGS]; /**< ticks with that flag */
 	uint64_t limited;		     /**< ticks CLAMPED or SLEWED or both */
-	double force_N, force_max_N;	     /**< magnitude of the requested force */
+	double force_N, force_max_N;	     /**< magnitude of the commanded force */
 	int64_t lateness_ns, lateness_max_ns;
 	int64_t cost_ns, cost_max_ns;
 	uint64_t lateness_sum_ns, cost_sum_ns; /**< over all ticks */
 	double absorbed_mJ;		       /**< work of the hand on the tissue */
 	double returned_mJ;	 /**< work of the tissue on the hand, ≥ 0 */
 	int64_t first_ns;	 /**< time of the first tick, by the loop's clock */
-	struct incise_tick tick; /**< the last one */
+	struct incise_tick tick; /**< last tick */
 
 	/** May differ from the rest by a tick. */
 	struct incise_state_histogram lateness, cost;
 };
 
 /**
- * Open a page. Its contents are not trusted: a malformed page leads to an errno and nothing
- * worse. The file is read, not mapped: truncation gives an errno, and no signal. A page that is
- * malformed although its writer lives is looked at again, for up to 1 s: it was just cut off.
+ * Open a status file. The contents are not trusted: a malformed file leads to an errno. The
+ * file is read, not mapped: truncation leads to an errno, not to a signal. If the file is
+ * malformed although its writer is running, it was just truncated, and this function tries
+ * again for up to 1 s.
  *
  * @return state, to be closed with incise_state_close(); NULL with errno of open(2), EINVAL
- *         (no page), EPROTO (another version of the format), ENOMEM.
+ *         (not a status file), EPROTO (another version of the format), ENOMEM.
  */
 INCISE_API struct incise_state *incise_state_open(const char *path,
 						  struct incise_error *err);
 
 /**
- * Copy the contents of a page.
+ * Copy the contents of a status file.
  *
- * @return 0; -EAGAIN (each copy was torn, or the file was truncated and its living writer
- *         writes it anew: try again), -EIO (truncated or malformed). Some 6 system calls,
+ * @return 0; -EAGAIN (each copy was inconsistent, or the running writer is restoring a
+ *         truncated file: try again), -EIO (truncated or malformed). About 6 system calls,
  *         never waits.
  */
 INCISE_API int incise_state_read(struct incise_state *state,
@@ -187,21 +188,22 @@ INCISE_API int incise_state_read(struct incise_state *state,
 #define INCISE_STATE_NEWEST UINT64_MAX /**< cursor for ticks from now on only */
 
 /**
- * Ticks since the last call, oldest first. Each reader has a cursor of its own: the number of
- * the next tick, counted from 0.
+ * Read the ticks since the last call, oldest first. Each reader has its own cursor: the number
+ * of the next tick, counted from 0.
  *
  * @param cursor 0: from the oldest in the ring; INCISE_STATE_NEWEST: from now on. Is advanced
  * @param n      capacity of @ticks
- * @param lost   ticks that were overwritten before they were read are added; or NULL
- * @return how many ticks; -EAGAIN, -EIO as above. Never waits.
+ * @param lost   increased by the number of ticks that were overwritten before they were read;
+ *               or NULL
+ * @return number of ticks; -EAGAIN, -EIO as above. Never waits.
  */
 INCISE_API int incise_state_ticks(struct incise_state *state, uint64_t *cursor,
 				  struct incise_tick *ticks, int n, uint64_t *lost);
 
-/** Whether the writer lives. @return 1 or 0; -EIO */
+/** Test whether the writer is running. @return 1 or 0; -EIO */
 INCISE_API int incise_state_alive(struct incise_state *state);
 
-/** NULL is accepted. The page stays. */
+/** NULL is accepted. The file remains. */
 INCISE_API void incise_state_close(struct incise_state *state);
 
 INCISE_END_DECLS

@@ -13,16 +13,16 @@
 /** The tool in the hand. */
 enum incise_tool {
 	/**
-	 * Blade or handle, whichever end of the scalpel is down; or the tube, where it has a
-	 * station of the tracker, while that is nearer to the tissue than both of them.
+	 * Blade or handle, the lower end of the scalpel; or the tube, if it has a station of
+	 * the tracker and is nearer to the tissue than both.
 	 */
 	INCISE_TOOL_AUTO,
 	INCISE_TOOL_BLADE,
 	INCISE_TOOL_HANDLE, /**< the scalpel's other end */
-	INCISE_TOOL_TUBE, /**< round; its end is at its own station, else where the tip was */
+	INCISE_TOOL_TUBE,   /**< round; its end is its own station, else the tip */
 };
 
-/** Phases of a procedure; paper 2, §2.2 and §2.3. */
+/** Phases of a procedure; Bhasin et al. (2005), §2.2 and §2.3. */
 enum incise_phase {
 	INCISE_PHASE_FREE,
 	INCISE_PHASE_CUTTING,
