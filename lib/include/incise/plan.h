@@ -219,9 +219,10 @@ INCISE_API int incise_plan_set_tip(struct incise_plan *plan, const double tip_mm
  * Set the tool in the hand from now on; default INCISE_TOOL_AUTO. The tool changes only
  * outside of the tissue. Without insertion in the scene there is only the blade.
  *
- * @return 0, -EINVAL. Real-time safe; in the thread of the ticks. */
-INCISE_API int *incise_plan_set_tool(struct incise_plan *plan,
-				     enum incise_tool tool) INCISE_REALTIME;
+ * @return 0, -EINVAL. Real-time safe; in the thread of the ticks.
+ */
+INCISE_API int incise_plan_set_tool(struct incise_plan *plan,
+				    enum incise_tool tool) INCISE_REALTIME;
 
 /**
  * Longest duration of a ramp to 0, ns: limits.fade_ms plus the largest force over its slew.
