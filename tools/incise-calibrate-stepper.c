@@ -65,7 +65,7 @@ static const struct cli_option option_table[] = {
 	 CLI_QUANTITY(struct options, max_N, forces, 0.001, 10000)},
 	{0, "no-rate", NULL, "do not search the largest step rate",
 	 CLI_FLAG(struct options, no_rate)},
-	{0, "step-mm", "MM", "with --from: way of a microstep",
+	{0, "step-mm", "MM", "with --from: travel per microstep, in mm",
 	 CLI_NUMBER(struct options, step_mm, 1e-7, 100)},
 	{0},
 };
@@ -150,8 +150,8 @@ static void read_header(struct reader *r, char **columns)
 	}
 	if (r->force < 0 || (r->position < 0 && r->steps < 0))
 		cli_fail(
-			"%s:%d: expected a line of names with force_N, and position_mm or "
-			"steps",
+			"%s:%d: expected a line of column names: force_N, and position_mm "
+			"or steps; t_s is optional",
 			r->path, r->line);
 }
 
@@ -164,8 +164,8 @@ static double number(const struct reader *r, char **columns, int i, const char *
 		return NAN;
 	value = incise_decimal(columns[i], &end);
 	if (!*columns[i] || *end || !isfinite(value))
-		cli_fail("%s:%d: %s is '%.20s' and not a number", r->path, r->line, name,
-			 columns[i]);
+		cli_fail("%s:%d: %s: expected a number, found '%.20s'; correct it",
+			 r->path, r->line, name, columns[i]);
 	return value;
 }
 
@@ -183,7 +183,8 @@ static void read_point(struct reader *r, char **columns, struct stepper_series *
 		r->mm = fabs(mm - r->first_mm);
 	}
 	if (fabs(steps - round(steps)) > 1e-3)
-		cli_fail("%s:%d: steps is %.6g and no whole number; are columns swapped?",
+		cli_fail("%s:%d: steps: expected a whole number, found %.6g; see whether "
+			 "columns are swapped",
 			 r->path, r->line, steps);
 	/* From the second position on the ratio of both columns is fixed. */
 	if (r->counted > 0 && r->mm > 0 && r->position >= 0 &&
@@ -191,7 +192,8 @@ static void read_point(struct reader *r, char **columns, struct stepper_series *
 		 fabs(steps - r->first_steps) * r->mm / r->counted) >
 		    1.5 * r->mm / r->counted + 0.01 * r->mm)
 		cli_fail(
-			"%s:%d: position_mm and steps do not go together; are columns swapped?",
+			"%s:%d: position_mm and steps disagree about the travel of a step; "
+			"see whether columns are swapped",
 			r->path, r->line);
 	if (series->n == POINTS_MAX)
 		cli_fail("%s:%d: more than %d points; take every tenth", r->path, r->line,
@@ -224,13 +226,16 @@ static void read_series(struct stepper_series *series, const char *path, double 
 			continue;
 		}
 		if (n != r.columns)
-			cli_fail("%s:%d: %d columns where the first line names %d", path,
-				 r.line, n, r.columns);
+			cli_fail("%s:%d: %d fields, but the first line names %d columns; "
+				 "correct the line, or remove it",
+				 path, r.line, n, r.columns);
 		read_point(&r, columns, series);
 	}
 	incise_infile_close(in);
 	if (!series->n)
-		cli_fail("%s: no points in it", path);
+		cli_fail("%s: no points; expected a line of column names (force_N, and "
+			 "position_mm or steps) and lines of numbers",
+			 path);
 	if (r.counted > 0 && r.position >= 0)
 		series->step_mm = r.mm / r.counted;
 	else
@@ -238,10 +243,9 @@ static void read_series(struct stepper_series *series, const char *path, double 
 	if (!isnan(step_mm))
 		series->step_mm = step_mm;
 	if (!(series->step_mm > 0))
-		cli_fail(
-			"%s: how far a step goes is not in it; give --step-mm, or both columns, "
-			"steps and position_mm",
-			path);
+		cli_fail("%s: the travel of a microstep is not in it; give --step-mm, or "
+			 "both columns, steps and position_mm",
+			 path);
 	for (int i = 0; i < series->n && r.steps >= 0; i++)
 		series->points[i].position_mm *= series->step_mm;
 }

@@ -123,7 +123,8 @@ static void read_recording(struct list *list, const char *path)
 	incise_recording_close(recording);
 }
 
-static void find_columns(const char *path, char **fields, int n, int at[COLUMNS])
+static void find_columns(const char *path, int line, char **fields, int n,
+			 int at[COLUMNS])
 {
 	for (int c = 0; c < COLUMNS; c++) {
 		at[c] = -1;
@@ -132,9 +133,9 @@ static void find_columns(const char *path, char **fields, int n, int at[COLUMNS]
 				at[c] = i;
 		if (at[c] < 0 && c)
 			cli_fail(
-				"%s: line 1 has no column '%s'; it is to name t_s, x_mm, "
-				"y_mm, z_mm, qw, qx, qy, qz",
-				path, names[c]);
+				"%s:%d: there is no column '%s'; expected a line of column "
+				"names: x_mm, y_mm, z_mm, qw, qx, qy, qz; t_s is optional",
+				path, line, names[c]);
 	}
 }
 
@@ -153,7 +154,7 @@ static void read_csv(struct list *list, const char *path)
 			continue;
 		n = calibrate_cut(line, fields, CSV_MAX, " \t", "");
 		if (!header) {
-			find_columns(path, fields, n, at);
+			find_columns(path, number, fields, n, at);
 			header = true;
 			continue;
 		}
@@ -165,13 +166,16 @@ static void read_csv(struct list *list, const char *path)
 			if (at[c] < 0)
 				continue;
 			if (at[c] >= n)
-				cli_fail("%s: line %d: '%s' is missing", path, number,
-					 names[c]);
+				cli_fail(
+					"%s:%d: %s is missing; add it, or remove the line",
+					path, number, names[c]);
 			values[c] = incise_decimal(fields[at[c]], &end);
 			if (end == fields[at[c]] || end[strspn(end, " \t")] ||
 			    !isfinite(values[c]) || (!c && fabs(values[c]) > 1e9))
-				cli_fail("%s: line %d: %s: '%s' is no number", path,
-					 number, names[c], fields[at[c]]);
+				cli_fail(
+					"%s:%d: %s: expected a number, found '%s'; correct "
+					"it",
+					path, number, names[c], fields[at[c]]);
 		}
 		struct incise_tip_pose *pose = next_pose(list);
 
@@ -180,6 +184,11 @@ static void read_csv(struct list *list, const char *path)
 		memcpy(pose->quaternion, values + 4, sizeof(pose->quaternion));
 	}
 	incise_infile_close(in);
+	if (!list->n)
+		cli_fail(
+			"%s: no poses; expected a line of column names (x_mm, y_mm, z_mm, "
+			"qw, qx, qy, qz) and lines of numbers",
+			path);
 }
 
 static void read_poses(struct list *list, const char *path)

@@ -108,31 +108,50 @@ static void evaluate(struct evaluator *e, const double *x, bool inputs)
 	putchar('\n');
 }
 
-static void parse_line(const struct evaluator *e, const char *path, unsigned long line,
-		       char *text, double *x)
+#define SEPARATORS " \t,;"
+
+/* Behind a line with more numbers than there are inputs: they may be decimal commas. */
+static const char *advice(const char *text)
 {
+	const char *comma = strchr(text, ',');
+
+	return comma && strpbrk(text, " \t;") ? "write decimal points, not commas"
+					      : "remove what is not an input";
+}
+
+static void parse_line(const struct evaluator *e, const char *path, unsigned long line,
+		       const char *text, double *x)
+{
+	const char *at = text;
 	int n = e->n_inputs;
-	char *at = text;
 
 	for (int i = 0; i < n; i++) {
 		const char *name = e->input[i];
+		size_t length;
 		char *end;
 
-		at += strspn(at, " \t,;");
+		at += strspn(at, SEPARATORS);
+		length = strcspn(at, SEPARATORS);
 		x[i] = incise_decimal(at, &end);
-		if (end == at)
-			cli_fail(
-				"%s:%lu: column %d (%s): '%.20s' is not a number; a line needs "
-				"%d numbers",
-				path, line, i + 1, name, at, n);
+		if (!length)
+			cli_fail("%s:%lu: column %d (%s) is missing; a line needs %d "
+				 "numbers",
+				 path, line, i + 1, name, n);
+		if (end == at || end != at + length)
+			cli_fail("%s:%lu: column %d (%s): '%.*s' is not a number; write "
+				 "%d numbers without units, and '#' before a heading",
+				 path, line, i + 1, name,
+				 (int)(length < 20 ? length : 20), at, n);
 		if (!isfinite(x[i]))
-			cli_fail("%s:%lu: column %d (%s): %.*s is not finite", path, line,
-				 i + 1, name, (int)(end - at), at);
+			cli_fail("%s:%lu: column %d (%s): %.*s is not finite; remove the "
+				 "line",
+				 path, line, i + 1, name, (int)length, at);
 		at = end;
 	}
-	if (at[strspn(at, " \t,;")])
-		cli_fail("%s:%lu: column %d: '%.20s': a line needs just %d numbers", path,
-			 line, n + 1, at + strspn(at, " \t,;"), n);
+	at += strspn(at, SEPARATORS);
+	if (*at)
+		cli_fail("%s:%lu: column %d: '%.20s' is more than the %d inputs; %s",
+			 path, line, n + 1, at, n, advice(text));
 }
 
 static void load_uncertainty(struct evaluator *e, const char *model)
@@ -236,7 +255,7 @@ static void eval_file(struct evaluator *e, const char *path)
 	char *text;
 	int rc;
 
-	file_expect(path, FILE_TABLE);
+	file_expect(path, FILE_TABLE | FILE_SEMICOLONS | FILE_TABS);
 	in = cli_require(incise_infile_open(path, &points, &err), &err);
 	while ((rc = incise_infile_line(in, &text, &err)) > 0) {
 		line++;

@@ -12,7 +12,9 @@ int incise_lines_open(struct incise_lines *in, const char *path,
 		      const struct incise_infile_kind *kind, struct incise_error *err)
 {
 	*in = (struct incise_lines){
-		.path = path, .file = incise_infile_open(path, kind, err), .err = err};
+		.path = strcmp(path, "-") || kind->regular ? path : "standard input",
+		.file = incise_infile_open(path, kind, err),
+		.err = err};
 	if (!in->file)
 		return -errno;
 	in->locale = incise_c_locale_begin();
@@ -48,5 +50,7 @@ int incise_lines_error(struct incise_lines *in, int code, const char *fmt, ...)
 	va_start(args, fmt);
 	vsnprintf(what, sizeof(what), fmt, args);
 	va_end(args);
+	if (!in->line)
+		return incise_error_set(in->err, code, "%s: %s", in->path, what);
 	return incise_error_set(in->err, code, "%s:%d: %s", in->path, in->line, what);
 }

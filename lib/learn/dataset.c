@@ -105,18 +105,30 @@ static int look_for_column(const struct reader *in, const char *name)
 
 static int find_column(struct reader *in, const char *name)
 {
-	char list[300] = "";
+	const char *names[FIELDS_MAX + 1] = {NULL}, *nearest;
+	char list[260] = "";
 	size_t used = 0;
 	int at = look_for_column(in, name);
 
 	if (at >= 0)
 		return at;
+	for (int i = 0; i < in->n_fields; i++)
+		names[i] = in->field[i];
+	nearest = incise_nearest_name(name, names);
 	for (int i = 0; i < in->n_fields && used < sizeof(list); i++)
 		used += snprintf(list + used, sizeof(list) - used, "%s%s", i ? ", " : "",
 				 in->field[i]);
-	return incise_lines_error(&in->lines, EINVAL,
-				  "there is no column '%s'; the columns are: %s", name,
-				  list);
+	if (in->n_fields == 1 && strpbrk(in->field[0], ";\t"))
+		return incise_lines_error(
+			&in->lines, EINVAL,
+			"expected commas between the columns, and decimal "
+			"points, found: %s",
+			list);
+	return incise_lines_error(
+		&in->lines, EINVAL,
+		"there is no column '%s'; the columns are: %s; %s%s%s", name, list,
+		nearest ? "did you mean '" : "rename one, or name another",
+		nearest ? nearest : "", nearest ? "'?" : "");
 }
 
 static int number(struct reader *in, int field, const char *column, double *value)
@@ -127,12 +139,15 @@ static int number(struct reader *in, int field, const char *column, double *valu
 	*value = incise_decimal(text, &end);
 	if (end == text || end[strspn(end, " \t")])
 		return incise_lines_error(&in->lines, EINVAL,
-					  "column %d (%s): '%.40s' is not a number",
-					  field + 1, column, text);
+					  "column %d (%s): '%.40s' is not a number; %s",
+					  field + 1, column, text,
+					  strchr(text, ',')
+						  ? "write a decimal point, not a comma"
+						  : "correct it, or remove the row");
 	if (!isfinite(*value))
 		return incise_lines_error(
 			&in->lines, EINVAL,
-			"column %d (%s): %.40s is not finite; remove the row or mend it",
+			"column %d (%s): %.40s is not finite; correct it, or remove the row",
 			field + 1, column, text);
 	return 0;
 }
@@ -188,8 +203,8 @@ static int read_rows(struct reader *in, const char *const *columns, const char *
 		return rc;
 	if (!rc)
 		return incise_lines_error(&in->lines, ENODATA,
-					  "the file is empty: expected a header row with "
-					  "column names");
+					  "the file is empty; expected a header row with "
+					  "column names, and rows of numbers");
 	for (int i = 0; i < data->columns; i++) {
 		at[i] = find_column(in, columns[i]);
 		if (at[i] < 0)
@@ -208,9 +223,12 @@ static int read_rows(struct reader *in, const char *const *columns, const char *
 		if (in->n_fields != header)
 			return incise_lines_error(
 				&in->lines, EINVAL,
-				"column %d: the row has %d fields, the header has %d",
+				"column %d: the row has %d fields, the header has %d; %s",
 				in->n_fields < header ? in->n_fields + 1 : header + 1,
-				in->n_fields, header);
+				in->n_fields, header,
+				in->n_fields < header
+					? "add what is missing, or remove the row"
+					: "write decimal points, not commas");
 		rc = where_at >= 0 ? number(in, where_at, where, &wanted) : 0;
 		if (rc)
 			return rc;
@@ -241,8 +259,9 @@ static int read_rows(struct reader *in, const char *const *columns, const char *
 					"all %zu rows have 0 in the column '%s'",
 					*left_out, where);
 	else if (!rc && !data->rows)
-		rc = incise_lines_error(&in->lines, ENODATA,
-					"there are no rows below the header");
+		rc = incise_lines_error(
+			&in->lines, ENODATA,
+			"there are no rows below the header; add rows of numbers");
 	return rc;
 }
 

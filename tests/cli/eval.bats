@@ -278,7 +278,7 @@ degree_model() {
 	run --separate-stderr incise eval m.fis a b
 	bad_usage "at most one file"
 	run --separate-stderr incise eval m.fis --arith float
-	bad_usage "neither double nor fixed"
+	bad_usage "--arith: expected double or fixed"
 	run --separate-stderr incise eval none.fis
 	failed_with none.fis "No such file"
 	run --separate-stderr incise eval m.fis none.txt

@@ -329,7 +329,7 @@ beside_the_model() {
 		bad_usage --duration
 	done
 	run --separate-stderr incise haptic liver.scene --rig $quick --arith float
-	bad_usage "neither double nor fixed"
+	bad_usage "--arith: expected double or fixed"
 }
 
 @test "haptic: a log that cannot be written" {

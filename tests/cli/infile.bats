@@ -125,7 +125,7 @@ readers() {
 
 @test "a hexadecimal number is none, in files and options" {
 	run --separate-stderr incise eval m.fis <<<'0x5 20'
-	failed_with "standard input:1: column 1" "'0x5 20' is not a number"
+	failed_with "standard input:1: column 1" "'0x5' is not a number"
 	printf 'depth_mm,velocity_mm_s,force_N\n0x10,1,1\n' >hex.csv
 	run --separate-stderr incise train hex.csv -o out.fis
 	failed_with "hex.csv:2: column 1 (depth_mm): '0x10' is not a number"

@@ -32,8 +32,7 @@ struct table {
 static void add_pair(struct pairs *pairs, const struct incise_calibrate_force_pair *pair)
 {
 	if (pairs->n == PAIRS_MAX)
-		cli_fail("more than %d pairs: average what is read under one load",
-			 PAIRS_MAX);
+		cli_fail("more than %d pairs; give one average for each load", PAIRS_MAX);
 	/* grown in steps: 64, 128, … */
 	if (!(pairs->n & (pairs->n - 1)) && (pairs->n >= 64 || !pairs->n))
 		pairs->pair = cli_resize(pairs->pair, pairs->n ? 2 * pairs->n : 64,
@@ -52,8 +51,8 @@ static void read_header(struct table *table, char **fields, int n)
 	if (table->column[READING] < 0 ||
 	    (table->column[MASS] < 0) == (table->column[FORCE] < 0))
 		cli_fail(
-			"%s:%d: expected a line that names the columns, with reading_mV and "
-			"either mass_g or force_N (and series, direction: up or down)",
+			"%s:%d: expected a line of column names: reading_mV, and mass_g or "
+			"force_N; series and direction (up, down) are optional",
 			table->path, table->line);
 }
 
@@ -132,9 +131,9 @@ void pairs_read(struct pairs *pairs, const char *path)
 	}
 	incise_infile_close(in);
 	if (!pairs->n)
-		cli_fail(
-			"%s: no pairs in it: expected a line of names and lines of numbers",
-			path);
+		cli_fail("%s: no pairs; expected a line of column names (reading_mV, and "
+			 "mass_g or force_N) and lines of numbers",
+			 path);
 }
 
 void pairs_write(const struct pairs *pairs, const char *path)

@@ -32,7 +32,7 @@ static const struct {
 	{"a scene", ".scene", "'incise plan %1$s' shows what it runs"},
 	{"the configuration of a rig", NULL, "name it with --rig %1$s"},
 	{"a calibration", NULL, "'incise calibrate check --calibration %1$s' shows it"},
-	{"a CSV table", ".csv",
+	{"a CSV table (separated by commas)", ".csv",
 	 "'incise train' learns from one, 'incise calibrate KIND --from' reads readings"},
 	{"a session", ".session", "'incise assess %1$s' evaluates it"},
 	{"a JSON report", ".json",
@@ -45,6 +45,10 @@ static const struct {
 	{"a video", NULL, "give the recording that it belongs to"},
 	{"an export (HDF5 or MCAP)", NULL, "give the recording that it was made from"},
 	{"a database", NULL, "give the folder of the recording that it is in"},
+	{"a table separated by semicolons", ".csv",
+	 "convert it, and decimal commas with it: sed 's/,/./g; s/;/,/g' %1$s > NEW.csv"},
+	{"a table separated by tabs", ".csv",
+	 "convert it: tr '\\t' ',' < %1$s > NEW.csv"},
 };
 
 /* What leads from one kind to another. */
@@ -167,10 +171,13 @@ static int separators(const char *text, char separator)
 	return n;
 }
 
-/* Whether the first two rows that are no comment have as many fields, and more than one. */
-static bool is_table(const char *text)
+/* By the separator of which the first two rows that are no comment have as many, if any. */
+static enum file_kind kind_of_table(const char *text)
 {
-	static const char known[] = {',', ';', '\t'};
+	static const struct {
+		char separator;
+		enum file_kind kind;
+	} known[] = {{';', FILE_SEMICOLONS}, {'\t', FILE_TABS}, {',', FILE_TABLE}};
 	const char *second;
 
 	while (*text == '#' || *text == '\n' || *text == '\r') {
@@ -178,13 +185,14 @@ static bool is_table(const char *text)
 		text += *text == '\n';
 	}
 	second = strchr(text, '\n');
-	for (size_t i = 0; i < sizeof(known); i++) {
-		int n = separators(text, known[i]);
+	for (size_t i = 0; i < sizeof(known) / sizeof(*known); i++) {
+		int n = separators(text, known[i].separator);
 
-		if (n && (!second || !second[1] || separators(second + 1, known[i]) == n))
-			return true;
+		if (n && (!second || !second[1] ||
+			  separators(second + 1, known[i].separator) == n))
+			return known[i].kind;
 	}
-	return false;
+	return FILE_UNKNOWN;
 }
 
 static enum file_kind kind_of_text(const char *text)
@@ -199,7 +207,7 @@ static enum file_kind kind_of_text(const char *text)
 	if (!strncmp(text, "incise-sd ", 10))
 		return FILE_DEVIATION;
 	kind = kind_of_settings(text);
-	return kind ? kind : is_table(text) ? FILE_TABLE : FILE_UNKNOWN;
+	return kind ? kind : kind_of_table(text);
 }
 
 static enum file_kind kind_of_bytes(const char *head, size_t n)

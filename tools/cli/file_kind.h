@@ -16,16 +16,18 @@ enum file_kind {
 	FILE_SCENE = 1 << 4,
 	FILE_RIG = 1 << 5,	   /* rig.conf */
 	FILE_CALIBRATION = 1 << 6, /* calibration.conf */
-	FILE_TABLE = 1 << 7,	   /* CSV */
+	FILE_TABLE = 1 << 7,	   /* CSV with commas */
 	FILE_SESSION = 1 << 8,
-	FILE_REPORT = 1 << 9,	  /* any other JSON */
-	FILE_STATE = 1 << 10,	  /* the state page of a loop */
-	FILE_DEVIATION = 1 << 11, /* .sd */
-	FILE_IMAGE = 1 << 12,	  /* PNG, JPEG, PGM or PPM */
-	FILE_VIDEO = 1 << 13,	  /* Matroska */
-	FILE_EXPORT = 1 << 14,	  /* HDF5 or MCAP */
-	FILE_DATABASE = 1 << 15,  /* SQLite */
-	FILE_KINDS = 16,
+	FILE_REPORT = 1 << 9,	   /* any other JSON */
+	FILE_STATE = 1 << 10,	   /* the state page of a loop */
+	FILE_DEVIATION = 1 << 11,  /* .sd */
+	FILE_IMAGE = 1 << 12,	   /* PNG, JPEG, PGM or PPM */
+	FILE_VIDEO = 1 << 13,	   /* Matroska */
+	FILE_EXPORT = 1 << 14,	   /* HDF5 or MCAP */
+	FILE_DATABASE = 1 << 15,   /* SQLite */
+	FILE_SEMICOLONS = 1 << 16, /* a table that is no CSV: its separator */
+	FILE_TABS = 1 << 17,
+	FILE_KINDS = 18,
 };
 
 /* FILE_UNKNOWN also where there is no such file, or none that may be read. */
