@@ -23,7 +23,7 @@ static const struct {
 	{"depth", "0.11875 mm/px", {"depth_mm_px"}},
 	{"tip", "0 0 0 mm", {"tip_x_mm", "tip_y_mm", "tip_z_mm"}},
 	{"delay",
-	 "what the devices say",
+	 "as reported by the devices",
 	 {"force_delay_ms", "force_delay_sd_ms", "tracker_delay_ms",
 	  "tracker_delay_sd_ms", "camera_delay_ms", "camera_delay_sd_ms"}},
 	{"stepper",
@@ -59,15 +59,16 @@ static const struct cli_unit ages[] = {
 	{"d", 86400}, {"h", 3600}, {"w", 7 * 86400}, {"y", 365.25 * 86400}, {0}};
 
 static const struct cli_option option_table[] = {
-	{'c', "calibration", "FILE", "to look at (default: calibration.conf)",
+	{'c', "calibration", "FILE", "file to check (default: calibration.conf)",
 	 CLI_INPUT(struct options, calibration)},
-	{0, "due", "AGE", "a calibration older than this is due (default: 365d)",
+	{0, "due", "AGE", "age at which a calibration expires (default: 365d)",
 	 CLI_QUANTITY(struct options, due_s, ages, 0, 1e10)},
 	{0, "only", "LIST",
-	 "what this rig needs, of force,depth,tip,delay,stepper (default: all)",
+	 "calibrations that this rig needs, of\n"
+	 "force,depth,tip,delay,stepper (default: all)",
 	 CLI_PARSED_BY(parse_only)},
 	{0, "recording", "NAME.rec",
-	 "see whether its tracker and camera agree about the depth",
+	 "check whether its tracker and camera agree about the depth",
 	 CLI_INPUT(struct options, recording)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, json)},
 	{0}};
@@ -75,13 +76,13 @@ static const struct cli_option option_table[] = {
 static const struct cli_command command = {
 	.name = "calibrate check",
 	.synopsis = "[-c FILE] [--due AGE] [--recording NAME.rec]",
-	.summary =
-		"Say what is calibrated, how old it is and what is due; and whether the "
-		"tracker and\nthe camera of a recording agree.",
+	.summary = "Show the active calibrations, their age, and any that have expired; "
+		   "and whether the\n"
+		   "tracker and the camera of a recording agree about the depth.",
 	.options = option_table,
-	.notes =
-		"Exit codes: 0 all is well, 1 something is due, failed or disagrees, 2 bad "
-		"usage.",
+	.notes = "Exit codes: 0 all is well, 1 a calibration has expired or failed, or "
+		 "tracker and camera\n"
+		 "disagree, 2 bad usage.",
 };
 
 /* The state of one kind. */
@@ -161,13 +162,14 @@ static void judge(const struct options *options, int kind,
 	s->due = true;
 	by_hand(calibration, kind, records, n, hand, sizeof(hand));
 	if (*hand)
-		snprintf(in_force, sizeof(in_force), "%s by hand, nominal is %s", hand,
+		snprintf(in_force, sizeof(in_force), "set by hand: %s; nominal: %s", hand,
 			 kinds[kind].nominal);
 	else
 		snprintf(in_force, sizeof(in_force), "nominal, %s", kinds[kind].nominal);
 	if (!s->passed)
 		snprintf(s->why, sizeof(s->why), "%s: %s",
-			 s->last ? "none has passed" : "never calibrated", in_force);
+			 s->last ? "no calibration has passed" : "never calibrated",
+			 in_force);
 	else if (s->failed)
 		snprintf(s->why, sizeof(s->why), "the last one, of %.10s, failed",
 			 s->last->date);
@@ -175,7 +177,7 @@ static void judge(const struct options *options, int kind,
 		snprintf(s->why, sizeof(s->why), "changed by hand since: %s", hand);
 	else if (s->age_s < -60)
 		snprintf(s->why, sizeof(s->why),
-			 "its date is in the future: look at the clock");
+			 "its date is in the future: check the clock");
 	else if (s->age_s > options->due_s)
 		snprintf(s->why, sizeof(s->why), "older than %.4g days",
 			 options->due_s / 86400);
@@ -204,7 +206,7 @@ static void print_status(const struct incise_calibration *calibration, int kind,
 		printf("         %-22s %s (k = 2)", v->key,
 		       uncertainty_text(v->left, 2 * v->u, v->unit, text));
 		if (now != v->left)
-			printf("; in force: %.8g", now);
+			printf("; active: %.8g", now);
 		putchar('\n');
 	}
 	if (s->last && *s->last->verdict)
@@ -260,23 +262,22 @@ static void compare(const char *path, struct comparison *c)
 	incise_recording_close(recording);
 	c->bad = r->bias_bad || r->place_bad || r->trend_bad;
 	if (r->place_bad)
-		snprintf(
-			c->verdict, sizeof(c->verdict),
-			"metal nearby? camera and tracker differ by %.2f mm between places; "
-			"more than %g mm: move steel away from tracker and scalpel",
-			r->place_mm, INCISE_REDUNDANCY_PLACE_MM);
+		snprintf(c->verdict, sizeof(c->verdict),
+			 "metal may be near: camera and tracker differ by %.2f mm "
+			 "between places, more than %g mm; move steel away from tracker "
+			 "and scalpel",
+			 r->place_mm, INCISE_REDUNDANCY_PLACE_MM);
 	else if (r->trend_bad)
-		snprintf(
-			c->verdict, sizeof(c->verdict),
-			"wrong scale? they differ by %.1f %% of the depth; more than %g %%: "
-			"calibrate depth",
-			100 * r->trend, 100 * INCISE_REDUNDANCY_TREND);
+		snprintf(c->verdict, sizeof(c->verdict),
+			 "a scale may be wrong: they differ by %.1f %% of the depth, "
+			 "more than %g %%; run incise calibrate depth",
+			 100 * r->trend, 100 * INCISE_REDUNDANCY_TREND);
 	else if (r->bias_bad)
-		snprintf(
-			c->verdict, sizeof(c->verdict),
-			"shifted camera? they differ by %+.2f mm everywhere; more than %g "
-			"mm: calibrate depth and tip, or look at the surface in rig.conf",
-			r->bias_mm, INCISE_REDUNDANCY_BIAS_MM);
+		snprintf(c->verdict, sizeof(c->verdict),
+			 "the camera may have moved: they differ by %+.2f mm "
+			 "everywhere, more than %g mm; run incise calibrate depth and "
+			 "tip, or check the surface in rig.conf",
+			 r->bias_mm, INCISE_REDUNDANCY_BIAS_MM);
 	else
 		snprintf(c->verdict, sizeof(c->verdict), "camera and tracker agree");
 }
@@ -286,7 +287,9 @@ static void print_comparison(const char *path, const struct comparison *c)
 	const struct incise_redundancy *r = &c->redundancy;
 	char text[UNCERTAINTY_TEXT];
 
-	printf("\n%s: camera - tracker, of %d pictures\n", path, r->n);
+	printf("\n"
+	       "%s: camera minus tracker, in %d frames\n",
+	       path, r->n);
 	printf("         bias     %s (k = 2)\n",
 	       uncertainty_text(r->bias_mm, 2 * r->bias_u_mm, "mm", text));
 	if (isfinite(r->trend))

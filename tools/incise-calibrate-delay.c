@@ -40,25 +40,25 @@ struct options {
 static const struct cli_option option_table[] = {
 	{CLI_RIG_OPTION(struct options, common.rig)},
 	{CALIBRATE_FILE_OPTION(struct options)},
-	{0, "duration", "TIME", "record so long (default: 15s)",
+	{0, "duration", "TIME", "length of the recording (default: 15s)",
 	 CLI_DURATION(struct options, time_s, 8, 600)},
 	{0, "reference-stream", "STREAM",
-	 "whose delay is right: force (default), tracker, camera",
+	 "stream whose delay is taken as known: force (default),\n"
+	 "tracker or camera",
 	 CLI_CHOICE(struct options, reference, stream_names)},
-	{0, "max-delay", "MS", "look for a delay up to so many ms (default: 150)",
+	{0, "max-delay", "MS", "largest delay to look for, in ms (default: 150)",
 	 CLI_NUMBER(struct options, max_delay_ms, 10, 1000)},
-	{0, "with-camera", NULL, "of the virtual rig, record its camera too",
+	{0, "with-camera", NULL, "on the simulated rig, record its camera too",
 	 CLI_FLAG(struct options, camera)},
-	{0, "from", "NAME.rec", "take a recording that is there, not a rig",
+	{0, "from", "NAME.rec", "use this recording instead of a rig",
 	 CLI_INPUT(struct options, common.from)},
-	{0, "keep", "NAME.rec", "keep the recording, for --from",
+	{0, "keep", "NAME.rec", "keep the recording here, for --from",
 	 CLI_OUTPUTS(struct options, common.keep)},
-	{0, "report", "DIR", "report.txt, report.json and pictures",
+	{0, "report", "DIR", "write report.txt, report.json and plots into this folder",
 	 CLI_OUTPUTS(struct options, common.report)},
-	{0, "dry-run", NULL, "do all but write calibration.conf",
+	{0, "dry-run", NULL, "do everything except writing calibration.conf",
 	 CLI_FLAG(struct options, common.dry_run)},
-	{0, "json", NULL, "tell the result as one JSON object",
-	 CLI_FLAG(struct options, common.json)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, common.json)},
 	{0},
 };
 
@@ -66,13 +66,16 @@ static const struct cli_command command = {
 	.name = "calibrate delay",
 	.synopsis = "[--rig RIG | --from NAME.rec] [OPTIONS]",
 	.summary =
-		"Measure how late tracker, force channel and camera are against each other. "
-		"Press\nthe blade's tip on something springy that it does not cut, foam or "
-		"rubber, and\nlift it off again, two or three times a second, unevenly.",
+		"Measure the delays of tracker, force channel and camera relative to "
+		"each other. Press\n"
+		"the tip of the blade on something springy that it does not cut, for "
+		"example foam or rubber,\n"
+		"and lift it off again, two or three times a second, at an uneven pace.",
 	.options = option_table,
-	.notes =
-		"Example: incise calibrate delay --rig rig.conf --duration 15s --report delay\n"
-		"Exit codes: 0 done and in force, 1 failed or refused, 2 bad usage.",
+	.notes = "Example: incise calibrate delay --rig rig.conf --duration 15s "
+		 "--report delay\n"
+		 "Exit codes: 0 done, the calibration is active; 1 failed or refused; 2 "
+		 "bad usage.",
 };
 
 struct stream {
@@ -94,12 +97,13 @@ static void parse(struct options *options, int argc, char **argv)
 	cli_parse(&command, argc, argv, options);
 	cli_no_operands(argc, argv, "--from");
 	if (common->from && options->time_s > 0)
-		cli_usage("--duration: a recording has its own");
+		cli_usage("--duration does not go with --from: a recording has its own");
 	if (!common->from && !(options->time_s > 0) && !isatty(STDIN_FILENO))
-		cli_usage("without a terminal, --duration or --from is needed");
+		cli_usage("missing --duration or --from (needed without a terminal)");
 	if (common->keep &&
 	    (strlen(common->keep) < 5 || !cli_ends_with(common->keep, ".rec")))
-		cli_usage("--keep: '%s' is not a name that ends in .rec", common->keep);
+		cli_usage("--keep: expected a name that ends in .rec, found '%s'",
+			  common->keep);
 	if (common->keep)
 		cli_output(common->keep);
 	calibrate_begin(common);
@@ -134,8 +138,8 @@ static void read_streams(struct stream streams[STREAMS], const char *path)
 	if (incise_recording_info(recording, &info, &err))
 		cli_fail_with(&err);
 	if (!info.n_streams)
-		cli_fail("%s: is of an older incise, and does not say which delays its "
-			 "times have; record anew",
+		cli_fail("%s: written by an older incise, without the delays of its "
+			 "times; record again",
 			 path);
 	for (int i = 0; i < STREAMS; i++) {
 		streams[i] = (struct stream){0};
@@ -161,8 +165,8 @@ static int poll_for(struct incise_recorder *recorder, struct incise_clock *clock
 		rc = incise_recorder_poll(recorder, err);
 		incise_recorder_stats(recorder, &stats);
 		cli_progress("%s  %.0f s left, depth %.1f mm, force %.2f N",
-			     (now - start) * 1e-9 < 1 ? "hold the tool free  "
-						      : "tap or press, unevenly",
+			     (now - start) * 1e-9 < 1 ? "hold the tool clear "
+						      : "press and lift, unevenly",
 			     time_s - (now - start) * 1e-9, stats.depth_mm,
 			     stats.force_N);
 	}
@@ -198,7 +202,9 @@ static int record(const struct options *options, double time_s, const char *path
 		rc = -1;
 	incise_rig_close(rig);
 	if (!rc && cli_stop) {
-		incise_error_set(err, EINTR, "stopped; the old calibration stays");
+		incise_error_set(err, EINTR,
+				 "stopped; the previous calibration stays "
+				 "active");
 		rc = -1;
 	}
 	return rc ? -1 : 0;
@@ -214,9 +220,9 @@ static void record_now(const struct options *options, struct stream *streams)
 
 	if (isatty(STDIN_FILENO)) {
 		fprintf(stderr,
-			"Hold the tool free of all; Enter begins. After a second "
-			"press on something springy\nand lift off again, quickly and "
-			"unevenly. ");
+			"Hold the tool clear of everything and press Enter. After a "
+			"second, press on something\n"
+			"springy and lift off again, quickly and at an uneven pace. ");
 		while (getchar() != '\n' && !feof(stdin) && !cli_stop)
 			;
 	}
@@ -262,9 +268,9 @@ static void fit_pair(const struct options *options, const struct stream *streams
 	pair->known = true;
 	if (fabs(fit->drift_ms) > DRIFT_MAX_MS &&
 	    fabs(fit->drift_ms) > DRIFT_SIGMAS * fit->drift_sd_ms)
-		cli_fail("tracker and %s: the delay drifts by %.2f ms in %.0f s (u %.2f "
-			 "ms): the time of one of them is wrong; see incise info on the "
-			 "recording",
+		cli_fail("tracker and %s: the delay drifts by %.2f ms in %.0f s (u "
+			 "%.2f ms): the clock of one of them is wrong; see 'incise "
+			 "info' on the recording",
 			 stream_names[other], fit->drift_ms, fit->span_s,
 			 fit->drift_sd_ms);
 }
@@ -378,7 +384,7 @@ static void draw(const char *folder, const struct stream *streams,
 			(pairs[CAMERA].fit.delay_ms - pairs[FORCE].fit.delay_ms) * 1e-3);
 	putc('\n', script);
 	if (!plot_draw(script, folder, "fit"))
-		cli_warn("fit.png could not be drawn");
+		cli_warn("fit.png: could not be drawn; see whether gnuplot works");
 }
 
 static void fill_record(const struct options *options, const struct stream *streams,
@@ -445,12 +451,13 @@ int main(int argc, char **argv)
 	else
 		record_now(&options, streams);
 	if (options.reference == CAMERA && !streams[CAMERA].n)
-		cli_fail(
-			"--reference-stream camera: the recording has no depth by a camera");
+		cli_fail("--reference-stream camera: the recording has no depth from a "
+			 "camera; choose force or tracker");
 	fit_pair(&options, streams, FORCE, &pairs[FORCE]);
 	fit_pair(&options, streams, CAMERA, &pairs[CAMERA]);
 	if (!pairs[FORCE].known && !pairs[CAMERA].known)
-		cli_fail("there is nothing beside the tracker to compare with");
+		cli_fail("the recording has neither force nor camera depth to compare "
+			 "with the tracker; record one of them");
 	raw = options.common.keep ? options.common.keep : options.common.from;
 	if (raw)
 		snprintf(record.raw, sizeof(record.raw), "%s", raw);

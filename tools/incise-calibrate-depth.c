@@ -46,8 +46,10 @@ static void parse_board(void *whole, char *text)
 	    options->columns < 3 || options->rows < 3 || options->columns > 100 ||
 	    options->rows > 100 ||
 	    options->columns * options->rows > INCISE_BOARD_CORNERS)
-		cli_usage("--board: '%s': inner corners as 9x6, 3 or more, at most %d",
-			  text, INCISE_BOARD_CORNERS);
+		cli_usage(
+			"--board: expected inner corners such as 9x6, 3 or more each way "
+			"and at most %d together, found '%s'",
+			INCISE_BOARD_CORNERS, text);
 }
 
 static const struct cli_option option_table[] = {
@@ -55,13 +57,17 @@ static const struct cli_option option_table[] = {
 	 CLI_INPUT(struct options, common.rig)},
 	{CALIBRATE_FILE_OPTION(struct options)},
 	{0, "from", "FILE",
-	 "pictures (more may follow), FILE.csv or NAME.rec instead of the\nrig's camera",
+	 "images (more may follow), FILE.csv or NAME.rec instead of the\n"
+	 "rig's camera",
 	 CLI_INPUT(struct options, common.from)},
-	{0, "keep", "FILE", "write the raw data there, as --from reads them",
+	{0, "keep", "FILE", "write the raw data to this file, for --from",
 	 CLI_OUTPUT(struct options, common.keep)},
-	{0, "report", "DIR", "report.txt, report.json, fit.png and residuals.png there",
+	{0, "report", "DIR",
+	 "write report.txt, report.json, fit.png and residuals.png "
+	 "into\n"
+	 "this folder",
 	 CLI_OUTPUTS(struct options, common.report)},
-	{0, "dry-run", NULL, "change no calibration.conf",
+	{0, "dry-run", NULL, "do everything except writing calibration.conf",
 	 CLI_FLAG(struct options, common.dry_run)},
 	{0, "json", NULL, "report as one JSON object",
 	 CLI_FLAG(struct options, common.json)},
@@ -70,20 +76,23 @@ static const struct cli_option option_table[] = {
 	{0, "length-u", "LENGTH",
 	 "two-point: its standard uncertainty (default: 0.012mm)",
 	 CLI_QUANTITY(struct options, u_length_mm, lengths, 0, 100)},
-	{0, "pixels", "PX,...", "two-point: the length in pixels, once or more",
+	{0, "pixels", "PX,...", "two-point: the length in pixels, one value or more",
 	 CLI_TEXT(struct options, pixels)},
 	{0, "pixels-u", "PX",
-	 "two-point: standard uncertainty that all have alike\n(default: 0.7 of --pixels, 0.03 by vision)",
+	 "two-point: standard uncertainty common to all lengths\n"
+	 "(default: 0.7 for --pixels, 0.03 from images)",
 	 CLI_NUMBER(struct options, u_px, 0, 1000)},
 	{0, "images", "N",
-	 "take so many of the camera (default: on a terminal 50, of a\nboard 8)",
+	 "number of frames to take from the camera (default: 50 on a\n"
+	 "terminal, 8 of a board)",
 	 CLI_INTEGER(struct options, source.pictures, 1, FILES_MAX)},
-	{0, "every", "TIME", "board: time between two pictures, without a terminal",
+	{0, "every", "TIME", "board: time between two frames, without a terminal",
 	 CLI_DURATION(struct options, source.every_s, 0.01, 3600)},
-	{0, "pick", "X,Y", "learn the handle's colour from this pixel",
+	{0, "pick", "X,Y", "learn the colour of the handle from this pixel",
 	 CLI_TEXT(struct options, source.pick)},
 	{0, "gauge-u", "PERCENT",
-	 "line: standard uncertainty of the gauge's scale (default: 0.05)",
+	 "line: standard uncertainty of the scale of the depth gauge\n"
+	 "(default: 0.05)",
 	 CLI_NUMBER(struct options, u_gauge, 0, 100)},
 	{0, "zero-u", "LENGTH",
 	 "line: standard uncertainty of its zero (default: 0.02mm)",
@@ -95,10 +104,14 @@ static const struct cli_option option_table[] = {
 	{0, "square-u", "PERCENT",
 	 "board: standard uncertainty of the squares (default: 0.02)",
 	 CLI_NUMBER(struct options, u_square, 0, 100)},
-	{0, "plane-u", "LENGTH", "board: how well it lies in the plane (default: 0.1mm)",
+	{0, "plane-u", "LENGTH",
+	 "board: standard uncertainty of its distance from the "
+	 "cutting\n"
+	 "plane (default: 0.1mm)",
 	 CLI_QUANTITY(struct options, u_plane_mm, lengths, 0, 100)},
 	{0, "handle", "X,Y,X,Y",
-	 "board: ends of the handle in the picture (default: upright in\nits middle)",
+	 "board: ends of the handle in the image (default: upright in\n"
+	 "its middle)",
 	 CLI_TEXT(struct options, axis)},
 	{0, "region", "X,Y,X,Y",
 	 "board: corners of the region of interest (default: 100 px\naround the axis)",
@@ -109,17 +122,20 @@ static const struct cli_option option_table[] = {
 static const struct cli_command command = {
 	.name = "calibrate depth",
 	.synopsis = "two-point | line | board [OPTIONS]",
-	.summary =
-		"Measure the scale of the camera's picture in the plane of the scalpel, and write\n"
-		"it to calibration.conf.\n"
-		"two-point: a known length, seen as so many pixels.\n"
-		"line: many pairs of a depth, by a gauge or the tracker, and an exposed length.\n"
-		"board: a chessboard in the cutting plane, and tilted.",
+	.summary = "Measure the scale of the camera's image in the plane of the scalpel, "
+		   "and write it to\n"
+		   "calibration.conf, by one of three methods.\n"
+		   "two-point: a known length and its length in pixels.\n"
+		   "line: many pairs of a depth, from a gauge or the tracker, and an "
+		   "exposed length.\n"
+		   "board: a chessboard in the cutting plane, and tilted.",
 	.options = option_table,
-	.notes =
-		"Example: incise calibrate depth two-point --length 47.5mm --pixels 400\n"
-		"         incise calibrate depth board --from plane.png tilt*.png --square 5mm\n"
-		"Exit codes: 0 done and in force, 1 failed or refused, 2 bad usage.",
+	.notes = "Example: incise calibrate depth two-point --length 47.5mm --pixels "
+		 "400\n"
+		 "         incise calibrate depth board --from plane.png tilt*.png "
+		 "--square 5mm\n"
+		 "Exit codes: 0 done, the calibration is active; 1 failed or refused; 2 "
+		 "bad usage.",
 };
 
 static void parse_files(struct options *options, int argc, char **argv)
@@ -127,7 +143,8 @@ static void parse_files(struct options *options, int argc, char **argv)
 	struct depth_source *source = &options->source;
 
 	if (!options->common.from && optind < argc)
-		cli_usage("'%s': pictures follow --from", argv[optind]);
+		cli_usage("unexpected argument '%s'; images are given with --from",
+			  argv[optind]);
 	if (!options->common.from)
 		return;
 	source->path = cli_alloc(argc - optind + 1, sizeof(*source->path));
@@ -138,7 +155,8 @@ static void parse_files(struct options *options, int argc, char **argv)
 		for (int i = 0; i < source->n_paths; i++)
 			if (depth_is_csv(source->path[i]) ||
 			    depth_is_recording(source->path[i]))
-				cli_usage("'%s': one CSV or recording at a time",
+				cli_usage("unexpected argument '%s'; give one CSV file "
+					  "or recording at a time",
 					  source->path[i]);
 }
 
@@ -162,13 +180,14 @@ static void parse(struct options *options, int argc, char **argv)
 	options->way = argv[optind++];
 	if (strcmp(options->way, "two-point") && strcmp(options->way, "line") &&
 	    strcmp(options->way, "board"))
-		cli_usage("'%s': two-point, line or board", options->way);
+		cli_usage("unknown method '%s'; expected two-point, line or board",
+			  options->way);
 	parse_files(options, argc, argv);
 	options->source.rig = options->common.rig;
 	options->source.guided = !options->source.n_paths && isatty(STDIN_FILENO);
 	if (options->pixels &&
 	    (options->common.from || strcmp(options->way, "two-point")))
-		cli_usage("--pixels is of two-point, and without --from");
+		cli_usage("--pixels goes with two-point, and without --from");
 }
 
 /* --- lengths and board --------------------------------------------------------------- */
@@ -179,7 +198,7 @@ static void corner_pair(const char *option, const char *text, double to[2][2],
 	char *items[5];
 
 	if (cli_list(option, (char *)text, items, 5) != 4)
-		cli_usage("--%s: four numbers: X,Y,X,Y", option);
+		cli_usage("--%s: expected four numbers: X,Y,X,Y", option);
 	for (int i = 0; i < 4; i++)
 		to[i / 2][i % 2] = cli_number(option, items[i], 0, most);
 }
@@ -191,7 +210,8 @@ static void need_schedule(const struct options *options)
 	if (!source->n_paths && !source->guided &&
 	    (!source->pictures ||
 	     (!strcmp(options->way, "board") && !(source->every_s > 0))))
-		cli_usage("without a terminal give --from, or --images%s of the camera",
+		cli_usage("missing --from, or --images%s of the camera (needed without "
+			  "a terminal)",
 			  strcmp(options->way, "board") ? "" : " and --every");
 }
 
@@ -243,7 +263,7 @@ static void by_lengths(struct options *options, struct depth_result *result,
 		snprintf(options->source.device, sizeof(options->source.device),
 			 "recording");
 	} else if (line) {
-		cli_usage("line: give --from pairs.csv or --from NAME.rec");
+		cli_usage("line: missing --from pairs.csv or --from NAME.rec");
 	} else {
 		need_schedule(options);
 		depth_lengths_measure(l, &options->source);
@@ -280,11 +300,10 @@ static void by_lengths(struct options *options, struct depth_result *result,
 		 fit.inliers, fit.n, fit.full_px);
 	if (line && fit.bend_mm > BEND_MM && fit.bend_mm > BEND_SD * fit.bend_sd_mm) {
 		record->pass = false;
-		snprintf(
-			record->verdict, sizeof(record->verdict),
-			"the pairs lie on a curve: a parabola is %.3f mm off the line at "
-			"its ends; is the camera square to the plane?",
-			fit.bend_mm);
+		snprintf(record->verdict, sizeof(record->verdict),
+			 "the pairs lie on a curve: a parabola is %.3f mm off the line "
+			 "at its ends; turn the camera square to the plane",
+			 fit.bend_mm);
 	}
 }
 
@@ -301,7 +320,8 @@ static void by_board(struct options *options, struct depth_result *result,
 		depth_corners_read(c, options->source.path[0]);
 		snprintf(options->source.device, sizeof(options->source.device), "CSV");
 	} else if (one_of(options, depth_is_recording)) {
-		cli_usage("board: give pictures or a CSV of corners, not a recording");
+		cli_usage("board: a recording does not show a board; give images or a "
+			  "CSV of corners with --from");
 	} else {
 		need_schedule(options);
 		depth_corners_find(c, &options->source);
@@ -343,11 +363,10 @@ static void by_board(struct options *options, struct depth_result *result,
 		c->columns, c->rows, fit.views, fit.n, fit.tilt_deg + 2 * fit.u_tilt_deg);
 	if (fit.bend_mm > BEND_MM) {
 		record->pass = false;
-		snprintf(
-			record->verdict, sizeof(record->verdict),
-			"one number is up to %.3f mm off along the handle: turn the camera "
-			"square to the plane (it is %.1f degrees off)",
-			fit.bend_mm, fit.tilt_deg);
+		snprintf(record->verdict, sizeof(record->verdict),
+			 "one scale for the whole handle is up to %.3f mm wrong; turn "
+			 "the camera square to the plane (it is %.1f degrees off)",
+			 fit.bend_mm, fit.tilt_deg);
 	}
 }
 
@@ -362,11 +381,10 @@ static void end_record(const struct options *options, struct depth_result *resul
 
 	if (record->pass && 2 * u > U_WORST) {
 		record->pass = false;
-		snprintf(
-			record->verdict, sizeof(record->verdict),
-			"U is %.2f %% of the scale, more than %.1f %%: give more, or better, "
-			"readings",
-			200 * u, 100 * U_WORST);
+		snprintf(record->verdict, sizeof(record->verdict),
+			 "U is %.2f %% of the scale, more than %.1f %%; give more "
+			 "readings, or better ones",
+			 200 * u, 100 * U_WORST);
 	}
 	if (record->pass)
 		snprintf(record->verdict, sizeof(record->verdict),
@@ -382,7 +400,7 @@ static void end_record(const struct options *options, struct depth_result *resul
 	if (options->common.report)
 		depth_report_folder(result, options->common.report);
 	if (cli_stop)
-		cli_fail("stopped; the old calibration stays");
+		cli_fail("stopped; the previous calibration stays active");
 	if (!options->common.dry_run &&
 	    incise_calibration_append(options->common.calibration, record, &err))
 		cli_fail_with(&err);
@@ -420,6 +438,7 @@ int main(int argc, char **argv)
 		depth_report_text(&result, stdout);
 	cli_finish();
 	if (!record.pass)
-		cli_fail("not in force: %s", record.verdict);
+		cli_fail("refused, the previous calibration stays active: %s",
+			 record.verdict);
 	return 0;
 }

@@ -52,11 +52,13 @@ static void parse_range(void *whole, char *text)
 	char *item[2];
 
 	if (cli_list("input-range", text, item, 2) != 2)
-		cli_usage("--input-range: expected two voltages in mV such as 0,5000");
+		cli_usage("--input-range: expected two voltages in mV, the lower one "
+			  "first, for example 0,5000");
 	options->setup.low_mV = cli_number("input-range", item[0], -1e6, 1e6);
 	options->setup.high_mV = cli_number("input-range", item[1], -1e6, 1e6);
 	if (!(options->setup.low_mV < options->setup.high_mV))
-		cli_usage("--input-range: the first is to be the lower one");
+		cli_usage("--input-range: expected the lower voltage first, for "
+			  "example 0,5000");
 	options->ranged = true;
 }
 
@@ -74,62 +76,68 @@ static const struct cli_option option_table[] = {
 	{CALIBRATE_FILE_OPTION(struct options)},
 	{0, "from", "FILE",
 	 "pairs instead of a rig: CSV with mass_g or force_N, reading_mV,\n"
-	 "and perhaps series and direction (up, down)",
+	 "and optionally series and direction (up, down)",
 	 CLI_INPUT(struct options, common.from)},
-	{0, "keep", "FILE", "write the pairs there, as --from reads them",
+	{0, "keep", "FILE", "write the pairs to this file, for --from",
 	 CLI_OUTPUT(struct options, common.keep)},
-	{0, "report", "DIR", "report.txt, report.json and pictures",
+	{0, "report", "DIR", "write report.txt, report.json and plots into this folder",
 	 CLI_OUTPUTS(struct options, common.report)},
-	{0, "dry-run", NULL, "leave the calibration as it is",
+	{0, "dry-run", NULL, "do everything except writing calibration.conf",
 	 CLI_FLAG(struct options, common.dry_run)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, common.json)},
 	{0, "weights", "LIST",
-	 "loads such as 0,50g,100g,0.2kg; without it they are asked for",
+	 "loads, for example 0,50g,100g,0.2kg (default: ask for them)",
 	 CLI_PARSED(struct options, weights, parse_weights)},
 	{0, "series", "N",
-	 "times up by all loads, the last one down as well (default: 3)",
+	 "series of all loads upwards; the last one also downwards\n"
+	 "(default: 3)",
 	 CLI_INTEGER(struct options, weights.series, 1, 100)},
-	{0, "duration", "TIME", "mean of each reading (default: 2s)",
+	{0, "duration", "TIME", "averaging time of each reading (default: 2s)",
 	 CLI_DURATION(struct options, weights.mean_s, 0.1, 600)},
-	{0, "timeout", "TIME", "for a load to come and be steady (default: 1min)",
+	{0, "timeout", "TIME",
+	 "longest wait for a load to be put on and be steady\n"
+	 "(default: 1min)",
 	 CLI_DURATION(struct options, weights.timeout_s, 2, 3600)},
 	{0, "gravity", "M_S2",
-	 "local gravity (default: 9.80665, with the uncertainty of not\n"
-	 "knowing where)",
+	 "local gravity (default: 9.80665, with the uncertainty of an\n"
+	 "unknown place)",
 	 CLI_PARSED_BY(parse_gravity)},
-	{0, "latitude", "DEG", "compute gravity for this place",
+	{0, "latitude", "DEG", "latitude, to compute gravity from",
 	 CLI_NUMBER(struct options, latitude_deg, -90, 90)},
-	{0, "altitude", "M", "above the sea (default: 0)",
+	{0, "altitude", "M",
+	 "altitude above the sea, to compute gravity from "
+	 "(default: 0)",
 	 CLI_NUMBER(struct options, altitude_m, -1000, 10000)},
 	{0, "scale", "MASS",
-	 "resolution of the scale that weighed the loads (default: 0.5g)",
+	 "resolution of the scale that weighed the loads\n"
+	 "(default: 0.5g)",
 	 CLI_QUANTITY(struct options, setup.scale_g, grams, 0, 1e4)},
-	{0, "density", "KG_M3", "of the weights (default: 7950)",
+	{0, "density", "KG_M3", "density of the weights (default: 7950)",
 	 CLI_PARSED_BY(parse_density)},
 	{0, "input-range", "LOW,HIGH",
-	 "ends of the converter in mV (default: those of the rig,\n"
-	 "or not known, with --from)",
+	 "range of the converter in mV (default: that of the rig; unknown\n"
+	 "with --from)",
 	 CLI_PARSED_BY(parse_range)},
-	{0, "nominal", "MV_N", "to compare with (default: 1240)",
+	{0, "nominal", "MV_N", "nominal sensitivity to compare with (default: 1240)",
 	 CLI_NUMBER(struct options, setup.nominal_mV_N, 1, 1e5)},
-	{0, "tolerance", "PERCENT", "of it, to pass (default: 5)",
+	{0, "tolerance", "PERCENT", "largest deviation from it that passes (default: 5)",
 	 CLI_PARSED(struct options, setup.tolerance, parse_tolerance)},
 	{0, "zero", NULL,
-	 "put the zero in force as well; else it is measured at each\n"
-	 "recording's start",
+	 "also calibrate the zero (default: measured at the start of\n"
+	 "each recording)",
 	 CLI_FLAG(struct options, zero)},
 	{0}};
 
 static const struct cli_command command = {
 	.name = "calibrate force",
 	.synopsis = "[--weights LIST | --from FILE] [OPTIONS]",
-	.summary =
-		"Measure the sensitivity of the force channel with weights (procedure after "
-		"ISO 376)\nand put it in force in calibration.conf.",
+	.summary = "Measure the sensitivity of the force channel with weights (procedure "
+		   "after ISO 376)\n"
+		   "and write it to calibration.conf.",
 	.options = option_table,
-	.notes =
-		"Exit codes: 0 in force (or would be, --dry-run), 1 failed or refused, 2 bad "
-		"usage.",
+	.notes = "Exit codes: 0 the calibration is active (or would be, with "
+		 "--dry-run), 1 failed or refused,\n"
+		 "2 bad usage.",
 };
 
 static void parse(struct options *options, int argc, char **argv)
@@ -140,10 +148,11 @@ static void parse(struct options *options, int argc, char **argv)
 	cli_parse(&command, argc, argv, options);
 	cli_no_operands(argc, argv, "--from");
 	if (common->from && (common->rig || options->weights.n || common->keep))
-		cli_usage("--from takes the place of a rig: leave --rig, --weights and "
-			  "--keep out");
+		cli_usage("--from does not go with --rig, --weights or --keep: it "
+			  "takes the place of a rig");
 	if (!isnan(options->latitude_deg) && options->gravity)
-		cli_usage("--gravity or --latitude: one of them");
+		cli_usage("--gravity and --latitude exclude each other; give one of "
+			  "them");
 }
 
 /* Gravity of the place, and its source for the report. */
@@ -171,8 +180,8 @@ static void read_rig(struct options *options, struct pairs *pairs, char *device,
 
 	if (!options->weights.n) {
 		if (!isatty(STDIN_FILENO))
-			cli_usage("no terminal to ask for weights: give --weights or "
-				  "--from");
+			cli_usage("missing --weights or --from (needed without a "
+				  "terminal to ask for weights)");
 		weights_ask(&options->weights);
 	}
 	options->weights.rig = cli_open_rig(spec, INCISE_RIG_FORCE);
@@ -277,7 +286,7 @@ static void print_metrics(const struct report *report, FILE *out)
 		uncertainty_text(r->sensitivity_mV_N, 2 * r->sensitivity_u_mV_N, "mV/N",
 				 text),
 		200 * r->sensitivity_u_mV_N / r->sensitivity_mV_N);
-	fprintf(out, "%-15s %.2f mV/N as found, %+.3f %%\n", "", report->found_mV_N,
+	fprintf(out, "%-15s %.2f mV/N previously, %+.3f %%\n", "", report->found_mV_N,
 		100 * (r->sensitivity_mV_N / report->found_mV_N - 1));
 	fprintf(out, "%-15s %s (k = 2)\n", "zero",
 		uncertainty_text(r->zero_mV, 2 * r->zero_u_mV, "mV", text));
@@ -300,8 +309,8 @@ static void print_metrics(const struct report *report, FILE *out)
 		r->outliers);
 	if (r->misfit > 1)
 		fprintf(out,
-			"%-15s loads lie %.1f times as far from a line as their uncertainty "
-			"explains: U is widened by it\n",
+			"%-15s loads deviate from a line by %.1f times their "
+			"uncertainty; U is widened by this factor\n",
 			"misfit", r->misfit);
 }
 
@@ -311,7 +320,9 @@ static void print_budget(const struct report *report, FILE *out)
 	const struct incise_calibrate_force_setup *s = report->setup;
 
 	fprintf(out,
-		"\nBudget of the sensitivity's standard uncertainty\n\n"
+		"\n"
+		"Uncertainty budget of the sensitivity (standard uncertainties)\n"
+		"\n"
 		"%-28s %-4s %-18s %-20s %s\n",
 		"source", "type", "u", "sensitivity", "u, mV/N");
 	for (int i = 0; i < r->parts; i++) {
@@ -323,12 +334,14 @@ static void print_budget(const struct report *report, FILE *out)
 		fprintf(out, "%-28s %-4c %-18s %-20s %.4f\n", part->source, part->type, u,
 			c, part->u_mV_N);
 	}
-	fprintf(out, "%-28s %-4s %-18s %-20s %.4f\n\n", "all, in squares", "", "", "",
+	fprintf(out, "%-28s %-4s %-18s %-20s %.4f\n\n", "root sum of squares", "", "", "",
 		r->sensitivity_u_mV_N);
 	fprintf(out,
-		"Type A rests on %d degrees of freedom, and is widened so that k = 2 is 95 %%.\n"
+		"Type A has %d degrees of freedom, and is widened so that k = 2 covers "
+		"95 %%.\n"
 		"Gravity %.5f m/s2, u = %.2g, %s. Air %.3g kg/m3, weights %.5g kg/m3.\n"
-		"The scale resolves %.3g g: rectangular, one error for each load weighed.\n",
+		"The scale resolves %.3g g: rectangular distribution, one error for "
+		"each load weighed.\n",
 		r->freedom, s->gravity_m_s2, s->gravity_u_m_s2, report->gravity,
 		s->air_kg_m3, s->weight_kg_m3, s->scale_g);
 }
@@ -493,7 +506,8 @@ static void write_report(const struct report *report, const char *folder)
 		if (!report->refused)
 			draw(report, folder);
 	} else {
-		cli_warn("gnuplot is not installed: the report has no pictures");
+		cli_warn("gnuplot is not installed, so the report has no plots; "
+			 "apt-get install gnuplot-nox");
 		if (mkdir(folder, 0777) && errno != EEXIST)
 			cli_fail("%s: %s", folder, strerror(errno));
 	}
@@ -550,12 +564,14 @@ int main(int argc, char **argv)
 		cli_fail("refused: %s; %s stays as it was", err.text,
 			 options.common.calibration);
 	if (cli_stop)
-		cli_fail("stopped; %s stays as it was", options.common.calibration);
+		cli_fail("stopped; the calibration in %s stays active",
+			 options.common.calibration);
 	if (!options.common.dry_run &&
 	    incise_calibration_append(options.common.calibration, &record, &err))
 		cli_fail_with(&err);
 	if (!record.pass)
-		cli_fail("not in force: %s", record.verdict);
+		cli_fail("refused, the previous calibration stays active: %s",
+			 record.verdict);
 	free(states);
 	free(pairs.pair);
 	return 0;

@@ -30,13 +30,15 @@ static void parse_range(void *whole, char *text)
 	char *dots = strstr(text, "..");
 
 	if (!dots)
-		cli_usage("--range: expected two places such as 0mm..1.5mm, got '%.40s'",
+		cli_usage("--range: expected two positions, for example 0mm..1.5mm, "
+			  "found '%.40s'",
 			  text);
 	*dots = 0;
 	options->low_mm = cli_quantity("--range", text, lengths, 0, 1000);
 	options->high_mm = cli_quantity("--range", dots + 2, lengths, 0, 1000);
 	if (!(options->high_mm > options->low_mm))
-		cli_usage("--range: it ends at %g mm, where it begins or before",
+		cli_usage("--range: it ends at %g mm, not above its start; give "
+			  "FROM..TO, for example 0mm..1.5mm",
 			  options->high_mm);
 }
 
@@ -46,24 +48,27 @@ static const struct cli_option option_table[] = {
 	{0, "from", "FILE",
 	 "CSV with position_mm or steps, and force_N, instead of devices",
 	 CLI_INPUT(struct options, common.from)},
-	{0, "keep", "FILE", "write the points there as CSV",
+	{0, "keep", "FILE", "write the points to this CSV file, for --from",
 	 CLI_OUTPUT(struct options, common.keep)},
-	{0, "report", "DIR", "pictures of fit and residuals, report.txt and report.json",
+	{0, "report", "DIR",
+	 "write report.txt, report.json and plots of fit and "
+	 "residuals\n"
+	 "into this folder",
 	 CLI_OUTPUTS(struct options, common.report)},
-	{0, "dry-run", NULL, "leave the calibration as it is",
+	{0, "dry-run", NULL, "do everything except writing calibration.conf",
 	 CLI_FLAG(struct options, common.dry_run)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, common.json)},
 	{0, "range", "MM..MM",
-	 "of the strokes, e.g. 0mm..1.5mm (default: from 0 to 70 % of what\n"
-	 "the force channel reads)",
+	 "range of the strokes, for example 0mm..1.5mm (default: from 0 to\n"
+	 "70 % of the force channel's range)",
 	 CLI_PARSED_BY(parse_range)},
-	{0, "strokes", "N", "up and down, 2 to 100 (default: 3)",
+	{0, "strokes", "N", "number of strokes up and down, 2 to 100 (default: 3)",
 	 CLI_INTEGER(struct options, strokes, 2, 100)},
 	{0, "max-force", "N",
-	 "stop and go back beyond this (default: 80 % of what the channel\n"
-	 "reads)",
+	 "stop and go back beyond this force (default: 80 % of the force\n"
+	 "channel's range)",
 	 CLI_QUANTITY(struct options, max_N, forces, 0.001, 10000)},
-	{0, "no-rate", NULL, "do not search the largest step rate",
+	{0, "no-rate", NULL, "do not look for the largest step rate",
 	 CLI_FLAG(struct options, no_rate)},
 	{0, "step-mm", "MM", "with --from: travel per microstep, in mm",
 	 CLI_NUMBER(struct options, step_mm, 1e-7, 100)},
@@ -73,17 +78,21 @@ static const struct cli_option option_table[] = {
 static const struct cli_command command = {
 	.name = "calibrate stepper",
 	.synopsis = "[--from FILE.csv] [OPTIONS]",
-	.summary =
-		"Drive the actuator up and down against the force sensor, and tell the force of a\n"
-		"microstep, backlash, hysteresis, stiction, and the largest step rate that loses\n"
-		"no step. The handle is to press the sensor, and nobody is to hold it. Ctrl-C\n"
-		"ends with the motor at rest and without power. Not a safety device: keep a hand\n"
-		"on the emergency stop.",
+	.summary = "Drive the actuator up and down against the force sensor, and measure "
+		   "the force per\n"
+		   "microstep, backlash, hysteresis, stiction, and the largest step rate "
+		   "that loses no step.\n"
+		   "Let the handle press on the sensor, and do not hold it. Ctrl-C ends "
+		   "with the motor at\n"
+		   "rest and without power. Not a safety device: keep a hand on the "
+		   "emergency stop.",
 	.options = option_table,
-	.notes =
-		"Example:\n  incise calibrate stepper --range 0mm..1.5mm --report bench\n\n"
-		"Exit: 0 done and in force, 1 failed, refused or stopped, 2 bad usage.\n"
-		"See incise-calibrate-stepper(1).",
+	.notes = "Example:\n"
+		 "  incise calibrate stepper --range 0mm..1.5mm --report bench\n"
+		 "\n"
+		 "Exit: 0 done, the calibration is active; 1 failed, refused or "
+		 "stopped; 2 bad usage.\n"
+		 "See incise-calibrate-stepper(1).",
 };
 
 static void parse(struct options *options, int argc, char **argv)
@@ -93,17 +102,14 @@ static void parse(struct options *options, int argc, char **argv)
 	*options = (struct options){
 		.low_mm = NAN, .high_mm = NAN, .max_N = NAN, .step_mm = NAN};
 	cli_parse(&command, argc, argv, options);
-	if (optind < argc)
-		cli_usage("there is nothing to do with '%s'", argv[optind]);
+	cli_no_operands(argc, argv, "--from");
 	if (!isnan(options->step_mm) && !common->from)
-		cli_usage(
-			"--step-mm is for --from: a rig says itself how far a step goes");
+		cli_usage("--step-mm goes with --from: a rig knows the travel of a step");
 	if (common->from &&
 	    (common->rig || common->keep || !isnan(options->low_mm) ||
 	     !isnan(options->max_N) || options->strokes || options->no_rate))
-		cli_usage(
-			"--from drives nothing: it does not go with --rig, --keep, --range, "
-			"--strokes, --max-force or --no-rate");
+		cli_usage("--from does not go with --rig, --keep, --range, --strokes, "
+			  "--max-force or --no-rate: it drives nothing");
 	if (!options->strokes)
 		options->strokes = 3;
 }
@@ -143,8 +149,8 @@ static void read_header(struct reader *r, char **columns)
 							     : NULL;
 
 		if (at && *at >= 0)
-			cli_fail("%s:%d: two columns are called %s; name each once",
-				 r->path, r->line, columns[i]);
+			cli_fail("%s:%d: two columns are called %s; rename one", r->path,
+				 r->line, columns[i]);
 		if (at)
 			*at = i;
 	}
@@ -196,7 +202,7 @@ static void read_point(struct reader *r, char **columns, struct stepper_series *
 			"see whether columns are swapped",
 			r->path, r->line);
 	if (series->n == POINTS_MAX)
-		cli_fail("%s:%d: more than %d points; take every tenth", r->path, r->line,
+		cli_fail("%s:%d: more than %d points; keep every tenth", r->path, r->line,
 			 POINTS_MAX);
 	/* Steps are exact; a position in mm has been rounded. */
 	stepper_series_add(series, number(r, columns, r->time, "t_s"),
@@ -302,13 +308,13 @@ static void put_rate(const struct stepper_rate *rate, FILE *out)
 		return;
 	if (!(rate->kept_1_s > 0))
 		fprintf(out,
-			"largest step rate  none found: even %.0f /s lost %.4f mm, and the strokes "
-			"above were not much slower; see what blocks it\n",
+			"largest step rate  none found: even %.0f /s lost %.4f mm, and "
+			"the strokes above were not much slower; check what blocks it\n",
 			rate->lost_1_s, rate->lost_mm);
 	else if (isnan(rate->lost_1_s))
 		fprintf(out,
-			"largest step rate  %.0f /s lost no step, which is as fast as this range "
-			"and rig.conf let it go\n",
+			"largest step rate  %.0f /s lost no step; this range and "
+			"rig.conf allow no faster\n",
 			rate->kept_1_s);
 	else
 		fprintf(out,
@@ -316,10 +322,12 @@ static void put_rate(const struct stepper_rate *rate, FILE *out)
 			"margin of 30 %%: %.0f /s\n",
 			rate->kept_1_s, rate->lost_1_s, rate->lost_mm,
 			0.7 * rate->kept_1_s);
-	fprintf(out, "  %d strokes; a loss of %.4f mm would have been seen\n",
-		rate->strokes, rate->seen_mm);
+	fprintf(out, "  %d strokes; detection limit %.4f mm\n", rate->strokes,
+		rate->seen_mm);
 	if (rate->off_mm != 0)
-		fprintf(out, "  the count is off by %.4f mm now: home it\n",
+		fprintf(out,
+			"  the position count is off by %.4f mm now; run incise "
+			"stepper home\n",
 			rate->off_mm);
 }
 
@@ -332,13 +340,13 @@ static void report_text(const struct report *report, FILE *out)
 	int listed = 0;
 
 	fprintf(out,
-		"%s: %d strokes, %.4g to %.4g mm, %.3f to %.3f N\n\n"
+		"%s: %d strokes, %.4g to %.4g mm, %.3f to %.3f N\n"
+		"\n"
 		"force per microstep %s (k = 2)\n"
 		"  per mm           %s (k = 2); a step is %.6g mm\n"
-		"backlash           %s (k = 2); with friction at the sensor, which looks the "
-		"same\n"
+		"backlash           %s (k = 2); includes friction at the sensor\n"
 		"hysteresis         %s (k = 2); %s\n"
-		"stiction           %s (k = 2); the force stands still for %.4f mm, %.0f "
+		"stiction           %s (k = 2); no change of force for %.4f mm, %.0f "
 		"steps\n",
 		report->source, fit->strokes, fit->low_mm, fit->high_mm, fit->low_N,
 		fit->high_N, uncertainty_text(fit->N_step, 2 * fit->N_step_u, "N", step),
@@ -348,9 +356,9 @@ static void report_text(const struct report *report, FILE *out)
 				 backlash),
 		uncertainty_text(fit->hysteresis_N, 2 * fit->hysteresis_u_N, "N",
 				 hysteresis),
-		fit->rest_N == 0  ? "none to be seen"
-		: fit->rest_N > 0 ? "a loss, between the ways"
-				  : "force comes late after turning round",
+		fit->rest_N == 0  ? "below detection limit"
+		: fit->rest_N > 0 ? "loss between the two directions"
+				  : "force lags after reversals",
 		uncertainty_text(fit->stiction_N, 2 * fit->stiction_u_N, "N", stiction),
 		fit->dead_mm, fit->dead_mm / report->setup->step_mm);
 	put_rate(report->rate, out);
@@ -360,8 +368,11 @@ static void report_text(const struct report *report, FILE *out)
 		fit->linearity, fit->residual_sd_N, fit->drift_N);
 	put_budget(fit, out);
 	fprintf(out,
-		"\n%d points: %d used, %d saturated, %d outliers, the rest behind turns\n",
-		fit->points, fit->used, fit->saturated, fit->outliers);
+		"\n"
+		"%d points: %d used, %d saturated, %d outliers, %d excluded after "
+		"reversals\n",
+		fit->points, fit->used, fit->saturated, fit->outliers,
+		fit->points - fit->used - fit->saturated - fit->outliers);
 	for (int i = 0; i < series->n && listed < LISTED; i++)
 		if (series->states[i] >= INCISE_CALIBRATE_STEPPER_SATURATED) {
 			fprintf(out, "  point %d: %.4f mm, %.4f N: %s\n", i + 1,
@@ -511,10 +522,9 @@ static void find_sensor_u(const struct calibrate_options *options, double *senso
 		}
 	free(records);
 	if (!known)
-		cli_warn(
-			"how sure force_mV_N is does not stand in %s: taken is 5 %%; run "
-			"incise calibrate force",
-			options->calibration);
+		cli_warn("%s has no uncertainty of force_mV_N, so 5 %% is assumed; run "
+			 "incise calibrate force",
+			 options->calibration);
 }
 
 static void fill_record(struct incise_calibration_record *record,
@@ -524,10 +534,10 @@ static void fill_record(struct incise_calibration_record *record,
 			const struct incise_calibration *found)
 {
 	snprintf(record->kind, sizeof(record->kind), "stepper");
-	snprintf(
-		record->method, sizeof(record->method),
-		"%d strokes against the force sensor, lines of one slope, turns told apart",
-		fit->strokes);
+	snprintf(record->method, sizeof(record->method),
+		 "%d strokes against the force sensor, lines of one slope for both "
+		 "directions",
+		 fit->strokes);
 	calibrate_value(record, "stepper_N_step", "N", found->stepper_N_step, fit->N_step,
 			fit->N_step_u);
 	calibrate_value(record, "stepper_backlash_mm", "mm", found->stepper_backlash_mm,
@@ -622,10 +632,10 @@ int main(int argc, char **argv)
 		if (!options.no_rate)
 			stepper_live_rate(&live, &fit, &rate);
 		else
-			rate.why = "not asked for";
+			rate.why = "off by --no-rate";
 		stepper_drive_end(&live.drive);
 	} else
-		rate.why = "a file does not drive";
+		rate.why = "no motor: the data come from a file";
 	fill_record(&record, &fit, &setup, &rate, &options.common.found);
 	if ((options.common.from || options.common.keep) &&
 	    incise_calibration_raw(&record,
@@ -649,6 +659,7 @@ int main(int argc, char **argv)
 	}
 	free_series(&series);
 	if (!fit.pass)
-		cli_fail("not in force: %s", record.verdict);
+		cli_fail("refused, the previous calibration stays active: %s",
+			 record.verdict);
 	return 0;
 }

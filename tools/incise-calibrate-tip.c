@@ -37,19 +37,23 @@ static const struct cli_option option_table[] = {
 	{CLI_RIG_OPTION(struct options, common.rig)},
 	{CALIBRATE_FILE_OPTION(struct options)},
 	{0, "duration", "TIME",
-	 "turn it for so long at most (default: 20s); it ends earlier\n"
-	 "when the tip is known well enough",
+	 "longest recording (default: 20s); ends earlier when the tip is\n"
+	 "known well enough",
 	 CLI_DURATION(struct options, time_s, 1, 600)},
-	{0, "from", "FILE", "take poses from a CSV file or a recording, not from a rig",
+	{0, "from", "FILE",
+	 "take the poses from a CSV file or a recording instead of "
+	 "a rig",
 	 CLI_INPUT(struct options, common.from)},
-	{0, "keep", "FILE", "write the poses there, as CSV for --from",
+	{0, "keep", "FILE", "write the poses to this CSV file, for --from",
 	 CLI_OUTPUT(struct options, common.keep)},
-	{0, "report", "DIR", "report.txt, report.json and pictures of the residuals",
+	{0, "report", "DIR",
+	 "write report.txt, report.json and plots of the residuals "
+	 "into\n"
+	 "this folder",
 	 CLI_OUTPUTS(struct options, common.report)},
-	{0, "dry-run", NULL, "do all but write calibration.conf",
+	{0, "dry-run", NULL, "do everything except writing calibration.conf",
 	 CLI_FLAG(struct options, common.dry_run)},
-	{0, "json", NULL, "tell the result as one JSON object",
-	 CLI_FLAG(struct options, common.json)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, common.json)},
 	{0},
 };
 
@@ -57,13 +61,16 @@ static const struct cli_command command = {
 	.name = "calibrate tip",
 	.synopsis = "[--rig RIG | --from FILE] [OPTIONS]",
 	.summary =
-		"Find where the tip of the blade is in the frame of the tracker's sensor. "
-		"Put\nthe tip into a dimple that stays where it is, and turn the tool all "
-		"ways about\nit, by 60 degrees at least from one side to the other.",
+		"Measure the position of the blade's tip in the frame of the tracker's "
+		"sensor (pivot\n"
+		"calibration). Put the tip into a dimple that does not move, and "
+		"rotate the tool about it in\n"
+		"all directions, by at least 60 degrees from side to side.",
 	.options = option_table,
-	.notes =
-		"Example: incise calibrate tip --rig rig.conf --duration 20s --report tip\n"
-		"Exit codes: 0 done and in force, 1 failed or refused, 2 bad usage.",
+	.notes = "Example: incise calibrate tip --rig rig.conf --duration 20s --report "
+		 "tip\n"
+		 "Exit codes: 0 done, the calibration is active; 1 failed or refused; 2 "
+		 "bad usage.",
 };
 
 /* --- poses -------------------------------------------------------------------------- */
@@ -86,7 +93,7 @@ static struct incise_tip_pose *next_pose(struct list *list)
 	if (list->n == list->capacity) {
 		list->capacity = list->capacity ? 2 * list->capacity : 4096;
 		if (list->capacity > 2 * POSES_MAX)
-			cli_fail("too many poses; a minute of them will do");
+			cli_fail("too many poses; a minute of them is enough");
 		list->poses = cli_resize(list->poses, (size_t)list->capacity,
 					 sizeof(*list->poses));
 	}
@@ -259,8 +266,8 @@ static void record_poses(const struct options *options, struct list *list,
 
 	if (isatty(STDIN_FILENO)) {
 		fprintf(stderr,
-			"Put the tip into its dimple. Enter begins; then turn the "
-			"tool all ways. ");
+			"Put the tip into its dimple and press Enter; then rotate the "
+			"tool in all directions. ");
 		while (getchar() != '\n' && !feof(stdin) && !cli_stop)
 			;
 	}
@@ -299,7 +306,7 @@ static void record_poses(const struct options *options, struct list *list,
 	cli_progress_end();
 	incise_rig_close(rig);
 	if (cli_stop)
-		cli_fail("stopped; the old calibration stays");
+		cli_fail("stopped; the previous calibration stays active");
 }
 
 /* --- the report ---------------------------------------------------------------------- */
@@ -361,7 +368,8 @@ static void draw(const char *folder, const struct list *list, const bool *inlier
 				"7 ps 0.3 lc 1 title 'believed', '' using 6:(int($5) ? NaN : "
 				"$7) with points pt 2 ps 1 lc 2 title 'left out'\n");
 		if (!plot_draw(script, folder, plots[i]))
-			cli_warn("%s.png could not be drawn", plots[i]);
+			cli_warn("%s.png: could not be drawn; see whether gnuplot works",
+				 plots[i]);
 	}
 }
 
@@ -386,17 +394,20 @@ static void write_report(const char *folder, const struct list *list, const bool
 		fprintf(out, "  %12.4e %12.4e %12.4e\n", fit->covariance[3 * i],
 			fit->covariance[3 * i + 1], fit->covariance[3 * i + 2]);
 	fprintf(out,
-		"\nBudget           type  u of it   sensitivity\n"
+		"\n"
+		"Budget           type  u         sensitivity\n"
 		"pose residuals   A     %.4f mm rms, in %d independent blocks of %d; "
 		"the covariance is of these\n"
-		"distortion       -     not known: what of it changes with the pose is in "
-		"the residuals\n\n",
+		"distortion       -     not known; its part that varies with the pose "
+		"is in the residuals\n"
+		"\n",
 		fit->rms_mm, fit->blocks, fit->block);
 	fprintf(out,
-		"%d poses, %d believed; residuals %.4f mm rms, %.4f mm largest, %.4f mm "
-		"rms held out\n"
-		"cone %.1f degrees, least turned direction %.1f degrees, condition %.1f\n"
-		"pivot at %.3f %.3f %.3f mm, trend of it %.4f mm (u %.4f mm)\n",
+		"%d poses, %d accepted; residuals %.4f mm rms, %.4f mm largest, %.4f "
+		"mm rms held out\n"
+		"cone %.1f degrees, least turned direction %.1f degrees, condition "
+		"%.1f\n"
+		"pivot at %.3f %.3f %.3f mm, drift %.4f mm (u %.4f mm)\n",
 		fit->n, fit->inliers, fit->rms_mm, fit->largest_mm, fit->held_out_mm,
 		fit->cone_deg, fit->least_deg, fit->condition, fit->pivot_mm[0],
 		fit->pivot_mm[1], fit->pivot_mm[2], fit->moved_mm, fit->moved_sd_mm);
@@ -460,9 +471,9 @@ static void parse(struct options *options, int argc, char **argv)
 	timed = options->time_s > 0;
 	cli_no_operands(argc, argv, "--from");
 	if (options->common.from && timed)
-		cli_usage("--duration: a file has its own");
+		cli_usage("--duration does not go with --from: the file has its own");
 	if (!options->common.from && !timed && !isatty(STDIN_FILENO))
-		cli_usage("without a terminal, --duration or --from is needed");
+		cli_usage("missing --duration or --from (needed without a terminal)");
 	calibrate_begin(&options->common);
 }
 
@@ -491,7 +502,7 @@ int main(int argc, char **argv)
 	if (incise_calibrate_tip(list.poses, list.n, inlier, &fit, &err))
 		cli_fail_with(&err);
 	if (list.doubtful)
-		cli_warn("%d records that the tracker itself doubts were left out",
+		cli_warn("%d samples were left out that the tracker marks as doubtful",
 			 list.doubtful);
 	fill_record(&common->found, &fit, &record);
 	/* a recording is a folder, and has its own checksums */

@@ -10,15 +10,20 @@ static const struct cli_command command = {
 	.name = "calibrate",
 	.synopsis = "force | depth | tip | delay | stepper | check [OPTIONS]",
 	.summary =
-		"Measure what turns readings into mm, N and s, and write it to calibration.conf.\n"
+		"Measure scale factors, offsets and delays of the rig, and write them "
+		"to calibration.conf.\n"
 		"force: mV/N of the force channel, with weights.\n"
-		"depth: mm per pixel of the camera, from two points or a board.\n"
-		"tip: where the tip is in the tracker's sensor, by turning it about a point.\n"
-		"delay: how late tracker, force and camera are, from a motion.\n"
-		"stepper: force per microstep of the actuator, its backlash and its limits.\n"
-		"check: what is calibrated, how old it is, and what is due.",
+		"depth: mm per pixel of the camera, from two points, a line of pairs "
+		"or a board.\n"
+		"tip: position of the tip in the tracker's sensor, by turning the tool "
+		"about its tip.\n"
+		"delay: delays of tracker, force and camera, from a motion.\n"
+		"stepper: force per microstep of the actuator, its backlash and its "
+		"limits.\n"
+		"check: active calibrations, their age, and any that have expired.",
 	.options = options,
-	.notes = "'incise calibrate WORD --help' lists the options of each.\n"
+	.notes = "'incise calibrate force --help' lists the options of force, and so "
+		 "on.\n"
 		 "Exit codes: 0 done, 1 failed or refused, 2 bad usage.",
 };
 
@@ -30,5 +35,5 @@ int main(int argc, char **argv)
 	cli_parse(&command, argc, argv, NULL);
 	if (optind < argc)
 		cli_unknown("calibration", argv[optind], names);
-	cli_usage("a subcommand is missing: force, depth, tip, delay, stepper or check");
+	cli_usage("missing subcommand: force, depth, tip, delay, stepper or check");
 }

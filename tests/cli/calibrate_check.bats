@@ -40,12 +40,12 @@ today=$(date -u +%Y-%m-%dT00:00:00Z)
 	while IFS='|' read -r kind text said; do
 		echo "$text" >calibration.conf
 		run -1 incise calibrate check
-		[[ "$output" == *$'\n'"$kind "*": never calibrated: $said by hand, nominal is "* ]] ||
+		[[ "$output" == *$'\n'"$kind "*": never calibrated: set by hand: $said; nominal: "* ]] ||
 			complain "$output" || return
 		[ "$(grep -c 'never calibrated: nominal' <<<"$output")" = 4 ]
 		run -1 incise calibrate check --json --only "$kind"
 		echo "$output" >c.json
-		[[ "$(key c.json 'kinds[0].why')" == "never calibrated: $said by hand, nominal is "* ]]
+		[[ "$(key c.json 'kinds[0].why')" == "never calibrated: set by hand: $said; nominal: "* ]]
 		holds "$(key c.json "kinds[0].in_force.${said%% *}") == ${said##* }"
 	done <<-'END'
 		force|force_mV_N = 1500.0;|force_mV_N = 1500
@@ -58,7 +58,7 @@ today=$(date -u +%Y-%m-%dT00:00:00Z)
 	# none has passed; or another key of the kind was calibrated, and this one is by hand
 	echo "force_mV_N = 1500.0; history = ( $(entry force force_mV_N 1300.0 "$today" false) );" >calibration.conf
 	run -1 incise calibrate check
-	[[ "$output" == *"none has passed: force_mV_N = 1500 by hand, nominal is 1240 mV/N"* ]]
+	[[ "$output" == *"no calibration has passed: set by hand: force_mV_N = 1500; nominal: 1240 mV/N"* ]]
 	echo "force_mV_N = 1300.0; force_zero_mV = 20.0;
 		history = ( $(entry force force_mV_N 1300.0 "$today" true) );" >calibration.conf
 	run -1 incise calibrate check
@@ -94,7 +94,7 @@ today=$(date -u +%Y-%m-%dT00:00:00Z)
 	grep -q "^depth    due, 2020-01-01, .*: older than 365 days" <<<"$output"
 	grep -q "^delay    FAILED, .*: the last one, of ${today%T*}, failed" <<<"$output"
 	grep -q "^stepper  due, .*: changed by hand since: stepper_N_step = 0.001" <<<"$output"
-	grep -q "in force: 0.001" <<<"$output"
+	grep -q "active: 0.001" <<<"$output"
 	grep -q "^tip      due, .*: its date is in the future" <<<"$output"
 	run -0 incise calibrate check --only force
 	[ "$(grep -cE '^(depth|delay|tip|stepper)' <<<"$output")" = 0 ]
@@ -127,11 +127,11 @@ altered() {
 
 @test "a shifted camera, metal nearby and a wrong scale are told apart" {
 	altered "UPDATE frames SET depth_mm = depth_mm + 1.2 WHERE depth_mm > 0"
-	[[ "$output" == *"shifted camera? they differ by +1."* ]]
+	[[ "$output" == *"the camera may have moved: they differ by +1."* ]]
 	altered "UPDATE tracker SET z_mm = z_mm + 2 * max(0, x_mm - 25) / 25"
-	[[ "$output" == *"metal nearby?"* ]]
+	[[ "$output" == *"metal may be near"* ]]
 	altered "UPDATE frames SET depth_mm = depth_mm * 1.08 WHERE depth_mm > 0"
-	[[ "$output" == *"wrong scale? they differ by 8."* ]]
+	[[ "$output" == *"a scale may be wrong: they differ by 8."* ]]
 }
 
 @test "a recording without a camera, and what is none" {

@@ -122,9 +122,9 @@ pairs() {
 	holds "($(key report.json full_px) - 380)^2 < 0.1^2"
 	pairs '(i == 7 || i == 21) ? 1 : (i == 30 || i == 33) ? 2 : 0' >wrong.csv
 	run -0 incise calibrate depth line --from wrong.csv --gauge-u 0
-	[[ "$output" == *"40, of which 36 were believed"* ]]
+	[[ "$output" == *"40 (36 accepted, effective n = "* ]]
 	[[ "$output" == *"outlier        row 8: "* && "$output" == *"outlier        row 22: "* ]]
-	[[ "$output" == *"outlier        row 31: "*"columns swapped?"* ]]
+	[[ "$output" == *"outlier        row 31: "*"; the columns may be swapped"* ]]
 	holds "($(in_force depth_mm_px) - 0.125)^2 < 0.0001^2"
 }
 
@@ -164,7 +164,7 @@ pairs() {
 @test "one that does not pass is in the history, and not in force" {
 	incise calibrate depth two-point --pixels 400 >/dev/null
 	run --separate-stderr incise calibrate depth two-point --pixels 390 --pixels-u 3
-	failed_with "not in force: U is 1.5"
+	failed_with "refused, the previous calibration stays active: U is 1.5"
 	[ "$(in_force depth_mm_px)" = 0.11875 ]
 	[ "$(grep -c 'kind = "depth"' calibration.conf)" -eq 2 ]
 	# pairs on a curve
@@ -186,7 +186,7 @@ pairs() {
 	echo "$output" >again.json
 	holds "($(key again.json depth_mm_px) - $(key line.json depth_mm_px))^2 < 1e-16"
 	run --separate-stderr incise calibrate depth board --from "$BATS_FILE_TMPDIR/cut.rec"
-	bad_usage "not a recording"
+	bad_usage "a recording does not show a board"
 }
 
 @test "a board against the truth of the camera that drew it" {
@@ -233,7 +233,7 @@ pairs() {
 	run --separate-stderr incise calibrate depth board --from view1.pgm view2.pgm view3.pgm --board 8x7
 	failed_with "no chessboard of 8 x 7 inner corners"
 	run --separate-stderr incise calibrate depth board --board 9 --from view1.pgm
-	bad_usage "inner corners as 9x6"
+	bad_usage "--board: expected inner corners such as 9x6"
 	export INCISE_MODULE_PATH=$PWD
 	run --separate-stderr incise calibrate depth board --from view1.pgm
 	failed_with "there is no module board_opencv.so in $PWD"
@@ -247,12 +247,12 @@ pairs() {
 		bad_usage "$text"
 		[ ! -e calibration.conf ]
 	}
-	usage "how? two-point, line or board"
+	usage "missing method: two-point, line or board"
 	usage "three-point" three-point
-	usage "without a terminal" two-point </dev/null
-	usage "without a terminal" board --images 5 </dev/null
-	usage "--from pairs.csv" line
-	usage "pictures follow --from" two-point a.png
+	usage "(needed without a terminal)" two-point </dev/null
+	usage "(needed without a terminal)" board --images 5 </dev/null
+	usage "missing --from pairs.csv" line
+	usage "unexpected argument 'a.png'; images are given with --from" two-point a.png
 	usage "--length" two-point --length 47.5kg --pixels 400
-	usage "--pixels is of two-point" line --pixels 400
+	usage "--pixels goes with two-point" line --pixels 400
 }

@@ -53,11 +53,11 @@ made_weights() {
 	incise calibrate force --from w.csv --dry-run
 	[ ! -e calibration.conf ]
 	run --separate-stderr incise calibrate force --from w.csv --nominal 1500
-	failed_with "not in force" "-16.67 % from the nominal 1500 mV/N, more than 5 %"
+	failed_with "refused, the previous calibration stays active" "-16.67 % from the nominal 1500 mV/N, more than 5 %"
 	run ! grep -q '^force_mV_N' calibration.conf
 	grep -q 'pass = false;' calibration.conf
 	run -0 incise calibrate force --from w.csv --latitude 48 --altitude 300
-	[[ "$output" == *"1240.00 mV/N as found"* ]]
+	[[ "$output" == *"1240.00 mV/N previously"* ]]
 	grep -q '^force_mV_N = ' calibration.conf
 }
 
@@ -121,13 +121,13 @@ made_weights() {
 		run --separate-stderr incise calibrate force --from w.csv
 		failed_with "w.csv" "$said"
 	done <<-'END'
-		mass,reading_mV\n1,2\n|w.csv:1: expected a line that names the columns
+		mass,reading_mV\n1,2\n|w.csv:1: expected a line of column names
 		mass_g,reading_mV\n1,2\n1,x\n|w.csv:3: reading_mV: expected a number, found 'x'
 		mass_g,reading_mV\n1\n|w.csv:2: reading_mV: expected a number, found ''
 		mass_g,reading_mV\nnan,1\n|w.csv:2: mass_g: expected a number
 		mass_g,reading_mV,direction\n1,1,left\n|w.csv:2: direction: expected up or down
 		mass_g,reading_mV,series\n1,1,1.5\n|w.csv:2: series: expected a whole number
-		|no pairs in it
+		|w.csv: no pairs; expected a line of column names
 	END
 	run --separate-stderr incise calibrate force --from none.csv
 	failed_with "none.csv: No such file or directory"
@@ -139,15 +139,15 @@ made_weights() {
 
 @test "what is not a wish" {
 	run --separate-stderr incise calibrate force --from w.csv --weights 0,1,2
-	bad_usage "--from takes the place of a rig"
+	bad_usage "--from does not go with --rig, --weights or --keep"
 	run --separate-stderr incise calibrate force --rig sim: </dev/null
-	bad_usage "no terminal to ask for weights"
+	bad_usage "missing --weights or --from"
 	run --separate-stderr incise calibrate force --rig sim: --weights 100g
-	bad_usage "2 weights or more beside the empty pan"
+	bad_usage "the empty pan and 2 weights or more"
 	run --separate-stderr incise calibrate force --rig sim: --weights 100g,100g,50g
-	bad_usage "100 g is there twice"
+	bad_usage "100 g is listed twice"
 	run --separate-stderr incise calibrate force --input-range 5,1
-	bad_usage "the first is to be the lower one"
+	bad_usage "expected the lower voltage first"
 	run --separate-stderr incise calibrate force extra
 	bad_usage "unexpected argument 'extra'; did you mean --from extra?"
 }
@@ -165,6 +165,6 @@ made_weights() {
 	status=0
 	wait "$pid" || status=$?
 	[ "$status" = 1 ]
-	grep -q "stopped; the calibration stays as it was" said
+	grep -q "stopped; the previous calibration stays active" said
 	cmp calibration.conf before
 }

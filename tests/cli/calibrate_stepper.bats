@@ -92,14 +92,14 @@ made_points() {
 @test "an actuator that loses no step says how fast it was asked" {
 	stepper --rig $bench,screw_mm_s=5 --dry-run
 	[ "$status" -eq 0 ]
-	[[ "$output" == *"8000 /s lost no step, which is as fast as this range and rig.conf"* ]]
+	[[ "$output" == *"8000 /s lost no step; this range and rig.conf allow no faster"* ]]
 }
 
 @test "too much force: it goes back, and nothing is written" {
 	stepper --rig $bench --range 0mm..1.5mm --max-force 1N
 	[ "$status" -eq 1 ]
 	[[ "$stderr" == *"going back"* ]]
-	[[ "$stderr" == *"the force was more than 1.00 N"*"--range"* ]]
+	[[ "$stderr" == *"the force exceeded 1.00 N"*"--range"* ]]
 	cmp calibration.conf before.conf
 }
 
@@ -146,7 +146,7 @@ made_points() {
 	incise calibrate stepper --from p.csv --step-mm 0.000625 --dry-run
 	made_points '' | sed '9s/,[^,]*$/,x/' >p.csv
 	stepper --from p.csv
-	failed_with "p.csv:9" "force_N is 'x'"
+	failed_with "p.csv:9" "force_N: expected a number, found 'x'"
 	cmp calibration.conf before.conf
 }
 
@@ -163,7 +163,7 @@ made_points() {
 	made_points 'F += 0.3 * x * x' >p.csv
 	stepper --from p.csv
 	[ "$status" -eq 1 ]
-	[[ "$stderr" == *"not in force: linearity of"* ]]
+	[[ "$stderr" == *"refused, the previous calibration stays active: linearity of"* ]]
 	run ! grep -q '^stepper_N_step' calibration.conf
 	grep -q 'pass = false' calibration.conf
 }
@@ -182,17 +182,17 @@ made_points() {
 
 @test "bad usage" {
 	stepper --range 5mm
-	bad_usage "two places"
+	bad_usage "--range: expected two positions"
 	stepper --range 5mm..1mm
-	bad_usage "ends at 1 mm"
+	bad_usage "it ends at 1 mm, not above its start"
 	stepper --strokes 1
 	bad_usage "strokes"
 	stepper --from p.csv --range 0mm..1mm
-	bad_usage "--from drives nothing"
+	bad_usage "--from does not go with --rig, --keep, --range"
 	stepper --step-mm 1
-	bad_usage "--step-mm is for --from"
+	bad_usage "--step-mm goes with --from"
 	stepper now
-	bad_usage "nothing to do with 'now'"
+	bad_usage "unexpected argument 'now'"
 	stepper --rig $bench --range 0mm..50mm
 	failed_with "--range ends at 50 mm"
 }

@@ -298,7 +298,7 @@ refused() {
 	head -c 20000000 /dev/zero | tr '\0' ' ' >bad.session
 	refused "8"
 	cp "$root/scenes/neck.scene" bad.session
-	refused "no JSON"
+	refused "this is a scene, not a session"
 	rm bad.session
 	refused "No such file"
 	mkdir bad.session

@@ -109,7 +109,7 @@ setup() {
 		code=0
 		timeout -k 1 1 "${words[@]}" >/dev/null 2>err </dev/null || code=$?
 		# Who asks for weights needs somebody who answers.
-		[ "$code" -ne 2 ] || grep -q "no terminal to ask" err || echo "$document: $command: $(head -n 1 err)" >>wrong
+		[ "$code" -ne 2 ] || grep -q "without a terminal to ask" err || echo "$document: $command: $(head -n 1 err)" >>wrong
 		n=$((n + 1))
 	done <typed
 	[ "$n" -eq "$(wc -l <typed)" ]

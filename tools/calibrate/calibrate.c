@@ -53,9 +53,10 @@ void calibrate_find(struct calibrate_options *options)
 void calibrate_begin(struct calibrate_options *options)
 {
 	if (options->from && options->rig)
-		cli_usage("--from and --rig: one source at a time");
+		cli_usage("--from and --rig exclude each other; give one of them");
 	if (options->from && options->keep)
-		cli_usage("--keep: what comes --from a file is kept there already");
+		cli_usage("--keep does not go with --from: the data are in that file "
+			  "already");
 	calibrate_find(options);
 	if (options->report && mkdir(options->report, 0777) && errno != EEXIST)
 		cli_fail("%s: %s", options->report, strerror(errno));
@@ -104,7 +105,8 @@ bool calibrate_can_plot(const char *folder)
 		plot_folder(folder);
 		return true;
 	}
-	cli_warn("no pictures: gnuplot is not installed, apt-get install gnuplot-nox");
+	cli_warn("gnuplot is not installed, so there are no plots; apt-get install "
+		 "gnuplot-nox");
 	return false;
 }
 
@@ -170,7 +172,7 @@ struct incise_infile *calibrate_open(const char *path)
 {
 	static const struct incise_infile_kind csv = {
 		.name = "a CSV file of a calibration",
-		.advice = "give a CSV file",
+		.advice = "give a CSV file with a line of column names",
 		.size_max = 1 << 30,
 	};
 	struct incise_error err = {0};

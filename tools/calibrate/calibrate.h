@@ -22,9 +22,9 @@ struct calibrate_options {
 };
 
 /* The option -c of a command, whose options begin with these as `common`. */
-#define CALIBRATE_FILE_OPTION(type)                                       \
-	'c', "calibration", "FILE",                                       \
-		"read as found, and written (default: calibration.conf)", \
+#define CALIBRATE_FILE_OPTION(type)                                          \
+	'c', "calibration", "FILE",                                          \
+		"calibration to read and write (default: calibration.conf)", \
 		CLI_INPUT(type, common.calibration)
 
 /* Read the calibration in force; a missing file is the nominal one. */

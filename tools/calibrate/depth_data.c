@@ -43,9 +43,9 @@ static void next_frame(struct incise_rig *rig, struct incise_camera_frame *frame
 
 	while (!(rc = incise_camera_read(camera, frame))) {
 		if (cli_stop)
-			cli_fail("stopped; the old calibration stays");
+			cli_fail("stopped; the previous calibration stays active");
 		if (incise_clock_now(clock) > until)
-			cli_fail("the camera gives no picture");
+			cli_fail("no frames arrive from the camera; check its cable");
 		wait_for(clock, WAIT_NS);
 	}
 	if (rc > 0)
@@ -69,7 +69,7 @@ static void ask(const char *prompt, int n)
 	fprintf(stderr, prompt, n);
 	fprintf(stderr, " [Enter] ");
 	if (!fgets(line, sizeof(line), stdin) || cli_stop)
-		cli_fail("stopped; the old calibration stays");
+		cli_fail("stopped; the previous calibration stays active");
 }
 
 static void from_camera(struct depth_source *source, int pictures, const char *prompt,
@@ -97,7 +97,7 @@ static void from_camera(struct depth_source *source, int pictures, const char *p
 		/* On a terminal ask again for a picture of no use. */
 		if (handle(context, &frame, name) || !source->guided || ++tries > 100)
 			taken++;
-		cli_progress("%d of %d pictures", taken, pictures);
+		cli_progress("%d of %d frames", taken, pictures);
 	}
 	cli_progress_end();
 	incise_rig_close(rig);
@@ -115,7 +115,7 @@ static void for_each_picture(struct depth_source *source, int pictures,
 		struct incise_camera_frame frame;
 
 		if (cli_stop)
-			cli_fail("stopped; the old calibration stays");
+			cli_fail("stopped; the previous calibration stays active");
 		image_read(source->path[i], &frame);
 		handle(context, &frame, source->path[i]);
 		free((void *)frame.data);
@@ -165,7 +165,7 @@ void depth_lengths_read(struct depth_lengths *lengths, const char *path, bool li
 	data = cli_require(incise_dataset_read(path, columns, line ? 2 : 1, NULL, &err),
 			   &err);
 	if (incise_dataset_rows(data) > 1000000)
-		cli_fail("%s: more than a million rows", path);
+		cli_fail("%s: more than a million rows; keep every tenth", path);
 	for (size_t i = 0; i < incise_dataset_rows(data); i++) {
 		const double *row = incise_dataset_row(data, i);
 
@@ -187,7 +187,7 @@ void depth_lengths_recording(struct depth_lengths *lengths, const char *path, bo
 	if (n < 0)
 		cli_fail_with(&err);
 	if (!n)
-		cli_fail("%s: no picture in which the scalpel was found; record with a "
+		cli_fail("%s: the scalpel was not found in any frame; record with a "
 			 "camera whose rig.conf has a group vision",
 			 path);
 	lengths->vision_px = VISION_PX;
@@ -198,8 +198,8 @@ void depth_lengths_recording(struct depth_lengths *lengths, const char *path, bo
 		depth_lengths_add(lengths, rows[i].length_px, rows[i].depth_mm, name);
 	}
 	if (!lengths->n)
-		cli_fail("%s: no picture with the blade in the %s", path,
-			 line ? "tissue" : "air");
+		cli_fail("%s: no frame shows the blade in the %s; record one that does",
+			 path, line ? "tissue" : "air");
 	free(rows);
 	incise_recording_close(recording);
 }
@@ -217,7 +217,8 @@ static void learn(struct depth_source *source, const struct incise_camera_frame 
 	char rest;
 
 	if (sscanf(source->pick, "%d,%d%c", &box.x, &box.y, &rest) != 2)
-		cli_usage("--pick: '%s': a pixel of the handle, X,Y", source->pick);
+		cli_usage("--pick: expected a pixel of the handle, X,Y, found '%s'",
+			  source->pick);
 	if (incise_vision_learn(frame, &box, &source->setup, &err))
 		cli_fail_with(&err);
 	source->found_setup = true;
@@ -238,9 +239,9 @@ static bool measure(void *context, const struct incise_camera_frame *frame,
 	}
 	rc = incise_vision_measure(m->vision, frame, &result);
 	if (rc)
-		cli_fail("picture %s: %s", name, strerror(-rc));
+		cli_fail("image %s: %s", name, strerror(-rc));
 	if (!result.found) {
-		cli_warn("picture %s: no scalpel: %s", name, result.why);
+		cli_warn("image %s: no scalpel: %s", name, result.why);
 		return false;
 	}
 	depth_lengths_add(m->lengths, result.length_px, NAN, name);
@@ -253,18 +254,16 @@ static void find_setup(struct depth_source *source)
 	struct incise_rig *rig;
 
 	if (source->n_paths && !source->rig && !source->pick)
-		cli_usage(
-			"what does the handle look like? give --pick X,Y, a pixel of it, "
-			"or --rig");
+		cli_usage("missing --pick X,Y (a pixel of the handle, for its colour), "
+			  "or --rig");
 	if (source->n_paths && !source->rig)
 		return;
 	rig = cli_open_rig(source->rig, 0);
 	if (incise_rig_vision(rig, &source->setup)) {
 		if (!source->pick)
-			cli_fail(
-				"%s: has no group vision: give --pick X,Y, a pixel of the "
-				"handle",
-				incise_rig_spec(rig));
+			cli_fail("%s: it has no group vision; give --pick X,Y, a pixel "
+				 "of the handle",
+				 incise_rig_spec(rig));
 	} else {
 		source->found_setup = true;
 	}
@@ -281,13 +280,12 @@ void depth_lengths_measure(struct depth_lengths *lengths, struct depth_source *s
 	lengths->vision_px = VISION_PX;
 	for_each_picture(
 		source, source->pictures ? source->pictures : LENGTH_PICTURES,
-		"Hold the scalpel where it cuts, all of its handle in the picture",
+		"Hold the scalpel where it cuts, with all of its handle in the frame",
 		measure, &m);
 	incise_vision_free(m.vision);
 	if (!lengths->n)
-		cli_fail(
-			"no scalpel was found in any picture; --pick X,Y learns its colour "
-			"from a pixel of it");
+		cli_fail("no scalpel was found in any image; give --pick X,Y, a pixel "
+			 "of its handle, to learn its colour");
 }
 
 void depth_lengths_write(const struct depth_lengths *lengths, const char *path, bool line)
@@ -318,7 +316,7 @@ static double *add_view(struct depth_corners *c, const char *name)
 	size_t of_view = (size_t)2 * c->columns * c->rows;
 
 	if (c->n == INCISE_BOARD_VIEWS)
-		cli_fail("more than %d views", INCISE_BOARD_VIEWS);
+		cli_fail("more than %d views; give fewer images", INCISE_BOARD_VIEWS);
 	c->px = cli_resize(c->px, (c->n + 1) * of_view, sizeof(*c->px));
 	c->name = cli_resize(c->name, c->n + 1, sizeof(*c->name));
 	c->name[c->n] = cli_text("%s", name);
@@ -339,13 +337,14 @@ static bool find(void *context, const struct incise_camera_frame *frame, const c
 		cli_fail_with(&err);
 	/* The first one must show the plane. */
 	if (rc && !c->n && !finding->again)
-		cli_fail("picture %s, which is to show the cutting plane: %s", name,
+		cli_fail("image %s, which must show the cutting plane: %s", name,
 			 err.text);
 	if (rc)
-		cli_warn("picture %s: %s", name, err.text);
+		cli_warn("image %s: %s", name, err.text);
 	else if (c->n && (frame->width != c->width || frame->height != c->height))
-		cli_fail("picture %s: %d x %d pixels, those before %d x %d", name,
-			 frame->width, frame->height, c->width, c->height);
+		cli_fail("image %s: %d x %d pixels, but the images before have %d x "
+			 "%d; give images of one size",
+			 name, frame->width, frame->height, c->width, c->height);
 	else
 		memcpy(add_view(c, name), px, size);
 	c->width = frame->width;
@@ -360,8 +359,8 @@ void depth_corners_find(struct depth_corners *corners, struct depth_source *sour
 
 	for_each_picture(
 		source, source->pictures ? source->pictures : CORNER_PICTURES,
-		"View %d: the board in the cutting plane first, then tilted by 20 to "
-		"45 degrees, each time another way",
+		"View %d: hold the board in the cutting plane first, then tilted by 20 "
+		"to 45 degrees, each time in another direction",
 		find, &finding);
 }
 
@@ -389,8 +388,9 @@ void depth_corners_read(struct depth_corners *c, const char *path)
 				at / c->columns + 1, at % c->columns + 1, c->columns,
 				c->rows);
 		if (!(row[5] >= 16 && row[5] <= 8192 && row[6] >= 16 && row[6] <= 8192))
-			cli_fail("%s: row %zu: a picture of %g x %g pixels", path, i + 1,
-				 row[5], row[6]);
+			cli_fail("%s: row %zu: an image of %g x %g pixels; expected 16 "
+				 "to 8192",
+				 path, i + 1, row[5], row[6]);
 		if (!at) {
 			snprintf(name, sizeof(name), "%zu", i / of_view + 1);
 			px = add_view(c, name);
@@ -401,7 +401,8 @@ void depth_corners_read(struct depth_corners *c, const char *path)
 		c->height = (int)row[6];
 	}
 	if (incise_dataset_rows(data) % of_view)
-		cli_fail("%s: the last view is not whole: %zu rows of it, expected %d",
+		cli_fail("%s: the last view is incomplete: %zu rows, expected %d; add "
+			 "the missing corners",
 			 path, incise_dataset_rows(data) % of_view, of_view);
 	incise_dataset_free(data);
 }

@@ -55,15 +55,15 @@ static void lengths_text(const struct depth_result *r, FILE *out)
 	int shown = 0;
 
 	fprintf(out, "full_px        %.3f, u %.3f\n", fit->full_px, fit->u_full_px);
-	fprintf(out, "readings       %d, of which %d were believed, worth %d\n", fit->n,
+	fprintf(out, "readings       %d (%d accepted, effective n = %d)\n", fit->n,
 		fit->inliers, fit->effective);
 	if (isfinite(fit->sd_mm))
 		fprintf(out, "residuals      sd %.4f mm, largest %.4f mm\n", fit->sd_mm,
 			fit->largest_mm);
 	if (isfinite(fit->bend_mm))
 		fprintf(out,
-			"bend           %.4f mm, u %.4f mm: what a parabola adds at the "
-			"ends\n",
+			"bend           %.4f mm, u %.4f mm: difference of a parabola "
+			"at the ends\n",
 			fit->bend_mm, fit->bend_sd_mm);
 	fprintf(out, "range          %.1f to %.1f px\n", fit->low_px, fit->high_px);
 	for (int i = 0; i < fit->n; i++)
@@ -72,7 +72,7 @@ static void lengths_text(const struct depth_result *r, FILE *out)
 				r->lengths->name[i], r->lengths->px[i],
 				!strcmp(r->way, "line") &&
 						r->lengths->mm[i] > r->lengths->px[i]
-					? ", columns swapped?"
+					? "; the columns may be swapped"
 					: "");
 	if (shown > OUTLIERS_SHOWN)
 		fprintf(out, "outliers       %d more\n", shown - OUTLIERS_SHOWN);
@@ -83,8 +83,8 @@ static void board_text(const struct depth_result *r, FILE *out)
 	const struct incise_board_fit *b = r->board;
 	const struct incise_board_lens *l = &b->lens, *u = &b->u_lens;
 
-	fprintf(out, "views          %d, of which %d were believed, %.1f degrees apart\n",
-		b->n, b->views, b->spread_deg);
+	fprintf(out, "views          %d (%d accepted), %.1f degrees apart\n", b->n,
+		b->views, b->spread_deg);
 	fprintf(out,
 		"corners        %.3f px (rms) off the board; in the plane %.4f mm, "
 		"largest %.4f mm\n",
@@ -103,7 +103,7 @@ static void board_text(const struct depth_result *r, FILE *out)
 		b->tilt_deg, b->tilt_deg + 2 * b->u_tilt_deg, b->distance_mm);
 	fprintf(out, "region         %.6f to %.6f mm/px along the handle\n", b->low_mm_px,
 		b->high_mm_px);
-	fprintf(out, "one number     is off by up to %.4f mm along the handle\n",
+	fprintf(out, "one scale      is off by up to %.4f mm along the handle\n",
 		b->bend_mm);
 	fprintf(out, "homography     [%.6g %.6g %.6g; %.6g %.6g %.6g; %.6g %.6g %.6g]\n",
 		b->homography[0], b->homography[1], b->homography[2], b->homography[3],
@@ -136,7 +136,7 @@ void depth_report_text(const struct depth_result *r, FILE *out)
 	fprintf(out, "depth_mm_px    %s (k = 2), %.2g %%\n",
 		uncertainty_text(value->left, 2 * value->u, "mm/px", text),
 		200 * value->u / value->left);
-	fprintf(out, "as found       %.7f, changed by %+.3f %%\n", value->found,
+	fprintf(out, "previous       %.7f, changed by %+.3f %%\n", value->found,
 		100 * (value->left / value->found - 1));
 	fprintf(out, "method         %s\n", r->record->method);
 	if (r->fit)
@@ -335,7 +335,7 @@ static void draw(const struct depth_result *r, const char *folder)
 	else
 		fprintf(script,
 			"set xlabel 'x on the board / mm'\nset ylabel 'y on the board / mm'\n"
-			"set title 'corners in the plane, off by, 100 times as large'\n"
+			"set title 'residuals of the corners in the plane, 100 times as large'\n"
 			"set size ratio -1\n"
 			"plot 'depth.dat' using 3:4:($5 * 100):($6 * 100) with vectors lc rgb "
 			"blue\n");

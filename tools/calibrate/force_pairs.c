@@ -96,7 +96,8 @@ static struct incise_calibrate_force_pair read_pair(const struct table *table,
 	if (table->column[SERIES] >= 0) {
 		series = number_of(table, SERIES, fields, n);
 		if (series != floor(series) || fabs(series) > 1e6)
-			cli_fail("%s:%d: series: expected a whole number; correct it",
+			cli_fail("%s:%d: series: expected a whole number from -1000000 "
+				 "to 1000000; correct it",
 				 table->path, table->line);
 		pair.series = (int)series;
 	}
@@ -197,12 +198,12 @@ void weights_parse(struct weights *weights, char *list)
 	}
 	for (int i = 1; i < weights->n; i++)
 		if (weights->mass_g[i] == weights->mass_g[i - 1])
-			cli_usage("--weights: %g g is there twice; --series repeats",
+			cli_usage("--weights: %g g is listed twice; repeat all loads "
+				  "with --series",
 				  weights->mass_g[i]);
 	if (weights->n < 3)
-		cli_usage(
-			"--weights: 2 weights or more beside the empty pan are needed, 5 "
-			"are good");
+		cli_usage("--weights: expected the empty pan and 2 weights or more, for "
+			  "example 0,50g,100g; 5 are recommended");
 }
 
 void weights_ask(struct weights *weights)
@@ -210,10 +211,10 @@ void weights_ask(struct weights *weights)
 	char *line = NULL;
 	size_t size = 0;
 
-	fprintf(stderr, "Which weights are there, together on the pan? Such as "
+	fprintf(stderr, "Enter the loads that you can put on the pan, for example "
 			"0,50g,100g,200g,300g: ");
 	if (getline(&line, &size, stdin) < 0)
-		cli_fail("stopped before a weight was named; nothing has changed");
+		cli_fail("stopped before a load was entered; nothing has changed");
 	line[strcspn(line, "\n")] = 0;
 	weights_parse(weights, line);
 	free(line);
@@ -268,7 +269,7 @@ static struct mean read_for(struct incise_rig *rig, double s)
 		}
 	}
 	if (cli_stop)
-		cli_fail("stopped; the calibration stays as it was");
+		cli_fail("stopped; the previous calibration stays active");
 	if (mean.n < 10)
 		cli_fail(
 			"%s: the force channel gave %ld samples in %g s; nothing has changed",
@@ -316,8 +317,8 @@ static void wait_steady(const struct weights *weights, double mass_g, double bef
 			cli_fail("%g g: %s within %g s: %.1f mV, sd %.1f mV; nothing has "
 				 "changed",
 				 mass_g,
-				 there ? "the reading did not get steady"
-				       : "the load did not come",
+				 there ? "the reading did not become steady"
+				       : "the load was not put on",
 				 weights->timeout_s, now.mV, sd_of(&now));
 		last = now;
 	}
@@ -335,7 +336,7 @@ static void request_load(const struct weights *weights, double mass_g)
 	}
 	cli_progress_end();
 	if (mass_g > 0)
-		fprintf(stderr, "Put on %g g in all", mass_g);
+		fprintf(stderr, "Put a total of %g g on", mass_g);
 	else
 		fprintf(stderr, "Take all weights off");
 	if (!is_terminal()) {
@@ -346,7 +347,7 @@ static void request_load(const struct weights *weights, double mass_g)
 	for (int c = 0; c != '\n' && c != EOF && !cli_stop;)
 		c = getchar();
 	if (cli_stop || feof(stdin))
-		cli_fail("stopped; the calibration stays as it was");
+		cli_fail("stopped; the previous calibration stays active");
 }
 
 /* Whether the reading is within the converter's range. */

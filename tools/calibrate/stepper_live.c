@@ -37,8 +37,8 @@ void stepper_live_open(struct stepper_live *live, const char *rig)
 	if (!live->drive.status.homed && !info->can_home)
 		stepper_drive_fail(
 			&live->drive,
-			"%s has no home input, and its count is not the machine's: "
-			"limits would mean nothing; run incise stepper home, or wire one",
+			"%s has no home input, and is not homed: its limits would mean "
+			"nothing; run incise stepper home, or wire a home switch",
 			info->name);
 }
 
@@ -82,8 +82,8 @@ static void read_force(struct stepper_live *live)
 	stepper_live_creep(live, live->low_mm);
 	stepper_drive_rest(&live->drive);
 	stepper_drive_fail(&live->drive,
-			   "the force was more than %.2f N on the way; give a smaller "
-			   "--range, or a larger --max-force",
+			   "the force exceeded %.2f N; give a smaller --range, or a "
+			   "larger --max-force",
 			   live->max_N);
 }
 
@@ -154,7 +154,9 @@ static double mean_force(struct stepper_live *live, double seconds)
 		} else if (settled && s >= seconds && live->samples)
 			return live->sum_N / live->samples;
 		else if (settled && s > seconds + ARRIVE_S)
-			stepper_drive_fail(drive, "%s gives no samples; see its cable",
+			stepper_drive_fail(drive,
+					   "%s: no samples arrive; check its "
+					   "cable",
 					   live->channel.name);
 		stepper_drive_to(drive, here_mm);
 		watch(live);
@@ -180,7 +182,7 @@ void stepper_live_plan(struct stepper_live *live)
 		live->retreating = false;
 		if (!live->samples)
 			stepper_drive_fail(&live->drive,
-					   "%s gives no samples; see its cable",
+					   "%s: no samples arrive; check its cable",
 					   live->channel.name);
 		live->zero_mV =
 			live->sum_N / live->samples * live->calibration.force_mV_N;
@@ -199,7 +201,8 @@ void stepper_live_plan(struct stepper_live *live)
 								     info->spring_N_mm);
 	if (live->high_mm > info->travel_mm + 0.5 * info->step_mm)
 		stepper_drive_fail(&live->drive,
-				   "--range ends at %g mm, and the travel of %s at %g mm",
+				   "--range ends at %g mm, but the travel of %s at %g "
+				   "mm; give a smaller one",
 				   live->high_mm, info->name, info->travel_mm);
 	if (live->high_mm - live->low_mm < 100 * info->step_mm)
 		stepper_drive_fail(
@@ -217,12 +220,14 @@ static void confirm(struct stepper_live *live)
 	if (!isatty(STDIN_FILENO) || !isatty(STDERR_FILENO))
 		return;
 	fprintf(stderr,
-		"The handle is to press the force sensor, and nobody is to hold it. %s will\n"
-		"%sgo %d times from %g to %g mm and back, with up to %.2f N. Keep a hand on the\n"
-		"emergency stop. Enter starts it, Ctrl-C ends it: ",
+		"Let the handle press on the force sensor, and do not hold it. %s "
+		"will\n"
+		"%sgo %d times from %g to %g mm and back, with up to %.2f N. Keep a "
+		"hand on the\n"
+		"emergency stop. Press Enter to start, Ctrl-C to end: ",
 		live->drive.info.name,
-		live->drive.info.can_home ? "search its home, then " : "", live->strokes,
-		live->low_mm, live->high_mm, live->max_N);
+		live->drive.info.can_home ? "look for its home, then " : "",
+		live->strokes, live->low_mm, live->high_mm, live->max_N);
 	while ((c = getchar()) != '\n')
 		if (c == EOF)
 			stepper_drive_fail(&live->drive,
@@ -347,8 +352,8 @@ static double stroke(struct stepper_live *live, int way, double mm_s)
 		    most_s * INCISE_NS_PER_S)
 			stepper_drive_fail(
 				drive,
-				"%s is told to go at %g mm/s and stays at %.4f mm; "
-				"see incise stepper status",
+				"%s is commanded at %g mm/s but stays at %.4f mm; see "
+				"incise stepper status",
 				drive->info.name, way * mm_s, drive->status.position_mm);
 	}
 	do {
@@ -438,7 +443,7 @@ void stepper_live_rate(struct stepper_live *live,
 
 	*rate = (struct stepper_rate){.lost_1_s = NAN};
 	if (incise_stepper_jog(live->drive.stepper, 0) == -EOPNOTSUPP) {
-		rate->why = "it cannot be driven at a speed";
+		rate->why = "it takes positions only, no speeds";
 		return;
 	}
 	rate->tried = true;
