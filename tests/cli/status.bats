@@ -417,6 +417,9 @@ until_lines() {
 @test "a page that is no page, or of another release, is refused" {
 	echo "rate_hz = 1000.0;" >a.state
 	run --separate-stderr incise status a.state
+	failed_with "a.state: this is a scene, not the state page of a loop"
+	echo nonsense >a.state
+	run --separate-stderr incise status a.state
 	failed_with "a.state: is no state of a loop"
 	"$loop" incise/neck.state done
 	printf '\2' | dd of=incise/neck.state bs=1 seek=8 conv=notrunc 2>/dev/null

@@ -334,41 +334,44 @@ static const char *base_of(const char *path)
 	return slash ? slash + 1 : path;
 }
 
+static char *stem_of(const char *name)
+{
+	const char *dot = strrchr(name, '.');
+
+	return cli_text("%.*s", dot ? (int)(dot - name) : (int)strlen(name), name);
+}
+
+static bool is_near(const char *name, const char *other)
+{
+	return incise_nearest_name(name, (const char *const[]){other, NULL});
+}
+
+/* "pairs.cvs" and "pairs" for "pairs.csv", but not "bad.fis" for "red.fis". */
+static bool meant(const char *typed, const char *name)
+{
+	char *stem = stem_of(name), *typed_stem = stem_of(typed);
+	bool is = !strcmp(typed, stem) ||
+		  (is_near(typed, name) && is_near(typed_stem, stem));
+
+	free(stem);
+	free(typed_stem);
+	return is;
+}
+
 /* A file next to @path whose name is near, with its folder: free(3); NULL: there is none. */
 static char *near(const char *path, unsigned int expected)
 {
-	int folder = (int)(base_of(path) - path);
-	char *pattern = cli_text("%.*s*", folder, path), *found = NULL;
-	const char *nearest, **names;
+	char *pattern = cli_text("%.*s*", (int)(base_of(path) - path), path);
+	char *found = NULL;
 	glob_t files;
-	size_t n = 0;
 
-	if (glob(pattern, GLOB_NOSORT, NULL, &files)) {
-		free(pattern);
-		return NULL;
+	if (!glob(pattern, 0, NULL, &files)) {
+		for (size_t i = 0; i < files.gl_pathc && !found; i++)
+			if (meant(base_of(path), base_of(files.gl_pathv[i])) &&
+			    file_kind_of(files.gl_pathv[i]) & expected)
+				found = cli_text("%s", files.gl_pathv[i]);
+		globfree(&files);
 	}
-	names = cli_alloc(files.gl_pathc + 1, sizeof(*names));
-	for (size_t i = 0; i < files.gl_pathc; i++)
-		names[n++] = base_of(files.gl_pathv[i]);
-	nearest = incise_nearest_name(base_of(path), names);
-	if (nearest)
-		found = cli_text("%.*s%s", folder, path, nearest);
-	for (int i = 0; i < FILE_KINDS && !found; i++) {
-		char *whole = kinds[i].extension && expected & 1u << i
-				      ? cli_text("%s%s", path, kinds[i].extension)
-				      : NULL;
-
-		if (whole && !access(whole, F_OK))
-			found = whole;
-		else
-			free(whole);
-	}
-	if (found && !(file_kind_of(found) & expected)) {
-		free(found);
-		found = NULL;
-	}
-	free(names);
-	globfree(&files);
 	free(pattern);
 	return found;
 }
@@ -387,16 +390,16 @@ static bool is_missing(const char *path)
 void file_expect(const char *path, unsigned int expected)
 {
 	enum file_kind found = file_kind_of(path);
-	char *meant;
+	char *other;
 
 	if (!strcmp(path, "-") || found & expected)
 		return;
 	if (found)
 		cli_fail("%s: this is %s, not %s; %s", path, names_of(found),
 			 names_of(expected), with_path(hint_of(found, expected), path));
-	meant = is_missing(path) ? near(path, expected) : NULL;
-	if (meant)
-		cli_fail("%s: no such file; did you mean %s?", path, meant);
+	other = is_missing(path) ? near(path, expected) : NULL;
+	if (other)
+		cli_fail("%s: no such file; did you mean %s?", path, other);
 }
 
 const char *file_operand(const char *path, enum file_kind expected)
