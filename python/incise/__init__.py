@@ -8,10 +8,12 @@ Lengths are millimetres, forces newtons, times seconds, or nanoseconds of CLOCK_
 name ends in _ns. Everything is in the C library; this package calls it by ctypes.
 """
 
+from . import calibrate
 from ._library import VERSION as __version__
 from ._library import Error, Invalid, NotFound
 from .arrow import Batch, Field, Table
 from .model import CompiledModel, Model, TrainReport, Variable, load, train
+from .plan import Plan, Stability, Tick
 from .recording import Info, Recording, Stream, open
 from .verify import Finding, Report, verify
 
@@ -25,15 +27,28 @@ __all__ = [
     "Invalid",
     "Model",
     "NotFound",
+    "Plan",
     "Recording",
     "Report",
+    "Stability",
     "Stream",
     "Table",
+    "Tick",
     "TrainReport",
     "Variable",
+    "calibrate",
     "load",
     "open",
     "train",
     "verify",
     "__version__",
 ]
+
+
+def __getattr__(name):
+    """ForceRegressor needs scikit-learn, which is imported with it."""
+    if name == "ForceRegressor":
+        from .sklearn import ForceRegressor
+
+        return ForceRegressor
+    raise AttributeError(f"module 'incise' has no attribute {name!r}")

@@ -86,6 +86,22 @@ class Failure:
         return pointer
 
 
+class Handle:
+    """An object of the C library, freed with the last reference to it; it cannot be copied."""
+
+    def __init__(self, pointer, free):
+        self._as_parameter_ = pointer
+        self._free = free
+
+    def __del__(self):
+        pointer, self._as_parameter_ = self._as_parameter_, None
+        if pointer:
+            function(self._free)(pointer)
+
+    def __reduce__(self):
+        raise TypeError("an object of the C library cannot be copied or pickled")
+
+
 # --- finding ---------------------------------------------------------------------------
 
 

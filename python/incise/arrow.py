@@ -122,6 +122,9 @@ class Batch:
         if array is not None and array.release:
             array.release(byref(array))
 
+    def __reduce__(self) -> Any:
+        raise TypeError("a Batch cannot be copied or pickled; copy its columns")
+
     def _index(self, name: str) -> int:
         for i, field in enumerate(self.fields):
             if field.name == name:

@@ -7,6 +7,7 @@ import ctypes
 import errno
 import math
 import os
+import tempfile
 from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 from . import _library
@@ -345,7 +346,11 @@ class CompiledModel:
     """A model in fixed point, with a certified bound of its error: a .fx file."""
 
     def __init__(self, pointer: Any):
-        self._pointer = pointer
+        self._pointer = _library.Handle(pointer, "incise_fixed_free")
+        self._struct = pointer.contents
+
+    def __reduce__(self) -> Any:
+        return _compiled_of_bytes, (ctypes.string_at(self._struct.blob, self._struct.size),)
 
     @classmethod
     def load(cls, path: PathLike) -> "CompiledModel":
@@ -357,10 +362,6 @@ class CompiledModel:
             )
         )
 
-    def __del__(self) -> None:
-        if getattr(self, "_pointer", None):
-            function("incise_fixed_free")(self._pointer)
-
     @property
     def bound(self) -> float:
         """Certified largest error, in the output's unit."""
@@ -369,19 +370,19 @@ class CompiledModel:
     @property
     def size(self) -> int:
         """Bytes of the file."""
-        return self._pointer.contents.size
+        return self._struct.size
 
     @property
     def arithmetic(self) -> str:
         """direct, table or force."""
-        return text(function("incise_fixed_arithmetic_name")(self._pointer.contents.arithmetic))
+        return text(function("incise_fixed_arithmetic_name")(self._struct.arithmetic))
 
     def __call__(self, x: Any) -> Any:
         """The output at one point, or at each point of an array (…, inputs)."""
-        points = Points(x, self._pointer.contents.n_inputs)
+        points = Points(x, self._struct.n_inputs)
         block, address = points.results()
         one = function("incise_fixed_eval_double")
-        step = 8 * self._pointer.contents.n_inputs
+        step = 8 * self._struct.n_inputs
         out = (c_double * points.n).from_address(address) if points.n else []
         for k in range(points.n):
             out[k] = one(self._pointer, points.address + k * step)
@@ -422,8 +423,8 @@ class Model:
     """
 
     def __init__(self, pointer: int, uncertainty: Optional[int] = None):
-        self._pointer: Optional[int] = pointer
-        self._uncertainty = uncertainty
+        self._pointer = _library.Handle(pointer, "incise_model_free")
+        self._set_uncertainty(uncertainty)
         self.report: Optional[TrainReport] = None  #: of the training, if it was trained here
 
     @classmethod
@@ -433,16 +434,27 @@ class Model:
         name = _library.path_bytes(path)
         model = cls(failure.require(function("incise_model_load")(name, failure.ref)))
         if os.path.exists(name + b".sd"):
-            model._uncertainty = failure.require(
-                function("incise_uncertainty_load")(name + b".sd", model._pointer, failure.ref)
+            model._set_uncertainty(
+                failure.require(
+                    function("incise_uncertainty_load")(
+                        name + b".sd", model._pointer, failure.ref
+                    )
+                )
             )
         return model
 
-    def __del__(self) -> None:
-        if getattr(self, "_uncertainty", None):
-            function("incise_uncertainty_free")(self._uncertainty)
-        if getattr(self, "_pointer", None):
-            function("incise_model_free")(self._pointer)
+    def _set_uncertainty(self, pointer: Optional[int]) -> None:
+        self._uncertainty = pointer and _library.Handle(pointer, "incise_uncertainty_free")
+
+    def __reduce__(self) -> Any:
+        """Copies and pickles are the files, whose numbers are exact."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "model.fis")
+            self.save(path)
+            texts = tuple(
+                _bytes_of(name) if os.path.exists(name) else None for name in (path, path + ".sd")
+            )
+        return _model_of_bytes, (*texts, self.report)
 
     def __repr__(self) -> str:
         inputs = ", ".join(variable.name for variable in self.inputs)
@@ -537,6 +549,34 @@ class Model:
         )
 
 
+def _bytes_of(path: str) -> bytes:
+    with open(path, "rb") as file:
+        return file.read()
+
+
+def _write_bytes(path: str, content: bytes) -> None:
+    with open(path, "wb") as file:
+        file.write(content)
+
+
+def _model_of_bytes(fis: bytes, sd: Optional[bytes], report: Optional[TrainReport]) -> Model:
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "model.fis")
+        _write_bytes(path, fis)
+        if sd is not None:
+            _write_bytes(path + ".sd", sd)
+        model = Model.load(path)
+    model.report = report
+    return model
+
+
+def _compiled_of_bytes(blob: bytes) -> CompiledModel:
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "model.fx")
+        _write_bytes(path, blob)
+        return CompiledModel.load(path)
+
+
 def _name_array(names: Sequence[str]) -> Any:
     return (ctypes.c_char_p * len(names))(*(name.encode() for name in names))
 
@@ -623,7 +663,7 @@ class _Training:
                 self.failure.ref,
             )
         )
-        model._uncertainty = uncertainty.value
+        model._set_uncertainty(uncertainty.value)
         return report
 
     def baselines(self) -> Dict[str, float]:

@@ -164,6 +164,9 @@ class Recording:
     def __repr__(self) -> str:
         return f"<incise.Recording {self.path}{'' if self._pointer else ', closed'}>"
 
+    def __reduce__(self) -> Any:
+        raise TypeError("a Recording cannot be copied or pickled; open it again")
+
     def __enter__(self) -> "Recording":
         return self
 

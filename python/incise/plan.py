@@ -1,0 +1,486 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Scenes without a device: the loop's stages, tick by tick or over a whole stroke in one C call."""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import os
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
+
+from . import _library
+from ._library import Failure, Invalid, NotFound, c_bool, c_char, c_double, c_int, c_int64, c_void_p
+from ._library import function, text
+from .recording import PathLike
+
+AXES_MAX, POSES_MAX = 3, 32
+PHASES = ("free", "cutting", "insertion")
+TOOLS = ("auto", "blade", "handle", "tube")
+#: Bits of a tick's flags, in order; see incise/tick_flags.h.
+FLAGS = {
+    "contact": 1,
+    "extrapolated": 2,
+    "stale": 4,
+    "clamped": 8,
+    "fault": 16,
+    "slewed": 32,
+    "travel": 64,
+    "starting": 256,
+    "not_finite": 512,
+    "unusable": 1024,
+    "in_cut": 2048,
+    "membrane": 4096,
+    "lumen": 8192,
+    "back_wall": 16384,
+    "full": 32768,
+}
+
+
+class SampleStruct(ctypes.Structure):
+    """struct incise_tracker_sample"""
+
+    _fields_ = [
+        ("t_ns", c_int64),
+        ("seq", ctypes.c_uint64),
+        ("position_mm", c_double * 3),
+        ("quaternion", c_double * 4),
+        ("status", c_char),
+        ("station", ctypes.c_uint8),
+        ("button", c_bool),
+        ("restarted", c_bool),
+    ]
+    c_name = "struct incise_tracker_sample"
+
+
+class TrackerStruct(ctypes.Structure):
+    """struct incise_tracker_info"""
+
+    _fields_ = [
+        ("name", c_char * 64),
+        ("rate_hz", c_double),
+        ("latency_ns", c_int64),
+        ("stations", c_int),
+        ("external_sync", c_bool),
+        ("grain_ns", c_int64),
+        ("scalpel_station", ctypes.c_uint8),
+        ("tube_station", ctypes.c_uint8),
+    ]
+    c_name = "struct incise_tracker_info"
+
+
+class TickStruct(ctypes.Structure):
+    """struct incise_tick"""
+
+    _fields_ = [
+        ("t_ns", c_int64),
+        ("position_mm", c_double * 3),
+        ("quaternion", c_double * 4),
+        ("tool_mm", c_double * 3),
+        ("proxy_mm", c_double * 3),
+        ("normal", c_double * 3),
+        ("depth_mm", c_double),
+        ("velocity_mm_s", c_double),
+        ("command_N", c_double * 3),
+        ("actuated_N", c_double * AXES_MAX),
+        ("rendered_N", c_double * AXES_MAX),
+        ("unfelt_N", c_double),
+        ("flags", ctypes.c_uint),
+        ("phase", c_int),
+        ("tool", c_int),
+    ]
+    c_name = "struct incise_tick"
+
+
+class DeviceStruct(ctypes.Structure):
+    """struct incise_haptic_device"""
+
+    _fields_ = [
+        ("mass_kg", c_double),
+        ("damping_N_s_mm", c_double),
+        ("coulomb_N", c_double),
+        ("encoder_mm", c_double),
+        ("period_s", c_double),
+        ("delay_ticks", c_int),
+    ]
+    c_name = "struct incise_haptic_device"
+
+
+class _Axis(ctypes.Structure):
+    _fields_ = [("stiffness_N_mm", c_double), ("limit_N_mm", c_double), ("late_ticks", c_int)]
+
+
+class _Worst(ctypes.Structure):
+    _fields_ = [
+        ("lean_N", c_double),
+        ("along_mm_s", c_double),
+        ("depth_mm", c_double),
+        ("swing_mm", c_double),
+        ("settle_s", c_double),
+    ]
+
+
+class StabilityStruct(ctypes.Structure):
+    """struct incise_plan_stability"""
+
+    _fields_ = [
+        ("device", DeviceStruct),
+        ("own_delay", c_bool),
+        ("stiffness_N_mm", c_double),
+        ("damping_N_s_mm", c_double),
+        ("limit_N_mm", c_double),
+        ("late_ticks", c_int),
+        ("n_axes", c_int),
+        ("axis", _Axis * AXES_MAX),
+        ("speed_slope_N_s_mm", c_double),
+        ("slope_N_mm", c_double),
+        ("unloading_N_mm", c_double),
+        ("support_mm", c_double),
+        ("beyond_N_mm", c_double),
+        ("runs", c_int),
+        ("worst", _Worst),
+        ("noise_mm", c_double),
+        ("noise_N", c_double),
+        ("certified", c_bool),
+    ]
+    c_name = "struct incise_plan_stability"
+
+
+_library.declare(
+    "libincise",
+    {
+        "incise_scene_load": (c_void_p, ctypes.c_char_p, ctypes.c_char_p, c_void_p),
+        "incise_scene_free": (None, c_void_p),
+        "incise_scene_rate_hz": (c_double, c_void_p),
+        "incise_scene_set_arithmetic": (c_int, c_void_p, ctypes.c_char_p, c_void_p),
+        "incise_scene_set_full": (None, c_void_p, c_bool),
+        "incise_plan_new_fed": (c_void_p, c_void_p, ctypes.POINTER(TrackerStruct), c_void_p),
+        "incise_plan_free": (None, c_void_p),
+        "incise_plan_stage": (ctypes.c_char_p, c_void_p, c_int),
+        "incise_plan_left_out": (
+            ctypes.c_char_p,
+            c_void_p,
+            c_int,
+            ctypes.POINTER(ctypes.c_char_p),
+        ),
+        "incise_plan_memory": (ctypes.c_size_t, c_void_p),
+        "incise_plan_bound": (c_double, c_void_p, c_double),
+        "incise_plan_stability": (None, c_void_p, ctypes.POINTER(StabilityStruct)),
+        "incise_plan_set_tool": (c_int, c_void_p, c_int),
+        "incise_plan_set_tip": (c_int, c_void_p, ctypes.POINTER(c_double)),
+        "incise_plan_feed": (c_int, c_void_p, ctypes.POINTER(SampleStruct), c_int),
+        "incise_plan_tick": (c_int, c_void_p, c_int64, ctypes.POINTER(TickStruct)),
+        "incise_plan_cause": (c_int, c_void_p, ctypes.c_char_p, ctypes.c_size_t),
+        "incise_plan_run": (
+            c_int64,
+            c_void_p,
+            c_void_p,
+            ctypes.c_size_t,
+            c_int64,
+            c_int64,
+            c_void_p,
+            ctypes.c_size_t,
+        ),
+    },
+)
+
+Vector = Tuple[float, float, float]
+
+
+class Tick(NamedTuple):
+    """The result of one tick."""
+
+    t_ns: int
+    position_mm: Vector  #: of the tip, predicted
+    quaternion: Tuple[float, float, float, float]  #: of the scalpel, w first
+    tool_mm: Vector  #: end of what the hand holds
+    proxy_mm: Vector  #: its point on the surface, in contact
+    normal: Vector  #: along which the tissue pushes, in contact
+    depth_mm: float
+    velocity_mm_s: float
+    command_N: Vector  #: force, in the tracker's frame
+    flags: int  #: bits of incise.plan.FLAGS
+    phase: str
+    tool: str
+
+
+class Stability(NamedTuple):
+    """What the plan's device can hold; see incise-plan(1)."""
+
+    stiffness_N_mm: float  #: largest of the scene
+    damping_N_s_mm: float
+    limit_N_mm: float  #: stiffness that the device holds
+    slope_N_mm: float  #: largest of the model's force by the depth
+    unloading_N_mm: float
+    support_mm: float  #: largest depth that the model knows
+    runs: int  #: closed loops that were tried
+    settle_s: float  #: of the one that took longest to rest
+    certified: bool  #: the model's slopes are bounds, not estimates
+
+
+def _scene_folders() -> List[str]:
+    folders = [".", "/etc/incise/scenes"]
+    here = os.path.dirname(os.path.abspath(__file__))
+    source = os.path.join(here, "..", "..")
+    if os.path.exists(os.path.join(source, "lib", "libincise.map")):
+        folders.append(os.path.normpath(os.path.join(source, "scenes")))
+    for prefix in ("/usr/local", "/usr"):
+        folders.append(os.path.join(prefix, "share", "incise", "scenes"))
+    try:
+        from . import _installed  # written by make install
+
+        folders.insert(2, os.path.join(_installed.DATADIR, "incise", "scenes"))
+    except ImportError:
+        pass
+    return folders
+
+
+def find_scene(scene: PathLike) -> str:
+    """The file of a scene: a path, or a name such as "neck" of a shipped one."""
+    name = os.fspath(scene)
+    if os.path.isfile(name):
+        return name
+    import glob
+
+    found: List[str] = []
+    for folder in _scene_folders():
+        path = os.path.join(folder, name + ".scene")
+        if "/" not in name and os.path.isfile(path):
+            return path
+        found += glob.glob(os.path.join(folder, "*.scene"))
+    names = sorted({os.path.basename(path)[: -len(".scene")] for path in found})
+    raise NotFound(
+        errno.ENOENT,
+        f"{name}: no such scene; give the path of a file, or one of: {', '.join(names)}",
+    )
+
+
+def _fill_pose(sample: SampleStruct, t_ns: int, pose: Any) -> None:
+    """A pose is (position, quaternion), or a position alone: the scalpel upright."""
+    try:
+        if len(pose) == 2:
+            position, quaternion = pose
+        else:
+            position, quaternion = pose, (1.0, 0.0, 0.0, 0.0)
+        sample.t_ns = t_ns
+        sample.position_mm[:] = [float(x) for x in position]
+        sample.quaternion[:] = [float(x) for x in quaternion]
+    except (TypeError, ValueError) as failure:
+        raise Invalid(
+            errno.EINVAL,
+            f"a pose is (x, y, z) in mm, or that and a quaternion (w, x, y, z): {failure}",
+        ) from None
+    sample.status = b" "
+
+
+def _columns(poses: Any) -> Dict[str, Any]:
+    """The columns of poses: a table such as rec.tracker, or {column: values}."""
+    if hasattr(poses, "numpy"):
+        poses = poses.numpy()
+    elif hasattr(poses, "to_dict") and hasattr(poses, "columns"):
+        poses = {name: poses[name].to_numpy() for name in poses.columns}
+    if not hasattr(poses, "keys"):
+        raise Invalid(
+            errno.EINVAL,
+            "poses are a table such as rec.tracker, or {t_ns, x_mm, y_mm, z_mm[, qw, qx, qy, qz]}",
+        )
+    missing = [name for name in ("t_ns", "x_mm", "y_mm", "z_mm") if name not in poses]
+    if missing:
+        raise Invalid(errno.EINVAL, f"poses have no column {', '.join(missing)}")
+    return poses
+
+
+class Plan:
+    """A scene, compiled to its stages, and fed with poses.
+
+    scene: a .scene file, or the name of a shipped one. model: a .fis or .fx in place of the scene's.
+    tracker_hz, latency_ms: of the tracker that the poses are from; the prediction and the stability
+    depend on them. A scene that its device cannot hold is refused with the largest safe gain.
+    """
+
+    def __init__(
+        self,
+        scene: PathLike,
+        model: Optional[PathLike] = None,
+        *,
+        arithmetic: Optional[str] = None,
+        full: bool = False,
+        tool: str = "auto",
+        tip_mm: Sequence[float] = (0, 0, 0),
+        tracker_hz: float = 120,
+        latency_ms: float = 4.2,
+    ):
+        failure = Failure()
+        self.path = find_scene(scene)
+        self._scene = _library.Handle(
+            failure.require(
+                function("incise_scene_load")(
+                    _library.path_bytes(self.path),
+                    None if model is None else _library.path_bytes(model),
+                    failure.ref,
+                )
+            ),
+            "incise_scene_free",
+        )
+        if arithmetic is not None:
+            failure.check(
+                function("incise_scene_set_arithmetic")(
+                    self._scene, arithmetic.encode(), failure.ref
+                )
+            )
+        function("incise_scene_set_full")(self._scene, full)
+        self.rate_hz: float = function("incise_scene_rate_hz")(self._scene)
+        self._period_ns = round(1e9 / self.rate_hz)
+        tracker = TrackerStruct(
+            b"poses", tracker_hz, round(latency_ms * 1e6), 1, False, 0, 1, 0
+        )
+        self._plan = _library.Handle(
+            failure.require(
+                function("incise_plan_new_fed")(self._scene, ctypes.byref(tracker), failure.ref)
+            ),
+            "incise_plan_free",
+        )
+        self.set_tool(tool)
+        if function("incise_plan_set_tip")(self._plan, (c_double * 3)(*tip_mm)) < 0:
+            raise Invalid(errno.EINVAL, f"tip_mm={tuple(tip_mm)!r}: not within 1e6 mm")
+        self._tick = TickStruct()
+        self._sample = SampleStruct()
+
+    def __reduce__(self) -> Any:
+        raise TypeError("a Plan is at work and cannot be copied or pickled; make another one")
+
+    def __del__(self) -> None:
+        self.__dict__.pop("_plan", None)  # before its scene
+
+    def __repr__(self) -> str:
+        return f"<incise.Plan {self.path}: {' '.join(self.stages)}>"
+
+    @property
+    def stages(self) -> List[str]:
+        """The stages that the scene needs, in order."""
+        names = []
+        while (name := function("incise_plan_stage")(self._plan, len(names))) is not None:
+            names.append(text(name))
+        return names
+
+    @property
+    def left_out(self) -> Dict[str, str]:
+        """The stages that the scene does not need, {stage: reason}."""
+        found: Dict[str, str] = {}
+        why = ctypes.c_char_p()
+        left_out = function("incise_plan_left_out")
+        while (name := left_out(self._plan, len(found), ctypes.byref(why))) is not None:
+            found[text(name)] = text(why.value or b"")
+        return found
+
+    @property
+    def memory(self) -> int:
+        """Bytes that the plan holds."""
+        return function("incise_plan_memory")(self._plan)
+
+    @property
+    def stability(self) -> Stability:
+        """Stiffness of the plan, and what its device holds."""
+        s = StabilityStruct()
+        function("incise_plan_stability")(self._plan, ctypes.byref(s))
+        return Stability(
+            s.stiffness_N_mm,
+            s.damping_N_s_mm,
+            s.limit_N_mm,
+            s.slope_N_mm,
+            s.unloading_N_mm,
+            s.support_mm,
+            s.runs,
+            s.worst.settle_s,
+            s.certified,
+        )
+
+    def set_tool(self, tool: str) -> None:
+        """Say what the hand holds: auto, blade, handle or tube. It changes out of the tissue."""
+        if tool not in TOOLS:
+            raise Invalid(errno.EINVAL, f"tool={tool!r}: one of {', '.join(TOOLS)}")
+        function("incise_plan_set_tool")(self._plan, TOOLS.index(tool))
+
+    def _fail(self, rc: int) -> None:
+        cause = ctypes.create_string_buffer(500)
+        function("incise_plan_cause")(self._plan, cause, len(cause))
+        raise _library.make_error(-rc, text(cause.value) or os.strerror(-rc))
+
+    def step(self, t: float, pose: Any) -> Tick:
+        """Feed a pose, (x, y, z) in mm or that and a quaternion, and run the tick at t seconds.
+
+        t grows from call to call. pose may be None: none has come.
+        """
+        t_ns = round(t * 1e9)
+        if pose is not None:
+            _fill_pose(self._sample, t_ns, pose)
+            function("incise_plan_feed")(self._plan, ctypes.byref(self._sample), 1)
+        tick = self._tick
+        rc = function("incise_plan_tick")(self._plan, t_ns, ctypes.byref(tick))
+        if rc < 0:
+            self._fail(rc)
+        return Tick(
+            tick.t_ns,
+            tuple(tick.position_mm),
+            tuple(tick.quaternion),
+            tuple(tick.tool_mm),
+            tuple(tick.proxy_mm),
+            tuple(tick.normal),
+            tick.depth_mm,
+            tick.velocity_mm_s,
+            tuple(tick.command_N),
+            tick.flags,
+            PHASES[tick.phase],
+            TOOLS[tick.tool],
+        )
+
+    def run(self, poses: Any, arrival: Optional[str] = None) -> Dict[str, Any]:
+        """Run the whole stroke in one C call; needs numpy.
+
+        poses: a table such as ``rec.tracker``, a DataFrame, or {t_ns, x_mm, y_mm, z_mm[, qw, qx, qy,
+        qz, station]}; ``arrival`` names the column of the times of arrival (default: arrival_ns if
+        there, else t_ns). Ticks follow each other
+        at rate_hz from the first pose to the last. Returns {column: array}: t_ns, position_mm,
+        depth_mm, velocity_mm_s, command_N, flags, phase, tool, …, a row for each tick.
+        """
+        import numpy
+
+        columns = _columns(poses)
+        kind = numpy.dtype(SampleStruct)
+        if arrival is None:
+            arrival = "arrival_ns" if "arrival_ns" in columns else "t_ns"
+        if arrival not in columns:
+            raise Invalid(errno.EINVAL, f"poses have no column {arrival}")
+        t_ns = numpy.asarray(columns[arrival])
+        samples = numpy.zeros(len(t_ns), dtype=kind)
+        try:
+            samples["t_ns"] = t_ns
+            for i, name in enumerate(("x_mm", "y_mm", "z_mm")):
+                samples["position_mm"][:, i] = columns[name]
+            samples["quaternion"][:, 0] = 1
+            if "qw" in columns:
+                for i, name in enumerate(("qw", "qx", "qy", "qz")):
+                    samples["quaternion"][:, i] = columns[name]
+            samples["station"] = columns["station"] if "station" in columns else 0
+            status = columns["status"] if "status" in columns else b" "
+            samples["status"] = numpy.asarray(status, dtype="S1")
+        except (TypeError, ValueError) as failure:
+            raise Invalid(errno.EINVAL, f"poses: {failure}") from None
+        if not len(samples):
+            raise Invalid(errno.EINVAL, "poses: there are none")
+        start = int(samples["t_ns"][0])
+        n = (int(samples["t_ns"][-1]) - start) // self._period_ns + 1
+        if not 0 < n < 1 << 28:
+            raise Invalid(errno.EINVAL, f"poses: {n} ticks from the first to the last; sort them")
+        ticks = numpy.zeros(n, dtype=numpy.dtype(TickStruct))
+        done = function("incise_plan_run")(
+            self._plan,
+            samples.ctypes.data,
+            len(samples),
+            start,
+            self._period_ns,
+            ticks.ctypes.data,
+            n,
+        )
+        if done < 0:
+            raise Invalid(errno.EINVAL, f"poses: {arrival} has to rise from row to row")
+        return {name: ticks[name] for name in ticks.dtype.names}

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The model as an estimator of scikit-learn, for its pipelines, cross-validation and searches."""
+
+from __future__ import annotations
+
+from typing import Any, Optional, Sequence, Union
+
+try:
+    import numpy
+    from sklearn.base import BaseEstimator, RegressorMixin
+    from sklearn.utils.validation import check_is_fitted
+except ImportError as failure:  # pragma: no cover - depends on what is installed
+    import errno
+
+    from ._library import NotFound
+
+    raise NotFound(
+        errno.ENOENT,
+        f"ForceRegressor needs scikit-learn ({failure}); install python3-sklearn, or pip install "
+        "scikit-learn",
+    ) from None
+
+from .model import INPUTS_MAX, train
+
+try:  # scikit-learn 1.6 and later
+    from sklearn.utils.validation import validate_data as _validate
+except ImportError:
+
+    def _validate(estimator: Any, *args: Any, **options: Any) -> Any:
+        options.pop("skip_check_array", None)
+        return estimator._validate_data(*args, **options)
+
+
+class ForceRegressor(RegressorMixin, BaseEstimator):
+    """A Takagi-Sugeno model of up to eight inputs, learnt as :func:`incise.train` learns it.
+
+    Parameters
+    ----------
+    mf : "auto": membership functions by cross-validation, or their count for each input
+    mf_type : "gaussmf" or "gbellmf"
+    epochs, ridge, starts, seed : as of :func:`incise.train`
+
+    Attributes
+    ----------
+    model_ : the :class:`incise.Model`
+    n_features_in_ : number of inputs
+    """
+
+    def __init__(
+        self,
+        mf: Union[str, Sequence[int]] = "auto",
+        mf_type: str = "gaussmf",
+        epochs: int = 80,
+        ridge: Optional[float] = None,
+        starts: int = 3,
+        seed: int = 1,
+    ):
+        self.mf = mf
+        self.mf_type = mf_type
+        self.epochs = epochs
+        self.ridge = ridge
+        self.starts = starts
+        self.seed = seed
+
+    def fit(self, X: Any, y: Any, groups: Any = None) -> "ForceRegressor":
+        """Learn; groups: the cut of each row, which cross-validation keeps together."""
+        X, y = _validate(
+            self, X, y, dtype=numpy.float64, y_numeric=True, ensure_min_samples=2
+        )
+        if X.shape[1] > INPUTS_MAX:
+            raise ValueError(
+                f"X has {X.shape[1]} features; a model has at most {INPUTS_MAX} inputs"
+            )
+        names = [f"x{i}" for i in range(X.shape[1])]
+        columns = {name: X[:, i] for i, name in enumerate(names)}
+        columns["y"] = numpy.asarray(y, dtype=numpy.float64)
+        if groups is not None:
+            columns["group"] = numpy.asarray(groups)
+        self.model_ = train(
+            columns,
+            inputs=names,
+            target="y",
+            group=None if groups is None else "group",
+            seed=self.seed,
+            mf=self.mf,
+            mf_type=self.mf_type,
+            epochs=self.epochs,
+            ridge=self.ridge,
+            starts=self.starts,
+        )
+        return self
+
+    def predict(self, X: Any, return_std: bool = False) -> Any:
+        """Outputs; with return_std=True (outputs, standard deviations)."""
+        check_is_fitted(self, "model_")
+        X = _validate(self, X, dtype=numpy.float64, reset=False)
+        return self.model_(X, sd=return_std)
