@@ -514,207 +514,21 @@ static void remove_folder(void)
 	folder_remove(folder);
 }
 
-#define MARGIN_MM 10.0
-#define SHAPE 0.75 /* height of a path's plot, of its width */
-#define CIRCLE 72  /* corners of the membrane's */
-
-static const char *const colours[] = {"grey", "blue", "green", "purple"};
-
-struct range {
-	double low[2], high[2];
-};
-
-static void widen(struct range *range, const double at_mm[3])
-{
-	for (int i = 0; i < 2; i++) {
-		range->low[i] = fmin(range->low[i], at_mm[i] - MARGIN_MM);
-		range->high[i] = fmax(range->high[i], at_mm[i] + MARGIN_MM);
-	}
-}
-
-/* Lengths are the same on both axes: show more where the plot has place for it. */
-static void fill_plot(struct range *range)
-{
-	double size[2] = {range->high[0] - range->low[0], range->high[1] - range->low[1]};
-	int i = size[1] < SHAPE * size[0];
-	double more = i ? SHAPE * size[0] - size[1] : size[1] / SHAPE - size[0];
-
-	range->low[i] -= more / 2;
-	range->high[i] += more / 2;
-}
-
-/* Of all that is shown but the way through the air. */
-static struct range range_of(const struct session *s)
-{
-	struct range range = {{NAN, NAN}, {NAN, NAN}};
-
-	for (int i = 0; i < s->n_trace; i++)
-		if (s->trace[i].tool != INCISE_TOOL_AUTO)
-			widen(&range, s->trace[i].tool_mm);
-	for (int i = 0; i < s->n_cuts; i++) {
-		widen(&range, s->cut[i].from_mm);
-		widen(&range, s->cut[i].to_mm);
-	}
-	if (s->has_membrane)
-		widen(&range, s->membrane.point_mm);
-	if (isnan(range.low[0]))
-		widen(&range, s->trace[0].tool_mm);
-	fill_plot(&range);
-	return range;
-}
-
-/* Data of gnuplot: the path of one tool, with gaps where another one is in the tissue. */
-static int put_path(FILE *script, const char *name, const struct session *s,
-		    enum incise_tool tool)
-{
-	int n = 0;
-
-	fprintf(script, "$%s << END\n", name);
-	for (int i = 0; i < s->n_trace; i++) {
-		const struct session_sample *sample = &s->trace[i];
-
-		if (sample->tool == tool)
-			fprintf(script, "%.4f %.4f\n", sample->tool_mm[0],
-				sample->tool_mm[1]);
-		else if (i && s->trace[i - 1].tool == tool)
-			fputc('\n', script);
-		n += sample->tool == tool;
-	}
-	fputs("END\n", script);
-	return n;
-}
-
-static int put_cuts(FILE *script, const char *name, const struct session *s)
-{
-	fprintf(script, "$%s << END\n", name);
-	for (int i = 0; i < s->n_cuts; i++)
-		fprintf(script, "%.4f %.4f\n%.4f %.4f\n\n", s->cut[i].from_mm[0],
-			s->cut[i].from_mm[1], s->cut[i].to_mm[0], s->cut[i].to_mm[1]);
-	fputs("END\n", script);
-	return s->n_cuts;
-}
-
-/* As seen from above, wherever its normal leads. */
-static void put_membrane(FILE *script, const struct incise_scene_membrane *membrane)
-{
-	const double *n = membrane->normal;
-	/* Two directions across the normal: the first one across z, or x where that is it. */
-	double across = hypot(n[0], n[1]);
-	double u[2] = {1, 0}, v[2] = {0, n[2]};
-
-	if (across > 1e-6) {
-		u[0] = -n[1] / across;
-		u[1] = n[0] / across;
-		v[0] = -n[2] * n[0] / across;
-		v[1] = -n[2] * n[1] / across;
-	}
-	fputs("$membrane << END\n", script);
-	for (int i = 0; i <= CIRCLE; i++) {
-		double a = 2 * M_PI * i / CIRCLE, c = membrane->radius_mm * cos(a),
-		       d = membrane->radius_mm * sin(a);
-
-		fprintf(script, "%.4f %.4f\n",
-			membrane->point_mm[0] + c * u[0] + d * v[0],
-			membrane->point_mm[1] + c * u[1] + d * v[1]);
-	}
-	fputs("END\n", script);
-}
-
-static FILE *begin_path(const struct session *s, const char *name)
-{
-	struct range range = range_of(s);
-	FILE *script = plot_begin(folder, name, 900, 560);
-
-	fprintf(script,
-		"set size ratio -1\nset xlabel 'x, mm'\nset ylabel 'y, mm'\n"
-		"set xrange [%.4f:%.4f]\nset yrange [%.4f:%.4f]\n"
-		"set key outside right top\n",
-		range.low[0], range.high[0], range.low[1], range.high[1]);
-	return script;
-}
-
 static void draw_path(const struct session *s, const struct session *reference,
 		      const char *name)
 {
-	FILE *script = begin_path(s, name);
-	int there[4], cuts = put_cuts(script, "cuts", s);
-	int expert = reference ? put_cuts(script, "expert", reference) : 0;
+	FILE *script = plot_begin(folder, name, 900, 560);
 
-	for (int tool = 0; tool <= INCISE_TOOL_TUBE; tool++)
-		there[tool] = put_path(script, loop_tool_names[tool], s,
-				       (enum incise_tool)tool);
-	if (s->has_membrane)
-		put_membrane(script, &s->membrane);
-	/* A plot of nothing is an error of gnuplot. */
-	fputs("plot NaN notitle", script);
-	if (cuts)
-		fputs(", $cuts with lines lw 6 lc rgb orange title 'cut'", script);
-	for (int tool = 0; tool <= INCISE_TOOL_TUBE; tool++)
-		if (there[tool])
-			fprintf(script, ", $%s with lines lw %s lc rgb %s title '%s'",
-				loop_tool_names[tool], tool ? "2" : "0.7", colours[tool],
-				tool ? loop_tool_names[tool] : "in the air");
-	if (expert)
-		fputs(", $expert with lines lw 2 dt 2 lc rgb ink title 'cut, "
-		      "reference'",
-		      script);
-	if (s->has_membrane)
-		fputs(", $membrane with lines lw 2 lc rgb orange title 'membrane'",
-		      script);
+	session_figure_path(script, s, reference);
 	plot_draw_or_fail(script, folder, name);
 }
 
-static void put_force(FILE *script, const char *name, const struct session *s,
-		      double later_s)
-{
-	fprintf(script, "$%s << END\n", name);
-	for (int i = 0; i < s->n_trace; i++)
-		fprintf(script, "%.4f %.4f\n", s->trace[i].t_s + later_s,
-			s->trace[i].force_N);
-	fputs("END\n", script);
-}
-
-static void put_phases(FILE *script, const struct session *s)
-{
-	for (int i = 0; i < s->n_phases; i++)
-		fprintf(script,
-			"set object %d rectangle from %.4f, graph 0 to %.4f, graph 1 "
-			"fc rgb %s fs solid 0.15 noborder behind\n",
-			i + 1, s->phase[i].from_s, s->phase[i].to_s,
-			colours[s->phase[i].tool]);
-}
-
-/* Of the reference from its first contact on, as of this session. */
 static void draw_force(const struct session *s, const struct session *reference,
 		       const char *name)
 {
-	const struct incise_scene_criterion *asked = &s->criteria[INCISE_CRITERION_FORCE];
 	FILE *script = plot_begin(folder, name, 900, 420);
-	double later_s = reference ? s->first_s - reference->first_s : NAN;
-	double most_N = fmax(s->force.largest_N, asked->asked ? asked->max : 0);
 
-	if (reference)
-		most_N = fmax(most_N, reference->force.largest_N);
-	fprintf(script,
-		"set xlabel 'time, s'\nset ylabel 'force, N'\nset yrange [0:%.4f]\n"
-		"set xrange [0:%.4f]\nset key outside right top\n",
-		fmax(1.1 * most_N, 0.1), fmax(s->duration_s, 0.001));
-	put_phases(script, s);
-	put_force(script, "force", s, 0);
-	if (!isnan(later_s))
-		put_force(script, "expert", reference, later_s);
-	fputs("plot $force with lines ls 2 title 'force'", script);
-	if (!isnan(later_s))
-		fputs(", $expert with lines lw 1 dt 2 lc rgb ink title 'reference'",
-		      script);
-	if (asked->asked)
-		fprintf(script,
-			", %.4f with lines lw 2 dt 3 lc rgb vermillion title 'at most'",
-			asked->max);
-	for (int tool = 1; tool <= INCISE_TOOL_TUBE; tool++)
-		fprintf(script,
-			", NaN with boxes fs solid 0.15 noborder lc rgb %s title '%s'",
-			colours[tool], loop_tool_names[tool]);
+	session_figure_force(script, s, reference);
 	plot_draw_or_fail(script, folder, name);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise plot FILE: draws a file of incise, whose kind is recognized by its content, into a PNG or
+ * incise plot FILE: draws a file of incise, whose kind is recognised by its content, into a PNG or
  * SVG file or a window.
  */
 #include <errno.h>
@@ -41,9 +41,6 @@ static void parse_range(void *whole, char *text)
 	job->range = true;
 }
 
-/* Kinds of files, in the help and in errors. */
-#define FILES "a recording (.rec), a model (.fis, .fx) or a dataset (.csv)"
-
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
 	 "the file to write: NAME.png or NAME.svg (default: a window)",
@@ -60,8 +57,9 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "plot",
 	.synopsis = "FILE [-o NAME.png|NAME.svg] [OPTIONS]",
-	.summary = "Draw " FILES ".\n"
-		   "The kind of the file is recognized by its content.",
+	.summary =
+		"Draw a recording, a dataset, a model (.fis, .fx), a session or a calibration.\n"
+		"The kind of the file is recognised by its content.",
 	.options = options,
 	.notes = "Example:\n  incise plot liver.fis --data pairs.csv -o liver.png\n\n"
 		 "Exit: 0 drawn, 1 failed, 2 bad usage. See incise-plot(1).",
@@ -73,10 +71,9 @@ static const struct drawn {
 	enum file_kind kind;
 	FILE *(*draw)(const struct figure *figure);
 } drawn[] = {
-	{FILE_RECORDING, figure_of_recording},
-	{FILE_MODEL, figure_of_model},
-	{FILE_COMPILED, figure_of_compiled},
-	{FILE_TABLE, figure_of_dataset},
+	{FILE_RECORDING, figure_of_recording}, {FILE_MODEL, figure_of_model},
+	{FILE_COMPILED, figure_of_compiled},   {FILE_TABLE, figure_of_dataset},
+	{FILE_SESSION, figure_of_session},     {FILE_CALIBRATION, figure_of_calibration},
 };
 
 #define DRAWN (sizeof(drawn) / sizeof(*drawn))
@@ -98,8 +95,10 @@ static const struct drawn *find_drawn(const char *path)
 	if (kind == FILE_UNKNOWN &&
 	    file_kind_of(cli_text("%s.part", path)) == FILE_RECORDING)
 		return &drawn[0];
-	cli_fail("%s: %s; give " FILES, path,
-		 stat(path, &st) ? strerror(errno) : "is of no kind that is known");
+	cli_fail(
+		"%s: %s; give a recording (.rec), a dataset (.csv), a model (.fis, .fx), a "
+		"session or a calibration.conf",
+		path, stat(path, &st) ? strerror(errno) : "is of no kind that is known");
 }
 
 /* --- the figure as a file or a window ---------------------------------------------------- */
@@ -140,7 +139,9 @@ static const char *window_form(void)
 static void parse(struct job *job, int argc, char **argv)
 {
 	cli_parse(&command, argc, argv, job);
-	job->figure.path = cli_operand(argc, argv, "FILE", "model or dataset to draw");
+	job->figure.path =
+		cli_operand(argc, argv, "FILE",
+			    "recording, dataset, model, session or calibration to draw");
 }
 
 int main(int argc, char **argv)

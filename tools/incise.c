@@ -31,7 +31,7 @@ static const struct {
 	{"compile", "convert a model or a scene to fixed point with a certified error"},
 	{"eval", "print the force of a model at given depth and velocity"},
 	{"info", "describe a recording, model, plan or stepper module"},
-	{"plot", "draw a recording, a model or a dataset"},
+	{"plot", "draw a recording, dataset, model, session or calibration"},
 	{"plan", "show the stages that a scene runs, and why it leaves out others"},
 	{"haptic", "run the real-time loop of a scene"},
 	{"feed", "load a scene into the kernel and send it the poses"},

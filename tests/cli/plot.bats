@@ -297,3 +297,53 @@ keep_data() {
 	run --separate-stderr incise plot a.rec.part -o a.rec.part/b.png
 	failed_with "a.rec.part/b.png: is inside an input"
 }
+
+@test "a session: the path, depth and force, and the tools that were in the tissue" {
+	incise haptic neck --procedure --state none --session a.session >/dev/null
+	incise assess a.session --json >a.json
+	draws a.session
+	shows "x / mm" "y / mm" "depth / mm" "force / N" "time / s" cut membrane blade handle tube \
+		"at most" "in the air"
+	grep -q "^a.session, neck.scene, 22.0 s, $(key a.json 'sessions[0].met') of $(
+		key a.json 'sessions[0].judged') criteria met$" texts
+	incise haptic liver --rig sim:clock=simulated --duration 4s --state none \
+		--session b.session >/dev/null
+	draws b.session
+	shows "force / N" blade
+	! grep -qxE 'handle|tube|membrane' texts
+	sed 's/"incise_session": *1/"incise_session": 2/' a.session >broken.session
+	! cmp -s a.session broken.session
+	run --separate-stderr incise plot broken.session -o b.png
+	failed_with broken.session
+}
+
+# An entry of a history: kind, date, key, unit, value, u, pass.
+entry() {
+	printf '{ kind = "%s"; date = "%sT00:00:00Z"; pass = %s;
+		values = ( { key = "%s"; found = 1.0; left = %s; u = %s; unit = "%s"; } ); }' \
+		"$1" "$2" "$7" "$3" "$5" "$6" "$4"
+}
+
+@test "a calibration: each coefficient of its history, with its uncertainty" {
+	cat >c.conf <<-END
+		force_mV_N = 1238.5;
+		history = ( $(entry force 2026-01-05 force_mV_N mV/N 1236.0 1.5 true),
+			$(entry force 2026-04-05 force_mV_N mV/N 1300.0 9.0 false),
+			$(entry depth 2026-04-06 depth_mm_px mm/px 0.119 0.0001 true),
+			$(entry force 2026-07-05 force_mV_N mV/N 1238.5 1.5 true) );
+	END
+	draws c.conf
+	shows "c.conf: 4 calibrations" "force_mV_N / (mV/N)" "depth_mm_px / (mm/px)" before \
+		"in force" "value and U (k = 2)" "not passed" 2026-04-06
+	[ "$(grep -cx "not passed" texts)" = 1 ]
+	keep_data c.conf
+	# UNIX time, value, U = 2 u, passed
+	diff - kept/series-0.dat <<-END
+		$(date -ud 2026-01-05 +%s) 1236 3 1
+		$(date -ud 2026-04-05 +%s) 1300 18 0
+		$(date -ud 2026-07-05 +%s) 1238.5 3 1
+	END
+	echo "force_mV_N = 1238.5;" >c.conf
+	run --separate-stderr incise plot c.conf -o c.png
+	failed_with "c.conf: has no history to draw; 'incise calibrate' adds to it"
+}

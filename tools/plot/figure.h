@@ -25,6 +25,8 @@ struct figure {
 FILE *figure_of_model(const struct figure *figure);
 FILE *figure_of_compiled(const struct figure *figure);
 FILE *figure_of_recording(const struct figure *figure);
+FILE *figure_of_session(const struct figure *figure);
+FILE *figure_of_calibration(const struct figure *figure);
 FILE *figure_of_dataset(const struct figure *figure);
 
 /*

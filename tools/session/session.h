@@ -185,4 +185,17 @@ double session_criterion_difference(int criterion, double value, double referenc
 /* "29.6", "yes", "-" where there is none. */
 void session_criterion_value(int criterion, double value, char *text, size_t size);
 
+/* --- figures --- */
+
+/*
+ * Commands for a script of cli/plot.h: the tool's path from above with the cuts, and the force and
+ * the depth over time with the phases. The session has samples, @reference may be NULL.
+ */
+void session_figure_path(FILE *script, const struct session *session,
+			 const struct session *reference);
+void session_figure_force(FILE *script, const struct session *session,
+			  const struct session *reference);
+void session_figure_depth(FILE *script, const struct session *session,
+			  const struct session *reference);
+
 #endif

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The figure of a calibration: each coefficient of its history over the date, with U (k = 2), a
+ * panel each; and its value before it was calibrated first. See figure.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <incise/calibration.h>
+#include "../cli/cli.h"
+#include "../cli/plot.h"
+#include "figure.h"
+
+#define TITLE_HEIGHT 50
+#define PANEL_HEIGHT 260
+#define COLUMNS 2
+#define DAY_S 86400.0
+
+/* A coefficient of a kind of calibration. */
+struct series {
+	const char *kind, *key, *unit;
+	int n, passed, failed;
+	double first_s, last_s; /* UNIX time */
+	double before;		/* in force before the first one, NAN: nothing */
+	double in_force;
+};
+
+struct history {
+	struct incise_calibration_record *record; /* n, oldest first */
+	int n;
+	struct series *series;
+	int n_series;
+};
+
+/* "2026-11-21T14:48:16Z" as UNIX time; NAN: it is another text. */
+static double date_s(const char *text)
+{
+	struct tm tm = {0};
+	const char *end = strptime(text, "%Y-%m-%dT%H:%M:%SZ", &tm);
+
+	return end && !*end ? (double)timegm(&tm) : NAN;
+}
+
+static struct series *find_series(struct history *history, const char *kind,
+				  const struct incise_calibration_value *value)
+{
+	struct series *series;
+
+	for (int i = 0; i < history->n_series; i++) {
+		series = &history->series[i];
+		if (!strcmp(series->kind, kind) && !strcmp(series->key, value->key))
+			return series;
+	}
+	history->series = cli_resize(history->series, (size_t)history->n_series + 1,
+				     sizeof(*history->series));
+	series = &history->series[history->n_series++];
+	*series = (struct series){
+		.kind = kind,
+		.key = value->key,
+		.unit = value->unit,
+		.before = value->found,
+	};
+	return series;
+}
+
+static struct history read_history(const char *path)
+{
+	struct incise_calibration in_force;
+	struct history history = {0};
+	struct incise_error err = {0};
+
+	history.n = incise_calibration_history(path, &history.record, &err);
+	if (history.n < 0 || incise_calibration_load(path, &in_force, &err))
+		cli_fail_with(&err);
+	for (int i = 0; i < history.n; i++) {
+		const struct incise_calibration_record *record = &history.record[i];
+		double t_s = date_s(record->date);
+
+		for (int k = 0; k < record->n && !isnan(t_s); k++) {
+			struct series *series =
+				find_series(&history, record->kind, &record->values[k]);
+
+			series->first_s = series->n ? fmin(series->first_s, t_s) : t_s;
+			series->last_s = series->n ? fmax(series->last_s, t_s) : t_s;
+			series->n++;
+			record->pass ? series->passed++ : series->failed++;
+		}
+	}
+	for (int i = 0; i < history.n_series; i++)
+		history.series[i].in_force =
+			incise_calibration_get(&in_force, history.series[i].key);
+	if (!history.n_series)
+		cli_fail("%s: has no history to draw; 'incise calibrate' adds to it",
+			 path);
+	return history;
+}
+
+/* Rows "UNIX time, value, U, 1 where it passed". */
+static void write_series(const struct history *history, const struct series *series,
+			 const char *folder, const char *name)
+{
+	FILE *data = plot_data(folder, name);
+
+	for (int i = 0; i < history->n; i++) {
+		const struct incise_calibration_record *record = &history->record[i];
+		double t_s = date_s(record->date);
+
+		for (int k = 0; k < record->n && !isnan(t_s); k++) {
+			const struct incise_calibration_value *value = &record->values[k];
+
+			if (!strcmp(record->kind, series->kind) &&
+			    !strcmp(value->key, series->key))
+				fprintf(data, "%.0f %.9g %.4g %d\n", t_s, value->left,
+					2 * value->u, record->pass);
+		}
+	}
+	plot_data_end(data, folder);
+}
+
+static void put_panel(FILE *script, const struct series *series, const char *name)
+{
+	/* A day at least, and a margin, so that one calibration has an axis too. */
+	double margin_s = fmax(0.06 * (series->last_s - series->first_s), DAY_S);
+	bool quotient = strchr(series->unit, '/');
+	char *label = cli_text(quotient ? "%s / (%s)" : "%s / %s", series->key,
+			       *series->unit ? series->unit : "1");
+
+	fputs("set ylabel ", script);
+	plot_put_text(script, label);
+	fprintf(script, "\nset xrange [%.0f:%.0f]\nset xtics %.0f\nplot ",
+		series->first_s - margin_s, series->last_s + margin_s,
+		DAY_S * fmax(1, ceil((series->last_s - series->first_s + 2 * margin_s) /
+				     DAY_S / 4)));
+	if (!isnan(series->before))
+		fprintf(script, "%.9g with lines lc rgb grey dt 2 title 'before', \\\n  ",
+			series->before);
+	if (!isnan(series->in_force))
+		fprintf(script, "%.9g with lines lt 3 title 'in force', \\\n  ",
+			series->in_force);
+	if (series->passed)
+		fprintf(script,
+			"'%s' using 1:($4>0?$2:NaN):3 with yerrorbars lt 1 title 'value and U (k = 2)', "
+			"\\\n  '' using 1:($4>0?$2:NaN) with lines lt 1 lw 0.8 dt 3, \\\n  ",
+			name);
+	if (series->failed)
+		fprintf(script,
+			"'%s' using 1:($4>0?NaN:$2):3 with yerrorbars lt 2 pt 2 title 'not passed', "
+			"\\\n  ",
+			name);
+	fputs("NaN\n", script);
+	free(label);
+}
+
+FILE *figure_of_calibration(const struct figure *figure)
+{
+	struct history history = read_history(figure->path);
+	int rows = (history.n_series + COLUMNS - 1) / COLUMNS;
+	int height = TITLE_HEIGHT + rows * PANEL_HEIGHT;
+	FILE *script = plot_begin(figure->folder, FIGURE_NAME, FIGURE_WIDTH, height);
+	double share = (double)PANEL_HEIGHT / height;
+
+	fputs("set multiplot title ", script);
+	plot_put_text(script, figure->path);
+	fprintf(script,
+		".': %d calibrations' noenhanced\nset xdata time\nset timefmt '%%s'\n"
+		"set format x '%%Y-%%m-%%d'\nset key outside top center horizontal\nset offsets 0, 0, graph 0.1, graph "
+		"0.1\nset size %g,%g\n",
+		history.n, 1.0 / COLUMNS, share);
+	for (int i = 0; i < history.n_series; i++) {
+		char *name = cli_text("series-%d.dat", i);
+
+		write_series(&history, &history.series[i], figure->folder, name);
+		fprintf(script, "set origin %g,%g\n", (double)(i % COLUMNS) / COLUMNS,
+			1 - (double)TITLE_HEIGHT / height - (i / COLUMNS + 1) * share);
+		put_panel(script, &history.series[i], name);
+		free(name);
+	}
+	fputs("unset multiplot\n", script);
+	free(history.series), free(history.record);
+	return script;
+}
