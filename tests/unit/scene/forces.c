@@ -578,9 +578,10 @@ static void test_manual_has_each_force(void **state)
 		const struct incise_tissue_force *force = &incise_tissue_forces[i];
 
 		for (int k = 0; k < INCISE_FORCE_NUMBERS && force->number[k].key; k++) {
-			snprintf(item, sizeof(item), ".It Ic %s\n", force->number[k].key);
+			/* a row of a table: the key, then its unit */
+			snprintf(item, sizeof(item), "\n%s\t", force->number[k].key);
 			if (!strstr(scene, item))
-				fail_msg("incise-scene(5) has no %s", item);
+				fail_msg("incise-scene(5) has no %s", item + 1);
 		}
 		snprintf(item, sizeof(item), " %s ", force->name);
 		if (!strstr(strstr(scene, ".Sh FORCES"), item))
