@@ -112,7 +112,8 @@ static const struct cli_command command = {
 
 static void parse(struct view_job *job, int argc, char **argv)
 {
-	*job = (struct view_job){.output = {.width = 1280, .height = 720, .fps = 60}};
+	*job = (struct view_job){.output = {.width = 1280, .height = 720, .fps = 60},
+				 .percent = -1};
 	cli_parse(&command, argc, argv, job);
 	scene_argument_operand(&job->argument, argc, argv, optind);
 	session_options_check(&job->session);
@@ -134,12 +135,16 @@ static void parse(struct view_job *job, int argc, char **argv)
 
 static void report(const struct view_job *job)
 {
+	json_t *files = json_array();
 	struct incise_view_report did;
 	double seconds = (double)(job->end_ns - job->begin_ns) / INCISE_NS_PER_S;
 
 	incise_view_report(job->view, &did);
+	view_output_json(&job->output, files);
+	if (job->session.path)
+		json_array_append_new(files, json_text(job->session.path));
 	json_print(json_pack(
-		"{sI so sI sf sI sf sf sf sf si sI ss}", "frames",
+		"{sI so sI sf sI sf sf sf sf si sI ss so}", "frames",
 		(json_int_t)job->frames, "frames_per_s",
 		json_number(job->frames > 1 ? (double)(job->frames - 1) / seconds : NAN),
 		"ticks_lost", (json_int_t)job->lost, "cut_mm", did.cut_mm, "stamps",
@@ -147,7 +152,7 @@ static void report(const struct view_job *job)
 		"blood_in_drops_ul", did.blood_ul_drops, "blood_in_trails_ul",
 		did.blood_ul_trails, "blood_off_ul", did.blood_ul_off, "drops", did.drops,
 		"texels_uploaded", (json_int_t)did.uploaded_texels, "renderer",
-		did.renderer ? did.renderer : ""));
+		did.renderer ? did.renderer : "", "files", files));
 }
 
 static void print_rate(const struct view_job *job)
@@ -159,6 +164,13 @@ static void print_rate(const struct view_job *job)
 	printf("%.1f frames per second: %llu in %.1f s, %dx%d, %d texels, %s\n",
 	       (double)report.frames / s, (unsigned long long)report.frames, s,
 	       job->output.width, job->output.height, report.texture_px, report.renderer);
+}
+
+static void print_files(const struct view_job *job)
+{
+	view_output_print(&job->output);
+	if (job->session.path)
+		printf("wrote %s\n", job->session.path);
 }
 
 static void begin_session(struct view_job *job)
@@ -214,6 +226,8 @@ int main(int argc, char **argv)
 		report(&job);
 	else if (job.no_output)
 		print_rate(&job);
+	if (!job.json)
+		print_files(&job);
 	incise_view_free(job.view);
 	incise_plan_free(job.plan);
 	incise_rig_close(job.own_rig);

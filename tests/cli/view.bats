@@ -75,6 +75,48 @@ teardown() {
 	[[ "$stderr" == *"ends before its picture 2, at 9 s"* ]]
 }
 
+@test "a strip alone draws no frame but its own, and they are those of a film" {
+	incise view neck --procedure --strip all.png --frames f --at 0s,1.25s,3s --fps 4 --duration 4s --json $small >all.json
+	[ "$(key all.json frames)" = 16 ]
+	# with a session the run goes on to its end, else it ends with the last frame
+	incise view neck --procedure --strip alone.png --at 0s,1.25s,3s --fps 4 --duration 4s --json $small >alone.json
+	[ "$(key alone.json frames)" = 3 ]
+	cmp all.png alone.png
+	incise view neck --procedure --strip session.png --session s.session --at 0s,1.25s,3s --fps 4 --duration 4s --json $small >session.json
+	[ "$(key session.json frames)" = 3 ]
+	cmp all.png session.png
+	holds "$(key session.json stamps) == $(key all.json stamps) && $(key alone.json stamps) < $(key all.json stamps)"
+	[ "$(key session.json files)" = '["session.png","s.session"]' ]
+}
+
+@test "view prints the files that it wrote" {
+	run -0 --separate-stderr incise view neck --procedure --frames f --strip n.png --at 0s,0.75s --session s.session \
+		--fps 4 --duration 1s $small
+	[ "$output" = "wrote n.png: 2 frames
+wrote f/frame-000000.png to frame-000003.png
+wrote s.session" ]
+	[ -z "$stderr" ]
+	[ -s f/frame-000003.png ]
+	[ ! -e f/frame-000004.png ]
+	incise view neck --procedure --frames f --overwrite --fps 4 --duration 0.5s --json $small >r.json
+	[ "$(key r.json files)" = '["f/frame-000000.png","f/frame-000001.png"]' ]
+	[ -e "$INCISE_BUILD/lib/incise/film_mkv.so" ] || return 0
+	run -0 --separate-stderr incise view wall --procedure --video w.mkv --fps 10 --duration 2s $small
+	[ "$output" = "wrote w.mkv: 20 frames, 2.0 s" ]
+}
+
+@test "on a terminal view shows the frame of so many, and the percentage" {
+	export TERM=xterm
+	run -0 --separate-stderr python3 "$root/tests/cli/terminal.py" 2 incise view wall --procedure --frames f --fps 4 --duration 1s $small
+	[[ "$output" == *"frame 1 of 4 ["*"] 25 %"*"frame 2 of 4 ["*"] 50 %"*"frame 4 of 4 ["*"] 100 %"* ]]
+	run -0 --separate-stderr python3 "$root/tests/cli/terminal.py" 2 incise view wall --procedure --strip n.png --at 0.25s,0.5s --fps 4 $small
+	[[ "$output" == *"frame 0 of 2 ["*"] 0 %"*"frame 1 of 2 ["*"] 50 %"*"frame 2 of 2 ["*"] 100 %"* ]]
+	# of a recording: by its length
+	incise capture -o a.rec --rig sim:clock=simulated --duration 1s >/dev/null
+	run -0 --separate-stderr python3 "$root/tests/cli/terminal.py" 2 incise view wall --from a.rec --frames g --fps 4 $small
+	[[ "$output" == *"frame 4 of 4 ["*"] 100 %"* ]]
+}
+
 @test "the demo leaves a film and a strip of a scene" {
 	[ -e "$INCISE_BUILD/lib/incise/film_mkv.so" ] || skip "film_mkv.so is not built"
 	# a wall neither bleeds nor is cut: that takes the least time

@@ -14,6 +14,7 @@
 #include <incise/clock.h>
 #include "../cli/cli.h"
 #include "../cli/image.h"
+#include "../cli/json.h"
 #include "view.h"
 
 /* --- files ---------------------------------------------------------------------------- */
@@ -21,6 +22,23 @@
 bool view_output_wanted(const struct view_output *output)
 {
 	return output->folder || output->film_path || output->strip_path;
+}
+
+/* A strip needs its own frames only; a window, a film or a folder each one. */
+static bool is_strip_alone(const struct view_output *output)
+{
+	return output->strip_path && !output->folder && !output->film_path;
+}
+
+bool view_output_complete(const struct view_output *output)
+{
+	return is_strip_alone(output) && output->stripped == output->n_strip;
+}
+
+static bool is_due(const struct view_output *output, double t_s)
+{
+	return !is_strip_alone(output) || (output->stripped < output->n_strip &&
+					   t_s >= output->strip_s[output->stripped]);
 }
 
 /* Frames and films that are there already are replaced with --overwrite only. */
@@ -127,6 +145,36 @@ void view_output_end(struct view_output *output)
 		cli_fail_with(&err);
 	free(output->rgb);
 	free(output->strip);
+}
+
+void view_output_print(const struct view_output *output)
+{
+	unsigned long long n = output->frames;
+
+	if (output->film_path)
+		printf("wrote %s: %llu frame%s, %.1f s\n", output->film_path, n,
+		       n == 1 ? "" : "s", (double)n / output->fps);
+	if (output->strip_path)
+		printf("wrote %s: %d frame%s\n", output->strip_path, output->stripped,
+		       output->stripped == 1 ? "" : "s");
+	if (output->folder && n)
+		printf("wrote %s/frame-000000.png to frame-%06llu.png\n", output->folder,
+		       n - 1);
+}
+
+void view_output_json(const struct view_output *output, json_t *files)
+{
+	if (output->film_path)
+		json_array_append_new(files, json_text(output->film_path));
+	if (output->strip_path)
+		json_array_append_new(files, json_text(output->strip_path));
+	for (uint64_t i = 0; output->folder && i < output->frames; i++) {
+		char *path = cli_text("%s/frame-%06llu.png", output->folder,
+				      (unsigned long long)i);
+
+		json_array_append_new(files, json_text(path));
+		free(path);
+	}
 }
 
 /* --- the hand ------------------------------------------------------------------------- */
@@ -296,7 +344,35 @@ static void keep_frame(struct view_job *job)
 	}
 	if (image_write_png(path, rgb, width, height, &err))
 		cli_warn("%s", err.text);
+	else if (!job->json)
+		printf("wrote %s\n", path);
 	free(rgb);
+}
+
+/* The frame of so many that will be drawn, or without a known end the time. */
+static void show_progress(struct view_job *job, double t_s)
+{
+	const struct view_output *output = &job->output;
+	double all = ceil(job->total_s * output->fps - 1e-6);
+	char *name;
+
+	if (!(all >= 1) || !view_output_wanted(output)) {
+		cli_progress("%.1f s", t_s);
+	} else if (is_strip_alone(output)) {
+		double end_s =
+			job->log ? job->total_s : output->strip_s[output->n_strip - 1];
+
+		name = cli_text("frame %d of %d", output->stripped, output->n_strip);
+		cli_progress_bar(name, end_s > 0 ? fmin(1, t_s / end_s) : 1,
+				 &job->percent);
+		free(name);
+	} else {
+		name = cli_text("frame %llu of %.0f", (unsigned long long)output->frames,
+				all);
+		cli_progress_bar(name, fmin(1, (double)output->frames / all),
+				 &job->percent);
+		free(name);
+	}
 }
 
 void view_job_draw(struct view_job *job, const struct incise_view_status *status,
@@ -304,14 +380,17 @@ void view_job_draw(struct view_job *job, const struct incise_view_status *status
 {
 	struct incise_error err = {0};
 
-	if (!job->frames++)
-		job->begin_ns = view_wall();
-	if (incise_view_frame(job->view, status, &err))
-		cli_fail_with(&err);
-	job->end_ns = view_wall();
-	if (job->keep)
-		keep_frame(job);
-	write_frame(&job->output, job->view, t_s);
+	if (is_due(&job->output, t_s)) {
+		if (!job->frames++)
+			job->begin_ns = view_wall();
+		if (incise_view_frame(job->view, status, &err))
+			cli_fail_with(&err);
+		job->end_ns = view_wall();
+		if (job->keep)
+			keep_frame(job);
+		write_frame(&job->output, job->view, t_s);
+	}
+	show_progress(job, t_s);
 }
 
 bool view_job_events(struct view_job *job, struct view_hand *hand, struct view_live *live)

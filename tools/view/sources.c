@@ -36,6 +36,12 @@ static _Noreturn void fail(struct view_job *job, const char *path,
 	cli_fail_with(err);
 }
 
+/* Nothing more is to be drawn, and no session to be written. */
+static bool is_over(const struct view_job *job)
+{
+	return view_output_complete(&job->output) && !job->log;
+}
+
 /* --- in real time ---------------------------------------------------------------------- */
 
 static void run_live(struct view_job *job, struct view_live *live, struct view_hand *hand)
@@ -45,7 +51,8 @@ static void run_live(struct view_job *job, struct view_live *live, struct view_h
 	int64_t begin = view_wall(), last = begin, due = begin, now;
 	int rc = 0;
 
-	while (!rc && view_job_events(job, hand, live)) {
+	job->total_s = job->duration_s;
+	while (!rc && !is_over(job) && view_job_events(job, hand, live)) {
 		now = view_wall();
 		if (job->duration_s && now - begin > job->duration_s * INCISE_NS_PER_S)
 			break;
@@ -161,8 +168,7 @@ static int show_tick(struct run *run, const struct incise_tick *tick)
 		view_pause_until(due);
 	}
 	view_job_draw(job, NULL, t_s);
-	cli_progress("%.1f s", t_s);
-	return !view_job_events(job, NULL, NULL);
+	return !view_job_events(job, NULL, NULL) || is_over(job);
 }
 
 static int procedure_tick(void *context, const struct incise_tick *tick)
@@ -183,6 +189,7 @@ void view_procedure(struct view_job *job)
 	struct incise_error err = {0};
 	double end_s = job->duration_s ? job->duration_s : PROCEDURE_S;
 
+	job->total_s = end_s;
 	job->own_rig = cli_open_rig(PROCEDURE_RIG, INCISE_RIG_TRACKER);
 	make_plan(job);
 	view_job_view(job);
@@ -204,6 +211,18 @@ static int replay_tick(void *context, const struct incise_replay_tick *tick,
 	return incise_error_set(err, ECANCELED, "ended");
 }
 
+/* What of a recording is shown; 0: not known. */
+static double recorded_s(const struct view_job *job, struct incise_recording *recording)
+{
+	static struct incise_recording_info info;
+	double s;
+
+	if (incise_recording_info(recording, &info, NULL))
+		return job->duration_s;
+	s = (double)(info.end_ns - info.start_ns) / INCISE_NS_PER_S;
+	return job->duration_s && job->duration_s < s ? job->duration_s : s;
+}
+
 void view_recording(struct view_job *job)
 {
 	struct run run = run_of(job);
@@ -214,6 +233,7 @@ void view_recording(struct view_job *job)
 	struct incise_error err = {0};
 
 	recording = recording_open(job->from);
+	job->total_s = recorded_s(job, recording);
 	make_plan(job);
 	view_job_view(job);
 	if (incise_replay(recording, job->scene, &replay, &stats, &report, &err) &&

@@ -8,6 +8,7 @@
 
 #include <stdbool.h>
 #include <stdint.h>
+#include <jansson.h>
 #include <incise/film.h>
 #include <incise/plan.h>
 #include <incise/rig.h>
@@ -30,7 +31,7 @@ struct view_output {
 	struct incise_film *film;
 	uint8_t *rgb, *strip;
 	int stripped;
-	uint64_t frames;
+	uint64_t frames; /* that were written */
 };
 
 struct view_job {
@@ -54,6 +55,8 @@ struct view_job {
 	uint64_t frames, lost;
 	int64_t begin_ns, end_ns; /* CLOCK_MONOTONIC, of the frames */
 	bool keep;		  /* write the next frame to a file of its own */
+	double total_s;		  /* of the run; 0: not known */
+	int percent;		  /* that the progress bar shows */
 };
 
 /* CLOCK_MONOTONIC. */
@@ -65,10 +68,20 @@ void view_output_begin(struct view_output *output);
 bool view_output_wanted(const struct view_output *output);
 void view_output_end(struct view_output *output);
 
+/* Whether all frames are written that will be: the last one of a strip alone. */
+bool view_output_complete(const struct view_output *output);
+
+/* Print the files that were written, or add them to a report. */
+void view_output_print(const struct view_output *output);
+void view_output_json(const struct view_output *output, json_t *files);
+
 /* Make the view of the job's plan. */
 void view_job_view(struct view_job *job);
 
-/* Draw, show and write a frame. @status NULL: of a loop in simulated time. */
+/*
+ * Draw, show and write the frame of a time; of a strip alone only those that it has. @status NULL:
+ * of a loop in simulated time.
+ */
 void view_job_draw(struct view_job *job, const struct incise_view_status *status,
 		   double t_s);
 
