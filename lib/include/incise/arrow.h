@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The Arrow C data and stream interfaces: columns that another library reads in place, without
- * a copy and without a library between the two. The structs are those of the Arrow
- * specification; other headers may define the same ones, under the same guards.
+ * The Arrow C data and stream interfaces: another library reads the columns in place, without
+ * a copy and without an Arrow library. The structs are those of the Arrow specification; other
+ * headers may define the same ones, under the same guards.
  *
  *     recording ──► incise_recording_stream() ──► ArrowArrayStream ──► pyarrow, polars, DuckDB …
  *     ArrowArrayStream ──► incise_dataset_from_arrow() ──► training
@@ -74,14 +74,12 @@ struct incise_recording;
 /**
  * Open a stream of a recording's rows, in order of time, as columns. Part of libincise-record.
  *
- * | what | columns |
- * | --- | --- |
- * | "force" | seq, t_ns, code, force_N (NaN while the zero is not known), clipped |
- * | "tracker" | seq, t_ns, arrival_ns, x_mm y_mm z_mm, qw qx qy qz (as received, without the calibrated tip), status, station, button |
- * | "depth" | seq, t_ns, depth_mm, velocity_mm_s |
- * | "frames" | seq, t_ns, arrival_ns, pts, bytes, and what vision saw or null: length_px, sd_px, depth_mm, quality |
- * | "events" | t_ns, kind, text |
- * | "table" | the columns of incise_export() with these options |
+ * | what | columns | | --- | --- | | "force" | seq, t_ns, code, force_N (NaN while the zero is
+ * not known), clipped | | "tracker" | seq, t_ns, arrival_ns, x_mm y_mm z_mm, qw qx qy qz (as
+ * received, without the calibrated tip), status, station, button | | "depth" | seq, t_ns,
+ * depth_mm, velocity_mm_s | | "frames" | seq, t_ns, arrival_ns, pts, bytes, and the result of
+ * vision or null: length_px, sd_px, depth_mm, quality | | "events" | t_ns, kind, text | |
+ * "table" | the columns of incise_export() with these options |
  *
  * t_ns is the best time of acquisition, CLOCK_MONOTONIC. Fields have the metadata "unit" and
  * "description", those that a calibration enters its values too; the table has the provenance of

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * A table of numbers with named columns, read from CSV: the training data. A header row
- * names the columns (with units); one column may hold text, the group (cut) a row
- * belongs to. Part of libincise-learn.
+ * Training data: a table of numbers with named columns, read from CSV. A header row names the
+ * columns (with units); one column may be text, the group (cut) of a row. Part of
+ * libincise-learn.
  */
 #ifndef INCISE_DATASET_H
 #define INCISE_DATASET_H
@@ -20,13 +20,13 @@ struct incise_dataset;
  * line that starts with '#' and an empty line are ignored.
  *
  * @param path    file, or "-" for standard input
- * @param columns n names; "" matches nothing
- * @param group   name of the column whose text names the cut that a row belongs to, or NULL
- * @return dataset with the n columns in the order asked for, to be freed with
+ * @param columns n names; "" matches no column
+ * @param group   name of the column with the cut of a row, or NULL
+ * @return dataset with the n columns in the order of @columns, to be freed with
  *         incise_dataset_free(); NULL with errno of incise_infile_open() or
- *         incise_infile_line(), EINVAL (a field that is no finite number, a row with too few fields: line and column are named; a column
- *         that does not exist: the ones that do are listed), E2BIG (too many columns),
- *         ENODATA (no rows), ENOMEM.
+ *         incise_infile_line(), EINVAL (a field that is not a finite number, or a row with too
+ *         few fields, with line and column in the message; a missing column, with a list of
+ *         the existing ones), E2BIG (too many columns), ENODATA (no rows), ENOMEM.
  */
 INCISE_API struct incise_dataset *incise_dataset_read(const char *path,
 						      const char *const *columns, int n,
@@ -34,12 +34,12 @@ INCISE_API struct incise_dataset *incise_dataset_read(const char *path,
 						      struct incise_error *err);
 
 /**
- * The same without the rows whose number in one column is 0; what else they hold does not
- * matter. A file without that column is read whole.
+ * The same without rows that have 0 in one column; their other fields may have any content.
+ * All rows are read if the file lacks that column.
  *
  * @param where    name of the column, or NULL for incise_dataset_read()
- * @param left_out how many rows were left out
- * @return as incise_dataset_read(); ENODATA if all rows were left out
+ * @param left_out set to the number of omitted rows
+ * @return as incise_dataset_read(); ENODATA if all rows were omitted
  */
 INCISE_API struct incise_dataset *incise_dataset_read_where(
 	const char *path, const char *const *columns, int n, const char *group,
@@ -51,7 +51,7 @@ INCISE_API void incise_dataset_free(struct incise_dataset *data);
 /** Number of rows. */
 INCISE_API size_t incise_dataset_rows(const struct incise_dataset *data);
 
-/** Row @row: one value per column, in the order asked for; owned by the dataset. */
+/** Row @row: one value per column, in the order of @columns; owned by the dataset. */
 INCISE_API const double *incise_dataset_row(const struct incise_dataset *data,
 					    size_t row);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * A film for viewing: Matroska with H.264 if libavcodec has an encoder for it (libx264), else
- * MJPEG. Compression is lossy: measurements belong into recordings. Part of libincise-view; the
+ * MJPEG. Compression is lossy: keep measurements in recordings. Part of libincise-view; the
  * first call loads a module on libavformat, incise/film_mkv.so.
  */
 #ifndef INCISE_FILM_H
@@ -19,7 +19,7 @@ struct incise_film;
 #define INCISE_FILM_SIDE_MAX 8192
 
 /**
- * Start a film at PATH.part; PATH stays as it is until incise_film_close().
+ * Start a film at PATH.part; PATH is unchanged until incise_film_close().
  *
  * @param width, height even, 16 … INCISE_FILM_SIDE_MAX
  * @param rate_hz       frames per second, 1 … 1000; whole
@@ -32,21 +32,21 @@ INCISE_API struct incise_film *incise_film_new(const char *path, int width, int 
 /**
  * Add a frame.
  * @param rgb rows from the top, 3 bytes a pixel, without padding
- * @return 0; -EIO, -ENOSPC: no more can be added
+ * @return 0; -EIO, -ENOSPC: no more frames can be added
  */
 INCISE_API int incise_film_add(struct incise_film *film, const uint8_t *rgb,
 			       struct incise_error *err);
 
 /**
- * End the film and rename it to PATH, replacing a file there. Without a frame, or after an error,
- * no file is left. Frees it.
+ * End the film, rename it to PATH, replacing a file there, and free it. Without a frame, or
+ * after an error, no file remains.
  *
- * @param film NULL is allowed
- * @return 0; the error that ended it, or of writing the rest
+ * @param film NULL is accepted
+ * @return 0; the error that ended it, or of writing the remaining frames
  */
 INCISE_API int incise_film_close(struct incise_film *film, struct incise_error *err);
 
-/** Discard it: no file is left. Frees it. */
+/** Discard and free the film; no file remains. */
 INCISE_API void incise_film_drop(struct incise_film *film);
 
 INCISE_END_DECLS

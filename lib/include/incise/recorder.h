@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Writing a recording: NAME.rec/recording.db (SQLite, WAL). It is written as
- * NAME.rec.part/ and gets its name when it is complete, so that a NAME.rec is
- * always complete; a .part left by a crash is readable up to its last commit. Part of
- * libincise-record.
+ * Writing a recording: NAME.rec/recording.db (SQLite, WAL). The folder is called
+ * NAME.rec.part/ until it is complete, so that a NAME.rec is always complete; a .part of a
+ * crashed program is readable up to its last commit. Part of libincise-record.
  */
 #ifndef INCISE_RECORDER_H
 #define INCISE_RECORDER_H
@@ -21,38 +20,46 @@ INCISE_BEGIN_DECLS
 /** Options of a recording. */
 struct incise_recorder_setup {
 	const struct incise_calibration *calibration;
-	/** Its file, whose text the recording keeps; NULL: none. */
+	/** Path of its file, whose text becomes part of the recording; or NULL. */
 	const char *calibration_path;
-	/** Find the scalpel in the camera's frames; NULL: record frames only. The
-	 * calibration's depth_mm_px is used in place of its own. */
+	/**
+	 * Detection of the scalpel in frames; NULL: record frames only. depth_mm_px of the
+	 * calibration replaces its own.
+	 */
 	const struct incise_vision_setup *vision;
-	double planned_s; /**< for the disk's free space; 0: not known */
-	/** Start armed: everything is read and shown, but nothing written until a trigger;
-	 * the recording then starts with the samples of the second before. */
+	/** expected duration, to check the disk's free space; 0: unknown */
+	double planned_s;
+	/**
+	 * Start armed: samples are read and shown, but not written until a trigger; the
+	 * recording then starts with the samples of the previous second.
+	 */
 	bool armed;
-	/** Armed: triggers besides incise_recorder_trigger(). The size of the force, once
-	 * its zero is known (0: none), and a press of the stylus's button. */
+	/**
+	 * Armed: triggers in addition to incise_recorder_trigger(): size of the force, once its
+	 * zero is known (0: none), and a press of the stylus's button.
+	 */
 	double trigger_force_N;
 	bool trigger_button;
-	bool cuts; /**< write start and end of each cut as events of kind "cut" */
+	bool cuts; /**< write start and end of each cut as events "cut" */
 };
 
-/** The state of a recorder: rows, losses, the last samples, the streams. */
+/** State of a recorder: rows, losses, last samples, streams. */
 struct incise_recorder_stats {
 	uint64_t force, tracker, depth, frames; /**< rows */
-	struct incise_pose_counts poses; /**< of the tracker's rows; unusable: no depth */
+	/** poses of tracker rows; unusable ones give no depth */
+	struct incise_pose_counts poses;
 	uint64_t force_lost, tracker_lost, frames_lost;
-	uint64_t frames_unlooked; /**< vision had no time for them */
+	uint64_t frames_unlooked; /**< frames not analysed for lack of time */
 	uint64_t force_clipped;	  /**< codes at either end of the range */
-	double depth_mm;	  /**< last, by the tracker */
-	double camera_depth_mm;	  /**< last, by vision; NAN: not seen */
-	double force_N;		  /**< last; 0 until the zero is known */
+	double depth_mm;	  /**< last depth, from the tracker */
+	double camera_depth_mm;	  /**< last depth, from vision; NAN: none */
+	double force_N;		  /**< last force; 0 until the zero is known */
 	double zero_mV;		  /**< NAN until known */
-	bool button;		  /**< of the stylus */
-	bool armed;		  /**< waits for its trigger */
+	bool button;		  /**< button of the stylus */
+	bool armed;		  /**< waits for a trigger */
 	double bytes_per_s;	  /**< written to the disk */
-	double disk_s;		  /**< until the disk is full; INFINITY: not known yet */
-	struct incise_stream streams[INCISE_STREAMS_MAX]; /**< with their times */
+	double disk_s;		  /**< until the disk is full; INFINITY: unknown */
+	struct incise_stream streams[INCISE_STREAMS_MAX]; /**< streams with their times */
 	int n_streams;					  /**< 2 or 3 */
 };
 
@@ -61,62 +68,62 @@ struct incise_recorder;
 /**
  * Start a recording of a rig's tracker and force channel, and of its camera if that is open.
  *
- * @param path  folder NAME.rec; it must not exist
- * @param rig   opened with INCISE_RIG_TRACKER | INCISE_RIG_FORCE, and INCISE_RIG_CAMERA or
- *              not; not owned
- * @param setup its pointers are not kept
+ * @param path  folder NAME.rec; must not exist
+ * @param rig   opened with INCISE_RIG_TRACKER | INCISE_RIG_FORCE, optionally with
+ *              INCISE_RIG_CAMERA; not owned
+ * @param setup not used after the call
  * @return recorder, to be ended with incise_recorder_close(); NULL with errno EEXIST, EINVAL
- *         (a path without a name; vision's thresholds),
- *         ENODEV (the rig has no tracker or force channel), EOPNOTSUPP (its tracker reads
- *         more than one sensor), ENOSPC (no space for the planned time), of mkdir(2), EIO,
- *         ENOMEM; ENOENT, ENOEXEC (a module for frames is not installed, or broken).
+ *         (a path without a name; vision's thresholds), ENODEV (the rig has no tracker or
+ *         force channel), EOPNOTSUPP (its tracker reads more than one sensor), ENOSPC (too
+ *         little space for planned_s), errno of mkdir(2), EIO, ENOMEM; ENOENT, ENOEXEC (a
+ *         module for frames is not installed, or broken).
  */
 INCISE_API struct incise_recorder *incise_recorder_new(
 	const char *path, struct incise_rig *rig,
 	const struct incise_recorder_setup *setup, struct incise_error *err);
 
 /**
- * Read the samples since the last call and write them; to be called at least 10 times
- * a second. Commits every 100 ms of the rig's clock. A device that dies is an event, and the
- * others continue: see incise_recorder_stats::streams.
+ * Read the samples since the last call and write them. Call it at least 10 times a second.
+ * Commits every 100 ms of the rig's clock. The failure of a device is an event, and the others
+ * continue: see incise_recorder_stats::streams.
  *
- * @return 0; 1: it must be closed now, because the disk is nearly full or no device is left,
- *         with the cause in *err; -ENOSPC (disk full), -EIO, -EBUSY (the tool was not free
- *         while the zero was measured). After an error only incise_recorder_close() is useful.
+ * @return 0; 1: close it now, because the disk is nearly full or no device is left; *err has
+ *         the cause; -ENOSPC (disk full), -EIO, -EBUSY (the tool was in contact while the zero
+ *         was measured). After an error call only incise_recorder_close().
  */
 INCISE_API int incise_recorder_poll(struct incise_recorder *recorder,
 				    struct incise_error *err);
 
-/** Armed: start. The next poll writes the samples of the second before. */
+/** Start an armed recorder. The next poll writes the samples of the previous second. */
 INCISE_API void incise_recorder_trigger(struct incise_recorder *recorder);
 
 /**
  * Add a row to the table of events, of kind "marker" or "cut", with the clock's time.
  *
- * @return 0, or a negative errno of the disk, after which only closing is useful
+ * @return 0, or a negative errno of the disk; then call only incise_recorder_close()
  */
 INCISE_API int incise_recorder_mark(struct incise_recorder *recorder, const char *kind,
 				    const char *text, struct incise_error *err);
 
-/** The recording so far. */
+/** Get the state of the recording. */
 INCISE_API void incise_recorder_stats(const struct incise_recorder *recorder,
 				      struct incise_recorder_stats *stats);
 
 /**
- * Read no more samples, and write those that still wait: up to 5 s for frames. The stats are
- * final then; close() makes the recording complete.
+ * Stop reading samples, and write the waiting ones: up to 5 s for frames. The stats are final
+ * afterwards; close() completes the recording.
  *
- * @return 0; as incise_recorder_poll() < 0
+ * @return 0; negative errno of incise_recorder_poll()
  */
 INCISE_API int incise_recorder_end(struct incise_recorder *recorder,
 				   struct incise_error *err);
 
 /**
- * End the recording and give it its name; frees @recorder in any case. Calls
- * incise_recorder_end() if that was not done.
+ * End and rename the recording; frees @recorder in any case. Calls incise_recorder_end() if
+ * necessary.
  *
- * @return 0, or a negative errno when it could not be completed; what was committed then
- *         stays readable as NAME.rec.part.
+ * @return 0, or a negative errno if it could not be completed; the committed data then remain
+ *         readable in NAME.rec.part.
  */
 INCISE_API int incise_recorder_close(struct incise_recorder *recorder,
 				     struct incise_error *err);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The same depth by two ways: from the tracker and from the camera's frames. Where they
- * disagree, one of them is wrong: steel near the tracker bends its field, by another amount at
- * each place; a camera that was moved is off by the same amount everywhere; a wrong mm per
- * pixel by an amount that grows with the depth. Part of libincise-learn.
+ * Comparison of the depth from the tracker with the depth from camera frames. A difference
+ * shows an error: steel near the tracker distorts its field differently at each place; a
+ * displaced camera has the same error everywhere; with a wrong scale (mm per pixel) the error
+ * grows with the depth. Part of libincise-learn.
  */
 #ifndef INCISE_REDUNDANCY_H
 #define INCISE_REDUNDANCY_H
@@ -15,28 +15,29 @@
 
 INCISE_BEGIN_DECLS
 
-/** Largest bias: four pixels; 10 ms at 50 mm/s make as much. */
+/** Largest bias: four pixels, or 10 ms at 50 mm/s. */
 #define INCISE_REDUNDANCY_BIAS_MM 0.5
-/** Largest difference between places: 15 sd of a tracker's noise; steel makes millimetres. */
+/** Largest difference between places: 15 sd of a tracker's noise; steel causes millimetres. */
 #define INCISE_REDUNDANCY_PLACE_MM 0.3
 /** Largest trend: 0.4 mm at 20 mm of depth. */
 #define INCISE_REDUNDANCY_TREND 0.02
 
-/** Camera against tracker. */
+/** Camera compared with tracker. */
 struct incise_redundancy {
 	int n;
-	double bias_mm, bias_u_mm;   /**< camera - tracker, median */
-	double trend, trend_u;	     /**< mm per mm of depth */
-	double place_mm, place_u_mm; /**< largest difference between quarters of the way,
-				      * without the trend */
-	double scatter_sd_mm;	     /**< about all of that; robust */
-	double depth_low_mm, depth_high_mm, travel_mm; /**< what was visited */
+	double bias_mm, bias_u_mm; /**< camera - tracker, median */
+	double trend, trend_u;	   /**< mm per mm of depth */
+	/** Largest difference between quarters of the path, without the trend. */
+	double place_mm, place_u_mm;
+	double scatter_sd_mm; /**< robust, about bias, trend and places */
+	double depth_low_mm, depth_high_mm, travel_mm; /**< range of the data */
 	bool bias_bad, place_bad, trend_bad; /**< above the limit by twice its u */
 };
 
 /**
- * Compare. Pairs while the depth changes by more than 20 mm/s are left out, and the
- * uncertainties are those of means over a second, as neighbours err alike. A pure function.
+ * Compare both depths. Pairs with a change of depth above 20 mm/s are omitted. The
+ * uncertainties are those of means over one second, because errors of neighbouring pairs are
+ * correlated. A pure function.
  *
  * @return 0; -ENODATA (fewer than 30 pairs, or 4 seconds of them), -EINVAL, -ENOMEM
  */

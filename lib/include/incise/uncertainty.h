@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The uncertainty of a model's prediction: the standard deviation of an output that has
- * not been seen, of Bayesian linear consequents,
+ * The uncertainty of a model's prediction: the standard deviation of a new output, by Bayesian
+ * linear consequents,
  *
  *   sd(x)² = noise² (1 + |R⁻ᵀφ(x)|²)
  *
- * with φ(x) the firing strengths times (1, x), inputs scaled to [0, 1] over their ranges,
- * and R the triangular factor of the training rows with their ridge. So it grows where
- * there were few data. The noise is that of groups left out in training, hence ±1.96 sd is
- * meant to hold 95 % of a new cut.
+ * with φ(x) the firing strengths times (1, x), inputs scaled to [0, 1] over their ranges, and
+ * R the triangular factor of the training rows with their ridge. It grows where training data
+ * are sparse. The noise comes from held-out groups, so that ±1.96 sd should contain 95 % of a
+ * new cut.
  *
- * MATLAB could not read a .fis that held this: it lies beside it, in MODEL.fis.sd
- * (incise-sd(5)), tied to the parameters of its model by a checksum.
+ * MATLAB cannot read a .fis file with this data. It is in a separate file, MODEL.fis.sd
+ * (incise-sd(5)), with a checksum of the parameters of its model.
  */
 #ifndef INCISE_UNCERTAINTY_H
 #define INCISE_UNCERTAINTY_H
@@ -25,16 +25,16 @@ INCISE_BEGIN_DECLS
 
 struct incise_uncertainty;
 
-/** Standard deviations of a normal distribution that hold 95 %. */
+/** Half the width of the 95 % interval of a normal distribution, in standard deviations. */
 #define INCISE_INTERVAL95 1.959963984540054
 
 /**
- * Tie a factor to a model.
+ * Make the uncertainty of a model from its factor.
  *
- * @param noise  in the unit of the output, ≥ 0
- * @param factor R, row by row, n = n_rules·(n_inputs+1); what lies below its diagonal is
- *               not read
- * @param stride from one row to the next
+ * @param noise  noise in the unit of the output, ≥ 0
+ * @param factor R, row by row, n = n_rules·(n_inputs+1); values below its diagonal are not
+ *               read
+ * @param stride distance of rows in @factor
  * @return uncertainty, to be freed with incise_uncertainty_free(); NULL with errno EINVAL
  *         (not finite, or 0 on the diagonal), ENOMEM.
  */
@@ -43,19 +43,19 @@ INCISE_API struct incise_uncertainty *incise_uncertainty_new(
 	size_t stride, struct incise_error *err);
 
 /**
- * Read MODEL.fis.sd. The content is not trusted: every number is checked, and an error
- * names file and line.
+ * Read MODEL.fis.sd. Every number is validated, and an error names file and line.
  *
  * @param path  file, or "-" for standard input
- * @param model the model it must belong to, to the bit
- * @return uncertainty; NULL with errno of incise_infile_open() or incise_infile_line(), EINVAL
- *         (malformed), ESTALE (made for other parameters), ENOMEM.
+ * @param model its model, bit-exact
+ * @return uncertainty, to be freed with incise_uncertainty_free(); NULL with errno of
+ *         incise_infile_open() or incise_infile_line(), EINVAL (malformed), ESTALE (made for
+ *         other parameters), ENOMEM.
  */
 INCISE_API struct incise_uncertainty *incise_uncertainty_load(
 	const char *path, const struct incise_model *model, struct incise_error *err);
 
 /**
- * Write it with 17 significant digits; whole or not at all.
+ * Write MODEL.fis.sd with 17 significant digits, completely or not at all.
  *
  * @return 0, or a negative errno of incise_outfile_open() and incise_outfile_commit().
  */
@@ -69,10 +69,10 @@ INCISE_API void incise_uncertainty_free(struct incise_uncertainty *uncertainty);
 INCISE_API double incise_uncertainty_noise(const struct incise_uncertainty *uncertainty);
 
 /**
- * The standard deviation at x. Inputs outside the ranges are taken as incise_model_eval()
- * takes them.
+ * The standard deviation at x. Inputs outside the ranges are handled as in
+ * incise_model_eval().
  *
- * @param model the one it was made or loaded with
+ * @param model its model
  * @return finite, at least the noise. Real-time safe.
  */
 INCISE_API double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,

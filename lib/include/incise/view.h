@@ -6,11 +6,11 @@
  *     ticks ──▶ wound, blood ──▶ texture ──▶ frame ──▶ window
  *                                              ╰─────▶ pixels
  *
- * Images depend on the ticks and the camera only, not on the times of frames: ticks change the
- * texture, and a frame shows the state after the last of them.
+ * Images depend only on the ticks and the camera, not on the times of frames: ticks change the
+ * texture, and a frame shows the state after the last tick.
  *
- * A view and its functions belong to the thread that made it, whose OpenGL context it uses. None of
- * them is for a loop's thread; incise_state_ticks() reads a loop's ticks.
+ * Call the functions of a view only in the thread that made it, whose OpenGL context it uses,
+ * and not in a loop's thread; incise_state_ticks() reads a loop's ticks.
  */
 #ifndef INCISE_VIEW_H
 #define INCISE_VIEW_H
@@ -26,19 +26,18 @@ INCISE_BEGIN_DECLS
 
 struct incise_view;
 
-#define INCISE_VIEW_SIDE_MAX 8192 /**< of an image, pixels */
+#define INCISE_VIEW_SIDE_MAX 8192 /**< largest side of an image, pixels */
 
 /** Options of a view. */
 struct incise_view_setup {
 	int width, height; /**< pixels, 16 … INCISE_VIEW_SIDE_MAX */
-	bool window;	   /**< on a screen, by SDL; else in memory, without a screen */
-	const char *title; /**< of the window; or NULL */
-	/** Per pixel: 1, or 4 for smooth edges; 0: 4 by a card, 1 by a CPU. */
+	bool window;	   /**< on a screen, with SDL; else in memory, without a screen */
+	const char *title; /**< title of the window; or NULL */
+	/** Samples per pixel: 1, or 4 for smooth edges; 0: 4 on a GPU, 1 on a CPU. */
 	int samples;
 	/**
-	 * Frames in time matter more than that each shows the state after the last tick: large
-	 * changes of the texture come with this and the next frames. A frame then depends on those
-	 * before.
+	 * Prefer timely frames to complete ones: large changes of the texture are distributed
+	 * over this and the next frames. A frame then depends on the previous ones.
 	 */
 	bool live;
 };
@@ -46,9 +45,9 @@ struct incise_view_setup {
 /**
  * Make the view of a scene. Paints the skin, which takes some tenths of a second at 2048 texels.
  *
- * @param scene lives as long as the view
- * @param plan  compiled from it, for its surface. Lives as long as the view, but may tick in
- *              another thread
+ * @param scene must outlive the view
+ * @param plan  compiled from the scene, for its surface; must outlive the view, but may tick
+ *              in another thread
  * @return view, to be freed with incise_view_free(); NULL with errno EINVAL (size), ENODEV
  *         (no screen for a window), ENOTSUP (no OpenGL 3.3, or too small textures; @err names
  *         the packages), ENOMEM.
@@ -77,10 +76,11 @@ struct incise_view_status {
 };
 
 /**
- * Draw the state after the last tick; in a window show it, in step with the screen if supported.
+ * Draw the state after the last tick; show it in a window, synchronised with the screen if
+ * supported.
  *
  * @param status for the panel, or NULL
- * @return 0, also when a window is minimized and nothing can be drawn; -EIO (the graphics
+ * @return 0, also if a window is minimized and nothing can be drawn; -EIO (the graphics
  *         failed: the view is unusable), -ENOMEM
  */
 INCISE_API int incise_view_frame(struct incise_view *view,
@@ -91,7 +91,7 @@ INCISE_API int incise_view_frame(struct incise_view *view,
 INCISE_API void incise_view_size(const struct incise_view *view, int *width, int *height);
 
 /**
- * The last frame's pixels.
+ * Read the pixels of the last frame.
  *
  * @param rgb capacity of width × height × 3 bytes, rows from the top; sRGB
  * @return 0, -ENODATA (no frame was drawn), -EIO
@@ -99,16 +99,16 @@ INCISE_API void incise_view_size(const struct incise_view *view, int *width, int
 INCISE_API int incise_view_pixels(struct incise_view *view, uint8_t *rgb);
 
 /**
- * Show panel and keys over the image or not; at first the panel only. Images below 360 000
- * pixels have no panel.
+ * Show or hide panel and keys over the image; initially only the panel is shown. Images below
+ * 360 000 pixels have no panel.
  */
 INCISE_API void incise_view_panel(struct incise_view *view, bool panel, bool keys);
 
 /**
- * Help for the caller's keys, above the view's own: lines "KEY\tWHAT IT DOES". The first 18 are
- * shown.
+ * Set the help for the caller's keys, above the view's own: lines "KEY\tEFFECT". The first 18
+ * are shown.
  *
- * @param lines are copied
+ * @param lines help lines, copied
  * @return 0, -ENOMEM
  */
 INCISE_API int incise_view_keys(struct incise_view *view, const char *const *lines,
@@ -132,11 +132,13 @@ struct incise_view_camera {
 	double fov_deg;	      /**< across the height; 5 … 120 */
 };
 
-/** The present camera. */
+/** Get the current camera. */
 INCISE_API void incise_view_camera(const struct incise_view *view,
 				   struct incise_view_camera *camera);
 
-/** Values are limited to their ranges; if one is not finite, nothing changes. */
+/**
+ * Set the camera. Values are clamped to their ranges; if one is not finite, nothing changes.
+ */
 INCISE_API void incise_view_set_camera(struct incise_view *view,
 				       const struct incise_view_camera *camera);
 
@@ -144,7 +146,7 @@ INCISE_API void incise_view_set_camera(struct incise_view *view,
 struct incise_view_ray {
 	double from_mm[3]; /**< the camera */
 	double way[3];	   /**< unit */
-	bool met;	   /**< it meets the surface, from outside */
+	bool met;	   /**< it enters the surface from outside */
 	double point_mm[3];
 	double normal[3]; /**< outward, unit */
 };
@@ -152,16 +154,16 @@ struct incise_view_ray {
 /** Types of events of a window. */
 enum incise_view_event_type {
 	INCISE_VIEW_KEY,
-	INCISE_VIEW_MOTION, /**< of the mouse, a pen or a finger */
-	INCISE_VIEW_BUTTON, /**< of one of them */
+	INCISE_VIEW_MOTION, /**< of mouse, pen or finger */
+	INCISE_VIEW_BUTTON, /**< of mouse, pen or finger */
 	INCISE_VIEW_WHEEL,
 	INCISE_VIEW_AXIS,	  /**< of a joystick */
-	INCISE_VIEW_STICK_BUTTON, /**< of it */
+	INCISE_VIEW_STICK_BUTTON, /**< of a joystick */
 	INCISE_VIEW_RESIZE,
 	INCISE_VIEW_QUIT, /**< the user closes the window */
 };
 
-/** Keys without a character: above all of Unicode's. */
+/** Keys without a character, above the range of Unicode. */
 enum incise_view_key {
 	INCISE_VIEW_LEFT = 0x110001,
 	INCISE_VIEW_RIGHT,
@@ -179,7 +181,7 @@ enum incise_view_key {
 /** An event of a window. Fields that do not belong to the type are 0. */
 struct incise_view_event {
 	enum incise_view_event_type type;
-	int64_t t_ns; /**< CLOCK_MONOTONIC, when it was read here */
+	int64_t t_ns; /**< CLOCK_MONOTONIC at its reading */
 	/**
 	 * The view used it: right button or arrows turn the camera, middle button moves it,
 	 * the wheel changes the distance, Home resets it, F1 or h shows the keys, g the panel.
@@ -192,20 +194,21 @@ struct incise_view_event {
 	unsigned
 		buttons; /**< MOTION, BUTTON, WHEEL: held now; bit 0 left, 1 middle, 2 right */
 	int button;	 /**< BUTTON: 1 left, 2 middle, 3 right; STICK_BUTTON: from 0 */
-	double x_px, y_px;	    /**< MOTION, BUTTON, WHEEL: place in the frame */
-	struct incise_view_ray ray; /**< there */
-	double pressure; /**< MOTION, BUTTON: of a pen or finger, 0 … 1; of a mouse 1 */
-	double wheel;	 /**< WHEEL: notches, up is positive */
-	int stick;	 /**< AXIS, STICK_BUTTON: number of the joystick, from 0 */
-	int axis;	 /**< AXIS: from 0 */
-	double value;	 /**< AXIS: -1 … 1 */
-	int width, height; /**< RESIZE: of the frames from now on, pixels */
+	double x_px, y_px;	    /**< MOTION, BUTTON, WHEEL: position in the frame */
+	struct incise_view_ray ray; /**< ray at that position */
+	/** MOTION, BUTTON: pressure of pen or finger, 0 … 1; mouse: 1 */
+	double pressure;
+	double wheel;	   /**< WHEEL: notches, up is positive */
+	int stick;	   /**< AXIS, STICK_BUTTON: number of the joystick, from 0 */
+	int axis;	   /**< AXIS: from 0 */
+	double value;	   /**< AXIS: -1 … 1 */
+	int width, height; /**< RESIZE: new size of frames, pixels */
 };
 
 /**
- * The next event, without waiting.
+ * Get the next event, without waiting.
  *
- * @return 1; 0 when there is none, or the view has no window
+ * @return 1; 0 if there is none, or the view has no window
  */
 INCISE_API int incise_view_event(struct incise_view *view,
 				 struct incise_view_event *event);
@@ -213,22 +216,22 @@ INCISE_API int incise_view_event(struct incise_view *view,
 /** Counts and times of a view. */
 struct incise_view_report {
 	double cut_mm;	 /**< length of all cuts */
-	uint64_t stamps; /**< stretches of the wound */
+	uint64_t stamps; /**< segments of the wound */
 	/** Blood: emitted = drops + trails + off. */
 	double blood_ul_emitted, blood_ul_drops, blood_ul_trails, blood_ul_off;
 	int drops;
-	uint64_t uploads; /**< rectangles sent to the graphics, all levels */
+	uint64_t uploads; /**< rectangles sent to the graphics, on all levels */
 	uint64_t uploaded_texels;
-	uint64_t ticks; /**< added */
+	uint64_t ticks; /**< added ticks */
 	uint64_t frames;
 	/**
-	 * Times, s: of ticks for wound and blood; of texture updates; of drawing, which is
-	 * complete without a window, as incise_view_frame() then finishes the frame.
+	 * Times, s: ticks for wound and blood; texture updates; drawing (complete only without
+	 * a window, where incise_view_frame() finishes the frame).
 	 */
 	double ticks_s, texture_s, draw_s;
 	int triangles, texture_px;
-	const char *renderer; /**< OpenGL's name of it; lives as long as the view */
-	int samples;	      /**< per pixel */
+	const char *renderer; /**< name in OpenGL; valid as long as the view */
+	int samples;	      /**< samples per pixel */
 };
 
 /** Report counts and times so far. */
