@@ -5,7 +5,7 @@
  * read again.
  *
  *   [System]  Type='sugeno' NumInputs=2 NumRules=20 AndMethod='prod' …
- *   [Input1]  Name='depth_mm' Range=[0 20] NumMFs=5 MF1='in1mf1':'gaussmf',[2.1 0]
+ *   [Input1]  Name='depth_mm' Range=[0 20] NumMFs=5 MF1='very_shallow':'gaussmf',[2.1 0]
  *   [Output1] MF1='out1mf1':'linear',[p1 p2 p0]
  *   [Rules]   1 1, 1 (1) : 1
  */

@@ -11,12 +11,46 @@
 #include <string.h>
 #include "model.h"
 
+static bool begins(const char *name, const char *word)
+{
+	return !strncmp(name, word, strlen(word));
+}
+
+/*
+ * Name function @k of @n for a reader: "shallow" to "deep" over a depth, "slow" to "fast" over
+ * a velocity, "low" to "high" over anything else, and over a range that is partly negative.
+ * Five are "very_shallow", "shallow", "medium", "deep", "very_deep"; more than seven are numbers.
+ */
+static void name_mf(char name[INCISE_MODEL_NAME_MAX], const struct incise_variable *input,
+		    int k, int n)
+{
+	static const char *const degrees[] = {"", "very_", "extremely_"};
+	static const char *const words[][2] = {
+		{"low", "high"}, {"shallow", "deep"}, {"slow", "fast"}};
+	/* Functions between this one and the end of its half, where the word alone stands. */
+	int inner = k < n / 2 ? n / 2 - 1 - k : k - (n + 1) / 2;
+	int kind = 0;
+
+	if (input->min >= 0 && begins(input->name, "depth"))
+		kind = 1;
+	else if (input->min >= 0 &&
+		 (begins(input->name, "velocity") || begins(input->name, "speed")))
+		kind = 2;
+	if (n % 2 && k == n / 2 && n < 8)
+		snprintf(name, INCISE_MODEL_NAME_MAX, "medium");
+	else if (n < 8)
+		snprintf(name, INCISE_MODEL_NAME_MAX, "%s%s", degrees[inner],
+			 words[kind][k >= n / 2]);
+	else
+		snprintf(name, INCISE_MODEL_NAME_MAX, "level_%d", k + 1);
+}
+
 /*
  * Evenly spaced functions over the range, neighbours crossing at 0.5, shoulders where
  * MATLAB's genfis1 has them: 0.3 of the spacing from the centre.
  */
 static void grid_mf(struct incise_mf *mf, enum incise_mf_type type,
-		    const struct incise_variable *input, int index, int k, int n)
+		    const struct incise_variable *input, int k, int n)
 {
 	double range = input->max - input->min;
 	double half = n > 1 ? range / (n - 1) / 2 : range / 2;
@@ -24,7 +58,7 @@ static void grid_mf(struct incise_mf *mf, enum incise_mf_type type,
 	double shoulder = 0.6 * half;
 
 	mf->type = type;
-	snprintf(mf->name, sizeof(mf->name), "in%dmf%d", index + 1, k + 1);
+	name_mf(mf->name, input, k, n);
 	switch (type) {
 	case INCISE_MF_GAUSS:
 		mf->p[0] = half / sqrt(2 * M_LN2);
@@ -130,7 +164,7 @@ struct incise_model *incise_model_new_grid(int n_inputs,
 		model->info.input[i] = inputs[i];
 		model->info.n_mfs[i] = n_mfs[i];
 		for (int k = 0; k < n_mfs[i]; k++) {
-			grid_mf(&model->mf[i][k], type, &inputs[i], i, k, n_mfs[i]);
+			grid_mf(&model->mf[i][k], type, &inputs[i], k, n_mfs[i]);
 			if (!incise_mf_fault(type, model->mf[i][k].p))
 				continue;
 			incise_error_set(err, EINVAL,

@@ -325,7 +325,7 @@ degree_model() {
 }
 
 @test "what a .fis may hold and incise does not know is refused by name and line" {
-	line=$(grep -n "^MF1='in1mf1'" m.fis | cut -d: -f1)
+	line=$(grep -n "^MF1='very_shallow'" m.fis | cut -d: -f1)
 	sed "${line}s/gaussmf/pimf/" m.fis >bad.fis
 	refuses "bad.fis:$line: " "'pimf'" gauss2mf
 	sed "s/^AndMethod='prod'/AndMethod='max'/" m.fis >bad.fis
@@ -341,7 +341,7 @@ degree_model() {
 }
 
 @test "numbers in a .fis that cannot be are refused" {
-	line=$(grep -n "^MF1='in1mf1'" m.fis | cut -d: -f1)
+	line=$(grep -n "^MF1='very_shallow'" m.fis | cut -d: -f1)
 	for numbers in "[0 5]" "[-1 5]" "[nan 5]" "[1 inf]" "[1e999 5]" "[1]" "[1 2 3]" "[a b]" "1 2" "[]" "[1 2"; do
 		sed "${line}s/\[.*/$numbers/" m.fis >bad.fis
 		refuses "bad.fis:$line: "
@@ -383,7 +383,7 @@ degree_model() {
 	incise eval bell.fis <<<'5 20' >out
 	holds "$(cat out) > 0"
 	run --separate-stderr incise eval bell.fis --arith fixed <<<'5 20'
-	failed_with bell.fis gbellmf depth_mm in1mf1
+	failed_with bell.fis gbellmf depth_mm very_shallow
 }
 
 @test "a model that fixed point cannot hold is refused by name" {
@@ -393,9 +393,9 @@ degree_model() {
 	[ -s out ]
 	run --separate-stderr incise eval big.fis --arith fixed <<<'5 20'
 	failed_with big.fis "too extreme"
-	sed "s/^MF1='in1mf1':'gaussmf',.*/MF1='in1mf1':'gaussmf',[1e-9 0]/" m.fis >thin.fis
+	sed "s/^MF1='very_shallow':'gaussmf',.*/MF1='very_shallow':'gaussmf',[1e-9 0]/" m.fis >thin.fis
 	run --separate-stderr incise eval thin.fis --arith fixed <<<'5 20'
-	failed_with thin.fis in1mf1
+	failed_with thin.fis very_shallow
 }
 
 @test "eval reports as JSON" {

@@ -64,7 +64,7 @@ setup() {
 	constant=$(sed -n "s/^MF20='out1mf20':'linear',\[.* \(.*\)\]/\1/p" m.fis)
 	holds "($(key r.json 'rules[19].consequent[0]') / $constant - 1)^2 < 1e-20"
 	# and the width of its first function
-	width=$(sed -n "s/^MF1='in1mf1':'gaussmf',\[\(.*\) .*\]/\1/p" m.fis)
+	width=$(sed -n "s/^MF1='very_shallow':'gaussmf',\[\(.*\) .*\]/\1/p" m.fis)
 	holds "($(key r.json 'inputs[0].mfs[0].params[0]') / $width - 1)^2 < 1e-20"
 }
 
@@ -114,11 +114,11 @@ setup() {
 	[ -z "$stderr" ]
 	[[ "${lines[0]}" == "model incise: "* ]]
 	[ "$(head -c 8 "my pictures/m.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
-	for text in "depth / mm" "velocity / (mm/s)" "force / N" in1mf5 in2mf4; do
+	for text in "depth / mm" "velocity / (mm/s)" "force / N" shallow medium slow fast; do
 		grep -qF ">$text<" "my pictures/m.svg"
 	done
 	# another kind, and names that gnuplot could take amiss
-	sed "s/Name='depth_mm'/Name='a \"b\" \`touch c\` \\\\ \$x'/; s/'in1mf1'/'x \"y'/" bell.fis >odd.fis
+	sed "s/Name='depth_mm'/Name='a \"b\" \`touch c\` \\\\ \$x'/; s/'very_shallow'/'x \"y'/" bell.fis >odd.fis
 	run -0 --separate-stderr incise info odd.fis --plot odd
 	[ -z "$stderr" ]
 	[ -s odd.png ] && [ -s odd.svg ] && [ ! -e c ] && [ ! -e plot/c ]

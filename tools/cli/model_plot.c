@@ -2,6 +2,7 @@
 /*
  * Plots of a model; see model_plot.h.
  */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "cli.h"
@@ -89,30 +90,105 @@ void model_plot_write_functions(const struct incise_model *model, const char *fo
 	plot_data_end(out, folder);
 }
 
+/* A panel's plot is about that wide, and a character of a name is at most about that wide. */
+#define PLOT_WIDTH 350.0
+#define CHARACTER_WIDTH 7.5
+
+/* A name above the peak of its function, its words below each other: '_' ends a line. */
+struct peak {
+	const char *name;
+	double x, px; /* of the input; in the plot */
+	double width; /* of the longest word, px */
+};
+
+static struct peak peak_of(const struct incise_variable *v, const struct incise_mf *mf)
+{
+	struct peak peak = {.name = mf->name};
+	double highest = -1, from = 0, to = 0;
+
+	for (int s = 0; s <= SAMPLES; s++) {
+		double x = between(v, s, SAMPLES), y = incise_mf_eval(mf, x);
+
+		if (y > highest + 1e-9) {
+			highest = y;
+			from = x;
+		}
+		if (y > highest - 1e-9)
+			to = x;
+	}
+	for (const char *word = mf->name; *word;) {
+		size_t n = strcspn(word, "_");
+
+		peak.width = fmax(peak.width, CHARACTER_WIDTH * (double)n);
+		word += n + (word[n] == '_');
+	}
+	peak.px = ((from + to) / 2 - v->min) / (v->max - v->min) * PLOT_WIDTH;
+	/* Within the plot at its ends. */
+	peak.px = fmax(peak.width / 2, fmin(peak.px, PLOT_WIDTH - peak.width / 2));
+	peak.x = v->min + peak.px / PLOT_WIDTH * (v->max - v->min);
+	return peak;
+}
+
+/* Whether no name of more than two words, and none covers another. */
+static bool peaks_fit(const struct peak *peak, int n)
+{
+	for (int i = 0; i < n; i++) {
+		const char *first = strchr(peak[i].name, '_');
+
+		if (first && strchr(first + 1, '_'))
+			return false;
+		for (int k = 0; k < i; k++)
+			if (fabs(peak[i].px - peak[k].px) <
+			    (peak[i].width + peak[k].width) / 2)
+				return false;
+	}
+	return true;
+}
+
+/* As a string of gnuplot in double quotes; @space for '_'. */
+static void put_name(FILE *script, const char *name, const char *space)
+{
+	fputc('"', script);
+	for (const char *c = name; *c; c++)
+		if (*c == '_')
+			fputs(space, script);
+		else
+			fputc(strchr("\"\\\n\r`", *c) ? ' ' : *c, script);
+	fputc('"', script);
+}
+
 void model_plot_functions(FILE *script, const struct incise_model *model, int input,
-			  const char *data, const char *title, const char *names)
+			  const char *data, const char *title)
 {
 	const struct incise_model_info *info = incise_model_info(model);
+	const struct incise_variable *v = &info->input[input];
 	int first = 0, n = info->n_mfs[input];
+	struct peak peak[INCISE_MODEL_MFS_MAX];
+	bool fit;
 
 	for (int i = 0; i < input; i++)
 		first += info->n_mfs[i];
-	fprintf(script, "set title '%s'\nset yrange [0:1.1]\nset ylabel 'degree'\n",
-		title);
-	put_axis(script, "x", &info->input[input]);
-	fputs("names = \"", script);
-	if (names)
-		fputs(names, script);
-	/* Words, as gnuplot counts them. */
-	for (int k = 0; k < n && !names; k++) {
-		for (const char *c = incise_model_mf(model, input, k)->name; *c; c++)
-			fputc(strchr("\"\\\n\r` ", *c) ? '_' : *c, script);
-		fputc(' ', script);
-	}
+	for (int k = 0; k < n; k++)
+		peak[k] = peak_of(v, incise_model_mf(model, input, k));
+	fit = peaks_fit(peak, n);
 	fprintf(script,
-		"\"\nplot for [k=%d:%d] '%s' index k using 1:2 with lines ls ((k-%d)%%5+1) "
-		"lw 2 title word(names, k-%d+1)\n",
-		first, first + n - 1, data, first, first);
+		"set title '%s'\nset xrange [%.9g:%.9g]\nset yrange [0:%s]\n"
+		"set ytics 0,0.25,1\nset ylabel 'degree of membership / 1'\n",
+		title, v->min, v->max, fit ? "1.25" : "1.05");
+	put_axis(script, "x", v);
+	for (int k = 0; k < n && fit; k++) {
+		fprintf(script, "set label %d ", k + 1);
+		put_name(script, peak[k].name, "\\n");
+		fprintf(script, " at %.9g,1.14 center noenhanced font small\n",
+			peak[k].x);
+	}
+	fputs("plot", script);
+	for (int k = 0; k < n; k++) {
+		fprintf(script, "%s '%s' index %d using 1:2 with lines lt %d title ",
+			k ? ", \\\n " : "", data, first + k, k + 1);
+		put_name(script, fit ? "" : peak[k].name, " ");
+	}
+	fputs("\nunset label\nset ytics auto\nset xrange [*:*]\n", script);
 }
 
 void model_plot_write_surface(const struct model_surface *surface, const char *folder,
@@ -154,9 +230,12 @@ void model_plot_surface(FILE *script, const struct model_surface *surface,
 	put_axis(script, "z", &surface->output);
 	put_axis(script, "cb", &surface->output);
 	fprintf(script,
-		"set zlabel rotate parallel\nset yrange [*:*]\nset ticslevel 0\n"
-		"set view 55,320\n"
-		"splot '%s' with pm3d%s\n",
+		"set cblabel offset 1,0\nset xlabel rotate parallel\nset ylabel rotate parallel\nset zlabel rotate parallel\n"
+		"set yrange [*:*]\nset autoscale fix\nset ticslevel 0\nset view 55,320,0.95\n"
+		"set border 31\nset xtics offset 0.3,-0.3\nset ytics offset -0.3,-0.3\n"
+		"splot '%s' with pm3d%s\n"
+		"set border 3\nset xtics offset 0,0\nset ytics offset 0,0\nset autoscale xy\n"
+		"set xlabel norotate\nset ylabel rotate\n",
 		data, more);
 }
 
@@ -202,7 +281,7 @@ void model_plot_draw(const struct incise_model *model, const char *folder,
 		fprintf(script, "set size %g,%g\nset origin %g,%g\n", 1.0 / columns,
 			panel, (double)(i % columns) / columns,
 			1 - (i / columns + 1) * panel);
-		model_plot_functions(script, model, i, functions, "", NULL);
+		model_plot_functions(script, model, i, functions, "");
 	}
 	fprintf(script, "set size 1,%g\nset origin 0,0\nunset key\n", 1 - rows * panel);
 	model_plot_surface(script, &of, surface,

@@ -26,9 +26,10 @@ struct model_surface model_surface_of_fixed(const struct incise_fixed *fixed);
 void model_plot_write_functions(const struct incise_model *model, const char *folder,
 				const char *data);
 
-/* Plot one input's functions from such data. @names: for the legend; NULL: the model's. */
+/* Plot one input's functions from such data, with their names above them, or as a legend if these
+ * would cover each other. */
 void model_plot_functions(FILE *script, const struct incise_model *model, int input,
-			  const char *data, const char *title, const char *names);
+			  const char *data, const char *title);
 
 /* Write the output over the first one or two inputs, the others at the middle of their
  * support. */

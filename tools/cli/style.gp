@@ -6,11 +6,12 @@
 
 if (!exists("ext")) { ext = 'png' }
 if (!exists("figure_width")) { figure_width = 900; figure_height = 560 } # of a script, in pixels of 1/96 inch
+paper = '#FFFFFF'
 font = 'DejaVu Sans' # px: normal 14, small 12; a figure of 900 px printed 180 mm wide has 8 pt
 small = font.',12'
 large = font.',15'
 set encoding utf8
-if (ext eq 'svg') { set terminal svg size figure_width, figure_height font font.',14' linewidth 1.2 background 'white' }
+if (ext eq 'svg') { set terminal svg size figure_width, figure_height font font.',14' linewidth 1.2 background paper }
 if (ext eq 'png') { set terminal pngcairo size 2 * figure_width, 2 * figure_height font font.',14' fontscale 1.5 \
 	linewidth 2.4 pointscale 2 }
 if (ext eq 'pdf') { set terminal pdfcairo size figure_width / 96.0, figure_height / 96.0 font font.',14' \

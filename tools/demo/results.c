@@ -12,6 +12,7 @@
 #include <incise/rig.h>
 #include <incise/sim.h>
 #include <incise/version.h>
+#include <incise/vision.h>
 #include "../cli/cli.h"
 #include "../cli/file.h"
 #include "../cli/json.h"
@@ -69,7 +70,7 @@ static char *quantile_us(const json_t *haptic, const char *what, const char *nam
 	const json_t *value = json_object_get(json_object_get(haptic, what), name);
 
 	return json_is_number(value)
-		       ? cli_text("< %g us", json_number_value(value) * unit)
+		       ? cli_text("< %g µs", json_number_value(value) * unit)
 		       : cli_text("beyond the histogram");
 }
 
@@ -177,64 +178,108 @@ static int nearest_nominal(double depth_mm)
 	return best;
 }
 
+/* Force of the cuts of each depth, over the time in the cut. */
+struct averages {
+	double sum[N_NOMINAL][SLOTS];
+	int count[N_NOMINAL][SLOTS];
+	/* of the raw cuts: where their name stands */
+	double from_s[N_NOMINAL], to_s[N_NOMINAL], highest_N[N_NOMINAL];
+};
+
+/* Write one cut, its nominal depth as the last column, as a block. */
+static void write_cut(FILE *data, const struct incise_dataset *raw, size_t first,
+		      size_t last, struct averages *of)
+{
+	double deepest = 0, start = incise_dataset_row(raw, first)[0];
+	int n;
+
+	for (size_t k = first; k <= last; k++)
+		deepest = fmax(deepest, incise_dataset_row(raw, k)[1]);
+	n = nearest_nominal(deepest);
+	if (!of->to_s[n])
+		of->from_s[n] = start;
+	of->to_s[n] = incise_dataset_row(raw, last)[0];
+	for (size_t k = first; k <= last; k++) {
+		const double *row = incise_dataset_row(raw, k);
+		int slot = (int)((row[0] - start) / SLOT_S);
+
+		fprintf(data, "%.4f %.4f %g\n", row[0], row[3], nominal_mm[n]);
+		of->highest_N[n] = fmax(of->highest_N[n], row[3]);
+		if (slot < 0 || slot >= SLOTS)
+			continue;
+		of->sum[n][slot] += row[3];
+		of->count[n][slot]++;
+	}
+	fputs("\n\n", data);
+}
+
+/* Where the averaged curve is in the middle of the cut, N. */
+static double plateau(const struct averages *of, int n, double *middle_s)
+{
+	double highest = 0;
+	int slots = 0;
+
+	while (slots < SLOTS && of->count[n][slots])
+		slots++;
+	*middle_s = SLOT_S * slots / 2;
+	for (int s = slots * 2 / 5; s < slots * 3 / 5; s++)
+		highest = fmax(highest, of->sum[n][s] / of->count[n][s]);
+	return highest;
+}
+
+static void name_depths(FILE *script, const struct averages *of, bool averaged)
+{
+	for (int n = 0; n < N_NOMINAL; n++) {
+		double x = (of->from_s[n] + of->to_s[n]) / 2, y = of->highest_N[n];
+
+		if (averaged)
+			y = plateau(of, n, &x);
+		fprintf(script,
+			"set label %d '%g mm' at %.4f,%.4f center offset 0,0.7 tc lt %d\n",
+			n + 1, nominal_mm[n], x, y, n + 1);
+	}
+}
+
 static void figure_force(const struct demo *demo)
 {
 	struct incise_dataset *raw =
 		read_dataset(demo, "raw.csv", raw_columns, 4, "cut", NULL);
-	static double sum[N_NOMINAL][SLOTS];
-	static int count[N_NOMINAL][SLOTS];
+	static struct averages averages;
 	size_t rows = incise_dataset_rows(raw), first = 0;
 	FILE *data = plot_data(demo->folder, "force-raw.dat");
 	FILE *script;
 
-	/* A block per cut, its nominal depth as the last column. */
 	for (size_t i = 0; i < rows; i++) {
-		double deepest = 0, start = incise_dataset_row(raw, first)[0];
-		int nominal;
-
 		if (i + 1 < rows &&
 		    incise_dataset_group(raw, i + 1) == incise_dataset_group(raw, first))
 			continue;
-		for (size_t k = first; k <= i; k++)
-			deepest = fmax(deepest, incise_dataset_row(raw, k)[1]);
-		nominal = nearest_nominal(deepest);
-		for (size_t k = first; k <= i; k++) {
-			const double *row = incise_dataset_row(raw, k);
-			int slot = (int)((row[0] - start) / SLOT_S);
-
-			fprintf(data, "%.4f %.4f %g\n", row[0], row[3],
-				nominal_mm[nominal]);
-			if (slot < 0 || slot >= SLOTS)
-				continue;
-			sum[nominal][slot] += row[3];
-			count[nominal][slot]++;
-		}
-		fputs("\n\n", data);
+		write_cut(data, raw, first, i, &averages);
 		first = i + 1;
 	}
 	plot_data_end(data, demo->folder);
 	data = plot_data(demo->folder, "force-averaged.dat");
 	for (int d = 0; d < N_NOMINAL; d++) {
 		for (int s = 0; s < SLOTS; s++)
-			if (count[d][s])
+			if (averages.count[d][s])
 				fprintf(data, "%.4f %.5f\n", (s + 0.5) * SLOT_S,
-					sum[d][s] / count[d][s]);
+					averages.sum[d][s] / averages.count[d][s]);
 		fputs("\n\n", data);
 	}
 	plot_data_end(data, demo->folder);
-	script = plot_begin(demo->folder, "fig2-force", 1200, 800);
-	fputs("set multiplot layout 2,1 title 'Cutting force, virtual liver (as paper 1, fig. 2)'\n"
+	script = plot_begin(demo->folder, "fig2-force", 1000, 720);
+	fputs("set multiplot layout 2,1 title 'Cutting force of the simulated liver "
+	      "(compare figure 2 of Song et al., 2006)'\n"
+	      "set autoscale fix\nset offsets 0, 0, graph 0.14, graph 0.03\n"
 	      "set xlabel 'time in the recording / s'\nset ylabel 'force / N'\n"
-	      "set title '(a) raw: cuts at 5, 10, 15 and 20 mm'\n"
-	      "set key top left Left reverse samplen 2\n"
-	      "plot 'force-raw.dat' using 1:($3==5?$2:NaN) with lines ls 1 title '5 mm', \\\n"
-	      "  '' using 1:($3==10?$2:NaN) with lines ls 2 title '10 mm', \\\n"
-	      "  '' using 1:($3==15?$2:NaN) with lines ls 3 title '15 mm', \\\n"
-	      "  '' using 1:($3==20?$2:NaN) with lines ls 4 title '20 mm'\n"
+	      "set title '(a) raw samples, three or four cuts at each depth'\n",
+	      script);
+	name_depths(script, &averages, false);
+	fputs("plot for [i=1:4] 'force-raw.dat' using 1:($3==5*i?$2:NaN) with lines lt i lw 0.7\n"
 	      "set xlabel 'time in the cut / s'\n"
-	      "set title '(b) averaged over the cuts of each depth'\n"
-	      "plot for [i=0:3] 'force-averaged.dat' index i using 1:2 with lines ls (i+1) lw 2 \\\n"
-	      "  title sprintf('%d mm', 5*(i+1))\n"
+	      "set title '(b) mean of the cuts of each depth'\n",
+	      script);
+	name_depths(script, &averages, true);
+	fputs("plot for [i=0:3] 'force-averaged.dat' index i using 1:2 with lines lt (i+1)\n"
 	      "unset multiplot\n",
 	      script);
 	draw(demo, script, "fig2-force");
@@ -245,22 +290,21 @@ static void figure_force(const struct demo *demo)
 
 static void figure_membership(const struct demo *demo, const struct incise_model *model)
 {
-	static const char *const names[] = {"NB NS Z PS PB", "NB NS PS PB"};
 	struct incise_model *before = demo_model(demo, "liver-initial.fis");
 	FILE *script;
 
 	model_plot_write_functions(before, demo->folder, "membership-before.dat");
 	model_plot_write_functions(model, demo->folder, "membership-after.dat");
-	script = plot_begin(demo->folder, "fig3a-membership", 1200, 700);
-	fputs("set multiplot layout 2,2 title 'Membership functions before and after training "
-	      "(as paper 1, fig. 3a)'\nset key outside right center\n",
+	script = plot_begin(demo->folder, "fig3a-membership", 1000, 680);
+	fputs("set multiplot layout 2,2 title 'Membership functions of depth and velocity "
+	      "(compare figure 3a of Song et al., 2006)'\nset key outside right center\n",
 	      script);
 	for (int i = 0; i < 2; i++)
 		model_plot_functions(script, before, i, "membership-before.dat",
-				     "before training", names[i]);
+				     i ? "(b) before training" : "(a) before training");
 	for (int i = 0; i < 2; i++)
 		model_plot_functions(script, model, i, "membership-after.dat",
-				     "after training", names[i]);
+				     i ? "(d) after training" : "(c) after training");
 	fputs("unset multiplot\n", script);
 	draw(demo, script, "fig3a-membership");
 	incise_model_free(before);
@@ -272,11 +316,11 @@ static void figure_surface(const struct demo *demo, const struct incise_model *m
 	FILE *script;
 
 	model_plot_write_surface(&surface, demo->folder, "surface.dat");
-	script = plot_begin(demo->folder, "fig3b-surface", 1000, 800);
-	model_plot_surface(
-		script, &surface, "surface.dat",
-		"Force of the trained model (as paper 1, fig. 3b); dots: the averaged pairs",
-		", \\\n  'pairs.dat' with points pt 7 ps 0.6 lc rgb ink");
+	script = plot_begin(demo->folder, "fig3b-surface", 1000, 720);
+	model_plot_surface(script, &surface, "surface.dat",
+			   "Cutting force of the trained model; markers: averaged pairs "
+			   "(compare figure 3b of Song et al., 2006)",
+			   ", \\\n  'pairs.dat' with points pt 7 ps 0.5 lc rgb ink");
 	draw(demo, script, "fig3b-surface");
 }
 
@@ -308,14 +352,14 @@ static void figure_prediction(const struct demo *demo)
 	struct incise_dataset *log =
 		read_dataset(demo, "haptic.csv", ticks, 4, NULL, NULL);
 	FILE *data = plot_data(demo->folder, "prediction.dat");
-	double contact = -1;
+	double contact = -1, duration_s = 1;
 	FILE *script;
 
 	for (size_t i = 0; i < incise_dataset_rows(cut); i++) {
 		const double *row = incise_dataset_row(cut, i);
 
-		fprintf(data, "%.4f %.5f %.5f\n", row[0] - incise_dataset_row(cut, 0)[0],
-			row[1], row[2]);
+		duration_s = row[0] - incise_dataset_row(cut, 0)[0];
+		fprintf(data, "%.4f %.5f %.5f\n", duration_s, row[1], row[2]);
 	}
 	plot_data_end(data, demo->folder);
 	/* Both begin where the blade meets the tissue. */
@@ -333,84 +377,178 @@ static void figure_prediction(const struct demo *demo)
 	if (contact < 0)
 		fputs("0 0 0\n", data);
 	plot_data_end(data, demo->folder);
-	script = plot_begin(demo->folder, "fig5-prediction", 1200, 800);
-	fputs("set multiplot layout 2,1 title 'A new cut at 5 mm (as paper 1, fig. 5)'\n"
-	      "set xlabel 'time in the cut / s'\nset ylabel 'force / N'\nset key top right\n"
-	      "set xrange [0:*]\nset yrange [0:*]\n"
-	      "set title '(a) predicted by the model, and measured'\n"
-	      "plot 'prediction.dat' using 1:2 with lines lc rgb grey title 'measured', \\\n"
-	      "  '' using 1:3 with lines ls 2 lw 2 title 'predicted'\n"
-	      "set title '(b) rendered by the haptic loop, and recorded'\n"
-	      "plot 'prediction.dat' using 1:2 with lines lc rgb grey title 'recorded', \\\n"
-	      "  'rendered.dat' using 1:3 with lines ls 3 lw 2.5 title 'on the hand', \\\n"
-	      "  '' using 1:2 with lines lc rgb ink dt 2 title 'commanded'\n"
-	      "unset multiplot\n",
-	      script);
+	script = plot_begin(demo->folder, "fig5-prediction", 1000, 720);
+	/* One time axis: that of the cut, whatever the loop ran on for. */
+	fprintf(script,
+		"set multiplot layout 2,1 margins screen 0.08,0.98,0.15,0.86 spacing 0,0.14 "
+		"title 'New cut at 5 mm (compare figure 5 of Song et al., 2006)'\n"
+		"set xlabel 'time in the cut / s'\nset ylabel 'force / N'\nset key off\n"
+		"set xrange [0:%.4f]\nset yrange [0:*]\nset ytics 0.1\n"
+		"set title '(a) measured, and predicted by the model'\n"
+		"plot 'prediction.dat' using 1:2 with lines lc rgb grey lw 0.8, \\\n"
+		"  '' using 1:3 with lines lt 2\n"
+		"set title '(b) measured, and rendered by the haptic loop'\n"
+		"plot 'prediction.dat' using 1:2 with lines lc rgb grey lw 0.8, \\\n"
+		"  'rendered.dat' using 1:3 with lines lt 3 lw 2.5, \\\n"
+		"  '' using 1:2 with lines lc rgb ink dt 2 lw 1\n"
+		"eval key_panel\n"
+		"plot NaN with lines lc rgb grey lw 0.8 title 'measured', \\\n"
+		"  NaN with lines lt 2 title 'predicted', \\\n"
+		"  NaN with lines lt 3 lw 2.5 title 'force on the hand', \\\n"
+		"  NaN with lines lc rgb ink dt 2 lw 1 title 'commanded force'\n"
+		"unset multiplot\n",
+		duration_s);
 	draw(demo, script, "fig5-prediction");
 	incise_dataset_free(cut);
 	incise_dataset_free(log);
 }
 
+/* Share of the ticks in bins that widen with the lateness. */
+static void write_lateness(const json_t *histogram, double ticks, FILE *data)
+{
+	double end = 0, from = 0;
+	size_t i = 0, n = json_array_size(histogram);
+
+	for (size_t k = 0; k < n; k++)
+		end = fmax(end, json_number_value(
+					json_array_get(json_array_get(histogram, k), 0)));
+	while (from <= end && n) {
+		double to = from + fmax(1, floor(from / 10)), count = 0;
+
+		for (; i < n; i++) {
+			const json_t *bin = json_array_get(histogram, i);
+
+			if (json_number_value(json_array_get(bin, 0)) >= to)
+				break;
+			count += json_number_value(json_array_get(bin, 1));
+		}
+		/* Lateness within the first µs begins where the axis does. */
+		if (count > 0)
+			fprintf(data, "%g %g %.9g\n", fmax(from, 0.5), to, count / ticks);
+		from = to;
+	}
+}
+
 static void figure_lateness(const struct demo *demo, const json_t *haptic)
 {
 	const json_t *lateness = json_object_get(haptic, "lateness_us");
-	const json_t *histogram = json_object_get(lateness, "histogram");
+	double ticks = fmax(1, number_of(haptic, "ticks", NULL));
 	char *median = quantile_us(haptic, "lateness_us", "median", 1);
 	char *p999 = quantile_us(haptic, "lateness_us", "p999", 1);
 	FILE *data = plot_data(demo->folder, "lateness.dat");
-	size_t i;
-	json_t *bin;
 	FILE *script;
 
-	json_array_foreach(histogram, i, bin)
-		fprintf(data, "%g %g\n", json_number_value(json_array_get(bin, 0)) + 0.5,
-			json_number_value(json_array_get(bin, 1)));
+	write_lateness(json_object_get(lateness, "histogram"), ticks, data);
 	plot_data_end(data, demo->folder);
-	script = plot_begin(demo->folder, "tick-lateness", 1000, 500);
+	script = plot_begin(demo->folder, "tick-lateness", 900, 480);
 	fprintf(script,
-		"set title 'Lateness of %g ticks at 1 kHz (this machine, %s): median %s, "
-		"99.9 %% %s, largest %.0f µs'\n"
-		"set xlabel 'lateness / us (the last bin holds all above 20 ms)'\n"
-		"set ylabel 'ticks'\nset logscale xy\nset xrange [0.4:25000]\n"
-		"set yrange [0.7:*]\nset style fill solid 0.6\n"
-		"plot 'lateness.dat' using 1:2 with impulses ls 1 lw 2\n",
-		number_of(haptic, "ticks", NULL),
-		json_string_value(json_object_get(haptic, "scheduling")), median, p999,
-		number_of(lateness, "max", NULL));
+		"set title \"Lateness of %g ticks of the haptic loop at 1 kHz, %s\\n"
+		"median %s, 99.9th percentile %s, largest %.0f µs\"\n"
+		"set xlabel 'lateness / µs'\nset ylabel 'share of the ticks / 1'\n"
+		"set logscale xy\nset format xy power\nset style fill solid 0.8 noborder\n"
+		"set autoscale xfix\nset yrange [%g:1]\n"
+		"plot 'lateness.dat' using (sqrt($1*$2)):3:1:2:(%g):3 "
+		"with boxxyerror fc rgb blue\n",
+		ticks, json_string_value(json_object_get(haptic, "scheduling")), median,
+		p999, number_of(lateness, "max", NULL), 0.5 / ticks, 0.5 / ticks);
 	free(median), free(p999);
 	draw(demo, script, "tick-lateness");
 }
 
-/* ---- The camera's picture ---- */
+/* ---- The camera's frame ---- */
+
+/*
+ * Draw over the frame what the camera's measurement found: the edge of the tissue, the exposed
+ * length along the axis, and the hidden part of the blade down to its tip.
+ *
+ *     ├─┤  upper end of the black part
+ *      │   exposed length
+ *   ───┼─── skin line
+ *      ╎   depth
+ *      ▼   tip
+ */
+static void annotate(FILE *script, const struct incise_vision_result *r, double mm_px)
+{
+	const double *e = r->edge_px, *a = r->axis;
+	double down = r->depth_mm / mm_px, up = r->length_px;
+	double aside = 60; /* of the exposed length, px */
+
+	fprintf(script,
+		"set arrow from %.1f,%.1f to %.1f,%.1f nohead dt 2 lc rgb sky lw 2 front\n"
+		"set label 'skin line' at %.1f,%.1f left front tc rgb paper\n",
+		e[0] + 150 * a[1], e[1] - 150 * a[0], e[0] - 150 * a[1],
+		e[1] + 150 * a[0], e[0] + 155, e[1] - 14);
+	fprintf(script,
+		"set arrow from %.1f,%.1f to %.1f,%.1f heads size 8,20 lc rgb sky lw 2 front\n"
+		"set label \"exposed length\\n%.1f px = %.2f mm\" at %.1f,%.1f left front "
+		"tc rgb paper\n",
+		e[0] + aside, e[1] - aside * a[0], e[0] + aside - up * a[0],
+		e[1] - aside * a[0] - up * a[1], r->length_px, r->length_px * mm_px,
+		e[0] + aside + 14 - up / 2 * a[0], e[1] - up / 2 * a[1]);
+	fprintf(script,
+		"set arrow from %.1f,%.1f to %.1f,%.1f nohead dt 3 lc rgb ink lw 2 front\n"
+		"set label '' at %.1f,%.1f point pt 11 ps 1.2 lc rgb ink front\n"
+		"set label \"tip, hidden by the tissue,\\n%.2f mm below the skin line\" at "
+		"%.1f,%.1f left front\n",
+		e[0], e[1], e[0] + down * a[0], e[1] + down * a[1], e[0] + down * a[0],
+		e[1] + down * a[1], r->depth_mm, e[0] + down * a[0] + 16,
+		e[1] + down * a[1] - 14);
+}
+
+/* Measure the frame as incise capture does; false without the module for it. */
+static bool measure(struct incise_rig *rig, const struct incise_camera_frame *frame,
+		    struct incise_vision_setup *setup,
+		    struct incise_vision_result *result)
+{
+	struct incise_error err = {0};
+	struct incise_vision *vision;
+	bool found;
+
+	if (incise_rig_vision(rig, setup))
+		return false;
+	vision = incise_vision_new(setup, &err);
+	if (!vision)
+		return false;
+	found = !incise_vision_measure(vision, frame, result) && result->found;
+	incise_vision_free(vision);
+	return found;
+}
 
 static void figure_camera(const struct demo *demo)
 {
+	struct incise_vision_result result;
+	struct incise_vision_setup setup;
 	struct incise_camera_frame frame;
 	struct incise_rig *rig;
 	char *spec =
 		cli_text("sim:seed=%ld,clock=simulated,depth_mm=10,times=1", demo->seed);
 	FILE *data, *script;
+	double mm_px;
 
 	rig = cli_open_rig(spec, INCISE_RIG_CAMERA);
+	mm_px = incise_sim_config(incise_rig_sim(rig))->camera_mm_px;
 	/* Well into the first cut. */
 	incise_clock_wait_until(incise_rig_clock(rig),
 				incise_clock_now(incise_rig_clock(rig)) +
 					6 * INCISE_NS_PER_S);
 	if (incise_camera_newest(incise_rig_camera(rig), &frame) != 1)
-		cli_fail("the virtual camera gave no picture");
+		cli_fail("the simulated camera gave no frame");
 	data = plot_data(demo->folder, "camera.rgb");
 	for (int y = 0; y < frame.height; y++)
 		fwrite(frame.data + (size_t)y * frame.stride, 3, frame.width, data);
 	plot_data_end(data, demo->folder);
-	script =
-		plot_begin(demo->folder, "camera", frame.width + 160, frame.height + 120);
+	script = plot_begin(demo->folder, "camera", 900, 860);
 	fprintf(script,
-		"set title 'Virtual camera: %g mm/px, scalpel 10 mm deep'\nset size ratio -1\n"
-		"unset grid\nset xrange [0:%d]\nset yrange [%d:0]\nset xlabel 'px'\n"
-		"set ylabel 'px'\nplot 'camera.rgb' binary array=(%d,%d) format='%%uchar' "
-		"with rgbimage\n",
-		incise_sim_config(incise_rig_sim(rig))->camera_mm_px, frame.width,
-		frame.height, frame.width, frame.height);
+		"set title 'Scalpel in a cut: frame of the simulated camera at %.5g mm per "
+		"pixel'\n"
+		"set size ratio -1\nunset grid\nset xrange [0:%d]\nset yrange [%d:0]\n"
+		"set xlabel 'x / px'\nset ylabel 'y / px'\n",
+		mm_px, frame.width, frame.height + 120);
+	if (measure(rig, &frame, &setup, &result))
+		annotate(script, &result, mm_px);
+	fprintf(script,
+		"plot 'camera.rgb' binary array=(%d,%d) format='%%uchar' with rgbimage\n",
+		frame.width, frame.height);
 	draw(demo, script, "camera");
 	incise_rig_close(rig);
 	free(spec);
@@ -478,7 +616,7 @@ void demo_summary_print(const struct demo *demo, FILE *out, double seconds)
 		"fixed point against double                   %.4f mN largest of %d points, "
 		"certified to %.4f mN\n\n"
 		"haptic loop        %.0f ticks at %g Hz, %.0f skipped (%s)\n"
-		"  lateness         median %s, 99.9 %% %s, largest %.0f us\n"
+		"  lateness         median %s, 99.9 %% %s, largest %.0f µs\n"
 		"  tick             median %s, 99.9 %% %s\n"
 		"  force            largest %.3f N, actuator off by %.4f N rms\n\n"
 		"took               %.0f s\n",

@@ -200,7 +200,7 @@ static FILE *draw(const struct figure *figure, const struct model_surface *surfa
 	fputs("set multiplot\nset key outside right center\n", grid.script);
 	for (int i = 0; i < n; i++) {
 		place(&grid, i % columns, columns, FUNCTIONS_HEIGHT);
-		model_plot_functions(grid.script, model, i, "functions.dat", "", NULL);
+		model_plot_functions(grid.script, model, i, "functions.dat", "");
 	}
 	if (n % columns)
 		grid.top += FUNCTIONS_HEIGHT;

@@ -106,8 +106,10 @@ struct incise_model;
 
 /**
  * A model whose rules form the full grid of the inputs' membership functions. Inputs get
- * evenly spaced functions over their range, neighbours crossing at 0.5 (genfis1);
- * consequents are zero.
+ * evenly spaced functions over their range, neighbours crossing at 0.5 (genfis1), named for a
+ * reader: "shallow" … "deep" over an input whose name begins with depth, "slow" … "fast" over
+ * velocity or speed, else, and over negative values, "low" … "high"; "level_1" … from eight on.
+ * Consequents are zero.
  *
  * @param n_inputs  1 … INCISE_MODEL_INPUTS_MAX
  * @param inputs    n_inputs names and ranges

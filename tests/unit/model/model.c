@@ -576,6 +576,47 @@ static void test_grid_shape(void **state)
 	incise_model_free(model);
 }
 
+/* Names say where a function lies, and none is negative over a depth. */
+static void test_names(void **state)
+{
+	static const struct incise_variable out = {"force_N", 0, 4};
+	static const struct {
+		struct incise_variable in;
+		int n;
+		const char *first, *second, *last;
+	} cases[] = {
+		{{"depth_mm", 0, 20}, 1, "medium", NULL, "medium"},
+		{{"depth_mm", 0, 20}, 2, "shallow", "deep", "deep"},
+		{{"depth_mm", 0, 20}, 3, "shallow", "medium", "deep"},
+		{{"depth_mm", 0, 20}, 5, "very_shallow", "shallow", "very_deep"},
+		{{"velocity_mm_s", 0, 50}, 4, "very_slow", "slow", "very_fast"},
+		{{"velocity_mm_s", -50, 50}, 4, "very_low", "low", "very_high"},
+		{{"speed", 0, 1}, 6, "extremely_slow", "very_slow", "extremely_fast"},
+		{{"angle_deg", 0, 90}, 7, "extremely_low", "very_low", "extremely_high"},
+		{{"depth_mm", 0, 20}, 32, "level_1", "level_2", "level_32"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		int n = cases[i].n;
+		struct incise_model *model = incise_model_new_grid(
+			1, &cases[i].in, &n, INCISE_MF_GAUSS, &out, NULL);
+
+		assert_non_null(model);
+		assert_string_equal(incise_model_mf(model, 0, 0)->name, cases[i].first);
+		if (n > 1)
+			assert_string_equal(incise_model_mf(model, 0, 1)->name,
+					    cases[i].second);
+		assert_string_equal(incise_model_mf(model, 0, n - 1)->name,
+				    cases[i].last);
+		for (int k = 0; k < n; k++)
+			for (int j = 0; j < k; j++)
+				assert_string_not_equal(
+					incise_model_mf(model, 0, j)->name,
+					incise_model_mf(model, 0, k)->name);
+		incise_model_free(model);
+	}
+}
+
 static void test_refusals(void **state)
 {
 	static const struct {
@@ -691,6 +732,7 @@ int main(void)
 		cmocka_unit_test(test_nothing_yields_nan),
 		cmocka_unit_test(test_no_input_yields_nan),
 		cmocka_unit_test(test_grid_shape),
+		cmocka_unit_test(test_names),
 		cmocka_unit_test(test_refusals),
 		cmocka_unit_test(test_constant_rule_takes_slopes),
 		cmocka_unit_test(test_setters_refuse_what_is_no_number),

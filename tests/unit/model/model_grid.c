@@ -138,16 +138,16 @@ static void test_refusals(void **state)
 	refused(square(3, 2, 1), E2BIG, "3 inputs");
 	refused(square(1, 2, 20000), ERANGE, "16383");
 	refused(square(2, 2, 1e-4), ERANGE, "0.001");
-	refused(paper_model(INCISE_MF_GBELL, 1, 1), ENOTSUP, "in1mf1 is a gbellmf");
+	refused(paper_model(INCISE_MF_GBELL, 1, 1), ENOTSUP, "very_shallow is a gbellmf");
 	model = square(2, 2, 1);
 	model->info.and_method = INCISE_AND_MIN;
 	refused(model, ENOTSUP, "AndMethod is min");
 	model = square(1, 2, 1);
 	incise_model_set_mf(model, 0, 1, (double[4]){1e-12, 0.5});
-	refused(model, ERANGE, "in1mf2: its width");
+	refused(model, ERANGE, "high: its width");
 	model = square(1, 2, 1);
 	incise_model_set_mf(model, 0, 0, (double[4]){1, -1e9});
-	refused(model, ERANGE, "in1mf1: its centre");
+	refused(model, ERANGE, "low: its centre");
 }
 
 static void test_same_model(void **state)
