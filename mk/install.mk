@@ -7,6 +7,9 @@ scenes := $(wildcard scenes/*.scene scenes/*.fis)
 examples := $(wildcard doc/*.example)
 # All but the main page of the headers' reference, which is in that.
 documents := README.md CHANGELOG.md $(filter-out doc/reference.md,$(wildcard doc/*.md doc/*.svg doc/*.png))
+# Sources of examples, not what was built of them.
+example_files := $(addprefix examples/,README.md Makefile own_loop.c tracker_lines.c)
+example_scripts := examples/capture_to_figure.sh
 udev_rules := $(wildcard udev/*.rules)
 sysusers := $(wildcard udev/*.sysusers)
 tmpfiles := $(wildcard udev/*.tmpfiles)
@@ -22,7 +25,7 @@ installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(foreach page,$(notdir $(man_pages)),$(mandir)/man$(subst .,,$(suffix $(page)))/$(page)) \
 	$(addprefix $(datadir)/incise/scenes/,$(notdir $(scenes))) \
 	$(addprefix $(datadir)/incise/,$(notdir $(examples))) \
-	$(addprefix $(docdir)/,$(notdir $(documents))) \
+	$(addprefix $(docdir)/,$(notdir $(documents)) $(example_files) $(example_scripts)) \
 	$(completiondir)/incise \
 	$(addprefix $(udevrulesdir)/,$(notdir $(udev_rules))) \
 	$(addprefix $(sysusersdir)/,$(patsubst %.sysusers,%.conf,$(notdir $(sysusers)))) \
@@ -64,6 +67,8 @@ install: all ## install below $(DESTDIR)$(prefix)
 	$(INSTALL) -m 644 $(scenes) $(DESTDIR)$(datadir)/incise/scenes
 	$(INSTALL) -m 644 $(examples) $(DESTDIR)$(datadir)/incise
 	$(INSTALL) -m 644 $(documents) $(DESTDIR)$(docdir)
+	$(INSTALL) -m 644 $(example_files) $(DESTDIR)$(docdir)/examples
+	$(INSTALL) -m 755 $(example_scripts) $(DESTDIR)$(docdir)/examples
 	$(INSTALL) -m 644 tools/incise.bash $(DESTDIR)$(completiondir)/incise
 	$(INSTALL) -m 644 $(udev_rules) $(DESTDIR)$(udevrulesdir)
 	for file in $(sysusers); do \

@@ -195,7 +195,7 @@ $(tsan_programs): tests/unit/loop/state_reader.c $(wildcard lib/loop/state_*.c) 
 check-tsan: $(tsan_programs) ## what threads share without a lock, under ThreadSanitizer
 	@tests/unit/run $(tsan_programs)
 
-style_sources := $(shell find lib tools tests driver -name '*.[ch]' -o -path 'lib/*.cc' 2>/dev/null)
+style_sources := $(shell find lib tools tests driver examples -name '*.[ch]' -o -path 'lib/*.cc' 2>/dev/null)
 check-style: ## the house's form: clang-format, an SPDX line in every file
 	@tests/style $(style_sources)
 
