@@ -347,3 +347,52 @@ entry() {
 	run --separate-stderr incise plot c.conf -o c.png
 	failed_with "c.conf: has no history to draw; 'incise calibrate' adds to it"
 }
+
+@test "without -o it is a window, which ends when it is closed" {
+	local i pid id seen=
+	command -v Xvfb >/dev/null && command -v xdotool >/dev/null || skip "Xvfb or xdotool are not installed"
+	gnuplot -e "set print '-'; print GPVAL_TERMINALS" | grep -qwE 'qt|wxt|x11' || skip "gnuplot has no windows"
+	Xvfb -displayfd 5 -screen 0 1280x1024x24 5>display >/dev/null 2>&1 3>&- &
+	server=$!
+	for ((i = 0; i < 500; i++)); do [ -s display ] && break || sleep 0.02; done
+	DISPLAY=:$(cat display)
+	export DISPLAY
+	incise plot m.fis >out 2>err 3>&- &
+	pid=$!
+	# hidden windows of gnuplot have its name too, and a key before the plot is drawn is lost
+	for ((i = 0; i < 300; i++)); do
+		kill -0 $pid 2>/dev/null || break
+		for id in $(xdotool search --name Gnuplot 2>/dev/null); do
+			seen=yes
+			xdotool windowfocus "$id" key --window "$id" q 2>/dev/null || :
+		done
+		sleep 0.1
+	done
+	[ "$seen" = yes ] || complain "no window: $(cat err)"
+	wait $pid || complain "exit $?: $(cat err)"
+	[ ! -s out ] && [ ! -s err ]
+	kill $server
+}
+
+@test "a window that is interrupted ends with gnuplot" {
+	mkdir bin
+	cat >bin/gnuplot <<-'END'
+		#!/bin/sh
+		case "$*" in
+		*GPVAL_TERMINALS*) echo "png x11 svg" ;;
+		*ext=\'x11\'*) grep -q 'pause mouse close' figure.gp && echo $$ >"$STARTED" && exec sleep 600 ;;
+		*) exit 1 ;;
+		esac
+	END
+	chmod +x bin/gnuplot
+	export STARTED=$PWD/started
+	PATH=$PWD/bin:$PATH DISPLAY=:7 incise plot m.fis >out 2>err 3>&- &
+	pid=$!
+	for ((i = 0; i < 500; i++)); do [ -s started ] && break || sleep 0.02; done
+	kill -INT $pid
+	status=0
+	wait $pid || status=$?
+	[ "$status" = 1 ]
+	[ "$(cat err)" = "incise plot: interrupted" ]
+	run ! kill -0 "$(cat started)"
+}
