@@ -352,6 +352,7 @@ static void draw(const char *folder, const struct stream *streams,
 		 const struct pair *pairs)
 {
 	FILE *script;
+	int n = 0;
 
 	if (!calibrate_can_plot(folder))
 		return;
@@ -370,18 +371,25 @@ static void draw(const char *folder, const struct stream *streams,
 				streams[i].points[k].value);
 		plot_data_end(data, folder);
 	}
-	script = plot_begin(folder, "fit", 1000, 500);
-	fprintf(script,
-		"set xlabel 'time, s'\nset ylabel 'depth, mm'\nset y2label 'force, N'\n"
-		"set y2tics\nset key top right\n"
-		"plot 'tracker.dat' using ($1-%g):2 with lines ls 1 title 'tracker, "
-		"moved', 'force.dat' using 1:2 axes x1y2 with lines ls 2 title 'force'",
+	script = plot_begin(folder, "fit", 1000, 520);
+	fputs("set title 'Streams of the rig, each moved by its measured delay'\n"
+	      "set xlabel 'time / s'\nset ylabel 'depth / mm'\nset autoscale xfix\n"
+	      "eval key_below\n",
+	      script);
+	if (streams[FORCE].n)
+		fputs("set border 11\nset y2label 'force / N'\nset y2tics\n", script);
+	plot_add(
+		script, &n,
+		"'tracker.dat' using ($1-%g):2 with lines lt 1 title 'depth by the tracker'",
 		pairs[FORCE].known ? pairs[FORCE].fit.delay_ms * 1e-3 : 0);
+	if (streams[FORCE].n)
+		plot_add(script, &n,
+			 "'force.dat' using 1:2 axes x1y2 with lines lt 2 title 'force'");
 	if (pairs[CAMERA].known)
-		fprintf(script,
-			", 'camera.dat' using ($1+%g):2 with points pt 7 ps 0.4 lc 3 "
-			"title 'camera, moved'",
-			(pairs[CAMERA].fit.delay_ms - pairs[FORCE].fit.delay_ms) * 1e-3);
+		plot_add(script, &n,
+			 "'camera.dat' using ($1+%g):2 with points lt 3 ps 0.5 "
+			 "title 'depth by the camera'",
+			 (pairs[CAMERA].fit.delay_ms - pairs[FORCE].fit.delay_ms) * 1e-3);
 	putc('\n', script);
 	if (!plot_draw(script, folder, "fit"))
 		cli_warn("fit.png: could not be drawn; see whether gnuplot works");

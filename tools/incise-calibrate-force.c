@@ -460,38 +460,57 @@ static json_t *report_json(const struct report *report)
 	return root;
 }
 
+/* The pairs by rising, falling and left out, those that are there, as a plot of a column. */
+static void put_pairs(FILE *script, int column, const bool there[3])
+{
+	static const char *const names[] = {"rising", "falling", "left out"};
+	static const int markers[] = {9, 11, 2};
+	int n = 0;
+
+	for (int k = 0; k < 3; k++)
+		if (there[k])
+			plot_add(
+				script, &n,
+				"'pairs.dat' using ($4 == %d ? $1 : NaN):%d with points lt %d "
+				"pt %d ps 1 title '%s'",
+				k, column, k + 1, markers[k], names[k]);
+}
+
 /* Both plots use one file: force, reading, residual, and whether it was used. */
 static void draw(const struct report *report, const char *folder)
 {
 	const struct incise_calibrate_force *r = report->result;
 	FILE *data = plot_data(folder, "pairs.dat"), *script;
+	bool there[3] = {false};
 
 	for (int i = 0; i < report->pairs->n; i++) {
 		const struct incise_calibrate_force_pair *p = &report->pairs->pair[i];
 		double F_N = incise_calibrate_force_of(p, report->setup);
 
+		int kind = report->states[i] ? 2 : p->descending ? 1 : 0;
+
+		there[kind] = true;
 		fprintf(data, "%.6f %.4f %.4f %d\n", F_N, p->reading_mV,
-			p->reading_mV - r->zero_mV - r->sensitivity_mV_N * F_N,
-			report->states[i] ? 2
-			: p->descending	  ? 1
-					  : 0);
+			p->reading_mV - r->zero_mV - r->sensitivity_mV_N * F_N, kind);
 	}
 	plot_data_end(data, folder);
-	script = plot_begin(folder, "fit", 1000, 700);
+	script = plot_begin(folder, "fit", 900, 560);
+	fputs("set title 'Reading of the force channel over the applied force'\n"
+	      "set xlabel 'force / N'\nset ylabel 'reading / mV'\neval key_below\n",
+	      script);
+	put_pairs(script, 2, there);
 	fprintf(script,
-		"set xlabel 'force / N'\nset ylabel 'reading / mV'\nset key top left\n"
-		"plot %.10g + %.10g * x with lines ls 1 title '%.2f mV/N', \\\n"
-		"  'pairs.dat' using ($4 == 0 ? $1 : 1/0):2 with points pt 9 title 'up', \\\n"
-		"  '' using ($4 == 1 ? $1 : 1/0):2 with points pt 11 title 'down', \\\n"
-		"  '' using ($4 == 2 ? $1 : 1/0):2 with points pt 2 title 'left out'\n",
+		", \\\n  %.10g + %.10g * x with lines lc rgb ink lw 1 title 'line, %.2f mV/N'\n",
 		r->zero_mV, r->sensitivity_mV_N, r->sensitivity_mV_N);
 	plot_draw_or_fail(script, folder, "fit");
-	script = plot_begin(folder, "residuals", 1000, 700);
-	fprintf(script,
-		"set xlabel 'force / N'\nset ylabel 'reading - line / mV'\nset key top left\n"
-		"plot 0 with lines ls 1 notitle, \\\n"
-		"  'pairs.dat' using ($4 == 0 ? $1 : 1/0):3 with points pt 9 title 'up', \\\n"
-		"  '' using ($4 == 1 ? $1 : 1/0):3 with points pt 11 title 'down'\n");
+	script = plot_begin(folder, "residuals", 900, 560);
+	fputs("set title 'Residuals of the reading from the line'\n"
+	      "set xlabel 'force / N'\nset ylabel 'residual of the reading / mV'\n"
+	      "eval key_below\n",
+	      script);
+	there[2] = false;
+	put_pairs(script, 3, there);
+	fputs(", \\\n  0 with lines lc rgb ink lw 1\n", script);
 	plot_draw_or_fail(script, folder, "residuals");
 }
 

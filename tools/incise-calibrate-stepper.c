@@ -457,6 +457,49 @@ static json_t *report_json(const struct report *report)
 	return object;
 }
 
+static bool has_state(const struct stepper_series *series, int from, int to)
+{
+	for (int i = 0; i < series->n; i++)
+		if ((int)series->states[i] >= from && (int)series->states[i] <= to)
+			return true;
+	return false;
+}
+
+static void draw_report(const struct incise_calibrate_stepper *fit,
+			const struct stepper_series *series, const char *folder)
+{
+	FILE *script = plot_begin(folder, "fit", 900, 560);
+	int n = 0;
+
+	fprintf(script,
+		"set title 'Force of the actuator over its position, and fitted lines'\n"
+		"set xlabel 'position / mm'\nset ylabel 'force / N'\neval key_below\n"
+		"plot 'points.dat' using 1:($4==1?$2:NaN) with points lt 1 pt 9 title 'up', \\\n"
+		"  '' using 1:($4==0?$2:NaN) with points lt 2 pt 11 title 'down', \\\n"
+		"  %.9g+%.9g*x lt 1 title 'line, up', %.9g+%.9g*x lt 2 title 'line, down'\n",
+		fit->up_N, fit->N_mm, fit->down_N, fit->N_mm);
+	plot_draw_or_fail(script, folder, "fit");
+	script = plot_begin(folder, "residuals", 900, 560);
+	fputs("set title 'Residuals of the force from the fitted lines'\n"
+	      "set xlabel 'position / mm'\nset ylabel 'residual of the force / N'\n"
+	      "eval key_below\n",
+	      script);
+	plot_add(script, &n,
+		 "'points.dat' using 1:($5==0?$3:NaN) with points lt 1 title 'used'");
+	if (has_state(series, INCISE_CALIBRATE_STEPPER_TURN,
+		      INCISE_CALIBRATE_STEPPER_TURN))
+		plot_add(
+			script, &n,
+			"'points.dat' using 1:($5==1?$3:NaN) with points lt 8 title 'after a turn'");
+	if (has_state(series, INCISE_CALIBRATE_STEPPER_SATURATED,
+		      INCISE_CALIBRATE_STEPPER_OUTLIER))
+		plot_add(
+			script, &n,
+			"'points.dat' using 1:($5>1?$3:NaN) with points lt 2 pt 2 title 'left out'");
+	fputc('\n', script);
+	plot_draw_or_fail(script, folder, "residuals");
+}
+
 /* FOLDER/fit.png, residuals.png, report.txt, report.json. */
 static void write_report(const struct report *report, const char *folder)
 {
@@ -464,7 +507,7 @@ static void write_report(const struct report *report, const char *folder)
 	const struct stepper_series *series = report->series;
 	struct incise_outfile *file;
 	double before = NAN;
-	FILE *data, *script;
+	FILE *data;
 	int up = 1;
 
 	plot_folder(folder);
@@ -481,20 +524,7 @@ static void write_report(const struct report *report, const char *folder)
 			p->force_N - line, up, (int)series->states[i]);
 	}
 	plot_data_end(data, folder);
-	script = plot_begin(folder, "fit", 1000, 700);
-	fprintf(script,
-		"set xlabel 'position / mm'\nset ylabel 'force / N'\nset key top left\n"
-		"plot 'points.dat' using 1:($4==1?$2:1/0) with points pt 8 title 'up', \\\n"
-		"  '' using 1:($4==0?$2:1/0) with points pt 10 title 'down', \\\n"
-		"  %.9g+%.9g*x title 'line up', %.9g+%.9g*x title 'line down'\n",
-		fit->up_N, fit->N_mm, fit->down_N, fit->N_mm);
-	plot_draw_or_fail(script, folder, "fit");
-	script = plot_begin(folder, "residuals", 1000, 700);
-	fprintf(script, "set xlabel 'position / mm'\nset ylabel 'off the line / N'\n"
-			"plot 'points.dat' using 1:($5==0?$3:1/0) title 'used', \\\n"
-			"  '' using 1:($5==1?$3:1/0) title 'behind turns', \\\n"
-			"  '' using 1:($5>1?$3:1/0) pt 7 title 'left out'\n");
-	plot_draw_or_fail(script, folder, "residuals");
+	draw_report(fit, series, folder);
 	report_text(report, calibrate_report_text(folder, &file));
 	whole_file_end(file);
 	calibrate_report_json(folder, report_json(report));

@@ -332,10 +332,40 @@ static void residual(const struct incise_tip_fit *fit, const struct incise_tip_p
 	}
 }
 
+static void put_plot(FILE *script, bool residuals, bool left_out)
+{
+	int n = 0;
+
+	if (residuals)
+		fputs("set title 'Residuals of the tip, without poses left out'\n"
+		      "set xlabel 'time / s'\nset ylabel 'residual of the tip / mm'\n"
+		      "set autoscale xfix\neval key_below\n"
+		      "plot for [k=2:4] 'poses.dat' using 1:(int($5) ? column(k) : NaN) "
+		      "with points lt k-1 ps 0.35 title word('x y z', k-1)",
+		      script);
+	else {
+		fputs("set title 'Positions of the sensor while the blade turns about its tip'\n"
+		      "set size ratio -1\nset xlabel 'x of the sensor / mm'\n"
+		      "set ylabel 'y of the sensor / mm'\neval key_below\n",
+		      script);
+		plot_add(
+			script, &n,
+			"'poses.dat' using 6:(int($5) ? $7 : NaN) with points lt 1 ps 0.35 "
+			"title 'used'");
+		if (left_out)
+			plot_add(
+				script, &n,
+				"'poses.dat' using 6:(int($5) ? NaN : $7) with points lt 2 "
+				"pt 2 title 'left out'");
+	}
+	fputc('\n', script);
+}
+
 static void draw(const char *folder, const struct list *list, const bool *inlier,
 		 const struct incise_tip_fit *fit)
 {
 	static const char *const plots[] = {"residuals", "fit"};
+	bool left_out = false;
 	FILE *data, *script;
 
 	if (!calibrate_can_plot(folder))
@@ -345,6 +375,7 @@ static void draw(const char *folder, const struct list *list, const bool *inlier
 		double r[3];
 
 		residual(fit, &list->poses[i], r);
+		left_out |= !inlier[i];
 		fprintf(data, "%.4f %.5f %.5f %.5f %d %.4f %.4f\n",
 			(list->poses[i].t_ns - list->poses[0].t_ns) * 1e-9, r[0], r[1],
 			r[2], inlier[i], list->poses[i].position_mm[0],
@@ -352,24 +383,10 @@ static void draw(const char *folder, const struct list *list, const bool *inlier
 	}
 	plot_data_end(data, folder);
 	for (int i = 0; i < 2; i++) {
-		script = plot_begin(folder, plots[i], 900, 500);
-		if (!i)
-			fprintf(script,
-				"set xlabel 'time, s'\nset ylabel 'residual, mm'\n"
-				"set key top right\n"
-				"plot for [k=2:4] 'poses.dat' using 1:(int($5) ? column(k) : "
-				"NaN) with points pt 7 ps 0.3 lc k-1 title "
-				"word('x y z', k-1)\n");
-		else
-			fprintf(script,
-				"set size ratio -1\nset xlabel 'x of the sensor, mm'\n"
-				"set ylabel 'y of the sensor, mm'\nset key top right\n"
-				"plot 'poses.dat' using 6:(int($5) ? $7 : NaN) with points pt "
-				"7 ps 0.3 lc 1 title 'believed', '' using 6:(int($5) ? NaN : "
-				"$7) with points pt 2 ps 1 lc 2 title 'left out'\n");
+		script = plot_begin(folder, plots[i], 900, 560);
+		put_plot(script, !i, left_out);
 		if (!plot_draw(script, folder, plots[i]))
-			cli_warn("%s.png: could not be drawn; see whether gnuplot works",
-				 plots[i]);
+			cli_warn("%s.png could not be drawn", plots[i]);
 	}
 }
 

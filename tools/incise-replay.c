@@ -78,9 +78,10 @@ static void parse(struct job *job, int argc, char **argv)
 /* Measured beside predicted force, and depth, over time. */
 struct plot {
 	const char *folder, *name;
-	char file[80]; /* of the data */
-	FILE *data;    /* NULL: nothing is drawn */
-	int drawn;     /* of PLOT_POINTS, the last; -1: none */
+	char file[80];		   /* of the data */
+	FILE *data;		   /* NULL: nothing is drawn */
+	int drawn;		   /* of PLOT_POINTS, the last; -1: none */
+	bool has_force, has_depth; /* of the recording */
 };
 
 static void begin_plot(struct plot *plot, const char *path)
@@ -100,7 +101,9 @@ static void add_to_plot(struct plot *plot, const struct incise_replay_tick *tick
 	if (point == plot->drawn)
 		return;
 	plot->drawn = point;
-	/* gnuplot leaves out what is nan */
+	plot->has_force |= isfinite(tick->measured_N);
+	plot->has_depth |= isfinite(tick->depth_mm);
+	/* gnuplot leaves out nan. */
 	fprintf(plot->data, "%.4f %.5f %.5f %.4f %.4f\n", tick->t_s, tick->measured_N,
 		tick->predicted_N, tick->depth_mm, tick->tick->depth_mm);
 }
@@ -108,19 +111,32 @@ static void add_to_plot(struct plot *plot, const struct incise_replay_tick *tick
 static void draw_plot(struct plot *plot)
 {
 	FILE *script;
+	int n = 0;
 
 	plot_data_end(plot->data, plot->folder);
-	script = plot_begin(plot->folder, plot->name, 1200, 800);
+	script = plot_begin(plot->folder, plot->name, 1000, 720);
 	fprintf(script,
-		"set multiplot layout 2,1\n"
-		"set xlabel 'time / s'\nset key top right\nset ylabel 'force / N'\n"
-		"plot '%s' using 1:2 with lines lc rgb grey title 'measured', \\\n"
-		"  '' using 1:3 with lines ls 2 title 'predicted'\n"
-		"set ylabel 'depth / mm'\nset yrange [0:*]\n"
-		"plot '%s' using 1:4 with lines lc rgb grey title 'recorded', \\\n"
-		"  '' using 1:5 with lines ls 1 title 'in the loop'\n"
-		"unset multiplot\n",
-		plot->file, plot->file);
+		"set multiplot layout 2,1 margins screen 0.08,0.98,0.15,0.9 spacing 0,0.14 "
+		"title 'Recording replayed through the scene'\n"
+		"data = '%s'\nset xlabel 'time / s'\nset key off\nset autoscale xfix\n"
+		"set title '(a) force'\nset ylabel 'force / N'\n",
+		plot->file);
+	if (plot->has_force)
+		plot_add(script, &n, "data using 1:2 with lines lc rgb grey lw 0.8");
+	plot_add(script, &n, "data using 1:3 with lines lt 2");
+	fputs("\nset title '(b) depth'\nset ylabel 'depth / mm'\nset yrange [0:*]\n",
+	      script);
+	n = 0;
+	if (plot->has_depth)
+		plot_add(script, &n, "data using 1:4 with lines lc rgb grey lw 2.5");
+	plot_add(script, &n, "data using 1:5 with lines lt 1");
+	fputs("\neval key_panel\n", script);
+	n = 0;
+	if (plot->has_force || plot->has_depth)
+		plot_add(script, &n, "NaN with lines lc rgb grey title 'recorded'");
+	plot_add(script, &n, "NaN with lines lt 2 title 'predicted force'");
+	plot_add(script, &n, "NaN with lines lt 1 title 'depth in the loop'");
+	fputs("\nunset multiplot\n", script);
 	plot_draw_or_fail(script, plot->folder, plot->name);
 }
 

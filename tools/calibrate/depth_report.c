@@ -291,54 +291,70 @@ static void board_data(const struct depth_result *r, FILE *data)
 	}
 }
 
+static void draw_fit(const struct depth_result *r, bool line, bool outliers, FILE *script)
+{
+	const char *columns = line ? "2:($5 > 0 ? $3 : NaN)" : "1:($5 > 0 ? $2 : NaN)";
+	const char *others = line ? "2:($5 > 0 ? NaN : $3)" : "1:($5 > 0 ? NaN : $2)";
+	int n = 0;
+
+	if (!r->fit) {
+		fputs("set title 'Corners of the board in the frame of its plane'\n"
+		      "set xlabel 'x / px'\nset ylabel 'y / px'\n"
+		      "set yrange [*:*] reverse\nset size ratio -1\n"
+		      "plot 'depth.dat' using 1:2 with points lt 1\n",
+		      script);
+		return;
+	}
+	fprintf(script,
+		"set title '%s'\nset xlabel '%s'\nset ylabel '%s'\neval key_below\n",
+		line ? "Depth over the exposed length"
+		     : "Exposed length in the air, reading by reading",
+		line ? "exposed length / px" : "number of the reading / 1",
+		line ? "depth / mm" : "exposed length / px");
+	plot_add(script, &n, "'depth.dat' using %s with points lt 1 title '%s'", columns,
+		 line ? "pairs" : "readings");
+	if (outliers)
+		plot_add(script, &n,
+			 "'depth.dat' using %s with points lt 2 pt 2 title 'outliers'",
+			 others);
+	if (line)
+		plot_add(script, &n, "%.12g * (%.12g - x) lt 3 title 'fit'",
+			 r->fit->mm_px, r->fit->full_px);
+	else
+		plot_add(script, &n, "%.12g lt 3 title 'mean'", r->fit->full_px);
+	fputc('\n', script);
+}
+
 static void draw(const struct depth_result *r, const char *folder)
 {
 	FILE *script, *data = plot_data(folder, "depth.dat");
-	bool line = !strcmp(r->way, "line");
+	bool line = !strcmp(r->way, "line"), outliers = false;
 
 	if (r->fit)
 		lengths_data(r, data);
 	else
 		board_data(r, data);
 	plot_data_end(data, folder);
-	script = plot_begin(folder, "fit", 900, 600);
-	if (line)
-		fprintf(script,
-			"set xlabel 'exposed length / px'\nset ylabel 'depth / mm'\n"
-			"set key top right\n"
-			"plot 'depth.dat' using 2:($5 > 0 ? $3 : 1/0) pt 7 ps 0.5 lc rgb blue "
-			"title 'pairs', \\\n"
-			"  '' using 2:($5 > 0 ? 1/0 : $3) pt 2 lc rgb vermillion title 'outliers', \\\n"
-			"  %.12g * (%.12g - x) ls 3 title 'fit'\n",
-			r->fit->mm_px, r->fit->full_px);
-	else if (r->fit)
-		fprintf(script,
-			"set xlabel 'reading'\nset ylabel 'length / px'\nset key top right\n"
-			"plot 'depth.dat' using 1:($5 > 0 ? $2 : 1/0) pt 7 ps 0.7 lc rgb blue "
-			"title 'lengths', \\\n"
-			"  '' using 1:($5 > 0 ? 1/0 : $2) pt 2 lc rgb vermillion title 'outliers', \\\n"
-			"  %.12g ls 3 title 'mean'\n",
-			r->fit->full_px);
-	else
-		fprintf(script,
-			"set xlabel 'x / px'\nset ylabel 'y / px'\nset yrange [*:*] reverse\n"
-			"set size ratio -1\n"
-			"plot 'depth.dat' using 1:2 pt 1 lc rgb blue\n");
+	for (int i = 0; r->fit && i < r->fit->n; i++)
+		outliers |= !r->inlier[i];
+	script = plot_begin(folder, "fit", 900, 560);
+	draw_fit(r, line, outliers, script);
 	plot_draw_or_fail(script, folder, "fit");
-	script = plot_begin(folder, "residuals", 900, 600);
+	script = plot_begin(folder, "residuals", 900, 560);
 	if (r->fit)
 		fprintf(script,
-			"set xlabel '%s'\nset ylabel 'residual / mm'\n"
-			"plot 'depth.dat' using %d:($5 > 0 ? $4 : 1/0) pt 7 ps 0.5 lc rgb "
-			"blue, 0 ls 3\n",
-			line ? "exposed length / px" : "reading", line ? 2 : 1);
+			"set title 'Residuals of the fit, without outliers'\n"
+			"set xlabel '%s'\nset ylabel 'residual of the depth / mm'\n"
+			"plot 'depth.dat' using %d:($5 > 0 ? $4 : NaN) with points lt 1, "
+			"0 lt 3 lw 1\n",
+			line ? "exposed length / px" : "number of the reading / 1",
+			line ? 2 : 1);
 	else
-		fprintf(script,
-			"set xlabel 'x on the board / mm'\nset ylabel 'y on the board / mm'\n"
-			"set title 'residuals of the corners in the plane, 100 times as large'\n"
-			"set size ratio -1\n"
-			"plot 'depth.dat' using 3:4:($5 * 100):($6 * 100) with vectors lc rgb "
-			"blue\n");
+		fputs("set title 'Residuals of the corners in the plane, 100 times as large'\n"
+		      "set xlabel 'x on the board / mm'\nset ylabel 'y on the board / mm'\n"
+		      "set size ratio -1\n"
+		      "plot 'depth.dat' using 3:4:($5 * 100):($6 * 100) with vectors lt 1\n",
+		      script);
 	plot_draw_or_fail(script, folder, "residuals");
 }
 

@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
+#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
@@ -135,6 +136,16 @@ FILE *plot_begin(const char *folder, const char *name, int width, int height)
 		"else { eval 'set terminal '.ext.' size '.figure_width.','.figure_height }\n",
 		name, width, height, name);
 	return script;
+}
+
+void plot_add(FILE *script, int *n, const char *format, ...)
+{
+	va_list args;
+
+	fputs((*n)++ ? ", \\\n  " : "plot ", script);
+	va_start(args, format);
+	vfprintf(script, format, args);
+	va_end(args);
 }
 
 static bool draw(const char *folder, const char *name, const char *ext)

@@ -44,6 +44,13 @@ void plot_data_end(FILE *data, const char *folder);
 /* Open the script of a plot of width × height pixels of 1/96 inch; gnuplot commands follow. */
 FILE *plot_begin(const char *folder, const char *name, int width, int height);
 
+/*
+ * Add an element to a plot command: "plot" before the first one, a comma before the others;
+ * *n counts them. A command leaves out an element without data, and so its legend.
+ */
+__attribute__((format(printf, 3, 4))) void plot_add(FILE *script, int *n,
+						    const char *format, ...);
+
 /* Close the script and draw. Returns whether both files were made. */
 bool plot_draw(FILE *script, const char *folder, const char *name);
 
