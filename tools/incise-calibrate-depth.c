@@ -17,6 +17,7 @@
 #define U_ZERO_MM 0.02
 #define U_SQUARE 0.02 /* % */
 #define U_PLANE_MM 0.1
+#define TOLERANCE 0.05 /* as for force: a larger deviation is more often an error */
 
 #define U_CLICKS_PX 0.7 /* two ends, half a pixel each */
 #define U_WORST 0.005	/* a larger 2 u, relative, is no calibration */
@@ -31,11 +32,17 @@ struct options {
 	const char *pixels, *axis, *region;
 	int columns, rows;
 	double square_mm, u_square, u_plane_mm;
+	double nominal_mm_px, tolerance;
 	struct depth_source source;
 };
 
 static const struct cli_unit lengths[] = {
 	{"mm", 1}, {"um", 1e-3}, {"cm", 10}, {"m", 1e3}, {0}};
+
+static void parse_tolerance(void *tolerance, char *text)
+{
+	*(double *)tolerance = cli_number("tolerance", text, 0.001, 1000) / 100;
+}
 
 static void parse_board(void *whole, char *text)
 {
@@ -71,6 +78,10 @@ static const struct cli_option option_table[] = {
 	 CLI_FLAG(struct options, common.dry_run)},
 	{0, "json", NULL, "report as one JSON object",
 	 CLI_FLAG(struct options, common.json)},
+	{0, "nominal", "MM_PX", "nominal scale to compare with (default: 0.11875)",
+	 CLI_NUMBER(struct options, nominal_mm_px, 1e-4, 10)},
+	{0, "tolerance", "PERCENT", "largest deviation from it that passes (default: 5)",
+	 CLI_PARSED(struct options, tolerance, parse_tolerance)},
 	{0, "length", "LENGTH", "two-point: known length (default: 47.5mm)",
 	 CLI_QUANTITY(struct options, length_mm, lengths, 0.1, 1000)},
 	{0, "length-u", "LENGTH",
@@ -162,7 +173,12 @@ static void parse_files(struct options *options, int argc, char **argv)
 
 static void parse(struct options *options, int argc, char **argv)
 {
+	struct incise_calibration nominal;
+
+	incise_calibration_nominal(&nominal);
 	*options = (struct options){
+		.nominal_mm_px = nominal.depth_mm_px,
+		.tolerance = TOLERANCE,
 		.length_mm = LENGTH_MM,
 		.u_length_mm = U_LENGTH_MM,
 		.u_px = -1,
@@ -372,23 +388,43 @@ static void by_board(struct options *options, struct depth_result *result,
 
 /* --- record -------------------------------------------------------------------------- */
 
-static void end_record(const struct options *options, struct depth_result *result,
-		       struct incise_calibration_record *record)
+/* Reasons in this order: data that do not fit the method come first. */
+static void judge(const struct options *options, struct incise_calibration_record *record)
 {
-	struct incise_error err = {0};
-	double u = record->values[0].u / record->values[0].left;
-	const char *raw = options->common.keep;
+	double scale = record->values[0].left, u = record->values[0].u / scale;
+	double off = scale / options->nominal_mm_px - 1;
 
-	if (record->pass && 2 * u > U_WORST) {
-		record->pass = false;
+	if (!record->pass)
+		return;
+	record->pass = false;
+	if (2 * u > U_WORST) {
 		snprintf(record->verdict, sizeof(record->verdict),
 			 "U is %.2f %% of the scale, more than %.1f %%; give more "
 			 "readings, or better ones",
 			 200 * u, 100 * U_WORST);
-	}
-	if (record->pass)
+	} else if (fabs(off) > options->tolerance) {
 		snprintf(record->verdict, sizeof(record->verdict),
-			 "U is %.3f %% of the scale", 200 * u);
+			 "%+.2f %% from the nominal %g mm/px, more than %g %%; check "
+			 "length and pixels, or give the scale of your camera with "
+			 "--nominal",
+			 100 * off, options->nominal_mm_px, 100 * options->tolerance);
+	} else {
+		record->pass = true;
+		snprintf(record->verdict, sizeof(record->verdict),
+			 "%+.2f %% from the nominal %g mm/px, within %g %%; U is %.3f %% "
+			 "of the scale, within %.1f %%",
+			 100 * off, options->nominal_mm_px, 100 * options->tolerance,
+			 200 * u, 100 * U_WORST);
+	}
+}
+
+static void end_record(const struct options *options, struct depth_result *result,
+		       struct incise_calibration_record *record)
+{
+	struct incise_error err = {0};
+	const char *raw = options->common.keep;
+
+	judge(options, record);
 	snprintf(record->device, sizeof(record->device), "%s", options->source.device);
 	if (!raw && options->source.n_paths == 1 && depth_is_csv(options->common.from) &&
 	    strcmp(options->common.from, "-"))

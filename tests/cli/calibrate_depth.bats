@@ -66,7 +66,7 @@ pairs() {
 	[ "$(in_force depth_mm_px)" = 0.11875 ]
 	# the next one has it as found; units, repeats and uncertainties as given
 	run -0 incise calibrate depth two-point --length 4.75cm --length-u 0.01mm \
-		--pixels 380,380.2,379.8 --pixels-u 0.05 --json
+		--pixels 380,380.2,379.8 --pixels-u 0.05 --nominal 0.125 --json
 	echo "$output" >report.json
 	[ "$(key report.json found_mm_px)" = 0.11875 ]
 	holds "$(key report.json depth_mm_px) == 0.125"
@@ -77,7 +77,7 @@ pairs() {
 @test "two points by vision on the virtual rig" {
 	need_vision
 	run -0 --separate-stderr incise calibrate depth two-point --rig rig.conf --images 40 \
-		--keep kept.csv --json </dev/null
+		--nominal 0.13 --keep kept.csv --json </dev/null
 	[ -z "$stderr" ]
 	echo "$output" >report.json
 	# 0.1 % is what is to be reached
@@ -86,11 +86,11 @@ pairs() {
 	holds "($(key report.json full_px) - 47.5 / 0.13)^2 < 0.05^2"
 	grep -q 'raw = "kept.csv"' calibration.conf
 	# what was kept gives the same
-	run -0 incise calibrate depth two-point --from kept.csv --pixels-u 0.03 --json --dry-run
+	run -0 incise calibrate depth two-point --from kept.csv --pixels-u 0.03 --nominal 0.13 --json --dry-run
 	echo "$output" >again.json
 	holds "($(key again.json depth_mm_px) - $(key report.json depth_mm_px))^2 < 1e-16"
 	# thresholds that fit go to rig.conf
-	run -0 incise calibrate depth two-point --rig rig.conf --images 5 --dry-run </dev/null
+	run -0 incise calibrate depth two-point --rig rig.conf --images 5 --nominal 0.13 --dry-run </dev/null
 	[[ "$output" == *"for rig.conf:"*"value = ["*"full_px = 365."* ]]
 }
 
@@ -100,7 +100,7 @@ pairs() {
 		"$BATS_FILE_TMPDIR/convert" $length $length.ppm
 	done
 	run -0 incise calibrate depth two-point --from 361.2.ppm 361.4.ppm 361.6.ppm --pick 325,300 \
-		--json
+		--nominal 0.13 --json
 	echo "$output" >report.json
 	# three lengths about 361.4; vision is right to 0.1 px
 	holds "($(key report.json full_px) - 361.4)^2 < 0.1^2"
@@ -115,13 +115,13 @@ pairs() {
 
 @test "a line of pairs: outliers and swapped rows are named, and left out" {
 	pairs >pairs.csv
-	run -0 incise calibrate depth line --from pairs.csv --gauge-u 0 --json
+	run -0 incise calibrate depth line --from pairs.csv --nominal 0.125 --gauge-u 0 --json
 	echo "$output" >report.json
 	holds "($(key report.json depth_mm_px) - 0.125)^2 < $(key report.json U_mm_px)^2"
 	holds "$(key report.json U_mm_px) < 0.0001"
 	holds "($(key report.json full_px) - 380)^2 < 0.1^2"
 	pairs '(i == 7 || i == 21) ? 1 : (i == 30 || i == 33) ? 2 : 0' >wrong.csv
-	run -0 incise calibrate depth line --from wrong.csv --gauge-u 0
+	run -0 incise calibrate depth line --from wrong.csv --nominal 0.125 --gauge-u 0
 	[[ "$output" == *"40 (36 accepted, effective n = "* ]]
 	[[ "$output" == *"outlier        row 8: "* && "$output" == *"outlier        row 22: "* ]]
 	[[ "$output" == *"outlier        row 31: "*"; the columns may be swapped"* ]]
@@ -157,7 +157,7 @@ pairs() {
 	printf 'P5 640 480 255\n' >short.pgm
 	refused "" board --from short.pgm
 	# a dry run changes nothing either
-	run -0 incise calibrate depth two-point --pixels 380 --dry-run
+	run -0 incise calibrate depth two-point --pixels 400 --dry-run
 	cmp before.conf calibration.conf
 }
 
@@ -173,16 +173,34 @@ pairs() {
 	failed_with "lie on a curve"
 }
 
+@test "a scale far from the nominal one does not pass" {
+	incise calibrate depth two-point --pixels 400 >/dev/null
+	# -36.8 %: the length of another handle
+	run --separate-stderr incise calibrate depth two-point --length 30mm --pixels 400
+	failed_with "refused, the previous calibration stays active: -36.84 % from the nominal 0.11875 mm/px, more than 5 %" \
+		"--nominal"
+	[ "$(in_force depth_mm_px)" = 0.11875 ]
+	grep -q 'pass = false' calibration.conf
+	# 4.99 % are within the tolerance, 5.01 % are not
+	run -0 incise calibrate depth two-point --length 748.0538mm --pixels 6000 --dry-run
+	[[ "$output" == *"+4.99 % from the nominal"*"within 5 %"* ]] || complain "$output"
+	run -1 incise calibrate depth two-point --length 748.1963mm --pixels 6000 --dry-run
+	[[ "$output" == *"+5.01 % from the nominal"*"more than 5 %"* ]] || complain "$output"
+	run -0 incise calibrate depth two-point --length 30mm --pixels 400 --tolerance 37 --dry-run
+	run -0 incise calibrate depth two-point --length 30mm --pixels 400 --nominal 0.075
+	[ "$(in_force depth_mm_px)" = 0.075 ]
+}
+
 @test "a recording gives both" {
 	need_vision
-	run -0 incise calibrate depth line --from "$BATS_FILE_TMPDIR/cut.rec" --keep pairs.csv --json
+	run -0 incise calibrate depth line --from "$BATS_FILE_TMPDIR/cut.rec" --nominal 0.13 --keep pairs.csv --json
 	echo "$output" >line.json
 	holds "($(key line.json depth_mm_px) - 0.13)^2 < 0.00013^2"
 	holds "$(key line.json readings) > 200"
-	run -0 incise calibrate depth two-point --from "$BATS_FILE_TMPDIR/cut.rec" --json
+	run -0 incise calibrate depth two-point --from "$BATS_FILE_TMPDIR/cut.rec" --nominal 0.13 --json
 	echo "$output" >points.json
 	holds "($(key points.json depth_mm_px) - 0.13)^2 < $(key points.json U_mm_px)^2"
-	run -0 incise calibrate depth line --from pairs.csv --json --dry-run
+	run -0 incise calibrate depth line --from pairs.csv --nominal 0.13 --json --dry-run
 	echo "$output" >again.json
 	holds "($(key again.json depth_mm_px) - $(key line.json depth_mm_px))^2 < 1e-16"
 	run --separate-stderr incise calibrate depth board --from "$BATS_FILE_TMPDIR/cut.rec"
