@@ -14,7 +14,7 @@ import errno
 from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional
 
 from . import _library
-from ._library import ArrowArray, ArrowArrayStream, ArrowSchema, Invalid, make_error
+from ._library import ArrowArray, ArrowArrayStream, ArrowSchema, Invalid, function, make_error
 
 _ctypes_of = {
     "l": ctypes.c_int64,
@@ -140,11 +140,11 @@ class Batch:
         return view
 
     def column(self, name: str) -> memoryview:
-        """A column of numbers, without a copy; of flags the bytes of their bits."""
+        """A column of numbers, without a copy; of flags the bytes of their bits, see flags()."""
         i = self._index(name)
         form = self.fields[i].format
         if form == "b":
-            return memoryview(self._buffer(i, 1, ctypes.c_uint8, (len(self) + 7) // 8))
+            return memoryview(self._buffer(i, 1, ctypes.c_uint8, (len(self) + 7) // 8)).cast("B")
         if form not in _ctypes_of:
             raise Invalid(errno.EINVAL, f"column {name} is text; take texts({name!r})")
         view = self._buffer(i, 1, _ctypes_of[form], len(self))
@@ -165,13 +165,18 @@ class Batch:
             texts.append(text)
         return texts
 
+    def flags(self, name: str) -> List[bool]:
+        """A column of flags."""
+        bits = self.column(name)
+        return [bool(bits[i // 8] >> i % 8 & 1) for i in range(len(self))]
+
     def missing(self, name: str) -> Optional[memoryview]:
         """Bits of a column, 1 where a value is there; None where none is missing."""
         i = self._index(name)
         child = self._array.children[i].contents
         if not child.null_count:
             return None
-        return memoryview(self._buffer(i, 0, ctypes.c_uint8, (len(self) + 7) // 8))
+        return memoryview(self._buffer(i, 0, ctypes.c_uint8, (len(self) + 7) // 8)).cast("B")
 
     def _numpy_column(self, field: Field):
         import numpy
@@ -196,35 +201,33 @@ class Batch:
 
 # --- capsules ----------------------------------------------------------------------------
 
-_capsule_name = b"arrow_array_stream"
-_capsules: Dict[int, ArrowArrayStream] = {}  # by address, as long as their capsule
+_library.declare("libincise-record", {"incise_arrow_capsule_free": (None, ctypes.c_void_p)})
 
 _new = ctypes.pythonapi.PyCapsule_New
 _new.restype = ctypes.py_object
 _new.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
-_pointer = ctypes.pythonapi.PyCapsule_GetPointer
-_pointer.restype = ctypes.c_void_p
-_pointer.argtypes = [ctypes.c_void_p, ctypes.c_char_p]
+_name = ctypes.c_char_p(b"arrow_array_stream")  # for capsules to point at, for ever
+ctypes.pythonapi.Py_IncRef(ctypes.py_object(_name))
 
 
-@ctypes.PYFUNCTYPE(None, ctypes.c_void_p)
-def _destroy(capsule, pointer=_pointer, capsules=_capsules, name=_capsule_name, ref=ctypes.byref):
-    """Release a stream that nobody has taken."""
-    stream = capsules.pop(pointer(capsule, name), None)
-    if stream is not None and stream.release:
-        stream.release(ref(stream))
-
-
-# A capsule may outlive this module at the end of the program.
-ctypes.pythonapi.Py_IncRef(ctypes.py_object(_destroy))
-
-
-def _capsule(open_stream: Callable[[ArrowArrayStream], None]):
-    stream = ArrowArrayStream()
-    open_stream(stream)
-    address = ctypes.addressof(stream)
-    _capsules[address] = stream
-    return _new(address, _capsule_name, ctypes.cast(_destroy, ctypes.c_void_p))
+def _capsule(open_stream: Callable[[ArrowArrayStream], None]) -> Any:
+    # A consumer moves the stream out of this block, which the capsule's destructor frees.
+    libc = ctypes.CDLL(None)
+    libc.malloc.restype = ctypes.c_void_p
+    libc.malloc.argtypes = [ctypes.c_size_t]
+    destructor = ctypes.cast(function("incise_arrow_capsule_free"), ctypes.c_void_p)
+    address = libc.malloc(ctypes.sizeof(ArrowArrayStream))
+    if not address:
+        raise MemoryError("no memory for a stream")
+    stream = ArrowArrayStream.from_address(address)
+    stream.release = type(stream.release)()
+    try:
+        open_stream(stream)
+    except BaseException:
+        libc.free.argtypes = [ctypes.c_void_p]
+        libc.free(address)
+        raise
+    return _new(address, _name, destructor)
 
 
 # --- tables -------------------------------------------------------------------------------

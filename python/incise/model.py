@@ -296,6 +296,8 @@ class Points:
         elif isinstance(x, (tuple, list)) and x and isinstance(x[0], (int, float)):
             return None
         try:
+            if numpy.iscomplexobj(x):
+                raise TypeError("complex numbers")
             return numpy.ascontiguousarray(x, dtype=numpy.float64)
         except (TypeError, ValueError) as failure:
             raise Invalid(errno.EINVAL, f"inputs of a model: {failure}") from None
@@ -737,7 +739,11 @@ def train(
     options.classic = classic
     if ridge is not None:
         options.ridge = ridge
-    dataset, left_out = _read_dataset(data, names, group, None if all_rows else "advancing")
+    # Not in this thread, whose KeyboardInterrupt a callback of the reading would swallow.
+    dataset, left_out = _library.call_interruptible(
+        lambda: _read_dataset(data, names, group, None if all_rows else "advancing"),
+        lambda: None,
+    )
     training = _Training(dataset, check, options)
 
     def learn() -> Model:

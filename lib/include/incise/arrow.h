@@ -27,28 +27,30 @@ INCISE_BEGIN_DECLS
 struct ArrowSchema {
 	const char *
 		format; /**< type: "l" int64, "g" float64, "b" bool, "u" text, "+s" struct … */
-	const char *name;
+	const char *name;     /**< of the column */
 	const char *metadata; /**< pairs of key and text, in the specification's form */
-	int64_t flags;
-	int64_t n_children;
-	struct ArrowSchema **children;
-	struct ArrowSchema *dictionary;
+	int64_t flags;	      /**< ARROW_FLAG_ bits */
+	int64_t n_children;   /**< columns of a struct */
+	struct ArrowSchema **children; /**< n_children of them */
+	struct ArrowSchema *
+		dictionary; /**< of the values that a column of numbers stands for; or NULL */
 	void (*release)(struct ArrowSchema *schema); /**< NULL: released */
-	void *private_data;
+	void *private_data;			     /**< of the producer */
 };
 
 /** The values of a column, or of some rows of a table. */
 struct ArrowArray {
-	int64_t length;
-	int64_t null_count;
-	int64_t offset;
-	int64_t n_buffers;
-	int64_t n_children;
-	const void **buffers;
-	struct ArrowArray **children;
-	struct ArrowArray *dictionary;
+	int64_t length;	    /**< rows */
+	int64_t null_count; /**< missing values; -1: not known */
+	int64_t offset;	    /**< of the first row in the buffers */
+	int64_t n_buffers;  /**< 1 of a struct, 2 of numbers, 3 of text */
+	int64_t n_children; /**< columns of a struct */
+	const void **
+		buffers; /**< bits of the values that are there or NULL; then the values, or offsets and text */
+	struct ArrowArray **children;  /**< n_children of them */
+	struct ArrowArray *dictionary; /**< values that the numbers stand for; or NULL */
 	void (*release)(struct ArrowArray *array); /**< NULL: released */
-	void *private_data;
+	void *private_data;			   /**< of the producer */
 };
 #endif
 
@@ -57,13 +59,14 @@ struct ArrowArray {
 
 /** A table in batches of rows; get_ functions return 0 or a positive errno. */
 struct ArrowArrayStream {
+	/** The columns; out is the caller's to release. */
 	int (*get_schema)(struct ArrowArrayStream *stream, struct ArrowSchema *out);
 	/** At the end out->release is NULL. */
 	int (*get_next)(struct ArrowArrayStream *stream, struct ArrowArray *out);
 	/** One line, valid until the next call; NULL without an error. */
 	const char *(*get_last_error)(struct ArrowArrayStream *stream);
 	void (*release)(struct ArrowArrayStream *stream); /**< NULL: released */
-	void *private_data;
+	void *private_data;				  /**< of the producer */
 };
 #endif
 
@@ -103,6 +106,16 @@ INCISE_API int incise_recording_stream(struct incise_recording *recording,
 				       const struct incise_export_options *options,
 				       struct ArrowArrayStream *stream,
 				       struct incise_error *err);
+
+/**
+ * Release a stream that is in a PyCapsule "arrow_array_stream" of Python, unless a consumer has
+ * taken it, and free(3) its struct. It is the capsule's destructor, for bindings without compiled
+ * code: an exception may be on its way when a capsule goes, so no code in Python may run. Part of
+ * libincise-record.
+ *
+ * @param capsule PyObject of a process that has PyCapsule_GetPointer(); in another one nothing happens
+ */
+INCISE_API void incise_arrow_capsule_free(void *capsule);
 
 /**
  * Read columns of an Arrow stream as a dataset, as incise_dataset_read_where() does of CSV.

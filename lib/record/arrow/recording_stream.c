@@ -5,6 +5,7 @@
  *
  *     table ──► rows, with their best times ──► batch ──► ArrowArrayStream
  */
+#include <dlfcn.h>
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -475,4 +476,17 @@ int incise_recording_stream(struct incise_recording *recording, const char *what
 		.private_data = made,
 	};
 	return 0;
+}
+
+void incise_arrow_capsule_free(void *capsule)
+{
+	void *(*pointer_of)(void *, const char *);
+	struct ArrowArrayStream *stream;
+
+	/* POSIX has this form for a function's address. */
+	*(void **)&pointer_of = dlsym(RTLD_DEFAULT, "PyCapsule_GetPointer");
+	stream = pointer_of ? pointer_of(capsule, "arrow_array_stream") : NULL;
+	if (stream && stream->release)
+		stream->release(stream);
+	free(stream);
 }

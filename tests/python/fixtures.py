@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""What the tests of python/incise share: recordings of the simulated rig, made once by the real programs.
+
+INCISE_BUILD is the build folder; by default the one beside the sources.
+"""
+
+import functools
+import os
+import shutil
+import sqlite3
+import subprocess
+import tempfile
+import unittest
+
+SOURCE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+BUILD = os.environ.get("INCISE_BUILD", os.path.join(SOURCE, "build"))
+SHORT = "sim:seed=1,clock=simulated,cut_s=2,pause_s=1"  # all 14 cuts, in 43 s
+
+
+def run(*command, **options):
+    """Run an incise program; its standard output."""
+    environment = {**os.environ, "PATH": os.path.join(BUILD, "bin") + ":" + os.environ["PATH"]}
+    environment.pop("LD_PRELOAD", None)  # of a sanitizer, which is Python's
+    return subprocess.run(
+        command, check=True, capture_output=True, env=environment, text=True, **options
+    ).stdout
+
+
+class Case(unittest.TestCase):
+    """A test in a folder of its own, with recordings that are made once."""
+
+    folder = None
+
+    @classmethod
+    def setUpClass(cls):
+        cls.shared = _shared()
+
+    def setUp(self):
+        self.folder = tempfile.mkdtemp(prefix="incise-python-")
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def copy(self, name="short.rec"):
+        """A recording that a test may change."""
+        return shutil.copytree(os.path.join(self.shared, name), self.path(name))
+
+    def change(self, recording, sql):
+        with sqlite3.connect(os.path.join(recording, "recording.db")) as database:
+            database.executescript(sql)
+        database.close()
+
+    def says(self, kind, text, call, *arguments, **options):
+        """A call raises that exception with a line that has this text."""
+        with self.assertRaises(kind) as caught:
+            call(*arguments, **options)
+        self.assertIn(text, str(caught.exception))
+        self.assertNotIn("\n", str(caught.exception))
+        return caught.exception
+
+
+@functools.lru_cache(maxsize=None)
+def _shared():
+    folder = tempfile.mkdtemp(prefix="incise-python-shared-")
+    import atexit
+
+    pid = os.getpid()
+
+    def remove():  # not by a child of a fork
+        if os.getpid() == pid:
+            shutil.rmtree(folder)
+
+    atexit.register(remove)
+    short = os.path.join(folder, "short.rec")
+    run("incise", "capture", "-o", short, "--rig", SHORT)
+    run(
+        "incise",
+        "export",
+        short,
+        "-o",
+        os.path.join(folder, "pairs.csv"),
+        "--average",
+        "12x10",
+        "--by-cut",
+    )
+    return folder
+
+
+def has(*names):
+    """Whether packages can be imported."""
+    import importlib.util
+
+    return all(importlib.util.find_spec(name) for name in names)

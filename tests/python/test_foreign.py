@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Other libraries read the streams in place: pyarrow, polars, DuckDB, pandas 3, by the Arrow PyCapsule
+interface; and training reads theirs. Runs in tests/python/venv, which has them."""
+
+import os
+import unittest
+
+import duckdb
+import numpy
+import pandas
+import polars
+import pyarrow
+import pyarrow.parquet
+
+import incise
+from fixtures import Case
+
+STREAMS = ("force", "tracker", "depth", "frames", "events")
+
+
+class Foreign(Case):
+    def setUp(self):
+        super().setUp()
+        self.rec = incise.open(os.path.join(self.shared, "short.rec"))
+        self.tables = {name: getattr(self.rec, name) for name in STREAMS}
+        self.tables["pairs"] = self.rec.pairs()
+        self.tables["bins"] = self.rec.pairs(12, 10, by_cut=True)
+        self.tables["resampled"] = self.rec.resample()
+
+    def same(self, arrays, wanted, what):
+        """Bit by bit, in all columns."""
+        self.assertEqual(list(arrays), list(wanted), what)
+        for name, values in wanted.items():
+            found = numpy.asarray(arrays[name])
+            if values.dtype == object:
+                self.assertEqual(found.tolist(), values.tolist(), (what, name))
+            else:
+                self.assertEqual(found.astype(values.dtype).tobytes(), values.tobytes(), (what, name))
+
+    def test_pyarrow_and_parquet(self):
+        for name, table in self.tables.items():
+            read = pyarrow.table(table)
+            read.validate(full=True)
+            self.same({c: read[c].to_numpy() for c in read.column_names}, table.numpy(), name)
+            self.assertEqual(read.schema.field(0).metadata[b"unit"] != b"", True)
+            path = self.path(name + ".parquet")
+            pyarrow.parquet.write_table(read, path)
+            again = pyarrow.parquet.read_table(path)
+            self.assertEqual(again.schema.types, read.schema.types)
+            self.same({c: again[c].to_numpy() for c in again.column_names}, table.numpy(), name)
+            self.assertEqual(again.schema.metadata[b"source"], read.schema.metadata[b"source"])
+
+    def test_polars(self):
+        for name, table in self.tables.items():
+            read = polars.DataFrame(table)
+            self.same({c: read[c].to_numpy() for c in read.columns}, table.numpy(), name)
+
+    def test_duckdb(self):
+        for name, table in self.tables.items():
+            stream = table  # found by its name in the query; "table" is a word of SQL
+            for _ in range(2):  # its own streams are used up by the first query
+                read = duckdb.sql("SELECT * FROM stream").fetchnumpy()
+                self.same(
+                    {c: numpy.ma.filled(v.astype("f8"), numpy.nan) if numpy.ma.is_masked(v) else
+                     numpy.asarray(v) for c, v in read.items()},
+                    table.numpy(), name,
+                )
+
+    def test_pandas_3(self):
+        self.assertGreaterEqual(int(pandas.__version__.split(".")[0]), 3)
+        for name, table in self.tables.items():
+            read = pandas.DataFrame.from_arrow(table)
+            self.same({c: read[c].to_numpy() for c in read.columns}, table.numpy(), name)
+
+    def test_training_from_their_tables(self):
+        stream = table = self.tables["bins"]
+        self.assertIs(stream, table)
+        wanted = incise.train(table, group="cut", check=0.3)((5, 20))
+        for other in (
+            pyarrow.table(table),
+            polars.DataFrame(table),
+            pandas.DataFrame.from_arrow(table),
+            duckdb.sql("SELECT * FROM stream").arrow(),
+            pyarrow.table(table).set_column(
+                0, "cut", pyarrow.table(table)["cut"].dictionary_encode()
+            ),
+            pyarrow.table(table).slice(3).combine_chunks(),
+        ):
+            sliced = getattr(other, "num_rows", None) == len(pyarrow.table(table)) - 3
+            model = incise.train(other, group="cut", check=0.3)
+            if not sliced:
+                self.assertEqual(model((5, 20)), wanted, type(other))
+
+    def test_a_consumer_that_stops_early(self):
+        for table in self.tables.values():
+            reader = pyarrow.RecordBatchReader.from_stream(table)
+            if table is not self.tables["frames"]:  # has no rows
+                reader.read_next_batch()
+            del reader
+
+    def test_damage_is_their_exception(self):
+        path = self.copy()
+        self.change(path, "UPDATE force SET t_ns = -1 WHERE seq = 70000")
+        table = incise.open(path, damaged=True).force
+        with self.assertRaises(Exception) as caught:
+            pyarrow.table(table)
+        self.assertIn("row 70000 cannot be", str(caught.exception))
+        with self.assertRaises(incise.Invalid):
+            pyarrow.table(incise.open(path).force)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Models in Python: values against the tools', forms of inputs, training from any table, errors."""
+
+import copy
+import ctypes
+import math
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+import unittest
+
+import incise
+from fixtures import SOURCE, Case, has, run
+
+OPTIONS = {"group": "cut", "check": 0.3}
+
+
+class Models(Case):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.csv = os.path.join(cls.shared, "pairs.csv")
+        cls.fis = os.path.join(cls.shared, "tool.fis")
+        if not os.path.exists(cls.fis):
+            run("incise", "train", cls.csv, "--group", "cut", "--check", "0.3", "-o", cls.fis)
+        cls.model = incise.load(cls.fis)
+
+    def test_values_are_those_of_the_tool(self):
+        points = [(0, 0), (5, 20), (12.5, 3), (30, 100), (-1, 5)]
+        text = "".join(f"{x} {y}\n" for x, y in points)
+        for line, force, sd in zip(
+            run("incise", "eval", self.fis, "--sd", input=text).splitlines(),
+            *self.model(points, sd=True),
+        ):
+            told = [float(word) for word in line.split()]
+            # ten and nine digits
+            self.assertLessEqual(abs(told[0] - force), 5e-10 * abs(force) + 1e-15)
+            self.assertLessEqual(abs(told[1] - sd), 5e-9 * sd)
+
+    def test_forms_of_inputs(self):
+        one = self.model((5, 20))
+        self.assertIsInstance(one, float)
+        self.assertEqual(self.model([5, 20]), one)
+        self.assertEqual(self.model([[5, 20], [6, 20]])[0], one)
+        self.assertEqual(len(self.model([])) if self.model.inputs == () else 0, 0)
+        self.assertEqual(self.model((5, 20), sd=True)[0], one)
+        self.assertTrue(math.isfinite(self.model((math.nan, math.inf))))
+        slope = (self.model((5.0001, 20)) - self.model((4.9999, 20))) / 2e-4
+        # the second difference of a force over 2e-4 mm is below 1e-7 of it
+        self.assertAlmostEqual(self.model.gradient((5, 20))[0], slope, delta=1e-6)
+        self.assertEqual(self.model.gradient((500, 20))[0], 0)
+
+    @unittest.skipUnless(has("numpy"), "numpy is not installed")
+    def test_arrays(self):
+        import numpy
+
+        x = numpy.random.RandomState(1).rand(7, 3, 2) * (20, 50)
+        y = self.model(x)
+        self.assertEqual(y.shape, (7, 3))
+        self.assertEqual(y[4, 2], self.model(x[4, 2]))
+        self.assertEqual(y[4, 2], self.model(tuple(x[4, 2].tolist())))
+        self.assertEqual(self.model.gradient(x).shape, (7, 3, 2))
+        self.assertEqual(self.model(x.astype("f4")).shape, (7, 3))
+        self.assertEqual(self.model(x[::2, ::-1])[1, 0], y[2, 2])  # strides
+        self.assertEqual(self.model(numpy.empty((0, 2))).shape, (0,))
+        self.assertEqual(self.model(numpy.array([5.0, 20])), self.model((5, 20)))
+        value, sd = self.model(x, sd=True)
+        self.assertTrue((sd > 0).all() and (value == y).all())
+
+    def test_wrong_inputs(self):
+        for bad, said in (
+            ((1, 2, 3), "the model has 2 inputs"),
+            ([[1, 2], [3]], "inputs"),
+            ("ab", "inputs of a model"),
+            ([["a", 2]], "inputs of a model"),
+            (None, "inputs"),
+            ({"depth_mm": 5}, "inputs of a model"),
+        ):
+            self.says(incise.Invalid, said, self.model, bad)
+        if has("numpy"):
+            import numpy
+
+            self.says(incise.Invalid, "(4, 3)", self.model, numpy.zeros((4, 3)))
+            self.says(incise.Invalid, "inputs", self.model, numpy.zeros(()))
+            self.says(incise.Invalid, "inputs", self.model, numpy.array(["a", "b"]))
+            self.says(incise.Invalid, "inputs", self.model, numpy.zeros((1, 2), complex) * 1j)
+
+    def test_files(self):
+        self.model.save(self.path("a.fis"))
+        again = incise.load(self.path("a.fis"))
+        self.assertEqual(again((5, 20), sd=True), self.model((5, 20), sd=True))
+        os.remove(self.path("a.fis.sd"))
+        bare = incise.load(self.path("a.fis"))
+        self.assertTrue(math.isnan(bare.noise))
+        self.says(incise.Invalid, "no standard deviation", bare, (5, 20), sd=True)
+        self.says(incise.NotFound, "none.fis", incise.load, self.path("none.fis"))
+        self.says(incise.Error, "", incise.load, self.csv)
+        self.says(incise.Error, "", self.model.save, self.path("no/folder/a.fis"))
+        self.assertEqual([v.name for v in self.model.inputs], ["depth_mm", "velocity_mm_s"])
+        self.assertEqual(self.model.output.name, "force_N")
+
+    def test_compiled(self):
+        run("incise", "compile", self.fis, "--budget", "0.1mN", "-o", self.path("tool.fx"))
+        compiled = self.model.compile(budget_mN=0.1)
+        compiled.save(self.path("a.fx"))
+        with open(self.path("a.fx"), "rb") as a, open(self.path("tool.fx"), "rb") as b:
+            self.assertEqual(a.read(), b.read())
+        self.assertLessEqual(compiled.bound, 1e-4)
+        self.assertEqual(incise.load(self.path("a.fx"))((5, 20)), compiled((5, 20)))
+        for k in range(200):
+            x = (k % 20, k / 5)
+            self.assertLessEqual(abs(compiled(x) - self.model(x)), compiled.bound)
+        self.says(incise.Invalid, "allow more", self.model.compile, budget_mN=1e-9)
+
+    def test_copies(self):
+        """Copies and pickles give the same numbers, and each is freed once."""
+        for thing in (self.model, self.model.compile()):
+            for again in (
+                copy.copy(thing),
+                copy.deepcopy(thing),
+                pickle.loads(pickle.dumps(thing)),
+            ):
+                self.assertEqual(again((5, 20)), thing((5, 20)))
+                del again
+
+    def test_training_is_that_of_the_tool(self):
+        model = incise.train(self.csv, **OPTIONS)
+        model.save(self.path("a.fis"))
+        for end in ("", ".sd"):
+            with open(self.path("a.fis") + end) as a, open(self.fis + end) as b:
+                self.assertEqual(a.read(), b.read())
+        self.assertLess(model.report.check_rms_error, model.report.baselines["linear"])
+
+    def test_training_from_any_table(self):
+        """Pairs of a recording have all digits; from all forms the model is the same."""
+        rec = incise.open(os.path.join(self.shared, "short.rec"))
+        table = rec.pairs(depth_bins=12, velocity_bins=10, by_cut=True)
+        wanted = incise.train(rec, **OPTIONS)((5, 20))
+        columns = {field.name: [] for field in table.fields}
+        for batch in table.batches():
+            for field in batch.fields:
+                columns[field.name] += (
+                    batch.texts(field.name)
+                    if field.format == "u"
+                    else batch.flags(field.name)
+                    if field.format == "b"
+                    else batch.column(field.name).tolist()
+                )
+        forms = [table, columns, rec.path]
+        if has("numpy"):
+            forms.append(table.numpy())
+        if has("numpy", "pandas"):
+            forms.append(table.pandas())
+        for form in forms:
+            self.assertEqual(incise.train(form, **OPTIONS)((5, 20)), wanted, type(form))
+
+    def test_wrong_training(self):
+        good = {"depth_mm": [1.0, 2], "velocity_mm_s": [1, 2], "force_N": [1, 2]}
+        for data, said in (
+            (5, "is no table"),
+            ([1, 2], "is no table"),
+            ({}, "columns"),
+            ({"depth_mm": [1.0]}, "no column 'velocity_mm_s'"),
+            ({**good, "force_N": [1]}, "different lengths"),
+            ({**good, "force_N": ["a", "b"]}, "no column of numbers"),
+            ({**good, "force_N": [1, math.nan]}, "row 1, column force_N: is not finite"),
+            (good, "2 training pairs"),
+            (self.path("none.csv"), "none.csv"),
+            (self.path("none.rec"), "no such recording"),
+        ):
+            self.says(incise.Error, said, incise.train, data)
+        for options, said in (
+            ({"group": "hand"}, "no column 'hand'"),
+            ({"check": 2}, "a share"),
+            ({"mf": (0, 3)}, "a count from 1 to 32"),
+            ({"mf": "many"}, "'auto'"),
+            ({"mf_type": "trimf"}, "gaussmf or gbellmf"),
+            ({"epochs": 0}, "at least 1 epoch"),
+            ({"inputs": ("depth_mm",), "mf": (3, 3)}, "a count"),
+        ):
+            self.says(incise.Invalid, said, incise.train, self.csv, **options)
+
+    def test_ctrl_c_ends_a_training(self):
+        """A training of minutes ends by KeyboardInterrupt, and leaves nothing behind."""
+        script = (
+            "import incise, math, sys\n"
+            "n = 40000\n"
+            "data = {'a': [i * 37 % 101 for i in range(n)], 'b': [i * 53 % 97 for i in range(n)],\n"
+            "        'c': [i * 71 % 89 for i in range(n)],\n"
+            "        'y': [math.sin(i) for i in range(n)]}\n"
+            "try:\n"
+            "    print('ready', flush=True)\n"
+            "    incise.train(data, inputs=('a', 'b', 'c'), target='y', mf=(4, 4, 4), starts=100)\n"
+            "except KeyboardInterrupt:\n"
+            "    print('stopped')\n"
+        )
+        process = subprocess.Popen(
+            [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True
+        )
+        self.assertEqual(process.stdout.readline(), "ready\n")
+        time.sleep(1)  # most of the time it trains then; it has to end whatever it does
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=300)
+        self.assertEqual((out, process.returncode), ("stopped\n", 0))
+
+    def test_nothing_leaks(self):
+        """Five hundred models of 100 KB or more each would be 50 MB; 10 MB is noise."""
+
+        def resident():
+            with open("/proc/self/statm") as file:
+                return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+        def use():
+            model = incise.load(self.fis)
+            model([(5, 20)] * 100, sd=True)
+            pickle.dumps(compiled)
+
+        compiled = self.model.compile()
+        for _ in range(20):
+            use()
+        before = resident()
+        for _ in range(500):
+            use()
+        self.assertLess(resident() - before, 10e6)
+
+
+@unittest.skipUnless(has("sklearn"), "scikit-learn is not installed")
+class Estimator(Case):
+    def test_cross_validation_by_cut(self):
+        import numpy
+        from sklearn.model_selection import GroupKFold, cross_val_score
+
+        rec = incise.open(os.path.join(self.shared, "short.rec"))
+        pairs = rec.pairs(12, 10, by_cut=True).numpy()
+        use = pairs["advancing"]
+        x = numpy.column_stack((pairs["depth_mm"], pairs["velocity_mm_s"]))[use]
+        scores = cross_val_score(
+            incise.ForceRegressor(mf=(3, 2)),
+            x,
+            pairs["force_N"][use],
+            groups=pairs["cut"][use],
+            cv=GroupKFold(3),
+        )
+        self.assertGreater(scores.min(), 0.9)
+
+    def test_its_protocol(self):
+        """scikit-learn's own checks. Those that need ten features cannot pass: a model has eight
+        inputs at most. They are named, and they fail for that reason."""
+        import warnings
+
+        from sklearn.utils import estimator_checks
+
+        passed, refused = set(), {}
+        make = getattr(estimator_checks, "estimator_checks_generator", None)
+        estimator = incise.ForceRegressor()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            checks = (
+                make(estimator)
+                if make
+                else estimator_checks.check_estimator(estimator, generate_only=True)
+            )
+            for tried, check in checks:
+                name = getattr(check, "func", check).__name__
+                try:
+                    check(tried)
+                    passed.add(name)
+                except unittest.SkipTest:
+                    pass
+                except Exception as failure:
+                    refused[name] = str(failure)
+        self.assertGreater(len(passed), 25)
+        for name, why in refused.items():
+            self.assertIn("at most 8 inputs", why, name)
+        self.assertLessEqual(
+            set(refused),
+            {
+                "check_dtype_object",
+                "check_regressors_train",
+                "check_regressor_data_not_an_array",
+                "check_regressors_int",
+                "check_estimators_dtypes",
+                "check_supervised_y_2d",
+                "check_regressors_no_decision_function",
+            },
+        )
+
+
+if __name__ == "__main__":
+    unittest.main()

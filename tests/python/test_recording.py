@@ -1,0 +1,392 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""Recordings in Python: values, metadata, damage, closed and moved files, threads, fork."""
+
+import gc
+import math
+import os
+import sqlite3
+import subprocess
+import sys
+import threading
+import unittest
+
+import incise
+from fixtures import SOURCE, Case, has, run
+
+STREAMS = ("force", "tracker", "depth", "frames", "events")
+
+
+def rows(table):
+    """A column-wise table without any other package, {column: list}."""
+    columns = {field.name: [] for field in table.fields}
+    for batch in table.batches():
+        for field in batch.fields:
+            if field.format == "u":
+                values = batch.texts(field.name)
+            elif field.format == "b":
+                values = batch.flags(field.name)
+            else:
+                values = batch.column(field.name).tolist()
+            columns[field.name] += values
+    return columns
+
+
+class Recordings(Case):
+    def setUp(self):
+        super().setUp()
+        self.rec = incise.open(os.path.join(self.shared, "short.rec"))
+        self.addCleanup(self.rec.close)
+
+    def sql(self, query):
+        path = os.path.join(self.rec.path, "recording.db")
+        database = sqlite3.connect(f"file:{path}?mode=ro", uri=True)
+        self.addCleanup(database.close)
+        return database.execute(query).fetchall()
+
+    def test_info_is_that_of_the_tool(self):
+        info = self.rec.info
+        self.assertTrue(info.complete)
+        self.assertEqual(info.cuts, 14)
+        self.assertEqual(info.force, self.sql("SELECT count(*) FROM force")[0][0])
+        self.assertEqual(info.force_mV_N, 1240)
+        self.assertEqual([s.name for s in info.streams], ["force", "tracker"])
+        self.assertEqual(info.streams[1].lost, 0)
+        self.assertEqual(info.surface_normal, (0, 0, 1))
+
+    def test_streams_are_the_tables(self):
+        force = rows(self.rec.force)
+        stored = self.sql("SELECT seq, code FROM force")
+        self.assertEqual(force["seq"], [row[0] for row in stored])
+        self.assertEqual(force["code"], [row[1] for row in stored])
+        info = self.rec.info
+        scale = info.full_scale_V * 1e3 / 2**info.bits / info.force_mV_N
+        zero = (info.zero_mV - info.offset_V * 1e3) / info.force_mV_N
+        self.assertEqual(force["force_N"], [code * scale - zero for _, code in stored])
+        self.assertFalse(any(force["clipped"]))
+        self.assertTrue(all(b > a for a, b in zip(force["t_ns"], force["t_ns"][1:])))
+        tracker = rows(self.rec.tracker)
+        names = ["x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz", "status", "station"]
+        stored = self.sql(f"SELECT {', '.join(names)} FROM tracker")
+        for i, name in enumerate(names):
+            self.assertEqual(tracker[name], [row[i] for row in stored], name)
+        depth = rows(self.rec.depth)
+        stored = self.sql("SELECT depth_mm, velocity_mm_s FROM depth")
+        self.assertEqual(depth["depth_mm"], [row[0] for row in stored])
+        self.assertEqual(depth["t_ns"], tracker["t_ns"])
+        self.assertEqual(rows(self.rec.frames)["seq"], [])
+        self.assertEqual(rows(self.rec.events)["kind"], [r[0] for r in self.sql(
+            "SELECT kind FROM events ORDER BY t_ns, rowid")])
+
+    def test_pairs_are_those_of_the_tool(self):
+        """CSV has nine digits of a mean; 5e-9 of the value is half a unit of the last."""
+        pairs = rows(self.rec.pairs(depth_bins=12, velocity_bins=10, by_cut=True))
+        with open(os.path.join(self.shared, "pairs.csv")) as file:
+            names = file.readline().strip().split(",")
+            lines = [line.strip().split(",") for line in file]
+        self.assertEqual(list(pairs), names)
+        self.assertEqual(pairs["cut"], [line[0] for line in lines])
+        for i, name in enumerate(names[1:], 1):
+            for value, line in zip(pairs[name], lines):
+                self.assertLessEqual(abs(value - float(line[i])), 5e-9 * abs(value), name)
+
+    def test_fields_and_metadata(self):
+        fields = {field.name: field for field in self.rec.force.fields}
+        self.assertEqual(fields["force_N"].unit, "N")
+        self.assertEqual(fields["force_N"].metadata["force_mV_N"], "1240")
+        self.assertEqual(fields["t_ns"].unit, "ns")
+        metadata = self.rec.pairs().metadata
+        self.assertEqual(metadata["source"], self.rec.path)
+        self.assertEqual(metadata["options"], "raw, every force sample")
+
+    def test_another_calibration(self):
+        path = self.path("calibration.conf")
+        with open(path, "w") as file:
+            file.write("force_mV_N = 2480.0;\n")
+        half = incise.open(self.rec.path, calibration=path)
+        a, b = rows(self.rec.force)["force_N"], rows(half.force)["force_N"]
+        self.assertTrue(all(abs(x - 2 * y) < 1e-12 for x, y in zip(a, b)))
+        self.says(incise.Invalid, "syntax error", incise.open, self.rec.path, calibration=__file__)
+
+    def test_a_table_is_read_again_and_again(self):
+        table = self.rec.depth
+        first = rows(table)
+        self.assertEqual(rows(table), first)
+        a, b = table.batches(), table.batches()  # by turns, too
+        self.assertEqual(next(a).column("seq").tolist(), next(b).column("seq").tolist())
+        views = [batch.column("depth_mm") for batch in table.batches()]
+        gc.collect()  # views keep their batches
+        self.assertEqual(sum((view.tolist() for view in views), []), first["depth_mm"])
+
+    def test_closed(self):
+        table = self.rec.depth
+        n = len(rows(table)["seq"])
+        self.rec.close()
+        self.rec.close()
+        self.says(incise.Invalid, "is closed; open it again", lambda: self.rec.force)
+        self.says(incise.Invalid, "is closed; open it again", lambda: self.rec.info)
+        self.assertEqual(len(rows(table)["seq"]), n)  # by a connection of its own
+        with incise.open(self.rec.path) as rec:
+            pass
+        self.says(incise.Invalid, "is closed", lambda: rec.info)
+
+    def test_moved_and_foreign_files(self):
+        self.says(incise.NotFound, "no such recording", incise.open, self.path("none.rec"))
+        self.says(FileNotFoundError, "no such recording", incise.open, self.path("none.rec"))
+        self.says(incise.Error, "recording", incise.open, self.folder)
+        self.says(incise.Error, "", incise.open, __file__)
+        self.says(ValueError, "NUL", incise.open, "a\0b")
+        self.assertRaises(TypeError, incise.open, 5)
+        path = self.copy()
+        table = incise.open(path).force
+        os.rename(path, self.path("moved.rec"))
+        self.says(incise.NotFound, "no such recording", rows, table)
+        with open(self.path("text.rec"), "w") as file:
+            file.write("no recording\n")
+        self.says(incise.Error, "", incise.open, self.path("text.rec"))
+
+    def test_damaged(self):
+        path = self.copy()
+        self.change(path, "UPDATE force SET code = code + 1 WHERE seq = 5000")
+        self.says(incise.Invalid, "is not what was recorded", rows, incise.open(path).force)
+        self.assertEqual(len(rows(incise.open(path, damaged=True).force)["seq"]),
+                         len(rows(self.rec.force)["seq"]))
+        report = incise.verify(path)
+        self.assertFalse(report.intact)
+        self.assertEqual(report.findings[0].kind, "altered")
+        self.change(path, "UPDATE force SET t_ns = -1 WHERE seq = 70000")
+        table = incise.open(path, damaged=True).force
+        self.says(incise.Invalid, "row 70000 cannot be", rows, table)
+        with open(os.path.join(path, "recording.db"), "r+b") as file:
+            file.truncate(100000)
+        self.says(incise.Error, "damaged", lambda: rows(incise.open(path, damaged=True).force))
+
+    def test_verify(self):
+        report = incise.verify(self.rec.path)
+        self.assertTrue(report.complete and report.intact)
+        self.assertEqual(report.findings, ())
+        self.assertEqual(report.streams[0].present, self.rec.info.force)
+        self.says(incise.NotFound, "no such recording", incise.verify, self.path("none.rec"))
+
+    def test_wrong_arguments(self):
+        self.says(incise.Invalid, "each number must be within", rows, self.rec.pairs(12))
+        self.says(incise.Invalid, "depth_bins", self.rec.pairs, "many")
+        self.says(incise.Invalid, "rate", rows, self.rec.resample(rate_hz=-1))
+        self.says(KeyError, "no column 'x'", next(self.rec.force.batches()).column, "x")
+        self.says(incise.Invalid, "is text", next(self.rec.events.batches()).column, "text")
+
+    def test_no_copies_of_what_is_open(self):
+        import copy
+        import pickle
+
+        for thing in (self.rec, next(self.rec.force.batches()), incise.Plan("wall")):
+            for call in (copy.copy, copy.deepcopy, pickle.dumps):
+                self.assertRaises(TypeError, call, thing)
+
+    def test_threads(self):
+        wanted, found = rows(self.rec.depth), []
+
+        def read():
+            found.append(rows(self.rec.depth) == wanted and self.rec.info.cuts == 14)
+
+        threads = [threading.Thread(target=read) for _ in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(found, [True] * 8)
+
+    def test_fork(self):
+        """A child may not use what its parent has opened, and nothing hangs or crashes."""
+        batches = self.rec.resample().batches()
+        next(batches)
+        pid = os.fork()
+        if pid == 0:
+            status = 1
+            try:
+                with self.assertRaises(incise.Invalid) as failure:
+                    next(batches)
+                assert "before a fork" in str(failure.exception)
+                with self.assertRaises(incise.Invalid):
+                    self.rec.info
+                with incise.open(self.rec.path) as again:
+                    assert len(rows(again.depth)["seq"]) > 0
+                status = 0
+            finally:
+                os._exit(status)
+        self.assertEqual(os.waitpid(pid, 0)[1], 0)
+        self.assertGreater(sum(len(batch) for batch in batches), 0)
+
+    def test_unreleased_streams_are_released(self):
+        """Open files of a hundred streams that nobody has read to the end: none is left."""
+        count = lambda: len(os.listdir("/proc/self/fd"))
+        next(self.rec.pairs().batches())
+        gc.collect()
+        before = count()
+        for _ in range(100):
+            self.rec.pairs().__arrow_c_stream__()
+            next(self.rec.force.batches())
+        gc.collect()
+        self.assertLessEqual(count(), before)
+
+    def test_memory_is_bounded(self):
+        """10 times the rows take no more: batches are 65536 rows, 25 bytes each, and SQLite's cache
+        is 2 MB. 20 MB is ten times both."""
+        path = self.copy()
+        self.change(path, "INSERT INTO force SELECT seq + 1000000, t_ns + 1000000000000, code "
+                          "FROM force; UPDATE meta SET value = value * 2 WHERE key = 'force_rows'")
+        script = (
+            "import incise, sys\n"
+            "def peak(): return [int(l.split()[1]) for l in open('/proc/self/status') "
+            "if l.startswith('VmHWM')][0]\n"
+            "rec = incise.open(sys.argv[1], damaged=True)\n"
+            "next(rec.force.batches())\n"
+            "before = peak()\n"
+            "n = sum(len(batch) for _ in range(5) for batch in rec.force.batches())\n"
+            "print(n, peak() - before)\n"
+        )
+        out = subprocess.run(
+            [sys.executable, "-c", script, path], check=True, capture_output=True, text=True
+        ).stdout
+        n, grown = map(int, out.split())
+        self.assertEqual(n, 10 * self.rec.info.force)
+        self.assertLess(grown, 20000)
+
+    def test_a_recording_that_is_being_written(self):
+        """Up to its last commit: commits come every 100 ms, and the reader waits for one."""
+        environment = {**os.environ}
+        environment["PATH"] = os.path.join(
+            os.environ.get("INCISE_BUILD", os.path.join(SOURCE, "build")), "bin"
+        ) + ":" + os.environ["PATH"]
+        environment.pop("LD_PRELOAD", None)
+        capture = subprocess.Popen(
+            ["incise", "capture", "-o", self.path("live.rec"), "--rig", "sim:"],
+            env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )
+        try:
+            n = 0
+            while n < 5000:  # half a second of samples
+                self.assertIsNone(capture.poll())
+                try:
+                    with incise.open(self.path("live.rec")) as rec:
+                        self.assertFalse(rec.info.complete)
+                        force = rows(rec.force)
+                        n = len(force["seq"])
+                        self.assertEqual(force["seq"], list(range(n)))
+                except incise.Error as failure:  # not there yet, or before its first commit
+                    self.assertIn("live.rec", str(failure))
+        finally:
+            capture.terminate()
+            capture.wait()
+        with incise.open(self.path("live.rec")) as rec:
+            self.assertTrue(rec.info.complete)
+
+    @unittest.skipUnless(has("numpy"), "numpy is not installed")
+    def test_numpy(self):
+        import numpy
+
+        for name in STREAMS:
+            table = getattr(self.rec, name)
+            arrays, lists = table.numpy(), rows(table)
+            self.assertEqual(list(arrays), list(lists))
+            for column, values in lists.items():
+                self.assertEqual(arrays[column].tolist(), values, (name, column))
+        self.assertEqual(self.rec.frames.numpy()["quality"].dtype, numpy.float64)
+        batch = next(self.rec.force.batches())
+        array = batch.numpy()["force_N"]
+        self.assertFalse(array.flags.owndata)  # no copy
+        first = array[0]
+        del batch
+        gc.collect()
+        self.assertEqual(array[0], first)
+
+    @unittest.skipUnless(has("numpy"), "numpy is not installed")
+    def test_values_of_an_export_as_hdf5(self):
+        """Every column of every kind of table is the exported one, bit by bit."""
+        if not has("h5py"):
+            self.skipTest("h5py is not installed")
+        import h5py
+        import numpy
+
+        kinds = (
+            ([], self.rec.pairs()),
+            (["--rate", "200"], self.rec.pairs(rate_hz=200)),
+            (["--average", "12x10"], self.rec.pairs(12, 10)),
+            (["--average", "12x10", "--by-cut"], self.rec.pairs(12, 10, by_cut=True)),
+            (["--resample"], self.rec.resample()),
+            (["--resample", "--rate", "500"], self.rec.resample(500)),
+        )
+        for i, (options, table) in enumerate(kinds):
+            path = self.path(f"{i}.h5")
+            run("incise", "export", self.rec.path, "-o", path, *options)
+            arrays = table.numpy()
+            with h5py.File(path) as file:
+                names = [n for n in file if not n.endswith("_names")]
+                self.assertEqual(sorted(arrays), sorted(names))
+                for name in names:
+                    stored = file[name][:]
+                    if name + "_names" in file:
+                        texts = [t.decode() for t in file[name + "_names"][:]]
+                        self.assertEqual(arrays[name].tolist(), [texts[k - 1] for k in stored])
+                    elif stored.dtype.kind == "f":
+                        self.assertEqual(arrays[name].dtype, stored.dtype)
+                        self.assertEqual(arrays[name].tobytes(), stored.tobytes(), name)
+                    else:
+                        self.assertTrue(numpy.array_equal(arrays[name], stored), name)
+
+    @unittest.skipUnless(has("numpy", "pandas"), "pandas is not installed")
+    def test_pandas(self):
+        frame = self.rec.pairs(12, 10, by_cut=True).pandas()
+        self.assertEqual(frame.columns[0], "cut")
+        self.assertEqual(frame.attrs["units"]["force_N"], "N")
+        self.assertEqual(frame.cut.nunique(), 14)
+        lists = rows(self.rec.pairs(12, 10, by_cut=True))
+        for name in frame.columns:
+            self.assertEqual(frame[name].tolist(), lists[name])
+
+
+class Import(Case):
+    def test_maps_no_library(self):
+        """Importing loads no library of incise, nor numpy, pandas or scikit-learn."""
+        script = (
+            "import incise, sys\n"
+            "maps = open('/proc/self/maps').read()\n"
+            "print('libincise' in maps, [m for m in ('numpy', 'pandas', 'sklearn', 'sqlite3') "
+            "if m in sys.modules])\n"
+        )
+        out = subprocess.run(
+            [sys.executable, "-c", script], check=True, capture_output=True, text=True
+        ).stdout
+        self.assertEqual(out, "False []\n")
+
+    def test_reading_maps_no_heavy_library(self):
+        script = (
+            "import incise, sys\n"
+            "list(incise.open(sys.argv[1]).pairs().batches())\n"
+            "maps = open('/proc/self/maps').read()\n"
+            "print([m for m in ('lapack', 'opencv', 'hdf5', 'avformat', 'SDL2') if m in maps])\n"
+        )
+        out = subprocess.run(
+            [sys.executable, "-c", script, os.path.join(self.shared, "short.rec")],
+            check=True, capture_output=True, text=True,
+        ).stdout
+        self.assertEqual(out, "[]\n")
+
+    def test_missing_libraries(self):
+        out = subprocess.run(
+            [sys.executable, "-c", "import incise; incise.load('a.fis')"],
+            env={**os.environ, "INCISE_LIBDIR": self.folder}, capture_output=True, text=True,
+        )
+        self.assertEqual(out.returncode, 1)
+        self.assertIn("libincise.so.2: cannot be loaded", out.stderr.splitlines()[-1])
+        self.assertIn("mend INCISE_LIBDIR", out.stderr.splitlines()[-1])
+
+    def test_names(self):
+        for name in incise.__all__:
+            self.assertTrue(hasattr(incise, name), name)
+        self.assertRaises(AttributeError, lambda: incise.nothing)
+        with open(os.path.join(SOURCE, "lib/include/incise/version.h")) as file:
+            self.assertIn(f'#define INCISE_VERSION "{incise.__version__}"', file.read())
+
+
+if __name__ == "__main__":
+    unittest.main()
