@@ -6,9 +6,9 @@
  * place when it is whole.
  *
  *   incise-bench WORD --json ─▶ data/WORD.json ─┐
- *                     --plot ─▶ pictures/       ├─▶ report.{json,html,md}
+ *                     --plot ─▶ plots/       ├─▶ report.{json,html,md}
  *
- *   DIR/.unfinished/{data,pictures,report.*}  ─▶  DIR/{data,pictures,report.*}
+ *   DIR/.unfinished/{data,plots,report.*}  ─▶  DIR/{data,plots,report.*}
  */
 #include <dirent.h>
 #include <errno.h>
@@ -33,11 +33,11 @@
 #include "cli/plot.h"
 #include "cli/stopwatch.h"
 
-#define WORDS 32
+#define BENCHMARKS_MAX 32
 
 struct job {
 	const char *folder, *from, *against;
-	char *only[WORDS];
+	char *only[BENCHMARKS_MAX];
 	int n_only;
 	bool quick, json;
 };
@@ -46,19 +46,20 @@ static void parse_only(void *options, char *text)
 {
 	struct job *job = options;
 
-	job->n_only = cli_list("only", text, job->only, WORDS);
+	job->n_only = cli_list("only", text, job->only, BENCHMARKS_MAX);
 }
 
 static const struct cli_option options[] = {
-	{0, "report", "DIR", "folder to leave everything in",
+	{0, "report", "DIR", "folder to write everything to",
 	 CLI_OUTPUTS(struct job, folder)},
 	{0, "from", "DIR",
 	 "measure nothing: write report.html and report.md of\nDIR/report.json again",
 	 CLI_TEXT(struct job, from)},
-	{0, "against", "OLD.json", "say what changed beyond noise since that report.json",
+	{0, "against", "OLD.json",
+	 "report what changed beyond noise since that report.json",
 	 CLI_INPUT(struct job, against)},
 	{0, "only", "LIST", "these benchmarks only", CLI_PARSED_BY(parse_only)},
-	{0, "quick", NULL, "fewer points and repeats: a look, not a measurement",
+	{0, "quick", NULL, "smoke test with few points and repeats, not for\npublication",
 	 CLI_FLAG(struct job, quick)},
 	{0, "json", NULL, "print report.json, too", CLI_FLAG(struct job, json)},
 	{0},
@@ -68,12 +69,12 @@ static const struct cli_command command = {
 	.name = "bench all",
 	.synopsis = "--report DIR [OPTIONS]",
 	.summary =
-		"Run every bench and leave one report: report.html to read, on a phone and on\n"
-		"paper, too; report.md, the same; report.json; pictures; the JSON of each word.",
+		"Run every benchmark and write one report: report.html to read, on a phone and on\n"
+		"paper, too; report.md, the same; report.json; plots; the JSON of each benchmark.",
 	.options = options,
 	.notes =
-		"Exit: 0 done, 1 failed, a word has, or figures got worse: the report says\n"
-		"which and why; 2 bad usage. See incise-bench-all(1).",
+		"Exit: 0 done, 1 failed, or a benchmark failed, or metrics got worse: the report\n"
+		"says which and why; 2 bad usage. See incise-bench-all(1).",
 };
 
 /* --- the folder --- */
@@ -100,7 +101,7 @@ static bool may_be_replaced(const char *path)
 	bool empty = true;
 	char *file = cli_text("%s/report.json", path);
 	json_t *report = json_read(file, NULL);
-	bool is_report = json_is_object(json_object_get(report, "words"));
+	bool is_report = json_is_object(json_object_get(report, "benchmarks"));
 
 	free(file);
 	json_decref(report);
@@ -131,27 +132,27 @@ static struct folder folder_begin(const char *path)
 {
 	struct folder folder = {path, cli_text("%s/.unfinished", path), false};
 	char *data = cli_text("%s/data", folder.unfinished),
-	     *pictures = cli_text("%s/pictures", folder.unfinished);
+	     *plots = cli_text("%s/plots", folder.unfinished);
 
 	folder.made = access(path, F_OK);
 	folder_make_all(path);
 	if (!folder.made && !may_be_replaced(path))
-		cli_fail("%s: is there, and is no report; give another --report DIR",
+		cli_fail("%s: not empty and not a report; give another --report DIR",
 			 path);
 	reserve_files(path, false);
 	remove_all(folder.unfinished);
 	folder_make_all(data);
-	folder_make_all(pictures);
+	folder_make_all(plots);
 	free(data);
-	free(pictures);
+	free(plots);
 	return folder;
 }
 
 /* Put the new report in the old one's place. */
 static void folder_finish(const struct folder *folder)
 {
-	static const char *const parts[] = {"data", "pictures", "report.json",
-					    "report.html", "report.md"};
+	static const char *const parts[] = {"data", "plots", "report.json", "report.html",
+					    "report.md"};
 
 	for (size_t i = 0; i < sizeof(parts) / sizeof(*parts); i++) {
 		char *from = cli_text("%s/%s", folder->unfinished, parts[i]),
@@ -180,8 +181,8 @@ static json_t *load_report(const char *path)
 	struct incise_error err = {0};
 	json_t *report = cli_require(json_read(file, &err), &err);
 
-	if (!json_is_object(json_object_get(report, "words")))
-		cli_fail("%s: is no report of 'incise bench all'", file);
+	if (!json_is_object(json_object_get(report, "benchmarks")))
+		cli_fail("%s: not a report of 'incise bench all'", file);
 	free(file);
 	return report;
 }
@@ -213,11 +214,11 @@ static void failed_name(const json_t *row, char *name, size_t size)
 	json_object_foreach((json_t *)row, key, value)
 	{
 		const char *text = json_string_value(value);
-		char word[80], number[64];
+		char padded[80], number[64];
 
-		snprintf(word, sizeof(word), " %s ", key);
+		snprintf(padded, sizeof(padded), " %s ", key);
 		if (n >= size || !strcmp(key, "failed") ||
-		    (!text && !(json_is_number(value) && strstr(settings, word))))
+		    (!text && !(json_is_number(value) && strstr(settings, padded))))
 			continue;
 		report_number(json_number_value(value), 4, number, sizeof(number));
 		n += (size_t)snprintf(name + n, size - n, "%s%s%s%s", n ? ", " : "",
@@ -226,8 +227,8 @@ static void failed_name(const json_t *row, char *name, size_t size)
 	}
 }
 
-/* Rows with a reason why they failed, wherever they are, as {"word", "row", "why"}. */
-static void find_failed(const char *word, const json_t *value, json_t *rows)
+/* Rows with a reason why they failed, wherever they are, as {"benchmark", "row", "why"}. */
+static void find_failed(const char *benchmark, const json_t *value, json_t *rows)
 {
 	const char *why = json_string_value(json_object_get(value, "failed")), *key;
 	const json_t *member;
@@ -236,14 +237,16 @@ static void find_failed(const char *word, const json_t *value, json_t *rows)
 
 	if (why && *why) {
 		failed_name(value, name, sizeof(name));
-		json_array_append_new(rows, json_pack("{ss so ss}", "word", word, "row",
-						      json_text(name), "why", why));
+		json_array_append_new(rows,
+				      json_pack("{ss so ss}", "benchmark", benchmark,
+						"row", json_text(name), "why", why));
 	}
-	json_array_foreach((json_t *)value, i, member) find_failed(word, member, rows);
+	json_array_foreach((json_t *)value, i, member)
+		find_failed(benchmark, member, rows);
 	json_object_foreach((json_t *)value, key, member)
 	{
 		if (strcmp(key, "integrators"))
-			find_failed(word, member, rows);
+			find_failed(benchmark, member, rows);
 	}
 }
 
@@ -259,34 +262,34 @@ static json_t *failures(const json_t *report)
 {
 	json_t *lines = json_array(), *all = json_array();
 	const json_t *run, *json, *line;
-	const char *word;
+	const char *benchmark;
 	size_t i;
 
-	json_object_foreach(json_object_get(report, "runs"), word, run)
+	json_object_foreach(json_object_get(report, "runs"), benchmark, run)
 	{
 		if (strcmp(text_at(run, "state"), "measured"))
-			json_array_append_new(lines, json_sprintf("%s: %s: %s", word,
+			json_array_append_new(lines, json_sprintf("%s: %s: %s", benchmark,
 								  text_at(run, "state"),
 								  text_at(run, "why")));
 		json_array_foreach(json_object_get(run, "warnings"), i, line)
 			json_array_append_new(lines,
-					      json_sprintf("%s: %s", word,
+					      json_sprintf("%s: %s", benchmark,
 							   json_string_value(line)));
 	}
-	json_object_foreach(json_object_get(report, "words"), word, json)
+	json_object_foreach(json_object_get(report, "benchmarks"), benchmark, json)
 	{
 		json_t *rows = json_array();
 		int more;
 
-		find_failed(word, json, rows);
+		find_failed(benchmark, json, rows);
 		more = (int)json_array_size(rows) - FAILED_MAX;
 		while (json_array_size(rows) > FAILED_MAX)
 			json_array_remove(rows, FAILED_MAX);
 		if (more > 0)
-			json_array_append_new(rows,
-					      json_pack("{ss so ss}", "word", word, "row",
-							json_sprintf("%d more", more),
-							"why", "as in its JSON"));
+			json_array_append_new(
+				rows, json_pack("{ss so ss}", "benchmark", benchmark,
+						"row", json_sprintf("%d more", more),
+						"why", "see its JSON"));
 		json_array_extend(all, rows);
 		json_decref(rows);
 	}
@@ -369,7 +372,7 @@ static int write_report(const char *path, json_t *report, struct incise_error *e
 #define LINES 20   /* of warnings that are kept */
 
 /* Wait for its end, or for ours. */
-static int wait_for(pid_t pid, const char *word, int number, int of)
+static int wait_for(pid_t pid, const char *benchmark, int number, int of)
 {
 	double begin_ns = stopwatch_ns();
 	int status = 0;
@@ -379,7 +382,7 @@ static int wait_for(pid_t pid, const char *word, int number, int of)
 			kill(-pid, SIGTERM);
 			return child_end(pid, ASKED_S);
 		}
-		cli_progress("%s (%d of %d): %.0f s", word, number, of,
+		cli_progress("%s (%d of %d): %.0f s", benchmark, number, of,
 			     (stopwatch_ns() - begin_ns) * 1e-9);
 		usleep(POLL_US);
 	}
@@ -415,25 +418,25 @@ static json_t *read_warnings(FILE *said, bool failed, char *why, size_t size)
 	return lines;
 }
 
-static void note(json_t *report, const char *word, const char *state, double seconds,
+static void note(json_t *report, const char *benchmark, const char *state, double seconds,
 		 const char *why, json_t *warnings)
 {
 	if (!strcmp(state, "failed"))
 		json_array_append_new(json_object_get(report, "failed"),
-				      json_string(word));
-	json_object_set_new(json_object_get(report, "runs"), word,
+				      json_string(benchmark));
+	json_object_set_new(json_object_get(report, "runs"), benchmark,
 			    json_pack("{ss sf so so}", "state", state, "seconds", seconds,
 				      "why", *why ? json_text(why) : json_null(),
 				      "warnings", warnings));
 }
 
-/* Its report, and its metrics once more among those of all, named with the word. */
-static void add_report(json_t *report, const char *word, json_t *json)
+/* Its report, and its metrics once more among those of all, named with the benchmark. */
+static void add_report(json_t *report, const char *benchmark, json_t *json)
 {
 	const json_t *metric;
 	size_t i;
 
-	json_object_set(json_object_get(report, "words"), word, json);
+	json_object_set(json_object_get(report, "benchmarks"), benchmark, json);
 	json_array_foreach(json_object_get(json, "figures"), i, metric)
 	{
 		const char *name = json_string_value(json_object_get(metric, "name"));
@@ -443,7 +446,7 @@ static void add_report(json_t *report, const char *word, json_t *json)
 			continue;
 		copy = json_copy((json_t *)metric);
 		json_object_set_new(copy, "name",
-				    json_sprintf("%s: %s", word, name ? name : ""));
+				    json_sprintf("%s: %s", benchmark, name ? name : ""));
 		json_array_append_new(json_object_get(report, "figures"), copy);
 	}
 }
@@ -452,7 +455,7 @@ static void add_report(json_t *report, const char *word, json_t *json)
 static int run(const struct report_section *s, const char *program, const char *folder,
 	       const char *data, bool quick, FILE *said, int number, int of)
 {
-	char *plot = cli_text("%s/pictures/%s", folder, s->word);
+	char *plot = cli_text("%s/plots/%s", folder, s->benchmark);
 	const char *argv[8] = {program};
 	int n = 1, status;
 	FILE *out = fopen(data, "we");
@@ -461,7 +464,7 @@ static int run(const struct report_section *s, const char *program, const char *
 		cli_fail("%s: %s", data, strerror(errno));
 	/* A benchmark with a program of its own is not named once more. */
 	if (!strcmp(s->program, "incise-bench"))
-		argv[n++] = s->word;
+		argv[n++] = s->benchmark;
 	argv[n++] = "--json";
 	if (quick)
 		argv[n++] = "--quick";
@@ -470,18 +473,18 @@ static int run(const struct report_section *s, const char *program, const char *
 		argv[n++] = plot;
 	}
 	status = wait_for(child_start((char *const *)argv, fileno(out), fileno(said)),
-			  s->word, number, of);
+			  s->benchmark, number, of);
 	fclose(out);
 	free(plot);
 	return status;
 }
 
 /* A benchmark that fails is in the report with its last line, and the others go on. */
-static void measure_word(const struct report_section *s, const char *folder, bool quick,
-			 json_t *report, int number, int of)
+static void measure_one(const struct report_section *s, const char *folder, bool quick,
+			json_t *report, int number, int of)
 {
 	char *program = cli_text("%s/%s", cli_folder(), s->program),
-	     *data = cli_text("%s/data/%s.json", folder, s->word);
+	     *data = cli_text("%s/data/%s.json", folder, s->benchmark);
 	struct memory_file said = memory_file_begin("said");
 	double begin_ns = stopwatch_ns();
 	struct incise_error err = {0};
@@ -491,9 +494,9 @@ static void measure_word(const struct report_section *s, const char *folder, boo
 
 	if (access(program, X_OK)) {
 		snprintf(why, sizeof(why),
-			 "%s is not there: it is built where its libraries are",
+			 "%s is missing: it is built if its libraries are installed",
 			 s->program);
-		note(report, s->word, "left out", 0, why, json_array());
+		note(report, s->benchmark, "left out", 0, why, json_array());
 		goto out_free;
 	}
 	status = run(s, program, folder, data, quick, said.file, number, of);
@@ -503,14 +506,14 @@ static void measure_word(const struct report_section *s, const char *folder, boo
 		snprintf(why, sizeof(why), "ended by a signal: %s",
 			 strsignal(WTERMSIG(status)));
 	else if (!json_is_object(json) && !status)
-		snprintf(why, sizeof(why), "what it reported is no JSON: %s",
+		snprintf(why, sizeof(why), "its output is not JSON: %s",
 			 *err.text ? err.text : "no object");
 	else if (!status)
 		*why = 0;
-	note(report, s->word, *why ? "failed" : "measured",
+	note(report, s->benchmark, *why ? "failed" : "measured",
 	     (stopwatch_ns() - begin_ns) * 1e-9, why, warnings);
 	if (json_is_object(json))
-		add_report(report, s->word, json);
+		add_report(report, s->benchmark, json);
 	else
 		unlink(data);
 	json_decref(json);
@@ -520,10 +523,10 @@ out_free:
 	free(data);
 }
 
-static bool wanted(const struct job *job, const char *word)
+static bool wanted(const struct job *job, const char *benchmark)
 {
 	for (int i = 0; i < job->n_only; i++)
-		if (!strcmp(job->only[i], word))
+		if (!strcmp(job->only[i], benchmark))
 			return true;
 	return !job->n_only;
 }
@@ -549,18 +552,19 @@ static json_t *begin_report(const struct job *job)
 
 	gmtime_r(&now, &utc);
 	strftime(date, sizeof(date), "%Y-%m-%d %H:%M UTC", &utc);
-	return json_with_schema(
-		json_pack("{ss ss so sb so so so so so}", "version", incise_version(),
-			  "date", date, "command", command_of(job), "quick", job->quick,
-			  "machine", machine_json(), "runs", json_object(), "failed",
-			  json_array(), "words", json_object(), "figures", json_array()),
-		NULL);
+	return json_with_schema(json_pack("{ss ss so sb so so so so so}", "version",
+					  incise_version(), "date", date, "command",
+					  command_of(job), "quick", job->quick, "machine",
+					  machine_json(), "runs", json_object(), "failed",
+					  json_array(), "benchmarks", json_object(),
+					  "figures", json_array()),
+				NULL);
 }
 
 /* Of a report of all benchmarks; that of one is itself. */
-static const json_t *words_of(const json_t *report)
+static const json_t *benchmarks_of(const json_t *report)
 {
-	const json_t *words = json_object_get(report, "words");
+	const json_t *words = json_object_get(report, "benchmarks");
 
 	return words ? words : report;
 }
@@ -569,8 +573,8 @@ static const json_t *words_of(const json_t *report)
 static void compare(const char *path, const json_t *old, json_t *report)
 {
 	struct incise_error err = {0};
-	json_t *comparison =
-		compare_reports(words_of(old), path, words_of(report), "this run", &err);
+	json_t *comparison = compare_reports(benchmarks_of(old), path,
+					     benchmarks_of(report), "this run", &err);
 
 	if (!comparison)
 		comparison = json_pack("{so}", "failed", json_text(err.text));
@@ -586,15 +590,15 @@ static json_t *measure(const struct job *job)
 	int n = 0, of = 0;
 
 	report = begin_report(job);
-	for (const struct report_section *s = report_sections(); *s->word; s++)
-		of += wanted(job, s->word);
-	for (const struct report_section *s = report_sections(); *s->word && !cli_stop;
-	     s++)
-		if (wanted(job, s->word))
-			measure_word(s, folder.unfinished, job->quick, report, ++n, of);
+	for (const struct report_section *s = report_sections(); *s->benchmark; s++)
+		of += wanted(job, s->benchmark);
+	for (const struct report_section *s = report_sections();
+	     *s->benchmark && !cli_stop; s++)
+		if (wanted(job, s->benchmark))
+			measure_one(s, folder.unfinished, job->quick, report, ++n, of);
 	if (cli_stop) {
 		folder_abandon(&folder);
-		cli_fail("%s: %s is as it was", strsignal(cli_stop), job->folder);
+		cli_fail("%s: %s is unchanged", strsignal(cli_stop), job->folder);
 	}
 	if (old)
 		compare(job->against, old, report);
@@ -610,17 +614,17 @@ static json_t *measure(const struct job *job)
 
 /* --- the command line --- */
 
-static void check_words(const struct job *job)
+static void check_names(const struct job *job)
 {
 	for (int i = 0; i < job->n_only; i++) {
 		const char *names[32] = {0};
 		const struct report_section *s = report_sections();
 		int n = 0;
 
-		for (; *s->word && strcmp(s->word, job->only[i]); s++)
+		for (; *s->benchmark && strcmp(s->benchmark, job->only[i]); s++)
 			if (n < 31)
-				names[n++] = s->word;
-		if (!*s->word)
+				names[n++] = s->benchmark;
+		if (!*s->benchmark)
 			cli_unknown("benchmark", job->only[i], names);
 	}
 }
@@ -639,7 +643,7 @@ static void parse(struct job *job, int argc, char **argv)
 			"--report");
 	if (!*(job->folder ? job->folder : job->from))
 		cli_usage("the folder has no name");
-	check_words(job);
+	check_names(job);
 }
 
 /* One line for the worst that is not as it should be. */
@@ -650,16 +654,17 @@ static void judge(const struct job *job, const json_t *report)
 	const char *why = json_string_value(json_object_get(against, "failed"));
 	int worse = compare_worse(against);
 
-	if (!json_object_size(json_object_get(report, "words")) && !failed)
+	if (!json_object_size(json_object_get(report, "benchmarks")) && !failed)
 		cli_fail("nothing was measured; %s/report.md says why", job->folder);
 	if (failed)
-		cli_fail("%zu of %zu words failed; %s/report.md says why", failed,
+		cli_fail("%zu of %zu benchmarks failed; %s/report.md says why", failed,
 			 json_object_size(json_object_get(report, "runs")), job->folder);
 	if (why)
 		cli_fail("%s", why);
 	if (worse)
-		cli_fail("%d figure%s worse or gone against %s; %s/report.md says which",
-			 worse, worse > 1 ? "s are" : " is", job->against, job->folder);
+		cli_fail(
+			"%d metric%s worse or missing compared with %s; %s/report.md says which",
+			worse, worse > 1 ? "s are" : " is", job->against, job->folder);
 }
 
 int main(int argc, char **argv)
@@ -681,9 +686,9 @@ int main(int argc, char **argv)
 	if (job.json)
 		json_print(json_incref(report));
 	else
-		printf("%s/report.html, report.md, report.json: figures of %zu of %zu words\n",
+		printf("%s/report.html, report.md, report.json: %zu of %zu benchmarks\n",
 		       job.folder ? job.folder : job.from,
-		       json_object_size(json_object_get(report, "words")),
+		       json_object_size(json_object_get(report, "benchmarks")),
 		       json_object_size(json_object_get(report, "runs")));
 	cli_finish();
 	if (job.folder)

@@ -682,7 +682,7 @@ static bool has_view(const struct wakeup *run)
 /* Of the lateness of all runs of a kind together. */
 static double pooled(const struct beside *beside, bool view, bool cyclictest)
 {
-	uint64_t *bins = cli_alloc(INCISE_LOOP_BINS, sizeof(*bins));
+	uint64_t *bins = cli_alloc(INCISE_LOOP_BINS, sizeof(*bins)), ticks = 0;
 	double p999;
 
 	for (int i = 0; i < beside->n; i++) {
@@ -691,11 +691,11 @@ static double pooled(const struct beside *beside, bool view, bool cyclictest)
 
 		if (has_view(run) == view && l->bins)
 			for (int k = 0; k < INCISE_LOOP_BINS; k++)
-				bins[k] += l->bins[k];
+				bins[k] += l->bins[k], ticks += l->bins[k];
 	}
 	p999 = incise_loop_quantile(bins, 0.999);
 	free(bins);
-	return p999 > 0 ? p999 : NAN;
+	return p999 > 0 && stopwatch_resolves(ticks, 0.999) ? p999 : NAN;
 }
 
 static void measure_beside(const char *scene, double seconds, bool quick,

@@ -6,7 +6,7 @@ load cli
 load report
 
 # One report for all that only look at it. What fails here is in it, with the reason. What each
-# word says of itself is looked at in tests of their own.
+# benchmark says of itself is looked at in tests of their own.
 setup_file() {
 	cd "$BATS_FILE_TMPDIR"
 	PATH=$INCISE_BUILD/bin:$PATH
@@ -20,7 +20,7 @@ setup() {
 	r=$BATS_FILE_TMPDIR/r
 }
 
-words="precision training stability pose timeline loop vision capture view scenes integers extremes"
+benchmarks="precision training stability pose timeline loop vision capture view scenes integers extremes"
 
 # A folder that is a report to incise bench all, of this JSON.
 report_of() {
@@ -28,7 +28,7 @@ report_of() {
 	printf '%s\n' "$1" >made/report.json
 }
 
-@test "one command measures every word, and leaves one report" {
+@test "one command measures every benchmark, and writes one report" {
 	for file in report.html report.md report.json; do
 		[ -s "$r/$file" ]
 	done
@@ -38,28 +38,28 @@ report_of() {
 	[ -n "$(key "$r/report.json" date)" ]
 	[ "$(key "$r/report.json" quick)" = 1 ]
 	[ "$(key "$r/report.json" command)" = "incise bench all --report DIR --quick" ]
-	[ "incise $(key "$r/report.json" version)" = "$(incise --version)" ]
-	for word in $words; do
-		case $(key "$r/report.json" "runs.$word.state") in
+	[ "incise $(key "$r/report.json" version)" = "$(incise --version | head -n 1)" ]
+	for benchmark in $benchmarks; do
+		case $(key "$r/report.json" "runs.$benchmark.state") in
 		measured)
 			cmp <(sqlite3 :memory: "SELECT json_extract(readfile('$r/report.json'),
-				'\$.words.$word')") <(sqlite3 :memory: "SELECT json(readfile(
-				'$r/data/$word.json'))")
-			grep -qF "(data/$word.json)" "$r/report.md" ;;
+				'\$.benchmarks.$benchmark')") <(sqlite3 :memory: "SELECT json(readfile(
+				'$r/data/$benchmark.json'))")
+			grep -qF "(data/$benchmark.json)" "$r/report.md" ;;
 		failed | "left out")
-			grep -qE "^- $word: (failed|left out): .{10}" "$r/report.md" ;;
-		*) complain "$word: what came out?" ;;
+			grep -qE "^- $benchmark: (failed|left out): .{10}" "$r/report.md" ;;
+		*) complain "$benchmark: what came out?" ;;
 		esac
 	done
 	# what needs no screen, camera or real time
-	for word in precision training stability; do
-		[ "$(key "$r/report.json" "runs.$word.state")" = measured ]
+	for benchmark in precision training stability; do
+		[ "$(key "$r/report.json" "runs.$benchmark.state")" = measured ]
 	done
 	holds "$(key "$r/report.json" "figures[0].value") > 0"
 	[[ "$(key "$r/report.json" "figures[0].name")" == "precision: "* ]]
 }
 
-@test "it fails when a word failed, and says where that stands" {
+@test "it fails when a benchmark failed, and says where that stands" {
 	n=$(sqlite3 :memory: "SELECT json_array_length(readfile('$r/report.json'), '\$.failed')")
 	if [ "$n" = 0 ]; then
 		[ "$(cat "$BATS_FILE_TMPDIR/status")" = 0 ]
@@ -67,7 +67,7 @@ report_of() {
 	else
 		[ "$(cat "$BATS_FILE_TMPDIR/status")" = 1 ]
 		[ "$(cat "$BATS_FILE_TMPDIR/err")" = \
-			"incise bench all: $n of 11 words failed; r/report.md says why" ]
+			"incise bench all: $n of 12 benchmarks failed; r/report.md says why" ]
 	fi
 }
 
@@ -81,12 +81,69 @@ report_of() {
 	grep -qx "picture .*" html
 }
 
+@test "the report begins with a verdict of three sentences and a figure" {
+	for file in "$r/report.html" "$r/report.md"; do
+		python3 "$BATS_TEST_DIRNAME/report_cells.py" "$file" >cells
+		mapfile -t lines < <(head -n 6 cells)
+		[[ "${lines[1]}" =~ ^"Error against run time: a fixed-point force takes "[0-9.]+" ns and is within "[0-9.]+" µN " ]]
+		[[ "${lines[2]}" =~ ^"Stable when stiff: "[0-9]+" of "[0-9]+" simulated " ]]
+		[[ "${lines[3]}" =~ ^"Nothing that a scene does not need: "[0-9]+" of "[0-9]+" scenes " ]]
+		! command -v gnuplot >/dev/null || [[ "${lines[4]}" == "picture A scatter of evaluators"* ]]
+		# a sentence each
+		for line in "${lines[@]:1:3}"; do
+			[ "$(grep -o '\.\( \|$\)' <<<"$line" | wc -l)" = 1 ] || complain "$line"
+		done
+	done
+	# of nothing, it says so, and what was measured is in it
+	report_of '{"benchmarks": {"extremes": {"rows": []}}, "quick": true}'
+	incise bench all --from made
+	[ "$(grep -c 'not measured\.$' made/report.md)" = 3 ]
+}
+
+@test "each row of the summary can be read alone, in a quick report too" {
+	python3 "$BATS_TEST_DIRNAME/report_cells.py" "$r/report.md" >cells
+	run ! grep '^…' cells
+	run ! grep '^| …' "$root/tools/bench/report.md"
+	# a row whose neighbour is missing: only one of two textures
+	report_of '{"benchmarks": {"view": {"frames": [{"width": 1280, "texture_px": 512, "frames_hz": 61}]}}}'
+	incise bench all --from made
+	grep -qF '| Frame rate of a bleeding wound, 1280 × 720, texture of 512² | 61 Hz |' made/report.md
+	run ! grep -F '2048²' made/report.md
+}
+
+@test "a percentile of too few samples is a dash, with the reason" {
+	# 200 wake-ups resolve the 99th percentile, and not the 99.9th
+	report_of '{"benchmarks": {"loop": {"wakeups": {"rows": [{"load": "idle", "rate_hz": 1000,
+		"lateness_us": {"median": 12, "p99": 34, "p999": null, "max": 56}, "cyclictest_us": null}]}},
+		"precision": {"rows": [{"name": "fixed_table", "ns": 10, "ns_p5": null, "ns_p95": null},
+		{"name": "fuzzylite", "ns": null, "ns_p5": null, "failed": "not built in"}]}}}'
+	incise bench all --from made
+	grep -qE '^\| Wake-up latency at 1 kHz, idle machine: 99.9th percentile \| – \(fewer than 1000 samples\) \|' made/report.md
+	# a program that was not there took no samples at all
+	run ! grep 'cyclictest at the same time' made/report.md
+	grep -qF '| idle | 1000 | 12 | 34 | – | 56 |' made/report.md
+	grep -qx '“–” means fewer samples than the percentile needs: 99.9 %, µs takes 1000.' made/report.md
+	grep -qx '“–” means fewer samples than the percentile needs: 5 %, ns takes 20, 95 %, ns takes 20.' made/report.md
+	# what was measured follows the same rule: 20 values for the 5th, 1000 for the 99.9th
+	[ "$(sqlite3 :memory: "SELECT count(*) FROM json_each(readfile('$r/data/loop.json'), '\$.wakeups.rows')
+		WHERE (json_extract(value, '\$.lateness_us.p999') IS NULL) <>
+			(coalesce(json_extract(value, '\$.lateness_us.ticks'), 0) < 1000)")" = 0 ]
+}
+
+@test "reference implementations are named, with how to measure them" {
+	for name in fuzzylite scikit-learn cyclictest MATLAB CHAI3D SOFA; do
+		grep -qE "^\| $name[^|]* \| [^|]+ \| [^|]+ \| .{40}" "$r/report.md"
+	done
+	grep -q '^| CHAI3D .*computeInteractionForces()' "$r/report.md"
+}
+
 @test "every picture is there, in both" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the pictures"
-	grep -oE '\(pictures/[a-z-]+\.svg\)' "$r/report.md" | tr -d '()' >named
-	(cd "$r" && ls pictures/*.svg) >there
-	diff <(sort named) there
-	[ "$(grep -c . named)" -ge 4 ]
+	grep -oE '\(plots/[a-z-]+\.svg\)' "$r/report.md" | tr -d '()' >named
+	(cd "$r" && ls plots/*.svg) >there
+	# the one of the verdict is in its section, too
+	diff <(sort -u named) there
+	[ "$(grep -c . named)" -ge 5 ]
 	[ "$(grep -o 'src="data:image/svg+xml;base64,' "$r/report.html" | wc -l)" = "$(grep -c . named)" ]
 	while read -r file; do
 		base64 -w0 <"$r/$file" >coded
@@ -119,16 +176,16 @@ report_of() {
 	done
 }
 
-@test "a word that fails stands in the report, and the others go on" {
+@test "a benchmark that fails stands in the report, and the others go on" {
 	mkdir modules
 	export INCISE_MODULE_PATH=$PWD/modules
 	run --separate-stderr incise bench all --quick --report r --only precision,vision
-	failed_with "1 of 2 words failed" r/report.md
+	failed_with "1 of 2 benchmarks failed" r/report.md
 	grep -qE "^- vision: failed: vision: there is no module vision_opencv\.so" r/report.md
-	grep -qE "see “What failed or was left out”" r/report.md
+	grep -qE "see “Failures and omissions”" r/report.md
 	[ "$(key r/report.json 'failed[0]')" = vision ]
 	[ ! -e r/data/vision.json ]
-	grep -q "^## Evaluator" r/report.md
+	grep -q "^## Force evaluation" r/report.md
 	run ! grep "^## Vision" r/report.md
 	# it is replaced by the next one
 	unset INCISE_MODULE_PATH
@@ -137,7 +194,7 @@ report_of() {
 	incise bench all --quick --report r --overwrite --only training --json >r.json
 	cmp <(sqlite3 :memory: "SELECT json(readfile('r.json'))") \
 		<(sqlite3 :memory: "SELECT json(readfile('r/report.json'))")
-	[ "$(ls r)" = "$(printf '%s\n' data pictures report.html report.json report.md)" ]
+	[ "$(ls r)" = "$(printf '%s\n' data plots report.html report.json report.md)" ]
 	[ "$(ls r/data)" = training.json ]
 }
 
@@ -150,20 +207,20 @@ report_of() {
 	cp r/report.json first.json
 	run --separate-stderr incise bench all --quick --report r --overwrite --only timeline,training \
 		--against first.json
-	grep -q "^## What changed" r/report.md
+	grep -q "^## Changes" r/report.md
 	holds "$(key r/report.json against.same) > 50"
 	[ "$(key r/report.json against.file)" = first.json ]
 	n=$(sqlite3 :memory: "SELECT json_array_length(readfile('r/report.json'), '\$.against.gone')
 		+ json_extract(readfile('r/report.json'), '\$.against.worse')")
-	[ "$n" = 0 ] && [ "$status" = 0 ] || failed_with "$n figure" "against first.json"
+	[ "$n" = 0 ] && [ "$status" = 0 ] || failed_with "$n metric" "compared with first.json"
 	# of an older one that was better, and had more
 	sqlite3 :memory: "SELECT json_set(readfile('r/report.json'),
-		'\$.words.timeline.figures[0].value', 1e-9,
-		'\$.words.timeline.figures[#]', json('{\"name\": \"other\", \"kind\": \"exact\",
+		'\$.benchmarks.timeline.figures[0].value', 1e-9,
+		'\$.benchmarks.timeline.figures[#]', json('{\"name\": \"other\", \"kind\": \"exact\",
 		\"unit\": \"mm\", \"value\": 1}'))" >old.json
 	run --separate-stderr incise bench all --quick --report r --overwrite --only timeline --against old.json
-	failed_with "worse or gone against old.json; r/report.md says which"
-	grep -qF -- "- Gone: timeline: other" r/report.md
+	failed_with "worse or missing compared with old.json; r/report.md says which"
+	grep -qF -- "- Missing: timeline: other" r/report.md
 	grep -qE "^\| timeline \| .* \| 1.000×10⁻⁹ \| .* \| yes \|$" r/report.md
 	# what is none is said before anything is measured
 	echo '{}' >none.json
@@ -175,7 +232,7 @@ report_of() {
 }
 
 @test "what a report holds is shown as it is, whatever it is" {
-	report_of '{"words": {"training": {"rows": [
+	report_of '{"benchmarks": {"training": {"rows": [
 		{"name": "<script>alert(1)</script>", "ms": 1.5, "failed": "a|b *c* [d](e) `f` & \"g\""},
 		{"name": "\\| --- \u0007_x_ <!--", "ms": 1e300, "failed": null}, 7, null],
 		"figures": 3}, "no_such_word": {}, "loop": [], "pose": {"rows": {"a": 1}}},
@@ -197,7 +254,7 @@ report_of() {
 	mkdir other
 	echo mine >other/report.json
 	run --separate-stderr incise bench all --report other
-	failed_with "other: is there, and is no report; give another --report DIR"
+	failed_with "other: not empty and not a report; give another --report DIR"
 	[ "$(cat other/report.json)" = mine ]
 	[ "$(ls -A other)" = report.json ]
 	touch file
@@ -209,7 +266,7 @@ report_of() {
 	failed_with nowhere/report.json
 	echo '{"rows": []}' >other/report.json
 	run --separate-stderr incise bench all --from other
-	failed_with "other/report.json: is no report"
+	failed_with "other/report.json: not a report"
 }
 
 @test "bad usage of bench all" {
@@ -239,7 +296,7 @@ report_of() {
 		[ -n "$child" ]
 		kill -INT "$pid"
 		wait "$pid" && complain "it went on" || [ "$?" = 1 ]
-		grep -qx "incise bench all: Interrupt: $folder is as it was" err
+		grep -qx "incise bench all: Interrupt: $folder is unchanged" err
 		run ! kill -0 "$child"
 	done
 	cmp old/report.json was.json
@@ -275,9 +332,19 @@ asked() {
 			const broken = [...document.querySelectorAll('a[href^="#"]')]
 				.filter(a => !document.getElementById(a.hash.slice(1))).length;
 			const ids = [...document.querySelectorAll("[id]")].map(e => e.id);
+			// boxes with more in them than they show, which would scroll sideways
+			const wide = [...document.querySelectorAll("body, body *")]
+				.filter(e => getComputedStyle(e).display != "inline" &&
+					e.scrollWidth > e.clientWidth + 1).length;
+			// cells that show the name of their column
+			const named = [...document.querySelectorAll("td")].filter(e =>
+				getComputedStyle(e, "::before").content.startsWith('"') &&
+				e.dataset.label == e.closest("table").querySelectorAll("th")
+					[e.cellIndex].textContent.trim()).length;
 			parent.postMessage([innerWidth, document.documentElement.scrollWidth,
 				small, document.images.length, blank, broken,
-				ids.length - new Set(ids).size].join(" "), "*");
+				ids.length - new Set(ids).size, wide, named,
+				document.querySelectorAll("td").length].join(" "), "*");
 		});
 		</script>
 	EOF
@@ -298,11 +365,19 @@ asked() {
 		run ! grep CONSOLE said
 		answer=$(grep -oE 'data-asked="[^"]*' dom | cut -d'"' -f2)
 		echo "$width: $answer"
-		read -r inner page small pictures blank broken twice <<<"$answer"
+		read -r inner page small pictures blank broken twice wide named cells <<<"$answer"
 		[ "$inner" = "$width" ]
 		[ "$page" -le "$width" ]
 		[ "$small $blank $broken $twice" = "0 0 0 0" ]
 		[ "$pictures" = "$(grep -c '^!\[' "$r/report.md")" ]
+		# on a phone a row is a block, its cells have the names of their columns, and nothing
+		# scrolls sideways; on a screen a wide table scrolls in its own box
+		if [ "$width" = 390 ]; then
+			[ "$cells" -gt 500 ]
+			[ "$wide $named" = "0 $cells" ]
+		else
+			[ "$named" = 0 ]
+		fi
 	done
 }
 
@@ -330,7 +405,7 @@ asked() {
 	while read -r name; do
 		[[ "$facts" == *"| $name | {"* ]] || complain "no fact: $name"
 		n=$((n + 1))
-	done < <(sed -n 's/^| \([^|]*\) | .* |$/\1/p' <<<"$figures" | grep -v -e '^what$' -e '^---')
+	done < <(sed -n 's/^| \([^|]*\) | .* |$/\1/p' <<<"$figures" | grep -v -e '^metric$' -e '^---')
 	((n > 20))
 	run -1 --separate-stderr "$root/mk/readme-figures" "$PWD/none"
 	[[ "$stderr" == *"'make bench' makes one"* ]]

@@ -11,6 +11,7 @@
 #include "bench.h"
 #include "../../lib/sim/sim.h"
 #include "../cli/file.h"
+#include "../cli/json.h"
 #include "../cli/stopwatch.h"
 #include "../cli/tick_cost.h"
 #include "sheet.h"
@@ -611,9 +612,10 @@ static void report_first(struct bench_run *run, const struct tick_row *tick,
 	if (row->loop.json)
 		json_object_set_new(late, "skipped",
 				    json_integer((json_int_t)row->skipped));
-	bench_values(run, "{s{sf sf sf} so sO?}", "tick_ns", "median", tick->cost.median,
-		     "p99", tick->cost.p99, "p999", tick->cost.p999, "lateness_us", late,
-		     "cyclictest_us", row->cyclictest.json);
+	bench_values(run, "{s{sf so so} so sO?}", "tick_ns", "median", tick->cost.median,
+		     "p99", json_number(tick->cost.p99), "p999",
+		     json_number(tick->cost.p999), "lateness_us", late, "cyclictest_us",
+		     row->cyclictest.json);
 }
 
 static void run(struct bench_run *run)

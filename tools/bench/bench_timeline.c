@@ -30,7 +30,7 @@ static const double drifts_ppm[] = {-200, 0, 200};
 #define WITHIN 0.9545
 
 #define REPEATS 51
-#define QUICK_REPEATS 5
+#define QUICK_REPEATS 21 /* 20 resolve the 5th and the 95th percentile */
 
 /* --- streams of known times: a device with a clock of its own, whose samples come late by
  * chance, and some not at all ---

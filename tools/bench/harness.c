@@ -144,7 +144,7 @@ void harness_spread(const double *values, int n, struct harness_spread *spread)
 {
 	double *sorted;
 
-	*spread = (struct harness_spread){NAN, NAN, NAN, NAN, NAN};
+	*spread = HARNESS_SPREAD_NONE;
 	if (n < 1)
 		return;
 	sorted = cli_alloc(n, sizeof(*sorted));
@@ -153,6 +153,8 @@ void harness_spread(const double *values, int n, struct harness_spread *spread)
 	spread->median = stopwatch_quantile(sorted, n, 0.5);
 	spread->p5 = stopwatch_quantile(sorted, n, 0.05);
 	spread->p95 = stopwatch_quantile(sorted, n, 0.95);
+	spread->min = sorted[0];
+	spread->max = sorted[n - 1];
 	if (n >= 2 * STRETCHES) {
 		interval_of_stretches(values, n, spread);
 	} else {

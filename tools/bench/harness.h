@@ -12,6 +12,8 @@
 #ifndef INCISE_HARNESS_H
 #define INCISE_HARNESS_H
 
+#include <math.h>
+
 /*
  * Three kinds of fixed work, as no machine is slower evenly: beside a busy processor of the same
  * core, wide work takes half as long again, a chain as long as before. A change of them makes
@@ -34,9 +36,12 @@ struct harness_variant {
 
 /* Of measured values in the order in which they came. */
 struct harness_spread {
-	double median, p5, p95;
-	double low, high; /* 95 % interval of the median */
+	double median, p5, p95; /* the percentiles from 20 values on, else NaN */
+	double low, high;	/* 95 % interval of the median */
+	double min, max;
 };
+
+#define HARNESS_SPREAD_NONE ((struct harness_spread){NAN, NAN, NAN, NAN, NAN, NAN, NAN})
 
 struct harness_time {
 	struct harness_spread ns;	     /* of one unit */

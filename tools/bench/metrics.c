@@ -276,10 +276,11 @@ static int add_all(struct metrics *all, const char *bench, const json_t *list,
 	int rc = 0;
 
 	if (bench && !plain(bench))
-		return incise_error_set(err, EINVAL,
-					"%s: a word's name is empty, too long, or holds "
-					"control characters",
-					all->report);
+		return incise_error_set(
+			err, EINVAL,
+			"%s: a benchmark's name is empty, too long, or holds "
+			"control characters",
+			all->report);
 	if (!json_is_array(list))
 		return incise_error_set(err, EINVAL, "%s: %s%s'figures' is no list",
 					all->report, bench ? bench : "",
@@ -420,7 +421,7 @@ static double ratio(const struct metric *was, const struct metric *is)
 
 static json_t *metric_json(const struct metric *m)
 {
-	return json_pack("{ss? ss ss ss}", "word", m->bench, "name", m->name, "kind",
+	return json_pack("{ss? ss ss ss}", "benchmark", m->bench, "name", m->name, "kind",
 			 kind_names[m->kind], "unit", m->unit);
 }
 
@@ -450,8 +451,9 @@ static json_t *missing(const struct metrics *from, const struct metrics *to)
 			bench = m->bench;
 			known = metrics_have(to, bench);
 			if (!known)
-				json_array_append_new(list, json_pack("{ss sn}", "word",
-								      bench, "name"));
+				json_array_append_new(list,
+						      json_pack("{ss sn}", "benchmark",
+								bench, "name"));
 		}
 		if (known && !metrics_find(to, m))
 			json_array_append_new(list, metric_json(m));
@@ -540,7 +542,7 @@ static int comparable(const struct metrics *was, const struct metrics *is,
 			return 0;
 	return incise_error_set(err, EINVAL,
 				"%s and %s have no figure in common: compare two of one "
-				"word, or two of incise bench all",
+				"benchmark, or two of incise bench all",
 				was->report, is->report);
 }
 
@@ -592,9 +594,9 @@ static const char *text_of(const json_t *object, const char *key)
 
 static void name_of(const json_t *metric, char *name, size_t size)
 {
-	const char *word = text_of(metric, "word"), *is = text_of(metric, "name");
+	const char *bench = text_of(metric, "benchmark"), *is = text_of(metric, "name");
 
-	snprintf(name, size, "%s%s%s", word ? word : "", word && is ? ": " : "",
+	snprintf(name, size, "%s%s%s", bench ? bench : "", bench && is ? ": " : "",
 		 is ? is : "");
 }
 

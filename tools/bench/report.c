@@ -1,23 +1,27 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Figures in the places of report.md, a template that is made of blocks with empty lines between:
+ * Fills the places of report.md, a template that is made of blocks with empty lines between:
  *
  *   ## TITLE {section PATH by PROGRAM}  the blocks from here on are of this object of report.json,
- *                      and are left out where it is none; a benchmark's is words.NAME, and
+ *                      and are left out where it is none; a benchmark's is benchmarks.NAME, and
  *                      measured by a program, or incise-bench
- *   {if KEY} {if !KEY} first line of a block that is left out unless the object has it
+ *   {if KEY} {if !KEY} first line of a block that is left out unless the object has it; all of
+ *                      several must hold
+ *   {contents}         a block: links to the sections below it
  *   {each LIST where K=V,…} CAPTION  first line of a block for each row of a list of the object,
  *                      or of lists "a,b"; a list item is repeated, and so is the last line of a
  *                      table. Rows of an object are its members.
  *   {to NAME}          a link to a benchmark's section
  *   {VALUE}            of the object or row; {: VALUE} with the text in front, if any
  *
- * VALUE is KEY*FACTOR PART:DIGITS of WORD.LIST where K=V,…, all but KEY at will. A KEY leads
- * inwards, "a.b", or is a ratio, "a/b"; "@" is the row's name, or that of its list, "." the row
+ * VALUE is KEY*FACTOR PART:DIGITS needs N of BENCHMARK.LIST where K=V,…, all but KEY optional. A KEY
+ * leads inwards, "a.b", or is a ratio, "a/b"; "@" is the row's name, or that of its list, "." the row
  * itself, "count" how many rows there are. Without digits it is a text, or yes and no. A PART is
  * of several rows: least, largest (of magnitude), range, median, sum, holding (how many are true,
  * or a text: "3 of 12"). In a table with parts rows are one whose other columns are equal. A
- * column without a value is left out, as is a row of a table without {each}.
+ * column without a value is left out, as is a row of a table without {each}; other values that are
+ * missing are "–". A percentile needs N samples: without a value it is shown as "–", with the
+ * reason below its table.
  */
 #include <ctype.h>
 #include <stdlib.h>
@@ -52,6 +56,7 @@ struct value {
 	enum part part;
 	double factor;
 	int digits; /* significant ones; 0: text */
+	int needs;  /* samples, for a percentile; 0 */
 };
 
 struct row {
@@ -70,8 +75,8 @@ struct report {
 	const json_t *report, *object; /* of the section */
 	const char *folder;
 	FILE *out;
-	bool item;  /* the last block was a list item */
-	char *word; /* of the section; "": none */
+	bool item;	 /* the last block was a list item */
+	char *benchmark; /* of the section; "": none */
 };
 
 /* --- Markdown --- */
@@ -209,7 +214,7 @@ static char *cut(char *text, const char *mark)
 	return at + strlen(mark);
 }
 
-/* "KEY*FACTOR PART:DIGITS of LISTS where CONDITION" */
+/* "KEY*FACTOR PART:DIGITS needs N of LISTS where CONDITION" */
 static struct value value_of(const char *text)
 {
 	struct value v = {.factor = 1};
@@ -219,6 +224,7 @@ static struct value value_of(const char *text)
 	snprintf(line, sizeof(line), "%s", text);
 	snprintf(v.where, sizeof(v.where), "%s", cut(line, " where "));
 	snprintf(v.lists, sizeof(v.lists), "%s", cut(line, " of "));
+	v.needs = atoi(cut(line, " needs "));
 	v.digits = atoi(cut(line, ":"));
 	part = cut(line, " ");
 	while (v.part < PART_COUNT && strcmp(part, parts[v.part]))
@@ -416,50 +422,73 @@ static void cell_text(const struct rows *rows, int group, const struct value *v,
 /* --- text with places --- */
 
 /* A link, where the report has the section. */
-static void put_link(struct report *r, const char *word)
+static void put_link(struct report *r, const char *benchmark)
 {
 	const struct report_section *s = report_sections();
 	char anchor[100];
 
-	while (*s->word && strcmp(s->word, word))
+	while (*s->benchmark && strcmp(s->benchmark, benchmark))
 		s++;
-	if (!*s->word || !json_object_get(json_object_get(r->report, "words"), word)) {
-		document_text(r->out, word);
+	if (!*s->benchmark ||
+	    !json_object_get(json_object_get(r->report, "benchmarks"), benchmark)) {
+		document_text(r->out, benchmark);
 		return;
 	}
 	document_anchor(s->title, anchor, sizeof(anchor));
-	fprintf(r->out, "[%s](#%s)", word, anchor);
+	fprintf(r->out, "[%s](#%s)", benchmark, anchor);
 }
 
-/* A place's text without its braces; returns whether it has a value. */
-static bool put_place(struct report *r, const struct row *row, const char *place,
-		      void (*put)(FILE *, const char *))
+/* Whether a percentile is missing where others of its samples are not. */
+static bool lacks_samples(const struct row *row, const struct value *v)
+{
+	char parent[sizeof(v->key)];
+	char *dot;
+
+	snprintf(parent, sizeof(parent), "%s", v->key);
+	dot = strrchr(parent, '.');
+	if (dot)
+		*dot = 0;
+	return v->needs && !has(row, v) &&
+	       (!dot || json_is_object(at_path(row->object, parent)));
+}
+
+enum placed { PLACED, MISSING, TOO_FEW_SAMPLES };
+
+/* A place's text without its braces. */
+static enum placed put_place(struct report *r, const struct row *row, const char *place,
+			     void (*put)(FILE *, const char *))
 {
 	size_t front = *place == ':' ? 2 : 0;
 	struct value v = value_of(place + front);
 	struct rows rows = {.row = (struct row *)row, .group = (int[]){0}, .n = 1};
-	char text[TEXT], path[64] = "words.";
-	bool there;
+	char text[TEXT], path[64] = "benchmarks.";
+	enum placed placed = PLACED;
 
 	if (!strcmp(v.key, "to")) {
 		put_link(r, place + 3);
-		return true;
+		return PLACED;
 	}
 	if (*v.lists) {
-		size_t word = strcspn(v.lists, ".");
+		size_t benchmark = strcspn(v.lists, ".");
 
-		strncat(path, v.lists, word);
-		find_rows(at_path(r->report, path), v.lists + word + 1, v.where, &rows);
+		strncat(path, v.lists, benchmark);
+		find_rows(at_path(r->report, path), v.lists + benchmark + 1, v.where,
+			  &rows);
 	}
-	there = any_has(&rows, &v);
-	if (there) {
+	if (any_has(&rows, &v) || v.part == PART_COUNT) {
 		cell_text(&rows, 0, &v, text);
 		fprintf(r->out, "%.*s", (int)front, place);
 		put(r->out, text);
+	} else if (rows.n && lacks_samples(rows.row, &v)) {
+		fprintf(r->out, "– (fewer than %d samples) ", v.needs);
+		placed = TOO_FEW_SAMPLES;
+	} else {
+		fputs(front ? "" : "–", r->out);
+		placed = MISSING;
 	}
 	if (*v.lists)
 		free_rows(&rows);
-	return there;
+	return placed;
 }
 
 /* Returns whether its first place has a value. */
@@ -472,6 +501,7 @@ static bool put_line(struct report *r, const struct row *row, const char *line,
 
 	while (*line) {
 		size_t n = strcspn(line, "{");
+		enum placed placed;
 
 		fwrite(line, 1, n, r->out);
 		line += n;
@@ -479,10 +509,14 @@ static bool put_line(struct report *r, const struct row *row, const char *line,
 			break;
 		n = strcspn(line, "}");
 		snprintf(place, sizeof(place), "%.*s", (int)n - 1, line + 1);
-		if (!put_place(r, row ? row : &whole, place, put) && first)
+		placed = put_place(r, row ? row : &whole, place, put);
+		if (placed == MISSING && first)
 			there = false;
 		first = false;
 		line += n + 1;
+		/* A reason has no unit. */
+		if (placed == TOO_FEW_SAMPLES)
+			line += strcspn(line, "|");
 	}
 	return there;
 }
@@ -688,6 +722,28 @@ static void put_reason(struct report *r, const struct table *t, const struct row
 	fputc('\n', r->out);
 }
 
+/* Why percentiles are missing in rows that did not fail. */
+static void put_needs(struct report *r, const struct table *t, const struct rows *rows)
+{
+	const char *front = "\n“–” means fewer samples than the percentile needs:";
+
+	for (int k = 0; k < t->n; k++) {
+		const struct value *v = &t->column[k];
+		bool missing = false;
+
+		for (int i = 0; v->needs && i < rows->n; i++)
+			missing |= lacks_samples(&rows->row[i], v) &&
+				   !json_string_length(json_object_get(
+					   rows->row[i].object, "failed"));
+		if (!missing)
+			continue;
+		fprintf(r->out, "%s %s takes %d", front, t->heading[k], v->needs);
+		front = ",";
+	}
+	if (*front == ',')
+		fputs(".\n", r->out);
+}
+
 /* Rows that are equal in all that is not summed up are one. */
 static void put_table(struct report *r, struct block block, const char *caption,
 		      struct rows *rows)
@@ -697,8 +753,8 @@ static void put_table(struct report *r, struct block block, const char *caption,
 	char text[TEXT];
 
 	for (int k = 0; k < t.n; k++)
-		t.shown[k] =
-			!strcmp(t.column[k].key, "to") || any_has(rows, &t.column[k]);
+		t.shown[k] = !strcmp(t.column[k].key, "to") || t.column[k].needs ||
+			     any_has(rows, &t.column[k]);
 	put_head(r, &t, caption);
 	for (int i = 0; i < groups && i < ROWS_MAX; i++) {
 		for (int k = 0; k < t.n; k++) {
@@ -714,6 +770,7 @@ static void put_table(struct report *r, struct block block, const char *caption,
 		}
 		fputs("|\n", r->out);
 	}
+	put_needs(r, &t, rows);
 	/* Those of groups are counted in them. */
 	for (int i = 0; i < rows->n && groups == rows->n; i++)
 		put_reason(r, &t, &rows->row[i]);
@@ -745,11 +802,12 @@ const struct report_section *report_sections(void)
 	struct report_section *s = sections;
 	char path[TEXT];
 
-	while (lines.n && (s > sections || !*s->word)) {
+	while (lines.n && (s > sections || !*s->benchmark)) {
 		struct block block = next_block(&lines);
 
 		if (directive(block, "section", path) &&
-		    sscanf(path, "words.%31s by %31s", s->word, s->program) > 0) {
+		    sscanf(path, "benchmarks.%31s by %31s", s->benchmark, s->program) >
+			    0) {
 			if (!*s->program)
 				strcpy(s->program, "incise-bench");
 			snprintf(s->title, sizeof(s->title), "%.*s",
@@ -770,7 +828,20 @@ static bool holds(const json_t *object, const char *key)
 	const json_t *value = at_path(object, key + negated);
 
 	return (json_is_true(value) || json_string_length(value) ||
-		json_array_size(value)) != negated;
+		json_array_size(value) || json_object_size(value)) != negated;
+}
+
+/* Whether all conditions of a line "{if KEY} {if !KEY}" hold. */
+static bool all_hold(const json_t *object, const char *line)
+{
+	char key[TEXT];
+
+	for (; (line = strstr(line, "{if ")); line++) {
+		snprintf(key, sizeof(key), "%.*s", (int)strcspn(line + 4, "}"), line + 4);
+		if (!holds(object, key))
+			return false;
+	}
+	return true;
 }
 
 static void put_block(struct report *r, struct block block)
@@ -778,7 +849,7 @@ static void put_block(struct report *r, struct block block)
 	char argument[TEXT];
 
 	if (directive(block, "if", argument)) {
-		if (!holds(r->object, argument))
+		if (!all_hold(r->object, *block.line))
 			return;
 		block = rest(block);
 	}
@@ -797,9 +868,18 @@ static void put_block(struct report *r, struct block block)
 /* A benchmark's section ends with its data. */
 static void end_section(struct report *r)
 {
-	if (*r->word && json_is_object(r->object))
-		fprintf(r->out, "\nAll figures, as JSON: [data/%s.json](data/%s.json)\n",
-			r->word, r->word);
+	if (*r->benchmark && json_is_object(r->object))
+		fprintf(r->out, "\nAll values as JSON: [data/%s.json](data/%s.json)\n",
+			r->benchmark, r->benchmark);
+}
+
+/* "loop" of "benchmarks.loop"; "" of another object. */
+static char *section_benchmark(char *path)
+{
+	static const char prefix[] = "benchmarks.";
+
+	return path +
+	       (strncmp(path, prefix, strlen(prefix)) ? strlen(path) : strlen(prefix));
 }
 
 static void start_section(struct report *r, const char *title, char *path)
@@ -807,7 +887,7 @@ static void start_section(struct report *r, const char *title, char *path)
 	end_section(r);
 	cut(path, " by ");
 	r->object = at_path(r->report, path);
-	r->word = strncmp(path, "words.", 6) ? "" : path + 6;
+	r->benchmark = section_benchmark(path);
 	if (json_is_object(r->object))
 		fprintf(r->out, "\n%.*s\n", (int)(strstr(title, " {") - title), title);
 	r->item = false;
@@ -830,29 +910,34 @@ static void put_contents(FILE *out, const char *body)
 
 void report_markdown(const json_t *report, const char *folder, FILE *out)
 {
-	struct report r = {
-		.report = report, .object = report, .folder = folder, .word = ""};
+	struct report r = {.report = report,
+			   .object = report,
+			   .folder = folder,
+			   .out = out,
+			   .benchmark = ""};
 	struct block lines = template_lines(), block = next_block(&lines);
 	char *body = NULL, path[TEXT], section[TEXT];
 	size_t size;
 
 	/* Its first block is about the template, but for the title, its last line. */
-	fprintf(out, "%s\n\n", block.line[block.n - 1]);
-	r.out = open_memstream(&body, &size);
-	if (!r.out)
-		cli_fail("no memory");
+	fprintf(out, "%s\n", block.line[block.n - 1]);
 	while (lines.n) {
 		block = next_block(&lines);
-		if (directive(block, "section", path)) {
+		if (block.n && !strcmp(*block.line, "{contents}")) {
+			r.out = open_memstream(&body, &size);
+			if (!r.out)
+				cli_fail("no memory");
+		} else if (directive(block, "section", path)) {
 			start_section(&r, *block.line, path);
 			memcpy(section, path, sizeof(section));
-			r.word = *r.word ? section + 6 : "";
+			r.benchmark = section_benchmark(section);
 		} else if (block.n && json_is_object(r.object)) {
 			put_block(&r, block);
 		}
 	}
 	end_section(&r);
 	fclose(r.out);
+	fputc('\n', out);
 	put_contents(out, body);
 	fwrite(body, 1, size, out);
 	free(body);

@@ -12,12 +12,12 @@
 
 /* A benchmark's section of the template. */
 struct report_section {
-	char word[32], title[100];
+	char benchmark[32], title[100];
 	char program[32]; /* that has the benchmark */
 	bool plots;
 };
 
-/* In the order of the template; the last one has no word. */
+/* In the order of the template; the last one has no benchmark. */
 const struct report_section *report_sections(void);
 
 /* Write report.json, and what else the template names, as Markdown; plots are looked for in its

@@ -35,6 +35,7 @@
 #include "../cli/child.h"
 #include "../cli/folder.h"
 #include "../cli/json.h"
+#include "../cli/stopwatch.h"
 #include "wakeup.h"
 
 /* --- loads --- */
@@ -406,13 +407,15 @@ static void close_run(struct run *run)
 
 /* --- both together --- */
 
+/* NaN if the wake-ups are too few for it. */
+static double percentile(const struct lateness *l, double q)
+{
+	return stopwatch_resolves(l->ticks, q) ? incise_loop_quantile(l->bins, q) : NAN;
+}
+
 static struct lateness lateness_of(const uint64_t *bins, double max_us)
 {
 	struct lateness l = {
-		.median = incise_loop_quantile(bins, 0.5),
-		.p99 = incise_loop_quantile(bins, 0.99),
-		.p999 = incise_loop_quantile(bins, 0.999),
-		.p9999 = incise_loop_quantile(bins, 0.9999),
 		.max = max_us,
 		.bins = cli_alloc(INCISE_LOOP_BINS, sizeof(*bins)),
 	};
@@ -422,9 +425,14 @@ static struct lateness lateness_of(const uint64_t *bins, double max_us)
 		l.min++;
 	for (int i = 0; i < INCISE_LOOP_BINS; i++)
 		l.ticks += bins[i];
-	l.json = json_pack("{sf sf sf sf sf sf sI}", "min", l.min, "median", l.median,
-			   "p99", l.p99, "p999", l.p999, "p9999", l.p9999, "max", l.max,
-			   "ticks", (json_int_t)l.ticks);
+	l.median = percentile(&l, 0.5);
+	l.p99 = percentile(&l, 0.99);
+	l.p999 = percentile(&l, 0.999);
+	l.p9999 = percentile(&l, 0.9999);
+	l.json = json_pack("{sf so so so so sf sI}", "min", l.min, "median",
+			   json_number(l.median), "p99", json_number(l.p99), "p999",
+			   json_number(l.p999), "p9999", json_number(l.p9999), "max",
+			   l.max, "ticks", (json_int_t)l.ticks);
 	return l;
 }
 
@@ -433,6 +441,8 @@ static struct harness_spread quantile_of(const struct lateness *l, double q)
 {
 	double off = 1.96 * sqrt(q * (1 - q) / fmax((double)l->ticks, 1));
 
+	if (!stopwatch_resolves(l->ticks, q))
+		return HARNESS_SPREAD_NONE;
 	return (struct harness_spread){
 		.median = incise_loop_quantile(l->bins, q),
 		.low = incise_loop_quantile(l->bins, fmax(q - off, 0)),

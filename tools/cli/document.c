@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * Markdown as one file of HTML, rendered by libcmark-gfm; see document.h. This file adds the
- * outline: sections that links lead to, a box that scrolls around each table and plot, and the
- * plots themselves.
+ * outline: sections that links lead to, a box around each table and plot, the plots themselves, and
+ * the name of its column in each cell, which a narrow screen shows.
  */
 #include <ctype.h>
 #include <errno.h>
@@ -117,6 +117,14 @@ static void put_escaped(FILE *out, const char *text)
 			fputc(*text, out);
 }
 
+static void put_text_of(FILE *out, cmark_node *node)
+{
+	char *text = text_of(node);
+
+	put_escaped(out, text ? text : "");
+	free(text);
+}
+
 static void put_box(FILE *out, const char *class, const char *label)
 {
 	fprintf(out, "<div%s role=\"region\" tabindex=\"0\" aria-label=\"", class);
@@ -147,6 +155,28 @@ static void mark_long_cells(cmark_node *table)
 		}
 }
 
+/* HTML of a table, with the heading of its column in each cell: <td data-label="HEADING">. */
+static void put_cells(const struct page *page, cmark_node *table, const char *html)
+{
+	static const char row[] = "<tr>", cell[] = "<td";
+	cmark_node *headings = cmark_node_first_child(cmark_node_first_child(table)),
+		   *heading = headings;
+
+	while (*html) {
+		if (!strncmp(html, row, strlen(row)))
+			heading = headings;
+		fputc(*html, page->out);
+		/* Text has no < that is not escaped. */
+		if (strncmp(html++, cell, strlen(cell)) || !heading)
+			continue;
+		fprintf(page->out, "td data-label=\"");
+		html += strlen(cell) - 1;
+		put_text_of(page->out, heading);
+		fputc('"', page->out);
+		heading = cmark_node_next(heading);
+	}
+}
+
 static void put_table(const struct page *page, cmark_node *table, const char *caption)
 {
 	char *html;
@@ -156,7 +186,9 @@ static void put_table(const struct page *page, cmark_node *table, const char *ca
 	put_box(page->out, " class=\"scroll\"", caption);
 	fputs("\n<table>\n<caption><span>", page->out);
 	put_escaped(page->out, caption);
-	fprintf(page->out, "</span></caption>\n%s</div>\n", strchr(html, '\n') + 1);
+	fputs("</span></caption>\n", page->out);
+	put_cells(page, table, strchr(html, '\n') + 1);
+	fputs("</div>\n", page->out);
 	free(html);
 }
 
@@ -237,7 +269,7 @@ static void begin_section(const struct page *page, cmark_node *heading, bool fir
 	char *title = text_of(heading), anchor[200];
 
 	document_anchor(title, anchor, sizeof(anchor));
-	fprintf(page->out, "%s<section id=\"%s\">\n", first ? "</nav>\n" : "</section>\n",
+	fprintf(page->out, "%s<section id=\"%s\">\n", first ? "" : "</section>\n",
 		anchor);
 	put_node(page, heading);
 	free(title);
@@ -251,6 +283,7 @@ static cmark_node *put_block(const struct page *page, cmark_node *node, bool *se
 	cmark_node *next = cmark_node_next(node), *inner = cmark_node_first_child(node);
 	bool is_plot = inner && next && cmark_node_get_type(inner) == CMARK_NODE_IMAGE,
 	     is_table = next && !strcmp(cmark_node_get_type_string(next), "table");
+	bool is_nav;
 	char *caption;
 
 	if (cmark_node_get_heading_level(node) == 2) {
@@ -267,9 +300,11 @@ static cmark_node *put_block(const struct page *page, cmark_node *node, bool *se
 		free(caption);
 		return *rc ? NULL : cmark_node_next(next);
 	}
+	/* The list in front of the first section is the contents. */
+	is_nav = !*section && cmark_node_get_type(node) == CMARK_NODE_LIST;
+	fputs(is_nav ? "<nav aria-label=\"Contents\">\n" : "", page->out);
 	put_node(page, node);
-	if (cmark_node_get_heading_level(node) == 1)
-		fputs("<nav aria-label=\"Contents\">\n", page->out);
+	fputs(is_nav ? "</nav>\n" : "", page->out);
 	return next;
 }
 

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "loop_report.h"
+#include "stopwatch.h"
 
 const char *const loop_tool_names[] = {"auto", "blade", "handle", "tube", NULL};
 
@@ -40,13 +41,20 @@ json_t *loop_flags_json(const uint64_t counts[INCISE_TICK_FLAGS])
 double loop_quantile(const uint64_t *histogram, double share, double unit)
 {
 	double bin = incise_loop_quantile(histogram, share);
+	uint64_t n = 0;
 
+	for (int i = 0; i < INCISE_LOOP_BINS; i++)
+		n += histogram[i];
+	if (!stopwatch_resolves(n, share))
+		return NAN;
 	return bin < INCISE_LOOP_BINS ? bin * unit : INFINITY;
 }
 
 const char *loop_below(char *text, size_t size, double us)
 {
-	if (isfinite(us))
+	if (isnan(us))
+		snprintf(text, size, "- (too few)");
+	else if (isfinite(us))
 		snprintf(text, size, "< %g us", us);
 	else
 		snprintf(text, size, "beyond the histogram");

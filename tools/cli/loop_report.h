@@ -23,7 +23,8 @@ const char *loop_flags_text(unsigned int flags, char *text);
 /* Counts by the name of their flag. */
 json_t *loop_flags_json(const uint64_t counts[INCISE_TICK_FLAGS]);
 
-/* Bins of 1 µs or 100 ns as a quantile in their unit; INFINITY in the open last bin. */
+/* Bins of 1 µs or 100 ns as a quantile in their unit; INFINITY in the open last bin,
+ * NaN of fewer wake-ups than the quantile takes, see stopwatch_resolves(). */
 double loop_quantile(const uint64_t *histogram, double share, double unit);
 
 /* "< 74 us", or that it lies beyond the histogram; text is the caller's. */

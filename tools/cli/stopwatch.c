@@ -2,6 +2,7 @@
 /*
  * Times of runs; see stopwatch.h.
  */
+#include <math.h>
 #include <stdlib.h>
 #include "stopwatch.h"
 
@@ -43,8 +44,16 @@ double stopwatch_own_ns(void)
 	return stopwatch_middle(times, n);
 }
 
+bool stopwatch_resolves(uint64_t n, double q)
+{
+	/* 1e-9: (1 - 0.95) * 20 is a rounding off 1. */
+	return q == 0.5 ? n >= 1 : fmin(q, 1 - q) * (double)n >= 1 - 1e-9;
+}
+
 double stopwatch_quantile(const double *sorted, int n, double q)
 {
+	if (!stopwatch_resolves((uint64_t)n, q))
+		return NAN;
 	return sorted[(int)(q * (n - 1) + 0.5)];
 }
 

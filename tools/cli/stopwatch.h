@@ -6,6 +6,8 @@
 #ifndef INCISE_STOPWATCH_H
 #define INCISE_STOPWATCH_H
 
+#include <stdbool.h>
+#include <stdint.h>
 #include <time.h>
 
 /* CLOCK_MONOTONIC, ns; and any clock of clock_gettime(2). */
@@ -17,7 +19,11 @@ double stopwatch_own_ns(void);
 
 void stopwatch_sort(double *times, int n);
 
-/* Of sorted times: nearest rank; q from 0 to 1. */
+/* Whether n values resolve a percentile: one of them at least lies beyond it, so that the 99.9th
+ * takes 1000. The median takes one. */
+bool stopwatch_resolves(uint64_t n, double q);
+
+/* Of sorted times: nearest rank; q from 0 to 1. NaN if they are too few, see above. */
 double stopwatch_quantile(const double *sorted, int n, double q);
 
 /* Of sorted times: mean of the middle half, which is finer than the clock's steps. */

@@ -12,6 +12,7 @@
 #include <string.h>
 #include "../../../lib/base/random.h"
 #include "../../../tools/bench/harness.h"
+#include "../../../tools/cli/stopwatch.h"
 
 #define TRIALS 4000
 #define VALUES_MAX 200
@@ -42,8 +43,12 @@ static double covered(int n)
 		for (int i = 0; i < n; i++)
 			values[i] = skewed(&state);
 		harness_spread(values, n, &s);
-		assert_true(s.p5 <= s.low && s.low <= s.median);
-		assert_true(s.median <= s.high && s.high <= s.p95);
+		assert_true(s.min <= s.low && s.low <= s.median);
+		assert_true(s.median <= s.high && s.high <= s.max);
+		if (n >= 20)
+			assert_true(s.p5 <= s.low && s.high <= s.p95);
+		else
+			assert_true(isnan(s.p5) && isnan(s.p95));
 		held += s.low <= 1 && 1 <= s.high;
 	}
 	return (double)held / TRIALS;
@@ -106,6 +111,27 @@ static double say(void *context)
 	return 1000 + (double)strlen(order);
 }
 
+/* One value in twenty lies beyond the 95th percentile, one in a thousand beyond the 99.9th. */
+static void test_percentiles_take_values(void **state)
+{
+	static const struct {
+		double share;
+		uint64_t needs;
+	} cases[] = {{0.5, 1},	  {0.05, 20},	 {0.95, 20},	 {0.01, 100},
+		     {0.99, 100}, {0.999, 1000}, {0.9999, 10000}};
+	double values[1000];
+
+	(void)state;
+	for (int i = 0; i < 1000; i++)
+		values[i] = i;
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		assert_true(stopwatch_resolves(cases[i].needs, cases[i].share));
+		assert_false(stopwatch_resolves(cases[i].needs - 1, cases[i].share));
+	}
+	assert_true(stopwatch_quantile(values, 1000, 0.999) == 998);
+	assert_true(isnan(stopwatch_quantile(values, 999, 0.999)));
+}
+
 static void test_variants_take_turns(void **state)
 {
 	struct harness_time times[3];
@@ -131,6 +157,7 @@ int main(void)
 		cmocka_unit_test(test_intervals_hold_the_median),
 		cmocka_unit_test(test_a_slow_while_widens_it),
 		cmocka_unit_test(test_few_values),
+		cmocka_unit_test(test_percentiles_take_values),
 		cmocka_unit_test(test_variants_take_turns),
 	};
 

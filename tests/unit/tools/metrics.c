@@ -130,11 +130,13 @@ static json_t *sharp(double value, double chain, double wide, double memory)
 	struct harness_time time;
 	json_t *metrics = json_array();
 
-	time.ns = (struct harness_spread){value, value, value, value, value};
+	time.ns =
+		(struct harness_spread){value, value, value, value, value, value, value};
 	for (int w = 0; w < WORKLOADS; w++) {
 		double by = value / unit[w];
 
-		time.by[w] = (struct harness_spread){by, by, by, 0.99 * by, 1.01 * by};
+		time.by[w] =
+			(struct harness_spread){by, by, by, 0.99 * by, 1.01 * by, by, by};
 	}
 	metrics_add(metrics, METRIC_TIME, &time, "us", "time");
 	return report_of(metrics);
