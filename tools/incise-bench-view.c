@@ -222,7 +222,7 @@ static const struct bench_table frame_table = {
 	.row_bytes = sizeof(struct frame_row),
 	.columns =
 		{
-			COLUMN(frame_row, NULL, size, "%s", "texture picture"),
+			COLUMN(frame_row, NULL, size, "%s", "texture image"),
 			COLUMN(frame_row, "texture_px", texture_px),
 			COLUMN(frame_row, "width", width),
 			COLUMN(frame_row, "height", height),
@@ -248,12 +248,13 @@ static const struct bench_table frame_table = {
 static void report_frames(struct bench_run *run, const struct frame_rows *rows)
 {
 	bench_value(run, "renderer", json_string(rows->renderer));
-	bench_text(run,
-		   "ms a frame, %s, %d triangles, %d frames each; %% within %.0f ms, the "
-		   "%.0f Hz of paper 1\n%-15s %-20s %-20s %-20s %-20s %7s %6s %9s\n",
-		   rows->renderer, rows->row[0].triangles, rows->row[0].frames,
-		   1e3 / PAPER_HZ, PAPER_HZ, "", " wound, blood", " texture", " drawing",
-		   " whole", "% 20 ms", "fps", "texels");
+	bench_text(
+		run,
+		"ms per frame, %s, %d triangles, %d frames each; %% within %.0f ms, the "
+		"%.0f Hz of Song et al. (2006)\n%-15s %-20s %-20s %-20s %-20s %7s %6s %9s\n",
+		rows->renderer, rows->row[0].triangles, rows->row[0].frames,
+		1e3 / PAPER_HZ, PAPER_HZ, "", " wound, blood", " texture", " drawing",
+		" whole", "% 20 ms", "fps", "texels");
 	bench_table(run, &frame_table, rows->row, rows->n);
 }
 
@@ -366,7 +367,7 @@ static void draw(struct fed_view *fed, double t_s, uint8_t *rgb)
 	fed_view_until(fed, t_s);
 	fed_view_frame(fed);
 	if (incise_view_pixels(fed->view, rgb))
-		cli_fail("the picture cannot be read");
+		cli_fail("the image cannot be read");
 }
 
 /* When the frame that is shown was drawn, in steps. @fps: 0 is at the moment itself. */
@@ -464,7 +465,7 @@ static void measure_shown(const struct view_script *script, bool quick,
 	double until_s = quick ? QUICK_ERROR_UNTIL_S : ERROR_UNTIL_S;
 	struct compared c;
 
-	cli_progress("pictures beside finer ones");
+	cli_progress("error against finer images");
 	open_views(&c, script, quick ? QUICK_TEXTURES : TEXTURES);
 	for (int step = (int)(FRAMES_FROM_S * STEP_HZ); step < until_s * STEP_HZ;
 	     step += quick ? QUICK_STRIDE : STRIDE) {
@@ -472,7 +473,7 @@ static void measure_shown(const struct view_script *script, bool quick,
 			cli_fail("interrupted");
 		compare(&c, step);
 		rows->moments++;
-		cli_progress("pictures beside finer ones: %.1f of %.1f s",
+		cli_progress("error against finer images: %.1f of %.1f s",
 			     (double)step / STEP_HZ, until_s);
 	}
 	close_views(&c);
@@ -517,7 +518,7 @@ static void report_shown(struct bench_run *run, const struct shown_rows *rows)
 	bench_values(run, "{s{si si}}", "shown", "moments", rows->moments,
 		     "exact_texture_px", rows->exact_px);
 	bench_text(run,
-		   "\nwhat is shown, against texture %d at that very moment; %d "
+		   "\ndisplayed image compared with texture %d at the same moment; %d "
 		   "moments\n",
 		   rows->exact_px, rows->moments);
 	bench_table(run, &shown_table, rows->row, rows->n);
@@ -650,9 +651,9 @@ static void report_absorbed(struct bench_run *run, const struct absorbed *a)
 		    "cuts lost");
 	bench_text(
 		run,
-		"\ncutting all the time at %d Hz (%s): %llu ticks in %.1f s (%.0f a "
-		"second), %llu lost; %.0f mm cut,\n%llu stamps; %.2f us a tick for "
-		"wound and blood, %.1f frames a second; a frame takes\n%.1f ms median, "
+		"\ncontinuous cut at %d Hz (%s): %llu ticks in %.1f s (%.0f per "
+		"second), %llu lost; %.0f mm cut,\n%llu segments; %.2f us per tick for "
+		"wound and blood, %.1f frames per second; a frame takes\n%.1f ms median, "
 		"%.1f ms 99 %%: %.1f %% within %.0f ms\n",
 		CUTS_HZ, a->realtime ? "SCHED_FIFO" : "SCHED_OTHER",
 		(unsigned long long)view->ticks, a->seconds, ticks / a->seconds,
@@ -712,7 +713,7 @@ static void measure_beside(const char *scene, double seconds, bool quick,
 		beside->run[i] = wakeups.row[0];
 		beside->realtime = wakeups.realtime;
 		if (wakeups.row[0].no_load)
-			cli_fail("the picture beside a loop: %s", wakeups.row[0].no_load);
+			cli_fail("rendering with a loop: %s", wakeups.row[0].no_load);
 	}
 	for (int view = 0; view < 2; view++) {
 		beside->p999_us[view] = pooled(beside, view, false);
@@ -746,10 +747,10 @@ static void print_beside(struct bench_run *run, const struct beside *beside, dou
 			 double cyclictest_ratio)
 {
 	bench_text(run,
-		   "\nthe loop without and with the picture, us late; %.3g s each, %s\n",
+		   "\nwake-up latency without and with rendering, us; %.3g s each, %s\n",
 		   beside->seconds,
 		   beside->realtime ? "SCHED_FIFO"
-				    : "SCHED_OTHER, as real time is not granted");
+				    : "SCHED_OTHER, without real-time permission");
 	bench_table(run, &beside_table, beside->run, beside->n);
 	bench_text(run, "99.9 %% of all: %.0f without, %.0f with: %.2f times",
 		   beside->p999_us[0], beside->p999_us[1], ratio);
@@ -857,15 +858,15 @@ static const struct bench bench_view = {
 static const struct cli_option options[] = {
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct bench_run, json)},
 	{0, "against", "OLD.json",
-	 "compare with an older report of --json: what changed\nbeyond noise",
+	 "report significant changes since an older report of\n--json",
 	 CLI_INPUT(struct bench_run, against)},
 	{0, "plot", "NAME",
-	 "draw error over run time as NAME.png and NAME.svg,\nand times of frames as NAME-frames",
+	 "plot error over run time as NAME.png and NAME.svg,\nand run times of frames as NAME-frames",
 	 CLI_OUTPUTS(struct bench_run, plot)},
 	{0, "duration", "TIME",
-	 "of each run beside a loop, and of that of cuts,\nsuch as 10min (default: 4s)",
+	 "of each run with a loop and of the test of cuts\n(default: 4s)",
 	 CLI_DURATION(struct bench_run, seconds, 0.5, 86400)},
-	{0, "quick", NULL, "fewer frames and runs: a look, not a measurement",
+	{0, "quick", NULL, "smoke test with fewer frames and runs",
 	 CLI_FLAG(struct bench_run, quick)},
 	{0},
 };
@@ -874,12 +875,12 @@ static const struct cli_command command = {
 	.name = "bench view",
 	.synopsis = "[SCENE] [OPTIONS]",
 	.summary =
-		"Measure the picture of a scene, drawn without a screen while a cut bleeds: time\n"
-		"per frame by sizes of texture and picture; error against a finer texture and more\n"
-		"frames, over that time; whether cuts of a loop of 5 kHz are all seen; how late a\n"
-		"loop is with and without it. Without SCENE that is paper 2's neck.",
+		"Measure the image of a scene, rendered off-screen while a cut bleeds: run time of a\n"
+		"frame by sizes of texture and image; error against a finer texture; lost cuts of a\n"
+		"loop of 5 kHz; wake-up latency of a loop without and with rendering. Without SCENE\n"
+		"it renders the neck of Bhasin et al. (2005).",
 	.options = options,
-	.notes = "Exit: 0 measured, 1 failed or figures got worse, 2 bad usage.\n"
+	.notes = "Exit: 0 success; 1 failure or worse metrics; 2 bad usage.\n"
 		 "See incise-bench-view(1).",
 };
 

@@ -24,26 +24,26 @@ static void parse_seed(void *seed, char *text)
 static const struct cli_option options[] = {
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct bench_run, json)},
 	{0, "against", "OLD.json",
-	 "compare with an older report of --json: what changed\nbeyond noise",
+	 "report significant changes since an older report of\n--json",
 	 CLI_INPUT(struct bench_run, against)},
 	{0, "plot", "NAME",
-	 "draw error over time as NAME.png and NAME.svg;\n"
-	 "stability: NAME-map, NAME-guard, NAME-integrators;\n"
+	 "plot error over run time as NAME.png and NAME.svg;\n"
+	 "stability: NAME-map, -rest, -guard, -integrators;\n"
 	 "loop: NAME-wakeups, NAME-rates;\n"
 	 "pose: NAME, NAME-rates; timeline: NAME, NAME-windows",
 	 CLI_OUTPUTS(struct bench_run, plot)},
 	{0, "duration", "TIME",
-	 "of each run of capture, and each of loop's wake-ups,\nsuch as 10min (default: 7s and 5s)",
+	 "capture: of each run (default: 7s); loop: of each\nmeasurement of wake-up latency (default: 5s)",
 	 CLI_DURATION(struct bench_run, seconds, 1, 86400)},
 	{0, "load", "NAME",
-	 "loop: wake-ups under one load only: idle, cpu,\nmemory, disk or view",
+	 "loop: wake-up latency under one load only: idle,\ncpu, memory, disk or view",
 	 CLI_TEXT(struct bench_run, load)},
-	{0, "profile", "WHICH",
-	 "scenes: only run some ticks of one, with the stages\nthat it needs or with all: needed or full; for perf\nstat or callgrind",
+	{0, "profile", "STAGES",
+	 "scenes: run one test path of one scene for perf stat\nor callgrind, with its stages or with all: needed\nor full",
 	 CLI_PARSED(struct bench_run, profile, parse_profile)},
-	{0, "seed", "N", "extremes: another set of cases (default: 1)",
+	{0, "seed", "N", "extremes: seed of the cases (default: 1)",
 	 CLI_PARSED(struct bench_run, seed, parse_seed)},
-	{0, "quick", NULL, "fewer points and repeats: a look, not a measurement",
+	{0, "quick", NULL, "smoke test with fewer points and repeats",
 	 CLI_FLAG(struct bench_run, quick)},
 	{0},
 };
@@ -72,34 +72,33 @@ static void add_summary(char *text, const char *name, const char *operands,
 
 static const struct cli_command *help(void)
 {
-	static char synopsis[400], summary[4000];
+	static char summary[4000];
 	static struct cli_command command = {
 		.name = "bench",
-		.synopsis = synopsis,
+		.synopsis = "BENCHMARK [OPERAND...] [OPTIONS]",
 		.summary = summary,
 		.options = options,
 		.notes =
-			"Exit: 0 measured, 1 failed, simulation and theory or the forces of two ways differ,\n"
-			"or figures got worse, 2 bad usage.\n"
+			"Exit: 0 success; 1 failure, disagreement with theory or between variants, or worse\n"
+			"metrics; 2 bad usage.\n"
 			"See incise-bench(1).",
 	};
 
 	strcpy(summary,
-	       "Measure error against run time, and what is stable; tables, JSON, pictures.\n");
+	       "Measure error against run time, and stability limits; print tables, JSON or plots.\n");
 	for (int i = 0; i < N(benches); i++) {
 		const char *operands = benches[i]->operands ? benches[i]->operands : "";
 
-		sprintf(synopsis + strlen(synopsis), "%s%s%s | ", benches[i]->name,
-			*operands ? " " : "", operands);
 		add_summary(summary, benches[i]->name, operands, benches[i]->summary);
 	}
-	strcat(synopsis, "view [SCENE] | all | compare OLD.json NEW.json [OPTIONS]");
-	add_summary(summary, "view", "[SCENE]",
-		    "the picture of a scene: see 'incise bench view --help'");
+	add_summary(
+		summary, "view", "[SCENE]",
+		"run time and error of the image of a scene;\nsee 'incise bench view --help'");
 	add_summary(summary, "all", "",
-		    "all of these, and one report: see 'incise bench all --help'");
+		    "all of these, and one report;\nsee 'incise bench all --help'");
 	strcat(summary,
-	       "compare says what changed beyond noise between two reports of --json.");
+	       "compare OLD.json NEW.json lists the significant changes between two reports\n"
+	       "of --json.");
 	return &command;
 }
 

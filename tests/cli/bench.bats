@@ -90,7 +90,7 @@ setup() {
 	mv fast.json r.json
 	run -1 --separate-stderr incise bench compare r.json slow.json
 	[[ "$output" == *"double_libm "*" worse"* ]]
-	failed_with "1 figure is worse or gone"
+	failed_with "1 metric is worse or gone"
 	run -0 --separate-stderr incise bench compare slow.json r.json
 	[[ "$output" == *"double_libm "*" better"* ]]
 	edit remove "'\$.figures[1]'" >less.json
@@ -99,7 +99,7 @@ setup() {
 	run -0 --separate-stderr incise bench compare less.json r.json
 	[[ "$output" == *"new: double_libm largest error"* ]]
 	edit set "'\$.machine.cpu', 'abacus'" >other.json
-	incise bench compare other.json r.json | grep -q '^another machine or build: cpu$'
+	incise bench compare other.json r.json | grep -q '^machine or build differs: cpu$'
 	incise bench compare other.json r.json --json >c.json
 	[ "$(key c.json differs[0]) $(key c.json worse)" = "cpu 0" ]
 	holds "$(key c.json same) > 30"
@@ -113,7 +113,7 @@ setup() {
 	echo "{\"a\": {\"figures\": [$(figure x 1), $(figure y 3)]}, \"title\": \"of today\"}" >new.json
 	run -1 --separate-stderr incise bench compare old.json new.json
 	[[ "$output" == *"a: y "*" 1.500 N, worse"*"gone: b"*"1 same, 0 better, 1 worse, 1 gone, 0 new" ]]
-	failed_with "2 figures are worse or gone"
+	failed_with "2 metrics are worse or gone"
 	run -0 --separate-stderr incise bench compare new.json old.json
 	[[ "$output" == *"new: b"* ]]
 }
@@ -131,9 +131,9 @@ setup() {
 	try '' "no JSON"
 	try '{' "no JSON"
 	try '{"figures": [{"name": "x[2J"}]}' "no JSON"
-	try '[]' "holds no figures"
+	try '[]' "no metrics"
 	try '7' "no"
-	try '{}' "holds no figures"
+	try '{}' "no metrics"
 	try '{"figures": 1}' "'figures' is no list"
 	try '{"figures": [7]}' "figures[0] is no object"
 	try '{"figures": [{}]}' "'name' is missing"
@@ -147,8 +147,8 @@ setup() {
 	try '{"figures": [{"name": "x", "unit": "N", "kind": "measured", "value": 1}]}' "'low' is missing"
 	try '{"figures": [{"name": "x", "unit": "N", "kind": "measured", "value": 1, "low": 2, "high": 3}]}' "is not between 2 and 3"
 	try '{"figures": [{"name": "x", "unit": "s", "kind": "time", "value": 1}]}' "'yardsticks' is missing"
-	try "{\"figures\": [{$good}, {$good}]}" "'x' stands twice"
-	try '{"figures": [{"name": "y", "unit": "N", "kind": "exact", "value": 1}]}' "no figure in common"
+	try "{\"figures\": [{$good}, {$good}]}" "'x' occurs twice"
+	try '{"figures": [{"name": "y", "unit": "N", "kind": "exact", "value": 1}]}' "no metric in common"
 	run --separate-stderr incise bench compare good.json none.json
 	failed_with none.json "No such file"
 	run --separate-stderr incise bench compare . good.json
@@ -165,7 +165,7 @@ setup() {
 	echo "{\"quick\": true, \"figures\": [{$good}]}" >quick.json
 	echo "{\"quick\": false, \"figures\": [{$good}]}" >full.json
 	run --separate-stderr incise bench compare quick.json full.json
-	failed_with "quick.json is of --quick and full.json is not"
+	failed_with "quick.json was made with --quick and full.json was not"
 	run --separate-stderr incise bench compare good.json
 	bad_usage "'compare' and two reports"
 	run --separate-stderr incise bench compare good.json good.json --quick
@@ -184,7 +184,7 @@ setup() {
 	# said before the work
 	echo '{}' >bad.json
 	run --separate-stderr incise bench stability --against bad.json
-	failed_with bad.json "holds no figures"
+	failed_with bad.json "no metrics"
 	run --separate-stderr incise bench stability --against r.json --load cpu
 	bad_usage "--load"
 }
@@ -562,7 +562,7 @@ rate() {
 @test "bench stability as text, with a verdict on every ratio" {
 	run -0 --separate-stderr incise bench stability --quick
 	[ -z "$stderr" ]
-	[[ "$output" == *"quick: a part of the grids"* ]]
+	[[ "$output" == *"quick: a part of each grid"* ]]
 	[[ "$output" == *"none wins: "* ]]
 	[[ "$output" == *"diverged"* ]]
 	[ "$(grep -c '  ok$' <<<"$output")" -ge 30 ]

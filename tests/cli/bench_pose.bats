@@ -137,13 +137,13 @@ at_most() {
 	quick_report timeline
 	# bursts whose phases never change: 20 ms are 4.8 periods
 	[ "$(of rows 'count(*)' "name = 'line_untold' AND late = 'bursts' AND drift_ppm = 0
-		AND window_s >= 10 AND failed LIKE 'surer than it may be: %'")" = 4 ]
+		AND window_s >= 10 AND failed LIKE 'stated uncertainty too small: %'")" = 4 ]
 	[ "$(of rows 'count(*)' "name = 'lowest' AND drift_ppm = -200 AND window_s = 120
-		AND failed LIKE 'worse than arrivals as they are: %'")" = 3 ]
+		AND failed LIKE 'worse than arrival times: %'")" = 3 ]
 	[ "$(of rows 'count(*)' "failed = ''")" = 0 ]
 	run -0 --separate-stderr incise bench timeline --quick
 	[ -z "$stderr" ]
-	[[ "$output" == *"* lowest, bursts, -200 ppm, 120 s: worse than arrivals as they are: "* ]]
+	[[ "$output" == *"* lowest, bursts, -200 ppm, 120 s: worse than arrival times: "* ]]
 }
 
 # bats test_tags=slow

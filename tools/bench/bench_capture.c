@@ -86,7 +86,7 @@ static void code(const struct incise_camera_frame *frame, int k)
 static void code(const struct incise_camera_frame *frame, int k)
 {
 	(void)frame, (void)k;
-	cli_fail("this incise was built without libjpeg, which makes the pictures; "
+	cli_fail("this incise was built without libjpeg, which encodes the frames; "
 		 "build it where libjpeg-dev is");
 }
 #endif
@@ -151,7 +151,7 @@ static void camera_info(const struct incise_camera *of_rig,
 		.height = camera.height,
 		.pixels = INCISE_PIXELS_MJPEG,
 	};
-	snprintf(info->name, sizeof(info->name), "JPEG pictures made before");
+	snprintf(info->name, sizeof(info->name), "JPEG frames, encoded before");
 }
 
 static uint64_t camera_lost(const struct incise_camera *of_rig)
@@ -260,9 +260,9 @@ static int poll_streams(struct row *row, struct incise_error *err)
 		return incise_recorder_poll(row->recorder, err);
 	rc = drop_samples(row);
 	if (rc)
-		return incise_error_set(err, -rc, "the virtual rig: %s", strerror(-rc));
+		return incise_error_set(err, -rc, "simulated rig: %s", strerror(-rc));
 	rc = drop_frame(row);
-	return rc ? incise_error_set(err, -rc, "a picture: %s", strerror(-rc)) : 0;
+	return rc ? incise_error_set(err, -rc, "frame: %s", strerror(-rc)) : 0;
 }
 
 /* Memory of this process that is in use, MB. */
@@ -470,9 +470,9 @@ static void report(struct bench_run *run, const struct row *rows, int n, double 
 		   bytes / FRAMES / 1e3, seconds);
 	bench_table(run, &rows_table, rows, n);
 	bench_text(run,
-		   "net: without what the virtual rig itself takes in the runs "
+		   "net: without the load of the simulation, as in the runs "
 		   "virtual_*\n"
-		   "pictures that vision had no time for: %llu\n",
+		   "frames that vision skipped for lack of time: %llu\n",
 		   (unsigned long long)rows->stats.frames_unlooked);
 }
 
@@ -507,7 +507,7 @@ static void run(struct bench_run *run)
 const struct bench bench_capture = {
 	.name = "capture",
 	.operands = "[RUN]",
-	.summary = "how much of a core it takes to record all streams",
+	.summary = "processor load of a capture of all streams",
 	.n_operands = 1,
 	.takes_duration = true,
 	.run = run,

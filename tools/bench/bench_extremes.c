@@ -103,7 +103,7 @@ static void report_properties(struct bench_run *run, const struct extremes_row *
 	bench_text(run, "\n");
 	if (wrong)
 		bench_fail(run,
-			   "%ld cases came out wrong, the first in %s: a fault of "
+			   "%ld cases are wrong, the first in %s: a fault of "
 			   "incise, please report it with the line above",
 			   wrong, first);
 }
@@ -197,7 +197,7 @@ static void judge(struct run *run)
 	else if (wall->accepted &&
 		 !(wall->late_mm < STILL * (BEGIN_mm + PRESS_N / wall->K_N_mm)))
 		snprintf(wall->failed, sizeof(wall->failed),
-			 "accepted, and not still: it moves by %.3g mm", wall->late_mm);
+			 "accepted, but not at rest: it moves by %.3g mm", wall->late_mm);
 	wall->missed = *wall->failed;
 }
 
@@ -320,7 +320,7 @@ static void press_plan(struct wall *wall)
 	judge(&run);
 	if (wall->accepted != (wall->K_N_mm <= wall->limit_N_mm)) {
 		snprintf(wall->failed, sizeof(wall->failed),
-			 "%s, and theory says otherwise",
+			 "%s, in contradiction to theory",
 			 wall->accepted ? "accepted" : "refused");
 		wall->missed = true;
 	}
@@ -399,8 +399,8 @@ static void print_path(const struct bench_run *run, const char *title,
 static void report_walls(struct bench_run *run, struct wall *walls, int each)
 {
 	static const char *const titles[PATHS] = {
-		"a plan, poses of a tracker of 120 Hz, 4.2 ms late",
-		"the wall alone, its position that of the tick"};
+		"whole plan, tracker of 120 Hz with 4.2 ms delay",
+		"wall alone, exact position at each tick"};
 	int missed = 0;
 
 	for (int i = 0; i < PATHS * each; i++) {
@@ -418,7 +418,7 @@ static void report_walls(struct bench_run *run, struct wall *walls, int each)
 		bench_text(run, "limit by theory, %s: %.4g N/m\n", walls[i].path,
 			   walls[i].limit_N_mm * 1e3);
 	if (missed)
-		bench_fail(run, "%d walls are not as theory says: see 'failed'", missed);
+		bench_fail(run, "%d walls contradict theory: see 'failed'", missed);
 }
 
 static void run_extremes(struct bench_run *run)
@@ -440,8 +440,8 @@ static void run_extremes(struct bench_run *run)
 
 const struct bench bench_extremes = {
 	.name = "extremes",
-	.summary = "numbers and bytes that nobody should send, at each door of\n"
-		   "the library; walls of 10 N/m to 1 GN/m",
+	.summary = "extreme numbers and corrupt bytes at each interface;\n"
+		   "walls of 10 N/m to 1 GN/m",
 	.takes_seed = true,
 	.run = run_extremes,
 	.plots = {{.script = text_extremes_gp,

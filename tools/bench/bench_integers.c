@@ -217,8 +217,7 @@ static const struct bench_table table = {
 		{
 			COLUMN(row, "name", name, "%-10s", "scene"),
 			COLUMN(row, "double_ns", time[0].ns.median, "%7.1f", "double ns"),
-			COLUMN(row, "integers_ns", time[1].ns.median, "%7.1f",
-			       "integers"),
+			COLUMN(row, "integers_ns", time[1].ns.median, "%7.1f", "fixed"),
 			COLUMN(row, "ratio", ratio, "%5.2f", "ratio"),
 			COLUMN(row, "rms_error_N", rms_mN, "%7.4f", "rms mN", 1e-3, 1e3),
 			COLUMN(row, "max_error_N", most_mN, "%7.4f", "largest", 1e-3,
@@ -227,7 +226,7 @@ static const struct bench_table table = {
 			COLUMN(row, "holds", holds),
 			COLUMN(row, "ticks", ticks, "%9.0f", "ticks"),
 			COLUMN(row, "contact", contact, "%9.0f", "contact"),
-			COLUMN(row, "apart", apart, "%6.0f", "apart"),
+			COLUMN(row, "apart", apart, "%8.0f", "separate"),
 			COLUMN(row, "apart_max_error_N", apart_most_mN, "%8.3f", "by mN",
 			       1e-3, 1e3),
 			COLUMN(row, "failed", failed),
@@ -283,14 +282,14 @@ static void run_integers(struct bench_run *run)
 	}
 	time_all(all, run->quick);
 	bench_text(run,
-		   "a tick in integers and in double, and their forces along the same "
-		   "varied strokes\n%s\n\n",
+		   "fixed-point and double tick, and their forces along the same test "
+		   "path\n%s\n\n",
 		   bench_machine(run, NULL));
 	bench_table(run, &table, all->row, all->n);
 	bench_rows(run, &bench_points, all->point, all->points);
 	bench_text(run,
-		   "\napart: ticks from one at which only one of the two began or ended "
-		   "a contact,\nor changed a tool, until their forces are alike again\n");
+		   "\nseparate: ticks after only one variant began or ended a contact or "
+		   "changed\nthe tool, until the forces agree again\n");
 	for (int i = 0; i < all->n; i++) {
 		if (*all->row[i].failed)
 			bench_fail(run, "%s", all->row[i].failed);
@@ -306,7 +305,7 @@ static void run_integers(struct bench_run *run)
 const struct bench bench_integers = {
 	.name = "integers",
 	.operands = "[SCENE...]",
-	.summary = "the plan in integers, as the kernel runs it, against double",
+	.summary = "fixed-point plan of the kernel compared with double",
 	.n_operands = SCENES_MAX,
 	.run = run_integers,
 	.plots = {{.script = text_integers_gp,

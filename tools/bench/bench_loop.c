@@ -534,14 +534,14 @@ static void print_wakeups(struct bench_run *run, const struct wakeups *wakeups)
 		if (!row->no_load && row->no_cyclictest)
 			no_cyclictest = row->no_cyclictest;
 	}
-	bench_text(run, "\nwake-ups, us late; %.3g s each; %s, CPU %d\n",
+	bench_text(run, "\nwake-up latency, us; %.3g s each; %s, CPU %d\n",
 		   wakeups->seconds,
 		   wakeups->realtime ? cli_text("SCHED_FIFO %d", INCISE_REALTIME_PRIORITY)
-				     : "SCHED_OTHER, as real time is not granted",
+				     : "SCHED_OTHER, without real-time permission",
 		   wakeups->cpu);
 	bench_lines(run, &line_table, lines, n);
 	if (frames_hz > 0)
-		bench_text(run, "view: %.1f pictures a second\n", frames_hz);
+		bench_text(run, "view: %.1f frames per second\n", frames_hz);
 	if (no_cyclictest)
 		bench_text(run, "%s\n", no_cyclictest);
 }
@@ -646,7 +646,7 @@ static void run(struct bench_run *run)
 	report_first(run, ticks, wakeups.row);
 	bench_table(run, &tick_table, ticks, n);
 	report_wakeups(run, &wakeups);
-	bench_text(run, "\nerror of the force over a cut, mN    asked for              "
+	bench_text(run, "\nforce error over a cut, mN           commanded              "
 			"rendered        ideal\n");
 	bench_table(run, &rates_table, rates, N(rates));
 }
@@ -654,8 +654,8 @@ static void run(struct bench_run *run)
 const struct bench bench_loop = {
 	.name = "loop",
 	.operands = "[SCENE]",
-	.summary = "cost of a tick; how late the machine wakes the loop, idle\n"
-		   "and under loads, beside cyclictest; error over its rate",
+	.summary = "run time of a tick; wake-up latency, idle and under\n"
+		   "load, compared with cyclictest; error over the rate",
 	.n_operands = 1,
 	.takes_duration = true,
 	.takes_load = true,

@@ -133,7 +133,7 @@ static const struct motion {
 	{"tremor", "tremor: 0.1 mm at 8, 10 and 12 Hz", tremor_motion},
 	{"stroke", "stroke: 40 mm and back, up to 94 mm/s", stroke_motion},
 	{"wall", "wall: 60 mm/s, stopped dead", wall_motion},
-	{"surgeon", "surgeon: two cuts of the virtual rig", NULL},
+	{"surgeon", "surgeon: two cuts of the simulated rig", NULL},
 };
 #define STROKE (&motions[2])
 
@@ -661,10 +661,11 @@ static void measure_row(const struct track *track, const struct method *method,
 	if (!isfinite(row->place_mm.rms + row->velocity_mm_s.rms + row->turn_deg.rms))
 		snprintf(row->failed, sizeof(row->failed), "a pose is not a number");
 	else if (row->place_mm.rms > row->spread_mm)
-		snprintf(row->failed, sizeof(row->failed),
-			 "worse than no tracker: off by %.3g mm, where the middle of the "
-			 "motion is by %.3g mm",
-			 row->place_mm.rms, row->spread_mm);
+		snprintf(
+			row->failed, sizeof(row->failed),
+			"worse than no tracker: error %.3g mm, that of the constant mean "
+			"position %.3g mm",
+			row->place_mm.rms, row->spread_mm);
 	free(place);
 	free(own);
 }
@@ -859,7 +860,7 @@ static void run(struct bench_run *run)
 
 const struct bench bench_pose = {
 	.name = "pose",
-	.summary = "error of the pose over the tracker's rate, delay and cost",
+	.summary = "error of the predicted pose over tracker rate and delay",
 	.run = run,
 	.plots = {{.script = text_pose_gp,
 		   .width = 1000,

@@ -451,7 +451,7 @@ static struct incise_model *own_model(struct incise_error *err)
 static const struct bench_table rows_table = {
 	.key = "rows",
 	.row_bytes = sizeof(struct row),
-	.columns = {COLUMN(row, "name", name, "%-18s", "arithmetic"),
+	.columns = {COLUMN(row, "name", name, "%-18s", "evaluator"),
 		    COLUMN(row, "ns", time.ns.median, "%9.1f", "median ns"),
 		    COLUMN(row, "ns_p5", time.ns.p5, "%8.1f", "5 %"),
 		    COLUMN(row, "ns_p95", time.ns.p95, "%8.1f", "95 %"),
@@ -508,7 +508,7 @@ static void run(struct bench_run *run)
 const struct bench bench_precision = {
 	.name = "precision",
 	.operands = "[MODEL.fis]",
-	.summary = "arithmetics of a model, without MODEL of the paper's size",
+	.summary = "error and run time of a model's evaluators",
 	.n_operands = 1,
 	.run = run,
 	.plots = {{.script = text_precision_gp,

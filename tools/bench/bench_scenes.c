@@ -601,8 +601,8 @@ static void print_notes(const struct bench_run *run, const struct scenes *all)
 		else if (s->measured && s->full.time.ns.low <= s->few.time.ns.high)
 			/* The 95 % intervals of the medians meet. */
 			bench_text(run,
-				   "%s: the full pipeline costs no more that could be "
-				   "told\n",
+				   "%s: no significant difference to the full "
+				   "pipeline\n",
 				   s->name);
 	}
 }
@@ -618,8 +618,8 @@ static void report(struct bench_run *run, struct scenes *all)
 		n += of[i];
 	}
 	bench_text(run,
-		   "a tick of each scene, and of the full pipeline: the same with every "
-		   "stage kept\n%s\n\n",
+		   "a tick of each scene, and of the full pipeline, which has all "
+		   "stages\n%s\n\n",
 		   bench_machine(run, NULL));
 	bench_values(run, "{ss? ss?}", "instructions_by", all->counted_by,
 		     "instructions_failed", all->not_counted);
@@ -635,11 +635,12 @@ static void judge(struct bench_run *run, const struct scenes *all)
 {
 	for (int i = 0; i < all->n; i++)
 		if (all->scene[i].first_difference >= 0)
-			bench_fail(run,
-				   "%s: leaving out changes the force, first in tick "
-				   "%ld: a fault of incise, please report it with the "
-				   "scene",
-				   all->scene[i].name, all->scene[i].first_difference);
+			bench_fail(
+				run,
+				"%s: a disabled stage changes the force, first in tick "
+				"%ld: a fault of incise, please report it with the "
+				"scene",
+				all->scene[i].name, all->scene[i].first_difference);
 	for (int i = 0; i < all->n && run->n_operands; i++)
 		if (*all->scene[i].failed)
 			bench_fail(run, "%s: not measured: %s", all->scene[i].name,
@@ -687,7 +688,7 @@ static void run_or_profile(struct bench_run *run)
 const struct bench bench_scenes = {
 	.name = "scenes",
 	.operands = "[SCENE...]",
-	.summary = "what each scene leaves out, and what that saves",
+	.summary = "disabled stages of each scene, and the time saved",
 	.n_operands = SCENES_MAX,
 	.takes_profile = true,
 	.run = run_or_profile,

@@ -377,14 +377,15 @@ static void judge(struct row *row, double arrival_us, int streams)
 		snprintf(row->failed, sizeof(row->failed), "a time is not a number");
 	else if (row->rms_us > arrival_us)
 		snprintf(row->failed, sizeof(row->failed),
-			 "worse than arrivals as they are: off by %.3g us, where "
-			 "these are by %.3g us",
+			 "worse than arrival times: error %.3g us, theirs "
+			 "%.3g us",
 			 row->rms_us, arrival_us);
 	else if (row->within < least)
-		snprintf(row->failed, sizeof(row->failed),
-			 "surer than it may be: %.1f %% of the truth is within twice the "
-			 "uncertainty that it states",
-			 row->within * 100);
+		snprintf(
+			row->failed, sizeof(row->failed),
+			"stated uncertainty too small: %.1f %% of the true times are within "
+			"twice of it",
+			row->within * 100);
 }
 
 /* A row per method; of the seeds of each window none is that of another. */
@@ -541,8 +542,8 @@ static void run(struct bench_run *run)
 
 const struct bench bench_timeline = {
 	.name = "timeline",
-	.summary = "error of times of samples that come late, by a clock that\n"
-		   "drifts, over how much was seen and the cost",
+	.summary = "error of reconstructed timestamps over window and run\n"
+		   "time",
 	.run = run,
 	.plots = {{.script = text_timeline_gp,
 		   .width = 1000,

@@ -499,7 +499,7 @@ static void run(struct bench_run *run)
 
 const struct bench bench_training = {
 	.name = "training",
-	.summary = "error on unseen cuts over the seconds that training takes",
+	.summary = "error on unseen cuts over the training time",
 	.run = run,
 	.plots = {{.script = text_training_gp,
 		   .width = 1000,

@@ -112,7 +112,7 @@ static struct incise_vision_result look(struct incise_vision *vision,
 	struct incise_vision_result result;
 
 	if (incise_vision_measure(vision, frame, &result))
-		cli_fail("a picture cannot be measured");
+		cli_fail("a frame cannot be measured");
 	return result;
 }
 
@@ -197,7 +197,7 @@ static void measure(const struct kind *kind, const struct frames *f, int rounds,
 static const struct bench_table rows_table = {
 	.key = "rows",
 	.row_bytes = sizeof(struct row),
-	.columns = {COLUMN(row, "name", name, "%-12s", "pictures"),
+	.columns = {COLUMN(row, "name", name, "%-12s", "frames"),
 		    COLUMN(row, "region", region, "%-8s", "region"),
 		    COLUMN(row, NULL, size, "%-9s", "size"),
 		    COLUMN(row, "width", width),
@@ -209,7 +209,7 @@ static const struct bench_table rows_table = {
 		    COLUMN(row, "sd_px", sd_px, "%7.3f", "sd px"),
 		    COLUMN(row, "rms_error_px", rms_px, "%7.3f", "rms px"),
 		    COLUMN(row, "max_error_px", max_px, "%7.3f", "max px"),
-		    COLUMN(row, "said_sd_px", stated_px, "%7.3f", "said px"),
+		    COLUMN(row, "said_sd_px", stated_px, "%7.3f", "stated"),
 		    COLUMN(row, "us", us, "%8.0f", "us"),
 		    COLUMN(row, "us_p99", us_p99, "%8.0f", "us p99"),
 		    COLUMN(row, "us_low", time.ns.low, .scale = 1e-3),
@@ -242,7 +242,7 @@ static void run(struct bench_run *run)
 
 const struct bench bench_vision = {
 	.name = "vision",
-	.summary = "error of the exposed length over the time per picture",
+	.summary = "error of the exposed length over the time per frame",
 	.run = run,
 	.plots = {{.script = text_vision_gp,
 		   .width = 1000,

@@ -260,7 +260,7 @@ static int add(struct metrics *all, const char *bench, const json_t *from, size_
 	if (rc)
 		return rc;
 	if (json_object_get(all->index, key_of(bench, m->name, key)))
-		return incise_error_set(err, EINVAL, "%s: '%s' stands twice", where,
+		return incise_error_set(err, EINVAL, "%s: '%s' occurs twice", where,
 					m->name);
 	if (json_object_set_new(all->index, key, json_integer(all->n++)))
 		return incise_error_set(err, ENOMEM, "%s: no memory", all->report);
@@ -326,10 +326,11 @@ static int metrics_read(const json_t *report, const char *name, struct metrics *
 			rc = add_all(all, bench, list, err);
 	}
 	if (!rc && !all->n)
-		rc = incise_error_set(err, EINVAL,
-				      "%s: holds no figures; expected what 'incise bench "
-				      "WORD --json' wrote",
-				      name);
+		rc = incise_error_set(
+			err, EINVAL,
+			"%s: no metrics; expected the output of 'incise bench "
+			"NAME --json'",
+			name);
 	return rc;
 }
 
@@ -533,17 +534,18 @@ static int comparable(const struct metrics *was, const struct metrics *is,
 	    json_is_true(old_quick) != json_is_true(new_quick))
 		return incise_error_set(
 			err, EINVAL,
-			"%s is of --quick and %s is not: they measured "
-			"other things",
+			"%s was made with --quick and %s was not: compare "
+			"reports of the same kind",
 			json_is_true(old_quick) ? was->report : is->report,
 			json_is_true(old_quick) ? is->report : was->report);
 	for (int i = 0; i < is->n; i++)
 		if (metrics_find(was, &is->metric[i]))
 			return 0;
-	return incise_error_set(err, EINVAL,
-				"%s and %s have no figure in common: compare two of one "
-				"benchmark, or two of incise bench all",
-				was->report, is->report);
+	return incise_error_set(
+		err, EINVAL,
+		"%s and %s have no metric in common: compare two reports of "
+		"one benchmark, or two of incise bench all",
+		was->report, is->report);
 }
 
 json_t *compare_reports(const json_t *old_report, const char *old_name,
@@ -621,12 +623,12 @@ static void print(const json_t *comparison)
 	size_t i;
 
 	for (i = 0; i < json_array_size(differs); i++)
-		printf("%s%s", i ? ", " : "another machine or build: ",
+		printf("%s%s", i ? ", " : "machine or build differs: ",
 		       json_string_value(json_array_get(differs, i)));
 	if (i)
 		printf("\n");
 	if (json_array_size(list))
-		printf("%-52s %12s %12s %8s\n", "changed beyond noise", "old", "new",
+		printf("%-52s %12s %12s %8s\n", "significant changes", "old", "new",
 		       "ratio");
 	json_array_foreach((json_t *)list, i, change)
 	{
@@ -666,7 +668,7 @@ void compare_finish(json_t *comparison, bool json)
 		cli_finish();
 	}
 	if (worse)
-		cli_fail("%d figure%s worse or gone, see above", worse,
+		cli_fail("%d metric%s worse or gone, see above", worse,
 			 worse > 1 ? "s are" : " is");
 }
 
@@ -684,7 +686,7 @@ static _Noreturn void wait_and_compare(pid_t pid, const struct memory_file *said
 	signal(SIGINT, SIG_IGN);
 	while (waitpid(pid, &status, 0) < 0)
 		if (errno != EINTR)
-			cli_fail("what measures is lost: %s", strerror(errno));
+			cli_fail("the measuring process is lost: %s", strerror(errno));
 	rewind(said->file);
 	/* One that failed before it had a report has said why. */
 	report = json_read_from(said->file, "the report", &err);
@@ -698,7 +700,8 @@ static _Noreturn void wait_and_compare(pid_t pid, const struct memory_file *said
 		json_object_set_new(report, "against", comparison);
 		json_print(report);
 		if (worse)
-			cli_fail("%d worse or gone against %s", worse, path);
+			cli_fail("%d metrics are worse or gone compared with %s", worse,
+				 path);
 	} else {
 		compare_finish(comparison, false);
 	}

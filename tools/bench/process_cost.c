@@ -138,8 +138,9 @@ static void ended(struct loop_process *process, int status)
 {
 	process->pid = 0;
 	if (!WIFEXITED(status) || WEXITSTATUS(status))
-		snprintf(process->failed, sizeof(process->failed),
-			 "its loop fails on the virtual rig: incise haptic says why");
+		snprintf(
+			process->failed, sizeof(process->failed),
+			"its loop fails on the simulated rig; run incise haptic to see the reason");
 	else if (!process->libraries)
 		snprintf(process->failed, sizeof(process->failed),
 			 "its loop was not seen in /proc");

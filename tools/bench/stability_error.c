@@ -248,8 +248,8 @@ void stability_error(struct bench_run *run)
 	harness_times(variants, n, run->quick ? QUICK_REPEATS : REPEATS);
 	cli_progress_end();
 	bench_text(run,
-		   "error against run time of paper 2's forces on a sphere of %g mm; a "
-		   "tick with its pose\n",
+		   "force laws of Bhasin et al. (2005) on a sphere of %g mm: error, and "
+		   "run time of a tick with its pose\n",
 		   RADIUS_MM);
 	bench_table(run, &stability_error_table, rows, n);
 	bench_text(run, "\n");

@@ -337,20 +337,20 @@ static struct cost costs[GUARDS];
 static const struct bench_table cost_table = {
 	.key = "guards_ns",
 	.row_bytes = sizeof(struct cost),
-	.columns = {COLUMN(cost, "guard", guard, "%-16s", "guard"),
-		    COLUMN(cost, "ns", time.ns.median, "%8.1f", "ns a tick")},
+	.columns = {COLUMN(cost, "guard", guard, "%-16s", "controller"),
+		    COLUMN(cost, "ns", time.ns.median, "%8.1f", "ns/tick")},
 	.metrics = {METRIC(TIME, cost, time, "ns", "tick with guard {guard}")},
 };
 
 const struct bench_table stability_guard_table = {
 	.key = "guards",
 	.row_bytes = sizeof(struct row),
-	.columns = {COLUMN(row, "guard", guard, "%-16s", "guard"),
+	.columns = {COLUMN(row, "guard", guard, "%-16s", "controller"),
 		    COLUMN(row, "gain", gain, "%6.2f", "gain"), COLUMN(row, "own", own),
 		    COLUMN(row, "cases", cases, "%7.0f", "cases"),
 		    COLUMN(row, "rests", rests, "%7.0f", "rest"),
 		    COLUMN(row, "rest_share", rest_share, "%7.3f", "share"),
-		    COLUMN(row, "swing_mm", swing_mm, "%10.3g", "swing, mm"),
+		    COLUMN(row, "swing_mm", swing_mm, "%10.3g", "osc., mm"),
 		    COLUMN(row, "force_N", force_N, "%9.4f", "force, N"),
 		    COLUMN(row, "error_N", error_N, "%9.4f", "error, N"),
 		    COLUMN(row, "error_share", error_share, "%7.3f", "of it")},
@@ -359,7 +359,7 @@ const struct bench_table stability_guard_table = {
 static const struct bench_table stiffest_table = {
 	.key = "guards_stiffest",
 	.row_bytes = sizeof(struct stiffest),
-	.columns = {COLUMN(stiffest, "guard", guard, "%-16s", "guard"),
+	.columns = {COLUMN(stiffest, "guard", guard, "%-16s", "controller"),
 		    COLUMN(stiffest, "scene", scene, " %-12s", " scene"),
 		    COLUMN(stiffest, "setups", setups, "%7.0f", "setups"),
 		    COLUMN(stiffest, "felt_N_mm", felt_N_mm, "%8.4f", "N/mm"),
@@ -687,25 +687,26 @@ static void judge(struct bench_run *run)
 		}
 	}
 	if (most > wins)
-		snprintf(verdict, sizeof(verdict), "%s wins: %.2f times as stiff as none",
-			 best, most);
+		snprintf(verdict, sizeof(verdict),
+			 "%s wins: %.2f times as stiff as without a controller", best,
+			 most);
 	else
 		snprintf(
 			verdict, sizeof(verdict),
-			"none wins: at most %.2f times as stiff at rest (%s), of %.2f that a "
-			"hand notices; %d of %d cases rest without one at the scenes' own gains",
+			"none wins: at most %.2f times as stiff (%s), below the %.2f that a hand "
+			"perceives; %d of %d cases rest without one at the scenes' own gains",
 			most, best, wins, rows[0].rests, rows[0].cases);
 	bench_value(run, "guards_verdict", json_string(verdict));
 	bench_value(run, "guards_winner",
 		    json_string(most > wins ? best : guard_names[NONE]));
 	bench_text(
 		run,
-		"guards in the real plan, behind a late tracker and a late actuator; gain of "
-		"the largest that is accepted, - is the scene's own\n");
+		"passivity controllers in the real plan with delayed tracker and actuator; gain "
+		"relative to the largest accepted one, - is the scene's own\n");
 	bench_table(run, &stability_guard_table, rows, N(rows));
 	bench_text(
 		run,
-		"the stiffest that rests under every lean, with a force within %g %%\n",
+		"stiffest cut at rest under every hand force, with a force error of at most %g %%\n",
 		100 * FORCE_NOTICED);
 	bench_table(run, &stiffest_table, stiffests, N(stiffests));
 	bench_table(run, &cost_table, costs, GUARDS);

@@ -364,16 +364,17 @@ void stability_integrators(struct bench_run *run)
 	int missed = 0;
 
 	measure(run->quick);
-	bench_text(run,
-		   "integrators of a spring: %g kg, ratio of damping %g, steps of 1 ms; "
-		   "largest error as part of the largest place\n",
-		   DEVICE_KG, DAMPING_RATIO);
+	bench_text(
+		run,
+		"integrators of a spring: %g kg, damping ratio %g, steps of 1 ms; largest "
+		"error relative to the largest displacement\n",
+		DEVICE_KG, DAMPING_RATIO);
 	/* Steps are of the second stiffness: nothing overflows there. */
 	bench_block(run, &places_block, sizeof(*rows), rows, N(integrators),
 		    n_whole_ticks / N(integrators), 1);
 	bench_text(run,
-		   "ns for 1 ms of motion, by the largest error that it has with the "
-		   "best of the steps tried\n");
+		   "ns per 1 ms of motion for a given largest error, with the fastest "
+		   "step\n");
 	for (int i = 0; i < N(work); i++)
 		work[i] = work_of(&integrators[i % N(integrators)],
 				  swept[i / N(integrators)]);

@@ -396,14 +396,14 @@ static const struct bench_table sum_table = {
 		    COLUMN(sum, "cases", cases, "%7.0f", "cases", .whole = true),
 		    COLUMN(sum, "accepted", accepted, "%10.0f", "accepted",
 			   .whole = true),
-		    COLUMN(sum, "swing", swing, "%7.0f", "swing", .whole = true),
-		    COLUMN(sum, "widest_mm", widest_mm, "%12.2g", "widest, mm"),
+		    COLUMN(sum, "swing", swing, "%10.0f", "oscillate", .whole = true),
+		    COLUMN(sum, "widest_mm", widest_mm, "%12.2g", "largest, mm"),
 		    COLUMN(sum, "plans_refused", plans_refused, "%15.0f", "plans refused",
 			   .whole = true),
-		    COLUMN(sum, "rest_as_is", rest_as_is, "%19.0f", "rest all the same",
+		    COLUMN(sum, "rest_as_is", rest_as_is, "%19.0f", "stable as it is",
 			   .whole = true),
-		    COLUMN(sum, "rest_twice", rest_twice, "%22.0f",
-			   "twice as strong, too", .whole = true)},
+		    COLUMN(sum, "rest_twice", rest_twice, "%22.0f", "at twice the force",
+			   .whole = true)},
 };
 
 static struct sum sum_of(const char *model, const char *withdrawal)
@@ -463,18 +463,19 @@ void stability_rest(struct bench_run *run)
 	all = sum_of(NULL, NULL);
 	bench_text(
 		run,
-		"learned models on devices of %g to %g kg: accepted by the plan or "
-		"refused, and whether they rest under %d leans; a swing is more than %g mm "
-		"in the last quarter of %g s\n",
+		"learned models on devices of %g to %g kg: accepted or refused by the plan, "
+		"and at rest under %d hand forces; an oscillation is more than %g mm in the "
+		"last quarter of %g s\n",
 		cases[0].mass_kg, cases[n_cases - 1].mass_kg, LEANS, CLOSED_LOOP_SWING_MM,
 		RUN_S);
 	bench_table(run, &sum_table, sums, n);
-	bench_text(run,
-		   "%.0f cases: %.0f accepted, of which %.0f swing; %.0f plans refused, "
-		   "of which %.0f would rest twice as strong\n",
-		   all.cases, all.accepted, all.swing, all.plans_refused, all.rest_twice);
-	list(run, "accepted, and swings", true);
-	list(run, "refused, and would rest twice as strong", false);
+	bench_text(
+		run,
+		"%.0f cases: %.0f accepted, of which %.0f oscillate; %.0f plans refused, "
+		"of which %.0f are stable at twice the force\n",
+		all.cases, all.accepted, all.swing, all.plans_refused, all.rest_twice);
+	list(run, "accepted, but oscillates", true);
+	list(run, "refused, but stable at twice the force", false);
 	bench_text(run, "\n");
 	bench_rows(run, &stability_rest_table, cases, n_cases);
 	early = all.plans_refused > 0 ? all.rest_twice / all.plans_refused : 0;
@@ -485,7 +486,8 @@ void stability_rest(struct bench_run *run)
 	metrics_more_is_better(metrics_add(run->metrics, METRIC_EXACT, &all.accepted, "1",
 					   "accepted cases of learned models"));
 	if (all.swing > 0)
-		bench_fail(run,
-			   "rest: %.0f of %.0f accepted cases swing: please report it",
-			   all.swing, all.accepted);
+		bench_fail(
+			run,
+			"rest: %.0f of %.0f accepted cases oscillate: please report it",
+			all.swing, all.accepted);
 }

@@ -45,11 +45,10 @@ static const struct bench_table work_table = {
 	.row_bytes = sizeof(struct work_row),
 	.columns = {COLUMN(work_row, "scene", name, "%12s", "scene"),
 		    COLUMN(work_row, "tool", tool, "%8s", "tool"),
-		    COLUMN(work_row, "motions", motions, "%9.0f", "motions",
-			   .whole = true),
+		    COLUMN(work_row, "motions", motions, "%9.0f", "paths", .whole = true),
 		    COLUMN(work_row, "in_contact", in_contact, "%12.0f", "in contact",
 			   .whole = true),
-		    COLUMN(work_row, "returned", returned, "%13.0f", "give it back",
+		    COLUMN(work_row, "returned", returned, "%13.0f", "return work",
 			   .whole = true),
 		    COLUMN(work_row, "least_N_mm", least_N_mm, "%15.3g", "least taken"),
 		    COLUMN(work_row, "rounding_N_mm", rounding_N_mm, "%10.1g",
@@ -285,14 +284,13 @@ void stability_work(struct bench_run *run)
 	cli_progress_end();
 	for (int i = 0; i < n_rows; i++)
 		returned += rows[i].returned;
-	bench_text(run, "work that tissue takes over random closed motions, N mm; held: "
-			"forces held for a tick, as a device gets them\n");
+	bench_text(run, "work taken by the tissue along random closed paths, N mm; held: "
+			"with forces held for a tick, as on a device\n");
 	bench_table(run, &work_table, rows, n_rows);
 	bench_text(run, "\n");
 	metrics_add(run->metrics, METRIC_EXACT, &returned, "1",
 		    "closed motions that give work back");
 	if (returned > 0)
-		bench_fail(run,
-			   "work: %.0f closed motions gave work back: please report it",
+		bench_fail(run, "work: %.0f closed paths returned work: please report it",
 			   returned);
 }
