@@ -59,7 +59,7 @@ setup() {
 
 @test "bench says what machine and build its figures are of" {
 	quick_report precision
-	[ "$(key r.json machine.version)" = "$(incise --version | awk '{ print $2 }')" ]
+	[ "$(key r.json machine.version)" = "$(incise --version | awk 'NR == 1 { print $2 }')" ]
 	[ "$(key r.json machine.processors)" = "$(nproc)" ]
 	holds "$(key r.json machine.timed_on) >= 0 && $(key r.json machine.memory_MB) > 100"
 	[[ "$(key r.json machine.date)" =~ ^20[0-9]{2}-[0-9]{2}-[0-9]{2}T[0-9:]{8}Z$ ]]
