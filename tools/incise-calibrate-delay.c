@@ -395,6 +395,24 @@ static void draw(const char *folder, const struct stream *streams,
 		cli_warn("fit.png: could not be drawn; see whether gnuplot works");
 }
 
+/* What fit_pair() and the library have judged, with the limits. */
+static void fill_verdict(const struct pair *pairs,
+			 struct incise_calibration_record *record)
+{
+	int used = 0;
+
+	for (int i = 0; i < STREAMS; i++)
+		if (pairs[i].known)
+			used += snprintf(
+				record->verdict + used, sizeof(record->verdict) - used,
+				"%stracker and %s: correlation %.3f, drift %.3f ms",
+				used ? "; " : "", stream_names[i],
+				pairs[i].fit.correlation, pairs[i].fit.drift_ms);
+	snprintf(record->verdict + used, sizeof(record->verdict) - used,
+		 "; limits: correlation %g, drift %g ms or %d u",
+		 INCISE_DELAY_CORRELATION_MIN, DRIFT_MAX_MS, DRIFT_SIGMAS);
+}
+
 static void fill_record(const struct options *options, const struct stream *streams,
 			const struct pair *pairs,
 			struct incise_calibration_record *record)
@@ -406,6 +424,7 @@ static void fill_record(const struct options *options, const struct stream *stre
 	struct incise_outfile *file;
 	FILE *out = calibrate_report_text(options->common.report, &file);
 
+	fill_verdict(pairs, record);
 	if (out) {
 		fprintf(out, "Delays against the %s\n\n",
 			stream_names[options->reference]);
@@ -437,7 +456,7 @@ static void fill_record(const struct options *options, const struct stream *stre
 				delay, late.ms, u, late.fits_u, late.lines_u);
 	}
 	if (out)
-		fprintf(out, "\npass\n");
+		calibrate_result_text(&options->common, record, out);
 	whole_file_end(file);
 	if (out)
 		draw(options->common.report, streams, pairs);
@@ -476,9 +495,6 @@ int main(int argc, char **argv)
 		 pairs[FORCE].known ? pairs[FORCE].fit.span_s : pairs[CAMERA].fit.span_s,
 		 stream_names[options.reference]);
 	fill_record(&options, streams, pairs, &record);
-	snprintf(record.verdict, sizeof(record.verdict),
-		 "correlation %.3f with the force, %.3f with the camera",
-		 pairs[FORCE].fit.correlation, pairs[CAMERA].fit.correlation);
 	calibrate_end(&options.common, &record,
 		      json_pack("{ss so so}", "reference",
 				stream_names[options.reference], "force",

@@ -397,17 +397,17 @@ static void judge(const struct options *options, struct incise_calibration_recor
 	if (!record->pass)
 		return;
 	record->pass = false;
-	if (2 * u > U_WORST) {
-		snprintf(record->verdict, sizeof(record->verdict),
-			 "U is %.2f %% of the scale, more than %.1f %%; give more "
-			 "readings, or better ones",
-			 200 * u, 100 * U_WORST);
-	} else if (fabs(off) > options->tolerance) {
+	if (fabs(off) > options->tolerance) {
 		snprintf(record->verdict, sizeof(record->verdict),
 			 "%+.2f %% from the nominal %g mm/px, more than %g %%; check "
 			 "length and pixels, or give the scale of your camera with "
 			 "--nominal",
 			 100 * off, options->nominal_mm_px, 100 * options->tolerance);
+	} else if (2 * u > U_WORST) {
+		snprintf(record->verdict, sizeof(record->verdict),
+			 "U is %.2f %% of the scale, more than %.1f %%; give more "
+			 "readings, or better ones",
+			 200 * u, 100 * U_WORST);
 	} else {
 		record->pass = true;
 		snprintf(record->verdict, sizeof(record->verdict),
@@ -435,11 +435,7 @@ static void end_record(const struct options *options, struct depth_result *resul
 	/* Everything that can fail comes before the calibration changes. */
 	if (options->common.report)
 		depth_report_folder(result, options->common.report);
-	if (cli_stop)
-		cli_fail("stopped; the previous calibration stays active");
-	if (!options->common.dry_run &&
-	    incise_calibration_append(options->common.calibration, record, &err))
-		cli_fail_with(&err);
+	calibrate_append(&options->common, record);
 }
 
 int main(int argc, char **argv)
@@ -452,7 +448,8 @@ int main(int argc, char **argv)
 						   .pass = true};
 	struct depth_lengths l = {0};
 	struct depth_corners corners = {0};
-	struct depth_result result = {.record = &record, .source = &options.source};
+	struct depth_result result = {
+		.record = &record, .source = &options.source, .common = &options.common};
 
 	parse(&options, argc, argv);
 	result.way = options.way;
@@ -468,13 +465,12 @@ int main(int argc, char **argv)
 		depth_lengths_write(&l, options.common.keep,
 				    !strcmp(options.way, "line"));
 	end_record(&options, &result, &record);
-	if (options.common.json)
+	if (options.common.json) {
 		json_print(depth_report_json(&result));
-	else
+	} else {
 		depth_report_text(&result, stdout);
-	cli_finish();
-	if (!record.pass)
-		cli_fail("refused, the previous calibration stays active: %s",
-			 record.verdict);
+		calibrate_result(&options.common, &record);
+	}
+	calibrate_require_pass(&record);
 	return 0;
 }

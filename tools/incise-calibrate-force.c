@@ -259,7 +259,7 @@ struct report {
 	const enum incise_calibrate_force_state *states;
 	const struct incise_calibration_record *record;
 	const char *refused; /* why there is no result; NULL: there is one */
-	double found_mV_N;   /* in force before */
+	const struct calibrate_options *common;
 	const char *gravity; /* its source */
 };
 
@@ -286,8 +286,6 @@ static void print_metrics(const struct report *report, FILE *out)
 		uncertainty_text(r->sensitivity_mV_N, 2 * r->sensitivity_u_mV_N, "mV/N",
 				 text),
 		200 * r->sensitivity_u_mV_N / r->sensitivity_mV_N);
-	fprintf(out, "%-15s %.2f mV/N previously, %+.3f %%\n", "", report->found_mV_N,
-		100 * (r->sensitivity_mV_N / report->found_mV_N - 1));
 	fprintf(out, "%-15s %s (k = 2)\n", "zero",
 		uncertainty_text(r->zero_mV, 2 * r->zero_u_mV, "mV", text));
 	fprintf(out, "%-15s %.3g mV, scatter of one load %.3g mV\n", "residual sd",
@@ -383,9 +381,8 @@ static void print_report(const struct report *report, bool all, FILE *out)
 	if (all)
 		fputc('\n', out);
 	print_pairs(report, all, out);
-	if (!report->refused)
-		fprintf(out, "%s: %s\n", report->record->pass ? "pass" : "fail",
-			report->record->verdict);
+	if (!report->refused && all)
+		calibrate_result_text(report->common, report->record, out);
 }
 
 static json_t *json_budget(const struct incise_calibrate_force *r)
@@ -434,7 +431,7 @@ static json_t *report_json(const struct report *report)
 	json_object_update_new(
 		root,
 		json_pack("{s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o, s:o}",
-			  "found_mV_N", json_number(report->found_mV_N),
+			  "found_mV_N", json_number(report->common->found.force_mV_N),
 			  "sensitivity_mV_N", json_number(r->sensitivity_mV_N),
 			  "sensitivity_u_mV_N", json_number(r->sensitivity_u_mV_N),
 			  "sensitivity_U_mV_N", json_number(2 * r->sensitivity_u_mV_N),
@@ -562,35 +559,25 @@ int main(int argc, char **argv)
 	states = cli_alloc(pairs.n, sizeof(*states));
 	rc = incise_calibrate_force(pairs.pair, pairs.n, &options.setup, &result, states,
 				    &err);
-	report = (struct report){&pairs,
-				 &options.setup,
-				 &result,
-				 states,
-				 &record,
-				 rc ? err.text : NULL,
-				 options.common.found.force_mV_N,
-				 options.gravity};
+	report = (struct report){&pairs,	  &options.setup, &result,
+				 states,	  &record,	  rc ? err.text : NULL,
+				 &options.common, options.gravity};
 	if (!rc)
 		fill_record(&options, &result, &record);
 	if (options.common.report)
 		write_report(&report, options.common.report);
-	if (options.common.json)
+	if (!rc)
+		calibrate_append(&options.common, &record);
+	if (options.common.json) {
 		json_print(report_json(&report));
-	else if (!rc)
+	} else if (!rc) {
 		print_report(&report, false, stdout);
-	cli_finish();
+		calibrate_result(&options.common, &record);
+	}
 	if (rc)
 		cli_fail("refused: %s; %s stays as it was", err.text,
 			 options.common.calibration);
-	if (cli_stop)
-		cli_fail("stopped; the calibration in %s stays active",
-			 options.common.calibration);
-	if (!options.common.dry_run &&
-	    incise_calibration_append(options.common.calibration, &record, &err))
-		cli_fail_with(&err);
-	if (!record.pass)
-		cli_fail("refused, the previous calibration stays active: %s",
-			 record.verdict);
+	calibrate_require_pass(&record);
 	free(states);
 	free(pairs.pair);
 	return 0;

@@ -277,6 +277,7 @@ struct report {
 	const struct incise_calibrate_stepper_setup *setup;
 	const struct stepper_rate *rate;
 	const struct incise_calibration_record *record;
+	const struct calibrate_options *common;
 	const char *source; /* device, or file */
 };
 
@@ -335,32 +336,23 @@ static void report_text(const struct report *report, FILE *out)
 {
 	const struct incise_calibrate_stepper *fit = report->fit;
 	const struct stepper_series *series = report->series;
-	char step[UNCERTAINTY_TEXT], per_mm[UNCERTAINTY_TEXT], backlash[UNCERTAINTY_TEXT],
-		hysteresis[UNCERTAINTY_TEXT], stiction[UNCERTAINTY_TEXT];
+	char per_mm[UNCERTAINTY_TEXT];
 	int listed = 0;
 
 	fprintf(out,
 		"%s: %d strokes, %.4g to %.4g mm, %.3f to %.3f N\n"
 		"\n"
-		"force per microstep %s (k = 2)\n"
-		"  per mm           %s (k = 2); a step is %.6g mm\n"
-		"backlash           %s (k = 2); includes friction at the sensor\n"
-		"hysteresis         %s (k = 2); %s\n"
-		"stiction           %s (k = 2); no change of force for %.4f mm, %.0f "
-		"steps\n",
+		"stiffness          %s (k = 2); a step is %.6g mm\n"
+		"backlash           no change of force for %.4f mm, %.0f steps; includes "
+		"friction at the sensor\n"
+		"hysteresis         %s\n",
 		report->source, fit->strokes, fit->low_mm, fit->high_mm, fit->low_N,
-		fit->high_N, uncertainty_text(fit->N_step, 2 * fit->N_step_u, "N", step),
-		uncertainty_text(fit->N_mm, 2 * fit->N_mm_u, "N/mm", per_mm),
-		report->setup->step_mm,
-		uncertainty_text(fit->backlash_mm, 2 * fit->backlash_u_mm, "mm",
-				 backlash),
-		uncertainty_text(fit->hysteresis_N, 2 * fit->hysteresis_u_N, "N",
-				 hysteresis),
+		fit->high_N, uncertainty_text(fit->N_mm, 2 * fit->N_mm_u, "N/mm", per_mm),
+		report->setup->step_mm, fit->dead_mm,
+		fit->dead_mm / report->setup->step_mm,
 		fit->rest_N == 0  ? "below detection limit"
 		: fit->rest_N > 0 ? "loss between the two directions"
-				  : "force lags after reversals",
-		uncertainty_text(fit->stiction_N, 2 * fit->stiction_u_N, "N", stiction),
-		fit->dead_mm, fit->dead_mm / report->setup->step_mm);
+				  : "force lags after reversals");
 	put_rate(report->rate, out);
 	fprintf(out,
 		"linearity          %.2f %% of full scale; points lie %.2g N off their lines; "
@@ -380,7 +372,6 @@ static void report_text(const struct report *report, FILE *out)
 				states[series->states[i]]);
 			listed++;
 		}
-	fprintf(out, "%s: %s\n", fit->pass ? "pass" : "fail", report->record->verdict);
 }
 
 static json_t *budget_json(const struct incise_calibrate_stepper *fit)
@@ -507,7 +498,7 @@ static void write_report(const struct report *report, const char *folder)
 	const struct stepper_series *series = report->series;
 	struct incise_outfile *file;
 	double before = NAN;
-	FILE *data;
+	FILE *data, *out;
 	int up = 1;
 
 	plot_folder(folder);
@@ -525,7 +516,9 @@ static void write_report(const struct report *report, const char *folder)
 	}
 	plot_data_end(data, folder);
 	draw_report(fit, series, folder);
-	report_text(report, calibrate_report_text(folder, &file));
+	out = calibrate_report_text(folder, &file);
+	report_text(report, out);
+	calibrate_result_text(report->common, report->record, out);
 	whole_file_end(file);
 	calibrate_report_json(folder, report_json(report));
 }
@@ -563,6 +556,13 @@ static void fill_record(struct incise_calibration_record *record,
 			const struct stepper_rate *rate,
 			const struct incise_calibration *found)
 {
+	char spring[100] = "";
+
+	if (!isnan(setup->spring_N_mm))
+		snprintf(spring, sizeof(spring),
+			 "; %+.2f %% from the spring's %.4g N/mm, within %g %%",
+			 100 * (fit->N_mm / setup->spring_N_mm - 1), setup->spring_N_mm,
+			 100 * setup->tolerance);
 	snprintf(record->kind, sizeof(record->kind), "stepper");
 	snprintf(record->method, sizeof(record->method),
 		 "%d strokes against the force sensor, lines of one slope for both "
@@ -593,12 +593,14 @@ static void fill_record(struct incise_calibration_record *record,
 			 setup->linearity);
 	else if (!fit->pass)
 		snprintf(record->verdict, sizeof(record->verdict),
-			 "%.4g N/mm are more than %g %% off the spring's %.4g N/mm",
-			 fit->N_mm, 100 * setup->tolerance, setup->spring_N_mm);
+			 "%.4g N/mm, %+.2f %% from the spring's %.4g N/mm, more than "
+			 "%g %%",
+			 fit->N_mm, 100 * (fit->N_mm / setup->spring_N_mm - 1),
+			 setup->spring_N_mm, 100 * setup->tolerance);
 	else
 		snprintf(record->verdict, sizeof(record->verdict),
-			 "linearity %.2f %% of %g %%%s", fit->linearity, setup->linearity,
-			 isnan(setup->spring_N_mm) ? "" : ", and as stiff as the spring");
+			 "linearity %.2f %%, within %g %%%s", fit->linearity,
+			 setup->linearity, spring);
 }
 
 /* Fail with the reason; a powered motor comes to rest first. */
@@ -621,12 +623,13 @@ int main(int argc, char **argv)
 	struct stepper_series series = {.step_mm = NAN};
 	struct stepper_live live;
 	struct incise_error err = {0};
+	struct options options;
 	struct report report = {.series = &series,
 				.fit = &fit,
 				.setup = &setup,
 				.rate = &rate,
-				.record = &record};
-	struct options options;
+				.record = &record,
+				.common = &options.common};
 
 	parse(&options, argc, argv);
 	incise_calibrate_stepper_init(&setup);
@@ -676,20 +679,14 @@ int main(int argc, char **argv)
 	if (options.common.report)
 		write_report(&report, options.common.report);
 	/* Everything that can fail comes before the calibration changes. */
-	if (cli_stop)
-		cli_fail("%s: nothing has changed", strsignal(cli_stop));
-	if (!options.common.dry_run &&
-	    incise_calibration_append(options.common.calibration, &record, &err))
-		cli_fail_with(&err);
-	if (options.common.json)
+	calibrate_append(&options.common, &record);
+	if (options.common.json) {
 		json_print(report_json(&report));
-	else {
+	} else {
 		report_text(&report, stdout);
-		cli_finish();
+		calibrate_result(&options.common, &record);
 	}
 	free_series(&series);
-	if (!fit.pass)
-		cli_fail("refused, the previous calibration stays active: %s",
-			 record.verdict);
+	calibrate_require_pass(&record);
 	return 0;
 }

@@ -15,7 +15,6 @@
 #include "cli/json.h"
 #include "cli/plot.h"
 #include "cli/recording.h"
-#include "cli/uncertainty.h"
 
 #define POLL_NS 10000000LL
 #define CHECK_NS 1000000000LL
@@ -390,23 +389,18 @@ static void draw(const char *folder, const struct list *list, const bool *inlier
 	}
 }
 
-static void write_report(const char *folder, const struct list *list, const bool *inlier,
-			 const struct incise_tip_fit *fit)
+static void write_report(const struct calibrate_options *common, const struct list *list,
+			 const bool *inlier, const struct incise_tip_fit *fit,
+			 const struct incise_calibration_record *record)
 {
-	static const char axes[] = "xyz";
 	struct incise_outfile *file;
-	FILE *out = calibrate_report_text(folder, &file);
-	char text[UNCERTAINTY_TEXT];
+	FILE *out = calibrate_report_text(common->report, &file);
 	int listed = 0;
 
 	if (!out)
 		return;
 	fprintf(out, "Tip of the blade in the frame of the tracker's sensor\n\n");
-	for (int i = 0; i < 3; i++)
-		fprintf(out, "tip_%c_mm  %s (k = 2)\n", axes[i],
-			uncertainty_text(fit->tip_mm[i], 2 * sqrt(fit->covariance[4 * i]),
-					 "mm", text));
-	fprintf(out, "\nCovariance, mm²\n");
+	fprintf(out, "Covariance, mm²\n");
 	for (int i = 0; i < 3; i++)
 		fprintf(out, "  %12.4e %12.4e %12.4e\n", fit->covariance[3 * i],
 			fit->covariance[3 * i + 1], fit->covariance[3 * i + 2]);
@@ -435,9 +429,11 @@ static void write_report(const char *folder, const struct list *list, const bool
 			fprintf(out, " pose %d", i + 1);
 	if (listed > OUTLIERS_LISTED)
 		fprintf(out, " and %d more", listed - OUTLIERS_LISTED);
-	fprintf(out, "\npass\n");
+	if (listed)
+		fputc('\n', out);
+	calibrate_result_text(common, record, out);
 	whole_file_end(file);
-	draw(folder, list, inlier, fit);
+	draw(common->report, list, inlier, fit);
 }
 
 static json_t *details(const struct list *list, const bool *inlier,
@@ -476,8 +472,10 @@ static void fill_record(const struct incise_calibration *found,
 		 "pivot, least squares of %d of %d poses, cone %.0f degrees",
 		 fit->inliers, fit->n, fit->cone_deg);
 	snprintf(record->verdict, sizeof(record->verdict),
-		 "residuals %.3f mm rms, %.3f mm held out", fit->rms_mm,
-		 fit->held_out_mm);
+		 "residuals %.3f mm rms, within 1 mm, and %.3f mm held out; cone %.0f "
+		 "degrees, at least %g; %d of %d poses used",
+		 fit->rms_mm, fit->held_out_mm, fit->cone_deg, INCISE_TIP_CONE_DEG,
+		 fit->inliers, fit->n);
 }
 
 static void parse(struct options *options, int argc, char **argv)
@@ -525,7 +523,7 @@ int main(int argc, char **argv)
 	/* a recording is a folder, and has its own checksums */
 	if (raw && incise_calibration_raw(&record, raw, &err))
 		snprintf(record.raw, sizeof(record.raw), "%s", raw);
-	write_report(common->report, &list, inlier, &fit);
+	write_report(common, &list, inlier, &fit, &record);
 	calibrate_end(common, &record, details(&list, inlier, &fit));
 	free(list.poses);
 	free(inlier);

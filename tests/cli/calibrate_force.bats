@@ -57,8 +57,28 @@ made_weights() {
 	run ! grep -q '^force_mV_N' calibration.conf
 	grep -q 'pass = false;' calibration.conf
 	run -0 incise calibrate force --from w.csv --latitude 48 --altitude 300
-	[[ "$output" == *"1240.00 mV/N previously"* ]]
+	[[ "$output" == *"force_mV_N  1249."*" ± "*" mV/N  1240."*" (nominal)  +"*" mV/N (+0."*" %)"* ]]
 	grep -q '^force_mV_N = ' calibration.conf
+}
+
+@test "the report ends with value, U, previous value, change, limits and file" {
+	made_weights "" >w.csv
+	run -0 incise calibrate force --from w.csv --latitude 48
+	[ "${lines[-2]%%,*}" = "pass: +0.78 % from the nominal 1240 mV/N" ] || complain "$output"
+	[[ "${lines[-2]}" == *", within 5 %; U = "* ]]
+	[ "${lines[-1]}" = "wrote calibration.conf: active from now on" ]
+	# the next one has the date of this one, whose value is the same
+	run -0 incise calibrate force --from w.csv --latitude 48 --dry-run --report r
+	[[ "${lines[-4]}" =~ ^result\ +value\ ±\ U\ \(k\ =\ 2\)\ +previous\ +change$ ]] || complain "$output"
+	[[ "${lines[-3]}" == "force_mV_N  12"*" ± "*" mV/N  12"*" ($(date -u +%Y)-"*")  +0.0"*" mV/N (+0.00 %)" ]] || complain "$output"
+	[ "${lines[-1]}" = "calibration.conf: not written (--dry-run)" ]
+	[[ "$(tail -n 1 r/report.txt)" == "pass: +0.78 % from"* ]]
+	# changed by hand since, and one that does not pass
+	sed -i 's/^force_mV_N = [^;]*/force_mV_N = 1300.0/' calibration.conf
+	run -1 --separate-stderr incise calibrate force --from w.csv --nominal 1500
+	[[ "$output" == *" 1300."*" (by hand)  -"*" mV/N (-"* ]] || complain "$output"
+	[[ "${lines[-2]}" == "FAIL: -16.67 % from the nominal 1500 mV/N, more than 5 %;"* ]] || complain "$output"
+	[ "${lines[-1]}" = "wrote calibration.conf: in its history only, the previous values stay active" ]
 }
 
 @test "outliers up to one in ten are listed, more are refused" {

@@ -48,6 +48,11 @@ void calibrate_find(struct calibrate_options *options)
 		incise_calibration_nominal(&options->found);
 	else if (rc)
 		cli_fail_with(&err);
+	if (!rc)
+		options->n_history = incise_calibration_history(options->calibration,
+								&options->history, &err);
+	if (options->n_history < 0)
+		cli_fail_with(&err);
 }
 
 void calibrate_begin(struct calibrate_options *options)
@@ -127,25 +132,157 @@ static json_t *values_json(const struct incise_calibration_record *record)
 	return list;
 }
 
-static void print_values(const struct incise_calibration_record *record)
+/* --- the block at the end ---------------------------------------------------------------- */
+
+enum { KEY, VALUE, PREVIOUS, CHANGE, COLUMNS };
+
+struct row {
+	char text[COLUMNS][UNCERTAINTY_TEXT];
+};
+
+/* Date of the calibration that gave the previous value; NULL: none did. */
+static const char *previous_date(const struct calibrate_options *options,
+				 const struct incise_calibration_value *value)
 {
-	char text[UNCERTAINTY_TEXT];
+	const char *date = NULL;
+	double left = NAN;
 
-	for (int i = 0; i < record->n; i++) {
-		const struct incise_calibration_value *value = &record->values[i];
+	for (int i = 0; i < options->n_history; i++) {
+		const struct incise_calibration_record *r = &options->history[i];
 
-		printf("%-20s %s (k = 2)", value->key,
-		       uncertainty_text(value->left, 2 * value->u, value->unit, text));
-		if (!isnan(value->found))
-			printf(", was %.4f", value->found);
-		putchar('\n');
+		for (int k = 0; r->pass && k < r->n; k++)
+			if (!strcmp(r->values[k].key, value->key)) {
+				left = r->values[k].left;
+				date = r->date;
+			}
 	}
+	return left == value->found ? date : NULL;
+}
+
+/* A value with the digits of @U, which is not printed. */
+static void round_to(double value, double U, const char *unit,
+		     char text[UNCERTAINTY_TEXT])
+{
+	char *end;
+
+	uncertainty_text(value, U, unit, text);
+	end = strstr(text, " ±");
+	if (end)
+		snprintf(end, UNCERTAINTY_TEXT - (end - text), "%s%s", *unit ? " " : "",
+			 unit);
+}
+
+static void fill_row(const struct calibrate_options *options,
+		     const struct incise_calibration_value *value, struct row *row)
+{
+	const char *date = previous_date(options, value);
+	double change = value->left - value->found, U = 2 * value->u;
+	double percent = 100 * change / fabs(value->found);
+	char text[UNCERTAINTY_TEXT];
+	struct incise_calibration nominal;
+	int n;
+
+	incise_calibration_nominal(&nominal);
+	snprintf(row->text[KEY], UNCERTAINTY_TEXT, "%s", value->key);
+	uncertainty_text(value->left, U, value->unit, row->text[VALUE]);
+	if (isnan(value->found)) {
+		strcpy(row->text[PREVIOUS], "none");
+		strcpy(row->text[CHANGE], "-");
+		return;
+	}
+	if (!date)
+		date = value->found == incise_calibration_get(&nominal, value->key)
+			       ? "nominal"
+			       : "by hand";
+	round_to(value->found, U, "", text);
+	snprintf(row->text[PREVIOUS], UNCERTAINTY_TEXT, "%.40s (%.10s)", text, date);
+	round_to(change, U, value->unit, text);
+	n = snprintf(row->text[CHANGE], UNCERTAINTY_TEXT, "%s%.40s",
+		     *text == '-' ? "" : "+", text);
+	/* A percentage of nearly nothing says nothing; no "-0.00 %". */
+	if (fabs(percent) < 1000)
+		snprintf(row->text[CHANGE] + n, UNCERTAINTY_TEXT - n, " (%+.2f %%)",
+			 fabs(percent) < 0.005 ? 0 : percent);
+}
+
+/* Columns on the screen of UTF-8. */
+static int width_of(const char *text)
+{
+	int width = 0;
+
+	for (; *text; text++)
+		width += ((unsigned char)*text & 0xc0) != 0x80;
+	return width;
+}
+
+static bool is_of_another(const struct incise_calibration_value *value)
+{
+	return cli_ends_with(value->key, "_delay_sd_ms"); /* U of that delay, halved */
+}
+
+void calibrate_result_text(const struct calibrate_options *options,
+			   const struct incise_calibration_record *record, FILE *out)
+{
+	struct row rows[INCISE_CALIBRATION_VALUES + 1] = {
+		{{"result", "value ± U (k = 2)", "previous", "change"}}};
+	int width[COLUMNS] = {0}, n = 1;
+
+	for (int i = 0; i < record->n; i++)
+		if (!is_of_another(&record->values[i]))
+			fill_row(options, &record->values[i], &rows[n++]);
+	for (int i = 0; i < n; i++)
+		for (int c = 0; c < COLUMNS; c++)
+			width[c] = (int)fmax(width[c], width_of(rows[i].text[c]));
+	fputc('\n', out);
+	for (int i = 0; i < n; i++) {
+		for (int c = 0; c < CHANGE; c++)
+			fprintf(out, "%s%*s", rows[i].text[c],
+				width[c] - width_of(rows[i].text[c]) + 2, "");
+		fprintf(out, "%s\n", rows[i].text[CHANGE]);
+	}
+	fprintf(out, "%s%s%s: %s\n", cli_colour(out, record->pass ? CLI_GREEN : CLI_RED),
+		record->pass ? "pass" : "FAIL", cli_colour(out, CLI_PLAIN),
+		record->verdict);
+}
+
+void calibrate_result(const struct calibrate_options *options,
+		      const struct incise_calibration_record *record)
+{
+	calibrate_result_text(options, record, stdout);
+	if (options->dry_run)
+		printf("%s: not written (--dry-run)\n", options->calibration);
+	else if (record->pass)
+		printf("wrote %s: active from now on\n", options->calibration);
+	else
+		printf("wrote %s: in its history only, the previous values stay active\n",
+		       options->calibration);
+}
+
+void calibrate_append(const struct calibrate_options *options,
+		      const struct incise_calibration_record *record)
+{
+	struct incise_error err = {0};
+
+	if (cli_stop)
+		cli_fail("stopped; %s is not written, the previous calibration stays "
+			 "active",
+			 options->calibration);
+	if (!options->dry_run &&
+	    incise_calibration_append(options->calibration, record, &err))
+		cli_fail_with(&err);
+}
+
+void calibrate_require_pass(const struct incise_calibration_record *record)
+{
+	cli_finish();
+	if (!record->pass)
+		cli_fail("refused, the previous calibration stays active: %s",
+			 record->verdict);
 }
 
 void calibrate_end(const struct calibrate_options *options,
 		   const struct incise_calibration_record *record, json_t *details)
 {
-	struct incise_error err = {0};
 	json_t *all = json_pack("{ss ss sb sb so so}", "kind", record->kind, "method",
 				record->method, "pass", record->pass, "written",
 				!options->dry_run, "values", values_json(record),
@@ -154,16 +291,12 @@ void calibrate_end(const struct calibrate_options *options,
 	/* The report first: a calibration in force must have one. */
 	if (options->report)
 		calibrate_report_json(options->report, json_incref(all));
-	if (!options->dry_run &&
-	    incise_calibration_append(options->calibration, record, &err))
-		cli_fail_with(&err);
+	calibrate_append(options, record);
 	if (options->json) {
 		json_print(all);
 		return;
 	}
-	print_values(record);
-	printf("%s: %s\n", options->calibration,
-	       options->dry_run ? "not written, as it is a dry run" : "in force");
+	calibrate_result(options, record);
 	json_decref(all);
 	cli_finish();
 }

@@ -18,7 +18,9 @@
 struct calibrate_options {
 	const char *rig, *calibration, *from, *keep, *report;
 	bool dry_run, json;
-	struct incise_calibration found; /* in force before */
+	struct incise_calibration found; /* active before */
+	struct incise_calibration_record *history;
+	int n_history;
 };
 
 /* The option -c of a command, whose options begin with these as `common`. */
@@ -27,7 +29,7 @@ struct calibrate_options {
 		"calibration to read and write (default: calibration.conf)", \
 		CLI_INPUT(type, common.calibration)
 
-/* Read the calibration in force; a missing file is the nominal one. */
+/* Read the active calibration and its history; a missing file is the nominal one. */
 void calibrate_find(struct calibrate_options *options);
 
 /* Reject options that exclude each other, read the calibration, make the report's folder. */
@@ -47,7 +49,25 @@ void calibrate_report_json(const char *folder, json_t *object);
 bool calibrate_can_plot(const char *folder);
 
 /*
- * End with a result: append it unless it is a dry run, write report.json, and print it as
+ * The block that ends each report: per value of the record its U, the previous value with its
+ * date, and the change; pass or FAIL with the limits of the verdict.
+ */
+void calibrate_result_text(const struct calibrate_options *options,
+			   const struct incise_calibration_record *record, FILE *out);
+
+/* The same on standard output, with the file written, or why it was not. */
+void calibrate_result(const struct calibrate_options *options,
+		      const struct incise_calibration_record *record);
+
+/* Append the record unless it is a dry run; fails after a signal. */
+void calibrate_append(const struct calibrate_options *options,
+		      const struct incise_calibration_record *record);
+
+/* Flush the report, and fail if the calibration did not pass. */
+void calibrate_require_pass(const struct incise_calibration_record *record);
+
+/*
+ * End with a result that passed: append it unless it is a dry run, write report.json, and print it as
  * text or JSON, with @details in the JSON.
  */
 void calibrate_end(const struct calibrate_options *options,

@@ -14,6 +14,7 @@
 #include <incise/calibration.h>
 #include <incise/rig.h>
 #include <incise/vision.h>
+#include "calibrate.h"
 
 struct depth_lengths {
 	double *px, *mm; /* n; mm of a line only */
@@ -73,6 +74,7 @@ void depth_corners_write(const struct depth_corners *corners, const char *path);
 
 struct depth_result {
 	const char *way; /* two-point, line, board */
+	const struct calibrate_options *common;
 	const struct incise_calibration_record *record;
 	const struct depth_lengths *lengths; /* of two-point and line */
 	const struct depth_corners *corners; /* of a board */
@@ -84,6 +86,7 @@ struct depth_result {
 	bool in_force;
 };
 
+/* Without the block of calibrate_result_text(). */
 void depth_report_text(const struct depth_result *result, FILE *out);
 json_t *depth_report_json(const struct depth_result *result);
 

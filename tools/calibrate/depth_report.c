@@ -9,7 +9,6 @@
 #include "depth.h"
 #include "../cli/json.h"
 #include "../cli/plot.h"
-#include "../cli/uncertainty.h"
 
 #define OUTLIERS_SHOWN 20
 
@@ -130,21 +129,12 @@ static void vision_text(const struct depth_result *r, FILE *out)
 
 void depth_report_text(const struct depth_result *r, FILE *out)
 {
-	const struct incise_calibration_value *value = &r->record->values[0];
-	char text[UNCERTAINTY_TEXT];
-
-	fprintf(out, "depth_mm_px    %s (k = 2), %.2g %%\n",
-		uncertainty_text(value->left, 2 * value->u, "mm/px", text),
-		200 * value->u / value->left);
-	fprintf(out, "previous       %.7f, changed by %+.3f %%\n", value->found,
-		100 * (value->left / value->found - 1));
 	fprintf(out, "method         %s\n", r->record->method);
 	if (r->fit)
 		lengths_text(r, out);
 	else
 		board_text(r, out);
 	budget_text(r, out);
-	fprintf(out, "\n%s: %s\n", r->record->pass ? "pass" : "fail", r->record->verdict);
 	vision_text(r, out);
 }
 
@@ -361,9 +351,12 @@ static void draw(const struct depth_result *r, const char *folder)
 void depth_report_folder(const struct depth_result *r, const char *folder)
 {
 	struct incise_outfile *file;
+	FILE *out;
 
 	plot_folder(folder);
-	depth_report_text(r, calibrate_report_text(folder, &file));
+	out = calibrate_report_text(folder, &file);
+	depth_report_text(r, out);
+	calibrate_result_text(r->common, r->record, out);
 	whole_file_end(file);
 	calibrate_report_json(folder, depth_report_json(r));
 	draw(r, folder);
