@@ -503,7 +503,7 @@ static const struct bench_table line_table = {
 		    COLUMN(line, NULL, late.p9999, "%7.0f", "99.99 %"),
 		    COLUMN(line, NULL, late.max, "%8.0f", "max"),
 		    COLUMN(line, NULL, skipped, "%8.0f", "skipped"),
-		    COLUMN(line, NULL, machine, "%8.0f", "not ours"),
+		    COLUMN(line, NULL, machine, "%8.0f", "machine"),
 		    COLUMN(line, NULL, ratio, "%6.2f", "ratio"),
 		    COLUMN(line, "failed", failed)},
 };
