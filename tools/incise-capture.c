@@ -457,7 +457,8 @@ int main(int argc, char **argv)
 	run.recorder =
 		cli_require(incise_recorder_new(target, run.rig, &setup, &err), &err);
 	keyboard_begin();
-	capture_view_begin();
+	run.view.live = incise_clock_is_real(incise_rig_clock(run.rig));
+	capture_view_begin(&run.view);
 	record(&run);
 	keyboard_end();
 	if (incise_recorder_end(run.recorder, &err))

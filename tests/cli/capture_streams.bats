@@ -20,13 +20,16 @@ ask() {
 	sqlite3 -readonly "$1/recording.db" "$2"
 }
 
-# What Python types at the terminal of a command: pairs of seconds and keys.
+# What Python types at the terminal of a command, of 80 columns and 24 lines or of $size: pairs of
+# seconds and keys.
 on_a_terminal() {
 	python3 - "$@" <<'END'
-import os, pty, select, sys, time
+import fcntl, os, pty, select, struct, sys, termios, time
 keys = [(float(a.split(':')[0]), a.split(':')[1]) for a in sys.argv[1].split(',')]
+columns, lines = map(int, os.environ.get('size', '80x24').split('x'))
 pid, fd = pty.fork()
 if not pid:
+    fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack('HHHH', lines, columns, 0, 0))
     os.execvp(sys.argv[2], sys.argv[2:])
 start, out = time.monotonic(), b''
 while True:
@@ -148,12 +151,80 @@ END
 	ask a.rec "SELECT text FROM events WHERE kind = 'marker' ORDER BY t_ns" >marks
 	printf 'marker 1\n7\n' | cmp - marks
 	incise verify a.rec
-	# a level, the disk, a line per stream
-	grep -aEq 'force +-?[0-9.]+ N \[[#.]{10}\] +depth +-?[0-9.]+ mm +disk [0-9]' out
+	# the disk, a level, a line per stream
+	grep -aEq '^.*[0-9.]+ of 60.0 s +disk [0-9]' out
+	grep -aEq 'force +-?[0-9.]+ N \[[#.]{10}\] of 4.03 N' out
+	grep -aEq 'depth +-?[0-9.]+ mm' out
 	grep -aEq 'tracker +12[0-9.]+' out
 	grep -aq 'marked: 7' out
 	# the view is gone at the end, and the report stands
 	tail -c 700 out | grep -aEq 'a.rec: [12]\.[0-9] s, .* 0 lost'
+}
+
+# What was on the terminal, as the views that were drawn: each has at most $1 characters in a line and
+# $2 lines. Prints the last one.
+views_fit() {
+	python3 - "$1" "$2" <<-'END'
+		import re, sys
+		columns, lines = int(sys.argv[1]), int(sys.argv[2])
+		text = open('out', encoding='utf-8', newline='').read()
+		# each view is replaced by going up, and clearing from there
+		views = re.split('(?:\x1b\\[[0-9]+A)?\r\x1b\\[J', text)
+		views = [view.replace('\r\n', '\n') for view in views if 'stream ' in view or 'force ' in view]
+		assert len(views) > 5, len(views)
+		for view in views[:-1]:
+		    rows = view.split('\n')
+		    assert len(rows) <= lines, view
+		    # the last column stays free: a line that wraps could not be replaced
+		    assert max(map(len, rows)) < columns, view
+		    assert '\x1b' not in view
+		print(views[-2])
+	END
+}
+
+@test "the live view has traces of force and depth, and fits its terminal" {
+	export LC_ALL=C.UTF-8
+	on_a_terminal 4.5:q incise capture -o a.rec --rig sim:cut_s=2,pause_s=0.6 >out
+	views_fit 80 24 >view
+	# two traces of four lines, with their axes
+	[ "$(grep -cE '^ *(-?[0-9.e]+ (N|mm))?\|.{70}$' view)" = 8 ]
+	grep -q '⠉\|⠒\|⠤\|⣀\|⠓' view
+	grep -q 'last 14 s$' view
+	grep -qE '^stream .* offset ms$' view
+	grep -qE '^m, 1-9: marker' view
+	size=52x14 on_a_terminal 2:q incise capture -o b.rec --rig sim: >out
+	views_fit 52 14 >view
+	[ "$(grep -cE '^ *(-?[0-9.e]+ (N|mm))?\|.{42}$' view)" -ge 4 ]
+	# no place for traces, and not even for all lines
+	size=30x5 on_a_terminal 1.5:q incise capture -o c.rec --rig sim: >out
+	views_fit 30 5 >view
+	! grep -q '|' view
+}
+
+@test "without UTF-8, and on Linux's console, traces are of ASCII" {
+	local values
+	for values in "C xterm" "C.UTF-8 linux"; do
+		rm -rf a.rec
+		LC_ALL=${values% *} TERM=${values#* } on_a_terminal 1.5:q incise capture -o a.rec --rig sim: >out
+		views_fit 80 24 >view
+		[ "$(grep -c '|' view)" = 8 ]
+		grep -q "|.*[.:']" view
+		# but for ± in the table
+		sed 's/±//g' view >plain
+		LC_ALL=C run ! grep '[^ -~]' plain
+	done
+}
+
+@test "in a pipe there is a line each second, on stderr" {
+	incise capture -o a.rec --rig sim: --duration 3500ms --json >out 2>err
+	holds "$(key out seconds) >= 3.5"
+	[ "$(wc -l <err)" = 3 ]
+	grep -cE '^[1-3] s: force -?[0-9]+\.[0-9]{3} N, depth -?[0-9.]+ mm; [0-9]+ force samples, [0-9]+ tracker records, 0 lost$' \
+		err | grep -qx 3
+	awk -F'[; ]+' '{ n = $9; if (n < 10000 * NR - 5000 || n > 10000 * NR + 5000) exit 1 }' err
+	# simulated time passes as fast as the machine goes: no seconds to report in
+	incise capture -o b.rec --rig $quick --duration 30s 2>err
+	[ ! -s err ]
 }
 
 @test "the key t triggers" {

@@ -2,13 +2,20 @@
 /*
  * The terminal of a running capture; see terminal.h.
  *
- *     12.3 of 60.0 s   force   0.532 N [####......]   depth   4.21 mm   disk 5.2 h
- *     stream      rate/s       rows   lost   late  jitter ms  drift ppm       offset ms
- *     force     10000.00     123456      0      0 …
+ *     12.3 of 60.0 s   disk 5.2 h
+ *     force    0.532 N [####......] of 4.03 N
+ *          1 N|⠀⠀⡠⠒⠢⡀   the last seconds
+ *          0 N|⠤⠊⠀⠀⠀⠈
+ *     depth     4.21 mm
+ *          … a trace
+ *     stream     rate/s       rows   lost   late jitter ms   drift ppm      offset ms
+ *     force    10000.00     123456      0      0 …
  *     m: marker   q: end
  */
 #include <errno.h>
 #include <fcntl.h>
+#include <langinfo.h>
+#include <locale.h>
 #include <math.h>
 #include <poll.h>
 #include <signal.h>
@@ -26,20 +33,28 @@
 
 /* --- the view ------------------------------------------------------------------------ */
 
-#define SHOW_NS 200000000LL
+#define SHOW_NS 100000000LL
+#define LINE_NS 1000000000LL /* in a pipe */
+#define READ_NS 20000000LL   /* values for the traces */
 #define BAR 10
+#define WIDTH_MOST 79  /* characters: a line of 80 would wrap */
+#define TRACE_HEIGHT 4 /* lines, where there are as many */
+#define STARTING_RANGE_N 0.1
+#define STARTING_RANGE_MM 1.0
 
 /*
  * A terminal that is stopped (Ctrl-S) or unreachable must not hold up the recording, so writes
  * do not block. It is opened again, as the shell shares the flags of the inherited one.
  */
-void capture_view_begin(void)
+void capture_view_begin(struct capture_view *view)
 {
 	int fd = isatty(STDERR_FILENO)
 			 ? open("/proc/self/fd/2",
 				O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC)
 			 : -1;
 
+	trace_begin(&view->force_N, "N", STARTING_RANGE_N);
+	trace_begin(&view->depth_mm, "mm", STARTING_RANGE_MM);
 	if (fd < 0)
 		return;
 	dup2(fd, STDERR_FILENO);
@@ -85,52 +100,156 @@ static void level(char bar[BAR + 1], double share)
 	bar[BAR] = 0;
 }
 
-static void headline(const struct capture_view *view,
-		     const struct incise_recorder_stats *stats, double seconds,
-		     char *text, size_t size)
+/* "ARMED 12.3 of 60.0 s   disk 5.2 h   tracker ENDED" */
+static void put_headline(FILE *out, const struct capture_view *view,
+			 const struct incise_recorder_stats *stats, double seconds)
 {
-	char left[32], bar[BAR + 1], camera[40] = "", of[32] = "";
+	char left[32];
 
 	time_left(left, sizeof(left), stats->disk_s);
-	level(bar, stats->force_N / view->full_scale_N);
-	if (view->depth && isfinite(stats->camera_depth_mm))
-		snprintf(camera, sizeof(camera), " (camera %.2f)",
-			 stats->camera_depth_mm);
-	else if (view->depth)
-		snprintf(camera, sizeof(camera), " (camera -)");
+	fprintf(out, "%s%.1f", stats->armed ? "ARMED " : "", seconds);
 	if (view->planned_s > 0)
-		snprintf(of, sizeof(of), " of %.1f", view->planned_s);
+		fprintf(out, " of %.1f", view->planned_s);
+	fprintf(out, " s   disk %s", left);
+	for (int i = 0; i < stats->n_streams; i++)
+		if (*stats->streams[i].ended)
+			fprintf(out, "   %s ENDED", stats->streams[i].name);
+}
+
+/* @span_s: of the trace below; 0: there is none. */
+static void put_force(FILE *out, const struct capture_view *view,
+		      const struct incise_recorder_stats *stats, double span_s)
+{
+	char bar[BAR + 1];
+
+	level(bar, stats->force_N / view->full_scale_N);
 	if (isnan(stats->zero_mV))
-		snprintf(text, size,
-			 "zero of the force: hold the tool free   depth %.2f mm",
-			 stats->depth_mm);
+		fputs("\nzero of the force: hold the tool free", out);
 	else
-		snprintf(text, size,
-			 "%s%.1f%s s   force %7.3f N [%s]   depth %6.2f mm%s%s   disk %s",
-			 stats->armed ? "ARMED " : "", seconds, of, stats->force_N, bar,
-			 stats->depth_mm, camera, stats->button ? "   button" : "", left);
+		fprintf(out, "\nforce  %7.3f N [%s] of %.3g N", stats->force_N, bar,
+			view->full_scale_N);
+	if (span_s > 0)
+		fprintf(out, "   last %.0f s", span_s);
+}
+
+static void put_depth(FILE *out, const struct capture_view *view,
+		      const struct incise_recorder_stats *stats)
+{
+	fprintf(out, "\ndepth  %7.2f mm", stats->depth_mm);
+	if (view->depth && isfinite(stats->camera_depth_mm))
+		fprintf(out, " (camera %.2f)", stats->camera_depth_mm);
+	else if (view->depth)
+		fputs(" (camera -)", out);
+	if (stats->button)
+		fputs("   button", out);
+}
+
+/* Braille where the locale has UTF-8; the font of Linux's own console has none. */
+static bool has_braille(void)
+{
+	const char *terminal = getenv("TERM");
+	locale_t locale = newlocale(LC_CTYPE_MASK, "", (locale_t)0);
+	bool has = locale && !strcmp(nl_langinfo_l(CODESET, locale), "UTF-8") &&
+		   !(terminal && !strcmp(terminal, "linux"));
+
+	if (locale)
+		freelocale(locale);
+	return has;
+}
+
+/* The lines of the terminal that are not needed otherwise, for two traces. */
+static int trace_height(int lines, const struct incise_recorder_stats *stats)
+{
+	/* Headline, force, depth, heading, streams and keys. */
+	int height = (lines - 5 - stats->n_streams) / 2;
+
+	return height < 2 ? 0 : height < TRACE_HEIGHT ? height : TRACE_HEIGHT;
+}
+
+static void draw(const struct capture_view *view,
+		 const struct incise_recorder_stats *stats, double seconds)
+{
+	bool braille = has_braille();
+	int width, lines, height;
+	char *text = NULL;
+	size_t size;
+	FILE *out = open_memstream(&text, &size);
+
+	if (!out)
+		return;
+	cli_terminal_size(&width, &lines);
+	width = width - 1 < WIDTH_MOST ? width - 1 : WIDTH_MOST;
+	height = trace_height(lines, stats);
+	put_headline(out, view, stats, seconds);
+	put_force(out, view, stats, height ? trace_span_s(width) : 0);
+	if (height)
+		trace_put(&view->force_N, width, height, braille, out);
+	put_depth(out, view, stats);
+	if (height)
+		trace_put(&view->depth_mm, width, height, braille, out);
+	fprintf(out, "\n%s", stream_heading);
+	for (int i = 0; i < stats->n_streams; i++) {
+		char line[200];
+
+		stream_line(&stats->streams[i], line, sizeof(line));
+		fprintf(out, "\n%s", line);
+	}
+	fprintf(out, "\nm, 1-9: marker   %sq: end   %s",
+		stats->armed ? "t: trigger   " : "", view->last);
+	if (!fclose(out))
+		cli_progress("%s", text);
+	free(text);
+}
+
+/* "12 s: force 0.532 N, depth 4.21 mm; 120000 force samples, 1440 tracker records, 0 lost" */
+static void put_line(const struct capture_view *view,
+		     const struct incise_recorder_stats *stats, double seconds)
+{
+	char force[40] = "zero not known";
+
+	if (!isnan(stats->zero_mV))
+		snprintf(force, sizeof(force), "%.3f N", stats->force_N);
+	fprintf(stderr,
+		"%s%.0f s: force %s, depth %.2f mm; %llu force samples, %llu tracker records",
+		stats->armed ? "armed " : "", seconds, force, stats->depth_mm,
+		(unsigned long long)stats->force, (unsigned long long)stats->tracker);
+	if (stats->n_streams > 2)
+		fprintf(stderr, ", %llu frames", (unsigned long long)stats->frames);
+	fprintf(stderr, ", %llu lost%s%s\n",
+		(unsigned long long)(stats->force_lost + stats->tracker_lost +
+				     stats->frames_lost),
+		*view->last ? "; " : "", view->last);
 }
 
 void capture_view_show(struct capture_view *view, const struct incise_recorder *recorder,
 		       double seconds)
 {
-	struct incise_recorder_stats stats;
-	char top[200], lines[INCISE_STREAMS_MAX][200] = {{0}};
 	int64_t now_ns = (int64_t)stopwatch_ns();
+	bool terminal = isatty(STDERR_FILENO);
+	struct incise_recorder_stats stats;
 
-	if (now_ns - view->shown_ns < SHOW_NS)
+	if (!terminal && (!view->live || now_ns - view->line_ns < LINE_NS))
+		return;
+	if (terminal && now_ns - view->read_ns < READ_NS)
+		return;
+	view->read_ns = now_ns;
+	incise_recorder_stats(recorder, &stats);
+	if (!terminal) {
+		/* The first one is after a second. */
+		if (view->line_ns)
+			put_line(view, &stats, seconds);
+		/* Whole seconds, of which some may have passed meanwhile. */
+		view->line_ns = view->line_ns
+					? now_ns - (now_ns - view->line_ns) % LINE_NS
+					: now_ns;
+		return;
+	}
+	trace_add(&view->force_N, seconds, isnan(stats.zero_mV) ? NAN : stats.force_N);
+	trace_add(&view->depth_mm, seconds, stats.tracker ? stats.depth_mm : NAN);
+	if (now_ns - view->shown_ns < SHOW_NS || !terminal_ready())
 		return;
 	view->shown_ns = now_ns;
-	if (!terminal_ready())
-		return;
-	incise_recorder_stats(recorder, &stats);
-	headline(view, &stats, seconds, top, sizeof(top));
-	for (int i = 0; i < stats.n_streams; i++)
-		stream_line(&stats.streams[i], lines[i], sizeof(lines[i]));
-	cli_progress("%s\n%s\n%s\n%s\n%s%sm, 1-9: marker   %sq: end   %s", top,
-		     stream_heading, lines[0], lines[1], lines[2],
-		     stats.n_streams > 2 ? "\n" : "", stats.armed ? "t: trigger   " : "",
-		     view->last);
+	draw(view, &stats, seconds);
 }
 
 /*

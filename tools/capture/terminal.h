@@ -9,21 +9,28 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <incise/recorder.h>
+#include "trace.h"
 
 struct capture_view {
 	double planned_s;    /* 0: not known */
 	double full_scale_N; /* of the force channel, for its level */
 	bool depth;	     /* vision measures the depth */
-	char last[80];	     /* the last marker */
-	int64_t shown_ns;
+	bool live;     /* its clock is real: in a pipe there is a line each second */
+	char last[80]; /* the last marker */
+	int64_t shown_ns, read_ns, line_ns;
+	struct trace force_N, depth_mm;
 };
 
-/* Draw at most five times a second; @seconds: since the recording, or waiting, started. */
+/*
+ * On a terminal draw at most ten times a second: traces of the last seconds, and the streams.
+ * Otherwise print a line each second on stderr. @seconds: since the recording, or waiting,
+ * started.
+ */
 void capture_view_show(struct capture_view *view, const struct incise_recorder *recorder,
 		       double seconds);
 
 /* From begin to end no write to the terminal waits for it. */
-void capture_view_begin(void);
+void capture_view_begin(struct capture_view *view);
 void capture_view_end(void);
 
 /*

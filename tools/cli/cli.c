@@ -726,13 +726,44 @@ void cli_progress_forget(void)
 	status_above = 0;
 }
 
+/* Go to the first of the status lines, and clear from there. */
+static void put_progress_end(FILE *out)
+{
+	if (status_line && status_above)
+		fprintf(out, "\033[%dA", status_above);
+	if (status_line)
+		fputs("\r\033[J", out);
+	status_line = false;
+	status_above = 0;
+}
+
+void cli_terminal_size(int *columns, int *lines)
+{
+	struct winsize window = {0};
+
+	ioctl(STDERR_FILENO, TIOCGWINSZ, &window);
+	*columns = window.ws_col ? window.ws_col : 80;
+	*lines = window.ws_row ? window.ws_row : 24;
+}
+
+/* Bytes of at most so many characters of a line in UTF-8, each a column wide. */
+static int bytes_of(const char *line, int characters)
+{
+	int n = 0;
+
+	for (; line[n] && line[n] != '\n'; n++)
+		if ((line[n] & 0xc0) != 0x80 && !characters--)
+			break;
+	return n;
+}
+
 void cli_progress(const char *fmt, ...)
 {
+	char *text, *shown = NULL;
+	int columns, lines;
 	va_list args;
-
-	char text[4096], *line = text, *end;
-	struct winsize window;
-	int columns = 80, rows = 24;
+	size_t size;
+	FILE *out;
 
 	if (!isatty(STDERR_FILENO))
 		return;
@@ -741,26 +772,27 @@ void cli_progress(const char *fmt, ...)
 		return;
 	}
 	va_start(args, fmt);
-	vsnprintf(text, sizeof(text), fmt, args);
+	if (vasprintf(&text, fmt, args) < 0)
+		text = NULL;
 	va_end(args);
-	if (!ioctl(STDERR_FILENO, TIOCGWINSZ, &window) && window.ws_col) {
-		columns = window.ws_col;
-		rows = window.ws_row ? window.ws_row : rows;
-	}
-	cli_progress_end();
+	out = open_memstream(&shown, &size);
+	if (!text || !out)
+		cli_fail("out of memory");
+	cli_terminal_size(&columns, &lines);
+	put_progress_end(out);
 	/* A line that wraps, or scrolled off the top, could not be overwritten. */
-	for (;; line = end + 1) {
-		size_t length = strcspn(line, "\n");
-
-		end = line + length;
-		fprintf(stderr, "%.*s",
-			length < (size_t)columns ? (int)length : columns - 1, line);
-		if (!*end || status_above + 1 >= rows)
+	for (const char *line = text;; line += strcspn(line, "\n") + 1) {
+		fprintf(out, "%.*s", bytes_of(line, columns - 1), line);
+		if (!line[strcspn(line, "\n")] || status_above + 1 >= lines)
 			break;
-		fputc('\n', stderr);
+		fputc('\n', out);
 		status_above++;
 	}
+	if (fclose(out))
+		cli_fail("out of memory");
+	fputs(shown, stderr);
 	fflush(stderr);
+	free(shown), free(text);
 	status_line = true;
 }
 
@@ -777,12 +809,7 @@ void cli_progress_bar(const char *name, double share, int *percent)
 
 void cli_progress_end(void)
 {
-	if (status_line && status_above)
-		fprintf(stderr, "\033[%dA", status_above);
-	if (status_line)
-		fputs("\r\033[J", stderr);
-	status_line = false;
-	status_above = 0;
+	put_progress_end(stderr);
 }
 
 static void on_signal(int number)

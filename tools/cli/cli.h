@@ -232,7 +232,13 @@ char *cli_text(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
 bool cli_ends_with(const char *text, const char *end);
 
-/* Replace the status lines on stderr; does nothing if that is not a terminal. */
+/* Columns and lines of the terminal at stderr; 80 and 24 where they are not known. */
+void cli_terminal_size(int *columns, int *lines);
+
+/*
+ * Replace the status lines on stderr, UTF-8, by one write, cut to the terminal's size; does nothing
+ * if that is not a terminal.
+ */
 void cli_progress(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
 /* A bar of it, redrawn only when *percent changes; starts with -1. */
