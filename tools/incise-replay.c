@@ -114,9 +114,10 @@ static void draw_plot(struct plot *plot)
 	int n = 0;
 
 	plot_data_end(plot->data, plot->folder);
-	script = plot_begin(plot->folder, plot->name, 1000, 720);
+	script = plot_begin(plot->folder, plot->name, 1000, 740);
 	fprintf(script,
-		"set multiplot layout 2,1 margins screen 0.08,0.98,0.15,0.9 spacing 0,0.14 "
+		"layout = panels(80, 20, below(1), above(1), 0, between)\n"
+		"set multiplot layout 2,1 @layout "
 		"title 'Recording replayed through the scene'\n"
 		"data = '%s'\nset xlabel 'time / s'\nset key off\nset autoscale xfix\n"
 		"set title '(a) force'\nset ylabel 'force / N'\n",

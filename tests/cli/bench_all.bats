@@ -151,6 +151,11 @@ report_of() {
 	done <named
 }
 
+@test "its figures can be printed: no text is cut, none overlaps, axes are quantity / unit" {
+	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the pictures"
+	python3 "$BATS_TEST_DIRNAME/figures.py" "$r"/pictures/*.svg
+}
+
 @test "no number is missing by its name, and nothing comes from elsewhere" {
 	python3 "$BATS_TEST_DIRNAME/report_cells.py" "$r/report.md" >cells
 	run ! grep -iwE '^[+-]?(nan|null|inf)$|^null| null' cells

@@ -446,6 +446,6 @@ const struct bench bench_extremes = {
 	.run = run_extremes,
 	.plots = {{.script = text_extremes_gp,
 		   .width = 900,
-		   .height = 840,
+		   .height = 860,
 		   .data = {&stiff, "path"}}},
 };

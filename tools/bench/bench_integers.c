@@ -310,6 +310,6 @@ const struct bench bench_integers = {
 	.run = run_integers,
 	.plots = {{.script = text_integers_gp,
 		   .width = 900,
-		   .height = 480,
+		   .height = 500,
 		   .data = {&bench_points, "block"}}},
 };

@@ -864,11 +864,11 @@ const struct bench bench_pose = {
 	.run = run,
 	.plots = {{.script = text_pose_gp,
 		   .width = 1000,
-		   .height = 760,
+		   .height = 800,
 		   .data = {&rows_table, "panel,name", "delay_ms=4"}},
 		  {.suffix = "rates",
 		   .script = text_pose_gp,
 		   .width = 1000,
-		   .height = 760,
+		   .height = 800,
 		   .data = {&rows_table, "panel,name", "delay_ms=4"}}},
 };

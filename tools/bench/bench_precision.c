@@ -513,6 +513,6 @@ const struct bench bench_precision = {
 	.run = run,
 	.plots = {{.script = text_precision_gp,
 		   .width = 1000,
-		   .height = 700,
+		   .height = 720,
 		   .data = {&rows_table, "kind", "failed="}}},
 };

@@ -696,6 +696,6 @@ const struct bench bench_scenes = {
 		   .width = 900,
 		   .height = 46,
 		   .down = "name",
-		   .margin = 160,
+		   .margin = 180,
 		   .data = {&table, "", "measured=1"}}},
 };

@@ -547,11 +547,11 @@ const struct bench bench_timeline = {
 	.run = run,
 	.plots = {{.script = text_timeline_gp,
 		   .width = 1000,
-		   .height = 620,
+		   .height = 640,
 		   .data = {&rows_table, "late,name", "drift_ppm=200"}},
 		  {.suffix = "windows",
 		   .script = text_timeline_gp,
 		   .width = 1000,
-		   .height = 620,
+		   .height = 660,
 		   .data = {&rows_table, "late,name", "drift_ppm=200"}}},
 };

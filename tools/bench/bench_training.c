@@ -503,6 +503,6 @@ const struct bench bench_training = {
 	.run = run,
 	.plots = {{.script = text_training_gp,
 		   .width = 1000,
-		   .height = 700,
+		   .height = 720,
 		   .data = {&rows_table, "kind", "failed="}}},
 };

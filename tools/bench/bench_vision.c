@@ -246,6 +246,6 @@ const struct bench bench_vision = {
 	.run = run,
 	.plots = {{.script = text_vision_gp,
 		   .width = 1000,
-		   .height = 700,
+		   .height = 720,
 		   .data = {&rows_table, "region", "failed="}}},
 };

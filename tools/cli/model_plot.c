@@ -91,7 +91,7 @@ void model_plot_write_functions(const struct incise_model *model, const char *fo
 }
 
 /* A panel's plot is about that wide, and a character of a name is at most about that wide. */
-#define PLOT_WIDTH 350.0
+#define PLOT_WIDTH 320.0
 #define CHARACTER_WIDTH 7.5
 
 /* A name above the peak of its function, its words below each other: '_' ends a line. */
@@ -145,12 +145,20 @@ static bool peaks_fit(const struct peak *peak, int n)
 	return true;
 }
 
+#define NAME_SHOWN \
+	16 /* characters of a name; more is cut, as a legend takes the plot's place */
+
 /* As a string of gnuplot in double quotes; @space for '_'. */
 static void put_name(FILE *script, const char *name, const char *space)
 {
+	int n = 0;
+
 	fputc('"', script);
 	for (const char *c = name; *c; c++)
-		if (*c == '_')
+		if ((*c & 0xc0) != 0x80 && ++n > NAME_SHOWN) {
+			fputs("…", script);
+			break;
+		} else if (*c == '_')
 			fputs(space, script);
 		else
 			fputc(strchr("\"\\\n\r`", *c) ? ' ' : *c, script);

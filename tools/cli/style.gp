@@ -13,9 +13,11 @@ large = font.',15'
 set encoding utf8
 if (ext eq 'svg') { set terminal svg size figure_width, figure_height font font.',14' linewidth 1.2 background paper }
 if (ext eq 'png') { set terminal pngcairo size 2 * figure_width, 2 * figure_height font font.',14' fontscale 1.5 \
-	linewidth 2.4 pointscale 2 }
+	linewidth 2.4 pointscale 2.6 }
 if (ext eq 'pdf') { set terminal pdfcairo size figure_width / 96.0, figure_height / 96.0 font font.',14' \
-	fontscale 0.75 linewidth 1.2 pointscale 0.75 }
+	fontscale 0.75 linewidth 1.2 pointscale 0.95 }
+# px from one line of text to the next: gnuplot places the lines of an SVG farther apart.
+line_px = ext eq 'svg' ? 21.0 : 17.0
 
 # Okabe and Ito's colours, which colour-blind readers tell apart, each with a marker of its own: a
 # printed page without colour still shows which series is which. Yellow is too pale for lines.
@@ -28,14 +30,14 @@ green = '#009E73'
 purple = '#CC79A7'
 orange = '#E69F00'
 sky = '#56B4E9'
-set linetype 1 lc rgb blue lw 1.5 pt 7 ps 0.7
-set linetype 2 lc rgb vermillion lw 1.5 pt 5 ps 0.65
-set linetype 3 lc rgb green lw 1.5 pt 9 ps 0.8
-set linetype 4 lc rgb purple lw 1.5 pt 13 ps 0.9
-set linetype 5 lc rgb orange lw 1.5 pt 11 ps 0.8
-set linetype 6 lc rgb sky lw 1.5 pt 6 ps 0.8
-set linetype 7 lc rgb ink lw 1.5 pt 4 ps 0.7
-set linetype 8 lc rgb grey lw 1.5 pt 2 ps 0.8
+set linetype 1 lc rgb blue lw 1.5 pt 7 ps 0.56
+set linetype 2 lc rgb vermillion lw 1.5 pt 5 ps 0.52
+set linetype 3 lc rgb green lw 1.5 pt 9 ps 0.64
+set linetype 4 lc rgb purple lw 1.5 pt 13 ps 0.72
+set linetype 5 lc rgb orange lw 1.5 pt 11 ps 0.64
+set linetype 6 lc rgb sky lw 1.5 pt 6 ps 0.64
+set linetype 7 lc rgb ink lw 1.5 pt 4 ps 0.56
+set linetype 8 lc rgb grey lw 1.5 pt 2 ps 0.64
 set linetype cycle 8
 colour(k) = word(blue.' '.vermillion.' '.green.' '.purple.' '.orange.' '.sky.' '.ink.' '.grey, (k - 1) % 8 + 1)
 
@@ -59,12 +61,23 @@ set y2label noenhanced
 set zlabel noenhanced
 set cblabel noenhanced
 set key noautotitle noenhanced Left reverse samplen 2 spacing 1.15 height 0.3
-# One key below the axis of a plot, and below the panels of several: `eval key_below`, and
-# `eval key_panel` behind the last panel, followed by a plot of NaN with the titles.
+# Panels with margins in px: above(n) for a title of n lines and a title of each panel, below(rows)
+# for tics, label and a key of so many rows, between for the tics, label and title of two panels.
+above(n) = (n + 2.6) * line_px
+below(rows) = (3.1 + 1.3 * rows) * line_px + 8
+between = 5.8 * line_px
+panels(left, right, bottom, top, across, down) = sprintf("margins screen %.5f,%.5f,%.5f,%.5f \
+spacing screen %.5f,%.5f", 1.0 * left / figure_width, 1 - 1.0 * right / figure_width, 1.0 * bottom / figure_height, \
+	1 - 1.0 * top / figure_height, 1.0 * across / figure_width, 1.0 * down / figure_height)
+
+# One key below the axis of a plot, and below the panels of several: `eval key_below`, or for more
+# rows `key_rows = 2; eval key_below`; and `eval key_panel` behind the last panel, followed by a
+# plot of NaN with the titles.
+key_rows = 1
 key_at = 'set key on at screen 0.5, screen 8.0 / figure_height center bottom horizontal'
-key_below = 'set bmargin at screen 110.0 / figure_height; '.key_at
+key_below = 'set bmargin at screen below(key_rows) / figure_height; '.key_at
 key_panel = 'set lmargin at screen 0.01; set rmargin at screen 0.99; set bmargin at screen 0; \
-	set tmargin at screen 60.0 / figure_height; unset logscale; unset xlabel; unset ylabel; unset title; \
+	set tmargin at screen 3.0 * line_px / figure_height; unset logscale; unset xlabel; unset ylabel; unset title; \
 	unset tics; unset border; unset grid; unset label; unset arrow; unset object; \
 	set xrange [0:1]; set yrange [0:1]; '.key_at
 
@@ -84,7 +97,7 @@ words_of(s) = strstrt(s, '_') ? s[:strstrt(s, '_') - 1].' '.words_of(s[strstrt(s
 # Names next to points, of which none covers another, a marker or an error bar. A script fixes the
 # ranges and the plot's margins with `eval name_margins`, adds each point with name_point(), and
 # places all with `eval name_points`: each name tries distances and directions around its point.
-name_left = 90.0; name_right = 20.0; name_top = 75.0; name_bottom = 105.0 # px
+name_left = 90.0; name_right = 20.0; name_top = 3.4 * line_px + 14; name_bottom = below(1) # px
 name_margins = 'set lmargin at screen name_left / figure_width; set rmargin at screen 1 - name_right / figure_width; \
 	set bmargin at screen name_bottom / figure_height; set tmargin at screen 1 - name_top / figure_height; \
 	name_width = figure_width - name_left - name_right; name_height = figure_height - name_top - name_bottom; \

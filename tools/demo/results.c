@@ -266,8 +266,9 @@ static void figure_force(const struct demo *demo)
 		fputs("\n\n", data);
 	}
 	plot_data_end(data, demo->folder);
-	script = plot_begin(demo->folder, "fig2-force", 1000, 720);
-	fputs("set multiplot layout 2,1 title 'Cutting force of the simulated liver "
+	script = plot_begin(demo->folder, "fig2-force", 1000, 740);
+	fputs("layout = panels(80, 20, below(0), above(1), 0, between)\n"
+	      "set multiplot layout 2,1 @layout title 'Cutting force of the simulated liver "
 	      "(compare figure 2 of Song et al., 2006)'\n"
 	      "set autoscale fix\nset offsets 0, 0, graph 0.14, graph 0.03\n"
 	      "set xlabel 'time in the recording / s'\nset ylabel 'force / N'\n"
@@ -377,10 +378,11 @@ static void figure_prediction(const struct demo *demo)
 	if (contact < 0)
 		fputs("0 0 0\n", data);
 	plot_data_end(data, demo->folder);
-	script = plot_begin(demo->folder, "fig5-prediction", 1000, 720);
+	script = plot_begin(demo->folder, "fig5-prediction", 1000, 740);
 	/* One time axis: that of the cut, whatever the loop ran on for. */
 	fprintf(script,
-		"set multiplot layout 2,1 margins screen 0.08,0.98,0.15,0.86 spacing 0,0.14 "
+		"layout = panels(80, 20, below(1), above(1), 0, between)\n"
+		"set multiplot layout 2,1 @layout "
 		"title 'New cut at 5 mm (compare figure 5 of Song et al., 2006)'\n"
 		"set xlabel 'time in the cut / s'\nset ylabel 'force / N'\nset key off\n"
 		"set xrange [0:%.4f]\nset yrange [0:*]\nset ytics 0.1\n"
@@ -479,7 +481,7 @@ static void annotate(FILE *script, const struct incise_vision_result *r, double 
 		e[0] + 150 * a[1], e[1] - 150 * a[0], e[0] - 150 * a[1],
 		e[1] + 150 * a[0], e[0] + 155, e[1] - 14);
 	fprintf(script,
-		"set arrow from %.1f,%.1f to %.1f,%.1f heads size 8,20 lc rgb sky lw 2 front\n"
+		"set arrow from %.1f,%.1f to %.1f,%.1f heads size 8,20 dt 1 lc rgb sky lw 2 front\n"
 		"set label \"exposed length\\n%.1f px = %.2f mm\" at %.1f,%.1f left front "
 		"tc rgb paper\n",
 		e[0] + aside, e[1] - aside * a[0], e[0] + aside - up * a[0],

@@ -18,8 +18,8 @@ do for [path in data_path] {
 	set arrow n from STATS_max, graph 0 to STATS_max, graph 1 nohead dt 2 lw 1 lc rgb colour(n) back
 	set label n sprintf("limit of the %s", path) at STATS_max, graph 1.06 center tc rgb colour(n) font small
 }
-set multiplot layout 3,1 margins screen 90.0 / figure_width, 1 - 20.0 / figure_width, \
-	90.0 / figure_height, 1 - 80.0 / figure_height spacing screen 0, 40.0 / figure_height \
+layout = panels(90, 20, below(1), above(1), 0, 40)
+set multiplot layout 3,1 @layout \
 	title "Stiff walls: 50 g, 0.01 N s/mm, pressed by 1 N, behind a limit of 4 N; 12 s at 1 kHz" noenhanced
 set logscale xy
 set format x ''

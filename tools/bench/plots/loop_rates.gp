@@ -13,8 +13,8 @@ stats data using (1e-3 * column("ns_per_s")) prefix "fast" nooutput
 stats data using "rate_hz" prefix "rate" nooutput
 low = (hold_min < good_min ? hold_min : good_min) / 1.4
 high = (bad_max > good_max ? bad_max : good_max) * 1.4
-set multiplot layout 1,2 margins screen 80.0 / figure_width, 1 - 20.0 / figure_width, \
-	150.0 / figure_height, 1 - 50.0 / figure_height spacing screen 40.0 / figure_width, 0 \
+layout = panels(80, 20, below(4), 1.8 * line_px + 10, 40, 0)
+set multiplot layout 1,2 @layout \
 	title "Error of the force in a cut of some 3 N, compared with the exact force of a plain wall" noenhanced
 set logscale xy
 set yrange [low:high]

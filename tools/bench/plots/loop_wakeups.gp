@@ -2,9 +2,9 @@
 # Lateness of the loop and of cyclictest: a column of histograms for each rate.
 both = strstrt(data_blocks, "cyclictest") > 0
 rows = words(data_load)
-set multiplot layout rows,words(data_rate_hz) columnsfirst margins screen 90.0 / figure_width, \
-	1 - 20.0 / figure_width, (both ? 110.0 : 70.0) / figure_height, 1 - 100.0 / figure_height \
-	spacing screen 40.0 / figure_width, 75.0 / figure_height title sprintf("Lateness of the loop's \
+layout = panels(90, 20, below(both), above(2) + line_px, 40, 4.4 * line_px)
+set multiplot layout rows,words(data_rate_hz) columnsfirst @layout \
+	title sprintf("Lateness of the loop's \
 wake-ups%s\n%s, %.3g s each", both ? ", and of cyclictest next to it" : "", policy, seconds) noenhanced
 stats more using (column("y") > 0 ? column("x") : NaN) nooutput
 set logscale xy

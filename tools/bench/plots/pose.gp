@@ -16,8 +16,8 @@ if (!rates) {
 	stats data using "ns_p5" prefix "fast" nooutput
 	stats data using "ns_p95" prefix "slow" nooutput
 }
-set multiplot layout 2,3 margins screen 80.0 / figure_width, 1 - 10.0 / figure_width, \
-	60.0 / figure_height, 1 - 75.0 / figure_height spacing screen 30.0 / figure_width, 80.0 / figure_height \
+layout = panels(80, 10, below(0), above(1), 30, between)
+set multiplot layout 2,3 @layout \
 	title sprintf("Error of the shown pose over %s: tracker %g ms late, with %g mm of noise and %g %% lost", \
 	rates ? "the tracker's rate" : "its cost", delay_ms, noise_mm, lost * 100) noenhanced
 set logscale xy
@@ -59,7 +59,7 @@ set key at graph 0.05, 0.9 top left spacing 1.3
 set xrange [0:1]
 set yrange [0:1]
 if (!rates) {
-	set label 1 "bars: 5 to 95 % of the runs\nlarger markers: faster tracker,\n60 to 1000 Hz" at graph 0.06, 0.17 font small
+	set label 1 "bars: 5 to 95 % of the runs\nlarger markers: faster tracker,\n60 to 1000 Hz" at graph 0.06, 0.1 font small
 }
 plot for [k=1:methods] NaN with linespoints ls 10+k ps 0.8 title title(k)
 unset multiplot

@@ -17,6 +17,7 @@ x0 = fast_min / 1.3
 x1 = slow_max * 1.3
 y0 = good_min / 10
 y1 = (bound_max > bad_max ? bound_max : bad_max) * 10
+name_bottom = below(2)
 eval name_margins
 x(key) = log_place(column(key), x0, x1)
 y(key) = log_place(error(key), y0, y1)

@@ -20,7 +20,7 @@ set offsets 0, graph 0.12, 0, 0
 set ytics nomirror scale 0
 set grid noytics
 eval key_below
-set tmargin at screen 1 - 60.0 / figure_height
+set tmargin at screen 1 - (2.4 * line_px + 10) / figure_height
 set lmargin at screen 160.0 / figure_width
 set rmargin at screen counted ? 0.58 : 1 - 20.0 / figure_width
 set style fill solid noborder

@@ -4,8 +4,8 @@
 n = words(data_guard)
 wide(k) = 1.2 + 0.9 * (n - k)
 large(k) = 0.8 + 0.18 * (n - k)
-set multiplot layout 1,2 margins screen 70.0 / figure_width, 1 - 20.0 / figure_width, \
-	100.0 / figure_height, 1 - 75.0 / figure_height spacing screen 80.0 / figure_width, 0 \
+layout = panels(80, 20, below(2), above(1), 90, 0)
+set multiplot layout 1,2 @layout \
 	title "Guards in the real plan, with a late tracker and a late actuator" noenhanced
 set xrange [0.95:2.05]
 set xlabel 'gain relative to the largest accepted / 1'

@@ -4,8 +4,8 @@ names = "explicit_euler semi_implicit_euler implicit_euler trapezoid rk4 exact_z
 titles = "'explicit Euler' 'semi-implicit Euler' 'implicit Euler' trapezoid RK4 \
 'exact, matrix (ZOH)' 'exact, plant with events'"
 diverged = 10 # its place on the axis
-set multiplot layout 1,3 margins screen 80.0 / figure_width, 1 - 20.0 / figure_width, \
-	135.0 / figure_height, 1 - 75.0 / figure_height spacing screen 30.0 / figure_width, 0 \
+layout = panels(95, 30, below(3), above(1), 30, 0)
+set multiplot layout 1,3 @layout \
 	title "Integrators of a mass on a spring: 50 g, damping ratio 0.1" noenhanced
 stats data using "ns_per_ms" nooutput
 stats more using "K_N_m" prefix "K" nooutput
@@ -38,5 +38,6 @@ set format x power
 plot for [i=1:7] more index word(names, i) using "K_N_m":(error(diverged)) \
 	with linespoints lt i
 eval key_panel
+set key maxcols 3
 plot for [i=1:7] NaN with linespoints lt i title word(titles, i)
 unset multiplot

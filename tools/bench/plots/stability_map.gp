@@ -2,8 +2,8 @@
 # Largest stable stiffness: a panel for each damping of the wall, a curve for each delay.
 least = 1e-4
 n = words(data_BT_m)
-set multiplot layout 1,n margins screen 80.0 / figure_width, 1 - 20.0 / figure_width, \
-	100.0 / figure_height, 1 - 95.0 / figure_height spacing screen 25.0 / figure_width, 0 \
+layout = panels(80, 20, below(1), above(2), 25, 0)
+set multiplot layout 1,n @layout \
 	title "Largest stable stiffness of a sampled wall, stable below\n\
 lines: computed; markers: simulated; triangle downward: no stiffness is stable" noenhanced
 set logscale xy

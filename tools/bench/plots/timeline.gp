@@ -7,8 +7,8 @@ do for [k=1:8] {
 	set style line 10+k lc rgb colour(int(word(order, k))) lw k == 6 || k == 8 ? 2.2 : 1.2 \
 		pt int(word('2 11 5 9 13 7 4 6', k))
 }
-set multiplot layout 1,3 margins screen 90.0 / figure_width, 1 - 20.0 / figure_width, \
-	(windows ? 150.0 : 130.0) / figure_height, 1 - 95.0 / figure_height spacing screen 30.0 / figure_width, 0 \
+layout = panels(90, 20, below(3), above(2), 30, 0)
+set multiplot layout 1,3 @layout \
 	title sprintf("Error of acquisition times over %s\n%d Hz by a clock that is off by %g ppm, up to %d ms late%s", \
 	windows ? "the length of the recording" : "their cost", rate_hz, drift_ppm, late_ms, windows ? "" : \
 	"; larger markers: 1 to 120 s seen; bars: 5 to 95 %") noenhanced
@@ -51,6 +51,7 @@ do for [i=1:words(data_late)] {
 	set format y ''
 }
 eval key_panel
+set key maxcols 4
 plot for [k=1:8] NaN with linespoints ls 10+k ps 0.8 title words_of(word(data_name, k)), \
 	for [k=6:5 + 3 * windows] NaN with lines ls 10+k dt 3 title words_of(word(data_name, k)).', stated'
 unset multiplot

@@ -6,8 +6,8 @@ titles = "'rms error of sRGB values (0 to 255) / 1' '1 − structural similarity
 # Where two are the same to the last digit there is no place of 0.
 place(x) = x > 1e-6 ? x : 1e-6
 error(k) = place(k == 1 ? column("rms_error") : 1 - column("ssim"))
-set multiplot layout 1,2 margins screen 80.0 / figure_width, 1 - 20.0 / figure_width, \
-	110.0 / figure_height, 1 - 75.0 / figure_height spacing screen 90.0 / figure_width, 0 \
+layout = panels(80, 20, below(1), 2.8 * line_px + 10, 90, 0)
+set multiplot layout 1,2 @layout \
 	title sprintf("Shown image of a bleeding cut, compared with a texture of %d² drawn at that very moment\n\
 markers, small to large: 15, 30 and 60 frames per second", word(data_texture_px, n) + 0) noenhanced
 set key off
