@@ -19,9 +19,9 @@
 #include "cli/json.h"
 #include "cli/plan_report.h"
 #include "cli/stream_report.h"
-#include "cli/model_plot.h"
 #include "cli/plot.h"
 #include "cli/recording.h"
+#include "plot/figure.h"
 #include "stepper/module.h"
 
 struct job {
@@ -208,7 +208,9 @@ static void show_model(const char *path, bool json, const char *plot)
 		model_text(model, fixed, refused.text);
 	cli_finish();
 	if (plot)
-		model_plot_draw(model, folder, name);
+		plot_draw_or_fail(figure_of_model(&(struct figure){
+					  .path = path, .folder = folder, .name = name}),
+				  folder, name);
 	incise_fixed_free(fixed);
 	incise_model_free(model);
 }

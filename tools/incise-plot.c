@@ -43,7 +43,7 @@ static void parse_range(void *whole, char *text)
 
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
-	 "the file to write: NAME.png or NAME.svg (default: a window)",
+	 "the file to write: NAME.png, .svg or .pdf (default: a window)",
 	 CLI_OUTPUT(struct job, output)},
 	{0, "range", "TIME..TIME",
 	 "of a recording: the part to draw, such as 2s..4.5s, 90s..\n"
@@ -56,7 +56,7 @@ static const struct cli_option options[] = {
 
 static const struct cli_command command = {
 	.name = "plot",
-	.synopsis = "FILE [-o NAME.png|NAME.svg] [OPTIONS]",
+	.synopsis = "FILE [-o NAME.png] [OPTIONS]",
 	.summary =
 		"Draw a recording, a dataset, a model (.fis, .fx), a session or a calibration.\n"
 		"The kind of the file is recognised by its content.",
@@ -103,7 +103,7 @@ static const struct drawn *find_drawn(const char *path)
 
 /* --- the figure as a file or a window ---------------------------------------------------- */
 
-static char *folder; /* of the figure */
+static char folder[4096]; /* of data and script, for a while */
 
 static void remove_folder(void)
 {
@@ -112,11 +112,14 @@ static void remove_folder(void)
 
 static const char *form_of(const char *output)
 {
-	if (cli_ends_with(output, ".png"))
-		return "png";
-	if (cli_ends_with(output, ".svg"))
-		return "svg";
-	cli_usage("-o: '%s' has no extension of a figure; give NAME.png or NAME.svg",
+	static const char *const forms[] = {"png", "svg", "pdf"};
+	const char *dot = strrchr(output, '.');
+
+	for (size_t i = 0; i < sizeof(forms) / sizeof(*forms) && dot; i++)
+		if (!strcmp(dot + 1, forms[i]))
+			return forms[i];
+	cli_usage("-o: '%s' has no extension of a figure; give NAME.png, NAME.svg or "
+		  "NAME.pdf",
 		  output);
 }
 
@@ -127,11 +130,11 @@ static const char *window_form(void)
 
 	if (!getenv("DISPLAY") && !getenv("WAYLAND_DISPLAY"))
 		cli_fail(
-			"there is no display for a window; give -o NAME.png or NAME.svg");
+			"there is no display for a window; give -o NAME.png, .svg or .pdf");
 	form = plot_window();
 	if (!form)
 		cli_fail(
-			"this gnuplot opens no windows; give -o NAME.png or NAME.svg, or "
+			"this gnuplot opens no windows; give -o NAME.png, .svg or .pdf, or "
 			"apt-get install gnuplot-qt");
 	return form;
 }
@@ -146,7 +149,12 @@ static void parse(struct job *job, int argc, char **argv)
 
 int main(int argc, char **argv)
 {
-	struct job job = {.figure = {.from_s = -INFINITY, .to_s = INFINITY}};
+	struct job job = {.figure = {
+				  .from_s = -INFINITY,
+				  .to_s = INFINITY,
+				  .folder = folder,
+				  .name = "figure",
+			  }};
 	const struct drawn *kind;
 	const char *form;
 	FILE *script;
@@ -164,12 +172,11 @@ int main(int argc, char **argv)
 	if (!form)
 		form = window_form();
 	cli_catch_signals();
-	folder_make(job.figure.folder, sizeof(job.figure.folder), "for a figure");
-	folder = job.figure.folder;
+	folder_make(folder, sizeof(folder), "for a figure");
 	atexit(remove_folder);
 	plot_folder(folder);
 	script = kind->draw(&job.figure);
-	plot_draw_form(script, folder, FIGURE_NAME, form, job.output);
+	plot_draw_form(script, folder, job.figure.name, form, job.output);
 	if (job.output)
 		printf("wrote %s\n", job.output);
 	cli_finish();

@@ -124,12 +124,16 @@ shows() {
 	shows "m.fx: 288 rows"
 }
 
-@test "PNG and SVG follow from the extension, others are refused" {
+@test "PNG, SVG and PDF follow from the extension, others are refused" {
 	run -0 --separate-stderr incise plot m.fis -o a.png
 	[ "$output" = "wrote a.png" ] && [ -z "$stderr" ]
 	[ "$(od -An -c -N 4 a.png | tr -d ' ')" = '211PNG' ]
-	run -2 --separate-stderr incise plot m.fis -o a.pdf
-	bad_usage "-o: 'a.pdf' has no extension of a figure; give NAME.png or NAME.svg"
+	incise plot m.fis -o a.pdf
+	[ "$(head -c 5 a.pdf)" = %PDF- ]
+	for name in a.eps png a; do
+		run -2 --separate-stderr incise plot m.fis -o $name
+		bad_usage "-o: '$name' has no extension of a figure; give NAME.png, NAME.svg or NAME.pdf"
+	done
 	run --separate-stderr incise plot m.fis -o a.png
 	failed_with "a.png: exists; give --overwrite"
 	cp pairs.csv pairs.svg
@@ -169,7 +173,7 @@ shows() {
 	run --separate-stderr env PATH="$INCISE_BUILD/bin" incise plot m.fis -o a.png
 	failed_with "gnuplot is not installed" "apt-get install gnuplot-nox"
 	run --separate-stderr incise plot m.fis
-	failed_with "there is no display for a window; give -o NAME.png or NAME.svg"
+	failed_with "there is no display for a window; give -o NAME.png, .svg or .pdf"
 	mkdir bin
 	printf '#!/bin/sh\necho png svg\n' >bin/gnuplot
 	chmod +x bin/gnuplot
@@ -261,6 +265,22 @@ keep_data() {
 	# of all samples, those in cuts and others
 	largest=$(awk '$2 != "NaN" && $2 > most { most = $2 } END { printf "%.4f", most }' kept/force.dat)
 	[ "$largest" = "$want" ] || complain "$largest is not $want"
+}
+
+@test "texts from anywhere make a figure, no command and no broken SVG" {
+	incise capture -o a.rec --rig sim:clock=simulated --duration 2s >/dev/null
+	sqlite3 a.rec/recording.db "INSERT INTO events SELECT t_ns, 'marker', 'a # ' || char(27) || x'c3' ||
+		' <b> & \`touch broken\`' FROM force WHERE seq = 10"
+	mv a.rec $'a\xff\x01\'`touch broken`"<&é.rec'
+	draws $'a\xff\x01\'`touch broken`"<&é.rec'
+	grep -qF 'a # ?? <b> &  touch broken' texts
+	grep -qF 'a    touch broken  <&é.rec, sim:clock=simulated, 2 s' texts
+	[ ! -e broken ] && [ ! -e tmp/broken ]
+	# and a long one leaves the rest of the title its place
+	long=$(printf 'x%.0s' {1..100}).csv
+	cp pairs.csv "$long"
+	draws "$long"
+	shows "$(printf 'x%.0s' {1..60})…: 288 rows"
 }
 
 @test "a part of a recording" {

@@ -44,8 +44,4 @@ void model_plot_surface(FILE *script, const struct model_surface *surface,
 void model_plot_contours(FILE *script, const struct model_surface *surface,
 			 const char *data, const char *title);
 
-/* All of it as one plot, FOLDER/NAME.png and .svg; fails the program on an error. */
-void model_plot_draw(const struct incise_model *model, const char *folder,
-		     const char *name);
-
 #endif

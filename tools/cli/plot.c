@@ -13,6 +13,7 @@
 #include <unistd.h>
 #include "child.h"
 #include "cli.h"
+#include "control_character.h"
 #include "file.h"
 #include "folder.h"
 #include "plot.h"
@@ -180,13 +181,45 @@ void plot_draw_or_fail(FILE *script, const char *folder, const char *name)
 		cli_fail("gnuplot could not draw %s/%s", folder, name);
 }
 
+/* Bytes of the character of UTF-8 that a text starts with; 0: it starts with none. */
+static int character(const char *text)
+{
+	static const struct {
+		unsigned char mask, lead;
+	} forms[] = {{0x80, 0}, {0xe0, 0xc0}, {0xf0, 0xe0}, {0xf8, 0xf0}};
+	const unsigned char *c = (const unsigned char *)text;
+
+	for (int n = 0; n < 4; n++) {
+		int more = 0;
+
+		while (more < n && (c[more + 1] & 0xc0) == 0x80)
+			more++;
+		if ((*c & forms[n].mask) == forms[n].lead)
+			return more == n && *c != 0xc0 && *c != 0xc1 ? n + 1 : 0;
+	}
+	return 0;
+}
+
+void plot_put_quoted(FILE *out, const char *text, int most, char quote)
+{
+	/* A name in a file may hold anything, also what would end the string, or an SVG. */
+	fputc(quote, out);
+	for (int n; *text && most; text += n, most--) {
+		n = character(text);
+		if (!n || control_character(text) || strchr("'\"\\`", *text)) {
+			fputc(' ', out);
+			n = n ? n : 1;
+		} else {
+			fwrite(text, 1, (size_t)n, out);
+		}
+	}
+	fputs(*text ? "…" : "", out);
+	fputc(quote, out);
+}
+
 void plot_put_text(FILE *script, const char *text)
 {
-	/* A name in a file may hold anything, also what would end the string. */
-	fputc('\'', script);
-	for (; *text; text++)
-		fputc(strchr("'\\\n\r`", *text) ? ' ' : *text, script);
-	fputc('\'', script);
+	plot_put_quoted(script, text, 60, '\'');
 }
 
 void plot_put_label(FILE *script, const char *name)

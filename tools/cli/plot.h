@@ -67,7 +67,13 @@ const char *plot_window(void);
 void plot_draw_form(FILE *script, const char *folder, const char *name, const char *form,
 		    const char *path);
 
-/* Write a text, which may hold anything, as a string of a script. */
+/*
+ * Write a text, which may hold anything, as a string of a script, or in data. What a string or an
+ * SVG cannot hold becomes a space; of a longer one than @most characters there is the beginning.
+ */
+void plot_put_quoted(FILE *out, const char *text, int most, char quote);
+
+/* The same in a script, of 60 characters at most. */
 void plot_put_text(FILE *script, const char *text);
 
 /* Write the name of a quantity as the title of an axis: 'depth / mm' of depth_mm. */

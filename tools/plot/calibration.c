@@ -158,7 +158,7 @@ FILE *figure_of_calibration(const struct figure *figure)
 	struct history history = read_history(figure->path);
 	int rows = (history.n_series + COLUMNS - 1) / COLUMNS;
 	int height = TITLE_HEIGHT + rows * PANEL_HEIGHT;
-	FILE *script = plot_begin(figure->folder, FIGURE_NAME, FIGURE_WIDTH, height);
+	FILE *script = plot_begin(figure->folder, figure->name, FIGURE_WIDTH, height);
 	double share = (double)PANEL_HEIGHT / height;
 
 	fputs("set multiplot title ", script);

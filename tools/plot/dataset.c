@@ -278,7 +278,7 @@ FILE *figure_of_dataset(const struct figure *figure)
 	velocity = table.column[VELOCITY] >= 0;
 	rows = table.n_groups > 1 ? 2 : 1;
 	height = (double)HEIGHT / (rows * HEIGHT + TITLE_HEIGHT);
-	script = plot_begin(figure->folder, FIGURE_NAME, FIGURE_WIDTH,
+	script = plot_begin(figure->folder, figure->name, FIGURE_WIDTH,
 			    rows * HEIGHT + TITLE_HEIGHT);
 	put_title(script, &table, figure->path);
 	fprintf(script,

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * The figure of incise plot: a function for each kind of file writes its data and script, and
- * incise plot makes a file of it, or a window. See cli/plot.h.
+ * The figure of a file: a function for each kind writes its data and script, of which incise plot
+ * makes a file or a window. See cli/plot.h.
  */
 #ifndef INCISE_FIGURE_H
 #define INCISE_FIGURE_H
@@ -10,18 +10,17 @@
 #include <stdint.h>
 #include <stdio.h>
 
-#define FIGURE_NAME "figure" /* of the script, in the figure's folder */
-#define FIGURE_WIDTH 1200    /* pixels */
+#define FIGURE_WIDTH 1200 /* pixels */
 
 struct figure {
 	const char *path; /* the file that is drawn */
 	const char *data; /* of a model: the dataset of its residuals, or NULL */
-	double from_s,
-		to_s; /* of a recording: the time that is drawn; INFINITY: to its end */
-	char folder[4096]; /* of data and script; it is removed at the end */
+	/* Of a recording: the time that is drawn; -INFINITY, INFINITY: all. */
+	double from_s, to_s;
+	const char *folder, *name; /* of cli/plot.h */
 };
 
-/* Each returns the script, for plot_draw_form(). Every failure ends the program. */
+/* Each returns the script, to be drawn. Every failure ends the program. */
 FILE *figure_of_model(const struct figure *figure);
 FILE *figure_of_compiled(const struct figure *figure);
 FILE *figure_of_recording(const struct figure *figure);

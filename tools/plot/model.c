@@ -27,6 +27,8 @@
 struct grid {
 	FILE *script;
 	int height, top; /* pixels */
+	/* Files of data, of this figure alone: another one may be in its folder. */
+	const char *functions, *surface, *residuals, *quantiles;
 };
 
 /* The next row of that height has panels of half the figure's width, or of all of it. */
@@ -88,9 +90,10 @@ static void widen(double *low, double *high, const double *value, size_t n)
 	}
 }
 
-static void write_residuals(const struct residuals *r, const char *folder)
+static void write_residuals(const struct residuals *r, const char *folder,
+			    const char *name)
 {
-	FILE *data = plot_data(folder, "residuals.dat");
+	FILE *data = plot_data(folder, name);
 	double low[2], high[2];
 	struct scatter scatter;
 
@@ -112,9 +115,9 @@ static int ascending(const void *a, const void *b)
 }
 
 /* Shares and quantiles; both ends are there, however many are left out between. */
-static void write_quantiles(struct residuals *r, const char *folder)
+static void write_quantiles(struct residuals *r, const char *folder, const char *name)
 {
-	FILE *data = plot_data(folder, "quantiles.dat");
+	FILE *data = plot_data(folder, name);
 	size_t last = r->n - 1, step = r->n / QUANTILES + 1;
 
 	qsort(r->value, r->n, sizeof(*r->value), ascending);
@@ -143,16 +146,17 @@ static void put_residuals(struct grid *grid, const struct model_surface *surface
 	plot_put_label(grid->script, surface->input[0].name);
 	fputc('\n', grid->script);
 	put_residual_label(grid->script, surface);
-	fputs("plot 'residuals.dat' with points pt 7 ps 0.4 lc rgb blue, "
-	      "0 with lines lc rgb ink\n",
-	      grid->script);
+	fprintf(grid->script,
+		"plot '%s' with points pt 7 ps 0.4 lc rgb blue, 0 with lines lc rgb ink\n",
+		grid->residuals);
 	place(grid, 1, 2, RESIDUALS_HEIGHT);
 	fprintf(grid->script,
 		"set title 'quantiles of the residuals; line: normal distribution'\n"
 		"set xlabel 'quantile of the normal distribution / SD'\n"
-		"plot 'quantiles.dat' using (invnorm($1)):2 with points pt 7 ps 0.4 lc rgb "
+		"plot '%s' using (invnorm($1)):2 with points pt 7 ps 0.4 lc rgb "
 		"blue, %g + %g * x with lines lc rgb ink\n",
-		r->mean, sqrt(fmax(0, r->rms * r->rms - r->mean * r->mean)));
+		grid->quantiles, r->mean,
+		sqrt(fmax(0, r->rms * r->rms - r->mean * r->mean)));
 }
 
 /* --- the figure -------------------------------------------------------------------------- */
@@ -166,16 +170,16 @@ static void put_surface(struct grid *grid, const struct model_surface *surface)
 	fputs("unset key\nset xrange [*:*]\n", grid->script);
 	if (surface->n_inputs == 1) {
 		place(grid, 0, 1, SURFACE_HEIGHT);
-		model_plot_surface(grid->script, surface, "surface.dat", title, "");
+		model_plot_surface(grid->script, surface, grid->surface, title, "");
 		return;
 	}
 	/* The map's colours are those of the surface. */
 	fputs("unset colorbox\n", grid->script);
 	place(grid, 0, 2, SURFACE_HEIGHT);
-	model_plot_surface(grid->script, surface, "surface.dat", title, "");
+	model_plot_surface(grid->script, surface, grid->surface, title, "");
 	fputs("set colorbox\n", grid->script);
 	place(grid, 1, 2, SURFACE_HEIGHT);
-	model_plot_contours(grid->script, surface, "surface.dat", title);
+	model_plot_contours(grid->script, surface, grid->surface, title);
 }
 
 /* @model NULL: of a compiled one the functions are not known. */
@@ -185,22 +189,28 @@ static FILE *draw(const struct figure *figure, const struct model_surface *surfa
 	int n = model ? surface->n_inputs : 0, columns = n > 1 ? 2 : 1;
 	int rows = (n + columns - 1) / columns;
 	struct residuals residuals = {0};
-	struct grid grid = {.height = rows * FUNCTIONS_HEIGHT + SURFACE_HEIGHT};
+	struct grid grid = {
+		.height = rows * FUNCTIONS_HEIGHT + SURFACE_HEIGHT,
+		.functions = cli_text("%s-functions.dat", figure->name),
+		.surface = cli_text("%s-surface.dat", figure->name),
+		.residuals = cli_text("%s-residuals.dat", figure->name),
+		.quantiles = cli_text("%s-quantiles.dat", figure->name),
+	};
 
 	if (figure->data) {
 		residuals = residuals_of(surface, figure->data);
-		write_residuals(&residuals, figure->folder);
-		write_quantiles(&residuals, figure->folder);
+		write_residuals(&residuals, figure->folder, grid.residuals);
+		write_quantiles(&residuals, figure->folder, grid.quantiles);
 		grid.height += RESIDUALS_HEIGHT;
 	}
 	if (model)
-		model_plot_write_functions(model, figure->folder, "functions.dat");
-	model_plot_write_surface(surface, figure->folder, "surface.dat");
-	grid.script = plot_begin(figure->folder, FIGURE_NAME, FIGURE_WIDTH, grid.height);
+		model_plot_write_functions(model, figure->folder, grid.functions);
+	model_plot_write_surface(surface, figure->folder, grid.surface);
+	grid.script = plot_begin(figure->folder, figure->name, FIGURE_WIDTH, grid.height);
 	fputs("set multiplot\nset key outside right center\n", grid.script);
 	for (int i = 0; i < n; i++) {
 		place(&grid, i % columns, columns, FUNCTIONS_HEIGHT);
-		model_plot_functions(grid.script, model, i, "functions.dat", "");
+		model_plot_functions(grid.script, model, i, grid.functions, "");
 	}
 	if (n % columns)
 		grid.top += FUNCTIONS_HEIGHT;

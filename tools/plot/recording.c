@@ -227,6 +227,7 @@ struct recorded {
 	struct incise_recording *recording;
 	struct incise_recording_info info;
 	struct span span;
+	double whole_s; /* all that was recorded */
 	struct presence presence[STREAMS];
 	uint64_t clipped;
 	int n_cuts, n_events;
@@ -503,6 +504,7 @@ static void find_span(struct recorded *r)
 		cli_fail("%s: holds no sample", figure->path);
 	r->span.start_ns = r->info.force ? r->info.start_ns : first;
 	end_s = seconds(&r->span, last);
+	r->whole_s = (double)(last - first) / INCISE_NS_PER_S;
 	r->span.from_s = fmax(figure->from_s, seconds(&r->span, first));
 	r->span.to_s = fmin(figure->to_s, end_s);
 	if (r->span.from_s > end_s || r->span.to_s < seconds(&r->span, first))
@@ -571,16 +573,17 @@ static void write_events(const struct recorded *r)
 	for (int i = 0; i < r->n_events; i++) {
 		const struct event *event = &r->event[i];
 		const char *text = *event->text ? event->text : event->kind;
-		int letters = 0,
-		    most = (int)((r->span.to_s - event->t_s) / letter_s) + 14;
+		int most = (int)((r->span.to_s - event->t_s) / letter_s) + 14;
 
-		fprintf(data, "%.7g \"", event->t_s);
-		for (const char *c = text; *c && event->t_s >= free_s && letters < most;
-		     c++)
-			letters += fputc(strchr("\"\\\n\r", *c) ? ' ' : *c, data) != EOF;
-		fputs("\"\n", data);
-		if (letters)
-			free_s = event->t_s + (letters + 2) * letter_s;
+		fprintf(data, "%.7g ", event->t_s);
+		if (event->t_s >= free_s) {
+			plot_put_quoted(data, text, most, '"');
+			free_s = event->t_s +
+				 fmin((double)strlen(text) + 2, most + 3) * letter_s;
+		} else {
+			fputs("\"\"", data);
+		}
+		fputc('\n', data);
 	}
 	plot_data_end(data, r->figure->folder);
 }
@@ -751,8 +754,7 @@ static void put_title(FILE *script, const struct recorded *r)
 	plot_put_text(script, r->figure->path);
 	fputs(".', '.", script);
 	plot_put_text(script, info->rig);
-	fprintf(script, ".', %.4g s from %s, %llu lost",
-		(info->end_ns - info->start_ns) * 1e-9, info->started,
+	fprintf(script, ".', %.4g s from %s, %llu lost", r->whole_s, info->started,
 		(unsigned long long)lost);
 	if (r->clipped)
 		fprintf(script, ", %llu clipped", (unsigned long long)r->clipped);
@@ -778,8 +780,8 @@ static FILE *draw(struct recorded *r)
 		lost[i] = write_bins(r, r->presence[i].lost, gone);
 		free(name), free(gone);
 	}
-	script =
-		plot_begin(r->figure->folder, FIGURE_NAME, FIGURE_WIDTH, figure_height());
+	script = plot_begin(r->figure->folder, r->figure->name, FIGURE_WIDTH,
+			    figure_height());
 	put_title(script, r);
 	fprintf(script,
 		"set lmargin at screen %g\nset rmargin at screen %g\n"

@@ -48,7 +48,7 @@ FILE *figure_of_session(const struct figure *figure)
 
 	if (!s->n_trace)
 		cli_fail("%s: ended before its first tick", figure->path);
-	script = plot_begin(figure->folder, FIGURE_NAME, FIGURE_WIDTH, HEIGHT);
+	script = plot_begin(figure->folder, figure->name, FIGURE_WIDTH, HEIGHT);
 	put_title(script, figure->path, s);
 	place(script, TITLE_HEIGHT, PATH_HEIGHT);
 	session_figure_path(script, s, NULL);
