@@ -297,8 +297,7 @@ report_of() {
 		incise bench all --report "$folder" --overwrite --only stability 2>err &
 		pid=$!
 		until [ -e "$folder/.unfinished/data/stability.json" ]; do sleep 0.05; done
-		child=$(ps -o pid= --ppid "$pid" | tr -d ' ')
-		[ -n "$child" ]
+		until child=$(ps -o pid= --ppid "$pid" | tr -d ' ') && [ -n "$child" ]; do sleep 0.05; done
 		kill -INT "$pid"
 		wait "$pid" && complain "it went on" || [ "$?" = 1 ]
 		grep -qx "incise bench all: Interrupt: $folder is unchanged" err
