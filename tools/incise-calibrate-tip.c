@@ -350,7 +350,8 @@ static void put_plot(FILE *script, bool residuals, bool left_out)
 		plot_add(
 			script, &n,
 			"'poses.dat' using 6:(int($5) ? $7 : NaN) with points lt 1 ps 0.35 "
-			"title 'used'");
+			"title '%s'",
+			left_out ? "used" : "");
 		if (left_out)
 			plot_add(
 				script, &n,

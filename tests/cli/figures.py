@@ -181,6 +181,9 @@ def check(path):
     # Turned texts are labels of axes; and so is the text below the tics of a plot's x axis.
     labels = [t for t in figure.texts if t.degrees]
     for segment in figure.segments:
+        # Before the first tic there is the title of the plot before.
+        while segment and not segment[0].enhanced:
+            segment = segment[1:]
         tics = [t.y for t in segment if t.enhanced and not t.degrees]
         labels += [t for t in segment if not t.degrees and not t.enhanced and tics and
                    t.y > max(tics) and t.anchor == "middle"]

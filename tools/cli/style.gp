@@ -64,7 +64,7 @@ set key noautotitle noenhanced Left reverse samplen 2 spacing 1.15 height 0.3
 # Panels with margins in px: above(n) for a title of n lines and a title of each panel, below(rows)
 # for tics, label and a key of so many rows, between for the tics, label and title of two panels.
 above(n) = (n + 2.6) * line_px
-below(rows) = (3.1 + 1.3 * rows) * line_px + 8
+below(rows) = (3.4 + 1.3 * rows) * line_px + 8
 between = 5.8 * line_px
 panels(left, right, bottom, top, across, down) = sprintf("margins screen %.5f,%.5f,%.5f,%.5f \
 spacing screen %.5f,%.5f", 1.0 * left / figure_width, 1 - 1.0 * right / figure_width, 1.0 * bottom / figure_height, \

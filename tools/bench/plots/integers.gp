@@ -11,6 +11,6 @@ set key outside right top
 set yrange [*:*]
 set autoscale xfix
 plot for [i=1:words(data_block)] data index word(data_block, i) using "x":"y" \
-		with lines lt i title words_of(word(data_block, i)), \
+		with lines lt i lw 0.8 title words_of(word(data_block, i)), \
 	for [i=1:words(data_block)] data index word(data_block, i) using "x":"z" \
 		with lines dt 2 lt i

@@ -19,7 +19,8 @@ set yrange [rows - 0.4:-0.6]
 set offsets 0, graph 0.12, 0, 0
 set ytics nomirror scale 0
 set grid noytics
-eval key_below
+set key off
+set bmargin at screen below(1) / figure_height
 set tmargin at screen 1 - (2.4 * line_px + 10) / figure_height
 set lmargin at screen 160.0 / figure_width
 set rmargin at screen counted ? 0.58 : 1 - 20.0 / figure_width
@@ -32,16 +33,17 @@ do for [k=0:counted] {
 	set xlabel k ? 'instructions per tick / 1' : 'median time of a tick / ns'
 	set xrange [0:most[k + 1] * 1.15]
 	if (k) {
-		unset key
 		set format y ''
 		set lmargin at screen 0.61
 		set rmargin at screen 0.98
 	}
 	plot data using (0):($0):(0):(column(few)):($0-bar):($0):ytic(names(k)) \
-			with boxxyerror fc rgb blue title k ? '' : 'only the stages needed', \
+			with boxxyerror fc rgb blue, \
 		data using (column(few)):($0-bar/2):(sprintf('%.0f', column(few))) with labels left offset 0.5,0 font small, \
 		data using (0):($0):(0):(column(full)):($0):($0+bar) \
-			with boxxyerror fc rgb orange title k ? '' : 'all stages', \
+			with boxxyerror fc rgb orange, \
 		data using (column(full)):($0+bar/2):(sprintf('%.0f', column(full))) with labels left offset 0.5,0 font small
 }
+eval key_panel
+plot NaN with boxes fc rgb blue title 'only the stages needed', NaN with boxes fc rgb orange title 'all stages'
 unset multiplot
