@@ -191,6 +191,8 @@ views_fit() {
 	grep -q '⠉\|⠒\|⠤\|⣀\|⠓' view
 	grep -q 'last 14 s$' view
 	grep -qE '^stream .* offset ms$' view
+	# no value of the table is cut off
+	[ "$(grep -cE '^(force|tracker) .* [0-9.-]+±([0-9.]+|\?)$' view)" = 2 ]
 	grep -qE '^m, 1-9: marker' view
 	size=52x14 on_a_terminal 2:q incise capture -o b.rec --rig sim: >out
 	views_fit 52 14 >view

@@ -11,7 +11,7 @@
 #include "uncertainty.h"
 
 const char stream_heading[] =
-	"stream     rate/s       rows   lost   late jitter ms   drift ppm      offset ms";
+	"stream     rate/s      rows   lost   late jitter ms     drift ppm     offset ms";
 
 /* "1.23", or "-" for what is not known. */
 static const char *number(char *text, size_t size, double value, int decimals)
@@ -49,9 +49,9 @@ int stream_line(const struct incise_stream *s, char *text, size_t size)
 {
 	char rate[32], jitter[32], drift[80], offset[80];
 
-	put_with_sd(drift, sizeof(drift), s->drift_ppm, s->drift_sd_ppm, 2, 11);
-	put_with_sd(offset, sizeof(offset), s->offset_ms, s->offset_sd_ms, 3, 14);
-	return snprintf(text, size, "%-7s %9s %10llu %6llu %6llu %9s %s %s", s->name,
+	put_with_sd(drift, sizeof(drift), s->drift_ppm, s->drift_sd_ppm, 2, 13);
+	put_with_sd(offset, sizeof(offset), s->offset_ms, s->offset_sd_ms, 3, 13);
+	return snprintf(text, size, "%-7s %9s %9llu %6llu %6llu %9s %s %s", s->name,
 			number(rate, sizeof(rate), s->rate_hz, 2),
 			(unsigned long long)s->rows, (unsigned long long)s->lost,
 			(unsigned long long)s->late,
