@@ -112,11 +112,15 @@ unit-programs: $(unit_programs)
 
 # The CAN drive that tests talk to is on python-canopen, in a folder of its own.
 can-drive: ## the CAN drive of the tests, $(O)/tests/can/drive; see tests/can/README.md
-	@tests/can/venv $(O)/tests/can
+	@tests/venv tests/can $(O)/tests/can 'tests with the CAN drive are skipped' drive selftest
 
 # The reader of MCAP's own makers, for what is exported.
 mcap-reader: ## a second reader for the tests of MCAP, $(O)/tests/mcap/check
-	@tests/mcap/venv $(O)/tests/mcap
+	@tests/venv tests/mcap $(O)/tests/mcap 'tests read MCAP with our own reader alone' check:--package
+
+# What reads Arrow streams in place, for the tests of incise for Python.
+python-peers: ## pyarrow, polars, DuckDB, pandas 3 and scikit-learn for the tests of python/
+	@tests/venv tests/python $(O)/tests/python 'tests with pyarrow, polars, DuckDB, pandas 3 and scikit-learn are skipped'
 
 # Attacks on recordings. What is in a module is found by INCISE_MODULE_PATH.
 attack_programs := $(addprefix $(O)/tests/attack/,kill faults damage record watch.so stall.so)
@@ -148,7 +152,7 @@ check-attack: all $(attack_programs) ## attacks on recordings with their full co
 	ATTACK=full $(attack_bats)
 
 # Benches measure for seconds: tests that are tagged slow are not in `check`.
-cli-needs: all $(locale) can-drive mcap-reader $(O)/tests/polhemus/fastrak $(O)/tests/state/loop \
+cli-needs: all $(locale) can-drive mcap-reader python-peers $(O)/tests/polhemus/fastrak $(O)/tests/state/loop \
 		$(O)/tests/day $(attack_programs)
 
 check-cli: cli-needs ## command-line tests of the real programs
@@ -166,6 +170,16 @@ check-sanitize: ## unit tests under AddressSanitizer and UBSan
 	@mkdir -p $(O)/sanitize
 	+@SKIPPED=$(abspath $(skipped_there)) $(MAKE) --no-print-directory O=$(O)/sanitize \
 		CFLAGS="-O1 -g1 $(sanitize_flags)" LDFLAGS="$(sanitize_flags)" check-unit
+	+@$(MAKE) --no-print-directory check-python-sanitize
+
+# Python's own memory is not of interest: its objects of the end of the program count as leaks.
+check-python-sanitize: all ## tests of incise for Python on libraries under AddressSanitizer and UBSan
+	+@$(MAKE) --no-print-directory O=$(O)/sanitize \
+		CFLAGS="-O1 -g1 $(sanitize_flags)" LDFLAGS="$(sanitize_flags)" libs
+	cd tests/python && INCISE_BUILD=$(abspath $(O)) INCISE_LIBDIR=$(abspath $(O))/sanitize/lib \
+		LD_PRELOAD=$$($(CC) -print-file-name=libasan.so) ASAN_OPTIONS=detect_leaks=0 \
+		PYTHONPATH=../../python PYTHONDONTWRITEBYTECODE=1 \
+		/usr/bin/python3 -m unittest test_recording test_model test_plan
 
 # Plainly, after that, those that skipped something there, those that do less there and so
 # name __SANITIZE_ADDRESS__, and those about bits, which are of the flags that are shipped.
@@ -209,7 +223,7 @@ doc: ## reference of the public headers in build/doc/html; fails where a comment
 
 check-doc: doc
 
-.PHONY: doc check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests check-attack check-sanitize check-tsan can-drive mcap-reader
+.PHONY: doc check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests check-attack check-sanitize check-python-sanitize check-tsan can-drive mcap-reader python-peers
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so

@@ -28,7 +28,7 @@ setup_file() {
 
 setup() {
 	[ -x "$INCISE_BUILD/tests/can/drive" ] ||
-		skip "python-canopen is not there; see tests/can/venv"
+		skip "python-canopen is not there; see build/tests/can/venv.log"
 	watch_machine
 	work_folder
 }

@@ -14,6 +14,7 @@ import unittest
 
 SOURCE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 BUILD = os.environ.get("INCISE_BUILD", os.path.join(SOURCE, "build"))
+SANITIZED = "asan" in os.environ.get("LD_PRELOAD", "")
 SHORT = "sim:seed=1,clock=simulated,cut_s=2,pause_s=1"  # all 14 cuts, in 43 s
 
 

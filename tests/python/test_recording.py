@@ -11,7 +11,7 @@ import threading
 import unittest
 
 import incise
-from fixtures import SOURCE, Case, has, run
+from fixtures import SANITIZED, SOURCE, Case, has, run
 
 STREAMS = ("force", "tracker", "depth", "frames", "events")
 
@@ -228,6 +228,7 @@ class Recordings(Case):
         gc.collect()
         self.assertLessEqual(count(), before)
 
+    @unittest.skipIf(SANITIZED, "a sanitizer keeps freed memory")
     def test_memory_is_bounded(self):
         """10 times the rows take no more: batches are 65536 rows, 25 bytes each, and SQLite's cache
         is 2 MB. 20 MB is ten times both."""

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise for Python: its tests by the system's Python with Debian's numpy and pandas, by one without
+# any package, and with foreign readers of Arrow streams from pip.
+bats_require_minimum_version 1.5.0
+load cli.bash
+
+setup() {
+	root="$BATS_TEST_DIRNAME/../.."
+	export PYTHONPATH="$root/python" PYTHONDONTWRITEBYTECODE=1
+	cd "$root/tests/python"
+	peers="$INCISE_BUILD/tests/python/venv/bin/python"
+}
+
+# Run test modules; print what was skipped.
+python_tests() {
+	run "$@"
+	grep -E "skipped [^0-9]" <<<"$output" | sed 's/^/# /' >&3 || :
+	[ "$status" = 0 ] || { echo "$output"; false; }
+	[[ "$output" == *OK* ]]
+}
+
+@test "python: structs are those of the headers" {
+	run -0 /usr/bin/python3 abi.py "${CC:-cc}"
+	[[ "$output" == *" structs, "*" fields" ]]
+}
+
+@test "python: recordings, with Debian's packages" {
+	python_tests /usr/bin/python3 -m unittest -v test_recording
+}
+
+@test "python: models, scenes and calibrations, with Debian's packages" {
+	python_tests /usr/bin/python3 -m unittest -v test_model test_plan
+}
+
+@test "python: without any package" {
+	# -S leaves out dist-packages, and so numpy
+	run /usr/bin/python3 -S -c 'import numpy'
+	[ "$status" = 1 ]
+	python_tests /usr/bin/python3 -S -m unittest -v test_plan test_recording.Import \
+		test_recording.Recordings.test_streams_are_the_tables \
+		test_recording.Recordings.test_pairs_are_those_of_the_tool \
+		test_model.Models.test_forms_of_inputs test_model.Models.test_wrong_inputs
+}
+
+@test "python: pyarrow, Parquet, polars, DuckDB and pandas 3 read the streams" {
+	[ -x "$peers" ] || skip "pip could not install tests/python/requirements.txt"
+	python_tests "$peers" -m unittest -v test_foreign
+}
+
+@test "python: scikit-learn's protocol" {
+	[ -x "$peers" ] || skip "pip could not install tests/python/requirements.txt"
+	python_tests "$peers" -m unittest -v test_model.Estimator
+}
