@@ -20,6 +20,9 @@ udevrulesdir ?= $(prefix)/lib/udev/rules.d
 sysusersdir ?= $(prefix)/lib/sysusers.d
 tmpfilesdir ?= $(prefix)/lib/tmpfiles.d
 unitdir ?= $(prefix)/lib/systemd/system
+# Where Debian's Python looks: below /usr one folder for all its versions.
+python_version := $(shell /usr/bin/python3 -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
+pythondir ?= $(prefix)/lib/python$(if $(filter-out /usr,$(prefix)),$(python_version),3)/dist-packages
 completiondir ?= $(datadir)/bash-completion/completions
 
 # Programs and libraries find each other by where they are, whatever the prefix. With rpath=no
@@ -46,7 +49,7 @@ endif
 
 # Goals that need no compiler or install it first; a kernel's headers name its own one.
 unbuilt_goals := help clean deps check check-all check-debian12 check-debian13 check-module-newest demo bench \
-	deb check-deb doc check-doc dist uninstall readme-figures \
+	deb check-deb doc check-doc dist wheel uninstall readme-figures \
 	module module_install module_uninstall dkms_install dkms_uninstall check-module
 ifneq ($(filter-out $(unbuilt_goals),$(or $(MAKECMDGOALS),all)),)
 missing := $(foreach tool,$(firstword $(CC)) $(firstword $(AR)),$(if $(call there,$(tool)),,$(tool))) $(missing)

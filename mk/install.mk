@@ -15,6 +15,10 @@ sysusers := $(wildcard udev/*.sysusers)
 tmpfiles := $(wildcard udev/*.tmpfiles)
 units := $(wildcard udev/*.service udev/*.service.in)
 
+python_files := $(wildcard python/incise/*.py) python/incise/py.typed
+# The libraries of this installation, unless they are where the system looks.
+python_installed := $(if $(filter-out no,$(rpath)),_installed.py)
+
 # Every file that `install` makes, relative to nothing: uninstall removes just these.
 installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(foreach lib,$(libraries),$(addprefix $(libdir)/lib$(lib).so,.$(version) .$(soversion)) \
@@ -26,6 +30,7 @@ installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(addprefix $(datadir)/incise/scenes/,$(notdir $(scenes))) \
 	$(addprefix $(datadir)/incise/,$(notdir $(examples))) \
 	$(addprefix $(docdir)/,$(notdir $(documents)) $(example_files) $(example_scripts)) \
+	$(addprefix $(pythondir)/incise/,$(notdir $(python_files)) $(python_installed)) \
 	$(completiondir)/incise \
 	$(addprefix $(udevrulesdir)/,$(notdir $(udev_rules))) \
 	$(addprefix $(sysusersdir)/,$(patsubst %.sysusers,%.conf,$(notdir $(sysusers)))) \
@@ -70,6 +75,9 @@ install: all ## install below $(DESTDIR)$(prefix)
 	$(INSTALL) -m 644 $(example_files) $(DESTDIR)$(docdir)/examples
 	$(INSTALL) -m 755 $(example_scripts) $(DESTDIR)$(docdir)/examples
 	$(INSTALL) -m 644 tools/incise.bash $(DESTDIR)$(completiondir)/incise
+	$(INSTALL) -m 644 $(python_files) $(DESTDIR)$(pythondir)/incise
+	$(if $(python_installed),printf '# Written by make install.\nLIBDIR = "%s"\nDATADIR = "%s"\n' \
+		'$(libdir)' '$(datadir)' >$(DESTDIR)$(pythondir)/incise/_installed.py)
 	$(INSTALL) -m 644 $(udev_rules) $(DESTDIR)$(udevrulesdir)
 	for file in $(sysusers); do \
 		$(INSTALL) -m 644 $$file \
@@ -90,6 +98,7 @@ uninstall: ## remove what install installed
 	@made=$$(sort -ru $(DESTDIR)$(made_folders) 2>/dev/null) || \
 		made="$(libdir)/incise $(includedir)/incise $(datadir)/incise/scenes $(datadir)/incise"; \
 	rm -f $(addprefix $(DESTDIR),$(installed) $(made_folders)); \
+	rm -rf $(DESTDIR)$(pythondir)/incise/__pycache__; \
 	for folder in $$made; do \
 		rmdir "$(DESTDIR)$$folder" 2>/dev/null || :; \
 	done
@@ -98,6 +107,13 @@ dist: ## a tarball of the committed tree
 	@mkdir -p $(O)
 	git archive --prefix=incise-$(version)/ -o $(O)/incise-$(version).tar.gz HEAD
 	@echo $(O)/incise-$(version).tar.gz
+
+wheel: ## a wheel of incise for Python, in build/wheel; it loads the system's libraries
+	@mk/deps wheel
+	@rm -rf $(O)/wheel && mkdir -p $(O)/wheel && cp -r python $(O)/wheel/source
+	cd $(O)/wheel/source && /usr/bin/python3 -m build --wheel --no-isolation -o .. >../log 2>&1 || \
+		{ tail -20 ../log; exit 1; }
+	@rm -r $(O)/wheel/source; echo $(O)/wheel/*.whl
 
 deb: ## Debian packages of the tree as it is, in build/deb
 	@mk/deps build deb
@@ -110,4 +126,4 @@ check-deb: ## the packages: lintian, then installed, tried and purged in a clean
 		echo "skipped: Debian packages, for what builds them is missing"; \
 	fi
 
-.PHONY: install uninstall dist deb check-deb
+.PHONY: install uninstall dist wheel deb check-deb
