@@ -59,6 +59,20 @@ report_of() {
 	[[ "$(key "$r/report.json" "figures[0].name")" == "precision: "* ]]
 }
 
+@test "each report agrees with its schema" {
+	for python in python3 /usr/bin/python3; do
+		! "$python" -c "import jsonschema" 2>/dev/null || break
+	done
+	"$python" -c "import jsonschema" || skip "python3-jsonschema is not installed"
+	incise bench compare "$r/data/timeline.json" "$r/data/timeline.json" --json >compare.json
+	run "$python" "$BATS_TEST_DIRNAME/json_schema.py" "$root/schema" "$r/report.json" "$r"/data/*.json compare.json
+	[ "$status $output" = "0 " ] || complain "$output"
+	# each benchmark that was measured is one of them
+	for benchmark in $benchmarks; do
+		[ -e "$root/schema/bench-$benchmark.json" ]
+	done
+}
+
 @test "it fails when a benchmark failed, and says where that stands" {
 	n=$(sqlite3 :memory: "SELECT json_array_length(readfile('$r/report.json'), '\$.failed')")
 	if [ "$n" = 0 ]; then

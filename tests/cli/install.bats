@@ -54,6 +54,9 @@ setup() {
 		cmp "$root/$document" "$dest/usr/share/doc/incise/${document##*/}"
 	done
 	cmp "$root/scenes/liver.scene" "$dest/usr/share/incise/scenes/liver.scene"
+	for schema in "$root"/schema/*.json; do
+		cmp "$schema" "$dest/usr/share/incise/schema/${schema##*/}"
+	done
 	cmp "$root/tools/incise.bash" "$dest/usr/share/bash-completion/completions/incise"
 	for lib in incise incise-learn incise-record; do
 		[ -f "$dest/usr/lib/lib$lib.so" ]
