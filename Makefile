@@ -24,6 +24,7 @@ unitdir ?= $(prefix)/lib/systemd/system
 python_version := $(shell /usr/bin/python3 -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
 pythondir ?= $(prefix)/lib/python$(if $(filter-out /usr,$(prefix)),$(python_version),3)/dist-packages
 completiondir ?= $(datadir)/bash-completion/completions
+zshcompletiondir ?= $(datadir)/zsh/site-functions
 
 # Programs and libraries find each other by where they are, whatever the prefix. With rpath=no
 # the system's own folders are all that is searched, as distributions want it.

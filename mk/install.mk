@@ -33,7 +33,7 @@ installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(addprefix $(datadir)/incise/,$(notdir $(examples))) \
 	$(addprefix $(docdir)/,$(notdir $(documents)) $(example_files) $(example_scripts)) \
 	$(addprefix $(pythondir)/incise/,$(notdir $(python_files)) $(python_installed)) \
-	$(completiondir)/incise \
+	$(completiondir)/incise $(zshcompletiondir)/_incise \
 	$(addprefix $(udevrulesdir)/,$(notdir $(udev_rules))) \
 	$(addprefix $(sysusersdir)/,$(patsubst %.sysusers,%.conf,$(notdir $(sysusers)))) \
 	$(addprefix $(tmpfilesdir)/,$(patsubst %.tmpfiles,%.conf,$(notdir $(tmpfiles)))) \
@@ -81,6 +81,7 @@ install: all ## install below $(DESTDIR)$(prefix)
 	$(INSTALL) -m 644 $(python_files) $(DESTDIR)$(pythondir)/incise
 	$(if $(python_installed),printf '# Written by make install.\nLIBDIR = "%s"\nDATADIR = "%s"\n' \
 		'$(libdir)' '$(datadir)' >$(DESTDIR)$(pythondir)/incise/_installed.py)
+	$(INSTALL) -m 644 tools/_incise $(DESTDIR)$(zshcompletiondir)
 	$(INSTALL) -m 644 $(udev_rules) $(DESTDIR)$(udevrulesdir)
 	for file in $(sysusers); do \
 		$(INSTALL) -m 644 $$file \

@@ -47,6 +47,17 @@ static void parse_only(void *options, char *text)
 	struct job *job = options;
 
 	job->n_only = cli_list("only", text, job->only, BENCHMARKS_MAX);
+	for (int i = 0; i < job->n_only; i++) {
+		const char *names[BENCHMARKS_MAX] = {0};
+		const struct report_section *s = report_sections();
+		int n = 0;
+
+		for (; *s->benchmark && strcmp(s->benchmark, job->only[i]); s++)
+			if (n < BENCHMARKS_MAX - 1)
+				names[n++] = s->benchmark;
+		if (!*s->benchmark)
+			cli_unknown("benchmark", job->only[i], names);
+	}
 }
 
 static const struct cli_option options[] = {
@@ -614,21 +625,6 @@ static json_t *measure(const struct job *job)
 
 /* --- the command line --- */
 
-static void check_names(const struct job *job)
-{
-	for (int i = 0; i < job->n_only; i++) {
-		const char *names[32] = {0};
-		const struct report_section *s = report_sections();
-		int n = 0;
-
-		for (; *s->benchmark && strcmp(s->benchmark, job->only[i]); s++)
-			if (n < 31)
-				names[n++] = s->benchmark;
-		if (!*s->benchmark)
-			cli_unknown("benchmark", job->only[i], names);
-	}
-}
-
 static void parse(struct job *job, int argc, char **argv)
 {
 	*job = (struct job){0};
@@ -643,7 +639,6 @@ static void parse(struct job *job, int argc, char **argv)
 			"--report");
 	if (!*(job->folder ? job->folder : job->from))
 		cli_usage("the folder has no name");
-	check_names(job);
 }
 
 /* One line for the worst that is not as it should be. */

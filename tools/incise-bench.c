@@ -6,14 +6,15 @@
 #include <stdio.h>
 #include <string.h>
 #include "bench/bench.h"
+#include "bench/wakeup.h"
 #include "cli/file_kind.h"
 #include "cli/json.h"
 
 static void parse_profile(void *profile, char *text)
 {
-	if (strcmp(text, "needed") && strcmp(text, "full"))
-		cli_usage("--profile: '%s' is neither needed nor full", text);
-	*(const char **)profile = text;
+	static const char *const names[] = {"needed", "full", NULL};
+
+	*(const char **)profile = names[cli_choice("profile", text, names)];
 }
 
 static void parse_seed(void *seed, char *text)
@@ -37,7 +38,7 @@ static const struct cli_option options[] = {
 	 CLI_DURATION(struct bench_run, seconds, 1, 86400)},
 	{0, "load", "NAME",
 	 "loop: wake-up latency under one load only: idle,\ncpu, memory, disk or view",
-	 CLI_TEXT(struct bench_run, load)},
+	 CLI_TEXT(struct bench_run, load), .names = load_names},
 	{0, "profile", "STAGES",
 	 "scenes: run one test path of one scene for perf stat\nor callgrind, with its stages or with all: needed\nor full",
 	 CLI_PARSED(struct bench_run, profile, parse_profile)},
@@ -72,7 +73,7 @@ static void add_summary(char *text, const char *name, const char *operands,
 
 static const struct cli_command *help(void)
 {
-	static char summary[4000];
+	static char summary[4000], all[500];
 	static struct cli_command command = {
 		.name = "bench",
 		.synopsis = "BENCHMARK [OPERAND...] [OPTIONS]",
@@ -82,15 +83,19 @@ static const struct cli_command *help(void)
 			"Exit: 0 success; 1 failure, disagreement with theory or between variants, or worse\n"
 			"metrics; 2 bad usage.\n"
 			"See incise-bench(1).",
+		.operands = all,
 	};
 
+	all[0] = '\0';
 	strcpy(summary,
 	       "Measure error against run time, and stability limits; print tables, JSON or plots.\n");
 	for (int i = 0; i < N(benches); i++) {
 		const char *operands = benches[i]->operands ? benches[i]->operands : "";
 
 		add_summary(summary, benches[i]->name, operands, benches[i]->summary);
+		sprintf(all + strlen(all), "%s %s | ", benches[i]->name, operands);
 	}
+	strcat(all, "view [SCENE] | all | compare OLD.json NEW.json");
 	add_summary(
 		summary, "view", "[SCENE]",
 		"run time and error of the image of a scene;\nsee 'incise bench view --help'");

@@ -33,12 +33,14 @@ struct options {
 
 static const char *const cameras[] = {"auto", "off", "frames", "depth", NULL};
 
+static const char *const triggers[] = {"button", NULL}; /* or a force */
+
 static void parse_trigger(void *whole, char *text)
 {
 	static const struct cli_unit units[] = {{"N", 1}, {"mN", 1e-3}, {0}};
 	struct options *options = whole;
 
-	options->trigger_button = !strcmp(text, "button");
+	options->trigger_button = !strcmp(text, triggers[0]);
 	options->trigger_force_N =
 		options->trigger_button
 			? 0
@@ -67,7 +69,7 @@ static const struct cli_option option_table[] = {
 	{0, "trigger", "WHAT",
 	 "wait for the stylus's button, or for a force such as 0.2N;\n"
 	 "the second before is recorded too",
-	 CLI_PARSED_BY(parse_trigger)},
+	 CLI_PARSED_BY(parse_trigger), .names = triggers},
 	{0, "cuts", NULL, "mark beginning and end of each cut in the table events",
 	 CLI_FLAG(struct options, cuts)},
 	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct options, json)},

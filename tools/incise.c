@@ -16,6 +16,7 @@
 #include <incise/error.h>
 #include <incise/version.h>
 #include "cli/cli.h"
+#include "cli/complete.h"
 #include "cli/features.h"
 
 #define LETTERS "abcdefghijklmnopqrstuvwxyz"
@@ -205,6 +206,50 @@ static bool has_libraries(const char *program)
 	return false;
 }
 
+/* The program of a command, and of its subcommand if there is one: free(3); NULL: none here. */
+static char *program_of(const char *command, const char *subcommand)
+{
+	char *program = cli_text("%s/incise-%.64s%s%.64s", cli_folder(), command,
+				 subcommand ? "-" : "", subcommand ? subcommand : "");
+
+	if (!strchr(command, '/') && (!subcommand || !strchr(subcommand, '/')) &&
+	    !access(program, X_OK))
+		return program;
+	free(program);
+	return NULL;
+}
+
+/* Print what the last of @n words may be, which follow "incise". */
+static int complete(int n, char **words)
+{
+	char *program = n > 2 ? program_of(words[0], words[1]) : NULL;
+	bool help = n > 1 && !strcmp(words[0], "help");
+	int used = program ? 2 : 1;
+
+	if (n < 2 || (help && n == 2)) {
+		for (size_t i = 0; i < COMMANDS; i++)
+			complete_word(commands[i].name, commands[i].does);
+		for (size_t i = 0; help && i < TOPICS; i++)
+			complete_word(topics[i].name, topics[i].page);
+	}
+	if (n < 2) {
+		complete_word("help", "open the manual page of a command or file format");
+		complete_word("--help", "list the commands");
+		complete_word("--version", "print version and features");
+	}
+	if (!program && n > 1 && !help)
+		program = program_of(words[0], NULL);
+	if (program && !fflush(stdout) && has_libraries(program)) {
+		char **argv = cli_alloc((size_t)(n - used) + 3, sizeof(*argv));
+
+		argv[0] = program;
+		argv[1] = "--complete";
+		memcpy(argv + 2, words + used, (size_t)(n - used) * sizeof(*argv));
+		execv(program, argv);
+	}
+	return 0;
+}
+
 int main(int argc, char **argv)
 {
 	const char *command = argv[1];
@@ -223,6 +268,8 @@ int main(int argc, char **argv)
 		features_print(stdout);
 		return finish();
 	}
+	if (!strcmp(command, "--complete"))
+		return complete(argc - 2, argv + 2);
 	if (!strcmp(command, "help")) {
 		if (argc > 2)
 			return manual(argv[2], argv[3]);

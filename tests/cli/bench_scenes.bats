@@ -123,7 +123,7 @@ in_plan() {
 		[ -z "$output$stderr" ]
 	done
 	run --separate-stderr incise bench scenes wall --profile some
-	bad_usage "neither needed nor full"
+	bad_usage "expected needed or full"
 	run --separate-stderr incise bench scenes wall neck --profile full
 	bad_usage "one scene"
 	run --separate-stderr incise bench training --profile full

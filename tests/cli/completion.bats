@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# tools/incise.bash: what bash offers after a tab.
+# Completion in bash and zsh, tools/incise.bash and tools/_incise: what they offer after a tab, by
+# `incise --complete`.
 
 load cli
 
@@ -9,100 +10,185 @@ setup() {
 	source "$root/tools/incise.bash"
 }
 
-# complete_words WORD… : what is offered for the last word.
+# complete_words WORD… : what bash offers for the last word.
 complete_words() {
-	COMP_WORDS=("$@")
-	COMP_CWORD=$(($# - 1))
+	COMP_LINE=$(printf '%s ' "${@// /\\ }")
+	COMP_LINE=${COMP_LINE% }
+	[ -n "${*: -1}" ] || COMP_LINE="${*:1:$#-1} "
+	COMP_POINT=${#COMP_LINE}
 	COMPREPLY=()
 	_incise
 }
 
-@test "bash knows what completes incise" {
+sorted() {
+	printf '%s\n' "${COMPREPLY[@]}" | LC_ALL=C sort | tr '\n' ' ' | sed 's/ $//'
+}
+
+@test "bash completes incise" {
 	[[ "$(complete -p incise)" == *"-F _incise incise" ]]
 }
 
-@test "verbs are completed" {
+@test "commands are completed, and topics of help" {
 	complete_words incise ""
-	for verb in capture verify export train eval info plot haptic status tool view assess replay bench demo help; do
-		[[ " ${COMPREPLY[*]} " == *" $verb "* ]]
+	for verb in $(incise --help | awk '/^  [a-z]/ { print $1 }') help --help --version; do
+		[[ " ${COMPREPLY[*]} " == *" $verb "* ]] || complain "no $verb"
 	done
 	complete_words incise tr
 	[ "${COMPREPLY[*]}" = train ]
 	complete_words incise help ev
 	[ "${COMPREPLY[*]}" = eval ]
+	complete_words incise help rig
+	[ "${COMPREPLY[*]}" = "rig rig.conf" ]
 	complete_words incise nosuch
+	[ "${#COMPREPLY[@]}" -eq 0 ]
+	complete_words incise nosuch --
 	[ "${#COMPREPLY[@]}" -eq 0 ]
 }
 
-@test "options are those of --help" {
+@test "options are those of --help, of every command" {
 	complete_words incise train --m
 	[ "${COMPREPLY[*]}" = "--mf --mf-type" ]
-	complete_words incise haptic --lo
-	[ "${COMPREPLY[*]}" = --log ]
-	for verb in capture verify export train eval info plot haptic status tool assess replay stepper bench demo; do
-		complete_words incise "$verb" --
-		for option in "${COMPREPLY[@]}"; do
-			"incise-$verb" --help | grep -qE -- "^ .*$option( |\$)"
-		done
-		[[ " ${COMPREPLY[*]} " == *" --help "* ]]
-		# not one is missing
-		[ "${#COMPREPLY[@]}" -eq "$("incise-$verb" --help |
-			grep -cE '^  (-[A-Za-z],|   ) --[a-z]')" ]
+	for program in "$INCISE_BUILD"/bin/incise-*; do
+		name=${program##*/incise-}
+		# shellcheck disable=SC2086 # "calibrate-force" is two words
+		complete_words incise ${name//-/ } --
+		"$program" --help | sed -nE 's/^  (-[A-Za-z],|   ) (--[a-z-]+).*/\2/p' | sort >help
+		printf '%s\n' "${COMPREPLY[@]}" | sort | diff help - || complain "incise $name"
+		[ "$(wc -l <help)" -ge 2 ]
 	done
+	# letters, too
+	complete_words incise train -
+	[[ " ${COMPREPLY[*]} " == *" -o "* ]]
 }
 
-@test "words of calibrate are completed, and the options of each" {
+@test "values are the choices that the command accepts" {
+	while read -r option command; do
+		# shellcheck disable=SC2086
+		complete_words incise $command $option ""
+		[ "${#COMPREPLY[@]}" -ge 1 ] || complain "$command $option: none"
+		values=${COMPREPLY[*]}
+		for value in $values nosuch; do
+			# refused or not by the parser of the option, before anything else is
+			# shellcheck disable=SC2086
+			run --separate-stderr incise $command $option $value --nosuch
+			case $value in
+			nosuch) [[ "${stderr_lines[0]}" == *"$option"*"nosuch"* && "$stderr" != *"--nosuch"* ]] ;;
+			*) [[ "${stderr_lines[0]}" == *"--nosuch: no such option"* ]] ;;
+			esac || complain "$command $option $value: $stderr"
+		done
+	done <<-'END'
+		--camera capture
+		--trigger capture
+		--method compile
+		--arith eval m.fis
+		--arith haptic neck
+		--tool haptic neck
+		--policy haptic neck
+		--poses replay a.rec neck
+		--reference-stream calibrate delay
+		--only calibrate check
+		--mf-type train
+		--profile bench
+	END
+	complete_words incise haptic neck --policy f
+	[ "${COMPREPLY[*]}" = fifo ]
+	complete_words incise bench loop --load ""
+	[ "${COMPREPLY[*]}" = "idle cpu memory disk view" ]
+	# lists: the item behind the last comma
+	complete_words incise bench all --only pose,stab
+	[ "${COMPREPLY[*]}" = pose,stability ]
+	# as bash takes "--policy=fi" apart
+	complete_words incise haptic neck --policy=fi
+	[ "${COMPREPLY[*]}" = fifo ]
+	# a number has none
+	complete_words incise train --epochs ""
+	[ "${#COMPREPLY[@]}" -eq 0 ]
+}
+
+@test "operands are completed as the synopsis has them" {
 	complete_words incise calibrate ""
 	[ "${COMPREPLY[*]}" = "force depth tip delay stepper check" ]
-	complete_words incise calibrate st
-	[ "${COMPREPLY[*]}" = stepper ]
-	complete_words incise calibrate --h
-	[ "${COMPREPLY[*]}" = --help ]
-	for program in "$root"/tools/incise-calibrate-*.c; do
-		[ -e "$program" ] || continue
-		word=$(basename "$program" .c)
-		complete_words incise calibrate "${word##*-}" --
-		[ "${#COMPREPLY[@]}" -eq "$("$word" --help |
-			grep -cE '^  (-[A-Za-z],|   ) --[a-z]')" ]
-	done
+	complete_words incise calibrate depth ""
+	[ "${COMPREPLY[*]}" = "two-point line board" ]
+	complete_words incise bench ""
+	[ "${COMPREPLY[*]}" = "$(incise bench --help | awk '/^  [a-z]/ { printf "%s ", $1 } /^compare/ { print $1; exit }')" ]
+	complete_words incise bench st
+	[ "${COMPREPLY[*]}" = stability ]
+	complete_words incise stepper mo
+	[ "${COMPREPLY[*]}" = move ]
+	complete_words incise stepper move ""
+	[ "${#COMPREPLY[@]}" -eq 0 ]
+	complete_words incise tool neck ""
+	[ "${COMPREPLY[*]}" = "blade handle tube auto" ]
+	# options in between are no operands, and their arguments neither
+	complete_words incise tool --json neck tu
+	[ "${COMPREPLY[*]}" = tube ]
+	complete_words incise replay --log ticks.csv a.rec ne
+	[[ " ${COMPREPLY[*]} " == *" neck "* ]]
 }
 
-@test "loops that told their state are completed, beside files" {
+@test "scenes are those of the folder and the installed ones" {
+	touch mine.scene
+	complete_words incise haptic ""
+	for scene in mine liver neck wall mine.scene; do
+		[[ " ${COMPREPLY[*]} " == *" $scene "* ]]
+	done
+	complete_words incise plan mi
+	[ "${COMPREPLY[*]}" = "mine mine.scene" ]
+	complete_words incise bench scenes liver ne
+	[ "${COMPREPLY[*]}" = neck ]
+}
+
+@test "recordings, calibrations, models and data are files with such names" {
+	touch pairs.csv "two words.csv" my.conf m.fis m.fx p.plan old.json s.session
+	mkdir cuts.rec folder
+	complete_words incise verify ""
+	[ "$(sorted)" = "cuts.rec folder" ]
+	complete_words incise export cuts.rec -c ""
+	[ "$(sorted)" = "cuts.rec folder my.conf" ]
+	complete_words incise haptic neck --model m
+	[ "$(sorted)" = "m.fis m.fx" ]
+	complete_words incise train pa
+	[ "$(sorted)" = pairs.csv ]
+	complete_words incise train tw
+	[ "${COMPREPLY[0]}" = "two words.csv" ]
+	complete_words incise train "two words.csv" --check 0.3 --js
+	[ "$(sorted)" = --json ]
+	complete_words incise bench compare old.json o
+	[ "$(sorted)" = old.json ]
+	complete_words incise assess ""
+	[ "$(sorted)" = "cuts.rec folder s.session" ]
+	complete_words incise info m
+	[ "$(sorted)" = "m.fis m.fx" ]
+	complete_words incise bench all --report ""
+	[ "$(sorted)" = "cuts.rec folder" ]
+	# where none has such a name, any file
+	complete_words incise train m.f
+	[ "$(sorted)" = "m.fis m.fx" ]
+}
+
+@test "rigs are files, and keys of the simulated one" {
+	touch rig.conf
+	complete_words incise capture --rig ""
+	[ "$(sorted)" = "rig.conf sim: sim:clock=simulated" ]
+	# behind the colon, as bash takes it apart
+	complete_words incise capture --rig sim:se
+	[ "$(sorted)" = "seed=" ]
+	complete_words incise capture --rig sim:seed=7,clo
+	[ "$(sorted)" = "7,clock=" ]
+	COMP_WORDBREAKS=${COMP_WORDBREAKS//[:=]/}
+	complete_words incise capture --rig sim:se
+	[ "$(sorted)" = "sim:seed=" ]
+}
+
+@test "loops are those that have a page here" {
 	mkdir -p run/incise
 	touch run/incise/neck.state run/incise/nose.state nest.state
 	export XDG_RUNTIME_DIR=$PWD/run
-	complete_words incise status ne
-	[ "${COMPREPLY[*]}" = "nest.state neck" ]
-	complete_words incise tool ne
-	[ "${COMPREPLY[*]}" = "nest.state neck" ]
-	complete_words incise tool neck ""
-	[ "${COMPREPLY[*]}" = "blade handle tube auto" ]
-	complete_words incise tool neck tu
-	[ "${COMPREPLY[*]}" = tube ]
-}
-
-@test "what bench measures is completed" {
-	touch stale.csv
-	complete_words incise bench ""
-	[ "${COMPREPLY[*]}" = "precision training stability loop pose timeline vision capture scenes integers extremes view all compare" ]
-	complete_words incise bench st
-	[ "${COMPREPLY[*]}" = stability ]
-	complete_words incise bench precision st
-	[ "${COMPREPLY[*]}" = stale.csv ]
-}
-
-@test "commands of stepper are completed, and the word beside files of info" {
-	touch stale.csv
-	complete_words incise stepper ""
-	[ "${COMPREPLY[*]}" = "status enable disable move jog home clear" ]
-	complete_words incise stepper mo
-	[ "${COMPREPLY[*]}" = move ]
-	complete_words incise info st
-	[ "${COMPREPLY[*]}" = "stale.csv stepper" ]
-	complete_words incise info stepper st
-	[ "${COMPREPLY[*]}" = stale.csv ]
-	complete_words incise info dev
-	[ "${COMPREPLY[*]}" = devices ]
+	for command in status tool; do
+		complete_words incise $command ne
+		[ "${COMPREPLY[*]}" = "neck nest.state" ] || complain "$command: ${COMPREPLY[*]}"
+	done
 }
 
 @test "buses of info are completed: their word, then what there is of them" {
@@ -110,33 +196,88 @@ complete_words() {
 	[ "${COMPREPLY[*]}" = can: ]
 	complete_words incise info sl
 	[ "${COMPREPLY[*]}" = slcan: ]
-	# as bash takes "can:can" apart
-	export INCISE_SYS=$PWD/sys
-	mkdir -p sys/class/net/{can0,can1,eth0,vcan0}
-	echo 280 | tee sys/class/net/{can0,can1,vcan0}/type
-	echo 1 >sys/class/net/eth0/type
-	complete_words incise info can :
-	[ "${COMPREPLY[*]}" = "can0 can1 vcan0" ]
-	complete_words incise info can : can
-	[ "${COMPREPLY[*]}" = "can0 can1" ]
-	complete_words incise info can : x
+	complete_words incise info slcan:/dev/ttyNONE
 	[ "${#COMPREPLY[@]}" -eq 0 ]
-	complete_words incise info slcan : /dev/ttyNONE
-	[ "${#COMPREPLY[@]}" -eq 0 ]
+	unshare -rm true 2>/dev/null || skip "no user namespaces"
+	mkdir -p net/{can0,can1,eth0,vcan0}
+	echo 280 | tee net/{can0,can1,vcan0}/type
+	echo 1 >net/eth0/type
+	run -0 unshare -rm sh -c "mount --bind net /sys/class/net && incise --complete info can:"
+	[ "$(grep ^can: <<<"$output" | cut -f1 | tr '\n' ' ')" = "can:can0 can:can1 can:vcan0 " ]
 }
 
-@test "files are completed otherwise" {
-	touch data.csv "two words.csv"
-	mkdir data.rec
-	complete_words incise train da
-	[ "${COMPREPLY[*]}" = "data.csv data.rec" ] || [ "${COMPREPLY[*]}" = "data.rec data.csv" ]
-	complete_words incise train two
-	[ "${COMPREPLY[0]}" = "two words.csv" ]
-	complete_words incise train -o da
-	[ "${#COMPREPLY[@]}" -eq 2 ]
+@test "completion starts nothing and writes nothing" {
+	touch calibration.conf
+	for program in "$INCISE_BUILD"/bin/incise-*; do
+		"$program" --complete "" >/dev/null
+		"$program" --complete -o new --rig sim: "" >/dev/null
+	done
+	[ "$(ls -A)" = calibration.conf ]
+	# nor has an error an output
+	run -0 --separate-stderr incise --complete export a.rec --average x --nosuch ""
+	[ -z "$stderr" ]
+	run -0 --separate-stderr incise --complete
+	[ -z "$stderr" ]
 }
 
-@test "options of a verb that does not exist are none" {
-	complete_words incise nosuch --
-	[ "${#COMPREPLY[@]}" -eq 0 ]
+# Type keys at a shell on a terminal, and print what is there after each tab. \t is a tab.
+typed_at() { # SHELL… -- SETUP KEYS
+	python3 - "$@" <<-'END'
+		import os, pty, select, sys, time
+		split = sys.argv.index("--")
+		shell, (setup, keys) = sys.argv[1:split], sys.argv[split + 1:]
+		pid, fd = pty.fork()
+		if pid == 0:
+		    os.environ.update(TERM="dumb", PS1="> ")
+		    os.execvp(shell[0], shell)
+
+		def until(text, seconds=60):
+		    """What comes up to a text; all of it where that does not come."""
+		    got, end = b"", time.monotonic() + seconds
+		    while text not in got and time.monotonic() < end:
+		        if select.select([fd], [], [], 0.1)[0]:
+		            try:
+		                got += os.read(fd, 65536)
+		            except OSError:
+		                break
+		    return got
+
+		# What the shell echoes of the setup has a quote where the prompt has none.
+		os.write(fd, setup.encode() + b"; PS1='read''y> '\n")
+		until(b"\nready> ")
+		keys, want = keys.split("=>")
+		os.write(fd, keys.replace("\\t", "\t").encode())
+		text = until(want.encode())
+		os.write(fd, b"\x15exit\n")
+		os.close(fd)
+		os.waitpid(pid, 0)
+		sys.exit(want not in text.decode(errors="replace") and repr(text))
+	END
+}
+
+@test "a tab in bash completes" {
+	typed_at bash --norc -i -- "source '$root/tools/incise.bash'" 'incise verif\t=>verify '
+	typed_at bash --norc -i -- "source '$root/tools/incise.bash'" 'incise haptic neck --policy=fi\t=>--policy=fifo '
+	typed_at bash --norc -i -- "source '$root/tools/incise.bash'" 'incise capture --rig sim:see\t=>sim:seed='
+}
+
+@test "a tab in zsh completes, with descriptions" {
+	command -v zsh >/dev/null || skip "zsh is not installed"
+	touch "two words.csv"
+	begin="unsetopt zle_bracketed_paste prompt_cr prompt_sp 2>/dev/null; fpath=('$root/tools' \$fpath); autoload -U compinit; compinit -u -D; stty cols 200 rows 100"
+	while IFS= read -r keys; do
+		typed_at zsh -f -i -- "$begin" "$keys"
+	done <<-'END'
+		incise verif\t=>verify 
+		incise train --mf-type ga\t=>gaussmf 
+		incise haptic neck --policy=fi\t=>--policy=fifo 
+		incise capture --rig sim:see\t=>sim:seed=
+		incise train two\t=>two\ words.csv 
+		incise bench stab\t=>stability 
+		incise plan ne\t=>neck 
+		incise calibrate dep\t=>depth 
+		incise train --classi\t=>--classic 
+		incise ex\t=>export 
+		incise train --in\t\t=>input columns
+	END
 }

@@ -58,6 +58,7 @@ setup() {
 		cmp "$schema" "$dest/usr/share/incise/schema/${schema##*/}"
 	done
 	cmp "$root/tools/incise.bash" "$dest/usr/share/bash-completion/completions/incise"
+	cmp "$root/tools/_incise" "$dest/usr/share/zsh/site-functions/_incise"
 	for lib in incise incise-learn incise-record; do
 		[ -f "$dest/usr/lib/lib$lib.so" ]
 		[ "$(readlink "$dest/usr/lib/lib$lib.so")" = lib$lib.so.2 ]

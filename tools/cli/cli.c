@@ -21,10 +21,12 @@
 #include <incise/rig.h>
 #include <incise/version.h>
 #include "cli.h"
+#include "complete.h"
 #include "file_kind.h"
 
 #define OPTIONS_MAX 40
 #define OVERWRITE 1 /* of getopt, no letter */
+#define LONG 256    /* first of the numbers of long options */
 
 static const struct cli_command *current;
 static bool status_line, verbose;
@@ -45,7 +47,7 @@ static void print_help(const struct cli_command *command)
 	printf("Usage: incise %s %s\n\n%s\n\nOptions:\n", command->name,
 	       command->synopsis, command->summary);
 	for (const struct cli_option *opt = command->options; opt->name; opt++) {
-		bool letter = opt->id && opt->id < CLI_LONG;
+		bool letter = opt->id;
 		const char *help = opt->help;
 		char left[64];
 
@@ -190,9 +192,9 @@ static const struct cli_option *next(const struct cli_command *command, int argc
 		/* Each has a number of its own, or getopt would complete "--m" to any. */
 		longs[n] = (struct option){opt->name,
 					   opt->arg ? required_argument : no_argument,
-					   NULL, CLI_LONG + n};
+					   NULL, LONG + n};
 		n++;
-		if (opt->id && opt->id < CLI_LONG) {
+		if (opt->id) {
 			*s++ = (char)opt->id;
 			if (opt->arg)
 				*s++ = ':';
@@ -205,7 +207,7 @@ static const struct cli_option *next(const struct cli_command *command, int argc
 	opterr = 0;
 	id = getopt_long(argc, argv, shorts, longs, NULL);
 	switch (id) {
-	case CLI_END:
+	case -1:
 		return NULL;
 	case OVERWRITE:
 		cli_allow_overwrite();
@@ -224,18 +226,11 @@ static const struct cli_option *next(const struct cli_command *command, int argc
 	case '?':
 		refuse(command, argv[optind - 1], optopt);
 	}
-	if (id >= CLI_LONG)
-		return &options[id - CLI_LONG];
+	if (id >= LONG)
+		return &options[id - LONG];
 	while (options->id != id)
 		options++;
 	return options;
-}
-
-int cli_next(const struct cli_command *command, int argc, char **argv)
-{
-	const struct cli_option *opt = next(command, argc, argv);
-
-	return opt ? opt->id : CLI_END;
 }
 
 static void store_integer(const struct cli_option *opt, void *member)
@@ -253,8 +248,6 @@ static void store(const struct cli_option *opt, void *member)
 	char what[64];
 
 	switch (opt->kind) {
-	case CLI_KIND_NONE:
-		break;
 	case CLI_KIND_FLAG:
 		*(bool *)member = true;
 		break;
@@ -330,10 +323,41 @@ static void expect(const struct cli_command *command, const void *options)
 	}
 }
 
+/* The choices of an option: what cli_choice() expects in the function that parses it. */
+static void *completed; /* the command's struct, while a command line is completed */
+
+static void list_choices(const struct cli_option *opt)
+{
+	char nothing[] = "\001";
+
+	opt->parse((char *)completed + opt->offset, nothing);
+}
+
+static void complete(const struct cli_command *command, int n, char **words,
+		     void *options)
+{
+	current = command;
+	completed = options;
+	complete_command(command, n, words, list_choices);
+	exit(0);
+}
+
+/* While a command line is completed, names that are expected are the answer. */
+static void answer(const char *const *names)
+{
+	if (!completed)
+		return;
+	for (int i = 0; names[i]; i++)
+		complete_word(names[i], NULL);
+	exit(0);
+}
+
 void cli_parse(const struct cli_command *command, int argc, char **argv, void *options)
 {
 	const struct cli_option *opt;
 
+	if (argc > 1 && !strcmp(argv[1], "--complete"))
+		complete(command, argc - 2, argv + 2, options);
 	while ((opt = next(command, argc, argv)))
 		store(opt, (char *)options + opt->offset);
 	cli_input("-");
@@ -397,6 +421,8 @@ static void say(int level, const char *fmt, va_list args)
 				 : level == LOG_WARNING ? CLI_BOLD
 							: CLI_PLAIN;
 
+	if (completed) /* there is no answer */
+		exit(0);
 	cli_progress_end();
 	vsnprintf(text, sizeof(text), fmt, args);
 	/* Text from outside must not break the line or control the terminal. */
@@ -498,6 +524,7 @@ void cli_unknown(const char *what, const char *name, const char *const *names)
 {
 	const char *nearest = incise_nearest_name(name, names);
 
+	answer(names);
 	if (nearest)
 		cli_usage("unknown %s '%s'; did you mean '%s'?", what, name, nearest);
 	cli_usage("unknown %s '%s'; expected %s", what, name, one_of(names));
@@ -591,6 +618,7 @@ int cli_choice(const char *option, const char *text, const char *const *names)
 {
 	const char *nearest = incise_nearest_name(text, names);
 
+	answer(names);
 	for (int i = 0; names[i]; i++)
 		if (!strcmp(text, names[i]))
 			return i;

@@ -19,7 +19,6 @@
 
 /* The way cli_parse() stores the argument of an option; see the macros below. */
 enum cli_kind {
-	CLI_KIND_NONE,
 	CLI_KIND_FLAG,
 	CLI_KIND_TEXT,
 	CLI_KIND_INPUT,
@@ -33,12 +32,11 @@ enum cli_kind {
 	CLI_KIND_PARSED,
 };
 
-/* Rows for cli_next() end with the help. */
 #pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 
 /* An option; a table of them ends with {0}. */
 struct cli_option {
-	int id;		  /* its letter, 0, or for cli_next() a number from CLI_LONG on */
+	int id;		  /* its letter, or 0 */
 	const char *name; /* long name */
 	const char *arg;  /* name of its argument, or NULL */
 	const char *help; /* one line; may hold newlines */
@@ -48,7 +46,7 @@ struct cli_option {
 	size_t offset, size; /* of the member in the command's struct */
 	double min, max;
 	const struct cli_unit *units;
-	const char *const *names;
+	const char *const *names; /* choices; of other kinds for completion only */
 	void (*parse)(void *member, char *text);
 };
 
@@ -101,9 +99,6 @@ struct cli_option {
 	.kind = CLI_KIND_PARSED, CLI_MEMBER(type, member, void), .parse = (function)
 #define CLI_PARSED_BY(function) .kind = CLI_KIND_PARSED, .parse = (function)
 
-#define CLI_LONG 256 /* first id of options without a letter */
-#define CLI_END (-1)
-
 /* The row of the rig to use, without its braces. */
 #define CLI_RIG_OPTION(type, member)                                        \
 	'r', "rig", "RIG",                                                  \
@@ -117,6 +112,8 @@ struct cli_command {
 	const char *summary;  /* one sentence for --help */
 	const struct cli_option *options;
 	const char *notes; /* examples and exit codes, below the options; or NULL */
+	/* All operands as a synopsis, "move MM | home", if .synopsis does not have them; or NULL. */
+	const char *operands;
 };
 
 /*
@@ -125,9 +122,6 @@ struct cli_command {
  * that are files, and paths of CLI_INPUT, are inputs; those of CLI_OUTPUT are outputs.
  */
 void cli_parse(const struct cli_command *command, int argc, char **argv, void *options);
-
-/* The same by hand: the next option's id, with its argument in optarg, or CLI_END. */
-int cli_next(const struct cli_command *command, int argc, char **argv);
 
 /*
  * A file or recording that is read. If an output is it, or would lie in it, the program fails,
