@@ -70,7 +70,7 @@ static const struct cli_option options[] = {
 	 "report what changed beyond noise since that report.json",
 	 CLI_INPUT(struct job, against)},
 	{0, "only", "LIST", "these benchmarks only", CLI_PARSED_BY(parse_only)},
-	{0, "quick", NULL, "smoke test with few points and repeats, not for\npublication",
+	{0, "quick", NULL, "smoke test: few points and repeats, not for publication",
 	 CLI_FLAG(struct job, quick)},
 	{0, "json", NULL, "print report.json, too", CLI_FLAG(struct job, json)},
 	{0},
