@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# bash completion for incise. `incise --complete WORD…` says what the last word may be, from the
-# tables that --help is printed from, so that nothing is listed here; tools/cli/complete.h has the
-# form of its answer.
+# bash completion for incise. `incise --complete WORD…` prints the words that may replace the last
+# one, from the tables of --help, so that nothing is listed here; tools/cli/complete.h documents the
+# form of its output.
 # shellcheck shell=bash
 
 _incise()

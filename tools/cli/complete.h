@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * Words that may follow in a command line, for the completion of bash and zsh: tools/incise.bash
- * and tools/_incise run `incise --complete WORD…`, whose last word is to be completed. It answers
+ * and tools/_incise run `incise --complete WORD…`, whose last word is to be completed. The words come
  * from the tables of options and from the synopsis that --help prints. A line each:
  *
  *     VALUE<TAB>DESCRIPTION    a word
