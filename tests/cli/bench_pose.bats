@@ -70,7 +70,7 @@ at_most() {
 @test "bench pose lists what is worse than no tracker, and why" {
 	quick_report pose
 	[ "$(of rows 'count(*)' '(failed IS NULL) <> (rms_error_mm <= spread_mm)')" = 0 ]
-	[ "$(of rows 'count(*)' "failed NOT LIKE 'worse than no tracker: off by % mm, where%'")" = 0 ]
+	[ "$(of rows 'count(*)' "failed NOT LIKE 'worse than no tracker: error % mm, that of%'")" = 0 ]
 	# two noisy poses a millisecond apart say nothing of a tremor that is 12 ms away
 	[ "$(of rows 'count(*)' "name = 'line' AND motion = 'tremor' AND tracker_hz = 1000
 		AND failed IS NOT NULL")" = 2 ]
