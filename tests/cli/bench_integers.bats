@@ -27,5 +27,5 @@ setup() {
 	[[ "$output" =~ $'\n'wall\ +[0-9.]+\ +[0-9.]+\ +[0-9.]+\  ]]
 	[ -s over.png ]
 	run --separate-stderr incise bench integers none
-	failed_with "no file none, and no scene of that name"
+	failed_with "none: no such scene"
 }
