@@ -219,11 +219,26 @@ check-layers: libs ## no layer of lib/ uses a higher one
 doc: ## reference of the public headers in build/doc/html; fails where a comment is missing
 	@mk/deps doc
 	@mk/doc $(abspath $(O))/doc $(version)
-	@echo $(O)/doc/html/index.html
+	@cd $(O)/doc/html && PYTHONPATH=$(abspath python) PYTHONDONTWRITEBYTECODE=1 \
+		python3 -m pydoc -w incise $(patsubst python/incise/%.py,incise.%,$(filter-out \
+		python/incise/_% python/incise/sklearn.py,$(wildcard python/incise/*.py))) >/dev/null
+	@echo $(O)/doc/html/index.html and $(O)/doc/html/incise.html, of incise for Python
+
+# The documents of the notebooks, with figures; tests only run the code.
+notebooks: all ## run doc/notebooks and write them with their figures to build/notebooks
+	@tests/venv doc/notebooks $(O)/notebooks 'no notebooks are written'
+	@for source in doc/notebooks/*.py; do \
+		name=$$(basename $$source .py); \
+		PATH=$(abspath $(O))/bin:$(abspath $(O))/notebooks/venv/bin:$$PATH PYTHONPATH=$(abspath python) \
+			sh -ec 'jupytext -q --to ipynb --execute -o $(O)/notebooks/$$0.ipynb doc/notebooks/$$0.py; \
+			jupyter nbconvert --log-level ERROR --to markdown --output-dir $(O)/notebooks \
+			$(O)/notebooks/$$0.ipynb' $$name || exit 1; \
+		echo $(O)/notebooks/$$name.md; \
+	done
 
 check-doc: doc
 
-.PHONY: doc check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests check-attack check-sanitize check-python-sanitize check-tsan can-drive mcap-reader python-peers
+.PHONY: doc notebooks check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests check-attack check-sanitize check-python-sanitize check-tsan can-drive mcap-reader python-peers
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so

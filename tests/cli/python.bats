@@ -51,3 +51,26 @@ python_tests() {
 	[ -x "$peers" ] || skip "pip could not install tests/python/requirements.txt"
 	python_tests "$peers" -m unittest -v test_model.Estimator
 }
+
+# Cells are comments: the same file is a program. make notebooks runs it as a notebook.
+@test "python: notebooks run" {
+	[ -x "$peers" ] || skip "pip could not install tests/python/requirements.txt"
+	cd "$BATS_TEST_TMPDIR"
+	for notebook in "$root"/doc/notebooks/*.py; do
+		echo "$notebook"
+		MPLBACKEND=Agg run -0 "$peers" "$notebook"
+	done
+	[[ "$output" == *"largest difference"*" mN"* ]]
+}
+
+@test "python: the examples of its README" {
+	command -v incise
+	cd "$BATS_TEST_TMPDIR"
+	incise capture -o liver.rec --rig sim:seed=1,clock=simulated
+	sed -n '/^```python$/,/^```$/p' "$root/python/README.md" | sed '/^```/d' >readme.py
+	[ "$(wc -l <readme.py)" -gt 15 ]
+	[ -x "$peers" ] || skip "pip could not install tests/python/requirements.txt"
+	run -0 "$peers" readme.py
+	[ -s liver.fis.sd ]
+	[ -s liver.fx ]
+}

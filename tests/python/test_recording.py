@@ -385,6 +385,12 @@ class Import(Case):
         for name in incise.__all__:
             self.assertTrue(hasattr(incise, name), name)
         self.assertRaises(AttributeError, lambda: incise.nothing)
+        for name in incise.__all__:
+            thing = getattr(incise, name)
+            self.assertTrue(isinstance(thing, str) or thing.__doc__, name)
+            for key, value in vars(thing).items() if isinstance(thing, type) else ():
+                if not key.startswith("_") and (callable(value) or isinstance(value, property)):
+                    self.assertTrue(value.__doc__, f"{name}.{key}")
         with open(os.path.join(SOURCE, "lib/include/incise/version.h")) as file:
             self.assertIn(f'#define INCISE_VERSION "{incise.__version__}"', file.read())
 
