@@ -14,7 +14,7 @@ from ._library import Error, Invalid, NotFound
 from .arrow import Batch, Field, Table
 from .model import CompiledModel, Model, TrainReport, Variable, load, train
 from .plan import Plan, Stability, Tick
-from .recording import Info, Recording, Stream, open
+from .recording import Frame, Info, Recording, Stream, open
 from .verify import Finding, Report, verify
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "Error",
     "Field",
     "Finding",
+    "Frame",
     "Info",
     "Invalid",
     "Model",

@@ -290,6 +290,22 @@ class CalibrationStruct(ctypes.Structure):
     c_name = "struct incise_calibration"
 
 
+class FrameStruct(ctypes.Structure):
+    """struct incise_camera_frame"""
+
+    _fields_ = [
+        ("t_ns", c_int64),
+        ("seq", c_uint64),
+        ("width", c_int),
+        ("height", c_int),
+        ("stride", c_int),
+        ("pixels", c_int),
+        ("data", c_void_p),
+        ("size", ctypes.c_size_t),
+    ]
+    c_name = "struct incise_camera_frame"
+
+
 ExportProgress = ctypes.CFUNCTYPE(c_int, c_void_p, c_double)
 
 

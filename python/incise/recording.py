@@ -15,7 +15,9 @@ from ._library import (
     CalibrationStruct,
     ExportOptions,
     Failure,
+    FrameStruct,
     Invalid,
+    NotFound,
     RecordingInfo,
     function,
     text,
@@ -44,6 +46,15 @@ _library.declare(
             ctypes.c_void_p,
         ),
         "incise_export_options_init": (None, ctypes.POINTER(ExportOptions)),
+        "incise_frame_reader_new": (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p),
+        "incise_frame_reader_free": (None, ctypes.c_void_p),
+        "incise_frame_reader_at": (
+            ctypes.c_int,
+            ctypes.c_void_p,
+            ctypes.c_int64,
+            ctypes.POINTER(FrameStruct),
+            ctypes.c_void_p,
+        ),
     },
 )
 _library.declare(
@@ -121,6 +132,43 @@ def _values(struct: ctypes.Structure, names: Tuple[str, ...]) -> Iterator[Any]:
         yield value
 
 
+class Frame(NamedTuple):
+    """A frame of the camera."""
+
+    t_ns: int  #: middle of the exposure, CLOCK_MONOTONIC
+    seq: int  #: a gap is a lost frame
+    image: Any  #: numpy array of bytes: height × width × 3 (red first), or height × width
+
+
+def _pixels(frame: FrameStruct) -> Any:
+    """The frame as an array of its own."""
+    import numpy
+
+    data = numpy.frombuffer(ctypes.string_at(frame.data, frame.size), numpy.uint8)
+    if frame.pixels == 3:  # MJPEG
+        import io
+
+        try:
+            from PIL import Image
+        except ImportError:
+            raise NotFound(
+                errno.ENOENT,
+                "frames are JPEG, which Pillow decodes; install python3-pil, or pip install pillow",
+            ) from None
+        return numpy.asarray(Image.open(io.BytesIO(data.tobytes())).convert("RGB"))
+    rows = data.reshape(frame.height, frame.stride)
+    if frame.pixels == 0:
+        return rows[:, : 3 * frame.width].reshape(frame.height, frame.width, 3).copy()
+    if frame.pixels == 1:
+        return rows[:, : frame.width].copy()
+    # YUYV of BT.601 with luma from 16 to 235, as cameras send it
+    pairs = rows[:, : 2 * frame.width].reshape(frame.height, frame.width // 2, 4).astype(float)
+    y = pairs[:, :, (0, 2)].reshape(frame.height, frame.width) - 16
+    u, v = (numpy.repeat(pairs[:, :, i] - 128, 2, axis=1) for i in (1, 3))
+    rgb = (1.164 * y + 1.596 * v, 1.164 * y - 0.813 * v - 0.392 * u, 1.164 * y + 2.017 * u)
+    return numpy.rint(numpy.clip(numpy.stack(rgb, axis=2), 0, 255)).astype(numpy.uint8)
+
+
 def load_calibration(path: Optional[PathLike]) -> CalibrationStruct:
     """Read a calibration.conf; None: the nominal values of Song et al. (2006)."""
     calibration = CalibrationStruct()
@@ -154,6 +202,8 @@ class Recording:
         self._process = os.getpid()
         self._damaged = damaged
         self._checked = False
+        self._frames: Optional[int] = None
+        self._start_ns: Optional[int] = None
         self._calibration = load_calibration(calibration) if calibration is not None else None
         self.path = os.fspath(path)
         failure = Failure()
@@ -181,8 +231,9 @@ class Recording:
         """Close it; again is harmless."""
         with self._lock:
             if self._pointer and self._process == os.getpid():
+                function("incise_frame_reader_free")(self._frames)
                 function("incise_recording_close")(self._pointer)
-            self._pointer = None
+            self._pointer = self._frames = None
 
     def _open(self) -> int:
         if self._process != os.getpid():
@@ -209,6 +260,26 @@ class Recording:
             Stream(*_values(struct.streams[i], Stream._fields)) for i in range(struct.n_streams)
         )
         return Info(*_values(struct, Info._fields[:-1]), streams)
+
+    def frame(self, t: float) -> Frame:
+        """The frame nearest to t, in seconds since the first force sample (as the column t_s); needs
+        numpy, and Pillow for a camera that sends JPEG. Going forward is quick."""
+        if self._start_ns is None:
+            self._start_ns = self.info.start_ns
+        start_ns = self._start_ns
+        failure, frame = Failure(), FrameStruct()
+        with self._lock:
+            recording = self._open()
+            if self._frames is None:
+                self._frames = failure.require(
+                    function("incise_frame_reader_new")(recording, failure.ref)
+                )
+            failure.check(
+                function("incise_frame_reader_at")(
+                    self._frames, start_ns + round(t * 1e9), ctypes.byref(frame), failure.ref
+                )
+            )
+            return Frame(frame.t_ns, frame.seq, _pixels(frame))
 
     # --- tables --------------------------------------------------------------------------
 

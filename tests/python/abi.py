@@ -17,7 +17,7 @@ import incise
 from incise import _library, arrow, calibrate, model, plan, recording, verify
 
 HEADERS = (
-    "arrow calibrate_depth calibrate_force calibrate_tip calibration fixed model plan recording "
+    "arrow camera calibrate_depth calibrate_force calibrate_tip calibration fixed model plan recording "
     "stability tracker train uncertainty verify"
 ).split()
 

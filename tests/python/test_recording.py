@@ -11,7 +11,7 @@ import threading
 import unittest
 
 import incise
-from fixtures import SANITIZED, SOURCE, Case, has, run
+from fixtures import SANITIZED, SHORT, SOURCE, Case, has, run
 
 STREAMS = ("force", "tracker", "depth", "frames", "events")
 
@@ -280,6 +280,31 @@ class Recordings(Case):
             capture.wait()
         with incise.open(self.path("live.rec")) as rec:
             self.assertTrue(rec.info.complete)
+
+    @unittest.skipUnless(has("numpy"), "numpy is not installed")
+    def test_frames(self):
+        """By time, in any order; the simulated camera is 640 x 480 pixels over liver."""
+        self.says(incise.Error, "camera.mkv", self.rec.frame, 0.5)
+        path = self.path("seen.rec")
+        run("incise", "capture", "-o", path, "--rig", SHORT, "--camera", "frames",
+            "--duration", "2s")
+        rec = incise.open(path)
+        table = rows(rec.frames)
+        start = rec.info.start_ns
+        if not table["seq"]:
+            self.skipTest("no module writes frames here")
+        seen = {}
+        for i in (5, 40, 41, 3, len(table["seq"]) - 1, 5):
+            frame = rec.frame((table["t_ns"][i] - start) * 1e-9)
+            self.assertEqual(frame.seq, table["seq"][i])
+            self.assertEqual(frame.image.shape, (480, 640, 3))
+            seen.setdefault(i, frame.image.tobytes())
+            self.assertEqual(frame.image.tobytes(), seen[i])
+        self.assertEqual(len(set(seen.values())), 5)
+        self.assertEqual(rec.frame(-1e9).seq, table["seq"][0])
+        self.assertEqual(rec.frame(1e9).seq, table["seq"][-1])
+        rec.close()
+        self.says(incise.Invalid, "is closed", rec.frame, 0)
 
     @unittest.skipUnless(has("numpy"), "numpy is not installed")
     def test_numpy(self):

@@ -144,6 +144,35 @@ INCISE_API int incise_recording_lengths(struct incise_recording *recording,
 					struct incise_recording_length **lengths,
 					struct incise_error *err);
 
+struct incise_camera_frame;
+struct incise_frame_reader;
+
+/**
+ * Read the frames of a recording's camera.mkv, by their times.
+ *
+ * @return reader, to be freed with incise_frame_reader_free(); it reads by connections of its own.
+ *         NULL with errno ENOTSUP (a recording of form 1), ENODATA (without frames), EINVAL, EIO,
+ *         ENOMEM; ENOENT, ENOEXEC (the file, or the module that reads it).
+ */
+INCISE_API struct incise_frame_reader *incise_frame_reader_new(
+	struct incise_recording *recording, struct incise_error *err);
+
+/** NULL is accepted. */
+INCISE_API void incise_frame_reader_free(struct incise_frame_reader *reader);
+
+/**
+ * Get the frame of the row of table frames whose t_ns is nearest. Frames before the last one that
+ * was read make it start at the file's beginning; later ones are quick.
+ *
+ * @param frame t_ns is that of the row, CLOCK_MONOTONIC; data as the camera sent it (MJPEG) or
+ *              without row padding, valid until the next call
+ * @return 0; -ENODATA (no row), -EBADMSG (the frame is missing in the file or was altered), -EINVAL,
+ *         -EIO, -ENOMEM.
+ */
+INCISE_API int incise_frame_reader_at(struct incise_frame_reader *reader, int64_t t_ns,
+				      struct incise_camera_frame *frame,
+				      struct incise_error *err);
+
 /** Options of an export. */
 struct incise_export_options {
 	/** Rows per second of raw export, each with mean force; 0: every force sample. */

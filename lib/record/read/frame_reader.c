@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Frames of a recording by their times; see incise/recording.h. The table has the times, the file the
+ * frames in the same order; the ones before are read without decoding them.
+ *
+ *     rows    ──┬────┬────┬────►    nearest to t: number n, and its seq
+ *     file    ──┴────┴────┴────►    n frames are skipped, the next one is decoded
+ */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../frames.h"
+#include "../schema.h"
+#include "recording.h"
+
+struct incise_frame_reader {
+	struct incise_recording *recording;
+	struct incise_frames_reader *file;
+	uint64_t passed; /* frames of the file */
+};
+
+static int open_file(struct incise_frame_reader *reader, struct incise_error *err)
+{
+	char *path;
+
+	if (asprintf(&path, "%s/%s", reader->recording->path, INCISE_FRAMES_FILE) < 0)
+		return incise_error_set(err, ENOMEM, "%s: out of memory",
+					reader->recording->path);
+	incise_frames_reader_close(reader->file);
+	reader->file = incise_frames_reader_new(path, err);
+	reader->passed = 0;
+	free(path);
+	return reader->file ? 0 : -errno;
+}
+
+struct incise_frame_reader *incise_frame_reader_new(struct incise_recording *recording,
+						    struct incise_error *err)
+{
+	struct incise_frame_reader *reader = calloc(1, sizeof(*reader));
+	int rc = 0;
+
+	if (!reader)
+		rc = incise_error_set(err, ENOMEM, "%s: out of memory", recording->path);
+	else if (recording->form < 2)
+		rc = incise_error_set(err, ENOTSUP,
+				      "%s: is of an older form, which has no frames",
+				      recording->path);
+	if (!rc) {
+		reader->recording = incise_recording_open(recording->path, err);
+		rc = reader->recording ? open_file(reader, err) : -errno;
+	}
+	if (!rc)
+		return reader;
+	incise_frame_reader_free(reader);
+	errno = -rc;
+	return NULL;
+}
+
+void incise_frame_reader_free(struct incise_frame_reader *reader)
+{
+	if (!reader)
+		return;
+	incise_frames_reader_close(reader->file);
+	incise_recording_close(reader->recording);
+	free(reader);
+}
+
+/* The row nearest to a time: its own seq, time and number from 0. */
+static int find_row(struct incise_recording *recording, int64_t t_ns, uint64_t *seq,
+		    int64_t *row_ns, uint64_t *number, struct incise_error *err)
+{
+	sqlite3_stmt *stmt = NULL;
+	int rc;
+
+	if (sqlite3_prepare_v2(recording->db,
+			       "SELECT seq, t_ns, (SELECT count(*) FROM frames AS before "
+			       "WHERE before.seq < frames.seq) FROM frames "
+			       "ORDER BY abs(t_ns - ?), seq LIMIT 1",
+			       -1, &stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(recording->db, recording->path, err);
+	sqlite3_bind_int64(stmt, 1, t_ns);
+	rc = sqlite3_step(stmt);
+	*seq = (uint64_t)sqlite3_column_int64(stmt, 0);
+	*row_ns = sqlite3_column_int64(stmt, 1);
+	*number = (uint64_t)sqlite3_column_int64(stmt, 2);
+	if (rc == SQLITE_ROW)
+		rc = 0;
+	else if (rc == SQLITE_DONE)
+		rc = incise_error_set(err, ENODATA, "%s: has no frames", recording->path);
+	else
+		rc = incise_schema_fail(recording->db, recording->path, err);
+	sqlite3_finalize(stmt);
+	return rc;
+}
+
+int incise_frame_reader_at(struct incise_frame_reader *reader, int64_t t_ns,
+			   struct incise_camera_frame *frame, struct incise_error *err)
+{
+	struct incise_frames_stored stored;
+	uint64_t seq = 0, number = 0;
+	int64_t row_ns = 0;
+	/* Differences of times stay within 64 bits. */
+	int64_t t = t_ns > INT64_MAX / 4    ? INT64_MAX / 4
+		    : t_ns < -INT64_MAX / 4 ? -INT64_MAX / 4
+					    : t_ns;
+	int rc = find_row(reader->recording, t, &seq, &row_ns, &number, err);
+
+	if (!rc && number < reader->passed)
+		rc = open_file(reader, err);
+	if (rc)
+		return rc;
+	do {
+		reader->file->undecoded = reader->passed < number;
+		rc = incise_frames_next(reader->file, frame, &stored, err);
+		reader->passed += rc != 0;
+		if (rc < 0 && (rc != -EBADMSG || reader->passed > number))
+			return rc;
+	} while (rc && reader->passed <= number);
+	if (!rc || frame->seq != seq)
+		return incise_error_set(
+			err, EBADMSG,
+			"%s: frame %llu is not in %s where its row is; `incise verify %s` "
+			"has all findings",
+			reader->recording->path, (unsigned long long)seq,
+			INCISE_FRAMES_FILE, reader->recording->path);
+	frame->t_ns = row_ns;
+	return 0;
+}
