@@ -73,4 +73,9 @@ python_tests() {
 	run -0 "$peers" readme.py
 	[ -s liver.fis.sd ]
 	[ -s liver.fx ]
+	run -0 /usr/bin/python3 "$root/examples/learn.py" liver.rec b.fis
+	cmp liver.fis b.fis
+	[[ "$output" == "rms error on unseen cuts "*"15 mm, 20 mm/s: "* ]]
+	run -1 --separate-stderr /usr/bin/python3 "$root/examples/learn.py" none.rec b.fis
+	[ "$stderr" = "learn.py: none.rec: there is no such recording" ]
 }
