@@ -119,7 +119,9 @@ class Figure:
                     text.seen = True
         if element.tag == SVG + "text" and "".join(element.itertext()).strip():
             text = Text(self.parent, element)
-            self.texts.append(text)
+            # gnuplot writes a text in a box twice: box and text.
+            if not any(t.text == text.text and t.corners() == text.corners() for t in self.texts):
+                self.texts.append(text)
             if series:
                 series["texts"].append(text)
         if element.tag in (SVG + "path", SVG + "use", SVG + "polygon", SVG + "rect", SVG + "image"):

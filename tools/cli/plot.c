@@ -133,7 +133,8 @@ FILE *plot_begin(const char *folder, const char *name, int width, int height)
 	fprintf(script,
 		"# gnuplot -e \"ext='png'\" %s.gp\n"
 		"figure_width = %d\nfigure_height = %d\nload 'style.gp'\n"
-		"if (strstrt('png svg pdf', ext)) { set output '../%s.'.ext } \\\n"
+		"figure_file = '../%s.'.ext\n"
+		"if (strstrt('png svg pdf', ext)) { set output figure_file } \\\n"
 		"else { eval 'set terminal '.ext.' size '.figure_width.','.figure_height }\n",
 		name, width, height, name);
 	return script;
@@ -169,7 +170,7 @@ static bool draw(const char *folder, const char *name, const char *ext)
 
 bool plot_draw(FILE *script, const char *folder, const char *name)
 {
-	fputs("\nunset output\n", script);
+	fputs("\neval end_figure\n", script);
 	if (fclose(script))
 		cli_fail("%s/plot/%s.gp: %s", folder, name, strerror(errno));
 	return draw(folder, name, "png") && draw(folder, name, "svg");
@@ -332,7 +333,7 @@ void plot_draw_form(FILE *script, const char *folder, const char *name, const ch
 	char *errors = cli_text("%s/errors", folder), *drawn, line[300];
 	int fd = open(errors, O_WRONLY | O_CREAT | O_CLOEXEC, 0600), status;
 
-	fputs(path ? "\nunset output\n" : "\npause mouse close\n", script);
+	fputs(path ? "\neval end_figure\n" : "\npause mouse close\n", script);
 	if (fd < 0 || fclose(script))
 		cli_fail("%s: %s; make room and run it again", folder, strerror(errno));
 	status = wait_for(child_start(argv, -1, fd));

@@ -16,6 +16,9 @@ if (ext eq 'png') { set terminal pngcairo size 2 * figure_width, 2 * figure_heig
 	linewidth 2.4 pointscale 2.6 }
 if (ext eq 'pdf') { set terminal pdfcairo size figure_width / 96.0, figure_height / 96.0 font font.',14' \
 	fontscale 0.75 linewidth 1.2 pointscale 0.95 }
+# `eval end_figure` closes the file; whoever reads an SVG without this font gets one of its widths.
+font_names = "sed -i 's/font-family=\"DejaVu Sans\"/font-family=\"DejaVu Sans, Verdana, sans-serif\"/g' "
+end_figure = 'unset output; if (ext eq "svg") { font_names = system(font_names.figure_file) }'
 # px from one line of text to the next: gnuplot places the lines of an SVG farther apart.
 line_px = ext eq 'svg' ? 21.0 : 17.0
 
