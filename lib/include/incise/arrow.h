@@ -10,6 +10,7 @@
 #ifndef INCISE_ARROW_H
 #define INCISE_ARROW_H
 
+#include <stddef.h>
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/export.h>
