@@ -284,6 +284,11 @@ $(O)/tests/state_tick: tests/bench/state_tick.c $(O)/lib/libincise-tests.a
 check-state: $(O)/tests/state_tick ## what it costs the loop to tell its state, ns
 	$(O)/tests/state_tick
 
+ROWS ?= 10000000
+check-python-speed: all ## rows/s and memory of streams in Python next to sqlite3; ROWS=100000000
+	INCISE_BUILD=$(abspath $(O)) PYTHONPATH=python PYTHONDONTWRITEBYTECODE=1 \
+		/usr/bin/python3 tests/bench/python_streams.py $(ROWS)
+
 TRACKER_SECONDS ?= 600
 check-tracker: $(O)/tests/tracker_line ## a FASTRAK at a serial line for ten minutes, clean and with harm on the way
 	$(O)/tests/tracker_line $(TRACKER_SECONDS)
@@ -304,4 +309,4 @@ check-exhaustive: $(O)/tests/exhaustive ## every pair of 16-bit inputs of the sh
 	$(O)/tests/exhaustive scenes/liver.fis
 	$(O)/tests/exhaustive scenes/liver.fis force
 
-.PHONY: check-exhaustive check-frames check-tracker check-depth check-day check-state
+.PHONY: check-python-speed check-exhaustive check-frames check-tracker check-depth check-day check-state
