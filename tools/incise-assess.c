@@ -39,8 +39,9 @@ static const struct cli_option options[] = {
 	{0, "reference", "FILE", "an expert's session, to compare with",
 	 CLI_INPUT(struct job, reference_path)},
 	{'o', "output", "FILE.html", "write a page with figures: the path, the force",
-	 CLI_OUTPUT(struct job, page)},
-	{0, "csv", "FILE", "write a row for each session", CLI_OUTPUT(struct job, csv)},
+	 CLI_OUTPUT(struct job, page), .extensions = ".html"},
+	{0, "csv", "FILE", "write a row for each session", CLI_OUTPUT(struct job, csv),
+	 .extensions = ".csv"},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{0},
 };
@@ -745,10 +746,8 @@ int main(int argc, char **argv)
 		print_one(&job.session[0], job.reference);
 	else if (!quiet)
 		print_table(&job);
-	if (!job.json && !quiet && job.csv)
-		puts(job.csv);
-	if (!job.json && !quiet && job.page)
-		puts(job.page);
+	if (!job.json && !quiet)
+		cli_written();
 	cli_finish();
 	for (int i = 0; i < rows(&job); i++)
 		free(job.session[i].session);

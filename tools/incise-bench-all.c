@@ -681,7 +681,7 @@ int main(int argc, char **argv)
 	if (job.json)
 		json_print(json_incref(report));
 	else
-		printf("%s/report.html, report.md, report.json: %zu of %zu benchmarks\n",
+		printf("wrote %s/report.html, report.md, report.json: %zu of %zu benchmarks\n",
 		       job.folder ? job.folder : job.from,
 		       json_object_size(json_object_get(report, "benchmarks")),
 		       json_object_size(json_object_get(report, "runs")));

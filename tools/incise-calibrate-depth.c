@@ -68,7 +68,7 @@ static const struct cli_option option_table[] = {
 	 "rig's camera",
 	 CLI_INPUT(struct options, common.from)},
 	{0, "keep", "FILE", "write the raw data to this file, for --from",
-	 CLI_OUTPUT(struct options, common.keep)},
+	 CLI_OUTPUT(struct options, common.keep), .extensions = ".csv"},
 	{0, "report", "DIR",
 	 "write report.txt, report.json, fit.png and residuals.png "
 	 "into\n"

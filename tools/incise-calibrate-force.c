@@ -79,7 +79,7 @@ static const struct cli_option option_table[] = {
 	 "and optionally series and direction (up, down)",
 	 CLI_INPUT(struct options, common.from)},
 	{0, "keep", "FILE", "write the pairs to this file, for --from",
-	 CLI_OUTPUT(struct options, common.keep)},
+	 CLI_OUTPUT(struct options, common.keep), .extensions = ".csv"},
 	{0, "report", "DIR", "write report.txt, report.json and plots into this folder",
 	 CLI_OUTPUTS(struct options, common.report)},
 	{0, "dry-run", NULL, "do everything except writing calibration.conf",

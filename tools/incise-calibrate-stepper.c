@@ -49,7 +49,7 @@ static const struct cli_option option_table[] = {
 	 "CSV with position_mm or steps, and force_N, instead of devices",
 	 CLI_INPUT(struct options, common.from)},
 	{0, "keep", "FILE", "write the points to this CSV file, for --from",
-	 CLI_OUTPUT(struct options, common.keep)},
+	 CLI_OUTPUT(struct options, common.keep), .extensions = ".csv"},
 	{0, "report", "DIR",
 	 "write report.txt, report.json and plots of fit and "
 	 "residuals\n"

@@ -44,7 +44,7 @@ static const struct cli_option option_table[] = {
 	 "a rig",
 	 CLI_INPUT(struct options, common.from)},
 	{0, "keep", "FILE", "write the poses to this CSV file, for --from",
-	 CLI_OUTPUT(struct options, common.keep)},
+	 CLI_OUTPUT(struct options, common.keep), .extensions = ".csv"},
 	{0, "report", "DIR",
 	 "write report.txt, report.json and plots of the residuals "
 	 "into\n"

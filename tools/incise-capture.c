@@ -365,6 +365,7 @@ static void report(const struct options *options, const struct result *result)
 	if (incise_pose_counts_text(&stats->poses, text, sizeof(text)))
 		puts(text);
 	stream_table(streams, n);
+	cli_written();
 	cli_finish();
 }
 

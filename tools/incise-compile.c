@@ -62,7 +62,7 @@ static const struct cli_option options[] = {
 	{'o', "output", "FILE",
 	 "write the compiled model (.fx) or plan (.plan) there; '-' is standard\n"
 	 "output",
-	 CLI_OUTPUT(struct job, output)},
+	 CLI_OUTPUT(struct job, output), .extensions = ".fx .plan"},
 	{0, "budget", "ERROR",
 	 "largest error that may be certified, e.g. 0.1mN, 50uN or\n"
 	 "1e-4 in the output's unit (default: 0.1mN)",
@@ -76,7 +76,7 @@ static const struct cli_option options[] = {
 	{0, "c-source", "FILE.c",
 	 "write it as C for a microcontroller, too; FILE_eval() is the\n"
 	 "function",
-	 CLI_OUTPUT(struct job, c_source), .parse = check_c_source},
+	 CLI_OUTPUT(struct job, c_source), .parse = check_c_source, .extensions = ".c"},
 	{0, "model", "FILE", "of a scene: use this model instead of its own",
 	 CLI_INPUT(struct job, scene.model)},
 	{'r', "rig", "RIG",
@@ -134,9 +134,10 @@ static void report(const struct incise_fixed *fx, const char *model, const char 
 	printf("%s: %s", model, name);
 	for (int i = 0; i < fx->n_inputs && fx->input[i].cells; i++)
 		printf(i ? " x %d" : ", %d", fx->input[i].cells);
-	printf("%s, %u bytes; error certified to %.3g mN\nwrote %s\n",
-	       fx->input[0].cells ? " cells" : "", fx->size, incise_fixed_bound(fx) * 1e3,
-	       path);
+	printf("%s, %u bytes; error certified to %.3g mN\n",
+	       fx->input[0].cells ? " cells" : "", fx->size,
+	       incise_fixed_bound(fx) * 1e3);
+	cli_written();
 }
 
 static void compile_model(const struct job *job, const char *path)
@@ -187,10 +188,12 @@ static void compile_scene(const struct job *job)
 	if (incise_plan_file_save(file, job->output, &err))
 		cli_fail_with(&err);
 	incise_plan_file_info(file, &info);
-	if (job->json)
+	if (job->json) {
 		json_print(plan_report_json(&info));
-	else if (strcmp(job->output, "-"))
+	} else if (strcmp(job->output, "-")) {
 		plan_report_text(&info);
+		cli_written();
+	}
 	if (!info.n_axes)
 		cli_warn("it is for no actuator: give --rig for a plan that the kernel "
 			 "loads");
@@ -230,6 +233,7 @@ int main(int argc, char **argv)
 		if (job.rig || job.calibration || job.scene.model)
 			cli_usage("%s: --rig, --calibration and --model are of a scene",
 				  path);
+		cli_extension("output", job.output, ".fx");
 		compile_model(&job, path);
 	} else {
 		if (is_of_model(&job))
@@ -237,6 +241,7 @@ int main(int argc, char **argv)
 				"%s: --budget, --method, --cells and --c-source are of a "
 				"model",
 				path);
+		cli_extension("output", job.output, ".plan");
 		compile_scene(&job);
 	}
 	cli_finish();

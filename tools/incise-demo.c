@@ -379,7 +379,7 @@ static void film_scene(const char *scene, const char *folder)
 				 "--viewpoint", NEAR, "--fps", "10", NULL},
 		 folder);
 	end_folder(folder);
-	printf("\n%s\n%s\n", film, strip);
+	printf("\nwrote %s and %s\n", film, strip);
 	cli_finish();
 	free(name), free(film), free(strip);
 }

@@ -53,7 +53,7 @@ static void load_calibration(void *options, char *path)
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
 	 "dataset to write: FILE.csv, or FILE.h5 for HDF5; - is CSV on\nstandard output (default)",
-	 CLI_OUTPUT(struct job, output)},
+	 CLI_OUTPUT(struct job, output), .extensions = ".csv .h5 .mcap"},
 	{0, "rate", "HZ",
 	 "rows per second, each the mean of its samples (default: all\nsamples)",
 	 CLI_NUMBER(struct job, how.rate_hz, 1e-3, 1e9)},
@@ -171,11 +171,12 @@ int main(int argc, char **argv)
 	if (job.json)
 		print_report(&report, job.output);
 	else if (strcmp(job.output, "-") && !report.cuts && !job.how.resample)
-		printf("%s: %llu messages\n", job.output,
+		printf("wrote %s: %llu messages\n", job.output,
 		       (unsigned long long)report.rows);
 	else if (strcmp(job.output, "-"))
-		printf("%s: %llu rows from %d cuts\n", job.output,
-		       (unsigned long long)report.rows, report.cuts);
+		printf("wrote %s: %llu rows from %d cut%s\n", job.output,
+		       (unsigned long long)report.rows, report.cuts,
+		       report.cuts == 1 ? "" : "s");
 	cli_finish();
 	return 0;
 }

@@ -46,7 +46,7 @@ static const struct cli_option options[] = {
 	 "scene's name in /run/incise, $XDG_RUNTIME_DIR/incise or /tmp/incise-UID)",
 	 CLI_TEXT(struct haptic_job, state)},
 	{0, "log", "FILE", "write every tick as CSV at the end; needs --duration",
-	 CLI_OUTPUT(struct haptic_job, log)},
+	 CLI_OUTPUT(struct haptic_job, log), .extensions = ".csv"},
 	SESSION_OPTIONS(struct haptic_job, session),
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct haptic_job, json)},
 	{'v', "verbose", NULL, "say on stderr what happens meanwhile",

@@ -211,6 +211,10 @@ static void show_model(const char *path, bool json, const char *plot)
 		plot_draw_or_fail(figure_of_model(&(struct figure){
 					  .path = path, .folder = folder, .name = name}),
 				  folder, name);
+	if (plot && !json) {
+		cli_written();
+		cli_finish();
+	}
 	incise_fixed_free(fixed);
 	incise_model_free(model);
 }

@@ -44,7 +44,7 @@ static void parse_range(void *whole, char *text)
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
 	 "the file to write: NAME.png, .svg or .pdf (default: a window)",
-	 CLI_OUTPUT(struct job, output)},
+	 CLI_OUTPUT(struct job, output), .extensions = ".png .svg .pdf"},
 	{0, "range", "TIME..TIME",
 	 "of a recording: the part to draw, such as 2s..4.5s, 90s..\n"
 	 "or ..1min; from its first force sample (default: all)",
@@ -178,7 +178,7 @@ int main(int argc, char **argv)
 	script = kind->draw(&job.figure);
 	plot_draw_form(script, folder, job.figure.name, form, job.output);
 	if (job.output)
-		printf("wrote %s\n", job.output);
+		cli_written();
 	cli_finish();
 	return 0;
 }

@@ -31,7 +31,7 @@ static const char *const times[] = {"arrival", "acquisition", NULL};
 static const struct cli_option options[] = {
 	{0, "log", "FILE",
 	 "write every tick, predicted beside measured force; - is standard\noutput",
-	 CLI_OUTPUT(struct job, csv)},
+	 CLI_OUTPUT(struct job, csv), .extensions = ".csv"},
 	{0, "plot", "NAME",
 	 "draw predicted beside measured force as NAME.png and NAME.svg",
 	 CLI_OUTPUTS(struct job, plot)},
@@ -317,10 +317,12 @@ int main(int argc, char **argv)
 			 report.seconds, job.csv ? "; nothing was written" : "");
 	if (job.plot)
 		draw_plot(&sink.plot);
-	if (job.json)
+	if (job.json) {
 		report_json(&job, rate_hz, &stats, &report);
-	else if (sink.bar)
+	} else if (sink.bar) {
 		report_text(&job, rate_hz, &stats, &report);
+		cli_written();
+	}
 	cli_finish();
 	incise_recording_close(recording);
 	incise_scene_free(scene);

@@ -63,7 +63,7 @@ static void parse_type(void *type, char *text)
 
 static const struct cli_option option_table[] = {
 	{'o', "output", "FILE", "write the model there (.fis); '-' is standard output",
-	 CLI_OUTPUT(struct options, model)},
+	 CLI_OUTPUT(struct options, model), .extensions = ".fis"},
 	{0, "inputs", "A,B", "input columns (default: depth_mm,velocity_mm_s)",
 	 CLI_PARSED_BY(parse_inputs)},
 	{0, "target", "COLUMN", "column to learn (default: force_N)",
@@ -96,9 +96,9 @@ static const struct cli_option option_table[] = {
 	 "the check data choose the epoch",
 	 CLI_FLAG(struct options, train.classic)},
 	{0, "initial", "FILE", "also write the model as it was before training",
-	 CLI_OUTPUT(struct options, initial)},
+	 CLI_OUTPUT(struct options, initial), .extensions = ".fis"},
 	{0, "history", "FILE", "write RMSE by epoch as CSV",
-	 CLI_OUTPUT(struct options, history)},
+	 CLI_OUTPUT(struct options, history), .extensions = ".csv"},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, json)},
 	{0},
 };
@@ -474,8 +474,7 @@ static void report_text(const struct result *result)
 		printf("  membership functions from a random %zu of the pairs, consequents "
 		       "from all\n",
 		       report->pairs_tuned);
-	if (strcmp(options->model, "-"))
-		printf("wrote %s\n", options->model);
+	cli_written();
 }
 
 int main(int argc, char **argv)

@@ -85,7 +85,7 @@ well_formed() {
 
 @test "export averaged" {
 	run -0 --separate-stderr incise export liver.rec --average 12x10 -o a.csv
-	[[ "$output" == "a.csv: "*" rows from 14 cuts" ]]
+	[[ "$output" == "wrote a.csv: "*" rows from 14 cuts" ]]
 	[ "$(head -n 1 a.csv)" = depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing ]
 	well_formed a.csv 7 1
 	for advancing in 0 1; do
@@ -230,7 +230,7 @@ well_formed() {
 	incise export liver.rec --rate 100 -o raw.csv
 	run -0 --separate-stderr incise export liver.rec --rate 100 -o raw.h5
 	[ -z "$stderr" ]
-	[[ "$output" == "raw.h5: "*" rows from 14 cuts" ]]
+	[[ "$output" == "wrote raw.h5: "*" rows from 14 cuts" ]]
 	h5dump -y -w 1 -d /t_s -m "%.6f" raw.h5 | grep -oE '^ +[0-9.]+' | tr -d ' ' >t
 	diff t <(tail -n +2 raw.csv | cut -d, -f2)
 	h5dump -y -w 1 -d /force_N -m "%.5f" raw.h5 | grep -oE '^ +-?[0-9.]+' >force
@@ -318,7 +318,7 @@ read_mcap() {
 	sqlite3 short.rec/recording.db "UPDATE knots SET t_ns = t_ns + 1000000"
 	run -0 --separate-stderr incise export short.rec -o short.mcap --damaged
 	[ "${#stderr_lines[@]}" -eq 1 ]
-	[[ "$output" == "short.mcap: "*" messages" ]]
+	[[ "$output" == "wrote short.mcap: "*" messages" ]]
 	read_mcap short.mcap >found.json
 	for table in force tracker depth events; do
 		[ "$(sqlite3 :memory: "SELECT json_extract(readfile('found.json'),

@@ -59,13 +59,17 @@ spares_inputs() {
 	done
 	spares_inputs export d.rec -o d.rec/recording.db
 	spares_inputs export d.rec -o calibration.conf -c calibration.conf
+	# The extension of a log is .csv, by which name ever.
 	for path in d.rec/recording.db m.scene m.fis s.obj calibration.conf; do
-		spares_inputs replay d.rec m.scene -c calibration.conf --log $path
+		ln -sf $path log.csv
+		spares_inputs replay d.rec m.scene -c calibration.conf --log log.csv
 	done
 	for path in m.scene m.fis s.obj calibration.conf; do
-		spares_inputs haptic m.scene --rig $quick --duration 100ms -c calibration.conf --log $path
+		ln -sf $path log.csv
+		spares_inputs haptic m.scene --rig $quick --duration 100ms -c calibration.conf --log log.csv
 	done
-	spares_inputs haptic m.scene --rig $quick --duration 100ms --model link.fis --log m.fis
+	ln -sf m.fis log.csv
+	spares_inputs haptic m.scene --rig $quick --duration 100ms --model link.fis --log log.csv
 	mkdir report
 	ln -s ../forces.csv report/fit.png
 	spares_inputs calibrate force --from forces.csv -c calibration.conf --report report
@@ -96,7 +100,8 @@ spares_inputs() {
 @test "rig.conf that is found, and scenes by name, are inputs too" {
 	cp "${BATS_FILE_TMPDIR:?}/rig.conf" .
 	for path in rig.conf m.scene; do
-		run --separate-stderr incise haptic m --duration 100ms --log $path --overwrite
+		ln -sf $path log.csv
+		run --separate-stderr incise haptic m --duration 100ms --log log.csv --overwrite
 		failed_with "$path" "is an input"
 	done
 	cmp rig.conf "$BATS_FILE_TMPDIR/rig.conf"
@@ -114,7 +119,9 @@ spares_inputs() {
 		run --separate-stderr incise train pairs.csv -o a.fis --initial $more --overwrite
 		failed_with a.fis "written twice"
 	done
-	run --separate-stderr incise train pairs.csv -o a.fis --history a.fis.sd
+	touch a.fis.sd
+	ln -s a.fis.sd history.csv
+	run --separate-stderr incise train pairs.csv -o a.fis --history history.csv --overwrite
 	failed_with a.fis.sd "written twice"
 	[ ! -e a.fis ]
 }
@@ -143,8 +150,8 @@ replaces_when_told() {
 	replaces_when_told a.csv export d.rec -o a.csv
 	replaces_when_told a.fis train pairs.csv -o a.fis --epochs 2
 	replaces_when_told b.fis.sd train pairs.csv -o b.fis --epochs 2
-	replaces_when_told c.initial train pairs.csv -o c.fis --epochs 2 --initial c.initial
-	replaces_when_told d.history train pairs.csv -o d.fis --epochs 2 --history d.history
+	replaces_when_told c0.fis train pairs.csv -o c.fis --epochs 2 --initial c0.fis
+	replaces_when_told dh.csv train pairs.csv -o d.fis --epochs 2 --history dh.csv
 	replaces_when_told r.csv replay d.rec liver.scene --log r.csv
 	replaces_when_told l.csv haptic liver.scene --rig $quick --duration 100ms --log l.csv
 	replaces_when_told k.csv calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g \
@@ -244,4 +251,71 @@ replaces_when_told() {
 		run --separate-stderr incise $command --overwrite
 		bad_usage overwrite
 	done
+}
+
+@test "an extension that the command does not write is refused, and the possible ones are named" {
+	while IFS='|' read -r command said; do
+		# shellcheck disable=SC2086 # words of a command
+		run --separate-stderr incise $command </dev/null
+		bad_usage "$said"
+		[ ! -e out ] && [ ! -e out.odd ]
+	done <<-'END'
+		export d.rec -o out.odd|--output: out.odd: unknown extension .odd; give .csv, .h5 or .mcap
+		export d.rec -o out.CSV|--output: out.CSV: unknown extension .CSV; give .csv, .h5 or .mcap
+		train pairs.csv -o out.odd|--output: out.odd: unknown extension .odd; give .fis
+		train pairs.csv -o out.fis --initial out.odd|--initial: out.odd: unknown extension .odd; give .fis
+		train pairs.csv -o out.fis --history out.odd|--history: out.odd: unknown extension .odd; give .csv
+		compile m.fis -o out.odd|--output: out.odd: unknown extension .odd; give .fx or .plan
+		compile m.fis -o out.plan|--output: out.plan: unknown extension .plan; give .fx
+		compile m.scene -o out.fx|--output: out.fx: unknown extension .fx; give .plan
+		compile m.fis -o out.fx --c-source out.odd|--c-source: out.odd: unknown extension .odd; give .c
+		replay d.rec m.scene --log out.odd|--log: out.odd: unknown extension .odd; give .csv
+		haptic m.scene --log out.odd|--log: out.odd: unknown extension .odd; give .csv
+		haptic m.scene --session out.odd|--session: out.odd: unknown extension .odd; give .session
+		info m.fis --plot out.odd|--plot: out.odd: unknown extension .odd; give .png or .svg
+		plot d.rec -o out.odd|--output: out.odd: unknown extension .odd; give .png, .svg or .pdf
+		calibrate tip --from none.csv --keep out.odd|--keep: out.odd: unknown extension .odd; give .csv
+		capture -o out.odd|not a name that ends in .rec
+	END
+	if [ -x "$INCISE_BUILD/bin/incise-view" ]; then
+		run --separate-stderr incise view wall --procedure --video a.mp4
+		bad_usage "--video: a.mp4: unknown extension .mp4; give .mkv"
+	fi
+	# No extension is none that is wrong.
+	incise export d.rec -o out
+	incise export d.rec -o .out
+	cmp out .out
+}
+
+@test "each command ends with the files it wrote" {
+	incise export d.rec -o a.csv >out
+	[[ "$(cat out)" == "wrote a.csv: "*" rows from "*" cut"* ]] || complain "$(cat out)"
+	ends() {
+		local said=$1
+		shift
+		incise "$@" >out 2>err </dev/null || complain "incise $*: $(cat err)" || return
+		[ "$(tail -n 1 out)" = "$said" ] || complain "incise $*: $(cat out)"
+	}
+	ends "wrote a.fis and a.fis.sd" train pairs.csv -o a.fis --epochs 2
+	mkdir deep
+	ends "wrote b.fis, deep/i.fis, h.csv and b.fis.sd" train pairs.csv -o b.fis --epochs 2 \
+		--initial deep/i.fis --history h.csv
+	ends "wrote a.fis and a.fis.sd" train pairs.csv -o a.fis --epochs 2 --overwrite
+	ends "wrote m.fx and m.c" compile m.fis -o m.fx --c-source m.c
+	ends "wrote l.csv and s.session" haptic m.scene --rig $quick --duration 100ms --log l.csv --session s.session
+	ends "wrote r.csv" replay d.rec m.scene --log r.csv
+	ends "wrote c.rec" capture -o c.rec --rig $quick --duration 1s
+	ends "wrote k.csv" calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g \
+		--series 3 --duration 200ms -c k.conf --keep k.csv
+	grep -q '^wrote k.conf: active from now on$' out
+	if command -v gnuplot >/dev/null; then
+		ends "wrote i.png and i.svg" info m.fis --plot i
+		ends "wrote f.png" plot d.rec -o f.png
+		# more than a few files of a folder are one name
+		ends "wrote deep/r/ (6 files)" calibrate force --from forces.csv -c k.conf --report deep/r
+	fi
+	# nothing where the data go to standard output, or where nothing is written
+	incise train pairs.csv -o - --epochs 2 --history h2.csv 2>/dev/null | grep -c wrote | grep -qx 0
+	incise haptic m.scene --rig $quick --duration 100ms >out
+	run ! grep -q wrote out
 }

@@ -130,7 +130,9 @@ shows() {
 	[ "$(od -An -c -N 4 a.png | tr -d ' ')" = '211PNG' ]
 	incise plot m.fis -o a.pdf
 	[ "$(head -c 5 a.pdf)" = %PDF- ]
-	for name in a.eps png a; do
+	run -2 --separate-stderr incise plot m.fis -o a.eps
+	bad_usage "--output: a.eps: unknown extension .eps; give .png, .svg or .pdf"
+	for name in png a; do
 		run -2 --separate-stderr incise plot m.fis -o $name
 		bad_usage "-o: '$name' has no extension of a figure; give NAME.png, NAME.svg or NAME.pdf"
 	done

@@ -19,7 +19,7 @@ refuses() {
 @test "train learns, and says how well" {
 	run -0 --separate-stderr incise train pairs.csv --group cut --check 0.3 -o m.fis
 	[ "${lines[0]}" = "pairs.csv: 192 pairs to train (4 cuts), 96 to check (2 cuts)" ]
-	[ "${lines[-1]}" = "wrote m.fis" ]
+	[ "${lines[-1]}" = "wrote m.fis and m.fis.sd" ]
 	grep -q "^Type='sugeno'" m.fis
 	[ "$(grep -c "gaussmf" m.fis)" -eq 9 ]
 	[ "$(grep -c "'linear'" m.fis)" -eq 20 ]
@@ -150,7 +150,7 @@ refuses() {
 	holds "($(cut -d, -f2 <<<"$row") / $(key r.json train.rmse_N) - 1)^2 < 1e-18"
 	holds "($(cut -d, -f3 <<<"$row") / $(key r.json check.rmse_N) - 1)^2 < 1e-18"
 	# evenly spaced centres, no consequents yet
-	[ "$(sed -n "s/^MF[0-9]='in2mf[0-9]':'gaussmf',\[[^ ]* \(.*\)\]/\1/p" first.fis |
+	[ "$(sed -n "/^.Input2/,/^.Output1/s/^MF[0-9]='[^']*':'gaussmf',\[[^ ]* \(.*\)\]/\1/p" first.fis |
 		awk '{ printf "%.3f ", $1 }')" = "0.000 16.667 33.333 50.000 " ]
 	[ "$(grep -c "'linear',\[0 0 0\]" first.fis)" -eq 20 ]
 	run ! cmp -s first.fis m.fis

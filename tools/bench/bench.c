@@ -661,6 +661,10 @@ void bench_measure(struct bench_run *run)
 	cli_finish();
 	for (const struct bench_plot *p = run->bench->plots; run->plot && p->script; p++)
 		draw(run, p);
+	if (!run->json) {
+		cli_written();
+		cli_finish();
+	}
 	if (*run->failed)
 		cli_fail("%s", run->failed);
 	json_decref(run->report);

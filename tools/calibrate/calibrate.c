@@ -40,7 +40,7 @@ void calibrate_find(struct calibrate_options *options)
 	if (!access(options->calibration, F_OK))
 		cli_input(options->calibration);
 	else if (!options->dry_run)
-		cli_output(options->calibration);
+		cli_output_part(options->calibration); /* calibrate_result() names it */
 	if (options->report)
 		reserve_report(options->report);
 	rc = incise_calibration_load(options->calibration, &options->found, &err);
@@ -256,6 +256,7 @@ void calibrate_result(const struct calibrate_options *options,
 	else
 		printf("wrote %s: in its history only, the previous values stay active\n",
 		       options->calibration);
+	cli_written();
 }
 
 void calibrate_append(const struct calibrate_options *options,

@@ -352,6 +352,19 @@ static void answer(const char *const *names)
 	exit(0);
 }
 
+static void check_extensions(const struct cli_command *command, const void *options)
+{
+	for (const struct cli_option *opt = command->options; opt->name; opt++) {
+		const char *path = NULL;
+
+		if (opt->extensions)
+			path = *(const char *const *)((const char *)options +
+						      opt->offset);
+		if (path)
+			cli_extension(opt->name, path, opt->extensions);
+	}
+}
+
 void cli_parse(const struct cli_command *command, int argc, char **argv, void *options)
 {
 	const struct cli_option *opt;
@@ -366,6 +379,7 @@ void cli_parse(const struct cli_command *command, int argc, char **argv, void *o
 	note_paths(command, CLI_KIND_INPUT, options, cli_input);
 	note_paths(command, CLI_KIND_OUTPUT, options, cli_output_once);
 	expect(command, options);
+	check_extensions(command, options);
 }
 
 char *cli_operand(int argc, char **argv, const char *name, const char *what)

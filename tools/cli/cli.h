@@ -48,6 +48,7 @@ struct cli_option {
 	const struct cli_unit *units;
 	const char *const *names; /* choices; of other kinds for completion only */
 	void (*parse)(void *member, char *text);
+	const char *extensions; /* of a file that is written, as of cli_extension() */
 };
 
 /* The compiler warns when the member has another type. */
@@ -65,7 +66,8 @@ struct cli_option {
 /*
  * const char *: the path of a file or recording that is read; of a file that is written; the
  * name of several files, or of a folder, for which the command calls cli_output(). A command
- * with outputs has the option --overwrite. A .parse behind it checks the argument.
+ * with outputs has the option --overwrite. Behind it, .parse checks the argument, and .extensions
+ * lists those that a CLI_OUTPUT may have.
  */
 #define CLI_INPUT(type, member) \
 	.kind = CLI_KIND_INPUT, CLI_MEMBER(type, member, const char *)
@@ -138,6 +140,22 @@ void cli_output(const char *path);
 
 /* The same for one that is no other output either. */
 void cli_output_once(const char *path);
+
+/* The same for a file that cli_written() leaves out unless it was noted before. */
+void cli_output_part(const char *path);
+
+/*
+ * Print "wrote A, B and C": all outputs that were noted and are there as new or changed files. Of
+ * more than a few in a folder it names the folder. A command calls it at the end of a report for
+ * people, and not if an output is standard output.
+ */
+void cli_written(void);
+
+/*
+ * Bad usage if the name of a file to write ends with an extension that is not in the list, for
+ * example ".csv .h5 .mcap". "-", a name without a dot, pipes and devices have none.
+ */
+void cli_extension(const char *option, const char *path, const char *list);
 
 /* Whether --overwrite was given; and the same as if it was. */
 bool cli_overwrite(void);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * Inputs and outputs of a command, compared by device and inode: an output is never an input,
- * nor inside a recording that is read, and replaces a file only with --overwrite. See cli.h.
+ * nor inside a recording that is read, and replaces a file only with --overwrite. Its extension
+ * is one that the command writes, and the files written are listed at the end. See cli.h.
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,6 +20,7 @@ struct output {
 	struct place file, folder; /* of "-" there is no folder */
 	const char *name;	   /* below its folder */
 	bool exists;
+	bool part; /* of another output */
 	struct output *next;
 };
 
@@ -154,7 +156,7 @@ static bool find_output(const char *path, struct output *output)
 }
 
 /* @once: no other option may name it. */
-static void note_output(const char *path, bool once)
+static void note_output(const char *path, bool once, bool part)
 {
 	struct output output, *kept;
 
@@ -177,16 +179,156 @@ static void note_output(const char *path, bool once)
 	kept = cli_alloc(1, sizeof(*kept));
 	*kept = output;
 	kept->file.path = cli_text("%s", path);
+	kept->part = part;
 	kept->next = outputs;
 	outputs = kept;
 }
 
 void cli_output(const char *path)
 {
-	note_output(path, false);
+	note_output(path, false, false);
+}
+
+void cli_output_part(const char *path)
+{
+	note_output(path, false, true);
 }
 
 void cli_output_once(const char *path)
 {
-	note_output(path, true);
+	note_output(path, true, false);
+}
+
+/* --- extensions ------------------------------------------------------------------------- */
+
+/* ".csv .h5 .mcap" as ".csv, .h5 or .mcap": free(3) */
+static char *alternatives(const char *list)
+{
+	char *text = cli_text("%s", ""), *longer;
+
+	while (*list) {
+		int n = (int)strcspn(list, " ");
+		bool last = !list[n], first = !*text;
+
+		longer = cli_text("%s%s%.*s", text,
+				  first	 ? ""
+				  : last ? " or "
+					 : ", ",
+				  n, list);
+		free(text);
+		text = longer;
+		list += n + strspn(list + n, " ");
+	}
+	return text;
+}
+
+static bool in_list(const char *extension, const char *list)
+{
+	size_t length = strlen(extension);
+
+	for (size_t n; *list; list += n + strspn(list + n, " ")) {
+		n = strcspn(list, " ");
+		if (n == length && !strncmp(list, extension, n))
+			return true;
+	}
+	return false;
+}
+
+void cli_extension(const char *option, const char *path, const char *list)
+{
+	const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
+	const char *dot = strrchr(name, '.');
+	struct stat st;
+
+	if (!strcmp(path, "-") || !dot || dot == name || in_list(dot, list) ||
+	    (!stat(path, &st) && !S_ISREG(st.st_mode)))
+		return;
+	cli_usage("--%s: %s: unknown extension %s; give %s", option, path, dot,
+		  alternatives(list));
+}
+
+/* --- files written ---------------------------------------------------------------------- */
+
+/* More of them in a folder of their own are named by that folder. */
+#define FEW 3
+
+static bool is_written(const struct output *output)
+{
+	const struct stat *before = &output->file.st;
+	struct stat now;
+
+	if (output->part || !strcmp(output->file.path, "-") ||
+	    stat(output->file.path, &now))
+		return false;
+	return !output->exists || !same(&now, before) || now.st_size != before->st_size ||
+	       now.st_mtim.tv_sec != before->st_mtim.tv_sec ||
+	       now.st_mtim.tv_nsec != before->st_mtim.tv_nsec;
+}
+
+/* Length of the folder in a path with its slash; 0: none. */
+static size_t folder_length(const char *path)
+{
+	const char *slash = strrchr(path, '/');
+
+	return slash ? (size_t)(slash + 1 - path) : 0;
+}
+
+static bool share_folder(const char *a, const char *b)
+{
+	size_t n = folder_length(a);
+
+	return n && n == folder_length(b) && !strncmp(a, b, n);
+}
+
+struct written {
+	const char *path;
+	int files; /* 0: this one; else as many, of its folder */
+};
+
+/* Name a crowded folder once; returns how many names remain. */
+static int name_folders(struct written *list, int n)
+{
+	for (int i = 0; i < n; i++) {
+		int kept = i + 1, alike = 1;
+
+		for (int k = i + 1; k < n; k++)
+			alike += share_folder(list[i].path, list[k].path);
+		if (alike <= FEW)
+			continue;
+		for (int k = i + 1; k < n; k++)
+			if (!share_folder(list[i].path, list[k].path))
+				list[kept++] = list[k];
+		list[i].files = alike;
+		n = kept;
+	}
+	return n;
+}
+
+void cli_written(void)
+{
+	int n = 0, end;
+	struct written *list;
+
+	for (const struct output *o = outputs; o; o = o->next)
+		n += is_written(o);
+	list = cli_alloc((size_t)n, sizeof(*list));
+	end = n;
+	/* The last one noted comes first. */
+	for (const struct output *o = outputs; o && end; o = o->next)
+		if (is_written(o))
+			list[--end].path = strncmp(o->file.path, "./", 2)
+						   ? o->file.path
+						   : o->file.path + 2;
+	n = name_folders(list, n);
+	for (int i = 0; i < n; i++) {
+		printf("%s", i == 0 ? "wrote " : i == n - 1 ? " and " : ", ");
+		if (list[i].files)
+			printf("%.*s (%d files)", (int)folder_length(list[i].path),
+			       list[i].path, list[i].files);
+		else
+			printf("%s", list[i].path);
+	}
+	if (n)
+		putchar('\n');
+	free(list);
 }

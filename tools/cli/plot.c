@@ -34,6 +34,7 @@ void plot_place(const char *option, const char *path, const char **folder,
 	const char *slash = strrchr(path, '/'), *last = slash ? slash + 1 : path;
 	size_t n = strlen(last);
 
+	cli_extension(option, path, ".png .svg");
 	if (n > 4 && (!strcmp(last + n - 4, ".png") || !strcmp(last + n - 4, ".svg")))
 		n -= 4;
 	/* The name is part of a script and a command: '-' would be an option of gnuplot. */
@@ -49,16 +50,23 @@ void plot_place(const char *option, const char *path, const char **folder,
 	plot_folder(*folder);
 }
 
+static void reserve(const char *folder, const char *name, void (*note)(const char *path))
+{
+	char *png = cli_text("%s/%s.png", folder, name);
+	char *svg = cli_text("%s/%s.svg", folder, name);
+	char *script = plot_path(folder, name, ".gp");
+
+	note(png);
+	note(svg);
+	cli_output_part(script);
+	free(png);
+	free(svg);
+	free(script);
+}
+
 void plot_reserve(const char *folder, const char *name)
 {
-	static const char *const files[] = {"%s/%s.png", "%s/%s.svg", "%s/plot/%s.gp"};
-
-	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++) {
-		char *path = cli_text(files[i], folder, name);
-
-		cli_output(path);
-		free(path);
-	}
+	reserve(folder, name, cli_output);
 }
 
 void plot_folder(const char *folder)
@@ -87,7 +95,7 @@ static FILE *open_plot(const char *folder, const char *name, const char *suffix)
 	char *path = plot_path(folder, name, suffix);
 	FILE *file;
 
-	cli_output(path);
+	cli_output_part(path);
 	file = fopen(path, "we");
 	if (!file)
 		cli_fail("%s: %s", path, strerror(errno));
@@ -117,6 +125,7 @@ static void write_style(const char *folder)
 	struct incise_outfile *file;
 
 	if (access(path, F_OK) || cli_overwrite()) {
+		cli_output_part(path);
 		fputs(text_style_gp, whole_file_begin(path, &file));
 		whole_file_end(file);
 	}
@@ -127,7 +136,8 @@ FILE *plot_begin(const char *folder, const char *name, int width, int height)
 {
 	FILE *script;
 
-	plot_reserve(folder, name);
+	/* Of a folder for a while, or reserved already. */
+	reserve(folder, name, cli_output_part);
 	script = open_plot(folder, name, ".gp");
 	write_style(folder);
 	fprintf(script,

@@ -656,10 +656,12 @@ int haptic_run(struct haptic_job *job)
 		cli_warn("the blade left no cut in %llu ticks: as many as "
 			 "tissue.cuts_most were there; raise it",
 			 (unsigned long long)ticks_with(&stats, INCISE_TICK_FULL));
-	if (job->json)
+	if (job->json) {
 		report_json(haptic);
-	else if (!job->log || strcmp(job->log, "-"))
+	} else if (!job->log || strcmp(job->log, "-")) {
 		report_text(haptic);
+		cli_written();
+	}
 	cli_finish();
 	finish(job);
 	/* The run cannot be repeated: its summary comes first, with or without its log. */

@@ -22,7 +22,8 @@ struct session_options {
 	 "FILE",                                                                         \
 	 "write at the end what happened, for incise assess",                            \
 	 CLI_OUTPUT(type, member.path),                                                  \
-	 .parse = session_path_parse},                                                   \
+	 .parse = session_path_parse,                                                    \
+	 .extensions = ".session"},                                                      \
 	{                                                                                \
 		0, "code", "CODE",                                                       \
 			"of the session's subject, no name: up to 16 letters, digits,\n" \
