@@ -71,7 +71,6 @@ struct ArrowArrayStream {
 };
 #endif
 
-struct incise_dataset;
 struct incise_export_options;
 struct incise_recording;
 
@@ -117,22 +116,6 @@ INCISE_API int incise_recording_stream(struct incise_recording *recording,
  * @param capsule PyObject of a process that has PyCapsule_GetPointer(); in another one nothing happens
  */
 INCISE_API void incise_arrow_capsule_free(void *capsule);
-
-/**
- * Read columns of an Arrow stream as a dataset, as incise_dataset_read_where() does of CSV.
- * Numbers may be integers, float32, float64 or bool; the group may be text (also as a
- * dictionary) or an integer. Part of libincise-learn.
- *
- * @param stream  released in any case
- * @param where   leave out rows whose value in this column is 0; NULL, or a column that the
- *                stream does not have: none
- * @param left_out number of these, or NULL
- * @return as incise_dataset_read_where(); EINVAL also for a null, a value that is not finite, and
- *         a column of another type, named with its row; EIO or the stream's errno if it fails.
- */
-INCISE_API struct incise_dataset *incise_dataset_from_arrow(
-	struct ArrowArrayStream *stream, const char *const *columns, int n,
-	const char *group, const char *where, size_t *left_out, struct incise_error *err);
 
 INCISE_END_DECLS
 #endif

@@ -45,6 +45,24 @@ INCISE_API struct incise_dataset *incise_dataset_read_where(
 	const char *path, const char *const *columns, int n, const char *group,
 	const char *where, size_t *left_out, struct incise_error *err);
 
+struct ArrowArrayStream;
+
+/**
+ * Read columns of an Arrow stream as a dataset, as incise_dataset_read_where() does of CSV.
+ * Numbers may be integers, float32, float64 or bool; the group may be text (also as a
+ * dictionary) or an integer.
+ *
+ * @param stream  released in any case
+ * @param where   leave out rows whose value in this column is 0; NULL, or a column that the
+ *                stream does not have: none
+ * @param left_out number of these, or NULL
+ * @return as incise_dataset_read_where(); EINVAL also for a null, a value that is not finite, and
+ *         a column of another type, named with its row; EIO or the stream's errno if it fails.
+ */
+INCISE_API struct incise_dataset *incise_dataset_from_arrow(
+	struct ArrowArrayStream *stream, const char *const *columns, int n,
+	const char *group, const char *where, size_t *left_out, struct incise_error *err);
+
 /** NULL is accepted. */
 INCISE_API void incise_dataset_free(struct incise_dataset *data);
 
