@@ -59,7 +59,7 @@ static const struct cli_option option_table[] = {
 	 CLI_INPUT(struct options, calibration)},
 	{0, "duration", "TIME",
 	 "end after 10s, 500ms, 2min, 1h (default: at Ctrl-C;\n"
-	 "on the virtual rig at the end of its cuts)",
+	 "on the simulated rig at the end of its cuts)",
 	 CLI_DURATION(struct options, duration_s, 0.01, 1e6)},
 	{0, "camera", "WHAT",
 	 "off; frames: record them; depth: and find the scalpel in\n"
@@ -356,7 +356,7 @@ static void report(const struct options *options, const struct result *result)
 	       (unsigned long long)stats->force_clipped,
 	       (unsigned long long)stats->tracker);
 	if (n > 2)
-		printf("%llu pictures, ", (unsigned long long)stats->frames);
+		printf("%llu frames, ", (unsigned long long)stats->frames);
 	printf("%llu lost", (unsigned long long)lost);
 	/* A short recording has no zero before it is closed. */
 	if (!isnan(stats->zero_mV))
@@ -378,7 +378,7 @@ _Noreturn static void fail_of_losses(const char *path,
 	} lost[] = {
 		{stats->force_lost, "force samples"},
 		{stats->tracker_lost, "tracker records"},
-		{stats->frames_lost, "pictures"},
+		{stats->frames_lost, "frames"},
 	};
 	char text[200] = "";
 	size_t at = 0;

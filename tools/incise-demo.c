@@ -45,12 +45,12 @@ static void parse_loop(void *loop_time, char *text)
 static const struct cli_option option_table[] = {
 	{0, "report", "DIR", "folder to leave everything in (default: demo.out)",
 	 CLI_OUTPUTS(struct options, demo.folder)},
-	{0, "seed", "N", "of the virtual rig (default: 1)",
+	{0, "seed", "N", "of the simulated rig (default: 1)",
 	 CLI_INTEGER(struct options, demo.seed, 0, SEED_MAX)},
 	{0, "duration", "TIME", "length of the haptic loop (default: 10s)",
 	 CLI_PARSED(struct options, loop_time, parse_loop)},
 	{0, "scene", "SCENE",
-	 "paper 2 instead: a film and a strip of a procedure on this scene, as neck",
+	 "Bhasin et al. (2005) instead: a film and a strip of a procedure on\nthis scene, for example neck",
 	 CLI_TEXT(struct options, scene)},
 	{0, "json", NULL, "print the summary as JSON, and nothing else",
 	 CLI_FLAG(struct options, demo.quiet)},
@@ -61,7 +61,7 @@ static const struct cli_command command = {
 	.name = "demo",
 	.synopsis = "[OPTIONS]",
 	.summary =
-		"Walk paper 1 on the virtual rig: cut, record, export, train, compile to fixed\n"
+		"Walk Song et al. (2006) on the simulated rig: cut, record, export, train, compile to fixed\n"
 		"point, run the haptic loop; leave data, model, pictures and summary in a folder.",
 	.options = option_table,
 	.notes = "Exit: 0 done, 1 failed, 2 bad usage. See incise-demo(1).",

@@ -21,7 +21,7 @@ static const struct cli_option options[] = {
 	 "terminal the keys a, b, h, t change it",
 	 CLI_CHOICE(struct haptic_job, haptic.tool, loop_tool_names)},
 	{0, "procedure", NULL,
-	 "on the virtual rig, in simulated time: a script cuts, enlarges the cut and\n"
+	 "on the simulated rig, in simulated time: a script cuts, enlarges the cut and\n"
 	 "inserts a tube",
 	 CLI_FLAG(struct haptic_job, scripted)},
 	{0, "in-kernel", NULL,
@@ -76,7 +76,7 @@ static void watch_kernel(struct haptic_job *job)
 	int n = 1;
 
 	if (job->scripted)
-		cli_usage("--procedure is on the virtual rig: leave out --in-kernel");
+		cli_usage("--procedure is on the simulated rig: leave out --in-kernel");
 	if (haptic->argument.arith && strcmp(haptic->argument.arith, "fixed"))
 		cli_usage("--arith: the kernel renders in integers: leave it out");
 	if (job->realtime.cpu != INCISE_REALTIME_ANY_CPU || job->realtime.policy ||

@@ -55,7 +55,7 @@ END
 	[ "$(ask a.rec "SELECT count(*) FROM streams")" = 2 ]
 	[ ! -e a.rec/camera.mkv ]
 	incise capture -o b.rec --rig $quick --duration 1s --camera frames >out
-	grep -Eq '^b.rec: .* 5[01] pictures, 0 lost' out
+	grep -Eq '^b.rec: .* 5[01] frames, 0 lost' out
 	[ "$(ask b.rec "SELECT rows = (SELECT count(*) FROM frames) FROM streams WHERE name =
 		'camera'")" = 1 ]
 	[ "$(ask b.rec "SELECT count(*) FROM frames WHERE bytes > 0 AND length_px IS NULL")" = \

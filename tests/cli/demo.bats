@@ -71,7 +71,7 @@ pictures="fig2-force fig3a-membership fig3b-surface fig5-prediction tick-latenes
 }
 
 @test "demo leaves a summary for people, and prints it" {
-	grep -q "virtual rig with seed 3" "$demo/summary.txt"
+	grep -q "simulated rig with seed 3" "$demo/summary.txt"
 	run ! grep -qiE '\bnan\b|\binf\b' "$demo/summary.txt"
 	# all of it is in what was printed
 	while IFS= read -r line; do

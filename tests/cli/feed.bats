@@ -94,7 +94,7 @@ setup() {
 	[ "$status" -eq 1 ]
 	[[ "$stderr" == *"incise feed ended before it fed" ]]
 	run -2 --separate-stderr incise haptic wall --in-kernel --procedure
-	[[ "$stderr" == *"--procedure is on the virtual rig"* ]]
+	[[ "$stderr" == *"--procedure is on the simulated rig"* ]]
 	run -2 --separate-stderr incise haptic wall --in-kernel --arith double
 	[[ "$stderr" == *"the kernel renders in integers"* ]]
 	run --separate-stderr incise haptic wall --in-kernel --rig sim: --state none

@@ -694,7 +694,7 @@ const char *cli_rig(const char *given)
 	}
 	cli_fail(
 		"there is neither ./rig.conf nor /etc/incise/rig.conf; name the rig with "
-		"--rig FILE, or try the virtual one: --rig sim:");
+		"--rig FILE, or try the simulated rig: --rig sim:");
 }
 
 struct incise_rig *cli_open_rig(const char *given, unsigned int devices)

@@ -102,10 +102,10 @@ struct cli_option {
 #define CLI_PARSED_BY(function) .kind = CLI_KIND_PARSED, .parse = (function)
 
 /* The row of the rig to use, without its braces. */
-#define CLI_RIG_OPTION(type, member)                                        \
-	'r', "rig", "RIG",                                                  \
-		"file rig.conf, or sim:KEY=VALUE,… for the virtual rig\n" \
-		"(default: ./rig.conf, else /etc/incise/rig.conf)",         \
+#define CLI_RIG_OPTION(type, member)                                          \
+	'r', "rig", "RIG",                                                    \
+		"file rig.conf, or sim:KEY=VALUE,… for the simulated rig\n" \
+		"(default: ./rig.conf, else /etc/incise/rig.conf)",           \
 		CLI_INPUT(type, member)
 
 struct cli_command {

@@ -598,9 +598,9 @@ void demo_summary_print(const struct demo *demo, FILE *out, double seconds)
 	char *tick999 = quantile_us(haptic, "tick_ns", "p999", 1e-3);
 
 	fprintf(out,
-		"incise demo, version %s, virtual rig with seed %ld\n\n"
+		"incise demo, version %s, simulated rig with seed %ld\n\n"
 		"recording          %.1f s, %.0f force samples, %.0f lost, %.0f clipped\n"
-		"pairs              %.0f, averaged over depth and velocity as in paper 1, "
+		"pairs              %.0f, averaged over depth and velocity as in Song et al. (2006), "
 		"section 4.1\n\n"
 		"Random halves, as the paper does it (classic ANFIS, 20 rules, 80 epochs). Its data "
 		"are\nnot published and ours are of a virtual liver: the figures compare in kind, "
