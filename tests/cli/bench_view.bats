@@ -38,7 +38,7 @@ draws() {
 	for i in 0 1 2; do
 		for part in effects texture draw whole; do
 			median=$(key r.json "frames[$i].${part}_ms.median")
-			holds "$median > 0 && $median <= $(key r.json "frames[$i].${part}_ms.p99")"
+			holds "$median > 0 && $median <= $(key r.json "frames[$i].${part}_ms.max")"
 		done
 		holds "$(key r.json "frames[$i].texels") > 0"
 	done
