@@ -29,7 +29,7 @@ static bool stepper_defaults_read(struct stepper_defaults *from, const char *nam
 		return true;
 	if (!from->error)
 		from->error = dev_err_probe(from->dev, ret,
-					    "motor %u: property %s: it is to be %s\n",
+					    "motor %u: property %s: expected %s\n",
 					    from->motor, name, form);
 	return false;
 }
@@ -121,7 +121,8 @@ static void stepper_defaults_fit(struct stepper_motor *motor,
 
 	if (c->tick_ns < info->tick_min_ns) {
 		dev_warn(dev,
-			 "motor %u: a tick of %u ns is too short for this machine: %u\n",
+			 "motor %u: a tick of %u ns is too short for this machine: at "
+			 "least %u\n",
 			 motor->index, c->tick_ns, info->tick_min_ns);
 		c->tick_ns = info->tick_min_ns;
 	}
@@ -131,7 +132,7 @@ static void stepper_defaults_fit(struct stepper_motor *motor,
 			 div_u64(NSEC_PER_SEC, max(c->high_ns + c->low_ns, 1U)));
 	if (c->velocity > velocity) {
 		dev_warn(dev,
-			 "motor %u: %u steps/s are more than this machine holds: %u\n",
+			 "motor %u: %u steps/s exceed the limit of this machine: %u\n",
 			 motor->index, c->velocity, velocity);
 		c->velocity = velocity;
 	}

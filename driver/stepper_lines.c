@@ -46,7 +46,7 @@ static int stepper_lines_fail(struct device *dev, int ret, const char *key,
 	if (!label)
 		return dev_err_probe(dev, ret, "line %s: %s\n", key, why);
 	if (ret == -EPROBE_DEFER) {
-		dev_err(dev, "line %s: there is no chip labelled %s\n", key, label);
+		dev_err(dev, "line %s: no chip labelled %s\n", key, label);
 		return -ENODEV;
 	}
 	dev_err(dev, "line %s of %s: %s: %pe\n", key, label, why, ERR_PTR(ret));
@@ -69,8 +69,8 @@ static struct gpio_desc *stepper_lines_one(struct device *dev, struct fwnode_han
 	if (PTR_ERR_OR_ZERO(line) == -ENOENT && !needed)
 		return NULL;
 	if (IS_ERR(line))
-		return ERR_PTR(
-			stepper_lines_fail(dev, PTR_ERR(line), key, "it cannot be had"));
+		return ERR_PTR(stepper_lines_fail(dev, PTR_ERR(line), key,
+						  "it is not available"));
 	if (flags != GPIOD_IN && node && !stepper_node_push_pull(node, name))
 		return ERR_PTR(stepper_lines_fail(
 			dev, -EOPNOTSUPP, key,
@@ -207,7 +207,7 @@ static int stepper_lines_request(struct stepper *stepper, struct stepper_irq *ir
 			  dev_name(&stepper->dev), irq);
 	if (ret)
 		return stepper_lines_fail(stepper->parent, ret, key,
-					  "its interrupt cannot be had");
+					  "its interrupt is not available");
 	irq->irq = number;
 	return 0;
 }

@@ -141,7 +141,7 @@ static int stepper_main_probe(struct platform_device *pdev)
 			dev,
 			"a panic leaves power on: crash kernel, no crash_kexec_post_notifiers\n");
 	dev_info(dev,
-		 "%s: %u motors, at most %u steps/s; timers late by %u ns, %u at most\n",
+		 "%s: %u motors, at most %u steps/s; timer latency %u ns, at most %u\n",
 		 dev_name(&stepper->dev), stepper->n_motors, stepper->info.rate_max,
 		 stepper->info.lateness_ns, stepper->info.lateness_max_ns);
 	return 0;

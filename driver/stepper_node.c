@@ -75,6 +75,6 @@ int stepper_node_count(struct device *dev)
 		return n;
 	if (!n || seen != BIT(n) - 1)
 		return dev_err_probe(dev, -EINVAL,
-				     "motors must be numbered from 0 on without a gap\n");
+				     "motors must be numbered from 0 without a gap\n");
 	return n;
 }

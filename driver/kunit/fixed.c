@@ -27,7 +27,7 @@ MODULE_PARM_DESC(count, "Random inputs");
 
 static unsigned long long seed;
 module_param(seed, ullong, 0);
-MODULE_PARM_DESC(seed, "Of the random inputs");
+MODULE_PARM_DESC(seed, "Seed of the random inputs");
 
 static unsigned int digest;
 module_param(digest, uint, 0);
@@ -90,7 +90,7 @@ void fixed_bits(struct kunit *test)
 	if (!bytes)
 		return;
 	if (incise_fixed_open(&fx, bytes, size))
-		KUNIT_FAIL(test, "the blob is refused");
+		KUNIT_FAIL(test, "the blob is rejected");
 	else
 		KUNIT_EXPECT_EQ(test, fixed_digest(&fx, count, seed), digest);
 	vfree(bytes);

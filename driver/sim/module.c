@@ -19,12 +19,12 @@ MODULE_PARM_DESC(lines, "Number of GPIO lines, 1 to 256");
 
 static unsigned int ring = 1U << 20;
 module_param(ring, uint, 0444);
-MODULE_PARM_DESC(ring, "Edges that are held for a reader, up to 2^24");
+MODULE_PARM_DESC(ring, "Number of edges kept for a reader, up to 2^24");
 
 static char *source = "";
 module_param(source, charp, 0444);
-MODULE_PARM_DESC(source,
-		 "Controller whose plans have the ADC as source, incise-stepper.0 say");
+MODULE_PARM_DESC(source, "Controller whose plans have the ADC as source, for example "
+			 "incise-stepper.0");
 
 static struct sim sim_instance;
 static struct sim_adc sim_adc_instance;

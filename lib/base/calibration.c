@@ -161,11 +161,11 @@ static const char *fault(const struct incise_calibration_record *record)
 	const int n = record->n;
 
 	if (!is_kind(record->kind))
-		return "kind: expected a word of letters a to z, such as force";
+		return "kind: expected letters a to z, for example force";
 	if (!is_date(record->date))
 		return "date: expected a date and time as 2026-11-21T14:48:16Z";
 	if (n < 1 || n > INCISE_CALIBRATION_VALUES)
-		return "values: expected 1 to 16 of them";
+		return "values: expected 1 to 16 values";
 	for (int i = 0; i < n; i++) {
 		const struct incise_calibration_value *value = &record->values[i];
 		const struct known_key *key = find_key(value->key);
@@ -177,15 +177,16 @@ static const char *fault(const struct incise_calibration_record *record)
 		    (record->pass && !in_range(key, value->left)))
 			return "values: left: expected a number in the range of its key";
 		if (isinf(value->found))
-			return "values: found: expected a number that is finite";
+			return "values: found: expected a finite number";
 		if (!isfinite(value->u) || value->u < 0)
-			return "values: u: expected a standard uncertainty, not below 0";
+			return "values: u: expected a standard uncertainty of at least "
+			       "0";
 	}
 	if (record->n_covariance && record->n_covariance != n * (n + 1) / 2)
 		return "covariance: expected n (n + 1)/2 numbers for n values";
 	for (int i = 0; i < record->n_covariance; i++)
 		if (!isfinite(record->covariance[i]))
-			return "covariance: expected numbers that are finite";
+			return "covariance: expected finite numbers";
 	if (isinf(record->low) || isinf(record->high) || record->low > record->high)
 		return "low: expected a range from low to high";
 	return NULL;
@@ -589,7 +590,7 @@ static void put_file(const struct file_content *file, const char *notes, FILE *o
 	      "calibration.conf(5).\n",
 	      out);
 	fputs(notes, out);
-	fputs("\n## In force; what is absent is nominal.\n", out);
+	fputs("\n## Active values; absent keys have their nominal value.\n", out);
 	put_keys(file, out);
 	fputs("\n## Each calibration, oldest first; u is a standard uncertainty (k = 1).\n"
 	      "history = (",
@@ -702,7 +703,9 @@ static int add(struct file_content *file, const char *path,
 	wrong = fault(last);
 	if (wrong)
 		return incise_error_set(
-			err, EINVAL, "%.100s: nothing appended: of the calibration, %s",
+			err, EINVAL,
+			"%.100s: nothing appended: the calibration has an "
+			"invalid field: %s",
 			path, wrong);
 	make_printable(last->device);
 	make_printable(last->method);

@@ -161,8 +161,8 @@ int incise_conf_read(config_t *config, const char *path, struct incise_error *er
 	line = stream ? include_line(stream) : 0;
 	if (line)
 		rc = incise_error_set(err, EINVAL,
-				      "%.200s:%d: @include is not supported: write it "
-				      "all in one file",
+				      "%.200s:%d: @include is not supported; write all "
+				      "keys in one file",
 				      path, line);
 	else if (!stream || fseek(stream, 0, SEEK_SET))
 		rc = incise_error_set(err, ENOMEM, "%.200s: no memory to read it", path);
@@ -214,7 +214,8 @@ static int unknown_key(const config_setting_t *setting, const char *path,
 	if (meant && !config_setting_is_group(setting))
 		return incise_error_set(
 			err, EINVAL,
-			"%.100s:%d: %s: unknown key; expected %s, in that unit",
+			"%.100s:%d: %s: unknown key; expected %s, in the unit of its "
+			"name",
 			file_of(setting, path), config_setting_source_line(setting), name,
 			meant);
 	if (nearest)
@@ -377,7 +378,7 @@ int incise_conf_numbers(const config_setting_t *group, const char *path, const c
 
 		if (!is_number(element) || !isfinite(number_of(element)))
 			return setting_error(setting, path, EINVAL, err,
-					     "numbers that are finite");
+					     "finite numbers");
 		values[i] = number_of(element);
 	}
 	*n = config_setting_length(setting);

@@ -83,10 +83,12 @@ int incise_error_library(struct incise_error *err, const char *where, const char
 	if (!strncmp(said + length, ": cannot open shared object", 27) &&
 	    package_of(said, length, package, sizeof(package)))
 		return incise_error_set(err, ENOEXEC,
-					"%.200s: %.*s is missing; install what it needs: "
-					"sudo apt-get install %s",
+					"%.200s: %.*s is missing; install it: sudo "
+					"apt-get install %s",
 					where, (int)length, said, package);
-	return incise_error_set(err, ENOEXEC, "%.200s: %.250s; install what it needs",
+	return incise_error_set(err, ENOEXEC,
+				"%.200s: %.250s; install the missing "
+				"library",
 				where, said);
 }
 

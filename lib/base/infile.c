@@ -83,7 +83,7 @@ static int begin_pipe(struct incise_infile *file, struct incise_error *err)
 	poll(&ready, 1, WRITER_MS);
 	rc = read_some(file);
 	if (!rc)
-		return fail(file, err, ENODATA, "nobody writes to this pipe");
+		return fail(file, err, ENODATA, "no program writes to this pipe");
 	if (rc < 0 && rc != -EAGAIN)
 		return fail(file, err, -rc, strerror(-rc));
 	if (fcntl(file->fd, F_SETFL, 0))
@@ -191,12 +191,15 @@ static int find_end(struct incise_infile *file, size_t from, char **newline,
 
 	*newline = memchr(bytes, '\n', n);
 	if (memchr(bytes, 0, *newline ? (size_t)(*newline - bytes) : n))
-		return incise_error_set(err, EINVAL, "%.200s:%d: a NUL byte: not %s",
+		return incise_error_set(err, EINVAL,
+					"%.200s:%d: a NUL byte: this is "
+					"not %s",
 					file->path, file->line, file->kind->name);
 	/* The limit may also lie within the bytes that were read at once. */
 	if ((*newline ? (size_t)(*newline - bytes) : n) + from > INCISE_INFILE_LINE_MAX)
 		return incise_error_set(err, EFBIG,
-					"%.200s:%d: a line longer than %d MiB: not %s",
+					"%.200s:%d: a line longer than %d MiB: this is "
+					"not %s",
 					file->path, file->line,
 					INCISE_INFILE_LINE_MAX >> 20, file->kind->name);
 	return 0;

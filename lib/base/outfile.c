@@ -192,7 +192,7 @@ int incise_outfile_commit(struct incise_outfile *file, struct incise_error *err)
 			err, -rc, "%s: not written: %s%s",
 			strcmp(file->path, "-") ? file->path : "standard output",
 			strerror(-rc),
-			file->temp ? "; what stood there before is unchanged" : "");
+			file->temp ? "; the previous file is unchanged" : "");
 		incise_outfile_abort(file);
 		return rc;
 	}

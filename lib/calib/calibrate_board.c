@@ -141,15 +141,15 @@ static int find_start(const struct incise_board_views *views, struct solution *s
 	for (int v = 0; v < views->n; v++)
 		if (homography(views, views->corners + (size_t)2 * corners * v, h[v]))
 			return incise_error_set(err, EDOM,
-						"view %d has no homography: its corners "
-						"do not lie on a board",
+						"view %d has no homography: its "
+						"corners do not lie on a board; check "
+						"its order of corners",
 						v + 1);
 	if (focal_length(h, views->n, &f))
 		return incise_error_set(
 			err, EDOM,
-			"the views have no focal length in common: tilt "
-			"the board by 20 to 45 degrees, each time another "
-			"way");
+			"the views have no common focal length; tilt the board by 20 "
+			"to 45 degrees, each time in another direction");
 	solution->lens.by_name = (struct incise_board_lens){
 		.fx = f,
 		.fy = f,
@@ -662,9 +662,8 @@ static int covariance(struct board *b, struct solution *s, double variance,
 	    LAPACKE_dpotri(LAPACK_ROW_MAJOR, 'U', n, b->work, n))
 		return incise_error_set(
 			err, EDOM,
-			"the views do not tell lens and poses apart: tilt "
-			"the board by 20 to 45 degrees, each time another "
-			"way");
+			"the views cannot separate lens and poses; tilt the board by "
+			"20 to 45 degrees, each time in another direction");
 	for (int i = 0; i < n; i++)
 		for (int j = 0; j < n; j++)
 			s->covariance[(size_t)i * n + j] =
@@ -688,8 +687,8 @@ static int fit_views(struct board *b, struct solution *s, double *step,
 		if (descend(b, s, step))
 			return incise_error_set(
 				err, EDOM,
-				"lens and poses were not found: are the "
-				"corners of one board, in the same order?");
+				"no lens and poses fit the corners; check that all "
+				"views are of one board, with corners in the same order");
 	} while (leave_out(b, s, fit->view_rms_px));
 	fit->views = 0;
 	for (int v = 0; v < b->views->n; v++)
@@ -701,22 +700,23 @@ static int fit_views(struct board *b, struct solution *s, double *step,
 	fit->lens = s->lens.by_name;
 	if (!b->believed[b->views->plane])
 		return incise_error_set(err, EDOM,
-					"view %d, which lies in the cutting plane, is an "
-					"outlier: %.2f px; the others leave %.2f px: is "
-					"the board flat, and the picture sharp?",
+					"view %d, in the cutting plane, is an outlier: "
+					"residuals of %.2f px, the others %.2f px; "
+					"check that the board is flat and the frame "
+					"sharp",
 					b->views->plane + 1,
 					fit->view_rms_px[b->views->plane], fit->rms_px);
 	if (fit->rms_px > RMS_MAX_PX)
 		return incise_error_set(
 			err, EDOM,
-			"corners are %.2f px (rms) off a board of %d x %d: "
-			"is it flat, was it still, are the sizes right?",
+			"corners deviate by %.2f px (rms) from a board of %d x %d; "
+			"check that it is flat, that it was still, and its sizes",
 			fit->rms_px, b->views->columns, b->views->rows);
 	if (fit->spread_deg < SPREAD_MIN_DEG)
 		return incise_error_set(
 			err, EDOM,
-			"the views are %.1f degrees apart only: tilt the "
-			"board by 20 to 45 degrees, each time another way",
+			"the views differ by %.1f degrees only; tilt the board by 20 "
+			"to 45 degrees, each time in another direction",
 			fit->spread_deg);
 	rc = covariance(b, s, sum / (equations - b->n), err);
 	if (!rc)
@@ -732,14 +732,14 @@ static int check(const struct incise_board_views *v, struct incise_error *err)
 	if (v->columns < 3 || v->rows < 3 || v->columns * v->rows > INCISE_BOARD_CORNERS)
 		return incise_error_set(
 			err, EINVAL,
-			"a board of %d x %d inner corners: give 3 or more, "
-			"and no more than %d of all",
+			"a board of %d x %d inner corners: expected 3 or more per "
+			"side, and at most %d in total",
 			v->columns, v->rows, INCISE_BOARD_CORNERS);
 	if (v->n < VIEWS_MIN || v->n > INCISE_BOARD_VIEWS)
 		return incise_error_set(
 			err, EDOM,
-			"%d views of the board: give %d to %d, one in the "
-			"cutting plane and others tilted",
+			"%d views of the board: expected %d to %d, one in the cutting "
+			"plane and the others tilted",
 			v->n, VIEWS_MIN, INCISE_BOARD_VIEWS);
 	all = v->u_square_mm + v->u_plane_mm + v->square_mm;
 	for (int i = 0; i < 4; i++)
@@ -750,13 +750,14 @@ static int check(const struct incise_board_views *v, struct incise_error *err)
 	    hypot(v->axis_px[1][0] - v->axis_px[0][0],
 		  v->axis_px[1][1] - v->axis_px[0][1]) < 1)
 		return incise_error_set(err, EINVAL,
-					"sizes of the board, its plane, the axis or the "
-					"region are out of range");
+					"sizes of the board, its plane, the axis or "
+					"the region are out of range; correct them");
 	numbers = (size_t)2 * v->columns * v->rows * v->n;
 	for (size_t i = 0; i < numbers; i++)
 		if (!(fabs(v->corners[i]) < 1e6))
 			return incise_error_set(err, EINVAL,
-						"a corner of view %d is at %g",
+						"a corner of view %d is at %g, out of "
+						"range; remove the view",
 						(int)(i / 2 / v->columns / v->rows) + 1,
 						v->corners[i]);
 	return 0;

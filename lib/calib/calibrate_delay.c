@@ -248,17 +248,19 @@ static int search(struct delay *d, struct incise_delay_fit *fit, struct incise_e
 	if (peak < INCISE_DELAY_CORRELATION_MIN)
 		return incise_error_set(
 			err, EDOM,
-			"the streams are too little alike (correlation %.2f, %g is needed); "
-			"tap on, or press, something springy, quickly and unevenly",
+			"the streams correlate too little (%.2f, at least %g is "
+			"required); tap or press on elastic material, quickly and "
+			"irregularly",
 			peak, INCISE_DELAY_CORRELATION_MIN);
 	if (fit->second > INCISE_DELAY_SECOND_MAX)
 		return incise_error_set(err, EDOM,
 					"the motion is periodic: another delay fits "
-					"%.0f %% as well; tap unevenly",
+					"%.0f %% as well; tap irregularly",
 					100 * fit->second);
 	if (best == 0 || best == lags - 1)
 		return incise_error_set(err, EDOM,
-					"the delay is beyond %.0f ms; look farther",
+					"the delay is beyond %.0f ms; increase the "
+					"range",
 					d->range * DELAY_STEP_S * 1e3);
 	return 0;
 }
@@ -509,8 +511,8 @@ static int measure_motion(struct delay *d, struct incise_error *err)
 	d->high_mm = grid->scratch[n - 1 - n / 50];
 	if (d->high_mm - d->low_mm < MOTION_MIN_MM)
 		return incise_error_set(err, EDOM,
-					"the motion is %.2f mm only, %g are needed; tap "
-					"farther",
+					"the motion has only %.2f mm, at least %g are "
+					"required; move farther",
 					d->high_mm - d->low_mm, MOTION_MIN_MM);
 	return 0;
 }
@@ -534,8 +536,8 @@ static int fit_delay(struct delay *d, struct incise_delay_fit *fit,
 		rc = incise_error_set(err, ENOMEM, "out of memory");
 	else if (!refine(d, &t))
 		rc = incise_error_set(err, EDOM,
-				      "no delay fits best; tap on something springy, "
-				      "quickly and unevenly");
+				      "no delay fits best; tap on elastic material, "
+				      "quickly and irregularly");
 	if (!rc) {
 		for (int i = 0; i < t.n; i++)
 			if (!isnan(t.rest[i])) {
@@ -554,8 +556,8 @@ static int fit_delay(struct delay *d, struct incise_delay_fit *fit,
 	if (!(fit->sd_ms <= INCISE_DELAY_SD_MAX_MS))
 		return incise_error_set(
 			err, EDOM,
-			"this motion tells the delay to ±%.1f ms only (%.1f ms); tap on, or "
-			"press, something springy, quickly and unevenly",
+			"the interval of the delay, ±%.1f ms, is too wide (%.1f ms); "
+			"tap or press on elastic material, quickly and irregularly",
 			2 * fit->sd_ms, fit->delay_ms);
 	return 0;
 }
@@ -577,7 +579,7 @@ int incise_calibrate_delay(const struct incise_delay_point *motion, int n_motion
 					 .contact_mm = NAN};
 	if (!(range_ms >= 10 && range_ms <= 1000))
 		return incise_error_set(
-			err, EINVAL, "a range of %g ms is not from 10 to 1000", range_ms);
+			err, EINVAL, "a range of %g ms: expected 10 to 1000", range_ms);
 	rc = delay_grid_make(&d.grid, motion, n_motion, other, n_other, err);
 	if (!rc) {
 		fit->span_s = d.grid.n * DELAY_STEP_S;

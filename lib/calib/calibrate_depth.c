@@ -133,8 +133,8 @@ static int check_outliers(int n, int inliers, struct incise_error *err)
 		return 0;
 	return incise_error_set(
 		err, EDOM,
-		"%d of %d readings are outliers; more than 30 %% is no "
-		"calibration: see that the scalpel is found in the pictures",
+		"%d of %d readings are outliers, more than 30 %%; check that vision "
+		"finds the scalpel in the frames",
 		n - inliers, n);
 }
 
@@ -144,8 +144,8 @@ static int check_scale(double mm_px, struct incise_error *err)
 		return 0;
 	return incise_error_set(
 		err, EDOM,
-		"%.5g mm per pixel is no scale of a camera over a cut: are "
-		"mm and pixels swapped?",
+		"%.5g mm per pixel is not a plausible scale; check that mm and pixels "
+		"are not swapped",
 		mm_px);
 }
 
@@ -366,22 +366,21 @@ static int check_line(const struct line *line, const struct incise_depth_fit *fi
 	    fabs(slope) < SCALE_MAX)
 		return incise_error_set(
 			err, EDOM,
-			"the lengths span %.1f pixels only, %.1f to %.1f: "
-			"give depths over at least %g pixels",
+			"the lengths span only %.1f pixels, %.1f to %.1f; give depths "
+			"over at least %g pixels",
 			fit->high_px - fit->low_px, fit->low_px, fit->high_px,
 			INCISE_DEPTH_SPAN_MIN_PX);
 	if (fabs(slope) > SCALE_MAX && 1 / fabs(slope) > SCALE_MIN)
 		return incise_error_set(
 			err, EDOM,
-			"the columns are swapped: %.4g mm per pixel, which "
-			"the other way round would be %.4g",
+			"the columns are swapped: %.4g mm per pixel; in the other "
+			"order it is %.4g",
 			fabs(slope), 1 / fabs(slope));
 	if (slope > 0)
 		return incise_error_set(
 			err, EDOM,
-			"the length grows with the depth, %.4g mm per "
-			"pixel: what is exposed must shrink; is the sign of "
-			"the depth turned?",
+			"the exposed length grows with the depth, %.4g mm per pixel, "
+			"but must decrease; check the sign of the depth",
 			slope);
 	return check_scale(-slope, err);
 }
@@ -429,7 +428,9 @@ static int fit_pairs(const struct incise_depth_lengths *p, bool *near, double *r
 	if (rc)
 		return rc;
 	if (k < INCISE_DEPTH_PAIRS_MIN)
-		return incise_error_set(err, EDOM, "%d pairs are left: give at least %d",
+		return incise_error_set(err, EDOM,
+					"%d pairs without outliers: give at "
+					"least %d",
 					k, INCISE_DEPTH_PAIRS_MIN);
 	for (int i = 0; i < k; i++) {
 		fit->sd_mm += residual[i] * residual[i];

@@ -452,7 +452,7 @@ static int check_setup(const struct incise_calibrate_force_setup *s,
 		    : incise_error_set(
 			      err, EINVAL,
 			      "the setup of the calibration: gravity, densities, "
-			      "scale, range and tolerance are to be positive");
+			      "scale, range and tolerance must be positive");
 }
 
 static bool near(double ratio, double expected)
@@ -483,10 +483,11 @@ static int check_slope(const struct work *w, double slope, struct incise_error *
 	else if (near(ratio, 1 / N_g) && w->masses)
 		sign = "the masses seem to be forces in N";
 	else if (!(slope > 0))
-		sign = "the reading does not grow with the load: see how the sensor is wired";
+		sign = "the reading does not increase with the load; check the wiring "
+		       "of the sensor";
 	return sign ? incise_error_set(err, EDOM,
-				       "a slope of %.4g mV/N cannot be, where %.4g is "
-				       "expected: %s",
+				       "a slope of %.4g mV/N is not plausible; "
+				       "expected about %.4g: %s",
 				       slope, nominal, sign)
 		    : 0;
 }
@@ -567,18 +568,19 @@ static int check_loads(struct work *w, struct incise_error *err)
 	if (used < w->n)
 		return incise_error_set(
 			err, ENODATA,
-			"%d pairs are saturated or wrong; %d pairs of %d different loads are "
-			"left, and 5 of 3 are needed: use smaller weights",
+			"%d pairs are saturated or outliers; the remaining %d pairs of "
+			"%d different loads are too few, at least 5 of 3 are required; "
+			"use smaller weights",
 			w->n - used, used, loads);
 	if (loads == 1)
 		return incise_error_set(
 			err, ENODATA,
-			"all %d pairs are of one load: one repeated weight "
-			"has no slope; use 5 loads or more",
+			"all %d pairs have the same load, which gives no slope; use 5 "
+			"loads or more",
 			used);
 	return incise_error_set(err, ENODATA,
-				"%d pairs of %d different loads: 5 pairs of 3 loads are "
-				"the least; 5 loads in 3 series are good",
+				"%d pairs of %d different loads: expected at least 5 "
+				"pairs of 3 loads; 5 loads in 3 series are recommended",
 				used, loads);
 }
 
@@ -614,14 +616,14 @@ static int mark_outliers(struct work *w, struct incise_error *err)
 	if (rc)
 		return incise_error_set(err, -rc,
 					rc == -ENOMEM ? "no memory for %d pairs"
-						      : "%d pairs carry no line",
+						      : "no line fits %d pairs",
 					w->n);
 	w->robust_slope = line.slope;
 	if (found > OUTLIERS_MAX * m)
 		return incise_error_set(
 			err, EDOM,
-			"%d of %d pairs lie far from the line of the others, and one in ten "
-			"is borne: repeat the calibration (the report lists them)",
+			"%d of %d pairs are outliers, more than one in ten; repeat the "
+			"calibration (the report lists them)",
 			found, m);
 	return 0;
 }
@@ -666,9 +668,9 @@ static int fit(struct work *w, struct incise_calibrate_force *result,
 	    SCATTER_MAX * result->sensitivity_mV_N * w->loads[w->n_loads - 1].F_N)
 		return incise_error_set(
 			err, EDOM,
-			"the readings scatter by %.3g mV about their line, "
-			"more than %g %% of full scale: wait until each is "
-			"steady, and look for wrong loads",
+			"the readings scatter by %.3g mV about their line, more than "
+			"%g %% of full scale; wait until each is steady, and check the "
+			"loads",
 			result->residual_sd_mV, 100 * SCATTER_MAX);
 	measure_metrics(w, result);
 	result->pass = fabs(result->sensitivity_mV_N - w->setup->nominal_mV_N) <=

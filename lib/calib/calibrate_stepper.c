@@ -246,8 +246,9 @@ static int check_moves(const struct work *w, struct incise_error *err)
 		return 0;
 	return incise_error_set(
 		err, EDOM,
-		"the force changes by %.3g N over %g mm, and its noise is %.2g N: the sensor "
-		"does not move; does the handle press it, is its cable in?",
+		"the force changes by %.3g N over %g mm, with a noise of %.2g N: the "
+		"sensor does not react; check that the handle presses on it, and its "
+		"cable",
 		spread, w->range_mm, noise);
 }
 
@@ -284,9 +285,9 @@ static int check_follows(const struct work *w, struct incise_error *err)
 			    -0.5 * w->slope)
 			return incise_error_set(
 				err, EDOM,
-				"from about %.3g to %.3g mm the force does not follow: the "
-				"sensor is saturated there, or not in touch; give a range "
-				"where it is",
+				"from about %.3g to %.3g mm the force does not follow: "
+				"the sensor is saturated or without contact; give "
+				"another range",
 				low + b * w->range_mm / BLOCKS,
 				low + (b + 2) * w->range_mm / BLOCKS);
 	return 0;
@@ -316,8 +317,9 @@ static int check_slip(const struct work *w, struct incise_calibrate_stepper *res
 		return 0;
 	return incise_error_set(
 		err, EDOM,
-		"stroke %d lies %.3g mm (%.3g N) beside another of its way: steps were lost, or "
-		"the force sensor's zero drifts; go slower, or let it warm up",
+		"stroke %d differs by %.3g mm (%.3g N) from another in the same "
+		"direction: steps were lost, or the zero of the force sensor drifts; "
+		"go slower, or let it warm up",
 		from + 1, worst / w->slope, worst);
 }
 
@@ -330,8 +332,9 @@ static int check_lines(const struct work *w, struct incise_calibrate_stepper *re
 	if (w->slope <= 0)
 		return incise_error_set(
 			err, EDOM,
-			"the force falls by %.3g N per mm where the position rises: the sign of "
-			"the sensor or of the actuator is reversed; see invert in rig.conf",
+			"the force falls by %.3g N per mm while the position rises: "
+			"the sign of the sensor or of the actuator is reversed; see "
+			"invert in rig.conf",
 			-w->slope);
 	rc = check_follows(w, err);
 	if (!rc)
@@ -341,8 +344,8 @@ static int check_lines(const struct work *w, struct incise_calibrate_stepper *re
 	if (w->slope * w->range_mm < 30 * fmax(w->sd, w->setup->resolution_N))
 		return incise_error_set(
 			err, EDOM,
-			"a range of %g mm, %.3g N, is too small for readings that lie %.2g N "
-			"off a line; give a larger one",
+			"a range of %g mm, %.3g N, is too small for readings that "
+			"deviate by %.2g N from a line; give a larger one",
 			w->range_mm, w->slope * w->range_mm, w->sd);
 	result->outliers = 0;
 	for (int i = 0; i < w->n; i++)
@@ -350,8 +353,8 @@ static int check_lines(const struct work *w, struct incise_calibrate_stepper *re
 	if (result->outliers > w->n / 7)
 		return incise_error_set(
 			err, EDOM,
-			"%d of %d points lie far off any line; see what shakes "
-			"the sensor, and measure again",
+			"%d of %d points are outliers; find the cause, for example "
+			"vibration, and measure again",
 			result->outliers, w->n);
 	return 0;
 }
@@ -619,8 +622,8 @@ static int check_values(const struct incise_calibrate_stepper_point *points, int
 			struct incise_error *err)
 {
 	if (n < 1 || n > 1000000)
-		return incise_error_set(err, EINVAL,
-					"%d points; give 1 to 1000000 of them", n);
+		return incise_error_set(err, EINVAL, "%d points: expected 1 to 1000000",
+					n);
 	if (!(setup->step_mm > 0 && setup->step_mm <= 100) ||
 	    !(setup->sensor_u >= 0 && setup->sensor_u < 1) ||
 	    !(setup->resolution_N >= 0 && setup->resolution_N < 1e4) ||
@@ -628,15 +631,15 @@ static int check_values(const struct incise_calibrate_stepper_point *points, int
 	    (!isnan(setup->spring_N_mm) && !(setup->spring_N_mm > 0)))
 		return incise_error_set(
 			err, EINVAL,
-			"step, uncertainty or resolution of the sensor, or what "
-			"passes, is out of range; correct it");
+			"step, uncertainty, resolution of the sensor or a limit is out "
+			"of range; correct it");
 	for (int i = 0; i < n; i++)
 		if (!(fabs(points[i].position_mm) <= 1e4) ||
 		    !(fabs(points[i].force_N) <= 1e4))
 			return incise_error_set(
 				err, EINVAL,
-				"point %d: position_mm and force_N are to be numbers up "
-				"to 10000; correct it",
+				"point %d: position_mm and force_N: expected numbers "
+				"up to 10000; correct it",
 				i + 1);
 	return 0;
 }
@@ -658,8 +661,9 @@ static int find_strokes(struct work *w, struct incise_error *err)
 			if (w->n_strokes == most)
 				return incise_error_set(
 					err, EDOM,
-					"positions turn round at every few points and are no "
-					"strokes; are the columns swapped?");
+					"positions reverse every few points and form "
+					"no strokes; check that the columns are not "
+					"swapped");
 			s = &w->strokes[w->n_strokes++];
 			*s = (struct stroke){.first = i,
 					     .from_mm = i ? w->points[i - 1].position_mm
@@ -692,14 +696,14 @@ static int find_strokes(struct work *w, struct incise_error *err)
 	if (short_ones > w->n_strokes / 3)
 		return incise_error_set(
 			err, EDOM,
-			"%d of %d strokes are shorter than %d points; are the "
-			"columns swapped?",
+			"%d of %d strokes have fewer than %d points; check that the "
+			"columns are not swapped",
 			short_ones, w->n_strokes, LEAST_POINTS);
 	if (short_ones || ways[0] < 2 || ways[1] < 2)
 		return incise_error_set(
 			err, ENODATA,
-			"%d strokes up and %d down, %d of them with fewer than %d points; "
-			"give two of each way, and more points",
+			"%d strokes up and %d down, %d of them with fewer than %d "
+			"points; give two in each direction, and more points",
 			ways[1], ways[0], short_ones, LEAST_POINTS);
 	return 0;
 }
@@ -723,8 +727,8 @@ static int find_saturated(struct work *w, struct incise_calibrate_stepper *resul
 	if (result->saturated > w->n / 10)
 		return incise_error_set(
 			err, EDOM,
-			"the force sensor is saturated at %d of %d points, such "
-			"as at %g mm; give a smaller range",
+			"the force sensor is saturated at %d of %d points, for example "
+			"at %g mm; give a smaller range",
 			result->saturated, w->n, at);
 	return 0;
 }
@@ -850,8 +854,8 @@ static int fit(struct work *w, struct incise_calibrate_stepper *result,
 		if (rc)
 			return incise_error_set(
 				err, ENODATA,
-				"too few points lie on the strokes' lines; strokes are to go "
-				"through the whole range, with more points");
+				"too few points lie on the lines of the strokes; give "
+				"strokes over the whole range, with more points");
 		rc = check_lines(w, result, err);
 		if (!rc && measure_turn(w, result))
 			rc = incise_error_set(err, ENOMEM, "no memory for %d points",
@@ -861,8 +865,8 @@ static int fit(struct work *w, struct incise_calibrate_stepper *result,
 		if (result->dead_mm > MOST_DEAD * w->range_mm)
 			return incise_error_set(
 				err, EDOM,
-				"after turning round the force stands still for %.3g mm, and "
-				"the range is %g mm; give a larger one",
+				"after a reversal the force does not change for %.3g "
+				"mm, and the range is %g mm; give a larger one",
 				result->dead_mm, w->range_mm);
 		skip_mm = fmin(FIRST_SKIP * w->range_mm,
 			       1.1 * (result->dead_mm + result->rest_mm) +

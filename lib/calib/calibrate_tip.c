@@ -493,44 +493,47 @@ static int tip_judge(const struct tip_poses *poses, const struct incise_tip_fit 
 	if (fit->least_deg < INCISE_TIP_LEAST_DEG)
 		return incise_error_set(
 			err, EDOM,
-			"it turned about one axis only: the direction (%.2f %.2f %.2f) "
-			"of the sensor swept %.0f degrees; turn the tool all ways",
+			"the tool rotated about one axis only: the direction (%.2f "
+			"%.2f %.2f) of the sensor swept %.0f degrees; rotate it in all "
+			"directions",
 			fit->least[0], fit->least[1], fit->least[2], fit->least_deg);
 	if (fit->n - fit->inliers > OUTLIERS_MAX * fit->n) {
 		if (outliers_at_end(poses))
 			return incise_error_set(
 				err, EDOM,
-				"the pivot moved: %d of %d poses are about another point "
+				"the pivot moved: %d of %d poses have another pivot "
 				"than the rest; keep the tip in its dimple",
 				fit->n - fit->inliers, fit->n);
 		return incise_error_set(
 			err, EDOM,
-			"%d of %d poses are not about the pivot of the others; keep the "
-			"tip in its dimple, or are columns swapped?",
+			"%d of %d poses have another pivot than the rest; keep the tip "
+			"in its dimple, and check the order of the columns",
 			fit->n - fit->inliers, fit->n);
 	}
 	if (fit->rms_mm > RMS_MAX_MM)
 		return incise_error_set(
 			err, EDOM,
-			"poses miss their pivot by %.2f mm rms, more than %g mm; keep the "
-			"tip in its dimple, or are columns swapped (quaternion w first)?",
+			"poses miss their pivot by %.2f mm rms, more than %g mm; keep "
+			"the tip in its dimple, and check the order of the columns "
+			"(quaternion w first)",
 			fit->rms_mm, RMS_MAX_MM);
 	if (fit->cone_deg < INCISE_TIP_CONE_DEG)
 		return incise_error_set(
 			err, EDOM,
-			"the tool swept a cone of %.0f degrees only; %g are needed",
+			"the tool swept a cone of only %.0f degrees; at least %g are "
+			"required",
 			fit->cone_deg, INCISE_TIP_CONE_DEG);
 	if (chi2 > CHI2_MOVED && fit->moved_mm > MOVED_MIN_MM)
 		return incise_error_set(
 			err, EDOM,
-			"the pivot moved by %.2f mm while it turned; keep the tip in its "
-			"dimple, and the dimple where it is",
+			"the pivot moved by %.2f mm during the rotation; keep the tip "
+			"in its dimple, and the dimple in place",
 			fit->moved_mm);
 	if (fit->blocks < INCISE_TIP_POSES_MIN)
 		return incise_error_set(
 			err, EDOM,
-			"%d poses are worth %d independent ones, %d are needed; turn the "
-			"tool longer",
+			"%d poses correspond to %d independent ones, %d are required; "
+			"rotate the tool longer",
 			fit->n, fit->blocks, INCISE_TIP_POSES_MIN);
 	return 0;
 }
@@ -563,13 +566,14 @@ static int take(struct tip_poses *to, const struct incise_tip_pose *from,
 		if (!v3_finite(from[i].position_mm) || !isfinite(length) ||
 		    v3_length(from[i].position_mm) > 1e6)
 			return incise_error_set(err, EINVAL,
-						"pose %d: not a number, or no place of "
-						"a tool; remove it",
+						"pose %d: not finite, or not a "
+						"position of a tool; remove it",
 						i + 1);
 		if (fabs(length - 1) > 0.02)
 			return incise_error_set(err, EINVAL,
 						"pose %d: the quaternion's length is "
-						"%.3g, not 1; are columns swapped?",
+						"%.3g, not 1; check the order of the "
+						"columns",
 						i + 1, length);
 		v3_copy(to->p[i], from[i].position_mm);
 		rotation(to->r[i], q);
@@ -644,8 +648,8 @@ static int fit_poses(struct tip_poses *poses, const struct incise_tip_pose *give
 	if (!tip_robust(poses, &s))
 		return incise_error_set(
 			err, EDOM,
-			"the tool did not turn, or about one axis only; turn it all "
-			"ways, the tip in its dimple");
+			"the tool did not rotate, or about one axis only; rotate it in "
+			"all directions, with the tip in its dimple");
 	n = fit->inliers = tip_listed(poses);
 	v3_copy(fit->tip_mm, s.t);
 	v3_copy(fit->pivot_mm, s.c);
@@ -693,8 +697,8 @@ int incise_calibrate_tip(const struct incise_tip_pose *poses, int n, bool *inlie
 		memset(inlier, 0, (size_t)(n > 0 ? n : 0) * sizeof(*inlier));
 	if (n < INCISE_TIP_POSES_MIN)
 		return incise_error_set(err, EDOM,
-					"%d poses are too few, %d are needed at least; "
-					"turn the tool longer",
+					"%d poses are too few, at least %d are "
+					"required; rotate the tool longer",
 					n, INCISE_TIP_POSES_MIN);
 	rc = allocate(&own, n) ? take(&own, poses, err)
 			       : incise_error_set(err, ENOMEM, "out of memory");

@@ -242,36 +242,36 @@ int delay_grid_make(struct delay_grid *grid, const struct incise_delay_point *mo
 	memset(grid, 0, sizeof(*grid));
 	if (n_motion < 10 || n_other < 10)
 		return incise_error_set(err, EDOM,
-					"a stream of %d values tells no delay; record "
-					"10 to 15 s of motion",
+					"a stream of %d values is too short for a "
+					"delay; record 10 to 15 s of motion",
 					n_motion < n_other ? n_motion : n_other);
 	periods[0] = period_of(motion, n_motion);
 	periods[1] = period_of(other, n_other);
 	if (periods[0] < 0 || periods[1] < 0)
 		return incise_error_set(err, EINVAL,
-					"times of a stream do not ascend, or cannot be; "
-					"sort them");
+					"times of a stream do not ascend, or are out "
+					"of range; sort them");
 	grid->start_ns = motion->t_ns > other->t_ns ? motion->t_ns : other->t_ns;
 	end_ns = motion[n_motion - 1].t_ns < other[n_other - 1].t_ns
 			 ? motion[n_motion - 1].t_ns
 			 : other[n_other - 1].t_ns;
 	if (end_ns - grid->start_ns < INCISE_DELAY_SPAN_MIN_S * 1e9)
 		return incise_error_set(err, EDOM,
-					"the streams have %.1f s in common, %g are "
-					"needed; record longer",
+					"the streams have %.1f s in common, at least "
+					"%g are required; record longer",
 					fmax(0, (double)(end_ns - grid->start_ns) * 1e-9),
 					INCISE_DELAY_SPAN_MIN_S);
 	if ((end_ns - grid->start_ns) / NS_PER_STEP >= STEPS_MAX)
 		return incise_error_set(err, EDOM,
 					"the streams have more than 10 minutes in "
-					"common; a part of that will do");
+					"common; use a part of them");
 	grid->n = (int)((end_ns - grid->start_ns) / NS_PER_STEP) + 1;
 	grid->sigma = fmax(SIGMA_MIN_STEPS,
 			   SIGMA_PERIODS * fmax(periods[0], periods[1]) / NS_PER_STEP);
 	if (grid->sigma > 25)
 		return incise_error_set(err, EDOM,
-					"a stream has a value each %.0f ms; that is too "
-					"slow for a delay",
+					"a stream has a value each %.0f ms, too slow "
+					"for a delay; use a faster one",
 					fmax(periods[0], periods[1]) * 1e-6);
 	grid->reach = (int)ceil(REACH_SIGMAS * grid->sigma);
 	if (!allocate(grid))

@@ -194,8 +194,7 @@ int incise_redundancy(const struct incise_depth_pair *pairs, int n,
 		    pairs[i].t_ns < (i ? pairs[i - 1].t_ns : 0))
 			return incise_error_set(
 				err, EINVAL,
-				"pair %d of depths is not finite, or its time "
-				"goes back",
+				"pair %d of depths is not finite, or its time decreases",
 				i + 1);
 	w.depth = malloc((6 * sizeof(double) + sizeof(int64_t)) * (n > 0 ? n : 1));
 	w.wild = malloc(n > 0 ? n : 1);
@@ -220,9 +219,9 @@ int incise_redundancy(const struct incise_depth_pair *pairs, int n,
 		else
 			rc = incise_error_set(
 				err, ENODATA,
-				"%d pictures within %d seconds have a depth of 1 mm or more "
-				"beside the tracker's: %d within %d are needed; record a few "
-				"slow cuts with the camera",
+				"%d frames within %d seconds have depths of 1 mm or "
+				"more from camera and tracker: %d within %d are "
+				"required; record a few slow cuts with the camera",
 				w.n, seconds, PAIRS_MIN, SECONDS_MIN);
 	} else {
 		rc = incise_error_set(err, ENOMEM, "no memory for %d pairs", n);

@@ -159,8 +159,8 @@ static int read_active_low(struct incise_actuator *actuator,
 		if (k == INCISE_LINES || actuator->line[k] < 0)
 			return incise_error_set(
 				err, EINVAL,
-				"%.200s:%d: actuator.lines.active_low: \"%.40s\" is no "
-				"line that is given here; correct it",
+				"%.200s:%d: actuator.lines.active_low: \"%.40s\" is "
+				"not a line of this group; correct it",
 				path, config_setting_source_line(names),
 				name ? name : "?");
 		actuator->active_low |= 1u << k;
@@ -303,8 +303,8 @@ static int read_cycle(struct incise_actuator_can *can, const config_setting_t *g
 		return rc;
 	return incise_error_set(
 		err, EINVAL,
-		"%.200s:%d: actuator.can.cycle_us: expected a whole number of %d us, as a "
-		"drive keeps it in a byte, found %d; give %d or %d",
+		"%.200s:%d: actuator.can.cycle_us: expected a multiple of %d us, found "
+		"%d; give %d or %d",
 		path, line_of(group, "cycle_us"), CYCLE_UNIT_US, us,
 		us - us % CYCLE_UNIT_US, us - us % CYCLE_UNIT_US + CYCLE_UNIT_US);
 }
@@ -322,14 +322,15 @@ static int check_can(const struct incise_actuator_can *can, const config_setting
 		    !config_setting_get_member(group, needed[i]))
 			return incise_error_set(
 				err, EINVAL,
-				"%.200s:%d: actuator.can.%s is missing: in mode \"cst\" the "
-				"loop is closed here, and only you know this motor; add it",
+				"%.200s:%d: actuator.can.%s is missing: in mode "
+				"\"cst\" incise closes the control loops and needs it; "
+				"add it",
 				path, line_of(group, "mode"), needed[i]);
 	if (can->mode == INCISE_ACTUATOR_CSV && can->position_gain_1_s > most_1_s)
 		return incise_error_set(
 			err, EINVAL,
-			"%.200s:%d: actuator.can.position_gain_1_s: expected at most %.1f "
-			"1/s, half of what is stable over a bus with cycle_us = %u, found "
+			"%.200s:%d: actuator.can.position_gain_1_s: expected at most "
+			"%.1f 1/s, half of the stable limit with cycle_us = %u, found "
 			"%g; correct it",
 			path, line_of(group, "position_gain_1_s"),
 			floor(most_1_s * 10) / 10, can->cycle_ns / NS_PER_US,
@@ -432,8 +433,9 @@ static int check(const struct incise_actuator *actuator, const config_setting_t 
 	if (pulse_ns * rate > SECOND_NS * (1 + 1e-9))
 		return incise_error_set(
 			err, EINVAL,
-			"%.200s:%d: actuator.velocity_mm_s: %g mm/s are a step each %.3f us, "
-			"but high_us and low_us take %.3f us; give at most %g mm/s",
+			"%.200s:%d: actuator.velocity_mm_s: at %g mm/s a step takes "
+			"%.3f us, but high_us and low_us take %.3f us; give at most %g "
+			"mm/s",
 			path, line_of(group, "velocity_mm_s"), actuator->velocity_mm_s,
 			SECOND_NS / US / rate, pulse_ns / US,
 			floor(SECOND_NS / pulse_ns * step_mm * 1e4) / 1e4);

@@ -80,14 +80,14 @@ static int load(struct incise_loaded *loaded, const char *kind, const char *name
 	backend = module.symbol;
 	if (backend->abi != INCISE_BACKEND_ABI)
 		rc = incise_error_set(err, ENOEXEC,
-				      "%s: %.200s: is made for interface %u, this is %u; "
+				      "%s: %.200s: built for interface %u, this is %u; "
 				      "build it again",
 				      where, path, backend->abi, INCISE_BACKEND_ABI);
 	else if (!backend->open || !backend->kind || strcmp(backend->kind, kind) ||
 		 !backend->name || strcmp(backend->name, name))
 		rc = incise_error_set(err, ENOEXEC,
-				      "%s: %.200s: holds another backend than its name "
-				      "says; build it again",
+				      "%s: %.200s: contains another backend than its "
+				      "name says; build it again",
 				      where, path);
 	if (rc) {
 		dlclose(module.handle);
@@ -118,8 +118,8 @@ int incise_backend_find(struct incise_loaded *loaded, const char *kind, const ch
 	}
 	list(kind, has_folder ? in : NULL, known, sizeof(known));
 	return incise_error_set(err, ENODEV,
-				"%s: there is no backend \"%.40s\"; those there are: %s",
-				where, name, known);
+				"%s: no such backend \"%.40s\"; there are: %s", where,
+				name, known);
 }
 
 void incise_backend_unload(struct incise_loaded *loaded)

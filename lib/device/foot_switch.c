@@ -119,23 +119,22 @@ static int check(const struct incise_foot_switch *foot,
 	if (ioctl(foot->fd, EVIOCGBIT(EV_KEY, sizeof(known)), known) < 0) {
 		rc = errno == EINVAL ? ENOTTY : errno;
 		return refuse(setup, rc,
-			      rc == ENOTTY ? "is no input device; see /dev/input/by-id"
+			      rc == ENOTTY ? "not an input device; see /dev/input/by-id"
 					   : strerror(rc),
 			      err);
 	}
 	if (!has(known, foot->key))
 		return refuse(setup, ENXIO,
-			      "has no key of that name; see foot_switch.key in "
-			      "rig.conf(5)",
-			      err);
+			      "has no such key; see foot_switch.key in rig.conf(5)", err);
 	if (ioctl(foot->fd, EVIOCGKEY(sizeof(pressed)), pressed) < 0)
 		return refuse(setup, errno, strerror(errno), err);
 	if (has(pressed, foot->key))
-		return refuse(setup, EBUSY, "is pressed; take the foot away", err);
+		return refuse(setup, EBUSY, "the switch is pressed; release it", err);
 	if (ioctl(foot->fd, EVIOCGRAB, 1) < 0) {
 		rc = errno;
 		return refuse(setup, rc,
-			      rc == EBUSY ? "another program has it for itself; end that"
+			      rc == EBUSY ? "another program has it open exclusively; "
+					    "end it"
 					  : strerror(rc),
 			      err);
 	}
@@ -150,12 +149,12 @@ static int open_device(struct incise_foot_switch *foot,
 	if (foot->fd >= 0)
 		return check(foot, setup, err);
 	if (errno == ENOENT)
-		return refuse(setup, ENOENT, "is not there; plug it in", err);
+		return refuse(setup, ENOENT, "no such device; plug it in", err);
 	if (errno == EACCES)
 		return refuse(
 			setup, EACCES,
-			"may not be read by this user; rig.conf(5) has the udev rule "
-			"for it",
+			"this user may not read it; rig.conf(5) has the udev rule for "
+			"it",
 			err);
 	return refuse(setup, errno, strerror(errno), err);
 }

@@ -46,7 +46,8 @@ int incise_module_open(struct incise_module *module, const char *path, const cha
 		return 0;
 	dlclose(module->handle);
 	return incise_error_set(err, ENOEXEC,
-				"%s: %.200s: has no symbol %s; it is no module of incise",
+				"%s: %.200s: has no symbol %s, so it is not a module "
+				"of incise; name another",
 				where, path, symbol);
 }
 
@@ -69,8 +70,8 @@ int incise_module_absent(const char *file, const char *where, const char *packag
 	char in[PATH_MAX];
 
 	return incise_error_set(err, ENOENT,
-				"%s: there is no module %s in %.300s; build and install "
-				"incise where %s, or set INCISE_MODULE_PATH",
+				"%s: no module %s in %.300s; build and install incise "
+				"where %s, or set INCISE_MODULE_PATH",
 				where, file,
 				incise_module_folder(in, sizeof(in)) ? in : "any folder",
 				packages);
@@ -81,7 +82,7 @@ int incise_module_refuse(struct incise_module *module, const char *file,
 {
 	dlclose(module->handle);
 	return incise_error_set(err, ENOEXEC,
-				"%s: %s is made for another version of incise; build it "
-				"again",
+				"%s: %s was built for another version of incise; build "
+				"it again",
 				where, file);
 }

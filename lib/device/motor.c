@@ -215,16 +215,16 @@ static int reported(struct incise_motor *motor, int rc, const char *what,
 		return incise_error_set(err, -rc, "%s", said->text);
 	look(motor);
 	if (motor->watches)
-		why = "it was opened to watch; the program that drives it can";
+		why = "it was opened only to watch; use the program that drives it";
 	else if (motor->last.faults & INCISE_STEPPER_FAULT_GONE || rc == -ENODEV)
 		why = incise_stepper_fault_text(INCISE_STEPPER_FAULT_GONE);
 	else if (rc == -EBUSY && motor->last.inputs & INCISE_STEPPER_LINE_ESTOP)
 		why = "the e-stop is active; release it";
 	else if (rc == -EBUSY && motor->last.inputs & INCISE_STEPPER_LINE_ALARM)
-		why = "the power stage reports a fault; see what it says, switch it off "
+		why = "the power stage reports a fault; see its display, switch it off "
 		      "and on";
 	else if (rc == -EBUSY)
-		why = "it still moves; wait until it rests";
+		why = "it still moves; wait until it is at rest";
 	else if (motor->last.faults)
 		why = fault_text(motor);
 	return incise_error_set(err, -rc, "%s: %s: %s", motor->name, what,
@@ -422,8 +422,8 @@ int incise_motor_fit(struct incise_actuator *actuator, const char *where,
 	if (actuator->high_ns < pulse_ns || actuator->low_ns < pulse_ns)
 		return incise_error_set(
 			err, ERANGE,
-			"%s: high_us and low_us are %g and %g, but this machine holds no less "
-			"than %g; correct them in rig.conf, or leave them out",
+			"%s: high_us and low_us are %g and %g, but this machine needs "
+			"at least %g; correct or remove them in rig.conf",
 			where, actuator->high_ns / 1e3, actuator->low_ns / 1e3,
 			pulse_ns / 1e3);
 	own = 1e9 / ((double)actuator->high_ns + actuator->low_ns);
@@ -432,9 +432,9 @@ int incise_motor_fit(struct incise_actuator *actuator, const char *where,
 		return 0;
 	return incise_error_set(
 		err, ERANGE,
-		"%s: velocity_mm_s = %g asks for %.0f steps/s, but this machine holds %.0f "
-		"at most (by its self-test and the pulses' times); give at most %g mm/s in "
-		"rig.conf, or fewer microsteps",
+		"%s: velocity_mm_s = %g needs %.0f steps/s, but this machine reaches "
+		"at most %.0f (by its self-test and the pulse times); give at most %g "
+		"mm/s in rig.conf, or fewer microsteps",
 		where, actuator->velocity_mm_s, rate, floor(most),
 		floor(most * step_mm * 1e4) / 1e4);
 }

@@ -15,19 +15,19 @@ static const struct {
 	bool usable;
 	const char *text;
 } flags[] = {
-	{'=', '=', false, "the same pose again and again: it measures nothing"},
+	{'=', '=', false, "the same pose for too long: the sensor does not measure"},
 	{'A', 'G', false, "its source or a self-test failed"},
 	{'a', 'g', false, "its source or its self-calibration failed"},
-	{'j', 'j', false, "the signal is too strong: the sensor is too near"},
-	{'k', 'l', false, "the signal is too weak: the sensor is too far, or unplugged"},
+	{'j', 'j', false, "signal too strong: the sensor is too near"},
+	{'k', 'l', false, "signal too weak: the sensor is too far away, or unplugged"},
 	{'m', 'm', true, "its memory of settings is damaged"},
 	{'s', 's', false, "its search for the position was restarted"},
 	{'t', 't', true, "its map of the distortion by metal is damaged"},
-	{'u', 'u', true, "outside of its map of the distortion by metal"},
+	{'u', 'u', true, "outside its map of the distortion by metal"},
 	{'v', 'v', true, "no video sync"},
 	{'w', 'w', true, "its settings could not be stored"},
-	{'x', 'x', false, "the sensor is outside of its motion box"},
-	{'y', 'y', false, "the attitude is outside of its envelope"},
+	{'x', 'x', false, "the sensor is outside its motion box"},
+	{'y', 'y', false, "the attitude is outside its envelope"},
 };
 
 static int find(char status)

@@ -136,8 +136,8 @@ static int read_tube_station(struct incise_tracker_setup *setup,
 	return incise_error_set(
 		err, EINVAL,
 		"%.200s:%d: tracker_setup.tube_station: expected one of "
-		"tracker_setup.stations, and not the first, which is the scalpel's, found "
-		"%d; correct it",
+		"tracker_setup.stations except the first, which is the scalpel's, "
+		"found %d; correct it",
 		path, config_setting_source_line(setting), station);
 }
 
@@ -381,8 +381,8 @@ static int plan_real(struct incise_rig_plan *plan, int slot, const char *path, i
 	snprintf(real->where, sizeof(real->where), "%.200s:%d: %.20s", path, line, name);
 	if (plan->simulated)
 		return incise_error_set(err, EINVAL,
-					"%s: only the virtual rig can follow a simulated "
-					"clock; write clock = \"real\"",
+					"%s: only the simulated rig can follow a "
+					"simulated clock; write clock = \"real\"",
 					real->where);
 	if (slot == KIND_STEPPER && !plan->n_actuators)
 		return incise_error_set(
@@ -429,7 +429,7 @@ static int plan_string(struct incise_rig_plan *plan, int slot, bool wanted, int 
 			err, EINVAL,
 			"%.200s:%d: %s: expected \"" SIM_BACKEND
 			":\" without arguments, found \"%.40s\"; settings of "
-			"the virtual rig belong in the group `sim`",
+			"the simulated rig belong in the group `sim`",
 			path, line, name, device);
 	return 0;
 }
@@ -446,7 +446,7 @@ static int plan_device(struct incise_rig_plan *plan, int kind, bool wanted,
 		return rc;
 	if (!device && wanted)
 		return incise_error_set(err, ENODEV,
-					"%.200s: %s: not named, but needed; add `%s = "
+					"%.200s: %s: missing, but required; add `%s = "
 					"\"" SIM_BACKEND ":\";` or another backend",
 					path, name, name);
 	if (!device)
@@ -518,9 +518,9 @@ static int check_pair(const struct incise_rig_plan *plan, int i, int k, const ch
 		return 0;
 	return incise_error_set(
 		err, EINVAL,
-		"%s: the directions of actuators %d and %d lie within %.3g degrees of one "
-		"line: expected %d or more; give each actuator a direction = [x, y, z] of "
-		"its own",
+		"%s: the directions of actuators %d and %d are within %.3g degrees of "
+		"one line: expected %d or more; give each actuator its own direction = "
+		"[x, y, z]",
 		where, i + 1, k + 1, apart_deg, APART_DEG);
 }
 
@@ -541,9 +541,9 @@ static int check_directions(const struct incise_rig_plan *plan, const char *wher
 		if (!(apart_deg >= APART_DEG - ROUNDING))
 			return incise_error_set(
 				err, EINVAL,
-				"%s: the direction of actuator %d lies within %.3g degrees "
-				"of the plane of the other two: expected %d or more; "
-				"correct one",
+				"%s: the direction of actuator %d is within %.3g "
+				"degrees of the plane of the other two: expected %d or "
+				"more; correct one",
 				where, i + 1, isnan(apart_deg) ? 0 : apart_deg,
 				APART_DEG);
 	}
@@ -568,7 +568,7 @@ static int plan_list(struct incise_rig_plan *plan, bool wanted,
 			return incise_error_set(
 				err, EINVAL,
 				"%.200s:%d: %s: expected text in quotes, the BACKEND:ARGUMENTS "
-				"of a real one; the virtual rig's are all named by stepper = "
+				"of a real one; the simulated rig's are all named by stepper = "
 				"\"" SIM_BACKEND ":\", and sim.axes counts them",
 				path, config_setting_source_line(one), name);
 		rc = plan_string(plan, KIND_STEPPER + i, wanted,
@@ -580,8 +580,9 @@ static int plan_list(struct incise_rig_plan *plan, bool wanted,
 	if (n < 1 || n > INCISE_RIG_AXES_MAX || n != plan->n_actuators)
 		return incise_error_set(
 			err, EINVAL,
-			"%.200s:%d: stepper: expected 1 to %d, each with its group in "
-			"actuator = ( { … }, { … } ), found %d and %d groups; correct them",
+			"%.200s:%d: stepper: expected 1 to %d, each with a group in "
+			"actuator = ( { … }, { … } ), found %d and %d groups; correct "
+			"them",
 			path, line, INCISE_RIG_AXES_MAX, n, plan->n_actuators);
 	plan->n_axes = n;
 	return 0;
@@ -613,8 +614,8 @@ static int plan_steppers(struct incise_rig_plan *plan, const config_setting_t *r
 	if (device && plan->n_actuators > 1)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: stepper: one is named, but actuator has %d groups; name as "
-			"many in [ ], or keep one group",
+			"%s: stepper: one device, but actuator has %d groups; give as "
+			"many devices in [ ], or keep one group",
 			where, plan->n_actuators);
 	set_directions(plan);
 	return check_directions(plan, where, err);
@@ -718,8 +719,8 @@ static int plan_sim(struct incise_rig_plan *plan, const config_setting_t *root,
 			!config_setting_length(depths))))
 		return incise_error_set(
 			err, EINVAL,
-			"%.200s:%d: sim: expected depth_mm and times with as "
-			"many values each, 1 to %d; correct them",
+			"%.200s:%d: sim: expected depth_mm and times with equally many "
+			"values, 1 to %d; correct them",
 			path, config_setting_source_line(depths ? depths : times),
 			INCISE_SIM_DEPTHS_MAX);
 	if (depths)

@@ -67,8 +67,8 @@ static int find_any(struct incise_loaded *loaded, struct kind_found *of, const c
 		}
 	}
 	return rc == -ENODEV ? incise_error_set(err, ENODEV,
-						"%s: there is no backend \"%.40s\"; "
-						"those there are: %.160s",
+						"%s: no such backend \"%.40s\"; there "
+						"are: %.160s",
 						where, name, known)
 			     : rc;
 }
@@ -118,8 +118,8 @@ int incise_scan(const char *kind, const char *spec, incise_scan_found *found,
 		rc = loaded.backend->scan(spec + length + 1, pass_on, &of, err);
 	else
 		rc = incise_error_set(err, EOPNOTSUPP,
-				      "%s: this backend cannot look for devices; name "
-				      "yours in rig.conf",
+				      "%s: this backend cannot search for devices; "
+				      "name yours in rig.conf",
 				      where);
 	incise_backend_unload(&loaded);
 	return rc;

@@ -92,7 +92,7 @@ static int fault_error(const struct home *h)
 			incise_stepper_fault_text(INCISE_STEPPER_FAULT_GONE));
 	if (!faults)
 		return incise_error_set(h->err, EIO,
-					"homing %s: it is not powered; enable it first",
+					"homing %s: it is off; enable it first",
 					h->info.name);
 	/* The fault may have been cleared since; homing failed all the same. */
 	if (incise_stepper_cause(h->stepper, cause, sizeof(cause)) <= 0)
@@ -111,13 +111,13 @@ static int look(struct home *h)
 
 	if (h->stop && *h->stop)
 		return incise_error_set(h->err, EINTR,
-					"homing %s: stopped; its position is not that of "
-					"the machine: home again",
+					"homing %s: stopped; its position is unknown: "
+					"home again",
 					h->info.name);
 	if (h->left_ns <= 0)
 		return incise_error_set(h->err, ETIMEDOUT,
-					"homing %s: not done in time; see that it moves, "
-					"and home_mm_s in rig.conf",
+					"homing %s: not done in time; check that it "
+					"moves, and home_mm_s in rig.conf",
 					h->info.name);
 	rc = sleep_ns(h->stepper, h->poll_ns);
 	h->left_ns -= h->poll_ns;
@@ -248,8 +248,8 @@ static int back_off(struct home *h)
 		if (rc > 0)
 			return incise_error_set(
 				h->err, EIO,
-				"homing %s: the %s stays active on a quarter of the "
-				"travel; see its wiring and polarity",
+				"homing %s: the %s stays active over a quarter of the "
+				"travel; check its wiring and polarity",
 				h->info.name, input_name(h));
 	}
 	if (!rc)
@@ -270,8 +270,8 @@ static int approach(struct home *h)
 	if (rc > 0)
 		return incise_error_set(
 			h->err, EIO,
-			"homing %s: the %s did not come within the travel; "
-			"see its wiring, and invert in rig.conf",
+			"homing %s: no edge of the %s within the travel; check its "
+			"wiring, and invert in rig.conf",
 			h->info.name, input_name(h));
 	return rc;
 }
@@ -291,8 +291,8 @@ static int find(struct home *h)
 			  &edge_mm);
 	if (rc > 0)
 		return incise_error_set(h->err, EIO,
-					"homing %s: the %s did not come back; see that "
-					"it is firm",
+					"homing %s: no edge of the %s on the way back; "
+					"check that it is mounted firmly",
 					h->info.name, input_name(h));
 	h->edge_mm = edge_mm - h->renamed_mm;
 	/* To the edge, or from it to where the travel starts. */
@@ -355,7 +355,8 @@ static int cannot(const struct incise_stepper *stepper, const char *what,
 
 	stepper->ops->info(stepper, &info);
 	return incise_error_set(err, EOPNOTSUPP,
-				"%s cannot be %s; name another backend in rig.conf",
+				"%s does not support being %s; name another backend in "
+				"rig.conf",
 				info.name, what);
 }
 
@@ -402,7 +403,7 @@ int incise_stepper_home(struct incise_stepper *stepper, const volatile int *stop
 	if (ops->home)
 		return ops->home(stepper, stop, edge, err);
 	if (!ops->jog || !ops->homing || !ops->edge || !ops->origin)
-		return cannot(stepper, "homed: its position is the machine's", err);
+		return cannot(stepper, "homed: its position is absolute", err);
 	return home_by_edge(stepper, stop, edge, err);
 }
 
@@ -462,10 +463,10 @@ const char *incise_stepper_fault_text(enum incise_stepper_fault fault)
 {
 	switch (fault) {
 	case INCISE_STEPPER_FAULT_DEADMAN:
-		return "deadman: targets stopped coming; clear, and look at what drives "
-		       "it";
+		return "deadman: no more targets arrived; check the program that "
+		       "drives it, then clear";
 	case INCISE_STEPPER_FAULT_TRAVEL:
-		return "travel: a target lay outside and was held";
+		return "travel: a target was outside and was clamped";
 	case INCISE_STEPPER_FAULT_LIMIT_MIN:
 		return "limit switch at 0: clear, enable and home";
 	case INCISE_STEPPER_FAULT_LIMIT_MAX:
@@ -473,35 +474,35 @@ const char *incise_stepper_fault_text(enum incise_stepper_fault fault)
 	case INCISE_STEPPER_FAULT_ESTOP:
 		return "e-stop: release it, then clear";
 	case INCISE_STEPPER_FAULT_ALARM:
-		return "alarm of the power stage: see what it says, switch it off and "
+		return "alarm of the power stage: see its display, switch it off and "
 		       "on, then clear";
 	case INCISE_STEPPER_FAULT_LATE:
 		return "late: this machine could not hold the step times; give a "
 		       "smaller velocity_mm_s or a real-time kernel, then clear";
 	case INCISE_STEPPER_FAULT_SETPOINT:
-		return "set-point that cannot be read: two programs drive it, or one "
-		       "is broken; end it, then clear";
+		return "invalid setpoint: two programs drive it, or one is faulty; end "
+		       "it, then clear";
 	case INCISE_STEPPER_FAULT_OWNER:
-		return "the program that drove it ended while it was powered: clear";
+		return "the program that drove it ended while it was on: clear";
 	case INCISE_STEPPER_FAULT_SUSPEND:
-		return "the machine went to sleep: clear, enable and home";
+		return "the machine was suspended: clear, enable and home";
 	case INCISE_STEPPER_FAULT_GONE:
-		return "the device went away: plug it in, or load its module again";
+		return "the device was removed: plug it in, or load its module again";
 	case INCISE_STEPPER_FAULT_LINE:
-		return "a GPIO line cannot be written or read: see its wiring and the "
-		       "kernel's log, then clear";
+		return "a GPIO line cannot be written or read: check its wiring and "
+		       "the kernel's log, then clear";
 	case INCISE_STEPPER_FAULT_BUS:
-		return "the bus to the drive fails: see its cable, its ends and "
+		return "the bus to the drive fails: check its cable, termination and "
 		       "`ip -details link show`, then clear";
 	case INCISE_STEPPER_FAULT_LOST:
-		return "the drive is not heard any more, or began anew: see its power and "
-		       "cable, then clear, enable and home";
+		return "the drive does not answer any more, or restarted: check its "
+		       "power and cable, then clear, enable and home";
 	case INCISE_STEPPER_FAULT_FOLLOWING:
-		return "it does not follow its targets: see what blocks it, or give a "
-		       "smaller acceleration_mm_s2, then clear";
+		return "it does not follow its targets: check that nothing blocks it, "
+		       "or give a smaller acceleration_mm_s2, then clear";
 	case INCISE_STEPPER_FAULT_PLAN:
-		return "another motor of the same plan was stopped: see that one, then "
-		       "clear both";
+		return "another motor of the same plan was stopped: check that one, "
+		       "then clear both";
 	}
 	return "unknown fault: see incise/stepper.h of the version in use";
 }
@@ -517,9 +518,9 @@ int incise_stepper_load_plan(struct incise_stepper *const *steppers, int n,
 	return plan ? plan->load(steppers, n, bytes, size, err)
 		    : incise_error_set(
 			      err, EOPNOTSUPP,
-			      "the rig has no stepper of the kernel module, which "
-			      "alone runs plans; give its device in rig.conf, such "
-			      "as kernel:/dev/incise-stepper0");
+			      "the rig has no stepper of the kernel module, which is "
+			      "required for plans; name its device in rig.conf, for "
+			      "example kernel:/dev/incise-stepper0");
 }
 
 int incise_stepper_follow_plan(struct incise_stepper *stepper)
@@ -563,17 +564,17 @@ const char *incise_stepper_plan_reason_text(enum incise_stepper_plan_reason reas
 {
 	switch (reason) {
 	case INCISE_STEPPER_PLAN_SILENT:
-		return "no fresh pose came";
+		return "no fresh pose arrived";
 	case INCISE_STEPPER_PLAN_ASKED:
-		return "its feeder let go of it";
+		return "its feeder released it";
 	case INCISE_STEPPER_PLAN_LEFT:
 		return "its feeder ended";
 	case INCISE_STEPPER_PLAN_AWAY:
-		return "the machine went to sleep, or its device away";
+		return "the machine was suspended, or its device removed";
 	case INCISE_STEPPER_PLAN_STOPPED:
 		return "a motor was stopped by a fault";
 	case INCISE_STEPPER_PLAN_REFUSED:
-		return "poses came that are none, or backwards";
+		return "invalid poses, or poses in wrong order";
 	}
 	return "unknown";
 }

@@ -137,7 +137,8 @@ static int plan_motors(struct incise_stepper *const *steppers, int n, __u32 *mas
 		if (!is_kernel(steppers[i]) || strcmp(k->path, first->path))
 			return incise_error_set(
 				err, EINVAL,
-				"a plan has the motors of one controller: %s is not of %s",
+				"a plan needs motors of one controller, but %s is not "
+				"on %s; correct rig.conf",
 				is_kernel(steppers[i]) ? k->path : "an actuator",
 				first->path);
 		if (i && k->index < least)
@@ -147,7 +148,7 @@ static int plan_motors(struct incise_stepper *const *steppers, int n, __u32 *mas
 				"in rig.conf in the order of their motors",
 				k->path, k->index, least - 1);
 		if (k->motor.watches)
-			return incise_error_set(err, EPERM, "%s: opened to watch",
+			return incise_error_set(err, EPERM, "%s: opened only to watch",
 						k->path);
 		least = k->index + 1;
 		*mask |= 1u << k->index;
@@ -172,23 +173,23 @@ static int plan_load(struct incise_stepper *const *steppers, int n, const void *
 	case -EOPNOTSUPP:
 		return incise_error_set(
 			err, ENOTSUP,
-			"%s: its module runs no plans, or none of this version; load "
-			"that of this version (modinfo incise_stepper)",
+			"%s: its module cannot run plans of this version; load the "
+			"module of this version (modinfo incise_stepper)",
 			first->path);
 	case -ERANGE:
 		return incise_error_set(
 			err, ERANGE,
 			"%s: deadman_ms in rig.conf is not longer than the plan's pose "
-			"age and fade, tick_us is longer than a tick of the plan, or this "
-			"machine has no time for it; see `incise info` of both",
+			"age and fade, tick_us is longer than a tick of the plan, or "
+			"this machine is too slow; see `incise info` of both",
 			first->path);
 	case -EBUSY:
 		return incise_error_set(err, EBUSY,
-					"%s: a motor has power, or still comes to rest; "
+					"%s: a motor is on, or still decelerates; "
 					"disable it",
 					first->path);
 	default:
-		return incise_error_set(err, -rc, "%s: refuses the plan: %s", first->path,
+		return incise_error_set(err, -rc, "%s: rejects the plan: %s", first->path,
 					strerror(-rc));
 	}
 }
@@ -333,9 +334,8 @@ static int parse(struct kernel_stepper *k, const struct incise_backend_request *
 	if (*text != '/' || length >= sizeof(k->path))
 		return incise_error_set(
 			err, EINVAL,
-			"%s: expected the path of a device such as "
-			"kernel:/dev/incise-stepper0, found kernel:%.60s; "
-			"correct it",
+			"%s: expected the path of a device, for example "
+			"kernel:/dev/incise-stepper0, found kernel:%.60s; correct it",
 			asked->where, text);
 	memcpy(k->path, text, length);
 	k->index = colon ? (unsigned int)(colon[1] - '0') : 0;
@@ -359,8 +359,8 @@ static int join_sibling(struct kernel_stepper *k,
 		if (other->index == k->index)
 			return incise_error_set(
 				err, EINVAL,
-				"%s: motor %u of %.200s is an actuator of this rig already; "
-				"name another",
+				"%s: motor %u of %.200s is already an actuator of this "
+				"rig; name another",
 				asked->where, k->index, k->path);
 		k->fd = fcntl(other->fd, F_DUPFD_CLOEXEC, 0);
 		return k->fd >= 0
@@ -395,19 +395,19 @@ static int open_device(struct kernel_stepper *k,
 	case ENOENT:
 	case ENXIO:
 	case ENODEV:
-		todo = "there is no such device: load the module (modprobe incise_stepper) "
-		       "and bind its lines, or name another";
+		todo = "no such device: load the module (modprobe incise_stepper) and "
+		       "bind its lines, or name another";
 		break;
 	case EACCES:
 	case EPERM:
 		todo = "not permitted: become a member of the group incise, or root";
 		break;
 	case EBUSY:
-		todo = "another program drives it: end that (incise haptic and its service, "
-		       "incise stepper), or only watch";
+		todo = "another program drives it: end it (incise haptic and its "
+		       "service, incise stepper), or only watch";
 		break;
 	case ENOTTY:
-		todo = "is no device; name the one of incise_stepper, such as "
+		todo = "not a device; name one of incise_stepper, for example "
 		       "/dev/incise-stepper0";
 		break;
 	default:
@@ -428,7 +428,7 @@ static int check_info(const struct kernel_stepper *k,
 	if (rc == -ENOTTY)
 		return incise_error_set(
 			err, ENODEV,
-			"%s: %.200s: is no incise stepper, or its module is of another "
+			"%s: %.200s: not an incise stepper, or its module has another "
 			"version; see `modinfo incise_stepper`",
 			asked->where, k->path);
 	if (!rc && (!info->n_motors || info->n_motors > INCISE_STEPPER_MOTORS_MAX ||
@@ -436,8 +436,8 @@ static int check_info(const struct kernel_stepper *k,
 		rc = -EPROTO;
 	if (rc)
 		return incise_error_set(err, -rc,
-					"%s: %.200s: cannot say what it is: %s; load its "
-					"module again",
+					"%s: %.200s: its properties cannot be read: "
+					"%s; load its module again",
 					asked->where, k->path, strerror(-rc));
 	if (k->index >= info->n_motors)
 		return incise_error_set(
@@ -463,7 +463,7 @@ static int configure(struct kernel_stepper *k,
 	if (config.tick_ns < info->tick_min_ns)
 		return incise_error_set(
 			err, ERANGE,
-			"%s: tick_us is %g, but this machine holds no less than %g with %u "
+			"%s: tick_us is %g, but this machine needs at least %g with %u "
 			"motors (by its self-test); correct it in rig.conf",
 			asked->where, config.tick_ns / 1e3, info->tick_min_ns / 1e3,
 			info->n_motors);
@@ -478,9 +478,9 @@ static int configure(struct kernel_stepper *k,
 	if (rc == -ERANGE)
 		return incise_error_set(
 			err, ERANGE,
-			"%s: %.200s: %u steps/s with pulses of %u and %u ns are more than this "
-			"machine holds: %u steps/s, %u ns; give a smaller velocity_mm_s, "
-			"fewer microsteps or longer pulses",
+			"%s: %.200s: %u steps/s with pulses of %u and %u ns exceed the "
+			"limits of this machine: %u steps/s, %u ns; give a smaller "
+			"velocity_mm_s, fewer microsteps or longer pulses",
 			asked->where, k->path, config.velocity, config.high_ns,
 			config.low_ns, info->rate_max, info->pulse_ns);
 	return incise_error_set(
@@ -488,7 +488,7 @@ static int configure(struct kernel_stepper *k,
 		rc == -EBUSY
 			? "%s: %.200s: its motor does not come to rest: %s; switch it "
 			  "off"
-			: "%s: %.200s: refuses the group actuator: %s; see `dmesg`",
+			: "%s: %.200s: rejects the group actuator: %s; see `dmesg`",
 		asked->where, k->path, strerror(-rc));
 }
 

@@ -213,8 +213,8 @@ int incise_baselines(const struct incise_pairs *train, const int *groups,
 
 	if (!train->n || !on->n || on->n_inputs != d || d > INCISE_MODEL_INPUTS_MAX)
 		return incise_error_set(err, EINVAL,
-					"baselines: no pairs, or pairs of "
-					"different width");
+					"baselines: no pairs, or pairs with different "
+					"numbers of inputs");
 	find_columns(train, columns);
 	rc = linear_rmse(train, on, columns, &result->linear);
 	if (!rc)

@@ -125,9 +125,8 @@ static int find_column(struct reader *in, const char *name)
 			"points, found: %s",
 			list);
 	return incise_lines_error(
-		&in->lines, EINVAL,
-		"there is no column '%s'; the columns are: %s; %s%s%s", name, list,
-		nearest ? "did you mean '" : "rename one, or name another",
+		&in->lines, EINVAL, "no column '%s'; the columns are: %s; %s%s%s", name,
+		list, nearest ? "did you mean '" : "rename one, or name another",
 		nearest ? nearest : "", nearest ? "'?" : "");
 }
 
@@ -227,7 +226,7 @@ static int read_rows(struct reader *in, const char *const *columns, const char *
 				in->n_fields < header ? in->n_fields + 1 : header + 1,
 				in->n_fields, header,
 				in->n_fields < header
-					? "add what is missing, or remove the row"
+					? "add the missing fields, or remove the row"
 					: "write decimal points, not commas");
 		rc = where_at >= 0 ? number(in, where_at, where, &wanted) : 0;
 		if (rc)
@@ -381,9 +380,8 @@ static int arrow_find(struct arrow_reader *in, const struct ArrowSchema *schema,
 				 schema->children[i]->name ? schema->children[i]->name
 							   : "");
 	return incise_error_set(in->err, EINVAL,
-				"Arrow stream: there is no column '%s'; the columns are: "
-				"%s",
-				name, list);
+				"Arrow stream: no column '%s'; the columns are: %s", name,
+				list);
 }
 
 static int arrow_columns(struct arrow_reader *in, const struct ArrowSchema *schema,
@@ -400,7 +398,7 @@ static int arrow_columns(struct arrow_reader *in, const struct ArrowSchema *sche
 
 		rc = arrow_find(in, schema, names[i], false, column);
 		if (!rc && (column->index_format || !is_number(column->format)))
-			rc = arrow_fail(in, column, "is no column of numbers");
+			rc = arrow_fail(in, column, "is not a column of numbers");
 	}
 	if (!rc)
 		rc = arrow_find(in, schema, group, !group, &in->group);
@@ -413,7 +411,7 @@ static int arrow_columns(struct arrow_reader *in, const struct ArrowSchema *sche
 		rc = arrow_find(in, schema, where, true, &in->where);
 	if (!rc && in->where.at >= 0 &&
 	    (in->where.index_format || !is_number(in->where.format)))
-		rc = arrow_fail(in, &in->where, "is no column of numbers");
+		rc = arrow_fail(in, &in->where, "is not a column of numbers");
 	return rc;
 }
 
@@ -467,10 +465,12 @@ static int arrow_number(const struct arrow_reader *in, const struct ArrowArray *
 	int64_t at = row + array->offset;
 
 	if (!arrow_valid(array, at))
-		return arrow_fail(in, column, "is null; remove the row or mend it");
+		return arrow_fail(in, column, "is null; correct it, or remove the row");
 	*value = arrow_real(array, *column->format, at);
 	if (!isfinite(*value))
-		return arrow_fail(in, column, "is not finite; remove the row or mend it");
+		return arrow_fail(in, column,
+				  "is not finite; correct it, or remove "
+				  "the row");
 	return 0;
 }
 

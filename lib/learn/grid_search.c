@@ -230,11 +230,11 @@ int incise_choose_grid(const struct incise_pairs *pairs,
 		return incise_error_set(err, ECANCELED, "training was stopped");
 	return incise_error_set(
 		err, -rc,
-		rc == -ENODATA	? "%zu training pairs are too few to compare "
-				  "numbers of membership functions"
+		rc == -ENODATA	? "%zu training pairs are too few to select numbers of "
+				  "membership functions; give --mf or more data"
 		: rc == -ENOMEM ? "no memory to compare grids over %zu pairs"
-				: "no grid can be fitted to these %zu pairs: they "
-				  "are too extreme",
+				: "no grid can be fitted to these %zu pairs: their "
+				  "values are too extreme; scale them",
 		pairs->n);
 }
 
@@ -271,7 +271,7 @@ struct incise_model *incise_train_start(const struct incise_pairs *pairs,
 	if (!isfinite(out.max - out.min)) {
 		incise_error_set(
 			err, EINVAL,
-			"column %s spans %g to %g: too far for a double; scale it",
+			"column %s spans %g to %g, too wide for a double; scale it",
 			out.name, out.min, out.max);
 		return NULL;
 	}

@@ -128,8 +128,8 @@ int incise_pairs_check_inputs(const struct incise_pairs *pairs,
 	if (pairs->n < PAIRS_MIN)
 		return incise_error_set(
 			err, ENODATA,
-			"%zu training pairs are too few to learn from: at least %d",
-			pairs->n, PAIRS_MIN);
+			"%zu training pairs are too few; expected at least %d", pairs->n,
+			PAIRS_MIN);
 	for (int i = 0; i < pairs->n_inputs; i++) {
 		size_t n = 1;
 
@@ -138,8 +138,8 @@ int incise_pairs_check_inputs(const struct incise_pairs *pairs,
 		if (n == pairs->n)
 			return incise_error_set(
 				err, EINVAL,
-				"input %s is constant, %g, in all %zu training pairs: "
-				"leave it out or record more",
+				"input %s is constant, %g, in all %zu training pairs; "
+				"remove it or record more",
 				inputs[i].name, pairs->rows[i], pairs->n);
 	}
 	return 0;
@@ -253,9 +253,7 @@ int incise_split(size_t n, const int *groups, double share, uint64_t seed, bool 
 	if (!(share > 0 && share < 1))
 		return incise_error_set(
 			err, EINVAL,
-			"the share of check data is %g: it must lie between 0 "
-			"and 1",
-			share);
+			"the share of check data is %g: expected between 0 and 1", share);
 	if (groups) {
 		n_units = 0;
 		for (size_t i = 0; i < n; i++)
@@ -265,8 +263,8 @@ int incise_split(size_t n, const int *groups, double share, uint64_t seed, bool 
 	if (n_units < 2)
 		return incise_error_set(
 			err, EINVAL,
-			"there are %zu %s: at least two are needed to keep some "
-			"back for checking",
+			"%zu %s: at least two are required to hold out some for "
+			"checking",
 			n_units, groups ? "groups" : "rows");
 	order = malloc(n_units * sizeof(*order));
 	count = calloc(n_units, sizeof(*count));

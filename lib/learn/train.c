@@ -123,8 +123,9 @@ static int check_all(const struct incise_model *model,
 	if (train->n < n_linear)
 		return incise_error_set(
 			err, ENODATA,
-			"%zu training pairs cannot settle the %zu consequent parameters of "
-			"%d rules; ask for fewer membership functions or record more",
+			"%zu training pairs cannot determine the %zu consequent "
+			"parameters of %d rules; give fewer membership functions or "
+			"record more",
 			train->n, n_linear, info->n_rules);
 	return incise_pairs_check_inputs(train, inputs, err);
 }
@@ -137,8 +138,8 @@ static int check_trainable(const struct incise_model *model, struct incise_error
 	if (info->and_method != INCISE_AND_PROD)
 		return incise_error_set(
 			err, ENOTSUP,
-			"the model joins degrees by min: only models with the AND "
-			"method prod can be trained");
+			"the AND method of the model is min: only models with prod can "
+			"be trained");
 	for (int i = 0; i < info->n_inputs; i++)
 		for (int k = 0; k < info->n_mfs[i]; k++) {
 			const struct incise_mf *mf = incise_model_mf(model, i, k);
@@ -341,10 +342,10 @@ static int fail(struct incise_error *err, int rc)
 		rc == -ENOMEM	   ? "no memory to train"
 		: rc == -ECANCELED ? "training was stopped"
 		: rc == -ENOTSUP
-			? "only models whose rules are the grid of Gaussians or "
+			? "only models whose rules are the full grid of Gaussians or "
 			  "bells, all with weight 1, can be trained"
-			: "least squares failed: the data are too extreme for a "
-			  "solution; scale them or ask for fewer membership functions");
+			: "least squares failed: the values are too extreme; scale "
+			  "them or give fewer membership functions");
 }
 
 int incise_train(struct incise_model *model, const struct incise_pairs *train,

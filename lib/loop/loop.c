@@ -241,14 +241,14 @@ static int explain(const struct run *run, int rc, struct incise_error *err)
 	if (rc == -ETIME)
 		return incise_error_set(
 			err, ETIME,
-			"%u ticks in a row came a period late or more, the last at tick %llu: "
-			"the force was taken away; this machine is too slow or too busy for "
-			"%g Hz",
+			"%u ticks in a row were a period late or more, the last at "
+			"tick %llu: the force was removed; this machine is too slow or "
+			"too busy for %g Hz",
 			run->in_row, ticks, run->options->rate_hz);
 	incise_plan_cause(run->plan, cause, sizeof(cause));
-	return incise_error_set(
-		err, -rc, "a device failed at tick %llu: %s; the force was taken away",
-		ticks, cause);
+	return incise_error_set(err, -rc,
+				"a device failed at tick %llu: %s; the force was removed",
+				ticks, cause);
 }
 
 int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,

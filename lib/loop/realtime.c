@@ -89,14 +89,14 @@ static int check_setup(const struct incise_realtime_setup *setup,
 	if (deadline && setup->cpu >= 0)
 		return incise_error_set(
 			err, ENOTSUP,
-			"real time: SCHED_DEADLINE runs on all CPUs and takes none for "
-			"itself: leave out the CPU %d, or use SCHED_FIFO",
+			"real time: SCHED_DEADLINE runs on all CPUs; remove CPU %d, or "
+			"use SCHED_FIFO",
 			setup->cpu);
 	if (deadline && setup->period_ns < DEADLINE_MIN_NS)
 		return incise_error_set(
 			err, EINVAL,
-			"real time: SCHED_DEADLINE has no periods below 0.1 ms: run the "
-			"loop at 10000 Hz or less, or use SCHED_FIFO");
+			"real time: SCHED_DEADLINE has no periods below 0.1 ms; run "
+			"the loop at 10000 Hz or less, or use SCHED_FIFO");
 	return 0;
 }
 
@@ -291,7 +291,9 @@ static int require(const struct incise_realtime_setup *setup, struct incise_erro
 		return rc;
 	rc = realtime_try(setup, &answers);
 	if (rc)
-		return incise_error_set(err, -rc, "real time: no thread to try it on: %s",
+		return incise_error_set(err, -rc,
+					"real time: no thread for the test: "
+					"%s",
 					strerror(-rc));
 	n = realtime_judge(setup, &answers, "", checks, INCISE_REALTIME_CHECKS);
 	return realtime_denied(&answers, checks, n, err);
@@ -376,7 +378,9 @@ int incise_realtime_enter(const struct incise_realtime *realtime,
 	touch_stack();
 	rc = take_cpu(&realtime->setup);
 	if (rc)
-		return incise_error_set(err, rc, "real time: CPU %d cannot be had: %s",
+		return incise_error_set(err, rc,
+					"real time: CPU %d is not available: "
+					"%s",
 					realtime->setup.cpu, strerror(rc));
 	rc = take_policy(&realtime->setup);
 	/* The share of an ended SCHED_DEADLINE thread is free one period later. */
@@ -387,8 +391,8 @@ int incise_realtime_enter(const struct incise_realtime *realtime,
 	if (rc)
 		return incise_error_set(
 			err, rc,
-			"real time: the loop's thread was refused what was granted when "
-			"it was tried: %s",
+			"real time: the loop's thread lost a privilege since the test: "
+			"%s",
 			strerror(rc));
 	return 0;
 }

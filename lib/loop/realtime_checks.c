@@ -142,15 +142,15 @@ static void check_deadline(const struct judgement *j, struct incise_realtime_che
 	} else if (error == EPERM) {
 		set_found(check,
 			  "SCHED_DEADLINE is denied: this program may not run on all "
-			  "CPUs, or a sandbox refuses it");
+			  "CPUs, or a sandbox denies it");
 		/* Only a list of numbers goes into a command, whatever the file says. */
 		if (read_line(j, CPUS "online", cpus, sizeof(cpus)) &&
 		    !cpus[strspn(cpus, "0123456789,-")])
 			set_fix(check, "taskset -pc %s $$", cpus);
 	} else if (error == EBUSY) {
 		set_found(check,
-			  "SCHED_DEADLINE is denied: too much of the CPUs is promised to "
-			  "others already");
+			  "SCHED_DEADLINE is denied: other programs have reserved too "
+			  "much of the CPUs");
 		set_fix(check, "ps -eo pid,cls,comm | grep -w DLN");
 	} else {
 		set_found(check, "SCHED_DEADLINE: %s", strerror(error));
@@ -199,14 +199,15 @@ static void check_cpu(const struct judgement *j, struct incise_realtime_check *c
 	if (!error)
 		set_found(check, "CPU %d", cpu);
 	else if (error != EINVAL)
-		set_found(check, "CPU %d cannot be had: %s", cpu, strerror(error));
+		set_found(check, "CPU %d is not available: %s", cpu, strerror(error));
 	else if (!read_line(j, CPUS "online", cpus, sizeof(cpus)) ||
 		 proc_file_lists(cpus, cpu))
 		set_found(check,
-			  "CPU %d cannot be had: it is not in the cpuset of this program",
+			  "CPU %d is not available: it is not in the cpuset of this "
+			  "program",
 			  cpu);
 	else
-		set_found(check, "CPU %d cannot be had: there are %s", cpu, cpus);
+		set_found(check, "CPU %d is not available: there are %s", cpu, cpus);
 }
 
 static void check_kernel(const struct judgement *j, struct incise_realtime_check *check)
@@ -219,8 +220,7 @@ static void check_kernel(const struct judgement *j, struct incise_realtime_check
 		set_found(check, "PREEMPT_RT");
 		return;
 	}
-	set_found(check,
-		  "not PREEMPT_RT: a busy kernel makes wake-ups late (then: reboot)");
+	set_found(check, "not PREEMPT_RT: a busy kernel delays wake-ups (then: reboot)");
 #if defined(__x86_64__)
 	set_fix(check, "sudo apt-get install linux-image-rt-amd64");
 #elif defined(__aarch64__)
@@ -246,11 +246,11 @@ static void check_throttling(const struct judgement *j,
 	    !proc_file_integer(text, &period_us) || period_us < 1)
 		period_us = 1000000;
 	if (runtime_us == -1) {
-		set_found(check, "off: only RLIMIT_RTTIME ends a loop that hangs");
+		set_found(check, "off: only RLIMIT_RTTIME ends a hanging loop");
 		return;
 	}
 	check->ok = runtime_us >= 0.9 * (double)period_us;
-	set_found(check, "real-time threads have %.0f %% of a CPU at most",
+	set_found(check, "real-time threads get at most %.0f %% of a CPU",
 		  100 * (double)runtime_us / (double)period_us);
 	if (check->ok)
 		return;
@@ -310,13 +310,13 @@ static void check_idle(const struct judgement *j, struct incise_realtime_check *
 	check->ok = true;
 	if (!read_line(j, CPUS "cpuidle/current_driver", driver, sizeof(driver)) ||
 	    !strcmp(driver, "none")) {
-		set_found(check, "the kernel knows no deep idle states here");
+		set_found(check, "the kernel has no deep idle states here");
 	} else if (!error) {
 		set_found(check, "/dev/cpu_dma_latency can be held at 0");
 	} else {
 		check->ok = false;
 		set_found(check,
-			  "/dev/cpu_dma_latency: %s: deep idle states make wake-ups late",
+			  "/dev/cpu_dma_latency: %s: deep idle states delay wake-ups",
 			  strerror(error));
 		if (error != EACCES && error != EPERM)
 			return;
@@ -341,8 +341,8 @@ static void check_clock(const struct judgement *j, struct incise_realtime_check 
 	if (resolution_ns > 1000) {
 		check->ok = false;
 		set_found(check,
-			  "timers come every %.3g ms only: the kernel was started with "
-			  "highres=off, or its clock cannot do better",
+			  "timers have a resolution of only %.3g ms: the kernel was "
+			  "started with highres=off, or lacks a better clock",
 			  (double)resolution_ns * 1e-6);
 		return;
 	}
@@ -354,8 +354,8 @@ static void check_clock(const struct judgement *j, struct incise_realtime_check 
 		set_found(check, "%s", source);
 	} else {
 		set_found(check,
-			  "%s: to read it takes a system call, about a microsecond or "
-			  "more of each tick",
+			  "%s: reading it needs a system call, about a microsecond or "
+			  "more per tick",
 			  source);
 		set_fix(check, "cat " CLOCKSOURCE "available_clocksource");
 	}
@@ -369,10 +369,12 @@ static void check_isolated(const struct judgement *j, struct incise_realtime_che
 	check->ok = read_line(j, CPUS "isolated", cpus, sizeof(cpus)) &&
 		    proc_file_lists(cpus, cpu);
 	if (check->ok) {
-		set_found(check, "CPU %d is kept for those who ask for it", cpu);
+		set_found(check, "CPU %d is isolated", cpu);
 		return;
 	}
-	set_found(check, "CPU %d is not isolated: others run on it too (then: reboot)",
+	set_found(check,
+		  "CPU %d is not isolated: other programs run on it, too (then: "
+		  "reboot)",
 		  cpu);
 	set_fix(check,
 		"echo 'GRUB_CMDLINE_LINUX=\"$GRUB_CMDLINE_LINUX "
@@ -462,9 +464,9 @@ int realtime_denied(const struct realtime_answers *answers,
 			  *fixes ? "` and start again" : "");
 	/* Half a command is worse than none. */
 	if (err && *keeps &&
-	    (size_t)length + strlen(keeps) + sizeof("; to make it last: ``") <=
+	    (size_t)length + strlen(keeps) + sizeof("; to make it permanent: ``") <=
 		    sizeof(err->text))
 		snprintf(text + length, sizeof(text) - (size_t)length,
-			 "; to make it last: `%s`", keeps);
+			 "; to make it permanent: `%s`", keeps);
 	return incise_error_set(err, error, "%s", text);
 }

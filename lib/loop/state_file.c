@@ -35,8 +35,7 @@ static int busy(const char *path, int fd, struct incise_error *err)
 		head.pid = 0;
 	return incise_error_set(
 		err, EBUSY,
-		"%s: another loop runs there, as process %lld: stop it, or "
-		"give another path",
+		"%s: another loop uses it, process %lld; stop it, or give another path",
 		path, (long long)head.pid);
 }
 
@@ -61,8 +60,8 @@ static int look(const char *path, struct incise_error *err)
 	if (fd < 0 || n < 0 ||
 	    (n && (n < (ssize_t)sizeof(magic) || memcmp(magic, STATE_MAGIC, n))))
 		rc = incise_error_set(err, EEXIST,
-				      "%s: is there and is no state of a loop: give "
-				      "another path",
+				      "%s: exists and is not a status file of a loop; "
+				      "give another path",
 				      path);
 	else
 		rc = incise_state_file_held(fd) == 1 ? busy(path, fd, err) : 0;
@@ -148,8 +147,7 @@ int incise_state_file_new(struct incise_state_file *file, const char *path, size
 		incise_state_file_close(file);
 		return incise_error_set(
 			err, -rc,
-			"%s: the loop's state cannot be put there: %s; give "
-			"another path",
+			"%s: the status file cannot be created: %s; give another path",
 			path, strerror(-rc));
 	}
 	return 0;
@@ -190,8 +188,7 @@ static int swapped(struct incise_state_file *file, struct incise_error *err)
 	renameat2(AT_FDCWD, file->hidden, AT_FDCWD, file->path, RENAME_EXCHANGE);
 	return incise_error_set(
 		err, -rc,
-		"%s: another loop starts there just now: stop it, or give "
-		"another path",
+		"%s: another loop is starting with it; stop it, or give another path",
 		file->path);
 }
 
@@ -225,8 +222,7 @@ int incise_state_file_publish(struct incise_state_file *file, struct incise_erro
 		return 0;
 	}
 failed:
-	return incise_error_set(err, -rc,
-				"%s: cannot be put there: %s; give another path",
+	return incise_error_set(err, -rc, "%s: cannot be created: %s; give another path",
 				file->path, strerror(-rc));
 }
 

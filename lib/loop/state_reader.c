@@ -107,18 +107,17 @@ static int read_head(struct incise_state *state, const char *path,
 	if (!S_ISREG(st.st_mode) || copy(state, head, sizeof(*head), 0) ||
 	    memcmp(head->magic, STATE_MAGIC, sizeof(head->magic)))
 		return incise_error_set(err, EINVAL,
-					"%s: is no state of a loop: expected a file such "
-					"as /run/incise/NAME.state",
+					"%s: not a status file of a loop; expected for "
+					"example /run/incise/NAME.state",
 					path);
 	if (head->major != STATE_MAJOR)
 		return incise_error_set(err, EPROTO,
-					"%s: is a state of version %u.%u, and this reads "
-					"%d: both programs must be of one release",
+					"%s: a status file of version %u.%u, but this "
+					"program reads %d; use programs of one release",
 					path, head->major, head->minor, STATE_MAJOR);
 	if (!sound_head(head, (uint64_t)st.st_size))
 		return incise_error_set(err, EINVAL,
-					"%s: is damaged, or was cut off: start the loop "
-					"again",
+					"%s: damaged or truncated; start the loop again",
 					path);
 	return 0;
 }

@@ -408,7 +408,7 @@ struct incise_state_writer *incise_state_new(const char *path,
 
 	if (!(setup->rate_hz > 0) || !isfinite(setup->rate_hz)) {
 		incise_error_set(err, EINVAL,
-				 "the loop's rate is %g Hz: expected one above 0",
+				 "the loop's rate is %g Hz: expected more than 0",
 				 setup->rate_hz);
 		return NULL;
 	}

@@ -228,11 +228,10 @@ static void put_comment(FILE *out, const struct incise_fixed *fx, const char *sy
 	fputs(" * returns  ", out);
 	put_name(out, fx->output);
 	fprintf(out,
-		", Q16.16; within %.3g of the model in real numbers, whatever\n"
-		" *          the input: a certified bound\n *\n"
-		" * Q16.16: 65536 stands for 1 of the unit that the name ends in. Needs "
-		"64-bit integers,\n * and right shifts of negative numbers that keep the "
-		"sign, as compilers have them.\n */\n",
+		", Q16.16; within %.3g of the model in real numbers for every\n *      "
+		"    input: a certified bound\n *\n * Q16.16: 65536 stands for 1 of "
+		"the unit in the name. Needs 64-bit integers, and right\n * shifts of "
+		"negative numbers that keep the sign, as compilers have them.\n */\n",
 		incise_fixed_bound(fx));
 }
 
@@ -351,8 +350,8 @@ int incise_fixed_write_c(const struct incise_fixed *fx, const char *path,
 	if (!is_identifier(symbol))
 		return incise_error_set(
 			err, EINVAL,
-			"'%s' is no name for a C function: letters, digits and '_', not a "
-			"digit first, at most %d",
+			"'%s' is not a name for a C function: expected at most %d "
+			"letters, digits and '_', no digit first",
 			symbol, SYMBOL_MAX);
 	file = incise_outfile_open(path, err);
 	if (!file)

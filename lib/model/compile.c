@@ -211,7 +211,8 @@ static struct incise_fixed *image_finish(struct image *image, struct incise_erro
 		free(owned);
 		incise_error_set(
 			err, ERANGE,
-			"fixed point: the model's numbers fit no format; use double");
+			"fixed point: the model's numbers exceed all number formats; "
+			"use double");
 		return NULL;
 	}
 	return &owned->fx;
@@ -607,11 +608,9 @@ struct incise_fixed *incise_fixed_compile(const struct incise_model *model,
 		return NULL;
 	}
 	if (o.arithmetic > INCISE_FIXED_FORCE || o.cells > cell_counts[N_COUNTS - 1]) {
-		incise_error_set(
-			err, EINVAL,
-			"fixed point: there is no such arithmetic, or more than %d "
-			"cells were asked for",
-			cell_counts[N_COUNTS - 1]);
+		incise_error_set(err, EINVAL,
+				 "fixed point: unknown arithmetic, or more than %d cells",
+				 cell_counts[N_COUNTS - 1]);
 		goto out;
 	}
 	if (incise_grid_init(grid, model, err))
@@ -622,19 +621,19 @@ struct incise_fixed *incise_fixed_compile(const struct incise_model *model,
 	else if (rc == -E2BIG)
 		incise_error_set(
 			err, E2BIG,
-			"fixed point: a force table of so many cells exceeds %d bytes; ask for "
-			"fewer, or for the arithmetic 'table'",
+			"fixed point: a force table with so many cells exceeds %d "
+			"bytes; give fewer cells, or the arithmetic 'table'",
 			FORCE_SIZE_MAX);
 	else if (rc)
 		incise_error_set(
 			err, ERANGE,
-			"fixed point: consequents or widths are too extreme for any "
-			"format; train with more ridge, or use double");
+			"fixed point: consequents or widths exceed all number formats; "
+			"train with more ridge, or use double");
 	else if (o.budget > 0 && best.bound > o.budget)
 		incise_error_set(
 			err, ERANGE,
-			"fixed point: no arithmetic holds an error of %.3g: the best, %s, "
-			"is certain to %.3g; allow more, or use double",
+			"fixed point: no arithmetic has an error of at most %.3g; the "
+			"bound of the best, %s, is %.3g; allow more, or use double",
 			o.budget, names[best.head.arithmetic], best.bound);
 	else
 		fx = image_finish(&best, err);
@@ -672,8 +671,8 @@ struct incise_fixed *incise_fixed_load(const char *path, struct incise_error *er
 		return &owned->fx;
 	free(owned);
 	incise_error_set(err, -rc,
-			 rc == -EINVAL	  ? "%s: not a .fx file, or a damaged one; "
-					    "compile the model again"
+			 rc == -EINVAL	  ? "%s: not a .fx file, or damaged; compile "
+					    "the model again"
 			 : rc == -ENOTSUP ? "%s: a .fx file of another version; compile "
 					    "the model again"
 					  : "%s: no memory to read it",

@@ -290,7 +290,7 @@ static int check_variables(struct reader *in)
 		if (!model->info.n_mfs[i] ||
 		    in->mfs_seen[i] != (1ull << model->info.n_mfs[i]) - 1)
 			return fail(in, EINVAL,
-				    "[Input%d] has not all of its NumMFs=%d functions",
+				    "[Input%d] lacks some of its NumMFs=%d functions",
 				    i + 1, model->info.n_mfs[i]);
 	}
 	if (!in->output)
@@ -410,8 +410,8 @@ static int read_file(struct reader *in)
 		if (!equals || section == NONE)
 			return fail(
 				in, EINVAL,
-				"expected [System] or KEY=VALUE, found '%.40s': is this a "
-				".fis file?",
+				"expected [System] or KEY=VALUE, found '%.40s': not a "
+				".fis file",
 				in->text);
 		*equals = 0;
 		value = equals + 1;
@@ -425,7 +425,7 @@ static int read_file(struct reader *in)
 		return rc;
 	if (!in->system)
 		return fail(in, EINVAL,
-			    "the file is empty or has no [System]: is it a .fis file?");
+			    "the file is empty or has no [System]: not a .fis file");
 	if (!in->rules || in->model->info.n_rules != in->n_rules)
 		return fail(
 			in, EINVAL,
@@ -434,7 +434,7 @@ static int read_file(struct reader *in)
 	for (int r = 0; r < in->n_rules; r++)
 		if (in->model->rule[r].weight > 0)
 			return 0;
-	return fail(in, EINVAL, "all rules have weight 0: none ever fires");
+	return fail(in, EINVAL, "all rules have weight 0, so no rule fires");
 }
 
 struct incise_model *incise_model_load(const char *path, struct incise_error *err)

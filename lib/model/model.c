@@ -129,7 +129,7 @@ struct incise_model *incise_model_new_grid(int n_inputs,
 			incise_error_set(
 				err, EINVAL,
 				"input %s: its range is %g to %g: it must be finite "
-				"and not empty; is the column constant?",
+				"and not empty; check whether the column is constant",
 				in->name, in->min, in->max);
 			return NULL;
 		}
@@ -144,8 +144,8 @@ struct incise_model *incise_model_new_grid(int n_inputs,
 		if (n_rules > INCISE_MODEL_RULES_MAX) {
 			incise_error_set(
 				err, E2BIG,
-				"the grid has %d rules or more: at most %d; ask for "
-				"fewer membership functions",
+				"the grid has %d rules or more: at most %d; give fewer "
+				"membership functions",
 				n_rules, INCISE_MODEL_RULES_MAX);
 			return NULL;
 		}

@@ -164,8 +164,9 @@ static int check_input(const struct incise_model *model, int i, struct incise_er
 		if (mf->type != INCISE_MF_GAUSS)
 			return incise_error_set(
 				err, ENOTSUP,
-				"fixed point: input %s, function %s is a %s, only gaussmf has "
-				"a fixed form; train with --mf-type gaussmf or use double",
+				"fixed point: input %s, function %s is a %s, only "
+				"gaussmf has a fixed-point form; train with --mf-type "
+				"gaussmf or use double",
 				v->name, mf->name, incise_mf_type_name(mf->type));
 		if (fabs(mf->p[1]) > X_MAX)
 			return incise_error_set(
@@ -177,8 +178,8 @@ static int check_input(const struct incise_model *model, int i, struct incise_er
 		if (mf->p[0] < 64.0 / INCISE_FIXED_ONE / INCISE_FIXED_ONE)
 			return incise_error_set(
 				err, ERANGE,
-				"fixed point: input %s, function %s: its width %g is too small "
-				"for a format; use double",
+				"fixed point: input %s, function %s: its width %g is "
+				"too small for all number formats; use double",
 				v->name, mf->name, mf->p[0]);
 	}
 	return 0;
@@ -201,7 +202,7 @@ int incise_grid_init(struct incise_grid *grid, const struct incise_model *model,
 		return incise_error_set(
 			err, ENOTSUP,
 			"fixed point: the model's AndMethod is min, only prod has a "
-			"fixed form; use double");
+			"fixed-point form; use double");
 	for (int i = 0; i < n; i++) {
 		rc = check_input(model, i, err);
 		if (rc)
@@ -211,8 +212,8 @@ int incise_grid_init(struct incise_grid *grid, const struct incise_model *model,
 	if (grid_rules != n_rules)
 		return incise_error_set(
 			err, ENOTSUP,
-			"fixed point: the model has %d rules, its grid has %d: "
-			"only full grids have a fixed form; use double",
+			"fixed point: the model has %d rules, its grid has %d: only "
+			"full grids have a fixed-point form; use double",
 			n_rules, grid_rules);
 	grid->one = n == 1;
 	grid->a = (struct incise_axis){.n = 1, .s = {1}};

@@ -119,8 +119,8 @@ struct incise_uncertainty *incise_uncertainty_new(const struct incise_model *mod
 	if (!good) {
 		incise_uncertainty_free(u);
 		incise_error_set(err, EINVAL,
-				 "the standard deviation cannot be told: its factor is "
-				 "singular or not finite; use a ridge");
+				 "no standard deviation: its factor is singular or not "
+				 "finite; use a ridge");
 		return NULL;
 	}
 	return u;
@@ -202,7 +202,7 @@ static char *value_of(struct incise_lines *in, const char *key)
 	if (rc < 0)
 		return NULL;
 	if (!rc || strncmp(in->text, key, length) || in->text[length] != ' ') {
-		fail(in, EINVAL, "expected '%s', found '%.40s': is this a .sd file?", key,
+		fail(in, EINVAL, "expected '%s', found '%.40s': not a .sd file", key,
 		     rc ? in->text : "the end");
 		return NULL;
 	}
@@ -254,7 +254,7 @@ static int read_row(struct incise_lines *in, double *to, int n, int row)
 			return rc;
 	}
 	if (*at)
-		return fail(in, EINVAL, "row %d holds more than its %d numbers", row + 1,
+		return fail(in, EINVAL, "row %d has more than %d numbers", row + 1,
 			    n - row);
 	if (*to == 0)
 		return fail(in, EINVAL, "row %d begins with 0: the factor is singular",
@@ -280,11 +280,11 @@ static int read_file(struct incise_lines *in, struct incise_uncertainty *u)
 		return -errno;
 	sum = strtoull(text, &end, 16);
 	if (strspn(text, "0123456789abcdef") != 16 || *end)
-		return fail(in, EINVAL, "model: '%.40s' is no checksum of 16 digits",
+		return fail(in, EINVAL, "model: '%.40s' is not a checksum of 16 digits",
 			    text);
 	if (sum != u->checksum)
 		return fail(in, ESTALE,
-			    "made for a model of other parameters: it is stale; train "
+			    "stale: made for other parameters of the model; train "
 			    "again, or remove it");
 	rc = integer_of(in, "unknowns", &value);
 	if (rc)
@@ -306,7 +306,7 @@ static int read_file(struct incise_lines *in, struct incise_uncertainty *u)
 		return rc;
 	rc = next_line(in);
 	if (rc > 0)
-		return fail(in, EINVAL, "'%.20s' behind the last row", in->text);
+		return fail(in, EINVAL, "'%.20s' after the last row", in->text);
 	return rc;
 }
 
@@ -317,7 +317,7 @@ struct incise_uncertainty *incise_uncertainty_load(const char *path,
 	/* 2304 unknowns, half of a matrix in 25 bytes a number, are 66 MB. */
 	static const struct incise_infile_kind sd = {
 		.name = "a .sd file",
-		.advice = "it lies beside a model that 'incise train' wrote",
+		.advice = "'incise train' writes it next to a model",
 		.size_max = 128 << 20,
 	};
 	struct incise_uncertainty *u = make(model);

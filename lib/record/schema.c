@@ -132,14 +132,14 @@ int incise_schema_fail(sqlite3 *db, const char *path, struct incise_error *err)
 	if (code == EINVAL)
 		return incise_error_set(
 			err, code,
-			"%s: damaged (%s); take a copy of it, `sqlite3 %s/%s "
-			".recover` may save rows",
+			"%s: damaged (%s); copy it; `sqlite3 %s/%s .recover` may save "
+			"rows",
 			path, sqlite3_errmsg(db), path, INCISE_SCHEMA_DB);
 	if (code == EACCES || code == EROFS)
 		return incise_error_set(
 			err, code,
-			"%s: cannot be opened (%s); an interrupted recording "
-			"needs a folder that can be written: copy it to one",
+			"%s: cannot be opened (%s); an interrupted recording needs a "
+			"writable folder; copy it to one",
 			path, sqlite3_errmsg(db));
 	return incise_error_set(err, code, "%s: cannot be read: %s", path,
 				db ? sqlite3_errmsg(db) : strerror(ENOMEM));
@@ -180,10 +180,10 @@ static int check_tables(sqlite3 *db, const char *path, int form, struct incise_e
 		if (step != SQLITE_ROW && step != SQLITE_DONE)
 			rc = incise_schema_fail(db, path, err);
 		else if (!sql || strcmp(sql, tables[i].sql))
-			rc = incise_error_set(err, EINVAL,
-					      "%s: damaged or altered: table '%s' is %s",
-					      path, tables[i].name,
-					      sql ? "not as incise makes it" : "missing");
+			rc = incise_error_set(
+				err, EINVAL, "%s: damaged or altered: table '%s' is %s",
+				path, tables[i].name,
+				sql ? "not as incise creates it" : "missing");
 	}
 	sqlite3_finalize(stmt);
 	return rc;
@@ -199,25 +199,24 @@ int incise_schema_check(sqlite3 *db, const char *path, int *form,
 	    pragma(db, "SELECT count(*) FROM sqlite_master", &entries) != SQLITE_OK)
 		return incise_schema_fail(db, path, err);
 	if (!application && !version && !entries)
-		return incise_error_set(
-			err, EINVAL,
-			"%s: empty: interrupted before anything was recorded; there is "
-			"nothing to keep",
-			path);
+		return incise_error_set(err, EINVAL,
+					"%s: empty: interrupted before the first data",
+					path);
 	if (application != INCISE_SCHEMA_APPLICATION)
 		return incise_error_set(err, EINVAL,
-					"%s: no recording: its %s was not made by incise",
+					"%s: not a recording: its %s was not made by "
+					"incise",
 					path, INCISE_SCHEMA_DB);
 	if (version > INCISE_SCHEMA_VERSION)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: made by a newer incise (form %lld, this one reads up "
-			"to %d); use that version",
+			"%s: made by a newer incise (format %lld, this version reads "
+			"up to %d); use that version",
 			path, (long long)version, INCISE_SCHEMA_VERSION);
 	if (version < 1)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: damaged: its form has the impossible number %lld", path,
+			"%s: damaged: its format has the invalid number %lld", path,
 			(long long)version);
 	*form = version;
 	return check_tables(db, path, version, err);

@@ -169,7 +169,7 @@ const char *incise_axes_fault(const struct incise_axes *axes)
 	if (faults)
 		return incise_stepper_fault_text(
 			(enum incise_stepper_fault)(faults & -faults));
-	return axes->off ? "the actuator has no power: enable it" : NULL;
+	return axes->off ? "the actuator is off: enable it" : NULL;
 }
 
 int incise_axes_cause(const struct incise_axes *axes, int rc, char *text, size_t size)

@@ -200,8 +200,8 @@ static int set_lateness(struct incise_plan *plan, struct incise_error *err)
 		if (ticks > INCISE_POSE_LOOP_LATE_MAX)
 			return incise_error_set(
 				err, EDOM,
-				"%s: %s: actuator.late_ms of rig.conf is %g, %.0f ticks: "
-				"stability can be checked up to %d",
+				"%s: %s: actuator.late_ms of rig.conf is %g, %.0f "
+				"ticks: stability can be checked up to %d; correct it",
 				plan->scene->path, info->name, info->late_s * 1e3, ticks,
 				INCISE_POSE_LOOP_LATE_MAX);
 		s->axis[i].late_ticks = (int)fmax(plan->scene->device.late_ticks, ticks);
@@ -259,10 +259,10 @@ static void name_delay(const struct incise_plan_stability *s,
 		       const struct incise_tracker_info *tracker, char name[64])
 {
 	if (s->own_delay)
-		snprintf(name, 64, "that answers %d ticks late", s->device.delay_ticks);
+		snprintf(name, 64, "with a delay of %d ticks", s->device.delay_ticks);
 	else
-		snprintf(name, 64, "felt through a tracker of %g Hz and %g ms",
-			 tracker->rate_hz, (double)tracker->latency_ns * 1e-6);
+		snprintf(name, 64, "with a tracker of %g Hz and %g ms", tracker->rate_hz,
+			 (double)tracker->latency_ns * 1e-6);
 }
 
 static double membrane_N_mm(const struct incise_plan *plan)
@@ -365,12 +365,12 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 		snprintf(advice, sizeof(advice), "set tissue.gain to at most %.3g", gain);
 	else
 		snprintf(advice, sizeof(advice),
-			 "no gain is small enough: it needs damping");
+			 "no gain is small enough: the device needs damping");
 	return incise_error_set(
 		err, EDOM,
-		"%s: not stable: its tissue has %.4g N/mm and %.4g N s/mm, a device of "
-		"%g kg and %g N s/mm %s holds %.4g N/mm, of which %g %% are kept in "
-		"reserve; %s, or describe the device",
+		"%s: not stable: its tissue has %.4g N/mm and %.4g N s/mm, but a "
+		"device of %g kg and %g N s/mm %s is stable up to %.4g N/mm, of which "
+		"%g %% are kept in reserve; %s, or describe the device",
 		scene->path, s->stiffness_N_mm, s->damping_N_s_mm, s->device.mass_kg,
 		s->device.damping_N_s_mm, delay, s->limit_N_mm, 100 * RESERVE, advice);
 }
@@ -438,7 +438,8 @@ int incise_plan_check_rest(struct incise_plan *plan,
 {
 	struct incise_plan_stability *s = &plan->stability;
 	const struct incise_rest_trial as_is = {1, s->device.damping_N_s_mm, -1};
-	char advice[160] = "no smaller gain and no damping of the device ends it";
+	char advice[160] = "neither a smaller gain nor damping of the device prevents "
+			   "it";
 	struct incise_rest rest;
 	double gain, damping;
 
@@ -471,9 +472,9 @@ int incise_plan_check_rest(struct incise_plan *plan,
 			 damping);
 	return incise_error_set(
 		err, EDOM,
-		"%s: does not come to rest: a hand that leans on it with %.2f N%s at %.1f mm "
-		"depth swings by %.3f mm and %.2f N; %s",
+		"%s: does not come to rest: a hand that leans on it with %.2f N%s at "
+		"%.1f mm depth oscillates by %.3f mm and %.2f N; %s",
 		plan->scene->path, rest.lean_N,
-		rest.along_mm_s > 0 ? " while it goes along the skin" : "", rest.depth_mm,
-		rest.swing_mm, rest.swing_N, advice);
+		rest.along_mm_s > 0 ? " while it moves along the skin" : "",
+		rest.depth_mm, rest.swing_mm, rest.swing_N, advice);
 }

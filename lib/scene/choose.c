@@ -31,7 +31,7 @@ static const char *no_normal(const struct incise_plan *plan)
 	if (plan->average_ticks > 1)
 		return NULL;
 	return plan->scene->effects.average_ticks > 1
-		       ? "a plane has one normal: there is nothing to average"
+		       ? "the normal of a plane is constant"
 		       : "effects.average_ticks is 1";
 }
 
@@ -113,7 +113,7 @@ static void choose_forces(struct incise_plan *plan)
 
 void incise_plan_choose(struct incise_plan *plan)
 {
-	const char *drawn = "the loop draws nothing: that is for incise view";
+	const char *drawn = "incise view draws it, not the loop";
 
 	for (size_t i = 0; i < sizeof(all) / sizeof(*all); i++) {
 		const char *why = all[i].why_not ? all[i].why_not(plan) : NULL;
@@ -138,7 +138,7 @@ void incise_plan_choose(struct incise_plan *plan)
 	else
 		leave_out(plan, "actuate",
 			  plan->tracker ? "the rig has no stepper"
-					: "there is no rig, and no stepper");
+					: "no rig, and so no stepper");
 	leave_out(plan, "wound",
 		  plan->scene->picture.wound ? drawn : "picture.wound is false");
 	leave_out(plan, "bleeding",

@@ -138,9 +138,9 @@ static int overhang(struct heights *h, const double p[3])
 	to_world(h, p, at);
 	return incise_error_set(
 		h->err, ERANGE,
-		"the surface has an overhang, or is steeper than 76°, at (%.1f, %.1f, %.1f) mm: a plan "
-		"in the kernel has one height at each place; it stays in user space: leave "
-		"--in-kernel away",
+		"the surface has an overhang, or is steeper than 76°, at (%.1f, %.1f, "
+		"%.1f) mm: a plan in the kernel needs one height at each point; remove "
+		"--in-kernel",
 		at[0], at[1], at[2]);
 }
 
@@ -213,8 +213,8 @@ static int begin(struct heights *h, const double up[3])
 		    fmax(fabs(h->low[i]), fabs(h->high[i])) > HEIGHT_MOST_MM)
 			rc = incise_error_set(
 				h->err, ERANGE,
-				"the surface goes from %.0f to %.0f mm: heights hold up to "
-				"%d mm; it stays in user space: leave --in-kernel away",
+				"the surface extends from %.0f to %.0f mm: heights are "
+				"limited to %d mm; remove --in-kernel",
 				h->low[i], h->high[i], HEIGHT_MOST_MM);
 	return rc;
 }
@@ -969,8 +969,8 @@ static int choose(struct heights *h, struct incise_heights *heights)
 		return 0;
 	return incise_error_set(
 		h->err, ERANGE,
-		"the surface, %.0f × %.0f mm, bends too sharply for heights: smooth it; it stays in "
-		"user space: leave --in-kernel away",
+		"the surface, %.0f × %.0f mm, is too curved for heights; smooth it, or "
+		"remove --in-kernel",
 		h->high[0] - h->low[0], h->high[1] - h->low[1]);
 }
 

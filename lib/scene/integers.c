@@ -35,7 +35,7 @@ static int32_t to_integer(struct conversion *c, const char *name, double value,
 	if (!(fabs(value) <= most) || !(fabs(scaled) <= LARGEST)) {
 		c->rc = incise_error_set(
 			c->err, ERANGE,
-			"%s: %s is %g: integers hold up to %g; make it smaller, or set "
+			"%s: %s is %g: integers are limited to %g; reduce it, or set "
 			"arithmetic to \"double\"",
 			c->plan->scene->path, name, value, fmin(most, LARGEST / one));
 		return 0;
@@ -91,7 +91,7 @@ static void set_filter(struct conversion *c, struct incise_fixed_filter *filter)
 	if (!c->rc && filter->period_ns > INCISE_FIXED_PERIOD_MAX_NS)
 		c->rc = incise_error_set(
 			c->err, ERANGE,
-			"%s: the tracker has %g Hz: integers take 20 Hz and more; set "
+			"%s: the tracker has %g Hz: integers need at least 20 Hz; set "
 			"arithmetic to \"double\"",
 			c->plan->scene->path, 1 / p->period_s);
 	if (c->rc)
@@ -126,7 +126,7 @@ static void set_shape(struct conversion *c, struct incise_fixed_shape *shape)
 		direction(shape->normal, surface->plane.normal);
 	} else if (!surface->mesh) {
 		shape->kind = INCISE_FIXED_CAPSULE;
-		place(c, "the surface's place", shape->point, capsule->a);
+		place(c, "the surface's position", shape->point, capsule->a);
 		v3_sub(axis, capsule->b, capsule->a);
 		v3_unit(unit, axis, 0);
 		direction(shape->normal, unit);
@@ -181,8 +181,8 @@ static void set_incision(struct conversion *c, struct incise_fixed_incision_setu
 	if (!c->rc && setup->cuts_most > INCISE_FIXED_CUTS_MAX)
 		c->rc = incise_error_set(
 			c->err, ERANGE,
-			"%s: tissue.cuts_most is %d: integers hold up to %d; make it "
-			"smaller, or set arithmetic to \"double\"",
+			"%s: tissue.cuts_most is %d: integers are limited to %d; "
+			"reduce it, or set arithmetic to \"double\"",
 			scene->path, setup->cuts_most, INCISE_FIXED_CUTS_MAX);
 	setup->cut_from =
 		to_integer(c, "tissue.cut_from_mm", scene->tissue.cut_from_mm, ONE, 1000);
@@ -246,7 +246,7 @@ int incise_integers_numbers(const struct incise_plan *plan,
 	if (!c.rc && !incise_fixed_numbers_good(numbers))
 		c.rc = incise_error_set(
 			err, ERANGE,
-			"%s: its numbers do not fit into integers together; set "
+			"%s: the combination of its numbers exceeds integers; set "
 			"arithmetic to \"double\"",
 			plan->scene->path);
 	return c.rc;
@@ -286,8 +286,9 @@ static int make_heights(const struct incise_plan *plan, struct incise_heights *h
 	}
 	return incise_error_set(
 		err, ERANGE,
-		"%s: its surface is too curved: heights of it hold %.1f mm of depth, and "
-		"its force is at limits.force_N at %.1f; run it without the kernel",
+		"%s: its surface is too curved: its heights are valid to a depth of "
+		"%.1f mm, but the force reaches limits.force_N at %.1f; remove "
+		"--in-kernel",
 		plan->scene->path, reach_mm, enough_mm);
 }
 
@@ -302,7 +303,7 @@ static void set_axis(struct conversion *c, const struct incise_axis *axis,
 					 axis->dual[k], 16777216.0, 127);
 	to->compliance =
 		to_integer(c, "1 / spring_N_mm", 1 / info->spring_N_mm, 1048576.0, 2047);
-	to->steps_per_mm = number(c, "an actuator's steps of a mm", 1 / info->step_mm);
+	to->steps_per_mm = number(c, "an actuator's steps per mm", 1 / info->step_mm);
 	to->origin = length(c, "an actuator's origin", info->origin_mm);
 	to->travel = length(c, "travel_mm", info->travel_mm);
 	to->rest = length(c, "rest_mm", info->rest_mm);
@@ -320,8 +321,8 @@ static void set_bound(struct conversion *c, struct incise_fixed_numbers *numbers
 
 	if (!c->rc && !(bound_N < 4096))
 		c->rc = incise_error_set(c->err, ERANGE,
-					 "%s: its error in integers has no bound; set "
-					 "arithmetic to \"double\"",
+					 "%s: its error in integers is not bounded; "
+					 "set arithmetic to \"double\"",
 					 c->plan->scene->path);
 	if (!c->rc)
 		numbers->bound = (int64_t)ceil(ldexp(bound_N, 32));

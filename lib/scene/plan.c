@@ -36,8 +36,8 @@ static int take_model(struct incise_plan *plan, struct incise_error *err)
 	if (scene->compiled && !scene->fixed)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: its model is compiled: it cannot run in double; use the "
-			".fis it was made of",
+			"%s: its model is compiled and cannot run in double; use its "
+			".fis file",
 			scene->path);
 	plan->fixed = scene->compiled;
 	if (!scene->model)
@@ -65,7 +65,7 @@ static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
 		if (!plan->tracker)
 			return incise_error_set(
 				err, ENODEV,
-				"%s: the rig has no tracker: name one in rig.conf",
+				"%s: the rig has no tracker; name one in rig.conf",
 				plan->scene->path);
 		incise_tracker_info(plan->tracker, tracker);
 		incise_rig_surface(rig, place.point_mm, place.normal);
@@ -122,7 +122,7 @@ static void find_insertion(struct incise_plan *plan)
 {
 	size_t size = sizeof(plan->no_tool), n;
 
-	n = (size_t)snprintf(plan->no_tool, size, "nothing is inserted:");
+	n = (size_t)snprintf(plan->no_tool, size, "no insertion:");
 	for (int i = 0, k = 0; i < incise_n_tissue_forces && n < size; i++) {
 		const struct incise_tissue_force *force = &incise_tissue_forces[i];
 
@@ -169,13 +169,13 @@ static int check_membrane(const struct incise_plan *plan, struct incise_error *e
 	if (!proxy.touching)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: membrane.point_mm lies outside of the tissue; place it "
-			"below the surface",
+			"%s: membrane.point_mm is outside the tissue; place it below "
+			"the surface",
 			plan->scene->path);
 	if (!(v3_dot(membrane->normal, proxy.touch.normal) > 0))
 		return incise_error_set(
 			err, EINVAL,
-			"%s: membrane.normal points into the tissue; turn it round",
+			"%s: membrane.normal points into the tissue; reverse it",
 			plan->scene->path);
 	return 0;
 }
@@ -228,8 +228,9 @@ static int check_age(const struct incise_plan *plan,
 		return 0;
 	return incise_error_set(
 		err, EDOM,
-		"%s: limits.pose_age_ms: no pose of a tracker of %g Hz that is %g ms late is "
-		"always younger than %g ms: there would be no force; set it to %.1f or more",
+		"%s: limits.pose_age_ms: poses of a tracker of %g Hz with a latency of "
+		"%g ms can be older than %g ms, and then there is no force; set it to "
+		"%.1f or more",
 		plan->scene->path, tracker->rate_hz, (double)tracker->latency_ns * 1e-6,
 		plan->scene->limits.pose_age_ms, ceil(least_ms * 10) / 10);
 }
@@ -305,8 +306,8 @@ struct incise_plan *incise_plan_new_fed_on(const struct incise_scene *scene,
 	if (!(tracker->rate_hz > 0) || !isfinite(tracker->rate_hz) ||
 	    tracker->latency_ns < 0) {
 		incise_error_set(err, EINVAL,
-				 "a tracker of %g Hz and %g ms: expected a rate above 0 "
-				 "and no negative latency",
+				 "a tracker of %g Hz and %g ms: expected a rate above "
+				 "0 and a latency of at least 0",
 				 tracker->rate_hz, (double)tracker->latency_ns * 1e-6);
 		errno = EINVAL;
 		return NULL;
@@ -314,7 +315,7 @@ struct incise_plan *incise_plan_new_fed_on(const struct incise_scene *scene,
 	v3_copy(place.point_mm, point_mm);
 	if (!v3_finite(point_mm) || !v3_unit(place.normal, normal, 0)) {
 		incise_error_set(err, EINVAL,
-				 "the tissue's plane has no place or no normal");
+				 "the tissue's plane has no point or no normal");
 		errno = EINVAL;
 		return NULL;
 	}
@@ -476,7 +477,7 @@ static int blind_cause(const struct incise_plan *plan, char *text, size_t size)
 	incise_tracker_info(plan->tracker, &info);
 	return snprintf(
 		text, size,
-		"%s gave no usable pose for %.0f s, the last with the flag '%c' (%s); "
+		"%s sent no usable pose for %.0f s, the last with the flag '%c' (%s); "
 		"see Tracker flags in rig.conf(5)",
 		info.name, (double)INCISE_PLAN_BLIND_NS / INCISE_NS_PER_S,
 		plan->pose_flag > ' ' && plan->pose_flag <= '~' ? plan->pose_flag : '?',

@@ -42,16 +42,17 @@ static int check_axes(const struct incise_plan *plan, struct incise_error *err)
 {
 	if (!plan->integers)
 		return incise_error_set(err, EINVAL,
-					"%s: its arithmetic is \"double\"; a plan as a "
-					"file is in integers",
+					"%s: its arithmetic is \"double\", but a plan "
+					"file is in integers; set arithmetic to "
+					"\"fixed\"",
 					plan->scene->path);
 	for (int i = 0; i < plan->axes.n; i++)
 		if (plan->axes.axis[i].info.measures_handle)
 			return incise_error_set(
 				err, ENOTSUP,
-				"%s: it measures its handle, and a plan as a file takes "
-				"that from the tracker; give a rig with a stepper of the "
-				"kernel module",
+				"%s: it measures its handle, but a plan file takes "
+				"that from the tracker; use a rig with a stepper of "
+				"the kernel module",
 				plan->axes.axis[i].info.name);
 	return 0;
 }
@@ -103,7 +104,8 @@ struct incise_plan_file *incise_plan_file_new(const struct incise_plan *plan,
 	rc = incise_fixed_plan_open(&file->view, file->bytes, file->size);
 	if (rc)
 		rc = incise_error_set(err, ERANGE,
-				      "%s: its numbers do not fit into integers together",
+				      "%s: the combination of its numbers exceeds "
+				      "integers",
 				      plan->scene->path);
 out:
 	incise_heights_free(&heights);
@@ -140,8 +142,8 @@ struct incise_plan_file *incise_plan_file_load(const char *path, struct incise_e
 	free(file);
 	rc = incise_error_set(
 		err, -rc,
-		rc == -EINVAL	 ? "%s: not a .plan file, or a damaged one; compile "
-				   "the scene again"
+		rc == -EINVAL	 ? "%s: not a .plan file, or damaged; compile the "
+				   "scene again"
 		: rc == -ENOTSUP ? "%s: a .plan file of another version; compile the "
 				   "scene again"
 				 : "%s: no memory to read it",

@@ -393,7 +393,7 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 	if (n_inputs != 2)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: its model has %d inputs, a cutting model has 2: "
+			"%s: its model has %d inputs, but a cutting model has 2: "
 			"depth_mm and velocity_mm_s",
 			scene->path, n_inputs);
 	return 0;
@@ -461,8 +461,8 @@ static int read_membrane(struct incise_scene *scene, const config_setting_t *roo
 		return rc;
 	return incise_error_set(
 		err, EINVAL,
-		"%s:%u: membrane.back_wall_mm: the wall behind the airway is not behind the "
-		"membrane, which yields after thickness_mm, %g; expected more",
+		"%s:%u: membrane.back_wall_mm: expected more than thickness_mm, %g, so "
+		"that the back wall is behind the membrane",
 		scene->path, config_setting_source_line(group),
 		scene->membrane.thickness_mm);
 }
@@ -590,7 +590,7 @@ static int check_forces(const struct incise_scene *scene, struct incise_error *e
 		if (there && model && incise_tissue_forces[i].model)
 			return incise_error_set(
 				err, EINVAL,
-				"%s: both a model and tissue.%s: a scene has one "
+				"%s: a model and tissue.%s: a scene has only one "
 				"reaction; remove one of them",
 				scene->path, incise_tissue_forces[i].number[0].key);
 	}
@@ -598,8 +598,8 @@ static int check_forces(const struct incise_scene *scene, struct incise_error *e
 		return 0;
 	return incise_error_set(
 		err, EINVAL,
-		"%s: no model and no other force: expected model = \"FILE.fis\", or "
-		"tissue = { reaction_N_mm = K; }, or give --model",
+		"%s: no force: expected model = \"FILE.fis\" or tissue = { "
+		"reaction_N_mm = K; }, or give --model",
 		scene->path);
 }
 
@@ -614,8 +614,8 @@ static int check_tool(const struct incise_scene *scene, const config_setting_t *
 		return 0;
 	return incise_error_set(
 		err, EINVAL,
-		"%.200s:%d: tool.%s: axis and side are within 10 degrees of one line; "
-		"side is the normal of the blade, across axis; correct it",
+		"%.200s:%d: tool.%s: axis and side are within 10 degrees of one line, "
+		"but side is the normal of the blade, across axis; correct it",
 		scene->path, config_setting_source_line(setting), key);
 }
 
@@ -631,8 +631,8 @@ static int refuse_guard(const char *path, const config_setting_t *root,
 		return 0;
 	return incise_error_set(
 		err, EINVAL,
-		"%.200s:%d: effects.guard is gone: the same scenes come to rest without "
-		"it, see incise bench stability; remove the key",
+		"%.200s:%d: effects.guard was removed: scenes come to rest without it, "
+		"see incise bench stability; remove the key",
 		path, config_setting_source_line(guard));
 }
 

@@ -29,8 +29,7 @@ static int take_axes(struct incise_plan *plan, struct incise_rig *rig,
 	if (incise_stepper_rendered(first->stepper, &rendered) == -EOPNOTSUPP)
 		return incise_error_set(
 			err, EOPNOTSUPP,
-			"%s: it runs no plan; only steppers of the kernel "
-			"module do",
+			"%s: it cannot run plans; use a stepper of the kernel module",
 			first->info.name);
 	for (int i = 0; i < plan->axes.n; i++)
 		deadman_s = fmin(deadman_s, plan->axes.axis[i].info.deadman_s);

@@ -22,7 +22,7 @@ struct incise_sim *incise_sim_new(const struct incise_sim_config *config,
 		return NULL;
 	sim = calloc(1, sizeof(*sim));
 	if (!sim) {
-		incise_error_set(err, ENOMEM, "virtual rig: %s; free some memory",
+		incise_error_set(err, ENOMEM, "simulated rig: %s; free some memory",
 				 strerror(ENOMEM));
 		return NULL;
 	}

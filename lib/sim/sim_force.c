@@ -83,7 +83,7 @@ static void sim_force_info(const struct incise_force *force,
 		.bits = BITS,
 		.full_scale_V = FULL_SCALE_V,
 	};
-	snprintf(info->name, sizeof(info->name), "virtual force channel");
+	snprintf(info->name, sizeof(info->name), "simulated force channel");
 }
 
 static uint64_t sim_force_lost(const struct incise_force *force)

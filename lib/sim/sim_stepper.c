@@ -307,7 +307,7 @@ static void sim_stepper_info(const struct incise_stepper *stepper,
 		.measures_handle = true,
 		.rest_mm = s->rest_mm,
 	};
-	snprintf(info->name, sizeof(info->name), "virtual haptic scalpel%s",
+	snprintf(info->name, sizeof(info->name), "simulated haptic scalpel%s",
 		 of_axis[s->axis]);
 }
 

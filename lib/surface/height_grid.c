@@ -69,12 +69,12 @@ static int read_header(struct grid *grid)
 					  "xllcorner|xllcenter, yllcorner|yllcenter, "
 					  "cellsize, NODATA_value, each once",
 					  (int)(length < 40 ? length : 40), word,
-					  key == N_KEYS ? "no known key"
+					  key == N_KEYS ? "not a known key"
 							: "there already");
 		length = text_word(&grid->text, &word);
 		if (!text_number(word, length, grid->value + key))
 			return text_error(&grid->text, grid->err,
-					  "%s: '%.*s' is no number", keys[key],
+					  "%s: '%.*s' is not a number", keys[key],
 					  (int)(length < 40 ? length : 40), word);
 		grid->given[key] = true;
 		if (text_word(&grid->text, &word))
@@ -100,7 +100,8 @@ static int check_header(struct grid *grid)
 		if (!(value[key] >= 2 && value[key] <= INCISE_SURFACE_TRIANGLES_MAX) ||
 		    value[key] != floor(value[key]))
 			return text_error(&grid->text, grid->err,
-					  "%s is %g: expected a whole number from 2 on",
+					  "%s is %g: expected a whole number of at "
+					  "least 2",
 					  keys[key], value[key]);
 	if (!(value[CELL] >= 1e-6 && value[CELL] <= MESH_COORDINATE_MAX_MM))
 		return text_error(&grid->text, grid->err,
@@ -112,7 +113,7 @@ static int check_header(struct grid *grid)
 	    INCISE_SURFACE_TRIANGLES_MAX)
 		return incise_error_set(
 			grid->err, E2BIG,
-			"%s: %zu × %zu heights make more than %d triangles",
+			"%s: %zu × %zu heights are more than %d triangles",
 			grid->text.path, grid->columns, grid->rows,
 			INCISE_SURFACE_TRIANGLES_MAX);
 	return 0;
@@ -129,7 +130,7 @@ static int read_height(struct grid *grid, size_t column, size_t row, double *hei
 				  column + 1, row + 1, grid->rows);
 	if (!text_number(word, length, height))
 		return text_error(&grid->text, grid->err,
-				  "'%.*s' is no height (column %zu, row %zu)",
+				  "'%.*s' is not a height (column %zu, row %zu)",
 				  (int)(length < 40 ? length : 40), word, column + 1,
 				  row + 1);
 	if (grid->given[NODATA] && *height == grid->value[NODATA])
@@ -168,8 +169,8 @@ static int read_heights(struct grid *grid, const double at_mm[3])
 				if (!(fabs(p[i]) <= MESH_COORDINATE_MAX_MM))
 					return text_error(
 						&grid->text, grid->err,
-						"%g mm is farther than %g mm from "
-						"the origin; is its unit mm?",
+						"%g mm is farther than %g mm from the "
+						"origin; check that its unit is mm",
 						p[i], MESH_COORDINATE_MAX_MM);
 			}
 		}

@@ -130,15 +130,15 @@ static int pair_sides(struct mesh_builder *b, const struct side *side, uint32_t 
 			return incise_error_set(
 				b->err, EINVAL,
 				"%s:%d: an edge of this face has more than two "
-				"triangles, one of them of line %d; part them",
+				"triangles, one of them in line %d; separate them",
 				b->draft->path, line_of(b, side[k + 2].face),
 				line_of(b, s->face));
 		if (s->down == t->down)
 			return incise_error_set(
 				b->err, EINVAL,
-				"%s:%d: this face turns the other way than its "
-				"neighbour of line %d; make all turn "
-				"counter-clockwise seen from outside",
+				"%s:%d: this face is oriented opposite to its "
+				"neighbour in line %d; orient all counter-clockwise "
+				"seen from outside",
 				b->draft->path, line_of(b, t->face), line_of(b, s->face));
 		b->neighbour[s->face][s->edge] = t->face;
 		b->neighbour[t->face][t->edge] = s->face;
@@ -334,7 +334,7 @@ struct mesh *mesh_new(const struct mesh_draft *draft, struct incise_error *err)
 		return NULL;
 	}
 	if (n > INCISE_SURFACE_TRIANGLES_MAX) {
-		incise_error_set(err, E2BIG, "%s: %zu triangles, at most %d can be held",
+		incise_error_set(err, E2BIG, "%s: %zu triangles: expected at most %d",
 				 draft->path, n, INCISE_SURFACE_TRIANGLES_MAX);
 		return NULL;
 	}

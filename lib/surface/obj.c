@@ -68,8 +68,9 @@ static int numbers(struct obj *obj, const char *what, int least, int most, doubl
 			return text_error(&obj->text, obj->err,
 					  "%s with more than %d numbers", what, most);
 		if (!text_number(word, length, value + n++))
-			return text_error(&obj->text, obj->err, "%s: '%.*s' is no number",
-					  what, (int)(length < 40 ? length : 40), word);
+			return text_error(&obj->text, obj->err,
+					  "%s: '%.*s' is not a number", what,
+					  (int)(length < 40 ? length : 40), word);
 	}
 	if (n < least)
 		return text_error(&obj->text, obj->err, "%s with %d numbers, not %d",
@@ -96,7 +97,7 @@ static int read_point(struct obj *obj)
 		if (!(fabs(x) <= MESH_COORDINATE_MAX_MM))
 			return text_error(&obj->text, obj->err,
 					  "v: %g mm is farther than %g mm from the "
-					  "origin; is its unit mm?",
+					  "origin; check that its unit is mm",
 					  x, MESH_COORDINATE_MAX_MM);
 		/* A sum with +0 is never -0, so that equal ones compare equal. */
 		draft->point[draft->n_points][i] = x + 0.0;
@@ -119,7 +120,7 @@ static int read_uv(struct obj *obj)
 	for (int i = 0; i < 2; i++) {
 		if (!(fabs(value[i]) <= 1e6))
 			return text_error(&obj->text, obj->err,
-					  "vt: %g is no texture coordinate", value[i]);
+					  "vt: %g is not a texture coordinate", value[i]);
 		obj->vt[obj->n_vt][i] = (float)value[i];
 	}
 	obj->n_vt++;
@@ -135,12 +136,12 @@ static int read_index(struct obj *obj, const char **at, const char *end, const c
 
 	*at = text_integer(word, end, &value);
 	if (!*at)
-		return text_error(&obj->text, obj->err, "f: '%.*s' is no index",
+		return text_error(&obj->text, obj->err, "f: '%.*s' is not an index",
 				  (int)(end - word < 40 ? end - word : 40), word);
 	if (!value || value > (long long)n || -value > (long long)n)
 		return text_error(&obj->text, obj->err,
-				  "f: there is no %s %lld among the %zu before this line",
-				  what, value, n);
+				  "f: no %s %lld among the %zu before this line", what,
+				  value, n);
 	*index = (uint32_t)(value > 0 ? value - 1 : (long long)n + value);
 	return 0;
 }

@@ -35,7 +35,7 @@ static struct incise_surface *refuse(struct incise_error *err, const char *what,
 	return NULL;
 }
 
-static const char coordinates[] = "numbers of mm, 1e5 at most";
+static const char coordinates[] = "numbers of mm, at most 1e5";
 
 struct incise_surface *incise_surface_new_plane(const double point_mm[3],
 						const double normal[3],
@@ -102,7 +102,7 @@ static struct incise_surface *load(enum incise_surface_kind kind, const char *pa
 	struct incise_surface *surface;
 
 	if (!within_reach(at_mm))
-		return refuse(err, path, "to be put at numbers of mm, 1e5 at most");
+		return refuse(err, path, "at a position in mm, at most 1e5");
 	surface = surface_new(kind, err);
 	if (!surface)
 		return NULL;

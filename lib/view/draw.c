@@ -173,7 +173,7 @@ static int target_size(struct target *target, int width, int height,
 	glGetIntegerv(GL_MAX_SAMPLES, &samples_max);
 	if (width < 1 || height < 1 || width > side_max || height > side_max)
 		return incise_error_set(err, EINVAL,
-					"picture: %d × %d pixels; expected 1 to %d each",
+					"image: %d × %d pixels; expected 1 to %d each",
 					width, height, side_max);
 	target_free(target);
 	target->width = width;
@@ -186,8 +186,8 @@ static int target_size(struct target *target, int width, int height,
 			target->width = target->height = 0;
 			return incise_error_set(
 				err, ENOTSUP,
-				"picture: no framebuffer of %d × %d pixels: "
-				"a smaller picture may do",
+				"image: no framebuffer of %d × %d pixels; try a "
+				"smaller image",
 				width, height);
 		}
 		target->samples = samples;
@@ -255,8 +255,8 @@ static bool too_large(int size, struct incise_error *err)
 	if (size <= most)
 		return false;
 	incise_error_set(err, ENOTSUP,
-			 "picture: a texture of %d texels; the graphics have at most %d: "
-			 "make picture.texture_px of the scene smaller",
+			 "image: a texture of %d texels, but the graphics allow %d; "
+			 "reduce picture.texture_px of the scene",
 			 size, most);
 	return true;
 }
@@ -466,7 +466,7 @@ static struct texture *texture_new(const struct incise_draw_setup *setup,
 
 out_memory:
 	texture_free(texture);
-	incise_error_set(err, ENOMEM, "picture: no memory for a texture of %d texels",
+	incise_error_set(err, ENOMEM, "image: no memory for a texture of %d texels",
 			 size);
 	return NULL;
 }
@@ -518,9 +518,9 @@ static int failed(struct incise_error *err)
 	if (why == GL_NO_ERROR)
 		return 0;
 	if (why == GL_OUT_OF_MEMORY)
-		return incise_error_set(err, ENOMEM, "picture: no memory for graphics");
+		return incise_error_set(err, ENOMEM, "image: no memory for graphics");
 	return incise_error_set(
-		err, EIO, "picture: the graphics failed (OpenGL 0x%x): start again", why);
+		err, EIO, "image: the graphics failed (OpenGL 0x%x); start again", why);
 }
 
 static int put_instruments(struct incise_draw *draw, struct incise_error *err)
@@ -534,7 +534,7 @@ static int put_instruments(struct incise_draw *draw, struct incise_error *err)
 		rc = instrument_tube(draw->tool.tube_mm, &mesh);
 	}
 	if (rc)
-		return incise_error_set(err, -rc, "picture: no memory");
+		return incise_error_set(err, -rc, "image: no memory");
 	solid_instrument(&draw->tube, &mesh);
 	instrument_free(&mesh);
 	return 0;
@@ -565,8 +565,7 @@ static bool has_library(struct incise_error *err)
 		if (dlopen(names[i], RTLD_LAZY))
 			return true;
 	incise_error_set(err, ENOTSUP,
-			 "picture: there is no libOpenGL.so.0 and no libGL.so.1: "
-			 "install libgl1");
+			 "image: no libOpenGL.so.0 and no libGL.so.1; install libgl1");
 	return false;
 }
 
@@ -594,12 +593,12 @@ struct incise_draw *incise_draw_new(const struct incise_draw_setup *setup,
 		return NULL;
 	draw = calloc(1, sizeof(*draw));
 	if (!draw) {
-		incise_error_set(err, ENOMEM, "picture: no memory");
+		incise_error_set(err, ENOMEM, "image: no memory");
 		return NULL;
 	}
 	if (epoxy_gl_version() < 33) {
 		incise_error_set(err, ENOTSUP,
-				 "picture: OpenGL %d.%d; 3.3 is needed: install "
+				 "image: OpenGL %d.%d, but 3.3 is required; install "
 				 "libgl1-mesa-dri, or run with LIBGL_ALWAYS_SOFTWARE=1",
 				 epoxy_gl_version() / 10, epoxy_gl_version() % 10);
 		goto out_free;
@@ -826,7 +825,7 @@ int incise_draw_frame(struct incise_draw *draw, const struct incise_view_camera 
 	int rc;
 
 	if (!view_camera_limit(&held))
-		return incise_error_set(err, EINVAL, "picture: the camera is nowhere");
+		return incise_error_set(err, EINVAL, "image: the camera has no position");
 	rc = target_size(&draw->target, width, height, err);
 	if (rc)
 		return rc;

@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include "egl.h"
 
-#define HINT "install libegl1 and libgl1-mesa-dri, which draw without a screen"
+#define HINT "install libegl1 and libgl1-mesa-dri to draw without a screen"
 
 struct incise_egl {
 	EGLDisplay display;
@@ -94,7 +94,7 @@ struct incise_egl *incise_egl_new(struct incise_error *err)
 	EGLint why;
 
 	if (!egl) {
-		incise_error_set(err, ENOMEM, "picture: no memory");
+		incise_error_set(err, ENOMEM, "image: no memory");
 		return NULL;
 	}
 	egl->surface = EGL_NO_SURFACE;
@@ -108,7 +108,7 @@ struct incise_egl *incise_egl_new(struct incise_error *err)
 	shut(egl);
 	free(egl);
 	incise_error_set(err, ENOTSUP,
-			 "picture: EGL gives no OpenGL 3.3 here (error 0x%x): " HINT,
+			 "image: EGL has no OpenGL 3.3 here (error 0x%x); " HINT,
 			 (unsigned)why);
 	return NULL;
 }
@@ -120,7 +120,7 @@ int incise_egl_current(struct incise_egl *egl, struct incise_error *err)
 	    eglMakeCurrent(egl->display, egl->surface, egl->surface, egl->context))
 		return 0;
 	return incise_error_set(err, EIO,
-				"picture: the graphics context is lost (EGL 0x%x): "
+				"image: the graphics context was lost (EGL 0x%x); "
 				"start again",
 				(unsigned)eglGetError());
 }

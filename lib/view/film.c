@@ -77,8 +77,8 @@ struct incise_film *incise_film_new(const char *path, int width, int height, int
 	    rate_hz > 1000) {
 		incise_error_set(
 			err, EINVAL,
-			"%.300s: a film of %d x %d at %d Hz: expected even sides "
-			"from 16 to %d and 1 to 1000 Hz",
+			"%.300s: film of %d x %d at %d Hz: expected even sides from 16 "
+			"to %d and 1 to 1000 Hz",
 			path, width, height, rate_hz, INCISE_FILM_SIDE_MAX);
 		return NULL;
 	}

@@ -61,7 +61,7 @@ struct incise_injury *incise_injury_new(const struct incise_scene_picture *pictu
 
 	if (map->size != incise_canvas_size(canvas)) {
 		incise_error_set(err, EINVAL,
-				 "view: a chart of %d texels on a canvas of %d",
+				 "view: a UV map of %d texels on a canvas of %d",
 				 map->size, incise_canvas_size(canvas));
 		return NULL;
 	}

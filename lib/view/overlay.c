@@ -314,7 +314,7 @@ struct incise_overlay *incise_overlay_new(struct incise_error *err)
 	struct incise_overlay *overlay = calloc(1, sizeof(*overlay));
 
 	if (!overlay)
-		incise_error_set(err, ENOMEM, "picture: no memory");
+		incise_error_set(err, ENOMEM, "image: no memory");
 	else
 		overlay->force.last = overlay->depth.last = INT64_MIN;
 	return overlay;

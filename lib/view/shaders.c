@@ -197,9 +197,8 @@ static unsigned compile(const char *what, GLenum kind, const char *text,
 		return shader;
 	glGetShaderInfoLog(shader, sizeof(log), NULL, log);
 	glDeleteShader(shader);
-	incise_error_set(err, EIO,
-			 "picture: %s: the graphics driver refuses a shader: %s", what,
-			 log);
+	incise_error_set(err, EIO, "image: %s: the graphics driver rejects a shader: %s",
+			 what, log);
 	return 0;
 }
 
@@ -217,9 +216,8 @@ static unsigned link(const char *what, unsigned vs, unsigned fs, struct incise_e
 		return program;
 	glGetProgramInfoLog(program, sizeof(log), NULL, log);
 	glDeleteProgram(program);
-	incise_error_set(err, EIO,
-			 "picture: %s: the graphics driver refuses a program: %s", what,
-			 log);
+	incise_error_set(err, EIO, "image: %s: the graphics driver rejects a program: %s",
+			 what, log);
 	return 0;
 }
 

@@ -542,7 +542,7 @@ struct uv_map *uv_map_new(const struct incise_surface *surface,
 			return map;
 		uv_map_free(map);
 	}
-	incise_error_set(err, ENOMEM, "no memory for the picture's surface");
+	incise_error_set(err, ENOMEM, "no memory for the image's surface");
 	return NULL;
 }
 

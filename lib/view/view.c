@@ -89,13 +89,13 @@ static int make_texture(struct incise_view *view, uint8_t **normals,
 	*normals = malloc(texels * 3);
 	if (!view->base || !*normals)
 		return incise_error_set(err, ENOMEM,
-					"picture: no memory for %d² texels: make "
-					"picture.texture_px of the scene smaller",
+					"image: no memory for %d² texels; reduce "
+					"picture.texture_px of the scene",
 					view->map->size);
 	rc = incise_skin_paint(view->map, view->picture.skin,
 			       (uint64_t)view->picture.seed, view->base, *normals);
 	if (rc)
-		return incise_error_set(err, -rc, "picture: no memory for the skin");
+		return incise_error_set(err, -rc, "image: no memory for the skin");
 	view->canvas = incise_canvas_new(view->map->size, view->base, err);
 	if (!view->canvas)
 		return -errno;
@@ -173,13 +173,13 @@ struct incise_view *incise_view_new(const struct incise_scene *scene,
 	if (setup->width < 16 || setup->height < 16 ||
 	    setup->width > INCISE_VIEW_SIDE_MAX || setup->height > INCISE_VIEW_SIDE_MAX) {
 		incise_error_set(err, EINVAL,
-				 "picture: %d × %d pixels; expected 16 to %d each",
+				 "image: %d × %d pixels; expected 16 to %d each",
 				 setup->width, setup->height, INCISE_VIEW_SIDE_MAX);
 		return NULL;
 	}
 	view = calloc(1, sizeof(*view));
 	if (!view) {
-		incise_error_set(err, ENOMEM, "picture: no memory");
+		incise_error_set(err, ENOMEM, "image: no memory");
 		return NULL;
 	}
 	view->surface = incise_plan_surface(plan);
@@ -359,10 +359,10 @@ void incise_view_panel(struct incise_view *view, bool panel, bool keys)
 int incise_view_keys(struct incise_view *view, const char *const *lines, int n)
 {
 	static const char *const own[] = {
-		"right button\tturn the camera (or arrows)",
-		"middle button\tmove it",
+		"right button\trotate the camera (or arrows)",
+		"middle button\tmove the camera",
 		"wheel\tnearer, farther (or page up, down)",
-		"Home\tthe camera as at first",
+		"Home\treset the camera",
 		"F1, h\tthis help",
 		"g\tgraphs",
 	};

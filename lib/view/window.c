@@ -49,8 +49,8 @@ static int open_window(struct incise_window *window, const char *title, int widt
 	if (!window->video || !is_seen(SDL_GetCurrentVideoDriver()))
 		return incise_error_set(
 			err, ENODEV,
-			"picture: no screen for a window (%s): set DISPLAY "
-			"or WAYLAND_DISPLAY, or draw without a window",
+			"image: no screen for a window (%s); set DISPLAY or "
+			"WAYLAND_DISPLAY, or draw without a window",
 			window->video ? "SDL finds none" : SDL_GetError());
 	SDL_GL_SetAttribute(SDL_GL_CONTEXT_MAJOR_VERSION, 3);
 	SDL_GL_SetAttribute(SDL_GL_CONTEXT_MINOR_VERSION, 3);
@@ -66,9 +66,8 @@ static int open_window(struct incise_window *window, const char *title, int widt
 	if (!window->context)
 		return incise_error_set(
 			err, ENOTSUP,
-			"picture: no window with OpenGL 3.3 (%s): install "
-			"libgl1 and libgl1-mesa-dri, or run with "
-			"LIBGL_ALWAYS_SOFTWARE=1",
+			"image: no window with OpenGL 3.3 (%s); install libgl1 and "
+			"libgl1-mesa-dri, or run with LIBGL_ALWAYS_SOFTWARE=1",
 			SDL_GetError());
 	/* In step with the screen; late frames at once, if supported. */
 	if (SDL_GL_SetSwapInterval(-1))
@@ -83,7 +82,7 @@ struct incise_window *incise_window_new(const char *title, int width, int height
 	int rc;
 
 	if (!window) {
-		incise_error_set(err, ENOMEM, "picture: no memory");
+		incise_error_set(err, ENOMEM, "image: no memory");
 		return NULL;
 	}
 	set_hints();
@@ -121,7 +120,7 @@ int incise_window_current(struct incise_window *window, struct incise_error *err
 	if (!SDL_GL_MakeCurrent(window->window, window->context))
 		return 0;
 	return incise_error_set(
-		err, EIO, "picture: the window's graphics are lost (%s): start again",
+		err, EIO, "image: the window's graphics were lost (%s); start again",
 		SDL_GetError());
 }
 

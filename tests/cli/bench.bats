@@ -196,7 +196,7 @@ setup() {
 	[ -z "$(row r.json force_table_256 ns)" ]
 	[ -z "$(row r.json force_table_256 max_error_N)" ]
 	run -0 --separate-stderr incise bench precision --quick
-	[[ "$output" == *"force_table_256: fixed point: a force table of so many cells"* ]]
+	[[ "$output" == *"force_table_256: fixed point: a force table with so many cells"* ]]
 }
 
 @test "bench precision has fuzzylite as a row, or says why not" {

@@ -200,7 +200,7 @@ report_of() {
 	export INCISE_MODULE_PATH=$PWD/modules
 	run --separate-stderr incise bench all --quick --report r --only precision,vision
 	failed_with "1 of 2 benchmarks failed" r/report.md
-	grep -qE "^- vision: failed: vision: there is no module vision_opencv\.so" r/report.md
+	grep -qE "^- vision: failed: vision: no module vision_opencv\.so" r/report.md
 	grep -qE "see “Failures and omissions”" r/report.md
 	[ "$(key r/report.json 'failed[0]')" = vision ]
 	[ ! -e r/data/vision.json ]

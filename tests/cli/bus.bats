@@ -74,7 +74,7 @@ setup_file() {
 		static int counter(struct incise_stepper *s, int i, struct incise_stepper_counter *counter)
 		{
 			const struct incise_stepper_counter counters[] = {
-				{"setpoints", "set-points sent", 1234, false},
+				{"setpoints", "setpoints sent", 1234, false},
 				{"sync_late", "SYNCs sent late", strstr(name, "sound") ? 0 : 3, true},
 				{"tpdo_missing", "answers missing", 0, true},
 				{"emcy", "emergencies", strstr(name, "sound") ? 0 : 1, true}};
@@ -194,10 +194,10 @@ rig() { # ARGUMENTS
 
 @test "info of a bus whose backend is not there, or cannot look" {
 	run --separate-stderr incise info nosuch:can0
-	failed_with 'nosuch:can0: there is no backend "nosuch"; those there are: sim, kernel, bench'
+	failed_with 'nosuch:can0: no such backend "nosuch"; there are: sim, kernel, bench'
 	for bus in sim: kernel:/dev/incise-stepper0; do
 		run --separate-stderr incise info $bus
-		failed_with "$bus: this backend cannot look for devices"
+		failed_with "$bus: this backend cannot search for devices"
 	done
 	run --separate-stderr incise info bench:bus0 --plot p
 	bad_usage "--plot"
@@ -222,7 +222,7 @@ rig() { # ARGUMENTS
 @test "status shows what is counted" {
 	rig bus0
 	run -0 --separate-stderr incise stepper status
-	[[ "$output" == *$'\ncounted    set-points sent: 1234\n           SYNCs sent late: 3\n           answers missing: 0\n           emergencies: 1' ]]
+	[[ "$output" == *$'\ncounted    setpoints sent: 1234\n           SYNCs sent late: 3\n           answers missing: 0\n           emergencies: 1' ]]
 	[[ "$output" == *"faults     none"* ]]
 	[[ "$output" != *cause* ]]
 	incise stepper status --json >s.json
@@ -265,18 +265,18 @@ rig() { # ARGUMENTS
 	incise stepper status --json >s.json
 	[[ "$(key s.json cause)" == "alarm of the power stage: "* ]]
 	run --separate-stderr incise stepper move 1
-	failed_with "alarm of the power stage: " "; the drive is not heard any more"
+	failed_with "alarm of the power stage: " "; the drive does not answer any more"
 }
 
 @test "haptic ends with the drive's own cause, and reports what went wrong on the way" {
 	rig failing
 	run --separate-stderr incise haptic liver.scene --no-rt --duration 10s
 	[ "$status" -eq 1 ]
-	[[ "${stderr_lines[-1]}" == "incise haptic: liver.scene: a device failed at tick 21: over-voltage (3210h): see the supply, then clear; the force was taken away" ]]
+	[[ "${stderr_lines[-1]}" == "incise haptic: liver.scene: a device failed at tick 21: over-voltage (3210h): see the supply, then clear; the force was removed" ]]
 	[ "${lines[-1]}" = "actuator   SYNCs sent late: 3, emergencies: 1" ]
 	rig "mute, failing"
 	run --separate-stderr incise haptic liver.scene --no-rt --duration 10s
-	[[ "${stderr_lines[-1]}" == *" tick 21: alarm of the power stage: see what it says, "* ]]
+	[[ "${stderr_lines[-1]}" == *" tick 21: alarm of the power stage: see its display, "* ]]
 }
 
 @test "haptic says nothing of a bus that is sound, but in JSON" {

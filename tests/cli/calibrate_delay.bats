@@ -43,7 +43,7 @@ setup() {
 
 @test "what cannot tell a delay is refused, and nothing is changed" {
 	run --separate-stderr incise calibrate delay --rig sim:clock=simulated --duration 20s </dev/null
-	failed_with "too little alike"
+	failed_with "correlate too little"
 	run --separate-stderr incise calibrate delay --rig $rig,tracker_latency_ms=250 \
 		--max-delay 50 --duration 12s -c late.conf </dev/null
 	[ "$status" -eq 0 ] # the device says itself that it is late

@@ -149,7 +149,7 @@ pairs() {
 	refused "span" line --from one.csv
 	pairs | sed 's/^\([0-9]\)/-\1/' >sign.csv
 	refused "grows with the depth" line --from sign.csv
-	refused "no scale of a camera" two-point --length 400mm --pixels 47.5
+	refused "not a plausible scale" two-point --length 400mm --pixels 47.5
 	printf 'length_px\nnone\n' >text.csv
 	refused "text.csv" two-point --from text.csv
 	refused "absent.png" board --from absent.png
@@ -247,7 +247,7 @@ pairs() {
 	need_board
 	cp "$BATS_FILE_TMPDIR"/board/view*.pgm .
 	run --separate-stderr incise calibrate depth board --from view1.pgm view2.pgm
-	failed_with "2 views of the board: give 3"
+	failed_with "2 views of the board: expected 3"
 	run --separate-stderr incise calibrate depth board --from view1.pgm view1.pgm view1.pgm
 	failed_with "tilt the board"
 	run --separate-stderr incise calibrate depth board --from view1.pgm view2.pgm view3.pgm --board 8x7
@@ -256,7 +256,7 @@ pairs() {
 	bad_usage "--board: expected inner corners such as 9x6"
 	export INCISE_MODULE_PATH=$PWD
 	run --separate-stderr incise calibrate depth board --from view1.pgm
-	failed_with "there is no module board_opencv.so in $PWD"
+	failed_with "no module board_opencv.so in $PWD"
 }
 
 @test "wrong usage is told" {

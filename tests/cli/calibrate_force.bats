@@ -89,7 +89,7 @@ made_weights() {
 	cp calibration.conf before
 	made_weights "if (i % 7 == 3) r += 400 + 50 * s" >w.csv
 	run --separate-stderr incise calibrate force --from w.csv --report r --overwrite
-	failed_with "refused" "of 28 pairs lie far from the line" "calibration.conf stays as it was"
+	failed_with "refused" "of 28 pairs are outliers" "calibration.conf stays as it was"
 	cmp calibration.conf before
 	grep -q "^refused: " r/report.txt
 	[ "$(grep -c 'outlier$' r/report.txt)" = 4 ]
@@ -127,10 +127,10 @@ made_weights() {
 		failed_with "refused" "$said"
 	done <<-END
 		swapped the columns of loads and readings are swapped
-		one one repeated weight
-		few 5 pairs of 3 loads are the least
+		one have the same load
+		few at least 5 pairs of 3 loads
 		kg the masses seem to be in kg
-		falls the reading does not grow with the load
+		falls the reading does not increase with the load
 	END
 	[ ! -e calibration.conf ]
 }

@@ -136,7 +136,7 @@ made_points() {
 	END
 	made_points '' | awk -F, 'NR < 70' >p.csv
 	stepper --from p.csv
-	failed_with "two of each way"
+	failed_with "two in each direction"
 	made_points '' | cut -d, -f 1,2,3 >p.csv
 	stepper --from p.csv
 	failed_with "force_N"

@@ -74,7 +74,7 @@ within() {
 
 @test "what cannot tell the tip is refused, and nothing is changed" {
 	run --separate-stderr incise calibrate tip --rig "$rig,cone_deg=40" --duration 10s </dev/null
-	failed_with "a cone of" "60 are needed"
+	failed_with "a cone of" "at least 60 are required"
 	run --separate-stderr incise calibrate tip --rig sim:clock=simulated --duration 10s </dev/null
 	failed_with "one axis only"
 	incise calibrate tip --rig $rig --duration 10s --keep p.csv --dry-run </dev/null

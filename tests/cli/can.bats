@@ -83,7 +83,7 @@ begin() {
 		kill -9 "$pid" 2>/dev/null || :
 		wait "$pid" || :
 		pid=
-		grep -q "nobody answers at node\|no heartbeat of it\|no status (TPDO1)" err || break
+		grep -q "no answer from node\|no heartbeat from it\|no status (TPDO1)" err || break
 		echo "# the drive was too late, try $try: $(cat err)"
 	done
 	complain "the drive was not enabled: $(cat out err)"
@@ -136,7 +136,7 @@ ended() {
 	[ "$(drive_value bitrate)" = "$rate" ] || complain "$drive_line"
 	write_rig
 	run -1 --separate-stderr incise stepper status --rig rig.conf
-	[[ "$stderr" == *"is given 500000 bit/s behind its @, and bitrate is 1000000"* ]] ||
+	[[ "$stderr" == *"has 500000 bit/s after its @, but bitrate is 1000000"* ]] ||
 		complain "$stderr"
 	sed -i 's/bitrate = 1000000;//' rig.conf
 	run -0 --separate-stderr incise stepper status --rig rig.conf
@@ -191,7 +191,7 @@ ended() {
 			for try in 1 2 3; do
 				code=0
 				"${words[@]}" >out 2>err </dev/null 3>&- 7>&- || code=$?
-				grep -q "nobody answers at node" err || break
+				grep -q "no answer from node" err || break
 			done
 			[ "$code" -eq 0 ] || failed+="$document: $command: $code $(cat err);"
 			n=$((n + 1))
@@ -486,7 +486,7 @@ frozen() {
 		drive_tell watch off
 		# shellcheck disable=SC2086 # words
 		frozen stepper $verb --rig rig.conf
-		ended "this program stood still for" "longer than deadman_ms"
+		ended "this program was stopped for" "longer than deadman_ms"
 		drive_is "switch-on disabled"
 		# A quick stop, and nothing else.
 		holds "$(drive_value shaft) - $before < 12800 && $before - $(drive_value shaft) < 12800"
@@ -500,7 +500,7 @@ frozen() {
 		rig --homed
 		drive_tell watch $watch
 		frozen haptic "$root/scenes/liver.scene" --no-rt --rig rig.conf --duration 3s
-		ended "this program stood still for"
+		ended "this program was stopped for"
 		drive_end
 	done
 }

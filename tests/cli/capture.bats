@@ -224,7 +224,7 @@ until_it_runs() {
 
 @test "capture with the blade in the tissue fails and leaves nothing" {
 	run --separate-stderr incise capture -o a.rec --rig $quick,cut_s=1,pause_s=0.1
-	failed_with "hold the tool free for the first 0.5 s"
+	failed_with "keep the tool free of contact for the first 0.5 s"
 	[ -z "$(ls)" ]
 }
 
@@ -314,7 +314,7 @@ small_disk() {
 	[ "$small" -lt 2000000 ]
 	head -c 24m /dev/zero >disk/more
 	run --separate-stderr incise capture -o disk/b.rec --rig $quick --duration 1s
-	failed_with "are kept back to end a recording in"
+	failed_with "are reserved to end a recording"
 	[ ! -e disk/b.rec.part ]
 }
 
@@ -389,7 +389,7 @@ small_disk() {
 		wait $pid && false
 		cat err
 		case $how in
-		rm) grep -q "rm.rec.part: was removed by another program .*nothing is left" err ;;
+		rm) grep -q "rm.rec.part: was removed by another program .*no data remain" err ;;
 		mv) grep -q "mv.rec.part: was moved by another program" err
 			incise info mv-away >/dev/null ;;
 		esac

@@ -100,7 +100,7 @@ END
 @test "a camera that is not there, and a wish that is none" {
 	printf 'clock = "simulated"; tracker = "sim:"; force = "sim:";\n' >rig.conf
 	run -1 --separate-stderr incise capture -o a.rec --duration 1s --camera frames
-	[[ "$stderr" == *"camera: not named, but needed"* ]]
+	[[ "$stderr" == *"camera: missing, but required"* ]]
 	incise capture -o a.rec --duration 600ms
 	for wrong in "--camera on" "--trigger 0N" "--trigger knob" "--trigger -1N"; do
 		# shellcheck disable=SC2086

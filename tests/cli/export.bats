@@ -113,7 +113,7 @@ well_formed() {
 	incise export liver.rec -a 12x10 --min-count 2000 -o a.csv
 	awk -F, 'NR > 1 && $5 < 2000 { bad = 1 } END { exit bad }' a.csv
 	run --separate-stderr incise export liver.rec -a 12x10 --min-count 999999999 -o b.csv
-	failed_with "no bin holds 999999999 samples"
+	failed_with "no bin has 999999999 samples"
 	[ ! -e b.csv ]
 }
 
@@ -153,7 +153,7 @@ well_formed() {
 @test "export replaces an old dataset, and leaves it where it fails" {
 	echo old >a.csv
 	run --separate-stderr incise export none.rec -o a.csv --overwrite
-	failed_with "none.rec: there is no such recording"
+	failed_with "none.rec: no such recording"
 	[ "$(cat a.csv)" = old ]
 	incise export liver.rec -a 3x3 -o a.csv --overwrite
 	[ "$(wc -l <a.csv)" -gt 3 ]
@@ -245,7 +245,7 @@ well_formed() {
 @test "export as HDF5 needs a file and the module" {
 	mkdir none
 	INCISE_MODULE_PATH=$PWD/none run --separate-stderr incise export liver.rec -o a.h5
-	failed_with "there is no module export_hdf5.so"
+	failed_with "no module export_hdf5.so"
 	[ ! -e a.h5 ]
 	[ -e "$INCISE_BUILD/lib/incise/export_hdf5.so" ] || skip "the module of HDF5 is not built"
 	ln -s /dev/null null.h5
@@ -338,7 +338,7 @@ read_mcap() {
 	for arguments in "liver.rec liver.rec" "liver.rec --rate 100" "liver.rec -a 3x3"; do
 		# shellcheck disable=SC2086
 		run --separate-stderr incise export $arguments -o a.mcap
-		failed_with "MCAP takes one recording as it is"
+		failed_with "MCAP exports one whole recording"
 		[ ! -e a.mcap ]
 	done
 	ln -s /dev/full full.mcap

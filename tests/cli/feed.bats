@@ -66,7 +66,7 @@ setup() {
 	echo hello >none.plan
 	for file in bit short none; do
 		run --separate-stderr incise info $file.plan
-		failed_with "$file.plan: not a .plan file, or a damaged one"
+		failed_with "$file.plan: not a .plan file, or damaged"
 	done
 	run --separate-stderr incise info other.plan
 	failed_with "other.plan: a .plan file of another version"
@@ -89,7 +89,7 @@ setup() {
 
 @test "without a stepper of the kernel module nothing is fed, and nothing is left" {
 	run --separate-stderr incise feed wall --rig sim: --state "$PWD/wall.state"
-	failed_with "it runs no plan"
+	failed_with "it cannot run plans"
 	run --separate-stderr incise haptic wall --in-kernel --rig sim: --state "$PWD/wall.state"
 	[ "$status" -eq 1 ]
 	[[ "$stderr" == *"incise feed ended before it fed" ]]

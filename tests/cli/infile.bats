@@ -64,7 +64,7 @@ readers() {
 		# shellcheck disable=SC2086
 		run --separate-stderr incise_in_bounds ${command//FILE/pipe.$suffix} </dev/null
 		refused "pipe.$suffix: " || complain "$command" || return
-		[[ "$stderr" == *"nobody writes to this pipe"* || "$stderr" == *"not a regular file"* ]] ||
+		[[ "$stderr" == *"no program writes to this pipe"* || "$stderr" == *"not a regular file"* ]] ||
 			complain "$command: $stderr" || return
 	done < <(readers)
 }

@@ -174,7 +174,7 @@ maps() {
 	mkdir modules
 	export INCISE_MODULE_PATH=$PWD/modules
 	run --separate-stderr incise bench vision --quick
-	failed_with "vision: there is no module vision_opencv.so in $PWD/modules" \
+	failed_with "vision: no module vision_opencv.so in $PWD/modules" \
 		libopencv-imgproc-dev
 	# one that is none, and one of another kind
 	echo none >modules/vision_opencv.so
@@ -182,7 +182,7 @@ maps() {
 	failed_with "vision: the module cannot be loaded"
 	cp "$INCISE_BUILD/lib/incise/tracker_tty.so" modules/vision_opencv.so
 	run --separate-stderr incise bench vision --quick
-	failed_with "holds another backend"
+	failed_with "contains another backend"
 }
 
 @test "a module exports its backend and nothing else of its own" {

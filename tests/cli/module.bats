@@ -40,7 +40,7 @@ setup() {
 	rig "mine:pressed"
 	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --duration 10s
 	[ "$status" -eq 1 ]
-	[[ "${stderr_lines[-1]}" == "incise haptic: liver.scene: a device failed at tick 21: e-stop: release it, then clear; the force was taken away" ]]
+	[[ "${stderr_lines[-1]}" == "incise haptic: liver.scene: a device failed at tick 21: e-stop: release it, then clear; the force was removed" ]]
 	[[ "$output" == "21 ticks"* ]]
 }
 
@@ -56,7 +56,7 @@ setup() {
 	touch modules/tracker_other.so modules/stepper_.so modules/stepper_x.txt
 	rig other:1
 	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s
-	failed_with 'rig.conf:2: stepper: there is no backend "other"' 'those there are: sim, kernel, mine'
+	failed_with 'rig.conf:2: stepper: no such backend "other"' 'there are: sim, kernel, mine'
 	[[ "$stderr" == *mine ]]
 }
 
@@ -65,11 +65,11 @@ setup() {
 	rig mine:1
 	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s
 	[ "$status" -eq 1 ]
-	[[ "${stderr_lines[-1]}" == *"stepper_mine.so: is made for interface 99, this is "*"; build it again" ]]
+	[[ "${stderr_lines[-1]}" == *"stepper_mine.so: built for interface 99, this is "*"; build it again" ]]
 	make_module stepper_mine other INCISE_BACKEND_ABI
 	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s
 	[ "$status" -eq 1 ]
-	[[ "${stderr_lines[-1]}" == *"holds another backend than its name says"* ]]
+	[[ "${stderr_lines[-1]}" == *"contains another backend than its name says"* ]]
 	echo 'int incise_nothing;' >empty.c
 	$CC -shared -fPIC -o modules/stepper_mine.so empty.c
 	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s
@@ -83,7 +83,7 @@ setup() {
 	mkdir -p modules && rm -f modules/stepper_mine.so && mkfifo modules/stepper_mine.so
 	rig mine:1
 	run --separate-stderr timeout 60 incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s
-	failed_with 'there is no backend "mine"'
+	failed_with 'no such backend "mine"'
 }
 
 @test "the modules that are built are found beside the library" {
@@ -92,7 +92,7 @@ setup() {
 	rig gpio:no-such-chip
 	sed -i 's/lead_mm/lines = { step = 1; dir = 2; }; &/' rig.conf
 	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s
-	failed_with "rig.conf:2: stepper: gpio chip no-such-chip: there is no such chip" gpiodetect
+	failed_with "rig.conf:2: stepper: gpio chip no-such-chip: no such chip" gpiodetect
 }
 
 # A copy of a file that needs another version of a library, which there is not.

@@ -98,8 +98,8 @@ until_it_runs() {
 	pid=
 	[ "$status" -eq 1 ]
 	[ "$(key a.session end.kind)" = fault ]
-	[[ "$(key a.session end.why)" == *"came a period late"* ]]
-	grep -q "came a period late" err
+	[[ "$(key a.session end.why)" == *"were a period late"* ]]
+	grep -q "were a period late" err
 }
 
 @test "a session is of one scene: it is not read again" {

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # Captures from real sources, as a user meets them: a FASTRAK that answers behind a pseudo
-# terminal (tests/polhemus), beside the virtual force channel; and sources that are absent.
+# terminal (tests/polhemus), beside the simulated force channel; and sources that are absent.
 # Those that need a kernel with their drivers are in tests/vm/guest.
 
 load cli
@@ -70,7 +70,7 @@ ask() {
 	grep -q "^ *family *FASTRAK" told
 	grep -q "^ *firmware " told
 	run --separate-stderr incise info "tty:$PWD/none:115200"
-	failed_with "$PWD/none" "is the adapter plugged in?"
+	failed_with "$PWD/none" "plug in the adapter"
 	run --separate-stderr incise info v4l2:/dev/video99
 	failed_with "v4l2:/dev/video99: nobody answers" "cable"
 	run --separate-stderr incise info nonsense:x
@@ -137,7 +137,7 @@ ask() {
 	plug_in --stations 12
 	echo 'tracker_setup = { stations = [1, 2]; };' >>rig.conf
 	run --separate-stderr incise capture -o a.rec --duration 1s
-	failed_with "a.rec: a recording holds one sensor" "tracker_setup.stations"
+	failed_with "a.rec: a recording has one sensor" "tracker_setup.stations"
 	[ ! -e a.rec ]
 	[ ! -e a.rec.part ]
 	# either of them does
@@ -156,8 +156,8 @@ ask() {
 		[ ! -e a.rec ]
 		[ ! -e a.rec.part ]
 	done <<-END
-		tracker = "usb:0f44:9999"|is no tracker of Polhemus that is known
-		tracker = "tty:$PWD/nothing:115200"|is not there: is the adapter plugged in?
+		tracker = "usb:0f44:9999"|is not a known Polhemus tracker
+		tracker = "tty:$PWD/nothing:115200"|no such device $PWD/nothing; plug in the adapter
 		tracker = "tty:/dev/null:115200"|/dev/null
 		force = "iio:no-such-converter"|driver of your converter
 		force = "comedi:/dev/comedi77"|/dev/comedi77: No such file
@@ -192,7 +192,7 @@ in_the_tissue() {
 	echo "flag x" >&9
 	run -0 --separate-stderr incise haptic a.scene --rig felt.conf --no-rt --duration 1s --json
 	echo "$output" >report.json
-	[[ "$stderr" == *"the tracker flags poses 'x': the sensor is outside of its motion box; they are not used"* ]]
+	[[ "$stderr" == *"the tracker flags poses 'x': the sensor is outside its motion box; they are not used"* ]]
 	holds "$(key report.json poses.taken) > 0"
 	[ "$(key report.json poses.unusable)" = "$(key report.json poses.taken)" ]
 	[ "$(key report.json poses.flags.x)" = "$(key report.json poses.taken)" ]
@@ -201,7 +201,7 @@ in_the_tissue() {
 	incise haptic a.scene --rig felt.conf --no-rt --duration 500ms >text
 	grep -Eq "^poses +([0-9]+) of \1 poses were not used: \1 'x' \(" text
 	run -1 --separate-stderr incise capture -o a.rec --duration 2s
-	[[ "$stderr" == *"poses were not used: "*" 'x' (the sensor is outside of its motion box)"* ]]
+	[[ "$stderr" == *"poses were not used: "*" 'x' (the sensor is outside its motion box)"* ]]
 	[[ "$stderr" == *"a.rec: no depth: the tracker flagged every pose; see Tracker flags in rig.conf(5)" ]]
 	[ "$(ask a.rec "SELECT count(*) > 100 AND min(status) = 'x' AND max(status) = 'x'
 		FROM tracker")" = 1 ]
@@ -214,10 +214,10 @@ in_the_tissue() {
 	echo freeze >&9
 	run -0 --separate-stderr incise haptic a.scene --rig felt.conf --no-rt --duration 2s --json
 	echo "$output" >report.json
-	[[ "$stderr" == *"the tracker flags poses '=': the same pose again and again"*"they are not used"* ]]
+	[[ "$stderr" == *"the tracker flags poses '=': the same pose for too long"*"they are not used"* ]]
 	[ "$(key report.json 'poses.flags."="')" = "$(key report.json poses.unusable)" ]
 	run -0 --separate-stderr incise capture -o a.rec --duration 2s
-	[[ "$stderr" == *"a.rec: "*" poses were not used: "*" '=' (the same pose again and again"* ]]
+	[[ "$stderr" == *"a.rec: "*" poses were not used: "*" '=' (the same pose for too long"* ]]
 	echo 'tracker_setup = { repeat_ms = 0; };' >>felt.conf
 	run -0 --separate-stderr incise haptic a.scene --rig felt.conf --no-rt --duration 1s --json
 	echo "$output" >report.json
@@ -236,6 +236,6 @@ in_the_tissue() {
 	holds "$(key report.json poses.flags.u) > 0"
 	holds "$(key report.json contact) > 0"
 	run -0 --separate-stderr incise capture -o a.rec --duration 2s
-	[[ "$stderr" == *"a.rec: "*" poses are doubtful: "*" 'u' (outside of its map of the distortion by metal)"* ]]
+	[[ "$stderr" == *"a.rec: "*" poses are doubtful: "*" 'u' (outside its map of the distortion by metal)"* ]]
 	[ "$(ask a.rec "SELECT count(*) > 100 FROM depth")" = 1 ]
 }

@@ -247,7 +247,7 @@ until_ticks() {
 @test "a second loop is refused in a place where one lives" {
 	play neck run
 	run -1 --separate-stderr "$loop" incise/neck.state done
-	[[ "$stderr" == *"another loop runs there, as process $played: stop it"* ]]
+	[[ "$stderr" == *"another loop uses it, process $played; stop it"* ]]
 	incise status neck
 }
 
@@ -424,7 +424,7 @@ until_lines() {
 	"$loop" incise/neck.state done
 	printf '\2' | dd of=incise/neck.state bs=1 seek=8 conv=notrunc 2>/dev/null
 	run --separate-stderr incise status neck
-	failed_with "is a state of version 2.0" "one release"
+	failed_with "a status file of version 2.0" "one release"
 	"$loop" incise/other.state done
 	truncate -s 1000 incise/other.state
 	run --separate-stderr incise status other

@@ -25,7 +25,7 @@ until_it_says() {
 @test "status says where it stands and what its limits are" {
 	run -0 --separate-stderr incise stepper status --rig $quick,travel_mm=15
 	[ -z "$stderr" ]
-	[ "${lines[0]}" = "virtual haptic scalpel: ready at 0.0000 mm (step 0), homed" ]
+	[ "${lines[0]}" = "simulated haptic scalpel: ready at 0.0000 mm (step 0), homed" ]
 	[[ "$output" == *"faults     none"* ]]
 	[[ "$output" == *"limits     0 to 15 mm in steps of 0.625 um, up to 30 mm/s"* ]]
 }
@@ -104,18 +104,18 @@ until_it_says() {
 
 @test "disable and clear" {
 	run -0 --separate-stderr incise stepper disable --rig $quick
-	[[ "$output" == "virtual haptic scalpel: ready at 0.0000 mm, as it is always powered" ]]
+	[[ "$output" == "simulated haptic scalpel: ready at 0.0000 mm, as it is always powered" ]]
 	run -0 --separate-stderr incise stepper clear --rig $quick
-	[ "$output" = "virtual haptic scalpel: there was no fault" ]
+	[ "$output" = "simulated haptic scalpel: there was no fault" ]
 	incise stepper clear --rig $quick --json >c.json
 	[ "$(key c.json faults)" = '[]' ]
 }
 
 @test "what makes no sense on the virtual rig is said in a line" {
 	run --separate-stderr incise stepper jog -2 --rig $quick
-	failed_with "virtual haptic scalpel has no jog" "incise stepper move"
+	failed_with "simulated haptic scalpel has no jog" "incise stepper move"
 	run --separate-stderr incise stepper home --rig $quick
-	failed_with "virtual haptic scalpel cannot be homed"
+	failed_with "simulated haptic scalpel does not support being homed"
 	run --separate-stderr incise stepper jog 31mm/s --rig $quick
 	failed_with "31 mm/s" "30 mm/s"
 }
@@ -190,7 +190,7 @@ until_it_says() {
 		END
 		for command in status clear; do
 			run --separate-stderr timeout 60 incise stepper $command --rig kernel.conf
-			failed_with "is no device"
+			failed_with "not a device"
 		done
 	done
 }
@@ -248,7 +248,7 @@ until_it_says() {
 @test "--axis chooses one of the rig's actuators" {
 	run -0 --separate-stderr incise stepper status --rig $quick,axes=2 --axis 2
 	# it pushes both ways, and rests half way
-	[ "${lines[0]}" = "virtual haptic scalpel, across the blade: ready at 10.0000 mm (step 16000), homed" ]
+	[ "${lines[0]}" = "simulated haptic scalpel, across the blade: ready at 10.0000 mm (step 16000), homed" ]
 	run --separate-stderr incise stepper status --rig $quick,axes=2 --axis 3
 	failed_with "--axis 3: the rig has no such actuator"
 	run -2 --separate-stderr incise stepper status --rig $quick --axis 4

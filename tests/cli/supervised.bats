@@ -143,7 +143,7 @@ ended() {
 	rig mine:slow
 	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --overruns 5 --duration 10s
 	[ "$status" -eq 1 ]
-	[[ "${stderr_lines[-1]}" == *"5 ticks in a row came a period late or more"*"too slow or too busy for 1000 Hz" ]]
+	[[ "${stderr_lines[-1]}" == *"5 ticks in a row were a period late or more"*"too slow or too busy for 1000 Hz" ]]
 	# those, and what the host was late with before
 	overruns=$(sed -n 's/.* skipped in \([0-9]*\) overruns .*/\1/p' <<<"$output")
 	[ "$overruns" -ge 5 ]

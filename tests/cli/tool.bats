@@ -103,7 +103,7 @@ packets() {
 	[[ "$stderr" == "incise tool: neck: no loop of that name has run here: "* ]]
 	serve liver.scene
 	run -1 --separate-stderr incise tool neck tube
-	[ "$stderr" = "incise tool: neck: the scene has only the blade: nothing is inserted: tissue.insertion_N_mm and tissue.spread_N_mm are 0" ]
+	[ "$stderr" = "incise tool: neck: the scene has only the blade: no insertion: tissue.insertion_N_mm and tissue.spread_N_mm are 0" ]
 	run -0 incise tool neck blade
 	mv "$control" moved
 	run -1 --separate-stderr incise tool neck
@@ -274,7 +274,7 @@ at_terminal() {
 	rig=sim:clock=simulated,depth_mm=5,times=3
 	# Two stations share the rate: the shipped scene is too stiff for that, and is refused.
 	run -1 --separate-stderr incise plan neck.scene --rig $rig,tube_s=10
-	[[ "$stderr" == *"felt through a tracker of 60 Hz and 4.2 ms holds "* ]]
+	[[ "$stderr" == *"with a tracker of 60 Hz and 4.2 ms holds "* ]]
 	incise plan neck.scene --rig $rig >/dev/null
 	phases() {
 		incise haptic soft.scene --duration 40s --log - "$@" |

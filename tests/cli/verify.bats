@@ -77,13 +77,13 @@ tampered() {
 	tampered "DELETE FROM force WHERE seq = 12345" \
 		"a.rec: force: 1 missing, number 12345, before 1.2346 s" "force: block 12 is altered"
 	tampered "INSERT INTO force SELECT 30000, t_ns + 100000, code FROM force
-		WHERE seq = 29999" "force: 1 rows behind the end of the ledger"
+		WHERE seq = 29999" "force: 1 rows after the end of the ledger"
 	tampered "DELETE FROM force WHERE seq >= 29000;
 		DELETE FROM ledger WHERE stream = 'force' AND block >= 29" \
-		"the ledger has no end: its last blocks were cut off" "1000 lost"
-	tampered "DELETE FROM ledger" "rows behind the end of the ledger" "has no end"
+		"the ledger has no end: its last blocks were removed" "1000 lost"
+	tampered "DELETE FROM ledger" "rows after the end of the ledger" "has no end"
 	tampered "UPDATE meta SET value = 100.0 WHERE key = 'force_mV_N'" \
-		"a.rec: table meta is altered: its rows or its seal are not what was written"
+		"a.rec: table meta is altered: its rows or its seal differ from those written"
 }
 
 @test "verify holds the pictures of the camera against their rows" {
@@ -131,7 +131,7 @@ tampered() {
 	rm d.rec/camera.mkv
 	run --separate-stderr incise verify d.rec
 	failed_with "d.rec: not what was recorded"
-	[[ "$output" == *"camera.mkv is missing, and $n pictures with it"* ]]
+	[[ "$output" == *"camera.mkv is missing, and $n frames with it"* ]]
 }
 
 @test "verify takes nothing behind the last page of the database" {
@@ -150,7 +150,7 @@ tampered() {
 	incise capture -o c.rec --rig sim:clock=simulated --camera frames --duration 200ms
 	INCISE_MODULE_PATH=$PWD run --separate-stderr incise verify c.rec
 	failed_with "c.rec: not all of it could be verified"
-	[[ "$output" == *"c.rec: camera: the pictures are not verified: "*"no module frames_mkv.so"* ]]
+	[[ "$output" == *"c.rec: camera: the frames are not verified: "*"no module frames_mkv.so"* ]]
 	INCISE_MODULE_PATH=$PWD run -1 --separate-stderr incise verify c.rec --json
 	echo "$output" >report.json
 	[ "$(key report.json unverified)" = 1 ]
@@ -186,20 +186,20 @@ qw REAL NOT NULL, qx REAL NOT NULL, qy REAL NOT NULL, qz REAL NOT NULL, status T
 		qz, status FROM old; DROP TABLE old"
 	incise info a.rec # is still read
 	run --separate-stderr incise verify a.rec
-	failed_with "kept no ledger"
+	failed_with "without a ledger"
 }
 
 @test "a recording of a form that is not known yet is told from a damaged one" {
 	ask a.rec "PRAGMA user_version=3"
 	for verb in verify info export; do
 		run --separate-stderr incise $verb a.rec
-		failed_with "a.rec: made by a newer incise (form 3, this one reads up to 2)"
+		failed_with "a.rec: made by a newer incise (format 3, this version reads up to 2)"
 	done
 }
 
 @test "verify of nothing, and of too much" {
 	run --separate-stderr incise verify none.rec
-	failed_with "none.rec: there is no such recording"
+	failed_with "none.rec: no such recording"
 	run --separate-stderr incise verify
 	bad_usage "missing NAME.rec (recording to check)"
 	run --separate-stderr incise verify a.rec b.rec

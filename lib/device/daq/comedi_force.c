@@ -156,12 +156,12 @@ static int open_device(struct card *card, struct incise_error *err)
 	code = errno ? errno : ENODEV;
 	if (code == EACCES || code == EPERM)
 		return incise_error_set(err, EACCES,
-					"%s: may not open %s; join the group that may "
+					"%s: no permission to open %s; join its group "
 					"(udev/ has the rules), or be root",
 					card->where, card->path);
 	return incise_error_set(err, code,
-				"%s: %s: %s; load the driver of your card, and "
-				"comedi_config where it does not set up itself",
+				"%s: %s: %s; load the driver of your card, and run "
+				"comedi_config if it needs that",
 				card->where, card->path, strerror(code));
 }
 
@@ -175,8 +175,8 @@ static int take_subdevice(struct card *card, int asked, struct incise_error *err
 	if (asked < 0 || asked >= n || !can_stream(card->device, (unsigned int)asked))
 		return incise_error_set(
 			err, EOPNOTSUPP,
-			"%s: %s: subdevice %d is no analog input that samples by "
-			"itself; see `comedi_board_info -v %s`",
+			"%s: %s: subdevice %d is not an analogue input with timed "
+			"sampling; see `comedi_board_info -v %s`",
 			card->where, card->path, asked, card->path);
 	card->subdevice = (unsigned int)asked;
 	flags = comedi_get_subdevice_flags(card->device, card->subdevice);
@@ -229,7 +229,7 @@ static int take_channel(struct card *card, struct incise_error *err)
 	if (!card->bits)
 		return incise_error_set(err, EOPNOTSUPP,
 					"%s: %s: codes up to %u are not those of a "
-					"converter of 1 to 31 bits",
+					"converter of 1 to 31 bits; use another card",
 					card->where, card->path, maxdata);
 	n = comedi_get_n_ranges(card->device, card->subdevice, channel);
 	n = n < RANGES_MAX ? n : RANGES_MAX;
@@ -262,14 +262,13 @@ static int take_rate(struct card *card, struct incise_error *err)
 	if (card->period_ns <= 0)
 		return incise_error_set(
 			err, EOPNOTSUPP,
-			"%s: %s takes no command that samples by a timer; "
-			"use another card",
+			"%s: %s does not support timed sampling; use another card",
 			card->where, card->path);
 	if (fabs(card->period_ns - asked_ns) > asked_ns * TOLERANCE)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: %s does not take %.9g Hz, next to it is %.9g "
-			"Hz; set force_setup.rate_hz",
+			"%s: %s does not support %.9g Hz, the nearest is %.9g Hz; set "
+			"force_setup.rate_hz",
 			card->where, card->path, card->setup.rate_hz,
 			1e9 / card->period_ns);
 	/* A larger buffer than the maximum is refused. */
@@ -515,9 +514,9 @@ static void *run(void *argument)
 	}
 	daq_feed_end(&f->feed, rc,
 		     f->restarts > RESTARTS
-			     ? "its command ends as soon as it begins; see dmesg"
-			     : "no sample comes any more, or none that can be read; see "
-			       "dmesg, and begin again");
+			     ? "its command ends at once; see dmesg"
+			     : "no more valid samples arrive; see dmesg, and start "
+			       "again");
 	return NULL;
 }
 

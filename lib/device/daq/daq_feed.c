@@ -121,7 +121,7 @@ void daq_feed_end(struct daq_feed *feed, int error, const char *what)
 {
 	if (error == -ENODEV)
 		incise_error_set(&feed->cause, ENODEV,
-				 "%s was unplugged; plug it in and begin again",
+				 "%s was unplugged; plug it in and start again",
 				 feed->info.name);
 	else if (error)
 		incise_error_set(&feed->cause, -error, "%s: %s", feed->info.name, what);

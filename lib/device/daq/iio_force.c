@@ -162,10 +162,10 @@ static void *run(void *argument)
 		     got == -ENODEV ? -ENODEV
 		     : got < 0	    ? -EIO
 				    : 0,
-		     got == -ETIME ? "no sample came any more; see that what triggers "
-				     "it runs, and begin again"
-				   : "its buffer cannot be read any more; see dmesg, and "
-				     "begin again");
+		     got == -ETIME ? "no more samples arrived; check that its trigger "
+				     "runs, and start again"
+				   : "its buffer cannot be read any more; see dmesg, "
+				     "and start again");
 	return NULL;
 }
 
@@ -199,8 +199,8 @@ static int start_buffer(struct iio_force *f, struct incise_error *err)
 	snprintf(folder, sizeof(folder), "/sys/bus/iio/devices/%.60s", id);
 	rc = iio_source_start(&f->source, folder, block, block * BLOCKS);
 	return rc ? incise_error_set(err, -rc,
-				     "%s: %s starts no buffer of %u samples: %s; see "
-				     "dmesg",
+				     "%s: %s cannot start a buffer of %u samples: %s; "
+				     "see dmesg",
 				     f->source.where, id, block * BLOCKS, strerror(-rc))
 		  : 0;
 }
@@ -223,13 +223,13 @@ static int start(struct iio_force *f, struct incise_error *err)
 	spacing_init(&f->spacing, &f->feed, s->rate_hz);
 	rc = daq_feed_init(&f->feed);
 	if (rc)
-		return incise_error_set(err, -rc, "%s: no room for samples: %s", s->where,
-					strerror(-rc));
+		return incise_error_set(err, -rc, "%s: no memory for samples: %s",
+					s->where, strerror(-rc));
 	rc = start_buffer(f, err);
 	if (rc)
 		return rc;
 	rc = daq_feed_start(&f->feed, run, f);
-	return rc ? incise_error_set(err, -rc, "%s: no thread to read with: %s", s->where,
+	return rc ? incise_error_set(err, -rc, "%s: no thread to read it: %s", s->where,
 				     strerror(-rc))
 		  : 0;
 }
@@ -242,8 +242,8 @@ static void *force_open(const struct incise_backend_request *request,
 
 	if (!*request->arguments) {
 		incise_error_set(err, EINVAL,
-				 "%s: expected iio:NAME, such as iio:iio:device0; see "
-				 "`incise info devices`",
+				 "%s: expected iio:NAME, for example iio:iio:device0; "
+				 "see `incise info devices`",
 				 request->where);
 		return NULL;
 	}

@@ -203,22 +203,22 @@ static int set_rate(struct iio_source *s, const struct iio_device *trigger,
 	else if (!has_rate(&own))
 		return incise_error_set(
 			err, EOPNOTSUPP,
-			"%s: neither %s nor its trigger has a rate; name a timer in "
-			"force_setup.trigger",
+			"%s: neither %s nor its trigger has a rate; name a timer "
+			"trigger in force_setup.trigger",
 			s->where, iio_device_get_id(s->device));
 	rc = write_rate(at, asked);
 	if (rc == -EACCES)
 		return incise_error_set(
 			err, EACCES,
-			"%s: may not set the rate of %s; join the group that "
-			"may (udev/ has the rules), or be root",
+			"%s: no permission to set the rate of %s; join its group "
+			"(udev/ has the rules), or be root",
 			s->where, iio_device_get_id(at->device));
 	s->rate_hz = read_rate(at);
 	if (fabs(s->rate_hz - asked) > asked * TOLERANCE) {
 		read_available(at, known, sizeof(known));
 		return incise_error_set(
 			err, EINVAL,
-			"%s: %s does not take %.9g Hz%s%s and runs at %.9g Hz; set "
+			"%s: %s does not support %.9g Hz%s%s and runs at %.9g Hz; set "
 			"force_setup.rate_hz (available: %s)",
 			s->where, iio_device_get_id(at->device), asked, rc ? ": " : "",
 			rc ? strerror(-rc) : "", s->rate_hz, known);
@@ -315,15 +315,15 @@ static int find_device(struct iio_source *s, const char *name, struct incise_err
 	if (!s->context)
 		return incise_error_set(
 			err, errno ? errno : ENODEV,
-			"%s: this kernel shows no IIO devices: %s; load the "
-			"driver of your converter",
+			"%s: this kernel has no IIO devices: %s; load the driver of "
+			"your converter",
 			s->where, strerror(errno));
 	s->device = iio_context_find_device(s->context, name);
 	if (s->device && !iio_device_is_trigger(s->device))
 		return 0;
 	list(s->context, false, known, sizeof(known));
 	return incise_error_set(err, ENODEV,
-				"%s: there is no IIO device \"%.60s\"; there are: %s",
+				"%s: no such IIO device \"%.60s\"; there are: %s",
 				s->where, name, known);
 }
 
@@ -335,7 +335,7 @@ static int refused(const struct iio_source *s, int rc, const char *what,
 
 	if (rc == -EACCES || rc == -EPERM)
 		return incise_error_set(err, EACCES,
-					"%s: may not %s of %s; join the group that may "
+					"%s: no permission to %s of %s; join its group "
 					"(udev/ has the rules), or be root",
 					s->where, what, id);
 	if (rc == -EBUSY)
@@ -371,20 +371,19 @@ static int take_channels(struct iio_source *s, struct incise_error *err)
 
 	s->voltage = find_voltage(s->device, s->setup.channel);
 	if (!s->voltage)
-		return incise_error_set(
-			err, ENODEV,
-			"%s: %s has no voltage%d that a buffer can have; see `ls "
-			"/sys/bus/iio/devices/%s/scan_elements` and set "
-			"force_setup.channel",
-			s->where, id, s->setup.channel, id);
+		return incise_error_set(err, ENODEV,
+					"%s: %s has no voltage%d for buffers; see `ls "
+					"/sys/bus/iio/devices/%s/scan_elements` and set "
+					"force_setup.channel",
+					s->where, id, s->setup.channel, id);
 	s->timestamp = iio_device_find_channel(s->device, "timestamp", false);
 	if (!s->timestamp || !iio_channel_is_scan_element(s->timestamp) ||
 	    iio_format_of(&s->timestamp_format, iio_channel_get_data_format(s->timestamp),
 			  64))
 		return incise_error_set(
 			err, EOPNOTSUPP,
-			"%s: %s has no time stamps in its buffer, so losses "
-			"could not be told; use another converter",
+			"%s: %s has no timestamps in its buffer, so losses cannot be "
+			"detected; use another converter",
 			s->where, id);
 	data = iio_channel_get_data_format(s->voltage);
 	if (iio_format_of(&s->format, data, CODE_BITS_MAX))
@@ -405,7 +404,7 @@ static int set_clock(struct iio_source *s, struct incise_error *err)
 	ssize_t rc = iio_device_attr_write(s->device, key, "monotonic");
 
 	if (rc < 0)
-		return refused(s, (int)rc, "set the clock of time stamps", err);
+		return refused(s, (int)rc, "set the clock of timestamps", err);
 	rc = iio_device_attr_read(s->device, key, is, sizeof(is));
 	/*
 	 * Linux 6.1 adds a NUL behind the end of the line; libiio removes only one of the
@@ -415,9 +414,8 @@ static int set_clock(struct iio_source *s, struct incise_error *err)
 	if (rc < 0 || strcmp(is, "monotonic") != 0)
 		return incise_error_set(
 			err, EOPNOTSUPP,
-			"%s: time stamps of %s stay on the clock \"%s\", and "
-			"cannot be put beside the tracker's; use another "
-			"converter",
+			"%s: timestamps of %s remain on the clock \"%s\" and cannot be "
+			"compared with the tracker's; use another converter",
 			s->where, iio_device_get_id(s->device), is);
 	return 0;
 }
@@ -429,8 +427,8 @@ static int set_volts(struct iio_source *s, struct incise_error *err)
 	if (s->setup.full_scale_V <= 0)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: the driver of %s does not say what its codes "
-			"stand for; set force_setup.full_scale_V",
+			"%s: the driver of %s does not report the scale of its codes; "
+			"set force_setup.full_scale_V",
 			s->where, iio_device_get_id(s->device));
 	s->full_scale_V = s->setup.full_scale_V;
 	s->offset_V = s->format.is_signed ? -s->full_scale_V / 2 : 0;
@@ -461,13 +459,13 @@ static int use_named(struct iio_source *s, struct incise_error *err)
 	if (rc == -ENODEV) {
 		list(s->context, true, known, sizeof(known));
 		return incise_error_set(err, ENODEV,
-					"%s: there is no trigger \"%s\"; there are: %s",
+					"%s: no such trigger \"%s\"; there are: %s",
 					s->where, s->setup.trigger, known);
 	}
 	if (rc == -EINVAL)
 		return incise_error_set(err, EINVAL,
-					"%s: %s does not take the trigger \"%s\"; leave "
-					"force_setup.trigger out",
+					"%s: %s does not accept the trigger \"%s\"; "
+					"remove force_setup.trigger",
 					s->where, iio_device_get_id(s->device),
 					s->setup.trigger);
 	return rc ? refused(s, rc, "set the trigger", err) : 0;
@@ -494,16 +492,15 @@ static int set_trigger(struct iio_source *s, struct incise_error *err)
 	if (!*s->trigger_before && s->trigger_refused)
 		return incise_error_set(
 			err, EACCES,
-			"%s: nothing starts the conversions of %s, and you may make no "
-			"trigger; as root: mkdir %s/incise, and name "
-			"force_setup.trigger = \"incise\"",
+			"%s: no trigger for %s, and no permission to make one; as "
+			"root: mkdir %s/incise, then set force_setup.trigger = "
+			"\"incise\"",
 			s->where, iio_device_get_id(s->device), s->trigger_folder);
 	if (!*s->trigger_before)
 		return incise_error_set(
 			err, ENODEV,
-			"%s: nothing starts the conversions of %s; `modprobe "
-			"iio-trig-hrtimer` where the kernel has it, or name "
-			"force_setup.trigger",
+			"%s: no trigger for %s; run `modprobe iio-trig-hrtimer` if the "
+			"kernel has it, or set force_setup.trigger",
 			s->where, iio_device_get_id(s->device));
 	snprintf(s->trigger_used, sizeof(s->trigger_used), "%s", s->trigger_before);
 	return 0;

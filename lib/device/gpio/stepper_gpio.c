@@ -270,8 +270,8 @@ static int request_lines(struct gpio_stepper *g,
 	if (!*request->arguments)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: expected gpio:CHIP, a name, label or path such "
-			"as gpio:gpiochip0; correct it",
+			"%s: expected gpio:CHIP, a name, label or path, for example "
+			"gpio:gpiochip0; correct it",
 			request->where);
 	if (!actuator->has_lines)
 		return incise_error_set(
@@ -281,9 +281,9 @@ static int request_lines(struct gpio_stepper *g,
 			request->where);
 	if (request->watch)
 		return incise_error_set(err, EOPNOTSUPP,
-					"%s: steps over gpio are made within the program "
-					"that drives them, and cannot be watched from "
-					"another",
+					"%s: the program that drives a gpio stepper "
+					"makes its steps, so another program cannot "
+					"watch it; use that program",
 					request->where);
 	/* At rest all are inactive. */
 	g->lines =
@@ -293,10 +293,10 @@ static int request_lines(struct gpio_stepper *g,
 	switch (errno) {
 	case ENOENT:
 	case ENODEV:
-		todo = "there is no such chip; `gpiodetect` lists those there are";
+		todo = "no such chip; `gpiodetect` lists them";
 		break;
 	case EBUSY:
-		todo = "a line is in use; `gpioinfo` says by whom";
+		todo = "a line is in use; `gpioinfo` prints its user";
 		break;
 	case EACCES:
 	case EPERM:
@@ -304,7 +304,7 @@ static int request_lines(struct gpio_stepper *g,
 		       "/dev/gpiochip*, or root";
 		break;
 	case EINVAL:
-		todo = "it has not all of the lines in actuator.lines";
+		todo = "it lacks a line of actuator.lines; correct the offsets";
 		break;
 	default:
 		todo = strerror(errno);

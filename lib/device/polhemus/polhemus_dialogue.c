@@ -161,7 +161,7 @@ int polhemus_frame_read(const unsigned char *b, size_t n, struct polhemus_frame 
 static int gone(struct polhemus_dialogue *d, int rc)
 {
 	return incise_error_set(d->err, -rc,
-				"%s: the tracker at %s went away while it was set up: "
+				"%s: the tracker at %s disconnected during set-up; "
 				"check its cable and power",
 				d->where, d->line->name);
 }
@@ -191,8 +191,9 @@ static ssize_t receive_at(struct polhemus_dialogue *d, int timeout_ms, int64_t *
 	if (n && *t_ns - d->first_ns > WHOLE_NS)
 		return incise_error_set(
 			d->err, EIO,
-			"%s: the tracker at %s was not set up after 15 s, so slowly does "
-			"it answer: see its baud rate, or what else is at that line",
+			"%s: the tracker at %s answers so slowly that its set-up "
+			"exceeded 15 s; check its baud rate, and other devices on that "
+			"line",
 			d->where, d->line->name);
 	d->n += (size_t)n;
 	return n;
@@ -261,7 +262,7 @@ void polhemus_print(char *text, size_t size, const char *command)
 int polhemus_not_taken(struct polhemus_dialogue *d, const char *what, const char *got)
 {
 	return incise_error_set(d->err, EIO,
-				"%s: the tracker at %s did not take %s: it says \"%s\"; "
+				"%s: the tracker at %s did not accept %s: \"%s\"; "
 				"switch it off and on, and try again",
 				d->where, d->line->name, what, got);
 }
@@ -273,8 +274,8 @@ static int refused(struct polhemus_dialogue *d, const char *command, const char 
 	polhemus_print(text, sizeof(text), command);
 	return incise_error_set(
 		d->err, EINVAL,
-		"%s: the tracker at %s refuses the command %s: \"%s\"; its "
-		"firmware may be too old",
+		"%s: the tracker at %s rejects the command %s: \"%s\"; its firmware "
+		"may be too old",
 		d->where, d->line->name, text, said);
 }
 

@@ -61,8 +61,8 @@ static int measure(struct polhemus_dialogue *d, const struct incise_tracker_setu
 	}
 	return incise_error_set(
 		d->err, EIO,
-		"%s: the tracker at %s answers P with %d bytes that are not "
-		"a record of each of its %d stations: check its sensors",
+		"%s: the tracker at %s answers P with %d bytes, which are not one "
+		"record of each of its %d stations; check its sensors",
 		d->where, d->line->name, total, setup->n_stations);
 }
 
@@ -128,8 +128,8 @@ static int no_sensor(struct polhemus_dialogue *d, int station)
 {
 	return incise_error_set(
 		d->err, EIO,
-		"%s: station %d of the tracker at %s does not switch on: plug its sensor "
-		"in and set its switch, or leave it out of tracker_setup",
+		"%s: station %d of the tracker at %s does not switch on; plug in its "
+		"sensor and set its switch, or remove it from tracker_setup",
 		d->where, station, d->line->name);
 }
 
@@ -356,8 +356,8 @@ static int liberty_setup(struct polhemus_dialogue *d,
 	if (setup->sync != INCISE_TRACKER_INTERNAL)
 		return incise_error_set(
 			d->err, EINVAL,
-			"%s: sync from outside is only known of a FASTRAK: "
-			"set sync = \"internal\" in tracker_setup",
+			"%s: only a FASTRAK supports external sync; set sync = "
+			"\"internal\" in tracker_setup",
 			d->where);
 	liberty = identity->layout.family == POLHEMUS_LIBERTY;
 	rc = liberty_put(d, "U1\r", "U\r", false, one, 1, "centimetres");
@@ -405,12 +405,12 @@ static bool is_serial(const struct polhemus_dialogue *d)
 static int no_answer(struct polhemus_dialogue *d)
 {
 	return incise_error_set(
-		d->err, ETIMEDOUT, "%s: no tracker answers at %s: %s", d->where,
+		d->err, ETIMEDOUT, "%s: no tracker answers at %s; %s", d->where,
 		d->line->name,
-		is_serial(d) ? "switch it on, set the baud rate that its switches "
-			       "say, and use a null modem cable"
-			     : "switch it off and on, wait for 20 s until it has "
-			       "started, and plug its USB cable in again");
+		is_serial(d) ? "switch it on, set the baud rate of its switches, and "
+			       "use a null modem cable"
+			     : "switch it off and on, wait 20 s until it has started, "
+			       "and plug its USB cable in again");
 }
 
 /*
@@ -433,7 +433,7 @@ static int quiet(struct polhemus_dialogue *d)
 	}
 	if (rc == -EBUSY)
 		incise_error_set(
-			d->err, EBUSY, "%s: the device at %s does not stop sending: %s",
+			d->err, EBUSY, "%s: the device at %s does not stop sending; %s",
 			d->where, d->line->name,
 			is_serial(d)
 				? "name the line of a Polhemus tracker, and its baud "

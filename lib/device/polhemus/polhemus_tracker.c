@@ -129,8 +129,8 @@ static void *run(void *argument)
 	}
 	incise_error_set(
 		&t->cause, ENODEV,
-		"%s went away and was not back, and set up, after %.0f s; plug it in, "
-		"switch it on and begin again",
+		"%s disconnected and was not back and set up after %.0f s; plug it in, "
+		"switch it on and start again",
 		t->identity.name, t->times.gone_ms / 1e3);
 	atomic_store(&t->gone, -ENODEV);
 	return NULL;
@@ -218,13 +218,14 @@ static int check(const struct incise_tracker_setup *setup, const char *where,
 		       (!i || setup->stations[i] > setup->stations[i - 1]);
 	for (int i = 1; good && i < setup->n_stations; i++)
 		tube |= setup->stations[i] == setup->tube_station;
-	return good && tube ? 0
-			    : incise_error_set(
-				      err, EINVAL,
-				      "%s: tracker_setup: expected stations 1 to 4, "
-				      "ascending, the tube's not the first of them, a "
-				      "hemisphere of length 1 and numbers; correct it",
-				      where);
+	return good && tube
+		       ? 0
+		       : incise_error_set(err, EINVAL,
+					  "%s: tracker_setup: expected stations 1 to 4, "
+					  "ascending, the tube's not the first, a "
+					  "hemisphere of length 1 and finite numbers; "
+					  "correct it",
+					  where);
 }
 
 static int begin(struct polhemus_tracker *t, const struct incise_tracker_setup *setup,
@@ -241,7 +242,7 @@ static int begin(struct polhemus_tracker *t, const struct incise_tracker_setup *
 	t->line->family = (int)t->identity.layout.family;
 	if (polhemus_stream_init(&t->stream, setup, &t->identity.layout))
 		rc = incise_error_set(err, ENOMEM,
-				      "%s: out of memory: end other programs", where);
+				      "%s: out of memory; end other programs", where);
 	if (!rc) {
 		polhemus_gaps_start(&t->stream.gaps, incise_monotonic_ns());
 		t->line->stop = &t->stop;
@@ -250,7 +251,8 @@ static int begin(struct polhemus_tracker *t, const struct incise_tracker_setup *
 			return 0;
 		incise_error_set(
 			err, -rc,
-			"%s: no thread to read the tracker in: end other programs, or raise the limit of threads",
+			"%s: no thread to read the tracker; end other programs, or "
+			"raise the limit of threads",
 			where);
 	}
 	t->line->stop = NULL;
@@ -271,7 +273,7 @@ struct incise_tracker *polhemus_tracker_open(struct polhemus_line *line,
 
 	if (!t) {
 		line->ops->close(line);
-		incise_error_set(err, ENOMEM, "%s: out of memory: end other programs",
+		incise_error_set(err, ENOMEM, "%s: out of memory; end other programs",
 				 where);
 		return NULL;
 	}

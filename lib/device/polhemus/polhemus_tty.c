@@ -145,37 +145,39 @@ static void refuse(const char *path, int code, const char *where,
 	case ENXIO:
 	case ENODEV:
 		incise_error_set(err, ENODEV,
-				 "%s: %s is not there: is the adapter plugged in? "
-				 "/dev/serial/by-id lists those that are",
+				 "%s: no such device %s; plug in the adapter; "
+				 "/dev/serial/by-id lists the serial ports",
 				 where, path);
 		break;
 	case EACCES:
 	case EPERM:
 		incise_error_set(err, EACCES,
-				 "%s: no right to open %s: join the group that owns it, "
-				 "which mostly is dialout",
+				 "%s: no permission to open %s; join its group, "
+				 "usually dialout",
 				 where, path);
 		break;
 	case EBUSY:
 	case EWOULDBLOCK:
 		incise_error_set(err, EBUSY,
-				 "%s: another program has %s open: end it first", where,
+				 "%s: another program has %s open; end it first", where,
 				 path);
 		break;
 	case ENOTTY:
 		incise_error_set(err, EINVAL,
-				 "%s: %s is no serial line: expected one such as "
-				 "/dev/ttyUSB0",
+				 "%s: %s is not a serial port; expected one, for "
+				 "example /dev/ttyUSB0",
 				 where, path);
 		break;
 	case EINVAL:
 		incise_error_set(err, EIO,
-				 "%s: %s cannot run at this rate: choose another one, "
-				 "here and at the tracker's switches",
+				 "%s: %s does not support this baud rate; choose "
+				 "another, here and at the tracker's switches",
 				 where, path);
 		break;
 	default:
-		incise_error_set(err, EIO, "%s: %s: %s: plug the adapter out and in",
+		incise_error_set(err, EIO,
+				 "%s: %s: %s; unplug the adapter and plug it "
+				 "in",
 				 where, path, strerror(code));
 	}
 }
@@ -212,7 +214,7 @@ struct polhemus_line *polhemus_tty_open(const char *arguments, const char *where
 	const char *tail;
 
 	if (!tty) {
-		incise_error_set(err, ENOMEM, "%s: out of memory: end other programs",
+		incise_error_set(err, ENOMEM, "%s: out of memory; end other programs",
 				 where);
 		return NULL;
 	}
@@ -280,7 +282,7 @@ static int list_lines(incise_scan_found *found, void *context)
 			continue;
 		device.usable = true;
 		snprintf(device.what, sizeof(device.what),
-			 "a serial line, not asked; behind it may be a tracker");
+			 "a serial port, not probed; a tracker may be behind it");
 		rc = found(context, &device);
 	}
 	if (folder)
@@ -310,11 +312,9 @@ static int scan(const char *arguments, incise_scan_found *found, void *context,
 		return rc;
 	if (snprintf(device.device, sizeof(device.device), "tty:%s", arguments) >=
 	    (int)sizeof(device.device))
-		return incise_error_set(
-			err, EINVAL,
-			"%s: the path is too long to be shown: name it by a "
-			"shorter one",
-			where);
+		return incise_error_set(err, EINVAL,
+					"%s: the path is too long; use a shorter one",
+					where);
 	device.usable = true;
 	snprintf(device.what, sizeof(device.what), "%s", identity.name);
 	incise_scan_tell(&device, "family", "%s",

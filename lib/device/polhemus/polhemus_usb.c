@@ -107,7 +107,7 @@ static void write_path(char path[USB_PATH_MAX], unsigned int bus, const uint8_t 
 /* --- search --- */
 
 #define FIRMWARE \
-	"has no firmware yet: load the maker's .hex file with fxload, then it appears anew"
+	"has no firmware yet: load the manufacturer's .hex file with fxload, then it appears again"
 
 /* The name in @arguments and its model. -EINVAL; -ENODEV: it waits for its firmware. */
 static int read_wanted(const char *arguments, struct usb_name *wanted,
@@ -117,15 +117,15 @@ static int read_wanted(const char *arguments, struct usb_name *wanted,
 	if (read_name(arguments, wanted))
 		return incise_error_set(
 			err, EINVAL,
-			"%s: usb:%.60s: expected usb:0f44:0002, and @1-1.2 or "
-			"#SERIAL behind it where there are several; correct it",
+			"%s: usb:%.60s: expected usb:0f44:0002, with @1-1.2 or #SERIAL "
+			"if there are several; correct it",
 			where, arguments);
 	*model = polhemus_model_find(wanted->vendor, wanted->product);
 	if (!*model)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: %04x:%04x is no tracker of Polhemus that is known, "
-			"such as 0f44:0002; correct it",
+			"%s: %04x:%04x is not a known Polhemus tracker, for example "
+			"0f44:0002; correct it",
 			where, wanted->vendor, wanted->product);
 	if (!(*model)->ready)
 		return incise_error_set(err, ENODEV, "%s: a %s %04x:%04x " FIRMWARE,
@@ -245,8 +245,8 @@ static int none(libusb_device **list, const char *name, const char *where,
 					path);
 	return incise_error_set(
 		err, ENODEV,
-		"%s: no %s is attached: plug it in and switch it on; incise "
-		"info devices lists those that are",
+		"%s: no %s is attached; plug it in and switch it on; `incise info "
+		"devices` lists the trackers",
 		where, name);
 }
 
@@ -256,24 +256,27 @@ static int refuse(int rc, const char *name, const char *where, struct incise_err
 	switch (rc) {
 	case -EACCES:
 		return incise_error_set(err, EACCES,
-					"%s: no right to open %s: join the group incise, "
-					"and see that its udev rules are installed",
+					"%s: no permission to open %s; join the group "
+					"incise, and check that its udev rules are "
+					"installed",
 					where, name);
 	case -EBUSY:
 		return incise_error_set(err, EBUSY,
-					"%s: another program has %s open: end it first",
+					"%s: another program has %s open; end it first",
 					where, name);
 	case -ENODEV:
-		return incise_error_set(err, ENODEV, "%s: %s went away: check its cable",
+		return incise_error_set(err, ENODEV,
+					"%s: %s disconnected; check its "
+					"cable",
 					where, name);
 	case -ENOMEM:
 		return incise_error_set(err, ENOMEM,
-					"%s: out of memory: end other programs", where);
+					"%s: out of memory; end other programs", where);
 	default:
 		return incise_error_set(
 			err, EIO,
-			"%s: %s cannot be talked to: plug it out and in, and "
-			"switch it on",
+			"%s: %s does not respond; unplug it, plug it in, and switch it "
+			"on",
 			where, name);
 	}
 }
@@ -298,8 +301,8 @@ static int choose(libusb_device **list, const struct usb_name *wanted, const cha
 	if (f.n > 1)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: %d devices are %s: name one by its place, which "
-			"are %s, or by #SERIAL",
+			"%s: %d devices match %s; name one by its port (%s) or by "
+			"#SERIAL",
 			where, f.n, name, f.where);
 	*device = libusb_ref_device(f.first);
 	return 0;
@@ -351,7 +354,8 @@ static int show(libusb_device *device, const struct libusb_device_descriptor *d,
 		snprintf(seen.what, sizeof(seen.what), "%s", model->name);
 	else
 		snprintf(seen.what, sizeof(seen.what),
-			 "%s without firmware: load the maker's .hex file with fxload",
+			 "%s without firmware: load the manufacturer's .hex file with "
+			 "fxload",
 			 model->name);
 	incise_scan_tell(&seen, "family", "%s", polhemus_family_name(model->family));
 	incise_scan_tell(&seen, "usb_id", "%s", id);
@@ -637,8 +641,8 @@ static int usb_attach(struct polhemus_usb *usb, const char *where,
 		usb->context = NULL;
 		return incise_error_set(
 			err, EIO,
-			"%s: this computer has no USB that libusb can use: load the "
-			"driver of its controller, or use a serial line",
+			"%s: libusb finds no USB on this computer; load the driver of "
+			"its controller, or use a serial port",
 			where);
 	}
 	rc = find_device(usb->context, &usb->wanted, usb->path, usb->line.name, &device,

@@ -154,18 +154,17 @@ static int open_file(struct v4l2_camera *c, const char *path, struct incise_erro
 	case -ENOENT:
 	case -ENXIO:
 	case -ENODEV:
-		todo = "there is no such camera; plug it in, or look for its path in "
-		       "/dev/v4l/by-id";
+		todo = "no such camera; plug it in, or find its path in /dev/v4l/by-id";
 		break;
 	case -EACCES:
 	case -EPERM:
-		todo = "not permitted; become a member of the group that owns it";
+		todo = "no permission; join the group that owns it";
 		break;
 	case -EBUSY:
-		todo = "another program uses it; end that one";
+		todo = "another program uses it; end it";
 		break;
 	case -ENOTTY:
-		todo = "this is no camera; name one of /dev/v4l/by-id";
+		todo = "not a camera; name one of /dev/v4l/by-id";
 		break;
 	default:
 		todo = strerror(-rc);
@@ -176,9 +175,8 @@ static int open_file(struct v4l2_camera *c, const char *path, struct incise_erro
 	if (!(c->identity.capabilities & V4L2_CAP_VIDEO_CAPTURE) ||
 	    !(c->identity.capabilities & V4L2_CAP_STREAMING))
 		return incise_error_set(err, EOPNOTSUPP,
-					"%s: camera %.120s: %s gives no stream of "
-					"pictures here; it may have another "
-					"/dev/video… that does",
+					"%s: camera %.120s: %s has no stream of "
+					"frames; try its other /dev/video…",
 					c->where, path, c->identity.card);
 	return 0;
 }
@@ -324,8 +322,8 @@ static int camera_scan(const char *arguments, incise_scan_found *found, void *co
 		look_at_all(&s);
 	if (s.denied && !s.n)
 		return incise_error_set(err, EACCES,
-					"v4l2: cameras may not be opened; become a "
-					"member of the group that owns /dev/video*");
+					"v4l2: no permission to open cameras; join the "
+					"group that owns /dev/video*");
 	/* A missing device, or one that is no camera, was not found. */
 	if (rc && rc != -ENOENT && rc != -ENOTTY && rc != -ENXIO && rc != -ENODEV)
 		return incise_error_set(err, -rc, "v4l2: %.100s: %s", arguments,

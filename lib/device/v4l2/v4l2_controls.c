@@ -108,8 +108,8 @@ static int refuse(struct locking *l, int rc, const char *name)
 					l->where);
 	if (rc == -EBUSY)
 		return incise_error_set(l->err, EBUSY,
-					"%s: the camera's %s is held by another program; "
-					"end that one",
+					"%s: the camera's %s is controlled by another "
+					"program; end it",
 					l->where, name);
 	return incise_error_set(l->err, EIO, "%s: the camera's %s cannot be set: %s",
 				l->where, name, strerror(-rc));
@@ -192,8 +192,8 @@ static int lock_pair(struct locking *l, const struct pair *pair,
 					pair->key, asked);
 	if (asked > 0 && (!there || range.flags & V4L2_CTRL_FLAG_READ_ONLY))
 		return incise_error_set(l->err, EOPNOTSUPP,
-					"%s: the camera has no %s that can be set; take "
-					"camera_setup.%s away",
+					"%s: the camera's %s cannot be set; remove "
+					"camera_setup.%s",
 					l->where, pair->name, pair->key);
 	/* Read the value chosen by the camera before automatic goes off. */
 	if (there && !(asked > 0))
@@ -215,8 +215,8 @@ static int check_exposure(const struct incise_camera_setup *setup, double rate_h
 	if (!(setup->exposure_ms * rate_hz > 1000))
 		return 0;
 	return incise_error_set(err, ERANGE,
-				"%s: camera_setup.exposure_ms is %g, longer than the %g "
-				"ms of a picture at %g Hz; correct one of them",
+				"%s: camera_setup.exposure_ms is %g, longer than the "
+				"%g ms of a frame at %g Hz; correct one of them",
 				where, setup->exposure_ms, 1000 / rate_hz, rate_hz);
 }
 
@@ -235,8 +235,8 @@ static int read_back(struct locking *l)
 		if (is != lock->value)
 			return incise_error_set(
 				l->err, EIO,
-				"%s: the camera's %s does not hold: set to %d, it is %d; "
-				"set another value in camera_setup",
+				"%s: the camera changes its %s from the set value %d "
+				"to %d; set another value in camera_setup",
 				l->where, lock->name, lock->value, is);
 	}
 	return 0;
@@ -283,15 +283,16 @@ int v4l2_controls_check(struct v4l2_controls *c, const char *where,
 		if (rc == -ENODEV)
 			return incise_error_set(
 				err, ENODEV,
-				"%s: the camera was unplugged; plug it in and begin again",
+				"%s: the camera was unplugged; plug it in and start "
+				"again",
 				where);
 		if (rc)
 			break;
 		if (is != lock->value)
 			return incise_error_set(
 				err, EIO,
-				"%s: the camera's %s has changed from %d to %d; end what "
-				"changes it, and begin again",
+				"%s: the camera's %s has changed from %d to %d; end "
+				"the program that changes it, and start again",
 				where, lock->name, lock->value, is);
 	}
 	/* A transfer on a bus may fail once. */
@@ -299,7 +300,7 @@ int v4l2_controls_check(struct v4l2_controls *c, const char *where,
 	if (c->unread < UNREAD_MAX)
 		return 0;
 	return incise_error_set(err, EIO,
-				"%s: the camera's controls cannot be read any more: %s; "
-				"look at its cable",
+				"%s: the camera's controls cannot be read any more: "
+				"%s; check its cable",
 				where, strerror(-rc));
 }

@@ -203,12 +203,12 @@ static const char *wrong(const struct v4l2_pix_format *reported, size_t kind,
 	if (reported->pixelformat != known[kind].fourcc)
 		return "other pixels than were set";
 	if (reported->field != V4L2_FIELD_NONE)
-		return "interlaced pictures, whose halves are of two times; set a "
+		return "interlaced frames, whose halves have two times; set a "
 		       "progressive mode";
 	if (reported->width - 1 >= V4L2_SIDE_MAX || reported->height - 1 >= V4L2_SIDE_MAX)
-		return "a size that cannot be";
+		return "an invalid size";
 	if (!reported->sizeimage || reported->sizeimage > FRAME_MAX)
-		return "a number of bytes that cannot be";
+		return "an invalid number of bytes";
 	*shape = (struct v4l2_shape){
 		.pixels = known[kind].pixels,
 		.fourcc = reported->pixelformat,
@@ -237,14 +237,13 @@ static int check_setup(const struct incise_camera_setup *setup, const char *wher
 	    setup->height > V4L2_SIDE_MAX)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: camera_setup: a picture of %d x %d pixels cannot be; "
-			"correct width and height",
+			"%s: camera_setup: invalid frame size %d x %d pixels; correct "
+			"width and height",
 			where, setup->width, setup->height);
 	if (!(setup->rate_hz >= 0 && setup->rate_hz <= 10000))
 		return incise_error_set(
 			err, EINVAL,
-			"%s: camera_setup: %g pictures a second cannot be; correct "
-			"rate_hz",
+			"%s: camera_setup: invalid rate of %g frames/s; correct rate_hz",
 			where, setup->rate_hz);
 	return 0;
 }
@@ -264,14 +263,14 @@ int v4l2_format_set(int fd, const struct incise_camera_setup *setup, const char 
 		return rc;
 	rc = v4l2_ask(fd, VIDIOC_G_FMT, &set);
 	if (rc)
-		return incise_error_set(err, -rc, "%s: the camera tells no format: %s",
+		return incise_error_set(err, -rc, "%s: the camera reports no format: %s",
 					where, strerror(-rc));
 	if (kind == KNOWN) {
 		v4l2_format_list(fd, list, sizeof(list));
 		return incise_error_set(
 			err, EOPNOTSUPP,
-			"%s: the camera has no pictures of camera_setup.format; it has "
-			"%s: name one of yuyv, grey, mjpeg, rgb among them",
+			"%s: the camera does not support camera_setup.format; it has "
+			"%s; set a format that both have: yuyv, grey, mjpeg or rgb",
 			where, *list ? list : "none");
 	}
 	width = setup->width ? setup->width
@@ -290,13 +289,13 @@ int v4l2_format_set(int fd, const struct incise_camera_setup *setup, const char 
 	if (rc)
 		return incise_error_set(err, -rc,
 					rc == -EBUSY ? "%s: another program uses the "
-						       "camera; end that one: %s"
+						       "camera; end it: %s"
 						     : "%s: the camera's format cannot "
 						       "be set: %s",
 					where, strerror(-rc));
 	why = wrong(&reported.fmt.pix, kind, shape);
 	if (why)
-		return incise_error_set(err, EPROTO, "%s: the camera's driver gives %s",
+		return incise_error_set(err, EPROTO, "%s: the camera's driver sends %s",
 					where, why);
 	set_rate(fd, shape, setup->rate_hz);
 	return 0;

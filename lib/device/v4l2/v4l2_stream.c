@@ -47,16 +47,15 @@ static int other_clock(const struct v4l2_stream *s, int code, struct incise_erro
 {
 	return incise_error_set(
 		err, code,
-		"%s: the camera's driver does not stamp its pictures with "
-		"CLOCK_MONOTONIC, so that they have no time beside the force; use "
-		"another camera or driver",
+		"%s: the camera's driver has no timestamps of CLOCK_MONOTONIC, so "
+		"frames cannot be aligned with the force; use another camera or driver",
 		s->where);
 }
 
 static int gone(const struct v4l2_stream *s, struct incise_error *err)
 {
 	return incise_error_set(
-		err, ENODEV, "%s: the camera was unplugged; plug it in and begin again",
+		err, ENODEV, "%s: the camera was unplugged; plug it in and start again",
 		s->where);
 }
 
@@ -69,8 +68,8 @@ static int queue(struct v4l2_stream *s, int i, struct incise_error *err)
 	if (rc == -ENODEV)
 		return gone(s, err);
 	return rc ? incise_error_set(err, EIO,
-				     "%s: the camera's driver takes a buffer no more: "
-				     "%s; unplug and plug it",
+				     "%s: the camera's driver accepts no more buffers: "
+				     "%s; unplug the camera and plug it in",
 				     s->where, strerror(-rc))
 		  : 0;
 }
@@ -83,15 +82,15 @@ static int map(struct v4l2_stream *s, int i, struct incise_error *err)
 
 	if (rc)
 		return incise_error_set(err, -rc,
-					"%s: the camera's driver tells nothing of buffer "
-					"%d: %s",
+					"%s: the camera's driver cannot describe "
+					"buffer %d: %s",
 					s->where, i, strerror(-rc));
 	if (!is_monotonic(&buffer))
 		return other_clock(s, EPROTO, err);
 	if (!buffer.length || buffer.length < s->shape.least)
 		return incise_error_set(err, EPROTO,
-					"%s: the camera's driver has buffers of %u bytes "
-					"for pictures of %zu",
+					"%s: the camera's driver has buffers of %u "
+					"bytes for frames of %zu",
 					s->where, buffer.length, s->shape.least);
 	data = mmap(NULL, buffer.length, PROT_READ, MAP_SHARED, s->fd, buffer.m.offset);
 	if (data == MAP_FAILED)
@@ -113,15 +112,15 @@ static int take_buffers(struct v4l2_stream *s, struct incise_error *err)
 
 	if (rc)
 		return incise_error_set(err, -rc,
-					rc == -EBUSY
-						? "%s: another program uses the camera; "
-						  "end that one: %s"
-						: "%s: the camera gives no memory: %s",
+					rc == -EBUSY ? "%s: another program uses the "
+						       "camera; end it: %s"
+						     : "%s: the camera's driver has no "
+						       "memory: %s",
 					s->where, strerror(-rc));
 	if (asked.count < FEWEST)
 		return incise_error_set(err, EPROTO,
-					"%s: the camera's driver has %u buffers, and "
-					"fewer than %d lose pictures; give it more",
+					"%s: the camera's driver has %u buffers, but "
+					"fewer than %d lose frames; give it more",
 					s->where, asked.count, FEWEST);
 	n = asked.count < V4L2_BUFFERS_MAX ? asked.count : V4L2_BUFFERS_MAX;
 	for (s->n = 0; s->n < (int)n; s->n++) {
@@ -151,11 +150,12 @@ int v4l2_stream_start(struct v4l2_stream *s, int fd, const struct v4l2_shape *sh
 	rc = v4l2_ask(fd, VIDIOC_STREAMON, &type);
 	if (rc)
 		return incise_error_set(err, -rc,
-					rc == -ENOSPC ? "%s: the bus has no room for the "
-							"camera's pictures; lower size "
-							"or rate_hz in camera_setup: %s"
+					rc == -ENOSPC ? "%s: the bus has too little "
+							"bandwidth for the camera; "
+							"lower size or rate_hz in "
+							"camera_setup: %s"
 						      : "%s: the camera does not "
-							"begin: %s",
+							"start: %s",
 					where, strerror(-rc));
 	s->runs = true;
 	s->seen_ns = incise_monotonic_ns();
@@ -255,9 +255,8 @@ static int count(struct v4l2_stream *s, uint32_t sequence, bool whole,
 	if (!step || step > INT32_MAX)
 		return incise_error_set(
 			err, EIO,
-			"%s: the camera's driver counts picture %u behind "
-			"%u, so that losses cannot be told; use another "
-			"camera or driver",
+			"%s: the camera's driver numbers frame %u after %u, so losses "
+			"cannot be detected; use another camera or driver",
 			s->where, sequence, s->sequence);
 	/* The first frame is number 0. */
 	if (s->any)
@@ -276,8 +275,8 @@ static int drop_damaged(struct v4l2_stream *s, int i, struct incise_error *err)
 		return queue(s, i, err);
 	return incise_error_set(
 		err, EIO,
-		"%s: the last %d pictures of the camera all came damaged, "
-		"too short or with a wrong time; look at its cable",
+		"%s: the last %d frames of the camera were all damaged, too short or "
+		"had a wrong time; check its cable",
 		s->where, DAMAGED_ROW);
 }
 
@@ -340,8 +339,9 @@ static int take(struct v4l2_stream *s, const struct v4l2_buffer *buffer, int64_t
 
 	if (buffer->index >= (uint32_t)s->n || !s->slot[buffer->index].queued)
 		return incise_error_set(err, EIO,
-					"%s: the camera's driver fills a buffer that it "
-					"does not have, number %u; use another driver",
+					"%s: the camera's driver returned a buffer "
+					"that does not exist, number %u; use another "
+					"driver",
 					s->where, buffer->index);
 	slot = &s->slot[buffer->index];
 	slot->queued = false;
@@ -371,8 +371,8 @@ static int check_silence(const struct v4l2_stream *s, struct incise_error *err)
 	if (incise_monotonic_ns() - s->seen_ns < most)
 		return 0;
 	return incise_error_set(err, EIO,
-				"%s: no picture came from the camera for %.0f s; look at "
-				"its cable, and begin again",
+				"%s: no frame arrived from the camera for %.0f s; "
+				"check its cable, and start again",
 				s->where, (double)most / 1e9);
 }
 
@@ -398,8 +398,8 @@ static int no_frame(struct v4l2_stream *s, int rc, short events, struct incise_e
 	if (v4l2_ask(s->fd, VIDIOC_QUERYCAP, &reported) == -ENODEV)
 		return gone(s, err);
 	return incise_error_set(err, EIO,
-				"%s: the camera's driver gives no more pictures: %s; "
-				"unplug and plug it",
+				"%s: the camera's driver sends no more frames: %s; "
+				"unplug the camera and plug it in",
 				s->where, strerror(rc == -EAGAIN ? EIO : -rc));
 }
 

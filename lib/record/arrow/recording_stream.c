@@ -43,8 +43,8 @@ static bool is_foreign(struct stream *stream)
 	if (stream->owner == getpid())
 		return false;
 	incise_error_set(&stream->err, EINVAL,
-			 "this stream was opened by process %ld before a fork; open the "
-			 "recording again in this one",
+			 "this stream was opened by process %ld before a fork; open "
+			 "the recording again in this process",
 			 (long)stream->owner);
 	return true;
 }
@@ -195,7 +195,7 @@ static const struct table {
 	 NULL,
 	 "iii",
 	 put_force,
-	 {SEQ, TIME, FIELD("code", "1", "of the converter", INT32),
+	 {SEQ, TIME, FIELD("code", "1", "code of the converter", INT32),
 	  FIELD("force_N", "N", "on the blade", REAL),
 	  FIELD("clipped", "1", "the converter was at an end", FLAG)},
 	 "force_N"},
@@ -210,8 +210,8 @@ static const struct table {
 	  FIELD("qw", "1", ORIENTATION, REAL), FIELD("qx", "1", ORIENTATION, REAL),
 	  FIELD("qy", "1", ORIENTATION, REAL), FIELD("qz", "1", ORIENTATION, REAL),
 	  FIELD("status", "1", "error letter of the tracker, space: none", TEXT),
-	  FIELD("station", "1", "which of the tracker's sensors, from 1", INT32),
-	  FIELD("button", "1", "the stylus's button was pressed", FLAG)},
+	  FIELD("station", "1", "sensor of the tracker, from 1", INT32),
+	  FIELD("button", "1", "the button of the stylus was pressed", FLAG)},
 	 NULL},
 	{"depth",
 	 "seq, t_ns, depth_mm, velocity_mm_s",
@@ -227,11 +227,11 @@ static const struct table {
 	 "iiiiinnnn",
 	 put_columns,
 	 {SEQ, TIME, ARRIVAL, FIELD("pts", "ms", "timestamp in camera.mkv", INT64),
-	  FIELD("bytes", "byte", "of the coded frame", INT64),
+	  FIELD("bytes", "byte", "size of the coded frame", INT64),
 	  SEEN("length_px", "pixel", "exposed length of the blade"),
 	  SEEN("sd_px", "pixel", "standard deviation of the edge"),
-	  SEEN("depth_mm", "mm", "of the tip below the surface, by vision"),
-	  SEEN("quality", "1", "of the measurement, 0 to 1")},
+	  SEEN("depth_mm", "mm", "depth of the tip below the surface, from vision"),
+	  SEEN("quality", "1", "quality of the measurement, 0 to 1")},
 	 "depth_mm"},
 	{"events",
 	 "0, t_ns, kind, text",
@@ -239,7 +239,7 @@ static const struct table {
 	 "iitt",
 	 put_event,
 	 {FIELD("t_ns", "ns", "CLOCK_MONOTONIC", INT64),
-	  FIELD("kind", "1", "of the event", TEXT),
+	  FIELD("kind", "1", "kind of the event", TEXT),
 	  FIELD("text", "1", "its description", TEXT)},
 	 NULL},
 };
@@ -443,12 +443,12 @@ int incise_recording_stream(struct incise_recording *recording, const char *what
 	if (!table && strcmp(what, "table"))
 		return incise_error_set(
 			err, EINVAL,
-			"a recording has no stream '%s'; there are: force, "
-			"tracker, depth, frames, events, table",
+			"no stream '%s' in a recording; there are: force, tracker, "
+			"depth, frames, events, table",
 			what);
 	if (table && !strcmp(what, "frames") && recording->form < 2)
 		return incise_error_set(err, ENOTSUP,
-					"%s: is of an older form, which has no frames",
+					"%s: has an older format, without frames",
 					recording->path);
 	incise_export_options_init(&defaults);
 	made = calloc(1, sizeof(*made));

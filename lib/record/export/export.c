@@ -294,7 +294,7 @@ static const struct incise_column bin_columns[] = {
 	{"force_N", "N", "mean force in the bin", INCISE_COLUMN_REAL, -1},
 	{"sd_N", "N", "standard deviation of single samples", INCISE_COLUMN_REAL, -1},
 	{"count", "1", "samples", INCISE_COLUMN_INTEGER, 0},
-	{"cuts", "1", "different cuts that they are from", INCISE_COLUMN_INTEGER, 0},
+	{"cuts", "1", "number of cuts in the bin", INCISE_COLUMN_INTEGER, 0},
 	INCISE_ADVANCING_COLUMN,
 };
 
@@ -431,15 +431,13 @@ int incise_export_check(const struct incise_export_options *o, struct incise_err
 {
 	if (!(o->rate_hz >= 0 && o->rate_hz <= 1e9))
 		return incise_error_set(err, EINVAL,
-					"rate of export %g Hz is not within 0 to 1e9",
+					"rate of export %g Hz: expected 0 to 1e9",
 					o->rate_hz);
 	if (o->depth_bins < 0 || o->depth_bins > BINS_MAX || o->velocity_bins < 0 ||
 	    o->velocity_bins > BINS_MAX || !o->depth_bins != !o->velocity_bins)
-		return incise_error_set(
-			err, EINVAL,
-			"%d × %d bins: each number must be within 1 to %d, or both "
-			"0",
-			o->depth_bins, o->velocity_bins, BINS_MAX);
+		return incise_error_set(err, EINVAL,
+					"%d × %d bins: expected 1 to %d each, or both 0",
+					o->depth_bins, o->velocity_bins, BINS_MAX);
 	if (!(o->depth_max_mm >= 0 && o->depth_max_mm < 1e9) ||
 	    !(o->velocity_max_mm_s >= 0 && o->velocity_max_mm_s < 1e12))
 		return incise_error_set(
@@ -449,7 +447,7 @@ int incise_export_check(const struct incise_export_options *o, struct incise_err
 			o->depth_max_mm, o->velocity_max_mm_s);
 	if (o->resample && (o->depth_bins || (o->rate_hz > 0 && o->rate_hz < 1)))
 		return incise_error_set(err, EINVAL,
-					"resampling takes a rate of 1 Hz or more, and "
+					"resampling needs a rate of 1 Hz or more, and "
 					"no averages");
 	if (o->min_count < 0)
 		return incise_error_set(err, EINVAL, "smallest count %d is negative",
@@ -481,8 +479,8 @@ static int write_cuts(struct pass *pass, struct incise_recording *const *recordi
 	if (!pass->report.rows)
 		return incise_error_set(
 			pass->err, ENODATA,
-			"%s%s: no bin holds %d samples; take fewer bins or a "
-			"smaller least count",
+			"%s%s: no bin has %d samples; give fewer bins or a smaller "
+			"minimum count",
 			recordings[0]->path, n > 1 ? " and the others" : "",
 			o->min_count);
 	return incise_table_finish(pass->table, pass->err);
@@ -560,8 +558,8 @@ static int write_mcap(struct incise_recording *const *recordings, int n,
 	if (n > 1 || options->rate_hz > 0 || options->depth_bins || options->resample)
 		return incise_error_set(
 			err, EINVAL,
-			"MCAP takes one recording as it is: no rate, no "
-			"averages; give -o FILE.csv or FILE.h5 for these");
+			"MCAP exports one whole recording, without rate and averages; "
+			"give -o FILE.csv or FILE.h5 for these");
 	return incise_export_mcap(recordings[0], options, out, provenance, report, err);
 }
 

@@ -583,7 +583,8 @@ static int fail_write(int rc, struct incise_error *err)
 {
 	return incise_error_set(
 		err, -rc,
-		"the messages cannot be written: %s; make room, or give another -o",
+		"the messages cannot be written: %s; free disk space, or give another "
+		"-o",
 		strerror(-rc));
 }
 
@@ -609,7 +610,7 @@ static int64_t each_row(struct mcap_export *export, struct mcap *mcap,
 		rc = streams[next].message(export, &rows[next]);
 		if (rc < 0)
 			return incise_error_set(
-				err, -rc, "%s: damaged: table %s, row %lld cannot be",
+				err, -rc, "%s: damaged: table %s, row %lld is invalid",
 				export->recording->path, streams[next].table,
 				(long long)sqlite3_column_int64(rows[next].stmt, 0));
 		rc = mcap_message(mcap, next, rows[next].t_ns > 0 ? rows[next].t_ns : 0,

@@ -431,7 +431,7 @@ static int find_last(struct incise_force_interpolator *force, struct incise_erro
 			INCISE_TIME_NONE; /* reading the rows reports the damage */
 	sqlite3_finalize(stmt);
 	return found ? 0
-		     : incise_error_set(err, ENODATA, "%s: there is no force sample",
+		     : incise_error_set(err, ENODATA, "%s: no force sample",
 					recording->path);
 }
 

@@ -34,9 +34,8 @@ const struct incise_column incise_resample_columns[INCISE_RESAMPLE_COLUMNS +
 	SINGLE("qx", "1", ORIENTATION, 6),
 	SINGLE("qy", "1", ORIENTATION, 6),
 	SINGLE("qz", "1", ORIENTATION, 6),
-	{"station", "1", "which of the tracker's sensors, 0 not known",
-	 INCISE_COLUMN_INTEGER, 0},
-	FLAG("button", "1: the stylus's button was pressed"),
+	{"station", "1", "sensor of the tracker, 0: unknown", INCISE_COLUMN_INTEGER, 0},
+	FLAG("button", "1: the button of the stylus was pressed"),
 	SINGLE("depth_mm", "mm", "of the tip below the surface", 4),
 	SINGLE("depth_u_mm", "mm", "standard uncertainty from noise and time", 4),
 	SINGLE("velocity_mm_s", "mm/s", "speed of the tip, smoothed", 3),
@@ -44,15 +43,15 @@ const struct incise_column incise_resample_columns[INCISE_RESAMPLE_COLUMNS +
 	SINGLE("force_u_N", "N", "standard uncertainty of force_N from noise", 6),
 	FLAG("clipped", "1: the converter was at an end"),
 	FLAG("interpolated", "1: a tracker record is missing here"),
-	FLAG("tracker_error", "1: the tracker told of an error"),
+	FLAG("tracker_error", "1: the tracker reported an error"),
 	INCISE_ADVANCING_COLUMN,
-	SINGLE("camera_depth_mm", "mm", "depth by the pictures", 4),
-	SINGLE("camera_depth_sd_mm", "mm",
-	       "standard deviation of the edge in the pictures", 4),
+	SINGLE("camera_depth_mm", "mm", "depth from the frames", 4),
+	SINGLE("camera_depth_sd_mm", "mm", "standard deviation of the edge in the frames",
+	       4),
 	SINGLE("camera_depth_u_mm", "mm", "standard uncertainty from the edge and time",
 	       4),
-	SINGLE("quality", "1", "of the pictures, 0 to 1", 3),
-	FLAG("low_quality", "1: below 0.5 in a picture, or not seen"),
+	SINGLE("quality", "1", "quality of the frames, 0 to 1", 3),
+	FLAG("low_quality", "1: below 0.5 in a frame, or not detected"),
 };
 
 /* A hundred days: longer than any session; a grid over forged times would not end. */
@@ -256,8 +255,8 @@ int incise_resample(struct incise_recording *recording, const char *name,
 		span_ns = (double)(r.force.last_ns - r.first_ns);
 		if (span_ns > SPAN_MAX_NS)
 			rc = incise_error_set(err, EINVAL,
-					      "%s: damaged: table force: times from %lld "
-					      "to %lld ns cannot be",
+					      "%s: damaged: table force: times from "
+					      "%lld to %lld ns are invalid",
 					      recording->path, (long long)r.first_ns,
 					      (long long)r.force.last_ns);
 		else

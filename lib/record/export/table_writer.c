@@ -125,7 +125,7 @@ static int check(struct incise_table *table, bool bad, struct incise_error *err)
 		return 0;
 	return incise_error_set(
 		err, code,
-		"the dataset cannot be written: %s; make room, or give another -o",
+		"the dataset cannot be written: %s; free disk space, or give another -o",
 		strerror(code));
 }
 

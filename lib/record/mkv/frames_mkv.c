@@ -237,12 +237,12 @@ static int fail(struct writer *w, int rc, const char *what, struct incise_error 
 	if (code == ENOSPC || code == EDQUOT || code == EFBIG)
 		return incise_error_set(
 			err, code,
-			"%.300s: disk full (or a quota or limit on files); "
-			"the pictures end here, what came before is kept",
+			"%.300s: disk full (or a quota or limit on files); the frames "
+			"end here, earlier ones are kept",
 			w->path);
 	return incise_error_set(err, code,
-				"%.300s: %s: %s; the pictures end here, what came before "
-				"is kept",
+				"%.300s: %s: %s; the frames end here, earlier ones are "
+				"kept",
 				w->path, what, strerror(code));
 }
 
@@ -344,18 +344,18 @@ static int writer_put(struct incise_frames_writer *writer,
 
 	if (w->failed)
 		return incise_error_set(err, -w->failed,
-					"%.300s: the pictures have ended: %s", w->path,
+					"%.300s: the frames have ended: %s", w->path,
 					strerror(-w->failed));
 	if (!fits(&w->shape, frame))
 		return incise_error_set(err, EINVAL,
-					"%.300s: a picture of %d × %d, %zu bytes, is not "
-					"what the camera said it sends",
+					"%.300s: a frame of %d × %d, %zu bytes, "
+					"differs from the format of the camera",
 					w->path, frame->width, frame->height,
 					frame->size);
 	stored->pts_ms = pts_of(w, frame->t_ns);
 	rc = encode(w, frame);
 	if (rc)
-		return fail(w, rc, "a picture cannot be encoded", err);
+		return fail(w, rc, "a frame cannot be encoded", err);
 	stored->bytes = (uint32_t)w->packet->size;
 	stored->crc = crc_of(w->packet->data, (size_t)w->packet->size);
 	w->packet->pts = w->packet->dts = stored->pts_ms;
@@ -404,11 +404,11 @@ static int writer_close(struct incise_frames_writer *writer, struct incise_error
 	if (!w->failed) {
 		avio_flush(w->format->pb);
 		if (rc < 0 || w->io_errno)
-			fail(w, rc, "cannot be ended", err);
+			fail(w, rc, "cannot be closed", err);
 		else if (fsync(w->fd) && errno != EINVAL)
 			fail(w, AVERROR(errno), "cannot be synced", err);
 	} else {
-		incise_error_set(err, -w->failed, "%.300s: the pictures have ended: %s",
+		incise_error_set(err, -w->failed, "%.300s: the frames have ended: %s",
 				 w->path, strerror(-w->failed));
 	}
 	rc = w->failed;
@@ -512,8 +512,8 @@ static struct incise_frames_writer *writer_new(
 
 	if (!is_shape(shape)) {
 		incise_error_set(err, EINVAL,
-				 "%.300s: pictures of %d × %d in this format cannot be "
-				 "recorded; set the camera to others",
+				 "%.300s: frames of %d × %d in this format cannot be "
+				 "recorded; set another size or format of the camera",
 				 path, shape->width, shape->height);
 		return NULL;
 	}
@@ -534,14 +534,14 @@ static struct incise_frames_writer *writer_new(
 	w->synced_ns = clock_ns();
 	w->fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
 	if (w->fd < 0) {
-		incise_error_set(err, errno, "%.300s: cannot be made: %s", path,
+		incise_error_set(err, errno, "%.300s: cannot be created: %s", path,
 				 strerror(errno));
 		rc = -errno;
 	} else {
 		rc = write_header(w, options ? options->threads : 1);
 		if (!rc)
 			return &w->writer;
-		rc = fail(w, rc, "cannot be begun", err);
+		rc = fail(w, rc, "cannot be started", err);
 		unlink(path);
 	}
 	writer_free(w);
@@ -706,7 +706,7 @@ static int reader_next(struct incise_frames_reader *reader,
 		.crc = crc_of(r->packet->data, (size_t)r->packet->size),
 	};
 	if (!r->packet->size || (noted && stored->crc != note.crc))
-		return bad(r, &note, "its bytes are not those that were recorded", err);
+		return bad(r, &note, "its bytes differ from those recorded", err);
 	if (!r->codec) {
 		frame->data = r->packet->data;
 		frame->size = (size_t)r->packet->size;
@@ -808,8 +808,8 @@ static struct incise_frames_reader *reader_new(const char *path, struct incise_e
 	rc = AVUNERROR(rc);
 	if (rc <= 0 || rc > 4095)
 		incise_error_set(err, EINVAL,
-				 "%.300s: holds no pictures that incise recorded, or is "
-				 "damaged in its first bytes",
+				 "%.300s: has no frames of incise, or is damaged in "
+				 "its first bytes",
 				 path);
 	else
 		incise_error_set(err, rc, "%.300s: cannot be read: %s", path,

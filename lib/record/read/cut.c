@@ -43,7 +43,7 @@ static int step(struct incise_cuts *cuts, sqlite3_stmt *stmt, const char *table,
 					  err);
 	if (sqlite3_column_type(stmt, 1) != SQLITE_INTEGER ||
 	    sqlite3_column_int64(stmt, 1) < 0)
-		return bad_row(cuts, table, stmt, "t_ns is no time", err);
+		return bad_row(cuts, table, stmt, "t_ns is not a time", err);
 	if (!incise_row_times_next(times, sqlite3_column_int64(stmt, 0),
 				   sqlite3_column_int64(stmt, 1), t_ns))
 		return bad_row(cuts, table, stmt, "t_ns does not increase", err);
@@ -98,10 +98,10 @@ static int step_depth(struct incise_cuts *cuts, struct incise_error *err)
 	next.velocity_mm_s = sqlite3_column_double(stmt, 3);
 	/* A rig is some metres wide; light is slow enough for the other bound. */
 	if (sqlite3_column_type(stmt, 2) != SQLITE_FLOAT || !(fabs(next.depth_mm) < 1e6))
-		return bad_row(cuts, "depth", stmt, "depth_mm is no depth", err);
+		return bad_row(cuts, "depth", stmt, "depth_mm is not a depth", err);
 	if (sqlite3_column_type(stmt, 3) != SQLITE_FLOAT ||
 	    !(next.velocity_mm_s >= 0 && next.velocity_mm_s < 1e12))
-		return bad_row(cuts, "depth", stmt, "velocity_mm_s is no speed", err);
+		return bad_row(cuts, "depth", stmt, "velocity_mm_s is not a speed", err);
 	cuts->after = next;
 	cuts->depth_rows++;
 	cuts->depth_max_mm = fmax(cuts->depth_max_mm, next.depth_mm);
@@ -225,7 +225,7 @@ static int check_tracker(struct incise_recording *rec, struct incise_error *err)
 		if (!good) {
 			rc = incise_error_set(
 				err, EINVAL,
-				"%s: damaged: table tracker, row %lld cannot be",
+				"%s: damaged: table tracker, row %lld is invalid",
 				rec->path, (long long)sqlite3_column_int64(stmt, 0));
 			goto out;
 		}

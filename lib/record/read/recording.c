@@ -120,9 +120,10 @@ static int read_item(struct incise_recording *rec, const struct item *item,
 	    (rc == SQLITE_DONE && item->optional))
 		rc = 0;
 	else if (rc == SQLITE_ROW || rc == SQLITE_DONE)
-		rc = incise_error_set(
-			err, EINVAL, "%s: damaged: '%s' in table meta is %s", rec->path,
-			item->key, rc == SQLITE_ROW ? "no value it can have" : "missing");
+		rc = incise_error_set(err, EINVAL,
+				      "%s: damaged: '%s' in table meta is %s", rec->path,
+				      item->key,
+				      rc == SQLITE_ROW ? "out of range" : "missing");
 	else
 		rc = incise_schema_fail(rec->db, rec->path, err);
 	sqlite3_finalize(stmt);
@@ -157,7 +158,7 @@ static int read_tip(struct incise_recording *rec, struct incise_error *err)
 		if (!rc && !(fabs(rec->meta.tip_mm[i]) <= TIP_MAX_MM))
 			rc = incise_error_set(err, EINVAL,
 					      "%s: damaged: '%s' in table meta is %g, "
-					      "which cannot be",
+					      "out of range",
 					      rec->path, keys[i], rec->meta.tip_mm[i]);
 	}
 	return rc;
@@ -207,8 +208,8 @@ static int read_meta(struct incise_recording *rec, struct incise_error *err)
 	    fabs(info->zero_mV) > 1e12)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: damaged: the force channel in table meta has %llu "
-			"bits, %g V from %g V, %g mV/N, zero %g mV, which cannot be",
+			"%s: damaged: the force channel in table meta has %llu bits, "
+			"%g V from %g V, %g mV/N, zero %g mV, which is invalid",
 			rec->path, (unsigned long long)bits, info->full_scale_V,
 			info->offset_V, info->force_mV_N, info->zero_mV);
 	info->bits = bits;
@@ -242,7 +243,7 @@ int incise_recording_need_zero(const struct incise_recording *rec,
 		return 0;
 	return incise_error_set(err, EINVAL,
 				"%s: ended before the zero of the force channel was "
-				"known (0.5 s), so no force can be told",
+				"known (0.5 s), so there is no force",
 				rec->path);
 }
 
@@ -265,8 +266,7 @@ static char *find_folder(const char *path, struct incise_error *err)
 	if (stat(folder, &st) && errno == ENOENT) {
 		folder[length] = '.';
 		if (stat(folder, &st) && errno == ENOENT) {
-			incise_error_set(err, ENOENT, "%s: there is no such recording",
-					 path);
+			incise_error_set(err, ENOENT, "%s: no such recording", path);
 			free(folder);
 			return NULL;
 		}
@@ -319,8 +319,8 @@ static int check_size(struct incise_recording *rec, struct incise_error *err)
 	    !has_log(rec))
 		return incise_error_set(
 			err, EINVAL,
-			"%s: damaged: its %s ends in mid-page: it was cut short, "
-			"as by a copy that did not finish",
+			"%s: damaged: its %s ends within a page: it was truncated, for "
+			"example by an incomplete copy",
 			rec->path, INCISE_SCHEMA_DB);
 	return 0;
 }
@@ -491,8 +491,8 @@ static int open_or_copy(struct incise_recording *rec, const char *file,
 		if (why && why != -EAGAIN)
 			return incise_error_set(
 				err, -why,
-				"%s: is being written, and no copy of it can be made to "
-				"read: %s; set TMPDIR to a folder with room",
+				"%s: is being written, and it cannot be copied for "
+				"reading: %s; set TMPDIR to a folder with free space",
 				rec->path, strerror(-why));
 	}
 	/* Held for a moment only, or just closed. */
@@ -509,8 +509,8 @@ static int open_or_copy(struct incise_recording *rec, const char *file,
 	}
 	if ((rc & 0xff) == SQLITE_BUSY && why == -EAGAIN)
 		return incise_error_set(err, EBUSY,
-					"%s: is being written, faster than a copy of it "
-					"can be made to read: wait for its end",
+					"%s: is being written faster than it can be "
+					"copied for reading; wait for its end",
 					rec->path);
 	return rc == SQLITE_OK ? 0 : incise_schema_fail(rec->db, rec->path, err);
 }
@@ -526,12 +526,14 @@ static int open_database(struct incise_recording *rec, struct incise_error *err)
 	if (stat(file, &st)) {
 		rc = errno == ENOENT || errno == ENOTDIR ? EINVAL : errno;
 		rc = incise_error_set(err, rc,
-				      rc == EINVAL
-					      ? "%s: no recording: it has no %s inside"
-					      : "%s: its %s: %s",
+				      rc == EINVAL ? "%s: not a recording: it has no %s "
+						     "inside"
+						   : "%s: its %s: %s",
 				      rec->path, INCISE_SCHEMA_DB, strerror(errno));
 	} else if (!S_ISREG(st.st_mode)) {
-		rc = incise_error_set(err, EINVAL, "%s: no recording: its %s is no file",
+		rc = incise_error_set(err, EINVAL,
+				      "%s: not a recording: its %s is not "
+				      "a file",
 				      rec->path, INCISE_SCHEMA_DB);
 	} else if (access(file, R_OK)) {
 		rc = incise_error_set(err, errno, "%s: %s", file, strerror(errno));
@@ -631,13 +633,12 @@ int incise_recording_streams(struct incise_recording *rec,
 		return incise_schema_fail(rec->db, rec->path, err);
 	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW && n < INCISE_STREAMS_MAX)
 		if (!take_stream(stmt, &streams[n++])) {
-			n = damaged(rec, "streams", "a value is none that it can have",
-				    err);
+			n = damaged(rec, "streams", "a value is out of range", err);
 			sqlite3_finalize(stmt);
 			return n;
 		}
 	if (rc == SQLITE_ROW)
-		n = damaged(rec, "streams", "more rows than there are streams", err);
+		n = damaged(rec, "streams", "more rows than streams", err);
 	else if (rc != SQLITE_DONE)
 		n = incise_schema_fail(rec->db, rec->path, err);
 	sqlite3_finalize(stmt);
@@ -781,8 +782,7 @@ int incise_recording_line(struct incise_recording *rec, const char *stream,
 		if (n == INCISE_TIMELINE_KNOTS_MAX ||
 		    !take_knot(stmt, n ? &line->knots[n - 1] : NULL, &line->knots[n])) {
 			sqlite3_finalize(stmt);
-			return damaged(rec, "knots", "a row is none that a line can have",
-				       err);
+			return damaged(rec, "knots", "a row is invalid", err);
 		}
 		line->n++;
 	}

@@ -55,7 +55,10 @@ static void *array_next(struct array *array, int *rc, struct incise_error *err)
 				: NULL;
 
 		if (!list) {
-			*rc = incise_error_set(err, ENOMEM, "%s: too long for the memory",
+			*rc = incise_error_set(err, ENOMEM,
+					       "%s: too long for the "
+					       "memory; use a shorter "
+					       "recording",
 					       array->rows.recording->path);
 			return NULL;
 		}
@@ -112,7 +115,7 @@ int incise_recording_values(struct incise_recording *recording, const char *name
 		if (!strcmp(sources[i].name, name))
 			source = &sources[i];
 	if (!source)
-		return incise_error_set(err, EINVAL, "a recording has no values '%s'",
+		return incise_error_set(err, EINVAL, "no values '%s' in a recording",
 					name);
 	if (source == &sources[2] && recording->form < 2)
 		return 0;
@@ -245,7 +248,7 @@ int incise_recording_lengths(struct incise_recording *recording,
 	*lengths = NULL;
 	if (recording->form < 2)
 		return incise_error_set(err, EINVAL,
-					"%s: is of an older form, which has no pictures",
+					"%s: has an older format, without frames",
 					recording->path);
 	rc = array_open(&l.frames, recording, "frames",
 			"seq, t_ns, ifnull(length_px, 0.0), ifnull(quality, 0.0)", "iirr",

@@ -215,7 +215,7 @@ int incise_rows_next(struct incise_rows *rows, struct incise_error *err)
 	if (!take(rows))
 		return incise_error_set(
 			err, EINVAL,
-			"%s: damaged: table %s%s%s, row %lld cannot be; `sqlite3 "
+			"%s: damaged: table %s%s%s, row %lld is invalid; `sqlite3 "
 			"%s/%s` shows it",
 			path, rows->table, rows->other ? " or " : "",
 			rows->other ? rows->other : "",

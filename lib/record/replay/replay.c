@@ -160,7 +160,7 @@ static int begin(struct replay *replay, const struct incise_scene *scene)
 	replay->first_ns = (source->first_ns / replay->period_ns + 1) * replay->period_ns;
 	if (replay->first_ns > source->last_ns)
 		return incise_error_set(replay->err, ENODATA,
-					"%s: it is shorter than a tick of %g ms",
+					"%s: shorter than a tick of %g ms",
 					source->recording->path,
 					replay->period_ns * 1e-6);
 	replay->plan =

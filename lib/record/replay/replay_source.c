@@ -43,7 +43,7 @@ static int step(struct incise_replay_stream *s, struct incise_error *err)
 		return rc;
 	seq = sqlite3_column_int64(s->rows.stmt, 0);
 	if (seq < 0 || seq > COUNT_MAX)
-		return damaged(s, "seq is no count", err);
+		return damaged(s, "seq is not a count", err);
 	s->t_ns = s->rows.t_ns;
 	return 1;
 }
@@ -76,7 +76,7 @@ static int step_pose(struct incise_replay_source *source, struct incise_error *e
 	s->t_ns = sqlite3_column_int64(s->rows.stmt, ARRIVAL);
 	/* The clock does not run back; a pose from far ahead would delay all behind it. */
 	if (s->t_ns < before_ns)
-		return damaged(s, "arrival_ns goes back", err);
+		return damaged(s, "arrival_ns decreases", err);
 	return 1;
 }
 
@@ -106,8 +106,8 @@ static int number(struct incise_recording *recording, const char *key, double le
 	if (rc || (*to >= least && *to <= most))
 		return rc;
 	return incise_error_set(err, EINVAL,
-				"%s: damaged: '%s' in table meta is missing, or no value "
-				"it can have",
+				"%s: damaged: '%s' in table meta is missing, or out of "
+				"range",
 				recording->path, key);
 }
 
@@ -190,8 +190,7 @@ static int find_span(struct incise_replay_source *source, struct incise_error *e
 
 	if (!source->tracker.rows.live)
 		return incise_error_set(err, ENODATA,
-					"%s: there is no pose to replay: its tracker "
-					"gave none",
+					"%s: no pose to replay: its tracker sent none",
 					path);
 	source->origin_ns =
 		source->force.rows.live ? source->force.t_ns : source->tracker.t_ns;
@@ -209,9 +208,8 @@ static int find_span(struct incise_replay_source *source, struct incise_error *e
 	    source->last_ns - source->first_ns > SPAN_MAX_NS)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: damaged: it begins at %.0f s and ends at %.0f "
-			"s, which cannot be",
-			path, source->first_ns * 1e-9, source->last_ns * 1e-9);
+			"%s: damaged: its times from %.0f s to %.0f s are invalid", path,
+			source->first_ns * 1e-9, source->last_ns * 1e-9);
 	return 0;
 }
 

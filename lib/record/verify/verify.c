@@ -114,9 +114,8 @@ static void check_names(struct incise_verification *verify)
 			: "SELECT count(*) FROM ledger WHERE stream NOT IN (" STREAMS
 			  ", " SEALS ")",
 		-1))
-		incise_verify_found(
-			verify, &found,
-			"the ledger has entries of streams that there are not");
+		incise_verify_found(verify, &found,
+				    "the ledger has entries of unknown streams");
 }
 
 /* The number of samples that a dead device would still have sent is not known. */
@@ -164,13 +163,13 @@ static void report_interruption(struct incise_verification *verify)
 		    "SELECT max(last_ns) FROM ledger WHERE stream IN (" STREAMS ")", -1);
 	if (found.last_ns < 0)
 		incise_verify_found(verify, &found,
-				    "interrupted, or being written: not a row in it yet");
+				    "interrupted, or being written: no row yet");
 	else
 		incise_verify_found(
 			verify, &found,
-			"interrupted, or being written: it ends with its last commit, at "
-			"%.4f s; tables depth, events, knots, meta and streams have no "
-			"seal before the end: nothing proves them",
+			"interrupted, or being written: it ends with its last commit, "
+			"at %.4f s; tables depth, events, knots, meta and streams have "
+			"no seal before the end and are not verified",
 			incise_verify_s(verify, found.last_ns));
 }
 
@@ -220,8 +219,8 @@ static void compare(struct incise_verification *verify, const char *stream,
 				    (long long)entry.count);
 	else
 		incise_verify_found(verify, &found,
-				    "%s is altered: its %s or its seal are not what was "
-				    "written",
+				    "%s is altered: its %s or its seal differ from "
+				    "those written",
 				    what, units);
 }
 
@@ -351,8 +350,8 @@ static int verify_it(const char *path, const struct incise_verify_watch *watch,
 	if (verify.recording->form < 2) {
 		rc = incise_error_set(
 			err, ENODATA,
-			"%s: made by an older incise (form %d), which kept no ledger: "
-			"there is nothing to verify it by; `incise info` reads it",
+			"%s: made by an older incise (format %d) without a ledger, so "
+			"it cannot be verified; `incise info` reads it",
 			path, verify.recording->form);
 		goto out;
 	}

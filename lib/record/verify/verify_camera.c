@@ -86,7 +86,7 @@ static void flush_run(struct walk *walk)
 			run->what == MISSING
 				? "camera: %llu missing in " INCISE_FRAMES_FILE ", %s"
 				: "camera: %llu in " INCISE_FRAMES_FILE
-				  " that no row has, %s",
+				  " without a row, %s",
 			(unsigned long long)run->count, where);
 	walk->run.what = NONE;
 }
@@ -192,7 +192,7 @@ static const char *difference(const struct walk *walk, const struct frame *frame
 		return "its number is";
 	if (row->pts_ms != frame->stored.pts_ms || !is_time(walk, frame->head.t_ns))
 		return "its time is";
-	return frame->good ? NULL : "its note or the file's head is";
+	return frame->good ? NULL : "its note or the file's header is";
 }
 
 /* Compare a frame with its row, after the rows without a frame. Returns 0 or -EIO. */
@@ -283,14 +283,14 @@ static void report_unopened(struct incise_verification *verify, const char *path
 		found.count = verify->report->frames.missing = verify->frames;
 		incise_verify_found(verify, &found,
 				    "camera: " INCISE_FRAMES_FILE
-				    " is missing, and %llu pictures with it",
+				    " is missing, and %llu frames with it",
 				    (unsigned long long)verify->frames);
 		return;
 	}
 	found.kind =
 		err->code == EINVAL ? INCISE_VERIFY_DAMAGED : INCISE_VERIFY_UNVERIFIED;
 	found.count = verify->frames;
-	incise_verify_found(verify, &found, "camera: the pictures are not verified: %s",
+	incise_verify_found(verify, &found, "camera: the frames are not verified: %s",
 			    err->text);
 }
 

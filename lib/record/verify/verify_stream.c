@@ -125,7 +125,7 @@ static void flush_altered(struct walk *walk)
 		snprintf(blocks, sizeof(blocks), "blocks %lld to %lld are",
 			 (long long)found->first_block, (long long)found->last_block);
 	if (walk->altered_rows == found->count)
-		snprintf(what, sizeof(what), "rows or ledger are not what was written");
+		snprintf(what, sizeof(what), "rows or ledger differ from those written");
 	else
 		snprintf(what, sizeof(what), "%llu rows, and %llu were written",
 			 (unsigned long long)walk->altered_rows,
@@ -209,8 +209,8 @@ static int skip_blocks(struct walk *walk, const struct incise_ledger_block *bloc
 	walk->out->altered += found.count;
 	incise_verify_found(
 		walk->verify, &found,
-		"%s: the ledger has no entry of block %lld%s%.0lld; %llu rows "
-		"are there in its place",
+		"%s: the ledger has no entry of block %lld%s%.0lld; %llu rows are in "
+		"its place",
 		walk->form->stream, (long long)found.first_block,
 		found.count > 1 ? " to " : "",
 		found.count > 1 ? (long long)found.last_block : 0,
@@ -284,7 +284,7 @@ static int take_extra(struct walk *walk)
 	found.last_ns = walk->last_ns;
 	incise_verify_found(
 		walk->verify, &found,
-		"%s: %llu rows behind the end of the ledger, numbers %lld to %lld",
+		"%s: %llu rows after the end of the ledger, numbers %lld to %lld",
 		walk->form->stream, (unsigned long long)found.count,
 		(long long)found.first_seq, (long long)found.last_seq);
 	return rc;
@@ -318,7 +318,7 @@ static void check_counts(struct walk *walk, uint64_t rows, uint64_t lost_rows)
 		found.count = lost_rows;
 		incise_verify_found(
 			walk->verify, &found,
-			"%s: %llu were lost when it was captured, and the ledger has %llu",
+			"%s: %llu were lost during the capture, and the ledger has %llu",
 			walk->form->stream, (unsigned long long)lost_rows,
 			(unsigned long long)out->lost_at_capture);
 	}
@@ -364,7 +364,7 @@ static int walk_through(struct walk *walk)
 		found.first_block = found.last_block = walk->next;
 		incise_verify_found(
 			walk->verify, &found,
-			"%s: the ledger has no end: its last blocks were cut off",
+			"%s: the ledger has no end: its last blocks were removed",
 			walk->form->stream);
 	}
 	return rc;

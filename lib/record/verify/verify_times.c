@@ -19,8 +19,8 @@ static void report(struct incise_verification *verify,
 {
 	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_TIMES);
 	const char *why = first->kind == INCISE_FIT_MOVED
-				  ? "arrived later than they are numbered, as some lost "
-				    "ones before them were not yet counted"
+				  ? "arrived later than their numbers say, because "
+				    "losses before them were counted late"
 				  : "did not arrive at the rate of the tracker";
 
 	found.stream = "tracker";
@@ -31,9 +31,9 @@ static void report(struct incise_verification *verify,
 	found.count = count;
 	incise_verify_found(
 		verify, &found,
-		"tracker: numbers %lld to %lld, %.4f to %.4f s: %llu rows %s; do "
-		"not trust their t_ns: readers time them by arrival, with a "
-		"standard uncertainty of up to %.3g ms",
+		"tracker: numbers %lld to %lld, %.4f to %.4f s: %llu rows %s; their "
+		"t_ns is wrong; readers use the arrival, with a standard uncertainty "
+		"of up to %.3g ms",
 		(long long)found.first_seq, (long long)found.last_seq,
 		incise_verify_s(verify, found.first_ns),
 		incise_verify_s(verify, found.last_ns), (unsigned long long)count, why,

@@ -533,7 +533,7 @@ struct incise_frame_pump *incise_frame_pump_new(
 	if (!p->file_runs)
 		incise_frames_writer_close(setup->writer, NULL);
 	incise_frame_pump_free(p);
-	incise_error_set(err, -rc, "camera: its pictures cannot be recorded: %s",
+	incise_error_set(err, -rc, "camera: its frames cannot be recorded: %s",
 			 strerror(-rc));
 	return NULL;
 }
@@ -588,8 +588,8 @@ int incise_frame_pump_stop(struct incise_frame_pump *p, int64_t patience_ns,
 	if (p->leaked)
 		return incise_error_set(
 			err, ETIMEDOUT,
-			"camera: disk or coder did not get on; %llu pictures "
-			"are not written",
+			"camera: disk or encoder were too slow; %llu frames are not "
+			"written",
 			(unsigned long long)p->unanswered);
 	if (is_set(&p->file_failed)) {
 		if (err)

@@ -126,10 +126,10 @@ static int check_silence(struct incise_recorder *rec, uint64_t read,
 			 ((double)camera->silent_ns >= SILENT_PERIODS * period_ns ||
 			  !(rec->camera_info.rate_hz > 0));
 	if (camera->silent && !was)
-		rc = incise_recorder_note(rec, "silent", "camera: no picture for %.1f s",
+		rc = incise_recorder_note(rec, "silent", "camera: no frame for %.1f s",
 					  (double)camera->silent_ns * 1e-9);
 	else if (was && !camera->silent)
-		rc = incise_recorder_note(rec, "silent", "camera: pictures come again");
+		rc = incise_recorder_note(rec, "silent", "camera: frames arrive again");
 	return incise_recorder_check(rec, rc, err);
 }
 
@@ -179,10 +179,9 @@ static int end_camera(struct incise_recorder *rec, struct incise_error *err)
 	if (!rc && stopped && !*stream->ended)
 		rc = incise_recorder_end_stream(rec, INCISE_LEDGER_CAMERA, why.text, err);
 	if (!rc && rec->camera.silent && !*stream->ended) {
-		incise_error_set(
-			&why, ENODATA,
-			"%s: gave no picture for the last %.1f s; check its cable",
-			stream->device, (double)rec->camera.silent_ns * 1e-9);
+		incise_error_set(&why, ENODATA,
+				 "%s: sent no frame for the last %.1f s; check its cable",
+				 stream->device, (double)rec->camera.silent_ns * 1e-9);
 		rc = incise_recorder_end_stream(rec, INCISE_LEDGER_CAMERA, why.text, err);
 	}
 	return rc;
@@ -319,17 +318,16 @@ static int check_rig(const char *path, struct incise_rig *rig, struct incise_err
 	if (!incise_rig_tracker(rig) || !incise_rig_force(rig))
 		return incise_error_set(
 			err, ENODEV,
-			"%s: a recording needs a tracker and a force channel; the rig "
-			"%s was opened without",
+			"%s: a recording needs a tracker and a force channel, but the "
+			"rig %s was opened without them",
 			path, incise_rig_spec(rig));
 	incise_tracker_info(incise_rig_tracker(rig), &tracker);
 	/* The tables have no column that separates two sensors. */
 	if (tracker.stations > 1)
 		return incise_error_set(
 			err, EOPNOTSUPP,
-			"%s: a recording holds one sensor, and the tracker of %s "
-			"reads %d; name the scalpel's alone in "
-			"tracker_setup.stations",
+			"%s: a recording has one sensor, but the tracker of %s reads "
+			"%d; name only the scalpel's in tracker_setup.stations",
 			path, incise_rig_spec(rig), tracker.stations);
 	return 0;
 }
@@ -511,8 +509,8 @@ static int check_end(struct incise_recorder *rec, struct incise_error *err)
 	if (incise_recorder_disk_full(rec)) {
 		incise_error_set(err, ENOSPC,
 				 "%s: the disk is nearly full (%.0f MB free); the "
-				 "recording was ended while there is room to; make room "
-				 "before the next",
+				 "recording was ended in time; free disk space before "
+				 "the next",
 				 rec->path, rec->disk.free_bytes / 1e6);
 		return 1;
 	}
@@ -620,9 +618,9 @@ static int check_rows(struct incise_recorder *rec, struct incise_error *err)
 		if (rows != rec->streams[i].rows)
 			return incise_error_set(
 				err, EIO,
-				"%s: its files were changed by another program while "
-				"they were written: table %s has %llu rows of %llu; "
-				"`incise verify %s` says what is left",
+				"%s: another program changed its files during the "
+				"recording: table %s has %llu rows of %llu; `incise "
+				"verify %s` lists the remaining data",
 				rec->part, table, (unsigned long long)rows,
 				(unsigned long long)rec->streams[i].rows, rec->part);
 	}
@@ -664,10 +662,12 @@ int incise_recorder_close(struct incise_recorder *rec, struct incise_error *err)
 		return 0;
 	rc = rec->failed;
 	if (rc)
-		incise_error_set(
-			err, -rc, "%s: not completed: %s; %s%s", rec->path, strerror(-rc),
-			rec->worthless ? "nothing was kept" : "what was committed is in ",
-			rec->worthless ? "" : rec->part);
+		incise_error_set(err, -rc, "%s: not completed: %s; %s%s", rec->path,
+				 strerror(-rc),
+				 rec->worthless ? "no data were kept"
+						: "the committed data are "
+						  "in ",
+				 rec->worthless ? "" : rec->part);
 	else
 		rc = complete(rec, err);
 	close_camera(rec);

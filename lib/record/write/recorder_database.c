@@ -48,17 +48,17 @@ int incise_recorder_fail(struct incise_recorder *rec, struct incise_error *err)
 	if (rc)
 		return rc;
 	if (rec->worthless) {
-		snprintf(kept, sizeof(kept), "nothing was kept");
+		snprintf(kept, sizeof(kept), "no data were kept");
 	} else {
 		snprintf(kept, sizeof(kept),
-			 "what was committed is in %.300s: `incise info` reads it",
+			 "the committed data are in %.300s: `incise info` reads it",
 			 rec->part);
 	}
 	if (code == ENOSPC)
 		return incise_error_set(
 			err, code,
-			"%.200s: disk full (or a quota or limit on files); make room "
-			"and record again; %s",
+			"%.200s: disk full (or a quota or limit on files); free disk "
+			"space and record again; %s",
 			rec->path, kept);
 	return incise_error_set(err, code == EINVAL ? EIO : code,
 				"%.200s: cannot be written: %s; %s", rec->path, text,

@@ -55,7 +55,7 @@ int incise_recorder_split_path(struct incise_recorder *rec, const char *path,
 	slash = strrchr(rec->path, '/');
 	rec->name = slash ? slash + 1 : rec->path;
 	if (!*rec->name || !strcmp(rec->name, ".") || !strcmp(rec->name, ".."))
-		return incise_error_set(err, EINVAL, "'%s': is no name for a recording",
+		return incise_error_set(err, EINVAL, "'%s': not a name for a recording",
 					path);
 	parent = slash ? strndup(rec->path, slash - rec->path + 1) : strdup(".");
 	rec->parent = parent ? open(parent, O_PATH | O_DIRECTORY | O_CLOEXEC) : -1;
@@ -74,16 +74,16 @@ int incise_recorder_make_folder(struct incise_recorder *rec, struct incise_error
 	if (!fstatat(rec->parent, rec->name, &st, AT_SYMLINK_NOFOLLOW))
 		return incise_error_set(
 			err, EEXIST,
-			"%s: exists already; record under another name, or "
-			"replace it with --overwrite",
+			"%s: exists; record under another name, or replace it with "
+			"--overwrite",
 			rec->path);
 	if (mkdirat(rec->parent, part, 0777)) {
 		if (errno == EEXIST)
 			return incise_error_set(
 				err, EEXIST,
-				"%s: left by an interrupted recording, or being written; `incise "
-				"info` reads it; rename it, or drop it with "
-				"--overwrite",
+				"%s: left by an interrupted recording, or being "
+				"written; `incise info` reads it; rename it, or "
+				"replace it with --overwrite",
 				rec->part);
 		return incise_error_set(err, errno, "%s: cannot be made: %s", rec->part,
 					strerror(errno));
@@ -136,8 +136,7 @@ int incise_recorder_rename_folder(struct incise_recorder *rec, struct incise_err
 	if (rc)
 		return incise_error_set(
 			err, -rc,
-			"%s: %s; the recording is complete but stays under the "
-			"name %s",
+			"%s: %s; the recording is complete but keeps the name %s",
 			rec->path, strerror(-rc), rec->part);
 	return 0;
 }
@@ -217,13 +216,13 @@ int incise_recorder_check_space(struct incise_recorder *rec, double planned_s,
 	if (usable <= 0)
 		return incise_error_set(
 			err, ENOSPC,
-			"%s: the disk has %.0f MB free, and %.0f MB are kept back to end "
-			"a recording in; make room, or record to another disk",
+			"%s: the disk has %.0f MB free, but %.0f MB are reserved to "
+			"end a recording; free disk space, or record to another disk",
 			rec->path, rec->disk.free_bytes / 1e6, reserved(bytes_s) / 1e6);
 	return incise_error_set(
 		err, ENOSPC,
-		"%s: %.0f s of this rig take some %.0f MB, and the disk has %.0f MB for "
-		"it: enough for %.0f s; make room, or record for a shorter time",
+		"%s: %.0f s of this rig take about %.0f MB, but the disk has %.0f MB, "
+		"enough for %.0f s; free disk space, or record for a shorter time",
 		rec->path, planned_s, planned_s * bytes_s / 1e6, usable / 1e6,
 		usable / bytes_s);
 }
@@ -254,11 +253,11 @@ int incise_recorder_check_files(const struct incise_recorder *rec,
 	    !fstat(rec->folder, &st))
 		return incise_error_set(
 			err, EIO,
-			"%s: was %s by another program while it was written: %s",
+			"%s: was %s by another program during the recording: %s",
 			rec->part, st.st_nlink ? "moved" : "removed",
-			!st.st_nlink	 ? "nothing is left of the recording"
-			: rec->worthless ? "nothing was kept"
-					 : "what was committed is where it is now");
+			!st.st_nlink	 ? "no data remain of the recording"
+			: rec->worthless ? "no data were kept"
+					 : "the committed data are at its new place");
 	for (int i = 0; i < INCISE_RECORDER_GROWING; i++) {
 		const char *what = NULL;
 
@@ -275,8 +274,8 @@ int incise_recorder_check_files(const struct incise_recorder *rec,
 			continue;
 		return incise_error_set(
 			err, EIO,
-			"%s/%s: was %s by another program while it was written: rows "
-			"that were in it are lost; `incise verify %s` says what is left",
+			"%s/%s: was %s by another program during the recording: its "
+			"rows are lost; `incise verify %s` lists the remaining data",
 			rec->part, files[i], what, rec->part);
 	}
 	return 0;

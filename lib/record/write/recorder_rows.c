@@ -204,9 +204,8 @@ static void zero_depth(struct incise_recorder *rec, int64_t t_ns, double depth_m
 int incise_recorder_settle_zero(struct incise_recorder *rec, struct incise_error *err)
 {
 	const struct incise_recorder_zero *zero = &rec->zero;
-	const char *remedy =
-		"hold the tool free for the first 0.5 s, or give force_zero_mV in "
-		"the calibration";
+	const char *remedy = "keep the tool free of contact for the first 0.5 s, or give "
+			     "force_zero_mV in the calibration";
 	double mean = (double)zero->sum / zero->n;
 	double var = fmax(0, (double)zero->sum2 / zero->n - mean * mean);
 	double sd_mV = span_mV(rec, sqrt(var));
@@ -228,7 +227,7 @@ int incise_recorder_settle_zero(struct incise_recorder *rec, struct incise_error
 	if (sd_N > ZERO_SD_MAX_N)
 		return incise_error_set(
 			err, EBUSY,
-			"%s: the force varied by %.3f N (sd; up to %.2f is rest) "
+			"%s: the force varied by %.3f N (sd; expected at most %.2f) "
 			"while its zero was measured; %s",
 			rec->path, sd_N, ZERO_SD_MAX_N, remedy);
 	rec->worthless = false;
@@ -267,8 +266,8 @@ static int take_number(struct incise_recorder_stream *stream, uint64_t seq,
 {
 	if (seq > INT64_MAX || (stream->started && seq < stream->next))
 		return incise_error_set(err, EIO,
-					"%s: sample %llu came after %llu; the driver of "
-					"this device is at fault",
+					"%s: sample %llu arrived after %llu; the "
+					"driver of this device is faulty",
 					stream->device, (unsigned long long)seq,
 					(unsigned long long)stream->next - 1);
 	*t_ns = incise_timeline_sample(&stream->timeline, seq, arrival_ns);
@@ -453,8 +452,9 @@ int incise_recorder_release(struct incise_recorder *rec, struct incise_error *er
 		incise_force_lost(incise_rig_force(rec->rig));
 	rec->streams[INCISE_LEDGER_TRACKER].lost_at_start =
 		incise_tracker_lost(incise_rig_tracker(rec->rig));
-	if (incise_recorder_note(rec, "trigger", "triggered; it begins 1 s before") !=
-	    SQLITE_OK)
+	if (incise_recorder_note(rec, "trigger",
+				 "triggered; the recording starts 1 s "
+				 "before") != SQLITE_OK)
 		return incise_recorder_fail(rec, err);
 	while (!rc && incise_ring_take(&rec->pretrigger.force, &force, 1))
 		if (force.t_ns >= from_ns)
@@ -539,9 +539,8 @@ static int check_pace(struct incise_recorder *rec, int64_t t_ns, struct incise_e
 	if (!pace->even) {
 		incise_error_set(
 			why, EIO,
-			"%s: sends %.0f records a second, and %g are expected; set "
-			"its rate and sync, or tracker_setup in rig.conf, and "
-			"begin again",
+			"%s: sends %.0f records/s instead of %g; set its rate and "
+			"sync, or tracker_setup in rig.conf, and start again",
 			info->name, hz, info->rate_hz);
 		return -EIO;
 	}
@@ -550,8 +549,8 @@ static int check_pace(struct incise_recorder *rec, int64_t t_ns, struct incise_e
 		rec,
 		incise_recorder_note(
 			rec, "rate",
-			"tracker: %.0f records arrive a second, and %g are "
-			"expected: do not trust their t_ns from %.1f s before",
+			"tracker: %.0f records/s arrive instead of %g: their t_ns is "
+			"wrong from %.1f s before",
 			hz, info->rate_hz, pace->odd_ns * 1e-9),
 		err);
 }
@@ -571,7 +570,7 @@ int incise_recorder_put_force(struct incise_recorder *rec,
 	if (sample->code < 0 || sample->code > top)
 		rc = incise_error_set(&why, EIO,
 				      "%s: code %d is not within 0 to %lld; the driver "
-				      "of this device is at fault",
+				      "of this device is faulty",
 				      stream->device, sample->code, (long long)top);
 	if (rc || take_number(stream, sample->seq, sample->t_ns, &row.t_ns, &why))
 		return incise_recorder_end_stream(rec, INCISE_LEDGER_FORCE, why.text,

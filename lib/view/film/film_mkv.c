@@ -195,7 +195,7 @@ static struct incise_film_coder *film_open(const char *path, int width, int heig
 		rc = open_file(coder);
 	if (rc >= 0)
 		return coder;
-	rc = av_fail(coder, rc, "a film cannot be begun", err);
+	rc = av_fail(coder, rc, "the film cannot be started", err);
 	free_coder(coder);
 	errno = -rc;
 	return NULL;
@@ -251,7 +251,7 @@ static int film_close(struct incise_film_coder *coder, struct incise_error *err)
 		rc = coder->format->pb->error;
 	if (rc >= 0)
 		rc = avio_closep(&coder->format->pb);
-	rc = rc < 0 ? av_fail(coder, rc, "the film cannot be ended", err) : 0;
+	rc = rc < 0 ? av_fail(coder, rc, "the film cannot be closed", err) : 0;
 	free_coder(coder);
 	return rc;
 }

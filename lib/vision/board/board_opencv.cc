@@ -57,15 +57,14 @@ int find(const struct incise_camera_frame &frame, int columns, int rows, double 
 
 	if (ret)
 		return incise_error_set(err, -ret,
-					"board: the picture's sizes do not fit");
+					"board: the frame's sizes are inconsistent");
 	if (columns < 3 || columns > 100 || rows < 3 || rows > 100)
 		return incise_error_set(err, EINVAL,
 					"board: %d x %d inner corners: give 3 to 100",
 					columns, rows);
 	ret = image.bring(cv::Rect(cv::Point(), image.size));
 	if (ret)
-		return incise_error_set(err, -ret,
-					"board: the picture cannot be decoded");
+		return incise_error_set(err, -ret, "board: the frame cannot be decoded");
 
 	cv::Mat grey(image.size, CV_8U);
 	std::vector<cv::Point2f> found;
@@ -91,9 +90,8 @@ int find(const struct incise_camera_frame &frame, int columns, int rows, double 
 	if ((int)found.size() != columns * rows)
 		return incise_error_set(
 			err, ENODATA,
-			"board: no chessboard of %d x %d inner corners is "
-			"to be seen: show all of it, sharp and evenly lit, "
-			"with white around it",
+			"board: no chessboard of %d x %d inner corners found; show all "
+			"of it, sharp and evenly lit, with white around it",
 			columns, rows);
 	refine(grey, columns, found);
 	/* OpenCV counts from the middle of the first pixel. */

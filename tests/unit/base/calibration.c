@@ -224,7 +224,7 @@ static void what_failed_is_not_in_force(void **state)
 			       "force_mV_N = 1250.0; ## mV/N, U = 0.67 (k = 2), force, "
 			       "2026-11-21\n"));
 	/* our own comments are not heaped up */
-	assert_null(strstr(strstr(content(file.path), "## In") + 1, "## In"));
+	assert_null(strstr(strstr(content(file.path), "## Active") + 1, "## Active"));
 	temp_file_free(&file);
 }
 
@@ -309,7 +309,9 @@ static void wrong_records_change_nothing(void **state)
 		assert_int_equal(incise_calibration_append(file.path, &row[i], &err),
 				 -EINVAL);
 		assert_int_equal(err.code, EINVAL);
-		assert_non_null(strstr(err.text, "nothing appended: of the calibration"));
+		assert_non_null(
+			strstr(err.text,
+			       "nothing appended: the calibration has an invalid field"));
 		assert_string_equal(content(file.path), "force_mV_N = 1200;\n");
 	}
 	temp_file_free(&file);
@@ -348,7 +350,7 @@ static void wrong_files_are_named(void **state)
 		{ENTRY(VALUE "covariance = [1.0, 2.0];"),
 		 ":2: history: covariance: expected n (n + 1)/2"},
 		{ENTRY(VALUE "covariance = [1e999];"),
-		 ":3: covariance: expected numbers that are finite"},
+		 ":3: covariance: expected finite numbers"},
 		{ENTRY(VALUE "covariance = \"x\";"), ":3: covariance: expected at most"},
 		{ENTRY(VALUE "raw_crc32c = \"xyz\";"), ":3: history: raw_crc32c: expect"},
 		{ENTRY(VALUE "raw_crc32c = 3;"), ":3: raw_crc32c: expected text"},
@@ -457,12 +459,9 @@ static void what_is_empty_is_said(void **state)
 	assert_string_equal(
 		text,
 		"## Calibration of a haptic cutting rig, kept by 'incise calibrate'; "
-		"see calibration.conf(5).\n"
-		"# by hand\n"
-		"\n## In force; what is absent is nominal.\n"
-		"\n## Each calibration, oldest first; u is a standard uncertainty (k = "
-		"1).\n"
-		"history = (\n);\n");
+		"see calibration.conf(5).\n# by hand\n\n## Active values; absent keys "
+		"have their nominal value.\n\n## Each calibration, oldest first; u is "
+		"a standard uncertainty (k = 1).\nhistory = (\n);\n");
 	free(text);
 }
 
@@ -513,7 +512,7 @@ static void text_is_as_documented(void **state)
 	setlocale(LC_ALL, "C");
 	assert_non_null(strstr(
 		text,
-		"## In force; what is absent is nominal.\n"
+		"## Active values; absent keys have their nominal value.\n"
 		"force_mV_N = 1238.25; ## mV/N, U = 2.5 (k = 2), force, 2026-11-21\n"
 		"force_zero_mV = 170.0; ## mV\n"
 		"tip_mm = [0.0, 0.3333333333333333, 0.0]; ## mm\n"));

@@ -85,14 +85,14 @@ static void test_a_missing_library_is_named_with_its_package(void **state)
 			 "%s: cannot open shared object file: No such file or directory",
 			 cases[i][0]);
 		snprintf(want, sizeof(want),
-			 "a: %s is missing; install what it needs: sudo apt-get install "
-			 "%s",
+			 "a: %s is missing; install it: sudo apt-get install %s",
 			 cases[i][0], cases[i][1]);
 		assert_int_equal(incise_error_library(&err, "a", said), -ENOEXEC);
 		assert_string_equal(err.text, want);
 	}
 	incise_error_library(&err, "a", "x.so: file too short");
-	assert_string_equal(err.text, "a: x.so: file too short; install what it needs");
+	assert_string_equal(err.text, "a: x.so: file too short; install the missing "
+				      "library");
 	/* A name that is no library's is no package either. */
 	incise_error_library(&err, "a",
 			     "lib;rm.so.1: cannot open shared object file: No such file");

@@ -82,7 +82,7 @@ static void test_limits_are_named(void **state)
 	assert_non_null(file);
 	assert_int_equal(truncate(temp.path, (off_t)1 << 40), 0);
 	assert_int_equal(incise_infile_line(file, &line, &err), -EINVAL);
-	assert_non_null(strstr(err.text, "l.txt:1: a NUL byte: not a note"));
+	assert_non_null(strstr(err.text, "l.txt:1: a NUL byte: this is not a note"));
 	incise_infile_close(file);
 	temp_file_free(&temp);
 }
@@ -110,7 +110,8 @@ static void test_pipes(void **state)
 	assert_int_equal(mkfifo(temp.path, 0600), 0);
 	assert_null(incise_infile_open(temp.path, &stream, &err));
 	assert_int_equal(errno, ENODATA);
-	assert_non_null(strstr(err.text, "/pipe: nobody writes to this pipe; give one"));
+	assert_non_null(strstr(err.text, "/pipe: no program writes to this pipe; give "
+					 "one"));
 	assert_null(incise_infile_open(temp.path, &regular, &err));
 	assert_int_equal(errno, EINVAL);
 	assert_non_null(strstr(err.text, "/pipe: not a regular file"));

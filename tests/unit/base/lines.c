@@ -43,7 +43,7 @@ static void test_errors(void **state)
 	assert_int_equal(incise_lines_open(&in, file.path, &text, &err), 0);
 	assert_int_equal(incise_lines_next(&in, "\n"), 1);
 	assert_int_equal(incise_lines_next(&in, "\n"), -EINVAL);
-	assert_non_null(strstr(err.text, "l.txt:2: a NUL byte: not a text"));
+	assert_non_null(strstr(err.text, "l.txt:2: a NUL byte: this is not a text"));
 	incise_lines_close(&in);
 	assert_int_equal(incise_lines_open(&in, file.dir, &text, &err), -EISDIR);
 	assert_non_null(strstr(err.text, ": Is a directory; give one"));

@@ -263,7 +263,7 @@ static void test_wrong_view(void **state)
 	/* the same view in the plane is no ground to stand on */
 	rig.views.plane = 4;
 	assert_int_equal(incise_calibrate_depth_board(&rig.views, &fit, &err), -EDOM);
-	assert_non_null(strstr(err.text, "view 5, which lies in the cutting plane"));
+	assert_non_null(strstr(err.text, "view 5, in the cutting plane"));
 }
 
 static void few(struct rig *rig)

@@ -248,8 +248,8 @@ static void test_refusals(void **state)
 		const struct link *link;
 		const char *said;
 	} cases[] = {
-		{&even, &force_link, "periodic"}, {&small, &force_link, "the motion is"},
-		{&usual, &brief, "in common"},	  {&usual, &loud, "too little alike"},
+		{&even, &force_link, "periodic"}, {&small, &force_link, "the motion has"},
+		{&usual, &brief, "in common"},	  {&usual, &loud, "correlate too little"},
 		{&usual, &late, "beyond"},	  {&usual, &clipped, "clipped"},
 	};
 

@@ -254,10 +254,14 @@ static void refuses_by_name(void **state)
 		int rc;
 		const char *text;
 	} row[] = {
-		{swap_columns, -EDOM, "swapped"},     {turn_sign, -EDOM, "reversed"},
-		{saturate, -EDOM, "does not follow"}, {lift_off, -EDOM, "not in touch"},
-		{unplug, -EDOM, "does not move"},     {lose_steps, -EDOM, "lost"},
-		{shrink, -EDOM, "too small"},	      {scatter, -EDOM, "far off"},
+		{swap_columns, -EDOM, "swapped"},
+		{turn_sign, -EDOM, "reversed"},
+		{saturate, -EDOM, "does not follow"},
+		{lift_off, -EDOM, "without contact"},
+		{unplug, -EDOM, "does not react"},
+		{lose_steps, -EDOM, "lost"},
+		{shrink, -EDOM, "too small"},
+		{scatter, -EDOM, "are outliers"},
 		{not_a_number, -EINVAL, "numbers"},
 	};
 	static struct incise_calibrate_stepper_point points[POINTS_MAX];

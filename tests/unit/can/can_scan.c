@@ -92,7 +92,7 @@ static void what_is_no_drive_is_listed_too(void **state)
 	assert_int_equal(can_stepper_scan(&can_rig_of, "can-test", found, &list, &err),
 			 0);
 	assert_int_equal(list.n, 1);
-	assert_non_null(strstr(list.device[0].what, "profile 401, no CiA 402 drive"));
+	assert_non_null(strstr(list.device[0].what, "profile 401, not a CiA 402 drive"));
 	assert_false(list.device[0].usable);
 }
 
@@ -119,7 +119,7 @@ static void what_is_not_told_is_not_made_up(void **state)
 	requests = rig.drive.requests;
 	assert_int_equal(requests, 2);
 	assert_string_equal(property(&list.device[0], "device_type"), "(there is none)");
-	assert_non_null(strstr(list.device[0].what, "does not say what it is"));
+	assert_non_null(strstr(list.device[0].what, "reports no device type"));
 	assert_false(list.device[0].usable);
 }
 

@@ -158,10 +158,10 @@ static const struct {
 	const char *says;
 } faults[] = {
 	{"EMCY", emcy, INCISE_STEPPER_FAULT_ALARM, "(3210h)"},
-	{"no heartbeat", heartbeat, INCISE_STEPPER_FAULT_LOST, "no heartbeat of it"},
+	{"no heartbeat", heartbeat, INCISE_STEPPER_FAULT_LOST, "no heartbeat from it"},
 	{"no TPDO", tpdo, INCISE_STEPPER_FAULT_LOST, "no status (TPDO1)"},
-	{"unplugged", unplugged, INCISE_STEPPER_FAULT_LOST, "see its power and cable"},
-	{"reboot", reboot, INCISE_STEPPER_FAULT_LOST, "began anew"},
+	{"unplugged", unplugged, INCISE_STEPPER_FAULT_LOST, "check its power and cable"},
+	{"reboot", reboot, INCISE_STEPPER_FAULT_LOST, "it restarted"},
 	{"blocked", blocked, INCISE_STEPPER_FAULT_FOLLOWING, "off its target by"},
 	{"bus-off", bus_off, INCISE_STEPPER_FAULT_BUS, "the bus is off"},
 	{"queue full", queue_full, INCISE_STEPPER_FAULT_BUS, "queue is full"},
@@ -274,14 +274,14 @@ static void a_program_that_stood_still_does_not_go_on(void **state)
 	s = can_rig_look(&rig);
 	assert_true(s.faults & INCISE_STEPPER_FAULT_DEADMAN);
 	assert_true(incise_stepper_cause(rig.stepper, cause, sizeof(cause)) > 0);
-	assert_non_null(strstr(cause, "this program stood still for 300"));
+	assert_non_null(strstr(cause, "this program was stopped for 300"));
 	assert_int_equal(incise_stepper_set(rig.stepper, 15), -EIO);
 	can_rig_hold(&rig, 15, 2000 * MS);
 	s = can_rig_look(&rig);
 	incise_stepper_cause(rig.stepper, cause, sizeof(cause));
 	if (s.state != INCISE_STEPPER_STATE_FAULT ||
 	    !(s.faults & INCISE_STEPPER_FAULT_DEADMAN) ||
-	    !strstr(cause, "this program stood still for 300"))
+	    !strstr(cause, "this program was stopped for 300"))
 		fail_msg("%s, faults %#x, \"%s\"", incise_stepper_state_name(s.state),
 			 s.faults, cause);
 	assert_false(drive_powered(&rig.drive));
@@ -516,7 +516,7 @@ static void inputs_that_fall_silent_are_a_fault(void **state)
 	assert_int_equal(can_rig_look(&rig).faults, 0);
 	rig.drive.od[OD_TPDO2_COB].value |= 0x80000000u;
 	can_rig_hold(&rig, 10, 400 * MS);
-	stopped(INCISE_STEPPER_FAULT_LOST, "its inputs (TPDO2) were not heard");
+	stopped(INCISE_STEPPER_FAULT_LOST, "no inputs (TPDO2)");
 	can_rig_close(&rig);
 	/* A drive without the event timer gives no such indication. */
 	can_rig_init(&rig);
@@ -660,7 +660,7 @@ static void homing_can_fail_and_be_stopped(void **state)
 	can_rig_init(&rig);
 	can_rig_open_or_fail(&rig);
 	assert_int_equal(incise_stepper_home(rig.stepper, NULL, NULL, &err), -EIO);
-	assert_non_null(strstr(err.text, "not powered"));
+	assert_non_null(strstr(err.text, "it is off"));
 	can_rig_enable_or_fail(&rig);
 	rig.drive.homing_fails = true;
 	assert_int_equal(incise_stepper_home(rig.stepper, NULL, NULL, &err), -EIO);

@@ -174,19 +174,20 @@ static void test_lines(void **state)
 		const char *line;
 	} cases[] = {
 		{-EREMOTEIO, 0x06090030, -EOPNOTSUPP,
-		 "here: the drive refuses to let quick-stop option (605A:0) be read: invalid "
-		 "value (06090030h); see its manual whether it can do this, and its firmware"},
+		 "here: the drive does not allow its quick-stop option (605A:0) to be "
+		 "read: invalid value (06090030h); check its manual and its firmware"},
 		{-ETIMEDOUT, 0, -ETIMEDOUT,
-		 "here: no answer when quick-stop option (605A:0) was to be read; see the "
-		 "drive's power, its wiring, node id and bit rate"},
+		 "here: no answer when quick-stop option (605A:0) was to be read; "
+		 "check the drive's power, its wiring, node id and bit rate"},
 		{-EPROTO, 0, -EPROTO,
-		 "here: the answer makes no sense when quick-stop option (605A:0) was to be "
-		 "read; see that no other node has this id and that it is a CiA 402 drive"},
+		 "here: invalid answer when quick-stop option (605A:0) was to be read; "
+		 "check that no other node has this id and that it is a CiA 402 drive"},
 		{-EINTR, 0, -EINTR,
 		 "here: stopped when quick-stop option (605A:0) was to be read"},
 		{-ENETDOWN, 0, -ENETDOWN,
-		 "here: the bus can-test failed when quick-stop option (605A:0) was to be "
-		 "read: Network is down; see `ip -details link`, cables and termination"},
+		 "here: the bus can-test failed when quick-stop option (605A:0) was to "
+		 "be read: Network is down; check `ip -details link`, cables and "
+		 "termination"},
 	};
 	struct led *led = *state;
 
@@ -225,8 +226,7 @@ static void test_objects(void **state)
 	assert_string_equal(
 		led->err.text,
 		"here: the drive did not keep quick-stop option (605A:0): 3 was "
-		"written, 65535 is read (FFFFh); see the range that its manual "
-		"gives");
+		"written, 65535 is read (FFFFh); check the range in its manual");
 
 	assert_int_equal(cia402_read(&led->client, &absent, &value), -EOPNOTSUPP);
 	assert_int_equal(cia402_write(&led->client, &absent, 1), -EOPNOTSUPP);

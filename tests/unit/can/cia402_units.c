@@ -204,7 +204,7 @@ static void test_identify(void **state)
 	assert_int_equal(cia402_identify(&led->client), -EOPNOTSUPP);
 	led->drive.mute = true;
 	assert_int_equal(cia402_identify(&led->client), -ENODEV);
-	assert_non_null(strstr(led->err.text, "nobody answers at node 0x10 on can-test"));
+	assert_non_null(strstr(led->err.text, "no answer from node 0x10 on can-test"));
 	led->drive.send_error = -ENETDOWN;
 	assert_int_equal(cia402_identify(&led->client), -ENETDOWN);
 }

@@ -222,7 +222,7 @@ static void a_rate_that_none_has_is_refused(void **state)
 	adapter_new(&a);
 	assert_int_equal(adapter_open(&a, 83333, &err), -EINVAL);
 	assert_non_null(
-		strstr(err.text, "rig.conf:1: stepper: no adapter has 83333 bit/s"));
+		strstr(err.text, "rig.conf:1: stepper: no adapter supports 83333 bit/s"));
 	close(a.fd);
 }
 
@@ -239,17 +239,17 @@ static void the_rate_may_follow_the_tty(void **state)
 		{"@1000000", 0, 0, ".C.S8.O."},
 		{"@10000", 0, 0, ".C.S0.O."},
 		{"@500000", 250000, -EINVAL,
-		 "is given 500000 bit/s behind its @, and bitrate is 250000"},
-		{"@83333", 0, -EINVAL, "no adapter has 83333 bit/s"},
-		{"@0", 0, -EINVAL, "no adapter has 0 bit/s"},
-		{"@500k", 0, -EINVAL, "no adapter has 500k bit/s"},
-		{"@500000 ", 0, -EINVAL, "no adapter has 500000  bit/s"},
-		{"@4295467296", 0, -EINVAL, "no adapter has 4295467296 bit/s"},
+		 "has 500000 bit/s after its @, but bitrate is 250000"},
+		{"@83333", 0, -EINVAL, "no adapter supports 83333 bit/s"},
+		{"@0", 0, -EINVAL, "no adapter supports 0 bit/s"},
+		{"@500k", 0, -EINVAL, "no adapter supports 500k bit/s"},
+		{"@500000 ", 0, -EINVAL, "no adapter supports 500000  bit/s"},
+		{"@4295467296", 0, -EINVAL, "no adapter supports 4295467296 bit/s"},
 		{"@99999999999999999999", 0, -EINVAL,
-		 "no adapter has 99999999999999999999 bit/s"},
-		{"@", 0, -ENODEV, "@ is not there"},
-		{"@-500000", 0, -ENODEV, "@-500000 is not there"},
-		{"@500000@", 0, -ENODEV, "@500000@ is not there"},
+		 "no adapter supports 99999999999999999999 bit/s"},
+		{"@", 0, -ENODEV, "@; plug in the adapter"},
+		{"@-500000", 0, -ENODEV, "@-500000; plug in the adapter"},
+		{"@500000@", 0, -ENODEV, "@500000@; plug in the adapter"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -655,12 +655,12 @@ static void a_path_that_is_no_tty_is_refused(void **state)
 		int code;
 		const char *words;
 	} cases[] = {
-		{file, -EINVAL, "is no serial line"},
-		{pipe, -EINVAL, "is no serial line"},
-		{folder, -EINVAL, "is no serial line"},
-		{"/dev/null", -EINVAL, "is no serial line"},
-		{"", -ENODEV, "is not there"},
-		{"/dev/ttyACM4711", -ENODEV, "is the adapter plugged in"},
+		{file, -EINVAL, "is not a serial port"},
+		{pipe, -EINVAL, "is not a serial port"},
+		{folder, -EINVAL, "is not a serial port"},
+		{"/dev/null", -EINVAL, "is not a serial port"},
+		{"", -ENODEV, "no such device"},
+		{"/dev/ttyACM4711", -ENODEV, "plug in the adapter"},
 	};
 	int fd;
 

@@ -262,27 +262,27 @@ static void a_failed_open_has_a_message(void **state)
 		 0},
 		{"can0", 0, EPROTONOSUPPORT, 0, 0, false, -EAFNOSUPPORT,
 		 "modprobe can_raw", 0},
-		{"can0", 0, EPERM, 0, 0, false, -EACCES, "no right", 0},
+		{"can0", 0, EPERM, 0, 0, false, -EACCES, "no permission", 0},
 		{"can0", 0, EMFILE, 0, 0, false, -EIO, "Too many open files", 0},
 		{"can0", 0, 0, EINVAL, 0, false, -EIO, "Invalid argument", 0},
 		{"can0", 0, 0, 0, ENODEV, false, -ENODEV, "No such device", 0},
 		{"can0", 0, 0, 0, ENETDOWN, false, -ENETDOWN, "Network is down", 0},
-		{"nope", 0, 0, 0, 0, false, -ENODEV, "there is no interface nope", 0},
-		{"", 0, 0, 0, 0, false, -ENODEV, "there is no interface", 0},
-		{"can0", 0, 0, 0, 0, false, -ENODEV, "there is no interface can0",
-		 ENODEV},
+		{"nope", 0, 0, 0, 0, false, -ENODEV, "no such interface nope", 0},
+		{"", 0, 0, 0, 0, false, -ENODEV, "no such interface", 0},
+		{"can0", 0, 0, 0, 0, false, -ENODEV, "no such interface can0", ENODEV},
 		{"can0", 0, 0, 0, 0, false, -EIO,
-		 "the kernel does not tell of can0: Connection timed out", ETIMEDOUT},
+		 "the kernel has no information on can0: Connection timed out",
+		 ETIMEDOUT},
 		{"can0", 0, 0, 0, 0, false, -EIO,
-		 "the kernel does not tell of can0: Bad message", EBADMSG},
+		 "the kernel has no information on can0: Bad message", EBADMSG},
 		{"can0", 0, 0, 0, 0, false, -ENOMEM, "can0: Cannot allocate", ENOMEM},
-		{"lo", 0, 0, 0, 0, false, -EINVAL, "lo is no CAN interface", 0},
+		{"lo", 0, 0, 0, 0, false, -EINVAL, "lo is not a CAN interface", 0},
 		{"can0", 0, 0, 0, 0, true, -ENETDOWN,
 		 "can0 is down: ip link set can0 up type can bitrate 1000000", 0},
 		{"vcan0", 0, 0, 0, 0, true, -ENETDOWN,
 		 "vcan0 is down: ip link set vcan0 up", 0},
 		{"can0", 500000, 0, 0, 0, false, -EINVAL,
-		 "can0 runs at 1000000 bit/s, bitrate is 500000", 0},
+		 "can0 runs at 1000000 bit/s, but bitrate is 500000", 0},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -567,7 +567,7 @@ static void a_node_has_one_owner(void **state)
 	assert_int_equal(open_bus(&second, interface, 0, 113, &err), -EBUSY);
 	assert_int_equal(err.code, EBUSY);
 	assert_ptr_equal(strstr(err.text,
-				"rig.conf:1: stepper: another program drives it: "),
+				"rig.conf:1: stepper: another program drives it; "),
 			 err.text);
 	/* The message has the name that ss prints. */
 	snprintf(name, sizeof(name), "@incise-can/%s/113)", interface);

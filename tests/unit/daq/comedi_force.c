@@ -120,13 +120,15 @@ static void refusals(void **state)
 		{"/dev/comedi0:-1", 1e4, NULL, 0, EINVAL, "expected comedi:"},
 		{"/dev/comedi0:4294967296", 1e4, NULL, 0, EINVAL, "expected comedi:"},
 		{"", 1e4, NULL, 0, EINVAL, "expected comedi:"},
-		{"/dev/comedi0", 1e4, &card.open_error, EACCES, EACCES, "join the group"},
+		{"/dev/comedi0", 1e4, &card.open_error, EACCES, EACCES, "join its group"},
 		{"/dev/comedi0", 1e4, &card.open_error, ENOENT, ENOENT,
 		 "load the driver of your card"},
-		{"/dev/comedi0:1", 1e4, NULL, 0, EOPNOTSUPP, "subdevice 1 is no analog"},
-		{"/dev/comedi0:7", 1e4, NULL, 0, EOPNOTSUPP, "subdevice 7 is no analog"},
+		{"/dev/comedi0:1", 1e4, NULL, 0, EOPNOTSUPP,
+		 "subdevice 1 is not an analogue"},
+		{"/dev/comedi0:7", 1e4, NULL, 0, EOPNOTSUPP,
+		 "subdevice 7 is not an analogue"},
 		{"/dev/comedi0", 1e4, &card.type, COMEDI_SUBD_AO, EOPNOTSUPP,
-		 "is no analog input"},
+		 "is not an analogue input"},
 		{"/dev/comedi0", 1e4, &card.flags, SDF_CMD_READ | SDF_BUSY, EBUSY,
 		 "in use by another program"},
 		{"/dev/comedi0", 1e4, &card.n_channels, 3, EINVAL,
@@ -134,9 +136,9 @@ static void refusals(void **state)
 		{"/dev/comedi0", 1e4, &card.maxdata, 5000, EOPNOTSUPP,
 		 "codes up to 5000 are not"},
 		{"/dev/comedi0", 1e4, &card.n_ranges, 0, ERANGE, "(ranges in V: none)"},
-		{"/dev/comedi0", 1e4, &card.no_timer, 1, EOPNOTSUPP, "by a timer"},
+		{"/dev/comedi0", 1e4, &card.no_timer, 1, EOPNOTSUPP, "timed sampling"},
 		{"/dev/comedi0", 1e4, &card.period_least_ns, 200000, EINVAL,
-		 "does not take 10000 Hz, next to it is 5000 Hz"},
+		 "does not support 10000 Hz, the nearest is 5000 Hz"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -533,7 +535,7 @@ static void a_card_is_told_of(void **state)
 		{"time_stamps", "by arrival"},
 	};
 
-	/* Its second subdevice is no analog input. */
+	/* Its second subdevice is not an analogue input. */
 	assert_int_equal(scan("/dev/null:0"), 0);
 	assert_int_equal(found.n, 1);
 	assert_string_equal(found.device[0].device, "comedi:/dev/null:0");

@@ -177,9 +177,9 @@ static void refusals(void **state)
 		{"", 10000, EINVAL, "expected iio:NAME"},
 		{"adc", 0, EINVAL, "correct force_setup"},
 		{"adc", 1e9, EINVAL, "correct force_setup"},
-		{"other", 10000, ENODEV, "there is no IIO device \"other\""},
+		{"other", 10000, ENODEV, "no such IIO device \"other\""},
 		/* set up wholly; then there is no such folder in sysfs to start it by */
-		{"adc", 10000, ENOENT, "null starts no buffer of 5000 samples"},
+		{"adc", 10000, ENOENT, "null cannot start a buffer of 5000 samples"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {

@@ -298,7 +298,7 @@ static void where_it_is(void **state)
 	rate_setup(NULL);
 	own()->key = "other";
 	assert_int_equal(set_to(3000, NULL, &err), -EOPNOTSUPP);
-	assert_non_null(strstr(err.text, "name a timer in force_setup.trigger"));
+	assert_non_null(strstr(err.text, "name a timer trigger in force_setup.trigger"));
 }
 
 /* Converters divide a clock: within 1 % it is the rate that was asked for. */
@@ -602,27 +602,29 @@ static void refusals(void **state)
 	} cases[] = {
 		{1, "adc", "", ENOSYS, "load the driver of your converter"},
 		{0, "other", "", ENODEV,
-		 "there is no IIO device \"other\"; there are: adc (null)"},
-		{0, "timer", "", ENODEV, "there is no IIO device \"timer\""},
+		 "no such IIO device \"other\"; there are: adc (null)"},
+		{0, "timer", "", ENODEV, "no such IIO device \"timer\""},
 		{2, "adc", "", EBUSY, "null is in use by another program"},
-		{3, "adc", "", EACCES, "may not open the file of null; join the group"},
-		{4, "adc", "", ENODEV, "has no voltage0 that a buffer can have"},
-		{5, "adc", "", EOPNOTSUPP, "has no time stamps"},
+		{3, "adc", "", EACCES,
+		 "no permission to open the file of null; join its group"},
+		{4, "adc", "", ENODEV, "has no voltage0 for buffers"},
+		{5, "adc", "", EOPNOTSUPP, "has no timestamps"},
 		{6, "adc", "", EOPNOTSUPP, "samples of null are 32 bits of 32"},
 		{7, "adc", "", EINVAL, "set force_setup.full_scale_V"},
-		{8, "adc", "", EOPNOTSUPP, "stay on the clock \"realtime\""},
-		{9, "adc", "", EACCES, "may not set the clock of time stamps of null"},
-		{10, "adc", "", ENODEV, "nothing starts the conversions"},
+		{8, "adc", "", EOPNOTSUPP, "remain on the clock \"realtime\""},
+		{9, "adc", "", EACCES,
+		 "no permission to set the clock of timestamps of null"},
+		{10, "adc", "", ENODEV, "no trigger for "},
 		{0, "adc", "none", ENODEV,
-		 "there is no trigger \"none\"; there are: own (trigger0), timer"},
-		{0, "adc", "adc", ENODEV, "there is no trigger \"adc\""},
-		{14, "adc", "timer", EINVAL, "does not take the trigger \"timer\""},
+		 "no such trigger \"none\"; there are: own (trigger0), timer"},
+		{0, "adc", "adc", ENODEV, "no such trigger \"adc\""},
+		{14, "adc", "timer", EINVAL, "does not accept the trigger \"timer\""},
 		{11, "adc", "", EOPNOTSUPP, "neither null nor its trigger has a rate"},
 		{12, "adc", "", EINVAL,
-		 "does not take 10000 Hz and runs at 1000 Hz; set "
+		 "does not support 10000 Hz and runs at 1000 Hz; set "
 		 "force_setup.rate_hz (available: 1000 2000)"},
-		{13, "adc", "", EACCES, "may not set the rate of null"},
-		{15, "adc", "", EINVAL, "does not take 10000 Hz: Invalid argument"},
+		{13, "adc", "", EACCES, "no permission to set the rate of null"},
+		{15, "adc", "", EINVAL, "does not support 10000 Hz: Invalid argument"},
 		{12, "adc", "timer", EINVAL,
 		 "null converts at 1000 Hz, its trigger at 10000 Hz"},
 	};

@@ -63,7 +63,8 @@ static void what_does_not_fit_is_refused_with_its_line(void **state)
 		{"spring_N_mm = 2.0; lead_mm = 2.0;", "actuator.travel_mm is missing"},
 		{"spring_N_mm = 2.0; travel_mm = 2.0;", "actuator.lead_mm is missing"},
 		{NEEDED "\nspeed = 3;", "r:3: actuator.speed: unknown key"},
-		{NEEDED "\nvelocity_cm_s = 3;", "expected velocity_mm_s, in that unit"},
+		{NEEDED "\nvelocity_cm_s = 3;",
+		 "expected velocity_mm_s, in the unit of its name"},
 		{NEEDED "\nmicrosteps = 16.5;",
 		 "r:3: actuator.microsteps: expected a whole"},
 		{NEEDED "\nmicrosteps = 0;",
@@ -100,7 +101,7 @@ static void what_does_not_fit_is_refused_with_its_line(void **state)
 		{NEEDED "\nlines = { step = 1; dir = 2; stop = 3; };",
 		 "stop: unknown key"},
 		{NEEDED "\nlines = { step = 1; dir = 2; active_low = [\"home\"]; };",
-		 "\"home\" is no line that is given here"},
+		 "\"home\" is not a line of this group"},
 		{NEEDED "\nlines = { step = 1; dir = 2; active_low = \"dir\"; };",
 		 "expected names such as"},
 		{NEEDED "\nlines = { step = 1; dir = 2; active_low = [1]; };",
@@ -172,16 +173,16 @@ static void the_machine_must_hold_the_rate(void **state)
 	assert_true(a.high_ns == 5000 && a.low_ns == 5000);
 	a = actuator_good("", NEEDED);
 	assert_int_equal(incise_motor_fit(&a, "m", 15999, 100, &err), -ERANGE);
-	assert_non_null(strstr(err.text, "asks for 16000 steps/s"));
-	assert_non_null(strstr(err.text, "holds 15999 at most"));
+	assert_non_null(strstr(err.text, "needs 16000 steps/s"));
+	assert_non_null(strstr(err.text, "reaches at most 15999"));
 	assert_non_null(strstr(err.text, "at most 9.9993 mm/s"));
 	/* Pulses so long that the rate does not fit: 2·40 µs are 12 500 steps/s. */
 	a = actuator_good("", NEEDED);
 	assert_int_equal(incise_motor_fit(&a, "m", 20000, 40000, &err), -ERANGE);
-	assert_non_null(strstr(err.text, "holds 12500 at most"));
+	assert_non_null(strstr(err.text, "reaches at most 12500"));
 	a = actuator_good("", NEEDED "high_us = 7.0;");
 	assert_int_equal(incise_motor_fit(&a, "m", 20000, 8000, &err), -ERANGE);
-	assert_non_null(strstr(err.text, "no less than 8"));
+	assert_non_null(strstr(err.text, "at least 8"));
 }
 
 int main(void)

@@ -185,8 +185,8 @@ static void what_does_not_fit_is_refused_with_its_line(void **state)
 		{"can = 3;", "r:2: actuator.can: expected a group"},
 		{"can = {\nspeed = 3; };", "r:3: actuator.can.speed: unknown key"},
 		{"can = {\nfollowing_um = 3; };",
-		 "actuator.can.following_um: unknown key; expected following_mm, in that "
-		 "unit"},
+		 "actuator.can.following_um: unknown key; expected following_mm, in the "
+		 "unit of its name"},
 		{"can = {\nmode = \"CSP\"; };",
 		 "r:3: actuator.can.mode: expected \"csp\", \"csv\" or \"cst\", found "
 		 "\"CSP\"; correct it"},
@@ -195,8 +195,8 @@ static void what_does_not_fit_is_refused_with_its_line(void **state)
 		{"can = {\nabsolute = 1; };",
 		 "r:3: actuator.can.absolute: expected true or false"},
 		{"can = {\ncycle_us = 1005; };",
-		 "r:3: actuator.can.cycle_us: expected a whole number of 10 us, as a drive "
-		 "keeps it in a byte, found 1005; give 1000 or 1010"},
+		 "r:3: actuator.can.cycle_us: expected a multiple of 10 us, found "
+		 "1005; give 1000 or 1010"},
 		{"can = {\ncycle_us = 1000.5; };",
 		 "r:3: actuator.can.cycle_us: expected a whole number from 500 to 2000"},
 		{"can = {\nmode = \"cst\"; };",
@@ -204,8 +204,8 @@ static void what_does_not_fit_is_refused_with_its_line(void **state)
 		{"can = { stiffness_permille_mm = 3;\nmode = \"cst\"; };",
 		 "r:3: actuator.can.torque_max_permille is missing"},
 		{"can = { mode = \"csv\";\nposition_gain_1_s = 223; };",
-		 "r:3: actuator.can.position_gain_1_s: expected at most 222.5 1/s, half of "
-		 "what is stable over a bus with cycle_us = 1000, found 223; correct it"},
+		 "r:3: actuator.can.position_gain_1_s: expected at most 222.5 1/s, "
+		 "half of the stable limit with cycle_us = 1000, found 223; correct it"},
 		/* Twice the cycle, half the gain. */
 		{"can = { mode = \"csv\"; cycle_us = 2000;\nposition_gain_1_s = 112; };",
 		 "at most 111.2 1/s"},

@@ -165,12 +165,12 @@ static void test_refused(void **state)
 		int key, pressed, no_input, grab, code;
 		const char *text;
 	} cases[] = {
-		{KEY_B, 0, EINVAL, 0, ENOTTY, "is no input device"},
-		{KEY_B, 0, ENOTTY, 0, ENOTTY, "is no input device"},
+		{KEY_B, 0, EINVAL, 0, ENOTTY, "not an input device"},
+		{KEY_B, 0, ENOTTY, 0, ENOTTY, "not an input device"},
 		{KEY_B, 0, ENODEV, 0, ENODEV, "No such device"},
-		{KEY_C, 0, 0, 0, ENXIO, "has no key of that name"},
-		{0, 0, 0, 0, ENXIO, "has no key of that name"},
-		{KEY_B, KEY_B, 0, 0, EBUSY, "take the foot away"},
+		{KEY_C, 0, 0, 0, ENXIO, "has no such key"},
+		{0, 0, 0, 0, ENXIO, "has no such key"},
+		{KEY_B, KEY_B, 0, 0, EBUSY, "release it"},
 		{KEY_B, 0, 0, EBUSY, EBUSY, "another program has it"},
 	};
 	struct pedal pedal;

@@ -41,9 +41,9 @@ static void flags_are_counted_and_named(void **state)
 	assert_int_equal(length, strlen(text));
 	assert_string_equal(
 		text,
-		"4 of 7 poses were not used: 1 '?' (its self-test found an error), 3 'x' "
-		"(the sensor is outside of its motion box); 1 of 7 poses are doubtful: 1 'u' "
-		"(outside of its map of the distortion by metal)");
+		"4 of 7 poses were not used: 1 '?' (its self-test found an error), 3 "
+		"'x' (the sensor is outside its motion box); 1 of 7 poses are "
+		"doubtful: 1 'u' (outside its map of the distortion by metal)");
 	/* As snprintf(): whatever the room is. */
 	for (size_t size = 0; size <= sizeof(some); size++) {
 		memset(some, '#', sizeof(some));

@@ -161,15 +161,16 @@ static void file_refuses(void **state)
 		const char *tail; /* of the message, after the path */
 	} row[] = {
 		{"", ENODEV,
-		 ": tracker: not named, but needed; add `tracker = \"sim:\";` or another backend"},
+		 ": tracker: missing, but required; add `tracker = \"sim:\";` or "
+		 "another backend"},
 		{"\ntracker = \"fastrak:usb\";", ENODEV,
-		 ":2: tracker: there is no backend \"fastrak\"; those there are: sim"},
+		 ":2: tracker: no such backend \"fastrak\"; there are: sim"},
 		{"tracker = \"sim\";", EINVAL,
 		 ":1: tracker: expected BACKEND:ARGUMENTS such as \"sim:\", found \"sim\"; "
 		 "correct it"},
 		{"tracker = \"sim:seed=1\";", EINVAL,
 		 ":1: tracker: expected \"sim:\" without arguments, found \"sim:seed=1\"; "
-		 "settings of the virtual rig belong in the group `sim`"},
+		 "settings of the simulated rig belong in the group `sim`"},
 		{"tracker = 1;", EINVAL,
 		 ":1: tracker: expected text in quotes, found 1; correct it"},
 		{"clock = \"fast\";", EINVAL,
@@ -200,14 +201,14 @@ static void file_refuses(void **state)
 		{"sim = {\nwithdrawal = \"both\"; };", EINVAL,
 		 ":2: sim.withdrawal: expected dissipative or paper, found both; correct it"},
 		{"sim = { depth_mm = [5]; };", EINVAL,
-		 ":1: sim: expected depth_mm and times with as many values each, 1 to 8; "
-		 "correct them"},
+		 ":1: sim: expected depth_mm and times with equally many values, 1 to "
+		 "8; correct them"},
 		{"sim = { depth_mm = [5, 6]; times = [1]; };", EINVAL,
-		 ":1: sim: expected depth_mm and times with as many values each, 1 to 8; "
-		 "correct them"},
+		 ":1: sim: expected depth_mm and times with equally many values, 1 to "
+		 "8; correct them"},
 		{"sim = { depth_mm = []; times = []; };", EINVAL,
-		 ":1: sim: expected depth_mm and times with as many values each, 1 to 8; "
-		 "correct them"},
+		 ":1: sim: expected depth_mm and times with equally many values, 1 to "
+		 "8; correct them"},
 		{"sim = { depth_mm = [1,1,1,1,1,1,1,1,1]; times = [1,1,1,1,1,1,1,1,1]; };",
 		 EINVAL,
 		 ":1: sim.depth_mm: expected an array of at most 8 numbers such as [5, 10]; "
@@ -220,8 +221,8 @@ static void file_refuses(void **state)
 		{"sim = { depth_mm = (\"5\"); times = [1]; };", EINVAL,
 		 ":1: sim.depth_mm: expected a number; correct it"},
 		{"sim = { depth_mm = 5; times = 1; };", EINVAL,
-		 ":1: sim: expected depth_mm and times with as many values each, 1 to 8; "
-		 "correct them"},
+		 ":1: sim: expected depth_mm and times with equally many values, 1 to "
+		 "8; correct them"},
 		{"surface = { normal = [0, 0, 0]; };", EINVAL,
 		 ":1: surface.normal: expected a direction [x, y, z] that is not 0, found 3 "
 		 "values; correct it"},
@@ -258,15 +259,15 @@ static void real_steppers_are_refused_with_a_line(void **state)
 		{"stepper = \"kernel:/dev/incise-nowhere\";", EINVAL,
 		 ":1: stepper: \"kernel:/dev/incise-nowhere\" needs the group actuator"},
 		{ACTUATOR "stepper = \"kernel:/dev/incise-nowhere\";", ENOENT,
-		 ":2: stepper: /dev/incise-nowhere: there is no such device"},
+		 ":2: stepper: /dev/incise-nowhere: no such device"},
 		{ACTUATOR "stepper = \"kernel:x\";", EINVAL,
 		 ":2: stepper: expected the path"},
 		{ACTUATOR "clock = \"simulated\"; stepper = \"kernel:/dev/x\";", EINVAL,
-		 ":2: stepper: only the virtual rig can follow a simulated clock"},
+		 ":2: stepper: only the simulated rig can follow a simulated clock"},
 		{ACTUATOR "stepper = \"canopen:can0\";", ENODEV,
-		 ":2: stepper: there is no backend \"canopen\"; those there are: sim, kernel"},
+		 ":2: stepper: no such backend \"canopen\"; there are: sim, kernel"},
 		{ACTUATOR "stepper = \"../../x:\";", ENODEV,
-		 "there is no backend \"../../x\""},
+		 "no such backend \"../../x\""},
 		/* Broken, it is refused where the virtual actuator stands, too. */
 		{"actuator = { travel_mm = 9.0; };\nstepper = \"sim:\";", EINVAL,
 		 ":1: actuator.spring_N_mm is missing"},
@@ -371,11 +372,11 @@ static void several_steppers_are_refused_with_a_line(void **state)
 		const char *text, *says;
 	} row[] = {
 		{TWO "\nactuator = {" MOTOR "};",
-		 ":1: stepper: expected 1 to 3, each with its "
+		 ":1: stepper: expected 1 to 3, each with a "
 		 "group in actuator = ( { … }, { … } ), "
 		 "found 2 and 1 groups"},
 		{"stepper = \"kernel:/dev/x\";\nactuator = ( {" MOTOR "}, {" MOTOR "} );",
-		 ":1: stepper: one is named, but actuator has 2 groups"},
+		 ":1: stepper: one device, but actuator has 2 groups"},
 		{"actuator = ();",
 		 ":1: actuator: expected a group { key = value; }, or 1 to 3"},
 		{"actuator = ( {" MOTOR "}, {" MOTOR "}, {" MOTOR "}, {" MOTOR "} );",
@@ -389,22 +390,22 @@ static void several_steppers_are_refused_with_a_line(void **state)
 		 ":1: stepper 2: expected BACKEND:ARGUMENTS"},
 		/* Directions. */
 		{TWO "actuator = ( {" MOTOR "}, {" MOTOR "} );",
-		 ":1: the directions of actuators 1 and 2 lie within 0 degrees of one line: "
-		 "expected 30 or more; give each actuator a direction"},
+		 ":1: the directions of actuators 1 and 2 are within 0 degrees of one line: "
+		 "expected 30 or more; give each actuator its own direction"},
 		{TWO "actuator = ( {" MOTOR "}, {" MOTOR
 		     "direction = [0.0, 0.1, -1.0]; } );",
-		 "actuators 1 and 2 lie within 5.71 degrees of one line"},
+		 "actuators 1 and 2 are within 5.71 degrees of one line"},
 		{TWO "actuator = ( {" MOTOR "}, {" MOTOR
 		     "direction = [0.499, 0.0, 0.8666]; } );",
 		 "within 29.9 degrees"},
 		{THREE "actuator = ( {" MOTOR "}, {" MOTOR
 		       "direction = [0.0, 1.0, 0.0]; }, {" MOTOR
 		       "direction = [0.0, 1.0, 0.4]; } );",
-		 "actuators 2 and 3 lie within 21.8 degrees of one line"},
+		 "actuators 2 and 3 are within 21.8 degrees of one line"},
 		{THREE "actuator = ( {" MOTOR "}, {" MOTOR
 		       "direction = [0.0, 1.0, 0.0]; }, {" MOTOR
 		       "direction = [0.0, 1.0, 1.0]; } );",
-		 "the direction of actuator 1 lies within 0 degrees of the plane of the other "
+		 "the direction of actuator 1 is within 0 degrees of the plane of the other "
 		 "two: expected 30 or more"},
 		{THREE "actuator = ( {" MOTOR "}, {" MOTOR
 		       "direction = [0.0, 1.0, 0.0]; }, {" MOTOR
@@ -418,7 +419,7 @@ static void several_steppers_are_refused_with_a_line(void **state)
 		 ":1: sim.axes: expected a whole number from 1 to 3, found 4"},
 		{"stepper = \"sim:\"; sim = { axes = 2; }; surface = { normal = [0.0, 1.0, "
 		 "0.0]; };",
-		 ":1: the directions of actuators 1 and 2 lie within 0 degrees"},
+		 ":1: the directions of actuators 1 and 2 are within 0 degrees"},
 	};
 
 	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
@@ -551,9 +552,9 @@ static void what_is_wrong_is_said(void **state)
 		{"tracker_setup = { stations = [1, 2, 3, 4, 4]; };", "numbers of 1 to 4"},
 		{"tracker_setup = { stations = 1; };", "numbers of 1 to 4"},
 		{"tracker_setup = { stations = [\"1\"]; };", "numbers of 1 to 4"},
-		{"tracker_setup = { tube_station = 1; };", "and not the first"},
+		{"tracker_setup = { tube_station = 1; };", "except the first"},
 		{"tracker_setup = { stations = [2, 3]; tube_station = 2; };",
-		 "and not the first, which is the scalpel's, found 2"},
+		 "except the first, which is the scalpel's, found 2"},
 		{"tracker_setup = { stations = [1, 2]; tube_station = 3; };",
 		 "rig.conf:1: tracker_setup.tube_station: expected one of "
 		 "tracker_setup.stations"},

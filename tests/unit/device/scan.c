@@ -28,10 +28,10 @@ static void what_cannot_be_scanned_is_said(void **state)
 		{"can0", EINVAL, "can0: expected BACKEND:ARGUMENTS"},
 		{"", EINVAL, "expected BACKEND:ARGUMENTS"},
 		{"an_extremely_long_name_of_a_backend:x", EINVAL, "expected BACKEND"},
-		{"nosuch:can0", ENODEV, "there is no backend \"nosuch\""},
-		{"../../etc:can0", ENODEV, "there is no backend"},
-		{"kernel:/dev/incise-stepper0", EOPNOTSUPP, "cannot look for devices"},
-		{"sim:", EOPNOTSUPP, "cannot look for devices"},
+		{"nosuch:can0", ENODEV, "no such backend \"nosuch\""},
+		{"../../etc:can0", ENODEV, "no such backend"},
+		{"kernel:/dev/incise-stepper0", EOPNOTSUPP, "cannot search for devices"},
+		{"sim:", EOPNOTSUPP, "cannot search for devices"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {

@@ -120,7 +120,8 @@ static void what_a_backend_has_not_is_said(void **state)
 								&err),
 				 -EOPNOTSUPP);
 		assert_int_equal(err.code, EOPNOTSUPP);
-		assert_int_equal(strncmp(err.text, "a simple one cannot be ", 23), 0);
+		assert_int_equal(
+			strncmp(err.text, "a simple one does not support being ", 36), 0);
 	}
 }
 
@@ -168,7 +169,7 @@ static int teller_counter(struct incise_stepper *stepper, int i,
 {
 	static const struct incise_stepper_counter counters[] = {
 		{"sync_late", "SYNCs sent late", 3, true},
-		{"setpoints", "set-points sent", 0, false}};
+		{"setpoints", "setpoints sent", 0, false}};
 
 	if (i > 1)
 		return -ENOENT;
@@ -551,7 +552,7 @@ static void what_is_wrong_is_said(void **state)
 		{{.home_at = 0}, -EOPNOTSUPP, "neither a home input nor"},
 		{{.home_at = INCISE_STEPPER_LINE_HOME, .stuck_off = true},
 		 -EIO,
-		 "did not come within the travel"},
+		 "within the travel"},
 		{{.home_at = INCISE_STEPPER_LINE_HOME, .stuck_on = true},
 		 -EIO,
 		 "stays active"},

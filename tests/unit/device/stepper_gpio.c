@@ -242,14 +242,15 @@ static void why_it_cannot_begin_is_said(void **state)
 	} cases[] = {
 		{"", false, false, 0, 0, 2.5, EINVAL, "expected gpio:CHIP"},
 		{"c", false, true, 0, 0, 2.5, EINVAL, "needs actuator.lines"},
-		{"c", true, false, 0, 0, 2.5, EOPNOTSUPP, "cannot be watched"},
+		{"c", true, false, 0, 0, 2.5, EOPNOTSUPP,
+		 "another program cannot watch it"},
 		{"c", false, false, ENOENT, 0, 2.5, ENOENT, "gpiodetect"},
 		{"c", false, false, EBUSY, 0, 2.5, EBUSY, "gpioinfo"},
 		{"c", false, false, EACCES, 0, 2.5, EACCES, "not permitted"},
-		{"c", false, false, EINVAL, 0, 2.5, EINVAL, "not all of the lines"},
+		{"c", false, false, EINVAL, 0, 2.5, EINVAL, "lacks a line of"},
 		{"c", false, false, 0, -EREMOTEIO, 2.5, EREMOTEIO, "cannot be used"},
 		/* 30 000 steps/s: more than it ever says that it holds. */
-		{"c", false, false, 0, 0, 300, ERANGE, "asks for 30000 steps/s"},
+		{"c", false, false, 0, 0, 300, ERANGE, "needs 30000 steps/s"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {

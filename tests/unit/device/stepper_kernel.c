@@ -291,8 +291,8 @@ static void a_motor_is_one_actuator_of_a_rig(void **state)
 	assert_null(incise_stepper_kernel.open(&request, &err));
 	assert_int_equal(errno, EINVAL);
 	assert_string_equal(err.text, "rig.conf:3: stepper 2: motor 2 of "
-				      "/dev/incise-stepper0 is an actuator of this rig "
-				      "already; name another");
+				      "/dev/incise-stepper0 is already an actuator of "
+				      "this rig; name another");
 	/* The first one goes on. */
 	assert_int_equal(module.opened, 1);
 	assert_int_equal(incise_stepper_enable(owner, NULL), 0);
@@ -326,7 +326,7 @@ static void a_watcher_only_looks(void **state)
 	assert_int_equal(incise_stepper_set(watcher, 1), -EPERM);
 	assert_int_equal(incise_stepper_jog(watcher, 1), -EPERM);
 	assert_int_equal(incise_stepper_enable(watcher, &err), -EPERM);
-	assert_non_null(strstr(err.text, "opened to watch"));
+	assert_non_null(strstr(err.text, "opened only to watch"));
 	assert_int_equal(incise_stepper_disable(watcher, &err), -EPERM);
 	assert_int_equal(incise_stepper_clear(watcher, &err), -EPERM);
 	watcher->ops->close(watcher);
@@ -355,18 +355,19 @@ static void why_it_does_not_open_is_said(void **state)
 		{"/dev/incise-stepper0:2", 0, ENOTTY, 0, 0, 3, 20000, ENODEV,
 		 "another version"},
 		{"/dev/incise-stepper0:2", 0, ENODEV, 0, 0, 3, 20000, ENODEV,
-		 "cannot say what it is"},
+		 "its properties cannot be read"},
 		/* What it says of itself is not believed. */
-		{"/dev/incise-stepper0:2", 0, 0, 0, 0, 99, 20000, EPROTO, "cannot say"},
-		{"/dev/incise-stepper0:2", 0, 0, 0, 0, 3, 0, EPROTO, "cannot say"},
+		{"/dev/incise-stepper0:2", 0, 0, 0, 0, 99, 20000, EPROTO,
+		 "cannot be read"},
+		{"/dev/incise-stepper0:2", 0, 0, 0, 0, 3, 0, EPROTO, "cannot be read"},
 		{"/dev/incise-stepper0:2", 0, 0, 0, 0, 2, 20000, EINVAL,
 		 "has motors 0 to 1"},
 		{"/dev/incise-stepper0:2", 0, 0, 0, 0, 3, 7999, ERANGE,
-		 "asks for 8000 steps/s, but this machine holds 7999"},
+		 "needs 8000 steps/s, but this machine reaches at most 7999"},
 		{"/dev/incise-stepper0:2", 0, 0, ERANGE, 0, 3, 20000, ERANGE,
 		 "8000 steps/s with pulses of 5000 and 5000 ns"},
 		{"/dev/incise-stepper0:2", 0, 0, EINVAL, 0, 3, 20000, EINVAL,
-		 "refuses the group actuator"},
+		 "rejects the group actuator"},
 		{"/dev/incise-stepper0:2", 0, 0, EBUSY, 0, 3, 20000, EBUSY,
 		 "does not come to rest"},
 		{"/dev/incise-stepper0:2", 0, 0, 0, ENOMEM, 3, 20000, ENOMEM,
@@ -444,7 +445,7 @@ static void a_device_that_goes_away(void **state)
 	assert_int_equal(status.faults, INCISE_STEPPER_FAULT_GONE);
 	run_for(100000000);
 	assert_int_equal(incise_stepper_enable(stepper, &err), -EPERM);
-	assert_non_null(strstr(err.text, "went away"));
+	assert_non_null(strstr(err.text, "was removed"));
 	stepper->ops->close(stepper);
 }
 

@@ -128,8 +128,7 @@ static void a_module_that_is_not_there_is_said(void **state)
 		int found, code;
 		const char *says;
 	} row[] = {
-		{-ENODEV, ENOENT,
-		 "vision: there is no module vision_opencv.so in /some/folder; "},
+		{-ENODEV, ENOENT, "vision: no module vision_opencv.so in /some/folder; "},
 		{-ENOEXEC, ENOEXEC, "as found"},
 	};
 

@@ -193,7 +193,7 @@ static void what_cannot_be(void **state)
 	begin(EMULATOR_FASTRAK, -1);
 	line.gone = -ENODEV;
 	assert_int_equal(set_up(&first), -ENODEV);
-	assert_non_null(strstr(err.text, "went away"));
+	assert_non_null(strstr(err.text, "disconnected"));
 }
 
 /*
@@ -218,7 +218,7 @@ static void station_without_a_sensor(void **state)
 			snprintf(name, sizeof(name), "station %d",
 				 wanted[i].stations[0] == 1 ? 2 : wanted[i].stations[0]);
 			if (!strstr(err.text, name) ||
-			    !strstr(err.text, "plug its sensor in") ||
+			    !strstr(err.text, "plug in its sensor") ||
 			    strstr(err.text, "off and on"))
 				fail_msg("%zu %zu: %s", k, i, err.text);
 		}
@@ -247,7 +247,7 @@ static void slow_line(void **state)
 		{EMULATOR_LIBERTY, 1041667, 0, NULL},
 		/* a tracker that does not stop sending is reported before */
 		{EMULATOR_FASTRAK, 40000000, 0, "does not stop sending"},
-		{EMULATOR_FASTRAK, 80000000, 'O', "was not set up after 15 s"},
+		{EMULATOR_FASTRAK, 80000000, 'O', "its set-up exceeded 15 s"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {

@@ -251,7 +251,7 @@ static void gone_for_good(void **state)
 	assert_int_equal(rc, -ENODEV);
 	assert_int_equal(incise_tracker_read(tracker, &sample, 1), -ENODEV);
 	assert_true(incise_tracker_cause(tracker, cause, sizeof(cause)) > 0);
-	assert_non_null(strstr(cause, "went away and was not back"));
+	assert_non_null(strstr(cause, "disconnected and was not back"));
 	tracker->ops->close(tracker);
 	assert_int_equal(pty_plug(&pty), 0);
 }

@@ -252,8 +252,8 @@ static void what_is_wanted(void **state)
 	} cases[] = {
 		{"", -EINVAL, "expected usb:0f44:0002"},
 		{"0f44:0002@", -EINVAL, "expected usb:0f44:0002"},
-		{"1d6b:0002", -EINVAL, "1d6b:0002 is no tracker"},
-		{"0f44:0004", -EINVAL, "no tracker"},
+		{"1d6b:0002", -EINVAL, "1d6b:0002 is not a known Polhemus tracker"},
+		{"0f44:0004", -EINVAL, "not a known Polhemus tracker"},
 		{"0f44:0001", -ENODEV, "fxload"},
 		{"0f44:ff11", -ENODEV, "a LIBERTY 0f44:ff11 has no firmware"},
 	};
@@ -302,8 +302,8 @@ static void a_scan(void **state)
 		{BUS(two), "0f44:0002@1-2.4", "usb:0f44:0002@1-2.4 FASTRAK\n"},
 		{BUS(two), "0f44:0003", ""},
 		{BUS(unready), "",
-		 "! usb:0f44:0001@3-2 FASTRAK without firmware: load the maker's .hex "
-		 "file with fxload\n"},
+		 "! usb:0f44:0001@3-2 FASTRAK without firmware: load the "
+		 "manufacturer's .hex file with fxload\n"},
 		/* Without the right to read the serial number, the place is the name. */
 		{BUS(locked), "",
 		 "usb:0f44:0002@1-1 FASTRAK\nusb:0f44:0002@1-2 FASTRAK\n"},
@@ -491,11 +491,11 @@ static void refuses(void **state)
 		{0, LIBUSB_ERROR_ACCESS, 0, 3, EACCES, "join the group"},
 		{0, LIBUSB_ERROR_NO_DEVICE, 0, 3, ENODEV, "check its cable"},
 		{0, LIBUSB_ERROR_NO_MEM, 0, 3, ENOMEM, "out of memory"},
-		{0, LIBUSB_ERROR_OTHER, 0, 3, EIO, "plug it out and in"},
-		{0, 0, 1, 3, EIO, "plug it out and in"},
+		{0, LIBUSB_ERROR_OTHER, 0, 3, EIO, "unplug it, plug it in"},
+		{0, 0, 1, 3, EIO, "unplug it, plug it in"},
 		/* No way in; no way at all. */
-		{0, 0, 0, 1, EIO, "cannot be talked to"},
-		{0, 0, 0, 0, EIO, "cannot be talked to"},
+		{0, 0, 0, 1, EIO, "does not respond"},
+		{0, 0, 0, 0, EIO, "does not respond"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {

@@ -309,16 +309,16 @@ static void refuses_what_cannot_be(void **state)
 		const char *said;
 	} cases[] = {
 		{"nothing", "", -EINVAL,
-		 "a recording has no stream 'nothing'; there are:"},
+		 "no stream 'nothing' in a recording; there are:"},
 		{"force", "UPDATE force SET t_ns = -1 WHERE seq = 3", 0,
-		 "table force, row 3 cannot be"},
+		 "table force, row 3 is invalid"},
 		{"force", "UPDATE force SET code = 'x' WHERE seq = 4", 0,
-		 "table force, row 4 cannot be"},
+		 "table force, row 4 is invalid"},
 		{"depth", "DELETE FROM depth WHERE seq = 7", 0, "table depth has"},
 		{"table", "UPDATE force SET t_ns = -1 WHERE seq = 3", 0,
-		 "table force, row 3: t_ns is no time"},
+		 "table force, row 3: t_ns is not a time"},
 		{"table", "UPDATE depth SET depth_mm = -1.0", 0, "no cut"},
-		{"frames", TO_FORM_1, -ENOTSUP, "is of an older form"},
+		{"frames", TO_FORM_1, -ENOTSUP, "has an older format"},
 	};
 	struct incise_export_options options;
 

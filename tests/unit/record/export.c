@@ -509,7 +509,7 @@ static void nothing_to_export(void **state)
 	how.min_count = 100000000;
 	assert_null(export((const char *[]){"liver.rec"}, 1, &how, NULL, &err));
 	assert_int_equal(err.code, ENODATA);
-	assert_non_null(strstr(err.text, "no bin holds"));
+	assert_non_null(strstr(err.text, "no bin has"));
 
 	change("air.rec/recording.db",
 	       "UPDATE meta SET value = NULL WHERE key = 'force_zero_mV'");

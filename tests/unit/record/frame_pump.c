@@ -355,7 +355,7 @@ static void a_disk_that_hangs_holds_nobody(void **state)
 		incise_frame_pump_stats(left, &stats);
 	} while (stats.read < 3000 || stats.written < 5);
 	assert_int_equal(incise_frame_pump_stop(left, 20 * MS, &err), -ETIMEDOUT);
-	assert_non_null(strstr(err.text, "disk or coder did not get on; 2"));
+	assert_non_null(strstr(err.text, "disk or encoder were too slow; 2"));
 	incise_frame_pump_stats(left, &stats);
 	/* 5 are in the file, one is in the hand of who hangs and in its slot still. */
 	assert_int_equal(stats.written, 5);

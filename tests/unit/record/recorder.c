@@ -233,16 +233,16 @@ static void existing_names_are_refused(void **state)
 	mkdir("left.rec.part", 0777);
 	fclose(fopen("file.rec", "w"));
 	symlink("nowhere", "link.rec");
-	refused("there.rec", rig, EEXIST, "there.rec: exists already");
-	refused("there.rec///", rig, EEXIST, "there.rec: exists already");
-	refused("file.rec", rig, EEXIST, "exists already");
-	refused("link.rec", rig, EEXIST, "exists already");
+	refused("there.rec", rig, EEXIST, "there.rec: exists; record");
+	refused("there.rec///", rig, EEXIST, "there.rec: exists; record");
+	refused("file.rec", rig, EEXIST, "exists; record");
+	refused("link.rec", rig, EEXIST, "exists; record");
 	refused("left.rec", rig, EEXIST,
 		"left.rec.part: left by an interrupted recording");
 	refused("no/such/a.rec", rig, ENOENT, "no/such/");
 	refused("file.rec/a.rec", rig, ENOTDIR, "file.rec/");
-	refused("", rig, EINVAL, "no name");
-	refused("..", rig, EINVAL, "no name");
+	refused("", rig, EINVAL, "not a name");
+	refused("..", rig, EINVAL, "not a name");
 	refused("a.rec", bare, ENODEV, "needs a tracker");
 	assert_int_equal(access("a.rec.part", F_OK), -1);
 	assert_int_equal(access("there.rec.part", F_OK), -1);
@@ -260,7 +260,7 @@ static void name_taken_meanwhile_is_kept(void **state)
 	assert_int_equal(poll_for(rec, rig, 600 * MS, &err), 0);
 	mkdir("a.rec", 0777);
 	assert_int_equal(incise_recorder_close(rec, &err), -EEXIST);
-	assert_non_null(strstr(err.text, "stays under the name a.rec.part"));
+	assert_non_null(strstr(err.text, "keeps the name a.rec.part"));
 	recording = incise_recording_open("a.rec.part", &err);
 	assert_non_null(recording);
 	incise_recording_close(recording);
@@ -537,7 +537,7 @@ static void failures_of_devices(void **state)
 		{"unplugged", gone, "", "is gone; check its cable"},
 		{"it tells why", gone, "the channel: its clock stands still; wind it up",
 		 "the channel: its clock stands still; wind it up"},
-		{"number twice", repeated, "", "came after"},
+		{"number twice", repeated, "", "arrived after"},
 		{"code out of range", too_large, "", "4096 is not within"},
 	};
 

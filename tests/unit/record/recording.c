@@ -92,13 +92,13 @@ static void no_recording(void **state)
 		int rc;
 		const char *text;
 	} cases[] = {
-		{"none.rec", -ENOENT, "none.rec: there is no such recording"},
+		{"none.rec", -ENOENT, "none.rec: no such recording"},
 		{"", -ENOENT, "no such recording"},
 		{"file.rec", -EINVAL, "no recording.db"},
 		{"empty.rec", -EINVAL, "no recording.db"},
-		{"folder.rec", -EINVAL, "is no file"},
+		{"folder.rec", -EINVAL, "is not a file"},
 		{"garbage.rec", -EINVAL, "file is not a database"},
-		{"nothing.rec", -EINVAL, "empty: interrupted before anything was"},
+		{"nothing.rec", -EINVAL, "empty: interrupted before the first data"},
 		{"text\nfile.rec", -ENOENT, "text?file.rec"},
 	};
 	struct incise_recording_info info;
@@ -189,8 +189,8 @@ static void damage_is_found(void **state)
 		{"UPDATE force SET code = 1.5 WHERE seq = 100", "row 100: code"},
 		{"UPDATE force SET code = x'00' WHERE seq = 100", "row 100: code"},
 		{"UPDATE force SET t_ns = 'soon' WHERE seq = 100",
-		 "row 100: t_ns is no time"},
-		{"UPDATE force SET t_ns = -1 WHERE seq = 0", "row 0: t_ns is no time"},
+		 "row 100: t_ns is not a time"},
+		{"UPDATE force SET t_ns = -1 WHERE seq = 0", "row 0: t_ns is not a time"},
 		{"UPDATE force SET t_ns = 5 WHERE seq = 100",
 		 "row 100: t_ns does not increase"},
 		{"UPDATE force SET t_ns = (SELECT t_ns FROM force WHERE seq = 99) WHERE seq = 100",
@@ -216,7 +216,7 @@ static void damage_is_found(void **state)
 		{"UPDATE tracker SET t_ns = 1 WHERE seq = 7", "table tracker, row 7"},
 		{"DELETE FROM meta WHERE key = 'rig'", "'rig' in table meta is missing"},
 		{"UPDATE meta SET value = 7 WHERE key = 'rig'",
-		 "'rig' in table meta is no value"},
+		 "'rig' in table meta is out of range"},
 		{"UPDATE meta SET value = -7 WHERE key = 'force_rows'", "'force_rows'"},
 		{"UPDATE meta SET value = 1 WHERE key = 'force_rows'", "table force has"},
 		{"UPDATE meta SET value = 0 WHERE key = 'force_bits'", "0 bits"},

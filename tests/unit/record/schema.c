@@ -41,7 +41,7 @@ static void only_the_own_form_is_taken(void **state)
 		{"PRAGMA user_version=0", -EINVAL, "damaged"},
 		{"PRAGMA user_version=-1", -EINVAL, "damaged"},
 		{"DROP TABLE force", -EINVAL, "table 'force' is missing"},
-		{"ALTER TABLE force ADD COLUMN x", -EINVAL, "not as incise makes it"},
+		{"ALTER TABLE force ADD COLUMN x", -EINVAL, "not as incise creates it"},
 		{"DROP TABLE depth; CREATE VIEW depth AS SELECT 1 AS seq, 2 AS t_ns",
 		 -EINVAL, "table 'depth' is missing"},
 	};

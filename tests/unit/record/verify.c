@@ -108,7 +108,7 @@ static void tampering_is_found(void **state)
 		/* a row inserted: before, behind */
 		{"INSERT INTO force VALUES(-1, 0, 7)", "block 0", 0, 0, 0, 1},
 		{"INSERT INTO force VALUES(30000, 9000000000, 7)",
-		 "force: 1 rows behind the end of the ledger, numbers 30000 to 30000", -1,
+		 "force: 1 rows after the end of the ledger, numbers 30000 to 30000", -1,
 		 -1, 0, 0},
 		/* the ledger */
 		{"DELETE FROM ledger WHERE stream = 'force' AND block = 0",
@@ -120,7 +120,7 @@ static void tampering_is_found(void **state)
 		 "no entry of block 5 to 6; 2000 rows", 5, 6, 0, 3},
 		{"DELETE FROM ledger WHERE stream = 'force' AND count = 0",
 		 "the ledger has no end", 30, 30, 0, 0},
-		{"DELETE FROM ledger", "30000 rows behind", -1, -1, 0, 0},
+		{"DELETE FROM ledger", "30000 rows after", -1, -1, 0, 0},
 		{"UPDATE ledger SET crc = (crc | 1) - (crc & 1) WHERE stream = 'force' AND block = 5",
 		 "block 5 is", 5, 5, 0, 1},
 		{"UPDATE ledger SET first_ns = first_ns + 1 WHERE stream = 'force' AND block "
@@ -139,7 +139,7 @@ static void tampering_is_found(void **state)
 		 "count = 0",
 		 "block 30 is", 30, 30, 0, 1},
 		{"INSERT INTO ledger VALUES('odour', 0, 0, 0, 0, 0, 1, 0, 0)",
-		 "streams that there are not", -1, -1, 0, 0},
+		 "unknown streams", -1, -1, 0, 0},
 		/* blocks 5 and 6 change places */
 		{"UPDATE ledger SET block = -block WHERE stream = 'force' AND block IN (5, "
 		 "6); UPDATE ledger SET block = 11 + block WHERE block < 0",
@@ -154,8 +154,8 @@ static void tampering_is_found(void **state)
 		{"UPDATE meta SET value = value + 1 WHERE key = 'force_rows'",
 		 "30001 rows were written, and the ledger has 30000", -1, -1, 1, 0},
 		{"UPDATE meta SET value = value + 1 WHERE key = 'tracker_lost'",
-		 "tracker: 1 were lost when it was captured, and the ledger has 0", -1,
-		 -1, 1, 0},
+		 "tracker: 1 were lost during the capture, and the ledger has 0", -1, -1,
+		 1, 0},
 		/* what is sealed */
 		{"DELETE FROM depth WHERE seq = 7", "table depth has ", -1, -1, 0, 0},
 		{"UPDATE depth SET depth_mm = depth_mm + 1e-9 WHERE seq = 7",
@@ -266,7 +266,7 @@ static void interrupted_is_intact(void **state)
 	incise_rig_close(rig);
 	verify("b.rec", &report, &findings);
 	assert_true(report.interrupted && report.intact);
-	assert_non_null(strstr(findings.text, "nothing proves them"));
+	assert_non_null(strstr(findings.text, "are not verified"));
 	/* of them no change is found, but that rows of depth are missing */
 	change("b.rec.part/recording.db", "UPDATE events SET text = 'else'");
 	verify("b.rec", &report, &findings);
@@ -290,7 +290,7 @@ static void closed_and_not_complete(void **state)
 	change(DB, "UPDATE meta SET value = 0 WHERE key = 'complete'");
 	verify("a.rec", &report, &findings);
 	assert_true(report.interrupted && !report.intact);
-	assert_non_null(strstr(findings.text, "entries of streams that there are not"));
+	assert_non_null(strstr(findings.text, "entries of unknown streams"));
 }
 
 static void what_cannot_be_verified(void **state)
@@ -302,7 +302,7 @@ static void what_cannot_be_verified(void **state)
 	record("a.rec", SIM, 600 * MS);
 	change(DB, TO_FORM_1);
 	assert_int_equal(incise_verify("a.rec", NULL, &report, &err), -ENODATA);
-	assert_non_null(strstr(err.text, "no ledger"));
+	assert_non_null(strstr(err.text, "without a ledger"));
 }
 
 /* A page in the middle is garbage: found, and no crash, wherever it is. */
@@ -616,11 +616,11 @@ static void frames_are_held_against_their_rows(void **state)
 		 .seq = 12,
 		 .altered = 1},
 		{.change = {.at = 7, .twice = true},
-		 .text = "camera: 1 in camera.mkv that no row has, number 1000, at ",
+		 .text = "camera: 1 in camera.mkv without a row, number 1000, at ",
 		 .seq = 1000,
 		 .extra = 1},
 		{.change = {.at = 29, .twice = true},
-		 .text = "camera: 1 in camera.mkv that no row has, number 1000, at ",
+		 .text = "camera: 1 in camera.mkv without a row, number 1000, at ",
 		 .seq = 1000,
 		 .extra = 1},
 	};
@@ -665,9 +665,9 @@ static void rows_of_frames_are_in_the_ledger(void **state)
 	} cases[] = {
 		{"DELETE FROM frames WHERE seq = 12",
 		 "camera: 1 missing, number 12, before"},
-		{"DELETE FROM frames WHERE seq = 12", "1 in camera.mkv that no row has"},
+		{"DELETE FROM frames WHERE seq = 12", "1 in camera.mkv without a row"},
 		{"UPDATE frames SET crc = crc + 1 WHERE seq = 12", "camera: block 0 is"},
-		{"UPDATE frames SET crc = crc + 1 WHERE seq = 12", "its bytes are not"},
+		{"UPDATE frames SET crc = crc + 1 WHERE seq = 12", "its bytes are"},
 		{"UPDATE frames SET length_px = 3.5 WHERE seq = 12",
 		 "camera: block 0 is"},
 		{"UPDATE frames SET length_px = NULL WHERE seq = 15",
@@ -675,7 +675,7 @@ static void rows_of_frames_are_in_the_ledger(void **state)
 		{"UPDATE meta SET value = 29 WHERE key = 'frames_rows'",
 		 "camera: 29 rows were written, and the ledger has 30"},
 		{"UPDATE meta SET value = 2 WHERE key = 'frames_lost'",
-		 "camera: 2 were lost when it was captured, and the ledger has 0"},
+		 "camera: 2 were lost during the capture, and the ledger has 0"},
 		{"DELETE FROM frames; DELETE FROM streams WHERE name = 'camera'",
 		 "camera: 30 missing at the end, numbers 5 to 34"},
 		{"DELETE FROM frames; DELETE FROM streams WHERE name = 'camera'; DELETE "
@@ -763,13 +763,13 @@ static void damaged_file(void **state)
 	assert_int_equal(system("echo nothing >" FILE_NAME), 0);
 	verify("a.rec", &report, &findings);
 	assert_false(report.intact);
-	assert_non_null(strstr(findings.text, "the pictures are not verified"));
+	assert_non_null(strstr(findings.text, "the frames are not verified"));
 	assert_int_equal(findings.first.kind, INCISE_VERIFY_DAMAGED);
 	unlink(FILE_NAME);
 	verify("a.rec", &report, &findings);
 	assert_false(report.intact);
 	assert_non_null(
-		strstr(findings.text, "camera.mkv is missing, and 30 pictures with it"));
+		strstr(findings.text, "camera.mkv is missing, and 30 frames with it"));
 	assert_int_equal(report.frames.missing, FRAMES);
 }
 
@@ -791,8 +791,8 @@ static void file_is_ahead_of_an_interrupted_recording(void **state)
 	seal(true);
 	verify("a.rec", &report, &findings);
 	assert_false(report.intact);
-	assert_non_null(strstr(findings.text,
-			       "4 in camera.mkv that no row has, numbers 31 to 34"));
+	assert_non_null(
+		strstr(findings.text, "4 in camera.mkv without a row, numbers 31 to 34"));
 	assert_int_equal(report.frames.extra, 4);
 }
 
@@ -811,7 +811,7 @@ static void without_the_module_it_is_said(void **state)
 	assert_true(report.unverified);
 	assert_int_equal(report.findings, 1);
 	assert_int_equal(findings.first.kind, INCISE_VERIFY_UNVERIFIED);
-	assert_non_null(strstr(findings.text, "the pictures are not verified: "));
+	assert_non_null(strstr(findings.text, "the frames are not verified: "));
 	assert_non_null(strstr(findings.text, "no module frames_mkv.so"));
 	assert_false(report.frames.checked);
 }

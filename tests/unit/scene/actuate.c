@@ -162,9 +162,9 @@ static void test_a_fault_of_the_actuator_is_named(void **state)
 		 INCISE_STEPPER_STATE_FAULT, "e-stop: release it", NULL},
 		{0, -EIO, INCISE_STEPPER_FAULT_ALARM, INCISE_STEPPER_STATE_FAULT,
 		 "alarm of", "over-voltage (3210h)"},
-		{0, -EIO, 0, INCISE_STEPPER_STATE_DISABLED, "no power: enable it", NULL},
+		{0, -EIO, 0, INCISE_STEPPER_STATE_DISABLED, "off: enable it", NULL},
 		{-ENODEV, 0, INCISE_STEPPER_FAULT_GONE, INCISE_STEPPER_STATE_FAULT,
-		 "the device went away", NULL},
+		 "the device was removed", NULL},
 		{-EIO, 0, 0, INCISE_STEPPER_STATE_READY, "Input/output error", NULL},
 		/* Another device failed: what the actuator may have is not why. */
 		{-EIO, 0, 0, INCISE_STEPPER_STATE_READY, "Input/output error",
@@ -397,9 +397,9 @@ static void test_a_fault_of_one_is_the_end_of_all(void **state)
 		{0, 0, -EIO, INCISE_STEPPER_FAULT_ESTOP, INCISE_STEPPER_STATE_FAULT,
 		 "motor 1: e-stop"},
 		{1, 0, -EIO, 0, INCISE_STEPPER_STATE_DISABLED,
-		 "motor 2: the actuator has no power"},
+		 "motor 2: the actuator is off"},
 		{1, -ENODEV, 0, INCISE_STEPPER_FAULT_GONE, INCISE_STEPPER_STATE_FAULT,
-		 "motor 2: the device went away"},
+		 "motor 2: the device was removed"},
 		{1, -EIO, 0, 0, INCISE_STEPPER_STATE_READY,
 		 "motor 2: Input/output error"},
 	};

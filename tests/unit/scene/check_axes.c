@@ -117,7 +117,7 @@ static void the_worst_actuator_decides(void **state)
 	/* Beyond what the theory covers. */
 	assert_int_equal(plan_wall(two, SOFT_N_mm, 0, 0.0161, &s, &err), -EDOM);
 	assert_non_null(strstr(err.text,
-			       "virtual haptic scalpel, across the blade: "
+			       "simulated haptic scalpel, across the blade: "
 			       "actuator.late_ms of rig.conf is 16.1, 17 ticks"));
 	assert_int_equal(plan_wall(two, SOFT_N_mm, 0, 0.016, &s, &err), 0);
 }

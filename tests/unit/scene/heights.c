@@ -274,7 +274,7 @@ static void refuse(struct incise_surface *surface, const double along[3],
 	assert_int_equal(incise_heights_make(surface, along, 1, 10, 0.02, &heights, &err),
 			 -ERANGE);
 	assert_non_null(strstr(err.text, text));
-	assert_non_null(strstr(err.text, "leave --in-kernel away"));
+	assert_non_null(strstr(err.text, "remove --in-kernel"));
 	assert_null(heights.height);
 	incise_surface_free(surface);
 }
@@ -319,9 +319,9 @@ static void test_refusals(void **state)
 	refuse(sheet_surface(&flat), aside, "overhang");
 	refuse(sheet_surface(&flat), down, "overhang");
 	refuse(layers(), up, "overhang");
-	refuse(sheet_surface(&large), up, "heights hold up to 4000 mm");
+	refuse(sheet_surface(&large), up, "heights are limited to 4000 mm");
 	refuse(incise_surface_new_plane(point, up, NULL), up,
-	       "heights hold up to 4000 mm");
+	       "heights are limited to 4000 mm");
 	refuse(incise_surface_new_plane(down, up, NULL), aside, "overhang");
 }
 

@@ -136,7 +136,7 @@ static void info_names_the_channel(void **state)
 	incise_force_info(force, &info);
 	assert_true(info.rate_hz == 10000 && info.full_scale_V == 5);
 	assert_int_equal(info.bits, 12);
-	assert_string_equal(info.name, "virtual force channel");
+	assert_string_equal(info.name, "simulated force channel");
 	force->ops->close(force);
 	incise_sim_free(sim);
 	incise_clock_free(clock);

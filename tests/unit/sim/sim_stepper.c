@@ -379,7 +379,7 @@ static void info_is_the_configuration(void **state)
 	assert_true(info.step_mm == 2.0 / 3200);
 	assert_true(info.velocity_mm_s == 30 && info.acceleration_mm_s2 == 3000);
 	assert_true(info.deadman_s == 0.1 && info.measures_handle && !info.inputs);
-	assert_string_equal(info.name, "virtual haptic scalpel");
+	assert_string_equal(info.name, "simulated haptic scalpel");
 	rig_free(&rig);
 }
 

@@ -116,8 +116,8 @@ static void an_unplugged_camera_says_so(void **state)
 	assert_int_equal(await(camera, &frame), -ENODEV);
 	assert_int_equal(incise_camera_read(camera, &frame), -ENODEV);
 	assert_true(incise_camera_cause(camera, text, sizeof(text)) > 0);
-	assert_string_equal(text, "rig.conf:1: camera: the camera was unplugged; plug it "
-				  "in and begin again");
+	assert_string_equal(text, "rig.conf:1: camera: the camera was unplugged; plug "
+				  "it in and start again");
 	/* What is held may still be looked at. */
 	assert_int_equal(frame.data[0], 0);
 	close_camera(camera);
@@ -176,17 +176,17 @@ static void why_it_cannot_be_opened_is_said(void **state)
 		{"", 0, 0, 0, NULL, EINVAL, "expected v4l2:PATH"},
 		{"video0", 0, 0, 0, NULL, EINVAL, "expected v4l2:PATH"},
 		{"/dev/video0", ENOENT, 0, 0, NULL, ENOENT, "no such camera"},
-		{"/dev/video0", EACCES, 0, 0, NULL, EACCES, "member of the group"},
+		{"/dev/video0", EACCES, 0, 0, NULL, EACCES, "join the group"},
 		{"/dev/video0", EBUSY, 0, 0, NULL, EBUSY, "another program"},
 		{"/dev/video0", EMFILE, 0, 0, NULL, EMFILE, "Too many open files"},
-		{"/dev/video0", 0, ENOTTY, 0, NULL, ENOTTY, "this is no camera"},
-		{"/dev/video0", 0, EINVAL, 0, NULL, ENOTTY, "this is no camera"},
+		{"/dev/video0", 0, ENOTTY, 0, NULL, ENOTTY, "not a camera"},
+		{"/dev/video0", 0, EINVAL, 0, NULL, ENOTTY, "not a camera"},
 		{"/dev/video0", 0, 0, V4L2_CAP_META_CAPTURE | V4L2_CAP_STREAMING, NULL,
-		 EOPNOTSUPP, "gives no stream of pictures"},
+		 EOPNOTSUPP, "has no stream of frames"},
 		{"/dev/video0", 0, 0, V4L2_CAP_VIDEO_CAPTURE, NULL, EOPNOTSUPP,
-		 "gives no stream of pictures"},
+		 "has no stream of frames"},
 		{"/dev/video0", 0, 0, V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING,
-		 forget_when_beginning, EIO, "does not begin"},
+		 forget_when_beginning, EIO, "does not start"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -353,7 +353,7 @@ static void who_may_not_look_is_reported(void **state)
 	driver_reset();
 	driver.open_error = EACCES;
 	assert_int_equal(scan(""), -EACCES);
-	assert_non_null(strstr(err.text, "member of the group"));
+	assert_non_null(strstr(err.text, "join the group"));
 	assert_int_equal(n, 0);
 }
 

@@ -115,20 +115,20 @@ static void what_cannot_be_is_refused(void **state)
 		int code;
 		const char *says;
 	} cases[] = {
-		{{.width = 100000}, {0}, EPROTO, "a size that cannot be"},
-		{{.height = UINT32_MAX}, {0}, EPROTO, "a size that cannot be"},
+		{{.width = 100000}, {0}, EPROTO, "an invalid size"},
+		{{.height = UINT32_MAX}, {0}, EPROTO, "an invalid size"},
 		{{.bytesperline = 31}, {0}, EPROTO, "rows that are too short"},
 		{{.bytesperline = UINT32_MAX}, {0}, EPROTO, "rows that are too short"},
 		{{.sizeimage = 255}, {0}, EPROTO, "fewer bytes than its rows"},
-		{{.sizeimage = UINT32_MAX}, {0}, EPROTO, "number of bytes that cannot"},
+		{{.sizeimage = UINT32_MAX}, {0}, EPROTO, "invalid number of bytes"},
 		{{.width = 15}, {0}, EPROTO, "odd number of pixels"},
 		{{.pixelformat = V4L2_PIX_FMT_GREY}, {0}, EPROTO, "other pixels"},
 		{{.field = V4L2_FIELD_INTERLACED}, {0}, EPROTO, "interlaced"},
-		{{0}, {.width = -1}, EINVAL, "-1 x 0 pixels cannot be"},
+		{{0}, {.width = -1}, EINVAL, "size -1 x 0 pixels"},
 		{{0}, {.height = 16385}, EINVAL, "0 x 16385"},
-		{{0}, {.rate_hz = -3}, EINVAL, "-3 pictures a second"},
-		{{0}, {.rate_hz = NAN}, EINVAL, "nan pictures a second"},
-		{{0}, {.rate_hz = INFINITY}, EINVAL, "inf pictures a second"},
+		{{0}, {.rate_hz = -3}, EINVAL, "rate of -3 frames/s"},
+		{{0}, {.rate_hz = NAN}, EINVAL, "rate of nan frames/s"},
+		{{0}, {.rate_hz = INFINITY}, EINVAL, "rate of inf frames/s"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -151,7 +151,7 @@ static void a_missing_format_names_those_there_are(void **state)
 	driver_reset();
 	assert_int_equal(set(&setup), -EOPNOTSUPP);
 	assert_non_null(
-		strstr(err.text, "camera_setup.format; it has YUYV MJPG: name one"));
+		strstr(err.text, "camera_setup.format; it has YUYV MJPG; set a format"));
 	driver.format[0] = 0;
 	assert_int_equal(set(&setup), -EOPNOTSUPP);
 	assert_non_null(strstr(err.text, "it has none"));

@@ -490,20 +490,20 @@ static void every_end_has_its_cause(void **state)
 		const char *says;
 	} cases[] = {
 		{lie_index, EIO, "number 500"},
-		{lie_not_queued, EIO, "fills a buffer that it does not have, number 0"},
+		{lie_not_queued, EIO, "returned a buffer that does not exist, number 0"},
 		{lie_clock, EIO, "CLOCK_MONOTONIC"},
-		{count_stands, EIO, "counts picture 0 behind 0"},
-		{count_falls, EIO, "counts picture 4294967295 behind 0"},
+		{count_stands, EIO, "numbers frame 0 after 0"},
+		{count_falls, EIO, "numbers frame 4294967295 after 0"},
 		{unplug, ENODEV, "unplugged"},
 		{unplug_silently, ENODEV, "unplugged"},
-		{break_down, EIO, "no more pictures"},
-		{fail_always, EIO, "no more pictures"},
-		{forget_streaming, EIO, "no more pictures: Invalid argument"},
-		{refuse_buffers, EIO, "takes a buffer no more"},
+		{break_down, EIO, "no more frames"},
+		{fail_always, EIO, "no more frames"},
+		{forget_streaming, EIO, "no more frames: Invalid argument"},
+		{refuse_buffers, EIO, "accepts no more buffers"},
 		{unplug_at_queueing, ENODEV, "unplugged"},
-		{damage_all, EIO, "last 30 pictures"},
-		{be_ready_and_not, EIO, "no picture came from the camera for 5 s"},
-		{fall_silent, EIO, "no picture came from the camera for 5 s"},
+		{damage_all, EIO, "last 30 frames"},
+		{be_ready_and_not, EIO, "no frame arrived from the camera for 5 s"},
+		{fall_silent, EIO, "no frame arrived from the camera for 5 s"},
 	};
 	struct incise_camera_frame frame;
 
@@ -570,14 +570,15 @@ static void why_it_cannot_begin_is_said(void **state)
 		 EPROTO, "CLOCK_MONOTONIC"},
 		{offsetof(struct driver, count), 3, EPROTO, "has 3 buffers"},
 		{offsetof(struct driver, length), 255, EPROTO,
-		 "buffers of 255 bytes for pictures of 256"},
+		 "buffers of 255 bytes for frames of 256"},
 		{offsetof(struct driver, reqbufs_error), EBUSY, EBUSY, "another program"},
 		{offsetof(struct driver, reqbufs_error), ENOMEM, ENOMEM, "no memory"},
 		{offsetof(struct driver, querybuf_error), EINVAL, EINVAL, "buffer 0"},
 		{offsetof(struct driver, map_error), EAGAIN, EAGAIN, "cannot be mapped"},
-		{offsetof(struct driver, qbuf_error), EINVAL, EIO, "takes a buffer"},
+		{offsetof(struct driver, qbuf_error), EINVAL, EIO,
+		 "accepts no more buffers"},
 		{offsetof(struct driver, streamon_error), ENOSPC, ENOSPC, "lower size"},
-		{offsetof(struct driver, streamon_error), EIO, EIO, "does not begin"},
+		{offsetof(struct driver, streamon_error), EIO, EIO, "does not start"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {

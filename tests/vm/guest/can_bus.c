@@ -95,9 +95,9 @@ static void refusals(void)
 		int code;
 		const char *words;
 	} cases[] = {
-		{"lo", -EINVAL, "lo is no CAN interface"},
-		{"nope0", -ENODEV, "there is no interface nope0"},
-		{"a-name-that-is-far-too-long", -ENODEV, "there is no interface a-name"},
+		{"lo", -EINVAL, "lo is not a CAN interface"},
+		{"nope0", -ENODEV, "no such interface nope0"},
+		{"a-name-that-is-far-too-long", -ENODEV, "no such interface a-name"},
 		{"vcan9", -ENETDOWN, "vcan9 is down: ip link set vcan9 up"},
 	};
 

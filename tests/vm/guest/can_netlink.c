@@ -96,7 +96,7 @@ static void as_ip_has_it(const char *name)
 		bus->ops->close(bus);
 	}
 	check(open_bus(&bus, name, 250000, &err) == -EINVAL &&
-		      strstr(err.text, "runs at 500000 bit/s, bitrate is 250000"),
+		      strstr(err.text, "runs at 500000 bit/s, but bitrate is 250000"),
 	      "another rate is refused: %s", err.text);
 	check(!run("ip link property add dev %s altname a-servo", name) &&
 		      !can_netlink_query("a-servo", &link) && !strcmp(link.name, name),

@@ -193,7 +193,7 @@ if [ -e "${INCISE_VM_LOOPBACK:-}" ]; then
 	check "the pause is in the times" holds "count(*) = 1 FROM (SELECT t_ns - lag(t_ns) OVER
 		(ORDER BY seq) AS d FROM frames) WHERE d > 2e9"
 	check "one that does not come back ended: exit code $code" sh -c "[ $code = 1 ] &&
-		[ \$(wc -l <err) = 1 ] && grep -q 'gave no picture for the last' err"
+		[ \$(wc -l <err) = 1 ] && grep -q 'sent no frame for the last' err"
 	check "verify says the same" verified 1
 	check "v4l2loopback goes" rmmod v4l2loopback
 else

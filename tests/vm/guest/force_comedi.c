@@ -214,11 +214,11 @@ static void refusals(void)
 		const char *says;
 	} cases[] = {
 		{"/dev/comedi9:0", 0, HZ, 0, ENOENT, "load the driver of your card"},
-		{"/dev/comedi0:1", 0, HZ, 0, EOPNOTSUPP, "is no analog input"},
+		{"/dev/comedi0:1", 0, HZ, 0, EOPNOTSUPP, "is not an analogue input"},
 		{"comedi0", 0, HZ, 0, EINVAL, "expected comedi:DEVICE:SUBDEVICE"},
 		{DEVICE, 8, HZ, 0, EINVAL, "has channels 0 to 7"},
 		{DEVICE, 0, HZ, 100, ERANGE, "(ranges in V: -10 to 10, -5 to 5)"},
-		{DEVICE, 0, 98765.4, 0, EINVAL, "next to it is 100000 Hz"},
+		{DEVICE, 0, 98765.4, 0, EINVAL, "the nearest is 100000 Hz"},
 	};
 	struct incise_force *force, *second;
 	struct incise_error err;

@@ -275,8 +275,8 @@ static void refusals(void)
 		int code;
 		const char *says;
 	} cases[] = {
-		{"none", "", HZ, ENODEV, "there is no IIO device \"none\"; there are: "},
-		{INCISE_SIM_ADC, "none", HZ, ENODEV, "there is no trigger \"none\""},
+		{"none", "", HZ, ENODEV, "no such IIO device \"none\"; there are: "},
+		{INCISE_SIM_ADC, "none", HZ, ENODEV, "no such trigger \"none\""},
 		{INCISE_SIM_ADC, INCISE_SIM_TRIGGER, 50000, EINVAL,
 		 "does not take 50000 Hz"},
 		{INCISE_SIM_ADC, "", 0, EINVAL, "correct force_setup"},

@@ -74,7 +74,7 @@ start watch $incise haptic $scene --in-kernel --rig /tmp/rig.conf --json
 check "haptic --in-kernel starts one of its own" until_true watches || cat /tmp/watch.err
 sleep 1
 kill -9 "$(pgrep -x incise-feed)"
-dies() { ended watch 1 && said "the program that drove it ended while it was powered" </tmp/watch.err; }
+dies() { ended watch 1 && said "the program that drove it ended while it was on" </tmp/watch.err; }
 check "when that dies, it fails with the reason" dies
 sed 's/^/# /' /tmp/watch.err
 check "and there is no power" until_true unpowered

@@ -48,7 +48,7 @@ frozen() {
 	n=0; until unpowered >/dev/null || [ $n -ge 200 ]; do sleep 0.1; n=$((n + 1)); done
 	sleep 3
 	kill -CONT $pid
-	! wait $pid && said "deadman: targets stopped coming" </tmp/err
+	! wait $pid && said "deadman: no more targets arrived" </tmp/err
 }
 check "stopped beyond its --duration it fails with the deadman" frozen
 sed 's/^/# /' /tmp/err

@@ -20,7 +20,7 @@ actuator = { spring_N_mm = 2.0; travel_mm = 3.0; lead_mm = 2.0; velocity_mm_s = 
 	acceleration_mm_s2 = 10.0; tick_us = 50.0; };
 END
 check "a tick that is too short for eight motors is named, with the shortest" \
-	says 1 "tick_us is 50, but this machine holds no less than" \
+	says 1 "tick_us is 50, but this machine needs at least" \
 	stepper move --rig /tmp/machine.conf --unhomed 0.1mm
 echo 0 >$config/live
 rmdir $config/motor? $config

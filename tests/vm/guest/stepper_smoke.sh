@@ -37,7 +37,7 @@ check "what is no line is refused" refused sh -c "echo incise-sim >$config/bench
 echo incise-sin:1 >$config/bench/motor0/dir
 check "a chip that is not there is refused" refused live 1
 check "the log names the line and the label" \
-	sh -c 'dmesg | grep -q "line motor0-dir: there is no chip labelled incise-sin"'
+	sh -c 'dmesg | grep -q "line motor0-dir: no chip labelled incise-sin"'
 echo incise-sim:1 >$config/bench/motor0/dir
 check "it goes live" live 1 || { dmesg | tail -n 20 | sed 's/^/# /'; exit 0; }
 cdev=$(cat $config/bench/cdev)

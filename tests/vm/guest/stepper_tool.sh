@@ -152,7 +152,7 @@ slowly move --by -750um
 kill -9 $pid
 wait $pid 2>/dev/null
 check "kill -9: the module brought it to rest, and says why" \
-	says 0 "the program that drove it ended while it was powered" stepper status
+	says 0 "the program that drove it ended while it was on" stepper status
 at=$(carriage position)
 check "it is latched" says 0 '"fault": "owner"' stepper status --json
 check "it stands" [ "$(carriage position)" = "$at" ]
@@ -162,7 +162,7 @@ slowly home
 kill -INT $pid
 wait $pid
 code=$?
-check "Ctrl-C stops homing" ended 1 "stopped; its position is not that of the machine"
+check "Ctrl-C stops homing" ended 1 "stopped; its position is unknown"
 check "without power, not homed" says 0 ": disabled at" stepper status
 
 # Homing counts down from the end of the travel.
@@ -171,12 +171,12 @@ kill -STOP $pid
 until grep -q "faults=0x1$" /sys/kernel/debug/incise_stepper/*/counters || ! kill -0 $pid; do :; done
 at=$(carriage position)
 check "the deadman takes power from a program that sleeps" \
-	says 0 "fault      deadman: targets stopped coming" stepper status
+	says 0 "fault      deadman: no more targets arrived" stepper status
 check "it stands" [ "$(carriage position)" = "$at" ]
 kill -CONT $pid
 wait $pid
 code=$?
-check "which says so when it wakes" ended 1 "deadman: targets stopped coming"
+check "which says so when it wakes" ended 1 "deadman: no more targets arrived"
 check "clear" says 0 "cleared; it was deadman" stepper clear
 
 incise info stepper --json >info.json

@@ -128,29 +128,26 @@ static int refuse_tty(const char *path, int code, const char *where,
 	case ENXIO:
 	case ENODEV:
 		return incise_error_set(err, ENODEV,
-					"%s: %s is not there: is the adapter plugged in? "
-					"/dev/serial/by-id lists those that are",
+					"%s: no such device %s; plug in the adapter; "
+					"/dev/serial/by-id lists the serial ports",
 					where, path);
 	case EACCES:
 	case EPERM:
 		return incise_error_set(
 			err, EACCES,
-			"%s: no right to open %s: join the group that owns "
-			"it, which mostly is dialout",
+			"%s: no permission to open %s; join its group, usually dialout",
 			where, path);
 	case EBUSY:
 	case EWOULDBLOCK:
-		return incise_error_set(
-			err, EBUSY,
-			"%s: another program has %s open: end it first, or "
-			"drive from one place only",
-			where, path);
+		return incise_error_set(err, EBUSY,
+					"%s: another program has %s open; end it first",
+					where, path);
 	case ENOTTY:
 	case EINVAL:
 		return incise_error_set(
 			err, EINVAL,
-			"%s: %s is no serial line: expected the tty of an "
-			"adapter that speaks slcan, such as /dev/ttyACM0",
+			"%s: %s is not a serial port; expected the tty of an slcan "
+			"adapter, for example /dev/ttyACM0",
 			where, path);
 	case ENOMEM:
 		return incise_error_set(err, ENOMEM, "%s: out of memory", where);
@@ -381,8 +378,8 @@ static int refuse_rate(const struct can_bus_request *request, const char *rate,
 {
 	return incise_error_set(
 		err, EINVAL,
-		"%s: no adapter has %.20s bit/s: choose 10000, 20000, 50000, 100000, "
-		"125000, 250000, 500000, 800000 or 1000000, as the drive has it",
+		"%s: no adapter supports %.20s bit/s; set the bit rate of the drive: "
+		"10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000 or 1000000",
 		request->where, rate);
 }
 
@@ -412,8 +409,8 @@ static int parse_device(const struct can_bus_request *request, char path[PATH_MA
 	if (rate && request->bitrate && request->bitrate != *bitrate)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: %s is given %u bit/s behind its @, and bitrate is %u: take one "
-			"of them away",
+			"%s: %s has %u bit/s after its @, but bitrate is %u; remove "
+			"one of them",
 			request->where, path, *bitrate, request->bitrate);
 	return 0;
 }
@@ -432,8 +429,7 @@ static int start(struct slcan *s, const struct can_bus_request *request,
 	tty_close(&s->tty, "", 0);
 	return incise_error_set(
 		err, rc == -ENODEV ? ENODEV : EIO,
-		"%s: %s takes no bytes: unplug the adapter and plug it in "
-		"again",
+		"%s: %s accepts no bytes; unplug the adapter and plug it in again",
 		request->where, s->bus.name);
 }
 

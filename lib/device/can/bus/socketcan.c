@@ -268,8 +268,8 @@ static int check_rate(struct socketcan *s, const struct can_bus_request *request
 		return 0;
 	return incise_error_set(
 		err, EINVAL,
-		"%s: %s runs at %u bit/s, bitrate is %u: correct it, or run ip link set %s "
-		"down, then ip link set %s up type can bitrate %u",
+		"%s: %s runs at %u bit/s, but bitrate is %u; correct it, or run ip "
+		"link set %s down, then ip link set %s up type can bitrate %u",
 		request->where, name, s->bus.bitrate, request->bitrate, name, name,
 		request->bitrate);
 }
@@ -280,13 +280,13 @@ static int refuse_query(const struct can_bus_request *request, int code,
 	if (code == ENODEV)
 		return incise_error_set(
 			err, ENODEV,
-			"%s: there is no interface %.40s: is the adapter plugged in, "
-			"its driver loaded? Then ip link set can0 up type can bitrate "
-			"1000000; ip -br link lists what there is",
+			"%s: no such interface %.40s; plug in the adapter and load its "
+			"driver, then ip link set can0 up type can bitrate 1000000; ip "
+			"-br link lists the interfaces",
 			request->where, request->device);
 	return incise_error_set(err, code == ENOMEM ? ENOMEM : EIO,
-				"%s: the kernel does not tell of %s: %s", request->where,
-				request->device, strerror(code));
+				"%s: the kernel has no information on %s: %s",
+				request->where, request->device, strerror(code));
 }
 
 /* Returns the interface's index, or -errno with a message. */
@@ -302,8 +302,8 @@ static int look_up(struct socketcan *s, const struct can_bus_request *request,
 	if (!link.is_can)
 		return incise_error_set(
 			err, EINVAL,
-			"%s: %s is no CAN interface: ip -br link show type "
-			"can lists those there are",
+			"%s: %s is not a CAN interface; ip -br link show type can "
+			"lists them",
 			where, name);
 	if (!link.is_up)
 		return incise_error_set(
@@ -363,8 +363,8 @@ static int own_node(const char *interface, uint8_t node, const char *where,
 	if (code == EADDRINUSE)
 		return incise_error_set(
 			err, EBUSY,
-			"%s: another program drives it: end that first (ss -xap shows the "
-			"one with @%s)",
+			"%s: another program drives it; end it first (ss -xap shows "
+			"the one with @%s)",
 			where, name.sun_path + 1);
 	return incise_error_set(err, EIO, "%s: bind: %s", where, strerror(code));
 }
@@ -380,13 +380,14 @@ static int open_socket(struct socketcan *s, const struct can_bus_request *reques
 	case EPROTONOSUPPORT:
 		return incise_error_set(
 			err, EAFNOSUPPORT,
-			"%s: this kernel has no CAN sockets: modprobe can_raw; "
-			"where it has no such module, a serial adapter works "
-			"as slcan:/dev/ttyACM0",
+			"%s: this kernel has no CAN sockets; run modprobe can_raw, or "
+			"use a serial adapter as slcan:/dev/ttyACM0",
 			request->where);
 	case EACCES:
 	case EPERM:
-		return incise_error_set(err, EACCES, "%s: no right to open a CAN socket",
+		return incise_error_set(err, EACCES,
+					"%s: no permission to open a CAN "
+					"socket",
 					request->where);
 	default:
 		return incise_error_set(err, errno == ENOMEM ? ENOMEM : EIO,

@@ -465,7 +465,7 @@ static const struct code_text emcys[] = {
 	{0x8312, "difficult start-up"},
 	{0x8311, "excess torque"},
 	{0x8300, "torque control"},
-	{0x8250, "RPDO time-out: set-points stopped"},
+	{0x8250, "RPDO time-out: setpoints stopped"},
 	{0x8240, "unexpected length of SYNC"},
 	{0x8230, "destination of a multiplexed PDO not available"},
 	{0x8220, "PDO length exceeded"},
@@ -586,7 +586,7 @@ static const struct code_text emcys[] = {
 
 const char *canopen_abort_text(uint32_t code, char *text, size_t size)
 {
-	const char *name = "an abort code that CiA 301 does not have";
+	const char *name = "an abort code not in CiA 301";
 
 	for (size_t i = 0; i < COUNT(aborts); i++)
 		if (aborts[i].code == code)

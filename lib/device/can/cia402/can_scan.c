@@ -112,7 +112,7 @@ static void add_modes(struct node *n)
 static void add_drive(struct node *n, const char *name)
 {
 	struct incise_scan_device *device = n->device;
-	const char *state = "it does not say its state";
+	const char *state = "it does not report its state";
 	char words[100] = "no fault";
 	uint32_t word, mode, code = 0;
 
@@ -185,11 +185,11 @@ static void describe(struct scan *scan, unsigned int node,
 		add_drive(&n, name);
 	else if (has_type)
 		snprintf(device->what, sizeof(device->what),
-			 "%.50s: CANopen profile %u, no CiA 402 drive",
+			 "%.50s: CANopen profile %u, not a CiA 402 drive",
 			 *name ? name : "a device", type & 0xffff);
 	else
 		snprintf(device->what, sizeof(device->what),
-			 "%.50s: does not say what it is, no CiA 402 drive",
+			 "%.50s: reports no device type, not a CiA 402 drive",
 			 *name ? name : "a device");
 	device->usable = has_type && (type & 0xffff) == CIA402_PROFILE;
 }
@@ -220,7 +220,7 @@ int can_stepper_scan(const struct can_transport *transport, const char *argument
 	snprintf(where, sizeof(where), "%s:%.80s", transport->name, arguments);
 	if (!*arguments || *arguments == ':' || *arguments == '@')
 		return incise_error_set(err, EINVAL,
-					"%s: expected a bus, such as can:can0 or "
+					"%s: expected a bus, for example can:can0 or "
 					"slcan:/dev/ttyACM0; correct it",
 					where);
 	if (can_session_parse(arguments, device, sizeof(device), &only))
@@ -231,7 +231,7 @@ int can_stepper_scan(const struct can_transport *transport, const char *argument
 	rc = scan_bus(&scan, only, found, context);
 	scan.bus->ops->close(scan.bus);
 	if (rc < 0)
-		incise_error_set(err, -rc, "%s: %s; see its cable, and that it is up",
+		incise_error_set(err, -rc, "%s: %s; check its cable, and that it is up",
 				 where, strerror(-rc));
 	return rc;
 }

@@ -98,7 +98,7 @@ static int open_bus(struct can_session *s, const struct can_transport *transport
 		return incise_error_set(err, EINVAL,
 					"%s: node %u is also actuator.can.master, the "
 					"id of this program's heartbeat; give another "
-					"one there",
+					"id there",
 					request->where, node);
 	bus.node = watch ? 0 : (uint8_t)node;
 	rc = transport->open(&s->bus, &bus, err);
@@ -126,7 +126,7 @@ static int check_alone(struct can_session *s)
 	if (rc)
 		return cia402_error(client, -rc, "%s: %s", s->bus->name, strerror(-rc));
 	return cia402_error(client, EBUSY,
-			    "another master sends SYNCs, set-points or heartbeats of "
+			    "another master sends SYNCs, setpoints or heartbeats of "
 			    "node 0x%02x on %s; end it, or give another "
 			    "actuator.can.master",
 			    s->master.own, s->bus->name);
@@ -191,10 +191,9 @@ static int set_up(struct can_session *s)
 	can_units_range(s);
 	if (!s->in_range)
 		return cia402_error(&s->client, ERANGE,
-				    "its position is %d counts, and with %g counts a "
-				    "turn the travel goes beyond what 32 bits hold; "
-				    "switch its power off and on, or see "
-				    "counts_per_turn in rig.conf",
+				    "its position is %d counts, and with %g counts per "
+				    "turn the travel exceeds 32 bits; switch its power "
+				    "off and on, or check counts_per_turn in rig.conf",
 				    s->axis.position, s->units.counts_per_turn);
 	s->boots = s->master.boots;
 	rc = cia402_configure(&s->client, &s->setup, &s->supported);
@@ -398,7 +397,7 @@ int can_session_ready(struct can_session *s, bool homing, struct incise_error *e
 	rc = canopen_await(&s->master, canopen_is_operational, now + READY_NS);
 	return rc ? incise_error_set(err, -rc,
 				     "%s: does not become operational, and is %s: %s; "
-				     "see its power and cable",
+				     "check its power and cable",
 				     s->name, canopen_state_name(s->master.state),
 				     strerror(-rc))
 		  : 0;

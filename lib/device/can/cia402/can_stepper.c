@@ -265,8 +265,8 @@ static int power(struct can_stepper *c, int64_t homing_ns, const volatile int *s
 	give_back(c);
 	if (rc == -ERANGE)
 		return incise_error_set(err, ERANGE,
-					"%s: stands at %.3f mm, outside of its travel: "
-					"home it, or move it there by hand",
+					"%s: is at %.3f mm, outside its travel: home "
+					"it, or move it back by hand",
 					c->motor.name,
 					(double)axis->motion.status.position *
 						axis->setup.step_mm);
@@ -367,15 +367,14 @@ static int stepper_counter(struct incise_stepper *stepper, int i,
 	const struct can_bus_counts *bus = &c->session.bus->counts;
 	const struct can_axis_counts *axis = &c->session.axis.counts;
 	const struct incise_stepper_counter counters[] = {
-		{"setpoints_sent", "set-points sent", axis->setpoints, false},
+		{"setpoints_sent", "setpoints sent", axis->setpoints, false},
 		{"sync_late", "SYNCs late by half a cycle", axis->sync_late, true},
 		{"tpdo_missing", "SYNCs without an answer", axis->tpdo_missing, true},
 		{"bus_errors", "error frames", bus->errors, true},
 		{"bus_offs", "times bus-off", c->session.master.bus_offs, true},
 		{"frames_lost", "frames lost before they were read", bus->overflow, true},
-		{"sends_refused", "frames that the queue had no room for", bus->full,
-		 true},
-		{"lines_broken", "what came and was no frame", bus->broken, true},
+		{"sends_refused", "frames lost in a full queue", bus->full, true},
+		{"lines_broken", "invalid data received", bus->broken, true},
 		{"emergencies", "emergency messages", c->session.master.emcy.count, true},
 	};
 
@@ -423,8 +422,8 @@ static int go_to_start(struct can_stepper *c, double home_mm, const volatile int
 						c->motor.name);
 		if (now > end)
 			return incise_error_set(err, ETIMEDOUT,
-						"homing %s: it does not come to %g mm; "
-						"see that it moves",
+						"homing %s: it does not reach %g mm; "
+						"check that it moves",
 						c->motor.name, to_mm);
 		if (rested == INT64_MAX && c->motor.last.setpoint_t_ns >= begin &&
 		    status.state == INCISE_STEPPER_STATE_READY)
@@ -444,18 +443,20 @@ static int stepper_home(struct incise_stepper *stepper, const volatile int *stop
 
 	if (!actuator->can.homing_method)
 		return incise_error_set(err, EOPNOTSUPP,
-					"homing %s: no homing_method in actuator.can of "
-					"rig.conf; give the drive's, such as 17",
+					"homing %s: no homing_method in actuator.can "
+					"of rig.conf; give the drive's, for example 17",
 					c->motor.name);
 	if (c->motor.watches)
-		return incise_error_set(err, EPERM, "homing %s: it was opened to watch",
+		return incise_error_set(err, EPERM,
+					"homing %s: it was opened only to "
+					"watch",
 					c->motor.name);
 	if (state_of(c) != INCISE_STEPPER_STATE_READY &&
 	    state_of(c) != INCISE_STEPPER_STATE_MOVING)
 		return refuse_by_cause(
 			c,
 			incise_error_set(err, EIO,
-					 "homing %s: it is not powered; enable it first",
+					 "homing %s: it is off; enable it first",
 					 c->motor.name),
 			"homing", err);
 	/* Change the mode only at rest. */
@@ -464,8 +465,8 @@ static int stepper_home(struct incise_stepper *stepper, const volatile int *stop
 		rc = power(c, most_ns, stop, "homing", err);
 	if (rc == -EINTR)
 		return incise_error_set(err, EINTR,
-					"homing %s: stopped; its position is not that "
-					"of the machine: home again",
+					"homing %s: stopped; its position is unknown: "
+					"home again",
 					c->motor.name);
 	if (!rc && (rc = stepper->ops->disable(stepper, err)) == 0)
 		rc = borrow(c, err);

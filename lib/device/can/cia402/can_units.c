@@ -115,8 +115,8 @@ int can_units_axis(struct can_session *s)
 	if (rc)
 		return cia402_error(&s->client, -rc,
 				    "velocity_mm_s = %g, acceleration_mm_s2 = %g or "
-				    "jerk_mm_s3 = %g is nothing that cycles of %g us "
-				    "can make; correct it",
+				    "jerk_mm_s3 = %g cannot be rendered in cycles of "
+				    "%g us; correct it",
 				    a->velocity_mm_s, a->acceleration_mm_s2,
 				    a->jerk_mm_s3, a->can.cycle_ns / 1e3);
 	return 0;
@@ -181,9 +181,9 @@ int can_units_load(struct can_session *s)
 	if (least_us <= CYCLE_MOST_US)
 		snprintf(slower, sizeof(slower), ", or cycle_us = %g", least_us);
 	return cia402_error(&s->client, ERANGE,
-			    "a cycle each %g us takes %u kbit/s, %u %% of the %u kbit/s "
-			    "of %s, and may take %d %%; give a bit rate of at least %u "
-			    "kbit/s%s",
+			    "cycles of %g us need %u kbit/s, %u %% of the %u kbit/s of "
+			    "%s; at most %d %% are allowed; give a bit rate of at "
+			    "least %u kbit/s%s",
 			    cycle_ns / 1e3, (load + 999) / 1000, s->load_percent,
 			    bitrate / 1000, s->bus->name, BUS_LOAD_MOST,
 			    (load * 100 / BUS_LOAD_MOST + 999) / 1000, slower);

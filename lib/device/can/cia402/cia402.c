@@ -200,28 +200,28 @@ int cia402_fail(const struct cia402_client *client, const struct cia402_object *
 	switch (rc) {
 	case -EREMOTEIO:
 		return cia402_error(client, EOPNOTSUPP,
-				    "the drive refuses to let %s be %s: %s; see its "
-				    "manual whether it can do this, and its firmware",
+				    "the drive does not allow its %s to be %s: %s; "
+				    "check its manual and its firmware",
 				    what, action,
 				    canopen_abort_text(client->master->abort, why,
 						       sizeof(why)));
 	case -ETIMEDOUT:
 		return cia402_error(client, ETIMEDOUT,
-				    "no answer when %s was to be %s; see the drive's "
+				    "no answer when %s was to be %s; check the drive's "
 				    "power, its wiring, node id and bit rate",
 				    what, action);
 	case -EPROTO:
 		return cia402_error(client, EPROTO,
-				    "the answer makes no sense when %s was to be %s; "
-				    "see that no other node has this id and that it is "
-				    "a CiA 402 drive",
+				    "invalid answer when %s was to be %s; check that "
+				    "no other node has this id and that it is a CiA "
+				    "402 drive",
 				    what, action);
 	case -EINTR:
 		return cia402_error(client, EINTR, "stopped when %s was to be %s", what,
 				    action);
 	default:
 		return cia402_error(client, -rc,
-				    "the bus %s failed when %s was to be %s: %s; see "
+				    "the bus %s failed when %s was to be %s: %s; check "
 				    "`ip -details link`, cables and termination",
 				    client->master->bus->name, what, action,
 				    strerror(-rc));
@@ -273,7 +273,7 @@ static int verify(const struct cia402_client *client, const struct cia402_object
 		return rc;
 	return cia402_error(client, EPROTO,
 			    "the drive did not keep %s (%04X:%u): %lld was written, "
-			    "%lld is read (%Xh); see the range that its manual gives",
+			    "%lld is read (%Xh); check the range in its manual",
 			    object->name, object->index, object->sub,
 			    (long long)truncate(object, value), (long long)kept, kept);
 }

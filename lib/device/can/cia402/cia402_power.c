@@ -58,8 +58,8 @@ int cia402_power_off(const struct cia402_client *client)
 		rc = cia402_await_state(client, without_power, RAMP_NS, &state);
 	if (rc == -ETIME)
 		return cia402_error(client, ETIMEDOUT,
-				    "the drive still has power (%s) after it was told "
-				    "to take it away; switch its supply off",
+				    "the drive is still on (%s) after it was commanded "
+				    "off; switch its supply off",
 				    cia402_state_name(state));
 	return rc;
 }
@@ -78,8 +78,8 @@ static int refuse_fault(const struct cia402_client *client)
 	if (has && value)
 		code = (uint16_t)value;
 	return cia402_error(client, EBUSY,
-			    "the drive stays in its fault: %s; remove the cause, then "
-			    "clear again",
+			    "the drive remains in its fault: %s; remove the cause, "
+			    "then clear again",
 			    canopen_emcy_text(code, text, sizeof(text)));
 }
 
@@ -116,8 +116,8 @@ int cia402_set_mode(const struct cia402_client *client, enum cia402_mode mode)
 			break;
 		if (bus->ops->now(bus) >= until_ns)
 			return cia402_error(client, ETIMEDOUT,
-					    "the drive does not take the mode %s and "
-					    "stays in %s; see its manual",
+					    "the drive does not accept the mode %s and "
+					    "remains in %s; see its manual",
 					    cia402_mode_name(mode),
 					    cia402_mode_name((int8_t)is));
 		rc = cia402_pause(client, POLL_NS);
@@ -133,7 +133,8 @@ int cia402_set_homing(const struct cia402_client *client, int method, uint32_t s
 
 	if (method < INT8_MIN || method > INT8_MAX)
 		return cia402_error(client, EINVAL,
-				    "homing method %d is none; give -128 … 127", method);
+				    "homing method %d is invalid; give -128 … 127",
+				    method);
 	rc = cia402_write_verified(client, &homing_method, (uint32_t)method);
 	/* A drive without the object has no offset. */
 	if (!rc)
@@ -160,8 +161,8 @@ int cia402_read_homed(const struct cia402_client *client, enum cia402_mode mode,
 		return rc;
 	if (cia402_powered(state))
 		return cia402_error(client, EBUSY,
-				    "the drive has power (%s); disable it before it is "
-				    "asked whether it is homed",
+				    "the drive is on (%s); disable it before reading "
+				    "whether it is homed",
 				    cia402_state_name(state));
 	rc = cia402_set_mode(client, CIA402_HOMING);
 	if (!rc)

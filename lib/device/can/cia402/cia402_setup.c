@@ -267,7 +267,7 @@ int cia402_set_range(const struct cia402_client *client, int32_t position_min,
 {
 	if (position_min >= position_max)
 		return cia402_error(client, EINVAL,
-				    "a range from %d to %d is none; see travel_mm and "
+				    "an empty range from %d to %d; check travel_mm and "
 				    "counts_per_turn in rig.conf",
 				    position_min, position_max);
 	return write_range(client, position_min, position_max);
@@ -338,7 +338,7 @@ static int check_setup(const struct cia402_client *client,
 	else if (client->master->own != setup->master ||
 		 client->master->heartbeat_ns <= 0 ||
 		 client->master->heartbeat_ns >= setup->deadman_ms * MS_NS)
-		problem = "a deadman that this program's heartbeats do not keep off";
+		problem = "a deadman shorter than this program's heartbeats";
 	else if (setup->mode != CIA402_CSP && setup->mode != CIA402_CSV &&
 		 setup->mode != CIA402_CST)
 		problem = "a mode that is not cyclic";
@@ -357,8 +357,8 @@ static int check_power(const struct cia402_client *client)
 	if (rc || !cia402_powered(state))
 		return rc;
 	return cia402_error(client, EBUSY,
-			    "the drive has power (%s); somebody else leads it, or it "
-			    "was left so: disable it first",
+			    "the drive is on (%s): another master controls it, or it "
+			    "was left on; disable it first",
 			    cia402_state_name(state));
 }
 
@@ -401,8 +401,8 @@ static int set_cycle(const struct cia402_client *client, const struct cia402_set
 		return rc;
 	if (has && !(available & 1u << (setup->mode - 1)))
 		return cia402_error(client, EOPNOTSUPP,
-				    "the drive does not have the mode %s: its 6502:0 is "
-				    "%08Xh; choose another mode in rig.conf, or see its "
+				    "the drive lacks the mode %s: its 6502:0 is %08Xh; "
+				    "choose another mode in rig.conf, or check its "
 				    "firmware",
 				    cia402_mode_name(setup->mode), available);
 	rc = cia402_set_mode(client, setup->mode);
@@ -426,8 +426,8 @@ static int set_cycle(const struct cia402_client *client, const struct cia402_set
 		return rc ? rc : cia402_ensure(client, &cycle_power, (uint32_t)powers[i]);
 	}
 	return cia402_error(client, EINVAL,
-			    "a cycle of %u ns is no digit times a power of ten; choose "
-			    "another cycle_us in rig.conf",
+			    "a cycle of %u ns cannot be represented in the drive; "
+			    "choose another cycle_us in rig.conf",
 			    setup->cycle_ns);
 }
 
@@ -469,8 +469,8 @@ static int start(const struct cia402_client *client, const struct cia402_setup *
 	if (rc == -ETIMEDOUT)
 		return cia402_error(client, ETIMEDOUT,
 				    "the drive does not become operational: its "
-				    "heartbeat says %s; see its EMCY codes with `incise "
-				    "info` of this bus",
+				    "heartbeat reports %s; see its EMCY codes with "
+				    "`incise info` of this bus",
 				    canopen_state_name(master->state));
 	if (rc)
 		return cia402_fail(client, &nmt, "heard", rc);

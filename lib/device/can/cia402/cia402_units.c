@@ -50,16 +50,17 @@ int cia402_identify(const struct cia402_client *client)
 
 	if (rc == -ETIMEDOUT)
 		return cia402_error(client, ENODEV,
-				    "nobody answers at node 0x%02x on %s; see the "
+				    "no answer from node 0x%02x on %s; check the "
 				    "drive's power, its wiring, node id and bit rate, "
-				    "and what else `incise info` finds on this bus",
+				    "and the other nodes that `incise info` finds on "
+				    "this bus",
 				    client->master->node, client->master->bus->name);
 	if (rc)
 		return cia402_fail(client, &device_type, "read", rc);
 	if ((type & 0xffff) != CIA402_PROFILE)
 		return cia402_error(client, EPROTO,
-				    "node %u is no CiA 402 drive: its device profile is "
-				    "%u; see the node id",
+				    "node %u is not a CiA 402 drive: its device "
+				    "profile is %u; check the node id",
 				    client->master->node, type & 0xffff);
 	return 0;
 }
@@ -134,8 +135,8 @@ static int refuse_unit(const struct cia402_client *client,
 		       const struct cia402_object *object, uint32_t unit, const char *key)
 {
 	return cia402_error(client, EPROTO,
-			    "what the drive's %s (%04X) says, %08Xh, is not known here; "
-			    "give %s in rig.conf",
+			    "the drive's %s (%04X), %08Xh, is unknown; give %s in "
+			    "rig.conf",
 			    object->name, object->index, unit, key);
 }
 
@@ -166,7 +167,7 @@ static int read_positions(const struct cia402_client *client, double *per_turn)
 		return rc;
 	if (!is_plausible(*per_turn) || *per_turn < 1 || *per_turn > MOST_PER_TURN)
 		return cia402_error(client, EPROTO,
-				    "the drive does not say how many counts a turn has "
+				    "the drive does not report its counts per turn "
 				    "(6092, 608F, 60A8: %g); give counts_per_turn in "
 				    "rig.conf",
 				    *per_turn);
@@ -237,8 +238,8 @@ int cia402_read_units(const struct cia402_client *client, struct cia402_units *u
 		    found.velocity_per_turn_s != found.counts_per_turn)
 			rc = cia402_error(client, EPROTO,
 					  "the unit of velocity is not a count per "
-					  "second, and the drive does not say that of "
-					  "acceleration (60AA); give "
+					  "second, and the drive does not report the "
+					  "unit of acceleration (60AA); give "
 					  "acceleration_per_turn_s2 in rig.conf, see "
 					  "its manual");
 	}

@@ -44,7 +44,9 @@ static int fail(struct hdf5 *hdf5, const char *what, struct incise_error *err)
 	int code = errno ? errno : EIO;
 
 	hdf5->failed = true;
-	return incise_error_set(err, code, "HDF5: %s: %s; make room, or give another -o",
+	return incise_error_set(err, code,
+				"HDF5: %s: %s; free disk space, or give "
+				"another -o",
 				what, strerror(code));
 }
 
@@ -184,7 +186,7 @@ static int hdf5_begin(struct incise_table *table, struct incise_error *err)
 	for (int i = 0; table->provenance && i < table->provenance->n && !bad; i++)
 		bad = put_text(hdf5->file, table->provenance->items[i].key,
 			       table->provenance->items[i].value);
-	return bad ? fail(hdf5, "the file cannot be begun", err) : 0;
+	return bad ? fail(hdf5, "the file cannot be started", err) : 0;
 }
 
 static size_t stored_width(enum incise_column_type type)
@@ -323,7 +325,7 @@ static int hdf5_end(struct incise_table *table, struct incise_error *err)
 		bad = 1;
 	else if (!bad)
 		hdf5->file = -1;
-	return bad ? fail(hdf5, "the file cannot be ended", err) : 0;
+	return bad ? fail(hdf5, "the file cannot be closed", err) : 0;
 }
 
 static const struct incise_table_format format = {
