@@ -137,7 +137,7 @@ altered() {
 @test "a recording without a camera, and what is none" {
 	incise capture -o n.rec --rig sim:clock=simulated,cut_s=1 --duration 3s
 	run --separate-stderr incise calibrate check --recording n.rec
-	failed_with "n.rec: 0 pictures within 0 seconds" "record a few slow cuts with the camera"
+	failed_with "n.rec: 0 frames within 0 seconds" "record a few slow cuts with the camera"
 	run --separate-stderr incise calibrate check --recording none.rec
 	failed_with "none.rec"
 	echo 'history = 1;' >calibration.conf

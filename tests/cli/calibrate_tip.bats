@@ -83,7 +83,7 @@ within() {
 	failed_with "too few"
 	sed '1s/x_mm,y_mm/y_mm,x_mm/' p.csv >swapped.csv
 	run --separate-stderr incise calibrate tip --from swapped.csv
-	failed_with "columns swapped"
+	failed_with "order of the columns"
 	sed '1s/qw,qx,qy,qz/qx,qy,qz,qw/' p.csv >last.csv
 	run --separate-stderr incise calibrate tip --from last.csv
 	failed_with "swapped"

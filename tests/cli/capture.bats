@@ -187,7 +187,7 @@ until_it_runs() {
 	incise capture -o a.rec --rig $quick --duration 1s
 	before=$(sha256sum <a.rec/recording.db)
 	run --separate-stderr incise capture -o a.rec --rig $quick --duration 2s
-	failed_with "a.rec: exists already"
+	failed_with "a.rec: exists"
 	[ "$(sha256sum <a.rec/recording.db)" = "$before" ]
 	incise capture -o a.rec --rig $quick --duration 2s --overwrite
 	[ "$(ask a.rec 'SELECT count(*) FROM force')" -ge 20000 ]
@@ -365,7 +365,7 @@ small_disk() {
 		[ $status -eq 1 ] || continue
 		seen=1
 		grep -q "Too many open files" err || { echo "$n: $(cat err)"; false; }
-		if grep -q "what was committed" err; then
+		if grep -q "the committed data" err; then
 			incise info "$n.rec" >/dev/null
 		else
 			[ ! -e "$n.rec.part" ]

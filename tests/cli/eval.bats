@@ -392,7 +392,7 @@ degree_model() {
 	incise eval big.fis <<<'5 20' >out
 	[ -s out ]
 	run --separate-stderr incise eval big.fis --arith fixed <<<'5 20'
-	failed_with big.fis "too extreme"
+	failed_with big.fis "exceed all number formats"
 	sed "s/^MF1='very_shallow':'gaussmf',.*/MF1='very_shallow':'gaussmf',[1e-9 0]/" m.fis >thin.fis
 	run --separate-stderr incise eval thin.fis --arith fixed <<<'5 20'
 	failed_with thin.fis very_shallow

@@ -29,7 +29,7 @@ setup() {
 	# It has a switch, but no way to go there.
 	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s --home
 	[ "$status" -eq 1 ]
-	[[ "${stderr_lines[-1]}" == *"mine at lost with switch cannot be homed"* ]]
+	[[ "${stderr_lines[-1]}" == *"mine at lost with switch does not support being homed"* ]]
 	rig "mine:lost"
 	run -0 --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s
 	[[ "$stderr" == *"warning: mine at lost cannot be homed: its 0 is where it stands"* ]]

@@ -165,7 +165,7 @@ replaces_when_told() {
 	incise $delay --duration 12s >/dev/null </dev/null
 	before=$(content)
 	run --separate-stderr incise $delay --duration 12s </dev/null
-	failed_with k.rec "exists already" "--overwrite"
+	failed_with k.rec "exists" "--overwrite"
 	run --separate-stderr incise $delay --rig none.conf --duration 12s --overwrite </dev/null
 	failed_with none.conf
 	incise verify k.rec >/dev/null

@@ -151,9 +151,9 @@ shows() {
 	failed_with "nothing.fis: No such file or directory"
 	printf 'a,b\n1,2\n' >other.csv
 	run --separate-stderr incise plot other.csv -o a.png
-	failed_with "other.csv:1: there is no column 'force_N'; the columns are: a, b"
+	failed_with "other.csv:1: no column 'force_N'; the columns are: a, b"
 	run --separate-stderr incise plot m.fis --data other.csv -o a.png
-	failed_with "other.csv:1: there is no column 'depth_mm'"
+	failed_with "other.csv:1: no column 'depth_mm'"
 	head -n 20 m.fis >half.fis
 	run --separate-stderr incise plot half.fis -o a.png
 	failed_with half.fis

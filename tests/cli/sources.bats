@@ -74,7 +74,7 @@ ask() {
 	run --separate-stderr incise info v4l2:/dev/video99
 	failed_with "v4l2:/dev/video99: nobody answers" "cable"
 	run --separate-stderr incise info nonsense:x
-	failed_with 'no backend "nonsense"' "tty" "can" "v4l2"
+	failed_with 'no such backend "nonsense"' "tty" "can" "v4l2"
 }
 
 @test "a module that cannot be loaded is no device" {
