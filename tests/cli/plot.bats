@@ -23,10 +23,12 @@ teardown() {
 	[ ! -d tmp ] || [ -z "$(ls -A tmp)" ]
 }
 
-# Draw a file as SVG: the texts of the figure are in the file texts, a line each.
+# Draw a file as SVG: the texts of the figure are in the file texts, a line each. None of them
+# overlaps another one or leaves the canvas.
 draws() {
 	incise plot "$@" -o figure.svg --overwrite >out
 	[ "$(cat out)" = "wrote figure.svg" ] || complain "$(cat out)" || return
+	python3 "$root/tests/cli/figures.py" figure.svg || return
 	python3 - >texts <<-'END'
 		import xml.etree.ElementTree as tree
 		for text in tree.parse("figure.svg").iter("{http://www.w3.org/2000/svg}text"):
@@ -59,11 +61,11 @@ shows() {
 	draws m.fis --data pairs.csv
 	shows "residual of force / N" "quantile of the normal distribution / SD"
 	awk -F, 'NR > 1 { print $2, $3 }' pairs.csv >points
-	# the mean is rounded to two digits, the RMSE to three
+	# three digits of the RMSE, which is 0.0442 N: no "mean -8.4e-06"
 	paste -d, <(tail -n +2 pairs.csv) <(incise eval m.fis points) | awk -F, '
 		{ e = $4 - $5; sum += e; squares += e * e; n++ }
-		END { printf "%d rows: measured - model, RMSE %.3g, mean %.2g\n",
-			n, sqrt(squares / n), sum / n }' >want
+		END { printf "%d rows: measured - model, RMSE %.4f, mean %.4f\n",
+			n, sqrt(squares / n), sum / n }' | sed 's/-0.0000/0.0000/' >want
 	shows "$(cat want)"
 	# rows where the blade did not advance are no data of the model
 	sed '1s/$/,advancing/; 2,11s/$/,0/; 12,$s/$/,1/' pairs.csv >some.csv
@@ -74,7 +76,7 @@ shows() {
 @test "a dataset: over depth and velocity, and by cut" {
 	draws pairs.csv
 	shows "pairs.csv: 288 rows" "depth / mm" "velocity / (mm/s)" "force / N" \
-		"mean and SD" cut mean SD "cut 1" "cut 6"
+		"mean and SD" "cut / 1" mean SD "cut 1" "cut 6"
 	! grep -qx "cut 7" texts
 	cut -d, -f2,4 pairs.csv >two.csv
 	draws two.csv
@@ -105,10 +107,10 @@ shows() {
 	draws flat.fis --data pairs.csv
 	shows "force / N"
 	# a text in a file is no command of gnuplot
-	sed "s/^Name='depth_mm'/Name='\`touch broken\`_mm'/" m.fis >odd.fis
+	sed "s/^Name='depth_mm'/Name='a\`touch broken\`b_mm'/" m.fis >odd.fis
 	! cmp -s m.fis odd.fis
 	draws odd.fis
-	shows " touch broken  / mm"
+	shows "a touch broken b / mm"
 	[ ! -e broken ] && [ ! -e tmp/broken ]
 }
 
@@ -157,7 +159,7 @@ shows() {
 	head -n 20 m.fis >half.fis
 	run --separate-stderr incise plot half.fis -o a.png
 	failed_with half.fis
-	head -c 100 /dev/urandom >noise
+	printf '\177ELF\2\1\0\0no file of incise' >noise
 	run --separate-stderr incise plot "$root/scenes/liver.scene" -o a.png
 	failed_with "liver.scene: this is a scene, not" "'incise plan "
 	run --separate-stderr incise plot m.fis --data m.fx -o a.png
@@ -355,8 +357,8 @@ entry() {
 			$(entry force 2026-07-05 force_mV_N mV/N 1238.5 1.5 true) );
 	END
 	draws c.conf
-	shows "c.conf: 4 calibrations" "force_mV_N / (mV/N)" "depth_mm_px / (mm/px)" before \
-		"in force" "value and U (k = 2)" "not passed" 2026-04-06
+	shows "c.conf: 4 calibrations" "sensitivity of the force / (mV/N)" "scale of the depth / (mm/px)" before \
+		"in force" "value and U (k = 2)" "not passed" 2026-04-05
 	[ "$(grep -cx "not passed" texts)" = 1 ]
 	keep_data c.conf
 	# UNIX time, value, U = 2 u, passed

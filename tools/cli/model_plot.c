@@ -247,19 +247,48 @@ void model_plot_surface(FILE *script, const struct model_surface *surface,
 		data, more);
 }
 
+struct contours {
+	double first, step, last;
+};
+
+/* Some eight steps of 1, 2 or 5 times a power of ten over the output's range on the mesh. */
+static struct contours contours_of(const struct model_surface *surface)
+{
+	double low = INFINITY, high = -INFINITY, x[INCISE_MODEL_INPUTS_MAX], step, power;
+
+	for (int i = 2; i < surface->n_inputs; i++)
+		x[i] = between(&surface->input[i], 1, 2);
+	for (int i = 0; i <= MESH; i++)
+		for (int j = 0; j <= MESH; j++) {
+			x[0] = between(&surface->input[0], i, MESH);
+			x[1] = between(&surface->input[1], j, MESH);
+			low = fmin(low, surface->eval(surface->of, x));
+			high = fmax(high, surface->eval(surface->of, x));
+		}
+	step = (high - low) / 8;
+	if (!(step > 1e-9 * fmax(fabs(low), fabs(high))))
+		return (struct contours){low, 1, low + 1};
+	power = pow(10, floor(log10(step)));
+	step = power * (step < 1.5 * power ? 1 : step < 3.5 * power ? 2 : 5);
+	return (struct contours){ceil(low / step) * step, step, high};
+}
+
 void model_plot_contours(FILE *script, const struct model_surface *surface,
 			 const char *data, const char *title)
 {
-	fprintf(script, "set title '%s'\n", title);
+	struct contours contours = contours_of(surface);
+
+	fprintf(script, "set title '%s%sa contour at each tick of the colours'\n", title,
+		*title ? "; " : "");
 	put_axis(script, "x", &surface->input[0]);
 	put_axis(script, "y", &surface->input[1]);
 	put_axis(script, "cb", &surface->output);
 	fprintf(script,
 		"set ylabel offset -2,0\nset view map\nset pm3d noborder\nset contour base\n"
-		"set cntrparam levels auto 10\nset cntrlabel onecolor start 20 interval 60\n"
-		"set style textbox opaque noborder\nset autoscale fix\nunset grid\n"
-		"splot '%s' with pm3d nocontour, '' with lines lc rgb ink nosurface, \\\n"
-		"  '' with labels font small boxed nosurface\n"
+		"set cntrlabel onecolor\n"
+		"set cntrparam levels incremental %g, %g, %g\nset cbtics %g\n"
+		"set autoscale fix\nunset grid\n"
+		"splot '%s' with pm3d nocontour, '' with lines lc rgb 'white' nosurface\n"
 		"unset contour\nset ylabel offset 0,0\nset grid\nset autoscale xy\n",
-		data);
+		contours.first, contours.step, contours.last, contours.step, data);
 }

@@ -119,20 +119,67 @@ static void write_series(const struct history *history, const struct series *ser
 	plot_data_end(data, folder);
 }
 
+/* "force zero / mV" of force_zero_mV: free(3). */
+static char *label_of(const struct series *series)
+{
+	static const struct {
+		const char *key, *name;
+	} names[] = {
+		{"force_mV_N", "sensitivity of the force"},
+		{"depth_mm_px", "scale of the depth"},
+		{"stepper_N_step", "force of a microstep"},
+		{"stepper_steps_s", "largest rate of the stepper"},
+	};
+	const char *unit = *series->unit ? series->unit : "1",
+		   *last = strrchr(series->key, '_');
+	char *name = cli_text("%.*s", (int)(last ? last - series->key : 32), series->key);
+	char *label;
+
+	for (char *c = name; *c; c++)
+		*c = *c == '_' ? ' ' : *c;
+	for (size_t i = 0; i < sizeof(names) / sizeof(*names); i++)
+		if (!strcmp(names[i].key, series->key))
+			snprintf(name = cli_resize(name, strlen(names[i].name) + 1, 1),
+				 strlen(names[i].name) + 1, "%s", names[i].name);
+	label = cli_text(strchr(unit, '/') ? "%s / (%s)" : "%s / %s", name, unit);
+	free(name);
+	return label;
+}
+
+/* An axis with three days, or fewer where they are one. */
+static void put_dates(FILE *script, double from_s, double to_s)
+{
+	static const double shares[] = {0.18, 0.5, 0.82};
+	double last_s = -INFINITY;
+
+	fprintf(script, "set xrange [%.0f:%.0f]\nset xtics (", from_s, to_s);
+	for (int i = 0; i < 3; i++) {
+		double day_s =
+			round((from_s + shares[i] * (to_s - from_s)) / DAY_S) * DAY_S;
+		time_t t = (time_t)day_s;
+		struct tm tm;
+		char text[32];
+
+		if (day_s <= last_s || !gmtime_r(&t, &tm))
+			continue;
+		strftime(text, sizeof(text), "%Y-%m-%d", &tm);
+		fprintf(script, "%s'%s' %.0f", last_s > 0 ? ", " : "", text, day_s);
+		last_s = day_s;
+	}
+	fputs(")\n", script);
+}
+
 static void put_panel(FILE *script, const struct series *series, const char *name)
 {
 	/* A day at least, and a margin, so that one calibration has an axis too. */
 	double margin_s = fmax(0.06 * (series->last_s - series->first_s), DAY_S);
-	bool quotient = strchr(series->unit, '/');
-	char *label = cli_text(quotient ? "%s / (%s)" : "%s / %s", series->key,
-			       *series->unit ? series->unit : "1");
+	char *label = label_of(series);
 
 	fputs("set ylabel ", script);
 	plot_put_text(script, label);
-	fprintf(script, "\nset xrange [%.0f:%.0f]\nset xtics %.0f\nplot ",
-		series->first_s - margin_s, series->last_s + margin_s,
-		DAY_S * fmax(1, ceil((series->last_s - series->first_s + 2 * margin_s) /
-				     DAY_S / 4)));
+	fputc('\n', script);
+	put_dates(script, series->first_s - margin_s, series->last_s + margin_s);
+	fputs("plot ", script);
 	if (!isnan(series->before))
 		fprintf(script, "%.9g with lines lc rgb grey dt 2 title 'before', \\\n  ",
 			series->before);
@@ -164,8 +211,8 @@ FILE *figure_of_calibration(const struct figure *figure)
 	fputs("set multiplot title ", script);
 	plot_put_text(script, figure->path);
 	fprintf(script,
-		".': %d calibrations' noenhanced\nset xdata time\nset timefmt '%%s'\n"
-		"set format x '%%Y-%%m-%%d'\nset key outside top center horizontal\nset offsets 0, 0, graph 0.1, graph "
+		".': %d calibrations' noenhanced\n"
+		"set key outside top center horizontal\nset offsets 0, 0, graph 0.1, graph "
 		"0.1\nset size %g,%g\n",
 		history.n, 1.0 / COLUMNS, share);
 	for (int i = 0; i < history.n_series; i++) {

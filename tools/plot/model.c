@@ -137,12 +137,16 @@ static void put_residual_label(FILE *script, const struct model_surface *surface
 static void put_residuals(struct grid *grid, const struct model_surface *surface,
 			  const struct residuals *r)
 {
+	/* Three digits of the RMSE. */
+	int decimals = r->rms > 0 ? (int)fmin(fmax(2 - floor(log10(r->rms)), 0), 12) : 0;
+
 	place(grid, 0, 2, RESIDUALS_HEIGHT);
 	fprintf(grid->script,
 		"unset key\nset xrange [*:*]\nset yrange [*:*]\n"
-		"set title '%zu rows: measured - model, RMSE %.3g, mean %.2g'\n"
+		"set title '%zu rows: measured - model, RMSE %.*f, mean %.*f'\n"
 		"set xlabel ",
-		r->n, r->rms, r->mean);
+		r->n, decimals, r->rms, decimals,
+		round(r->mean * pow(10, decimals)) / pow(10, decimals) + 0.0); /* no -0 */
 	plot_put_label(grid->script, surface->input[0].name);
 	fputc('\n', grid->script);
 	put_residual_label(grid->script, surface);

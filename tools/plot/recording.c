@@ -608,7 +608,7 @@ static const struct panel {
 };
 
 #define TITLE_HEIGHT 40
-#define STREAMS_HEIGHT 186
+#define STREAMS_HEIGHT 192
 
 static int figure_height(void)
 {
@@ -708,7 +708,7 @@ static void put_streams(FILE *script, const struct recorded *r, int top,
 	char tics[200] = "";
 	int row = 0;
 
-	place(script, top, STREAMS_HEIGHT, 66);
+	place(script, top, STREAMS_HEIGHT, 72);
 	for (int i = 0; i <= STREAMS; i++)
 		if (i < STREAMS ? r->presence[i].rows > 0 : r->n_events > 0)
 			snprintf(tics + strlen(tics), sizeof(tics) - strlen(tics),
