@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
  * A spring along a direction, in integers. It holds the blade in the plane of its cut, and
- * stands for tissue where no model is trained. Both forces of paper 2, §2.2 (plane
+ * stands for tissue where no model is trained. Both forces of Bhasin et al. (2005), §2.2 (plane
  * constraint Fx along Sx0, reaction Fn along Sn), are this one formula:
  *
  *        ○ P   tip               F = -K [(P - P0)·u] u

@@ -362,7 +362,7 @@ void incise_fixed_stage_contact(const struct incise_fixed_plan *plan,
 	incise_fx_copy(tick->normal, state->normal);
 }
 
-/* Paper 2's Snavg. Sums of integers are exact: nothing adds up. */
+/* Bhasin et al.'s Snavg. Sums of integers are exact: nothing adds up. */
 void incise_fixed_stage_normal(const struct incise_fixed_plan *plan,
 			       struct incise_fixed_state *state,
 			       struct incise_fixed_tick *tick)
@@ -476,7 +476,7 @@ void incise_fixed_stage_membrane(const struct incise_fixed_plan *plan,
 	push(state, membrane_force(membrane, state, tick, beyond), membrane->normal);
 }
 
-/* Paper 1, eq. (3); tissue does not pull. */
+/* Song et al. (2006), eq. (3); tissue does not pull. */
 static int32_t cutting_force(const struct incise_fixed_plan *plan,
 			     const struct incise_fixed_state *state,
 			     struct incise_fixed_tick *tick)

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The forces of paper 2, and paper 1's model as the first of them. P is the tool's end, P0
+ * The forces of Bhasin et al. (2005), and Song et al.'s model as the first of them.
+ * P is the tool's end, P0
  * where the contact began, n the outward normal (the paper's Sn, or Snavg), d the depth.
  *
  *   cutting     reaction    F += Kn d n                      §2.2, Fn
- *               with a model F += F(d, |v|) n                paper 1, eq. (3), by the front
+ *               with a model F += F(d, |v|) n       Song et al. (2006), eq. (3), by the front
  *                                                            of ../tissue/front.h
  *               plane       F -= Kx ((P-P0)·s) s             §2.2, Fx
  *   insertion   insertion   F += Ky d n Fort                 §2.3, Fy
@@ -40,7 +41,8 @@ static void reaction(struct incise_plan *plan, struct incise_tick *tick,
 }
 
 /*
- * Paper 1, eq. (3), as the size of paper 2's Fn; tissue does not pull. Beyond the depths that
+ * Song et al. (2006), eq. (3), as the size of Bhasin et al.'s Fn; tissue does not pull.
+ * Beyond the depths that
  * the model knows the force goes on with the slope that it has there.
  */
 static double cutting_N(struct incise_plan *plan, struct incise_tick *tick, double size_N,
@@ -151,7 +153,8 @@ static double eased(const struct incise_plan *plan, enum incise_tool tool, doubl
 }
 
 /*
- * Fort as paper 2 prints it, the scalar product of the directions of handle and cut: its flat
+ * Fort as Bhasin et al. (2005) print it, the scalar product of the directions of handle
+ * and cut: its flat
  * side, which lies along the cut, resists most.
  */
 static double printed(const struct incise_plan *plan)

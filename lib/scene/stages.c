@@ -278,7 +278,7 @@ static void contact_begins(struct incise_plan *plan)
 }
 
 /*
- * Paper 2's Sn = (Q - P)/|Q - P|, which is no direction where Q and P meet. Where the
+ * Bhasin et al.'s Sn = (Q - P)/|Q - P|, which is no direction where Q and P meet. Where the
  * proxy is the nearest point of a smooth surface it is the surface's normal.
  */
 static void find_normal(struct incise_plan *plan, const double tool_mm[3])
@@ -317,7 +317,7 @@ int incise_stage_contact(struct incise_plan *plan, struct incise_tick *tick)
 	return 0;
 }
 
-/* Paper 2's Snavg. */
+/* Bhasin et al.'s Snavg. */
 int incise_stage_normal(struct incise_plan *plan, struct incise_tick *tick)
 {
 	if (tick->phase == INCISE_PHASE_FREE)

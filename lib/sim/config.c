@@ -147,7 +147,7 @@ static int key_check(const struct key *key, double value, int code,
 
 void incise_sim_config_init(struct incise_sim_config *config)
 {
-	/* Paper 1, §3. */
+	/* Song et al. (2006), §3. */
 	*config = (struct incise_sim_config){
 		.n_depths = 4,
 		.depth_mm = {5, 10, 15, 20},

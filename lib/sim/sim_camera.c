@@ -27,7 +27,7 @@
 #define HEIGHT 480
 #define STRIDE (WIDTH * 3)
 
-#define SCALPEL_MM 47.5 /* paper 1, §2 */
+#define SCALPEL_MM 47.5 /* Song et al. (2006), §2 */
 #define SCALPEL_WIDE_MM 8.0
 #define ROLL 0.05 /* rad */
 #define ENTRY_X (WIDTH / 2.0)

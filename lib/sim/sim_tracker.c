@@ -18,7 +18,7 @@
 #include "sim.h"
 #include "world.h"
 
-/* Attitude noise, rad: FASTRAK's 0.025° static accuracy (paper 1, §2). */
+/* Attitude noise, rad: FASTRAK's 0.025° static accuracy (Song et al. (2006), §2). */
 #define ATTITUDE_NOISE (0.025 * M_PI / 180)
 
 enum { SCALPEL = 1, TUBE }; /* stations */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The averaged normal of paper 2, section 2.2: ΣSn_i / |ΣSn_i| over the last n ticks, so
+ * The averaged normal of Bhasin et al. (2005), section 2.2:
+ * ΣSn_i / |ΣSn_i| over the last n ticks, so
  * that a force does not jerk where the normal does.
  */
 #ifndef INCISE_AVERAGE_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Surfaces of all kinds, and the proxy that follows the tool on one: paper 2's Pfing (the
+ * Surfaces of all kinds, and the proxy that follows the tool on one: Bhasin et al.'s Pfing (the
  * tool's end) and Pprxy (the point of the surface that belongs to it).
  *
  *            outside       ▲ normal
@@ -135,7 +135,8 @@ struct incise_proxy {
 	double tool_mm[3];
 	/* The proxy; while not touching, what a contact would begin with is not known. */
 	struct incise_touch touch;
-	struct incise_touch first; /* where the contact began: paper 2's P(0), Q(0) */
+	struct incise_touch
+		first; /* where the contact began: Bhasin et al.'s P(0), Q(0) */
 	/*
 	 * The proxy has got to the nearest place around; otherwise it goes on with the next
 	 * moves. Always so on kinds other than a mesh.

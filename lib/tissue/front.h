@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * The front of a cut: tissue that takes work and does not give more of it back. Cutting force
- * laws such as paper 1's, F(depth, speed), describe a blade that advances. This adds the way
+ * laws such as Song et al.'s, F(depth, speed), describe a blade that advances. This adds the way
  * back, in double; lib/fixed/front.h has the same in integers.
  *
  *   force                        c  the model's force: the blade cuts, the front moves with it

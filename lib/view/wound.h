@@ -13,7 +13,8 @@
  * Each texel has three fields: distance inside of the lips, depth, redness. Each stretch of line
  * raises them to its own values where these are larger, so that joints, crossings and repeated
  * cuts are unions in any order. The stretch that is nearest also gives the cut's half-width and
- * the lean of its walls to the lamp. (Paper 2, §2.1, uses a stamp of 5 × 5, blurred so that neighbours
+ * the lean of its walls to the lamp. (Bhasin et al. 2005, §2.1,
+ * uses a stamp of 5 × 5, blurred so that neighbours
  * match at their edges.) Colour is a function of the fields.
  *
  * Handle and tube open the cut where they are inserted: points move apart by up to half the tool's

@@ -3,7 +3,7 @@
  * Export of recordings; see incise/recording.h.
  *
  *     recordings ──► cuts ──► raw rows, or means over 1/rate            ──► table
- *                        └──► bins of depth × velocity (paper 1, §4.1), ──► table
+ *                        └──► bins of depth × velocity (Song et al. (2006), §4.1), ──► table
  *                             of where the blade advances, and of where not
  *     recordings ──► rows at the force's times, or on a grid            ──► table
  *     recording  ──► messages                                           ──► MCAP
@@ -285,7 +285,7 @@ static int write_raw(struct pass *pass, struct incise_recording *const *recordin
 	return each_cut(pass, recordings, n, &rows);
 }
 
-/* --- means over bins of depth and velocity (paper 1, §4.1) --------------------------- */
+/* --- means over bins of depth and velocity (Song et al. 2006, §4.1) --- */
 
 static const struct incise_column bin_columns[] = {
 	CUT,
