@@ -70,7 +70,7 @@ static void stepper_ability_shot(struct stepper_trial *trial,
 	compat_gpiod_set_value(lines->step, 0);
 }
 
-/* What a tick computes for a motor that moves. No step of it is given out. */
+/* The work of a tick for a moving motor. No step of it is given out. */
 static void stepper_ability_tick(struct stepper_trial *trial, struct stepper_motor *motor)
 {
 	unsigned long flags;
@@ -182,7 +182,7 @@ int stepper_ability_measure(struct stepper *stepper)
 			       (u64)INCISE_PROFILE_VELOCITY_MAX);
 	info->resolution_ns = hrtimer_resolution;
 	info->lateness_ns = late;
-	/* What a config can say at all. */
+	/* The limits of a config. */
 	info->pulse_ns = clamp(pulse, 500ULL, 1000000ULL);
 	info->tick_min_ns =
 		clamp(4 * stepper->n_motors * tick, (u64)INCISE_PROFILE_TICK_MIN_NS,

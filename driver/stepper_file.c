@@ -334,7 +334,7 @@ static ssize_t stepper_file_take(struct stepper_file *opened, char __user *to,
 				       min(wanted - done, ARRAY_SIZE(events)));
 		if (!n)
 			break;
-		/* What could not be handed over is not taken. */
+		/* Keep what could not be handed over. */
 		if (copy_to_user(to + done * sizeof(*events), events,
 				 n * sizeof(*events)))
 			return done ? done * sizeof(*events) : -EFAULT;

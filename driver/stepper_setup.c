@@ -111,7 +111,7 @@ int stepper_setup_enable(struct stepper_motor *motor)
 	motor->direction = 0; /* written before the first step, whatever it is */
 	motor->target = motor->position;
 	motor->asked = false;
-	/* What the page says now was said to somebody else. */
+	/* The page still has the values of the previous owner. */
 	motor->setpoint = (struct stepper_setpoint){
 		.seq = READ_ONCE(motor->stepper->setpoints[motor->index].seq),
 	};

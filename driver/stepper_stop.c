@@ -59,7 +59,7 @@ static void stepper_stop_gently(struct stepper_motor *motor, u32 fault, s64 now)
 		       motor->config.flags & INCISE_STEPPER_CONFIG_RETRACT &&
 		       motor->flags & INCISE_STEPPER_FLAG_HOMED;
 
-	/* Who retracts already goes on to do so, but a machine that sleeps will not wait. */
+	/* A motor that retracts continues, but a machine that sleeps will not wait. */
 	if (motor->disabling && fault & RETRACT)
 		return;
 	stepper_plan_end(motor, now);
@@ -81,7 +81,7 @@ void stepper_stop_fault(struct stepper_motor *motor, u32 fault, s64 now)
 {
 	if (!motor->powered)
 		return;
-	/* Who disabled it before closing the file did what is asked. */
+	/* It was disabled before the file was closed. */
 	if (fault == INCISE_STEPPER_FAULT_OWNER && motor->disabling && !motor->faults)
 		return;
 	if (fault & ~motor->faults) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
- * What goes wrong with a chip: interrupts that are late, missing or refused, and lines
+ * Faults of a chip: interrupts that are late, missing or refused, and lines
  * that cannot be read; and the machine's sleep, for one driver alone, as a guest cannot
  * sleep without its disk. See incise_sim.h for the words of the files.
  */

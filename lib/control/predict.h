@@ -52,7 +52,7 @@ struct incise_predict {
 	double v[3];  /* mm/s */
 	double a[3];  /* mm/s² */
 	double q[4];  /* attitude of the last pose that had one */
-	/* What was shown when the last pose arrived, to be blended out. */
+	/* The prediction when the last pose arrived, to be blended out. */
 	int64_t arrival_ns;
 	double x_shown[3], v_shown[3]; /* less what the filter says then */
 	double q_shown[4];

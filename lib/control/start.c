@@ -11,7 +11,7 @@
 double incise_start_gain(struct incise_start *start, double wanted_N, bool fresh,
 			 double dt_s)
 {
-	/* What was written there from outside must not get out either. */
+	/* Values written from outside must not get out either. */
 	double gain = start->gain > 0 ? fmin(start->gain, 1) : 0;
 
 	if (fresh && fabs(wanted_N) <= start->small_N)

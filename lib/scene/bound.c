@@ -102,7 +102,7 @@ static struct state_error settled(const struct incise_predict *p, double in_mm)
 	return (struct state_error){INFINITY, INFINITY, INFINITY};
 }
 
-/* Of what is shown so long after a pose, mm and mm/s per component. */
+/* Bounds of the prediction this long after a pose, mm and mm/s per component. */
 static struct state_error ahead(const struct state_error *e, double s)
 {
 	return (struct state_error){

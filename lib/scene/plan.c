@@ -440,7 +440,7 @@ int64_t incise_plan_fade_ns(const struct incise_plan *plan)
 
 int incise_plan_release(struct incise_plan *plan)
 {
-	/* What ended the ticks stays the cause. */
+	/* The first error remains the cause. */
 	int rc = plan->watched && !plan->feeds
 			 ? 0
 			 : incise_axes_release(&plan->axes, plan->fault);

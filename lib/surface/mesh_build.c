@@ -160,7 +160,7 @@ static int find_neighbours(struct mesh_builder *b)
 		return no_memory(b);
 	}
 	memset(b->neighbour, 0xff, b->n * sizeof(*b->neighbour)); /* MESH_NONE */
-	/* How many sides each point has, where they begin, and at last where they end. */
+	/* Number of sides of each point, where they begin, and at last where they end. */
 	for (uint32_t face = 0; face < b->n; face++) {
 		for (int i = 0; i < 3; i++) {
 			uint32_t p = b->corner[face][i], q = b->corner[face][(i + 1) % 3];

@@ -89,7 +89,7 @@ struct incise_arrow_source {
 	void (*close)(struct incise_arrow_source *source); /* also frees it */
 };
 
-/* What an export writes, as a source; takes @recording. NULL with errno. See arrow_table.c. */
+/* The output of an export, as a source; takes @recording. NULL with errno. See arrow_table.c. */
 struct incise_arrow_source *incise_arrow_table(
 	struct incise_recording *recording, const struct incise_export_options *options,
 	struct incise_error *err);

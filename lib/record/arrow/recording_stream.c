@@ -284,7 +284,7 @@ static int add_known(struct incise_provenance *to, const char *key, double value
 	return isnan(value) ? 0 : incise_provenance_add(to, key, "%.17g", value);
 }
 
-/* What a calibration says of the values: scales, and the plane that depth is measured from. */
+/* The calibration of the values: scales, and the plane that depth is measured from. */
 static int describe_values(struct rows_source *source,
 			   const struct incise_calibration *given)
 {

@@ -17,7 +17,7 @@
 #include <unistd.h>
 #include "recorder.h"
 
-/* What a kill may cost, and the shortest time between commits, whatever they take. */
+/* Largest loss after a kill, and the shortest time between commits, whatever they take. */
 #define COMMIT_NS 100000000LL
 #define COMMIT_LEAST_NS (COMMIT_NS / 2)
 /* The knots of a line are many and change little in a second: not with each commit. */
