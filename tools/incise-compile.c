@@ -47,7 +47,8 @@ static char *symbol_of(const char *path)
 		if (!isalnum((unsigned char)*c) || (unsigned char)*c >= 0x80)
 			*c = '_';
 	if (!*symbol || isdigit((unsigned char)*symbol))
-		cli_usage("--c-source: '%s' gives no name in C: begin it with a letter",
+		cli_usage("--c-source: '%s' makes no name in C; begin the file's name "
+			  "with a letter",
 			  path);
 	return symbol;
 }
@@ -60,11 +61,11 @@ static void check_c_source(void *c_source, char *path)
 
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
-	 "write the compiled model (.fx) or plan (.plan) there; '-' is standard\n"
-	 "output",
+	 "write the compiled model (.fx) or scene (.plan) to this file; - is\n"
+	 "standard output",
 	 CLI_OUTPUT(struct job, output), .extensions = ".fx .plan"},
 	{0, "budget", "ERROR",
-	 "largest error that may be certified, e.g. 0.1mN, 50uN or\n"
+	 "largest certified error, for example 0.1mN, 50uN or\n"
 	 "1e-4 in the output's unit (default: 0.1mN)",
 	 CLI_QUANTITY(struct job, options.budget, newtons, 1e-9, 1e9)},
 	{0, "method", "KIND",
@@ -74,16 +75,18 @@ static const struct cli_option options[] = {
 	{0, "cells", "N", "at least N cells per input of tables, up to 4096",
 	 CLI_INTEGER(struct job, options.cells, 1, 4096)},
 	{0, "c-source", "FILE.c",
-	 "write it as C for a microcontroller, too; FILE_eval() is the\n"
-	 "function",
+	 "also write it as C for a microcontroller, with the function\n"
+	 "FILE_eval()",
 	 CLI_OUTPUT(struct job, c_source), .parse = check_c_source, .extensions = ".c"},
-	{0, "model", "FILE", "of a scene: use this model instead of its own",
+	{0, "model", "FILE", "scene: use this model instead of its own",
 	 CLI_INPUT(struct job, scene.model)},
 	{'r', "rig", "RIG",
-	 "of a scene: rig.conf of the tracker and the actuators that the plan is for\n"
+	 "scene: rig.conf with the tracker and the actuators of the plan\n"
 	 "(default: a tracker of 120 Hz and no actuator, which no kernel loads)",
 	 CLI_INPUT(struct job, rig)},
-	{'c', "calibration", "FILE", "of a scene: calibration.conf, for where the tip is",
+	{'c', "calibration", "FILE",
+	 "scene: calibration.conf with the position of the "
+	 "tip",
 	 CLI_INPUT(struct job, calibration)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{0},
@@ -93,13 +96,18 @@ static const struct cli_command command = {
 	.name = "compile",
 	.synopsis = "MODEL.fis|SCENE -o MODEL.fx|NAME.plan [OPTIONS]",
 	.summary =
-		"Compile a model, or all of a scene on a rig, to integers, for the haptic loop and\n"
-		"for kernels, with a certified bound of the error: a model's over its whole\n"
-		"support by interval arithmetic.",
+		"Compile a model, or a whole scene on a rig, to fixed point for the "
+		"haptic loop and for\n"
+		"kernels, with a certified bound of the error, over the whole training "
+		"range by interval\n"
+		"arithmetic.",
 	.options = options,
-	.notes = "--budget, --method, --cells and --c-source are of a model.\n\n"
-		 "Examples:\n  incise compile liver.fis --budget 0.1mN -o liver.fx\n"
-		 "  incise compile neck --rig rig.conf -o neck.plan\n\n"
+	.notes = "--budget, --method, --cells and --c-source go with a model.\n"
+		 "\n"
+		 "Examples:\n"
+		 "  incise compile liver.fis --budget 0.1mN -o liver.fx\n"
+		 "  incise compile neck --rig rig.conf -o neck.plan\n"
+		 "\n"
 		 "Exit: 0 compiled, 1 failed, 2 bad usage. See incise-compile(1).",
 };
 
@@ -183,7 +191,9 @@ static void compile_scene(const struct job *job)
 	scene = scene_argument_load(&job->scene);
 	plan = cli_require(incise_plan_new(scene, rig, &err), &err);
 	if (incise_plan_set_tip(plan, calibration.tip_mm))
-		cli_fail("%s: a tip that far away is none", job->calibration);
+		cli_fail("%s: tip_mm is too far from the tracked point; run incise "
+			 "calibrate tip",
+			 job->calibration);
 	file = cli_require(incise_plan_file_new(plan, &err), &err);
 	if (incise_plan_file_save(file, job->output, &err))
 		cli_fail_with(&err);
@@ -195,7 +205,7 @@ static void compile_scene(const struct job *job)
 		cli_written();
 	}
 	if (!info.n_axes)
-		cli_warn("it is for no actuator: give --rig for a plan that the kernel "
+		cli_warn("the plan has no actuator; give --rig for one that the kernel "
 			 "loads");
 	incise_plan_file_free(file);
 	incise_plan_free(plan);
@@ -229,18 +239,18 @@ int main(int argc, char **argv)
 	file_expect(path, FILE_MODEL | FILE_SCENE);
 	if (cli_ends_with(path, ".fis") || !scene_argument_find(&job.scene, path)) {
 		if (!cli_ends_with(path, ".fis") && cli_ends_with(job.output, ".plan"))
-			cli_fail("%s: there is no file and no scene of that name", path);
+			cli_fail("%s: no such file or scene", path);
 		if (job.rig || job.calibration || job.scene.model)
-			cli_usage("%s: --rig, --calibration and --model are of a scene",
+			cli_usage("%s: --rig, --calibration and --model go with a "
+				  "scene, this is a model",
 				  path);
 		cli_extension("output", job.output, ".fx");
 		compile_model(&job, path);
 	} else {
 		if (is_of_model(&job))
-			cli_usage(
-				"%s: --budget, --method, --cells and --c-source are of a "
-				"model",
-				path);
+			cli_usage("%s: --budget, --method, --cells and --c-source go "
+				  "with a model, this is a scene",
+				  path);
 		cli_extension("output", job.output, ".plan");
 		compile_scene(&job);
 	}

@@ -22,7 +22,7 @@ struct job {
 };
 
 static const struct cli_option options[] = {
-	{0, "arith", "KIND", "double (default) or fixed; a .fx is fixed already",
+	{0, "arith", "KIND", "double (default) or fixed; a .fx is always fixed",
 	 CLI_PARSED(struct job, arith, scene_argument_arith)},
 	{0, "no-clamp", NULL, "extrapolate outside the support (double only)",
 	 CLI_FLAG(struct job, no_clamp)},
@@ -31,10 +31,10 @@ static const struct cli_option options[] = {
 	 "prints inputs and output, an empty line after each row",
 	 CLI_TEXT(struct job, grid)},
 	{0, "sd", NULL,
-	 "print the standard deviation of an unseen value behind\n"
-	 "the force; from MODEL.fis.sd, which train writes",
+	 "also print the standard deviation of a new measurement,\n"
+	 "from MODEL.fis.sd, which incise train writes",
 	 CLI_FLAG(struct job, sd)},
-	{0, "json", NULL, "report as JSON: a row per evaluation",
+	{0, "json", NULL, "report as JSON, one row for each evaluation",
 	 CLI_FLAG(struct job, json)},
 	{0},
 };
@@ -43,9 +43,11 @@ static const struct cli_command command = {
 	.name = "eval",
 	.synopsis = "MODEL.fis|MODEL.fx [FILE] [OPTIONS]",
 	.summary =
-		"Evaluate a model: one line of inputs in (depth_mm velocity_mm_s), one force "
-		"out.\nReads FILE, or standard input. Inputs outside the support are taken as "
-		"its\nnearest end, and counted in a warning.",
+		"Evaluate a model: read lines of inputs (depth_mm velocity_mm_s) from "
+		"FILE or standard\n"
+		"input, and print one force for each. Inputs out of the training range "
+		"are clamped to it,\n"
+		"and counted in a warning.",
 	.options = options,
 	.notes = "Example:\n  echo '5 20' | incise eval liver.fis\n\n"
 		 "Exit: 0 evaluated, 1 failed, 2 bad usage. See incise-eval(1).",
@@ -160,11 +162,12 @@ static void load_uncertainty(struct evaluator *e, const char *model)
 	char *path;
 
 	if (!e->model)
-		cli_usage("--sd: %s is compiled; give the .fis it was made of", model);
+		cli_usage("--sd: %s is compiled; give the .fis file that it was "
+			  "compiled from",
+			  model);
 	if (!strcmp(model, "-"))
-		cli_fail(
-			"--sd needs a model in a file: its standard deviation lies beside "
-			"it");
+		cli_fail("--sd: the model comes from standard input; give its file, "
+			 "next to which MODEL.fis.sd is");
 	path = cli_text("%s.sd", model);
 	e->uncertainty = cli_require(incise_uncertainty_load(path, e->model, &err), &err);
 	free(path);
@@ -175,11 +178,14 @@ static void eval_grid(struct evaluator *e, const char *size)
 	int n, m, end = 0;
 
 	if (e->n_inputs != 2)
-		cli_fail("--grid needs a model of two inputs, this one has %d",
+		cli_fail("--grid: the model has %d inputs, expected 2; give points on "
+			 "standard input instead",
 			 e->n_inputs);
 	if (sscanf(size, "%dx%d%n", &n, &m, &end) != 2 || size[end] || n < 2 || m < 2 ||
 	    n > 10000 || m > 10000)
-		cli_usage("--grid: '%s' is not NxM with 2 to 10000 each", size);
+		cli_usage("--grid: expected NxM with 2 to 10000 each, for example "
+			  "20x15, found '%s'",
+			  size);
 	for (int i = 0; i < n; i++) {
 		for (int j = 0; j < m; j++) {
 			/* Weighted so that both ends are met to the digit. */
@@ -217,9 +223,12 @@ static void open_model(struct evaluator *e, const char *path, const char *arith,
 	file_expect(path, FILE_MODEL | FILE_COMPILED);
 	if (kind ? kind == FILE_COMPILED : cli_ends_with(path, ".fx")) {
 		if (arith && !strcmp(arith, "double"))
-			cli_usage("--arith double: %s is compiled to fixed point", path);
+			cli_usage("--arith double: %s is compiled to fixed point; give "
+				  "the .fis file that it was compiled from",
+				  path);
 		if (!clamp)
-			cli_usage("--no-clamp: %s is compiled and ends at its support",
+			cli_usage("--no-clamp: %s is compiled and cannot extrapolate; "
+				  "give the .fis file that it was compiled from",
 				  path);
 		open_compiled(e, path);
 		return;
@@ -274,13 +283,17 @@ static void eval_file(struct evaluator *e, const char *path)
 static void parse(struct job *job, int argc, char **argv)
 {
 	cli_parse(&command, argc, argv, job);
-	if (optind >= argc || argc - optind > 2)
-		cli_usage("expected a model and at most one file of inputs");
+	if (optind >= argc)
+		cli_usage("missing MODEL.fis or MODEL.fx (model)");
+	if (argc - optind > 2)
+		cli_usage("unexpected argument '%s'; give a model, and one file of inputs",
+			  argv[optind + 2]);
 	if (job->no_clamp && job->arith && !strcmp(job->arith, "fixed"))
-		cli_usage(
-			"--no-clamp needs --arith double: fixed point ends at the support");
+		cli_usage("--no-clamp needs --arith double: fixed point cannot "
+			  "extrapolate");
 	if (job->grid && argc - optind == 2)
-		cli_usage("--grid evaluates its own points: it takes no file of inputs");
+		cli_usage("--grid does not go with a file of inputs: it evaluates "
+			  "points of its own");
 }
 
 static void warn_outside(const struct evaluator *e, bool no_clamp)
@@ -292,9 +305,8 @@ static void warn_outside(const struct evaluator *e, bool no_clamp)
 		n += snprintf(support + n, sizeof(support) - (size_t)n,
 			      "%s%.40s %.4g to %.4g", i ? ", " : "", e->input[i],
 			      e->min[i], e->max[i]);
-	cli_warn("%lu inputs lay outside the model's support (%s) and were %s",
-		 e->outside, support,
-		 no_clamp ? "extrapolated" : "taken as its nearest end");
+	cli_warn("%lu inputs were out of the training range (%s) and were %s", e->outside,
+		 support, no_clamp ? "extrapolated" : "clamped to it");
 }
 
 int main(int argc, char **argv)
@@ -317,10 +329,9 @@ int main(int argc, char **argv)
 	if (e.outside)
 		warn_outside(&e, job.no_clamp);
 	if (e.unfired)
-		cli_warn(
-			"%lu inputs lay where no rule of the model fires; the nearest rule "
-			"answered",
-			e.unfired);
+		cli_warn("%lu inputs were where no rule of the model fires; the nearest "
+			 "rule was used",
+			 e.unfired);
 	incise_uncertainty_free(e.uncertainty);
 	incise_model_free(e.model);
 	incise_fixed_free(e.fixed);

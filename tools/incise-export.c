@@ -33,9 +33,9 @@ static void parse_bins(void *options, char *text)
 		   &extra) != 2 ||
 	    how->depth_bins < 1 || how->depth_bins > BINS_MAX || how->velocity_bins < 1 ||
 	    how->velocity_bins > BINS_MAX)
-		cli_usage(
-			"--average: '%s' is not DEPTHxVELOCITY such as 12x10, each 1 to %d",
-			text, BINS_MAX);
+		cli_usage("--average: expected DEPTHxVELOCITY, for example 12x10, each 1 "
+			  "to %d, found '%s'",
+			  BINS_MAX, text);
 }
 
 static void load_calibration(void *options, char *path)
@@ -52,18 +52,22 @@ static void load_calibration(void *options, char *path)
 
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
-	 "dataset to write: FILE.csv, or FILE.h5 for HDF5; - is CSV on\nstandard output (default)",
+	 "dataset to write: FILE.csv, FILE.h5 (HDF5) or FILE.mcap; - is CSV\n"
+	 "on standard output (default)",
 	 CLI_OUTPUT(struct job, output), .extensions = ".csv .h5 .mcap"},
 	{0, "rate", "HZ",
 	 "rows per second, each the mean of its samples (default: all\nsamples)",
 	 CLI_NUMBER(struct job, how.rate_hz, 1e-3, 1e9)},
 	{0, "resample", NULL,
-	 "all of the recording with the pose, at each force sample or on a\ngrid of --rate, with uncertainty and flags",
+	 "export the whole recording with the pose, at each force sample or\n"
+	 "at --rate, with uncertainty and flags",
 	 CLI_FLAG(struct job, how.resample)},
 	{'a', "average", "DEPTHxVELOCITY",
-	 "average in so many bins of depth and of velocity: 12x10",
+	 "average in bins of depth and velocity, for example 12x10",
 	 CLI_PARSED_BY(parse_bins)},
-	{0, "by-cut", NULL, "average each cut by itself and name it in the column 'cut'",
+	{0, "by-cut", NULL,
+	 "average each cut separately and name it in the column "
+	 "'cut'",
 	 CLI_FLAG(struct job, how.by_cut)},
 	{0, "depth-max", "MM",
 	 "upper end of the bins (default: largest where the blade advances)",
@@ -74,9 +78,10 @@ static const struct cli_option options[] = {
 	{0, "min-count", "N", "leave out bins with fewer samples (default: 50)",
 	 CLI_INTEGER(struct job, min_count, 1, 1000000000)},
 	{'c', "calibration", "FILE",
-	 "take this calibration of force, camera and delays, not that of\nthe recordings",
+	 "use this calibration of force, camera and delays instead of that\n"
+	 "of the recordings",
 	 CLI_PARSED_BY(load_calibration)},
-	{0, "lineage", NULL, "begin a CSV with comments that tell where it is from",
+	{0, "lineage", NULL, "begin a CSV with comments on its provenance",
 	 CLI_FLAG(struct job, how.provenance)},
 	RECORDING_DAMAGED(struct job, damaged),
 	{0, "json", NULL, "report as one JSON object; needs -o FILE",
@@ -87,9 +92,9 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "export",
 	.synopsis = "NAME.rec… [-o FILE] [OPTIONS]",
-	.summary =
-		"Make a dataset of the cuts of some recordings: every force sample with depth\n"
-		"and velocity at its time, or their averages.",
+	.summary = "Make a dataset from the cuts of recordings: every force sample with "
+		   "depth and velocity\n"
+		   "at its time, or their averages.",
 	.options = options,
 	.notes = "Example: incise export liver.rec --average 12x10 -o liver.csv\n"
 		 "Exit codes: 0 success, 1 failure, 2 bad usage.",
@@ -143,9 +148,10 @@ static void parse(struct job *job, int argc, char **argv)
 	if (optind == argc)
 		cli_usage("missing NAME.rec (recording to export)");
 	if (how->resample && (how->depth_bins || (how->rate_hz > 0 && how->rate_hz < 1)))
-		cli_usage("--resample takes a --rate of 1 or more, and no --average");
+		cli_usage("--resample needs a --rate of 1 or more, and excludes "
+			  "--average");
 	if (how->rate_hz > 0 && how->depth_bins)
-		cli_usage("--rate and --average exclude each other");
+		cli_usage("--rate and --average exclude each other; give one of them");
 	if (!how->depth_bins && (how->by_cut || job->min_count || how->depth_max_mm > 0 ||
 				 how->velocity_max_mm_s > 0))
 		cli_usage("--by-cut, --depth-max, --velocity-max and --min-count go with "
@@ -153,7 +159,7 @@ static void parse(struct job *job, int argc, char **argv)
 	if (job->min_count)
 		how->min_count = job->min_count;
 	if (job->json && !strcmp(job->output, "-"))
-		cli_usage("--json needs -o FILE: standard output cannot take both");
+		cli_usage("--json needs -o FILE: both would write to standard output");
 	/* A bar would run through rows on the same terminal. */
 	if (strcmp(job->output, "-")) {
 		how->progress = progress;

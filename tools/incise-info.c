@@ -33,7 +33,7 @@ static const struct cli_option options[] = {
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	RECORDING_DAMAGED(struct job, damaged),
 	{0, "plot", "NAME",
-	 "of a .fis: draw the membership functions and the force\n"
+	 "model: draw the membership functions and the force\n"
 	 "surface as NAME.png and NAME.svg",
 	 CLI_OUTPUTS(struct job, plot)},
 	{0},
@@ -44,10 +44,10 @@ static const struct cli_command command = {
 	.synopsis =
 		"MODEL.fis|MODEL.fx|NAME.plan|NAME.rec|stepper|/dev/incise-stepperN|can:IFACE|"
 		"slcan:TTY|devices [OPTIONS]",
-	.summary =
-		"Say what a model, a compiled model, a plan or a recording holds, what the\n"
-		"kernel's stepper module found, does and costs, which drives are on a CAN bus, or which\n"
-		"devices are attached.",
+	.summary = "Describe a model, a compiled model, a compiled scene or a recording; "
+		   "the state and cost\n"
+		   "of the kernel's stepper module; the drives on a CAN bus; or the "
+		   "devices that are attached.",
 	.options = options,
 	.notes =
 		"Example:\n  incise info can:can0\n\nExit: 0 shown, 1 failed, 2 bad usage. See incise-info(1).",
@@ -168,7 +168,8 @@ static void model_text(const struct incise_model *model, const struct incise_fix
 			putchar('\n');
 		}
 	}
-	printf("rules by %s (functions: constant, then a coefficient per input)\n",
+	printf("rules by %s (functions: constant, then one coefficient for each "
+	       "input)\n",
 	       and_method(model));
 	for (int r = 0; r < info->n_rules; r++) {
 		const double *p = incise_model_rule(model, r)->p;
@@ -341,7 +342,7 @@ static void recording_text(const char *path, const struct incise_recording_info 
 	if (info->offset_V != 0)
 		printf(" from %g V", info->offset_V);
 	putchar('\n');
-	printf("tracker  %llu records, %llu lost\n", (unsigned long long)info->tracker,
+	printf("tracker  %llu samples, %llu lost\n", (unsigned long long)info->tracker,
 	       (unsigned long long)info->tracker_lost);
 	printf("depth    %llu rows, largest %.2f mm; largest force %.3f N\n",
 	       (unsigned long long)info->depth, info->depth_max_mm, info->force_max_N);
@@ -539,10 +540,9 @@ static void show_bus(const char *what, bool json)
 		cli_fail_with(&err);
 	/* A failure, as a file that is missing. */
 	if (!found.n)
-		cli_fail(
-			"%s: nobody answers; see that it has power and its cable is in; on a "
-			"bus its node id, bit rate and the two ends of 120 ohm",
-			what);
+		cli_fail("%s: no answer; check power and cable; on a bus also the node "
+			 "id, the bit rate and the two terminators of 120 ohm",
+			 what);
 	if (json)
 		devices_json("bus", what, &found);
 	else
@@ -570,10 +570,10 @@ static void check_exists(const char *path)
 	struct stat st;
 
 	if (strcmp(path, "-") && stat(path, &st))
-		cli_fail(
-			"%s: %s; give a model (.fis, .fx), a plan (.plan), a recording (NAME.rec), "
-			"`stepper` or a bus such as can:can0",
-			path, strerror(errno));
+		cli_fail("%s: %s; give a model (.fis, .fx), a compiled scene (.plan), a "
+			 "recording (NAME.rec), stepper, devices or a bus such as "
+			 "can:can0",
+			 path, strerror(errno));
 }
 
 int main(int argc, char **argv)
@@ -593,7 +593,8 @@ int main(int argc, char **argv)
 	plan = kind ? kind == FILE_PLAN : cli_ends_with(path, ".plan");
 	if (job.plot && (is_recording(path) || compiled || plan ||
 			 stepper_module_is(path) || is_bus(path)))
-		cli_usage("--plot draws a model, MODEL.fis");
+		cli_usage("--plot goes with a model (MODEL.fis); 'incise plot' draws "
+			  "other files");
 	if (stepper_module_is(path)) {
 		stepper_module_show(path, job.json);
 	} else if (!strcmp(path, "devices")) {

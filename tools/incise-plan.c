@@ -28,11 +28,11 @@ struct job {
 
 static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
-	 "file rig.conf, or sim:KEY=VALUE,…: its stepper and its tracker's delay count\n"
-	 "(default: no rig; a tracker of 120 Hz, 4.2 ms late)",
+	 "file rig.conf, or sim:KEY=VALUE,…, whose stepper and tracker delay are\n"
+	 "used (default: no rig; a tracker of 120 Hz with a delay of 4.2 ms)",
 	 CLI_INPUT(struct job, rig)},
 	SCENE_ARGUMENT_OPTIONS(struct job, scene),
-	{0, "full", NULL, "keep every stage, needed or not: what leaving out saves",
+	{0, "full", NULL, "keep every stage, needed or not, to see what pruning saves",
 	 CLI_FLAG(struct job, full)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{0},
@@ -42,8 +42,9 @@ static const struct cli_command command = {
 	.name = "plan",
 	.synopsis = "SCENE [OPTIONS]",
 	.summary =
-		"Show what the haptic loop of a scene runs and what it leaves out, what "
-		"a tick costs\non this machine, and how stable the scene is.",
+		"Show which stages the haptic loop of a scene runs and which it leaves "
+		"out, the time of a\n"
+		"tick on this machine, and the stability of the scene.",
 	.options = options,
 	.notes =
 		"Example:\n  incise plan scenes/neck.scene\n\n"

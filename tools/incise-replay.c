@@ -30,23 +30,23 @@ static const char *const times[] = {"arrival", "acquisition", NULL};
 
 static const struct cli_option options[] = {
 	{0, "log", "FILE",
-	 "write every tick, predicted beside measured force; - is standard\noutput",
+	 "write predicted and measured force of every tick as CSV; - is\n"
+	 "standard output",
 	 CLI_OUTPUT(struct job, csv), .extensions = ".csv"},
-	{0, "plot", "NAME",
-	 "draw predicted beside measured force as NAME.png and NAME.svg",
+	{0, "plot", "NAME", "draw predicted and measured force as NAME.png and NAME.svg",
 	 CLI_OUTPUTS(struct job, plot)},
-	{0, "real-time", NULL, "wait for each tick (default: as fast as it goes)",
+	{0, "real-time", NULL, "wait for each tick (default: as fast as possible)",
 	 CLI_FLAG(struct job, how.real_time)},
 	{0, "poses", "WHEN",
 	 "give poses to the loop at their arrival, as live, or at their\n"
 	 "acquisition (default: arrival)",
 	 CLI_CHOICE(struct job, how.at, times)},
 	{'c', "calibration", "FILE",
-	 "take this calibration of force, not that of the recording",
+	 "use this calibration of force instead of that of the recording",
 	 CLI_INPUT(struct job, calibration)},
 	SCENE_ARGUMENT_OPTIONS(struct job, scene),
 	{0, "tool", "KIND",
-	 "what the hand held: auto, blade, handle or tube (default: auto)",
+	 "tool in the hand: auto, blade, handle or tube (default: auto)",
 	 CLI_CHOICE(struct job, how.tool, loop_tool_names)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{0},
@@ -55,9 +55,9 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "replay",
 	.synopsis = "NAME.rec SCENE [OPTIONS]",
-	.summary =
-		"Run the haptic loop of a scene on a recording: the force that it would have\n"
-		"asked for, beside the one that was measured.",
+	.summary = "Run the haptic loop of a scene on a recording, and compare the force "
+		   "that it renders\n"
+		   "with the measured one.",
 	.options = options,
 	.notes = "Example: incise replay liver.rec scenes/liver.scene --log liver.csv\n"
 		 "Exit codes: 0 success, 1 failure, 2 bad usage.",
@@ -90,7 +90,8 @@ static void begin_plot(struct plot *plot, const char *path)
 	plot_place("plot", path, &plot->folder, &plot->name);
 	if (snprintf(plot->file, sizeof(plot->file), "%s.dat", plot->name) >=
 	    (int)sizeof(plot->file))
-		cli_usage("--plot: '%s' is too long a name", plot->name);
+		cli_usage("--plot: the name '%s' is too long; give a shorter one",
+			  plot->name);
 	plot->data = plot_data(plot->folder, plot->file);
 }
 
@@ -218,7 +219,7 @@ static void held_line(const struct incise_loop_stats *stats,
 		{INCISE_TICK_STARTING, "starting or fading"},
 		{INCISE_TICK_CLAMPED, "the largest force"},
 		{INCISE_TICK_SLEWED, "the largest slew"},
-		{INCISE_TICK_NOT_FINITE, "a force that was no number"},
+		{INCISE_TICK_NOT_FINITE, "a force that was not a number"},
 	};
 	const char *between = "held       ";
 
@@ -244,13 +245,13 @@ static void report_text(const struct job *job, double rate_hz,
 	       r->seconds, (unsigned long long)stats->ticks, rate_hz,
 	       (unsigned long long)r->poses, r->cuts);
 	if (r->compared) {
-		printf("predicted  off by %.4f N rms", r->rms_N);
+		printf("predicted  error %.4f N rms", r->rms_N);
 		if (!isnan(relative(r)))
 			printf(" (%.2f %% of the range)", 100 * relative(r));
 		printf(", at most %.4f N at %.3f s, in %llu ticks\n", r->max_N,
 		       r->max_t_s, (unsigned long long)r->compared);
 	} else {
-		printf("predicted  beside nothing: no force was measured in a cut\n");
+		printf("predicted  no cut in this recording: nothing to compare\n");
 	}
 	printf("force      largest %.3f N, %llu ticks in contact, %llu outside the model's "
 	       "support\n",

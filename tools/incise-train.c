@@ -62,42 +62,50 @@ static void parse_type(void *type, char *text)
 }
 
 static const struct cli_option option_table[] = {
-	{'o', "output", "FILE", "write the model there (.fis); '-' is standard output",
+	{'o', "output", "FILE",
+	 "write the model to this file (.fis); - is standard "
+	 "output",
 	 CLI_OUTPUT(struct options, model), .extensions = ".fis"},
 	{0, "inputs", "A,B", "input columns (default: depth_mm,velocity_mm_s)",
 	 CLI_PARSED_BY(parse_inputs)},
 	{0, "target", "COLUMN", "column to learn (default: force_N)",
 	 CLI_TEXT(struct options, target)},
-	{0, "group", "COLUMN", "column naming the cut; data are split by whole cuts",
+	{0, "group", "COLUMN", "column that names the cut; cuts are held out as a whole",
 	 CLI_TEXT(struct options, group)},
 	{0, "all-rows", NULL,
-	 "also take rows where the blade did not advance: advancing is 0",
+	 "also use rows in which the blade did not advance (advancing is 0)",
 	 CLI_FLAG(struct options, all_rows)},
-	{0, "check", "SHARE", "keep this share back as unseen data, e.g. 0.3",
+	{0, "check", "SHARE",
+	 "hold out this share of the data as a test set, for "
+	 "example 0.3",
 	 CLI_NUMBER(struct options, check, 0.01, 0.99)},
-	{0, "seed", "N", "of every random choice (default: 1)",
+	{0, "seed", "N", "seed of every random choice (default: 1)",
 	 CLI_INTEGER(struct options, train.seed, 0, 1L << 53)},
 	{0, "mf", "N,M",
-	 "membership functions per input (default: 5,4; else 3 each),\n"
-	 "or 'auto': chosen by cross-validation",
+	 "membership functions per input (default: 5,4 for two inputs,\n"
+	 "else 3 each), or auto: chosen by cross-validation",
 	 CLI_PARSED_BY(parse_mfs)},
 	{0, "mf-type", "KIND", "gaussmf (default) or gbellmf",
 	 CLI_PARSED(struct options, type, parse_type)},
-	{0, "epochs", "N", "epochs, at most (default: 80)",
+	{0, "epochs", "N", "largest number of epochs (default: 80)",
 	 CLI_INTEGER(struct options, train.epochs, 1, 100000)},
-	{0, "step", "K", "initial step of the premises (default: 0.01); --classic only",
+	{0, "step", "K",
+	 "initial step of the membership functions' parameters\n"
+	 "(default: 0.01); only with --classic",
 	 CLI_NUMBER(struct options, train.step, 1e-9, 10)},
 	{0, "ridge", "R", "ridge on scaled data (default: by cross-validation)",
 	 CLI_NUMBER(struct options, train.ridge, 0, 1e12)},
-	{0, "starts", "N", "premises to start from (default: 3)",
+	{0, "starts", "N",
+	 "number of starting points of the membership functions\n"
+	 "(default: 3)",
 	 CLI_INTEGER(struct options, train.starts, 1, 100)},
 	{0, "classic", NULL,
-	 "as MATLAB's anfis: no scaling, no ridge but 1e-6;\n"
-	 "the check data choose the epoch",
+	 "train as MATLAB's anfis does: no scaling, a ridge of 1e-6;\n"
+	 "the held-out data choose the epoch",
 	 CLI_FLAG(struct options, train.classic)},
-	{0, "initial", "FILE", "also write the model as it was before training",
+	{0, "initial", "FILE", "also write the initial model, before training",
 	 CLI_OUTPUT(struct options, initial), .extensions = ".fis"},
-	{0, "history", "FILE", "write RMSE by epoch as CSV",
+	{0, "history", "FILE", "write the RMSE of each epoch to this CSV file",
 	 CLI_OUTPUT(struct options, history), .extensions = ".csv"},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, json)},
 	{0},
@@ -141,7 +149,7 @@ static void parse(struct options *options, int argc, char **argv)
 	/* Neither a file nor a folder is there, nor is one meant: a column, of the old --output. */
 	if (strcmp(options->model, "-") && !strpbrk(options->model, "./") &&
 	    access(options->model, F_OK))
-		cli_usage("--output %s: a model is a .fis file; name the column to learn "
+		cli_usage("--output %s: expected a .fis file; name the column to learn "
 			  "with --target",
 			  options->model);
 	if (options->json && !strcmp(options->model, "-"))
@@ -346,18 +354,18 @@ static json_t *warnings(const struct result *result)
 	for (size_t i = 0; i < sizeof(others) / sizeof(*others); i++)
 		if (rmse > WORSE * others[i].rmse && rmse > rounding)
 			warn(list,
-			     "%s predicts %s data better than this model: RMSE %.4g against "
-			     "%.4g; try fewer rules or more data",
+			     "%s predicts %s data better than this model: RMSE %.4g "
+			     "compared with %.4g; try fewer rules or more data",
 			     others[i].name, data, others[i].rmse, rmse);
 	if (report->rules_unfired)
 		warn(list,
-		     "%d of %d rules never fire in the data: the model is a guess there; "
-		     "ask for fewer membership functions or record more",
+		     "%d of %d rules never fire in the data, so the model extrapolates "
+		     "there; use fewer membership functions (--mf) or record more data",
 		     report->rules_unfired, incise_model_info(model)->n_rules);
 	if (pairs < (size_t)PAIRS_PER_PARAMETER * report->parameters)
 		warn(list,
-		     "%zu training pairs for %d parameters: the model can follow noise; at "
-		     "least %d pairs support %d rules",
+		     "%zu training pairs for %d parameters: the model may overfit; "
+		     "record at least %d pairs for %d rules, or use fewer (--mf)",
 		     pairs, report->parameters, PAIRS_PER_PARAMETER * report->parameters,
 		     incise_model_info(model)->n_rules);
 	return list;

@@ -23,13 +23,14 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "verify",
 	.synopsis = "NAME.rec [OPTIONS]",
-	.summary =
-		"Prove that a recording is complete and as it was written: recompute its\n"
-		"ledger and check its pages. Says what is missing or altered, and where.",
+	.summary = "Check that a recording is complete and as it was written: recompute "
+		   "its ledger and check\n"
+		   "the pages of its database. Lists what is missing or altered, and "
+		   "where.",
 	.options = options,
-	.notes =
-		"Example: incise verify liver.rec\n"
-		"Exit codes: 0 all is there, 1 anything is missing or altered, 2 bad usage.",
+	.notes = "Example: incise verify liver.rec\n"
+		 "Exit codes: 0 complete, 1 something is missing or altered, 2 bad "
+		 "usage.",
 };
 
 /* Findings are printed as lines, or kept in a list. */
@@ -156,14 +157,14 @@ static void print_table(const struct incise_verify_report *report, const char *p
 		printf("\n");
 	}
 	if (report->frames.checked)
-		printf("%-8s %llu pictures as written, %llu missing, %llu altered, %llu that "
-		       "no row has\n",
+		printf("%-8s %llu frames as written, %llu missing, %llu altered, %llu "
+		       "without a row\n",
 		       "", (unsigned long long)report->frames.present,
 		       (unsigned long long)report->frames.missing,
 		       (unsigned long long)report->frames.altered,
 		       (unsigned long long)report->frames.extra);
 	if (report->complete)
-		printf("%s: complete: all is there, as it was written\n", path);
+		printf("%s: complete, and as it was written\n", path);
 }
 
 int main(int argc, char **argv)
@@ -201,24 +202,22 @@ int main(int argc, char **argv)
 			 "findings: %llu",
 			 sink.path, lost, (unsigned long long)report.findings);
 	if (!report.intact)
-		cli_fail("%s: not what was recorded: %llu samples missing, findings: "
-			 "%llu; keep a copy before anything else is done with it",
+		cli_fail("%s: not as it was recorded: %llu samples missing, findings: "
+			 "%llu; copy it before you do anything else with it",
 			 sink.path, lost, (unsigned long long)report.findings);
 	if (report.interrupted)
-		cli_fail(
-			"%s: interrupted: its end is missing; what was committed is there "
-			"as it was written, %llu samples were lost",
-			sink.path, lost);
+		cli_fail("%s: interrupted: its end is missing; the committed part is as "
+			 "it was written, %llu samples were lost",
+			 sink.path, lost);
 	if (sink.times && !lost)
-		cli_fail("%s: %llu rows of the tracker have a time that is not to be "
-			 "trusted; what was committed is there as it was written",
+		cli_fail("%s: %llu rows of the tracker have an unreliable time; the "
+			 "rest is as it was written",
 			 sink.path, (unsigned long long)sink.times);
 	if (!lost)
-		cli_fail(
-			"%s: a device was gone before it ended; what was committed is there "
-			"as it was written",
-			sink.path);
-	cli_fail("%s: %llu samples were lost when it was captured; what was committed is "
-		 "there as it was written",
+		cli_fail("%s: a device was disconnected before the end; the rest is as "
+			 "it was written",
+			 sink.path);
+	cli_fail("%s: %llu samples were lost during the capture; the rest is as it was "
+		 "written",
 		 sink.path, lost);
 }

@@ -42,9 +42,8 @@ static const struct {
 	{"assess", "evaluate sessions against the criteria of their scene"},
 	{"replay", "run the loop on a recording and compare it with the measured force"},
 	{"stepper", "show the state of the actuator and move it by hand"},
-	{"bench", "measure error against run time"},
-	{"doctor",
-	 "check this machine and its rig, and print the remedy of each finding"},
+	{"bench", "measure error, run time and stability"},
+	{"doctor", "check this machine and its rig, and print a remedy for each finding"},
 	{"rig", "print which rig.conf is used here, and what it resolves to"},
 	{"demo", "run the whole path on the simulated rig"},
 };

@@ -160,7 +160,7 @@ setup() {
 	(
 		ulimit -v 500000
 		run --separate-stderr incise bench compare good.json many.json
-		failed_with "many.json: no memory"
+		failed_with "many.json: out of memory"
 	)
 	echo "{\"quick\": true, \"figures\": [{$good}]}" >quick.json
 	echo "{\"quick\": false, \"figures\": [{$good}]}" >full.json

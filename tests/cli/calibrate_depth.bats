@@ -154,7 +154,7 @@ pairs() {
 	refused "text.csv" two-point --from text.csv
 	refused "absent.png" board --from absent.png
 	echo none >none.png
-	refused "is no PNG, JPEG, PGM or PPM" board --from none.png
+	refused "not an image; expected PNG, JPEG, PGM or PPM" board --from none.png
 	printf 'P5 640 480 255\n' >short.pgm
 	refused "" board --from short.pgm
 	# a dry run changes nothing either

@@ -60,7 +60,7 @@ until_it_runs() {
 	[[ "${lines[1]}" == "stream "*"drift ppm"* ]]
 	[[ "${lines[2]}" == "force "* ]]
 	[[ "${lines[3]}" == "tracker "* ]]
-	[ "${lines[4]}" = "delays not calibrated: force, tracker" ]
+	[ "${lines[4]}" = "warning: no delay calibration for force, tracker (run 'incise calibrate delay')" ]
 	[ "${#lines[@]}" -eq 5 ]
 	[ ! -e a.rec.part ]
 	[ "$(ls a.rec)" = recording.db ]
@@ -215,10 +215,10 @@ until_it_runs() {
 	mkdir a.rec && touch a.rec/thesis.txt
 	touch b.rec
 	run --separate-stderr incise capture -o a.rec --rig $quick --duration 1s --overwrite
-	failed_with "is no recording"
+	failed_with "not a recording"
 	[ -e a.rec/thesis.txt ]
 	run --separate-stderr incise capture -o b.rec --rig $quick --duration 1s --overwrite
-	failed_with "is no recording"
+	failed_with "not a recording"
 	[ -f b.rec ]
 }
 

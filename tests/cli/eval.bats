@@ -133,10 +133,10 @@ degree_model() {
 	run -0 --separate-stderr incise eval gap.fis <<<$'1\n4.9\n5.1\n9'
 	[ "${lines[*]}" = "1 1 0 0" ]
 	[ "${#stderr_lines[@]}" -eq 1 ]
-	[[ "$stderr" == "incise eval: warning: 2 inputs lay where no rule"* ]]
+	[[ "$stderr" == "incise eval: warning: 2 inputs were where no rule"* ]]
 	run -0 --separate-stderr incise eval gap.fis --json <<<$'4.9\n11'
 	[ "${#stderr_lines[@]}" -eq 2 ]
-	[[ "${stderr_lines[0]}" == *"warning: 1 inputs lay outside"* ]]
+	[[ "${stderr_lines[0]}" == *"warning: 1 inputs were out of the training range"* ]]
 	echo "$output" >r.json
 	[ "$(key r.json 'rows[0].extrapolated')" = 1 ]
 }
@@ -187,7 +187,7 @@ degree_model() {
 @test "eval outside the support takes its nearest end and says so" {
 	run -0 --separate-stderr incise eval m.fis <<<$'-3 20\n25 20\n5 60\n5 20'
 	[ "${#stderr_lines[@]}" -eq 1 ]
-	[[ "$stderr" == "incise eval: warning: 3 inputs lay outside the model's support (depth_mm 0 to 20, velocity_mm_s 0 to 50) and were taken as its nearest end" ]]
+	[[ "$stderr" == "incise eval: warning: 3 inputs were out of the training range (depth_mm 0 to 20, velocity_mm_s 0 to 50) and were clamped to it" ]]
 	[ "${lines[0]}" = "$(echo '0 20' | incise eval m.fis)" ]
 	[ "${lines[1]}" = "$(echo '20 20' | incise eval m.fis)" ]
 	[ "${lines[2]}" = "$(echo '5 50' | incise eval m.fis)" ]
@@ -262,7 +262,7 @@ degree_model() {
 	run --separate-stderr incise eval alone.fis --sd <<<'5 20'
 	failed_with alone.fis.sd:9 "not a number"
 	run --separate-stderr incise eval - --sd <m.fis
-	failed_with "--sd needs a model in a file"
+	failed_with "--sd: the model comes from standard input"
 	# without --sd nobody looks
 	echo '5 20' | incise eval alone.fis >/dev/null
 }
@@ -274,9 +274,9 @@ degree_model() {
 
 @test "eval: bad usage, and files that are not there" {
 	run --separate-stderr incise eval
-	bad_usage "a model"
+	bad_usage "missing MODEL.fis or MODEL.fx (model)"
 	run --separate-stderr incise eval m.fis a b
-	bad_usage "at most one file"
+	bad_usage "; give a model, and one file of inputs"
 	run --separate-stderr incise eval m.fis --arith float
 	bad_usage "--arith: expected double or fixed"
 	run --separate-stderr incise eval none.fis

@@ -40,17 +40,17 @@ well_formed() {
 	cp -r liver.rec/ altered.rec
 	sqlite3 altered.rec/recording.db "UPDATE force SET code = code + 1 WHERE seq = 12345"
 	run --separate-stderr incise export liver.rec altered.rec -o a.csv
-	failed_with "altered.rec: is not what was recorded: force: "
-	[[ "$stderr" == *"; \`incise verify altered.rec\` says all; --damaged takes it as it is" ]]
+	failed_with "altered.rec: not as it was recorded: force: "
+	[[ "$stderr" == *"; 'incise verify altered.rec' lists all; --damaged uses it as it is" ]]
 	[ ! -e a.csv ]
 	run -0 --separate-stderr incise export liver.rec altered.rec -o a.csv --damaged
-	[[ "$stderr" == "incise export: warning: altered.rec: is not what was recorded: force: "* ]]
+	[[ "$stderr" == "incise export: warning: altered.rec: not as it was recorded: force: "* ]]
 	[ -s a.csv ]
 	# what no block holds, and what is sealed
 	sqlite3 altered.rec/recording.db "UPDATE force SET code = code - 1 WHERE seq = 12345;
 		UPDATE depth SET depth_mm = 1 WHERE seq = 7"
 	run --separate-stderr incise export altered.rec -o b.csv
-	failed_with "altered.rec: is not what was recorded: table depth is altered"
+	failed_with "altered.rec: not as it was recorded: table depth is altered"
 	[ ! -e b.csv ]
 }
 

@@ -12,7 +12,7 @@ setup() {
 	run -0 --separate-stderr incise compile neck -o n.plan
 	[[ "${lines[0]}" == "plan of neck.scene: 1000 Hz, "*" bytes, CRC-32C "* ]]
 	[[ "$output" == *" mN of double, certified"*"surface  capsule, with a membrane"* ]]
-	[[ "$stderr" == *"it is for no actuator: give --rig"* ]]
+	[[ "$stderr" == *"the plan has no actuator; give --rig"* ]]
 	[ "$(head -c 8 n.plan)" = INCISEPL ]
 	incise info n.plan --json >info.json
 	[ "$(key info.json kind)" = plan ]
@@ -75,9 +75,9 @@ setup() {
 @test "options of a model are not of a scene, and the other way round" {
 	cp "$root/scenes/liver.fis" m.fis
 	run -2 --separate-stderr incise compile neck --budget 1mN -o n.plan
-	[[ "$stderr" == *"--budget, --method, --cells and --c-source are of a model"* ]]
+	[[ "$stderr" == *"--budget, --method, --cells and --c-source go with a model"* ]]
 	run -2 --separate-stderr incise compile m.fis --rig sim: -o m.fx
-	[[ "$stderr" == *"are of a scene"* ]]
+	[[ "$stderr" == *"go with a scene"* ]]
 	[ ! -e n.plan ]
 	[ ! -e m.fx ]
 }

@@ -113,9 +113,9 @@ options_of_page() {
 
 @test "an option without its argument, and with one it does not take" {
 	run --separate-stderr incise train --mf
-	bad_usage "--mf: the argument N,M is missing"
+	bad_usage "--mf: missing argument N,M"
 	run --separate-stderr incise train d.csv -o
-	bad_usage "-o: the argument FILE is missing"
+	bad_usage "-o: missing argument FILE"
 	run --separate-stderr incise train --json=yes
 	bad_usage "--json: this option takes no argument"
 }

@@ -178,7 +178,7 @@ replaces_when_told() {
 	mkdir other.rec
 	echo mine >other.rec/notes
 	run --separate-stderr incise capture -o other.rec --rig $quick --duration 1s --overwrite
-	failed_with other.rec "is no recording"
+	failed_with other.rec "not a recording"
 	[ "$(cat other.rec/notes)" = mine ]
 }
 

@@ -15,7 +15,7 @@ row() {
 @test "rig names the file that is used, and those that were passed over" {
 	[ ! -e /etc/incise/rig.conf ] || skip "this machine has a rig"
 	run -1 --separate-stderr incise rig
-	[[ "$stderr" == "incise rig: there is neither ./rig.conf nor /etc/incise/rig.conf; "* ]]
+	[[ "$stderr" == "incise rig: no rig: there is no ./rig.conf and no /etc/incise/rig.conf; "* ]]
 	echo 'tracker = "sim:";' >rig.conf
 	run -0 --separate-stderr incise rig
 	[ "$output" = "rig          rig.conf" ]

@@ -62,7 +62,7 @@ static void print_help(const struct cli_command *command)
 		putchar('\n');
 	}
 	if (has_outputs(command))
-		printf("      --overwrite             replace what is there already\n");
+		printf("      --overwrite             replace files that exist\n");
 	printf("  -h, --help                  show this\n"
 	       "  -V, --version               show the version\n");
 	if (command->notes)
@@ -155,11 +155,12 @@ _Noreturn static void refuse(const struct cli_command *command, const char *give
 		size_t length = strlen(option + 2);
 
 		if (!strcmp(names[i], option + 2))
-			cli_usage("%s: this option takes no argument", option);
+			cli_usage("%s: this option takes no argument; remove '='",
+				  option);
 		/* The beginning of two or more names. */
 		if (length && !strncmp(names[i], option + 2, length))
-			cli_usage("%s: more than one option begins like this, "
-				  "for example --%s",
+			cli_usage("%s: ambiguous: more than one option begins like "
+				  "this, for example --%s",
 				  option, names[i]);
 	}
 	nearest = incise_nearest_name(option + 2, names);
@@ -221,7 +222,7 @@ static const struct cli_option *next(const struct cli_command *command, int argc
 		cli_finish();
 		exit(0);
 	case ':':
-		cli_usage("%s: the argument %s is missing", argv[optind - 1],
+		cli_usage("%s: missing argument %s", argv[optind - 1],
 			  argument_of(command, argv[optind - 1]));
 	case '?':
 		refuse(command, argv[optind - 1], optopt);
@@ -692,9 +693,8 @@ const char *cli_rig(const char *given)
 		cli_input(found);
 		return found;
 	}
-	cli_fail(
-		"there is neither ./rig.conf nor /etc/incise/rig.conf; name the rig with "
-		"--rig FILE, or try the simulated rig: --rig sim:");
+	cli_fail("no rig: there is no ./rig.conf and no /etc/incise/rig.conf; give "
+		 "--rig FILE, or --rig sim: for the simulated rig");
 }
 
 struct incise_rig *cli_open_rig(const char *given, unsigned int devices)
@@ -884,6 +884,6 @@ void cli_finish(void)
 	if (!errno && poll(&reader, 1, 0) == 1 && reader.revents & POLLERR)
 		exit(1);
 	if (!errno)
-		cli_fail("standard output: writing failed; is the disk full?");
+		cli_fail("standard output: writing failed; see whether the disk is full");
 	cli_fail("standard output: %s", strerror(errno));
 }

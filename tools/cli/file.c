@@ -35,7 +35,7 @@ struct memory_file memory_file_begin(const char *name)
 
 	file.file = fd < 0 ? NULL : fdopen(fd, "w+");
 	if (!file.file)
-		cli_fail("no room for %s in memory: %s", name, strerror(errno));
+		cli_fail("%s: no memory: %s", name, strerror(errno));
 	snprintf(file.path, sizeof(file.path), "/proc/self/fd/%d", fd);
 	return file;
 }
@@ -43,5 +43,5 @@ struct memory_file memory_file_begin(const char *name)
 void memory_file_written(const struct memory_file *file)
 {
 	if (fflush(file->file))
-		cli_fail("no room for a file in memory: %s", strerror(errno));
+		cli_fail("no memory for a file: %s", strerror(errno));
 }

@@ -18,7 +18,7 @@ void folder_make(char *path, size_t size, const char *purpose)
 			      where && *where ? where : "/tmp");
 
 	if (length >= (int)size)
-		cli_fail("TMPDIR: is too long for a name; set another");
+		cli_fail("TMPDIR: its path is too long; set another");
 	if (!mkdtemp(path))
 		cli_fail("%s: no folder %s: %s; set TMPDIR", path, purpose,
 			 strerror(errno));

@@ -21,8 +21,8 @@
 static void check_sides(const char *path, unsigned long width, unsigned long height)
 {
 	if (width < 16 || height < 16 || width > SIDE_MAX || height > SIDE_MAX)
-		cli_fail("%s: %lu x %lu pixels: 16 to %d will do", path, width, height,
-			 SIDE_MAX);
+		cli_fail("%s: %lu x %lu pixels; expected 16 to %d each way", path, width,
+			 height, SIDE_MAX);
 }
 
 /* The size is in the start-of-frame marker; markers before it have a length. */
@@ -44,7 +44,7 @@ static void read_jpeg(const char *path, struct incise_camera_frame *frame)
 		}
 		at += marker == 0xff ? 1 : 2 + (size_t)(d[at + 2] << 8 | d[at + 3]);
 	}
-	cli_fail("%s: a JPEG without sizes; is it whole?", path);
+	cli_fail("%s: a JPEG without sizes; it may be incomplete", path);
 }
 
 /* Parse the next number of a header after blanks and comments; returns its end. */
@@ -75,10 +75,11 @@ static void read_pnm(const char *path, struct incise_camera_frame *frame, uint8_
 	at = number(data, frame->size, at, &height);
 	at = number(data, frame->size, at, &top) + 1;
 	if (at >= frame->size || top != 255)
-		cli_fail("%s: a PGM or PPM of 8 bits has 255 in its header", path);
+		cli_fail("%s: expected a PGM or PPM of 8 bits, with 255 in its header",
+			 path);
 	check_sides(path, width, height);
 	if (frame->size - at < width * height * channels)
-		cli_fail("%s: cut short: %zu bytes of pixels of %lu", path,
+		cli_fail("%s: incomplete: %zu bytes of pixels, expected %lu", path,
 			 frame->size - at, width * height * channels);
 	frame->width = (int)width;
 	frame->height = (int)height;
@@ -134,9 +135,8 @@ int image_write_png(const char *path, const uint8_t *rgb, int width, int height,
 static void read_png(const char *path, struct incise_camera_frame *frame)
 {
 	(void)frame;
-	cli_fail(
-		"%s: this build reads no PNG (libpng-dev was not there); convert it to PGM",
-		path);
+	cli_fail("%s: this build cannot read PNG (no libpng-dev); convert it to PGM",
+		 path);
 }
 
 int image_write_png(const char *path, const uint8_t *rgb, int width, int height,
@@ -170,5 +170,5 @@ void image_read(const char *path, struct incise_camera_frame *frame)
 	else if (frame->size > 10 && data[0] == 'P' && (data[1] == '5' || data[1] == '6'))
 		read_pnm(path, frame, data);
 	else
-		cli_fail("%s: is no PNG, JPEG, PGM or PPM picture", path);
+		cli_fail("%s: not an image; expected PNG, JPEG, PGM or PPM", path);
 }

@@ -107,9 +107,8 @@ void json_print(json_t *object)
 {
 	/* It is NULL if any part of it could not be made. */
 	if (!object)
-		cli_fail(
-			"the report cannot be written as JSON: no memory, or a name that is "
-			"not UTF-8");
+		cli_fail("the report cannot be written as JSON: out of memory, or a "
+			 "name is not UTF-8");
 	json_write(stdout, object, JSON_INDENT(2));
 	json_decref(object);
 	cli_finish();
@@ -123,13 +122,14 @@ json_t *json_parse(const char *text, size_t n, const char *path, struct incise_e
 	if (report)
 		return report;
 	if (!*wrong.text) {
-		incise_error_set(err, ENOMEM, "%s: no memory", path);
+		incise_error_set(err, ENOMEM, "%s: out of memory", path);
 		return NULL;
 	}
 	for (char *c = wrong.text; *c; c++)
 		if ((unsigned char)*c < ' ' || (unsigned char)*c >= 0x7f)
 			*c = '?';
-	incise_error_set(err, EINVAL, "%s:%d: no JSON: %s", path, wrong.line, wrong.text);
+	incise_error_set(err, EINVAL, "%s:%d: not JSON: %s", path, wrong.line,
+			 wrong.text);
 	return NULL;
 }
 
@@ -140,7 +140,7 @@ json_t *json_read_from(FILE *file, const char *path, struct incise_error *err)
 	size_t n;
 
 	if (!text) {
-		incise_error_set(err, ENOMEM, "%s: no memory", path);
+		incise_error_set(err, ENOMEM, "%s: out of memory", path);
 		return NULL;
 	}
 	n = fread(text, 1, READ_MOST + 1, file);

@@ -34,8 +34,8 @@ void plan_report_text(const struct incise_plan_file_info *info)
 	printf("force    within %.3g mN of double, certified; at most %.4g N, changes by at "
 	       "most %.4g N/s\n",
 	       info->bound_N * 1e3, info->force_N, info->slew_N_s);
-	printf("tracker  %.4g Hz, %.3g ms late; without a pose younger than %.4g ms the force "
-	       "fades, and is 0 by %.4g ms\n",
+	printf("tracker  %.4g Hz, delay %.3g ms; without a pose younger than %.4g ms "
+	       "the force ramps to zero, by %.4g ms\n",
 	       info->tracker_hz, info->latency_s * 1e3, info->pose_age_s * 1e3,
 	       info->fade_s * 1e3);
 	surface_text(info);

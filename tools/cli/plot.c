@@ -40,8 +40,8 @@ void plot_place(const char *option, const char *path, const char **folder,
 	/* The name is part of a script and a command: '-' would be an option of gnuplot. */
 	if (!n || *last == '.' || *last == '-' ||
 	    strspn(last, NAME_CHARACTERS) != strlen(last))
-		cli_usage("--%s: '%s' is no name for a picture: letters, digits, '.', "
-			  "'_' and '-', and not '.' or '-' first",
+		cli_usage("--%s: '%s' cannot name a plot; use letters, digits, '.', "
+			  "'_' and '-', but not '.' or '-' first",
 			  option, last);
 	*name = cli_text("%.*s", (int)n, last);
 	*folder = slash ? cli_text("%.*s", (int)(slash > path ? slash - path : 1), path)
@@ -86,7 +86,7 @@ bool plot_possible(void)
 void plot_require(void)
 {
 	if (!plot_possible())
-		cli_fail("gnuplot is not installed, it draws the pictures: apt-get "
+		cli_fail("gnuplot is not installed, which draws the plots; apt-get "
 			 "install gnuplot-nox");
 }
 
@@ -114,7 +114,7 @@ void plot_data_end(FILE *data, const char *folder)
 
 	errno = 0;
 	if (fclose(data) || failed)
-		cli_fail("%s/plot: %s; make room and run it again", folder,
+		cli_fail("%s/plot: %s; free some space and run it again", folder,
 			 strerror(errno ? errno : EIO));
 }
 

@@ -65,11 +65,11 @@ bool recording_intact(const char *path, bool damaged, struct incise_error *err)
 	if (!first.found)
 		return true;
 	if (damaged)
-		cli_warn("%s: is not what was recorded: %s", path, first.text);
+		cli_warn("%s: not as it was recorded: %s", path, first.text);
 	else
 		incise_error_set(err, EINVAL,
-				 "%s: is not what was recorded: %s; `incise verify %s` "
-				 "says all; --damaged takes it as it is",
+				 "%s: not as it was recorded: %s; 'incise verify %s' "
+				 "lists all; --damaged uses it as it is",
 				 path, first.text, path);
 	return false;
 }
@@ -86,10 +86,9 @@ void recording_remove(const char *path)
 	if (folder < 0)
 		cli_fail("%s: cannot be replaced: %s", path, strerror(errno));
 	if (flock(folder, LOCK_EX | LOCK_NB) && errno == EWOULDBLOCK)
-		cli_fail(
-			"%s: another incise capture is writing it; end that one, or take "
-			"another name",
-			path);
+		cli_fail("%s: another incise capture is writing it; end that one, or "
+			 "give another name",
+			 path);
 	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++)
 		if (unlinkat(folder, files[i], 0) && errno != ENOENT)
 			cli_fail("%s/%s: cannot be removed: %s", path, files[i],
@@ -112,10 +111,9 @@ static void check(const char *path)
 	}
 	snprintf(file, sizeof(file), "%s/recording.db", path);
 	if (!S_ISDIR(st.st_mode) || (access(file, F_OK) && rmdir(path)))
-		cli_fail(
-			"%s: is no recording, so --overwrite does not replace it; take another "
-			"name",
-			path);
+		cli_fail("%s: not a recording, so --overwrite does not replace it; give "
+			 "another name",
+			 path);
 }
 
 char *recording_target(const char *path)

@@ -13,11 +13,11 @@
 struct incise_recording *recording_open(const char *path);
 
 /* Row of the table of options for --damaged, a bool. */
-#define RECORDING_DAMAGED(type, member)                                             \
-	{                                                                           \
-		0, "damaged", NULL,                                                 \
-			"take a recording that is not what was recorded, as it is", \
-			CLI_FLAG(type, member)                                      \
+#define RECORDING_DAMAGED(type, member)                                       \
+	{                                                                     \
+		0, "damaged", NULL,                                           \
+			"use a recording that failed verification, as it is", \
+			CLI_FLAG(type, member)                                \
 	}
 
 /*

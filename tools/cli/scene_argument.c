@@ -34,7 +34,7 @@ void scene_argument_list_shipped(glob_t *found)
 	char *pattern = cli_text("%s/*.scene", scene_argument_shipped());
 
 	if (glob(pattern, 0, NULL, found))
-		cli_fail("%s: no scenes are there, though they come with the program",
+		cli_fail("%s: the installed scenes are missing; install incise again",
 			 scene_argument_shipped());
 	free(pattern);
 }

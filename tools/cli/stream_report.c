@@ -61,7 +61,7 @@ int stream_line(const struct incise_stream *s, char *text, size_t size)
 /* Whose offsets are no surer than their devices' word. */
 static void not_calibrated(const struct incise_stream *streams, int n)
 {
-	const char *before = "delays not calibrated: ";
+	const char *before = "warning: no delay calibration for ";
 
 	for (int i = 0; i < n; i++) {
 		if (!isnan(streams[i].delay_sd_ms))
@@ -70,7 +70,7 @@ static void not_calibrated(const struct incise_stream *streams, int n)
 		before = ", ";
 	}
 	if (*before == ',')
-		putchar('\n');
+		puts(" (run 'incise calibrate delay')");
 }
 
 void stream_table(const struct incise_stream *streams, int n)

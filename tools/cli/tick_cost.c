@@ -204,7 +204,7 @@ void tick_cost(const struct incise_scene *scene,
 	struct tick_cost tube = {0};
 
 	if (!times)
-		cli_fail("no memory for the times of %d ticks", ticks);
+		cli_fail("out of memory for the times of %d ticks", ticks);
 	*cost = (struct tick_cost){0};
 	if (cost_with(scene, tracker, INCISE_TOOL_BLADE, cuts, ticks, times, cost)) {
 		struct tick_cost blade = *cost;
