@@ -49,28 +49,27 @@ static void parse_trigger(void *whole, char *text)
 
 static const struct cli_option option_table[] = {
 	{'o', "output", "NAME.rec",
-	 "folder to record into; --overwrite replaces one once the new\n"
-	 "one is complete, and drops what an interrupted recording\n"
-	 "left as NAME.rec.part",
+	 "folder to record into; --overwrite replaces an existing one once\n"
+	 "the new one is complete, and removes the rest of an interrupted\n"
+	 "one, NAME.rec.part",
 	 CLI_OUTPUTS(struct options, output)},
 	{CLI_RIG_OPTION(struct options, rig)},
-	{'c', "calibration", "FILE",
-	 "calibration.conf (default: the figures of the paper)",
+	{'c', "calibration", "FILE", "calibration.conf (default: nominal values)",
 	 CLI_INPUT(struct options, calibration)},
 	{0, "duration", "TIME",
-	 "end after 10s, 500ms, 2min, 1h (default: at Ctrl-C;\n"
-	 "on the simulated rig at the end of its cuts)",
+	 "end after this time, for example 10s, 500ms, 2min or 1h (default:\n"
+	 "at Ctrl-C; on the simulated rig at the end of its cuts)",
 	 CLI_DURATION(struct options, duration_s, 0.01, 1e6)},
 	{0, "camera", "WHAT",
-	 "off; frames: record them; depth: and find the scalpel in\n"
-	 "them; auto: what rig.conf has (default; a rig of sim:… has\n"
-	 "no camera then)",
+	 "off; frames: record frames; depth: also find the scalpel in\n"
+	 "them; auto: as rig.conf has it (default; a rig sim:… then has\n"
+	 "no camera)",
 	 CLI_CHOICE(struct options, camera, cameras)},
 	{0, "trigger", "WHAT",
-	 "wait for the stylus's button, or for a force such as 0.2N;\n"
-	 "the second before is recorded too",
+	 "wait for the button of the stylus, or for a force such as 0.2N;\n"
+	 "the second before it is recorded too",
 	 CLI_PARSED_BY(parse_trigger), .names = triggers},
-	{0, "cuts", NULL, "mark beginning and end of each cut in the table events",
+	{0, "cuts", NULL, "mark the start and the end of each cut in the table events",
 	 CLI_FLAG(struct options, cuts)},
 	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct options, json)},
 	{0},
@@ -79,15 +78,16 @@ static const struct cli_option option_table[] = {
 static const struct cli_command command = {
 	.name = "capture",
 	.synopsis = "-o NAME.rec [--rig RIG] [OPTIONS]",
-	.summary =
-		"Record tracker, force channel and camera of a rig in sync. Hold the tool free\n"
-		"for the first half second: the zero of the force is measured then. On a\n"
-		"terminal the keys m and 1 to 9 set markers, t triggers, q ends.",
+	.summary = "Record tracker, force channel and camera of a rig in sync. Hold the "
+		   "tool clear of\n"
+		   "everything for the first half second: the zero of the force is "
+		   "measured then. On a\n"
+		   "terminal the keys m and 1 to 9 set markers, t triggers, q ends.",
 	.options = option_table,
-	.notes =
-		"Example: incise capture -o liver.rec --rig sim:clock=simulated\n"
-		"Exit codes: 0 recorded without loss; 1 failed, samples lost, a device died or\n"
-		"the disk was nearly full; 2 bad usage.",
+	.notes = "Example: incise capture -o liver.rec --rig sim:clock=simulated\n"
+		 "Exit codes: 0 recorded without loss; 1 failed, samples were lost, a "
+		 "device failed or\n"
+		 "the disk was nearly full; 2 bad usage.",
 };
 
 static void parse(struct options *options, int argc, char **argv)
@@ -103,9 +103,9 @@ static void parse(struct options *options, int argc, char **argv)
 	for (length = strlen(output); length > 1 && output[length - 1] == '/'; length--)
 		output[length - 1] = 0;
 	if (length < 5 || !cli_ends_with(output, ".rec") || output[length - 5] == '/')
-		cli_usage("-o: '%s' is not a name that ends in .rec", output);
+		cli_usage("-o: expected a name that ends in .rec, found '%s'", output);
 	if (length > PATH_MAX - 16)
-		cli_usage("-o: the path is too long");
+		cli_usage("-o: the path is too long; give a shorter one");
 	cli_output(output);
 	options->output = output;
 }
@@ -286,8 +286,10 @@ static void keep_old(const struct run *run, const char *new)
 	if (run->result.early.code)
 		cli_fail_with(&run->result.early);
 	cli_fail("%s: %s; nothing was recorded%s", run->options->output,
-		 stats->armed ? "was never triggered" : "no device gave a sample",
-		 cli_overwrite() ? ", and nothing is replaced" : "");
+		 stats->armed ? "it was never triggered"
+			      : "no samples arrived; see "
+				"incise doctor",
+		 cli_overwrite() ? ", and nothing was replaced" : "");
 }
 
 static struct incise_rig *open_rig(const struct options *options)
@@ -309,10 +311,9 @@ static bool use_vision(const struct options *options, struct incise_rig *rig,
 	bool has = incise_rig_camera(rig) && !incise_rig_vision(rig, vision);
 
 	if (options->camera == CAMERA_DEPTH && !has)
-		cli_fail(
-			"%s: --camera depth needs its group `vision`, which says what the "
-			"handle looks like; see rig.conf(5)",
-			incise_rig_spec(rig));
+		cli_fail("%s: --camera depth needs a group vision, with the colour of "
+			 "the handle; see 'incise help rig.conf'",
+			 incise_rig_spec(rig));
 	return has && options->camera != CAMERA_PICTURES;
 }
 
@@ -351,7 +352,7 @@ static void report(const struct options *options, const struct result *result)
 			"streams", stream_json(streams, n)));
 		return;
 	}
-	printf("%s: %.1f s, %llu force samples (%llu clipped), %llu tracker records, ",
+	printf("%s: %.1f s, %llu force samples (%llu clipped), %llu tracker samples, ",
 	       path, result->seconds, (unsigned long long)stats->force,
 	       (unsigned long long)stats->force_clipped,
 	       (unsigned long long)stats->tracker);
@@ -377,7 +378,7 @@ _Noreturn static void fail_of_losses(const char *path,
 		const char *what;
 	} lost[] = {
 		{stats->force_lost, "force samples"},
-		{stats->tracker_lost, "tracker records"},
+		{stats->tracker_lost, "tracker samples"},
 		{stats->frames_lost, "frames"},
 	};
 	char text[200] = "";
@@ -389,7 +390,7 @@ _Noreturn static void fail_of_losses(const char *path,
 					       at ? ", " : "",
 					       (unsigned long long)lost[i].n,
 					       lost[i].what);
-	cli_fail("%s: %s were lost; the table events says when", path, text);
+	cli_fail("%s: %s were lost; the table events lists when", path, text);
 }
 
 /* A recording that is not complete is a failure. */
@@ -404,27 +405,30 @@ static void judge(const char *path, const struct result *result)
 		cli_fail_with(&result->early);
 	for (int i = 0; i < n; i++)
 		if (*streams[i].ended)
-			cli_fail("%s: the %s ended before the recording did: %s", path,
-				 streams[i].name, streams[i].ended);
+			cli_fail("%s: the %s failed before the end of the recording: %s",
+				 path, streams[i].name, streams[i].ended);
 	if (!stats->force || !stats->tracker)
-		cli_fail("%s: the %s gave nothing in %.1f s; check its cable and power",
+		cli_fail("%s: no samples arrived from the %s in %.1f s; check its "
+			 "cable and power",
 			 path, stats->force ? "tracker" : "force channel",
 			 result->seconds);
 	incise_pose_counts_text(&stats->poses, text, sizeof(text));
 	if (poses_are_doubtful(&stats->poses))
 		cli_warn("%s: %s", path, text);
 	else if (!stats->depth)
-		cli_warn("%s: no depth came of %llu poses", path,
-			 (unsigned long long)stats->tracker);
+		cli_warn("%s: no depth came of %llu poses; check the surface in "
+			 "rig.conf",
+			 path, (unsigned long long)stats->tracker);
 	if (stats->force_lost || stats->tracker_lost || stats->frames_lost)
 		fail_of_losses(path, stats);
 	if (stats->poses.unusable && stats->poses.unusable == stats->poses.poses)
-		cli_fail("%s: no depth: the tracker flagged every pose; see "
-			 "Tracker flags in rig.conf(5)",
+		cli_fail("%s: no depth: the tracker flagged every pose; see Tracker "
+			 "flags in 'incise help rig.conf'",
 			 path);
 	if (n > 2 && !stats->frames)
-		cli_fail("%s: the camera gave nothing in %.1f s; check its cable", path,
-			 result->seconds);
+		cli_fail("%s: no frames arrived from the camera in %.1f s; check its "
+			 "cable",
+			 path, result->seconds);
 }
 
 int main(int argc, char **argv)

@@ -14,17 +14,17 @@ static const struct cli_option options[] = {
 	{0, "model", "FILE", "use this model instead of the scene's",
 	 CLI_INPUT(struct haptic_job, haptic.argument.model)},
 	{0, "tool", "KIND",
-	 "what the hand holds at first: auto, blade, handle or tube (default: auto)",
+	 "tool in the hand at the start: auto, blade, handle or tube (default: auto)",
 	 CLI_CHOICE(struct haptic_job, haptic.tool, loop_tool_names)},
 	HAPTIC_HOLD_OPTIONS,
-	{0, "no-rt", NULL, "run without real time: poses may be late",
+	{0, "no-rt", NULL, "run with normal scheduling: poses may be late",
 	 CLI_FLAG(struct haptic_job, no_rt)},
 	{0, "state", "FILE",
-	 "page of the loop beside which its own is, NAME.feed.state for NAME.state,\n"
-	 "none for no page (default: as of incise haptic)",
+	 "status file of the loop; its own is NAME.feed.state for NAME.state,\n"
+	 "none for no file (default: as of incise haptic)",
 	 CLI_TEXT(struct haptic_job, state)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct haptic_job, json)},
-	{'v', "verbose", NULL, "say on stderr what happens meanwhile",
+	{'v', "verbose", NULL, "print events on stderr",
 	 CLI_FLAG(struct haptic_job, verbose)},
 	{0},
 };
@@ -32,15 +32,20 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "feed",
 	.synopsis = "SCENE [OPTIONS]",
-	.summary =
-		"Let the kernel module render a scene's force, and hand it the tracker's poses. The\n"
-		"force goes on while other programs stop, start or die, and fades when this one\n"
-		"does. Not a safety device, not a medical device.",
+	.summary = "Let the kernel module render the force of a scene, and send it the "
+		   "tracker's poses. The\n"
+		   "force continues while other programs stop, start or crash, and ramps "
+		   "to zero when this one\n"
+		   "ends. Not a safety device, not a medical device.",
 	.options = options,
 	.notes = "SCENE is as for incise haptic. Needs steppers of the kernel module\n"
-		 "incise_stepper (incise info stepper).\n\n"
-		 "Example:\n  incise feed neck --rig rig.conf\n\n"
-		 "Exit: 0 ended as asked, 1 failed, 2 bad usage. See incise-feed(1).",
+		 "incise_stepper (incise info stepper).\n"
+		 "\n"
+		 "Example:\n"
+		 "  incise feed neck --rig rig.conf\n"
+		 "\n"
+		 "Exit: 0 ended as requested, 1 failed, 2 bad usage. See "
+		 "incise-feed(1).",
 };
 
 int main(int argc, char **argv)

@@ -16,40 +16,46 @@ static const struct cli_option options[] = {
 	HAPTIC_TIP_OPTION,
 	SCENE_ARGUMENT_OPTIONS(struct haptic_job, haptic.argument),
 	{0, "tool", "KIND",
-	 "what the hand holds at first: auto (blade or handle, by the scalpel's turn, or\n"
-	 "a tube with a station of its own), blade, handle or tube (default: auto); on a\n"
+	 "tool in the hand at the start: auto (blade or handle, by the scalpel's turn, "
+	 "or\n"
+	 "a tube with a station of its own), blade, handle or tube (default: auto); on "
+	 "a\n"
 	 "terminal the keys a, b, h, t change it",
 	 CLI_CHOICE(struct haptic_job, haptic.tool, loop_tool_names)},
 	{0, "procedure", NULL,
-	 "on the simulated rig, in simulated time: a script cuts, enlarges the cut and\n"
+	 "on the simulated rig, in simulated time: a script cuts, enlarges the cut "
+	 "and\n"
 	 "inserts a tube",
 	 CLI_FLAG(struct haptic_job, scripted)},
 	{0, "in-kernel", NULL,
-	 "let the kernel module render, and only watch it: the force outlives this\n"
-	 "program; starts incise feed, unless that runs",
+	 "let the kernel module render the force, and only watch it: the force "
+	 "outlives this\n"
+	 "program; starts incise feed, unless it runs",
 	 CLI_FLAG(struct haptic_job, in_kernel)},
 	HAPTIC_HOLD_OPTIONS,
 	{0, "policy", "POLICY", "fifo or deadline (default: fifo)",
 	 CLI_CHOICE(struct haptic_job, realtime.policy, policies)},
-	{0, "priority", "N", "of fifo, 1 to 84 (default: 80)",
+	{0, "priority", "N", "priority of fifo, 1 to 84 (default: 80)",
 	 CLI_INTEGER(struct haptic_job, realtime.priority, 1,
 		     INCISE_REALTIME_PRIORITY_MAX)},
-	{0, "cpu", "N", "run the loop's thread on this CPU alone (default: any)",
+	{0, "cpu", "N", "run the loop's thread on this CPU only (default: any)",
 	 CLI_INTEGER(struct haptic_job, realtime.cpu, 0, 1023)},
-	{0, "no-rt", NULL, "run without real time: ticks may be late",
+	{0, "no-rt", NULL, "run with normal scheduling: ticks may be late",
 	 CLI_FLAG(struct haptic_job, no_rt)},
 	{0, "overruns", "N",
 	 "end after this many overruns in a row; 0: never (default: 100)",
 	 CLI_INTEGER(struct haptic_job, haptic.loop.overruns_most, 0, 1000000)},
 	{0, "state", "FILE",
-	 "page that others read, none for no page (default: NAME.state of the\n"
-	 "scene's name in /run/incise, $XDG_RUNTIME_DIR/incise or /tmp/incise-UID)",
+	 "status file that other programs read, none for no file (default: "
+	 "NAME.state,\n"
+	 "by the scene's name, in /run/incise, $XDG_RUNTIME_DIR/incise or "
+	 "/tmp/incise-UID)",
 	 CLI_TEXT(struct haptic_job, state)},
 	{0, "log", "FILE", "write every tick as CSV at the end; needs --duration",
 	 CLI_OUTPUT(struct haptic_job, log), .extensions = ".csv"},
 	SESSION_OPTIONS(struct haptic_job, session),
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct haptic_job, json)},
-	{'v', "verbose", NULL, "say on stderr what happens meanwhile",
+	{'v', "verbose", NULL, "print events on stderr",
 	 CLI_FLAG(struct haptic_job, verbose)},
 	{0},
 };
@@ -58,14 +64,20 @@ static const struct cli_command command = {
 	.name = "haptic",
 	.synopsis = "SCENE [OPTIONS]",
 	.summary =
-		"Run the haptic loop of a scene: read the pose, evaluate the force, drive the\n"
-		"actuator, at the scene's rate. Not a safety device, not a medical device.",
+		"Run the haptic loop of a scene: read the pose, evaluate the force and "
+		"drive the\n"
+		"actuators, at the scene's rate. Not a safety device, not a medical "
+		"device.",
 	.options = options,
-	.notes =
-		"SCENE is a file, or a name such as liver: ./liver.scene, else the one in\n"
-		"/etc/incise/scenes, else the one that is installed.\n\n"
-		"Example:\n  incise haptic scenes/liver.scene --rig sim: --duration 10s\n\n"
-		"Exit: 0 ended as asked, 1 failed, 2 bad usage. See incise-haptic(1).",
+	.notes = "SCENE is a file, or a name such as liver: ./liver.scene, else the one "
+		 "in\n"
+		 "/etc/incise/scenes, else the installed one.\n"
+		 "\n"
+		 "Example:\n"
+		 "  incise haptic scenes/liver.scene --rig sim: --duration 10s\n"
+		 "\n"
+		 "Exit: 0 ended as requested, 1 failed, 2 bad usage. See "
+		 "incise-haptic(1).",
 };
 
 /* All that is of the feeder, as it was given here. */
@@ -76,14 +88,14 @@ static void watch_kernel(struct haptic_job *job)
 	int n = 1;
 
 	if (job->scripted)
-		cli_usage("--procedure is on the simulated rig: leave out --in-kernel");
+		cli_usage("--procedure runs on the simulated rig: leave out --in-kernel");
 	if (haptic->argument.arith && strcmp(haptic->argument.arith, "fixed"))
-		cli_usage("--arith: the kernel renders in integers: leave it out");
+		cli_usage("--arith does not go with --in-kernel: the kernel computes "
+			  "in fixed point");
 	if (job->realtime.cpu != INCISE_REALTIME_ANY_CPU || job->realtime.policy ||
 	    job->realtime.priority != INCISE_REALTIME_PRIORITY)
-		cli_usage(
-			"--cpu, --policy and --priority: a program that only watches has "
-			"no real time; give them up, or --in-kernel");
+		cli_usage("--cpu, --policy and --priority do not go with --in-kernel: "
+			  "this program then only watches");
 	haptic->mode = HAPTIC_WATCH;
 	/* A watcher that is late takes no force away. */
 	haptic->loop.overruns_most = 0;
@@ -118,7 +130,7 @@ static void parse(struct haptic_job *job, int argc, char **argv)
 		cli_be_verbose();
 	scene_argument_operand(&job->haptic.argument, argc, argv, optind);
 	if (job->scripted && (job->rig || job->haptic.tool != INCISE_TOOL_AUTO))
-		cli_usage("--procedure has a rig and tools of its own: leave out %s",
+		cli_usage("--procedure has its own rig and tools: leave out %s",
 			  job->rig ? "--rig" : "--tool");
 	if (job->scripted && !job->duration)
 		job->duration = PROCEDURE_S;
@@ -126,12 +138,12 @@ static void parse(struct haptic_job *job, int argc, char **argv)
 		watch_kernel(job);
 	session_options_check(&job->session);
 	if (job->log && !job->duration)
-		cli_usage("--log keeps all ticks in memory: it needs --duration");
+		cli_usage("--log needs --duration: it keeps all ticks in memory");
 	if (job->json && job->log && !strcmp(job->log, "-"))
 		cli_usage("--json and --log - would both write to standard output");
 	if (job->no_rt && job->realtime.cpu != INCISE_REALTIME_ANY_CPU)
-		cli_usage("--no-rt: the loop's thread gets no CPU of its own; leave out "
-			  "--cpu, or --no-rt");
+		cli_usage("--cpu does not go with --no-rt: only a real-time thread is "
+			  "given its own CPU");
 }
 
 int main(int argc, char **argv)

@@ -21,10 +21,10 @@ struct job {
 
 static const struct cli_option options[] = {
 	{'f', "follow", NULL,
-	 "go on: a live view on a terminal, a line a second in a pipe;\n"
-	 "ends with the loop, or at SIGINT",
+	 "keep reporting: a live view on a terminal, one line per second in a\n"
+	 "pipe; ends with the loop, or at Ctrl-C",
 	 CLI_FLAG(struct job, follow)},
-	{0, "json", NULL, "report as one JSON object; with --follow one a second",
+	{0, "json", NULL, "report as one JSON object; with --follow one per second",
 	 CLI_FLAG(struct job, json)},
 	{0, "prometheus", NULL, "report in Prometheus' text format",
 	 CLI_FLAG(struct job, prometheus)},
@@ -34,15 +34,18 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "status",
 	.synopsis = "[NAME|FILE] [OPTIONS]",
-	.summary =
-		"Say what the haptic loops on this machine do, or did last: state and reason,\n"
-		"rate, how late ticks are, faults, force and energy. NAME is a scene's, FILE a\n"
-		"page that a loop tells its state in; without either all are shown.",
+	.summary = "Report what the haptic loops on this machine do, or did last: state "
+		   "and reason, rate,\n"
+		   "lateness of ticks, faults, force and energy. NAME is the name of a "
+		   "scene, FILE the status\n"
+		   "file of a loop; the default is all loops.",
 	.options = options,
-	.notes =
-		"Example:\n  incise status neck --follow\n\n"
-		"Exit: 0 runs, or stopped as asked; 1 in fault, dead, stalled or not there,\n"
-		"2 bad usage. See incise-status(1).",
+	.notes = "Example:\n"
+		 "  incise status neck --follow\n"
+		 "\n"
+		 "Exit: 0 runs, or stopped as requested; 1 in fault, dead, stalled or "
+		 "missing;\n"
+		 "2 bad usage. See incise-status(1).",
 };
 
 /* --- live ---------------------------------------------------------------------------- */
@@ -249,12 +252,13 @@ static const struct state_page_file *followed(const struct state_pages *pages)
 		if (incise_state_alive(pages->page[i].state) != 1)
 			continue;
 		if (one)
-			cli_fail("--follow: %s and %s run: name one", one->name,
-				 pages->page[i].name);
+			cli_fail("--follow: more than one loop runs, for example %s "
+				 "and %s; name one",
+				 one->name, pages->page[i].name);
 		one = &pages->page[i];
 	}
 	if (!one)
-		cli_fail("--follow: no loop runs here");
+		cli_fail("--follow: no loop runs here; 'incise haptic SCENE' starts one");
 	return one;
 }
 
@@ -266,9 +270,10 @@ int main(int argc, char **argv)
 
 	cli_parse(&command, argc, argv, &job);
 	if (argc - optind > 1)
-		cli_usage("'%s': one name or file at most", argv[optind + 1]);
+		cli_usage("unexpected argument '%s'; give one NAME or FILE at a time",
+			  argv[optind + 1]);
 	if (job.prometheus && (job.json || job.follow))
-		cli_usage("--prometheus stands alone: who collects asks again");
+		cli_usage("--prometheus cannot be combined with --follow or --json");
 	state_pages_open(&pages, argv[optind]);
 	if (job.follow)
 		well = state_follow(followed(&pages), job.json);

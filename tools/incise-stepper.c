@@ -37,20 +37,21 @@ struct subcommand {
 
 static const struct cli_option options[] = {
 	{CLI_RIG_OPTION(struct job, rig)},
-	{0, "axis", "N", "which of the rig's actuators, 1 to 3 (default: 1)",
+	{0, "axis", "N", "actuator of the rig, 1 to 3 (default: 1)",
 	 CLI_INTEGER(struct job, axis, 1, INCISE_RIG_AXES_MAX)},
-	{'f', "follow", NULL, "status: a line at each change, until Ctrl-C",
+	{'f', "follow", NULL, "status: print a line at each change, until Ctrl-C",
 	 CLI_FLAG(struct job, follow)},
-	{0, "by", NULL, "move: by MM from where it stands, not to MM",
+	{0, "by", NULL, "move: by MM from the present position, not to MM",
 	 CLI_FLAG(struct job, by)},
-	{0, "unhomed", NULL, "move: to MM of a count that is not the machine's",
+	{0, "unhomed", NULL, "move: also if not homed, to MM of the present count",
 	 CLI_FLAG(struct job, unhomed)},
 	{0, "hold", NULL, "move, home: stay powered afterwards, until Ctrl-C",
 	 CLI_FLAG(struct job, hold)},
 	{0, "duration", "TIME",
-	 "status --follow, enable, jog, --hold: end after this time, e.g. 2s",
+	 "status --follow, enable, jog, --hold: end after this time, for\n"
+	 "example 2s",
 	 CLI_DURATION(struct job, seconds, 0.001, 86400)},
-	{0, "repeat", "N", "home: N times, and say how well it repeats",
+	{0, "repeat", "N", "home N times, and report the repeatability",
 	 CLI_INTEGER(struct job, repeat, 1, 1000)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{0},
@@ -60,21 +61,24 @@ static const struct cli_command command = {
 	.name = "stepper",
 	.synopsis = "status | enable | disable | move MM | jog MM_S | home | clear "
 		    "[OPTIONS]",
-	.summary =
-		"Look at a rig's actuator, and move it by hand within its limits:\n"
-		"  status   state, position, inputs, faults and what to do about them\n"
-		"  enable   power it and hold it where it stands, until Ctrl-C\n"
-		"  disable  bring it to rest and take power away\n"
-		"  move MM  to a position such as 10 or 10mm, then disable\n"
-		"  jog MM_S at a speed such as -2 or -2mm/s until Ctrl-C, then disable\n"
-		"  home     find the machine's 0, then disable\n"
-		"  clear    forget faults whose cause is gone\n"
-		"Ctrl-C always ends with the motor at rest and without power. Not a safety\n"
-		"device: keep a hand on the emergency stop.",
+	.summary = "Show the state of a rig's actuator, and move it within its limits:\n"
+		   "  status   print state, position, inputs, faults and their remedies\n"
+		   "  enable   power it and hold its position, until Ctrl-C\n"
+		   "  disable  bring it to rest and switch power off\n"
+		   "  move MM  move to a position such as 10 or 10mm, then disable\n"
+		   "  jog MM_S move at a speed such as -2 or -2mm/s until Ctrl-C, then "
+		   "disable\n"
+		   "  home     find the zero position, then disable\n"
+		   "  clear    clear faults whose cause is gone\n"
+		   "Ctrl-C always ends with the motor at rest and without power. Not a "
+		   "safety\n"
+		   "device: keep a hand on the emergency stop.",
 	.options = options,
-	.notes = "Example:\n  incise stepper move 2mm --by\n\n"
-		 "Exit: 0 done, 1 failed, a fault, or stopped before it was done, 2 bad "
-		 "usage.\nSee incise-stepper(1).",
+	.notes = "Example:\n"
+		 "  incise stepper move 2mm --by\n"
+		 "\n"
+		 "Exit: 0 done, 1 failed, in fault, or stopped early, 2 bad usage. See "
+		 "incise-stepper(1).",
 };
 
 /* --- status, disable, clear ------------------------------------------------------------ */
@@ -183,7 +187,7 @@ static void run_clear(const struct job *job, struct stepper_drive *drive)
 			*strstr(text, ", then clear") = 0;
 		printf("%s: cleared; it was %s\n", drive->info.name, text);
 	} else
-		printf("%s: there was no fault\n", drive->info.name);
+		printf("%s: no fault to clear\n", drive->info.name);
 }
 
 /* --- enable, move, jog, home ----------------------------------------------------------- */
@@ -192,8 +196,8 @@ static void run_enable(const struct job *job, struct stepper_drive *drive)
 {
 	stepper_drive_power(drive);
 	if (!job->json) {
-		printf("powered, held at %.4f mm; Ctrl-C disables it, and so does the end of "
-		       "this program within %g ms\n",
+		printf("powered, held at %.4f mm; Ctrl-C disables it, and so does the "
+		       "end of this program, within %g ms\n",
 		       drive->status.position_mm, drive->info.deadman_s * 1e3);
 		fflush(stdout);
 	}
@@ -242,18 +246,17 @@ static double destination(const struct job *job, struct stepper_drive *drive)
 	else if (!drive->status.homed && !job->unhomed)
 		stepper_drive_fail(
 			drive,
-			"%s is not homed, so %g mm is no place of it: run `incise stepper "
-			"home`, or move --by, or with --unhomed",
+			"%s is not homed, so %g mm is not a known position; run "
+			"'incise stepper home', or add --by or --unhomed",
 			drive->info.name, mm);
 	if (mm < -slack_mm || mm > drive->info.travel_mm + slack_mm)
 		stepper_drive_fail(
 			drive,
-			"from %g mm to %g mm: that lies outside the travel of %s, "
-			"0 to %g mm%s",
+			"from %g mm to %g mm: out of the travel of %s, 0 to %g mm%s",
 			from_mm, mm, drive->info.name, drive->info.travel_mm,
-			drive->status.homed ? ""
-					    : "; its count is not the machine's: run "
-					      "`incise stepper home`");
+			drive->status.homed ? "; give a position within it"
+					    : "; it is not homed: run 'incise stepper "
+					      "home'");
 	return fmax(0, fmin(drive->info.travel_mm, mm));
 }
 
@@ -323,7 +326,9 @@ static void run_jog(const struct job *job, struct stepper_drive *drive)
 	bool ended;
 
 	if (fabs(mm_s) > drive->info.velocity_mm_s)
-		stepper_drive_fail(drive, "%g mm/s is faster than the %g mm/s of %s",
+		stepper_drive_fail(drive,
+				   "%g mm/s is faster than %g mm/s, the limit "
+				   "of %s; give a lower speed",
 				   mm_s, drive->info.velocity_mm_s, drive->info.name);
 	stepper_drive_power(drive);
 	begin = incise_clock_now(drive->clock);
@@ -337,10 +342,8 @@ static void run_jog(const struct job *job, struct stepper_drive *drive)
 	stepper_drive_rest(drive);
 	put_moved(job, drive, from_mm, seconds);
 	if (ended && !job->json)
-		printf("that is the end of the travel, 0 to %g mm%s\n",
-		       drive->info.travel_mm,
-		       drive->status.homed ? ""
-					   : " of a count that is not the machine's");
+		printf("end of the travel, 0 to %g mm%s\n", drive->info.travel_mm,
+		       drive->status.homed ? "" : " (not homed)");
 }
 
 /* Home edges as found; offsets in steps of the count after the first homing. */
@@ -365,10 +368,10 @@ static void put_unknown_edge(struct edges *edges, const struct job *job,
 		return;
 	cli_progress_end();
 	if (first)
-		printf("%s homes by itself and does not tell where the edge was in the count "
+		printf("%s homes by itself and does not report where the edge was "
 		       "before%s\n",
 		       drive->info.name,
-		       job->repeat > 1 ? ": how well it repeats is not known" : "");
+		       job->repeat > 1 ? ", so the repeatability is unknown" : "");
 	fflush(stdout);
 }
 
@@ -402,7 +405,8 @@ static void find_edge(struct edges *edges, const struct job *job,
 	if (job->json)
 		return;
 	cli_progress_end();
-	printf("home edge at step %lld, %.4f mm, of the count before; now at %.4f mm\n",
+	printf("home edge at step %lld, %.4f mm, of the previous count; now at %.4f "
+	       "mm\n",
 	       before, (double)before * info->step_mm, edge.after_mm);
 	fflush(stdout);
 }
@@ -486,25 +490,28 @@ static void check_options(const struct job *job)
 
 	for (size_t i = 0; i < sizeof(given) / sizeof(*given); i++)
 		if (given[i].given && !strchr(job->subcommand->takes, given[i].letter))
-			cli_usage("%s does not take --%s", job->subcommand->name,
+			cli_usage("--%2$s does not go with %1$s", job->subcommand->name,
 				  given[i].name);
 	if (job->by && job->unhomed)
-		cli_usage("--by needs no --unhomed: it goes from where it stands");
+		cli_usage("--unhomed is not needed with --by, which moves relative to "
+			  "the present position");
 	if (job->seconds && strchr(job->subcommand->takes, 'h') && !job->hold)
-		cli_usage("--duration is how long to hold it: add --hold");
+		cli_usage("--duration needs --hold: it is the time to hold the position");
 	if (job->seconds && job->subcommand->run == run_status && !job->follow)
-		cli_usage("--duration is how long to follow it: add --follow");
+		cli_usage("--duration needs --follow: it is the time to follow the "
+			  "status");
 }
 
 static const struct subcommand *subcommand_named(const char *name)
 {
+	const char *names[SUBCOMMANDS + 1] = {NULL};
+
 	for (size_t i = 0; i < SUBCOMMANDS; i++)
 		if (!strcmp(name, subcommands[i].name))
 			return &subcommands[i];
-	cli_usage(
-		"there is no command '%.40s': status, enable, disable, move, jog, home or "
-		"clear",
-		name);
+	for (size_t i = 0; i < SUBCOMMANDS; i++)
+		names[i] = subcommands[i].name;
+	cli_unknown("subcommand", name, names);
 }
 
 static void parse(struct job *job, int argc, char **argv)
@@ -516,14 +523,18 @@ static void parse(struct job *job, int argc, char **argv)
 	cli_parse(&command, argc, argv, job);
 	operands = argc - optind;
 	if (!operands)
-		cli_usage("which command: status, enable, disable, move, jog, home or "
-			  "clear?");
+		cli_usage("missing subcommand: status, enable, disable, move, jog, "
+			  "home or clear");
 	sub = job->subcommand = subcommand_named(argv[optind]);
-	if (sub->operand && operands != 2)
-		cli_usage("%s needs one %s, got %d", sub->name, sub->operand,
-			  operands - 1);
+	if (sub->operand && operands < 2)
+		cli_usage("%s: missing %s, for example 'incise stepper %s 2'", sub->name,
+			  sub->operand, sub->name);
+	if (sub->operand && operands > 2)
+		cli_usage("unexpected argument '%s'; %s takes one %s", argv[optind + 2],
+			  sub->name, sub->operand);
 	if (!sub->operand && operands != 1)
-		cli_usage("%s takes no '%s'", sub->name, argv[optind + 1]);
+		cli_usage("unexpected argument '%2$s'; %1$s takes none", sub->name,
+			  argv[optind + 1]);
 	if (sub->operand)
 		job->amount = cli_quantity(sub->operand, argv[optind + 1], sub->units,
 					   -MM_MAX, MM_MAX);

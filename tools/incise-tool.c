@@ -24,16 +24,21 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "tool",
 	.synopsis = "LOOP [blade|handle|tube|auto] [OPTIONS]",
-	.summary =
-		"Set the tool that the hand holds in a running haptic loop, or print it. The force\n"
-		"fades out before a tool in the tissue changes, and comes back with a ramp.",
+	.summary = "Set the tool in the hand of a running haptic loop, or print it. The "
+		   "force ramps to zero\n"
+		   "before a tool in the tissue changes, and ramps up afterwards.",
 	.options = options,
-	.notes =
-		"LOOP is the name of a scene, or the file of a state page, as for incise status.\n"
-		"auto is blade or handle by the scalpel's turn, and a tube with a station of its\n"
-		"own while it is nearer to the tissue.\n\n"
-		"Example:\n  incise tool neck tube\n\n"
-		"Exit: 0 the loop took it, 1 failed, 2 bad usage. See incise-tool(1).",
+	.notes = "LOOP is the name of a scene, or a status file, as for incise status. "
+		 "auto is blade or\n"
+		 "handle by the scalpel's turn, and a tube with a station of its own "
+		 "while it is nearer to\n"
+		 "the tissue.\n"
+		 "\n"
+		 "Example:\n"
+		 "  incise tool neck tube\n"
+		 "\n"
+		 "Exit: 0 the loop accepted it, 1 failed, 2 bad usage. See "
+		 "incise-tool(1).",
 };
 
 static void check_tool(const char *name)
@@ -60,25 +65,24 @@ static _Noreturn void fail_to_ask(int code)
 {
 	switch (code) {
 	case ENOENT:
-		cli_fail("%s: its loop has no control socket: %s is missing; start it "
-			 "again",
+		cli_fail("%s: its loop has no control socket: %s is missing; start the "
+			 "loop again",
 			 loop.name, loop.path);
 	case ECONNREFUSED:
-		cli_fail("%s: nobody listens at %s: its loop has just ended; start it "
-			 "again",
+		cli_fail("%s: no program listens at %s: its loop has just ended; start "
+			 "it again",
 			 loop.name, loop.path);
 	case EAGAIN:
-		cli_fail("%s: its loop does not answer", loop.name);
+		cli_fail("%s: its loop does not answer; try again", loop.name);
 	case ECONNRESET:
-		cli_fail(
-			"%s: its loop does not answer: it has ended, or too many programs "
-			"ask it at once",
-			loop.name);
+		cli_fail("%s: its loop does not answer: it has ended, or too many "
+			 "programs ask it at once; try again",
+			 loop.name);
 	case EACCES:
 	case EPERM:
-		cli_fail("%s: %s is for user %s, and in /run/incise for the group "
-			 "incise: run as one of them",
-			 loop.name, loop.path, loop.user);
+		cli_fail("%s: only user %s, or in /run/incise the group incise, may use "
+			 "%s; run as one of them",
+			 loop.name, loop.user, loop.path);
 	default:
 		cli_fail("%s: %s: %s", loop.name, loop.path, strerror(code));
 	}
@@ -96,7 +100,8 @@ static void ask(const char *request, char held[CONTROL_LINE], char wanted[CONTRO
 		cli_fail("%s: %s", loop.name, reply + strlen("error "));
 	/* Both arrays are as long as a reply. */
 	if (sscanf(reply, "ok held=%255[a-z] wanted=%255[a-z]", held, wanted) != 2)
-		cli_fail("%s: its loop answers '%s': it is of another version of incise",
+		cli_fail("%s: its loop answers '%s': it runs another version of "
+			 "incise; restart it",
 			 loop.name, reply);
 }
 
@@ -111,8 +116,8 @@ static void find_loop(struct state_pages *pages, const char *name)
 	loop.user = pages->page->user;
 	loop.path = control_path(pages->page->path);
 	if (!now->alive)
-		cli_fail("%s: no loop of that name runs; 'incise status %s' says how it "
-			 "ended",
+		cli_fail("%s: no loop of that name runs; 'incise status %s' shows how "
+			 "it ended",
 			 loop.name, name);
 	free(now);
 }
@@ -143,7 +148,7 @@ int main(int argc, char **argv)
 	cli_parse(&command, argc, argv, &job);
 	n = argc - optind;
 	if (n < 1)
-		cli_usage("missing NAME (loop, as 'incise status' lists it)");
+		cli_usage("missing LOOP (name, as 'incise status' lists it)");
 	if (n > 2)
 		cli_usage("unexpected argument '%s'; give a loop and a tool",
 			  argv[optind + 2]);

@@ -25,9 +25,9 @@ static void parse_size(void *whole, char *text)
 	    text[used] || job->output.width < 16 || job->output.height < 16 ||
 	    job->output.width > INCISE_VIEW_SIDE_MAX ||
 	    job->output.height > INCISE_VIEW_SIDE_MAX)
-		cli_usage(
-			"--size: '%s' is not a size such as 1280x720, sides from 16 to %d",
-			text, INCISE_VIEW_SIDE_MAX);
+		cli_usage("--size: expected a size such as 1280x720, sides from 16 to "
+			  "%d, found '%s'",
+			  INCISE_VIEW_SIDE_MAX, text);
 }
 
 static void parse_camera(void *whole, char *text)
@@ -36,8 +36,8 @@ static void parse_camera(void *whole, char *text)
 	char *items[3];
 
 	if (cli_list("viewpoint", text, items, 3) != 3)
-		cli_usage(
-			"--viewpoint: expected azimuth, elevation and distance, as 20,35,220");
+		cli_usage("--viewpoint: expected azimuth, elevation and distance, for "
+			  "example 20,35,220");
 	job->camera[0] = cli_number("viewpoint", items[0], -360, 360);
 	job->camera[1] = cli_number("viewpoint", items[1], -89, 89);
 	job->camera[2] = cli_number("viewpoint", items[2], 1, 1e5);
@@ -53,41 +53,48 @@ static void parse_times(void *whole, char *text)
 	for (int i = 0; i < job->output.n_strip; i++) {
 		job->output.strip_s[i] = cli_duration("at", items[i], 0, 86400);
 		if (i && !(job->output.strip_s[i] > job->output.strip_s[i - 1]))
-			cli_usage("--at: times go up");
+			cli_usage("--at: expected times in ascending order, for "
+				  "example 2s,6s,12s");
 	}
 }
 
 static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
-	 "run a loop here on this rig's tracker; sim:mouse is moved by the mouse",
+	 "run a loop here on this rig's tracker; sim:mouse follows the mouse",
 	 CLI_INPUT(struct view_job, rig)},
-	{0, "from", "NAME.rec", "show the loop on this recording",
+	{0, "from", "NAME.rec", "run the loop on this recording",
 	 CLI_INPUT(struct view_job, from)},
 	{0, "procedure", NULL,
 	 "show a scripted procedure: cut, bleeding, enlarging, tube",
 	 CLI_FLAG(struct view_job, procedure)},
-	{0, "frames", "DIR", "no window: a PNG file for each frame into this folder",
+	{0, "frames", "DIR",
+	 "no window: write a PNG file for each frame into this "
+	 "folder",
 	 CLI_OUTPUTS(struct view_job, output.folder)},
-	{0, "video", "FILE.mkv", "no window: a film",
+	{0, "video", "FILE.mkv", "no window: write a film (Matroska)",
 	 CLI_OUTPUT(struct view_job, output.film_path), .extensions = ".mkv"},
-	{0, "strip", "FILE.png", "no window: a few frames side by side",
+	{0, "strip", "FILE.png", "no window: write a few frames side by side",
 	 CLI_OUTPUT(struct view_job, output.strip_path), .extensions = ".png"},
-	{0, "no-output", NULL, "no window and no files: draw in real time, say how often",
+	{0, "no-output", NULL,
+	 "no window and no files: draw in real time and report "
+	 "the frame\n"
+	 "rate",
 	 CLI_FLAG(struct view_job, no_output)},
-	{0, "at", "TIMES", "of the strip, e.g. 2s,6s,12s,20s",
+	{0, "at", "TIMES", "times of the frames of --strip, for example 2s,6s,12s,20s",
 	 CLI_PARSED_BY(parse_times)},
-	{0, "size", "WxH", "pixels (default: 1280x720)", CLI_PARSED_BY(parse_size)},
+	{0, "size", "WxH", "width and height in pixels (default: 1280x720)",
+	 CLI_PARSED_BY(parse_size)},
 	{0, "fps", "N", "frames per second of files, 1 to 240 (default: 60)",
 	 CLI_INTEGER(struct view_job, output.fps, 1, 240)},
 	{0, "duration", "TIME", "end after this time",
 	 CLI_DURATION(struct view_job, duration_s, 0.01, 86400)},
 	{0, "viewpoint", "A,E,D", "azimuth and elevation in degrees, distance in mm",
 	 CLI_PARSED_BY(parse_camera)},
-	{0, "no-panel", NULL, "the tissue alone, without graphs",
+	{0, "no-panel", NULL, "draw the tissue without graphs",
 	 CLI_FLAG(struct view_job, no_panel)},
 	SCENE_ARGUMENT_OPTIONS(struct view_job, argument),
 	SESSION_OPTIONS(struct view_job, session),
-	{0, "json", NULL, "report what was drawn, as JSON, at the end",
+	{0, "json", NULL, "report the frames drawn as JSON, at the end",
 	 CLI_FLAG(struct view_job, json)},
 	{0},
 };
@@ -96,18 +103,21 @@ static const struct cli_command command = {
 	.name = "view",
 	.synopsis = "SCENE [OPTIONS]",
 	.summary =
-		"Show a scene: the tissue, its wound and blood, the instrument; beside it force,\n"
-		"depth and how the loop runs. Without an option the loop of this scene that runs\n"
-		"on this machine.",
+		"Show a scene: the tissue, its wound and blood, and the instrument; "
+		"next to it force, depth\n"
+		"and the state of the loop. The default is the loop of this scene that "
+		"runs on this machine.",
 	.options = options,
-	.notes =
-		"Keys: h shows all; left button presses, right turns the camera, the wheel comes\n"
-		"near; b blade, n handle, t tube, + and - the depth that is pressed, s keeps the\n"
-		"picture, q ends.\n\n"
-		"Examples:\n"
-		"  incise view neck --rig sim:mouse\n"
-		"  incise view neck --procedure --video neck.mkv\n\n"
-		"Exit: 0 done, 1 failed, 2 bad usage. See incise-view(1).",
+	.notes = "Keys: h lists all; left button presses, right button turns the "
+		 "camera, the wheel zooms;\n"
+		 "b blade, n handle, t tube, + and - the depth of a press, s saves the "
+		 "image, q ends.\n"
+		 "\n"
+		 "Examples:\n"
+		 "  incise view neck --rig sim:mouse\n"
+		 "  incise view neck --procedure --video neck.mkv\n"
+		 "\n"
+		 "Exit: 0 done, 1 failed, 2 bad usage. See incise-view(1).",
 };
 
 static void parse(struct view_job *job, int argc, char **argv)
@@ -118,19 +128,20 @@ static void parse(struct view_job *job, int argc, char **argv)
 	scene_argument_operand(&job->argument, argc, argv, optind);
 	session_options_check(&job->session);
 	if (!!job->rig + !!job->from + job->procedure > 1)
-		cli_usage(
-			"--rig, --from and --procedure are three sources: one at a time");
+		cli_usage("--rig, --from and --procedure exclude each other; give one of "
+			  "them");
 	if (job->output.strip_path && !job->output.n_strip)
-		cli_usage("--strip needs --at");
+		cli_usage("--strip needs --at (times of its frames)");
 	if (job->output.n_strip && !job->output.strip_path)
-		cli_usage("--at needs --strip");
+		cli_usage("--at needs --strip (file to write)");
 	if (job->no_output && view_output_wanted(&job->output))
-		cli_usage("--no-output writes no files");
+		cli_usage("--no-output does not go with --frames, --video or --strip");
 	if (job->output.film_path && (job->output.width % 2 || job->output.height % 2))
-		cli_usage("--video needs even sides");
+		cli_usage("--video needs an even width and height; change --size");
 	if (view_output_wanted(&job->output) && !job->from && !job->procedure &&
 	    !job->duration_s)
-		cli_usage("a loop that runs has no end: files need --duration");
+		cli_usage("missing --duration (a running loop has no end, but a file "
+			  "has)");
 }
 
 static void report(const struct view_job *job)

@@ -181,7 +181,7 @@ rig() { # ARGUMENTS
 	for json in "" --json; do
 		# shellcheck disable=SC2086
 		run --separate-stderr incise info bench:empty $json
-		failed_with "bench:empty: nobody answers" power "node id" "120 ohm"
+		failed_with "bench:empty: no answer" power "node id" "120 ohm"
 		[ -z "$output" ]
 		# shellcheck disable=SC2086
 		run --separate-stderr incise info bench:dead $json
@@ -307,12 +307,12 @@ rig() { # ARGUMENTS
 	rig sound
 	run -0 --separate-stderr incise stepper home
 	diff - <(echo "$output") <<-'END'
-		drive sound homes by itself and does not tell where the edge was in the count before
+		drive sound homes by itself and does not report where the edge was before
 		homed, at 0.0000 mm
 	END
 	run -0 --separate-stderr incise stepper home --repeat 3
 	diff - <(echo "$output") <<-'END'
-		drive sound homes by itself and does not tell where the edge was in the count before: how well it repeats is not known
+		drive sound homes by itself and does not report where the edge was before, so the repeatability is unknown
 		homed, at 0.0000 mm
 	END
 	incise stepper home --repeat 2 --json >h.json

@@ -206,7 +206,7 @@ until_it_runs() {
 	incise capture -o a.rec --rig $quick --duration 1s
 	before=$(sha256sum <a.rec/recording.db)
 	run --separate-stderr incise capture -o a.rec --rig $quick,cut_s=1 --trigger 100N --overwrite
-	failed_with "was never triggered; nothing was recorded, and nothing is replaced"
+	failed_with "it was never triggered; nothing was recorded, and nothing was replaced"
 	[ "$(sha256sum <a.rec/recording.db)" = "$before" ]
 	[ "$(ls)" = a.rec ]
 }

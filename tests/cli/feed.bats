@@ -92,11 +92,11 @@ setup() {
 	failed_with "it cannot run plans"
 	run --separate-stderr incise haptic wall --in-kernel --rig sim: --state "$PWD/wall.state"
 	[ "$status" -eq 1 ]
-	[[ "$stderr" == *"incise feed ended before it fed" ]]
+	[[ "$stderr" == *"incise feed ended before it sent a pose" ]]
 	run -2 --separate-stderr incise haptic wall --in-kernel --procedure
-	[[ "$stderr" == *"--procedure is on the simulated rig"* ]]
+	[[ "$stderr" == *"--procedure runs on the simulated rig"* ]]
 	run -2 --separate-stderr incise haptic wall --in-kernel --arith double
-	[[ "$stderr" == *"the kernel renders in integers"* ]]
+	[[ "$stderr" == *"the kernel computes in fixed point"* ]]
 	run --separate-stderr incise haptic wall --in-kernel --rig sim: --state none
-	failed_with "--in-kernel needs a state page"
+	failed_with "--in-kernel needs a status file"
 }

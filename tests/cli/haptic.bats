@@ -44,7 +44,7 @@ refuses() {
 @test "haptic runs a scene in simulated time" {
 	run -0 --separate-stderr incise haptic liver.scene --rig $quick --duration 3s
 	[ -z "$stderr" ]
-	[[ "${lines[0]}" == "3000 ticks at 1000 Hz, 0 skipped"* ]]
+	[[ "${lines[0]}" == "3000 ticks at 1000 Hz, 0 missed deadlines"* ]]
 	[[ "${lines[1]}" =~ ^stages\ +pose\ predict\ contact\ reaction\ start\ limit\ actuate$ ]]
 }
 

@@ -149,13 +149,13 @@ setup() {
 	cp -r a.rec/ b.rec
 	sqlite3 b.rec/recording.db "UPDATE tracker SET z_mm = z_mm + 1 WHERE seq = 100"
 	run --separate-stderr incise info b.rec
-	failed_with "b.rec: is not what was recorded: tracker: "
+	failed_with "b.rec: not as it was recorded: tracker: "
 	[[ "${lines[0]}" == "recording b.rec: "* ]]
 	run -1 --separate-stderr incise info b.rec --json
 	echo "$output" >r.json
 	[ "$(key r.json intact)" = 0 ]
 	run -0 --separate-stderr incise info b.rec --damaged
-	[[ "$stderr" == "incise info: warning: b.rec: is not what was recorded: tracker: "* ]]
+	[[ "$stderr" == "incise info: warning: b.rec: not as it was recorded: tracker: "* ]]
 	incise info a.rec --json >r.json
 	[ "$(key r.json intact)" = 1 ]
 }

@@ -25,14 +25,14 @@ setup() {
 	rig "mine:lost with switch"
 	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s
 	[ "$status" -eq 1 ]
-	[[ "${stderr_lines[-1]}" == "incise haptic: mine at lost with switch is not homed; run \`incise stepper home --rig rig.conf\`, or give --home" ]]
+	[[ "${stderr_lines[-1]}" == "incise haptic: mine at lost with switch is not homed; run 'incise stepper home --rig rig.conf', or give --home" ]]
 	# It has a switch, but no way to go there.
 	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s --home
 	[ "$status" -eq 1 ]
 	[[ "${stderr_lines[-1]}" == *"mine at lost with switch does not support being homed"* ]]
 	rig "mine:lost"
 	run -0 --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s
-	[[ "$stderr" == *"warning: mine at lost cannot be homed: its 0 is where it stands"* ]]
+	[[ "$stderr" == *"warning: mine at lost cannot be homed: its 0 is its present position"* ]]
 }
 
 @test "a fault of the actuator ends the loop with its name" {

@@ -98,7 +98,7 @@ ask() {
 	# samples are lost: it says so, and exits with 1
 	wait $capture || code=$?
 	[ "$code" = 1 ]
-	grep -q "tracker records were lost" err
+	grep -q "tracker samples were lost" err
 	# but for the line of each second
 	[ "$(grep -cv '^[0-9]* s: ' err)" = 1 ]
 	lost=$(ask a.rec "SELECT value FROM meta WHERE key='tracker_lost'")
@@ -120,7 +120,7 @@ ask() {
 	echo unplug >&9
 	wait $capture || code=$?
 	[ "$code" = 1 ]
-	grep -q "tracker records were lost" err
+	grep -q "tracker samples were lost" err
 	[ "$(ask a.rec "SELECT value FROM meta WHERE key='tracker_lost'")" -ge 60 ]
 }
 

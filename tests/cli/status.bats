@@ -58,8 +58,8 @@ until_ticks() {
 	[[ "$output" == *"scene      /scenes/other.scene"* ]]
 	[[ "$output" == *"reloads    1 done, 1 refused"* ]]
 	[[ "$output" == *"policy     SCHED_FIFO 80, CPU 1"* ]]
-	[[ "$output" == *"rate       1000 Hz asked, 1000.00 Hz in the mean"* ]]
-	[[ "$output" == *"ticks      1000, 3 skipped in 1 overrun"* ]]
+	[[ "$output" == *"rate       1000 Hz requested, 1000.00 Hz on average"* ]]
+	[[ "$output" == *"ticks      1000, 3 missed in 1 overrun"* ]]
 	# lateness was 1, 2 … 1000 us: buckets are 3.2 % wide
 	[[ "$output" == *"lateness   median 508, 99 % 999, 99.9 % 999, 99.99 % 1000, max 1000.0 us"* ]]
 	[[ "$output" == *"tick       median 5.00, "*" max 5.0 us"* ]]
@@ -67,7 +67,7 @@ until_ticks() {
 	[[ "$output" == *"force      2.000 N now, 2.000 N at most, limited in 100 ticks"* ]]
 	# 999 ways of 0.01 mm against 2 N
 	[[ "$output" == *"energy     19.98 mJ into the tissue, 0.00 mJ back"* ]]
-	[[ "$output" == *"thread     11 minor and 12 major page faults, 13 waits, 14 times put off"* ]]
+	[[ "$output" == *"thread     11 minor and 12 major page faults, 13 voluntary, 14 involuntary context switches"* ]]
 	# the same by the scene and by the file
 	run -0 incise status scenes/neck.scene
 	[[ "${lines[0]}" == "neck: stopped since "* ]]
@@ -83,7 +83,7 @@ until_ticks() {
 	run -0 --separate-stderr incise status neck
 	[ -z "$stderr" ]
 	[[ "${lines[0]}" == "neck: running since "*", process $played" ]]
-	[[ "$output" == *"1000 Hz asked, 1000.00 Hz now"* ]]
+	[[ "$output" == *"1000 Hz requested, 1000.00 Hz now"* ]]
 	# who is asked to stop says so
 	kill -TERM "$played"
 	wait "$played"
@@ -167,7 +167,7 @@ until_ticks() {
 	[ -z "$stderr" ]
 	[[ "${lines[1]}" == "page       $place/wall.state, of user $(id -un)" ]]
 	[ "$(stat -c %a "$place")" = 700 ]
-	grep -qF "the state page is $place/wall.state" err
+	grep -qF "the status file is $place/wall.state" err
 	incise status --json >report.json
 	[ "$(key report.json 'loops[0].user')" = "$(id -un)" ]
 	kill -TERM "$played"
@@ -178,7 +178,7 @@ until_ticks() {
 	failed_with "no loop of that name"
 	run -0 --separate-stderr incise haptic "$root/scenes/wall.scene" --rig sim: --no-rt \
 		--duration 100ms
-	[[ "$stderr" == *"there is no state page: $place is another user's, or others may write there"* ]]
+	[[ "$stderr" == *"no status file: $place belongs to another user, or others may write there"* ]]
 	# Nor a link to one.
 	mv "$place" real
 	chmod 700 real
@@ -191,7 +191,7 @@ until_ticks() {
 	play neck start
 	run -0 incise status neck
 	[[ "${lines[0]}" == "neck: starting since "* ]]
-	[[ "$output" == *"ticks      0, 0 skipped in 0 overruns"* ]]
+	[[ "$output" == *"ticks      0, 0 missed in 0 overruns"* ]]
 	incise status neck --json >report.json
 	[ "$(key report.json 'loops[0].mean_hz')" = "" ]
 	incise status neck --prometheus | "$root/tests/state/prometheus.py" >/dev/null
@@ -214,7 +214,7 @@ until_ticks() {
 	wait "$played" || true
 	run -1 --separate-stderr incise status neck
 	[ -z "$stderr" ]
-	[[ "${lines[0]}" == "neck: dead: process $played ended without a word; it was running since "* ]]
+	[[ "${lines[0]}" == "neck: dead: process $played exited without cleanup; it was running since "* ]]
 	incise status neck --json >report.json || true
 	[ "$(key report.json 'loops[0].state')" = dead ]
 	[ "$(key report.json 'loops[0].alive')" = 0 ]
@@ -403,7 +403,7 @@ until_lines() {
 		    assert len(rows) <= 7 and all(len(row) <= 40 for row in rows), rows
 		    assert rows[0].startswith('neck: running since'), rows
 		# what was last seen stays
-		assert '1000 Hz asked' in after
+		assert '1000 Hz requested' in after
 	PYTHON
 }
 
@@ -417,7 +417,7 @@ until_lines() {
 @test "a page that is no page, or of another release, is refused" {
 	echo "rate_hz = 1000.0;" >a.state
 	run --separate-stderr incise status a.state
-	failed_with "a.state: this is a scene, not the state page of a loop"
+	failed_with "a.state: this is a scene, not the status file of a loop"
 	echo nonsense >a.state
 	run --separate-stderr incise status a.state
 	failed_with "a.state: is no state of a loop"
@@ -428,16 +428,16 @@ until_lines() {
 	"$loop" incise/other.state done
 	truncate -s 1000 incise/other.state
 	run --separate-stderr incise status other
-	failed_with "was cut off"
+	failed_with "is damaged, or was cut off"
 }
 
 @test "status refuses bad usage" {
 	run --separate-stderr incise status a b
-	bad_usage "one name or file"
+	bad_usage "; give one NAME or FILE at a time"
 	run --separate-stderr incise status --prometheus --json
-	bad_usage "--prometheus stands alone"
+	bad_usage "--prometheus cannot be combined with --follow or --json"
 	run --separate-stderr incise status --prometheus --follow
-	bad_usage "--prometheus stands alone"
+	bad_usage "--prometheus cannot be combined with --follow or --json"
 }
 
 # Compiles what the manual says of the bytes, and reads a page by it and nothing else.

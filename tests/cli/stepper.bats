@@ -81,7 +81,7 @@ until_it_says() {
 	for way in 20.1 -1 -0.1mm "-1 --by" "20001um --by"; do
 		# shellcheck disable=SC2086
 		run --separate-stderr incise stepper move $way --rig $quick
-		failed_with "outside the travel" "0 to 20 mm"
+		failed_with "out of the travel" "0 to 20 mm"
 		[ -z "$output" ]
 	done
 }
@@ -106,14 +106,14 @@ until_it_says() {
 	run -0 --separate-stderr incise stepper disable --rig $quick
 	[[ "$output" == "simulated haptic scalpel: ready at 0.0000 mm, as it is always powered" ]]
 	run -0 --separate-stderr incise stepper clear --rig $quick
-	[ "$output" = "simulated haptic scalpel: there was no fault" ]
+	[ "$output" = "simulated haptic scalpel: no fault to clear" ]
 	incise stepper clear --rig $quick --json >c.json
 	[ "$(key c.json faults)" = '[]' ]
 }
 
 @test "what makes no sense on the virtual rig is said in a line" {
 	run --separate-stderr incise stepper jog -2 --rig $quick
-	failed_with "simulated haptic scalpel has no jog" "incise stepper move"
+	failed_with "simulated haptic scalpel cannot jog" "incise stepper move"
 	run --separate-stderr incise stepper home --rig $quick
 	failed_with "simulated haptic scalpel does not support being homed"
 	run --separate-stderr incise stepper jog 31mm/s --rig $quick
@@ -197,35 +197,35 @@ until_it_says() {
 
 @test "stepper: bad usage" {
 	run --separate-stderr incise stepper --rig $quick
-	bad_usage "which command"
+	bad_usage "missing subcommand"
 	run --separate-stderr incise stepper spin --rig $quick
-	bad_usage "no command 'spin'"
+	bad_usage "unknown subcommand 'spin'; expected status, enable"
 	run --separate-stderr incise stepper move --rig $quick
-	bad_usage "move needs one MM"
+	bad_usage "move: missing MM"
 	run --separate-stderr incise stepper move 1 2 --rig $quick
-	bad_usage "move needs one MM, got 2"
+	bad_usage "unexpected argument '2'; move takes one MM"
 	run --separate-stderr incise stepper status 3 --rig $quick
-	bad_usage "status takes no '3'"
+	bad_usage "unexpected argument '3'; status takes none"
 	for amount in 1x mm "" nan 1e9 -- 1mm/s; do
 		run --separate-stderr incise stepper move --rig $quick -- "$amount"
 		bad_usage ""
 	done
 	run --separate-stderr incise stepper jog 1mm --rig $quick
-	bad_usage "MM_S: '1mm'"
+	bad_usage "MM_S: expected a number, alone or with a unit"
 	run --separate-stderr incise stepper jog -x --rig $quick
 	bad_usage "-x"
 	for wrong in "status --by" "enable --hold" "move 1 --repeat 2" "home --unhomed" \
 		"clear --follow" "disable --duration 1s"; do
 		# shellcheck disable=SC2086
 		run --separate-stderr incise stepper $wrong --rig $quick
-		bad_usage "${wrong%% *} does not take --"
+		bad_usage " does not go with ${wrong%% *}"
 	done
 	run --separate-stderr incise stepper move 1 --duration 1s --rig $quick
-	bad_usage "add --hold"
+	bad_usage "--duration needs --hold"
 	run --separate-stderr incise stepper status --duration 1s --rig $quick
-	bad_usage "add --follow"
+	bad_usage "--duration needs --follow"
 	run --separate-stderr incise stepper move 1 --by --unhomed --rig $quick
-	bad_usage "--by needs no --unhomed"
+	bad_usage "--unhomed is not needed with --by"
 	run --separate-stderr incise stepper home --repeat 0 --rig $quick
 	bad_usage --repeat
 }
@@ -250,6 +250,6 @@ until_it_says() {
 	# it pushes both ways, and rests half way
 	[ "${lines[0]}" = "simulated haptic scalpel, across the blade: ready at 10.0000 mm (step 16000), homed" ]
 	run --separate-stderr incise stepper status --rig $quick,axes=2 --axis 3
-	failed_with "--axis 3: the rig has no such actuator"
+	failed_with "--axis 3: the rig has fewer actuators"
 	run -2 --separate-stderr incise stepper status --rig $quick --axis 4
 }

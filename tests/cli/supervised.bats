@@ -71,7 +71,7 @@ ended() {
 	[ "$(grep -oE 'READY=1|STOPPING=1' told | tr '\n' ' ')" = "READY=1 STOPPING=1 " ]
 	[ "$(key r.json stopped_by)" = Terminated ]
 	grep -q "^incise haptic: self-test: " err
-	grep -q "^incise haptic: Terminated: the force fades" err
+	grep -q "^incise haptic: Terminated: the force ramps to zero" err
 }
 
 @test "the watchdog is fed only while ticks come" {
@@ -98,7 +98,7 @@ ended() {
 	kill -HUP "$pid"
 	awaits RELOADING=1
 	awaits "READY=1$"
-	grep -q "liver.scene: read again and in force" err
+	grep -q "liver.scene: reloaded" err
 	echo "nonsense" >>liver.scene
 	: >told
 	kill -HUP "$pid"
@@ -107,8 +107,8 @@ ended() {
 	sed -i 's/rate_hz = [0-9.]*/rate_hz = 500.0/' liver.scene
 	: >told
 	kill -HUP "$pid"
-	awaits "not reloaded: liver.scene: rate_hz is 500, and the loop runs at 1000"
-	grep -q "warning: not reloaded, the scene before goes on: liver.scene:" err
+	awaits "not reloaded: liver.scene: rate_hz is 500, but the loop runs at 1000 Hz"
+	grep -q "warning: not reloaded, the previous scene continues: liver.scene:" err
 	incise status ./page --json >s.json
 	[ "$(key s.json 'loops[0].reloads')" = 1 ]
 	[ "$(key s.json 'loops[0].reloads_refused')" = 2 ]
@@ -126,7 +126,7 @@ ended() {
 	[ "$status" -eq 1 ]
 	[[ "$stderr" != *cleared* ]]
 	run -0 --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --recover -v --duration 0.1s
-	[[ "$stderr" == *"mine at left: cleared what was left behind"* ]]
+	[[ "$stderr" == *"mine at left: cleared the fault of an earlier program"* ]]
 	rig mine:latched
 	run --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --recover --duration 0.1s \
 		--state page
@@ -145,7 +145,7 @@ ended() {
 	[ "$status" -eq 1 ]
 	[[ "${stderr_lines[-1]}" == *"5 ticks in a row were a period late or more"*"too slow or too busy for 1000 Hz" ]]
 	# those, and what the host was late with before
-	overruns=$(sed -n 's/.* skipped in \([0-9]*\) overruns .*/\1/p' <<<"$output")
+	overruns=$(sed -n 's/.* missed deadlines in \([0-9]*\) overruns .*/\1/p' <<<"$output")
 	[ "$overruns" -ge 5 ]
 }
 
@@ -219,7 +219,7 @@ as_nobody() {
 		bad_usage "${wrong% *}"
 	done
 	run --separate-stderr incise haptic liver.scene --rig sim: --cpu 0 --no-rt --duration 0.1s
-	bad_usage "--no-rt: the loop's thread gets no CPU of its own"
+	bad_usage "--cpu does not go with --no-rt"
 	run --separate-stderr incise haptic liver.scene --rig sim: --cpu 1000 --duration 0.1s
 	[ "$status" -eq 1 ]
 }

@@ -100,7 +100,7 @@ packets() {
 
 @test "what is missing is said" {
 	run -1 --separate-stderr incise tool neck
-	[[ "$stderr" == "incise tool: neck: no loop of that name has run here: "* ]]
+	[[ "$stderr" == "incise tool: neck: no loop of that name has run here; "* ]]
 	serve liver.scene
 	run -1 --separate-stderr incise tool neck tube
 	[ "$stderr" = "incise tool: neck: the scene has only the blade: no insertion: tissue.insertion_N_mm and tissue.spread_N_mm are 0" ]
@@ -134,7 +134,7 @@ packets() {
 	as 65534 65534 test -r "$page" -a -x "$INCISE_BUILD/bin/incise-tool" ||
 		skip "others cannot reach the page or the program"
 	run -1 --separate-stderr as 65534 65534 incise-tool "$page" tube
-	[[ "$stderr" == *"is for user root, and in /run/incise for the group incise: "* ]]
+	[[ "$stderr" == *"only user root, or in /run/incise the group incise, may use "* ]]
 	ended
 	# In a folder that hands its group on, as /run/incise.
 	chgrp 65534 "$outside"
@@ -189,7 +189,7 @@ as() {
 @test "a file that is no socket is left alone, and the loop runs without" {
 	echo mine >"$control"
 	serve neck.scene
-	grep -q "warning: there is no control socket: $control: File exists" err
+	grep -q "warning: no control socket: $control: File exists" err
 	ended
 	[ "$(cat "$control")" = mine ]
 }
@@ -262,7 +262,7 @@ at_terminal() {
 
 @test "tool refuses bad usage" {
 	run -2 --separate-stderr incise tool
-	[[ "${stderr_lines[0]}" == "incise tool: missing NAME (loop, as 'incise status' lists it)" ]]
+	[[ "${stderr_lines[0]}" == "incise tool: missing LOOP (name, as 'incise status' lists it)" ]]
 	run -2 --separate-stderr incise tool neck spoon
 	[[ "${stderr_lines[0]}" == "incise tool: unknown tool 'spoon'; expected auto, blade, handle or tube" ]]
 	run -2 incise tool neck tube more

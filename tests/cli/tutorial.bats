@@ -40,7 +40,7 @@ setup() {
 	# mV/N, mm/px and ms of the simulated rig (incise/sim.h)
 	force_mV_N=$(sed -n 's/^force_mV_N *= *\([0-9.]*\);.*/\1/p' calibration.conf)
 	holds "$force_mV_N > 1240 - 5 && $force_mV_N < 1240 + 5"
-	grep -q "liver.rec: complete: all is there" out
+	grep -q "liver.rec: complete, and as it was written" out
 	grep -q "certified to 0\.0" out
 	grep -q "^liver: running since" seen
 	[ "$(awk -F, 'NR > 1' felt.csv | wc -l)" -gt 100000 ]

@@ -27,7 +27,7 @@ tampered() {
 	cp -r "$BATS_FILE_TMPDIR/good.rec" a.rec
 	ask a.rec "$sql"
 	run --separate-stderr incise verify a.rec
-	failed_with "a.rec: not what was recorded"
+	failed_with "a.rec: not as it was recorded"
 	for text; do
 		[[ "$output" == *"$text"* ]] || complain "$sql: no '$text' in: $output"
 	done
@@ -39,7 +39,7 @@ tampered() {
 	[ -z "$stderr" ]
 	[ "${lines[0]}" = "force    30000 expected, 30000 present, 0 lost, in 31 blocks" ]
 	[[ "${lines[1]}" == "tracker  "*" expected, "*" present, 0 lost, in 31 blocks" ]]
-	[ "${lines[2]}" = "a.rec: complete: all is there, as it was written" ]
+	[ "${lines[2]}" = "a.rec: complete, and as it was written" ]
 	[ "${#lines[@]}" -eq 3 ]
 	[ "$(sha256sum a.rec/recording.db)" = "$before" ]
 	[ "$(ls a.rec)" = recording.db ]
@@ -92,7 +92,7 @@ tampered() {
 	n=$(ask c.rec "SELECT count(*) FROM frames")
 	run -0 --separate-stderr incise verify c.rec
 	[[ "${lines[2]}" == "camera   $n expected, $n present, 0 lost, in "*" blocks" ]]
-	[ "${lines[3]}" = "         $n pictures as written, 0 missing, 0 altered, 0 that no row has" ]
+	[ "${lines[3]}" = "         $n frames as written, 0 missing, 0 altered, 0 without a row" ]
 	incise verify c.rec --json >report.json
 	[ "$(key report.json pictures.checked)" = 1 ]
 	[ "$(key report.json pictures.present)" = "$n" ]
@@ -104,13 +104,13 @@ tampered() {
 	printf '%b' "\\0$(printf %o $((byte ^ 1)))" |
 		dd of=d.rec/camera.mkv bs=1 seek=$((size / 2)) conv=notrunc 2>/dev/null
 	run --separate-stderr incise verify d.rec
-	failed_with "d.rec: not what was recorded"
+	failed_with "d.rec: not as it was recorded"
 	[[ "$output" == *"d.rec: camera: 1 altered in camera.mkv, number "*": its bytes are not as written"* ]] ||
 		complain "$output"
 
 	truncate -s $((size / 2)) d.rec/camera.mkv
 	run --separate-stderr incise verify d.rec
-	failed_with "d.rec: not what was recorded"
+	failed_with "d.rec: not as it was recorded"
 	[[ "$output" == *" missing in camera.mkv, numbers "* ]]
 
 	# its length is known: nothing behind its end, nothing less
@@ -118,19 +118,19 @@ tampered() {
 		cp c.rec/camera.mkv d.rec/camera.mkv
 		$change >>d.rec/camera.mkv
 		run --separate-stderr incise verify d.rec
-		failed_with "d.rec: not what was recorded"
+		failed_with "d.rec: not as it was recorded"
 		[[ "$output" == *"d.rec: camera.mkv has $(stat -c %s d.rec/camera.mkv) bytes of $size"* ]] ||
 			complain "$change: $output"
 	done
 	cp c.rec/camera.mkv d.rec/camera.mkv
 	truncate -s -1 d.rec/camera.mkv
 	run --separate-stderr incise verify d.rec
-	failed_with "d.rec: not what was recorded"
+	failed_with "d.rec: not as it was recorded"
 	[[ "$output" == *"d.rec: camera.mkv has $((size - 1)) bytes of $size"* ]]
 
 	rm d.rec/camera.mkv
 	run --separate-stderr incise verify d.rec
-	failed_with "d.rec: not what was recorded"
+	failed_with "d.rec: not as it was recorded"
 	[[ "$output" == *"camera.mkv is missing, and $n frames with it"* ]]
 }
 
@@ -172,7 +172,7 @@ tampered() {
 @test "verify of a page that went bad" {
 	dd if=/dev/urandom of=a.rec/recording.db bs=4096 seek=40 count=1 conv=notrunc 2>/dev/null
 	run --separate-stderr incise verify a.rec
-	failed_with "a.rec: not what was recorded"
+	failed_with "a.rec: not as it was recorded"
 	[[ "$output" == *"recording.db is damaged"* ]]
 }
 

@@ -72,7 +72,7 @@ teardown() {
 	failed_with wall.scene
 	run --separate-stderr incise view neck --procedure --strip n.png --overwrite --at 1s,9s --fps 10 --duration 2s $small
 	[ "$status" -eq 0 ]
-	[[ "$stderr" == *"ends before its picture 2, at 9 s"* ]]
+	[[ "$stderr" == *"the run ends before frame 2, at 9 s"* ]]
 }
 
 @test "a strip alone draws no frame but its own, and they are those of a film" {
@@ -201,7 +201,7 @@ begin_view() {
 	kill -9 $pid
 	wait $seen
 	[ "$(key v.session end.kind)" = fault ]
-	[ "$(key v.session end.why)" = "the loop ended without a word" ]
+	[ "$(key v.session end.why)" = "the loop exited without cleanup" ]
 	pid=
 }
 
@@ -273,7 +273,7 @@ begin_view() {
 	run --separate-stderr incise view neck --rig sim:clock=simulated --duration 1s --frames f
 	failed_with "simulated time"
 	run --separate-stderr env -u DISPLAY -u WAYLAND_DISPLAY SDL_VIDEODRIVER=x11 incise view neck --procedure
-	failed_with "without a screen give --frames"
+	failed_with "without a display give --frames"
 }
 
 # SDL has a driver that draws where nobody sees it, and takes it by itself.
@@ -284,7 +284,7 @@ begin_view() {
 		# shellcheck disable=SC2086
 		run --separate-stderr timeout 60 env -u DISPLAY -u WAYLAND_DISPLAY -u SDL_VIDEODRIVER \
 			XDG_RUNTIME_DIR="$PWD" incise view neck.scene $source $small
-		failed_with "no screen for a window" "without a screen give --frames" || complain "$source"
+		failed_with "no screen for a window" "without a display give --frames" || complain "$source"
 	done
 	# Who names that driver has asked for it.
 	run -0 --separate-stderr timeout 60 env -u DISPLAY -u WAYLAND_DISPLAY SDL_VIDEODRIVER=offscreen \

@@ -37,7 +37,7 @@ static const struct {
 	{"a session", ".session", "'incise assess %1$s' evaluates it"},
 	{"a JSON report", ".json",
 	 "'incise bench compare OLD.json NEW.json' compares reports of benchmarks"},
-	{"the state page of a loop", ".state", "'incise status %1$s' shows it"},
+	{"the status file of a loop", ".state", "'incise status %1$s' shows it"},
 	{"the standard deviation of a model (.sd)", ".sd",
 	 "give its model; 'incise eval MODEL.fis --sd' reads both"},
 	{"an image", NULL,

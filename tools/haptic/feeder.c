@@ -94,12 +94,13 @@ static int await(struct feeder *feeder, struct incise_error *err)
 		if (waitpid(feeder->pid, &status, WNOHANG) == feeder->pid) {
 			feeder->own = false;
 			return incise_error_set(err, ECHILD,
-						"incise feed ended before it fed");
+						"incise feed ended before it sent a "
+						"pose");
 		}
 		if (!looks--) {
 			feeder_end(feeder);
 			return incise_error_set(err, ETIME,
-						"incise feed does not feed after %d s",
+						"incise feed sent no pose within %d s",
 						START_MOST_S);
 		}
 		if (cli_stop) {
@@ -117,19 +118,17 @@ int feeder_begin(struct feeder *feeder, char **argv, struct incise_error *err)
 	int rc;
 
 	if (feeder_lives(feeder->page, &feeder->pid, &of)) {
-		cli_warn(
-			"incise feed runs already, process %d, of %s: it feeds on when this "
-			"program ends; `kill %d` ends it",
-			(int)feeder->pid, of, (int)feeder->pid);
+		cli_warn("incise feed already runs, process %d, with %s: it continues "
+			 "when this program ends; 'kill %d' ends it",
+			 (int)feeder->pid, of, (int)feeder->pid);
 		free(of);
 		return 0;
 	}
 	/* One of a service would end with it. */
 	if (getenv("NOTIFY_SOCKET"))
-		return incise_error_set(
-			err, ESRCH,
-			"a service starts no feeder: start incise-feed@.service "
-			"of that scene");
+		return incise_error_set(err, ESRCH,
+					"a service does not start incise feed; start "
+					"incise-feed@.service of that scene");
 	argv[0] = program();
 	feeder->pid = start(argv);
 	feeder->own = true;

@@ -48,7 +48,7 @@ static int recover_it(struct incise_stepper *stepper, const char *name,
 	rc = incise_stepper_clear(stepper, err);
 	if (rc)
 		return rc;
-	cli_note("%s: cleared what was left behind (%s)", name, cause);
+	cli_note("%s: cleared the fault of an earlier program (%s)", name, cause);
 	rc = incise_stepper_status(stepper, status);
 	/* Where clearing is enough, what is latched is no error. */
 	return rc == -EIO ? 0 : rc;
@@ -83,13 +83,13 @@ static int make_ready(struct incise_rig *rig, int axis, bool home, bool recover,
 		if (info.can_home)
 			return incise_error_set(
 				err, EPERM,
-				"%s is not homed; run `incise stepper home --rig %s%s`, or "
-				"give --home",
+				"%s is not homed; run 'incise stepper home --rig "
+				"%s%s', or give --home",
 				info.name, incise_rig_spec(rig),
 				axis == 0   ? ""
 				: axis == 1 ? " --axis 2"
 					    : " --axis 3");
-		cli_warn("%s cannot be homed: its 0 is where it stands", info.name);
+		cli_warn("%s cannot be homed: its 0 is its present position", info.name);
 	}
 	return !status.homed && home ? home_it(stepper, err) : 0;
 }

@@ -47,15 +47,13 @@ static char *state_path(const char *scene)
 		path = cli_text("%s/%s.state", list[i], name);
 	/* Of the same folder for the feeder's page it was said already. */
 	if (i == STATE_FOLDER_TEMPORARY && !warned)
-		cli_warn(
-			"there is no %s and no XDG_RUNTIME_DIR: the state page is %s, which "
-			"`incise status` of this user finds",
-			list[STATE_FOLDER_SYSTEM], path);
+		cli_warn("there is no %s and no XDG_RUNTIME_DIR: the status file is %s, "
+			 "which 'incise status' finds for this user only",
+			 list[STATE_FOLDER_SYSTEM], path);
 	else if (i < 0)
-		cli_warn(
-			"there is no state page: %s is another user's, or others may write "
-			"there; give --state FILE",
-			list[STATE_FOLDER_TEMPORARY]);
+		cli_warn("no status file: %s belongs to another user, or others may "
+			 "write there; give --state FILE",
+			 list[STATE_FOLDER_TEMPORARY]);
 	warned = true;
 	state_folders_free(list);
 	free(name);
@@ -109,13 +107,13 @@ static void enter_real_time(struct haptic_job *job)
 
 	haptic->scheduling = "SCHED_OTHER";
 	if (job->no_rt) {
-		cli_note("without real time, as asked: ticks may be late");
+		cli_note("normal scheduling (--no-rt): ticks may be late");
 		return;
 	}
 	job->realtime.period_ns = llrint(INCISE_NS_PER_S / haptic->loop.rate_hz);
 	haptic->realtime = incise_realtime_new(&job->realtime, &err);
 	if (!haptic->realtime)
-		cli_fail("%s; or give --no-rt to run without", err.text);
+		cli_fail("%s; or give --no-rt for normal scheduling", err.text);
 	if (job->realtime.policy == INCISE_REALTIME_DEADLINE)
 		haptic->scheduling = "SCHED_DEADLINE";
 	else
@@ -176,9 +174,8 @@ static void begin_feeder(struct haptic_job *job)
 				: state_path(haptic->argument.path);
 
 	if (!page || !strcmp(page, "none"))
-		cli_fail(
-			"--in-kernel needs a state page, by which it finds the feeder: give "
-			"--state FILE");
+		cli_fail("--in-kernel needs a status file, to find incise feed by; give "
+			 "--state FILE");
 	haptic->feeder.page = feeds_at(page);
 	own_feeder = &haptic->feeder;
 	atexit(end_own_feeder);
@@ -188,7 +185,7 @@ static void begin_feeder(struct haptic_job *job)
 		cli_fail("%s: %s", haptic->argument.path, err.text);
 	if (!haptic->feeder.own && haptic->tool != INCISE_TOOL_AUTO &&
 	    feeder_tool(&haptic->feeder, loop_tool_names[haptic->tool], &err))
-		cli_warn("the tool stays as it is: %s", err.text);
+		cli_warn("the tool is unchanged: %s", err.text);
 }
 
 static void watch(struct haptic_job *job)
@@ -213,10 +210,9 @@ static void test_scene(struct haptic *haptic)
 
 	if (haptic_self_test(haptic->scene, incise_rig_tracker(haptic->rig), &test, &err))
 		cli_fail_with(&err);
-	cli_note(
-		"self-test: %u ticks in the tissue, at most %.3f N; no force %.0f ms after the "
-		"last pose (at most %.0f)",
-		test.contact, test.force_max_N, test.silent_ms, test.silent_max_ms);
+	cli_note("self-test: %u ticks in the tissue, at most %.3f N; force 0 within "
+		 "%.0f ms of the last pose (limit %.0f)",
+		 test.contact, test.force_max_N, test.silent_ms, test.silent_max_ms);
 }
 
 /* Everything but power: scene, real time, devices, plan, self-test. */
@@ -341,8 +337,8 @@ static void make_log(double duration_s, struct incise_loop_options *loop)
 	if (ticks <= most)
 		loop->log = calloc((size_t)ticks, sizeof(*loop->log));
 	if (!loop->log)
-		cli_fail("--log: no memory for %.0f ticks; a --duration of up to %.0f s "
-			 "fits in half of it",
+		cli_fail("--log: not enough memory for %.0f ticks; give a --duration "
+			 "of up to %.0f s, which takes half of it",
 			 ticks, floor(most / loop->rate_hz));
 	loop->log_size = (size_t)ticks;
 	/* Touch the pages now: a page fault in the loop is a late tick. */
@@ -461,8 +457,8 @@ static void kernel_line(const struct haptic *haptic)
 		return;
 	incise_plan_rendered(haptic->plan, &r);
 	reasons_text(r.reasons, reasons, sizeof(reasons));
-	printf("kernel     %s; %llu ticks, %llu missed; %llu poses, %llu refused; force was "
-	       "taken away by: %s\n",
+	printf("kernel     %s; %llu ticks, %llu missed; %llu poses, %llu refused; "
+	       "force switched off by: %s\n",
 	       incise_stepper_plan_state_name(r.state), (unsigned long long)r.ticks,
 	       (unsigned long long)r.missed, (unsigned long long)r.poses,
 	       (unsigned long long)r.refused, reasons);
@@ -519,7 +515,8 @@ static void report_text(const struct haptic *haptic)
 	double rms_N = render_error(haptic);
 	char a[32], b[32], flags[1000];
 
-	printf("%llu ticks at %g Hz, %llu skipped in %llu overruns (%s)\nstages    ",
+	printf("%llu ticks at %g Hz, %llu missed deadlines in %llu overruns (%s)\n"
+	       "stages    ",
 	       (unsigned long long)s->ticks, haptic->loop.rate_hz,
 	       (unsigned long long)s->skipped, (unsigned long long)s->overruns,
 	       haptic->scheduling);
@@ -533,7 +530,8 @@ static void report_text(const struct haptic *haptic)
 		       loop_below(a, sizeof(a), loop_quantile(s->tick_100ns, 0.5, 0.1)),
 		       loop_below(b, sizeof(b), loop_quantile(s->tick_100ns, 0.999, 0.1)),
 		       s->tick_max_ns * 1e-3);
-		printf("thread     %llu page faults, %llu times another had its CPU\n",
+		printf("thread     %llu page faults, %llu involuntary context "
+		       "switches\n",
 		       (unsigned long long)(haptic->counts.minor_faults +
 					    haptic->counts.major_faults),
 		       (unsigned long long)haptic->counts.involuntary);
@@ -543,16 +541,17 @@ static void report_text(const struct haptic *haptic)
 		printf(", actuator off by %.4f N rms", rms_N);
 	if (stepper)
 		felt_line(haptic);
-	printf("\nticks      %llu in contact, %llu outside the model's support, %llu without a "
-	       "fresh pose, %llu limited\n",
+	printf("\n"
+	       "ticks      %llu in contact, %llu out of the training range, %llu "
+	       "without a fresh pose, %llu limited\n",
 	       (unsigned long long)ticks_with(s, INCISE_TICK_CONTACT),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_EXTRAPOLATED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_STALE),
 	       (unsigned long long)s->limited);
 	if (incise_pose_counts_text(&s->poses, flags, sizeof(flags)))
 		printf("poses      %s\n", flags);
-	printf("held       %llu at the largest force, %llu at the largest slew, %llu at the end "
-	       "of the travel, %llu starting or fading\n",
+	printf("saturated  %llu at the largest force, %llu at the largest slew, %llu "
+	       "at the end of the travel, %llu in a ramp\n",
 	       (unsigned long long)ticks_with(s, INCISE_TICK_CLAMPED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_SLEWED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_TRAVEL),
@@ -653,8 +652,8 @@ int haptic_run(struct haptic_job *job)
 			  &log_err);
 	end_session(haptic, rc, &err, &session_err);
 	if (ticks_with(&stats, INCISE_TICK_FULL))
-		cli_warn("the blade left no cut in %llu ticks: as many as "
-			 "tissue.cuts_most were there; raise it",
+		cli_warn("the blade left no cut in %llu ticks: the scene has "
+			 "tissue.cuts_most cuts already; raise it",
 			 (unsigned long long)ticks_with(&stats, INCISE_TICK_FULL));
 	if (job->json) {
 		report_json(haptic);

@@ -25,22 +25,23 @@ struct haptic_job {
 };
 
 /* Rows of the tables of options that both commands have. */
-#define HAPTIC_TIP_OPTION                                                              \
-	{                                                                              \
-		'c', "calibration", "FILE",                                            \
-			"calibration.conf, for where the tip is (default: where the\n" \
-			"tracker takes it to be)",                                     \
-			CLI_INPUT(struct haptic_job, calibration)                      \
+#define HAPTIC_TIP_OPTION                                                                     \
+	{                                                                                     \
+		'c', "calibration", "FILE",                                                   \
+			"calibration.conf with the position of the tip (default: where the\n" \
+			"tracker reports it)",                                                \
+			CLI_INPUT(struct haptic_job, calibration)                             \
 	}
-#define HAPTIC_HOLD_OPTIONS                                                                 \
-	{0, "duration", "TIME", "stop after this time, e.g. 10s (default: at SIGINT)",      \
-	 CLI_DURATION(struct haptic_job, duration, 0.01, 86400)},                           \
-		{0, "home", NULL, "find each actuator's 0 first, unless it is known",       \
-		 CLI_FLAG(struct haptic_job, home)},                                        \
-	{                                                                                   \
-		0, "recover", NULL,                                                         \
-			"clear first what a program that died left latched in an actuator", \
-			CLI_FLAG(struct haptic_job, recover)                                \
+#define HAPTIC_HOLD_OPTIONS                                                       \
+	{0, "duration", "TIME",                                                   \
+	 "stop after this time, for example 10s (default: at Ctrl-C)",            \
+	 CLI_DURATION(struct haptic_job, duration, 0.01, 86400)},                 \
+		{0, "home", NULL, "home each actuator first, unless it is homed", \
+		 CLI_FLAG(struct haptic_job, home)},                              \
+	{                                                                         \
+		0, "recover", NULL,                                               \
+			"first clear faults that a crashed program left latched", \
+			CLI_FLAG(struct haptic_job, recover)                      \
 	}
 
 /* Run it; the command line was parsed before, and incise_realtime_prepare() called. Returns the exit

@@ -44,8 +44,8 @@ static int run_tick(struct trajectory *trajectory, bool fed, struct self_test *t
 	if (tick.flags & INCISE_TICK_NOT_FINITE || !isfinite(trajectory->force_N))
 		return incise_error_set(
 			err, EPROTO,
-			"self-test: %g mm deep at %g mm/s the force is no number; see the "
-			"scene's model",
+			"self-test: at a depth of %g mm and %g mm/s the force is not a "
+			"number; check the scene's model with incise eval",
 			tick.depth_mm, tick.velocity_mm_s);
 	test->contact += !!(tick.flags & INCISE_TICK_CONTACT);
 	test->force_max_N = fmax(test->force_max_N, trajectory->force_N);
@@ -64,8 +64,8 @@ static int run(struct trajectory *trajectory, double force_N, struct self_test *
 		return rc;
 	if (!test->contact)
 		return incise_error_set(err, EPROTO,
-					"self-test: a stroke over the scene's top met no "
-					"tissue; see its surface");
+					"self-test: a stroke over the top of the scene "
+					"met no tissue; check the scene's surface");
 	if (test->force_max_N > force_N)
 		return incise_error_set(
 			err, EPROTO, "self-test: a force of %g N, above limits.force_N",

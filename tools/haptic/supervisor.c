@@ -248,21 +248,21 @@ static int prepare_next(struct supervisor *s, struct incise_error *err)
 	if (haptic->session || haptic->loop.ticked)
 		return incise_error_set(
 			err, EBUSY,
-			"--session and --procedure are of one scene: end it, "
-			"and start another with the scene as it is now");
+			"--session and --procedure keep their scene; end this run, and "
+			"start another with the changed scene");
 	if (haptic->mode != HAPTIC_LOOP)
 		return incise_error_set(
 			err, EBUSY,
-			"the kernel keeps its plan for as long as its actuators "
-			"have power: end incise feed, and start it again");
+			"the kernel keeps its plan while its actuators have power; end "
+			"incise feed, and start it again");
 	s->next_scene = scene_argument_read(&haptic->argument, err);
 	if (!s->next_scene)
 		return -errno;
 	rate_hz = incise_scene_rate_hz(s->next_scene);
 	if (rate_hz != haptic->loop.rate_hz)
 		return incise_error_set(err, EINVAL,
-					"%s: rate_hz is %g, and the loop runs at %g: "
-					"restart it",
+					"%s: rate_hz is %g, but the loop runs at %g "
+					"Hz; restart it",
 					haptic->argument.path, rate_hz,
 					haptic->loop.rate_hz);
 	rc = haptic_self_test(s->next_scene, incise_rig_tracker(haptic->rig), &test, err);
@@ -293,7 +293,7 @@ static void start_reload(struct supervisor *s)
 	free_next(s);
 	incise_state_run(s->haptic->state, INCISE_RUN_RUNNING, "");
 	incise_state_refused(s->haptic->state, err.text);
-	cli_warn("not reloaded, the scene before goes on: %s", err.text);
+	cli_warn("not reloaded, the previous scene continues: %s", err.text);
 	snprintf(s->refused, sizeof(s->refused), "; not reloaded: %s", err.text);
 	notify_send("READY=1");
 }
@@ -314,7 +314,7 @@ static void end_reload(struct supervisor *s)
 	incise_state_scene(haptic->state, haptic->argument.path, haptic->plan);
 	incise_state_run(s->haptic->state, INCISE_RUN_RUNNING, "");
 	s->refused[0] = 0;
-	cli_note("%s: read again and in force", haptic->argument.path);
+	cli_note("%s: reloaded", haptic->argument.path);
 	notify_send("READY=1");
 }
 
@@ -402,7 +402,7 @@ static void miss_foot(struct supervisor *s, const char *why)
 	incise_foot_switch_close(s->foot);
 	s->foot = NULL;
 	if (!s->foot_missed)
-		cli_warn("there is no foot switch until it is back: %s", why);
+		cli_warn("foot switch disconnected: %s", why);
 	s->foot_missed = true;
 }
 
@@ -454,7 +454,7 @@ static void report_flag(struct supervisor *s, char flag)
 			 flag > ' ' && flag <= '~' ? flag : '?', incise_pose_flag(flag),
 			 incise_pose_usable(flag)
 				 ? "they are used"
-				 : "they are not used, and the force fades");
+				 : "they are not used, and the force ramps to zero");
 	*reported = true;
 }
 
@@ -474,16 +474,17 @@ static void handle_events(struct supervisor *s)
 				s->stale = true;
 				/* At the start the first pose is still to come. */
 				if (events[i].tick)
-					cli_note("no fresh pose: the force fades");
+					cli_note("no fresh pose: the force ramps to "
+						 "zero");
 				break;
 			case INCISE_LOOP_FRESH:
 				s->stale = false;
 				if (events[i].value > 100)
-					cli_note("poses again, after %.0f ms",
+					cli_note("poses arrive again, after %.0f ms",
 						 events[i].value);
 				break;
 			case INCISE_LOOP_NOT_FINITE:
-				cli_warn("the force was no number: none was asked for");
+				cli_warn("the force was not a number: 0 was commanded");
 				break;
 			case INCISE_LOOP_FLAGGED:
 				report_flag(s, (char)events[i].value);
@@ -526,12 +527,12 @@ static void report(struct supervisor *s, uint64_t ticks, int64_t now_ns)
 	s->overruns_all += s->overruns;
 	s->skipped_all += s->skipped;
 	if (s->overruns)
-		cli_note("%llu overruns, %llu ticks skipped",
+		cli_note("%llu overruns, %llu ticks missed",
 			 (unsigned long long)s->overruns, (unsigned long long)s->skipped);
 	s->overruns = s->skipped = 0;
 	if (s->tid && !incise_realtime_count(s->tid, &counts))
 		incise_state_counts(haptic->state, &counts);
-	snprintf(text, sizeof(text), "%.0f of %g Hz, %llu overruns, %llu ticks skipped%s",
+	snprintf(text, sizeof(text), "%.0f of %g Hz, %llu overruns, %llu ticks missed%s",
 		 rate_hz, haptic->loop.rate_hz, (unsigned long long)s->overruns_all,
 		 (unsigned long long)s->skipped_all, s->stale ? ", no fresh pose" : "");
 	notify_send("STATUS=%s%s", text, s->refused);
@@ -567,8 +568,9 @@ static void look(struct supervisor *s)
 		s->keys = false;
 		incise_state_run(s->haptic->state, INCISE_RUN_STOPPING,
 				 strsignal(cli_stop));
-		notify_send("STOPPING=1\nSTATUS=the force fades");
-		cli_note("%s: the force fades", strsignal(cli_stop));
+		notify_send("STOPPING=1\n"
+			    "STATUS=the force ramps to zero");
+		cli_note("%s: the force ramps to zero", strsignal(cli_stop));
 	}
 	look_for_foot(s, now_ns);
 	end_reload(s);
@@ -636,7 +638,7 @@ static void open_orders(struct supervisor *s)
 		return;
 	s->control = control_new(s->haptic->page, &err);
 	if (!s->control)
-		cli_warn("there is no control socket: %s", err.text);
+		cli_warn("no control socket: %s", err.text);
 }
 
 static void close_orders(struct supervisor *s)
@@ -685,7 +687,7 @@ int haptic_supervise(struct haptic *haptic, struct incise_error *err)
 
 	haptic->loop.control = incise_loop_control_new();
 	if (!haptic->loop.control || !s.time || s.ended_fd < 0 || keep_ticks(haptic)) {
-		rc = incise_error_set(err, errno, "the loop cannot be looked after: %s",
+		rc = incise_error_set(err, errno, "the loop cannot be supervised: %s",
 				      strerror(errno));
 	} else {
 		s.report_ns = incise_clock_now(s.time) + REPORT_NS;

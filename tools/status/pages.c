@@ -102,10 +102,11 @@ static void open_all(struct state_pages *pages, char *list[STATE_FOLDERS])
 		if (state_folder_trusted(list, i))
 			bad += add_folder(pages, list[i]);
 	if (!pages->n && bad)
-		cli_fail("no state of a loop can be read here");
+		cli_fail("no status file of a loop can be read here; see whether they "
+			 "belong to another user");
 	if (!pages->n)
-		cli_fail("no loop has run here: 'incise haptic SCENE' starts one, or the "
-			 "service 'systemctl start incise-haptic@NAME'");
+		cli_fail("no loop has run here; 'incise haptic SCENE' starts one, or "
+			 "'systemctl start incise-haptic@NAME' the service");
 	qsort(pages->page, (size_t)pages->n, sizeof(*pages->page), by_name);
 }
 
@@ -135,10 +136,9 @@ static void open_name(struct state_pages *pages, const char *name,
 	if (!pages->n && found)
 		cli_fail_with(&err);
 	if (!pages->n)
-		cli_fail(
-			"%s: no loop of that name has run here: 'incise haptic %s' starts "
-			"one; 'incise status' shows all",
-			name, name);
+		cli_fail("%s: no loop of that name has run here; 'incise haptic %s' "
+			 "starts one, 'incise status' shows all",
+			 name, name);
 }
 
 void state_pages_open(struct state_pages *pages, const char *asked)
@@ -183,13 +183,13 @@ int state_pages_try(const struct state_page_file *page, struct incise_state_now 
 	if (rc == -EAGAIN)
 		return incise_error_set(
 			err, EAGAIN,
-			"%s: is not whole: its loop stands still in the middle of "
-			"writing it, or its disk is full",
+			"%s: incomplete: its loop stopped in the middle of writing it, "
+			"or the disk is full; start the loop again",
 			page->path);
 	if (rc)
-		return incise_error_set(
-			err, EIO, "%s: is damaged, or was cut off: start the loop again",
-			page->path);
+		return incise_error_set(err, EIO,
+					"%s: damaged or incomplete; start the loop again",
+					page->path);
 	return 0;
 }
 

@@ -114,8 +114,8 @@ static void headline(FILE *out, const struct state_look *look)
 	put_time(when, sizeof(when), state_unix_s(now, now->since_ns));
 	if (!strcmp(word, "dead"))
 		fprintf(out,
-			"%s: dead: process %" PRId64 " ended without a word; it was %s "
-			"since %s\n",
+			"%s: dead: process %" PRId64 " exited without cleanup; it was "
+			"%s since %s\n",
 			look->name, now->pid, incise_run_name(now->run), when);
 	else if (now->alive)
 		fprintf(out, "%s: %s%s since %s (%s), process %" PRId64 "\n", look->name,
@@ -128,7 +128,8 @@ static void headline(FILE *out, const struct state_look *look)
 	if (*now->reason)
 		fprintf(out, "reason     %s\n", now->reason);
 	if (now->torn)
-		fputs("torn       it ended while it told its state: some is older\n",
+		fputs("torn       it ended while it wrote its state: some values are "
+		      "older\n",
 		      out);
 }
 
@@ -191,14 +192,13 @@ static void ticks(FILE *out, const struct state_look *look)
 {
 	const struct incise_state_now *now = look->now;
 
-	fprintf(out, "rate       %g Hz asked", now->rate_hz);
+	fprintf(out, "rate       %g Hz requested", now->rate_hz);
 	if (isfinite(look->measured_hz))
 		fprintf(out, ", %.2f Hz now", look->measured_hz);
 	if (isfinite(mean_hz(now)))
-		fprintf(out, ", %.2f Hz in the mean", mean_hz(now));
+		fprintf(out, ", %.2f Hz on average", mean_hz(now));
 	fprintf(out,
-		"\nticks      %" PRIu64 ", %" PRIu64 " skipped in %" PRIu64
-		" overrun%s\n",
+		"\nticks      %" PRIu64 ", %" PRIu64 " missed in %" PRIu64 " overrun%s\n",
 		now->ticks, now->skipped, now->overruns, now->overruns == 1 ? "" : "s");
 	if (!now->ticks)
 		return;
@@ -223,7 +223,7 @@ void state_report_text(FILE *out, const struct state_look *look)
 	ticks(out, look);
 	fprintf(out,
 		"thread     %" PRIu64 " minor and %" PRIu64 " major page faults, %" PRIu64
-		" waits, %" PRIu64 " times put off\n",
+		" voluntary, %" PRIu64 " involuntary context switches\n",
 		now->minor_faults, now->major_faults, now->voluntary, now->involuntary);
 }
 

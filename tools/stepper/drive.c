@@ -28,8 +28,7 @@ void stepper_drive_open(struct stepper_drive *drive, const char *rig, int axis,
 	drive->clock = incise_rig_clock(drive->rig);
 	drive->stepper = incise_rig_axis(drive->rig, axis - 1, NULL);
 	if (!drive->stepper)
-		stepper_drive_fail(drive, "--axis %d: the rig has no such actuator",
-				   axis);
+		stepper_drive_fail(drive, "--axis %d: the rig has fewer actuators", axis);
 	incise_stepper_info(drive->stepper, &drive->info);
 	drive->period_ns = (int64_t)fmax(
 		LEAST_PERIOD_NS, fmin(PERIOD_NS, drive->info.deadman_s * INCISE_NS_PER_S /
@@ -119,7 +118,7 @@ static _Noreturn void fail_with_fault(struct stepper_drive *drive)
 			   drive->status.position_mm,
 			   faults ? stepper_why(drive->stepper, faults, text,
 						sizeof(text))
-				  : "power was taken away; try again");
+				  : "power was switched off; try again");
 }
 
 void stepper_drive_rest(struct stepper_drive *drive)
@@ -155,9 +154,8 @@ static void follow(struct stepper_drive *drive, int rc)
 	int64_t now = incise_clock_now(drive->clock);
 
 	if (rc == -EOPNOTSUPP)
-		stepper_drive_fail(
-			drive, "%s has no jog; give it positions: incise stepper move",
-			drive->info.name);
+		stepper_drive_fail(drive, "%s cannot jog; use incise stepper move",
+				   drive->info.name);
 	if (rc && rc != -EIO)
 		stepper_drive_fail(drive, "%s: %s", drive->info.name, strerror(-rc));
 	if (rc)

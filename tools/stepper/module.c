@@ -175,9 +175,9 @@ static void read_debugfs(struct controller *controller)
 				  read_histogram(controller, "cost", true);
 	if (controller->has_debugfs)
 		return;
-	controller->no_debugfs = geteuid() ? "debugfs is for root"
+	controller->no_debugfs = geteuid() ? "only root may read debugfs"
 					   : "there is no " DEBUGFS
-					     "; is debugfs mounted?";
+					     "; see whether debugfs is mounted";
 }
 
 static void query(struct controller *controller, int fd, unsigned long what, void *answer)
@@ -186,8 +186,8 @@ static void query(struct controller *controller, int fd, unsigned long what, voi
 		return;
 	close(fd);
 	if (errno == ENOTTY || errno == EINVAL)
-		cli_fail("%s: this is no controller of incise_stepper, or one of another "
-			 "version",
+		cli_fail("%s: not a controller of incise_stepper, or one of another "
+			 "version; see incise info stepper",
 			 controller->path);
 	cli_fail("%s: %s", controller->path, strerror(errno));
 }
@@ -198,15 +198,16 @@ static void read_controller(struct controller *controller, const char *path)
 
 	*controller = (struct controller){.path = path};
 	if (fd < 0 && errno == EACCES)
-		cli_fail("%s: %s; join the group incise, or be root", path,
+		cli_fail("%s: %s; join the group incise, or run as root", path,
 			 strerror(errno));
 	if (fd < 0)
-		cli_fail("%s: %s; incise info stepper shows those there are", path,
+		cli_fail("%s: %s; incise info stepper lists the controllers", path,
 			 strerror(errno));
 	query(controller, fd, INCISE_STEPPER_GET_INFO, &controller->info);
 	if (controller->info.n_motors > INCISE_STEPPER_MOTORS_MAX)
-		cli_fail("%s: it says it has %u motors: another version", path,
-			 controller->info.n_motors);
+		cli_fail("%s: it reports %u motors: module and program are of "
+			 "different versions",
+			 path, controller->info.n_motors);
 	for (uint32_t i = 0; i < controller->info.n_motors; i++) {
 		controller->motor[i].config.motor = i;
 		query(controller, fd, INCISE_STEPPER_GET_CONFIG,
@@ -290,13 +291,13 @@ static void put_histograms(const struct controller *controller, const struct mot
 	for (int i = 0; i < controller->bins; i++)
 		firings += motor->lateness.count[i];
 	printf("  timer      %" PRIu64
-	       " firings, late by %.3f us in the mean and %.3f us at "
-	       "most\n  callback   %.3f us in the mean, %.3f us at most\n",
+	       " firings, late by %.3f us on average and %.3f us at "
+	       "most\n  callback   %.3f us on average, %.3f us at most\n",
 	       firings, (double)motor->lateness.mean_ns * US,
 	       (double)motor->lateness.max_ns * US, (double)motor->cost.mean_ns * US,
 	       (double)motor->cost.max_ns * US);
 	if (firings)
-		puts("  from us    firings late    callbacks that took so long");
+		puts("  from us    firings late    callbacks of that duration");
 	for (int i = 0; i < controller->bins; i++)
 		if (motor->lateness.count[i] || motor->cost.count[i])
 			printf("  %7u %15" PRIu64 " %15" PRIu64 "\n",
@@ -320,7 +321,7 @@ static void put_motor(const struct controller *controller, uint32_t i)
 	put_bits("faults", s->faults, faults, FAULTS);
 	put_config(&motor->config);
 	printf("  steps      %" PRIu64 " up, %" PRIu64 " down; %" PRIu64
-	       " edges late, the motion put off by %g us\n",
+	       " edges late, the motion delayed by %g us\n",
 	       (uint64_t)s->steps_up, (uint64_t)s->steps_down, (uint64_t)s->late,
 	       (double)s->shifted_ns * US);
 	if (controller->has_debugfs)
@@ -358,7 +359,8 @@ static void put_text(const struct controller *controller)
 	for (uint32_t i = 0; i < info->n_motors; i++)
 		put_motor(controller, i);
 	if (!controller->has_debugfs)
-		printf("no lateness and callback cost: %s\n", controller->no_debugfs);
+		printf("lateness and callback cost are not known: %s\n",
+		       controller->no_debugfs);
 }
 
 static json_t *config_json(const struct incise_stepper_config *c)
@@ -468,9 +470,9 @@ void stepper_module_show(const char *what, bool json)
 	bool all = !strcmp(what, "stepper");
 
 	if (all && glob(DEVICES, 0, NULL, &found))
-		cli_fail(
-			"there is no " DEVICES ": load the module with `modprobe "
-			"incise_stepper`, and bind a controller as in incise-stepper(1)");
+		cli_fail("there is no " DEVICES ": load the module with 'modprobe "
+			 "incise_stepper', and bind a controller "
+			 "as in incise-stepper(1)");
 	for (size_t i = 0; i < (all ? found.gl_pathc : 1); i++) {
 		read_controller(&controller, all ? found.gl_pathv[i] : what);
 		if (json)

@@ -107,7 +107,7 @@ static void write_frame(struct view_output *output, struct incise_view *view, do
 		return;
 	rc = incise_view_pixels(view, output->rgb);
 	if (rc)
-		cli_fail("the picture cannot be read: %s", strerror(-rc));
+		cli_fail("the image cannot be read back: %s", strerror(-rc));
 	if (output->folder) {
 		snprintf(path, sizeof(path), "%s/frame-%06llu.png", output->folder,
 			 (unsigned long long)output->frames);
@@ -132,12 +132,11 @@ void view_output_end(struct view_output *output)
 	if (incise_film_close(output->film, &err))
 		cli_fail_with(&err);
 	if (output->strip_path && !output->stripped)
-		cli_fail(
-			"%s: it is not written: the run ends before its first picture, at "
-			"%g s; give an earlier --at",
-			output->strip_path, *output->strip_s);
+		cli_fail("%s: not written: the run ends before its first frame, at %g "
+			 "s; give an earlier --at",
+			 output->strip_path, *output->strip_s);
 	if (output->strip_path && output->stripped < output->n_strip)
-		cli_warn("%s: ends before its picture %d, at %g s", output->strip_path,
+		cli_warn("%s: the run ends before frame %d, at %g s", output->strip_path,
 			 output->stripped + 1, output->strip_s[output->stripped]);
 	if (output->strip_path &&
 	    image_write_png(output->strip_path, output->strip,
@@ -332,7 +331,7 @@ static void keep_frame(struct view_job *job)
 	incise_view_size(job->view, &width, &height);
 	rgb = malloc((size_t)width * height * 3);
 	if (!rgb || incise_view_pixels(job->view, rgb)) {
-		cli_warn("the picture cannot be read");
+		cli_warn("the image cannot be read back");
 		free(rgb);
 		return;
 	}
@@ -414,12 +413,12 @@ bool view_job_events(struct view_job *job, struct view_hand *hand, struct view_l
 static const char *const keys[] = {
 	"left button\tpress the tool in",
 	"b  n  t\tblade, handle, tube",
-	"+  -\thow deep it is pressed",
+	"+  -\tdepth of a press",
 	"right button\tturn the camera",
 	"wheel\tnear, far",
 	"Home\tcamera as it was",
 	"g\tgraphs",
-	"s\tkeep the picture",
+	"s\tsave the image",
 	"h  F1\tthis",
 	"q\tend",
 };
@@ -438,7 +437,8 @@ void view_job_view(struct view_job *job)
 	job->view = incise_view_new(job->scene, job->plan, &setup, &err);
 	if (!job->view)
 		cli_fail("%s%s", err.text,
-			 window ? "; without a screen give --frames, --video or --strip"
+			 window ? "; without a display give --frames, --video or "
+				  "--strip"
 				: "");
 	incise_view_panel(job->view, !job->no_panel, false);
 	incise_view_keys(job->view, keys, sizeof(keys) / sizeof(*keys));

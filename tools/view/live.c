@@ -44,7 +44,7 @@ struct view_live *view_live_open(const char *page, struct incise_error *err)
 	struct view_live *live = calloc(1, sizeof(*live));
 
 	if (!live) {
-		incise_error_set(err, ENOMEM, "no memory to look at a loop");
+		incise_error_set(err, ENOMEM, "out of memory");
 		errno = ENOMEM;
 		return NULL;
 	}
@@ -159,7 +159,9 @@ int view_live_take(struct view_live *live, struct incise_view *view,
 	int n = BATCH, rc = incise_state_read(live->state, &live->now);
 
 	if (rc && rc != -EAGAIN)
-		return incise_error_set(err, -rc, "the loop's page cannot be read: %s",
+		return incise_error_set(err, -rc,
+					"the status file of the loop cannot "
+					"be read: %s",
 					strerror(-rc));
 	while (n == BATCH) {
 		n = incise_state_ticks(live->state, &live->cursor, live->ticks, BATCH,
@@ -169,7 +171,8 @@ int view_live_take(struct view_live *live, struct incise_view *view,
 			break;
 		if (n < 0)
 			return incise_error_set(err, -n,
-						"the loop's page cannot be read: %s",
+						"the status file of the loop cannot be "
+						"read: %s",
 						strerror(-n));
 		incise_view_ticks(view, live->ticks, n);
 		for (int i = 0; i < n && (live->own || live->looked); i++)
@@ -186,8 +189,8 @@ int view_live_take(struct view_live *live, struct incise_view *view,
 	if (log && live->now.reloads != live->reloads)
 		return incise_error_set(
 			err, EBUSY,
-			"the loop began another scene, and a session is of "
-			"one: begin it again");
+			"the loop started another scene, but a session has one; start "
+			"the view again");
 	if (live->own && atomic_load(&live->ended)) {
 		rc = atomic_load(&live->rc);
 		if (rc)
@@ -204,7 +207,7 @@ const char *view_live_fault(const struct view_live *live)
 	if (live->now.run == INCISE_RUN_FAULT)
 		return live->now.reason;
 	return live->now.run == INCISE_RUN_STOPPED ? NULL
-						   : "the loop ended without a word";
+						   : "the loop exited without cleanup";
 }
 
 void view_live_close(struct view_live *live)

@@ -49,7 +49,9 @@ void view_script_begin(struct view_script *script, const char *scene, double sec
 	loop.log_size = (size_t)(seconds * loop.rate_hz) + 2;
 	loop.log = calloc(loop.log_size, sizeof(*loop.log));
 	if (!stats || !loop.log)
-		cli_fail("no memory for %.3g s of ticks", seconds);
+		cli_fail("not enough memory for %.3g s of ticks; give a shorter "
+			 "--duration",
+			 seconds);
 	if (incise_loop_run(run.plan, incise_rig_clock(run.rig), &loop, stats, &err) < 0)
 		cli_fail_with(&err);
 	*script = (struct view_script){

@@ -82,10 +82,9 @@ void view_running(struct view_job *job)
 	state_pages_open(&pages, job->argument.path);
 	name = pages.page[0].name;
 	if (incise_state_alive(pages.page[0].state) != 1)
-		cli_fail(
-			"%s: its loop has ended, as 'incise status %s' says: start one "
-			"with 'incise haptic %s', or let the picture run its own by --rig",
-			name, name, name);
+		cli_fail("%s: its loop has ended, see 'incise status %s'; start one "
+			 "with 'incise haptic %s', or run one here with --rig",
+			 name, name, name);
 	make_plan(job);
 	live = cli_require(view_live_open(pages.page[0].path, &err), &err);
 	state_pages_close(&pages);
@@ -106,9 +105,8 @@ void view_rig(struct view_job *job)
 
 	job->own_rig = cli_open_rig(job->rig, INCISE_RIG_TRACKER);
 	if (!incise_clock_is_real(incise_rig_clock(job->own_rig)))
-		cli_fail(
-			"--rig: a loop in simulated time runs away from its picture; leave "
-			"out clock=simulated, or give --procedure");
+		cli_fail("--rig: a loop in simulated time outruns its image; leave out "
+			 "clock=simulated, or give --procedure");
 	make_plan(job);
 	incise_plan_top(job->plan, &top);
 	view_job_view(job);

@@ -60,7 +60,7 @@ check "a press: the tube" presses tube
 check "another key: nothing" presses tube c
 check "the next press: auto again" presses "blade (auto)"
 pull_out
-check "pulled out: one warning" until_it "there is no foot switch until it is back"
+check "pulled out: one warning" until_it "foot switch disconnected"
 sleep 3
 once() { [ "$(grep -c "no foot switch" /run/err)" = 1 ]; }
 check "and only one" once

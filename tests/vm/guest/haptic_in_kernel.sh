@@ -54,7 +54,7 @@ check "a feeder starts" until_true feeds || cat /tmp/feed.err
 start watch $incise haptic $scene --in-kernel --rig /tmp/rig.conf --json
 watches() { $incise status wall 2>/dev/null | grep -q running; }
 check "haptic --in-kernel watches it" until_true watches || cat /tmp/watch.err
-known() { said "incise feed runs already" </tmp/watch.err; }
+known() { said "incise feed already runs" </tmp/watch.err; }
 check "and says who feeds" known
 both() { $incise status >/tmp/status 2>/dev/null; grep -q "^wall: running" /tmp/status && grep -q "^wall.feed: running" /tmp/status || { grep "^wall" /tmp/status; return 1; }; }
 check "incise status shows both" both

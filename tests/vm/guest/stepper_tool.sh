@@ -95,7 +95,7 @@ check "status: not powered, not homed" \
 check "status names what is wired" \
 	says 0 "wired: limit at 0, limit at the end, home, e-stop" stepper status
 check "a place is refused before it is homed, with the command" \
-	says 1 "run \`incise stepper home\`" stepper move 1
+	says 1 "run 'incise stepper home'" stepper move 1
 check "a way is not" says 0 "now at 0.2500 mm (step 100), not homed" stepper move 250um --by
 check "and it went that way" [ "$(carriage position)" = 500 ]
 
@@ -183,7 +183,7 @@ incise info stepper --json >info.json
 incise info stepper >info
 check "info: the self-test" grep -q "^self-test  99 % of timers" info
 check "info: steps as the carriage has them" grep -q " $(carriage up) up, $(carriage down) down;" info
-check "info: the timer's lateness and the callback's cost" grep -q "^  callback   [0-9.]* us in the mean" info
+check "info: the timer's lateness and the callback's cost" grep -q "^  callback   [0-9.]* us on average" info
 check "info: JSON" grep -q '"kind": "stepper"' info.json
 check "info: histograms" sh -c 'tr -d " \n" <info.json | grep -q "\"callback\":{\"mean_ns\":[1-9][0-9]*,\"max_ns\":[1-9]"'
 check "info: of one device" says 0 "bench, 1 motor" info "/dev/$(cat $config/cdev)"
