@@ -36,12 +36,14 @@ struct assessed {
 };
 
 static const struct cli_option options[] = {
-	{0, "reference", "FILE", "an expert's session, to compare with",
+	{0, "reference", "FILE", "session to compare with, for example of an expert",
 	 CLI_INPUT(struct job, reference_path)},
-	{'o', "output", "FILE.html", "write a page with figures: the path, the force",
+	{'o', "output", "FILE.html",
+	 "write a page with figures of the path and the "
+	 "force",
 	 CLI_OUTPUT(struct job, page), .extensions = ".html"},
-	{0, "csv", "FILE", "write a row for each session", CLI_OUTPUT(struct job, csv),
-	 .extensions = ".csv"},
+	{0, "csv", "FILE", "write one row per session as CSV",
+	 CLI_OUTPUT(struct job, csv)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{0},
 };
@@ -49,14 +51,14 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "assess",
 	.synopsis = "NAME.session... [OPTIONS]",
-	.summary =
-		"Report what happened in sessions of incise haptic or incise view, against the\n"
-		"criteria of their scene.",
+	.summary = "Evaluate sessions of incise haptic or incise view against the "
+		   "criteria of their scene.",
 	.options = options,
-	.notes =
-		"Example:\n  incise assess p07.session --reference expert.session -o p07.html\n\n"
-		"Exit: 0 reported, whether criteria are met or not, 1 failed, 2 bad usage.\n"
-		"See incise-assess(1).",
+	.notes = "Example:\n"
+		 "  incise assess p07.session --reference expert.session -o p07.html\n"
+		 "\n"
+		 "Exit: 0 reported, with criteria met or not, 1 failed, 2 bad usage. "
+		 "See incise-assess(1).",
 };
 
 /* Values beside those of criteria. */
@@ -75,9 +77,9 @@ static const struct metric {
 	METRIC("tube_force_N", "force of the tube", "N", 2, insertion.force_N),
 	METRIC("tube_deepest_mm", "largest depth of the tube", "mm", 1,
 	       insertion.depth_mm),
-	METRIC("off_axis_mm", "way beside the membrane's axis", "mm", 1,
+	METRIC("off_axis_mm", "distance from the membrane's axis", "mm", 1,
 	       target.off_axis_mm),
-	METRIC("missed", "ways that missed the membrane", "", 0, target.missed),
+	METRIC("missed", "strokes that missed the membrane", "", 0, target.missed),
 	METRIC("duration_s", "whole session", "s", 1, duration_s),
 #undef METRIC
 };
@@ -101,12 +103,14 @@ static void parse(struct job *job, int argc, char **argv)
 	cli_parse(&command, argc, argv, job);
 	job->n = argc - optind;
 	if (job->n < 1)
-		cli_usage("expected a session at least");
+		cli_usage("missing NAME.session (session to evaluate)");
 	if (job->json && ((job->page && !strcmp(job->page, "-")) ||
 			  (job->csv && !strcmp(job->csv, "-"))))
-		cli_usage("--json and '-' would both write to standard output");
+		cli_usage("--json and - would both write to standard output; give a "
+			  "file name");
 	if (job->page && job->csv && !strcmp(job->page, "-") && !strcmp(job->csv, "-"))
-		cli_usage("-o - and --csv - would both write to standard output");
+		cli_usage("-o - and --csv - would both write to standard output; give "
+			  "a file name");
 }
 
 static void load(struct assessed *a, const char *path)
@@ -135,8 +139,9 @@ static void load_all(struct job *job, char **paths)
 	for (int i = 0; i < job->n; i++)
 		if (strcmp(job->session[i].session->scene.crc32c,
 			   job->reference->session->scene.crc32c))
-			cli_warn("%s: its scene is not that of %s", paths[i],
-				 job->reference_path);
+			cli_warn("%s: its scene differs from that of %s; compare "
+				 "sessions of one scene",
+				 paths[i], job->reference_path);
 }
 
 /* Sessions, and the reference if there is one. */
@@ -228,7 +233,7 @@ static struct line line_of(const struct assessed *a, const struct assessed *refe
 static const char *ended(const struct session *s)
 {
 	if (!strcmp(s->end.kind, "asked"))
-		return "ended as asked";
+		return "ended as requested";
 	return !strcmp(s->end.kind, "fault") ? "ended by a fault" : "ended by a signal";
 }
 
@@ -239,16 +244,18 @@ static void put_doubts(FILE *out, const struct session *s, const char *before,
 	if (!strcmp(s->end.kind, "fault"))
 		fprintf(out, "%s%s%s", before, s->end.why, behind);
 	if (s->lost > 0)
-		fprintf(out, "%s%.0f of %.0f ticks were lost: there may have been more%s",
+		fprintf(out,
+			"%s%.0f of %.0f ticks were lost; events in them are not "
+			"counted%s",
 			before, s->lost, s->lost + s->ticks, behind);
 	if (s->unusable > 0)
-		fprintf(out, "%s%.0f ticks were no numbers, or of the past%s", before,
+		fprintf(out, "%s%.0f ticks were not numbers, or out of order%s", before,
 			s->unusable, behind);
 	if (s->cuts_full)
-		fprintf(out, "%sthe blade was to cut beyond tissue.cuts_most%s", before,
+		fprintf(out, "%sthe blade cut more often than tissue.cuts_most%s", before,
 			behind);
 	if (s->phases_left_out > 0)
-		fprintf(out, "%s%.0f phases are left out%s", before, s->phases_left_out,
+		fprintf(out, "%s%.0f phases are not listed%s", before, s->phases_left_out,
 			behind);
 }
 
@@ -370,7 +377,7 @@ static void print_table(const struct job *job)
 		printf(" %2d of %d%s\n", a->met, a->judged,
 		       a == job->reference ? ", reference" : "");
 	}
-	puts("'!' is a criterion that is not met.");
+	puts("'!' marks a criterion that is not met.");
 	for (int i = 0; i < rows(job); i++) {
 		char before[300];
 
@@ -539,7 +546,11 @@ static void put_overview(FILE *out, const struct job *job)
 {
 	char text[40];
 
-	fputs("\n## All sessions\n\nValues; **bold** is a criterion that is not met.\n\n"
+	fputs("\n"
+	      "## All sessions\n"
+	      "\n"
+	      "Values; **bold** marks a criterion that is not met.\n"
+	      "\n"
 	      "| session | code | met |",
 	      out);
 	for (int k = 0; k < INCISE_CRITERIA; k++)
@@ -571,8 +582,11 @@ static void put_lines(FILE *out, const struct assessed *a,
 		      const struct assessed *reference)
 {
 	fprintf(out,
-		"\nCriteria of the scene, and other values: %d of %d criteria met.\n\n"
-		"| | value | | asked | met |%s\n|---|---:|---|---|---|%s\n",
+		"\n"
+		"Criteria of the scene, and other values: %d of %d criteria met.\n"
+		"\n"
+		"| | value | | required | met |%s\n"
+		"|---|---:|---|---|---|%s\n",
 		a->met, a->judged, reference ? " reference | difference |" : "",
 		reference ? "---:|---:|" : "");
 	for (int i = 0; i < LINES; i++) {
@@ -591,9 +605,11 @@ static void put_cuts_table(FILE *out, const struct session *s)
 {
 	if (!s->n_cuts)
 		return;
-	fputs("\nCuts; those with one number of an incision are joined.\n\n"
-	      "| cut | incision | from, mm | to, mm | length, mm | direction, ° | depth, mm "
-	      "| median, mm | open, mm | off target, mm |\n"
+	fputs("\n"
+	      "Cuts; those with the same incision number are joined.\n"
+	      "\n"
+	      "| cut | incision | from, mm | to, mm | length, mm | direction, ° | "
+	      "depth, mm | median, mm | open, mm | off target, mm |\n"
 	      "|---:|---:|---|---|---:|---:|---:|---:|---:|---:|\n",
 	      out);
 	for (int i = 0; i < s->n_cuts; i++) {
@@ -634,11 +650,15 @@ static void put_figures(FILE *out, const struct assessed *a,
 	draw_path(s, expert, path);
 	draw_force(s, expert, force);
 	fprintf(out,
-		"\n![The tool's way from above](%s.svg)\n\n"
-		"The tool's way from above, the cuts%s.\n"
-		"\n![Force over time](%s.svg)\n\n"
-		"Largest force in each interval over time; shaded where a tool was in the "
-		"tissue.\n",
+		"\n"
+		"![Path of the tool from above](%s.svg)\n"
+		"\n"
+		"Path of the tool from above, the cuts%s.\n"
+		"\n"
+		"![Force over time](%s.svg)\n"
+		"\n"
+		"Largest force in each interval over time; shaded while a tool was in "
+		"the tissue.\n",
 		path, s->has_membrane ? ", and the membrane" : "", force);
 }
 
@@ -714,7 +734,8 @@ static void write_page(const struct job *job)
 	put_overview(out, job);
 	for (int i = 0; i < job->n; i++) {
 		if (cli_stop)
-			cli_fail("%s: %s is as it was", strsignal(cli_stop), job->page);
+			cli_fail("%s: interrupted; %s is unchanged", strsignal(cli_stop),
+				 job->page);
 		cli_progress("figures %d of %d", i + 1, job->n);
 		put_session(out, &job->session[i], job->reference, i + 1);
 	}

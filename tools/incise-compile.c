@@ -227,6 +227,7 @@ int main(int argc, char **argv)
 {
 	struct job job = {.scene.arith = "fixed"};
 	const char *path;
+	bool found; /* a scene, by its path or name */
 
 	incise_fixed_options_init(&job.options);
 	cli_parse(&command, argc, argv, &job);
@@ -236,8 +237,9 @@ int main(int argc, char **argv)
 			"missing -o FILE (output: MODEL.fx of a model, NAME.plan of a scene)");
 	if (job.json && !strcmp(job.output, "-"))
 		cli_usage("--json and -o - would both write to standard output");
-	file_expect(path, FILE_MODEL | FILE_SCENE);
-	if (cli_ends_with(path, ".fis") || !scene_argument_find(&job.scene, path)) {
+	found = !cli_ends_with(path, ".fis") && scene_argument_find(&job.scene, path);
+	file_expect(found ? job.scene.path : path, FILE_MODEL | FILE_SCENE);
+	if (!found || file_kind_of(path) == FILE_MODEL) {
 		if (!cli_ends_with(path, ".fis") && cli_ends_with(job.output, ".plan"))
 			cli_fail("%s: no such file or scene", path);
 		if (job.rig || job.calibration || job.scene.model)

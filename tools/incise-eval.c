@@ -286,8 +286,9 @@ static void parse(struct job *job, int argc, char **argv)
 	if (optind >= argc)
 		cli_usage("missing MODEL.fis or MODEL.fx (model)");
 	if (argc - optind > 2)
-		cli_usage("unexpected argument '%s'; give a model, and one file of inputs",
-			  argv[optind + 2]);
+		cli_usage(
+			"unexpected argument '%s'; give a model, and one file of inputs",
+			argv[optind + 2]);
 	if (job->no_clamp && job->arith && !strcmp(job->arith, "fixed"))
 		cli_usage("--no-clamp needs --arith double: fixed point cannot "
 			  "extrapolate");

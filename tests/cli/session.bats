@@ -112,7 +112,7 @@ until_it_runs() {
 		! grep -q "not reloaded" err || break
 		sleep 0.05
 	done
-	grep -q "not reloaded.*--session .*of one scene" err
+	grep -q "not reloaded.*--session .*keep their scene" err
 	kill -INT $pid
 	wait $pid
 	pid=
@@ -137,7 +137,7 @@ until_it_runs() {
 	bad_usage "--code needs --session"
 	for code in "A B" ABCDEFGHIJKLMNOPQ é ""; do
 		run --separate-stderr incise haptic neck --rig $quick --duration 1s --session b.session --code "$code"
-		bad_usage "is no code"
+		bad_usage "--code: expected up to"
 	done
 	[ ! -e b.session ]
 }
@@ -152,7 +152,7 @@ print(row[sys.argv[3]])' "$@"
 @test "criteria that are met and that are not, each with its value" {
 	run -0 --separate-stderr incise assess easy.session
 	[ -z "$stderr" ]
-	[[ "${lines[0]}" == "easy.session: easy.scene, code S-easy, 8.0 s, 8000 ticks, ended as asked" ]]
+	[[ "${lines[0]}" == "easy.session: easy.scene, code S-easy, 8.0 s, 8000 ticks, ended as requested" ]]
 	[[ "$output" =~ length\ of\ the\ incision\ +[0-9.]+\ mm\ +10\ to\ 200\ +yes ]]
 	# no membrane, no value and no judgement
 	[[ "$output" =~ back\ wall\ touched\ +-\ +no\ +- ]]
@@ -185,7 +185,7 @@ print(max(math.dist(p, q) for i, p in ends for k, q in ends if i == k))')
 @test "a reference has a column and the differences; against itself there are none" {
 	run -0 --separate-stderr incise assess hard.session --reference easy.session
 	[ "${#stderr_lines[@]}" -eq 1 ]
-	[[ "$stderr" == *"hard.session: its scene is not that of easy.session" ]]
+	[[ "$stderr" == *"hard.session: its scene differs from that of easy.session; compare sessions of one scene" ]]
 	[[ "$output" == *"reference difference"* ]]
 	sed 's/"largest_N": [0-9.]*/"largest_N": 0.5/' easy.session >expert.session
 	incise assess easy.session --reference expert.session --json >r.json
@@ -279,9 +279,9 @@ refused() {
 
 @test "damaged files are refused in one line that says where" {
 	head -c 1000 easy.session >bad.session
-	refused "no JSON"
+	refused "not JSON"
 	: >bad.session
-	refused "no JSON"
+	refused "not JSON"
 	echo '[]' >bad.session
 	refused incise_session
 	sed 's/"incise_session": 1/"incise_session": 7/' easy.session >bad.session
@@ -295,7 +295,7 @@ refused() {
 	sed 's/"path": "easy.scene"/"path": "\\u001b[2J"/' easy.session >bad.session
 	refused "scene.path"
 	python3 -c 'print("[" * 100000)' >bad.session
-	refused "no JSON"
+	refused "not JSON"
 	head -c 20000000 /dev/zero | tr '\0' ' ' >bad.session
 	refused "8"
 	cp "$root/scenes/neck.scene" bad.session
@@ -305,7 +305,7 @@ refused() {
 	mkdir bad.session
 	refused directory
 	run --separate-stderr incise assess
-	bad_usage "expected a session"
+	bad_usage "missing NAME.session"
 	run --separate-stderr incise assess easy.session --reference none.session
 	failed_with none.session
 	run --separate-stderr incise assess easy.session --json --csv -

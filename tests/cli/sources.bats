@@ -72,7 +72,7 @@ ask() {
 	run --separate-stderr incise info "tty:$PWD/none:115200"
 	failed_with "$PWD/none" "plug in the adapter"
 	run --separate-stderr incise info v4l2:/dev/video99
-	failed_with "v4l2:/dev/video99: nobody answers" "cable"
+	failed_with "v4l2:/dev/video99: no answer" "cable"
 	run --separate-stderr incise info nonsense:x
 	failed_with 'no such backend "nonsense"' "tty" "can" "v4l2"
 }
@@ -202,7 +202,7 @@ in_the_tissue() {
 	grep -Eq "^poses +([0-9]+) of \1 poses were not used: \1 'x' \(" text
 	run -1 --separate-stderr incise capture -o a.rec --duration 2s
 	[[ "$stderr" == *"poses were not used: "*" 'x' (the sensor is outside its motion box)"* ]]
-	[[ "$stderr" == *"a.rec: no depth: the tracker flagged every pose; see Tracker flags in rig.conf(5)" ]]
+	[[ "$stderr" == *"a.rec: no depth: the tracker flagged every pose; see Tracker flags in 'incise help rig.conf'" ]]
 	[ "$(ask a.rec "SELECT count(*) > 100 AND min(status) = 'x' AND max(status) = 'x'
 		FROM tracker")" = 1 ]
 	[ "$(ask a.rec "SELECT count(*) FROM depth")" = 0 ]

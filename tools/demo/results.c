@@ -581,7 +581,7 @@ json_t *demo_summary_begin(long seed)
 {
 	return json_pack("{ss sI ss s{sf sf}}", "version", incise_version(), "seed",
 			 (json_int_t)seed, "note",
-			 "virtual liver: the paper's data are not published", "paper",
+			 "simulated liver: the paper's data are not published", "paper",
 			 "mse_train", PAPER_MSE_TRAIN, "mse_check", PAPER_MSE_CHECK);
 }
 
@@ -598,29 +598,37 @@ void demo_summary_print(const struct demo *demo, FILE *out, double seconds)
 	char *tick999 = quantile_us(haptic, "tick_ns", "p999", 1e-3);
 
 	fprintf(out,
-		"incise demo, version %s, simulated rig with seed %ld\n\n"
-		"recording          %.1f s, %.0f force samples, %.0f lost, %.0f clipped\n"
-		"pairs              %.0f, averaged over depth and velocity as in Song et al. (2006), "
-		"section 4.1\n\n"
-		"Random halves, as the paper does it (classic ANFIS, 20 rules, 80 epochs). Its data "
-		"are\nnot published and ours are of a virtual liver: the figures compare in kind, "
-		"not in value.\n"
+		"incise demo, version %s, simulated rig with seed %ld\n"
+		"\n"
+		"recording          %.1f s, %.0f force samples, %.0f lost, %.0f "
+		"clipped\n"
+		"pairs              %.0f, averaged over depth and velocity as in Song "
+		"et al. (2006), section 4.1\n"
+		"\n"
+		"Random halves, as in the paper (classic ANFIS, 20 rules, 80 epochs). "
+		"Its data are\n"
+		"not published and these are of a simulated liver: compare the kind of "
+		"the figures, not the values.\n"
 		"                         training      check\n"
 		"  MSE here / N^2     %12.5f %10.5f\n"
-		"  MSE in the paper   %12.5f %10.5f   (its unit is not stated)\n\n"
-		"By unseen cuts, ridge and epochs by cross-validation, RMSE / N:\n"
+		"  MSE in the paper   %12.5f %10.5f   (its unit is not stated)\n"
+		"\n"
+		"On held-out cuts, ridge and epochs by cross-validation, RMSE / N:\n"
 		"  this model         %12.4f %10.4f\n"
 		"  mean                            %10.4f\n"
 		"  linear regression               %10.4f\n"
-		"  nearest neighbours              %10.4f\n\n"
+		"  nearest neighbours              %10.4f\n"
+		"\n"
 		"model against the tissue's true mean force   %.4f N rms at the pairs\n"
 		"model against a new cut at 5 mm, replayed    %.4f N rms\n"
-		"fixed point against double                   %.4f mN largest of %d points, "
-		"certified to %.4f mN\n\n"
+		"fixed point against double                   %.4f mN largest of %d "
+		"points, certified to %.4f mN\n"
+		"\n"
 		"haptic loop        %.0f ticks at %g Hz, %.0f skipped (%s)\n"
 		"  lateness         median %s, 99.9 %% %s, largest %.0f µs\n"
 		"  tick             median %s, 99.9 %% %s\n"
-		"  force            largest %.3f N, actuator off by %.4f N rms\n\n"
+		"  force            largest %.3f N, actuator off by %.4f N rms\n"
+		"\n"
 		"took               %.0f s\n",
 		incise_version(), demo->seed, number_of(capture, "seconds", NULL),
 		number_of(capture, "force", NULL),

@@ -18,14 +18,15 @@ void session_path_parse(void *path, char *text)
 {
 	(void)path;
 	if (!strcmp(text, "-"))
-		cli_usage("--session: expected a file, as reports go to standard output");
+		cli_usage("--session: expected a file, not standard output, which "
+			  "reports use");
 }
 
 void session_code_parse(void *code, char *text)
 {
 	if (!session_is_code(text))
-		cli_usage("--code: '%.40s' is no code: up to %d letters, digits, '-' and "
-			  "'_'; give no name of a person",
+		cli_usage("--code: expected up to %2$d letters, digits, '-' and '_', "
+			  "found '%1$.40s'; do not give a person's name",
 			  text, SESSION_CODE_MAX);
 	*(const char **)code = text;
 }
@@ -33,7 +34,7 @@ void session_code_parse(void *code, char *text)
 void session_options_check(const struct session_options *options)
 {
 	if (options->code && !options->path)
-		cli_usage("--code needs --session");
+		cli_usage("--code needs --session (file to write)");
 }
 
 /* As much of the end of a path as there is place for. */

@@ -20,7 +20,7 @@ struct session_options {
 	{0,                                                                              \
 	 "session",                                                                      \
 	 "FILE",                                                                         \
-	 "write at the end what happened, for incise assess",                            \
+	 "write a session file at the end, for incise assess",                           \
 	 CLI_OUTPUT(type, member.path),                                                  \
 	 .parse = session_path_parse,                                                    \
 	 .extensions = ".session"},                                                      \

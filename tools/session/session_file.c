@@ -19,7 +19,7 @@
 
 static const struct incise_infile_kind session_kind = {
 	.name = "a session",
-	.advice = "give a file of incise haptic --session",
+	.advice = "give a file that incise haptic --session wrote",
 	.size_max = FILE_MOST,
 };
 
@@ -343,8 +343,8 @@ struct reader {
 static int expected(const struct reader *reader, const char *key, const char *what)
 {
 	return incise_error_set(reader->err, EINVAL,
-				"%s: %s%s: expected %s; the file is damaged, or none of "
-				"incise",
+				"%s: %s%s: expected %s; the file is damaged, or not a "
+				"session of incise",
 				reader->name, reader->place, key, what);
 }
 
@@ -398,7 +398,9 @@ static int take_text(const struct reader *reader, const struct member *member,
 		memcpy(to, json_string_value(json), n + 1);
 		return 0;
 	}
-	snprintf(what, sizeof(what), "a text of at most %.0f bytes without controls",
+	snprintf(what, sizeof(what),
+		 "a text of at most %.0f bytes without control "
+		 "characters",
 		 member->max - 1);
 	return expected(reader, member->key, what);
 }
@@ -591,8 +593,8 @@ static int take_session(struct reader *reader, const json_t *json,
 		return expected(reader, "incise_session", "the number of its form");
 	if (json_integer_value(form) != SESSION_FORM)
 		return incise_error_set(reader->err, EPROTO,
-					"%s: of form %lld, and this program reads form "
-					"%d: take the version that wrote it",
+					"%s: form %lld, but this program reads form "
+					"%d; use the version of incise that wrote it",
 					reader->name, (long long)json_integer_value(form),
 					SESSION_FORM);
 	rc = take_members(reader, whole, json, session);
@@ -625,7 +627,7 @@ struct session *session_parse(const char *text, size_t n, const char *name,
 	int rc = session ? take_session(&reader, json, session) : -EINVAL;
 
 	if (json && !session)
-		rc = incise_error_set(err, ENOMEM, "%s: no memory", name);
+		rc = incise_error_set(err, ENOMEM, "%s: out of memory", name);
 	json_decref(json);
 	if (!rc)
 		return session;
