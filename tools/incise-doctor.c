@@ -218,7 +218,7 @@ static void check_device(struct doctor *doctor, const char *rig, const char *nam
 		add(doctor, "devices", name, OK, NULL, "the rig names none");
 	else if (open)
 		add_opened(doctor, name, open);
-	else if (err.code == ENODEV && strstr(err.text, "not named"))
+	else if (err.code == ENODEV && strstr(err.text, "missing, but required"))
 		add(doctor, "devices", name, OK, NULL, "the rig names none");
 	else if (err.code == EBUSY)
 		add(doctor, "devices", name, WARNING, "incise status", "%s", err.text);

@@ -128,9 +128,9 @@ setup() {
 		run --separate-stderr incise bench compare good.json bad.json
 		failed_with bad.json "$2"
 	}
-	try '' "no JSON"
-	try '{' "no JSON"
-	try '{"figures": [{"name": "x[2J"}]}' "no JSON"
+	try '' "not JSON"
+	try '{' "not JSON"
+	try '{"figures": [{"name": "x[2J"}]}' "not JSON"
 	try '[]' "no metrics"
 	try '7' "no"
 	try '{}' "no metrics"

@@ -167,7 +167,7 @@ report_of() {
 
 @test "its figures can be printed: no text is cut, none overlaps, axes are quantity / unit" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the pictures"
-	python3 "$BATS_TEST_DIRNAME/figures.py" "$r"/pictures/*.svg
+	python3 "$BATS_TEST_DIRNAME/figures.py" "$r"/plots/*.svg
 }
 
 @test "no number is missing by its name, and nothing comes from elsewhere" {

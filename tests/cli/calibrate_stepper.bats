@@ -129,7 +129,7 @@ made_points() {
 		failed_with "$text"
 	done <<-END
 		F = -F|reversed
-		F = 0.1 + n * 7 % 11 / 1000|does not move
+		F = 0.1 + n * 7 % 11 / 1000|does not react
 		if (n > 180) F -= 0.1|steps were lost
 		if (F > 2) F = 2|does not follow
 		y = x; x = F; F = y|swapped
@@ -175,7 +175,7 @@ made_points() {
 	for file in fit.png residuals.png; do
 		[ "$(head -c 4 bench/$file | tail -c 3)" = PNG ]
 	done
-	head -n -1 out | cmp - bench/report.txt # the last line names the file
+	head -n -2 out | cmp - bench/report.txt # the last lines name the files
 	grep -q 'sensitivity of the sensor *B' out
 	holds "($(key bench/report.json N_mm) - 2)^2 < 0.0001"
 }

@@ -86,7 +86,7 @@ within() {
 	failed_with "order of the columns"
 	sed '1s/qw,qx,qy,qz/qx,qy,qz,qw/' p.csv >last.csv
 	run --separate-stderr incise calibrate tip --from last.csv
-	failed_with "swapped"
+	failed_with "quaternion w first"
 	awk -F, -v OFS=, 'NR > 500 { $2 += 3 } { print }' p.csv >moved.csv
 	run --separate-stderr incise calibrate tip --from moved.csv
 	failed_with "pivot moved"

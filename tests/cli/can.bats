@@ -226,7 +226,7 @@ under() {
 		"heartbeat off|heartbeat"
 		"tpdo off|TPDO1"
 		"silent|no "
-		"reboot|began anew"
+		"reboot|it restarted"
 		"disable|switch-on disabled"
 		"hang 1000|no "
 		"inputs 0x8|e-stop"
@@ -250,7 +250,7 @@ under() {
 		"fault 0x7305|7305h"
 		"heartbeat off|heartbeat"
 		"tpdo off|TPDO1"
-		"reboot|began anew"
+		"reboot|it restarted"
 		# The drive's own window is no larger than ours: whichever notices first.
 		$'block|8611h\noff its target'
 		"disable|switch-on disabled"
@@ -554,7 +554,7 @@ frozen() {
 				[ "$(wc -l <err)" -eq 1 ] || failed+=" $how $place (lines);"
 				drive_tell report
 				[ "$(drive_value enabled_rpdos)" = 0 ] || failed+=" $how $place (enabled);"
-				grep -qiE "${place:2:4}|nobody answers" err || failed+=" $how $place (not named);"
+				grep -qiE "${place:2:4}|no answer from" err || failed+=" $how $place (not named);"
 				;;
 			*) failed+=" $how $place (exit $code);" ;;
 			esac

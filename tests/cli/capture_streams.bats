@@ -130,7 +130,7 @@ END
 
 @test "what is never triggered leaves nothing, and exit 1" {
 	run -1 --separate-stderr incise capture -o a.rec --rig $quick,cut_s=1 --trigger 100N
-	[[ "$stderr" == *"a.rec: was never triggered; nothing was recorded" ]]
+	[[ "$stderr" == *"a.rec: it was never triggered; nothing was recorded" ]]
 	[ -z "$(ls)" ]
 }
 

@@ -33,10 +33,10 @@ teardown() {
 }
 
 @test "forces are the same from run to run and at both speeds" {
-	incise replay liver.rec liver.scene --log a.csv | tail -n 1 >a
-	incise replay liver.rec liver.scene --log b.csv | tail -n 1 >b
+	incise replay liver.rec liver.scene --log a.csv | grep ^crc32c >a
+	incise replay liver.rec liver.scene --log b.csv | grep ^crc32c >b
 	incise replay liver.rec liver.scene --log c.csv --real-time >report
-	tail -n 1 report >c
+	grep ^crc32c report >c
 	cmp a.csv b.csv
 	cmp a.csv c.csv
 	cmp a b
@@ -44,7 +44,7 @@ teardown() {
 	grep -q '^lateness ' report
 	grep -q '^late ' report
 	# and others where they must be
-	incise replay liver.rec liver.scene --arith double | tail -n 1 >d
+	incise replay liver.rec liver.scene --arith double | grep ^crc32c >d
 	run ! cmp -s a d
 	incise replay liver.rec liver.scene --poses acquisition | tail -n 1 >e
 	run ! cmp -s a e

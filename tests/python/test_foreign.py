@@ -104,7 +104,7 @@ class Foreign(Case):
         table = incise.open(path, damaged=True).force
         with self.assertRaises(Exception) as caught:
             pyarrow.table(table)
-        self.assertIn("row 70000 cannot be", str(caught.exception))
+        self.assertIn("row 70000 is invalid", str(caught.exception))
         with self.assertRaises(incise.Invalid):
             pyarrow.table(incise.open(path).force)
 

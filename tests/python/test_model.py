@@ -165,7 +165,7 @@ class Models(Case):
             ({}, "columns"),
             ({"depth_mm": [1.0]}, "no column 'velocity_mm_s'"),
             ({**good, "force_N": [1]}, "different lengths"),
-            ({**good, "force_N": ["a", "b"]}, "no column of numbers"),
+            ({**good, "force_N": ["a", "b"]}, "is not a column of numbers"),
             ({**good, "force_N": [1, math.nan]}, "row 1, column force_N: is not finite"),
             (good, "2 training pairs"),
             (self.path("none.csv"), "none.csv"),

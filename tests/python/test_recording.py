@@ -155,7 +155,7 @@ class Recordings(Case):
         self.assertEqual(report.findings[0].kind, "altered")
         self.change(path, "UPDATE force SET t_ns = -1 WHERE seq = 70000")
         table = incise.open(path, damaged=True).force
-        self.says(incise.Invalid, "row 70000 cannot be", rows, table)
+        self.says(incise.Invalid, "row 70000 is invalid", rows, table)
         with open(os.path.join(path, "recording.db"), "r+b") as file:
             file.truncate(100000)
         self.says(incise.Error, "damaged", lambda: rows(incise.open(path, damaged=True).force))
@@ -168,7 +168,7 @@ class Recordings(Case):
         self.says(incise.NotFound, "no such recording", incise.verify, self.path("none.rec"))
 
     def test_wrong_arguments(self):
-        self.says(incise.Invalid, "each number must be within", rows, self.rec.pairs(12))
+        self.says(incise.Invalid, "expected 1 to 1000 each", rows, self.rec.pairs(12))
         self.says(incise.Invalid, "depth_bins", self.rec.pairs, "many")
         self.says(incise.Invalid, "rate", rows, self.rec.resample(rate_hz=-1))
         self.says(KeyError, "no column 'x'", next(self.rec.force.batches()).column, "x")

@@ -127,7 +127,7 @@ static void a_bus_that_is_too_slow_is_refused(void **state)
 		if (rc != (cases[i].fits ? 0 : -ERANGE))
 			fail_msg("case %zu: %d, %u %%", i, rc, session.load_percent);
 		if (!cases[i].fits)
-			assert_non_null(strstr(err.text, "may take 80 %"));
+			assert_non_null(strstr(err.text, "at most 80 % are allowed"));
 		assert_int_equal(!session.load_percent, !cases[i].bitrate);
 	}
 }

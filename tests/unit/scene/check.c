@@ -210,7 +210,7 @@ static void test_refusal_names_a_gain(void **state)
 					strstr(err.text,
 					       wall.delay_ticks < 0
 						       ? "a tracker of 120 Hz and 4.2 ms"
-						       : "answers 20 ticks late"));
+						       : "a delay of 20 ticks"));
 				assert_non_null(strstr(err.text, most));
 			}
 			if (more < 0)

@@ -102,7 +102,7 @@ check "clear" says 0 "" stepper clear --rig rig.conf
 begin stepper jog 5
 drive_tell reboot
 finish
-check "so does a drive that begins anew" ended "began anew"
+check "so does a drive that begins anew" ended "it restarted"
 check "home again" says 0 "" stepper home --rig rig.conf
 begin stepper jog 5
 kill -9 "$pid"
