@@ -269,7 +269,7 @@ until_ticks() {
 	rm incise/c.state
 	echo "rate_hz = 1000.0;" >incise/d.state
 	run -0 --separate-stderr incise status
-	[[ "$stderr" == *"warning: "*"incise/d.state: is no state of a loop"* ]]
+	[[ "$stderr" == *"warning: "*"incise/d.state: not a status file"* ]]
 	[ "$(grep -c '^[ab]: stopped' <<<"$output")" = 2 ]
 }
 
@@ -420,7 +420,7 @@ until_lines() {
 	failed_with "a.state: this is a scene, not the status file of a loop"
 	echo nonsense >a.state
 	run --separate-stderr incise status a.state
-	failed_with "a.state: is no state of a loop"
+	failed_with "a.state: not a status file"
 	"$loop" incise/neck.state done
 	printf '\2' | dd of=incise/neck.state bs=1 seek=8 conv=notrunc 2>/dev/null
 	run --separate-stderr incise status neck
@@ -428,7 +428,7 @@ until_lines() {
 	"$loop" incise/other.state done
 	truncate -s 1000 incise/other.state
 	run --separate-stderr incise status other
-	failed_with "is damaged, or was cut off"
+	failed_with "damaged or truncated"
 }
 
 @test "status refuses bad usage" {

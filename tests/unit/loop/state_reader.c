@@ -247,17 +247,17 @@ static void test_what_is_no_page(void **state)
 	incise_state_free(made.writer);
 	made.writer = NULL;
 	refused("/nosuch/a.state", ENOENT, "No such file");
-	refused("/dev/null", EINVAL, "no state of a loop");
-	refused(made.dir, EINVAL, "no state of a loop");
+	refused("/dev/null", EINVAL, "not a status file");
+	refused(made.dir, EINVAL, "not a status file");
 	store(made.path, 0);
-	refused(made.path, EINVAL, "no state of a loop");
+	refused(made.path, EINVAL, "not a status file");
 	store(made.path, sizeof(page.head) - 1);
-	refused(made.path, EINVAL, "no state of a loop");
+	refused(made.path, EINVAL, "not a status file");
 	store(made.path, sizeof(page) - 8);
-	refused(made.path, EINVAL, "cut off");
+	refused(made.path, EINVAL, "truncated");
 	page.head.magic[3]++;
 	store(made.path, sizeof(page));
-	refused(made.path, EINVAL, "no state of a loop");
+	refused(made.path, EINVAL, "not a status file");
 	page = good;
 	page.head.major++;
 	store(made.path, sizeof(page));
@@ -268,7 +268,7 @@ static void test_what_is_no_page(void **state)
 	refused(made.path, EINVAL, "damaged");
 	unlink(made.path);
 	assert_int_equal(mkfifo(made.path, 0600), 0);
-	refused(made.path, EINVAL, "no state of a loop"); /* and does not wait */
+	refused(made.path, EINVAL, "not a status file"); /* and does not wait */
 	made_free(&made);
 }
 
