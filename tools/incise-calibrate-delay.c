@@ -395,7 +395,7 @@ static void draw(const char *folder, const struct stream *streams,
 		cli_warn("fit.png: could not be drawn; see whether gnuplot works");
 }
 
-/* What fit_pair() and the library have judged, with the limits. */
+/* The verdicts of fit_pair() and the library, with the limits. */
 static void fill_verdict(const struct pair *pairs,
 			 struct incise_calibration_record *record)
 {

@@ -51,7 +51,7 @@ static const struct {
 	 "convert it: tr '\\t' ',' < %1$s > NEW.csv"},
 };
 
-/* What leads from one kind to another. */
+/* The command that makes one kind from another. */
 static const struct {
 	enum file_kind found;
 	unsigned int expected;
@@ -161,7 +161,7 @@ static enum file_kind kind_of_settings(const char *text)
 	return kind;
 }
 
-/* How many of these separators the line at @text has. */
+/* The number of these separators in the line at @text. */
 static int separators(const char *text, char separator)
 {
 	int n = 0;

@@ -286,7 +286,7 @@ const char *plot_window(void)
 	return NULL;
 }
 
-/* What gnuplot reported: '"NAME.gp" line 9: …', below the command, or its first line. */
+/* The report of gnuplot: '"NAME.gp" line 9: …', below the command, or its first line. */
 static void find_report(const char *path, char *report, size_t size)
 {
 	FILE *file = fopen(path, "re");

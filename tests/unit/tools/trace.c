@@ -111,7 +111,7 @@ static void old_values_go_and_gaps_are_empty(void **state)
 	assert_int_equal(trace.n, 1);
 }
 
-/* Whatever comes in, lines have the width and the height that was asked for. */
+/* For any input, lines have the width and the height that was asked for. */
 static void any_value_fits(void **state)
 {
 	static const double values[] = {0,	  -1e-300,   1e300, -1e300,
