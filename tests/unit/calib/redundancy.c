@@ -82,7 +82,7 @@ static void too_little_is_refused(void **state)
 
 	make(pairs, PLAIN, 1);
 	assert_int_equal(incise_redundancy(pairs, 34, &r, &err), -ENODATA);
-	assert_non_null(strstr(err.text, "29 pictures within 1 seconds"));
+	assert_non_null(strstr(err.text, "29 frames within 1 seconds"));
 	assert_int_equal(incise_redundancy(pairs, 150, &r, &err), -ENODATA);
 	assert_int_equal(incise_redundancy(NULL, 0, &r, &err), -ENODATA);
 	pairs[10].camera_mm = NAN;
