@@ -268,8 +268,8 @@ static void test_refusals(void **state)
 		{&still, 600, 0, 0, "one axis only"},
 		{&moved, 600, 0, 0, "the pivot moved"},
 		{&jumped, 600, 0, 0, "the pivot moved"},
-		{&usual, 600, 0, 1, "quaternion w first"},
-		{&usual, 600, 0, 4, "quaternion w first"},
+		{&usual, 600, 0, 1, "check the order of the columns"},
+		{&usual, 600, 0, 4, "check the order of the columns"},
 		{&usual, 600, 3, 6, "check the order of the columns"},
 		{&slow, 600, 0, 0, "independent"},
 	};
