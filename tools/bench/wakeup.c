@@ -478,6 +478,22 @@ static double blame(const struct run *run)
 }
 
 /* A loop that fails fails the program. */
+/* The title of a row's histogram: 99.9 %, or the largest of samples that do not resolve that. */
+static void name_wakeups(struct wakeup *row)
+{
+	bool resolved = !isnan(row->loop.p999) &&
+			(row->no_cyclictest || !isnan(row->cyclictest.p999));
+	const char *name = resolved ? "99.9 %" : "largest";
+	double loop_us = resolved ? row->loop.p999 : row->loop.max;
+	double peer_us = resolved ? row->cyclictest.p999 : row->cyclictest.max;
+
+	if (row->no_cyclictest)
+		snprintf(row->title, sizeof(row->title), "%s: %.0f µs", name, loop_us);
+	else
+		snprintf(row->title, sizeof(row->title),
+			 "%s: %.0f µs, cyclictest %.0f µs", name, loop_us, peer_us);
+}
+
 static void run_both(struct run *run, const char *scene, struct wakeup *row)
 {
 	struct cyclictest *c = &run->cyclictest;
@@ -502,15 +518,12 @@ static void run_both(struct run *run, const char *scene, struct wakeup *row)
 	row->p999 = quantile_of(&row->loop, 0.999);
 	row->tick_max_us = run->stats.tick_max_ns * 1e-3;
 	row->skipped = run->stats.skipped;
-	snprintf(row->title, sizeof(row->title), "99.9 %%: %.0f µs", row->loop.p999);
 	if (!row->no_cyclictest) {
 		row->cyclictest = lateness_of(c->late_us, c->max_us);
 		row->ratio = row->loop.p999 / row->cyclictest.p999;
 		row->machine = blame(run);
-		snprintf(row->title, sizeof(row->title),
-			 "99.9 %%: %.0f µs, cyclictest %.0f µs", row->loop.p999,
-			 row->cyclictest.p999);
 	}
+	name_wakeups(row);
 }
 
 static void measure(const char *scene, enum load_kind load, const struct wakeups *wakeups,
