@@ -275,7 +275,7 @@ replaces_when_told() {
 		info m.fis --plot out.odd|--plot: out.odd: unknown extension .odd; give .png or .svg
 		plot d.rec -o out.odd|--output: out.odd: unknown extension .odd; give .png, .svg or .pdf
 		calibrate tip --from none.csv --keep out.odd|--keep: out.odd: unknown extension .odd; give .csv
-		capture -o out.odd|not a name that ends in .rec
+		capture -o out.odd|expected a name that ends in .rec
 	END
 	if [ -x "$INCISE_BUILD/bin/incise-view" ]; then
 		run --separate-stderr incise view wall --procedure --video a.mp4

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * An export as a source of Arrow batches. An export pushes its rows; a stream is pulled: the export
- * runs in a thread, which hands over a block of rows at a time and waits until it is taken.
+ * runs in a thread, but only while the caller waits in get_next() for a block of rows.
  *
- *     thread:   rows ──► block ──► array ─┐ waits while the last one is there
- *     caller:                             └──► get_next()
+ *     thread:   waits ─┐ rows ──► block ─┐ waits
+ *     caller:          └ get_next() ……   └──► returns
+ *
+ * So a caller that forks finds the thread at rest: SQLite's locks are free in the child.
  */
 #include <errno.h>
 #include <math.h>
@@ -32,6 +34,7 @@ struct table_source {
 	pthread_cond_t changed;
 	struct ArrowArray block; /* release NULL: none */
 	bool started;		 /* the columns are known */
+	bool wanted;		 /* the caller waits for a block */
 	bool ended, stop;
 	int rc; /* of the export, once it has ended */
 	struct incise_error err;
@@ -69,6 +72,24 @@ static enum incise_arrow_type type_of(enum incise_column_type type)
 	}
 }
 
+/* Leave a block, or NULL before the first, and wait until another is wanted. 0 or -ECANCELED. */
+static int hand_over(struct table_source *source, const struct ArrowArray *block)
+{
+	bool stop;
+
+	pthread_mutex_lock(&source->lock);
+	if (block) {
+		source->block = *block;
+		source->wanted = false;
+	}
+	pthread_cond_broadcast(&source->changed);
+	while (!source->wanted && !source->stop)
+		pthread_cond_wait(&source->changed, &source->lock);
+	stop = source->stop;
+	pthread_mutex_unlock(&source->lock);
+	return stop ? -ECANCELED : 0;
+}
+
 static int table_begin(struct incise_table *table, struct incise_error *err)
 {
 	struct table_source *source = source_of(table);
@@ -89,7 +110,7 @@ static int table_begin(struct incise_table *table, struct incise_error *err)
 	source->base.fields = source->fields;
 	source->base.n_fields = table->n_columns;
 	signal_state(source, &source->started);
-	return 0;
+	return hand_over(source, NULL);
 }
 
 static void put_cell(struct table_source *source, const struct incise_table *table,
@@ -107,25 +128,6 @@ static void put_cell(struct table_source *source, const struct incise_table *tab
 	default:
 		incise_arrow_put_int(&source->batch, column, cell->integer);
 	}
-}
-
-/* Wait until the last block is taken, and leave this one. Returns 0 or -ECANCELED. */
-static int hand_over(struct table_source *source, struct ArrowArray *block)
-{
-	bool stop;
-
-	pthread_mutex_lock(&source->lock);
-	while (source->block.release && !source->stop)
-		pthread_cond_wait(&source->changed, &source->lock);
-	stop = source->stop;
-	if (!stop) {
-		source->block = *block;
-		pthread_cond_broadcast(&source->changed);
-	}
-	pthread_mutex_unlock(&source->lock);
-	if (stop)
-		block->release(block);
-	return stop ? -ECANCELED : 0;
 }
 
 static int table_rows(struct incise_table *table, struct incise_error *err)
@@ -185,12 +187,13 @@ static int table_next(struct incise_arrow_source *base, struct ArrowArray *array
 	int rc = 0;
 
 	pthread_mutex_lock(&source->lock);
+	source->wanted = true;
+	pthread_cond_broadcast(&source->changed);
 	while (!source->block.release && !source->ended)
 		pthread_cond_wait(&source->changed, &source->lock);
 	if (source->block.release) {
 		*array = source->block;
 		source->block.release = NULL;
-		pthread_cond_broadcast(&source->changed);
 	} else {
 		rc = source->rc;
 		*err = source->err;
