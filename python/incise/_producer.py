@@ -12,6 +12,13 @@ _capsule_pointer = ctypes.PYFUNCTYPE(ctypes.c_void_p, ctypes.py_object, ctypes.c
 )
 
 
+def _released(pointer):
+    """Mark a struct as released; its memory is the stream's."""
+    struct = pointer.contents
+    place = type(struct).release
+    ctypes.memset(ctypes.addressof(struct) + place.offset, 0, place.size)
+
+
 class ColumnStream:
     """A stream over {name: values}. Keep it until the stream is released."""
 
@@ -43,26 +50,10 @@ class ColumnStream:
             dict(kind._fields_)["get_schema"](self._get_schema),
             dict(kind._fields_)["get_next"](self._get_next),
             dict(kind._fields_)["get_last_error"](lambda stream: None),
-            dict(kind._fields_)["release"](self._release),
+            dict(kind._fields_)["release"](_released),
         )
-        self._release_schema = dict(ArrowSchema._fields_)["release"](self._no_schema)
-        self._release_array = dict(ArrowArray._fields_)["release"](self._no_array)
-
-    @staticmethod
-    def _no_schema(schema):
-        ctypes.memmove(
-            ctypes.addressof(schema.contents) + ArrowSchema.release.offset,
-            bytes(ctypes.sizeof(ctypes.c_void_p)),
-            ctypes.sizeof(ctypes.c_void_p),
-        )
-
-    @staticmethod
-    def _no_array(column):
-        ctypes.memmove(
-            ctypes.addressof(column.contents) + ArrowArray.release.offset,
-            bytes(ctypes.sizeof(ctypes.c_void_p)),
-            ctypes.sizeof(ctypes.c_void_p),
-        )
+        self._release_schema = dict(ArrowSchema._fields_)["release"](_released)
+        self._release_array = dict(ArrowArray._fields_)["release"](_released)
 
     def _keep(self, *buffers):
         kept = (ctypes.c_void_p * len(buffers))()
@@ -125,14 +116,6 @@ class ColumnStream:
         )
         batch.release = self._release_array
         return 0
-
-    @staticmethod
-    def _release(stream):
-        ctypes.memmove(
-            ctypes.addressof(stream.contents) + ArrowArrayStream.release.offset,
-            bytes(ctypes.sizeof(ctypes.c_void_p)),
-            ctypes.sizeof(ctypes.c_void_p),
-        )
 
 
 def open_stream(table):

@@ -209,7 +209,7 @@ static int replay_tick(void *context, const struct incise_replay_tick *tick,
 	return incise_error_set(err, ECANCELED, "ended");
 }
 
-/* What of a recording is shown; 0: not known. */
+/* The part of a recording that is shown; 0: not known. */
 static double recorded_s(const struct view_job *job, struct incise_recording *recording)
 {
 	static struct incise_recording_info info;
