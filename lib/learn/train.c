@@ -13,50 +13,11 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../base/ascending.h"
 #include "anfis.h"
+#include "interval.h"
 #include "pairs.h"
 #include "tune.h"
 #include "varpro.h"
-
-/* The 97.5 % quantile of Student's t, to 0.1 %. */
-static double student(int freedom)
-{
-	static const double few[] = {12.706, 4.303, 3.182, 2.776, 2.571};
-	const double z = INCISE_INTERVAL95, n = freedom;
-
-	if (freedom <= 5)
-		return few[freedom - 1];
-	/* Cornish and Fisher's expansion. */
-	return z + (pow(z, 3) + z) / (4 * n) +
-	       (5 * pow(z, 5) + 16 * pow(z, 3) + 3 * z) / (96 * n * n);
-}
-
-static int held_out_noise(const struct incise_basis *basis,
-			  const struct incise_folds *folds,
-			  const struct incise_ridge *ridge, int epochs, double *noise)
-{
-	double *error = malloc((size_t)epochs * folds->n_units * sizeof(*error));
-	double *ratios = malloc(folds->n_held * sizeof(*ratios));
-	int rc = error && ratios ? incise_crossval_search(basis, folds, ridge, epochs,
-							  error, ratios)
-				 : -ENOMEM;
-
-	if (!rc) {
-		/* The quantile that also holds the pair to come: (n+1)·0.95 from below. */
-		double rank = ceil(0.95 * (folds->n_held + 1.0));
-		size_t at = fmin(rank, folds->n_held) - 1;
-
-		qsort(ratios, folds->n_held, sizeof(*ratios), ascending);
-		*noise = ratios[at] / INCISE_INTERVAL95 * student(folds->n_units - 1) /
-			 INCISE_INTERVAL95;
-	}
-	free(error);
-	free(ratios);
-	return rc;
-}
-
-/* --- training --- */
 
 /* MATLAB's recursive least squares starts with S = 1e6 I, which is this ridge. */
 #define CLASSIC_RIDGE 1e-6
@@ -279,7 +240,8 @@ static int find_uncertainty(struct learner *l, const struct incise_tuning *tunin
 	const double *factor;
 
 	ridge.ridge = fmax(ridge.ridge, LEAST_RIDGE);
-	rc = held_out_noise(&tuning->basis, &l->folds, &ridge, tuning->epochs, &noise);
+	rc = incise_interval_noise(&tuning->basis, &l->folds, &ridge, tuning->epochs,
+				   &noise);
 	if (rc)
 		return rc;
 	factor = incise_lsq_factor(l->lsq, &ridge, &stride);
