@@ -112,9 +112,53 @@ static double log_degree(enum incise_mf_type type, const double *p, double x)
 	return fmax(t > 40 ? -t : -log1p(exp(t)), LOG_MIN);
 }
 
+typedef double v4 __attribute__((vector_size(32)));
+typedef int64_t i4 __attribute__((vector_size(32)));
+
+/* Below, exp() is taken as 0: its result is nearly subnormal. */
+#define EXP_MIN (-708.0)
+
+/*
+ * exp() of numbers up to 0, to less than a unit in the last place (the method of fdlibm), with the
+ * same bits on every machine: the C library's differ with the processor. n up to a multiple
+ * of 4 is read and written.
+ */
+static void exponentials(double *values, int n)
+{
+	const double log2_e = 1.44269504088896338700,
+		     ln2_high = 6.93147180369123816490e-01,
+		     ln2_low = 1.90821492927058770002e-10, whole = 0x1.8p52;
+
+	for (int at = 0; at < n; at += 4) {
+		v4 x, k, bits, high, low, r, t, c, y;
+		i4 inside, power;
+
+		memcpy(&x, values + at, sizeof(x));
+		inside = x >= EXP_MIN;
+		x = (v4)((i4)x & inside);
+		bits = x * log2_e + whole;
+		k = bits - whole;
+		high = x - k * ln2_high;
+		low = k * ln2_low;
+		r = high - low;
+		t = r * r;
+		c = r - t * (1.66666666666666019037e-01 +
+			     t * (-2.77777777770155933842e-03 +
+				  t * (6.61375632143793436117e-05 +
+				       t * (-1.65339022054652515390e-06 +
+					    t * 4.13813679705723846039e-08))));
+		y = 1 - ((low - (r * c) / (2 - c)) - high);
+		/* The lowest bits of `bits` are k: shifted, they are 2ᵏ but for the bias. */
+		power = ((i4)bits << 52) + (1023LL << 52);
+		y = y * (v4)power;
+		y = (v4)((i4)y & inside);
+		memcpy(values + at, &y, sizeof(y));
+	}
+}
+
 void incise_basis_firing(const struct incise_basis *basis, const double *x, double *w)
 {
-	double degree[INCISE_MODEL_MFS_MAX];
+	double degree[INCISE_MODEL_MFS_MAX + 3] = {0};
 	int n = 1;
 
 	w[0] = 1;
@@ -127,10 +171,11 @@ void incise_basis_firing(const struct incise_basis *basis, const double *x, doub
 					       basis->p + basis->at[i][k], x[i]);
 			largest = fmax(largest, degree[k]);
 		}
-		for (int k = 0; k < n_mfs; k++) {
-			degree[k] = exp(degree[k] - largest);
+		for (int k = 0; k < n_mfs; k++)
+			degree[k] -= largest;
+		exponentials(degree, n_mfs);
+		for (int k = 0; k < n_mfs; k++)
 			sum += degree[k];
-		}
 		for (int k = 0; k < n_mfs; k++)
 			degree[k] /= sum;
 		/* From the last, because the results grow over their sources. */

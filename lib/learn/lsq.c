@@ -89,6 +89,12 @@ void incise_lsq_reset(struct incise_lsq *lsq)
 	memset(lsq->r, 0, (size_t)(lsq->n + 1) * lsq->stride * sizeof(double));
 }
 
+double *incise_lsq_factor_row(struct incise_lsq *lsq, int i)
+{
+	lsq->rows = 0;
+	return lsq->r + (size_t)i * lsq->stride;
+}
+
 double *incise_lsq_row(struct incise_lsq *lsq)
 {
 	return lsq->a + (size_t)lsq->rows * lsq->stride;

@@ -32,6 +32,12 @@ void incise_lsq_free(struct incise_lsq *lsq);
 /* Forget all rows. */
 void incise_lsq_reset(struct incise_lsq *lsq);
 
+/*
+ * Row i of the n+1 of the factor without a ridge, for a factor that was found in another way to
+ * be put in: elements i … n of each. Rows that wait are forgotten.
+ */
+double *incise_lsq_factor_row(struct incise_lsq *lsq, int i);
+
 /* The n coefficients of the next row, to be filled in: they are not zero. */
 double *incise_lsq_row(struct incise_lsq *lsq);
 

@@ -5,15 +5,16 @@
  *   classic:  anfis.c on the data as they are ──────────────────────────────┐
  *   default:  scaling ─▶ tune.c ─▶ varpro.c ─▶ consequents of all pairs ──┐ │
  *                        └ a random part of very many pairs ┘             ▼ ▼
- *                       report, and the standard deviation ◀── one QR of all pairs
+ *        report, and the standard deviation ◀── the exact Gram matrix of all pairs
  *
- * Memory: the tuned part and its folds, and triangular factors; the pairs are streamed.
+ * Memory: the tuned part and its folds, and triangular factors; the pairs are read in order.
  */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "anfis.h"
+#include "design.h"
 #include "interval.h"
 #include "pairs.h"
 #include "tune.h"
@@ -24,9 +25,6 @@
 
 /* Pairs that settle ridge and premises; beyond, more of them change neither. */
 #define TUNED_MAX 3000
-
-/* A rule that never fires stronger than this learns nothing from the data. */
-#define UNFIRED 0.05
 
 /* Just enough that the standard deviation is finite where the user wants no ridge. */
 #define LEAST_RIDGE 1e-9
@@ -40,6 +38,7 @@ struct learner {
 	struct incise_basis basis; /* scaled */
 	double *consequents;
 	struct incise_lsq *lsq;
+	struct incise_design design; /* of all pairs */
 	struct incise_sample tuned;
 	struct incise_folds folds; /* of that */
 };
@@ -146,26 +145,33 @@ static bool on_epoch(void *user, int epoch, const struct incise_basis *basis,
 	return !options->stop || !*options->stop;
 }
 
-/* One QR of all pairs at the premises reached, and which rules they fire. */
-static void fold_all(struct learner *l)
+/*
+ * The least squares of all pairs at the premises of the model, and which rules they fire. Both
+ * basis and scaling are then those of that; the former is taken from the model, so that a model
+ * that was read again leads to the same numbers.
+ */
+static int fold_all(struct learner *l)
 {
-	double w[INCISE_MODEL_RULES_MAX], largest[INCISE_MODEL_RULES_MAX] = {0};
-	double x[INCISE_MODEL_INPUTS_MAX + 1];
-	int d = l->train->n_inputs;
+	int d = l->train->n_inputs, rc;
+	const double *y = l->train->rows + d;
+	double min = *y, max = *y, mean, scale;
 
-	incise_lsq_reset(l->lsq);
-	for (size_t i = 0; i < l->train->n; i++) {
-		incise_scaling_row(&l->scaling, l->train->rows + i * (d + 1), x);
-		incise_basis_firing(&l->basis, x, w);
-		for (int r = 0; r < l->basis.n_rules; r++)
-			largest[r] = fmax(largest[r], w[r]);
-		incise_basis_row(&l->basis, w, x, incise_lsq_row(l->lsq));
-		incise_lsq_add(l->lsq, x[d]);
+	for (size_t i = 1; i < l->train->n; i++) {
+		min = fmin(min, y[i * (d + 1)]);
+		max = fmax(max, y[i * (d + 1)]);
 	}
+	rc = incise_design_init(&l->design, l->model, min, max);
+	for (size_t i = 0; i < l->train->n && !rc; i++)
+		rc = incise_design_add(&l->design, l->train->rows + i * (d + 1));
+	if (rc)
+		return rc;
 	for (int r = 0; r < l->basis.n_rules; r++) {
-		l->report->unfired[r] = largest[r] < UNFIRED;
+		l->report->unfired[r] = l->design.largest[r] < DESIGN_UNFIRED;
 		l->report->rules_unfired += l->report->unfired[r];
 	}
+	l->basis = l->design.basis;
+	incise_design_target(&l->design, l->design.gram, &l->scaling, &mean, &scale);
+	return incise_gram_factor(l->design.gram, mean, scale, l->lsq);
 }
 
 static int train_classic(struct learner *l, struct incise_tuning *tuning)
@@ -186,8 +192,9 @@ static int train_classic(struct learner *l, struct incise_tuning *tuning)
 		rc = incise_basis_init(&l->basis, l->model);
 	if (rc)
 		return rc;
-	incise_scaling_premises(&l->scaling, &l->basis, false);
-	fold_all(l);
+	rc = fold_all(l);
+	if (rc)
+		return rc;
 	*tuning = (struct incise_tuning){.epochs = 1, .basis = l->basis, .rmse = NAN};
 	tuning->ridge = (struct incise_ridge){
 		CLASSIC_RIDGE, 1, l->basis.n_rules * (l->basis.n_inputs + 1), 1};
@@ -213,7 +220,12 @@ static int train_default(struct learner *l, struct incise_tuning *tuning)
 		rc = -ECANCELED;
 	if (rc)
 		return rc;
-	fold_all(l);
+	raw = l->basis;
+	incise_scaling_premises(&l->scaling, &raw, true);
+	incise_basis_store(&raw, l->model);
+	rc = fold_all(l);
+	if (rc)
+		return rc;
 	rc = incise_lsq_solve(l->lsq, &tuning->ridge, l->consequents);
 	if (!rc)
 		rc = incise_scaling_consequents(&l->scaling, l->basis.n_rules,
@@ -222,9 +234,6 @@ static int train_default(struct learner *l, struct incise_tuning *tuning)
 		rc = incise_basis_set_consequents(l->model, l->consequents);
 	if (rc)
 		return rc;
-	raw = l->basis;
-	incise_scaling_premises(&l->scaling, &raw, true);
-	incise_basis_store(&raw, l->model);
 	l->report->epochs = l->report->best_epoch = varpro.run;
 	l->report->start = tuning->start;
 	l->report->pairs_tuned = l->tuned.pairs.n;
@@ -301,7 +310,9 @@ static int fail(struct incise_error *err, int rc)
 {
 	return incise_error_set(
 		err, -rc,
-		rc == -ENOMEM	   ? "no memory to train"
+		rc == -ENOMEM	? "no memory to train"
+		: rc == -ERANGE ? "a training pair is a whole range or more outside the "
+				  "model's ranges; give the model the ranges of the pairs"
 		: rc == -ECANCELED ? "training was stopped"
 		: rc == -ENOTSUP
 			? "only models whose rules are the full grid of Gaussians or "
@@ -343,6 +354,7 @@ int incise_train(struct incise_model *model, const struct incise_pairs *train,
 		incise_model_assign(model, l->model);
 	incise_model_free(l->model);
 	incise_lsq_free(l->lsq);
+	incise_design_free(&l->design);
 	incise_folds_free(&l->folds);
 	free(l->consequents);
 	incise_sample_free(&l->tuned);

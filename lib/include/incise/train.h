@@ -77,8 +77,9 @@ struct incise_train_report {
 	double ridge;	/**< ridge in use */
 	double train_rmse,
 		check_rmse; /**< of the kept parameters; check NaN without data */
-	double condition;   /**< of the scaled least-squares problem, without ridge */
-	int parameters;	    /**< linear + premise */
+	/** Of the scaled least-squares problem, without ridge; infinite: not all is determined. */
+	double condition;
+	int parameters;	   /**< linear + premise */
 	int rules_unfired; /**< rules whose firing strength never exceeds 0.05 in the data */
 	/**
 	 * 1 - (squared error)/(variation about the mean of that side); NaN for a constant
@@ -115,7 +116,8 @@ INCISE_API void incise_train_options_init(struct incise_train_options *options);
  * @param report  or NULL
  * @return 0; -EINVAL (no pairs, a value that is not finite, wrong n_inputs, a constant input),
  *         -ENODATA (fewer pairs than consequent parameters), -ENOTSUP (the rules are not a
- *         full grid, the AND method is min, or another kind of membership function), -EDOM
+ *         full grid, the AND method is min, or another kind of membership function), -ERANGE (a
+ *         training pair is a whole range or more outside the model's ranges), -EDOM
  *         (least squares failed), -ECANCELED (options->stop), -ENOMEM. On error the model is
  *         unchanged.
  */
