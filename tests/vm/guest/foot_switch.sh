@@ -62,7 +62,7 @@ check "the next press: auto again" presses "blade (auto)"
 pull_out
 check "pulled out: one warning" until_it "foot switch disconnected"
 sleep 3
-once() { [ "$(grep -c "no foot switch" /run/err)" = 1 ]; }
+once() { [ "$(grep -c "foot switch disconnected" /run/err)" = 1 ]; }
 check "and only one" once
 plug_in
 check "plugged in: it is back" until_it "foot switch: /run/pedal is back"

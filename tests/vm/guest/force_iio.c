@@ -278,7 +278,7 @@ static void refusals(void)
 		{"none", "", HZ, ENODEV, "no such IIO device \"none\"; there are: "},
 		{INCISE_SIM_ADC, "none", HZ, ENODEV, "no such trigger \"none\""},
 		{INCISE_SIM_ADC, INCISE_SIM_TRIGGER, 50000, EINVAL,
-		 "does not take 50000 Hz"},
+		 "does not support 50000 Hz"},
 		{INCISE_SIM_ADC, "", 0, EINVAL, "correct force_setup"},
 		{"", "", HZ, EINVAL, "expected iio:NAME"},
 	};
