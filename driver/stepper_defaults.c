@@ -121,8 +121,7 @@ static void stepper_defaults_fit(struct stepper_motor *motor,
 
 	if (c->tick_ns < info->tick_min_ns) {
 		dev_warn(dev,
-			 "motor %u: a tick of %u ns is too short for this machine: at "
-			 "least %u\n",
+			 "motor %u: a tick of %u ns is too short here: at least %u\n",
 			 motor->index, c->tick_ns, info->tick_min_ns);
 		c->tick_ns = info->tick_min_ns;
 	}

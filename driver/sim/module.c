@@ -23,8 +23,7 @@ MODULE_PARM_DESC(ring, "Number of edges kept for a reader, up to 2^24");
 
 static char *source = "";
 module_param(source, charp, 0444);
-MODULE_PARM_DESC(source, "Controller whose plans have the ADC as source, for example "
-			 "incise-stepper.0");
+MODULE_PARM_DESC(source, "Controller whose plans read the ADC: incise-stepper.0");
 
 static struct sim sim_instance;
 static struct sim_adc sim_adc_instance;
