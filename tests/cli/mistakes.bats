@@ -22,6 +22,9 @@ setup() {
 	printf '5mm 20\n' >unit.txt
 	printf '5,3 20,1\n' >comma.txt
 	printf '5\n' >one.txt
+	printf 'tissue = { reaction_N_mm = 50.0; };\n' >stiff.scene
+	mkdir bad.rec
+	head -c 4096 /dev/zero >bad.rec/recording.db
 }
 
 # Exit code, arguments of incise, message.
@@ -78,6 +81,7 @@ table() {
 		1|plan typo.scene|incise plan: typo.scene:2: tisue: unknown key; did you mean tissue?
 		1|plan unit.scene|incise plan: unit.scene:2: limits.force_mN: unknown key; expected force_N, in the unit of its name
 		1|plan m.fx|incise plan: m.fx: this is a compiled model (.fx), not a scene; give a scene, and the model with --model m.fx
+		1|plan stiff.scene|incise plan: stiff.scene: not stable: its tissue has 50 N/mm and 0 N s/mm, but a device of 0.05 kg and 0.01 N s/mm with a tracker of 120 Hz and 4.2 ms is stable up to 0.3997 N/mm, of which 5 % are kept in reserve; set tissue.gain to at most 0.00756, or describe the device
 		1|plan rig.conf|incise plan: rig.conf: this is the configuration of a rig, not a scene; name it with --rig rig.conf
 		1|haptic typo.scene --rig sim:|incise haptic: typo.scene:2: tisue: unknown key; did you mean tissue?
 		2|capture|incise capture: missing -o NAME.rec (output recording)
@@ -94,6 +98,10 @@ table() {
 		2|capture -o x.rec --rig sim: --duraton 5s|incise capture: --duraton: no such option; did you mean --duration?
 		2|export|incise export: missing NAME.rec (recording to export)
 		1|export pairs.csv -o x.csv|incise export: pairs.csv: this is a CSV table (separated by commas), not a recording; 'incise train' learns from one, 'incise calibrate KIND --from' reads readings
+		1|verify bad.rec|incise verify: bad.rec: damaged (file is not a database); copy it; `sqlite3 bad.rec/recording.db .recover` may save rows
+		1|export bad.rec -o x.csv|incise export: bad.rec: damaged (file is not a database); copy it; `sqlite3 bad.rec/recording.db .recover` may save rows
+		1|train pairs.csv --mf 2,2 -o /proc/x.fis|incise train: /proc/x.fis: cannot be written: No such file or directory; give another path
+		1|compile m.fis -o ./m.fis --overwrite|incise compile: ./m.fis: is an input (m.fis); give another path to write
 		2|verify|incise verify: missing NAME.rec (recording to check)
 		1|verify m.fis|incise verify: m.fis: this is a model (.fis), not a recording; 'incise info m.fis' describes it, 'incise eval m.fis' runs it
 		2|replay|incise replay: missing NAME.rec (recording)
