@@ -12,6 +12,7 @@
 #include "cli/json.h"
 #include "cli/mapped_libraries.h"
 #include "cli/scene_argument.h"
+#include "cli/stopwatch.h"
 #include "cli/tick_cost.h"
 
 /* Seconds of the stroke in which ticks are timed. */
@@ -51,6 +52,67 @@ static const struct cli_command command = {
 		"Exit: 0 shown, 1 failed or not stable, 2 bad usage. See incise-plan(1).",
 };
 
+/* Places over the ranges of a model's inputs at which its evaluation is timed; rounds of them. */
+#define PLACES 1000
+#define ROUNDS 21
+
+/* ns of an evaluation of the model, of the middle half of the rounds. */
+static double model_ns(const struct incise_plan *plan,
+		       const struct incise_plan_model *model)
+{
+	double ns[ROUNDS], x[PLACES][INCISE_PLAN_INPUTS_MAX];
+	volatile double sum = 0;
+
+	for (int k = 0; k < PLACES; k++)
+		for (int i = 0; i < model->n_inputs; i++)
+			x[k][i] = model->min[i] +
+				  (model->max[i] - model->min[i]) *
+					  fmod(0.5 + k * sqrt(2 + 3 * i), 1);
+	for (int round = 0; round < ROUNDS; round++) {
+		double begin = stopwatch_ns();
+
+		for (int k = 0; k < PLACES; k++)
+			sum += incise_plan_model_force(plan, x[k]);
+		ns[round] = (stopwatch_ns() - begin) / PLACES;
+	}
+	stopwatch_sort(ns, ROUNDS);
+	return stopwatch_middle(ns, ROUNDS);
+}
+
+static json_t *model_json(const struct incise_plan *plan)
+{
+	struct incise_plan_model model;
+	json_t *inputs = json_array();
+
+	incise_plan_model(plan, &model);
+	for (int i = 0; i < model.n_inputs; i++)
+		json_array_append_new(
+			inputs, json_pack("{ss sf sf}", "name", model.input[i], "min",
+					  model.min[i], "max", model.max[i]));
+	if (model.n_inputs)
+		return json_pack("{so ss sf sI}", "inputs", inputs, "evaluator",
+				 model.evaluator, "ns", model_ns(plan, &model),
+				 "memory_bytes", (json_int_t)model.memory_bytes);
+	json_decref(inputs);
+	return json_null();
+}
+
+/* The inputs of the model, with their ranges, and its cost. */
+static void print_evaluation(const struct incise_plan *plan)
+{
+	struct incise_plan_model model;
+
+	incise_plan_model(plan, &model);
+	if (!model.n_inputs)
+		return;
+	printf("model       ");
+	for (int i = 0; i < model.n_inputs; i++)
+		printf("%s%s %.4g to %.4g", i ? ", " : "", model.input[i], model.min[i],
+		       model.max[i]);
+	printf("\n            %s: %.0f ns an evaluation, %.1f KiB\n", model.evaluator,
+	       model_ns(plan, &model), (double)model.memory_bytes / 1024);
+}
+
 static double margin(const struct incise_plan_stability *s)
 {
 	return s->stiffness_N_mm > 0 ? s->limit_N_mm / s->stiffness_N_mm : INFINITY;
@@ -75,14 +137,15 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 {
 	const struct incise_haptic_device *d = &s->device;
 
-	return json_pack("{so so so so so so so sf sf sf sf si s{sf sf sf sf sf} sf sf "
-			 "si sb sb s{sf sf sf sf sf si}}",
+	return json_pack("{so so so so so so so sf sf sf sf sf si s{sf sf sf sf sf} sf "
+			 "sf si sb sb s{sf sf sf sf sf si}}",
 			 "stiffness_N_mm", json_number(s->stiffness_N_mm), "limit_N_mm",
 			 json_number(s->limit_N_mm), "margin", json_number(margin(s)),
 			 "damping_N_s_mm", json_number(s->damping_N_s_mm),
 			 "speed_slope_N_s_mm", json_number(s->speed_slope_N_s_mm),
 			 "passive_N_mm", json_number(passive_N_mm(s)), "encoder_N_mm",
-			 json_number(encoder_N_mm(s)), "slope_N_mm", s->slope_N_mm,
+			 json_number(encoder_N_mm(s)), "acceleration_slope_N_s2_mm",
+			 s->acceleration_slope_N_s2_mm, "slope_N_mm", s->slope_N_mm,
 			 "unloading_N_mm", s->unloading_N_mm, "support_mm", s->support_mm,
 			 "beyond_N_mm", s->beyond_N_mm, "leans", s->runs, "worst",
 			 "lean_N", s->worst.lean_N, "along_mm_s", s->worst.along_mm_s,
@@ -150,6 +213,7 @@ static void report_json(const struct job *job, const struct incise_plan *plan,
 			 : json_pack("[ssss]", "tracker", "stepper", "force", "camera"),
 		"libraries", mapped, "unmapped_libraries", unmapped_libraries(mapped));
 	json_object_update_new(object, stability_json(&stability));
+	json_object_set_new(object, "model", model_json(plan));
 	json_object_set_new(object, "axes", axes_json(rig, &stability));
 	json_print(object);
 }
@@ -160,6 +224,9 @@ static void print_model(const struct incise_plan_stability *s)
 	printf("            the model: up to %.3g N/mm and %.3g N s/mm, to a depth of "
 	       "%.3g mm, then on with %.3g N/mm\n",
 	       s->slope_N_mm, s->speed_slope_N_s_mm, s->support_mm, s->beyond_N_mm);
+	if (s->acceleration_slope_N_s2_mm > 0)
+		printf("            by acceleration it acts as a mass of up to %.3g kg\n",
+		       s->acceleration_slope_N_s2_mm * 1e3);
 	if (s->unloading_N_mm > 0)
 		printf("            withdrawal: unloads with %.3g N/mm, %.3g mm for each N, "
 		       "then friction\n",
@@ -288,6 +355,7 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 	if (bound_N > 0)
 		printf(", reaction and plane within %.3g mN, certified", bound_N * 1e3);
 	putchar('\n');
+	print_evaluation(plan);
 	print_stability(plan);
 	incise_plan_stability(plan, &stability);
 	if (rig)

@@ -21,7 +21,7 @@
 #define LATE_MOST 32  /* P in the latency */
 /* On their way are those of the latency, and those that wait for their tick. */
 #define WAITING_MOST (LATE_MOST + POSES_MOST)
-#define OWN_STATES 7 /* of device and predictor */
+#define OWN_STATES 8 /* of device and predictor; the last one counts with A only */
 #define STATES (OWN_STATES + WAITING_MOST + INCISE_POSE_LOOP_LATE_MAX)
 
 /* Part of a tick that a pose waits before it is taken in: the mean. */
@@ -43,8 +43,8 @@ struct loop {
 	int ticks, poses; /* in a period */
 	int waiting;	  /* poses on their way when a period starts */
 	int late;	  /* ticks until a force acts */
-	int states;
-	double K, B;
+	int own_states, states;
+	double K, B, A;
 };
 
 /* Three runs at once: the predictor has three axes. */
@@ -71,12 +71,12 @@ static double *place(const struct loop *loop, struct run *run, int state, int ax
 		&run->plant[axis].position_mm, &run->plant[axis].velocity_mm_s,
 		&run->predict.x[axis],	       &run->predict.v[axis],
 		&run->predict.a[axis],	       &run->predict.x_shown[axis],
-		&run->predict.v_shown[axis],
+		&run->predict.v_shown[axis],   &run->predict.a_shown[axis],
 	};
 
-	if (state < OWN_STATES)
+	if (state < loop->own_states)
 		return own[state];
-	state -= OWN_STATES;
+	state -= loop->own_states;
 	return state < loop->waiting ? &run->pose_mm[state][axis]
 				     : &run->late_N[state - loop->waiting][axis];
 }
@@ -104,11 +104,14 @@ static void take_pose(struct run *run, double arrival_s)
 
 static void set_force(const struct loop *loop, struct run *run)
 {
-	double x[3], v[3], attitude[4];
+	double x[3], v[3], a[3] = {0}, attitude[4];
 
 	incise_predict_at(&run->predict, to_ns(run->t_s), x, v, attitude);
+	if (loop->A != 0)
+		incise_predict_acceleration(&run->predict, to_ns(run->t_s), a);
 	for (int i = 0; i < 3; i++)
-		run->late_N[loop->late][i] = -loop->K * x[i] - loop->B * v[i];
+		run->late_N[loop->late][i] =
+			-loop->K * x[i] - loop->B * v[i] - loop->A * a[i];
 	memcpy(run->force_N, run->late_N[0], sizeof(run->force_N));
 	memmove(run->late_N[0], run->late_N[1],
 		(size_t)loop->late * sizeof(run->late_N[0]));
@@ -234,7 +237,8 @@ static void set_times(struct loop *loop, double tick_s)
 	loop->tick_s = loop->pose_s * loop->poses / loop->ticks;
 	loop->waiting =
 		(int)((loop->latency_s + LEAD * loop->tick_s) / loop->pose_s + 1e-9);
-	loop->states = OWN_STATES + loop->waiting + loop->late;
+	loop->own_states = loop->A != 0 ? OWN_STATES : OWN_STATES - 1;
+	loop->states = loop->own_states + loop->waiting + loop->late;
 }
 
 /* The predictor as it is at the begin of a period, with all that it knows 0. */
@@ -248,7 +252,8 @@ static void set_predict(struct loop *loop)
 	p->arrival_ns = to_ns(-LEAD * loop->tick_s);
 	p->t_ns = p->arrival_ns - p->latency_ns;
 	for (int i = 0; i < 3; i++)
-		p->x[i] = p->v[i] = p->a[i] = p->x_shown[i] = p->v_shown[i] = 0;
+		p->x[i] = p->v[i] = p->a[i] = p->x_shown[i] = p->v_shown[i] =
+			p->a_shown[i] = 0;
 }
 
 static bool valid(const struct incise_pose_loop *of)
@@ -257,8 +262,8 @@ static bool valid(const struct incise_pose_loop *of)
 
 	return d->mass_kg > 0 && isfinite(d->mass_kg) && d->damping_N_s_mm >= 0 &&
 	       isfinite(d->damping_N_s_mm) && d->period_s > 0 && isfinite(d->period_s) &&
-	       isfinite(of->damping_N_s_mm) && of->late_ticks >= 0 &&
-	       of->late_ticks <= INCISE_POSE_LOOP_LATE_MAX;
+	       isfinite(of->damping_N_s_mm) && isfinite(of->acceleration_N_s2_mm) &&
+	       of->late_ticks >= 0 && of->late_ticks <= INCISE_POSE_LOOP_LATE_MAX;
 }
 
 static void loop_init(struct loop *loop, const struct incise_pose_loop *of)
@@ -272,6 +277,7 @@ static void loop_init(struct loop *loop, const struct incise_pose_loop *of)
 		.predict = *of->predict,
 		.late = of->late_ticks,
 		.B = of->damping_N_s_mm,
+		.A = of->acceleration_N_s2_mm,
 	};
 	if (hand) {
 		loop->plant.mass_kg += hand->mass_kg;

@@ -3,7 +3,7 @@
  * Largest stable stiffness of a wall felt through a tracker: the loop of device, tracker,
  * predictor (with extrapolation and blending) and wall.
  *
- *   device ──pose, P apart──▶ latency ──▶ predict ──each tick T──▶ f = -K x - B v ──┐
+ *   device ──pose, P apart──▶ latency ──▶ predict ──each tick T──▶ f = -Kx-Bv-Aa ───┐
  *      ▲                                                                            │
  *      └───────────────────────────── held for T ◀──────────────────────────────────┘
  *
@@ -20,7 +20,8 @@
  * what device (incise/plant.h) and predictor (predict.h) make of each unit state in one P.
  * So it is that of the real predictor, whatever that becomes.
  *
- *   state: device x v | predictor x v a, shown x v | poses on their way | forces on theirs
+ *   state: device x v | predictor x v a, shown x v (and a, with A) | poses on their way | forces on
+ *   theirs
  *
  * N, mm, s.
  */
@@ -43,8 +44,9 @@ struct incise_pose_loop {
 	const struct incise_haptic_device *device;
 	/* As initialised for the tracker: its gains, period and latency count. */
 	const struct incise_predict *predict;
-	double damping_N_s_mm; /* of the wall, B, by the predictor's velocity */
-	int late_ticks;	       /* until a force acts, 0 … INCISE_POSE_LOOP_LATE_MAX */
+	double damping_N_s_mm;	     /* of the wall, B, by the predictor's velocity … */
+	double acceleration_N_s2_mm; /* … and A, by its acceleration; may be negative */
+	int late_ticks; /* until a force acts, 0 … INCISE_POSE_LOOP_LATE_MAX */
 	const struct incise_hand_impedance *hand; /* or NULL: none */
 };
 

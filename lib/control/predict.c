@@ -135,6 +135,15 @@ void incise_predict_at(const struct incise_predict *p, int64_t t_ns,
 	turn_between(attitude, p->q_shown, p->q, share);
 }
 
+void incise_predict_acceleration(const struct incise_predict *p, int64_t t_ns,
+				 double acceleration_mm_s2[3])
+{
+	v3_add(acceleration_mm_s2, p->a, left(p, t_ns), p->a_shown);
+	for (int i = 0; i < 3; i++)
+		acceleration_mm_s2[i] =
+			within(acceleration_mm_s2[i], -HARD_MM_S2, HARD_MM_S2);
+}
+
 static bool believable(const double x[3])
 {
 	return fabs(x[0]) < FAR_MM && fabs(x[1]) < FAR_MM && fabs(x[2]) < FAR_MM;
@@ -180,7 +189,7 @@ static bool correct(struct incise_predict *p, int64_t t_ns, const double positio
 void incise_predict_add(struct incise_predict *p,
 			const struct incise_tracker_sample *sample)
 {
-	double shown[3], speed[3], attitude[4], x[3], v[3], step[3];
+	double shown[3], speed[3], hard[3], attitude[4], x[3], v[3], step[3];
 	bool blend = p->started;
 	int64_t t_ns;
 
@@ -190,6 +199,7 @@ void incise_predict_add(struct incise_predict *p,
 	if (p->started && t_ns <= p->t_ns)
 		return;
 	incise_predict_at(p, sample->t_ns, shown, speed, attitude);
+	incise_predict_acceleration(p, sample->t_ns, hard);
 	if (!p->started || since(t_ns, p->t_ns) > p->gap_ns ||
 	    !correct(p, t_ns, sample->position_mm)) {
 		v3_copy(p->x, sample->position_mm);
@@ -209,6 +219,7 @@ void incise_predict_add(struct incise_predict *p,
 	for (int i = 0; i < 3; i++) {
 		p->x_shown[i] = blend ? shown[i] - x[i] : 0;
 		p->v_shown[i] = blend ? speed[i] - v[i] : 0;
+		p->a_shown[i] = blend ? hard[i] - p->a[i] : 0;
 	}
 	if (!blend)
 		for (int i = 0; i < 4; i++)

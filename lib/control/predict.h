@@ -55,6 +55,7 @@ struct incise_predict {
 	/* The prediction when the last pose arrived, to be blended out. */
 	int64_t arrival_ns;
 	double x_shown[3], v_shown[3]; /* less what the filter says then */
+	double a_shown[3];
 	double q_shown[4];
 };
 
@@ -91,6 +92,13 @@ void incise_predict_add(struct incise_predict *p,
 void incise_predict_at(const struct incise_predict *p, int64_t t_ns,
 		       double position_mm[3], double velocity_mm_s[3],
 		       double attitude[4]) INCISE_REALTIME;
+
+/*
+ * Acceleration at t_ns, mm/s², within ±10⁵ per component: the filter's, which takes it as constant
+ * between poses, blended as the velocity is. Causal: poses before t_ns only. Real-time safe.
+ */
+void incise_predict_acceleration(const struct incise_predict *p, int64_t t_ns,
+				 double acceleration_mm_s2[3]) INCISE_REALTIME;
 
 /* Age of the last pose at t_ns, ≥ 0; INT64_MAX before the first. Real-time safe. */
 int64_t incise_predict_age(const struct incise_predict *p, int64_t t_ns) INCISE_REALTIME;

@@ -9,6 +9,7 @@
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
+#include "../base/units.h"
 #include "../base/vector.h"
 #include "../control/pose_loop.h"
 #include "../model/slope.h"
@@ -20,52 +21,109 @@
  */
 #define STEEPER 1.25
 
-static double model_N(const struct incise_plan *plan, double depth_mm)
+void incise_plan_input_range(const struct incise_plan *plan, int i, double ends[2])
 {
-	const double x[] = {depth_mm, 0};
+	const struct incise_variable *in;
 
-	if (plan->fixed)
-		return incise_fixed_eval_double(plan->fixed, x);
-	return incise_model_eval(plan->model, x, NULL);
+	if (plan->fixed) {
+		ends[0] = plan->fixed->input[i].min / (double)INCISE_FIXED_ONE;
+		ends[1] = plan->fixed->input[i].max / (double)INCISE_FIXED_ONE;
+		return;
+	}
+	in = &incise_model_info(plan->model)->input[i];
+	ends[0] = in->min;
+	ends[1] = in->max;
+}
+
+static int input_of(const struct incise_plan *plan, enum incise_model_input kind)
+{
+	for (int i = 0; i < plan->scene->n_inputs; i++)
+		if (plan->scene->input[i] == kind)
+			return i;
+	return -1;
 }
 
 /* Part of the support over which the slope at its end is taken; least stiffness. */
 #define EDGE 0.05
 #define LEAST_N_mm 1e-3
 
+/* Places of each other input at which that slope is looked at. */
+#define PLACES 5
+
+/*
+ * The steepest slope by depth at the end of its support: at no speed, and wherever the other inputs
+ * are. @x: all but the depth, from input @i on, are set here.
+ */
+static double edge_slope(const struct incise_plan *plan, int i,
+			 double x[INCISE_LOOP_INPUTS_MAX])
+{
+	enum incise_model_input kind = plan->scene->input[i];
+	double ends[2], steepest = -INFINITY, deep_N;
+
+	if (i == plan->scene->n_inputs) {
+		int depth = input_of(plan, INCISE_INPUT_DEPTH);
+		double edge_mm;
+
+		incise_plan_input_range(plan, depth, ends);
+		edge_mm = EDGE * ends[1];
+		x[depth] = ends[1];
+		deep_N = incise_plan_model_force(plan, x);
+		x[depth] = ends[1] - edge_mm;
+		return (deep_N - incise_plan_model_force(plan, x)) / edge_mm;
+	}
+	x[i] = 0;
+	if (kind == INCISE_INPUT_DEPTH || kind == INCISE_INPUT_SPEED)
+		return edge_slope(plan, i + 1, x);
+	incise_plan_input_range(plan, i, ends);
+	for (int k = 0; k < PLACES; k++) {
+		x[i] = ends[0] + (ends[1] - ends[0]) * k / (PLACES - 1);
+		steepest = fmax(steepest, edge_slope(plan, i + 1, x));
+	}
+	return steepest;
+}
+
 /* The model's support, its slope there, and the stiffness with which its tissue unloads. */
 static void set_tissue(struct incise_plan *plan, double steepest_N_mm)
 {
-	double support_mm = plan->fixed
-				    ? plan->fixed->input[0].max / (double)INCISE_FIXED_ONE
-				    : incise_model_info(plan->model)->input[0].max;
-	double edge_mm = EDGE * support_mm, slope;
 	double own = plan->scene->tissue.force[0][INCISE_REACTION_UNLOADING];
+	double x[INCISE_LOOP_INPUTS_MAX] = {0}, ends[2];
 
-	slope = (model_N(plan, support_mm) - model_N(plan, support_mm - edge_mm)) /
-		edge_mm;
-	plan->support_mm = support_mm;
-	plan->beyond_N_mm = fmin(fmax(plan->gain * slope, 0), steepest_N_mm);
+	incise_plan_input_range(plan, input_of(plan, INCISE_INPUT_DEPTH), ends);
+	plan->support_mm = ends[1];
+	plan->beyond_N_mm =
+		fmin(fmax(plan->gain * edge_slope(plan, 0, x), 0), steepest_N_mm);
 	plan->dissipates = plan->scene->tissue.dissipates;
 	/* Softer than the model, it could not follow it. */
 	plan->unloading_N_mm = fmax(
 		own > 0 ? fmax(own, steepest_N_mm) : STEEPER * steepest_N_mm, LEAST_N_mm);
 }
 
-/* The largest slopes of the model, by depth and by speed. */
+/* The larger slope of the model's force by an input, whichever its sign; 0 without the input. */
+static double slope_by(const struct incise_plan *plan, const struct incise_slope *slopes,
+		       enum incise_model_input kind)
+{
+	int i = input_of(plan, kind);
+
+	return i < 0 ? 0
+		     : plan->gain * fmax(fabs(slopes[i].lowest), fabs(slopes[i].highest));
+}
+
+/* The largest slopes of the model, by depth, by speed and by acceleration. */
 static int survey_model(struct incise_plan *plan, double *stiffness_N_mm)
 {
 	struct incise_plan_stability *s = &plan->stability;
-	struct incise_slope slope[2];
+	struct incise_slope slope[INCISE_LOOP_INPUTS_MAX];
 
 	if (plan->fixed && !plan->scene->model)
 		incise_fixed_slopes(plan->fixed, slope);
 	else if (incise_model_slopes(plan->scene->model, slope))
 		return -ENOMEM;
-	s->certified = slope[0].certified && slope[1].certified;
-	s->speed_slope_N_s_mm =
-		plan->gain * fmax(fabs(slope[1].lowest), fabs(slope[1].highest));
-	s->slope_N_mm = plan->gain * fmax(slope[0].highest, 0);
+	for (int i = 0; i < plan->scene->n_inputs; i++)
+		s->certified = s->certified && slope[i].certified;
+	s->speed_slope_N_s_mm = slope_by(plan, slope, INCISE_INPUT_SPEED);
+	s->acceleration_slope_N_s2_mm = slope_by(plan, slope, INCISE_INPUT_ACCELERATION);
+	s->slope_N_mm =
+		plan->gain * fmax(slope[input_of(plan, INCISE_INPUT_DEPTH)].highest, 0);
 	set_tissue(plan, s->slope_N_mm);
 	s->support_mm = plan->support_mm;
 	s->beyond_N_mm = plan->beyond_N_mm;
@@ -148,13 +206,39 @@ static bool hands_hold(const struct incise_plan *plan, int late_ticks, double sh
 	return true;
 }
 
+/*
+ * A force by the acceleration of the motion acts along the normal like a mass, which counts as one to
+ * add where the blade goes in and as one to take away where it comes out. With both, on skin that is
+ * as stiff as it gets and on none, in each hand and in none.
+ */
+static bool acceleration_holds(const struct incise_plan *plan, int late_ticks,
+			       double share)
+{
+	const struct incise_plan_stability *s = &plan->stability;
+	bool all = true;
+
+	for (int i = 0; i < 4 * (1 + INCISE_HANDS) && s->acceleration_slope_N_s2_mm > 0;
+	     i++) {
+		struct incise_pose_loop loop =
+			pose_loop(plan, late_ticks, share * s->damping_N_s_mm,
+				  i / 4 ? &incise_hands[i / 4 - 1] : NULL);
+		double K = i & 1 ? share * (1 + RESERVE) * s->stiffness_N_mm : 0;
+
+		loop.acceleration_N_s2_mm =
+			(i & 2 ? -share : share) * s->acceleration_slope_N_s2_mm;
+		all = all && !s->own_delay && incise_pose_loop_holds(&loop, K);
+	}
+	return all;
+}
+
 static bool stable_along(const struct incise_plan *plan, int late_ticks, double share)
 {
 	const struct incise_plan_stability *s = &plan->stability;
 
 	return holds(plan, late_ticks, share * s->stiffness_N_mm,
 		     share * s->damping_N_s_mm) &&
-	       hands_hold(plan, late_ticks, share);
+	       hands_hold(plan, late_ticks, share) &&
+	       acceleration_holds(plan, late_ticks, share);
 }
 
 /*
@@ -232,7 +316,8 @@ static double largest_gain(const struct incise_plan *plan)
 {
 	double low = 0, high = 1;
 
-	if (!(plan->stability.damping_N_s_mm > 0) && all_hands_hold(plan))
+	if (!(plan->stability.damping_N_s_mm > 0) &&
+	    !(plan->stability.acceleration_slope_N_s2_mm > 0) && all_hands_hold(plan))
 		return plan->gain * plan->stability.limit_N_mm / (1 + RESERVE) /
 		       plan->stability.stiffness_N_mm;
 	while (high - low > 1e-4) {
@@ -340,7 +425,7 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 	struct incise_plan_stability *s = &plan->stability;
 	const struct incise_scene *scene = plan->scene;
 	double model_N_mm = 0, gain;
-	char delay[64], advice[64];
+	char delay[64], advice[64], mass[64] = "";
 
 	s->device = (struct incise_haptic_device){
 		.mass_kg = scene->device.mass_kg,
@@ -359,7 +444,17 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 	set_limits(plan);
 	if (stable(plan, 1))
 		return 0;
+	if (s->acceleration_slope_N_s2_mm > 0 && s->own_delay)
+		return incise_error_set(
+			err, EDOM,
+			"%s: device.delay_ticks: with it no scene is known to be stable "
+			"whose model has the input acceleration_mm_s2; remove "
+			"delay_ticks",
+			scene->path);
 	name_delay(s, tracker, delay);
+	if (s->acceleration_slope_N_s2_mm > 0)
+		snprintf(mass, sizeof(mass), " and acts as %.3g kg by acceleration",
+			 s->acceleration_slope_N_s2_mm / N_S2_PER_MM_KG);
 	gain = three_digits_down(largest_gain(plan));
 	if (gain > 0)
 		snprintf(advice, sizeof(advice), "set tissue.gain to at most %.3g", gain);
@@ -368,11 +463,12 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 			 "no gain is small enough: the device needs damping");
 	return incise_error_set(
 		err, EDOM,
-		"%s: not stable: its tissue has %.4g N/mm and %.4g N s/mm, but a "
+		"%s: not stable: its tissue has %.4g N/mm and %.4g N s/mm%s, but a "
 		"device of %g kg and %g N s/mm %s is stable up to %.4g N/mm, of which "
 		"%g %% are kept in reserve; %s, or describe the device",
-		scene->path, s->stiffness_N_mm, s->damping_N_s_mm, s->device.mass_kg,
-		s->device.damping_N_s_mm, delay, s->limit_N_mm, 100 * RESERVE, advice);
+		scene->path, s->stiffness_N_mm, s->damping_N_s_mm, mass,
+		s->device.mass_kg, s->device.damping_N_s_mm, delay, s->limit_N_mm,
+		100 * RESERVE, advice);
 }
 
 /*
@@ -384,18 +480,54 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 #define SAFER_MOST 3
 #define DAMPING_MOST 16 /* times the device's own, or than 1 mN s/mm */
 
-static bool rests(const struct incise_plan *plan,
-		  const struct incise_tracker_info *tracker, double gain,
-		  double damping_N_s_mm, int way)
+/* Inputs that the search's hand does not move, or does not move far enough. */
+static const enum incise_model_input unmoved[] = {INCISE_INPUT_TILT, INCISE_INPUT_TIME};
+#define UNMOVED ((int)(sizeof(unmoved) / sizeof(*unmoved)))
+
+/*
+ * Search as the inputs are, then with those unmoved ones held at either end of their supports, in all
+ * combinations, until one swings. Returns 0 or -ENOMEM.
+ */
+static int search(struct incise_plan *plan, const struct incise_tracker_info *tracker,
+		  const struct incise_rest_trial *trial, struct incise_rest *rest)
+{
+	int inputs[UNMOVED], n = 0, rc;
+
+	for (int i = 0; i < UNMOVED; i++)
+		if (input_of(plan, unmoved[i]) >= 0)
+			inputs[n++] = input_of(plan, unmoved[i]);
+	rc = incise_plan_rest(plan, tracker, trial, rest);
+	for (int corner = 0; n && corner < 1 << n && !rc && rest->rests; corner++) {
+		struct incise_rest here;
+
+		for (int i = 0; i < n; i++) {
+			double ends[2];
+
+			incise_plan_input_range(plan, inputs[i], ends);
+			plan->held[plan->scene->input[inputs[i]]] = ends[corner >> i & 1];
+			plan->holds |= 1U << plan->scene->input[inputs[i]];
+		}
+		rc = incise_plan_rest(plan, tracker, trial, &here);
+		here.runs += rest->runs;
+		if (!here.rests || here.settle_s > rest->settle_s)
+			*rest = here;
+		rest->runs = here.runs;
+	}
+	plan->holds = 0;
+	return rc;
+}
+
+static bool rests(struct incise_plan *plan, const struct incise_tracker_info *tracker,
+		  double gain, double damping_N_s_mm, int way)
 {
 	const struct incise_rest_trial trial = {gain, damping_N_s_mm, way};
 	struct incise_rest rest;
 
-	return !incise_plan_rest(plan, tracker, &trial, &rest) && rest.rests;
+	return !search(plan, tracker, &trial, &rest) && rest.rests;
 }
 
 /* The largest gain that rests, times the plan's; 0: none was found. */
-static double resting_gain(const struct incise_plan *plan,
+static double resting_gain(struct incise_plan *plan,
 			   const struct incise_tracker_info *tracker, int way)
 {
 	double low = 0, high = 1, damping = plan->stability.device.damping_N_s_mm;
@@ -412,7 +544,7 @@ static double resting_gain(const struct incise_plan *plan,
 }
 
 /* The smallest damping of the device that rests; 0: none was found. */
-static double resting_damping(const struct incise_plan *plan,
+static double resting_damping(struct incise_plan *plan,
 			      const struct incise_tracker_info *tracker, int way)
 {
 	double low = plan->stability.device.damping_N_s_mm;
@@ -445,7 +577,7 @@ int incise_plan_check_rest(struct incise_plan *plan,
 
 	if (!plan->model && !plan->fixed)
 		return 0;
-	if (incise_plan_rest(plan, tracker, &as_is, &rest))
+	if (search(plan, tracker, &as_is, &rest))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
 	s->runs = rest.runs;
 	s->worst.lean_N = rest.lean_N;

@@ -56,19 +56,66 @@ static double cutting_N(struct incise_plan *plan, struct incise_tick *tick, doub
 	return fmax(plan->gain * size_N, 0) + plan->beyond_N_mm * beyond_mm;
 }
 
+static double acceleration(const struct incise_plan *plan, const struct incise_tick *tick)
+{
+	double hard_mm_s2[3];
+
+	incise_predict_acceleration(&plan->predict, tick->t_ns, hard_mm_s2);
+	return incise_input_acceleration(plan->velocity_mm_s, hard_mm_s2);
+}
+
+/* Unsigned: two times may be farther apart than an int64_t holds. */
+static double time_in_tissue(const struct incise_plan *plan,
+			     const struct incise_tick *tick)
+{
+	return (double)((uint64_t)tick->t_ns - (uint64_t)plan->touched_ns) /
+	       INCISE_NS_PER_S;
+}
+
+static double find_input(const struct incise_plan *plan, const struct incise_tick *tick,
+			 enum incise_model_input kind)
+{
+	switch (kind) {
+	case INCISE_INPUT_SPEED:
+		return tick->velocity_mm_s;
+	case INCISE_INPUT_ACCELERATION:
+		return acceleration(plan, tick);
+	case INCISE_INPUT_TILT:
+		return incise_input_tilt_deg(plan->attitude, plan->instrument.axis,
+					     plan->normal);
+	case INCISE_INPUT_TIME:
+		return time_in_tissue(plan, tick);
+	default:
+		return plan->depth_mm;
+	}
+}
+
+/* The model's inputs, in its order. Only those that it has are computed. */
+static void find_inputs(const struct incise_plan *plan, const struct incise_tick *tick,
+			double x[INCISE_LOOP_INPUTS_MAX])
+{
+	for (int i = 0; i < plan->scene->n_inputs; i++) {
+		enum incise_model_input kind = plan->scene->input[i];
+
+		x[i] = plan->holds >> kind & 1 ? plan->held[kind]
+					       : find_input(plan, tick, kind);
+	}
+}
+
 static double cutting(struct incise_plan *plan, struct incise_tick *tick)
 {
-	double x[] = {plan->depth_mm, tick->velocity_mm_s};
+	double x[INCISE_LOOP_INPUTS_MAX] = {0};
 	unsigned int flags = 0;
 	bool outside = false;
 	double size_N;
 
+	find_inputs(plan, tick, x);
 	if (plan->model) {
 		size_N = incise_model_eval(plan->model, x, &flags);
 		return cutting_N(plan, tick, size_N, flags);
 	}
 	/* A compiled one, in a search for swings; its ticks are in integers. */
-	for (int i = 0; i < 2; i++)
+	for (int i = 0; i < plan->fixed->n_inputs; i++)
 		outside |= x[i] * INCISE_FIXED_ONE < plan->fixed->input[i].min ||
 			   x[i] * INCISE_FIXED_ONE > plan->fixed->input[i].max;
 	return cutting_N(plan, tick, incise_fixed_eval_double(plan->fixed, x), outside);

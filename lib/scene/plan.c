@@ -27,6 +27,15 @@ struct place {
 
 static const struct place floor_place = {.normal = {0, 0, 1}};
 
+/* Whether a model's inputs are depth alone, or depth and speed in this order. */
+static bool fits_integers(const struct incise_scene *scene)
+{
+	for (int i = 0; i < scene->n_inputs; i++)
+		if (scene->input[i] != (i ? INCISE_INPUT_SPEED : INCISE_INPUT_DEPTH))
+			return false;
+	return scene->n_inputs <= 2;
+}
+
 /* The model in the scene's arithmetic. */
 static int take_model(struct incise_plan *plan, struct incise_error *err)
 {
@@ -38,6 +47,13 @@ static int take_model(struct incise_plan *plan, struct incise_error *err)
 			err, EINVAL,
 			"%s: its model is compiled and cannot run in double; use its "
 			".fis file",
+			scene->path);
+	if (scene->fixed && !fits_integers(scene))
+		return incise_error_set(
+			err, ENOTSUP,
+			"%s: its model has other inputs than depth_mm, or depth_mm and "
+			"velocity_mm_s: integers have no more; set arithmetic to "
+			"\"double\"",
 			scene->path);
 	plan->fixed = scene->compiled;
 	if (!scene->model)
@@ -635,6 +651,35 @@ size_t incise_plan_memory(const struct incise_plan *plan)
 	if (plan->scene->model)
 		size += sizeof(*plan->scene->model);
 	return size;
+}
+
+_Static_assert(INCISE_PLAN_INPUTS_MAX == INCISE_LOOP_INPUTS_MAX, "the same");
+
+void incise_plan_model(const struct incise_plan *plan, struct incise_plan_model *model)
+{
+	*model = (struct incise_plan_model){.n_inputs = plan->scene->n_inputs};
+	for (int i = 0; i < model->n_inputs; i++) {
+		double ends[2];
+
+		incise_plan_input_range(plan, i, ends);
+		model->input[i] = incise_model_input_kinds[plan->scene->input[i]].name;
+		model->min[i] = ends[0];
+		model->max[i] = ends[1];
+	}
+	if (!model->n_inputs)
+		return;
+	model->evaluator = plan->fixed
+				   ? incise_fixed_arithmetic_name(plan->fixed->arithmetic)
+				   : "double";
+	model->memory_bytes = plan->fixed ? sizeof(*plan->fixed) + plan->fixed->size
+					  : sizeof(*plan->model);
+}
+
+double incise_plan_model_force(const struct incise_plan *plan, const double *x)
+{
+	if (plan->fixed)
+		return incise_fixed_eval_double(plan->fixed, x);
+	return plan->model ? incise_model_eval(plan->model, x, NULL) : 0;
 }
 
 void incise_plan_top(const struct incise_plan *plan, struct incise_touch *touch)

@@ -94,11 +94,12 @@ struct incise_plan {
 	struct incise_surface *own_surface; /* the rig's plane, when it is that */
 	double up[3];			    /* normal of the surface's top */
 	struct incise_proxy proxy;
-	double sn[3];	  /* the paper's Sn of this tick */
-	double normal[3]; /* the one that forces go along: Sn, or its average */
-	double depth_mm;  /* ≥ 0; of the tissue in front of a membrane */
-	double p0_mm[3];  /* where the contact began */
-	double side[3];	  /* of the blade then: Sx(0) */
+	double sn[3];	    /* the paper's Sn of this tick */
+	double normal[3];   /* the one that forces go along: Sn, or its average */
+	double depth_mm;    /* ≥ 0; of the tissue in front of a membrane */
+	double p0_mm[3];    /* where the contact began … */
+	int64_t touched_ns; /* … and when */
+	double side[3];	    /* of the blade then: Sx(0) */
 	struct incise_incision *incision; /* with its stage */
 	struct incise_opening opening;	  /* that handle or tube went into … */
 	double tightness; /* … and how tight it was; incise_incision_tightness() */
@@ -122,6 +123,9 @@ struct incise_plan {
 	const struct incise_model *model; /* fuzzy: one of these */
 	const struct incise_fixed *fixed;
 	struct incise_fixed *own_fixed; /* compiled here */
+	/* Inputs that a search for swings holds: bits 1 << enum incise_model_input, and where. */
+	unsigned int holds;
+	double held[INCISE_MODEL_INPUT_KINDS];
 	struct incise_acting_force acting[INCISE_FORCES_MAX];
 
 	/* start, limit */
@@ -181,6 +185,9 @@ int incise_plan_give(struct incise_plan *plan, bool tube,
  */
 void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 		      double gain);
+
+/* The lower end of the support of the model's input, and the upper one. */
+void incise_plan_input_range(const struct incise_plan *plan, int i, double ends[2]);
 
 /* Fill in the stages that the scene and the rig need, and why the others are left out. */
 void incise_plan_choose(struct incise_plan *plan);

@@ -367,12 +367,72 @@ static bool ends_with(const char *text, const char *end)
 	return n >= m && !strcmp(text + n - m, end);
 }
 
+static const char *input_name(const struct incise_scene *scene, int i)
+{
+	return scene->model ? incise_model_info(scene->model)->input[i].name
+			    : scene->compiled->input[i].name;
+}
+
+static int refuse_input(const struct incise_scene *scene, int i, struct incise_error *err)
+{
+	const char *names[INCISE_MODEL_INPUT_KINDS + 1] = {NULL}, *nearest;
+	const char *name = input_name(scene, i);
+
+	for (int k = 0; k < INCISE_MODEL_INPUT_KINDS; k++)
+		names[k] = incise_model_input_kinds[k].name;
+	nearest = incise_nearest_name(name, names);
+	return incise_error_set(
+		err, EINVAL,
+		"%.200s: its model has the input '%.64s', which a loop does not have%s%s: "
+		"expected %s, %s, %s, %s or %s; train with --inputs of these",
+		scene->path, name, nearest ? "; did you mean " : "",
+		nearest ? nearest : "", names[INCISE_INPUT_DEPTH],
+		names[INCISE_INPUT_SPEED], names[INCISE_INPUT_ACCELERATION],
+		names[INCISE_INPUT_TILT], names[INCISE_INPUT_TIME]);
+}
+
+/* The origin of each input, by its name. */
+static int find_inputs(struct incise_scene *scene, struct incise_error *err)
+{
+	int n = scene->model ? incise_model_info(scene->model)->n_inputs
+			     : scene->compiled->n_inputs;
+	unsigned int found = 0;
+
+	for (int i = 0; i < n && i < INCISE_LOOP_INPUTS_MAX; i++) {
+		int kind = incise_model_input_find(input_name(scene, i));
+
+		if (kind < 0)
+			return refuse_input(scene, i, err);
+		if (found >> kind & 1)
+			return incise_error_set(
+				err, EINVAL,
+				"%.200s: its model has the input %s twice; train it "
+				"again",
+				scene->path, incise_model_input_kinds[kind].name);
+		found |= 1U << kind;
+		scene->input[i] = (enum incise_model_input)kind;
+	}
+	if (n > INCISE_LOOP_INPUTS_MAX)
+		return incise_error_set(err, EINVAL,
+					"%.200s: its model has %d inputs, but a loop has "
+					"at most %d; train with fewer --inputs",
+					scene->path, n, INCISE_LOOP_INPUTS_MAX);
+	if (!(found >> INCISE_INPUT_DEPTH & 1))
+		return incise_error_set(
+			err, EINVAL,
+			"%.200s: its model has no input depth_mm, from "
+			"which its stiffness is known; add it to --inputs "
+			"of incise train",
+			scene->path);
+	scene->n_inputs = n;
+	return 0;
+}
+
 static int read_model(struct incise_scene *scene, const config_setting_t *root,
 		      const char *override, struct incise_error *err)
 {
 	struct incise_error why = {0};
 	const char *name = NULL;
-	int n_inputs;
 	char *path;
 	int rc = incise_conf_string(root, scene->path, "model", &name, err);
 
@@ -388,15 +448,7 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 	if (!scene->model && !scene->compiled)
 		return incise_error_set(err, why.code, "%s: its model %s", scene->path,
 					why.text);
-	n_inputs = scene->model ? incise_model_info(scene->model)->n_inputs
-				: scene->compiled->n_inputs;
-	if (n_inputs != 2)
-		return incise_error_set(
-			err, EINVAL,
-			"%s: its model has %d inputs, but a cutting model has 2: "
-			"depth_mm and velocity_mm_s",
-			scene->path, n_inputs);
-	return 0;
+	return find_inputs(scene, err);
 }
 
 /* A key of tissue that is "paper", for the paper's own way, or @other. */

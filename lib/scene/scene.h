@@ -9,6 +9,7 @@
 #include <incise/fixed.h>
 #include <incise/model.h>
 #include <incise/scene.h>
+#include "../control/model_input.h"
 #include "../surface/surface.h"
 #include "forces.h"
 
@@ -20,6 +21,8 @@ struct incise_scene {
 	bool full;		    /* see incise_scene_set_full() */
 	struct incise_model *model; /* one of these, or none */
 	struct incise_fixed *compiled;
+	int n_inputs; /* of it, 1 … INCISE_LOOP_INPUTS_MAX, and where each comes from */
+	enum incise_model_input input[INCISE_LOOP_INPUTS_MAX];
 	struct incise_surface *surface; /* or NULL: the rig's plane */
 	const char *surface_kind;	/* as the file names it */
 	struct {

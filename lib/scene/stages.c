@@ -265,11 +265,12 @@ int incise_stage_tool(struct incise_plan *plan, struct incise_tick *tick)
 	return 0;
 }
 
-static void contact_begins(struct incise_plan *plan)
+static void contact_begins(struct incise_plan *plan, int64_t t_ns)
 {
 	const struct incise_touch *first = &plan->proxy.first;
 
 	v3_copy(plan->p0_mm, first->point_mm);
+	plan->touched_ns = t_ns;
 	v3_copy(plan->sn, first->normal);
 	if (plan->instrument.held == INCISE_TOOL_BLADE)
 		v3_rotate(plan->side, plan->attitude, plan->instrument.side);
@@ -305,7 +306,7 @@ int incise_stage_contact(struct incise_plan *plan, struct incise_tick *tick)
 	if (!proxy->touching)
 		return 0;
 	if (proxy->began)
-		contact_begins(plan);
+		contact_begins(plan, tick->t_ns);
 	find_normal(plan, tick->tool_mm);
 	plan->depth_mm = fmax(proxy->touch.depth_mm, 0);
 	tick->flags |= INCISE_TICK_CONTACT;

@@ -141,6 +141,7 @@ class StabilityStruct(ctypes.Structure):
         ("noise_mm", c_double),
         ("noise_N", c_double),
         ("certified", c_bool),
+        ("acceleration_slope_N_s2_mm", c_double),
     ]
     c_name = "struct incise_plan_stability"
 

@@ -365,9 +365,9 @@ class Recording:
         """Force with depth and velocity inside the cuts, as `incise export` gives them.
 
         Without bins every force sample, or with rate_hz means over 1/rate_hz: cut, t_s, depth_mm,
-        velocity_mm_s, force_N, clipped, advancing. With bins of depth and velocity (both) the means
-        of each bin with min_count samples or more: [cut,] depth_mm, velocity_mm_s, force_N, sd_N,
-        count, cuts, advancing.
+        velocity_mm_s, force_N, clipped, advancing, acceleration_mm_s2, tilt_deg, time_in_tissue_s.
+        With bins of depth and velocity (both) the means of each bin with min_count samples or more:
+        [cut,] depth_mm, velocity_mm_s, force_N, sd_N, count, cuts, advancing, and the last three.
         """
         return self._table(
             "table",

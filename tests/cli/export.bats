@@ -65,10 +65,10 @@ well_formed() {
 @test "export raw at a rate, to standard output" {
 	run -0 --separate-stderr incise export liver.rec --rate 100
 	[ -z "$stderr" ]
-	[ "${lines[0]}" = cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing ]
+	[ "${lines[0]}" = cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s ]
 	[[ "${lines[1]}" == liver-01,* ]]
 	printf '%s\n' "${lines[@]}" >out.csv
-	well_formed out.csv 7 2
+	well_formed out.csv 10 2
 	[ "$(cut -d, -f1 out.csv | sort -u | grep -c liver-)" -eq 14 ]
 	# 14 cuts of not quite 2 s at 100 rows a second
 	[ "${#lines[@]}" -gt 1400 ]
@@ -77,7 +77,7 @@ well_formed() {
 
 @test "export of all samples" {
 	incise export liver.rec -o all.csv
-	well_formed all.csv 7 2
+	well_formed all.csv 10 2
 	# as many as lie in the tissue, nearly: depth is interpolated between the table's rows
 	awk -F, 'NR > 1 && $3 <= 0 { bad = 1 } END { exit bad }' all.csv
 	[ "$(wc -l <all.csv)" -gt 140000 ]
@@ -86,10 +86,10 @@ well_formed() {
 @test "export averaged" {
 	run -0 --separate-stderr incise export liver.rec --average 12x10 -o a.csv
 	[[ "$output" == "wrote a.csv: "*" rows from 14 cuts" ]]
-	[ "$(head -n 1 a.csv)" = depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing ]
-	well_formed a.csv 7 1
+	[ "$(head -n 1 a.csv)" = depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s ]
+	well_formed a.csv 10 1
 	for advancing in 0 1; do
-		[ "$(grep -c ",$advancing\$" a.csv)" -le 120 ]
+		[ "$(cut -d, -f7 a.csv | grep -cx $advancing)" -le 120 ]
 	done
 	# the force rises with depth: rows are in order of depth
 	awk -F, '!$7 || NR == 1 { next } !first { first = $3 } { last = $3 }
@@ -99,8 +99,8 @@ well_formed() {
 
 @test "export averaged by cut" {
 	incise export liver.rec -a 12x10 --by-cut -o a.csv
-	[ "$(head -n 1 a.csv)" = cut,depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing ]
-	well_formed a.csv 8 2
+	[ "$(head -n 1 a.csv)" = cut,depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s ]
+	well_formed a.csv 11 2
 	[ "$(tail -n +2 a.csv | cut -d, -f1 | uniq | wc -l)" -eq 14 ]
 }
 
@@ -147,7 +147,7 @@ well_formed() {
 	incise capture -o cut.rec --rig sim:clock=simulated --duration 6s >/dev/null
 	mv cut.rec cut.rec.part
 	incise export cut.rec -a 3x3 -o a.csv
-	well_formed a.csv 7 1
+	well_formed a.csv 10 1
 }
 
 @test "export replaces an old dataset, and leaves it where it fails" {
@@ -213,7 +213,7 @@ well_formed() {
 
 @test "export killed by a closed pipe is quiet" {
 	bash -c "set -o pipefail; incise export liver.rec 2>err | head -n 1" >out || true
-	[ "$(cat out)" = cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing ]
+	[ "$(cat out)" = cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s ]
 	[ ! -s err ]
 }
 
@@ -280,7 +280,7 @@ well_formed() {
 	incise export liver.rec -a 3x3 -o a.csv
 	incise export liver.rec -a 3x3 -c half.conf -o b.csv
 	paste -d, a.csv b.csv | awk -F, '
-		NR > 1 { d = $3 - 2 * $10; if (d > 1e-7 || d < -1e-7) bad = 1 } END { exit bad || NR < 2 }'
+		NR > 1 { d = $3 - 2 * $13; if (d > 1e-7 || d < -1e-7) bad = 1 } END { exit bad || NR < 2 }'
 	echo 'force_mV_N = 0;' >bad.conf
 	run --separate-stderr incise export liver.rec -c bad.conf -o c.csv
 	failed_with "bad.conf"
@@ -348,7 +348,7 @@ read_mcap() {
 
 @test "export resampled" {
 	incise export liver.rec --resample --rate 100 -o a.csv
-	well_formed <(sed 's/nan/0/g' a.csv) 22 2
+	well_formed <(sed 's/nan/0/g' a.csv) 25 2
 	[[ "$(head -n 1 a.csv)" != *camera* ]]
 	# 43 s of it, in cuts or not
 	[ "$(wc -l <a.csv)" -eq 4301 ]
@@ -366,14 +366,14 @@ read_mcap() {
 	sqlite3 seen.rec/recording.db "DELETE FROM knots;
 		INSERT INTO frames SELECT seq, t_ns, t_ns, 0, 1, 0, 100.0, 0.5, depth_mm, 0.9 FROM depth"
 	incise export seen.rec liver.rec --resample --rate 50 -o a.csv --damaged
-	[[ "$(head -n 1 a.csv)" == *,tracker_error,advancing,camera_depth_mm,camera_depth_sd_mm,camera_depth_u_mm,quality,low_quality ]]
+	[[ "$(head -n 1 a.csv)" == *,tracker_error,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s,camera_depth_mm,camera_depth_sd_mm,camera_depth_u_mm,quality,low_quality ]]
 	# by the pictures as by the tracker; and none of what has no pictures
-	awk -F, 'NR > 1 && $1 == "seen" && $14 != "nan" { n++; if ($14 != $23 || $27) bad = 1 }
-		NR > 1 && $1 == "liver" && ($23 != "nan" || !$27) { bad = 1 }
+	awk -F, 'NR > 1 && $1 == "seen" && $14 != "nan" { n++; if ($14 != $26 || $30) bad = 1 }
+		NR > 1 && $1 == "liver" && ($26 != "nan" || !$30) { bad = 1 }
 		END { exit bad || n < 2100 }' a.csv
 	echo 'depth_mm_px = 0.2375;' >twice.conf
 	incise export seen.rec --resample --rate 50 -c twice.conf --lineage -o b.csv --damaged
-	awk -F, 'FNR > 1 && /^seen/ && $14 != "nan" { n++; d = $23 - 2 * $14; if (d > 2e-4 || d < -2e-4) bad = 1 }
+	awk -F, 'FNR > 1 && /^seen/ && $14 != "nan" { n++; d = $26 - 2 * $14; if (d > 2e-4 || d < -2e-4) bad = 1 }
 		END { exit bad || n < 2100 }' b.csv
 	grep -qx '# depth_mm_px: 0.2375' b.csv
 }
@@ -409,8 +409,8 @@ read_mcap() {
 	delay=$(sqlite3 line.rec/recording.db "SELECT delay_ns FROM streams WHERE name = 'tracker'")
 	echo "tracker_delay_ms = $(awk "BEGIN { print 100 + $delay / 1e6 }");" >back.conf
 	incise export line.rec --resample --rate 100 -c back.conf -o c.csv --damaged
-	paste -d, a.csv c.csv | awk -F, 'NR > 20 && $14 != "nan" && $36 != "nan" {
-		n++; d = $14 - $36; if (d > 1.5e-4 || d < -1.5e-4) bad = 1 } END { exit bad || n < 4000 }'
+	paste -d, a.csv c.csv | awk -F, 'NR > 20 && $14 != "nan" && $39 != "nan" {
+		n++; d = $14 - $39; if (d > 1.5e-4 || d < -1.5e-4) bad = 1 } END { exit bad || n < 4000 }'
 }
 
 @test "export as HDF5 is what h5py reads" {
@@ -440,8 +440,10 @@ read_mcap() {
 		        for value, row in zip(column, rows):
 		            text = float(row[name])
 		            # float32, and half of the last digit
-		            assert math.isnan(value) and math.isnan(text) or abs(value - text) < 2e-5 + 5.1e-4 * (
-		                name == "velocity_mm_s") + 5.1e-5 * name.endswith("_mm") + 1e-6 * abs(text), (name, value, text)
+		            half = {"velocity_mm_s": 5.1e-4, "acceleration_mm_s2": 5.1e-2, "tilt_deg": 5.1e-3,
+		                    "time_in_tissue_s": 5.1e-5}.get(name, 5.1e-5 * name.endswith("_mm"))
+		            assert math.isnan(value) and math.isnan(text) or abs(
+		                value - text) < 2e-5 + half + 1e-6 * abs(text), (name, value, text)
 	END
 }
 

@@ -284,12 +284,38 @@ beside_the_model() {
 	head -n 30 liver.fis >cut.fis
 	printf 'model = "cut.fis";\n' >bad.scene
 	refuses cut.fis
-	# one input only
-	awk 'BEGIN { print "depth_mm,force_N"; for (i = 0; i < 40; i++) print i ",", i }' |
+	# an input that no loop has
+	awk 'BEGIN { print "depth_m,force_N"; for (i = 0; i < 40; i++) print i ",", i }' |
 		tr -d ' ' | sed 's/,,/,/' >one.csv
-	incise train one.csv --inputs depth_mm -o one.fis 2>/dev/null
+	incise train one.csv --inputs depth_m -o one.fis 2>/dev/null
 	printf 'model = "one.fis";\n' >bad.scene
-	refuses bad.scene "1 inputs"
+	refuses bad.scene "'depth_m', which a loop does not have; did you mean depth_mm: expected depth_mm, "
+}
+
+@test "haptic: a column of training is an input of the loop" {
+	incise capture -o d.rec --rig sim:clock=simulated,cut_s=2,pause_s=0.5
+	incise export d.rec --rate 100 -o d.csv
+	incise train d.csv --inputs depth_mm,velocity_mm_s,acceleration_mm_s2 --mf 3,2,1 -o d.fis
+	printf 'model = "d.fis"; arithmetic = "double"; tissue = { gain = 0.5; };\n' >d.scene
+	incise haptic d.scene --rig $quick --duration 3s --log l.csv --json >r.json
+	[ "$(key r.json ticks)" = 3000 ]
+	# a force, and none beyond the limit
+	python3 - <<-'END'
+		import csv, math
+		forces = [float(r["command_z_N"]) for r in csv.DictReader(open("l.csv"))]
+		assert all(math.isfinite(f) and abs(f) <= 4.0001 for f in forces)
+		assert max(forces) > 0.1, max(forces)
+	END
+	incise plan d.scene --json >p.json
+	[ "$(key p.json 'model.inputs[2].name')" = acceleration_mm_s2 ]
+	[ "$(key p.json model.evaluator)" = double ]
+	holds "$(key p.json model.ns) > 0 && $(key p.json acceleration_slope_N_s2_mm) > 0"
+	# too much of it; and none in integers
+	rm l.csv
+	printf 'model = "d.fis"; arithmetic = "double"; tissue = { gain = 2.0; };\n' >bad.scene
+	refuses bad.scene "kg by acceleration, but a device of 0.05 kg"
+	printf 'model = "d.fis";\n' >bad.scene
+	refuses bad.scene "set arithmetic to \"double\""
 }
 
 @test "haptic: a model that fixed point cannot hold is refused before it runs" {

@@ -83,6 +83,33 @@ INCISE_API const char *incise_plan_stage(const struct incise_plan *plan, int ind
 INCISE_API const char *incise_plan_left_out(const struct incise_plan *plan, int index,
 					    const char **why);
 
+/** Largest number of inputs of a model in a plan. */
+#define INCISE_PLAN_INPUTS_MAX 4
+
+/** The model that gives a plan's reaction force. */
+struct incise_plan_model {
+	int n_inputs; /**< 0: the scene has no model; the rest is 0 */
+	const char
+		*input[INCISE_PLAN_INPUTS_MAX]; /**< names; valid as long as the plan */
+	double min[INCISE_PLAN_INPUTS_MAX],
+		max[INCISE_PLAN_INPUTS_MAX]; /**< their ranges */
+	const char *evaluator; /**< "double", or as incise_fixed_arithmetic_name() */
+	size_t memory_bytes;
+};
+
+/** Get the model of a plan, as it is evaluated in its ticks. */
+INCISE_API void incise_plan_model(const struct incise_plan *plan,
+				  struct incise_plan_model *model);
+
+/**
+ * Evaluate the model of a plan as its ticks do, without tissue.gain and without limits.
+ *
+ * @param x the inputs, as of incise_plan_model()
+ * @return N; 0 without a model. Real-time safe.
+ */
+INCISE_API double incise_plan_model_force(const struct incise_plan *plan,
+					  const double *x) INCISE_REALTIME;
+
 /** Memory of the plan, bytes, including model and surface. */
 INCISE_API size_t incise_plan_memory(const struct incise_plan *plan);
 
@@ -144,6 +171,11 @@ struct incise_plan_stability {
 	 */
 	double noise_mm, noise_N;
 	bool certified; /**< the model's slopes are bounds, not estimates */
+	/**
+	 * Largest slope of the model's force over the acceleration, absolute value: it acts as a mass
+	 * of 1000 times so many kg; 0 without such an input.
+	 */
+	double acceleration_slope_N_s2_mm;
 };
 
 /** Get stiffness and damping of the plan, and the limits of its device. */

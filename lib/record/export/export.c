@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/outfile.h>
+#include "../../control/model_input.h"
 #include "../read/cut.h"
 #include "../read/recording.h"
 #include "interpolators.h"
@@ -28,7 +29,8 @@
 /* Force samples of one bin, or of one row of a raw export. Set to {0} before use. */
 struct bin {
 	uint64_t n;
-	double t_s, depth_mm, velocity_mm_s, force_N; /* means */
+	double t_s, depth_mm, velocity_mm_s, force_N; /* means … */
+	double acceleration_mm_s2, tilt_deg, time_in_tissue_s;
 	double m2; /* sum of squared deviations of the force */
 	int cuts;  /* that have samples here */
 	int last;  /* the cut counted last */
@@ -47,9 +49,9 @@ struct pass {
 	uint64_t samples, samples_all; /* of force, read and to be read */
 	int cut;		       /* the present one of all recordings, from 1 */
 	int number;		       /* of the same cut in its recording */
-	bool advancing;		       /* the blade, at the present sample */
-	double depth_deepest_mm;       /* of any row, for the error without a cut */
-	void *state;		       /* of the visitor */
+	struct incise_blade_pose_value blade; /* at the present sample */
+	double depth_deepest_mm; /* of any row, for the error without a cut */
+	void *state;		 /* of the visitor */
 };
 
 /* Functions for each sample and cut; each returns 0 or -errno. */
@@ -104,10 +106,15 @@ static void bin_add(struct bin *bin, const struct pass *pass,
 	bin->t_s += share * (t_s - bin->t_s);
 	bin->depth_mm += share * (sample->depth_mm - bin->depth_mm);
 	bin->velocity_mm_s += share * (sample->velocity_mm_s - bin->velocity_mm_s);
+	bin->acceleration_mm_s2 +=
+		share * (pass->blade.acceleration_mm_s2 - bin->acceleration_mm_s2);
+	bin->tilt_deg += share * (pass->blade.tilt_deg - bin->tilt_deg);
+	bin->time_in_tissue_s +=
+		share * (pass->blade.time_in_tissue_s - bin->time_in_tissue_s);
 	bin->force_N += share * delta;
 	bin->m2 += delta * (sample->force_N - bin->force_N);
 	bin->clipped |= sample->clipped;
-	bin->advancing = pass->advancing && (bin->n == 1 || bin->advancing);
+	bin->advancing = pass->blade.advancing && (bin->n == 1 || bin->advancing);
 	if (bin->last != cut) {
 		bin->last = cut;
 		bin->cuts++;
@@ -139,12 +146,11 @@ static int each_cut_sample(struct pass *pass, struct incise_cuts *cuts,
 			   struct incise_blade_pose *blade, const struct visitor *visitor)
 {
 	struct incise_cut_sample sample;
-	struct incise_blade_pose_value pose;
 	int rc;
 
 	pass->number = 0;
 	while ((rc = incise_cuts_next(cuts, &sample, pass->err)) > 0) {
-		rc = incise_blade_pose_at(blade, sample.t_ns, 0, &pose, pass->err);
+		rc = incise_blade_pose_at(blade, sample.t_ns, 0, &pass->blade, pass->err);
 		if (rc)
 			return rc;
 		if (sample.cut != pass->number) {
@@ -154,7 +160,6 @@ static int each_cut_sample(struct pass *pass, struct incise_cuts *cuts,
 			pass->number = sample.cut;
 			pass->cut++;
 		}
-		pass->advancing = pose.advancing;
 		rc = visitor->sample(pass, &sample,
 				     (sample.t_ns - cuts->first_ns) * 1e-9);
 		if (!rc && (cuts->force_rows & 0xfff) == 0)
@@ -224,6 +229,9 @@ static const struct incise_column raw_columns[] = {
 	{"force_N", "N", "on the blade", INCISE_COLUMN_SINGLE, 5},
 	{"clipped", "1", "1: the converter was at an end", INCISE_COLUMN_FLAG, 0},
 	INCISE_ADVANCING_COLUMN,
+	{INCISE_ACCELERATION_COLUMN, INCISE_COLUMN_SINGLE, 1},
+	{INCISE_TILT_COLUMN, INCISE_COLUMN_SINGLE, 2},
+	{INCISE_TIME_COLUMN, INCISE_COLUMN_SINGLE, 4},
 };
 
 struct raw {
@@ -251,6 +259,9 @@ static int put_row(struct pass *pass)
 				      {.real = row->force_N},
 				      {.integer = row->clipped},
 				      {.integer = row->advancing},
+				      {.real = row->acceleration_mm_s2},
+				      {.real = row->tilt_deg},
+				      {.real = row->time_in_tissue_s},
 			      },
 			      pass->err);
 	pass->report.rows++;
@@ -296,6 +307,9 @@ static const struct incise_column bin_columns[] = {
 	{"count", "1", "samples", INCISE_COLUMN_INTEGER, 0},
 	{"cuts", "1", "number of cuts in the bin", INCISE_COLUMN_INTEGER, 0},
 	INCISE_ADVANCING_COLUMN,
+	{INCISE_ACCELERATION_COLUMN, INCISE_COLUMN_REAL, -1},
+	{INCISE_TILT_COLUMN, INCISE_COLUMN_REAL, -1},
+	{INCISE_TIME_COLUMN, INCISE_COLUMN_REAL, -1},
 };
 
 /* Bin of a value; the upper end belongs to the last one. -1: above it. */
@@ -323,8 +337,8 @@ static int add_to_bin(struct pass *pass, const struct incise_cut_sample *sample,
 		   o->velocity_bins);
 
 	if (i >= 0 && k >= 0)
-		bin_add(&bins[2 * (i * o->velocity_bins + k) + pass->advancing], pass,
-			sample, 0);
+		bin_add(&bins[2 * (i * o->velocity_bins + k) + pass->blade.advancing],
+			pass, sample, 0);
 	return 0;
 }
 
@@ -348,6 +362,9 @@ static int put_bins(struct pass *pass)
 			{.integer = (int64_t)bin->n},
 			{.integer = bin->cuts},
 			{.integer = bin->advancing},
+			{.real = bin->acceleration_mm_s2},
+			{.real = bin->tilt_deg},
+			{.real = bin->time_in_tissue_s},
 		};
 
 		if (bin->n >= enough && !rc) {
@@ -369,7 +386,7 @@ static int find_extent(struct pass *pass, const struct incise_cut_sample *sample
 		       double t_s)
 {
 	(void)t_s;
-	if (pass->advancing)
+	if (pass->blade.advancing)
 		extend(pass, sample);
 	return 0;
 }

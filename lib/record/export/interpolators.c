@@ -692,6 +692,46 @@ static int feed(struct incise_blade_pose *blade, struct incise_error *err)
 	return 1;
 }
 
+/* The filter needs positive times; rows' are within ±2^61. */
+static int64_t loop_ns(int64_t t_ns)
+{
+	return t_ns + (1LL << 62);
+}
+
+static void arrive(struct incise_loop_motion *loop)
+{
+	incise_predict_add(&loop->predict,
+			   &loop->waiting[loop->first++ % INCISE_LOOP_POSES]);
+}
+
+static void loop_push(struct incise_loop_motion *loop,
+		      const struct incise_smooth_record *record)
+{
+	struct incise_tracker_sample *sample;
+
+	if (loop->last - loop->first == INCISE_LOOP_POSES)
+		arrive(loop);
+	sample = &loop->waiting[loop->last++ % INCISE_LOOP_POSES];
+	*sample = (struct incise_tracker_sample){
+		.t_ns = loop_ns(record->t_ns) + loop->predict.latency_ns,
+		.quaternion = {1},
+	};
+	v3_copy(sample->position_mm, record->position_mm);
+}
+
+/* The acceleration that the loop would find at this time. */
+static double loop_acceleration(struct incise_loop_motion *loop, int64_t t_ns)
+{
+	double x[3], v[3], a[3], attitude[4];
+
+	while (loop->first != loop->last &&
+	       loop->waiting[loop->first % INCISE_LOOP_POSES].t_ns <= loop_ns(t_ns))
+		arrive(loop);
+	incise_predict_at(&loop->predict, loop_ns(t_ns), x, v, attitude);
+	incise_predict_acceleration(&loop->predict, loop_ns(t_ns), a);
+	return incise_input_acceleration(v, a);
+}
+
 static int more_depth(struct incise_blade_pose *blade, struct incise_error *err)
 {
 	const struct incise_smooth_record *record;
@@ -709,6 +749,8 @@ static int more_depth(struct incise_blade_pose *blade, struct incise_error *err)
 	deep[1].t_ns = INCISE_TIME_NONE;
 	if (!record)
 		return 0;
+	loop_push(&blade->loop, record);
+	incise_stay_add(&blade->stay, record->t_ns, record->depth_mm);
 	deep[1] = (struct incise_blade_depth){
 		record->t_ns,
 		record->depth_mm,
@@ -719,6 +761,8 @@ static int more_depth(struct incise_blade_pose *blade, struct incise_error *err)
 		record->depth_noise_mm,
 		record->t_sd_s,
 		incise_progress_add(&blade->progress, record, blade->smooth.noise_1_s),
+		blade->stay.inside,
+		blade->stay.began_ns,
 	};
 	if (deep[0].t_ns != INCISE_TIME_NONE)
 		blade->rate_mm_s = (deep[1].depth_mm - deep[0].depth_mm) /
@@ -731,7 +775,8 @@ int incise_blade_pose_open(struct incise_blade_pose *blade,
 			   const struct incise_calibration *given,
 			   struct incise_error *err)
 {
-	double rate_hz;
+	struct incise_tracker_info tracker = {0};
+	double rate_hz, latency_ns = 0;
 	int rc = incise_recording_number(recording, "tracker_hz", &rate_hz, err);
 
 	*blade = (struct incise_blade_pose){0};
@@ -741,8 +786,14 @@ int incise_blade_pose_open(struct incise_blade_pose *blade,
 		blade->pose[i].t_ns = blade->deep[i].t_ns = INCISE_TIME_NONE;
 	if (rc)
 		return rc;
+	rc = incise_recording_number(recording, "tracker_latency_ns", &latency_ns, err);
+	if (rc)
+		return rc;
+	tracker.rate_hz = rate_hz > 0 ? rate_hz : 120;
+	tracker.latency_ns = (int64_t)fmin(fmax(latency_ns, 0), 1e9);
+	incise_predict_init(&blade->loop.predict, &tracker, 0);
 	/* The gains of the loop's filter are made for the nominal rate. */
-	if (incise_smooth_init(&blade->smooth, rate_hz > 0 ? rate_hz : 120))
+	if (incise_smooth_init(&blade->smooth, tracker.rate_hz))
 		return incise_error_set(err, ENOMEM, "out of memory");
 	rc = incise_rows_open(&blade->tracker, recording, "tracker",
 			      recording->form < 2
@@ -802,6 +853,17 @@ static void slerp(const struct incise_blade_pose *blade, double s, double to[4])
 		to[i] = wa * a[i] + wb * b[i];
 }
 
+/* Since the contact began that there was at this time. */
+static double time_in_tissue(const struct incise_blade_pose *blade, int64_t t_ns)
+{
+	const struct incise_blade_depth *before = &blade->deep[0],
+					*after = &blade->deep[1];
+
+	if (after->inside && after->began_ns <= t_ns)
+		return (double)(t_ns - after->began_ns) * 1e-9;
+	return before->inside ? (double)(t_ns - before->began_ns) * 1e-9 : 0;
+}
+
 /* Of the line between two values with this noise, and of the time at this speed. */
 static double uncertainty(double noise, double share, double time_s, double speed)
 {
@@ -837,6 +899,11 @@ int incise_blade_pose_at(struct incise_blade_pose *blade, int64_t t_ns, double t
 	slerp(blade, s, value->q);
 	value->depth_mm = mix(c->depth_mm, d->depth_mm, e);
 	value->velocity_mm_s = mix(c->velocity_mm_s, d->velocity_mm_s, e);
+	value->acceleration_mm_s2 =
+		isnan(e) ? NAN : loop_acceleration(&blade->loop, t_ns);
+	value->tilt_deg = incise_input_tilt_deg(
+		value->q, (const double[3])INCISE_SCALPEL_AXIS, blade->progress.normal);
+	value->time_in_tissue_s = isnan(e) ? NAN : time_in_tissue(blade, t_ns);
 	value->position_u_mm = uncertainty(mix(c->noise_mm, d->noise_mm, e), s, time_s,
 					   blade->speed_mm_s);
 	value->depth_u_mm = uncertainty(mix(c->depth_noise_mm, d->depth_noise_mm, e), e,

@@ -17,6 +17,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include "../../control/model_input.h"
 #include "../../control/predict.h"
 #include "../read/cut.h"
 #include "../read/rows.h"
@@ -173,6 +174,20 @@ struct incise_blade_depth {
 	double depth_mm, velocity_mm_s;
 	double noise_mm, depth_noise_mm, t_sd_s;
 	bool advancing;
+	bool inside;	  /* the tissue … */
+	int64_t began_ns; /* … since then */
+};
+
+/*
+ * The loop's filter, as it runs in a haptic loop: each pose arrives with the tracker's latency. A pose
+ * waits here for its arrival, at most as many as INCISE_LOOP_POSES.
+ */
+#define INCISE_LOOP_POSES 256
+
+struct incise_loop_motion {
+	struct incise_predict predict;
+	struct incise_tracker_sample waiting[INCISE_LOOP_POSES]; /* a ring */
+	unsigned int first, last;
 };
 
 struct incise_blade_pose {
@@ -187,12 +202,16 @@ struct incise_blade_pose {
 	double speed_mm_s, rate_mm_s; /* of position and of depth between the two */
 	struct incise_cut cut;
 	struct incise_progress progress;
+	struct incise_stay stay;
+	struct incise_loop_motion loop;
 };
 
 /* NAN: not known. */
 struct incise_blade_pose_value {
 	double position_mm[3], position_u_mm, q[4];
 	double depth_mm, depth_u_mm, velocity_mm_s;
+	/* As in the haptic loop; see ../../control/model_input.h. Outside of tissue the time is 0. */
+	double acceleration_mm_s2, tilt_deg, time_in_tissue_s;
 	int station, cut; /* 0: not known; outside cuts */
 	bool button, interpolated, error;
 	bool advancing; /* at both records around; false where depth is not known */

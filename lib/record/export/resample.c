@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
+#include "../../control/model_input.h"
 #include "../read/recording.h"
 #include "writers.h"
 #include "interpolators.h"
@@ -45,6 +46,9 @@ const struct incise_column incise_resample_columns[INCISE_RESAMPLE_COLUMNS +
 	FLAG("interpolated", "1: a tracker record is missing here"),
 	FLAG("tracker_error", "1: the tracker reported an error"),
 	INCISE_ADVANCING_COLUMN,
+	{INCISE_ACCELERATION_COLUMN, INCISE_COLUMN_SINGLE, 1},
+	{INCISE_TILT_COLUMN, INCISE_COLUMN_SINGLE, 2},
+	{INCISE_TIME_COLUMN, INCISE_COLUMN_SINGLE, 4},
 	SINGLE("camera_depth_mm", "mm", "depth from the frames", 4),
 	SINGLE("camera_depth_sd_mm", "mm", "standard deviation of the edge in the frames",
 	       4),
@@ -145,6 +149,9 @@ static int put_row(struct resample *r, int64_t t_ns,
 				      {.integer = blade.interpolated},
 				      {.integer = blade.error},
 				      {.integer = blade.advancing},
+				      {.real = blade.acceleration_mm_s2},
+				      {.real = blade.tilt_deg},
+				      {.real = blade.time_in_tissue_s},
 				      {.real = camera.depth_mm},
 				      {.real = coarse(camera.sd_mm)},
 				      {.real = coarse(camera.u_mm)},

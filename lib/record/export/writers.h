@@ -54,13 +54,13 @@ int incise_export_table(struct incise_recording *const *recordings, int n,
  * the blade, depth and speed, depth by the camera, each with its uncertainty and flags. The last
  * columns are of the camera.
  */
-#define INCISE_RESAMPLE_COLUMNS 22
+#define INCISE_RESAMPLE_COLUMNS 25
 #define INCISE_RESAMPLE_CAMERA_COLUMNS 5
 
 extern const struct incise_column
 	incise_resample_columns[INCISE_RESAMPLE_COLUMNS + INCISE_RESAMPLE_CAMERA_COLUMNS];
 
-/* Number of columns for these recordings: 22 or 27, or -errno. */
+/* Number of columns for these recordings: 25 or 30, or -errno. */
 int incise_resample_width(struct incise_recording *const *recordings, int n,
 			  struct incise_error *err);
 

@@ -287,7 +287,7 @@ static void table_streams_end_early(void **state)
 	batch = next(&stream);
 	stream.release(&stream);
 	other.release(&other);
-	assert_int_equal(batch.n_children, 22);
+	assert_int_equal(batch.n_children, 25);
 	batch.release(&batch);
 	/* by the caller's own progress; what came before may be read */
 	options.progress = stop_at_once;

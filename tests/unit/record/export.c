@@ -104,6 +104,8 @@ static struct truth brute_force(const char *file)
 /* One recording of the short script for all tests, and its truth. */
 static struct truth truth;
 
+#define INPUTS "acceleration_mm_s2,tilt_deg,time_in_tissue_s"
+
 static void read_advancing(void);
 
 static int record_once(void **state)
@@ -163,7 +165,15 @@ static char *next_line(char **text)
 	return strsep(text, "\n");
 }
 
-/* The last column of all samples, and the largest values there. */
+/* The column of a line, from 0. */
+static const char *column(const char *line, int n)
+{
+	while (n--)
+		line = strchr(line, ',') + 1;
+	return line;
+}
+
+/* The column `advancing` of all samples, and the largest values there. */
 static void read_advancing(void)
 {
 	struct incise_export_options how;
@@ -178,7 +188,7 @@ static void read_advancing(void)
 		struct truth_sample *s = &truth.samples[n];
 
 		assert_true(n < truth.n);
-		s->advancing = !strcmp(line + strlen(line) - 2, ",1");
+		s->advancing = *column(line, 6) == '1';
 		advancing += s->advancing;
 		if (!s->advancing || s->clipped)
 			continue;
@@ -304,7 +314,7 @@ static void averages_are_those_of_brute_force(void **state)
 		average(bins, 0, depth_max, velocity_max);
 		assert_string_equal(
 			next_line(&rest),
-			"depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing");
+			"depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing," INPUTS);
 		assert_int_equal(report.rows, compare(&rest, bins, how.min_count, NULL));
 		assert_string_equal(rest, ""); /* not a line more */
 		assert_int_equal(report.cuts, 14);
@@ -329,7 +339,7 @@ static void averages_by_cut(void **state)
 	text = rest = export_liver(&how, &report);
 	assert_string_equal(
 		next_line(&rest),
-		"cut,depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing");
+		"cut,depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing," INPUTS);
 	for (int cut = 1; cut <= truth.cuts; cut++) {
 		struct mean bins[2 * BINS];
 		char name[20];
@@ -369,7 +379,7 @@ static void clipped_samples_are_left_out(void **state)
 			}
 		}
 		while (pass && *(line = next_line(&rest)))
-			flagged += line[strlen(line) - 3] == '1';
+			flagged += *column(line, 5) == '1';
 		free(text);
 	}
 	assert_true(clipped > 1000);
@@ -392,8 +402,9 @@ static void raw_rows_are_the_samples(void **state)
 
 	incise_export_options_init(&how);
 	text = rest = export_liver(&how, &report);
-	assert_string_equal(next_line(&rest),
-			    "cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing");
+	assert_string_equal(
+		next_line(&rest),
+		"cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing," INPUTS);
 	for (; *(line = next_line(&rest)); n++) {
 		const struct truth_sample *s = &truth.samples[n];
 		double t, depth, velocity, force;

@@ -50,7 +50,8 @@ static char *resample(const char *path, double rate_hz,
 
 struct row {
 	double cut, t, x[3], x_u, q[4], station, button, depth, depth_u, velocity, force,
-		u, clipped, interpolated, error, advancing, camera[5];
+		u, clipped, interpolated, error, advancing, acceleration, tilt, time,
+		camera[5];
 };
 
 /* Columns in the order of the struct, with the camera's or without. */
@@ -142,6 +143,12 @@ static void rows_are_those_of_the_signals(void **state)
 			assert_true(!r.clipped && !r.interpolated);
 			/* always deeper, and along the skin */
 			assert_true(r.advancing == 1);
+			/* Even motion, once the filter that starts at rest has found it. */
+			assert_true(at < 60 || fabs(r.acceleration) < 0.2);
+			/* It turns by 0.02 rad a record, over and over; two decimals. */
+			assert_true(fabs(r.tilt - acos(cos(0.02 * at)) * 180 / M_PI) <
+				    2e-2);
+			assert_true(fabs(r.time - 0.008 * at) < 2e-4);
 			if (fabs(at - record - 0.5) < 0.49)
 				assert_true(r.error == (record == 59 || record == 60));
 		}
@@ -185,10 +192,10 @@ static void uncertainties_are_what_was_put_in(void **state)
 	incise_calibration_nominal(&calibration);
 	text = rest = resample("camera.rec", 1000, NULL);
 	first = at("SELECT value FROM meta WHERE key = 'depth_mm_px'");
-	assert_non_null(
-		strstr(strsep(&rest, "\n"),
-		       "tracker_error,advancing,camera_depth_mm,camera_depth_sd_mm,"
-		       "camera_depth_u_mm,quality,low_quality"));
+	assert_non_null(strstr(strsep(&rest, "\n"),
+			       "tracker_error,advancing,acceleration_mm_s2,tilt_deg,"
+			       "time_in_tissue_s,camera_depth_mm,camera_depth_sd_mm,"
+			       "camera_depth_u_mm,quality,low_quality"));
 	for (int i = 0; next_row(&rest, &r); i++) {
 		int frame = i / 10;
 		double share = i % 10 / 10.0, line = hypot(share, 1 - share);

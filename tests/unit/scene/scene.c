@@ -599,18 +599,52 @@ static void test_refusals(void **state)
 	}
 }
 
-static void test_model_of_other_shape(void **state)
+/* Inputs whose names are not all of a loop, once each, with depth_mm among them, at most four. */
+static void test_inputs_of_a_model(void **state)
 {
-	static const struct incise_variable in = {"x", 0, 1}, out = {"y", 0, 1};
-	static const int mfs[] = {2};
-	struct incise_model *model =
-		incise_model_new_grid(1, &in, mfs, INCISE_MF_GAUSS, &out, NULL);
-	struct incise_error err = {0};
+	static const struct {
+		const char *inputs[5];
+		const char *says; /* NULL: it is good */
+	} cases[] = {
+		{{"depth_mm"}, NULL},
+		{{"velocity_mm_s", "depth_mm"}, NULL},
+		{{"time_in_tissue_s", "tilt_deg", "depth_mm", "acceleration_mm_s2"},
+		 NULL},
+		{{"depth_mm", "pressure_Pa"},
+		 "a.scene: its model has the input 'pressure_Pa', which a loop does not "
+		 "have: expected depth_mm, velocity_mm_s, acceleration_mm_s2, tilt_deg or "
+		 "time_in_tissue_s; train with --inputs of these"},
+		{{"depth_mm", "velocity_mms"}, "; did you mean velocity_mm_s: expected"},
+		{{"velocity_mm_s"}, "has no input depth_mm"},
+		{{"depth_mm", "tilt_deg", "tilt_deg"}, "has the input tilt_deg twice"},
+		{{"depth_mm", "velocity_mm_s", "acceleration_mm_s2", "tilt_deg",
+		  "time_in_tissue_s"},
+		 "has 5 inputs, but a loop has at most 4"},
+	};
+	static const struct incise_variable out = {"force_N", 0, 1};
+	static const int mfs[] = {2, 2, 1, 1, 1};
 
-	assert_int_equal(incise_model_save(model, model_path, NULL), 0);
-	incise_model_free(model);
-	assert_null(load("model = \"m.fis\";", NULL, &err));
-	assert_non_null(strstr(err.text, "1 inputs"));
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_variable in[5];
+		struct incise_model *model;
+		struct incise_scene *scene;
+		struct incise_error err = {0};
+		int n = 0;
+
+		for (; n < 5 && cases[i].inputs[n]; n++) {
+			in[n] = (struct incise_variable){.min = 0, .max = 1};
+			strcpy(in[n].name, cases[i].inputs[n]);
+		}
+		model = incise_model_new_grid(n, in, mfs, INCISE_MF_GAUSS, &out, NULL);
+		assert_int_equal(incise_model_save(model, model_path, NULL), 0);
+		incise_model_free(model);
+		scene = load("model = \"m.fis\";", NULL, &err);
+		if (!!scene != !cases[i].says)
+			fail_msg("case %zu gave %d '%s'", i, err.code, err.text);
+		if (cases[i].says && !strstr(err.text, cases[i].says))
+			fail_msg("case %zu gave '%s'", i, err.text);
+		incise_scene_free(scene);
+	}
 	felt_write_model(model_path);
 }
 
@@ -632,7 +666,7 @@ int main(void)
 		cmocka_unit_test(test_other_model),
 		cmocka_unit_test(test_files),
 		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_model_of_other_shape),
+		cmocka_unit_test(test_inputs_of_a_model),
 	};
 
 	return cmocka_run_group_tests(tests, set_up, tear_down);

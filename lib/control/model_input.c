@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Inputs of a model in the haptic loop; see model_input.h.
+ */
+#include <math.h>
+#include <string.h>
+#include "../base/vector.h"
+#include "model_input.h"
+
+/* Below this speed the direction of the motion is not known. */
+#define SLOW_MM_S 1.0
+
+const struct incise_model_input_kind incise_model_input_kinds[INCISE_MODEL_INPUT_KINDS] =
+	{
+		[INCISE_INPUT_DEPTH] = {INCISE_DEPTH_COLUMN},
+		[INCISE_INPUT_SPEED] = {INCISE_SPEED_COLUMN},
+		[INCISE_INPUT_ACCELERATION] = {INCISE_ACCELERATION_COLUMN},
+		[INCISE_INPUT_TILT] = {INCISE_TILT_COLUMN},
+		[INCISE_INPUT_TIME] = {INCISE_TIME_COLUMN},
+};
+
+int incise_model_input_find(const char *name)
+{
+	for (int i = 0; i < INCISE_MODEL_INPUT_KINDS; i++)
+		if (!strcmp(name, incise_model_input_kinds[i].name))
+			return i;
+	return -1;
+}
+
+double incise_input_acceleration(const double velocity_mm_s[3],
+				 const double acceleration_mm_s2[3])
+{
+	return v3_dot(velocity_mm_s, acceleration_mm_s2) /
+	       fmax(v3_length(velocity_mm_s), SLOW_MM_S);
+}
+
+double incise_input_tilt_deg(const double quaternion[4], const double axis[3],
+			     const double normal[3])
+{
+	double turned[3], across[3];
+
+	v3_rotate(turned, quaternion, axis);
+	v3_cross(across, turned, normal);
+	/* Exact at all angles, where an arc cosine is not near 0 and 180. */
+	return atan2(v3_length(across), v3_dot(turned, normal)) * (180 / M_PI);
+}
+
+void incise_stay_add(struct incise_stay *stay, int64_t t_ns, double depth_mm)
+{
+	bool was_inside = stay->inside;
+
+	if (!was_inside && depth_mm > 0) {
+		double rise_mm = depth_mm - stay->depth_mm, share = 1;
+
+		if (stay->known && stay->depth_mm <= 0)
+			share = depth_mm / rise_mm;
+		stay->inside = true;
+		stay->began_ns =
+			stay->known ? t_ns - llround(share * (double)(t_ns - stay->t_ns))
+				    : t_ns;
+	} else if (was_inside && depth_mm < -INCISE_STAY_LEAVE_MM) {
+		stay->inside = false;
+	}
+	stay->known = true;
+	stay->t_ns = t_ns;
+	stay->depth_mm = depth_mm;
+}

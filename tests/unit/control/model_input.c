@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Inputs of a model: acceleration, tilt and time in tissue against what they are by definition.
+ */
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <math.h>
+#include <stdlib.h>
+#include <incise/clock.h>
+#include "../../../lib/control/model_input.h"
+#include "../../../lib/control/predict.h"
+
+static void names_are_found(void **state)
+{
+	for (int i = 0; i < INCISE_MODEL_INPUT_KINDS; i++)
+		assert_int_equal(
+			incise_model_input_find(incise_model_input_kinds[i].name), i);
+	assert_int_equal(incise_model_input_find("depth"), -1);
+	assert_int_equal(incise_model_input_find(""), -1);
+}
+
+/* d|v|/dt of a motion; below 1 mm/s less, without a leap. */
+static void acceleration_is_that_of_the_speed(void **state)
+{
+	double last = 0;
+
+	for (int k = -2000; k <= 2000; k++) {
+		double v[] = {0.001 * k, 0, 0}, a[] = {300, 50, 0};
+		double found = incise_input_acceleration(v, a);
+
+		if (k <= -1000 || k >= 1000)
+			assert_true(fabs(found - (k < 0 ? -300 : 300)) < 1e-9);
+		assert_true(k == -2000 || fabs(found - last) < 0.31);
+		last = found;
+	}
+	assert_true(incise_input_acceleration((double[]){3, 4, 0},
+					      (double[]){4, -3, 9}) == 0);
+}
+
+static void tilt_is_the_angle(void **state)
+{
+	const double normal[] = {0, 0.6, 0.8}, axis[] = {0, 0.6, 0.8};
+
+	for (int k = 0; k <= 180; k++) {
+		double half = k * M_PI / 360;
+		/* About x, which is across; the sign of a quaternion does not matter. */
+		double q[] = {cos(half), sin(half), 0, 0}, minus[] = {-q[0], -q[1], 0, 0};
+
+		assert_true(fabs(incise_input_tilt_deg(q, axis, normal) - k) < 1e-9);
+		assert_true(fabs(incise_input_tilt_deg(minus, axis, normal) - k) < 1e-9);
+	}
+	assert_true(isnan(incise_input_tilt_deg((double[]){NAN, 0, 0, 0}, axis, normal)));
+}
+
+static void a_stay_begins_at_the_surface(void **state)
+{
+	/* ms, mm; since when it is inside, ms, or -1 */
+	static const struct {
+		int t_ms;
+		double depth_mm;
+		int began_ms;
+	} depths[] = {
+		{0, -1, -1},	{10, -0.5, -1}, {20, 0.5, 15},	{30, 3, 15},
+		{40, -0.1, 15}, /* not out yet */
+		{50, 0.4, 15},	{60, -0.3, -1}, {70, -0.1, -1}, {80, 0.3, 72},
+	};
+	struct incise_stay stay = {0};
+
+	for (size_t i = 0; i < sizeof(depths) / sizeof(*depths); i++) {
+		incise_stay_add(&stay, depths[i].t_ms * 1000000LL, depths[i].depth_mm);
+		assert_int_equal(stay.inside, depths[i].began_ms >= 0);
+		if (stay.inside)
+			assert_true(llabs(stay.began_ns -
+					  depths[i].began_ms * 1000000LL) < 600000);
+	}
+	/* From the first depth on, when it is one. */
+	stay = (struct incise_stay){0};
+	incise_stay_add(&stay, 5, 1);
+	assert_true(stay.inside && stay.began_ns == 5);
+}
+
+/* A hand that is pushed evenly: the filter finds it; and between two ticks nothing leaps. */
+static void filter_finds_an_even_acceleration(void **state)
+{
+	const struct incise_tracker_info tracker = {
+		.name = "t", .rate_hz = 120, .latency_ns = 4200000};
+	const double push_mm_s2 = 400;
+	struct incise_predict p;
+	double last = 0;
+	int64_t pose = 0;
+
+	incise_predict_init(&p, &tracker, 0);
+	for (int64_t t_ns = 0; t_ns < INCISE_NS_PER_S / 2; t_ns += 1000000) {
+		double a[3];
+
+		for (; pose * 8333333 + tracker.latency_ns <= t_ns; pose++) {
+			double t_s = (double)(pose * 8333333) * 1e-9;
+
+			incise_predict_add(
+				&p, &(struct incise_tracker_sample){
+					    .t_ns = pose * 8333333 + tracker.latency_ns,
+					    .position_mm = {push_mm_s2 / 2 * t_s * t_s},
+					    .quaternion = {1}});
+		}
+		incise_predict_acceleration(&p, t_ns, a);
+		assert_true(fabs(a[0] - last) < push_mm_s2 / 10);
+		assert_true(a[1] == 0 && a[2] == 0);
+		if (t_ns > 300000000)
+			assert_true(fabs(a[0] - push_mm_s2) < 1);
+		last = a[0];
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(names_are_found),
+		cmocka_unit_test(acceleration_is_that_of_the_speed),
+		cmocka_unit_test(tilt_is_the_angle),
+		cmocka_unit_test(a_stay_begins_at_the_surface),
+		cmocka_unit_test(filter_finds_an_even_acceleration),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
