@@ -93,7 +93,9 @@ static const struct cli_option option_table[] = {
 	 "initial step of the membership functions' parameters\n"
 	 "(default: 0.01); only with --classic",
 	 CLI_NUMBER(struct options, train.step, 1e-9, 10)},
-	{0, "ridge", "R", "ridge on scaled data (default: by cross-validation)",
+	{0, "ridge", "R",
+	 "one ridge on scaled data (default: an average of fits,\n"
+	 "weighted by cross-validation)",
 	 CLI_NUMBER(struct options, train.ridge, 0, 1e12)},
 	{0, "starts", "N",
 	 "number of starting points of the membership functions\n"
@@ -406,6 +408,10 @@ static void report_json(const struct result *result, json_t *warned)
 	json_set_integer(object, "epochs", report->epochs);
 	json_set_integer(object, "best_epoch", report->best_epoch);
 	json_set_number(object, "ridge", report->ridge);
+	json_set_integer(object, "averaged", report->averaged);
+	json_set_number(object, "plane_weight", report->plane_weight);
+	json_set_number(object, "mean_weight", report->mean_weight);
+	json_set_number(object, "cut_weight", report->cut_weight);
 	json_set_number(object, "condition", report->condition);
 	json_set_integer(object, "rules_unfired", report->rules_unfired);
 	for (int r = 0; r < incise_model_info(model)->n_rules; r++)
@@ -458,9 +464,12 @@ static void report_text(const struct result *result)
 		printf("\nleft out %zu of %zu rows: the blade did not advance",
 		       result->left_out,
 		       result->left_out + fit->pairs.n + (check ? check->pairs.n : 0));
-	printf("\n%d rules, %d parameters, %d epochs (kept %d), ridge %g, condition %.2g\n",
+	printf("\n%d rules, %d parameters, %d epochs (kept %d), ",
 	       incise_model_info(model)->n_rules, report->parameters, report->epochs,
-	       report->best_epoch, report->ridge, report->condition);
+	       report->best_epoch);
+	report->averaged ? printf("average of %d fits", report->averaged)
+			 : printf("ridge %g", report->ridge);
+	printf(", condition %.2g\n", report->condition);
 	printf("  %-22s%12s%14s\n", "RMSE", "training", check ? unseen : "");
 	print_row("this model", report->train_rmse, report->check_rmse);
 	snprintf(knn, sizeof(knn), "%d nearest", baselines->k);

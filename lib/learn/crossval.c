@@ -92,6 +92,7 @@ int incise_folds_init(struct incise_folds *folds, const struct incise_pairs *pai
 				       n_groups >= 2, n_folds, f);
 	}
 	folds->n_units = (int)elements;
+	folds->cuts = n_groups >= 2;
 	free(unit);
 	free(place);
 	return rc;

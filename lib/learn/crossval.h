@@ -21,6 +21,8 @@
 struct incise_folds {
 	int n; /* below 2: nothing can be held out */
 	int n_units;
+	bool cuts;     /* units are groups, and the pairs are all that they have */
+	double zero;   /* raw output 0 in scaled units */
 	size_t n_held; /* pairs, over all folds */
 	struct incise_pairs fit[CROSSVAL_MAX], held[CROSSVAL_MAX];
 	int *unit[CROSSVAL_MAX];  /* of each held pair */

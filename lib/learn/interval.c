@@ -8,8 +8,7 @@
 #include "../base/ascending.h"
 #include "interval.h"
 
-/* The 97.5 % quantile of Student's t, to 0.1 %. */
-static double student(int freedom)
+double incise_student(int freedom)
 {
 	static const double few[] = {12.706, 4.303, 3.182, 2.776, 2.571};
 	const double z = INCISE_INTERVAL95, n = freedom;
@@ -23,22 +22,25 @@ static double student(int freedom)
 
 int incise_interval_noise(const struct incise_basis *basis,
 			  const struct incise_folds *folds,
-			  const struct incise_ridge *ridge, int epochs, double *noise)
+			  const struct incise_ridge *ridge, int epochs,
+			  const struct incise_average *average, double *noise)
 {
 	double *error = malloc((size_t)epochs * folds->n_units * sizeof(*error));
 	double *ratios = malloc(folds->n_held * sizeof(*ratios));
-	int rc = error && ratios ? incise_crossval_search(basis, folds, ridge, epochs,
-							  error, ratios)
-				 : -ENOMEM;
+	int rc = -ENOMEM;
 
+	if (error && ratios)
+		rc = average ? incise_average_ratios(average, basis, folds, ratios)
+			     : incise_crossval_search(basis, folds, ridge, epochs, error,
+						      ratios);
 	if (!rc) {
 		/* The quantile that also holds the pair to come: (n+1)·0.95 from below. */
 		double rank = ceil(0.95 * (folds->n_held + 1.0));
 		size_t at = fmin(rank, folds->n_held) - 1;
 
 		qsort(ratios, folds->n_held, sizeof(*ratios), ascending);
-		*noise = ratios[at] / INCISE_INTERVAL95 * student(folds->n_units - 1) /
-			 INCISE_INTERVAL95;
+		*noise = ratios[at] / INCISE_INTERVAL95 *
+			 incise_student(folds->n_units - 1) / INCISE_INTERVAL95;
 	}
 	free(error);
 	free(ratios);

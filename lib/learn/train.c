@@ -41,6 +41,7 @@ struct learner {
 	struct incise_design design; /* of all pairs */
 	struct incise_sample tuned;
 	struct incise_folds folds; /* of that */
+	struct incise_tuning tuning;
 };
 
 void incise_train_options_init(struct incise_train_options *options)
@@ -226,7 +227,10 @@ static int train_default(struct learner *l, struct incise_tuning *tuning)
 	rc = fold_all(l);
 	if (rc)
 		return rc;
-	rc = incise_lsq_solve(l->lsq, &tuning->ridge, l->consequents);
+	if (tuning->average)
+		rc = incise_average_solve(tuning->average, l->lsq, l->consequents);
+	else
+		rc = incise_lsq_solve(l->lsq, &tuning->ridge, l->consequents);
 	if (!rc)
 		rc = incise_scaling_consequents(&l->scaling, l->basis.n_rules,
 						l->consequents);
@@ -247,27 +251,34 @@ static int find_uncertainty(struct learner *l, const struct incise_tuning *tunin
 	double noise;
 	int stride, rc;
 	const double *factor;
+	double *own = NULL;
 
 	ridge.ridge = fmax(ridge.ridge, LEAST_RIDGE);
 	rc = incise_interval_noise(&tuning->basis, &l->folds, &ridge, tuning->epochs,
-				   &noise);
+				   tuning->average, &noise);
 	if (rc)
 		return rc;
-	factor = incise_lsq_factor(l->lsq, &ridge, &stride);
+	factor = own = tuning->average
+			       ? incise_average_factor(tuning->average, l->lsq, &stride)
+			       : NULL;
+	if (!tuning->average)
+		factor = incise_lsq_factor(l->lsq, &ridge, &stride);
 	if (!factor)
-		return -EDOM;
+		return tuning->average ? -errno : -EDOM;
 	*l->options->uncertainty =
 		incise_uncertainty_new(l->model,
 				       noise * l->scaling.scale[l->basis.n_inputs],
 				       factor, stride, NULL);
-	return *l->options->uncertainty ? 0 : errno == ENOMEM ? -ENOMEM : -EDOM;
+	rc = *l->options->uncertainty ? 0 : errno == ENOMEM ? -ENOMEM : -EDOM;
+	free(own);
+	return rc;
 }
 
 static int learn(struct learner *l)
 {
 	struct incise_train_report *report = l->report;
 	bool classic = l->options->classic;
-	struct incise_tuning tuning;
+	struct incise_tuning *tuning = &l->tuning;
 	int rc = incise_basis_init(&l->basis, l->model), n;
 	size_t most;
 
@@ -287,14 +298,26 @@ static int learn(struct learner *l)
 		rc = incise_folds_init(&l->folds, &l->tuned.pairs, l->tuned.groups,
 				       l->options->seed);
 	l->folds.stop = l->options->stop;
+	l->folds.zero = -l->scaling.offset[l->basis.n_inputs] /
+			l->scaling.scale[l->basis.n_inputs];
+	l->folds.cuts &= l->tuned.pairs.n == l->train->n;
 	if (!rc)
-		rc = classic ? train_classic(l, &tuning) : train_default(l, &tuning);
+		rc = classic ? train_classic(l, tuning) : train_default(l, tuning);
 	if (!rc)
 		rc = incise_lsq_condition(l->lsq, &report->condition);
 	if (rc)
 		return rc;
-	report->ridge = tuning.ridge.ridge;
-	report->crossval_rmse = tuning.rmse * l->scaling.scale[l->basis.n_inputs];
+	report->ridge = tuning->ridge.ridge;
+	report->crossval_rmse = tuning->rmse * l->scaling.scale[l->basis.n_inputs];
+	if (tuning->average) {
+		struct incise_average_shares shares =
+			incise_average_shares(tuning->average);
+
+		report->averaged = shares.settings;
+		report->plane_weight = shares.plane;
+		report->mean_weight = shares.mean;
+		report->cut_weight = shares.cuts;
+	}
 	report->parameters = n + l->basis.n_premises;
 	report->train_rmse = incise_pairs_rmse(l->model, l->train);
 	report->train_r2 = incise_pairs_r2(l->train, report->train_rmse);
@@ -303,7 +326,7 @@ static int learn(struct learner *l)
 		report->check_rmse = incise_pairs_rmse(l->model, l->check);
 		report->check_r2 = incise_pairs_r2(l->check, report->check_rmse);
 	}
-	return l->options->uncertainty ? find_uncertainty(l, &tuning) : 0;
+	return l->options->uncertainty ? find_uncertainty(l, tuning) : 0;
 }
 
 static int fail(struct incise_error *err, int rc)
@@ -356,6 +379,7 @@ int incise_train(struct incise_model *model, const struct incise_pairs *train,
 	incise_lsq_free(l->lsq);
 	incise_design_free(&l->design);
 	incise_folds_free(&l->folds);
+	incise_average_free(l->tuning.average);
 	free(l->consequents);
 	incise_sample_free(&l->tuned);
 	free(l);

@@ -2,7 +2,8 @@
 /*
  * Choosing ridge, start and epochs; see tune.h.
  *
- *   ridge of the first premises ─▶ search with it and its neighbours ─▶ other starts
+ *   ridge and average of the first premises ─▶ search with the ridge and its neighbours
+ *                                                            └─▶ other starts
  *
  * The setting that moves the premises less is kept unless the other's
  * held-out error is clearly less: held-out errors of many settings have a winner by chance.
@@ -11,6 +12,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "interval.h"
 #include "tune.h"
 
 static const double sizes[TUNE_SIZES] = {1e-5, 1e-4, 1e-3, 1e-2, 1e-1,
@@ -31,7 +33,10 @@ static const double means[TUNE_MEANS] = {1, 1e-3};
 /* Multiplications that all searches may cost together: some ten seconds at most. */
 #define BUDGET 1e11
 
-/* Standard errors by which a search has to win. */
+/*
+ * Standard errors by which a search has to win against one ridge. Against the average, it has to
+ * be beyond chance: one search of many that wins by less has been worse on unseen cuts.
+ */
 #define CLEAR 1.0
 
 struct tuner {
@@ -40,6 +45,7 @@ struct tuner {
 	double *error; /* epochs × units, of the search at hand */
 	double *best;  /* units, of the setting kept */
 	double best_total;
+	double clear; /* standard errors by which another setting has to win */
 	struct incise_tuning *tuning;
 };
 
@@ -53,8 +59,8 @@ static int try_search(struct tuner *t, const struct incise_basis *basis, int sta
 		const double *error = t->error + (size_t)e * t->folds->n_units;
 		double total = incise_crossval_total(t->folds, error);
 
-		if (total >= t->best_total - CLEAR * incise_crossval_spread(
-							     t->folds, error, t->best))
+		if (total >= t->best_total - t->clear * incise_crossval_spread(
+								t->folds, error, t->best))
 			continue;
 		t->best_total = total;
 		memcpy(t->best, error, t->folds->n_units * sizeof(*error));
@@ -62,6 +68,9 @@ static int try_search(struct tuner *t, const struct incise_basis *basis, int sta
 		t->tuning->start = start;
 		t->tuning->epochs = e + 1;
 		t->tuning->basis = *basis;
+		incise_average_free(t->tuning->average);
+		t->tuning->average = NULL;
+		t->clear = CLEAR;
 	}
 	return rc;
 }
@@ -105,6 +114,23 @@ static int choose_ridge(struct tuner *t, const struct incise_basis *basis,
 	return rc;
 }
 
+/* The average of ridges at the premises given, which a search then has to beat. */
+static int choose_average(struct tuner *t, const struct incise_basis *basis)
+{
+	double *error = malloc(t->folds->n_units * sizeof(*error));
+	int rc = error ? incise_average_find(&t->tuning->average, basis, t->folds, error)
+		       : -ENOMEM;
+
+	if (!rc) {
+		t->clear = incise_student(t->folds->n_units - 1);
+		t->best_total = incise_crossval_total(t->folds, error);
+		memcpy(t->best, error, t->folds->n_units * sizeof(*error));
+	}
+	free(error);
+	/* Where there is no average, the ridge stays. */
+	return rc == -E2BIG || rc == -EDOM ? 0 : rc;
+}
+
 /* Multiplications of one epoch in all folds. */
 static double cost(const struct incise_basis *basis, const struct incise_folds *folds)
 {
@@ -141,7 +167,8 @@ static int search_all(struct tuner *t, const struct incise_basis *basis,
 int incise_tune(const struct incise_basis *basis, const struct incise_folds *folds,
 		const struct incise_train_options *options, struct incise_tuning *tuning)
 {
-	struct tuner t = {.folds = folds, .best_total = HUGE_VAL, .tuning = tuning};
+	struct tuner t = {
+		.folds = folds, .best_total = HUGE_VAL, .clear = CLEAR, .tuning = tuning};
 	struct incise_ridge ridges[TUNE_RIDGES];
 	struct incise_basis first = *basis;
 	int rc = -ENOMEM, chosen = -1, starts = options->starts;
@@ -167,11 +194,17 @@ int incise_tune(const struct incise_basis *basis, const struct incise_folds *fol
 	rc = 0;
 	if (isnan(options->ridge))
 		rc = choose_ridge(&t, &first, ridges, &chosen);
+	if (!rc && isnan(options->ridge))
+		rc = choose_average(&t, &first);
 	if (!rc)
 		rc = search_all(&t, &first, ridges, chosen, starts, options->seed);
 	if (!rc)
 		tuning->rmse = sqrt(t.best_total / folds->n_held);
 out:
+	if (rc) {
+		incise_average_free(tuning->average);
+		tuning->average = NULL;
+	}
 	free(t.error);
 	free(t.best);
 	return rc;

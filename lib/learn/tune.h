@@ -7,6 +7,7 @@
 #ifndef INCISE_TUNE_H
 #define INCISE_TUNE_H
 
+#include "average.h"
 #include "basis.h"
 #include "crossval.h"
 
@@ -16,6 +17,11 @@ struct incise_tuning {
 	int epochs;		   /* of varpro.h: 1 keeps the premises of the start */
 	struct incise_basis basis; /* premises of that start */
 	double rmse;		   /* held-out, scaled; NAN where nothing was held out */
+	/*
+	 * The consequents at the premises given, if they are as good as any other choice: to
+	 * be freed with incise_average_free(). NULL: those of the ridge.
+	 */
+	struct incise_average *average;
 };
 
 /* Returns 0, -EDOM, -ENOMEM. */

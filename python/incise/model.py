@@ -95,6 +95,10 @@ class TrainReportStruct(ctypes.Structure):
         ("start", c_int),
         ("pairs_tuned", ctypes.c_size_t),
         ("unfired", c_bool * RULES_MAX),
+        ("averaged", c_int),
+        ("plane_weight", c_double),
+        ("mean_weight", c_double),
+        ("cut_weight", c_double),
     ]
     c_name = "struct incise_train_report"
 

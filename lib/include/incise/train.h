@@ -40,7 +40,8 @@ struct incise_train_options {
 	double step; /**< initial step of the premises, default 0.01; classic only */
 	/**
 	 * Ridge of the least squares: penalty ridge·Σp² with inputs scaled to [0, 1] and the
-	 * output to its standard deviation; NAN (default) selects it by cross-validation.
+	 * output to its standard deviation; NAN (default) averages fits with different penalties,
+	 * weighted by cross-validation.
 	 * Ignored if classic.
 	 */
 	double ridge;
@@ -74,7 +75,7 @@ struct incise_train_options {
 struct incise_train_report {
 	int epochs;	/**< epochs of the final training */
 	int best_epoch; /**< from 1: the epoch whose parameters were kept */
-	double ridge;	/**< ridge in use */
+	double ridge; /**< ridge of the search, and of the consequents unless averaged */
 	double train_rmse,
 		check_rmse; /**< of the kept parameters; check NaN without data */
 	/** Of the scaled least-squares problem, without ridge; infinite: not all is determined. */
@@ -95,6 +96,13 @@ struct incise_train_report {
 	 */
 	size_t pairs_tuned;
 	bool unfired[INCISE_MODEL_RULES_MAX]; /**< the rules that rules_unfired counts */
+	/**
+	 * Ridge fits with a weight of at least 1 % in the average of the consequents; 0: one
+	 * fit with @ridge. Of these, the weight of the plane and of the mean of the output,
+	 * and of all fits with a random factor of each cut.
+	 */
+	int averaged;
+	double plane_weight, mean_weight, cut_weight;
 };
 
 /** Set the defaults documented above. */
@@ -106,7 +114,10 @@ INCISE_API void incise_train_options_init(struct incise_train_options *options);
  * The default method scales the data and searches the premises by Levenberg–Marquardt on the
  * variable-projected problem (consequents always optimal for the premises), with functions
  * that remain ordered and overlapping. It selects ridge, start and number of epochs by the
- * smallest error on held-out groups of the training pairs. Check pairs are not used, except to
+ * smallest error on held-out groups of the training pairs. Unless a search is better beyond
+ * chance, the premises stay and the consequents are an average of fits with different
+ * penalties, up to the plane and the mean, with and without a random factor of each group,
+ * weighted by that error. Check pairs are not used, except to
  * select the epoch with @options->classic (as in MATLAB's anfis). In the default mode the
  * check error is therefore an error on unseen data.
  *
