@@ -289,6 +289,12 @@ check-python-speed: all ## rows/s and memory of streams in Python next to sqlite
 	INCISE_BUILD=$(abspath $(O)) PYTHONPATH=python PYTHONDONTWRITEBYTECODE=1 \
 		/usr/bin/python3 tests/bench/python_streams.py $(ROWS)
 
+DATA ?=
+SPLITS ?= 4
+check-few-cuts: all python-peers ## errors on unseen cuts next to scikit-learn's; DATA='a.csv b.csv' SPLITS=8
+	@[ ! -e $(O)/tests/python/ready ] || INCISE_BUILD=$(abspath $(O)) SPLITS=$(SPLITS) \
+		$(O)/tests/python/venv/bin/python -B tests/bench/few_cuts.py $(DATA)
+
 TRACKER_SECONDS ?= 600
 check-tracker: $(O)/tests/tracker_line ## a FASTRAK at a serial line for ten minutes, clean and with harm on the way
 	$(O)/tests/tracker_line $(TRACKER_SECONDS)
@@ -309,4 +315,4 @@ check-exhaustive: $(O)/tests/exhaustive ## every pair of 16-bit inputs of the sh
 	$(O)/tests/exhaustive scenes/liver.fis
 	$(O)/tests/exhaustive scenes/liver.fis force
 
-.PHONY: check-python-speed check-exhaustive check-frames check-tracker check-depth check-day check-state
+.PHONY: check-few-cuts check-python-speed check-exhaustive check-frames check-tracker check-depth check-day check-state
