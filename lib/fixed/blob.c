@@ -36,11 +36,11 @@ static uint64_t magnitude(int64_t v)
 	return v < 0 ? -(uint64_t)v : (uint64_t)v;
 }
 
-/* True where n bytes at offset lie within the blob, behind the header, aligned. */
+/* True where n bytes at offset lie within the blob, behind the shortest header, aligned. */
 static int within(uint64_t offset, uint64_t n, uint32_t size, uint32_t align)
 {
-	return offset >= sizeof(struct incise_fx_header) && offset % align == 0 &&
-	       offset <= size && n <= size - offset;
+	return offset >= incise_fx_header_size(INCISE_FX_VERSION) &&
+	       offset % align == 0 && offset <= size && n <= size - offset;
 }
 
 /* Supports, counts, and for tables that the cells reach over the whole support. */
@@ -250,15 +250,16 @@ bool incise_fx_is_name(const char *name, int size)
 /* Bytes without a meaning in this version must be zero, so that a later one can use them. */
 static int check_unused(const struct incise_fx_header *head)
 {
-	const uint8_t *input = (const uint8_t *)&head->input[1];
+	const uint8_t *input = (const uint8_t *)head->input;
+	uint32_t room = incise_fx_header_inputs(incise_fx_le32(head->version));
 
 	if (head->reserved[0] || head->reserved[1] || head->reserved[2])
 		return BAD;
-	for (int i = 0; i < INCISE_FIXED_INPUTS_MAX; i++)
+	for (uint32_t i = 0; i < room; i++)
 		if (head->input[i].reserved[0] || head->input[i].reserved[1])
 			return BAD;
-	for (uint32_t i = 0;
-	     incise_fx_le32(head->n_inputs) == 1 && i < sizeof(head->input[1]); i++)
+	for (uint32_t i = incise_fx_le32(head->n_inputs) * (uint32_t)sizeof(*head->input);
+	     i < room * sizeof(*head->input); i++)
 		if (input[i])
 			return BAD;
 	return 0;
@@ -268,15 +269,18 @@ int incise_fixed_open(struct incise_fixed *fx, const void *blob, uint32_t size)
 {
 	const struct incise_fx_header *head = blob;
 	const uint8_t *bytes = blob;
+	uint32_t version;
 
-	if (size < sizeof(*head) || size > INCISE_FIXED_SIZE_MAX)
+	if (size < incise_fx_header_size(INCISE_FX_VERSION) ||
+	    size > INCISE_FIXED_SIZE_MAX)
 		return BAD;
 	for (int i = 0; i < 8; i++)
 		if (head->magic[i] != INCISE_FX_MAGIC[i])
 			return BAD;
-	if (incise_fx_le32(head->version) != INCISE_FX_VERSION)
+	version = incise_fx_le32(head->version);
+	if (version != INCISE_FX_VERSION && version != INCISE_FX_VERSION_MANY)
 		return UNSUPPORTED;
-	if (incise_fx_le32(head->size) != size ||
+	if (size < incise_fx_header_size(version) || incise_fx_le32(head->size) != size ||
 	    incise_fx_le32(head->crc) !=
 		    incise_fx_crc(bytes + INCISE_FX_CRC_FROM, size - INCISE_FX_CRC_FROM))
 		return BAD;
@@ -298,8 +302,13 @@ int incise_fixed_open(struct incise_fixed *fx, const void *blob, uint32_t size)
 	/* Differences of formats are checked below, and must not overflow there. */
 	if (fx->shift_a < 0 || fx->shift_a > 127 || fx->shift_b < 0 || fx->shift_b > 127)
 		return BAD;
-	if (fx->n_inputs < 1 || fx->n_inputs > INCISE_FIXED_INPUTS_MAX || !fx->bound ||
-	    check_unused(head) || !incise_fx_is_name(head->name, sizeof(head->name)) ||
+	if (fx->n_inputs < 1 ||
+	    fx->n_inputs > (int32_t)incise_fx_header_inputs(version) ||
+	    (version == INCISE_FX_VERSION_MANY &&
+	     (fx->n_inputs <= INCISE_FX_INPUTS_FEW ||
+	      fx->arithmetic != INCISE_FIXED_DIRECT)) ||
+	    !fx->bound || check_unused(head) ||
+	    !incise_fx_is_name(head->name, sizeof(head->name)) ||
 	    !incise_fx_is_name(head->output, sizeof(head->output)))
 		return BAD;
 	for (int i = 0; i < fx->n_inputs; i++) {

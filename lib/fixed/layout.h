@@ -3,7 +3,8 @@
  * The bytes of a blob, all little-endian:
  *
  *   0    struct incise_fx_header
- *   288  data, by arithmetic:
+ *   288  data, by arithmetic; at 416 in version 2, which has room for four inputs in its header and
+ *        is that of models of three and four
  *
  *   direct  per input, at its offset: n_mfs × struct incise_fx_mf
  *           at data: n_rules × (n_inputs + 1) consequents, int64 in Q(shift_a), the
@@ -29,7 +30,9 @@
 #include "integers.h"
 
 #define INCISE_FX_MAGIC "INCISEFX"
-#define INCISE_FX_VERSION 1
+#define INCISE_FX_VERSION 1	 /* of one and two inputs */
+#define INCISE_FX_VERSION_MANY 2 /* of three and four */
+#define INCISE_FX_INPUTS_FEW 2
 
 struct incise_fx_input {
 	int32_t min, max;
@@ -56,8 +59,23 @@ struct incise_fx_header {
 	uint32_t reserved[3]; /* zero */
 	char name[64];	      /* of the model */
 	char output[32];
-	struct incise_fx_input input[INCISE_FIXED_INPUTS_MAX];
+	struct incise_fx_input
+		input[INCISE_FIXED_INPUTS_MAX]; /* INCISE_FX_INPUTS_FEW in version 1 */
 };
+
+/* Inputs for which a header of this version has room, and its size. */
+static inline uint32_t incise_fx_header_inputs(uint32_t version)
+{
+	return version == INCISE_FX_VERSION ? INCISE_FX_INPUTS_FEW
+					    : INCISE_FIXED_INPUTS_MAX;
+}
+
+static inline uint32_t incise_fx_header_size(uint32_t version)
+{
+	return (uint32_t)(sizeof(struct incise_fx_header) -
+			  (INCISE_FIXED_INPUTS_MAX - incise_fx_header_inputs(version)) *
+				  sizeof(struct incise_fx_input));
+}
 
 #define INCISE_FX_CRC_FROM 20 /* offset of the first byte behind crc */
 

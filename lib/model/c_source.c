@@ -153,6 +153,40 @@ static const char direct_one_text[] =
 	"\treturn rounded(sum / sum_w);\n"
 	"}\n";
 
+/* Three inputs and more; before it the degrees of each. */
+static const char direct_many_text[] =
+	"\tfor (r = 0; r < RULES; r++, p += INPUTS + 1) {\n"
+	"\t\tint64_t rule = p[0] * 65536;\n"
+	"\t\tuint64_t w = 1 << 30;\n\n"
+	"\t\tfor (i = 0; i < INPUTS; i++) {\n"
+	"\t\t\tw = (w * mu[i][at[i]]) >> 30;\n"
+	"\t\t\trule += p[i + 1] * in[i];\n"
+	"\t\t}\n"
+	"\t\tsum += (int64_t)w * (rule >> (SHIFT_A + 16 - SHIFT_B));\n"
+	"\t\tsum_w += (int64_t)w;\n"
+	"\t\tfor (i = INPUTS - 1; i >= 0 && ++at[i] == n[i]; i--)\n"
+	"\t\t\tat[i] = 0;\n"
+	"\t}\n"
+	"\treturn rounded(sum / sum_w);\n"
+	"}\n";
+
+static void put_direct_many(FILE *out, const struct incise_fixed *fx)
+{
+	fputs("{\n\tstatic const int n[INPUTS] = {", out);
+	for (int i = 0; i < fx->n_inputs; i++)
+		fprintf(out, "%sFUNCTIONS_%d", i ? ", " : "", i);
+	fputs("};\n\tuint32_t mu[INPUTS][FUNCTIONS_MAX];\n\tint64_t in[INPUTS], sum = 0, "
+	      "sum_w = 0;\n\tconst int64_t *p = consequents;\n\tint at[INPUTS] = {0};\n"
+	      "\tint i, r;\n\n",
+	      out);
+	for (int i = 0; i < fx->n_inputs; i++)
+		fprintf(out,
+			"\tin[%d] = (int64_t)MIN_%d + from_min(x[%d], MIN_%d, MAX_%d);\n"
+			"\tdegrees(functions_%d, FUNCTIONS_%d, in[%d], mu[%d]);\n",
+			i, i, i, i, i, i, i, i, i);
+	fputs(direct_many_text, out);
+}
+
 /* --- the numbers --- */
 
 static void put_array(FILE *out, const char *name, const int32_t *values, size_t n)
@@ -253,6 +287,9 @@ static void put_formats(FILE *out, const struct incise_fixed *fx)
 				"u\n",
 				i, in->cell_shift, i, in->cells + 1);
 	}
+	if (fx->n_inputs > 2)
+		fprintf(out, "#define INPUTS %" PRId32 "\n#define RULES %" PRId32 "\n",
+			fx->n_inputs, fx->n_rules);
 	fputc('\n', out);
 }
 
@@ -319,7 +356,10 @@ static void put_source(FILE *out, const struct incise_fixed *fx, const char *sym
 	fprintf(out, "int32_t %s_eval(const int32_t *x)\n", symbol);
 	switch (fx->arithmetic) {
 	case INCISE_FIXED_DIRECT:
-		fputs(one ? direct_one_text : direct_text, out);
+		if (fx->n_inputs > 2)
+			put_direct_many(out, fx);
+		else
+			fputs(one ? direct_one_text : direct_text, out);
 		break;
 	case INCISE_FIXED_TABLE:
 		fputs(one ? line_text : table_text, out);

@@ -28,6 +28,8 @@ struct compiled {
 /* The model to compile, in the forms that all evaluators are built from. */
 struct source {
 	const struct incise_model *model;
+	struct incise_axis axis[INCISE_FIXED_INPUTS_MAX]; /* of each input */
+	/* Of one and two inputs; else NULL. */
 	const struct incise_grid *grid;
 	const struct incise_survey *survey;
 	struct incise_grid_size size;
@@ -68,16 +70,6 @@ static int32_t q16(double x)
 	return (int32_t)lrint(x * INCISE_FIXED_ONE);
 }
 
-static const struct incise_axis *input_axis(const struct incise_grid *grid, int i)
-{
-	return i == 0 && !grid->one ? &grid->a : &grid->b;
-}
-
-static int n_inputs(const struct incise_grid *grid)
-{
-	return grid->one ? 1 : 2;
-}
-
 /* A name cut to fit, and zero-padded: the header was zeroed. */
 static void put_name(char *to, size_t size, const char *name)
 {
@@ -92,28 +84,26 @@ static void image_start(struct image *image, const struct source *source,
 			enum incise_fixed_arithmetic arithmetic)
 {
 	const struct incise_model *model = source->model;
-	const struct incise_grid *grid = source->grid;
+	const struct incise_model_info *info = incise_model_info(model);
 
 	memset(image, 0, sizeof(*image));
 	image->source = source;
-	image->grid = grid;
+	image->grid = source->grid;
 	memcpy(image->head.magic, INCISE_FX_MAGIC, sizeof(image->head.magic));
-	image->head.version = INCISE_FX_VERSION;
+	image->head.version = source->grid ? INCISE_FX_VERSION : INCISE_FX_VERSION_MANY;
 	image->head.arithmetic = arithmetic;
-	image->head.n_inputs = n_inputs(grid);
-	image->head.n_rules = grid->a.n * grid->b.n;
-	put_name(image->head.name, sizeof(image->head.name),
-		 incise_model_info(model)->name);
-	put_name(image->head.output, sizeof(image->head.output),
-		 incise_model_info(model)->output.name);
-	for (int i = 0; i < n_inputs(grid); i++) {
-		const struct incise_axis *axis = input_axis(grid, i);
+	image->head.n_inputs = (uint32_t)info->n_inputs;
+	image->head.n_rules = (uint32_t)info->n_rules;
+	put_name(image->head.name, sizeof(image->head.name), info->name);
+	put_name(image->head.output, sizeof(image->head.output), info->output.name);
+	for (int i = 0; i < info->n_inputs; i++) {
+		const struct incise_axis *axis = &source->axis[i];
 
 		image->head.input[i].min = q16(axis->min);
 		image->head.input[i].max = q16(axis->max);
 		image->head.input[i].n_mfs = axis->n;
 		put_name(image->head.input[i].name, sizeof(image->head.input[i].name),
-			 incise_model_info(model)->input[i].name);
+			 info->input[i].name);
 	}
 }
 
@@ -124,7 +114,7 @@ static void *image_extend(struct image *image, size_t n, uint32_t *offset)
 
 	if (!data)
 		return NULL;
-	*offset = (uint32_t)(sizeof(image->head) + image->size);
+	*offset = incise_fx_header_size(image->head.version) + (uint32_t)image->size;
 	image->data = data;
 	image->size += n;
 	memset(data + image->size - n, 0, n);
@@ -134,7 +124,7 @@ static void *image_extend(struct image *image, size_t n, uint32_t *offset)
 /* Cells of all inputs: the width is the largest power of two that gives at least n cells. */
 static void set_cells(struct image *image, int n)
 {
-	for (int i = 0; i < n_inputs(image->grid); i++) {
+	for (uint32_t i = 0; i < image->head.n_inputs; i++) {
 		struct incise_fx_input *in = &image->head.input[i];
 		int64_t range = (int64_t)in->max - in->min;
 		int shift = 0;
@@ -172,7 +162,8 @@ static void image_cells(const struct image *image, struct cells *a, struct cells
 /* Put header and data together, and validate the result as one from a file. */
 static struct incise_fixed *image_finish(struct image *image, struct incise_error *err)
 {
-	size_t size = sizeof(image->head) + image->size;
+	uint32_t front = incise_fx_header_size(image->head.version);
+	size_t size = front + image->size;
 	struct compiled *owned = malloc(sizeof(*owned) + size);
 	struct incise_fx_header *head;
 	int rc;
@@ -182,8 +173,8 @@ static struct incise_fixed *image_finish(struct image *image, struct incise_erro
 		return NULL;
 	}
 	head = (struct incise_fx_header *)owned->blob;
-	*head = image->head;
-	memcpy(head + 1, image->data, image->size);
+	memcpy(owned->blob, &image->head, front);
+	memcpy((uint8_t *)owned->blob + front, image->data, image->size);
 	head->size = incise_fx_le32((uint32_t)size);
 	head->version = incise_fx_le32(head->version);
 	head->arithmetic = incise_fx_le32(head->arithmetic);
@@ -193,7 +184,7 @@ static struct incise_fixed *image_finish(struct image *image, struct incise_erro
 	head->shift_b = incise_fx_int32(head->shift_b);
 	head->bound = incise_fx_le64((uint64_t)ceil(ldexp(image->bound, 32)));
 	head->data = incise_fx_le32(head->data);
-	for (int i = 0; i < INCISE_FIXED_INPUTS_MAX; i++) {
+	for (uint32_t i = 0; i < image->head.n_inputs; i++) {
 		struct incise_fx_input *in = &head->input[i];
 
 		in->min = incise_fx_int32(in->min);
@@ -391,14 +382,14 @@ static bool covered(const struct incise_axis *axis)
 
 static int build_direct(struct image *image)
 {
-	const struct incise_grid *grid = image->grid;
-	const struct incise_grid_size *size = &image->source->size;
-	int n = n_inputs(grid);
-	double reach = 1;
+	const struct source *source = image->source;
+	const struct incise_grid_size *size = &source->size;
+	int n = (int)image->head.n_inputs, n_rules = (int)image->head.n_rules;
+	double reach = 1, bound;
 	int64_t *p;
 
 	for (int i = 0; i < n; i++) {
-		const struct incise_axis *axis = input_axis(grid, i);
+		const struct incise_axis *axis = &source->axis[i];
 		struct incise_fx_mf *mf = image_extend(image, axis->n * sizeof(*mf),
 						       &image->head.input[i].offset);
 
@@ -413,28 +404,24 @@ static int build_direct(struct image *image)
 	}
 	/* p·x adds up in Q(shift_a + 16), Σ w·y in Q(shift_b + 30): within 62 bits. */
 	image->head.shift_a = (int)fmin(30, 61 - 16 - bits_of(size->parts + 1));
-	image->head.shift_b = (int)fmin(26, 61 - 30 - bits_of(grid->a.n * grid->b.n) -
-						    bits_of(size->rule + 1e-3));
+	image->head.shift_b =
+		(int)fmin(26, 61 - 30 - bits_of(n_rules) - bits_of(size->rule + 1e-3));
 	if (image->head.shift_b < 17 || image->head.shift_a < 1 ||
 	    image->head.shift_a + 16 < image->head.shift_b)
 		return -ERANGE;
-	p = image_extend(image, (size_t)grid->a.n * grid->b.n * (n + 1) * 8,
-			 &image->head.data);
+	p = image_extend(image, (size_t)n_rules * (size_t)(n + 1) * 8, &image->head.data);
 	if (!p)
 		return -ENOMEM;
-	for (int i = 0; i < grid->a.n; i++)
-		for (int j = 0; j < grid->b.n; j++) {
-			const double *c = grid->p[i][j];
-			const double order[] = {c[0], grid->one ? c[2] : c[1], c[2]};
-
-			for (int k = 0; k <= n; k++)
-				*p++ = incise_fx_int64(
-					llrint(ldexp(order[k], image->head.shift_a)));
-		}
+	for (int r = 0; r < n_rules; r++)
+		for (int k = 0; k <= n; k++)
+			*p++ = incise_fx_int64(
+				llrint(ldexp(incise_model_rule(source->model, r)->p[k],
+					     image->head.shift_a)));
+	bound = source->survey ? incise_survey_direct(source->survey)
+			       : incise_many_direct(source->model);
 	/* A consequent's half LSB times the inputs; a rule's floor and the quotient's; half
 	 * an LSB of the output. */
-	image->bound = incise_survey_direct(image->source->survey) +
-		       ldexp(0.5 * reach, -image->head.shift_a) +
+	image->bound = bound + ldexp(0.5 * reach, -image->head.shift_a) +
 		       ldexp(2, -image->head.shift_b) + 0.5 / INCISE_FIXED_ONE;
 	return 0;
 }
@@ -545,16 +532,21 @@ static int choose(struct image *best, const struct incise_grid *grid,
 	static const int order[] = {INCISE_FIXED_FORCE, INCISE_FIXED_TABLE,
 				    INCISE_FIXED_DIRECT};
 	struct source source = {.model = model, .grid = grid};
-	struct incise_survey *survey;
+	struct incise_survey *survey = NULL;
 	int rc = -ERANGE;
 
-	incise_grid_size(grid, &source.size);
+	for (int i = 0; i < incise_model_info(model)->n_inputs; i++)
+		incise_axis_init(&source.axis[i], model, i);
+	if (grid)
+		incise_grid_size(grid, &source.size);
+	else
+		incise_many_size(model, &source.size);
 	*best = (struct image){.bound = INFINITY};
 	/* Nothing of that size has a format; the evaluators may count on finite numbers. */
 	if (!(source.size.parts < INCISE_GRID_LARGEST))
 		return rc;
-	survey = incise_survey_new(grid);
-	if (!survey)
+	survey = grid ? incise_survey_new(grid) : NULL;
+	if (grid && !survey)
 		return -ENOMEM;
 	source.survey = survey;
 	for (int k = 0; k < 3; k++)
@@ -565,7 +557,7 @@ static int choose(struct image *best, const struct incise_grid *grid,
 			if ((o->arithmetic >= 0 && order[k] != o->arithmetic) ||
 			    (order[k] == INCISE_FIXED_DIRECT && c) ||
 			    (order[k] != INCISE_FIXED_DIRECT &&
-			     cell_counts[c] < o->cells))
+			     (!grid || cell_counts[c] < o->cells)))
 				continue;
 			built = build(&image, &source, order[k], cell_counts[c]);
 			if (built == -ENOMEM) {
@@ -598,6 +590,7 @@ struct incise_fixed *incise_fixed_compile(const struct incise_model *model,
 	struct incise_fixed_options o;
 	struct incise_fixed *fx = NULL;
 	struct image best = {0};
+	bool many;
 	int rc;
 
 	incise_fixed_options_init(&o);
@@ -613,9 +606,19 @@ struct incise_fixed *incise_fixed_compile(const struct incise_model *model,
 				 cell_counts[N_COUNTS - 1]);
 		goto out;
 	}
-	if (incise_grid_init(grid, model, err))
+	many = incise_model_info(model)->n_inputs > INCISE_GRID_INPUTS_MAX;
+	if (incise_many_check(model, err))
 		goto out;
-	rc = choose(&best, grid, &o, model);
+	if (many && o.arithmetic >= 0 && o.arithmetic != INCISE_FIXED_DIRECT) {
+		incise_error_set(err, ENOTSUP,
+				 "fixed point: a model of %d inputs has no tables; "
+				 "give the arithmetic 'direct'",
+				 incise_model_info(model)->n_inputs);
+		goto out;
+	}
+	if (!many && incise_grid_init(grid, model, err))
+		goto out;
+	rc = choose(&best, many ? NULL : grid, &o, model);
 	if (rc == -ENOMEM)
 		incise_error_set(err, ENOMEM, "no memory to compile a model");
 	else if (rc == -E2BIG)

@@ -185,13 +185,23 @@ static int check_input(const struct incise_model *model, int i, struct incise_er
 	return 0;
 }
 
-int incise_grid_init(struct incise_grid *grid, const struct incise_model *model,
-		     struct incise_error *err)
+/* Functions of a rule of a full grid: the last input's come fastest. */
+static bool is_in_order(const struct incise_model *model, int r)
 {
-	int n = model->info.n_inputs, n_rules = model->info.n_rules;
-	int n_b = model->info.n_mfs[n - 1], grid_rules = 1, rc;
+	int rest = r;
 
-	memset(grid, 0, sizeof(*grid));
+	for (int i = model->info.n_inputs - 1; i >= 0; i--) {
+		if (incise_model_rule(model, r)->mf[i] != rest % model->info.n_mfs[i])
+			return false;
+		rest /= model->info.n_mfs[i];
+	}
+	return true;
+}
+
+int incise_many_check(const struct incise_model *model, struct incise_error *err)
+{
+	int n = model->info.n_inputs, n_rules = model->info.n_rules, grid_rules = 1, rc;
+
 	if (n > INCISE_FIXED_INPUTS_MAX)
 		return incise_error_set(
 			err, E2BIG,
@@ -215,24 +225,41 @@ int incise_grid_init(struct incise_grid *grid, const struct incise_model *model,
 			"fixed point: the model has %d rules, its grid has %d: only "
 			"full grids have a fixed-point form; use double",
 			n_rules, grid_rules);
-	grid->one = n == 1;
-	grid->a = (struct incise_axis){.n = 1, .s = {1}};
-	if (n == 2)
-		incise_axis_init(&grid->a, model, 0);
-	incise_axis_init(&grid->b, model, n - 1);
-	for (int r = 0; r < n_rules; r++) {
-		const double *p = incise_model_rule(model, r)->p;
-		double *to = grid->p[r / n_b][r % n_b];
-
-		if (incise_model_rule(model, r)->mf[n - 1] != r % n_b ||
-		    (n == 2 && incise_model_rule(model, r)->mf[0] != r / n_b) ||
-		    model->rule[r].weight != 1)
+	for (int r = 0; r < n_rules; r++)
+		if (model->rule[r].weight != 1 || !is_in_order(model, r))
 			return incise_error_set(
 				err, ENOTSUP,
 				"fixed point: rule %d has a weight, or is out "
 				"of the grid's order (last input fastest); use "
 				"double",
 				r + 1);
+	return 0;
+}
+
+int incise_grid_init(struct incise_grid *grid, const struct incise_model *model,
+		     struct incise_error *err)
+{
+	int n = model->info.n_inputs, n_b = model->info.n_mfs[n - 1];
+	int rc;
+
+	memset(grid, 0, sizeof(*grid));
+	if (n > INCISE_GRID_INPUTS_MAX)
+		return incise_error_set(err, E2BIG,
+					"fixed point: the model has %d inputs, at most "
+					"%d have a grid",
+					n, INCISE_GRID_INPUTS_MAX);
+	rc = incise_many_check(model, err);
+	if (rc)
+		return rc;
+	grid->one = n == 1;
+	grid->a = (struct incise_axis){.n = 1, .s = {1}};
+	if (n == 2)
+		incise_axis_init(&grid->a, model, 0);
+	incise_axis_init(&grid->b, model, n - 1);
+	for (int r = 0; r < model->info.n_rules; r++) {
+		const double *p = incise_model_rule(model, r)->p;
+		double *to = grid->p[r / n_b][r % n_b];
+
 		to[0] = p[0];
 		to[1] = n == 2 ? p[1] : 0;
 		to[2] = p[n];
@@ -596,4 +623,96 @@ double incise_survey_force(const struct incise_survey *s, double wa, double wb)
 double incise_survey_direct(const struct incise_survey *s)
 {
 	return larger(0, (s->input + s->direct) * SLACK);
+}
+
+/* --- three inputs and more --- */
+
+void incise_many_size(const struct incise_model *model, struct incise_grid_size *size)
+{
+	*size = (struct incise_grid_size){0};
+	for (int r = 0; r < model->info.n_rules; r++) {
+		const double *p = incise_model_rule(model, r)->p;
+		double middle = p[0], half = 0, parts = fabs(p[0]);
+
+		for (int i = 0; i < model->info.n_inputs; i++) {
+			const struct incise_variable *in = &model->info.input[i];
+
+			middle += p[i + 1] * (in->min + in->max) / 2;
+			half += fabs(p[i + 1]) * (in->max - in->min) / 2;
+			parts += fabs(p[i + 1]) * fmax(fabs(in->min), fabs(in->max));
+		}
+		size->rule = fmax(size->rule, fabs(middle) + half);
+		size->parts = fmax(size->parts, parts);
+	}
+}
+
+/* The farthest that two rules are apart anywhere within the blocks' supports. */
+static double farthest(const struct incise_model *model, const struct interval *support)
+{
+	double most = 0;
+
+	for (int r = 0; r < model->info.n_rules; r++)
+		for (int k = 0; k < r; k++) {
+			const double *p = incise_model_rule(model, r)->p,
+				     *q = incise_model_rule(model, k)->p;
+			struct interval d = iv_sub(iv(p[0]), iv(q[0]));
+
+			for (int i = 0; i < model->info.n_inputs; i++)
+				d = iv_add(d, iv_mul(iv_sub(iv(p[i + 1]), iv(q[i + 1])),
+						     support[i]));
+			most = larger(most, iv_mag(d));
+		}
+	return most;
+}
+
+/*
+ * y = Σ w f / Σ w, w = Π μ, lies between the rules' outputs f, so that |f - y| ≤ D, the farthest that
+ * two of them are apart. The largest of each input's degrees μ is 1. With errors e of the degrees, and
+ * a floor of 2^-30 at each product,
+ *
+ *     |Δy| ≤ D · (Σi Σk e(i,k) + rules · inputs · 2^-30)
+ *
+ * and, of inputs that are off by half an LSB, with ā the degrees that add up to 1,
+ *
+ *     |∂y/∂xi| ≤ max |p(i)| + D/2 · Σk |∂ā(i,k)/∂xi|
+ */
+double incise_many_direct(const struct incise_model *model)
+{
+	int n = model->info.n_inputs;
+	struct interval support[INCISE_FIXED_INPUTS_MAX];
+	double degrees = model->info.n_rules * n * 0x1p-30, input = 0, bends = 0, D;
+
+	for (int i = 0; i < n; i++) {
+		struct incise_axis axis;
+		struct blocks blocks = {0};
+		double worst = 0, steepest = 0, slope = 0;
+
+		incise_axis_init(&axis, model, i);
+		if (make_blocks(&blocks, &axis, false)) {
+			free(blocks.block);
+			return HUGE_VAL;
+		}
+		support[i] = (struct interval){blocks.block[0].x.lo,
+					       blocks.block[blocks.n - 1].x.hi};
+		for (int b = 0; b < blocks.n; b++) {
+			double e[N], sum = 0, turns = 0;
+
+			degree_errors(&axis, &blocks.block[b], e);
+			for (int k = 0; k < axis.n; k++) {
+				sum += e[k];
+				turns += iv_mag(blocks.block[b].range.d1[k]);
+			}
+			worst = larger(worst, sum);
+			steepest = larger(steepest, turns);
+		}
+		free(blocks.block);
+		for (int r = 0; r < model->info.n_rules; r++)
+			slope = fmax(slope, fabs(incise_model_rule(model, r)->p[i + 1]));
+		degrees += worst;
+		input += slope * HALF_LSB;
+		bends += steepest / 2 * HALF_LSB;
+	}
+	D = farthest(model, support);
+	/* Products of errors, and a sum of weights that is 1 within 1e-6. */
+	return larger(0, (input + D * (bends + degrees * 1.001)) * SLACK);
 }

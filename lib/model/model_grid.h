@@ -45,6 +45,9 @@ void incise_axis_at(const struct incise_axis *axis, long double x, long double *
 void incise_axis_over(const struct incise_axis *axis, struct interval x,
 		      struct incise_axis_range *range);
 
+/* Inputs that a grid has; more only have the direct arithmetic, see incise_many_check(). */
+#define INCISE_GRID_INPUTS_MAX 2
+
 struct incise_grid {
 	bool one; /* input */
 	struct incise_axis a, b;
@@ -117,5 +120,19 @@ void incise_survey_free(struct incise_survey *survey);
 double incise_survey_table(const struct incise_survey *survey, double wa, double wb);
 double incise_survey_force(const struct incise_survey *survey, double wa, double wb);
 double incise_survey_direct(const struct incise_survey *survey);
+
+/*
+ * --- three inputs and more, for the direct arithmetic ---
+ *
+ * Its bound is one over the whole support, of each input by itself: coarser than a survey, and no
+ * patches over four dimensions.
+ */
+
+/* 0; -ENOTSUP, -E2BIG, -ERANGE as incise_grid_init(). Of any number of inputs. */
+int incise_many_check(const struct incise_model *model, struct incise_error *err);
+
+/* Of a model that was checked: sizes but for @slope; and as incise_survey_direct(). */
+void incise_many_size(const struct incise_model *model, struct incise_grid_size *size);
+double incise_many_direct(const struct incise_model *model);
 
 #endif

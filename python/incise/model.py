@@ -142,7 +142,7 @@ class FixedStruct(ctypes.Structure):
         ("shift_a", ctypes.c_int32),
         ("shift_b", ctypes.c_int32),
         ("bound", ctypes.c_uint64),
-        ("input", FixedInputStruct * 2),
+        ("input", FixedInputStruct * 4),
         ("name", ctypes.c_char_p),
         ("output", ctypes.c_char_p),
         ("data", c_void_p),

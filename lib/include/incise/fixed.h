@@ -26,7 +26,7 @@
 INCISE_BEGIN_DECLS
 
 /** Largest number of inputs of a compiled model. */
-#define INCISE_FIXED_INPUTS_MAX 2
+#define INCISE_FIXED_INPUTS_MAX 4
 /** Largest number of membership functions of one input. */
 #define INCISE_FIXED_MFS_MAX 32
 /** Largest number of rules. */
@@ -38,8 +38,9 @@ INCISE_BEGIN_DECLS
 /** The arithmetic of a blob; see lib/fixed. */
 enum incise_fixed_arithmetic {
 	INCISE_FIXED_DIRECT, /**< exponentials by polynomial, one division */
-	INCISE_FIXED_TABLE, /**< tables of normalised weights: no exponential, no division */
-	INCISE_FIXED_FORCE, /**< a table of the output itself */
+	/** tables of normalised weights: no exponential, no division; one or two inputs */
+	INCISE_FIXED_TABLE,
+	INCISE_FIXED_FORCE, /**< a table of the output itself; one or two inputs */
 };
 
 /** One input of a compiled model. */
@@ -115,7 +116,8 @@ INCISE_API void incise_fixed_options_init(struct incise_fixed_options *options);
  * The bound is valid for every real input in the support and includes its rounding to Q16.16.
  * It comes from interval arithmetic over the whole support, not from samples.
  *
- * @param model  full grid of Gaussians over one or two inputs; others are rejected by name
+ * @param model  full grid of Gaussians over one to four inputs; others are rejected by name.
+ *               Three and four have the direct arithmetic only
  * @param options or NULL for the defaults
  * @return compiled model, to be freed with incise_fixed_free(); NULL with errno ENOTSUP (a
  *         kind or shape without a fixed-point form), E2BIG, ERANGE (a support, width or

@@ -16,16 +16,19 @@
 #include "compiled.h"
 
 static const struct {
-	int arithmetic, one;
-} kinds[] = {{INCISE_FIXED_DIRECT, 0}, {INCISE_FIXED_TABLE, 0}, {INCISE_FIXED_FORCE, 0},
-	     {INCISE_FIXED_DIRECT, 1}, {INCISE_FIXED_TABLE, 1}, {INCISE_FIXED_FORCE, 1}};
+	int arithmetic, n_inputs;
+} kinds[] = {{INCISE_FIXED_DIRECT, 2}, {INCISE_FIXED_TABLE, 2}, {INCISE_FIXED_FORCE, 2},
+	     {INCISE_FIXED_DIRECT, 1}, {INCISE_FIXED_TABLE, 1}, {INCISE_FIXED_FORCE, 1},
+	     {INCISE_FIXED_DIRECT, 3}, {INCISE_FIXED_DIRECT, 4}};
 #define KINDS (sizeof(kinds) / sizeof(*kinds))
 
 /* A blob of some kind in memory of just its size. */
 static void *blob_of(int kind, uint32_t *size)
 {
-	struct incise_model *model =
-		kinds[kind].one ? line_model(1) : paper_model(INCISE_MF_GAUSS, 1, 2);
+	struct incise_model *model = kinds[kind].n_inputs == 1 ? line_model(1)
+				     : kinds[kind].n_inputs == 2
+					     ? paper_model(INCISE_MF_GAUSS, 1, 2)
+					     : many_model(kinds[kind].n_inputs, 1);
 	struct incise_fixed *fx = compiled(model, kinds[kind].arithmetic, 8);
 	void *blob;
 
@@ -61,7 +64,7 @@ static void test_good_blobs_open(void **state)
 
 		assert_int_equal(incise_fixed_open(&fx, blob, size), 0);
 		assert_int_equal(fx.arithmetic, kinds[k].arithmetic);
-		assert_int_equal(fx.n_inputs, kinds[k].one ? 1 : 2);
+		assert_int_equal(fx.n_inputs, kinds[k].n_inputs);
 		assert_string_equal(fx.input[0].name, "depth_mm");
 		assert_string_equal(fx.output, "force_N");
 		free(blob);
@@ -93,13 +96,22 @@ static void test_versions(void **state)
 	uint32_t size;
 	struct incise_fx_header *head = blob_of(0, &size);
 
-	head->version = incise_fx_le32(2);
+	head->version = incise_fx_le32(3);
 	seal(head, size);
 	assert_int_equal(incise_fixed_open(&fx, head, size), -ENOTSUP);
+	/* The second one is of three inputs and more, and the first one of fewer. */
+	head->version = incise_fx_le32(2);
+	seal(head, size);
+	assert_int_equal(incise_fixed_open(&fx, head, size), -EINVAL);
 	head->version = incise_fx_le32(1);
 	head->arithmetic = incise_fx_le32(7);
 	seal(head, size);
 	assert_int_equal(incise_fixed_open(&fx, head, size), -ENOTSUP);
+	free(head);
+	head = blob_of(6, &size);
+	head->version = incise_fx_le32(1);
+	seal(head, size);
+	assert_int_equal(incise_fixed_open(&fx, head, size), -EINVAL);
 	free(head);
 }
 

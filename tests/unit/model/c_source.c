@@ -40,9 +40,11 @@ static struct incise_fixed *compiled(int n_inputs, int arithmetic, double size,
 				     const char *name)
 {
 	const struct incise_variable in[] = {{"depth_mm", -3, 20},
-					     {"velocity_mm_s", 0, 50}};
+					     {"velocity_mm_s", 0, 50},
+					     {"acceleration_mm_s2", -400, 300},
+					     {"tilt_deg", 0, 60}};
 	const struct incise_variable out = {"force_N", 0, 4};
-	const int mfs[] = {5, 4};
+	const int mfs[] = {5, 4, 2, 2};
 	struct incise_fixed_options options = {.arithmetic = arithmetic};
 	struct incise_model *model =
 		incise_model_new_grid(n_inputs, in, mfs, INCISE_MF_GAUSS, &out, NULL);
@@ -51,7 +53,9 @@ static struct incise_fixed *compiled(int n_inputs, int arithmetic, double size,
 
 	for (int r = 0; r < incise_model_info(model)->n_rules; r++) {
 		double p[] = {size * paper_random(&seed), size * paper_random(&seed) / 9,
-			      size * paper_random(&seed) / 9};
+			      size * paper_random(&seed) / 9,
+			      size * paper_random(&seed) / 400,
+			      size * paper_random(&seed) / 60};
 
 		incise_model_set_consequent(model, r, p);
 	}
@@ -80,24 +84,25 @@ static void compare(const struct incise_fixed *fx, int32_t (*eval)(const int32_t
 	uint64_t seed = 1;
 
 	for (int k = 0; k < N; k++) {
-		int32_t x[2] = {0};
+		int32_t x[INCISE_FIXED_INPUTS_MAX] = {0};
 
 		for (int i = 0; i < fx->n_inputs; i++)
-			x[i] = k < 25 ? ends[i ? k / 5 : k % 5]
+			x[i] = k < 25 ? ends[i & 1 ? k / 5 : k % 5]
 				      : random_input(&fx->input[i], &seed);
 		assert_int_equal(eval(x), incise_fixed_eval(fx, x));
 	}
 }
 
-/* Every arithmetic, one input and two, small numbers and large, an awkward name. */
+/* Every arithmetic, one input to four, small numbers and large, an awkward name. */
 static void test_same_to_the_bit(void **state)
 {
 	static const double sizes[] = {1e-6, 3, 50};
 
-	for (int k = 0; k < 3 * 2 * 3; k++) {
-		struct incise_fixed *fx =
-			compiled(1 + k % 2, k / 2 % 3, sizes[k / 6],
-				 "liver /* of \"mine\" */ \?\?/ \\\n µ");
+	for (int k = 0; k < 3 * 2 * 3 + 2; k++) {
+		bool many = k >= 3 * 2 * 3;
+		struct incise_fixed *fx = compiled(
+			1 + k % 2 + 2 * many, many ? INCISE_FIXED_DIRECT : k / 2 % 3,
+			many ? 3 : sizes[k / 6], "liver /* of \"mine\" */ \?\?/ \\\n µ");
 		int32_t (*eval)(const int32_t *);
 		char path[64];
 		void *so;

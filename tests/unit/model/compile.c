@@ -66,6 +66,43 @@ static void test_default_budget_holds(void **state)
 	}
 }
 
+/* Three and four inputs: within the bound that is certified, and as good as two. */
+static void test_many_inputs_hold_their_bound(void **state)
+{
+	for (uint64_t seed = 1; seed <= 12; seed++) {
+		int n = 3 + (int)(seed % 2);
+		struct incise_model *model = many_model(n, seed);
+		struct incise_fixed *fx = incise_fixed_compile(model, NULL, NULL);
+		double worst = 0;
+		uint64_t points = seed;
+
+		assert_non_null(fx);
+		assert_int_equal(fx->n_inputs, n);
+		assert_int_equal(fx->arithmetic, INCISE_FIXED_DIRECT);
+		assert_true(incise_fixed_bound(fx) <= 1e-4);
+		for (int k = 0; k < 20000; k++) {
+			double x[4];
+
+			for (int i = 0; i < n; i++) {
+				const struct incise_variable *in =
+					&incise_model_info(model)->input[i];
+				double u = (paper_random(&points) + 1) / 2;
+
+				/* The ends, too. */
+				u = k % 5 ? u : u < 0.3 ? 0 : u > 0.7 ? 1 : u;
+				x[i] = in->min + (in->max - in->min) * u;
+			}
+			worst = fmax(worst, fabs(incise_fixed_eval_double(fx, x) -
+						 incise_model_eval(model, x, NULL)));
+		}
+		assert_true(worst <= incise_fixed_bound(fx));
+		/* The bound is no empty word: some tens of what is met. */
+		assert_true(worst > incise_fixed_bound(fx) / 100);
+		incise_fixed_free(fx);
+		incise_model_free(model);
+	}
+}
+
 static void test_refusals(void **state)
 {
 	struct incise_fixed_options o = {.budget = 1e-6, .arithmetic = -1};
@@ -79,6 +116,12 @@ static void test_refusals(void **state)
 	o = (struct incise_fixed_options){.arithmetic = 3};
 	assert_null(incise_fixed_compile(model, &o, &err));
 	assert_int_equal(err.code, EINVAL);
+	incise_model_free(model);
+	model = many_model(3, 1);
+	o = (struct incise_fixed_options){.arithmetic = INCISE_FIXED_TABLE};
+	assert_null(incise_fixed_compile(model, &o, &err));
+	assert_int_equal(err.code, ENOTSUP);
+	assert_non_null(strstr(err.text, "a model of 3 inputs has no tables"));
 	incise_model_free(model);
 }
 
@@ -153,6 +196,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_budget_chooses),
 		cmocka_unit_test(test_default_budget_holds),
+		cmocka_unit_test(test_many_inputs_hold_their_bound),
 		cmocka_unit_test(test_refusals),
 		cmocka_unit_test(test_extreme_consequents),
 		cmocka_unit_test(test_narrow_functions),
