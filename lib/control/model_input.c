@@ -7,8 +7,8 @@
 #include "../base/vector.h"
 #include "model_input.h"
 
-/* Below this speed the direction of the motion is not known. */
-#define SLOW_MM_S 1.0
+/* Below this speed the noise of a tracker hides the direction of the motion. */
+#define SLOW_MM_S 5.0
 
 const struct incise_model_input_kind incise_model_input_kinds[INCISE_MODEL_INPUT_KINDS] =
 	{

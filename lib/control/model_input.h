@@ -56,7 +56,7 @@ extern const struct incise_model_input_kind
 int incise_model_input_find(const char *name);
 
 /*
- * The rate of change of the speed |v|, mm/s². Below 1 mm/s it goes to 0 with the speed, for a blade
+ * The rate of change of the speed |v|, mm/s². Below 5 mm/s it goes to 0 with the speed, for a blade
  * at rest has no direction of motion: no more than |a|, and without a leap.
  */
 double incise_input_acceleration(const double velocity_mm_s[3],

@@ -91,6 +91,25 @@ static bool is_axis(const struct incise_fixed_axis *axis)
 	       in_range(axis->rest, 0, axis->travel) && !axis->reserved;
 }
 
+/* Number of inputs of a plan's model, -1 if they are not good; 2 at most where it does not say. */
+static int count_inputs(int32_t inputs)
+{
+	uint32_t left = (uint32_t)inputs, found = 0;
+	int n = 0;
+
+	if (!inputs)
+		return 2;
+	for (; left; left >>= 4, n++) {
+		uint32_t kind = left & 15;
+
+		if (n == INCISE_FIXED_INPUTS_MAX || kind == INCISE_FIXED_INPUT_NONE ||
+		    kind >= INCISE_FIXED_INPUT_KINDS || found >> kind & 1)
+			return -1;
+		found |= 1U << kind;
+	}
+	return n;
+}
+
 bool incise_fixed_numbers_good(const struct incise_fixed_numbers *numbers)
 {
 	if (numbers->bound < 0 || !in_range(numbers->pose_age_ns, 0, AGE_MAX_NS) ||
@@ -98,6 +117,7 @@ bool incise_fixed_numbers_good(const struct incise_fixed_numbers *numbers)
 	    !in_range(numbers->n_axes, 0, INCISE_FIXED_AXES_MAX) ||
 	    !incise_fixed_filter_good(&numbers->filter) || !is_scalpel(numbers) ||
 	    !is_surface(numbers) || !is_tissue(numbers) || !are_limits(numbers) ||
+	    count_inputs(numbers->inputs) < 0 ||
 	    !are_zero(numbers->reserved,
 		      sizeof(numbers->reserved) / sizeof(*numbers->reserved)))
 		return false;
@@ -138,6 +158,13 @@ static int open_parts(struct incise_fixed_plan *plan, const uint8_t *bytes,
 	if (plan->has_model)
 		rc = incise_fixed_open(&plan->model, bytes + head->model_at,
 				       head->model_size);
+	if (!rc && plan->has_model &&
+	    (plan->model.n_inputs > count_inputs(head->numbers.inputs) ||
+	     (head->numbers.inputs &&
+	      plan->model.n_inputs < count_inputs(head->numbers.inputs))))
+		return BAD;
+	if (!plan->has_model && head->numbers.inputs)
+		return BAD;
 	if (!rc && head->heights_size)
 		rc = incise_fixed_grid_open(
 			&plan->grid, &head->numbers.grid,
@@ -162,8 +189,11 @@ int incise_fixed_plan_open(struct incise_fixed_plan *plan, const void *blob,
 	for (int i = 0; i < 8; i++)
 		if (head->magic[i] != INCISE_FIXED_PLAN_MAGIC[i])
 			return BAD;
-	if (head->version != INCISE_FIXED_PLAN_VERSION)
+	if (head->version != INCISE_FIXED_PLAN_VERSION &&
+	    head->version != INCISE_FIXED_PLAN_VERSION_INPUTS)
 		return UNSUPPORTED;
+	if ((head->version == INCISE_FIXED_PLAN_VERSION_INPUTS) != !!head->numbers.inputs)
+		return BAD;
 	if (head->size != size || head->reserved ||
 	    head->crc != incise_fx_crc(bytes + INCISE_FIXED_PLAN_CRC_FROM,
 				       size - INCISE_FIXED_PLAN_CRC_FROM) ||

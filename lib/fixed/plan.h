@@ -27,6 +27,7 @@
 #include "front.h"
 #include "grid.h"
 #include "incision.h"
+#include "input.h"
 #include "integers.h"
 #include "line.h"
 #include "predict.h"
@@ -34,6 +35,7 @@
 
 #define INCISE_FIXED_PLAN_MAGIC "INCISEPL"
 #define INCISE_FIXED_PLAN_VERSION 1
+#define INCISE_FIXED_PLAN_VERSION_INPUTS 2 /* of a plan with @inputs */
 #define INCISE_FIXED_PLAN_SIZE_MAX (32 << 20)
 
 #define INCISE_FIXED_AXES_MAX 3
@@ -100,7 +102,12 @@ struct incise_fixed_numbers {
 	int32_t fade_ns;     /* … and goes in this */
 	int32_t force, slew; /* largest one, and largest change of it in a tick */
 	struct incise_fixed_axis axes[INCISE_FIXED_AXES_MAX];
-	int32_t reserved[9];
+	/*
+	 * The model's inputs, from the lowest bits on: four bits each, enum
+	 * incise_fixed_input_kind, once each. 0: depth, or depth and speed.
+	 */
+	int32_t inputs;
+	int32_t reserved[8];
 };
 
 /* The bytes of a plan, all little-endian: this, then a model (a blob as of incise/fixed.h) and the
@@ -183,8 +190,9 @@ struct incise_fixed_state {
 	struct incise_fixed_proxy proxy;
 	int32_t attitude[4], velocity[3];
 	int32_t p0[3], sn[3], normal[3], depth;
-	int32_t side[3]; /* of the blade when its contact began */
-	int32_t flat[3]; /* of blade and handle now */
+	int64_t touched_ns; /* when the contact began */
+	int32_t side[3];    /* of the blade when its contact began */
+	int32_t flat[3];    /* of blade and handle now */
 	struct {
 		int32_t n, at;
 		int32_t ring[INCISE_FIXED_AVERAGE_MAX][3];

@@ -13,6 +13,7 @@
  *   |miss|²      3 · 2^57                      Q48; each component is held to 20 mm before
  *   x_shown      held to 4096 mm, 2^36 · 2^26 = 2^62   Q50, to Q32
  *   v_shown      2 · 10^4, 2^34.3 · 2^26 = 2^60.3
+ *   a_shown      2 · 10^5, 2^33.6 · 2^26 = 2^59.6
  *   x            2^13.3 and what is added: below 2^15 mm, 2^47 in Q32
  */
 #include "predict.h"
@@ -120,6 +121,18 @@ void incise_fixed_predict_at(const struct incise_fixed_predict *p,
 	}
 }
 
+void incise_fixed_predict_acceleration(const struct incise_fixed_predict *p,
+				       const struct incise_fixed_filter *filter,
+				       int64_t t_ns, int64_t acceleration[3])
+{
+	int64_t share = left(p, filter, t_ns);
+
+	for (int i = 0; i < 3; i++)
+		acceleration[i] = incise_fx_hold(
+			p->a[i] + incise_fx_rounded(share * p->a_shown[i], SHARE_BITS),
+			HARD);
+}
+
 void incise_fixed_predict_attitude(const struct incise_fixed_predict *p,
 				   const struct incise_fixed_filter *filter, int64_t t_ns,
 				   int32_t attitude[4])
@@ -219,7 +232,7 @@ bool incise_fixed_predict_add(struct incise_fixed_predict *p,
 			      int64_t t_ns)
 {
 	const int32_t far = INCISE_FIXED_FAR_MM * (1 << 16);
-	int64_t shown[3], speed[3], x[3], v[3], acquired_ns;
+	int64_t shown[3], speed[3], hard[3], x[3], v[3], acquired_ns;
 	int32_t attitude[4];
 	bool blend = p->started;
 
@@ -232,6 +245,7 @@ bool incise_fixed_predict_add(struct incise_fixed_predict *p,
 	if (p->started && acquired_ns <= p->t_ns)
 		return false;
 	show(p, filter, t_ns, shown, speed);
+	incise_fixed_predict_acceleration(p, filter, t_ns, hard);
 	incise_fixed_predict_attitude(p, filter, t_ns, attitude);
 	if (!p->started || since(acquired_ns, p->t_ns) > filter->gap_ns ||
 	    !correct(p, filter, acquired_ns, position)) {
@@ -254,6 +268,7 @@ bool incise_fixed_predict_add(struct incise_fixed_predict *p,
 
 		p->x_shown[i] = blend ? incise_fx_hold(step, SHOWN_MAX) : 0;
 		p->v_shown[i] = blend ? speed[i] - v[i] : 0;
+		p->a_shown[i] = blend ? hard[i] - p->a[i] : 0;
 	}
 	for (int i = 0; i < 4 && !blend; i++)
 		p->q_shown[i] = p->q[i];

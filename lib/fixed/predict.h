@@ -38,6 +38,7 @@ struct incise_fixed_predict {
 	int64_t x[3], v[3], a[3]; /* at t_ns */
 	int64_t x_shown[3]; /* when it arrived, less what the filter says then; Q24 mm */
 	int64_t v_shown[3]; /* the same; Q20 mm/s */
+	int64_t a_shown[3]; /* the same; Q16 mm/s² */
 	int32_t q[4], q_shown[4];
 	uint32_t discontinuities;
 	int32_t started;
@@ -74,6 +75,12 @@ bool incise_fixed_predict_add(struct incise_fixed_predict *p,
 void incise_fixed_predict_at(const struct incise_fixed_predict *p,
 			     const struct incise_fixed_filter *filter, int64_t t_ns,
 			     int32_t position[3], int32_t velocity[3]) INCISE_REALTIME;
+
+/* The acceleration then, as incise_predict_acceleration(): Q16 mm/s², within ±10^5 mm/s². */
+void incise_fixed_predict_acceleration(const struct incise_fixed_predict *p,
+				       const struct incise_fixed_filter *filter,
+				       int64_t t_ns,
+				       int64_t acceleration[3]) INCISE_REALTIME;
 
 /* The attitude then, a unit quaternion. Costs a root and four divisions: only when asked. */
 void incise_fixed_predict_attitude(const struct incise_fixed_predict *p,

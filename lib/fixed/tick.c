@@ -314,8 +314,9 @@ void incise_fixed_stage_tool(const struct incise_fixed_plan *plan,
 
 /* --- contact ---------------------------------------------------------------------------- */
 
-static void contact_begins(struct incise_fixed_state *state)
+static void contact_begins(struct incise_fixed_state *state, int64_t t_ns)
 {
+	state->touched_ns = t_ns;
 	incise_fx_copy(state->p0, state->proxy.first.point);
 	incise_fx_copy(state->sn, state->proxy.first.normal);
 	if (state->held == INCISE_TOOL_BLADE)
@@ -350,7 +351,7 @@ void incise_fixed_stage_contact(const struct incise_fixed_plan *plan,
 	if (!proxy->touching)
 		return;
 	if (proxy->began)
-		contact_begins(state);
+		contact_begins(state, tick->t_ns);
 	incise_fx_copy(state->sn, proxy->touch.normal);
 	incise_fx_copy(state->normal, state->sn);
 	state->depth = proxy->touch.depth > 0 ? proxy->touch.depth : 0;
@@ -476,6 +477,38 @@ void incise_fixed_stage_membrane(const struct incise_fixed_plan *plan,
 	push(state, membrane_force(membrane, state, tick, beyond), membrane->normal);
 }
 
+static int32_t acceleration(const struct incise_fixed_plan *plan,
+			    const struct incise_fixed_state *state,
+			    const struct incise_fixed_tick *tick)
+{
+	int64_t hard[3];
+
+	incise_fixed_predict_acceleration(&state->scalpel, &plan->numbers.filter,
+					  tick->t_ns, hard);
+	return incise_fixed_input_acceleration(state->velocity, hard);
+}
+
+static int32_t find_input(const struct incise_fixed_plan *plan,
+			  const struct incise_fixed_state *state,
+			  const struct incise_fixed_tick *tick, uint32_t kind)
+{
+	int32_t axis[3];
+
+	switch (kind) {
+	case INCISE_FIXED_INPUT_SPEED:
+		return tick->speed;
+	case INCISE_FIXED_INPUT_ACCELERATION:
+		return acceleration(plan, state, tick);
+	case INCISE_FIXED_INPUT_TILT:
+		incise_fx_rotate(axis, state->attitude, plan->numbers.axis);
+		return incise_fixed_input_tilt(axis, state->normal);
+	case INCISE_FIXED_INPUT_TIME:
+		return incise_fixed_input_time(tick->t_ns, state->touched_ns);
+	default:
+		return state->depth;
+	}
+}
+
 /* Song et al. (2006), eq. (3); tissue does not pull. */
 static int32_t cutting_force(const struct incise_fixed_plan *plan,
 			     const struct incise_fixed_state *state,
@@ -485,7 +518,10 @@ static int32_t cutting_force(const struct incise_fixed_plan *plan,
 	const struct incise_fixed *model = &plan->model;
 	int32_t x[INCISE_FIXED_INPUTS_MAX] = {state->depth, tick->speed}, size;
 	int32_t beyond = state->depth - numbers->support;
+	uint32_t kinds = (uint32_t)numbers->inputs;
 
+	for (int i = 0; kinds; i++, kinds >>= 4)
+		x[i] = find_input(plan, state, tick, kinds & 15);
 	for (int i = 0; i < model->n_inputs && numbers->gain > 0; i++)
 		if (x[i] < model->input[i].min || x[i] > model->input[i].max)
 			tick->flags |= INCISE_TICK_EXTRAPOLATED;

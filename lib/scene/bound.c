@@ -14,12 +14,18 @@
 #include <math.h>
 #include "../base/vector.h"
 #include "../fixed/front.h"
+#include "../fixed/input.h"
 #include "../fixed/spring.h"
 #include "plan.h"
 
 /* A hand's speed at most, mm/s, and its largest acceleration that the filter lets pass, mm/s². */
 #define SPEED_MM_S 1000
 #define HARD_MM_S2 100000
+
+/* A hand's own acceleration across its motion, at most: errors of the direction count by it. Below this
+ * speed the direction counts in proportion to the speed: see lib/control/model_input.c. */
+#define HAND_MM_S2 2000
+#define SLOW_MM_S 5
 
 #define LSB_MM (1.0 / 65536)
 
@@ -113,7 +119,7 @@ static struct state_error ahead(const struct state_error *e, double s)
 	};
 }
 
-/* Place and velocity of the tool, as lengths of vectors. */
+/* Place, velocity and acceleration of the tool, as lengths of vectors. */
 static struct state_error shown(const struct incise_plan *plan)
 {
 	const struct incise_predict *p = &plan->predict;
@@ -129,14 +135,41 @@ static struct state_error shown(const struct incise_plan *plan)
 	return (struct state_error){
 		sqrt(3) * (2 * now.x + then.x + ldexp(1, -25) + LSB_MM / 2),
 		sqrt(3) * (2 * now.v + then.v + ldexp(1, -17)),
-		0,
+		sqrt(3) * (3 * e.a + ldexp(1, -13)),
 	};
 }
 
-/* Rounding of the model's table, of the cut's front, and of each stiffness over its reach. */
-static double tissue_N(const struct incise_plan *plan, double reach_mm)
+/*
+ * By the inputs of the model but its depth, each with its steepest slope. The acceleration along the
+ * motion is off by that of the vector, and by the direction's; the tilt by attitude and normal; and a
+ * contact may begin a tick earlier.
+ */
+static double inputs_N(const struct incise_plan *plan, const struct state_error *e)
 {
-	double bound_N = plan->fixed ? plan->gain * incise_fixed_bound(plan->fixed) : 0;
+	const double *slope = plan->input_slope;
+	double turned = ldexp(1, -25);
+
+	if (plan->surface->kind != INCISE_SURFACE_PLANE && !plan->surface->mesh)
+		turned += 2 * e->x / plan->surface->capsule.radius;
+	return slope[INCISE_INPUT_SPEED] * (e->v + LSB_MM) +
+	       slope[INCISE_INPUT_ACCELERATION] *
+		       (e->a + HAND_MM_S2 * e->v / SLOW_MM_S +
+			ldexp(1, -INCISE_FIXED_INPUT_ACCELERATION_BITS) +
+			ldexp(HARD_MM_S2, -INCISE_FIXED_INPUT_ACCELERATION_SHARE_BITS)) +
+	       slope[INCISE_INPUT_TILT] *
+		       (INCISE_FIXED_INPUT_TILT_DEG + turned * 180 / M_PI) +
+	       slope[INCISE_INPUT_TIME] * (1 / plan->scene->rate_hz + 2 * LSB_MM);
+}
+
+/* Rounding of the model's table, of the cut's front, and of each stiffness over its reach. */
+static double tissue_N(const struct incise_plan *plan, const struct state_error *e,
+		       double reach_mm)
+{
+	double bound_N = 0;
+
+	if (plan->fixed)
+		bound_N =
+			plan->gain * incise_fixed_bound(plan->fixed) + inputs_N(plan, e);
 
 	/* The force is below the unloading from the surface on. */
 	if (plan->fixed && plan->dissipates)
@@ -162,7 +195,7 @@ double incise_plan_bound(const struct incise_plan *plan, double reach_mm)
 	if (!plan->scene->fixed)
 		return 0;
 	e = shown(plan);
-	return tissue_N(plan, reach_mm) +
+	return tissue_N(plan, &e, reach_mm) +
 	       s->stiffness_N_mm * (PLACES * (e.x + 4 * LSB_MM) + ldexp(reach_mm, -26)) +
 	       plane_N_mm * e.x / ENTERS + s->damping_N_s_mm * e.v +
 	       ldexp(SPEED_MM_S, -29);

@@ -120,8 +120,11 @@ static int survey_model(struct incise_plan *plan, double *stiffness_N_mm)
 		return -ENOMEM;
 	for (int i = 0; i < plan->scene->n_inputs; i++)
 		s->certified = s->certified && slope[i].certified;
-	s->speed_slope_N_s_mm = slope_by(plan, slope, INCISE_INPUT_SPEED);
-	s->acceleration_slope_N_s2_mm = slope_by(plan, slope, INCISE_INPUT_ACCELERATION);
+	for (int kind = 0; kind < INCISE_MODEL_INPUT_KINDS; kind++)
+		plan->input_slope[kind] =
+			slope_by(plan, slope, (enum incise_model_input)kind);
+	s->speed_slope_N_s_mm = plan->input_slope[INCISE_INPUT_SPEED];
+	s->acceleration_slope_N_s2_mm = plan->input_slope[INCISE_INPUT_ACCELERATION];
 	s->slope_N_mm =
 		plan->gain * fmax(slope[input_of(plan, INCISE_INPUT_DEPTH)].highest, 0);
 	set_tissue(plan, s->slope_N_mm);

@@ -137,6 +137,27 @@ static void set_shape(struct conversion *c, struct incise_fixed_shape *shape)
 	}
 }
 
+_Static_assert(INCISE_FIXED_INPUT_DEPTH == INCISE_INPUT_DEPTH + 1 &&
+		       INCISE_FIXED_INPUT_SPEED == INCISE_INPUT_SPEED + 1 &&
+		       INCISE_FIXED_INPUT_ACCELERATION == INCISE_INPUT_ACCELERATION + 1 &&
+		       INCISE_FIXED_INPUT_TILT == INCISE_INPUT_TILT + 1 &&
+		       INCISE_FIXED_INPUT_TIME == INCISE_INPUT_TIME + 1,
+	       "the same, from 1");
+
+/* Depth, or depth and speed, are 0: so plans say it whose format is the first. */
+static int32_t inputs_of(const struct incise_scene *scene)
+{
+	int32_t inputs = 0;
+
+	for (int i = 0; i < scene->n_inputs; i++)
+		inputs |= (int32_t)(scene->input[i] + 1) << 4 * i;
+	return inputs == INCISE_FIXED_INPUT_DEPTH ||
+			       inputs == (INCISE_FIXED_INPUT_DEPTH |
+					  INCISE_FIXED_INPUT_SPEED << 4)
+		       ? 0
+		       : inputs;
+}
+
 static void set_tissue(struct conversion *c, struct incise_fixed_numbers *numbers)
 {
 	const struct incise_plan *plan = c->plan;
@@ -146,6 +167,7 @@ static void set_tissue(struct conversion *c, struct incise_fixed_numbers *number
 	numbers->leave = length(c, "tissue.leave_mm", plan->scene->tissue.leave_mm);
 	numbers->average_ticks = plan->average_ticks;
 	if (model) {
+		numbers->inputs = inputs_of(plan->scene);
 		numbers->gain = number(c, "tissue.gain", plan->gain);
 		numbers->support = number(c, "the model's depth", plan->support_mm);
 		numbers->beyond = number(c, "the model's slope", plan->beyond_N_mm);

@@ -27,13 +27,14 @@ struct place {
 
 static const struct place floor_place = {.normal = {0, 0, 1}};
 
-/* Whether a model's inputs are depth alone, or depth and speed in this order. */
+/* On a mesh the direction to the surface is rounding where the tool is shallow: so is the tilt. */
 static bool fits_integers(const struct incise_scene *scene)
 {
+	bool tilts = false;
+
 	for (int i = 0; i < scene->n_inputs; i++)
-		if (scene->input[i] != (i ? INCISE_INPUT_SPEED : INCISE_INPUT_DEPTH))
-			return false;
-	return scene->n_inputs <= 2;
+		tilts |= scene->input[i] == INCISE_INPUT_TILT;
+	return !tilts || !scene->surface || !scene->surface->mesh;
 }
 
 /* The model in the scene's arithmetic. */
@@ -51,9 +52,8 @@ static int take_model(struct incise_plan *plan, struct incise_error *err)
 	if (scene->fixed && !fits_integers(scene))
 		return incise_error_set(
 			err, ENOTSUP,
-			"%s: its model has other inputs than depth_mm, or depth_mm and "
-			"velocity_mm_s: integers have no more; set arithmetic to "
-			"\"double\"",
+			"%s: its model has the input tilt_deg, whose error on a mesh is "
+			"not bounded in integers; set arithmetic to \"double\"",
 			scene->path);
 	plan->fixed = scene->compiled;
 	if (!scene->model)

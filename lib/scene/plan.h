@@ -118,8 +118,10 @@ struct incise_plan {
 	double gain;
 	bool dissipates;       /* a model's force unloads when the blade draws back … */
 	double unloading_N_mm; /* … with this stiffness */
-	double support_mm;     /* the model's largest depth; beyond it the force … */
-	double beyond_N_mm;    /* … goes on with this slope, ≥ 0 */
+	/* The model's steepest slope by each input, N per its unit, times the gain. */
+	double input_slope[INCISE_MODEL_INPUT_KINDS];
+	double support_mm;  /* the model's largest depth; beyond it the force … */
+	double beyond_N_mm; /* … goes on with this slope, ≥ 0 */
 	const struct incise_model *model; /* fuzzy: one of these */
 	const struct incise_fixed *fixed;
 	struct incise_fixed *own_fixed; /* compiled here */

@@ -71,6 +71,8 @@ struct incise_plan_file *incise_plan_file_new(const struct incise_plan *plan,
 		rc = incise_integers_file(plan, &head.numbers, &heights, err);
 	if (rc)
 		goto out;
+	if (head.numbers.inputs)
+		head.version = INCISE_FIXED_PLAN_VERSION_INPUTS;
 	take_name(head.name, plan->scene->path);
 	strncpy(head.surface,
 		plan->scene->surface_kind ? plan->scene->surface_kind : "plane",

@@ -217,10 +217,11 @@ INCISE_API void incise_plan_rendered(const struct incise_plan *plan,
  * The certified error of a plan with arithmetic = "fixed": the largest difference of its force
  * from that of the same plan in double, on the same poses, before limits.
  *
- * It holds for poses one tracker period apart, of a hand up to 1 m/s; within @reach_mm of the
- * start of the contact, at most half of the surface's radius deep; for a blade that enters at
- * 6 degrees to the surface or more; and while both plans are in the same phase, with the same
- * tool in the same cut (if one changes a tick earlier, that is not an error of the force).
+ * It holds for poses one tracker period apart, of a hand up to 1 m/s, with up to 2 m/s² across
+ * its motion; within @reach_mm of the start of the contact, at most half of the surface's
+ * radius deep; for a blade that enters at 6 degrees to the surface or more; and while both
+ * plans are in the same phase, with the same tool in the same cut (if one changes a tick
+ * earlier, that is not an error of the force).
  * lib/scene/bound.c has its parts. `incise bench` measures the rest.
  *
  * @return N; 0 in double
