@@ -192,10 +192,42 @@ static int grow(struct incise_dataset *data, bool groups)
 	return 0;
 }
 
-static int read_rows(struct reader *in, const char *const *columns, const char *group,
-		     const char *where, struct incise_dataset *data, size_t *left_out)
+/* What rows are read for, and where they go. */
+struct sink {
+	const char *const *columns;
+	int n;
+	const char *group, *where;
+	incise_row_taker take;
+	void *user;
+	uint64_t rows, left_out;
+};
+
+/* The row that is appended to a dataset. */
+static int keep_row(void *user, const double *row, const char *group,
+		    struct incise_error *err)
+{
+	struct incise_dataset *data = user;
+	int at = 0;
+
+	if (data->rows == data->capacity && grow(data, group))
+		return incise_error_set(err, ENOMEM, "no memory for more than %zu rows",
+					data->rows);
+	if (group) {
+		at = find_group(data, group);
+		if (at < 0)
+			return incise_error_set(err, ENOMEM, "no memory for more groups");
+		data->group[data->rows] = at;
+	}
+	memcpy(&data->values[data->rows * data->columns], row,
+	       data->columns * sizeof(*row));
+	data->rows++;
+	return 0;
+}
+
+static int read_rows(struct reader *in, struct sink *sink)
 {
 	int at[FIELDS_MAX], group_at = -1, where_at, rc;
+	double row[FIELDS_MAX];
 
 	rc = next_row(in);
 	if (rc < 0)
@@ -204,17 +236,17 @@ static int read_rows(struct reader *in, const char *const *columns, const char *
 		return incise_lines_error(&in->lines, ENODATA,
 					  "the file is empty; expected a header row with "
 					  "column names, and rows of numbers");
-	for (int i = 0; i < data->columns; i++) {
-		at[i] = find_column(in, columns[i]);
+	for (int i = 0; i < sink->n; i++) {
+		at[i] = find_column(in, sink->columns[i]);
 		if (at[i] < 0)
 			return at[i];
 	}
-	if (group) {
-		group_at = find_column(in, group);
+	if (sink->group) {
+		group_at = find_column(in, sink->group);
 		if (group_at < 0)
 			return group_at;
 	}
-	where_at = look_for_column(in, where);
+	where_at = look_for_column(in, sink->where);
 	rc = in->n_fields;
 	for (int header = rc; (rc = next_row(in)) > 0;) {
 		double wanted = 1;
@@ -228,39 +260,64 @@ static int read_rows(struct reader *in, const char *const *columns, const char *
 				in->n_fields < header
 					? "add the missing fields, or remove the row"
 					: "write decimal points, not commas");
-		rc = where_at >= 0 ? number(in, where_at, where, &wanted) : 0;
+		rc = where_at >= 0 ? number(in, where_at, sink->where, &wanted) : 0;
 		if (rc)
 			return rc;
 		if (wanted == 0) {
-			++*left_out;
+			sink->left_out++;
 			continue;
 		}
-		if (data->rows == data->capacity && grow(data, group))
-			return incise_lines_error(&in->lines, ENOMEM,
-						  "no memory for more rows");
-		for (int i = 0; i < data->columns; i++) {
-			rc = number(in, at[i], columns[i],
-				    &data->values[data->rows * data->columns + i]);
+		for (int i = 0; i < sink->n; i++) {
+			rc = number(in, at[i], sink->columns[i], &row[i]);
 			if (rc)
 				return rc;
 		}
-		if (group) {
-			rc = find_group(data, in->field[group_at]);
-			if (rc < 0)
-				return incise_lines_error(&in->lines, ENOMEM,
-							  "no memory for more groups");
-			data->group[data->rows] = rc;
-		}
-		data->rows++;
+		rc = sink->take(sink->user, row,
+				sink->group ? in->field[group_at] : NULL, in->lines.err);
+		if (rc)
+			return rc;
+		sink->rows++;
 	}
-	if (!rc && !data->rows && *left_out)
+	if (!rc && !sink->rows && sink->left_out)
 		rc = incise_lines_error(&in->lines, ENODATA,
-					"all %zu rows have 0 in the column '%s'",
-					*left_out, where);
-	else if (!rc && !data->rows)
+					"all %llu rows have 0 in the column '%s'",
+					(unsigned long long)sink->left_out, sink->where);
+	else if (!rc && !sink->rows)
 		rc = incise_lines_error(
 			&in->lines, ENODATA,
 			"there are no rows below the header; add rows of numbers");
+	return rc;
+}
+
+static int read_file(const char *path, struct sink *sink, struct incise_error *err)
+{
+	/* Of any size: only the columns that are asked for are kept. */
+	static const struct incise_infile_kind csv = {
+		.name = "a CSV file",
+		.advice = "give a CSV file with a header row",
+	};
+	struct reader in;
+	int rc = incise_lines_open(&in.lines, path, &csv, err);
+
+	if (rc)
+		return rc;
+	rc = read_rows(&in, sink);
+	incise_lines_close(&in.lines);
+	return rc < 0 ? rc : 0;
+}
+
+int incise_dataset_each(const char *path, const char *const *columns, int n,
+			const char *group, const char *where, incise_row_taker take,
+			void *user, uint64_t *left_out, struct incise_error *err)
+{
+	struct sink sink = {columns, n, group, where, take, user, 0, 0};
+	int rc = n < 1 || n > FIELDS_MAX
+			 ? incise_error_set(err, EINVAL, "%s: cannot read %d columns",
+					    path, n)
+			 : read_file(path, &sink, err);
+
+	if (left_out)
+		*left_out = sink.left_out;
 	return rc;
 }
 
@@ -286,24 +343,15 @@ struct incise_dataset *incise_dataset_read_where(const char *path,
 						 size_t *left_out,
 						 struct incise_error *err)
 {
-	/* Of any size: only the columns that are asked for are kept. */
-	static const struct incise_infile_kind csv = {
-		.name = "a CSV file",
-		.advice = "give a CSV file with a header row",
-	};
 	struct incise_dataset *data = new_dataset(path, n, err);
-	struct reader in;
+	struct sink sink = {columns, n, group, where, keep_row, data, 0, 0};
 	int rc;
 
 	if (!data)
 		return NULL;
-	*left_out = 0;
-	rc = incise_lines_open(&in.lines, path, &csv, err);
-	if (!rc) {
-		rc = read_rows(&in, columns, group, where, data, left_out);
-		incise_lines_close(&in.lines);
-	}
-	if (rc < 0) {
+	rc = read_file(path, &sink, err);
+	*left_out = (size_t)sink.left_out;
+	if (rc) {
 		incise_dataset_free(data);
 		errno = -rc;
 		return NULL;
@@ -330,10 +378,9 @@ struct arrow_column {
 };
 
 struct arrow_reader {
-	struct incise_dataset *data;
+	struct sink *sink;
 	struct arrow_column columns[FIELDS_MAX], group, where;
 	uint64_t row; /* of the stream, from 0 */
-	size_t left_out;
 	struct incise_error *err;
 };
 
@@ -384,19 +431,19 @@ static int arrow_find(struct arrow_reader *in, const struct ArrowSchema *schema,
 				list);
 }
 
-static int arrow_columns(struct arrow_reader *in, const struct ArrowSchema *schema,
-			 const char *const *names, const char *group, const char *where)
+static int arrow_columns(struct arrow_reader *in, const struct ArrowSchema *schema)
 {
+	const char *group = in->sink->group, *where = in->sink->where;
 	int rc = 0;
 
 	if (strcmp(schema->format, "+s"))
 		return incise_error_set(in->err, EINVAL,
 					"Arrow stream: is of type '%s', not a table",
 					schema->format);
-	for (int i = 0; i < in->data->columns && !rc; i++) {
+	for (int i = 0; i < in->sink->n && !rc; i++) {
 		struct arrow_column *column = &in->columns[i];
 
-		rc = arrow_find(in, schema, names[i], false, column);
+		rc = arrow_find(in, schema, in->sink->columns[i], false, column);
 		if (!rc && (column->index_format || !is_number(column->format)))
 			rc = arrow_fail(in, column, "is not a column of numbers");
 	}
@@ -513,10 +560,10 @@ static int arrow_group_name(const struct arrow_reader *in, const struct ArrowArr
 
 static int arrow_row(struct arrow_reader *in, const struct ArrowArray *batch, int64_t row)
 {
-	struct incise_dataset *data = in->data;
+	struct sink *sink = in->sink;
 	bool grouped = in->group.at >= 0;
 	char name[256];
-	double *values, wanted = 1;
+	double values[FIELDS_MAX], wanted = 1;
 	int rc = 0;
 
 	if (in->where.at >= 0)
@@ -524,29 +571,19 @@ static int arrow_row(struct arrow_reader *in, const struct ArrowArray *batch, in
 	if (rc)
 		return rc;
 	if (wanted == 0) {
-		in->left_out++;
+		sink->left_out++;
 		return 0;
 	}
-	if (data->rows == data->capacity && grow(data, grouped))
-		return incise_error_set(in->err, ENOMEM,
-					"Arrow stream: no memory for more than %zu rows",
-					data->rows);
-	values = &data->values[data->rows * data->columns];
-	for (int i = 0; i < data->columns && !rc; i++)
+	for (int i = 0; i < sink->n && !rc; i++)
 		rc = arrow_number(in, batch, &in->columns[i], row, &values[i]);
 	if (!rc && grouped) {
 		const struct ArrowArray *array = batch->children[in->group.at];
 
 		rc = arrow_group_name(in, array, row + array->offset, name, sizeof(name));
-		if (!rc) {
-			data->group[data->rows] = find_group(data, name);
-			if (data->group[data->rows] < 0)
-				rc = incise_error_set(in->err, ENOMEM,
-						      "Arrow stream: no memory for more "
-						      "groups");
-		}
 	}
-	data->rows += !rc;
+	if (!rc)
+		rc = sink->take(sink->user, values, grouped ? name : NULL, in->err);
+	sink->rows += !rc;
 	return rc;
 }
 
@@ -595,28 +632,53 @@ static int arrow_rows(struct arrow_reader *in, struct ArrowArrayStream *stream,
 						(long long)n_children);
 		batch.release(&batch);
 	} while (!rc);
-	if (!rc && !in->data->rows)
+	if (!rc && !in->sink->rows)
 		rc = incise_error_set(in->err, ENODATA,
-				      in->left_out
-					      ? "Arrow stream: all %zu rows have 0 in "
+				      in->sink->left_out
+					      ? "Arrow stream: all %llu rows have 0 in "
 						"the column '%s'"
 					      : "Arrow stream: has no rows",
-				      in->left_out, in->where.name);
+				      (unsigned long long)in->sink->left_out,
+				      in->where.name);
 	return rc;
 }
 
-static int arrow_read(struct arrow_reader *in, struct ArrowArrayStream *stream,
-		      const char *const *columns, const char *group, const char *where)
+/* Releases the stream. */
+static int arrow_read(struct ArrowArrayStream *stream, struct sink *sink,
+		      struct incise_error *err)
 {
+	struct arrow_reader in = {.sink = sink, .err = err};
 	struct ArrowSchema schema = {0};
 	int rc = stream->get_schema(stream, &schema);
 
-	if (rc)
-		return arrow_stream_error(in, stream, rc);
-	rc = arrow_columns(in, &schema, columns, group, where);
-	if (!rc)
-		rc = arrow_rows(in, stream, schema.n_children);
-	schema.release(&schema);
+	if (rc) {
+		rc = arrow_stream_error(&in, stream, rc);
+	} else {
+		rc = arrow_columns(&in, &schema);
+		if (!rc)
+			rc = arrow_rows(&in, stream, schema.n_children);
+		schema.release(&schema);
+	}
+	stream->release(stream);
+	return rc;
+}
+
+int incise_dataset_each_arrow(struct ArrowArrayStream *stream, const char *const *columns,
+			      int n, const char *group, const char *where,
+			      incise_row_taker take, void *user, uint64_t *left_out,
+			      struct incise_error *err)
+{
+	struct sink sink = {columns, n, group, where, take, user, 0, 0};
+	int rc;
+
+	if (n < 1 || n > FIELDS_MAX) {
+		stream->release(stream);
+		return incise_error_set(err, EINVAL,
+					"Arrow stream: cannot read %d columns", n);
+	}
+	rc = arrow_read(stream, &sink, err);
+	if (left_out)
+		*left_out = sink.left_out;
 	return rc;
 }
 
@@ -626,16 +688,19 @@ struct incise_dataset *incise_dataset_from_arrow(struct ArrowArrayStream *stream
 						 size_t *left_out,
 						 struct incise_error *err)
 {
-	struct arrow_reader in = {.data = new_dataset("Arrow stream", n, err),
-				  .err = err};
-	int rc = in.data ? arrow_read(&in, stream, columns, group, where) : -errno;
+	struct incise_dataset *data = new_dataset("Arrow stream", n, err);
+	struct sink sink = {columns, n, group, where, keep_row, data, 0, 0};
+	int rc = -EINVAL;
 
-	stream->release(stream);
+	if (data)
+		rc = arrow_read(stream, &sink, err);
+	else
+		stream->release(stream);
 	if (left_out)
-		*left_out = in.left_out;
+		*left_out = (size_t)sink.left_out;
 	if (!rc)
-		return in.data;
-	incise_dataset_free(in.data);
+		return data;
+	incise_dataset_free(data);
 	errno = -rc;
 	return NULL;
 }

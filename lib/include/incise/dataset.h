@@ -8,6 +8,7 @@
 #define INCISE_DATASET_H
 
 #include <stddef.h>
+#include <stdint.h>
 #include <incise/error.h>
 #include <incise/export.h>
 
@@ -45,7 +46,36 @@ INCISE_API struct incise_dataset *incise_dataset_read_where(
 	const char *path, const char *const *columns, int n, const char *group,
 	const char *where, size_t *left_out, struct incise_error *err);
 
+/**
+ * Take a row of numbers, in the order of the columns, with the text of its group (NULL without);
+ * both are valid during the call. Not 0: no further row is read, and that is returned.
+ */
+typedef int (*incise_row_taker)(void *user, const double *row, const char *group,
+				struct incise_error *err);
+
+/**
+ * Read rows one by one, in memory of one row, as incise_dataset_read_where() reads them.
+ *
+ * @param left_out set to the number of omitted rows; or NULL
+ * @return 0; the negative errno of incise_dataset_read_where(), or what @take returned
+ */
+INCISE_API int incise_dataset_each(const char *path, const char *const *columns, int n,
+				   const char *group, const char *where,
+				   incise_row_taker take, void *user, uint64_t *left_out,
+				   struct incise_error *err);
+
 struct ArrowArrayStream;
+
+/**
+ * The same for an Arrow stream, as incise_dataset_from_arrow() reads it; releases the stream.
+ *
+ * @return 0; the negative errno of incise_dataset_from_arrow(), or what @take returned
+ */
+INCISE_API int incise_dataset_each_arrow(struct ArrowArrayStream *stream,
+					 const char *const *columns, int n,
+					 const char *group, const char *where,
+					 incise_row_taker take, void *user,
+					 uint64_t *left_out, struct incise_error *err);
 
 /**
  * Read columns of an Arrow stream as a dataset, as incise_dataset_read_where() does of CSV.
