@@ -244,39 +244,28 @@ double incise_pairs_rmse(const struct incise_model *model,
 
 /* --- both sides of a split --- */
 
-int incise_split(size_t n, const int *groups, double share, uint64_t seed, bool *check,
-		 struct incise_error *err)
+int incise_split_units(uint64_t *count, size_t n_units, double share, uint64_t seed,
+		       const char *what, struct incise_error *err)
 {
-	size_t n_units = n, taken = 0;
-	size_t *order, *count;
+	size_t *order;
+	uint64_t n = 0, taken = 0;
 
 	if (!(share > 0 && share < 1))
 		return incise_error_set(
 			err, EINVAL,
 			"the share of check data is %g: expected between 0 and 1", share);
-	if (groups) {
-		n_units = 0;
-		for (size_t i = 0; i < n; i++)
-			if ((size_t)groups[i] + 1 > n_units)
-				n_units = (size_t)groups[i] + 1;
-	}
 	if (n_units < 2)
 		return incise_error_set(
 			err, EINVAL,
 			"%zu %s: at least two are required to hold out some for "
 			"checking",
-			n_units, groups ? "groups" : "rows");
+			n_units, what);
 	order = malloc(n_units * sizeof(*order));
-	count = calloc(n_units, sizeof(*count));
-	if (!order || !count) {
-		free(order);
-		free(count);
-		return incise_error_set(err, ENOMEM, "no memory to split %zu rows", n);
-	}
-	for (size_t i = 0; i < n; i++) {
-		count[groups ? (size_t)groups[i] : i]++;
-		check[i] = false;
-	}
+	if (!order)
+		return incise_error_set(err, ENOMEM, "no memory to split %zu %s", n_units,
+					what);
+	for (size_t u = 0; u < n_units; u++)
+		n += count[u];
 	incise_random_shuffle(order, n_units, seed);
 	/* Take units until the next one would lead further away from the share. */
 	for (size_t u = 0; u + 1 < n_units; u++) {
@@ -287,9 +276,32 @@ int incise_split(size_t n, const int *groups, double share, uint64_t seed, bool 
 		taken += count[order[u]];
 		count[order[u]] = 0; /* taken */
 	}
-	for (size_t i = 0; i < n; i++)
-		check[i] = !count[groups ? (size_t)groups[i] : i];
 	free(order);
-	free(count);
 	return 0;
+}
+
+int incise_split(size_t n, const int *groups, double share, uint64_t seed, bool *check,
+		 struct incise_error *err)
+{
+	size_t n_units = n;
+	uint64_t *count;
+	int rc;
+
+	if (groups) {
+		n_units = 0;
+		for (size_t i = 0; i < n; i++)
+			if ((size_t)groups[i] + 1 > n_units)
+				n_units = (size_t)groups[i] + 1;
+	}
+	count = calloc(n_units + 1, sizeof(*count));
+	if (!count)
+		return incise_error_set(err, ENOMEM, "no memory to split %zu rows", n);
+	for (size_t i = 0; i < n; i++)
+		count[groups ? (size_t)groups[i] : i]++;
+	rc = incise_split_units(count, n_units, share, seed, groups ? "groups" : "rows",
+				err);
+	for (size_t i = 0; i < n && !rc; i++)
+		check[i] = !count[groups ? (size_t)groups[i] : i];
+	free(count);
+	return rc;
 }

@@ -77,4 +77,11 @@ double incise_pairs_rmse(const struct incise_model *model,
 int incise_split(size_t n, const int *groups, double share, uint64_t seed, bool *check,
 		 struct incise_error *err);
 
+/*
+ * The same over units with numbers of rows, "groups" or "rows" in messages: the number of a unit
+ * that is kept back for checking becomes 0.
+ */
+int incise_split_units(uint64_t *count, size_t n_units, double share, uint64_t seed,
+		       const char *what, struct incise_error *err);
+
 #endif

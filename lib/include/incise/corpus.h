@@ -1,0 +1,134 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Training from many recordings and files, each read twice and never held in memory: a survey
+ * (rows, ranges, groups, a random sample), then the sums of a factor (incise/factor.h). Nothing
+ * depends on the order of the sources, or on which process surveys which. Part of
+ * libincise-learn.
+ *
+ *     source ──► survey ──┐                              ┌── sources ──► fold ──► factors ─► model
+ *     source ──► survey ──┴► settle ──► sample ──► search of premises
+ */
+#ifndef INCISE_CORPUS_H
+#define INCISE_CORPUS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <incise/dataset.h>
+#include <incise/error.h>
+#include <incise/export.h>
+#include <incise/factor.h>
+#include <incise/train.h>
+
+INCISE_BEGIN_DECLS
+
+/** Rows of the sample at most. */
+#define INCISE_CORPUS_SAMPLE 20000
+
+/** A recording or file. */
+struct incise_corpus_source {
+	const char *name; /**< for messages */
+	const char *hash; /**< SHA-256 of its bytes, hexadecimal */
+	const char *text; /**< name, rig, calibration: provenance, one line */
+	/** Group of all its rows; NULL: the text that comes with each row. */
+	const char *group;
+	bool own_groups; /**< groups of that text are others than those of other sources */
+	/** Read all rows, the same at each call: inputs, then output. 0 or a negative errno. */
+	int (*read)(void *user, incise_row_taker take, void *taker,
+		    struct incise_error *err);
+	void *user;
+};
+
+struct incise_corpus;
+
+/** A group of rows, for example a cut. */
+struct incise_corpus_group {
+	uint64_t key;  /**< as of incise_group_key() */
+	char name[64]; /**< cut to this length */
+	uint64_t rows;
+	/** Sum, smallest and largest value of each column. */
+	double sum[INCISE_MODEL_INPUTS_MAX + 1], min[INCISE_MODEL_INPUTS_MAX + 1],
+		max[INCISE_MODEL_INPUTS_MAX + 1];
+	bool check; /**< held out */
+};
+
+/** The survey of a source. */
+struct incise_corpus_survey {
+	char hash[65], text[INCISE_FACTOR_TEXT_MAX];
+	uint64_t rows;
+	int n_groups;
+	struct incise_corpus_group *groups; /**< in order of appearance */
+	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
+};
+
+/**
+ * Make a corpus without sources.
+ *
+ * @param n_inputs columns of a row are those and the output
+ * @param grouped  hold out whole groups, not rows
+ * @param seed     of the sample and of the rows or groups held out
+ * @return corpus, to be freed with incise_corpus_free(); NULL with errno ENOMEM
+ */
+INCISE_API struct incise_corpus *incise_corpus_new(int n_inputs, bool grouped,
+						   uint64_t seed);
+
+/** NULL is accepted. */
+INCISE_API void incise_corpus_free(struct incise_corpus *corpus);
+
+/**
+ * Survey a source.
+ *
+ * @return 0; -EEXIST (its hash is there already), -ENOMEM, or the negative errno of its read
+ */
+INCISE_API int incise_corpus_survey(struct incise_corpus *corpus,
+				    const struct incise_corpus_source *source,
+				    struct incise_error *err);
+
+/** The surveys as bytes, for another process; to be freed with free(3). NULL: ENOMEM. */
+INCISE_API void *incise_corpus_encode(const struct incise_corpus *corpus, size_t *size);
+
+/** Add the surveys of another process. @return 0, -EEXIST, -EINVAL (no such bytes), -ENOMEM. */
+INCISE_API int incise_corpus_add(struct incise_corpus *corpus, const void *bytes,
+				 size_t size, struct incise_error *err);
+
+/**
+ * All sources are surveyed: choose what is held out, and the sample.
+ *
+ * @param share held out, 0 ≤ share < 1, as near as groups allow
+ * @return 0; -EINVAL (fewer than two groups or rows to share), -ENODATA (no rows), -ENOMEM
+ */
+INCISE_API int incise_corpus_settle(struct incise_corpus *corpus, double share,
+				    struct incise_error *err);
+
+/** Number of sources, and their surveys in order of their hashes, after settling. */
+INCISE_API int incise_corpus_sources(const struct incise_corpus *corpus);
+INCISE_API const struct incise_corpus_survey *incise_corpus_source(
+	const struct incise_corpus *corpus, int i);
+
+/** Rows, groups and ranges of a side. */
+struct incise_corpus_side {
+	struct incise_train_side sample; /**< of its rows, owned by the corpus */
+	uint64_t rows;
+	int n_groups;
+};
+INCISE_API const struct incise_corpus_side *incise_corpus_side(
+	const struct incise_corpus *corpus, bool check);
+
+/** Ranges of all rows that are not held out by group: inputs, then output. */
+INCISE_API void incise_corpus_ranges(const struct incise_corpus *corpus, double *min,
+				     double *max);
+
+/**
+ * Add a source's rows to the factors.
+ *
+ * @param check    factor of the rows held out, or NULL where there are none
+ * @param left_out rows held out that are a whole range or more outside; or NULL
+ * @return 0; -ESTALE (the source has changed since its survey), the negative errno of
+ *         incise_factor_add() with the source's name, or of its read
+ */
+INCISE_API int incise_corpus_fold(const struct incise_corpus *corpus,
+				  const struct incise_corpus_source *source,
+				  struct incise_factor *fit, struct incise_factor *check,
+				  uint64_t *left_out, struct incise_error *err);
+
+INCISE_END_DECLS
+#endif

@@ -1,0 +1,1066 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Factors; see incise/factor.h. The file and its text are those of incise-fac(5): lines of text,
+ * exact sums, and a CRC-32C of all before it.
+ */
+#include <endian.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <incise/factor.h>
+#include <incise/infile.h>
+#include <incise/outfile.h>
+#include <incise/version.h>
+#include "../base/c_locale.h"
+#include "../base/crc32c.h"
+#include "../base/random.h"
+#include "design.h"
+#include "sha256.h"
+#include "tune.h"
+
+#define FORM 1 /* of the file */
+#define FOLDS INCISE_FACTOR_FOLDS
+#define SOURCES_MAX 1000000
+
+struct incise_factor {
+	struct incise_design design; /* its gram is used for sums over folds */
+	struct incise_gram *fold[FOLDS];
+	struct incise_model *model; /* of the premises, without consequents */
+	char *premises;		    /* their text, and its hash */
+	char hash[65];
+	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
+	uint64_t groups;
+	struct incise_factor_source *sources;
+	int n_sources, capacity;
+	int at; /* the source that pairs are added to */
+	char version[40], options[INCISE_FACTOR_TEXT_MAX];
+};
+
+/* --- hashes -------------------------------------------------------------------------- */
+
+int incise_file_sha256(const char *path, char hex[65], struct incise_error *err)
+{
+	int fd = open(path, O_RDONLY | O_CLOEXEC), code;
+	struct incise_sha256 sha;
+	char bytes[1 << 16];
+	ssize_t n = -1;
+
+	incise_sha256_start(&sha);
+	while (fd >= 0 && (n = read(fd, bytes, sizeof(bytes))) > 0)
+		incise_sha256_add(&sha, bytes, (size_t)n);
+	code = errno;
+	if (fd >= 0)
+		close(fd);
+	if (n < 0)
+		return incise_error_set(err, code, "%s: %s", path, strerror(code));
+	incise_sha256_end(&sha, hex);
+	return 0;
+}
+
+uint64_t incise_group_key(const char *source, const char *name)
+{
+	uint64_t key = 0;
+
+	for (; *source; source++)
+		key = incise_random_mix(key * 257 + (unsigned char)*source + 1);
+	key = incise_random_mix(key + 0x9e3779b97f4a7c15ULL);
+	for (; *name; name++)
+		key = incise_random_mix(key * 257 + (unsigned char)*name + 1);
+	return key;
+}
+
+/* --- premises ------------------------------------------------------------------------ */
+
+static char *premises_text(const struct incise_model *model)
+{
+	const struct incise_model_info *info = incise_model_info(model);
+	struct incise_c_locale locale = incise_c_locale_begin();
+	char *text = NULL;
+	size_t size;
+	FILE *out = open_memstream(&text, &size);
+
+	for (int i = 0; i < info->n_inputs && out; i++) {
+		const struct incise_variable *v = &info->input[i];
+
+		fprintf(out, "input %.17g %.17g %s %d %s\n", v->min, v->max,
+			incise_mf_type_name(incise_model_mf(model, i, 0)->type),
+			info->n_mfs[i], v->name);
+		for (int k = 0; k < info->n_mfs[i]; k++) {
+			const struct incise_mf *mf = incise_model_mf(model, i, k);
+
+			fputs("mf", out);
+			for (int p = 0; p < incise_mf_n_params(mf->type); p++)
+				fprintf(out, " %.17g", mf->p[p]);
+			fputc('\n', out);
+		}
+	}
+	if (out)
+		fprintf(out, "output %.17g %.17g %s\n", info->output.min,
+			info->output.max, info->output.name);
+	incise_c_locale_end(locale);
+	if (!out || fclose(out)) {
+		free(text);
+		errno = ENOMEM;
+		return NULL;
+	}
+	return text;
+}
+
+/* A model of its own without consequents: other factors rebuild the same one from the text. */
+static struct incise_model *bare_model(const struct incise_model *from,
+				       struct incise_error *err)
+{
+	const struct incise_model_info *info = incise_model_info(from);
+	struct incise_variable inputs[INCISE_MODEL_INPUTS_MAX];
+	enum incise_mf_type type = incise_model_mf(from, 0, 0)->type;
+	struct incise_model *model;
+
+	for (int i = 0; i < info->n_inputs; i++) {
+		inputs[i] = info->input[i];
+		for (int k = 0; k < info->n_mfs[i]; k++)
+			if (incise_model_mf(from, i, k)->type != type) {
+				incise_error_set(err, ENOTSUP,
+						 "the premises have functions of several "
+						 "kinds; expected one kind");
+				return NULL;
+			}
+		if (strchr(inputs[i].name, '\n'))
+			inputs[i].name[strcspn(inputs[i].name, "\n")] = 0;
+	}
+	if (!(info->output.min < info->output.max)) {
+		incise_error_set(err, EINVAL,
+				 "the premises' output has no range; give a model that "
+				 "incise train wrote");
+		return NULL;
+	}
+	model = incise_model_new_grid(info->n_inputs, inputs, info->n_mfs, type,
+				      &info->output, err);
+	for (int i = 0; i < info->n_inputs && model; i++)
+		for (int k = 0; k < info->n_mfs[i]; k++)
+			incise_model_set_mf(model, i, k, incise_model_mf(from, i, k)->p);
+	return model;
+}
+
+struct incise_factor *incise_factor_new(const struct incise_model *premises,
+					struct incise_error *err)
+{
+	const struct incise_variable *out = &incise_model_info(premises)->output;
+	struct incise_factor *factor = calloc(1, sizeof(*factor));
+	struct incise_sha256 sha;
+	int rc = factor ? 0 : -ENOMEM;
+
+	if (factor) {
+		factor->at = -1;
+		snprintf(factor->version, sizeof(factor->version), "%s",
+			 incise_version());
+		rc = incise_design_init(&factor->design, premises, out->min, out->max);
+	}
+	if (!rc) {
+		factor->model = bare_model(premises, err);
+		if (!factor->model) {
+			rc = -errno;
+			goto out;
+		}
+		incise_design_free(&factor->design);
+		rc = incise_design_init(&factor->design, factor->model, out->min,
+					out->max);
+		factor->premises = premises_text(factor->model);
+		if (!factor->premises)
+			rc = -ENOMEM;
+	}
+	for (int f = 0; f < FOLDS && !rc; f++) {
+		factor->fold[f] =
+			incise_gram_new(factor->design.basis.n_rules *
+						(factor->design.basis.n_inputs + 1) +
+					2);
+		if (!factor->fold[f])
+			rc = -ENOMEM;
+	}
+	if (rc)
+		incise_error_set(
+			err, -rc,
+			rc == -ENOMEM ? "no memory for a factor"
+				      : "the premises are no full grid of Gaussians or "
+					"bells, all rules with weight 1");
+out:
+	if (rc) {
+		incise_factor_free(factor);
+		errno = -rc;
+		return NULL;
+	}
+	incise_sha256_start(&sha);
+	incise_sha256_add(&sha, factor->premises, strlen(factor->premises));
+	incise_sha256_end(&sha, factor->hash);
+	return factor;
+}
+
+void incise_factor_free(struct incise_factor *factor)
+{
+	if (!factor)
+		return;
+	incise_design_free(&factor->design);
+	for (int f = 0; f < FOLDS; f++)
+		incise_gram_free(factor->fold[f]);
+	incise_model_free(factor->model);
+	free(factor->premises);
+	free(factor->sources);
+	free(factor);
+}
+
+/* --- sources and pairs --------------------------------------------------------------- */
+
+/* One line of a text: what would end it is replaced. */
+static void put_line(char *to, size_t size, const char *from)
+{
+	snprintf(to, size, "%s", from);
+	for (; *to; to++)
+		if ((unsigned char)*to < ' ')
+			*to = ' ';
+}
+
+void incise_factor_set_options(struct incise_factor *factor, const char *options)
+{
+	put_line(factor->options, sizeof(factor->options), options);
+}
+
+static int find_source(const struct incise_factor *factor, const char *hash)
+{
+	for (int i = 0; i < factor->n_sources; i++)
+		if (!strcmp(factor->sources[i].hash, hash))
+			return i;
+	return -1;
+}
+
+/* At its place by hash; -1: no memory. */
+static int insert_source(struct incise_factor *factor,
+			 const struct incise_factor_source *source)
+{
+	int at = factor->n_sources;
+
+	if (factor->n_sources == factor->capacity) {
+		int capacity = factor->capacity ? 2 * factor->capacity : 16;
+		void *sources =
+			realloc(factor->sources, capacity * sizeof(*factor->sources));
+
+		if (!sources)
+			return -1;
+		factor->sources = sources;
+		factor->capacity = capacity;
+	}
+	for (; at > 0 && strcmp(factor->sources[at - 1].hash, source->hash) > 0; at--)
+		factor->sources[at] = factor->sources[at - 1];
+	factor->sources[at] = *source;
+	factor->n_sources++;
+	return at;
+}
+
+int incise_factor_start(struct incise_factor *factor, const char *hash, const char *text,
+			struct incise_error *err)
+{
+	struct incise_factor_source source = {0};
+
+	if (find_source(factor, hash) >= 0)
+		return incise_error_set(err, EEXIST,
+					"%s: this recording is there already, under "
+					"another name or twice; give it once",
+					text);
+	snprintf(source.hash, sizeof(source.hash), "%s", hash);
+	put_line(source.text, sizeof(source.text), text);
+	factor->at = insert_source(factor, &source);
+	return factor->at >= 0 ? 0 : incise_error_set(err, ENOMEM, "no memory");
+}
+
+static uint64_t rows_of(const struct incise_factor *factor)
+{
+	uint64_t rows = 0;
+
+	for (int f = 0; f < FOLDS; f++)
+		rows += incise_gram_rows(factor->fold[f]);
+	return rows;
+}
+
+int incise_factor_add(struct incise_factor *factor, const double *row, uint64_t group,
+		      struct incise_error *err)
+{
+	const struct incise_model_info *info = incise_model_info(factor->model);
+	const struct incise_scaling *scaling = &factor->design.scaling;
+	int d = info->n_inputs;
+	bool first = !rows_of(factor);
+	int rc = incise_design_add_to(&factor->design, factor->fold[group % FOLDS], row);
+
+	if (rc == -EOVERFLOW)
+		return incise_error_set(err, EOVERFLOW, "more than 2^33 pairs");
+	for (int i = 0; i <= d && rc; i++) {
+		double low = i < d ? -1 : -2,
+		       x = (row[i] - scaling->offset[i]) / scaling->scale[i];
+
+		if (!(x > low && x < 2))
+			return incise_error_set(
+				err, ERANGE,
+				"%s = %g is a whole range or more outside the model's "
+				"%g to %g; remove the row, or train without --premises",
+				i < d ? info->input[i].name : info->output.name, row[i],
+				i < d ? info->input[i].min : info->output.min,
+				i < d ? info->input[i].max : info->output.max);
+	}
+	if (rc)
+		return incise_error_set(err, ERANGE, "a pair is out of range");
+	for (int i = 0; i <= d; i++) {
+		factor->min[i] = first ? row[i] : fmin(factor->min[i], row[i]);
+		factor->max[i] = first ? row[i] : fmax(factor->max[i], row[i]);
+	}
+	if (factor->at >= 0)
+		factor->sources[factor->at].rows++;
+	return 0;
+}
+
+void incise_factor_add_groups(struct incise_factor *factor, uint64_t groups)
+{
+	factor->groups += groups;
+}
+
+void incise_factor_info(const struct incise_factor *factor,
+			struct incise_factor_info *info)
+{
+	*info = (struct incise_factor_info){
+		.rows = rows_of(factor),
+		.groups = factor->groups,
+		.n_inputs = factor->design.basis.n_inputs,
+		.n_rules = factor->design.basis.n_rules,
+		.n_sources = factor->n_sources,
+		.sources = factor->sources,
+		.premises = factor->hash,
+		.version = factor->version,
+		.options = factor->options,
+	};
+	memcpy(info->min, factor->min, sizeof(info->min));
+	memcpy(info->max, factor->max, sizeof(info->max));
+}
+
+/* --- merging ------------------------------------------------------------------------- */
+
+/* The reason, in words, why premises differ, or NULL. */
+static const char *difference(const struct incise_factor *a,
+			      const struct incise_factor *b)
+{
+	const struct incise_model_info *p = incise_model_info(a->model);
+	const struct incise_model_info *q = incise_model_info(b->model);
+	bool ranges = p->output.min == q->output.min && p->output.max == q->output.max;
+
+	if (!strcmp(a->premises, b->premises))
+		return NULL;
+	if (p->n_inputs != q->n_inputs)
+		return "has another number of inputs";
+	if (strcmp(p->output.name, q->output.name))
+		return "has another output, or another unit";
+	for (int i = 0; i < p->n_inputs; i++) {
+		if (strcmp(p->input[i].name, q->input[i].name))
+			return "has other inputs, or other units";
+		ranges &= p->input[i].min == q->input[i].min &&
+			  p->input[i].max == q->input[i].max;
+	}
+	return ranges ? "has other membership functions" : "has other ranges, a scaling";
+}
+
+int incise_factor_merge(struct incise_factor *factor, struct incise_factor *other,
+			const char *name, struct incise_error *err)
+{
+	const char *differs = difference(factor, other);
+	uint64_t had = rows_of(factor), more = rows_of(other);
+
+	if (differs)
+		return incise_error_set(
+			err, EINVAL, "%s: %s of its own; give factors of one --premises",
+			name, differs);
+	for (int i = 0; i < other->n_sources; i++)
+		if (find_source(factor, other->sources[i].hash) >= 0)
+			return incise_error_set(
+				err, EEXIST,
+				"%s: the recording %.200s (SHA-256 %.12s) is in another "
+				"factor too; merge it once",
+				name, other->sources[i].text, other->sources[i].hash);
+	if (had + more > GRAM_ROWS_MAX)
+		return incise_error_set(err, EOVERFLOW,
+					"%s: more than 2^33 pairs together", name);
+	for (int i = 0; i < other->n_sources; i++)
+		if (insert_source(factor, &other->sources[i]) < 0)
+			return incise_error_set(err, ENOMEM, "%s: no memory", name);
+	for (int f = 0; f < FOLDS; f++)
+		incise_gram_merge(factor->fold[f], other->fold[f]);
+	for (int r = 0; r < factor->design.basis.n_rules; r++)
+		factor->design.largest[r] =
+			fmax(factor->design.largest[r], other->design.largest[r]);
+	for (int i = 0; i <= factor->design.basis.n_inputs && more; i++) {
+		factor->min[i] =
+			had ? fmin(factor->min[i], other->min[i]) : other->min[i];
+		factor->max[i] =
+			had ? fmax(factor->max[i], other->max[i]) : other->max[i];
+	}
+	factor->groups += other->groups;
+	if (!had)
+		memcpy(factor->options, other->options, sizeof(factor->options));
+	factor->at = -1;
+	return 0;
+}
+
+/* --- the file ------------------------------------------------------------------------ */
+
+static void encode_text(const struct incise_factor *factor, FILE *out)
+{
+	int d = factor->design.basis.n_inputs;
+
+	fprintf(out, "incise factor %d\nversion %s\npremises %s\n%soptions %s\n", FORM,
+		factor->version, factor->hash, factor->premises, factor->options);
+	fprintf(out, "groups %llu\nsources %d\n", (unsigned long long)factor->groups,
+		factor->n_sources);
+	for (int i = 0; i < factor->n_sources; i++)
+		fprintf(out, "source %s %llu %s\n", factor->sources[i].hash,
+			(unsigned long long)factor->sources[i].rows,
+			factor->sources[i].text);
+	for (int i = 0; i <= d; i++)
+		fprintf(out, "range %.17g %.17g\n", factor->min[i], factor->max[i]);
+	for (int r = 0; r < factor->design.basis.n_rules; r++)
+		fprintf(out, "fired %.17g\n", factor->design.largest[r]);
+	for (int f = 0; f < FOLDS; f++)
+		fprintf(out, "fold %llu\n",
+			(unsigned long long)incise_gram_rows(factor->fold[f]));
+	fprintf(out, "sums %zu\n", incise_gram_count(factor->design.gram));
+}
+
+static void put_u64(FILE *out, uint64_t value)
+{
+	value = htole64(value);
+	fwrite(&value, sizeof(value), 1, out);
+}
+
+void *incise_factor_encode(struct incise_factor *factor, size_t *size)
+{
+	struct incise_c_locale locale = incise_c_locale_begin();
+	char *bytes = NULL;
+	FILE *out = open_memstream(&bytes, size);
+	uint32_t crc;
+
+	if (out)
+		encode_text(factor, out);
+	incise_c_locale_end(locale);
+	for (int f = 0; f < FOLDS && out; f++) {
+		const incise_gram_sum *sum = incise_gram_sums(factor->fold[f]);
+
+		for (size_t i = 0; i < incise_gram_count(factor->fold[f]); i++) {
+			put_u64(out, (uint64_t)sum[i]);
+			put_u64(out, (uint64_t)(sum[i] >> 64));
+		}
+	}
+	if (out && !fflush(out)) {
+		crc = htole32(incise_crc32c(0, bytes, *size));
+		fwrite(&crc, sizeof(crc), 1, out);
+	}
+	if (!out || fclose(out)) {
+		free(bytes);
+		errno = ENOMEM;
+		return NULL;
+	}
+	return bytes;
+}
+
+int incise_factor_save(struct incise_factor *factor, const char *path,
+		       struct incise_error *err)
+{
+	size_t size;
+	void *bytes = incise_factor_encode(factor, &size);
+	struct incise_outfile *file;
+	int rc;
+
+	if (!bytes)
+		return incise_error_set(err, ENOMEM, "%s: no memory to write it", path);
+	file = incise_outfile_open(path, err);
+	rc = file ? 0 : -errno;
+	if (file) {
+		fwrite(bytes, 1, size, incise_outfile_stream(file));
+		rc = incise_outfile_commit(file, err);
+	}
+	free(bytes);
+	return rc;
+}
+
+struct decoder {
+	const char *name;
+	char *at, *end; /* of the text left */
+	int line;
+	struct incise_error *err;
+};
+
+static int damaged(const struct decoder *in, const char *what)
+{
+	return incise_error_set(in->err, EINVAL,
+				"%s:%d: %s; the file is damaged or no factor of incise "
+				"train: write it again",
+				in->name, in->line, what);
+}
+
+/* The rest of the next line behind "KEY ", or NULL. */
+static char *next_line(struct decoder *in, const char *key)
+{
+	size_t n = strlen(key);
+	char *line = in->at, *end = memchr(line, '\n', (size_t)(in->end - line));
+
+	in->line++;
+	if (!end || (size_t)(end - line) < n + 1 || strncmp(line, key, n) ||
+	    line[n] != ' ' || memchr(line, 0, (size_t)(end - line)))
+		return NULL;
+	*end = 0;
+	in->at = end + 1;
+	return line + n + 1;
+}
+
+static bool number(char **text, double *value)
+{
+	char *end;
+
+	*value = incise_decimal(*text, &end);
+	if (end == *text || !isfinite(*value) || (*end && *end != ' '))
+		return false;
+	*text = *end ? end + 1 : end;
+	return true;
+}
+
+/* A count up to a limit at the end of a line. */
+static bool whole(const char *text, uint64_t max, uint64_t *value)
+{
+	char *end;
+
+	errno = 0;
+	*value = strtoull(text, &end, 10);
+	return *text >= '0' && *text <= '9' && !*end && !errno && *value <= max;
+}
+
+static bool is_hash(const char *text)
+{
+	return strspn(text, "0123456789abcdef") == 64;
+}
+
+/* input MIN MAX KIND N NAME and its N lines mf …; parameters go to p. */
+static int decode_input(struct decoder *in, char *line, struct incise_variable *v,
+			int *n_mfs, enum incise_mf_type *type,
+			double (*p)[BASIS_PARAMS_MAX + 1])
+{
+	const enum incise_mf_type kinds[] = {INCISE_MF_GAUSS, INCISE_MF_GBELL};
+	bool known = false;
+	char *end;
+	long n;
+
+	if (!number(&line, &v->min) || !number(&line, &v->max))
+		return damaged(in, "a range is no pair of numbers");
+	for (int k = 0; k < 2 && !known; k++) {
+		const char *name = incise_mf_type_name(kinds[k]);
+
+		known = !strncmp(line, name, strlen(name)) && line[strlen(name)] == ' ';
+		*type = kinds[k];
+	}
+	if (!known)
+		return damaged(in, "a kind of function is neither gaussmf nor gbellmf");
+	line += strlen(incise_mf_type_name(*type)) + 1;
+	n = strtol(line, &end, 10);
+	if (n < 1 || n > INCISE_MODEL_MFS_MAX || *end != ' ' ||
+	    strlen(end + 1) >= sizeof(v->name))
+		return damaged(in, "an input has no such number of functions and name");
+	*n_mfs = (int)n;
+	strcpy(v->name, end + 1);
+	for (int k = 0; k < n; k++) {
+		line = next_line(in, "mf");
+		for (int i = 0; i < incise_mf_n_params(*type); i++)
+			if (!line || !number(&line, &p[k][i]))
+				return damaged(in, "a function has no such parameters");
+		if (*line)
+			return damaged(in, "a function has too many parameters");
+	}
+	return 0;
+}
+
+static struct incise_factor *decode_premises(struct decoder *in)
+{
+	struct incise_variable inputs[INCISE_MODEL_INPUTS_MAX] = {0}, output = {0};
+	static const char *const grid = "the functions make no model";
+	double p[INCISE_MODEL_INPUTS_MAX][INCISE_MODEL_MFS_MAX][BASIS_PARAMS_MAX + 1];
+	enum incise_mf_type type = INCISE_MF_GAUSS, first = type;
+	struct incise_error why = {0};
+	int n_mfs[INCISE_MODEL_INPUTS_MAX], n = 0;
+	struct incise_factor *factor;
+	struct incise_model *model;
+	char *line;
+
+	while (n < INCISE_MODEL_INPUTS_MAX && (line = next_line(in, "input"))) {
+		if (decode_input(in, line, &inputs[n], &n_mfs[n], &type, p[n]))
+			return NULL;
+		if (n && type != first) {
+			damaged(in, "inputs have functions of several kinds");
+			return NULL;
+		}
+		first = type;
+		n++;
+	}
+	in->line -= n < INCISE_MODEL_INPUTS_MAX;
+	line = next_line(in, "output");
+	if (!n || !line || !number(&line, &output.min) || !number(&line, &output.max) ||
+	    strlen(line) >= sizeof(output.name)) {
+		damaged(in, "expected inputs and an output with its range");
+		return NULL;
+	}
+	strcpy(output.name, line);
+	model = incise_model_new_grid(n, inputs, n_mfs, first, &output, &why);
+	for (int i = 0; i < n && model; i++)
+		for (int k = 0; k < n_mfs[i] && model; k++)
+			if (incise_model_set_mf(model, i, k, p[i][k])) {
+				incise_model_free(model);
+				model = NULL;
+			}
+	factor = model ? incise_factor_new(model, &why) : NULL;
+	incise_model_free(model);
+	if (!factor)
+		damaged(in, grid);
+	return factor;
+}
+
+static int decode_sources(struct decoder *in, struct incise_factor *factor,
+			  uint64_t *rows)
+{
+	char *line = next_line(in, "options");
+	uint64_t n;
+
+	if (!line)
+		return damaged(in, "expected the options");
+	incise_factor_set_options(factor, line);
+	line = next_line(in, "groups");
+	if (!line || !whole(line, GRAM_ROWS_MAX, &factor->groups))
+		return damaged(in, "expected a number of groups");
+	line = next_line(in, "sources");
+	if (!line || !whole(line, SOURCES_MAX, &n))
+		return damaged(in, "expected a number of sources");
+	for (uint64_t i = 0; i < n; i++) {
+		struct incise_factor_source source = {0};
+		char *end;
+
+		line = next_line(in, "source");
+		if (!line || !is_hash(line) || line[64] != ' ' ||
+		    (i && strncmp(factor->sources[i - 1].hash, line, 64) >= 0))
+			return damaged(in, "expected the next source by its hash");
+		memcpy(source.hash, line, 64);
+		source.rows = strtoull(line + 65, &end, 10);
+		if (end == line + 65 || *end != ' ' || source.rows > GRAM_ROWS_MAX)
+			return damaged(in, "expected a number of pairs");
+		put_line(source.text, sizeof(source.text), end + 1);
+		*rows += source.rows;
+		if (insert_source(factor, &source) < 0)
+			return incise_error_set(in->err, ENOMEM, "%s: no memory",
+						in->name);
+	}
+	return 0;
+}
+
+static int decode_statistics(struct decoder *in, struct incise_factor *factor,
+			     uint64_t rows)
+{
+	uint64_t count, sum = 0;
+	char *line;
+
+	for (int i = 0; i <= factor->design.basis.n_inputs; i++) {
+		line = next_line(in, "range");
+		if (!line || !number(&line, &factor->min[i]) ||
+		    !number(&line, &factor->max[i]) || *line ||
+		    factor->min[i] > factor->max[i])
+			return damaged(in, "expected the range of a column");
+	}
+	for (int r = 0; r < factor->design.basis.n_rules; r++) {
+		double *largest = &factor->design.largest[r];
+
+		line = next_line(in, "fired");
+		if (!line || !number(&line, largest) || *line || *largest < 0 ||
+		    *largest > 1)
+			return damaged(in, "expected the firing of a rule, 0 to 1");
+	}
+	for (int f = 0; f < FOLDS; f++) {
+		line = next_line(in, "fold");
+		if (!line || !whole(line, GRAM_ROWS_MAX, &count))
+			return damaged(in, "expected a number of pairs");
+		incise_gram_set_rows(factor->fold[f], count);
+		sum += count;
+	}
+	if (sum != rows || sum > GRAM_ROWS_MAX)
+		return damaged(in, "sources and folds have different numbers of pairs");
+	line = next_line(in, "sums");
+	if (!line || !whole(line, SIZE_MAX, &count) ||
+	    count != incise_gram_count(factor->design.gram))
+		return damaged(in, "expected another number of sums");
+	return 0;
+}
+
+/* No sum is larger than its rows allow, and the column of ones counts them. */
+static int decode_sums(struct decoder *in, struct incise_factor *factor)
+{
+	size_t count = incise_gram_count(factor->design.gram);
+	const char *from = in->at;
+
+	if ((size_t)(in->end - in->at) != FOLDS * count * 2 * sizeof(uint64_t))
+		return damaged(in, "the sums are not as long as expected");
+	for (int f = 0; f < FOLDS; f++) {
+		incise_gram_sum *sum = incise_gram_sums(factor->fold[f]);
+		incise_gram_sum rows = incise_gram_rows(factor->fold[f]);
+
+		for (size_t i = 0; i < count; i++, from += 16) {
+			uint64_t word[2];
+
+			memcpy(word, from, sizeof(word));
+			sum[i] = (incise_gram_sum)((unsigned __int128)le64toh(word[1])
+							   << 64 |
+						   le64toh(word[0]));
+			if (sum[i] > rows << 94 || sum[i] < -(rows << 94))
+				return damaged(in, "a sum is too large for its pairs");
+		}
+		if (sum[count - 3] != rows << 92)
+			return damaged(in, "the sums do not count their pairs");
+	}
+	return 0;
+}
+
+static struct incise_factor *decode(struct decoder *in, size_t size)
+{
+	struct incise_factor *factor = NULL;
+	char *line = next_line(in, "incise factor"), hash[65];
+	uint64_t rows = 0, form;
+	uint32_t crc;
+
+	if (!line || !whole(line, UINT32_MAX, &form)) {
+		damaged(in, "expected 'incise factor'");
+		return NULL;
+	}
+	if (form != FORM) {
+		incise_error_set(
+			in->err, ENOTSUP,
+			"%s: is of form %llu, and this incise reads form %d; use "
+			"the same version of incise everywhere",
+			in->name, (unsigned long long)form, FORM);
+		return NULL;
+	}
+	in->end -= sizeof(crc);
+	memcpy(&crc, in->end, sizeof(crc));
+	line[strlen(line)] = '\n';
+	if (le32toh(crc) !=
+	    incise_crc32c(0, in->end - (size - sizeof(crc)), size - sizeof(crc))) {
+		damaged(in, "the checksum does not fit");
+		return NULL;
+	}
+	line = next_line(in, "version");
+	if (!line || strlen(line) >= sizeof(factor->version)) {
+		damaged(in, "expected a version");
+		return NULL;
+	}
+	if (strcmp(line, incise_version())) {
+		incise_error_set(in->err, ENOTSUP,
+				 "%s: is of incise %s, and this is %s; use the same "
+				 "version everywhere",
+				 in->name, line, incise_version());
+		return NULL;
+	}
+	line = next_line(in, "premises");
+	if (!line || !is_hash(line) || line[64]) {
+		damaged(in, "expected the premises' hash");
+		return NULL;
+	}
+	memcpy(hash, line, sizeof(hash));
+	factor = decode_premises(in);
+	if (!factor)
+		return NULL;
+	if ((strcmp(hash, factor->hash) &&
+	     damaged(in, "the premises are not those of their hash")) ||
+	    decode_sources(in, factor, &rows) || decode_statistics(in, factor, rows) ||
+	    decode_sums(in, factor)) {
+		incise_factor_free(factor);
+		return NULL;
+	}
+	return factor;
+}
+
+struct incise_factor *incise_factor_decode(const void *bytes, size_t size,
+					   const char *name, struct incise_error *err)
+{
+	struct incise_c_locale locale = incise_c_locale_begin();
+	struct incise_error own = {0};
+	struct decoder in = {.name = name, .err = err ? err : &own};
+	struct incise_factor *factor = NULL;
+	char *copy = malloc(size + 1);
+
+	if (!copy) {
+		incise_error_set(in.err, ENOMEM, "%s: no memory to read it", name);
+	} else if (size < 64) {
+		in.line = 1;
+		damaged(&in, "the file is too short");
+	} else {
+		memcpy(copy, bytes, size);
+		copy[size] = 0;
+		in.at = copy;
+		in.end = copy + size;
+		factor = decode(&in, size);
+	}
+	free(copy);
+	incise_c_locale_end(locale);
+	if (!factor)
+		errno = in.err->code;
+	return factor;
+}
+
+struct incise_factor *incise_factor_load(const char *path, struct incise_error *err)
+{
+	static const struct incise_infile_kind kind = {
+		.name = "a .fac file",
+		.advice = "give a file that incise train --factor wrote",
+		.size_max = 256 << 20,
+	};
+	struct incise_factor *factor;
+	size_t size;
+	char *bytes = incise_infile_read(path, &kind, &size, err);
+
+	if (!bytes)
+		return NULL;
+	factor = incise_factor_decode(bytes, size, path, err);
+	free(bytes);
+	return factor;
+}
+
+/* --- solving ------------------------------------------------------------------------- */
+
+/* The ridge without cross-validation, as incise_tune() has it. */
+#define DEFAULT_RIDGE 1.0
+
+/* Just enough that the standard deviation is finite where the user wants no ridge. */
+#define LEAST_RIDGE 1e-9
+
+struct solver {
+	struct incise_factor *factor;
+	struct incise_gram *all;
+	struct incise_lsq *lsq;
+	struct incise_scaling scaling;
+	double mean, scale; /* of the target */
+	double *x;
+	int n;
+};
+
+/* Squared held-out errors of ridges, in squares of the scale. */
+static int crossval(struct solver *s, const struct incise_ridge *ridges, int n_ridges,
+		    double *errors)
+{
+	int rc = 0;
+
+	memset(errors, 0, n_ridges * sizeof(*errors));
+	for (int f = 0; f < FOLDS && !rc; f++) {
+		struct incise_gram *held = s->factor->fold[f];
+
+		if (!incise_gram_rows(held))
+			continue;
+		incise_gram_subtract(s->all, held);
+		rc = incise_gram_factor(s->all, s->mean, s->scale, s->lsq);
+		incise_gram_merge(s->all, held);
+		for (int i = 0; i < n_ridges && !rc; i++) {
+			rc = incise_lsq_solve(s->lsq, &ridges[i], s->x);
+			errors[i] +=
+				rc ? 0 : incise_gram_error(held, s->mean, s->scale, s->x);
+		}
+	}
+	return rc;
+}
+
+static int choose_ridge(struct solver *s, const struct incise_factor_ridge *wanted,
+			struct incise_ridge *ridge, double *held)
+{
+	struct incise_ridge ridges[TUNE_RIDGES];
+	double errors[TUNE_RIDGES];
+	int parts = 0, n = 1, rc;
+
+	for (int f = 0; f < FOLDS; f++)
+		parts += incise_gram_rows(s->factor->fold[f]) > 0;
+	*held = NAN;
+	if (isnan(wanted->ridge)) {
+		incise_tune_ridges(&s->factor->design.basis, ridges);
+		n = TUNE_RIDGES;
+	} else {
+		ridges[0] = (struct incise_ridge){wanted->ridge, wanted->mean, s->n,
+						  s->factor->design.basis.n_rules};
+	}
+	*ridge = ridges[0];
+	if (n > 1)
+		ridge->ridge = DEFAULT_RIDGE;
+	if (parts < 2 || (n == 1 && !isnan(wanted->noise)))
+		return 0;
+	if (n == 1)
+		ridges[0].ridge = fmax(ridges[0].ridge, LEAST_RIDGE);
+	rc = crossval(s, ridges, n, errors);
+	for (int i = 0; i < n && !rc; i++)
+		if (!(errors[i] >= *held)) {
+			*held = errors[i];
+			if (n > 1)
+				*ridge = ridges[i];
+		}
+	*held = sqrt(*held / incise_gram_rows(s->all));
+	return rc;
+}
+
+static void fill_report(struct solver *s, const struct incise_ridge *ridge, double held,
+			struct incise_model *model, struct incise_train_report *report)
+{
+	const struct incise_design *design = &s->factor->design;
+
+	*report = (struct incise_train_report){
+		.ridge = ridge->ridge,
+		.parameters = s->n + design->basis.n_premises,
+		.check_rmse = NAN,
+		.check_r2 = NAN,
+		.crossval_rmse = held * s->scaling.scale[design->basis.n_inputs],
+	};
+	for (int r = 0; r < design->basis.n_rules; r++) {
+		report->unfired[r] = design->largest[r] < DESIGN_UNFIRED;
+		report->rules_unfired += report->unfired[r];
+	}
+	report->train_rmse = incise_factor_rmse(s->factor, model, &report->train_r2);
+	incise_lsq_condition(s->lsq, &report->condition);
+}
+
+/* Groups are few: Student's factor for them widens what their errors say. */
+static int make_uncertainty(struct solver *s, const struct incise_ridge *wanted,
+			    double noise, double held, const struct incise_model *model,
+			    struct incise_uncertainty **uncertainty)
+{
+	struct incise_ridge ridge = *wanted;
+	double scale = s->scaling.scale[s->factor->design.basis.n_inputs];
+	const double *factor;
+	int stride;
+
+	ridge.ridge = fmax(ridge.ridge, LEAST_RIDGE);
+	factor = incise_lsq_factor(s->lsq, &ridge, &stride);
+	if (!factor)
+		return -EDOM;
+	if (isnan(noise))
+		noise = scale * (isnan(held) ? sqrt(incise_gram_error(s->all, s->mean,
+								      s->scale, s->x) /
+						    incise_gram_rows(s->all))
+					     : held);
+	*uncertainty = incise_uncertainty_new(model, noise, factor, stride, NULL);
+	return *uncertainty ? 0 : errno == ENOMEM ? -ENOMEM : -EDOM;
+}
+
+/* Sum of all folds, in the design's own matrix. */
+static struct incise_gram *sum_folds(struct incise_factor *factor)
+{
+	incise_gram_reset(factor->design.gram);
+	for (int f = 0; f < FOLDS; f++)
+		incise_gram_merge(factor->design.gram, factor->fold[f]);
+	return factor->design.gram;
+}
+
+static int solve(struct solver *s, const struct incise_factor_ridge *wanted,
+		 struct incise_train_report *report, struct incise_model *model,
+		 struct incise_uncertainty **uncertainty)
+{
+	struct incise_factor *factor = s->factor;
+	struct incise_ridge ridge;
+	double held, *raw = malloc(s->n * sizeof(*raw));
+	int rc = raw ? 0 : -ENOMEM;
+
+	s->all = sum_folds(factor);
+	incise_design_target(&factor->design, s->all, &s->scaling, &s->mean, &s->scale);
+	if (!rc)
+		rc = choose_ridge(s, wanted, &ridge, &held);
+	if (!rc)
+		rc = incise_gram_factor(s->all, s->mean, s->scale, s->lsq);
+	if (!rc)
+		rc = incise_lsq_solve(s->lsq, &ridge, s->x);
+	if (!rc) {
+		memcpy(raw, s->x, s->n * sizeof(*raw));
+		rc = incise_scaling_consequents(&s->scaling, factor->design.basis.n_rules,
+						raw);
+	}
+	if (!rc)
+		rc = incise_basis_set_consequents(model, raw);
+	free(raw);
+	if (!rc && uncertainty)
+		rc = make_uncertainty(s, &ridge, wanted->noise, held, model, uncertainty);
+	if (!rc && report)
+		fill_report(s, &ridge, held, model, report);
+	return rc;
+}
+
+struct incise_model *incise_factor_solve(struct incise_factor *factor,
+					 const struct incise_factor_ridge *ridge,
+					 struct incise_train_report *report,
+					 struct incise_uncertainty **uncertainty,
+					 struct incise_error *err)
+{
+	const struct incise_basis *basis = &factor->design.basis;
+	struct solver s = {.factor = factor, .n = basis->n_rules * (basis->n_inputs + 1)};
+	struct incise_model *model = incise_model_copy(factor->model);
+	uint64_t rows = rows_of(factor);
+	int rc = -ENODATA;
+
+	s.lsq = incise_lsq_new(s.n);
+	s.x = malloc(s.n * sizeof(*s.x));
+	if (!model || !s.lsq || !s.x)
+		rc = -ENOMEM;
+	else if (rows >= (uint64_t)s.n)
+		rc = solve(&s, ridge, report, model, uncertainty);
+	incise_lsq_free(s.lsq);
+	free(s.x);
+	if (!rc)
+		return model;
+	incise_model_free(model);
+	if (rc == -ENODATA)
+		incise_error_set(
+			err, ENODATA,
+			"%llu training pairs cannot determine the %d consequent "
+			"parameters of %d rules; give fewer membership functions "
+			"or record more",
+			(unsigned long long)rows, s.n, basis->n_rules);
+	else
+		incise_error_set(err, -rc,
+				 rc == -ENOMEM
+					 ? "no memory to train"
+					 : "least squares failed: the values are too "
+					   "extreme; scale them or give fewer membership "
+					   "functions");
+	return NULL;
+}
+
+double incise_factor_rmse(struct incise_factor *factor, const struct incise_model *model,
+			  double *r2)
+{
+	const struct incise_scaling *t = &factor->design.scaling;
+	int d = t->n_inputs, n_rules = factor->design.basis.n_rules;
+	struct incise_gram *all = sum_folds(factor);
+	double rows = (double)incise_gram_rows(all), mean, sd, error;
+	double *x = malloc((size_t)n_rules * (d + 1) * sizeof(*x));
+
+	if (!x || !(rows > 0)) {
+		free(x);
+		if (r2)
+			*r2 = NAN;
+		return NAN;
+	}
+	/* Consequents for x in 0 … 1 and the target t. */
+	for (int r = 0; r < n_rules; r++) {
+		const double *p = incise_model_rule(model, r)->p;
+		double *q = x + (size_t)r * (d + 1);
+
+		q[0] = (p[0] - t->offset[d]) / t->scale[d];
+		for (int i = 0; i < d; i++) {
+			q[0] += p[i + 1] * t->offset[i] / t->scale[d];
+			q[i + 1] = p[i + 1] * t->scale[i] / t->scale[d];
+		}
+	}
+	error = incise_gram_error(all, 0, 1, x) / rows;
+	incise_gram_target(all, &mean, &sd);
+	if (r2)
+		*r2 = sd > 1e-13 ? 1 - error / (sd * sd) : NAN;
+	free(x);
+	return sqrt(error) * t->scale[d];
+}

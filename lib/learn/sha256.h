@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/* SHA-256 (FIPS 180-4): names of recordings and premises that do not depend on a path. */
+#ifndef INCISE_SHA256_H
+#define INCISE_SHA256_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+struct incise_sha256 {
+	uint32_t h[8];
+	uint64_t bytes;
+	uint8_t block[64];
+};
+
+void incise_sha256_start(struct incise_sha256 *sha);
+void incise_sha256_add(struct incise_sha256 *sha, const void *bytes, size_t n);
+
+/* 64 lower-case hexadecimal digits and a 0; the state is used up. */
+void incise_sha256_end(struct incise_sha256 *sha, char hex[65]);
+
+#endif
