@@ -47,6 +47,8 @@ fuzz_libs_scene_file = $(pc_libs_incise) $(libs_incise) -pthread
 fuzz_session_file := $(fuzz_scene_file) $(addprefix tools/session/,digest.c judge.c \
 	session_file.c) tools/cli/json.c tools/cli/loop_report.c tools/cli/stopwatch.c
 fuzz_libs_session_file = $(fuzz_libs_scene_file) $(shell $(PKG_CONFIG) --libs jansson)
+fuzz_factor_file := $(fuzz_scene_file) $(wildcard lib/learn/*.c)
+fuzz_libs_factor_file = $(fuzz_libs_scene_file) $(shell $(PKG_CONFIG) --libs $(pc_incise-learn))
 
 fuzz_core := $(patsubst %.c,$(O)/obj/fuzz/%.o,$(wildcard lib/fixed/*.c))
 define fuzz_program

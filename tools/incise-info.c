@@ -119,8 +119,24 @@ static void add_fixed_json(json_t *report, const struct incise_fixed *fx,
 			    fx ? json_number(incise_fixed_bound(fx)) : json_null());
 }
 
+/* Each line of the notes. */
+static json_t *notes_json(const char *notes)
+{
+	json_t *list = json_array();
+
+	for (size_t n; *notes; notes += n + (notes[n] == '\n')) {
+		char *line;
+
+		n = strcspn(notes, "\n");
+		line = cli_text("%.*s", (int)n, notes);
+		json_array_append_new(list, json_text(line));
+		free(line);
+	}
+	return list;
+}
+
 static void model_json(const struct incise_model *model, const struct incise_fixed *fx,
-		       const char *refused)
+		       const char *refused, const char *notes)
 {
 	const struct incise_model_info *info = incise_model_info(model);
 	const struct incise_variable *out = &info->output;
@@ -143,12 +159,13 @@ static void model_json(const struct incise_model *model, const struct incise_fix
 			   json_text(info->name), "inputs", inputs, "output", "name",
 			   json_text(out->name), "min", out->min, "max", out->max,
 			   "and_method", and_method(model), "rules", rules);
+	json_object_set_new(report, "notes", notes_json(notes));
 	add_fixed_json(report, fx, refused);
 	json_print(report);
 }
 
 static void model_text(const struct incise_model *model, const struct incise_fixed *fx,
-		       const char *refused)
+		       const char *refused, const char *notes)
 {
 	const struct incise_model_info *info = incise_model_info(model);
 	const struct incise_variable *v = &info->output;
@@ -156,6 +173,10 @@ static void model_text(const struct incise_model *model, const struct incise_fix
 
 	printf("model %s: %d rules, %d inputs, output %s (%g to %g in the data)\n",
 	       info->name, info->n_rules, n, v->name, v->min, v->max);
+	for (size_t k; *notes; notes += k + (notes[k] == '\n')) {
+		k = strcspn(notes, "\n");
+		printf("%.*s\n", (int)k, notes);
+	}
 	for (int i = 0; i < n; i++) {
 		v = &info->input[i];
 		printf("input %s, support %g to %g\n", v->name, v->min, v->max);
@@ -184,12 +205,12 @@ static void model_text(const struct incise_model *model, const struct incise_fix
 			printf("  weight %.6g", incise_model_rule(model, r)->weight);
 		putchar('\n');
 	}
-	if (!fx) {
+	if (fx) {
+		printf("fixed point: ");
+		put_fixed(fx);
+	} else {
 		puts(refused);
-		return;
 	}
-	printf("fixed point: ");
-	put_fixed(fx);
 }
 
 static void show_model(const char *path, bool json, const char *plot)
@@ -198,15 +219,21 @@ static void show_model(const char *path, bool json, const char *plot)
 	const char *folder, *name;
 	struct incise_model *model;
 	struct incise_fixed *fixed;
+	struct stat st;
+	char *notes;
 
 	if (plot)
 		plot_place("plot", plot, &folder, &name);
 	model = cli_require(incise_model_load(path, &err), &err);
+	/* A pipe has been read. */
+	notes = !stat(path, &st) && S_ISREG(st.st_mode)
+			? cli_require(incise_model_notes(path, &err), &err)
+			: cli_text("%s", "");
 	fixed = incise_fixed_compile(model, NULL, &refused);
 	if (json)
-		model_json(model, fixed, refused.text);
+		model_json(model, fixed, refused.text, notes);
 	else
-		model_text(model, fixed, refused.text);
+		model_text(model, fixed, refused.text, notes);
 	cli_finish();
 	if (plot)
 		plot_draw_or_fail(figure_of_model(&(struct figure){
@@ -216,6 +243,7 @@ static void show_model(const char *path, bool json, const char *plot)
 		cli_written();
 		cli_finish();
 	}
+	free(notes);
 	incise_fixed_free(fixed);
 	incise_model_free(model);
 }

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise train DATA.csv -o MODEL.fis: learn a fuzzy force model, and compare it with simpler
- * predictors.
+ * incise train SOURCE... -o MODEL.fis: learn a fuzzy force model from recordings and CSV files,
+ * and compare it with simpler predictors.
+ *
+ *   sources ─► survey ─► sample ─► search of the premises ─┐
+ *      └──────────────────────────► sums of all pairs ─────┴─► model, or a factor
  */
 #include <math.h>
 #include <stdarg.h>
@@ -9,15 +12,25 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <incise/dataset.h>
+#include <time.h>
+#include <incise/corpus.h>
+#include <incise/factor.h>
 #include <incise/train.h>
+#include <incise/version.h>
 #include "cli/cli.h"
 #include "cli/file.h"
 #include "cli/file_kind.h"
 #include "cli/json.h"
+#include "cli/recording.h"
+#include "train/sources.h"
 
 struct options {
-	const char *data, *model, *initial, *history;
+	char **paths;
+	int n_paths;
+	const char *data; /* for messages: the path, or the number of sources */
+	const char *model, *initial, *history, *premises, *factor;
+	bool damaged;
+	double rate;
 	char *inputs[INCISE_MODEL_INPUTS_MAX];
 	int n_inputs;
 	const char *target, *group;
@@ -66,12 +79,27 @@ static const struct cli_option option_table[] = {
 	 "write the model to this file (.fis); - is standard "
 	 "output",
 	 CLI_OUTPUT(struct options, model), .extensions = ".fis"},
+	{0, "premises", "FILE",
+	 "keep the membership functions and ranges of this model (.fis);\n"
+	 "only the consequents are learnt",
+	 CLI_INPUT(struct options, premises)},
+	{0, "factor", "FILE",
+	 "write the sums of these sources (.fac) for incise merge,\n"
+	 "instead of a model; needs --premises",
+	 CLI_OUTPUT(struct options, factor), .extensions = ".fac"},
 	{0, "inputs", "A,B", "input columns (default: depth_mm,velocity_mm_s)",
 	 CLI_PARSED_BY(parse_inputs)},
 	{0, "target", "COLUMN", "column to learn (default: force_N)",
 	 CLI_TEXT(struct options, target)},
-	{0, "group", "COLUMN", "column that names the cut; cuts are held out as a whole",
+	{0, "group", "GROUP",
+	 "hold out whole groups: recording, rig, or a column that\n"
+	 "names them, such as cut (default: cut for recordings)",
 	 CLI_TEXT(struct options, group)},
+	{0, "rate", "HZ",
+	 "rows per second of a recording, each the mean of its samples\n"
+	 "(default: all samples)",
+	 CLI_NUMBER(struct options, rate, 0.1, 1e6)},
+	RECORDING_DAMAGED(struct options, damaged),
 	{0, "all-rows", NULL,
 	 "also use rows in which the blade did not advance (advancing is 0)",
 	 CLI_FLAG(struct options, all_rows)},
@@ -115,11 +143,13 @@ static const struct cli_option option_table[] = {
 
 static const struct cli_command command = {
 	.name = "train",
-	.synopsis = "DATA.csv -o MODEL.fis [OPTIONS]",
-	.summary = "Learn a Takagi-Sugeno force model from data (ANFIS).",
+	.synopsis = "DATA.csv|NAME.rec… -o MODEL.fis [OPTIONS]",
+	.summary =
+		"Learn a Takagi-Sugeno force model from recordings or CSV files (ANFIS).",
 	.options = option_table,
 	.notes =
-		"Example:\n  incise train pairs.csv --group cut --check 0.3 -o liver.fis\n\n"
+		"Examples:\n  incise train pairs.csv --group cut --check 0.3 -o liver.fis\n"
+		"  incise train day1.rec day2.rec --group recording -o liver.fis\n\n"
 		"Exit: 0 trained, 1 failed, 2 bad usage. See incise-train(1).",
 };
 
@@ -144,8 +174,27 @@ static void parse(struct options *options, int argc, char **argv)
 	};
 	incise_train_options_init(&options->train);
 	cli_parse(&command, argc, argv, options);
-	options->data = file_operand(
-		cli_operand(argc, argv, "DATA.csv", "pairs to learn from"), FILE_TABLE);
+	options->paths = argv + optind;
+	options->n_paths = argc - optind;
+	if (!options->n_paths)
+		cli_usage("missing DATA.csv or NAME.rec (pairs to learn from)");
+	if (options->factor && !options->premises)
+		cli_usage(
+			"--factor: missing --premises MODEL.fis, which all factors share");
+	if (options->factor && options->model)
+		cli_usage(
+			"--factor and -o: give one; incise merge makes a model of factors");
+	if (options->factor && options->check > 0)
+		cli_usage("--factor takes all pairs; leave out --check");
+	if (options->premises &&
+	    (options->train.classic || options->initial || options->history ||
+	     options->n_mfs || options->auto_mfs))
+		cli_usage("--premises keeps the membership functions; leave out --mf, "
+			  "--classic, --initial and --history");
+	if (options->factor && options->json)
+		cli_usage("--json reports a model; leave it out with --factor");
+	if (options->factor)
+		return;
 	if (!options->model || !*options->model)
 		cli_usage("missing -o MODEL.fis (output model)");
 	/* Neither a file nor a folder is there, nor is one meant: a column, of the old --output. */
@@ -177,12 +226,13 @@ struct interval {
 struct result {
 	const struct options *options;
 	const struct incise_model *model;
-	const struct incise_train_side *fit;
-	const struct incise_train_side *check; /* NULL: no pairs were kept back */
+	const struct incise_corpus_side *fit;
+	const struct incise_corpus_side *check; /* NULL: no pairs were kept back */
 	struct incise_train_report report;
 	struct incise_baselines baselines;
 	struct interval interval;
-	size_t left_out; /* rows */
+	uint64_t left_out;	/* rows */
+	uint64_t check_outside; /* rows kept back, outside the training ranges */
 };
 
 /* --- training ------------------------------------------------------------------------ */
@@ -221,6 +271,7 @@ static void check_writable(const char *path)
 	incise_outfile_abort(file);
 }
 
+/* On the sample of the pairs kept back. */
 static void judge_interval(struct interval *interval, const struct incise_model *model,
 			   const struct incise_train_side *check)
 {
@@ -228,6 +279,7 @@ static void judge_interval(struct interval *interval, const struct incise_model 
 
 	interval->noise = incise_uncertainty_noise(interval->uncertainty);
 	interval->coverage = NAN;
+	check = check && check->pairs.n ? check : NULL;
 	for (size_t i = 0; check && i < check->pairs.n; i++) {
 		const double *x = check->pairs.rows + i * (check->pairs.n_inputs + 1);
 		double e = incise_model_eval(model, x, NULL) - x[check->pairs.n_inputs];
@@ -251,29 +303,145 @@ static void save_uncertainty(const struct interval *interval, const char *model)
 	free(path);
 }
 
-static void train(struct options *options, struct incise_model *model,
-		  struct result *result)
-{
-	const struct incise_train_side *check = result->check;
-	struct incise_error err = {0};
-	struct incise_outfile *file = NULL;
-	struct history history = {.epochs = options->train.epochs};
+/* The reading of all sources, once or twice, with the time left on a terminal. */
+struct reading {
+	const char *what;
+	struct timespec start;
+	uint64_t done, total; /* rows; total 0: not known */
+	int at, n;	      /* sources */
+};
 
-	if (options->history) {
-		history.csv = whole_file_begin(options->history, &file);
-		fprintf(history.csv, "epoch,train_rmse,check_rmse\n");
-	}
-	options->train.progress = on_epoch;
-	options->train.user = &history;
-	options->train.uncertainty = &result->interval.uncertainty;
-	if (incise_train(model, &result->fit->pairs, check ? &check->pairs : NULL,
-			 &options->train, &result->report, &err)) {
-		incise_outfile_abort(file);
+static void on_rows(void *user, uint64_t rows)
+{
+	struct reading *reading = user;
+	struct timespec now;
+	double past, left;
+
+	reading->done += rows;
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	past = (double)(now.tv_sec - reading->start.tv_sec) +
+	       1e-9 * (double)(now.tv_nsec - reading->start.tv_nsec);
+	left = reading->total ? past * (double)(reading->total - reading->done) /
+					(double)reading->done
+			      : past * (reading->n - reading->at) / (reading->at + 0.5);
+	cli_progress("%s source %d of %d: %.3g million rows, %.0f s left", reading->what,
+		     reading->at + 1, reading->n, 1e-6 * (double)reading->done, left);
+}
+
+static void begin_reading(struct reading *reading, const char *what, int n,
+			  uint64_t total)
+{
+	*reading = (struct reading){.what = what, .n = n, .total = total};
+	clock_gettime(CLOCK_MONOTONIC, &reading->start);
+}
+
+/* The columns, or those of the premises if these are given. */
+static void choose_columns(struct options *options, const struct incise_model *premises,
+			   const char **columns)
+{
+	const struct incise_model_info *info =
+		premises ? incise_model_info(premises) : NULL;
+
+	for (int i = 0; i < options->n_inputs; i++)
+		columns[i] = options->inputs[i];
+	columns[options->n_inputs] = options->target;
+	if (!info)
+		return;
+	options->n_inputs = info->n_inputs;
+	for (int i = 0; i < info->n_inputs; i++)
+		columns[i] = options->inputs[i] = cli_text("%s", info->input[i].name);
+	columns[info->n_inputs] = options->target = cli_text("%s", info->output.name);
+}
+
+/* The model to start from: an even grid over the ranges of all training pairs. */
+static struct incise_model *start_model(struct options *options,
+					const struct incise_corpus *corpus,
+					const char *const *columns)
+{
+	const struct incise_corpus_side *fit = incise_corpus_side(corpus, false);
+	struct incise_variable ranges[INCISE_MODEL_INPUTS_MAX + 1];
+	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
+	struct incise_error err = {0};
+	struct incise_model *model;
+
+	incise_corpus_ranges(corpus, min, max);
+	for (int i = 0; i <= options->n_inputs; i++)
+		ranges[i] = (struct incise_variable){.min = min[i], .max = max[i]};
+	options->train.ranges = ranges;
+	if (options->auto_mfs)
+		options->mfs[0] = 0;
+	model = incise_train_start(&fit->sample.pairs, columns, options->type,
+				   options->mfs, &options->train, &err);
+	options->train.ranges = NULL;
+	if (!model)
 		cli_fail("%s: %s", options->data, err.text);
+	if (options->initial && incise_model_save(model, options->initial, &err))
+		cli_fail_with(&err);
+	return model;
+}
+
+/* The options that a model depends on, for people: free(3). */
+static char *options_text(const struct options *options)
+{
+	char check[40] = "";
+
+	if (options->check > 0)
+		snprintf(check, sizeof(check), ", %g held out with seed %llu",
+			 options->check, (unsigned long long)options->train.seed);
+	return cli_text("%sgroups: %s%s%s%s", options->train.classic ? "classic, " : "",
+			options->group ? options->group : "none",
+			options->all_rows ? ", all rows" : "",
+			options->rate > 0 ? ", averaged" : "", check);
+}
+
+static struct incise_factor *new_factor(const struct options *options,
+					const struct incise_model *premises)
+{
+	struct incise_error err = {0};
+	struct incise_factor *factor = incise_factor_new(premises, &err);
+	char *text = options_text(options);
+
+	if (!factor)
+		cli_fail("%s: %s", options->premises ? options->premises : options->data,
+			 err.text);
+	incise_factor_set_options(factor, text);
+	free(text);
+	return factor;
+}
+
+/* The consequents of all pairs at given premises. */
+static struct incise_model *solve(const struct options *options,
+				  struct incise_factor *fit, struct result *result)
+{
+	const struct incise_factor_ridge ridge = {options->train.ridge, 1, NAN};
+	struct incise_error err = {0};
+	struct incise_model *model = incise_factor_solve(
+		fit, &ridge, &result->report, &result->interval.uncertainty, &err);
+
+	if (!model)
+		cli_fail("%s: %s", options->data, err.text);
+	return model;
+}
+
+/* The notes of a model of --classic, which has no factor. To be freed with free(3). */
+static char *classic_notes(const struct incise_corpus *corpus, const char *how)
+{
+	char *text = NULL;
+	size_t size;
+	FILE *out = open_memstream(&text, &size);
+
+	if (!out)
+		cli_fail("no memory");
+	fprintf(out, "version: %s\noptions: %s\n", incise_version(), how);
+	for (int i = 0; i < incise_corpus_sources(corpus); i++) {
+		const struct incise_corpus_survey *survey =
+			incise_corpus_source(corpus, i);
+
+		fprintf(out, "source: %s %llu pairs, %s\n", survey->hash,
+			(unsigned long long)survey->rows, survey->text);
 	}
-	cli_progress_end();
-	judge_interval(&result->interval, model, check);
-	whole_file_end(file);
+	fclose(out);
+	return text;
 }
 
 /* --- the report ---------------------------------------------------------------------- */
@@ -293,7 +461,7 @@ static const char *unit_of(const char *column)
 }
 
 static json_t *error_object(const struct options *options, double rmse, double r2,
-			    size_t pairs)
+			    uint64_t pairs)
 {
 	const char *unit = unit_of(options->target);
 	json_t *object = json_object();
@@ -309,7 +477,7 @@ static json_t *error_object(const struct options *options, double rmse, double r
 	snprintf(key, sizeof(key), "mse%s%s%s", *unit ? "_" : "", unit, *unit ? "2" : "");
 	json_set_number(object, key, rmse * rmse);
 	json_set_number(object, "r2", r2);
-	json_set_integer(object, "pairs", pairs);
+	json_set_integer(object, "pairs", (json_int_t)pairs);
 	return object;
 }
 
@@ -334,7 +502,7 @@ static json_t *warnings(const struct result *result)
 	const struct incise_model *model = result->model;
 	const struct incise_train_report *report = &result->report;
 	const struct incise_baselines *baselines = &result->baselines;
-	const size_t pairs = result->fit->pairs.n;
+	const uint64_t pairs = result->fit->rows;
 	const double rmse = result->check ? report->check_rmse : report->train_rmse;
 	const struct {
 		const char *name;
@@ -364,11 +532,17 @@ static json_t *warnings(const struct result *result)
 		     "%d of %d rules never fire in the data, so the model extrapolates "
 		     "there; use fewer membership functions (--mf) or record more data",
 		     report->rules_unfired, incise_model_info(model)->n_rules);
+	if (result->check_outside)
+		warn(list,
+		     "%llu pairs held out are a whole range or more outside the training "
+		     "pairs, and are left out of the check",
+		     (unsigned long long)result->check_outside);
 	if (pairs < (size_t)PAIRS_PER_PARAMETER * report->parameters)
 		warn(list,
-		     "%zu training pairs for %d parameters: the model may overfit; "
+		     "%llu training pairs for %d parameters: the model may overfit; "
 		     "record at least %d pairs for %d rules, or use fewer (--mf)",
-		     pairs, report->parameters, PAIRS_PER_PARAMETER * report->parameters,
+		     (unsigned long long)pairs, report->parameters,
+		     PAIRS_PER_PARAMETER * report->parameters,
 		     incise_model_info(model)->n_rules);
 	return list;
 }
@@ -377,7 +551,7 @@ static void report_json(const struct result *result, json_t *warned)
 {
 	const struct options *options = result->options;
 	const struct incise_model *model = result->model;
-	const struct incise_train_side *fit = result->fit, *check = result->check;
+	const struct incise_corpus_side *fit = result->fit, *check = result->check;
 	const struct incise_train_report *report = &result->report;
 	const struct incise_baselines *baselines = &result->baselines;
 	const struct interval *interval = &result->interval;
@@ -385,14 +559,14 @@ static void report_json(const struct result *result, json_t *warned)
 	const char *unit = unit_of(options->target);
 	char key[80];
 
-	json_set_integer(object, "pairs", fit->pairs.n + (check ? check->pairs.n : 0));
+	json_set_integer(object, "pairs", fit->rows + (check ? check->rows : 0));
 	json_set_integer(object, "left_out", result->left_out);
 	json_object_set_new(object, "train",
 			    error_object(options, report->train_rmse, report->train_r2,
-					 fit->pairs.n));
+					 fit->rows));
 	json_object_set_new(object, "check",
 			    check ? error_object(options, report->check_rmse,
-						 report->check_r2, check->pairs.n)
+						 report->check_r2, check->rows)
 				  : json_null());
 	json_object_set_new(
 		object, "baselines",
@@ -444,7 +618,7 @@ static void report_text(const struct result *result)
 {
 	const struct options *options = result->options;
 	const struct incise_model *model = result->model;
-	const struct incise_train_side *fit = result->fit, *check = result->check;
+	const struct incise_corpus_side *fit = result->fit, *check = result->check;
 	const struct incise_train_report *report = &result->report;
 	const struct incise_baselines *baselines = &result->baselines;
 	const struct interval *interval = &result->interval;
@@ -453,17 +627,18 @@ static void report_text(const struct result *result)
 						    : "unseen pairs";
 	char knn[40];
 
-	printf("%s: %zu pairs to train", options->data, fit->pairs.n);
+	printf("%s: %llu pairs to train", options->data, (unsigned long long)fit->rows);
 	if (options->group)
 		printf(" (%d cuts)", fit->n_groups);
 	if (check)
-		printf(", %zu to check", check->pairs.n);
+		printf(", %llu to check", (unsigned long long)check->rows);
 	if (check && options->group)
 		printf(" (%d cuts)", check->n_groups);
 	if (result->left_out)
-		printf("\nleft out %zu of %zu rows: the blade did not advance",
-		       result->left_out,
-		       result->left_out + fit->pairs.n + (check ? check->pairs.n : 0));
+		printf("\nleft out %llu of %llu rows: the blade did not advance",
+		       (unsigned long long)result->left_out,
+		       (unsigned long long)(result->left_out + fit->rows +
+					    (check ? check->rows : 0)));
 	printf("\n%d rules, %d parameters, %d epochs (kept %d), ",
 	       incise_model_info(model)->n_rules, report->parameters, report->epochs,
 	       report->best_epoch);
@@ -487,69 +662,236 @@ static void report_text(const struct result *result)
 	if (check)
 		printf(", holds %.1f %% of the %s", 100 * interval->coverage, unseen);
 	printf("\n");
-	if (report->pairs_tuned && report->pairs_tuned < fit->pairs.n)
+	if (report->pairs_tuned && report->pairs_tuned < fit->rows)
 		printf("  membership functions from a random %zu of the pairs, consequents "
 		       "from all\n",
 		       report->pairs_tuned);
 	cli_written();
 }
 
+/* Survey all sources: rows, ranges, groups, and the sample. */
+static struct incise_corpus *survey(struct options *options,
+				    const struct source_options *how,
+				    struct source *sources, struct reading *reading)
+{
+	struct incise_corpus *corpus = incise_corpus_new(
+		options->n_inputs, how->group, options->train.seed,
+		options->train.classic ? SIZE_MAX : INCISE_CORPUS_SAMPLE);
+	struct incise_error err = {0};
+
+	if (!corpus)
+		cli_fail("no memory");
+	begin_reading(reading, "surveying", options->n_paths, 0);
+	for (; reading->at < options->n_paths; reading->at++)
+		if (source_open(&sources[reading->at], &err) ||
+		    incise_corpus_survey(corpus, &sources[reading->at].corpus, &err))
+			cli_fail_with(&err);
+	cli_progress_end();
+	if (incise_corpus_settle(corpus, options->check, &err))
+		cli_fail("%s: %s", options->data, err.text);
+	return corpus;
+}
+
+/* The second reading, for the sums of all pairs at some premises. */
+struct folding {
+	const struct options *options;
+	const struct incise_corpus *corpus;
+	struct source *sources;
+	struct reading *reading;
+	struct result *result;
+	struct incise_factor *fit,
+		*check; /* made by it; check NULL: nothing is held out */
+};
+
+static void fold(struct folding *folding, const struct incise_model *premises)
+{
+	const struct options *options = folding->options;
+	struct reading *reading = folding->reading;
+	struct incise_error err = {0};
+
+	folding->fit = new_factor(options, premises);
+	folding->check = folding->result->check ? new_factor(options, premises) : NULL;
+	begin_reading(reading, "adding", options->n_paths,
+		      incise_corpus_side(folding->corpus, false)->rows +
+			      incise_corpus_side(folding->corpus, true)->rows);
+	for (; reading->at < options->n_paths; reading->at++) {
+		struct source *source = &folding->sources[reading->at];
+
+		if (incise_corpus_fold(folding->corpus, &source->corpus, folding->fit,
+				       folding->check, &folding->result->check_outside,
+				       &err))
+			cli_fail_with(&err);
+	}
+	cli_progress_end();
+}
+
+/* The search of premises from the sample, which then asks for the sums. */
+struct searching {
+	struct history history;
+	struct folding *folding;
+};
+
+static void on_search_epoch(void *user, int epoch, double train_rmse, double check_rmse)
+{
+	struct searching *searching = user;
+
+	on_epoch(&searching->history, epoch, train_rmse, check_rmse);
+}
+
+static struct incise_factor *on_premises(void *user, const struct incise_model *premises)
+{
+	struct searching *searching = user;
+
+	cli_progress_end();
+	fold(searching->folding, premises);
+	return searching->folding->fit;
+}
+
+static void search(struct options *options, struct incise_model *model,
+		   struct folding *folding, struct result *result)
+{
+	const struct incise_pairs *check =
+		result->check ? &result->check->sample.pairs : NULL;
+	struct searching searching = {.history.epochs = options->train.epochs,
+				      .folding = folding};
+	struct incise_error err = {0};
+	struct incise_outfile *file = NULL;
+
+	if (options->history) {
+		searching.history.csv = whole_file_begin(options->history, &file);
+		fprintf(searching.history.csv, "epoch,train_rmse,check_rmse\n");
+	}
+	options->train.progress = on_search_epoch;
+	options->train.user = &searching;
+	options->train.all = options->train.classic ? NULL : on_premises;
+	options->train.uncertainty = &result->interval.uncertainty;
+	if (incise_train(model, &result->fit->sample.pairs,
+			 check && check->n ? check : NULL, &options->train,
+			 &result->report, &err)) {
+		incise_outfile_abort(file);
+		cli_fail("%s: %s", options->data, err.text);
+	}
+	cli_progress_end();
+	whole_file_end(file);
+}
+
+static void save_factor(const struct options *options, struct incise_factor *factor)
+{
+	struct incise_factor_info info;
+	struct incise_error err = {0};
+
+	incise_factor_info(factor, &info);
+	if (info.rows < INCISE_FACTOR_PAIRS_MIN)
+		cli_fail(
+			"%s: a factor of %llu pairs would reveal them; expected at least "
+			"%d",
+			options->data, (unsigned long long)info.rows,
+			INCISE_FACTOR_PAIRS_MIN);
+	if (incise_factor_save(factor, options->factor, &err))
+		cli_fail_with(&err);
+	printf("%s: %llu pairs of %llu groups, premises %.12s\n", options->data,
+	       (unsigned long long)info.rows, (unsigned long long)info.groups,
+	       info.premises);
+	cli_written();
+}
+
+static void save_model(const struct options *options, const struct incise_corpus *corpus,
+		       const struct incise_factor *factor,
+		       const struct incise_model *model, struct result *result)
+{
+	struct incise_error err = {0};
+	char *how = options_text(options);
+	char *notes = factor ? incise_factor_notes(factor) : classic_notes(corpus, how);
+	json_t *warned;
+
+	result->model = model;
+	judge_interval(&result->interval, model,
+		       result->check ? &result->check->sample : NULL);
+	if (incise_baselines(&result->fit->sample.pairs, result->fit->sample.groups,
+			     &(result->check && result->check->sample.pairs.n
+				       ? result->check
+				       : result->fit)
+				      ->sample.pairs,
+			     &result->baselines, &err))
+		cli_fail("%s: %s", options->data, err.text);
+	if (incise_model_save_notes(model, options->model, notes, &err))
+		cli_fail_with(&err);
+	free(notes);
+	free(how);
+	save_uncertainty(&result->interval, options->model);
+	warned = warnings(result);
+	if (options->json)
+		report_json(result, warned);
+	else if (strcmp(options->model, "-"))
+		report_text(result);
+	if (!options->json)
+		json_decref(warned);
+}
+
 int main(int argc, char **argv)
 {
 	const char *columns[INCISE_MODEL_INPUTS_MAX + 1];
-	struct incise_train_side fit = {0}, check = {0};
+	struct incise_model *premises = NULL, *model;
+	struct folding folding;
+	struct source_options how;
+	struct incise_corpus *corpus;
+	struct reading reading;
+	struct source *sources;
 	struct options options;
-	struct result result = {.options = &options, .fit = &fit};
+	struct result result = {.options = &options};
 	struct incise_error err = {0};
-	struct incise_dataset *data;
-	struct incise_model *model;
-	json_t *warned;
 
 	parse(&options, argc, argv);
-	for (int i = 0; i < options.n_inputs; i++)
-		columns[i] = options.inputs[i];
-	columns[options.n_inputs] = options.target;
 	check_writable(options.model);
+	check_writable(options.factor);
 	check_writable(options.initial);
 	check_writable(options.history);
-	data = cli_require(incise_dataset_read_where(
-				   options.data, columns, options.n_inputs + 1,
-				   options.group, options.all_rows ? NULL : "advancing",
-				   &result.left_out, &err),
-			   &err);
-	if (incise_train_split(data, options.check, options.train.seed, &fit, &check,
-			       &err))
-		cli_fail("%s: %s", options.data, err.text);
-	result.check = options.check > 0 ? &check : NULL;
-	options.train.groups = fit.groups;
-	if (options.auto_mfs)
-		options.mfs[0] = 0;
-	result.model = model = incise_train_start(&fit.pairs, columns, options.type,
-						  options.mfs, &options.train, &err);
-	if (!model)
-		cli_fail("%s: %s", options.data, err.text);
-	if (options.initial && incise_model_save(model, options.initial, &err))
-		cli_fail_with(&err);
-	train(&options, model, &result);
-	if (incise_baselines(&fit.pairs, fit.groups,
-			     &(result.check ? &check : &fit)->pairs, &result.baselines,
-			     &err))
-		cli_fail("%s: %s", options.data, err.text);
-	if (incise_model_save(model, options.model, &err))
-		cli_fail_with(&err);
-	save_uncertainty(&result.interval, options.model);
-	warned = warnings(&result);
-	if (options.json)
-		report_json(&result, warned);
-	else if (strcmp(options.model, "-"))
-		report_text(&result);
-	if (!options.json)
-		json_decref(warned);
+	if (options.premises)
+		premises = cli_require(incise_model_load(options.premises, &err), &err);
+	choose_columns(&options, premises, columns);
+	how = (struct source_options){
+		.columns = columns,
+		.n_columns = options.n_inputs + 1,
+		.group = options.group,
+		.all_rows = options.all_rows,
+		.damaged = options.damaged,
+		.rate_hz = options.rate,
+		.progress = on_rows,
+		.user = &reading,
+	};
+	sources = sources_new(options.paths, options.n_paths, &how);
+	options.group = how.group;
+	options.data = options.n_paths == 1 ? sources[0].path
+					    : cli_text("%d sources", options.n_paths);
+	corpus = survey(&options, &how, sources, &reading);
+	result.fit = incise_corpus_side(corpus, false);
+	result.check = options.check > 0 ? incise_corpus_side(corpus, true) : NULL;
+	options.train.groups = result.fit->sample.groups;
+	folding = (struct folding){&options, corpus, sources, &reading,
+				   &result,  NULL,   NULL};
+	if (!premises) {
+		model = start_model(&options, corpus, columns);
+		search(&options, model, &folding, &result);
+	} else {
+		fold(&folding, premises);
+		model = options.factor ? NULL : solve(&options, folding.fit, &result);
+	}
+	if (folding.check)
+		result.report.check_rmse =
+			incise_factor_rmse(folding.check, model, &result.report.check_r2);
+	for (int i = 0; i < options.n_paths; i++)
+		result.left_out += sources[i].left_out;
+	if (options.factor)
+		save_factor(&options, folding.fit);
+	else
+		save_model(&options, corpus, folding.fit, model, &result);
 	cli_finish();
+	incise_factor_free(folding.fit);
+	incise_factor_free(folding.check);
 	incise_model_free(model);
+	incise_model_free(premises);
 	incise_uncertainty_free(result.interval.uncertainty);
-	incise_dataset_free(data);
-	incise_train_side_free(&fit);
-	incise_train_side_free(&check);
+	incise_corpus_free(corpus);
+	sources_free(sources, options.n_paths);
 	return 0;
 }

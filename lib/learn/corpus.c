@@ -15,7 +15,6 @@
 #include "../base/random.h"
 #include "pairs.h"
 
-#define SAMPLE INCISE_CORPUS_SAMPLE
 #define COLUMNS_MAX (INCISE_MODEL_INPUTS_MAX + 1)
 
 /* A row that may be in the sample. */
@@ -38,7 +37,7 @@ struct incise_corpus {
 	struct incise_corpus_survey *surveys;
 	int n_surveys, survey_capacity;
 	struct candidate *heap; /* the largest key first, until it is settled */
-	size_t n_heap;
+	size_t n_heap, heap_capacity, sample;
 	/* After settling: */
 	struct group *groups; /* by key */
 	int n_groups;
@@ -47,7 +46,8 @@ struct incise_corpus {
 	struct incise_corpus_side sides[2]; /* fit, check */
 };
 
-struct incise_corpus *incise_corpus_new(int n_inputs, bool grouped, uint64_t seed)
+struct incise_corpus *incise_corpus_new(int n_inputs, bool grouped, uint64_t seed,
+					size_t sample)
 {
 	struct incise_corpus *corpus = calloc(1, sizeof(*corpus));
 
@@ -56,12 +56,7 @@ struct incise_corpus *incise_corpus_new(int n_inputs, bool grouped, uint64_t see
 	corpus->columns = n_inputs + 1;
 	corpus->grouped = grouped;
 	corpus->seed = seed;
-	corpus->heap = malloc(SAMPLE * sizeof(*corpus->heap));
-	if (!corpus->heap) {
-		free(corpus);
-		errno = ENOMEM;
-		return NULL;
-	}
+	corpus->sample = sample;
 	return corpus;
 }
 
@@ -124,22 +119,32 @@ static void sift_down(struct candidate *heap, size_t n)
 	heap[at] = moved;
 }
 
-static void offer(struct incise_corpus *corpus, const struct candidate *c)
+static int offer(struct incise_corpus *corpus, const struct candidate *c)
 {
 	struct candidate *heap = corpus->heap;
 	size_t at = corpus->n_heap;
 
-	if (corpus->n_heap == SAMPLE) {
+	if (corpus->n_heap == corpus->sample) {
 		if (!before(c, &heap[0]))
-			return;
+			return 0;
 		heap[0] = *c;
-		sift_down(heap, SAMPLE);
-		return;
+		sift_down(heap, corpus->n_heap);
+		return 0;
+	}
+	if (at == corpus->heap_capacity) {
+		size_t capacity = at ? 2 * at : 1024;
+
+		heap = realloc(heap, capacity * sizeof(*heap));
+		if (!heap)
+			return -ENOMEM;
+		corpus->heap = heap;
+		corpus->heap_capacity = capacity;
 	}
 	corpus->n_heap++;
 	for (; at && before(&heap[(at - 1) / 2], c); at = (at - 1) / 2)
 		heap[at] = heap[(at - 1) / 2];
 	heap[at] = *c;
+	return 0;
 }
 
 /* --- surveys ------------------------------------------------------------------------- */
@@ -244,8 +249,9 @@ static int survey_row(void *user, const double *row, const char *name,
 	group->rows++;
 	survey->rows++;
 	c.key = row_key(corpus, FOR_SAMPLE, c.source, c.row);
-	offer(corpus, &c);
-	return 0;
+	return offer(corpus, &c)
+		       ? incise_error_set(err, ENOMEM, "no memory for more rows")
+		       : 0;
 }
 
 static int add_survey(struct incise_corpus *corpus, const char *hash, const char *text,
@@ -347,14 +353,15 @@ int incise_corpus_add(struct incise_corpus *corpus, const void *bytes, size_t si
 	memcpy(&header, at, sizeof(header));
 	at += sizeof(header);
 	if (memcmp(header.magic, "survey1", 8) || header.columns != corpus->columns ||
-	    header.size != size || header.n_heap > SAMPLE || header.n_surveys < 0 ||
-	    (size_t)(end - at) < header.n_heap * sizeof(struct candidate))
+	    header.size != size || header.n_surveys < 0 ||
+	    (size_t)(end - at) / sizeof(struct candidate) < header.n_heap)
 		return incise_error_set(err, EINVAL, "%s", damaged);
 	for (uint64_t i = 0; i < header.n_heap; i++, at += sizeof(struct candidate)) {
 		struct candidate c;
 
 		memcpy(&c, at, sizeof(c));
-		offer(corpus, &c);
+		if (offer(corpus, &c))
+			return incise_error_set(err, ENOMEM, "no memory for more rows");
 	}
 	for (int i = 0; i < header.n_surveys && !rc; i++) {
 		struct incise_corpus_survey survey, *to;
@@ -530,10 +537,12 @@ static int take_sample(struct incise_corpus *corpus)
 {
 	for (int side = 0; side < 2; side++) {
 		struct incise_train_side *to = &corpus->sides[side].sample;
-		double *rows = malloc(SAMPLE * corpus->columns * sizeof(*rows));
+		double *rows =
+			malloc((corpus->n_heap + 1) * corpus->columns * sizeof(*rows));
 
-		to->groups =
-			corpus->grouped ? malloc(SAMPLE * sizeof(*to->groups)) : NULL;
+		to->groups = corpus->grouped
+				     ? malloc((corpus->n_heap + 1) * sizeof(*to->groups))
+				     : NULL;
 		to->pairs = (struct incise_pairs){rows, 0, corpus->columns - 1};
 		if (!rows || (corpus->grouped && !to->groups))
 			return -ENOMEM;
@@ -665,19 +674,25 @@ static int fold_row(void *user, const double *row, const char *name,
 {
 	struct folder *f = user;
 	uint64_t group = key_of(f->source, name), at = f->row++;
+	struct incise_error own;
 	int rc;
 
 	/* Without groups each row is in a part of cross-validation by itself. */
 	if (is_check(f->corpus, f->number, at, group)) {
-		rc = incise_factor_add(f->check, row, group, err);
+		rc = incise_factor_add(f->check, row, group, &own);
 		f->left_out += rc == -ERANGE;
-		return rc == -ERANGE ? 0 : rc;
+		rc = rc == -ERANGE ? 0 : rc;
+	} else {
+		rc = incise_factor_add(f->fit, row,
+				       f->corpus->grouped ? group
+							  : row_key(f->corpus, FOR_SAMPLE,
+								    f->number, at),
+				       &own);
 	}
-	return incise_factor_add(f->fit, row,
-				 f->corpus->grouped
-					 ? group
-					 : row_key(f->corpus, FOR_SAMPLE, f->number, at),
-				 err);
+	return rc ? incise_error_set(err, -rc, "%s: row %llu of those used: %.300s",
+				     f->source->name, (unsigned long long)at + 1,
+				     own.text)
+		  : 0;
 }
 
 int incise_corpus_fold(const struct incise_corpus *corpus,

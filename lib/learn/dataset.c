@@ -272,8 +272,8 @@ static int read_rows(struct reader *in, struct sink *sink)
 			if (rc)
 				return rc;
 		}
-		rc = sink->take(sink->user, row,
-				sink->group ? in->field[group_at] : NULL, in->lines.err);
+		rc = sink->take(sink->user, row, sink->group ? in->field[group_at] : NULL,
+				in->lines.err);
 		if (rc)
 			return rc;
 		sink->rows++;

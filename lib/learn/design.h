@@ -44,4 +44,9 @@ void incise_design_target(const struct incise_design *design, struct incise_gram
 /* A rule that never fires stronger than this learns nothing from the data. */
 #define DESIGN_UNFIRED 0.05
 
+struct incise_factor;
+
+/* The design of a factor, with the sums of all its pairs; valid until the factor changes. */
+struct incise_design *incise_factor_design(struct incise_factor *factor);
+
 #endif

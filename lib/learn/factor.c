@@ -341,6 +341,27 @@ void incise_factor_info(const struct incise_factor *factor,
 	memcpy(info->max, factor->max, sizeof(info->max));
 }
 
+char *incise_factor_notes(const struct incise_factor *factor)
+{
+	char *text = NULL;
+	size_t size;
+	FILE *out = open_memstream(&text, &size);
+
+	if (out)
+		fprintf(out, "version: %s\noptions: %s\npremises: %s\n", factor->version,
+			factor->options, factor->hash);
+	for (int i = 0; i < factor->n_sources && out; i++)
+		fprintf(out, "source: %s %llu pairs, %s\n", factor->sources[i].hash,
+			(unsigned long long)factor->sources[i].rows,
+			factor->sources[i].text);
+	if (!out || fclose(out)) {
+		free(text);
+		errno = ENOMEM;
+		return NULL;
+	}
+	return text;
+}
+
 /* --- merging ------------------------------------------------------------------------- */
 
 /* The reason, in words, why premises differ, or NULL. */
@@ -957,6 +978,12 @@ static struct incise_gram *sum_folds(struct incise_factor *factor)
 	for (int f = 0; f < FOLDS; f++)
 		incise_gram_merge(factor->design.gram, factor->fold[f]);
 	return factor->design.gram;
+}
+
+struct incise_design *incise_factor_design(struct incise_factor *factor)
+{
+	sum_folds(factor);
+	return &factor->design;
 }
 
 static int solve(struct solver *s, const struct incise_factor_ridge *wanted,

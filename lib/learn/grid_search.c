@@ -268,6 +268,12 @@ struct incise_model *incise_train_start(const struct incise_pairs *pairs,
 	for (int i = 0; i < n; i++)
 		in[i] = find_variable(pairs, i, names[i]);
 	out = find_variable(pairs, n, names[n]);
+	for (int i = 0; i <= n && options->ranges; i++) {
+		struct incise_variable *v = i < n ? &in[i] : &out;
+
+		v->min = options->ranges[i].min;
+		v->max = options->ranges[i].max;
+	}
 	if (!isfinite(out.max - out.min)) {
 		incise_error_set(
 			err, EINVAL,

@@ -13,6 +13,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <incise/factor.h>
 #include "anfis.h"
 #include "design.h"
 #include "interval.h"
@@ -38,7 +39,8 @@ struct learner {
 	struct incise_basis basis; /* scaled */
 	double *consequents;
 	struct incise_lsq *lsq;
-	struct incise_design design; /* of all pairs */
+	struct incise_design design; /* of all pairs, or those of a sample's factor: */
+	struct incise_factor *all;
 	struct incise_sample tuned;
 	struct incise_folds folds; /* of that */
 	struct incise_tuning tuning;
@@ -146,16 +148,12 @@ static bool on_epoch(void *user, int epoch, const struct incise_basis *basis,
 	return !options->stop || !*options->stop;
 }
 
-/*
- * The least squares of all pairs at the premises of the model, and which rules they fire. Both
- * basis and scaling are then those of that; the former is taken from the model, so that a model
- * that was read again leads to the same numbers.
- */
-static int fold_all(struct learner *l)
+/* The design of the pairs given, which are all. */
+static int design_pairs(struct learner *l)
 {
 	int d = l->train->n_inputs, rc;
 	const double *y = l->train->rows + d;
-	double min = *y, max = *y, mean, scale;
+	double min = *y, max = *y;
 
 	for (size_t i = 1; i < l->train->n; i++) {
 		min = fmin(min, y[i * (d + 1)]);
@@ -164,15 +162,38 @@ static int fold_all(struct learner *l)
 	rc = incise_design_init(&l->design, l->model, min, max);
 	for (size_t i = 0; i < l->train->n && !rc; i++)
 		rc = incise_design_add(&l->design, l->train->rows + i * (d + 1));
+	return rc;
+}
+
+/*
+ * The least squares of all pairs at the premises of the model, and which rules they fire. The
+ * basis is taken from the model, so that a model that was read again leads to the same numbers.
+ */
+static int fold_all(struct learner *l)
+{
+	struct incise_design *design = &l->design;
+	int d = l->train->n_inputs, rc = 0;
+	double unit, mean, scale;
+
+	if (l->options->all) {
+		l->all = l->options->all(l->options->user, l->model);
+		if (!l->all)
+			return -ECANCELED;
+		design = incise_factor_design(l->all);
+	} else {
+		rc = design_pairs(l);
+	}
 	if (rc)
 		return rc;
 	for (int r = 0; r < l->basis.n_rules; r++) {
-		l->report->unfired[r] = l->design.largest[r] < DESIGN_UNFIRED;
+		l->report->unfired[r] = design->largest[r] < DESIGN_UNFIRED;
 		l->report->rules_unfired += l->report->unfired[r];
 	}
-	l->basis = l->design.basis;
-	incise_design_target(&l->design, l->design.gram, &l->scaling, &mean, &scale);
-	return incise_gram_factor(l->design.gram, mean, scale, l->lsq);
+	l->basis = design->basis;
+	unit = design->scaling.scale[d];
+	mean = (l->scaling.offset[d] - design->scaling.offset[d]) / unit;
+	scale = l->scaling.scale[d] / unit;
+	return incise_gram_factor(design->gram, mean, scale, l->lsq);
 }
 
 static int train_classic(struct learner *l, struct incise_tuning *tuning)
@@ -321,6 +342,9 @@ static int learn(struct learner *l)
 	report->parameters = n + l->basis.n_premises;
 	report->train_rmse = incise_pairs_rmse(l->model, l->train);
 	report->train_r2 = incise_pairs_r2(l->train, report->train_rmse);
+	if (l->all)
+		report->train_rmse =
+			incise_factor_rmse(l->all, l->model, &report->train_r2);
 	report->check_rmse = report->check_r2 = NAN;
 	if (l->check) {
 		report->check_rmse = incise_pairs_rmse(l->model, l->check);

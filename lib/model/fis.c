@@ -437,14 +437,15 @@ static int read_file(struct reader *in)
 	return fail(in, EINVAL, "all rules have weight 0, so no rule fires");
 }
 
+/* 256 rules and 512 functions are less than 100 kB; comments may be longer. */
+static const struct incise_infile_kind fis = {
+	.name = "a .fis file",
+	.advice = "give a .fis file",
+	.size_max = 64 << 20,
+};
+
 struct incise_model *incise_model_load(const char *path, struct incise_error *err)
 {
-	/* 256 rules and 512 functions are less than 100 kB; comments may be longer. */
-	static const struct incise_infile_kind fis = {
-		.name = "a .fis file",
-		.advice = "give a .fis file",
-		.size_max = 16 << 20,
-	};
 	struct reader *in = calloc(1, sizeof(*in));
 	struct incise_model *model = calloc(1, sizeof(*model));
 	int rc;
@@ -540,8 +541,30 @@ static void write_model(const struct incise_model *model, FILE *out)
 	}
 }
 
+/* A comment, which MATLAB and the reader above skip, for each line of the notes. */
+#define NOTE "% incise: "
+
+static void write_notes(const char *notes, FILE *out)
+{
+	while (*notes) {
+		int n = (int)strcspn(notes, "\n");
+
+		fputs(NOTE, out);
+		for (int i = 0; i < n; i++)
+			fputc((unsigned char)notes[i] < ' ' ? ' ' : notes[i], out);
+		fputc('\n', out);
+		notes += n + (notes[n] == '\n');
+	}
+}
+
 int incise_model_save(const struct incise_model *model, const char *path,
 		      struct incise_error *err)
+{
+	return incise_model_save_notes(model, path, "", err);
+}
+
+int incise_model_save_notes(const struct incise_model *model, const char *path,
+			    const char *notes, struct incise_error *err)
 {
 	struct incise_outfile *file = incise_outfile_open(path, err);
 	struct incise_c_locale locale;
@@ -549,7 +572,34 @@ int incise_model_save(const struct incise_model *model, const char *path,
 	if (!file)
 		return -errno;
 	locale = incise_c_locale_begin();
+	write_notes(notes, incise_outfile_stream(file));
 	write_model(model, incise_outfile_stream(file));
 	incise_c_locale_end(locale);
 	return incise_outfile_commit(file, err);
+}
+
+char *incise_model_notes(const char *path, struct incise_error *err)
+{
+	struct incise_lines lines;
+	char *notes = NULL;
+	size_t size;
+	FILE *out;
+	int rc = incise_lines_open(&lines, path, &fis, err);
+
+	if (rc) {
+		errno = -rc;
+		return NULL;
+	}
+	out = open_memstream(&notes, &size);
+	while (out && (rc = incise_lines_next(&lines, " \t\r\n")) > 0)
+		if (!strncmp(lines.text, NOTE, strlen(NOTE)))
+			fprintf(out, "%s\n", lines.text + strlen(NOTE));
+	incise_lines_close(&lines);
+	if (!out || fclose(out))
+		rc = incise_error_set(err, ENOMEM, "%s: no memory to read it", path);
+	if (rc >= 0)
+		return notes;
+	free(notes);
+	errno = -rc;
+	return NULL;
 }

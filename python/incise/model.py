@@ -73,6 +73,8 @@ class TrainOptionsStruct(ctypes.Structure):
         ("starts", c_int),
         ("stop", ctypes.POINTER(c_int)),
         ("uncertainty", ctypes.POINTER(c_void_p)),
+        ("ranges", ctypes.POINTER(VariableStruct)),
+        ("all", c_void_p),
     ]
     c_name = "struct incise_train_options"
 

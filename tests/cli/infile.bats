@@ -106,7 +106,7 @@ readers() {
 	[ "$(incise eval m.fis late)" = "$(incise eval m.fis <<<'5 20')" ]
 	wait
 	incise train <(cat pairs.csv) --mf 2,2 -o again.fis 2>/dev/null
-	cmp m.fis again.fis
+	cmp <(grep -v ^% m.fis) <(grep -v ^% again.fis)
 	[ "$(incise eval <(cat m.fx) <<<'5 20')" = "$(incise eval m.fx <<<'5 20')" ] ||
 		incise eval - <<<'5 20' <m.fx || true
 	incise info - <m.fis >/dev/null

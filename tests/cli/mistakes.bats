@@ -42,8 +42,7 @@ table() {
 		2|tool neck blad|incise tool: unknown tool 'blad'; did you mean 'blade'?
 		2|tool|incise tool: missing LOOP (name, as 'incise status' lists it)
 		2|train pairs.csv|incise train: missing -o MODEL.fis (output model)
-		2|train|incise train: missing DATA.csv (pairs to learn from)
-		2|train pairs.csv more.csv -o x.fis|incise train: unexpected argument 'more.csv'; give one DATA.csv at a time
+		2|train|incise train: missing DATA.csv or NAME.rec (pairs to learn from)
 		2|train pairs.csv --epochs many -o x.fis|incise train: --epochs: expected a whole number from 1 to 100000, found 'many'
 		2|train pairs.csv --check 2 -o x.fis|incise train: --check: expected a number from 0.01 to 0.99, found '2'
 		2|train pairs.csv --mf 5 -o x.fis|incise train: --mf: expected 2 counts, one for each of --inputs, found 1

@@ -60,8 +60,7 @@ static const struct {
 	{FILE_RECORDING, FILE_TABLE,
 	 "make a dataset of it: 'incise export %1$s -o DATA.csv'"},
 	{FILE_RECORDING, FILE_MODEL | FILE_COMPILED,
-	 "learn a model from it: 'incise export %1$s -o DATA.csv', then 'incise train "
-	 "DATA.csv -o MODEL.fis'"},
+	 "learn a model from it: 'incise train %1$s -o MODEL.fis'"},
 	{FILE_TABLE, FILE_MODEL | FILE_COMPILED,
 	 "learn a model from it: 'incise train %1$s -o MODEL.fis'"},
 	{FILE_MODEL, FILE_COMPILED, "compile it: 'incise compile %1$s -o MODEL.fx'"},
@@ -200,6 +199,13 @@ static enum file_kind kind_of_text(const char *text)
 	enum file_kind kind;
 
 	text += strspn(text, " \t\r\n");
+	/* The notes of a model may be longer than what is looked at. */
+	if (!strncmp(text, "% incise: ", 10))
+		return FILE_MODEL;
+	while (*text == '%') {
+		text += strcspn(text, "\n");
+		text += strspn(text, " \t\r\n");
+	}
 	if (!strncmp(text, "[System]", 8))
 		return FILE_MODEL;
 	if (*text == '{')

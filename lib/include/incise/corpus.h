@@ -21,7 +21,7 @@
 
 INCISE_BEGIN_DECLS
 
-/** Rows of the sample at most. */
+/** Rows of a sample that settles premises and ridge. */
 #define INCISE_CORPUS_SAMPLE 20000
 
 /** A recording or file. */
@@ -66,10 +66,11 @@ struct incise_corpus_survey {
  * @param n_inputs columns of a row are those and the output
  * @param grouped  hold out whole groups, not rows
  * @param seed     of the sample and of the rows or groups held out
+ * @param sample   rows of the sample at most; SIZE_MAX: all rows
  * @return corpus, to be freed with incise_corpus_free(); NULL with errno ENOMEM
  */
 INCISE_API struct incise_corpus *incise_corpus_new(int n_inputs, bool grouped,
-						   uint64_t seed);
+						   uint64_t seed, size_t sample);
 
 /** NULL is accepted. */
 INCISE_API void incise_corpus_free(struct incise_corpus *corpus);

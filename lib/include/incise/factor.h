@@ -114,6 +114,12 @@ INCISE_API int incise_factor_merge(struct incise_factor *factor,
 				   struct incise_factor *other, const char *name,
 				   struct incise_error *err);
 
+/**
+ * Notes for a model of a factor: version, options and sources, one a line; see
+ * incise_model_save_notes(). To be freed with free(3); NULL with errno ENOMEM.
+ */
+INCISE_API char *incise_factor_notes(const struct incise_factor *factor);
+
 /** Write NAME.fac; see incise-fac(5). @return 0; the negative errno of incise_outfile_open(). */
 INCISE_API int incise_factor_save(struct incise_factor *factor, const char *path,
 				  struct incise_error *err);

@@ -146,6 +146,24 @@ INCISE_API struct incise_model *incise_model_load(const char *path,
 INCISE_API int incise_model_save(const struct incise_model *model, const char *path,
 				 struct incise_error *err);
 
+/**
+ * Write a .fis file with notes: comments, which MATLAB skips. incise train notes the recordings,
+ * calibrations, options and version that a model came from.
+ *
+ * @param notes lines that end with a newline
+ * @return as incise_model_save()
+ */
+INCISE_API int incise_model_save_notes(const struct incise_model *model, const char *path,
+				       const char *notes, struct incise_error *err);
+
+/**
+ * Read the notes of a .fis file, which a model in memory does not have.
+ *
+ * @return lines that end with a newline, "" without notes, to be freed with free(3); NULL with
+ *         errno of incise_infile_open(), ENOMEM
+ */
+INCISE_API char *incise_model_notes(const char *path, struct incise_error *err);
+
 /** @return a copy, to be freed with incise_model_free(); NULL with errno ENOMEM. */
 INCISE_API struct incise_model *incise_model_copy(const struct incise_model *model);
 

@@ -19,6 +19,7 @@
 INCISE_BEGIN_DECLS
 
 struct incise_dataset;
+struct incise_factor;
 
 /** Rows of inputs and output, row-major, n × (n_inputs + 1); not owned. */
 struct incise_pairs {
@@ -69,6 +70,18 @@ struct incise_train_options {
 	 * incise_uncertainty_free(); or NULL. Not set on error.
 	 */
 	struct incise_uncertainty **uncertainty;
+	/**
+	 * Ranges of inputs and output over all pairs, where those given are a sample of them
+	 * (n_inputs + 1; only min and max are used), for incise_train_start(); NULL: those of the
+	 * pairs.
+	 */
+	const struct incise_variable *ranges;
+	/**
+	 * The pairs given are a sample: return the sums of all pairs, at the membership functions
+	 * of the model, which the consequents are fitted to; the caller's to free. NULL ends the
+	 * training with -ECANCELED. Called once with @user; NULL: the pairs given are all.
+	 */
+	struct incise_factor *(*all)(void *user, const struct incise_model *premises);
 };
 
 /** Report of a training. */

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# Training from many sources, factors, and their merge: the same model to the bit.
+
+load cli
+
+setup() {
+	work_folder
+}
+
+# Cuts $2 … $3 of about 250 pairs each into the file $1.
+cuts() {
+	awk -v from="$2" -v to="$3" 'BEGIN {
+		print "cut,depth_mm,velocity_mm_s,force_N"
+		for (c = from; c <= to; c++)
+			for (i = 0; i < 250; i++) {
+				d = (i * 7919 + c * 13) % 1000 / 50; v = (i * 104729 + c * 7) % 997 / 20
+				noise = (c * 7919 + i * 1299709) % 1000 / 1000 - 0.5
+				force = (0.045 * d + 0.0028 * d * d) * (1 + 0.35 * v / (v + 15))
+				force = force * (1 + 0.02 * (c % 5 - 2)) + 0.02 * noise
+				printf "c%d,%.6f,%.6f,%.6f\n", c, d, v, force
+			}
+	}' >"$1"
+}
+
+shares() {
+	for i in 1 2 3 4; do
+		cuts "s$i.csv" $((5 * i - 4)) $((5 * i))
+	done
+}
+
+@test "train takes many sources in any order" {
+	shares
+	incise train s1.csv s2.csv s3.csv s4.csv --group cut --check 0.3 -o a.fis >out
+	grep -q "4 sources: 3500 pairs to train (14 cuts), 1500 to check (6 cuts)" out
+	incise train s3.csv s1.csv s4.csv s2.csv --group cut --check 0.3 -o b.fis >/dev/null
+	cmp a.fis b.fis
+	cmp a.fis.sd b.fis.sd
+	# The notes name what it came from.
+	incise info a.fis >out
+	for i in 1 2 3 4; do
+		grep -q "source: $(sha256sum <s$i.csv | cut -c1-64) [0-9]* pairs, s$i.csv" out
+	done
+	grep -q "groups: cut, 0.3 held out with seed 1" out
+}
+
+@test "a source given twice is named, and a group may be a source" {
+	shares
+	cp s1.csv same.csv
+	run --separate-stderr incise train s1.csv s2.csv same.csv -o m.fis
+	failed_with same.csv "the same content as s1.csv"
+	[ ! -e m.fis ]
+	incise train s1.csv s2.csv s3.csv --group recording --check 0.3 -o m.fis >out
+	grep -q "(2 cuts), 1250 to check (1 cuts)" out
+}
+
+@test "factors of shares merge to the model of all pairs, to the bit" {
+	shares
+	incise train s1.csv --group cut -o start.fis >/dev/null
+	incise train s?.csv --premises start.fis --group cut -o all.fis >/dev/null
+	incise train s1.csv --premises start.fis --group cut --factor a.fac >/dev/null
+	incise train s4.csv s3.csv --premises start.fis --group cut --factor b.fac >/dev/null
+	incise train s2.csv --premises start.fis --group cut --factor c.fac >/dev/null
+	incise merge c.fac a.fac b.fac -o merged.fis >out
+	grep -q "3 factors: 5000 pairs of 20 groups from 4 sources" out
+	cmp all.fis merged.fis
+	cmp all.fis.sd merged.fis.sd
+	incise merge a.fac b.fac -o ab.fac >/dev/null
+	incise merge ab.fac c.fac -o - >twice.fis
+	cmp all.fis twice.fis
+	incise train s?.csv --premises start.fis --group cut --factor all.fac >/dev/null
+	incise merge ab.fac c.fac -o abc.fac >/dev/null
+	cmp all.fac abc.fac
+	[ "$(stat -c %s all.fac)" -lt 160000 ]
+	incise merge ab.fac c.fac -o j.fis --json >r.json
+	[ "$(key r.json pairs)" -eq 5000 ]
+}
+
+@test "merge refuses what does not belong together, by name" {
+	shares
+	incise train s1.csv -o start.fis >/dev/null
+	incise train s1.csv --premises start.fis --factor a.fac >/dev/null
+	run --separate-stderr incise merge a.fac a.fac -o m.fis
+	failed_with a.fac "the recording s1.csv"
+	# another ridge of the premises, another range, another unit
+	sed '/MF2/s/\[\([0-9]\)/[1\1/' start.fis >mf.fis
+	awk '/^Range/ && !done { sub(/\[.* /, "[-1 "); done = 1 } 1' start.fis >range.fis
+	incise train s2.csv --premises mf.fis --factor mf.fac >/dev/null
+	incise train s2.csv --premises range.fis --factor range.fac >/dev/null
+	sed 's/depth_mm/depth_cm/' s2.csv >cm.csv
+	sed 's/depth_mm/depth_cm/' start.fis >cm.fis
+	incise train cm.csv --premises cm.fis --factor cm.fac >/dev/null
+	for other in "mf.fac:has other membership functions" "range.fac:has other ranges" \
+		"cm.fac:has other inputs, or other units"; do
+		run --separate-stderr incise merge a.fac "${other%%:*}" -o m.fis
+		failed_with "${other%%:*}" "${other#*:}"
+	done
+	head -c 90000 a.fac >cut.fac
+	sed 's/^version .*/version 9.9.9/' a.fac >version.fac
+	for bad in cut.fac version.fac s1.csv; do
+		run --separate-stderr incise merge a.fac $bad -o m.fis
+		failed_with $bad
+	done
+	[ ! -e m.fis ]
+	# few pairs would be revealed; values far outside have no place
+	head -n 200 s3.csv >few.csv
+	run --separate-stderr incise train few.csv --premises start.fis --factor few.fac
+	failed_with few.csv "199 pairs would reveal them"
+	sed '5s/,[^,]*,/,99,/' s3.csv >far.csv
+	run --separate-stderr incise train far.csv --premises start.fis --factor far.fac
+	failed_with far.csv "depth_mm = 99"
+	[ ! -e few.fac ] && [ ! -e far.fac ]
+}
+
+@test "train reads recordings, and names a damaged one" {
+	for seed in 1 2 3; do
+		incise capture -o $seed.rec \
+			--rig "sim:clock=simulated,seed=$seed,depth_mm=6,times=2,pause_s=1,cut_s=2" >/dev/null
+	done
+	incise train 1.rec 2.rec 3.rec --rate 200 --check 0.3 -o m.fis >out
+	grep -q "^3 sources: " out
+	incise info m.fis | grep -q "source: $(sha256sum <2.rec/recording.db | cut -c1-64) .* 2.rec, recorded .*, rig sim:"
+	cp -r 2.rec bad.rec
+	sqlite3 bad.rec/recording.db "UPDATE force SET code = code + 1 WHERE rowid = 500"
+	run --separate-stderr incise train 1.rec bad.rec 3.rec --rate 200 -o bad.fis
+	failed_with bad.rec "not as it was recorded"
+	[ ! -e bad.fis ]
+}

@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/* Sources of pairs; see sources.h. */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <incise/arrow.h>
+#include <incise/recording.h>
+#include "../cli/cli.h"
+#include "../cli/file_kind.h"
+#include "../cli/recording.h"
+#include "sources.h"
+
+/* The column that is 0 where the blade did not advance. */
+static const char *where(const struct source *source)
+{
+	return source->options->all_rows ? NULL : "advancing";
+}
+
+/* The column with the groups of rows, or NULL. */
+static const char *group_column(const struct source *source)
+{
+	return source->corpus.group ? NULL : source->options->group;
+}
+
+#define PROGRESS_ROWS (1 << 16)
+
+static void report(const struct source *source, uint64_t rows)
+{
+	if (source->options->progress && rows)
+		source->options->progress(source->options->user, rows);
+}
+
+static int count_row(void *user, const double *row, const char *group,
+		     struct incise_error *err)
+{
+	struct source *source = user;
+
+	if (!(++source->taken % PROGRESS_ROWS))
+		report(source, PROGRESS_ROWS);
+	return source->take(source->taker, row, group, err);
+}
+
+static void begin(struct source *source, incise_row_taker take, void *taker)
+{
+	source->take = take;
+	source->taker = taker;
+	source->taken = 0;
+}
+
+static int end(struct source *source, int rc)
+{
+	report(source, source->taken % PROGRESS_ROWS);
+	return rc;
+}
+
+static int read_file(void *user, incise_row_taker take, void *taker,
+		     struct incise_error *err)
+{
+	struct source *source = user;
+
+	begin(source, take, taker);
+	return end(source,
+		   incise_dataset_each(source->path, source->options->columns,
+				       source->options->n_columns, group_column(source),
+				       where(source), count_row, source,
+				       &source->left_out, err));
+}
+
+/* Rows of a pipe; its groups have numbers for names. */
+static int read_pipe(void *user, incise_row_taker take, void *taker,
+		     struct incise_error *err)
+{
+	const struct source *source = user;
+	int rc = 0;
+
+	for (size_t i = 0; i < incise_dataset_rows(source->pipe) && !rc; i++) {
+		char name[16];
+
+		snprintf(name, sizeof(name), "%d", incise_dataset_group(source->pipe, i));
+		rc = take(taker, incise_dataset_row(source->pipe, i),
+			  group_column(source) ? name : NULL, err);
+	}
+	return rc;
+}
+
+/* A message of the rows, with the recording in front. */
+static int name_it(const struct source *source, int rc, struct incise_error *err)
+{
+	struct incise_error own = *err;
+
+	return rc && strncmp(own.text, source->path, strlen(source->path))
+		       ? incise_error_set(err, own.code, "%s: %.300s", source->path,
+					  own.text)
+		       : rc;
+}
+
+static int read_recording(void *user, incise_row_taker take, void *taker,
+			  struct incise_error *err)
+{
+	struct source *source = user;
+	struct incise_recording *recording = incise_recording_open(source->path, err);
+	struct incise_export_options options;
+	struct ArrowArrayStream stream;
+	int rc;
+
+	if (!recording)
+		return -errno;
+	incise_export_options_init(&options);
+	options.rate_hz = source->options->rate_hz;
+	begin(source, take, taker);
+	rc = incise_recording_stream(recording, "table", &options, &stream, err);
+	incise_recording_close(recording);
+	if (!rc)
+		rc = incise_dataset_each_arrow(&stream, source->options->columns,
+					       source->options->n_columns,
+					       group_column(source), where(source), take,
+					       taker, &source->left_out, err);
+	return name_it(source, rc, err);
+}
+
+static const char *name_of(const char *path)
+{
+	size_t n = strlen(path);
+
+	while (n > 1 && path[n - 1] == '/')
+		n--;
+	while (n && path[n - 1] != '/')
+		n--;
+	return path + n;
+}
+
+static bool is_pipe(const char *path)
+{
+	struct stat st;
+
+	return !strcmp(path, "-") ||
+	       (!stat(path, &st) && !S_ISREG(st.st_mode) && !S_ISDIR(st.st_mode));
+}
+
+/* A recording may be named without its extension. */
+static const char *find(const char *path)
+{
+	enum file_kind kind = file_kind_of(path);
+	char *whole = cli_text("%s.rec", path);
+	bool recording =
+		kind == FILE_RECORDING || (access(path, F_OK) && !access(whole, F_OK));
+
+	free(whole);
+	return file_operand(path, recording ? FILE_RECORDING : FILE_TABLE);
+}
+
+struct source *sources_new(char **paths, int n, struct source_options *options)
+{
+	struct source *sources = cli_alloc(n, sizeof(*sources));
+	bool all = true;
+
+	for (int i = 0; i < n; i++) {
+		struct source *source = &sources[i];
+
+		source->path = find(paths[i]);
+		source->recording = file_kind_of(source->path) == FILE_RECORDING;
+		source->options = options;
+		all &= source->recording;
+		source->corpus = (struct incise_corpus_source){
+			.name = source->path,
+			.hash = source->hash,
+			.text = source->text,
+			.read = source->recording	? read_recording
+				: is_pipe(source->path) ? read_pipe
+							: read_file,
+			.user = source,
+		};
+	}
+	if (!options->group && all)
+		options->group = "cut";
+	for (int i = 0; i < n && options->group; i++) {
+		struct source *source = &sources[i];
+
+		/* Cuts are numbered in each recording; other names mean the same everywhere. */
+		source->corpus.own_groups = !strcmp(options->group, "cut");
+		if (!strcmp(options->group, "recording"))
+			source->corpus.group = source->hash;
+		else if (source->recording && !strcmp(options->group, "rig"))
+			source->corpus.group = source->rig;
+	}
+	return sources;
+}
+
+static int open_recording(struct source *source, struct incise_error *err)
+{
+	struct incise_recording_info info;
+	struct incise_recording *recording;
+	char *database;
+	int rc;
+
+	/* Says itself what is wrong, as a warning, where damaged ones are used. */
+	if (!recording_intact(source->path, source->options->damaged, err) && err->code)
+		return -err->code;
+	recording = incise_recording_open(source->path, err);
+	if (!recording)
+		return -errno;
+	rc = incise_recording_info(recording, &info, err);
+	incise_recording_close(recording);
+	if (rc)
+		return name_it(source, rc, err);
+	database = cli_text("%s/recording.db", source->path);
+	rc = incise_file_sha256(database, source->hash, err);
+	free(database);
+	snprintf(source->rig, sizeof(source->rig), "%s", info.rig);
+	snprintf(source->text, sizeof(source->text),
+		 "%.100s, recorded %s, rig %.120s, force %.9g mV/N, zero %.9g mV, camera "
+		 "%.9g mm/px",
+		 name_of(source->path), info.started, info.rig, info.force_mV_N,
+		 info.zero_mV, info.depth_mm_px);
+	return rc;
+}
+
+static int stop(void *user, const double *row, const char *group,
+		struct incise_error *err)
+{
+	(void)user;
+	(void)row;
+	(void)group;
+	(void)err;
+	return 1;
+}
+
+int source_open(struct source *source, struct incise_error *err)
+{
+	static const char nothing[] =
+		"0000000000000000000000000000000000000000000000000000000000000000";
+	size_t left_out;
+	int rc;
+
+	if (source->recording)
+		return open_recording(source, err);
+	if (source->corpus.read == read_pipe) {
+		strcpy(source->hash, nothing);
+		strcpy(source->text, "a pipe, which was not hashed");
+		source->pipe =
+			incise_dataset_read_where(source->path, source->options->columns,
+						  source->options->n_columns,
+						  group_column(source), where(source),
+						  &left_out, err);
+		source->left_out = left_out;
+		return source->pipe ? 0 : -errno;
+	}
+	snprintf(source->text, sizeof(source->text), "%.300s", name_of(source->path));
+	/* A file of another kind is refused before all of it is hashed. */
+	rc = incise_dataset_each(source->path, source->options->columns,
+				 source->options->n_columns, group_column(source),
+				 where(source), stop, NULL, NULL, err);
+	return rc ? rc : incise_file_sha256(source->path, source->hash, err);
+}
+
+void sources_free(struct source *sources, int n)
+{
+	for (int i = 0; i < n; i++)
+		incise_dataset_free(sources[i].pipe);
+	free(sources);
+}

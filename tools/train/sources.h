@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * Recordings and CSV files that pairs come from, for incise train and incise info --dataset: each
+ * by its hash, read as often as asked. Every failure ends the program unless it says otherwise.
+ */
+#ifndef TRAIN_SOURCES_H
+#define TRAIN_SOURCES_H
+
+#include <stdbool.h>
+#include <incise/corpus.h>
+#include <incise/error.h>
+
+/* The columns and rows that are read. */
+struct source_options {
+	const char *const *columns; /* inputs, then output */
+	int n_columns;
+	/* cut, recording, rig, or a column; NULL: cut where all are recordings, else none. */
+	const char *group;
+	bool all_rows;	/* also where the blade did not advance */
+	bool damaged;	/* also recordings that failed verification */
+	double rate_hz; /* of a recording's rows; 0: every force sample */
+	/* Called after every 65536 rows and the last of a source. */
+	void (*progress)(void *user, uint64_t rows);
+	void *user;
+};
+
+struct source {
+	struct incise_corpus_source corpus;
+	const struct source_options *options;
+	const char *path;
+	bool recording;
+	char hash[65], text[INCISE_FACTOR_TEXT_MAX];
+	char rig[256];
+	uint64_t left_out;	     /* rows in the last reading */
+	struct incise_dataset *pipe; /* that can be read once only: its rows, or NULL */
+	incise_row_taker take;	     /* of the present reading, and the rows it took */
+	void *taker;
+	uint64_t taken;
+};
+
+/* Of @paths, which outlive them: free(3). Decides @options->group. */
+struct source *sources_new(char **paths, int n, struct source_options *options);
+
+void sources_free(struct source *sources, int n);
+
+/*
+ * Hash a source, and verify it if it is a recording; its provenance is known afterwards. 0, or a
+ * negative errno.
+ */
+int source_open(struct source *source, struct incise_error *err);
+
+#endif
