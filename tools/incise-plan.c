@@ -56,8 +56,11 @@ static const struct cli_command command = {
 #define PLACES 1000
 #define ROUNDS 21
 
+/* As a scene has them. */
+static const char *const phases[INCISE_CUTTING_PHASES] = {"cut", "puncture", "withdraw"};
+
 /* ns of an evaluation of the model, of the middle half of the rounds. */
-static double model_ns(const struct incise_plan *plan,
+static double model_ns(const struct incise_plan *plan, enum incise_cutting_phase phase,
 		       const struct incise_plan_model *model)
 {
 	double ns[ROUNDS], x[PLACES][INCISE_PLAN_INPUTS_MAX];
@@ -72,45 +75,49 @@ static double model_ns(const struct incise_plan *plan,
 		double begin = stopwatch_ns();
 
 		for (int k = 0; k < PLACES; k++)
-			sum += incise_plan_model_force(plan, x[k]);
+			sum += incise_plan_model_force(plan, phase, x[k]);
 		ns[round] = (stopwatch_ns() - begin) / PLACES;
 	}
 	stopwatch_sort(ns, ROUNDS);
 	return stopwatch_middle(ns, ROUNDS);
 }
 
-static json_t *model_json(const struct incise_plan *plan)
+static json_t *model_json(const struct incise_plan *plan, enum incise_cutting_phase phase)
 {
 	struct incise_plan_model model;
 	json_t *inputs = json_array();
 
-	incise_plan_model(plan, &model);
+	incise_plan_model(plan, phase, &model);
 	for (int i = 0; i < model.n_inputs; i++)
 		json_array_append_new(
 			inputs, json_pack("{ss sf sf}", "name", model.input[i], "min",
 					  model.min[i], "max", model.max[i]));
 	if (model.n_inputs)
 		return json_pack("{so ss sf sI}", "inputs", inputs, "evaluator",
-				 model.evaluator, "ns", model_ns(plan, &model),
+				 model.evaluator, "ns", model_ns(plan, phase, &model),
 				 "memory_bytes", (json_int_t)model.memory_bytes);
 	json_decref(inputs);
 	return json_null();
 }
 
-/* The inputs of the model, with their ranges, and its cost. */
+/* The inputs of each model, with their ranges, and its cost. */
 static void print_evaluation(const struct incise_plan *plan)
 {
-	struct incise_plan_model model;
+	for (int k = 0; k < INCISE_CUTTING_PHASES; k++) {
+		enum incise_cutting_phase phase = (enum incise_cutting_phase)k;
+		struct incise_plan_model model;
 
-	incise_plan_model(plan, &model);
-	if (!model.n_inputs)
-		return;
-	printf("model       ");
-	for (int i = 0; i < model.n_inputs; i++)
-		printf("%s%s %.4g to %.4g", i ? ", " : "", model.input[i], model.min[i],
-		       model.max[i]);
-	printf("\n            %s: %.0f ns an evaluation, %.1f KiB\n", model.evaluator,
-	       model_ns(plan, &model), (double)model.memory_bytes / 1024);
+		incise_plan_model(plan, phase, &model);
+		if (!model.n_inputs)
+			continue;
+		printf("%-12s", k ? phases[k] : "model");
+		for (int i = 0; i < model.n_inputs; i++)
+			printf("%s%s %.4g to %.4g", i ? ", " : "", model.input[i],
+			       model.min[i], model.max[i]);
+		printf("\n            %s: %.0f ns an evaluation, %.1f KiB\n",
+		       model.evaluator, model_ns(plan, phase, &model),
+		       (double)model.memory_bytes / 1024);
+	}
 }
 
 static double margin(const struct incise_plan_stability *s)
@@ -213,7 +220,9 @@ static void report_json(const struct job *job, const struct incise_plan *plan,
 			 : json_pack("[ssss]", "tracker", "stepper", "force", "camera"),
 		"libraries", mapped, "unmapped_libraries", unmapped_libraries(mapped));
 	json_object_update_new(object, stability_json(&stability));
-	json_object_set_new(object, "model", model_json(plan));
+	json_object_set_new(object, "model", model_json(plan, INCISE_CUT));
+	json_object_set_new(object, "puncture_model", model_json(plan, INCISE_PUNCTURE));
+	json_object_set_new(object, "withdraw_model", model_json(plan, INCISE_WITHDRAW));
 	json_object_set_new(object, "axes", axes_json(rig, &stability));
 	json_print(object);
 }

@@ -21,7 +21,8 @@
  */
 #define STEEPER 1.25
 
-void incise_plan_input_range(const struct incise_plan *plan, int i, double ends[2])
+void incise_plan_input_range(const struct incise_plan *plan,
+			     enum incise_cutting_phase phase, int i, double ends[2])
 {
 	const struct incise_variable *in;
 
@@ -30,17 +31,42 @@ void incise_plan_input_range(const struct incise_plan *plan, int i, double ends[
 		ends[1] = plan->fixed->input[i].max / (double)INCISE_FIXED_ONE;
 		return;
 	}
-	in = &incise_model_info(plan->model)->input[i];
+	in = &incise_model_info(plan->scene->cut[phase].model)->input[i];
 	ends[0] = in->min;
 	ends[1] = in->max;
 }
 
-static int input_of(const struct incise_plan *plan, enum incise_model_input kind)
+static int input_of(const struct incise_plan *plan, enum incise_cutting_phase phase,
+		    enum incise_model_input kind)
 {
-	for (int i = 0; i < plan->scene->n_inputs; i++)
-		if (plan->scene->input[i] == kind)
+	const struct incise_scene_model *cut = &plan->scene->cut[phase];
+
+	for (int i = 0; i < cut->n_inputs; i++)
+		if (cut->input[i] == kind)
 			return i;
 	return -1;
+}
+
+/* The range of an input over the models that have it. Returns whether any has. */
+static bool range_of(const struct incise_plan *plan, enum incise_model_input kind,
+		     double ends[2])
+{
+	bool any = false;
+
+	ends[0] = INFINITY;
+	ends[1] = -INFINITY;
+	for (int phase = 0; phase < INCISE_CUTTING_PHASES; phase++) {
+		int i = input_of(plan, (enum incise_cutting_phase)phase, kind);
+		double own[2];
+
+		if (i < 0)
+			continue;
+		incise_plan_input_range(plan, (enum incise_cutting_phase)phase, i, own);
+		ends[0] = fmin(ends[0], own[0]);
+		ends[1] = fmax(ends[1], own[1]);
+		any = true;
+	}
+	return any;
 }
 
 /* Part of the support over which the slope at its end is taken; least stiffness. */
@@ -57,29 +83,65 @@ static int input_of(const struct incise_plan *plan, enum incise_model_input kind
 static double edge_slope(const struct incise_plan *plan, int i,
 			 double x[INCISE_LOOP_INPUTS_MAX])
 {
-	enum incise_model_input kind = plan->scene->input[i];
+	const struct incise_scene_model *cut = &plan->scene->cut[INCISE_CUT];
 	double ends[2], steepest = -INFINITY, deep_N;
 
-	if (i == plan->scene->n_inputs) {
-		int depth = input_of(plan, INCISE_INPUT_DEPTH);
+	if (i == cut->n_inputs) {
+		int depth = input_of(plan, INCISE_CUT, INCISE_INPUT_DEPTH);
 		double edge_mm;
 
-		incise_plan_input_range(plan, depth, ends);
+		incise_plan_input_range(plan, INCISE_CUT, depth, ends);
 		edge_mm = EDGE * ends[1];
 		x[depth] = ends[1];
-		deep_N = incise_plan_model_force(plan, x);
+		deep_N = incise_plan_model_force(plan, INCISE_CUT, x);
 		x[depth] = ends[1] - edge_mm;
-		return (deep_N - incise_plan_model_force(plan, x)) / edge_mm;
+		return (deep_N - incise_plan_model_force(plan, INCISE_CUT, x)) / edge_mm;
 	}
 	x[i] = 0;
-	if (kind == INCISE_INPUT_DEPTH || kind == INCISE_INPUT_SPEED)
+	if (cut->input[i] == INCISE_INPUT_DEPTH || cut->input[i] == INCISE_INPUT_SPEED)
 		return edge_slope(plan, i + 1, x);
-	incise_plan_input_range(plan, i, ends);
+	incise_plan_input_range(plan, INCISE_CUT, i, ends);
 	for (int k = 0; k < PLACES; k++) {
 		x[i] = ends[0] + (ends[1] - ends[0]) * k / (PLACES - 1);
 		steepest = fmax(steepest, edge_slope(plan, i + 1, x));
 	}
 	return steepest;
+}
+
+/* The largest force of a phase at a depth, times @sign, wherever the other inputs are. */
+static double largest_N(const struct incise_plan *plan, enum incise_cutting_phase phase,
+			double depth_mm, double sign, int i,
+			double x[INCISE_LOOP_INPUTS_MAX])
+{
+	const struct incise_scene_model *cut = &plan->scene->cut[phase];
+	double ends[2], largest = -INFINITY;
+
+	if (i == cut->n_inputs)
+		return sign * incise_plan_model_force(plan, phase, x);
+	incise_plan_input_range(plan, phase, i, ends);
+	if (cut->input[i] == INCISE_INPUT_DEPTH)
+		ends[0] = ends[1] = depth_mm;
+	for (int k = 0; k < (ends[1] > ends[0] ? PLACES : 1); k++) {
+		x[i] = ends[0] + (ends[1] - ends[0]) * k / (PLACES - 1);
+		largest = fmax(largest, largest_N(plan, phase, depth_mm, sign, i + 1, x));
+	}
+	return largest;
+}
+
+/* The slope by which the force may rise from that of the puncture to that of the cut. */
+static double opening_slope(const struct incise_plan *plan)
+{
+	double x[INCISE_LOOP_INPUTS_MAX] = {0}, rise_N = 0;
+
+	for (int k = 0; k < PLACES && plan->scene->cut[INCISE_PUNCTURE].model; k++) {
+		double depth_mm = plan->scene->tissue.cut_from_mm +
+				  INCISE_PUNCTURE_MM * k / (PLACES - 1);
+
+		rise_N = fmax(rise_N, largest_N(plan, INCISE_CUT, depth_mm, 1, 0, x) +
+					      largest_N(plan, INCISE_PUNCTURE, depth_mm,
+							-1, 0, x));
+	}
+	return rise_N / INCISE_PUNCTURE_MM;
 }
 
 /* The model's support, its slope there, and the stiffness with which its tissue unloads. */
@@ -88,7 +150,8 @@ static void set_tissue(struct incise_plan *plan, double steepest_N_mm)
 	double own = plan->scene->tissue.force[0][INCISE_REACTION_UNLOADING];
 	double x[INCISE_LOOP_INPUTS_MAX] = {0}, ends[2];
 
-	incise_plan_input_range(plan, input_of(plan, INCISE_INPUT_DEPTH), ends);
+	incise_plan_input_range(plan, INCISE_CUT,
+				input_of(plan, INCISE_CUT, INCISE_INPUT_DEPTH), ends);
 	plan->support_mm = ends[1];
 	plan->beyond_N_mm =
 		fmin(fmax(plan->gain * edge_slope(plan, 0, x), 0), steepest_N_mm);
@@ -98,35 +161,49 @@ static void set_tissue(struct incise_plan *plan, double steepest_N_mm)
 		own > 0 ? fmax(own, steepest_N_mm) : STEEPER * steepest_N_mm, LEAST_N_mm);
 }
 
-/* The larger slope of the model's force by an input, whichever its sign; 0 without the input. */
-static double slope_by(const struct incise_plan *plan, const struct incise_slope *slopes,
-		       enum incise_model_input kind)
+/* Take the slopes of a phase's model into those of the plan, where they are larger. */
+static void take_slopes(struct incise_plan *plan, enum incise_cutting_phase phase,
+			const struct incise_slope *slopes)
 {
-	int i = input_of(plan, kind);
+	const struct incise_scene_model *cut = &plan->scene->cut[phase];
+	struct incise_plan_stability *s = &plan->stability;
 
-	return i < 0 ? 0
-		     : plan->gain * fmax(fabs(slopes[i].lowest), fabs(slopes[i].highest));
+	for (int i = 0; i < cut->n_inputs; i++) {
+		double either = fmax(fabs(slopes[i].lowest), fabs(slopes[i].highest));
+		double *to = &plan->input_slope[cut->input[i]];
+
+		s->certified = s->certified && slopes[i].certified;
+		*to = fmax(*to, plan->gain * either);
+		/* What pulls a blade back may rise either way. */
+		if (cut->input[i] == INCISE_INPUT_DEPTH)
+			s->slope_N_mm =
+				fmax(s->slope_N_mm,
+				     plan->gain * (phase == INCISE_WITHDRAW
+							   ? either
+							   : fmax(slopes[i].highest, 0)));
+	}
 }
 
-/* The largest slopes of the model, by depth, by speed and by acceleration. */
+/* The largest slopes of the models, by depth, by speed and by acceleration. */
 static int survey_model(struct incise_plan *plan, double *stiffness_N_mm)
 {
 	struct incise_plan_stability *s = &plan->stability;
 	struct incise_slope slope[INCISE_LOOP_INPUTS_MAX];
 
-	if (plan->fixed && !plan->scene->model)
-		incise_fixed_slopes(plan->fixed, slope);
-	else if (incise_model_slopes(plan->scene->model, slope))
-		return -ENOMEM;
-	for (int i = 0; i < plan->scene->n_inputs; i++)
-		s->certified = s->certified && slope[i].certified;
-	for (int kind = 0; kind < INCISE_MODEL_INPUT_KINDS; kind++)
-		plan->input_slope[kind] =
-			slope_by(plan, slope, (enum incise_model_input)kind);
+	for (int i = 0; i < INCISE_CUTTING_PHASES; i++) {
+		const struct incise_scene_model *cut = &plan->scene->cut[i];
+
+		if (!cut->path)
+			continue;
+		if (!cut->model)
+			incise_fixed_slopes(plan->fixed, slope);
+		else if (incise_model_slopes(cut->model, slope))
+			return -ENOMEM;
+		take_slopes(plan, (enum incise_cutting_phase)i, slope);
+	}
 	s->speed_slope_N_s_mm = plan->input_slope[INCISE_INPUT_SPEED];
 	s->acceleration_slope_N_s2_mm = plan->input_slope[INCISE_INPUT_ACCELERATION];
-	s->slope_N_mm =
-		plan->gain * fmax(slope[input_of(plan, INCISE_INPUT_DEPTH)].highest, 0);
+	s->slope_N_mm += plan->gain * opening_slope(plan);
 	set_tissue(plan, s->slope_N_mm);
 	s->support_mm = plan->support_mm;
 	s->beyond_N_mm = plan->beyond_N_mm;
@@ -494,21 +571,20 @@ static const enum incise_model_input unmoved[] = {INCISE_INPUT_TILT, INCISE_INPU
 static int search(struct incise_plan *plan, const struct incise_tracker_info *tracker,
 		  const struct incise_rest_trial *trial, struct incise_rest *rest)
 {
-	int inputs[UNMOVED], n = 0, rc;
+	enum incise_model_input inputs[UNMOVED];
+	double ends[UNMOVED][2];
+	int n = 0, rc;
 
 	for (int i = 0; i < UNMOVED; i++)
-		if (input_of(plan, unmoved[i]) >= 0)
-			inputs[n++] = input_of(plan, unmoved[i]);
+		if (range_of(plan, unmoved[i], ends[n]))
+			inputs[n++] = unmoved[i];
 	rc = incise_plan_rest(plan, tracker, trial, rest);
 	for (int corner = 0; n && corner < 1 << n && !rc && rest->rests; corner++) {
 		struct incise_rest here;
 
 		for (int i = 0; i < n; i++) {
-			double ends[2];
-
-			incise_plan_input_range(plan, inputs[i], ends);
-			plan->held[plan->scene->input[inputs[i]]] = ends[corner >> i & 1];
-			plan->holds |= 1U << plan->scene->input[inputs[i]];
+			plan->held[inputs[i]] = ends[i][corner >> i & 1];
+			plan->holds |= 1U << inputs[i];
 		}
 		rc = incise_plan_rest(plan, tracker, trial, &here);
 		here.runs += rest->runs;

@@ -90,31 +90,70 @@ static double find_input(const struct incise_plan *plan, const struct incise_tic
 	}
 }
 
-/* The model's inputs, in its order. Only those that it has are computed. */
+/* A model's inputs, in its order. Only those that it has are computed. */
 static void find_inputs(const struct incise_plan *plan, const struct incise_tick *tick,
-			double x[INCISE_LOOP_INPUTS_MAX])
+			enum incise_cutting_phase phase, double x[INCISE_LOOP_INPUTS_MAX])
 {
-	for (int i = 0; i < plan->scene->n_inputs; i++) {
-		enum incise_model_input kind = plan->scene->input[i];
+	const struct incise_scene_model *cut = &plan->scene->cut[phase];
 
-		x[i] = plan->holds >> kind & 1 ? plan->held[kind]
-					       : find_input(plan, tick, kind);
-	}
+	for (int i = 0; i < cut->n_inputs; i++)
+		x[i] = plan->holds >> cut->input[i] & 1
+			       ? plan->held[cut->input[i]]
+			       : find_input(plan, tick, cut->input[i]);
+}
+
+/* Of a phase besides the cut, N; 0 without its model. */
+static double phase_N(const struct incise_plan *plan, const struct incise_tick *tick,
+		      enum incise_cutting_phase phase, unsigned int *flags)
+{
+	const struct incise_model *model = plan->scene->cut[phase].model;
+	double x[INCISE_LOOP_INPUTS_MAX] = {0};
+
+	if (!model)
+		return 0;
+	find_inputs(plan, tick, phase, x);
+	return incise_model_eval(model, x, flags);
+}
+
+/* Skin that was not cut before gives way from this depth on … */
+static double open_share(struct incise_plan *plan)
+{
+	/* … over the next INCISE_PUNCTURE_MM; the deepest depth only grows, and so does this. */
+	double beyond_mm = plan->deepest_mm - plan->scene->tissue.cut_from_mm;
+
+	return plan->skin_open ? 1 : fmax(0, fmin(beyond_mm / INCISE_PUNCTURE_MM, 1));
+}
+
+/* The model's force: of the puncture, of the cut, or between them. */
+static double model_N(struct incise_plan *plan, const struct incise_tick *tick,
+		      unsigned int *flags)
+{
+	double x[INCISE_LOOP_INPUTS_MAX] = {0}, share = 1, cut_N = 0;
+
+	plan->deepest_mm = fmax(plan->deepest_mm, plan->depth_mm);
+	if (plan->scene->cut[INCISE_PUNCTURE].model)
+		share = open_share(plan);
+	find_inputs(plan, tick, INCISE_CUT, x);
+	if (share > 0)
+		cut_N = incise_model_eval(plan->model, x, flags);
+	if (share < 1)
+		cut_N = share * cut_N +
+			(1 - share) * phase_N(plan, tick, INCISE_PUNCTURE, flags);
+	return cut_N;
 }
 
 static double cutting(struct incise_plan *plan, struct incise_tick *tick)
 {
-	double x[INCISE_LOOP_INPUTS_MAX] = {0};
+	double x[INCISE_LOOP_INPUTS_MAX] = {0}, size_N;
 	unsigned int flags = 0;
 	bool outside = false;
-	double size_N;
 
-	find_inputs(plan, tick, x);
 	if (plan->model) {
-		size_N = incise_model_eval(plan->model, x, &flags);
+		size_N = model_N(plan, tick, &flags);
 		return cutting_N(plan, tick, size_N, flags);
 	}
 	/* A compiled one, in a search for swings; its ticks are in integers. */
+	find_inputs(plan, tick, INCISE_CUT, x);
 	for (int i = 0; i < plan->fixed->n_inputs; i++)
 		outside |= x[i] * INCISE_FIXED_ONE < plan->fixed->input[i].min ||
 			   x[i] * INCISE_FIXED_ONE > plan->fixed->input[i].max;
@@ -149,16 +188,34 @@ static double advance_mm(struct incise_plan *plan, struct incise_acting_force *o
 	return incise_front_advance(cut, plan->proxy.touch.point_mm, plan->sn, side);
 }
 
+/*
+ * Drag on a blade that comes out, as a part of the force of its cut: what the model of the withdrawal
+ * says where that pulls, else tissue.friction.
+ */
+static double friction(const struct incise_plan *plan, struct incise_tick *tick,
+		       const struct incise_acting_force *own, double most_N)
+{
+	unsigned int flags = 0;
+	double drag_N;
+
+	if (!plan->scene->cut[INCISE_WITHDRAW].model || !(plan->depth_mm > 0))
+		return own->number[INCISE_REACTION_FRICTION];
+	drag_N = -plan->gain * phase_N(plan, tick, INCISE_WITHDRAW, &flags);
+	return most_N > 0 ? fmax(0, fmin(drag_N / most_N, 1)) : 0;
+}
+
 static void reaction_front(struct incise_plan *plan, struct incise_tick *tick,
 			   struct incise_acting_force *own)
 {
 	bool fresh;
-	double way_mm = advance_mm(plan, own, &fresh);
-	double most_N = plan->depth_mm > 0 ? cutting(plan, tick) : 0;
+	double way_mm = advance_mm(plan, own, &fresh), most_N;
 
+	if (plan->proxy.began)
+		plan->skin_open = !fresh;
+	most_N = plan->depth_mm > 0 ? cutting(plan, tick) : 0;
 	push(plan, incise_front_force(&own->front, plan->unloading_N_mm,
-				      own->number[INCISE_REACTION_FRICTION],
-				      plan->depth_mm, way_mm, most_N));
+				      friction(plan, tick, own, most_N), plan->depth_mm,
+				      way_mm, most_N));
 }
 
 /* The blade stays in the plane of its cut: s is Sx(0), its side when the cut began. */

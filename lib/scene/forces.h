@@ -49,6 +49,12 @@ struct incise_force_number {
 	double skin; /* of neck.scene: what tests and benchmarks take */
 };
 
+/*
+ * Over so much more depth the force goes from that of the puncture to that of the cut: a blade that is
+ * pushed as it opens the skin loses the hold of it on that way, and not at once.
+ */
+#define INCISE_PUNCTURE_MM 0.5
+
 /* A force as a plan runs it. */
 struct incise_acting_force {
 	const struct incise_tissue_force *force;

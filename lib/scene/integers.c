@@ -147,10 +147,11 @@ _Static_assert(INCISE_FIXED_INPUT_DEPTH == INCISE_INPUT_DEPTH + 1 &&
 /* Depth, or depth and speed, are 0: so plans say it whose format is the first. */
 static int32_t inputs_of(const struct incise_scene *scene)
 {
+	const struct incise_scene_model *cut = &scene->cut[INCISE_CUT];
 	int32_t inputs = 0;
 
-	for (int i = 0; i < scene->n_inputs; i++)
-		inputs |= (int32_t)(scene->input[i] + 1) << 4 * i;
+	for (int i = 0; i < cut->n_inputs; i++)
+		inputs |= (int32_t)(cut->input[i] + 1) << 4 * i;
 	return inputs == INCISE_FIXED_INPUT_DEPTH ||
 			       inputs == (INCISE_FIXED_INPUT_DEPTH |
 					  INCISE_FIXED_INPUT_SPEED << 4)

@@ -30,10 +30,11 @@ static const struct place floor_place = {.normal = {0, 0, 1}};
 /* On a mesh the direction to the surface is rounding where the tool is shallow: so is the tilt. */
 static bool fits_integers(const struct incise_scene *scene)
 {
+	const struct incise_scene_model *cut = &scene->cut[INCISE_CUT];
 	bool tilts = false;
 
-	for (int i = 0; i < scene->n_inputs; i++)
-		tilts |= scene->input[i] == INCISE_INPUT_TILT;
+	for (int i = 0; i < cut->n_inputs; i++)
+		tilts |= cut->input[i] == INCISE_INPUT_TILT;
 	return !tilts || !scene->surface || !scene->surface->mesh;
 }
 
@@ -41,13 +42,21 @@ static bool fits_integers(const struct incise_scene *scene)
 static int take_model(struct incise_plan *plan, struct incise_error *err)
 {
 	const struct incise_scene *scene = plan->scene;
+	const struct incise_scene_model *cut = scene->cut;
 	struct incise_error why = {0};
 
-	if (scene->compiled && !scene->fixed)
+	for (int i = 0; i < INCISE_CUTTING_PHASES; i++)
+		if (cut[i].compiled && (!scene->fixed || i != INCISE_CUT))
+			return incise_error_set(
+				err, EINVAL,
+				"%s: its model is compiled and cannot run in double; use "
+				"its .fis file",
+				scene->path);
+	if (scene->fixed && (cut[INCISE_PUNCTURE].path || cut[INCISE_WITHDRAW].path))
 		return incise_error_set(
-			err, EINVAL,
-			"%s: its model is compiled and cannot run in double; use its "
-			".fis file",
+			err, ENOTSUP,
+			"%s: model.puncture and model.withdraw have no form in integers; "
+			"set arithmetic to \"double\"",
 			scene->path);
 	if (scene->fixed && !fits_integers(scene))
 		return incise_error_set(
@@ -55,13 +64,11 @@ static int take_model(struct incise_plan *plan, struct incise_error *err)
 			"%s: its model has the input tilt_deg, whose error on a mesh is "
 			"not bounded in integers; set arithmetic to \"double\"",
 			scene->path);
-	plan->fixed = scene->compiled;
-	if (!scene->model)
+	plan->fixed = cut[INCISE_CUT].compiled;
+	plan->model = cut[INCISE_CUT].model;
+	if (!plan->model || !scene->fixed)
 		return 0;
-	plan->model = scene->model;
-	if (!scene->fixed)
-		return 0;
-	plan->fixed = plan->own_fixed = incise_fixed_compile(scene->model, NULL, &why);
+	plan->fixed = plan->own_fixed = incise_fixed_compile(plan->model, NULL, &why);
 	if (!plan->fixed)
 		return incise_error_set(err, why.code, "%s: its model: %s", scene->path,
 					why.text);
@@ -648,21 +655,25 @@ size_t incise_plan_memory(const struct incise_plan *plan)
 	size += plan->integers ? sizeof(*plan->integers) : 0;
 	if (plan->fixed)
 		size += sizeof(*plan->fixed) + plan->fixed->size;
-	if (plan->scene->model)
-		size += sizeof(*plan->scene->model);
+	for (int i = 0; i < INCISE_CUTTING_PHASES; i++)
+		if (plan->scene->cut[i].model)
+			size += sizeof(*plan->scene->cut[i].model);
 	return size;
 }
 
 _Static_assert(INCISE_PLAN_INPUTS_MAX == INCISE_LOOP_INPUTS_MAX, "the same");
 
-void incise_plan_model(const struct incise_plan *plan, struct incise_plan_model *model)
+void incise_plan_model(const struct incise_plan *plan, enum incise_cutting_phase phase,
+		       struct incise_plan_model *model)
 {
-	*model = (struct incise_plan_model){.n_inputs = plan->scene->n_inputs};
+	const struct incise_scene_model *cut = &plan->scene->cut[phase];
+
+	*model = (struct incise_plan_model){.n_inputs = cut->n_inputs};
 	for (int i = 0; i < model->n_inputs; i++) {
 		double ends[2];
 
-		incise_plan_input_range(plan, i, ends);
-		model->input[i] = incise_model_input_kinds[plan->scene->input[i]].name;
+		incise_plan_input_range(plan, phase, i, ends);
+		model->input[i] = incise_model_input_kinds[cut->input[i]].name;
 		model->min[i] = ends[0];
 		model->max[i] = ends[1];
 	}
@@ -675,11 +686,15 @@ void incise_plan_model(const struct incise_plan *plan, struct incise_plan_model 
 					  : sizeof(*plan->model);
 }
 
-double incise_plan_model_force(const struct incise_plan *plan, const double *x)
+/* In integers there is the model of the cut only. */
+double incise_plan_model_force(const struct incise_plan *plan,
+			       enum incise_cutting_phase phase, const double *x)
 {
+	const struct incise_model *model = plan->scene->cut[phase].model;
+
 	if (plan->fixed)
 		return incise_fixed_eval_double(plan->fixed, x);
-	return plan->model ? incise_model_eval(plan->model, x, NULL) : 0;
+	return model ? incise_model_eval(model, x, NULL) : 0;
 }
 
 void incise_plan_top(const struct incise_plan *plan, struct incise_touch *touch)

@@ -99,6 +99,8 @@ struct incise_plan {
 	double depth_mm;    /* ≥ 0; of the tissue in front of a membrane */
 	double p0_mm[3];    /* where the contact began … */
 	int64_t touched_ns; /* … and when */
+	double deepest_mm;  /* of the blade since then */
+	bool skin_open;	    /* it came into a cut that was there */
 	double side[3];	    /* of the blade then: Sx(0) */
 	struct incise_incision *incision; /* with its stage */
 	struct incise_opening opening;	  /* that handle or tube went into … */
@@ -188,8 +190,9 @@ int incise_plan_give(struct incise_plan *plan, bool tube,
 void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 		      double gain);
 
-/* The lower end of the support of the model's input, and the upper one. */
-void incise_plan_input_range(const struct incise_plan *plan, int i, double ends[2]);
+/* The lower end of the support of an input of a phase's model, and the upper one. */
+void incise_plan_input_range(const struct incise_plan *plan,
+			     enum incise_cutting_phase phase, int i, double ends[2]);
 
 /* Fill in the stages that the scene and the rig need, and why the others are left out. */
 void incise_plan_choose(struct incise_plan *plan);

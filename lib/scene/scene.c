@@ -367,16 +367,16 @@ static bool ends_with(const char *text, const char *end)
 	return n >= m && !strcmp(text + n - m, end);
 }
 
-static const char *input_name(const struct incise_scene *scene, int i)
+static const char *input_name(const struct incise_scene_model *cut, int i)
 {
-	return scene->model ? incise_model_info(scene->model)->input[i].name
-			    : scene->compiled->input[i].name;
+	return cut->model ? incise_model_info(cut->model)->input[i].name
+			  : cut->compiled->input[i].name;
 }
 
-static int refuse_input(const struct incise_scene *scene, int i, struct incise_error *err)
+static int refuse_input(const struct incise_scene *scene, const char *name,
+			struct incise_error *err)
 {
 	const char *names[INCISE_MODEL_INPUT_KINDS + 1] = {NULL}, *nearest;
-	const char *name = input_name(scene, i);
 
 	for (int k = 0; k < INCISE_MODEL_INPUT_KINDS; k++)
 		names[k] = incise_model_input_kinds[k].name;
@@ -392,17 +392,18 @@ static int refuse_input(const struct incise_scene *scene, int i, struct incise_e
 }
 
 /* The origin of each input, by its name. */
-static int find_inputs(struct incise_scene *scene, struct incise_error *err)
+static int find_inputs(const struct incise_scene *scene, struct incise_scene_model *cut,
+		       struct incise_error *err)
 {
-	int n = scene->model ? incise_model_info(scene->model)->n_inputs
-			     : scene->compiled->n_inputs;
+	int n = cut->model ? incise_model_info(cut->model)->n_inputs
+			   : cut->compiled->n_inputs;
 	unsigned int found = 0;
 
 	for (int i = 0; i < n && i < INCISE_LOOP_INPUTS_MAX; i++) {
-		int kind = incise_model_input_find(input_name(scene, i));
+		int kind = incise_model_input_find(input_name(cut, i));
 
 		if (kind < 0)
-			return refuse_input(scene, i, err);
+			return refuse_input(scene, input_name(cut, i), err);
 		if (found >> kind & 1)
 			return incise_error_set(
 				err, EINVAL,
@@ -410,7 +411,7 @@ static int find_inputs(struct incise_scene *scene, struct incise_error *err)
 				"again",
 				scene->path, incise_model_input_kinds[kind].name);
 		found |= 1U << kind;
-		scene->input[i] = (enum incise_model_input)kind;
+		cut->input[i] = (enum incise_model_input)kind;
 	}
 	if (n > INCISE_LOOP_INPUTS_MAX)
 		return incise_error_set(err, EINVAL,
@@ -424,31 +425,70 @@ static int find_inputs(struct incise_scene *scene, struct incise_error *err)
 			"which its stiffness is known; add it to --inputs "
 			"of incise train",
 			scene->path);
-	scene->n_inputs = n;
+	cut->n_inputs = n;
 	return 0;
+}
+
+static int load_model(const struct incise_scene *scene, struct incise_scene_model *cut,
+		      char *path, struct incise_error *err)
+{
+	struct incise_error why = {0};
+
+	cut->path = path;
+	if (!path)
+		return incise_error_set(err, ENOMEM, "%s: no memory", scene->path);
+	if (ends_with(path, ".fx"))
+		cut->compiled = incise_fixed_load(path, &why);
+	else
+		cut->model = incise_model_load(path, &why);
+	if (!cut->model && !cut->compiled)
+		return incise_error_set(err, why.code, "%s: its model %s", scene->path,
+					why.text);
+	return find_inputs(scene, cut, err);
+}
+
+/* In the order of enum incise_cutting_phase. */
+static const char *const cutting_phases[] = {"cut", "puncture", "withdraw", NULL};
+
+static int read_phases(struct incise_scene *scene, const config_setting_t *group,
+		       struct incise_error *err)
+{
+	int rc = incise_conf_known(group, scene->path, cutting_phases, err);
+
+	if (!rc)
+		rc = incise_conf_need(group, scene->path, "cut", err);
+	for (int i = 0; i < INCISE_CUTTING_PHASES && !rc; i++) {
+		const char *name = NULL;
+
+		rc = incise_conf_string(group, scene->path, cutting_phases[i], &name,
+					err);
+		if (!rc && name)
+			rc = load_model(scene, &scene->cut[i], beside(scene, name), err);
+	}
+	if (!rc && scene->cut[INCISE_WITHDRAW].path && !scene->tissue.dissipates)
+		rc = incise_error_set(
+			err, EINVAL,
+			"%s:%u: model.withdraw: with tissue.withdrawal \"paper\" a blade "
+			"comes out with the force of its cut; remove one of them",
+			scene->path, config_setting_source_line(group));
+	return rc;
 }
 
 static int read_model(struct incise_scene *scene, const config_setting_t *root,
 		      const char *override, struct incise_error *err)
 {
-	struct incise_error why = {0};
+	const config_setting_t *setting = config_setting_get_member(root, "model");
 	const char *name = NULL;
-	char *path;
-	int rc = incise_conf_string(root, scene->path, "model", &name, err);
+	int rc = 0;
 
-	if (rc || (!name && !override))
+	if (override)
+		return load_model(scene, &scene->cut[INCISE_CUT], strdup(override), err);
+	if (setting && config_setting_is_group(setting))
+		return read_phases(scene, setting, err);
+	rc = incise_conf_string(root, scene->path, "model", &name, err);
+	if (rc || !name)
 		return rc;
-	path = scene->model_path = override ? strdup(override) : beside(scene, name);
-	if (!path)
-		return incise_error_set(err, ENOMEM, "%s: no memory", scene->path);
-	if (ends_with(path, ".fx"))
-		scene->compiled = incise_fixed_load(path, &why);
-	else
-		scene->model = incise_model_load(path, &why);
-	if (!scene->model && !scene->compiled)
-		return incise_error_set(err, why.code, "%s: its model %s", scene->path,
-					why.text);
-	return find_inputs(scene, err);
+	return load_model(scene, &scene->cut[INCISE_CUT], beside(scene, name), err);
 }
 
 /* A key of tissue that is "paper", for the paper's own way, or @other. */
@@ -633,7 +673,7 @@ static int read_tissue(struct incise_scene *scene, const config_setting_t *root,
 /* One reaction, and any force at all. */
 static int check_forces(const struct incise_scene *scene, struct incise_error *err)
 {
-	bool model = scene->model || scene->compiled, any = model;
+	bool model = scene->cut[INCISE_CUT].path, any = model;
 
 	for (int i = 0; i < incise_n_tissue_forces; i++) {
 		bool there = scene->tissue.force[i][0] > 0;
@@ -848,18 +888,22 @@ void incise_scene_free(struct incise_scene *scene)
 {
 	if (!scene)
 		return;
-	incise_model_free(scene->model);
-	incise_fixed_free(scene->compiled);
+	for (int i = 0; i < INCISE_CUTTING_PHASES; i++) {
+		incise_model_free(scene->cut[i].model);
+		incise_fixed_free(scene->cut[i].compiled);
+		free(scene->cut[i].path);
+	}
 	incise_surface_free(scene->surface);
 	free(scene->path);
-	free(scene->model_path);
 	free(scene->surface_path);
 	free(scene);
 }
 
 const char *incise_scene_file(const struct incise_scene *scene, int i)
 {
-	const char *files[] = {scene->path, scene->model_path, scene->surface_path};
+	const char *files[] = {scene->path, scene->cut[INCISE_CUT].path,
+			       scene->cut[INCISE_PUNCTURE].path,
+			       scene->cut[INCISE_WITHDRAW].path, scene->surface_path};
 	const int n = sizeof(files) / sizeof(*files);
 
 	for (int k = 0; k < n; k++)

@@ -8,21 +8,28 @@
 #include <stdbool.h>
 #include <incise/fixed.h>
 #include <incise/model.h>
+#include <incise/plan.h>
 #include <incise/scene.h>
 #include "../control/model_input.h"
 #include "../surface/surface.h"
 #include "forces.h"
 
+/* The model of a phase of cutting; INCISE_CUT has one where any has. */
+struct incise_scene_model {
+	char *path;		    /* or NULL: there is none */
+	struct incise_model *model; /* one of these */
+	struct incise_fixed *compiled;
+	int n_inputs; /* 1 … INCISE_LOOP_INPUTS_MAX, and where each comes from */
+	enum incise_model_input input[INCISE_LOOP_INPUTS_MAX];
+};
+
 struct incise_scene {
 	char *path;
-	char *model_path, *surface_path; /* or NULL */
+	char *surface_path; /* or NULL */
 	double rate_hz;
 	bool fixed;
-	bool full;		    /* see incise_scene_set_full() */
-	struct incise_model *model; /* one of these, or none */
-	struct incise_fixed *compiled;
-	int n_inputs; /* of it, 1 … INCISE_LOOP_INPUTS_MAX, and where each comes from */
-	enum incise_model_input input[INCISE_LOOP_INPUTS_MAX];
+	bool full; /* see incise_scene_set_full() */
+	struct incise_scene_model cut[INCISE_CUTTING_PHASES];
 	struct incise_surface *surface; /* or NULL: the rig's plane */
 	const char *surface_kind;	/* as the file names it */
 	struct {

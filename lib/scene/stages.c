@@ -271,6 +271,8 @@ static void contact_begins(struct incise_plan *plan, int64_t t_ns)
 
 	v3_copy(plan->p0_mm, first->point_mm);
 	plan->touched_ns = t_ns;
+	plan->deepest_mm = 0;
+	plan->skin_open = false;
 	v3_copy(plan->sn, first->normal);
 	if (plan->instrument.held == INCISE_TOOL_BLADE)
 		v3_rotate(plan->side, plan->attitude, plan->instrument.side);

@@ -636,7 +636,7 @@ static void try_mutant(struct mutants *m, const struct text *text)
 		cli_fail_with(&err);
 	scene = incise_scene_load(m->path, NULL, &err);
 	m->loaded += !!scene;
-	if (!scene || !scene->model || m->models++ < MODELS) {
+	if (!scene || !scene->cut[INCISE_CUT].model || m->models++ < MODELS) {
 		int rc = load_scene(m->path, &err);
 
 		m->planned += !rc;

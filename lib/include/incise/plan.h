@@ -86,9 +86,17 @@ INCISE_API const char *incise_plan_left_out(const struct incise_plan *plan, int 
 /** Largest number of inputs of a model in a plan. */
 #define INCISE_PLAN_INPUTS_MAX 4
 
-/** The model that gives a plan's reaction force. */
+/** Phases of a cut that can have a model each; incise-scene(5) says when each begins. */
+enum incise_cutting_phase {
+	INCISE_CUT,
+	INCISE_PUNCTURE,
+	INCISE_WITHDRAW,
+};
+#define INCISE_CUTTING_PHASES 3 /**< number of them */
+
+/** A model that gives a plan's reaction force. */
 struct incise_plan_model {
-	int n_inputs; /**< 0: the scene has no model; the rest is 0 */
+	int n_inputs; /**< 0: the phase has no model; the rest is 0 */
 	const char
 		*input[INCISE_PLAN_INPUTS_MAX]; /**< names; valid as long as the plan */
 	double min[INCISE_PLAN_INPUTS_MAX],
@@ -97,17 +105,19 @@ struct incise_plan_model {
 	size_t memory_bytes;
 };
 
-/** Get the model of a plan, as it is evaluated in its ticks. */
+/** Get the model of a phase, as it is evaluated in the plan's ticks. */
 INCISE_API void incise_plan_model(const struct incise_plan *plan,
+				  enum incise_cutting_phase phase,
 				  struct incise_plan_model *model);
 
 /**
- * Evaluate the model of a plan as its ticks do, without tissue.gain and without limits.
+ * Evaluate the model of a phase as the plan's ticks do, without tissue.gain and without limits.
  *
  * @param x the inputs, as of incise_plan_model()
  * @return N; 0 without a model. Real-time safe.
  */
 INCISE_API double incise_plan_model_force(const struct incise_plan *plan,
+					  enum incise_cutting_phase phase,
 					  const double *x) INCISE_REALTIME;
 
 /** Memory of the plan, bytes, including model and surface. */

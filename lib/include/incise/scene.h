@@ -30,7 +30,7 @@ struct incise_scene;
  * Read a scene with its model and its surface.
  *
  * @param path  .scene file
- * @param model path of a model that replaces the scene's, or NULL
+ * @param model path of a model that replaces all of the scene's, or NULL
  * @return scene, to be freed with incise_scene_free(); NULL with errno of
  *         incise_infile_open(), EINVAL (syntax, unknown key, value out of range; the error
  *         names file, line and accepted range), or of incise_model_load(),
@@ -61,7 +61,7 @@ INCISE_API void incise_scene_set_full(struct incise_scene *scene, bool full);
 INCISE_API void incise_scene_free(struct incise_scene *scene);
 
 /**
- * Files of the scene: its own, its model, the mesh or heights of its surface. @return path of
+ * Files of the scene: its own, its models, the mesh or heights of its surface. @return path of
  * file @i, from 0, valid as long as the scene; NULL: no more files.
  */
 INCISE_API const char *incise_scene_file(const struct incise_scene *scene, int i);

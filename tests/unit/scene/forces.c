@@ -530,7 +530,8 @@ static void test_insertion_by_turn_and_opening(void **state)
 static void test_tissue_does_not_pull_and_gain_counts(void **state)
 {
 	const struct incise_scene scene = {
-		.n_inputs = 2, .input = {INCISE_INPUT_DEPTH, INCISE_INPUT_SPEED}};
+		.cut[INCISE_CUT] = {.n_inputs = 2,
+				    .input = {INCISE_INPUT_DEPTH, INCISE_INPUT_SPEED}}};
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 0.1);
 
 	for (int sign = -1; sign <= 1; sign += 2) {
