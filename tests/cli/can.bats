@@ -70,6 +70,7 @@ write_rig() {
 
 # In the background until the drive has power; its number is $pid. A machine that does not run
 # the drive for as long as an answer may take is no fault of either: it is tried again.
+late='no answer from node|no answer when|no heartbeat from it|no status .TPDO1.|8130h'
 begin() {
 	local try i
 	for try in 1 2 3; do
@@ -83,8 +84,10 @@ begin() {
 		kill -9 "$pid" 2>/dev/null || :
 		wait "$pid" || :
 		pid=
-		grep -q "no answer from node\|no heartbeat from it\|no status (TPDO1)" err || break
+		grep -qE "$late" err || break
 		echo "# the drive was too late, try $try: $(cat err)"
+		# It may be the drive that saw the other one too late, and keeps that as a fault.
+		incise stepper clear --rig rig.conf >/dev/null 2>&1 3>&- 7>&- || :
 	done
 	complain "the drive was not enabled: $(cat out err)"
 }
@@ -191,7 +194,7 @@ ended() {
 			for try in 1 2 3; do
 				code=0
 				"${words[@]}" >out 2>err </dev/null 3>&- 7>&- || code=$?
-				grep -q "no answer from node" err || break
+				grep -qE "$late" err || break
 			done
 			[ "$code" -eq 0 ] || failed+="$document: $command: $code $(cat err);"
 			n=$((n + 1))
