@@ -65,8 +65,9 @@ dkms_uninstall: ## remove them
 
 .PHONY: module module_headers module_install module_uninstall dkms_install dkms_uninstall
 
+module_kernels := main second
 check-module: ## the modules for each kernel: W=1, sparse, checkpatch, dkms
-	@INCISE_BUILD=$(abspath $(O)) tests/module/check
+	@INCISE_BUILD=$(abspath $(O)) tests/module/check $(module_kernels)
 
 check-module-newest: ## the modules for the newest kernel in Debian, in a chroot
 	@mk/deps debian

@@ -78,9 +78,10 @@ check: ## install what is missing, build, and test
 	@echo "left out, and run by make check-all: $$(cat tests/cli/*.bats | grep -c test_tags=slow) slow tests" \
 		"of benches, most unit tests again without sanitizers, most cases of the slowest properties," \
 		"ThreadSanitizer, three of four fuzz runs, full attacks on recordings, the test bed's own tests," \
-		"the boots of the second kernel and of two processors, long tests of the first one"
+		"the boots of the second kernel and of two processors, long tests of the first one, its modules," \
+		"the tests of Python once more under sanitizers"
 	$(call in_parts,parts=check-unit-once cli_filter="--filter-tags '!slow'" \
-		FUZZ_RUNS=10000 vm_boots="main:deterministic main:service" vm_bed= INCISE_VM_SHORT=1)
+		FUZZ_RUNS=10000 vm_boots="main:deterministic main:service" vm_bed= INCISE_VM_SHORT=1 module_kernels=main)
 
 check-all: ## the same with all tests in all builds, on all kernels: an hour
 	$(call in_parts,parts="check-sanitize check-unit check-tsan" ATTACK=full)
@@ -166,11 +167,14 @@ cli-tests:
 # The unit tests once more, on a build that stops at any bad access or undefined operation.
 sanitize_flags := -fsanitize=address,undefined -fno-sanitize-recover=all
 skipped_there := $(O)/sanitize/skipped
-check-sanitize: ## unit tests under AddressSanitizer and UBSan
+check-sanitize: ## unit tests and tests of Python under AddressSanitizer and UBSan
+	+@status=0; $(MAKE) --no-print-directory check-unit-sanitized || status=$$?; \
+		$(MAKE) --no-print-directory check-python-sanitize || status=$$?; exit $$status
+
+check-unit-sanitized:
 	@mkdir -p $(O)/sanitize
 	+@SKIPPED=$(abspath $(skipped_there)) $(MAKE) --no-print-directory O=$(O)/sanitize \
 		CFLAGS="-O1 -g1 $(sanitize_flags)" LDFLAGS="$(sanitize_flags)" check-unit
-	+@$(MAKE) --no-print-directory check-python-sanitize
 
 # Python's own memory is not of interest: its objects of the end of the program count as leaks.
 check-python-sanitize: all ## tests of incise for Python on libraries under AddressSanitizer and UBSan
@@ -186,8 +190,8 @@ check-python-sanitize: all ## tests of incise for Python on libraries under Addr
 plain_programs = $(sort $(filter $(O)/tests/unit/fixed/% $(O)/tests/unit/model/% \
 	$(patsubst tests/%.c,$(O)/tests/%,$(shell grep -l __SANITIZE_ADDRESS__ $(unit_sources))) \
 	$(addprefix $(O)/tests/unit/,$(shell cat $(skipped_there))),$(unit_programs)))
-check-unit-once: ## check-sanitize, and of check-unit what differs plainly
-	+@status=0; $(MAKE) --no-print-directory check-sanitize || status=$$?; \
+check-unit-once: ## check-unit-sanitized, and of check-unit what differs plainly
+	+@status=0; $(MAKE) --no-print-directory check-unit-sanitized || status=$$?; \
 		$(MAKE) --no-print-directory check-unit-plain || status=$$?; exit $$status
 
 check-unit-plain:
@@ -238,7 +242,7 @@ notebooks: all ## run doc/notebooks and write them with their figures to build/n
 
 check-doc: doc
 
-.PHONY: doc notebooks check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests check-attack check-sanitize check-python-sanitize check-tsan can-drive mcap-reader python-peers
+.PHONY: doc notebooks check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests check-attack check-sanitize check-unit-sanitized check-python-sanitize check-tsan can-drive mcap-reader python-peers
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so
