@@ -15,6 +15,7 @@
 #include <time.h>
 #include <incise/corpus.h>
 #include <incise/factor.h>
+#include <incise/ranks.h>
 #include <incise/train.h>
 #include <incise/version.h>
 #include "cli/cli.h"
@@ -31,6 +32,9 @@ struct options {
 	const char *model, *initial, *history, *premises, *factor;
 	bool damaged;
 	double rate;
+	struct shard {
+		long at, of; /* of 0: all sources */
+	} shard;
 	char *inputs[INCISE_MODEL_INPUTS_MAX];
 	int n_inputs;
 	const char *target, *group;
@@ -39,7 +43,8 @@ struct options {
 	int n_mfs;
 	bool auto_mfs;
 	enum incise_mf_type type;
-	bool all_rows, json;
+	bool all_rows, json, mpi;
+	const struct incise_ranks *ranks; /* NULL: a single process */
 	struct incise_train_options train;
 };
 
@@ -72,6 +77,18 @@ static void parse_type(void *type, char *text)
 				     incise_mf_type_name(types[1]), NULL};
 
 	*(enum incise_mf_type *)type = types[cli_choice("mf-type", text, names)];
+}
+
+static void parse_shard(void *shard, char *text)
+{
+	struct shard *to = shard;
+	char *slash = strchr(text, '/');
+
+	if (!slash)
+		cli_usage("--shard %s: expected I/N, for example 3/16", text);
+	*slash = '\0';
+	to->of = cli_integer("shard", slash + 1, 1, 1000000);
+	to->at = cli_integer("shard", text, 1, to->of);
 }
 
 static const struct cli_option option_table[] = {
@@ -137,6 +154,12 @@ static const struct cli_option option_table[] = {
 	 CLI_OUTPUT(struct options, initial), .extensions = ".fis"},
 	{0, "history", "FILE", "write the RMSE of each epoch to this CSV file",
 	 CLI_OUTPUT(struct options, history), .extensions = ".csv"},
+	{0, "shard", "I/N",
+	 "use share I of N of the sources, from 1: for the tasks of a job\n"
+	 "array; needs --factor",
+	 CLI_PARSED(struct options, shard, parse_shard)},
+	{0, "mpi", NULL, "share the sources among the processes of mpirun",
+	 CLI_FLAG(struct options, mpi)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, json)},
 	{0},
 };
@@ -178,6 +201,20 @@ static void parse(struct options *options, int argc, char **argv)
 	options->n_paths = argc - optind;
 	if (!options->n_paths)
 		cli_usage("missing DATA.csv or NAME.rec (pairs to learn from)");
+	if (options->shard.of && !options->factor)
+		cli_usage(
+			"--shard: missing --factor SHARE.fac; incise merge makes a model of "
+			"all shares");
+	for (long i = options->shard.at - 1, n = 0;
+	     options->shard.of && i < (argc - optind); i += options->shard.of) {
+		options->paths[n++] = options->paths[i];
+		options->n_paths = (int)n;
+	}
+	if (options->shard.of > argc - optind)
+		cli_usage(
+			"--shard: %ld shares of %d sources; give at least one source for "
+			"each",
+			options->shard.of, argc - optind);
 	if (options->factor && !options->premises)
 		cli_usage(
 			"--factor: missing --premises MODEL.fis, which all factors share");
@@ -191,6 +228,8 @@ static void parse(struct options *options, int argc, char **argv)
 	     options->n_mfs || options->auto_mfs))
 		cli_usage("--premises keeps the membership functions; leave out --mf, "
 			  "--classic, --initial and --history");
+	if (options->mpi && options->train.classic)
+		cli_usage("--classic keeps all pairs in one memory; leave out --mpi");
 	if (options->factor && options->json)
 		cli_usage("--json reports a model; leave it out with --factor");
 	if (options->factor)
@@ -669,6 +708,142 @@ static void report_text(const struct result *result)
 	cli_written();
 }
 
+/* --- many processes ------------------------------------------------------------------ */
+
+static const struct incise_ranks *job; /* that the program leaves at its end */
+static bool alone = true; /* a failure is not shared: others would wait for ever */
+
+static void leave_job(void)
+{
+	job->close(alone);
+}
+
+/* Only rank 0 prints; failures of others are passed on to it. */
+static void join_job(struct options *options)
+{
+	struct incise_error err = {0};
+
+	if (incise_ranks_open(&options->ranks, &err))
+		cli_fail_with(&err);
+	job = options->ranks;
+	atexit(leave_job);
+	if (job->rank &&
+	    (!freopen("/dev/null", "w", stdout) || !freopen("/dev/null", "w", stderr)))
+		cli_fail("no /dev/null");
+}
+
+static bool is_mine(const struct options *options, int source)
+{
+	return !options->ranks || source % options->ranks->size == options->ranks->rank;
+}
+
+static bool is_first(const struct options *options)
+{
+	return !options->ranks || !options->ranks->rank;
+}
+
+/* Fail if any rank has an error, with the one of the lowest rank; else add up a count of all. */
+static void agree(const struct options *options, const struct incise_error *err,
+		  uint64_t *count)
+{
+	struct {
+		struct incise_error err;
+		uint64_t count;
+	} mine = {*err, *count}, *all;
+	size_t *sizes;
+	void *bytes;
+
+	if (!options->ranks) {
+		if (err->code)
+			cli_fail_with(err);
+		return;
+	}
+	if (options->ranks->gather(&mine, sizeof(mine), &bytes, &sizes))
+		cli_fail("no memory");
+	all = bytes;
+	*count = 0;
+	for (int r = 0; r < options->ranks->size; r++) {
+		if (all[r].err.code) {
+			alone = false;
+			cli_fail_with(&all[r].err);
+		}
+		*count += all[r].count;
+	}
+	free(bytes);
+	free(sizes);
+}
+
+/* The surveys of all ranks at each. */
+static void share_surveys(const struct options *options, struct incise_corpus *corpus)
+{
+	const struct incise_ranks *ranks = options->ranks;
+	struct incise_error err = {0};
+	size_t n, *sizes;
+	void *mine = incise_corpus_encode(corpus, &n), *all;
+
+	if (!mine || ranks->gather(mine, n, &all, &sizes))
+		cli_fail("no memory");
+	free(mine);
+	for (size_t r = 0, at = 0; r < (size_t)ranks->size; at += sizes[r], r++)
+		if (r != (size_t)ranks->rank &&
+		    incise_corpus_add(corpus, (char *)all + at, sizes[r], &err)) {
+			alone = false;
+			cli_fail_with(&err);
+		}
+	free(all);
+	free(sizes);
+}
+
+/* A factor without pairs at the premises of rank 0. */
+static struct incise_factor *share_premises(const struct options *options,
+					    struct incise_factor *first)
+{
+	struct incise_error err = {0};
+	size_t n = 0, *sizes;
+	void *mine = first ? incise_factor_encode(first, &n) : NULL, *all;
+	struct incise_factor *factor;
+
+	if ((first && !mine) || options->ranks->gather(mine, n, &all, &sizes))
+		cli_fail("no memory");
+	factor = first ? first
+		       : cli_require(incise_factor_decode(all, sizes[0], "rank 0", &err),
+				     &err);
+	free(mine);
+	free(all);
+	free(sizes);
+	return factor;
+}
+
+/* The sum of all ranks' factors at rank 0, by a tree: any other gives the same. */
+static void add_up(const struct options *options, struct incise_factor *factor)
+{
+	const struct incise_ranks *ranks = options->ranks;
+	struct incise_error err = {0};
+	struct incise_factor *other;
+	void *bytes;
+	size_t n;
+
+	for (int step = 1; step < ranks->size; step *= 2) {
+		if (ranks->rank % (2 * step)) {
+			bytes = incise_factor_encode(factor, &n);
+			if (!bytes)
+				cli_fail("no memory");
+			ranks->send(ranks->rank - step, bytes, n);
+			free(bytes);
+			return;
+		}
+		if (ranks->rank + step >= ranks->size)
+			continue;
+		bytes = ranks->receive(ranks->rank + step, &n);
+		other = bytes ? incise_factor_decode(bytes, n, "another rank", &err)
+			      : NULL;
+		if (!other || incise_factor_merge(factor, other, "another rank", &err))
+			cli_fail_with(&err);
+		incise_factor_free(other);
+		free(bytes);
+	}
+}
+
 /* Survey all sources: rows, ranges, groups, and the sample. */
 static struct incise_corpus *survey(struct options *options,
 				    const struct source_options *how,
@@ -678,17 +853,28 @@ static struct incise_corpus *survey(struct options *options,
 		options->n_inputs, how->group, options->train.seed,
 		options->train.classic ? SIZE_MAX : INCISE_CORPUS_SAMPLE);
 	struct incise_error err = {0};
+	uint64_t none = 0;
+	int rc = 0;
 
 	if (!corpus)
 		cli_fail("no memory");
 	begin_reading(reading, "surveying", options->n_paths, 0);
-	for (; reading->at < options->n_paths; reading->at++)
-		if (source_open(&sources[reading->at], &err) ||
-		    incise_corpus_survey(corpus, &sources[reading->at].corpus, &err))
-			cli_fail_with(&err);
+	for (; reading->at < options->n_paths && !rc; reading->at++) {
+		if (!is_mine(options, reading->at))
+			continue;
+		rc = source_open(&sources[reading->at], &err);
+		if (!rc)
+			rc = incise_corpus_survey(corpus, &sources[reading->at].corpus,
+						  &err);
+	}
 	cli_progress_end();
+	agree(options, &err, &none);
+	if (options->ranks)
+		share_surveys(options, corpus);
+	alone = false;
 	if (incise_corpus_settle(corpus, options->check, &err))
 		cli_fail("%s: %s", options->data, err.text);
+	alone = true;
 	return corpus;
 }
 
@@ -703,26 +889,44 @@ struct folding {
 		*check; /* made by it; check NULL: nothing is held out */
 };
 
+/* Premises are those of rank 0, and the sums are complete there. */
 static void fold(struct folding *folding, const struct incise_model *premises)
 {
 	const struct options *options = folding->options;
+	struct result *result = folding->result;
 	struct reading *reading = folding->reading;
 	struct incise_error err = {0};
+	int rc = 0;
 
-	folding->fit = new_factor(options, premises);
-	folding->check = folding->result->check ? new_factor(options, premises) : NULL;
+	folding->fit = premises ? new_factor(options, premises) : NULL;
+	folding->check = premises && result->check ? new_factor(options, premises) : NULL;
+	if (options->ranks) {
+		folding->fit = share_premises(options, folding->fit);
+		if (result->check)
+			folding->check = share_premises(options, folding->check);
+	}
 	begin_reading(reading, "adding", options->n_paths,
 		      incise_corpus_side(folding->corpus, false)->rows +
 			      incise_corpus_side(folding->corpus, true)->rows);
-	for (; reading->at < options->n_paths; reading->at++) {
+	for (; reading->at < options->n_paths && !rc; reading->at++) {
 		struct source *source = &folding->sources[reading->at];
 
-		if (incise_corpus_fold(folding->corpus, &source->corpus, folding->fit,
-				       folding->check, &folding->result->check_outside,
-				       &err))
-			cli_fail_with(&err);
+		if (!is_mine(options, reading->at))
+			continue;
+		rc = incise_corpus_fold(folding->corpus, &source->corpus, folding->fit,
+					folding->check, &result->check_outside, &err);
+		result->left_out += source->left_out;
 	}
 	cli_progress_end();
+	agree(options, &err, &result->check_outside);
+	agree(options, &err, &result->left_out);
+	if (!options->ranks)
+		return;
+	add_up(options, folding->fit);
+	if (folding->check)
+		add_up(options, folding->check);
+	/* The others are at their end. */
+	alone = false;
 }
 
 /* The search of premises from the sample, which then asks for the sums. */
@@ -842,10 +1046,14 @@ int main(int argc, char **argv)
 	struct incise_error err = {0};
 
 	parse(&options, argc, argv);
-	check_writable(options.model);
-	check_writable(options.factor);
-	check_writable(options.initial);
-	check_writable(options.history);
+	if (options.mpi)
+		join_job(&options);
+	if (is_first(&options)) {
+		check_writable(options.model);
+		check_writable(options.factor);
+		check_writable(options.initial);
+		check_writable(options.history);
+	}
 	if (options.premises)
 		premises = cli_require(incise_model_load(options.premises, &err), &err);
 	choose_columns(&options, premises, columns);
@@ -869,6 +1077,10 @@ int main(int argc, char **argv)
 	options.train.groups = result.fit->sample.groups;
 	folding = (struct folding){&options, corpus, sources, &reading,
 				   &result,  NULL,   NULL};
+	if (!is_first(&options)) {
+		fold(&folding, NULL);
+		exit(0);
+	}
 	if (!premises) {
 		model = start_model(&options, corpus, columns);
 		search(&options, model, &folding, &result);
@@ -879,7 +1091,7 @@ int main(int argc, char **argv)
 	if (folding.check)
 		result.report.check_rmse =
 			incise_factor_rmse(folding.check, model, &result.report.check_r2);
-	for (int i = 0; i < options.n_paths; i++)
+	for (int i = 0; i < options.n_paths && options.train.classic; i++)
 		result.left_out += sources[i].left_out;
 	if (options.factor)
 		save_factor(&options, folding.fit);

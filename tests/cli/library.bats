@@ -194,6 +194,7 @@ maps() {
 		case $module in
 		*/frames_mkv.so) symbol=incise_frames ;;
 		*/film_mkv.so) symbol=incise_film_module ;;
+		*/ranks_mpi.so) symbol=incise_ranks_join ;;
 		*) symbol=incise_backend ;;
 		esac
 		[ "$(cat exported)" = "$symbol" ] || complain "$module: $(cat exported)"
