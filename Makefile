@@ -98,10 +98,10 @@ pc_incise-learn := lapacke lapack blas
 pc_incise-record := sqlite3 zlib
 pc_incise-view := sdl2 epoxy cairo egl
 libs_incise := -lm -ldl
-libs_incise-learn := -lm -ldl
+libs_incise-learn := -lm
 libs_incise-record := -lm -ldl -pthread
 libs_incise-view := -lm
-also_incise-learn := lib/base/lines.o lib/base/crc32c.o lib/device/module.o
+also_incise-learn := lib/base/lines.o lib/base/crc32c.o
 also_incise-view := lib/device/module.o
 also_incise-record := lib/base/crc32c.o lib/base/ring.o lib/device/module.o lib/device/thread.o \
 	lib/control/model_input.o lib/control/predict.o

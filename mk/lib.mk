@@ -133,11 +133,11 @@ pc_export_hdf5 := hdf5 zlib
 objects_export_hdf5 := $(O)/obj/lib/record/export/hdf5/export_hdf5.o
 $(objects_export_hdf5): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_export_hdf5))
 
-# Training on many computers; libincise-learn loads it.
+# Training on many computers.
 has_mpi := $(shell $(PKG_CONFIG) --exists ompi-c && echo yes)
 device_modules += $(if $(has_mpi),ranks_mpi)
 pc_ranks_mpi := ompi-c
-objects_ranks_mpi := $(O)/obj/lib/learn/mpi/ranks_mpi.o
+objects_ranks_mpi := $(O)/obj/lib/device/mpi/ranks_mpi.o
 $(objects_ranks_mpi): pc_cflags = $(patsubst -I%,-isystem %,$(shell $(PKG_CONFIG) --cflags $(pc_ranks_mpi)))
 
 define device_module

@@ -100,8 +100,10 @@ INCISE_API int incise_corpus_add(struct incise_corpus *corpus, const void *bytes
 INCISE_API int incise_corpus_settle(struct incise_corpus *corpus, double share,
 				    struct incise_error *err);
 
-/** Number of sources, and their surveys in order of their hashes, after settling. */
+/** Number of sources. */
 INCISE_API int incise_corpus_sources(const struct incise_corpus *corpus);
+
+/** Survey of a source, in order of their hashes after settling; owned by the corpus. */
 INCISE_API const struct incise_corpus_survey *incise_corpus_source(
 	const struct incise_corpus *corpus, int i);
 
@@ -111,6 +113,8 @@ struct incise_corpus_side {
 	uint64_t rows;
 	int n_groups;
 };
+
+/** A side of the corpus, after settling; owned by the corpus. */
 INCISE_API const struct incise_corpus_side *incise_corpus_side(
 	const struct incise_corpus *corpus, bool check);
 

@@ -2,7 +2,7 @@
 /* Loading the module ranks_mpi.so; see incise/ranks.h. It stays loaded. */
 #include <errno.h>
 #include <incise/ranks.h>
-#include "../device/module.h"
+#include "module.h"
 
 #define FILE_NAME "ranks_mpi.so"
 
