@@ -234,7 +234,9 @@ notebooks: all ## run doc/notebooks and write them with their figures to build/n
 	@for source in doc/notebooks/*.py; do \
 		name=$$(basename $$source .py); \
 		PATH=$(abspath $(O))/bin:$(abspath $(O))/notebooks/venv/bin:$$PATH PYTHONPATH=$(abspath python) \
-			sh -ec 'jupytext -q --to ipynb --execute -o $(O)/notebooks/$$0.ipynb doc/notebooks/$$0.py; \
+			sh -ec 'jupytext -q --to ipynb -o $(O)/notebooks/$$0.ipynb doc/notebooks/$$0.py; \
+			jupyter nbconvert --log-level ERROR --to notebook --execute --inplace \
+			--ExecutePreprocessor.kernel_name=python3 $(O)/notebooks/$$0.ipynb; \
 			jupyter nbconvert --log-level ERROR --to markdown --output-dir $(O)/notebooks \
 			$(O)/notebooks/$$0.ipynb' $$name || exit 1; \
 		echo $(O)/notebooks/$$name.md; \
