@@ -246,6 +246,13 @@ check-doc: doc
 
 .PHONY: doc notebooks check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests check-attack check-sanitize check-unit-sanitized check-python-sanitize check-tsan can-drive mcap-reader python-peers
 
+# Sums of very many pairs: time and memory, next to numpy.
+$(O)/tests/corpus: tests/bench/corpus.c $(O)/lib/libincise-learn.so
+	@mkdir -p $(@D)
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
+		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../lib' -lincise-learn -lincise -lm
+
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so
 	@mkdir -p $(@D)
@@ -317,8 +324,12 @@ DAY_HOURS ?= 24
 check-day: $(O)/tests/day ## 24 h of the wall scene in simulated time: no drift, leak or counter wrap
 	$(O)/tests/day scenes/wall.scene $(DAY_HOURS)
 
+PAIRS ?= 1000000
+check-corpus: $(O)/tests/corpus ## training sums of PAIRS pairs made on the fly, and numpy's lstsq on the same
+	python3 -B tests/bench/corpus.py $(O)/tests/corpus $(PAIRS)
+
 check-exhaustive: $(O)/tests/exhaustive ## every pair of 16-bit inputs of the shipped model, about a minute
 	$(O)/tests/exhaustive scenes/liver.fis
 	$(O)/tests/exhaustive scenes/liver.fis force
 
-.PHONY: check-few-cuts check-python-speed check-exhaustive check-frames check-tracker check-depth check-day check-state
+.PHONY: check-corpus check-few-cuts check-python-speed check-exhaustive check-frames check-tracker check-depth check-day check-state

@@ -23,15 +23,39 @@
 #include "cli/recording.h"
 #include "plot/figure.h"
 #include "stepper/module.h"
+#include "train/dataset.h"
 
 struct job {
-	bool json, damaged;
-	const char *plot;
+	bool json, damaged, dataset, all_rows;
+	const char *plot, *group, *target;
+	char *inputs[INCISE_MODEL_INPUTS_MAX];
+	int n_inputs;
 };
+
+static void parse_inputs(void *whole, char *text)
+{
+	struct job *job = whole;
+
+	job->n_inputs = cli_list("inputs", text, job->inputs, INCISE_MODEL_INPUTS_MAX);
+}
 
 static const struct cli_option options[] = {
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	RECORDING_DAMAGED(struct job, damaged),
+	{0, "dataset", NULL,
+	 "describe DATA.csv and NAME.rec as training data: rows,\n"
+	 "ranges, and groups that differ from the others",
+	 CLI_FLAG(struct job, dataset)},
+	{0, "group", "GROUP",
+	 "dataset: recording, rig, or a column that names the groups\n"
+	 "(default: cut for recordings)",
+	 CLI_TEXT(struct job, group)},
+	{0, "inputs", "A,B", "dataset: input columns (default: depth_mm,velocity_mm_s)",
+	 CLI_PARSED_BY(parse_inputs)},
+	{0, "target", "COLUMN", "dataset: column to learn (default: force_N)",
+	 CLI_TEXT(struct job, target)},
+	{0, "all-rows", NULL, "dataset: also rows in which the blade did not advance",
+	 CLI_FLAG(struct job, all_rows)},
 	{0, "plot", "NAME",
 	 "model: draw the membership functions and the force\n"
 	 "surface as NAME.png and NAME.svg",
@@ -43,7 +67,7 @@ static const struct cli_command command = {
 	.name = "info",
 	.synopsis =
 		"MODEL.fis|MODEL.fx|NAME.plan|NAME.rec|stepper|/dev/incise-stepperN|can:IFACE|"
-		"slcan:TTY|devices [OPTIONS]",
+		"slcan:TTY|devices|DATA.csv… [OPTIONS]",
 	.summary = "Describe a model, a compiled model, a compiled scene or a recording; "
 		   "the state and cost\n"
 		   "of the kernel's stepper module; the drives on a CAN bus; or the "
@@ -604,14 +628,42 @@ static void check_exists(const char *path)
 			 path, strerror(errno));
 }
 
+static void show_dataset(struct job *job, char **paths, int n)
+{
+	const char *columns[INCISE_MODEL_INPUTS_MAX + 1];
+	struct source_options how = {
+		.columns = columns,
+		.n_columns = job->n_inputs + 1,
+		.group = job->group,
+		.all_rows = job->all_rows,
+		.damaged = job->damaged,
+	};
+
+	if (!n)
+		cli_usage("missing DATA.csv or NAME.rec (training data)");
+	for (int i = 0; i < job->n_inputs; i++)
+		columns[i] = job->inputs[i];
+	columns[job->n_inputs] = job->target;
+	dataset_show(paths, n, &how, job->json);
+}
+
 int main(int argc, char **argv)
 {
-	struct job job = {0};
+	struct job job = {.inputs = {"depth_mm", "velocity_mm_s"},
+			  .n_inputs = 2,
+			  .target = "force_N"};
 	enum file_kind kind;
 	bool compiled, plan;
 	char *path;
 
 	cli_parse(&command, argc, argv, &job);
+	if (job.dataset) {
+		show_dataset(&job, argv + optind, argc - optind);
+		cli_finish();
+		return 0;
+	}
+	if (job.group || job.all_rows)
+		cli_usage("--group and --all-rows go with --dataset");
 	path = cli_operand(argc, argv, "FILE", "recording, model or plan; or a device");
 	if (!stepper_module_is(path) && strcmp(path, "devices") && !is_bus(path))
 		file_expect(path,

@@ -47,7 +47,7 @@ sorted() {
 
 @test "options are those of --help, of every command" {
 	complete_words incise train --m
-	[ "${COMPREPLY[*]}" = "--mf --mf-type" ]
+	[ "${COMPREPLY[*]}" = "--mf --mf-type --mpi" ]
 	for program in "$INCISE_BUILD"/bin/incise-*; do
 		name=${program##*/incise-}
 		# shellcheck disable=SC2086 # "calibrate-force" is two words

@@ -125,3 +125,17 @@ shares() {
 	failed_with bad.rec "not as it was recorded"
 	[ ! -e bad.fis ]
 }
+
+@test "info --dataset tells rows, ranges, and the cut that differs" {
+	shares
+	awk -F, -v OFS=, '$1 == "c7" { $4 = $4 + 2 } 1' s2.csv >odd.csv
+	incise info --dataset s1.csv odd.csv s3.csv --group cut >out
+	grep -q "^3 sources, 3750 rows, 15 groups by cut$" out
+	grep -q "^depth_mm: 0 to 19.98$" out
+	[ "$(grep -c "^outlier: " out)" -eq 1 ]
+	grep -q "^outlier: group c7 of odd.csv: mean force_N " out
+	incise info --dataset s1.csv s3.csv --group recording >out
+	grep -q "outliers are sought from 5 groups on" out
+	run --separate-stderr incise info s1.csv --group cut
+	bad_usage "--dataset"
+}

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Training data described; see dataset.h.
+ *
+ * A group is an outlier where the mean of a column is further from the median of all groups than
+ * LIMIT standard deviations, as estimated by the median distance from that median: neither moves
+ * with the outliers themselves.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../cli/cli.h"
+#include "../cli/json.h"
+#include "dataset.h"
+
+#define LIMIT 3.5	 /* Iglewicz and Hoaglin (1993) */
+#define GROUPS_MIN 5	 /* of fewer, none stands out */
+#define MAD_TO_SD 1.4826 /* of a normal distribution */
+
+struct row {
+	const struct incise_corpus_survey *source;
+	const struct incise_corpus_group *group;
+	double mean[INCISE_MODEL_INPUTS_MAX + 1];
+	double distance[INCISE_MODEL_INPUTS_MAX +
+			1]; /* in deviations; 0 without spread */
+	bool outlier;
+};
+
+struct dataset {
+	const struct source_options *options;
+	const struct incise_corpus *corpus;
+	struct row *rows;
+	int n;
+	uint64_t left_out;
+	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
+};
+
+static int ascending(const void *a, const void *b)
+{
+	double p = *(const double *)a, q = *(const double *)b;
+
+	return (p > q) - (p < q);
+}
+
+static double median(double *values, int n)
+{
+	qsort(values, n, sizeof(*values), ascending);
+	return (values[(n - 1) / 2] + values[n / 2]) / 2;
+}
+
+static void find_outliers(struct dataset *data)
+{
+	double *values = cli_alloc(data->n, sizeof(*values));
+
+	for (int c = 0; c < data->options->n_columns && data->n >= GROUPS_MIN; c++) {
+		double middle, spread;
+
+		for (int i = 0; i < data->n; i++)
+			values[i] = data->rows[i].mean[c];
+		middle = median(values, data->n);
+		for (int i = 0; i < data->n; i++)
+			values[i] = fabs(data->rows[i].mean[c] - middle);
+		spread = MAD_TO_SD * median(values, data->n);
+		for (int i = 0; i < data->n && spread > 0; i++) {
+			struct row *row = &data->rows[i];
+
+			row->distance[c] = (row->mean[c] - middle) / spread;
+			row->outlier |= fabs(row->distance[c]) > LIMIT;
+		}
+	}
+	free(values);
+}
+
+static void collect(struct dataset *data)
+{
+	for (int s = 0; s < incise_corpus_sources(data->corpus); s++)
+		data->n += incise_corpus_source(data->corpus, s)->n_groups;
+	data->rows = cli_alloc(data->n, sizeof(*data->rows));
+	data->n = 0;
+	for (int s = 0; s < incise_corpus_sources(data->corpus); s++) {
+		const struct incise_corpus_survey *survey =
+			incise_corpus_source(data->corpus, s);
+
+		for (int g = 0; g < survey->n_groups; g++) {
+			struct row *row = &data->rows[data->n++];
+
+			row->source = survey;
+			row->group = &survey->groups[g];
+			for (int c = 0; c < data->options->n_columns; c++)
+				row->mean[c] =
+					row->group->sum[c] / (double)row->group->rows;
+		}
+	}
+	incise_corpus_ranges(data->corpus, data->min, data->max);
+	if (data->options->group)
+		find_outliers(data);
+}
+
+/* A group by its name, which a whole source has as its hash. */
+static const char *name_of(const struct dataset *data, const struct row *row)
+{
+	return strcmp(data->options->group, "recording") ? row->group->name
+							 : row->source->text;
+}
+
+static void show_text(const struct dataset *data)
+{
+	int outliers = 0;
+
+	printf("%d sources, %llu rows", incise_corpus_sources(data->corpus),
+	       (unsigned long long)incise_corpus_side(data->corpus, false)->rows);
+	if (data->options->group)
+		printf(", %d groups by %s", data->n, data->options->group);
+	if (data->left_out)
+		printf("; the blade did not advance in %llu more",
+		       (unsigned long long)data->left_out);
+	printf("\n");
+	for (int c = 0; c < data->options->n_columns; c++)
+		printf("%s: %g to %g\n", data->options->columns[c], data->min[c],
+		       data->max[c]);
+	for (int s = 0; s < incise_corpus_sources(data->corpus); s++) {
+		const struct incise_corpus_survey *survey =
+			incise_corpus_source(data->corpus, s);
+
+		printf("%.12s  %10llu rows", survey->hash,
+		       (unsigned long long)survey->rows);
+		if (data->options->group)
+			printf(" %4d groups", survey->n_groups);
+		printf("  %s\n", survey->text);
+	}
+	for (int i = 0; i < data->n && data->options->group; i++) {
+		const struct row *row = &data->rows[i];
+
+		outliers += row->outlier;
+		for (int c = 0; c < data->options->n_columns && row->outlier; c++)
+			if (fabs(row->distance[c]) > LIMIT)
+				printf("outlier: group %.60s of %.60s: mean %s %g is %+.1f "
+				       "deviations from the median of the groups\n",
+				       name_of(data, row), row->source->text,
+				       data->options->columns[c], row->mean[c],
+				       row->distance[c]);
+	}
+	if (data->options->group && data->n < GROUPS_MIN)
+		printf("outliers are sought from %d groups on\n", GROUPS_MIN);
+	else if (data->options->group && !outliers)
+		printf("no group is further than %g deviations from the median\n", LIMIT);
+}
+
+static void show_json(const struct dataset *data)
+{
+	json_t *columns = json_array(), *sources = json_array(), *groups = json_array();
+
+	for (int c = 0; c < data->options->n_columns; c++)
+		json_array_append_new(
+			columns, json_pack("{so sf sf}", "name",
+					   json_text(data->options->columns[c]), "min",
+					   data->min[c], "max", data->max[c]));
+	for (int s = 0; s < incise_corpus_sources(data->corpus); s++) {
+		const struct incise_corpus_survey *survey =
+			incise_corpus_source(data->corpus, s);
+
+		json_array_append_new(
+			sources, json_pack("{ss so sI si}", "sha256", survey->hash,
+					   "text", json_text(survey->text), "rows",
+					   (json_int_t)survey->rows, "groups",
+					   data->options->group ? survey->n_groups : 0));
+	}
+	for (int i = 0; i < data->n && data->options->group; i++) {
+		const struct row *row = &data->rows[i];
+
+		json_array_append_new(
+			groups,
+			json_pack("{so ss sI so so sb}", "name",
+				  json_text(name_of(data, row)), "source",
+				  row->source->hash, "rows", (json_int_t)row->group->rows,
+				  "means",
+				  json_numbers(row->mean, data->options->n_columns),
+				  "deviations",
+				  json_numbers(row->distance, data->options->n_columns),
+				  "outlier", row->outlier));
+	}
+	json_print(json_pack("{ss sI sI so so so}", "kind", "dataset", "rows",
+			     (json_int_t)incise_corpus_side(data->corpus, false)->rows,
+			     "left_out", (json_int_t)data->left_out, "columns", columns,
+			     "sources", sources, "groups", groups));
+}
+
+void dataset_show(char **paths, int n, struct source_options *options, bool json)
+{
+	struct source *sources = sources_new(paths, n, options);
+	struct incise_corpus *corpus =
+		incise_corpus_new(options->n_columns - 1, options->group, 1, 1);
+	struct dataset data = {.options = options, .corpus = corpus};
+	struct incise_error err = {0};
+
+	if (!corpus)
+		cli_fail("no memory");
+	for (int i = 0; i < n; i++) {
+		cli_progress("source %d of %d", i + 1, n);
+		if (source_open(&sources[i], &err) ||
+		    incise_corpus_survey(corpus, &sources[i].corpus, &err))
+			cli_fail_with(&err);
+		data.left_out += sources[i].left_out;
+	}
+	cli_progress_end();
+	if (incise_corpus_settle(corpus, 0, &err))
+		cli_fail_with(&err);
+	collect(&data);
+	json ? show_json(&data) : show_text(&data);
+	free(data.rows);
+	incise_corpus_free(corpus);
+	sources_free(sources, n);
+}
