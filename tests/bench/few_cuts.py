@@ -9,6 +9,9 @@ unseen. Every method selects its own settings on the training cuts only, by cros
 cuts. Prints per tissue and over all splits the ratio of the RMSE to that of the best peer of the same
 split, the splits in which a method is more than 2 % worse than the plane or the mean, and the
 share of unseen pairs in the 95 % interval of incise.
+
+Inputs are not clamped to the range of the training cuts, as in the error that incise train --check
+reports. (The loop clamps them: where unseen cuts are deeper than all training cuts, its error is larger.)
 """
 
 import csv
@@ -35,7 +38,7 @@ except ImportError:
 
 INCISE = os.path.join(os.environ["INCISE_BUILD"], "bin", "incise")
 SPLITS = int(os.environ.get("SPLITS") or 4)
-SEED = int(os.environ.get("SEED") or 1000)
+SEED = int(os.environ.get("SEED") or 2000)  # not one of those used for development
 FEW = 6
 GP_PAIRS = 300  # a Gaussian process of more takes minutes
 
@@ -62,7 +65,7 @@ def incise(*command, text=None):
 
 def simulate(folder, number, keys):
     recording, pairs = (os.path.join(folder, "rig%02d%s" % (number, end)) for end in (".rec", ".csv"))
-    rig = "sim:seed=%d,clock=simulated%s" % (number, keys)
+    rig = "sim:seed=%d,clock=simulated%s" % (SEED + number, keys)
     incise("capture", "-o", recording, "--rig", rig)
     incise("export", recording, "-o", pairs, "--average", "12x10", "--by-cut")
     return pairs
@@ -134,7 +137,7 @@ def ours(folder, x, y, cut, unseen):
         for c, (depth, velocity), force in zip(cut, x, y):
             file.write("%d,%.17g,%.17g,%.17g\n" % (c, depth, velocity, force))
     incise("train", data, "--inputs", "depth,velocity", "--group", "cut", "-o", model, "--overwrite")
-    text = incise("eval", model, "--sd", text="".join("%.17g %.17g\n" % tuple(row) for row in unseen))
+    text = incise("eval", model, "--sd", "--no-clamp", text="".join("%.17g %.17g\n" % tuple(row) for row in unseen))
     return numpy.array([line.split()[:2] for line in text.splitlines()], dtype=float).T
 
 
@@ -178,7 +181,6 @@ def main():
     warnings.simplefilter("ignore")
     results, failures = [], []
     with tempfile.TemporaryDirectory() as folder:
-        # Seeds of the rigs and splits that were not used for development.
         files = [simulate(folder, i + 1, keys) for i, keys in enumerate(RIGS)] + sys.argv[1:]
         print("%-12s%-8s%6s%6s  %-18s%10s%8s%8s" % ("tissue", "split", "cuts", "pairs", "best peer", "RMSE / N", "ratio", "inside"))
         for number, path in enumerate(files):

@@ -41,6 +41,9 @@ static void tune(double noise, double shift, uint64_t seed, struct incise_tuning
 	assert_int_equal(incise_folds_init(&folds, &pairs, NULL, seed), 0);
 	assert_int_equal(incise_tune(&basis, &folds, options, tuning), 0);
 	incise_folds_free(&folds);
+	/* The choices are what counts here. */
+	incise_average_free(tuning->average);
+	tuning->average = NULL;
 }
 
 static void test_noise_asks_for_ridge(void **state)
