@@ -6,12 +6,12 @@
 Tissues are ten simulated rigs and the given CSV files (a column cut, then depth, velocity and
 force). In half of the splits 70 % of the cuts are for training, in the others 6 cuts; the rest is
 unseen. Every method selects its own settings on the training cuts only, by cross-validation over
-cuts. Prints per tissue and over all splits the ratio of the RMSE to that of the best peer of the same
-split, the splits in which a method is more than 2 % worse than the plane or the mean, and the
-share of unseen pairs in the 95 % interval of incise.
+cuts. Prints the ratio of the RMSE to that of the best peer of the same split, the splits in which a
+method is more than 2 % worse than the plane or the mean, and the share of unseen pairs in the 95 %
+interval of incise.
 
 Inputs are not clamped to the range of the training cuts, as in the error that incise train --check
-reports. (The loop clamps them: where unseen cuts are deeper than all training cuts, its error is larger.)
+reports. The loop clamps them: its error is larger if unseen cuts are deeper than all training cuts.
 """
 
 import csv
@@ -64,7 +64,8 @@ def incise(*command, text=None):
 
 
 def simulate(folder, number, keys):
-    recording, pairs = (os.path.join(folder, "rig%02d%s" % (number, end)) for end in (".rec", ".csv"))
+    recording = os.path.join(folder, "rig%02d.rec" % number)
+    pairs = os.path.join(folder, "rig%02d.csv" % number)
     rig = "sim:seed=%d,clock=simulated%s" % (SEED + number, keys)
     incise("capture", "-o", recording, "--rig", rig)
     incise("export", recording, "-o", pairs, "--average", "12x10", "--by-cut")
@@ -136,34 +137,43 @@ def ours(folder, x, y, cut, unseen):
         file.write("cut,depth,velocity,force_N\n")
         for c, (depth, velocity), force in zip(cut, x, y):
             file.write("%d,%.17g,%.17g,%.17g\n" % (c, depth, velocity, force))
-    incise("train", data, "--inputs", "depth,velocity", "--group", "cut", "-o", model, "--overwrite")
-    text = incise("eval", model, "--sd", "--no-clamp", text="".join("%.17g %.17g\n" % tuple(row) for row in unseen))
+    inputs = ["--inputs", "depth,velocity", "--group", "cut"]
+    incise("train", data, *inputs, "-o", model, "--overwrite")
+    lines = "".join("%.17g %.17g\n" % tuple(row) for row in unseen)
+    text = incise("eval", model, "--sd", "--no-clamp", text=lines)
     return numpy.array([line.split()[:2] for line in text.splitlines()], dtype=float).T
 
 
 def measure(folder, x, y, cut, training):
     fit = numpy.isin(cut, training)
-    truth = y[~fit]
+    unseen, truth = x[~fit], y[~fit]
+    predicted = {name: f(unseen) for name, f in peers(x[fit], y[fit], cut[fit]).items()}
+    predicted["incise train"], sd = ours(folder, x[fit], y[fit], cut[fit], unseen)
+    error = {name: numpy.abs(p - truth) for name, p in predicted.items()}
+    within = numpy.all((unseen >= x[fit].min(0)) & (unseen <= x[fit].max(0)), axis=1)
 
-    def rmse(predicted):
-        return float(numpy.sqrt(numpy.mean((predicted - truth) ** 2)))
+    def rmse(mask):
+        return {name: float(numpy.sqrt(numpy.mean(e[mask] ** 2))) for name, e in error.items()}
 
-    result = {name: rmse(f(x[~fit])) for name, f in peers(x[fit], y[fit], cut[fit]).items()}
-    best = min(result, key=result.get)
-    predicted, sd = ours(folder, x[fit], y[fit], cut[fit], x[~fit])
-    result["incise train"] = rmse(predicted)
-    inside = float(numpy.mean(numpy.abs(predicted - truth) <= 1.959964 * sd))
-    return {"rmse_N": result, "best_peer": best, "inside": inside}
+    return {
+        "rmse_N": rmse(slice(None)),
+        "rmse_within_N": rmse(within),
+        "inside": float(numpy.mean(error["incise train"] <= 1.959964 * sd)),
+    }
+
+
+def best_peer(rmse):
+    return min((name for name in rmse if name != "incise train"), key=rmse.get)
 
 
 def table(title, results):
+    """Of a list of the RMSE by method."""
     print("\n%s: %d splits" % (title, len(results)))
-    print("%-18s%8s%8s%8s%20s%8s" % ("RMSE / best peer", "median", "90 %", "most", "> 1.02 × plane/mean", "most"))
-    for name in results[0]["rmse_N"]:
-        ratio = [r["rmse_N"][name] / r["rmse_N"][r["best_peer"]] for r in results]
-        simple = [
-            r["rmse_N"][name] / min(r["rmse_N"]["mean"], r["rmse_N"]["linear"]) for r in results
-        ]
+    names = ("RMSE / best peer", "median", "90 %", "most", "> 1.02 × plane/mean", "most")
+    print("%-18s%8s%8s%8s%20s%8s" % names)
+    for name in results[0]:
+        ratio = [r[name] / r[best_peer(r)] for r in results]
+        simple = [r[name] / min(r["mean"], r["linear"]) for r in results]
         print(
             "%-18s%8.3f%8.3f%8.3f%20d%8.3f"
             % (
@@ -182,7 +192,8 @@ def main():
     results, failures = [], []
     with tempfile.TemporaryDirectory() as folder:
         files = [simulate(folder, i + 1, keys) for i, keys in enumerate(RIGS)] + sys.argv[1:]
-        print("%-12s%-8s%6s%6s  %-18s%10s%8s%8s" % ("tissue", "split", "cuts", "pairs", "best peer", "RMSE / N", "ratio", "inside"))
+        names = "tissue", "split", "cuts", "pairs", "best peer", "RMSE / N", "ratio", "inside"
+        print("%-12s%-8s%6s%6s  %-18s%10s%8s%8s" % names)
         for number, path in enumerate(files):
             name = os.path.basename(path)[:-4]
             x, y, cut = load(path)
@@ -193,18 +204,22 @@ def main():
                     failures.append("%s, %s: %s" % (name, kind, error.stderr.strip()))
                     continue
                 results.append(dict(r, tissue=name, kind=kind))
-                best = r["rmse_N"][r["best_peer"]]
+                rmse, peer = r["rmse_N"], best_peer(r["rmse_N"])
                 print(
-                    "%-12s%-8s%6d%6d  %-18s%10.4f%8.3f%8.3f"
-                    % (name, kind, len(training), numpy.isin(cut, training).sum(), r["best_peer"], best, r["rmse_N"]["incise train"] / best, r["inside"]),
+                    "%-12s%-8s" % (name, kind),
+                    "%5d%6d" % (len(training), numpy.isin(cut, training).sum()),
+                    " %-18s%10.4f" % (peer, rmse[peer]),
+                    "%7.3f%8.3f" % (rmse["incise train"] / rmse[peer], r["inside"]),
                     flush=True,
                 )
     for kind in "70 %", "6 cuts":
-        table("training on " + kind, [r for r in results if r["kind"] == kind])
-    table("all", results)
+        table("training on " + kind, [r["rmse_N"] for r in results if r["kind"] == kind])
+    table("all", [r["rmse_N"] for r in results])
+    table("all, pairs within the range of the training cuts", [r["rmse_within_N"] for r in results])
     print("\nshare of unseen pairs in the 95 % interval")
     for name in dict.fromkeys(r["tissue"] for r in results):
-        print("%-12s%8.3f" % (name, numpy.mean([r["inside"] for r in results if r["tissue"] == name])))
+        inside = [r["inside"] for r in results if r["tissue"] == name]
+        print("%-12s%8.3f" % (name, numpy.mean(inside)))
     print("%-12s%8.3f" % ("all", numpy.mean([r["inside"] for r in results])))
     print("\nfailures: %s" % ("; ".join(failures) or "none"))
     if os.environ.get("RESULTS"):
