@@ -37,7 +37,7 @@ except ImportError:
     sys.exit("few_cuts.py: skipped: scikit-learn is missing; make python-peers installs it")
 
 INCISE = os.path.join(os.environ["INCISE_BUILD"], "bin", "incise")
-SPLITS = int(os.environ.get("SPLITS") or 4)
+SPLITS = max(2, int(os.environ.get("SPLITS") or 4))
 SEED = int(os.environ.get("SEED") or 2000)  # not one of those used for development
 FEW = 6
 GP_PAIRS = 300  # a Gaussian process of more takes minutes
