@@ -23,6 +23,7 @@
 #include "cli/file_kind.h"
 #include "cli/json.h"
 #include "cli/recording.h"
+#include "train/progress.h"
 #include "train/sources.h"
 
 struct options {
@@ -844,10 +845,60 @@ static void add_up(const struct options *options, struct incise_factor *factor)
 	}
 }
 
+/* What a source has besides its survey, in the progress of a training. */
+struct surveyed {
+	uint64_t left_out, check_outside;
+	char rig[256];
+};
+
+static void keep_sources(struct progress *progress, const struct source *sources, int n,
+			 uint64_t check_outside)
+{
+	struct surveyed *all = cli_alloc(n, sizeof(*all));
+
+	for (int i = 0; i < n; i++) {
+		all[i].left_out = sources[i].left_out;
+		all[i].check_outside = check_outside;
+		memcpy(all[i].rig, sources[i].rig, sizeof(all[i].rig));
+	}
+	progress_set(progress, PROGRESS_SOURCES, all, n * sizeof(*all));
+}
+
+/* Take over the surveys of an interrupted training; returns how many of the first sources. */
+static int resume_surveys(const struct progress *progress, struct incise_corpus *corpus,
+			  struct source *sources, int n)
+{
+	size_t size, sources_size;
+	const void *surveys = progress_part(progress, PROGRESS_SURVEYS, &size);
+	const struct surveyed *all =
+		progress_part(progress, PROGRESS_SOURCES, &sources_size);
+	struct incise_error err = {0};
+	int done;
+
+	if (!surveys || sources_size != n * sizeof(*all))
+		return 0;
+	if (incise_corpus_add(corpus, surveys, size, &err))
+		cli_fail("%s; remove the file .progress next to the output", err.text);
+	done = incise_corpus_sources(corpus);
+	for (int i = 0; i < done && i < n; i++) {
+		const struct incise_corpus_survey *survey =
+			incise_corpus_source(corpus, i);
+
+		snprintf(sources[i].hash, sizeof(sources[i].hash), "%s", survey->hash);
+		snprintf(sources[i].text, sizeof(sources[i].text), "%s", survey->text);
+		snprintf(sources[i].rig, sizeof(sources[i].rig), "%s", all[i].rig);
+		sources[i].left_out = all[i].left_out;
+	}
+	cli_error("goes on from an interrupted training: %d of %d sources are surveyed",
+		  done, n);
+	return done;
+}
+
 /* Survey all sources: rows, ranges, groups, and the sample. */
 static struct incise_corpus *survey(struct options *options,
 				    const struct source_options *how,
-				    struct source *sources, struct reading *reading)
+				    struct source *sources, struct progress *progress,
+				    struct reading *reading)
 {
 	struct incise_corpus *corpus = incise_corpus_new(
 		options->n_inputs, how->group, options->train.seed,
@@ -859,13 +910,24 @@ static struct incise_corpus *survey(struct options *options,
 	if (!corpus)
 		cli_fail("no memory");
 	begin_reading(reading, "surveying", options->n_paths, 0);
+	reading->at = resume_surveys(progress, corpus, sources, options->n_paths);
 	for (; reading->at < options->n_paths && !rc; reading->at++) {
+		bool last = reading->at == options->n_paths - 1;
+
 		if (!is_mine(options, reading->at))
 			continue;
 		rc = source_open(&sources[reading->at], &err);
 		if (!rc)
 			rc = incise_corpus_survey(corpus, &sources[reading->at].corpus,
 						  &err);
+		if (!rc && progress && (last || progress_due(progress))) {
+			size_t size;
+			void *bytes = incise_corpus_encode(corpus, &size);
+
+			progress_set(progress, PROGRESS_SURVEYS, bytes, size);
+			keep_sources(progress, sources, options->n_paths, 0);
+			progress_write(progress);
+		}
 	}
 	cli_progress_end();
 	agree(options, &err, &none);
@@ -883,11 +945,82 @@ struct folding {
 	const struct options *options;
 	const struct incise_corpus *corpus;
 	struct source *sources;
+	struct progress *progress; /* or NULL */
 	struct reading *reading;
 	struct result *result;
 	struct incise_factor *fit,
 		*check; /* made by it; check NULL: nothing is held out */
 };
+
+/* The factor of an interrupted training, if it is of the same premises; else @fresh. */
+static struct incise_factor *resume_factor(const struct progress *progress,
+					   enum progress_part part,
+					   struct incise_factor *fresh)
+{
+	struct incise_factor_info wanted, found;
+	struct incise_factor *factor;
+	struct incise_error err;
+	size_t size;
+	const void *bytes = progress_part(progress, part, &size);
+
+	factor = bytes && fresh ? incise_factor_decode(bytes, size, "progress", &err)
+				: NULL;
+	if (!factor)
+		return fresh;
+	incise_factor_info(fresh, &wanted);
+	incise_factor_info(factor, &found);
+	if (strcmp(wanted.premises, found.premises)) {
+		incise_factor_free(factor);
+		return fresh;
+	}
+	incise_factor_free(fresh);
+	return factor;
+}
+
+static bool has_source(const struct incise_factor *factor, const char *hash)
+{
+	struct incise_factor_info info;
+	bool found = false;
+
+	incise_factor_info(factor, &info);
+	for (int i = 0; i < info.n_sources; i++)
+		found |= !strcmp(info.sources[i].hash, hash);
+	return found;
+}
+
+static void keep_factors(const struct folding *folding)
+{
+	size_t size;
+	void *bytes = incise_factor_encode(folding->fit, &size);
+
+	progress_set(folding->progress, PROGRESS_FIT, bytes, size);
+	if (folding->check) {
+		bytes = incise_factor_encode(folding->check, &size);
+		progress_set(folding->progress, PROGRESS_CHECK, bytes, size);
+	}
+	keep_sources(folding->progress, folding->sources, folding->options->n_paths,
+		     folding->result->check_outside);
+	progress_write(folding->progress);
+}
+
+static void resume_factors(struct folding *folding)
+{
+	size_t size;
+	const struct surveyed *all =
+		progress_part(folding->progress, PROGRESS_SOURCES, &size);
+	struct incise_factor *fresh = folding->fit;
+
+	folding->fit = resume_factor(folding->progress, PROGRESS_FIT, folding->fit);
+	if (folding->fit == fresh)
+		return;
+	fresh = folding->check;
+	folding->check = resume_factor(folding->progress, PROGRESS_CHECK, fresh);
+	if (fresh && folding->check == fresh)
+		cli_fail(
+			"the progress of an interrupted training is damaged; it is removed, "
+			"start again");
+	folding->result->check_outside = all ? all[0].check_outside : 0;
+}
 
 /* Premises are those of rank 0, and the sums are complete there. */
 static void fold(struct folding *folding, const struct incise_model *premises)
@@ -905,6 +1038,8 @@ static void fold(struct folding *folding, const struct incise_model *premises)
 		if (result->check)
 			folding->check = share_premises(options, folding->check);
 	}
+	if (folding->progress)
+		resume_factors(folding);
 	begin_reading(reading, "adding", options->n_paths,
 		      incise_corpus_side(folding->corpus, false)->rows +
 			      incise_corpus_side(folding->corpus, true)->rows);
@@ -913,9 +1048,15 @@ static void fold(struct folding *folding, const struct incise_model *premises)
 
 		if (!is_mine(options, reading->at))
 			continue;
+		if (has_source(folding->fit, source->hash)) {
+			result->left_out += source->left_out;
+			continue;
+		}
 		rc = incise_corpus_fold(folding->corpus, &source->corpus, folding->fit,
 					folding->check, &result->check_outside, &err);
 		result->left_out += source->left_out;
+		if (!rc && progress_due(folding->progress))
+			keep_factors(folding);
 	}
 	cli_progress_end();
 	agree(options, &err, &result->check_outside);
@@ -1032,10 +1173,29 @@ static void save_model(const struct options *options, const struct incise_corpus
 		json_decref(warned);
 }
 
+/* All options that the surveys and sums depend on: free(3). */
+static char *progress_key(const struct options *options)
+{
+	char *how = options_text(options), *key;
+	char columns[1000] = "";
+	size_t used = 0;
+
+	for (int i = 0; i < options->n_inputs && used < sizeof(columns); i++)
+		used += (size_t)snprintf(columns + used, sizeof(columns) - used, "%s,",
+					 options->inputs[i]);
+	key = cli_text("%s; seed %llu; rate %.17g; damaged %d; %s%s; %s", how,
+		       (unsigned long long)options->train.seed, options->rate,
+		       options->damaged, columns, options->target,
+		       options->premises ? options->premises : "");
+	free(how);
+	return key;
+}
+
 int main(int argc, char **argv)
 {
 	const char *columns[INCISE_MODEL_INPUTS_MAX + 1];
 	struct incise_model *premises = NULL, *model;
+	struct progress *progress = NULL;
 	struct folding folding;
 	struct source_options how;
 	struct incise_corpus *corpus;
@@ -1071,12 +1231,23 @@ int main(int argc, char **argv)
 	options.group = how.group;
 	options.data = options.n_paths == 1 ? sources[0].path
 					    : cli_text("%d sources", options.n_paths);
-	corpus = survey(&options, &how, sources, &reading);
+	if (!options.mpi && !options.train.classic) {
+		char *key = progress_key(&options);
+
+		progress = progress_new(options.factor ? options.factor : options.model,
+					key, sources, options.n_paths);
+		free(key);
+	}
+	corpus = survey(&options, &how, sources, progress, &reading);
 	result.fit = incise_corpus_side(corpus, false);
 	result.check = options.check > 0 ? incise_corpus_side(corpus, true) : NULL;
 	options.train.groups = result.fit->sample.groups;
-	folding = (struct folding){&options, corpus, sources, &reading,
-				   &result,  NULL,   NULL};
+	folding = (struct folding){.options = &options,
+				   .corpus = corpus,
+				   .sources = sources,
+				   .progress = progress,
+				   .reading = &reading,
+				   .result = &result};
 	if (!is_first(&options)) {
 		fold(&folding, NULL);
 		exit(0);

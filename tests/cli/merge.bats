@@ -139,3 +139,42 @@ shares() {
 	run --separate-stderr incise info s1.csv --group cut
 	bad_usage "--dataset"
 }
+
+# Train from l?.csv into m.fis with options, killed when the first line of its progress is like $1, or
+# at its end, whichever is first.
+train_killed_at() {
+	local like=$1
+	shift
+	incise train l?.csv --group cut --check 0.3 --mf 3,3 -o m.fis "$@" >/dev/null 2>&1 3>&- &
+	while kill -0 $! 2>/dev/null; do
+		! head -n 1 m.fis.progress 2>/dev/null | grep -qa "$like" || break
+		sleep 0.01
+	done
+	kill -KILL $! 2>/dev/null || :
+	wait $! || :
+}
+
+@test "a training that was killed goes on, to the same model" {
+	for i in 1 2 3; do
+		cuts s$i.csv $((20 * i - 19)) $((20 * i))
+		awk -F, -v OFS=, 'NR == 1 { print; next } { for (k = 0; k < 8; k++) print $1, $2, $3, $4 + k / 1000 }' \
+			s$i.csv >l$i.csv
+	done
+	incise train l?.csv --group cut --check 0.3 --mf 3,3 -o whole.fis >/dev/null 2>&1
+	# killed when the surveys are there, and when a part of the sums is
+	for like in 'incise progress 1 [0-9]* [0-9]* [0-9]* 0 ' 'incise progress 1 [0-9]* [0-9]* [0-9]* [1-9]'; do
+		train_killed_at "$like"
+		if [ ! -e m.fis ]; then
+			incise train l?.csv --group cut --check 0.3 --mf 3,3 -o m.fis >out 2>err
+			grep -q "goes on from an interrupted training: [1-3] of 3 sources are surveyed" err
+		fi
+		cmp whole.fis m.fis
+		cmp whole.fis.sd m.fis.sd
+		[ ! -e m.fis.progress ]
+		rm m.fis m.fis.sd
+	done
+	# of other options it is not used
+	train_killed_at incise
+	incise train l?.csv --group cut --check 0.3 --seed 2 --mf 3,3 -o m.fis --overwrite >out 2>err
+	run ! grep -q "goes on" err
+}
