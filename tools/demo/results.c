@@ -613,7 +613,7 @@ void demo_summary_print(const struct demo *demo, FILE *out, double seconds)
 		"  MSE here / N^2     %12.5f %10.5f\n"
 		"  MSE in the paper   %12.5f %10.5f   (its unit is not stated)\n"
 		"\n"
-		"On held-out cuts, ridge and epochs by cross-validation, RMSE / N:\n"
+		"On held-out cuts, settings by cross-validation, RMSE / N:\n"
 		"  this model         %12.4f %10.4f\n"
 		"  mean                            %10.4f\n"
 		"  linear regression               %10.4f\n"
