@@ -1202,6 +1202,7 @@ int main(int argc, char **argv)
 	struct reading reading;
 	struct source *sources;
 	struct options options;
+	char *data;
 	struct result result = {.options = &options};
 	struct incise_error err = {0};
 
@@ -1229,8 +1230,8 @@ int main(int argc, char **argv)
 	};
 	sources = sources_new(options.paths, options.n_paths, &how);
 	options.group = how.group;
-	options.data = options.n_paths == 1 ? sources[0].path
-					    : cli_text("%d sources", options.n_paths);
+	data = cli_text("%d sources", options.n_paths);
+	options.data = options.n_paths == 1 ? sources[0].path : data;
 	if (!options.mpi && !options.train.classic) {
 		char *key = progress_key(&options);
 
@@ -1276,5 +1277,8 @@ int main(int argc, char **argv)
 	incise_uncertainty_free(result.interval.uncertainty);
 	incise_corpus_free(corpus);
 	sources_free(sources, options.n_paths);
+	free(data);
+	for (int i = 0; i <= options.n_inputs && options.premises; i++)
+		free((char *)columns[i]);
 	return 0;
 }

@@ -591,7 +591,9 @@ int incise_corpus_settle(struct incise_corpus *corpus, double share,
 	uint64_t rows = 0;
 	int rc = 0;
 
-	qsort(corpus->surveys, corpus->n_surveys, sizeof(*corpus->surveys), by_hash);
+	if (corpus->n_surveys)
+		qsort(corpus->surveys, corpus->n_surveys, sizeof(*corpus->surveys),
+		      by_hash);
 	for (int i = 0; i < corpus->n_surveys; i++)
 		rows += corpus->surveys[i].rows;
 	if (!rows)

@@ -226,8 +226,8 @@ static void flush(struct incise_gram *gram)
 			int64_t ll = t->ll[i % TILE][j % TILE];
 			int64_t hl = t->ss[i % TILE][j % TILE] - hh - ll;
 
-			*sum++ += ((incise_gram_sum)hh << 2 * LOW_BITS) +
-				  ((incise_gram_sum)hl << LOW_BITS) + ll;
+			*sum++ += (incise_gram_sum)hh * (1LL << 2 * LOW_BITS) +
+				  (incise_gram_sum)hl * (1 << LOW_BITS) + ll;
 		}
 	}
 	memset(gram->tile, 0, n_tiles(gram) * sizeof(*gram->tile));
@@ -284,7 +284,7 @@ int incise_gram_add(struct incise_gram *gram)
 		uint64_t up = (uint64_t)(v + lift + (1 << (LOW_BITS - 1))) >> LOW_BITS;
 
 		h[k] = (int64_t)up - (lift >> LOW_BITS);
-		l[k] = v - (h[k] << LOW_BITS);
+		l[k] = v - h[k] * (1 << LOW_BITS);
 		s[k] = h[k] + l[k];
 	}
 	gram->rows++;

@@ -78,7 +78,8 @@ INCISE_API void incise_corpus_free(struct incise_corpus *corpus);
 /**
  * Survey a source.
  *
- * @return 0; -EEXIST (its hash is there already), -ENOMEM, or the negative errno of its read
+ * @return 0; -EEXIST (its hash is there already), -ENOMEM, or the negative errno of its read: the
+ *         corpus is then of no further use
  */
 INCISE_API int incise_corpus_survey(struct incise_corpus *corpus,
 				    const struct incise_corpus_source *source,
@@ -87,7 +88,10 @@ INCISE_API int incise_corpus_survey(struct incise_corpus *corpus,
 /** The surveys as bytes, for another process; to be freed with free(3). NULL: ENOMEM. */
 INCISE_API void *incise_corpus_encode(const struct incise_corpus *corpus, size_t *size);
 
-/** Add the surveys of another process. @return 0, -EEXIST, -EINVAL (no such bytes), -ENOMEM. */
+/**
+ * Add the surveys of another process. @return 0, -EEXIST, -EINVAL (no such bytes), -ENOMEM: the
+ * corpus is then of no further use.
+ */
 INCISE_API int incise_corpus_add(struct incise_corpus *corpus, const void *bytes,
 				 size_t size, struct incise_error *err);
 
