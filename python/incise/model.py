@@ -725,6 +725,9 @@ def train(
 ) -> Model:
     """Learn a model as `incise train` does: same data, options and seed give the same model.
 
+    All pairs are in memory here. The tool searches the premises of more than 20000 pairs on a random
+    sample of them, and holds out other single rows where check is given without group.
+
     data: a CSV file, a recording (its pairs averaged in 12 × 10 bins, by cut), a table (anything with
     ``__arrow_c_stream__``), a DataFrame, or {column: values}.
     group: column that names the cut; cross-validation and check keep whole cuts together.

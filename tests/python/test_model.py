@@ -131,7 +131,8 @@ class Models(Case):
         model.save(self.path("a.fis"))
         for end in ("", ".sd"):
             with open(self.path("a.fis") + end) as a, open(self.fis + end) as b:
-                self.assertEqual(a.read(), b.read())
+                # the tool also notes its sources
+                self.assertEqual(a.readlines(), [x for x in b if not x.startswith("%")])
         self.assertLess(model.report.check_rms_error, model.report.baselines["linear"])
 
     def test_training_from_any_table(self):
