@@ -38,6 +38,7 @@ struct incise_corpus {
 	int n_surveys, survey_capacity;
 	struct candidate *heap; /* the largest key first, until it is settled */
 	size_t n_heap, heap_capacity, sample;
+	const volatile int *stop; /* or NULL */
 	/* After settling: */
 	struct group *groups; /* by key */
 	int n_groups;
@@ -72,6 +73,16 @@ void incise_corpus_free(struct incise_corpus *corpus)
 	for (int side = 0; side < 2; side++)
 		incise_train_side_free(&corpus->sides[side].sample);
 	free(corpus);
+}
+
+void incise_corpus_set_stop(struct incise_corpus *corpus, const volatile int *stop)
+{
+	corpus->stop = stop;
+}
+
+static bool is_stopped(const struct incise_corpus *corpus)
+{
+	return corpus->stop && *corpus->stop;
 }
 
 /* --- random numbers of rows ---------------------------------------------------------- */
@@ -232,6 +243,8 @@ static int survey_row(void *user, const double *row, const char *name,
 				  : name	   ? name
 						   : "");
 
+	if (is_stopped(corpus))
+		return incise_error_set(err, ECANCELED, "canceled");
 	if (!group)
 		return incise_error_set(err, ENOMEM, "no memory for more groups");
 	for (int i = 0; i < corpus->columns; i++) {
@@ -679,6 +692,8 @@ static int fold_row(void *user, const double *row, const char *name,
 	struct incise_error own;
 	int rc;
 
+	if (is_stopped(f->corpus))
+		return incise_error_set(err, ECANCELED, "canceled");
 	/* Without groups each row is in a part of cross-validation by itself. */
 	if (is_check(f->corpus, f->number, at, group)) {
 		rc = incise_factor_add(f->check, row, group, &own);

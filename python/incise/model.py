@@ -56,6 +56,7 @@ class SideStruct(ctypes.Structure):
 
 
 _Progress = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_double, c_double)
+all_sums = ctypes.CFUNCTYPE(c_void_p, c_void_p, c_void_p)
 
 
 class TrainOptionsStruct(ctypes.Structure):
@@ -74,7 +75,7 @@ class TrainOptionsStruct(ctypes.Structure):
         ("stop", ctypes.POINTER(c_int)),
         ("uncertainty", ctypes.POINTER(c_void_p)),
         ("ranges", ctypes.POINTER(VariableStruct)),
-        ("all", c_void_p),
+        ("all", all_sums),
     ]
     c_name = "struct incise_train_options"
 
@@ -159,7 +160,7 @@ _library.declare(
     "libincise",
     {
         "incise_model_load": (c_void_p, _path, c_void_p),
-        "incise_model_save": (c_int, c_void_p, _path, c_void_p),
+        "incise_model_save_notes": (c_int, c_void_p, _path, ctypes.c_char_p, c_void_p),
         "incise_model_free": (None, c_void_p),
         "incise_model_info": (ctypes.POINTER(ModelInfoStruct), c_void_p),
         "incise_model_set_clamp": (None, c_void_p, c_bool),
@@ -434,6 +435,7 @@ class Model:
         self._pointer = _library.Handle(pointer, "incise_model_free")
         self._set_uncertainty(uncertainty)
         self.report: Optional[TrainReport] = None  #: of the training, if it was trained here
+        self._notes = b""  # of a training from many sources: version, options and sources
 
     @classmethod
     def load(cls, path: PathLike) -> "Model":
@@ -462,7 +464,7 @@ class Model:
             texts = tuple(
                 _bytes_of(name) if os.path.exists(name) else None for name in (path, path + ".sd")
             )
-        return _model_of_bytes, (*texts, self.report)
+        return _model_of_bytes, (*texts, self.report, self._notes)
 
     def __repr__(self) -> str:
         inputs = ", ".join(variable.name for variable in self.inputs)
@@ -531,10 +533,15 @@ class Model:
         return points.finish(block, n_inputs)
 
     def save(self, path: PathLike) -> None:
-        """Write the .fis file, and its standard deviation as PATH.sd; each whole or not at all."""
+        """Write the .fis file, and its standard deviation as PATH.sd; each whole or not at all.
+
+        A model trained from a list of sources notes version, options and sources, as the tool does.
+        """
         failure = Failure()
         name = _library.path_bytes(path)
-        failure.check(function("incise_model_save")(self._pointer, name, failure.ref))
+        failure.check(
+            function("incise_model_save_notes")(self._pointer, name, self._notes, failure.ref)
+        )
         if self._uncertainty:
             failure.check(
                 function("incise_uncertainty_save")(
@@ -567,14 +574,16 @@ def _write_bytes(path: str, content: bytes) -> None:
         file.write(content)
 
 
-def _model_of_bytes(fis: bytes, sd: Optional[bytes], report: Optional[TrainReport]) -> Model:
+def _model_of_bytes(
+    fis: bytes, sd: Optional[bytes], report: Optional[TrainReport], notes: bytes = b""
+) -> Model:
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "model.fis")
         _write_bytes(path, fis)
         if sd is not None:
             _write_bytes(path + ".sd", sd)
         model = Model.load(path)
-    model.report = report
+    model.report, model._notes = report, notes
     return model
 
 
@@ -585,8 +594,17 @@ def _compiled_of_bytes(blob: bytes) -> CompiledModel:
         return CompiledModel.load(path)
 
 
-def _name_array(names: Sequence[str]) -> Any:
+def name_array(names: Sequence[str]) -> Any:
     return (ctypes.c_char_p * len(names))(*(name.encode() for name in names))
+
+
+def is_path(data: Any) -> bool:
+    return isinstance(data, (str, bytes, os.PathLike))
+
+
+def is_recording(data: Any) -> bool:
+    """Whether it is a path with the name of a recording."""
+    return is_path(data) and _library.path_bytes(data).rstrip(b"/").endswith((b".rec", b".part"))
 
 
 def _read_dataset(
@@ -595,7 +613,7 @@ def _read_dataset(
     """A dataset of a path or a table, and how many rows were left out."""
     failure, left_out = Failure(), ctypes.c_size_t()
     rest = (
-        _name_array(columns),
+        name_array(columns),
         len(columns),
         group.encode() if group else None,
         where.encode() if where else None,
@@ -604,11 +622,10 @@ def _read_dataset(
     )
     if isinstance(data, Recording):
         data = data.pairs(depth_bins=12, velocity_bins=10, by_cut=True)
-    if isinstance(data, (str, bytes, os.PathLike)):
-        name = _library.path_bytes(data)
-        if name.rstrip(b"/").endswith((b".rec", b".part")):
-            return _read_dataset(Recording(os.fsdecode(name)), columns, group, where)
-        dataset = function("incise_dataset_read_where")(name, *rest)
+    if is_recording(data):
+        return _read_dataset(Recording(os.fsdecode(data)), columns, group, where)
+    if is_path(data):
+        dataset = function("incise_dataset_read_where")(_library.path_bytes(data), *rest)
     else:
         from ._producer import open_stream
 
@@ -616,6 +633,58 @@ def _read_dataset(
         dataset = function("incise_dataset_from_arrow")(ctypes.byref(stream), *rest)
         del keep
     return failure.require(dataset), left_out.value
+
+
+def start(
+    pairs: PairsStruct, names: Sequence[str], mf_type: int, mf: Any, options: TrainOptionsStruct
+) -> int:
+    """The model that a training starts from."""
+    failure = Failure()
+    return failure.require(
+        function("incise_train_start")(
+            ctypes.byref(pairs), name_array(names), mf_type, mf, ctypes.byref(options), failure.ref
+        )
+    )
+
+
+def baselines(fit: SideStruct, check: SideStruct) -> Dict[str, float]:
+    """Errors of simpler predictors on the pairs kept back."""
+    failure, result = Failure(), BaselinesStruct()
+    failure.check(
+        function("incise_baselines")(
+            ctypes.byref(fit.pairs),
+            fit.groups,
+            ctypes.byref(check.pairs),
+            ctypes.byref(result),
+            failure.ref,
+        )
+    )
+    return {"mean": result.mean, "linear": result.linear, "knn": result.knn}
+
+
+def report_of(
+    report: TrainReportStruct,
+    pairs: int,
+    check_pairs: int,
+    left_out: int,
+    others: Dict[str, float],
+) -> TrainReport:
+    return TrainReport(
+        pairs,
+        check_pairs,
+        left_out,
+        report.epochs,
+        report.ridge,
+        report.train_rmse,
+        report.check_rmse,
+        report.crossval_rmse,
+        report.condition,
+        report.parameters,
+        report.rules_unfired,
+        report.train_r2,
+        report.check_r2,
+        others,
+    )
 
 
 class _Training:
@@ -646,18 +715,6 @@ class _Training:
             function("incise_train_side_free")(ctypes.byref(self.check))
         function("incise_dataset_free")(self.dataset)
 
-    def start(self, names: Sequence[str], mf_type: int, mf: Any) -> int:
-        return self.failure.require(
-            function("incise_train_start")(
-                ctypes.byref(self.fit.pairs),
-                _name_array(names),
-                mf_type,
-                mf,
-                ctypes.byref(self.options),
-                self.failure.ref,
-            )
-        )
-
     def run(self, model: Model) -> TrainReportStruct:
         report, uncertainty = TrainReportStruct(), c_void_p()
         self.options.uncertainty = ctypes.pointer(uncertainty)
@@ -673,21 +730,6 @@ class _Training:
         )
         model._set_uncertainty(uncertainty.value)
         return report
-
-    def baselines(self) -> Dict[str, float]:
-        if not self.has_check:
-            return {}
-        result = BaselinesStruct()
-        self.failure.check(
-            function("incise_baselines")(
-                ctypes.byref(self.fit.pairs),
-                self.fit.groups,
-                ctypes.byref(self.check.pairs),
-                ctypes.byref(result),
-                self.failure.ref,
-            )
-        )
-        return {"mean": result.mean, "linear": result.linear, "knn": result.knn}
 
 
 _mf_types = {"gaussmf": 0, "gbellmf": 1}
@@ -725,14 +767,33 @@ def train(
 ) -> Model:
     """Learn a model as `incise train` does: same data, options and seed give the same model.
 
-    All pairs are in memory here. The tool searches the premises of more than 20000 pairs on a random
-    sample of them, and holds out other single rows where check is given without group.
+    data: a list of sources, or one table, whose pairs are then all in memory.
 
-    data: a CSV file, a recording (its pairs averaged in 12 × 10 bins, by cut), a table (anything with
-    ``__arrow_c_stream__``), a DataFrame, or {column: values}.
-    group: column that names the cut; cross-validation and check keep whole cuts together.
+    A list [source, …] is read twice in bounded memory, and files in it give the very file that the
+    tool writes of them. A source is a CSV file, a recording (every force sample of its cuts), a table
+    that can be read again (anything with ``__arrow_c_stream__``, a DataFrame, {column: values}), or a
+    function that returns such a table anew each time it is called, with the same rows::
+
+        def strokes():  # batch by batch
+            file = pyarrow.parquet.ParquetFile("strokes.parquet")
+            return pyarrow.RecordBatchReader.from_batches(file.schema_arrow, file.iter_batches())
+
+        incise.train(["a.csv", "b.rec", ("strokes", strokes)], group="cut")
+
+    (name, table) names a table; without one it is "source N" by its place in the list. The SHA-256 of
+    the name takes the place of a file's in the random choices and in the notes of the model: with
+    names, the order of the list changes nothing.
+
+    One table is a CSV file, a recording (its pairs averaged in 12 × 10 bins, by cut), or a table as
+    above. The tool searches the premises of more than 20000 pairs on a random sample of them, and
+    holds out other single rows where check is given without group; so does a list, [source] too.
+
+    group: column that names the cut; cross-validation and check keep whole cuts together. In a list
+    also "recording" or "rig"; cuts of different sources are different ones, and a list of recordings
+    only is grouped by "cut" unless told otherwise.
     check: share that is kept back, 0 to 1; its error is in ``model.report``.
     mf: membership functions of each input (default 5, 4; else 3 each), or "auto".
+    classic: the method of MATLAB's anfis; not for a list.
     all_rows: also take rows whose column ``advancing`` is 0.
     Ctrl-C ends the training.
     """
@@ -748,6 +809,12 @@ def train(
     options.classic = classic
     if ridge is not None:
         options.ridge = ridge
+    if isinstance(data, (list, tuple)):
+        from ._corpus import train_sources
+
+        return train_sources(
+            data, names, options, group, check, all_rows, _mf_types[mf_type], counts
+        )
     # Not in this thread, whose KeyboardInterrupt a callback of the reading would swallow.
     dataset, left_out = _library.call_interruptible(
         lambda: _read_dataset(data, names, group, None if all_rows else "advancing"),
@@ -756,23 +823,14 @@ def train(
     training = _Training(dataset, check, options)
 
     def learn() -> Model:
-        model = Model(training.start(names, _mf_types[mf_type], counts))
+        model = Model(start(training.fit.pairs, names, _mf_types[mf_type], counts, options))
         report = training.run(model)
-        model.report = TrainReport(
+        model.report = report_of(
+            report,
             training.fit.pairs.n,
-            training.check.pairs.n if training.has_check else 0,
+            training.check.pairs.n,
             left_out,
-            report.epochs,
-            report.ridge,
-            report.train_rmse,
-            report.check_rmse,
-            report.crossval_rmse,
-            report.condition,
-            report.parameters,
-            report.rules_unfired,
-            report.train_r2,
-            report.check_r2,
-            training.baselines(),
+            baselines(training.fit, training.check) if training.has_check else {},
         )
         return model
 

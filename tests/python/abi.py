@@ -14,10 +14,10 @@ import sys
 import tempfile
 
 import incise
-from incise import _library, arrow, calibrate, model, plan, recording, verify
+from incise import _corpus, _library, arrow, calibrate, model, plan, recording, verify
 
 HEADERS = (
-    "arrow camera calibrate_depth calibrate_force calibrate_tip calibration fixed model plan recording "
+    "arrow camera calibrate_depth calibrate_force calibrate_tip calibration corpus fixed model plan recording "
     "stability tracker train uncertainty verify"
 ).split()
 
@@ -25,7 +25,7 @@ HEADERS = (
 def structs():
     """All structs with a name in C, once each."""
     found = {}
-    for module in (_library, arrow, calibrate, model, plan, recording, verify):
+    for module in (_corpus, _library, arrow, calibrate, model, plan, recording, verify):
         for value in vars(module).values():
             if (
                 isinstance(value, type)

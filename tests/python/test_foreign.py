@@ -91,6 +91,39 @@ class Foreign(Case):
             if not sliced:
                 self.assertEqual(model((5, 20)), wanted, type(other))
 
+    def test_training_from_a_parquet_file_in_batches(self):
+        """The docstring's way; the same pairs by any producer that has the same name."""
+        import pyarrow.parquet
+
+        table = self.tables["bins"]
+        pyarrow.parquet.write_table(pyarrow.table(table), self.path("bins.parquet"))
+
+        def read():
+            file = pyarrow.parquet.ParquetFile(self.path("bins.parquet"))
+            return pyarrow.RecordBatchReader.from_batches(
+                file.schema_arrow, file.iter_batches(batch_size=100)
+            )
+
+        def fails(batches=iter(((), (1,)))):
+            reader = read()
+            part = next(batches)  # none left in the first pass, a wrong one in the second
+
+            def all_batches():
+                yield from reader
+                for _ in part:
+                    raise RuntimeError("disk on fire")
+
+            return pyarrow.RecordBatchReader.from_batches(reader.schema, all_batches())
+
+        options = {"group": "cut", "check": 0.3, "mf": (2, 2), "starts": 1}
+        wanted = incise.train([("bins", table)], **options)((5, 20))
+        for other in (read, pyarrow.table(table), polars.DataFrame(table)):
+            model = incise.train([("bins", other)], **options)
+            self.assertEqual(model((5, 20)), wanted)
+        self.says(incise.Error, "bins: Arrow stream", incise.train, [("bins", fails)], mf=(2, 2))
+        with self.assertRaises(Exception):  # a reader is used up by the first pass
+            incise.train([read()], mf=(2, 2))
+
     def test_a_consumer_that_stops_early(self):
         for table in self.tables.values():
             reader = pyarrow.RecordBatchReader.from_stream(table)

@@ -16,6 +16,8 @@ import incise
 from fixtures import SANITIZED, SOURCE, Case, has, run
 
 OPTIONS = {"group": "cut", "check": 0.3}
+QUICK = {"mf": (2, 2), "starts": 1, "epochs": 5}
+QUICK_TOOL = ("--mf", "2,2", "--starts", "1", "--epochs", "5")
 
 
 class Models(Case):
@@ -183,6 +185,126 @@ class Models(Case):
             ({"inputs": ("depth_mm",), "mf": (3, 3)}, "a count"),
         ):
             self.says(incise.Invalid, said, incise.train, self.csv, **options)
+
+    def same_files(self, model, wanted):
+        model.save(self.path("list.fis"))
+        for end in ("", ".sd"):
+            with open(self.path("list.fis") + end) as a, open(wanted + end) as b:
+                self.assertEqual(a.read(), b.read())
+
+    def test_training_from_many_sources_is_that_of_the_tool(self):
+        """Two CSV files and a recording; then recordings alone, which have groups by default."""
+        rec = os.path.join(self.shared, "short.rec")
+        with open(self.csv) as file:
+            head, *rows = [line for line in file if not line.startswith("#")]
+        for name, part in (("a.csv", rows[::2]), ("b.csv", rows[1::2])):
+            with open(self.path(name), "w") as file:
+                file.writelines([head, *part])
+        paths = [self.path("a.csv"), rec, self.path("b.csv")]
+        wanted = self.path("tool.fis")
+        grouped = ("--group", "cut", "--check", "0.3")
+        run("incise", "train", *paths, *grouped, *QUICK_TOOL, "-o", wanted)
+        with incise.open(rec) as opened:
+            model = incise.train((paths[2], opened, paths[0]), **OPTIONS, **QUICK)
+        self.same_files(model, wanted)
+        self.same_files(pickle.loads(pickle.dumps(model)), wanted)
+        self.assertGreater(model.report.pairs, 20000)
+        self.assertGreater(model.report.left_out, 0)
+        self.assertLess(model.report.check_rms_error, model.report.baselines["mean"])
+        for options, arguments in (
+            ({}, ()),
+            ({"group": "rig", "all_rows": True}, ("--group", "rig", "--all-rows")),
+        ):
+            run("incise", "train", rec, *arguments, *QUICK_TOOL, "--overwrite", "-o", wanted)
+            self.same_files(incise.train([rec], **options, **QUICK), wanted)
+
+    def test_training_from_tables_that_are_read_twice(self):
+        rec = incise.open(os.path.join(self.shared, "short.rec"))
+        table = rec.pairs(depth_bins=12, velocity_bins=10, by_cut=True)
+        calls = []
+
+        def anew():
+            calls.append(1)
+            return table
+
+        sources = [("bins", anew), ("all", rec.pairs(rate_hz=100))]
+        model = incise.train(sources, **OPTIONS, **QUICK)
+        self.assertEqual(len(calls), 2)
+        again = incise.train(sources[::-1], **OPTIONS, **QUICK)
+        self.assertEqual(again((5, 20)), model((5, 20)))
+        model.save(self.path("a.fis"))
+        self.assertIn("bins\n", run("incise", "info", self.path("a.fis")))
+        # pairs that are not sampled, in one source: the grid and its consequents are those of a table
+        one = incise.train([table], group="cut")
+        self.assertAlmostEqual(one((5, 20)), incise.train(table, group="cut")((5, 20)), places=9)
+
+    def test_wrong_sources(self):
+        good = {"depth_mm": [1.0, 2], "velocity_mm_s": [1, 2], "force_N": [1, 2]}
+        passes = []
+
+        def fails():
+            passes.append(1)
+            if len(passes) > 1:
+                raise RuntimeError("no second pass")
+            return incise.open(os.path.join(self.shared, "short.rec")).pairs(rate_hz=50)
+
+        def shrinks():
+            passes.append(1)
+            return incise.open(os.path.join(self.shared, "short.rec")).pairs(
+                rate_hz=50 * len(passes)
+            )
+
+        self.says(RuntimeError, "no second pass", incise.train, [fails], **QUICK)
+        self.assertEqual(len(passes), 2)
+        passes.clear()
+        self.says(incise.Error, "source 1: has changed", incise.train, [shrinks], **QUICK)
+        os.mkfifo(self.path("pipe"))
+        for data, said in (
+            ([], "no rows"),
+            ([self.csv, good, lambda: 5], "a int is no table"),
+            ([("a", good), ("a", good)], "name 'a': is given twice"),
+            ([("", good)], "a name of one line"),
+            ([("a\nb", good)], "a name of one line"),
+            ([("a", self.csv)], "leave the name out"),
+            ([self.csv, self.csv], "has the same content"),
+            ([self.path("none.csv")], "none.csv"),
+            ([self.path("none.rec")], "no such recording"),
+            ([self.path("pipe")], "is no file"),
+            ([("a", {**good, "force_N": [1, math.nan]})], "a: Arrow stream, row 1, column force_N"),
+            ([{"depth_mm": [1.0]}], "source 1: Arrow stream: no column 'velocity_mm_s'"),
+        ):
+            self.says(incise.Error, said, incise.train, data)
+        self.says(incise.Invalid, "classic", incise.train, [self.csv], classic=True)
+
+    def test_ctrl_c_ends_the_reading_of_a_source(self):
+        """A table without end; the signal comes when its rows are being read."""
+        script = (
+            "import incise, sys\n"
+            "from incise import _producer\n"
+            "class Endless(_producer.ColumnStream):\n"
+            "    def _get_next(self, stream, out):\n"
+            "        print('ready', flush=True) if not self._given else None\n"
+            "        super()._get_next(stream, out)\n"
+            "        return 0 if out.contents.length else self.again(stream, out)\n"
+            "    def again(self, stream, out):\n"
+            "        self._given = False\n"
+            "        super()._get_next(stream, out)\n"
+            "        self._given = True\n"
+            "        return 0\n"
+            "_producer.ColumnStream = Endless\n"
+            "data = {'depth_mm': [1.0, 2], 'velocity_mm_s': [1, 2], 'force_N': [1, 2]}\n"
+            "try:\n"
+            "    incise.train([data])\n"
+            "except KeyboardInterrupt:\n"
+            "    print('stopped')\n"
+        )
+        process = subprocess.Popen(
+            [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True
+        )
+        self.assertEqual(process.stdout.readline(), "ready\n")
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=300)
+        self.assertEqual((out, process.returncode), ("stopped\n", 0))
 
     def test_ctrl_c_ends_a_training(self):
         """A training of minutes ends by KeyboardInterrupt, and leaves nothing behind."""

@@ -76,6 +76,15 @@ INCISE_API struct incise_corpus *incise_corpus_new(int n_inputs, bool grouped,
 INCISE_API void incise_corpus_free(struct incise_corpus *corpus);
 
 /**
+ * Let another thread or a signal handler end the reading of a source: survey and fold return
+ * -ECANCELED at the next row once @stop is not 0.
+ *
+ * @param stop outlives the corpus; NULL (default): none
+ */
+INCISE_API void incise_corpus_set_stop(struct incise_corpus *corpus,
+				       const volatile int *stop);
+
+/**
  * Survey a source.
  *
  * @return 0; -EEXIST (its hash is there already), -ENOMEM, or the negative errno of its read: the

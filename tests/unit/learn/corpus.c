@@ -136,7 +136,7 @@ static void test_refused(void **state)
 	static const int one[] = {0, 1};
 	struct incise_corpus *corpus = survey(one, 1, true, true);
 	struct incise_variable inputs[] = {{"a", 0, 20}, {"b", 0, 2}}, out = {"c", -1, 3};
-	const int n_mfs[] = {2, 2};
+	const int n_mfs[] = {2, 2}, stop = 1;
 	struct incise_model *model =
 		incise_model_new_grid(2, inputs, n_mfs, INCISE_MF_GAUSS, &out, NULL);
 	struct incise_factor *fit = incise_factor_new(model, NULL);
@@ -149,6 +149,11 @@ static void test_refused(void **state)
 	made.rows--;
 	assert_int_equal(incise_corpus_fold(corpus, &made.source, fit, NULL, NULL, &err),
 			 -ESTALE);
+	incise_corpus_set_stop(corpus, &stop);
+	make(&made, 1, true);
+	assert_int_equal(incise_corpus_survey(corpus, &made.source, &err), -ECANCELED);
+	assert_int_equal(incise_corpus_fold(corpus, &made.source, fit, NULL, NULL, &err),
+			 -ECANCELED);
 	incise_corpus_free(corpus);
 	corpus = incise_corpus_new(2, true, 1, 10);
 	assert_int_equal(incise_corpus_settle(corpus, 0, &err), -ENODATA);
