@@ -411,23 +411,27 @@ def call_interruptible(call, cancel):
 
     if threading.current_thread() is not threading.main_thread():
         return call()
-    result = []
+    result, done, stopped = [], threading.Event(), False
 
     def run():
         try:
             result.append((True, call()))
         except BaseException as failure:  # raised again in the caller
             result.append((False, failure))
+        finally:
+            done.set()
 
-    thread = threading.Thread(target=run, daemon=True)
-    thread.start()
-    try:
-        while thread.is_alive():
-            thread.join(0.1)
-    except KeyboardInterrupt:
-        cancel()
-        thread.join()
-        raise
+    threading.Thread(target=run, daemon=True).start()
+    # Not Thread.join(), which before Python 3.13 takes an interrupted wait for the thread's end; and
+    # through every Ctrl-C, since the caller frees what the call uses.
+    while not done.is_set():
+        try:
+            done.wait(0.1)
+        except KeyboardInterrupt:
+            stopped = True
+            cancel()
+    if stopped:
+        raise KeyboardInterrupt
     good, value = result[0]
     if not good:
         raise value

@@ -276,6 +276,16 @@ class Models(Case):
             self.says(incise.Error, said, incise.train, data)
         self.says(incise.Invalid, "classic", incise.train, [self.csv], classic=True)
 
+    def interrupt(self, script, wanted, after_s=0):
+        process = subprocess.Popen(
+            [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True
+        )
+        self.assertEqual(process.stdout.readline(), "ready\n")
+        time.sleep(after_s)
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=300)
+        self.assertEqual((out, process.returncode), (wanted, 0))
+
     def test_ctrl_c_ends_the_reading_of_a_source(self):
         """A table without end; the signal comes when its rows are being read."""
         script = (
@@ -298,13 +308,23 @@ class Models(Case):
             "except KeyboardInterrupt:\n"
             "    print('stopped')\n"
         )
-        process = subprocess.Popen(
-            [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True
+        self.interrupt(script, "stopped\n")
+
+    def test_ctrl_c_waits_for_what_is_in_use(self):
+        """A source that cannot be stopped is at its end before anything is freed."""
+        script = (
+            "import incise, time\n"
+            "ended = []\n"
+            "def slow():\n"
+            "    print('ready', flush=True)\n"
+            "    time.sleep(1)\n"
+            "    ended.append(1)\n"
+            "try:\n"
+            "    incise.train([slow])\n"
+            "except KeyboardInterrupt:\n"
+            "    print('stopped', len(ended))\n"
         )
-        self.assertEqual(process.stdout.readline(), "ready\n")
-        process.send_signal(signal.SIGINT)
-        out, _ = process.communicate(timeout=300)
-        self.assertEqual((out, process.returncode), ("stopped\n", 0))
+        self.interrupt(script, "stopped 1\n")
 
     def test_ctrl_c_ends_a_training(self):
         """A training of minutes ends by KeyboardInterrupt, and leaves nothing behind."""
@@ -320,14 +340,8 @@ class Models(Case):
             "except KeyboardInterrupt:\n"
             "    print('stopped')\n"
         )
-        process = subprocess.Popen(
-            [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True
-        )
-        self.assertEqual(process.stdout.readline(), "ready\n")
-        time.sleep(1)  # most of the time it trains then; it has to end whatever it does
-        process.send_signal(signal.SIGINT)
-        out, _ = process.communicate(timeout=300)
-        self.assertEqual((out, process.returncode), ("stopped\n", 0))
+        # most of the time it trains then; it has to end whatever it does
+        self.interrupt(script, "stopped\n", after_s=1)
 
     @unittest.skipIf(SANITIZED, "a sanitizer keeps freed memory")
     def test_nothing_leaks(self):
