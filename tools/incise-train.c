@@ -33,6 +33,7 @@ struct options {
 	const char *model, *initial, *history, *premises, *factor;
 	bool damaged;
 	double rate;
+	long sample; /* pairs; 0: all */
 	struct shard {
 		long at, of; /* of 0: all sources */
 	} shard;
@@ -147,6 +148,10 @@ static const struct cli_option option_table[] = {
 	 "number of starting points of the membership functions\n"
 	 "(default: 3)",
 	 CLI_INTEGER(struct options, train.starts, 1, 100)},
+	{0, "sample", "N",
+	 "pairs that the search of the membership functions uses, at\n"
+	 "random; 0: all (default: 3000)",
+	 CLI_INTEGER(struct options, sample, 0, 1000000000)},
 	{0, "classic", NULL,
 	 "train as MATLAB's anfis does: no scaling, a ridge of 1e-6;\n"
 	 "the held-out data choose the epoch",
@@ -195,6 +200,7 @@ static void parse(struct options *options, int argc, char **argv)
 		.inputs = {"depth_mm", "velocity_mm_s"},
 		.n_inputs = 2,
 		.target = "force_N",
+		.sample = -1,
 	};
 	incise_train_options_init(&options->train);
 	cli_parse(&command, argc, argv, options);
@@ -202,6 +208,13 @@ static void parse(struct options *options, int argc, char **argv)
 	options->n_paths = argc - optind;
 	if (!options->n_paths)
 		cli_usage("missing DATA.csv or NAME.rec (pairs to learn from)");
+	if (options->sample >= 0)
+		options->train.tuned =
+			options->sample ? (size_t)options->sample : SIZE_MAX;
+	if (options->sample >= 0 && (options->premises || options->train.classic))
+		cli_usage(
+			"--sample: --premises and --classic do not search on a sample; leave "
+			"it out");
 	if (options->shard.of && !options->factor)
 		cli_usage(
 			"--shard: missing --factor SHARE.fac; incise merge makes a model of "
@@ -423,15 +436,20 @@ static struct incise_model *start_model(struct options *options,
 /* The options that a model depends on, for people: free(3). */
 static char *options_text(const struct options *options)
 {
-	char check[40] = "";
+	char check[40] = "", sample[40] = "";
 
+	if (options->sample >= 0)
+		snprintf(sample, sizeof(sample), ", search on %ld pairs",
+			 options->sample);
+	if (!options->sample)
+		strcpy(sample, ", search on all pairs");
 	if (options->check > 0)
 		snprintf(check, sizeof(check), ", %g held out with seed %llu",
 			 options->check, (unsigned long long)options->train.seed);
-	return cli_text("%sgroups: %s%s%s%s", options->train.classic ? "classic, " : "",
+	return cli_text("%sgroups: %s%s%s%s%s", options->train.classic ? "classic, " : "",
 			options->group ? options->group : "none",
 			options->all_rows ? ", all rows" : "",
-			options->rate > 0 ? ", averaged" : "", check);
+			options->rate > 0 ? ", averaged" : "", sample, check);
 }
 
 static struct incise_factor *new_factor(const struct options *options,
@@ -900,9 +918,10 @@ static struct incise_corpus *survey(struct options *options,
 				    struct source *sources, struct progress *progress,
 				    struct reading *reading)
 {
+	size_t sample = options->train.classic ? SIZE_MAX : options->train.tuned;
 	struct incise_corpus *corpus = incise_corpus_new(
 		options->n_inputs, how->group, options->train.seed,
-		options->train.classic ? SIZE_MAX : INCISE_CORPUS_SAMPLE);
+		sample > INCISE_CORPUS_SAMPLE ? sample : INCISE_CORPUS_SAMPLE);
 	struct incise_error err = {0};
 	uint64_t none = 0;
 	int rc = 0;

@@ -24,9 +24,6 @@
 /* MATLAB's recursive least squares starts with S = 1e6 I, which is this ridge. */
 #define CLASSIC_RIDGE 1e-6
 
-/* Pairs that settle ridge and premises; beyond, more of them change neither. */
-#define TUNED_MAX 3000
-
 /* Just enough that the standard deviation is finite where the user wants no ridge. */
 #define LEAST_RIDGE 1e-9
 
@@ -306,7 +303,9 @@ static int learn(struct learner *l)
 	if (rc)
 		return rc;
 	n = l->basis.n_rules * (l->basis.n_inputs + 1);
-	most = (size_t)3 * n > TUNED_MAX ? (size_t)3 * n : TUNED_MAX;
+	most = l->options->tuned ? l->options->tuned : TUNED_PAIRS;
+	if (most < (size_t)3 * n)
+		most = (size_t)3 * n;
 	l->consequents = malloc(n * sizeof(*l->consequents));
 	l->lsq = incise_lsq_new(n);
 	if (!l->consequents || !l->lsq)

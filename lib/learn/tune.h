@@ -24,6 +24,9 @@ struct incise_tuning {
 	struct incise_average *average;
 };
 
+/* Pairs that a search uses unless told otherwise. */
+#define TUNED_PAIRS 3000
+
 /* Returns 0, -EDOM, -ENOMEM. */
 int incise_tune(const struct incise_basis *basis, const struct incise_folds *folds,
 		const struct incise_train_options *options, struct incise_tuning *tuning);

@@ -72,6 +72,7 @@ class TrainOptionsStruct(ctypes.Structure):
         ("progress", _Progress),
         ("user", c_void_p),
         ("starts", c_int),
+        ("tuned", ctypes.c_size_t),
         ("stop", ctypes.POINTER(c_int)),
         ("uncertainty", ctypes.POINTER(c_void_p)),
         ("ranges", ctypes.POINTER(VariableStruct)),

@@ -292,6 +292,23 @@ holds_on_unseen_cuts() {
 	bad_usage --mf
 }
 
+@test "train --sample sets how many pairs the search uses" {
+	awk -v OFS=, 'BEGIN { print "depth_mm,velocity_mm_s,force_N"
+		for (i = 0; i < 5000; i++) { d = i * 7919 % 2011 / 100; v = i * 104729 % 5021 / 100
+			print d, v, d * 0.1 + v * d * 0.001 } }' >some.csv
+	# three pairs for each consequent of a rule at least: 3 · 4 · 3
+	for sample in :3000 10:36 4000:4000 0:5000; do
+		# shellcheck disable=SC2086 # none where there is none
+		incise train some.csv --mf 2,2 $([ -z "${sample%:*}" ] || echo "--sample ${sample%:*}") \
+			-o m.fis --overwrite --json >r.json 2>/dev/null
+		[ "$(key r.json pairs_tuned)" = "${sample#*:}" ] || complain "$sample: $(key r.json pairs_tuned)" || return
+		[ "$(key r.json pairs)" = 5000 ]
+	done
+	grep -q '^% incise: options: .*search on all pairs' m.fis
+	run --separate-stderr incise train some.csv --premises m.fis --sample 10 -o n.fis
+	bad_usage --sample
+}
+
 @test "train takes a million pairs within 300 MB" {
 	awk -v OFS=, 'BEGIN { print "cut,depth_mm,velocity_mm_s,force_N"
 		for (i = 0; i < 1000000; i++) { d = i * 7919 % 20011 / 1000; v = i * 104729 % 50021 / 1000

@@ -62,6 +62,11 @@ struct incise_train_options {
 	void *user;
 	/** Number of initial premises: the given ones and others near them; default 3. */
 	int starts;
+	/**
+	 * Pairs that the search of the premises and of the ridge uses, at random; at least three for
+	 * each consequent. 0 (default): 3000. SIZE_MAX: all, in time that grows with them.
+	 */
+	size_t tuned;
 	/** Training ends soon with -ECANCELED when another thread or a signal handler makes it other
 	 *  than 0; or NULL. */
 	const volatile int *stop;
