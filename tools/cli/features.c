@@ -82,7 +82,7 @@ static const struct {
 	{"camera", "cameras", ""},	   {"stepper", "steppers", "kernel"},
 	{"vision", "vision", ""},	   {"board", "chessboard", ""},
 	{"frames", "frames", ""},	   {"film", "video", ""},
-	{"export", "export", "csv, mcap"},
+	{"export", "export", "csv, mcap"}, {"ranks", "parallel", ""},
 };
 
 #define KINDS (sizeof(kinds) / sizeof(*kinds))
