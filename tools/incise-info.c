@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <incise/factor.h>
 #include <incise/fixed.h>
 #include <incise/model.h>
 #include <incise/recording.h>
@@ -66,12 +67,13 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "info",
 	.synopsis =
-		"MODEL.fis|MODEL.fx|NAME.plan|NAME.rec|stepper|/dev/incise-stepperN|can:IFACE|"
+		"MODEL.fis|MODEL.fx|NAME.plan|NAME.fac|NAME.rec|stepper|/dev/incise-stepperN|can:IFACE|"
 		"slcan:TTY|devices|DATA.csv… [OPTIONS]",
-	.summary = "Describe a model, a compiled model, a compiled scene or a recording; "
-		   "the state and cost\n"
-		   "of the kernel's stepper module; the drives on a CAN bus; or the "
-		   "devices that are attached.",
+	.summary =
+		"Describe a model, a compiled model, a compiled scene, a factor or a recording; "
+		"the state and cost\n"
+		"of the kernel's stepper module; the drives on a CAN bus; or the "
+		"devices that are attached.",
 	.options = options,
 	.notes =
 		"Example:\n  incise info can:can0\n\nExit: 0 shown, 1 failed, 2 bad usage. See incise-info(1).",
@@ -628,6 +630,42 @@ static void check_exists(const char *path)
 			 path, strerror(errno));
 }
 
+/* A factor, which incise merge makes models of. */
+static void show_factor(const char *path, bool json)
+{
+	struct incise_error err = {0};
+	struct incise_factor *factor = cli_require(incise_factor_load(path, &err), &err);
+	struct incise_factor_info info;
+	json_t *sources = json_array();
+
+	incise_factor_info(factor, &info);
+	for (int i = 0; i < info.n_sources; i++)
+		json_array_append_new(
+			sources, json_pack("{ss so sI}", "sha256", info.sources[i].hash,
+					   "text", json_text(info.sources[i].text),
+					   "rows", (json_int_t)info.sources[i].rows));
+	if (json) {
+		json_print(json_pack("{ss sI sI si si ss so so so}", "kind", "factor",
+				     "pairs", (json_int_t)info.rows, "groups",
+				     (json_int_t)info.groups, "n_inputs", info.n_inputs,
+				     "n_rules", info.n_rules, "premises", info.premises,
+				     "version", json_text(info.version), "options",
+				     json_text(info.options), "sources", sources));
+	} else {
+		printf("factor of %llu pairs, groups %llu, %d rules, %d inputs\n"
+		       "premises   %s\nversion    %s\noptions    %s\n",
+		       (unsigned long long)info.rows, (unsigned long long)info.groups,
+		       info.n_rules, info.n_inputs, info.premises, info.version,
+		       info.options);
+		for (int i = 0; i < info.n_sources; i++)
+			printf("source     %s  %llu pairs, %s\n", info.sources[i].hash,
+			       (unsigned long long)info.sources[i].rows,
+			       info.sources[i].text);
+		json_decref(sources);
+	}
+	incise_factor_free(factor);
+}
+
 static void show_dataset(struct job *job, char **paths, int n)
 {
 	const char *columns[INCISE_MODEL_INPUTS_MAX + 1];
@@ -666,12 +704,12 @@ int main(int argc, char **argv)
 		cli_usage("--group and --all-rows go with --dataset");
 	path = cli_operand(argc, argv, "FILE", "recording, model or plan; or a device");
 	if (!stepper_module_is(path) && strcmp(path, "devices") && !is_bus(path))
-		file_expect(path,
-			    FILE_RECORDING | FILE_MODEL | FILE_COMPILED | FILE_PLAN);
+		file_expect(path, FILE_RECORDING | FILE_MODEL | FILE_COMPILED |
+					  FILE_PLAN | FILE_FACTOR);
 	kind = file_kind_of(path);
 	compiled = kind ? kind == FILE_COMPILED : cli_ends_with(path, ".fx");
 	plan = kind ? kind == FILE_PLAN : cli_ends_with(path, ".plan");
-	if (job.plot && (is_recording(path) || compiled || plan ||
+	if (job.plot && (is_recording(path) || compiled || plan || kind == FILE_FACTOR ||
 			 stepper_module_is(path) || is_bus(path)))
 		cli_usage("--plot goes with a model (MODEL.fis); 'incise plot' draws "
 			  "other files");
@@ -687,6 +725,8 @@ int main(int argc, char **argv)
 		check_exists(path);
 		if (compiled)
 			show_compiled(path, job.json);
+		else if (kind == FILE_FACTOR || (!kind && cli_ends_with(path, ".fac")))
+			show_factor(path, job.json);
 		else if (plan)
 			show_plan(path, job.json);
 		else

@@ -126,9 +126,10 @@ static void print_report(const struct options *options,
 	       (unsigned long long)info->rows, (unsigned long long)info->groups,
 	       info->n_sources);
 	if (!isnan(report->train_rmse))
-		printf("RMSE %.5g, R² %.5g, held out %.5g; ridge %g\n",
-		       report->train_rmse, report->train_r2, report->crossval_rmse,
-		       report->ridge);
+		printf("RMSE %.5g, R² %.5g, ridge %g\n", report->train_rmse,
+		       report->train_r2, report->ridge);
+	if (!isnan(report->crossval_rmse))
+		printf("RMSE of parts that were held out %.5g\n", report->crossval_rmse);
 	cli_written();
 }
 

@@ -31,6 +31,7 @@ models() {
 	report info.compiled info m.fx
 	report info.plan info liver.plan
 	report info.devices info devices
+	report info.factor info m.fac
 	report info.dataset info --dataset pairs.csv --group cut
 }
 

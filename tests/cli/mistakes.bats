@@ -23,6 +23,7 @@ setup() {
 	printf '5,3 20,1\n' >comma.txt
 	printf '5\n' >one.txt
 	printf 'tissue = { reaction_N_mm = 50.0; };\n' >stiff.scene
+	printf 'incise factor 1\n' >m.fac
 	mkdir bad.rec
 	head -c 4096 /dev/zero >bad.rec/recording.db
 }
@@ -65,6 +66,7 @@ table() {
 		1|compile m.fx -o x.fx|incise compile: m.fx: this is a compiled model (.fx), not a model (.fis) or a scene; give a scene, and the model with --model m.fx
 		2|eval|incise eval: missing MODEL.fis or MODEL.fx (model)
 		1|eval pairs.csv|incise eval: pairs.csv: this is a CSV table (separated by commas), not a model (.fis) or a compiled model (.fx); learn a model from it: 'incise train pairs.csv -o MODEL.fis'
+		1|eval m.fac|incise eval: m.fac: this is a factor (.fac), not a model (.fis) or a compiled model (.fx); make a model of it: 'incise merge m.fac -o MODEL.fis'
 		1|eval m.fs|incise eval: m.fs: no such file; did you mean m.fis?
 		1|eval m.fis unit.txt|incise eval: unit.txt:1: column 1 (depth_mm): '5mm' is not a number; write 2 numbers without units, and '#' before a heading
 		1|eval m.fis comma.txt|incise eval: comma.txt:1: column 3: '20,1' is more than the 2 inputs; write decimal points, not commas
@@ -72,8 +74,8 @@ table() {
 		2|eval m.fis --arith flaot|incise eval: --arith: expected double or fixed, found 'flaot'
 		2|eval m.fis --grid 20|incise eval: --grid: expected NxM with 2 to 10000 each, for example 20x15, found '20'
 		2|eval m.fx --no-clamp|incise eval: --no-clamp: m.fx is compiled and cannot extrapolate; give the .fis file that it was compiled from
-		1|info pairs.csv|incise info: pairs.csv: this is a CSV table (separated by commas), not a recording, a model (.fis), a compiled model (.fx) or a compiled scene (.plan); learn a model from it: 'incise train pairs.csv -o MODEL.fis'
-		1|info rig.conf|incise info: rig.conf: this is the configuration of a rig, not a recording, a model (.fis), a compiled model (.fx) or a compiled scene (.plan); name it with --rig rig.conf
+		1|info pairs.csv|incise info: pairs.csv: this is a CSV table (separated by commas), not a recording, a model (.fis), a compiled model (.fx), a compiled scene (.plan) or a factor (.fac); learn a model from it: 'incise train pairs.csv -o MODEL.fis'
+		1|info rig.conf|incise info: rig.conf: this is the configuration of a rig, not a recording, a model (.fis), a compiled model (.fx), a compiled scene (.plan) or a factor (.fac); name it with --rig rig.conf
 		2|plan|incise plan: missing SCENE (file, or name of an installed scene, for example liver)
 		1|plan livr|incise plan: livr: no such scene; did you mean liver?
 		1|plan m.fis|incise plan: m.fis: this is a model (.fis), not a scene; give a scene, and the model with --model m.fis

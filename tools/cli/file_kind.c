@@ -49,6 +49,8 @@ static const struct {
 	 "convert it, and decimal commas with it: sed 's/,/./g; s/;/,/g' %1$s > NEW.csv"},
 	{"a table separated by tabs", ".csv",
 	 "convert it: tr '\\t' ',' < %1$s > NEW.csv"},
+	{"a factor (.fac)", ".fac",
+	 "'incise info %1$s' describes it, 'incise merge' makes a model of factors"},
 };
 
 /* The command that makes one kind from another. */
@@ -67,6 +69,8 @@ static const struct {
 	{FILE_MODEL, FILE_SCENE, "give a scene, and the model with --model %1$s"},
 	{FILE_COMPILED, FILE_SCENE, "give a scene, and the model with --model %1$s"},
 	{FILE_COMPILED, FILE_MODEL, "give the .fis file that it was compiled from"},
+	{FILE_FACTOR, FILE_MODEL | FILE_COMPILED,
+	 "make a model of it: 'incise merge %1$s -o MODEL.fis'"},
 	{FILE_PLAN, FILE_SCENE, "give the scene that it was compiled from"},
 };
 
@@ -225,6 +229,7 @@ static enum file_kind kind_of_bytes(const char *head, size_t n)
 		{FILE_COMPILED, "INCISEFX"},
 		{FILE_PLAN, "INCISEPL"},
 		{FILE_STATE, "INCSTATE"},
+		{FILE_FACTOR, "incise factor "},
 		{FILE_VIDEO, "\x1a\x45\xdf\xa3"},
 		{FILE_EXPORT, "\x89HDF\r\n\x1a\n"},
 		{FILE_EXPORT, "\x89MCAP0\r\n"},
