@@ -27,19 +27,20 @@ int32_t incise_fixed_input_acceleration(const int32_t velocity[3],
 	return incise_fx_hold32(div64_s64(sum, speed) * 16);
 }
 
+/* atan 2^-k, Q24 degrees */
+static const int32_t turn[] = {
+	754974720, 445687602, 235489088, 119537938, 60000934, 30029717, 15018523,
+	7509720,   3754917,   1877466,	 938734,    469367,   234684,	117342,
+	58671,	   29335,     14668,	 7334,	    3667,     1833,	917,
+	458,	   229,	      115,	 57,	    29,	      14,	7,
+};
+
 /*
  * atan2(y, x) in the first quadrant, Q16.16 degrees, by CORDIC (Volder 1959): the vector is turned
  * to the x axis by ever smaller angles whose tangents are powers of two.
  */
 static int32_t turn_of(int64_t x, int64_t y)
 {
-	/* atan 2^-k, Q24 degrees */
-	static const int32_t turn[] = {
-		754974720, 445687602, 235489088, 119537938, 60000934, 30029717, 15018523,
-		7509720,   3754917,   1877466,	 938734,    469367,   234684,	117342,
-		58671,	   29335,     14668,	 7334,	    3667,     1833,	917,
-		458,	   229,	      115,	 57,	    29,	      14,	7,
-	};
 	int64_t angle = 0;
 
 	/* Q38, so that what is shifted out does not count. */
