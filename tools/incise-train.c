@@ -651,7 +651,8 @@ static void report_json(const struct result *result, json_t *warned)
 			json_array_append_new(unfired, json_integer(r + 1));
 	json_object_set_new(object, "unfired_rules", unfired);
 	for (int i = 0; i < options->n_inputs; i++)
-		json_array_append_new(mfs, json_integer(options->mfs[i]));
+		json_array_append_new(mfs,
+				      json_integer(incise_model_info(model)->n_mfs[i]));
 	json_object_set_new(object, "mf", mfs);
 	json_set_integer(object, "start", report->start);
 	json_set_integer(object, "pairs_tuned", report->pairs_tuned);
@@ -734,6 +735,9 @@ static bool alone = true; /* a failure is not shared: others would wait for ever
 
 static void leave_job(void)
 {
+	/* Rank 0 may fail of the same, and is the one that says so. */
+	if (alone && job->rank)
+		sleep(2);
 	job->close(alone);
 }
 
@@ -854,8 +858,9 @@ static void add_up(const struct options *options, struct incise_factor *factor)
 		if (ranks->rank + step >= ranks->size)
 			continue;
 		bytes = ranks->receive(ranks->rank + step, &n);
-		other = bytes ? incise_factor_decode(bytes, n, "another rank", &err)
-			      : NULL;
+		if (!bytes)
+			cli_fail("no memory for the sums of another rank");
+		other = incise_factor_decode(bytes, n, "another rank", &err);
 		if (!other || incise_factor_merge(factor, other, "another rank", &err))
 			cli_fail_with(&err);
 		incise_factor_free(other);
@@ -896,7 +901,9 @@ static int resume_surveys(const struct progress *progress, struct incise_corpus 
 	if (!surveys || sources_size != n * sizeof(*all))
 		return 0;
 	if (incise_corpus_add(corpus, surveys, size, &err))
-		cli_fail("%s; remove the file .progress next to the output", err.text);
+		cli_fail(
+			"the progress of an interrupted training is damaged; it is removed, "
+			"start again");
 	done = incise_corpus_sources(corpus);
 	for (int i = 0; i < done && i < n; i++) {
 		const struct incise_corpus_survey *survey =
@@ -904,7 +911,7 @@ static int resume_surveys(const struct progress *progress, struct incise_corpus 
 
 		snprintf(sources[i].hash, sizeof(sources[i].hash), "%s", survey->hash);
 		snprintf(sources[i].text, sizeof(sources[i].text), "%s", survey->text);
-		snprintf(sources[i].rig, sizeof(sources[i].rig), "%s", all[i].rig);
+		snprintf(sources[i].rig, sizeof(sources[i].rig), "%.255s", all[i].rig);
 		sources[i].left_out = all[i].left_out;
 	}
 	cli_error("goes on from an interrupted training: %d of %d sources are surveyed",
@@ -1153,6 +1160,8 @@ static void save_factor(const struct options *options, struct incise_factor *fac
 			INCISE_FACTOR_PAIRS_MIN);
 	if (incise_factor_save(factor, options->factor, &err))
 		cli_fail_with(&err);
+	if (!strcmp(options->factor, "-"))
+		return;
 	printf("%s: %llu pairs of %llu groups, premises %.12s\n", options->data,
 	       (unsigned long long)info.rows, (unsigned long long)info.groups,
 	       info.premises);

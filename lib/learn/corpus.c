@@ -400,6 +400,11 @@ int incise_corpus_add(struct incise_corpus *corpus, const void *bytes, size_t si
 		}
 		memcpy(to->groups, at, n);
 		at += n;
+		for (int g = 0; g < to->n_groups; g++)
+			survey.rows -= to->groups[g].rows;
+		if ((corpus->grouped && survey.rows) ||
+		    strspn(to->hash, "0123456789abcdef") != 64)
+			return incise_error_set(err, EINVAL, "%s", damaged);
 	}
 	return rc;
 }

@@ -424,6 +424,8 @@ int incise_factor_merge(struct incise_factor *factor, struct incise_factor *othe
 	factor->groups += other->groups;
 	if (!had)
 		memcpy(factor->options, other->options, sizeof(factor->options));
+	else if (more && strcmp(factor->options, other->options))
+		strcpy(factor->options, "different in the factors");
 	factor->at = -1;
 	return 0;
 }
@@ -705,7 +707,7 @@ static int decode_statistics(struct decoder *in, struct incise_factor *factor,
 	}
 	for (int f = 0; f < FOLDS; f++) {
 		line = next_line(in, "fold");
-		if (!line || !whole(line, GRAM_ROWS_MAX, &count))
+		if (!line || !whole(line, GRAM_ROWS_MAX - 1, &count))
 			return damaged(in, "expected a number of pairs");
 		incise_gram_set_rows(factor->fold[f], count);
 		sum += count;
@@ -750,10 +752,13 @@ static int decode_sums(struct decoder *in, struct incise_factor *factor)
 static struct incise_factor *decode(struct decoder *in, size_t size)
 {
 	struct incise_factor *factor = NULL;
-	char *line = next_line(in, "incise factor"), hash[65];
+	char *line, hash[65];
 	uint64_t rows = 0, form;
 	uint32_t crc;
 
+	/* First, so that no line reaches into it. */
+	in->end -= sizeof(crc);
+	line = next_line(in, "incise factor");
 	if (!line || !whole(line, UINT32_MAX, &form)) {
 		damaged(in, "expected 'incise factor'");
 		return NULL;
@@ -766,7 +771,6 @@ static struct incise_factor *decode(struct decoder *in, size_t size)
 			in->name, (unsigned long long)form, FORM);
 		return NULL;
 	}
-	in->end -= sizeof(crc);
 	memcpy(&crc, in->end, sizeof(crc));
 	line[strlen(line)] = '\n';
 	if (le32toh(crc) !=

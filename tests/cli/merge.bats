@@ -178,3 +178,35 @@ train_killed_at() {
 	incise train l?.csv --group cut --check 0.3 --seed 2 --mf 3,3 -o m.fis --overwrite >out 2>err
 	run ! grep -q "goes on" err
 }
+
+@test "a factor goes to a pipe, pipes are told apart by their rows, and options that differ are noted" {
+	shares
+	incise train s1.csv --mf 3,2 -o start.fis >/dev/null
+	incise train s1.csv --premises start.fis --group cut --factor a.fac >/dev/null
+	incise train s1.csv --premises start.fis --group cut --factor - >b.fac
+	cmp a.fac b.fac
+	incise train s2.csv --premises start.fis --group cut --all-rows --factor b.fac --overwrite >/dev/null
+	incise merge a.fac b.fac -o m.fis >/dev/null
+	incise merge b.fac a.fac -o n.fis >/dev/null
+	cmp m.fis n.fis
+	grep -q "options: different in the factors" m.fis
+	# of the premises, not of the default
+	incise train s1.csv --premises start.fis -o m.fis --overwrite --json >r.json 2>/dev/null
+	[ "$(key r.json 'mf[0]') $(key r.json 'mf[1]')" = "3 2" ]
+	incise train <(cat s1.csv) <(cat s2.csv) -o m.fis --overwrite >/dev/null 2>&1
+	run --separate-stderr incise train <(cat s1.csv) <(cat s1.csv) -o m.fis --overwrite
+	failed_with "the same content"
+}
+
+@test "a file that has the name of the progress, and is none, stays" {
+	shares
+	cp s1.csv m.fis.progress
+	incise train m.fis.progress s2.csv -o m.fis >/dev/null
+	cmp s1.csv m.fis.progress
+}
+
+@test "a factor whose first line reaches into its checksum is refused" {
+	printf 'incise factor %0224d1\n\223a/' 0 >bad.fac
+	run --separate-stderr incise info bad.fac
+	failed_with bad.fac damaged
+}

@@ -108,6 +108,21 @@ out:
 	free(bytes);
 }
 
+/* A file of another kind, which is not ours to replace or to remove. */
+static bool is_foreign(const char *path)
+{
+	static const char own[] = "incise progress ";
+	char head[sizeof(own)] = "";
+	FILE *in = fopen(path, "r");
+
+	if (!in)
+		return !access(path, F_OK);
+	if (fread(head, 1, sizeof(own) - 1, in) != sizeof(own) - 1)
+		head[0] = 0;
+	fclose(in);
+	return strcmp(head, own) != 0;
+}
+
 struct progress *progress_new(const char *output, const char *options,
 			      const struct source *sources, int n)
 {
@@ -122,6 +137,11 @@ struct progress *progress_new(const char *output, const char *options,
 			return NULL;
 	progress = cli_alloc(1, sizeof(*progress));
 	progress->path = cli_text("%s.progress", output);
+	if (is_foreign(progress->path)) {
+		free(progress->path);
+		free(progress);
+		return NULL;
+	}
 	progress->key = make_key(options, sources, n, &progress->key_size);
 	read_file(progress);
 	progress->last = -1e9;

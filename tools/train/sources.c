@@ -117,9 +117,9 @@ static int read_recording(void *user, incise_row_taker take, void *taker,
 	if (!rc)
 		rc = incise_dataset_each_arrow(&stream, source->options->columns,
 					       source->options->n_columns,
-					       group_column(source), where(source), take,
-					       taker, &source->left_out, err);
-	return name_it(source, rc, err);
+					       group_column(source), where(source),
+					       count_row, source, &source->left_out, err);
+	return name_it(source, end(source, rc), err);
 }
 
 static const char *name_of(const char *path)
@@ -231,23 +231,23 @@ static int stop(void *user, const double *row, const char *group,
 
 int source_open(struct source *source, struct incise_error *err)
 {
-	static const char nothing[] =
-		"0000000000000000000000000000000000000000000000000000000000000000";
 	size_t left_out;
 	int rc;
 
 	if (source->recording)
 		return open_recording(source, err);
 	if (source->corpus.read == read_pipe) {
-		strcpy(source->hash, nothing);
-		strcpy(source->text, "a pipe, which was not hashed");
+		strcpy(source->text, "a pipe");
 		source->pipe =
 			incise_dataset_read_where(source->path, source->options->columns,
 						  source->options->n_columns,
 						  group_column(source), where(source),
 						  &left_out, err);
+		if (!source->pipe)
+			return -errno;
 		source->left_out = left_out;
-		return source->pipe ? 0 : -errno;
+		incise_dataset_sha256(source->pipe, source->hash);
+		return 0;
 	}
 	snprintf(source->text, sizeof(source->text), "%.300s", name_of(source->path));
 	/* A file of another kind is refused before all of it is hashed. */
