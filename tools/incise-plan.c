@@ -360,13 +360,14 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 		       json_string_value(json_array_get(absent, i)));
 	json_decref(mapped);
 	json_decref(absent);
+	incise_plan_stability(plan, &stability);
 	printf("\narithmetic  %s", bound_N > 0 ? "fixed" : "double");
 	if (bound_N > 0)
-		printf(", reaction and plane within %.3g mN, certified", bound_N * 1e3);
+		printf(", reaction and plane within %.3g mN, %s", bound_N * 1e3,
+		       stability.certified ? "certified" : "by estimated slopes");
 	putchar('\n');
 	print_evaluation(plan);
 	print_stability(plan);
-	incise_plan_stability(plan, &stability);
 	if (rig)
 		print_axes(rig, &stability);
 }

@@ -204,6 +204,9 @@ static int survey_model(struct incise_plan *plan, double *stiffness_N_mm)
 	s->speed_slope_N_s_mm = plan->input_slope[INCISE_INPUT_SPEED];
 	s->acceleration_slope_N_s2_mm = plan->input_slope[INCISE_INPUT_ACCELERATION];
 	s->slope_N_mm += plan->gain * opening_slope(plan);
+	/* That was looked at in places. */
+	if (plan->scene->cut[INCISE_PUNCTURE].model)
+		s->certified = false;
 	set_tissue(plan, s->slope_N_mm);
 	s->support_mm = plan->support_mm;
 	s->beyond_N_mm = plan->beyond_N_mm;
@@ -587,6 +590,8 @@ static int search(struct incise_plan *plan, const struct incise_tracker_info *tr
 			plan->holds |= 1U << inputs[i];
 		}
 		rc = incise_plan_rest(plan, tracker, trial, &here);
+		if (rc)
+			break;
 		here.runs += rest->runs;
 		if (!here.rests || here.settle_s > rest->settle_s)
 			*rest = here;

@@ -136,9 +136,13 @@ static double model_N(struct incise_plan *plan, const struct incise_tick *tick,
 	find_inputs(plan, tick, INCISE_CUT, x);
 	if (share > 0)
 		cut_N = incise_model_eval(plan->model, x, flags);
-	if (share < 1)
+	if (share < 1) {
+		unsigned int skin = 0;
+
 		cut_N = share * cut_N +
-			(1 - share) * phase_N(plan, tick, INCISE_PUNCTURE, flags);
+			(1 - share) * phase_N(plan, tick, INCISE_PUNCTURE, &skin);
+		*flags |= skin;
+	}
 	return cut_N;
 }
 
@@ -201,6 +205,8 @@ static double friction(const struct incise_plan *plan, struct incise_tick *tick,
 	if (!plan->scene->cut[INCISE_WITHDRAW].model || !(plan->depth_mm > 0))
 		return own->number[INCISE_REACTION_FRICTION];
 	drag_N = -plan->gain * phase_N(plan, tick, INCISE_WITHDRAW, &flags);
+	/* It goes to 0 at the surface, as the force that unloads does. */
+	drag_N = fmin(drag_N, plan->unloading_N_mm * plan->depth_mm);
 	return most_N > 0 ? fmax(0, fmin(drag_N / most_N, 1)) : 0;
 }
 

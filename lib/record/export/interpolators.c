@@ -713,7 +713,7 @@ static void loop_push(struct incise_loop_motion *loop,
 		arrive(loop);
 	sample = &loop->waiting[loop->last++ % INCISE_LOOP_POSES];
 	*sample = (struct incise_tracker_sample){
-		.t_ns = loop_ns(record->t_ns) + loop->predict.latency_ns,
+		.t_ns = loop_ns(record->t_ns) + loop->late_ns,
 		.quaternion = {1},
 	};
 	v3_copy(sample->position_mm, record->position_mm);
@@ -812,6 +812,12 @@ int incise_blade_pose_open(struct incise_blade_pose *blade,
 		incise_row_times_calibrate(&blade->tracker.times, given);
 		incise_row_times_calibrate(&blade->depth.times, given);
 	}
+	/* Rows are dated by the calibrated delay, the loop knows that of the device. */
+	blade->loop.late_ns = blade->loop.predict.latency_ns;
+	if (!rc && !isnan(blade->depth.times.delay_ns))
+		blade->loop.late_ns =
+			(int64_t)fmax(fmin(blade->depth.times.delay_ns, 1e12), -1e12) -
+			blade->depth.times.shift_ns;
 	if (!rc)
 		rc = more_pose(blade, err);
 	if (rc >= 0)
@@ -901,8 +907,12 @@ int incise_blade_pose_at(struct incise_blade_pose *blade, int64_t t_ns, double t
 	value->velocity_mm_s = mix(c->velocity_mm_s, d->velocity_mm_s, e);
 	value->acceleration_mm_s2 =
 		isnan(e) ? NAN : loop_acceleration(&blade->loop, t_ns);
-	value->tilt_deg = incise_input_tilt_deg(
-		value->q, (const double[3])INCISE_SCALPEL_AXIS, blade->progress.normal);
+	/* A record without an orientation has none to take a part of. */
+	value->tilt_deg = incise_input_tilt_deg(!isnan(value->q[0]) ? value->q
+						: isnan(b->q[0])    ? a->q
+								    : b->q,
+						(const double[3])INCISE_SCALPEL_AXIS,
+						blade->progress.normal);
 	value->time_in_tissue_s = isnan(e) ? NAN : time_in_tissue(blade, t_ns);
 	value->position_u_mm = uncertainty(mix(c->noise_mm, d->noise_mm, e), s, time_s,
 					   blade->speed_mm_s);

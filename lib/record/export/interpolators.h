@@ -186,6 +186,7 @@ struct incise_blade_depth {
 
 struct incise_loop_motion {
 	struct incise_predict predict;
+	int64_t late_ns; /* from a row's time to its arrival */
 	struct incise_tracker_sample waiting[INCISE_LOOP_POSES]; /* a ring */
 	unsigned int first, last;
 };
