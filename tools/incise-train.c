@@ -868,7 +868,7 @@ static void add_up(const struct options *options, struct incise_factor *factor)
 	}
 }
 
-/* What a source has besides its survey, in the progress of a training. */
+/* Values of a source besides its survey, in the progress of a training. */
 struct surveyed {
 	uint64_t left_out, check_outside;
 	char rig[256];

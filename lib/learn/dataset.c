@@ -193,7 +193,7 @@ static int grow(struct incise_dataset *data, bool groups)
 	return 0;
 }
 
-/* What rows are read for, and where they go. */
+/* The columns that are read, and the taker of the rows. */
 struct sink {
 	const char *const *columns;
 	int n;

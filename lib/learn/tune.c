@@ -172,7 +172,7 @@ int incise_tune(const struct incise_basis *basis, const struct incise_folds *fol
 	struct incise_ridge ridges[TUNE_RIDGES];
 	struct incise_basis first = *basis;
 	int rc = -ENOMEM, chosen = -1, starts = options->starts;
-	/* Who asks for more pairs accepts more time. */
+	/* A larger sample may take more time. */
 	double patience =
 		options->tuned ? fmax(1, folds->n_held / (double)TUNED_PAIRS) : 1;
 	double epochs = patience * BUDGET / cost(basis, folds);

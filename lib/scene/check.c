@@ -174,7 +174,7 @@ static void take_slopes(struct incise_plan *plan, enum incise_cutting_phase phas
 
 		s->certified = s->certified && slopes[i].certified;
 		*to = fmax(*to, plan->gain * either);
-		/* What pulls a blade back may rise either way. */
+		/* A force that pulls the blade back may rise either way. */
 		if (cut->input[i] == INCISE_INPUT_DEPTH)
 			s->slope_N_mm =
 				fmax(s->slope_N_mm,

@@ -67,7 +67,7 @@ static char *make_key(const char *options, const struct source *sources, int n,
 	return key;
 }
 
-/* What is not of the same training is as if it were not there. */
+/* The progress of another training counts as none. */
 static void read_file(struct progress *progress)
 {
 	static const struct incise_infile_kind kind = {

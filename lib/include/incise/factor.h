@@ -38,7 +38,7 @@ struct incise_factor_source {
 	char text[INCISE_FACTOR_TEXT_MAX]; /**< name, rig and calibration, one line */
 };
 
-/** What a factor is made of. */
+/** Contents of a factor, without its sums. */
 struct incise_factor_info {
 	uint64_t rows, groups; /**< pairs; groups, which are counted by source */
 	int n_inputs, n_rules;

@@ -76,7 +76,7 @@ static void cut(void *own, double t_s, struct incise_tracker_sample *pose)
 	fed_attitude(pose->quaternion, 0.4 * sin(2 * s), 0.7 * s);
 }
 
-/* What the loop is to find, from the poses alone and what a tick shows. */
+/* Inputs that the loop has to find, from the poses and a tick alone. */
 struct truth {
 	struct incise_predict predict;
 	int64_t touched_ns;
