@@ -232,7 +232,8 @@ INCISE_API void incise_plan_rendered(const struct incise_plan *plan,
  * radius deep; for a blade that enters at 6 degrees to the surface or more; and while both
  * plans are in the same phase, with the same tool in the same cut (if one changes a tick
  * earlier, that is not an error of the force).
- * lib/scene/bound.c has its parts. `incise bench` measures the rest.
+ * With a model of three or four inputs it rests on estimated slopes
+ * (incise_plan_stability.certified) and is no proof. lib/scene/bound.c has its parts. `incise bench` measures the rest.
  *
  * @return N; 0 in double
  */
