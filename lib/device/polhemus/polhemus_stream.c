@@ -287,7 +287,8 @@ bool polhemus_gaps_add(struct polhemus_gaps *gaps, const struct polhemus_record 
 
 /* --- samples --- */
 
-#define WAIT_NS INT64_C(250000000) /* for records that come by and by */
+#define WAIT_NS INT64_C(250000000)  /* for records that come by and by */
+#define WORKER_NS INT64_C(50000000) /* for the kernel's worker, on a busy machine */
 #define CAPACITY ((size_t)POLHEMUS_RING_S * 240 * POLHEMUS_STATIONS)
 
 int polhemus_stream_init(struct polhemus_stream *stream,
@@ -422,10 +423,20 @@ static uint64_t missing_before(const struct polhemus_stream *stream)
 	const struct polhemus_gaps *gaps = &stream->gaps;
 	int64_t round_ns = round_of(gaps), late_ns = stream->wait.late_ns;
 
-	if (late_ns > stream->wait.first_late_ns)
-		late_ns = stream->wait.first_late_ns;
+	if (late_ns > stream->wait.least_late_ns)
+		late_ns = stream->wait.least_late_ns;
 	late_ns += late_ns / 2000 + round_ns / 256;
 	return (uint64_t)(late_ns / round_ns) * (uint64_t)gaps->n;
+}
+
+/* Until then those that wait may be followed by others that were held up. */
+int64_t polhemus_stream_due_ns(const struct polhemus_stream *stream)
+{
+	const struct polhemus_wait *wait = &stream->wait;
+	int64_t half_ns = round_of(&stream->gaps) / 2;
+	bool held_up = wait->least_late_ns < wait->first_late_ns - half_ns;
+
+	return wait->n ? wait->since_ns + (held_up ? WORKER_NS : half_ns) : INT64_MAX;
 }
 
 /* The end of the wait, if the record that came last shows it. */
@@ -433,15 +444,15 @@ static void decide(struct polhemus_stream *stream)
 {
 	const struct polhemus_wait *wait = &stream->wait;
 	int64_t round_ns = round_of(&stream->gaps);
-	int64_t waited_ns = wait->records[wait->n - 1].t_ns - wait->records[0].t_ns;
+	int64_t last_ns = wait->records[wait->n - 1].t_ns;
 
 	if (wait->late_ns < round_ns)
 		release(stream, 0);
-	else if (waited_ns >= round_ns / 2 &&
-		 wait->late_ns >= wait->first_late_ns - round_ns / 2)
+	else if (last_ns >= polhemus_stream_due_ns(stream))
 		release(stream, missing_before(stream));
 	/* They come by and by, as of a slow line. */
-	else if (waited_ns > WAIT_NS + round_ns || wait->n == CAPACITY)
+	else if (last_ns - wait->records[0].t_ns > WAIT_NS + round_ns ||
+		 wait->n == CAPACITY)
 		release(stream, 0);
 }
 
@@ -450,14 +461,6 @@ static void count(struct polhemus_stream *stream, uint64_t silent)
 	atomic_store_explicit(&stream->lost,
 			      stream->gaps.lost + stream->overflowed + silent,
 			      memory_order_relaxed);
-}
-
-int64_t polhemus_stream_due_ns(const struct polhemus_stream *stream)
-{
-	const struct polhemus_wait *wait = &stream->wait;
-
-	return wait->n ? wait->records[wait->n - 1].t_ns + round_of(&stream->gaps) / 2
-		       : INT64_MAX;
 }
 
 void polhemus_stream_quiet(struct polhemus_stream *stream, int64_t t_ns)
@@ -482,15 +485,22 @@ static void take_record(struct polhemus_stream *stream,
 		number(stream, record);
 		return;
 	}
-	/* Nobody may have looked in between. */
-	polhemus_stream_quiet(stream, record->t_ns);
 	late_ns = late_if_held_up(stream, record, &seq);
+	/* Nobody may have looked in between. */
+	if (wait->n && late_ns >= wait->least_late_ns - round_of(gaps) / 2) {
+		polhemus_stream_quiet(stream, record->t_ns);
+		late_ns = late_if_held_up(stream, record, &seq);
+	}
 	if (!wait->n && late_ns < round_of(gaps) * 3 / 2) {
 		number(stream, record);
 		return;
 	}
 	if (!wait->n)
 		wait->first_late_ns = late_ns;
+	if (!wait->n || late_ns < wait->least_late_ns - round_of(gaps) / 2) {
+		wait->least_late_ns = late_ns;
+		wait->since_ns = record->t_ns;
+	}
 	wait->late_ns = late_ns;
 	wait->seq = seq;
 	wait->last = place(gaps, record->station);

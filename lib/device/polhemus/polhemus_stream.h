@@ -100,14 +100,17 @@ struct polhemus_repeat {
  *     lost      ──o──o──o────────────────────o──┊·····   quiet for half a round, or the next one
  *     held up   ──o──o──o────────────────────ooooooo     comes as late: lost, else held up
  *
- * They are late by half a round then, once.
+ * They are late by half a round then, once. Where records that were held up have come, more of them
+ * may be on their way: a terminal hands on 4 kB, and the rest when the kernel's worker runs. Then they
+ * wait for 50 ms.
  */
 struct polhemus_wait {
 	struct polhemus_record *records; /* capacity of the ring */
 	size_t n;
 	uint64_t seq; /* of the last one, if none is missing before them */
 	int last;     /* its place in the order */
-	int64_t first_late_ns, late_ns;
+	int64_t first_late_ns, late_ns, least_late_ns;
+	int64_t since_ns; /* for so long none was less late by half a round */
 };
 
 struct polhemus_stream {

@@ -556,6 +556,41 @@ static void bursts_are_no_loss(void **state)
 }
 
 /*
+ * After a pause of the program a terminal gives 4 kB, and the rest when the kernel's worker has run,
+ * which other programs may hold up: nothing is lost. Where the rest is not there, it is.
+ */
+static void rest_of_a_terminal_is_no_loss(void **state)
+{
+	static const int64_t worker_ms[] = {0, 3, 10, 45};
+
+	for (size_t p = 0; p < 8; p++) {
+		size_t first = 120 * 34, n;
+		unsigned char bytes[16384];
+		struct bench b;
+
+		bench_init(&b, EMULATOR_FASTRAK, 1);
+		bench_run(&b, 2);
+		b.line.now_ns += 1500 * MS;
+		emulator_advance(&b.e, b.line.now_ns);
+		n = emulator_take(&b.e, bytes, sizeof(bytes));
+		assert_true(n > first + 34);
+		polhemus_stream_put(&b.stream, bytes, first, b.line.now_ns);
+		b.line.now_ns += worker_ms[p % 4] * MS;
+		if (p < 4) {
+			polhemus_stream_quiet(&b.stream, b.line.now_ns);
+			polhemus_stream_put(&b.stream, bytes + first, n - first,
+					    b.line.now_ns);
+		}
+		bench_run(&b, 2);
+		assert_int_equal(b.n + (p < 4 ? 0 : n / 34 - 120), b.e.n_sent);
+		assert_int_equal(polhemus_stream_lost(&b.stream),
+				 p < 4 ? 0 : n / 34 - 120);
+		assert_int_equal(b.samples[b.n - 1].seq + 1, b.e.n_sent);
+		bench_free(&b);
+	}
+}
+
+/*
  * Bytes from nowhere, and a host that is late just then: what they did not touch is there, and no
  * more is counted than they did.
  */
@@ -769,6 +804,7 @@ int main(void)
 		cmocka_unit_test(long_gaps_have_their_place),
 		cmocka_unit_test(what_waits_is_released),
 		cmocka_unit_test(bursts_are_no_loss),
+		cmocka_unit_test(rest_of_a_terminal_is_no_loss),
 		cmocka_unit_test(bursts_and_new_bytes),
 		cmocka_unit_test(drift_is_no_loss),
 		cmocka_unit_test(the_tip),
