@@ -39,6 +39,8 @@ fuzz_polhemus_records := lib/base/ring.c lib/device/pose_flags.c $(addprefix lib
 	model.c records.c stream.c)
 fuzz_polhemus_status := lib/base/error.c lib/device/polhemus/polhemus_dialogue.c
 
+fuzz_igtl_stream := lib/base/igtl.c
+
 fuzz_state_page := lib/base/error.c $(addprefix lib/loop/state_,file.c page.c reader.c)
 
 # A scene is read with all that it names.

@@ -18,9 +18,11 @@ test_packages := cmocka jansson $(if $(has_libmnl),libmnl) $(if $(has_libiio),li
 	$(if $(has_frames),$(pc_frames_mkv)) $(if $(has_hdf5),$(pc_export_hdf5)) \
 	$(foreach lib,$(libraries),$(pc_$(lib)))
 test_cflags = $(eval test_cflags := $(shell $(PKG_CONFIG) --cflags $(test_packages)))$(test_cflags)
+# The reference for messages of OpenIGTLink; it has no file of pkg-config.
+has_igtl := $(wildcard /usr/include/openigtlink/igtl_header.h)
 # A test maps only what it uses of these.
 test_libs = $(eval test_libs := -Wl,--as-needed $(shell $(PKG_CONFIG) --libs $(test_packages)) \
-	$(if $(has_vision),$(libs_vision_opencv)) -lm -ldl -pthread)$(test_libs)
+	$(if $(has_vision),$(libs_vision_opencv)) $(if $(has_igtl),-lOpenIGTLink) -lm -ldl -pthread)$(test_libs)
 
 $(O)/obj/tests/%.o: tests/%.c
 	@mkdir -p $(@D)
