@@ -117,9 +117,9 @@ unit-programs: $(unit_programs)
 can-drive: ## the CAN drive of the tests, $(O)/tests/can/drive; see tests/can/README.md
 	@tests/venv tests/can $(O)/tests/can 'tests with the CAN drive are skipped' drive selftest
 
-# The reader of MCAP's own makers, for what is exported.
-mcap-reader: ## a second reader for the tests of MCAP, $(O)/tests/mcap/check
-	@tests/venv tests/mcap $(O)/tests/mcap 'tests read MCAP with our own reader alone' check:--package
+# The reader of MCAP's own makers, and one of ROS 2, for what is exported.
+mcap-reader: ## other readers for the tests of MCAP, $(O)/tests/mcap/check and ros2
+	@tests/venv tests/mcap $(O)/tests/mcap 'tests read MCAP with our own reader alone' check:--package ros2
 
 # What reads Arrow streams in place, for the tests of incise for Python.
 python-peers: ## pyarrow, polars, DuckDB, pandas 3 and scikit-learn for the tests of python/

@@ -19,6 +19,7 @@ struct job {
 	bool json, damaged;
 	int min_count; /* 0: not given */
 	int percent;   /* of the bar */
+	enum { PLAIN, ROS2 } profile;
 	struct incise_calibration calibration;
 	struct incise_export_options how;
 };
@@ -49,6 +50,8 @@ static void load_calibration(void *options, char *path)
 		cli_fail_with(&err);
 	job->how.calibration = &job->calibration;
 }
+
+static const char *const profiles[] = {"plain", "ros2", NULL};
 
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
@@ -81,6 +84,10 @@ static const struct cli_option options[] = {
 	 "use this calibration of force, camera and delays instead of that\n"
 	 "of the recordings",
 	 CLI_PARSED_BY(load_calibration)},
+	{0, "profile", "NAME",
+	 "messages of MCAP: plain (JSON, default) or ros2 (ROS 2, as rosbag2\n"
+	 "stores them; metres and UTC)",
+	 CLI_CHOICE(struct job, profile, profiles)},
 	{0, "lineage", NULL, "begin a CSV with comments on its provenance",
 	 CLI_FLAG(struct job, how.provenance)},
 	RECORDING_DAMAGED(struct job, damaged),
@@ -156,6 +163,9 @@ static void parse(struct job *job, int argc, char **argv)
 				 how->velocity_max_mm_s > 0))
 		cli_usage("--by-cut, --depth-max, --velocity-max and --min-count go with "
 			  "--average");
+	if (job->profile && !cli_ends_with(job->output, ".mcap"))
+		cli_usage("--profile needs -o FILE.mcap");
+	how->ros2 = job->profile == ROS2;
 	if (job->min_count)
 		how->min_count = job->min_count;
 	if (job->json && !strcmp(job->output, "-"))

@@ -346,6 +346,50 @@ read_mcap() {
 	failed_with "No space left"
 }
 
+@test "export as messages of ROS 2: the values of a CSV, read by rosbags" {
+	command -v python3 >/dev/null || skip "python3 is not installed"
+	incise capture -o c.rec --rig sim:clock=simulated,camera_hz=5 --camera frames \
+		--duration 2s >/dev/null
+	# a tip away from the tracked point, and one pose that no one may use
+	sqlite3 c.rec/recording.db "UPDATE meta SET value = 3.0 WHERE key = 'tip_x_mm'"
+	incise export c.rec -o c.csv --resample --damaged
+	sqlite3 c.rec/recording.db "UPDATE tracker SET status = 'A' WHERE seq = 238"
+	run -0 --separate-stderr incise export c.rec -o c.mcap --profile ros2 --damaged
+	rows() { sqlite3 c.rec/recording.db "SELECT count(*) FROM $1"; }
+	[ "$output" = "wrote c.mcap: $(($(rows force) + $(rows tracker) - 1 + $(rows events) +
+		$(rows frames))) messages" ]
+	read_mcap c.mcap >found.json
+	[ "$(key found.json profile)" = ros2 ]
+	[ "$(key found.json 'topics."/tip"')" = $(($(rows tracker) - 1)) ]
+	[ "$(key found.json 'metadata."incise.wall".uncertainty_s')" = 1 ]
+	[[ "$(key found.json 'metadata.rosbag2.serialized_metadata')" == "{version: 5, "*"/tip"* ]]
+	started=$(date -d "$(sqlite3 c.rec/recording.db "SELECT value FROM meta
+		WHERE key = 'started'")" +%s)
+	[ "$(key found.json 'metadata."incise.wall".offset_ns')" = $((started * 1000000000 -
+		$(sqlite3 c.rec/recording.db "SELECT t_ns FROM events WHERE kind = 'start'"))) ]
+	[ -x "$INCISE_BUILD/tests/mcap/ros2" ] || skip "the package rosbags is not there"
+	"$INCISE_BUILD/tests/mcap/ros2" c.mcap c.csv >ros2.json
+	[ "$(key ros2.json 'topics."/force"')" = '["geometry_msgs/msg/WrenchStamped",20000]' ]
+	[ "$(key ros2.json 'topics."/camera/image"[0]')" = sensor_msgs/msg/Image ]
+	[ "$(key ros2.json frame)" = '[480,640,"rgb8",1920,921600]' ]
+	[ "$(key ros2.json 'events[0]')" = '["start","recording started"]' ]
+	[ "$(key ros2.json compared)" -gt 19000 ]
+}
+
+@test "export as messages of ROS 2 needs MCAP and a time that ROS can have" {
+	for output in a.csv a.h5 -; do
+		run -2 --separate-stderr incise export liver.rec --profile ros2 -o "$output"
+		[[ "${stderr_lines[0]}" == *"--profile needs -o FILE.mcap" ]]
+	done
+	cp -r liver.rec/ late.rec
+	sqlite3 late.rec/recording.db "UPDATE meta SET value = '2039-01-01T00:00:00Z'
+		WHERE key = 'started'"
+	run --separate-stderr incise export late.rec --damaged --profile ros2 -o a.mcap
+	[ "$status" -eq 1 ]
+	[[ "$stderr" == *"late.rec: started at '2039-01-01T00:00:00Z', but times of ROS lie between 1970 and 2038;"* ]]
+	[ ! -e a.mcap ]
+}
+
 @test "export resampled" {
 	incise export liver.rec --resample --rate 100 -o a.csv
 	well_formed <(sed 's/nan/0/g' a.csv) 25 2

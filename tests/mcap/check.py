@@ -65,16 +65,21 @@ def records(data, at, end):
 def schema(f):
     s = (f.number(2), f.text(), f.text(), bytes(f.take(f.number(4))))
     f.done()
-    assert s[0] != 0 and s[2] == "jsonschema"
-    assert json.loads(s[3])["type"] == "object"
+    assert s[0] != 0 and s[2] in ("jsonschema", "ros2msg")
+    assert s[2] == "ros2msg" or json.loads(s[3])["type"] == "object"
     return s
 
 
 def channel(f):
     c = (f.number(2), f.number(2), f.text(), f.text(), f.map(Fields.text, Fields.text))
     f.done()
-    assert c[3] == "json"
+    assert c[3] in ("json", "cdr")
     return c
+
+
+def content(channel_encoding, data):
+    """JSON, or the text of other bytes."""
+    return json.loads(data.decode("utf-8")) if channel_encoding == "json" else data.hex()
 
 
 def matches(value, s, path="message"):
@@ -105,7 +110,8 @@ def check(data):
         assert end is None, "a record behind DataEnd"
         if opcode == 1:
             assert at == 8
-            f.text(), f.text(), f.done()
+            profile, _ = f.text(), f.text()
+            f.done()
         elif opcode == 3:
             s = schema(f)
             schemas[s[0]] = s
@@ -128,12 +134,16 @@ def check(data):
                 assert op == 5
                 number, sequence = m.number(2), m.number(4)
                 log, publish = m.number(8), m.number(8)
-                value = json.loads(m.take(len(m.data) - m.at).decode("utf-8"))
+                encoding = channels[number][3]
+                value = content(encoding, m.take(len(m.data) - m.at))
                 assert log == publish
                 assert sequence == counts[number] & 0xFFFFFFFF, "sequence"
                 assert previous is None or log >= previous, "messages are out of order"
                 previous = log
-                matches(value, json.loads(schemas[channels[number][1]][3]))
+                if encoding == "json":
+                    matches(value, json.loads(schemas[channels[number][1]][3]))
+                else:
+                    assert value.startswith("00010000"), "little-endian CDR"
                 counts[number] += 1
                 times.append(log)
                 found.setdefault(number, []).append((log, where))
@@ -207,7 +217,7 @@ def check(data):
         told[group] = [f.number(8), f.number(8)]
         f.done()
     assert told == groups, "SummaryOffset"
-    return {"topics": {c[2]: counts[i] for i, c in channels.items()},
+    return {"profile": profile, "topics": {c[2]: counts[i] for i, c in channels.items()},
             "metadata": {m[0]: m[1] for m in metadata.values()},
             "chunks": len(chunks), "first": first, "last": final}
 
@@ -226,7 +236,7 @@ def by_package(path):
             topics[c.topic] = 0
         for _, c, message in reader.iter_messages():
             topics[c.topic] += 1
-            last = [c.topic, message.log_time, json.loads(message.data)]
+            last = [c.topic, message.log_time, content(c.message_encoding, message.data)]
             first = first or last
         metadata = {m.name: m.metadata for m in reader.iter_metadata()}
     return topics, metadata, first, last

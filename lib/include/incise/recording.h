@@ -195,6 +195,7 @@ struct incise_export_options {
 	 */
 	const struct incise_calibration *calibration;
 	bool provenance; /**< CSV starts with lines "# key: value"; others always have it */
+	bool ros2;	 /**< MCAP with messages of ROS 2, see incise_export() */
 
 	/**
 	 * Called at intervals with the completed share, 0 to 1, or NULL; a value other than 0
@@ -230,7 +231,10 @@ struct incise_export_report {
  * attributes are the provenance.
  *
  * MCAP has one whole recording for viewers, not only its cuts: /force, /tracker, /depth and
- * /events in JSON. In the report, rows is then the number of messages, and cuts is 0.
+ * /events in JSON. In the report, rows is then the number of messages, and cuts is 0. With
+ * @ref incise_export_options.ros2 its messages are those of ROS 2, with the camera's frames, in
+ * metres and UTC: /tip, /force, /events, /camera/image; poses that the tracker flags as unusable
+ * are omitted.
  *
  * @param recordings n recordings
  * @param report     or NULL

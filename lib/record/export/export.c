@@ -594,6 +594,12 @@ int incise_export(struct incise_recording *const *recordings, int n,
 		return rc;
 	if (n < 1)
 		return incise_error_set(err, EINVAL, "no recording to export");
+	if (options->ros2 && !ends_with(path, ".mcap"))
+		return incise_error_set(
+			err, EINVAL,
+			"%s: messages of ROS 2 are written as MCAP; give -o "
+			"FILE.mcap",
+			path);
 	if (hdf5 && !(format = incise_table_hdf5(err)))
 		return -errno;
 	file = incise_outfile_open(path, err);

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Messages in JSON with JSON Schemas, in the project's units; see messages.h.
+ */
+#include <string.h>
+#include "../../base/utf8.h"
+#include "decimal.h"
+#include "messages.h"
+
+#define NUMBER(about) "{\"type\":\"number\",\"description\":\"" about "\"}"
+#define OBJECT(properties) "{\"type\":\"object\",\"properties\":{" properties "}}"
+
+static char *add(char *to, const char *text)
+{
+	return stpcpy(to, text);
+}
+
+static char *add_real(char *to, const char *before, double value, int decimals)
+{
+	return incise_decimal_real(add(to, before), value, decimals);
+}
+
+static int64_t force_message(struct incise_messages *messages,
+			     const struct incise_rows *rows)
+{
+	char *to = messages->text;
+	double force_N;
+	bool clipped;
+	int64_t code = incise_message_force(messages, rows, &force_N, &clipped);
+
+	if (code < 0)
+		return code;
+	to = add_real(to, "{\"force_N\":", force_N, 5);
+	to = incise_decimal_integer(add(to, ",\"code\":"), code);
+	to = add(to, clipped ? ",\"clipped\":true}" : ",\"clipped\":false}");
+	return to - messages->text;
+}
+
+/* A text in JSON's quotes; bytes that are not UTF-8 become '?'. */
+static char *add_text(char *to, const char *before, const char *text)
+{
+	to = add(to, before);
+	*to++ = '"';
+	while (*text) {
+		int length = utf8_printable(text);
+
+		if (*text == '"' || *text == '\\')
+			*to++ = '\\';
+		*to++ = length ? *text : '?';
+		text++;
+		for (int i = 1; i < length; i++)
+			*to++ = *text++;
+	}
+	*to++ = '"';
+	return to;
+}
+
+static int64_t tracker_message(struct incise_messages *messages,
+			       const struct incise_rows *rows)
+{
+	static const char *const before[] = {"{\"position_mm\":{\"x\":",
+					     ",\"y\":",
+					     ",\"z\":",
+					     "},\"orientation\":{\"w\":",
+					     ",\"x\":",
+					     ",\"y\":",
+					     ",\"z\":"};
+	int rc = incise_messages_reserve(messages, sqlite3_column_bytes(rows->stmt, 9));
+	char *to = messages->text;
+
+	if (rc)
+		return rc;
+	for (int i = 0; i < 7; i++)
+		to = add_real(to, before[i], sqlite3_column_double(rows->stmt, 2 + i),
+			      i < 3 ? 4 : 6);
+	to = add_text(to,
+		      "},\"status\":", (const char *)sqlite3_column_text(rows->stmt, 9));
+	return add(to, "}") - messages->text;
+}
+
+static int64_t depth_message(struct incise_messages *messages,
+			     const struct incise_rows *rows)
+{
+	char *to = messages->text;
+
+	to = add_real(to, "{\"depth_mm\":", sqlite3_column_double(rows->stmt, 2), 4);
+	to = add_real(to, ",\"velocity_mm_s\":", sqlite3_column_double(rows->stmt, 3), 3);
+	return add(to, "}") - messages->text;
+}
+
+static int64_t event_message(struct incise_messages *messages,
+			     const struct incise_rows *rows)
+{
+	int rc = incise_messages_reserve(messages,
+					 sqlite3_column_bytes(rows->stmt, 2) +
+						 sqlite3_column_bytes(rows->stmt, 3));
+	char *to = messages->text;
+
+	if (rc)
+		return rc;
+	to = add_text(to, "{\"kind\":", (const char *)sqlite3_column_text(rows->stmt, 2));
+	to = add_text(to, ",\"text\":", (const char *)sqlite3_column_text(rows->stmt, 3));
+	return add(to, "}") - messages->text;
+}
+
+static const struct incise_message_stream streams[] = {
+	{"force", "seq, t_ns, code", "iii", force_message, "/force", "incise.Force",
+	 OBJECT("\"force_N\":" NUMBER("N") ",\"code\":{\"type\":\"integer\"},"
+					   "\"clipped\":{\"type\":\"boolean\"}")},
+	{"tracker", "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status", "iirrrrrrrt",
+	 tracker_message, "/tracker", "incise.Pose",
+	 OBJECT("\"position_mm\":" OBJECT("\"x\":" NUMBER("mm") ",\"y\":" NUMBER("mm") ",\"z\":" NUMBER("mm")) ",\"orientation\":" OBJECT(
+		 "\"w\":" NUMBER("unit quaternion") ",\"x\":" NUMBER("unit quaternion") ",\"y\":" NUMBER(
+			 "unit quaternion") ",\"z\":" NUMBER("unit quaternion")) ",\"status\":{\"type\":\"string\"}")},
+	{"depth", "seq, t_ns, depth_mm, velocity_mm_s", "iirr", depth_message, "/depth",
+	 "incise.Depth",
+	 OBJECT("\"depth_mm\":" NUMBER("mm") ",\"velocity_mm_s\":" NUMBER("mm/s"))},
+	{"events", "rowid, t_ns, kind, text", "iitt", event_message, "/events",
+	 "incise.Event",
+	 OBJECT("\"kind\":{\"type\":\"string\"},\"text\":{\"type\":\"string\"}")},
+};
+
+const struct incise_message_profile incise_messages_json = {
+	.name = "",
+	.encoding = "json",
+	.schema_encoding = "jsonschema",
+	.streams = streams,
+	.n = sizeof(streams) / sizeof(*streams),
+};
