@@ -62,10 +62,10 @@ check-parts:
 	+@status=0; \
 	$(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,check-style cli-needs) || status=$$?; \
 	$(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,$(parts) cli-tests check-vm check-layers \
-		check-fuzz check-rtsan check-deb check-module) || status=$$?; \
+		attack-tests check-fuzz check-rtsan check-deb check-module) || status=$$?; \
 	exit $$status
 timed-%:
-	+@$(if $(filter $*,cli-tests check-layers check-vm),NEEDS=cli-needs) tests/timed $(times) $* $(MAKE) -k --no-print-directory $*
+	+@$(if $(filter $*,cli-tests attack-tests check-layers check-vm),NEEDS=cli-needs) tests/timed $(times) $* $(MAKE) -k --no-print-directory $*
 
 check_deps = mk/deps build check demo; \
 	mk/deps vm || echo "going on without what the test bed needs"; \
@@ -150,21 +150,27 @@ $(O)/tests/state/loop: tests/state/loop.c $(O)/lib/libincise-tests.a
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $^ \
 		$(test_libs)
 
-attack_bats = INCISE_BUILD=$(abspath $(O)) bats --print-output-on-failure tests/attack
+bats = LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" \
+	bats --print-output-on-failure
 check-attack: all $(attack_programs) ## attacks on recordings with their full counts: 100 kills, thousands of faults
-	ATTACK=full $(attack_bats)
+	ATTACK=full $(bats) tests/attack
 
 # Benches measure for seconds: tests that are tagged slow are not in `check`.
 cli-needs: all $(locale) can-drive mcap-reader python-peers $(O)/tests/polhemus/fastrak $(O)/tests/state/loop \
 		$(O)/tests/day $(attack_programs)
 
 check-cli: cli-needs ## command-line tests of the real programs
-	+@$(MAKE) --no-print-directory cli-tests
+	+@$(MAKE) --no-print-directory cli-tests attack-tests
 
-# Without building first; `check` starts with these.
+# Without building first; `check` starts with these. The tests of bench_all leave their reports to
+# those of each benchmark. Attacks mostly wait.
+cli_files = tests/cli/bench_all.bats $(filter-out %/bench_all.bats,$(sort $(wildcard tests/cli/*.bats)))
 cli-tests:
 	@$(if $(cli_filter),echo "left out: slow tests of benches; make check-cli runs them; bench_all.bats runs each word once")
-	$(Q)LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" bats --print-output-on-failure $(cli_filter) tests/cli tests/attack
+	$(Q)$(bats) $(cli_filter) $(cli_files)
+
+attack-tests:
+	$(Q)$(bats) tests/attack
 
 # The unit tests once more, on a build that stops at any bad access or undefined operation.
 sanitize_flags := -fsanitize=address,undefined -fno-sanitize-recover=all
@@ -246,7 +252,7 @@ notebooks: all ## run doc/notebooks and write them with their figures to build/n
 
 check-doc: doc
 
-.PHONY: doc notebooks check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests check-attack check-sanitize check-unit-sanitized check-python-sanitize check-tsan can-drive mcap-reader python-peers
+.PHONY: doc notebooks check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests attack-tests check-attack check-sanitize check-unit-sanitized check-python-sanitize check-tsan can-drive mcap-reader python-peers
 
 # Sums of very many pairs: time and memory, next to numpy.
 $(O)/tests/corpus: tests/bench/corpus.c $(O)/lib/libincise-learn.so

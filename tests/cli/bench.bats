@@ -559,20 +559,16 @@ rate() {
 	holds "$(of integrators 'min(ns_per_step)') > 0"
 }
 
-@test "bench stability as text, with a verdict on every ratio" {
-	run -0 --separate-stderr incise bench stability --quick
+@test "bench stability as text, with a verdict on every ratio, and its maps" {
+	! command -v gnuplot >/dev/null || plot=(--plot "a folder/w")
+	run -0 --separate-stderr incise bench stability --quick "${plot[@]}"
 	[ -z "$stderr" ]
 	[[ "$output" == *"quick: a part of each grid"* ]]
 	[[ "$output" == *"none wins: "* ]]
 	[[ "$output" == *"diverged"* ]]
 	[ "$(grep -c '  ok$' <<<"$output")" -ge 30 ]
 	[[ "$output" != *MISSED* ]]
-}
-
-@test "bench stability draws maps" {
-	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
-	run -0 --separate-stderr incise bench stability --quick --json --plot "a folder/w"
-	[ -z "$stderr" ]
+	[ -n "${plot[*]}" ] || skip "gnuplot is not installed, it draws the chart"
 	for part in map rest guard integrators; do
 		[ "$(head -c 8 "a folder/w-$part.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
 		grep -q '<svg' "a folder/w-$part.svg"
