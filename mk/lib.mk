@@ -84,6 +84,10 @@ pc_force_iio := libiio
 objects_force_iio := $(daq_core) $(daq_iio)
 pc_force_comedi := comedilib
 objects_force_comedi := $(daq_core) $(O)/obj/lib/device/stable_path.o $(daq_comedi)
+# Streams of the Lab Streaming Layer; liblsl is opened at run time, and needs no package here.
+device_modules += force_lsl
+pc_force_lsl :=
+objects_force_lsl := $(daq_core) $(addprefix $(O)/obj/lib/device/,pace.o lsl/liblsl.o lsl/lsl_force.o)
 # One tracker on two kinds of line.
 polhemus_lines := lib/device/polhemus/polhemus_usb.c lib/device/polhemus/polhemus_tty.c
 polhemus_core := $(addprefix $(O)/obj/lib/,base/ring.o device/thread.o) \
@@ -158,6 +162,7 @@ test_objects := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/v4l2/*.c)) \
 	$(filter $(O)/obj/lib/device/can/%,$(can_core) $(can_slcan) $(if $(has_libmnl),$(can_socketcan))) \
 	$(O)/obj/lib/device/daq/daq_feed.o $(if $(has_libiio),$(daq_iio)) \
 	$(if $(has_comedilib),$(daq_comedi)) \
+	$(filter $(O)/obj/lib/device/lsl/%,$(objects_force_lsl)) \
 	$(filter $(O)/obj/lib/device/polhemus/%,$(objects_tracker_tty)) \
 	$(if $(has_vision),$(filter-out %/vision_opencv.o,$(objects_vision_opencv))) \
 	$(if $(has_frames),$(objects_frames_mkv) $(objects_film_mkv)) \

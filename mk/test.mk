@@ -125,6 +125,10 @@ mcap-reader: ## other readers for the tests of MCAP, $(O)/tests/mcap/check and r
 python-peers: ## pyarrow, polars, DuckDB, pandas 3 and scikit-learn for the tests of python/
 	@tests/venv tests/python $(O)/tests/python 'tests with pyarrow, polars, DuckDB, pandas 3 and scikit-learn are skipped'
 
+# What sends and receives streams over a network as others do.
+stream-peers: ## pylsl, with liblsl, for tests/cli/streams.bats
+	@tests/venv tests/streams $(O)/tests/streams 'tests with streams of LSL and pyigtl are skipped' lsl_send
+
 # Attacks on recordings. What is in a module is found by INCISE_MODULE_PATH.
 attack_programs := $(addprefix $(O)/tests/attack/,kill faults damage record watch.so stall.so)
 
@@ -156,7 +160,7 @@ check-attack: all $(attack_programs) ## attacks on recordings with their full co
 	ATTACK=full $(bats) tests/attack
 
 # Benches measure for seconds: tests that are tagged slow are not in `check`.
-cli-needs: all $(locale) can-drive mcap-reader python-peers $(O)/tests/polhemus/fastrak $(O)/tests/state/loop \
+cli-needs: all $(locale) can-drive mcap-reader python-peers stream-peers $(O)/tests/polhemus/fastrak $(O)/tests/state/loop \
 		$(O)/tests/day $(attack_programs)
 
 check-cli: cli-needs ## command-line tests of the real programs
@@ -252,7 +256,7 @@ notebooks: all ## run doc/notebooks and write them with their figures to build/n
 
 check-doc: doc
 
-.PHONY: doc notebooks check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests attack-tests check-attack check-sanitize check-unit-sanitized check-python-sanitize check-tsan can-drive mcap-reader python-peers
+.PHONY: doc notebooks check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests attack-tests check-attack check-sanitize check-unit-sanitized check-python-sanitize check-tsan can-drive mcap-reader python-peers stream-peers
 
 # Sums of very many pairs: time and memory, next to numpy.
 $(O)/tests/corpus: tests/bench/corpus.c $(O)/lib/libincise-learn.so

@@ -186,6 +186,11 @@ static void read_rig(struct options *options, struct pairs *pairs, char *device,
 	}
 	options->weights.rig = cli_open_rig(spec, INCISE_RIG_FORCE);
 	incise_force_info(incise_rig_force(options->weights.rig), &info);
+	if (info.newtons)
+		cli_fail(
+			"%s measures newtons itself: no mV/N applies to it; calibrate it "
+			"with its own program",
+			info.name);
 	if (!options->ranged) {
 		options->setup.low_mV = 1e3 * info.offset_V;
 		options->setup.high_mV = 1e3 * (info.offset_V + info.full_scale_V);

@@ -456,6 +456,7 @@ int main(int argc, char **argv)
 	setup.trigger_button = options.trigger_button;
 	setup.armed = options.trigger_button || options.trigger_force_N > 0;
 	incise_force_info(incise_rig_force(run.rig), &force);
+	incise_force_calibration(&force, &calibration);
 	run.view.full_scale_N = force.full_scale_V * 1e3 / calibration.force_mV_N;
 	run.view.depth = setup.vision;
 

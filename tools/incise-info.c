@@ -368,7 +368,7 @@ static void show_plan(const char *path, bool json)
 static void recording_json(const struct incise_recording_info *info, bool intact)
 {
 	json_print(json_pack(
-		"{sb so ss sb sf so so s{sI sI sI} s{sI sI} sI s{si sf sf} s{sf so sf} si sf sf}",
+		"{sb so ss sb sf so so s{sI sI sI} s{sI sI} sI s{si sf sf sb} s{sf so sf} si sf sf}",
 		"intact", intact, "streams", stream_json(info->streams, info->n_streams),
 		"kind", "recording", "complete", info->complete, "seconds",
 		(info->end_ns - info->start_ns) * 1e-9, "started",
@@ -377,24 +377,27 @@ static void recording_json(const struct incise_recording_info *info, bool intact
 		(json_int_t)info->depth, "lost", "force", (json_int_t)info->force_lost,
 		"tracker", (json_int_t)info->tracker_lost, "force_clipped",
 		(json_int_t)info->force_clipped, "adc", "bits", info->bits,
-		"full_scale_V", info->full_scale_V, "offset_V", info->offset_V,
-		"calibration", "force_mV_N", info->force_mV_N, "force_zero_mV",
-		json_number(info->zero_mV), "depth_mm_px", info->depth_mm_px, "cuts",
-		info->cuts, "depth_max_mm", info->depth_max_mm, "force_max_N",
-		info->force_max_N));
+		"full_scale_V", info->full_scale_V, "offset_V", info->offset_V, "newtons",
+		info->newtons, "calibration", "force_mV_N", info->force_mV_N,
+		"force_zero_mV", json_number(info->zero_mV), "depth_mm_px",
+		info->depth_mm_px, "cuts", info->cuts, "depth_max_mm", info->depth_max_mm,
+		"force_max_N", info->force_max_N));
 }
 
 static void recording_text(const char *path, const struct incise_recording_info *info)
 {
+	char unit = info->newtons ? 'N' : 'V';
+
 	printf("recording %s: %.1f s, started %s, rig %s\n", path,
 	       (info->end_ns - info->start_ns) * 1e-9, info->started, info->rig);
 	if (!info->complete)
 		printf("incomplete: its capture was interrupted; readable up to the last commit\n");
-	printf("force    %llu samples, %llu lost, %llu clipped; %d bits over %g V",
+	printf("force    %llu samples, %llu lost, %llu clipped; %d bits over %g %c",
 	       (unsigned long long)info->force, (unsigned long long)info->force_lost,
-	       (unsigned long long)info->force_clipped, info->bits, info->full_scale_V);
+	       (unsigned long long)info->force_clipped, info->bits, info->full_scale_V,
+	       unit);
 	if (info->offset_V != 0)
-		printf(" from %g V", info->offset_V);
+		printf(" from %g %c", info->offset_V, unit);
 	putchar('\n');
 	printf("tracker  %llu samples, %llu lost\n", (unsigned long long)info->tracker,
 	       (unsigned long long)info->tracker_lost);

@@ -3,6 +3,7 @@
  * Tracker, force channel and camera, each in front of its backend; see incise/tracker.h,
  * incise/force.h and incise/camera.h.
  */
+#include <math.h>
 #include <stdio.h>
 #include <incise/backend.h>
 
@@ -43,6 +44,19 @@ int incise_force_read(struct incise_force *force, struct incise_force_sample *sa
 void incise_force_info(const struct incise_force *force, struct incise_force_info *info)
 {
 	force->ops->info(force, info);
+}
+
+#define NEWTONS_MV_N 1000 /* its volts are newtons */
+
+void incise_force_calibration(const struct incise_force_info *info,
+			      struct incise_calibration *calibration)
+{
+	if (!info->newtons)
+		return;
+	/* Another sensitivity shows that the zero is of another device. */
+	if (calibration->force_mV_N != NEWTONS_MV_N)
+		calibration->force_zero_mV = NAN;
+	calibration->force_mV_N = NEWTONS_MV_N;
 }
 
 uint64_t incise_force_lost(const struct incise_force *force)

@@ -263,6 +263,7 @@ class RecordingInfo(ctypes.Structure):
         ("force_max_N", c_double),
         ("streams", Stream * 3),
         ("n_streams", c_int),
+        ("newtons", c_bool),
     ]
     c_name = "struct incise_recording_info"
 

@@ -31,6 +31,7 @@ void stepper_live_open(struct stepper_live *live, const char *rig)
 	stepper_drive_open(&live->drive, rig, 1, INCISE_RIG_FORCE, "strokes");
 	live->force = incise_rig_force(live->drive.rig);
 	incise_force_info(live->force, &live->channel);
+	incise_force_calibration(&live->channel, &live->calibration);
 	live->creep_mm_s = fmin(CREEP_MM_S, 0.1 * info->velocity_mm_s);
 	live->drive.period_ns =
 		PERIOD_NS < live->drive.period_ns ? PERIOD_NS : live->drive.period_ns;
@@ -44,8 +45,9 @@ void stepper_live_open(struct stepper_live *live, const char *rig)
 
 static double code_mV(const struct stepper_live *live, double code)
 {
-	return 1000 * (live->channel.offset_V +
-		       code / (1 << live->channel.bits) * live->channel.full_scale_V);
+	return 1000 *
+	       (live->channel.offset_V +
+		code / (double)(1LL << live->channel.bits) * live->channel.full_scale_V);
 }
 
 static double newtons(const struct stepper_live *live, double code)

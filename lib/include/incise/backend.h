@@ -248,7 +248,7 @@ struct incise_actuator {
 };
 
 /** Version of the structs and values that backends use. */
-#define INCISE_BACKEND_ABI 8
+#define INCISE_BACKEND_ABI 9
 
 /** Settings of rig.conf for a backend. */
 struct incise_backend_request {

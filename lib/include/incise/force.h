@@ -1,13 +1,15 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The force channel: raw codes of an A/D converter behind the bridge amplifier.
- * incise/calibration.h converts them to newtons.
+ * The force channel: raw codes of an A/D converter behind the bridge amplifier, which
+ * incise/calibration.h converts to newtons; or steps of a device that measures newtons itself.
  */
 #ifndef INCISE_FORCE_H
 #define INCISE_FORCE_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <incise/calibration.h>
 #include <incise/error.h>
 #include <incise/export.h>
 
@@ -29,6 +31,9 @@ struct incise_force_info {
 	double offset_V;     /**< voltage of code 0; 0 for a unipolar range */
 	uint64_t clipped;    /**< samples at either end of the range so far */
 	uint64_t overflows;  /**< overflows of the device or the kernel so far */
+	/** It measures newtons itself: full_scale_V and offset_V are in N, not in V. */
+	bool newtons;
+	int64_t t_sd_ns; /**< standard deviation of its timestamps; 0: not known */
 };
 
 /** Settings of a real force channel; the group `force_setup` of rig.conf. */
@@ -55,6 +60,14 @@ INCISE_API int incise_force_read(struct incise_force *force,
 /** Properties and current counts of the channel. */
 INCISE_API void incise_force_info(const struct incise_force *force,
 				  struct incise_force_info *info);
+
+/**
+ * Adapt a calibration to a channel. One that measures newtons has 1000 mV/N; unless the
+ * calibration has these, its zero is that of another device, and becomes NAN: it is measured.
+ * A calibration stays as it is for a channel in volts.
+ */
+INCISE_API void incise_force_calibration(const struct incise_force_info *info,
+					 struct incise_calibration *calibration);
 
 /** Samples lost so far, in the device or in full buffers. */
 INCISE_API uint64_t incise_force_lost(const struct incise_force *force);

@@ -74,6 +74,7 @@ struct incise_recording_info {
 	double depth_max_mm, force_max_N;
 	struct incise_stream streams[INCISE_STREAMS_MAX]; /**< in format 2 */
 	int n_streams;
+	bool newtons; /**< the force channel measures N: read full_scale_V, offset_V as N */
 };
 
 /**

@@ -294,6 +294,8 @@ static int describe_values(struct rows_source *source,
 	int rc = 0;
 
 	if (!strcmp(source->table->name, "force")) {
+		if (meta->newtons)
+			given = NULL;
 		rc = add_known(to, "force_mV_N",
 			       given ? given->force_mV_N : meta->force_mV_N);
 		if (!rc)

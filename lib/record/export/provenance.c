@@ -137,9 +137,11 @@ static int add_calibration(struct incise_provenance *provenance,
 			   struct incise_recording *const *recordings, int n,
 			   const struct incise_calibration *given)
 {
-	double mV_N = given ? given->force_mV_N : recordings[0]->meta.force_mV_N;
+	/* A device in newtons was not calibrated in mV/N. */
+	bool volts = given && !recordings[0]->meta.newtons;
+	double mV_N = volts ? given->force_mV_N : recordings[0]->meta.force_mV_N;
 	double zero_mV = recordings[0]->meta.zero_mV;
-	bool own = !given || isnan(given->force_zero_mV);
+	bool own = !volts || isnan(given->force_zero_mV);
 	int rc;
 
 	if (!own)

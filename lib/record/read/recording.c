@@ -167,7 +167,7 @@ static int read_tip(struct incise_recording *rec, struct incise_error *err)
 static int read_meta(struct incise_recording *rec, struct incise_error *err)
 {
 	struct incise_recording_info *info = &rec->meta;
-	uint64_t complete = 0, bits = 0;
+	uint64_t complete = 0, bits = 0, newtons = 0;
 	const struct item items[] = {
 		{"complete", COUNT, &complete, 0, false},
 		{"started", TEXT, info->started, sizeof(info->started), false},
@@ -189,8 +189,9 @@ static int read_meta(struct incise_recording *rec, struct incise_error *err)
 		{"force_lost", COUNT, &info->force_lost, 0, false},
 		{"tracker_lost", COUNT, &info->tracker_lost, 0, false},
 		{"force_clipped", COUNT, &info->force_clipped, 0, false},
-		/* Older recordings have none, and start at 0 V. */
+		/* Older recordings have none: they start at 0 V, and are in volts. */
 		{"force_offset_V", REAL, &info->offset_V, 0, true},
+		{"force_newtons", COUNT, &newtons, 0, true},
 	};
 	int rc = 0;
 
@@ -214,6 +215,7 @@ static int read_meta(struct incise_recording *rec, struct incise_error *err)
 			info->offset_V, info->force_mV_N, info->zero_mV);
 	info->bits = bits;
 	info->complete = complete;
+	info->newtons = newtons;
 	return 0;
 }
 
@@ -224,9 +226,14 @@ void incise_recording_force(const struct incise_recording *rec,
 			    struct incise_recording_force *force)
 {
 	const struct incise_recording_info *meta = &rec->meta;
-	double mV_N = given ? given->force_mV_N : meta->force_mV_N;
-	double zero_mV = given && !isnan(given->force_zero_mV) ? given->force_zero_mV
-							       : meta->zero_mV;
+	double mV_N, zero_mV;
+
+	/* A device in newtons was not calibrated in mV/N. */
+	if (meta->newtons)
+		given = NULL;
+	mV_N = given ? given->force_mV_N : meta->force_mV_N;
+	zero_mV = given && !isnan(given->force_zero_mV) ? given->force_zero_mV
+							: meta->zero_mV;
 
 	*force = (struct incise_recording_force){
 		.n_per_code = meta->full_scale_V * 1e3 / (1LL << meta->bits) / mV_N,

@@ -399,10 +399,11 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	rec->cuts = setup->cuts;
 	rec->pretrigger.force_N = setup->trigger_force_N;
 	rec->pretrigger.button = setup->trigger_button;
-	rec->stats.zero_mV = rec->calibration.force_zero_mV;
 	rec->stats.camera_depth_mm = NAN;
 	rec->zero.depth_max_mm = -INFINITY;
 	incise_force_info(incise_rig_force(rig), &rec->force_info);
+	incise_force_calibration(&rec->force_info, &rec->calibration);
+	rec->stats.zero_mV = rec->calibration.force_zero_mV;
 	incise_tracker_info(incise_rig_tracker(rig), &rec->tracker_info);
 	if (incise_rig_camera(rig))
 		incise_camera_info(incise_rig_camera(rig), &rec->camera_info);

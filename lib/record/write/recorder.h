@@ -69,7 +69,9 @@ struct incise_recorder_pace {
 
 /* Codes of the force channel while the tool is free. */
 struct incise_recorder_zero {
-	int64_t n, sum, sum2;
+	int64_t n;
+	int32_t base; /* the first code; the sums are of differences from it */
+	double sum, sum2;
 	bool clipped;
 	double depth_max_mm;
 	int64_t tracker_ns; /* last record */

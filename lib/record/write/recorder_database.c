@@ -227,6 +227,7 @@ static int write_meta(struct incise_recorder *rec, const char *calibration_path)
 	bad |= incise_recorder_set_integer(rec, "force_bits", force->bits);
 	bad |= incise_recorder_set_real(rec, "force_full_scale_V", force->full_scale_V);
 	bad |= incise_recorder_set_real(rec, "force_offset_V", force->offset_V);
+	bad |= incise_recorder_set_integer(rec, "force_newtons", force->newtons);
 	bad |= incise_recorder_set_real(rec, "force_mV_N", rec->calibration.force_mV_N);
 	bad |= incise_recorder_set_real(rec, "force_zero_mV", rec->stats.zero_mV);
 	bad |= incise_recorder_set_real(rec, "depth_mm_px", rec->calibration.depth_mm_px);

@@ -70,9 +70,12 @@ static void start_stream(struct incise_recorder *rec, int i, const char *name,
 void incise_recorder_start_streams(struct incise_recorder *rec)
 {
 	const struct incise_calibration *calibration = &rec->calibration;
+	double force_sd_ms = calibration->force_delay_sd_ms;
 
-	start_stream(rec, INCISE_LEDGER_FORCE, "force", rec->force_info.name,
-		     calibration->force_delay_sd_ms,
+	/* A calibrated delay has the deviation that was measured with it. */
+	if (isnan(force_sd_ms) && rec->force_info.t_sd_ns > 0)
+		force_sd_ms = (double)rec->force_info.t_sd_ns * 1e-6;
+	start_stream(rec, INCISE_LEDGER_FORCE, "force", rec->force_info.name, force_sd_ms,
 		     &(struct incise_timeline_setup){
 			     .timestamped = true,
 			     .rate_hz = rec->force_info.rate_hz,
@@ -188,9 +191,10 @@ static void zero_force(struct incise_recorder *rec, int64_t t_ns, int32_t code,
 {
 	if (t_ns - rec->streams[INCISE_LEDGER_FORCE].first_ns >= ZERO_NS)
 		return;
-	rec->zero.n++;
-	rec->zero.sum += code;
-	rec->zero.sum2 += (int64_t)code * code;
+	if (!rec->zero.n++)
+		rec->zero.base = code;
+	rec->zero.sum += (double)code - rec->zero.base;
+	rec->zero.sum2 += pow((double)code - rec->zero.base, 2);
 	rec->zero.clipped |= clipped;
 }
 
@@ -206,8 +210,8 @@ int incise_recorder_settle_zero(struct incise_recorder *rec, struct incise_error
 	const struct incise_recorder_zero *zero = &rec->zero;
 	const char *remedy = "keep the tool free of contact for the first 0.5 s, or give "
 			     "force_zero_mV in the calibration";
-	double mean = (double)zero->sum / zero->n;
-	double var = fmax(0, (double)zero->sum2 / zero->n - mean * mean);
+	double above = zero->sum / (double)zero->n, mean = zero->base + above;
+	double var = fmax(0, zero->sum2 / (double)zero->n - above * above);
 	double sd_mV = span_mV(rec, sqrt(var));
 	double sd_N = sd_mV / fabs(rec->calibration.force_mV_N);
 
