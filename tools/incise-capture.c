@@ -29,6 +29,7 @@ struct options {
 	bool trigger_button;
 	double duration_s; /* 0: not given */
 	bool cuts, json;
+	const char *clock_source;
 };
 
 static const char *const cameras[] = {"auto", "off", "frames", "depth", NULL};
@@ -69,6 +70,10 @@ static const struct cli_option option_table[] = {
 	 "wait for the button of the stylus, or for a force such as 0.2N;\n"
 	 "the second before it is recorded too",
 	 CLI_PARSED_BY(parse_trigger), .names = triggers},
+	{0, "clock-source", "SOURCE",
+	 "where the wall time comes from: auto (default), kernel, none;\n"
+	 "of a simulated clock none (default) or sim:TAI_S,PPM,BOUND_US",
+	 CLI_TEXT(struct options, clock_source)},
 	{0, "cuts", NULL, "mark the start and the end of each cut in the table events",
 	 CLI_FLAG(struct options, cuts)},
 	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct options, json)},
@@ -454,6 +459,7 @@ int main(int argc, char **argv)
 	setup.cuts = options.cuts;
 	setup.trigger_force_N = options.trigger_force_N;
 	setup.trigger_button = options.trigger_button;
+	setup.clock_source = options.clock_source;
 	setup.armed = options.trigger_button || options.trigger_force_N > 0;
 	incise_force_info(incise_rig_force(run.rig), &force);
 	incise_force_calibration(&force, &calibration);

@@ -22,6 +22,7 @@
 #include "cli/stream_report.h"
 #include "cli/plot.h"
 #include "cli/recording.h"
+#include "cli/wall_report.h"
 #include "plot/figure.h"
 #include "stepper/module.h"
 #include "train/dataset.h"
@@ -365,10 +366,13 @@ static void show_plan(const char *path, bool json)
 
 /* --- recordings ---------------------------------------------------------------------- */
 
-static void recording_json(const struct incise_recording_info *info, bool intact)
+static void recording_json(const struct incise_recording_info *info, bool intact,
+			   const struct incise_wall *wall)
 {
 	json_print(json_pack(
-		"{sb so ss sb sf so so s{sI sI sI} s{sI sI} sI s{si sf sf sb} s{sf so sf} si sf sf}",
+		"{so sb so ss sb sf so so s{sI sI sI} s{sI sI} sI s{si sf sf sb} s{sf so sf} si sf sf}",
+		"wall",
+		wall ? wall_json(wall, info->start_ns, info->end_ns) : json_null(),
 		"intact", intact, "streams", stream_json(info->streams, info->n_streams),
 		"kind", "recording", "complete", info->complete, "seconds",
 		(info->end_ns - info->start_ns) * 1e-9, "started",
@@ -384,7 +388,8 @@ static void recording_json(const struct incise_recording_info *info, bool intact
 		"force_max_N", info->force_max_N));
 }
 
-static void recording_text(const char *path, const struct incise_recording_info *info)
+static void recording_text(const char *path, const struct incise_recording_info *info,
+			   const struct incise_wall *wall)
 {
 	char unit = info->newtons ? 'N' : 'V';
 
@@ -406,6 +411,10 @@ static void recording_text(const char *path, const struct incise_recording_info 
 	printf("calibration  %g mV/N, zero %.1f mV, %g mm/px\n", info->force_mV_N,
 	       info->zero_mV, info->depth_mm_px);
 	printf("cuts     %d\n", info->cuts);
+	if (wall)
+		wall_text(wall, info->start_ns, info->end_ns);
+	else
+		puts("wall time  none");
 	stream_table(info->streams, info->n_streams);
 }
 
@@ -414,15 +423,21 @@ static void show_recording(const char *path, bool json, bool damaged)
 	struct incise_recording_info info;
 	struct incise_error err = {0};
 	struct incise_recording *recording = recording_open(path);
+	struct incise_wall *wall;
 	bool intact;
 
 	if (incise_recording_info(recording, &info, &err))
 		cli_fail_with(&err);
+	wall = incise_recording_wall(recording, &err);
+	if (!wall && err.code != ENODATA)
+		cli_fail_with(&err);
+	err = (struct incise_error){0};
 	intact = recording_intact(path, damaged, &err);
 	if (json)
-		recording_json(&info, intact);
+		recording_json(&info, intact, wall);
 	else
-		recording_text(path, &info);
+		recording_text(path, &info, wall);
+	incise_wall_free(wall);
 	incise_recording_close(recording);
 	if (err.code)
 		cli_fail_with(&err);

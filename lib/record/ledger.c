@@ -10,7 +10,7 @@
 #include "../base/crc32c.h"
 #include "ledger.h"
 
-const struct incise_ledger_form incise_ledger_forms[INCISE_LEDGER_STREAMS] = {
+const struct incise_ledger_form incise_ledger_forms[INCISE_LEDGER_FORMS] = {
 	[INCISE_LEDGER_FORCE] = {"force", "force", "seq, t_ns, code", "iii"},
 	[INCISE_LEDGER_TRACKER] = {"tracker", "tracker",
 				   "seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, qy, "
@@ -20,6 +20,11 @@ const struct incise_ledger_form incise_ledger_forms[INCISE_LEDGER_STREAMS] = {
 				  "seq, t_ns, arrival_ns, pts, bytes, crc, length_px, "
 				  "sd_px, depth_mm, quality",
 				  "iiiiiinnnn"},
+	[INCISE_LEDGER_WALL] = {"wall", "wall",
+				"seq, t_ns, tai_ns, uncertainty_ns, rate_ppb, "
+				"rate_uncertainty_ppb, utc_offset_s, held, source, "
+				"reference, leap, restart",
+				"iiinrriissss"},
 };
 
 /* --- rows ------------------------------------------------------------------------- */
@@ -94,6 +99,34 @@ void incise_ledger_row_frame(struct incise_ledger_row *row,
 	put_real(row, record->quality);
 }
 
+static void put_text(struct incise_ledger_row *row, const char *text, size_t length)
+{
+	memset(row->bytes + row->n, 0, INCISE_LEDGER_TEXT + 1);
+	memcpy(row->bytes + row->n, text, length);
+	row->n += INCISE_LEDGER_TEXT + 1;
+}
+
+void incise_ledger_row_wall(struct incise_ledger_row *row, uint64_t seq,
+			    const struct incise_wall_point *point)
+{
+	const char *const texts[] = {point->source, point->reference, point->leap,
+				     point->restart};
+
+	row->seq = seq;
+	row->t_ns = point->t_ns;
+	row->n = 0;
+	put_integer(row, seq);
+	put_integer(row, point->t_ns);
+	put_integer(row, point->tai_ns);
+	put_real(row, isfinite(point->uncertainty_ns) ? point->uncertainty_ns : NAN);
+	put_real(row, point->rate_ppb);
+	put_real(row, point->rate_uncertainty_ppb);
+	put_integer(row, point->utc_offset_s);
+	put_integer(row, point->held);
+	for (size_t i = 0; i < sizeof(texts) / sizeof(*texts); i++)
+		put_text(row, texts[i], strlen(texts[i]));
+}
+
 bool incise_ledger_row_read(struct incise_ledger_row *row,
 			    const struct incise_ledger_form *form, sqlite3_stmt *stmt)
 {
@@ -125,6 +158,13 @@ bool incise_ledger_row_read(struct incise_ledger_row *row,
 			    sqlite3_column_bytes(stmt, i) != 1)
 				return false;
 			row->bytes[row->n++] = *sqlite3_column_text(stmt, i);
+			break;
+		case 's':
+			if (type != SQLITE_TEXT || !sqlite3_column_text(stmt, i) ||
+			    sqlite3_column_bytes(stmt, i) > INCISE_LEDGER_TEXT)
+				return false;
+			put_text(row, (const char *)sqlite3_column_text(stmt, i),
+				 sqlite3_column_bytes(stmt, i));
 			break;
 		}
 	}

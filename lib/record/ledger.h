@@ -20,13 +20,17 @@
 #include <stdint.h>
 #include <sqlite3.h>
 #include <incise/tracker.h>
+#include <incise/wall.h>
 #include "frames.h"
 
 /* A stream, its table, and the encoding of its columns. */
 struct incise_ledger_form {
 	const char *stream, *table;
 	const char *columns; /* seq and t_ns are first */
-	/* of each column: i integer, r real, n real or NULL, c one character; see below */
+	/*
+	 * Of each column: i integer, r real, n real or NULL, c one character, s a text of at most
+	 * INCISE_LEDGER_TEXT bytes; see below.
+	 */
 	const char *types;
 };
 
@@ -34,20 +38,25 @@ enum {
 	INCISE_LEDGER_FORCE,
 	INCISE_LEDGER_TRACKER,
 	INCISE_LEDGER_CAMERA,
-	INCISE_LEDGER_STREAMS
+	INCISE_LEDGER_STREAMS,
+	/* Not of a device: readings of the computer's clocks, from form 3 of the tables on. */
+	INCISE_LEDGER_WALL = INCISE_LEDGER_STREAMS,
+	INCISE_LEDGER_FORMS
 };
 
-extern const struct incise_ledger_form incise_ledger_forms[INCISE_LEDGER_STREAMS];
+extern const struct incise_ledger_form incise_ledger_forms[INCISE_LEDGER_FORMS];
+
+#define INCISE_LEDGER_TEXT 23
 
 /*
  * One row, encoded: integers and reals (IEEE 754) as 8 bytes, little-endian, a character as
- * one. Minus zero is zero, since SQLite keeps no minus zero; NULL is the NaN
- * 0x7ff8000000000000, since it keeps no NaN.
+ * one, a text with zeros up to 24 bytes. Minus zero is zero, since SQLite keeps no minus zero;
+ * NULL is the NaN 0x7ff8000000000000, since it keeps no NaN.
  */
 struct incise_ledger_row {
 	int64_t seq, t_ns;
 	size_t n;
-	uint8_t bytes[13 * 8];
+	uint8_t bytes[20 * 8];
 };
 
 void incise_ledger_row_force(struct incise_ledger_row *row, uint64_t seq, int64_t t_ns,
@@ -57,6 +66,9 @@ void incise_ledger_row_tracker(struct incise_ledger_row *row, int64_t t_ns,
 /* NaN stands for a column that is NULL; t_ns is the time as in the table. */
 void incise_ledger_row_frame(struct incise_ledger_row *row,
 			     const struct incise_frame_record *record);
+/* An uncertainty that is INFINITY stands for a column that is NULL. */
+void incise_ledger_row_wall(struct incise_ledger_row *row, uint64_t seq,
+			    const struct incise_wall_point *point);
 
 /* Encode the row of a SELECT of a form's columns. False: a column has a wrong type. */
 bool incise_ledger_row_read(struct incise_ledger_row *row,

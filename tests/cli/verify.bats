@@ -190,10 +190,10 @@ qw REAL NOT NULL, qx REAL NOT NULL, qy REAL NOT NULL, qz REAL NOT NULL, status T
 }
 
 @test "a recording of a form that is not known yet is told from a damaged one" {
-	ask a.rec "PRAGMA user_version=3"
+	ask a.rec "PRAGMA user_version=4"
 	for verb in verify info export; do
 		run --separate-stderr incise $verb a.rec
-		failed_with "a.rec: made by a newer incise (format 3, this version reads up to 2)"
+		failed_with "a.rec: made by a newer incise (format 4, this version reads up to 3)"
 	done
 }
 

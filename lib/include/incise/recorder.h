@@ -41,6 +41,11 @@ struct incise_recorder_setup {
 	double trigger_force_N;
 	bool trigger_button;
 	bool cuts; /**< write start and end of each cut as events "cut" */
+	/**
+	 * Source of wall time; see incise-capture(1), --clock-source. NULL: "auto", and none for
+	 * a simulated clock.
+	 */
+	const char *clock_source;
 };
 
 /** State of a recorder: rows, losses, last samples, streams. */
@@ -73,7 +78,7 @@ struct incise_recorder;
  *              INCISE_RIG_CAMERA; not owned
  * @param setup not used after the call
  * @return recorder, to be ended with incise_recorder_close(); NULL with errno EEXIST, EINVAL
- *         (a path without a name; vision's thresholds), ENODEV (the rig has no tracker or
+ *         (a path without a name; vision's thresholds; the source of wall time), ENODEV (the rig has no tracker or
  *         force channel), EOPNOTSUPP (its tracker reads more than one sensor), ENOSPC (too
  *         little space for planned_s), errno of mkdir(2), EIO, ENOMEM; ENOENT, ENOEXEC (a
  *         module for frames is not installed, or broken).

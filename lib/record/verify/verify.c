@@ -101,6 +101,7 @@ static void check_depth(struct incise_verification *verify)
 
 /* An entry with an unknown name would pass as verified. */
 #define STREAMS "'force', 'tracker', 'camera'"
+#define WALL ", 'wall'"
 #define SEALS                                                                           \
 	"'table:depth', 'table:events', 'table:knots', 'table:meta', 'table:streams', " \
 	"'file:camera.mkv'"
@@ -110,8 +111,9 @@ static void check_names(struct incise_verification *verify)
 
 	if (ask(verify,
 		verify->report->interrupted
-			? "SELECT count(*) FROM ledger WHERE stream NOT IN (" STREAMS ")"
-			: "SELECT count(*) FROM ledger WHERE stream NOT IN (" STREAMS
+			? "SELECT count(*) FROM ledger WHERE stream NOT IN (" STREAMS WALL
+			  ")"
+			: "SELECT count(*) FROM ledger WHERE stream NOT IN (" STREAMS WALL
 			  ", " SEALS ")",
 		-1))
 		incise_verify_found(verify, &found,
@@ -300,6 +302,25 @@ static bool has_camera(struct incise_verification *verify)
 		1);
 }
 
+/* Wall time is no stream of the report: its findings are all there is to tell. */
+static int check_wall(struct incise_verification *verify)
+{
+	struct incise_verify_stream rows = {0};
+
+	/* Any trace counts, because others may have been removed. */
+	if (verify->recording->form < 3 ||
+	    !ask(verify,
+		 "SELECT EXISTS(SELECT 1 FROM ledger WHERE stream = 'wall') OR "
+		 "EXISTS(SELECT 1 FROM meta WHERE key = 'wall_rows' AND value > 0) OR "
+		 "EXISTS(SELECT 1 FROM wall)",
+		 1))
+		return 0;
+	return incise_verify_stream(
+		verify, &incise_ledger_forms[INCISE_LEDGER_WALL],
+		ask(verify, "SELECT value FROM meta WHERE key = 'wall_rows'", 0), 0,
+		&rows);
+}
+
 /* Streams one after the other. Returns 0 or -ECANCELED. */
 static int check_streams(struct incise_verification *verify)
 {
@@ -330,6 +351,8 @@ static int check_streams(struct incise_verification *verify)
 					  counted[i].rows, counted[i].lost,
 					  &report->streams[report->n_streams++]);
 	}
+	if (!rc)
+		rc = check_wall(verify);
 	if (!rc && verify->camera && !verify->rows_only)
 		rc = incise_verify_camera(verify);
 	return rc;

@@ -238,6 +238,7 @@ static int write_counts(struct incise_recorder *rec)
 		{"force_lost", stats.force_lost},
 		{"tracker_lost", stats.tracker_lost},
 		{"force_clipped", stats.force_clipped},
+		{"wall_rows", rec->wall.rows},
 		{"frames_rows", stats.frames},
 		{"frames_lost", stats.frames_lost},
 		{"frames_unlooked", stats.frames_unlooked},
@@ -300,6 +301,7 @@ static int commit(struct incise_recorder *rec, int64_t now_ns, bool last,
 static void recorder_free(struct incise_recorder *rec)
 {
 	close_camera(rec);
+	incise_wall_sampler_free(rec->wall.sampler);
 	incise_recorder_close_database(rec);
 	incise_recorder_disarm(rec);
 	if (rec->folder >= 0)
@@ -363,6 +365,10 @@ static int start(struct incise_recorder *rec, const struct incise_recorder_setup
 			    err);
 	if (!rc && rec->streams[INCISE_LEDGER_CAMERA].exists)
 		rc = open_camera(rec, setup->vision, err);
+	if (!rc)
+		rc = incise_wall_sampler_new(
+			&rec->wall.sampler, setup->clock_source,
+			incise_clock_is_real(incise_rig_clock(rec->rig)), err);
 	if (!rc && setup->armed && incise_recorder_arm(rec))
 		rc = incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
 	if (!rc && !setup->armed)
@@ -410,6 +416,7 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	incise_rig_surface(rig, point_mm, normal);
 	incise_depth_init(&rec->depth, point_mm, normal);
 	incise_recorder_start_streams(rec);
+	incise_ledger_init(&rec->wall.ledger);
 	rc = incise_recorder_split_path(rec, path, err);
 	if (!rc)
 		rc = incise_recorder_make_folder(rec, err);
@@ -553,6 +560,8 @@ int incise_recorder_poll(struct incise_recorder *rec, struct incise_error *err)
 		rc = read_tracker(rec, err);
 	if (!rc)
 		rc = read_camera(rec, err);
+	if (!rc)
+		rc = incise_recorder_put_wall(rec, err);
 	if (!rc && incise_recorder_zero_due(rec))
 		rc = incise_recorder_settle_zero(rec, err);
 	if (!rc && rec->stats.armed && rec->pretrigger.triggered)
@@ -594,6 +603,10 @@ int incise_recorder_end(struct incise_recorder *rec, struct incise_error *err)
 		rc = incise_recorder_settle_zero(rec, err);
 	if (!rc)
 		rc = incise_recorder_flush_depth(rec, err);
+	incise_wall_sampler_stop(rec->wall.sampler,
+				 incise_clock_now(incise_rig_clock(rec->rig)));
+	if (!rc)
+		rc = incise_recorder_put_wall(rec, err);
 	rec->failed = rc;
 	return rc;
 }
@@ -604,8 +617,10 @@ int incise_recorder_end(struct incise_recorder *rec, struct incise_error *err)
  */
 static int check_rows(struct incise_recorder *rec, struct incise_error *err)
 {
-	for (int i = 0; i < INCISE_LEDGER_STREAMS; i++) {
+	for (int i = 0; i < INCISE_LEDGER_FORMS; i++) {
 		const char *table = incise_ledger_forms[i].table;
+		uint64_t written =
+			i == INCISE_LEDGER_WALL ? rec->wall.rows : rec->streams[i].rows;
 		sqlite3_stmt *stmt = NULL;
 		uint64_t rows = 0;
 		char text[60];
@@ -616,14 +631,14 @@ static int check_rows(struct incise_recorder *rec, struct incise_error *err)
 			rows = (uint64_t)sqlite3_column_int64(stmt, 0);
 		if (sqlite3_finalize(stmt) != SQLITE_OK)
 			return incise_recorder_fail(rec, err);
-		if (rows != rec->streams[i].rows)
+		if (rows != written)
 			return incise_error_set(
 				err, EIO,
 				"%s: another program changed its files during the "
 				"recording: table %s has %llu rows of %llu; `incise "
 				"verify %s` lists the remaining data",
 				rec->part, table, (unsigned long long)rows,
-				(unsigned long long)rec->streams[i].rows, rec->part);
+				(unsigned long long)written, rec->part);
 	}
 	return 0;
 }

@@ -21,6 +21,7 @@
 #include "../read/depth.h"
 #include "../time/timeline.h"
 #include "frame_pump.h"
+#include "wall_sampler.h"
 
 /* Statements, prepared once; see recorder_database.c. */
 enum {
@@ -34,6 +35,7 @@ enum {
 	SET_STREAM,
 	DROP_KNOTS,
 	INSERT_KNOT,
+	INSERT_WALL,
 	STATEMENTS
 };
 
@@ -97,6 +99,15 @@ struct incise_recorder_camera {
 	bool given_up;	   /* its file is not closed: the disk hangs */
 };
 
+/* Wall time. Before the trigger the newest points are kept. */
+struct incise_recorder_wall {
+	struct incise_wall_sampler *sampler; /* NULL: without wall time */
+	struct incise_ledger ledger;
+	uint64_t rows;
+	int n_kept;
+	struct incise_wall_point kept[3];
+};
+
 struct incise_recorder_disk {
 	int64_t asked_ns; /* last look */
 	int64_t started_ns;
@@ -128,6 +139,7 @@ struct incise_recorder {
 	struct incise_recorder_pace pace;
 	struct incise_recorder_pretrigger pretrigger;
 	struct incise_recorder_camera camera;
+	struct incise_recorder_wall wall;
 	struct incise_recorder_disk disk;
 	struct incise_recorder_stats stats;
 	struct {
@@ -175,6 +187,9 @@ int incise_recorder_put_tracker(struct incise_recorder *rec,
 int incise_recorder_put_frame(struct incise_recorder *rec,
 			      const struct incise_frame_record *frame,
 			      struct incise_error *err);
+
+/* Write the points of wall time since the last call. Returns 0 or a disk error. */
+int incise_recorder_put_wall(struct incise_recorder *rec, struct incise_error *err);
 
 /* Write the depth rows whose windows are still open. Returns 0 or a disk error. */
 int incise_recorder_flush_depth(struct incise_recorder *rec, struct incise_error *err);

@@ -31,6 +31,7 @@ static const char *const sql[STATEMENTS] = {
 		       "VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)",
 	[DROP_KNOTS] = "DELETE FROM knots WHERE stream = ?",
 	[INSERT_KNOT] = "INSERT INTO knots VALUES(?,?,?,?,?,?)",
+	[INSERT_WALL] = "INSERT INTO wall VALUES(?,?,?,?,?,?,?,?,?,?,?,?)",
 };
 
 int incise_recorder_fail(struct incise_recorder *rec, struct incise_error *err)

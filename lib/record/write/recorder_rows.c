@@ -394,6 +394,92 @@ static int write_tracker(struct incise_recorder *rec, const struct tracker_row *
 	return rc;
 }
 
+/* --- wall time ------------------------------------------------------------------------ */
+
+static int write_wall(struct incise_recorder *rec, const struct incise_wall_point *point,
+		      struct incise_error *err)
+{
+	sqlite3_stmt *stmt = rec->stmt[INSERT_WALL];
+	const char *const texts[] = {point->source, point->reference, point->leap,
+				     point->restart};
+	struct incise_ledger_row entry;
+
+	sqlite3_bind_int64(stmt, 1, (sqlite3_int64)rec->wall.rows);
+	sqlite3_bind_int64(stmt, 2, point->t_ns);
+	sqlite3_bind_int64(stmt, 3, point->tai_ns);
+	if (isfinite(point->uncertainty_ns))
+		sqlite3_bind_double(stmt, 4, point->uncertainty_ns);
+	else
+		sqlite3_bind_null(stmt, 4);
+	sqlite3_bind_double(stmt, 5, point->rate_ppb);
+	sqlite3_bind_double(stmt, 6, point->rate_uncertainty_ppb);
+	sqlite3_bind_int(stmt, 7, point->utc_offset_s);
+	sqlite3_bind_int(stmt, 8, point->held);
+	for (int i = 0; i < 4; i++)
+		sqlite3_bind_text(stmt, 9 + i, texts[i], -1, SQLITE_TRANSIENT);
+	if (incise_recorder_run(stmt) != SQLITE_OK)
+		return incise_recorder_fail(rec, err);
+	incise_ledger_row_wall(&entry, rec->wall.rows++, point);
+	incise_ledger_add(&rec->wall.ledger, &entry);
+	return 0;
+}
+
+/* The points of the second before the trigger. */
+static int release_wall(struct incise_recorder *rec, struct incise_error *err)
+{
+	struct incise_recorder_wall *wall = &rec->wall;
+	int rc = 0;
+
+	for (int i = 0; i < wall->n_kept && !rc; i++) {
+		/* Nothing is before the first one. */
+		if (!i)
+			*wall->kept[i].restart = 0;
+		rc = write_wall(rec, &wall->kept[i], err);
+	}
+	wall->n_kept = 0;
+	return rc;
+}
+
+static int put_point(struct incise_recorder *rec, const struct incise_wall_point *point,
+		     struct incise_error *err)
+{
+	struct incise_recorder_wall *wall = &rec->wall;
+	const int most = sizeof(wall->kept) / sizeof(*wall->kept);
+
+	if (!rec->stats.armed)
+		return write_wall(rec, point, err);
+	if (wall->n_kept == most) {
+		memmove(wall->kept, wall->kept + 1, (most - 1) * sizeof(*wall->kept));
+		wall->n_kept--;
+	}
+	wall->kept[wall->n_kept++] = *point;
+	return 0;
+}
+
+int incise_recorder_put_wall(struct incise_recorder *rec, struct incise_error *err)
+{
+	struct incise_wall_result results[4];
+	int n = 4, rc = 0;
+
+	while (rec->wall.sampler && n == 4 && !rc) {
+		n = incise_wall_sampler_take(rec->wall.sampler,
+					     incise_clock_now(incise_rig_clock(rec->rig)),
+					     results, 4);
+		for (int i = 0; i < n && !rc; i++) {
+			for (int k = 0; k < results[i].n_events && !rc; k++)
+				rc = incise_recorder_check(
+					rec,
+					incise_recorder_note_at(
+						rec, results[i].point.t_ns, "clock", "%s",
+						results[i].events[k]),
+					err);
+			if (!rc)
+				rc = put_point(rec, &results[i].point, err);
+		}
+	}
+	return rc;
+}
+
 /*
  * --- pretrigger --------------------------------------------------------------------------
  *
@@ -469,6 +555,8 @@ int incise_recorder_release(struct incise_recorder *rec, struct incise_error *er
 	/* The device's count starts here; samples missing in the second before were lost too. */
 	for (int i = 0; i < INCISE_LEDGER_STREAMS; i++)
 		rec->streams[i].gaps_held = rec->streams[i].gaps;
+	if (!rc)
+		rc = release_wall(rec, err);
 	incise_recorder_disarm(rec);
 	return rc;
 }
@@ -783,6 +871,9 @@ int incise_recorder_write_ledger(struct incise_recorder *rec)
 	for (int i = 0; i < INCISE_LEDGER_STREAMS && rc == SQLITE_OK; i++)
 		if (incise_ledger_end(&rec->streams[i].ledger, &block))
 			rc = put_block(rec, rec->streams[i].name, &block);
+	if (rc == SQLITE_OK && incise_ledger_end(&rec->wall.ledger, &block))
+		rc = put_block(rec, incise_ledger_forms[INCISE_LEDGER_WALL].stream,
+			       &block);
 	return rc;
 }
 
@@ -790,6 +881,13 @@ int incise_recorder_end_ledger(struct incise_recorder *rec)
 {
 	int rc = incise_recorder_write_ledger(rec);
 
+	if (rc == SQLITE_OK && rec->wall.sampler) {
+		struct incise_ledger_block block;
+
+		incise_ledger_close(&rec->wall.ledger, 0, &block);
+		rc = put_block(rec, incise_ledger_forms[INCISE_LEDGER_WALL].stream,
+			       &block);
+	}
 	for (int i = 0; i < INCISE_LEDGER_STREAMS && rc == SQLITE_OK; i++) {
 		struct incise_ledger *ledger = &rec->streams[i].ledger;
 		struct incise_ledger_block block;

@@ -39,7 +39,7 @@ __attribute__((unused)) static int remove_entry(const char *path, const struct s
 	return remove(path);
 }
 
-/* Makes a recording of form 1, from before the ledger, of one of form 2. */
+/* Makes a recording of form 1, from before the ledger, of one of today. */
 #define TO_FORM_1                                                                      \
 	"CREATE TABLE old AS SELECT * FROM tracker; DROP TABLE tracker; "              \
 	"CREATE TABLE tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "        \
@@ -49,6 +49,9 @@ __attribute__((unused)) static int remove_entry(const char *path, const struct s
 	"INSERT INTO tracker SELECT seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, " \
 	"qy, qz, status FROM old; DROP TABLE old; DROP TABLE frames; "                 \
 	"DROP TABLE streams; DROP TABLE knots; DROP TABLE ledger; PRAGMA user_version=1"
+
+/* Makes one of form 2, from before there was wall time. */
+#define TO_FORM_2 "DROP TABLE wall; PRAGMA user_version=2"
 
 /* For setup and teardown: a folder as the working folder, so that paths are short. */
 __attribute__((unused)) static int enter_folder(void **state)

@@ -19,7 +19,9 @@ static void check(const char *sql, int expected, const char *text)
 	if (rc != expected || !strstr(err.text, text))
 		fail_msg("%s: %d, %s", sql, rc, err.text);
 	else if (!rc)
-		assert_int_equal(form, strcmp(sql, TO_FORM_1) ? 2 : 1);
+		assert_int_equal(form, !strcmp(sql, TO_FORM_1)	 ? 1
+				       : !strcmp(sql, TO_FORM_2) ? 2
+								 : 3);
 	sqlite3_close(db);
 }
 
@@ -34,10 +36,12 @@ static void only_the_own_form_is_taken(void **state)
 		/* what others add does not hurt */
 		{"CREATE TABLE mine(a); CREATE INDEX i ON force(t_ns)", 0, ""},
 		{TO_FORM_1, 0, ""},
+		{TO_FORM_2, 0, ""},
+		{"DROP TABLE wall", -EINVAL, "table 'wall' is missing"},
 		{"PRAGMA user_version=1", -EINVAL, "table 'tracker' is not as incise"},
 		{"DROP TABLE ledger", -EINVAL, "table 'ledger' is missing"},
 		{"PRAGMA application_id=1", -EINVAL, "not made by incise"},
-		{"PRAGMA user_version=3", -EINVAL, "newer incise"},
+		{"PRAGMA user_version=4", -EINVAL, "newer incise"},
 		{"PRAGMA user_version=0", -EINVAL, "damaged"},
 		{"PRAGMA user_version=-1", -EINVAL, "damaged"},
 		{"DROP TABLE force", -EINVAL, "table 'force' is missing"},

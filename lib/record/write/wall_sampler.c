@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Points of wall time once a second; see wall_sampler.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/clock.h>
+#include "../../device/thread.h"
+#include "wall_sampler.h"
+#include "wall_sources.h"
+
+#define PERIOD_NS INCISE_NS_PER_S
+/* Taken 10 times a second at least; a disk that hangs holds up a poll for some seconds. */
+#define WAITING 64
+/* 2027-01-15 08:00 */
+#define SIMULATED_S 1.8e9
+
+struct incise_wall_sampler {
+	bool real;
+	/* Of a simulated clock: TAI at its time 0, s; its rate; the bound. */
+	double tai_s, rate_ppm, bound_us;
+	int64_t next_ns;
+	struct incise_wall_follow follow;
+	struct incise_wall_kernel kernel;
+
+	pthread_t thread;
+	bool running;
+	pthread_mutex_t lock;
+	pthread_cond_t changed;
+	/* Under the lock. */
+	bool stop;
+	int n;
+	struct incise_wall_result waiting[WAITING];
+};
+
+/* --- points --------------------------------------------------------------------------- */
+
+/* Where there are too many, the newest takes the place of the one before, and its restart. */
+static void put(struct incise_wall_sampler *sampler,
+		const struct incise_wall_result *result)
+{
+	struct incise_wall_point *point;
+
+	pthread_mutex_lock(&sampler->lock);
+	if (sampler->n == WAITING)
+		sampler->n--;
+	else
+		*sampler->waiting[sampler->n].point.restart = 0;
+	point = &sampler->waiting[sampler->n].point;
+	if (*point->restart && !*result->point.restart) {
+		struct incise_wall_result kept = *result;
+
+		memcpy(kept.point.restart, point->restart, sizeof(kept.point.restart));
+		sampler->waiting[sampler->n++] = kept;
+	} else {
+		sampler->waiting[sampler->n++] = *result;
+	}
+	pthread_mutex_unlock(&sampler->lock);
+}
+
+static void sample(struct incise_wall_sampler *sampler)
+{
+	struct incise_wall_statement statements[INCISE_WALL_SOURCES];
+	struct incise_wall_reading readings[INCISE_WALL_SOURCES];
+	struct incise_wall_clocks clocks = {0};
+	struct incise_wall_result result;
+	int n = 2;
+
+	incise_wall_read_clocks(&clocks);
+	incise_wall_kernel_read(&sampler->kernel, &clocks, statements);
+	incise_wall_read_clocks(&clocks);
+	for (int i = 0; i < n; i++) {
+		readings[i] = statements[i].reading;
+		readings[i].tai_ns = clocks.real_ns +
+				     readings[i].utc_offset_s * INCISE_NS_PER_S -
+				     llrint(statements[i].offset_ns);
+	}
+	incise_wall_follow(&sampler->follow, &clocks, readings, n, &result);
+	put(sampler, &result);
+}
+
+/* The time of a simulated clock is true within its bound, by its own statement. */
+static void simulate(struct incise_wall_sampler *sampler, int64_t now_ns)
+{
+	struct incise_wall_result result = {
+		.point = {
+			.t_ns = now_ns,
+			.tai_ns = llrint(sampler->tai_s * 1e9) + now_ns +
+				  llrint((double)now_ns * sampler->rate_ppm * 1e-6),
+			.uncertainty_ns = sampler->bound_us * 1e3,
+			.rate_ppb = sampler->rate_ppm * 1e3,
+			.utc_offset_s = 37,
+			.source = "simulated",
+			.reference = "TAI",
+			.leap = "assumed",
+		}};
+
+	put(sampler, &result);
+	sampler->next_ns = now_ns + PERIOD_NS;
+}
+
+static void *run(void *argument)
+{
+	struct incise_wall_sampler *sampler = argument;
+	bool last = false;
+
+	while (!last) {
+		struct timespec until;
+		int rc = 0;
+
+		clock_gettime(CLOCK_MONOTONIC, &until);
+		until.tv_sec++;
+		/* One more after the stop. */
+		pthread_mutex_lock(&sampler->lock);
+		last = sampler->stop;
+		pthread_mutex_unlock(&sampler->lock);
+		sample(sampler);
+		pthread_mutex_lock(&sampler->lock);
+		while (!sampler->stop && !rc)
+			rc = pthread_cond_timedwait(&sampler->changed, &sampler->lock,
+						    &until);
+		pthread_mutex_unlock(&sampler->lock);
+	}
+	return NULL;
+}
+
+/* --- interface ------------------------------------------------------------------------ */
+
+/* "sim", or "sim:TAI_S,PPM,BOUND_US" with any of them left out from the end. */
+static bool read_simulated(struct incise_wall_sampler *sampler, const char *text)
+{
+	double *const to[] = {&sampler->tai_s, &sampler->rate_ppm, &sampler->bound_us};
+	size_t i = 0;
+
+	if (strncmp(text, "sim", 3) != 0 || (text[3] && text[3] != ':'))
+		return false;
+	text += 3;
+	while (*text && i < 3) {
+		char *end;
+
+		*to[i] = strtod(text + 1, &end);
+		if (end == text + 1 || !isfinite(*to[i++]) || (*end && *end != ','))
+			return false;
+		text = end;
+	}
+	return !*text && sampler->tai_s >= 0 && sampler->tai_s < 9e9 &&
+	       fabs(sampler->rate_ppm) <= 1e4 && sampler->bound_us >= 0 &&
+	       sampler->bound_us <= 1e9;
+}
+
+static int read_source(struct incise_wall_sampler *sampler, const char *source,
+		       bool *wanted, struct incise_error *err)
+{
+	bool simulated = source && !strncmp(source, "sim", 3);
+
+	*wanted = sampler->real ? !source || strcmp(source, "none") != 0 : simulated;
+	if (!source || !strcmp(source, "none"))
+		return 0;
+	if (sampler->real != simulated &&
+	    (simulated ? read_simulated(sampler, source)
+		       : !strcmp(source, "auto") || !strcmp(source, "kernel")))
+		return 0;
+	return incise_error_set(
+		err, EINVAL, "clock source '%s': %s", source,
+		sampler->real == simulated
+			? sampler->real
+				  ? "is for a simulated rig, and this rig's clock is real"
+				  : "the clock of this rig is simulated and has no wall "
+				    "time; use none or sim:TAI_S,PPM,BOUND_US"
+		: sampler->real ? "no such source; use auto, kernel or none"
+				: "not sim:TAI_S,PPM,BOUND_US, with numbers");
+}
+
+static int start_thread(struct incise_wall_sampler *sampler)
+{
+	pthread_condattr_t attributes;
+	int rc = -pthread_condattr_init(&attributes);
+
+	if (rc)
+		return rc;
+	pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
+	rc = -pthread_cond_init(&sampler->changed, &attributes);
+	pthread_condattr_destroy(&attributes);
+	if (rc)
+		return rc;
+	rc = incise_thread_start(&sampler->thread, run, sampler, NULL);
+	sampler->running = !rc;
+	if (rc)
+		pthread_cond_destroy(&sampler->changed);
+	return rc;
+}
+
+int incise_wall_sampler_new(struct incise_wall_sampler **sampler, const char *source,
+			    bool real, struct incise_error *err)
+{
+	struct incise_wall_sampler *made = calloc(1, sizeof(*made));
+	bool wanted = false;
+	int rc;
+
+	*sampler = NULL;
+	if (!made)
+		return incise_error_set(err, ENOMEM, "clock source: out of memory");
+	made->real = real;
+	made->tai_s = SIMULATED_S;
+	made->bound_us = 1;
+	rc = read_source(made, source, &wanted, err);
+	if (rc || !wanted) {
+		free(made);
+		return rc;
+	}
+	pthread_mutex_init(&made->lock, NULL);
+	if (real)
+		rc = start_thread(made);
+	if (rc) {
+		pthread_mutex_destroy(&made->lock);
+		free(made);
+		return incise_error_set(err, -rc, "clock source: no thread: %s",
+					strerror(-rc));
+	}
+	*sampler = made;
+	return 0;
+}
+
+int incise_wall_sampler_take(struct incise_wall_sampler *sampler, int64_t now_ns,
+			     struct incise_wall_result *results, int max)
+{
+	int n;
+
+	if (!sampler->real && now_ns >= sampler->next_ns)
+		simulate(sampler, now_ns);
+	pthread_mutex_lock(&sampler->lock);
+	n = sampler->n < max ? sampler->n : max;
+	memcpy(results, sampler->waiting, n * sizeof(*results));
+	sampler->n -= n;
+	memmove(sampler->waiting, sampler->waiting + n, sampler->n * sizeof(*results));
+	pthread_mutex_unlock(&sampler->lock);
+	return n;
+}
+
+void incise_wall_sampler_stop(struct incise_wall_sampler *sampler, int64_t now_ns)
+{
+	if (!sampler)
+		return;
+	if (!sampler->real && now_ns > sampler->next_ns - PERIOD_NS)
+		simulate(sampler, now_ns);
+	if (!sampler->running)
+		return;
+	pthread_mutex_lock(&sampler->lock);
+	sampler->stop = true;
+	pthread_cond_signal(&sampler->changed);
+	pthread_mutex_unlock(&sampler->lock);
+	pthread_join(sampler->thread, NULL);
+	pthread_cond_destroy(&sampler->changed);
+	sampler->running = false;
+}
+
+void incise_wall_sampler_free(struct incise_wall_sampler *sampler)
+{
+	if (!sampler)
+		return;
+	incise_wall_sampler_stop(sampler, sampler->next_ns - PERIOD_NS);
+	pthread_mutex_destroy(&sampler->lock);
+	free(sampler);
+}

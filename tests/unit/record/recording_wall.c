@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Wall time through a recorder, its ledger and a reader: table wall, incise_recording_wall().
+ */
+#include "recorded.h"
+#include <time.h>
+#include <incise/verify.h>
+#include <incise/wall.h>
+
+#define S INCISE_NS_PER_S
+#define DB "a.rec/recording.db"
+
+static void record_by(const char *spec, const char *source, int64_t duration_ns)
+{
+	struct incise_rig *rig = open_rig(spec);
+	struct incise_calibration calibration;
+	struct incise_recorder *recorder;
+	struct incise_error err = {0};
+
+	incise_calibration_nominal(&calibration);
+	recorder = incise_recorder_new(
+		"a.rec", rig,
+		&(struct incise_recorder_setup){.calibration = &calibration,
+						.clock_source = source},
+		&err);
+	if (!recorder || poll_for(recorder, rig, duration_ns, &err) ||
+	    incise_recorder_close(recorder, &err))
+		fail_msg("%s", err.text);
+	incise_rig_close(rig);
+}
+
+static struct incise_wall *read_wall(int code)
+{
+	struct incise_error err = {0};
+	struct incise_recording *recording = incise_recording_open("a.rec", &err);
+	struct incise_wall *wall;
+
+	assert_non_null(recording);
+	errno = 0;
+	wall = incise_recording_wall(recording, &err);
+	if (code) {
+		assert_null(wall);
+		assert_int_equal(errno, code);
+		assert_int_equal(err.code, code);
+	} else if (!wall) {
+		fail_msg("%s", err.text);
+	}
+	incise_recording_close(recording);
+	return wall;
+}
+
+static bool is_intact(void)
+{
+	struct incise_verify_report report;
+	struct incise_error err = {0};
+
+	if (incise_verify("a.rec", NULL, &report, &err))
+		fail_msg("%s", err.text);
+	return report.intact;
+}
+
+static void stated_time_of_a_simulated_clock(void **state)
+{
+	const struct incise_wall_point *points;
+	struct incise_wall *wall;
+	int64_t tai, u, back;
+
+	record_by(SHORT_SCRIPT, "sim:1.5e9,50,2", 5 * S);
+	wall = read_wall(0);
+	assert_int_equal(incise_wall_points(wall, &points),
+			 6); /* each second, and the end */
+	for (int64_t t = 0; t < 5 * S; t += S / 3) {
+		assert_int_equal(incise_wall_tai(wall, t, &tai, &u), 0);
+		/* 2 µs, and what the rounding of a point to 1 ns is worth */
+		assert_true(llabs(tai - (1500000000 * S + t + t / 20000)) <= 2);
+		assert_in_range(u, 2000, 2010);
+		assert_int_equal(incise_wall_monotonic(wall, tai, &back, &u), 0);
+		assert_true(llabs(back - t) <= 2);
+	}
+	assert_int_equal(incise_wall_tai(wall, -61 * S, &tai, &u), -ENODATA);
+	assert_int_equal(incise_wall_tai(wall, 67 * S, &tai, &u), -ENODATA);
+	assert_int_equal(incise_wall_monotonic(wall, 0, &back, &u), -ENODATA);
+	incise_wall_free(wall);
+	assert_true(is_intact());
+}
+
+static void rows_are_protected(void **state)
+{
+	static const char *const changes[] = {
+		"UPDATE wall SET tai_ns = tai_ns + 1 WHERE seq = 2",
+		"UPDATE wall SET uncertainty_ns = NULL WHERE seq = 1",
+		"UPDATE wall SET uncertainty_ns = 1.0 WHERE seq = 1",
+		"UPDATE wall SET source = 'ptp' WHERE seq = 0",
+		"UPDATE wall SET reference = 'other' WHERE seq = 0",
+		"UPDATE wall SET restart = 'step' WHERE seq = 3",
+		"DELETE FROM wall WHERE seq = 1",
+		"DELETE FROM wall",
+		"DELETE FROM ledger WHERE stream = 'wall'",
+		"DELETE FROM wall; DELETE FROM ledger WHERE stream = 'wall'",
+		"INSERT INTO wall SELECT 99, t_ns + 1, tai_ns, uncertainty_ns, rate_ppb, "
+		"rate_uncertainty_ppb, utc_offset_s, held, source, reference, leap, "
+		"restart FROM wall WHERE seq = 5",
+	};
+
+	record_by(SHORT_SCRIPT, "sim", 5 * S);
+	assert_int_equal(system("cp -r a.rec good.rec"), 0);
+	for (size_t i = 0; i < sizeof(changes) / sizeof(*changes); i++) {
+		change(DB, changes[i]);
+		if (is_intact())
+			fail_msg("not found: %s", changes[i]);
+		assert_int_equal(system("rm -r a.rec; cp -r good.rec a.rec"), 0);
+	}
+}
+
+static void damaged_rows_are_refused(void **state)
+{
+	static const char *const changes[] = {
+		"UPDATE wall SET tai_ns = 9223372036854775807 WHERE seq = 2",
+		"UPDATE wall SET t_ns = 0 WHERE seq = 2",
+		"UPDATE wall SET rate_ppb = 1e300 WHERE seq = 2",
+		"UPDATE wall SET rate_uncertainty_ppb = -1.0 WHERE seq = 2",
+		"UPDATE wall SET uncertainty_ns = -1.0 WHERE seq = 2",
+		"UPDATE wall SET utc_offset_s = 4294967296 WHERE seq = 2",
+		"UPDATE wall SET source = x'00' WHERE seq = 2",
+		"UPDATE wall SET source = printf('%.99c', 'a') WHERE seq = 2",
+		"UPDATE wall SET tai_ns = 'soon' WHERE seq = 2",
+	};
+
+	record_by(SHORT_SCRIPT, "sim", 5 * S);
+	assert_int_equal(system("cp -r a.rec good.rec"), 0);
+	for (size_t i = 0; i < sizeof(changes) / sizeof(*changes); i++) {
+		change(DB, changes[i]);
+		read_wall(EINVAL);
+		assert_int_equal(system("rm -r a.rec; cp -r good.rec a.rec"), 0);
+	}
+}
+
+static void older_and_simulated_ones_have_none(void **state)
+{
+	record_by(SHORT_SCRIPT, NULL, 2 * S);
+	read_wall(ENODATA);
+	assert_true(is_intact());
+	change(DB, TO_FORM_2);
+	read_wall(ENODATA);
+	assert_true(is_intact());
+	change(DB, TO_FORM_1);
+	read_wall(ENODATA);
+}
+
+/* The clock of this machine, whatever sets it: TAI is CLOCK_REALTIME plus the leap seconds. */
+static void time_of_a_real_clock(void **state)
+{
+	const struct incise_wall_point *points;
+	struct timespec before, after;
+	struct incise_wall *wall;
+	int64_t tai;
+	size_t n;
+
+	clock_gettime(CLOCK_REALTIME, &before);
+	record_by("sim:clock=real", NULL, S / 10);
+	clock_gettime(CLOCK_REALTIME, &after);
+	wall = read_wall(0);
+	n = incise_wall_points(wall, &points);
+	assert_in_range(n, 2, 5); /* the start, and the end */
+	for (size_t i = 0; i < n; i++) {
+		assert_int_equal(incise_wall_tai(wall, points[i].t_ns, &tai, NULL), 0);
+		tai -= points[i].utc_offset_s * S;
+		/* the source may correct the clock by its bound; a day covers any here */
+		assert_in_range(tai / S, before.tv_sec - 1, after.tv_sec + 1);
+		assert_in_range(points[i].utc_offset_s, 37, 40);
+	}
+	assert_string_equal(points[0].reference, "TAI");
+	incise_wall_free(wall);
+	assert_true(is_intact());
+	assert_true(ask(DB, "SELECT count(*) FROM events WHERE kind = 'clock'") >= 1);
+}
+
+static void sources_of_another_clock_are_refused(void **state)
+{
+	static const struct {
+		const char *rig, *source, *text;
+	} cases[] = {
+		{SHORT_SCRIPT, "kernel", "is simulated and has no wall time"},
+		{SHORT_SCRIPT, "sim:x", "not sim:TAI_S"},
+		{SHORT_SCRIPT, "sim:1,2,3,4", "not sim:TAI_S"},
+		{SHORT_SCRIPT, "sim:1,2,-3", "not sim:TAI_S"},
+		{SHORT_SCRIPT, "sim:nan", "not sim:TAI_S"},
+		{"sim:clock=real", "sim", "this rig's clock is real"},
+		{"sim:clock=real", "sundial", "no such source"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_rig *rig = open_rig(cases[i].rig);
+		struct incise_calibration calibration;
+		struct incise_error err = {0};
+
+		incise_calibration_nominal(&calibration);
+		assert_null(incise_recorder_new(
+			"a.rec", rig,
+			&(struct incise_recorder_setup){.calibration = &calibration,
+							.clock_source = cases[i].source},
+			&err));
+		assert_int_equal(err.code, EINVAL);
+		if (!strstr(err.text, cases[i].text))
+			fail_msg("%s: %s", cases[i].source, err.text);
+		assert_int_equal(access("a.rec.part", F_OK), -1);
+		incise_rig_close(rig);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		IN_FOLDER(stated_time_of_a_simulated_clock),
+		IN_FOLDER(rows_are_protected),
+		IN_FOLDER(damaged_rows_are_refused),
+		IN_FOLDER(older_and_simulated_ones_have_none),
+		IN_FOLDER(time_of_a_real_clock),
+		IN_FOLDER(sources_of_another_clock_are_refused),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
