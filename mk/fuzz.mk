@@ -41,6 +41,8 @@ fuzz_polhemus_status := lib/base/error.c lib/device/polhemus/polhemus_dialogue.c
 
 fuzz_igtl_stream := lib/base/igtl.c
 
+fuzz_wall_packets := $(addprefix lib/record/write/wall_,packets.c kernel.c)
+
 fuzz_state_page := lib/base/error.c $(addprefix lib/loop/state_,file.c page.c reader.c)
 
 # A scene is read with all that it names.

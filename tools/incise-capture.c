@@ -71,8 +71,9 @@ static const struct cli_option option_table[] = {
 	 "the second before it is recorded too",
 	 CLI_PARSED_BY(parse_trigger), .names = triggers},
 	{0, "clock-source", "SOURCE",
-	 "where the wall time comes from: auto (default), kernel, none;\n"
-	 "of a simulated clock none (default) or sim:TAI_S,PPM,BOUND_US",
+	 "where the wall time comes from: auto (default),\n"
+	 "ptp[:SOCKET[,DOMAIN]], chrony[:PORT], kernel or none; of a\n"
+	 "simulated clock none (default) or sim:TAI_S,PPM,BOUND_US",
 	 CLI_TEXT(struct options, clock_source)},
 	{0, "cuts", NULL, "mark the start and the end of each cut in the table events",
 	 CLI_FLAG(struct options, cuts)},

@@ -39,8 +39,10 @@ struct incise_wall_point {
 	int utc_offset_s;	     /**< TAI less UTC */
 	/** The clock has lost its source: continued from earlier points, with a growing bound. */
 	bool held;
-	/** "ptp", "chrony", "kernel" (synchronised by a program), "plain" (not synchronised),
-	 * "simulated" */
+	/**
+	 * "ptp", "ptp-master" (this computer is the grandmaster), "chrony", "kernel" (synchronised
+	 * by a program), "plain" (not synchronised), "simulated"
+	 */
 	char source[24];
 	/** "TAI", or "ptp:" and the identity of a grandmaster that is not traceable */
 	char reference[24];

@@ -161,7 +161,9 @@ void incise_wall_kernel_read(struct incise_wall_kernel *kernel,
 		kernel->updated++;
 	kernel->last_ns = error_ns;
 	synced->updated = kernel->updated;
-	synced->bound_ns = error_ns + (state.esterror > 0 ? 0 : UNSTATED_NS);
+	/* ptp4l and phc2sys set the first to 0 and leave the second, at 16 s. */
+	synced->bound_ns = error_ns + (state.esterror > 0 ? (double)state.esterror * 1e3
+							  : UNSTATED_NS);
 	synced->utc_offset_s = plain->utc_offset_s = clocks->utc_offset_s;
 	memcpy(synced->leap, clocks->leap, sizeof(synced->leap));
 	memcpy(plain->leap, clocks->leap, sizeof(plain->leap));

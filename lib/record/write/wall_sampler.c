@@ -18,9 +18,14 @@
 #define WAITING 64
 /* 2027-01-15 08:00 */
 #define SIMULATED_S 1.8e9
+#define CHRONY_PORT 323
+
+enum { PTP, CHRONY, KERNEL, KINDS };
 
 struct incise_wall_sampler {
 	bool real;
+	bool use[KINDS];
+	struct incise_wall_peer ptp, chrony;
 	/* Of a simulated clock: TAI at its time 0, s; its rate; the bound. */
 	double tai_s, rate_ppm, bound_us;
 	int64_t next_ns;
@@ -68,17 +73,31 @@ static void sample(struct incise_wall_sampler *sampler)
 	struct incise_wall_reading readings[INCISE_WALL_SOURCES];
 	struct incise_wall_clocks clocks = {0};
 	struct incise_wall_result result;
-	int n = 2;
+	/* In this order of preference; the kernel's are last. */
+	struct incise_wall_statement *const ptp = &statements[0];
+	struct incise_wall_statement *const chrony = &statements[1];
+	const int n = INCISE_WALL_SOURCES;
 
 	incise_wall_read_clocks(&clocks);
-	incise_wall_kernel_read(&sampler->kernel, &clocks, statements);
+	incise_wall_kernel_read(&sampler->kernel, &clocks, &statements[2]);
+	*ptp = *chrony = (struct incise_wall_statement){0};
+	if (sampler->use[PTP])
+		incise_wall_ptp_read(&sampler->ptp, &clocks, ptp);
+	/* Last, as chronyd may be slewing the clock fast. */
+	if (sampler->use[CHRONY])
+		incise_wall_chrony_read(&sampler->chrony, &clocks, chrony);
 	incise_wall_read_clocks(&clocks);
 	for (int i = 0; i < n; i++) {
 		readings[i] = statements[i].reading;
-		readings[i].tai_ns = clocks.real_ns +
-				     readings[i].utc_offset_s * INCISE_NS_PER_S -
-				     llrint(statements[i].offset_ns);
+		/* The change of the rate within ms is nothing. */
+		if (statements[i].tai_raw_ns)
+			readings[i].tai_ns += clocks.raw_ns - statements[i].tai_raw_ns;
+		else
+			readings[i].tai_ns = clocks.real_ns +
+					     readings[i].utc_offset_s * INCISE_NS_PER_S -
+					     llrint(statements[i].offset_ns);
 	}
+	readings[2].good &= sampler->use[KERNEL];
 	incise_wall_follow(&sampler->follow, &clocks, readings, n, &result);
 	put(sampler, &result);
 }
@@ -152,6 +171,53 @@ static bool read_simulated(struct incise_wall_sampler *sampler, const char *text
 	       sampler->bound_us <= 1e9;
 }
 
+/* A number from 0 to @most behind a sign, or the end of the text. */
+static bool read_number(const char *text, int most, int *value)
+{
+	char *end;
+	long number;
+
+	if (!*text)
+		return true;
+	number = strtol(text + 1, &end, 10);
+	*value = (int)number;
+	return end != text + 1 && !*end && number >= 0 && number <= most;
+}
+
+/* "auto"; "kernel"; "chrony", "chrony:PORT"; "ptp", "ptp:SOCKET", "ptp:SOCKET,DOMAIN" */
+static bool read_real(struct incise_wall_sampler *sampler, const char *text)
+{
+	bool all = !strcmp(text, "auto");
+	const char *comma;
+
+	for (int i = 0; i < KINDS; i++)
+		sampler->use[i] = all;
+	if (all)
+		return true;
+	if (!strncmp(text, "chrony", 6)) {
+		sampler->use[CHRONY] = true;
+		return (!text[6] || text[6] == ':') &&
+		       read_number(text + 6, 65535, &sampler->chrony.port) &&
+		       sampler->chrony.port > 0;
+	}
+	if (!strncmp(text, "ptp", 3)) {
+		sampler->use[PTP] = true;
+		text += 3;
+		comma = strchr(text, ',');
+		if (!comma)
+			comma = text + strlen(text);
+		if (*text && (*text != ':' || comma == text + 1 ||
+			      comma - text > (ptrdiff_t)sizeof(sampler->ptp.path)))
+			return false;
+		if (*text)
+			snprintf(sampler->ptp.path, sizeof(sampler->ptp.path), "%.*s",
+				 (int)(comma - text - 1), text + 1);
+		return read_number(comma, 127, &sampler->ptp.domain);
+	}
+	sampler->use[KERNEL] = !strcmp(text, "kernel");
+	return sampler->use[KERNEL];
+}
+
 static int read_source(struct incise_wall_sampler *sampler, const char *source,
 		       bool *wanted, struct incise_error *err)
 {
@@ -161,8 +227,7 @@ static int read_source(struct incise_wall_sampler *sampler, const char *source,
 	if (!source || !strcmp(source, "none"))
 		return 0;
 	if (sampler->real != simulated &&
-	    (simulated ? read_simulated(sampler, source)
-		       : !strcmp(source, "auto") || !strcmp(source, "kernel")))
+	    (simulated ? read_simulated(sampler, source) : read_real(sampler, source)))
 		return 0;
 	return incise_error_set(
 		err, EINVAL, "clock source '%s': %s", source,
@@ -171,7 +236,8 @@ static int read_source(struct incise_wall_sampler *sampler, const char *source,
 				  ? "is for a simulated rig, and this rig's clock is real"
 				  : "the clock of this rig is simulated and has no wall "
 				    "time; use none or sim:TAI_S,PPM,BOUND_US"
-		: sampler->real ? "no such source; use auto, kernel or none"
+		: sampler->real ? "no such source; use auto, ptp[:SOCKET[,DOMAIN]], "
+				  "chrony[:PORT], kernel or none"
 				: "not sim:TAI_S,PPM,BOUND_US, with numbers");
 }
 
@@ -205,6 +271,10 @@ int incise_wall_sampler_new(struct incise_wall_sampler **sampler, const char *so
 	if (!made)
 		return incise_error_set(err, ENOMEM, "clock source: out of memory");
 	made->real = real;
+	incise_wall_peer_init(&made->ptp);
+	incise_wall_peer_init(&made->chrony);
+	made->chrony.port = CHRONY_PORT;
+	read_real(made, "auto");
 	made->tai_s = SIMULATED_S;
 	made->bound_us = 1;
 	rc = read_source(made, source, &wanted, err);
@@ -263,6 +333,8 @@ void incise_wall_sampler_free(struct incise_wall_sampler *sampler)
 	if (!sampler)
 		return;
 	incise_wall_sampler_stop(sampler, sampler->next_ns - PERIOD_NS);
+	incise_wall_peer_close(&sampler->ptp);
+	incise_wall_peer_close(&sampler->chrony);
 	pthread_mutex_destroy(&sampler->lock);
 	free(sampler);
 }

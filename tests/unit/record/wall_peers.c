@@ -1,0 +1,451 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Tests of lib/record/write/wall_peers.c with sockets of a chronyd and a ptp4l that are made here, on
+ * simulated clocks: the master is 3 s and 50 ppm from this machine, which is never set right.
+ */
+#include <arpa/inet.h>
+#include <errno.h>
+#include <math.h>
+#include <poll.h>
+#include <pthread.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+#include <cmocka.h>
+#include "../../../lib/base/random.h"
+#include "../../../lib/record/write/wall_sources.h"
+
+#define S 1000000000LL
+#define REAL_NS (1795741869 * S)
+#define UTC_S 37
+#define PPM 50e-6
+#define PATH_NS 30000.0
+#define ASYMMETRY_NS 20000.0
+#define NOISE_NS 15000.0
+
+enum manner { GOOD, SILENT, GARBAGE, WRONG_SEQUENCE, LOST, MASTER, HARDWARE };
+
+struct daemon {
+	pthread_t thread;
+	int fd, stop[2];
+	enum manner manner;
+	uint64_t random;
+	bool chrony;
+	/* the state, set between requests */
+	int64_t ingress_ns, offset_ns, correction_ns, ref_ns;
+	uint8_t flags; /* of TIME_PROPERTIES */
+	uint8_t gm;
+	int requests;
+};
+
+static void put(uint8_t *to, uint64_t value, int n)
+{
+	while (n--) {
+		to[n] = value & 0xff;
+		value >>= 8;
+	}
+}
+
+/* As chronyd packs: 7 bits of exponent, 25 of coefficient. */
+static void put_float(uint8_t *to, double value)
+{
+	int exponent;
+	double share = frexp(value, &exponent);
+
+	put(to,
+	    (uint64_t)((exponent + 1) & 0x7f) << 25 |
+		    ((uint64_t)llrint(share * (1 << 24)) & 0x1ffffff),
+	    4);
+}
+
+static size_t answer_chrony(const struct daemon *d, const uint8_t *request, uint8_t *out)
+{
+	memset(out, 0, 104);
+	out[0] = 6;
+	out[1] = 2;
+	put(out + 4, 33, 2);
+	put(out + 6, 5, 2);
+	memcpy(out + 16, request + 8, 4);
+	put(out + 28, d->manner == LOST ? 0x7f7f0101 : 0xc0a80001, 4);
+	put(out + 52, 2, 2);
+	put(out + 60, (uint64_t)(d->ref_ns / S), 4);
+	put(out + 64, (uint64_t)(d->ref_ns % S), 4);
+	put_float(out + 68, (double)d->correction_ns * 1e-9);
+	put_float(out + 84, 0.01);
+	put_float(out + 88, 0.05);
+	put_float(out + 92, 400e-6);
+	put_float(out + 96, 100e-6);
+	return 104;
+}
+
+static size_t answer_ptp(const struct daemon *d, const uint8_t *request, uint8_t *out)
+{
+	int id = request[52] << 8 | request[53];
+	uint8_t *data = out + 54;
+	size_t size = 0;
+
+	memcpy(out, request, 54);
+	memset(data, 0, 100);
+	out[46] = 2;
+	switch (id) {
+	case 0xc000:
+		put(data, (uint64_t)d->offset_ns, 8);
+		put(data + 8, (uint64_t)d->ingress_ns, 8);
+		data[41] = d->manner != LOST && d->manner != MASTER;
+		memset(data + 42, d->gm, 8);
+		size = 50;
+		break;
+	case 0x2001:
+		put(data + 10, (uint64_t)PATH_NS << 16, 8);
+		size = 18;
+		break;
+	case 0x2003:
+		put(data, UTC_S, 2);
+		data[2] = d->flags;
+		size = 4;
+		break;
+	case 0x2004:
+		data[10] = d->manner == LOST || d->manner == MASTER ? 6 : 9;
+		size = 26;
+		break;
+	}
+	put(out + 2, 54 + size, 2);
+	put(out + 50, 2 + size, 2);
+	return 54 + size;
+}
+
+static void *run(void *argument)
+{
+	struct daemon *d = argument;
+	struct pollfd wait[] = {{.fd = d->fd, .events = POLLIN},
+				{.fd = d->stop[0], .events = POLLIN}};
+	uint8_t request[1500], reply[1500];
+
+	while (poll(wait, 2, -1) > 0 && !wait[1].revents) {
+		struct sockaddr_storage from;
+		socklen_t length = sizeof(from);
+		ssize_t n = recvfrom(d->fd, request, sizeof(request), 0,
+				     (struct sockaddr *)&from, &length);
+		size_t size;
+
+		if (n < 54)
+			continue;
+		d->requests++;
+		size = d->chrony ? answer_chrony(d, request, reply)
+				 : answer_ptp(d, request, reply);
+		if (d->manner == WRONG_SEQUENCE)
+			reply[d->chrony ? 19 : 31] ^= 1;
+		if (d->manner == GARBAGE)
+			for (size_t i = 0; i < size; i++)
+				reply[i] = incise_random_next(&d->random) & 0xff;
+		if (d->manner != SILENT)
+			sendto(d->fd, reply, size, 0, (struct sockaddr *)&from, length);
+	}
+	return NULL;
+}
+
+static char folder[] = "/tmp/incise-peers-XXXXXX";
+static char path[64];
+
+static void start(struct daemon *d, bool chrony, struct incise_wall_peer *peer)
+{
+	struct sockaddr_un name = {.sun_family = AF_UNIX};
+	struct sockaddr_in address = {.sin_family = AF_INET,
+				      .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+	socklen_t length = sizeof(address);
+
+	*d = (struct daemon){.chrony = chrony, .random = 1, .gm = 0xaa};
+	incise_wall_peer_init(peer);
+	d->fd = socket(chrony ? AF_INET : AF_UNIX, SOCK_DGRAM, 0);
+	if (chrony) {
+		assert_int_equal(bind(d->fd, (struct sockaddr *)&address, length), 0);
+		getsockname(d->fd, (struct sockaddr *)&address, &length);
+		peer->port = ntohs(address.sin_port);
+	} else {
+		strcpy(name.sun_path, path);
+		strcpy(peer->path, path);
+		assert_int_equal(bind(d->fd, (struct sockaddr *)&name, sizeof(name)), 0);
+	}
+	assert_int_equal(pipe(d->stop), 0);
+	assert_int_equal(pthread_create(&d->thread, NULL, run, d), 0);
+}
+
+static void stop(struct daemon *d, struct incise_wall_peer *peer)
+{
+	assert_int_equal(write(d->stop[1], "", 1), 1);
+	pthread_join(d->thread, NULL);
+	close(d->fd);
+	close(d->stop[0]);
+	close(d->stop[1]);
+	unlink(path);
+	incise_wall_peer_close(peer);
+}
+
+/* The clocks after so much true time; none is set right. */
+static struct incise_wall_clocks clocks_at(double s)
+{
+	int64_t mono_ns = 1000 * S + llrint(s * 1e9 * (1 + PPM));
+
+	return (struct incise_wall_clocks){.mono_ns = mono_ns,
+					   .raw_ns = mono_ns - 5 * S,
+					   .boot_ns = mono_ns + S,
+					   .real_ns = REAL_NS + mono_ns,
+					   .half_ns = 100,
+					   .utc_offset_s = UTC_S,
+					   .leap = "list"};
+}
+
+/* UTC of the master: at the start 3 s behind this machine. */
+static int64_t master_ns(double s)
+{
+	return REAL_NS + 1000 * S - 3 * S + llrint(s * 1e9);
+}
+
+/* A sync a third of a second ago; the offset has the asymmetry of the path, and noise. */
+static void sync_at(struct daemon *d, double s)
+{
+	struct incise_wall_clocks clocks = clocks_at(s - 0.3);
+
+	d->ingress_ns = clocks.real_ns;
+	d->offset_ns =
+		clocks.real_ns - master_ns(s - 0.3) +
+		llrint(ASYMMETRY_NS + NOISE_NS * incise_random_symmetric(&d->random));
+}
+
+static struct incise_wall_statement ask_at(struct incise_wall_peer *peer, double s)
+{
+	struct incise_wall_clocks clocks = clocks_at(s);
+	struct incise_wall_statement statement;
+
+	incise_wall_ptp_read(peer, &clocks, &statement);
+	return statement;
+}
+
+static void check_ptp(const struct incise_wall_reading *r, double s, double most_ns)
+{
+	double error_ns = (double)(r->tai_ns - (master_ns(s) + UTC_S * S));
+
+	assert_true(r->good);
+	if (fabs(error_ns) > r->bound_ns)
+		fail_msg("at %g s: %g ns wrong, stated %g", s, error_ns, r->bound_ns);
+	assert_true(r->bound_ns < most_ns);
+}
+
+/*
+ * Free running: the offset is applied. The bound is the path's delay, twice the largest distance
+ * from the line, 15 µs of noise, and what 0.3 s at 200 ppm are until the rate is known.
+ */
+static void offset_of_ptp4l_is_applied(void **state)
+{
+	struct incise_wall_peer peer;
+	struct daemon d;
+
+	start(&d, false, &peer);
+	for (int s = 1; s < 60; s++) {
+		struct incise_wall_statement statement;
+
+		sync_at(&d, s);
+		statement = ask_at(&peer, s);
+		check_ptp(&statement.reading, s,
+			  PATH_NS + (s < 4 ? 60100 : 2 * 2 * NOISE_NS + 2000));
+		assert_string_equal(statement.reading.source, "ptp");
+		assert_string_equal(statement.reading.reference, "ptp:aaaaaaaaaaaaaaaa");
+	}
+	stop(&d, &peer);
+}
+
+static void timescale_and_traceability(void **state)
+{
+	struct incise_wall_statement statement;
+	struct incise_wall_peer peer;
+	struct daemon d;
+
+	start(&d, false, &peer);
+	d.flags = 1 << 2 | 1 << 3 | 1 << 4;
+	sync_at(&d, 1);
+	statement = ask_at(&peer, 1);
+	assert_string_equal(statement.reading.reference, "TAI");
+	assert_string_equal(statement.reading.leap, "ptp");
+	check_ptp(&statement.reading, 1, 1e6);
+	stop(&d, &peer);
+}
+
+static void lost_master_is_no_master(void **state)
+{
+	struct incise_wall_statement statement;
+	struct incise_wall_peer peer;
+	struct daemon d;
+
+	start(&d, false, &peer);
+	for (int s = 1; s < 10; s++) {
+		sync_at(&d, s);
+		statement = ask_at(&peer, s);
+	}
+	assert_true(statement.reading.good);
+	/* No sync for 5 s, though the daemon says that it is a slave. */
+	assert_true(ask_at(&peer, 12).reading.good);
+	assert_false(ask_at(&peer, 15.5).reading.good);
+	/* It makes itself the master: the time of another source and reference. */
+	d.manner = LOST;
+	d.gm = 0xbb;
+	statement = ask_at(&peer, 16);
+	assert_string_equal(statement.reading.source, "ptp-master");
+	assert_string_equal(statement.reading.reference, "ptp:bbbbbbbbbbbbbbbb");
+	/* Back again. */
+	d.manner = GOOD;
+	d.gm = 0xaa;
+	sync_at(&d, 17);
+	statement = ask_at(&peer, 17);
+	check_ptp(&statement.reading, 17, 1e6);
+	/* A hardware clock counts TAI: its time is not that of CLOCK_REALTIME. */
+	d.ingress_ns += UTC_S * S;
+	assert_false(ask_at(&peer, 18).reading.good);
+	stop(&d, &peer);
+}
+
+/* The first sync after a step may be from before it. */
+static void syncs_around_a_step(void **state)
+{
+	struct incise_wall_statement statement;
+	struct incise_wall_clocks clocks;
+	struct incise_wall_peer peer;
+	struct daemon d;
+
+	start(&d, false, &peer);
+	for (int s = 1; s < 10; s++) {
+		sync_at(&d, s);
+		ask_at(&peer, s);
+	}
+	/* A sync at 9.7 s, a step by 1 s at 9.8 s, read at 10 s. */
+	sync_at(&d, 10);
+	clocks = clocks_at(10);
+	clocks.real_ns += S;
+	incise_wall_ptp_read(&peer, &clocks, &statement);
+	if (statement.reading.good)
+		check_ptp(&statement.reading, 10, 1e6);
+	for (int s = 11; s < 15; s++) {
+		sync_at(&d, s);
+		d.ingress_ns += S;
+		d.offset_ns += S;
+		clocks = clocks_at(s);
+		clocks.real_ns += S;
+		incise_wall_ptp_read(&peer, &clocks, &statement);
+		check_ptp(&statement.reading, s, PATH_NS + 4 * NOISE_NS + 2000);
+	}
+	stop(&d, &peer);
+}
+
+static void bad_answers_are_none(void **state)
+{
+	static const enum manner manners[] = {SILENT, GARBAGE, WRONG_SEQUENCE};
+	struct incise_wall_clocks clocks = clocks_at(1);
+	struct incise_wall_statement statement;
+	struct incise_wall_peer peer;
+	struct daemon d;
+
+	for (int chrony = 0; chrony < 2; chrony++)
+		for (int i = 0; i < 3; i++) {
+			start(&d, chrony, &peer);
+			d.manner = manners[i];
+			sync_at(&d, 1);
+			for (int k = 0; k < 3; k++) {
+				if (chrony)
+					incise_wall_chrony_read(&peer, &clocks,
+								&statement);
+				else
+					incise_wall_ptp_read(&peer, &clocks, &statement);
+				assert_false(statement.reading.good);
+			}
+			assert_true(d.requests >= 1);
+			/* And then it answers. */
+			d.manner = GOOD;
+			if (chrony)
+				incise_wall_chrony_read(&peer, &clocks, &statement);
+			else
+				incise_wall_ptp_read(&peer, &clocks, &statement);
+			assert_true(statement.reading.good);
+			stop(&d, &peer);
+		}
+	/* Nobody is there. */
+	incise_wall_peer_init(&peer);
+	strcpy(peer.path, path);
+	incise_wall_ptp_read(&peer, &clocks, &statement);
+	assert_false(statement.reading.good);
+}
+
+static void tracking_of_chronyd(void **state)
+{
+	struct incise_wall_clocks clocks = clocks_at(1);
+	struct incise_wall_statement statement;
+	struct incise_wall_peer peer;
+	struct daemon d;
+
+	start(&d, true, &peer);
+	d.correction_ns = -2500000; /* the clock is fast */
+	d.ref_ns = REAL_NS + 123456789;
+	incise_wall_chrony_read(&peer, &clocks, &statement);
+	assert_true(statement.reading.good);
+	/* 25 bits of 2.5 ms; half of the delay, the dispersion, and a slew of 2.5 ms at most */
+	assert_true(fabs(statement.offset_ns - 2500000) < 1);
+	assert_true(statement.reading.bound_ns >= 299999 &&
+		    statement.reading.bound_ns <= 2800001);
+	assert_true(fabs(statement.reading.rate_uncertainty_ppb - 60) < 1e-3);
+	assert_int_equal(statement.reading.updated, d.ref_ns);
+	d.manner = LOST;
+	incise_wall_chrony_read(&peer, &clocks, &statement);
+	assert_false(statement.reading.good);
+	stop(&d, &peer);
+}
+
+static void list_of_leap_seconds(void **state)
+{
+	char good[] = "#\tcomment\n#@\t3991593600\n2272060800\t10\t# 1 Jan 1972\n"
+		      "3692217600\t37\n",
+	     reversed[] = "#@ 3991593600\n3692217600 37\n2272060800 10\n",
+	     endless[] = "2272060800 10\n", nothing[] = "";
+	struct incise_leap_list list;
+
+	assert_true(incise_leap_list_read(&list, good));
+	assert_int_equal(list.n, 2);
+	assert_int_equal(list.expires_s, 1782604800); /* 2026-06-28 */
+	assert_int_equal(list.leaps[1].from_s, 1483228800);
+	assert_int_equal(list.leaps[1].offset_s, 37);
+	assert_false(incise_leap_list_read(&list, reversed));
+	assert_false(incise_leap_list_read(&list, endless));
+	assert_false(incise_leap_list_read(&list, nothing));
+}
+
+static int make_folder(void **state)
+{
+	if (!mkdtemp(folder))
+		return -1;
+	snprintf(path, sizeof(path), "%s/ptp4l", folder);
+	return 0;
+}
+
+static int remove_folder(void **state)
+{
+	return rmdir(folder);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(offset_of_ptp4l_is_applied),
+		cmocka_unit_test(timescale_and_traceability),
+		cmocka_unit_test(lost_master_is_no_master),
+		cmocka_unit_test(syncs_around_a_step),
+		cmocka_unit_test(bad_answers_are_none),
+		cmocka_unit_test(tracking_of_chronyd),
+		cmocka_unit_test(list_of_leap_seconds),
+	};
+
+	return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
