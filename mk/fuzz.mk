@@ -40,6 +40,7 @@ fuzz_polhemus_records := lib/base/ring.c lib/device/pose_flags.c $(addprefix lib
 fuzz_polhemus_status := lib/base/error.c lib/device/polhemus/polhemus_dialogue.c
 
 fuzz_igtl_stream := lib/base/igtl.c
+fuzz_igtl_poses := lib/base/igtl.c lib/base/ring.c lib/device/pace.c lib/device/igtl/igtl_poses.c
 
 fuzz_wall_packets := $(addprefix lib/record/write/wall_,packets.c kernel.c)
 

@@ -126,8 +126,8 @@ python-peers: ## pyarrow, polars, DuckDB, pandas 3 and scikit-learn for the test
 	@tests/venv tests/python $(O)/tests/python 'tests with pyarrow, polars, DuckDB, pandas 3 and scikit-learn are skipped'
 
 # What sends and receives streams over a network as others do.
-stream-peers: ## pylsl, with liblsl, for tests/cli/streams.bats
-	@tests/venv tests/streams $(O)/tests/streams 'tests with streams of LSL and pyigtl are skipped' lsl_send
+stream-peers: ## pylsl, with liblsl, and pyigtl for tests/cli/streams.bats
+	@tests/venv tests/streams $(O)/tests/streams 'tests with streams of LSL and pyigtl are skipped' lsl_send igtl_send
 
 # Attacks on recordings. What is in a module is found by INCISE_MODULE_PATH.
 attack_programs := $(addprefix $(O)/tests/attack/,kill faults damage record watch.so stall.so)

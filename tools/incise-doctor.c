@@ -195,8 +195,15 @@ static void check_modules(struct doctor *doctor)
 
 static void add_opened(struct doctor *doctor, const char *name, struct incise_rig *rig)
 {
-	if (incise_rig_tracker(rig))
+	if (incise_rig_tracker(rig)) {
 		incise_tracker_info(incise_rig_tracker(rig), &doctor->tracker);
+		if (doctor->tracker.network)
+			add(doctor, "devices", "network", WARNING,
+			    "man rig.conf    # the section on OpenIGTLink",
+			    "the haptic loop fades the force whenever the network delays "
+			    "poses of %s",
+			    doctor->tracker.name);
+	}
 	if (incise_rig_force(rig))
 		incise_force_info(incise_rig_force(rig), &doctor->force);
 	if (incise_rig_camera(rig))

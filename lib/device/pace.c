@@ -25,6 +25,7 @@ static void start_line(struct incise_pace *pace, int64_t t_ns)
 	pace->line_ns = pace->base_ns = pace->last_ns = t_ns;
 	pace->n = pace->on_line = 0;
 	pace->started = true;
+	pace->broken = false;
 	pace->scatter_ns[0] = pace->scatter_ns[1] = -1;
 	start_window(pace, t_ns);
 }
@@ -73,9 +74,10 @@ uint64_t incise_pace_add(struct incise_pace *pace, int64_t t_ns)
 		start_line(pace, t_ns);
 		return 0;
 	}
-	if (gap_ns > HOLE_NS + HOLE_PERIODS * pace->period_ns) {
+	if (pace->broken || gap_ns > HOLE_NS + HOLE_PERIODS * pace->period_ns) {
 		start_line(pace, t_ns);
-		return (uint64_t)fmin(round(gap_ns / pace->period_ns) - 1, MISSING_MAX);
+		return (uint64_t)fmin(fmax(0, round(gap_ns / pace->period_ns) - 1),
+				      MISSING_MAX);
 	}
 	pace->last_ns = t_ns;
 	pace->n++;
@@ -85,4 +87,14 @@ uint64_t incise_pace_add(struct incise_pace *pace, int64_t t_ns)
 	if (++pace->in_window < WINDOW_SAMPLES || t_ns - pace->window_ns < WINDOW_NS)
 		return 0;
 	return end_window(pace, t_ns);
+}
+
+void incise_pace_skip(struct incise_pace *pace)
+{
+	pace->n += pace->started;
+}
+
+void incise_pace_broken(struct incise_pace *pace)
+{
+	pace->broken = pace->started;
 }

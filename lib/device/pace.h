@@ -12,7 +12,7 @@
  * half a second is a loss, rounded to whole periods, if it exceeds the scatter of the windows
  * before it: a loss that is shorter than the scatter cannot be seen. What is less moves the
  * line, as the clock of the source, and its period, drift. A hole of a quarter of a second, and
- * four periods, counts at once.
+ * four periods, counts at once; in the first second, nothing else does.
  */
 #ifndef INCISE_DEVICE_PACE_H
 #define INCISE_DEVICE_PACE_H
@@ -26,7 +26,7 @@ struct incise_pace {
 	uint64_t n; /* periods since base_ns, which is moved to the end of each window */
 	int64_t line_ns;
 	uint64_t on_line; /* periods since line_ns, up to base_ns */
-	bool started;
+	bool started, broken;
 	/* The window. */
 	int64_t window_ns;
 	uint64_t in_window;
@@ -43,5 +43,11 @@ void incise_pace_init(struct incise_pace *pace, double rate_hz);
  * a quarter of a second start a new line; they lose nothing. Real-time safe.
  */
 uint64_t incise_pace_add(struct incise_pace *pace, int64_t t_ns);
+
+/* The link was gone: the gap before the next sample counts at once. */
+void incise_pace_broken(struct incise_pace *pace);
+
+/* A sample that came without a time, and is counted by others. Real-time safe. */
+void incise_pace_skip(struct incise_pace *pace);
 
 #endif

@@ -15,6 +15,7 @@ static const struct {
 	bool usable;
 	const char *text;
 } flags[] = {
+	{'!', '!', false, "its sender does not see it"},
 	{'=', '=', false, "the same pose for too long: the sensor does not measure"},
 	{'A', 'G', false, "its source or a self-test failed"},
 	{'a', 'g', false, "its source or its self-calibration failed"},
@@ -28,6 +29,7 @@ static const struct {
 	{'w', 'w', true, "its settings could not be stored"},
 	{'x', 'x', false, "the sensor is outside its motion box"},
 	{'y', 'y', false, "the attitude is outside its envelope"},
+	{'~', '~', false, "not a pose: no rotation, or not finite"},
 };
 
 static int find(char status)

@@ -64,6 +64,7 @@ class TrackerStruct(ctypes.Structure):
         ("grain_ns", c_int64),
         ("scalpel_station", ctypes.c_uint8),
         ("tube_station", ctypes.c_uint8),
+        ("network", c_bool),
     ]
     c_name = "struct incise_tracker_info"
 

@@ -133,3 +133,111 @@ ask() {
 	run -1 --separate-stderr incise capture -o b.rec
 	[[ "$stderr" == *"has a nominal rate of 0 Hz; expected 1 to 100000 Hz (a regular stream)" ]]
 }
+
+# A server of poses on a port of its own.
+poses() {
+	[ -e "$peers/ready" ] || skip "pyigtl is not there; see build/tests/streams/venv.log"
+	port=$((20000 + BATS_TEST_NUMBER * 1000 + $$ % 1000))
+	send igtl_send $port "$@"
+	rig "igtl:127.0.0.1:$port:Stylus" "sim:"
+}
+
+# The server before is gone, and its port with it.
+no_more_poses() {
+	kill "$sender"
+	wait "$sender" || true
+}
+
+@test "poses of pyigtl are captured, and the loop is warned of the network" {
+	poses --seconds 30
+	incise capture -o a.rec --duration 2s --json >report.json
+	[ "$(key report.json tracker_lost)" = 0 ]
+	[ "$(ask "SELECT value FROM meta WHERE key='tracker_name'")" = "OpenIGTLink Stylus at 127.0.0.1" ]
+	# Poses are those of the sender in their order, turned by 90 degrees about z; of a busy
+	# machine pyigtl leaves some out. Singles, and rounding.
+	python3 - <<-'END'
+		import sqlite3
+		db = sqlite3.connect("a.rec/recording.db")
+		rows = db.execute("SELECT seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz FROM tracker").fetchall()
+		assert len(rows) > 100, len(rows)
+		for a, b in zip(rows, rows[1:]):
+		    assert b[0] == a[0] + 1 and b[1] > a[1], (a, b)
+		    assert 0 < (b[2] - a[2]) * 64 % 1000 < 100 and b[3:5] == (2, 10), (a, b)
+		    assert abs(b[5] - 0.5**0.5) < 1e-7 and abs(b[8] - 0.5**0.5) < 1e-7, b
+		    assert b[6] == b[7] == 0, b
+	END
+	incise verify a.rec
+	no_more_poses
+	# without a name, it must be clear whose poses are meant
+	poses --name Stylus --name Probe --seconds 60
+	rig "igtl:127.0.0.1:$port" "sim:"
+	run -1 --separate-stderr incise capture -o b.rec
+	[[ "$stderr" == *"tracker: the server at 127.0.0.1 port $port sends several poses: "*"; name one, as in igtl:HOST:PORT:DEVICE" ]]
+	rig "igtl:127.0.0.1:$port:Needle" "sim:"
+	run -1 --separate-stderr incise capture -o b.rec
+	[[ "$stderr" == *"sends no pose \"Needle\" within 5 s; poses come of: "*Stylus* ]]
+	rig "igtl:127.0.0.1:$port:Stylus" "sim:"
+	run incise doctor --rig rig.conf
+	[[ "$output" == *"the haptic loop fades the force whenever the network delays poses of OpenIGTLink Stylus"* ]]
+	echo 'stepper = "sim:";' >>rig.conf
+	run --separate-stderr incise haptic "$root/scenes/liver.scene" --rig rig.conf --no-rt --duration 0.3s
+	[[ "$stderr" == *"poses come over a network, whose delay has no bound"* ]]
+}
+
+@test "what a hostile server sends is flagged or counted" {
+	for what in nan:'~' mirror:'~' unseen:'!'; do
+		poses --do "${what%:*}"
+		rm -rf a.rec
+		incise capture -o a.rec --duration 2s --json >report.json
+		[ "$(key report.json tracker_lost)" = 0 ]
+		# one of ten, and a pose at either end
+		[ "$(ask "SELECT abs(count(*) * 10 - (SELECT count(*) FROM tracker)) <= 20 AND count(*) > 5
+			FROM tracker WHERE status = '${what#*:}'")" = 1 ] ||
+			complain "$what: $(ask "SELECT status, count(*) FROM tracker GROUP BY status")"
+		no_more_poses
+	done
+	poses --do crc
+	rm -rf a.rec
+	run -1 incise capture -o a.rec --duration 2s --json
+	[ "$(ask "SELECT abs(value * 10 - (SELECT value FROM meta WHERE key = 'tracker_rows') * 10 / 9) <= 20
+		FROM meta WHERE key = 'tracker_lost'")" = 1 ] || complain "$(ask 'SELECT * FROM meta')"
+}
+
+@test "a server of poses that is absent, silent or speaks nonsense is one line" {
+	rig "igtl:127.0.0.1:1" "sim:"
+	run -1 --separate-stderr incise capture -o a.rec
+	[[ "$stderr" == *"tracker: 127.0.0.1 port 1: Connection refused; start its OpenIGTLink server, and check host and port" ]]
+	for arguments in "" ":1" "h:0" "h:65536" "h:x" "h:1:" "h::Stylus" "h:1:123456789012345678901" "[::1"; do
+		rig "igtl:$arguments" "sim:"
+		run -1 --separate-stderr incise capture -o a.rec
+		[[ "$stderr" == *"tracker: "*": expected igtl:HOST:PORT:DEVICE with a name of at most 20 letters"* ]] ||
+			complain "$arguments: $stderr"
+	done
+	for what in silence:"sends no message within 5 s; start its transmission" \
+		half:"sends no message within 5 s; start its transmission" \
+		noise:"does not send OpenIGTLink; correct host and port"; do
+		poses --do "${what%%:*}"
+		run -1 --separate-stderr incise capture -o a.rec
+		[[ "$stderr" == *"${what#*:}" ]] || complain "$stderr"
+		[ "${#stderr_lines[@]}" = 1 ]
+		no_more_poses
+	done
+}
+
+@test "a server of poses that goes away is connected again, and its poses count as lost" {
+	poses --do drop --seconds 30
+	# Each connection has 150 poses; some are sent while there is none.
+	run -1 --separate-stderr incise capture -o a.rec --duration 4s
+	[[ "$stderr" == *"tracker samples were lost"* ]] || complain "$stderr; $(ask "SELECT seq, arrival_ns, x_mm * 64 FROM tracker")"
+	[ "$(ask "SELECT count(*) > 100 FROM tracker")" = 1 ]
+	[ "$(ask "SELECT count(*) >= 2 FROM events WHERE kind = 'lost'")" = 1 ] ||
+		complain "$(ask 'SELECT * FROM events')"
+	# pose i was sent at i / 100 s: numbers go on as they do
+	[ "$(ask "SELECT max(abs((b.x_mm - a.x_mm) * 64 - (b.seq - a.seq))) <= 1 FROM tracker a, tracker b
+		WHERE b.rowid = a.rowid + 1 AND b.x_mm > a.x_mm")" = 1 ] ||
+		complain "$(ask 'SELECT seq, x_mm * 64 FROM tracker')"
+	no_more_poses
+	poses --do drop --seconds 2
+	run -1 --separate-stderr incise capture -o b.rec --duration 30s
+	[[ "$stderr" == *"OpenIGTLink Stylus at 127.0.0.1 disconnected and was not back after 10 s; start its server again"* ]]
+}

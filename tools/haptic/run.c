@@ -203,11 +203,24 @@ static void watch(struct haptic_job *job)
 	open_state(job, true);
 }
 
+static void warn_of_network(const struct haptic *haptic)
+{
+	struct incise_tracker_info info;
+
+	incise_tracker_info(incise_rig_tracker(haptic->rig), &info);
+	if (info.network)
+		cli_warn(
+			"%s: poses come over a network, whose delay has no bound; the force "
+			"fades whenever a pose is late",
+			info.name);
+}
+
 static void test_scene(struct haptic *haptic)
 {
 	struct incise_error err = {0};
 	struct self_test test;
 
+	warn_of_network(haptic);
 	if (haptic_self_test(haptic->scene, incise_rig_tracker(haptic->rig), &test, &err))
 		cli_fail_with(&err);
 	cli_note("self-test: %u ticks in the tissue, at most %.3f N; force 0 within "

@@ -80,6 +80,7 @@ static void take(struct lsl_force *f, double value, double stamp_s)
 
 	/* No time: it is lost, as is a force that is no number. */
 	if (!(t_s >= 0 && t_s < TIME_MAX_S)) {
+		incise_pace_skip(&f->pace);
 		daq_feed_lose(&f->feed, 1);
 		return;
 	}

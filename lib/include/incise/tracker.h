@@ -56,12 +56,13 @@ struct incise_tracker_info {
 	double rate_hz;
 	int64_t latency_ns; /**< nominal, from acquisition to arrival */
 	int stations;	    /**< sensors that send records; seq counts all of them */
-	/** Pulses from outside trigger it: rate_hz is its highest rate; records have no period. */
+	/** Others trigger it: rate_hz is its highest or mean rate; records have no period. */
 	bool external_sync;
 	int64_t grain_ns; /**< grid of arrival times: 1000000 for USB; 0: none */
 	/** Station on the scalpel: the first one; 0: every station but the tube's */
 	uint8_t scalpel_station;
 	uint8_t tube_station; /**< station at the end of the tube; 0: none */
+	bool network;	      /**< poses come over a network, whose delay has no bound */
 };
 
 /** Counts of poses and of their flags. */

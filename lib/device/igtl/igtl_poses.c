@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Samples from the bytes of an OpenIGTLink server; see igtl_poses.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+#include "../../base/vector.h"
+#include "igtl_poses.h"
+
+#define BODY_MAX 65536 /* of a TDATA of 900 instruments; images are passed over */
+#define CAPACITY 4096  /* of the ring: 4 s at 1 kHz */
+#define LIMIT_MM 1e6
+/* Of products of columns: a sender may print three digits; a scale of 1 % is an error. */
+#define ORTHONORMAL 2e-3
+#define WINDOW_NS INT64_C(5000000000)
+#define DELAY_MAX_NS INT64_C(1000000000) /* more is another clock, not a delay */
+#define POSES_LEAST 5
+
+#define UNSEEN '!'
+#define INVALID '~'
+
+int igtl_poses_init(struct igtl_poses *poses, const struct incise_tracker_setup *setup,
+		    const char *device)
+{
+	*poses = (struct igtl_poses){.setup = *setup};
+	snprintf(poses->device, sizeof(poses->device), "%s", device);
+	poses->stream = incise_igtl_stream_new(BODY_MAX);
+	return poses->stream
+		       ? incise_ring_init(&poses->ring,
+					  sizeof(struct incise_tracker_sample), CAPACITY)
+		       : -ENOMEM;
+}
+
+void igtl_poses_free(struct igtl_poses *poses)
+{
+	incise_igtl_stream_free(poses->stream);
+	incise_ring_free(&poses->ring);
+	poses->stream = NULL;
+}
+
+double igtl_poses_hz(const struct igtl_poses *poses)
+{
+	double span_s = (double)(poses->last_ns - poses->first_ns) * 1e-9;
+
+	if (poses->n < POSES_LEAST || (!*poses->device && poses->n_names != 1))
+		return 0;
+	return span_s > 0 ? (double)(poses->n - 1) / span_s : 0;
+}
+
+void igtl_poses_start(struct igtl_poses *poses, double rate_hz)
+{
+	struct incise_tracker_sample sample;
+
+	while (incise_ring_take(&poses->ring, &sample, 1) == 1)
+		;
+	incise_pace_init(&poses->pace, rate_hz);
+	/* Others that begin to send later are not taken for it. */
+	if (!*poses->device && poses->n_names)
+		memcpy(poses->device, poses->names[0], sizeof(poses->device));
+	poses->counts = true;
+	poses->seq = 0;
+	atomic_store(&poses->lost, 0);
+}
+
+int igtl_poses_reconnected(struct igtl_poses *poses)
+{
+	struct incise_igtl_stream *stream = incise_igtl_stream_new(BODY_MAX);
+
+	if (!stream)
+		return -ENOMEM;
+	incise_igtl_stream_free(poses->stream);
+	poses->stream = stream;
+	incise_pace_broken(&poses->pace);
+	poses->restarted = poses->n;
+	poses->is_mapped = poses->refused = false;
+	poses->stamp_ns = 0;
+	return 0;
+}
+
+/* --- time --- */
+
+static void lose(struct igtl_poses *poses, uint64_t n)
+{
+	poses->seq += n;
+	atomic_fetch_add_explicit(&poses->lost, n, memory_order_relaxed);
+}
+
+/* The clock of the sender was set, or it is the first timestamp. */
+static void map_anew(struct igtl_poses *poses, int64_t t_ns, int64_t offset_ns)
+{
+	poses->is_mapped = true;
+	poses->window_ns = t_ns;
+	poses->least_ns[0] = poses->least_ns[1] = offset_ns;
+}
+
+/* Wall clocks of 1970 to 2106 and a monotonic one: no difference overflows. */
+static int64_t map(struct igtl_poses *poses, int64_t stamp_ns, int64_t t_ns)
+{
+	int64_t offset_ns = t_ns - stamp_ns, least_ns;
+
+	if (!poses->is_mapped || stamp_ns < poses->stamp_ns)
+		map_anew(poses, t_ns, offset_ns);
+	if (t_ns - poses->window_ns > WINDOW_NS) {
+		poses->window_ns = t_ns;
+		poses->least_ns[1] = poses->least_ns[0];
+		poses->least_ns[0] = offset_ns;
+	}
+	if (offset_ns < poses->least_ns[0])
+		poses->least_ns[0] = offset_ns;
+	least_ns = poses->least_ns[1] < poses->least_ns[0] ? poses->least_ns[1]
+							   : poses->least_ns[0];
+	if (offset_ns - least_ns <= DELAY_MAX_NS)
+		return stamp_ns + least_ns;
+	map_anew(poses, t_ns, offset_ns);
+	return t_ns;
+}
+
+/* --- poses --- */
+
+/*
+ * A rotation matrix as a unit quaternion, by the largest of its four squares, after Shepperd,
+ * J. Guidance and Control 1(3), 1978. False: it is no rotation.
+ */
+static bool quaternion_of(const double m[3][4], double q[4])
+{
+	static const int next[3] = {1, 2, 0};
+	double trace = m[0][0] + m[1][1] + m[2][2], across[3], root, length = 0;
+	double column[3][3];
+	int i = 0, j, k;
+
+	for (int c = 0; c < 3; c++)
+		for (int r = 0; r < 3; r++)
+			column[c][r] = m[r][c];
+	for (int a = 0; a < 3; a++)
+		for (int b = a; b < 3; b++)
+			if (!(fabs(v3_dot(column[a], column[b]) - (a == b)) <=
+			      ORTHONORMAL))
+				return false;
+	/* A mirror is orthonormal, too. */
+	v3_cross(across, column[0], column[1]);
+	if (!(v3_dot(across, column[2]) > 0))
+		return false;
+	for (int r = 1; r < 3; r++)
+		if (m[r][r] > m[i][i])
+			i = r;
+	if (trace >= m[i][i]) {
+		root = sqrt(fmax(0, 1 + trace));
+		q[0] = root / 2;
+		for (int r = 0; r < 3; r++)
+			q[r + 1] = (m[(r + 2) % 3][(r + 1) % 3] -
+				    m[(r + 1) % 3][(r + 2) % 3]) /
+				   (2 * root);
+	} else {
+		j = next[i];
+		k = next[j];
+		root = sqrt(fmax(0, 1 + m[i][i] - m[j][j] - m[k][k]));
+		q[0] = (m[k][j] - m[j][k]) / (2 * root);
+		q[i + 1] = root / 2;
+		q[j + 1] = (m[j][i] + m[i][j]) / (2 * root);
+		q[k + 1] = (m[k][i] + m[i][k]) / (2 * root);
+	}
+	for (int r = 0; r < 4; r++)
+		length += q[r] * q[r];
+	for (int r = 0; r < 4; r++)
+		q[r] /= sqrt(length);
+	return true;
+}
+
+/* '=' where the same pose comes for too long; every tracker has noise. */
+static char repeats(struct igtl_poses *poses, const double matrix[3][4], int64_t t_ns)
+{
+	double most_ns = poses->setup.repeat_ms * 1e6;
+
+	if (!poses->n || memcmp(poses->pose, matrix, sizeof(poses->pose))) {
+		memcpy(poses->pose, matrix, sizeof(poses->pose));
+		poses->since_ns = t_ns;
+	}
+	return most_ns > 0 && (double)(t_ns - poses->since_ns) > most_ns ? '=' : ' ';
+}
+
+/* @matrix NULL: it is not finite. @seen: the sender does not flag it. */
+static void take(struct igtl_poses *poses, const double (*matrix)[4], bool seen,
+		 int64_t stamp_ns, int64_t t_ns)
+{
+	struct incise_tracker_sample sample = {
+		.t_ns = t_ns, .status = INVALID, .station = 1, .quaternion = {1}};
+	double offset[3];
+
+	/* The same timestamp is the same pose, sent again. */
+	if (stamp_ns && stamp_ns == poses->stamp_ns)
+		return;
+	if (stamp_ns)
+		sample.t_ns = map(poses, stamp_ns, t_ns);
+	poses->stamp_ns = stamp_ns;
+	if (poses->n && sample.t_ns <= poses->last_ns)
+		sample.t_ns = poses->last_ns + 1;
+	if (matrix && quaternion_of(matrix, sample.quaternion)) {
+		sample.status = repeats(poses, matrix, sample.t_ns);
+		v3_rotate(offset, sample.quaternion, poses->setup.offset_mm);
+		for (int i = 0; i < 3; i++)
+			sample.position_mm[i] = matrix[i][3] + offset[i];
+		for (int i = 0; i < 3; i++)
+			if (!(fabs(sample.position_mm[i]) <= LIMIT_MM)) {
+				memset(sample.position_mm, 0, sizeof(sample.position_mm));
+				sample.status = INVALID;
+			}
+	}
+	if (!seen)
+		sample.status = UNSEEN;
+	if (!poses->n++)
+		poses->first_ns = sample.t_ns;
+	poses->last_ns = sample.t_ns;
+	if (poses->counts)
+		lose(poses, incise_pace_add(&poses->pace, sample.t_ns));
+	sample.seq = poses->seq++;
+	sample.restarted = poses->restarted;
+	if (incise_ring_put(&poses->ring, &sample))
+		poses->restarted = false;
+	else
+		atomic_fetch_add_explicit(&poses->lost, 1, memory_order_relaxed);
+}
+
+static bool is_ours(struct igtl_poses *poses, const char *name)
+{
+	bool known = false;
+
+	for (int i = 0; i < poses->n_names; i++)
+		known |= !strcmp(poses->names[i], name);
+	if (!known && poses->n_names < IGTL_NAMES)
+		snprintf(poses->names[poses->n_names++], sizeof(*poses->names), "%s",
+			 name);
+	return !*poses->device || !strcmp(poses->device, name);
+}
+
+/* PLUS sends the state of a tool as metadata: "OK", or else. */
+static bool is_seen(const struct incise_igtl_message *message)
+{
+	struct incise_igtl_pair pair;
+	bool seen = true;
+
+	for (int i = 0; !incise_igtl_metadata(message, i, &pair); i++)
+		if (pair.key_n >= 6 &&
+		    !strncasecmp(pair.key + pair.key_n - 6, "status", 6))
+			seen &= pair.value_n == 2 && !strncasecmp(pair.value, "OK", 2);
+	return seen;
+}
+
+static void take_message(struct igtl_poses *poses,
+			 const struct incise_igtl_message *message, int64_t t_ns)
+{
+	struct incise_igtl_status status;
+	char name[INCISE_IGTL_NAME + 1];
+	bool seen = !poses->refused && is_seen(message);
+	double matrix[3][4];
+	int rc = -EPROTO;
+
+	poses->messages++;
+	if (!strcmp(message->type, "STATUS")) {
+		if (!incise_igtl_status(message, &status) &&
+		    (!*message->name || !strcmp(message->name, poses->device)))
+			poses->refused = status.code != INCISE_IGTL_OK;
+		return;
+	}
+	if (!strcmp(message->type, "TRANSFORM"))
+		rc = incise_igtl_transform(message, matrix);
+	else if (!strcmp(message->type, "POSITION"))
+		rc = incise_igtl_position(message, matrix);
+	if (rc != -EPROTO && is_ours(poses, message->name))
+		take(poses, rc ? NULL : (const double(*)[4])matrix, seen, message->utc_ns,
+		     t_ns);
+	for (int i = 0; !strcmp(message->type, "TDATA"); i++) {
+		rc = incise_igtl_tdata(message, i, name, matrix);
+		if (rc && rc != -EDOM)
+			break;
+		if (is_ours(poses, name))
+			take(poses, rc ? NULL : (const double(*)[4])matrix, seen,
+			     message->utc_ns, t_ns);
+	}
+}
+
+int igtl_poses_put(struct igtl_poses *poses, const uint8_t *bytes, size_t n, int64_t t_ns)
+{
+	struct incise_igtl_message message;
+	int found;
+
+	while ((found = incise_igtl_stream_next(poses->stream, &bytes, &n, &message))) {
+		if (found == -EPROTO)
+			return found;
+		if (found == 1) {
+			take_message(poses, &message, t_ns);
+		} else if (found == -EBADMSG && poses->counts) {
+			/* A damaged message may have been a pose. */
+			incise_pace_skip(&poses->pace);
+			lose(poses, 1);
+		}
+	}
+	return 0;
+}

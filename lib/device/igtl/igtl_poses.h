@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * From bytes of an OpenIGTLink server to samples in a ring:
+ *
+ *   bytes -> incise_igtl_stream -> TRANSFORM, POSITION or TDATA of the device -> rotation to
+ *   quaternion -> time -> seq and losses -> flag, offset, mm -> ring -> reader
+ *
+ * Time: the sender's timestamps are of its own wall clock, and arrivals are late by the network.
+ * The least of arrival less timestamp, of the last 5 to 10 s, maps the timestamps to the clock
+ * here: a sample's time is that of an arrival that no network delayed. Without timestamps it is
+ * the arrival.
+ *
+ *   arrival - timestamp |   o      o                o
+ *                       | o   o o     o o  o  o  o      least of 10 s: the offset
+ *                       '-------------------------------> time
+ *
+ * Without thread, clock or socket, so that tests have their own time, in ns.
+ */
+#ifndef INCISE_IGTL_POSES_H
+#define INCISE_IGTL_POSES_H
+
+#include <stdatomic.h>
+#include <incise/igtl.h>
+#include <incise/tracker.h>
+#include "../../base/ring.h"
+#include "../pace.h"
+
+#define IGTL_NAMES 8 /* of devices that are remembered for a message */
+
+struct igtl_poses {
+	struct incise_tracker_setup setup;
+	char device[INCISE_IGTL_NAME + 1]; /* "": any */
+	struct incise_igtl_stream *stream;
+	struct incise_ring ring; /* of struct incise_tracker_sample */
+	struct incise_pace pace;
+	uint64_t seq; /* of the next sample */
+	_Atomic uint64_t lost;
+	uint64_t messages; /* whole ones, of any type and device */
+	bool counts;	   /* igtl_poses_start() was called */
+	bool restarted;	   /* the next sample is marked so */
+	bool refused;	   /* the device's last STATUS was an error */
+	/* Names of devices that sent poses. */
+	char names[IGTL_NAMES][INCISE_IGTL_NAME + 1];
+	int n_names;
+	/* Poses so far, and times of the first and the last one. */
+	uint64_t n;
+	int64_t first_ns, last_ns;
+	/* Timestamps: of the last pose; arrival less timestamp, least of two windows of 5 s. */
+	int64_t stamp_ns, window_ns, least_ns[2];
+	bool is_mapped;
+	/* The last pose as it came, and since when. */
+	double pose[3][4];
+	int64_t since_ns;
+};
+
+/* @device: whose poses are taken; "" takes any. 0 or -ENOMEM. @setup is copied. */
+int igtl_poses_init(struct igtl_poses *poses, const struct incise_tracker_setup *setup,
+		    const char *device);
+void igtl_poses_free(struct igtl_poses *poses);
+
+/* Poses per second of those so far; 0: there are too few, or the device of "" is not clear. */
+double igtl_poses_hz(const struct igtl_poses *poses);
+
+/* Forget the samples so far, number from 0, and count losses from here, at @rate_hz. */
+void igtl_poses_start(struct igtl_poses *poses, double rate_hz);
+
+/* Another connection: bytes start with a header. 0 or -ENOMEM. */
+int igtl_poses_reconnected(struct igtl_poses *poses);
+
+/* Bytes that arrived at @t_ns: 0, or -EPROTO (not OpenIGTLink). */
+int igtl_poses_put(struct igtl_poses *poses, const uint8_t *bytes, size_t n,
+		   int64_t t_ns);
+
+#endif

@@ -1,0 +1,454 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A tracker behind an OpenIGTLink server, "igtl:HOST:PORT:DEVICE": PLUS, 3D Slicer, or `incise
+ * serve`. A thread receives and puts samples into a ring; incise_tracker_read() takes them from
+ * there, which is real-time safe.
+ *
+ * When the connection breaks, or what comes is not OpenIGTLink, the thread connects again every
+ * 250 ms for 10 s. Until then read() returns 0, and missing poses count as lost when others come.
+ * After that, and after 10 s without any message, read() returns -ENODEV for good.
+ */
+#include <errno.h>
+#include <limits.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <unistd.h>
+#include "../../base/monotonic.h"
+#include "../backends.h"
+#include "../thread.h"
+#include "igtl_poses.h"
+
+#define MS INT64_C(1000000)
+#define CONNECT_MS 2000
+#define FIRST_MS 5000  /* for enough poses to know the rate */
+#define LEARN_NS 5e8   /* of poses */
+#define RATE_LEAST 1.0 /* of a tracker, Hz */
+#define RATE_MOST 10000.0
+#define RETRY_MS 250
+#define GONE_MS 10000
+#define CHUNK 65536
+#define HOST_MAX 256
+
+struct igtl_tracker {
+	struct incise_tracker tracker;
+	struct igtl_poses poses;
+	char host[HOST_MAX], port[8];
+	char name[64];
+	struct sockaddr_storage address;
+	socklen_t address_n;
+	double rate_hz;
+	int fd, stop; /* socket, or -1; eventfd */
+	pthread_t thread;
+	bool runs;
+	_Atomic int gone; /* negative errno, for good: then cause is set */
+	struct incise_error cause;
+	uint8_t bytes[CHUNK];
+};
+
+static struct igtl_tracker *of(const struct incise_tracker *tracker)
+{
+	return (struct igtl_tracker *)tracker;
+}
+
+/* --- connection --- */
+
+/* Until @fd has @events, it is to stop (-ECANCELED), or @ms are over (0). 1: ready. */
+static int wait_for(const struct igtl_tracker *t, int fd, short events, int64_t ms)
+{
+	struct pollfd on[2] = {{.fd = t->stop, .events = POLLIN},
+			       {.fd = fd, .events = events}};
+	int n = poll(on, 2, ms < 0 ? 0 : ms > INT_MAX ? INT_MAX : (int)ms);
+
+	if (n > 0 && on[0].revents)
+		return -ECANCELED;
+	return n > 0;
+}
+
+/* A peer that lost its power or its cable does not close: the kernel asks it, and gives up. */
+static void watch_peer(int fd)
+{
+	static const struct {
+		int level, option, value;
+	} options[] = {
+		{SOL_SOCKET, SO_KEEPALIVE, 1},	{IPPROTO_TCP, TCP_NODELAY, 1},
+		{IPPROTO_TCP, TCP_KEEPIDLE, 2}, {IPPROTO_TCP, TCP_KEEPINTVL, 1},
+		{IPPROTO_TCP, TCP_KEEPCNT, 3},
+	};
+
+	/* An error leaves the silence, which ends it later. */
+	for (size_t i = 0; i < sizeof(options) / sizeof(*options); i++)
+		setsockopt(fd, options[i].level, options[i].option, &options[i].value,
+			   sizeof(options[i].value));
+}
+
+/* 0 or -errno. */
+static int connect_server(struct igtl_tracker *t)
+{
+	int fd = socket(t->address.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK,
+			0);
+	socklen_t size = sizeof(int);
+	int rc, code = 0;
+
+	if (fd < 0)
+		return -errno;
+	rc = connect(fd, (const struct sockaddr *)&t->address, t->address_n) ? -errno : 0;
+	if (rc == -EINPROGRESS) {
+		rc = wait_for(t, fd, POLLOUT, CONNECT_MS);
+		rc = rc == 1 ? 0 : rc ? rc : -ETIMEDOUT;
+		if (!rc && !getsockopt(fd, SOL_SOCKET, SO_ERROR, &code, &size))
+			rc = -code;
+	}
+	if (rc) {
+		close(fd);
+		return rc;
+	}
+	watch_peer(fd);
+	t->fd = fd;
+	return 0;
+}
+
+static void disconnect(struct igtl_tracker *t)
+{
+	if (t->fd >= 0)
+		close(t->fd);
+	t->fd = -1;
+}
+
+/*
+ * Receive for at most @ms. 1: something came; 0: nothing; -ECANCELED; -EPIPE (it was closed),
+ * -EPROTO, or another errno of the connection.
+ */
+static int receive(struct igtl_tracker *t, int64_t ms)
+{
+	int rc = wait_for(t, t->fd, POLLIN, ms);
+	ssize_t n;
+
+	if (rc <= 0)
+		return rc;
+	n = recv(t->fd, t->bytes, sizeof(t->bytes), 0);
+	if (n < 0)
+		return errno == EAGAIN || errno == EINTR ? 0 : -errno;
+	if (!n)
+		return -EPIPE;
+	rc = igtl_poses_put(&t->poses, t->bytes, (size_t)n, incise_monotonic_ns());
+	return rc ? rc : 1;
+}
+
+/* --- thread --- */
+
+/* Connect again. False: it did not come back, or is being closed. */
+static bool recover(struct igtl_tracker *t)
+{
+	int64_t until_ns = incise_monotonic_ns() + GONE_MS * MS;
+
+	disconnect(t);
+	do {
+		/* -1 is passed over by poll(). */
+		if (wait_for(t, -1, 0, RETRY_MS) < 0)
+			return false;
+		if (!connect_server(t))
+			return !igtl_poses_reconnected(&t->poses);
+	} while (incise_monotonic_ns() < until_ns);
+	return false;
+}
+
+static void end(struct igtl_tracker *t, const char *what)
+{
+	incise_error_set(&t->cause, ENODEV,
+			 "%s %s; start its server again, check the network, "
+			 "and start again",
+			 t->name, what);
+	atomic_store(&t->gone, -ENODEV);
+}
+
+static void *run(void *argument)
+{
+	struct igtl_tracker *t = argument;
+	int64_t since_ns = incise_monotonic_ns();
+	uint64_t messages = t->poses.messages;
+	int rc = 0;
+
+	while (rc != -ECANCELED) {
+		int64_t now_ns;
+
+		rc = receive(t, RETRY_MS);
+		now_ns = incise_monotonic_ns();
+		if (messages != t->poses.messages)
+			since_ns = now_ns;
+		messages = t->poses.messages;
+		/* A server that answers each connection with the same nonsense, too. */
+		if (now_ns - since_ns > GONE_MS * MS) {
+			end(t, "sent no message for 10 s");
+			break;
+		}
+		if (rc >= 0 || rc == -ECANCELED)
+			continue;
+		incise_thread_hurry(false);
+		if (!recover(t)) {
+			end(t, "disconnected and was not back after 10 s");
+			break;
+		}
+		incise_thread_hurry(true);
+	}
+	return NULL;
+}
+
+/* --- struct incise_tracker_ops --- */
+
+static INCISE_REALTIME int tracker_read(struct incise_tracker *tracker,
+					struct incise_tracker_sample *samples, int n)
+{
+	struct igtl_tracker *t = of(tracker);
+	/* Read ahead of the ring, which has the samples from before the end. */
+	int gone = atomic_load(&t->gone);
+	int taken = incise_ring_take(&t->poses.ring, samples, n);
+
+	return taken || n <= 0 ? taken : gone;
+}
+
+static void tracker_info(const struct incise_tracker *tracker,
+			 struct incise_tracker_info *info)
+{
+	*info = (struct incise_tracker_info){
+		.rate_hz = of(tracker)->rate_hz,
+		.stations = 1,
+		.scalpel_station = 1,
+		.external_sync = true, /* the sender decides when */
+		.network = true,
+	};
+	snprintf(info->name, sizeof(info->name), "%s", of(tracker)->name);
+}
+
+static uint64_t tracker_lost(const struct incise_tracker *tracker)
+{
+	return atomic_load_explicit(&of(tracker)->poses.lost, memory_order_relaxed);
+}
+
+static int tracker_cause(struct incise_tracker *tracker, char *text, size_t size)
+{
+	return snprintf(text, size, "%s",
+			atomic_load(&of(tracker)->gone) ? of(tracker)->cause.text : "");
+}
+
+static void tracker_close(struct incise_tracker *tracker)
+{
+	struct igtl_tracker *t = of(tracker);
+	uint64_t one = 1;
+
+	if (t->runs) {
+		while (write(t->stop, &one, sizeof(one)) < 0 && errno == EINTR)
+			;
+		pthread_join(t->thread, NULL);
+	}
+	disconnect(t);
+	if (t->stop >= 0)
+		close(t->stop);
+	igtl_poses_free(&t->poses);
+	free(t);
+}
+
+static const struct incise_tracker_ops ops = {
+	.read = tracker_read,
+	.info = tracker_info,
+	.lost = tracker_lost,
+	.close = tracker_close,
+	.cause = tracker_cause,
+};
+
+/* --- opening --- */
+
+/* "HOST", "HOST:PORT", "HOST:PORT:DEVICE"; an address of IPv6 in brackets. */
+static int parse(struct igtl_tracker *t, const char *arguments, const char **device,
+		 const char *where, struct incise_error *err)
+{
+	bool bracket = *arguments == '[';
+	const char *host = arguments + bracket;
+	size_t host_n = strcspn(host, bracket ? "]" : ":");
+	const char *port = host + host_n + (bracket && host[host_n]);
+	size_t port_n = *port == ':' ? strcspn(port + 1, ":") : 0;
+	bool bad = !host_n || (bracket && !host[host_n]) || host_n >= sizeof(t->host) ||
+		   (*port && *port != ':') || (*port && !port_n) ||
+		   port_n >= sizeof(t->port);
+	long number = bad || !port_n ? INCISE_IGTL_PORT : strtol(port + 1, NULL, 10);
+
+	*device = port_n && port[1 + port_n] ? port + 2 + port_n : "";
+	bad |= port_n && strspn(port + 1, "0123456789") != port_n;
+	bad |= number < 1 || number > 65535 || strlen(*device) > INCISE_IGTL_NAME ||
+	       (port_n && port[1 + port_n] && !**device);
+	if (bad)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: \"%.80s\": expected igtl:HOST:PORT:DEVICE with a name of at most "
+			"%d letters, such as igtl:localhost:18944:StylusToTracker; correct it",
+			where, arguments, INCISE_IGTL_NAME);
+	snprintf(t->host, sizeof(t->host), "%.*s", (int)host_n, host);
+	snprintf(t->port, sizeof(t->port), "%ld", number);
+	return 0;
+}
+
+/* Each address of the host, until one accepts. */
+static int find_server(struct igtl_tracker *t, const char *where,
+		       struct incise_error *err)
+{
+	struct addrinfo hints = {.ai_socktype = SOCK_STREAM}, *found = NULL, *one;
+	int rc = getaddrinfo(t->host, t->port, &hints, &found), failed = -ENODEV;
+
+	if (rc)
+		return incise_error_set(
+			err, ENODEV,
+			"%s: the host %.100s cannot be found: %s; correct its name",
+			where, t->host, gai_strerror(rc));
+	for (one = found; one && t->fd < 0; one = one->ai_next) {
+		memcpy(&t->address, one->ai_addr, one->ai_addrlen);
+		t->address_n = one->ai_addrlen;
+		failed = connect_server(t);
+	}
+	freeaddrinfo(found);
+	return t->fd >= 0
+		       ? 0
+		       : incise_error_set(
+				 err, -failed,
+				 "%s: %.100s port %s: %s; start its OpenIGTLink server, "
+				 "and check host and port",
+				 where, t->host, t->port, strerror(-failed));
+}
+
+static int no_poses(const struct igtl_tracker *t, const char *where,
+		    struct incise_error *err)
+{
+	const struct igtl_poses *poses = &t->poses;
+	char list[160] = "";
+
+	for (int i = 0; i < poses->n_names; i++)
+		snprintf(list + strlen(list), sizeof(list) - strlen(list), "%s%s",
+			 i ? ", " : "",
+			 *poses->names[i] ? poses->names[i] : "one without a name");
+	if (!poses->messages)
+		return incise_error_set(
+			err, EIO,
+			"%s: the server at %.100s port %s sends no message within "
+			"%d s; start its transmission",
+			where, t->host, t->port, FIRST_MS / 1000);
+	if (!*poses->device && poses->n_names > 1)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: the server at %.100s port %s sends several poses: %s; "
+			"name one, as in igtl:HOST:PORT:DEVICE",
+			where, t->host, t->port, list);
+	if (poses->n >= 2)
+		return incise_error_set(
+			err, EIO,
+			"%s: \"%s\" of the server at %.100s port %s sends less "
+			"than %g or more than %g poses a second; change its rate",
+			where, poses->names[0], t->host, t->port, RATE_LEAST, RATE_MOST);
+	return incise_error_set(
+		err, EIO,
+		"%s: the server at %.100s port %s sends no pose \"%s\" within %d "
+		"s; poses come of: %s",
+		where, t->host, t->port, poses->device, FIRST_MS / 1000,
+		*list ? list : "no device");
+}
+
+/* Receive until the rate is known. */
+static int learn(struct igtl_tracker *t, const char *where, struct incise_error *err)
+{
+	int64_t until_ns = incise_monotonic_ns() + FIRST_MS * MS, now_ns;
+	double hz;
+	int rc = 0;
+
+	while (rc >= 0 && (now_ns = incise_monotonic_ns()) < until_ns) {
+		rc = receive(t, (until_ns - now_ns) / MS + 1);
+		hz = igtl_poses_hz(&t->poses);
+		if (hz >= RATE_LEAST && hz <= RATE_MOST &&
+		    (double)(t->poses.last_ns - t->poses.first_ns) >= LEARN_NS) {
+			t->rate_hz = hz;
+			return 0;
+		}
+	}
+	if (rc == -EPROTO)
+		return incise_error_set(
+			err, EPROTO,
+			"%s: %.100s port %s does not send OpenIGTLink; correct host "
+			"and port",
+			where, t->host, t->port);
+	if (rc < 0)
+		return incise_error_set(
+			err, -rc,
+			"%s: %.100s port %s: the server closed the connection; see "
+			"its messages",
+			where, t->host, t->port);
+	return no_poses(t, where, err);
+}
+
+static int begin(struct igtl_tracker *t, const struct incise_backend_request *request,
+		 struct incise_error *err)
+{
+	static const struct incise_tracker_setup usual = {.repeat_ms = 100};
+	const char *device, *where = request->where;
+	bool real_time;
+	int rc = parse(t, request->arguments, &device, where, err);
+
+	if (rc)
+		return rc;
+	t->stop = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+	rc = t->stop < 0 ? -errno
+			 : igtl_poses_init(&t->poses,
+					   request->tracker ? request->tracker : &usual,
+					   device);
+	if (rc)
+		return incise_error_set(err, -rc, "%s: %s; end other programs", where,
+					strerror(-rc));
+	rc = find_server(t, where, err);
+	rc = rc ? rc : learn(t, where, err);
+	if (rc)
+		return rc;
+	igtl_poses_start(&t->poses, t->rate_hz);
+	snprintf(t->name, sizeof(t->name), "OpenIGTLink %s at %.24s", t->poses.device,
+		 t->host);
+	rc = incise_thread_start(&t->thread, run, t, &real_time);
+	t->runs = !rc;
+	return rc ? incise_error_set(err, -rc,
+				     "%s: no thread to receive it; end other programs",
+				     where)
+		  : 0;
+}
+
+static void *tracker_open(const struct incise_backend_request *request,
+			  struct incise_error *err)
+{
+	/* The indices of the ring have their own cache lines. */
+	struct igtl_tracker *t =
+		aligned_alloc(_Alignof(struct igtl_tracker), sizeof(struct igtl_tracker));
+	int rc;
+
+	if (!t) {
+		incise_error_set(err, ENOMEM, "%s: out of memory; end other programs",
+				 request->where);
+		return NULL;
+	}
+	memset(t, 0, sizeof(*t));
+	t->tracker.ops = &ops;
+	t->fd = t->stop = -1;
+	rc = begin(t, request, err);
+	if (!rc)
+		return &t->tracker;
+	tracker_close(&t->tracker);
+	errno = -rc;
+	return NULL;
+}
+
+const struct incise_backend incise_tracker_igtl = {
+	.abi = INCISE_BACKEND_ABI,
+	.kind = "tracker",
+	.name = "igtl",
+	.open = tracker_open,
+};
+
+INCISE_MODULE(incise_tracker_igtl);
