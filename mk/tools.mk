@@ -17,9 +17,9 @@ $(O)/obj/tools/stepper/%.o: cppflags += -Idriver
 $(O)/obj/tools/bench/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst ",,$(filter-out \
 	-ffile-prefix-map=% -fdebug-prefix-map=% -fmacro-prefix-map=%,$(CFLAGS))))"'
 
-# Frames that incise bench capture codes before it measures.
+# Frames that incise bench capture codes before it measures, and that incise serve decodes.
 has_jpeg := $(shell $(CC) -E -x c -include stdio.h -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes)
-$(O)/obj/tools/bench/bench_capture.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
+$(O)/obj/tools/bench/bench_capture.o $(O)/obj/tools/serve/pixels.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
 
 # Reports as HTML.
 has_cmark := $(shell $(PKG_CONFIG) --exists libcmark-gfm && echo yes)

@@ -37,6 +37,7 @@ static const struct {
 	{"plan", "show the stages that a scene runs, and why it leaves out others"},
 	{"haptic", "run the real-time loop of a scene"},
 	{"feed", "load a scene into the kernel and send it the poses"},
+	{"serve", "send poses, forces and frames live to other programs"},
 	{"status", "report the state of the loops on this machine"},
 	{"tool", "set or print the tool in the hand of a running loop"},
 	{"view", "show a scene: tissue, wound, blood, instrument"},

@@ -39,6 +39,7 @@ recordings() {
 	report capture capture -o a.rec --rig "$short"
 	report info.recording info a.rec
 	report verify verify a.rec
+	report serve serve a.rec --igtl 0 --duration 300ms
 	cp -r a.rec b.rec
 	sqlite3 b.rec/recording.db "DELETE FROM tracker WHERE rowid = 5"
 	report verify.findings verify b.rec

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise serve: OpenIGTLink for clients that others wrote, and for those that misbehave.
+
+load cli
+
+setup() {
+	work_folder
+}
+
+teardown() {
+	[ -z "$server" ] || kill -KILL "$server" 2>/dev/null || :
+}
+
+# Start incise serve on a free port, and wait for it: sets server and port.
+start_server() {
+	local i
+	incise-serve "$@" --igtl 0 -v --json >report.json 2>log 3>&- &
+	server=$!
+	for ((i = 0; i < 600; i++)); do
+		port=$(sed -n 's/.*OpenIGTLink on 127.0.0.1:\([0-9]*\):.*/\1/p' log)
+		[ -z "$port" ] || return 0
+		kill -0 "$server" || complain "$(cat log)"
+		sleep 0.05
+	done
+	complain "no port in 30 s: $(cat log)"
+}
+
+# End it as Ctrl-C does: exit 0 and a report.
+stop_server() {
+	local status=0
+	kill -INT "$server"
+	wait "$server" || status=$?
+	server=
+	[ "$status" = 0 ] || complain "exit $status: $(cat log)"
+	[ -s report.json ] || complain "no report: $(cat log)"
+}
+
+client() {
+	timeout 120 python3 -B "$root/tests/igtl/client.py" "$@"
+}
+
+# An expression of Python about a file of JSON, or lines of it, as j.
+holds() {
+	python3 -c '
+import json, sys
+text = open(sys.argv[1]).read()
+try:
+    j = json.loads(text)
+except ValueError:
+    j = [json.loads(line) for line in text.splitlines()]
+sys.exit(not eval(sys.argv[2]))' "$@" || complain "$2: $(head -c 2000 "$1")"
+}
+
+@test "pyigtl receives poses, forces, data and frames with times of acquisition" {
+	[ -x "$INCISE_BUILD/tests/igtl/receive" ] || skip "pip could not install pyigtl; see tests/venv"
+	start_server --rig sim: --camera frames
+	timeout 90 "$INCISE_BUILD/tests/igtl/receive" "$port" 5 TipToTracker Force ForceData Camera >found.json
+	stop_server
+	holds found.json 'all(a[0] < b[0] for rows in j.values() for a, b in zip(rows, rows[1:]))'
+	# rotations of unit determinant: columns at right angles
+	holds found.json 'all(abs(sum(m[i][0] * m[i][1] for i in range(3))) < 1e-5 and
+		abs(sum(m[i][2] ** 2 for i in range(3)) - 1) < 1e-5 for _, m in j["TipToTracker"])'
+	holds found.json 'all(m[0][:3] == [1, 0, 0] and m[0][3] == m[1][3] == 0 for _, m in j["Force"])'
+	holds found.json 'set(json.loads(j["ForceData"][0][1])) == {"t_ns", "force_N", "sd_N", "samples", "lost"}'
+	holds found.json 'all(shape == [1, 480, 640, 3] for _, shape in j["Camera"])'
+	# no message is older than the server, nor from the future: not the time of sending, but near it
+	python3 -c '
+import json, os, sys, time
+t = [row[0] for rows in json.load(open("found.json")).values() for row in rows]
+sys.exit(not (os.stat("log").st_ctime - 60 < min(t) and max(t) <= time.time()))'
+}
+
+@test "the client of libopenigtlink reads all types, and their checksums are right" {
+	[ -x "$INCISE_BUILD/tests/igtl/ReceiveClient" ] || skip "openigtlink-examples is not installed"
+	start_server --rig sim: --camera frames
+	"$INCISE_BUILD/tests/igtl/ReceiveClient" 127.0.0.1 "$port" >received 2>&1 3>&- &
+	reader=$!
+	# it prints the content only of what has the right checksum
+	for ((i = 0; i < 600; i++)); do
+		if grep -q 'Dimensions *: (640, 480, 1)' received && grep -q 'String: {"t_ns":' received &&
+			grep -q ' Status    : rig sim:' received && [ "$(grep -c 'Receiving TRANSFORM' received)" -gt 20 ]; then
+			break
+		fi
+		sleep 0.1
+	done
+	kill "$reader"
+	wait "$reader" || :
+	[ "$i" -lt 600 ] || complain "$(tail -n 40 received)"
+	stop_server
+}
+
+@test "a recording is played: the poses are those of its rows, at their times" {
+	incise capture -o a.rec --rig sim:clock=simulated,depth_mm=6,times=1,pause_s=0.2,cut_s=1 >/dev/null
+	start_server a.rec --rate 1000 --endless
+	client receive "$port" 400 >found.json
+	stop_server
+	sqlite3 -separator ' ' a.rec/recording.db "SELECT x_mm, y_mm, z_mm FROM tracker" >rows
+	python3 - <<-'END'
+		import json
+		rows = {tuple(round(float(x), 3) for x in line.split()) for line in open("rows")}
+		poses = [m for m in map(json.loads, open("found.json")) if m["name"] == "TipToTracker"]
+		assert len(poses) > 15, len(poses)
+		for pose in poses:
+		    # a float has 24 bits
+		    near = tuple(round(x, 3) for x in pose["matrix"][9:])
+		    assert any(all(abs(a - b) < 2e-3 for a, b in zip(near, row)) for row in rows), near
+	END
+	holds report.json 'j["lost"] == 0 and j["igtl"]["accepted"] == 1'
+	# and ends by itself
+	timeout 60 incise serve a.rec --igtl 0 --speed 10 >out
+	grep -q '^recording a.rec: ' out
+}
+
+@test "a loop is followed: its state, its end, and the next one of its name" {
+	cp "$root"/scenes/{wall.scene,liver*} . 2>/dev/null || cp "$root"/scenes/* .
+	incise haptic wall.scene --rig sim: --no-rt --duration 60s --state wall.state >/dev/null 2>&1 3>&- &
+	loop=$!
+	for ((i = 0; i < 600; i++)); do
+		! incise status ./wall.state 2>/dev/null | grep -q running || break
+		sleep 0.1
+	done
+	start_server ./wall.state
+	client receive "$port" 300 >found.json
+	holds found.json '{m["name"] for m in j} == {"TipToTracker", "Force", "ForceData", "Status"}'
+	holds found.json 'all(m["code"] == 1 and m["error"] == "running" for m in j if m["type"] == "STATUS")'
+	kill -KILL "$loop"
+	wait "$loop" || :
+	# 16: not present
+	for ((i = 0; i < 100; i++)); do
+		client receive "$port" 1 1 GET_STATUS >found.json
+		! grep -q '"code": 16' found.json || break
+	done
+	holds found.json 'j["text"].endswith("its process is dead")'
+	incise haptic wall.scene --rig sim: --no-rt --duration 60s --state wall.state >/dev/null 2>&1 3>&- &
+	loop=$!
+	client receive "$port" 300 >found.json
+	holds found.json 'any(m["type"] == "TRANSFORM" for m in j)'
+	stop_server
+	kill -TERM "$loop"
+	wait "$loop" || :
+}
+
+@test "clients ask for values, stop and start them, and choose the version" {
+	start_server --rig sim:
+	client receive "$port" 60 2 STP_STRING >found.json
+	holds found.json 'all(m["version"] == 2 for m in j[9:])'
+	holds found.json 'all(m["type"] != "STRING" for m in j[9:])'
+	holds found.json 'all(int(m["metadata"]["lost"]) == 0 and int(m["metadata"]["t_ns"]) > 0 for m in j[9:])'
+	holds found.json 'all(a["id"] < b["id"] for a, b in zip(j[9:], j[10:]))'
+	client receive "$port" 30 1 STP_TRANS STP_STRING STT_TRANS:Force GET_CAPABIL NONSENSE >found.json
+	holds found.json 'all(m["name"] != "TipToTracker" for m in j[9:])'
+	holds found.json 'any(m["type"] == "CAPABILITY" for m in j)'
+	stop_server
+	holds report.json 'j["igtl"]["requests"] == 6 and j["igtl"]["requests_ignored"] == 1'
+	start_server --rig sim: --igtl-version 2
+	client receive "$port" 5 >found.json
+	holds found.json 'all(m["version"] == 2 for m in j)'
+	stop_server
+}
+
+@test "clients that hang, die and send nonsense slow no other, and memory is bounded" {
+	start_server --rig sim:camera_hz=10 --camera frames --idle 1s
+	client crowd "$port" 400 >found.json
+	# 100 poses a second are sent: by their own times none is missing, but on a machine that stands still
+	holds found.json 'len(j) == 5 and all(c["hz"] >= 60 and c["ordered"] for c in j)'
+	# A frame has 0.9 MB; each of nine clients may hold a part of one, and two wait: 20 MB with all
+	# that is mapped anyway; three times that is a leak.
+	awk '/^VmHWM/ { exit $2 > 60000 }' "/proc/$server/status" || complain "$(grep VmHWM "/proc/$server/status")"
+	stop_server
+	holds report.json 'any(c["closed"] == "it took nothing for too long" and c["lost"] > 0 for c in j["igtl"]["clients"])'
+	grep -q 'closed: it began a message and did not end it' log
+	grep -q 'closed: it sent bytes that are not OpenIGTLink' log
+}
+
+@test "addresses: this machine only unless one is given, IPv6 in brackets, mistakes are explained" {
+	refuses() { # CODE MESSAGE ARGUMENT…
+		local code=$1 message=$2
+		shift 2
+		run -"$code" --separate-stderr timeout 20 incise serve --rig sim: --duration 50ms "$@"
+		[[ "${stderr_lines[0]}" == "incise serve: $message"* ]] || complain "$stderr"
+	}
+	incise serve --rig sim: --duration 50ms --igtl 0 -v 2>&1 >/dev/null | grep -q 'on 127.0.0.1:'
+	incise serve --rig sim: --duration 50ms --igtl 0.0.0.0:0 -v 2>&1 >/dev/null | grep -q 'on 0.0.0.0:'
+	[ ! -s /proc/net/if_inet6 ] ||
+		incise serve --rig sim: --duration 50ms --igtl '[::1]:0' -v 2>&1 >/dev/null | grep -q 'on \[::1\]:'
+	refuses 2 "--igtl: '::1:0': put an IPv6 address in brackets" --igtl ::1:0
+	refuses 2 "--igtl: expected a whole number" --igtl 127.0.0.1:x
+	refuses 2 "--igtl: ':0': no address before the port" --igtl :0
+	refuses 1 "--igtl 192.0.2.1:0: Cannot assign requested address; give an address of this machine" --igtl 192.0.2.1:0
+	refuses 2 "--speed: only for a recording" --speed 2
+	refuses 2 "--rig: 'a.rec' is a source, too" a.rec
+	run -1 --separate-stderr timeout 20 incise serve --rig sim:clock=simulated
+	[[ "$stderr" == *"its clock is simulated"* ]]
+	start_server --rig sim:
+	refuses 1 "--igtl $port: Address already in use; another program listens there" --igtl "$port"
+	stop_server
+	run -1 --separate-stderr timeout 20 incise serve nosuch
+	[[ "$stderr" == "incise serve: nosuch: no loop of that name has run here"* ]] || complain "$stderr"
+}

@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise serve: poses, forces and frames live to other programs, over OpenIGTLink. A process of its
+ * own: no loop waits for it, nor notices its clients.
+ */
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/epoll.h>
+#include <sys/timerfd.h>
+#include <unistd.h>
+#include "cli/cli.h"
+#include "cli/file_kind.h"
+#include "cli/json.h"
+#include "serve/serve.h"
+#include "serve/stream.h"
+
+#define NS 1000000000LL
+#define TICK_NS 100000000LL
+/* At the end clients get what waits for them, for so long. */
+#define LINGER_NS NS
+
+enum camera { CAMERA_AUTO, CAMERA_OFF, CAMERA_FRAMES };
+static const char *const cameras[] = {"auto", "off", "frames", NULL};
+static const char *const versions[] = {"auto", "1", "2", NULL};
+
+struct job {
+	const char *rig, *calibration;
+	struct serve_igtl_options igtl;
+	struct serve_source_options source;
+	enum camera camera;
+	double duration_s;
+	bool json, verbose;
+};
+
+static const struct cli_option options[] = {
+	{'r', "rig", "RIG",
+	 "serve the devices of this rig: file rig.conf, or sim:KEY=VALUE,… for\n"
+	 "the simulated rig",
+	 CLI_INPUT(struct job, rig)},
+	{'c', "calibration", "FILE",
+	 "calibration of the rig (default: the values of Song et al., 2006)",
+	 CLI_INPUT(struct job, calibration)},
+	{0, "igtl", "[ADDR:]PORT",
+	 "serve OpenIGTLink there (default: 127.0.0.1:18944); without ADDR\n"
+	 "to this machine only; there is no authentication",
+	 CLI_TEXT(struct job, igtl.address)},
+	{0, "igtl-version", "VERSION",
+	 "header version: 1, 2, or auto, which is 1 until a client sends 2\n"
+	 "(default: auto)",
+	 CLI_CHOICE(struct job, igtl.version, versions)},
+	{0, "rate", "HZ",
+	 "values per second of each kind at most, forces as means (default: 100)",
+	 CLI_NUMBER(struct job, source.rate_hz, 0.1, 20000)},
+	{0, "camera", "WHAT", "frames: fail without frames; off; auto (default)",
+	 CLI_CHOICE(struct job, camera, cameras)},
+	{0, "speed", "FACTOR", "play a recording faster or slower (default: 1)",
+	 CLI_NUMBER(struct job, source.speed, 0.01, 100)},
+	{0, "endless", NULL, "play a recording again and again",
+	 CLI_FLAG(struct job, source.endless)},
+	{0, "idle", "TIME", "close a client that stands still for so long (default: 30s)",
+	 CLI_DURATION(struct job, igtl.idle_s, 0.2, 86400)},
+	{0, "duration", "TIME", "end after this time (default: at Ctrl-C)",
+	 CLI_DURATION(struct job, duration_s, 0.01, 1e9)},
+	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
+	{'v', "verbose", NULL, "print events on stderr", CLI_FLAG(struct job, verbose)},
+	{0},
+};
+
+static const struct cli_command command = {
+	.name = "serve",
+	.synopsis = "[NAME|NAME.rec] [OPTIONS]",
+	.summary =
+		"Send poses, forces and frames live to other programs, for example 3D "
+		"Slicer: of the haptic\n"
+		"loop NAME, of a rig with --rig, or of a recording. The default is the "
+		"loop that runs.",
+	.options = options,
+	.notes =
+		"Example: incise serve neck --igtl 18944\n"
+		"Exit codes: 0 ended as requested, or at the end of the recording; 1 failed; "
+		"2 bad usage.\n"
+		"See incise-serve(1).",
+};
+
+struct run {
+	struct serve_source *source;
+	struct serve_info info;
+	struct serve_stream *stream;
+	struct serve_sink *sink[SERVE_SINKS];
+	int sinks, epoll, timer;
+	double seconds;
+};
+
+static bool is_recording(const char *operand)
+{
+	return cli_ends_with(operand, ".rec") || cli_ends_with(operand, ".rec/") ||
+	       file_kind_of(operand) == FILE_RECORDING;
+}
+
+static void open_source(struct run *run, struct job *job)
+{
+	struct incise_error err = {0};
+	const char *operand = job->source.operand;
+	bool recording = !job->rig && operand && is_recording(operand);
+
+	job->source.rig = job->rig;
+	job->source.camera = job->camera != CAMERA_OFF;
+	job->source.camera_needed = job->camera == CAMERA_FRAMES;
+	if (job->rig && operand)
+		cli_usage("--rig: '%s' is a source, too; give one of them", operand);
+	if (!job->rig && job->calibration)
+		cli_usage(
+			"--calibration: only with --rig; loops and recordings are calibrated");
+	if (!recording && (job->source.endless || job->source.speed != 1))
+		cli_usage("--%s: only for a recording",
+			  job->source.endless ? "endless" : "speed");
+	incise_calibration_nominal(&job->source.calibration);
+	if (job->calibration &&
+	    incise_calibration_load(job->calibration, &job->source.calibration, &err))
+		cli_fail_with(&err);
+	run->info.rate_hz = job->source.rate_hz;
+	run->info.kinds[SERVE_STATUS] = true;
+	run->source = job->rig	  ? serve_rig_open(&job->source, &run->info)
+		      : recording ? serve_recording_open(&job->source, &run->info)
+				  : serve_loop_open(&job->source, &run->info);
+	run->stream = serve_stream_new(run->source, job->source.rate_hz);
+}
+
+static void add_sink(struct run *run, struct serve_sink *sink)
+{
+	struct epoll_event event = {.events = EPOLLIN, .data.ptr = sink};
+
+	run->sink[run->sinks++] = sink;
+	serve_stream_add(run->stream, sink);
+	if (sink->ops->fd &&
+	    epoll_ctl(run->epoll, EPOLL_CTL_ADD, sink->ops->fd(sink), &event))
+		cli_fail("epoll: %s", strerror(errno));
+}
+
+static void open_sinks(struct run *run, const struct job *job)
+{
+	struct epoll_event event = {.events = EPOLLIN};
+
+	run->epoll = epoll_create1(EPOLL_CLOEXEC);
+	run->timer = timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC);
+	if (run->epoll < 0 || run->timer < 0 ||
+	    epoll_ctl(run->epoll, EPOLL_CTL_ADD, run->timer, &event))
+		cli_fail("epoll: %s", strerror(errno));
+	add_sink(run, serve_igtl_new(&job->igtl, &run->info));
+}
+
+/* Work of the sinks until a time, or a signal. */
+static void wait_until(struct run *run, int64_t t_ns)
+{
+	const struct itimerspec at = {.it_value = {t_ns / NS, t_ns % NS}};
+	struct epoll_event events[SERVE_SINKS + 1];
+	uint64_t expired;
+	int n;
+
+	timerfd_settime(run->timer, TFD_TIMER_ABSTIME, &at, NULL);
+	n = epoll_wait(run->epoll, events, SERVE_SINKS + 1, -1);
+	for (int i = 0; i < n; i++) {
+		struct serve_sink *sink = events[i].data.ptr;
+
+		if (sink)
+			sink->ops->work(sink);
+		else if (read(run->timer, &expired, sizeof(expired)) < 0)
+			continue;
+	}
+}
+
+static void show(const struct run *run, double seconds)
+{
+	char text[400];
+	int n = snprintf(text, sizeof(text), "%s, %.0f s", run->info.name, seconds);
+
+	for (int i = 0; i < run->sinks && n < (int)sizeof(text) - 2; i++) {
+		n += snprintf(text + n, sizeof(text) - (size_t)n, "; ");
+		n += run->sink[i]->ops->summary(run->sink[i], text + n,
+						sizeof(text) - (size_t)n);
+	}
+	cli_progress("%s", text);
+}
+
+static void tick_sinks(struct run *run, int64_t now)
+{
+	for (int i = 0; i < run->sinks; i++)
+		if (run->sink[i]->ops->tick)
+			run->sink[i]->ops->tick(run->sink[i], now);
+}
+
+static void serve(struct run *run, const struct job *job)
+{
+	int64_t start = serve_now(), now = start, next = start, tick = start;
+	int64_t end = job->duration_s > 0 ? start + (int64_t)(job->duration_s * 1e9)
+					  : INT64_MAX;
+	bool ended = false;
+
+	while (!cli_stop && now < end && !ended) {
+		if (now >= next)
+			ended = run->source->ops->read(run->source, run->stream, now,
+						       &next);
+		if (now >= tick) {
+			tick_sinks(run, now);
+			show(run, (now - start) / 1e9);
+			tick = now + TICK_NS;
+		}
+		wait_until(run, next < tick ? next : tick);
+		now = serve_now();
+	}
+	run->seconds = (now - start) / 1e9;
+	for (end = now + LINGER_NS; now < end && !cli_stop; now = serve_now()) {
+		bool empty = true;
+
+		for (int i = 0; i < run->sinks; i++)
+			empty &= !run->sink[i]->ops->is_empty ||
+				 run->sink[i]->ops->is_empty(run->sink[i]);
+		if (empty)
+			break;
+		wait_until(run, now + 10000000);
+	}
+	cli_progress_end();
+}
+
+static void report(const struct run *run, const struct job *job)
+{
+	const struct serve_stream *stream = run->stream;
+	json_t *object;
+
+	if (!job->json) {
+		printf("%s: %.1f s, %llu poses, %llu forces, %llu frames; the source lost %llu\n",
+		       run->info.name, run->seconds,
+		       (unsigned long long)serve_stream_sent(stream, SERVE_POSE),
+		       (unsigned long long)serve_stream_sent(stream, SERVE_FORCE),
+		       (unsigned long long)serve_stream_sent(stream, SERVE_FRAME),
+		       (unsigned long long)serve_stream_lost(stream));
+		for (int i = 0; i < run->sinks; i++)
+			run->sink[i]->ops->print(run->sink[i]);
+		return;
+	}
+	object = json_pack("{so so sI sI sI sI}", "source", json_text(run->info.name),
+			   "seconds", json_number(run->seconds), "poses",
+			   (json_int_t)serve_stream_sent(stream, SERVE_POSE), "forces",
+			   (json_int_t)serve_stream_sent(stream, SERVE_FORCE), "frames",
+			   (json_int_t)serve_stream_sent(stream, SERVE_FRAME), "lost",
+			   (json_int_t)serve_stream_lost(stream));
+	for (int i = 0; i < run->sinks; i++) {
+		json_t *more = run->sink[i]->ops->report(run->sink[i]);
+
+		json_object_update(object, more);
+		json_decref(more);
+	}
+	json_print(object);
+}
+
+int main(int argc, char **argv)
+{
+	struct job job = {.igtl = {.address = "127.0.0.1:18944", .idle_s = 30},
+			  .source = {.rate_hz = 100, .speed = 1}};
+	struct run run = {0};
+
+	cli_parse(&command, argc, argv, &job);
+	if (argc - optind > 1)
+		cli_usage("unexpected argument '%s'; give one source", argv[optind + 1]);
+	job.source.operand = argv[optind];
+	if (job.verbose)
+		cli_be_verbose();
+	cli_catch_signals();
+	open_source(&run, &job);
+	open_sinks(&run, &job);
+	serve(&run, &job);
+	for (int i = 0; i < run.sinks; i++)
+		run.sink[i]->ops->close(run.sink[i]);
+	report(&run, &job);
+	for (int i = 0; i < run.sinks; i++)
+		run.sink[i]->ops->free(run.sink[i]);
+	serve_stream_free(run.stream);
+	run.source->ops->free(run.source);
+	cli_finish();
+	return 0;
+}

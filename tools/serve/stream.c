@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Rates, means and times of what is sent; see serve.h.
+ *
+ *     samples   | | | | | | | | | | | | | | |        a value is due on a grid of 1/rate, and the
+ *     due       ^       ^       ^       ^            next sample at most half a step early is it;
+ *     sent      ●       ●       ●       ●            of forces the mean of those in between
+ */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include "../cli/cli.h"
+#include "stream.h"
+
+#define NS 1000000000LL
+#define STATUS_NS NS
+
+struct serve_stream {
+	struct serve_source *source;
+	struct serve_sink *sink[SERVE_SINKS];
+	int sinks;
+	int64_t period_ns;
+	int64_t due_ns[SERVE_KINDS];
+	uint64_t sent[SERVE_KINDS];
+	uint64_t lost;
+
+	/* Forces since the last that was sent. */
+	int samples;
+	int64_t first_ns;
+	double first_N[3], sum_N[3], squares; /* less the first, which keeps the digits */
+
+	enum serve_state state;
+	char name[32], text[300];
+	int64_t status_ns; /* when it was sent; 0: never */
+
+	/* Of a recording: t_ns is played at here_ns; speed 0: live. */
+	int64_t t_ns, here_ns;
+	double speed;
+};
+
+int64_t serve_now(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return now.tv_sec * NS + now.tv_nsec;
+}
+
+int64_t serve_utc_of(int64_t t_ns)
+{
+	struct timespec utc;
+	int64_t before = serve_now(), after;
+
+	clock_gettime(CLOCK_REALTIME, &utc);
+	after = serve_now();
+	return utc.tv_sec * NS + utc.tv_nsec + (t_ns - before) - (after - before) / 2;
+}
+
+struct serve_stream *serve_stream_new(struct serve_source *source, double rate_hz)
+{
+	struct serve_stream *stream = cli_alloc(1, sizeof(*stream));
+
+	stream->source = source;
+	stream->period_ns = (int64_t)(NS / rate_hz);
+	return stream;
+}
+
+void serve_stream_add(struct serve_stream *stream, struct serve_sink *sink)
+{
+	stream->sink[stream->sinks++] = sink;
+}
+
+uint64_t serve_stream_sent(const struct serve_stream *stream, enum serve_kind kind)
+{
+	return stream->sent[kind];
+}
+
+uint64_t serve_stream_lost(const struct serve_stream *stream)
+{
+	return stream->lost;
+}
+
+void serve_stream_free(struct serve_stream *stream)
+{
+	free(stream);
+}
+
+void serve_play(struct serve_stream *stream, int64_t t_ns, int64_t here_ns, double speed)
+{
+	stream->t_ns = t_ns;
+	stream->here_ns = here_ns;
+	stream->speed = speed;
+	memset(stream->due_ns, 0, sizeof(stream->due_ns));
+	stream->samples = 0;
+}
+
+static void send_item(struct serve_stream *stream, struct serve_item *item)
+{
+	item->here_ns = item->t_ns;
+	if (stream->speed > 0 && item->kind != SERVE_STATUS)
+		item->here_ns = stream->here_ns +
+				(int64_t)((item->t_ns - stream->t_ns) / stream->speed);
+	if (!item->utc_ns)
+		item->utc_ns = stream->source->ops->utc(stream->source, item->t_ns);
+	stream->sent[item->kind]++;
+	for (int i = 0; i < stream->sinks; i++)
+		stream->sink[i]->ops->send(stream->sink[i], item);
+}
+
+/* Half a step early is on time: sources that have the very rate keep all samples. */
+static bool is_due(const struct serve_stream *stream, enum serve_kind kind, int64_t t_ns)
+{
+	return t_ns >= stream->due_ns[kind] - stream->period_ns / 2;
+}
+
+static void set_due(struct serve_stream *stream, enum serve_kind kind, int64_t t_ns)
+{
+	int64_t *due = &stream->due_ns[kind];
+
+	/* After a gap the grid starts again. */
+	*due = t_ns > *due + stream->period_ns ? t_ns : *due;
+	*due += stream->period_ns;
+}
+
+void serve_pose(struct serve_stream *stream, int64_t t_ns, const double position_mm[3],
+		const double quaternion[4], const double tip_mm[3], uint64_t lost)
+{
+	struct serve_item item = {.kind = SERVE_POSE, .t_ns = t_ns, .lost = lost};
+	const double *q = quaternion;
+	double norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+	double norm = sqrt(norm2), unit[4], across[3];
+
+	stream->lost = lost;
+	/* A loop has no orientation before it saw one. */
+	if (!is_due(stream, SERVE_POSE, t_ns) || !(norm > 0.5 && norm < 2))
+		return;
+	set_due(stream, SERVE_POSE, t_ns);
+	for (int i = 0; i < 4; i++)
+		unit[i] = q[i] / norm;
+	/* tip + 2 w (v × tip) + 2 v × (v × tip) */
+	for (int i = 0; i < 3; i++) {
+		int j = (i + 1) % 3, k = (i + 2) % 3;
+
+		across[i] = unit[1 + j] * tip_mm[k] - unit[1 + k] * tip_mm[j];
+	}
+	for (int i = 0; i < 3; i++) {
+		int j = (i + 1) % 3, k = (i + 2) % 3;
+
+		item.pose.position_mm[i] =
+			position_mm[i] + tip_mm[i] + 2 * unit[0] * across[i] +
+			2 * (unit[1 + j] * across[k] - unit[1 + k] * across[j]);
+	}
+	memcpy(item.pose.quaternion, unit, sizeof(unit));
+	send_item(stream, &item);
+}
+
+void serve_force(struct serve_stream *stream, int64_t t_ns, const double force_N[3],
+		 uint64_t lost)
+{
+	struct serve_item item = {.kind = SERVE_FORCE, .lost = lost};
+	double n, squares = 0;
+
+	stream->lost = lost;
+	if (!stream->samples) {
+		stream->first_ns = t_ns;
+		memcpy(stream->first_N, force_N, sizeof(stream->first_N));
+		memset(stream->sum_N, 0, sizeof(stream->sum_N));
+		stream->squares = 0;
+	}
+	for (int i = 0; i < 3; i++) {
+		double value = force_N[i] - stream->first_N[i];
+
+		stream->sum_N[i] += value;
+		stream->squares += value * value;
+	}
+	n = ++stream->samples;
+	if (!is_due(stream, SERVE_FORCE, t_ns))
+		return;
+	set_due(stream, SERVE_FORCE, t_ns);
+	for (int i = 0; i < 3; i++) {
+		item.force.mean_N[i] = stream->first_N[i] + stream->sum_N[i] / n;
+		squares += stream->sum_N[i] * stream->sum_N[i] / n;
+	}
+	item.t_ns = stream->first_ns + (t_ns - stream->first_ns) / 2;
+	item.force.sd_N =
+		n > 1 ? sqrt(fmax(0, stream->squares - squares) / (n - 1)) : NAN;
+	item.force.samples = stream->samples;
+	stream->samples = 0;
+	send_item(stream, &item);
+}
+
+bool serve_frame_is_due(const struct serve_stream *stream, int64_t t_ns)
+{
+	return is_due(stream, SERVE_FRAME, t_ns);
+}
+
+void serve_frame(struct serve_stream *stream, const struct incise_camera_frame *frame,
+		 uint64_t lost)
+{
+	struct serve_item item = {.kind = SERVE_FRAME, .t_ns = frame->t_ns, .lost = lost};
+
+	if (!is_due(stream, SERVE_FRAME, frame->t_ns))
+		return;
+	set_due(stream, SERVE_FRAME, frame->t_ns);
+	item.frame = frame;
+	send_item(stream, &item);
+}
+
+void serve_status(struct serve_stream *stream, enum serve_state state, const char *name,
+		  const char *text)
+{
+	struct serve_item item = {.kind = SERVE_STATUS, .t_ns = serve_now()};
+
+	if (stream->status_ns && item.t_ns - stream->status_ns < STATUS_NS &&
+	    stream->state == state && !strcmp(stream->text, text))
+		return;
+	stream->status_ns = item.t_ns;
+	stream->state = state;
+	snprintf(stream->name, sizeof(stream->name), "%s", name);
+	snprintf(stream->text, sizeof(stream->text), "%s", text);
+	item.lost = stream->lost;
+	item.utc_ns = serve_utc_of(item.t_ns);
+	item.status.state = state;
+	item.status.name = stream->name;
+	item.status.text = stream->text;
+	send_item(stream, &item);
+}
