@@ -121,22 +121,20 @@ can-drive: ## the CAN drive of the tests, $(O)/tests/can/drive; see tests/can/RE
 mcap-reader: ## other readers for the tests of MCAP, $(O)/tests/mcap/check and ros2
 	@tests/venv tests/mcap $(O)/tests/mcap 'tests read MCAP with our own reader alone' check:--package ros2
 
-# Clients of OpenIGTLink that others wrote: pyigtl, and the example of libopenigtlink.
-receiver := $(wildcard /usr/share/doc/openigtlink-examples/examples/Receiver/ReceiveClient.cxx)
-igtl-peers: $(if $(has_igtl),$(if $(receiver),$(O)/tests/igtl/ReceiveClient)) ## clients for the tests of incise serve, $(O)/tests/igtl
-	@tests/venv tests/igtl $(O)/tests/igtl 'tests with pyigtl are skipped' receive
-$(O)/tests/igtl/ReceiveClient: $(receiver)
-	@mkdir -p $(@D)
-	$(call step,CXX)
-	$(Q)$(CXX) -O1 -w -I/usr/include/openigtlink -o $@ $< -lOpenIGTLink
-
 # What reads Arrow streams in place, for the tests of incise for Python.
 python-peers: ## pyarrow, polars, DuckDB, pandas 3 and scikit-learn for the tests of python/
 	@tests/venv tests/python $(O)/tests/python 'tests with pyarrow, polars, DuckDB, pandas 3 and scikit-learn are skipped'
 
 # What sends and receives streams over a network as others do.
-stream-peers: ## pylsl, with liblsl, and pyigtl for tests/cli/streams.bats
+receiver := $(wildcard /usr/share/doc/openigtlink-examples/examples/Receiver/ReceiveClient.cxx)
+stream-peers: $(if $(has_igtl),$(if $(receiver),$(O)/tests/streams/ReceiveClient))
+stream-peers: ## pylsl, with liblsl, pyigtl, and a client of libopenigtlink for tests of streams
 	@tests/venv tests/streams $(O)/tests/streams 'tests with streams of LSL and pyigtl are skipped' lsl_send igtl_send
+
+$(O)/tests/streams/ReceiveClient: $(receiver)
+	@mkdir -p $(@D)
+	$(call step,CXX)
+	$(Q)$(CXX) -O1 -w -I/usr/include/openigtlink -o $@ $< -lOpenIGTLink
 
 # Attacks on recordings. What is in a module is found by INCISE_MODULE_PATH.
 attack_programs := $(addprefix $(O)/tests/attack/,kill faults damage record watch.so stall.so)
@@ -169,7 +167,7 @@ check-attack: all $(attack_programs) ## attacks on recordings with their full co
 	ATTACK=full $(bats) tests/attack
 
 # Benches measure for seconds: tests that are tagged slow are not in `check`.
-cli-needs: all $(locale) can-drive mcap-reader igtl-peers python-peers stream-peers $(O)/tests/polhemus/fastrak $(O)/tests/state/loop \
+cli-needs: all $(locale) can-drive mcap-reader python-peers stream-peers $(O)/tests/polhemus/fastrak $(O)/tests/state/loop \
 		$(O)/tests/day $(attack_programs)
 
 check-cli: cli-needs ## command-line tests of the real programs
@@ -265,7 +263,7 @@ notebooks: all ## run doc/notebooks and write them with their figures to build/n
 
 check-doc: doc
 
-.PHONY: doc notebooks check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests attack-tests check-attack check-sanitize check-unit-sanitized check-python-sanitize check-tsan can-drive mcap-reader igtl-peers python-peers stream-peers
+.PHONY: doc notebooks check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests attack-tests check-attack check-sanitize check-unit-sanitized check-python-sanitize check-tsan can-drive mcap-reader python-peers stream-peers
 
 # Sums of very many pairs: time and memory, next to numpy.
 $(O)/tests/corpus: tests/bench/corpus.c $(O)/lib/libincise-learn.so

@@ -36,7 +36,7 @@ stop_server() {
 }
 
 client() {
-	timeout 120 python3 -B "$root/tests/igtl/client.py" "$@"
+	timeout 120 python3 -B "$root/tests/streams/igtl_client.py" "$@"
 }
 
 # An expression of Python about a file of JSON, or lines of it, as j.
@@ -52,9 +52,9 @@ sys.exit(not eval(sys.argv[2]))' "$@" || complain "$2: $(head -c 2000 "$1")"
 }
 
 @test "pyigtl receives poses, forces, data and frames with times of acquisition" {
-	[ -x "$INCISE_BUILD/tests/igtl/receive" ] || skip "pip could not install pyigtl; see tests/venv"
+	[ -e "$INCISE_BUILD/tests/streams/ready" ] || skip "pip could not install pyigtl; see tests/venv"
 	start_server --rig sim: --camera frames
-	timeout 90 "$INCISE_BUILD/tests/igtl/receive" "$port" 5 TipToTracker Force ForceData Camera >found.json
+	timeout 90 "$INCISE_BUILD/tests/streams/venv/bin/python" -B "$root/tests/streams/igtl_receive.py" "$port" 5 TipToTracker Force ForceData Camera >found.json
 	stop_server
 	holds found.json 'all(a[0] < b[0] for rows in j.values() for a, b in zip(rows, rows[1:]))'
 	# rotations of unit determinant: columns at right angles
@@ -71,9 +71,9 @@ sys.exit(not (os.stat("log").st_ctime - 60 < min(t) and max(t) <= time.time()))'
 }
 
 @test "the client of libopenigtlink reads all types, and their checksums are right" {
-	[ -x "$INCISE_BUILD/tests/igtl/ReceiveClient" ] || skip "openigtlink-examples is not installed"
+	[ -x "$INCISE_BUILD/tests/streams/ReceiveClient" ] || skip "openigtlink-examples is not installed"
 	start_server --rig sim: --camera frames
-	"$INCISE_BUILD/tests/igtl/ReceiveClient" 127.0.0.1 "$port" >received 2>&1 3>&- &
+	"$INCISE_BUILD/tests/streams/ReceiveClient" 127.0.0.1 "$port" >received 2>&1 3>&- &
 	reader=$!
 	# it prints the content only of what has the right checksum
 	for ((i = 0; i < 600; i++)); do

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <time.h>
 #include <incise/recording.h>
+#include <incise/wall.h>
 #include "../cli/cli.h"
 #include "../cli/recording.h"
 #include "serve.h"
@@ -27,8 +28,9 @@ struct playback {
 	struct incise_frame_reader *frames;
 	int64_t frame_ns; /* the last that was sent */
 	int64_t first_ns, last_ns;
-	int64_t utc_start_ns; /* of info.start_ns */
-	int64_t here_ns;      /* when first_ns was played; 0: not started */
+	struct incise_wall *wall; /* NULL: the recording has no wall time */
+	int64_t utc_start_ns;	  /* of info.start_ns, to a second; 0: not known */
+	int64_t here_ns;	  /* when first_ns was played; 0: not started */
 	int64_t read_ns;
 	double speed;
 	bool endless;
@@ -113,7 +115,13 @@ static int playback_read(struct serve_source *source, struct serve_stream *strea
 static int64_t playback_utc(struct serve_source *source, int64_t t_ns)
 {
 	const struct playback *playback = (struct playback *)source;
+	int64_t tai_ns;
 
+	if (playback->wall)
+		return incise_wall_tai(playback->wall, t_ns, &tai_ns, NULL)
+			       ? 0
+			       : tai_ns - 1000000000LL * incise_wall_utc_offset_s(
+								 playback->wall, t_ns);
 	return playback->utc_start_ns
 		       ? playback->utc_start_ns + (t_ns - playback->info.start_ns)
 		       : 0;
@@ -124,6 +132,7 @@ static void playback_free(struct serve_source *source)
 	struct playback *playback = (struct playback *)source;
 
 	incise_frame_reader_free(playback->frames);
+	incise_wall_free(playback->wall);
 	incise_recording_close(playback->recording);
 	free(playback->poses);
 	free(playback->forces);
@@ -190,6 +199,9 @@ struct serve_source *serve_recording_open(const struct serve_source_options *opt
 				     ? p->last_ns
 				     : p->forces[p->n_forces - 1].t_ns;
 	}
+	p->wall = incise_recording_wall(p->recording, &err);
+	if (!p->wall && err.code != ENODATA)
+		cli_fail_with(&err);
 	p->utc_start_ns = utc_of(p->info.started);
 	info->name = cli_text("recording %s", options->operand);
 	info->kinds[SERVE_POSE] = p->n_poses > 0;

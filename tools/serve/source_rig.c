@@ -210,6 +210,7 @@ struct serve_source *serve_rig_open(const struct serve_source_options *options,
 	rig->camera = incise_rig_camera(rig->rig);
 	incise_tracker_info(rig->tracker, &rig->tracker_info);
 	incise_force_info(rig->force, &rig->force_info);
+	incise_force_calibration(&rig->force_info, &rig->calibration);
 	rig->zero_mV = rig->calibration.force_zero_mV;
 	rig->tracker_delay_ns =
 		delay_ns(rig->calibration.tracker_delay_ms, rig->tracker_info.latency_ns);

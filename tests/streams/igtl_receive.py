@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-"""pyigtl as a client: receive.py PORT COUNT NAME...
+"""pyigtl as a client: igtl_receive.py PORT COUNT NAME...
 
 Waits until COUNT messages of each device have come, and prints a JSON object of them: name to a list
 of [timestamp, value], where a value is a matrix, a text, or the shape of an image.

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """A client of OpenIGTLink by the protocol's description alone, and clients that misbehave.
 
-client.py receive PORT COUNT [VERSION] [REQUEST[:NAME]]...
+igtl_client.py receive PORT COUNT [VERSION] [REQUEST[:NAME]]...
     Send the requests, then receive COUNT messages and print each as a line of JSON.
-client.py crowd PORT COUNT
+igtl_client.py crowd PORT COUNT
     Receive COUNT poses in five clients, while others hang, die, and send nonsense. Prints a line of
     JSON: for each of the five the poses per second by their own times, and whether they are in order.
 """
