@@ -88,6 +88,9 @@ objects_force_comedi := $(daq_core) $(O)/obj/lib/device/stable_path.o $(daq_come
 device_modules += force_lsl
 pc_force_lsl :=
 objects_force_lsl := $(daq_core) $(addprefix $(O)/obj/lib/device/,pace.o lsl/liblsl.o lsl/lsl_force.o)
+device_modules += outlet_lsl
+pc_outlet_lsl :=
+objects_outlet_lsl := $(addprefix $(O)/obj/lib/device/lsl/,liblsl.o lsl_outlet.o)
 # One tracker on two kinds of line.
 polhemus_lines := lib/device/polhemus/polhemus_usb.c lib/device/polhemus/polhemus_tty.c
 polhemus_core := $(addprefix $(O)/obj/lib/,base/ring.o device/thread.o) \

@@ -195,6 +195,7 @@ maps() {
 		*/frames_mkv.so) symbol=incise_frames ;;
 		*/film_mkv.so) symbol=incise_film_module ;;
 		*/ranks_mpi.so) symbol=incise_ranks_join ;;
+		*/outlet_lsl.so) symbol=incise_outlets_load ;;
 		*) symbol=incise_backend ;;
 		esac
 		[ "$(cat exported)" = "$symbol" ] || complain "$module: $(cat exported)"
