@@ -88,6 +88,9 @@ static const struct cli_option options[] = {
 	 "messages of MCAP: plain (JSON, default) or ros2 (ROS 2, as rosbag2\n"
 	 "stores them; metres and UTC)",
 	 CLI_CHOICE(struct job, profile, profiles)},
+	{0, "tai", NULL,
+	 "also columns tai_ns and tai_u_ns: TAI and the bound of its error",
+	 CLI_FLAG(struct job, how.tai)},
 	{0, "lineage", NULL, "begin a CSV with comments on its provenance",
 	 CLI_FLAG(struct job, how.provenance)},
 	RECORDING_DAMAGED(struct job, damaged),
@@ -163,6 +166,8 @@ static void parse(struct job *job, int argc, char **argv)
 				 how->velocity_max_mm_s > 0))
 		cli_usage("--by-cut, --depth-max, --velocity-max and --min-count go with "
 			  "--average");
+	if (how->tai && (how->depth_bins || cli_ends_with(job->output, ".mcap")))
+		cli_usage("--tai goes with rows of .csv and .h5, without --average");
 	if (job->profile && !cli_ends_with(job->output, ".mcap"))
 		cli_usage("--profile needs -o FILE.mcap");
 	how->ros2 = job->profile == ROS2;

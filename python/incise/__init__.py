@@ -16,6 +16,7 @@ from .model import CompiledModel, Model, TrainReport, Variable, load, train
 from .plan import Plan, Stability, Tick
 from .recording import Frame, Info, Recording, Stream, open
 from .verify import Finding, Report, verify
+from .wall import Wall, WallPoint
 
 __all__ = [
     "Batch",
@@ -37,6 +38,8 @@ __all__ = [
     "Tick",
     "TrainReport",
     "Variable",
+    "Wall",
+    "WallPoint",
     "calibrate",
     "load",
     "open",

@@ -324,6 +324,8 @@ class ExportOptions(ctypes.Structure):
         ("resample", c_bool),
         ("calibration", ctypes.POINTER(CalibrationStruct)),
         ("provenance", c_bool),
+        ("ros2", c_bool),
+        ("tai", c_bool),
         ("progress", ExportProgress),
         ("context", c_void_p),
     ]

@@ -23,6 +23,8 @@ from ._library import (
     text,
 )
 from .arrow import Table
+from .wall import Wall
+from .wall import read as read_wall
 
 PathLike = Union[str, "os.PathLike[str]"]
 
@@ -261,6 +263,13 @@ class Recording:
         )
         return Info(*_values(struct, Info._fields[:-1]), streams)
 
+    @property
+    def wall(self) -> Optional[Wall]:
+        """TAI and UTC of its times, with bounds; None without wall time, as of a simulated clock."""
+        failure = Failure()
+        with self._lock:
+            return read_wall(self._open(), failure)
+
     def frame(self, t: float) -> Frame:
         """The frame nearest to t, in seconds since the first force sample (as the column t_s); needs
         numpy, and Pillow for a camera that sends JPEG. Going forward is quick."""
@@ -361,6 +370,7 @@ class Recording:
         min_count: int = 50,
         depth_max_mm: float = 0,
         velocity_max_mm_s: float = 0,
+        tai: bool = False,
     ) -> Table:
         """Force with depth and velocity inside the cuts, as `incise export` gives them.
 
@@ -368,6 +378,7 @@ class Recording:
         velocity_mm_s, force_N, clipped, advancing, acceleration_mm_s2, tilt_deg, time_in_tissue_s.
         With bins of depth and velocity (both) the means of each bin with min_count samples or more:
         [cut,] depth_mm, velocity_mm_s, force_N, sd_N, count, cuts, advancing, and the last three.
+        With tai, rows without bins end with tai_ns and tai_u_ns, the bound of its error.
         """
         return self._table(
             "table",
@@ -379,12 +390,13 @@ class Recording:
             min_count=min_count,
             depth_max_mm=depth_max_mm,
             velocity_max_mm_s=velocity_max_mm_s,
+            tai=tai,
         )
 
-    def resample(self, rate_hz: float = 0) -> Table:
+    def resample(self, rate_hz: float = 0, tai: bool = False) -> Table:
         """All of the recording on one grid of rate_hz, or at each force sample: force, pose, depth,
-        velocity and camera, with standard uncertainties."""
-        return self._table("table", "resampled rows", rate_hz=rate_hz, resample=True)
+        velocity and camera, with standard uncertainties; with tai also tai_ns and tai_u_ns."""
+        return self._table("table", "resampled rows", rate_hz=rate_hz, resample=True, tai=tai)
 
 
 def open(  # the name that every reader of files has

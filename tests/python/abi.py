@@ -14,18 +14,18 @@ import sys
 import tempfile
 
 import incise
-from incise import _corpus, _library, arrow, calibrate, model, plan, recording, verify
+from incise import _corpus, _library, arrow, calibrate, model, plan, recording, verify, wall
 
 HEADERS = (
     "arrow camera calibrate_depth calibrate_force calibrate_tip calibration corpus fixed model plan recording "
-    "stability tracker train uncertainty verify"
+    "stability tracker train uncertainty verify wall"
 ).split()
 
 
 def structs():
     """All structs with a name in C, once each."""
     found = {}
-    for module in (_corpus, _library, arrow, calibrate, model, plan, recording, verify):
+    for module in (_corpus, _library, arrow, calibrate, model, plan, recording, verify, wall):
         for value in vars(module).values():
             if (
                 isinstance(value, type)

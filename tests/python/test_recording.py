@@ -370,6 +370,33 @@ class Recordings(Case):
             self.assertEqual(frame[name].tolist(), lists[name])
 
 
+class WallTime(Case):
+    def test_wall_time_and_columns(self):
+        path = self.path("wall.rec")
+        command = ["incise", "capture", "-o", path, "--rig", SHORT, "--duration", "5s"]
+        run(*command, "--clock-source", "sim:1.8e9,50,3")
+        with incise.open(path) as recording:
+            wall = recording.wall
+            table = recording.resample(rate_hz=10, tai=True)
+            start_ns = recording.info.start_ns
+        self.assertEqual(table.columns[-2:], ["tai_ns", "tai_u_ns"])
+        self.assertEqual(table.metadata["wall_source"], "simulated, time of TAI")
+        self.assertEqual([p.source for p in wall.points], ["simulated"] * 6)
+        t_ns = 2_500_000_000
+        tai_ns, bound_ns = wall.tai(t_ns)
+        # 50 ppm of 2.5 s; a point is rounded to 1 ns
+        self.assertLessEqual(abs(tai_ns - (1_800_000_000_000_000_000 + t_ns + 125_000)), 2)
+        self.assertTrue(3000 <= bound_ns <= 3010)
+        self.assertLessEqual(abs(wall.monotonic(tai_ns)[0] - t_ns), 2)
+        self.assertTrue(wall.utc(t_ns).startswith("2027-01-15T07:59:25.500125"))
+        self.says(incise.Invalid, "more than 60 s", wall.tai, 10**12)
+        self.assertEqual(rows(table)["tai_ns"][0], wall.tai(start_ns)[0])
+        with incise.open(os.path.join(self.shared, "short.rec")) as recording:
+            self.assertIsNone(recording.wall)
+            without = recording.resample(tai=True)
+            self.says(incise.Invalid, "has no wall time", rows, without)
+
+
 class Import(Case):
     def test_maps_no_library(self):
         """Importing loads no library of incise, nor numpy, pandas or scikit-learn."""

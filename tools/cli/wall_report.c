@@ -5,39 +5,22 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
-#include <incise/clock.h>
 #include "json.h"
 #include "wall_report.h"
 
-void wall_utc_text(int64_t tai_ns, int utc_offset_s, char text[WALL_TEXT])
-{
-	int64_t utc_ns = tai_ns - utc_offset_s * INCISE_NS_PER_S;
-	int64_t ns = utc_ns % INCISE_NS_PER_S;
-	time_t s = utc_ns / INCISE_NS_PER_S;
-	struct tm utc;
-	char whole[24];
-
-	if (ns < 0) {
-		ns += INCISE_NS_PER_S;
-		s--;
-	}
-	strftime(whole, sizeof(whole), "%Y-%m-%dT%H:%M:%S", gmtime_r(&s, &utc));
-	snprintf(text, WALL_TEXT, "%s.%09dZ", whole, (int)ns);
-}
-
-void wall_uncertainty_text(int64_t uncertainty_ns, char text[WALL_TEXT])
+void wall_uncertainty_text(int64_t uncertainty_ns, char text[INCISE_WALL_TEXT])
 {
 	if (uncertainty_ns == INCISE_WALL_UNKNOWN)
-		snprintf(text, WALL_TEXT, "unknown");
+		snprintf(text, INCISE_WALL_TEXT, "unknown");
 	else
-		snprintf(text, WALL_TEXT, "%.3g ms", (double)uncertainty_ns * 1e-6);
+		snprintf(text, INCISE_WALL_TEXT, "%.3g ms",
+			 (double)uncertainty_ns * 1e-6);
 }
 
 /* The ends of a recording, and what its points say. */
 struct summary {
 	int64_t tai_ns[2], uncertainty_ns[2]; /* start, end */
-	char utc[2][WALL_TEXT];
+	char utc[2][INCISE_WALL_TEXT];
 	size_t n, held, restarts;
 	const struct incise_wall_point *points;
 	bool several; /* sources or references */
@@ -60,8 +43,9 @@ static void summarise(const struct incise_wall *wall, int64_t start_ns, int64_t 
 			sum->tai_ns[i] = p->tai_ns + (ends[i] - p->t_ns);
 			sum->uncertainty_ns[i] = INCISE_WALL_UNKNOWN;
 		}
-		wall_utc_text(sum->tai_ns[i], incise_wall_utc_offset_s(wall, ends[i]),
-			      sum->utc[i]);
+		incise_wall_utc_text(sum->tai_ns[i],
+				     incise_wall_utc_offset_s(wall, ends[i]),
+				     sum->utc[i]);
 	}
 	for (size_t i = 0; i < sum->n; i++) {
 		sum->held += sum->points[i].held;
@@ -84,7 +68,7 @@ static double moved_ns(const struct incise_wall_point *p)
 
 void wall_text(const struct incise_wall *wall, int64_t start_ns, int64_t end_ns)
 {
-	char bounds[2][WALL_TEXT];
+	char bounds[2][INCISE_WALL_TEXT];
 	const struct incise_wall_point *p;
 	struct summary sum;
 

@@ -9,13 +9,8 @@
 #include <jansson.h>
 #include <incise/wall.h>
 
-#define WALL_TEXT 40
-
-/* "2026-11-27T08:00:00.123456789Z"; @utc_offset_s: TAI less UTC. */
-void wall_utc_text(int64_t tai_ns, int utc_offset_s, char text[WALL_TEXT]);
-
 /* "0.013 ms"; "unknown". */
-void wall_uncertainty_text(int64_t uncertainty_ns, char text[WALL_TEXT]);
+void wall_uncertainty_text(int64_t uncertainty_ns, char text[INCISE_WALL_TEXT]);
 
 /* Lines of a recording from start_ns to end_ns, CLOCK_MONOTONIC. */
 void wall_text(const struct incise_wall *wall, int64_t start_ns, int64_t end_ns);

@@ -197,6 +197,8 @@ struct incise_export_options {
 	const struct incise_calibration *calibration;
 	bool provenance; /**< CSV starts with lines "# key: value"; others always have it */
 	bool ros2;	 /**< MCAP with messages of ROS 2, see incise_export() */
+	/** Also columns tai_ns and tai_u_ns, the bound of its error; not of averages in bins. */
+	bool tai;
 
 	/**
 	 * Called at intervals with the completed share, 0 to 1, or NULL; a value other than 0
@@ -239,7 +241,7 @@ struct incise_export_report {
  *
  * @param recordings n recordings
  * @param report     or NULL
- * @return 0; -ENODATA (no cut in any recording), -EINVAL, -EIO, -ENOSPC, -ENOMEM; -ENOENT
+ * @return 0; -ENODATA (no cut in any recording; no wall time), -EINVAL, -EIO, -ENOSPC, -ENOMEM; -ENOENT
  *         without the module export_hdf5.so; -EINTR if progress stopped it; errno of
  *         incise_outfile_open().
  */

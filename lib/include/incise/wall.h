@@ -105,6 +105,13 @@ INCISE_API int incise_wall_tai(const struct incise_wall *wall, int64_t t_ns,
 INCISE_API int incise_wall_monotonic(const struct incise_wall *wall, int64_t tai_ns,
 				     int64_t *t_ns, int64_t *uncertainty_ns);
 
+/** Room for incise_wall_utc_text(). */
+#define INCISE_WALL_TEXT 40
+
+/** Write a time as "2026-11-27T08:00:00.123456789Z". @param utc_offset_s TAI less UTC */
+INCISE_API void incise_wall_utc_text(int64_t tai_ns, int utc_offset_s,
+				     char text[INCISE_WALL_TEXT]);
+
 /** Get TAI less UTC at a time of CLOCK_MONOTONIC, s, by the last point before it. */
 INCISE_API int incise_wall_utc_offset_s(const struct incise_wall *wall, int64_t t_ns);
 

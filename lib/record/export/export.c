@@ -50,8 +50,10 @@ struct pass {
 	int cut;		       /* the present one of all recordings, from 1 */
 	int number;		       /* of the same cut in its recording */
 	struct incise_blade_pose_value blade; /* at the present sample */
-	double depth_deepest_mm; /* of any row, for the error without a cut */
-	void *state;		 /* of the visitor */
+	struct incise_wall *wall; /* of the present recording; NULL: without TAI */
+	int64_t first_ns;	  /* its time 0, CLOCK_MONOTONIC */
+	double depth_deepest_mm;  /* of any row, for the error without a cut */
+	void *state;		  /* of the visitor */
 };
 
 /* Functions for each sample and cut; each returns 0 or -errno. */
@@ -160,6 +162,7 @@ static int each_cut_sample(struct pass *pass, struct incise_cuts *cuts,
 			pass->number = sample.cut;
 			pass->cut++;
 		}
+		pass->first_ns = cuts->first_ns;
 		rc = visitor->sample(pass, &sample,
 				     (sample.t_ns - cuts->first_ns) * 1e-9);
 		if (!rc && (cuts->force_rows & 0xfff) == 0)
@@ -198,6 +201,17 @@ static int each_sample(struct pass *pass, struct incise_recording *recording,
 	return rc;
 }
 
+/* Read the wall time of a recording, where it is asked for. Returns 0 or -errno. */
+static int open_wall(struct pass *pass, struct incise_recording *recording)
+{
+	incise_wall_free(pass->wall);
+	pass->wall = NULL;
+	if (!pass->options->tai)
+		return 0;
+	pass->wall = incise_recording_wall(recording, pass->err);
+	return pass->wall ? 0 : -errno;
+}
+
 /* Visit every sample in a cut, in order. Returns 0 or -errno. */
 static int each_cut(struct pass *pass, struct incise_recording *const *recordings, int n,
 		    const struct visitor *visitor)
@@ -208,8 +222,10 @@ static int each_cut(struct pass *pass, struct incise_recording *const *recording
 	for (int i = 0; i < n && !rc; i++) {
 		free(pass->name);
 		pass->name = unique_name(recordings, i);
-		rc = pass->name ? each_sample(pass, recordings[i], visitor)
+		rc = pass->name ? open_wall(pass, recordings[i])
 				: incise_error_set(pass->err, ENOMEM, "out of memory");
+		if (!rc)
+			rc = each_sample(pass, recordings[i], visitor);
 	}
 	return rc;
 }
@@ -243,27 +259,33 @@ static int put_row(struct pass *pass)
 {
 	struct raw *raw = pass->state;
 	const struct bin *row = &raw->row;
-	int name, rc;
+	union incise_cell cells[] = {
+		{.integer = 0},
+		{.real = row->t_s},
+		{.real = row->depth_mm},
+		{.real = row->velocity_mm_s},
+		{.real = row->force_N},
+		{.integer = row->clipped},
+		{.integer = row->advancing},
+		{.real = row->acceleration_mm_s2},
+		{.real = row->tilt_deg},
+		{.real = row->time_in_tissue_s},
+		{0},
+		{0}, /* of TAI, if it is asked for */
+	};
+	int rc = 0;
 
 	if (!row->n)
 		return 0;
-	name = cut_name(pass);
-	if (name < 0)
-		return name;
-	rc = incise_table_add(pass->table,
-			      (union incise_cell[]){
-				      {.integer = name},
-				      {.real = row->t_s},
-				      {.real = row->depth_mm},
-				      {.real = row->velocity_mm_s},
-				      {.real = row->force_N},
-				      {.integer = row->clipped},
-				      {.integer = row->advancing},
-				      {.real = row->acceleration_mm_s2},
-				      {.real = row->tilt_deg},
-				      {.real = row->time_in_tissue_s},
-			      },
-			      pass->err);
+	cells[0].integer = cut_name(pass);
+	if (cells[0].integer < 0)
+		return (int)cells[0].integer;
+	if (pass->wall)
+		rc = incise_tai_cells(pass->wall,
+				      pass->first_ns + llround(row->t_s * 1e9),
+				      cells + COLUMNS(raw_columns), pass->err);
+	if (!rc)
+		rc = incise_table_add(pass->table, cells, pass->err);
 	pass->report.rows++;
 	raw->row = (struct bin){0};
 	return rc;
@@ -466,6 +488,10 @@ int incise_export_check(const struct incise_export_options *o, struct incise_err
 		return incise_error_set(err, EINVAL,
 					"resampling needs a rate of 1 Hz or more, and "
 					"no averages");
+	if (o->tai && (o->depth_bins || o->ros2))
+		return incise_error_set(err, EINVAL,
+					"TAI is of rows, not of averages in bins, and "
+					"messages of ROS 2 have UTC");
 	if (o->min_count < 0)
 		return incise_error_set(err, EINVAL, "smallest count %d is negative",
 					o->min_count);
@@ -511,10 +537,12 @@ static int write_resampled(struct pass *pass, struct incise_recording *const *re
 	for (int i = 0; i < n && !rc; i++) {
 		char *name = unique_name(recordings, i);
 
-		rc = name ? incise_resample(recordings[i], name, pass->options,
-					    pass->table, &pass->report, pass->samples,
-					    pass->samples_all, pass->err)
+		rc = name ? open_wall(pass, recordings[i])
 			  : incise_error_set(pass->err, ENOMEM, "out of memory");
+		if (!rc)
+			rc = incise_resample(recordings[i], name, pass->options,
+					     pass->wall, pass->table, &pass->report,
+					     pass->samples, pass->samples_all, pass->err);
 		pass->samples += recordings[i]->meta.force;
 		free(name);
 	}
@@ -530,29 +558,34 @@ int incise_export_table(struct incise_recording *const *recordings, int n,
 	struct pass pass = {
 		.options = options, .err = err, .depth_deepest_mm = -INFINITY};
 	bool bins = options->depth_bins > 0, whole = !bins || options->by_cut;
+	const struct incise_column *columns =
+		options->resample ? incise_resample_columns
+				  : (bins ? bin_columns : raw_columns) + !whole;
+	struct incise_column *with_tai = NULL;
 	struct incise_table table;
-	int rc;
+	int rc = 0, width = (bins ? COLUMNS(bin_columns) : COLUMNS(raw_columns)) - !whole;
 
 	for (int i = 0; i < n; i++)
 		pass.samples_all += recordings[i]->meta.force;
-	if (options->resample) {
-		rc = incise_resample_width(recordings, n, err);
-		if (rc > 0)
-			rc = incise_table_open(&table, format, out,
-					       incise_resample_columns, rc, provenance,
-					       err);
-	} else {
-		rc = incise_table_open(
-			&table, format, out, (bins ? bin_columns : raw_columns) + !whole,
-			(bins ? COLUMNS(bin_columns) : COLUMNS(raw_columns)) - !whole,
-			provenance, err);
+	if (options->resample)
+		width = incise_resample_width(recordings, n, err);
+	if (width < 0)
+		return width;
+	if (options->tai) {
+		columns = with_tai = incise_tai_columns(columns, width);
+		width += INCISE_TAI_COLUMNS;
+		if (!columns)
+			return incise_error_set(err, ENOMEM, "out of memory");
 	}
+	rc = incise_table_open(&table, format, out, columns, width, provenance, err);
 	if (!rc) {
 		pass.table = &table;
 		rc = options->resample ? write_resampled(&pass, recordings, n)
 				       : write_cuts(&pass, recordings, n);
 		incise_table_close(&table);
 	}
+	incise_wall_free(pass.wall);
+	free(with_tai);
 	free(pass.name);
 	if (!rc && report)
 		*report = pass.report;

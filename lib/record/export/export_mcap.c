@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <incise/clock.h>
 #include "../../base/c_locale.h"
 #include "decimal.h"
 #include "messages.h"
@@ -50,6 +51,9 @@ uint64_t incise_message_ns(const struct incise_messages *messages, int64_t t_ns)
 {
 	int64_t ns = t_ns + messages->wall_ns;
 
+	if (messages->wall && !incise_wall_tai(messages->wall, t_ns, &ns, NULL))
+		ns -= incise_wall_utc_offset_s(messages->wall, t_ns) * INCISE_NS_PER_S;
+
 	return ns > 0 ? (uint64_t)ns : 0;
 }
 
@@ -70,10 +74,11 @@ static int find_start(struct incise_recording *recording, int64_t *start_ns,
 	return rc < 0 ? rc : 0;
 }
 
-/* From the wall clock at the start, which a recording has in whole seconds. */
+/* By the wall time, else from the wall clock at the start, in whole seconds. */
 static int find_wall(struct incise_messages *messages, struct incise_error *err)
 {
 	const struct incise_recording *recording = messages->recording;
+	struct incise_error none = {0};
 	int64_t start_ns;
 	const char *end;
 	struct tm utc = {0};
@@ -91,7 +96,34 @@ static int find_wall(struct incise_messages *messages, struct incise_error *err)
 			"export it without --profile",
 			recording->path, recording->meta.started);
 	messages->wall_ns = (int64_t)t * 1000000000 - start_ns;
+	messages->wall = incise_recording_wall(messages->recording, &none);
+	/* A recording that claims to have it, and has it not, is not to be trusted. */
+	if (!messages->wall && none.code != ENODATA)
+		return incise_error_set(err, none.code, "%s", none.text);
 	return 0;
+}
+
+/* The largest bound at any of the points. */
+static int add_points(struct incise_provenance *pairs, const struct incise_wall *wall)
+{
+	const struct incise_wall_point *points;
+	size_t n = incise_wall_points(wall, &points);
+	int64_t largest_ns = 0;
+	int rc = incise_provenance_add(pairs, "source", "%s, time of %s", points->source,
+				       points->reference);
+
+	for (size_t i = 0; i < n; i++) {
+		int64_t tai_ns, u_ns = 0;
+
+		incise_wall_tai(wall, points[i].t_ns, &tai_ns, &u_ns);
+		largest_ns = u_ns > largest_ns ? u_ns : largest_ns;
+	}
+	if (rc)
+		return rc;
+	return largest_ns == INCISE_WALL_UNKNOWN
+		       ? incise_provenance_add(pairs, "uncertainty_s", "unknown")
+		       : incise_provenance_add(pairs, "uncertainty_s", "%.9g",
+					       (double)largest_ns * 1e-9);
 }
 
 static int write_wall(struct incise_mcap *mcap, const struct incise_messages *messages)
@@ -99,12 +131,14 @@ static int write_wall(struct incise_mcap *mcap, const struct incise_messages *me
 	struct incise_provenance pairs = {0};
 	int rc = incise_provenance_add(&pairs, "clock", "UTC");
 
-	if (!rc)
+	if (!rc && messages->wall)
+		rc = add_points(&pairs, messages->wall);
+	if (!rc && !messages->wall)
 		rc = incise_provenance_add(&pairs, "source",
 					   "wall clock at the start, in whole seconds");
-	if (!rc)
+	if (!rc && !messages->wall)
 		rc = incise_provenance_add(&pairs, "uncertainty_s", "1");
-	if (!rc)
+	if (!rc && !messages->wall)
 		rc = incise_provenance_add(&pairs, "offset_ns", "%lld",
 					   (long long)messages->wall_ns);
 	if (!rc)
@@ -295,6 +329,7 @@ int incise_export_mcap(struct incise_recording *recording,
 		incise_rows_close(&export.rows[i]);
 	incise_mcap_free(&export.mcap);
 	incise_frames_reader_close(export.messages.frames);
+	incise_wall_free(export.messages.wall);
 	free(export.messages.text);
 	if (n < 0)
 		return (int)n;

@@ -13,6 +13,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <incise/wall.h>
 #include "../frames.h"
 #include "../read/recording.h"
 #include "../read/rows.h"
@@ -22,6 +23,7 @@ struct incise_messages {
 	struct incise_recording *recording;
 	struct incise_recording_force scale;
 	uint64_t clipped, omitted; /* force samples at an end; rows without a message */
+	struct incise_wall *wall;  /* for times since 1970; or NULL, and then */
 	int64_t wall_ns; /* added to CLOCK_MONOTONIC: nanoseconds since 1970, or 0 */
 	char *text;	 /* of a message */
 	size_t capacity;

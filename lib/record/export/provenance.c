@@ -10,6 +10,7 @@
 #include <string.h>
 #include <time.h>
 #include <incise/version.h>
+#include <incise/wall.h>
 #include "provenance.h"
 #include "../read/recording.h"
 
@@ -102,6 +103,52 @@ static int add_sources(struct incise_provenance *provenance,
 			  : -ENOMEM;
 		free(text);
 	}
+	return rc;
+}
+
+/* The mapping to TAI of one recording: its first and last point, which have all that is constant. */
+static int add_wall(struct incise_provenance *provenance,
+		    struct incise_recording *recording)
+{
+	static const char *const keys[][4] = {{"wall_start_t_ns", "wall_start_tai_ns",
+					       "wall_start_u_ns", "wall_start_utc"},
+					      {"wall_end_t_ns", "wall_end_tai_ns",
+					       "wall_end_u_ns", "wall_end_utc"}};
+	struct incise_error none = {0};
+	struct incise_wall *wall = incise_recording_wall(recording, &none);
+	const struct incise_wall_point *points;
+	size_t n;
+	int rc = 0;
+
+	/* A damaged table stops the export only where its times are asked for. */
+	if (!wall)
+		return errno == ENOMEM ? -ENOMEM : 0;
+	n = incise_wall_points(wall, &points);
+	for (int i = 0; i < 2 && !rc; i++) {
+		const struct incise_wall_point *p = &points[i ? n - 1 : 0];
+		char utc[INCISE_WALL_TEXT];
+		int64_t tai_ns, u_ns;
+
+		incise_wall_tai(wall, p->t_ns, &tai_ns, &u_ns);
+		incise_wall_utc_text(tai_ns, p->utc_offset_s, utc);
+		rc = incise_provenance_add(provenance, keys[i][0], "%lld",
+					   (long long)p->t_ns);
+		if (!rc)
+			rc = incise_provenance_add(provenance, keys[i][1], "%lld",
+						   (long long)tai_ns);
+		if (!rc)
+			rc = u_ns == INCISE_WALL_UNKNOWN
+				     ? incise_provenance_add(provenance, keys[i][2],
+							     "unknown")
+				     : incise_provenance_add(provenance, keys[i][2],
+							     "%lld", (long long)u_ns);
+		if (!rc)
+			rc = incise_provenance_add(provenance, keys[i][3], "%s", utc);
+	}
+	if (!rc)
+		rc = incise_provenance_add(provenance, "wall_source", "%s, time of %s",
+					   points->source, points->reference);
+	incise_wall_free(wall);
 	return rc;
 }
 
@@ -206,6 +253,8 @@ int incise_provenance_of(struct incise_provenance *provenance,
 			   : add_options(provenance, options);
 	if (!rc)
 		rc = add_calibration(provenance, recordings, n, options->calibration);
+	if (!rc && n == 1)
+		rc = add_wall(provenance, recordings[0]);
 	return rc ? incise_error_set(err, -rc, "lineage: %s", strerror(-rc)) : 0;
 }
 

@@ -11,7 +11,7 @@
 #include <incise/export.h>
 #include <incise/recording.h>
 
-#define INCISE_PROVENANCE_MAX 32
+#define INCISE_PROVENANCE_MAX 48
 
 /* Set to {0} before use. */
 struct incise_provenance {

@@ -4,6 +4,7 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <string.h>
 #include <stdlib.h>
 #include "../../control/model_input.h"
 #include "../read/recording.h"
@@ -70,6 +71,8 @@ struct resample {
 	const struct incise_export_options *options;
 	struct incise_table *table;
 	struct incise_export_report *report;
+	const struct incise_wall *wall; /* NULL: without TAI */
+	int width;			/* columns without those of TAI */
 	int64_t name, first_ns;
 	uint64_t samples, all;
 	struct incise_error *err;
@@ -113,9 +116,11 @@ static int put_row(struct resample *r, int64_t t_ns,
 	struct incise_export_report *report = r->report;
 	struct incise_camera_value camera;
 	struct incise_blade_pose_value blade;
+	union incise_cell all[INCISE_RESAMPLE_COLUMNS + INCISE_RESAMPLE_CAMERA_COLUMNS +
+			      INCISE_TAI_COLUMNS];
 	int rc = incise_blade_pose_at(&r->blade, t_ns, r->t_sd_s, &blade, r->err);
 
-	if (!rc && r->table->n_columns > INCISE_RESAMPLE_COLUMNS)
+	if (!rc && r->width > INCISE_RESAMPLE_COLUMNS)
 		rc = incise_camera_interpolator_at(&r->camera, t_ns, r->t_sd_s, &camera,
 						   r->err);
 	else
@@ -125,40 +130,44 @@ static int put_row(struct resample *r, int64_t t_ns,
 	report->clipped += force->clipped;
 	report->depth_max_mm = least(report->depth_max_mm, blade.depth_mm);
 	report->velocity_max_mm_s = least(report->velocity_max_mm_s, blade.velocity_mm_s);
-	rc = incise_table_add(r->table,
-			      (union incise_cell[]){
-				      {.integer = r->name},
-				      {.integer = blade.cut},
-				      {.real = (double)(t_ns - r->first_ns) * 1e-9},
-				      {.real = blade.position_mm[0]},
-				      {.real = blade.position_mm[1]},
-				      {.real = blade.position_mm[2]},
-				      {.real = coarse(blade.position_u_mm)},
-				      {.real = blade.q[0]},
-				      {.real = blade.q[1]},
-				      {.real = blade.q[2]},
-				      {.real = blade.q[3]},
-				      {.integer = blade.station},
-				      {.integer = blade.button},
-				      {.real = blade.depth_mm},
-				      {.real = coarse(blade.depth_u_mm)},
-				      {.real = blade.velocity_mm_s},
-				      {.real = force->force_N},
-				      {.real = coarse(force->u_N)},
-				      {.integer = force->clipped},
-				      {.integer = blade.interpolated},
-				      {.integer = blade.error},
-				      {.integer = blade.advancing},
-				      {.real = blade.acceleration_mm_s2},
-				      {.real = blade.tilt_deg},
-				      {.real = blade.time_in_tissue_s},
-				      {.real = camera.depth_mm},
-				      {.real = coarse(camera.sd_mm)},
-				      {.real = coarse(camera.u_mm)},
-				      {.real = camera.quality},
-				      {.integer = camera.low_quality},
-			      },
-			      r->err);
+	const union incise_cell cells[] = {
+		{.integer = r->name},
+		{.integer = blade.cut},
+		{.real = (double)(t_ns - r->first_ns) * 1e-9},
+		{.real = blade.position_mm[0]},
+		{.real = blade.position_mm[1]},
+		{.real = blade.position_mm[2]},
+		{.real = coarse(blade.position_u_mm)},
+		{.real = blade.q[0]},
+		{.real = blade.q[1]},
+		{.real = blade.q[2]},
+		{.real = blade.q[3]},
+		{.integer = blade.station},
+		{.integer = blade.button},
+		{.real = blade.depth_mm},
+		{.real = coarse(blade.depth_u_mm)},
+		{.real = blade.velocity_mm_s},
+		{.real = force->force_N},
+		{.real = coarse(force->u_N)},
+		{.integer = force->clipped},
+		{.integer = blade.interpolated},
+		{.integer = blade.error},
+		{.integer = blade.advancing},
+		{.real = blade.acceleration_mm_s2},
+		{.real = blade.tilt_deg},
+		{.real = blade.time_in_tissue_s},
+		{.real = camera.depth_mm},
+		{.real = coarse(camera.sd_mm)},
+		{.real = coarse(camera.u_mm)},
+		{.real = camera.quality},
+		{.integer = camera.low_quality},
+	};
+
+	memcpy(all, cells, sizeof(cells));
+	if (r->wall)
+		rc = incise_tai_cells(r->wall, t_ns, all + r->width, r->err);
+	if (!rc)
+		rc = incise_table_add(r->table, all, r->err);
 	if (!rc && (++report->rows & 0xfff) == 0)
 		rc = incise_export_progress(r->options,
 					    (double)(r->samples + r->force.rows.n),
@@ -233,14 +242,17 @@ static int on_grid(struct resample *r, double force_hz)
 
 int incise_resample(struct incise_recording *recording, const char *name,
 		    const struct incise_export_options *options,
-		    struct incise_table *table, struct incise_export_report *report,
-		    uint64_t samples, uint64_t all, struct incise_error *err)
+		    const struct incise_wall *wall, struct incise_table *table,
+		    struct incise_export_report *report, uint64_t samples, uint64_t all,
+		    struct incise_error *err)
 {
 	const struct incise_calibration *given = options->calibration;
 	struct resample r = {
 		.options = options,
 		.table = table,
 		.report = report,
+		.wall = wall,
+		.width = table->n_columns - (wall ? INCISE_TAI_COLUMNS : 0),
 		.name = incise_table_name(table, name),
 		.samples = samples,
 		.all = all,

@@ -10,6 +10,7 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <incise/recording.h>
+#include <incise/wall.h>
 #include "provenance.h"
 #include "table_writer.h"
 
@@ -30,6 +31,18 @@ static inline int incise_export_progress(const struct incise_export_options *opt
 		"advancing", "1", "1: the blade went into new tissue", \
 			INCISE_COLUMN_FLAG, 0                          \
 	}
+
+/* --- columns_tai.c ------------------------------------------------------------------ */
+
+#define INCISE_TAI_COLUMNS 2
+
+/* A copy of columns, to be freed, with those of TAI behind them. NULL: no memory. */
+struct incise_column *incise_tai_columns(const struct incise_column *columns, int n);
+
+/* Their cells at a time of CLOCK_MONOTONIC; the mapping must reach to it. Returns 0 or -ENODATA. */
+int incise_tai_cells(const struct incise_wall *wall, int64_t t_ns,
+		     union incise_cell cells[INCISE_TAI_COLUMNS],
+		     struct incise_error *err);
 
 /* --- export.c ---------------------------------------------------------------------- */
 
@@ -65,13 +78,14 @@ int incise_resample_width(struct incise_recording *const *recordings, int n,
 			  struct incise_error *err);
 
 /*
- * Add the rows of a recording under a name. For the progress, @samples of force were read
+ * Add the rows of a recording under a name, with TAI if @wall is not NULL. For the progress, @samples of force were read
  * before, of @all. Returns 0 or -errno.
  */
 int incise_resample(struct incise_recording *recording, const char *name,
 		    const struct incise_export_options *options,
-		    struct incise_table *table, struct incise_export_report *report,
-		    uint64_t samples, uint64_t all, struct incise_error *err);
+		    const struct incise_wall *wall, struct incise_table *table,
+		    struct incise_export_report *report, uint64_t samples, uint64_t all,
+		    struct incise_error *err);
 
 /* --- export_mcap.c ----------------------------------------------------------------- */
 

@@ -9,8 +9,10 @@
 #include <errno.h>
 #include <math.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <incise/clock.h>
 #include <incise/wall.h>
 
@@ -264,6 +266,22 @@ int incise_wall_tai(const struct incise_wall *wall, int64_t t_ns, int64_t *tai_n
 int incise_wall_utc_offset_s(const struct incise_wall *wall, int64_t t_ns)
 {
 	return wall->points[find(wall, t_ns)].utc_offset_s;
+}
+
+void incise_wall_utc_text(int64_t tai_ns, int utc_offset_s, char text[INCISE_WALL_TEXT])
+{
+	int64_t utc_ns = tai_ns - utc_offset_s * INCISE_NS_PER_S;
+	int64_t ns = utc_ns % INCISE_NS_PER_S;
+	time_t s = utc_ns / INCISE_NS_PER_S;
+	struct tm utc;
+	char whole[24];
+
+	if (ns < 0) {
+		ns += INCISE_NS_PER_S;
+		s--;
+	}
+	strftime(whole, sizeof(whole), "%Y-%m-%dT%H:%M:%S", gmtime_r(&s, &utc));
+	snprintf(text, INCISE_WALL_TEXT, "%s.%09dZ", whole, (int)ns);
 }
 
 /* --- the inverse ----------------------------------------------------------------------- */

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Wall time of a recording: from CLOCK_MONOTONIC, the column t_ns, to TAI and UTC with a bound of the error."""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import math
+import os
+from typing import NamedTuple, Optional, Tuple
+
+from . import _library
+from ._library import Handle, Invalid, function, text
+
+_UNKNOWN = 2**63 - 1
+
+
+class WallPointStruct(ctypes.Structure):
+    """struct incise_wall_point"""
+
+    _fields_ = [
+        ("t_ns", ctypes.c_int64),
+        ("tai_ns", ctypes.c_int64),
+        ("uncertainty_ns", ctypes.c_double),
+        ("rate_ppb", ctypes.c_double),
+        ("rate_uncertainty_ppb", ctypes.c_double),
+        ("utc_offset_s", ctypes.c_int),
+        ("held", ctypes.c_bool),
+        ("source", ctypes.c_char * 24),
+        ("reference", ctypes.c_char * 24),
+        ("leap", ctypes.c_char * 24),
+        ("restart", ctypes.c_char * 24),
+    ]
+    c_name = "struct incise_wall_point"
+
+
+_library.declare(
+    "libincise-record",
+    {
+        "incise_recording_wall": (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p),
+        "incise_wall_free": (None, ctypes.c_void_p),
+        "incise_wall_points": (
+            ctypes.c_size_t,
+            ctypes.c_void_p,
+            ctypes.POINTER(ctypes.POINTER(WallPointStruct)),
+        ),
+        "incise_wall_tai": (
+            ctypes.c_int,
+            ctypes.c_void_p,
+            ctypes.c_int64,
+            ctypes.POINTER(ctypes.c_int64),
+            ctypes.POINTER(ctypes.c_int64),
+        ),
+        "incise_wall_monotonic": (
+            ctypes.c_int,
+            ctypes.c_void_p,
+            ctypes.c_int64,
+            ctypes.POINTER(ctypes.c_int64),
+            ctypes.POINTER(ctypes.c_int64),
+        ),
+        "incise_wall_utc_offset_s": (ctypes.c_int, ctypes.c_void_p, ctypes.c_int64),
+        "incise_wall_utc_text": (None, ctypes.c_int64, ctypes.c_int, ctypes.c_char_p),
+    },
+)
+
+
+class WallPoint(NamedTuple):
+    """A reading of the clocks while recording; see table wall of incise-recording(5)."""
+
+    t_ns: int  #: CLOCK_MONOTONIC
+    tai_ns: int  #: ns since 1970-01-01 00:00:00 TAI
+    uncertainty_ns: float  #: bound of the error; inf: unknown
+    rate_ppb: float
+    rate_uncertainty_ppb: float
+    utc_offset_s: int  #: TAI less UTC
+    held: bool  #: continued from earlier points, as the source was lost
+    source: str
+    reference: str  #: TAI, or ptp: and the identity of a grandmaster
+    leap: str
+    restart: str  #: why the mapping starts again here, or empty
+
+
+class Wall:
+    """The mapping of one recording, ``rec.wall``; it can be used after the recording is closed."""
+
+    def __init__(self, pointer: int):
+        self._handle = Handle(pointer, "incise_wall_free")
+
+    @property
+    def points(self) -> Tuple[WallPoint, ...]:
+        """All readings, in order."""
+        points = ctypes.POINTER(WallPointStruct)()
+        n = function("incise_wall_points")(self._handle, ctypes.byref(points))
+        return tuple(
+            WallPoint(
+                *(
+                    text(value) if isinstance(value, bytes) else value
+                    for value in (getattr(points[i], name) for name in WallPoint._fields)
+                )
+            )
+            for i in range(n)
+        )
+
+    def _convert(self, name: str, what: str, time_ns: int) -> Tuple[int, float]:
+        result, bound = ctypes.c_int64(), ctypes.c_int64()
+        rc = function(name)(self._handle, time_ns, ctypes.byref(result), ctypes.byref(bound))
+        if rc < 0:
+            raise Invalid(
+                -rc,
+                f"{what} {time_ns}: "
+                + (
+                    "is more than 60 s from the recording's wall time"
+                    if -rc == errno.ENODATA
+                    else os.strerror(-rc)
+                ),
+            )
+        return result.value, math.inf if bound.value == _UNKNOWN else float(bound.value)
+
+    def tai(self, t_ns: int) -> Tuple[int, float]:
+        """TAI in ns since 1970 at a time of CLOCK_MONOTONIC, and the bound of its error, ns (inf: unknown)."""
+        return self._convert("incise_wall_tai", "t_ns", int(t_ns))
+
+    def monotonic(self, tai_ns: int) -> Tuple[int, float]:
+        """The inverse: t_ns of a time of TAI, and the bound of its error, ns."""
+        return self._convert("incise_wall_monotonic", "tai_ns", int(tai_ns))
+
+    def utc(self, t_ns: int) -> str:
+        """UTC at a time of CLOCK_MONOTONIC, in ISO 8601 with nanoseconds."""
+        tai_ns, _ = self.tai(t_ns)
+        offset_s = function("incise_wall_utc_offset_s")(self._handle, int(t_ns))
+        out = ctypes.create_string_buffer(40)
+        function("incise_wall_utc_text")(tai_ns, offset_s, out)
+        return out.value.decode()
+
+    def __repr__(self) -> str:
+        first = self.points[0]
+        return f"<incise.Wall by {first.source}, time of {first.reference}>"
+
+
+def read(recording: int, failure: _library.Failure) -> Optional[Wall]:
+    """The wall time of an open recording, or None without one."""
+    pointer = function("incise_recording_wall")(recording, failure.ref)
+    if not pointer and failure.struct.code == errno.ENODATA:
+        return None
+    return Wall(failure.require(pointer))
