@@ -21,7 +21,7 @@ systemd_analyze() {
 
 @test "units are where systemd looks for them, with the folder of the programs" {
 	[ "$(cd "$units" && ls)" = \
-		"$(printf '%s\n' incise-devices.service incise-feed@.service incise-haptic@.service incise-stepper-off@.service)" ]
+		"$(printf '%s\n' incise-devices.service incise-feed@.service incise-haptic@.service incise-serve.service incise-stepper-off@.service)" ]
 	run ! grep -r '@[a-z]*@' "$units"
 	grep -q '^ExecStart=/usr/bin/incise haptic ' "$haptic"
 	grep -q '^ExecStart=/usr/bin/incise feed ' "$feed"
@@ -35,7 +35,7 @@ systemd_analyze() {
 	for unit in "$units"/*.service; do
 		sed "s|/usr/bin/incise |$INCISE_BUILD/bin/incise |" "$unit" >"try/${unit##*/}"
 	done
-	for unit in incise-devices incise-feed@neck incise-haptic@neck incise-haptic@neck_2.a incise-stepper-off@neck; do
+	for unit in incise-devices incise-feed@neck incise-haptic@neck incise-haptic@neck_2.a incise-serve incise-stepper-off@neck; do
 		SYSTEMD_UNIT_PATH="$PWD/try:" run -0 systemd_analyze verify --man=no "$unit.service"
 		[ -z "$output" ]
 	done
@@ -80,6 +80,7 @@ systemd_analyze() {
 		[ "${words[-2]}" = -- ]
 		[ "${words[-3]}" = "\$${name^^}_OPTIONS" ]
 	done
+	[ "$(sed -n 's/^ExecStart=//p' "$units/incise-serve.service")" = '/usr/bin/incise serve --verbose $SERVE_OPTIONS' ]
 	read -ra words < <(sed -n 's/^ExecStart=//p' "$off")
 	"${words[0]/#\/usr\/bin/$INCISE_BUILD/bin}" stepper --help >help
 	grep -qE '^ +disable ' help
