@@ -129,7 +129,7 @@ python-peers: ## pyarrow, polars, DuckDB, pandas 3 and scikit-learn for the test
 receiver := $(wildcard /usr/share/doc/openigtlink-examples/examples/Receiver/ReceiveClient.cxx)
 stream-peers: $(if $(has_igtl),$(if $(receiver),$(O)/tests/streams/ReceiveClient))
 stream-peers: ## pylsl, with liblsl, pyigtl, and a client of libopenigtlink for tests of streams
-	@tests/venv tests/streams $(O)/tests/streams 'tests with streams of LSL and pyigtl are skipped' lsl_send igtl_send
+	@tests/venv tests/streams $(O)/tests/streams 'tests with streams of LSL and pyigtl are skipped' lsl_send lsl_receive igtl_send
 
 $(O)/tests/streams/ReceiveClient: $(receiver)
 	@mkdir -p $(@D)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise serve: poses, forces and frames live to other programs, over OpenIGTLink. A process of its
- * own: no loop waits for it, nor notices its clients.
+ * incise serve: poses, forces and frames live to other programs, over OpenIGTLink and LSL. A
+ * process of its own: no loop waits for it, nor notices its clients.
  */
 #include <errno.h>
 #include <stdlib.h>
@@ -25,7 +25,7 @@ static const char *const cameras[] = {"auto", "off", "frames", NULL};
 static const char *const versions[] = {"auto", "1", "2", NULL};
 
 struct job {
-	const char *rig, *calibration;
+	const char *rig, *calibration, *lsl;
 	struct serve_igtl_options igtl;
 	struct serve_source_options source;
 	enum camera camera;
@@ -49,6 +49,10 @@ static const struct cli_option options[] = {
 	 "header version: 1, 2, or auto, which is 1 until a client sends 2\n"
 	 "(default: auto)",
 	 CLI_CHOICE(struct job, igtl.version, versions)},
+	{0, "lsl", "PREFIX",
+	 "offer streams of the Lab Streaming Layer, too: PREFIX-pose,\n"
+	 "PREFIX-force, PREFIX-events; to the whole network",
+	 CLI_TEXT(struct job, lsl)},
 	{0, "rate", "HZ",
 	 "values per second of each kind at most, forces as means (default: 100)",
 	 CLI_NUMBER(struct job, source.rate_hz, 0.1, 20000)},
@@ -148,6 +152,8 @@ static void open_sinks(struct run *run, const struct job *job)
 	    epoll_ctl(run->epoll, EPOLL_CTL_ADD, run->timer, &event))
 		cli_fail("epoll: %s", strerror(errno));
 	add_sink(run, serve_igtl_new(&job->igtl, &run->info));
+	if (job->lsl)
+		add_sink(run, serve_lsl_new(job->lsl, &run->info));
 }
 
 /* Work of the sinks until a time, or a signal. */

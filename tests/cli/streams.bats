@@ -241,3 +241,52 @@ no_more_poses() {
 	run -1 --separate-stderr incise capture -o b.rec --duration 30s
 	[[ "$stderr" == *"OpenIGTLink Stylus at 127.0.0.1 disconnected and was not back after 10 s; start its server again"* ]]
 }
+
+@test "incise serve --lsl: pylsl reads poses, forces and events with their units and times" {
+	lsl
+	cut=a.rec
+	incise capture -o $cut --rig "sim:clock=simulated,cut_s=1,pause_s=0.6,seed=3" --duration 5s
+	incise serve $cut --lsl "$name" --rate 200 --igtl 0 --endless -v --json >report.json 2>serve.err 3>&- &
+	sender=$!
+	"$peers/lsl_receive" 2.5 "$name-pose" "$name-force" "$name-events" >read.json 2>read.err ||
+		complain "$(cat read.err serve.err)"
+	kill -INT "$sender"
+	wait "$sender"
+	sender=
+	[ "$(key report.json lsl.prefix)" = "$name" ]
+	[ "$(key report.json lsl.poses)" -gt 200 ]
+	python3 - "$name" $cut <<-'END'
+		import json, sqlite3, sys
+		name, cut = sys.argv[1:]
+		read = json.load(open("read.json"))
+		pose, force = read[name + "-pose"], read[name + "-force"]
+		assert pose["type"] == "MoCap" and pose["rate"] == 0, pose
+		assert [c[0] for c in pose["channels"]] == ["x", "y", "z", "qw", "qx", "qy", "qz"]
+		assert pose["channels"][0] == ["x", "PositionX", "mm"], pose["channels"]
+		assert pose["channels"][3][1] == "OrientationA", pose["channels"]
+		assert force["type"] == "Force" and force["rate"] == 200, force
+		assert force["channels"][2] == ["Fz", "ForceZ", "N"], force["channels"]
+		assert pose["source"].startswith(name + "-pose@"), pose["source"]
+		db = sqlite3.connect(cut + "/recording.db")
+		rows = db.execute("SELECT t_ns, x_mm, y_mm, z_mm FROM tracker ORDER BY seq").fetchall()
+		at = {row[1:]: row[0] for row in rows}
+		samples, times = pose["samples"], pose["times"]
+		# What came is in the recording to the last bit, and apart by as much; the clock of the
+		# player and the line of the whole recording differ by less than 1 ms.
+		assert len(samples) > 200, len(samples)
+		known = [(at[tuple(s[:3])], t) for s, t in zip(samples, times)]
+		for (a, s), (b, t) in zip(known, known[1:]):
+		    if b > a:  # else it starts again
+		        assert abs((b - a) * 1e-9 - (t - s)) < 1e-3, (a, b, s, t)
+		# Forces are means of all samples of 5 ms, on a regular grid.
+		gaps = [b - a for a, b in zip(force["times"], force["times"][1:])]
+		assert sum(abs(g - 0.005) < 2e-4 for g in gaps) > 0.95 * len(gaps), gaps[:20]
+		assert all(abs(s[2]) < 20 and s[3] >= 0 for s in force["samples"])
+	END
+	# and what one rig offers is a force of another
+	incise serve --rig "sim:clock=real" --lsl "$name" --rate 500 --igtl 0 >out 2>serve.err 3>&- &
+	sender=$!
+	rig "sim:" "lsl:$name-force:Fz"
+	incise capture -o b.rec --duration 1s --json >report.json || complain "$(cat serve.err)"
+	[ "$(key report.json force)" -gt 400 ]
+}

@@ -103,6 +103,12 @@ struct serve_igtl_options {
 struct serve_sink *serve_igtl_new(const struct serve_igtl_options *options,
 				  const struct serve_info *info);
 
+/*
+ * The Lab Streaming Layer (lsl.c), streams PREFIX-pose, -force and -events; fails the program if
+ * there is no liblsl. @prefix and @info live longer.
+ */
+struct serve_sink *serve_lsl_new(const char *prefix, const struct serve_info *info);
+
 /* --- sources --------------------------------------------------------------------------- */
 
 struct serve_stream;
