@@ -22,6 +22,7 @@
 #include "cli/stream_report.h"
 #include "cli/plot.h"
 #include "cli/recording.h"
+#include "cli/session_report.h"
 #include "cli/wall_report.h"
 #include "plot/figure.h"
 #include "stepper/module.h"
@@ -367,14 +368,15 @@ static void show_plan(const char *path, bool json)
 /* --- recordings ---------------------------------------------------------------------- */
 
 static void recording_json(const struct incise_recording_info *info, bool intact,
-			   const struct incise_wall *wall)
+			   const struct incise_wall *wall, json_t *members)
 {
 	json_print(json_pack(
-		"{so sb so ss sb sf so so s{sI sI sI} s{sI sI} sI s{si sf sf sb} s{sf so sf} si sf sf}",
+		"{so so sb so ss sb sf so so s{sI sI sI} s{sI sI} sI s{si sf sf sb} s{sf so sf} si sf sf}",
 		"wall",
 		wall ? wall_json(wall, info->start_ns, info->end_ns) : json_null(),
-		"intact", intact, "streams", stream_json(info->streams, info->n_streams),
-		"kind", "recording", "complete", info->complete, "seconds",
+		"members", members, "intact", intact, "streams",
+		stream_json(info->streams, info->n_streams), "kind", "recording",
+		"complete", info->complete, "seconds",
 		(info->end_ns - info->start_ns) * 1e-9, "started",
 		json_text(info->started), "rig", json_text(info->rig), "rows", "force",
 		(json_int_t)info->force, "tracker", (json_int_t)info->tracker, "depth",
@@ -422,9 +424,18 @@ static void show_recording(const char *path, bool json, bool damaged)
 {
 	struct incise_recording_info info;
 	struct incise_error err = {0};
-	struct incise_recording *recording = recording_open(path);
+	const struct incise_session_info *members = NULL;
+	char *any = cli_text("%s:*", path);
+	/* A joined recording is described without a choice of its machines too. */
+	struct incise_recording *recording = incise_recording_open(any, NULL);
 	struct incise_wall *wall;
 	bool intact;
+	int n;
+
+	if (!recording)
+		recording = recording_open(path);
+	free(any);
+	n = incise_session_members(recording, &members);
 
 	if (incise_recording_info(recording, &info, &err))
 		cli_fail_with(&err);
@@ -434,9 +445,12 @@ static void show_recording(const char *path, bool json, bool damaged)
 	err = (struct incise_error){0};
 	intact = recording_intact(path, damaged, &err);
 	if (json)
-		recording_json(&info, intact, wall);
+		recording_json(&info, intact, wall,
+			       n ? session_json(members, n) : json_null());
 	else
 		recording_text(path, &info, wall);
+	if (!json)
+		session_print(members, n);
 	incise_wall_free(wall);
 	incise_recording_close(recording);
 	if (err.code)
@@ -632,6 +646,8 @@ static bool is_recording(const char *path)
 
 	while (n > 1 && path[n - 1] == '/')
 		n--;
+	if (file_kind_of(path) == FILE_RECORDING)
+		return true;
 	if (!stat(path, &st))
 		return S_ISDIR(st.st_mode);
 	return n >= 4 && !strncmp(path + n - 4, ".rec", 4);

@@ -27,6 +27,7 @@ static const struct {
 	{"calibrate", "measure the scale factors, delays and offsets of a rig"},
 	{"capture", "record the streams of a rig in sync"},
 	{"verify", "check that a recording is complete"},
+	{"join", "put recordings of several machines on one timeline"},
 	{"export", "make a dataset from recordings, raw or averaged"},
 	{"train", "learn a fuzzy force model from recordings or datasets"},
 	{"merge", "make one model of the factors of several laboratories or machines"},

@@ -27,6 +27,14 @@ SAMPLE = 20000  # INCISE_CORPUS_SAMPLE
 _Read = ctypes.CFUNCTYPE(c_int, c_void_p, c_void_p, c_void_p, c_void_p)
 
 
+def _without_choice(path: bytes) -> bytes:
+    """ "day.rec" of "day.rec:a", a joined recording with a choice of its machines."""
+    folder, _, name = path.rpartition(b"/")
+    if b":" not in name or os.path.exists(path):
+        return path
+    return os.path.join(folder, name.split(b":", 1)[0])
+
+
 class SourceStruct(ctypes.Structure):
     """struct incise_corpus_source"""
 
@@ -150,7 +158,7 @@ class Source:
             )
             if self.recording._calibration is not None:
                 text += b", read with another calibration"
-            digest = _sha256(os.path.join(self.path, b"recording.db"))
+            digest = _sha256(os.path.join(_without_choice(self.path), b"recording.db"))
         else:
             text = os.path.basename(self.path)[:300]
             digest = _sha256(self.path)

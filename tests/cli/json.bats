@@ -43,6 +43,12 @@ recordings() {
 	cp -r a.rec b.rec
 	sqlite3 b.rec/recording.db "DELETE FROM tracker WHERE rowid = 5"
 	report verify.findings verify b.rec
+	for i in 1 2; do
+		incise capture -o j$i.rec --rig sim:clock=simulated,seed=$i --duration 1s \
+			--clock-source sim:1000,0,20 >/dev/null
+	done
+	report join join j1.rec j2.rec -o joined.rec
+	report info.joined info joined.rec
 	report export export a.rec -o a.csv
 	report replay replay a.rec liver.scene
 	report replay.real_time replay a.rec liver.scene --real-time

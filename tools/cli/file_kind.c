@@ -260,6 +260,19 @@ static bool is_recording(const char *path)
 	return is;
 }
 
+char *file_without_choice(const char *path)
+{
+	char *whole = cli_text("%s", path), *slash = strrchr(whole, '/');
+	char *colon = strchr(slash ? slash : whole, ':');
+
+	if (!colon || !access(path, F_OK))
+		return whole;
+	*colon = 0;
+	if (!is_recording(whole))
+		*colon = ':';
+	return whole;
+}
+
 enum file_kind file_kind_of(const char *path)
 {
 	enum file_kind kind = FILE_UNKNOWN;
@@ -268,8 +281,13 @@ enum file_kind file_kind_of(const char *path)
 	int fd;
 	ssize_t n;
 
-	if (stat(path, &st))
-		return FILE_UNKNOWN;
+	if (stat(path, &st)) {
+		head = file_without_choice(path);
+		if (strcmp(head, path))
+			kind = file_kind_of(head);
+		free(head);
+		return kind;
+	}
 	if (S_ISDIR(st.st_mode))
 		return is_recording(path) ? FILE_RECORDING : FILE_UNKNOWN;
 	if (!S_ISREG(st.st_mode))
@@ -390,10 +408,11 @@ static char *near(const char *path, unsigned int expected)
 /* Whether there is no file, and no recording that was interrupted either. */
 static bool is_missing(const char *path)
 {
-	char *part = cli_text("%s.part", path);
+	char *part = cli_text("%s.part", path), *whole = file_without_choice(path);
 	bool missing =
-		*path && access(path, F_OK) && errno == ENOENT && access(part, F_OK);
+		*path && access(whole, F_OK) && errno == ENOENT && access(part, F_OK);
 
+	free(whole);
 	free(part);
 	return missing;
 }

@@ -31,6 +31,12 @@ enum file_kind {
 	FILE_KINDS = 19,
 };
 
+/*
+ * The path of a file or folder without the choice of a joined recording, "day.rec" of "day.rec:a"
+ * if only that exists: free(3).
+ */
+char *file_without_choice(const char *path);
+
 /* FILE_UNKNOWN also where there is no such file, or none that may be read. */
 enum file_kind file_kind_of(const char *path);
 

@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include "cli.h"
+#include "file_kind.h"
 
 struct place {
 	const char *path; /* as given, for messages */
@@ -92,21 +93,22 @@ static void note_input(const char *path, const struct stat *st)
 
 void cli_input(const char *path)
 {
-	char *beside = cli_text("%s.sd", path),
-	     *within = cli_text("%s/recording.db", path);
+	char *beside = cli_text("%s.sd", path), *whole = file_without_choice(path),
+	     *within = cli_text("%s/recording.db", whole);
 	struct stat st;
 
 	/* A folder is an input as a recording only: others are just words, or made of files. */
 	if (!strcmp(path, "-")) {
 		if (!fstat(STDIN_FILENO, &st) && S_ISREG(st.st_mode))
 			note_input("standard input", &st);
-	} else if (!stat(path, &st) && (S_ISREG(st.st_mode) || !access(within, F_OK))) {
-		note_input(path, &st);
+	} else if (!stat(whole, &st) && (S_ISREG(st.st_mode) || !access(within, F_OK))) {
+		note_input(whole, &st);
 		/* The uncertainty of a model belongs to it. */
 		if (S_ISREG(st.st_mode) && !stat(beside, &st) && S_ISREG(st.st_mode))
 			note_input(beside, &st);
 	}
 	free(beside);
+	free(whole);
 	free(within);
 }
 

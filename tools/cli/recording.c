@@ -4,6 +4,7 @@
  */
 #include <errno.h>
 #include <fcntl.h>
+#include <glob.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -74,6 +75,22 @@ bool recording_intact(const char *path, bool damaged, struct incise_error *err)
 	return false;
 }
 
+/* Those of a joined recording: the folders in it with a recording, each with nothing else. */
+static void remove_members(const char *path)
+{
+	char *pattern = cli_text("%s/*/recording.db", path);
+	glob_t found;
+
+	if (!glob(pattern, 0, NULL, &found)) {
+		for (size_t i = 0; i < found.gl_pathc; i++) {
+			*strrchr(found.gl_pathv[i], '/') = 0;
+			recording_remove(found.gl_pathv[i]);
+		}
+		globfree(&found);
+	}
+	free(pattern);
+}
+
 void recording_remove(const char *path)
 {
 	static const char *const files[] = {"recording.db", "recording.db-wal",
@@ -89,6 +106,7 @@ void recording_remove(const char *path)
 		cli_fail("%s: another incise capture is writing it; end that one, or "
 			 "give another name",
 			 path);
+	remove_members(path);
 	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++)
 		if (unlinkat(folder, files[i], 0) && errno != ENOENT)
 			cli_fail("%s/%s: cannot be removed: %s", path, files[i],

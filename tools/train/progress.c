@@ -15,6 +15,7 @@
 #include <incise/outfile.h>
 #include <incise/version.h>
 #include "../cli/cli.h"
+#include "../cli/file_kind.h"
 #include "progress.h"
 
 #define SHARE 10.0 /* of the time between two writings, at least, to that of one */
@@ -52,8 +53,9 @@ static char *make_key(const char *options, const struct source *sources, int n,
 		cli_fail("no memory");
 	fprintf(out, "%s\n%s\n", incise_version(), options);
 	for (int i = 0; i < n; i++) {
-		char *file = cli_text(sources[i].recording ? "%s/recording.db" : "%s",
-				      sources[i].path);
+		char *whole = file_without_choice(sources[i].path);
+		char *file =
+			cli_text(sources[i].recording ? "%s/recording.db" : "%s", whole);
 		struct stat st = {0};
 
 		stat(file, &st);
@@ -61,6 +63,7 @@ static char *make_key(const char *options, const struct source *sources, int n,
 			(intmax_t)st.st_size, (intmax_t)st.st_mtim.tv_sec,
 			st.st_mtim.tv_nsec, (uintmax_t)st.st_ino);
 		free(file);
+		free(whole);
 	}
 	if (fclose(out))
 		cli_fail("no memory");

@@ -194,7 +194,7 @@ static int open_recording(struct source *source, struct incise_error *err)
 {
 	struct incise_recording_info info;
 	struct incise_recording *recording;
-	char *database;
+	char *database, *whole;
 	int rc;
 
 	/* Says itself what is wrong, as a warning, where damaged ones are used. */
@@ -207,8 +207,10 @@ static int open_recording(struct source *source, struct incise_error *err)
 	incise_recording_close(recording);
 	if (rc)
 		return name_it(source, rc, err);
-	database = cli_text("%s/recording.db", source->path);
+	whole = file_without_choice(source->path);
+	database = cli_text("%s/recording.db", whole);
 	rc = incise_file_sha256(database, source->hash, err);
+	free(whole);
 	free(database);
 	snprintf(source->rig, sizeof(source->rig), "%s", info.rig);
 	snprintf(source->text, sizeof(source->text),

@@ -13,6 +13,7 @@
 #include <unistd.h>
 #include <incise/recording.h>
 #include "../read/rows.h"
+#include "../read/session.h"
 #include "arrow_batch.h"
 
 #define BATCH_ROWS 65536
@@ -164,10 +165,15 @@ static void put_column(struct rows_source *source, int column, int to)
 					      (field->nullable && field->calibration
 						       ? source->depth_scale
 						       : 1));
+	else if (column == 1)
+		incise_arrow_put_int(batch, to, source->rows.t_ns);
+	else if (!strcmp(field->name, "arrival_ns"))
+		incise_arrow_put_int(
+			batch, to,
+			incise_session_time(source->rows.times.map,
+					    sqlite3_column_int64(stmt, column)));
 	else
-		incise_arrow_put_int(batch, to,
-				     column == 1 ? source->rows.t_ns
-						 : sqlite3_column_int64(stmt, column));
+		incise_arrow_put_int(batch, to, sqlite3_column_int64(stmt, column));
 }
 
 static void put_columns(struct rows_source *source)

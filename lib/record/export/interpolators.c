@@ -937,6 +937,7 @@ int incise_camera_interpolator_any(struct incise_recording *recording,
 	sqlite3_stmt *stmt = NULL;
 	int rc;
 
+	recording = incise_recording_member(recording, "frames");
 	if (recording->form < 2)
 		return 0;
 	if (sqlite3_prepare_v2(recording->db, "SELECT 1 FROM frames LIMIT 1", -1, &stmt,

@@ -39,7 +39,7 @@ static int step(struct incise_cuts *cuts, sqlite3_stmt *stmt, const char *table,
 	if (rc == SQLITE_DONE)
 		return 0;
 	if (rc != SQLITE_ROW)
-		return incise_schema_fail(cuts->recording->db, cuts->recording->path,
+		return incise_schema_fail(sqlite3_db_handle(stmt), cuts->recording->path,
 					  err);
 	if (sqlite3_column_type(stmt, 1) != SQLITE_INTEGER ||
 	    sqlite3_column_int64(stmt, 1) < 0)
@@ -119,6 +119,8 @@ void incise_cuts_calibrate(struct incise_cuts *cuts,
 int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recording,
 		     struct incise_error *err)
 {
+	sqlite3 *force = incise_recording_member(recording, "force")->db;
+	sqlite3 *depth = incise_recording_member(recording, "depth")->db;
 	int rc;
 
 	*cuts = (struct incise_cuts){
@@ -128,14 +130,14 @@ int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recordin
 		.depth_max_mm = -INFINITY,
 	};
 	incise_recording_force(recording, NULL, &cuts->scale);
-	if (sqlite3_prepare_v2(recording->db,
-			       "SELECT seq, t_ns, code FROM force ORDER BY seq", -1,
-			       &cuts->force, NULL) != SQLITE_OK ||
+	if (sqlite3_prepare_v2(force, "SELECT seq, t_ns, code FROM force ORDER BY seq",
+			       -1, &cuts->force, NULL) != SQLITE_OK ||
 	    sqlite3_prepare_v2(
-		    recording->db,
+		    depth,
 		    "SELECT seq, t_ns, depth_mm, velocity_mm_s FROM depth ORDER BY seq",
 		    -1, &cuts->depth, NULL) != SQLITE_OK) {
-		rc = incise_schema_fail(recording->db, recording->path, err);
+		rc = incise_schema_fail(cuts->force ? depth : force, recording->path,
+					err);
 		incise_cuts_close(cuts);
 		return rc;
 	}
@@ -207,6 +209,7 @@ static int check_tracker(struct incise_recording *rec, struct incise_error *err)
 	int64_t last_ns = -1;
 	int rc;
 
+	rec = incise_recording_member(rec, "tracker");
 	if (sqlite3_prepare_v2(
 		    rec->db,
 		    "SELECT seq, t_ns, arrival_ns, status, x_mm, y_mm, z_mm, qw, qx, "

@@ -13,9 +13,11 @@
 #include "../frames.h"
 #include "../schema.h"
 #include "recording.h"
+#include "session.h"
 
 struct incise_frame_reader {
-	struct incise_recording *recording;
+	struct incise_recording *opened;
+	struct incise_recording *recording; /* with the frames: that one, or its member */
 	struct incise_frames_reader *file;
 	uint64_t passed; /* frames of the file */
 };
@@ -47,7 +49,10 @@ struct incise_frame_reader *incise_frame_reader_new(struct incise_recording *rec
 				      "%s: is of an older form, which has no frames",
 				      recording->path);
 	if (!rc) {
-		reader->recording = incise_recording_open(recording->path, err);
+		reader->opened = incise_recording_open(recording->path, err);
+		if (reader->opened)
+			reader->recording =
+				incise_recording_member(reader->opened, "frames");
 		rc = reader->recording ? open_file(reader, err) : -errno;
 	}
 	if (!rc)
@@ -62,7 +67,7 @@ void incise_frame_reader_free(struct incise_frame_reader *reader)
 	if (!reader)
 		return;
 	incise_frames_reader_close(reader->file);
-	incise_recording_close(reader->recording);
+	incise_recording_close(reader->opened);
 	free(reader);
 }
 
@@ -104,7 +109,9 @@ int incise_frame_reader_at(struct incise_frame_reader *reader, int64_t t_ns,
 	int64_t t = t_ns > INT64_MAX / 4    ? INT64_MAX / 4
 		    : t_ns < -INT64_MAX / 4 ? -INT64_MAX / 4
 					    : t_ns;
-	int rc = find_row(reader->recording, t, &seq, &row_ns, &number, err);
+	const struct incise_session_map *map = reader->recording->map;
+	int rc = find_row(reader->recording, incise_session_member_time(map, t), &seq,
+			  &row_ns, &number, err);
 
 	if (!rc && number < reader->passed)
 		rc = open_file(reader, err);
@@ -124,6 +131,6 @@ int incise_frame_reader_at(struct incise_frame_reader *reader, int64_t t_ns,
 			"has all findings",
 			reader->recording->path, (unsigned long long)seq,
 			INCISE_FRAMES_FILE, reader->recording->path);
-	frame->t_ns = row_ns;
+	frame->t_ns = incise_session_time(map, row_ns);
 	return 0;
 }

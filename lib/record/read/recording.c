@@ -14,6 +14,7 @@
 #include <time.h>
 #include <unistd.h>
 #include "recording.h"
+#include "session.h"
 #include "../schema.h"
 
 #define COUNT_MAX (1LL << 53)
@@ -134,8 +135,11 @@ int incise_recording_number(struct incise_recording *rec, const char *key, doubl
 			    struct incise_error *err)
 {
 	sqlite3_stmt *stmt = NULL;
-	int rc = find_key(rec, key, &stmt);
+	int rc;
 
+	rec = incise_recording_member(rec,
+				      !strncmp(key, "tracker", 7) ? "tracker" : "force");
+	rc = find_key(rec, key, &stmt);
 	if (rc != SQLITE_ROW || !take_known(stmt, 0, 1, value))
 		*value = NAN;
 	rc = rc == SQLITE_ROW || rc == SQLITE_DONE
@@ -255,6 +259,15 @@ int incise_recording_need_zero(const struct incise_recording *rec,
 }
 
 /* --- opening ----------------------------------------------------------------------- */
+
+/* The choice behind a session's name, "session.rec:CHOICE"; NULL: there is none. */
+static const char *choice_of(const char *path)
+{
+	const char *slash = strrchr(path, '/'),
+		   *colon = strchr(slash ? slash : path, ':');
+
+	return colon && colon > path ? colon + 1 : NULL;
+}
 
 /* The folder of the recording: path, or path.part; no trailing slashes. */
 static char *find_folder(const char *path, struct incise_error *err)
@@ -556,17 +569,69 @@ static int open_database(struct incise_recording *rec, struct incise_error *err)
 	return 0;
 }
 
-struct incise_recording *incise_recording_open(const char *path, struct incise_error *err)
+/* The folder of a recording, or of a session with a choice behind its name. */
+static int find_any_folder(struct incise_recording *rec, const char *path,
+			   const char **choice, struct incise_error *err)
+{
+	char *start;
+
+	*choice = choice_of(path);
+	rec->path = find_folder(path, *choice ? NULL : err);
+	if (rec->path)
+		*choice = NULL;
+	if (rec->path || !*choice)
+		return rec->path ? 0 : -errno;
+	start = strndup(path, (size_t)(*choice - 1 - path));
+	if (!start)
+		return incise_error_set(err, ENOMEM, "%s: out of memory", path);
+	rec->path = find_folder(start, err);
+	free(start);
+	return rec->path ? 0 : -errno;
+}
+
+/* Open the members; the path is then that under which the same is opened again. */
+static int open_session(struct incise_recording *rec, const char *choice,
+			struct incise_error *err)
+{
+	int rc = incise_session_open(rec, rec->path, choice ? choice : "", err);
+	char *path;
+
+	if (rc || !choice)
+		return rc;
+	if (asprintf(&path, "%s:%s", rec->path, choice) < 0)
+		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+	free(rec->path);
+	rec->path = path;
+	return 0;
+}
+
+static int open_one(struct incise_recording *rec, const char *choice,
+		    struct incise_error *err)
+{
+	int rc = incise_schema_check(rec->db, rec->path, &rec->form, err);
+
+	if (!rc && choice)
+		rc = incise_error_set(err, EINVAL,
+				      "%s: is one recording, not a joined one; give it "
+				      "without ':%s'",
+				      rec->path, choice);
+	if (!rc)
+		rc = check_size(rec, err);
+	return rc ? rc : read_meta(rec, err);
+}
+
+static struct incise_recording *open_path(const char *path, bool any,
+					  struct incise_error *err)
 {
 	struct incise_recording *rec = calloc(1, sizeof(*rec));
+	const char *choice;
 	int rc;
 
 	if (!rec) {
 		incise_error_set(err, ENOMEM, "%s: out of memory", path);
 		return NULL;
 	}
-	rec->path = find_folder(path, err);
-	rc = rec->path ? 0 : -errno;
+	rc = find_any_folder(rec, path, &choice, err);
 	if (!rc) {
 		rec->name = find_name(rec->path);
 		if (!rec->name)
@@ -574,12 +639,10 @@ struct incise_recording *incise_recording_open(const char *path, struct incise_e
 	}
 	if (!rc)
 		rc = open_database(rec, err);
-	if (!rc)
-		rc = incise_schema_check(rec->db, rec->path, &rec->form, err);
-	if (!rc)
-		rc = check_size(rec, err);
-	if (!rc)
-		rc = read_meta(rec, err);
+	if (!rc && incise_session_is(rec->db))
+		rc = open_session(rec, choice || !any ? choice : "*", err);
+	else if (!rc)
+		rc = open_one(rec, choice, err);
 	if (!rc)
 		return rec;
 	incise_recording_close(rec);
@@ -587,10 +650,22 @@ struct incise_recording *incise_recording_open(const char *path, struct incise_e
 	return NULL;
 }
 
+struct incise_recording *incise_recording_open(const char *path, struct incise_error *err)
+{
+	return open_path(path, false, err);
+}
+
+struct incise_recording *incise_recording_open_any(const char *path,
+						   struct incise_error *err)
+{
+	return open_path(path, true, err);
+}
+
 void incise_recording_close(struct incise_recording *rec)
 {
 	if (!rec)
 		return;
+	incise_session_close(rec->session);
 	sqlite3_close(rec->db);
 	free(rec->fit);
 	free(rec->path);
@@ -621,6 +696,29 @@ static bool take_stream(sqlite3_stmt *stmt, struct incise_stream *stream)
 	       take_text(stmt, 16, true, s->ended, sizeof(s->ended));
 }
 
+/* The streams of a session: each of the member that it is of. */
+static int member_streams(struct incise_recording *rec,
+			  struct incise_stream streams[INCISE_STREAMS_MAX],
+			  struct incise_error *err)
+{
+	static const char *const tables[] = {"force", "tracker", "frames"};
+	static const char *const names[] = {"force", "tracker", "camera"};
+	int n = 0;
+
+	for (int i = 0; i < INCISE_STREAMS_MAX; i++) {
+		struct incise_stream of_member[INCISE_STREAMS_MAX];
+		int found = incise_recording_streams(
+			incise_recording_member(rec, tables[i]), of_member, err);
+
+		if (found < 0)
+			return found;
+		for (int k = 0; k < found; k++)
+			if (!strcmp(of_member[k].name, names[i]))
+				streams[n++] = of_member[k];
+	}
+	return n;
+}
+
 int incise_recording_streams(struct incise_recording *rec,
 			     struct incise_stream streams[INCISE_STREAMS_MAX],
 			     struct incise_error *err)
@@ -628,6 +726,8 @@ int incise_recording_streams(struct incise_recording *rec,
 	sqlite3_stmt *stmt;
 	int n = 0, rc;
 
+	if (rec->session)
+		return member_streams(rec, streams, err);
 	if (rec->form < 2)
 		return 0;
 	if (sqlite3_prepare_v2(
@@ -772,6 +872,7 @@ int incise_recording_line(struct incise_recording *rec, const char *stream,
 	sqlite3_stmt *stmt;
 	int rc;
 
+	rec = incise_recording_member(rec, !strcmp(stream, "camera") ? "frames" : stream);
 	line->n = 0;
 	line->others = NULL;
 	line->n_others = 0;

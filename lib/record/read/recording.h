@@ -10,6 +10,9 @@
 #include "../time/fit.h"
 #include "../time/timeline.h"
 
+struct incise_session;
+struct incise_session_map;
+
 struct incise_recording {
 	sqlite3 *db; /* read-only, in one transaction: a snapshot, even of a live one */
 	char *path;  /* of the folder that was opened */
@@ -20,7 +23,19 @@ struct incise_recording {
 	bool fitted;
 	struct incise_fit_time *fit;
 	size_t n_fit;
+	/* Of a session: its members; then db has the events only, and path the choice too. */
+	struct incise_session *session;
+	/* Of a member: from its clock to the session's; it belongs to the session. Or NULL. */
+	const struct incise_session_map *map;
 };
+
+/* The same as incise_recording_open(), and a session without a choice: of any of its members. */
+struct incise_recording *incise_recording_open_any(const char *path,
+						   struct incise_error *err);
+
+/* The recording that has the rows of a table: a member, or the recording itself. */
+struct incise_recording *incise_recording_member(const struct incise_recording *recording,
+						 const char *table);
 
 /*
  * A number of table meta, NAN if it is missing, NULL or no number. Returns 0, or -errno if the

@@ -97,6 +97,7 @@ struct incise_wall *incise_recording_wall(struct incise_recording *rec,
 	size_t n = 0;
 	int rc = 0;
 
+	rec = incise_recording_member(rec, "wall");
 	if (rec->form >= 3) {
 		sql = sqlite3_mprintf("SELECT %s FROM %s ORDER BY seq", form->columns,
 				      form->table);

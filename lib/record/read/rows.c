@@ -8,6 +8,7 @@
 #include <string.h>
 #include "depth.h"
 #include "rows.h"
+#include "session.h"
 #include "../schema.h"
 
 /* --- times ------------------------------------------------------------------------- */
@@ -31,11 +32,15 @@ int incise_row_times_open(struct incise_row_times *times,
 	struct incise_stream known[INCISE_STREAMS_MAX];
 	int rc = 0, n;
 
+	recording = incise_recording_member(recording, table);
 	*times = (struct incise_row_times){
 		.may_repeat = true,
 		.delay_ns = NAN,
-		.own_ns = -1,
+		.own_ns = -TIME_MAX - 1,
 		.last_ns = INCISE_TIME_NONE,
+		.map = recording->map,
+		/* Events of a session are on its clock already. */
+		.least_ns = recording->session ? -TIME_MAX : 0,
 	};
 	for (size_t i = 0; i < sizeof(streams) / sizeof(*streams); i++)
 		if (!strcmp(streams[i].table, table))
@@ -96,11 +101,12 @@ bool incise_row_times_next(struct incise_row_times *times, int64_t seq, int64_t 
 {
 	int64_t best;
 
-	if (t_ns < 0 || t_ns > TIME_MAX || t_ns < times->own_ns ||
+	if (t_ns < times->least_ns || t_ns > TIME_MAX || t_ns < times->own_ns ||
 	    (t_ns == times->own_ns && !times->may_repeat))
 		return false;
 	times->own_ns = t_ns;
 	best = incise_recording_time(&times->line, seq, t_ns) + times->shift_ns;
+	best = incise_session_time(times->map, best);
 	best = best > TIME_MAX ? TIME_MAX : best < -TIME_MAX ? -TIME_MAX : best;
 	if (times->last_ns != INCISE_TIME_NONE &&
 	    best < times->last_ns + !times->may_repeat)
@@ -114,7 +120,9 @@ double incise_row_times_sd(const struct incise_row_times *times, int64_t seq)
 	double on_line_ns = incise_recording_time_sd(&times->line, seq);
 	double sd_ns = times->line.n ? on_line_ns
 				     : known(times->offset_sd_ns, known(on_line_ns, 0));
-	double variance = sd_ns * sd_ns + times->variance_ns2;
+	/* Of a bounded error that is as likely anywhere within. */
+	double map_ns = times->map ? incise_session_bound(times->map, times->own_ns) : 0;
+	double variance = sd_ns * sd_ns + times->variance_ns2 + map_ns * map_ns / 3;
 
 	return variance > 0 ? sqrt(variance) * 1e-9 : 0;
 }
@@ -136,6 +144,7 @@ int incise_rows_open_joined(struct incise_rows *rows, struct incise_recording *r
 {
 	char sql[300];
 
+	recording = incise_recording_member(recording, table);
 	*rows = (struct incise_rows){
 		.recording = recording,
 		.table = table,

@@ -31,7 +31,9 @@ struct incise_row_times {
 	double offset_sd_ns;	      /* of times without a line */
 	double variance_ns2;	      /* added by another calibration */
 	int64_t shift_ns;
-	int64_t own_ns, last_ns; /* of the row before */
+	int64_t own_ns, last_ns;	      /* of the row before */
+	const struct incise_session_map *map; /* to the clock of a session, or NULL */
+	int64_t least_ns;		      /* of own times */
 };
 
 /* For a table of a recording. Returns 0 or -errno. */

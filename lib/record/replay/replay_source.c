@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "../read/depth.h"
+#include "../read/session.h"
 #include "replay_source.h"
 #include "../schema.h"
 
@@ -226,6 +227,13 @@ int incise_replay_source_open(struct incise_replay_source *source,
 		.at = at,
 		.deep = {{.t_ns = INCISE_TIME_NONE}, {.t_ns = INCISE_TIME_NONE}},
 	};
+	/* What a loop saw is of one machine. */
+	if (recording->session)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: a joined recording cannot be replayed; replay one of "
+			"its members, for example %s",
+			recording->path, recording->session->members[0]->path);
 	incise_recording_force(recording, calibration, &source->scale);
 	rc = read_info(source, err);
 	if (!rc)

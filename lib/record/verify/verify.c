@@ -11,6 +11,7 @@
 #include <unistd.h>
 #include "../frames.h"
 #include "../schema.h"
+#include "../read/session.h"
 #include "verify.h"
 
 /* One integer by SQL; @otherwise if it is NULL or cannot be read. */
@@ -358,9 +359,9 @@ static int check_streams(struct incise_verification *verify)
 	return rc;
 }
 
-static int verify_it(const char *path, const struct incise_verify_watch *watch,
-		     bool rows_only, struct incise_verify_report *report,
-		     struct incise_error *err)
+static int verify_one(const char *path, const struct incise_verify_watch *watch,
+		      bool rows_only, struct incise_verify_report *report,
+		      struct incise_error *err)
 {
 	struct incise_verification verify = {
 		.watch = watch, .report = report, .rows_only = rows_only};
@@ -410,6 +411,117 @@ static int verify_it(const char *path, const struct incise_verify_watch *watch,
 out:
 	incise_recording_close(verify.recording);
 	return rc;
+}
+
+/* --- joined recordings --------------------------------------------------------------- */
+
+/* A member of a session under verification; findings get its name. */
+struct member_watch {
+	const struct incise_verify_watch *watch;
+	const char *name;
+	int at, n;
+};
+
+static void member_found(void *user, const struct incise_verify_finding *finding)
+{
+	const struct member_watch *member = user;
+	struct incise_verify_finding named = *finding;
+	char text[480];
+
+	if (!member->watch || !member->watch->found)
+		return;
+	snprintf(text, sizeof(text), "%s: %s", member->name, finding->text);
+	named.text = text;
+	member->watch->found(member->watch->user, &named);
+}
+
+static int member_progress(void *user, double share)
+{
+	const struct member_watch *member = user;
+
+	if (!member->watch || !member->watch->progress)
+		return 0;
+	return member->watch->progress(member->watch->user,
+				       share < 0 ? share
+						 : (member->at + share) / member->n);
+}
+
+/* Add the report of a member to that of all. */
+static void add_report(struct incise_verify_report *to,
+		       const struct incise_verify_report *member)
+{
+	to->interrupted |= member->interrupted;
+	to->unverified |= member->unverified;
+	to->findings += member->findings;
+	to->complete &= member->complete;
+	to->intact &= member->intact;
+	to->frames.checked |= member->frames.checked;
+	to->frames.present += member->frames.present;
+	to->frames.missing += member->frames.missing;
+	to->frames.altered += member->frames.altered;
+	to->frames.extra += member->frames.extra;
+	to->frames.ahead += member->frames.ahead;
+	for (int i = 0; i < member->n_streams; i++) {
+		const struct incise_verify_stream *from = &member->streams[i];
+		int k = 0;
+
+		while (k < to->n_streams && strcmp(to->streams[k].name, from->name))
+			k++;
+		if (k == to->n_streams) {
+			to->streams[to->n_streams++] = *from;
+			continue;
+		}
+		to->streams[k].expected += from->expected;
+		to->streams[k].present += from->present;
+		to->streams[k].lost += from->lost;
+		to->streams[k].lost_at_capture += from->lost_at_capture;
+		to->streams[k].blocks += from->blocks;
+		to->streams[k].altered += from->altered;
+	}
+}
+
+/* Each member by itself; the session's own tables were checked when it was opened. */
+static int verify_members(const struct incise_session *session,
+			  const struct incise_verify_watch *watch, bool rows_only,
+			  struct incise_verify_report *report, struct incise_error *err)
+{
+	int rc = 0;
+
+	*report = (struct incise_verify_report){.complete = true, .intact = true};
+	for (int i = 0; i < session->n && !rc; i++) {
+		struct member_watch member = {watch, session->info[i].name, i,
+					      session->n};
+		const struct incise_verify_watch named = {member_found, member_progress,
+							  &member};
+		struct incise_verify_report found;
+
+		rc = verify_one(session->members[i]->path, &named, rows_only, &found,
+				err);
+		if (!rc)
+			add_report(report, &found);
+	}
+	return rc;
+}
+
+static int verify_it(const char *path, const struct incise_verify_watch *watch,
+		     bool rows_only, struct incise_verify_report *report,
+		     struct incise_error *err)
+{
+	struct incise_recording *recording = incise_recording_open_any(path, err);
+	int rc;
+
+	*report = (struct incise_verify_report){0};
+	if (!recording)
+		return -errno;
+	rc = recording->session
+		     ? verify_members(recording->session, watch, rows_only, report, err)
+		     : 0;
+	if (recording->session) {
+		incise_recording_close(recording);
+		return rc;
+	}
+	incise_recording_close(recording);
+	return verify_one(path, watch, rows_only, report, err);
 }
 
 int incise_verify(const char *path, const struct incise_verify_watch *watch,

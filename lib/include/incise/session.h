@@ -1,0 +1,85 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Sessions: recordings of several machines on one timeline, the CLOCK_MONOTONIC of the first
+ * one. A session is a folder with the recordings as they were; incise_recording_open() opens it
+ * like a recording. Part of libincise-record.
+ *
+ *     a  force    ├────────────────────────┤
+ *     b  tracker       ├──────────────────────┤      offset and rate of b's clock: by wall time
+ *     b                     │tap                     (incise/wall.h), by a signal that both
+ *     a                     │tap                     recorded, or by both, which must agree
+ */
+#ifndef INCISE_SESSION_H
+#define INCISE_SESSION_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <incise/error.h>
+#include <incise/export.h>
+#include <incise/recording.h>
+
+INCISE_BEGIN_DECLS
+
+/** Largest number of members. */
+#define INCISE_SESSION_MEMBERS_MAX 32
+
+/** Signals that align clocks. */
+enum incise_session_align {
+	INCISE_ALIGN_CLOCKS, /**< none: wall time alone */
+	INCISE_ALIGN_TAP,    /**< knocks that force or tracker of each member show */
+	INCISE_ALIGN_EVENTS, /**< events of the kind "sync", of a common line */
+};
+
+/** A member, and its clock. Times are ns of the session's clock. */
+struct incise_session_info {
+	char name[64];		   /**< of its folder in the session, unique */
+	char host[64];		   /**< name of the machine */
+	char method[16];	   /**< "first", "clocks", "tap", "sync" */
+	char streams[64];	   /**< that it has: "force, tracker, camera" */
+	bool complete;		   /**< closed by its recorder */
+	int64_t first_ns, last_ns; /**< first and last row; -1: no row */
+	int64_t offset_ns; /**< session's clock less the member's, at its first row */
+	double rate_ppm; /**< how much faster the session's clock runs, over the recording */
+	double uncertainty_ns; /**< largest bound of the error of its times */
+	int64_t overlap_ns; /**< common time with the members before it; below 0: a gap */
+	/** Signals that both recorded; 0: not aligned. */
+	int matches;
+	/** Time by the signal less time by the clocks, and its bound; NAN: not both known. */
+	double agreement_ns, agreement_bound_ns;
+};
+
+/** Options of a join. */
+struct incise_session_options {
+	double within_s; /**< largest bound of the error that is accepted; 0: any */
+	enum incise_session_align align;
+	/** Called with texts for people, for example of a recording that was interrupted; or NULL. */
+	void (*note)(void *context, const char *text);
+	void *context;
+};
+
+/**
+ * Join recordings into a session. Their files are cloned, linked or copied; not a bit changes.
+ *
+ * @param paths  n recordings, 2 to INCISE_SESSION_MEMBERS_MAX, the first one's clock is that of
+ *               the session
+ * @param output a new folder; while it is written, it is output.part
+ * @return 0; -EINVAL (a session, the same recording twice, a recording of format 1), -ENODATA (no
+ *         wall time, or an unknown uncertainty, and no signal that aligns), -ERANGE (an uncertainty
+ *         above within_s, clocks and signal that disagree, a clock that went back), -EEXIST, -EIO,
+ *         -ENOSPC, -ENOMEM, errno of incise_recording_open().
+ */
+INCISE_API int incise_session_join(const char *const *paths, int n,
+				   const struct incise_session_options *options,
+				   const char *output, struct incise_error *err);
+
+/**
+ * Get the members of a session.
+ *
+ * @param members belongs to the recording
+ * @return the number of members; 0: it is no session
+ */
+INCISE_API int incise_session_members(const struct incise_recording *recording,
+				      const struct incise_session_info **members);
+
+INCISE_END_DECLS
+#endif

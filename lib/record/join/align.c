@@ -1,0 +1,411 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Alignment of two clocks by common marks; see align.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../../base/vector.h"
+#include "../read/rows.h"
+#include "align.h"
+
+#define APART_NS 150000000LL /* two taps of a hand are further apart */
+#define RISE_NS 2000000LL    /* a knock rises within this time */
+#define RISE_ROWS 64	     /* of it that are kept */
+#define SHARE 0.3	     /* of the largest: smaller ones are no taps */
+#define NOISES 8	     /* standard deviations that a tap exceeds */
+#define SYNC_SD_NS 1000	     /* of an event of a common line: latency of an interrupt */
+#define BOUND_SDS 4	     /* a normal error exceeds 4 of them once in 16000 */
+
+/* --- marks of a recording ------------------------------------------------------------ */
+
+/* A signal of how sudden something is, a value for each row. */
+struct sudden {
+	int64_t t_ns; /* of what the value shows */
+	double value; /* at least 0 */
+	double sd_ns;
+};
+
+/* A row of the table into the signal; false: no value yet. */
+typedef bool (*sudden_at)(void *state, const struct incise_rows *rows, struct sudden *to);
+
+/* Force: its change within RISE_NS. The onset is the row before the change started. */
+struct rise {
+	struct {
+		int64_t t_ns, code;
+	} rows[RISE_ROWS];
+	int n;
+};
+
+static bool force_sudden(void *state, const struct incise_rows *rows, struct sudden *to)
+{
+	struct rise *rise = state;
+	int64_t code = sqlite3_column_int64(rows->stmt, 2);
+	int from = 0;
+
+	if (rise->n == RISE_ROWS)
+		memmove(rise->rows, rise->rows + 1, --rise->n * sizeof(*rise->rows));
+	rise->rows[rise->n].t_ns = rows->t_ns;
+	rise->rows[rise->n++].code = code;
+	while (rise->rows[from].t_ns < rows->t_ns - RISE_NS)
+		from++;
+	if (from == rise->n - 1)
+		from = rise->n > 1 ? rise->n - 2 : 0;
+	to->value = fabs((double)(code - rise->rows[from].code));
+	/* The edge: the first half of the change. */
+	to->t_ns = rows->t_ns;
+	for (int i = from; i < rise->n; i++)
+		if (fabs((double)(rise->rows[i].code - rise->rows[from].code)) >=
+		    0.5 * to->value) {
+			to->t_ns =
+				i > from ? (rise->rows[i - 1].t_ns + rise->rows[i].t_ns) /
+						   2
+					 : rise->rows[i].t_ns;
+			to->sd_ns = i > from ? (double)(rise->rows[i].t_ns -
+							rise->rows[i - 1].t_ns)
+					     : 0;
+			break;
+		}
+	return rise->n > 1;
+}
+
+/* Motion: the change of the velocity at a row, by the rows before and after. */
+struct bend {
+	int64_t t_ns[3];
+	double position_mm[3][3];
+	int n;
+};
+
+static bool tracker_sudden(void *state, const struct incise_rows *rows, struct sudden *to)
+{
+	struct bend *bend = state;
+	const char *status = (const char *)sqlite3_column_text(rows->stmt, 5);
+	double before_s, after_s, sum = 0;
+
+	if (!incise_pose_usable(*status)) {
+		bend->n = 0;
+		return false;
+	}
+	if (bend->n == 3) {
+		memmove(bend->t_ns, bend->t_ns + 1, 2 * sizeof(*bend->t_ns));
+		memmove(bend->position_mm, bend->position_mm + 1,
+			2 * sizeof(*bend->position_mm));
+		bend->n = 2;
+	}
+	bend->t_ns[bend->n] = rows->t_ns;
+	for (int i = 0; i < 3; i++)
+		bend->position_mm[bend->n][i] = sqlite3_column_double(rows->stmt, 2 + i);
+	if (++bend->n < 3)
+		return false;
+	before_s = (double)(bend->t_ns[1] - bend->t_ns[0]) * 1e-9;
+	after_s = (double)(bend->t_ns[2] - bend->t_ns[1]) * 1e-9;
+	if (before_s > 0.05 || after_s > 0.05)
+		return false;
+	for (int i = 0; i < 3; i++) {
+		double v0 =
+			(bend->position_mm[1][i] - bend->position_mm[0][i]) / before_s;
+		double v1 = (bend->position_mm[2][i] - bend->position_mm[1][i]) / after_s;
+
+		sum += (v1 - v0) * (v1 - v0);
+	}
+	to->t_ns = bend->t_ns[1];
+	to->value = sqrt(sum);
+	to->sd_ns = 0.25e9 * (before_s + after_s);
+	return true;
+}
+
+struct walk {
+	const char *table, *columns, *types;
+	sudden_at at;
+	void *state;
+	size_t size;   /* of it */
+	bool centroid; /* the mark lies between the values around the largest */
+};
+
+/* The largest value, and the typical one. */
+static int find_scale(struct incise_recording *recording, const struct walk *walk,
+		      double *largest, double *noise, struct incise_error *err)
+{
+	struct incise_rows rows;
+	struct sudden sudden;
+	double sum = 0, n = 0;
+	int rc = incise_rows_open(&rows, recording, walk->table, walk->columns,
+				  walk->types, UINT64_MAX, err);
+
+	memset(walk->state, 0, walk->size);
+	*largest = 0;
+	while (!rc && (rc = incise_rows_next(&rows, err)) > 0) {
+		rc = 0;
+		if (!walk->at(walk->state, &rows, &sudden))
+			continue;
+		*largest = fmax(*largest, sudden.value);
+		sum += sudden.value;
+		n++;
+	}
+	incise_rows_close(&rows);
+	/* The mean of a magnitude is 0.8 standard deviations. */
+	*noise = n > 0 ? sum / n / 0.8 : 0;
+	return rc;
+}
+
+/* The last three values, for a mark between them. */
+static void mark_of(const struct sudden last[3], bool centroid, struct incise_mark *mark)
+{
+	double weight = 0, sum = 0;
+
+	*mark = (struct incise_mark){last[1].t_ns, last[1].sd_ns};
+	if (!centroid)
+		return;
+	for (int i = 0; i < 3; i++) {
+		weight += last[i].value;
+		sum += last[i].value * (double)(last[i].t_ns - last[1].t_ns);
+	}
+	if (weight > 0)
+		mark->t_ns += llrint(sum / weight);
+}
+
+static int find_marks(struct incise_recording *recording, const struct walk *walk,
+		      struct incise_mark marks[INCISE_MARKS_MAX],
+		      struct incise_error *err)
+{
+	struct sudden last[3] = {{0}}, peak[3] = {{0}};
+	struct incise_rows rows;
+	double largest, noise, limit;
+	int rc = find_scale(recording, walk, &largest, &noise, err), n = 0;
+	bool in = false;
+
+	limit = fmax(NOISES * noise, SHARE * largest);
+	if (rc || !(largest > 0) || largest < limit)
+		return rc;
+	rc = incise_rows_open(&rows, recording, walk->table, walk->columns, walk->types,
+			      UINT64_MAX, err);
+	memset(walk->state, 0, walk->size);
+	while (!rc && (rc = incise_rows_next(&rows, err)) > 0) {
+		rc = 0;
+		memmove(last, last + 1, 2 * sizeof(*last));
+		if (!walk->at(walk->state, &rows, &last[2]))
+			continue;
+		/* The value before is a local peak, or the first above the limit. */
+		if (last[1].value >= limit && last[1].value >= last[2].value &&
+		    last[1].value > last[0].value &&
+		    (!in || last[1].t_ns - peak[1].t_ns < APART_NS) &&
+		    (!in || last[1].value > peak[1].value)) {
+			if (!in && n == INCISE_MARKS_MAX)
+				break;
+			memcpy(peak, last, sizeof(peak));
+			mark_of(peak, walk->centroid, &marks[in ? n - 1 : n]);
+			n += !in;
+			in = true;
+		}
+		in = in && last[2].t_ns - peak[1].t_ns < APART_NS;
+	}
+	incise_rows_close(&rows);
+	return rc ? rc : n;
+}
+
+/* The events of a kind. */
+static int find_events(struct incise_recording *recording,
+		       struct incise_mark marks[INCISE_MARKS_MAX],
+		       struct incise_error *err)
+{
+	struct incise_rows rows;
+	int rc = incise_rows_open(&rows, recording, "events", "rowid, t_ns, kind", "iit",
+				  UINT64_MAX, err),
+	    n = 0;
+
+	while (!rc && (rc = incise_rows_next(&rows, err)) > 0) {
+		rc = 0;
+		if (!strcmp((const char *)sqlite3_column_text(rows.stmt, 2), "sync") &&
+		    n < INCISE_MARKS_MAX)
+			marks[n++] = (struct incise_mark){rows.t_ns, SYNC_SD_NS};
+	}
+	incise_rows_close(&rows);
+	return rc ? rc : n;
+}
+
+int incise_align_marks(struct incise_recording *recording,
+		       enum incise_session_align align,
+		       struct incise_mark marks[INCISE_MARKS_MAX],
+		       struct incise_error *err)
+{
+	struct rise rise;
+	struct bend bend;
+	const struct walk force = {"force", "seq, t_ns, code", "iii", force_sudden,
+				   &rise,   sizeof(rise),      false};
+	const struct walk tracker = {"tracker", "seq, t_ns, x_mm, y_mm, z_mm, status",
+				     "iirrrt",	tracker_sudden,
+				     &bend,	sizeof(bend),
+				     true};
+	int n;
+
+	if (align == INCISE_ALIGN_EVENTS)
+		return find_events(recording, marks, err);
+	n = recording->meta.force ? find_marks(recording, &force, marks, err) : 0;
+	return n ? n : find_marks(recording, &tracker, marks, err);
+}
+
+/* --- matching ------------------------------------------------------------------------ */
+
+/* How far apart two marks may be on one clock, matched at another pair. */
+static double tolerance(const struct incise_mark *a, const struct incise_mark *b,
+			int64_t from_ns)
+{
+	return BOUND_SDS * hypot(a->sd_ns, b->sd_ns) +
+	       INCISE_ALIGN_RATE_MAX * fabs((double)(b->t_ns - from_ns)) + 1;
+}
+
+/* The mark of a that belongs to one of b; -1: none. */
+static int partner(const struct incise_mark *a, int n_a, const struct incise_mark *b,
+		   int64_t offset_ns, int64_t from_ns)
+{
+	int best = -1;
+
+	for (int i = 0; i < n_a; i++) {
+		double far = fabs((double)(a[i].t_ns - b->t_ns - offset_ns));
+
+		if (far <= tolerance(&a[i], b, from_ns) &&
+		    (best < 0 ||
+		     far < fabs((double)(a[best].t_ns - b->t_ns - offset_ns))))
+			best = i;
+	}
+	return best;
+}
+
+static int count(const struct incise_mark *a, int n_a, const struct incise_mark *b,
+		 int n_b, int64_t offset_ns, int64_t from_ns)
+{
+	int n = 0;
+
+	for (int k = 0; k < n_b; k++)
+		n += partner(a, n_a, &b[k], offset_ns, from_ns) >= 0;
+	return n;
+}
+
+/* The pair whose offset matches most marks; @second: of other offsets. */
+static int match(const struct incise_mark *a, int n_a, const struct incise_mark *b,
+		 int n_b, int64_t *offset_ns, int64_t *from_ns, int *second)
+{
+	int best = 0;
+	double wide = 0;
+
+	for (int i = 0; i < n_a; i++)
+		for (int k = 0; k < n_b; k++) {
+			int64_t offset = a[i].t_ns - b[k].t_ns;
+			int n = count(a, n_a, b, n_b, offset, b[k].t_ns);
+
+			if (n <= best)
+				continue;
+			best = n;
+			*offset_ns = offset;
+			*from_ns = b[k].t_ns;
+		}
+	for (int k = 0; k < n_b; k++)
+		wide = fmax(wide, tolerance(&a[0], &b[k], *from_ns));
+	*second = 0;
+	for (int i = 0; i < n_a; i++)
+		for (int k = 0; k < n_b; k++) {
+			int64_t offset = a[i].t_ns - b[k].t_ns;
+			int n;
+
+			if (fabs((double)(offset - *offset_ns)) <= 2 * wide)
+				continue;
+			n = count(a, n_a, b, n_b, offset, b[k].t_ns);
+			*second = n > *second ? n : *second;
+		}
+	return best;
+}
+
+/* Weighted straight line through the matched marks. */
+static void fit_line(const struct incise_mark *a, int n_a, const struct incise_mark *b,
+		     int n_b, int64_t offset_ns, int64_t from_ns,
+		     struct incise_align_fit *fit)
+{
+	double w = 0, x = 0, y = 0, xx = 0, xy = 0, residual = 0, mean_x, mean_y;
+	int n = 0;
+
+	for (int pass = 0; pass < 2; pass++)
+		for (int k = 0; k < n_b; k++) {
+			int i = partner(a, n_a, &b[k], offset_ns, from_ns);
+			double dx = (double)(b[k].t_ns - from_ns), dy, weight, variance;
+
+			if (i < 0)
+				continue;
+			variance = a[i].sd_ns * a[i].sd_ns + b[k].sd_ns * b[k].sd_ns + 1;
+			weight = 1 / variance;
+			dy = (double)(a[i].t_ns - b[k].t_ns - offset_ns);
+			if (!pass) {
+				w += weight;
+				x += weight * dx;
+				y += weight * dy;
+				n++;
+				continue;
+			}
+			dx -= x / w;
+			dy -= y / w;
+			xx += weight * dx * dx;
+			xy += weight * dx * dy;
+		}
+	mean_x = x / w;
+	mean_y = y / w;
+	*fit = (struct incise_align_fit){
+		.matches = n,
+		.at_ns = from_ns + llrint(mean_x),
+		.offset_ns = offset_ns + llrint(mean_y),
+		.offset_sd_ns = 1 / sqrt(w),
+		.rate_sd = NAN,
+	};
+	/* A rate that the marks show better than what is known of quartz clocks. */
+	if (n < 3 || !(xx > 0) || 1 / sqrt(xx) > INCISE_ALIGN_RATE_MAX / BOUND_SDS)
+		return;
+	fit->rate = xy / xx;
+	fit->rate_sd = 1 / sqrt(xx);
+	for (int k = 0; k < n_b; k++) {
+		int i = partner(a, n_a, &b[k], offset_ns, from_ns);
+		double dy, variance;
+
+		if (i < 0)
+			continue;
+		variance = a[i].sd_ns * a[i].sd_ns + b[k].sd_ns * b[k].sd_ns + 1;
+		dy = (double)(a[i].t_ns - b[k].t_ns - offset_ns) - mean_y -
+		     fit->rate * ((double)(b[k].t_ns - from_ns) - mean_x);
+		residual += dy * dy / variance;
+	}
+	/* Marks that scatter more than their uncertainty says are so uncertain. */
+	residual = sqrt(fmax(1, residual / fmax(1, n - 2)));
+	fit->offset_sd_ns *= residual;
+	fit->rate_sd *= residual;
+}
+
+int incise_align_fit(const struct incise_mark *a, int n_a, const struct incise_mark *b,
+		     int n_b, struct incise_align_fit *fit, struct incise_error *err)
+{
+	int64_t offset_ns = 0, from_ns = 0;
+	int second = 0,
+	    best = n_a && n_b ? match(a, n_a, b, n_b, &offset_ns, &from_ns, &second) : 0;
+
+	if (!best)
+		return incise_error_set(err, ENODATA,
+					"%d and %d marks, and none of them in common",
+					n_a, n_b);
+	if (second >= best)
+		return incise_error_set(
+			err, EDOM,
+			"%d and %d marks match at more than one offset; tap at least three "
+			"times in an irregular rhythm",
+			n_a, n_b);
+	fit_line(a, n_a, b, n_b, offset_ns, from_ns, fit);
+	return 0;
+}
+
+int64_t incise_align_time(const struct incise_align_fit *fit, int64_t t_ns,
+			  double *bound_ns)
+{
+	double far = (double)(t_ns - fit->at_ns);
+	double sd = isnan(fit->rate_sd) ? 0 : fit->rate_sd * far;
+
+	*bound_ns = BOUND_SDS * hypot(fit->offset_sd_ns, sd) +
+		    (isnan(fit->rate_sd) ? INCISE_ALIGN_RATE_MAX * fabs(far) : 0);
+	return t_ns + fit->offset_ns + llrint(fit->rate * far);
+}

@@ -1,0 +1,719 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Opening a session; see session.h. Its database is untrusted, like those of its members.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../../base/crc32c.h"
+#include "../schema.h"
+#include "rows.h"
+#include "session.h"
+
+#define TIME_MAX (INT64_MAX / 4) /* of rows.c */
+#define BOUND_MAX 1e18
+
+static const char *const stream_names[INCISE_STREAMS_MAX] = {"force", "tracker",
+							     "camera"};
+
+const char *const incise_session_tables[] = {
+	"CREATE TABLE session(key TEXT PRIMARY KEY NOT NULL, value)",
+	"CREATE TABLE members(member INTEGER PRIMARY KEY, name TEXT NOT NULL, "
+	"host TEXT NOT NULL, method TEXT NOT NULL, ledger TEXT NOT NULL, "
+	"matches INTEGER NOT NULL, agreement_ns REAL, agreement_bound_ns REAL)",
+	"CREATE TABLE maps(member INTEGER NOT NULL, knot INTEGER NOT NULL, "
+	"t_ns INTEGER NOT NULL, session_ns INTEGER NOT NULL, bound_ns REAL NOT NULL, "
+	"PRIMARY KEY(member, knot)) WITHOUT ROWID",
+	NULL,
+};
+
+/* --- clocks -------------------------------------------------------------------------- */
+
+/* The piece of the line at or before a time, by a member of struct knot. */
+static size_t find_piece(const struct incise_session_map *map, int64_t t_ns, bool inverse)
+{
+	size_t low = 0, high = map->n - 1;
+
+	while (high - low > 1) {
+		size_t middle = low + (high - low) / 2;
+		const struct incise_session_knot *knot = &map->knots[middle];
+
+		if ((inverse ? knot->to_ns : knot->t_ns) <= t_ns)
+			low = middle;
+		else
+			high = middle;
+	}
+	return low;
+}
+
+static int64_t on_line(int64_t a, int64_t b, int64_t to_a, int64_t to_b, int64_t t)
+{
+	double slope = (double)(to_b - to_a) / (double)(b - a);
+	/* The offset is exact, and only the small rest is rounded. */
+	double rest = (double)(t - a) * (slope - 1);
+
+	return to_a + (t - a) + llrint(fmax(fmin(rest, 1e18), -1e18));
+}
+
+int64_t incise_session_time(const struct incise_session_map *map, int64_t t_ns)
+{
+	const struct incise_session_knot *a;
+
+	if (!map)
+		return t_ns;
+	a = &map->knots[find_piece(map, t_ns, false)];
+	return on_line(a[0].t_ns, a[1].t_ns, a[0].to_ns, a[1].to_ns, t_ns);
+}
+
+int64_t incise_session_member_time(const struct incise_session_map *map, int64_t t_ns)
+{
+	const struct incise_session_knot *a;
+
+	if (!map)
+		return t_ns;
+	a = &map->knots[find_piece(map, t_ns, true)];
+	return on_line(a[0].to_ns, a[1].to_ns, a[0].t_ns, a[1].t_ns, t_ns);
+}
+
+double incise_session_bound(const struct incise_session_map *map, int64_t t_ns)
+{
+	const struct incise_session_knot *a;
+
+	if (!map)
+		return 0;
+	a = &map->knots[find_piece(map, t_ns, false)];
+	return fmax(a[0].bound_ns, a[1].bound_ns);
+}
+
+/* --- identity ------------------------------------------------------------------------ */
+
+char *incise_session_identity(struct incise_recording *recording)
+{
+	sqlite3_stmt *stmt = NULL;
+	char *text = NULL, *more;
+
+	if (sqlite3_prepare_v2(recording->db,
+			       "SELECT stream, block, count, crc FROM ledger AS a WHERE "
+			       "block = (SELECT max(block) FROM ledger AS b WHERE "
+			       "b.stream = a.stream) ORDER BY stream",
+			       -1, &stmt, NULL) != SQLITE_OK)
+		return NULL;
+	while (sqlite3_step(stmt) == SQLITE_ROW) {
+		if (asprintf(&more, "%s%s%.40s:%lld:%lld:%08llx", text ? text : "",
+			     text ? " " : "", (const char *)sqlite3_column_text(stmt, 0),
+			     sqlite3_column_int64(stmt, 1), sqlite3_column_int64(stmt, 2),
+			     (unsigned long long)sqlite3_column_int64(stmt, 3)) < 0)
+			more = NULL;
+		free(text);
+		text = more;
+		if (!text || strlen(text) > 4000)
+			break;
+	}
+	sqlite3_finalize(stmt);
+	return text;
+}
+
+static void add_value(uint32_t *crc, sqlite3_stmt *stmt, int column)
+{
+	const unsigned char *text = sqlite3_column_text(stmt, column);
+	int n = sqlite3_column_bytes(stmt, column);
+
+	*crc = incise_crc32c(*crc, text ? text : (const unsigned char *)"",
+			     text ? (size_t)n + 1 : 1);
+}
+
+int incise_session_seal(sqlite3 *db, uint32_t *crc)
+{
+	static const char *const all[] = {
+		"SELECT key, value FROM session WHERE key <> 'seal' ORDER BY key",
+		"SELECT member, name, host, method, ledger, matches, agreement_ns, "
+		"agreement_bound_ns FROM members ORDER BY member",
+		"SELECT member, knot, t_ns, session_ns, bound_ns FROM maps ORDER BY "
+		"member, knot",
+	};
+	int rc = SQLITE_OK;
+
+	*crc = 0;
+	for (size_t i = 0; i < sizeof(all) / sizeof(*all) && rc == SQLITE_OK; i++) {
+		sqlite3_stmt *stmt;
+
+		rc = sqlite3_prepare_v2(db, all[i], -1, &stmt, NULL);
+		while (rc == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW)
+			for (int k = 0; k < sqlite3_column_count(stmt); k++)
+				add_value(crc, stmt, k);
+		if (rc == SQLITE_OK)
+			rc = sqlite3_finalize(stmt);
+	}
+	return rc;
+}
+
+/* --- members ------------------------------------------------------------------------- */
+
+static int damaged(const char *folder, const char *what, struct incise_error *err)
+{
+	return incise_error_set(
+		err, EINVAL, "%s: damaged joined recording: %s; join its members again",
+		folder, what);
+}
+
+bool incise_session_is(sqlite3 *db)
+{
+	sqlite3_stmt *stmt = NULL;
+	bool is = sqlite3_prepare_v2(db, "PRAGMA application_id", -1, &stmt, NULL) ==
+			  SQLITE_OK &&
+		  sqlite3_step(stmt) == SQLITE_ROW &&
+		  sqlite3_column_int64(stmt, 0) == INCISE_SESSION_APPLICATION;
+
+	sqlite3_finalize(stmt);
+	return is;
+}
+
+/* A text of a row; false: it has none, or it is too long. */
+static bool take(sqlite3_stmt *stmt, int column, char *to, size_t size)
+{
+	const char *text = (const char *)sqlite3_column_text(stmt, column);
+
+	if (!text || strlen(text) >= size)
+		return false;
+	for (const char *c = text; *c; c++)
+		if ((unsigned char)*c < ' ' || *c == 0x7f)
+			return false;
+	strcpy(to, text);
+	return true;
+}
+
+/* The name of a member is that of a folder in the session, and stands behind ':' and '='. */
+static bool is_name(const char *name)
+{
+	return *name && *name != '.' && !strpbrk(name, "/:=,");
+}
+
+static double real_or_nan(sqlite3_stmt *stmt, int column)
+{
+	return sqlite3_column_type(stmt, column) == SQLITE_FLOAT
+		       ? sqlite3_column_double(stmt, column)
+		       : NAN;
+}
+
+/* Version, tables and checksum. */
+static int check(sqlite3 *db, const char *folder, struct incise_error *err)
+{
+	sqlite3_stmt *stmt = NULL;
+	sqlite3_int64 version = 0, seal = -1;
+	uint32_t crc = 0;
+	int found = 0;
+
+	if (sqlite3_prepare_v2(db, "PRAGMA user_version", -1, &stmt, NULL) == SQLITE_OK &&
+	    sqlite3_step(stmt) == SQLITE_ROW)
+		version = sqlite3_column_int64(stmt, 0);
+	sqlite3_finalize(stmt);
+	if (version > INCISE_SESSION_VERSION)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: made by a newer incise (joined recording of version "
+			"%lld, this one reads up to %d); use that version",
+			folder, (long long)version, INCISE_SESSION_VERSION);
+	for (; incise_session_tables[found]; found++) {
+		sqlite3_stmt *known = NULL;
+		bool same;
+
+		if (sqlite3_prepare_v2(db,
+				       "SELECT 1 FROM sqlite_master WHERE type = 'table' "
+				       "AND sql = ?",
+				       -1, &known, NULL) != SQLITE_OK)
+			return incise_schema_fail(db, folder, err);
+		sqlite3_bind_text(known, 1, incise_session_tables[found], -1,
+				  SQLITE_STATIC);
+		same = sqlite3_step(known) == SQLITE_ROW;
+		sqlite3_finalize(known);
+		if (!same)
+			return damaged(folder, "a table is missing or altered", err);
+	}
+	if (incise_session_seal(db, &crc) != SQLITE_OK)
+		return incise_schema_fail(db, folder, err);
+	if (sqlite3_prepare_v2(db, "SELECT value FROM session WHERE key = 'seal'", -1,
+			       &stmt, NULL) == SQLITE_OK &&
+	    sqlite3_step(stmt) == SQLITE_ROW)
+		seal = sqlite3_column_int64(stmt, 0);
+	sqlite3_finalize(stmt);
+	return seal == (sqlite3_int64)crc
+		       ? 0
+		       : damaged(folder, "its tables are not as they were written", err);
+}
+
+/* Open a member, and see that it is the one that was joined. */
+static int open_member(struct incise_session *session, const char *folder,
+		       const char *ledger, struct incise_error *err)
+{
+	int at = session->n;
+	const char *name = session->info[at].name;
+	char *path = NULL, *identity = NULL;
+	int rc = 0;
+
+	if (asprintf(&path, "%s/%s", folder, name) < 0)
+		return incise_error_set(err, ENOMEM, "%s: out of memory", folder);
+	session->members[at] = incise_recording_open(path, err);
+	if (!session->members[at])
+		rc = -errno;
+	if (!rc && session->members[at]->session)
+		rc = damaged(folder, "a member is a joined recording itself", err);
+	session->n += session->members[at] != NULL;
+	if (!rc && session->members[at]->form < 2)
+		rc = damaged(folder, "a member has no ledger", err);
+	if (!rc) {
+		identity = incise_session_identity(session->members[at]);
+		if (!identity || strcmp(identity, ledger))
+			rc = incise_error_set(
+				err, EINVAL,
+				"%s: member %s is not the recording that was joined, or "
+				"was altered since; join again",
+				folder, name);
+	}
+	free(identity);
+	free(path);
+	return rc;
+}
+
+static int read_members(struct incise_session *session, sqlite3 *db, const char *folder,
+			struct incise_error *err)
+{
+	sqlite3_stmt *stmt;
+	int rc = 0, step;
+
+	if (sqlite3_prepare_v2(
+		    db,
+		    "SELECT name, host, method, ledger, matches, agreement_ns, "
+		    "agreement_bound_ns FROM members ORDER BY member",
+		    -1, &stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(db, folder, err);
+	while (!rc && (step = sqlite3_step(stmt)) == SQLITE_ROW) {
+		struct incise_session_info *info = &session->info[session->n];
+		const char *ledger = (const char *)sqlite3_column_text(stmt, 3);
+
+		if (session->n == INCISE_SESSION_MEMBERS_MAX ||
+		    !take(stmt, 0, info->name, sizeof(info->name)) ||
+		    !is_name(info->name) ||
+		    !take(stmt, 1, info->host, sizeof(info->host)) ||
+		    !take(stmt, 2, info->method, sizeof(info->method)) || !ledger) {
+			rc = damaged(folder, "a row of table members is invalid", err);
+			break;
+		}
+		info->matches = sqlite3_column_int(stmt, 4);
+		info->agreement_ns = real_or_nan(stmt, 5);
+		info->agreement_bound_ns = real_or_nan(stmt, 6);
+		rc = open_member(session, folder, ledger, err);
+	}
+	sqlite3_finalize(stmt);
+	if (!rc && session->n < 2)
+		rc = damaged(folder, "it has less than two members", err);
+	return rc;
+}
+
+static bool good_knot(const struct incise_session_knot *knot, size_t n)
+{
+	/* A quartz is within 1e-3 of another one; a line twice as steep is none of a clock. */
+	return knot->t_ns >= 0 && knot->t_ns <= TIME_MAX && knot->to_ns >= -TIME_MAX &&
+	       knot->to_ns <= TIME_MAX && knot->bound_ns >= 0 &&
+	       knot->bound_ns <= BOUND_MAX &&
+	       (!n || (knot->t_ns > knot[-1].t_ns && knot->to_ns > knot[-1].to_ns &&
+		       (double)(knot->to_ns - knot[-1].to_ns) <
+			       1e6 * (double)(knot->t_ns - knot[-1].t_ns)));
+}
+
+static int read_map(struct incise_session *session, int member, sqlite3 *db,
+		    const char *folder, struct incise_error *err)
+{
+	struct incise_session_map *map = &session->maps[member];
+	sqlite3_stmt *stmt;
+	size_t capacity = 0;
+	int rc = 0;
+
+	if (sqlite3_prepare_v2(db,
+			       "SELECT t_ns, session_ns, bound_ns FROM maps WHERE member "
+			       "= ? ORDER BY knot",
+			       -1, &stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(db, folder, err);
+	sqlite3_bind_int(stmt, 1, member);
+	while (!rc && sqlite3_step(stmt) == SQLITE_ROW) {
+		struct incise_session_knot *knots = map->knots;
+
+		if (map->n == capacity) {
+			capacity = capacity ? 2 * capacity : 16;
+			knots = realloc(map->knots, capacity * sizeof(*knots));
+			if (!knots) {
+				rc = incise_error_set(err, ENOMEM, "%s: out of memory",
+						      folder);
+				break;
+			}
+			map->knots = knots;
+		}
+		knots[map->n] = (struct incise_session_knot){
+			sqlite3_column_int64(stmt, 0),
+			sqlite3_column_int64(stmt, 1),
+			sqlite3_column_double(stmt, 2),
+		};
+		if (map->n == INCISE_SESSION_KNOTS_MAX ||
+		    !good_knot(&knots[map->n], map->n))
+			rc = damaged(folder, "a row of table maps is invalid", err);
+		map->n++;
+	}
+	sqlite3_finalize(stmt);
+	if (!rc && map->n < 2)
+		rc = damaged(folder, "the map of a clock is missing", err);
+	session->members[member]->map = map;
+	return rc;
+}
+
+/* --- what they have ------------------------------------------------------------------ */
+
+static const char *const tables[INCISE_STREAMS_MAX] = {"force", "tracker", "frames"};
+
+bool incise_session_span(struct incise_recording *member, const char *table,
+			 int64_t *first_ns, int64_t *last_ns)
+{
+	sqlite3_stmt *stmt = NULL;
+	char sql[120];
+	bool any;
+
+	snprintf(
+		sql, sizeof(sql),
+		"SELECT (SELECT t_ns FROM %s ORDER BY seq LIMIT 1), (SELECT t_ns FROM %s "
+		"ORDER BY seq DESC LIMIT 1)",
+		table, table);
+	any = sqlite3_prepare_v2(member->db, sql, -1, &stmt, NULL) == SQLITE_OK &&
+	      sqlite3_step(stmt) == SQLITE_ROW &&
+	      sqlite3_column_type(stmt, 0) == SQLITE_INTEGER;
+	*first_ns = sqlite3_column_int64(stmt, 0);
+	*last_ns = sqlite3_column_int64(stmt, 1);
+	sqlite3_finalize(stmt);
+	return any && *first_ns >= 0 && *last_ns >= *first_ns && *last_ns <= TIME_MAX;
+}
+
+/* Describe a member; the ones before it are described. */
+static void describe(struct incise_session *session, int at)
+{
+	struct incise_session_info *info = &session->info[at];
+	struct incise_recording *member = session->members[at];
+	const struct incise_session_map *map = member->map;
+	int64_t first_ns = INT64_MAX, last_ns = -1, others_first = INT64_MAX,
+		others_last = INT64_MIN;
+
+	for (int i = 0; i < INCISE_STREAMS_MAX; i++) {
+		int64_t first, last;
+
+		if (!incise_session_span(member, tables[i], &first, &last))
+			continue;
+		first_ns = first < first_ns ? first : first_ns;
+		last_ns = last > last_ns ? last : last_ns;
+		if (*info->streams)
+			strcat(info->streams, ", ");
+		strcat(info->streams, stream_names[i]);
+	}
+	info->complete = member->meta.complete;
+	info->first_ns = info->last_ns = -1;
+	for (size_t i = 0; i < map->n; i++)
+		info->uncertainty_ns = fmax(info->uncertainty_ns, map->knots[i].bound_ns);
+	info->offset_ns = map->knots[0].to_ns - map->knots[0].t_ns;
+	if (last_ns < 0)
+		return;
+	info->first_ns = incise_session_time(map, first_ns);
+	info->last_ns = incise_session_time(map, last_ns);
+	info->offset_ns = info->first_ns - first_ns;
+	if (last_ns > first_ns)
+		info->rate_ppm = 1e6 * ((double)(info->last_ns - info->first_ns) /
+						(double)(last_ns - first_ns) -
+					1);
+	for (int i = 0; i < at; i++) {
+		const struct incise_session_info *other = &session->info[i];
+
+		if (other->last_ns < 0)
+			continue;
+		others_first =
+			other->first_ns < others_first ? other->first_ns : others_first;
+		others_last = other->last_ns > others_last ? other->last_ns : others_last;
+	}
+	if (others_first > others_last)
+		return;
+	info->overlap_ns =
+		(info->last_ns < others_last ? info->last_ns : others_last) -
+		(info->first_ns > others_first ? info->first_ns : others_first);
+}
+
+static bool has(const struct incise_session_info *info, int stream)
+{
+	return strstr(info->streams, stream_names[stream]) != NULL;
+}
+
+/* --- the choice ---------------------------------------------------------------------- */
+
+static int find_member(const struct incise_session *session, const char *name,
+		       size_t length)
+{
+	for (int i = 0; i < session->n; i++)
+		if (strlen(session->info[i].name) == length &&
+		    !strncmp(session->info[i].name, name, length))
+			return i;
+	return -1;
+}
+
+static int find_stream(const char *name, size_t length)
+{
+	for (int i = 0; i < INCISE_STREAMS_MAX; i++)
+		if (strlen(stream_names[i]) == length &&
+		    !strncmp(stream_names[i], name, length))
+			return i;
+	return -1;
+}
+
+/* "a, b": the members with a stream, or all with -1; to be freed. */
+static char *list(const struct incise_session *session, int stream, const char *between)
+{
+	char *text = strdup("");
+
+	for (int i = 0; i < session->n && text; i++) {
+		char *before = text;
+
+		if (stream >= 0 && !has(&session->info[i], stream))
+			continue;
+		if (asprintf(&text, "%s%s%s", before, *before ? between : "",
+			     session->info[i].name) < 0)
+			text = NULL;
+		free(before);
+	}
+	return text;
+}
+
+/* One part of a choice: "b", or "force=a". */
+static int take_part(struct incise_session *session, const char *part, size_t length,
+		     const char *folder, struct incise_error *err)
+{
+	const char *equals = memchr(part, '=', length);
+	const char *name = equals ? equals + 1 : part;
+	size_t n = length - (size_t)(name - part);
+	int member = find_member(session, name, n);
+	int stream = equals ? find_stream(part, (size_t)(equals - part)) : -1;
+	char *names;
+
+	if (member >= 0 && equals && stream < 0)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: no stream '%.*s'; there are: force, tracker, "
+			"camera",
+			folder, (int)(equals - part), part);
+	if (member >= 0 && equals && !has(&session->info[member], stream))
+		return incise_error_set(err, EINVAL,
+					"%s: member %.*s has no %s; it has: %s", folder,
+					(int)n, name, stream_names[stream],
+					session->info[member].streams);
+	if (member < 0) {
+		names = list(session, -1, ", ");
+		incise_error_set(err, EINVAL, "%s: no member '%.*s'; there are: %s",
+				 folder, (int)n, name, names ? names : "");
+		free(names);
+		return -EINVAL;
+	}
+	for (int i = 0; i < INCISE_STREAMS_MAX; i++)
+		if ((i == stream || (stream < 0 && session->of[i] < 0)) &&
+		    has(&session->info[member], i))
+			session->of[i] = member;
+	return 0;
+}
+
+/* Choose the member of each stream: by the choice, else the only one that has it. */
+static int choose(struct incise_session *session, const char *folder, const char *choice,
+		  struct incise_error *err)
+{
+	int rc = 0;
+
+	bool any = false;
+
+	for (int i = 0; i < INCISE_STREAMS_MAX; i++)
+		session->of[i] = -1;
+	while (!rc && *choice) {
+		size_t n = strcspn(choice, ",");
+
+		if (n == 1 && *choice == '*')
+			any = true;
+		else
+			rc = take_part(session, choice, n, folder, err);
+		choice += n + (choice[n] == ',');
+	}
+	for (int i = 0; i < INCISE_STREAMS_MAX && !rc; i++) {
+		int n = 0, first = 0;
+		char *names;
+
+		for (int k = session->n - 1; k >= 0; k--)
+			if (has(&session->info[k], i)) {
+				n++;
+				first = k;
+			}
+		if (session->of[i] < 0 && n > 1 && !any) {
+			names = list(session, i, " and ");
+			rc = incise_error_set(
+				err, EINVAL,
+				"%s: %s was recorded by %s; choose one: %s:%s for all "
+				"that it has, or %s:%s=%s",
+				folder, stream_names[i], names ? names : "", folder,
+				session->info[first].name, folder, stream_names[i],
+				session->info[first].name);
+			free(names);
+		} else if (session->of[i] < 0) {
+			session->of[i] = first;
+		}
+	}
+	return rc;
+}
+
+/* --- a recording of them ------------------------------------------------------------- */
+
+struct incise_recording *incise_recording_member(const struct incise_recording *recording,
+						 const char *table)
+{
+	const struct incise_session *session = recording->session;
+	int stream = !strcmp(table, "force") ? 0 : !strcmp(table, "frames") ? 2 : 1;
+
+	if (!session || !strcmp(table, "events"))
+		return (struct incise_recording *)recording;
+	/* The session's clock is that of its first member. */
+	return session->members[strcmp(table, "wall") ? session->of[stream] : 0];
+}
+
+static void merge_meta(struct incise_recording *rec)
+{
+	const struct incise_session *session = rec->session;
+	const struct incise_recording_info *force =
+		&incise_recording_member(rec, "force")->meta;
+	const struct incise_recording_info *tracker =
+		&incise_recording_member(rec, "tracker")->meta;
+	struct incise_recording_info *to = &rec->meta;
+
+	*to = *force;
+	memcpy(to->started, session->members[0]->meta.started, sizeof(to->started));
+	memcpy(to->rig, session->members[0]->meta.rig, sizeof(to->rig));
+	to->tracker = tracker->tracker;
+	to->tracker_lost = tracker->tracker_lost;
+	to->depth = tracker->depth;
+	memcpy(to->surface_normal, tracker->surface_normal, sizeof(to->surface_normal));
+	memcpy(to->surface_point_mm, tracker->surface_point_mm,
+	       sizeof(to->surface_point_mm));
+	memcpy(to->tip_mm, tracker->tip_mm, sizeof(to->tip_mm));
+	to->depth_mm_px = incise_recording_member(rec, "frames")->meta.depth_mm_px;
+	for (int i = 0; i < session->n; i++)
+		to->complete = to->complete && session->members[i]->meta.complete;
+}
+
+/* The events of a member, with its name in front, on the session's clock. */
+static int copy_events(struct incise_session *session, int at, sqlite3_stmt *insert,
+		       struct incise_error *err)
+{
+	struct incise_recording *member = session->members[at];
+	struct incise_rows rows;
+	int rc = incise_rows_open(&rows, member, "events", "rowid, t_ns, kind, text",
+				  "iitt", UINT64_MAX, err);
+
+	while (!rc && (rc = incise_rows_next(&rows, err)) > 0) {
+		char *text;
+
+		rc = 0;
+		if (asprintf(&text, "%s: %s", session->info[at].name,
+			     (const char *)sqlite3_column_text(rows.stmt, 3)) < 0) {
+			rc = incise_error_set(err, ENOMEM, "%s: out of memory",
+					      member->path);
+			break;
+		}
+		sqlite3_reset(insert);
+		sqlite3_bind_int64(insert, 1, rows.t_ns); /* mapped */
+		sqlite3_bind_value(insert, 2, sqlite3_column_value(rows.stmt, 2));
+		sqlite3_bind_text(insert, 3, text, -1, SQLITE_TRANSIENT);
+		if (sqlite3_step(insert) != SQLITE_DONE)
+			rc = incise_error_set(err, ENOMEM, "%s: out of memory",
+					      member->path);
+		free(text);
+	}
+	incise_rows_close(&rows);
+	return rc;
+}
+
+/* The session's own database is replaced by one in memory, with the events of all members. */
+static int merge_events(struct incise_recording *rec, struct incise_error *err)
+{
+	sqlite3_stmt *insert = NULL;
+	int rc = 0;
+
+	sqlite3_close(rec->db);
+	rec->db = NULL;
+	if (sqlite3_open_v2(":memory:", &rec->db,
+			    SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX,
+			    NULL) != SQLITE_OK ||
+	    sqlite3_exec(rec->db,
+			 "CREATE TABLE events(t_ns INTEGER NOT NULL, kind TEXT NOT NULL, "
+			 "text TEXT NOT NULL)",
+			 NULL, NULL, NULL) != SQLITE_OK ||
+	    sqlite3_prepare_v2(rec->db, "INSERT INTO events VALUES(?, ?, ?)", -1, &insert,
+			       NULL) != SQLITE_OK)
+		rc = incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+	for (int i = 0; i < rec->session->n && !rc; i++)
+		rc = copy_events(rec->session, i, insert, err);
+	sqlite3_finalize(insert);
+	return rc;
+}
+
+int incise_session_open(struct incise_recording *rec, const char *folder,
+			const char *choice, struct incise_error *err)
+{
+	struct incise_session *session = calloc(1, sizeof(*session));
+	int rc = check(rec->db, folder, err);
+
+	rec->session = session;
+	if (session) {
+		session->info =
+			calloc(INCISE_SESSION_MEMBERS_MAX, sizeof(*session->info));
+		session->members =
+			calloc(INCISE_SESSION_MEMBERS_MAX, sizeof(*session->members));
+		session->maps =
+			calloc(INCISE_SESSION_MEMBERS_MAX, sizeof(*session->maps));
+	}
+	if (!session || !session->info || !session->members || !session->maps)
+		return incise_error_set(err, ENOMEM, "%s: out of memory", folder);
+	if (!rc)
+		rc = read_members(session, rec->db, folder, err);
+	for (int i = 0; i < session->n && !rc; i++) {
+		rc = read_map(session, i, rec->db, folder, err);
+		if (!rc)
+			describe(session, i);
+	}
+	if (!rc)
+		rc = choose(session, folder, choice, err);
+	if (!rc)
+		rc = merge_events(rec, err);
+	if (rc)
+		return rc;
+	rec->form = session->members[0]->form;
+	merge_meta(rec);
+	return 0;
+}
+
+void incise_session_close(struct incise_session *session)
+{
+	if (!session)
+		return;
+	for (int i = 0; i < session->n; i++) {
+		incise_recording_close(session->members[i]);
+		free(session->maps[i].knots);
+	}
+	free(session->info);
+	free(session->members);
+	free(session->maps);
+	free(session);
+}
+
+int incise_session_members(const struct incise_recording *recording,
+			   const struct incise_session_info **members)
+{
+	if (!recording->session)
+		return 0;
+	*members = recording->session->info;
+	return recording->session->n;
+}

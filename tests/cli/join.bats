@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise join, as a user meets it; its arithmetic is in tests/unit/record/session.c.
+
+bats_require_minimum_version 1.5.0
+
+# b's clock is 3 s behind and 50 ppm fast: TAI is 1000 s + t of a, and 1003 s + (1 + 50e-6) t of b.
+setup_file() {
+	cd "$BATS_FILE_TMPDIR"
+	rig=sim:clock=simulated,cut_s=2,pause_s=1
+	"$INCISE_BUILD/bin/incise" capture -o a.rec --rig $rig,seed=1 --duration 5s \
+		--clock-source sim:1000,0,20 >/dev/null
+	"$INCISE_BUILD/bin/incise" capture -o b.rec --rig $rig,seed=2 --duration 5s \
+		--clock-source sim:1003,50,30 >/dev/null
+	"$INCISE_BUILD/bin/incise" capture -o none.rec --rig $rig,seed=3 --duration 1s >/dev/null
+}
+
+setup() {
+	PATH=$INCISE_BUILD/bin:$PATH
+	mkdir "$BATS_TEST_TMPDIR/work"
+	cd "$BATS_TEST_TMPDIR/work"
+	cp -r "$BATS_FILE_TMPDIR"/*.rec .
+}
+
+failed_with() {
+	[ "$status" -eq 1 ]
+	[ "${#stderr_lines[@]}" -eq 1 ]
+	[[ "$stderr" == "incise join: "*"$1"* ]] || { echo "$stderr"; false; }
+}
+
+key() {
+	sqlite3 :memory: "SELECT json_extract(readfile('$1'), '\$.$2')"
+}
+
+sum() {
+	sha256sum "$@" | cut -d' ' -f1
+}
+
+@test "join states offset, rate, uncertainty and overlap, and keeps the recordings to the bit" {
+	before=$(sum a.rec/recording.db b.rec/recording.db)
+	run -0 --separate-stderr incise join a.rec b.rec -o day.rec --within 1ms
+	[ -z "$stderr" ]
+	[ "${lines[0]}" = "a: force, tracker, 1.000 to 6.000 s, on $(uname -n)" ]
+	# b's 1 s is TAI 1004.00005 s, and that 4.00005 s of a
+	[[ "${lines[2]}" == "  offset 3.000050000 s, rate +50.0000 ppm, uncertainty 0.05"*" ms, by clocks" ]]
+	[ "${lines[3]}" = "  overlap with those before: 2.000 s" ]
+	[ "${lines[-1]}" = "wrote day.rec" ]
+	[ "$(sum a.rec/recording.db b.rec/recording.db)" = "$before" ]
+	[ "$(sum day.rec/a/recording.db day.rec/b/recording.db)" = "$before" ]
+	incise join b.rec a.rec -o again.rec --json >join.json
+	[ "$(key join.json 'members[1].name')" = a ]
+	# 1 / 1.00005, and times in whole ns
+	sqlite3 :memory: "SELECT abs($(key join.json 'members[1].rate_ppm') + 49.9975) < 1e-3" |
+		grep -qx 1
+}
+
+@test "a joined recording is read like one: verify, info, export, train, plot, Python" {
+	incise join a.rec b.rec -o day.rec >/dev/null
+	run -0 --separate-stderr incise verify day.rec
+	[ "${lines[-1]}" = "day.rec: complete, and as it was written" ]
+	[[ "${lines[0]}" == "force    100000 expected, 100000 present, 0 lost"* ]]
+	incise info day.rec | grep -q '^  offset 3.000050000 s'
+	incise info day.rec --json >info.json
+	[ "$(key info.json 'members[1].method')" = clocks ]
+	# a folder that is moved as a whole
+	mkdir other && mv day.rec other/
+	incise export other/day.rec:a --resample | cut -d, -f2- >by_session.csv
+	incise export a.rec --resample | cut -d, -f2- >alone.csv
+	cmp by_session.csv alone.csv
+	incise export other/day.rec:force=a,tracker=b --resample --rate 100 -o mixed.csv
+	# there is a pose where both machines recorded, 2 s of it
+	poses=$(tail -n +2 mixed.csv | grep -cv nan)
+	[ "$poses" -ge 195 ] && [ "$poses" -le 201 ]
+	incise export other/day.rec:b -o b.mcap
+	incise train other/day.rec:a -o a.fis
+	incise plot other/day.rec:b -o b.png
+	[ -s a.fis ] && [ -s b.png ]
+	! command -v python3 >/dev/null || PYTHONPATH=$BATS_TEST_DIRNAME/../../python python3 -c '
+import incise
+assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.tracker'
+}
+
+@test "a stream of several machines needs a choice; the error lists them" {
+	incise join a.rec b.rec -o day.rec >/dev/null
+	for command in "export day.rec" "plot day.rec -o p.png" "train day.rec -o m.fis"; do
+		# shellcheck disable=SC2086
+		run -1 --separate-stderr incise $command
+		[[ "$stderr" == *"day.rec: force was recorded by a and b; choose one: day.rec:a for all that it has, or day.rec:force=a" ]]
+	done
+	run -1 --separate-stderr incise export day.rec:z
+	[[ "$stderr" == *"no member 'z'; there are: a, b" ]]
+	run -1 --separate-stderr incise export day.rec:camera=a
+	[[ "$stderr" == *"member a has no camera; it has: force, tracker" ]]
+}
+
+@test "join refuses what the clocks do not support, and writes nothing" {
+	run --separate-stderr incise join a.rec b.rec -o day.rec --within 10us
+	failed_with "b.rec: its times are uncertain by 0.05"
+	run --separate-stderr incise join a.rec none.rec -o day.rec
+	failed_with "none.rec: has no wall time; align by a signal that both recorded (--align tap)"
+	run --separate-stderr incise join a.rec b.rec -o day.rec --align sync
+	failed_with "a.rec: no event of the SYNC line"
+	run --separate-stderr incise join a.rec a.rec -o day.rec
+	failed_with "a.rec and a.rec: the same recording; give it once"
+	[ ! -e day.rec ] && [ ! -e day.rec.part ]
+	incise join a.rec b.rec -o day.rec >/dev/null
+	run --separate-stderr incise join day.rec none.rec -o two.rec
+	failed_with "day.rec: is a joined recording; give those in it, for example day.rec/a"
+	run --separate-stderr incise join a.rec b.rec -o a.rec --overwrite
+	failed_with "a.rec: is an input"
+	run --separate-stderr incise join a.rec b.rec -o day.rec
+	failed_with "exists"
+	incise join b.rec a.rec -o day.rec --overwrite >/dev/null
+	incise info day.rec --json >info.json
+	[ "$(key info.json 'members[0].name')" = b ]
+}
+
+@test "join names a recording that is damaged, and one that was interrupted" {
+	sqlite3 b.rec/recording.db "UPDATE force SET code = code + 1 WHERE seq = 77"
+	run --separate-stderr incise join a.rec b.rec -o day.rec
+	failed_with "b.rec: not as it was recorded"
+	incise join a.rec b.rec -o day.rec --damaged 2>/dev/null >/dev/null
+	run -1 --separate-stderr incise verify day.rec
+	[[ "$output" == *"day.rec: b: "* ]]
+	# what lies in it is checked for what was joined
+	sqlite3 day.rec/b/recording.db "UPDATE ledger SET crc = crc + 1"
+	run -1 --separate-stderr incise export day.rec:a
+	[[ "$stderr" == *"member b is not the recording that was joined"* ]]
+}

@@ -1,0 +1,467 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Tests of joined recordings, lib/record/join and lib/record/read/session.c. Machine a's clock is
+ * the true time, less 1000 s of TAI; that of b is 3 s ahead, and 50 ppm slow:
+ *
+ *     b's reading = (t + 3 s) / (1 + 50e-6)
+ *
+ * Both record the same motion (the same seed); b's rows are put on b's clock by SQL here, with a
+ * formula that the code under test never sees.
+ */
+#include "recorded.h"
+#include <incise/session.h>
+#include <incise/verify.h>
+#include "../../../lib/base/random.h"
+#include "../../../lib/record/join/align.h"
+
+#define SPEC "sim:clock=simulated,cut_s=2,pause_s=1"
+#define S 1000000000LL
+#define BOUND_NS 20000.0 /* that each clock states */
+
+/* A time of a, in SQL, on b's clock. */
+#define ON_B(t) "CAST(round((" t " + 3000000000) / 1.00005) AS INTEGER)"
+
+/* Put the rows of a recording on b's clock. */
+static void move_to_b(const char *file)
+{
+	change(file, "UPDATE force SET t_ns = " ON_B("t_ns"));
+	change(file, "UPDATE tracker SET t_ns = " ON_B("t_ns") ", arrival_ns = " ON_B(
+			     "arrival_ns"));
+	change(file, "UPDATE depth SET t_ns = " ON_B("t_ns"));
+	change(file, "UPDATE knots SET t_ns = " ON_B("t_ns"));
+	change(file, "UPDATE events SET t_ns = " ON_B("t_ns"));
+}
+
+/* Give a recording points of wall time, a second apart, each wrong by less than its bound. */
+static void set_wall(const char *file, bool is_b, const char *reference, uint64_t *random,
+		     double bound_ns)
+{
+	change(file, "DELETE FROM wall");
+	for (int i = 0; i < 12; i++) {
+		int64_t true_ns = S / 2 + i * S;
+		int64_t t_ns =
+			is_b ? llround((double)(true_ns + 3 * S) / 1.00005) : true_ns;
+		int64_t tai_ns =
+			1000 * S + true_ns +
+			llround(0.9 * bound_ns * incise_random_symmetric(random));
+		char sql[500];
+
+		snprintf(
+			sql, sizeof(sql),
+			"INSERT INTO wall(seq, t_ns, tai_ns, uncertainty_ns, rate_ppb, "
+			"rate_uncertainty_ppb, utc_offset_s, held, source, reference, "
+			"leap, restart) VALUES(%d, %lld, %lld, %.1f, %.1f, 1000.0, 37, 0, "
+			"'ptp', '%s', 'ptp', '')",
+			i, (long long)t_ns, (long long)tai_ns, bound_ns,
+			is_b ? 50000.0 : 0.0, reference);
+		change(file, sql);
+	}
+}
+
+static void remove_session(const char *name)
+{
+	char command[100];
+
+	snprintf(command, sizeof(command), "rm -rf %s", name);
+	assert_int_equal(system(command), 0);
+}
+
+static void two_machines(int64_t duration_ns)
+{
+	record("a.rec", SPEC, duration_ns);
+	record("b.rec", SPEC ",seed=1", duration_ns);
+	move_to_b("b.rec/recording.db");
+}
+
+static const char *const both[] = {"a.rec", "b.rec"};
+
+static int join(const struct incise_session_options *options, struct incise_error *err)
+{
+	*err = (struct incise_error){0};
+	return incise_session_join(both, 2, options, "s.rec", err);
+}
+
+static struct incise_recording *open_it(const char *path)
+{
+	struct incise_error err = {0};
+	struct incise_recording *recording = incise_recording_open(path, &err);
+
+	if (!recording)
+		fail_msg("%s", err.text);
+	return recording;
+}
+
+/* Compare b's poses and forces, by the session, with a's: largest difference, ns. */
+static double largest_error_ns(void)
+{
+	struct incise_recording *a = open_it("a.rec"), *s = open_it("s.rec:b");
+	struct incise_tracker_sample *expected, *found;
+	struct incise_recording_value *force, *force_found;
+	int n = incise_recording_poses(a, &expected, NULL);
+	int n_force = incise_recording_values(a, "force", &force, NULL);
+	double largest = 0;
+
+	assert_true(n > 200 && n_force > 10000);
+	assert_int_equal(incise_recording_poses(s, &found, NULL), n);
+	assert_int_equal(incise_recording_values(s, "force", &force_found, NULL),
+			 n_force);
+	for (int i = 0; i < n; i++) {
+		assert_true(found[i].position_mm[0] == expected[i].position_mm[0]);
+		assert_true(!i || found[i].t_ns > found[i - 1].t_ns);
+		largest = fmax(largest, fabs((double)(found[i].t_ns - expected[i].t_ns)));
+	}
+	for (int i = 0; i < n_force; i++) {
+		assert_true(force_found[i].value == force[i].value);
+		largest = fmax(largest,
+			       fabs((double)(force_found[i].t_ns - force[i].t_ns)));
+	}
+	free(expected);
+	free(found);
+	free(force);
+	free(force_found);
+	incise_recording_close(a);
+	incise_recording_close(s);
+	return largest;
+}
+
+static struct incise_session_info info_of(int at)
+{
+	struct incise_recording *s = open_it("s.rec:*");
+	const struct incise_session_info *members;
+	struct incise_session_info info;
+
+	assert_true(incise_session_members(s, &members) > at);
+	info = members[at];
+	incise_recording_close(s);
+	return info;
+}
+
+/* 100 times, with other errors of the clocks: no time is wrong by more than is stated. */
+static void test_clocks(void **state)
+{
+	struct incise_error err;
+	uint64_t random = 1;
+	double worst = 0;
+
+	two_machines(2 * S);
+	for (int run = 0; run < 100; run++) {
+		struct incise_session_info b;
+		double error_ns;
+
+		set_wall("a.rec/recording.db", false, "TAI", &random, BOUND_NS);
+		set_wall("b.rec/recording.db", true, "TAI", &random, BOUND_NS);
+		if (join(&(struct incise_session_options){.within_s = 400e-6}, &err))
+			fail_msg("%s", err.text);
+		b = info_of(1);
+		error_ns = largest_error_ns();
+		worst = fmax(worst, error_ns);
+		/* 2 ns: roundings of b's times, here and there. */
+		if (error_ns > b.uncertainty_ns + 2)
+			fail_msg("run %d: wrong by %g ns, stated %g ns", run, error_ns,
+				 b.uncertainty_ns);
+		assert_true(b.uncertainty_ns >= 2 * BOUND_NS);
+		assert_true(fabs(b.rate_ppm - 50) < 1e6 * 4 * BOUND_NS / 2e9);
+		assert_string_equal(b.method, "clocks");
+		assert_true(b.overlap_ns > 1900 * MS);
+		remove_session("s.rec");
+	}
+	/* A bound that is never approached would be none. */
+	assert_true(worst > 0.5 * BOUND_NS);
+}
+
+/* What --within asks is refused where it is not reached. */
+static void test_refusals(void **state)
+{
+	const char *const twice[] = {"a.rec", "a.rec"}, *const nested[] = {"s.rec",
+									   "b.rec"};
+	const struct incise_session_options any = {0}, close = {.within_s = 10e-6};
+	struct incise_error err;
+	uint64_t random = 1;
+
+	two_machines(2 * S);
+	/* No wall time at all. */
+	assert_int_equal(join(&any, &err), -ENODATA);
+	assert_non_null(strstr(err.text, "a.rec: has no wall time"));
+	set_wall("a.rec/recording.db", false, "TAI", &random, BOUND_NS);
+	set_wall("b.rec/recording.db", true, "ptp:001122", &random, BOUND_NS);
+	assert_int_equal(join(&any, &err), -ENODATA);
+	assert_non_null(strstr(err.text, "different references (TAI and ptp:001122)"));
+	set_wall("b.rec/recording.db", true, "TAI", &random, BOUND_NS);
+	assert_int_equal(join(&close, &err), -ERANGE);
+	assert_non_null(strstr(err.text, "b.rec: its times are uncertain by "));
+	/* Not synchronised: whatever it says, its error is not known. */
+	change("b.rec/recording.db", "UPDATE wall SET uncertainty_ns = NULL");
+	if (!join(&any, &err) || !strstr(err.text, "b.rec"))
+		fail_msg("joined, or: %s", err.text);
+	set_wall("b.rec/recording.db", true, "TAI", &random, BOUND_NS);
+	/* A clock that went back. */
+	change("b.rec/recording.db",
+	       "UPDATE wall SET tai_ns = tai_ns - 2000000000, restart "
+	       "= CASE seq WHEN 1 THEN 'step' ELSE '' END WHERE seq > 0");
+	assert_true(join(&close, &err) < 0);
+	assert_true(access("s.rec", F_OK) && access("s.rec.part", F_OK));
+	set_wall("b.rec/recording.db", true, "TAI", &random, BOUND_NS);
+	assert_int_equal(incise_session_join(twice, 2, &any, "s.rec", &err), -EINVAL);
+	assert_int_equal(join(&any, &err), 0);
+	assert_int_equal(join(&any, &err), -EEXIST);
+	assert_int_equal(incise_session_join(nested, 2, &any, "t.rec", &err), -EINVAL);
+	/* A stream that both have needs a choice, which names both. */
+	assert_null(incise_recording_open("s.rec", &err));
+	assert_non_null(
+		strstr(err.text, "force was recorded by a and b; choose one: s.rec:a"));
+	err = (struct incise_error){0};
+	assert_null(incise_recording_open("s.rec:c", &err));
+	assert_non_null(strstr(err.text, "no member 'c'; there are: a, b"));
+	err = (struct incise_error){0};
+	assert_null(incise_recording_open("a.rec:b", &err));
+	assert_non_null(strstr(err.text, "not a joined one"));
+}
+
+/* Verification covers the members and the session's own tables. */
+static void test_verify(void **state)
+{
+	struct incise_verify_report report;
+	struct incise_error err;
+	uint64_t random = 1;
+
+	record("a.rec", SPEC, 2 * S);
+	record("b.rec", SPEC ",seed=2", 2 * S);
+	set_wall("a.rec/recording.db", false, "TAI", &random, BOUND_NS);
+	set_wall("b.rec/recording.db", false, "TAI", &random, BOUND_NS);
+	/* As if they had been written so. */
+	for (int i = 0; i < 2; i++) {
+		const char *file = i ? "b.rec/recording.db" : "a.rec/recording.db";
+
+		change(file, "DELETE FROM ledger WHERE stream = 'wall'");
+	}
+	assert_int_equal(join(&(struct incise_session_options){0}, &err), 0);
+	assert_int_equal(incise_verify("s.rec", NULL, &report, &err), 0);
+	assert_int_equal(report.streams[0].present, 40000);
+	assert_string_equal(report.streams[0].name, "force");
+	change("s.rec/b/recording.db", "UPDATE force SET code = code + 1 WHERE seq = 5");
+	assert_int_equal(incise_verify("s.rec", NULL, &report, &err), 0);
+	assert_false(report.intact);
+	/* Another recording in its place is noticed when it is opened. */
+	change("s.rec/b/recording.db", "UPDATE ledger SET crc = crc + 1");
+	assert_null(incise_recording_open("s.rec:a", &err));
+	assert_non_null(strstr(err.text, "member b is not the recording"));
+	remove_session("s.rec");
+	assert_int_equal(join(&(struct incise_session_options){0}, &err), 0);
+	change("s.rec/recording.db", "UPDATE maps SET session_ns = session_ns + 1");
+	err = (struct incise_error){0};
+	assert_null(incise_recording_open("s.rec:a", &err));
+	assert_non_null(strstr(err.text, "not as they were written"));
+}
+
+/* The force of one machine with the tracker of the other is as from one machine. */
+static void test_pairs(void **state)
+{
+	struct incise_export_options options;
+	struct incise_recording *recordings[2];
+	struct incise_error err;
+	uint64_t random = 7;
+	double largest = 0, stated = 0;
+	int rows = 0;
+	FILE *files[2];
+	char lines[2][500];
+
+	two_machines(10 * S);
+	set_wall("a.rec/recording.db", false, "TAI", &random, BOUND_NS);
+	set_wall("b.rec/recording.db", true, "TAI", &random, BOUND_NS);
+	if (join(&(struct incise_session_options){0}, &err))
+		fail_msg("%s", err.text);
+	recordings[0] = open_it("a.rec");
+	recordings[1] = open_it("s.rec:force=a,tracker=b");
+	incise_export_options_init(&options);
+	options.resample = true;
+	options.rate_hz = 100;
+	assert_int_equal(incise_export(&recordings[0], 1, &options, "a.csv", NULL, &err),
+			 0);
+	assert_int_equal(incise_export(&recordings[1], 1, &options, "s.csv", NULL, &err),
+			 0);
+	files[0] = fopen("a.csv", "r");
+	files[1] = fopen("s.csv", "r");
+	while (fgets(lines[0], sizeof(lines[0]), files[0])) {
+		double t[2], x[2], u[2], v[2];
+
+		assert_non_null(fgets(lines[1], sizeof(lines[1]), files[1]));
+		if (!rows++)
+			continue;
+		for (int i = 0; i < 2; i++)
+			if (sscanf(lines[i],
+				   "%*[^,],%*d,%lf,%lf,%*f,%*f,%lf,%*f,%*f,%*f,%*f,"
+				   "%*d,%*d,%*f,%*f,%lf",
+				   &t[i], &x[i], &u[i], &v[i]) != 4)
+				fail_msg("%s", lines[i]);
+		assert_true(t[0] == t[1]);
+		if (isnan(x[0]) || isnan(x[1]))
+			continue;
+		largest = fmax(largest, fabs(x[0] - x[1]));
+		/* Twice the bound of the time at the largest speed of the hand, and digits. */
+		stated = 2 * 2 * BOUND_NS * 1e-9 * 100 + 1e-4;
+		assert_true(fabs(x[0] - x[1]) <= stated);
+		/* Noise is propagated from points that are 20 us off, 0.5 % of their distance. */
+		assert_true(u[1] >= 0.99 * u[0] - 1e-4);
+	}
+	assert_true(rows > 900 && largest > 0);
+	fclose(files[0]);
+	fclose(files[1]);
+	incise_recording_close(recordings[0]);
+	incise_recording_close(recordings[1]);
+}
+
+/* --- signals ------------------------------------------------------------------------- */
+
+/* Taps at these true times, s. */
+static const double taps_s[] = {2.0123, 2.6371, 4.1034, 8.5219};
+#define TAPS (int)(sizeof(taps_s) / sizeof(*taps_s))
+
+/* Knock: the force rises by half of the range within a sample and falls in 20 ms. */
+static void knock_force(const char *file, int taps)
+{
+	char sql[300];
+
+	for (int i = 0; i < taps; i++) {
+		snprintf(
+			sql, sizeof(sql),
+			"UPDATE force SET code = code + CAST(1500 * (1 - (t_ns - %.0f) / 2e7) "
+			"AS INTEGER) WHERE t_ns >= %.0f AND t_ns < %.0f",
+			taps_s[i] * 1e9, taps_s[i] * 1e9, taps_s[i] * 1e9 + 2e7);
+		change(file, sql);
+	}
+}
+
+/* And the scalpel, which moves at 200 mm/s, bounces: at the times of the tracker's line. */
+static void knock_tracker(const char *file, int taps)
+{
+	struct incise_recording *recording = open_it("b.rec");
+	struct incise_tracker_sample *poses;
+	int n = incise_recording_poses(recording, &poses, NULL);
+
+	incise_recording_close(recording);
+	for (int i = 0; i < taps; i++)
+		for (int k = 0; k < n; k++) {
+			double far_s = fabs((double)poses[k].t_ns * 1e-9 - taps_s[i]);
+			char sql[200];
+
+			if (far_s > 0.05)
+				continue;
+			snprintf(sql, sizeof(sql),
+				 "UPDATE tracker SET x_mm = x_mm + %.9f WHERE seq = %llu",
+				 400 * (0.05 - far_s), (unsigned long long)poses[k].seq);
+			change(file, sql);
+		}
+	free(poses);
+}
+
+/* A force and a tracker without any wall time, four taps: offset and rate within the bound. */
+static void test_taps(void **state)
+{
+	const struct incise_session_options taps = {.align = INCISE_ALIGN_TAP};
+	struct incise_session_info b;
+	struct incise_error err;
+	double error_ns;
+
+	record("a.rec", SPEC, 10 * S);
+	record("b.rec", SPEC ",seed=1", 10 * S);
+	knock_force("a.rec/recording.db", TAPS);
+	knock_tracker("b.rec/recording.db", TAPS);
+	move_to_b("b.rec/recording.db");
+	/* Only the tracker of b is used: its force knows of no tap. */
+	change("b.rec/recording.db",
+	       "DELETE FROM force; UPDATE meta SET value = 0 WHERE key "
+	       "= 'force_rows'");
+	if (join(&taps, &err))
+		fail_msg("%s", err.text);
+	b = info_of(1);
+	assert_int_equal(b.matches, TAPS);
+	assert_string_equal(b.method, "tap");
+	assert_true(isnan(b.agreement_ns));
+	/* b's first row is that of a time of a that the formula says. */
+	error_ns =
+		fabs((double)b.first_ns -
+		     ask("a.rec/recording.db", "SELECT t_ns FROM tracker ORDER BY seq"));
+	if (error_ns > b.uncertainty_ns)
+		fail_msg("wrong by %g ms, stated %g ms", error_ns * 1e-6,
+			 b.uncertainty_ns * 1e-6);
+	/* 120 Hz: corners are found within the time between two records. */
+	assert_true(error_ns < 4 * MS && b.uncertainty_ns < 50 * MS);
+}
+
+/* One tap of two forces, at 10 kHz; and clocks that agree with it, or do not. */
+static void test_agreement(void **state)
+{
+	const struct incise_session_options taps = {.align = INCISE_ALIGN_TAP};
+	struct incise_session_info b;
+	struct incise_error err;
+	uint64_t random = 3;
+
+	record("a.rec", SPEC, 3 * S);
+	record("b.rec", SPEC ",seed=2", 3 * S);
+	knock_force("a.rec/recording.db", 1);
+	knock_force("b.rec/recording.db", 1);
+	move_to_b("b.rec/recording.db");
+	set_wall("a.rec/recording.db", false, "TAI", &random, BOUND_NS);
+	set_wall("b.rec/recording.db", true, "TAI", &random, BOUND_NS);
+	if (join(&taps, &err))
+		fail_msg("%s", err.text);
+	b = info_of(1);
+	assert_int_equal(b.matches, 1);
+	assert_true(fabs(b.agreement_ns) <= b.agreement_bound_ns);
+	assert_true(b.agreement_bound_ns < 1 * MS);
+	/* 0.1 ms between samples; 100 ppm over 1 s from the tap: the rate is not known. */
+	assert_true(b.uncertainty_ns < 1 * MS);
+	remove_session("s.rec");
+	change("b.rec/recording.db", "UPDATE wall SET tai_ns = tai_ns + 50000000");
+	assert_int_equal(join(&taps, &err), -ERANGE);
+	assert_non_null(strstr(err.text, "signal and clocks disagree by -"));
+	/* And no tap at all. */
+	change("b.rec/recording.db", "DELETE FROM force; DELETE FROM tracker");
+	assert_true(join(&taps, &err) < 0);
+}
+
+/* Marks in a steady rhythm match at several offsets; in an irregular one at one. */
+static void test_marks(void **state)
+{
+	struct incise_mark a[8], b[8];
+	struct incise_align_fit fit;
+	struct incise_error err = {0};
+	double bound_ns;
+
+	for (int i = 0; i < 8; i++) {
+		a[i] = (struct incise_mark){(10 + i) * S, 1e5};
+		b[i] = (struct incise_mark){(110 + i) * S, 1e5};
+	}
+	assert_int_equal(incise_align_fit(a, 4, b + 2, 3, &fit, &err), -EDOM);
+	assert_non_null(strstr(err.text, "irregular rhythm"));
+	assert_int_equal(incise_align_fit(a, 0, b, 3, &fit, NULL), -ENODATA);
+	for (int i = 0; i < 8; i++)
+		a[i].t_ns = 10 * S + i * i * S + i * 100 * MS;
+	for (int i = 0; i < 5; i++)
+		b[i].t_ns = llround((double)(a[i + 2].t_ns + 7 * S) * (1 + 30e-6));
+	/* One of them is somebody's cough. */
+	b[5].t_ns = b[4].t_ns + 333 * MS;
+	assert_int_equal(incise_align_fit(a, 8, b, 6, &fit, NULL), 0);
+	assert_int_equal(fit.matches, 5);
+	for (int i = 0; i < 5; i++) {
+		double error_ns =
+			fabs((double)(incise_align_time(&fit, b[i].t_ns, &bound_ns) -
+				      a[i + 2].t_ns));
+
+		assert_true(error_ns < 100 && error_ns < bound_ns);
+	}
+	/* 30 ppm from marks of 0.1 ms over 40 s. */
+	assert_true(fabs(fit.rate + 30e-6) < 1e-8 && fit.rate_sd < 25e-6);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		IN_FOLDER(test_clocks),	      IN_FOLDER(test_refusals),
+		IN_FOLDER(test_verify),	      IN_FOLDER(test_pairs),
+		IN_FOLDER(test_taps),	      IN_FOLDER(test_agreement),
+		cmocka_unit_test(test_marks),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise join: puts recordings of several machines on one timeline.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/session.h>
+#include "cli/cli.h"
+#include "cli/file_kind.h"
+#include "cli/json.h"
+#include "cli/recording.h"
+#include "cli/session_report.h"
+
+struct job {
+	const char *output;
+	struct incise_session_options how;
+	bool json, damaged;
+};
+
+static const char *const aligns[] = {"clocks", "tap", "sync", NULL};
+
+static const struct cli_option options[] = {
+	{'o', "output", "NAME.rec", "session to write: a folder",
+	 CLI_OUTPUT(struct job, output), .extensions = ".rec"},
+	{0, "within", "TIME",
+	 "refuse times that are uncertain by more, for example 1ms (default:\n"
+	 "state the uncertainty)",
+	 CLI_QUANTITY(struct job, how.within_s, session_times, 1e-9, 3600)},
+	{0, "align", "SIGNAL",
+	 "align by clocks (default), tap (knocks in force or motion) or sync\n"
+	 "(events of the SYNC line), and compare with the clocks",
+	 CLI_CHOICE(struct job, how.align, aligns)},
+	RECORDING_DAMAGED(struct job, damaged),
+	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct job, json)},
+	{0},
+};
+
+static const struct cli_command command = {
+	.name = "join",
+	.synopsis = "A.rec B.rec… -o SESSION.rec [OPTIONS]",
+	.summary =
+		"Put recordings of several machines on one timeline, the clock of the "
+		"first one, by their wall\n"
+		"time or by a signal that all recorded. The recordings stay as they are.",
+	.options = options,
+	.notes = "Example: incise join force.rec tracker.rec --within 1ms -o day.rec\n"
+		 "Exit codes: 0 success, 1 failure, 2 bad usage.",
+};
+
+static void print_note(void *context, const char *text)
+{
+	(void)context;
+	cli_warn("%s", text);
+}
+
+int main(int argc, char **argv)
+{
+	struct job job = {.how.note = print_note};
+	const struct incise_session_info *members;
+	struct incise_recording *session;
+	struct incise_error err = {0};
+	char *target, *path;
+	int n;
+
+	cli_parse(&command, argc, argv, &job);
+	if (argc - optind < 2)
+		cli_usage("missing %s (recordings to join)",
+			  optind == argc ? "A.rec and B.rec" : "B.rec");
+	if (!job.output)
+		cli_usage("missing -o SESSION.rec");
+	for (int i = optind; i < argc; i++) {
+		argv[i] = (char *)file_operand(argv[i], FILE_RECORDING);
+		recording_intact(argv[i], job.damaged, &err);
+		if (err.code)
+			cli_fail_with(&err);
+	}
+	target = recording_target(job.output);
+	if (incise_session_join((const char *const *)argv + optind, argc - optind,
+				&job.how, target, &err))
+		cli_fail_with(&err);
+	recording_replace(target, job.output);
+	/* Each stream of the first member that has it: what is reported is the same for all. */
+	path = cli_text("%s:*", job.output);
+	session = cli_require(incise_recording_open(path, &err), &err);
+	n = incise_session_members(session, &members);
+	if (job.json)
+		json_print(json_pack("{so so}", "path", json_text(job.output), "members",
+				     session_json(members, n)));
+	else
+		session_print(members, n);
+	incise_recording_close(session);
+	free(path);
+	free(target);
+	if (!job.json)
+		cli_written();
+	cli_finish();
+	return 0;
+}
