@@ -34,7 +34,7 @@ static const struct cli_option options[] = {
 	 "pose: NAME, NAME-rates; timeline: NAME, NAME-windows",
 	 CLI_OUTPUTS(struct bench_run, plot)},
 	{0, "duration", "TIME",
-	 "capture: of each run (default: 7s); loop: of each\nmeasurement of wake-up latency (default: 5s)",
+	 "capture: of each run (default: 7s); loop and serve:\nof each measurement of wake-up latency (default: 5s)",
 	 CLI_DURATION(struct bench_run, seconds, 1, 86400)},
 	{0, "load", "NAME",
 	 "loop: wake-up latency under one load only: idle,\ncpu, memory, disk or view",
@@ -52,7 +52,7 @@ static const struct cli_option options[] = {
 static const struct bench *const benches[] = {
 	&bench_precision, &bench_training, &bench_stability, &bench_loop,
 	&bench_pose,	  &bench_timeline, &bench_vision,    &bench_capture,
-	&bench_scenes,	  &bench_integers, &bench_extremes,
+	&bench_serve,	  &bench_scenes,   &bench_integers,  &bench_extremes,
 };
 
 /* --- help --- */
