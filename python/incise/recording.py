@@ -121,6 +121,7 @@ class Info(NamedTuple):
     cuts: int
     depth_max_mm: float
     force_max_N: float
+    newtons: bool  #: the force channel measures N: full_scale_V and offset_V are in N
     streams: Tuple[Stream, ...]
 
 

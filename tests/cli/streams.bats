@@ -113,7 +113,8 @@ ask() {
 	run -1 --separate-stderr incise capture -o a.rec
 	[[ "$stderr" == *"force: no LSL stream \"$name\" found within 5 s; start the program that sends it"* ]]
 	[ "${#stderr_lines[@]}" = 1 ]
-	send lsl_send "$name" --unit N --seconds 6
+	send lsl_send "$name" --unit N --seconds 8
+	[[ "$(incise info devices)" == *'force       = "lsl:'"$name"'";'* ]]
 	for channel in Mx:"channel 0 of the stream has the unit \"Nm\"; expected N, mN, kN, V or mV" \
 		t:"channel 2 of the stream has no unit" \
 		9:"name its channel, as in lsl:NAME:CHANNEL; the stream has Mx (Nm), Fz (N), t (no unit)" \
@@ -132,6 +133,32 @@ ask() {
 	send lsl_send "$name" --irregular --seconds 20
 	run -1 --separate-stderr incise capture -o b.rec
 	[[ "$stderr" == *"has a nominal rate of 0 Hz; expected 1 to 100000 Hz (a regular stream)" ]]
+}
+
+@test "an LSL stream whose program starts again goes on, and the hole is counted" {
+	lsl
+	send lsl_send "$name" --recover --seconds 3
+	first=$(cat began)
+	incise capture -o a.rec --duration 7s --json >report.json 2>err &
+	capture=$!
+	wait "$sender"
+	send lsl_send "$name" --recover --seconds 20
+	# exit 1: some are lost
+	status=0
+	wait "$capture" || status=$?
+	[ "$status" = 1 ] || complain "$status: $(cat err)"
+	# The first one ended 3 s after it began; the second one is found again by its source id.
+	python3 - "$first" "$(cat began)" <<-'END'
+		import sqlite3, sys
+		first, second = map(int, sys.argv[1:])
+		rows = sqlite3.connect("a.rec/recording.db").execute("SELECT seq, t_ns FROM force ORDER BY seq").fetchall()
+		hole = max(range(1, len(rows)), key=lambda i: rows[i][1] - rows[i - 1][1])
+		(before, a), (after, b) = rows[hole - 1], rows[hole]
+		assert a < first + 3e9 + 1e6 and b > second - 1e6, (first, second, a, b)
+		# the number goes on as 1000 a second would
+		assert abs((b - a) * 1e-6 - (after - before)) <= 2, (before, a, after, b)
+		assert len(rows) - hole > 100, (len(rows), hole)
+	END
 }
 
 # A server of poses on a port of its own.

@@ -49,6 +49,7 @@ class Recordings(Case):
         self.assertEqual(info.cuts, 14)
         self.assertEqual(info.force, self.sql("SELECT count(*) FROM force")[0][0])
         self.assertEqual(info.force_mV_N, 1240)
+        self.assertIs(info.newtons, False)
         self.assertEqual([s.name for s in info.streams], ["force", "tracker"])
         self.assertEqual(info.streams[1].lost, 0)
         self.assertEqual(info.surface_normal, (0, 0, 1))
