@@ -126,3 +126,21 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	run -1 --separate-stderr incise export day.rec:a
 	[[ "$stderr" == *"member b is not the recording that was joined"* ]]
 }
+
+@test "a gap costs no accuracy, and TAI is that of the machine" {
+	incise capture -o late.rec --rig sim:clock=simulated,seed=9 --duration 1s \
+		--clock-source sim:8000,50,30 >/dev/null
+	run -0 --separate-stderr incise join a.rec late.rec -o day.rec
+	# a's last row is at 6 s, the other's first at 7001.00005 s of a
+	[ "${lines[3]}" = "  no overlap with those before: a gap of 6995.000 s" ]
+	[[ "${lines[2]}" == *"uncertainty 0.05"*" ms, by clocks" ]]
+	incise export day.rec:late --resample --rate 100 --tai -o joined.csv
+	incise export late.rec --resample --rate 100 --tai -o alone.csv
+	tai() { awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == "tai_ns") c = i }
+		NR == 2 { print $c, $(c + 1) }' "$1"; }
+	read -r joined bound <<<"$(tai joined.csv)"
+	read -r alone _ <<<"$(tai alone.csv)"
+	[ "$alone" = 8001000050000 ]
+	[ $((joined - alone)) -le "$bound" ] && [ $((alone - joined)) -le "$bound" ]
+	[ "$bound" -lt 200000 ]
+}

@@ -100,6 +100,15 @@ static int find_wall(struct incise_messages *messages, struct incise_error *err)
 	/* A recording that claims to have it, and has it not, is not to be trusted. */
 	if (!messages->wall && none.code != ENODATA)
 		return incise_error_set(err, none.code, "%s", none.text);
+	/* Of a joined recording, times may be far from the points; they go on from the last. */
+	if (messages->wall) {
+		const struct incise_wall_point *last;
+		size_t n = incise_wall_points(messages->wall, &last);
+
+		last += n - 1;
+		messages->wall_ns =
+			last->tai_ns - last->t_ns - last->utc_offset_s * INCISE_NS_PER_S;
+	}
 	return 0;
 }
 

@@ -24,7 +24,6 @@
 #include "align.h"
 
 #define NS_PER_S 1000000000LL
-#define FAR_NS (59 * NS_PER_S)	/* wall time is known for 60 s around its points */
 #define KNOT_APART_NS 1000000LL /* closer knots say nothing more */
 
 struct member {
@@ -201,8 +200,8 @@ static void find_ends(const struct member *first, int64_t ends_ns[2])
 	const struct incise_wall_point *points;
 	size_t n = incise_wall_points(first->wall, &points);
 
-	ends_ns[0] = points[0].t_ns - FAR_NS;
-	ends_ns[1] = points[n - 1].t_ns + FAR_NS;
+	ends_ns[0] = points[0].t_ns - INCISE_SESSION_FAR_NS;
+	ends_ns[1] = points[n - 1].t_ns + INCISE_SESSION_FAR_NS;
 }
 
 /*

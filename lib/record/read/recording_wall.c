@@ -10,6 +10,7 @@
 #include "../ledger.h"
 #include "../schema.h"
 #include "recording.h"
+#include "session.h"
 
 #define POINTS_MAX 10000000 /* one a second for 115 days */
 
@@ -97,7 +98,8 @@ struct incise_wall *incise_recording_wall(struct incise_recording *rec,
 	size_t n = 0;
 	int rc = 0;
 
-	rec = incise_recording_member(rec, "wall");
+	if (rec->session)
+		return incise_session_wall(rec->session, err);
 	if (rec->form >= 3) {
 		sql = sqlite3_mprintf("SELECT %s FROM %s ORDER BY seq", form->columns,
 				      form->table);

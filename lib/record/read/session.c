@@ -695,6 +695,89 @@ int incise_session_open(struct incise_recording *rec, const char *folder,
 	return 0;
 }
 
+/* The point where the session's clock goes over to TAI's rate; false: it is not known there. */
+static bool far_point(const struct incise_wall *wall, const struct incise_wall_point *end,
+		      int64_t t_ns, struct incise_wall_point *far)
+{
+	int64_t bound_ns;
+
+	*far = *end;
+	far->t_ns = t_ns;
+	far->rate_ppb = far->rate_uncertainty_ppb = 0;
+	*far->restart = 0;
+	if (incise_wall_tai(wall, t_ns, &far->tai_ns, &bound_ns))
+		return false;
+	far->uncertainty_ns =
+		bound_ns == INCISE_WALL_UNKNOWN ? INFINITY : (double)bound_ns;
+	return true;
+}
+
+/*
+ * Points beyond those of the first member, before and behind, up to the session's ends. The bounds are
+ * those of rows of any member: wider by the error of their times on the first one's clock.
+ */
+static struct incise_wall *extend(const struct incise_wall *wall, int64_t first_ns,
+				  int64_t last_ns, double wider_ns)
+{
+	const struct incise_wall_point *points;
+	size_t n = incise_wall_points(wall, &points), at = 0;
+	struct incise_wall_point *all = calloc(n + 4, sizeof(*all));
+	struct incise_wall *extended;
+	int64_t from_ns = points[0].t_ns - INCISE_SESSION_FAR_NS;
+	int64_t to_ns = points[n - 1].t_ns + INCISE_SESSION_FAR_NS;
+
+	if (!all)
+		return NULL;
+	if (first_ns < from_ns && far_point(wall, &points[0], from_ns, &all[1])) {
+		all[0] = all[1];
+		all[0].t_ns = first_ns;
+		all[0].tai_ns -= from_ns - first_ns;
+		at = 2;
+	}
+	memcpy(all + at, points, n * sizeof(*all));
+	at += n;
+	if (last_ns > to_ns && far_point(wall, &points[n - 1], to_ns, &all[at])) {
+		all[at + 1] = all[at];
+		all[at + 1].t_ns = last_ns;
+		all[at + 1].tai_ns += last_ns - to_ns;
+		at += 2;
+	}
+	for (size_t i = 0; i < at; i++)
+		all[i].uncertainty_ns += wider_ns;
+	extended = incise_wall_new(all, at);
+	free(all);
+	return extended;
+}
+
+struct incise_wall *incise_session_wall(const struct incise_session *session,
+					struct incise_error *err)
+{
+	struct incise_wall *wall = incise_recording_wall(session->members[0], err);
+	struct incise_wall *extended;
+	int64_t first_ns = INT64_MAX, last_ns = INT64_MIN;
+	double wider_ns = 0;
+
+	/* By a signal the others' clocks are those of the first one, not of TAI. */
+	for (int i = 0; i < session->n; i++) {
+		const struct incise_session_info *info = &session->info[i];
+
+		wider_ns = fmax(wider_ns, info->uncertainty_ns);
+		if (info->last_ns < info->first_ns ||
+		    (i && strcmp(info->method, "clocks")))
+			continue;
+		first_ns = info->first_ns < first_ns ? info->first_ns : first_ns;
+		last_ns = info->last_ns > last_ns ? info->last_ns : last_ns;
+	}
+	if (!wall || first_ns > last_ns)
+		return wall;
+	extended = extend(wall, first_ns, last_ns, wider_ns);
+	incise_wall_free(wall);
+	if (!extended)
+		incise_error_set(err, errno, "%s: its wall time: %s",
+				 session->members[0]->path, strerror(errno));
+	return extended;
+}
+
 void incise_session_close(struct incise_session *session)
 {
 	if (!session)

@@ -19,6 +19,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <incise/session.h>
+#include <incise/wall.h>
 #include "recording.h"
 
 #define INCISE_SESSION_APPLICATION 0x494e4353 /* "INCS", SQLite's application_id */
@@ -69,6 +70,16 @@ bool incise_session_is(sqlite3 *db);
 int incise_session_open(struct incise_recording *rec, const char *folder,
 			const char *choice, struct incise_error *err);
 void incise_session_close(struct incise_session *session);
+
+/*
+ * How far from its points of wall time the first member's clock goes on at its own rate; beyond, the
+ * session's goes on as TAI does.
+ */
+#define INCISE_SESSION_FAR_NS 59000000000LL
+
+/* The wall time of a session. As incise_recording_wall(). */
+struct incise_wall *incise_session_wall(const struct incise_session *session,
+					struct incise_error *err);
 
 /* A time of a member's clock on the session's, ns; without a map the same. */
 int64_t incise_session_time(const struct incise_session_map *map, int64_t t_ns);

@@ -13,6 +13,7 @@
 #include <incise/verify.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/record/join/align.h"
+#include "../../../lib/record/read/session.h"
 
 #define SPEC "sim:clock=simulated,cut_s=2,pause_s=1"
 #define S 1000000000LL
@@ -253,6 +254,90 @@ static void test_verify(void **state)
 	assert_non_null(strstr(err.text, "not as they were written"));
 }
 
+/* Change the tables of a session as a forger would, who knows the seal. */
+static void forge(const char *sql)
+{
+	char *text = NULL;
+	sqlite3 *db;
+	uint32_t crc;
+	char seal[100];
+
+	assert_int_equal(sqlite3_open("s.rec/recording.db", &db), SQLITE_OK);
+	if (sqlite3_exec(db, sql, NULL, NULL, &text) != SQLITE_OK)
+		fail_msg("%s: %s", sql, text);
+	assert_int_equal(incise_session_seal(db, &crc), SQLITE_OK);
+	snprintf(seal, sizeof(seal), "UPDATE session SET value = %u WHERE key = 'seal'",
+		 crc);
+	assert_int_equal(sqlite3_exec(db, seal, NULL, NULL, NULL), SQLITE_OK);
+	sqlite3_close(db);
+}
+
+/* Whatever is in the tables: an error, or times that increase and stay in range. */
+static void test_forged(void **state)
+{
+	static const char *const refused[] = {
+		"UPDATE members SET name = '../../etc' WHERE member = 1",
+		"UPDATE members SET name = '' WHERE member = 1",
+		"UPDATE members SET name = '.' WHERE member = 1",
+		"UPDATE members SET name = 'a' WHERE member = 1",
+		"UPDATE members SET name = char(27) || 'b' WHERE member = 1",
+		"UPDATE members SET name = printf('%0100d', 1) WHERE member = 1",
+		"UPDATE members SET ledger = '' WHERE member = 1",
+		"DELETE FROM members WHERE member = 1",
+		"DELETE FROM maps WHERE member = 1",
+		"DELETE FROM maps WHERE member = 1 AND knot > 0",
+		"UPDATE maps SET session_ns = 5 WHERE member = 1",
+		"UPDATE maps SET session_ns = -session_ns",
+		"UPDATE maps SET t_ns = 9223372036854775807 WHERE knot = 1",
+		"UPDATE maps SET t_ns = -9223372036854775807 WHERE knot = 0",
+		"UPDATE maps SET session_ns = 9223372036854775807 WHERE knot = 1",
+		"UPDATE maps SET bound_ns = -1.0",
+		"UPDATE maps SET bound_ns = 9e999",
+		"UPDATE maps SET t_ns = 'x', session_ns = x'00'",
+		"DROP TABLE maps; CREATE VIEW maps AS SELECT 1 AS member, 1 AS knot, 1 AS t_ns, "
+		"1 AS session_ns, 1.0 AS bound_ns",
+	};
+	struct incise_error err;
+	uint64_t random = 5;
+
+	record("a.rec", SPEC, S);
+	record("b.rec", SPEC ",seed=2", S);
+	set_wall("a.rec/recording.db", false, "TAI", &random, BOUND_NS);
+	set_wall("b.rec/recording.db", false, "TAI", &random, BOUND_NS);
+	for (size_t i = 0; i < sizeof(refused) / sizeof(*refused); i++) {
+		assert_int_equal(join(&(struct incise_session_options){0}, &err), 0);
+		forge(refused[i]);
+		err = (struct incise_error){0};
+		if (incise_recording_open("s.rec:b", &err) || !err.code)
+			fail_msg("opened after: %s", refused[i]);
+		remove_session("s.rec");
+	}
+	/* A map that is possible, but wild. */
+	assert_int_equal(join(&(struct incise_session_options){0}, &err), 0);
+	for (int i = 0; i < 50; i++) {
+		struct incise_recording *recording;
+		struct incise_tracker_sample *poses;
+		char sql[200];
+		int n;
+
+		snprintf(
+			sql, sizeof(sql),
+			"UPDATE maps SET session_ns = %.0f + knot * %.0f WHERE member = 1",
+			2e18 * incise_random_symmetric(&random),
+			1 + 1e12 * fabs(incise_random_symmetric(&random)));
+		forge(sql);
+		recording = incise_recording_open("s.rec:b", &err);
+		if (!recording)
+			continue;
+		n = incise_recording_poses(recording, &poses, &err);
+		for (int k = 1; k < n; k++)
+			assert_true(poses[k].t_ns > poses[k - 1].t_ns);
+		if (n > 0)
+			free(poses);
+		incise_recording_close(recording);
+	}
+}
+
 /* The force of one machine with the tracker of the other is as from one machine. */
 static void test_pairs(void **state)
 {
@@ -457,10 +542,10 @@ static void test_marks(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		IN_FOLDER(test_clocks),	      IN_FOLDER(test_refusals),
-		IN_FOLDER(test_verify),	      IN_FOLDER(test_pairs),
-		IN_FOLDER(test_taps),	      IN_FOLDER(test_agreement),
-		cmocka_unit_test(test_marks),
+		IN_FOLDER(test_clocks),	   IN_FOLDER(test_refusals),
+		IN_FOLDER(test_verify),	   IN_FOLDER(test_forged),
+		IN_FOLDER(test_pairs),	   IN_FOLDER(test_taps),
+		IN_FOLDER(test_agreement), cmocka_unit_test(test_marks),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
