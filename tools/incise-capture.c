@@ -2,6 +2,7 @@
 /*
  * incise capture: records the streams of a rig in sync: tracker, force, camera.
  */
+#include <errno.h>
 #include <limits.h>
 #include <math.h>
 #include <signal.h>
@@ -12,6 +13,7 @@
 #include <incise/recorder.h>
 #include <incise/rig.h>
 #include <incise/sim.h>
+#include "capture/start.h"
 #include "capture/terminal.h"
 #include "cli/cli.h"
 #include "cli/json.h"
@@ -19,6 +21,8 @@
 #include "cli/stream_report.h"
 
 #define POLL_NS 10000000LL
+/* The first point of wall time comes at once, unless its source hangs. */
+#define WALL_PATIENCE_NS (3 * INCISE_NS_PER_S)
 
 enum camera { CAMERA_AUTO, CAMERA_OFF, CAMERA_PICTURES, CAMERA_DEPTH };
 
@@ -27,6 +31,8 @@ struct options {
 	enum camera camera;
 	double trigger_force_N;
 	bool trigger_button;
+	const char *trigger_sync; /* device of the module; NULL: none */
+	struct start_time start_at;
 	double duration_s; /* 0: not given */
 	bool cuts, json;
 	const char *clock_source;
@@ -34,7 +40,8 @@ struct options {
 
 static const char *const cameras[] = {"auto", "off", "frames", "depth", NULL};
 
-static const char *const triggers[] = {"button", NULL}; /* or a force */
+static const char *const triggers[] = {"button", "sync", NULL}; /* or a force */
+#define SYNC_DEVICE "/dev/incise-stepper0"
 
 static void parse_trigger(void *whole, char *text)
 {
@@ -42,10 +49,27 @@ static void parse_trigger(void *whole, char *text)
 	struct options *options = whole;
 
 	options->trigger_button = !strcmp(text, triggers[0]);
-	options->trigger_force_N =
-		options->trigger_button
-			? 0
-			: cli_quantity("--trigger", text, units, 1e-3, 1e4);
+	options->trigger_force_N = 0;
+	options->trigger_sync = NULL;
+	if (!strcmp(text, triggers[1]))
+		options->trigger_sync = SYNC_DEVICE;
+	else if (!strncmp(text, "sync:", 5) && text[5])
+		options->trigger_sync = text + 5;
+	else if (!options->trigger_button)
+		options->trigger_force_N =
+			cli_quantity("--trigger", text, units, 1e-3, 1e4);
+}
+
+static void parse_start_at(void *whole, char *text)
+{
+	start_time_parse(&((struct options *)whole)->start_at, text);
+}
+
+/* Whether the recorder waits for something before it records. */
+static bool waits(const struct options *options)
+{
+	return options->trigger_button || options->trigger_force_N > 0 ||
+	       options->trigger_sync || options->start_at.given;
 }
 
 static const struct cli_option option_table[] = {
@@ -67,9 +91,14 @@ static const struct cli_option option_table[] = {
 	 "no camera)",
 	 CLI_CHOICE(struct options, camera, cameras)},
 	{0, "trigger", "WHAT",
-	 "wait for the button of the stylus, or for a force such as 0.2N;\n"
-	 "the second before it is recorded too",
+	 "wait for the button of the stylus, for a force such as 0.2N, or for\n"
+	 "sync[:DEVICE], a pulse of the SYNC line of the stepper module; the\n"
+	 "second before it is recorded too",
 	 CLI_PARSED_BY(parse_trigger), .names = triggers},
+	{0, "start-at", "TIME",
+	 "wait for a time, for example 2026-11-27T12:00:00Z (UTC), or with\n"
+	 "TAI in place of Z; the second before it is recorded too",
+	 CLI_PARSED_BY(parse_start_at)},
 	{0, "clock-source", "SOURCE",
 	 "where the wall time comes from: auto (default),\n"
 	 "ptp[:SOCKET[,DOMAIN]], chrony[:PORT], kernel or none; of a\n"
@@ -114,6 +143,11 @@ static void parse(struct options *options, int argc, char **argv)
 		cli_usage("-o: the path is too long; give a shorter one");
 	cli_output(output);
 	options->output = output;
+	if (options->start_at.given &&
+	    (options->trigger_button || options->trigger_force_N > 0 ||
+	     options->trigger_sync))
+		cli_usage("--start-at and --trigger exclude each other; give one of "
+			  "them");
 }
 
 /* --- recording ----------------------------------------------------------------------- */
@@ -132,9 +166,13 @@ struct run {
 	int64_t start_ns, end_ns; /* of the recording; end_ns INT64_MAX: not known */
 	int64_t held_ns;	  /* recorded before the trigger */
 	bool armed;
+	int sync;	 /* events of the stepper module; -1: none */
+	int64_t sync_ns; /* of the last pulse that was noted */
 	int markers;
-	int64_t judged_ns; /* when the poses were last looked at */
-	bool warned;	   /* of flagged poses */
+	bool timed;	     /* the time of --start-at was compared once */
+	const char *refused; /* why nothing is to be recorded */
+	int64_t judged_ns;   /* when the poses were last looked at */
+	bool warned;	     /* of flagged poses */
 	struct result result;
 };
 
@@ -176,6 +214,63 @@ static void handle_keys(struct run *run)
 			cli_stop = SIGINT;
 		}
 	}
+}
+
+#define SYNC_EVERY_NS INCISE_NS_PER_S
+
+/* A pulse of the SYNC line triggers; of the others one a second is an event. */
+static void follow_sync(struct run *run)
+{
+	struct incise_error err = {0};
+	struct start_pulse pulse;
+	bool lost = false;
+	char text[40];
+
+	while (run->sync >= 0 && start_sync_next(run->sync, &pulse, &lost)) {
+		if (!run->armed && pulse.t_ns - run->sync_ns < SYNC_EVERY_NS)
+			continue;
+		snprintf(text, sizeof(text), "pulse %lld", (long long)pulse.number);
+		if (incise_recorder_mark_at(run->recorder, pulse.t_ns, "sync", text,
+					    &err))
+			give_up(run, &err);
+		run->sync_ns = pulse.t_ns;
+		if (!run->armed)
+			continue;
+		incise_recorder_trigger(run->recorder);
+		break;
+	}
+	if (lost && run->armed) {
+		incise_error_set(&err, ENODEV,
+				 "--trigger sync: %s: is gone; reconnect it",
+				 run->options->trigger_sync);
+		give_up(run, &err);
+	}
+}
+
+/* The time of --start-at triggers, within a poll. */
+static void follow_time(struct run *run, int64_t now_ns)
+{
+	const struct start_time *start_at = &run->options->start_at;
+	int64_t left_ns;
+
+	if (!start_at->given || !run->armed)
+		return;
+	left_ns = start_time_left(start_at, run->recorder, now_ns);
+	if (left_ns == INT64_MAX && now_ns - run->start_ns < WALL_PATIENCE_NS)
+		return;
+	if (left_ns == INT64_MAX)
+		run->refused = "--start-at: the clock of this rig has no wall time; see "
+			       "--clock-source";
+	else if (!run->timed && left_ns < 0)
+		run->refused = "--start-at: this time is in the past";
+	run->timed = true;
+	if (run->refused)
+		return;
+	if (left_ns <= 0)
+		incise_recorder_trigger(run->recorder);
+	snprintf(run->view.last, sizeof(run->view.last),
+		 left_ns > 0 ? "starts in %.0f s" : "",
+		 ceil((double)left_ns / (double)INCISE_NS_PER_S));
 }
 
 /* The recording starts, maybe at its trigger; this sets its end. */
@@ -236,16 +331,17 @@ static void record(struct run *run)
 	int rc = 0;
 
 	start(run, now);
-	if (run->options->trigger_button || run->options->trigger_force_N > 0) {
+	if (waits(run->options)) {
 		/* After its cuts the virtual rig triggers nothing. */
 		run->armed = true;
 		run->end_ns =
-			incise_rig_sim(run->rig)
+			incise_rig_sim(run->rig) && !run->options->start_at.given &&
+					!run->options->trigger_sync
 				? now + incise_sim_duration(incise_rig_sim(run->rig))
 				: INT64_MAX;
 		run->view.planned_s = 0;
 	}
-	while (!cli_stop && now < run->end_ns && !rc) {
+	while (!cli_stop && now < run->end_ns && !rc && !run->refused) {
 		next = now > next + POLL_NS ? now : next + POLL_NS;
 		if (next > run->end_ns)
 			next = run->end_ns;
@@ -254,6 +350,8 @@ static void record(struct run *run)
 		rc = incise_recorder_poll(run->recorder, &err);
 		if (rc < 0)
 			give_up(run, &err);
+		follow_sync(run);
+		follow_time(run, now);
 		if (run->armed) {
 			incise_recorder_stats(run->recorder, &stats);
 			if (!stats.armed) {
@@ -289,6 +387,8 @@ static void keep_old(const struct run *run, const char *new)
 	    (!stats->armed && !cli_overwrite()))
 		return;
 	recording_remove(new);
+	if (run->refused)
+		cli_fail("%s; nothing was recorded", run->refused);
 	if (run->result.early.code)
 		cli_fail_with(&run->result.early);
 	cli_fail("%s: %s; nothing was recorded%s", run->options->output,
@@ -461,7 +561,8 @@ int main(int argc, char **argv)
 	setup.trigger_force_N = options.trigger_force_N;
 	setup.trigger_button = options.trigger_button;
 	setup.clock_source = options.clock_source;
-	setup.armed = options.trigger_button || options.trigger_force_N > 0;
+	setup.armed = waits(&options);
+	run.sync = options.trigger_sync ? start_sync_open(options.trigger_sync) : -1;
 	incise_force_info(incise_rig_force(run.rig), &force);
 	incise_force_calibration(&force, &calibration);
 	run.view.full_scale_N = force.full_scale_V * 1e3 / calibration.force_mV_N;

@@ -104,6 +104,8 @@ struct incise_recorder_wall {
 	struct incise_wall_sampler *sampler; /* NULL: without wall time */
 	struct incise_ledger ledger;
 	uint64_t rows;
+	bool known;
+	struct incise_wall_point newest;
 	int n_kept;
 	struct incise_wall_point kept[3];
 };

@@ -446,6 +446,8 @@ static int put_point(struct incise_recorder *rec, const struct incise_wall_point
 	struct incise_recorder_wall *wall = &rec->wall;
 	const int most = sizeof(wall->kept) / sizeof(*wall->kept);
 
+	wall->known = true;
+	wall->newest = *point;
 	if (!rec->stats.armed)
 		return write_wall(rec, point, err);
 	if (wall->n_kept == most) {

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# Wall time on the command line: capture, info, export; starts by a time and by the SYNC line.
+bats_require_minimum_version 1.5.0
+load cli.bash
+
+setup() {
+	cd "$BATS_TEST_TMPDIR"
+	quick="sim:clock=simulated,cut_s=1,pause_s=0.5"
+	real="sim:clock=real"
+}
+
+ask() { # RECORDING SQL
+	sqlite3 "$1/recording.db" "$2"
+}
+
+@test "capture --clock-source, info and export have the time of a simulated clock" {
+	incise capture -o a.rec --rig "$quick" --duration 5s --clock-source sim:1800000000,50,3
+	run -0 --separate-stderr incise info a.rec
+	[[ "$output" == *"wall time  2027-01-15T07:59:24."*"Z to 2027-01-15T07:59:29."*"bound) 0.003 ms to 0.003 ms"* ]]
+	[[ "$output" == *"by simulated, time of TAI; TAI is UTC + 37 s (assumed)"* ]]
+	# the first force sample is at t_ns 1e9 of the rig, on the mapping to 1 ns
+	run -0 --separate-stderr incise info a.rec --json
+	jq -e '.wall.start | (.tai_ns - 1800000000000000000 - .t_ns * 1.00005 | fabs) < 1000' <<<"$output"
+	jq -e '.wall | .sources == ["simulated"] and .restarts == [] and .held == 0' <<<"$output"
+	run -0 --separate-stderr incise export a.rec --resample --rate 10 --tai
+	[[ "${lines[0]}" == *,tai_ns,tai_u_ns ]]
+	[[ "${lines[1]}" == *,18000000???????????,300? ]]
+	run -0 --separate-stderr incise export a.rec --rate 10 --tai --lineage
+	[[ "$output" == *"# wall_start_utc: 2027-01-15T07:59:23."* || "$output" == *"# wall_start_utc: 2027-01-15T07:59:24."* ]]
+	[[ "$output" == *"# wall_source: simulated, time of TAI"* ]]
+	run -2 --separate-stderr incise export a.rec --average 3x3 --tai
+	incise verify a.rec
+}
+
+@test "without wall time info says so, and export --tai is refused" {
+	incise capture -o a.rec --rig "$quick" --duration 3s
+	run -0 --separate-stderr incise info a.rec
+	[[ "$output" == *"wall time  none"* ]]
+	run -0 --separate-stderr incise info a.rec --json
+	jq -e '.wall == null' <<<"$output"
+	run -1 --separate-stderr incise export a.rec --resample --tai
+	failed_with "a.rec: has no wall time: its clock was simulated"
+}
+
+@test "a recording of a real clock has the time of this computer" {
+	before=$(date +%s)
+	incise capture -o a.rec --rig "$real" --duration 500ms
+	after=$(date +%s)
+	run -0 --separate-stderr incise info a.rec --json
+	# a source may correct the clock; a second is more than any here does
+	jq -e --argjson a "$before" --argjson b "$after" '.wall as $w |
+		$w.start.tai_ns / 1e9 - $w.utc_offset_s |
+		. >= $a - 2 and . <= $b + 2' <<<"$output"
+	incise verify a.rec
+}
+
+@test "sources that are not there, or not of this clock" {
+	for source in sundial kernel: ptp: ptp:/x,128 ptp:,1 chrony:0 chrony:x sim:1; do
+		run -1 --separate-stderr incise capture -o a.rec --rig "$real" --duration 100ms \
+			--clock-source $source
+		failed_with "clock source '$source'"
+		[ ! -e a.rec.part ]
+	done
+	run -1 --separate-stderr incise capture -o a.rec --rig "$quick" --clock-source ptp
+	failed_with "is simulated and has no wall time"
+	# no daemon behind it: the time is that of the clock, of unknown error
+	incise capture -o a.rec --rig "$real" --duration 100ms --clock-source "ptp:$PWD/none"
+	[ "$(ask a.rec "SELECT DISTINCT source, uncertainty_ns IS NULL FROM wall")" = "plain|1" ]
+}
+
+@test "capture --start-at starts then, within a poll" {
+	incise capture -o a.rec --rig "$quick" --clock-source sim:1800000000 --duration 1s \
+		--start-at 2027-01-15T08:00:10.5TAI
+	# the second before it is recorded too; a poll is 10 ms
+	[ "$(ask a.rec "SELECT min(t_ns) BETWEEN 9490000000 AND 9530000000 FROM force")" = 1 ]
+	[ "$(ask a.rec "SELECT max(t_ns) BETWEEN 11490000000 AND 11530000000 FROM force")" = 1 ]
+	incise verify a.rec
+	# the same time in UTC
+	incise capture -o b.rec --rig "$quick" --clock-source sim:1800000000 --duration 1s \
+		--start-at 2027-01-15T07:59:33.5Z
+	[ "$(ask a.rec "SELECT min(t_ns) FROM force")" = "$(ask b.rec "SELECT min(t_ns) FROM force")" ]
+}
+
+@test "times that cannot be" {
+	for time in 2020-02-30T00:00:00Z 2027-01-15T08:00:10 2027-01-15T08:00:10.Z now \
+		2027-01-15T08:00:10+01:00 2027-01-15; do
+		run -2 --separate-stderr incise capture -o a.rec --rig "$quick" --start-at "$time"
+		bad_usage "--start-at: expected a time such as"
+	done
+	run -2 --separate-stderr incise capture -o a.rec --rig "$quick" \
+		--start-at 2027-01-15T08:00:10Z --trigger button
+	bad_usage "exclude each other"
+	run -1 --separate-stderr incise capture -o a.rec --rig "$quick" --clock-source sim \
+		--start-at 2020-01-01T00:00:00Z
+	failed_with "this time is in the past"
+	run -1 --separate-stderr incise capture -o a.rec --rig "$quick" \
+		--start-at 2027-01-15T08:00:10Z
+	failed_with "has no wall time"
+	# waiting ends by SIGINT, and leaves nothing
+	run -1 --separate-stderr timeout --preserve-status -s INT 1 incise capture -o a.rec \
+		--rig "$real" --start-at 2037-01-01T00:00:00Z
+	failed_with "nothing was recorded"
+	[ ! -e a.rec ] && [ ! -e a.rec.part ]
+}
+
+@test "capture --trigger sync starts at a pulse, whose edge is an event" {
+	mkfifo events
+	# an input, which is no pulse, and then pulses 7, 8, …; held open to the end
+	python3 - <<-'END' &
+		import struct, time
+		with open("events", "wb", buffering=0) as pipe:
+		    def event(kind, number):
+		        pipe.write(struct.pack("<QqqHHI", 1, time.monotonic_ns(), number, kind, 0, 0))
+		    event(3, 0)
+		    time.sleep(0.5)
+		    try:
+		        for number in range(7, 1000):
+		            event(4, number)
+		            time.sleep(0.2)
+		    except BrokenPipeError:
+		        pass
+	END
+	incise capture -o a.rec --rig "$real" --trigger sync:events --duration 300ms
+	wait
+	[ "$(ask a.rec "SELECT text FROM events WHERE kind = 'sync' ORDER BY rowid LIMIT 1")" = "pulse 7" ]
+	# noted at its edge, a poll or more before the trigger was seen
+	[ "$(ask a.rec "SELECT (SELECT t_ns FROM events WHERE kind = 'trigger') >
+		(SELECT min(t_ns) FROM events WHERE kind = 'sync')")" = 1 ]
+	run -1 --separate-stderr incise capture -o b.rec --rig "$real" --trigger sync:/dev/null
+	failed_with "not a controller of the stepper module"
+	run -1 --separate-stderr incise capture -o b.rec --rig "$real" --trigger sync:none
+	failed_with "No such file"
+}
