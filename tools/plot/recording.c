@@ -18,6 +18,7 @@
 #include <incise/arrow.h>
 #include <incise/clock.h>
 #include <incise/recording.h>
+#include "../cli/batch.h"
 #include "../cli/cli.h"
 #include "../cli/plot.h"
 #include "../cli/recording.h"
@@ -28,45 +29,6 @@
 /* Margins and key, in shares of the width. */
 #define LEFT 0.09
 #define RIGHT 0.88
-
-/* --- rows of a stream ------------------------------------------------------------------ */
-
-static double real_at(const struct ArrowArray *batch, int column, int64_t i)
-{
-	const struct ArrowArray *array = batch->children[column];
-	const uint8_t *known = array->buffers[0];
-
-	i += array->offset;
-	return known && !(known[i / 8] >> i % 8 & 1)
-		       ? NAN
-		       : ((const double *)array->buffers[1])[i];
-}
-
-static int64_t whole_at(const struct ArrowArray *batch, int column, int64_t i)
-{
-	const struct ArrowArray *array = batch->children[column];
-
-	return ((const int64_t *)array->buffers[1])[i + array->offset];
-}
-
-static bool flag_at(const struct ArrowArray *batch, int column, int64_t i)
-{
-	const struct ArrowArray *array = batch->children[column];
-
-	i += array->offset;
-	return ((const uint8_t *)array->buffers[1])[i / 8] >> i % 8 & 1;
-}
-
-/* A text of at most size - 1 bytes. */
-static void text_at(const struct ArrowArray *batch, int column, int64_t i, char *text,
-		    size_t size)
-{
-	const struct ArrowArray *array = batch->children[column];
-	const int32_t *at = (const int32_t *)array->buffers[1] + i + array->offset;
-
-	snprintf(text, size, "%.*s", at[1] - at[0],
-		 (const char *)array->buffers[2] + at[0]);
-}
 
 /* --- a line of a panel -------------------------------------------------------------------- */
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * A recording as a source: played at its pace. Its poses and forces are in memory, 100 bytes and 16
- * bytes each.
+ * A recording as a source: played at its pace, and read in batches meanwhile, so that its length
+ * does not matter.
  */
 #include <errno.h>
 #include <math.h>
@@ -10,6 +10,7 @@
 #include <time.h>
 #include <incise/recording.h>
 #include <incise/wall.h>
+#include "../cli/batch.h"
 #include "../cli/cli.h"
 #include "../cli/recording.h"
 #include "serve.h"
@@ -18,31 +19,119 @@
 /* A process that was stopped for longer goes on where it was. */
 #define STALL_NS 1000000000LL
 
+/* Rows of a stream, one after the other. */
+struct rows {
+	struct ArrowArrayStream stream; /* release NULL: not open, or at its end */
+	struct ArrowArray batch;
+	int64_t at;
+};
+
 struct playback {
 	struct serve_source base;
 	struct incise_recording *recording;
 	struct incise_recording_info info;
-	struct incise_tracker_sample *poses;
-	struct incise_recording_value *forces;
-	int n_poses, n_forces, pose, force;
+	struct rows poses, forces;
 	struct incise_frame_reader *frames;
 	int64_t frame_ns; /* the last that was sent */
-	int64_t first_ns, last_ns;
+	int64_t first_ns;
 	struct incise_wall *wall; /* NULL: the recording has no wall time */
 	int64_t utc_start_ns;	  /* of info.start_ns, to a second; 0: not known */
 	int64_t here_ns;	  /* when first_ns was played; 0: not started */
 	int64_t read_ns;
 	double speed;
 	bool endless;
-	uint64_t rounds;
 };
 
-static void start(struct playback *playback, struct serve_stream *stream, int64_t now_ns)
+static void rows_close(struct rows *rows)
 {
-	playback->here_ns = now_ns;
-	playback->pose = playback->force = 0;
+	if (rows->batch.release)
+		rows->batch.release(&rows->batch);
+	if (rows->stream.release)
+		rows->stream.release(&rows->stream);
+	*rows = (struct rows){0};
+}
+
+/* Whether there is a row, at rows->at of the batch; the stream is closed at its end. */
+static bool rows_have(struct rows *rows)
+{
+	while (rows->stream.release &&
+	       (!rows->batch.release || rows->at >= rows->batch.length)) {
+		if (rows->batch.release)
+			rows->batch.release(&rows->batch);
+		rows->at = 0;
+		if (rows->stream.get_next(&rows->stream, &rows->batch))
+			cli_fail("%s", rows->stream.get_last_error(&rows->stream));
+		if (!rows->batch.release)
+			rows_close(rows);
+	}
+	return rows->stream.release;
+}
+
+#define T_NS 1 /* the column */
+
+static int64_t rows_time(struct rows *rows)
+{
+	return rows_have(rows) ? whole_at(&rows->batch, T_NS, rows->at) : INT64_MAX;
+}
+
+static void rows_open(struct rows *rows, struct incise_recording *recording,
+		      const char *what)
+{
+	struct incise_error err = {0};
+
+	rows_close(rows);
+	if (incise_recording_stream(recording, what, NULL, &rows->stream, &err))
+		cli_fail_with(&err);
+}
+
+/* From the first row on. */
+static void open_rows(struct playback *playback)
+{
+	int64_t pose_ns, force_ns;
+
+	rows_open(&playback->poses, playback->recording, "tracker");
+	rows_open(&playback->forces, playback->recording, "force");
+	pose_ns = rows_time(&playback->poses);
+	force_ns = rows_time(&playback->forces);
+	playback->first_ns = pose_ns < force_ns ? pose_ns : force_ns;
+}
+
+static void start(struct playback *playback, struct serve_stream *stream)
+{
+	/* Opening takes its time. */
+	playback->here_ns = playback->read_ns = serve_now();
 	playback->frame_ns = INT64_MIN;
-	serve_play(stream, playback->first_ns, now_ns, playback->speed);
+	serve_play(stream, playback->first_ns, playback->here_ns, playback->speed);
+}
+
+static void play_pose(struct playback *playback, struct serve_stream *stream)
+{
+	const struct ArrowArray *batch = &playback->poses.batch;
+	int64_t row = playback->poses.at++;
+	double position_mm[3], quaternion[4];
+	char status[8];
+
+	text_at(batch, 10, row, status, sizeof(status));
+	if (!incise_pose_usable(*status))
+		return;
+	for (int i = 0; i < 3; i++)
+		position_mm[i] = real_at(batch, 3 + i, row);
+	for (int i = 0; i < 4; i++)
+		quaternion[i] = real_at(batch, 6 + i, row);
+	serve_pose(stream, whole_at(batch, T_NS, row), position_mm, quaternion,
+		   playback->info.tip_mm,
+		   playback->info.tracker_lost + playback->info.force_lost);
+}
+
+static void play_force(struct playback *playback, struct serve_stream *stream)
+{
+	const struct ArrowArray *batch = &playback->forces.batch;
+	int64_t row = playback->forces.at++;
+	double force_N[3] = {0, 0, real_at(batch, 3, row)};
+
+	if (!isnan(force_N[2]) && !flag_at(batch, 4, row))
+		serve_force(stream, whole_at(batch, T_NS, row), force_N,
+			    playback->info.tracker_lost + playback->info.force_lost);
 }
 
 static void play_frame(struct playback *playback, struct serve_stream *stream,
@@ -71,41 +160,32 @@ static int playback_read(struct serve_source *source, struct serve_stream *strea
 			 int64_t now_ns, int64_t *next_ns)
 {
 	struct playback *p = (struct playback *)source;
-	double force_N[3] = {0};
 	int64_t t_ns;
 	char text[400];
 
 	*next_ns = now_ns + POLL_NS;
 	if (!p->here_ns)
-		start(p, stream, now_ns);
+		start(p, stream);
 	else if (now_ns - p->read_ns > STALL_NS) {
 		p->here_ns += now_ns - p->read_ns;
 		serve_play(stream, p->first_ns, p->here_ns, p->speed);
 	}
 	p->read_ns = now_ns;
 	t_ns = p->first_ns + (int64_t)((now_ns - p->here_ns) * p->speed);
-	for (; p->pose < p->n_poses && p->poses[p->pose].t_ns <= t_ns; p->pose++)
-		if (incise_pose_usable(p->poses[p->pose].status))
-			serve_pose(stream, p->poses[p->pose].t_ns,
-				   p->poses[p->pose].position_mm,
-				   p->poses[p->pose].quaternion, p->info.tip_mm,
-				   p->info.tracker_lost + p->info.force_lost);
-	for (; p->force < p->n_forces && p->forces[p->force].t_ns <= t_ns; p->force++) {
-		force_N[2] = p->forces[p->force].value;
-		if (!isnan(force_N[2]))
-			serve_force(stream, p->forces[p->force].t_ns, force_N,
-				    p->info.tracker_lost + p->info.force_lost);
-	}
+	while (rows_time(&p->poses) <= t_ns)
+		play_pose(p, stream);
+	while (rows_time(&p->forces) <= t_ns)
+		play_force(p, stream);
 	if (p->frames)
 		play_frame(p, stream, t_ns);
 	snprintf(text, sizeof(text), "recording of %.200s", p->info.rig);
-	if (t_ns < p->last_ns) {
+	if (rows_have(&p->poses) || rows_have(&p->forces)) {
 		serve_status(stream, SERVE_RUNS, "playing", text);
 		return 0;
 	}
 	if (p->endless) {
-		p->rounds++;
-		start(p, stream, now_ns);
+		open_rows(p);
+		start(p, stream);
 		return 0;
 	}
 	serve_status(stream, SERVE_ENDED, "ended", text);
@@ -134,8 +214,8 @@ static void playback_free(struct serve_source *source)
 	incise_frame_reader_free(playback->frames);
 	incise_wall_free(playback->wall);
 	incise_recording_close(playback->recording);
-	free(playback->poses);
-	free(playback->forces);
+	rows_close(&playback->poses);
+	rows_close(&playback->forces);
 	free(playback);
 }
 
@@ -151,17 +231,25 @@ static int64_t utc_of(const char *text)
 	return end ? (int64_t)timegm(&tm) * 1000000000LL : 0;
 }
 
+static bool has_camera(const struct incise_recording_info *info)
+{
+	for (int i = 0; i < info->n_streams; i++)
+		if (!strcmp(info->streams[i].name, "camera"))
+			return true;
+	return false;
+}
+
 static void open_frames(struct playback *playback,
 			const struct serve_source_options *options)
 {
 	struct incise_error err = {0};
 
-	if (!options->camera)
+	if (!options->camera || (!options->camera_needed && !has_camera(&playback->info)))
 		return;
 	playback->frames = incise_frame_reader_new(playback->recording, &err);
 	if (!playback->frames && options->camera_needed)
 		cli_fail_with(&err);
-	if (!playback->frames && err.code != ENODATA && err.code != ENOTSUP)
+	if (!playback->frames && err.code != ENODATA)
 		cli_warn("%s; no frames are sent", err.text);
 }
 
@@ -177,35 +265,17 @@ struct serve_source *serve_recording_open(const struct serve_source_options *opt
 	p->endless = options->endless;
 	if (incise_recording_info(p->recording, &p->info, &err))
 		cli_fail_with(&err);
-	p->n_poses = incise_recording_poses(p->recording, &p->poses, &err);
-	if (p->n_poses >= 0)
-		p->n_forces =
-			incise_recording_values(p->recording, "force", &p->forces, &err);
-	if (p->n_poses < 0 || p->n_forces < 0)
-		cli_fail_with(&err);
-	if (!p->n_poses && !p->n_forces)
+	open_rows(p);
+	if (p->first_ns == INT64_MAX)
 		cli_fail("%s: it has no samples", options->operand);
 	open_frames(p, options);
-	p->first_ns = INT64_MAX;
-	p->last_ns = INT64_MIN;
-	if (p->n_poses) {
-		p->first_ns = p->poses[0].t_ns;
-		p->last_ns = p->poses[p->n_poses - 1].t_ns;
-	}
-	if (p->n_forces) {
-		p->first_ns =
-			p->first_ns < p->forces[0].t_ns ? p->first_ns : p->forces[0].t_ns;
-		p->last_ns = p->last_ns > p->forces[p->n_forces - 1].t_ns
-				     ? p->last_ns
-				     : p->forces[p->n_forces - 1].t_ns;
-	}
 	p->wall = incise_recording_wall(p->recording, &err);
 	if (!p->wall && err.code != ENODATA)
 		cli_fail_with(&err);
 	p->utc_start_ns = utc_of(p->info.started);
 	info->name = cli_text("recording %s", options->operand);
-	info->kinds[SERVE_POSE] = p->n_poses > 0;
-	info->kinds[SERVE_FORCE] = p->n_forces > 0;
+	info->kinds[SERVE_POSE] = rows_have(&p->poses);
+	info->kinds[SERVE_FORCE] = rows_have(&p->forces);
 	info->kinds[SERVE_FRAME] = p->frames;
 	return &p->base;
 }

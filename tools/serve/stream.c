@@ -20,7 +20,8 @@ struct serve_stream {
 	struct serve_source *source;
 	struct serve_sink *sink[SERVE_SINKS];
 	int sinks;
-	int64_t period_ns;
+	double rate_hz;
+	int64_t period_ns; /* of the source's time */
 	int64_t due_ns[SERVE_KINDS];
 	uint64_t sent[SERVE_KINDS];
 	uint64_t lost;
@@ -62,6 +63,7 @@ struct serve_stream *serve_stream_new(struct serve_source *source, double rate_h
 	struct serve_stream *stream = cli_alloc(1, sizeof(*stream));
 
 	stream->source = source;
+	stream->rate_hz = rate_hz;
 	stream->period_ns = (int64_t)(NS / rate_hz);
 	return stream;
 }
@@ -91,6 +93,7 @@ void serve_play(struct serve_stream *stream, int64_t t_ns, int64_t here_ns, doub
 	stream->t_ns = t_ns;
 	stream->here_ns = here_ns;
 	stream->speed = speed;
+	stream->period_ns = (int64_t)(NS / stream->rate_hz * speed);
 	memset(stream->due_ns, 0, sizeof(stream->due_ns));
 	stream->samples = 0;
 }
