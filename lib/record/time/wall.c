@@ -23,6 +23,7 @@
 /* A program that sets the clock right does not change its rate by more: chrony's limit is 8 %. */
 #define SLEW_MAX 0.1
 #define RATE_MAX_PPB 1e8
+#define SHORT 0.25
 #define UTC_OFFSET_MAX_S 1000
 
 struct incise_wall {
@@ -158,9 +159,14 @@ static double kink(const struct incise_wall *wall, size_t i)
 {
 	const struct incise_wall_point *a = &wall->points[i], *b = a + 1;
 	double span_ns = (double)(b->t_ns - a->t_ns), here = rate_of(wall, i);
-	double before = i && !*a->restart ? rate_of(wall, i - 1) : a->rate_ppb * 1e-9;
-	double after = i + 2 < wall->n && !restarts(wall, i + 1) ? rate_of(wall, i + 1)
-								 : b->rate_ppb * 1e-9;
+	double before = a->rate_ppb * 1e-9, after = b->rate_ppb * 1e-9;
+
+	/* The rate over a short time, as before the end of a recording, is mostly noise. */
+	if (i && !*a->restart && (double)(a->t_ns - a[-1].t_ns) > span_ns * SHORT)
+		before = rate_of(wall, i - 1);
+	if (i + 2 < wall->n && !restarts(wall, i + 1) &&
+	    (double)(b[1].t_ns - b->t_ns) > span_ns * SHORT)
+		after = rate_of(wall, i + 1);
 
 	return fmax(fabs(here - before), fabs(here - after)) * span_ns;
 }

@@ -25,6 +25,8 @@
 #define RESTART_SHARE 1e-4
 /* Rates are found over one to two of these. */
 #define ANCHOR_NS (16 * INCISE_NS_PER_S)
+/* Over less the readings' own noise is more than the rate. */
+#define RATE_LEAST_NS (INCISE_NS_PER_S / 10)
 #define ANCHOR_LEAST_NS (4 * INCISE_NS_PER_S)
 
 static void say(struct incise_wall_result *result, const char *fmt, ...)
@@ -287,6 +289,8 @@ void incise_wall_follow(struct incise_wall_follow *follow,
 			set_rate(follow, mono_raw);
 		point->rate_ppb = 0;
 	}
+	if (follow->started && now->raw_ns - before->raw_ns < RATE_LEAST_NS)
+		point->rate_ppb = follow->last.rate_ppb;
 	if (!isfinite(point->uncertainty_ns))
 		point->rate_uncertainty_ppb = FREE_PPB;
 	say_source(follow, point, result);

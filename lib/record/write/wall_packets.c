@@ -108,6 +108,7 @@ bool incise_chrony_read(struct incise_chrony_tracking *tracking, const uint8_t *
 #define PTP_RESPONSE 2
 #define PTP_TLV_MANAGEMENT 1
 #define PTP_MASTER 6
+#define PTP_UNCALIBRATED 8
 #define PTP_SLAVE 9
 /* Longer than any path of a network; more than any number of leap seconds. */
 #define PTP_DELAY_MAX_NS 1e9
@@ -165,7 +166,8 @@ static bool read_properties(struct incise_ptp_state *state, const uint8_t *data)
 
 static bool read_port(struct incise_ptp_state *state, const uint8_t *data)
 {
-	state->slave |= data[10] == PTP_SLAVE;
+	/* One that runs free never becomes more than uncalibrated, as it sets no clock. */
+	state->slave |= data[10] == PTP_SLAVE || data[10] == PTP_UNCALIBRATED;
 	state->master |= data[10] == PTP_MASTER;
 	return true;
 }

@@ -54,7 +54,7 @@ struct incise_ptp_state {
 	double path_delay_ns;
 	int utc_offset_s;
 	bool utc_valid, ptp_timescale, traceable;
-	bool slave, master; /* one port is */
+	bool slave, master; /* one port follows a master, or is one */
 };
 
 void incise_ptp_request(uint8_t bytes[INCISE_PTP_REQUEST_BYTES], enum incise_ptp_id id,

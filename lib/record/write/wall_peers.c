@@ -21,6 +21,7 @@
 #include "wall_sources.h"
 
 #define PATIENCE_NS 50000000LL /* of one request; both run on this computer */
+#define PORTS_NS 2000000LL     /* between the answers of two ports */
 /* A sync is a second apart or less; without one for this time the master is lost. */
 #define SYNC_AGE_NS (5 * INCISE_NS_PER_S)
 /* Further from CLOCK_REALTIME it is the time of another clock, a hardware one. */
@@ -39,7 +40,7 @@
 
 void incise_wall_peer_init(struct incise_wall_peer *peer)
 {
-	*peer = (struct incise_wall_peer){.fd = -1};
+	*peer = (struct incise_wall_peer){.fd = -1, .patience_ns = PATIENCE_NS};
 }
 
 void incise_wall_peer_close(struct incise_wall_peer *peer)
@@ -111,7 +112,7 @@ void incise_wall_chrony_read(struct incise_wall_peer *peer,
 	struct incise_wall_reading *reading = &statement->reading;
 	struct incise_chrony_tracking tracking;
 	uint8_t request[INCISE_CHRONY_BYTES], reply[512];
-	int64_t asked_ns = incise_monotonic_ns(), until_ns = asked_ns + PATIENCE_NS;
+	int64_t asked_ns = incise_monotonic_ns(), until_ns = asked_ns + peer->patience_ns;
 	bool answered = false;
 	ssize_t n;
 
@@ -155,7 +156,7 @@ static bool ask(struct incise_wall_peer *peer, enum incise_ptp_id id,
 		struct incise_ptp_state *state)
 {
 	uint8_t request[INCISE_PTP_REQUEST_BYTES], reply[1500];
-	int64_t until_ns = incise_monotonic_ns() + PATIENCE_NS;
+	int64_t until_ns = incise_monotonic_ns() + peer->patience_ns;
 	uint16_t sequence = (uint16_t)++peer->sequence;
 	bool any = false;
 	ssize_t n;
@@ -165,8 +166,7 @@ static bool ask(struct incise_wall_peer *peer, enum incise_ptp_id id,
 		return false;
 	/* Each port answers for itself; the others answer once. */
 	while ((!any || id == INCISE_PTP_PORT_DATA_SET) &&
-	       (n = receive(peer->fd,
-			    any ? incise_monotonic_ns() + PATIENCE_NS / 25 : until_ns,
+	       (n = receive(peer->fd, any ? incise_monotonic_ns() + PORTS_NS : until_ns,
 			    reply, sizeof(reply))) >= 0 &&
 	       incise_monotonic_ns() < until_ns)
 		any |= incise_ptp_read(state, reply, (size_t)n, (uint8_t)peer->domain,

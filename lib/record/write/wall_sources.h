@@ -49,7 +49,8 @@ struct incise_wall_sync {
 };
 
 struct incise_wall_peer {
-	int fd; /* -1: closed */
+	int fd;		     /* -1: closed */
+	int64_t patience_ns; /* with one request */
 	uint32_t sequence;
 	int64_t updated;
 	int port;	/* chronyd: of 127.0.0.1 */
