@@ -3,8 +3,8 @@
  * Rates, means and times of what is sent; see serve.h.
  *
  *     samples   | | | | | | | | | | | | | | |        a value is due on a grid of 1/rate, and the
- *     due       ^       ^       ^       ^            next sample at most half a step early is it;
- *     sent      ●       ●       ●       ●            of forces the mean of those in between
+ *     due       ^       ^       ^       ^            first sample that is not more than half a step
+ *     sent      ●       ●       ●       ●            of the source early is it; of forces the mean
  */
 #include <math.h>
 #include <stdlib.h>
@@ -23,6 +23,8 @@ struct serve_stream {
 	double rate_hz;
 	int64_t period_ns; /* of the source's time */
 	int64_t due_ns[SERVE_KINDS];
+	int64_t last_ns[SERVE_KINDS];
+	double step_ns[SERVE_KINDS]; /* of the source's samples, a running mean */
 	uint64_t sent[SERVE_KINDS];
 	uint64_t lost;
 
@@ -95,6 +97,7 @@ void serve_play(struct serve_stream *stream, int64_t t_ns, int64_t here_ns, doub
 	stream->speed = speed;
 	stream->period_ns = (int64_t)(NS / stream->rate_hz * speed);
 	memset(stream->due_ns, 0, sizeof(stream->due_ns));
+	memset(stream->last_ns, 0, sizeof(stream->last_ns));
 	stream->samples = 0;
 }
 
@@ -111,10 +114,24 @@ static void send_item(struct serve_stream *stream, struct serve_item *item)
 		stream->sink[i]->ops->send(stream->sink[i], item);
 }
 
-/* Half a step early is on time: sources that have the very rate keep all samples. */
+/* A sample has come. */
+static void note_step(struct serve_stream *stream, enum serve_kind kind, int64_t t_ns)
+{
+	double step_ns = (double)(t_ns - stream->last_ns[kind]);
+
+	/* A gap is no step. */
+	if (stream->last_ns[kind] && step_ns > 0 && step_ns < NS)
+		stream->step_ns[kind] += (step_ns - stream->step_ns[kind]) /
+					 (stream->step_ns[kind] > 0 ? 16 : 1);
+	stream->last_ns[kind] = t_ns;
+}
+
+/* Half a step early is on time: a source of the very rate keeps all samples, with its jitter. */
 static bool is_due(const struct serve_stream *stream, enum serve_kind kind, int64_t t_ns)
 {
-	return t_ns >= stream->due_ns[kind] - stream->period_ns / 2;
+	double early_ns = fmin(stream->step_ns[kind], (double)stream->period_ns) / 2;
+
+	return t_ns >= stream->due_ns[kind] - (int64_t)early_ns;
 }
 
 static void set_due(struct serve_stream *stream, enum serve_kind kind, int64_t t_ns)
@@ -135,6 +152,7 @@ void serve_pose(struct serve_stream *stream, int64_t t_ns, const double position
 	double norm = sqrt(norm2), unit[4], across[3];
 
 	stream->lost = lost;
+	note_step(stream, SERVE_POSE, t_ns);
 	/* A loop has no orientation before it saw one. */
 	if (!is_due(stream, SERVE_POSE, t_ns) || !(norm > 0.5 && norm < 2))
 		return;
@@ -178,6 +196,7 @@ void serve_force(struct serve_stream *stream, int64_t t_ns, const double force_N
 		stream->squares += value * value;
 	}
 	n = ++stream->samples;
+	note_step(stream, SERVE_FORCE, t_ns);
 	if (!is_due(stream, SERVE_FORCE, t_ns))
 		return;
 	set_due(stream, SERVE_FORCE, t_ns);
@@ -203,6 +222,7 @@ void serve_frame(struct serve_stream *stream, const struct incise_camera_frame *
 {
 	struct serve_item item = {.kind = SERVE_FRAME, .t_ns = frame->t_ns, .lost = lost};
 
+	note_step(stream, SERVE_FRAME, frame->t_ns);
 	if (!is_due(stream, SERVE_FRAME, frame->t_ns))
 		return;
 	set_due(stream, SERVE_FRAME, frame->t_ns);
