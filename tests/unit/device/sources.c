@@ -9,6 +9,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <incise/backend.h>
 
@@ -104,6 +105,32 @@ static void force_calls_reach_the_backend(void **state)
 	incise_force_info(&force_fake.force, &info);
 	assert_true(info.rate_hz == 3);
 	assert_true(incise_force_lost(&force_fake.force) == 30000000000ULL);
+}
+
+/* What applies of a calibration to a channel in volts, and to one in newtons. */
+static void a_channel_in_newtons_has_no_sensitivity(void **state)
+{
+	static const struct {
+		bool newtons;
+		double mV_N, zero_mV, to_mV_N, to_zero_mV;
+	} row[] = {
+		{false, 1240, 180, 1240, 180}, {false, 1000, NAN, 1000, NAN},
+		{true, 1240, 180, 1000, NAN},  {true, 1000, -20, 1000, -20},
+		{true, 1000, NAN, 1000, NAN},
+	};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof(row) / sizeof(*row); i++) {
+		struct incise_force_info info = {.newtons = row[i].newtons};
+		struct incise_calibration c = {.force_mV_N = row[i].mV_N,
+					       .force_zero_mV = row[i].zero_mV,
+					       .depth_mm_px = 7};
+
+		incise_force_calibration(&info, &c);
+		assert_true(c.force_mV_N == row[i].to_mV_N && c.depth_mm_px == 7);
+		assert_true(c.force_zero_mV == row[i].to_zero_mV ||
+			    (isnan(c.force_zero_mV) && isnan(row[i].to_zero_mV)));
+	}
 }
 
 /* --- camera --- */
@@ -220,6 +247,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(tracker_calls_reach_the_backend),
 		cmocka_unit_test(force_calls_reach_the_backend),
+		cmocka_unit_test(a_channel_in_newtons_has_no_sensitivity),
 		cmocka_unit_test(camera_calls_reach_the_backend),
 		cmocka_unit_test(a_backend_that_tells_no_cause_has_an_empty_one),
 		cmocka_unit_test(the_newest_is_the_last_that_waits),
