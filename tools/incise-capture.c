@@ -27,6 +27,7 @@
 enum camera { CAMERA_AUTO, CAMERA_OFF, CAMERA_PICTURES, CAMERA_DEPTH };
 
 struct options {
+	enum { BOTH, ONLY_FORCE, ONLY_TRACKER } only;
 	const char *rig, *calibration, *output;
 	enum camera camera;
 	double trigger_force_N;
@@ -72,6 +73,8 @@ static bool waits(const struct options *options)
 	       options->trigger_sync || options->start_at.given;
 }
 
+static const char *const onlys[] = {"force,tracker", "force", "tracker", NULL};
+
 static const struct cli_option option_table[] = {
 	{'o', "output", "NAME.rec",
 	 "folder to record into; --overwrite replaces an existing one once\n"
@@ -90,6 +93,10 @@ static const struct cli_option option_table[] = {
 	 "them; auto: as rig.conf has it (default; a rig sim:… then has\n"
 	 "no camera)",
 	 CLI_CHOICE(struct options, camera, cameras)},
+	{0, "only", "LIST",
+	 "force or tracker: record this stream alone (and the camera);\n"
+	 "force,tracker: both (default)",
+	 CLI_CHOICE(struct options, only, onlys)},
 	{0, "trigger", "WHAT",
 	 "wait for the button of the stylus, for a force such as 0.2N, or for\n"
 	 "sync[:DEVICE], a pulse of the SYNC line of the stepper module; the\n"
@@ -134,6 +141,9 @@ static void parse(struct options *options, int argc, char **argv)
 	cli_no_operands(argc, argv, "-o");
 	if (!options->output)
 		cli_usage("missing -o NAME.rec (output recording)");
+	if ((options->only == ONLY_FORCE && options->trigger_button) ||
+	    (options->only == ONLY_TRACKER && options->trigger_force_N > 0))
+		cli_usage("--trigger needs a stream that --only leaves out");
 	output = cli_text("%s", options->output);
 	for (length = strlen(output); length > 1 && output[length - 1] == '/'; length--)
 		output[length - 1] = 0;
@@ -400,14 +410,19 @@ static void keep_old(const struct run *run, const char *new)
 
 static struct incise_rig *open_rig(const struct options *options)
 {
+	static const unsigned int devices[] = {
+		[BOTH] = INCISE_RIG_TRACKER | INCISE_RIG_FORCE,
+		[ONLY_FORCE] = INCISE_RIG_FORCE,
+		[ONLY_TRACKER] = INCISE_RIG_TRACKER,
+	};
 	static const unsigned int camera[] = {
 		[CAMERA_AUTO] = INCISE_RIG_CAMERA | INCISE_RIG_IF_NAMED,
 		[CAMERA_PICTURES] = INCISE_RIG_CAMERA,
 		[CAMERA_DEPTH] = INCISE_RIG_CAMERA,
 	};
 
-	return cli_open_rig(options->rig, INCISE_RIG_TRACKER | INCISE_RIG_FORCE |
-						  camera[options->camera]);
+	return cli_open_rig(options->rig,
+			    devices[options->only] | camera[options->camera]);
 }
 
 /* Whether the depth is measured in pictures. */
@@ -513,11 +528,19 @@ static void judge(const char *path, const struct result *result)
 		if (*streams[i].ended)
 			cli_fail("%s: the %s failed before the end of the recording: %s",
 				 path, streams[i].name, streams[i].ended);
-	if (!stats->force || !stats->tracker)
-		cli_fail("%s: no samples arrived from the %s in %.1f s; check its "
-			 "cable and power",
-			 path, stats->force ? "tracker" : "force channel",
-			 result->seconds);
+	for (int i = 0; i < n; i++)
+		if (!streams[i].rows && strcmp(streams[i].name, "camera"))
+			cli_fail("%s: no samples arrived from the %s in %.1f s; check "
+				 "its cable and power",
+				 path,
+				 strcmp(streams[i].name, "force") ? "tracker"
+								  : "force channel",
+				 result->seconds);
+	if (!stats->tracker) {
+		if (stats->force_lost || stats->frames_lost)
+			fail_of_losses(path, stats);
+		return;
+	}
 	incise_pose_counts_text(&stats->poses, text, sizeof(text));
 	if (poses_are_doubtful(&stats->poses))
 		cli_warn("%s: %s", path, text);
@@ -542,7 +565,7 @@ int main(int argc, char **argv)
 	struct incise_calibration calibration;
 	struct incise_recorder_setup setup = {.calibration = &calibration};
 	struct incise_vision_setup vision;
-	struct incise_force_info force;
+	struct incise_force_info force = {0};
 	struct incise_error err = {0};
 	struct options options = {0};
 	struct run run = {.options = &options};
@@ -563,7 +586,8 @@ int main(int argc, char **argv)
 	setup.clock_source = options.clock_source;
 	setup.armed = waits(&options);
 	run.sync = options.trigger_sync ? start_sync_open(options.trigger_sync) : -1;
-	incise_force_info(incise_rig_force(run.rig), &force);
+	if (incise_rig_force(run.rig))
+		incise_force_info(incise_rig_force(run.rig), &force);
 	incise_force_calibration(&force, &calibration);
 	run.view.full_scale_N = force.full_scale_V * 1e3 / calibration.force_mV_N;
 	run.view.depth = setup.vision;

@@ -144,3 +144,33 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	[ $((joined - alone)) -le "$bound" ] && [ $((alone - joined)) -le "$bound" ]
 	[ "$bound" -lt 200000 ]
 }
+
+# Columns of a CSV by name, without those of uncertainties, which a joined recording has larger.
+without_u() {
+	awk -F, 'NR == 1 { for (i = 2; i <= NF; i++) if ($i !~ /_u_/) keep[++n] = i }
+		{ for (i = 1; i <= n; i++) printf "%s%s", $keep[i], i < n ? "," : "\n" }' "$1"
+}
+
+@test "a force-only and a tracker-only recording give what one with both gives" {
+	local rig=sim:clock=simulated,cut_s=2,pause_s=1,seed=4
+	incise capture -o force.rec --rig $rig --duration 8s --only force \
+		--clock-source sim:1000,0,20 >/dev/null
+	incise capture -o tracker.rec --rig $rig --duration 8s --only tracker \
+		--clock-source sim:1000,0,20 >/dev/null
+	incise capture -o both.rec --rig $rig --duration 8s >/dev/null
+	incise verify force.rec | grep -q 'force.rec: complete, and as it was written'
+	incise verify tracker.rec | grep -q 'tracker.rec: complete, and as it was written'
+	! incise verify tracker.rec | grep -q ^force
+	run -1 --separate-stderr incise export tracker.rec -o none.csv
+	run -2 --separate-stderr incise capture -o x.rec --rig $rig --only force --trigger button
+	[[ "${stderr_lines[0]}" == *"--trigger needs a stream that --only leaves out" ]]
+	# the stream of each is that of the only machine that has it
+	incise join force.rec tracker.rec -o day.rec --within 0.1ms >/dev/null
+	incise export day.rec --resample --rate 100 -o day.csv
+	incise export both.rec --resample --rate 100 -o both.csv
+	cmp <(without_u day.csv) <(without_u both.csv)
+	[ "$(wc -l <day.csv)" -eq 801 ]
+	incise export day.rec -a 6x5 -o pairs.csv
+	incise export both.rec -a 6x5 -o both_pairs.csv
+	cmp pairs.csv both_pairs.csv
+}

@@ -79,7 +79,7 @@ struct incise_recorder;
  *              INCISE_RIG_CAMERA; not owned
  * @param setup not used after the call
  * @return recorder, to be ended with incise_recorder_close(); NULL with errno EEXIST, EINVAL
- *         (a path without a name; vision's thresholds; the source of wall time), ENODEV (the rig has no tracker or
+ *         (a path without a name; vision's thresholds; the source of wall time), ENODEV (the rig has neither a tracker nor
  *         force channel), EOPNOTSUPP (its tracker reads more than one sensor), ENOSPC (too
  *         little space for planned_s), errno of mkdir(2), EIO, ENOMEM; ENOENT, ENOEXEC (a
  *         module for frames is not installed, or broken).

@@ -7,6 +7,7 @@
 #include <string.h>
 #include "cut.h"
 #include "depth.h"
+#include "session.h"
 #include "../schema.h"
 
 bool incise_cut_step(struct incise_cut *cut, double depth_mm)
@@ -276,6 +277,16 @@ int incise_recording_info(struct incise_recording *rec,
 	info->cuts = cuts.cut.count;
 	info->start_ns = cuts.first_ns;
 	info->end_ns = cuts.last_ns;
+	/* Without a force channel, the tracker's. */
+	if (!info->force &&
+	    incise_session_span(incise_recording_member(rec, "tracker"), "tracker",
+				&info->start_ns, &info->end_ns)) {
+		const struct incise_session_map *map =
+			incise_recording_member(rec, "tracker")->map;
+
+		info->start_ns = incise_session_time(map, info->start_ns);
+		info->end_ns = incise_session_time(map, info->end_ns);
+	}
 	incise_cuts_close(&cuts);
 	return rc;
 }

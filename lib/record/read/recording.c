@@ -197,6 +197,7 @@ static int read_meta(struct incise_recording *rec, struct incise_error *err)
 		{"force_offset_V", REAL, &info->offset_V, 0, true},
 		{"force_newtons", COUNT, &newtons, 0, true},
 	};
+	bool none; /* no force channel */
 	int rc = 0;
 
 	for (size_t i = 0; i < sizeof(items) / sizeof(*items) && !rc; i++)
@@ -205,9 +206,10 @@ static int read_meta(struct incise_recording *rec, struct incise_error *err)
 		rc = read_tip(rec, err);
 	if (rc)
 		return rc;
-	/* No converter has more than 31 bits; values within 1e±9 keep all results finite. */
-	if (bits < 1 || bits > 31 ||
-	    !(info->full_scale_V > 1e-9 && info->full_scale_V < 1e9) ||
+	none = !bits && !info->force && info->full_scale_V == 0;
+	/* No converter has more than 31 bits, and none has none; values within 1e±9 keep all results finite. */
+	if ((!none && (bits < 1 || bits > 31 ||
+		       !(info->full_scale_V > 1e-9 && info->full_scale_V < 1e9))) ||
 	    !(fabs(info->offset_V) < 1e9) ||
 	    !(fabs(info->force_mV_N) > 1e-9 && fabs(info->force_mV_N) < 1e9) ||
 	    fabs(info->zero_mV) > 1e12)

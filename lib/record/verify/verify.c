@@ -303,6 +303,20 @@ static bool has_camera(struct incise_verification *verify)
 		1);
 }
 
+/* Whether a stream was recorded, though it may have no row. */
+static bool recorded(struct incise_verification *verify, int stream)
+{
+	const struct incise_ledger_form *form = &incise_ledger_forms[stream];
+	char sql[300];
+
+	snprintf(
+		sql, sizeof(sql),
+		"SELECT EXISTS(SELECT 1 FROM ledger WHERE stream = '%s') OR EXISTS(SELECT 1 "
+		"FROM streams WHERE name = '%s') OR EXISTS(SELECT 1 FROM %s)",
+		form->stream, form->stream, form->table);
+	return ask(verify, sql, 1);
+}
+
 /* Wall time is no stream of the report: its findings are all there is to tell. */
 static int check_wall(struct incise_verification *verify)
 {
@@ -346,7 +360,8 @@ static int check_streams(struct incise_verification *verify)
 		verify->rows += verify->frames * INCISE_VERIFY_FRAME_ROWS;
 	}
 	for (int i = 0; i < INCISE_LEDGER_STREAMS && !rc; i++) {
-		if (i == INCISE_LEDGER_CAMERA && !verify->camera)
+		if (i == INCISE_LEDGER_CAMERA ? !verify->camera
+					      : !counted[i].rows && !recorded(verify, i))
 			continue;
 		rc = incise_verify_stream(verify, &incise_ledger_forms[i],
 					  counted[i].rows, counted[i].lost,

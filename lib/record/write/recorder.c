@@ -317,12 +317,14 @@ static int check_rig(const char *path, struct incise_rig *rig, struct incise_err
 {
 	struct incise_tracker_info tracker;
 
-	if (!incise_rig_tracker(rig) || !incise_rig_force(rig))
+	if (!incise_rig_tracker(rig) && !incise_rig_force(rig))
 		return incise_error_set(
 			err, ENODEV,
-			"%s: a recording needs a tracker and a force channel, but the "
+			"%s: a recording needs a tracker or a force channel, but the "
 			"rig %s was opened without them",
 			path, incise_rig_spec(rig));
+	if (!incise_rig_tracker(rig))
+		return 0;
 	incise_tracker_info(incise_rig_tracker(rig), &tracker);
 	/* The tables have no column that separates two sensors. */
 	if (tracker.stations > 1)
@@ -345,10 +347,11 @@ static void start_counts(struct incise_recorder *rec)
 	struct incise_tracker_sample record;
 	struct incise_force_sample sample;
 
-	incise_force_read(force, &sample, 0);
-	incise_tracker_read(tracker, &record, 0);
-	rec->streams[INCISE_LEDGER_FORCE].lost_at_start = incise_force_lost(force);
-	rec->streams[INCISE_LEDGER_TRACKER].lost_at_start = incise_tracker_lost(tracker);
+	if (force)
+		incise_force_read(force, &sample, 0);
+	if (tracker)
+		incise_tracker_read(tracker, &record, 0);
+	incise_recorder_count_losses(rec);
 }
 
 /* Make the files, and do all that may fail before the first sample is read. */
@@ -407,10 +410,12 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	rec->pretrigger.button = setup->trigger_button;
 	rec->stats.camera_depth_mm = NAN;
 	rec->zero.depth_max_mm = -INFINITY;
-	incise_force_info(incise_rig_force(rig), &rec->force_info);
+	if (incise_rig_force(rig))
+		incise_force_info(incise_rig_force(rig), &rec->force_info);
 	incise_force_calibration(&rec->force_info, &rec->calibration);
 	rec->stats.zero_mV = rec->calibration.force_zero_mV;
-	incise_tracker_info(incise_rig_tracker(rig), &rec->tracker_info);
+	if (incise_rig_tracker(rig))
+		incise_tracker_info(incise_rig_tracker(rig), &rec->tracker_info);
 	if (incise_rig_camera(rig))
 		incise_camera_info(incise_rig_camera(rig), &rec->camera_info);
 	incise_rig_surface(rig, point_mm, normal);
@@ -457,7 +462,7 @@ static int read_force(struct incise_recorder *rec, struct incise_error *err)
 	struct incise_force *force = incise_rig_force(rec->rig);
 	struct incise_force_sample samples[BATCH_FORCE];
 	char cause[200];
-	int n = BATCH_FORCE, rc = 0;
+	int n = force ? BATCH_FORCE : 0, rc = 0;
 
 	while (n == BATCH_FORCE && !*stream->ended) {
 		n = incise_force_read(force, samples, BATCH_FORCE);
@@ -470,7 +475,8 @@ static int read_force(struct incise_recorder *rec, struct incise_error *err)
 		if (rc)
 			return rc;
 	}
-	stream->device_lost = incise_force_lost(force) - stream->lost_at_start;
+	if (force)
+		stream->device_lost = incise_force_lost(force) - stream->lost_at_start;
 	return 0;
 }
 
@@ -480,7 +486,7 @@ static int read_tracker(struct incise_recorder *rec, struct incise_error *err)
 	struct incise_tracker *tracker = incise_rig_tracker(rec->rig);
 	struct incise_tracker_sample samples[BATCH];
 	char cause[200];
-	int n = BATCH, rc = 0;
+	int n = tracker ? BATCH : 0, rc = 0;
 
 	while (n == BATCH && !*stream->ended) {
 		n = incise_tracker_read(tracker, samples, BATCH);
@@ -493,8 +499,9 @@ static int read_tracker(struct incise_recorder *rec, struct incise_error *err)
 		if (rc)
 			return rc;
 	}
-	stream->device_lost =
-		incise_tracker_lost(tracker) - stream->lost_at_start + rec->not_finite;
+	if (tracker)
+		stream->device_lost = incise_tracker_lost(tracker) -
+				      stream->lost_at_start + rec->not_finite;
 	return 0;
 }
 

@@ -67,6 +67,19 @@ static void start_stream(struct incise_recorder *rec, int i, const char *name,
 	incise_timeline_init(&stream->timeline, &with_sd);
 }
 
+void incise_recorder_count_losses(struct incise_recorder *rec)
+{
+	struct incise_tracker *tracker = incise_rig_tracker(rec->rig);
+	struct incise_force *force = incise_rig_force(rec->rig);
+
+	if (force)
+		rec->streams[INCISE_LEDGER_FORCE].lost_at_start =
+			incise_force_lost(force);
+	if (tracker)
+		rec->streams[INCISE_LEDGER_TRACKER].lost_at_start =
+			incise_tracker_lost(tracker);
+}
+
 void incise_recorder_start_streams(struct incise_recorder *rec)
 {
 	const struct incise_calibration *calibration = &rec->calibration;
@@ -75,27 +88,28 @@ void incise_recorder_start_streams(struct incise_recorder *rec)
 	/* A calibrated delay has the deviation that was measured with it. */
 	if (isnan(force_sd_ms) && rec->force_info.t_sd_ns > 0)
 		force_sd_ms = (double)rec->force_info.t_sd_ns * 1e-6;
-	start_stream(rec, INCISE_LEDGER_FORCE, "force", rec->force_info.name, force_sd_ms,
-		     &(struct incise_timeline_setup){
-			     .timestamped = true,
-			     .rate_hz = rec->force_info.rate_hz,
-			     .delay_ns = delay_ns(calibration->force_delay_ms, 0),
-		     });
-	start_stream(rec, INCISE_LEDGER_TRACKER, "tracker", rec->tracker_info.name,
-		     calibration->tracker_delay_sd_ms,
-		     &(struct incise_timeline_setup){
-			     /* Pulses from outside have no period: no line is drawn. */
-			     .rate_hz = rec->tracker_info.external_sync
-						? 0
-						: rec->tracker_info.rate_hz,
-			     .delay_ns = delay_ns(calibration->tracker_delay_ms,
-						  rec->tracker_info.latency_ns),
-			     .grain_ns = rec->tracker_info.grain_ns,
-		     });
-	rec->streams[INCISE_LEDGER_FORCE].lost_at_start =
-		incise_force_lost(incise_rig_force(rec->rig));
-	rec->streams[INCISE_LEDGER_TRACKER].lost_at_start =
-		incise_tracker_lost(incise_rig_tracker(rec->rig));
+	if (incise_rig_force(rec->rig))
+		start_stream(rec, INCISE_LEDGER_FORCE, "force", rec->force_info.name,
+			     force_sd_ms,
+			     &(struct incise_timeline_setup){
+				     .timestamped = true,
+				     .rate_hz = rec->force_info.rate_hz,
+				     .delay_ns = delay_ns(calibration->force_delay_ms, 0),
+			     });
+	if (incise_rig_tracker(rec->rig))
+		start_stream(
+			rec, INCISE_LEDGER_TRACKER, "tracker", rec->tracker_info.name,
+			calibration->tracker_delay_sd_ms,
+			&(struct incise_timeline_setup){
+				/* Pulses from outside have no period: no line is drawn. */
+				.rate_hz = rec->tracker_info.external_sync
+						   ? 0
+						   : rec->tracker_info.rate_hz,
+				.delay_ns = delay_ns(calibration->tracker_delay_ms,
+						     rec->tracker_info.latency_ns),
+				.grain_ns = rec->tracker_info.grain_ns,
+			});
+	incise_recorder_count_losses(rec);
 	if (incise_rig_camera(rec->rig))
 		start_stream(rec, INCISE_LEDGER_CAMERA, "camera", rec->camera_info.name,
 			     calibration->camera_delay_sd_ms,
@@ -540,10 +554,7 @@ int incise_recorder_release(struct incise_recorder *rec, struct incise_error *er
 
 	rec->stats.armed = false;
 	rec->not_finite = 0;
-	rec->streams[INCISE_LEDGER_FORCE].lost_at_start =
-		incise_force_lost(incise_rig_force(rec->rig));
-	rec->streams[INCISE_LEDGER_TRACKER].lost_at_start =
-		incise_tracker_lost(incise_rig_tracker(rec->rig));
+	incise_recorder_count_losses(rec);
 	if (incise_recorder_note(rec, "trigger",
 				 "triggered; the recording starts 1 s "
 				 "before") != SQLITE_OK)

@@ -226,7 +226,7 @@ static void refused(const char *path, struct incise_rig *rig, int code, const ch
 static void existing_names_are_refused(void **state)
 {
 	struct incise_rig *rig = open_rig(SIM);
-	struct incise_rig *bare = incise_rig_open(SIM, INCISE_RIG_FORCE, NULL);
+	struct incise_rig *bare = incise_rig_open(SIM, INCISE_RIG_CAMERA, NULL);
 
 	assert_non_null(bare);
 	mkdir("there.rec", 0777);
