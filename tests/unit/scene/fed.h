@@ -84,6 +84,21 @@ static inline struct incise_scene *fed_scene(struct fed_folder *f, const char *t
 	return incise_scene_load(f->scene, NULL, err);
 }
 
+/* The plan of such a scene, which the caller frees too. */
+static inline struct incise_plan *fed_plan(struct fed_folder *f,
+					   const struct incise_tracker_info *tracker,
+					   struct incise_scene **scene, const char *text)
+{
+	struct incise_error err = {0};
+	struct incise_plan *plan;
+
+	*scene = fed_scene(f, text, &err);
+	plan = *scene ? incise_plan_new_fed(*scene, tracker, &err) : NULL;
+	if (!plan)
+		fail_msg("%s", err.text);
+	return plan;
+}
+
 /* Attitude: turned by @about_x, then by @about_z. */
 static inline void fed_attitude(double q[4], double about_x, double about_z)
 {

@@ -155,18 +155,6 @@ static const struct {
 };
 #define CASES ((int)(sizeof(cases) / sizeof(*cases)))
 
-static struct incise_plan *plan_of(struct incise_scene **scene, const char *text)
-{
-	struct incise_error err = {0};
-	struct incise_plan *plan;
-
-	*scene = fed_scene(&folder, text, &err);
-	plan = *scene ? incise_plan_new_fed(*scene, &tracker, &err) : NULL;
-	if (!plan)
-		fail_msg("%s", err.text);
-	return plan;
-}
-
 static void forces_are_those_of_the_model(void **state)
 {
 	for (int i = 0; i < CASES; i++) {
@@ -176,9 +164,9 @@ static void forces_are_those_of_the_model(void **state)
 
 		write_model(cases[i].inputs, cases[i].n, 0.02);
 		model = incise_model_load(folder.model, NULL);
-		plan = plan_of(&scene,
-			       "model = \"m.fis\"; arithmetic = \"double\"; tissue = { "
-			       "withdrawal = \"paper\"; };");
+		plan = fed_plan(&folder, &tracker, &scene,
+				"model = \"m.fis\"; arithmetic = \"double\"; tissue = { "
+				"withdrawal = \"paper\"; };");
 		assert_true(compare(plan, model, cases[i].inputs, cases[i].n) > 1500);
 		incise_plan_free(plan);
 		incise_scene_free(scene);
@@ -207,7 +195,7 @@ static void integers_hold_their_bound(void **state)
 			snprintf(text, sizeof(text),
 				 "model = \"m.fis\"; arithmetic = \"%s\"; %s",
 				 k ? "fixed" : "double", surfaces[i % 2]);
-			plan[k] = plan_of(&scene[k], text);
+			plan[k] = fed_plan(&folder, &tracker, &scene[k], text);
 		}
 		bound_N = incise_plan_bound(plan[1], 20);
 		assert_true(bound_N > 0 && bound_N < 0.02);
@@ -285,9 +273,10 @@ static void wild_poses_give_forces_within_the_limits(void **state)
 	write_model(inputs, 4, 0.02);
 	for (int fixed = 0; fixed < 2; fixed++) {
 		struct incise_scene *scene;
-		struct incise_plan *plan = plan_of(
-			&scene, fixed ? "model = \"m.fis\";"
-				      : "model = \"m.fis\"; arithmetic = \"double\";");
+		struct incise_plan *plan =
+			fed_plan(&folder, &tracker, &scene,
+				 fixed ? "model = \"m.fis\";"
+				       : "model = \"m.fis\"; arithmetic = \"double\";");
 		uint64_t seed = 1;
 
 		for (int64_t k = 1; k < 20000; k++) {
@@ -327,8 +316,9 @@ static void tilt_on_a_mesh_needs_double(void **state)
 	refused("model = \"m.fis\"; surface = { kind = \"mesh\"; file = \"hill.obj\"; };",
 		ENOTSUP, "set arithmetic to \"double\"");
 	incise_plan_free(
-		plan_of(&scene, "model = \"m.fis\"; arithmetic = \"double\"; surface = { "
-				"kind = \"mesh\"; file = \"hill.obj\"; };"));
+		fed_plan(&folder, &tracker, &scene,
+			 "model = \"m.fis\"; arithmetic = \"double\"; surface = { "
+			 "kind = \"mesh\"; file = \"hill.obj\"; };"));
 	incise_scene_free(scene);
 }
 

@@ -63,18 +63,6 @@ static int tear_down(void **state)
 
 #define DOUBLE "arithmetic = \"double\"; "
 
-static struct incise_plan *plan_of(struct incise_scene **scene, const char *text)
-{
-	struct incise_error err = {0};
-	struct incise_plan *plan;
-
-	*scene = fed_scene(&folder, text, &err);
-	plan = *scene ? incise_plan_new_fed(*scene, &tracker, &err) : NULL;
-	if (!plan)
-		fail_msg("%s", err.text);
-	return plan;
-}
-
 /* From 1 mm above straight down to 3 mm in two seconds, and up again. */
 static void stab(void *own, double t_s, struct incise_tracker_sample *pose)
 {
@@ -92,7 +80,7 @@ struct seen {
 static void run(const char *text, bool paper, struct seen *seen)
 {
 	struct incise_scene *scene;
-	struct incise_plan *plan = plan_of(&scene, text);
+	struct incise_plan *plan = fed_plan(&folder, &tracker, &scene, text);
 	double deepest_mm = 0, last_N = 0;
 
 	*seen = (struct seen){0};
@@ -156,8 +144,9 @@ static void stability_counts_each_model(void **state)
 	struct incise_plan_model model;
 	struct incise_scene *scene;
 	struct incise_plan *plan =
-		plan_of(&scene, DOUBLE
-			"model = { cut = \"cut.fis\"; puncture = \"skin.fis\"; };");
+		fed_plan(&folder, &tracker, &scene,
+			 DOUBLE
+			 "model = { cut = \"cut.fis\"; puncture = \"skin.fis\"; };");
 
 	incise_plan_stability(plan, &s);
 	assert_true(s.slope_N_mm > 0.99 * SKIN_N_MM && s.slope_N_mm < 1.02 * SKIN_N_MM);
@@ -171,8 +160,9 @@ static void stability_counts_each_model(void **state)
 	incise_plan_free(plan);
 	incise_scene_free(scene);
 	/* The other way round the force rises by 0.1 mm × 0.1 N/mm … over 0.5 mm, besides its slope. */
-	plan = plan_of(
-		&scene, DOUBLE
+	plan = fed_plan(
+		&folder, &tracker, &scene,
+		DOUBLE
 		"model = { cut = \"skin.fis\"; puncture = \"cut.fis\"; }; tissue = "
 		"{ gain = 0.5; };");
 	incise_plan_stability(plan, &s);
