@@ -329,7 +329,9 @@ void incise_wall_ptp_read(struct incise_wall_peer *peer,
 		reading->updated = ++peer->updated;
 		return;
 	}
+	/* Without a measured delay of the path there is no bound. */
 	if (!state.gm_present || !state.slave || !state.ingress_ns ||
+	    state.path_delay_ns == 0 ||
 	    llabs(clocks->real_ns - state.ingress_ns) > SAME_CLOCK_NS)
 		return;
 	if (memcmp(peer->gm, state.gm, sizeof(peer->gm)) != 0)

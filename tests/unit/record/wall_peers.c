@@ -37,7 +37,7 @@ struct daemon {
 	int fd, stop[2];
 	enum manner manner;
 	uint64_t random;
-	bool chrony;
+	bool chrony, no_delay;
 	/* the state, set between requests */
 	int64_t ingress_ns, offset_ns, correction_ns, ref_ns;
 	uint8_t flags; /* of TIME_PROPERTIES */
@@ -103,7 +103,7 @@ static size_t answer_ptp(const struct daemon *d, const uint8_t *request, uint8_t
 		size = 50;
 		break;
 	case 0x2001:
-		put(data + 10, (uint64_t)PATH_NS << 16, 8);
+		put(data + 10, d->no_delay ? 0 : (uint64_t)PATH_NS << 16, 8);
 		size = 18;
 		break;
 	case 0x2003:
@@ -251,6 +251,10 @@ static void offset_of_ptp4l_is_applied(void **state)
 	struct daemon d;
 
 	start(&d, false, &peer);
+	d.no_delay = true;
+	sync_at(&d, 0.5);
+	assert_false(ask_at(&peer, 0.5).reading.good);
+	d.no_delay = false;
 	for (int s = 1; s < 60; s++) {
 		struct incise_wall_statement statement;
 
