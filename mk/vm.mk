@@ -42,6 +42,11 @@ check-vm: all $(guest_programs) $(guest_model) $(system_programs) $(O)/tests/pol
 check-service: all $(system_programs) $(O)/tests/polhemus/fastrak ## of check-vm the boot of systemd, with our packages and the service
 	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check main:service
 
+# In real time, so of use on a machine that does little else.
+check-clocks: all ## two guests with clocks of their own, joined by PTP
+	@mk/deps vm
+	@INCISE_BUILD=$(abspath $(O)) tests/vm/clocks/check
+
 # In real time only: with every access checked its timers are late by up to a millisecond,
 # in virtual time too, so that nothing about time can be asserted.
 check-vm-debug: all $(guest_programs) $(guest_model) $(O)/tests/polhemus/fastrak ## the same on a kernel with KASAN, lockdep, kmemleak; built once
@@ -49,4 +54,4 @@ check-vm-debug: all $(guest_programs) $(guest_model) $(O)/tests/polhemus/fastrak
 	+@tests/vm/debug-kernel >/dev/null
 	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check --bed debug:smp
 
-.PHONY: check-vm check-service check-vm-debug
+.PHONY: check-vm check-service check-clocks check-vm-debug
