@@ -667,3 +667,20 @@ needs_pictures() {
 	failed_with vision_opencv.so
 	[ -z "$(ls -A t)" ]
 }
+
+@test "bench serve: poses reach a client next to a bare socket, and the loop ticks meanwhile" {
+	quick_report serve
+	for name in "bare socket" "rig to client" "loop to client"; do
+		# a second of 1 kHz, on a machine that may be busy
+		holds "$(row r.json "$name" messages) >= 100"
+		holds "0 <= $(row r.json "$name" p50_us) && $(row r.json "$name" p50_us) <= $(row r.json "$name" max_us)"
+	done
+	for i in 0 1; do
+		holds "$(key r.json "loop[$i].ticks") >= 100 && $(key r.json "loop[$i].p50_us") > 0"
+	done
+	[ "$(key r.json 'loop[0].name') $(key r.json 'loop[1].name')" = "alone 8 clients" ]
+	mkdir t
+	bench_interrupted serve --quick
+	run --separate-stderr incise bench serve --plot x
+	bad_usage "--plot does not go with 'serve'"
+}

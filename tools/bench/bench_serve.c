@@ -235,6 +235,22 @@ static void server_end(const struct server *server)
 	child_end(server->pid, 0);
 }
 
+/* What an interrupted run leaves: it is ended at exit. */
+static struct {
+	pid_t loop;
+	char folder[4096];
+} left;
+
+static void clean_up(void)
+{
+	if (left.loop)
+		child_end(left.loop, 0);
+	if (*left.folder)
+		folder_remove(left.folder);
+	left.loop = 0;
+	*left.folder = '\0';
+}
+
 /* --- latencies ----------------------------------------------------------------------- */
 
 struct latency {
@@ -388,7 +404,7 @@ static void finish(struct wakes *wakes)
 static void measure_loop(struct latency *row, struct wakes wakes[2], double seconds,
 			 int rounds, bool realtime)
 {
-	char folder[4096], *path, *program = cli_text("%s/incise-haptic", cli_folder());
+	char *path, *program = cli_text("%s/incise-haptic", cli_folder());
 	char *argv[] = {program,
 			"wall",
 			"--rig",
@@ -402,12 +418,12 @@ static void measure_loop(struct latency *row, struct wakes wakes[2], double seco
 	struct incise_state *state;
 	struct server server;
 	int n = 0;
-	pid_t loop;
 
-	folder_make(folder, sizeof(folder), "for a status file");
-	path = cli_text("%s/wall.state", folder);
+	atexit(clean_up);
+	folder_make(left.folder, sizeof(left.folder), "for a status file");
+	path = cli_text("%s/wall.state", left.folder);
 	argv[5] = path;
-	loop = child_start(argv, -1, -1);
+	left.loop = child_start(argv, -1, -1);
 	state = state_open(path);
 	wakes[0].name = "alone";
 	wakes[1].name = "8 clients";
@@ -428,8 +444,7 @@ static void measure_loop(struct latency *row, struct wakes wakes[2], double seco
 		n += client[0].n;
 	}
 	incise_state_close(state);
-	child_end(loop, 0);
-	folder_remove(folder);
+	clean_up();
 	evaluate(row, "loop to client", us, n, rounds * seconds);
 	finish(&wakes[0]);
 	finish(&wakes[1]);
