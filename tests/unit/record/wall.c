@@ -227,10 +227,12 @@ static bool has_event(const struct recorded *r, const char *text)
 	return false;
 }
 
-/* Largest uncertainty; fails where the true time is outside of one. */
-static int64_t check_truth(const struct recorded *r, uint64_t seed)
+/* Largest uncertainty, and number of those below 0.1 ms; fails where the truth is outside of one. */
+static int64_t check_truth(const struct recorded *r, uint64_t seed, int *small)
 {
 	int64_t largest = 0;
+
+	*small = 0;
 
 	for (int i = 0; i < EVENTS; i++) {
 		int64_t truth = EPOCH + ns(r->event_s[i]), tai, u, back, back_u;
@@ -250,6 +252,7 @@ static int64_t check_truth(const struct recorded *r, uint64_t seed)
 				 (unsigned long long)seed, r->event_s[i],
 				 (long long)(back - r->event_ns[i]), (long long)back_u);
 		largest = u > largest ? u : largest;
+		*small += u < 100000;
 	}
 	return largest;
 }
@@ -265,6 +268,7 @@ static void events_of_two_machines_agree(void **state)
 		double event_s[EVENTS];
 		struct machine ma, mb;
 		int64_t largest;
+		int small;
 
 		init(&ma, seed, 25, 1.5);
 		init(&mb, seed + 1000, -25, -1.5);
@@ -290,10 +294,12 @@ static void events_of_two_machines_agree(void **state)
 		}
 		record(&ma, event_s, &a);
 		record(&mb, event_s, &b);
-		largest = check_truth(&a, seed);
+		largest = check_truth(&a, seed, &small);
 		/* held for 60 s at 10 ppm; a slew within a second moves 80 ms at most */
 		assert_true(largest <= (seed % 5 == 2 ? 100000000 : 750000));
-		largest = check_truth(&b, seed);
+		largest = check_truth(&b, seed, &small);
+		/* Nothing but the suspend and the second behind it is uncertain. */
+		assert_true(small >= EVENTS * 8 / 10);
 		assert_true(largest <= (seed % 7 == 3 ? 18 * S : 100000));
 		for (int i = 0; i < EVENTS; i++) {
 			int64_t at, au, bt, bu;
@@ -313,9 +319,138 @@ static void events_of_two_machines_agree(void **state)
 	}
 }
 
+/* --- mappings of given points --------------------------------------------------------------- */
+
+/* At mono_s, TAI less that; within u_ns. */
+static struct incise_wall_point point(double mono_s, double tai_s, double u_ns,
+				      const char *restart)
+{
+	struct incise_wall_point p = {.t_ns = ns(mono_s),
+				      .tai_ns = EPOCH + ns(mono_s) + ns(tai_s),
+				      .uncertainty_ns = u_ns,
+				      .rate_uncertainty_ppb = 1000,
+				      .utc_offset_s = 37,
+				      .source = "kernel",
+				      .reference = "TAI",
+				      .leap = "list"};
+
+	strcpy(p.restart, restart);
+	return p;
+}
+
+static void bound_holds(const struct incise_wall *wall, double mono_s, double tai_s,
+			int64_t least, int64_t most)
+{
+	int64_t tai, u;
+
+	assert_int_equal(incise_wall_tai(wall, ns(mono_s), &tai, &u), 0);
+	assert_true(llabs(tai - (EPOCH + ns(mono_s) + ns(tai_s))) <= u);
+	assert_in_range(u, least, most);
+}
+
+/* One of both parts is wrong by 1 s, and nothing says which. */
+static void step_of_a_synchronised_clock_widens_all(void **state)
+{
+	const struct incise_wall_point points[] = {
+		point(0, 0, 5e6, ""),
+		point(1, 0, 5e6, ""),
+		point(2, 1, 5e6, "step"),
+		point(3, 1, 5e6, ""),
+	};
+	struct incise_wall *wall = incise_wall_new(points, 4);
+
+	for (double s = 0; s <= 3; s += 0.1) {
+		/* both are within: 1 s and 5 ms; between the parts half of that more */
+		bound_holds(wall, s, 0, 1005000000, 1510000000);
+		bound_holds(wall, s, 1, 1005000000, 1510000000);
+	}
+	incise_wall_free(wall);
+}
+
+/* A correction within its bounds contradicts nothing. */
+static void correction_within_the_bounds_widens_nothing(void **state)
+{
+	const struct incise_wall_point points[] = {
+		point(0, 0, 5e6, ""),
+		point(1, 0, 5e6, ""),
+		point(2, 4e-3, 1e5, "step"),
+		point(3, 4e-3, 1e5, ""),
+	};
+	struct incise_wall *wall = incise_wall_new(points, 4);
+
+	bound_holds(wall, 0.5, 4e-3, 5000000, 5002000);
+	bound_holds(wall, 1.5, 4e-3, 4500000, 5002000);
+	bound_holds(wall, 2.5, 4e-3, 100000, 102000);
+	incise_wall_free(wall);
+}
+
+static void unknown_and_far_times(void **state)
+{
+	const struct incise_wall_point points[] = {
+		point(0, 0, INFINITY, ""),
+		point(1, 0, 1000, ""),
+		point(2, 0, 1000, ""),
+	};
+	struct incise_wall *wall = incise_wall_new(points, 3);
+	int64_t tai, u;
+
+	assert_int_equal(incise_wall_tai(wall, S / 2, &tai, &u), 0);
+	assert_int_equal(u, INCISE_WALL_UNKNOWN);
+	assert_int_equal(tai, EPOCH + S / 2);
+	bound_holds(wall, 1, 0, 1000, 1001);
+	/* 1 ppm from the last point on */
+	bound_holds(wall, 12, 0, 11000, 11001);
+	assert_int_equal(incise_wall_tai(wall, 62 * S, &tai, &u), 0);
+	assert_int_equal(incise_wall_tai(wall, 62 * S + 1, &tai, &u), -ENODATA);
+	assert_int_equal(incise_wall_tai(wall, -60 * S - 1, &tai, &u), -ENODATA);
+	incise_wall_free(wall);
+	assert_null(incise_wall_new(points, 0));
+	assert_int_equal(errno, ENODATA);
+	assert_null(
+		incise_wall_new((struct incise_wall_point[]){points[1], points[0]}, 2));
+	assert_int_equal(errno, EINVAL);
+}
+
+/* After a step backwards two times have the same TAI. */
+static void inverse_contains_both_times(void **state)
+{
+	const struct incise_wall_point points[] = {
+		point(0, 0, 1000, ""),
+		point(2, 0, 1000, ""),
+		point(3, -1, INFINITY, "step"),
+		point(5, -1, INFINITY, ""),
+	};
+	struct incise_wall *wall = incise_wall_new(points, 2);
+	int64_t t, u;
+
+	assert_int_equal(incise_wall_monotonic(wall, EPOCH + S, &t, &u), 0);
+	assert_in_range(t, S - 1, S + 1);
+	assert_in_range(u, 1000, 2200); /* 1 µs and the growth of 1 s at 1 ppm */
+	incise_wall_free(wall);
+	wall = incise_wall_new(points, 4);
+	assert_int_equal(incise_wall_monotonic(wall, EPOCH + 5 * S / 2, &t, &u), 0);
+	assert_int_equal(u, INCISE_WALL_UNKNOWN);
+	incise_wall_free(wall);
+}
+
+static void text_of_utc(void **state)
+{
+	char text[INCISE_WALL_TEXT];
+
+	incise_wall_utc_text(EPOCH + 37 * S + 5, 37, text);
+	assert_string_equal(text, "2027-01-15T08:00:00.000000005Z");
+	incise_wall_utc_text(-1, 0, text);
+	assert_string_equal(text, "1969-12-31T23:59:59.999999999Z");
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(step_of_a_synchronised_clock_widens_all),
+		cmocka_unit_test(correction_within_the_bounds_widens_nothing),
+		cmocka_unit_test(unknown_and_far_times),
+		cmocka_unit_test(inverse_contains_both_times),
+		cmocka_unit_test(text_of_utc),
 		cmocka_unit_test(events_of_two_machines_agree),
 	};
 
