@@ -108,6 +108,7 @@ bool incise_chrony_read(struct incise_chrony_tracking *tracking, const uint8_t *
 #define PTP_RESPONSE 2
 #define PTP_TLV_MANAGEMENT 1
 #define PTP_MASTER 6
+#define PTP_SOFTWARE 0 /* timestamping */
 #define PTP_UNCALIBRATED 8
 #define PTP_SLAVE 9
 /* Longer than any path of a network; more than any number of leap seconds. */
@@ -172,6 +173,12 @@ static bool read_port(struct incise_ptp_state *state, const uint8_t *data)
 	return true;
 }
 
+static bool read_port_properties(struct incise_ptp_state *state, const uint8_t *data)
+{
+	state->hardware |= data[11] != PTP_SOFTWARE;
+	return true;
+}
+
 bool incise_ptp_read(struct incise_ptp_state *state, const uint8_t *bytes, size_t n,
 		     uint8_t domain, uint16_t sequence)
 {
@@ -184,6 +191,8 @@ bool incise_ptp_read(struct incise_ptp_state *state, const uint8_t *bytes, size_
 		{INCISE_PTP_CURRENT_DATA_SET, 18, read_current},
 		{INCISE_PTP_TIME_PROPERTIES, 4, read_properties},
 		{INCISE_PTP_PORT_DATA_SET, 26, read_port},
+		/* and the name of its interface */
+		{INCISE_PTP_PORT_PROPERTIES_NP, 13, read_port_properties},
 	};
 	size_t length;
 
@@ -196,7 +205,9 @@ bool incise_ptp_read(struct incise_ptp_state *state, const uint8_t *bytes, size_
 	length = get(bytes + PTP_TLV + 2, 2);
 	for (size_t i = 0; i < sizeof(sets) / sizeof(*sets); i++)
 		if (get(bytes + PTP_TLV + 4, 2) == sets[i].id)
-			return length == sets[i].size + 2 &&
+			return (length == sets[i].size + 2 ||
+				(sets[i].id == INCISE_PTP_PORT_PROPERTIES_NP &&
+				 length > sets[i].size + 2)) &&
 			       n >= PTP_DATA + sets[i].size &&
 			       sets[i].read(state, bytes + PTP_DATA);
 	return false;

@@ -42,6 +42,7 @@ enum incise_ptp_id {
 	INCISE_PTP_TIME_PROPERTIES = 0x2003,
 	INCISE_PTP_PORT_DATA_SET = 0x2004,
 	INCISE_PTP_TIME_STATUS_NP = 0xc000,
+	INCISE_PTP_PORT_PROPERTIES_NP = 0xc004,
 };
 
 /* Gathered from several answers; each reads its part. */
@@ -54,6 +55,7 @@ struct incise_ptp_state {
 	double path_delay_ns;
 	int utc_offset_s;
 	bool utc_valid, ptp_timescale, traceable;
+	bool hardware;	    /* a port's timestamps are not of CLOCK_REALTIME */
 	bool slave, master; /* one port follows a master, or is one */
 };
 

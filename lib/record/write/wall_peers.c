@@ -165,7 +165,8 @@ static bool ask(struct incise_wall_peer *peer, enum incise_ptp_id id,
 	if (send(peer->fd, request, sizeof(request), 0) != sizeof(request))
 		return false;
 	/* Each port answers for itself; the others answer once. */
-	while ((!any || id == INCISE_PTP_PORT_DATA_SET) &&
+	while ((!any || id == INCISE_PTP_PORT_DATA_SET ||
+		id == INCISE_PTP_PORT_PROPERTIES_NP) &&
 	       (n = receive(peer->fd, any ? incise_monotonic_ns() + PORTS_NS : until_ns,
 			    reply, sizeof(reply))) >= 0 &&
 	       incise_monotonic_ns() < until_ns)
@@ -189,7 +190,8 @@ static bool ask_all(struct incise_wall_peer *peer, struct incise_ptp_state *stat
 	if (ask(peer, INCISE_PTP_TIME_STATUS_NP, state) &&
 	    ask(peer, INCISE_PTP_CURRENT_DATA_SET, state) &&
 	    ask(peer, INCISE_PTP_TIME_PROPERTIES, state) &&
-	    ask(peer, INCISE_PTP_PORT_DATA_SET, state))
+	    ask(peer, INCISE_PTP_PORT_DATA_SET, state) &&
+	    ask(peer, INCISE_PTP_PORT_PROPERTIES_NP, state))
 		return true;
 	/* It may have been started anew, with another socket of that name. */
 	incise_wall_peer_close(peer);
@@ -319,6 +321,9 @@ void incise_wall_ptp_read(struct incise_wall_peer *peer,
 		reading->utc_offset_s = state.utc_offset_s;
 		snprintf(reading->leap, sizeof(reading->leap), "ptp");
 	}
+	/* The offset is of the network card's clock, and that of CLOCK_REALTIME is not known. */
+	if (state.hardware)
+		return;
 	name_reference(&state, reading->reference);
 	if (!state.gm_present && state.master && !state.slave) {
 		/* Only "ptp" goes on when the master is lost: this is another source. */

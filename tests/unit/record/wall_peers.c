@@ -111,6 +111,12 @@ static size_t answer_ptp(const struct daemon *d, const uint8_t *request, uint8_t
 		data[2] = d->flags;
 		size = 4;
 		break;
+	case 0xc004:
+		data[11] = d->manner == HARDWARE;
+		data[12] = 4;
+		memcpy(data + 13, "eth0", 4);
+		size = 17;
+		break;
 	case 0x2004:
 		/* as ptp4l with free_running: uncalibrated */
 		data[10] = d->manner == LOST || d->manner == MASTER ? 6 : 8;
@@ -311,7 +317,11 @@ static void lost_master_is_no_master(void **state)
 	sync_at(&d, 17);
 	statement = ask_at(&peer, 17);
 	check_ptp(&statement.reading, 17, 1e6);
-	/* A hardware clock counts TAI: its time is not that of CLOCK_REALTIME. */
+	/* The time of a hardware clock is not that of CLOCK_REALTIME, however near. */
+	d.manner = HARDWARE;
+	assert_false(ask_at(&peer, 17).reading.good);
+	d.manner = GOOD;
+	assert_true(ask_at(&peer, 17).reading.good);
 	d.ingress_ns += UTC_S * S;
 	assert_false(ask_at(&peer, 18).reading.good);
 	stop(&d, &peer);

@@ -122,6 +122,16 @@ check "times of the tracker go on" holds "max(abs(t_ns - seq * 1e9 / 120 / (1 + 
 	FROM tracker WHERE seq > 120"
 check "times of the pictures go on" holds "min(d) > 0 AND max(d) < 2e9 FROM (SELECT t_ns -
 	lag(t_ns) OVER (ORDER BY seq) AS d FROM frames)"
+# Two of the three may fall into one second, of which one point is kept.
+check "the steps are seen" holds "count(*) BETWEEN 1 AND 3 FROM events WHERE kind = 'clock' AND
+	text LIKE 'CLOCK_REALTIME was stepped by %'"
+check "the mapping to TAI restarts at them" holds "count(*) = (SELECT count(*) FROM events WHERE
+	kind = 'clock' AND text LIKE 'CLOCK_REALTIME was stepped by %') FROM wall WHERE restart = 'step'"
+check "without a source its error is unknown" holds "count(*) >= 5 AND sum(uncertainty_ns IS NULL
+	AND source = 'plain') = count(*) FROM wall"
+# set by whole seconds, three times
+check "in the end the clock is where it was" holds "abs((SELECT tai_ns - t_ns FROM wall ORDER BY
+	seq DESC LIMIT 1) - (SELECT tai_ns - t_ns FROM wall ORDER BY seq LIMIT 1)) < 5e9"
 # vivid hands out a picture up to a period before what it says is its end
 check "their stamps are by the clock that is not set" holds "count(*) > 10 AND
 	max(abs(arrival_ns - t_ns)) < 1e9 FROM frames"
