@@ -161,6 +161,13 @@ ask() {
 		assert abs((b - a) * 1e-6 - (after - before)) <= 2, (before, a, after, b)
 		assert len(rows) - hole > 100, (len(rows), hole)
 	END
+	# and where it does not, the capture ends after 10 s
+	kill "$sender"
+	wait "$sender" || true
+	send lsl_send "$name" --recover --seconds 3
+	run -1 --separate-stderr incise capture -o b.rec --duration 60s
+	[[ "$stderr" == *"LSL $name, channel 1: no more samples arrived; see the program that sends them, and start again"* ]] ||
+		complain "$stderr"
 }
 
 # A server of poses on a port of its own.
@@ -269,6 +276,23 @@ no_more_poses() {
 	poses --do drop --seconds 2
 	run -1 --separate-stderr incise capture -o b.rec --duration 30s
 	[[ "$stderr" == *"OpenIGTLink Stylus at 127.0.0.1 disconnected and was not back after 10 s; start its server again"* ]]
+}
+
+@test "a server of poses that stands still ends the capture" {
+	poses --do nan --seconds 60
+	incise capture -o a.rec --duration 60s >out 2>err &
+	capture=$!
+	for _ in $(seq 100); do
+		! incise info a.rec.part --json >rows.json 2>/dev/null || break
+		sleep 0.1
+	done
+	kill -STOP "$sender"
+	status=0
+	wait "$capture" || status=$?
+	kill -CONT "$sender"
+	[ "$status" = 1 ]
+	grep -q "OpenIGTLink Stylus at 127.0.0.1 sent no message for 10 s; start its server again, check the network" err ||
+		complain "$(cat err)"
 }
 
 @test "incise serve --lsl: pylsl reads poses, forces and events with their units and times" {

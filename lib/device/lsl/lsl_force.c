@@ -130,10 +130,11 @@ static void *run(void *argument)
 	struct lsl_force *f = argument;
 	int64_t last_ns = incise_clock_now(f->clock), corrected_ns = last_ns;
 	double uncertainty_s;
-	int got = 0;
+	int error = 0; /* of liblsl, or LSL_TIMEOUT: nothing comes */
 
-	while (daq_feed_wait(&f->feed, -1, PULL_MS) != DAQ_STOP) {
+	while (!error && daq_feed_wait(&f->feed, -1, PULL_MS) != DAQ_STOP) {
 		int64_t now_ns = incise_clock_now(f->clock);
+		int got;
 
 		if (now_ns - corrected_ns > CORRECT_MS * INT64_C(1000000)) {
 			correct(f, 0, &uncertainty_s);
@@ -142,15 +143,17 @@ static void *run(void *argument)
 		got = pull(f);
 		if (got > 0)
 			last_ns = now_ns;
-		if (got < 0 || now_ns - last_ns > DEAD_MS * INT64_C(1000000))
-			break;
-		got = 0;
+		else if (got < 0)
+			error = got;
+		else if (now_ns - last_ns > DEAD_MS * INT64_C(1000000))
+			error = LSL_TIMEOUT;
 	}
 	daq_feed_end(
-		&f->feed, got ? -EIO : 0,
-		got < 0 ? "the stream ended; start its program, and start again"
-			: "no more samples arrived; see the program that sends them, "
-			  "and start again");
+		&f->feed, error ? -EIO : 0,
+		error == LSL_TIMEOUT
+			? "no more samples arrived; see the program that sends them, "
+			  "and start again"
+			: "the stream ended; start its program, and start again");
 	return NULL;
 }
 
