@@ -27,7 +27,8 @@ INCISE_BEGIN_DECLS
 enum incise_session_align {
 	INCISE_ALIGN_CLOCKS, /**< none: wall time alone */
 	INCISE_ALIGN_TAP,    /**< knocks that force or tracker of each member show */
-	INCISE_ALIGN_EVENTS, /**< events of the kind "sync", of a common line */
+	/** events of the kind "sync", of a common line, or steps that it makes in the force */
+	INCISE_ALIGN_EVENTS,
 };
 
 /** A member, and its clock. Times are ns of the session's clock. */

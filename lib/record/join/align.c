@@ -14,6 +14,7 @@
 #define APART_NS 150000000LL /* two taps of a hand are further apart */
 #define RISE_NS 2000000LL    /* a knock rises within this time */
 #define RISE_ROWS 64	     /* of it that are kept */
+#define LARGER 1.25	     /* then it is the mark; the end of a short pulse is not */
 #define SHARE 0.3	     /* of the largest: smaller ones are no taps */
 #define NOISES 8	     /* standard deviations that a tap exceeds */
 #define SYNC_SD_NS 1000	     /* of an event of a common line: latency of an interrupt */
@@ -191,7 +192,7 @@ static int find_marks(struct incise_recording *recording, const struct walk *wal
 		if (last[1].value >= limit && last[1].value >= last[2].value &&
 		    last[1].value > last[0].value &&
 		    (!in || last[1].t_ns - peak[1].t_ns < APART_NS) &&
-		    (!in || last[1].value > peak[1].value)) {
+		    (!in || last[1].value > LARGER * peak[1].value)) {
 			if (!in && n == INCISE_MARKS_MAX)
 				break;
 			memcpy(peak, last, sizeof(peak));
@@ -240,8 +241,10 @@ int incise_align_marks(struct incise_recording *recording,
 				     true};
 	int n;
 
-	if (align == INCISE_ALIGN_EVENTS)
-		return find_events(recording, marks, err);
+	n = align == INCISE_ALIGN_EVENTS ? find_events(recording, marks, err) : 0;
+	if (n)
+		return n;
+	/* A line that another machine has events of may be seen as steps here. */
 	n = recording->meta.force ? find_marks(recording, &force, marks, err) : 0;
 	return n ? n : find_marks(recording, &tracker, marks, err);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * Alignment of two clocks by marks that both recorded: knocks ("taps") in force or motion, or
- * events of a common line.
+ * events of a common line, which may be steps of the force in another recording.
  *
  *     force, N        ____│\____________│\__      onset: where it starts to rise
  *     position, mm    ___/▔▔▔          /▔▔▔       corner: where the speed jumps

@@ -411,8 +411,8 @@ static int read_marks(struct join *join, struct member *member)
 	return incise_error_set(join->err, ENODATA,
 				tap ? "%s: no tap found: no sudden change of force or "
 				      "motion; --align sync, or without --align"
-				    : "%s: no event of the SYNC line; --align tap, or "
-				      "without --align",
+				    : "%s: no event of the SYNC line, and no step of the "
+				      "force; --align tap, or without --align",
 				member->recording->path);
 }
 

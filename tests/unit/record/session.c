@@ -505,6 +505,51 @@ static void test_agreement(void **state)
 	assert_true(join(&taps, &err) < 0);
 }
 
+/* Pulses of a line that goes to both machines, among other events; no wall time. */
+static void test_sync(void **state)
+{
+	const struct incise_session_options sync = {.align = INCISE_ALIGN_EVENTS};
+	struct incise_session_info b;
+	struct incise_error err;
+	double error_ns;
+
+	record("a.rec", SPEC, 10 * S);
+	record("b.rec", SPEC ",seed=1", 10 * S);
+	for (int i = 0; i < TAPS; i++)
+		for (int k = 0; k < 2; k++) {
+			char sql[200];
+
+			snprintf(sql, sizeof(sql),
+				 "INSERT INTO events VALUES(%.0f, 'sync', 'pulse')",
+				 taps_s[i] * 1e9);
+			change(k ? "b.rec/recording.db" : "a.rec/recording.db", sql);
+		}
+	move_to_b("b.rec/recording.db");
+	if (join(&sync, &err))
+		fail_msg("%s", err.text);
+	b = info_of(1);
+	assert_string_equal(b.method, "sync");
+	assert_int_equal(b.matches, TAPS);
+	/* 1 us at each pulse, over 8 s: the rate is known to 0.2 ppm. */
+	assert_true(fabs(b.rate_ppm - 50) < 0.1 && b.uncertainty_ns < 20000);
+	error_ns = largest_error_ns();
+	assert_true(error_ns < b.uncertainty_ns);
+	/* The other machine sees the line at its force channel. */
+	remove_session("s.rec");
+	change("b.rec/recording.db", "DELETE FROM events");
+	change("b.rec/recording.db", "UPDATE force SET t_ns = seq * 100000 + 1000000000");
+	knock_force("b.rec/recording.db", TAPS);
+	change("b.rec/recording.db", "UPDATE force SET t_ns = " ON_B("t_ns"));
+	if (join(&sync, &err))
+		fail_msg("%s", err.text);
+	b = info_of(1);
+	assert_int_equal(b.matches, TAPS);
+	/* 0.1 ms between two samples; 4 standard deviations at the ends. */
+	assert_true(fabs(b.rate_ppm - 50) < 100 && b.uncertainty_ns < 1 * MS);
+	error_ns = fabs((double)(b.first_ns - S));
+	assert_true(error_ns < b.uncertainty_ns);
+}
+
 /* Marks in a steady rhythm match at several offsets; in an irregular one at one. */
 static void test_marks(void **state)
 {
@@ -542,10 +587,11 @@ static void test_marks(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		IN_FOLDER(test_clocks),	   IN_FOLDER(test_refusals),
-		IN_FOLDER(test_verify),	   IN_FOLDER(test_forged),
-		IN_FOLDER(test_pairs),	   IN_FOLDER(test_taps),
-		IN_FOLDER(test_agreement), cmocka_unit_test(test_marks),
+		IN_FOLDER(test_clocks),	      IN_FOLDER(test_refusals),
+		IN_FOLDER(test_verify),	      IN_FOLDER(test_forged),
+		IN_FOLDER(test_pairs),	      IN_FOLDER(test_taps),
+		IN_FOLDER(test_agreement),    IN_FOLDER(test_sync),
+		cmocka_unit_test(test_marks),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
