@@ -98,7 +98,7 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	run --separate-stderr incise join a.rec none.rec -o day.rec
 	failed_with "none.rec: has no wall time; align by a signal that both recorded (--align tap)"
 	run --separate-stderr incise join a.rec b.rec -o day.rec --align sync
-	failed_with "a.rec: no event of the SYNC line"
+	failed_with "a.rec and b.rec: no event of the SYNC line; --align tap, or without --align"
 	run --separate-stderr incise join a.rec a.rec -o day.rec
 	failed_with "a.rec and a.rec: the same recording; give it once"
 	[ ! -e day.rec ] && [ ! -e day.rec.part ]

@@ -241,10 +241,8 @@ int incise_align_marks(struct incise_recording *recording,
 				     true};
 	int n;
 
-	n = align == INCISE_ALIGN_EVENTS ? find_events(recording, marks, err) : 0;
-	if (n)
-		return n;
-	/* A line that another machine has events of may be seen as steps here. */
+	if (align == INCISE_ALIGN_EVENTS)
+		return find_events(recording, marks, err);
 	n = recording->meta.force ? find_marks(recording, &force, marks, err) : 0;
 	return n ? n : find_marks(recording, &tracker, marks, err);
 }

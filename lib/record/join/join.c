@@ -38,6 +38,7 @@ struct member {
 	/* By a signal. */
 	struct incise_mark marks[INCISE_MARKS_MAX];
 	int n_marks;
+	bool has_events; /* of the SYNC line */
 	struct incise_align_fit fit;
 	double agreement_ns, agreement_bound_ns;
 };
@@ -397,23 +398,31 @@ static int map_by_wall(struct join *join, struct member *member)
 
 /* --- signals ------------------------------------------------------------------------- */
 
+/* The marks of a member: events of the line, or what is sudden in force or motion. */
 static int read_marks(struct join *join, struct member *member)
 {
 	bool tap = join->options->align == INCISE_ALIGN_TAP;
-	int n = incise_align_marks(member->recording, join->options->align, member->marks,
-				   join->err);
+	int n = 0;
 
+	if (!tap)
+		n = incise_align_marks(member->recording, INCISE_ALIGN_EVENTS,
+				       member->marks, join->err);
+	member->has_events = n > 0;
+	/* A line that another machine has events of may be seen as steps here. */
+	if (!n)
+		n = incise_align_marks(member->recording, INCISE_ALIGN_TAP, member->marks,
+				       join->err);
 	if (n < 0)
 		return n;
 	member->n_marks = n;
 	if (n)
 		return 0;
-	return incise_error_set(join->err, ENODATA,
-				tap ? "%s: no tap found: no sudden change of force or "
-				      "motion; --align sync, or without --align"
-				    : "%s: no event of the SYNC line, and no step of the "
-				      "force; --align tap, or without --align",
-				member->recording->path);
+	return incise_error_set(
+		join->err, ENODATA,
+		"%s: no %sno sudden change of force or motion; align by another signal, or "
+		"without --align",
+		member->recording->path,
+		tap ? "tap found: " : "event of the SYNC line, and ");
 }
 
 /* Compare the time by the signal with that by the clocks, if they can be compared. */
@@ -455,6 +464,13 @@ static int map_by_signal(struct join *join, struct member *member)
 		rc = read_marks(join, member);
 	if (rc)
 		return rc;
+	if (join->options->align == INCISE_ALIGN_EVENTS && !first->has_events &&
+	    !member->has_events)
+		return incise_error_set(
+			join->err, ENODATA,
+			"%s and %s: no event of the SYNC line; --align tap, "
+			"or without --align",
+			first->recording->path, member->recording->path);
 	rc = incise_align_fit(first->marks, first->n_marks, member->marks,
 			      member->n_marks, &member->fit, &why);
 	if (rc)
