@@ -76,8 +76,11 @@ void wall_text(const struct incise_wall *wall, int64_t start_ns, int64_t end_ns)
 	for (int i = 0; i < 2; i++)
 		wall_uncertainty_text(sum.uncertainty_ns[i], bounds[i]);
 	p = sum.points;
-	printf("wall time  %s to %s, uncertainty (bound) %s to %s\n", sum.utc[0],
-	       sum.utc[1], bounds[0], bounds[1]);
+	printf("wall time  %s to %s, uncertainty (bound) %s", sum.utc[0], sum.utc[1],
+	       bounds[0]);
+	if (strcmp(bounds[0], bounds[1]) != 0)
+		printf(" to %s", bounds[1]);
+	putchar('\n');
 	printf("           by %s%s, time of %s; TAI is UTC + %d s (%s)\n", p->source,
 	       sum.several ? " and others" : "", p->reference, p->utc_offset_s, p->leap);
 	if (sum.held)
