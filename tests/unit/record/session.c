@@ -37,7 +37,11 @@ static void move_to_b(const char *file)
 static void set_wall(const char *file, bool is_b, const char *reference, uint64_t *random,
 		     double bound_ns)
 {
-	change(file, "DELETE FROM wall");
+	char *sql = NULL;
+	size_t size;
+	FILE *out = open_memstream(&sql, &size);
+
+	fprintf(out, "BEGIN; DELETE FROM wall;");
 	for (int i = 0; i < 12; i++) {
 		int64_t true_ns = S / 2 + i * S;
 		int64_t t_ns =
@@ -45,18 +49,19 @@ static void set_wall(const char *file, bool is_b, const char *reference, uint64_
 		int64_t tai_ns =
 			1000 * S + true_ns +
 			llround(0.9 * bound_ns * incise_random_symmetric(random));
-		char sql[500];
 
-		snprintf(
-			sql, sizeof(sql),
+		fprintf(out,
 			"INSERT INTO wall(seq, t_ns, tai_ns, uncertainty_ns, rate_ppb, "
 			"rate_uncertainty_ppb, utc_offset_s, held, source, reference, "
 			"leap, restart) VALUES(%d, %lld, %lld, %.1f, %.1f, 1000.0, 37, 0, "
-			"'ptp', '%s', 'ptp', '')",
+			"'ptp', '%s', 'ptp', '');",
 			i, (long long)t_ns, (long long)tai_ns, bound_ns,
 			is_b ? 50000.0 : 0.0, reference);
-		change(file, sql);
 	}
+	fprintf(out, "COMMIT");
+	fclose(out);
+	change(file, sql);
+	free(sql);
 }
 
 static void remove_session(const char *name)
@@ -216,6 +221,38 @@ static void test_refusals(void **state)
 	err = (struct incise_error){0};
 	assert_null(incise_recording_open("a.rec:b", &err));
 	assert_non_null(strstr(err.text, "not a joined one"));
+}
+
+/* A clock that is stepped meanwhile: refused, or no time is wrong by more than is stated. */
+static void test_steps(void **state)
+{
+	static const double steps_s[] = {1, -1, 0.01, -0.01, 1e-5, -1e-5};
+	struct incise_error err;
+	uint64_t random = 11;
+	int joined = 0;
+
+	two_machines(4 * S);
+	for (size_t i = 0; i < sizeof(steps_s) / sizeof(*steps_s); i++) {
+		char sql[300];
+
+		set_wall("a.rec/recording.db", false, "TAI", &random, BOUND_NS);
+		set_wall("b.rec/recording.db", true, "TAI", &random, BOUND_NS);
+		/* The wall clock is wrong from the third point on, and its source notices. */
+		snprintf(
+			sql, sizeof(sql),
+			"UPDATE wall SET tai_ns = tai_ns + %.0f, restart = CASE seq WHEN 3 "
+			"THEN 'step' ELSE '' END WHERE seq >= 3",
+			steps_s[i] * 1e9);
+		change("b.rec/recording.db", sql);
+		if (join(&(struct incise_session_options){0}, &err)) {
+			assert_non_null(strstr(err.text, "b.rec"));
+			continue;
+		}
+		joined++;
+		assert_true(largest_error_ns() <= info_of(1).uncertainty_ns + 2);
+		remove_session("s.rec");
+	}
+	assert_true(joined > 0);
 }
 
 /* Verification covers the members and the session's own tables. */
@@ -587,11 +624,11 @@ static void test_marks(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		IN_FOLDER(test_clocks),	      IN_FOLDER(test_refusals),
-		IN_FOLDER(test_verify),	      IN_FOLDER(test_forged),
-		IN_FOLDER(test_pairs),	      IN_FOLDER(test_taps),
-		IN_FOLDER(test_agreement),    IN_FOLDER(test_sync),
-		cmocka_unit_test(test_marks),
+		IN_FOLDER(test_clocks), IN_FOLDER(test_refusals),
+		IN_FOLDER(test_steps),	IN_FOLDER(test_verify),
+		IN_FOLDER(test_forged), IN_FOLDER(test_pairs),
+		IN_FOLDER(test_taps),	IN_FOLDER(test_agreement),
+		IN_FOLDER(test_sync),	cmocka_unit_test(test_marks),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
