@@ -128,6 +128,17 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	run -0 --separate-stderr incise join a.rec killed.rec -o rest.rec
 	[[ "$stderr" == *"warning: killed.rec.part: was interrupted; it is joined up to its last commit" ]]
 	[[ "${lines[1]}" == "killed: force, tracker, 4.000 to 9.000 s, on "*", interrupted" ]]
+	# one that is being recorded
+	incise capture -o now.rec --rig sim:clock=real --duration 60s >/dev/null 2>&1 3>&- &
+	pid=$!
+	for ((i = 0; i < 600; i++)); do
+		[ "$(incise info now.rec --json 2>/dev/null | grep -c '"kind"')" != 1 ] || break
+		sleep 0.1
+	done
+	run -1 --separate-stderr incise join a.rec now.rec -o rest2.rec --align tap
+	kill -INT $pid
+	wait $pid || :
+	[[ "$stderr" == *"now.rec.part: is being recorded; wait for its end" ]]
 	# what lies in it is checked for what was joined
 	sqlite3 day.rec/b/recording.db "UPDATE ledger SET crc = crc + 1"
 	run -1 --separate-stderr incise export day.rec:a

@@ -13,6 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -130,6 +131,17 @@ static int read_span(struct join *join, struct member *member)
 	return 0;
 }
 
+/* Whether a recorder holds the lock of the folder. */
+static bool is_written(const char *folder)
+{
+	int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+	bool is = fd >= 0 && flock(fd, LOCK_SH | LOCK_NB) && errno == EWOULDBLOCK;
+
+	if (fd >= 0)
+		close(fd);
+	return is;
+}
+
 static int open_member(struct join *join, const char *path)
 {
 	struct member *member = &join->members[join->n];
@@ -165,6 +177,10 @@ static int open_member(struct join *join, const char *path)
 						"once",
 						join->members[i].recording->path,
 						recording->path);
+	if (!recording->meta.complete && is_written(recording->path))
+		return incise_error_set(join->err, EBUSY,
+					"%s: is being recorded; wait for its end",
+					recording->path);
 	if (!recording->meta.complete)
 		note(join, "%s: was interrupted; it is joined up to its last commit",
 		     recording->path);
@@ -519,8 +535,11 @@ static int map_clock(struct join *join, int at)
 
 /* --- writing ------------------------------------------------------------------------- */
 
-/* Clone, link or copy a file that exists; bit for bit. Returns 0 or -errno. */
-static int bring(const char *from, const char *to)
+/*
+ * Clone, link or copy a file that exists; bit for bit. A link is the same file, which nothing changes
+ * once it is complete. Returns 0 or -errno.
+ */
+static int bring(const char *from, const char *to, bool complete)
 {
 	int in = open(from, O_RDONLY | O_CLOEXEC), out, rc = 0;
 	ssize_t n = 1;
@@ -531,8 +550,7 @@ static int bring(const char *from, const char *to)
 	if (out < 0) {
 		rc = -errno;
 	} else if (ioctl(out, FICLONE, in)) {
-		/* A link is the same file, which nothing changes once it is complete. */
-		if (!unlink(to) && link(from, to)) {
+		if (!unlink(to) && (!complete || link(from, to))) {
 			close(out);
 			out = open(to, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
 			while (out >= 0 && n > 0)
@@ -594,7 +612,7 @@ static int bring_member(struct join *join, const struct member *member,
 			rc = -ENOMEM;
 			break;
 		}
-		rc = bring(from, to);
+		rc = bring(from, to, member->recording->meta.complete);
 		free(from);
 		free(to);
 	}
