@@ -32,7 +32,7 @@ def _without_choice(path: bytes) -> bytes:
     folder, _, name = path.rpartition(b"/")
     if b":" not in name or os.path.exists(path):
         return path
-    return os.path.join(folder, name.split(b":", 1)[0])
+    return os.path.join(folder, name.rpartition(b":")[0])
 
 
 class SourceStruct(ctypes.Structure):

@@ -63,6 +63,8 @@ sum() {
 	[ "$(key info.json 'members[1].method')" = clocks ]
 	# a folder that is moved as a whole
 	mkdir other && mv day.rec other/
+	ln -s day.rec "other/10:30.rec"
+	incise export other/10:30.rec:a --rate 10 -o named.csv
 	incise export other/day.rec:a --resample | cut -d, -f2- >by_session.csv
 	incise export a.rec --resample | cut -d, -f2- >alone.csv
 	cmp by_session.csv alone.csv

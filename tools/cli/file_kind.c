@@ -263,7 +263,7 @@ static bool is_recording(const char *path)
 char *file_without_choice(const char *path)
 {
 	char *whole = cli_text("%s", path), *slash = strrchr(whole, '/');
-	char *colon = strchr(slash ? slash : whole, ':');
+	char *colon = strrchr(slash ? slash : whole, ':');
 
 	if (!colon || !access(path, F_OK))
 		return whole;

@@ -266,7 +266,7 @@ int incise_recording_need_zero(const struct incise_recording *rec,
 static const char *choice_of(const char *path)
 {
 	const char *slash = strrchr(path, '/'),
-		   *colon = strchr(slash ? slash : path, ':');
+		   *colon = strrchr(slash ? slash : path, ':');
 
 	return colon && colon > path ? colon + 1 : NULL;
 }
