@@ -277,9 +277,15 @@ class Models(Case):
         self.says(incise.Invalid, "classic", incise.train, [self.csv], classic=True)
 
     def interrupt(self, script, wanted, after_s=0):
+        # A shell starts what it puts in the background with SIGINT ignored.
         process = subprocess.Popen(
-            [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True
+            [sys.executable, "-c", script],
+            stdout=subprocess.PIPE,
+            text=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
         self.assertEqual(process.stdout.readline(), "ready\n")
         time.sleep(after_s)
         process.send_signal(signal.SIGINT)
