@@ -147,6 +147,21 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	[[ "$stderr" == *"member b is not the recording that was joined"* ]]
 }
 
+@test "recordings of one machine have one clock, with or without wall time" {
+	for name in one two; do
+		incise capture -o $name.rec --rig "sim:clock=real,seed=1" --duration 200ms --camera off \
+			--clock-source none >/dev/null
+	done
+	run -0 --separate-stderr incise join one.rec two.rec -o day.rec --within 1ns
+	[[ "${lines[2]}" == "  offset 0.000000000 s, rate +0.0000 ppm, uncertainty 0 ms, the same clock" ]]
+	[[ "${lines[3]}" == "  no overlap with those before: a gap of "* ]]
+	incise verify day.rec
+	# another boot: its clock is another one
+	sqlite3 two.rec/recording.db "UPDATE meta SET value = 'x' || value WHERE key = 'boot'"
+	run -1 --separate-stderr incise join one.rec two.rec -o other.rec --damaged
+	[[ "$stderr" == *"one.rec: has no wall time; align by a signal"* ]] || { echo "$stderr"; false; }
+}
+
 @test "a gap costs no accuracy, and TAI is that of the machine" {
 	incise capture -o late.rec --rig sim:clock=simulated,seed=9 --duration 1s \
 		--clock-source sim:8000,50,30 >/dev/null

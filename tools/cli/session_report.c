@@ -13,9 +13,12 @@ const struct cli_unit session_times[] = {
 
 static void print_times(const struct incise_session_info *member)
 {
-	printf("  offset %.9f s, rate %+.4f ppm, uncertainty %.3g ms, by %s",
+	bool same = !strcmp(member->method, "same");
+
+	printf("  offset %.9f s, rate %+.4f ppm, uncertainty %.3g ms, %s%s",
 	       (double)member->offset_ns * 1e-9, member->rate_ppm,
-	       member->uncertainty_ns * 1e-6, member->method);
+	       member->uncertainty_ns * 1e-6, same ? "the same clock" : "by ",
+	       same ? "" : member->method);
 	if (member->matches)
 		printf(" (%d mark%s)", member->matches, member->matches == 1 ? "" : "s");
 	printf("\n");

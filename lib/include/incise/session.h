@@ -33,11 +33,11 @@ enum incise_session_align {
 
 /** A member, and its clock. Times are ns of the session's clock. */
 struct incise_session_info {
-	char name[64];		   /**< of its folder in the session, unique */
-	char host[64];		   /**< name of the machine */
-	char method[16];	   /**< "first", "clocks", "tap", "sync" */
-	char streams[64];	   /**< that it has: "force, tracker, camera" */
-	bool complete;		   /**< closed by its recorder */
+	char name[64];	  /**< of its folder in the session, unique */
+	char host[64];	  /**< name of the machine */
+	char method[16];  /**< "first", "same" (clock), "clocks", "tap", "sync" */
+	char streams[64]; /**< that it has: "force, tracker, camera" */
+	bool complete;	  /**< closed by its recorder */
 	int64_t first_ns, last_ns; /**< first and last row; -1: no row */
 	int64_t offset_ns; /**< session's clock less the member's, at its first row */
 	double rate_ppm; /**< how much faster the session's clock runs, over the recording */

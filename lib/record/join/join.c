@@ -32,6 +32,7 @@ struct member {
 	struct incise_wall *wall; /* or NULL */
 	char *identity;
 	char name[64], host[64];
+	char boot[80]; /* equal: one CLOCK_MONOTONIC */
 	const char *method;
 	int64_t first_ns, last_ns; /* of its rows, on its own clock */
 	struct incise_session_map map;
@@ -90,18 +91,21 @@ static void name_member(struct join *join, int at)
 		sprintf(member->name + strlen(member->name), "~%d", same);
 }
 
-static void read_host(struct member *member)
+/* A text of the recording's meta; empty if it has none. */
+static void read_text(const struct member *member, const char *key, char *text,
+		      size_t size)
 {
 	sqlite3_stmt *stmt = NULL;
 
+	text[0] = '\0';
 	if (sqlite3_prepare_v2(member->recording->db,
-			       "SELECT value FROM meta WHERE key = 'host'", -1, &stmt,
+			       "SELECT value FROM meta WHERE key = ?", -1, &stmt,
 			       NULL) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW)
-		snprintf(member->host, sizeof(member->host), "%s",
-			 (const char *)sqlite3_column_text(stmt, 0));
+	    sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC) == SQLITE_OK &&
+	    sqlite3_step(stmt) == SQLITE_ROW && sqlite3_column_text(stmt, 0))
+		snprintf(text, size, "%s", (const char *)sqlite3_column_text(stmt, 0));
 	sqlite3_finalize(stmt);
-	for (char *c = member->host; *c; c++)
+	for (char *c = text; *c; c++)
 		if ((unsigned char)*c < ' ' || *c == 0x7f)
 			*c = '?';
 }
@@ -185,7 +189,8 @@ static int open_member(struct join *join, const char *path)
 		note(join, "%s: was interrupted; it is joined up to its last commit",
 		     recording->path);
 	name_member(join, join->n - 1);
-	read_host(member);
+	read_text(member, "host", member->host, sizeof(member->host));
+	read_text(member, "boot", member->boot, sizeof(member->boot));
 	rc = read_span(join, member);
 	if (rc)
 		return rc;
@@ -509,14 +514,25 @@ static int map_by_signal(struct join *join, struct member *member)
 	return rc;
 }
 
+/* With others beside, a session's clock is not CLOCK_MONOTONIC far from the first recording. */
+static bool is_one_clock(const struct join *join)
+{
+	const char *boot = join->members[0].boot;
+
+	for (int i = 1; i < join->n; i++)
+		if (strcmp(join->members[i].boot, boot))
+			return false;
+	return boot[0];
+}
+
 static int map_clock(struct join *join, int at)
 {
 	struct member *member = &join->members[at];
 	double within_ns = join->options->within_s * 1e9;
 	int rc;
 
-	if (!at) {
-		member->method = "first";
+	if (!at || (is_one_clock(join) && join->options->align == INCISE_ALIGN_CLOCKS)) {
+		member->method = at ? "same" : "first";
 		rc = add_knot(join, member, member->first_ns, member->first_ns, 0);
 		return rc ? rc
 			  : add_knot(join, member, member->last_ns, member->last_ns, 0);

@@ -10,6 +10,7 @@
 #include <string.h>
 #include <sys/utsname.h>
 #include <time.h>
+#include <unistd.h>
 #include <incise/version.h>
 #include "../schema.h"
 #include "recorder.h"
@@ -193,6 +194,23 @@ static int set_settings(struct incise_recorder *rec, const char *calibration_pat
 	return bad;
 }
 
+/* Equal in recordings of one CLOCK_MONOTONIC: the kernel's boot, and the time namespace in it. */
+static int set_boot(struct incise_recorder *rec)
+{
+	char boot[40] = "", space[32] = "", text[80];
+	FILE *file = fopen("/proc/sys/kernel/random/boot_id", "re");
+	ssize_t n = readlink("/proc/self/ns/time", space, sizeof(space) - 1);
+
+	if (file) {
+		boot[fread(boot, 1, 36, file)] = '\0';
+		fclose(file);
+	}
+	if (!boot[0] || n <= 0 || !incise_clock_is_real(incise_rig_clock(rec->rig)))
+		return SQLITE_OK;
+	snprintf(text, sizeof(text), "%s %s", boot, space);
+	return set_text(rec, "boot", text);
+}
+
 static int write_meta(struct incise_recorder *rec, const char *calibration_path)
 {
 	const struct incise_tracker_info *tracker = &rec->tracker_info;
@@ -213,6 +231,7 @@ static int write_meta(struct incise_recorder *rec, const char *calibration_path)
 	bad |= set_text(rec, "incise", incise_version());
 	bad |= set_text(rec, "host", host.nodename);
 	bad |= set_text(rec, "kernel", host.release);
+	bad |= set_boot(rec);
 	bad |= set_text(rec, "started", started);
 	bad |= set_text(rec, "rig", incise_rig_spec(rec->rig));
 	bad |= set_settings(rec, calibration_path);
