@@ -209,3 +209,17 @@ without_u() {
 	incise export both.rec -a 6x5 -o both_pairs.csv
 	cmp pairs.csv both_pairs.csv
 }
+
+@test "cuts without a tap in common are not aligned by chance" {
+	local rig=sim:clock=simulated,times=2,depth_mm=5 pair seed
+	for seed in 1 2 4; do
+		incise capture -o n$seed.rec --rig $rig,seed=$seed >/dev/null
+	done
+	# each of them has marks by the dozen, of which 4 or 5 match at some offset
+	for pair in "1 2" "1 4" "2 4"; do
+		read -r one other <<<"$pair"
+		run --separate-stderr incise join n$one.rec n$other.rec -o day.rec --align tap
+		failed_with "n$one.rec and n$other.rec: "
+		[[ "$stderr" == *"tap at least three times in an irregular rhythm"* ]]
+	done
+}

@@ -19,6 +19,8 @@
 #define NOISES 8	     /* standard deviations that a tap exceeds */
 #define SYNC_SD_NS 1000	     /* of an event of a common line: latency of an interrupt */
 #define BOUND_SDS 4	     /* a normal error exceeds 4 of them once in 16000 */
+#define MATCHES_MIN 3	     /* two marks have one interval, which is no rhythm */
+#define CHANCE_MAX 1e-3 /* of a wrong alignment, for marks that have nothing in common */
 
 /* --- marks of a recording ------------------------------------------------------------ */
 
@@ -274,48 +276,96 @@ static int partner(const struct incise_mark *a, int n_a, const struct incise_mar
 	return best;
 }
 
+/* How many marks of b have a partner; @inside: of those between a's first and last mark. */
 static int count(const struct incise_mark *a, int n_a, const struct incise_mark *b,
-		 int n_b, int64_t offset_ns, int64_t from_ns)
+		 int n_b, int64_t offset_ns, int64_t from_ns, int *inside)
 {
 	int n = 0;
 
-	for (int k = 0; k < n_b; k++)
-		n += partner(a, n_a, &b[k], offset_ns, from_ns) >= 0;
+	*inside = 0;
+	for (int k = 0; k < n_b; k++) {
+		int64_t t_ns = b[k].t_ns + offset_ns;
+		bool has = partner(a, n_a, &b[k], offset_ns, from_ns) >= 0;
+
+		n += has;
+		*inside += has || (t_ns >= a[0].t_ns && t_ns <= a[n_a - 1].t_ns);
+	}
 	return n;
 }
 
-/* The pair whose offset matches most marks; @second: of other offsets. */
-static int match(const struct incise_mark *a, int n_a, const struct incise_mark *b,
-		 int n_b, int64_t *offset_ns, int64_t *from_ns, int *second)
-{
-	int best = 0;
-	double wide = 0;
+/* An offset that puts a mark of b on one of a. */
+struct found {
+	int64_t offset_ns, from_ns;
+	int n, inside;
+	int second;	/* the most matches of other offsets */
+	double typical; /* share of marks that other offsets match */
+};
 
+/* The pair whose offset matches most marks, next to the other offsets. */
+static void match(const struct incise_mark *a, int n_a, const struct incise_mark *b,
+		  int n_b, struct found *found)
+{
+	double wide = 0, matched = 0, inside = 0;
+	int n, in;
+
+	*found = (struct found){0};
 	for (int i = 0; i < n_a; i++)
 		for (int k = 0; k < n_b; k++) {
 			int64_t offset = a[i].t_ns - b[k].t_ns;
-			int n = count(a, n_a, b, n_b, offset, b[k].t_ns);
 
-			if (n <= best)
+			n = count(a, n_a, b, n_b, offset, b[k].t_ns, &in);
+			if (n <= found->n)
 				continue;
-			best = n;
-			*offset_ns = offset;
-			*from_ns = b[k].t_ns;
+			*found = (struct found){offset, b[k].t_ns, n, in, 0, 0};
 		}
 	for (int k = 0; k < n_b; k++)
-		wide = fmax(wide, tolerance(&a[0], &b[k], *from_ns));
-	*second = 0;
+		wide = fmax(wide, tolerance(&a[0], &b[k], found->from_ns));
 	for (int i = 0; i < n_a; i++)
 		for (int k = 0; k < n_b; k++) {
 			int64_t offset = a[i].t_ns - b[k].t_ns;
-			int n;
 
-			if (fabs((double)(offset - *offset_ns)) <= 2 * wide)
+			if (fabs((double)(offset - found->offset_ns)) <= 2 * wide)
 				continue;
-			n = count(a, n_a, b, n_b, offset, b[k].t_ns);
-			*second = n > *second ? n : *second;
+			n = count(a, n_a, b, n_b, offset, b[k].t_ns, &in);
+			found->second = n > found->second ? n : found->second;
+			/* Without the pair that makes the offset. */
+			matched += n - 1;
+			inside += in - 1;
 		}
-	return best;
+	found->typical = inside > 0 ? matched / inside : 0;
+}
+
+/*
+ * How many offsets are expected to match so many marks if nothing is common: each mark beside the
+ * pair that makes the offset finds one of a within its tolerance, at a's mean density or as often
+ * as at the other offsets.
+ */
+static double by_chance(const struct incise_mark *a, int n_a, const struct incise_mark *b,
+			int n_b, const struct found *found, double typical)
+{
+	double probability[INCISE_MARKS_MAX + 1] = {1}, sum = 0;
+	double density = n_a / fmax(1, (double)(a[n_a - 1].t_ns - a[0].t_ns));
+	int n = 0;
+
+	for (int k = 0; k < n_b; k++) {
+		int64_t t_ns = b[k].t_ns + found->offset_ns;
+		double p = 0;
+
+		if (b[k].t_ns == found->from_ns ||
+		    (partner(a, n_a, &b[k], found->offset_ns, found->from_ns) < 0 &&
+		     (t_ns < a[0].t_ns || t_ns > a[n_a - 1].t_ns)))
+			continue;
+		for (int i = 0; i < n_a; i++)
+			p += 2 * density * tolerance(&a[i], &b[k], found->from_ns) / n_a;
+		p = fmin(1, fmax(p, typical));
+		for (int j = ++n; j > 0; j--)
+			probability[j] =
+				probability[j] * (1 - p) + probability[j - 1] * p;
+		probability[0] *= 1 - p;
+	}
+	for (int j = found->n - 1; j <= n; j++)
+		sum += probability[j];
+	return sum * n_a * n_b;
 }
 
 /* Weighted straight line through the matched marks. */
@@ -377,26 +427,58 @@ static void fit_line(const struct incise_mark *a, int n_a, const struct incise_m
 	residual = sqrt(fmax(1, residual / fmax(1, n - 2)));
 	fit->offset_sd_ns *= residual;
 	fit->rate_sd *= residual;
+	/* No two clocks differ so much, but the estimate may: then it says nothing. */
+	if (fabs(fit->rate) > INCISE_ALIGN_RATE_MAX &&
+	    fabs(fit->rate) - BOUND_SDS * fit->rate_sd <= INCISE_ALIGN_RATE_MAX) {
+		fit->rate = 0;
+		fit->rate_sd = NAN;
+	}
 }
 
-int incise_align_fit(const struct incise_mark *a, int n_a, const struct incise_mark *b,
-		     int n_b, struct incise_align_fit *fit, struct incise_error *err)
-{
-	int64_t offset_ns = 0, from_ns = 0;
-	int second = 0,
-	    best = n_a && n_b ? match(a, n_a, b, n_b, &offset_ns, &from_ns, &second) : 0;
+#define TAP_AGAIN "tap at least three times in an irregular rhythm"
 
-	if (!best)
-		return incise_error_set(err, ENODATA,
-					"%d and %d marks, and none of them in common",
-					n_a, n_b);
-	if (second >= best)
+int incise_align_fit(const struct incise_mark *a, int n_a, const struct incise_mark *b,
+		     int n_b, enum incise_session_align align,
+		     struct incise_align_fit *fit, struct incise_error *err)
+{
+	struct found found = {0};
+	double expected;
+	int back, inside;
+
+	if (n_a && n_b)
+		match(a, n_a, b, n_b, &found);
+	if (found.n < MATCHES_MIN)
+		return incise_error_set(
+			err, ENODATA, "%d and %d marks, and no %d in common; " TAP_AGAIN,
+			n_a, n_b, MATCHES_MIN);
+	if (found.second >= found.n)
 		return incise_error_set(
 			err, EDOM,
-			"%d and %d marks match at more than one offset; tap at least three "
-			"times in an irregular rhythm",
-			n_a, n_b);
-	fit_line(a, n_a, b, n_b, offset_ns, from_ns, fit);
+			"%d and %d marks match at more than one offset; " TAP_AGAIN, n_a,
+			n_b);
+	back = count(b, n_b, a, n_a, -found.offset_ns, found.from_ns + found.offset_ns,
+		     &inside);
+	if (2 * found.n <= found.inside || 2 * back <= inside)
+		return incise_error_set(
+			err, EDOM,
+			"of %d and %d marks in their overlap only %d match, as by "
+			"chance; " TAP_AGAIN ", harder than anything else",
+			inside, found.inside, back < found.n ? back : found.n);
+	expected = by_chance(a, n_a, b, n_b, &found,
+			     align == INCISE_ALIGN_TAP ? found.typical : 0);
+	if (expected > CHANCE_MAX)
+		return incise_error_set(
+			err, EDOM,
+			"%d marks match, and would by chance with a probability of up to "
+			"%.2g; tap more often, in an irregular rhythm",
+			found.n, fmin(1, expected));
+	fit_line(a, n_a, b, n_b, found.offset_ns, found.from_ns, fit);
+	if (fabs(fit->rate) > INCISE_ALIGN_RATE_MAX)
+		return incise_error_set(
+			err, EDOM,
+			"their marks differ in rate by %.4g ppm, more than the clocks of any "
+			"two machines (%g ppm), so they match by chance; " TAP_AGAIN,
+			1e6 * fit->rate, 1e6 * INCISE_ALIGN_RATE_MAX);
 	return 0;
 }
 

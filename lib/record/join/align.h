@@ -46,9 +46,13 @@ struct incise_align_fit {
 		rate_sd; /* rate 0 if it is not known; then its sd is NAN */
 };
 
-/* Match and fit. Returns 0; -ENODATA (nothing matches), -EDOM (ambiguous), with a message. */
+/*
+ * Match and fit. Returns 0; -ENODATA (fewer than three match), -EDOM (ambiguous, or they may match
+ * by chance), with a message. Events of a line may be steady; taps must not be.
+ */
 int incise_align_fit(const struct incise_mark *a, int n_a, const struct incise_mark *b,
-		     int n_b, struct incise_align_fit *fit, struct incise_error *err);
+		     int n_b, enum incise_session_align align,
+		     struct incise_align_fit *fit, struct incise_error *err);
 
 /* Time of clock b on clock a, and the bound of its error: 4 standard deviations. */
 int64_t incise_align_time(const struct incise_align_fit *fit, int64_t t_ns,

@@ -493,7 +493,7 @@ static int map_by_signal(struct join *join, struct member *member)
 			"or without --align",
 			first->recording->path, member->recording->path);
 	rc = incise_align_fit(first->marks, first->n_marks, member->marks,
-			      member->n_marks, &member->fit, &why);
+			      member->n_marks, join->options->align, &member->fit, &why);
 	if (rc)
 		return incise_error_set(join->err, -rc, "%s and %s: %s",
 					first->recording->path, member->recording->path,

@@ -510,7 +510,7 @@ static void test_taps(void **state)
 	assert_true(error_ns < 4 * MS && b.uncertainty_ns < 50 * MS);
 }
 
-/* One tap of two forces, at 10 kHz; and clocks that agree with it, or do not. */
+/* Three taps of two forces, at 10 kHz; and clocks that agree with it, or do not. */
 static void test_agreement(void **state)
 {
 	const struct incise_session_options taps = {.align = INCISE_ALIGN_TAP};
@@ -518,20 +518,20 @@ static void test_agreement(void **state)
 	struct incise_error err;
 	uint64_t random = 3;
 
-	record("a.rec", SPEC, 3 * S);
-	record("b.rec", SPEC ",seed=2", 3 * S);
-	knock_force("a.rec/recording.db", 1);
-	knock_force("b.rec/recording.db", 1);
+	record("a.rec", SPEC, 5 * S);
+	record("b.rec", SPEC ",seed=2", 5 * S);
+	knock_force("a.rec/recording.db", 3);
+	knock_force("b.rec/recording.db", 3);
 	move_to_b("b.rec/recording.db");
 	set_wall("a.rec/recording.db", false, "TAI", &random, BOUND_NS);
 	set_wall("b.rec/recording.db", true, "TAI", &random, BOUND_NS);
 	if (join(&taps, &err))
 		fail_msg("%s", err.text);
 	b = info_of(1);
-	assert_int_equal(b.matches, 1);
+	assert_int_equal(b.matches, 3);
 	assert_true(fabs(b.agreement_ns) <= b.agreement_bound_ns);
 	assert_true(b.agreement_bound_ns < 1 * MS);
-	/* 0.1 ms between samples; 100 ppm over 1 s from the tap: the rate is not known. */
+	/* 0.1 ms between samples; 100 ppm over 3 s from the taps: the rate is not known. */
 	assert_true(b.uncertainty_ns < 1 * MS);
 	remove_session("s.rec");
 	change("b.rec/recording.db", "UPDATE wall SET tai_ns = tai_ns + 50000000");
@@ -587,6 +587,8 @@ static void test_sync(void **state)
 	assert_true(error_ns < b.uncertainty_ns);
 }
 
+#define TAP INCISE_ALIGN_TAP
+
 /* Marks in a steady rhythm match at several offsets; in an irregular one at one. */
 static void test_marks(void **state)
 {
@@ -599,16 +601,17 @@ static void test_marks(void **state)
 		a[i] = (struct incise_mark){(10 + i) * S, 1e5};
 		b[i] = (struct incise_mark){(110 + i) * S, 1e5};
 	}
-	assert_int_equal(incise_align_fit(a, 4, b + 2, 3, &fit, &err), -EDOM);
+	assert_int_equal(
+		incise_align_fit(a, 4, b + 2, 3, INCISE_ALIGN_EVENTS, &fit, &err), -EDOM);
 	assert_non_null(strstr(err.text, "irregular rhythm"));
-	assert_int_equal(incise_align_fit(a, 0, b, 3, &fit, NULL), -ENODATA);
+	assert_int_equal(incise_align_fit(a, 0, b, 3, TAP, &fit, NULL), -ENODATA);
 	for (int i = 0; i < 8; i++)
 		a[i].t_ns = 10 * S + i * i * S + i * 100 * MS;
 	for (int i = 0; i < 5; i++)
 		b[i].t_ns = llround((double)(a[i + 2].t_ns + 7 * S) * (1 + 30e-6));
 	/* One of them is somebody's cough. */
 	b[5].t_ns = b[4].t_ns + 333 * MS;
-	assert_int_equal(incise_align_fit(a, 8, b, 6, &fit, NULL), 0);
+	assert_int_equal(incise_align_fit(a, 8, b, 6, TAP, &fit, NULL), 0);
 	assert_int_equal(fit.matches, 5);
 	for (int i = 0; i < 5; i++) {
 		double error_ns =
@@ -621,14 +624,60 @@ static void test_marks(void **state)
 	assert_true(fabs(fit.rate + 30e-6) < 1e-8 && fit.rate_sd < 25e-6);
 }
 
+/* Marks without anything in common: hands at work, a peak or two, a rhythm that all have. */
+static void test_chance(void **state)
+{
+	struct incise_mark a[60], b[60];
+	struct incise_align_fit fit;
+	struct incise_error err = {0};
+	uint64_t random = 5;
+	int64_t t_ns[2] = {S, 70 * S};
+	int n;
+
+	for (int round = 0; round < 100; round++) {
+		/* Every 0.2 to 0.8 s, to the row of a tracker or of a force. */
+		for (int i = 0; i < 60; i++) {
+			t_ns[0] += llrint(1e9 *
+					  (0.5 + 0.3 * incise_random_symmetric(&random)));
+			t_ns[1] += llrint(1e9 *
+					  (0.5 + 0.3 * incise_random_symmetric(&random)));
+			a[i] = (struct incise_mark){t_ns[0], 1e5};
+			b[i] = (struct incise_mark){t_ns[1], round % 2 ? 4e6 : 1e5};
+		}
+		n = round % 20 ? 3 + round % 20 : 60;
+		if (!incise_align_fit(a, n, b, n, TAP, &fit, &err))
+			fail_msg("round %d: %d of %d matched by chance", round,
+				 fit.matches, n);
+	}
+	/* One or two are no rhythm, and a steady one is everybody's. */
+	assert_int_equal(incise_align_fit(a, 1, a, 1, TAP, &fit, &err), -ENODATA);
+	assert_int_equal(incise_align_fit(a, 2, a, 2, TAP, &fit, &err), -ENODATA);
+	assert_int_equal(incise_align_fit(a, 5, a, 5, TAP, &fit, &err), 0);
+	for (int i = 0; i < 5; i++)
+		a[i].t_ns = i * S;
+	assert_int_equal(incise_align_fit(a, 5, a, 5, TAP, &fit, &err), -EDOM);
+	assert_int_equal(incise_align_fit(a, 5, a, 5, INCISE_ALIGN_EVENTS, &fit, &err),
+			 0);
+	/* No clocks are 160 ppm apart. */
+	for (int i = 0; i < 6; i++) {
+		a[i] = (struct incise_mark){10 * S + i * i * 1600 * MS, 3e5};
+		b[i] = (struct incise_mark){10 * S + llrint(i * i * 1.6e9 * 1.00016),
+					    3e5};
+	}
+	assert_int_equal(incise_align_fit(a, 6, b, 6, TAP, &fit, &err), -EDOM);
+	if (!strstr(err.text, "differ in rate by -160 ppm"))
+		fail_msg("%s", err.text);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		IN_FOLDER(test_clocks), IN_FOLDER(test_refusals),
-		IN_FOLDER(test_steps),	IN_FOLDER(test_verify),
-		IN_FOLDER(test_forged), IN_FOLDER(test_pairs),
-		IN_FOLDER(test_taps),	IN_FOLDER(test_agreement),
-		IN_FOLDER(test_sync),	cmocka_unit_test(test_marks),
+		IN_FOLDER(test_clocks),	       IN_FOLDER(test_refusals),
+		IN_FOLDER(test_steps),	       IN_FOLDER(test_verify),
+		IN_FOLDER(test_forged),	       IN_FOLDER(test_pairs),
+		IN_FOLDER(test_taps),	       IN_FOLDER(test_agreement),
+		IN_FOLDER(test_sync),	       cmocka_unit_test(test_marks),
+		cmocka_unit_test(test_chance),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
