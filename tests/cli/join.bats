@@ -81,6 +81,23 @@ import incise
 assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.tracker'
 }
 
+@test "provenance and events are those of the machines that are read" {
+	incise join a.rec b.rec -o day.rec >/dev/null
+	incise export day.rec:b --rate 10 --lineage | grep -qx '# rig: .*seed=2'
+	incise info day.rec:a --json >a.json
+	incise info day.rec:b --json >b.json
+	[[ "$(key a.json rig)" == *,seed=1 && "$(key b.json rig)" == *,seed=2 ]]
+	incise info day.rec:force=b,tracker=a --json >both.json
+	[[ "$(key both.json rig)" == "a: sim:"*",seed=1; b: sim:"*",seed=2" ]]
+	incise train day.rec:b -o b.fis >/dev/null
+	incise info b.fis | grep -q 'seed=2'
+	! incise info b.fis | grep -q 'seed=1' || false
+	# MCAP begins with b's own events, 3 s after a's
+	incise export day.rec:b -o b.mcap --profile ros2 >/dev/null
+	grep -aq 'b: recording started' b.mcap
+	! grep -aq 'a: recording started' b.mcap || false
+}
+
 @test "a stream of several machines needs a choice; the error lists them" {
 	incise join a.rec b.rec -o day.rec >/dev/null
 	for command in "export day.rec" "plot day.rec -o p.png" "train day.rec -o m.fis"; do

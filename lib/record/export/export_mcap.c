@@ -77,13 +77,15 @@ static int find_start(struct incise_recording *recording, int64_t *start_ns,
 /* By the wall time, else from the wall clock at the start, in whole seconds. */
 static int find_wall(struct incise_messages *messages, struct incise_error *err)
 {
-	const struct incise_recording *recording = messages->recording;
+	/* Of a joined recording that of its clock, whatever is read of it. */
+	struct incise_recording *recording =
+		incise_recording_member(messages->recording, "wall");
 	struct incise_error none = {0};
 	int64_t start_ns;
 	const char *end;
 	struct tm utc = {0};
 	time_t t;
-	int rc = find_start(messages->recording, &start_ns, err);
+	int rc = find_start(recording, &start_ns, err);
 
 	if (rc)
 		return rc;

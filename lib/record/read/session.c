@@ -580,6 +580,43 @@ struct incise_recording *incise_recording_member(const struct incise_recording *
 	return session->members[strcmp(table, "wall") ? session->of[stream] : 0];
 }
 
+/* Whether a stream is read from a member. */
+static bool is_chosen(const struct incise_session *session, int member)
+{
+	for (int i = 0; i < INCISE_STREAMS_MAX; i++)
+		if (session->of[i] == member && has(&session->info[member], i))
+			return true;
+	return false;
+}
+
+/* The rig that the streams are of; of several, each behind the name of its member. */
+static void merge_rigs(const struct incise_session *session,
+		       struct incise_recording_info *to)
+{
+	int64_t first_ns = INT64_MAX;
+	int n = 0;
+	size_t length = 0;
+
+	for (int i = 0; i < session->n; i++)
+		n += is_chosen(session, i);
+	for (int i = 0; i < session->n; i++) {
+		const struct incise_recording_info *meta = &session->members[i]->meta;
+
+		if (!is_chosen(session, i))
+			continue;
+		if (session->info[i].first_ns < first_ns) {
+			first_ns = session->info[i].first_ns;
+			memcpy(to->started, meta->started, sizeof(to->started));
+		}
+		if (length < sizeof(to->rig))
+			length += (size_t)snprintf(to->rig + length,
+						   sizeof(to->rig) - length, "%s%s%s%s",
+						   length ? "; " : "",
+						   n > 1 ? session->info[i].name : "",
+						   n > 1 ? ": " : "", meta->rig);
+	}
+}
+
 static void merge_meta(struct incise_recording *rec)
 {
 	const struct incise_session *session = rec->session;
@@ -590,8 +627,7 @@ static void merge_meta(struct incise_recording *rec)
 	struct incise_recording_info *to = &rec->meta;
 
 	*to = *force;
-	memcpy(to->started, session->members[0]->meta.started, sizeof(to->started));
-	memcpy(to->rig, session->members[0]->meta.rig, sizeof(to->rig));
+	merge_rigs(session, to);
 	to->tracker = tracker->tracker;
 	to->tracker_lost = tracker->tracker_lost;
 	to->depth = tracker->depth;
@@ -636,8 +672,11 @@ static int copy_events(struct incise_session *session, int at, sqlite3_stmt *ins
 	return rc;
 }
 
-/* The session's own database is replaced by one in memory, with the events of all members. */
-static int merge_events(struct incise_recording *rec, struct incise_error *err)
+/*
+ * The session's own database is replaced by one in memory, with the events of the members that
+ * streams are read from.
+ */
+static int merge_events(struct incise_recording *rec, bool all, struct incise_error *err)
 {
 	sqlite3_stmt *insert = NULL;
 	int rc = 0;
@@ -655,7 +694,8 @@ static int merge_events(struct incise_recording *rec, struct incise_error *err)
 			       NULL) != SQLITE_OK)
 		rc = incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
 	for (int i = 0; i < rec->session->n && !rc; i++)
-		rc = copy_events(rec->session, i, insert, err);
+		if (all || is_chosen(rec->session, i))
+			rc = copy_events(rec->session, i, insert, err);
 	sqlite3_finalize(insert);
 	return rc;
 }
@@ -687,7 +727,7 @@ int incise_session_open(struct incise_recording *rec, const char *folder,
 	if (!rc)
 		rc = choose(session, folder, choice, err);
 	if (!rc)
-		rc = merge_events(rec, err);
+		rc = merge_events(rec, strchr(choice, '*') != NULL, err);
 	if (rc)
 		return rc;
 	rec->form = session->members[0]->form;
