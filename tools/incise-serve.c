@@ -73,7 +73,7 @@ static const struct cli_option options[] = {
 
 static const struct cli_command command = {
 	.name = "serve",
-	.synopsis = "[NAME|NAME.rec] [OPTIONS]",
+	.synopsis = "[NAME|FILE|NAME.rec] [OPTIONS]",
 	.summary =
 		"Send poses, forces and frames live to other programs, for example 3D "
 		"Slicer: of the haptic\n"
@@ -107,18 +107,24 @@ static void open_source(struct run *run, struct job *job)
 	struct incise_error err = {0};
 	const char *operand = job->source.operand;
 	bool recording = !job->rig && operand && is_recording(operand);
+	enum file_kind kind = operand ? file_kind_of(operand) : FILE_UNKNOWN;
 
 	job->source.rig = job->rig;
 	job->source.camera = job->camera != CAMERA_OFF;
 	job->source.camera_needed = job->camera == CAMERA_FRAMES;
 	if (job->rig && operand)
 		cli_usage("--rig: '%s' is a source, too; give one of them", operand);
+	/* A loop is named by itself, its scene, or its status file. */
+	if (kind != FILE_UNKNOWN)
+		file_expect(operand, FILE_RECORDING | FILE_STATE | FILE_SCENE);
 	if (!job->rig && job->calibration)
 		cli_usage(
 			"--calibration: only with --rig; loops and recordings are calibrated");
 	if (!recording && (job->source.endless || job->source.speed != 1))
-		cli_usage("--%s: only for a recording",
+		cli_usage("--%s: only for a recording; name one, or leave the option out",
 			  job->source.endless ? "endless" : "speed");
+	if (job->lsl && !*job->lsl)
+		cli_usage("--lsl: '' is no PREFIX; give one, for example rig");
 	incise_calibration_nominal(&job->source.calibration);
 	if (job->calibration &&
 	    incise_calibration_load(job->calibration, &job->source.calibration, &err))

@@ -264,6 +264,7 @@ class RecordingInfo(ctypes.Structure):
         ("streams", Stream * 3),
         ("n_streams", c_int),
         ("newtons", c_bool),
+        ("start_utc_ns", c_int64),
     ]
     c_name = "struct incise_recording_info"
 

@@ -126,6 +126,7 @@ sys.exit(not (os.stat("log").st_ctime - 60 < min(t) and max(t) <= time.time()))'
 	holds found.json 'all(m["code"] == 1 and m["error"] == "running" for m in j if m["type"] == "STATUS")'
 	kill -KILL "$loop"
 	wait "$loop" || :
+	timeout 20 incise serve ./wall.state --igtl 0 --duration 50ms 2>&1 >/dev/null | grep -q 'loop wall does not run; its next run is followed'
 	# 16: not present
 	for ((i = 0; i < 100; i++)); do
 		client receive "$port" 1 1 GET_STATUS >found.json
@@ -186,7 +187,10 @@ sys.exit(not (os.stat("log").st_ctime - 60 < min(t) and max(t) <= time.time()))'
 	[ ! -s /proc/net/if_inet6 ] ||
 		incise serve --rig sim: --duration 50ms --igtl '[::1]:0' -v 2>&1 >/dev/null | grep -q 'on \[::1\]:'
 	refuses 2 "--igtl: '::1:0': put an IPv6 address in brackets" --igtl ::1:0
-	refuses 2 "--igtl: expected a whole number" --igtl 127.0.0.1:x
+	for bad in 127.0.0.1:x 127.0.0.1 foo 65536 -1; do
+		refuses 2 "--igtl: '$bad': expected [ADDR:]PORT with a port from 0 to 65535" --igtl "$bad"
+	done
+	refuses 2 "--lsl: '' is no PREFIX; give one" --lsl ''
 	refuses 2 "--igtl: ':0': no address before the port" --igtl :0
 	refuses 1 "--igtl 192.0.2.1:0: Cannot assign requested address; give an address of this machine" --igtl 192.0.2.1:0
 	refuses 2 "--speed: only for a recording" --speed 2
@@ -198,4 +202,44 @@ sys.exit(not (os.stat("log").st_ctime - 60 < min(t) and max(t) <= time.time()))'
 	stop_server
 	run -1 --separate-stderr timeout 20 incise serve nosuch
 	[[ "$stderr" == "incise serve: nosuch: no loop of that name has run here"* ]] || complain "$stderr"
+	printf 'a,b\n1,2\n' >e1.csv
+	run -1 --separate-stderr timeout 20 incise serve e1.csv
+	[[ "$stderr" == "incise serve: e1.csv: "*table* ]] || complain "$stderr"
+}
+
+@test "frames of a recording are sent, or counted and said; one without a camera is refused" {
+	incise capture -o a.rec --rig sim:clock=simulated,depth_mm=6,times=1,camera_hz=10 --camera frames --duration 3s >/dev/null
+	rows=$(sqlite3 a.rec/recording.db "SELECT count(*) FROM frames")
+	incise serve a.rec --igtl 0 --rate 1000 --speed 2 --json >out 2>err
+	holds out "j['frames'] + j['lost'] == $rows and j['frames'] > 2"
+	# faster than frames can be decoded: some are left out, and it says how many
+	incise serve a.rec --igtl 0 --rate 20000 --speed 100 --json >out 2>err
+	holds out "j['frames'] + j['lost'] == $rows"
+	lost=$(python3 -c 'import json; print(json.load(open("out"))["lost"])')
+	[ "$lost" = 0 ] || grep -q "^incise serve: warning: $lost frames were skipped" err || complain "$(cat err)"
+	incise capture -o b.rec --rig sim:clock=simulated --duration 1s >/dev/null
+	run -1 --separate-stderr timeout 20 incise serve b.rec --igtl 0 --camera frames
+	[[ "$stderr" == "incise serve: --camera frames: b.rec has no camera; "* ]] || complain "$stderr"
+}
+
+@test "the UTC of a recording without wall time is that of its rows, not of the command" {
+	incise capture -o t.rec --rig sim:clock=simulated,times=2,depth_mm=5,pause_s=20 --trigger 0.2N --clock-source none >/dev/null
+	sqlite3 t.rec/recording.db "SELECT (SELECT min(t_ns) FROM force), (SELECT t_ns FROM events WHERE kind = 'start'),
+		(SELECT value FROM meta WHERE key = 'started')" >rows
+	incise info t.rec --json >info.json
+	start_server t.rec --endless
+	client receive "$port" 3 >found.json
+	stop_server
+	python3 - <<-'END'
+		import calendar, json, time
+		first, start, started = open("rows").read().strip().split("|")
+		of = lambda text: calendar.timegm(time.strptime(text, "%Y-%m-%dT%H:%M:%SZ"))
+		wait = (int(first) - int(start)) / 1e9
+		assert wait > 1, wait
+		# whole seconds are cut off
+		assert 0 <= of(started) + wait - of(json.load(open("info.json"))["started"]) < 1, wait
+		# clients come after the start; the recording has some seconds
+		t = [m["utc_s"] for m in map(json.loads, open("found.json")) if m["type"] == "TRANSFORM"]
+		assert all(of(started) + wait <= x for x in t), (t, started, wait)
+	END
 }

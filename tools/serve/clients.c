@@ -287,6 +287,10 @@ static void accept_one(struct clients *clients, int listener)
 	if (fd < 0)
 		return;
 	if (clients->n == CLIENTS_MOST) {
+		char address[72];
+
+		address_text((struct sockaddr *)&from, n, address, sizeof(address));
+		cli_note("%s: refused: %d clients are connected", address, CLIENTS_MOST);
 		clients->refused++;
 		close(fd);
 		return;
@@ -422,7 +426,11 @@ static void split(const char *given, char *text, const char **host, const char *
 				  given);
 		}
 	}
-	cli_integer("igtl", *port, 0, 65535);
+	if (!**port || strspn(*port, "0123456789") != strlen(*port) ||
+	    strlen(*port) > 5 || atoi(*port) > 65535)
+		cli_usage("--igtl: '%s': expected [ADDR:]PORT with a port from 0 to "
+			  "65535, for example 127.0.0.1:18944",
+			  given);
 	if (!**host)
 		cli_usage(
 			"--igtl: '%s': no address before the port; 0.0.0.0 and [::] are "

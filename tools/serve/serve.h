@@ -161,6 +161,8 @@ void serve_force(struct serve_stream *stream, int64_t t_ns, const double force_N
 bool serve_frame_is_due(const struct serve_stream *stream, int64_t t_ns);
 void serve_frame(struct serve_stream *stream, const struct incise_camera_frame *frame,
 		 uint64_t lost);
+/* What the source has lost so far, when no sample comes with it. */
+void serve_lost(struct serve_stream *stream, uint64_t lost);
 /* Sent when it changes, and each second. */
 void serve_status(struct serve_stream *stream, enum serve_state state, const char *name,
 		  const char *text);

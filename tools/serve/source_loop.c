@@ -112,24 +112,25 @@ static void loop_free(struct serve_source *source)
 static const struct serve_source_ops loop_ops = {
 	.read = loop_read, .utc = loop_utc, .free = loop_free};
 
-/* The only page, or that of the only loop that runs. */
-static struct state_page_file *choose(struct state_pages *pages)
+/* The page that was named, or that of the only loop that runs. */
+static struct state_page_file *choose(struct state_pages *pages, bool named)
 {
-	struct state_page_file *one = pages->n == 1 ? pages->page : NULL;
+	struct state_page_file *one = named && pages->n == 1 ? pages->page : NULL;
 
-	for (int i = 0; i < pages->n && pages->n > 1; i++) {
+	for (int i = 0; i < pages->n && !one; i++) {
 		if (incise_state_alive(pages->page[i].state) != 1)
 			continue;
-		if (one)
-			cli_fail(
-				"more than one loop runs, for example %s and %s; name one",
-				one->name, pages->page[i].name);
+		for (int k = i + 1; k < pages->n; k++)
+			if (incise_state_alive(pages->page[k].state) == 1)
+				cli_fail("more than one loop runs, for example %s and "
+					 "%s; name one",
+					 pages->page[i].name, pages->page[k].name);
 		one = &pages->page[i];
 	}
 	if (!one)
 		cli_fail(
-			"no loop runs here; 'incise haptic SCENE' starts one; or give --rig "
-			"RIG, or a recording");
+			"no loop runs here; 'incise haptic SCENE' starts one; or name one "
+			"to wait for its next run, or give --rig RIG, or a recording");
 	return one;
 }
 
@@ -143,7 +144,7 @@ struct serve_source *serve_loop_open(const struct serve_source_options *options,
 		cli_fail("--camera frames: a loop has no frames; give --rig RIG or a "
 			 "recording");
 	state_pages_open(&loop->pages, options->operand);
-	page = choose(&loop->pages);
+	page = choose(&loop->pages, options->operand);
 	/* The chosen one first, so that closing the pages closes what follows it, too. */
 	first = *loop->pages.page;
 	*loop->pages.page = *page;
@@ -154,6 +155,8 @@ struct serve_source *serve_loop_open(const struct serve_source_options *options,
 	loop->path = page->path;
 	loop->name = page->name;
 	loop->cursor = INCISE_STATE_NEWEST;
+	if (incise_state_alive(page->state) != 1)
+		cli_warn("loop %s does not run; its next run is followed", page->name);
 	info->name = cli_text("loop %s", page->name);
 	info->live = true;
 	info->kinds[SERVE_POSE] = info->kinds[SERVE_FORCE] = true;

@@ -7,7 +7,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <incise/recording.h>
 #include <incise/wall.h>
 #include "../cli/batch.h"
@@ -18,6 +17,8 @@
 #define POLL_NS 2000000LL
 /* A process that was stopped for longer goes on where it was. */
 #define STALL_NS 1000000000LL
+/* A frame is left out when it can be read only so much later than it is due. */
+#define LATE_NS 500000000LL
 
 /* Rows of a stream, one after the other. */
 struct rows {
@@ -30,12 +31,11 @@ struct playback {
 	struct serve_source base;
 	struct incise_recording *recording;
 	struct incise_recording_info info;
-	struct rows poses, forces;
+	struct rows poses, forces, times; /* times: of the frames */
 	struct incise_frame_reader *frames;
-	int64_t frame_ns; /* the last that was sent */
+	uint64_t skipped; /* frames that were too late */
 	int64_t first_ns;
 	struct incise_wall *wall; /* NULL: the recording has no wall time */
-	int64_t utc_start_ns;	  /* of info.start_ns, to a second; 0: not known */
 	int64_t here_ns;	  /* when first_ns was played; 0: not started */
 	int64_t read_ns;
 	double speed;
@@ -94,14 +94,24 @@ static void open_rows(struct playback *playback)
 	pose_ns = rows_time(&playback->poses);
 	force_ns = rows_time(&playback->forces);
 	playback->first_ns = pose_ns < force_ns ? pose_ns : force_ns;
+	if (!playback->frames)
+		return;
+	rows_open(&playback->times, playback->recording, "frames");
+	if (rows_time(&playback->times) < playback->first_ns)
+		playback->first_ns = rows_time(&playback->times);
 }
 
 static void start(struct playback *playback, struct serve_stream *stream)
 {
 	/* Opening takes its time. */
 	playback->here_ns = playback->read_ns = serve_now();
-	playback->frame_ns = INT64_MIN;
 	serve_play(stream, playback->first_ns, playback->here_ns, playback->speed);
+}
+
+static uint64_t lost(const struct playback *playback)
+{
+	return playback->info.tracker_lost + playback->info.force_lost +
+	       playback->skipped;
 }
 
 static void play_pose(struct playback *playback, struct serve_stream *stream)
@@ -119,8 +129,7 @@ static void play_pose(struct playback *playback, struct serve_stream *stream)
 	for (int i = 0; i < 4; i++)
 		quaternion[i] = real_at(batch, 6 + i, row);
 	serve_pose(stream, whole_at(batch, T_NS, row), position_mm, quaternion,
-		   playback->info.tip_mm,
-		   playback->info.tracker_lost + playback->info.force_lost);
+		   playback->info.tip_mm, lost(playback));
 }
 
 static void play_force(struct playback *playback, struct serve_stream *stream)
@@ -130,30 +139,47 @@ static void play_force(struct playback *playback, struct serve_stream *stream)
 	double force_N[3] = {0, 0, real_at(batch, 3, row)};
 
 	if (!isnan(force_N[2]) && !flag_at(batch, 4, row))
-		serve_force(stream, whole_at(batch, T_NS, row), force_N,
-			    playback->info.tracker_lost + playback->info.force_lost);
+		serve_force(stream, whole_at(batch, T_NS, row), force_N, lost(playback));
 }
 
-static void play_frame(struct playback *playback, struct serve_stream *stream,
+/*
+ * The next frame, if it is due: one at a time, as decoding takes long, and poses do not wait for
+ * all that are late. Returns whether there may be another.
+ */
+static bool play_frame(struct playback *playback, struct serve_stream *stream,
 		       int64_t t_ns)
 {
+	int64_t row_ns = rows_time(&playback->times);
 	struct incise_camera_frame frame;
 	struct incise_error err = {0};
 	int rc;
 
-	if (!serve_frame_is_due(stream, t_ns))
-		return;
-	rc = incise_frame_reader_at(playback->frames, t_ns, &frame, &err);
-	if (!rc && frame.t_ns != playback->frame_ns && frame.t_ns <= t_ns) {
-		playback->frame_ns = frame.t_ns;
-		serve_frame(stream, &frame, 0);
+	if (row_ns > t_ns)
+		return false;
+	playback->times.at++;
+	if (!serve_frame_is_due(stream, row_ns))
+		return true;
+	if ((double)(t_ns - row_ns) > LATE_NS * playback->speed) {
+		playback->skipped++;
+		return true;
 	}
+	rc = incise_frame_reader_at(playback->frames, row_ns, &frame, &err);
+	if (!rc)
+		serve_frame(stream, &frame, lost(playback));
 	/* One frame that is missing in the file is no reason to end. */
+	playback->skipped += rc == -ENODATA || rc == -EBADMSG;
 	if (!rc || rc == -ENODATA || rc == -EBADMSG)
-		return;
+		return true;
 	cli_warn("%s; no more frames are sent", err.text);
-	incise_frame_reader_free(playback->frames);
-	playback->frames = NULL;
+	rows_close(&playback->times);
+	return false;
+}
+
+/* Frames end with the other streams, or a moment later. */
+static bool has_more(struct playback *playback, int64_t t_ns)
+{
+	return rows_have(&playback->poses) || rows_have(&playback->forces) ||
+	       rows_time(&playback->times) < t_ns + STALL_NS;
 }
 
 static int playback_read(struct serve_source *source, struct serve_stream *stream,
@@ -176,10 +202,11 @@ static int playback_read(struct serve_source *source, struct serve_stream *strea
 		play_pose(p, stream);
 	while (rows_time(&p->forces) <= t_ns)
 		play_force(p, stream);
-	if (p->frames)
-		play_frame(p, stream, t_ns);
+	if (play_frame(p, stream, t_ns))
+		*next_ns = now_ns;
+	serve_lost(stream, lost(p));
 	snprintf(text, sizeof(text), "recording of %.200s", p->info.rig);
-	if (rows_have(&p->poses) || rows_have(&p->forces)) {
+	if (has_more(p, t_ns)) {
 		serve_status(stream, SERVE_RUNS, "playing", text);
 		return 0;
 	}
@@ -189,6 +216,10 @@ static int playback_read(struct serve_source *source, struct serve_stream *strea
 		return 0;
 	}
 	serve_status(stream, SERVE_ENDED, "ended", text);
+	if (p->skipped)
+		cli_warn("%llu frames were skipped, as they could not be read in time: "
+			 "use a lower --speed or --rate",
+			 (unsigned long long)p->skipped);
 	return 1;
 }
 
@@ -202,8 +233,8 @@ static int64_t playback_utc(struct serve_source *source, int64_t t_ns)
 			       ? 0
 			       : tai_ns - 1000000000LL * incise_wall_utc_offset_s(
 								 playback->wall, t_ns);
-	return playback->utc_start_ns
-		       ? playback->utc_start_ns + (t_ns - playback->info.start_ns)
+	return playback->info.start_utc_ns
+		       ? playback->info.start_utc_ns + (t_ns - playback->info.start_ns)
 		       : 0;
 }
 
@@ -216,20 +247,12 @@ static void playback_free(struct serve_source *source)
 	incise_recording_close(playback->recording);
 	rows_close(&playback->poses);
 	rows_close(&playback->forces);
+	rows_close(&playback->times);
 	free(playback);
 }
 
 static const struct serve_source_ops playback_ops = {
 	.read = playback_read, .utc = playback_utc, .free = playback_free};
-
-/* "2026-11-27T01:02:03Z", in whole seconds; 0: something else. */
-static int64_t utc_of(const char *text)
-{
-	struct tm tm = {0};
-	const char *end = strptime(text, "%Y-%m-%dT%H:%M:%S", &tm);
-
-	return end ? (int64_t)timegm(&tm) * 1000000000LL : 0;
-}
 
 static bool has_camera(const struct incise_recording_info *info)
 {
@@ -244,8 +267,16 @@ static void open_frames(struct playback *playback,
 {
 	struct incise_error err = {0};
 
-	if (!options->camera || (!options->camera_needed && !has_camera(&playback->info)))
+	if (!options->camera)
 		return;
+	if (!has_camera(&playback->info)) {
+		if (options->camera_needed)
+			cli_fail(
+				"--camera frames: %s has no camera; leave the option out, "
+				"or name another recording",
+				options->operand);
+		return;
+	}
 	playback->frames = incise_frame_reader_new(playback->recording, &err);
 	if (!playback->frames && options->camera_needed)
 		cli_fail_with(&err);
@@ -265,14 +296,13 @@ struct serve_source *serve_recording_open(const struct serve_source_options *opt
 	p->endless = options->endless;
 	if (incise_recording_info(p->recording, &p->info, &err))
 		cli_fail_with(&err);
+	open_frames(p, options);
 	open_rows(p);
 	if (p->first_ns == INT64_MAX)
-		cli_fail("%s: it has no samples", options->operand);
-	open_frames(p, options);
+		cli_fail("%s: has no samples; name another recording", options->operand);
 	p->wall = incise_recording_wall(p->recording, &err);
 	if (!p->wall && err.code != ENODATA)
 		cli_fail_with(&err);
-	p->utc_start_ns = utc_of(p->info.started);
 	info->name = cli_text("recording %s", options->operand);
 	info->kinds[SERVE_POSE] = rows_have(&p->poses);
 	info->kinds[SERVE_FORCE] = rows_have(&p->forces);

@@ -143,6 +143,11 @@ static void set_due(struct serve_stream *stream, enum serve_kind kind, int64_t t
 	*due += stream->period_ns;
 }
 
+void serve_lost(struct serve_stream *stream, uint64_t lost)
+{
+	stream->lost = lost;
+}
+
 void serve_pose(struct serve_stream *stream, int64_t t_ns, const double position_mm[3],
 		const double quaternion[4], const double tip_mm[3], uint64_t lost)
 {

@@ -61,7 +61,7 @@ struct incise_recording;
 struct incise_recording_info {
 	bool complete; /**< closed by its recorder; else readable up to the last commit */
 	int64_t start_ns, end_ns; /**< first and last force sample, CLOCK_MONOTONIC */
-	char started[32];	  /**< wall clock at the start, ISO 8601 UTC */
+	char started[32];	  /**< wall clock at start_ns, ISO 8601 UTC, in seconds */
 	char rig[256];		  /**< rig as given */
 	uint64_t force, tracker, depth; /**< rows */
 	uint64_t force_lost, tracker_lost, force_clipped;
@@ -75,6 +75,8 @@ struct incise_recording_info {
 	struct incise_stream streams[INCISE_STREAMS_MAX]; /**< in format 2 */
 	int n_streams;
 	bool newtons; /**< the force channel measures N: read full_scale_V, offset_V as N */
+	/** UTC of start_ns, ns since 1970, by the wall clock to one second; 0: not known */
+	int64_t start_utc_ns;
 };
 
 /**

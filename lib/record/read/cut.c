@@ -5,6 +5,8 @@
 #include <errno.h>
 #include <math.h>
 #include <string.h>
+#include <time.h>
+#include <incise/clock.h>
 #include "cut.h"
 #include "depth.h"
 #include "session.h"
@@ -250,6 +252,50 @@ out:
 	return rc;
 }
 
+/*
+ * The wall clock was read at the event "start", when the recorder started: samples come later,
+ * after a trigger by any time. 0 or -errno.
+ */
+static int find_started(struct incise_recording *rec, struct incise_recording_info *info,
+			struct incise_error *err)
+{
+	const struct incise_recording *member =
+		incise_recording_member(rec, info->force ? "force" : "tracker");
+	struct tm utc = {0};
+	const char *end = strptime(member->meta.started, "%Y-%m-%dT%H:%M:%SZ", &utc);
+	int64_t read_s = end && !*end ? (int64_t)timegm(&utc) : 0, after_ns;
+	sqlite3_stmt *stmt = NULL;
+	time_t started;
+	int rc = 0;
+
+	if (read_s <= 0 || read_s > UINT32_MAX)
+		return 0;
+	if (sqlite3_prepare_v2(member->db,
+			       "SELECT t_ns FROM events WHERE kind = 'start' "
+			       "ORDER BY rowid LIMIT 1",
+			       -1, &stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(member->db, member->path, err);
+	rc = sqlite3_step(stmt);
+	/* A time that is damaged, or later than the samples, leaves the text as it is. */
+	if (rc == SQLITE_ROW &&
+	    !__builtin_sub_overflow(info->start_ns,
+				    incise_session_time(member->map,
+							sqlite3_column_int64(stmt, 0)),
+				    &after_ns) &&
+	    after_ns >= 0 && after_ns < INT64_MAX / 4) {
+		info->start_utc_ns = read_s * INCISE_NS_PER_S + after_ns;
+		started = (time_t)(info->start_utc_ns / INCISE_NS_PER_S);
+		strftime(info->started, sizeof(info->started), "%Y-%m-%dT%H:%M:%SZ",
+			 gmtime_r(&started, &utc));
+	}
+	if (rc == SQLITE_ROW || rc == SQLITE_DONE)
+		rc = 0;
+	else
+		rc = incise_schema_fail(member->db, member->path, err);
+	sqlite3_finalize(stmt);
+	return rc;
+}
+
 int incise_recording_info(struct incise_recording *rec,
 			  struct incise_recording_info *info, struct incise_error *err)
 {
@@ -288,5 +334,5 @@ int incise_recording_info(struct incise_recording *rec,
 		info->end_ns = incise_session_time(map, info->end_ns);
 	}
 	incise_cuts_close(&cuts);
-	return rc;
+	return rc ? rc : find_started(rec, info, err);
 }

@@ -71,7 +71,7 @@ void incise_frame_reader_free(struct incise_frame_reader *reader)
 	free(reader);
 }
 
-/* The row nearest to a time: its own seq, time and number from 0. */
+/* The row nearest to a time: its own seq, time and number from 0. Rows before are counted once. */
 static int find_row(struct incise_recording *recording, int64_t t_ns, uint64_t *seq,
 		    int64_t *row_ns, uint64_t *number, struct incise_error *err)
 {
@@ -79,9 +79,9 @@ static int find_row(struct incise_recording *recording, int64_t t_ns, uint64_t *
 	int rc;
 
 	if (sqlite3_prepare_v2(recording->db,
-			       "SELECT seq, t_ns, (SELECT count(*) FROM frames AS before "
-			       "WHERE before.seq < frames.seq) FROM frames "
-			       "ORDER BY abs(t_ns - ?), seq LIMIT 1",
+			       "SELECT seq, t_ns, (SELECT count(*) FROM frames "
+			       "WHERE frames.seq < near.seq) FROM (SELECT seq, t_ns "
+			       "FROM frames ORDER BY abs(t_ns - ?), seq LIMIT 1) AS near",
 			       -1, &stmt, NULL) != SQLITE_OK)
 		return incise_schema_fail(recording->db, recording->path, err);
 	sqlite3_bind_int64(stmt, 1, t_ns);
