@@ -107,7 +107,7 @@ int64_t incise_igtl_time_ns(uint64_t time)
 static uint8_t *put(uint8_t *to, const void *from, size_t n)
 {
 	if (n)
-		memcpy(to, from, n);
+		memmove(to, from, n);
 	return to + n;
 }
 

@@ -179,6 +179,24 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	[[ "$stderr" == *"one.rec: has no wall time; align by a signal"* ]] || { echo "$stderr"; false; }
 }
 
+@test "an output with a slash behind it, on another file system, and of files behind links" {
+	incise join a.rec b.rec -o day.rec/ >/dev/null
+	incise join b.rec a.rec -o day.rec/ --overwrite >/dev/null
+	incise info day.rec --json >info.json
+	[ "$(key info.json 'members[0].name')" = b ]
+	[ "$(ls -A | sort | tr '\n' ' ')" = "a.rec b.rec day.rec info.json none.rec " ]
+	mkdir away && mv b.rec/recording.db away/ && ln -s ../away/recording.db b.rec/
+	incise join a.rec b.rec -o links.rec >/dev/null
+	rm -r away
+	incise verify links.rec
+	[ "$(stat -c %d /dev/shm)" != "$(stat -c %d .)" ] || skip "/dev/shm is on the same file system"
+	shm=$(mktemp -d /dev/shm/incise-join.XXXXXX)
+	incise join "$BATS_FILE_TMPDIR/a.rec" "$BATS_FILE_TMPDIR/b.rec" -o "$shm/day.rec" >/dev/null &&
+		incise verify "$shm/day.rec" && code=0 || code=1
+	rm -r "$shm"
+	[ $code = 0 ]
+}
+
 @test "a gap costs no accuracy, and TAI is that of the machine" {
 	incise capture -o late.rec --rig sim:clock=simulated,seed=9 --duration 1s \
 		--clock-source sim:8000,50,30 >/dev/null

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """An outlet of the Lab Streaming Layer, by pylsl: a force whose value is its own sample's number.
 
-    lsl_send.py NAME [--rate HZ] [--seconds S] [--unit UNIT] [--hole I:N] [--nan I] [--irregular]
-                     [--recover]
+    lsl_send.py NAME [--rate HZ] [--seconds S] [--unit UNIT] [--hole I:N] [--nan I] [--ahead I]
+                     [--irregular] [--recover]
 
 Sample i has the timestamp T0 + i/rate and the force (i % 1000) / 32768 N; it prints T0 in ns, and
-ends after S seconds. The samples I … I + N - 1 are not sent.
+ends after S seconds. The samples I … I + N - 1 are not sent; one is stamped 60 s later.
 """
 import argparse
 import time
@@ -21,6 +21,7 @@ def main():
     parser.add_argument("--unit", default="N")
     parser.add_argument("--hole", default="0:0")
     parser.add_argument("--nan", type=int, default=-1)
+    parser.add_argument("--ahead", type=int, default=-1)
     parser.add_argument("--irregular", action="store_true")
     parser.add_argument("--recover", action="store_true")
     options = parser.parse_args()
@@ -49,7 +50,8 @@ def main():
         while sent < min(due, options.seconds * options.rate):
             if not first <= sent < first + missing:
                 value = float("nan") if sent == options.nan else sent % 1000 / 32768
-                outlet.push_sample([-1.0, value, 0.0], start + sent / options.rate)
+                late = 60 * (sent == options.ahead)
+                outlet.push_sample([-1.0, value, 0.0], start + sent / options.rate + late)
             sent += 1
         time.sleep(0.002)
 

@@ -134,8 +134,19 @@ static void check(const char *path)
 			 path);
 }
 
-char *recording_target(const char *path)
+/* Without the slashes that completion puts behind a folder. */
+static char *plain(const char *path)
 {
+	size_t n = strlen(path);
+
+	while (n > 1 && path[n - 1] == '/')
+		n--;
+	return cli_text("%.*s", (int)n, path);
+}
+
+char *recording_target(const char *given)
+{
+	char *path = plain(given);
 	char *target = cli_text("%s%s", path, cli_overwrite() ? ".new" : "");
 	char *part = cli_text("%s.part", path), *rest = cli_text("%s.part", target);
 
@@ -145,12 +156,13 @@ char *recording_target(const char *path)
 		recording_remove(rest);
 		recording_remove(target);
 	}
+	free(path);
 	free(part);
 	free(rest);
 	return target;
 }
 
-void recording_replace(const char *new, const char *path)
+static void replace(const char *new, const char *path)
 {
 	if (!strcmp(new, path))
 		return;
@@ -171,4 +183,12 @@ void recording_replace(const char *new, const char *path)
 		return;
 	}
 	recording_remove(new);
+}
+
+void recording_replace(const char *new, const char *given)
+{
+	char *path = plain(given);
+
+	replace(new, path);
+	free(path);
 }

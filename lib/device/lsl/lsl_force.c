@@ -32,7 +32,8 @@
 #define CHUNK 4096 /* values */
 #define BITS 31
 #define STREAMS_MAX 64
-#define TIME_MAX_S 4e9 /* 127 years: no clock since boot */
+#define OLD_S (QUEUE_S + 5.0) /* in the queue here, and some in the sender's */
+#define AHEAD_S 0.5	      /* a correction that is off by more is none */
 
 /* Units in which a force comes; the range is ± half of 2^BITS steps. */
 static const struct unit {
@@ -72,14 +73,14 @@ static int32_t code_of(const struct lsl_force *f, double value)
 	return (int32_t)fmax(0, fmin(code, top));
 }
 
-static void take(struct lsl_force *f, double value, double stamp_s)
+static void take(struct lsl_force *f, double value, double stamp_s, int64_t now_ns)
 {
-	double t_s = stamp_s + f->correction_s;
+	double t_s = stamp_s + f->correction_s, now_s = (double)now_ns * 1e-9;
 	uint64_t missing;
 	int64_t t_ns;
 
-	/* No time: it is lost, as is a force that is no number. */
-	if (!(t_s >= 0 && t_s < TIME_MAX_S)) {
+	/* No time that a sample in the queue can have: it is lost, as is a force that is no number. */
+	if (!(t_s >= 0 && t_s > now_s - OLD_S && t_s < now_s + AHEAD_S)) {
 		incise_pace_skip(&f->pace);
 		daq_feed_lose(&f->feed, 1);
 		return;
@@ -94,7 +95,7 @@ static void take(struct lsl_force *f, double value, double stamp_s)
 }
 
 /* Samples taken, or a negative error of liblsl. */
-static int pull(struct lsl_force *f)
+static int pull(struct lsl_force *f, int64_t now_ns)
 {
 	unsigned long most = CHUNK / (unsigned long)f->n_channels, got, n;
 	int32_t error = 0;
@@ -107,7 +108,7 @@ static int pull(struct lsl_force *f)
 		take(f,
 		     f->values[i * (unsigned long)f->n_channels +
 			       (unsigned long)f->channel],
-		     f->times[i]);
+		     f->times[i], now_ns);
 	return error < 0 && !n ? error : (int)n;
 }
 
@@ -140,7 +141,7 @@ static void *run(void *argument)
 			correct(f, 0, &uncertainty_s);
 			corrected_ns = now_ns;
 		}
-		got = pull(f);
+		got = pull(f, now_ns);
 		if (got > 0)
 			last_ns = now_ns;
 		else if (got < 0)

@@ -83,6 +83,7 @@ static void name_member(struct join *join, int at)
 	snprintf(member->name, sizeof(member->name), "%.55s", name);
 	for (char *c = member->name; *c; c++)
 		if ((unsigned char)*c <= ' ' || *c == 0x7f || strchr("/:=,*", *c) ||
+		    ((unsigned char)*c == 0xc2 && (c[1] & 0xe0) == 0x80) ||
 		    (c == member->name && *c == '.'))
 			*c = '_';
 	for (int i = 0; i < at; i++)
@@ -106,7 +107,8 @@ static void read_text(const struct member *member, const char *key, char *text,
 		snprintf(text, size, "%s", (const char *)sqlite3_column_text(stmt, 0));
 	sqlite3_finalize(stmt);
 	for (char *c = text; *c; c++)
-		if ((unsigned char)*c < ' ' || *c == 0x7f)
+		if ((unsigned char)*c < ' ' || *c == 0x7f ||
+		    ((unsigned char)*c == 0xc2 && (c[1] & 0xe0) == 0x80))
 			*c = '?';
 }
 
@@ -551,32 +553,53 @@ static int map_clock(struct join *join, int at)
 
 /* --- writing ------------------------------------------------------------------------- */
 
+/* The rest of a file. Returns 0 or -errno. */
+static int copy(int in, int out)
+{
+	char bytes[1 << 16];
+	ssize_t n;
+
+	while ((n = copy_file_range(in, NULL, out, NULL, 1 << 30, 0)) > 0)
+		;
+	if (!n)
+		return 0;
+	/* From one kind of file system to another the kernel does not copy. */
+	if (errno != EXDEV && errno != EINVAL && errno != ENOSYS && errno != EOPNOTSUPP)
+		return -errno;
+	while ((n = read(in, bytes, sizeof(bytes))) > 0)
+		for (ssize_t done = 0, part; done < n; done += part) {
+			part = write(out, bytes + done, (size_t)(n - done));
+			if (part < 0)
+				return -errno;
+		}
+	return n < 0 ? -errno : 0;
+}
+
 /*
  * Clone, link or copy a file that exists; bit for bit. A link is the same file, which nothing changes
- * once it is complete. Returns 0 or -errno.
+ * once it is complete; of a symbolic link it is one to its target. Returns 0 or -errno.
  */
 static int bring(const char *from, const char *to, bool complete)
 {
 	int in = open(from, O_RDONLY | O_CLOEXEC), out, rc = 0;
-	ssize_t n = 1;
 
 	if (in < 0)
 		return errno == ENOENT ? 0 : -errno;
+	if (complete && !linkat(AT_FDCWD, from, AT_FDCWD, to, AT_SYMLINK_FOLLOW)) {
+		close(in);
+		return 0;
+	}
 	out = open(to, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
 	if (out < 0) {
 		rc = -errno;
-	} else if (ioctl(out, FICLONE, in)) {
-		if (!unlink(to) && (!complete || link(from, to))) {
-			close(out);
-			out = open(to, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-			while (out >= 0 && n > 0)
-				n = copy_file_range(in, NULL, out, NULL, 1 << 30, 0);
-			if (out < 0 || n < 0 || fsync(out))
-				rc = -errno;
-		}
+	} else {
+		if (ioctl(out, FICLONE, in))
+			rc = copy(in, out);
+		if (!rc && fsync(out))
+			rc = -errno;
+		if (close(out) && !rc)
+			rc = -errno;
 	}
-	if (out >= 0 && close(out) && !rc)
-		rc = -errno;
 	close(in);
 	return rc;
 }
@@ -747,6 +770,17 @@ static int write_database(struct join *join, const char *folder)
 	return rc;
 }
 
+/* Nothing that cannot be read gets the final name. */
+static int try_session(struct join *join, const char *folder)
+{
+	struct incise_recording *recording = incise_recording_open_any(folder, join->err);
+
+	if (!recording)
+		return -errno;
+	incise_recording_close(recording);
+	return 0;
+}
+
 static int write_session(struct join *join, const char *output)
 {
 	char *part;
@@ -768,6 +802,8 @@ static int write_session(struct join *join, const char *output)
 		rc = bring_member(join, &join->members[i], part);
 	if (!rc)
 		rc = write_database(join, part);
+	if (!rc)
+		rc = try_session(join, part);
 	if (!rc && rename(part, output))
 		rc = incise_error_set(join->err, errno, "%s: %s", output,
 				      strerror(errno));

@@ -586,9 +586,13 @@ static int find_any_folder(struct incise_recording *rec, const char *path,
 	start = strndup(path, (size_t)(*choice - 1 - path));
 	if (!start)
 		return incise_error_set(err, ENOMEM, "%s: out of memory", path);
-	rec->path = find_folder(start, err);
+	rec->path = find_folder(start, NULL);
 	free(start);
-	return rec->path ? 0 : -errno;
+	if (rec->path)
+		return 0;
+	/* Neither is there: the name is what was given. */
+	free(find_folder(path, err));
+	return -ENOENT;
 }
 
 /* Open the members; the path is then that under which the same is opened again. */

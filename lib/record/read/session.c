@@ -178,7 +178,8 @@ static bool take(sqlite3_stmt *stmt, int column, char *to, size_t size)
 	if (!text || strlen(text) >= size)
 		return false;
 	for (const char *c = text; *c; c++)
-		if ((unsigned char)*c < ' ' || *c == 0x7f)
+		if ((unsigned char)*c < ' ' || *c == 0x7f ||
+		    ((unsigned char)*c == 0xc2 && (c[1] & 0xe0) == 0x80)) /* of Latin-1 */
 			return false;
 	strcpy(to, text);
 	return true;
