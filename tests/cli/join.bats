@@ -204,6 +204,9 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	# a's last row is at 6 s, the other's first at 7001.00005 s of a
 	[ "${lines[3]}" = "  no overlap with those before: a gap of 6995.000 s" ]
 	[[ "${lines[2]}" == *"uncertainty 0.05"*" ms, by clocks" ]]
+	# without an overlap no cut has a force, whatever the depth
+	run -1 --separate-stderr incise export day.rec:force=late,tracker=a -o none.csv
+	[[ "$stderr" == *": no cut: no force was recorded while the blade was deeper than 0.3 mm (deepest "* ]]
 	incise export day.rec:late --resample --rate 100 --tai -o joined.csv
 	incise export late.rec --resample --rate 100 --tai -o alone.csv
 	tai() { awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == "tai_ns") c = i }
@@ -231,7 +234,23 @@ without_u() {
 	incise verify force.rec | grep -q 'force.rec: complete, and as it was written'
 	incise verify tracker.rec | grep -q 'tracker.rec: complete, and as it was written'
 	! incise verify tracker.rec | grep -q ^force
+	# each is exported as far as it has streams; else the error gives the reason
 	run -1 --separate-stderr incise export tracker.rec -o none.csv
+	[[ "$stderr" == "incise export: tracker.rec: has no force channel, and this needs one; "* ]]
+	run -1 --separate-stderr incise export tracker.rec --resample -o none.csv
+	[[ "$stderr" == *"tracker.rec: has no force channel, "*"give --rate HZ"* ]]
+	run -1 --separate-stderr incise info --dataset force.rec
+	[[ "$stderr" == "incise info: force.rec: no cut: without a pose there is no depth; "* ]]
+	incise export tracker.rec --resample --rate 100 -o poses.csv
+	[ "$(tail -n +2 poses.csv | cut -d, -f17 | sort -u)" = nan ]
+	[ "$(tail -n +2 poses.csv | grep -vc ',nan,nan,nan,0,0,nan')" -gt 790 ]
+	for profile in ros2 plain; do
+		incise export tracker.rec --profile $profile -o tracker.mcap --overwrite
+		incise export force.rec --profile $profile -o force.mcap --overwrite
+		grep -aqE '/(tip|tracker)' tracker.mcap && grep -aq /force force.mcap
+		! grep -aq /force tracker.mcap || false
+		! grep -aqE '/(tip|tracker|depth)' force.mcap || false
+	done
 	run -2 --separate-stderr incise capture -o x.rec --rig $rig --only force --trigger button
 	[[ "${stderr_lines[0]}" == *"--trigger needs a stream that --only leaves out" ]]
 	# the stream of each is that of the only machine that has it

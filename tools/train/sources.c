@@ -90,8 +90,14 @@ static int read_pipe(void *user, incise_row_taker take, void *taker,
 /* A message of the rows, with the recording in front. */
 static int name_it(const struct source *source, int rc, struct incise_error *err)
 {
+	static const char stream[] = "Arrow stream: ";
 	struct incise_error own = *err;
+	size_t known = sizeof(stream) - 1;
 
+	/* The stream is one of the recording, which its own message names. */
+	if (rc && !strncmp(own.text, stream, known) &&
+	    !strncmp(own.text + known, source->path, strlen(source->path)))
+		return incise_error_set(err, own.code, "%s", own.text + known);
 	return rc && strncmp(own.text, source->path, strlen(source->path))
 		       ? incise_error_set(err, own.code, "%s: %.300s", source->path,
 					  own.text)

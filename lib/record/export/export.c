@@ -498,6 +498,33 @@ int incise_export_check(const struct incise_export_options *o, struct incise_err
 	return 0;
 }
 
+/* Say why there is none. */
+static int no_cut(struct pass *pass, struct incise_recording *const *recordings, int n)
+{
+	const char *path = recordings[0]->path, *others = n > 1 ? " and the others" : "";
+
+	if (isinf(pass->depth_deepest_mm))
+		return incise_error_set(
+			pass->err, ENODATA,
+			"%s%s: no cut: without a pose there is no depth; join a recording "
+			"of the tracker (incise join), or export the force alone "
+			"(--resample)",
+			path, others);
+	if (pass->depth_deepest_mm > INCISE_CUT_START_MM)
+		return incise_error_set(
+			pass->err, ENODATA,
+			"%s%s: no cut: no force was recorded while the blade was deeper "
+			"than %.1f mm (deepest %.2f mm); `incise info` shows which "
+			"streams overlap",
+			path, others, INCISE_CUT_START_MM, pass->depth_deepest_mm);
+	return incise_error_set(pass->err, ENODATA,
+				"%s%s: no cut: the blade was never deeper than %.1f mm "
+				"(deepest %.2f mm); check `surface` in the rig's "
+				"configuration",
+				path, others, INCISE_CUT_START_MM,
+				pass->depth_deepest_mm);
+}
+
 static int write_cuts(struct pass *pass, struct incise_recording *const *recordings,
 		      int n)
 {
@@ -512,13 +539,7 @@ static int write_cuts(struct pass *pass, struct incise_recording *const *recordi
 		return rc;
 	pass->report.cuts = pass->cut;
 	if (!pass->cut)
-		return incise_error_set(
-			pass->err, ENODATA,
-			"%s%s: no cut: the blade was never deeper than %.1f mm "
-			"(deepest %.2f mm); check `surface` in the rig's "
-			"configuration",
-			recordings[0]->path, n > 1 ? " and the others" : "",
-			INCISE_CUT_START_MM, pass->depth_deepest_mm);
+		return no_cut(pass, recordings, n);
 	if (!pass->report.rows)
 		return incise_error_set(
 			pass->err, ENODATA,

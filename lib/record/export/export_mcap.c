@@ -246,6 +246,13 @@ static uint64_t expected(const struct incise_recording_info *meta, const char *t
 					   : UINT64_MAX;
 }
 
+/* Whether the rig had it; a topic without any message looks like a loss. */
+static bool exists(const struct incise_recording *recording, const char *table)
+{
+	return strcmp(table, "force") ? expected(&recording->meta, table) > 0
+				      : incise_recording_has_force(recording);
+}
+
 /* Open the tables, and announce their topics. Returns 0 or -errno. */
 static int open_streams(struct export *export, struct incise_error *err)
 {
@@ -262,6 +269,8 @@ static int open_streams(struct export *export, struct incise_error *err)
 	for (int i = 0; i < profile->n && !rc; i++) {
 		const struct incise_message_stream *stream = &profile->streams[i];
 
+		if (!exists(recording, stream->table))
+			export->selected &= ~(1 << i);
 		if (!(export->selected & 1 << i))
 			continue;
 		rc = incise_rows_open(&export->rows[i], recording, stream->table,
@@ -298,7 +307,8 @@ static int64_t write_messages(struct export *export,
 	if (rc)
 		return incise_error_set(err, ENOMEM, "out of memory");
 	incise_recording_force(recording, export->options->calibration, &messages->scale);
-	rc = incise_recording_need_zero(recording, &messages->scale, err);
+	if (incise_recording_has_force(recording))
+		rc = incise_recording_need_zero(recording, &messages->scale, err);
 	if (!rc && profile->wall)
 		rc = find_wall(messages, err);
 	if (!rc)

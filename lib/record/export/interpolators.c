@@ -4,6 +4,7 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <incise/tracker.h>
@@ -412,27 +413,27 @@ double incise_force_weight(double rows)
 	return sinc * (0.42 + 0.5 * cos(x) + 0.08 * cos(2 * x));
 }
 
-/* Find the last time of the table, which is the end of a grid. */
-static int find_last(struct incise_force_interpolator *force, struct incise_error *err)
+int incise_rows_last(const struct incise_rows *rows, int64_t *last_ns,
+		     struct incise_error *err)
 {
-	struct incise_recording *recording = force->rows.recording;
-	struct incise_row_times times = force->rows.times; /* as before the first row */
+	struct incise_recording *recording = rows->recording;
+	struct incise_row_times times = rows->times; /* as before the first row */
 	sqlite3_stmt *stmt = NULL;
-	bool found = sqlite3_prepare_v2(recording->db,
-					"SELECT seq, t_ns FROM force ORDER BY seq DESC "
-					"LIMIT 1",
-					-1, &stmt, NULL) == SQLITE_OK &&
-		     sqlite3_step(stmt) == SQLITE_ROW;
+	char sql[100];
+	bool found;
 
-	if (found &&
-	    !incise_row_times_next(&times, sqlite3_column_int64(stmt, 0),
-				   sqlite3_column_int64(stmt, 1), &force->last_ns))
-		force->last_ns =
-			INCISE_TIME_NONE; /* reading the rows reports the damage */
+	snprintf(sql, sizeof(sql), "SELECT seq, t_ns FROM %s ORDER BY seq DESC LIMIT 1",
+		 rows->table);
+	found = sqlite3_prepare_v2(recording->db, sql, -1, &stmt, NULL) == SQLITE_OK &&
+		sqlite3_step(stmt) == SQLITE_ROW;
+	if (found && !incise_row_times_next(&times, sqlite3_column_int64(stmt, 0),
+					    sqlite3_column_int64(stmt, 1), last_ns))
+		*last_ns = INCISE_TIME_NONE; /* reading the rows reports the damage */
 	sqlite3_finalize(stmt);
 	return found ? 0
-		     : incise_error_set(err, ENODATA, "%s: no force sample",
-					recording->path);
+		     : incise_error_set(err, ENODATA,
+					"%s: has no %s sample; leave it out",
+					recording->path, rows->table);
 }
 
 int incise_force_interpolator_open(struct incise_force_interpolator *force,
@@ -457,7 +458,7 @@ int incise_force_interpolator_open(struct incise_force_interpolator *force,
 	if (!rc && given)
 		incise_row_times_calibrate(&force->rows.times, given);
 	if (!rc)
-		rc = find_last(force, err);
+		rc = incise_rows_last(&force->rows, &force->last_ns, err);
 	if (!rc)
 		rc = incise_force_interpolator_more(force, err);
 	return rc < 0 ? rc : 0;

@@ -132,6 +132,10 @@ struct incise_force_value {
  */
 double incise_force_weight(double rows);
 
+/* Find the time of a table's last row, which is the end of a grid; before the first is read. */
+int incise_rows_last(const struct incise_rows *rows, int64_t *last_ns,
+		     struct incise_error *err);
+
 /* Open, and read the first sample if there is one. Returns 0 or -errno. */
 int incise_force_interpolator_open(struct incise_force_interpolator *force,
 				   struct incise_recording *recording,

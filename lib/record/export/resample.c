@@ -240,6 +240,71 @@ static int on_grid(struct resample *r, double force_hz)
 	return rc;
 }
 
+static int check_span(const struct resample *r, const struct incise_recording *recording,
+		      const char *table, int64_t last_ns)
+{
+	if ((double)(last_ns - r->first_ns) <= SPAN_MAX_NS)
+		return 0;
+	return incise_error_set(r->err, EINVAL,
+				"%s: damaged: table %s: times from %lld to %lld ns are "
+				"invalid",
+				recording->path, table, (long long)r->first_ns,
+				(long long)last_ns);
+}
+
+/* Without a force channel, a row for each multiple of 1/rate from the first pose to the last. */
+static int on_poses(struct resample *r, struct incise_recording *recording)
+{
+	const struct incise_calibration *given = r->options->calibration;
+	const struct incise_force_value none = {.force_N = NAN, .u_N = NAN};
+	struct incise_rows rows;
+	int64_t last_ns;
+	int rc;
+
+	if (!(r->options->rate_hz > 0))
+		return incise_error_set(
+			r->err, EINVAL,
+			"%s: has no force channel, whose samples would be the rows; give "
+			"--rate HZ, for example 120",
+			recording->path);
+	rc = incise_rows_open(&rows, recording, "tracker", "seq, t_ns", "ii",
+			      recording->meta.tracker, r->err);
+	if (!rc && given)
+		incise_row_times_calibrate(&rows.times, given);
+	if (!rc)
+		rc = incise_rows_last(&rows, &last_ns, r->err);
+	if (!rc)
+		rc = incise_rows_next(&rows, r->err);
+	r->first_ns = rows.t_ns;
+	incise_rows_close(&rows);
+	if (rc > 0)
+		rc = check_span(r, recording, "tracker", last_ns);
+	for (int64_t k = 0; rc >= 0; k++) {
+		int64_t t_ns = r->first_ns + llround(k * 1e9 / r->options->rate_hz);
+
+		if (t_ns > last_ns)
+			break;
+		rc = put_row(r, t_ns, &none);
+	}
+	return rc;
+}
+
+/* Rows at the times of the force, or on a grid over it. */
+static int on_samples(struct resample *r, struct incise_recording *recording)
+{
+	double span_ns = (double)(r->force.last_ns - r->force.samples[0].t_ns);
+	int rc;
+
+	r->first_ns = r->force.samples[0].t_ns;
+	r->t_sd_s = incise_row_times_sd(&r->force.rows.times, 0);
+	rc = check_span(r, recording, "force", r->force.last_ns);
+	if (rc)
+		return rc;
+	if (!(r->options->rate_hz > 0))
+		return on_force(r);
+	return on_grid(r, span_ns > 0 ? (recording->meta.force - 1) * 1e9 / span_ns : 1);
+}
+
 int incise_resample(struct incise_recording *recording, const char *name,
 		    const struct incise_export_options *options,
 		    const struct incise_wall *wall, struct incise_table *table,
@@ -258,34 +323,21 @@ int incise_resample(struct incise_recording *recording, const char *name,
 		.all = all,
 		.err = err,
 	};
-	double span_ns;
+	bool has_force = incise_recording_has_force(recording);
 	int rc = 0;
 
 	if (r.name < 0)
 		return incise_error_set(err, ENOMEM, "out of memory");
-	rc = incise_force_interpolator_open(&r.force, recording, given, err);
+	if (has_force)
+		rc = incise_force_interpolator_open(&r.force, recording, given, err);
 	if (!rc)
 		rc = incise_blade_pose_open(&r.blade, recording, given, err);
 	if (!rc)
 		rc = incise_camera_interpolator_open(&r.camera, recording, given, err);
-	if (!rc && r.force.n) {
-		r.first_ns = r.force.samples[0].t_ns;
-		r.t_sd_s = incise_row_times_sd(&r.force.rows.times, 0);
-		span_ns = (double)(r.force.last_ns - r.first_ns);
-		if (span_ns > SPAN_MAX_NS)
-			rc = incise_error_set(err, EINVAL,
-					      "%s: damaged: table force: times from "
-					      "%lld to %lld ns are invalid",
-					      recording->path, (long long)r.first_ns,
-					      (long long)r.force.last_ns);
-		else
-			rc = options->rate_hz > 0
-				     ? on_grid(&r, span_ns > 0
-							   ? (recording->meta.force - 1) *
-								     1e9 / span_ns
-							   : 1)
-				     : on_force(&r);
-	}
+	if (!rc && !has_force)
+		rc = on_poses(&r, recording);
+	else if (!rc && r.force.n)
+		rc = on_samples(&r, recording);
 	report->cuts += r.blade.cut.count;
 	incise_force_interpolator_close(&r.force);
 	incise_blade_pose_close(&r.blade);

@@ -248,12 +248,24 @@ void incise_recording_force(const struct incise_recording *rec,
 	};
 }
 
+bool incise_recording_has_force(const struct incise_recording *rec)
+{
+	return rec->meta.bits > 0;
+}
+
 int incise_recording_need_zero(const struct incise_recording *rec,
 			       const struct incise_recording_force *force,
 			       struct incise_error *err)
 {
 	if (!isnan(force->zero_N))
 		return 0;
+	if (!incise_recording_has_force(rec))
+		return incise_error_set(
+			err, ENODATA,
+			"%s: has no force channel, and this needs one; join it with a "
+			"recording of the force (incise join), or export its poses "
+			"(--resample --rate HZ, or -o FILE.mcap)",
+			rec->path);
 	return incise_error_set(err, EINVAL,
 				"%s: ended before the zero of the force channel was "
 				"known (0.5 s), so there is no force",

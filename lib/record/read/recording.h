@@ -55,7 +55,10 @@ void incise_recording_force(const struct incise_recording *recording,
 			    const struct incise_calibration *given,
 			    struct incise_recording_force *force);
 
-/* Returns 0, or -EINVAL if the zero is not known. */
+/* Whether it had a force channel: a tracker alone has none. */
+bool incise_recording_has_force(const struct incise_recording *recording);
+
+/* Returns 0; -EINVAL: the zero is not known; -ENODATA: no force channel. */
 int incise_recording_need_zero(const struct incise_recording *recording,
 			       const struct incise_recording_force *force,
 			       struct incise_error *err);
