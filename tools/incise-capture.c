@@ -19,6 +19,7 @@
 #include "cli/json.h"
 #include "cli/recording.h"
 #include "cli/stream_report.h"
+#include "cli/wall_report.h"
 
 #define POLL_NS 10000000LL
 /* The first point of wall time comes at once, unless its source hangs. */
@@ -66,6 +67,15 @@ static void parse_start_at(void *whole, char *text)
 	start_time_parse(&((struct options *)whole)->start_at, text);
 }
 
+static void parse_clock_source(void *whole, char *text)
+{
+	struct incise_error err = {0};
+
+	if (incise_recorder_check_clock_source(text, &err))
+		cli_usage("%s", err.text);
+	((struct options *)whole)->clock_source = text;
+}
+
 /* Whether the recorder waits for something before it records. */
 static bool waits(const struct options *options)
 {
@@ -110,7 +120,7 @@ static const struct cli_option option_table[] = {
 	 "where the wall time comes from: auto (default),\n"
 	 "ptp[:SOCKET[,DOMAIN]], chrony[:PORT], kernel or none; of a\n"
 	 "simulated clock none (default) or sim:TAI_S,PPM,BOUND_US",
-	 CLI_TEXT(struct options, clock_source)},
+	 CLI_PARSED_BY(parse_clock_source)},
 	{0, "cuts", NULL, "mark the start and the end of each cut in the table events",
 	 CLI_FLAG(struct options, cuts)},
 	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct options, json)},
@@ -141,9 +151,19 @@ static void parse(struct options *options, int argc, char **argv)
 	cli_no_operands(argc, argv, "-o");
 	if (!options->output)
 		cli_usage("missing -o NAME.rec (output recording)");
-	if ((options->only == ONLY_FORCE && options->trigger_button) ||
-	    (options->only == ONLY_TRACKER && options->trigger_force_N > 0))
-		cli_usage("--trigger needs a stream that --only leaves out");
+	if (options->only == ONLY_FORCE && options->trigger_button)
+		cli_usage("--trigger button: needs the tracker, which --only force "
+			  "leaves out; leave out one of them");
+	if (options->only == ONLY_TRACKER && options->trigger_force_N > 0)
+		cli_usage("--trigger: a force needs the force channel, which --only "
+			  "tracker leaves out; leave out one of them");
+	if (options->only == ONLY_FORCE && options->cuts)
+		cli_usage("--cuts: needs the tracker, which --only force leaves out; "
+			  "leave out one of them");
+	if (options->start_at.given && options->clock_source &&
+	    !strcmp(options->clock_source, "none"))
+		cli_usage("--start-at: needs the wall time, which --clock-source none "
+			  "leaves out; leave out one of them");
 	output = cli_text("%s", options->output);
 	for (length = strlen(output); length > 1 && output[length - 1] == '/'; length--)
 		output[length - 1] = 0;
@@ -164,6 +184,7 @@ static void parse(struct options *options, int argc, char **argv)
 
 struct result {
 	double seconds;		   /* recorded */
+	int64_t start_ns;	   /* of the first sample, about */
 	struct incise_error early; /* why it ended by itself; code 0: it did not */
 	struct incise_recorder_stats stats;
 };
@@ -180,6 +201,7 @@ struct run {
 	int64_t sync_ns; /* of the last pulse that was noted */
 	int markers;
 	bool timed;	     /* the time of --start-at was compared once */
+	bool clocked;	     /* the source of the wall time was looked at */
 	const char *refused; /* why nothing is to be recorded */
 	int64_t judged_ns;   /* when the poses were last looked at */
 	bool warned;	     /* of flagged poses */
@@ -272,7 +294,8 @@ static void follow_time(struct run *run, int64_t now_ns)
 		run->refused = "--start-at: the clock of this rig has no wall time; see "
 			       "--clock-source";
 	else if (!run->timed && left_ns < 0)
-		run->refused = "--start-at: this time is in the past";
+		run->refused = "--start-at: this time is in the past; give one to come, "
+			       "after the devices are open";
 	run->timed = true;
 	if (run->refused)
 		return;
@@ -281,6 +304,35 @@ static void follow_time(struct run *run, int64_t now_ns)
 	snprintf(run->view.last, sizeof(run->view.last),
 		 left_ns > 0 ? "starts in %.0f s" : "",
 		 ceil((double)left_ns / (double)INCISE_NS_PER_S));
+}
+
+/* Whether a point is not of the source that was named; "ptp-master" is of ptp. */
+static bool is_of_another(const char *named, const struct incise_wall_point *point)
+{
+	size_t length = named ? strcspn(named, ":") : 0;
+
+	return length && strncmp(named, "auto", length) != 0 &&
+	       strncmp(named, "sim", length) != 0 &&
+	       (point->held || strncmp(point->source, named, length) != 0);
+}
+
+/* Warn at the start of a source that was named and gives no time, as it may come later. */
+static void judge_clock(struct run *run)
+{
+	const char *named = run->options->clock_source;
+	struct incise_wall_point point;
+
+	if (run->clocked || incise_recorder_wall(run->recorder, &point))
+		return;
+	run->clocked = true;
+	if (is_of_another(named, &point))
+		cli_warn("--clock-source %s: not synchronised: the error of the wall "
+			 "time is unknown until it is; see %s",
+			 named,
+			 !strncmp(named, "chrony", 6) ? "'chronyc tracking'"
+			 : !strncmp(named, "ptp", 3)
+				 ? "'pmc -u -b 0 \"GET TIME_STATUS_NP\"'"
+				 : "'timedatectl timesync-status'");
 }
 
 /* The recording starts, maybe at its trigger; this sets its end. */
@@ -371,6 +423,7 @@ static void record(struct run *run)
 						       : INCISE_NS_PER_S;
 			}
 		}
+		judge_clock(run);
 		judge_poses(run, now);
 		handle_keys(run);
 		if (keyboard_resumed())
@@ -380,9 +433,11 @@ static void record(struct run *run)
 	}
 	if (rc)
 		run->result.early = err;
-	if (!run->armed)
-		run->result.seconds =
-			(now - run->start_ns + run->held_ns) / (double)INCISE_NS_PER_S;
+	if (run->armed)
+		return;
+	run->result.start_ns = run->start_ns - run->held_ns;
+	run->result.seconds =
+		(double)(now - run->result.start_ns) / (double)INCISE_NS_PER_S;
 }
 
 /*
@@ -449,19 +504,35 @@ static double planned_s(const struct options *options, struct incise_rig *rig)
 
 /* --- report ---------------------------------------------------------------------------- */
 
-static void report(const struct options *options, const struct result *result)
+/* The wall time of a recording that is complete; NULL: none. */
+static struct incise_wall *read_wall(const char *path)
+{
+	struct incise_recording *recording = incise_recording_open(path, NULL);
+	struct incise_wall *wall =
+		recording ? incise_recording_wall(recording, NULL) : NULL;
+
+	incise_recording_close(recording);
+	return wall;
+}
+
+static void report(const struct options *options, const struct result *result,
+		   const struct incise_wall *wall)
 {
 	const struct incise_recorder_stats *stats = &result->stats;
 	const struct incise_stream *streams = stats->streams;
 	const int n = stats->n_streams;
 	uint64_t lost = stats->force_lost + stats->tracker_lost + stats->frames_lost;
 	const char *path = options->output;
+	const int64_t end_ns =
+		result->start_ns + (int64_t)(result->seconds * INCISE_NS_PER_S);
 	char text[1000];
 
 	if (options->json) {
 		json_print(json_pack(
-			"{so so sI sI sI sI sI sI sI sI sI so so so}", "path",
-			json_text(path), "seconds", json_number(result->seconds), "force",
+			"{so so so sI sI sI sI sI sI sI sI sI so so so}", "path",
+			json_text(path), "wall",
+			wall ? wall_json(wall, result->start_ns, end_ns) : json_null(),
+			"seconds", json_number(result->seconds), "force",
 			(json_int_t)stats->force, "tracker", (json_int_t)stats->tracker,
 			"depth", (json_int_t)stats->depth, "frames",
 			(json_int_t)stats->frames, "lost", (json_int_t)lost, "force_lost",
@@ -486,6 +557,8 @@ static void report(const struct options *options, const struct result *result)
 	putchar('\n');
 	if (incise_pose_counts_text(&stats->poses, text, sizeof(text)))
 		puts(text);
+	if (wall)
+		wall_text(wall, result->start_ns, end_ns);
 	stream_table(streams, n);
 	cli_written();
 	cli_finish();
@@ -512,6 +585,20 @@ _Noreturn static void fail_of_losses(const char *path,
 					       (unsigned long long)lost[i].n,
 					       lost[i].what);
 	cli_fail("%s: %s were lost; the table events lists when", path, text);
+}
+
+/* Warn of points that are not of the source that was named. */
+static void judge_wall(const struct options *options, const struct incise_wall *wall)
+{
+	const struct incise_wall_point *points;
+	size_t n = wall ? incise_wall_points(wall, &points) : 0, others = 0;
+
+	for (size_t i = 0; i < n; i++)
+		others += is_of_another(options->clock_source, &points[i]);
+	if (others)
+		cli_warn("%s: the wall time is not by %s in %zu of %zu points, with an "
+			 "unknown or a growing error",
+			 options->output, options->clock_source, others, n);
 }
 
 /* A recording that is not complete is a failure. */
@@ -569,6 +656,7 @@ int main(int argc, char **argv)
 	struct incise_error err = {0};
 	struct options options = {0};
 	struct run run = {.options = &options};
+	struct incise_wall *wall;
 	char *target;
 
 	parse(&options, argc, argv);
@@ -578,6 +666,10 @@ int main(int argc, char **argv)
 		cli_fail_with(&err);
 	setup.calibration_path = options.calibration;
 	run.rig = open_rig(&options);
+	if (options.start_at.given && !options.clock_source &&
+	    !incise_clock_is_real(incise_rig_clock(run.rig)))
+		cli_fail("--start-at: the clock of this rig is simulated and has no wall "
+			 "time; give it one by --clock-source sim");
 	setup.planned_s = planned_s(&options, run.rig);
 	setup.vision = use_vision(&options, run.rig, &vision) ? &vision : NULL;
 	setup.cuts = options.cuts;
@@ -612,7 +704,10 @@ int main(int argc, char **argv)
 	keep_old(&run, target);
 	recording_replace(target, options.output);
 	free(target);
-	report(&options, &run.result);
+	wall = read_wall(options.output);
+	report(&options, &run.result, wall);
+	judge_wall(&options, wall);
+	incise_wall_free(wall);
 	judge(options.output, &run.result);
 	return 0;
 }

@@ -367,11 +367,29 @@ static void show_plan(const char *path, bool json)
 
 /* --- recordings ---------------------------------------------------------------------- */
 
+/* Whether a recording has a stream; in format 1 all have force and tracker. */
+static bool has_stream(const struct incise_recording_info *info, const char *name)
+{
+	for (int i = 0; i < info->n_streams; i++)
+		if (!strcmp(info->streams[i].name, name))
+			return true;
+	return !info->n_streams;
+}
+
+static json_t *adc_json(const struct incise_recording_info *info)
+{
+	return json_pack("{si sf sf sb}", "bits", info->bits, "full_scale_V",
+			 info->full_scale_V, "offset_V", info->offset_V, "newtons",
+			 info->newtons);
+}
+
 static void recording_json(const struct incise_recording_info *info, bool intact,
 			   const struct incise_wall *wall, json_t *members)
 {
+	bool force = has_stream(info, "force"), tracker = has_stream(info, "tracker");
+
 	json_print(json_pack(
-		"{so so sb so ss sb sf so so s{sI sI sI} s{sI sI} sI s{si sf sf sb} s{sf so sf} si sf sf}",
+		"{so so sb so ss sb sf so so s{sI sI sI} s{sI sI} sI so s{so so so} so so so}",
 		"wall",
 		wall ? wall_json(wall, info->start_ns, info->end_ns) : json_null(),
 		"members", members, "intact", intact, "streams",
@@ -382,23 +400,19 @@ static void recording_json(const struct incise_recording_info *info, bool intact
 		(json_int_t)info->force, "tracker", (json_int_t)info->tracker, "depth",
 		(json_int_t)info->depth, "lost", "force", (json_int_t)info->force_lost,
 		"tracker", (json_int_t)info->tracker_lost, "force_clipped",
-		(json_int_t)info->force_clipped, "adc", "bits", info->bits,
-		"full_scale_V", info->full_scale_V, "offset_V", info->offset_V, "newtons",
-		info->newtons, "calibration", "force_mV_N", info->force_mV_N,
-		"force_zero_mV", json_number(info->zero_mV), "depth_mm_px",
-		info->depth_mm_px, "cuts", info->cuts, "depth_max_mm", info->depth_max_mm,
-		"force_max_N", info->force_max_N));
+		(json_int_t)info->force_clipped, "adc",
+		force ? adc_json(info) : json_null(), "calibration", "force_mV_N",
+		force ? json_number(info->force_mV_N) : json_null(), "force_zero_mV",
+		json_number(info->zero_mV), "depth_mm_px", json_number(info->depth_mm_px),
+		"cuts", tracker ? json_integer(info->cuts) : json_null(), "depth_max_mm",
+		tracker ? json_number(info->depth_max_mm) : json_null(), "force_max_N",
+		force && tracker ? json_number(info->force_max_N) : json_null()));
 }
 
-static void recording_text(const char *path, const struct incise_recording_info *info,
-			   const struct incise_wall *wall)
+static void force_text(const struct incise_recording_info *info)
 {
 	char unit = info->newtons ? 'N' : 'V';
 
-	printf("recording %s: %.1f s, started %s, rig %s\n", path,
-	       (info->end_ns - info->start_ns) * 1e-9, info->started, info->rig);
-	if (!info->complete)
-		printf("incomplete: its capture was interrupted; readable up to the last commit\n");
 	printf("force    %llu samples, %llu lost, %llu clipped; %d bits over %g %c",
 	       (unsigned long long)info->force, (unsigned long long)info->force_lost,
 	       (unsigned long long)info->force_clipped, info->bits, info->full_scale_V,
@@ -406,13 +420,35 @@ static void recording_text(const char *path, const struct incise_recording_info 
 	if (info->offset_V != 0)
 		printf(" from %g %c", info->offset_V, unit);
 	putchar('\n');
-	printf("tracker  %llu samples, %llu lost\n", (unsigned long long)info->tracker,
-	       (unsigned long long)info->tracker_lost);
-	printf("depth    %llu rows, largest %.2f mm; largest force %.3f N\n",
-	       (unsigned long long)info->depth, info->depth_max_mm, info->force_max_N);
-	printf("calibration  %g mV/N, zero %.1f mV, %g mm/px\n", info->force_mV_N,
-	       info->zero_mV, info->depth_mm_px);
-	printf("cuts     %d\n", info->cuts);
+}
+
+static void recording_text(const char *path, const struct incise_recording_info *info,
+			   const struct incise_wall *wall)
+{
+	bool tracker = has_stream(info, "tracker");
+
+	printf("recording %s: %.1f s, started %s, rig %s\n", path,
+	       (info->end_ns - info->start_ns) * 1e-9, info->started, info->rig);
+	if (!info->complete)
+		printf("incomplete: its capture was interrupted; readable up to the last commit\n");
+	if (has_stream(info, "force"))
+		force_text(info);
+	if (tracker) {
+		printf("tracker  %llu samples, %llu lost\n",
+		       (unsigned long long)info->tracker,
+		       (unsigned long long)info->tracker_lost);
+		printf("depth    %llu rows, largest %.2f mm",
+		       (unsigned long long)info->depth, info->depth_max_mm);
+		if (has_stream(info, "force"))
+			printf("; largest force %.3f N", info->force_max_N);
+		putchar('\n');
+	}
+	fputs("calibration  ", stdout);
+	if (has_stream(info, "force"))
+		printf("%g mV/N, zero %.1f mV, ", info->force_mV_N, info->zero_mV);
+	printf("%g mm/px\n", info->depth_mm_px);
+	if (tracker)
+		printf("cuts     %d\n", info->cuts);
 	if (wall)
 		wall_text(wall, info->start_ns, info->end_ns);
 	else

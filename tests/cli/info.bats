@@ -182,6 +182,26 @@ setup() {
 	holds "$(key r.json force_max_N) > 0.1 && $(key r.json force_max_N) < 2"
 }
 
+@test "info of a recording of one stream has its depth and cuts, and no line of another" {
+	local rig=sim:clock=simulated,depth_mm=5,times=2,cut_s=1,pause_s=0.6
+	incise capture -o tracker.rec --rig $rig --only tracker >/dev/null
+	incise capture -o force.rec --rig $rig --only force >/dev/null
+	run -0 --separate-stderr incise info tracker.rec
+	[[ "$output" == *"cuts     2"* ]]
+	[[ "$output" != *force* && "$output" != *bits* && "$output" != *nan* && "$output" != *mV* ]]
+	# between the force samples of a.rec, or 8 ms of the tracker apart, it is the same cut
+	depth=$(incise info a.rec --json | jq .depth_max_mm)
+	incise info tracker.rec --json >tracker.json
+	jq -e --argjson depth "$depth" '.cuts == 2 and .depth_max_mm > 5 and
+		(.depth_max_mm - $depth | fabs) < 0.1 and
+		.adc == null and .force_max_N == null and .calibration.force_mV_N == null' tracker.json
+	run -0 --separate-stderr incise info force.rec
+	[[ "$output" == *"12 bits over 5 V"* ]]
+	[ -z "$(grep -E '^(tracker|depth|cuts)' <<<"$output")" ]
+	incise info force.rec --json >force.json
+	jq -e '.cuts == null and .depth_max_mm == null and .adc.bits == 12' force.json
+}
+
 @test "info of an interrupted recording" {
 	incise capture -o b.rec --rig sim: 2>/dev/null 3>&- &
 	pid=$!

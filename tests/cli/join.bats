@@ -252,7 +252,11 @@ without_u() {
 		! grep -aqE '/(tip|tracker|depth)' force.mcap || false
 	done
 	run -2 --separate-stderr incise capture -o x.rec --rig $rig --only force --trigger button
-	[[ "${stderr_lines[0]}" == *"--trigger needs a stream that --only leaves out" ]]
+	[[ "${stderr_lines[0]}" == *"--trigger button: needs the tracker, which --only force leaves out"* ]]
+	run -2 --separate-stderr incise capture -o x.rec --rig $rig --only tracker --trigger 1N
+	[[ "${stderr_lines[0]}" == *"--trigger: a force needs the force channel"* ]]
+	run -2 --separate-stderr incise capture -o x.rec --rig $rig --only force --cuts
+	[[ "${stderr_lines[0]}" == *"--cuts: needs the tracker"* ]]
 	# the stream of each is that of the only machine that has it
 	incise join force.rec tracker.rec -o day.rec --within 0.1ms >/dev/null
 	incise export day.rec --resample --rate 100 -o day.csv

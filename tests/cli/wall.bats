@@ -55,17 +55,47 @@ ask() { # RECORDING SQL
 }
 
 @test "sources that are not there, or not of this clock" {
-	for source in sundial kernel: ptp: ptp:/x,128 ptp:,1 chrony:0 chrony:x sim:1; do
+	for source in sundial kernel: ptp: ptp:/x,128 ptp:,1 chrony:0 chrony:x sim:x; do
+		run -2 --separate-stderr incise capture -o a.rec --rig "$real" --duration 100ms \
+			--clock-source $source
+		bad_usage "clock source '$source': no"
+	done
+	for source in sim: sim:1; do
 		run -1 --separate-stderr incise capture -o a.rec --rig "$real" --duration 100ms \
 			--clock-source $source
-		failed_with "clock source '$source'"
+		failed_with "clock source '$source': is for a simulated clock"
+		[[ "${stderr_lines[0]}" == *"; use a rig sim:clock=simulated, or another source" ]]
 		[ ! -e a.rec.part ]
 	done
 	run -1 --separate-stderr incise capture -o a.rec --rig "$quick" --clock-source ptp
 	failed_with "is simulated and has no wall time"
-	# no daemon behind it: the time is that of the clock, of unknown error
-	incise capture -o a.rec --rig "$real" --duration 100ms --clock-source "ptp:$PWD/none"
-	[ "$(ask a.rec "SELECT DISTINCT source, uncertainty_ns IS NULL FROM wall")" = "plain|1" ]
+	# no program behind it; port 1 of 127.0.0.1 is no one's
+	for source in "ptp:$PWD/none" chrony:1; do
+		run -1 --separate-stderr incise capture -o a.rec --rig "$real" --duration 100ms \
+			--clock-source "$source"
+		failed_with "clock source '$source': "
+		[[ "${stderr_lines[0]}" == *"does not answer"*"; start it, or use auto" ]]
+		[ ! -e a.rec ] && [ ! -e a.rec.part ]
+	done
+}
+
+@test "the report of capture has the wall time, and a source that gives none is warned of" {
+	incise capture -o a.rec --rig "$quick" --duration 2s --clock-source sim:1800000000,0,3 >text
+	grep -q '^wall time  2027-01-15T07:59:2.*uncertainty (bound) 0.003 ms' text
+	grep -q 'by simulated, time of TAI' text
+	incise capture -o b.rec --rig "$quick" --duration 2s --clock-source sim: --json >b.json
+	jq -e '.wall.sources == ["simulated"] and .wall.end.uncertainty_ns == 1000' b.json
+	incise capture -o c.rec --rig "$quick" --duration 2s --json >c.json
+	jq -e '.wall == null' c.json
+	# the kernel of a test machine is synchronised or not, and the warnings say so
+	incise capture -o k.rec --rig "$real" --duration 200ms --clock-source kernel --json >k.json 2>err
+	if jq -e '.wall.sources == ["kernel"]' k.json; then
+		[ ! -s err ]
+	else
+		jq -e '.wall | .sources == ["plain"] and .start.uncertainty_ns == null' k.json
+		grep -q 'warning: --clock-source kernel: not synchronised' err
+		grep -q 'warning: k.rec: the wall time is not by kernel in' err
+	fi
 }
 
 @test "capture --start-at starts then, within a poll" {
@@ -92,10 +122,13 @@ ask() { # RECORDING SQL
 	bad_usage "exclude each other"
 	run -1 --separate-stderr incise capture -o a.rec --rig "$quick" --clock-source sim \
 		--start-at 2020-01-01T00:00:00Z
-	failed_with "this time is in the past"
+	failed_with "this time is in the past; give one to come"
 	run -1 --separate-stderr incise capture -o a.rec --rig "$quick" \
 		--start-at 2027-01-15T08:00:10Z
-	failed_with "has no wall time"
+	failed_with "has no wall time; give it one by --clock-source sim"
+	run -2 --separate-stderr incise capture -o a.rec --rig "$real" --clock-source none \
+		--start-at 2037-01-15T08:00:10Z
+	bad_usage "--start-at: needs the wall time, which --clock-source none leaves out"
 	# waiting ends by SIGINT, and leaves nothing
 	run -1 --separate-stderr timeout --preserve-status -s INT 1 incise capture -o a.rec \
 		--rig "$real" --start-at 2037-01-01T00:00:00Z

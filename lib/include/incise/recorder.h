@@ -72,6 +72,14 @@ struct incise_recorder_stats {
 struct incise_recorder;
 
 /**
+ * Check the text of a source of wall time, without asking the source.
+ *
+ * @return 0; -EINVAL (*err says what there is), -ENOMEM. Thread-safe.
+ */
+INCISE_API int incise_recorder_check_clock_source(const char *source,
+						  struct incise_error *err);
+
+/**
  * Start a recording of a rig's tracker and force channel, and of its camera if that is open.
  *
  * @param path  folder NAME.rec; must not exist
@@ -81,7 +89,8 @@ struct incise_recorder;
  * @return recorder, to be ended with incise_recorder_close(); NULL with errno EEXIST, EINVAL
  *         (a path without a name; vision's thresholds; the source of wall time), ENODEV (the rig has neither a tracker nor
  *         force channel), EOPNOTSUPP (its tracker reads more than one sensor), ENOSPC (too
- *         little space for planned_s), errno of mkdir(2), EIO, ENOMEM; ENOENT, ENOEXEC (a
+ *         little space for planned_s), ENODATA (the program of a source of wall time that was
+ *         named does not answer for 2 s), errno of mkdir(2), EIO, ENOMEM; ENOENT, ENOEXEC (a
  *         module for frames is not installed, or broken).
  */
 INCISE_API struct incise_recorder *incise_recorder_new(

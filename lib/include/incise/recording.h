@@ -60,12 +60,13 @@ struct incise_recording;
 /** The contents of a recording. */
 struct incise_recording_info {
 	bool complete; /**< closed by its recorder; else readable up to the last commit */
-	int64_t start_ns, end_ns; /**< first and last force sample, CLOCK_MONOTONIC */
-	char started[32];	  /**< wall clock at start_ns, ISO 8601 UTC, in seconds */
-	char rig[256];		  /**< rig as given */
+	/** first and last force sample, else of the tracker, CLOCK_MONOTONIC */
+	int64_t start_ns, end_ns;
+	char started[32]; /**< wall clock at start_ns, ISO 8601 UTC, in seconds */
+	char rig[256];	  /**< rig as given */
 	uint64_t force, tracker, depth; /**< rows */
 	uint64_t force_lost, tracker_lost, force_clipped;
-	int bits;
+	int bits;		       /**< 0: without a force channel */
 	double full_scale_V, offset_V; /**< range of 2^bits codes; voltage of code 0 */
 	double force_mV_N, zero_mV, depth_mm_px; /**< calibration in use */
 	double surface_normal[3], surface_point_mm[3];

@@ -296,6 +296,18 @@ static int find_started(struct incise_recording *rec, struct incise_recording_in
 	return rc;
 }
 
+/* Count the cuts by the rows of the depth alone, and find the largest depth in them. */
+static int follow_depth(struct incise_cuts *cuts, double *depth_max_mm,
+			struct incise_error *err)
+{
+	int rc;
+
+	while ((rc = step_depth(cuts, err)) > 0)
+		if (incise_cut_step(&cuts->cut, cuts->after.depth_mm))
+			*depth_max_mm = fmax(*depth_max_mm, cuts->after.depth_mm);
+	return rc;
+}
+
 int incise_recording_info(struct incise_recording *rec,
 			  struct incise_recording_info *info, struct incise_error *err)
 {
@@ -320,6 +332,9 @@ int incise_recording_info(struct incise_recording *rec,
 		info->force_max_N =
 			fmax(info->force_max_N, sample.force_N); /* NaN: no zero */
 	}
+	/* Without force samples, by the rows of the depth themselves. */
+	if (!rc && !info->force)
+		rc = follow_depth(&cuts, &info->depth_max_mm, err);
 	info->cuts = cuts.cut.count;
 	info->start_ns = cuts.first_ns;
 	info->end_ns = cuts.last_ns;

@@ -139,6 +139,7 @@ void incise_wall_chrony_read(struct incise_wall_peer *peer,
 	}
 	if (!answered)
 		return;
+	statement->answered = true;
 	reading->good = tracking.synchronised;
 	statement->offset_ns = -tracking.correction_s * 1e9;
 	/* The limit that NTP defines, and how far a slew went since. */
@@ -316,6 +317,8 @@ void incise_wall_ptp_read(struct incise_wall_peer *peer,
 	follow_clocks(peer, clocks);
 	if (!ask_all(peer, &state))
 		return;
+	statement->answered = true;
+	statement->of_card = state.hardware;
 	/* A timescale that is not PTP's counts UTC: its number of leap seconds is not used. */
 	if (state.ptp_timescale) {
 		reading->utc_offset_s = state.utc_offset_s;

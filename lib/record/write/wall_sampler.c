@@ -9,6 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/clock.h>
+#include <incise/recorder.h>
+#include "../../base/monotonic.h"
 #include "../../device/thread.h"
 #include "wall_sampler.h"
 #include "wall_sources.h"
@@ -19,6 +21,8 @@
 /* 2027-01-15 08:00 */
 #define SIMULATED_S 1.8e9
 #define CHRONY_PORT 323
+/* Of a program that was named, to answer once. */
+#define ANSWER_NS (2 * INCISE_NS_PER_S)
 
 enum { PTP, CHRONY, KERNEL, KINDS };
 
@@ -157,7 +161,7 @@ static bool read_simulated(struct incise_wall_sampler *sampler, const char *text
 
 	if (strncmp(text, "sim", 3) != 0 || (text[3] && text[3] != ':'))
 		return false;
-	text += 3;
+	text += strcmp(text, "sim:") ? 3 : 4;
 	while (*text && i < 3) {
 		char *end;
 
@@ -233,12 +237,52 @@ static int read_source(struct incise_wall_sampler *sampler, const char *source,
 		err, EINVAL, "clock source '%s': %s", source,
 		sampler->real == simulated
 			? sampler->real
-				  ? "is for a simulated rig, and this rig's clock is real"
+				  ? "is for a simulated clock, and this rig's clock is real; "
+				    "use a rig sim:clock=simulated, or another source"
 				  : "the clock of this rig is simulated and has no wall "
 				    "time; use none or sim:TAI_S,PPM,BOUND_US"
 		: sampler->real ? "no such source; use auto, ptp[:SOCKET[,DOMAIN]], "
-				  "chrony[:PORT], kernel or none"
+				  "chrony[:PORT], kernel, none, or for a simulated clock "
+				  "sim:TAI_S,PPM,BOUND_US"
 				: "not sim:TAI_S,PPM,BOUND_US, with numbers");
+}
+
+/*
+ * A program that was named is asked before anything is recorded, as its silence would be noticed
+ * only when the recordings are joined. It may have been started just now.
+ */
+static int ask_named(struct incise_wall_sampler *sampler, const char *source,
+		     struct incise_error *err)
+{
+	const int64_t until_ns = incise_monotonic_ns() + ANSWER_NS;
+	struct incise_wall_statement statement = {0};
+	struct incise_wall_clocks clocks = {0};
+	bool ptp = sampler->use[PTP];
+
+	for (;;) {
+		incise_wall_read_clocks(&clocks);
+		if (ptp)
+			incise_wall_ptp_read(&sampler->ptp, &clocks, &statement);
+		else
+			incise_wall_chrony_read(&sampler->chrony, &clocks, &statement);
+		if (statement.answered || incise_monotonic_ns() > until_ns)
+			break;
+		nanosleep(&(struct timespec){.tv_nsec = 100000000}, NULL);
+	}
+	if (!statement.answered)
+		return incise_error_set(
+			err, ENODATA, "clock source '%s': %s; start it, or use auto",
+			source,
+			ptp ? "ptp4l does not answer at its socket, or it is for root only"
+			    : "chronyd does not answer");
+	if (statement.of_card)
+		return incise_error_set(
+			err, ENODATA,
+			"clock source '%s': ptp4l has the time of a network card, which "
+			"is not read; give it to chronyd by 'refclock PHC' and use "
+			"chrony, or run phc2sys and use kernel",
+			source);
+	return 0;
 }
 
 static int start_thread(struct incise_wall_sampler *sampler)
@@ -260,16 +304,12 @@ static int start_thread(struct incise_wall_sampler *sampler)
 	return rc;
 }
 
-int incise_wall_sampler_new(struct incise_wall_sampler **sampler, const char *source,
-			    bool real, struct incise_error *err)
+static struct incise_wall_sampler *make(bool real)
 {
 	struct incise_wall_sampler *made = calloc(1, sizeof(*made));
-	bool wanted = false;
-	int rc;
 
-	*sampler = NULL;
 	if (!made)
-		return incise_error_set(err, ENOMEM, "clock source: out of memory");
+		return NULL;
 	made->real = real;
 	incise_wall_peer_init(&made->ptp);
 	incise_wall_peer_init(&made->chrony);
@@ -277,8 +317,39 @@ int incise_wall_sampler_new(struct incise_wall_sampler **sampler, const char *so
 	read_real(made, "auto");
 	made->tai_s = SIMULATED_S;
 	made->bound_us = 1;
+	return made;
+}
+
+int incise_recorder_check_clock_source(const char *source, struct incise_error *err)
+{
+	/* Of the clock that the source is for. */
+	struct incise_wall_sampler *made = make(strncmp(source, "sim", 3) != 0);
+	bool wanted;
+	int rc;
+
+	if (!made)
+		return incise_error_set(err, ENOMEM, "clock source: out of memory");
 	rc = read_source(made, source, &wanted, err);
+	free(made);
+	return rc;
+}
+
+int incise_wall_sampler_new(struct incise_wall_sampler **sampler, const char *source,
+			    bool real, struct incise_error *err)
+{
+	struct incise_wall_sampler *made = make(real);
+	bool wanted = false;
+	int rc;
+
+	*sampler = NULL;
+	if (!made)
+		return incise_error_set(err, ENOMEM, "clock source: out of memory");
+	rc = read_source(made, source, &wanted, err);
+	if (!rc && real && made->use[PTP] + made->use[CHRONY] == 1)
+		rc = ask_named(made, source, err);
 	if (rc || !wanted) {
+		incise_wall_peer_close(&made->ptp);
+		incise_wall_peer_close(&made->chrony);
 		free(made);
 		return rc;
 	}

@@ -17,8 +17,9 @@ struct incise_wall_sampler;
 
 /*
  * @source as of incise_recorder_setup; @real: of a real clock. A simulated one has wall time only
- * where the source states it: *sampler is NULL otherwise. Returns 0; -EINVAL (no such source, or
- * not of this clock), -ENOMEM, errno of pthread_create(3).
+ * where the source states it: *sampler is NULL otherwise. Asks a program that the source names,
+ * for some seconds. Returns 0; -EINVAL (no such source, or not of this clock), -ENODATA (its
+ * program does not answer), -ENOMEM, errno of pthread_create(3).
  */
 int incise_wall_sampler_new(struct incise_wall_sampler **sampler, const char *source,
 			    bool real, struct incise_error *err);

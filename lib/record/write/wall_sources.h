@@ -22,6 +22,8 @@ void incise_wall_read_clocks(struct incise_wall_clocks *clocks);
  */
 struct incise_wall_statement {
 	struct incise_wall_reading reading;
+	bool answered;	    /* its program, by a time or without */
+	bool of_card;	    /* the time is that of a network card, and not used */
 	int64_t tai_raw_ns; /* 0: it states the offset */
 	double offset_ns;   /* CLOCK_REALTIME less UTC */
 };
