@@ -263,6 +263,15 @@ without_u() {
 	incise export both.rec --resample --rate 100 -o both.csv
 	cmp <(without_u day.csv) <(without_u both.csv)
 	[ "$(wc -l <day.csv)" -eq 801 ]
+	# and the loop runs on it: the same force to the bit on the clock of the tracker
+	incise train both.rec -o m.fis >/dev/null 2>&1
+	sed 's|"[^"]*\.fis"|"m.fis"|' "$BATS_TEST_DIRNAME/../../scenes/liver.scene" >liver.scene
+	incise join tracker.rec force.rec -o tracked.rec >/dev/null
+	incise replay both.rec liver.scene | tail -n +2 >alone
+	incise replay tracked.rec:force=force,tracker=tracker liver.scene | tail -n +2 >joined
+	diff alone joined
+	run -1 --separate-stderr incise replay force.rec liver.scene
+	[[ "$stderr" == "incise replay: force.rec: no pose to replay: it has no row of a tracker; join it "* ]]
 	incise export day.rec -a 6x5 -o pairs.csv
 	incise export both.rec -a 6x5 -o both_pairs.csv
 	cmp pairs.csv both_pairs.csv

@@ -63,6 +63,17 @@ static int step_force(struct incise_replay_source *source, struct incise_error *
 	return 1;
 }
 
+/* A time of the machine on the clock of a joined recording, however forged it is. */
+static int64_t on_clock(const struct incise_replay_stream *s, int64_t t_ns)
+{
+	const int64_t most_ns = INT64_MAX / 4;
+
+	if (!s->rows.times.map)
+		return t_ns;
+	t_ns = t_ns < 0 ? 0 : t_ns > most_ns ? most_ns : t_ns;
+	return incise_session_time(s->rows.times.map, t_ns);
+}
+
 /* A pose's time is that at which the loop receives it. */
 static int step_pose(struct incise_replay_source *source, struct incise_error *err)
 {
@@ -74,7 +85,7 @@ static int step_pose(struct incise_replay_source *source, struct incise_error *e
 		return rc;
 	if (source->at == INCISE_REPLAY_ACQUISITION)
 		return 1;
-	s->t_ns = sqlite3_column_int64(s->rows.stmt, ARRIVAL);
+	s->t_ns = on_clock(s, sqlite3_column_int64(s->rows.stmt, ARRIVAL));
 	/* The clock does not run back; a pose from far ahead would delay all behind it. */
 	if (s->t_ns < before_ns)
 		return damaged(s, "arrival_ns decreases", err);
@@ -161,7 +172,8 @@ static int find_last(struct incise_replay_source *source, const char *table,
 		     const struct incise_replay_stream *s, const char *column,
 		     struct incise_error *err)
 {
-	struct incise_recording *recording = source->recording;
+	struct incise_recording *recording =
+		incise_recording_member(source->recording, table);
 	bool best = strcmp(column, "arrival_ns") != 0;
 	sqlite3_stmt *stmt;
 	char sql[100];
@@ -176,6 +188,7 @@ static int find_last(struct incise_replay_source *source, const char *table,
 		if (best)
 			t_ns = incise_recording_time(&s->rows.times.line,
 						     sqlite3_column_int64(stmt, 0), t_ns);
+		t_ns = on_clock(s, t_ns);
 		if (t_ns > source->last_ns)
 			source->last_ns = t_ns;
 	}
@@ -227,13 +240,12 @@ int incise_replay_source_open(struct incise_replay_source *source,
 		.at = at,
 		.deep = {{.t_ns = INCISE_TIME_NONE}, {.t_ns = INCISE_TIME_NONE}},
 	};
-	/* What a loop saw is of one machine. */
-	if (recording->session)
+	if (!recording->meta.tracker)
 		return incise_error_set(
-			err, EINVAL,
-			"%s: a joined recording cannot be replayed; replay one of "
-			"its members, for example %s",
-			recording->path, recording->session->members[0]->path);
+			err, ENODATA,
+			"%s: no pose to replay: it has no row of a tracker; join it with "
+			"a recording of the tracker (incise join)",
+			recording->path);
 	incise_recording_force(recording, calibration, &source->scale);
 	rc = read_info(source, err);
 	if (!rc)
