@@ -200,6 +200,7 @@ struct run {
 	int sync;	 /* events of the stepper module; -1: none */
 	int64_t sync_ns; /* of the last pulse that was noted */
 	int markers;
+	int64_t due_ns;	     /* of --start-at, by the rig's clock; 0: not known */
 	bool timed;	     /* the time of --start-at was compared once */
 	bool clocked;	     /* the source of the wall time was looked at */
 	const char *refused; /* why nothing is to be recorded */
@@ -279,7 +280,7 @@ static void follow_sync(struct run *run)
 	}
 }
 
-/* The time of --start-at triggers, within a poll. */
+/* The time of --start-at triggers, before the poll that starts to write. */
 static void follow_time(struct run *run, int64_t now_ns)
 {
 	const struct start_time *start_at = &run->options->start_at;
@@ -299,6 +300,7 @@ static void follow_time(struct run *run, int64_t now_ns)
 	run->timed = true;
 	if (run->refused)
 		return;
+	run->due_ns = now_ns + left_ns;
 	if (left_ns <= 0)
 		incise_recorder_trigger(run->recorder);
 	snprintf(run->view.last, sizeof(run->view.last),
@@ -407,13 +409,15 @@ static void record(struct run *run)
 		next = now > next + POLL_NS ? now : next + POLL_NS;
 		if (next > run->end_ns)
 			next = run->end_ns;
+		if (run->armed && run->due_ns > now && next > run->due_ns)
+			next = run->due_ns;
 		incise_clock_wait_until(clock, next);
 		now = incise_clock_now(clock);
+		follow_time(run, now);
 		rc = incise_recorder_poll(run->recorder, &err);
 		if (rc < 0)
 			give_up(run, &err);
 		follow_sync(run);
-		follow_time(run, now);
 		if (run->armed) {
 			incise_recorder_stats(run->recorder, &stats);
 			if (!stats.armed) {
