@@ -218,6 +218,29 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	[ "$bound" -lt 200000 ]
 }
 
+@test "far from the other recording the bound is that of the clocks, not of a slew" {
+	# a is 7000 s before the first one, whose clock is 50 ppm fast
+	incise capture -o late.rec --rig sim:clock=simulated,seed=9 --duration 1s \
+		--clock-source sim:8000,50,30 >/dev/null
+	incise join late.rec a.rec -o day.rec >/dev/null
+	incise info day.rec --json >info.json
+	# 30 us of one, 20 us of the other, and once more 50 us of the map
+	[ "$(key info.json wall.start.uncertainty_ns)" -lt 110000 ]
+}
+
+@test "join says which clock was not synchronised" {
+	cp -r b.rec loose.rec
+	sqlite3 loose.rec/recording.db "UPDATE wall SET uncertainty_ns = NULL"
+	for pair in "a loose" "loose a"; do
+		# shellcheck disable=SC2086
+		set -- $pair
+		run --separate-stderr incise join $1.rec $2.rec -o day.rec --damaged
+		[ "$status" -eq 1 ]
+		[[ "$stderr" == *"incise join: loose.rec: its clock was not synchronised"* ]] ||
+			{ echo "$stderr"; false; }
+	done
+}
+
 # Columns of a CSV by name, without those of uncertainties, which a joined recording has larger.
 without_u() {
 	awk -F, 'NR == 1 { for (i = 2; i <= NF; i++) if ($i !~ /_u_/) keep[++n] = i }

@@ -379,6 +379,21 @@ static int comparable(struct join *join, const struct member *member)
 	return 0;
 }
 
+/* Say which of the two clocks has no bound at a time of the member: the member's, else the first. */
+static int unsynchronised(struct join *join, const struct member *member, int64_t t_ns)
+{
+	int64_t tai_ns, bound_ns = INCISE_WALL_UNKNOWN;
+
+	incise_wall_tai(member->wall, t_ns, &tai_ns, &bound_ns);
+	if (bound_ns != INCISE_WALL_UNKNOWN)
+		member = &join->members[0];
+	return incise_error_set(
+		join->err, ENODATA,
+		"%s: its clock was not synchronised, so its error is unknown; synchronise "
+		"the machine (PTP, chrony), or align by a signal (--align tap)",
+		member->recording->path);
+}
+
 static int map_by_wall(struct join *join, struct member *member)
 {
 	struct member *first = &join->members[0];
@@ -405,12 +420,7 @@ static int map_by_wall(struct join *join, struct member *member)
 				"by a signal (--align tap)",
 				member->recording->path, (double)times[i] * 1e-9);
 		else if (isinf(bound_ns))
-			rc = incise_error_set(
-				join->err, ENODATA,
-				"%s or %s: its clock was not synchronised, so its error is "
-				"unknown; synchronise the machines (PTP, chrony), or align "
-				"by a signal (--align tap)",
-				first->recording->path, member->recording->path);
+			rc = unsynchronised(join, member, times[i]);
 		else
 			rc = add_knot(join, member, times[i], to_ns, bound_ns);
 	}

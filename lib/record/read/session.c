@@ -736,20 +736,29 @@ int incise_session_open(struct incise_recording *rec, const char *folder,
 	return 0;
 }
 
-/* The point where the session's clock goes over to TAI's rate; false: it is not known there. */
-static bool far_point(const struct incise_wall *wall, const struct incise_wall_point *end,
-		      int64_t t_ns, struct incise_wall_point *far)
+/*
+ * The points where the session's clock goes over to TAI's rate: two, 1 ns apart, with the rates of
+ * both sides, because a change of rate between two points counts as a slew of unknown time. False:
+ * it is not known there.
+ */
+static bool far_points(const struct incise_wall *wall,
+		       const struct incise_wall_point *end, int64_t t_ns,
+		       struct incise_wall_point *near, struct incise_wall_point *far)
 {
 	int64_t bound_ns;
 
-	*far = *end;
-	far->t_ns = t_ns;
-	far->rate_ppb = far->rate_uncertainty_ppb = 0;
-	*far->restart = 0;
-	if (incise_wall_tai(wall, t_ns, &far->tai_ns, &bound_ns))
+	*near = *end;
+	near->t_ns = t_ns;
+	near->rate_uncertainty_ppb = 0;
+	*near->restart = 0;
+	if (incise_wall_tai(wall, t_ns, &near->tai_ns, &bound_ns))
 		return false;
-	far->uncertainty_ns =
+	near->uncertainty_ns =
 		bound_ns == INCISE_WALL_UNKNOWN ? INFINITY : (double)bound_ns;
+	*far = *near;
+	far->rate_ppb = 0;
+	far->t_ns += t_ns < end->t_ns ? -1 : 1;
+	far->tai_ns += t_ns < end->t_ns ? -1 : 1;
 	return true;
 }
 
@@ -762,26 +771,28 @@ static struct incise_wall *extend(const struct incise_wall *wall, int64_t first_
 {
 	const struct incise_wall_point *points;
 	size_t n = incise_wall_points(wall, &points), at = 0;
-	struct incise_wall_point *all = calloc(n + 4, sizeof(*all));
+	struct incise_wall_point *all = calloc(n + 6, sizeof(*all));
 	struct incise_wall *extended;
 	int64_t from_ns = points[0].t_ns - INCISE_SESSION_FAR_NS;
 	int64_t to_ns = points[n - 1].t_ns + INCISE_SESSION_FAR_NS;
 
 	if (!all)
 		return NULL;
-	if (first_ns < from_ns && far_point(wall, &points[0], from_ns, &all[1])) {
+	if (first_ns < from_ns - 1 &&
+	    far_points(wall, &points[0], from_ns, &all[2], &all[1])) {
 		all[0] = all[1];
 		all[0].t_ns = first_ns;
-		all[0].tai_ns -= from_ns - first_ns;
-		at = 2;
+		all[0].tai_ns -= all[1].t_ns - first_ns;
+		at = 3;
 	}
 	memcpy(all + at, points, n * sizeof(*all));
 	at += n;
-	if (last_ns > to_ns && far_point(wall, &points[n - 1], to_ns, &all[at])) {
-		all[at + 1] = all[at];
-		all[at + 1].t_ns = last_ns;
-		all[at + 1].tai_ns += last_ns - to_ns;
-		at += 2;
+	if (last_ns > to_ns + 1 &&
+	    far_points(wall, &points[n - 1], to_ns, &all[at], &all[at + 1])) {
+		all[at + 2] = all[at + 1];
+		all[at + 2].t_ns = last_ns;
+		all[at + 2].tai_ns += last_ns - all[at + 1].t_ns;
+		at += 3;
 	}
 	for (size_t i = 0; i < at; i++)
 		all[i].uncertainty_ns += wider_ns;
