@@ -71,7 +71,7 @@ void incise_ledger_row_tracker(struct incise_ledger_row *row, int64_t t_ns,
 	row->n = 0;
 	put_integer(row, sample->seq);
 	put_integer(row, t_ns);
-	put_integer(row, sample->t_ns);
+	put_integer(row, sample->t_ns + sample->after_ns);
 	for (int i = 0; i < 3; i++)
 		put_real(row, sample->position_mm[i]);
 	for (int i = 0; i < 4; i++)

@@ -48,6 +48,7 @@ class SampleStruct(ctypes.Structure):
         ("station", ctypes.c_uint8),
         ("button", c_bool),
         ("restarted", c_bool),
+        ("after_ns", ctypes.c_uint32),
     ]
     c_name = "struct incise_tracker_sample"
 

@@ -203,6 +203,9 @@ no_more_poses() {
 		    assert b[6] == b[7] == 0, b
 	END
 	incise verify a.rec
+	# the arrival is kept next to the sender's time: on no machine are all delays the least
+	[ "$(ask "SELECT min(arrival_ns >= t_ns) AND max(arrival_ns > t_ns) FROM tracker")" = 1 ]
+	[ "$(ask "SELECT stamped = 1 AND rate_hz > 1 FROM streams WHERE name = 'tracker'")" = 1 ]
 	no_more_poses
 	# without a name, it must be clear whose poses are meant
 	poses --name Stylus --name Probe --seconds 60

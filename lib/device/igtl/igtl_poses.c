@@ -210,6 +210,8 @@ static void take(struct igtl_poses *poses, const double (*matrix)[4], bool seen,
 	}
 	if (!seen)
 		sample.status = UNSEEN;
+	if (sample.t_ns < t_ns)
+		sample.after_ns = (uint32_t)(t_ns - sample.t_ns);
 	if (!poses->n++)
 		poses->first_ns = sample.t_ns;
 	poses->last_ns = sample.t_ns;

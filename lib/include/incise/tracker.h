@@ -24,6 +24,8 @@ struct incise_tracker_sample {
 	uint8_t station; /**< number of the sensor, from 1; 1 on the simulated rig */
 	bool button;	 /**< button of the stylus is pressed; false without one */
 	bool restarted; /**< first record after an interruption: periods have a new phase */
+	/** If t_ns is a timestamp of a sender: arrival at the host less t_ns, ns; else 0 */
+	uint32_t after_ns;
 };
 
 /** Trigger of a measurement. */

@@ -151,6 +151,7 @@ struct incise_recorder {
 	} seen[INCISE_RECORDER_GROWING]; /* after the last commit */
 	int64_t commit_ns;		 /* all that was read until then is committed */
 	int64_t polled_ns;		 /* last poll */
+	int64_t started_ns;		 /* its streams, by the rig's clock */
 	int64_t takes_ns;		 /* a commit, lately at most */
 	int commits;
 	bool ended;	     /* reads no more samples */

@@ -85,6 +85,7 @@ void incise_recorder_start_streams(struct incise_recorder *rec)
 	const struct incise_calibration *calibration = &rec->calibration;
 	double force_sd_ms = calibration->force_delay_sd_ms;
 
+	rec->started_ns = incise_clock_now(incise_rig_clock(rec->rig));
 	/* A calibrated delay has the deviation that was measured with it. */
 	if (isnan(force_sd_ms) && rec->force_info.t_sd_ns > 0)
 		force_sd_ms = (double)rec->force_info.t_sd_ns * 1e-6;
@@ -101,6 +102,8 @@ void incise_recorder_start_streams(struct incise_recorder *rec)
 			rec, INCISE_LEDGER_TRACKER, "tracker", rec->tracker_info.name,
 			calibration->tracker_delay_sd_ms,
 			&(struct incise_timeline_setup){
+				/* A sender's timestamps, on this clock by the least delay. */
+				.timestamped = rec->tracker_info.network,
 				/* Pulses from outside have no period: no line is drawn. */
 				.rate_hz = rec->tracker_info.external_sync
 						   ? 0
@@ -152,6 +155,11 @@ static void describe(const struct incise_recorder *rec, int i, struct incise_str
 		.offset_ms = report.offset_ns * 1e-6,
 		.offset_sd_ms = report.offset_sd_ns * 1e-6,
 	};
+	/* Without a period there is no line, but a mean rate. */
+	if (!(out->nominal_hz > 0) && stream->rows > 1 &&
+	    stream->ledger.last_ns > stream->first_ns)
+		out->rate_hz = (double)(stream->rows - 1 + stream->gaps) /
+			       (double)(stream->ledger.last_ns - stream->first_ns) * 1e9;
 	/* Only the delay of a timestamp is uncertain, and it is not known. */
 	if (out->timestamped && isnan(out->delay_sd_ms))
 		out->offset_sd_ms = NAN;
@@ -389,7 +397,7 @@ static int write_tracker(struct incise_recorder *rec, const struct tracker_row *
 	tip_of(rec, sample, tip_mm);
 	sqlite3_bind_int64(stmt, 1, sample->seq);
 	sqlite3_bind_int64(stmt, 2, row->t_ns);
-	sqlite3_bind_int64(stmt, 3, sample->t_ns);
+	sqlite3_bind_int64(stmt, 3, sample->t_ns + sample->after_ns);
 	for (int i = 0; i < 3; i++)
 		sqlite3_bind_double(stmt, 4 + i, sample->position_mm[i]);
 	for (int i = 0; i < 4; i++)
@@ -662,6 +670,14 @@ static int check_pace(struct incise_recorder *rec, int64_t t_ns, struct incise_e
 
 /* --- samples of the devices ---------------------------------------------------------- */
 
+/* It waited in a queue while other devices were opened, which may take seconds. */
+#define OLD_NS 100000000LL
+
+static bool is_old(const struct incise_recorder *rec, int stream, int64_t t_ns)
+{
+	return !rec->streams[stream].started && t_ns < rec->started_ns - OLD_NS;
+}
+
 int incise_recorder_put_force(struct incise_recorder *rec,
 			      const struct incise_force_sample *sample,
 			      struct incise_error *err)
@@ -672,6 +688,8 @@ int incise_recorder_put_force(struct incise_recorder *rec,
 	struct incise_error why = {0};
 	int rc = 0;
 
+	if (is_old(rec, INCISE_LEDGER_FORCE, sample->t_ns))
+		return 0;
 	if (sample->code < 0 || sample->code > top)
 		rc = incise_error_set(&why, EIO,
 				      "%s: code %d is not within 0 to %lld; the driver "
@@ -718,6 +736,8 @@ int incise_recorder_put_tracker(struct incise_recorder *rec,
 	double tip_mm[3];
 	int rc = 0;
 
+	if (is_old(rec, INCISE_LEDGER_TRACKER, sample->t_ns))
+		return 0;
 	/* One line through both parts would be wrong for either. */
 	if (sample->restarted)
 		incise_timeline_replug(&stream->timeline);

@@ -424,12 +424,43 @@ static void never_triggered_is_empty_and_whole(void **state)
 
 #define TEST(name) cmocka_unit_test_setup_teardown(name, enter_with_modules, leave_folder)
 
+/* While a device was opened, the other one's samples waited: they are of the time before. */
+static void samples_from_before_are_left_out(void **state)
+{
+	struct incise_rig *rig = open_rig(SIM);
+	struct incise_clock *clock = incise_rig_clock(rig);
+	struct incise_recorder *rec;
+	struct incise_error err = {0};
+	static const char *const tables[] = {"force", "tracker"};
+
+	incise_clock_wait_until(clock, incise_clock_now(clock) + 700 * MS);
+	rec = start_recorder("a.rec", rig);
+	assert_int_equal(poll_for(rec, rig, 500 * MS, &err), 0);
+	assert_int_equal(incise_recorder_close(rec, &err), 0);
+	for (int i = 0; i < 2; i++) {
+		char sql[120];
+		double before_ms;
+
+		snprintf(sql, sizeof(sql),
+			 "SELECT (SELECT t_ns FROM events WHERE kind = 'start') - "
+			 "min(t_ns) FROM %s",
+			 tables[i]);
+		before_ms = ask(DB, sql) / MS;
+		/* A tenth of a second, the delay of a pose, and a period. */
+		if (!(before_ms <= 120))
+			fail_msg("%s: %.1f ms before", tables[i], before_ms);
+	}
+	assert_int_equal(ask(DB, "SELECT sum(lost) FROM streams"), 0);
+	incise_rig_close(rig);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		IN_FOLDER(times_without_timestamps_are_near_the_truth),
 		IN_FOLDER(table_says_what_is_known),
 		IN_FOLDER(last_second_is_there),
+		IN_FOLDER(samples_from_before_are_left_out),
 		TEST(frames_are_rows),
 		TEST(camera_that_dies),
 		TEST(silent_camera),
