@@ -22,7 +22,7 @@ struct job {
 static const char *const aligns[] = {"clocks", "tap", "sync", NULL};
 
 static const struct cli_option options[] = {
-	{'o', "output", "NAME.rec", "session to write: a folder",
+	{'o', "output", "NAME.rec", "joined recording to write: a folder",
 	 CLI_OUTPUT(struct job, output), .extensions = ".rec"},
 	{0, "within", "TIME",
 	 "refuse times that are uncertain by more, for example 1ms (default:\n"
@@ -39,7 +39,7 @@ static const struct cli_option options[] = {
 
 static const struct cli_command command = {
 	.name = "join",
-	.synopsis = "A.rec B.rec… -o SESSION.rec [OPTIONS]",
+	.synopsis = "A.rec B.rec… -o JOINED.rec [OPTIONS]",
 	.summary =
 		"Put recordings of several machines on one timeline, the clock of the "
 		"first one, by their wall\n"
@@ -53,6 +53,16 @@ static void print_note(void *context, const char *text)
 {
 	(void)context;
 	cli_warn("%s", text);
+}
+
+/* Of what is written with --overwrite, name the file as the user did. */
+static void fail(const struct incise_error *err, const char *target, const char *given)
+{
+	size_t n = strlen(target);
+
+	if (!strncmp(err->text, target, n))
+		cli_fail("%s%s", given, err->text + n);
+	cli_fail_with(err);
 }
 
 int main(int argc, char **argv)
@@ -69,7 +79,7 @@ int main(int argc, char **argv)
 		cli_usage("missing %s (recordings to join)",
 			  optind == argc ? "A.rec and B.rec" : "B.rec");
 	if (!job.output)
-		cli_usage("missing -o SESSION.rec");
+		cli_usage("missing -o JOINED.rec");
 	for (int i = optind; i < argc; i++) {
 		argv[i] = (char *)file_operand(argv[i], FILE_RECORDING);
 		recording_intact(argv[i], job.damaged, &err);
@@ -79,7 +89,7 @@ int main(int argc, char **argv)
 	target = recording_target(job.output);
 	if (incise_session_join((const char *const *)argv + optind, argc - optind,
 				&job.how, target, &err))
-		cli_fail_with(&err);
+		fail(&err, target, job.output);
 	recording_replace(target, job.output);
 	/* Each stream of the first member that has it: what is reported is the same for all. */
 	path = cli_text("%s:*", job.output);

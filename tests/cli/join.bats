@@ -121,6 +121,14 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	run --separate-stderr incise join a.rec a.rec -o day.rec
 	failed_with "a.rec and a.rec: the same recording; give it once"
 	[ ! -e day.rec ] && [ ! -e day.rec.part ]
+	run --separate-stderr incise join a.rec b.rec -o missing/day.rec
+	failed_with "missing/day.rec: cannot be made: No such file or directory; make its folder, or give another name"
+	run --separate-stderr incise join a.rec b.rec -o missing/day.rec --overwrite
+	failed_with "missing/day.rec: cannot be made: No such file or directory; make its folder, or give another name"
+	run -1 --separate-stderr incise export a.rec b.rec -o x.mcap
+	[[ "$stderr" == "incise export: x.mcap: MCAP holds one recording, and 2 are given; export each "* ]]
+	run -1 --separate-stderr incise export a.rec --rate 10 -o x.mcap
+	[[ "$stderr" == "incise export: x.mcap: MCAP has every row as it was recorded; give -o FILE.csv or "* ]]
 	incise join a.rec b.rec -o day.rec >/dev/null
 	run --separate-stderr incise join day.rec none.rec -o two.rec
 	failed_with "day.rec: is a joined recording; give those in it, for example day.rec/a"
@@ -158,6 +166,11 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	kill -INT $pid
 	wait $pid || :
 	[[ "$stderr" == *"now.rec.part: is being recorded; wait for its end" ]]
+	# one of them was removed
+	cp -r day.rec lost.rec
+	rm -r lost.rec/b
+	run -1 --separate-stderr incise info lost.rec
+	[[ "$stderr" == *"lost.rec: member b is missing in its folder; join again" ]]
 	# what lies in it is checked for what was joined
 	sqlite3 day.rec/b/recording.db "UPDATE ledger SET crc = crc + 1"
 	run -1 --separate-stderr incise export day.rec:a

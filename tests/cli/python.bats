@@ -77,5 +77,5 @@ python_tests() {
 	cmp liver.fis b.fis
 	[[ "$output" == "rms error on unseen cuts "*"15 mm, 20 mm/s: "* ]]
 	run -1 --separate-stderr /usr/bin/python3 "$root/examples/learn.py" none.rec b.fis
-	[ "$stderr" = "learn.py: none.rec: no such recording" ]
+	[ "$stderr" = "learn.py: none.rec: no such recording; check name and folder" ]
 }

@@ -622,15 +622,22 @@ static bool ends_with(const char *path, const char *end)
 }
 
 static int write_mcap(struct incise_recording *const *recordings, int n,
-		      const struct incise_export_options *options, FILE *out,
-		      const struct incise_provenance *provenance,
+		      const struct incise_export_options *options, const char *path,
+		      FILE *out, const struct incise_provenance *provenance,
 		      struct incise_export_report *report, struct incise_error *err)
 {
-	if (n > 1 || options->rate_hz > 0 || options->depth_bins || options->resample)
+	if (n > 1)
 		return incise_error_set(
 			err, EINVAL,
-			"MCAP exports one whole recording, without rate and averages; "
-			"give -o FILE.csv or FILE.h5 for these");
+			"%s: MCAP holds one recording, and %d are given; export each to a "
+			"file of its own, or give -o FILE.csv or FILE.h5",
+			path, n);
+	if (options->rate_hz > 0 || options->depth_bins || options->resample)
+		return incise_error_set(
+			err, EINVAL,
+			"%s: MCAP has every row as it was recorded; give -o FILE.csv or "
+			"FILE.h5 for a rate, averages or resampled rows",
+			path);
 	return incise_export_mcap(recordings[0], options, out, provenance, report, err);
 }
 
@@ -661,7 +668,7 @@ int incise_export(struct incise_recording *const *recordings, int n,
 		return -errno;
 	rc = incise_provenance_of(&provenance, recordings, n, options, NULL, err);
 	if (!rc && ends_with(path, ".mcap"))
-		rc = write_mcap(recordings, n, options, incise_outfile_stream(file),
+		rc = write_mcap(recordings, n, options, path, incise_outfile_stream(file),
 				&provenance, report, err);
 	else if (!rc)
 		rc = incise_export_table(recordings, n, options, format,

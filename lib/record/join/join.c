@@ -804,9 +804,11 @@ static int write_session(struct join *join, const char *output)
 		return no_memory(join, output);
 	if (mkdir(part, 0777))
 		rc = incise_error_set(
-			join->err, errno, "%s: cannot be made: %s%s", part,
-			strerror(errno),
-			errno == EEXIST ? "; a join was interrupted: remove it" : "");
+			join->err, errno, "%s: cannot be made: %s; %s",
+			errno == EEXIST ? part : output, strerror(errno),
+			errno == EEXIST	  ? "a join was interrupted: remove it"
+			: errno == ENOENT ? "make its folder, or give another name"
+					  : "give another name");
 	made = !rc;
 	for (int i = 0; i < join->n && !rc; i++)
 		rc = bring_member(join, &join->members[i], part);

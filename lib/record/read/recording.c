@@ -300,7 +300,9 @@ static char *find_folder(const char *path, struct incise_error *err)
 	if (stat(folder, &st) && errno == ENOENT) {
 		folder[length] = '.';
 		if (stat(folder, &st) && errno == ENOENT) {
-			incise_error_set(err, ENOENT, "%s: no such recording", path);
+			incise_error_set(err, ENOENT,
+					 "%s: no such recording; check name and folder",
+					 path);
 			free(folder);
 			return NULL;
 		}

@@ -256,7 +256,11 @@ static int open_member(struct incise_session *session, const char *folder,
 	if (asprintf(&path, "%s/%s", folder, name) < 0)
 		return incise_error_set(err, ENOMEM, "%s: out of memory", folder);
 	session->members[at] = incise_recording_open(path, err);
-	if (!session->members[at])
+	if (!session->members[at] && errno == ENOENT)
+		rc = incise_error_set(
+			err, ENOENT, "%s: member %s is missing in its folder; join again",
+			folder, name);
+	else if (!session->members[at])
 		rc = -errno;
 	if (!rc && session->members[at]->session)
 		rc = damaged(folder, "a member is a joined recording itself", err);
