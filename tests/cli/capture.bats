@@ -285,7 +285,9 @@ until_it_runs() {
 
 @test "capture into a folder that is not there" {
 	run --separate-stderr incise capture -o no/such/a.rec --rig $quick --duration 1s
-	failed_with "no/such"
+	failed_with "no/such/: No such file or directory; make this folder first"
+	run --separate-stderr incise capture -o no/such/a.rec --overwrite --rig $quick --duration 1s
+	failed_with "no/such/: No such file or directory; make this folder first"
 }
 
 @test "capture into a folder that cannot be written" {

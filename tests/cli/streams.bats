@@ -246,7 +246,13 @@ no_more_poses() {
 	rig "igtl:127.0.0.1:1" "sim:"
 	run -1 --separate-stderr incise capture -o a.rec
 	[[ "$stderr" == *"tracker: 127.0.0.1 port 1: Connection refused; start its OpenIGTLink server, and check host and port" ]]
-	for arguments in "" ":1" "h:0" "h:65536" "h:x" "h:1:" "h::Stylus" "h:1:123456789012345678901" "[::1"; do
+	for arguments in h:0 h:65536 h:x h:99999:Stylus; do
+		rig "igtl:$arguments" "sim:"
+		run -1 --separate-stderr incise capture -o a.rec
+		[[ "$stderr" == *"tracker: \"$arguments\": the port is not a number from 1 to 65535; correct it" ]] ||
+			complain "$arguments: $stderr"
+	done
+	for arguments in "" ":1" "h:1:" "h::Stylus" "h:1:123456789012345678901" "[::1"; do
 		rig "igtl:$arguments" "sim:"
 		run -1 --separate-stderr incise capture -o a.rec
 		[[ "$stderr" == *"tracker: "*": expected igtl:HOST:PORT:DEVICE with a name of at most 20 letters"* ]] ||

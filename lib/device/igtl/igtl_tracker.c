@@ -279,8 +279,14 @@ static int parse(struct igtl_tracker *t, const char *arguments, const char **dev
 	long number = bad || !port_n ? INCISE_IGTL_PORT : strtol(port + 1, NULL, 10);
 
 	*device = port_n && port[1 + port_n] ? port + 2 + port_n : "";
-	bad |= port_n && strspn(port + 1, "0123456789") != port_n;
-	bad |= number < 1 || number > 65535 || strlen(*device) > INCISE_IGTL_NAME ||
+	if (port_n &&
+	    (strspn(port + 1, "0123456789") != port_n || number < 1 || number > 65535))
+		return incise_error_set(
+			err, EINVAL,
+			"%s: \"%.80s\": the port is not a number from 1 to "
+			"65535; correct it",
+			where, arguments);
+	bad |= strlen(*device) > INCISE_IGTL_NAME ||
 	       (port_n && port[1 + port_n] && !**device);
 	if (bad)
 		return incise_error_set(

@@ -12,7 +12,8 @@
 
 #define LIBRARY_VARIABLE "PYLSL_LIB" /* of pylsl, and of those who know it */
 #define CONFIG_VARIABLE "LSLAPICFG"
-#define QUIET "[log]\nlevel = -2\n"
+/* Its fatal errors only: that a stream broke off is reported by the reader, in its own words. */
+#define QUIET "[log]\nlevel = -3\n"
 
 /* Whether liblsl finds a configuration, which is the user's: the places are those it reads. */
 static bool is_configured(void)

@@ -60,8 +60,10 @@ int incise_recorder_split_path(struct incise_recorder *rec, const char *path,
 	parent = slash ? strndup(rec->path, slash - rec->path + 1) : strdup(".");
 	rec->parent = parent ? open(parent, O_PATH | O_DIRECTORY | O_CLOEXEC) : -1;
 	if (rec->parent < 0)
-		incise_error_set(err, errno, "%s: the folder %s: %s", rec->path,
-				 parent ? parent : "", strerror(errno));
+		incise_error_set(err, errno, "%s: %s; %s", parent ? parent : rec->path,
+				 strerror(errno),
+				 errno == ENOENT ? "make this folder first"
+						 : "give another folder");
 	free(parent);
 	return rec->parent < 0 ? -errno : 0;
 }
