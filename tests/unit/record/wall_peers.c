@@ -319,9 +319,13 @@ static void lost_master_is_no_master(void **state)
 	check_ptp(&statement.reading, 17, 1e6);
 	/* The time of a hardware clock is not that of CLOCK_REALTIME, however near. */
 	d.manner = HARDWARE;
-	assert_false(ask_at(&peer, 17).reading.good);
+	statement = ask_at(&peer, 17);
+	assert_false(statement.reading.good);
+	assert_true(statement.answered && statement.of_card);
 	d.manner = GOOD;
-	assert_true(ask_at(&peer, 17).reading.good);
+	statement = ask_at(&peer, 17);
+	assert_true(statement.reading.good);
+	assert_true(statement.answered && !statement.of_card);
 	d.ingress_ns += UTC_S * S;
 	assert_false(ask_at(&peer, 18).reading.good);
 	stop(&d, &peer);
@@ -421,6 +425,7 @@ static void tracking_of_chronyd(void **state)
 	d.manner = LOST;
 	incise_wall_chrony_read(&peer, &clocks, &statement);
 	assert_false(statement.reading.good);
+	assert_true(statement.answered); /* without a time, which is no silence */
 	stop(&d, &peer);
 }
 
