@@ -65,7 +65,8 @@ struct incise_session_options {
  *               the session
  * @param output a new folder; while it is written, it is output.part
  * @return 0; -EINVAL (a session, the same recording twice, a recording of format 1), -ENODATA (no
- *         wall time, or an unknown uncertainty, and no signal that aligns), -ERANGE (an uncertainty
+ *         wall time, or an unknown uncertainty, and no signal that aligns), -EDOM (a signal that
+ *         matches at several offsets, or may match by chance), -ERANGE (an uncertainty
  *         above within_s, clocks and signal that disagree, a clock that went back), -EEXIST, -EBUSY (it is being
  *         recorded), -EIO,
  *         -ENOSPC, -ENOMEM, errno of incise_recording_open().
