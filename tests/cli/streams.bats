@@ -116,10 +116,10 @@ ask() {
 	[[ "$stderr" == *"force: no LSL stream \"$name\" found within 5 s; start the program that sends it"* ]]
 	[ "${#stderr_lines[@]}" = 1 ]
 	send lsl_send "$name" --unit N --seconds 8
-	[[ "$(incise info devices)" == *'force       = "lsl:'"$name"'";'* ]]
+	[[ "$(incise info devices)" == *'force '*' = "lsl:'"$name"'";'*'Mx (Nm), Fz (N), t (no unit)'* ]]
 	for channel in Mx:"channel 0 of the stream has the unit \"Nm\"; expected N, mN, kN, V or mV" \
 		t:"channel 2 of the stream has no unit" \
-		9:"name its channel, as in lsl:NAME:CHANNEL; the stream has Mx (Nm), Fz (N), t (no unit)" \
+		9:"the stream has no channel \"9\"; it has Mx (Nm), Fz (N), t (no unit)" \
 		:"expected lsl:NAME or lsl:NAME:CHANNEL"; do
 		rig "sim:" "lsl:$name:${channel%%:*}"
 		run -1 --separate-stderr incise capture -o a.rec

@@ -289,7 +289,12 @@ static int choose_channel(struct lsl_force *f, lsl_streaminfo info, const char *
 		append_channel(list, sizeof(list), *label ? label : "no label", unit);
 		one = described ? lsl->lsl_next_sibling_n(one, "channel") : NULL;
 	}
-	if (f->channel < 0 || (!asked && fits > 1))
+	if (f->channel < 0 && asked)
+		return incise_error_set(err, EINVAL,
+					"%s: the stream has no channel \"%.40s\"; it has "
+					"%.200s; name one of these",
+					where, asked, list);
+	if (f->channel < 0 || fits > 1)
 		return incise_error_set(
 			err, EINVAL,
 			"%s: name its channel, as in lsl:NAME:CHANNEL; the "
@@ -433,15 +438,57 @@ static void *force_open(const struct incise_backend_request *request,
 
 /* --- search --- */
 
+/*
+ * The channels of a stream, which are in its full description alone, and the first one with a unit
+ * of a force. Returns how many have one.
+ */
+static int list_channels(const struct liblsl *lsl, lsl_streaminfo found, char *list,
+			 size_t size, char *first, size_t first_size)
+{
+	lsl_inlet inlet = lsl->lsl_create_inlet(found, 1, 0, 0);
+	int32_t error = 0;
+	lsl_streaminfo info = inlet ? lsl->lsl_get_fullinfo(inlet, SCAN_S, &error) : NULL;
+	int fits = 0, n = info ? lsl->lsl_get_channel_count(info) : 0;
+	lsl_xml one =
+		info ? lsl->lsl_child(lsl->lsl_child(lsl->lsl_get_desc(info), "channels"),
+				      "channel")
+		     : NULL;
+
+	for (int i = 0; i < n && i < CHANNELS_MAX && one && !lsl->lsl_empty(one); i++) {
+		const char *label = lsl->lsl_child_value_n(one, "label");
+		const char *unit = lsl->lsl_child_value_n(one, "unit");
+		char shown[40];
+
+		if (unit_of(unit) && !fits++)
+			*label ? snprintf(first, first_size, "%s",
+					  plain(shown, sizeof(shown), label))
+			       : snprintf(first, first_size, "%d", i);
+		append_channel(list, size, *label ? label : "no label", unit);
+		one = lsl->lsl_next_sibling_n(one, "channel");
+	}
+	if (info)
+		lsl->lsl_destroy_streaminfo(info);
+	if (inlet)
+		lsl->lsl_destroy_inlet(inlet);
+	return fits;
+}
+
+/* Of several channels of forces the first one is named, as an example that can be opened. */
 static void show(const struct liblsl *lsl, lsl_streaminfo info,
 		 struct incise_scan_device *device)
 {
+	char list[200] = "", first[48] = "";
+	bool numbers = lsl->lsl_get_channel_format(info) != LSL_STRING;
+	int fits = numbers ? list_channels(lsl, info, list, sizeof(list), first,
+					   sizeof(first))
+			   : 0;
 	double rate_hz = lsl->lsl_get_nominal_srate(info);
 	char text[100];
 
 	*device = (struct incise_scan_device){0};
-	snprintf(device->device, sizeof(device->device), "lsl:%.90s",
-		 plain(text, sizeof(text), lsl->lsl_get_name(info)));
+	snprintf(device->device, sizeof(device->device), "lsl:%.60s%s%s",
+		 plain(text, sizeof(text), lsl->lsl_get_name(info)), fits > 1 ? ":" : "",
+		 fits > 1 ? first : "");
 	snprintf(device->what, sizeof(device->what),
 		 "LSL stream of type %.40s, %d channel%s",
 		 plain(text, sizeof(text), lsl->lsl_get_type(info)),
@@ -450,10 +497,11 @@ static void show(const struct liblsl *lsl, lsl_streaminfo info,
 	incise_scan_tell(device, "host", "%.90s",
 			 plain(text, sizeof(text), lsl->lsl_get_hostname(info)));
 	incise_scan_tell(device, "channels", "%d", lsl->lsl_get_channel_count(info));
+	if (*list)
+		incise_scan_tell(device, "channel_list", "%s", list);
 	incise_scan_tell(device, "rate_hz", "%.9g", rate_hz);
 	incise_scan_tell(device, "time_stamps", "sender, corrected by LSL");
-	device->usable = rate_hz >= 1 && rate_hz <= 100000 &&
-			 lsl->lsl_get_channel_format(info) != LSL_STRING;
+	device->usable = rate_hz >= 1 && rate_hz <= 100000 && fits > 0;
 }
 
 /* Without liblsl there are no streams to be found. */
@@ -474,7 +522,9 @@ static int force_scan(const char *arguments, incise_scan_found *found, void *con
 	for (int i = 0; i < n && i < STREAMS_MAX; i++) {
 		if (!rc) {
 			show(&lsl, all[i], &device);
-			rc = found(context, &device);
+			/* Poses and markers are no force channels, but one that is asked for is shown. */
+			if (device.usable || *arguments)
+				rc = found(context, &device);
 		}
 		lsl.lsl_destroy_streaminfo(all[i]);
 	}
