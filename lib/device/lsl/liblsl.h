@@ -66,8 +66,8 @@ struct liblsl {
 /*
  * Open PYLSL_LIB of the environment, else liblsl.so.2, else liblsl.so, and never close it: its
  * threads outlive what they were started for. Unless a configuration of LSL is there, its
- * messages on stderr are turned off: what concerns the user is in the errors of the callers. 0, -ENOENT (there is none), -ENOEXEC (it
- * lacks a function).
+ * messages on stderr are turned off but for fatal errors: what concerns the user is in the errors
+ * of the callers. 0, -ENOENT (there is none), -ENOEXEC (it lacks a function).
  */
 int liblsl_open(struct liblsl *lsl, const char *where, struct incise_error *err);
 
