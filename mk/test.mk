@@ -62,10 +62,10 @@ check-parts:
 	+@status=0; \
 	$(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,check-style cli-needs) || status=$$?; \
 	$(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,$(parts) cli-tests check-vm check-layers \
-		attack-tests check-fuzz check-rtsan check-deb check-module) || status=$$?; \
+		waiting-tests check-fuzz check-rtsan check-deb check-module) || status=$$?; \
 	exit $$status
 timed-%:
-	+@$(if $(filter $*,cli-tests attack-tests check-layers check-vm),NEEDS=cli-needs) tests/timed $(times) $* $(MAKE) -k --no-print-directory $*
+	+@$(if $(filter $*,cli-tests waiting-tests check-layers check-vm),NEEDS=cli-needs) tests/timed $(times) $* $(MAKE) -k --no-print-directory $*
 
 check_deps = mk/deps build check demo; \
 	mk/deps vm || echo "going on without what the test bed needs"; \
@@ -171,17 +171,19 @@ cli-needs: all $(locale) can-drive mcap-reader python-peers stream-peers $(O)/te
 		$(O)/tests/day $(attack_programs)
 
 check-cli: cli-needs ## command-line tests of the real programs
-	+@$(MAKE) --no-print-directory cli-tests attack-tests
+	+@$(MAKE) --no-print-directory cli-tests waiting-tests
 
 # Without building first; `check` starts with these. The tests of bench_all leave their reports to
-# those of each benchmark. Attacks mostly wait.
-cli_files = tests/cli/bench_all.bats $(filter-out %/bench_all.bats,$(sort $(wildcard tests/cli/*.bats)))
+# those of each benchmark. Those that mostly wait, for buses, networks and disks, run beside the others.
+waiting_files = $(addprefix tests/cli/,can.bats capture_streams.bats serve.bats streams.bats wall.bats) tests/attack
+cli_files = tests/cli/bench_all.bats $(filter-out %/bench_all.bats $(waiting_files),\
+	$(sort $(wildcard tests/cli/*.bats)))
 cli-tests:
 	@$(if $(cli_filter),echo "left out: slow tests of benches; make check-cli runs them; bench_all.bats runs each word once")
 	$(Q)$(bats) $(cli_filter) $(cli_files)
 
-attack-tests:
-	$(Q)$(bats) tests/attack
+waiting-tests:
+	$(Q)$(bats) $(cli_filter) $(waiting_files)
 
 # The unit tests once more, on a build that stops at any bad access or undefined operation.
 sanitize_flags := -fsanitize=address,undefined -fno-sanitize-recover=all
@@ -263,7 +265,7 @@ notebooks: all ## run doc/notebooks and write them with their figures to build/n
 
 check-doc: doc
 
-.PHONY: doc notebooks check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests attack-tests check-attack check-sanitize check-unit-sanitized check-python-sanitize check-tsan can-drive mcap-reader python-peers stream-peers
+.PHONY: doc notebooks check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests waiting-tests check-attack check-sanitize check-unit-sanitized check-python-sanitize check-tsan can-drive mcap-reader python-peers stream-peers
 
 # Sums of very many pairs: time and memory, next to numpy.
 $(O)/tests/corpus: tests/bench/corpus.c $(O)/lib/libincise-learn.so

@@ -159,7 +159,7 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	incise capture -o now.rec --rig sim:clock=real --duration 60s >/dev/null 2>&1 3>&- &
 	pid=$!
 	for ((i = 0; i < 600; i++)); do
-		[ "$(incise info now.rec --json 2>/dev/null | grep -c '"kind"')" != 1 ] || break
+		[ ! -e now.rec.part/recording.db ] || ! incise info now.rec >/dev/null 2>&1 || break
 		sleep 0.1
 	done
 	run -1 --separate-stderr incise join a.rec now.rec -o rest2.rec --align tap

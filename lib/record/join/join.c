@@ -171,6 +171,10 @@ static int open_member(struct join *join, const char *path)
 			"%s: made by an older incise (format 1), which had "
 			"no ledger and no wall time; it cannot be joined",
 			recording->path);
+	if (!recording->meta.complete && is_written(recording->path))
+		return incise_error_set(join->err, EBUSY,
+					"%s: is being recorded; wait for its end",
+					recording->path);
 	member->identity = incise_session_identity(recording);
 	if (!member->identity)
 		return incise_error_set(join->err, EINVAL,
@@ -183,10 +187,6 @@ static int open_member(struct join *join, const char *path)
 						"once",
 						join->members[i].recording->path,
 						recording->path);
-	if (!recording->meta.complete && is_written(recording->path))
-		return incise_error_set(join->err, EBUSY,
-					"%s: is being recorded; wait for its end",
-					recording->path);
 	if (!recording->meta.complete)
 		note(join, "%s: was interrupted; it is joined up to its last commit",
 		     recording->path);
