@@ -17,12 +17,12 @@
 #include <incise/scan.h>
 #include "cli/cli.h"
 #include "cli/file_kind.h"
+#include "cli/joined_report.h"
 #include "cli/json.h"
 #include "cli/plan_report.h"
-#include "cli/stream_report.h"
 #include "cli/plot.h"
 #include "cli/recording.h"
-#include "cli/session_report.h"
+#include "cli/stream_report.h"
 #include "cli/wall_report.h"
 #include "plot/figure.h"
 #include "stepper/module.h"
@@ -482,11 +482,11 @@ static void show_recording(const char *path, bool json, bool damaged)
 	intact = recording_intact(path, damaged, &err);
 	if (json)
 		recording_json(&info, intact, wall,
-			       n ? session_json(members, n) : json_null());
+			       n ? joined_json(members, n) : json_null());
 	else
 		recording_text(path, &info, wall);
 	if (!json)
-		session_print(members, n);
+		joined_print(members, n);
 	incise_wall_free(wall);
 	incise_recording_close(recording);
 	if (err.code)

@@ -11,7 +11,7 @@
 #include "cli/file_kind.h"
 #include "cli/json.h"
 #include "cli/recording.h"
-#include "cli/session_report.h"
+#include "cli/joined_report.h"
 
 struct job {
 	const char *output;
@@ -27,7 +27,7 @@ static const struct cli_option options[] = {
 	{0, "within", "TIME",
 	 "refuse times that are uncertain by more, for example 1ms (default:\n"
 	 "state the uncertainty)",
-	 CLI_QUANTITY(struct job, how.within_s, session_times, 1e-9, 3600)},
+	 CLI_QUANTITY(struct job, how.within_s, joined_times, 1e-9, 3600)},
 	{0, "align", "SIGNAL",
 	 "align by clocks (default), tap (knocks in force or motion) or sync\n"
 	 "(events of the SYNC line), and compare with the clocks",
@@ -97,9 +97,9 @@ int main(int argc, char **argv)
 	n = incise_session_members(session, &members);
 	if (job.json)
 		json_print(json_pack("{so so}", "path", json_text(job.output), "members",
-				     session_json(members, n)));
+				     joined_json(members, n)));
 	else
-		session_print(members, n);
+		joined_print(members, n);
 	incise_recording_close(session);
 	free(path);
 	free(target);

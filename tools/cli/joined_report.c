@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The members of a session; see session_report.h.
+ * The members of a joined recording; see joined_report.h.
  */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "json.h"
-#include "session_report.h"
+#include "joined_report.h"
 
-const struct cli_unit session_times[] = {
+const struct cli_unit joined_times[] = {
 	{"s", 1}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}, {0}};
 
 static void print_times(const struct incise_session_info *member)
@@ -33,7 +33,7 @@ static void print_times(const struct incise_session_info *member)
 		       (double)-member->overlap_ns * 1e-9);
 }
 
-void session_print(const struct incise_session_info *members, int n)
+void joined_print(const struct incise_session_info *members, int n)
 {
 	for (int i = 0; i < n; i++) {
 		const struct incise_session_info *member = &members[i];
@@ -63,7 +63,7 @@ static json_t *streams_of(const char *text)
 	return list;
 }
 
-json_t *session_json(const struct incise_session_info *members, int n)
+json_t *joined_json(const struct incise_session_info *members, int n)
 {
 	json_t *list = json_array();
 
