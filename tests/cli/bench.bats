@@ -559,6 +559,7 @@ rate() {
 	holds "$(of integrators 'min(ns_per_step)') > 0"
 }
 
+# bats test_tags=slow
 @test "bench stability as text, with a verdict on every ratio, and its maps" {
 	! command -v gnuplot >/dev/null || plot=(--plot "a folder/w")
 	run -0 --separate-stderr incise bench stability --quick "${plot[@]}"
