@@ -93,7 +93,7 @@ pc_outlet_lsl :=
 objects_outlet_lsl := $(addprefix $(O)/obj/lib/device/lsl/,liblsl.o lsl_outlet.o)
 # One tracker on two kinds of line.
 polhemus_lines := lib/device/polhemus/polhemus_usb.c lib/device/polhemus/polhemus_tty.c
-polhemus_core := $(addprefix $(O)/obj/lib/,base/ring.o device/thread.o) \
+polhemus_core := $(addprefix $(O)/obj/lib/,base/ring.o device/thread.o device/tracker_feed.o) \
 	$(patsubst %.c,$(O)/obj/%.o,$(filter-out $(polhemus_lines),$(wildcard lib/device/polhemus/*.c)))
 has_libusb := $(shell $(PKG_CONFIG) --exists libusb-1.0 && echo yes)
 device_modules += $(if $(has_libusb),tracker_usb) tracker_tty
@@ -108,7 +108,7 @@ objects_tracker_tty := $(polhemus_core) $(O)/obj/lib/device/tty.o \
 device_modules += tracker_igtl
 pc_tracker_igtl :=
 objects_tracker_igtl := $(addprefix $(O)/obj/lib/,base/ring.o $(addprefix device/,\
-	pace.o thread.o igtl/igtl_poses.o igtl/igtl_tracker.o))
+	pace.o thread.o tracker_feed.o igtl/igtl_poses.o igtl/igtl_tracker.o))
 
 # Detection of the scalpel in frames, in C++.
 device_modules += $(if $(has_vision),vision_opencv)

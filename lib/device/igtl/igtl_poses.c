@@ -169,18 +169,6 @@ static bool quaternion_of(const double m[3][4], double q[4])
 	return true;
 }
 
-/* '=' where the same pose comes for too long; every tracker has noise. */
-static char repeats(struct igtl_poses *poses, const double matrix[3][4], int64_t t_ns)
-{
-	double most_ns = poses->setup.repeat_ms * 1e6;
-
-	if (!poses->n || memcmp(poses->pose, matrix, sizeof(poses->pose))) {
-		memcpy(poses->pose, matrix, sizeof(poses->pose));
-		poses->since_ns = t_ns;
-	}
-	return most_ns > 0 && (double)(t_ns - poses->since_ns) > most_ns ? '=' : ' ';
-}
-
 /* @matrix NULL: it is not finite. @seen: the sender does not flag it. */
 static void take(struct igtl_poses *poses, const double (*matrix)[4], bool seen,
 		 int64_t stamp_ns, int64_t t_ns)
@@ -198,7 +186,10 @@ static void take(struct igtl_poses *poses, const double (*matrix)[4], bool seen,
 	if (poses->n && sample.t_ns <= poses->last_ns)
 		sample.t_ns = poses->last_ns + 1;
 	if (matrix && quaternion_of(matrix, sample.quaternion)) {
-		sample.status = repeats(poses, matrix, sample.t_ns);
+		sample.status = tracker_repeats(&poses->repeat, matrix[0], 12,
+						sample.t_ns, poses->setup.repeat_ms)
+					? '='
+					: ' ';
 		v3_rotate(offset, sample.quaternion, poses->setup.offset_mm);
 		for (int i = 0; i < 3; i++)
 			sample.position_mm[i] = matrix[i][3] + offset[i];

@@ -24,6 +24,7 @@
 #include <incise/tracker.h>
 #include "../../base/ring.h"
 #include "../pace.h"
+#include "../tracker_feed.h"
 
 #define IGTL_NAMES 8 /* of devices that are remembered for a message */
 
@@ -48,9 +49,7 @@ struct igtl_poses {
 	/* Timestamps: of the last pose; arrival less timestamp, least of two windows of 5 s. */
 	int64_t stamp_ns, window_ns, least_ns[2];
 	bool is_mapped;
-	/* The last pose as it came, and since when. */
-	double pose[3][4];
-	int64_t since_ns;
+	struct tracker_repeat repeat;
 };
 
 /* @device: whose poses are taken; "" takes any. 0 or -ENOMEM. @setup is copied. */

@@ -23,6 +23,7 @@
 #include "../../base/monotonic.h"
 #include "../backends.h"
 #include "../thread.h"
+#include "../tracker_feed.h"
 #include "igtl_poses.h"
 
 #define MS INT64_C(1000000)
@@ -37,7 +38,7 @@
 #define HOST_MAX 256
 
 struct igtl_tracker {
-	struct incise_tracker tracker;
+	struct tracker_feed feed; /* first */
 	struct igtl_poses poses;
 	char host[HOST_MAX], port[8];
 	char name[64];
@@ -47,8 +48,6 @@ struct igtl_tracker {
 	int fd, stop; /* socket, or -1; eventfd */
 	pthread_t thread;
 	bool runs;
-	_Atomic int gone; /* negative errno, for good: then cause is set */
-	struct incise_error cause;
 	uint8_t bytes[CHUNK];
 };
 
@@ -161,11 +160,10 @@ static bool recover(struct igtl_tracker *t)
 
 static void end(struct igtl_tracker *t, const char *what)
 {
-	incise_error_set(&t->cause, ENODEV,
-			 "%s %s; start its server again, check the network, "
-			 "and start again",
+	tracker_feed_end(&t->feed,
+			 "%s %s; start its server again, check the network, and start "
+			 "again",
 			 t->name, what);
-	atomic_store(&t->gone, -ENODEV);
 }
 
 static void *run(void *argument)
@@ -202,17 +200,6 @@ static void *run(void *argument)
 
 /* --- struct incise_tracker_ops --- */
 
-static INCISE_REALTIME int tracker_read(struct incise_tracker *tracker,
-					struct incise_tracker_sample *samples, int n)
-{
-	struct igtl_tracker *t = of(tracker);
-	/* Read ahead of the ring, which has the samples from before the end. */
-	int gone = atomic_load(&t->gone);
-	int taken = incise_ring_take(&t->poses.ring, samples, n);
-
-	return taken || n <= 0 ? taken : gone;
-}
-
 static void tracker_info(const struct incise_tracker *tracker,
 			 struct incise_tracker_info *info)
 {
@@ -229,12 +216,6 @@ static void tracker_info(const struct incise_tracker *tracker,
 static uint64_t tracker_lost(const struct incise_tracker *tracker)
 {
 	return atomic_load_explicit(&of(tracker)->poses.lost, memory_order_relaxed);
-}
-
-static int tracker_cause(struct incise_tracker *tracker, char *text, size_t size)
-{
-	return snprintf(text, size, "%s",
-			atomic_load(&of(tracker)->gone) ? of(tracker)->cause.text : "");
 }
 
 static void tracker_close(struct incise_tracker *tracker)
@@ -255,11 +236,11 @@ static void tracker_close(struct incise_tracker *tracker)
 }
 
 static const struct incise_tracker_ops ops = {
-	.read = tracker_read,
+	.read = tracker_feed_read,
 	.info = tracker_info,
 	.lost = tracker_lost,
 	.close = tracker_close,
-	.cause = tracker_cause,
+	.cause = tracker_feed_cause,
 };
 
 /* --- opening --- */
@@ -440,12 +421,13 @@ static void *tracker_open(const struct incise_backend_request *request,
 		return NULL;
 	}
 	memset(t, 0, sizeof(*t));
-	t->tracker.ops = &ops;
+	t->feed.tracker.ops = &ops;
+	t->feed.ring = &t->poses.ring;
 	t->fd = t->stop = -1;
 	rc = begin(t, request, err);
 	if (!rc)
-		return &t->tracker;
-	tracker_close(&t->tracker);
+		return &t->feed.tracker;
+	tracker_close(&t->feed.tracker);
 	errno = -rc;
 	return NULL;
 }

@@ -332,22 +332,16 @@ void polhemus_stream_free(struct polhemus_stream *stream)
  */
 static char flag_of(struct polhemus_stream *stream, const struct polhemus_record *record)
 {
-	struct polhemus_repeat *repeat =
-		&stream->repeat[(record->station - 1) % POLHEMUS_STATIONS];
-	double pose[7], most_ns = stream->setup.repeat_ms * 1e6;
+	double pose[7];
+	bool repeats;
 
 	memcpy(pose, record->position_mm, sizeof(record->position_mm));
 	memcpy(pose + 3, record->quaternion, sizeof(record->quaternion));
-	if (!repeat->started || memcmp(pose, repeat->pose, sizeof(pose))) {
-		memcpy(repeat->pose, pose, sizeof(pose));
-		repeat->since_ns = record->t_ns;
-		repeat->started = true;
-	}
+	repeats = tracker_repeats(
+		&stream->repeat[(record->station - 1) % POLHEMUS_STATIONS], pose, 7,
+		record->t_ns, stream->setup.repeat_ms);
 	/* The device's own flag says more, unless it leaves the pose usable. */
-	return most_ns > 0 && (double)(record->t_ns - repeat->since_ns) > most_ns &&
-			       incise_pose_usable(record->status)
-		       ? '='
-		       : record->status;
+	return repeats && incise_pose_usable(record->status) ? '=' : record->status;
 }
 
 static void put_sample(struct polhemus_stream *stream,

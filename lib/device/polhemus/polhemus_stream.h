@@ -12,6 +12,7 @@
 #include <stdatomic.h>
 #include <incise/tracker.h>
 #include "../../base/ring.h"
+#include "../tracker_feed.h"
 #include "polhemus_records.h"
 
 /*
@@ -87,13 +88,6 @@ bool polhemus_gaps_add(struct polhemus_gaps *gaps, const struct polhemus_record 
 
 #define POLHEMUS_RING_S 4 /* capacity for samples at 240 Hz of four stations */
 
-/* A pose as it came, and since when the same one comes. */
-struct polhemus_repeat {
-	double pose[7]; /* position and quaternion */
-	int64_t since_ns;
-	bool started;
-};
-
 /*
  * Behind a long gap, records wait here until it is known how many are missing before them:
  *
@@ -119,7 +113,7 @@ struct polhemus_stream {
 	struct polhemus_gaps gaps;
 	struct polhemus_wait wait;
 	struct incise_ring ring; /* of struct incise_tracker_sample */
-	struct polhemus_repeat repeat[POLHEMUS_STATIONS];
+	struct tracker_repeat repeat[POLHEMUS_STATIONS];
 	uint64_t overflowed; /* samples lost because the ring was full */
 	bool restarted;	     /* the next sample is marked so */
 	_Atomic uint64_t lost;

@@ -9,6 +9,7 @@
 #include <time.h>
 #include "../../base/monotonic.h"
 #include "../thread.h"
+#include "../tracker_feed.h"
 #include "polhemus_setup.h"
 #include "polhemus_stream.h"
 #include "polhemus_tracker.h"
@@ -18,15 +19,13 @@
 #define NOISE_MAX (2 * POLHEMUS_RECORD_MAX) /* bytes that would contain a record */
 
 struct polhemus_tracker {
-	struct incise_tracker tracker;
+	struct tracker_feed feed; /* first */
 	struct polhemus_line *line;
 	struct polhemus_times times;
 	struct polhemus_identity identity;
 	struct polhemus_stream stream;
 	pthread_t thread;
 	_Atomic bool stop;
-	_Atomic int gone; /* negative errno, for good: then cause is set */
-	struct incise_error cause;
 };
 
 static struct polhemus_tracker *of_tracker(const struct incise_tracker *tracker)
@@ -127,24 +126,12 @@ static void *run(void *argument)
 		before_ms = now_ms();
 		noise = 0;
 	}
-	incise_error_set(
-		&t->cause, ENODEV,
+	tracker_feed_end(
+		&t->feed,
 		"%s disconnected and was not back and set up after %.0f s; plug it in, "
 		"switch it on and start again",
 		t->identity.name, t->times.gone_ms / 1e3);
-	atomic_store(&t->gone, -ENODEV);
 	return NULL;
-}
-
-static INCISE_REALTIME int tracker_read(struct incise_tracker *tracker,
-					struct incise_tracker_sample *samples, int n)
-{
-	struct polhemus_tracker *t = of_tracker(tracker);
-	/* Read ahead of the ring, which has the samples from before the end. */
-	int gone = atomic_load(&t->gone);
-	int taken = incise_ring_take(&t->stream.ring, samples, n);
-
-	return taken || n <= 0 ? taken : gone;
 }
 
 static void tracker_info(const struct incise_tracker *tracker,
@@ -173,13 +160,6 @@ static uint64_t tracker_lost(const struct incise_tracker *tracker)
 	return polhemus_stream_lost(&of_tracker(tracker)->stream);
 }
 
-static int tracker_cause(struct incise_tracker *tracker, char *text, size_t size)
-{
-	const struct polhemus_tracker *t = of_tracker(tracker);
-
-	return snprintf(text, size, "%s", atomic_load(&t->gone) ? t->cause.text : "");
-}
-
 static void tracker_close(struct incise_tracker *tracker)
 {
 	struct polhemus_tracker *t = of_tracker(tracker);
@@ -194,11 +174,11 @@ static void tracker_close(struct incise_tracker *tracker)
 }
 
 static const struct incise_tracker_ops ops = {
-	.read = tracker_read,
+	.read = tracker_feed_read,
 	.info = tracker_info,
 	.lost = tracker_lost,
 	.close = tracker_close,
-	.cause = tracker_cause,
+	.cause = tracker_feed_cause,
 };
 
 static int check(const struct incise_tracker_setup *setup, const char *where,
@@ -278,13 +258,13 @@ struct incise_tracker *polhemus_tracker_open(struct polhemus_line *line,
 		return NULL;
 	}
 	*t = (struct polhemus_tracker){
-		.tracker.ops = &ops,
+		.feed = {.tracker.ops = &ops, .ring = &t->stream.ring},
 		.line = line,
 		.times = *times,
 	};
 	rc = begin(t, setup, where, err);
 	if (!rc)
-		return &t->tracker;
+		return &t->feed.tracker;
 	line->ops->close(line);
 	free(t);
 	errno = -rc;
