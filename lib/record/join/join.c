@@ -20,6 +20,7 @@
 #include <incise/version.h>
 #include <incise/wall.h>
 #include "../frames.h"
+#include "../ledger.h"
 #include "../read/session.h"
 #include "../schema.h"
 #include "align.h"
@@ -115,14 +116,13 @@ static void read_text(const struct member *member, const char *key, char *text,
 /* First and last time of a member's rows. */
 static int read_span(struct join *join, struct member *member)
 {
-	static const char *const tables[] = {"force", "tracker", "frames"};
-
 	member->first_ns = INT64_MAX;
 	member->last_ns = -1;
-	for (int i = 0; i < 3; i++) {
+	for (int i = 0; i < INCISE_LEDGER_STREAMS; i++) {
 		int64_t first, last;
 
-		if (!incise_session_span(member->recording, tables[i], &first, &last))
+		if (!incise_session_span(member->recording, incise_ledger_forms[i].table,
+					 &first, &last))
 			continue;
 		member->first_ns = first < member->first_ns ? first : member->first_ns;
 		member->last_ns = last > member->last_ns ? last : member->last_ns;

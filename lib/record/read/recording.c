@@ -15,6 +15,7 @@
 #include <unistd.h>
 #include "recording.h"
 #include "session.h"
+#include "../ledger.h"
 #include "../schema.h"
 
 #define COUNT_MAX (1LL << 53)
@@ -721,19 +722,18 @@ static int member_streams(struct incise_recording *rec,
 			  struct incise_stream streams[INCISE_STREAMS_MAX],
 			  struct incise_error *err)
 {
-	static const char *const tables[] = {"force", "tracker", "frames"};
-	static const char *const names[] = {"force", "tracker", "camera"};
 	int n = 0;
 
 	for (int i = 0; i < INCISE_STREAMS_MAX; i++) {
 		struct incise_stream of_member[INCISE_STREAMS_MAX];
 		int found = incise_recording_streams(
-			incise_recording_member(rec, tables[i]), of_member, err);
+			incise_recording_member(rec, incise_ledger_forms[i].table),
+			of_member, err);
 
 		if (found < 0)
 			return found;
 		for (int k = 0; k < found; k++)
-			if (!strcmp(of_member[k].name, names[i]))
+			if (!strcmp(of_member[k].name, incise_ledger_forms[i].stream))
 				streams[n++] = of_member[k];
 	}
 	return n;

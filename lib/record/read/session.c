@@ -8,15 +8,14 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../../base/crc32c.h"
+#include "../ledger.h"
 #include "../schema.h"
 #include "rows.h"
 #include "session.h"
 
 #define TIME_MAX (INT64_MAX / 4) /* of rows.c */
 #define BOUND_MAX 1e18
-
-static const char *const stream_names[INCISE_STREAMS_MAX] = {"force", "tracker",
-							     "camera"};
+#define SLEWS 0.25
 
 const char *const incise_session_tables[] = {
 	"CREATE TABLE session(key TEXT PRIMARY KEY NOT NULL, value)",
@@ -318,13 +317,19 @@ static int read_members(struct incise_session *session, sqlite3 *db, const char 
 
 static bool good_knot(const struct incise_session_knot *knot, size_t n)
 {
-	/* A quartz is within 1e-3 of another one; a line twice as steep is none of a clock. */
+	double apart_ns, span_ns = 0, bound_ns = 0;
+
+	/* Two clocks that are slewed are within 20 % of each other, and a knot within its bound. */
+	if (n) {
+		span_ns = (double)knot->t_ns - (double)knot[-1].t_ns;
+		bound_ns = knot[-1].bound_ns + knot->bound_ns + 1;
+	}
+	apart_ns = n ? (double)knot->to_ns - (double)knot[-1].to_ns - span_ns : 0;
 	return knot->t_ns >= 0 && knot->t_ns <= TIME_MAX && knot->to_ns >= -TIME_MAX &&
 	       knot->to_ns <= TIME_MAX && knot->bound_ns >= 0 &&
 	       knot->bound_ns <= BOUND_MAX &&
 	       (!n || (knot->t_ns > knot[-1].t_ns && knot->to_ns > knot[-1].to_ns &&
-		       (double)(knot->to_ns - knot[-1].to_ns) <
-			       1e6 * (double)(knot->t_ns - knot[-1].t_ns)));
+		       fabs(apart_ns) <= SLEWS * span_ns + bound_ns));
 }
 
 static int read_map(struct incise_session *session, int member, sqlite3 *db,
@@ -373,8 +378,6 @@ static int read_map(struct incise_session *session, int member, sqlite3 *db,
 
 /* --- what they have ------------------------------------------------------------------ */
 
-static const char *const tables[INCISE_STREAMS_MAX] = {"force", "tracker", "frames"};
-
 bool incise_session_span(struct incise_recording *member, const char *table,
 			 int64_t *first_ns, int64_t *last_ns)
 {
@@ -408,13 +411,14 @@ static void describe(struct incise_session *session, int at)
 	for (int i = 0; i < INCISE_STREAMS_MAX; i++) {
 		int64_t first, last;
 
-		if (!incise_session_span(member, tables[i], &first, &last))
+		if (!incise_session_span(member, incise_ledger_forms[i].table, &first,
+					 &last))
 			continue;
 		first_ns = first < first_ns ? first : first_ns;
 		last_ns = last > last_ns ? last : last_ns;
 		if (*info->streams)
 			strcat(info->streams, ", ");
-		strcat(info->streams, stream_names[i]);
+		strcat(info->streams, incise_ledger_forms[i].stream);
 	}
 	info->complete = member->meta.complete;
 	info->first_ns = info->last_ns = -1;
@@ -448,7 +452,7 @@ static void describe(struct incise_session *session, int at)
 
 static bool has(const struct incise_session_info *info, int stream)
 {
-	return strstr(info->streams, stream_names[stream]) != NULL;
+	return strstr(info->streams, incise_ledger_forms[stream].stream) != NULL;
 }
 
 /* --- the choice ---------------------------------------------------------------------- */
@@ -466,8 +470,8 @@ static int find_member(const struct incise_session *session, const char *name,
 static int find_stream(const char *name, size_t length)
 {
 	for (int i = 0; i < INCISE_STREAMS_MAX; i++)
-		if (strlen(stream_names[i]) == length &&
-		    !strncmp(stream_names[i], name, length))
+		if (strlen(incise_ledger_forms[i].stream) == length &&
+		    !strncmp(incise_ledger_forms[i].stream, name, length))
 			return i;
 	return -1;
 }
@@ -510,7 +514,7 @@ static int take_part(struct incise_session *session, const char *part, size_t le
 	if (member >= 0 && equals && !has(&session->info[member], stream))
 		return incise_error_set(err, EINVAL,
 					"%s: member %.*s has no %s; it has: %s", folder,
-					(int)n, name, stream_names[stream],
+					(int)n, name, incise_ledger_forms[stream].stream,
 					session->info[member].streams);
 	if (member < 0) {
 		names = list(session, -1, ", ");
@@ -530,9 +534,8 @@ static int take_part(struct incise_session *session, const char *part, size_t le
 static int choose(struct incise_session *session, const char *folder, const char *choice,
 		  struct incise_error *err)
 {
-	int rc = 0;
-
 	bool any = false;
+	int rc = 0;
 
 	for (int i = 0; i < INCISE_STREAMS_MAX; i++)
 		session->of[i] = -1;
@@ -560,9 +563,9 @@ static int choose(struct incise_session *session, const char *folder, const char
 				err, EINVAL,
 				"%s: %s was recorded by %s; choose one: %s:%s for all "
 				"that it has, or %s:%s=%s",
-				folder, stream_names[i], names ? names : "", folder,
-				session->info[first].name, folder, stream_names[i],
-				session->info[first].name);
+				folder, incise_ledger_forms[i].stream, names ? names : "",
+				folder, session->info[first].name, folder,
+				incise_ledger_forms[i].stream, session->info[first].name);
 			free(names);
 		} else if (session->of[i] < 0) {
 			session->of[i] = first;
@@ -577,12 +580,15 @@ struct incise_recording *incise_recording_member(const struct incise_recording *
 						 const char *table)
 {
 	const struct incise_session *session = recording->session;
-	int stream = !strcmp(table, "force") ? 0 : !strcmp(table, "frames") ? 2 : 1;
 
 	if (!session || !strcmp(table, "events"))
 		return (struct incise_recording *)recording;
-	/* The session's clock is that of its first member. */
-	return session->members[strcmp(table, "wall") ? session->of[stream] : 0];
+	for (int i = 0; i < INCISE_STREAMS_MAX; i++)
+		if (!strcmp(table, incise_ledger_forms[i].table))
+			return session->members[session->of[i]];
+	/* Depth is the tracker's; the session's clock is that of its first member. */
+	return session
+		->members[strcmp(table, "wall") ? session->of[INCISE_LEDGER_TRACKER] : 0];
 }
 
 /* Whether a stream is read from a member. */
