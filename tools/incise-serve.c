@@ -204,7 +204,7 @@ static void tick_sinks(struct run *run, int64_t now)
 
 static void serve(struct run *run, const struct job *job)
 {
-	int64_t start = serve_now(), now = start, next = start, tick = start;
+	int64_t start = cli_now_ns(), now = start, next = start, tick = start;
 	int64_t end = job->duration_s > 0 ? start + (int64_t)(job->duration_s * 1e9)
 					  : INT64_MAX;
 	bool ended = false;
@@ -219,10 +219,10 @@ static void serve(struct run *run, const struct job *job)
 			tick = now + TICK_NS;
 		}
 		wait_until(run, next < tick ? next : tick);
-		now = serve_now();
+		now = cli_now_ns();
 	}
 	run->seconds = (now - start) / 1e9;
-	for (end = now + LINGER_NS; now < end && !cli_stop; now = serve_now()) {
+	for (end = now + LINGER_NS; now < end && !cli_stop; now = cli_now_ns()) {
 		bool empty = true;
 
 		for (int i = 0; i < run->sinks; i++)

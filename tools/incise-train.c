@@ -359,7 +359,7 @@ static void save_uncertainty(const struct interval *interval, const char *model)
 /* The reading of all sources, once or twice, with the time left on a terminal. */
 struct reading {
 	const char *what;
-	struct timespec start;
+	int64_t start_ns;
 	uint64_t done, total; /* rows; total 0: not known */
 	int at, n;	      /* sources */
 };
@@ -367,13 +367,10 @@ struct reading {
 static void on_rows(void *user, uint64_t rows)
 {
 	struct reading *reading = user;
-	struct timespec now;
 	double past, left;
 
 	reading->done += rows;
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	past = (double)(now.tv_sec - reading->start.tv_sec) +
-	       1e-9 * (double)(now.tv_nsec - reading->start.tv_nsec);
+	past = 1e-9 * (double)(cli_now_ns() - reading->start_ns);
 	left = reading->total ? past * (double)(reading->total - reading->done) /
 					(double)reading->done
 			      : past * (reading->n - reading->at) / (reading->at + 0.5);
@@ -385,7 +382,7 @@ static void begin_reading(struct reading *reading, const char *what, int n,
 			  uint64_t total)
 {
 	*reading = (struct reading){.what = what, .n = n, .total = total};
-	clock_gettime(CLOCK_MONOTONIC, &reading->start);
+	reading->start_ns = cli_now_ns();
 }
 
 /* The columns, or those of the premises if these are given. */

@@ -168,7 +168,7 @@ static void report(const struct view_job *job)
 
 static void print_rate(const struct view_job *job)
 {
-	double s = (double)(view_wall() - job->made_ns) / INCISE_NS_PER_S;
+	double s = (double)(cli_now_ns() - job->made_ns) / INCISE_NS_PER_S;
 	struct incise_view_report report;
 
 	incise_view_report(job->view, &report);

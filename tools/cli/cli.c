@@ -16,6 +16,7 @@
 #include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <syslog.h>
+#include <time.h>
 #include <unistd.h>
 #include <incise/infile.h>
 #include <incise/rig.h>
@@ -777,6 +778,14 @@ static void put_progress_end(FILE *out)
 		fputs("\r\033[J", out);
 	status_line = false;
 	status_above = 0;
+}
+
+int64_t cli_now_ns(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
 }
 
 void cli_terminal_size(int *columns, int *lines)

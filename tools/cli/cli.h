@@ -13,6 +13,7 @@
 #include <signal.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <incise/error.h>
 #include <incise/export.h>
@@ -246,6 +247,9 @@ bool cli_ends_with(const char *text, const char *end);
 
 /* Columns and lines of the terminal at stderr; 80 and 24 where they are not known. */
 void cli_terminal_size(int *columns, int *lines);
+
+/* CLOCK_MONOTONIC, ns. */
+int64_t cli_now_ns(void);
 
 /*
  * Replace the status lines on stderr, UTF-8, by one write, cut to the terminal's size; does nothing

@@ -139,7 +139,7 @@ static void flush(struct client *client)
 			doom(client, strerror(errno));
 			break;
 		}
-		client->moved_ns = serve_now();
+		client->moved_ns = cli_now_ns();
 		client->begun += (size_t)n;
 		if (client->begun < message->n)
 			continue;
@@ -184,7 +184,7 @@ void clients_send(struct client *client, struct message *message)
 	if (*client->why)
 		return;
 	if (!client->waiting)
-		client->moved_ns = serve_now();
+		client->moved_ns = cli_now_ns();
 	make_place(client, message);
 	message->refs++;
 	*place(client, client->waiting++) = message;
@@ -220,7 +220,7 @@ static void receive(struct client *client)
 static void close_client(struct clients *clients, int i)
 {
 	struct client *client = clients->client[i];
-	struct past past = {.seconds = (serve_now() - client->opened_ns) / 1e9,
+	struct past past = {.seconds = (cli_now_ns() - client->opened_ns) / 1e9,
 			    .sent = client->sent,
 			    .lost = client->lost + (uint64_t)client->waiting,
 			    .received = client->received};
@@ -308,7 +308,7 @@ static void accept_one(struct clients *clients, int listener)
 	client->fd = fd;
 	client->events = EPOLLIN;
 	client->opened_ns = client->moved_ns = client->window_ns = client->inside_ns =
-		serve_now();
+		cli_now_ns();
 	address_text((struct sockaddr *)&from, n, client->address,
 		     sizeof(client->address));
 	client->user = clients->setup.opened(clients->setup.context, client);

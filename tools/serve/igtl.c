@@ -345,7 +345,7 @@ static void send_capability(struct igtl *igtl, struct client *client, int versio
 						       "STATUS", "CAPABILITY"};
 	const struct incise_igtl_label label = {.version = version,
 						.name = outputs[REPLY].name,
-						.utc_ns = serve_utc_of(serve_now())};
+						.utc_ns = serve_utc_of(cli_now_ns())};
 	struct message *message = message_new(REPLY, false, SMALL);
 	ssize_t n = incise_igtl_pack(message_bytes(message), SMALL, &label, "CAPABILITY",
 				     types, sizeof(types));

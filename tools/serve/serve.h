@@ -172,7 +172,4 @@ void serve_play(struct serve_stream *stream, int64_t t_ns, int64_t here_ns, doub
 /* Time of this machine's CLOCK_MONOTONIC as UTC, both ns, by its clock as it is set now. */
 int64_t serve_utc_of(int64_t t_ns);
 
-/* CLOCK_MONOTONIC, ns. */
-int64_t serve_now(void);
-
 #endif

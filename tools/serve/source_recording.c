@@ -104,7 +104,7 @@ static void open_rows(struct playback *playback)
 static void start(struct playback *playback, struct serve_stream *stream)
 {
 	/* Opening takes its time. */
-	playback->here_ns = playback->read_ns = serve_now();
+	playback->here_ns = playback->read_ns = cli_now_ns();
 	serve_play(stream, playback->first_ns, playback->here_ns, playback->speed);
 }
 

@@ -11,6 +11,7 @@
 #include <string.h>
 #include <time.h>
 #include "../cli/cli.h"
+#include "../cli/quaternion.h"
 #include "stream.h"
 
 #define NS 1000000000LL
@@ -42,21 +43,13 @@ struct serve_stream {
 	double speed;
 };
 
-int64_t serve_now(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * NS + now.tv_nsec;
-}
-
 int64_t serve_utc_of(int64_t t_ns)
 {
 	struct timespec utc;
-	int64_t before = serve_now(), after;
+	int64_t before = cli_now_ns(), after;
 
 	clock_gettime(CLOCK_REALTIME, &utc);
-	after = serve_now();
+	after = cli_now_ns();
 	return utc.tv_sec * NS + utc.tv_nsec + (t_ns - before) - (after - before) / 2;
 }
 
@@ -154,7 +147,7 @@ void serve_pose(struct serve_stream *stream, int64_t t_ns, const double position
 	struct serve_item item = {.kind = SERVE_POSE, .t_ns = t_ns, .lost = lost};
 	const double *q = quaternion;
 	double norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-	double norm = sqrt(norm2), unit[4], across[3];
+	double norm = sqrt(norm2), unit[4], turned[3];
 
 	stream->lost = lost;
 	note_step(stream, SERVE_POSE, t_ns);
@@ -164,19 +157,9 @@ void serve_pose(struct serve_stream *stream, int64_t t_ns, const double position
 	set_due(stream, SERVE_POSE, t_ns);
 	for (int i = 0; i < 4; i++)
 		unit[i] = q[i] / norm;
-	/* tip + 2 w (v × tip) + 2 v × (v × tip) */
-	for (int i = 0; i < 3; i++) {
-		int j = (i + 1) % 3, k = (i + 2) % 3;
-
-		across[i] = unit[1 + j] * tip_mm[k] - unit[1 + k] * tip_mm[j];
-	}
-	for (int i = 0; i < 3; i++) {
-		int j = (i + 1) % 3, k = (i + 2) % 3;
-
-		item.pose.position_mm[i] =
-			position_mm[i] + tip_mm[i] + 2 * unit[0] * across[i] +
-			2 * (unit[1 + j] * across[k] - unit[1 + k] * across[j]);
-	}
+	quaternion_turn(turned, unit, tip_mm);
+	for (int i = 0; i < 3; i++)
+		item.pose.position_mm[i] = position_mm[i] + turned[i];
 	memcpy(item.pose.quaternion, unit, sizeof(unit));
 	send_item(stream, &item);
 }
@@ -238,7 +221,7 @@ void serve_frame(struct serve_stream *stream, const struct incise_camera_frame *
 void serve_status(struct serve_stream *stream, enum serve_state state, const char *name,
 		  const char *text)
 {
-	struct serve_item item = {.kind = SERVE_STATUS, .t_ns = serve_now()};
+	struct serve_item item = {.kind = SERVE_STATUS, .t_ns = cli_now_ns()};
 
 	if (stream->status_ns && item.t_ns - stream->status_ns < STATUS_NS &&
 	    stream->state == state && !strcmp(stream->text, text))

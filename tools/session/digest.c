@@ -10,6 +10,7 @@
 #include <incise/clock.h>
 #include <incise/incision.h>
 #include <incise/version.h>
+#include "../cli/quaternion.h"
 #include "session.h"
 
 #define TRACE_S 0.02	 /* 50 Hz */
@@ -60,18 +61,6 @@ static void cross(double to[3], const double a[3], const double b[3])
 {
 	for (int i = 0; i < 3; i++)
 		to[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
-}
-
-/* Turn by a unit quaternion, w first; to is not v. */
-static void turn(double to[3], const double q[4], const double v[3])
-{
-	double t[3], u[3];
-
-	cross(t, q + 1, v);
-	add(t, t, 1, t);
-	cross(u, q + 1, t);
-	add(to, v, q[0], t);
-	add(to, to, 1, u);
 }
 
 bool session_is_code(const char *text)
@@ -263,7 +252,7 @@ static void see_handle(struct session_digest *digest, const struct incise_tick *
 	/* Where cuts cross, it may be in either from one tick to the next. */
 	if (!digest->turning)
 		memcpy(digest->line, opening.along, sizeof(digest->line));
-	turn(flat, tick->quaternion, digest->scalpel.side);
+	quaternion_turn(flat, tick->quaternion, digest->scalpel.side);
 	cross(across, tick->normal, digest->line);
 	along_part = dot(flat, digest->line);
 	across_part = dot(flat, across);

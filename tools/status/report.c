@@ -7,6 +7,7 @@
 #include <string.h>
 #include <time.h>
 #include <incise/clock.h>
+#include "../cli/cli.h"
 #include "../cli/json.h"
 #include "../cli/loop_report.h"
 #include "report.h"
@@ -83,14 +84,6 @@ static const char *put_span(char *text, size_t size, double s)
 	return text;
 }
 
-static double monotonic_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return (double)now.tv_sec * 1e9 + (double)now.tv_nsec;
-}
-
 static double mean_hz(const struct incise_state_now *now)
 {
 	double gone_s = ((double)now->tick.t_ns - (double)now->first_ns) * 1e-9;
@@ -121,7 +114,7 @@ static void headline(FILE *out, const struct state_look *look)
 		fprintf(out, "%s: %s%s since %s (%s), process %" PRId64 "\n", look->name,
 			word, look->stalled ? ", but it does not tick," : "", when,
 			put_span(span, sizeof(span),
-				 (monotonic_ns() - (double)now->since_ns) * 1e-9),
+				 (double)(cli_now_ns() - now->since_ns) * 1e-9),
 			now->pid);
 	else
 		fprintf(out, "%s: %s since %s\n", look->name, word, when);

@@ -32,10 +32,7 @@ static struct progress *of_program; /* whose file goes with it */
 
 static double now(void)
 {
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+	return 1e-9 * (double)cli_now_ns();
 }
 
 static void remove_file(void)

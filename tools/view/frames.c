@@ -302,14 +302,6 @@ void view_hand_move(struct view_hand *hand, double dt_s)
 
 /* --- frames and events ---------------------------------------------------------------- */
 
-int64_t view_wall(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * INCISE_NS_PER_S + now.tv_nsec;
-}
-
 void view_pause_until(int64_t t_ns)
 {
 	struct timespec at = {t_ns / INCISE_NS_PER_S, t_ns % INCISE_NS_PER_S};
@@ -381,10 +373,10 @@ void view_job_draw(struct view_job *job, const struct incise_view_status *status
 
 	if (is_due(&job->output, t_s)) {
 		if (!job->frames++)
-			job->begin_ns = view_wall();
+			job->begin_ns = cli_now_ns();
 		if (incise_view_frame(job->view, status, &err))
 			cli_fail_with(&err);
-		job->end_ns = view_wall();
+		job->end_ns = cli_now_ns();
 		if (job->keep)
 			keep_frame(job);
 		write_frame(&job->output, job->view, t_s);
@@ -442,7 +434,7 @@ void view_job_view(struct view_job *job)
 				: "");
 	incise_view_panel(job->view, !job->no_panel, false);
 	incise_view_keys(job->view, keys, sizeof(keys) / sizeof(*keys));
-	job->made_ns = view_wall();
+	job->made_ns = cli_now_ns();
 	if (!job->has_camera)
 		return;
 	incise_view_camera(job->view, &camera);

@@ -48,12 +48,12 @@ static void run_live(struct view_job *job, struct view_live *live, struct view_h
 {
 	struct incise_view_status status;
 	struct incise_error err = {0};
-	int64_t begin = view_wall(), last = begin, due = begin, now;
+	int64_t begin = cli_now_ns(), last = begin, due = begin, now;
 	int rc = 0;
 
 	job->total_s = job->duration_s;
 	while (!rc && !is_over(job) && view_job_events(job, hand, live)) {
-		now = view_wall();
+		now = cli_now_ns();
 		if (job->duration_s && now - begin > job->duration_s * INCISE_NS_PER_S)
 			break;
 		if (hand)
@@ -66,8 +66,8 @@ static void run_live(struct view_job *job, struct view_live *live, struct view_h
 		job->lost = status.lost;
 		/* With vertical synchronization this does not wait. */
 		due += INCISE_NS_PER_S / job->output.fps;
-		if (due < view_wall())
-			due = view_wall();
+		if (due < cli_now_ns())
+			due = cli_now_ns();
 		view_pause_until(due);
 	}
 }
@@ -147,7 +147,7 @@ static int show_tick(struct run *run, const struct incise_tick *tick)
 
 	if (!run->first_ns) {
 		run->first_ns = run->next_ns = tick->t_ns;
-		run->wall_ns = view_wall();
+		run->wall_ns = cli_now_ns();
 	}
 	incise_view_ticks(job->view, tick, 1);
 	session_log_tick(job->log, tick);
@@ -161,7 +161,7 @@ static int show_tick(struct run *run, const struct incise_tick *tick)
 		/* In a window in real time; a late view skips frames. */
 		int64_t due = run->wall_ns + (tick->t_ns - run->first_ns);
 
-		if (view_wall() > due + run->period_ns)
+		if (cli_now_ns() > due + run->period_ns)
 			return !view_job_events(job, NULL, NULL);
 		view_pause_until(due);
 	}

@@ -59,8 +59,6 @@ struct view_job {
 	int percent;		  /* that the progress bar shows */
 };
 
-/* CLOCK_MONOTONIC. */
-int64_t view_wall(void);
 void view_pause_until(int64_t t_ns);
 
 /* Open the output files; whether there are any; close them. */

@@ -12,6 +12,7 @@
 #include <string.h>
 #include <time.h>
 #include <cmocka.h>
+#include "../../../tools/cli/cli.h"
 #include "../../../tools/serve/stream.h"
 
 #define NS 1000000000LL
@@ -184,7 +185,7 @@ static void a_recording_is_played_at_its_speed(void **state)
 static void utc_is_that_of_the_clock(void **state)
 {
 	struct timespec now;
-	int64_t ours = serve_utc_of(serve_now());
+	int64_t ours = serve_utc_of(cli_now_ns());
 
 	clock_gettime(CLOCK_REALTIME, &now);
 	/* in whole seconds: the machine may stand still in between */
