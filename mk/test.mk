@@ -125,7 +125,7 @@ mcap-reader: ## other readers for the tests of MCAP, $(O)/tests/mcap/check and r
 python-peers: ## pyarrow, polars, DuckDB, pandas 3 and scikit-learn for the tests of python/
 	@tests/venv tests/python $(O)/tests/python 'tests with pyarrow, polars, DuckDB, pandas 3 and scikit-learn are skipped'
 
-# What sends and receives streams over a network as others do.
+# Programs of others that send and receive streams over a network.
 receiver := $(wildcard /usr/share/doc/openigtlink-examples/examples/Receiver/ReceiveClient.cxx)
 stream-peers: $(if $(has_igtl),$(if $(receiver),$(O)/tests/streams/ReceiveClient))
 stream-peers: ## pylsl, with liblsl, pyigtl, and a client of libopenigtlink for tests of streams

@@ -235,7 +235,7 @@ static void server_end(const struct server *server)
 	child_end(server->pid, 0);
 }
 
-/* What an interrupted run leaves: it is ended at exit. */
+/* An interrupted run leaves it: it is ended at exit. */
 static struct {
 	pid_t loop;
 	char folder[4096];

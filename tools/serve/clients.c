@@ -49,7 +49,7 @@ struct client {
 	char why[100]; /* to close it; "" not */
 };
 
-/* What is left of one that is gone. */
+/* A client that is gone, for the report. */
 struct past {
 	char address[72], why[100];
 	double seconds;

@@ -48,7 +48,7 @@ struct igtl {
 	bool warned;
 };
 
-/* What is known of a client. */
+/* A client, and its choices. */
 struct peer {
 	struct incise_igtl_stream *stream;
 	int version;

@@ -57,7 +57,7 @@ struct serve_item {
 
 /* --- sinks ----------------------------------------------------------------------------- */
 
-/* What items will come, for a sink that announces them. */
+/* The items that will come, for a sink that announces them. */
 struct serve_info {
 	const char *name; /* "loop neck", "rig sim:", "recording a.rec" */
 	double rate_hz;	  /* poses and forces at most */
@@ -161,7 +161,7 @@ void serve_force(struct serve_stream *stream, int64_t t_ns, const double force_N
 bool serve_frame_is_due(const struct serve_stream *stream, int64_t t_ns);
 void serve_frame(struct serve_stream *stream, const struct incise_camera_frame *frame,
 		 uint64_t lost);
-/* What the source has lost so far, when no sample comes with it. */
+/* Losses of the source so far, when no sample comes with them. */
 void serve_lost(struct serve_stream *stream, uint64_t lost);
 /* Sent when it changes, and each second. */
 void serve_status(struct serve_stream *stream, enum serve_state state, const char *name,

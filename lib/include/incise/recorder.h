@@ -131,7 +131,7 @@ INCISE_API int incise_recorder_mark_at(struct incise_recorder *recorder, int64_t
 				       struct incise_error *err);
 
 /**
- * Get the newest point of the wall time, of some second ago at most.
+ * Get the newest point of the wall time, which is about a second old at most.
  *
  * @return 0; -ENODATA: none yet, or a recording without wall time
  */

@@ -51,7 +51,7 @@ struct incise_message_profile {
 	int n;	   /* of them, up to INCISE_MCAP_CHANNELS_MAX */
 	bool wall; /* times are since 1970 */
 
-	/* Which of them exist, a bit for each; or -errno. NULL: all. */
+	/* Get the streams that exist, a bit for each; or -errno. NULL: all exist. */
 	int (*select)(struct incise_messages *messages, struct incise_error *err);
 	/* Add metadata behind the last message; NULL: none. Returns 0 or -errno. */
 	int (*finish)(const struct incise_message_profile *profile,

@@ -298,7 +298,7 @@ static int select_streams(struct incise_messages *messages, struct incise_error 
 							       : ALWAYS | RAW;
 }
 
-/* What `ros2 bag info` shows, in YAML on one line; version 5 is that of the oldest readers. */
+/* The metadata of `ros2 bag info`, in YAML on one line; version 5 is that of the oldest readers. */
 static int add_metadata(const struct incise_message_profile *profile,
 			struct incise_mcap *mcap)
 {

@@ -251,7 +251,7 @@ int incise_align_marks(struct incise_recording *recording,
 
 /* --- matching ------------------------------------------------------------------------ */
 
-/* How far apart two marks may be on one clock, matched at another pair. */
+/* The largest distance of two marks that are one, where another pair gives the offset. */
 static double tolerance(const struct incise_mark *a, const struct incise_mark *b,
 			int64_t from_ns)
 {
@@ -276,7 +276,7 @@ static int partner(const struct incise_mark *a, int n_a, const struct incise_mar
 	return best;
 }
 
-/* How many marks of b have a partner; @inside: of those between a's first and last mark. */
+/* Count the marks of b with a partner; @inside: all between a's first and last mark. */
 static int count(const struct incise_mark *a, int n_a, const struct incise_mark *b,
 		 int n_b, int64_t offset_ns, int64_t from_ns, int *inside)
 {
@@ -336,7 +336,7 @@ static void match(const struct incise_mark *a, int n_a, const struct incise_mark
 }
 
 /*
- * How many offsets are expected to match so many marks if nothing is common: each mark beside the
+ * The expected number of offsets that match so many marks if nothing is common: each mark but the
  * pair that makes the offset finds one of a within its tolerance, at a's mean density or as often
  * as at the other offsets.
  */

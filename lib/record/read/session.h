@@ -72,8 +72,8 @@ int incise_session_open(struct incise_recording *rec, const char *folder,
 void incise_session_close(struct incise_session *session);
 
 /*
- * How far from its points of wall time the first member's clock goes on at its own rate; beyond, the
- * session's goes on as TAI does.
+ * The distance from its points of wall time up to which the first member's clock goes on at its own
+ * rate; beyond, the session's goes on as TAI does.
  */
 #define INCISE_SESSION_FAR_NS 59000000000LL
 

@@ -25,7 +25,7 @@ struct incise_wall_clocks {
 	char leap[24];	  /* its source, as of incise_wall_point */
 };
 
-/* What a source says of the time, best source first in a list of them. */
+/* A source's statement of the time; in a list, the best source is first. */
 struct incise_wall_reading {
 	bool good; /* there is a reading, with a bound */
 	char source[24], reference[24];

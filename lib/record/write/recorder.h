@@ -163,10 +163,10 @@ struct incise_recorder {
 
 /* --- recorder_rows.c --------------------------------------------------------------- */
 
-/* Set up the streams of the rig's devices. */
-/* Losses of the devices count from here on. */
+/* Count the losses of the devices from here on. */
 void incise_recorder_count_losses(struct incise_recorder *rec);
 
+/* Set up the streams of the rig's devices. */
 void incise_recorder_start_streams(struct incise_recorder *rec);
 
 /* Losses by the numbers, or by the device's own count, which includes the last ones. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What chronyd and ptp4l are asked and answer. No input and output; answers are untrusted. All
+ * Requests to chronyd and ptp4l, and their answers. No input and output; answers are untrusted. All
  * integers are big-endian.
  *
  *     chrony 6   version 6 │ type 1, 2 │ 0 0 │ command 33 │ attempt; reply 5 │ … │ data

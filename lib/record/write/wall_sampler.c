@@ -347,23 +347,18 @@ int incise_wall_sampler_new(struct incise_wall_sampler **sampler, const char *so
 	rc = read_source(made, source, &wanted, err);
 	if (!rc && real && made->use[PTP] + made->use[CHRONY] == 1)
 		rc = ask_named(made, source, err);
-	if (rc || !wanted) {
-		incise_wall_peer_close(&made->ptp);
-		incise_wall_peer_close(&made->chrony);
-		free(made);
-		return rc;
-	}
 	pthread_mutex_init(&made->lock, NULL);
-	if (real)
+	if (!rc && wanted && real) {
 		rc = start_thread(made);
-	if (rc) {
-		pthread_mutex_destroy(&made->lock);
-		free(made);
-		return incise_error_set(err, -rc, "clock source: no thread: %s",
-					strerror(-rc));
+		if (rc)
+			incise_error_set(err, -rc, "clock source: no thread: %s",
+					 strerror(-rc));
 	}
-	*sampler = made;
-	return 0;
+	if (rc || !wanted)
+		incise_wall_sampler_free(made);
+	else
+		*sampler = made;
+	return rc;
 }
 
 int incise_wall_sampler_take(struct incise_wall_sampler *sampler, int64_t now_ns,

@@ -17,7 +17,7 @@
 void incise_wall_read_clocks(struct incise_wall_clocks *clocks);
 
 /*
- * What a source says: the reading with its time at a CLOCK_MONOTONIC_RAW, or of CLOCK_REALTIME.
+ * A source's statement: the reading with its time at a CLOCK_MONOTONIC_RAW, or of CLOCK_REALTIME.
  * With clocks that are read after it, the sampler finds tai_ns from either.
  */
 struct incise_wall_statement {

@@ -237,7 +237,7 @@ static void what_is_unseen_or_stuck_is_flagged(void **state)
 			     sizeof(body));
 	assert_true(n > 0 && !igtl_poses_put(&poses, bytes, (size_t)n, 2 * SECOND));
 	assert_int_equal(taken(&poses).status, '!');
-	/* What is not OpenIGTLink ends it, until there is another connection. */
+	/* Bytes that are not OpenIGTLink end it, until there is another connection. */
 	memset(bytes, 0xff, sizeof(bytes));
 	assert_int_equal(igtl_poses_put(&poses, bytes, sizeof(bytes), 3 * SECOND),
 			 -EPROTO);

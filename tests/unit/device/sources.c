@@ -107,7 +107,7 @@ static void force_calls_reach_the_backend(void **state)
 	assert_true(incise_force_lost(&force_fake.force) == 30000000000ULL);
 }
 
-/* What applies of a calibration to a channel in volts, and to one in newtons. */
+/* The part of a calibration that applies to a channel in volts, and to one in newtons. */
 static void a_channel_in_newtons_has_no_sensitivity(void **state)
 {
 	static const struct {

@@ -175,7 +175,7 @@ static void test_clocks(void **state)
 	assert_true(worst > 0.5 * BOUND_NS);
 }
 
-/* What --within asks is refused where it is not reached. */
+/* A bound that --within asks for and that is not reached is refused. */
 static void test_refusals(void **state)
 {
 	const char *const twice[] = {"a.rec", "a.rec"}, *const nested[] = {"s.rec",

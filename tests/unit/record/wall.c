@@ -134,7 +134,7 @@ static void read_clocks(struct machine *m, struct incise_wall_clocks *clocks)
 }
 
 /*
- * What the source says: its offset as of its last measurement. It knows the rate, and slews since
+ * The source states its offset as of its last measurement. It knows the rate, and slews since
  * then are its own, so that it accounts for them; it knows nothing of steps by others.
  */
 static void read_source(struct machine *m, const struct incise_wall_clocks *clocks,
