@@ -81,12 +81,12 @@ check: ## install what is missing, build, and test
 		"of benches, most unit tests again without sanitizers, most cases of the slowest properties," \
 		"ThreadSanitizer, three of four fuzz runs, full attacks on recordings, the test bed's own tests," \
 		"the boots of the second kernel and of two processors, long tests of the first one, its modules," \
-		"the tests of Python once more under sanitizers"
+		"the tests of Python once more under sanitizers, two guests with clocks of their own"
 	$(call in_parts,parts=check-unit-once cli_filter="--filter-tags '!slow'" \
 		FUZZ_RUNS=10000 vm_boots="main:deterministic main:service" vm_bed= INCISE_VM_SHORT=1 module_kernels=main)
 
 check-all: ## the same with all tests in all builds, on all kernels: an hour
-	$(call in_parts,parts="check-sanitize check-unit check-tsan" ATTACK=full)
+	$(call in_parts,parts="check-sanitize check-unit check-tsan check-clocks" ATTACK=full)
 
 # For tests whose outcome may be left to chance; the load is whatever the machine has else to do.
 N ?= 20

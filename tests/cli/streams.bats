@@ -333,7 +333,7 @@ no_more_poses() {
 		rows = db.execute("SELECT t_ns, x_mm, y_mm, z_mm FROM tracker ORDER BY seq").fetchall()
 		at = {row[1:]: row[0] for row in rows}
 		samples, times = pose["samples"], pose["times"]
-		# What came is in the recording to the last bit, and apart by as much; the clock of the
+		# The samples are in the recording to the last bit, and apart by as much; the clock of the
 		# player and the line of the whole recording differ by less than 1 ms.
 		assert len(samples) > 200, len(samples)
 		known = [(at[tuple(s[:3])], t) for s, t in zip(samples, times)]
