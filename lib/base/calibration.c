@@ -50,6 +50,7 @@ static const struct known_key known_keys[] = {
 	TIP("x", 0),
 	TIP("y", 1),
 	TIP("z", 2),
+	NUMBER(surface_u_mm, "mm", 0, 1000),
 	/* a camera may timestamp the end of an exposure: later than its middle, or not */
 	NUMBER(force_delay_ms, "ms", -1000, 1000),
 	NUMBER(force_delay_sd_ms, "ms", 0, 1000),
@@ -85,6 +86,7 @@ void incise_calibration_nominal(struct incise_calibration *calibration)
 		.tracker_delay_sd_ms = NAN,
 		.camera_delay_ms = NAN,
 		.camera_delay_sd_ms = NAN,
+		.surface_u_mm = NAN,
 		.stepper_N_step = NAN,
 		.stepper_backlash_mm = NAN,
 		.stepper_hysteresis_N = NAN,
@@ -364,22 +366,16 @@ static int read_history(const config_setting_t *root, const char *path,
 	return 0;
 }
 
-/* Read all of a file; on 0 the caller frees file->records. */
-static int read_file(struct file_content *file, const char *path,
-		     struct incise_error *err)
+/* Read all of a configuration, and destroy it; on 0 the caller frees file->records. */
+static int read_config(struct file_content *file, const char *path, config_t *config,
+		       struct incise_error *err)
 {
 	const char *names[N_KEYS + 2] = {NULL};
 	const struct known_key *key;
-	const config_setting_t *root;
-	config_t config;
+	const config_setting_t *root = config_root_setting(config);
 	int rc, n = 0;
 
-	*file = (struct file_content){0};
-	rc = incise_conf_read(&config, path, err);
-	if (rc)
-		return rc;
 	incise_calibration_nominal(&file->in_force);
-	root = config_root_setting(&config);
 	for (key = known_keys; key < known_keys + N_KEYS; key++) {
 		const char *name = key->vector ? key->vector : key->name;
 
@@ -398,7 +394,7 @@ static int read_file(struct file_content *file, const char *path,
 		rc = incise_conf_vector(root, path, "tip_mm", file->in_force.tip_mm, err);
 	if (!rc)
 		rc = read_history(root, path, &file->records, &file->n, err);
-	config_destroy(&config);
+	config_destroy(config);
 	if (rc) {
 		/* One errno for every fault of the file, as the header promises. */
 		if (err)
@@ -407,6 +403,46 @@ static int read_file(struct file_content *file, const char *path,
 		return -EINVAL;
 	}
 	return 0;
+}
+
+static int read_file(struct file_content *file, const char *path,
+		     struct incise_error *err)
+{
+	config_t config;
+	int rc = incise_conf_read(&config, path, err);
+
+	*file = (struct file_content){0};
+	return rc ? rc : read_config(file, path, &config, err);
+}
+
+int incise_calibration_text(const char *text, const char *name,
+			    struct incise_calibration *calibration,
+			    struct incise_calibration_record **records,
+			    struct incise_error *err)
+{
+	struct file_content file = {0};
+	char *copy = strdup(*text ? text : "\n");
+	config_t config;
+	int rc;
+
+	if (records)
+		*records = NULL;
+	if (!copy)
+		return incise_error_set(err, ENOMEM, "%.100s: no memory to read it",
+					name);
+	rc = incise_conf_read_text(&config, name, copy, strlen(copy), err);
+	free(copy);
+	if (!rc)
+		rc = read_config(&file, name, &config, err);
+	if (rc)
+		return rc;
+	*calibration = file.in_force;
+	if (!records) {
+		free(file.records);
+		return 0;
+	}
+	*records = file.records;
+	return file.n;
 }
 
 int incise_calibration_load(const char *path, struct incise_calibration *calibration,

@@ -141,24 +141,13 @@ static int parse(config_t *config, const char *path, FILE *stream,
 	return rc;
 }
 
-int incise_conf_read(config_t *config, const char *path, struct incise_error *err)
+int incise_conf_read_text(config_t *config, const char *path, char *text, size_t size,
+			  struct incise_error *err)
 {
-	static const struct incise_infile_kind kind = {
-		.name = "a configuration file",
-		.advice = "give the path of a configuration file",
-		.size_max = 4 << 20,
-		.regular = true,
-	};
-	size_t size;
-	char *text = incise_infile_read(path, &kind, &size, err);
-	FILE *stream;
-	int rc = 0, line;
-
-	if (!text)
-		return -errno;
 	/* The parser ends the process where a disk fails to read; memory does not fail. */
-	stream = fmemopen(text, size, "r");
-	line = stream ? include_line(stream) : 0;
+	FILE *stream = fmemopen(text, size, "r");
+	int line = stream ? include_line(stream) : 0, rc;
+
 	if (line)
 		rc = incise_error_set(err, EINVAL,
 				      "%.200s:%d: @include is not supported; write all "
@@ -170,6 +159,24 @@ int incise_conf_read(config_t *config, const char *path, struct incise_error *er
 		rc = parse(config, path, stream, err);
 	if (stream)
 		fclose(stream);
+	return rc;
+}
+
+int incise_conf_read(config_t *config, const char *path, struct incise_error *err)
+{
+	static const struct incise_infile_kind kind = {
+		.name = "a configuration file",
+		.advice = "give the path of a configuration file",
+		.size_max = 4 << 20,
+		.regular = true,
+	};
+	size_t size;
+	char *text = incise_infile_read(path, &kind, &size, err);
+	int rc;
+
+	if (!text)
+		return -errno;
+	rc = incise_conf_read_text(config, path, text, size, err);
 	free(text);
 	return rc;
 }

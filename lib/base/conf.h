@@ -13,6 +13,10 @@
 /* Parse a file. Returns 0 or a negative errno; on 0 the caller owes config_destroy(). */
 int incise_conf_read(config_t *config, const char *path, struct incise_error *err);
 
+/* The same of a text of @size bytes; @path names it in errors. */
+int incise_conf_read_text(config_t *config, const char *path, char *text, size_t size,
+			  struct incise_error *err);
+
 /* Fail unless it is a group and every key of it is in the NULL-terminated list. */
 int incise_conf_known(const config_setting_t *group, const char *path,
 		      const char *const *keys, struct incise_error *err);

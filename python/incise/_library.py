@@ -283,6 +283,7 @@ class CalibrationStruct(ctypes.Structure):
         ("camera_delay_ms", c_double),
         ("camera_delay_sd_ms", c_double),
         ("tip_mm", c_double * 3),
+        ("surface_u_mm", c_double),
         ("stepper_N_step", c_double),
         ("stepper_backlash_mm", c_double),
         ("stepper_hysteresis_N", c_double),

@@ -31,6 +31,11 @@ struct incise_calibration {
 	 * default 0 0 0.
 	 */
 	double tip_mm[3];
+	/**
+	 * Standard uncertainty of the tissue surface of rig.conf along its normal; NAN: not
+	 * stated.
+	 */
+	double surface_u_mm;
 	/* The actuator as measured with the force channel; NAN: unknown. */
 	double stepper_N_step;	     /**< force per microstep, with its sign */
 	double stepper_backlash_mm;  /**< travel lost at a reversal */
@@ -121,6 +126,20 @@ INCISE_API int incise_calibration_raw(struct incise_calibration_record *record,
 INCISE_API int incise_calibration_history(const char *path,
 					  struct incise_calibration_record **records,
 					  struct incise_error *err);
+
+/**
+ * Read the text of a calibration.conf, for example that of a recording: its values as
+ * incise_calibration_load(), and its history as incise_calibration_history().
+ *
+ * @param name    of the text, for errors
+ * @param records to be freed with free(3); or NULL: values only
+ * @return number of records, 0 with records NULL; -EINVAL, -ENOMEM. Thread-safe; not real-time
+ *         safe.
+ */
+INCISE_API int incise_calibration_text(const char *text, const char *name,
+				       struct incise_calibration *calibration,
+				       struct incise_calibration_record **records,
+				       struct incise_error *err);
 
 INCISE_END_DECLS
 #endif

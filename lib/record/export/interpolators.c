@@ -79,20 +79,31 @@ static size_t fading(const struct incise_predict *p)
 	return lag;
 }
 
-/* Noise of the velocity for white noise of 1 of positions, per period: the mean square of v/x. */
-static double noise_per_period(const struct incise_predict *p)
+/*
+ * Noise of the velocity for white noise of 1 of positions, per period: the mean square of v/x,
+ * less that of the slope of a line through so many records to each side, 0 for none.
+ */
+static double noise_per_period(const struct incise_predict *p, int line)
 {
 	const int steps = 1000;
 	double s = sqrt(1 - p->alpha), index = 2 * pow(1 - s, 3) / (s * (1 + s)), sum = 0;
+	double squares = line * (line + 1) * (2 * line + 1) / 3.;
 
 	for (int i = 0; i < steps; i++) {
 		double half = M_PI / 2 * (i + 0.5) / steps;
 		double gain = 2 * tan(half) /
 			      (1 + pow(2 * sin(half), 6) / pow(index * cos(half), 2));
 
+		for (int k = 1; k <= line; k++)
+			gain -= 2 * k / squares * sin(2 * k * half);
 		sum += gain * gain;
 	}
 	return sqrt(sum / steps);
+}
+
+double incise_smooth_line_noise(const struct incise_smooth *smooth, int half)
+{
+	return noise_per_period(&smooth->fresh, half) / smooth->period_s;
 }
 
 int incise_smooth_init(struct incise_smooth *smooth, double rate_hz)
@@ -114,7 +125,7 @@ int incise_smooth_init(struct incise_smooth *smooth, double rate_hz)
 	smooth->pull[0] = b;
 	smooth->pull[1] = (8 * a * b + g * (b - 2 * a - 4)) / (8 * (1 - a));
 	smooth->pull[2] = b * (2 * b - g) / (4 * (1 - a));
-	smooth->noise_1_s = noise_per_period(p) / p->period_s;
+	smooth->noise_1_s = noise_per_period(p, 0) / p->period_s;
 	smooth->lag = fading(p);
 	smooth->capacity = 2 * smooth->lag + AHEAD + 2 * AROUND;
 	smooth->records = calloc(smooth->capacity, sizeof(*smooth->records));
@@ -541,17 +552,17 @@ void incise_force_interpolator_sample(const struct incise_force_interpolator *fo
 		force->samples[at].code * force->scale.n_per_code - force->scale.zero_N,
 		noise(force, at > HALF ? at - HALF : 0,
 		      at + HALF < force->n ? at + HALF + 1 : force->n),
-		clipped(force, at)};
+		clipped(force, at), 1};
 }
 
 void incise_force_interpolator_filter(const struct incise_force_interpolator *force,
 				      int64_t t_ns, double row_ns,
 				      struct incise_force_value *value)
 {
-	double sum = 0, squares = 0, code = 0, share;
+	double sum = 0, squares = 0, code = 0;
 	bool any = false;
 
-	*value = (struct incise_force_value){NAN, NAN, false};
+	*value = (struct incise_force_value){NAN, NAN, false, NAN};
 	for (size_t i = 0; i < force->n; i++) {
 		double rows = fabs((force->samples[i].t_ns - t_ns) / row_ns);
 		double at = rows * CELLS, w;
@@ -569,9 +580,9 @@ void incise_force_interpolator_filter(const struct incise_force_interpolator *fo
 	}
 	if (!any)
 		return;
-	share = sqrt(squares) / fabs(sum);
+	value->share = sqrt(squares) / fabs(sum);
 	value->force_N = code / sum * force->scale.n_per_code - force->scale.zero_N;
-	value->u_N = noise(force, 0, force->n) * share;
+	value->u_N = noise(force, 0, force->n) * value->share;
 }
 
 void incise_force_interpolator_line(const struct incise_force_interpolator *force,
@@ -581,7 +592,7 @@ void incise_force_interpolator_line(const struct incise_force_interpolator *forc
 	size_t i = 0;
 	double s;
 
-	*value = (struct incise_force_value){NAN, NAN, false};
+	*value = (struct incise_force_value){NAN, NAN, false, NAN};
 	while (i + 2 < force->n && force->samples[i + 1].t_ns <= t_ns)
 		i++;
 	if (i + 1 >= force->n)
@@ -592,7 +603,8 @@ void incise_force_interpolator_line(const struct incise_force_interpolator *forc
 	value->force_N =
 		(a->code + s * (b->code - (double)a->code)) * force->scale.n_per_code -
 		force->scale.zero_N;
-	value->u_N = noise(force, 0, force->n) * sqrt((1 - s) * (1 - s) + s * s);
+	value->share = sqrt((1 - s) * (1 - s) + s * s);
+	value->u_N = noise(force, 0, force->n) * value->share;
 	value->clipped = clipped(force, i) || clipped(force, i + 1);
 }
 
@@ -606,11 +618,8 @@ static double dot4(const double a[4], const double b[4])
 	return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
 }
 
-/* Move from the device's tip to that of the blade; without a change of bits if it is the same. */
-static void go_to_tip(const struct incise_blade_pose *blade, const double q[4],
-		      double position_mm[3])
+void incise_go_to_tip(const double tip_mm[3], const double q[4], double position_mm[3])
 {
-	const double *tip_mm = blade->tip_mm;
 	double arm_mm[3];
 
 	if (tip_mm[0] == 0 && tip_mm[1] == 0 && tip_mm[2] == 0)
@@ -654,7 +663,7 @@ static int more_pose(struct incise_blade_pose *blade, struct incise_error *err)
 	norm = sqrt(dot4(pose->q, pose->q));
 	for (int i = 0; i < 4; i++)
 		pose->q[i] = norm > 0 ? pose->q[i] / norm : NAN;
-	go_to_tip(blade, pose->q, pose->position_mm);
+	incise_go_to_tip(blade->tip_mm, pose->q, pose->position_mm);
 	status = (const char *)sqlite3_column_text(stmt, 9);
 	pose->error = !incise_pose_usable(*status);
 	pose->station = sqlite3_column_int(stmt, 10);
@@ -687,7 +696,7 @@ static int feed(struct incise_blade_pose *blade, struct incise_error *err)
 		record.position_mm[i] = sqlite3_column_double(stmt, 3 + i);
 	for (int i = 0; i < 4; i++)
 		q[i] = sqlite3_column_double(stmt, 6 + i);
-	go_to_tip(blade, q, record.position_mm);
+	incise_go_to_tip(blade->tip_mm, q, record.position_mm);
 	record.t_sd_s = incise_row_times_sd(&blade->depth.times, record.seq);
 	incise_smooth_push(&blade->smooth, &record);
 	return 1;
@@ -761,6 +770,8 @@ static int more_depth(struct incise_blade_pose *blade, struct incise_error *err)
 		record->noise_mm,
 		record->depth_noise_mm,
 		record->t_sd_s,
+		{record->velocity_mm_s[0], record->velocity_mm_s[1],
+		 record->velocity_mm_s[2]},
 		incise_progress_add(&blade->progress, record, blade->smooth.noise_1_s),
 		blade->stay.inside,
 		blade->stay.began_ns,
@@ -928,6 +939,42 @@ int incise_blade_pose_at(struct incise_blade_pose *blade, int64_t t_ns, double t
 	value->interpolated = isnan(s) || b->seq - a->seq != 1;
 	value->error = !isnan(s) && (a->error || b->error);
 	return 0;
+}
+
+/* Turn back by the quaternion: components of a direction in the frame of the sensor. */
+static void turn_back(double to[3], const double q[4], const double v[3])
+{
+	const double back[4] = {q[0], -q[1], -q[2], -q[3]};
+
+	v3_rotate(to, back, v);
+}
+
+void incise_blade_pose_budget(const struct incise_blade_pose *blade, int64_t t_ns,
+			      const struct incise_blade_pose_value *value,
+			      struct incise_budget_row *row)
+{
+	const struct incise_blade_depth *c = &blade->deep[0], *d = &blade->deep[1];
+	const struct incise_blade_record *a = &blade->pose[0], *b = &blade->pose[1];
+	double e = incise_row_share(c->t_ns, d->t_ns, t_ns);
+	double step_s = (double)(d->t_ns - c->t_ns) * 1e-9, from[3], to[3], speed;
+
+	row->share = e;
+	row->depth_rate_mm_s = isnan(e) ? NAN : blade->rate_mm_s;
+	row->acceleration_mm_s2 =
+		isnan(e) ? NAN : (d->velocity_mm_s - c->velocity_mm_s) / step_s;
+	for (int i = 0; i < 3; i++)
+		row->direction[i] = mix(c->vector_mm_s[i], d->vector_mm_s[i], e);
+	speed = v3_length(row->direction);
+	for (int i = 0; i < 3; i++)
+		row->direction[i] /= speed;
+	turn_back(row->tip, value->q, blade->progress.normal);
+	step_s = (double)(b->t_ns - a->t_ns) * 1e-9;
+	turn_back(from, a->q, row->direction);
+	turn_back(to, b->q, row->direction);
+	for (int i = 0; i < 3; i++) {
+		row->tip[i] = -row->tip[i];
+		row->tip_1_s[i] = (to[i] - from[i]) / step_s;
+	}
 }
 
 /* --- camera -------------------------------------------------------------------------- */

@@ -17,6 +17,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <incise/budget.h>
 #include "../../control/model_input.h"
 #include "../../control/predict.h"
 #include "../read/cut.h"
@@ -27,6 +28,7 @@
 struct incise_smooth_record {
 	int64_t seq, t_ns;
 	double position_mm[3], depth_mm, t_sd_s; /* given */
+	double line_mm_s;			 /* given: speed by table depth */
 	double velocity_mm_s[3];		 /* NAN: of an invalid position */
 	double noise_mm, depth_noise_mm; /* standard deviations of one; NAN: not known */
 	/* forward */
@@ -45,6 +47,12 @@ struct incise_smooth {
 		taken; /* records added, filtered, smoothed, returned */
 	bool ended;
 };
+
+/*
+ * Noise of the slope of a line through so many records to each side, less the smoother's
+ * velocity, for a noise of 1 mm of positions; 1/s.
+ */
+double incise_smooth_line_noise(const struct incise_smooth *smooth, int half);
 
 /* For records at this rate. Returns 0 or -ENOMEM. */
 int incise_smooth_init(struct incise_smooth *smooth, double rate_hz);
@@ -122,6 +130,7 @@ struct incise_force_interpolator {
 struct incise_force_value {
 	double force_N, u_N; /* NAN: none near */
 	bool clipped;
+	double share; /* of the noise of one sample */
 };
 
 /*
@@ -177,6 +186,7 @@ struct incise_blade_depth {
 	int64_t t_ns;
 	double depth_mm, velocity_mm_s;
 	double noise_mm, depth_noise_mm, t_sd_s;
+	double vector_mm_s[3]; /* velocity */
 	bool advancing;
 	bool inside;	  /* the tissue … */
 	int64_t began_ns; /* … since then */
@@ -232,6 +242,14 @@ void incise_blade_pose_close(struct incise_blade_pose *blade);
 /* The pose at a time, not before that of the last call. Returns 0 or -errno. */
 int incise_blade_pose_at(struct incise_blade_pose *blade, int64_t t_ns, double t_sd_s,
 			 struct incise_blade_pose_value *value, struct incise_error *err);
+
+/* What the uncertainty budget needs of the row of the last call, but its force. */
+void incise_blade_pose_budget(const struct incise_blade_pose *blade, int64_t t_ns,
+			      const struct incise_blade_pose_value *value,
+			      struct incise_budget_row *row);
+
+/* Move from the device's tip to that of the blade; without a change of bits if it is the same. */
+void incise_go_to_tip(const double tip_mm[3], const double q[4], double position_mm[3]);
 
 /* --- camera -------------------------------------------------------------------------- */
 

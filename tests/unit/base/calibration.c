@@ -80,7 +80,7 @@ static void faults_leave_the_calibration_alone(void **state)
 		 "10, found \"x\"; correct it"},
 		{"gain = 1;",
 		 ":1: gain: unknown key; expected one of force_mV_N, force_zero_mV, "
-		 "depth_mm_px, tip_mm, force_delay_ms, force_delay_sd_ms, "
+		 "depth_mm_px, tip_mm, surface_u_mm, force_delay_ms, force_delay_sd_ms, "
 		 "tracker_delay_ms, tracker_delay_sd_ms, camera_delay_ms, "
 		 "camera_delay_sd_ms, stepper_N_step, stepper_backlash_mm, "
 		 "stepper_hysteresis_N, stepper_stiction_N, stepper_steps_s, history"},
@@ -376,6 +376,13 @@ static void wrong_files_are_named(void **state)
 		assert_int_equal(incise_calibration_history(file.path, &records, NULL),
 				 -EINVAL);
 		assert_null(records);
+		/* a text is read by the same rules */
+		assert_int_equal(incise_calibration_text(row[i].text, "text", &c,
+							 &records, &err),
+				 -EINVAL);
+		assert_null(records);
+		if (!strstr(err.text, row[i].said) || strncmp(err.text, "text:", 5))
+			fail_msg("row %zu: %s", i, err.text);
 		/* a file that is not understood is not overwritten */
 		new = force_record(1240);
 		assert_int_equal(incise_calibration_append(file.path, &new, NULL),
