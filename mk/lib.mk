@@ -129,13 +129,13 @@ $(O)/obj/lib/vision/board/board_opencv.o: pc_cflags = $(opencv_cflags)
 # Pictures in a file; lib/record loads it.
 has_frames := $(shell $(PKG_CONFIG) --exists libavformat libavcodec libavutil && echo yes)
 device_modules += $(if $(has_frames),frames_mkv)
-pc_frames_mkv := libavformat libavcodec libavutil
+pc_frames_mkv := libavformat libavcodec libavutil libcrypto
 objects_frames_mkv := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/record/mkv/*.c))
 $(objects_frames_mkv): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_frames_mkv))
 
 # Films of pictures; lib/view loads it.
 device_modules += $(if $(has_view),$(if $(has_frames),film_mkv))
-pc_film_mkv := $(pc_frames_mkv)
+pc_film_mkv := libavformat libavcodec libavutil
 objects_film_mkv := $(O)/obj/lib/view/film/film_mkv.o
 $(objects_film_mkv): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_film_mkv))
 

@@ -24,9 +24,9 @@ static const struct cli_command command = {
 	.name = "verify",
 	.synopsis = "NAME.rec [OPTIONS]",
 	.summary = "Check that a recording is complete and as it was written: recompute "
-		   "its ledger and check\n"
-		   "the pages of its database. Lists what is missing or altered, and "
-		   "where.",
+		   "its ledger and\n"
+		   "seal, and check the pages of its database. Lists what is missing or "
+		   "altered, and where.",
 	.options = options,
 	.notes = "Example: incise verify liver.rec\n"
 		 "Exit codes: 0 complete, 1 something is missing or altered, 2 bad "
@@ -60,6 +60,7 @@ static json_t *as_json(const struct incise_verify_finding *finding)
 		[INCISE_VERIFY_DAMAGED] = "damaged",
 		[INCISE_VERIFY_ENDED] = "ended",
 		[INCISE_VERIFY_TIMES] = "times",
+		[INCISE_VERIFY_SEAL] = "seal",
 	};
 	bool numbers = finding->last_seq >= finding->first_seq;
 	bool blocks = finding->first_block >= 0;
@@ -133,10 +134,11 @@ static void print_json(const struct incise_verify_report *report, const struct s
 					   (json_int_t)stream->blocks, "altered_blocks",
 					   (json_int_t)stream->altered));
 	}
-	json_print(json_pack("{so sb sb sb sb so so so sI}", "path",
+	json_print(json_pack("{so sb sb sb sb sb sI so so so sI}", "path",
 			     json_text(sink->path), "complete", report->complete,
 			     "intact", report->intact, "unverified", report->unverified,
-			     "interrupted", report->interrupted, "pictures",
+			     "interrupted", report->interrupted, "sealed", report->sealed,
+			     "commits", (json_int_t)report->commits, "pictures",
 			     pictures(report), "streams", streams, "findings", sink->list,
 			     "findings_left_out", (json_int_t)sink->left_out));
 }
@@ -163,6 +165,11 @@ static void print_table(const struct incise_verify_report *report, const char *p
 		       (unsigned long long)report->frames.missing,
 		       (unsigned long long)report->frames.altered,
 		       (unsigned long long)report->frames.extra);
+	if (report->sealed)
+		printf("%-8s a chain of %llu commits\n", "seal",
+		       (unsigned long long)report->commits);
+	else if (!report->commits)
+		printf("%-8s none: made by an older incise\n", "seal");
 	if (report->complete)
 		printf("%s: complete, and as it was written\n", path);
 }

@@ -43,6 +43,7 @@ static bool package_of(const char *soname, size_t length, char *package, size_t 
 	} exceptions[] = {
 		{"libhdf5_serial.so.103", "libhdf5-103-1"},
 		{"libhdf5_serial.so.310", "libhdf5-310"},
+		{"libcrypto.so.3", "libssl3"},
 		{"libjpeg.so.62", "libjpeg62-turbo"},
 		{"liblapacke.so.3", "liblapacke"},
 		{"libgcc_s.so.1", "libgcc-s1"},

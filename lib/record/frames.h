@@ -33,6 +33,8 @@
 #define INCISE_FRAMES_SIDE_MAX 8192
 #define INCISE_FRAMES_BYTES_MAX ((size_t)1 << 28) /* of a frame: 8192² RGB fits */
 
+#define INCISE_FRAMES_DIGEST 32 /* bytes: SHA-256 of a frame in the file */
+
 /* The form of all frames of a file. YUYV has an even width. */
 struct incise_frames_shape {
 	int width, height;
@@ -50,6 +52,7 @@ struct incise_frames_stored {
 	int64_t pts_ms; /* unique, ascending */
 	uint32_t bytes;
 	uint32_t crc; /* CRC-32 of them */
+	uint8_t sha256[INCISE_FRAMES_DIGEST];
 };
 
 /* A row of the table frames: a frame in the file, and vision's result. */
@@ -58,6 +61,7 @@ struct incise_frame_record {
 	int64_t t_ns, arrival_ns;
 	int64_t pts_ms;
 	uint32_t bytes, crc;
+	uint8_t sha256[INCISE_FRAMES_DIGEST];
 	/* By vision. NaN: not looked at, or no handle found (then the quality is 0). */
 	double length_px, sd_px, depth_mm, quality;
 };
@@ -117,6 +121,8 @@ struct incise_frames_reader {
 	/* May be set between two frames: FFV1 is not decoded, which saves some 25 ms each, and
 	 * frames have no data. Their CRC is still checked. */
 	bool undecoded;
+	/* And so may this: stored frames come with their digest, which is 0 otherwise. */
+	bool digests;
 };
 
 /*
@@ -139,7 +145,7 @@ void incise_frames_reader_close(struct incise_frames_reader *reader);
 
 /* --- module ------------------------------------------------------------------------ */
 
-#define INCISE_FRAMES_ABI 2
+#define INCISE_FRAMES_ABI 3
 #define INCISE_FRAMES_SYMBOL "incise_frames"
 
 struct incise_frames_module {

@@ -18,14 +18,26 @@ const struct incise_ledger_form incise_ledger_forms[INCISE_LEDGER_FORMS] = {
 				   "iiirrrrrrrcii"},
 	[INCISE_LEDGER_CAMERA] = {"camera", "frames",
 				  "seq, t_ns, arrival_ns, pts, bytes, crc, length_px, "
-				  "sd_px, depth_mm, quality",
-				  "iiiiiinnnn"},
+				  "sd_px, depth_mm, quality, sha256",
+				  "iiiiiinnnnh"},
 	[INCISE_LEDGER_WALL] = {"wall", "wall",
 				"seq, t_ns, tai_ns, uncertainty_ns, rate_ppb, "
 				"rate_uncertainty_ppb, utc_offset_s, held, source, "
 				"reference, leap, restart",
 				"iiinrriissss"},
 };
+
+/* Before form 4 frames had no digest. */
+static const struct incise_ledger_form camera_3 = {
+	"camera", "frames",
+	"seq, t_ns, arrival_ns, pts, bytes, crc, length_px, sd_px, depth_mm, quality",
+	"iiiiiinnnn"};
+
+const struct incise_ledger_form *incise_ledger_form(int stream, int form)
+{
+	return stream == INCISE_LEDGER_CAMERA && form < 4 ? &camera_3
+							  : &incise_ledger_forms[stream];
+}
 
 /* --- rows ------------------------------------------------------------------------- */
 
@@ -50,6 +62,12 @@ static void put_real(struct incise_ledger_row *row, double value)
 	if (!isnan(value))
 		memcpy(&bits, &value, sizeof(bits));
 	put_integer(row, bits);
+}
+
+static void put_digest(struct incise_ledger_row *row, const uint8_t *bytes)
+{
+	memcpy(row->bytes + row->n, bytes, INCISE_FRAMES_DIGEST);
+	row->n += INCISE_FRAMES_DIGEST;
 }
 
 void incise_ledger_row_force(struct incise_ledger_row *row, uint64_t seq, int64_t t_ns,
@@ -97,6 +115,7 @@ void incise_ledger_row_frame(struct incise_ledger_row *row,
 	put_real(row, record->sd_px);
 	put_real(row, record->depth_mm);
 	put_real(row, record->quality);
+	put_digest(row, record->sha256);
 }
 
 static void put_text(struct incise_ledger_row *row, const char *text, size_t length)
@@ -158,6 +177,13 @@ bool incise_ledger_row_read(struct incise_ledger_row *row,
 			    sqlite3_column_bytes(stmt, i) != 1)
 				return false;
 			row->bytes[row->n++] = *sqlite3_column_text(stmt, i);
+			break;
+		case 'h':
+			if (type != SQLITE_BLOB ||
+			    sqlite3_column_bytes(stmt, i) != INCISE_FRAMES_DIGEST ||
+			    !sqlite3_column_blob(stmt, i))
+				return false;
+			put_digest(row, sqlite3_column_blob(stmt, i));
 			break;
 		case 's':
 			if (type != SQLITE_TEXT || !sqlite3_column_text(stmt, i) ||
@@ -308,67 +334,93 @@ static const struct {
 	 "offset_ns, offset_sd_ns, ended FROM streams ORDER BY rowid"},
 };
 
-static uint32_t add_number(uint32_t crc, char type, uint64_t value)
+const char *incise_ledger_sql(const char *table)
+{
+	for (size_t i = 0; i < sizeof(tables) / sizeof(*tables); i++)
+		if (!strcmp(tables[i].table, table))
+			return tables[i].sql;
+	return NULL;
+}
+
+static void add_number(incise_ledger_sink sink, void *user, char type, uint64_t value)
 {
 	uint8_t bytes[9] = {type};
 
 	put(bytes + 1, value);
-	return incise_crc32c(crc, bytes, sizeof(bytes));
+	sink(user, bytes, sizeof(bytes));
 }
 
-static uint32_t add_value(uint32_t crc, sqlite3_stmt *stmt, int column)
+static void add_value(incise_ledger_sink sink, void *user, sqlite3_stmt *stmt, int column)
 {
+	const int type = sqlite3_column_type(stmt, column);
 	uint64_t bits;
 	double real;
 	const void *bytes;
 	int n;
 
-	switch (sqlite3_column_type(stmt, column)) {
+	switch (type) {
 	case SQLITE_INTEGER:
-		return add_number(crc, 'i', sqlite3_column_int64(stmt, column));
+		add_number(sink, user, 'i', sqlite3_column_int64(stmt, column));
+		break;
 	case SQLITE_FLOAT:
 		real = sqlite3_column_double(stmt, column);
 		memcpy(&bits, &real, sizeof(bits));
-		return add_number(crc, 'r', bits);
+		add_number(sink, user, 'r', bits);
+		break;
 	case SQLITE_TEXT:
-		bytes = sqlite3_column_text(stmt, column); /* before its length */
-		n = sqlite3_column_bytes(stmt, column);
-		crc = add_number(crc, 't', n);
-		return bytes ? incise_crc32c(crc, bytes, n) : crc;
 	case SQLITE_BLOB:
-		bytes = sqlite3_column_blob(stmt, column);
+		/* before its length */
+		bytes = type == SQLITE_TEXT
+				? (const void *)sqlite3_column_text(stmt, column)
+				: sqlite3_column_blob(stmt, column);
 		n = sqlite3_column_bytes(stmt, column);
-		crc = add_number(crc, 'b', n);
-		return bytes ? incise_crc32c(crc, bytes, n) : crc;
+		add_number(sink, user, type == SQLITE_TEXT ? 't' : 'b', n);
+		if (bytes)
+			sink(user, bytes, n);
+		break;
 	default:
-		return incise_crc32c(crc, "n", 1);
+		sink(user, "n", 1);
 	}
+}
+
+int incise_ledger_values(sqlite3 *db, const char *sql, incise_ledger_sink sink,
+			 void *user, uint64_t *rows)
+{
+	sqlite3_stmt *stmt;
+	int rc = sql ? sqlite3_prepare_v2(db, sql, -1, &stmt, NULL) : SQLITE_ERROR;
+
+	*rows = 0;
+	if (rc != SQLITE_OK)
+		return rc;
+	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW) {
+		++*rows;
+		for (int j = 0; j < sqlite3_column_count(stmt); j++)
+			add_value(sink, user, stmt, j);
+	}
+	return sqlite3_finalize(stmt); /* reports a failed step too */
+}
+
+static void to_crc(void *user, const void *bytes, size_t n)
+{
+	uint32_t *crc = user;
+
+	*crc = incise_crc32c(*crc, bytes, n);
 }
 
 int incise_ledger_seal(sqlite3 *db, const char *table, struct incise_ledger_block *block)
 {
-	sqlite3_stmt *stmt;
-	size_t i = 0;
+	uint64_t rows;
 	int rc;
 
-	while (i < sizeof(tables) / sizeof(*tables) && strcmp(tables[i].table, table))
-		i++;
-	if (i == sizeof(tables) / sizeof(*tables))
-		return SQLITE_ERROR;
-	rc = sqlite3_prepare_v2(db, tables[i].sql, -1, &stmt, NULL);
-	if (rc != SQLITE_OK)
-		return rc;
 	*block = (struct incise_ledger_block){0};
-	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW) {
-		block->count++;
-		for (int j = 0; j < sqlite3_column_count(stmt); j++)
-			block->crc = add_value(block->crc, stmt, j);
-	}
+	rc = incise_ledger_values(db, incise_ledger_sql(table), to_crc, &block->crc,
+				  &rows);
+	block->count = rows;
 	seal_block(block);
-	return sqlite3_finalize(stmt); /* reports a failed step too */
+	return rc;
 }
 
-int incise_ledger_seal_file(int fd, int64_t length, struct incise_ledger_block *block)
+int incise_ledger_file_head(int fd, uint8_t **bytes, size_t *size)
 {
 	static const uint8_t cluster[] = {0x1f, 0x43, 0xb6,
 					  0x75}; /* its ID in Matroska */
@@ -386,8 +438,19 @@ int incise_ledger_seal_file(int fd, int64_t length, struct incise_ledger_block *
 		n += got > 0 ? got : 0;
 	}
 	found = memmem(head, n, cluster, sizeof(cluster));
-	if (found)
-		n = found - head;
+	*size = found ? (size_t)(found - head) : n;
+	*bytes = head;
+	return 0;
+}
+
+int incise_ledger_seal_file(int fd, int64_t length, struct incise_ledger_block *block)
+{
+	uint8_t *head;
+	size_t n;
+	int rc = incise_ledger_file_head(fd, &head, &n);
+
+	if (rc)
+		return rc;
 	*block = (struct incise_ledger_block){
 		.last_seq = length,
 		.count = n,

@@ -29,7 +29,7 @@ struct incise_ledger_form {
 	const char *columns; /* seq and t_ns are first */
 	/*
 	 * Of each column: i integer, r real, n real or NULL, c one character, s a text of at most
-	 * INCISE_LEDGER_TEXT bytes; see below.
+	 * INCISE_LEDGER_TEXT bytes, h a digest; see below.
 	 */
 	const char *types;
 };
@@ -46,11 +46,14 @@ enum {
 
 extern const struct incise_ledger_form incise_ledger_forms[INCISE_LEDGER_FORMS];
 
+/* That of a stream in a recording whose tables have this form, see schema.h. */
+const struct incise_ledger_form *incise_ledger_form(int stream, int form);
+
 #define INCISE_LEDGER_TEXT 23
 
 /*
  * One row, encoded: integers and reals (IEEE 754) as 8 bytes, little-endian, a character as
- * one, a text with zeros up to 24 bytes. Minus zero is zero, since SQLite keeps no minus zero;
+ * one, a text with zeros up to 24 bytes, a digest as its 32. Minus zero is zero, since SQLite keeps no minus zero;
  * NULL is the NaN 0x7ff8000000000000, since it keeps no NaN.
  */
 struct incise_ledger_row {
@@ -136,11 +139,22 @@ extern const char *const incise_ledger_sealed[];
  */
 int incise_ledger_seal(sqlite3 *db, const char *table, struct incise_ledger_block *block);
 
+/* Pass the values that a SELECT returns to a sink, encoded so. NULL is an error of SQLite. */
+typedef void (*incise_ledger_sink)(void *user, const void *bytes, size_t n);
+int incise_ledger_values(sqlite3 *db, const char *sql, incise_ledger_sink sink,
+			 void *user, uint64_t *rows);
+
+/* The SELECT of such a table; NULL for another. */
+const char *incise_ledger_sql(const char *table);
+
 /*
  * The entry of camera.mkv: count is the bytes of its head, those before the first frame, which
  * a decoder needs; last_seq is the length of the file, which is @length, 0 where it is not known.
  * The offset of @fd is not used. Returns 0 or a negative errno.
  */
 int incise_ledger_seal_file(int fd, int64_t length, struct incise_ledger_block *block);
+
+/* Read these bytes, to be freed. Returns 0 or a negative errno. */
+int incise_ledger_file_head(int fd, uint8_t **bytes, size_t *size);
 
 #endif

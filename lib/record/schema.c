@@ -7,6 +7,12 @@
 #include <string.h>
 #include "schema.h"
 
+#define FRAMES                                                                        \
+	"CREATE TABLE frames(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "        \
+	"arrival_ns INTEGER NOT NULL, pts INTEGER NOT NULL, bytes INTEGER NOT NULL, " \
+	"crc INTEGER NOT NULL, length_px REAL, sd_px REAL, depth_mm REAL, "           \
+	"quality REAL"
+
 /*
  * The texts that SQLite keeps of the tables are compared when a recording is opened, so a view,
  * a virtual table or a generated column cannot replace one. Additional tables are ignored.
@@ -16,8 +22,8 @@ static const struct {
 	int first, last; /* forms that have it so */
 	const char *sql;
 } tables[] = {
-	{"meta", 1, 3, "CREATE TABLE meta(key TEXT PRIMARY KEY NOT NULL, value)"},
-	{"force", 1, 3,
+	{"meta", 1, 4, "CREATE TABLE meta(key TEXT PRIMARY KEY NOT NULL, value)"},
+	{"force", 1, 4,
 	 "CREATE TABLE force(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
 	 "code INTEGER NOT NULL)"},
 	{"tracker", 1, 1,
@@ -25,46 +31,47 @@ static const struct {
 	 "arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, "
 	 "z_mm REAL NOT NULL, qw REAL NOT NULL, qx REAL NOT NULL, "
 	 "qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL)"},
-	{"tracker", 2, 3,
+	{"tracker", 2, 4,
 	 "CREATE TABLE tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
 	 "arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, "
 	 "z_mm REAL NOT NULL, qw REAL NOT NULL, qx REAL NOT NULL, "
 	 "qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL, "
 	 "station INTEGER NOT NULL, button INTEGER NOT NULL)"},
-	{"depth", 1, 3,
+	{"depth", 1, 4,
 	 "CREATE TABLE depth(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
 	 "depth_mm REAL NOT NULL, velocity_mm_s REAL NOT NULL)"},
-	{"events", 1, 3,
+	{"events", 1, 4,
 	 "CREATE TABLE events(t_ns INTEGER NOT NULL, kind TEXT NOT NULL, "
 	 "text TEXT NOT NULL)"},
-	{"frames", 2, 3,
-	 "CREATE TABLE frames(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
-	 "arrival_ns INTEGER NOT NULL, pts INTEGER NOT NULL, bytes INTEGER NOT NULL, "
-	 "crc INTEGER NOT NULL, length_px REAL, sd_px REAL, depth_mm REAL, "
-	 "quality REAL)"},
-	{"streams", 2, 3,
+	{"frames", 2, 3, FRAMES ")"},
+	{"frames", 4, 4, FRAMES ", sha256 BLOB NOT NULL)"},
+	{"streams", 2, 4,
 	 "CREATE TABLE streams(name TEXT PRIMARY KEY NOT NULL, device TEXT NOT NULL, "
 	 "stamped INTEGER NOT NULL, nominal_hz REAL, delay_ns INTEGER NOT NULL, "
 	 "delay_sd_ns INTEGER, grain_ns INTEGER NOT NULL, rows INTEGER NOT NULL, "
 	 "lost INTEGER NOT NULL, late INTEGER NOT NULL, rate_hz REAL, drift_ppm REAL, "
 	 "drift_sd_ppm REAL, jitter_ns REAL, jitter_max_ns REAL, offset_ns REAL, "
 	 "offset_sd_ns REAL, ended TEXT)"},
-	{"knots", 2, 3,
+	{"knots", 2, 4,
 	 "CREATE TABLE knots(stream TEXT NOT NULL, knot INTEGER NOT NULL, "
 	 "seq INTEGER NOT NULL, t_ns INTEGER NOT NULL, sd_ns REAL NOT NULL, "
 	 "begins INTEGER NOT NULL, PRIMARY KEY(stream, knot)) WITHOUT ROWID"},
-	{"ledger", 2, 3,
+	{"ledger", 2, 4,
 	 "CREATE TABLE ledger(stream TEXT NOT NULL, block INTEGER NOT NULL, "
 	 "first_seq INTEGER NOT NULL, last_seq INTEGER NOT NULL, "
 	 "first_ns INTEGER NOT NULL, last_ns INTEGER NOT NULL, "
 	 "count INTEGER NOT NULL, lost INTEGER NOT NULL, crc INTEGER NOT NULL, "
 	 "PRIMARY KEY(stream, block)) WITHOUT ROWID"},
-	{"wall", 3, 3,
+	{"wall", 3, 4,
 	 "CREATE TABLE wall(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
 	 "tai_ns INTEGER NOT NULL, uncertainty_ns REAL, rate_ppb REAL NOT NULL, "
 	 "rate_uncertainty_ppb REAL NOT NULL, utc_offset_s INTEGER NOT NULL, "
 	 "held INTEGER NOT NULL, source TEXT NOT NULL, reference TEXT NOT NULL, "
 	 "leap TEXT NOT NULL, restart TEXT NOT NULL)"},
+	{"seal", 4, 4,
+	 "CREATE TABLE seal(number INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
+	 "force INTEGER NOT NULL, tracker INTEGER NOT NULL, camera INTEGER NOT NULL, "
+	 "wall INTEGER NOT NULL, head BLOB NOT NULL)"},
 };
 
 #define TABLES (sizeof(tables) / sizeof(*tables))

@@ -68,6 +68,7 @@ static bool read_rows(const char *folder, uint32_t *crc)
 		"SELECT * FROM streams ORDER BY rowid",
 		"SELECT * FROM knots ORDER BY stream, knot",
 		"SELECT * FROM ledger ORDER BY stream, block",
+		"SELECT * FROM seal ORDER BY number",
 	};
 	char file[200];
 	sqlite3 *db;

@@ -51,6 +51,6 @@ INSERT INTO streams(name, device, stamped, nominal_hz, delay_ns, grain_ns, rows,
 INSERT INTO frames WITH RECURSIVE f(i) AS (SELECT 0 UNION ALL SELECT i + 1 FROM f
 	WHERE i < 215999) SELECT i, 1000000000 + i * 50000000 / 3,
 	1002000000 + i * 50000000 / 3, i * 50 / 3, 30000, 0, 200 + 100 * sin(i / 10.0), 0.05,
-	11.875 * (1 + sin(i / 10.0)), 0.9 FROM f;
+	11.875 * (1 + sin(i / 10.0)), 0.9, zeroblob(32) FROM f;
 SQL
 du -sh "$rec"

@@ -408,7 +408,7 @@ read_mcap() {
 @test "export resampled with pictures" {
 	cp -r liver.rec/ seen.rec
 	sqlite3 seen.rec/recording.db "DELETE FROM knots;
-		INSERT INTO frames SELECT seq, t_ns, t_ns, 0, 1, 0, 100.0, 0.5, depth_mm, 0.9 FROM depth"
+		INSERT INTO frames SELECT seq, t_ns, t_ns, 0, 1, 0, 100.0, 0.5, depth_mm, 0.9, zeroblob(32) FROM depth"
 	incise export seen.rec liver.rec --resample --rate 50 -o a.csv --damaged
 	[[ "$(head -n 1 a.csv)" == *,tracker_error,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s,camera_depth_mm,camera_depth_sd_mm,camera_depth_u_mm,quality,low_quality ]]
 	# by the pictures as by the tracker; and none of what has no pictures

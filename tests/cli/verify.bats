@@ -39,8 +39,9 @@ tampered() {
 	[ -z "$stderr" ]
 	[ "${lines[0]}" = "force    30000 expected, 30000 present, 0 lost, in 31 blocks" ]
 	[[ "${lines[1]}" == "tracker  "*" expected, "*" present, 0 lost, in 31 blocks" ]]
-	[ "${lines[2]}" = "a.rec: complete, and as it was written" ]
-	[ "${#lines[@]}" -eq 3 ]
+	[ "${lines[2]}" = "seal     a chain of 33 commits" ]
+	[ "${lines[3]}" = "a.rec: complete, and as it was written" ]
+	[ "${#lines[@]}" -eq 4 ]
 	[ "$(sha256sum a.rec/recording.db)" = "$before" ]
 	[ "$(ls a.rec)" = recording.db ]
 }
@@ -190,10 +191,10 @@ qw REAL NOT NULL, qx REAL NOT NULL, qy REAL NOT NULL, qz REAL NOT NULL, status T
 }
 
 @test "a recording of a form that is not known yet is told from a damaged one" {
-	ask a.rec "PRAGMA user_version=4"
+	ask a.rec "PRAGMA user_version=5"
 	for verb in verify info export; do
 		run --separate-stderr incise $verb a.rec
-		failed_with "a.rec: made by a newer incise (format 4, this version reads up to 3)"
+		failed_with "a.rec: made by a newer incise (format 5, this version reads up to 4)"
 	done
 }
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Proof that a recording is complete. It recomputes the ledger from the rows, compares the
+ * Proof that a recording is complete. It recomputes ledger and seal from the rows, compares the
  * frames of the camera with their rows, recomputes the seals, and lets SQLite check its pages.
  * See table ledger in incise-recording(5). Part of libincise-record.
  */
@@ -29,13 +29,16 @@ enum incise_verify_kind {
 	INCISE_VERIFY_DAMAGED,
 	INCISE_VERIFY_ENDED, /**< a device failed before the recording ended */
 	INCISE_VERIFY_TIMES, /**< t_ns of tracker rows is wrong; arrivals are used */
+	/** rows, though their ledger agrees, or a statement differ from the seal; see incise/seal.h */
+	INCISE_VERIFY_SEAL,
 };
 
 /** One finding and its place. */
 struct incise_verify_finding {
 	enum incise_verify_kind kind;
-	const char *stream;		 /**< "force", "tracker", "camera"; "": all */
-	int64_t first_block, last_block; /**< ALTERED and LEDGER; else -1 */
+	/** "force", "tracker", "camera"; "": all; of SEAL: the part, see incise_seal_part */
+	const char *stream;
+	int64_t first_block, last_block; /**< ALTERED, LEDGER; SEAL: commits; else -1 */
 	int64_t first_seq, last_seq;	 /**< numbers; last < first: unknown */
 	/** CLOCK_MONOTONIC; LOST: of the rows around; else of the numbers; -1: unknown. */
 	int64_t first_ns, last_ns;
@@ -78,6 +81,9 @@ struct incise_verify_report {
 	int n_streams;
 	struct incise_verify_stream streams[INCISE_VERIFY_STREAMS];
 	struct incise_verify_frames frames;
+	/** Its seal agrees, and the statement that it was compared with; false without a seal. */
+	bool sealed;
+	uint64_t commits; /**< in the seal; 0: of an older format, without one */
 };
 
 /** Callbacks; any may be NULL. */

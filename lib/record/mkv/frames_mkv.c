@@ -27,6 +27,7 @@
 #include <libavutil/frame.h>
 #include <libavutil/intreadwrite.h>
 #include <libavutil/opt.h>
+#include <openssl/evp.h>
 #include "../frames.h"
 
 #define BUFFER_BYTES (1 << 20) /* one write(2) for most frames */
@@ -67,6 +68,12 @@ static bool note_read(struct note *note, const uint8_t *bytes, size_t size)
 static uint32_t crc_of(const uint8_t *bytes, size_t size)
 {
 	return ~av_crc(av_crc_get_table(AV_CRC_32_IEEE_LE), ~0U, bytes, size);
+}
+
+static bool digest_of(const AVPacket *packet, struct incise_frames_stored *stored)
+{
+	return EVP_Digest(packet->data, (size_t)packet->size, stored->sha256, NULL,
+			  EVP_sha256(), NULL);
 }
 
 /*
@@ -360,7 +367,8 @@ static int writer_put(struct incise_frames_writer *writer,
 	stored->crc = crc_of(w->packet->data, (size_t)w->packet->size);
 	w->packet->pts = w->packet->dts = stored->pts_ms;
 	w->packet->flags |= AV_PKT_FLAG_KEY;
-	rc = add_note(w, frame, stored->crc);
+	rc = digest_of(w->packet, stored) ? add_note(w, frame, stored->crc)
+					  : AVERROR(ENOMEM);
 	if (!rc)
 		rc = mux(w);
 	av_packet_unref(w->packet);
@@ -705,6 +713,8 @@ static int reader_next(struct incise_frames_reader *reader,
 		.bytes = (uint32_t)r->packet->size,
 		.crc = crc_of(r->packet->data, (size_t)r->packet->size),
 	};
+	if (reader->digests && !digest_of(r->packet, stored))
+		return incise_error_set(err, ENOMEM, "%.300s: out of memory", r->path);
 	if (!r->packet->size || (noted && stored->crc != note.crc))
 		return bad(r, &note, "its bytes differ from those recorded", err);
 	if (!r->codec) {

@@ -12,6 +12,7 @@
 #include "../frames.h"
 #include "../schema.h"
 #include "../read/session.h"
+#include "seal_walk.h"
 #include "verify.h"
 
 /* One integer by SQL; @otherwise if it is NULL or cannot be read. */
@@ -306,7 +307,8 @@ static bool has_camera(struct incise_verification *verify)
 /* Whether a stream was recorded, though it may have no row. */
 static bool recorded(struct incise_verification *verify, int stream)
 {
-	const struct incise_ledger_form *form = &incise_ledger_forms[stream];
+	const struct incise_ledger_form *form =
+		incise_ledger_form(stream, verify->recording->form);
 	char sql[300];
 
 	snprintf(
@@ -331,7 +333,7 @@ static int check_wall(struct incise_verification *verify)
 		 1))
 		return 0;
 	return incise_verify_stream(
-		verify, &incise_ledger_forms[INCISE_LEDGER_WALL],
+		verify, incise_ledger_form(INCISE_LEDGER_WALL, verify->recording->form),
 		ask(verify, "SELECT value FROM meta WHERE key = 'wall_rows'", 0), 0,
 		&rows);
 }
@@ -363,23 +365,28 @@ static int check_streams(struct incise_verification *verify)
 		if (i == INCISE_LEDGER_CAMERA ? !verify->camera
 					      : !counted[i].rows && !recorded(verify, i))
 			continue;
-		rc = incise_verify_stream(verify, &incise_ledger_forms[i],
+		rc = incise_verify_stream(verify,
+					  incise_ledger_form(i, verify->recording->form),
 					  counted[i].rows, counted[i].lost,
 					  &report->streams[report->n_streams++]);
 	}
 	if (!rc)
 		rc = check_wall(verify);
+	verify->rows_altered = verify->altered;
 	if (!rc && verify->camera && !verify->rows_only)
 		rc = incise_verify_camera(verify);
 	return rc;
 }
 
 static int verify_one(const char *path, const struct incise_verify_watch *watch,
-		      bool rows_only, struct incise_verify_report *report,
-		      struct incise_error *err)
+		      bool rows_only, const struct incise_seal_statement *statement,
+		      struct incise_verify_report *report, struct incise_error *err)
 {
-	struct incise_verification verify = {
-		.watch = watch, .report = report, .rows_only = rows_only};
+	struct incise_verification verify = {.watch = watch,
+					     .report = report,
+					     .rows_only = rows_only,
+					     .statement = statement};
+	bool altered;
 	int rc;
 
 	*report = (struct incise_verify_report){0};
@@ -405,9 +412,15 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 		if (report->interrupted)
 			check_depth(&verify);
 		check_names(&verify);
+		altered = verify.altered;
+		verify.altered = false;
 		if (!report->interrupted)
 			rc = check_seals(&verify);
+		verify.tables_altered = verify.altered;
+		verify.altered |= altered;
 	}
+	if (!rc && verify.recording->form >= 4)
+		rc = incise_verify_seal(&verify);
 	if (!rc && !rows_only) {
 		rc = check_pages(&verify);
 		check_length(&verify);
@@ -468,6 +481,8 @@ static void add_report(struct incise_verify_report *to,
 	to->interrupted |= member->interrupted;
 	to->unverified |= member->unverified;
 	to->findings += member->findings;
+	to->sealed &= member->sealed;
+	to->commits += member->commits;
 	to->complete &= member->complete;
 	to->intact &= member->intact;
 	to->frames.checked |= member->frames.checked;
@@ -502,7 +517,8 @@ static int verify_members(const struct incise_session *session,
 {
 	int rc = 0;
 
-	*report = (struct incise_verify_report){.complete = true, .intact = true};
+	*report = (struct incise_verify_report){
+		.complete = true, .intact = true, .sealed = true};
 	for (int i = 0; i < session->n && !rc; i++) {
 		struct member_watch member = {watch, session->info[i].name, i,
 					      session->n};
@@ -510,8 +526,8 @@ static int verify_members(const struct incise_session *session,
 							  &member};
 		struct incise_verify_report found;
 
-		rc = verify_one(session->members[i]->path, &named, rows_only, &found,
-				err);
+		rc = verify_one(session->members[i]->path, &named, rows_only, NULL,
+				&found, err);
 		if (!rc)
 			add_report(report, &found);
 	}
@@ -536,7 +552,7 @@ static int verify_it(const char *path, const struct incise_verify_watch *watch,
 		return rc;
 	}
 	incise_recording_close(recording);
-	return verify_one(path, watch, rows_only, report, err);
+	return verify_one(path, watch, rows_only, NULL, report, err);
 }
 
 int incise_verify(const char *path, const struct incise_verify_watch *watch,
@@ -549,4 +565,22 @@ int incise_verify_rows(const char *path, const struct incise_verify_watch *watch
 		       struct incise_verify_report *report, struct incise_error *err)
 {
 	return verify_it(path, watch, true, report, err);
+}
+
+int incise_seal_compare(const char *path, const char *text, size_t length,
+			const struct incise_verify_watch *watch,
+			struct incise_verify_report *report, struct incise_error *err)
+{
+	struct incise_recording *recording = incise_recording_open_any(path, err);
+	struct incise_seal_statement statement;
+	int rc;
+
+	*report = (struct incise_verify_report){0};
+	if (!recording)
+		return -errno;
+	rc = incise_seal_possible(recording, err);
+	incise_recording_close(recording);
+	if (!rc)
+		rc = incise_seal_read(&statement, text, length, err);
+	return rc ? rc : verify_one(path, watch, false, &statement, report, err);
 }

@@ -5,12 +5,14 @@
  *     verify.c          the recording as a whole: seals, pages, counts, the report
  *     verify_stream.c   one stream: its rows compared with its ledger
  *     verify_camera.c   the camera's file compared with its rows
+ *     verify_seal.c     the chain of its commits, and a statement
  *     verify_times.c    the tracker's times compared with its arrivals
  *     verify_finding.c  findings and progress
  */
 #ifndef INCISE_VERIFY_PRIVATE_H
 #define INCISE_VERIFY_PRIVATE_H
 
+#include <incise/seal.h>
 #include <incise/verify.h>
 #include "../ledger.h"
 #include "../read/recording.h"
@@ -29,6 +31,8 @@ struct incise_verification {
 	bool camera;
 	uint64_t frames; /* rows of table frames */
 	bool altered;	 /* a finding other than losses and an interruption */
+	bool rows_altered, tables_altered;	       /* by the ledger */
+	const struct incise_seal_statement *statement; /* to compare with; NULL: none */
 };
 
 /*
@@ -41,6 +45,12 @@ int incise_verify_stream(struct incise_verification *verify,
 
 /* Verify the frames; fills report->frames. Returns as incise_verify_stream(). */
 int incise_verify_camera(struct incise_verification *verify);
+
+/*
+ * Recompute the seal, and compare it with the statement. Returns 0 or -ECANCELED; a read error is
+ * a finding. What the ledger has reported is not repeated.
+ */
+int incise_verify_seal(struct incise_verification *verify);
 
 /* Report rows of the tracker whose times are not to be trusted. */
 void incise_verify_times(struct incise_verification *verify);

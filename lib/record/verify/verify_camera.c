@@ -8,17 +8,20 @@
  *                  └ missing └ extra     ahead of the table
  *
  * A damaged frame may have any number, so a frame is identified by its number and by other
- * columns of its row: the timestamp in the file, or size and CRC.
+ * columns of its row: the timestamp in the file, or size and CRC. From form 4 on a row has a
+ * digest of its frame, which nobody can forge.
  */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 #include "../frames.h"
 #include "verify.h"
 
 struct row {
 	int64_t seq, t_ns, pts_ms, bytes, crc;
+	uint8_t sha256[INCISE_FRAMES_DIGEST]; /* zeros where it has none */
 };
 
 /* Consecutive frames that are wrong in the same way. */
@@ -112,8 +115,10 @@ static void read_row(sqlite3_stmt *stmt, struct row *row)
 	*row = (struct row){
 		sqlite3_column_int64(stmt, 0), sqlite3_column_int64(stmt, 1),
 		sqlite3_column_int64(stmt, 2), sqlite3_column_int64(stmt, 3),
-		sqlite3_column_int64(stmt, 4),
+		sqlite3_column_int64(stmt, 4), {0},
 	};
+	if (sqlite3_column_bytes(stmt, 5) == sizeof(row->sha256))
+		memcpy(row->sha256, sqlite3_column_blob(stmt, 5), sizeof(row->sha256));
 }
 
 /* Returns 0 or -EIO, which verify_stream.c has reported. */
@@ -186,7 +191,8 @@ static const char *difference(const struct walk *walk, const struct frame *frame
 
 	if (row->bytes != frame->stored.bytes)
 		return "its size is";
-	if (row->crc != frame->stored.crc)
+	if (row->crc != frame->stored.crc ||
+	    memcmp(row->sha256, frame->stored.sha256, sizeof(row->sha256)) != 0)
 		return "its bytes are";
 	if (row->seq < 0 || (uint64_t)row->seq != frame->head.seq)
 		return "its number is";
@@ -296,7 +302,10 @@ static void report_unopened(struct incise_verification *verify, const char *path
 
 static int prepare(struct walk *walk)
 {
-	static const char sql[] = "SELECT seq, t_ns, pts, bytes, crc FROM frames ";
+	const char *sql = walk->verify->recording->form < 4
+				  ? "SELECT seq, t_ns, pts, bytes, crc, NULL FROM frames "
+				  : "SELECT seq, t_ns, pts, bytes, crc, sha256 FROM "
+				    "frames ";
 	sqlite3 *db = walk->verify->recording->db;
 	sqlite3_stmt *stmt = NULL;
 	char text[120];
@@ -345,6 +354,7 @@ int incise_verify_camera(struct incise_verification *verify)
 		report_unopened(verify, path ? path : "", &err);
 		goto out;
 	}
+	reader->digests = verify->recording->form >= 4;
 	rc = prepare(&walk);
 	if (!rc)
 		rc = walk_through(&walk, reader);

@@ -324,6 +324,7 @@ static void put(struct incise_frame_pump *p, const struct slot *slot)
 				.quality = NAN,
 			},
 	};
+	memcpy(written.record.sha256, stored.sha256, sizeof(stored.sha256));
 	count(&p->written);
 	atomic_fetch_add_explicit(&p->bytes, stored.bytes, memory_order_relaxed);
 	if (!incise_ring_put(&p->records, &written))

@@ -281,7 +281,7 @@ static int commit(struct incise_recorder *rec, int64_t now_ns, bool last,
 
 	if (write_counts(rec) != SQLITE_OK ||
 	    incise_recorder_write_streams(rec, knots) != SQLITE_OK ||
-	    incise_recorder_write_ledger(rec) != SQLITE_OK)
+	    incise_recorder_write_ledger(rec, now_ns, last) != SQLITE_OK)
 		return incise_recorder_fail(rec, err);
 	rc = commit_files(rec, err);
 	if (rc)
@@ -303,6 +303,7 @@ static void recorder_free(struct incise_recorder *rec)
 	close_camera(rec);
 	incise_wall_sampler_free(rec->wall.sampler);
 	incise_recorder_close_database(rec);
+	incise_seal_free(&rec->seal);
 	incise_recorder_disarm(rec);
 	if (rec->folder >= 0)
 		close(rec->folder);
@@ -361,6 +362,11 @@ static int start(struct incise_recorder *rec, const struct incise_recorder_setup
 	int rc = incise_recorder_check_space(rec, setup->planned_s, err);
 
 	rec->worthless = true;
+	if (!rc && incise_seal_init(&rec->seal))
+		rc = incise_error_set(err, ENOMEM,
+				      "%s: libcrypto gives no SHA-256; check its "
+				      "openssl.cnf",
+				      rec->path);
 	if (!rc)
 		rc = incise_recorder_open_database(rec, setup->calibration_path, err);
 	if (!rc)
@@ -673,14 +679,13 @@ static int complete(struct incise_recorder *rec, struct incise_error *err)
 {
 	int rc = incise_recorder_end(rec, err);
 
-	if (!rc && (incise_recorder_end_ledger(rec) != SQLITE_OK ||
-		    incise_recorder_note(rec, "end", "recording ended") != SQLITE_OK))
+	if (!rc && incise_recorder_note(rec, "end", "recording ended") != SQLITE_OK)
 		rc = incise_recorder_fail(rec, err);
 	if (!rc)
 		rc = commit(rec, rec->commit_ns, true, err);
 	/* The seals are over all rows, those of this commit included. */
 	if (!rc && (incise_recorder_set_integer(rec, "complete", 1) != SQLITE_OK ||
-		    incise_recorder_seal(rec) != SQLITE_OK))
+		    incise_recorder_seal(rec, rec->commit_ns) != SQLITE_OK))
 		rc = incise_recorder_fail(rec, err);
 	if (!rc)
 		rc = commit_files(rec, err);

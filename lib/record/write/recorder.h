@@ -19,6 +19,7 @@
 #include "../ledger.h"
 #include "../read/cut.h"
 #include "../read/depth.h"
+#include "../seal_chain.h"
 #include "../time/timeline.h"
 #include "frame_pump.h"
 #include "wall_sampler.h"
@@ -36,6 +37,7 @@ enum {
 	DROP_KNOTS,
 	INSERT_KNOT,
 	INSERT_WALL,
+	INSERT_SEAL,
 	STATEMENTS
 };
 
@@ -142,6 +144,7 @@ struct incise_recorder {
 	struct incise_recorder_pretrigger pretrigger;
 	struct incise_recorder_camera camera;
 	struct incise_recorder_wall wall;
+	struct incise_seal seal;
 	struct incise_recorder_disk disk;
 	struct incise_recorder_stats stats;
 	struct {
@@ -218,17 +221,17 @@ int incise_recorder_settle_zero(struct incise_recorder *rec, struct incise_error
 /* Write tables streams and, with @knots, knots. Returns an SQLite code. */
 int incise_recorder_write_streams(struct incise_recorder *rec, bool knots);
 
-/* Write a block of the ledger for each stream with new rows. Returns an SQLite code. */
-int incise_recorder_write_ledger(struct incise_recorder *rec);
-
-/* Write the last blocks and the end of each stream's ledger. Returns an SQLite code. */
-int incise_recorder_end_ledger(struct incise_recorder *rec);
+/*
+ * Write a block of the ledger for each stream with new rows, and with @last the ends; then the
+ * head of the seal at this commit, whose time is @t_ns. Returns an SQLite code.
+ */
+int incise_recorder_write_ledger(struct incise_recorder *rec, int64_t t_ns, bool last);
 
 /*
  * Seal the tables without blocks; the last write, in the transaction that marks the recording
  * complete. Returns an SQLite code.
  */
-int incise_recorder_seal(struct incise_recorder *rec);
+int incise_recorder_seal(struct incise_recorder *rec, int64_t t_ns);
 
 /* --- recorder_database.c ----------------------------------------------------------- */
 

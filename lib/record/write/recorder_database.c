@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/random.h>
 #include <sys/utsname.h>
 #include <time.h>
 #include <unistd.h>
@@ -24,7 +25,7 @@ static const char *const sql[STATEMENTS] = {
 	[INSERT_FORCE] = "INSERT INTO force VALUES(?,?,?)",
 	[INSERT_TRACKER] = "INSERT INTO tracker VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?)",
 	[INSERT_DEPTH] = "INSERT INTO depth VALUES(?,?,?,?)",
-	[INSERT_FRAME] = "INSERT INTO frames VALUES(?,?,?,?,?,?,?,?,?,?)",
+	[INSERT_FRAME] = "INSERT INTO frames VALUES(?,?,?,?,?,?,?,?,?,?,?)",
 	[INSERT_EVENT] = "INSERT INTO events VALUES(?,?,?)",
 	[INSERT_LEDGER] = "INSERT INTO ledger VALUES(?,?,?,?,?,?,?,?,?)",
 	[SET_META] = "INSERT OR REPLACE INTO meta VALUES(?,?)",
@@ -33,6 +34,7 @@ static const char *const sql[STATEMENTS] = {
 	[DROP_KNOTS] = "DELETE FROM knots WHERE stream = ?",
 	[INSERT_KNOT] = "INSERT INTO knots VALUES(?,?,?,?,?,?)",
 	[INSERT_WALL] = "INSERT INTO wall VALUES(?,?,?,?,?,?,?,?,?,?,?,?)",
+	[INSERT_SEAL] = "INSERT INTO seal VALUES(?,?,?,?,?,?,?)",
 };
 
 int incise_recorder_fail(struct incise_recorder *rec, struct incise_error *err)
@@ -211,6 +213,19 @@ static int set_boot(struct incise_recorder *rec)
 	return set_text(rec, "boot", text);
 }
 
+/* No two recordings have the same one. */
+static int set_identity(struct incise_recorder *rec)
+{
+	uint8_t bytes[16];
+	char text[2 * sizeof(bytes) + 1];
+
+	if (getrandom(bytes, sizeof(bytes), 0) != sizeof(bytes))
+		return SQLITE_IOERR;
+	for (size_t i = 0; i < sizeof(bytes); i++)
+		snprintf(text + 2 * i, 3, "%02x", bytes[i]);
+	return set_text(rec, "identity", text);
+}
+
 static int write_meta(struct incise_recorder *rec, const char *calibration_path)
 {
 	const struct incise_tracker_info *tracker = &rec->tracker_info;
@@ -228,6 +243,7 @@ static int write_meta(struct incise_recorder *rec, const char *calibration_path)
 		 gmtime_r(&now.tv_sec, &utc));
 	uname(&host);
 	bad |= incise_recorder_set_integer(rec, "complete", 0);
+	bad |= set_identity(rec);
 	bad |= set_text(rec, "incise", incise_version());
 	bad |= set_text(rec, "host", host.nodename);
 	bad |= set_text(rec, "kernel", host.release);
@@ -315,6 +331,8 @@ int incise_recorder_open_database(struct incise_recorder *rec,
 					&rec->stmt[i], NULL);
 	if (rc == SQLITE_OK)
 		rc = write_meta(rec, calibration_path);
+	if (rc == SQLITE_OK)
+		rc = incise_seal_start(&rec->seal, rec->db);
 	return incise_recorder_check(rec, rc, err);
 }
 

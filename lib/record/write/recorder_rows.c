@@ -4,6 +4,7 @@
  *
  *     force ────► timeline ─┬─────────────────► table force
  *       └► zero: 0.5 s      ├─► CRC, chained ─► table ledger
+ *                           ├─► SHA-256 ──────► table seal
  *     tracker ──► timeline ─┼─────────────────► table tracker
  *       └► depth, speed ────┼─────────────────► table depth
  *     camera ───► timeline ─┴─────────────────► table frames
@@ -313,6 +314,7 @@ static int enter(struct incise_recorder *rec, struct incise_recorder_stream *str
 		stream->rows ? (uint64_t)row->seq - (uint64_t)ledger->last_seq - 1 : 0;
 
 	incise_ledger_add(ledger, row);
+	incise_seal_row(&rec->seal, (int)(stream - rec->streams), row);
 	stream->rows++;
 	if (!missing)
 		return 0;
@@ -443,6 +445,7 @@ static int write_wall(struct incise_recorder *rec, const struct incise_wall_poin
 		return incise_recorder_fail(rec, err);
 	incise_ledger_row_wall(&entry, rec->wall.rows++, point);
 	incise_ledger_add(&rec->wall.ledger, &entry);
+	incise_seal_row(&rec->seal, INCISE_LEDGER_WALL, &entry);
 	return 0;
 }
 
@@ -801,6 +804,7 @@ int incise_recorder_put_frame(struct incise_recorder *rec,
 	sqlite3_bind_int64(stmt, 6, row.crc);
 	for (int i = 0; i < 4; i++)
 		sqlite3_bind_double(stmt, 7 + i, seen[i]);
+	sqlite3_bind_blob(stmt, 11, row.sha256, sizeof(row.sha256), SQLITE_TRANSIENT);
 	if (incise_recorder_run(stmt) != SQLITE_OK)
 		return incise_recorder_fail(rec, err);
 	rec->stats.camera_depth_mm = row.depth_mm;
@@ -896,68 +900,86 @@ static int put_block(struct incise_recorder *rec, const char *stream,
 	return incise_recorder_run(stmt);
 }
 
-int incise_recorder_write_ledger(struct incise_recorder *rec)
+/* A stream's block, into the ledger and the seal. */
+static int put_stream_block(struct incise_recorder *rec, int i,
+			    const struct incise_ledger_block *block)
 {
-	struct incise_ledger_block block;
-	int rc = SQLITE_OK;
-
-	for (int i = 0; i < INCISE_LEDGER_STREAMS && rc == SQLITE_OK; i++)
-		if (incise_ledger_end(&rec->streams[i].ledger, &block))
-			rc = put_block(rec, rec->streams[i].name, &block);
-	if (rc == SQLITE_OK && incise_ledger_end(&rec->wall.ledger, &block))
-		rc = put_block(rec, incise_ledger_forms[INCISE_LEDGER_WALL].stream,
-			       &block);
-	return rc;
+	incise_seal_block(&rec->seal, i, block);
+	return put_block(rec, incise_ledger_forms[i].stream, block);
 }
 
-int incise_recorder_end_ledger(struct incise_recorder *rec)
+/* The head of a commit. */
+static int put_seal(struct incise_recorder *rec, int64_t t_ns)
 {
-	int rc = incise_recorder_write_ledger(rec);
+	const struct incise_seal *seal = &rec->seal;
+	sqlite3_stmt *stmt = rec->stmt[INSERT_SEAL];
 
-	if (rc == SQLITE_OK && rec->wall.sampler) {
+	sqlite3_bind_int64(stmt, 1, seal->next);
+	sqlite3_bind_int64(stmt, 2, t_ns);
+	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
+		sqlite3_bind_int64(stmt, 3 + i, seal->blocks[i]);
+	if (!incise_seal_commit(&rec->seal, t_ns))
+		return SQLITE_NOMEM;
+	sqlite3_bind_blob(stmt, 3 + INCISE_LEDGER_FORMS, seal->head, sizeof(seal->head),
+			  SQLITE_TRANSIENT);
+	return incise_recorder_run(stmt);
+}
+
+int incise_recorder_write_ledger(struct incise_recorder *rec, int64_t t_ns, bool last)
+{
+	int rc = SQLITE_OK;
+
+	for (int i = 0; i < INCISE_LEDGER_FORMS && rc == SQLITE_OK; i++) {
+		const bool wall = i == INCISE_LEDGER_WALL;
+		const bool exists =
+			wall ? rec->wall.sampler != NULL : rec->streams[i].exists;
+		struct incise_ledger *ledger =
+			wall ? &rec->wall.ledger : &rec->streams[i].ledger;
 		struct incise_ledger_block block;
+		uint64_t lost = wall ? 0 : incise_recorder_lost(rec, i);
 
-		incise_ledger_close(&rec->wall.ledger, 0, &block);
-		rc = put_block(rec, incise_ledger_forms[INCISE_LEDGER_WALL].stream,
-			       &block);
-	}
-	for (int i = 0; i < INCISE_LEDGER_STREAMS && rc == SQLITE_OK; i++) {
-		struct incise_ledger *ledger = &rec->streams[i].ledger;
-		struct incise_ledger_block block;
-		uint64_t lost = incise_recorder_lost(rec, i);
-
-		if (!rec->streams[i].exists)
+		if (incise_ledger_end(ledger, &block))
+			rc = put_stream_block(rec, i, &block);
+		if (!last || !exists || rc != SQLITE_OK)
 			continue;
 		/* Losses that no gap in the numbers shows. */
 		incise_ledger_close(ledger, lost > ledger->lost ? lost - ledger->lost : 0,
 				    &block);
-		rc = put_block(rec, rec->streams[i].name, &block);
+		rc = put_stream_block(rec, i, &block);
 	}
-	return rc;
+	return rc == SQLITE_OK ? put_seal(rec, t_ns) : rc;
 }
 
-/* Seal camera.mkv, if there is one. */
-static int seal_file(struct incise_recorder *rec)
+/* Seal camera.mkv, if there is one; then the tables, in the chain. */
+static int seal_chain(struct incise_recorder *rec, int64_t t_ns)
 {
 	struct incise_ledger_block block;
 	int fd = openat(rec->folder, INCISE_FRAMES_FILE, O_RDONLY | O_CLOEXEC);
+	int64_t length = 0;
 	struct stat st;
-	int rc;
+	int rc = SQLITE_OK, code;
 
-	if (fd < 0)
-		return errno == ENOENT ? SQLITE_OK : SQLITE_IOERR;
-	rc = fstat(fd, &st) ? -errno : 0;
-	/* A disk that hangs may yet write what its writer was left with. */
-	if (!rc)
-		rc = incise_ledger_seal_file(fd, rec->camera.given_up ? 0 : st.st_size,
-					     &block);
-	close(fd);
-	return rc ? SQLITE_IOERR : put_block(rec, INCISE_LEDGER_FILE, &block);
+	if (fd < 0 && errno != ENOENT)
+		return SQLITE_IOERR;
+	if (fd >= 0) {
+		code = fstat(fd, &st) ? -errno : 0;
+		/* A disk that hangs may yet write what its writer was left with. */
+		if (!rec->camera.given_up)
+			length = st.st_size;
+		if (!code)
+			code = incise_ledger_seal_file(fd, length, &block);
+		rc = code ? SQLITE_IOERR : put_block(rec, INCISE_LEDGER_FILE, &block);
+	}
+	if (rc == SQLITE_OK)
+		rc = incise_seal_tables(&rec->seal, rec->db, fd, length);
+	if (fd >= 0)
+		close(fd);
+	return rc == SQLITE_OK ? put_seal(rec, t_ns) : rc;
 }
 
-int incise_recorder_seal(struct incise_recorder *rec)
+int incise_recorder_seal(struct incise_recorder *rec, int64_t t_ns)
 {
-	int rc = seal_file(rec);
+	int rc = SQLITE_OK;
 
 	for (int i = 0; incise_ledger_sealed[i] && rc == SQLITE_OK; i++) {
 		struct incise_ledger_block block;
@@ -969,5 +991,5 @@ int incise_recorder_seal(struct incise_recorder *rec)
 		if (rc == SQLITE_OK)
 			rc = put_block(rec, stream, &block);
 	}
-	return rc;
+	return rc == SQLITE_OK ? seal_chain(rec, t_ns) : rc;
 }

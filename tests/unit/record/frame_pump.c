@@ -134,7 +134,7 @@ static int file_put(struct incise_frames_writer *writer,
 			;
 	if (f->at == n && f->fail)
 		return incise_error_set(err, f->fail, "the file: disk full");
-	*stored = (struct incise_frames_stored){(int64_t)frame->seq * 10, 100, 5};
+	*stored = (struct incise_frames_stored){(int64_t)frame->seq * 10, 100, 5, {0}};
 	return 0;
 }
 

@@ -48,10 +48,16 @@ __attribute__((unused)) static int remove_entry(const char *path, const struct s
 	"qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL); "                  \
 	"INSERT INTO tracker SELECT seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, " \
 	"qy, qz, status FROM old; DROP TABLE old; DROP TABLE frames; "                 \
-	"DROP TABLE streams; DROP TABLE knots; DROP TABLE ledger; PRAGMA user_version=1"
+	"DROP TABLE streams; DROP TABLE knots; DROP TABLE ledger; DROP TABLE wall; "   \
+	"DROP TABLE seal; PRAGMA user_version=1"
+
+/* Makes one of form 3, from before the seal. */
+#define TO_FORM_3                                                  \
+	"DROP TABLE seal; ALTER TABLE frames DROP COLUMN sha256; " \
+	"PRAGMA user_version=3"
 
 /* Makes one of form 2, from before there was wall time. */
-#define TO_FORM_2 "DROP TABLE wall; PRAGMA user_version=2"
+#define TO_FORM_2 TO_FORM_3 "; DROP TABLE wall; PRAGMA user_version=2"
 
 /* For setup and teardown: a folder as the working folder, so that paths are short. */
 __attribute__((unused)) static int enter_folder(void **state)

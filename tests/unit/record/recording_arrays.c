@@ -170,7 +170,7 @@ static void elements_are_rows(void **state)
 
 	change(DB,
 	       NUMBERS "INSERT INTO frames SELECT n, 1000 * n, 0, n, 1, 0, NULL, NULL, "
-		       "iif((n + 1) % 4, NULL, n + 1.0), NULL FROM i");
+		       "iif((n + 1) % 4, NULL, n + 1.0), NULL, zeroblob(32) FROM i");
 	assert_int_equal(values_of("camera", &values, &err), 2500);
 	assert_true(values[0].value == 4 && values[2499].value == 10000);
 	free(values);
@@ -218,7 +218,7 @@ static int lengths_of(struct incise_recording_length **rows, struct incise_error
 
 #define FRAME(seq, t, length, quality)                                          \
 	"INSERT INTO frames VALUES(" #seq ", " #t ", " #t ", 0, 1, 1, " #length \
-	", 0.1, 1.0, " #quality ");"
+	", 0.1, 1.0, " #quality ", zeroblob(32));"
 
 static void depths_are_interpolated(void **state)
 {
@@ -294,11 +294,11 @@ static void old_recordings_have_no_frames(void **state)
 #define CUTS "sim:clock=simulated,cut_s=2,pause_s=0.5,depth_mm=8"
 
 /* A frame between each two records, 0.25 mm deeper than the middle of both. */
-#define FRAMES                                                                            \
-	"DELETE FROM knots; DELETE FROM frames; "                                         \
-	"INSERT INTO frames SELECT a.seq, (a.t_ns + b.t_ns) / 2, b.t_ns, a.seq, 1, 0, "   \
-	"100.0, 0.1, 0.25 - (a.z_mm + b.z_mm) / 2, 0.9 FROM tracker a JOIN tracker b ON " \
-	"b.seq = a.seq + 1; "
+#define FRAMES                                                                          \
+	"DELETE FROM knots; DELETE FROM frames; "                                       \
+	"INSERT INTO frames SELECT a.seq, (a.t_ns + b.t_ns) / 2, b.t_ns, a.seq, 1, 0, " \
+	"100.0, 0.1, 0.25 - (a.z_mm + b.z_mm) / 2, 0.9, zeroblob(32) FROM tracker a "   \
+	"JOIN tracker b ON b.seq = a.seq + 1; "
 
 static int pairs_of(struct incise_depth_pair **pairs, struct incise_error *err)
 {

@@ -186,7 +186,7 @@ static void uncertainties_are_what_was_put_in(void **state)
 	       "INSERT INTO frames WITH RECURSIVE f(i) AS (SELECT 0 UNION ALL SELECT i + 1 "
 	       "FROM f WHERE i < 250) SELECT i, (SELECT min(t_ns) FROM force) + i * "
 	       "10000000, 0, 0, 1, 0, 100.0, 0.5, 0.2 * i, CASE WHEN i % 50 = 7 THEN 0.4 "
-	       "ELSE 0.9 END FROM f;"
+	       "ELSE 0.9 END, zeroblob(32) FROM f;"
 	       "UPDATE frames SET depth_mm = NULL, sd_px = NULL WHERE seq IN (20, 21);"
 	       "DELETE FROM frames WHERE seq BETWEEN 100 AND 105");
 	incise_calibration_nominal(&calibration);
@@ -282,10 +282,10 @@ static void damage_is_told(void **state)
 		{"UPDATE tracker SET t_ns = 5 WHERE seq = 70", "table tracker, row 70"},
 		{"UPDATE depth SET depth_mm = 'deep' WHERE seq = 70",
 		 "table depth or tracker, row 70"},
-		{"INSERT INTO frames VALUES(0, 1, 1, 0, 1, 0, 1.0, 1.0, 'x', 1.0)",
+		{"INSERT INTO frames VALUES(0, 1, 1, 0, 1, 0, 1.0, 1.0, 'x', 1.0, zeroblob(32))",
 		 "table frames, row 0"},
-		{"INSERT INTO frames VALUES(0, 5, 1, 0, 1, 0, 1.0, 1.0, 1.0, 1.0), "
-		 "(1, 5, 1, 0, 1, 0, 1.0, 1.0, 1.0, 1.0)",
+		{"INSERT INTO frames VALUES(0, 5, 1, 0, 1, 0, 1.0, 1.0, 1.0, 1.0, zeroblob(32)), "
+		 "(1, 5, 1, 0, 1, 0, 1.0, 1.0, 1.0, 1.0, zeroblob(32))",
 		 "table frames, row 1"},
 	};
 

@@ -21,7 +21,8 @@ static void check(const char *sql, int expected, const char *text)
 	else if (!rc)
 		assert_int_equal(form, !strcmp(sql, TO_FORM_1)	 ? 1
 				       : !strcmp(sql, TO_FORM_2) ? 2
-								 : 3);
+				       : !strcmp(sql, TO_FORM_3) ? 3
+								 : 4);
 	sqlite3_close(db);
 }
 
@@ -37,11 +38,14 @@ static void only_the_own_form_is_taken(void **state)
 		{"CREATE TABLE mine(a); CREATE INDEX i ON force(t_ns)", 0, ""},
 		{TO_FORM_1, 0, ""},
 		{TO_FORM_2, 0, ""},
+		{TO_FORM_3, 0, ""},
+		{"DROP TABLE seal", -EINVAL, "table 'seal' is missing"},
+		{"PRAGMA user_version=3", -EINVAL, "table 'frames' is not as incise"},
 		{"DROP TABLE wall", -EINVAL, "table 'wall' is missing"},
 		{"PRAGMA user_version=1", -EINVAL, "table 'tracker' is not as incise"},
 		{"DROP TABLE ledger", -EINVAL, "table 'ledger' is missing"},
 		{"PRAGMA application_id=1", -EINVAL, "not made by incise"},
-		{"PRAGMA user_version=4", -EINVAL, "newer incise"},
+		{"PRAGMA user_version=5", -EINVAL, "newer incise"},
 		{"PRAGMA user_version=0", -EINVAL, "damaged"},
 		{"PRAGMA user_version=-1", -EINVAL, "damaged"},
 		{"DROP TABLE force", -EINVAL, "table 'force' is missing"},

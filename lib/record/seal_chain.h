@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The seal of a recording: a chain of SHA-256 over its commits, while it is written or
+ * recomputed. It shows that nothing was changed since somebody signed a head of it.
+ *
+ *     meta of the start ─► genesis ─► head 0 ─► head 1 ─► … ─► last head
+ *                                       ▲         ▲               ▲
+ *     rows of a commit ─► digest ─┬─► its blocks, number, time    depth, events, knots, meta,
+ *                                 └─► chain of each stream        streams, camera.mkv
+ *
+ * All integers are 64 bits, little-endian. Described for users in incise-recording(5), which
+ * tests/attack/forgeries.py implements a second time. Part of libincise-record, on libcrypto.
+ */
+#ifndef INCISE_SEAL_CHAIN_H
+#define INCISE_SEAL_CHAIN_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <openssl/evp.h>
+#include <sqlite3.h>
+#include "ledger.h"
+
+#define INCISE_SEAL_BYTES 32
+
+/* What a statement has a digest of, in its order; the streams are those of the ledger. */
+enum incise_seal_number {
+	INCISE_SEAL_START,
+	INCISE_SEAL_CONFIGURATION,
+	INCISE_SEAL_CALIBRATION,
+	INCISE_SEAL_STREAM,
+	INCISE_SEAL_DEPTH = INCISE_SEAL_STREAM + INCISE_LEDGER_FORMS,
+	INCISE_SEAL_EVENTS,
+	INCISE_SEAL_KNOTS,
+	INCISE_SEAL_STREAMS,
+	INCISE_SEAL_META,
+	INCISE_SEAL_FILE,
+	INCISE_SEAL_PARTS
+};
+
+extern const char *const incise_seal_parts[INCISE_SEAL_PARTS];
+
+struct incise_seal {
+	EVP_MD *sha256;
+	EVP_MD_CTX *rows[INCISE_LEDGER_FORMS]; /* of the open blocks */
+	EVP_MD_CTX *commit;		       /* of the open commit */
+	bool failed;			     /* libcrypto did, which has no memory then */
+	int64_t next;			     /* number of the open commit */
+	int64_t blocks[INCISE_LEDGER_FORMS]; /* so far */
+	uint64_t n_rows[INCISE_LEDGER_FORMS]; /* so far */
+	uint8_t chain[INCISE_LEDGER_FORMS][INCISE_SEAL_BYTES];
+	uint8_t head[INCISE_SEAL_BYTES];
+};
+
+/* Returns 0, -ENOMEM, or -ENOTSUP: a libcrypto without SHA-256. Free it in any case. */
+int incise_seal_init(struct incise_seal *seal);
+void incise_seal_free(struct incise_seal *seal);
+
+/* The genesis: start the chain over the parts of table meta that are never rewritten. */
+int incise_seal_start(struct incise_seal *seal, sqlite3 *db);
+
+/* Go on from another head than the last: that of the table, where it is not the recomputed one. */
+void incise_seal_resume(struct incise_seal *seal, const uint8_t head[INCISE_SEAL_BYTES]);
+
+/* A row of a stream's open block, then the block. Within a commit: streams in their order. */
+void incise_seal_row(struct incise_seal *seal, int stream,
+		     const struct incise_ledger_row *row);
+void incise_seal_block(struct incise_seal *seal, int stream,
+		       const struct incise_ledger_block *block);
+
+/* The tables without blocks and camera.mkv (-1: none), before the last commit. SQLite's code. */
+int incise_seal_tables(struct incise_seal *seal, sqlite3 *db, int fd, int64_t length);
+
+/* End the commit: its head is in seal->head. False: libcrypto has failed. */
+bool incise_seal_commit(struct incise_seal *seal, int64_t t_ns);
+
+/*
+ * The digest of a part of meta or of a table, and the number of its rows. Returns an SQLite code;
+ * SQLITE_NOMEM where libcrypto failed.
+ */
+int incise_seal_table(const struct incise_seal *seal, sqlite3 *db,
+		      enum incise_seal_number part, uint64_t *rows,
+		      uint8_t digest[INCISE_SEAL_BYTES]);
+
+/* That of camera.mkv: its head, and its length, 0 where it is not known. Returns 0 or -errno. */
+int incise_seal_file(const struct incise_seal *seal, int fd, int64_t length,
+		     uint8_t digest[INCISE_SEAL_BYTES]);
+
+/* 64 lower-case digits and a NUL. */
+void incise_seal_hex(const uint8_t bytes[INCISE_SEAL_BYTES],
+		     char hex[2 * INCISE_SEAL_BYTES + 1]);
+
+#endif

@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The seal of a recording recomputed from its rows, commit by commit. Memory does not grow with
+ * the recording, and a commit that does not agree does not affect those after it.
+ *
+ *     rows of 4 streams ─┐
+ *     their ledgers ─────┼─► a commit ─► head, compared with that of table seal
+ *     table seal ────────┘
+ */
+#ifndef INCISE_SEAL_WALK_H
+#define INCISE_SEAL_WALK_H
+
+#include <incise/seal.h>
+#include "../read/recording.h"
+#include "../seal_chain.h"
+
+struct incise_seal_walk_stream {
+	sqlite3_stmt *rows, *blocks;
+	const struct incise_ledger_form *form;
+	struct incise_ledger_row row; /* next, where has_row */
+	bool has_row, good_row;
+	bool ended; /* no block is left */
+};
+
+struct incise_seal_walk {
+	struct incise_recording *recording;
+	struct incise_seal seal; /* after the commit */
+	sqlite3_stmt *commits;
+	struct incise_seal_walk_stream streams[INCISE_LEDGER_FORMS];
+	int64_t last; /* number of the last commit; -1: there is none */
+	/* The commit. */
+	int64_t number, t_ns;
+	bool good; /* it is what its rows give */
+};
+
+/* Returns 0, -EINVAL, -EIO, -ENOMEM; for a recording of form 4. Close it in any case. */
+int incise_seal_walk_open(struct incise_seal_walk *walk,
+			  struct incise_recording *recording, struct incise_error *err);
+
+/* Go to the next commit: 1; 0 at the end; as incise_seal_walk_open(). */
+int incise_seal_walk_next(struct incise_seal_walk *walk, struct incise_error *err);
+
+/* Behind the last commit: the number of rows, and whether the ledger has blocks. */
+uint64_t incise_seal_walk_behind(struct incise_seal_walk *walk, bool *blocks);
+
+void incise_seal_walk_close(struct incise_seal_walk *walk);
+
+/*
+ * Fill a statement from a recording up to commit @upto, -1: the last one. @step is called after
+ * each commit of the whole recording, and may stop it with its result. A recording that ends
+ * before @upto has fewer heads: those behind have an empty text.
+ */
+int incise_statement_make(struct incise_seal_statement *statement,
+			  struct incise_recording *recording, int64_t upto,
+			  int (*step)(void *user, struct incise_seal_walk *walk),
+			  void *user, struct incise_error *err);
+
+/* Write a statement's text. Returns its length, or 0: too long for any statement. */
+size_t incise_statement_write(const struct incise_seal_statement *statement,
+			      char text[INCISE_STATEMENT_MAX]);
+
+/* Whether a recording can have a seal: 0; -ENODATA, -ENOTSUP. */
+int incise_seal_possible(const struct incise_recording *recording,
+			 struct incise_error *err);
+
+#endif
