@@ -13,6 +13,7 @@
 #include <incise/factor.h>
 #include <incise/fixed.h>
 #include <incise/model.h>
+#include <incise/recalibration.h>
 #include <incise/recording.h>
 #include <incise/scan.h>
 #include "cli/cli.h"
@@ -384,13 +385,14 @@ static json_t *adc_json(const struct incise_recording_info *info)
 }
 
 static void recording_json(const struct incise_recording_info *info, bool intact,
-			   const struct incise_wall *wall, json_t *members)
+			   const struct incise_wall *wall, json_t *members,
+			   json_t *calibrations)
 {
 	bool force = has_stream(info, "force"), tracker = has_stream(info, "tracker");
 
 	json_print(json_pack(
-		"{so so sb so ss sb sf so so s{sI sI sI} s{sI sI} sI so s{so so so} so so so}",
-		"wall",
+		"{so so so sb so ss sb sf so so s{sI sI sI} s{sI sI} sI so s{so so so} so so so}",
+		"calibrations", calibrations, "wall",
 		wall ? wall_json(wall, info->start_ns, info->end_ns) : json_null(),
 		"members", members, "intact", intact, "streams",
 		stream_json(info->streams, info->n_streams), "kind", "recording",
@@ -409,6 +411,72 @@ static void recording_json(const struct incise_recording_info *info, bool intact
 		force && tracker ? json_number(info->force_max_N) : json_null()));
 }
 
+static json_t *text_or_null(const char *text)
+{
+	return *text ? json_text(text) : json_null();
+}
+
+/* Those of a recording, or of a member, to a list. */
+static void add_calibrations(json_t *to, const char *path, const char *member)
+{
+	struct incise_recalibration *list;
+	struct incise_error err = {0};
+	char *folder = *member ? cli_text("%s/%s", path, member) : cli_text("%s", path);
+	int n = incise_recalibrations(folder, &list, &err);
+
+	if (n < 0)
+		cli_fail_with(&err);
+	for (int i = 0; i < n; i++) {
+		const struct incise_recalibration *at = &list[i];
+		char *file = cli_text("%s%s%s", member, *member && *at->file ? "/" : "",
+				      at->file);
+
+		json_array_append_new(
+			to, json_pack("{so so sb so sb}", "file", text_or_null(file),
+				      "date", text_or_null(at->date), "original",
+				      at->original || !i, "sha256",
+				      text_or_null(at->sha256), "active", at->active));
+		free(file);
+	}
+	free(list);
+	free(folder);
+}
+
+static json_t *calibrations_json(const char *path,
+				 const struct incise_session_info *members, int n)
+{
+	char *folder = file_without_choice(path);
+	json_t *list = json_array();
+
+	if (!n)
+		add_calibrations(list, path, "");
+	for (int i = 0; i < n; i++)
+		add_calibrations(list, folder, members[i].name);
+	free(folder);
+	return list;
+}
+
+/* Nothing for a recording that was never recalibrated. */
+static void calibrations_text(json_t *list)
+{
+	size_t i;
+	json_t *at;
+
+	json_array_foreach(list, i, at)
+	{
+		const char *file = json_string_value(json_object_get(at, "file"));
+		const char *sha = json_string_value(json_object_get(at, "sha256"));
+
+		if (json_array_size(list) == 1)
+			break;
+		printf("  %s %s%s%s\n",
+		       json_is_true(json_object_get(at, "active")) ? "*" : " ",
+		       file ? file : "of the capture", sha ? ", SHA-256 " : "",
+		       sha ? sha : "");
+	}
+	json_decref(list);
+}
+
 static void force_text(const struct incise_recording_info *info)
 {
 	char unit = info->newtons ? 'N' : 'V';
@@ -423,7 +491,7 @@ static void force_text(const struct incise_recording_info *info)
 }
 
 static void recording_text(const char *path, const struct incise_recording_info *info,
-			   const struct incise_wall *wall)
+			   const struct incise_wall *wall, json_t *calibrations)
 {
 	bool tracker = has_stream(info, "tracker");
 
@@ -447,6 +515,7 @@ static void recording_text(const char *path, const struct incise_recording_info 
 	if (has_stream(info, "force"))
 		printf("%g mV/N, zero %.1f mV, ", info->force_mV_N, info->zero_mV);
 	printf("%g mm/px\n", info->depth_mm_px);
+	calibrations_text(calibrations);
 	if (tracker)
 		printf("cuts     %d\n", info->cuts);
 	if (wall)
@@ -482,9 +551,10 @@ static void show_recording(const char *path, bool json, bool damaged)
 	intact = recording_intact(path, damaged, &err);
 	if (json)
 		recording_json(&info, intact, wall,
-			       n ? joined_json(members, n) : json_null());
+			       n ? joined_json(members, n) : json_null(),
+			       calibrations_json(path, members, n));
 	else
-		recording_text(path, &info, wall);
+		recording_text(path, &info, wall, calibrations_json(path, members, n));
 	if (!json)
 		joined_print(members, n);
 	incise_wall_free(wall);

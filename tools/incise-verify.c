@@ -3,7 +3,9 @@
  * incise verify: proves that a recording is complete, or says what is missing and where.
  */
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <incise/recalibration.h>
 #include <incise/verify.h>
 #include "cli/cli.h"
 #include "cli/file_kind.h"
@@ -118,8 +120,22 @@ static json_t *pictures(const struct incise_verify_report *report)
 			 "ahead", (json_int_t)frames->ahead);
 }
 
+/* The calibration that is active in place of that of the capture; false: none is. */
+static bool recalibrated(const char *path, struct incise_recalibration *active)
+{
+	struct incise_recalibration *list;
+	int n = incise_recalibrations(path, &list, NULL);
+	bool is = n > 0 && !list[0].active;
+
+	if (is)
+		*active = list[n - 1];
+	free(list);
+	return is;
+}
+
 static void print_json(const struct incise_verify_report *report, const struct sink *sink)
 {
+	struct incise_recalibration active;
 	json_t *streams = json_array();
 
 	for (int i = 0; i < report->n_streams; i++) {
@@ -134,17 +150,21 @@ static void print_json(const struct incise_verify_report *report, const struct s
 					   (json_int_t)stream->blocks, "altered_blocks",
 					   (json_int_t)stream->altered));
 	}
-	json_print(json_pack("{so sb sb sb sb sb sI so so so sI}", "path",
-			     json_text(sink->path), "complete", report->complete,
-			     "intact", report->intact, "unverified", report->unverified,
-			     "interrupted", report->interrupted, "sealed", report->sealed,
-			     "commits", (json_int_t)report->commits, "pictures",
-			     pictures(report), "streams", streams, "findings", sink->list,
-			     "findings_left_out", (json_int_t)sink->left_out));
+	json_print(json_pack(
+		"{so sb sb sb sb sb sI so so so so sI}", "path", json_text(sink->path),
+		"complete", report->complete, "intact", report->intact, "unverified",
+		report->unverified, "interrupted", report->interrupted, "sealed",
+		report->sealed, "commits", (json_int_t)report->commits, "pictures",
+		pictures(report), "recalibrated",
+		recalibrated(sink->path, &active) ? json_text(active.file) : json_null(),
+		"streams", streams, "findings", sink->list, "findings_left_out",
+		(json_int_t)sink->left_out));
 }
 
 static void print_table(const struct incise_verify_report *report, const char *path)
 {
+	struct incise_recalibration active;
+
 	for (int i = 0; i < report->n_streams; i++) {
 		const struct incise_verify_stream *stream = &report->streams[i];
 
@@ -170,6 +190,9 @@ static void print_table(const struct incise_verify_report *report, const char *p
 		       (unsigned long long)report->commits);
 	else if (!report->commits)
 		printf("%-8s none: made by an older incise\n", "seal");
+	if (recalibrated(path, &active))
+		printf("%s: read by another calibration than that of the capture: %s\n",
+		       path, active.file);
 	if (report->complete)
 		printf("%s: complete, and as it was written\n", path);
 }

@@ -28,6 +28,7 @@ static const struct {
 	{"capture", "record the streams of a rig in sync"},
 	{"verify", "check that a recording is complete"},
 	{"join", "put recordings of several machines on one timeline"},
+	{"recalibrate", "give a recording another calibration after the fact"},
 	{"export", "make a dataset from recordings, raw or averaged"},
 	{"train", "learn a fuzzy force model from recordings or datasets"},
 	{"merge", "make one model of the factors of several laboratories or machines"},
@@ -60,7 +61,7 @@ static void help(FILE *out)
 		"A toolkit for haptic cutting: record, model and render how tissue resists a "
 		"scalpel.\n\nCommands:\n");
 	for (size_t i = 0; i < COMMANDS; i++)
-		fprintf(out, "  %-10s %s\n", commands[i].name, commands[i].does);
+		fprintf(out, "  %-11s %s\n", commands[i].name, commands[i].does);
 	fprintf(out,
 		"\n'incise COMMAND --help' lists the options of a command, 'incise help "
 		"COMMAND' opens its\nmanual. New here? Start with 'incise demo'.\n");

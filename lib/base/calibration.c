@@ -366,8 +366,12 @@ static int read_history(const config_setting_t *root, const char *path,
 	return 0;
 }
 
-/* Read all of a configuration, and destroy it; on 0 the caller frees file->records. */
-static int read_config(struct file_content *file, const char *path, config_t *config,
+/*
+ * Read all of a configuration, and destroy it; absent keys have the values of @base, or nominal ones
+ * if that is NULL. On 0 the caller frees file->records.
+ */
+static int read_config(struct file_content *file, const char *path,
+		       const struct incise_calibration *base, config_t *config,
 		       struct incise_error *err)
 {
 	const char *names[N_KEYS + 2] = {NULL};
@@ -376,6 +380,8 @@ static int read_config(struct file_content *file, const char *path, config_t *co
 	int rc, n = 0;
 
 	incise_calibration_nominal(&file->in_force);
+	if (base)
+		file->in_force = *base;
 	for (key = known_keys; key < known_keys + N_KEYS; key++) {
 		const char *name = key->vector ? key->vector : key->name;
 
@@ -405,14 +411,20 @@ static int read_config(struct file_content *file, const char *path, config_t *co
 	return 0;
 }
 
-static int read_file(struct file_content *file, const char *path,
-		     struct incise_error *err)
+static int read_onto(struct file_content *file, const char *path,
+		     const struct incise_calibration *base, struct incise_error *err)
 {
 	config_t config;
 	int rc = incise_conf_read(&config, path, err);
 
 	*file = (struct file_content){0};
-	return rc ? rc : read_config(file, path, &config, err);
+	return rc ? rc : read_config(file, path, base, &config, err);
+}
+
+static int read_file(struct file_content *file, const char *path,
+		     struct incise_error *err)
+{
+	return read_onto(file, path, NULL, err);
 }
 
 int incise_calibration_text(const char *text, const char *name,
@@ -433,7 +445,7 @@ int incise_calibration_text(const char *text, const char *name,
 	rc = incise_conf_read_text(&config, name, copy, strlen(copy), err);
 	free(copy);
 	if (!rc)
-		rc = read_config(&file, name, &config, err);
+		rc = read_config(&file, name, NULL, &config, err);
 	if (rc)
 		return rc;
 	*calibration = file.in_force;
@@ -445,17 +457,31 @@ int incise_calibration_text(const char *text, const char *name,
 	return file.n;
 }
 
-int incise_calibration_load(const char *path, struct incise_calibration *calibration,
-			    struct incise_error *err)
+static int load(const char *path, const struct incise_calibration *base,
+		struct incise_calibration *calibration, struct incise_error *err)
 {
 	struct file_content file;
-	int rc = read_file(&file, path, err);
+	int rc = read_onto(&file, path, base, err);
 
 	if (rc)
 		return rc;
 	free(file.records);
 	*calibration = file.in_force;
 	return 0;
+}
+
+int incise_calibration_load(const char *path, struct incise_calibration *calibration,
+			    struct incise_error *err)
+{
+	return load(path, NULL, calibration, err);
+}
+
+int incise_calibration_update(const char *path, struct incise_calibration *calibration,
+			      struct incise_error *err)
+{
+	const struct incise_calibration base = *calibration;
+
+	return load(path, &base, calibration, err);
 }
 
 int incise_calibration_history(const char *path,

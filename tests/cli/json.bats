@@ -50,6 +50,8 @@ recordings() {
 	report join join j1.rec j2.rec -o joined.rec
 	report info.joined info joined.rec
 	report export export a.rec -o a.csv
+	echo 'force_mV_N = 1234.0;' >new.conf
+	report recalibrate recalibrate a.rec -c new.conf
 	report replay replay a.rec liver.scene
 	report replay.real_time replay a.rec liver.scene --real-time
 }

@@ -12,6 +12,7 @@
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <incise/recalibration.h>
 #include <incise/verify.h>
 #include "cli.h"
 #include "file_kind.h"
@@ -91,6 +92,21 @@ static void remove_members(const char *path)
 	free(pattern);
 }
 
+/* Those of incise recalibrate, in a folder of their own. */
+static void remove_calibrations(int folder, const char *path)
+{
+	struct incise_recalibration *list;
+	int n = incise_recalibrations(path, &list, NULL);
+
+	for (int i = 1; i < n; i++)
+		if (unlinkat(folder, list[i].file, 0))
+			cli_fail("%s/%s: cannot be removed: %s", path, list[i].file,
+				 strerror(errno));
+	free(list);
+	if (unlinkat(folder, "calibration", AT_REMOVEDIR) && errno != ENOENT)
+		cli_fail("%s/calibration: cannot be removed: %s", path, strerror(errno));
+}
+
 void recording_remove(const char *path)
 {
 	static const char *const files[] = {"recording.db", "recording.db-wal",
@@ -107,6 +123,7 @@ void recording_remove(const char *path)
 			 "give another name",
 			 path);
 	remove_members(path);
+	remove_calibrations(folder, path);
 	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++)
 		if (unlinkat(folder, files[i], 0) && errno != ENOENT)
 			cli_fail("%s/%s: cannot be removed: %s", path, files[i],

@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include <incise/arrow.h>
+#include <incise/recalibration.h>
 #include <incise/recording.h>
 #include "../cli/cli.h"
 #include "../cli/file_kind.h"
@@ -198,9 +199,10 @@ struct source *sources_new(char **paths, int n, struct source_options *options)
 
 static int open_recording(struct source *source, struct incise_error *err)
 {
+	struct incise_recalibration active;
 	struct incise_recording_info info;
 	struct incise_recording *recording;
-	char *database, *whole;
+	char *database, *whole, *text;
 	int rc;
 
 	/* Says itself what is wrong, as a warning, where damaged ones are used. */
@@ -210,6 +212,7 @@ static int open_recording(struct source *source, struct incise_error *err)
 	if (!recording)
 		return -errno;
 	rc = incise_recording_info(recording, &info, err);
+	incise_recording_recalibration(recording, &active);
 	incise_recording_close(recording);
 	if (rc)
 		return name_it(source, rc, err);
@@ -219,11 +222,15 @@ static int open_recording(struct source *source, struct incise_error *err)
 	free(whole);
 	free(database);
 	snprintf(source->rig, sizeof(source->rig), "%s", info.rig);
-	snprintf(source->text, sizeof(source->text),
-		 "%.100s, recorded %s, rig %.120s, force %.9g mV/N, zero %.9g mV, camera "
-		 "%.9g mm/px",
-		 name_of(source->path), info.started, info.rig, info.force_mV_N,
-		 info.zero_mV, info.depth_mm_px);
+	text = cli_text(
+		"%.100s, recorded %s, rig %.*s, force %.9g mV/N, zero %.9g mV, camera "
+		"%.9g mm/px%s%s%s%s",
+		name_of(source->path), info.started, *active.file ? 40 : 120, info.rig,
+		info.force_mV_N, info.zero_mV, info.depth_mm_px,
+		*active.file ? ", by " : "", active.file,
+		*active.file ? ", SHA-256 " : "", active.sha256);
+	snprintf(source->text, sizeof(source->text), "%s", text);
+	free(text);
 	return rc;
 }
 

@@ -58,6 +58,15 @@ INCISE_API int incise_calibration_load(const char *path,
 				       struct incise_calibration *calibration,
 				       struct incise_error *err);
 
+/**
+ * The same, but absent keys keep the value that @calibration has.
+ *
+ * @return as incise_calibration_load(); then @calibration is unchanged
+ */
+INCISE_API int incise_calibration_update(const char *path,
+					 struct incise_calibration *calibration,
+					 struct incise_error *err);
+
 /** The active value of a key of the history; NAN: unknown, or no such key. */
 INCISE_API double incise_calibration_get(const struct incise_calibration *calibration,
 					 const char *key);

@@ -12,7 +12,9 @@
 #include <incise/version.h>
 #include <incise/wall.h>
 #include "provenance.h"
+#include "../read/recalibration.h"
 #include "../read/recording.h"
+#include "../read/session.h"
 
 int incise_provenance_add(struct incise_provenance *provenance, const char *key,
 			  const char *fmt, ...)
@@ -152,19 +154,81 @@ static int add_wall(struct incise_provenance *provenance,
 	return rc;
 }
 
-/* Add the camera's scale, and delays of a given calibration. */
+/* Add which calibration of a recording is active; of a joined one, of each member. */
+static int describe_active(const struct incise_recording *recording, FILE *out)
+{
+	const struct incise_session *session = recording->session;
+	int n = session ? session->n : 1;
+
+	for (int i = 0; i < n; i++) {
+		const struct incise_recording *member =
+			session ? session->members[i] : recording;
+		char *text = incise_recalibration_text(member);
+
+		if (!text)
+			return -ENOMEM;
+		fprintf(out, "%s%s%s%s", i ? ", " : "", n > 1 ? member->name : "",
+			n > 1 ? ": " : "", text);
+		free(text);
+	}
+	return 0;
+}
+
+static bool is_recalibrated(const struct incise_recording *recording)
+{
+	const struct incise_session *session = recording->session;
+	bool is = recording->recalibrated;
+
+	for (int i = 0; session && i < session->n; i++)
+		is |= session->members[i]->recalibrated != NULL;
+	return is;
+}
+
+/* The calibration in use, in words: to be freed, NULL: no memory. */
+static char *calibration_text(struct incise_recording *const *recordings, int n,
+			      const struct incise_calibration *given)
+{
+	bool any = false;
+	char *text = NULL;
+	size_t size = 0;
+	FILE *out;
+	int rc = 0;
+
+	for (int i = 0; i < n; i++)
+		any |= is_recalibrated(recordings[i]);
+	if (given || !any)
+		return strdup(given ? "given for the export" : "of the recording");
+	out = open_memstream(&text, &size);
+	for (int i = 0; i < n && out && !rc; i++) {
+		if (i)
+			fputs(", ", out);
+		if (n > 1)
+			fprintf(out, "%s: ", recordings[i]->name);
+		rc = describe_active(recordings[i], out);
+	}
+	if (out && !fclose(out) && !rc)
+		return text;
+	free(text);
+	return NULL;
+}
+
+/* Add the camera's scale, and delays of a given calibration, or of an active one. */
 static int add_lengths(struct incise_provenance *provenance,
 		       struct incise_recording *const *recordings, int n,
 		       const struct incise_calibration *given)
 {
 	double mm_px = given ? given->depth_mm_px : recordings[0]->meta.depth_mm_px;
+	const struct incise_calibration *of =
+		given || n > 1 || !recordings[0]->recalibrated
+			? given
+			: &recordings[0]->recalibrated->calibration;
 	const struct {
 		const char *key;
 		double ms;
 	} delays[] = {
-		{"force_delay_ms", given ? given->force_delay_ms : NAN},
-		{"tracker_delay_ms", given ? given->tracker_delay_ms : NAN},
-		{"camera_delay_ms", given ? given->camera_delay_ms : NAN},
+		{"force_delay_ms", of ? of->force_delay_ms : NAN},
+		{"tracker_delay_ms", of ? of->tracker_delay_ms : NAN},
+		{"camera_delay_ms", of ? of->camera_delay_ms : NAN},
 	};
 	int rc;
 
@@ -189,13 +253,15 @@ static int add_calibration(struct incise_provenance *provenance,
 	double mV_N = volts ? given->force_mV_N : recordings[0]->meta.force_mV_N;
 	double zero_mV = recordings[0]->meta.zero_mV;
 	bool own = !volts || isnan(given->force_zero_mV);
+	char *text = calibration_text(recordings, n, given);
 	int rc;
 
 	if (!own)
 		zero_mV = given->force_zero_mV;
 
-	rc = incise_provenance_add(provenance, "calibration", "%s",
-				   given ? "given for the export" : "of the recording");
+	rc = text ? incise_provenance_add(provenance, "calibration", "%s", text)
+		  : -ENOMEM;
+	free(text);
 	for (int i = 1; i < n && own; i++) {
 		if (!given && recordings[i]->meta.force_mV_N != mV_N)
 			return rc;

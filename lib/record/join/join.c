@@ -21,6 +21,7 @@
 #include <incise/wall.h>
 #include "../frames.h"
 #include "../ledger.h"
+#include "../read/recalibration.h"
 #include "../read/session.h"
 #include "../schema.h"
 #include "align.h"
@@ -630,6 +631,10 @@ static void remove_part(const struct join *join, const char *folder)
 				free(path);
 			}
 		if (asprintf(&path, "%s/%s", folder, join->members[i].name) >= 0) {
+			incise_recalibrations_remove(path);
+			free(path);
+		}
+		if (asprintf(&path, "%s/%s", folder, join->members[i].name) >= 0) {
 			rmdir(path);
 			free(path);
 		}
@@ -639,6 +644,35 @@ static void remove_part(const struct join *join, const char *folder)
 		free(path);
 	}
 	rmdir(folder);
+}
+
+/* The calibrations that a member got after its capture, copied or linked. Returns 0 or -errno. */
+static int bring_calibrations(const struct member *member, const char *own)
+{
+	struct incise_recalibration *list;
+	int n = incise_recalibrations(member->recording->path, &list, NULL), rc = 0;
+	char *to, *from;
+
+	if (n > 1 && asprintf(&to, "%s/calibration", own) >= 0) {
+		rc = mkdir(to, 0777) ? -errno : 0;
+		free(to);
+	}
+	for (int i = 1; i < n && !rc; i++) {
+		if (asprintf(&from, "%s/%s", member->recording->path, list[i].file) < 0) {
+			rc = -ENOMEM;
+			break;
+		}
+		if (asprintf(&to, "%s/%s", own, list[i].file) < 0) {
+			rc = -ENOMEM;
+		} else {
+			rc = bring(from, to, true);
+			free(to);
+		}
+		free(from);
+	}
+	if (n > 0)
+		free(list);
+	return n < 0 ? n : rc;
 }
 
 static int bring_member(struct join *join, const struct member *member,
@@ -665,6 +699,8 @@ static int bring_member(struct join *join, const struct member *member,
 		free(from);
 		free(to);
 	}
+	if (!rc)
+		rc = bring_calibrations(member, own);
 	if (rc)
 		rc = incise_error_set(join->err, -rc, "%s: cannot be written: %s", own,
 				      strerror(-rc));

@@ -9,6 +9,7 @@
 #include <incise/clock.h>
 #include "cut.h"
 #include "depth.h"
+#include "recalibration.h"
 #include "session.h"
 #include "../schema.h"
 
@@ -322,6 +323,13 @@ int incise_recording_info(struct incise_recording *rec,
 	if (rc < 0)
 		return rc;
 	info->n_streams = rc;
+	for (int i = 0; i < info->n_streams; i++)
+		incise_recalibration_stream(
+			incise_recording_member(rec,
+						!strcmp(info->streams[i].name, "camera")
+							? "frames"
+							: info->streams[i].name),
+			&info->streams[i]);
 	rc = incise_cuts_open(&cuts, rec, err);
 	if (rc)
 		return rc;

@@ -13,6 +13,7 @@
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
+#include "recalibration.h"
 #include "recording.h"
 #include "session.h"
 #include "../ledger.h"
@@ -284,8 +285,8 @@ static const char *choice_of(const char *path)
 	return colon && colon > path ? colon + 1 : NULL;
 }
 
-/* The folder of the recording: path, or path.part; no trailing slashes. */
-static char *find_folder(const char *path, struct incise_error *err)
+/* Without trailing slashes. */
+char *incise_recording_folder(const char *path, struct incise_error *err)
 {
 	size_t length = strlen(path);
 	char *folder;
@@ -593,7 +594,7 @@ static int find_any_folder(struct incise_recording *rec, const char *path,
 	char *start;
 
 	*choice = choice_of(path);
-	rec->path = find_folder(path, *choice ? NULL : err);
+	rec->path = incise_recording_folder(path, *choice ? NULL : err);
 	if (rec->path)
 		*choice = NULL;
 	if (rec->path || !*choice)
@@ -601,12 +602,12 @@ static int find_any_folder(struct incise_recording *rec, const char *path,
 	start = strndup(path, (size_t)(*choice - 1 - path));
 	if (!start)
 		return incise_error_set(err, ENOMEM, "%s: out of memory", path);
-	rec->path = find_folder(start, NULL);
+	rec->path = incise_recording_folder(start, NULL);
 	free(start);
 	if (rec->path)
 		return 0;
 	/* Neither is there: the name is what was given. */
-	free(find_folder(path, err));
+	free(incise_recording_folder(path, err));
 	return -ENOENT;
 }
 
@@ -626,7 +627,7 @@ static int open_session(struct incise_recording *rec, const char *choice,
 	return 0;
 }
 
-static int open_one(struct incise_recording *rec, const char *choice,
+static int open_one(struct incise_recording *rec, const char *choice, bool original,
 		    struct incise_error *err)
 {
 	int rc = incise_schema_check(rec->db, rec->path, &rec->form, err);
@@ -638,10 +639,14 @@ static int open_one(struct incise_recording *rec, const char *choice,
 				      rec->path, choice);
 	if (!rc)
 		rc = check_size(rec, err);
-	return rc ? rc : read_meta(rec, err);
+	if (!rc)
+		rc = read_meta(rec, err);
+	if (!rc && !original)
+		rc = incise_recalibration_apply(rec, err);
+	return rc || !rec->recalibrated ? rc : read_meta(rec, err);
 }
 
-static struct incise_recording *open_path(const char *path, bool any,
+static struct incise_recording *open_path(const char *path, bool any, bool original,
 					  struct incise_error *err)
 {
 	struct incise_recording *rec = calloc(1, sizeof(*rec));
@@ -663,7 +668,7 @@ static struct incise_recording *open_path(const char *path, bool any,
 	if (!rc && incise_session_is(rec->db))
 		rc = open_session(rec, choice || !any ? choice : "*", err);
 	else if (!rc)
-		rc = open_one(rec, choice, err);
+		rc = open_one(rec, choice, original, err);
 	if (!rc)
 		return rec;
 	incise_recording_close(rec);
@@ -673,13 +678,19 @@ static struct incise_recording *open_path(const char *path, bool any,
 
 struct incise_recording *incise_recording_open(const char *path, struct incise_error *err)
 {
-	return open_path(path, false, err);
+	return open_path(path, false, false, err);
 }
 
 struct incise_recording *incise_recording_open_any(const char *path,
 						   struct incise_error *err)
 {
-	return open_path(path, true, err);
+	return open_path(path, true, false, err);
+}
+
+struct incise_recording *incise_recording_open_original(const char *path,
+							struct incise_error *err)
+{
+	return open_path(path, true, true, err);
 }
 
 void incise_recording_close(struct incise_recording *rec)
@@ -688,6 +699,7 @@ void incise_recording_close(struct incise_recording *rec)
 		return;
 	incise_session_close(rec->session);
 	sqlite3_close(rec->db);
+	free(rec->recalibrated);
 	free(rec->fit);
 	free(rec->path);
 	free(rec->name);

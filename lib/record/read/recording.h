@@ -10,6 +10,7 @@
 #include "../time/fit.h"
 #include "../time/timeline.h"
 
+struct incise_recalibrated;
 struct incise_session;
 struct incise_session_map;
 
@@ -19,6 +20,8 @@ struct incise_recording {
 	char *name;  /* "liver" of dir/liver.rec and of dir/liver.rec.part */
 	int form;    /* of its tables, see schema.h */
 	struct incise_recording_info meta; /* the part that is in table meta */
+	/* The calibration that it is read by, if not that of its capture; see recalibration.h. */
+	struct incise_recalibrated *recalibrated;
 	/* Rows of the tracker that are not on its line, found at the first need. */
 	bool fitted;
 	struct incise_fit_time *fit;
@@ -32,6 +35,13 @@ struct incise_recording {
 /* The same as incise_recording_open(), and a session without a choice: of any of its members. */
 struct incise_recording *incise_recording_open_any(const char *path,
 						   struct incise_error *err);
+
+/* The same, as it was recorded: by the calibration of its capture. Members of a session are not. */
+struct incise_recording *incise_recording_open_original(const char *path,
+							struct incise_error *err);
+
+/* The folder of a recording, path or path.part; to be freed; NULL with ENOENT, ENOMEM. */
+char *incise_recording_folder(const char *path, struct incise_error *err);
 
 /* The recording that has the rows of a table: a member, or the recording itself. */
 struct incise_recording *incise_recording_member(const struct incise_recording *recording,

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "depth.h"
+#include "recalibration.h"
 #include "rows.h"
 #include "session.h"
 #include "../schema.h"
@@ -61,8 +62,11 @@ int incise_row_times_open(struct incise_row_times *times,
 			times->delay_sd_ns = known[i].delay_sd_ms * 1e6;
 			times->offset_sd_ns = known[i].offset_sd_ms * 1e6;
 		}
-	return n < 0 ? n
-		     : incise_recording_line(recording, times->stream, &times->line, err);
+	if (n < 0)
+		return n;
+	if (recording->recalibrated)
+		incise_row_times_calibrate(times, &recording->recalibrated->calibration);
+	return incise_recording_line(recording, times->stream, &times->line, err);
 }
 
 static double known(double value, double otherwise)

@@ -390,7 +390,7 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 	int rc;
 
 	*report = (struct incise_verify_report){0};
-	verify.recording = incise_recording_open(path, err);
+	verify.recording = incise_recording_open_original(path, err);
 	if (!verify.recording)
 		return -errno;
 	if (verify.recording->form < 2) {
@@ -538,7 +538,7 @@ static int verify_it(const char *path, const struct incise_verify_watch *watch,
 		     bool rows_only, struct incise_verify_report *report,
 		     struct incise_error *err)
 {
-	struct incise_recording *recording = incise_recording_open_any(path, err);
+	struct incise_recording *recording = incise_recording_open_original(path, err);
 	int rc;
 
 	*report = (struct incise_verify_report){0};

@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The active calibration of a recording, applied to its tables; for lib/record only. Tables in
+ * memory or in temporary files take the place of those of recording.db for this connection, so
+ * that all readers agree:
+ *
+ *     meta      keys of the calibration           depth    from the poses, if the tip differs
+ *     frames    depth in another scale
+ *
+ * Delays are no matter of tables: see incise_row_times_open().
+ */
+#ifndef INCISE_RECALIBRATION_PRIVATE_H
+#define INCISE_RECALIBRATION_PRIVATE_H
+
+#include <incise/calibration.h>
+#include <incise/recalibration.h>
+#include "recording.h"
+
+/* Of a recording that is read by another calibration than that of its capture. */
+struct incise_recalibrated {
+	struct incise_recalibration entry;
+	struct incise_calibration calibration; /* delays NAN: those of the capture */
+};
+
+/*
+ * Find the active calibration, and apply it to the tables; rec->meta is that of the capture, and
+ * is to be read again if rec->recalibrated is set. Returns 0 or -errno.
+ */
+int incise_recalibration_apply(struct incise_recording *rec, struct incise_error *err);
+
+/* Delays of a stream and their uncertainty by the active calibration. */
+void incise_recalibration_stream(const struct incise_recording *rec,
+				 struct incise_stream *stream);
+
+/* Remove all calibrations that a recording got after its capture, as far as that is possible. */
+void incise_recalibrations_remove(const char *folder);
+
+/* "of the recording", or which one since when, for people; to be freed; NULL: no memory. */
+char *incise_recalibration_text(const struct incise_recording *rec);
+
+#endif
