@@ -25,6 +25,7 @@
 #include "../../base/ascending.h"
 #include "../../base/vector.h"
 #include "../read/depth.h"
+#include "../read/recalibration.h"
 #include "../read/recording.h"
 #include "../schema.h"
 #include "interpolators.h"
@@ -495,6 +496,9 @@ static int find_times(struct incise_budget *budget, const struct use *use,
 	incise_calibration_nominal(&none);
 	budget->jitter_s = NAN;
 	for (int i = 0; i < n; i++) {
+		incise_recalibration_stream(
+			!strcmp(streams[i].name, "force") ? use->force : use->tracker,
+			&streams[i]);
 		if (!strcmp(streams[i].name, "force")) {
 			force_s = delay_sd_s(&streams[i], given->force_delay_ms,
 					     given->force_delay_sd_ms);
@@ -662,7 +666,7 @@ static int measure_tracker(struct incise_budget *budget, const struct use *use,
 {
 	struct tracker_sums sums = {0};
 	struct incise_rows rows;
-	double rate_hz, delay_sd_s;
+	double rate_hz, delay_ns;
 	int rc = incise_recording_number(recording, "tracker_hz", &rate_hz, err);
 
 	if (rc)
@@ -676,13 +680,12 @@ static int measure_tracker(struct incise_budget *budget, const struct use *use,
 		"iirrrrrrrrr", recording->meta.depth, err);
 	if (!rc && use->given)
 		incise_row_times_calibrate(&rows.times, use->given);
-	delay_sd_s = rows.times.delay_sd_ns * 1e-9;
-	if (use->given && !isnan(use->given->tracker_delay_ms) &&
-	    !isnan(use->given->tracker_delay_sd_ms))
-		delay_sd_s = use->given->tracker_delay_sd_ms * 1e-3;
+	/* Of the calibration in use: another one has added the difference. */
+	delay_ns = isnan(rows.times.delay_sd_ns) ? 0 : rows.times.delay_sd_ns;
+	delay_ns = sqrt(fmax(0, delay_ns * delay_ns + rows.times.variance_ns2));
 	if (!rc)
-		rc = read_tracker(&sums, &rows, recording->meta.tip_mm,
-				  isnan(delay_sd_s) ? 0 : delay_sd_s, err);
+		rc = read_tracker(&sums, &rows, recording->meta.tip_mm, delay_ns * 1e-9,
+				  err);
 	incise_rows_close(&rows);
 	if (!rc)
 		keep_tracker(budget, &sums);
