@@ -137,7 +137,7 @@ $(O)/tests/streams/ReceiveClient: $(receiver)
 	$(Q)$(CXX) -O1 -w -I/usr/include/openigtlink -o $@ $< -lOpenIGTLink
 
 # Attacks on recordings. What is in a module is found by INCISE_MODULE_PATH.
-attack_programs := $(addprefix $(O)/tests/attack/,kill faults damage record watch.so stall.so)
+attack_programs := $(addprefix $(O)/tests/attack/,kill faults damage record statement watch.so stall.so)
 
 $(addprefix $(O)/tests/attack/,kill faults): tests/attack/round.c
 $(O)/tests/attack/%: tests/attack/%.c $(O)/lib/libincise-tests.a

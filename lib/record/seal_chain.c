@@ -6,14 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include "seal_chain.h"
+#include "statement.h"
 
 #define GENESIS "incise seal 1\n"
-
-const char *const incise_seal_parts[INCISE_SEAL_PARTS] = {
-	"start",   "configuration", "calibration", "force",  "tracker",
-	"camera",  "wall",	    "depth",	   "events", "knots",
-	"streams", "meta",	    "camera.mkv",
-};
 
 /*
  * Table meta in four parts: the keys of START and CALIBRATION, those that are rewritten, and all

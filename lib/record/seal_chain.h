@@ -22,7 +22,7 @@
 
 #define INCISE_SEAL_BYTES 32
 
-/* What a statement has a digest of, in its order; the streams are those of the ledger. */
+/* Parts with a digest in a statement, in its order; the streams are those of the ledger. */
 enum incise_seal_number {
 	INCISE_SEAL_START,
 	INCISE_SEAL_CONFIGURATION,
@@ -36,8 +36,6 @@ enum incise_seal_number {
 	INCISE_SEAL_FILE,
 	INCISE_SEAL_PARTS
 };
-
-extern const char *const incise_seal_parts[INCISE_SEAL_PARTS];
 
 struct incise_seal {
 	EVP_MD *sha256;

@@ -118,7 +118,7 @@ static void attack(struct round *round, int count)
 		fprintf(stderr, "not one of %d recordings had rows\n", count);
 		exit(1);
 	}
-	printf("kill: %d times, %d before the first commit; all others open, are intact and "
+	printf("kill: %d times, %d before the first commit; all others open, are intact, sealed and "
 	       "have what was committed; lost at most %.1f ms, %.1f ms on average, by %d of "
 	       "them (%d while the machine or its disk stood still)\n",
 	       count, unbegun, lost_most_ns * 1e-6,

@@ -161,12 +161,15 @@ void check_recording(struct round *round, bool whole)
 							.user = &findings},
 			  &report, &err))
 		fail(round, "does not open: %s", err.text);
-	if (!report.intact || (report.interrupted && (has_name || report.complete)) ||
+	/* The chain holds for all that is left. */
+	if (!report.intact || !report.sealed ||
+	    (report.interrupted && (has_name || report.complete)) ||
 	    (whole && !report.complete))
 		fail(round,
-		     "intact %d, interrupted %d, complete %d: %s; capture said: %s",
-		     report.intact, report.interrupted, report.complete, findings.text,
-		     text_of("err"));
+		     "intact %d, sealed %d, interrupted %d, complete %d: %s; capture "
+		     "said: %s",
+		     report.intact, report.sealed, report.interrupted, report.complete,
+		     findings.text, text_of("err"));
 	for (int i = 0; i < WATCH_TABLES; i++) {
 		int64_t there = ask(round, max[i]);
 

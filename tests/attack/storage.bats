@@ -126,3 +126,28 @@ with_camera() {
 	[ "$(key report.json intact)" = 1 ] || complain "$(cat report.json)"
 	holds "$(key report.json 'streams[0].present') > 1000"
 }
+
+# Made by someone who knows the format and recomputes every checksum: a second implementation of
+# it, which must also agree on the statement of the untouched recording.
+forge() {
+	[ -e "$INCISE_MODULE_PATH/frames_mkv.so" ] || skip "frames_mkv.so is not built"
+	echo 'force_mV_N = 1240.0;' >calibration.conf
+	for seed in 1 2; do
+		printf '%s\n' 'clock = "simulated";' 'tracker = "sim:";' 'force = "sim:";' 'camera = "sim:";' \
+			"sim = { seed = $seed; force_hz = 200.0; camera_hz = 1.0; };" >rig.conf
+		incise capture -o $seed.rec --rig rig.conf -c calibration.conf --camera frames \
+			--duration 3s --clock-source sim:1800000000 2>capture.log
+	done
+	run -0 /usr/bin/python3 "$BATS_TEST_DIRNAME/forgeries.py" "$programs/statement" 1.rec 2.rec "$1" "$ATTACK_SEED"
+	[[ "$output" == "$1 forgeries of 56 kinds, $1 found and named: "* ]]
+	echo "# $output" >&3
+}
+
+@test "56 forgeries, one of each kind, with all checksums right" {
+	forge 56
+}
+
+# bats test_tags=slow
+@test "500 forgeries, with all checksums right, with those of the ledger, and with none" {
+	forge 500
+}

@@ -13,6 +13,7 @@
 #include <incise/seal.h>
 #include "../read/recording.h"
 #include "../seal_chain.h"
+#include "../statement.h"
 
 struct incise_seal_walk_stream {
 	sqlite3_stmt *rows, *blocks;
@@ -54,10 +55,6 @@ int incise_statement_make(struct incise_seal_statement *statement,
 			  struct incise_recording *recording, int64_t upto,
 			  int (*step)(void *user, struct incise_seal_walk *walk),
 			  void *user, struct incise_error *err);
-
-/* Write a statement's text. Returns its length, or 0: too long for any statement. */
-size_t incise_statement_write(const struct incise_seal_statement *statement,
-			      char text[INCISE_STATEMENT_MAX]);
 
 /* Whether a recording can have a seal: 0; -ENODATA, -ENOTSUP. */
 int incise_seal_possible(const struct incise_recording *recording,

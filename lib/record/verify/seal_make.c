@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The statement of a recording: made of it, written, and read; see incise/seal.h. A text that is
- * read comes from outside.
+ * The statement of a recording, made of its rows; see incise/seal.h.
  */
 #include <errno.h>
 #include <fcntl.h>
-#include <inttypes.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,8 +12,6 @@
 #include "../frames.h"
 #include "../schema.h"
 #include "seal_walk.h"
-
-#define TITLE "incise statement 1\n"
 
 /* --- making --------------------------------------------------------------------------- */
 
@@ -51,18 +46,13 @@ static int read_key(struct incise_recording *recording, const char *key, char *t
 		       : incise_schema_fail(recording->db, recording->path, err);
 }
 
-static bool is_hex(const char *text, size_t n)
-{
-	return strlen(text) == n && strspn(text, "0123456789abcdef") == n;
-}
-
 static int read_identity(struct incise_recording *recording, char identity[33],
 			 struct incise_error *err)
 {
 	int rc = read_key(recording, "identity", identity, 33, err);
 
 	/* A text of any other form is none, and so are all zeros. */
-	if (!rc && !is_hex(identity, 32))
+	if (!rc && !incise_statement_hex(identity, 32))
 		memset(identity, '0', 32);
 	identity[32] = 0;
 	return rc;
@@ -153,12 +143,6 @@ static void take_commit(struct incise_seal_statement *statement,
 	}
 }
 
-/* The number of the commit of an earlier head. */
-static int64_t earlier_commit(int i, int n, int64_t last)
-{
-	return n < INCISE_STATEMENT_EARLIER ? i : last / n * i + last % n * i / n;
-}
-
 int incise_statement_make(struct incise_seal_statement *statement,
 			  struct incise_recording *recording, int64_t upto,
 			  int (*step)(void *user, struct incise_seal_walk *walk),
@@ -190,7 +174,7 @@ int incise_statement_make(struct incise_seal_statement *statement,
 		upto < INCISE_STATEMENT_EARLIER ? upto : INCISE_STATEMENT_EARLIER;
 	for (int i = 0; i < statement->n_earlier; i++)
 		statement->earlier[i].commit =
-			earlier_commit(i, statement->n_earlier, upto);
+			incise_statement_earlier(i, statement->n_earlier, upto);
 	while (!rc && (rc = incise_seal_walk_next(&walk, err)) > 0) {
 		struct incise_seal_head *earlier = &statement->earlier[at];
 
@@ -211,160 +195,6 @@ int incise_statement_make(struct incise_seal_statement *statement,
 		rc = make_parts(statement, recording, &walk.seal, err);
 	incise_seal_walk_close(&walk);
 	return rc;
-}
-
-/* --- writing -------------------------------------------------------------------------- */
-
-struct out {
-	char *text;
-	size_t n;
-	bool full;
-};
-
-INCISE_PRINTF(2, 3) static void print(struct out *out, const char *fmt, ...)
-{
-	va_list args;
-	int n;
-
-	va_start(args, fmt);
-	n = vsnprintf(out->text + out->n, INCISE_STATEMENT_MAX - out->n, fmt, args);
-	va_end(args);
-	out->full |= n < 0 || (size_t)n >= INCISE_STATEMENT_MAX - out->n;
-	if (!out->full)
-		out->n += n;
-}
-
-static void print_head(struct out *out, const char *what,
-		       const struct incise_seal_head *head)
-{
-	print(out, "%s %" PRId64 " %" PRId64 " %s\n", what, head->commit, head->t_ns,
-	      head->head);
-}
-
-size_t incise_statement_write(const struct incise_seal_statement *statement,
-			      char text[INCISE_STATEMENT_MAX])
-{
-	struct out out = {.text = text};
-
-	print(&out, TITLE);
-	print(&out, "identity %s\n", statement->identity);
-	print(&out, "name %s\n", statement->name);
-	print(&out, "software %s\n", statement->software);
-	print(&out, "host %s\n", statement->host);
-	print(&out, "started %s\n", statement->started);
-	print(&out, "complete %s\n", statement->complete ? "yes" : "no");
-	print_head(&out, "commit", &statement->last);
-	for (int i = 0; i < INCISE_STATEMENT_PARTS; i++)
-		print(&out, "part %s %" PRIu64 " %s\n", statement->parts[i].name,
-		      statement->parts[i].rows, statement->parts[i].digest);
-	for (int i = 0; i < statement->n_earlier; i++)
-		print_head(&out, "earlier", &statement->earlier[i]);
-	print(&out, "end\n");
-	return out.full ? 0 : out.n;
-}
-
-/* --- reading -------------------------------------------------------------------------- */
-
-struct in {
-	const char *at, *end;
-	int line;
-};
-
-/* The rest of the line behind a word and a space, to a text. */
-static bool take_line(struct in *in, const char *word, char *to, size_t size)
-{
-	const size_t skip = strlen(word) + 1;
-	const char *end = memchr(in->at, '\n', in->end - in->at);
-	size_t n = end ? end - in->at : 0;
-
-	in->line++;
-	if (n < skip || memcmp(in->at, word, skip - 1) != 0 || in->at[skip - 1] != ' ' ||
-	    n - skip >= size)
-		return false;
-	n -= skip;
-	memcpy(to, in->at + skip, n);
-	to[n] = 0;
-	in->at = end + 1;
-	for (size_t i = 0; i < n; i++)
-		if ((unsigned char)to[i] < ' ' || to[i] == 0x7f)
-			return false;
-	return true;
-}
-
-/* "NUMBER NUMBER DIGEST" */
-static bool take_head(struct in *in, const char *word, struct incise_seal_head *head)
-{
-	char text[120];
-	int n = 0;
-
-	return take_line(in, word, text, sizeof(text)) &&
-	       sscanf(text, "%" SCNd64 " %" SCNd64 " %64[0-9a-f]%n", &head->commit,
-		      &head->t_ns, head->head, &n) == 3 &&
-	       n == (int)strlen(text) && head->commit >= 0 && is_hex(head->head, 64);
-}
-
-static bool take_part(struct in *in, struct incise_seal_part *part, const char *name)
-{
-	char text[120];
-	int n = 0;
-
-	return take_line(in, "part", text, sizeof(text)) &&
-	       sscanf(text, "%15s %" SCNu64 " %64[0-9a-f]%n", part->name, &part->rows,
-		      part->digest, &n) == 3 &&
-	       n == (int)strlen(text) && !strcmp(part->name, name) &&
-	       is_hex(part->digest, 64);
-}
-
-static bool take_all(struct in *in, struct incise_seal_statement *s)
-{
-	char complete[8];
-
-	in->line = 1;
-	if (in->end - in->at < (ptrdiff_t)strlen(TITLE) ||
-	    memcmp(in->at, TITLE, strlen(TITLE)) != 0)
-		return false;
-	in->at += strlen(TITLE);
-	if (!take_line(in, "identity", s->identity, sizeof(s->identity)) ||
-	    !is_hex(s->identity, 32) ||
-	    !take_line(in, "name", s->name, sizeof(s->name)) ||
-	    !take_line(in, "software", s->software, sizeof(s->software)) ||
-	    !take_line(in, "host", s->host, sizeof(s->host)) ||
-	    !take_line(in, "started", s->started, sizeof(s->started)) ||
-	    !take_line(in, "complete", complete, sizeof(complete)) ||
-	    !take_head(in, "commit", &s->last))
-		return false;
-	s->complete = !strcmp(complete, "yes");
-	for (int i = 0; i < INCISE_STATEMENT_PARTS; i++)
-		if (!take_part(in, &s->parts[i], incise_seal_parts[i]))
-			return false;
-	s->n_earlier = s->last.commit < INCISE_STATEMENT_EARLIER
-			       ? (int)s->last.commit
-			       : INCISE_STATEMENT_EARLIER;
-	for (int i = 0; i < s->n_earlier; i++)
-		if (!take_head(in, "earlier", &s->earlier[i]) ||
-		    s->earlier[i].commit !=
-			    earlier_commit(i, s->n_earlier, s->last.commit))
-			return false;
-	in->line++;
-	return in->end - in->at == 4 && !memcmp(in->at, "end\n", 4);
-}
-
-int incise_seal_read(struct incise_seal_statement *statement, const char *text,
-		     size_t length, struct incise_error *err)
-{
-	struct in in = {.at = text, .end = text + length};
-	char again[INCISE_STATEMENT_MAX];
-
-	*statement = (struct incise_seal_statement){0};
-	/* A number in another form, such as 007, is found as the text is written again. */
-	if (length < sizeof(again) && take_all(&in, statement) &&
-	    incise_statement_write(statement, again) == length &&
-	    !memcmp(again, text, length))
-		return 0;
-	return incise_error_set(err, EINVAL,
-				"not a statement of a recording by incise, or altered: "
-				"line %d",
-				in.line);
 }
 
 /* --- interface ------------------------------------------------------------------------ */
