@@ -20,6 +20,7 @@ struct job {
 	int min_count; /* 0: not given */
 	int percent;   /* of the bar */
 	enum { PLAIN, ROS2 } profile;
+	int uncertainty; /* enum incise_export_uncertainty */
 	struct incise_calibration calibration;
 	struct incise_export_options how;
 };
@@ -49,9 +50,12 @@ static void load_calibration(void *options, char *path)
 	if (incise_calibration_load(path, &job->calibration, &err))
 		cli_fail_with(&err);
 	job->how.calibration = &job->calibration;
+	job->how.calibration_path = path;
 }
 
 static const char *const profiles[] = {"plain", "ros2", NULL};
+
+static const char *const uncertainties[] = {"none", "total", "parts", NULL};
 
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
@@ -91,6 +95,10 @@ static const struct cli_option options[] = {
 	{0, "tai", NULL,
 	 "also columns tai_ns and tai_u_ns: TAI and the bound of its error",
 	 CLI_FLAG(struct job, how.tai)},
+	{0, "uncertainty", "WHICH",
+	 "columns of standard uncertainties: none (default), total, or parts,\n"
+	 "which are the total and what it is made of",
+	 CLI_CHOICE(struct job, uncertainty, uncertainties)},
 	{0, "lineage", NULL, "begin a CSV with comments on its provenance",
 	 CLI_FLAG(struct job, how.provenance)},
 	RECORDING_DAMAGED(struct job, damaged),
@@ -112,11 +120,13 @@ static const struct cli_command command = {
 
 static void print_report(const struct incise_export_report *report, const char *output)
 {
-	json_print(json_pack("{so sI si sI so so}", "path", json_text(output), "rows",
-			     (json_int_t)report->rows, "cuts", report->cuts, "clipped",
-			     (json_int_t)report->clipped, "depth_max_mm",
-			     json_number(report->depth_max_mm), "velocity_max_mm_s",
-			     json_number(report->velocity_max_mm_s)));
+	json_print(
+		json_pack("{so sI si sI so so so}", "path", json_text(output), "rows",
+			  (json_int_t)report->rows, "cuts", report->cuts, "clipped",
+			  (json_int_t)report->clipped, "depth_max_mm",
+			  json_number(report->depth_max_mm), "velocity_max_mm_s",
+			  json_number(report->velocity_max_mm_s), "unstated",
+			  *report->unstated ? json_text(report->unstated) : json_null()));
 }
 
 static int progress(void *context, double share)
@@ -170,7 +180,11 @@ static void parse(struct job *job, int argc, char **argv)
 		cli_usage("--tai goes with rows of .csv and .h5, without --average");
 	if (job->profile && !cli_ends_with(job->output, ".mcap"))
 		cli_usage("--profile needs -o FILE.mcap");
+	if (job->profile == ROS2 && job->uncertainty)
+		cli_usage("--uncertainty does not go with --profile ros2, whose messages "
+			  "have no place for it");
 	how->ros2 = job->profile == ROS2;
+	how->uncertainty = (enum incise_export_uncertainty)job->uncertainty;
 	if (job->min_count)
 		how->min_count = job->min_count;
 	if (job->json && !strcmp(job->output, "-"))
@@ -189,6 +203,9 @@ int main(int argc, char **argv)
 
 	parse(&job, argc, argv);
 	export(argv + optind, argc - optind, &job, &report);
+	if (*report.unstated)
+		cli_warn("uncertainties that are not stated are nan: %s",
+			 report.unstated);
 	if (job.json)
 		print_report(&report, job.output);
 	else if (strcmp(job.output, "-") && !report.cuts && !job.how.resample)

@@ -328,6 +328,8 @@ class ExportOptions(ctypes.Structure):
         ("provenance", c_bool),
         ("ros2", c_bool),
         ("tai", c_bool),
+        ("uncertainty", c_int),
+        ("calibration_path", c_char_p),
         ("progress", ExportProgress),
         ("context", c_void_p),
     ]

@@ -186,6 +186,15 @@ def load_calibration(path: Optional[PathLike]) -> CalibrationStruct:
     return calibration
 
 
+def _uncertainty(word: str) -> int:
+    words = ("none", "total", "parts")
+    if word not in words:
+        raise Invalid(
+            errno.EINVAL, f"uncertainty: expected none, total or parts, found {word!r}"
+        )
+    return words.index(word)
+
+
 class Recording:
     """A recording, opened with :func:`incise.open`.
 
@@ -208,6 +217,9 @@ class Recording:
         self._frames: Optional[int] = None
         self._start_ns: Optional[int] = None
         self._calibration = load_calibration(calibration) if calibration is not None else None
+        self._calibration_path = (
+            _library.path_bytes(calibration) if calibration is not None else None
+        )
         self.path = os.fspath(path)
         failure = Failure()
         self._pointer = failure.require(
@@ -314,6 +326,7 @@ class Recording:
                 raise Invalid(errno.EINVAL, f"{name}: {failure}") from None
         if self._calibration is not None:
             struct.calibration = ctypes.pointer(self._calibration)
+            struct.calibration_path = self._calibration_path
         path = _library.path_bytes(self.path)
 
         def open_stream(stream: ArrowArrayStream) -> None:
@@ -372,6 +385,7 @@ class Recording:
         depth_max_mm: float = 0,
         velocity_max_mm_s: float = 0,
         tai: bool = False,
+        uncertainty: str = "none",
     ) -> Table:
         """Force with depth and velocity inside the cuts, as `incise export` gives them.
 
@@ -380,6 +394,8 @@ class Recording:
         With bins of depth and velocity (both) the means of each bin with min_count samples or more:
         [cut,] depth_mm, velocity_mm_s, force_N, sd_N, count, cuts, advancing, and the last three.
         With tai, rows without bins end with tai_ns and tai_u_ns, the bound of its error.
+        With uncertainty "total" or "parts" there are columns of standard uncertainties, see
+        incise-export(1); which are of force_N, table.fields says in uncertainty_variables.
         """
         return self._table(
             "table",
@@ -392,12 +408,25 @@ class Recording:
             depth_max_mm=depth_max_mm,
             velocity_max_mm_s=velocity_max_mm_s,
             tai=tai,
+            uncertainty=_uncertainty(uncertainty),
         )
 
-    def resample(self, rate_hz: float = 0, tai: bool = False) -> Table:
+    def resample(
+        self, rate_hz: float = 0, tai: bool = False, uncertainty: str = "none"
+    ) -> Table:
         """All of the recording on one grid of rate_hz, or at each force sample: force, pose, depth,
-        velocity and camera, with standard uncertainties; with tai also tai_ns and tai_u_ns."""
-        return self._table("table", "resampled rows", rate_hz=rate_hz, resample=True, tai=tai)
+        velocity and camera, with standard uncertainties; with tai also tai_ns and tai_u_ns.
+
+        Without uncertainty "total" or "parts", those are of noise and time alone.
+        """
+        return self._table(
+            "table",
+            "resampled rows",
+            rate_hz=rate_hz,
+            resample=True,
+            tai=tai,
+            uncertainty=_uncertainty(uncertainty),
+        )
 
 
 def open(  # the name that every reader of files has

@@ -508,3 +508,121 @@ read_mcap() {
 	sqlite3 far.rec/recording.db "SELECT avg(abs(x_mm)) > 30 FROM tracker" | grep -qx 1 ||
 		sqlite3 far.rec/recording.db "SELECT avg(abs(z_mm)) > 30 FROM tracker" | grep -qx 1
 }
+
+# A calibration with a covariance of the tip, and all else stated.
+calibrated() {
+	cat >c.conf <<-'END'
+		force_mV_N = 1230.0; tip_mm = [1.0, 0.0, -20.0]; surface_u_mm = 0.05;
+		force_delay_ms = 0.0; force_delay_sd_ms = 0.02;
+		tracker_delay_ms = 4.2; tracker_delay_sd_ms = 0.1;
+		history = (
+		{ kind = "force"; date = "2026-11-20T10:00:00Z"; pass = true;
+		  values = ( { key = "force_mV_N"; left = 1230.0; u = 1.5; } ); },
+		{ kind = "tip"; date = "2026-11-20T10:00:00Z"; pass = true; values = (
+		  { key = "tip_x_mm"; left = 1.0; u = 0.03; }, { key = "tip_y_mm"; left = 0.0; u = 0.02; },
+		  { key = "tip_z_mm"; left = -20.0; u = 0.04; } );
+		  covariance = [ 9e-4, 3e-4, 4e-4, -2e-4, 1e-4, 16e-4 ]; },
+		{ kind = "delay"; date = "2026-11-20T10:00:00Z"; pass = true; method = "against the force";
+		  values = ( { key = "tracker_delay_ms"; left = 4.2; u = 0.1; } ); } );
+	END
+	incise capture -o calibrated.rec -c c.conf \
+		--rig sim:clock=simulated,cut_s=2,pause_s=1,tip_x_mm=1,tip_z_mm=-20 --duration 8s >/dev/null
+}
+
+@test "export with uncertainties: parts add up, and the rest stays as it is" {
+	calibrated
+	for how in "" "--rate 50" "--average 3x3 --by-cut" "--resample --rate 50"; do
+		incise export calibrated.rec $how -o none.csv --overwrite
+		incise export calibrated.rec $how --uncertainty none -o same.csv --overwrite
+		cmp none.csv same.csv
+		incise export calibrated.rec $how --uncertainty total -o total.csv --overwrite
+		incise export calibrated.rec $how --uncertainty parts -o parts.csv --overwrite
+		python3 - "$how" <<-'END'
+			import csv, math, sys
+			none, total, parts = (list(csv.DictReader(open(f))) for f in ("none.csv", "total.csv", "parts.csv"))
+			assert len(none) == len(total) == len(parts) > 15, sys.argv
+			totals = {"force_u_": "N", "depth_u_": "mm", "velocity_u_": "mm_s", "t_u_": "s"}
+			seen = 0
+			for a, b, c in zip(none, total, parts):
+			    for name in a:
+			        assert a[name] == b[name] == c[name] or "_u_" in name, name
+			    for start, unit in totals.items():
+			        whole = start + unit
+			        own = [k for k in c if k.startswith(start) and k != whole]
+			        if whole not in b or "nan" in (b[whole], c[whole]):
+			            continue
+			        assert b[whole] == c[whole]
+			        squares = sum(float(c[k]) ** 2 for k in own)
+			        # 12 bits of each and of the total, and seven decimals
+			        assert abs(math.sqrt(squares) - float(c[whole])) < 5e-4 * float(c[whole]) + 3e-7, (whole, c)
+			        seen += float(c[whole]) > 0
+			assert seen > 2 * len(none), seen
+		END
+	done
+}
+
+# 500 samples of white noise: the own part of the mean is that of one by √500, gain stays.
+@test "export with uncertainties: the own part of a mean shrinks, the common one does not" {
+	calibrated
+	incise export calibrated.rec --uncertainty parts -o one.csv
+	incise export calibrated.rec --rate 20 --uncertainty parts -o mean.csv
+	python3 - <<-'END'
+		import csv, math
+		rows = {}
+		for row in csv.DictReader(open("one.csv")):
+		    rows.setdefault((row["cut"], math.floor(float(row["t_s"]) * 20 + 1e-6)), []).append(row)
+		n = 0
+		for mean in csv.DictReader(open("mean.csv")):
+		    key = (mean["cut"], math.floor(float(mean["t_s"]) * 20 + 1e-6))
+		    of = rows[key]
+		    if len(of) != 500 or "nan" in mean.values():
+		        continue
+		    n += 1
+		    for name in ("force_u_gain_N", "depth_u_tip_x_mm", "depth_u_alignment_mm", "t_u_delay_s"):
+		        all = sum(float(r[name]) for r in of) / 500
+		        assert abs(float(mean[name]) - all) < 1e-3 * abs(all) + 2e-7, (name, mean[name], all)
+		    noise = float(of[0]["force_u_noise_N"]) / math.sqrt(500)
+		    # the correlation of white noise is found to be at most some percent
+		    assert 0.97 * noise < float(mean["force_u_noise_N"]) < 1.2 * noise
+		    # 0.05 s are 6 records of the tracker
+		    depth = 0.02 / math.sqrt(6)
+		    assert 0.7 * depth < float(mean["depth_u_noise_mm"]) < 1.3 * depth, mean["depth_u_noise_mm"]
+		assert n > 50
+	END
+}
+
+@test "export names the calibration that an uncertainty lacks" {
+	run -0 --separate-stderr incise export liver.rec --rate 10 --uncertainty total -o a.csv --json
+	[[ "$stderr" == "incise export: warning: uncertainties that are not stated are nan: force: the sensitivity "*"incise calibrate force"*"surface_u_mm"* ]]
+	[ "${#stderr_lines[@]}" -eq 1 ]
+	sqlite3 :memory: "SELECT json_extract('$(sed "s/'/''/g" <<<"$output")', '\$.unstated')" | grep -q 'calibrate tip'
+	awk -F, 'NR > 1 && ($11 != "nan" || $12 != "nan") { bad = 1 } END { exit bad || NR < 2 }' a.csv
+	run -2 incise export liver.rec --uncertainty parts --profile ros2 -o a.mcap
+	run -2 incise export liver.rec --uncertainty part -o a.csv
+}
+
+@test "export of MCAP and HDF5 names uncertainties in the style of CF" {
+	calibrated
+	incise export calibrated.rec --uncertainty parts -o a.mcap
+	grep -qa 'incise.uncertainty_variables' a.mcap
+	grep -qa '"force_u_N":0.00[0-9]*,"force_u_gain_N":-\?0.0' a.mcap
+	grep -qa '"depth_u_surface_mm":0.05' a.mcap
+	grep -qa 'calibration_covariance.*tip_x_mm tip_y_mm 0.0003' a.mcap
+	[ -e "$INCISE_BUILD/lib/incise/export_hdf5.so" ] || skip "the module of HDF5 is not built"
+	/usr/bin/python3 -c 'import h5py' 2>/dev/null || skip "python3-h5py is not installed"
+	incise export calibrated.rec --uncertainty parts --rate 100 -o a.h5
+	/usr/bin/python3 - <<-'END'
+		import h5py
+		with h5py.File("a.h5") as file:
+		    text = lambda at, key: at.attrs[key].decode() if isinstance(at.attrs[key], bytes) else at.attrs[key]
+		    names = text(file["force_N"], "uncertainty_variables")
+		    assert names == "force_u_N force_u_gain_N force_u_zero_N force_u_resolution_N force_u_noise_N", names
+		    assert text(file["force_N"], "ancillary_variables") == names
+		    for name in names.split():
+		        assert text(file[name], "uncertainty_of") == "force_N" and text(file[name], "units") == "N"
+		    assert text(file["depth_u_surface_mm"], "correlation") == "common to recordings with this calibration"
+		    assert text(file["depth_u_noise_mm"], "correlation") == "independent"
+		    assert "tip_x_mm tip_y_mm 0.0003" in text(file, "calibration_covariance")
+		    assert "surface_mm 0.05 mm" in text(file, "calibration_u")
+	END
+}

@@ -339,6 +339,10 @@ class Recordings(Case):
             (["--rate", "200"], self.rec.pairs(rate_hz=200)),
             (["--average", "12x10"], self.rec.pairs(12, 10)),
             (["--average", "12x10", "--by-cut"], self.rec.pairs(12, 10, by_cut=True)),
+            (
+                ["--rate", "200", "--uncertainty", "parts"],
+                self.rec.pairs(rate_hz=200, uncertainty="parts"),
+            ),
             (["--resample"], self.rec.resample()),
             (["--resample", "--rate", "500"], self.rec.resample(500)),
         )
@@ -359,6 +363,18 @@ class Recordings(Case):
                         self.assertEqual(arrays[name].tobytes(), stored.tobytes(), name)
                     else:
                         self.assertTrue(numpy.array_equal(arrays[name], stored), name)
+
+    def test_uncertainties_are_named(self):
+        table = self.rec.pairs(rate_hz=20, uncertainty="parts")
+        fields = {field.name: field for field in table.fields}
+        names = fields["force_N"].metadata["uncertainty_variables"].split()
+        self.assertEqual(names[:2], ["force_u_N", "force_u_gain_N"])
+        for name in names:
+            self.assertEqual(fields[name].metadata["uncertainty_of"], "force_N")
+        self.assertEqual(fields["force_u_noise_N"].metadata["correlation"], "independent")
+        self.assertIn("force_mV_N not stated", table.metadata["calibration_u"])
+        self.assertNotIn("uncertainty_variables", self.rec.pairs(rate_hz=20).fields[4].metadata)
+        self.says(incise.Invalid, "none, total or parts", self.rec.resample, 20, False, "all")
 
     @unittest.skipUnless(has("numpy", "pandas"), "pandas is not installed")
     def test_pandas(self):

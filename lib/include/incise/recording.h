@@ -177,6 +177,13 @@ INCISE_API int incise_frame_reader_at(struct incise_frame_reader *reader, int64_
 				      struct incise_camera_frame *frame,
 				      struct incise_error *err);
 
+/** Columns of standard uncertainties; see incise/budget.h. */
+enum incise_export_uncertainty {
+	INCISE_EXPORT_NONE,  /**< none; of resampled rows those of noise and time */
+	INCISE_EXPORT_TOTAL, /**< of each force, depth, velocity and time */
+	INCISE_EXPORT_PARTS, /**< these, and each of their parts */
+};
+
 /** Options of an export. */
 struct incise_export_options {
 	/** Rows per second of raw export, each with mean force; 0: every force sample. */
@@ -202,6 +209,10 @@ struct incise_export_options {
 	bool ros2;	 /**< MCAP with messages of ROS 2, see incise_export() */
 	/** Also columns tai_ns and tai_u_ns, the bound of its error; not of averages in bins. */
 	bool tai;
+	/** Not with messages of ROS 2, which have no place for them. */
+	enum incise_export_uncertainty uncertainty;
+	/** File of @ref calibration, whose history states uncertainties; NULL: none is stated. */
+	const char *calibration_path;
 
 	/**
 	 * Called at intervals with the completed share, 0 to 1, or NULL; a value other than 0
@@ -220,6 +231,8 @@ struct incise_export_report {
 	int cuts;
 	uint64_t clipped; /**< force samples at an end of the converter; not averaged */
 	double depth_max_mm, velocity_max_mm_s;
+	/** Which uncertainties are not stated, so that columns are NaN; empty: all are. */
+	char unstated[500];
 };
 
 /**
@@ -232,8 +245,12 @@ struct incise_export_report {
  * advancing blade and once without. Depth and velocity are interpolated at the times of the
  * force samples.
  *
+ * Uncertainties have columns as in incise/budget.h. Those of means are of the mean: its own parts
+ * shrink with the number of independent samples, the common parts do not.
+ *
  * HDF5 has a one-dimensional dataset per column, with its name and the attributes units and
- * description; the column cut has indices from 1 into the dataset cut_names. The root's
+ * description, with uncertainties also uncertainty_variables, ancillary_variables, uncertainty_of
+ * and correlation; the column cut has indices from 1 into the dataset cut_names. The root's
  * attributes are the provenance.
  *
  * MCAP has one whole recording for viewers, not only its cuts: /force, /tracker, /depth and

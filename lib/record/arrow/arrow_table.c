@@ -26,7 +26,9 @@ struct table_source {
 	struct incise_recording *recording;
 	struct incise_export_options options, given;
 	struct incise_calibration calibration;
+	char *calibration_path;
 	struct incise_arrow_field *fields;
+	struct incise_provenance *uncertainties; /* of each field */
 	struct incise_arrow_batch batch;
 	pthread_t thread;
 
@@ -90,25 +92,53 @@ static int hand_over(struct table_source *source, const struct ArrowArray *block
 	return stop ? -ECANCELED : 0;
 }
 
+/* What a field says of uncertainties: which are its own, or of which it is one. */
+static int describe_field(struct table_source *source, const struct incise_table *table,
+			  int i)
+{
+	const struct incise_column *column = &table->columns[i];
+	char *names = incise_column_uncertainties(table->columns, table->n_columns, i);
+	struct incise_provenance *to = &source->uncertainties[i];
+	int rc = 0;
+
+	if (names)
+		rc = incise_provenance_add(to, "uncertainty_variables", "%s", names);
+	free(names);
+	if (!rc && column->of)
+		rc = incise_provenance_add(to, "uncertainty_of", "%s", column->of);
+	if (!rc && column->of)
+		rc = incise_provenance_add(to, "correlation", "%s", column->correlation);
+	source->fields[i] = (struct incise_arrow_field){
+		.name = column->name,
+		.unit = column->unit,
+		.about = column->about,
+		.type = type_of(column->type),
+		.calibration = to->n ? to : NULL,
+	};
+	return rc;
+}
+
 static int table_begin(struct incise_table *table, struct incise_error *err)
 {
 	struct table_source *source = source_of(table);
+	int rc = 0;
 
 	source->fields = calloc((size_t)table->n_columns, sizeof(*source->fields));
-	if (!source->fields ||
+	source->uncertainties =
+		calloc((size_t)table->n_columns, sizeof(*source->uncertainties));
+	/* For its end, even if the rest fails. */
+	source->base.n_fields = source->uncertainties ? table->n_columns : 0;
+	if (!source->fields || !source->uncertainties ||
 	    incise_arrow_batch_open(&source->batch, source->fields, table->n_columns,
 				    INCISE_TABLE_BLOCK))
 		return incise_error_set(err, ENOMEM, "%s: out of memory",
 					source->recording->path);
-	for (int i = 0; i < table->n_columns; i++)
-		source->fields[i] = (struct incise_arrow_field){
-			.name = table->columns[i].name,
-			.unit = table->columns[i].unit,
-			.about = table->columns[i].about,
-			.type = type_of(table->columns[i].type),
-		};
+	for (int i = 0; i < table->n_columns && !rc; i++)
+		rc = describe_field(source, table, i);
+	if (rc)
+		return incise_error_set(err, -rc, "%s: out of memory",
+					source->recording->path);
 	source->base.fields = source->fields;
-	source->base.n_fields = table->n_columns;
 	signal_state(source, &source->started);
 	return hand_over(source, NULL);
 }
@@ -205,7 +235,11 @@ static int table_next(struct incise_arrow_source *base, struct ArrowArray *array
 static void table_free(struct table_source *source)
 {
 	incise_arrow_batch_close(&source->batch);
+	for (int i = 0; i < source->base.n_fields; i++)
+		incise_provenance_free(&source->uncertainties[i]);
+	free(source->uncertainties);
 	free(source->fields);
+	free(source->calibration_path);
 	pthread_cond_destroy(&source->changed);
 	pthread_mutex_destroy(&source->lock);
 	incise_recording_close(source->recording);
@@ -255,6 +289,13 @@ static int table_open(struct table_source *source,
 	if (options->calibration) {
 		source->calibration = *options->calibration;
 		source->options.calibration = &source->calibration;
+	}
+	if (options->calibration_path) {
+		source->calibration_path = strdup(options->calibration_path);
+		source->options.calibration_path = source->calibration_path;
+		if (!source->calibration_path)
+			return incise_error_set(err, ENOMEM, "%s: out of memory",
+						source->recording->path);
 	}
 	rc = incise_thread_start(&source->thread, run, source, NULL);
 	if (rc)

@@ -29,6 +29,7 @@
 #include "../read/recording.h"
 #include "../schema.h"
 #include "interpolators.h"
+#include "writers.h"
 
 #define PART(quantity, name, column, scope, source, about)                            \
 	{                                                                             \
@@ -126,6 +127,8 @@ struct incise_budget {
 	double shared, delay_s; /* the delay is shared · alignment, and the rest */
 	/* own */
 	double resolution_N, noise_N, jitter_s;
+	double samples;		   /* of the force in a row that count as one */
+	double window_s;	   /* of the filter of the velocity */
 	double position_mm2[3][3]; /* covariance of the noise of the tip's position */
 	double normal[3];
 	double line_1_s, smoother_1_s; /* noise of the velocity for one of positions */
@@ -346,6 +349,7 @@ static int measure_force(struct incise_budget *budget, struct incise_recording *
 			u_mV = hypot(u_mV, step_mV / sqrt(12));
 		if (measured)
 			set(budget, INCISE_BUDGET_ZERO, u_mV);
+		budget->samples = length;
 	}
 	sqlite3_finalize(stmt);
 	/* The codes' variance has that of their last digit. */
@@ -652,6 +656,7 @@ static void keep_tracker(struct incise_budget *budget, const struct tracker_sums
 		noise += budget->position_mm2[i][i] / 3;
 	}
 	budget->smoother_1_s = sums->smooth.noise_1_s;
+	budget->window_s = INCISE_DEPTH_WINDOW * sums->smooth.period_s;
 	budget->line_1_s = 1 / sums->smooth.period_s /
 			   sqrt(INCISE_DEPTH_HALF * (INCISE_DEPTH_HALF + 1) *
 				(2 * INCISE_DEPTH_HALF + 1) / 3.);
@@ -696,7 +701,8 @@ static int measure_tracker(struct incise_budget *budget, const struct use *use,
 /* --- the budget ---------------------------------------------------------------------- */
 
 static int find_all(struct incise_budget *budget, const struct use *use,
-		    struct incise_recording *recording, struct incise_error *err)
+		    struct incise_recording *recording, bool rows,
+		    struct incise_error *err)
 {
 	double surface_u_mm = use->of_tracker.calibration.surface_u_mm;
 	int rc = 0;
@@ -711,13 +717,15 @@ static int find_all(struct incise_budget *budget, const struct use *use,
 		     "the surface has no uncertainty (surface_u_mm in calibration.conf)");
 	if (!rc)
 		rc = find_times(budget, use, recording, err);
-	return rc ? rc : measure_tracker(budget, use, recording, err);
+	return rc || !rows ? rc : measure_tracker(budget, use, recording, err);
 }
 
-struct incise_budget *incise_budget_new(struct incise_recording *recording,
-					const struct incise_calibration *given,
-					const char *given_path, struct incise_error *err)
+struct incise_budget *incise_budget_open(struct incise_recording *recording,
+					 const struct incise_export_options *options,
+					 bool rows, struct incise_error *err)
 {
+	const struct incise_calibration *given = options->calibration;
+	const char *given_path = options->calibration_path;
 	struct incise_budget *budget = calloc(1, sizeof(*budget));
 	struct use use = {
 		.force = incise_recording_member(recording, "force"),
@@ -736,6 +744,7 @@ struct incise_budget *incise_budget_new(struct incise_recording *recording,
 			budget->covariance[i][k] = i == k ? NAN : 0;
 	}
 	budget->noise_N = budget->resolution_N = NAN;
+	budget->samples = 1;
 	rc = read_own(use.force, &use.of_force, err);
 	if (!rc)
 		rc = read_own(use.tracker, &use.of_tracker, err);
@@ -750,7 +759,7 @@ struct incise_budget *incise_budget_new(struct incise_recording *recording,
 	}
 	rc = rc < 0 ? rc : 0;
 	if (!rc)
-		rc = find_all(budget, &use, recording, err);
+		rc = find_all(budget, &use, recording, rows, err);
 	free(use.of_given.records);
 	free(use.of_force.records);
 	free(use.of_tracker.records);
@@ -759,6 +768,18 @@ struct incise_budget *incise_budget_new(struct incise_recording *recording,
 	free(budget);
 	errno = -rc;
 	return NULL;
+}
+
+struct incise_budget *incise_budget_new(struct incise_recording *recording,
+					const struct incise_calibration *given,
+					const char *given_path, struct incise_error *err)
+{
+	return incise_budget_open(recording,
+				  &(struct incise_export_options){
+					  .calibration = given,
+					  .calibration_path = given_path,
+				  },
+				  true, err);
 }
 
 void incise_budget_free(struct incise_budget *budget)
@@ -860,4 +881,95 @@ double incise_budget_total(enum incise_budget_quantity quantity,
 	for (int i = value->first; i < value->first + value->n; i++)
 		sum += part[i] * part[i];
 	return sqrt(sum);
+}
+
+/* --- means --------------------------------------------------------------------------- */
+
+static bool is_own(int i)
+{
+	return parts[i].scope == INCISE_BUDGET_OWN && i != VELOCITY_SMOOTHING;
+}
+
+/* Go on to other records of the tracker: the weights of those behind are complete. */
+static void to_records(struct incise_budget_mean *mean, const int64_t record_ns[2])
+{
+	if (mean->record_ns[0] == record_ns[0] && mean->record_ns[1] == record_ns[1])
+		return;
+	mean->depth2 += mean->depth[0] * mean->depth[0];
+	mean->depth[0] = 0;
+	if (mean->record_ns[1] == record_ns[0])
+		mean->depth[0] = mean->depth[1];
+	else
+		mean->depth2 += mean->depth[1] * mean->depth[1];
+	mean->depth[1] = 0;
+	mean->record_ns[0] = record_ns[0];
+	mean->record_ns[1] = record_ns[1];
+}
+
+/* The errors that are common to a recording end with it. */
+static void to_recording(struct incise_budget_mean *mean, int recording)
+{
+	if (mean->recording == recording)
+		return;
+	for (int i = 0; i < PARTS; i++)
+		if (parts[i].scope == INCISE_BUDGET_RECORDING) {
+			mean->past2[i] += mean->sum[i] * mean->sum[i];
+			mean->sum[i] = 0;
+		}
+	to_records(mean, (const int64_t[2]){INT64_MIN, INT64_MIN});
+	mean->recording = recording;
+}
+
+void incise_budget_mean_add(struct incise_budget_mean *mean,
+			    const struct incise_budget *budget, int recording,
+			    const int64_t record_ns[2],
+			    const struct incise_budget_row *row)
+{
+	double part[PARTS], noise_mm = noise_along(budget, budget->normal);
+	int64_t window = (int64_t)floor((double)record_ns[0] * 1e-9 / budget->window_s);
+	/* A code that no noise moves is off by the same in all samples. */
+	bool still = budget->noise_N < budget->resolution_N * sqrt(3);
+
+	incise_budget_row(budget, row, part);
+	to_recording(mean, recording);
+	to_records(mean, record_ns);
+	if (window != mean->window) {
+		mean->velocity2 += mean->velocity * mean->velocity;
+		mean->velocity = 0;
+		mean->window = window;
+	}
+	mean->depth[0] += (1 - row->share) * noise_mm;
+	mean->depth[1] += row->share * noise_mm;
+	mean->velocity += part[VELOCITY_NOISE];
+	for (int i = 0; i < PARTS; i++)
+		mean->sum[i] += is_own(i) ? part[i] * part[i] : part[i];
+	mean->force2 += part[FORCE_NOISE] * part[FORCE_NOISE];
+	/* Samples that hang together count as one. */
+	mean->sum[FORCE_NOISE] +=
+		(budget->samples - 1) * part[FORCE_NOISE] * part[FORCE_NOISE];
+	if (still)
+		mean->sum[FORCE_RESOLUTION] += 2.0 * (double)mean->n *
+					       part[FORCE_RESOLUTION] *
+					       part[FORCE_RESOLUTION];
+	mean->n++;
+}
+
+void incise_budget_mean_parts(const struct incise_budget_mean *mean, double part[PARTS])
+{
+	double n = (double)mean->n;
+
+	for (int i = 0; i < PARTS; i++) {
+		double sum = mean->sum[i];
+
+		part[i] = is_own(i) ? sqrt(sum) / n : sum / n;
+		if (mean->past2[i] > 0)
+			part[i] = copysign(sqrt(mean->past2[i] + sum * sum), sum) / n;
+	}
+	/* Of fewer than hang together it is that of one. */
+	part[FORCE_NOISE] = fmin(part[FORCE_NOISE], sqrt(mean->force2 / n));
+	part[DEPTH_NOISE] = sqrt(mean->depth2 + mean->depth[0] * mean->depth[0] +
+				 mean->depth[1] * mean->depth[1]) /
+			    n;
+	part[VELOCITY_NOISE] =
+		sqrt(mean->velocity2 + mean->velocity * mean->velocity) / n;
 }

@@ -53,7 +53,16 @@ struct pass {
 	struct incise_wall *wall; /* of the present recording; NULL: without TAI */
 	int64_t first_ns;	  /* its time 0, CLOCK_MONOTONIC */
 	double depth_deepest_mm;  /* of any row, for the error without a cut */
-	void *state;		  /* of the visitor */
+
+	/* Uncertainties, if they are asked for; else NULL. */
+	struct incise_budget **budgets; /* of each recording */
+	const struct incise_budget_columns *columns;
+	int recording;			  /* the present one, from 0 */
+	int width;			  /* columns without those of TAI */
+	struct incise_budget_row row;	  /* of the present sample … */
+	int64_t record_ns[2];		  /* … and the tracker's records around it */
+	struct incise_budget_mean *means; /* of the visitor's bins */
+	void *state;			  /* of the visitor */
 };
 
 /* Functions for each sample and cut; each returns 0 or -errno. */
@@ -97,8 +106,20 @@ static int cut_name(struct pass *pass)
 	return rc;
 }
 
-/* Welford's way: one pass, no cancellation. */
-static void bin_add(struct bin *bin, const struct pass *pass,
+/* Write the uncertainties of bin number @at, and empty them. */
+static void put_uncertainties(struct pass *pass, size_t at, union incise_cell *cells)
+{
+	double part[INCISE_BUDGET_PARTS];
+
+	if (!pass->budgets)
+		return;
+	incise_budget_mean_parts(&pass->means[at], part);
+	incise_budget_cells(pass->columns, part, cells);
+	pass->means[at] = (struct incise_budget_mean){0};
+}
+
+/* Add a sample to bin number @at. Welford's way: one pass, no cancellation. */
+static void bin_add(struct bin *bin, size_t at, const struct pass *pass,
 		    const struct incise_cut_sample *sample, double t_s)
 {
 	int cut = pass->cut;
@@ -121,6 +142,9 @@ static void bin_add(struct bin *bin, const struct pass *pass,
 		bin->last = cut;
 		bin->cuts++;
 	}
+	if (pass->budgets)
+		incise_budget_mean_add(&pass->means[at], pass->budgets[pass->recording],
+				       pass->recording, pass->record_ns, &pass->row);
 }
 
 /* Extend the bins without a given end to the largest sample that is not clipped. */
@@ -143,6 +167,21 @@ static int end_cut(struct pass *pass, const struct visitor *visitor)
 	return pass->number && visitor->end_cut ? visitor->end_cut(pass) : 0;
 }
 
+/* Find what the uncertainties of a sample depend on. */
+static void find_row(struct pass *pass, const struct incise_blade_pose *blade,
+		     const struct incise_cut_sample *sample)
+{
+	if (!pass->budgets)
+		return;
+	pass->row = (struct incise_budget_row){
+		.force_N = sample->force_N,
+		.force_share = 1,
+	};
+	incise_blade_pose_budget(blade, sample->t_ns, &pass->blade, &pass->row);
+	pass->record_ns[0] = blade->deep[0].t_ns;
+	pass->record_ns[1] = blade->deep[1].t_ns;
+}
+
 /* Pass over the cuts of one recording; the blade is that of the same one. */
 static int each_cut_sample(struct pass *pass, struct incise_cuts *cuts,
 			   struct incise_blade_pose *blade, const struct visitor *visitor)
@@ -155,6 +194,7 @@ static int each_cut_sample(struct pass *pass, struct incise_cuts *cuts,
 		rc = incise_blade_pose_at(blade, sample.t_ns, 0, &pass->blade, pass->err);
 		if (rc)
 			return rc;
+		find_row(pass, blade, &sample);
 		if (sample.cut != pass->number) {
 			rc = end_cut(pass, visitor);
 			if (rc)
@@ -221,6 +261,7 @@ static int each_cut(struct pass *pass, struct incise_recording *const *recording
 	pass->cut = 0;
 	for (int i = 0; i < n && !rc; i++) {
 		free(pass->name);
+		pass->recording = i;
 		pass->name = unique_name(recordings, i);
 		rc = pass->name ? open_wall(pass, recordings[i])
 				: incise_error_set(pass->err, ENOMEM, "out of memory");
@@ -232,22 +273,27 @@ static int each_cut(struct pass *pass, struct incise_recording *const *recording
 
 /* --- force samples, or means over 1/rate --------------------------------------------- */
 
-#define CUT                                                                          \
-	{                                                                            \
-		"cut", "1", "recording and number of the cut", INCISE_COLUMN_NAME, 0 \
+#define CUT                                                                           \
+	{                                                                             \
+		"cut", "1", "recording and number of the cut", INCISE_COLUMN_NAME, 0, \
+			NULL, NULL                                                    \
 	}
 
 static const struct incise_column raw_columns[] = {
 	CUT,
-	{"t_s", "s", "since the recording's first force sample", INCISE_COLUMN_REAL, 6},
-	{"depth_mm", "mm", "of the tip below the surface", INCISE_COLUMN_SINGLE, 4},
-	{"velocity_mm_s", "mm/s", "speed of the tip", INCISE_COLUMN_SINGLE, 3},
-	{"force_N", "N", "on the blade", INCISE_COLUMN_SINGLE, 5},
-	{"clipped", "1", "1: the converter was at an end", INCISE_COLUMN_FLAG, 0},
+	{"t_s", "s", "since the recording's first force sample", INCISE_COLUMN_REAL, 6,
+	 NULL, NULL},
+	{"depth_mm", "mm", "of the tip below the surface", INCISE_COLUMN_SINGLE, 4, NULL,
+	 NULL},
+	{"velocity_mm_s", "mm/s", "speed of the tip", INCISE_COLUMN_SINGLE, 3, NULL,
+	 NULL},
+	{"force_N", "N", "on the blade", INCISE_COLUMN_SINGLE, 5, NULL, NULL},
+	{"clipped", "1", "1: the converter was at an end", INCISE_COLUMN_FLAG, 0, NULL,
+	 NULL},
 	INCISE_ADVANCING_COLUMN,
-	{INCISE_ACCELERATION_COLUMN, INCISE_COLUMN_SINGLE, 1},
-	{INCISE_TILT_COLUMN, INCISE_COLUMN_SINGLE, 2},
-	{INCISE_TIME_COLUMN, INCISE_COLUMN_SINGLE, 4},
+	{INCISE_ACCELERATION_COLUMN, INCISE_COLUMN_SINGLE, 1, NULL, NULL},
+	{INCISE_TILT_COLUMN, INCISE_COLUMN_SINGLE, 2, NULL, NULL},
+	{INCISE_TIME_COLUMN, INCISE_COLUMN_SINGLE, 4, NULL, NULL},
 };
 
 struct raw {
@@ -259,7 +305,8 @@ static int put_row(struct pass *pass)
 {
 	struct raw *raw = pass->state;
 	const struct bin *row = &raw->row;
-	union incise_cell cells[] = {
+	union incise_cell cells[COLUMNS(raw_columns) + INCISE_BUDGET_COLUMNS +
+				INCISE_TAI_COLUMNS] = {
 		{.integer = 0},
 		{.real = row->t_s},
 		{.real = row->depth_mm},
@@ -270,8 +317,6 @@ static int put_row(struct pass *pass)
 		{.real = row->acceleration_mm_s2},
 		{.real = row->tilt_deg},
 		{.real = row->time_in_tissue_s},
-		{0},
-		{0}, /* of TAI, if it is asked for */
 	};
 	int rc = 0;
 
@@ -280,10 +325,11 @@ static int put_row(struct pass *pass)
 	cells[0].integer = cut_name(pass);
 	if (cells[0].integer < 0)
 		return (int)cells[0].integer;
+	put_uncertainties(pass, 0, cells);
 	if (pass->wall)
 		rc = incise_tai_cells(pass->wall,
 				      pass->first_ns + llround(row->t_s * 1e9),
-				      cells + COLUMNS(raw_columns), pass->err);
+				      cells + pass->width, pass->err);
 	if (!rc)
 		rc = incise_table_add(pass->table, cells, pass->err);
 	pass->report.rows++;
@@ -305,16 +351,18 @@ static int add_to_row(struct pass *pass, const struct incise_cut_sample *sample,
 	rc = slot != raw->slot ? put_row(pass) : 0;
 
 	raw->slot = slot;
-	bin_add(&raw->row, pass, sample, t_s);
+	bin_add(&raw->row, 0, pass, sample, t_s);
 	return rc;
 }
 
 static int write_raw(struct pass *pass, struct incise_recording *const *recordings, int n)
 {
 	static const struct visitor rows = {add_to_row, put_row};
+	struct incise_budget_mean mean = {0};
 	struct raw raw = {0};
 
 	pass->state = &raw;
+	pass->means = &mean;
 	return each_cut(pass, recordings, n, &rows);
 }
 
@@ -322,16 +370,18 @@ static int write_raw(struct pass *pass, struct incise_recording *const *recordin
 
 static const struct incise_column bin_columns[] = {
 	CUT,
-	{"depth_mm", "mm", "mean depth in the bin", INCISE_COLUMN_REAL, -1},
-	{"velocity_mm_s", "mm/s", "mean speed in the bin", INCISE_COLUMN_REAL, -1},
-	{"force_N", "N", "mean force in the bin", INCISE_COLUMN_REAL, -1},
-	{"sd_N", "N", "standard deviation of single samples", INCISE_COLUMN_REAL, -1},
-	{"count", "1", "samples", INCISE_COLUMN_INTEGER, 0},
-	{"cuts", "1", "number of cuts in the bin", INCISE_COLUMN_INTEGER, 0},
+	{"depth_mm", "mm", "mean depth in the bin", INCISE_COLUMN_REAL, -1, NULL, NULL},
+	{"velocity_mm_s", "mm/s", "mean speed in the bin", INCISE_COLUMN_REAL, -1, NULL,
+	 NULL},
+	{"force_N", "N", "mean force in the bin", INCISE_COLUMN_REAL, -1, NULL, NULL},
+	{"sd_N", "N", "standard deviation of single samples", INCISE_COLUMN_REAL, -1,
+	 NULL, NULL},
+	{"count", "1", "samples", INCISE_COLUMN_INTEGER, 0, NULL, NULL},
+	{"cuts", "1", "number of cuts in the bin", INCISE_COLUMN_INTEGER, 0, NULL, NULL},
 	INCISE_ADVANCING_COLUMN,
-	{INCISE_ACCELERATION_COLUMN, INCISE_COLUMN_REAL, -1},
-	{INCISE_TILT_COLUMN, INCISE_COLUMN_REAL, -1},
-	{INCISE_TIME_COLUMN, INCISE_COLUMN_REAL, -1},
+	{INCISE_ACCELERATION_COLUMN, INCISE_COLUMN_REAL, -1, NULL, NULL},
+	{INCISE_TILT_COLUMN, INCISE_COLUMN_REAL, -1, NULL, NULL},
+	{INCISE_TIME_COLUMN, INCISE_COLUMN_REAL, -1, NULL, NULL},
 };
 
 /* Bin of a value; the upper end belongs to the last one. -1: above it. */
@@ -358,9 +408,12 @@ static int add_to_bin(struct pass *pass, const struct incise_cut_sample *sample,
 	k = bin_of(sample->velocity_mm_s, pass->report.velocity_max_mm_s,
 		   o->velocity_bins);
 
-	if (i >= 0 && k >= 0)
-		bin_add(&bins[2 * (i * o->velocity_bins + k) + pass->blade.advancing],
-			pass, sample, 0);
+	if (i >= 0 && k >= 0) {
+		size_t at =
+			(size_t)2 * (i * o->velocity_bins + k) + pass->blade.advancing;
+
+		bin_add(&bins[at], at, pass, sample, 0);
+	}
 	return 0;
 }
 
@@ -375,7 +428,7 @@ static int put_bins(struct pass *pass)
 
 	for (size_t i = 0; i < n; i++) {
 		struct bin *bin = &bins[i];
-		union incise_cell cells[] = {
+		union incise_cell cells[COLUMNS(bin_columns) + INCISE_BUDGET_COLUMNS] = {
 			{.integer = 0},
 			{.real = bin->depth_mm},
 			{.real = bin->velocity_mm_s},
@@ -394,11 +447,14 @@ static int put_bins(struct pass *pass)
 				rc = cut_name(pass);
 				cells[0].integer = rc;
 			}
+			put_uncertainties(pass, i, cells + !o->by_cut);
 			if (rc >= 0)
 				rc = incise_table_add(pass->table, cells + !o->by_cut,
 						      pass->err);
 			pass->report.rows++;
 		}
+		if (pass->means && bin->n)
+			pass->means[i] = (struct incise_budget_mean){0};
 		*bin = (struct bin){0};
 	}
 	return rc;
@@ -444,9 +500,14 @@ static int write_bins(struct pass *pass, struct incise_recording *const *recordi
 
 	pass->state =
 		calloc((size_t)2 * o->depth_bins * o->velocity_bins, sizeof(struct bin));
-	if (!pass->state)
+	if (pass->budgets)
+		pass->means = calloc((size_t)2 * o->depth_bins * o->velocity_bins,
+				     sizeof(*pass->means));
+	if (!pass->state || (pass->budgets && !pass->means)) {
+		free(pass->state);
 		return incise_error_set(pass->err, ENOMEM, "%d × %d bins: out of memory",
 					o->depth_bins, o->velocity_bins);
+	}
 	if (!(o->depth_max_mm > 0 && o->velocity_max_mm_s > 0)) {
 		pass->samples_all += all; /* each is read twice */
 		rc = find_ends(pass, recordings, n);
@@ -455,6 +516,7 @@ static int write_bins(struct pass *pass, struct incise_recording *const *recordi
 		rc = each_cut(pass, recordings, n, &rows);
 	if (!rc && !o->by_cut)
 		rc = put_bins(pass);
+	free(pass->means);
 	free(pass->state);
 	return rc;
 }
@@ -492,6 +554,10 @@ int incise_export_check(const struct incise_export_options *o, struct incise_err
 		return incise_error_set(err, EINVAL,
 					"TAI is of rows, not of averages in bins, and "
 					"messages of ROS 2 have UTC");
+	if (o->uncertainty && o->ros2)
+		return incise_error_set(err, EINVAL,
+					"messages of ROS 2 have no place for "
+					"uncertainties");
 	if (o->min_count < 0)
 		return incise_error_set(err, EINVAL, "smallest count %d is negative",
 					o->min_count);
@@ -562,12 +628,84 @@ static int write_resampled(struct pass *pass, struct incise_recording *const *re
 			  : incise_error_set(pass->err, ENOMEM, "out of memory");
 		if (!rc)
 			rc = incise_resample(recordings[i], name, pass->options,
-					     pass->wall, pass->table, &pass->report,
-					     pass->samples, pass->samples_all, pass->err);
+					     pass->budgets ? pass->budgets[i] : NULL,
+					     pass->columns, pass->wall, pass->table,
+					     &pass->report, pass->samples,
+					     pass->samples_all, pass->err);
 		pass->samples += recordings[i]->meta.force;
 		free(name);
 	}
 	return rc ? rc : incise_table_finish(pass->table, pass->err);
+}
+
+void incise_report_unstated(struct incise_export_report *report,
+			    const struct incise_budget *budget)
+{
+	char *text = report->unstated;
+
+	for (int q = 0; q < INCISE_BUDGET_QUANTITIES; q++) {
+		const char *missing =
+			incise_budget_missing(budget, (enum incise_budget_quantity)q);
+		size_t n = strlen(text);
+
+		if (missing && !strstr(text, missing))
+			snprintf(text + n, sizeof(report->unstated) - n, "%s%s: %s",
+				 n ? "; " : "", incise_budget_values()[q].name, missing);
+	}
+}
+
+static void close_budgets(struct pass *pass, int n)
+{
+	for (int i = 0; i < n && pass->budgets; i++)
+		incise_budget_free(pass->budgets[i]);
+	free(pass->budgets);
+}
+
+/* The budgets of all recordings, if uncertainties are asked for. Returns 0 or -errno. */
+static int open_budgets(struct pass *pass, struct incise_recording *const *recordings,
+			int n)
+{
+	if (!pass->options->uncertainty)
+		return 0;
+	pass->budgets = calloc((size_t)n, sizeof(struct incise_budget *));
+	if (!pass->budgets)
+		return incise_error_set(pass->err, ENOMEM, "out of memory");
+	for (int i = 0; i < n; i++) {
+		pass->budgets[i] =
+			incise_budget_open(recordings[i], pass->options, true, pass->err);
+		if (!pass->budgets[i])
+			return -errno;
+		incise_report_unstated(&pass->report, pass->budgets[i]);
+	}
+	return 0;
+}
+
+/* Write the rows of a table of these columns; those of TAI come last. */
+static int write_table(struct pass *pass, struct incise_recording *const *recordings,
+		       int n, const struct incise_table_format *format, FILE *out,
+		       const struct incise_column *columns,
+		       const struct incise_provenance *provenance)
+{
+	struct incise_column *with_tai = NULL;
+	struct incise_table table;
+	int rc, width = pass->width;
+
+	if (pass->options->tai) {
+		columns = with_tai = incise_tai_columns(columns, width);
+		width += INCISE_TAI_COLUMNS;
+		if (!columns)
+			return incise_error_set(pass->err, ENOMEM, "out of memory");
+	}
+	rc = incise_table_open(&table, format, out, columns, width, provenance,
+			       pass->err);
+	if (!rc) {
+		pass->table = &table;
+		rc = pass->options->resample ? write_resampled(pass, recordings, n)
+					     : write_cuts(pass, recordings, n);
+		incise_table_close(&table);
+	}
+	free(with_tai);
+	return rc;
 }
 
 int incise_export_table(struct incise_recording *const *recordings, int n,
@@ -582,31 +720,31 @@ int incise_export_table(struct incise_recording *const *recordings, int n,
 	const struct incise_column *columns =
 		options->resample ? incise_resample_columns
 				  : (bins ? bin_columns : raw_columns) + !whole;
-	struct incise_column *with_tai = NULL;
-	struct incise_table table;
-	int rc = 0, width = (bins ? COLUMNS(bin_columns) : COLUMNS(raw_columns)) - !whole;
+	struct incise_budget_columns with_budget = {0};
+	int rc;
 
 	for (int i = 0; i < n; i++)
 		pass.samples_all += recordings[i]->meta.force;
+	pass.width = (bins ? COLUMNS(bin_columns) : COLUMNS(raw_columns)) - !whole;
 	if (options->resample)
-		width = incise_resample_width(recordings, n, err);
-	if (width < 0)
-		return width;
-	if (options->tai) {
-		columns = with_tai = incise_tai_columns(columns, width);
-		width += INCISE_TAI_COLUMNS;
-		if (!columns)
-			return incise_error_set(err, ENOMEM, "out of memory");
+		pass.width = incise_resample_width(recordings, n, err);
+	if (pass.width < 0)
+		return pass.width;
+	rc = open_budgets(&pass, recordings, n);
+	if (!rc && options->uncertainty) {
+		rc = incise_budget_columns(&with_budget, columns, pass.width,
+					   options->uncertainty);
+		if (rc)
+			incise_error_set(err, ENOMEM, "out of memory");
+		columns = with_budget.columns;
+		pass.columns = &with_budget;
+		pass.width = with_budget.n;
 	}
-	rc = incise_table_open(&table, format, out, columns, width, provenance, err);
-	if (!rc) {
-		pass.table = &table;
-		rc = options->resample ? write_resampled(&pass, recordings, n)
-				       : write_cuts(&pass, recordings, n);
-		incise_table_close(&table);
-	}
+	if (!rc)
+		rc = write_table(&pass, recordings, n, format, out, columns, provenance);
+	close_budgets(&pass, n);
+	free(with_budget.columns);
 	incise_wall_free(pass.wall);
-	free(with_tai);
 	free(pass.name);
 	if (!rc && report)
 		*report = pass.report;

@@ -19,7 +19,8 @@
 int incise_messages_reserve(struct incise_messages *messages, size_t bytes)
 {
 	/* Each byte may be quoted. */
-	size_t capacity = 16 * INCISE_DECIMAL_MAX + 2 * bytes;
+	size_t capacity =
+		(16 + 4 * INCISE_BUDGET_COLUMNS) * INCISE_DECIMAL_MAX + 2 * bytes;
 	char *text;
 
 	if (capacity <= messages->capacity)
@@ -154,6 +155,39 @@ static int write_wall(struct incise_mcap *mcap, const struct incise_messages *me
 					   (long long)messages->wall_ns);
 	if (!rc)
 		incise_mcap_metadata(mcap, "incise.wall", &pairs);
+	incise_provenance_free(&pairs);
+	return rc;
+}
+
+/* --- uncertainties ------------------------------------------------------------------- */
+
+/* In the style of the CF conventions: which members of a message are uncertainties of which. */
+static int write_uncertainties(struct incise_mcap *mcap,
+			       enum incise_export_uncertainty uncertainty)
+{
+	const struct incise_budget_value *values = incise_budget_values();
+	const struct incise_budget_part *parts = incise_budget_parts();
+	struct incise_provenance pairs = {0};
+	int rc = 0;
+
+	/* The messages have their times in their headers. */
+	for (int q = 0; q < INCISE_BUDGET_TIME && !rc; q++) {
+		const struct incise_budget_value *value = &values[q];
+		int n = uncertainty == INCISE_EXPORT_PARTS ? value->n : 0;
+		char text[600];
+		int used = snprintf(text, sizeof(text), "%s", value->total);
+
+		for (int i = value->first; i < value->first + n; i++)
+			used += snprintf(text + used, sizeof(text) - (size_t)used, " %s",
+					 parts[i].column);
+		rc = incise_provenance_add(&pairs, value->value, "%s", text);
+		for (int i = value->first; i < value->first + n && !rc; i++)
+			rc = incise_provenance_add(
+				&pairs, parts[i].column, "%s",
+				incise_budget_correlations[parts[i].scope]);
+	}
+	if (!rc)
+		incise_mcap_metadata(mcap, "incise.uncertainty_variables", &pairs);
 	incise_provenance_free(&pairs);
 	return rc;
 }
@@ -311,6 +345,15 @@ static int64_t write_messages(struct export *export,
 		rc = incise_recording_need_zero(recording, &messages->scale, err);
 	if (!rc && profile->wall)
 		rc = find_wall(messages, err);
+	if (!rc && export->options->uncertainty) {
+		messages->uncertainty = export->options->uncertainty;
+		messages->budget =
+			incise_budget_open(recording, export->options, true, err);
+		rc = messages->budget
+			     ? incise_blade_pose_open(&messages->blade, recording,
+						      export->options->calibration, err)
+			     : -errno;
+	}
 	if (!rc)
 		rc = open_streams(export, err);
 	if (rc)
@@ -318,6 +361,8 @@ static int64_t write_messages(struct export *export,
 	incise_mcap_metadata(&export->mcap, "incise", provenance);
 	if (profile->wall)
 		rc = write_wall(&export->mcap, messages);
+	if (!rc && messages->budget)
+		rc = write_uncertainties(&export->mcap, messages->uncertainty);
 	if (rc)
 		return fail_write(rc, err);
 	n = each_row(export, meta->force + meta->tracker + meta->depth, err);
@@ -352,12 +397,18 @@ int incise_export_mcap(struct incise_recording *recording,
 	incise_frames_reader_close(export.messages.frames);
 	incise_wall_free(export.messages.wall);
 	free(export.messages.text);
-	if (n < 0)
-		return (int)n;
-	if (report)
+	if (n >= 0 && report) {
 		*report = (struct incise_export_report){
 			.rows = (uint64_t)n,
 			.clipped = export.messages.clipped,
 		};
+		if (export.messages.budget)
+			incise_report_unstated(report, export.messages.budget);
+	}
+	if (export.messages.budget)
+		incise_blade_pose_close(&export.messages.blade);
+	incise_budget_free(export.messages.budget);
+	if (n < 0)
+		return (int)n;
 	return 0;
 }

@@ -13,10 +13,12 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <incise/budget.h>
 #include <incise/wall.h>
 #include "../frames.h"
 #include "../read/recording.h"
 #include "../read/rows.h"
+#include "interpolators.h"
 #include "mcap.h"
 
 struct incise_messages {
@@ -31,6 +33,10 @@ struct incise_messages {
 	struct incise_frames_reader *frames;
 	struct incise_camera_frame frame;
 	bool any_frame;
+	/* Uncertainties: the budget or NULL, with the pose for those of depths. */
+	struct incise_budget *budget;
+	struct incise_blade_pose blade;
+	enum incise_export_uncertainty uncertainty;
 };
 
 /* A table as a topic. */

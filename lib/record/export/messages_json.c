@@ -2,6 +2,7 @@
 /*
  * Messages in JSON with JSON Schemas, in the project's units; see messages.h.
  */
+#include <math.h>
 #include <string.h>
 #include "../../base/utf8.h"
 #include "decimal.h"
@@ -20,6 +21,28 @@ static char *add_real(char *to, const char *before, double value, int decimals)
 	return incise_decimal_real(add(to, before), value, decimals);
 }
 
+/* Uncertainties of a quantity, as further members. */
+static char *add_uncertainties(char *to, const struct incise_messages *messages,
+			       enum incise_budget_quantity quantity,
+			       const double part[INCISE_BUDGET_PARTS])
+{
+	const struct incise_budget_value *value = &incise_budget_values()[quantity];
+	int n = messages->uncertainty == INCISE_EXPORT_PARTS ? value->n : 0;
+
+	for (int i = -1; i < n; i++) {
+		double u = i < 0 ? incise_budget_total(quantity, part)
+				 : part[value->first + i];
+
+		to = add(to, ",\"");
+		to = add(to, i < 0 ? value->total
+				   : incise_budget_parts()[value->first + i].column);
+		to = add(to, "\":");
+		/* JSON has no NaN. */
+		to = isfinite(u) ? incise_decimal_real(to, u, 7) : add(to, "null");
+	}
+	return to;
+}
+
 static int64_t force_message(struct incise_messages *messages,
 			     const struct incise_rows *rows)
 {
@@ -32,8 +55,17 @@ static int64_t force_message(struct incise_messages *messages,
 		return code;
 	to = add_real(to, "{\"force_N\":", force_N, 5);
 	to = incise_decimal_integer(add(to, ",\"code\":"), code);
-	to = add(to, clipped ? ",\"clipped\":true}" : ",\"clipped\":false}");
-	return to - messages->text;
+	to = add(to, clipped ? ",\"clipped\":true" : ",\"clipped\":false");
+	if (messages->budget) {
+		double part[INCISE_BUDGET_PARTS];
+
+		incise_budget_row(messages->budget,
+				  &(struct incise_budget_row){.force_N = force_N,
+							      .force_share = 1},
+				  part);
+		to = add_uncertainties(to, messages, INCISE_BUDGET_FORCE, part);
+	}
+	return add(to, "}") - messages->text;
 }
 
 /* A text in JSON's quotes; bytes that are not UTF-8 become '?'. */
@@ -85,6 +117,20 @@ static int64_t depth_message(struct incise_messages *messages,
 
 	to = add_real(to, "{\"depth_mm\":", sqlite3_column_double(rows->stmt, 2), 4);
 	to = add_real(to, ",\"velocity_mm_s\":", sqlite3_column_double(rows->stmt, 3), 3);
+	if (messages->budget) {
+		struct incise_budget_row row = {.tracker_time = true};
+		struct incise_blade_pose_value value;
+		double part[INCISE_BUDGET_PARTS];
+		int rc = incise_blade_pose_at(&messages->blade, rows->t_ns, 0, &value,
+					      NULL);
+
+		if (rc)
+			return rc;
+		incise_blade_pose_budget(&messages->blade, rows->t_ns, &value, &row);
+		incise_budget_row(messages->budget, &row, part);
+		to = add_uncertainties(to, messages, INCISE_BUDGET_DEPTH, part);
+		to = add_uncertainties(to, messages, INCISE_BUDGET_VELOCITY, part);
+	}
 	return add(to, "}") - messages->text;
 }
 

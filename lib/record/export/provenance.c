@@ -11,7 +11,7 @@
 #include <time.h>
 #include <incise/version.h>
 #include <incise/wall.h>
-#include "provenance.h"
+#include "writers.h"
 #include "../read/recalibration.h"
 #include "../read/recording.h"
 #include "../read/session.h"
@@ -278,6 +278,103 @@ static int add_calibration(struct incise_provenance *provenance,
 	return rc ? rc : add_lengths(provenance, recordings, n, given);
 }
 
+static const struct {
+	const char *name, *unit; /* as in calibration.conf, and of what it has no key */
+} sources[INCISE_BUDGET_SOURCES] = {
+	[INCISE_BUDGET_GAIN] = {"force_mV_N", "mV/N"},
+	[INCISE_BUDGET_ZERO] = {"force_zero_mV", "mV"},
+	[INCISE_BUDGET_TIP_X] = {"tip_x_mm", "mm"},
+	[INCISE_BUDGET_TIP_Y] = {"tip_y_mm", "mm"},
+	[INCISE_BUDGET_TIP_Z] = {"tip_z_mm", "mm"},
+	[INCISE_BUDGET_SURFACE] = {"surface_mm", "mm"},
+	[INCISE_BUDGET_ALIGNMENT] = {"alignment_s", "s"},
+	[INCISE_BUDGET_DELAY] = {"delay_s", "s"},
+};
+
+/* Standard uncertainties and covariances of the common sources, as two texts to be freed. */
+static int describe_budget(const struct incise_budget *budget, char **u,
+			   char **covariance)
+{
+	size_t size[2];
+	FILE *text[2] = {open_memstream(u, &size[0]),
+			 open_memstream(covariance, &size[1])};
+	bool failed = !text[0] || !text[1];
+
+	for (int i = 0; i < INCISE_BUDGET_SOURCES && !failed; i++) {
+		double value = incise_budget_u(budget, (enum incise_budget_source)i);
+
+		if (!sources[i].name)
+			continue;
+		if (isnan(value))
+			fprintf(text[0], "%s%s not stated", i ? ", " : "",
+				sources[i].name);
+		else
+			fprintf(text[0], "%s%s %.9g %s", i ? ", " : "", sources[i].name,
+				value, sources[i].unit);
+		for (int k = 0; k < i; k++) {
+			value = incise_budget_covariance(budget,
+							 (enum incise_budget_source)k,
+							 (enum incise_budget_source)i);
+			if (sources[k].name && !isnan(value) && value != 0)
+				fprintf(text[1], "%s%s %s %.9g",
+					ftell(text[1]) > 0 ? ", " : "", sources[k].name,
+					sources[i].name, value);
+		}
+	}
+	for (int i = 0; i < 2; i++)
+		if (text[i] && fclose(text[i]))
+			failed = true;
+	return failed ? -ENOMEM : 0;
+}
+
+/* The uncertainties that the calibrations state, with their covariances; of several recordings
+ * only if they are the same. */
+static int add_budget(struct incise_provenance *provenance,
+		      struct incise_recording *const *recordings, int n,
+		      const struct incise_export_options *options,
+		      struct incise_error *err)
+{
+	static const char *const words[] = {"none", "total", "parts"};
+	char *u[2] = {NULL}, *covariance[2] = {NULL};
+	bool same = true;
+	int rc = 0;
+
+	if (!options->uncertainty)
+		return 0;
+	for (int i = 0; i < n && !rc && same; i++) {
+		struct incise_budget *budget =
+			incise_budget_open(recordings[i], options, false, err);
+
+		if (!budget)
+			rc = -errno;
+		else
+			rc = describe_budget(budget, &u[i > 0], &covariance[i > 0]);
+		incise_budget_free(budget);
+		if (i && !rc) {
+			same = !strcmp(u[0], u[1]) &&
+			       !strcmp(covariance[0], covariance[1]);
+			free(u[1]);
+			free(covariance[1]);
+			u[1] = covariance[1] = NULL;
+		}
+	}
+	if (!rc)
+		rc = incise_provenance_add(provenance, "uncertainty",
+					   "%s: standard uncertainties, 2 u holds 95 %%",
+					   words[options->uncertainty]);
+	if (!rc)
+		rc = incise_provenance_add(provenance, "calibration_u", "%s",
+					   same ? u[0] : "each recording's own");
+	if (!rc && same)
+		rc = incise_provenance_add(provenance, "calibration_covariance", "%s",
+					   covariance[0]);
+	for (int i = 0; i < 2; i++) {
+		free(u[i]);
+		free(covariance[i]);
+	}
+	return rc;
+}
+
 static int add_options(struct incise_provenance *provenance,
 		       const struct incise_export_options *o)
 {
@@ -319,6 +416,8 @@ int incise_provenance_of(struct incise_provenance *provenance,
 			   : add_options(provenance, options);
 	if (!rc)
 		rc = add_calibration(provenance, recordings, n, options->calibration);
+	if (!rc && !table)
+		rc = add_budget(provenance, recordings, n, options, err);
 	if (!rc && n == 1)
 		rc = add_wall(provenance, recordings[0]);
 	return rc ? incise_error_set(err, -rc, "lineage: %s", strerror(-rc)) : 0;

@@ -11,22 +11,24 @@
 #include "writers.h"
 #include "interpolators.h"
 
-#define SINGLE(name, unit, about, decimals)                       \
-	{                                                         \
-		name, unit, about, INCISE_COLUMN_SINGLE, decimals \
+#define SINGLE(name, unit, about, decimals)                                   \
+	{                                                                     \
+		name, unit, about, INCISE_COLUMN_SINGLE, decimals, NULL, NULL \
 	}
-#define FLAG(name, about)                               \
-	{                                               \
-		name, "1", about, INCISE_COLUMN_FLAG, 0 \
+#define FLAG(name, about)                                           \
+	{                                                           \
+		name, "1", about, INCISE_COLUMN_FLAG, 0, NULL, NULL \
 	}
 #define POSITION "position of the tip"
 #define ORIENTATION "orientation, unit quaternion"
 
 const struct incise_column incise_resample_columns[INCISE_RESAMPLE_COLUMNS +
 						   INCISE_RESAMPLE_CAMERA_COLUMNS] = {
-	{"recording", "1", "its name", INCISE_COLUMN_NAME, 0},
-	{"cut", "1", "number of the cut, 0 outside", INCISE_COLUMN_INTEGER, 0},
-	{"t_s", "s", "since the recording's first force sample", INCISE_COLUMN_REAL, 6},
+	{"recording", "1", "its name", INCISE_COLUMN_NAME, 0, NULL, NULL},
+	{"cut", "1", "number of the cut, 0 outside", INCISE_COLUMN_INTEGER, 0, NULL,
+	 NULL},
+	{"t_s", "s", "since the recording's first force sample", INCISE_COLUMN_REAL, 6,
+	 NULL, NULL},
 	SINGLE("x_mm", "mm", POSITION, 4),
 	SINGLE("y_mm", "mm", POSITION, 4),
 	SINGLE("z_mm", "mm", POSITION, 4),
@@ -36,7 +38,8 @@ const struct incise_column incise_resample_columns[INCISE_RESAMPLE_COLUMNS +
 	SINGLE("qx", "1", ORIENTATION, 6),
 	SINGLE("qy", "1", ORIENTATION, 6),
 	SINGLE("qz", "1", ORIENTATION, 6),
-	{"station", "1", "sensor of the tracker, 0: unknown", INCISE_COLUMN_INTEGER, 0},
+	{"station", "1", "sensor of the tracker, 0: unknown", INCISE_COLUMN_INTEGER, 0,
+	 NULL, NULL},
 	FLAG("button", "1: the button of the stylus was pressed"),
 	SINGLE("depth_mm", "mm", "of the tip below the surface", 4),
 	SINGLE("depth_u_mm", "mm", "standard uncertainty from noise and time", 4),
@@ -47,9 +50,9 @@ const struct incise_column incise_resample_columns[INCISE_RESAMPLE_COLUMNS +
 	FLAG("interpolated", "1: a tracker record is missing here"),
 	FLAG("tracker_error", "1: the tracker reported an error"),
 	INCISE_ADVANCING_COLUMN,
-	{INCISE_ACCELERATION_COLUMN, INCISE_COLUMN_SINGLE, 1},
-	{INCISE_TILT_COLUMN, INCISE_COLUMN_SINGLE, 2},
-	{INCISE_TIME_COLUMN, INCISE_COLUMN_SINGLE, 4},
+	{INCISE_ACCELERATION_COLUMN, INCISE_COLUMN_SINGLE, 1, NULL, NULL},
+	{INCISE_TILT_COLUMN, INCISE_COLUMN_SINGLE, 2, NULL, NULL},
+	{INCISE_TIME_COLUMN, INCISE_COLUMN_SINGLE, 4, NULL, NULL},
 	SINGLE("camera_depth_mm", "mm", "depth from the frames", 4),
 	SINGLE("camera_depth_sd_mm", "mm", "standard deviation of the edge in the frames",
 	       4),
@@ -73,6 +76,11 @@ struct resample {
 	struct incise_export_report *report;
 	const struct incise_wall *wall; /* NULL: without TAI */
 	int width;			/* columns without those of TAI */
+	bool camera_columns;
+	/* Uncertainties, or NULL. */
+	const struct incise_budget *budget;
+	const struct incise_budget_columns *columns;
+	bool has_force;
 	int64_t name, first_ns;
 	uint64_t samples, all;
 	struct incise_error *err;
@@ -97,17 +105,23 @@ static double least(double a, double b)
 	return isnan(b) ? a : fmax(a, b);
 }
 
-/* Twelve bits of an uncertainty are enough, and make a file that is smaller and faster to write. */
-static double coarse(double u)
+/* Columns of uncertainties of a row. */
+static void put_uncertainties(const struct resample *r, int64_t t_ns,
+			      const struct incise_blade_pose_value *blade,
+			      const struct incise_force_value *force,
+			      union incise_cell *cells)
 {
-	union {
-		float real;
-		uint32_t bits;
-	} single = {.real = u};
+	struct incise_budget_row row = {
+		.force_N = force->force_N,
+		.force_share = force->share,
+		.smoothed = true,
+		.tracker_time = !r->has_force,
+	};
+	double part[INCISE_BUDGET_PARTS];
 
-	if (isfinite(single.real))
-		single.bits = (single.bits + 0x800) & ~0xfffU;
-	return single.real;
+	incise_blade_pose_budget(&r->blade, t_ns, blade, &row);
+	incise_budget_row(r->budget, &row, part);
+	incise_budget_cells(r->columns, part, cells);
 }
 
 static int put_row(struct resample *r, int64_t t_ns,
@@ -117,10 +131,10 @@ static int put_row(struct resample *r, int64_t t_ns,
 	struct incise_camera_value camera;
 	struct incise_blade_pose_value blade;
 	union incise_cell all[INCISE_RESAMPLE_COLUMNS + INCISE_RESAMPLE_CAMERA_COLUMNS +
-			      INCISE_TAI_COLUMNS];
+			      INCISE_BUDGET_COLUMNS + INCISE_TAI_COLUMNS];
 	int rc = incise_blade_pose_at(&r->blade, t_ns, r->t_sd_s, &blade, r->err);
 
-	if (!rc && r->width > INCISE_RESAMPLE_COLUMNS)
+	if (!rc && r->camera_columns)
 		rc = incise_camera_interpolator_at(&r->camera, t_ns, r->t_sd_s, &camera,
 						   r->err);
 	else
@@ -137,7 +151,7 @@ static int put_row(struct resample *r, int64_t t_ns,
 		{.real = blade.position_mm[0]},
 		{.real = blade.position_mm[1]},
 		{.real = blade.position_mm[2]},
-		{.real = coarse(blade.position_u_mm)},
+		{.real = incise_coarse(blade.position_u_mm)},
 		{.real = blade.q[0]},
 		{.real = blade.q[1]},
 		{.real = blade.q[2]},
@@ -145,10 +159,10 @@ static int put_row(struct resample *r, int64_t t_ns,
 		{.integer = blade.station},
 		{.integer = blade.button},
 		{.real = blade.depth_mm},
-		{.real = coarse(blade.depth_u_mm)},
+		{.real = incise_coarse(blade.depth_u_mm)},
 		{.real = blade.velocity_mm_s},
 		{.real = force->force_N},
-		{.real = coarse(force->u_N)},
+		{.real = incise_coarse(force->u_N)},
 		{.integer = force->clipped},
 		{.integer = blade.interpolated},
 		{.integer = blade.error},
@@ -157,13 +171,15 @@ static int put_row(struct resample *r, int64_t t_ns,
 		{.real = blade.tilt_deg},
 		{.real = blade.time_in_tissue_s},
 		{.real = camera.depth_mm},
-		{.real = coarse(camera.sd_mm)},
-		{.real = coarse(camera.u_mm)},
+		{.real = incise_coarse(camera.sd_mm)},
+		{.real = incise_coarse(camera.u_mm)},
 		{.real = camera.quality},
 		{.integer = camera.low_quality},
 	};
 
 	memcpy(all, cells, sizeof(cells));
+	if (r->budget)
+		put_uncertainties(r, t_ns, &blade, force, all);
 	if (r->wall)
 		rc = incise_tai_cells(r->wall, t_ns, all + r->width, r->err);
 	if (!rc)
@@ -256,7 +272,7 @@ static int check_span(const struct resample *r, const struct incise_recording *r
 static int on_poses(struct resample *r, struct incise_recording *recording)
 {
 	const struct incise_calibration *given = r->options->calibration;
-	const struct incise_force_value none = {.force_N = NAN, .u_N = NAN};
+	const struct incise_force_value none = {.force_N = NAN, .u_N = NAN, .share = NAN};
 	struct incise_rows rows;
 	int64_t last_ns;
 	int rc;
@@ -307,6 +323,8 @@ static int on_samples(struct resample *r, struct incise_recording *recording)
 
 int incise_resample(struct incise_recording *recording, const char *name,
 		    const struct incise_export_options *options,
+		    const struct incise_budget *budget,
+		    const struct incise_budget_columns *columns,
 		    const struct incise_wall *wall, struct incise_table *table,
 		    struct incise_export_report *report, uint64_t samples, uint64_t all,
 		    struct incise_error *err)
@@ -318,6 +336,8 @@ int incise_resample(struct incise_recording *recording, const char *name,
 		.report = report,
 		.wall = wall,
 		.width = table->n_columns - (wall ? INCISE_TAI_COLUMNS : 0),
+		.budget = budget,
+		.columns = columns,
 		.name = incise_table_name(table, name),
 		.samples = samples,
 		.all = all,
@@ -326,6 +346,10 @@ int incise_resample(struct incise_recording *recording, const char *name,
 	bool has_force = incise_recording_has_force(recording);
 	int rc = 0;
 
+	r.has_force = has_force;
+	for (int i = 0; i < r.width; i++)
+		if (!strcmp(table->columns[i].name, "camera_depth_mm"))
+			r.camera_columns = true;
 	if (r.name < 0)
 		return incise_error_set(err, ENOMEM, "out of memory");
 	if (has_force)

@@ -15,6 +15,8 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 #include <incise/error.h>
 #include "provenance.h"
 
@@ -32,7 +34,27 @@ struct incise_column {
 	const char *name, *unit, *about; /* unit "1": none */
 	enum incise_column_type type;
 	int decimals; /* of a real in text; -1: nine digits in all */
+	/* Of an uncertainty: the column that it is of, and the rows that share it; else NULL. */
+	const char *of, *correlation;
 };
+
+/* Names of the uncertainties of a column, with spaces between them, to be freed; NULL: none. */
+static inline char *incise_column_uncertainties(const struct incise_column *columns,
+						int n, int of)
+{
+	size_t size = 0, used = 0;
+	char *text;
+
+	for (int i = 0; i < n; i++)
+		if (columns[i].of && !strcmp(columns[i].of, columns[of].name))
+			size += strlen(columns[i].name) + 1;
+	text = size ? malloc(size) : NULL;
+	for (int i = 0; i < n && text; i++)
+		if (columns[i].of && !strcmp(columns[i].of, columns[of].name))
+			used += (size_t)sprintf(text + used, "%s%s", used ? " " : "",
+						columns[i].name);
+	return text;
+}
 
 union incise_cell {
 	double real;
@@ -51,7 +73,7 @@ struct incise_table_format {
 	void (*close)(struct incise_table *table); /* if begin made a state */
 };
 
-#define INCISE_TABLE_ABI 2 /* changes when a struct of this header does */
+#define INCISE_TABLE_ABI 3 /* changes when a struct of this header does */
 
 struct incise_table {
 	const struct incise_table_format *format;

@@ -9,6 +9,7 @@
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <incise/budget.h>
 #include <incise/recording.h>
 #include <incise/wall.h>
 #include "provenance.h"
@@ -29,7 +30,7 @@ static inline int incise_export_progress(const struct incise_export_options *opt
 #define INCISE_ADVANCING_COLUMN                                        \
 	{                                                              \
 		"advancing", "1", "1: the blade went into new tissue", \
-			INCISE_COLUMN_FLAG, 0                          \
+			INCISE_COLUMN_FLAG, 0, NULL, NULL              \
 	}
 
 /* --- columns_tai.c ------------------------------------------------------------------ */
@@ -43,6 +44,67 @@ struct incise_column *incise_tai_columns(const struct incise_column *columns, in
 int incise_tai_cells(const struct incise_wall *wall, int64_t t_ns,
 		     union incise_cell cells[INCISE_TAI_COLUMNS],
 		     struct incise_error *err);
+
+/* --- budget.c ---------------------------------------------------------------------- */
+
+/* As incise_budget_new(), or without reading rows: then only what calibrations state is known. */
+struct incise_budget *incise_budget_open(struct incise_recording *recording,
+					 const struct incise_export_options *options,
+					 bool rows, struct incise_error *err);
+
+/*
+ * The parts of a mean over rows, in order of time; starts with {0}. Common parts and smoothing
+ * are means, with their signs; own ones get smaller:
+ *
+ *     force     samples that are independent of each other
+ *     depth     each record of the tracker by the weight that it has in the mean
+ *     velocity  the same, of the records of its filter: as one
+ */
+struct incise_budget_mean {
+	uint64_t n;
+	int recording;		 /* of the present rows */
+	int64_t record_ns[2];	 /* of the tracker, around the present row … */
+	double depth[2], depth2; /* … their weights, and squares of those before */
+	int64_t window;		 /* of the velocity's filter */
+	double force2;		 /* squares of the noise of the force */
+	double velocity, velocity2;
+	double sum[INCISE_BUDGET_PARTS];   /* of own parts squares */
+	double past2[INCISE_BUDGET_PARTS]; /* of recordings before */
+};
+
+/* Add a row of a recording, between the records of the tracker at these times. */
+void incise_budget_mean_add(struct incise_budget_mean *mean,
+			    const struct incise_budget *budget, int recording,
+			    const int64_t record_ns[2],
+			    const struct incise_budget_row *row);
+void incise_budget_mean_parts(const struct incise_budget_mean *mean,
+			      double part[INCISE_BUDGET_PARTS]);
+
+/* --- columns_budget.c ---------------------------------------------------------------- */
+
+#define INCISE_BUDGET_COLUMNS (INCISE_BUDGET_QUANTITIES + INCISE_BUDGET_PARTS)
+
+/* Columns of a table with those of uncertainties, which replace columns of their names. */
+struct incise_budget_columns {
+	struct incise_column *columns; /* to be freed */
+	int n;
+	int at[INCISE_BUDGET_COLUMNS]; /* totals, then parts; -1: not there */
+};
+
+/* Of quantities that have a column. Returns 0 or -ENOMEM. */
+int incise_budget_columns(struct incise_budget_columns *to,
+			  const struct incise_column *columns, int n,
+			  enum incise_export_uncertainty uncertainty);
+
+void incise_budget_cells(const struct incise_budget_columns *columns,
+			 const double part[INCISE_BUDGET_PARTS],
+			 union incise_cell *cells);
+
+/* Twelve bits of an uncertainty are enough, and make a file that is smaller and faster to write. */
+double incise_coarse(double u);
+
+/* The words of correlation of a part: of whom else it is the error. */
+extern const char *const incise_budget_correlations[];
 
 /* --- export.c ---------------------------------------------------------------------- */
 
@@ -59,6 +121,10 @@ int incise_export_table(struct incise_recording *const *recordings, int n,
 			const struct incise_table_format *format, FILE *out,
 			const struct incise_provenance *provenance,
 			struct incise_export_report *report, struct incise_error *err);
+
+/* Say in a report which uncertainties are not stated, each cause once. */
+void incise_report_unstated(struct incise_export_report *report,
+			    const struct incise_budget *budget);
 
 /* --- resample.c -------------------------------------------------------------------- */
 
@@ -78,11 +144,14 @@ int incise_resample_width(struct incise_recording *const *recordings, int n,
 			  struct incise_error *err);
 
 /*
- * Add the rows of a recording under a name, with TAI if @wall is not NULL. For the progress, @samples of force were read
+ * Add the rows of a recording under a name, with TAI if @wall is not NULL, with uncertainties if
+ * @budget is not. For the progress, @samples of force were read
  * before, of @all. Returns 0 or -errno.
  */
 int incise_resample(struct incise_recording *recording, const char *name,
 		    const struct incise_export_options *options,
+		    const struct incise_budget *budget,
+		    const struct incise_budget_columns *columns,
 		    const struct incise_wall *wall, struct incise_table *table,
 		    struct incise_export_report *report, uint64_t samples, uint64_t all,
 		    struct incise_error *err);

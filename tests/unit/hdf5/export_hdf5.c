@@ -20,11 +20,11 @@
 #include "../../../lib/record/export/table_writer.h"
 
 static const struct incise_column columns[] = {
-	{"cut", "1", "a name", INCISE_COLUMN_NAME, 0},
-	{"t_s", "s", "a time", INCISE_COLUMN_REAL, 6},
-	{"force_N", "N", "a force", INCISE_COLUMN_SINGLE, 5},
-	{"count", "1", "a count", INCISE_COLUMN_INTEGER, 0},
-	{"clipped", "1", "a flag", INCISE_COLUMN_FLAG, 0},
+	{"cut", "1", "a name", INCISE_COLUMN_NAME, 0, NULL, NULL},
+	{"t_s", "s", "a time", INCISE_COLUMN_REAL, 6, NULL, NULL},
+	{"force_N", "N", "a force", INCISE_COLUMN_SINGLE, 5, NULL, NULL},
+	{"count", "1", "a count", INCISE_COLUMN_INTEGER, 0, NULL, NULL},
+	{"clipped", "1", "a flag", INCISE_COLUMN_FLAG, 0, NULL, NULL},
 };
 
 #define FILE_NAME "table.h5"

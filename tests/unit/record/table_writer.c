@@ -16,12 +16,12 @@
 #include "../../../lib/record/export/table_writer.h"
 
 static const struct incise_column columns[] = {
-	{"name", "1", "a name", INCISE_COLUMN_NAME, 0},
-	{"fixed", "mm", "a real", INCISE_COLUMN_REAL, 4},
-	{"micro", "s", "a real", INCISE_COLUMN_SINGLE, 6},
-	{"free", "N", "a real", INCISE_COLUMN_REAL, -1},
-	{"count", "1", "a count", INCISE_COLUMN_INTEGER, 0},
-	{"flag", "1", "a flag", INCISE_COLUMN_FLAG, 0},
+	{"name", "1", "a name", INCISE_COLUMN_NAME, 0, NULL, NULL},
+	{"fixed", "mm", "a real", INCISE_COLUMN_REAL, 4, NULL, NULL},
+	{"micro", "s", "a real", INCISE_COLUMN_SINGLE, 6, NULL, NULL},
+	{"free", "N", "a real", INCISE_COLUMN_REAL, -1, NULL, NULL},
+	{"count", "1", "a count", INCISE_COLUMN_INTEGER, 0, NULL, NULL},
+	{"flag", "1", "a flag", INCISE_COLUMN_FLAG, 0, NULL, NULL},
 };
 
 #define N_COLUMNS ((int)(sizeof(columns) / sizeof(*columns)))

@@ -5,7 +5,7 @@
  *
  *     /            attributes: the provenance
  *     /t_s         float64, attributes units, description; chunks of a block,
- *     /force_N     float32  shuffled and deflated
+ *     /force_N     float32  shuffled and deflated; uncertainty_variables, if they are asked for
  *     /cut         int32, from 1, into
  *     /cut_names   texts of one length
  *
@@ -84,8 +84,28 @@ static hid_t stored_type(enum incise_column_type type)
 	}
 }
 
-static hid_t make_column(hid_t file, const struct incise_column *column)
+/* Uncertainties in the style of the CF conventions. */
+static int put_uncertainties(hid_t set, const struct incise_table *table, int i)
 {
+	const struct incise_column *column = &table->columns[i];
+	char *names = incise_column_uncertainties(table->columns, table->n_columns, i);
+	int rc = 0;
+
+	if (names)
+		rc = put_text(set, "uncertainty_variables", names);
+	if (names && !rc)
+		rc = put_text(set, "ancillary_variables", names);
+	free(names);
+	if (!rc && column->of)
+		rc = put_text(set, "uncertainty_of", column->of);
+	if (!rc && column->of)
+		rc = put_text(set, "correlation", column->correlation);
+	return rc;
+}
+
+static hid_t make_column(hid_t file, const struct incise_table *table, int i)
+{
+	const struct incise_column *column = &table->columns[i];
 	hsize_t none = 0, most = H5S_UNLIMITED, chunk = INCISE_TABLE_BLOCK;
 	hid_t space = H5Screate_simple(1, &none, &most);
 	hid_t how = H5Pcreate(H5P_DATASET_CREATE);
@@ -99,7 +119,8 @@ static hid_t make_column(hid_t file, const struct incise_column *column)
 	H5Pclose(how);
 	H5Sclose(space);
 	if (set >= 0 && !put_text(set, "units", column->unit) &&
-	    !put_text(set, "description", column->about))
+	    !put_text(set, "description", column->about) &&
+	    !put_uncertainties(set, table, i))
 		return set;
 	if (set >= 0)
 		H5Dclose(set);
@@ -180,7 +201,7 @@ static int hdf5_begin(struct incise_table *table, struct incise_error *err)
 		return incise_error_set(err, ENOMEM, "HDF5: out of memory");
 	bad = open_file(table, hdf5);
 	for (int i = 0; i < table->n_columns && !bad; i++) {
-		hdf5->columns[i] = make_column(hdf5->file, &table->columns[i]);
+		hdf5->columns[i] = make_column(hdf5->file, table, i);
 		bad = hdf5->columns[i] < 0;
 	}
 	for (int i = 0; table->provenance && i < table->provenance->n && !bad; i++)
