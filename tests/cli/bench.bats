@@ -173,19 +173,19 @@ setup() {
 }
 
 @test "bench --against compares what was just measured" {
-	quick_report stability
+	quick_report timeline
 	# what is exact is the same in every run; of times nothing is judged here
-	run --separate-stderr incise bench stability --quick --against r.json
+	run --separate-stderr incise bench timeline --quick --against r.json
 	[[ "$output" == *"same, "*" 0 gone, 0 new"* ]]
 	[[ "$output" != *" 1, worse"* && "$output" != *" 1, better"* ]]
-	incise bench stability --quick --against r.json --json >both.json || true
+	incise bench timeline --quick --against r.json --json >both.json || true
 	[ "$(key both.json against.gone)" = "[]" ]
 	[ "$(key both.json quick)" = 1 ]
 	# said before the work
 	echo '{}' >bad.json
-	run --separate-stderr incise bench stability --against bad.json
+	run --separate-stderr incise bench timeline --against bad.json
 	failed_with bad.json "no metrics"
-	run --separate-stderr incise bench stability --against r.json --load cpu
+	run --separate-stderr incise bench timeline --against r.json --load cpu
 	bad_usage "--load"
 }
 
@@ -583,6 +583,7 @@ rate() {
 	bad_usage "'stability'"
 	run --separate-stderr incise bench stability a
 	failed_with "a: No such file"
+	[ -z "$output" ] # before any work
 	run --separate-stderr incise bench stability --plot a/
 	bad_usage "--plot"
 }

@@ -6,6 +6,7 @@
  */
 #include <stdio.h>
 #include <string.h>
+#include <incise/model.h>
 #include "../../lib/control/plant.h"
 #include "../../lib/control/stability.h"
 #include "stability.h"
@@ -669,6 +670,12 @@ static void add_curves(struct bench_run *run)
 
 static void run(struct bench_run *run)
 {
+	struct incise_error err = {0};
+
+	/* A model that cannot be read is said before any work. */
+	if (run->n_operands)
+		incise_model_free(
+			cli_require(incise_model_load(run->operands[0], &err), &err));
 	bench_text(run, "%s%s\n\n", bench_machine(run, NULL),
 		   run->quick ? "\nquick: a part of each grid" : "");
 	for (int i = 0; i < N(experiments); i++) {

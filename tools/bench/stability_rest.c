@@ -112,12 +112,6 @@ static void write_model(void)
 
 static void make_models(const struct bench_run *run)
 {
-	struct incise_error err = {0};
-
-	/* Before any work. */
-	if (run->n_operands)
-		incise_model_free(
-			cli_require(incise_model_load(run->operands[0], &err), &err));
 	folder_make(folder, sizeof(folder), "for models");
 	add_model("shipped", cli_text("%s/liver.fis", scene_argument_shipped()));
 	if (run->n_operands)
