@@ -181,26 +181,40 @@ void incise_seal_row(struct incise_seal *seal, int stream,
 	seal->n_rows[stream]++;
 }
 
+void incise_seal_rows(struct incise_seal *seal, int stream,
+		      uint8_t digest[INCISE_SEAL_BYTES])
+{
+	end(&seal->failed, seal->rows[stream], digest);
+	start(seal, &seal->failed, seal->rows[stream]);
+}
+
 void incise_seal_block(struct incise_seal *seal, int stream,
 		       const struct incise_ledger_block *block)
+{
+	uint8_t digest[INCISE_SEAL_BYTES];
+
+	incise_seal_rows(seal, stream, digest);
+	incise_seal_rows_block(seal, stream, block, digest);
+}
+
+void incise_seal_rows_block(struct incise_seal *seal, int stream,
+			    const struct incise_ledger_block *block,
+			    const uint8_t digest[INCISE_SEAL_BYTES])
 {
 	const uint64_t values[] = {block->block,    block->first_seq, block->last_seq,
 				   block->first_ns, block->last_ns,   block->count,
 				   block->lost,	    block->crc};
-	EVP_MD_CTX *rows = seal->rows[stream];
-	uint8_t digest[INCISE_SEAL_BYTES];
+	EVP_MD_CTX *rows = seal->rows[stream]; /* it has none now */
 	bool *failed = &seal->failed;
 
-	end(failed, rows, digest);
 	add_integer(failed, seal->commit, stream);
-	start(seal, failed, rows);
 	add(failed, rows, seal->chain[stream], INCISE_SEAL_BYTES);
 	for (size_t i = 0; i < sizeof(values) / sizeof(*values); i++) {
 		add_integer(failed, seal->commit, values[i]);
 		add_integer(failed, rows, values[i]);
 	}
-	add(failed, seal->commit, digest, sizeof(digest));
-	add(failed, rows, digest, sizeof(digest));
+	add(failed, seal->commit, digest, INCISE_SEAL_BYTES);
+	add(failed, rows, digest, INCISE_SEAL_BYTES);
 	end(failed, rows, seal->chain[stream]);
 	start(seal, failed, rows);
 	seal->blocks[stream]++;

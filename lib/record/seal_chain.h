@@ -65,6 +65,13 @@ void incise_seal_row(struct incise_seal *seal, int stream,
 void incise_seal_block(struct incise_seal *seal, int stream,
 		       const struct incise_ledger_block *block);
 
+/* The digest of the rows of the open block, and a block whose rows have one. */
+void incise_seal_rows(struct incise_seal *seal, int stream,
+		      uint8_t digest[INCISE_SEAL_BYTES]);
+void incise_seal_rows_block(struct incise_seal *seal, int stream,
+			    const struct incise_ledger_block *block,
+			    const uint8_t digest[INCISE_SEAL_BYTES]);
+
 /* The tables without blocks and camera.mkv (-1: none), before the last commit. SQLite's code. */
 int incise_seal_tables(struct incise_seal *seal, sqlite3 *db, int fd, int64_t length);
 

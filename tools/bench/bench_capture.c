@@ -13,15 +13,18 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <incise/backend.h>
 #include <incise/calibration.h>
 #include <incise/recorder.h>
 #include <incise/rig.h>
+#include <incise/verify.h>
 #include <incise/vision.h>
 #include "bench.h"
 #include "../cli/folder.h"
 #include "../cli/stopwatch.h"
+#include "../../lib/record/seal_chain.h"
 #ifdef HAVE_JPEG
 #include <jpeglib.h>
 #endif
@@ -204,7 +207,8 @@ struct row {
 	struct harness_spread cpu, memory; /* with their intervals */
 	double late_ms;			   /* the latest wake */
 	double held_up; /* share of the time that wakes were late, by a period or more */
-	double rss_MB[2]; /* memory at a quarter of the time, and at its end */
+	double rss_MB[2];   /* memory at a quarter of the time, and at its end */
+	double verify_MB_s; /* of its recording; NAN: it made none */
 	bool done;
 	struct incise_recorder_stats stats; /* without a recorder only counts */
 	struct incise_tracker_info tracker_info;
@@ -354,6 +358,30 @@ static int open_run(struct row *row, const struct part *part, const char *folder
 	return 0;
 }
 
+static double file_MB(const char *folder, const char *name)
+{
+	char *path = cli_text("%s/%s", folder, name);
+	struct stat st;
+	double MB = stat(path, &st) ? 0 : (double)st.st_size / 1e6;
+
+	free(path);
+	return MB;
+}
+
+/* Its files are in the page cache, as they have just been written. */
+static int verify(struct row *row, const char *path, struct incise_error *err)
+{
+	const double MB = file_MB(path, "recording.db") + file_MB(path, "camera.mkv");
+	const double start = stopwatch_of(CLOCK_PROCESS_CPUTIME_ID);
+	struct incise_verify_report report;
+	int rc = incise_verify(path, NULL, &report, err);
+
+	if (!rc && !report.sealed)
+		rc = incise_error_set(err, EBADMSG, "%s: not as it was recorded", path);
+	row->verify_MB_s = MB / (stopwatch_of(CLOCK_PROCESS_CPUTIME_ID) - start) * 1e9;
+	return rc;
+}
+
 static int end_recorder(struct row *row, struct incise_error *err)
 {
 	struct incise_error ignored = {0};
@@ -369,6 +397,7 @@ static int run_part(struct row *row, const struct part *part, const char *folder
 {
 	struct incise_error ignored = {0};
 	int rc = open_run(row, part, folder, err), ended;
+	char path[PATH_MAX];
 
 	if (!rc)
 		rc = capture(row, seconds, err);
@@ -376,6 +405,11 @@ static int run_part(struct row *row, const struct part *part, const char *folder
 		rc = -err->code;
 	ended = row->recorder ? end_recorder(row, rc ? &ignored : err) : 0;
 	incise_rig_close(row->rig);
+	row->verify_MB_s = NAN;
+	if (!rc && !ended && part->recorder) {
+		snprintf(path, sizeof(path), "%s/%s.rec", folder, part->name);
+		rc = verify(row, path, err);
+	}
 	row->name = part->name;
 	row->done = true;
 	return rc ? rc : ended;
@@ -403,6 +437,50 @@ static void run_all(struct row *rows, const char *only, double seconds)
 		cli_fail_with(&err);
 }
 
+/* --- the seal --- */
+
+#define SEAL_SECONDS 20 /* of a capture; they take a fraction of one */
+
+/*
+ * Share of a core that the digests of rows, frames and commits take, which a recording without a
+ * seal would not need: the same calls as the recorder's, without the rest of its work.
+ */
+static double seal_percent(void)
+{
+	const int rows[] = {1000, 24, CAMERA_HZ / 10, 0}; /* of a commit, each 100 ms */
+	const size_t sizes[] = {24, 97, 112, 160};
+	const struct incise_ledger_block block = {.count = 1};
+	struct incise_ledger_row row = {0};
+	uint8_t digest[INCISE_SEAL_BYTES];
+	struct incise_seal seal;
+	double start;
+
+	if (incise_seal_init(&seal))
+		cli_fail("libcrypto gives no SHA-256");
+	incise_seal_resume(&seal, digest);
+	start = stopwatch_of(CLOCK_PROCESS_CPUTIME_ID);
+	for (int commit = 0; commit < SEAL_SECONDS * 10; commit++) {
+		for (int i = 0; i < INCISE_LEDGER_FORMS; i++) {
+			row.n = sizes[i];
+			for (int k = 0;
+			     k < rows[i] + (i == INCISE_LEDGER_WALL && commit % 10 == 0);
+			     k++)
+				incise_seal_row(&seal, i, &row);
+			incise_seal_block(&seal, i, &block);
+		}
+		for (int k = 0; k < rows[INCISE_LEDGER_CAMERA]; k++) {
+			const int n = (commit * rows[INCISE_LEDGER_CAMERA] + k) % FRAMES;
+
+			EVP_Digest(camera.frame[n].bytes, camera.frame[n].size, digest,
+				   NULL, EVP_sha256(), NULL);
+		}
+		incise_seal_commit(&seal, commit);
+	}
+	start = stopwatch_of(CLOCK_PROCESS_CPUTIME_ID) - start;
+	incise_seal_free(&seal);
+	return 100 * start / (SEAL_SECONDS * 1e9);
+}
+
 /* --- report --- */
 
 static const struct bench_table rows_table = {
@@ -420,6 +498,7 @@ static const struct bench_table rows_table = {
 		    COLUMN(row, "late_ms", late_ms, "%8.1f", "late ms"),
 		    COLUMN(row, "quarter_MB", rss_MB[0], "%7.1f", "MB 1/4"),
 		    COLUMN(row, "end_MB", rss_MB[1], "%7.1f", "MB end"),
+		    COLUMN(row, "verify_MB_s", verify_MB_s, "%6.0f", "MB/s"),
 		    COLUMN(row, "failed", failed)},
 	.metrics = {METRIC(MEASURED, row, cpu, "%", "{name} processor"),
 		    METRIC(MEASURED, row, memory, "MB", "{name} memory")},
@@ -454,14 +533,16 @@ static int set_rows(struct row *rows, struct row *done)
 static void report(struct bench_run *run, const struct row *rows, int n, double seconds)
 {
 	const struct incise_camera_info *info = &rows->camera_info;
+	const double percent = seal_percent();
 	double bytes = 0;
 
 	for (int i = 0; i < FRAMES; i++)
 		bytes += (double)camera.frame[i].size;
-	bench_values(run, "{sf sf sf sf si si sI}", "seconds", seconds, "force_hz",
+	bench_values(run, "{sf sf sf sf si si sI sf}", "seconds", seconds, "force_hz",
 		     rows->force_info.rate_hz, "tracker_hz", rows->tracker_info.rate_hz,
 		     "camera_hz", info->rate_hz, "width", info->width, "height",
-		     info->height, "unlooked", (json_int_t)rows->stats.frames_unlooked);
+		     info->height, "unlooked", (json_int_t)rows->stats.frames_unlooked,
+		     "seal_percent", percent);
 	bench_text(run,
 		   "%s\nforce %.0f Hz, tracker %.0f Hz, camera %d x %d at %.0f Hz, JPEG "
 		   "of %.0f kB; %.2g s each, in real time\n",
@@ -472,8 +553,10 @@ static void report(struct bench_run *run, const struct row *rows, int n, double 
 	bench_text(run,
 		   "net: without the load of the simulation, as in the runs "
 		   "virtual_*\n"
+		   "MB/s: verify, by its processor time\n"
+		   "seal of all streams, part of the load: %.2f %% of a core\n"
 		   "frames that vision skipped for lack of time: %llu\n",
-		   (unsigned long long)rows->stats.frames_unlooked);
+		   percent, (unsigned long long)rows->stats.frames_unlooked);
 }
 
 static void run(struct bench_run *run)

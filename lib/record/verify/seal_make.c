@@ -144,7 +144,8 @@ static void take_commit(struct incise_seal_statement *statement,
 }
 
 int incise_statement_make(struct incise_seal_statement *statement,
-			  struct incise_recording *recording, int64_t upto,
+			  struct incise_recording *recording,
+			  const struct incise_seal_digests *known, int64_t upto,
 			  int (*step)(void *user, struct incise_seal_walk *walk),
 			  void *user, struct incise_error *err)
 {
@@ -153,7 +154,7 @@ int incise_statement_make(struct incise_seal_statement *statement,
 
 	*statement = (struct incise_seal_statement){.complete = recording->meta.complete,
 						    .last = {.commit = -1}};
-	rc = incise_seal_walk_open(&walk, recording, err);
+	rc = incise_seal_walk_open(&walk, recording, known, err);
 	if (upto < 0)
 		upto = walk.last;
 	if (!rc && upto < 0)
@@ -216,8 +217,8 @@ static size_t make_text(struct incise_recording *recording,
 	size_t n = 0;
 
 	if (!rc)
-		rc = incise_statement_make(&statement, recording, -1, check_step, &good,
-					   err);
+		rc = incise_statement_make(&statement, recording, NULL, -1, check_step,
+					   &good, err);
 	if (!rc && !good)
 		rc = incise_error_set(err, EBADMSG,
 				      "%s: differs from its own seal; `incise verify` "

@@ -29,12 +29,15 @@ static int next_row(struct incise_seal_walk *walk, struct incise_seal_walk_strea
 }
 
 int incise_seal_walk_open(struct incise_seal_walk *walk,
-			  struct incise_recording *recording, struct incise_error *err)
+			  struct incise_recording *recording,
+			  const struct incise_seal_digests *known,
+			  struct incise_error *err)
 {
 	sqlite3 *db = recording->db;
 	int rc;
 
-	*walk = (struct incise_seal_walk){.recording = recording, .last = -1};
+	*walk = (struct incise_seal_walk){
+		.recording = recording, .known = known, .last = -1};
 	rc = incise_seal_init(&walk->seal);
 	if (rc)
 		return incise_error_set(err, -rc, "%s: libcrypto gives no SHA-256",
@@ -68,7 +71,7 @@ int incise_seal_walk_open(struct incise_seal_walk *walk,
 		    incise_ledger_select(db, stream->form->stream, &stream->blocks) !=
 			    SQLITE_OK)
 			return fail(walk, err);
-		rc = next_row(walk, stream, err);
+		rc = known ? 0 : next_row(walk, stream, err);
 		if (rc)
 			return rc;
 	}
@@ -99,6 +102,16 @@ static int take_block(struct incise_seal_walk *walk, int i, struct incise_error 
 	if (rc != SQLITE_ROW)
 		return fail(walk, err);
 	walk->good &= incise_ledger_block_read(&block, stream->blocks);
+	if (walk->known) {
+		const struct incise_seal_digests *known = &walk->known[i];
+		const uint8_t none[INCISE_SEAL_BYTES] = {0};
+		size_t at = walk->seal.blocks[i];
+
+		incise_seal_rows_block(&walk->seal, i, &block,
+				       at < known->n ? known->digests[at] : none);
+		walk->seal.n_rows[i] += block.count;
+		return 0;
+	}
 	for (rc = 0; !rc && stream->has_row && stream->row.seq <= block.last_seq;
 	     rc = next_row(walk, stream, err), rows++) {
 		walk->good &= stream->good_row;
@@ -194,7 +207,14 @@ uint64_t incise_seal_walk_behind(struct incise_seal_walk *walk, bool *blocks)
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++) {
 		struct incise_seal_walk_stream *stream = &walk->streams[i];
 
-		*blocks |= sqlite3_step(stream->blocks) == SQLITE_ROW;
+		struct incise_ledger_block block;
+
+		while (sqlite3_step(stream->blocks) == SQLITE_ROW) {
+			*blocks = true;
+			if (walk->known &&
+			    incise_ledger_block_read(&block, stream->blocks))
+				rows += block.count;
+		}
 		while (stream->has_row && !next_row(walk, stream, NULL))
 			rows++;
 	}

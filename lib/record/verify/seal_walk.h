@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The seal of a recording recomputed from its rows, commit by commit. Memory does not grow with
- * the recording, and a commit that does not agree does not affect those after it.
+ * The seal of a recording recomputed from its rows, commit by commit; or from the digests of its
+ * blocks, where another has read all rows. Memory does not grow with the recording, but for 32
+ * bytes of such a digest, and a commit that does not agree does not affect those after it.
  *
  *     rows of 4 streams ─┐
  *     their ledgers ─────┼─► a commit ─► head, compared with that of table seal
@@ -14,6 +15,12 @@
 #include "../read/recording.h"
 #include "../seal_chain.h"
 #include "../statement.h"
+
+/* Of the blocks of one stream, in order. */
+struct incise_seal_digests {
+	size_t n, capacity;
+	uint8_t (*digests)[INCISE_SEAL_BYTES];
+};
 
 struct incise_seal_walk_stream {
 	sqlite3_stmt *rows, *blocks;
@@ -28,15 +35,21 @@ struct incise_seal_walk {
 	struct incise_seal seal; /* after the commit */
 	sqlite3_stmt *commits;
 	struct incise_seal_walk_stream streams[INCISE_LEDGER_FORMS];
+	const struct incise_seal_digests *known; /* of each stream; NULL: read the rows */
 	int64_t last; /* number of the last commit; -1: there is none */
 	/* The commit. */
 	int64_t number, t_ns;
 	bool good; /* it is what its rows give */
 };
 
-/* Returns 0, -EINVAL, -EIO, -ENOMEM; for a recording of form 4. Close it in any case. */
+/*
+ * @known: the digests of all blocks of each stream, which agree with the ledger, or NULL. Returns
+ * 0, -EINVAL, -EIO, -ENOMEM; for a recording of form 4. Close it in any case.
+ */
 int incise_seal_walk_open(struct incise_seal_walk *walk,
-			  struct incise_recording *recording, struct incise_error *err);
+			  struct incise_recording *recording,
+			  const struct incise_seal_digests *known,
+			  struct incise_error *err);
 
 /* Go to the next commit: 1; 0 at the end; as incise_seal_walk_open(). */
 int incise_seal_walk_next(struct incise_seal_walk *walk, struct incise_error *err);
@@ -52,7 +65,8 @@ void incise_seal_walk_close(struct incise_seal_walk *walk);
  * before @upto has fewer heads: those behind have an empty text.
  */
 int incise_statement_make(struct incise_seal_statement *statement,
-			  struct incise_recording *recording, int64_t upto,
+			  struct incise_recording *recording,
+			  const struct incise_seal_digests *known, int64_t upto,
 			  int (*step)(void *user, struct incise_seal_walk *walk),
 			  void *user, struct incise_error *err);
 

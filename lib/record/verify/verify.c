@@ -12,7 +12,6 @@
 #include "../frames.h"
 #include "../schema.h"
 #include "../read/session.h"
-#include "seal_walk.h"
 #include "verify.h"
 
 /* One integer by SQL; @otherwise if it is NULL or cannot be read. */
@@ -333,7 +332,7 @@ static int check_wall(struct incise_verification *verify)
 		 1))
 		return 0;
 	return incise_verify_stream(
-		verify, incise_ledger_form(INCISE_LEDGER_WALL, verify->recording->form),
+		verify, INCISE_LEDGER_WALL,
 		ask(verify, "SELECT value FROM meta WHERE key = 'wall_rows'", 0), 0,
 		&rows);
 }
@@ -365,9 +364,7 @@ static int check_streams(struct incise_verification *verify)
 		if (i == INCISE_LEDGER_CAMERA ? !verify->camera
 					      : !counted[i].rows && !recorded(verify, i))
 			continue;
-		rc = incise_verify_stream(verify,
-					  incise_ledger_form(i, verify->recording->form),
-					  counted[i].rows, counted[i].lost,
+		rc = incise_verify_stream(verify, i, counted[i].rows, counted[i].lost,
 					  &report->streams[report->n_streams++]);
 	}
 	if (!rc)
@@ -402,6 +399,8 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 		goto out;
 	}
 	report->interrupted = !verify.recording->meta.complete;
+	verify.hashed =
+		verify.recording->form >= 4 && !incise_seal_init(&verify.rows_seal);
 	verify.origin_ns = ask(
 		&verify,
 		"SELECT min(first_ns) FROM ledger WHERE count > 0 AND stream IN (" STREAMS
@@ -437,6 +436,9 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 	report->complete = !report->findings;
 	report->intact = !verify.altered;
 out:
+	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
+		free(verify.digests[i].digests);
+	incise_seal_free(&verify.rows_seal);
 	incise_recording_close(verify.recording);
 	return rc;
 }

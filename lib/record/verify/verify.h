@@ -16,6 +16,7 @@
 #include <incise/verify.h>
 #include "../ledger.h"
 #include "../read/recording.h"
+#include "seal_walk.h"
 
 /* Work for a frame, in rows: for the share that is done. */
 #define INCISE_VERIFY_FRAME_ROWS 100
@@ -33,14 +34,17 @@ struct incise_verification {
 	bool altered;	 /* a finding other than losses and an interruption */
 	bool rows_altered, tables_altered;	       /* by the ledger */
 	const struct incise_seal_statement *statement; /* to compare with; NULL: none */
+	/* Digests of the blocks, which the streams give to the seal: rows are read once. */
+	bool hashed;
+	struct incise_seal rows_seal;
+	struct incise_seal_digests digests[INCISE_LEDGER_FORMS];
 };
 
 /*
- * Verify a stream; @rows and @lost are the recorder's counts. Fills @out. Returns 0 or
+ * Verify a stream, INCISE_LEDGER_*; @rows and @lost are the recorder's counts. Fills @out. Returns 0 or
  * -ECANCELED; a read error of SQLite is a finding.
  */
-int incise_verify_stream(struct incise_verification *verify,
-			 const struct incise_ledger_form *form, uint64_t rows,
+int incise_verify_stream(struct incise_verification *verify, int stream, uint64_t rows,
 			 uint64_t lost, struct incise_verify_stream *out);
 
 /* Verify the frames; fills report->frames. Returns as incise_verify_stream(). */

@@ -12,6 +12,7 @@
  */
 #include <errno.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "verify.h"
 
@@ -22,6 +23,7 @@
 struct walk {
 	struct incise_verification *verify;
 	const struct incise_ledger_form *form;
+	int stream;
 	struct incise_verify_stream *out;
 	sqlite3_stmt *rows, *blocks;
 
@@ -107,7 +109,30 @@ static int take_row(struct walk *walk, bool *good)
 	*good &= walk->good_row;
 	for (int i = 0; i < walk->chains; i++)
 		incise_ledger_add(&walk->chain[i], &walk->row);
+	if (walk->verify->hashed)
+		incise_seal_row(&walk->verify->rows_seal, walk->stream, &walk->row);
 	return next_row(walk);
+}
+
+/* The digest of a block's rows, for the seal. Without memory it reads the rows again. */
+static void keep_digest(struct walk *walk)
+{
+	struct incise_verification *verify = walk->verify;
+	struct incise_seal_digests *kept = &verify->digests[walk->stream];
+
+	if (verify->hashed && kept->n == kept->capacity) {
+		size_t capacity = kept->capacity ? 2 * kept->capacity : 1024;
+		void *more = reallocarray(kept->digests, capacity, INCISE_SEAL_BYTES);
+
+		verify->hashed = more;
+		if (more)
+			kept->digests = more;
+		if (more)
+			kept->capacity = capacity;
+	}
+	if (verify->hashed)
+		incise_seal_rows(&verify->rows_seal, walk->stream,
+				 kept->digests[kept->n++]);
 }
 
 /* Report the blocks that do not agree, if there are any. */
@@ -229,6 +254,7 @@ static int take_block(struct walk *walk, const struct incise_ledger_block *block
 		rc = take_row(walk, &good);
 	if (rc == -ECANCELED)
 		return rc;
+	keep_digest(walk);
 	for (int i = 0; i < walk->chains; i++) {
 		struct incise_ledger_block computed;
 		bool is = true;
@@ -370,12 +396,17 @@ static int walk_through(struct walk *walk)
 	return rc;
 }
 
-int incise_verify_stream(struct incise_verification *verify,
-			 const struct incise_ledger_form *form, uint64_t rows,
+int incise_verify_stream(struct incise_verification *verify, int stream, uint64_t rows,
 			 uint64_t lost_rows, struct incise_verify_stream *out)
 {
+	const struct incise_ledger_form *form =
+		incise_ledger_form(stream, verify->recording->form);
 	sqlite3 *db = verify->recording->db;
-	struct walk walk = {.verify = verify, .form = form, .out = out, .last_seq = -1};
+	struct walk walk = {.verify = verify,
+			    .form = form,
+			    .stream = stream,
+			    .out = out,
+			    .last_seq = -1};
 	char sql[300];
 	int rc = 0;
 
