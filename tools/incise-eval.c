@@ -18,7 +18,7 @@
 
 struct job {
 	const char *arith, *grid;
-	bool no_clamp, sd, json;
+	bool no_clamp, sd, parts, json;
 };
 
 static const struct cli_option options[] = {
@@ -34,6 +34,8 @@ static const struct cli_option options[] = {
 	 "also print the standard deviation of a new measurement,\n"
 	 "from MODEL.fis.sd, which incise train writes",
 	 CLI_FLAG(struct job, sd)},
+	{0, "parts", NULL, "also print its parts: data, model and calibration; with --sd",
+	 CLI_FLAG(struct job, parts)},
 	{0, "json", NULL, "report as JSON, one row for each evaluation",
 	 CLI_FLAG(struct job, json)},
 	{0},
@@ -63,13 +65,29 @@ struct evaluator {
 	unsigned long outside; /* of the support */
 	unsigned long unfired; /* inside, where no rule fires */
 	json_t *rows;	       /* NULL: text */
+	bool parts;	       /* of the uncertainty */
 };
+
+/* Of the standard deviation, in the order in which they are printed. */
+static const char *const part_names[] = {"data", "model", "calibration"};
+
+static void find_parts(const struct evaluator *e, const double *x, double parts[3])
+{
+	struct incise_uncertainty_parts all;
+
+	incise_uncertainty_parts(e->uncertainty, e->model, x, &all);
+	parts[0] = all.data;
+	parts[1] = all.model;
+	/* Of the rigs that trained, and of the one that measures. */
+	parts[2] = hypot(all.calibration, all.rig);
+}
 
 static void add_row(struct evaluator *e, const double *x, double y, bool outside)
 {
 	const char *unit = strrchr(e->output, '_');
 	json_t *row = json_object();
-	char key[INCISE_MODEL_NAME_MAX + 2];
+	char key[INCISE_MODEL_NAME_MAX + 20];
+	double parts[3];
 
 	snprintf(key, sizeof(key), "sd%s", unit ? unit : "");
 	for (int i = 0; i < e->n_inputs; i++)
@@ -79,6 +97,12 @@ static void add_row(struct evaluator *e, const double *x, double y, bool outside
 		json_object_set_new(
 			row, key,
 			json_number(incise_uncertainty_sd(e->uncertainty, e->model, x)));
+	if (e->parts)
+		find_parts(e, x, parts);
+	for (int i = 0; e->parts && i < 3; i++) {
+		snprintf(key, sizeof(key), "sd_%s%s", part_names[i], unit ? unit : "");
+		json_set_number(row, key, parts[i]);
+	}
 	json_object_set_new(row, "extrapolated", json_boolean(outside));
 	json_array_append_new(e->rows, row);
 }
@@ -88,7 +112,7 @@ static void evaluate(struct evaluator *e, const double *x, bool inputs)
 {
 	unsigned int flags = 0;
 	bool outside = false;
-	double y;
+	double y, parts[3];
 
 	for (int i = 0; i < e->n_inputs; i++)
 		outside |= !(x[i] >= e->min[i] && x[i] <= e->max[i]);
@@ -107,6 +131,10 @@ static void evaluate(struct evaluator *e, const double *x, bool inputs)
 	printf("%.10g", y);
 	if (e->uncertainty)
 		printf(" %.10g", incise_uncertainty_sd(e->uncertainty, e->model, x));
+	if (e->parts) {
+		find_parts(e, x, parts);
+		printf(" %.10g %.10g %.10g", parts[0], parts[1], parts[2]);
+	}
 	putchar('\n');
 }
 
@@ -292,6 +320,8 @@ static void parse(struct job *job, int argc, char **argv)
 	if (job->no_clamp && job->arith && !strcmp(job->arith, "fixed"))
 		cli_usage("--no-clamp needs --arith double: fixed point cannot "
 			  "extrapolate");
+	if (job->parts && !job->sd)
+		cli_usage("--parts goes with --sd: it prints what that is made of");
 	if (job->grid && argc - optind == 2)
 		cli_usage("--grid does not go with a file of inputs: it evaluates "
 			  "points of its own");
@@ -318,6 +348,7 @@ int main(int argc, char **argv)
 	parse(&job, argc, argv);
 	open_model(&e, argv[optind], job.arith, !job.no_clamp);
 	e.rows = job.json ? json_array() : NULL;
+	e.parts = job.parts;
 	if (job.sd)
 		load_uncertainty(&e, argv[optind]);
 	if (job.grid)

@@ -15,6 +15,7 @@
 #include <time.h>
 #include <incise/corpus.h>
 #include <incise/factor.h>
+#include <incise/propagation.h>
 #include <incise/ranks.h>
 #include <incise/train.h>
 #include <incise/version.h>
@@ -25,6 +26,7 @@
 #include "cli/recording.h"
 #include "train/progress.h"
 #include "train/sources.h"
+#include "train/uncertainties.h"
 
 struct options {
 	char **paths;
@@ -46,6 +48,7 @@ struct options {
 	bool auto_mfs;
 	enum incise_mf_type type;
 	bool all_rows, json, mpi;
+	enum uncertainties_wanted uncertainty;
 	const struct incise_ranks *ranks; /* NULL: a single process */
 	struct incise_train_options train;
 };
@@ -79,6 +82,15 @@ static void parse_type(void *type, char *text)
 				     incise_mf_type_name(types[1]), NULL};
 
 	*(enum incise_mf_type *)type = types[cli_choice("mf-type", text, names)];
+}
+
+static void parse_uncertainty(void *wanted, char *text)
+{
+	static const char *const names[] = {"none", "parts", NULL};
+
+	*(enum uncertainties_wanted *)wanted = cli_choice("uncertainty", text, names)
+						       ? UNCERTAINTIES_PARTS
+						       : UNCERTAINTIES_NONE;
 }
 
 static void parse_shard(void *shard, char *text)
@@ -122,6 +134,10 @@ static const struct cli_option option_table[] = {
 	{0, "all-rows", NULL,
 	 "also use rows in which the blade did not advance (advancing is 0)",
 	 CLI_FLAG(struct options, all_rows)},
+	{0, "uncertainty", "WHICH",
+	 "uncertainties of the columns, as incise export --uncertainty parts\n"
+	 "writes them: parts, or none (default: parts of files that have them)",
+	 CLI_PARSED(struct options, uncertainty, parse_uncertainty)},
 	{0, "check", "SHARE",
 	 "hold out this share of the data as a test set, for "
 	 "example 0.3",
@@ -284,6 +300,8 @@ struct result {
 	struct incise_train_report report;
 	struct incise_baselines baselines;
 	struct interval interval;
+	struct incise_propagation_report propagated;
+	bool weighed;		/* by uncertainties; propagated says how */
 	uint64_t left_out;	/* rows */
 	uint64_t check_outside; /* rows kept back, outside the training ranges */
 };
@@ -443,10 +461,12 @@ static char *options_text(const struct options *options)
 	if (options->check > 0)
 		snprintf(check, sizeof(check), ", %g held out with seed %llu",
 			 options->check, (unsigned long long)options->train.seed);
-	return cli_text("%sgroups: %s%s%s%s%s", options->train.classic ? "classic, " : "",
+	return cli_text("%sgroups: %s%s%s%s%s%s",
+			options->train.classic ? "classic, " : "",
 			options->group ? options->group : "none",
 			options->all_rows ? ", all rows" : "",
-			options->rate > 0 ? ", averaged" : "", sample, check);
+			options->rate > 0 ? ", averaged" : "", sample, check,
+			options->train.weighted ? ", weighted by uncertainties" : "");
 }
 
 static struct incise_factor *new_factor(const struct options *options,
@@ -602,6 +622,29 @@ static json_t *warnings(const struct result *result)
 	return list;
 }
 
+static json_t *propagated_json(const struct result *result)
+{
+	const struct incise_propagation_report *r = &result->propagated;
+	const char *unit = unit_of(result->options->target);
+	const struct {
+		const char *name;
+		double value;
+	} parts[] = {{"own", r->own}, {"calibration", r->calibration}, {"rig", r->rig}};
+	json_t *object;
+	char key[80];
+
+	if (!result->weighed)
+		return json_null();
+	object = json_pack("{sf si si}", "least_weight", r->weight, "recordings",
+			   r->recordings, "calibrations", r->calibrations);
+	for (size_t i = 0; i < sizeof(parts) / sizeof(*parts); i++) {
+		snprintf(key, sizeof(key), "%s%s%.60s", parts[i].name, *unit ? "_" : "",
+			 unit);
+		json_set_number(object, key, parts[i].value);
+	}
+	return object;
+}
+
 static void report_json(const struct result *result, json_t *warned)
 {
 	const struct options *options = result->options;
@@ -658,6 +701,7 @@ static void report_json(const struct result *result, json_t *warned)
 	snprintf(key, sizeof(key), "noise%s%s", *unit ? "_" : "", unit);
 	json_set_number(object, key, interval->noise);
 	json_set_number(object, "interval95_coverage", interval->coverage);
+	json_object_set_new(object, "uncertainty", propagated_json(result));
 	json_object_set_new(object, "warnings", warned);
 	json_object_set_new(object, "model", json_string(options->model));
 	json_print(object);
@@ -718,6 +762,12 @@ static void report_text(const struct result *result)
 	if (check)
 		printf(", holds %.1f %% of the %s", 100 * interval->coverage, unseen);
 	printf("\n");
+	if (result->weighed)
+		printf("  uncertainties: own parts %.3g %s; calibrations %.3g %s on the "
+		       "model, %.3g %s of another rig\n",
+		       result->propagated.own, unit_of(options->target),
+		       result->propagated.calibration, unit_of(options->target),
+		       result->propagated.rig, unit_of(options->target));
 	if (report->pairs_tuned && report->pairs_tuned < fit->rows)
 		printf("  membership functions from a random %zu of the pairs, consequents "
 		       "from all\n",
@@ -973,6 +1023,7 @@ struct folding {
 	struct result *result;
 	struct incise_factor *fit,
 		*check; /* made by it; check NULL: nothing is held out */
+	struct incise_propagation *propagation; /* NULL: no uncertainties */
 };
 
 /* The factor of an interrupted training, if it is of the same premises; else @fresh. */
@@ -1093,6 +1144,104 @@ static void fold(struct folding *folding, const struct incise_model *premises)
 	alone = false;
 }
 
+/* --- uncertainties ------------------------------------------------------------------- */
+
+/* The weights follow from a model, and the model from the weights; they have settled by then. */
+#define PASSES 3
+
+/* Root mean square error of a model on a sample; never 0. */
+static double sample_rmse(const struct incise_model *model,
+			  const struct incise_pairs *pairs)
+{
+	int d = pairs->n_inputs;
+	double sum = 0, least = 0;
+
+	for (size_t i = 0; i < pairs->n; i++) {
+		const double *x = pairs->rows + i * (size_t)(d + 1);
+		double e = incise_model_eval(model, x, NULL) - x[d];
+
+		sum += e * e;
+		least = fmax(least, fabs(x[d]));
+	}
+	return fmax(sqrt(sum / (double)pairs->n), 1e-9 * fmax(least, 1e-9));
+}
+
+/* The sums of all pairs with their weights, passed over several times. */
+static void fold_weighted(struct folding *folding, const struct incise_model *premises)
+{
+	const struct incise_factor_ridge ridge = {1e-3, 1, 1};
+	const struct incise_pairs *sample =
+		&incise_corpus_side(folding->corpus, false)->sample.pairs;
+	double scatter = sample_rmse(premises, sample);
+	struct incise_uncertainty *uncertainty;
+	struct incise_model *model = NULL, *next;
+	struct incise_error err = {0};
+
+	for (int pass = 0; pass < PASSES; pass++) {
+		if (incise_propagation_start(folding->propagation,
+					     model ? model : premises, scatter, &err))
+			cli_fail_with(&err);
+		incise_factor_free(folding->fit);
+		incise_factor_free(folding->check);
+		folding->result->left_out = folding->result->check_outside = 0;
+		fold(folding, premises);
+		next = incise_factor_solve(folding->fit, &ridge, NULL, &uncertainty,
+					   &err);
+		if (!next ||
+		    incise_propagation_end(folding->propagation, next, uncertainty,
+					   incise_factor_rmse(folding->fit, next, NULL),
+					   &scatter, &err))
+			cli_fail("%s: %s", folding->options->data, err.text);
+		incise_uncertainty_free(uncertainty);
+		incise_model_free(model);
+		model = next;
+	}
+	incise_model_free(model);
+}
+
+static void fold_all(struct folding *folding, const struct incise_model *premises)
+{
+	if (folding->propagation)
+		fold_weighted(folding, premises);
+	else
+		fold(folding, premises);
+}
+
+/* Put the calibrations into the standard deviation of the model. */
+static void finish_weighted(struct folding *folding, const struct incise_model *model)
+{
+	struct result *result = folding->result;
+	struct incise_error err = {0};
+	double scatter;
+
+	if (!folding->propagation)
+		return;
+	if (incise_propagation_end(folding->propagation, model,
+				   result->interval.uncertainty,
+				   result->report.train_rmse, &scatter, &err) ||
+	    incise_propagation_finish(folding->propagation, result->interval.uncertainty,
+				      &result->propagated, &err))
+		cli_fail("%s: %s", folding->options->data, err.text);
+	result->weighed = true;
+}
+
+/* Ways that cannot carry uncertainties are refused. */
+static void check_weighed(const struct options *options)
+{
+	const char *way = options->factor	   ? "--factor"
+			  : options->mpi	   ? "--mpi"
+			  : options->train.classic ? "--classic"
+						   : NULL;
+
+	/* All processes find the same. */
+	alone = alone && !options->mpi;
+	if (way)
+		cli_usage(
+			"%s cannot take uncertainties, which %s has; give --uncertainty "
+			"none",
+			way, options->data);
+}
+
 /* The search of premises from the sample, which then asks for the sums. */
 struct searching {
 	struct history history;
@@ -1111,7 +1260,7 @@ static struct incise_factor *on_premises(void *user, const struct incise_model *
 	struct searching *searching = user;
 
 	cli_progress_end();
-	fold(searching->folding, premises);
+	fold_all(searching->folding, premises);
 	return searching->folding->fit;
 }
 
@@ -1218,8 +1367,9 @@ static char *progress_key(const struct options *options)
 
 int main(int argc, char **argv)
 {
-	const char *columns[INCISE_MODEL_INPUTS_MAX + 1];
+	const char *columns[INCISE_MODEL_INPUTS_MAX + 1 + INCISE_BUDGET_PARTS];
 	struct incise_model *premises = NULL, *model;
+	struct uncertainties uncertainties;
 	struct progress *progress = NULL;
 	struct folding folding;
 	struct source_options how;
@@ -1243,9 +1393,18 @@ int main(int argc, char **argv)
 	if (options.premises)
 		premises = cli_require(incise_model_load(options.premises, &err), &err);
 	choose_columns(&options, premises, columns);
+	options.data = options.paths[0];
+	uncertainties_find(&uncertainties, options.uncertainty, columns, options.n_inputs,
+			   options.paths, options.n_paths);
+	options.train.weighted = uncertainties.n > 0;
+	if (uncertainties.n)
+		check_weighed(&options);
+	for (int i = 0; i < uncertainties.n; i++)
+		columns[options.n_inputs + 1 + i] = uncertainties.columns[i];
 	how = (struct source_options){
 		.columns = columns,
-		.n_columns = options.n_inputs + 1,
+		.n_columns = options.n_inputs + 1 + uncertainties.n,
+		.uncertainty = uncertainties.n > 0,
 		.group = options.group,
 		.all_rows = options.all_rows,
 		.damaged = options.damaged,
@@ -1257,7 +1416,8 @@ int main(int argc, char **argv)
 	options.group = how.group;
 	data = cli_text("%d sources", options.n_paths);
 	options.data = options.n_paths == 1 ? sources[0].path : data;
-	if (!options.mpi && !options.train.classic) {
+	/* Weights are not kept in the progress. */
+	if (!options.mpi && !options.train.classic && !uncertainties.n) {
 		char *key = progress_key(&options);
 
 		progress = progress_new(options.factor ? options.factor : options.model,
@@ -1274,6 +1434,13 @@ int main(int argc, char **argv)
 				   .progress = progress,
 				   .reading = &reading,
 				   .result = &result};
+	if (uncertainties.n) {
+		folding.propagation = cli_require(
+			incise_propagation_new(options.n_inputs, uncertainties.parts,
+					       uncertainties.n, &err),
+			&err);
+		incise_corpus_weigh(corpus, folding.propagation);
+	}
 	if (!is_first(&options)) {
 		fold(&folding, NULL);
 		exit(0);
@@ -1282,9 +1449,11 @@ int main(int argc, char **argv)
 		model = start_model(&options, corpus, columns);
 		search(&options, model, &folding, &result);
 	} else {
-		fold(&folding, premises);
+		fold_all(&folding, premises);
 		model = options.factor ? NULL : solve(&options, folding.fit, &result);
 	}
+	if (model)
+		finish_weighted(&folding, model);
 	if (folding.check)
 		result.report.check_rmse =
 			incise_factor_rmse(folding.check, model, &result.report.check_r2);
@@ -1297,6 +1466,7 @@ int main(int argc, char **argv)
 	cli_finish();
 	incise_factor_free(folding.fit);
 	incise_factor_free(folding.check);
+	incise_propagation_free(folding.propagation);
 	incise_model_free(model);
 	incise_model_free(premises);
 	incise_uncertainty_free(result.interval.uncertainty);

@@ -13,6 +13,7 @@
 #include <string.h>
 #include <incise/corpus.h>
 #include "../base/random.h"
+#include "design.h"
 #include "pairs.h"
 
 #define COLUMNS_MAX (INCISE_MODEL_INPUTS_MAX + 1)
@@ -38,7 +39,8 @@ struct incise_corpus {
 	int n_surveys, survey_capacity;
 	struct candidate *heap; /* the largest key first, until it is settled */
 	size_t n_heap, heap_capacity, sample;
-	const volatile int *stop; /* or NULL */
+	const volatile int *stop;		/* or NULL */
+	struct incise_propagation *propagation; /* or NULL */
 	/* After settling: */
 	struct group *groups; /* by key */
 	int n_groups;
@@ -78,6 +80,12 @@ void incise_corpus_free(struct incise_corpus *corpus)
 void incise_corpus_set_stop(struct incise_corpus *corpus, const volatile int *stop)
 {
 	corpus->stop = stop;
+}
+
+void incise_corpus_weigh(struct incise_corpus *corpus,
+			 struct incise_propagation *propagation)
+{
+	corpus->propagation = propagation;
 }
 
 static bool is_stopped(const struct incise_corpus *corpus)
@@ -705,11 +713,17 @@ static int fold_row(void *user, const double *row, const char *name,
 		f->left_out += rc == -ERANGE;
 		rc = rc == -ERANGE ? 0 : rc;
 	} else {
-		rc = incise_factor_add(f->fit, row,
-				       f->corpus->grouped ? group
-							  : row_key(f->corpus, FOR_SAMPLE,
-								    f->number, at),
-				       &own);
+		double weight =
+			f->corpus->propagation
+				? incise_propagation_add(f->corpus->propagation, row)
+				: 1;
+
+		rc = incise_factor_add_weighted(f->fit, row,
+						f->corpus->grouped
+							? group
+							: row_key(f->corpus, FOR_SAMPLE,
+								  f->number, at),
+						weight, &own);
 	}
 	return rc ? incise_error_set(err, -rc, "%s: row %llu of those used: %.300s",
 				     f->source->name, (unsigned long long)at + 1,
@@ -735,6 +749,10 @@ int incise_corpus_fold(const struct incise_corpus *corpus,
 		if (!strcmp(corpus->surveys[i].hash, source->hash))
 			survey = &corpus->surveys[i];
 	rc = incise_factor_start(fit, source->hash, source->text, err);
+	if (!rc && corpus->propagation)
+		rc = incise_propagation_origin(
+			corpus->propagation, source->hash,
+			source->calibration ? source->calibration : source->hash, err);
 	if (!rc && check)
 		rc = incise_factor_start(check, source->hash, source->text, err);
 	if (!rc)

@@ -37,7 +37,7 @@ void incise_design_free(struct incise_design *design)
 }
 
 int incise_design_add_to(struct incise_design *design, struct incise_gram *gram,
-			 const double *raw)
+			 const double *raw, double weight)
 {
 	double w[INCISE_MODEL_RULES_MAX], x[INCISE_MODEL_INPUTS_MAX + 1];
 	double *row = incise_gram_row(gram);
@@ -53,6 +53,9 @@ int incise_design_add_to(struct incise_design *design, struct incise_gram *gram,
 	for (int i = 0; i < d; i++)
 		if (!(x[i] > -1 && x[i] < 2))
 			return -ERANGE;
+	if (weight != 1)
+		for (int i = 0; i < n + 2; i++)
+			row[i] *= sqrt(weight);
 	rc = incise_gram_add(gram);
 	for (int r = 0; r < n_rules && !rc; r++)
 		design->largest[r] = fmax(design->largest[r], w[r]);
@@ -61,7 +64,7 @@ int incise_design_add_to(struct incise_design *design, struct incise_gram *gram,
 
 int incise_design_add(struct incise_design *design, const double *raw)
 {
-	return incise_design_add_to(design, design->gram, raw);
+	return incise_design_add_to(design, design->gram, raw, 1);
 }
 
 void incise_design_target(const struct incise_design *design, struct incise_gram *gram,

@@ -30,9 +30,12 @@ void incise_design_free(struct incise_design *design);
 /* Add a raw pair; -ERANGE if it is a whole range or more outside, -EOVERFLOW (gram.h). */
 int incise_design_add(struct incise_design *design, const double *raw);
 
-/* The same with the gram of another design of these premises, of the same width. */
+/*
+ * The same with the gram of another design of these premises, of the same width, and with a weight
+ * above 0 and at most 1 of its square.
+ */
 int incise_design_add_to(struct incise_design *design, struct incise_gram *gram,
-			 const double *raw);
+			 const double *raw, double weight);
 
 /*
  * Scaling for learning, which has the output about its mean in standard deviations, over the
@@ -45,6 +48,10 @@ void incise_design_target(const struct incise_design *design, struct incise_gram
 #define DESIGN_UNFIRED 0.05
 
 struct incise_factor;
+
+/* As incise_factor_add(), with a weight above 0 and at most 1; the factor cannot be encoded then. */
+int incise_factor_add_weighted(struct incise_factor *factor, const double *row,
+			       uint64_t group, double weight, struct incise_error *err);
 
 /* The design of a factor, with the sums of all its pairs; valid until the factor changes. */
 struct incise_design *incise_factor_design(struct incise_factor *factor);

@@ -286,11 +286,18 @@ static uint64_t rows_of(const struct incise_factor *factor)
 int incise_factor_add(struct incise_factor *factor, const double *row, uint64_t group,
 		      struct incise_error *err)
 {
+	return incise_factor_add_weighted(factor, row, group, 1, err);
+}
+
+int incise_factor_add_weighted(struct incise_factor *factor, const double *row,
+			       uint64_t group, double weight, struct incise_error *err)
+{
 	const struct incise_model_info *info = incise_model_info(factor->model);
 	const struct incise_scaling *scaling = &factor->design.scaling;
 	int d = info->n_inputs;
 	bool first = !rows_of(factor);
-	int rc = incise_design_add_to(&factor->design, factor->fold[group % FOLDS], row);
+	int rc = incise_design_add_to(&factor->design, factor->fold[group % FOLDS], row,
+				      weight);
 
 	if (rc == -EOVERFLOW)
 		return incise_error_set(err, EOVERFLOW, "more than 2^33 pairs");

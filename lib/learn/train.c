@@ -222,6 +222,14 @@ static int train_classic(struct learner *l, struct incise_tuning *tuning)
 	return 0;
 }
 
+/* Those of the model, from scaled ones, which become raw. */
+static int set_consequents(struct learner *l, double *consequents)
+{
+	int rc = incise_scaling_consequents(&l->scaling, l->basis.n_rules, consequents);
+
+	return rc ? rc : incise_basis_set_consequents(l->model, consequents);
+}
+
 static int train_default(struct learner *l, struct incise_tuning *tuning)
 {
 	struct incise_varpro varpro = {
@@ -242,7 +250,10 @@ static int train_default(struct learner *l, struct incise_tuning *tuning)
 	raw = l->basis;
 	incise_scaling_premises(&l->scaling, &raw, true);
 	incise_basis_store(&raw, l->model);
-	rc = fold_all(l);
+	if (l->options->weighted)
+		rc = set_consequents(l, l->consequents);
+	if (!rc)
+		rc = fold_all(l);
 	if (rc)
 		return rc;
 	if (tuning->average)
@@ -250,10 +261,7 @@ static int train_default(struct learner *l, struct incise_tuning *tuning)
 	else
 		rc = incise_lsq_solve(l->lsq, &tuning->ridge, l->consequents);
 	if (!rc)
-		rc = incise_scaling_consequents(&l->scaling, l->basis.n_rules,
-						l->consequents);
-	if (!rc)
-		rc = incise_basis_set_consequents(l->model, l->consequents);
+		rc = set_consequents(l, l->consequents);
 	if (rc)
 		return rc;
 	l->report->epochs = l->report->best_epoch = varpro.run;
@@ -320,7 +328,7 @@ static int learn(struct learner *l)
 	l->folds.stop = l->options->stop;
 	l->folds.zero = -l->scaling.offset[l->basis.n_inputs] /
 			l->scaling.scale[l->basis.n_inputs];
-	l->folds.cuts &= l->tuned.pairs.n == l->train->n;
+	l->folds.cuts &= l->tuned.pairs.n == l->train->n && !l->options->weighted;
 	if (!rc)
 		rc = classic ? train_classic(l, tuning) : train_default(l, tuning);
 	if (!rc)

@@ -16,7 +16,7 @@
 #include "../base/lines.h"
 #include "model.h"
 
-#define VERSION 1
+#define VERSION 2 /* with calibrations; without them 1 is written */
 
 #define UNKNOWNS_MAX (INCISE_MODEL_RULES_MAX * (INCISE_MODEL_INPUTS_MAX + 1))
 
@@ -25,7 +25,15 @@ struct incise_uncertainty {
 	int n;
 	double noise;
 	double *factor; /* upper triangle, row by row, packed */
+	/* Rows k of n: |k φ|² is a variance. Of the training's calibrations, of another rig's. */
+	int n_common, n_rig;
+	double *calibration; /* of both, after each other */
 };
+
+static int calibrations(const struct incise_uncertainty *u)
+{
+	return u->n_common + u->n_rig;
+}
 
 /* FNV-1a of what the output depends on, in the machine's double format. */
 static void sum(uint64_t *hash, double value)
@@ -131,7 +139,79 @@ void incise_uncertainty_free(struct incise_uncertainty *uncertainty)
 	if (!uncertainty)
 		return;
 	free(uncertainty->factor);
+	free(uncertainty->calibration);
 	free(uncertainty);
+}
+
+/* Room for rows of calibrations. Returns 0 or -ENOMEM. */
+static int make_calibrations(struct incise_uncertainty *u, int n_common, int n_rig)
+{
+	size_t n = (size_t)(n_common + n_rig) * (size_t)u->n;
+	double *rows = n ? malloc(n * sizeof(*rows)) : NULL;
+
+	if (n && !rows)
+		return -ENOMEM;
+	free(u->calibration);
+	u->calibration = rows;
+	u->n_common = n_common;
+	u->n_rig = n_rig;
+	return 0;
+}
+
+int incise_uncertainty_set_calibration(struct incise_uncertainty *u, double noise,
+				       const double *common, int n_common,
+				       const double *rig, int n_rig,
+				       struct incise_error *err)
+{
+	size_t n = (size_t)u->n;
+	bool good = isfinite(noise) && noise >= 0 && n_common >= 0 && n_rig >= 0 &&
+		    n_common <= u->n && n_rig <= INCISE_UNCERTAINTY_SOURCES;
+
+	for (size_t i = 0; good && i < (size_t)n_common * n; i++)
+		good = isfinite(common[i]);
+	for (size_t i = 0; good && i < (size_t)n_rig * n; i++)
+		good = isfinite(rig[i]);
+	if (!good)
+		return incise_error_set(err, EINVAL,
+					"the uncertainty of the calibrations is not "
+					"finite, or has too many parts");
+	if (make_calibrations(u, n_common, n_rig))
+		return incise_error_set(err, ENOMEM,
+					"no memory for the standard deviation");
+	u->noise = noise;
+	if (n_common)
+		memcpy(u->calibration, common, (size_t)n_common * n * sizeof(*common));
+	if (n_rig)
+		memcpy(u->calibration + (size_t)n_common * n, rig,
+		       (size_t)n_rig * n * sizeof(*rig));
+	return 0;
+}
+
+int incise_uncertainty_unknowns(const struct incise_uncertainty *u)
+{
+	return u->n;
+}
+
+int incise_uncertainty_solve(const struct incise_uncertainty *u, double *v)
+{
+	const double *row = u->factor, *end;
+	bool good = true;
+
+	for (int i = 0; i < u->n; i++) {
+		v[i] /= *row++;
+		for (int k = i + 1; k < u->n; k++)
+			v[k] -= *row++ * v[i];
+	}
+	/* Back through the rows, the last of which ends the triangle. */
+	end = u->factor + (size_t)u->n * ((size_t)u->n + 1) / 2;
+	for (int i = u->n - 1; i >= 0; i--) {
+		end -= u->n - i;
+		for (int k = i + 1; k < u->n; k++)
+			v[i] -= end[k - i] * v[k];
+		v[i] /= end[0];
+		good &= isfinite(v[i]);
+	}
+	return good ? 0 : -EDOM;
 }
 
 double incise_uncertainty_noise(const struct incise_uncertainty *uncertainty)
@@ -139,12 +219,10 @@ double incise_uncertainty_noise(const struct incise_uncertainty *uncertainty)
 	return uncertainty->noise;
 }
 
-double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,
-			     const struct incise_model *model, const double *x)
+void incise_uncertainty_row(const struct incise_model *model, const double *x,
+			    double *phi)
 {
-	double in[INCISE_MODEL_INPUTS_MAX], phi[UNKNOWNS_MAX];
-	double w[INCISE_MODEL_RULES_MAX], sum = 0, *at = phi;
-	const double *row = uncertainty->factor;
+	double in[INCISE_MODEL_INPUTS_MAX], w[INCISE_MODEL_RULES_MAX], *at = phi;
 
 	for (int i = 0; i < model->info.n_inputs; i++) {
 		const struct incise_variable *v = &model->info.input[i];
@@ -167,7 +245,37 @@ double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,
 					 : 0;
 		}
 	}
-	/* Forward substitution with Rᵀ, a row of R at a time. */
+}
+
+/* Σ (k φ)² over some rows of calibrations. */
+static double square(const struct incise_uncertainty *u, const double *phi, int first,
+		     int n)
+{
+	const double *row = u->calibration + (size_t)first * (size_t)u->n;
+	double sum = 0;
+
+	for (int i = 0; i < n; i++) {
+		double product = 0;
+
+		for (int k = 0; k < u->n; k++)
+			product += *row++ * phi[k];
+		sum += product * product;
+	}
+	return sum;
+}
+
+/* Only far outside can it overflow, or be inf - inf. */
+static double bounded(double sd)
+{
+	return isfinite(sd) ? sd : DBL_MAX;
+}
+
+/* |R⁻ᵀφ|², and φ is lost: forward substitution with Rᵀ, a row of R at a time. */
+static double leverage(const struct incise_uncertainty *uncertainty, double *phi)
+{
+	const double *row = uncertainty->factor;
+	double sum = 0;
+
 	for (int i = 0; i < uncertainty->n; i++) {
 		double v = phi[i] / *row++;
 
@@ -175,9 +283,38 @@ double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,
 		for (int k = i + 1; k < uncertainty->n; k++)
 			phi[k] -= *row++ * v;
 	}
-	sum = uncertainty->noise * sqrt(1 + sum);
-	/* Only far outside can it overflow, or be inf - inf. */
-	return isfinite(sum) ? sum : DBL_MAX;
+	return sum;
+}
+
+void incise_uncertainty_parts(const struct incise_uncertainty *u,
+			      const struct incise_model *model, const double *x,
+			      struct incise_uncertainty_parts *parts)
+{
+	double phi[UNKNOWNS_MAX], common, rig, model_square;
+
+	incise_uncertainty_row(model, x, phi);
+	common = square(u, phi, 0, u->n_common);
+	rig = square(u, phi, u->n_common, u->n_rig);
+	model_square = leverage(u, phi);
+	*parts = (struct incise_uncertainty_parts){
+		.total = bounded(calibrations(u)
+					 ? sqrt(u->noise * u->noise * (1 + model_square) +
+						common + rig)
+					 : u->noise * sqrt(1 + model_square)),
+		.data = u->noise,
+		.model = bounded(u->noise * sqrt(model_square)),
+		.calibration = bounded(sqrt(common)),
+		.rig = bounded(sqrt(rig)),
+	};
+}
+
+double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,
+			     const struct incise_model *model, const double *x)
+{
+	struct incise_uncertainty_parts parts;
+
+	incise_uncertainty_parts(uncertainty, model, x, &parts);
+	return parts.total;
 }
 
 #define fail incise_lines_error
@@ -236,6 +373,26 @@ static int number(struct incise_lines *in, char **at, double *value)
 	return 0;
 }
 
+/* The n numbers of a line of calibrations. */
+static int read_calibration(struct incise_lines *in, double *to, int n)
+{
+	int rc = next_line(in);
+	char *at = in->text;
+
+	if (rc < 0)
+		return rc;
+	if (!rc)
+		return fail(in, EINVAL,
+			    "the file ends within its calibrations: it is truncated; "
+			    "train again");
+	for (int k = 0; k < n; k++) {
+		rc = number(in, &at, to + k);
+		if (rc)
+			return rc;
+	}
+	return *at ? fail(in, EINVAL, "a calibration has more than %d numbers", n) : 0;
+}
+
 static int read_row(struct incise_lines *in, double *to, int n, int row)
 {
 	int rc = next_line(in);
@@ -267,14 +424,15 @@ static int read_file(struct incise_lines *in, struct incise_uncertainty *u)
 	double *to = u->factor;
 	char *text, *end;
 	uint64_t sum;
-	long value;
+	long value, version, n_common = 0, n_rig = 0;
 	int rc = integer_of(in, "incise-sd", &value);
 
 	if (rc)
 		return rc;
-	if (value != VERSION)
-		return fail(in, EINVAL, "version %ld: this incise reads version %d",
+	if (value < 1 || value > VERSION)
+		return fail(in, EINVAL, "version %ld: this incise reads versions 1 to %d",
 			    value, VERSION);
+	version = value;
 	text = value_of(in, "model");
 	if (!text)
 		return -errno;
@@ -300,8 +458,24 @@ static int read_file(struct incise_lines *in, struct incise_uncertainty *u)
 	if (*text || u->noise < 0)
 		return fail(in, EINVAL,
 			    "noise: expected one number that is not negative");
+	if (version > 1)
+		rc = integer_of(in, "common", &n_common);
+	if (!rc && version > 1)
+		rc = integer_of(in, "rig", &n_rig);
+	if (rc)
+		return rc;
+	if (n_common < 0 || n_common > u->n || n_rig < 0 ||
+	    n_rig > INCISE_UNCERTAINTY_SOURCES)
+		return fail(in, EINVAL,
+			    "expected at most %d common and %d rig calibrations", u->n,
+			    INCISE_UNCERTAINTY_SOURCES);
+	if (make_calibrations(u, (int)n_common, (int)n_rig))
+		return fail(in, ENOMEM, "no memory to read it");
 	for (int row = 0; row < u->n && !rc; to += u->n - row, row++)
 		rc = read_row(in, to, u->n, row);
+	for (int i = 0; i < calibrations(u) && !rc; i++)
+		rc = read_calibration(in, u->calibration + (size_t)i * (size_t)u->n,
+				      u->n);
 	if (rc)
 		return rc;
 	rc = next_line(in);
@@ -354,9 +528,18 @@ int incise_uncertainty_save(const struct incise_uncertainty *uncertainty,
 	locale = incise_c_locale_begin();
 	out = incise_outfile_stream(file);
 	fprintf(out, "incise-sd %d\nmodel %016" PRIx64 "\nunknowns %d\nnoise %.17g\n",
-		VERSION, uncertainty->checksum, uncertainty->n, uncertainty->noise);
+		calibrations(uncertainty) ? VERSION : 1, uncertainty->checksum,
+		uncertainty->n, uncertainty->noise);
+	if (calibrations(uncertainty))
+		fprintf(out, "common %d\nrig %d\n", uncertainty->n_common,
+			uncertainty->n_rig);
 	for (int i = 0; i < uncertainty->n; i++)
 		for (int k = i; k < uncertainty->n; k++)
+			fprintf(out, "%.17g%c", *from++,
+				k + 1 < uncertainty->n ? ' ' : '\n');
+	from = uncertainty->calibration;
+	for (int i = 0; i < calibrations(uncertainty); i++)
+		for (int k = 0; k < uncertainty->n; k++)
 			fprintf(out, "%.17g%c", *from++,
 				k + 1 < uncertainty->n ? ' ' : '\n');
 	incise_c_locale_end(locale);

@@ -46,6 +46,7 @@ class SourceStruct(ctypes.Structure):
         ("own_groups", c_bool),
         ("read", _Read),
         ("user", c_void_p),
+        ("calibration", c_char_p),
     ]
     c_name = "struct incise_corpus_source"
 

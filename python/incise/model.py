@@ -77,6 +77,7 @@ class TrainOptionsStruct(ctypes.Structure):
         ("uncertainty", ctypes.POINTER(c_void_p)),
         ("ranges", ctypes.POINTER(VariableStruct)),
         ("all", all_sums),
+        ("weighted", c_bool),
     ]
     c_name = "struct incise_train_options"
 

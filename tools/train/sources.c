@@ -118,6 +118,8 @@ static int read_recording(void *user, incise_row_taker take, void *taker,
 		return -errno;
 	incise_export_options_init(&options);
 	options.rate_hz = source->options->rate_hz;
+	options.uncertainty =
+		source->options->uncertainty ? INCISE_EXPORT_PARTS : INCISE_EXPORT_NONE;
 	begin(source, take, taker);
 	rc = incise_recording_stream(recording, "table", &options, &stream, err);
 	incise_recording_close(recording);
@@ -230,6 +232,12 @@ static int open_recording(struct source *source, struct incise_error *err)
 		*active.file ? ", by " : "", active.file,
 		*active.file ? ", SHA-256 " : "", active.sha256);
 	snprintf(source->text, sizeof(source->text), "%s", text);
+	free(text);
+	text = cli_text("%s; %.17g mV/N; tip %.17g %.17g %.17g; %s", info.rig,
+			info.force_mV_N, info.tip_mm[0], info.tip_mm[1], info.tip_mm[2],
+			active.sha256);
+	snprintf(source->calibration, sizeof(source->calibration), "%s", text);
+	source->corpus.calibration = source->calibration;
 	free(text);
 	return rc;
 }

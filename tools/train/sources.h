@@ -14,6 +14,7 @@
 struct source_options {
 	const char *const *columns; /* inputs, then output */
 	int n_columns;
+	bool uncertainty; /* columns of parts are among them */
 	/* cut, recording, rig, or a column; NULL: cut where all are recordings, else none. */
 	const char *group;
 	bool all_rows;	/* also where the blade did not advance */
@@ -30,8 +31,8 @@ struct source {
 	const char *path;
 	bool recording;
 	char hash[65], text[INCISE_FACTOR_TEXT_MAX];
-	char rig[256];
-	uint64_t left_out;	     /* rows in the last reading */
+	char rig[256], calibration[512]; /* the latter: the same where it is the same */
+	uint64_t left_out;		 /* rows in the last reading */
 	struct incise_dataset *pipe; /* that can be read once only: its rows, or NULL */
 	incise_row_taker take;	     /* of the present reading, and the rows it took */
 	void *taker;

@@ -17,6 +17,7 @@
 #include <incise/error.h>
 #include <incise/export.h>
 #include <incise/factor.h>
+#include <incise/propagation.h>
 #include <incise/train.h>
 
 INCISE_BEGIN_DECLS
@@ -36,6 +37,8 @@ struct incise_corpus_source {
 	int (*read)(void *user, incise_row_taker take, void *taker,
 		    struct incise_error *err);
 	void *user;
+	/** Calibration of its rig, any text that is the same for the same one; NULL: its own. */
+	const char *calibration;
 };
 
 struct incise_corpus;
@@ -83,6 +86,16 @@ INCISE_API void incise_corpus_free(struct incise_corpus *corpus);
  */
 INCISE_API void incise_corpus_set_stop(struct incise_corpus *corpus,
 				       const volatile int *stop);
+
+/**
+ * Fold pairs with the weights of their uncertainties: rows of the sources have the columns of a
+ * propagation behind the output, and incise_corpus_fold() adds those that are not held out to
+ * it. The caller starts and ends its passes. A factor of such pairs cannot be saved or merged.
+ *
+ * @param propagation outlives the corpus; NULL (default): all weigh the same
+ */
+INCISE_API void incise_corpus_weigh(struct incise_corpus *corpus,
+				    struct incise_propagation *propagation);
 
 /**
  * Survey a source.

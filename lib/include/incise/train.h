@@ -87,6 +87,11 @@ struct incise_train_options {
 	 * training with -ECANCELED. Called once with @user; NULL: the pairs given are all.
 	 */
 	struct incise_factor *(*all)(void *user, const struct incise_model *premises);
+	/**
+	 * The sums of @ref all have weights (incise_corpus_weigh()): there are then no fits with a
+	 * random factor of each group. The model given to it has the consequents of the sample.
+	 */
+	bool weighted;
 };
 
 /** Report of a training. */

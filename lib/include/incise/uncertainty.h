@@ -10,6 +10,12 @@
  * are sparse. The noise comes from held-out groups, so that ±1.96 sd should contain 95 % of a
  * new cut.
  *
+ * Of pairs with uncertainties (incise/propagation.h), the calibrations of the rigs add to it: of
+ * those that the model was trained on, and of the one that a new output is measured by.
+ *
+ *   sd(x)² = noise² (1 + |R⁻ᵀφ(x)|²) + |K φ(x)|² + |B φ(x)|²
+ *            data     model            calibration  rig
+ *
  * MATLAB cannot read a .fis file with this data. It is in a separate file, MODEL.fis.sd
  * (incise-sd(5)), with a checksum of the parameters of its model.
  */
@@ -78,6 +84,53 @@ INCISE_API double incise_uncertainty_noise(const struct incise_uncertainty *unce
 INCISE_API double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,
 					const struct incise_model *model,
 					const double *x);
+
+/** Parts of a standard deviation, in the unit of the output. */
+struct incise_uncertainty_parts {
+	double total; /**< root of the sum of squares, as of incise_uncertainty_sd() */
+	double data;  /**< scatter from cut to cut: the noise */
+	double model; /**< of a fit to limited data; it grows where they are sparse */
+	double calibration; /**< of the rigs that the model was trained on; 0: not stated */
+	double rig; /**< of another rig as well calibrated, that measures; 0: not stated */
+};
+
+/**
+ * The parts at x, as incise_uncertainty_sd(). Real-time safe.
+ */
+INCISE_API void incise_uncertainty_parts(const struct incise_uncertainty *uncertainty,
+					 const struct incise_model *model,
+					 const double *x,
+					 struct incise_uncertainty_parts *parts);
+
+/** Largest number of sources of a rig's calibration. */
+#define INCISE_UNCERTAINTY_SOURCES 64
+
+/**
+ * Set the calibrations, and the noise that is left without them.
+ *
+ * @param common n_common rows K of as many numbers as unknowns, row by row; at most that many rows
+ * @param rig    n_rig rows B of the same; at most INCISE_UNCERTAINTY_SOURCES
+ * @return 0; -EINVAL (a number is not finite, too many rows), -ENOMEM: then nothing is changed
+ */
+INCISE_API int incise_uncertainty_set_calibration(struct incise_uncertainty *uncertainty,
+						  double noise, const double *common,
+						  int n_common, const double *rig,
+						  int n_rig, struct incise_error *err);
+
+/** Number of unknowns of φ: rules · (inputs + 1). */
+INCISE_API int incise_uncertainty_unknowns(const struct incise_uncertainty *uncertainty);
+
+/**
+ * φ(x) of a model, with inputs as in incise_uncertainty_sd(). Real-time safe.
+ *
+ * @param phi room for n_rules · (n_inputs + 1) numbers
+ */
+INCISE_API void incise_uncertainty_row(const struct incise_model *model, const double *x,
+				       double *phi);
+
+/** Solve RᵀR v' = v in place. @return 0; -EDOM (not finite). Real-time safe. */
+INCISE_API int incise_uncertainty_solve(const struct incise_uncertainty *uncertainty,
+					double *v);
 
 /**
  * The same for many points: sd[k] of the n_inputs values at x + k·n_inputs. Real-time safe.

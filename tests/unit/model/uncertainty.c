@@ -255,6 +255,66 @@ static int remove_path(void **state)
 	return unlink(path);
 }
 
+/* Calibrations: in a file of version 2, the same to the bit; without them the file is version 1. */
+static void test_calibrations(void **state)
+{
+	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
+	struct incise_uncertainty *u = make(model), *read;
+	struct incise_uncertainty_parts a, b;
+	double rows[3 * N], v[N], x[] = {7, 31}, phi[N], square = 0;
+	uint64_t seed = 5;
+	char line[100];
+	FILE *file;
+
+	for (int i = 0; i < 3 * N; i++)
+		rows[i] = 0.1 * paper_random(&seed);
+	assert_int_equal(incise_uncertainty_unknowns(u), N);
+	/* RᵀR v' = v */
+	for (int i = 0; i < N; i++)
+		v[i] = paper_random(&seed);
+	memcpy(phi, v, sizeof(phi));
+	assert_int_equal(incise_uncertainty_solve(u, phi), 0);
+	for (int i = 0; i < N; i++) {
+		double sum = 0;
+
+		for (int j = 0; j <= i; j++)
+			for (int k = j; k < N; k++)
+				sum += factor[j * N + i] * factor[j * N + k] * phi[k];
+		assert_true(fabs(sum - v[i]) < 1e-12);
+	}
+	rows[0] = NAN;
+	assert_int_equal(incise_uncertainty_set_calibration(u, 0.2, rows, 2, rows, 1,
+							    NULL),
+			 -EINVAL);
+	assert_true(incise_uncertainty_noise(u) == 0.25);
+	rows[0] = 0.1;
+	assert_int_equal(incise_uncertainty_set_calibration(u, 0.2, rows, 2, rows + 2 * N,
+							    1, NULL),
+			 0);
+	incise_uncertainty_row(model, x, phi);
+	for (int i = 0; i < N; i++)
+		square += rows[2 * N + i] * phi[i];
+	incise_uncertainty_parts(u, model, x, &a);
+	assert_true(fabs(a.rig - fabs(square)) < 1e-15);
+	assert_true(a.data == 0.2 && a.total > a.data);
+	assert_int_equal(incise_uncertainty_save(u, path, NULL), 0);
+	read = incise_uncertainty_load(path, model, NULL);
+	assert_non_null(read);
+	incise_uncertainty_parts(read, model, x, &b);
+	assert_memory_equal(&a, &b, sizeof(a));
+	assert_int_equal(incise_uncertainty_set_calibration(read, 0.25, NULL, 0, NULL, 0,
+							    NULL),
+			 0);
+	assert_int_equal(incise_uncertainty_save(read, path, NULL), 0);
+	file = fopen(path, "r");
+	assert_non_null(fgets(line, sizeof(line), file));
+	assert_string_equal(line, "incise-sd 1\n");
+	fclose(file);
+	incise_uncertainty_free(read);
+	incise_uncertainty_free(u);
+	incise_model_free(model);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -264,6 +324,7 @@ int main(void)
 		cmocka_unit_test(test_round_trip),
 		cmocka_unit_test(test_stale),
 		cmocka_unit_test(test_damage_is_refused),
+		cmocka_unit_test(test_calibrations),
 	};
 
 	return cmocka_run_group_tests(tests, make_path, remove_path);

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# Uncertainties of training pairs, from the columns of a dataset to the parts of a prediction.
+
+load cli
+
+# Rigs a, b and c: 8 cuts each, with the parts of a calibrated rig. The gain of rig b is 4 % too large,
+# that of c 4 % too small; its pairs state 2 %. No rand(): awks differ.
+make_rigs() {
+	local rig
+	for rig in a b c; do
+		awk -v rig=$rig 'BEGIN {
+			print "cut,depth_mm,velocity_mm_s,force_N,force_u_gain_N,force_u_zero_N,force_u_noise_N," \
+				"depth_u_tip_z_mm,depth_u_noise_mm,velocity_u_noise_mm_s"
+			gain = rig == "a" ? 1 : rig == "b" ? 1.04 : 0.96
+			for (cut = 1; cut <= 8; cut++)
+				for (i = 1; i <= 40; i++) {
+					d = (8 + cut) * i / 40
+					v = 25 + 20 * sin(i / 4 + cut)
+					f = gain * (1 + 0.03 * cos(5 * cut + length(rig))) * (0.1 * d + 0.01 * v)
+					f += 0.01 * cos(97 * i + 31 * cut)
+					printf "%s-%02d,%.4f,%.4f,%.5f,%.6f,-0.01,%.3f,-0.05,0.02,0.3\n", rig, cut, d, v, f,
+						-0.02 * f, i % 4 ? 0.01 : 0.4
+				}
+		}' >$rig.csv
+	done
+}
+
+setup() {
+	work_folder
+	make_rigs
+}
+
+train() {
+	incise train "$@" --group cut --mf 2,2 >out 2>err || complain "$(cat err)"
+}
+
+@test "parts of the columns are in the model's interval, and a model without them is as before" {
+	train a.csv b.csv c.csv -o m.fis
+	grep -q "uncertainties: own parts .* N; calibrations .* N on the model, .* N of another rig" out
+	head -n 1 m.fis.sd | grep -qx "incise-sd 2"
+	grep -q "^% incise: options: .*, weighted by uncertainties" m.fis
+	printf '3 20\n8 30\n12 40\n' >points
+	incise eval m.fis points --sd --parts >got
+	awk 'NF != 5 { bad = 1 } { d = $2 ^ 2 - $3 ^ 2 - $4 ^ 2 - $5 ^ 2
+		if (d > 1e-9 || d < -1e-9 || $5 < 0.015) { print; bad = 1 } } END { exit bad || NR != 3 }' got
+	cut -d' ' -f1,2 got | diff - <(incise eval m.fis points --sd)
+	incise eval m.fis points --sd --parts --json >r.json
+	holds "($(key r.json 'rows[0].sd_calibration_N') - $(sed -n '1s/.* //p' got))^2 < 1e-18"
+	# none, and columns that are not there, give the same bytes
+	for rig in a b c; do cut -d, -f1-4 $rig.csv >plain_$rig.csv; done
+	train a.csv b.csv c.csv -o none.fis --uncertainty none
+	train plain_a.csv plain_b.csv plain_c.csv -o plain.fis
+	grep -v '^% incise' none.fis | diff - <(grep -v '^% incise' plain.fis)
+	diff none.fis.sd plain.fis.sd
+	head -n 1 plain.fis.sd | grep -qx "incise-sd 1"
+	incise eval plain.fis points --sd --parts | awk '$5 != 0 { exit 1 }'
+	run --separate-stderr incise eval m.fis points --parts
+	bad_usage "--parts goes with --sd"
+}
+
+@test "a calibration does not average out over rows, and does over rigs" {
+	incise train a.csv --group cut --mf 2,2 -o one.fis --json >one.json 2>err
+	incise train a.csv b.csv c.csv --group cut --mf 2,2 -o three.fis --json >three.json 2>err
+	one=$(key one.json uncertainty.calibration_N)
+	three=$(key three.json uncertainty.calibration_N)
+	# the same parts of three rigs: 1/√3 of one; the fits differ by some percent
+	holds "$one / $three > 1.6 && $one / $three < 1.87"
+	[ "$(key three.json uncertainty.calibrations)" = 3 ]
+	# a row in four has 0.4 N of its own, which the scatter hardly has
+	holds "$(key three.json uncertainty.least_weight) < 0.5"
+	# the rigs differ by 4 %, which is in the scatter of a model that knows no calibration
+	incise train a.csv b.csv c.csv --group cut --mf 2,2 -o none.fis --uncertainty none --json >none.json 2>err
+	holds "$(key three.json noise_N) < 0.95 * $(key none.json noise_N)"
+}
+
+@test "what cannot carry uncertainties is refused, and what lacks them is named" {
+	train a.csv -o m.fis
+	for way in "--classic -o x.fis" "--premises m.fis --factor x.fac" "--mpi -o x.fis"; do
+		# shellcheck disable=SC2086 # several words
+		run --separate-stderr incise train a.csv b.csv $way
+		bad_usage "cannot take uncertainties, which a.csv has; give --uncertainty none"
+	done
+	cut -d, -f1-4 b.csv >plain.csv
+	run --separate-stderr incise train a.csv plain.csv -o x.fis
+	failed_with "plain.csv: has other uncertainties than a.csv"
+	run --separate-stderr incise train plain.csv --uncertainty parts -o x.fis
+	failed_with "plain.csv: has no uncertainties of these columns" "--uncertainty parts"
+	sed '2,$s/-0.01,/nan,/' a.csv >nan.csv
+	incise train nan.csv --group cut --mf 2,2 -o x.fis >/dev/null 2>err
+	grep -q "nan.csv: its uncertainties are not all stated (nan), so none is used" err
+	sed '9s/-0.01,/nan,/' a.csv >late.csv
+	run --separate-stderr incise train late.csv --group cut -o y.fis
+	[[ "$stderr" == *"late.csv:9: column 6 (force_u_zero_N): nan is not finite"* ]]
+	incise capture -o r.rec --rig sim:clock=simulated,cut_s=2,pause_s=1 --duration 8s >/dev/null
+	run --separate-stderr incise train r.rec --uncertainty parts -o x.fis
+	failed_with "r.rec: the uncertainty of " "is not stated: "
+}
+
+@test "recordings state the same as their export does" {
+	cat >c.conf <<-'END'
+		force_mV_N = 1230.0; tip_mm = [1.0, 0.0, -20.0]; surface_u_mm = 0.05;
+		force_delay_ms = 0.0; force_delay_sd_ms = 0.02; tracker_delay_ms = 4.2; tracker_delay_sd_ms = 0.1;
+		history = (
+		{ kind = "force"; date = "2026-11-20T10:00:00Z"; pass = true;
+		  values = ( { key = "force_mV_N"; left = 1230.0; u = 12.0; } ); },
+		{ kind = "tip"; date = "2026-11-20T10:00:00Z"; pass = true; values = (
+		  { key = "tip_x_mm"; left = 1.0; u = 0.03; }, { key = "tip_y_mm"; left = 0.0; u = 0.02; },
+		  { key = "tip_z_mm"; left = -20.0; u = 0.04; } ); } );
+	END
+	incise capture -o r.rec -c c.conf --rig sim:clock=simulated,cut_s=2,pause_s=1,tip_x_mm=1,tip_z_mm=-20 --duration 14s >/dev/null
+	incise export r.rec --rate 25 --uncertainty parts -o r.csv >/dev/null
+	train r.rec --rate 25 --uncertainty parts -o rec.fis
+	train r.csv -o csv.fis
+	# the decimals of CSV: 5 of the force
+	for model in rec csv; do
+		echo '5 20' | incise eval $model.fis --sd --parts >$model.out 2>/dev/null
+	done
+	paste -d' ' rec.out csv.out | awk '{ for (i = 1; i <= 5; i++) { d = $i - $(i + 5)
+		if (d > 1e-3 || d < -1e-3) { print; exit 1 } } }'
+	head -n 1 rec.fis.sd | grep -qx "incise-sd 2"
+	# A calibration after the fact that is twice as uncertain is seen as such.
+	sed 's/u = 12.0/u = 48.0/' c.conf >worse.conf
+	incise recalibrate r.rec -c worse.conf >/dev/null
+	train r.rec --rate 25 --uncertainty parts -o worse.fis
+	worse=$(echo '5 20' | incise eval worse.fis --sd --parts 2>/dev/null | cut -d' ' -f5)
+	holds "$worse > 1.2 * $(cut -d' ' -f5 rec.out)"
+}
