@@ -45,6 +45,7 @@ fuzz_igtl_poses := lib/base/igtl.c lib/base/ring.c lib/device/pace.c lib/device/
 fuzz_wall_packets := $(addprefix lib/record/write/wall_,packets.c kernel.c)
 
 fuzz_statement := lib/base/error.c lib/record/statement.c
+fuzz_origin := lib/record/export/origin.c
 
 fuzz_state_page := lib/base/error.c $(addprefix lib/loop/state_,file.c page.c reader.c)
 

@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * The origin of a file: what it was made of, in the file itself. Exports, models and figures carry
+ * a token for each file that they were made of, and for those that these were made of, up to the
+ * recordings. A token is ASCII without blanks or quotes, so that each format holds it as it is, and
+ * a reader finds it in the bytes of any file:
+ *
+ *     incise:2:recording:4f1c…9a:97:4e1b…02:liver.rec;
+ *            │     │       │    │    │        └ name, other bytes than A-Z a-z 0-9 - . _ ~ as %XX
+ *            │     │       │    │    └ identity of the recording, or "-"
+ *            │     │       │    └ its commit; 0 of other files
+ *            │     │       └ its head at that commit, of other files SHA-256 of their bytes, in hex
+ *            │     └ recording, export, model …
+ *            └ depth: 1 for what the file was made of, 2 for what that was made of
+ *
+ * A token proves nothing by itself. The SHA-256 shows whether a file or recording that is at hand is
+ * the one that is meant. Part of libincise-record.
+ */
+#ifndef INCISE_ORIGIN_H
+#define INCISE_ORIGIN_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <incise/error.h>
+#include <incise/export.h>
+
+INCISE_BEGIN_DECLS
+
+/** Largest depth of an origin. */
+#define INCISE_ORIGIN_DEPTH_MAX 9
+/** Bytes of the longest token, with the final NUL. */
+#define INCISE_ORIGIN_TEXT 960
+
+/** A file that another was made of. */
+struct incise_origin {
+	int depth;	 /**< 1 … INCISE_ORIGIN_DEPTH_MAX */
+	char kind[16];	 /**< small letters: "recording", "export", "model", … */
+	char sha256[65]; /**< 64 small hexadecimal digits */
+	uint64_t
+		commit; /**< of a recording: the commit that sha256 is the head of; else 0 */
+	char identity[65]; /**< of a recording: letters, digits and '-'; else "" */
+	char name
+		[256]; /**< of the file or folder, without its folder; any bytes but '/' */
+};
+
+/**
+ * Write an origin as a token. Thread safe.
+ *
+ * @param text INCISE_ORIGIN_TEXT bytes
+ * @return its length, or -EINVAL: a member is none of those above
+ */
+INCISE_API int incise_origin_text(const struct incise_origin *origin, char *text);
+
+/**
+ * Find the next token in any bytes. Whatever looks like a token and is not well formed is passed
+ * over. Thread safe.
+ *
+ * @param bytes  n bytes
+ * @param at     place to search from; moved behind the token that was found, or to n
+ * @param origin the token
+ * @return whether there is one
+ */
+INCISE_API bool incise_origin_next(const char *bytes, size_t n, size_t *at,
+				   struct incise_origin *origin);
+
+INCISE_END_DECLS
+#endif
