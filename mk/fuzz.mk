@@ -46,6 +46,8 @@ fuzz_wall_packets := $(addprefix lib/record/write/wall_,packets.c kernel.c)
 
 fuzz_statement := lib/base/error.c lib/record/statement.c
 fuzz_origin := lib/record/export/origin.c
+fuzz_timestamp_reply := lib/base/error.c lib/base/infile.c tools/seal/timestamp.c
+fuzz_libs_timestamp_reply = $(shell $(PKG_CONFIG) --libs libcrypto)
 
 fuzz_state_page := lib/base/error.c $(addprefix lib/loop/state_,file.c page.c reader.c)
 

@@ -10,14 +10,26 @@
 #include "cli/cli.h"
 #include "cli/file_kind.h"
 #include "cli/json.h"
+#include "seal/members.h"
+#include "seal/vouch.h"
 
 #define FINDINGS_MAX 1000 /* in the JSON object */
 
 struct job {
+	struct trust_files trust;
 	bool json;
 };
 
 static const struct cli_option options[] = {
+	{0, "signers", "FILE",
+	 "check signatures and say who vouches for what; FILE lists who may\n"
+	 "sign, in the format ALLOWED SIGNERS of ssh-keygen(1)",
+	 CLI_INPUT(struct job, trust.signers)},
+	{0, "revoked", "FILE",
+	 "keys that are not accepted: public keys, or a list of ssh-keygen -k",
+	 CLI_INPUT(struct job, trust.revoked)},
+	{0, "ca", "FILE", "certificates of authorities in PEM: check time-stamps by them",
+	 CLI_INPUT(struct job, trust.ca)},
 	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct job, json)},
 	{0},
 };
@@ -30,9 +42,11 @@ static const struct cli_command command = {
 		   "seal, and check the pages of its database. Lists what is missing or "
 		   "altered, and where.",
 	.options = options,
-	.notes = "Example: incise verify liver.rec\n"
-		 "Exit codes: 0 complete, 1 something is missing or altered, 2 bad "
-		 "usage.",
+	.notes =
+		"Example: incise verify liver.rec\n"
+		"Exit codes: 0 complete, and signed if --signers is given; 1 something is "
+		"missing,\n"
+		"altered or not signed; 2 bad usage.",
 };
 
 /* Findings are printed as lines, or kept in a list. */
@@ -133,7 +147,8 @@ static bool recalibrated(const char *path, struct incise_recalibration *active)
 	return is;
 }
 
-static void print_json(const struct incise_verify_report *report, const struct sink *sink)
+static void print_json(const struct incise_verify_report *report, const struct sink *sink,
+		       json_t *vouches)
 {
 	struct incise_recalibration active;
 	json_t *streams = json_array();
@@ -151,14 +166,14 @@ static void print_json(const struct incise_verify_report *report, const struct s
 					   (json_int_t)stream->altered));
 	}
 	json_print(json_pack(
-		"{so sb sb sb sb sb sI so so so so sI}", "path", json_text(sink->path),
+		"{so sb sb sb sb sb sI so so so so sI so}", "path", json_text(sink->path),
 		"complete", report->complete, "intact", report->intact, "unverified",
 		report->unverified, "interrupted", report->interrupted, "sealed",
 		report->sealed, "commits", (json_int_t)report->commits, "pictures",
 		pictures(report), "recalibrated",
 		recalibrated(sink->path, &active) ? json_text(active.file) : json_null(),
 		"streams", streams, "findings", sink->list, "findings_left_out",
-		(json_int_t)sink->left_out));
+		(json_int_t)sink->left_out, "seals", vouches));
 }
 
 static void print_table(const struct incise_verify_report *report, const char *path)
@@ -197,10 +212,62 @@ static void print_table(const struct incise_verify_report *report, const char *p
 		printf("%s: complete, and as it was written\n", path);
 }
 
+/* --- who vouches for it --------------------------------------------------------------- */
+
+/* The seal of each member: verify the recording, too. */
+struct seals {
+	struct trust trust;
+	struct members members;
+	struct vouch *vouches;
+};
+
+static void seals_check(struct seals *seals, const char *path,
+			const struct incise_verify_watch *watch,
+			struct incise_verify_report *report)
+{
+	struct incise_error err = {0};
+	struct members *members = &seals->members;
+
+	members_find(members, path);
+	seals->vouches = cli_alloc((size_t)members->n, sizeof(*seals->vouches));
+	if (members->joined && incise_verify(path, watch, report, &err))
+		cli_fail_with(&err);
+	for (int i = 0; i < members->n; i++)
+		vouch_check(&seals->vouches[i], members->joined ? members->path[i] : path,
+			    &seals->trust, members->joined ? NULL : watch,
+			    members->joined ? NULL : report);
+}
+
+static json_t *seals_json(const struct seals *seals)
+{
+	json_t *list = json_array();
+
+	for (int i = 0; i < seals->members.n; i++)
+		json_array_append_new(list, vouch_json(&seals->vouches[i]));
+	return list;
+}
+
+/* Fails if someone was to be named who vouches for it, and nobody does. */
+static void seals_judge(struct seals *seals)
+{
+	for (int i = 0; i < seals->members.n && seals->trust.signers.path; i++)
+		if (!seals->vouches[i].vouched || seals->vouches[i].bad)
+			vouch_fail(&seals->vouches[i], &seals->trust);
+}
+
+static void seals_free(struct seals *seals)
+{
+	for (int i = 0; i < seals->members.n; i++)
+		vouch_free(&seals->vouches[i]);
+	free(seals->vouches);
+	members_free(&seals->members);
+	trust_free(&seals->trust);
+}
+
 int main(int argc, char **argv)
 {
 	struct incise_verify_report report;
-	struct incise_error err = {0};
+	struct seals seals;
 	struct sink sink = {0};
 	struct incise_verify_watch watch = {found, progress, &sink};
 	unsigned long long lost = 0;
@@ -212,21 +279,29 @@ int main(int argc, char **argv)
 	if (optind + 1 < argc)
 		cli_usage("unexpected argument '%s'; give one NAME.rec at a time",
 			  argv[optind + 1]);
+	if ((job.trust.ca || job.trust.revoked) && !job.trust.signers)
+		cli_usage("--%s goes with --signers FILE",
+			  job.trust.ca ? "ca" : "revoked");
 	sink.path = file_operand(argv[optind], FILE_RECORDING);
+	trust_read(&seals.trust, &job.trust);
 	sink.list = job.json ? json_array() : NULL;
 	cli_catch_signals();
-	if (incise_verify(sink.path, &watch, &report, &err))
-		cli_fail_with(&err);
+	seals_check(&seals, sink.path, &watch, &report);
 	cli_progress_end();
 	for (int i = 0; i < report.n_streams; i++)
 		lost += report.streams[i].lost;
 	if (job.json)
-		print_json(&report, &sink);
+		print_json(&report, &sink, seals_json(&seals));
 	else
 		print_table(&report, sink.path);
+	for (int i = 0; i < seals.members.n && !job.json; i++)
+		vouch_print(&seals.vouches[i], &seals.trust);
 	cli_finish();
-	if (report.complete)
+	if (report.complete) {
+		seals_judge(&seals);
+		seals_free(&seals);
 		return 0;
+	}
 	if (report.unverified)
 		cli_fail("%s: not all of it could be verified; %llu samples missing, "
 			 "findings: %llu",

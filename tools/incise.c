@@ -27,6 +27,7 @@ static const struct {
 	{"calibrate", "measure the scale factors, delays and offsets of a rig"},
 	{"capture", "record the streams of a rig in sync"},
 	{"verify", "check that a recording is complete"},
+	{"sign", "sign and time-stamp a recording"},
 	{"join", "put recordings of several machines on one timeline"},
 	{"recalibrate", "give a recording another calibration after the fact"},
 	{"export", "make a dataset from recordings, raw or averaged"},

@@ -43,6 +43,10 @@ recordings() {
 	cp -r a.rec b.rec
 	sqlite3 b.rec/recording.db "DELETE FROM tracker WHERE rowid = 5"
 	report verify.findings verify b.rec
+	ssh-keygen -q -t ed25519 -N "" -f key
+	report sign sign a.rec --key key
+	report sign.query sign a.rec --timestamp q.tsq
+	report verify.signed verify a.rec --signers <(echo "kim@lab $(cat key.pub)")
 	for i in 1 2; do
 		incise capture -o j$i.rec --rig sim:clock=simulated,seed=$i --duration 1s \
 			--clock-source sim:1000,0,20 >/dev/null

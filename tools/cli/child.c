@@ -38,7 +38,8 @@ static bool redirect(int from, int to)
 
 struct start {
 	char *const *argv;
-	int out, err;
+	int in, out, err;
+	bool foreground; /* in the process group of the parent */
 	pid_t parent;
 	volatile int code; /* errno of a start that failed; 0: it runs */
 };
@@ -46,29 +47,49 @@ struct start {
 static _Noreturn void exec_child(struct start *start)
 {
 	if (!prctl(PR_SET_PDEATHSIG, SIGTERM) && getppid() == start->parent &&
-	    !setpgid(0, 0) && redirect(0, -1) && redirect(1, start->out) &&
-	    redirect(2, start->err))
+	    (start->foreground || !setpgid(0, 0)) && redirect(0, start->in) &&
+	    redirect(1, start->out) && redirect(2, start->err))
 		execvp(start->argv[0], start->argv);
 	start->code = errno;
 	_exit(127);
 }
 
-pid_t child_start(char *const argv[], int out, int err)
+/* -1 with errno if it cannot be started. */
+static pid_t start_child(struct start *start)
 {
-	struct start start = {argv, out, err, getpid(), 0};
 	/* posix_spawn(3) has no PR_SET_PDEATHSIG. */
 	pid_t pid = vfork();
 
 	if (!pid)
-		exec_child(&start);
-	if (pid < 0)
-		start.code = errno;
-	else if (start.code)
+		exec_child(start);
+	if (pid > 0 && start->code) {
 		waitpid(pid, NULL, 0);
-	if (start.code)
-		cli_fail("%s: cannot be started: %s", start.argv[0],
-			 strerror(start.code));
+		errno = start->code;
+		pid = -1;
+	}
 	return pid;
+}
+
+pid_t child_start(char *const argv[], int out, int err)
+{
+	struct start start = {argv, -1, out, err, false, getpid(), 0};
+	pid_t pid = start_child(&start);
+
+	if (pid < 0)
+		cli_fail("%s: cannot be started: %s", argv[0], strerror(errno));
+	return pid;
+}
+
+int child_run(char *const argv[], int in, int out, int err)
+{
+	struct start start = {argv, in, out, err, true, getpid(), 0};
+	pid_t pid = start_child(&start);
+	int status;
+
+	while (pid > 0 && waitpid(pid, &status, 0) != pid)
+		if (errno != EINTR)
+			return -1;
+	return pid < 0 ? -1 : status;
 }
 
 bool child_ended(pid_t pid, int *status)

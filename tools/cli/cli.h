@@ -142,6 +142,9 @@ void cli_output(const char *path);
 /* The same for one that is no other output either. */
 void cli_output_once(const char *path);
 
+/* The same for a file that is added to a recording, which may be the one that is read. */
+void cli_output_within(const char *path);
+
 /* The same for a file that cli_written() leaves out unless it was noted before. */
 void cli_output_part(const char *path);
 

@@ -15,4 +15,24 @@ static inline int control_character(const char *text)
 	return (*c && *c < ' ') || *c == 0x7f;
 }
 
+/* Replace each by '?', and each byte that is no character of UTF-8: text of others, to be printed. */
+static inline void control_characters_hide(char *text)
+{
+	for (int n; *text; text += n) {
+		unsigned char c = (unsigned char)*text;
+		int length = c < 0x80	? 1
+			     : c < 0xc2 ? 0
+			     : c < 0xe0 ? 2
+			     : c < 0xf0 ? 3
+					: 4;
+
+		n = 1;
+		while (n < length && (text[n] & 0xc0) == 0x80)
+			n++;
+		if (n < length || !length || c > 0xf4 || control_character(text))
+			for (int i = 0; i < n; i++)
+				text[i] = '?';
+	}
+}
+
 #endif

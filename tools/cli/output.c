@@ -21,7 +21,8 @@ struct output {
 	struct place file, folder; /* of "-" there is no folder */
 	const char *name;	   /* below its folder */
 	bool exists;
-	bool part; /* of another output */
+	bool part;   /* of another output */
+	bool within; /* added to a recording that is read */
 	struct output *next;
 };
 
@@ -75,7 +76,7 @@ static void keep_apart(const struct input *input, const struct output *output)
 	if (output->exists && same(&input->at.st, &output->file.st))
 		cli_fail("%s: is an input (%s); give another path to write", called,
 			 input->at.path);
-	if (output->folder.path && S_ISDIR(input->at.st.st_mode) &&
+	if (output->folder.path && !output->within && S_ISDIR(input->at.st.st_mode) &&
 	    lies_in(output->folder.path, &input->at.st))
 		cli_fail("%s: is inside an input (%s); give another path to write",
 			 called, input->at.path);
@@ -158,7 +159,7 @@ static bool find_output(const char *path, struct output *output)
 }
 
 /* @once: no other option may name it. */
-static void note_output(const char *path, bool once, bool part)
+static void note_output(const char *path, bool once, bool part, bool within)
 {
 	struct output output, *kept;
 
@@ -167,6 +168,7 @@ static void note_output(const char *path, bool once, bool part)
 			return;
 	if (!find_output(path, &output))
 		return;
+	output.within = within;
 	for (const struct input *input = inputs; input; input = input->next)
 		keep_apart(input, &output);
 	for (const struct output *o = outputs; o; o = o->next)
@@ -188,17 +190,22 @@ static void note_output(const char *path, bool once, bool part)
 
 void cli_output(const char *path)
 {
-	note_output(path, false, false);
+	note_output(path, false, false, false);
 }
 
 void cli_output_part(const char *path)
 {
-	note_output(path, false, true);
+	note_output(path, false, true, false);
 }
 
 void cli_output_once(const char *path)
 {
-	note_output(path, true, false);
+	note_output(path, true, false, false);
+}
+
+void cli_output_within(const char *path)
+{
+	note_output(path, false, false, true);
 }
 
 /* --- extensions ------------------------------------------------------------------------- */

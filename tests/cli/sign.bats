@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# Signatures and time-stamps of recordings: ssh-keygen and openssl verify what incise signed, and incise
+# what they did; forgeries are found and named.
+
+load cli
+load authority
+
+key() { # NAME PERSON
+	ssh-keygen -q -t ed25519 -N "" -C "$2" -f "$1"
+}
+
+setup_file() {
+	cd "$BATS_FILE_TMPDIR"
+	for n in a b; do
+		"$INCISE_BUILD/bin/incise" capture -o $n.rec --rig sim:clock=simulated --duration 1s >/dev/null
+	done
+	key kim kim@lab
+	key lee lee@lab
+	authority ca
+	cp -r a.rec signed.rec
+	"$INCISE_BUILD/bin/incise" sign signed.rec --key kim >/dev/null
+}
+
+setup() {
+	work_folder
+	made=$BATS_FILE_TMPDIR
+	cp -r "$made/a.rec" a.rec
+	cp -r "$made/signed.rec" signed.rec
+	kim=$made/kim lee=$made/lee
+	echo "kim@lab $(cat "$kim.pub")" >signers
+}
+
+teardown() {
+	[ -z "${server:-}" ] || kill "$server"
+	[ -z "${SSH_AGENT_PID:-}" ] || kill "$SSH_AGENT_PID"
+}
+
+# not_vouched TEXT ARGUMENT…: verify signed.rec fails, with a line that holds this text.
+not_vouched() {
+	local text=$1
+	shift
+	run -1 --separate-stderr incise verify signed.rec --signers "$@"
+	[[ "$output" == *"$text"* ]] || complain "no '$text' in: $output $stderr"
+	[[ "$output" != *"signed by "* ]] || complain "signed: $output"
+	[[ "$output" != *[$'\e\a\r']* ]]
+}
+
+@test "a signature is made, verified and verified by ssh-keygen; the data stay as they are" {
+	before=$(sha256sum a.rec/recording.db)
+	run -0 --separate-stderr incise sign a.rec --key "$kim"
+	[[ "${lines[0]}" =~ ^"a.rec: signed with ED25519 SHA256:"[^\ ]+", all of it, statement of commit "[0-9]+$ ]]
+	sig=$(echo a.rec/seal/1.*.sig)
+	[ "${lines[1]}" = "wrote a.rec/seal/1.statement and $sig" ]
+	[ "$(sha256sum a.rec/recording.db)" = "$before" ]
+	ssh-keygen -Y verify -f signers -I kim@lab -n incise -s "$sig" <a.rec/seal/1.statement
+
+	run -0 --separate-stderr incise verify a.rec --signers signers
+	[[ "$output" =~ "a.rec: signed by kim@lab (ED25519 SHA256:"[^\ ]+"), all of it, statement of commit " ]]
+	run -0 --separate-stderr incise verify a.rec
+	[[ "$output" == *"a.rec: 1 signature and 0 time-stamps, not checked: give --signers FILE"* ]]
+	incise verify a.rec --signers signers --json | jq -e \
+		'.seals[0] | .vouched and .statements[0].agrees and .signatures[0].signer == "kim@lab"'
+
+	# another person signs the same statement, from a pipe of signers; the same one only once
+	incise sign a.rec --key "$lee"
+	run -0 --separate-stderr incise verify a.rec --signers <(cat signers; echo "lee@lab $(cat "$lee.pub")")
+	[ "$(grep -c "signed by" <<<"$output")" = 2 ]
+	run --separate-stderr incise sign a.rec --key "$kim"
+	failed_with "$sig: exists; give --overwrite"
+	incise sign a.rec --key "$kim" --overwrite
+	[ "$(find a.rec/seal -type f | wc -l)" = 3 ]
+	# it may be renamed, and is replaced with its seal
+	mv a.rec renamed.rec
+	rm renamed.rec/seal/"$(basename "$sig")"
+	run -0 --separate-stderr incise sign renamed.rec --key "$kim"
+	[ "${lines[1]}" = "wrote ${sig/a.rec/renamed.rec}" ]
+	incise capture -o renamed.rec --rig sim:clock=simulated --duration 300ms --overwrite
+	[ ! -e renamed.rec/seal ]
+}
+
+@test "a signature that ssh-keygen made by hand is accepted" {
+	incise sign a.rec --timestamp q.tsq
+	ssh-keygen -q -Y sign -f "$kim" -n incise a.rec/seal/1.statement
+	mv a.rec/seal/1.statement.sig a.rec/seal/1.byhand.sig
+	run -0 --separate-stderr incise verify a.rec --signers signers
+	[[ "$output" == *"signed by kim@lab"* ]]
+}
+
+@test "the agent signs for a public key; a passphrase that nobody types, no key and a pipe are named" {
+	eval "$(ssh-agent -a "$PWD/agent")"
+	ssh-add -q "$kim"
+	cp "$kim.pub" .
+	incise sign a.rec --key kim.pub
+	incise verify a.rec --signers signers
+	SSH_AUTH_SOCK=/none run --separate-stderr incise sign a.rec --key kim.pub --overwrite
+	failed_with "kim.pub: ssh-keygen did not sign with this key"
+	ssh-keygen -q -t ed25519 -N secret -f locked
+	SSH_AUTH_SOCK=/none SSH_ASKPASS=/bin/false SSH_ASKPASS_REQUIRE=force run --separate-stderr \
+		incise sign a.rec --key locked
+	failed_with "locked: ssh-keygen did not sign with this key"
+	mkfifo pipe
+	for key in pipe /dev/zero .; do
+		run --separate-stderr timeout 10 incise sign a.rec --key $key
+		failed_with "$key: not the file of a key"
+	done
+	run --separate-stderr incise sign a.rec --key -x
+	failed_with "-x: No such file or directory"
+	run -2 --separate-stderr incise sign a.rec
+	run -2 --separate-stderr incise sign a.rec --timestamp reply.der
+}
+
+@test "keys that may not sign are named: unknown, another purpose, expired, not yet, revoked" {
+	echo "lee@lab $(cat "$lee.pub")" >others
+	not_vouched "no signer has its key (ED25519 SHA256:" others
+	: >none
+	not_vouched "no signer has its key" none
+	echo "kim@lab namespaces=\"git,file\" $(cat "$kim.pub")" >git
+	not_vouched "key is not permitted for use in signature namespace" git
+	echo "kim@lab valid-before=\"20200101Z\" $(cat "$kim.pub")" >old
+	not_vouched "key has expired: " old
+	echo "kim@lab valid-after=\"20990101Z\" $(cat "$kim.pub")" >new
+	not_vouched "key is not yet valid: " new
+	not_vouched "its key is revoked" signers --revoked "$kim.pub"
+	printf 'kim\033[31m\a@lab %s\n' "$(cat "$kim.pub")" >escapes
+	run --separate-stderr incise verify signed.rec --signers escapes
+	[[ "$output$stderr" != *[$'\e\a']* ]]
+	run --separate-stderr incise verify signed.rec --signers /dev/zero
+	failed_with "/dev/zero: "
+	run --separate-stderr incise verify a.rec --signers signers
+	failed_with "a.rec: not signed: 'incise sign' signs it"
+	run -2 --separate-stderr incise verify a.rec --ca "$made/ca/ca.pem"
+}
+
+@test "seals of another recording, changed statements and signatures are named" {
+	incise sign "$made/b.rec" --key "$kim" --overwrite >/dev/null
+	rm -r signed.rec/seal
+	cp -r "$made/b.rec/seal" signed.rec/
+	run -1 --separate-stderr incise verify signed.rec --signers signers
+	[[ "$output" == *"another recording"* ]] || complain "$output"
+	[[ "$output" != *"all of it"* ]]
+
+	rm -r signed.rec
+	cp -r "$made/signed.rec" .
+	sed -i 's/^host .*/host other/' signed.rec/seal/1.statement
+	not_vouched "it is a signature over another statement" signers
+	echo rubbish >signed.rec/seal/1.statement
+	not_vouched "statement 1: seal/1.statement: " signers
+	rm signed.rec/seal/1.statement
+	not_vouched "its statement is missing" signers
+	sig=$(echo signed.rec/seal/1.*.sig)
+
+	# forged by one who may sign in his own name only
+	cp "$made/signed.rec/seal/1.statement" signed.rec/seal/
+	sed -i 's/^host .*/host other/' signed.rec/seal/1.statement
+	ssh-keygen -q -Y sign -f "$lee" -n incise signed.rec/seal/1.statement
+	mv -f signed.rec/seal/1.statement.sig "$sig"
+	not_vouched "no signer has its key" signers
+	ssh-keygen -q -Y sign -f "$kim" -n git signed.rec/seal/1.statement
+	mv -f signed.rec/seal/1.statement.sig "$sig"
+	not_vouched "it is a signature for another purpose" signers
+}
+
+@test "a row that was changed after it was signed, and a damaged recording, which is not signed" {
+	sqlite3 signed.rec/recording.db "UPDATE force SET code = code + 1 WHERE seq = 100"
+	run -1 --separate-stderr incise verify signed.rec --signers signers
+	[[ "$output" == *"force: block 0 is altered"* ]]
+	[[ "$output" != *"all of it"* ]]
+	run --separate-stderr incise sign signed.rec --key "$lee"
+	failed_with "signed.rec"
+	[ "$(find signed.rec/seal -name '*.sig' | wc -l)" = 1 ]
+}
+
+@test "a calibration after the fact is no longer what was signed, until it is signed" {
+	echo 'force_mV_N = 1111.0;' >c.conf
+	incise recalibrate signed.rec -c c.conf
+	run -1 --separate-stderr incise verify signed.rec --signers signers
+	[[ "$output" == *"calibrations after the fact are not those in the statement"* ]]
+	[[ "$output" == *"signed by kim@lab "*", but not for what it is now, statement of commit "* ]]
+	[[ "$stderr" == *"signed.rec: nobody in signers signed what it is now" ]]
+	incise sign signed.rec --key "$kim"
+	run -0 --separate-stderr incise verify signed.rec --signers signers
+	[[ "$output" == *", but not for what it is now, "*", all of it, "* ]]
+	sed -i 's/1111/1112/' signed.rec/calibration/*.conf
+	run -1 --separate-stderr incise verify signed.rec --signers signers
+}
+
+@test "links, pipes, huge files and strange names in the folder do no harm" {
+	sig=$(cd signed.rec/seal && echo 1.*.sig)
+	echo secret >target
+	ln -s "$PWD/target" signed.rec/seal/1.link.sig
+	not_vouched_file() {
+		run -1 --separate-stderr timeout 20 incise verify signed.rec --signers signers
+		[[ "$output" == *"$1"* ]] || complain "no '$1': $output"
+		rm -f "$2"
+	}
+	not_vouched_file "seal/1.link.sig: a link, which is not followed" signed.rec/seal/1.link.sig
+	mkfifo signed.rec/seal/1.pipe.sig
+	not_vouched_file "seal/1.pipe.sig: not a regular file" signed.rec/seal/1.pipe.sig
+	truncate -s 10G signed.rec/seal/1.huge.tsr
+	not_vouched_file "seal/1.huge.tsr: too large" signed.rec/seal/1.huge.tsr
+	head -c 3000 /dev/urandom >signed.rec/seal/1.noise.sig
+	not_vouched_file "seal/1.noise.sig: it is no signature of OpenSSH" signed.rec/seal/1.noise.sig
+	: >signed.rec/seal/1.empty.tsr
+	not_vouched_file "seal/1.empty.tsr: not valid: not a reply of RFC 3161" signed.rec/seal/1.empty.tsr
+	for name in $'1.\e[31m.sig' "1.a b.sig" -oProxyCommand=x.sig 0.x.sig 12345.x.sig 1.x.sig~; do
+		cp "signed.rec/seal/$sig" "signed.rec/seal/$name"
+	done
+	run -0 --separate-stderr incise verify signed.rec --signers signers
+	[ "$(grep -c "seal/\|signed by" <<<"$output")" = 1 ]
+
+	# nothing is written through a link
+	mkdir elsewhere
+	ln -s ../elsewhere a.rec/seal
+	run --separate-stderr incise sign a.rec --key "$kim"
+	failed_with "a.rec/seal: not a folder"
+	rm a.rec/seal
+	incise sign a.rec --key "$lee"
+	ln -s "$PWD/elsewhere/new" "a.rec/seal/$sig"
+	run --separate-stderr incise sign a.rec --key "$kim"
+	failed_with "a.rec/seal/$sig: "
+	[ -z "$(ls elsewhere)" ]
+}
+
+@test "time-stamps go to openssl and back, by files" {
+	run -0 --separate-stderr incise sign a.rec --key "$kim" --timestamp q.tsq
+	[[ "${lines[-1]}" == "wrote q.tsq, a.rec/seal/1.statement and a.rec/seal/1."*.sig ]]
+	openssl ts -query -in q.tsq -text 2>/dev/null | grep "Certificate required: yes"
+	stamp "$made/ca" q.tsq r.tsr
+	run -0 --separate-stderr incise sign a.rec --timestamp r.tsr
+	[[ "${lines[0]}" =~ ^"a.rec: time-stamped 20"[-0-9]+T[:0-9]+"Z by O=Lab, CN=Test TSA, all of it, statement of commit " ]]
+	openssl ts -verify -in a.rec/seal/1.*Z.tsr -data a.rec/seal/1.statement -CAfile "$made/ca/ca.pem"
+	run -0 --separate-stderr incise verify a.rec --signers signers --ca "$made/ca/ca.pem"
+	[[ "$output" == *"a.rec: time-stamped 20"*"Z by O=Lab, CN=Test TSA, all of it"* ]]
+	run -0 --separate-stderr incise verify a.rec --signers signers
+	[[ "$output" == *"by O=Lab, CN=Test TSA, not checked: give --ca FILE"* ]]
+
+	# one that openssl asked for itself
+	openssl ts -query -data a.rec/seal/1.statement -sha256 -cert -no_nonce -out own.tsq 2>/dev/null
+	stamp "$made/ca" own.tsq own.tsr
+	cp own.tsr a.rec/seal/1.own.tsr
+	incise verify a.rec --signers signers --ca "$made/ca/ca.pem"
+
+	# by a stranger; changed; for something else; refused; no reply
+	authority other
+	run --separate-stderr incise verify a.rec --signers signers --ca other/ca.pem
+	failed_with "a.rec: not everyone who vouches for it may"
+	[[ "$output" == *"not valid: not by an authority that is trusted: "* ]]
+	n=$(grep -obUa Lab own.tsr | tail -1)
+	printf 'Lob' | dd of=a.rec/seal/1.own.tsr bs=1 seek="${n%%:*}" conv=notrunc 2>/dev/null
+	run -1 --separate-stderr incise verify a.rec --signers signers --ca "$made/ca/ca.pem"
+	[[ "$output" == *"seal/1.own.tsr: not valid: "* ]]
+	run --separate-stderr incise sign "signed.rec" --timestamp r.tsr --overwrite
+	failed_with "r.tsr: a time-stamp for something else, not for this statement"
+	openssl ts -query -data signers -sha1 -out sha1.tsq 2>/dev/null
+	stamp "$made/ca" sha1.tsq sha1.tsr || :
+	run --separate-stderr incise sign a.rec --timestamp sha1.tsr
+	failed_with "sha1.tsr: the authority refused a time-stamp: "
+	cp q.tsq no.tsr
+	run --separate-stderr incise sign a.rec --timestamp no.tsr
+	failed_with "no.tsr: not a reply of RFC 3161"
+	run --separate-stderr incise verify a.rec --signers signers --ca signers
+	failed_with "signers: no certificate in it"
+}
+
+@test "a time-stamp says when a key had to be valid" {
+	incise sign a.rec --key "$kim" --timestamp q.tsq
+	stamp "$made/ca" q.tsq r.tsr
+	incise sign a.rec --timestamp r.tsr
+	# valid until the second after the time-stamp, which then passes
+	at=$(basename a.rec/seal/1.*Z.tsr .tsr)
+	at=${at#1.}
+	until=$(date -u -d "$(sed -E 's/(....)(..)(..)T(..)(..)(..)Z/\1-\2-\3 \4:\5:\6/' <<<"$at") UTC + 1 second" +%Y%m%d%H%M%SZ)
+	echo "kim@lab valid-before=\"$until\" $(cat "$kim.pub")" >signers
+	until [ "$(date -u +%Y%m%d%H%M%SZ)" \> "$until" ]; do sleep 0.1; done
+	run -1 --separate-stderr incise verify a.rec --signers signers
+	[[ "$output" == *"key has expired"* ]]
+	run -0 --separate-stderr incise verify a.rec --signers signers --ca "$made/ca/ca.pem"
+	[[ "$output" == *"signed by kim@lab"* ]]
+}
+
+@test "an authority answers over http; wrong answers and https are refused" {
+	python3 "$root/tests/cli/authority.py" "$made/ca/tsa.cnf" port 3>&- &
+	server=$!
+	until [ -s port ]; do sleep 0.02; done
+	at=http://127.0.0.1:$(cat port)
+	unset http_proxy HTTP_PROXY
+	incise sign a.rec --key "$kim" --timestamp "$at/tsr"
+	run -0 --separate-stderr incise verify a.rec --signers signers --ca "$made/ca/ca.pem"
+	[[ "$output" == *"time-stamped 20"* ]]
+	run --separate-stderr incise sign a.rec --timestamp "$at/old" --overwrite
+	failed_with "$at/old: the reply to another query: its nonce differs"
+	for path in large page; do
+		run --separate-stderr incise sign a.rec --timestamp "$at/$path"
+		failed_with "$at/$path: no time-stamp: "
+	done
+	run --separate-stderr incise sign a.rec --timestamp https://127.0.0.1/tsr
+	failed_with "https://127.0.0.1/tsr: https is not supported, and a time-stamp needs none"
+	run --separate-stderr incise sign a.rec --timestamp http://127.0.0.1:1/tsr
+	failed_with "http://127.0.0.1:1/tsr: no time-stamp: "
+}
+
+@test "an interrupted recording is signed up to its last commit, and one under way is not" {
+	incise capture -o p.rec --rig sim:clock=real 2>/dev/null >/dev/null 3>&- &
+	capture=$!
+	until [ -s p.rec.part/recording.db-wal ] && [ "$(stat -c %s p.rec.part/recording.db-wal)" -gt 200000 ]; do
+		sleep 0.05
+	done
+	run --separate-stderr incise sign p.rec.part --key "$kim"
+	failed_with "p.rec.part: another incise capture is writing it"
+	kill -KILL $capture
+	wait $capture || :
+	run -0 --separate-stderr incise sign p.rec --key "$kim"
+	[[ "${lines[0]}" == "p.rec.part: signed with ED25519 "*", up to where it was interrupted, statement of commit "* ]]
+	run -1 --separate-stderr incise verify p.rec --signers signers
+	[[ "$output" == *"p.rec.part: signed by kim@lab ("*"), all of it up to the interruption, statement of commit "* ]]
+	[[ "$stderr" == *"interrupted: its end is missing"* ]]
+}
+
+@test "each member of a joined recording is signed" {
+	for n in a b; do
+		incise capture -o $n.rec --rig sim:clock=simulated --duration 1s --overwrite \
+			--clock-source sim:1000,0,20 >/dev/null
+	done
+	incise join a.rec b.rec -o day.rec >/dev/null
+	run -0 --separate-stderr incise sign day.rec --key "$kim"
+	[ "$(grep -c "signed with" <<<"$output")" = 2 ]
+	run -0 --separate-stderr incise verify day.rec --signers signers
+	[[ "$output" == *"day.rec/a: signed by kim@lab "*"day.rec/b: signed by kim@lab "* ]]
+	rm -r day.rec/b/seal
+	run --separate-stderr incise verify day.rec --signers signers
+	failed_with "day.rec/b: not signed"
+}
