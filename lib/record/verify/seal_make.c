@@ -236,7 +236,7 @@ static size_t make_text(struct incise_recording *recording,
 
 char *incise_seal_statement(const char *path, struct incise_error *err)
 {
-	struct incise_recording *recording = incise_recording_open_any(path, err);
+	struct incise_recording *recording = incise_recording_open_original(path, err);
 	char text[INCISE_STATEMENT_MAX], *copy;
 	size_t n;
 	int code;
