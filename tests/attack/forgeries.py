@@ -569,6 +569,27 @@ def other_recording(recording, chance):
     return {"start"}, None
 
 
+def other_with_identity(recording, chance):
+    """And it has got the identity of this one."""
+    identity = recording.meta("identity")
+    other_recording(recording, chance)
+    recording.set_meta("identity", identity)
+    return {"start", "force"}, None
+
+
+def remove_seal(recording, chance):
+    recording.seal = []
+    return {"seal"}, None
+
+
+def downgrade(recording, chance):
+    """Made to look like a recording of format 3, which has no seal."""
+    db = sqlite3.connect(recording.path + "/recording.db")
+    db.executescript("DROP TABLE seal; ALTER TABLE frames DROP COLUMN sha256; PRAGMA user_version=3")
+    db.close()
+    return {"seal"}, None
+
+
 def other_seal(recording, chance):
     """The seal of another recording in the place of this one's."""
     recording.seal = Recording(sys.argv[3]).seal
@@ -631,10 +652,13 @@ FORGERIES = {
     "commit added": append_commit,
     "time of commit": time_of_commit,
     "another recording": other_recording,
+    "another, with this identity": other_with_identity,
     "another seal": other_seal,
+    "seal removed": remove_seal,
+    "format 3": downgrade,
 }
-# With all checksums right these leave the recording as it was.
-KEEP_SEAL = {"another seal"}
+# Nothing is recomputed after these.
+KEEP_SEAL = {"another seal", "seal removed", "format 3"}
 
 
 def statement(program, *arguments):
@@ -671,7 +695,8 @@ def main():
             recording.make_ledger()
         if level > 1 and kind not in KEEP_SEAL:
             recording.make_seal()
-        recording.save()
+        if kind != "format 3":
+            recording.save()
         if level > 1 and kind not in KEEP_SEAL:
             # Without a statement nothing could be found.
             status, own = statement(program, "forged.rec")
@@ -679,7 +704,7 @@ def main():
         status, text = statement(program, "forged.rec", "stated")
         lines = [line.split(" ", 3) for line in text.splitlines()]
         named = [line for line in lines if line[0] in parts]
-        if level < 2:
+        if level < 2 or kind in KEEP_SEAL:
             # The ledger names tables, streams and the file in words.
             named += [line for line in lines for part in parts if part in line[3]]
         placed = level < 2 or commit is None or any(

@@ -158,7 +158,8 @@ int incise_statement_make(struct incise_seal_statement *statement,
 	if (upto < 0)
 		upto = walk.last;
 	if (!rc && upto < 0)
-		rc = incise_error_set(err, ENODATA, "%s: has no commit", recording->path);
+		rc = incise_error_set(err, ENODATA, "%s: its seal has no commit",
+				      recording->path);
 	if (!rc)
 		rc = read_identity(recording, statement->identity, err);
 	if (!rc)

@@ -581,6 +581,13 @@ int incise_seal_compare(const char *path, const char *text, size_t length,
 	if (!recording)
 		return -errno;
 	rc = incise_seal_possible(recording, err);
+	/* Only form 4 has statements: another form is a forgery, or a mistake. */
+	if (rc == -ENODATA)
+		rc = incise_error_set(err, ENODATA,
+				      "%s: has format %d, which has no seal: it is not "
+				      "the recording of the statement, or its seal was "
+				      "removed",
+				      recording->path, recording->form);
 	incise_recording_close(recording);
 	if (!rc)
 		rc = incise_seal_read(&statement, text, length, err);

@@ -27,7 +27,7 @@
 /* Bytes of a row in the file, with its part of the pages; tests/unit/record/recorder.c. */
 #define FORCE_BYTES 18.0
 #define TRACKER_BYTES 180.0 /* with its row in table depth */
-#define FRAME_BYTES 110.0
+#define FRAME_BYTES 145.0
 /* Size of a frame in camera.mkv, an upper estimate. */
 #define FFV1_SHARE 0.75
 #define JPEG_BYTES_PIXEL 0.35
