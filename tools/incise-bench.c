@@ -50,9 +50,10 @@ static const struct cli_option options[] = {
 };
 
 static const struct bench *const benches[] = {
-	&bench_precision, &bench_training, &bench_stability, &bench_loop,
-	&bench_pose,	  &bench_timeline, &bench_vision,    &bench_capture,
-	&bench_serve,	  &bench_scenes,   &bench_integers,  &bench_extremes,
+	&bench_precision, &bench_training, &bench_prediction, &bench_stability,
+	&bench_loop,	  &bench_pose,	   &bench_timeline,   &bench_vision,
+	&bench_capture,	  &bench_serve,	   &bench_scenes,     &bench_integers,
+	&bench_extremes,
 };
 
 /* --- help --- */

@@ -11,6 +11,7 @@
 #include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/mapped_libraries.h"
+#include "cli/model_force.h"
 #include "cli/scene_argument.h"
 #include "cli/stopwatch.h"
 #include "cli/tick_cost.h"
@@ -25,6 +26,7 @@ struct job {
 	struct scene_argument scene;
 	const char *rig;
 	bool full, json;
+	const struct incise_scene *loaded;
 };
 
 static const struct cli_option options[] = {
@@ -186,12 +188,21 @@ static json_t *axes_json(struct incise_rig *rig, const struct incise_plan_stabil
 	return axes;
 }
 
+/* Of the model where the slowest of the hands comes to rest; false: not known. */
+static bool rest_force(const struct job *job, const struct incise_plan_stability *s,
+		       struct model_force *force)
+{
+	return s->support_mm > 0 &&
+	       model_force_at(job->loaded, s->worst.depth_mm, s->worst.along_mm_s, force);
+}
+
 static void report_json(const struct job *job, const struct incise_plan *plan,
 			struct incise_rig *rig, const struct tick_cost *cost)
 {
 	json_t *kept = json_array(), *stages = json_array(), *left = json_array();
 	json_t *mapped = mapped_libraries(0), *object;
 	struct incise_plan_stability stability;
+	struct model_force force;
 	const char *name, *why;
 
 	for (int i = 0; (name = incise_plan_stage(plan, i)); i++) {
@@ -220,6 +231,9 @@ static void report_json(const struct job *job, const struct incise_plan *plan,
 			 : json_pack("[ssss]", "tracker", "stepper", "force", "camera"),
 		"libraries", mapped, "unmapped_libraries", unmapped_libraries(mapped));
 	json_object_update_new(object, stability_json(&stability));
+	json_object_set_new(object, "rest",
+			    model_force_json(rest_force(job, &stability, &force) ? &force
+										 : NULL));
 	json_object_set_new(object, "model", model_json(plan, INCISE_CUT));
 	json_object_set_new(object, "puncture_model", model_json(plan, INCISE_PUNCTURE));
 	json_object_set_new(object, "withdraw_model", model_json(plan, INCISE_WITHDRAW));
@@ -253,9 +267,10 @@ static void print_model(const struct incise_plan_stability *s)
 	       s->noise_mm, s->noise_N);
 }
 
-static void print_stability(const struct incise_plan *plan)
+static void print_stability(const struct job *job, const struct incise_plan *plan)
 {
 	struct incise_plan_stability s;
+	struct model_force force;
 
 	incise_plan_stability(plan, &s);
 	printf("stability   %.4g N/mm of at most %.4g N/mm", s.stiffness_N_mm,
@@ -279,6 +294,10 @@ static void print_stability(const struct incise_plan *plan)
 		       encoder_N_mm(&s));
 	if (s.support_mm > 0)
 		print_model(&s);
+	if (rest_force(job, &s, &force)) {
+		fputs("            the model where that one rests: ", stdout);
+		model_force_print(stdout, &force);
+	}
 }
 
 /* For a person: at right angles to both, with -0 as 0. */
@@ -367,7 +386,7 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 		       stability.certified ? "certified" : "by estimated slopes");
 	putchar('\n');
 	print_evaluation(plan);
-	print_stability(plan);
+	print_stability(job, plan);
 	if (rig)
 		print_axes(rig, &stability);
 }
@@ -396,6 +415,7 @@ int main(int argc, char **argv)
 	cli_parse(&command, argc, argv, &job);
 	scene_argument_operand(&job.scene, argc, argv, optind);
 	scene = scene_argument_load(&job.scene);
+	job.loaded = scene;
 	incise_scene_set_full(scene, job.full);
 	if (job.rig) {
 		rig = cli_require(open_rig(job.rig, &err), &err);

@@ -188,11 +188,25 @@ static double pause_between(const struct incise_state_now *looks, int n)
 	return s;
 }
 
+/* The model of a loop's scene at its last tick, read by this program: the loop has no part in it. */
+static bool find_model(const struct incise_state_now *now, struct model_force *force)
+{
+	struct incise_scene *scene = now->ticks && *now->scene
+					     ? incise_scene_load(now->scene, NULL, NULL)
+					     : NULL;
+	bool found = scene && model_force_at(scene, now->tick.depth_mm,
+					     now->tick.velocity_mm_s, force);
+
+	incise_scene_free(scene);
+	return found;
+}
+
 static bool show_all(const struct state_pages *pages, bool json)
 {
 	struct incise_state_now *before = cli_alloc((size_t)pages->n, sizeof(*before));
 	struct incise_state_now *now = cli_alloc((size_t)pages->n, sizeof(*now));
 	json_t *list = json_array();
+	struct model_force force;
 	bool well = true;
 	double gap_s;
 
@@ -207,6 +221,8 @@ static bool show_all(const struct state_pages *pages, bool json)
 
 		state_pages_look(&pages->page[i], &now[i]);
 		state_look_since(&look, &before[i], gap_s);
+		if (find_model(&now[i], &force))
+			look.model = &force;
 		if (json)
 			json_array_append_new(list, state_report_json(&look));
 		else

@@ -73,6 +73,30 @@ train() {
 	holds "$(key three.json noise_N) < 0.95 * $(key none.json noise_N)"
 }
 
+@test "plan and status give the force of a model with its uncertainty" {
+	run_folder
+	train a.csv b.csv c.csv -o m.fis
+	printf 'model = "m.fis";\nlimits = { force_N = 2.0; };\n' >m.scene
+	incise plan m.scene --json >r.json
+	at="$(key r.json rest.depth_mm) $(key r.json rest.velocity_mm_s)"
+	[ "${at%% *}" = "$(key r.json worst.depth_mm)" ]
+	incise eval m.fis --sd --parts <<<"$at" >want
+	holds "($(key r.json rest.force_N) - $(cut -d' ' -f1 want))^2 < 1e-12"
+	holds "($(key r.json rest.sd_N) - $(cut -d' ' -f2 want))^2 < 1e-12"
+	holds "($(key r.json rest.sd_calibration_N) - $(cut -d' ' -f5 want))^2 < 1e-12"
+	incise plan m.scene | grep -q "the model where that one rests: .* N at .* mm and .* mm/s, u = .* N (data"
+	incise haptic m.scene --rig sim:clock=simulated --duration 1s --state m.state >/dev/null 2>&1
+	incise status ./m.state --json >s.json
+	incise eval m.fis --sd <<<"$(key s.json 'loops[0].depth_mm') $(key s.json 'loops[0].velocity_mm_s')" >want 2>/dev/null
+	holds "($(key s.json 'loops[0].model.sd_N') - $(cut -d' ' -f2 want))^2 < 1e-12"
+	incise status ./m.state | grep -q "^model      .* N at .* mm"
+	rm m.fis.sd
+	incise status ./m.state --json >s.json
+	[ -z "$(key s.json 'loops[0].model')" ]
+	incise plan m.scene --json >r.json
+	[ -z "$(key r.json rest)" ]
+}
+
 @test "what cannot carry uncertainties is refused, and what lacks them is named" {
 	train a.csv -o m.fis
 	for way in "--classic -o x.fis" "--premises m.fis --factor x.fac" "--mpi -o x.fis"; do
@@ -92,7 +116,7 @@ train() {
 	run --separate-stderr incise train late.csv --group cut -o y.fis
 	[[ "$stderr" == *"late.csv:9: column 6 (force_u_zero_N): nan is not finite"* ]]
 	incise capture -o r.rec --rig sim:clock=simulated,cut_s=2,pause_s=1 --duration 8s >/dev/null
-	run --separate-stderr incise train r.rec --uncertainty parts -o x.fis
+	run --separate-stderr incise train r.rec --uncertainty parts -o z.fis
 	failed_with "r.rec: the uncertainty of " "is not stated: "
 }
 

@@ -140,8 +140,8 @@ struct bench {
 };
 
 extern const struct bench bench_capture, bench_extremes, bench_integers, bench_loop,
-	bench_pose, bench_precision, bench_scenes, bench_serve, bench_stability,
-	bench_timeline, bench_training, bench_vision;
+	bench_pose, bench_precision, bench_prediction, bench_scenes, bench_serve,
+	bench_stability, bench_timeline, bench_training, bench_vision;
 
 /* --- a run --- */
 

@@ -202,6 +202,10 @@ static void ticks(FILE *out, const struct state_look *look)
 	fprintf(out,
 		"force      %.3f N now, %.3f N at most, limited in %" PRIu64 " ticks\n",
 		now->force_N, now->force_max_N, now->limited);
+	if (look->model) {
+		fputs("model      ", out);
+		model_force_print(out, look->model);
+	}
 	fprintf(out, "energy     %.2f mJ into the tissue, %.2f mJ back\n",
 		now->absorbed_mJ, now->returned_mJ);
 }
@@ -327,5 +331,6 @@ json_t *state_report_json(const struct state_look *look)
 	json_set_number(report, "mean_hz", mean_hz(now));
 	add_run_json(report, now);
 	add_tick_json(report, now);
+	json_object_set_new(report, "model", model_force_json(look->model));
 	return report;
 }

@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <jansson.h>
 #include <incise/state.h>
+#include "../cli/model_force.h"
 
 /* A reading of a loop's page, with changes since the one before. */
 struct state_look {
@@ -18,6 +19,8 @@ struct state_look {
 	double measured_hz; /* between the readings; NAN: not known */
 	double still_s;	    /* without a tick, over all readings */
 	bool stalled;	    /* it should tick, and did not for too long */
+	const struct model_force
+		*model; /* of its scene at the last tick; NULL: not known */
 };
 
 /* Set the changes since @before, @gap_s ago; @look->still_s goes on from its value. */
