@@ -42,7 +42,8 @@ static const struct cli_option options[] = {
 	{0, "profile", "STAGES",
 	 "scenes: run one test path of one scene for perf stat\nor callgrind, with its stages or with all: needed\nor full",
 	 CLI_PARSED(struct bench_run, profile, parse_profile)},
-	{0, "seed", "N", "extremes: seed of the cases (default: 1)",
+	{0, "seed", "N",
+	 "extremes: seed of the cases, coverage: of the rigs (default: 1)",
 	 CLI_PARSED(struct bench_run, seed, parse_seed)},
 	{0, "quick", NULL, "smoke test with fewer points and repeats",
 	 CLI_FLAG(struct bench_run, quick)},
@@ -53,7 +54,7 @@ static const struct bench *const benches[] = {
 	&bench_precision, &bench_training, &bench_prediction, &bench_stability,
 	&bench_loop,	  &bench_pose,	   &bench_timeline,   &bench_vision,
 	&bench_capture,	  &bench_serve,	   &bench_scenes,     &bench_integers,
-	&bench_extremes,
+	&bench_extremes,  &bench_coverage,
 };
 
 /* --- help --- */

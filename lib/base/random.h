@@ -20,6 +20,7 @@ enum incise_random_purpose {
 	INCISE_RANDOM_TRACKER,
 	INCISE_RANDOM_FORCE,
 	INCISE_RANDOM_CAMERA,
+	INCISE_RANDOM_STAMP,
 };
 
 /* The output function of splitmix64 (Steele, Lea, Flood 2014): every bit of x matters. */

@@ -74,6 +74,8 @@ static const struct key keys[] = {
 	KEY(KEY_DOUBLE, force_mV_N, 1240, 1, 100000),
 	KEY(KEY_DOUBLE, force_zero_mV, 180, -10000, 10000),
 	KEY(KEY_DOUBLE, force_noise_mV, 3, 0, 1000),
+	KEY(KEY_DOUBLE, force_delay_ms, 0, 0, 1000),
+	KEY(KEY_DOUBLE, force_jitter_ms, 0, 0, 10),
 	KEY(KEY_DOUBLE, camera_hz, 50, 1, 500),
 	/* The lower limit keeps the whole scalpel in the frame; see sim_camera.c. */
 	KEY(KEY_DOUBLE, camera_mm_px, 47.5 / 400, 0.118, 1),

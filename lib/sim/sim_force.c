@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * The virtual force channel: force on the blade → bridge, amplifier → 12-bit converter over 5 V,
- * in codes. On the bench the force is the actuator's. Samples lie on the exact grid n / force_hz.
+ * in codes. On the bench the force is the actuator's. Samples lie on the exact grid n / force_hz;
+ * their timestamps are later by a delay, and scatter.
  */
 #include <errno.h>
 #include <math.h>
@@ -19,7 +20,8 @@ struct sim_force {
 	struct incise_sim_stream stream;
 	struct incise_sim_ring ring;
 	struct incise_sim *sim;
-	uint64_t key;
+	uint64_t key, stamp_key;
+	int64_t stamp_ns;  /* the last one */
 	uint64_t n, first; /* next sample by the world's count; that of seq 0 */
 };
 
@@ -33,6 +35,19 @@ static int32_t code_of(double mV)
 	double code = round(mV / (FULL_SCALE_V * 1000) * (1 << BITS));
 
 	return (int32_t)fmax(0, fmin((1 << BITS) - 1, code));
+}
+
+/* Timestamps increase, and are not before the script's start. */
+static int64_t timestamp(struct sim_force *f, int64_t t_ns,
+			 const struct incise_sim_config *config)
+{
+	double ms = config->force_delay_ms;
+
+	if (config->force_jitter_ms > 0)
+		ms += config->force_jitter_ms * incise_random_normal(f->stamp_key, f->n);
+	t_ns += llround(fmax(ms, 0) * 1e6);
+	f->stamp_ns = t_ns > f->stamp_ns ? t_ns : f->stamp_ns + 1;
+	return f->stamp_ns;
 }
 
 static INCISE_REALTIME void sim_force_sample(struct incise_sim_stream *stream,
@@ -50,7 +65,7 @@ static INCISE_REALTIME void sim_force_sample(struct incise_sim_stream *stream,
 	else if (sim->press_N)
 		force_N = sim->press_N(sim->stepper, stream->t_ns);
 	sample = (struct incise_force_sample){
-		.t_ns = sim->start_ns + stream->t_ns,
+		.t_ns = timestamp(f, sim->start_ns + stream->t_ns, config),
 		.seq = f->n - f->first,
 		.code = code_of(config->force_zero_mV + force_N * config->force_mV_N +
 				config->force_noise_mV *
@@ -121,6 +136,8 @@ struct incise_force *incise_sim_force_new(struct incise_sim *sim)
 	f->force.ops = &ops;
 	f->sim = sim;
 	f->key = incise_random_key(sim->config.seed, INCISE_RANDOM_FORCE);
+	f->stamp_key = incise_random_key(sim->config.seed, INCISE_RANDOM_STAMP);
+	f->stamp_ns = INT64_MIN;
 	f->n = f->first = incise_sim_first(sim, hz);
 	f->stream.t_ns = incise_sim_time(f->n, hz);
 	f->stream.sample = sim_force_sample;

@@ -20,7 +20,7 @@ setup() {
 	r=$BATS_FILE_TMPDIR/r
 }
 
-benchmarks="precision training prediction stability pose timeline loop vision capture serve view scenes integers extremes"
+benchmarks="precision training prediction stability pose timeline coverage loop vision capture serve view scenes integers extremes"
 
 # A folder that is a report to incise bench all, of this JSON.
 report_of() {

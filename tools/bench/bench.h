@@ -139,9 +139,9 @@ struct bench {
 	struct bench_plot plots[5]; /* end with {0}; none: --plot is bad usage */
 };
 
-extern const struct bench bench_capture, bench_extremes, bench_integers, bench_loop,
-	bench_pose, bench_precision, bench_prediction, bench_scenes, bench_serve,
-	bench_stability, bench_timeline, bench_training, bench_vision;
+extern const struct bench bench_capture, bench_coverage, bench_extremes, bench_integers,
+	bench_loop, bench_pose, bench_precision, bench_prediction, bench_scenes,
+	bench_serve, bench_stability, bench_timeline, bench_training, bench_vision;
 
 /* --- a run --- */
 

@@ -83,10 +83,12 @@ struct incise_sim_config {
 	double tube_below_mm; /**< 10; lowest position below it */
 
 	/* Force channel. */
-	double force_hz;       /**< 10000 */
-	double force_mV_N;     /**< 1240 */
-	double force_zero_mV;  /**< 180; offset of the bridge times gain */
-	double force_noise_mV; /**< 3; sd */
+	double force_hz;	/**< 10000 */
+	double force_mV_N;	/**< 1240 */
+	double force_zero_mV;	/**< 180; offset of the bridge times gain */
+	double force_noise_mV;	/**< 3; sd */
+	double force_delay_ms;	/**< 0; of its timestamps, after the acquisition */
+	double force_jitter_ms; /**< 0; sd of its timestamps */
 
 	/* Camera. */
 	double camera_hz;    /**< 50 */

@@ -291,72 +291,102 @@ static double correlation_length(sqlite3_stmt *stmt, int n, double sd_codes)
 	return sum;
 }
 
-/* Variance of codes from second differences: the median of blocks, as a contact is no noise. */
-static double variance_of_blocks(sqlite3_stmt *stmt, uint64_t rows)
+/*
+ * Variances of codes and of times, ns², from second differences: the median of blocks, as a
+ * contact is no noise, and a lost sample no scatter of timestamps.
+ */
+static int variances_of_blocks(struct incise_recording *force, double *codes,
+			       double *times_ns2, struct incise_error *err)
 {
-	double variance[BLOCKS];
+	uint64_t rows = force->meta.force;
+	double variance[2][BLOCKS];
+	sqlite3_stmt *stmt;
 	int n = 0;
 
+	if (sqlite3_prepare_v2(force->db,
+			       "SELECT code, t_ns FROM force WHERE seq >= (SELECT "
+			       "min(seq) FROM force) + ? ORDER BY seq",
+			       -1, &stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(force->db, force->path, err);
 	for (int b = 0; b < BLOCKS && (uint64_t)b * BLOCK < rows; b++) {
-		double x[3] = {0}, sum = 0;
+		double x[2][3] = {{0}}, sum[2] = {0};
+		sqlite3_int64 first_ns = 0;
 		int m = 0;
 
 		sqlite3_reset(stmt);
 		sqlite3_bind_int64(stmt, 1, (sqlite3_int64)(rows / BLOCKS * (uint64_t)b));
 		for (; m < BLOCK && sqlite3_step(stmt) == SQLITE_ROW; m++) {
-			x[0] = x[1];
-			x[1] = x[2];
-			x[2] = sqlite3_column_double(stmt, 0);
-			if (m >= 2)
-				sum += pow(x[0] - 2 * x[1] + x[2], 2) / 6;
+			sqlite3_int64 t_ns = sqlite3_column_int64(stmt, 1);
+
+			if (!m)
+				first_ns = t_ns;
+			for (int k = 0; k < 2; k++) {
+				x[k][0] = x[k][1];
+				x[k][1] = x[k][2];
+				x[k][2] = k ? (double)t_ns - (double)first_ns
+					    : sqlite3_column_double(stmt, 0);
+				if (m >= 2)
+					sum[k] +=
+						pow(x[k][0] - 2 * x[k][1] + x[k][2], 2) /
+						6;
+			}
 		}
-		if (m > 2)
-			variance[n++] = sum / (m - 2);
+		for (int k = 0; k < 2 && m > 2; k++)
+			variance[k][n] = sum[k] / (m - 2);
+		n += m > 2;
 	}
-	return n ? median(variance, n) : NAN;
+	sqlite3_finalize(stmt);
+	*codes = n ? median(variance[0], n) : NAN;
+	*times_ns2 = n ? median(variance[1], n) : NAN;
+	return 0;
 }
 
-/* Noise of the force, and the zero if the recording measured it. */
+/* The zero that the recording has measured, and how many of its samples count as one. */
+static int measure_zero(struct incise_budget *budget, struct incise_recording *force,
+			double sd_mV, double samples, double step_mV, bool used,
+			struct incise_error *err)
+{
+	sqlite3_stmt *stmt;
+	double u_mV;
+
+	if (sqlite3_prepare_v2(force->db, "SELECT code FROM force ORDER BY seq LIMIT ?",
+			       -1, &stmt, NULL) != SQLITE_OK)
+		return incise_schema_fail(force->db, force->path, err);
+	budget->samples = correlation_length(stmt, (int)fmin(samples, ZERO_ROWS_MAX),
+					     sd_mV / step_mV);
+	sqlite3_finalize(stmt);
+	u_mV = sd_mV * sqrt(budget->samples / samples);
+	/* Noise of half a code and more makes means finer than a code. */
+	if (sd_mV < step_mV / 2)
+		u_mV = hypot(u_mV, step_mV / sqrt(12));
+	if (used)
+		set(budget, INCISE_BUDGET_ZERO, u_mV);
+	return 0;
+}
+
+/* Noise of the force and of its timestamps, and the zero if the recording measured it. */
 static int measure_force(struct incise_budget *budget, struct incise_recording *force,
 			 bool measured, struct incise_error *err)
 {
 	const struct incise_recording_info *meta = &force->meta;
 	double step_mV = meta->full_scale_V * 1e3 / (double)(1LL << meta->bits);
-	double sd_mV, samples, length, variance, u_mV;
-	sqlite3_stmt *stmt = NULL;
+	double sd_mV, samples, variance = NAN, times_ns2 = NAN;
 	int rc = incise_recording_number(force, "force_zero_sd_mV", &sd_mV, err);
 
 	if (!rc)
 		rc = incise_recording_number(force, "force_zero_samples", &samples, err);
-	if (rc)
-		return rc;
-	if (sqlite3_prepare_v2(force->db,
-			       isnan(sd_mV)
-				       ? "SELECT code FROM force WHERE seq >= (SELECT "
-					 "min(seq) FROM force) + ? ORDER BY seq"
-				       : "SELECT code FROM force ORDER BY seq LIMIT ?",
-			       -1, &stmt, NULL) != SQLITE_OK)
-		return incise_schema_fail(force->db, force->path, err);
-	if (isnan(sd_mV)) {
-		variance = variance_of_blocks(stmt, meta->force) * step_mV * step_mV;
-	} else {
-		length = correlation_length(stmt, (int)fmin(samples, ZERO_ROWS_MAX),
-					    sd_mV / step_mV);
-		variance = sd_mV * sd_mV;
-		u_mV = sd_mV * sqrt(length / samples);
-		/* Noise of half a code and more makes means finer than a code. */
-		if (sd_mV < step_mV / 2)
-			u_mV = hypot(u_mV, step_mV / sqrt(12));
-		if (measured)
-			set(budget, INCISE_BUDGET_ZERO, u_mV);
-		budget->samples = length;
-	}
-	sqlite3_finalize(stmt);
+	if (!rc)
+		rc = variances_of_blocks(force, &variance, &times_ns2, err);
+	if (!rc && !isnan(sd_mV) && samples >= 1)
+		rc = measure_zero(budget, force, sd_mV, samples, step_mV, measured, err);
+	/* At rest slow noise shows too. */
+	variance = isnan(sd_mV) ? variance * step_mV * step_mV : sd_mV * sd_mV;
 	/* The codes' variance has that of their last digit. */
 	budget->resolution_N = step_mV / sqrt(12) / fabs(budget->mV_N);
 	budget->noise_N =
 		sqrt(fmax(0, variance - step_mV * step_mV / 12)) / fabs(budget->mV_N);
-	return 0;
+	budget->jitter_s = sqrt(times_ns2) * 1e-9;
+	return rc;
 }
 
 static int find_force(struct incise_budget *budget, const struct use *use,
@@ -498,20 +528,16 @@ static int find_times(struct incise_budget *budget, const struct use *use,
 	int n = incise_recording_streams(recording, streams, err);
 
 	incise_calibration_nominal(&none);
-	budget->jitter_s = NAN;
 	for (int i = 0; i < n; i++) {
 		incise_recalibration_stream(
 			!strcmp(streams[i].name, "force") ? use->force : use->tracker,
 			&streams[i]);
-		if (!strcmp(streams[i].name, "force")) {
+		if (!strcmp(streams[i].name, "force"))
 			force_s = delay_sd_s(&streams[i], given->force_delay_ms,
 					     given->force_delay_sd_ms);
-			if (streams[i].timestamped)
-				budget->jitter_s = streams[i].jitter_ms * 1e-3;
-		} else if (!strcmp(streams[i].name, "tracker")) {
+		else if (!strcmp(streams[i].name, "tracker"))
 			tracker_s = delay_sd_s(&streams[i], given->tracker_delay_ms,
 					       given->tracker_delay_sd_ms);
-		}
 	}
 	if (against(stating(use, &use->of_tracker, given->tracker_delay_ms),
 		    "tracker_delay_ms", "force_delay_ms")) {
@@ -743,7 +769,7 @@ struct incise_budget *incise_budget_open(struct incise_recording *recording,
 		for (int k = 0; k < INCISE_BUDGET_SOURCES; k++)
 			budget->covariance[i][k] = i == k ? NAN : 0;
 	}
-	budget->noise_N = budget->resolution_N = NAN;
+	budget->noise_N = budget->resolution_N = budget->jitter_s = NAN;
 	budget->samples = 1;
 	rc = read_own(use.force, &use.of_force, err);
 	if (!rc)

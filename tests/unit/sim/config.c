@@ -33,6 +33,7 @@ static void defaults_are_those_of_the_header(void **state)
 	assert_true(c.tracker_drift_ppm == 50 && c.force_hz == 10000 &&
 		    c.force_mV_N == 1240);
 	assert_true(c.force_zero_mV == 180 && c.force_noise_mV == 3 && c.camera_hz == 50);
+	assert_true(c.force_delay_ms == 0 && c.force_jitter_ms == 0);
 	assert_true(c.camera_mm_px == 0.11875 && c.spring_N_mm == 2 && c.lead_mm == 2);
 	assert_int_equal(c.steps_per_turn, 3200);
 	assert_true(c.travel_mm == 20 && c.screw_mm_s == 30 && c.screw_mm_s2 == 3000);
