@@ -97,6 +97,23 @@ train() {
 	[ -z "$(key r.json rest)" ]
 }
 
+@test "figures of models and of pairs have bands" {
+	train a.csv b.csv c.csv -o m.fis
+	incise plot m.fis -o m.svg
+	for text in "95 % intervals" "a new cut on a new rig" "the model" output; do
+		grep -q ">\(<!\[CDATA\[\)\?$text" m.svg || complain "no '$text'"
+	done
+	rm m.fis.sd
+	incise plot m.fis -o plain.svg
+	run ! grep -q "95 % intervals" plain.svg
+	awk -F, -v OFS=, '{ print $0, NR == 1 ? "force_u_N" : 0.02 * $4 + 0.01 }' a.csv >u.csv
+	incise plot u.csv -o u.svg
+	grep -q "95 % by the uncertainty" u.svg
+	sed '2,$s/,[^,]*$/,nan/' u.csv >nan.csv
+	incise plot nan.csv -o nan.svg
+	run ! grep -q "95 % by the uncertainty" nan.svg
+}
+
 @test "what cannot carry uncertainties is refused, and what lacks them is named" {
 	train a.csv -o m.fis
 	for way in "--classic -o x.fis" "--premises m.fis --factor x.fac" "--mpi -o x.fis"; do

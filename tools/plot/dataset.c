@@ -23,10 +23,10 @@
 #define KEYS_MOST 8	 /* cuts with a colour and a key of their own */
 
 /* Columns, as they are read. */
-enum { FORCE, DEPTH, VELOCITY, SD, COLUMNS };
+enum { FORCE, DEPTH, VELOCITY, SD, UNCERTAINTY, COLUMNS };
 
-static const char *const names[COLUMNS] = {"force_N", "depth_mm", "velocity_mm_s",
-					   "sd_N"};
+static const char *const names[COLUMNS] = {"force_N", "depth_mm", "velocity_mm_s", "sd_N",
+					   "force_u_N"};
 
 struct table {
 	struct incise_dataset *data;
@@ -79,7 +79,7 @@ static void read_table(struct table *table, const char *path)
 	const char *columns[COLUMNS];
 	char *header = read_header(path);
 	struct incise_error err = {0};
-	int n = 0;
+	int n = 0, last;
 
 	for (int i = 0; i < COLUMNS; i++) {
 		bool there = i < VELOCITY || has(header, names[i]);
@@ -94,10 +94,18 @@ static void read_table(struct table *table, const char *path)
 	else if (has(header, "advancing"))
 		table->where = "advancing";
 	table->group = has(header, "cut") ? "cut" : NULL;
-	table->data = cli_require(incise_dataset_read_where(path, columns, n,
-							    table->group, table->where,
-							    &table->left_out, &err),
-				  &err);
+	last = table->column[UNCERTAINTY];
+	table->data = incise_dataset_read_where(path, columns, n, table->group,
+						table->where, &table->left_out, &err);
+	/* One that is not stated is nan, which is no number of a dataset. */
+	if (!table->data && last >= 0) {
+		table->column[UNCERTAINTY] = -1;
+		table->data = cli_require(
+			incise_dataset_read_where(path, columns, n - 1, table->group,
+						  table->where, &table->left_out, &err),
+			&err);
+	}
+	cli_require(table->data, &err);
 	table->n = incise_dataset_rows(table->data);
 	free(header);
 }
@@ -123,7 +131,13 @@ static void find_ranges(struct table *table)
 					    incise_dataset_group(table->data, i) + 1);
 }
 
-/* Columns x, force, its SD or 0, the cut from 1; as many as there are places in each cut. */
+/* 0: not known. */
+static double uncertainty(const struct table *table, size_t row)
+{
+	return table->column[UNCERTAINTY] < 0 ? 0 : value(table, row, UNCERTAINTY);
+}
+
+/* Columns x, force, its SD or 0, the cut from 1, its uncertainty or 0; as many as there are places in each cut. */
 static void write_rows(const struct table *table, int over, const char *folder,
 		       const char *name)
 {
@@ -140,8 +154,9 @@ static void write_rows(const struct table *table, int over, const char *folder,
 		double x = value(table, i, over), force = value(table, i, FORCE);
 
 		if (scatter_takes(&scatter[k], x, force))
-			fprintf(data, "%.6g %.6g %.6g %d\n", x, force,
-				table->column[SD] < 0 ? 0 : value(table, i, SD), k + 1);
+			fprintf(data, "%.6g %.6g %.6g %d %.6g\n", x, force,
+				table->column[SD] < 0 ? 0 : value(table, i, SD), k + 1,
+				uncertainty(table, i));
 	}
 	for (int k = 0; k < n; k++)
 		scatter_end(&scatter[k]);
@@ -172,7 +187,7 @@ static void write_bins(const struct table *table, int over, const char *folder,
 		       const char *name)
 {
 	double low = table->low[over], width = (table->high[over] - low) / BINS;
-	struct moments bin[BINS] = {{0}}, at[BINS] = {{0}};
+	struct moments bin[BINS] = {{0}}, at[BINS] = {{0}}, u[BINS] = {{0}};
 	FILE *data = plot_data(folder, name);
 
 	for (size_t i = 0; i < table->n; i++) {
@@ -182,11 +197,12 @@ static void write_bins(const struct table *table, int over, const char *folder,
 
 		add(&bin[k], value(table, i, FORCE));
 		add(&at[k], x);
+		add(&u[k], uncertainty(table, i));
 	}
 	for (int k = 0; k < BINS; k++)
 		if (bin[k].n)
-			fprintf(data, "%.6g %.6g %.6g\n", at[k].mean, bin[k].mean,
-				sd(&bin[k]));
+			fprintf(data, "%.6g %.6g %.6g %.6g\n", at[k].mean, bin[k].mean,
+				sd(&bin[k]), u[k].mean);
 	plot_data_end(data, folder);
 }
 
@@ -208,18 +224,29 @@ static void put_panel(FILE *script, const struct table *table, int over, const c
 		      const char *bins)
 {
 	bool averaged = table->column[SD] >= 0;
+	bool stated = table->column[UNCERTAINTY] >= 0;
 	int n = table->n_groups;
 
 	fputs("set xlabel ", script);
 	plot_put_label(script, names[over]);
-	fputs("\nset ylabel 'force / N'\n", script);
+	fputs("\nset ylabel 'force / N'\nplot ", script);
+	/* Of single values; what is common to all does not average out. */
+	if (stated && bins)
+		fprintf(script,
+			"'%s' using 1:($2-1.96*$4):($2+1.96*$4) with filledcurves lc rgb "
+			"blue fs transparent solid 0.25 noborder title '95 %% by the "
+			"uncertainty', \\\n  ",
+			bins);
+	else if (stated)
+		fprintf(script,
+			"'%s' using 1:2:(1.96*$5) with yerrorbars lc rgb blue pt 0 title "
+			"'95 %% by the uncertainty', \\\n  ",
+			rows);
 	if (averaged)
 		fprintf(script,
-			"plot '%s' using 1:2:3 with yerrorbars lc rgb grey pt 0 title "
+			"'%s' using 1:2:3 with yerrorbars lc rgb grey pt 0 title "
 			"'SD in the bin', \\\n  ",
 			rows);
-	else
-		fputs("plot ", script);
 	if (n > 1 && n <= KEYS_MOST)
 		fprintf(script,
 			"for [k=1:%d] '%s' using 1:($4==k?$2:NaN) with points lt k pt 7 ps "

@@ -5,6 +5,7 @@
  *
  *     ┌─ functions ──┬─ functions ──┐   of a .fis
  *     ├─ surface ────┼─ contours ───┤
+ *     ├─ band ───────┼─ band ───────┤   over the first two inputs, with MODEL.fis.sd
  *     ├─ residuals ──┼─ quantiles ──┤   with --data
  *     └──────────────┴──────────────┘
  */
@@ -12,6 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/dataset.h>
+#include <incise/uncertainty.h>
 #include "../cli/cli.h"
 #include "../cli/model_plot.h"
 #include "../cli/plot.h"
@@ -19,6 +21,7 @@
 
 #define FUNCTIONS_HEIGHT 280
 #define SURFACE_HEIGHT 500
+#define BAND_HEIGHT 360
 #define RESIDUALS_HEIGHT 400
 
 #define QUANTILES 400
@@ -28,7 +31,7 @@ struct grid {
 	FILE *script;
 	int height, top; /* pixels */
 	/* Files of data, of this figure alone: another one may be in its folder. */
-	const char *functions, *surface, *residuals, *quantiles;
+	const char *functions, *surface, *bands[2], *residuals, *quantiles;
 };
 
 /* The next row of that height has panels of half the figure's width, or of all of it. */
@@ -163,6 +166,65 @@ static void put_residuals(struct grid *grid, const struct model_surface *surface
 		sqrt(fmax(0, r->rms * r->rms - r->mean * r->mean)));
 }
 
+/* --- bands ----------------------------------------------------------------------------- */
+
+#define BAND_POINTS 200
+
+/* The uncertainty next to a model, or NULL. */
+static struct incise_uncertainty *uncertainty_of(const char *path,
+						 const struct incise_model *model)
+{
+	char *sd = cli_text("%s.sd", path);
+	struct incise_uncertainty *uncertainty = incise_uncertainty_load(sd, model, NULL);
+
+	free(sd);
+	return uncertainty;
+}
+
+/* Input, output, half the 95 % interval of all parts and of all but the data's scatter. */
+static void write_band(const struct incise_model *model,
+		       const struct incise_uncertainty *uncertainty, int input,
+		       const char *folder, const char *name)
+{
+	const struct incise_model_info *info = incise_model_info(model);
+	FILE *data = plot_data(folder, name);
+	double x[INCISE_MODEL_INPUTS_MAX];
+
+	for (int i = 0; i < info->n_inputs; i++)
+		x[i] = info->input[i].min + (info->input[i].max - info->input[i].min) / 2;
+	for (int k = 0; k <= BAND_POINTS; k++) {
+		const struct incise_variable *v = &info->input[input];
+		struct incise_uncertainty_parts u;
+
+		x[input] = v->min + (v->max - v->min) * k / BAND_POINTS;
+		incise_uncertainty_parts(uncertainty, model, x, &u);
+		fprintf(data, "%.6g %.6g %.6g %.6g\n", x[input],
+			incise_model_eval(model, x, NULL), INCISE_INTERVAL95 * u.total,
+			INCISE_INTERVAL95 * hypot(u.model, u.calibration));
+	}
+	plot_data_end(data, folder);
+}
+
+/* Over one of the inputs; the others are at the middle of their support. */
+static void put_band(struct grid *grid, const struct model_surface *surface, int input,
+		     int columns)
+{
+	place(grid, input, columns, BAND_HEIGHT);
+	fputs("set key inside top left\nset xrange [*:*]\nset yrange [*:*]\n"
+	      "set title '95 % intervals'\nset xlabel ",
+	      grid->script);
+	plot_put_label(grid->script, surface->input[input].name);
+	fputs("\nset ylabel ", grid->script);
+	plot_put_label(grid->script, surface->output.name);
+	fprintf(grid->script,
+		"\nplot '%s' using 1:($2-$3):($2+$3) with filledcurves lc rgb blue fs "
+		"transparent solid 0.2 noborder title 'a new cut on a new rig', \\\n  "
+		"'' using 1:($2-$4):($2+$4) with filledcurves lc rgb blue fs transparent "
+		"solid 0.4 noborder title 'the model', \\\n  "
+		"'' using 1:2 with lines lc rgb ink title 'output'\n",
+		grid->bands[input]);
+}
+
 /* --- the figure -------------------------------------------------------------------------- */
 
 static void put_surface(struct grid *grid, const struct model_surface *surface)
@@ -186,17 +248,22 @@ static void put_surface(struct grid *grid, const struct model_surface *surface)
 	model_plot_contours(grid->script, surface, grid->surface, title);
 }
 
-/* @model NULL: of a compiled one the functions are not known. */
+/* @model NULL: of a compiled one the functions are not known; @uncertainty NULL: none. */
 static FILE *draw(const struct figure *figure, const struct model_surface *surface,
-		  const struct incise_model *model)
+		  const struct incise_model *model,
+		  const struct incise_uncertainty *uncertainty)
 {
 	int n = model ? surface->n_inputs : 0, columns = n > 1 ? 2 : 1;
 	int rows = (n + columns - 1) / columns;
+	int bands = uncertainty ? columns : 0;
 	struct residuals residuals = {0};
 	struct grid grid = {
-		.height = rows * FUNCTIONS_HEIGHT + SURFACE_HEIGHT,
+		.height = rows * FUNCTIONS_HEIGHT + SURFACE_HEIGHT +
+			  (bands ? BAND_HEIGHT : 0),
 		.functions = cli_text("%s-functions.dat", figure->name),
 		.surface = cli_text("%s-surface.dat", figure->name),
+		.bands = {cli_text("%s-band.dat", figure->name),
+			  cli_text("%s-band-2.dat", figure->name)},
 		.residuals = cli_text("%s-residuals.dat", figure->name),
 		.quantiles = cli_text("%s-quantiles.dat", figure->name),
 	};
@@ -210,6 +277,8 @@ static FILE *draw(const struct figure *figure, const struct model_surface *surfa
 	if (model)
 		model_plot_write_functions(model, figure->folder, grid.functions);
 	model_plot_write_surface(surface, figure->folder, grid.surface);
+	for (int i = 0; i < bands; i++)
+		write_band(model, uncertainty, i, figure->folder, grid.bands[i]);
 	grid.script = plot_begin(figure->folder, figure->name, FIGURE_WIDTH, grid.height);
 	fputs("set multiplot\nset key outside right center\n", grid.script);
 	for (int i = 0; i < n; i++) {
@@ -219,6 +288,8 @@ static FILE *draw(const struct figure *figure, const struct model_surface *surfa
 	if (n % columns)
 		grid.top += FUNCTIONS_HEIGHT;
 	put_surface(&grid, surface);
+	for (int i = 0; i < bands; i++)
+		put_band(&grid, surface, i, bands);
 	if (figure->data)
 		put_residuals(&grid, surface, &residuals);
 	fputs("unset multiplot\n", grid.script);
@@ -232,7 +303,10 @@ FILE *figure_of_model(const struct figure *figure)
 	struct incise_model *model =
 		cli_require(incise_model_load(figure->path, &err), &err);
 	struct model_surface surface = model_surface_of(model);
-	FILE *script = draw(figure, &surface, model);
+	struct incise_uncertainty *uncertainty = uncertainty_of(figure->path, model);
+	FILE *script = draw(figure, &surface, model, uncertainty);
+
+	incise_uncertainty_free(uncertainty);
 
 	incise_model_free(model);
 	return script;
@@ -244,7 +318,7 @@ FILE *figure_of_compiled(const struct figure *figure)
 	struct incise_fixed *fixed =
 		cli_require(incise_fixed_load(figure->path, &err), &err);
 	struct model_surface surface = model_surface_of_fixed(fixed);
-	FILE *script = draw(figure, &surface, NULL);
+	FILE *script = draw(figure, &surface, NULL, NULL);
 
 	incise_fixed_free(fixed);
 	return script;
