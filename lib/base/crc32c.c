@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * CRC32C, a byte at a time; see crc32c.h. A table by itself is enough: 10 kHz of force are
- * 0.24 MB/s, and it takes some 400 MB/s.
+ * CRC32C; see crc32c.h. A table by itself is enough to record: 10 kHz of force are 0.24 MB/s, and
+ * it takes some 400 MB/s. To verify a recording of hours, the instruction of x86 is used where it
+ * is there, which takes ten times as many.
  */
+#include <string.h>
 #include "crc32c.h"
 
 /* The remainder of each byte; polynomial 0x1edc6f41, bits reversed: 0x82f63b78. */
@@ -52,7 +54,7 @@ static const uint32_t table[256] = {
 	0xbe2da0a5, 0x4c4623a6, 0x5f16d052, 0xad7d5351,
 };
 
-uint32_t incise_crc32c(uint32_t crc, const void *bytes, size_t n)
+uint32_t incise_crc32c_by_table(uint32_t crc, const void *bytes, size_t n)
 {
 	const uint8_t *byte = bytes;
 
@@ -60,4 +62,31 @@ uint32_t incise_crc32c(uint32_t crc, const void *bytes, size_t n)
 	for (size_t i = 0; i < n; i++)
 		crc = crc >> 8 ^ table[(crc ^ byte[i]) & 0xff];
 	return ~crc;
+}
+
+#ifdef __x86_64__
+__attribute__((target("sse4.2"))) static uint32_t by_instruction(uint32_t crc,
+								 const uint8_t *byte,
+								 size_t n)
+{
+	uint64_t sum = ~crc, eight;
+
+	for (; n >= 8; n -= 8, byte += 8) {
+		memcpy(&eight, byte, 8);
+		sum = __builtin_ia32_crc32di(sum, eight);
+	}
+	crc = (uint32_t)sum;
+	for (; n; n--)
+		crc = __builtin_ia32_crc32qi(crc, *byte++);
+	return ~crc;
+}
+#endif
+
+uint32_t incise_crc32c(uint32_t crc, const void *bytes, size_t n)
+{
+#ifdef __x86_64__
+	if (__builtin_cpu_supports("sse4.2"))
+		return by_instruction(crc, bytes, n);
+#endif
+	return incise_crc32c_by_table(crc, bytes, n);
 }

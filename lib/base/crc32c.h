@@ -16,4 +16,7 @@
  */
 uint32_t incise_crc32c(uint32_t crc, const void *bytes, size_t n);
 
+/* The same on any processor: that of those without an instruction for it. */
+uint32_t incise_crc32c_by_table(uint32_t crc, const void *bytes, size_t n);
+
 #endif

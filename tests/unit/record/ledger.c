@@ -52,14 +52,21 @@ static const struct incise_frame_record frame = {
 	.sd_px = 2.5,
 	.depth_mm = NAN,
 	.quality = 0.5,
+	.sha256 = "01234567890123456789012345678901",
 };
 
 /* 1.5, 2.5, NaN and 0.5: 3ff8…, 4004…, 7ff8…, 3fe0… */
 static const uint8_t frame_bytes[] = {
-	1, 0, 0, 0,    0, 0, 0, 0, 2, 0, 0,    0,    0, 0, 0,	 0,    3, 0, 0,	   0,
-	0, 0, 0, 0,    4, 0, 0, 0, 0, 0, 0,    0,    5, 0, 0,	 0,    0, 0, 0,	   0,
-	6, 0, 0, 0,    0, 0, 0, 0, 0, 0, 0,    0,    0, 0, 0xf8, 0x3f, 0, 0, 0,	   0,
-	0, 0, 4, 0x40, 0, 0, 0, 0, 0, 0, 0xf8, 0x7f, 0, 0, 0,	 0,    0, 0, 0xe0, 0x3f};
+	1,    0,    0,	 0,   0,   0,	0,   0,	   2,	 0,    0,   0,	 0,    0,
+	0,    0,    3,	 0,   0,   0,	0,   0,	   0,	 0,    4,   0,	 0,    0,
+	0,    0,    0,	 0,   5,   0,	0,   0,	   0,	 0,    0,   0,	 6,    0,
+	0,    0,    0,	 0,   0,   0,	0,   0,	   0,	 0,    0,   0,	 0xf8, 0x3f,
+	0,    0,    0,	 0,   0,   0,	4,   0x40, 0,	 0,    0,   0,	 0,    0,
+	0xf8, 0x7f, 0,	 0,   0,   0,	0,   0,	   0xe0, 0x3f, '0', '1', '2',  '3',
+	'4',  '5',  '6', '7', '8', '9', '0', '1',  '2',	 '3',  '4', '5', '6',  '7',
+	'8',  '9',  '0', '1', '2', '3', '4', '5',  '6',	 '7',  '8', '9', '0',  '1'};
+
+#define DIGEST "x'3031323334353637383930313233343536373839303132333435363738393031'"
 
 static void rows_are_these_bytes(void **state)
 {
@@ -107,11 +114,21 @@ static void read_from_SQLite(void **state)
 		{INCISE_LEDGER_FORCE, "1, 2, 3.5", 0},
 		{INCISE_LEDGER_FORCE, "1, 'x', 3", 0},
 		{INCISE_LEDGER_FORCE, "1, 2, NULL", 0},
-		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, 5, 6, NULL, NULL, NULL, NULL", 80},
-		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, 5, 6, 1.5, 2.5, NULL, 0.5",
+		{INCISE_LEDGER_CAMERA,
+		 "1, 2, 3, 4, 5, 6, NULL, NULL, NULL, NULL, " DIGEST, 112},
+		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, 5, 6, 1.5, 2.5, NULL, 0.5, " DIGEST,
 		 sizeof(frame_bytes)},
-		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, 5, NULL, 1.5, 2.5, NULL, 0.5", 0},
-		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, 5, 6, 1.5, 2.5, 'x', 0.5", 0},
+		{INCISE_LEDGER_CAMERA,
+		 "1, 2, 3, 4, 5, NULL, 1.5, 2.5, NULL, 0.5, " DIGEST, 0},
+		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, 5, 6, 1.5, 2.5, 'x', 0.5, " DIGEST,
+		 0},
+		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, 5, 6, 1.5, 2.5, NULL, 0.5, NULL", 0},
+		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, 5, 6, 1.5, 2.5, NULL, 0.5, x'00'", 0},
+		{INCISE_LEDGER_CAMERA, "1, 2, 3, 4, 5, 6, 1.5, 2.5, NULL, 0.5, x''", 0},
+		{INCISE_LEDGER_CAMERA,
+		 "1, 2, 3, 4, 5, 6, 1.5, 2.5, NULL, 0.5, "
+		 "'01234567890123456789012345678901'",
+		 0},
 	};
 	static const uint8_t null[] = {0, 0, 0, 0, 0, 0, 0xf8, 0x7f};
 	sqlite3 *db;

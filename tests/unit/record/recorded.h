@@ -40,16 +40,16 @@ __attribute__((unused)) static int remove_entry(const char *path, const struct s
 }
 
 /* Makes a recording of form 1, from before the ledger, of one of today. */
-#define TO_FORM_1                                                                      \
-	"CREATE TABLE old AS SELECT * FROM tracker; DROP TABLE tracker; "              \
-	"CREATE TABLE tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "        \
-	"arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, "        \
-	"z_mm REAL NOT NULL, qw REAL NOT NULL, qx REAL NOT NULL, "                     \
-	"qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL); "                  \
-	"INSERT INTO tracker SELECT seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, " \
-	"qy, qz, status FROM old; DROP TABLE old; DROP TABLE frames; "                 \
-	"DROP TABLE streams; DROP TABLE knots; DROP TABLE ledger; DROP TABLE wall; "   \
-	"DROP TABLE seal; PRAGMA user_version=1"
+#define TO_FORM_1                                                                        \
+	"CREATE TABLE old AS SELECT * FROM tracker; DROP TABLE tracker; "                \
+	"CREATE TABLE tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "          \
+	"arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, "          \
+	"z_mm REAL NOT NULL, qw REAL NOT NULL, qx REAL NOT NULL, "                       \
+	"qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL); "                    \
+	"INSERT INTO tracker SELECT seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, "   \
+	"qy, qz, status FROM old; DROP TABLE old; DROP TABLE frames; "                   \
+	"DROP TABLE streams; DROP TABLE knots; DROP TABLE ledger; DROP TABLE IF EXISTS " \
+	"wall; DROP TABLE IF EXISTS seal; PRAGMA user_version=1"
 
 /* Makes one of form 3, from before the seal. */
 #define TO_FORM_3                                                  \
