@@ -201,7 +201,7 @@ static void print_table(const struct incise_verify_report *report, const char *p
 		       (unsigned long long)report->frames.altered,
 		       (unsigned long long)report->frames.extra);
 	if (report->sealed)
-		printf("%-8s a chain of %llu commits\n", "seal",
+		printf("%-8s %llu commits, chained\n", "seal",
 		       (unsigned long long)report->commits);
 	else if (!report->commits)
 		printf("%-8s none: made by an older incise\n", "seal");

@@ -36,7 +36,7 @@ setup() {
 		[[ "$(incise verify $form.rec)" == *"seal     none: made by an older incise"* ]]
 		[ "$(incise verify --json $form.rec | grep -c '"sealed": false')" -eq 1 ]
 	done
-	[[ "$(incise verify 4.rec)" == *"seal     a chain of 21 commits"* ]]
+	[[ "$(incise verify 4.rec)" == *"seal     21 commits, chained"* ]]
 	for form in 1 2 3 4; do
 		incise info --json $form.rec >info.json
 		[ "$(key info.json rows.force) $(key info.json rows.tracker)" = "180 54" ]

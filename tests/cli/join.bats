@@ -55,6 +55,11 @@ sum() {
 
 @test "a joined recording is read like one: verify, info, export, train, plot, Python" {
 	incise join a.rec b.rec -o day.rec >/dev/null
+	# each member keeps its seal, and the whole has none of its own
+	statement=$INCISE_BUILD/tests/attack/statement
+	diff <("$statement" a.rec) <("$statement" day.rec/a)
+	run -1 "$statement" day.rec
+	[[ "$output" == *"day.rec: is a joined recording; each of its members has its own seal"* ]]
 	run -0 --separate-stderr incise verify day.rec
 	[ "${lines[-1]}" = "day.rec: complete, and as it was written" ]
 	[[ "${lines[0]}" == "force    100000 expected, 100000 present, 0 lost"* ]]

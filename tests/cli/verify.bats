@@ -39,7 +39,7 @@ tampered() {
 	[ -z "$stderr" ]
 	[ "${lines[0]}" = "force    30000 expected, 30000 present, 0 lost, in 31 blocks" ]
 	[[ "${lines[1]}" == "tracker  "*" expected, "*" present, 0 lost, in 31 blocks" ]]
-	[ "${lines[2]}" = "seal     a chain of 33 commits" ]
+	[ "${lines[2]}" = "seal     33 commits, chained" ]
 	[ "${lines[3]}" = "a.rec: complete, and as it was written" ]
 	[ "${#lines[@]}" -eq 4 ]
 	[ "$(sha256sum a.rec/recording.db)" = "$before" ]

@@ -451,7 +451,7 @@ static double seal_percent(void)
 	const size_t sizes[] = {24, 97, 112, 160};
 	const struct incise_ledger_block block = {.count = 1};
 	struct incise_ledger_row row = {0};
-	uint8_t digest[INCISE_SEAL_BYTES];
+	uint8_t digest[INCISE_SEAL_BYTES] = {0};
 	struct incise_seal seal;
 	double start;
 

@@ -4,6 +4,7 @@
  */
 #include <errno.h>
 #include <fcntl.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -61,11 +62,16 @@ static int read_identity(struct incise_recording *recording, char identity[33],
 int incise_seal_possible(const struct incise_recording *recording,
 			 struct incise_error *err)
 {
+	/* The path of a session ends with the choice of its streams. */
+	const char *choice = strrchr(recording->path, ':');
+	const int n = (int)(choice ? choice - recording->path
+				   : (ptrdiff_t)strlen(recording->path));
+
 	if (recording->session)
 		return incise_error_set(err, ENOTSUP,
-					"%s: is a joined recording; each of its members "
-					"has its own seal: give one, %s/NAME",
-					recording->path, recording->path);
+					"%.*s: is a joined recording; each of its "
+					"members has its own seal: give one, %.*s/NAME",
+					n, recording->path, n, recording->path);
 	if (recording->form < 4)
 		return incise_error_set(
 			err, ENODATA,
