@@ -20,6 +20,7 @@
 #include "cli/recording.h"
 #include "cli/stream_report.h"
 #include "cli/wall_report.h"
+#include "seal/seal.h"
 
 #define POLL_NS 10000000LL
 /* The first point of wall time comes at once, unless its source hangs. */
@@ -138,8 +139,8 @@ static const struct cli_command command = {
 	.options = option_table,
 	.notes = "Example: incise capture -o liver.rec --rig sim:clock=simulated\n"
 		 "Exit codes: 0 recorded without loss; 1 failed, samples were lost, a "
-		 "device failed or\n"
-		 "the disk was nearly full; 2 bad usage.",
+		 "device failed, the\n"
+		 "disk was nearly full, or the key of the rig did not sign; 2 bad usage.",
 };
 
 static void parse(struct options *options, int argc, char **argv)
@@ -506,6 +507,37 @@ static double planned_s(const struct options *options, struct incise_rig *rig)
 	return incise_sim_duration(sim) / (double)INCISE_NS_PER_S;
 }
 
+/* --- signature of the rig ---------------------------------------------------------------- */
+
+/* Of a recording that is complete; "" where there is none. */
+struct signing {
+	char *key;		 /* path in rig.conf; NULL: none */
+	char by[160];		 /* kind and fingerprint of the key */
+	struct incise_error err; /* why it is not signed */
+};
+
+/* The recording stays as it is if it cannot be signed. */
+static void sign(const char *path, struct signing *signing)
+{
+	struct signature signature;
+	char *bytes, *file;
+	struct seal seal;
+
+	if (!signing->key)
+		return;
+	/* The recorder has just written the rows, and the statement compares them with the seal. */
+	if (!seal_open(&seal, path, false, &signing->err)) {
+		bytes = seal_sign(&seal, signing->key, &signature, &signing->err);
+		file = bytes ? seal_signature_path(&seal, &signature) : NULL;
+		if (bytes &&
+		    !seal_write(&seal, file, bytes, strlen(bytes), &signing->err))
+			strcpy(signing->by, signature.key);
+		free(bytes);
+		free(file);
+	}
+	seal_close(&seal);
+}
+
 /* --- report ---------------------------------------------------------------------------- */
 
 /* The wall time of a recording that is complete; NULL: none. */
@@ -520,7 +552,7 @@ static struct incise_wall *read_wall(const char *path)
 }
 
 static void report(const struct options *options, const struct result *result,
-		   const struct incise_wall *wall)
+		   const struct incise_wall *wall, const struct signing *signing)
 {
 	const struct incise_recorder_stats *stats = &result->stats;
 	const struct incise_stream *streams = stats->streams;
@@ -533,7 +565,7 @@ static void report(const struct options *options, const struct result *result,
 
 	if (options->json) {
 		json_print(json_pack(
-			"{so so so sI sI sI sI sI sI sI sI sI so so so}", "path",
+			"{so so so sI sI sI sI sI sI sI sI sI so so so so}", "path",
 			json_text(path), "wall",
 			wall ? wall_json(wall, result->start_ns, end_ns) : json_null(),
 			"seconds", json_number(result->seconds), "force",
@@ -545,7 +577,8 @@ static void report(const struct options *options, const struct result *result,
 			(json_int_t)stats->frames_lost, "clipped",
 			(json_int_t)stats->force_clipped, "zero_mV",
 			json_number(stats->zero_mV), "poses", pose_json(&stats->poses),
-			"streams", stream_json(streams, n)));
+			"streams", stream_json(streams, n), "signed_by",
+			*signing->by ? json_text(signing->by) : json_null()));
 		return;
 	}
 	printf("%s: %.1f s, %llu force samples (%llu clipped), %llu tracker samples, ",
@@ -564,6 +597,8 @@ static void report(const struct options *options, const struct result *result,
 	if (wall)
 		wall_text(wall, result->start_ns, end_ns);
 	stream_table(streams, n);
+	if (*signing->by)
+		printf("signed by %s\n", signing->by);
 	cli_written();
 	cli_finish();
 }
@@ -660,6 +695,7 @@ int main(int argc, char **argv)
 	struct incise_error err = {0};
 	struct options options = {0};
 	struct run run = {.options = &options};
+	struct signing signing = {0};
 	struct incise_wall *wall;
 	char *target;
 
@@ -704,14 +740,20 @@ int main(int argc, char **argv)
 		cli_fail_with(&err);
 	/* The recording is closed: now the terminal may block. */
 	capture_view_end();
+	if (incise_rig_sign_key(run.rig))
+		signing.key = cli_text("%s", incise_rig_sign_key(run.rig));
 	incise_rig_close(run.rig);
 	keep_old(&run, target);
 	recording_replace(target, options.output);
 	free(target);
 	wall = read_wall(options.output);
-	report(&options, &run.result, wall);
+	sign(options.output, &signing);
+	report(&options, &run.result, wall, &signing);
 	judge_wall(&options, wall);
 	incise_wall_free(wall);
+	if (signing.err.code)
+		cli_error("%s: recorded, but not signed: %s; 'incise sign' signs it",
+			  options.output, signing.err.text);
 	judge(options.output, &run.result);
-	return 0;
+	return !!signing.err.code;
 }

@@ -30,6 +30,7 @@ struct incise_rig {
 	bool has_vision;
 	struct incise_foot_switch_setup foot_switch;
 	bool has_foot_switch;
+	char sign_key[INCISE_RIG_KEY_PATH_MAX];
 };
 
 static void *rig_open_sim(struct incise_rig *rig, int slot)
@@ -129,6 +130,7 @@ static struct incise_rig *rig_new(const struct incise_rig_plan *plan, const char
 	rig->has_vision = plan->has_vision;
 	rig->foot_switch = plan->foot_switch;
 	rig->has_foot_switch = plan->has_foot_switch;
+	strcpy(rig->sign_key, plan->sign_key);
 	rig->spec = strdup(spec);
 	rig->clock = plan->simulated ? incise_clock_new_simulated(SIM_START_NS)
 				     : incise_clock_new_real();
@@ -252,6 +254,11 @@ int incise_rig_vision(const struct incise_rig *rig, struct incise_vision_setup *
 		return -ENOENT;
 	*setup = rig->vision;
 	return 0;
+}
+
+const char *incise_rig_sign_key(const struct incise_rig *rig)
+{
+	return *rig->sign_key ? rig->sign_key : NULL;
 }
 
 int incise_rig_foot_switch(const struct incise_rig *rig,

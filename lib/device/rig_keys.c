@@ -468,6 +468,13 @@ static void all(struct list *list)
 				 incise_rig_groups[i].keys[k]);
 	for (int i = 0; i < n; i++)
 		actuator(list, i, n > 1);
+	if (member(list->root, "sign_key")) {
+		struct incise_rig_key key =
+			begin(list, member(list->root, "sign_key"), "", "sign_key");
+
+		append_text(&key, list->plan->sign_key);
+		end(list, &key);
+	}
 	if (list->plan->sim || member(list->root, "sim"))
 		sim(list);
 }

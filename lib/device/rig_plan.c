@@ -21,10 +21,9 @@
 /* --- groups tracker_setup, force_setup, camera_setup, vision and foot_switch --- */
 
 const char *const incise_rig_root_keys[] = {
-	"clock",	 "tracker",	"force",	"camera",
-	"stepper",	 "surface",	"sim",		"actuator",
-	"tracker_setup", "force_setup", "camera_setup", "vision",
-	"foot_switch",	 NULL};
+	"clock",	"tracker", "force",	  "camera",	   "stepper",
+	"surface",	"sim",	   "actuator",	  "tracker_setup", "force_setup",
+	"camera_setup", "vision",  "foot_switch", "sign_key",	   NULL};
 
 const struct incise_rig_group incise_rig_groups[INCISE_RIG_GROUPS] = {
 	{"tracker_setup",
@@ -55,6 +54,27 @@ static int group_of(const config_setting_t *root, const char *name, const char *
 	while (strcmp(known->name, name))
 		known++;
 	return incise_conf_known(*group, path, known->keys, err);
+}
+
+/* sign_key = "/PATH": capture may run in any folder. */
+static int read_sign_key(struct incise_rig_plan *plan, const config_setting_t *root,
+			 const char *path, struct incise_error *err)
+{
+	const char *key = NULL;
+	int rc = incise_conf_string(root, path, "sign_key", &key, err);
+
+	if (rc || !key)
+		return rc;
+	if (*key != '/' || strlen(key) >= sizeof(plan->sign_key))
+		return incise_error_set(
+			err, EINVAL,
+			"%.200s:%d: sign_key: expected the path of a private key of SSH, "
+			"such as \"/etc/incise/rig_ed25519\"; correct it",
+			path,
+			config_setting_source_line(
+				config_setting_get_member(root, "sign_key")));
+	strcpy(plan->sign_key, key);
+	return 0;
 }
 
 /* *value is the index in @words; unchanged where the key is absent. */
@@ -795,6 +815,8 @@ static int plan_root(struct incise_rig_plan *plan, const config_setting_t *root,
 		rc = read_vision_setup(&plan->vision, &plan->has_vision, root, path, err);
 	if (!rc)
 		rc = read_foot_switch(plan, root, path, err);
+	if (!rc)
+		rc = read_sign_key(plan, root, path, err);
 	if (plan->devices & INCISE_RIG_IF_NAMED &&
 	    !config_setting_get_member(root, "camera"))
 		plan->devices &= ~INCISE_RIG_CAMERA;

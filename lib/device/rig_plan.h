@@ -67,6 +67,7 @@ struct incise_rig_plan {
 	bool has_vision; /* rig.conf has it, or the camera is the virtual one */
 	struct incise_foot_switch_setup foot_switch;
 	bool has_foot_switch;
+	char sign_key[INCISE_RIG_KEY_PATH_MAX]; /* "": none */
 	struct incise_sim_config config;
 	double point_mm[3], normal[3];
 };

@@ -184,6 +184,30 @@ not_vouched() {
 	run -1 --separate-stderr incise verify signed.rec --signers signers
 }
 
+@test "the key of the rig signs at the end of a capture; without it the recording is whole and unsigned" {
+	cat >rig.conf <<-END
+		clock = "simulated";
+		tracker = "sim:";
+		force = "sim:";
+		sign_key = "$kim";
+	END
+	run -0 --separate-stderr incise capture -o r.rec --rig rig.conf --duration 1s
+	[[ "$output" == *"signed by ED25519 SHA256:"*"wrote r.rec" ]]
+	incise verify r.rec --signers signers
+	incise capture -o r.rec --rig rig.conf --duration 1s --overwrite --json | jq -e '.signed_by | startswith("ED25519 ")'
+	[ "$(find r.rec/seal -type f | wc -l)" = 2 ]
+	incise rig --show --rig rig.conf | grep "sign_key.*kim"
+	sed -i "s|$kim|$PWD/none|" rig.conf
+	run -1 --separate-stderr incise capture -o r2.rec --rig rig.conf --duration 1s
+	[ "${#stderr_lines[@]}" = 1 ]
+	[[ "$stderr" == *"incise capture: r2.rec: recorded, but not signed: $PWD/none: No such file or directory; "*"'incise sign' signs it" ]]
+	incise verify r2.rec
+	[ ! -e r2.rec/seal ]
+	sed -i 's|sign_key = .*|sign_key = "kim";|' rig.conf
+	run -1 --separate-stderr incise capture -o r3.rec --rig rig.conf --duration 1s
+	[[ "$stderr" == *"rig.conf:4: sign_key: expected the path of a private key of SSH"* ]]
+}
+
 @test "links, pipes, huge files and strange names in the folder do no harm" {
 	sig=$(cd signed.rec/seal && echo 1.*.sig)
 	echo secret >target

@@ -121,6 +121,16 @@ INCISE_API int incise_rig_vision(const struct incise_rig *rig,
 INCISE_API int incise_rig_foot_switch(const struct incise_rig *rig,
 				      struct incise_foot_switch_setup *setup);
 
+/** Largest length of the path of incise_rig_sign_key(), with its NUL. */
+#define INCISE_RIG_KEY_PATH_MAX 300
+
+/**
+ * The key `sign_key` of rig.conf: path of the private key of SSH that signs recordings of this rig.
+ *
+ * @return path, owned by the rig; NULL: none
+ */
+INCISE_API const char *incise_rig_sign_key(const struct incise_rig *rig);
+
 /** A key of a rig and its value. */
 struct incise_rig_key {
 	char name[80]; /**< "sim.seed"; "actuator[2].lead_mm" of several, from 1 on */

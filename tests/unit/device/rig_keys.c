@@ -29,6 +29,7 @@ static const char everything[] =
 	"	exposure_ms = 4; gain = 2; white_balance_K = 4600; focus = 30; };\n"
 	"vision = { hue = [170, 10]; saturation = [1, 2]; value = [3, 4]; full_px = 400.25;\n"
 	"	roi = [200, 0, 240, 480]; };\n"
+	"sign_key = \"/etc/incise/rig_ed25519\"; "
 	"foot_switch = { device = \"/dev/input/event0\"; key = \"b\"; };\n"
 	"sim = { seed = 7; withdrawal = \"paper\"; depth_mm = [5.0, 7.5]; times = [1, 2]; };\n"
 	"actuator = ( { spring_N_mm = 2; travel_mm = 20; lead_mm = 4; steps_per_turn = 400;\n"
@@ -258,6 +259,7 @@ static void values_are_those_of_the_file(void **state)
 		{"force_setup.rate_hz", "12500.5", 6},
 		{"vision.roi", "[200, 0, 240, 480]", 11},
 		{"foot_switch.key", "\"b\"", 12},
+		{"sign_key", "\"/etc/incise/rig_ed25519\"", 12},
 		{"sim.withdrawal", "\"paper\"", 13},
 		{"sim.depth_mm", "[5.0, 7.5]", 13},
 		{"sim.force_mV_N", "1240", 0},

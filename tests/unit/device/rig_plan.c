@@ -180,7 +180,7 @@ static void file_refuses(void **state)
 		{"voltmeter = \"sim:\";", EINVAL,
 		 ":1: voltmeter: unknown key; expected one of clock, tracker, force, camera, "
 		 "stepper, surface, sim, actuator, "
-		 "tracker_setup, force_setup, camera_setup, vision, foot_switch"},
+		 "tracker_setup, force_setup, camera_setup, vision, foot_switch, sign_key"},
 		{"sim = 1;", EINVAL,
 		 ":1: sim: expected a group { key = value; }; correct it"},
 		{"sim = {\n\nsede = 1; };", EINVAL,
@@ -581,6 +581,9 @@ static void what_is_wrong_is_said(void **state)
 		{"camera_setup = { exposure_ms = 0; };", "exposure_ms"},
 		{"camera_setup = { zoom = 1; };", "zoom"},
 		{"foot_switch = \"b\";", "expected a group"},
+		{"sign_key = 1;", "sign_key: expected text in quotes"},
+		{"sign_key = \"rig_ed25519\";",
+		 "rig.conf:1: sign_key: expected the path of a private key"},
 		{"foot_switch = { };",
 		 "rig.conf:1: foot_switch.device: expected the path"},
 		{"foot_switch = { device = \"event0\"; key = \"b\"; };",
