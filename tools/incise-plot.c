@@ -155,6 +155,7 @@ int main(int argc, char **argv)
 				  .folder = folder,
 				  .name = "figure",
 			  }};
+	struct origins origins = {0};
 	const struct drawn *kind;
 	const char *form;
 	FILE *script;
@@ -176,7 +177,12 @@ int main(int argc, char **argv)
 	atexit(remove_folder);
 	plot_folder(folder);
 	script = kind->draw(&job.figure);
-	plot_draw_form(script, folder, job.figure.name, form, job.output);
+	if (job.output)
+		origins_add(&origins, job.figure.path);
+	if (job.output && job.figure.data)
+		origins_add(&origins, job.figure.data);
+	plot_draw_form(script, folder, job.figure.name, form, job.output, &origins);
+	origins_end(&origins);
 	if (job.output)
 		cli_written();
 	cli_finish();

@@ -37,6 +37,7 @@ static const struct {
 	{"eval", "print the force of a model at given depth and velocity"},
 	{"info", "describe a recording, model, plan or stepper module"},
 	{"plot", "draw a recording, dataset, model, session or calibration"},
+	{"provenance", "print the way from a figure or model back to its recordings"},
 	{"plan", "show the stages that a scene runs, and why it leaves out others"},
 	{"haptic", "run the real-time loop of a scene"},
 	{"feed", "load a scene into the kernel and send it the poses"},

@@ -11,6 +11,7 @@ import ctypes
 import errno
 import hashlib
 import os
+import re
 from typing import Any, List, Optional, Sequence
 
 from . import _library
@@ -22,6 +23,9 @@ from .model import TrainReportStruct, VariableStruct, all_sums, baselines, name_
 from .model import is_path, is_recording, report_of
 from .recording import Recording
 
+TEXT_MAX = 1000  # INCISE_FACTOR_TEXT_MAX
+ORIGINS = 480  # bytes of a recording's origins in its text, as in tools/train/sources.c
+_ORIGIN = re.compile(rb"incise:([1-9]):([a-z]{1,15}:[0-9a-f]{64}:[0-9]+:[-0-9A-Za-z]+:[-0-9A-Za-z._~%]+;)")
 SAMPLE = 20000  # INCISE_CORPUS_SAMPLE
 
 _Read = ctypes.CFUNCTYPE(c_int, c_void_p, c_void_p, c_void_p, c_void_p)
@@ -100,6 +104,20 @@ def _sha256(path: bytes) -> bytes:
     return digest.value
 
 
+def _origins_of_file(path: bytes) -> List[bytes]:
+    """Those in the comments at the start of a CSV file, one deeper, each once; see incise/origin.h."""
+    found: List[bytes] = []
+    with open(path, "rb") as file:
+        for line in file:
+            if not line.startswith(b"#"):
+                break
+            for depth, rest in _ORIGIN.findall(line):
+                origin = b"incise:%d:%s" % (int(depth) + 1, rest)
+                if depth < b"9" and origin not in found:
+                    found.append(origin)
+    return found
+
+
 class Source:
     """A CSV file, a recording, or a table, as incise_corpus_source; close() it."""
 
@@ -146,10 +164,13 @@ class Source:
         elif self.recording:
             info = self.recording.info
             rig = info.rig.encode()
+            origins = self.recording._origins(ORIGINS)
             text = (
-                b"%.100s, recorded %s, rig %.120s, force %.9g mV/N, zero %.9g mV, camera %.9g mm/px"
+                b"%.100s, %s%srecorded %s, rig %.120s, force %.9g mV/N, zero %.9g mV, camera %.9g mm/px"
                 % (
                     os.path.basename(self.path.rstrip(b"/")),
+                    origins,
+                    b", " if origins else b"",
                     info.started.encode(),
                     rig,
                     info.force_mV_N,
@@ -162,6 +183,12 @@ class Source:
             digest = _sha256(os.path.join(_without_choice(self.path), b"recording.db"))
         else:
             text = os.path.basename(self.path)[:300]
+            between = b", "
+            for origin in _origins_of_file(self.path):
+                if len(text) + len(origin) + 2 >= TEXT_MAX:
+                    break
+                text += between + origin
+                between = b" "
             digest = _sha256(self.path)
         # A group of all rows; else the text of a column.
         whole = {"recording": digest, "rig": rig if self.recording else None}.get(group or "")

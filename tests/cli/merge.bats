@@ -118,7 +118,7 @@ shares() {
 	done
 	incise train 1.rec 2.rec 3.rec --rate 200 --check 0.3 -o m.fis >out
 	grep -q "^3 sources: " out
-	incise info m.fis | grep -q "source: $(sha256sum <2.rec/recording.db | cut -c1-64) .* 2.rec, recorded .*, rig sim:"
+	incise info m.fis | grep -q "source: $(sha256sum <2.rec/recording.db | cut -c1-64) .* 2.rec, incise:1:recording:.*:2.rec;, recorded .*, rig sim:"
 	cp -r 2.rec bad.rec
 	sqlite3 bad.rec/recording.db "UPDATE force SET code = code + 1 WHERE rowid = 500"
 	run --separate-stderr incise train 1.rec bad.rec 3.rec --rate 200 -o bad.fis

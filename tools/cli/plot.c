@@ -11,12 +11,15 @@
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
+#include <incise/infile.h>
 #include "child.h"
 #include "cli.h"
 #include "control_character.h"
 #include "file.h"
 #include "folder.h"
 #include "plot.h"
+
+#define FIGURE_MAX (1 << 30) /* bytes */
 
 extern const char text_style_gp[];
 
@@ -318,24 +321,25 @@ static int wait_for(pid_t gnuplot)
 	return status;
 }
 
-static void copy_file(const char *from, const char *to)
+static void copy_file(const char *from, const char *to, const struct origins *origins)
 {
+	static const struct incise_infile_kind kind = {.name = "a figure",
+						       .size_max = FIGURE_MAX};
+	struct incise_error err = {0};
 	struct incise_outfile *file;
-	FILE *out = whole_file_begin(to, &file), *in = fopen(from, "re");
-	char bytes[65536];
+	FILE *out = whole_file_begin(to, &file);
 	size_t n;
+	char *bytes = incise_infile_read(from, &kind, &n, &err);
 
-	if (!in)
-		cli_fail("%s: gnuplot did not draw it: %s", to, strerror(errno));
-	while ((n = fread(bytes, 1, sizeof(bytes), in)))
-		if (fwrite(bytes, 1, n, out) != n)
-			break;
-	fclose(in);
+	if (!bytes)
+		cli_fail("%s: gnuplot did not draw it: %s", to, err.text);
+	origins_into_figure(origins, bytes, n, out);
+	free(bytes);
 	whole_file_end(file);
 }
 
 void plot_draw_form(FILE *script, const char *folder, const char *name, const char *form,
-		    const char *path)
+		    const char *path, const struct origins *origins)
 {
 	char *command = cli_text("cd \"$0/plot\" && exec gnuplot -e \"ext='%s'\" %s.gp",
 				 form, name);
@@ -355,6 +359,6 @@ void plot_draw_form(FILE *script, const char *folder, const char *name, const ch
 		cli_fail("gnuplot could not draw it: %s", *line ? line : "it was killed");
 	drawn = cli_text("%s/%s.%s", folder, name, form);
 	if (path)
-		copy_file(drawn, path);
+		copy_file(drawn, path, origins);
 	free(drawn), free(errors), free(command);
 }

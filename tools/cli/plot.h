@@ -14,6 +14,7 @@
 
 #include <stdbool.h>
 #include <stdio.h>
+#include "../origin/origins.h"
 
 /*
  * Split the argument of @option, "a/b/name", perhaps with .png or .svg, into folder "a/b" and
@@ -61,11 +62,11 @@ void plot_draw_or_fail(FILE *script, const char *folder, const char *name);
 const char *plot_window(void);
 
 /*
- * Close the script and draw one form: "png" or "svg" as the file @path, which appears whole, or
- * in a window, until that is closed. Fails the program.
+ * Close the script and draw one form: "png", "svg" or "pdf" as the file @path, which appears whole
+ * and carries its origins, or in a window, until that is closed. Fails the program.
  */
 void plot_draw_form(FILE *script, const char *folder, const char *name, const char *form,
-		    const char *path);
+		    const char *path, const struct origins *origins);
 
 /*
  * Write a text, which may hold anything, as a string of a script, or in data. What a string or an

@@ -13,7 +13,10 @@
 #include "../cli/cli.h"
 #include "../cli/file_kind.h"
 #include "../cli/recording.h"
+#include "../origin/origins.h"
 #include "sources.h"
+
+#define ORIGINS_TEXT 480 /* bytes of a recording's origins in its text */
 
 /* The column that is 0 where the blade did not advance. */
 static const char *where(const struct source *source)
@@ -204,7 +207,7 @@ static int open_recording(struct source *source, struct incise_error *err)
 	struct incise_recalibration active;
 	struct incise_recording_info info;
 	struct incise_recording *recording;
-	char *database, *whole, *text;
+	char *database, *whole, *text, origins[ORIGINS_TEXT];
 	int rc;
 
 	/* Says itself what is wrong, as a warning, where damaged ones are used. */
@@ -215,6 +218,7 @@ static int open_recording(struct source *source, struct incise_error *err)
 		return -errno;
 	rc = incise_recording_info(recording, &info, err);
 	incise_recording_recalibration(recording, &active);
+	incise_recording_origins(recording, origins, sizeof(origins));
 	incise_recording_close(recording);
 	if (rc)
 		return name_it(source, rc, err);
@@ -225,11 +229,11 @@ static int open_recording(struct source *source, struct incise_error *err)
 	free(database);
 	snprintf(source->rig, sizeof(source->rig), "%s", info.rig);
 	text = cli_text(
-		"%.100s, recorded %s, rig %.*s, force %.9g mV/N, zero %.9g mV, camera "
+		"%.100s, %s%srecorded %s, rig %.*s, force %.9g mV/N, zero %.9g mV, camera "
 		"%.9g mm/px%s%s%s%s",
-		name_of(source->path), info.started, *active.file ? 40 : 120, info.rig,
-		info.force_mV_N, info.zero_mV, info.depth_mm_px,
-		*active.file ? ", by " : "", active.file,
+		name_of(source->path), origins, *origins ? ", " : "", info.started,
+		*active.file ? 40 : 120, info.rig, info.force_mV_N, info.zero_mV,
+		info.depth_mm_px, *active.file ? ", by " : "", active.file,
 		*active.file ? ", SHA-256 " : "", active.sha256);
 	snprintf(source->text, sizeof(source->text), "%s", text);
 	free(text);
@@ -252,6 +256,27 @@ static int stop(void *user, const double *row, const char *group,
 	return 1;
 }
 
+/* Its name, and the origins that the file carries, as many as fit. */
+static int name_file(struct source *source, struct incise_error *err)
+{
+	size_t at = (size_t)snprintf(source->text, sizeof(source->text), "%.300s",
+				     name_of(source->path));
+	struct origins origins = {0};
+	char text[INCISE_ORIGIN_TEXT];
+	int rc = origins_read(&origins, source->path, err);
+
+	for (int i = 0; i < origins.n; i++) {
+		origins.all[i].depth++;
+		if (incise_origin_text(&origins.all[i], text) <= 0)
+			continue;
+		if (at + strlen(text) + 2 >= sizeof(source->text))
+			break;
+		at += (size_t)sprintf(source->text + at, "%s%s", i ? " " : ", ", text);
+	}
+	origins_end(&origins);
+	return rc;
+}
+
 int source_open(struct source *source, struct incise_error *err)
 {
 	size_t left_out;
@@ -272,12 +297,13 @@ int source_open(struct source *source, struct incise_error *err)
 		incise_dataset_sha256(source->pipe, source->hash);
 		return 0;
 	}
-	snprintf(source->text, sizeof(source->text), "%.300s", name_of(source->path));
 	/* A file of another kind is refused before all of it is hashed. */
 	rc = incise_dataset_each(source->path, source->options->columns,
 				 source->options->n_columns, group_column(source),
 				 where(source), stop, NULL, NULL, err);
-	return rc ? rc : incise_file_sha256(source->path, source->hash, err);
+	if (!rc)
+		rc = incise_file_sha256(source->path, source->hash, err);
+	return rc ? rc : name_file(source, err);
 }
 
 void sources_free(struct source *sources, int n)

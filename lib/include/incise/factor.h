@@ -29,13 +29,14 @@ INCISE_BEGIN_DECLS
 #define INCISE_FACTOR_PAIRS_MIN 1000
 
 /** Length of the text of a source, with its 0. */
-#define INCISE_FACTOR_TEXT_MAX 400
+#define INCISE_FACTOR_TEXT_MAX 1000
 
 /** A recording or file whose pairs are in a factor. */
 struct incise_factor_source {
-	char hash[65];			   /**< SHA-256 of its bytes, hexadecimal */
-	uint64_t rows;			   /**< pairs */
-	char text[INCISE_FACTOR_TEXT_MAX]; /**< name, rig and calibration, one line */
+	char hash[65]; /**< SHA-256 of its bytes, hexadecimal */
+	uint64_t rows; /**< pairs */
+	char text
+		[INCISE_FACTOR_TEXT_MAX]; /**< name, origin, rig and calibration, one line */
 };
 
 /** Contents of a factor, without its sums. */

@@ -64,5 +64,18 @@ INCISE_API int incise_origin_text(const struct incise_origin *origin, char *text
 INCISE_API bool incise_origin_next(const char *bytes, size_t n, size_t *at,
 				   struct incise_origin *origin);
 
+struct incise_recording;
+
+/**
+ * Write the origin of an open recording: its head at its last commit, of depth 1; of a joined one that
+ * of each member, named "day.rec:a". One of an older format, without a seal, has none.
+ *
+ * @param text tokens with a blank between them, as many as fit, and a NUL
+ * @param size at least 1
+ * @return number of bytes before the NUL
+ */
+INCISE_API size_t incise_recording_origins(struct incise_recording *recording, char *text,
+					   size_t size);
+
 INCISE_END_DECLS
 #endif

@@ -9,6 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <incise/origin.h>
+#include <incise/seal.h>
 #include <incise/version.h>
 #include <incise/wall.h>
 #include "writers.h"
@@ -105,6 +107,71 @@ static int add_sources(struct incise_provenance *provenance,
 			  : -ENOMEM;
 		free(text);
 	}
+	return rc;
+}
+
+static const char *name_of(const char *path)
+{
+	const char *slash = strrchr(path, '/');
+
+	return slash ? slash + 1 : path;
+}
+
+/* Append the head of a recording as an origin; nothing of one that has none, or if it does not fit. */
+static size_t put_origin(struct incise_recording *recording, const char *name, char *text,
+			 size_t size, size_t at)
+{
+	struct incise_origin origin = {.depth = 1, .kind = "recording"};
+	char token[INCISE_ORIGIN_TEXT];
+	struct incise_seal_head head;
+
+	if (incise_seal_head(recording, origin.identity, &head, NULL))
+		return at;
+	strcpy(origin.sha256, head.head);
+	origin.commit = (uint64_t)head.commit;
+	snprintf(origin.name, sizeof(origin.name), "%s", name);
+	if (incise_origin_text(&origin, token) <= 0 ||
+	    at + (at > 0) + strlen(token) >= size)
+		return at;
+	return at + (size_t)sprintf(text + at, "%s%s", at ? " " : "", token);
+}
+
+size_t incise_recording_origins(struct incise_recording *recording, char *text,
+				size_t size)
+{
+	const struct incise_session *session = recording->session;
+	const char *whole = name_of(recording->path);
+	char name[512];
+	size_t at = 0;
+
+	*text = 0;
+	if (!session)
+		return put_origin(recording, whole, text, size, 0);
+	for (int i = 0; i < session->n; i++) {
+		snprintf(name, sizeof(name), "%s:%s", whole, session->info[i].name);
+		at = put_origin(session->members[i], name, text, size, at);
+	}
+	return at;
+}
+
+/* The origins of an export. */
+static int add_origins(struct incise_provenance *provenance,
+		       struct incise_recording *const *recordings, int n)
+{
+	const size_t most = INCISE_SESSION_MEMBERS_MAX * INCISE_ORIGIN_TEXT;
+	char *all = malloc((size_t)n * most), *to = all;
+	int rc;
+
+	if (!all)
+		return -ENOMEM;
+	*all = 0;
+	for (int i = 0; i < n; i++) {
+		if (to > all)
+			*to++ = ' ';
+		to += incise_recording_origins(recordings[i], to, most);
+	}
+	rc = incise_provenance_add(provenance, "origin", "%s", all);
+	free(all);
 	return rc;
 }
 
@@ -410,6 +477,8 @@ int incise_provenance_of(struct incise_provenance *provenance,
 		rc = incise_provenance_add(provenance, "date", "%s", date);
 	if (!rc)
 		rc = add_sources(provenance, recordings, n);
+	if (!rc)
+		rc = add_origins(provenance, recordings, n);
 	if (!rc)
 		rc = table ? incise_provenance_add(provenance, "options",
 						   "rows of table %s", table)

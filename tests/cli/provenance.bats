@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# The way back from a figure, a model or an export to its recordings.
+
+load cli
+
+setup_file() {
+	cd "$BATS_FILE_TMPDIR"
+	"$INCISE_BUILD/bin/incise" capture -o "a b;.rec" --rig sim:clock=simulated,times=2,seed=1 >/dev/null
+	"$INCISE_BUILD/bin/incise" export "a b;.rec" --average 6x6 --by-cut --min-count 5 --lineage -o p.csv >/dev/null
+	"$INCISE_BUILD/bin/incise" train p.csv -o m.fis >/dev/null 2>&1
+}
+
+setup() {
+	work_folder
+	made=$BATS_FILE_TMPDIR
+	cp -r "$made/a b;.rec" "$made/p.csv" "$made/m.fis" "$made/m.fis.sd" .
+	head=$(sqlite3 "a b;.rec/recording.db" "SELECT lower(hex(head)) FROM seal ORDER BY number DESC LIMIT 1")
+	found="recording a b;.rec, commit $(sqlite3 "a b;.rec/recording.db" "SELECT max(number) FROM seal"), head ${head:0:16}…"
+}
+
+@test "a figure leads over model and export back to the recording, in each of its forms" {
+	command -v gnuplot || skip "gnuplot is not installed"
+	for form in png svg pdf; do
+		incise plot m.fis -o f.$form
+		run -0 --separate-stderr incise provenance f.$form
+		[ "${lines[0]}" = "f.$form was made of" ]
+		[[ "${lines[1]}" == "  model m.fis, SHA-256 "*"…: m.fis is this file" ]]
+		[[ "${lines[2]}" == "    table p.csv, SHA-256 "*"…: p.csv is this file" ]]
+		[ "${lines[3]}" = "      $found: a b;.rec has this head" ]
+		[ "${#lines[@]}" = 4 ]
+	done
+	# each is still a figure of its kind
+	python3 - <<-'END'
+		import struct, xml.dom.minidom, zlib
+		data, at = open("f.png", "rb").read(), 8
+		while at < len(data):
+		    n, = struct.unpack(">I", data[at:at + 4])
+		    crc, = struct.unpack(">I", data[at + 8 + n:at + 12 + n])
+		    assert crc == zlib.crc32(data[at + 4:at + 8 + n])
+		    at += 12 + n
+		xml.dom.minidom.parse("f.svg")
+		pdf = open("f.pdf", "rb").read()
+		start = int(pdf.split(b"startxref")[-1].split()[0])
+		assert pdf[-1024:].rstrip().endswith(b"%%EOF")
+		assert pdf[start:start + 4] == b"xref" or b"/XRef" in pdf[start:start + 300]
+	END
+	incise plot "a b;.rec" -o r.svg
+	run -0 --separate-stderr incise provenance r.svg --json
+	jq -e --arg head "$head" '.origins | length == 1 and .[0].sha256 == $head and .[0].state == "same"' <<<"$output"
+}
+
+@test "exports carry it: CSV with --lineage, HDF5, MCAP; and models of recordings, also merged ones" {
+	incise export "a b;.rec" --rate 100 --lineage -o e.csv
+	incise export "a b;.rec" -o e.mcap
+	files="e.csv e.mcap"
+	if [ -e "$INCISE_BUILD/lib/incise/export_hdf5.so" ]; then
+		incise export "a b;.rec" -o e.h5
+		files+=" e.h5"
+	fi
+	incise train "a b;.rec" -o r.fis >/dev/null 2>&1
+	incise train "a b;.rec" --premises r.fis --factor r.fac >/dev/null 2>&1
+	incise merge r.fac -o merged.fis >/dev/null
+	for file in $files r.fis merged.fis; do
+		run -0 --separate-stderr incise provenance $file
+		[ "${lines[1]}" = "  $found: a b;.rec has this head" ] || complain "$file: $output"
+	done
+}
+
+@test "what differs, is missing or says nothing is named" {
+	mkdir away
+	cp m.fis away
+	run -0 --separate-stderr incise provenance away/m.fis
+	[ "${lines[2]}" = "    $found: not here" ]
+	run -0 --separate-stderr incise provenance away/m.fis --recording "a b;.rec"
+	[ "${lines[2]}" = "    $found: a b;.rec has this head" ]
+	echo "# changed" >>p.csv
+	run --separate-stderr incise provenance m.fis
+	failed_with "m.fis: a file here differs from the one that it was made of"
+	[[ "${lines[1]}" == *": p.csv is another file, or was changed" ]]
+	rm p.csv
+	sqlite3 "a b;.rec/recording.db" "UPDATE seal SET head = zeroblob(32)"
+	run -1 --separate-stderr incise provenance m.fis
+	[[ "${lines[2]}" == *": a b;.rec is another recording, or was changed" ]]
+	# a pipe of that name is not waited for
+	rm -r "a b;.rec"
+	mkfifo p.csv "a b;.rec"
+	run -0 --separate-stderr timeout 10 incise provenance m.fis
+
+	run --separate-stderr incise provenance away
+	failed_with "away: says nothing of its origin"
+	printf 'depth_mm,velocity_mm_s,force_N\n1,2,3\n' >plain.csv
+	run --separate-stderr incise provenance plain.csv
+	failed_with "plain.csv: says nothing of its origin; 'incise export --lineage' writes it into a CSV"
+	run --separate-stderr incise provenance m.fis.sd
+	failed_with "m.fis.sd: a .sd file belongs to its model; give that"
+	run --separate-stderr incise provenance none
+	failed_with "none: No such file or directory"
+	a=$(printf 'a%.0s' {1..64})
+	printf 'x\0incise:1:model:%s:0:-:%%1B%%5B31m%%2E.fis;incise:1:model:%s:0:-:%%1B%%5B31m.fis;' "$a" "$a" >odd
+	run -1 --separate-stderr incise provenance odd
+	[[ "${lines[1]}" == "  model ?[31m.fis, SHA-256 aaaaaaaaaaaaaaaa…: not here" ]]
+	[[ "$stderr" == *"odd: its way back ends before a recording"* ]]
+}

@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * incise provenance: the way from a figure, a model or an export back to its recordings.
+ */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <incise/factor.h>
+#include <incise/recording.h>
+#include <incise/seal.h>
+#include "cli/cli.h"
+#include "cli/control_character.h"
+#include "cli/file_kind.h"
+#include "cli/json.h"
+#include "origin/origins.h"
+
+struct job {
+	const char *recording;
+	bool json;
+};
+
+static const struct cli_option options[] = {
+	{0, "recording", "NAME.rec",
+	 "compare with this recording; others are sought next to FILE",
+	 CLI_INPUT(struct job, recording)},
+	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct job, json)},
+	{0},
+};
+
+static const struct cli_command command = {
+	.name = "provenance",
+	.synopsis = "FILE [--recording NAME.rec] [OPTIONS]",
+	.summary = "Print what a figure, a model or an export was made of, back to the "
+		   "recordings, and compare\n"
+		   "it with the files of these names next to it.",
+	.options = options,
+	.notes = "Example: incise provenance liver.png\n"
+		 "Exit codes: 0 success, 1 FILE says nothing of its origin, or a file "
+		 "differs from the one\n"
+		 "it was made of, 2 bad usage. See incise-provenance(1).",
+};
+
+enum state { SAME, OTHER, LATER, MISSING, STATES };
+
+static const char *const states[STATES] = {"same", "other", "later", "missing"};
+
+/* An origin, and the file of its name that is here. */
+struct step {
+	const struct incise_origin *origin;
+	enum state state;
+	char *found;	/* path; NULL: none */
+	int64_t commit; /* of the recording that was found */
+};
+
+/* --- comparison --------------------------------------------------------------------------- */
+
+/* Compare a recording at @path; false: there is none, or it has another identity. */
+static bool compare_recording(struct step *step, const char *path)
+{
+	const struct incise_origin *origin = step->origin;
+	struct incise_recording *recording = incise_recording_open(path, NULL);
+	struct incise_seal_head head;
+	char identity[33];
+	bool known = recording && !incise_seal_head(recording, identity, &head, NULL);
+
+	incise_recording_close(recording);
+	if (!known)
+		return false;
+	step->commit = head.commit;
+	if (strcmp(identity, origin->identity))
+		step->state = OTHER;
+	else if (!strcmp(head.head, origin->sha256) &&
+		 (uint64_t)head.commit == origin->commit)
+		step->state = SAME;
+	else
+		step->state = (uint64_t)head.commit > origin->commit ? LATER : OTHER;
+	return !strcmp(identity, origin->identity);
+}
+
+static void compare_file(struct step *step, const char *path)
+{
+	char hash[65];
+
+	step->state =
+		incise_file_sha256(path, hash, NULL) || strcmp(hash, step->origin->sha256)
+			? OTHER
+			: SAME;
+}
+
+/* "FOLDER/day.rec/a" of the member "day.rec:a" of a joined recording: free(3). */
+static char *beside(const char *file, const char *name)
+{
+	const char *slash = strrchr(file, '/');
+	char *path = cli_text("%.*s%s", slash ? (int)(slash + 1 - file) : 0, file, name);
+	char *colon = strrchr(path + (slash ? slash + 1 - file : 0), ':');
+	struct stat st;
+
+	if (colon && stat(path, &st))
+		*colon = '/';
+	return path;
+}
+
+static void compare(struct step *step, const struct job *job, const char *file)
+{
+	bool recording = !strcmp(step->origin->kind, "recording");
+	char *path = beside(file, step->origin->name);
+	struct stat st;
+
+	step->state = MISSING;
+	if (recording && job->recording && compare_recording(step, job->recording)) {
+		step->found = cli_text("%s", job->recording);
+		free(path);
+		return;
+	}
+	step->state = MISSING;
+	/* A pipe would be waited for. */
+	if (stat(path, &st) ||
+	    (recording ? !S_ISDIR(st.st_mode) : !S_ISREG(st.st_mode))) {
+		free(path);
+		return;
+	}
+	step->found = path;
+	if (!recording)
+		compare_file(step, path);
+	else if (!compare_recording(step, path) && step->state == MISSING)
+		step->state = OTHER;
+}
+
+/* --- report ------------------------------------------------------------------------------- */
+
+static char *shown(const char *text)
+{
+	char *copy = cli_text("%s", text);
+
+	control_characters_hide(copy);
+	return copy;
+}
+
+static void print_step(const struct step *step)
+{
+	const struct incise_origin *origin = step->origin;
+	bool recording = !strcmp(origin->kind, "recording");
+	char *name = shown(origin->name), *found = shown(step->found ? step->found : "");
+
+	printf("%*s%s %s, ", 2 * origin->depth, "", origin->kind, name);
+	if (recording)
+		printf("commit %llu, head %.16s…: ", (unsigned long long)origin->commit,
+		       origin->sha256);
+	else
+		printf("SHA-256 %.16s…: ", origin->sha256);
+	switch (step->state) {
+	case SAME:
+		printf(recording ? "%s has this head\n" : "%s is this file\n", found);
+		break;
+	case OTHER:
+		printf(recording ? "%s is another recording, or was changed\n"
+				 : "%s is another file, or was changed\n",
+		       found);
+		break;
+	case LATER:
+		printf("%s has gone on to commit %lld\n", found, (long long)step->commit);
+		break;
+	default:
+		printf("not here\n");
+	}
+	free(name);
+	free(found);
+}
+
+static json_t *step_json(const struct step *step)
+{
+	const struct incise_origin *origin = step->origin;
+	bool recording = !strcmp(origin->kind, "recording");
+
+	return json_pack(
+		"{si ss so ss so so so ss}", "depth", origin->depth, "kind", origin->kind,
+		"name", json_text(origin->name), "sha256", origin->sha256, "commit",
+		recording ? json_integer((json_int_t)origin->commit) : json_null(),
+		"identity", recording ? json_text(origin->identity) : json_null(),
+		"found", step->found ? json_text(step->found) : json_null(), "state",
+		states[step->state]);
+}
+
+static void report(const struct job *job, const char *path, const struct step *steps,
+		   int n, bool cut)
+{
+	json_t *list = json_array();
+
+	if (!job->json)
+		printf("%s was made of\n", path);
+	for (int i = 0; i < n; i++)
+		if (job->json)
+			json_array_append_new(list, step_json(&steps[i]));
+		else
+			print_step(&steps[i]);
+	if (cut)
+		cli_warn("%s: names more than %d files; the others are left out", path,
+			 ORIGINS_MAX);
+	if (job->json)
+		json_print(json_pack("{so so sb}", "path", json_text(path), "origins",
+				     list, "cut", cut));
+	else
+		json_decref(list);
+}
+
+/* --- the command -------------------------------------------------------------------------- */
+
+_Noreturn static void fail_without(const char *path)
+{
+	switch (file_kind_of(path)) {
+	case FILE_RECORDING:
+		cli_fail("%s: a recording is where every way back ends; 'incise verify "
+			 "%s' checks it",
+			 path, path);
+	case FILE_COMPILED:
+		cli_fail("%s: a compiled model has no room for its origin; give the .fis "
+			 "file that it was compiled from",
+			 path);
+	case FILE_DEVIATION:
+		cli_fail("%s: a .sd file belongs to its model; give that", path);
+	case FILE_TABLE:
+		cli_fail("%s: says nothing of its origin; 'incise export --lineage' "
+			 "writes it into a CSV",
+			 path);
+	default:
+		cli_fail("%s: says nothing of its origin: another program or an older "
+			 "incise made it",
+			 path);
+	}
+}
+
+int main(int argc, char **argv)
+{
+	struct origins origins = {0};
+	struct incise_error err = {0};
+	struct job job = {0};
+	bool recorded = false, differs = false;
+	struct step *steps;
+	const char *path;
+
+	cli_parse(&command, argc, argv, &job);
+	path = cli_operand(argc, argv, "FILE", "figure, model or export");
+	if (job.recording)
+		file_expect(job.recording, FILE_RECORDING);
+	cli_catch_signals();
+	if (origins_read(&origins, path, &err))
+		cli_fail_with(&err);
+	if (!origins.n)
+		fail_without(path);
+	steps = cli_alloc((size_t)origins.n, sizeof(*steps));
+	for (int i = 0; i < origins.n && !cli_stop; i++) {
+		steps[i].origin = &origins.all[i];
+		compare(&steps[i], &job, path);
+		recorded |= !strcmp(origins.all[i].kind, "recording");
+		differs |= steps[i].state == OTHER;
+	}
+	if (cli_stop)
+		cli_fail("interrupted");
+	report(&job, path, steps, origins.n, origins.cut);
+	for (int i = 0; i < origins.n; i++)
+		free(steps[i].found);
+	free(steps);
+	origins_end(&origins);
+	cli_finish();
+	if (differs)
+		cli_fail("%s: a file here differs from the one that it was made of",
+			 path);
+	if (!recorded)
+		cli_fail("%s: its way back ends before a recording; 'incise export "
+			 "--lineage' writes the origin into a CSV",
+			 path);
+	return 0;
+}
