@@ -308,6 +308,15 @@ void incise_uncertainty_parts(const struct incise_uncertainty *u,
 	};
 }
 
+void incise_uncertainty_parts_many(const struct incise_uncertainty *uncertainty,
+				   const struct incise_model *model, const double *x,
+				   size_t n, struct incise_uncertainty_parts *parts)
+{
+	for (size_t k = 0; k < n; k++)
+		incise_uncertainty_parts(uncertainty, model,
+					 x + k * (size_t)model->info.n_inputs, &parts[k]);
+}
+
 double incise_uncertainty_sd(const struct incise_uncertainty *uncertainty,
 			     const struct incise_model *model, const double *x)
 {

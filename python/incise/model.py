@@ -179,6 +179,14 @@ _library.declare(
             ctypes.c_size_t,
             c_void_p,
         ),
+        "incise_uncertainty_parts_many": (
+            None,
+            c_void_p,
+            c_void_p,
+            c_void_p,
+            ctypes.c_size_t,
+            c_void_p,
+        ),
         "incise_fixed_compile": (
             ctypes.POINTER(FixedStruct),
             c_void_p,
@@ -501,8 +509,14 @@ class Model:
             return math.nan
         return function("incise_uncertainty_noise")(self._uncertainty)
 
-    def __call__(self, x: Any, sd: bool = False) -> Any:
-        """The output; with sd=True (output, standard deviation)."""
+    def __call__(self, x: Any, sd: bool = False, parts: bool = False) -> Any:
+        """The output; with sd=True (output, standard deviation).
+
+        With parts=True too (output, standard deviation, parts): in the last dimension of the parts
+        data, model, calibration and rig, whose squares add up to that of the standard deviation.
+        """
+        if parts and not sd:
+            raise Invalid(errno.EINVAL, "parts are those of the standard deviation; give sd=True")
         points = Points(x, self._info().n_inputs)
         block, address = points.results()
         function("incise_model_eval_many")(
@@ -520,7 +534,21 @@ class Model:
         function("incise_uncertainty_sd_many")(
             self._uncertainty, self._pointer, points.address, points.n, spread_address
         )
-        return points.finish(block), points.finish(spread)
+        if not parts:
+            return points.finish(block), points.finish(spread)
+        # struct incise_uncertainty_parts: the total, and four parts
+        whole, whole_address = points.results(5)
+        function("incise_uncertainty_parts_many")(
+            self._uncertainty, self._pointer, points.address, points.n, whole_address
+        )
+        each = points.finish(whole, 5)
+        if points.array is not None:
+            each = each[..., 1:]
+        elif points.shape is None:
+            each = each[1:]
+        else:
+            each = [row[1:] for row in each]
+        return points.finish(block), points.finish(spread), each
 
     def gradient(self, x: Any) -> Any:
         """Slopes of the output by each input, in the last dimension; 0 outside the ranges."""

@@ -70,6 +70,14 @@ class Models(Case):
         self.assertEqual(self.model(numpy.empty((0, 2))).shape, (0,))
         self.assertEqual(self.model(numpy.array([5.0, 20])), self.model((5, 20)))
         value, sd = self.model(x, sd=True)
+        same, total, parts = self.model(x, sd=True, parts=True)
+        self.assertTrue((same == value).all() and (total == sd).all())
+        self.assertEqual(parts.shape, (7, 3, 4))
+        self.assertLess(abs((parts**2).sum(-1) - sd**2).max(), 1e-12)
+        one = self.model((5, 20), sd=True, parts=True)
+        self.assertEqual(one[:2], self.model((5, 20), sd=True))
+        self.assertAlmostEqual(sum(p * p for p in one[2]), one[1] ** 2, places=12)
+        self.says(incise.Invalid, "parts", self.model, (5, 20), parts=True)
         self.assertTrue((sd > 0).all() and (value == y).all())
 
     def test_wrong_inputs(self):

@@ -102,6 +102,11 @@ INCISE_API void incise_uncertainty_parts(const struct incise_uncertainty *uncert
 					 const double *x,
 					 struct incise_uncertainty_parts *parts);
 
+/** The same for many points: parts[k] of the n_inputs values at x + k·n_inputs. Real-time safe. */
+INCISE_API void incise_uncertainty_parts_many(
+	const struct incise_uncertainty *uncertainty, const struct incise_model *model,
+	const double *x, size_t n, struct incise_uncertainty_parts *parts);
+
 /** Largest number of sources of a rig's calibration. */
 #define INCISE_UNCERTAINTY_SOURCES 64
 
