@@ -88,6 +88,8 @@ class ReportStruct(ctypes.Structure):
         ("n_streams", c_int),
         ("streams", StreamStruct * 3),
         ("frames", FramesStruct),
+        ("sealed", ctypes.c_bool),
+        ("commits", ctypes.c_uint64),
     ]
     c_name = "struct incise_verify_report"
 
