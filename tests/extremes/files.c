@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <incise/budget.h>
 #include <incise/calibration.h>
 #include <incise/fixed.h>
 #include <incise/model.h>
@@ -231,7 +232,12 @@ static void write_calibration(FILE *out)
 {
 	fputs("force_mV_N = 1240.0;\nforce_zero_mV = 180.0;\ndepth_mm_px = 0.11875;\n"
 	      "tracker_delay_ms = 4.2;\ntracker_delay_sd_ms = 0.1;\ntip_mm = [0.1, 0.0, -2.0];\n"
-	      "stepper_N_step = 0.00125;\nstepper_backlash_mm = 0.01;\n",
+	      "stepper_N_step = 0.00125;\nstepper_backlash_mm = 0.01;\nsurface_u_mm = 0.05;\n"
+	      "history = ( { kind = \"tip\"; date = \"2026-11-20T10:00:00Z\"; pass = true;\n"
+	      "  values = ( { key = \"tip_x_mm\"; left = 0.1; u = 0.03; },\n"
+	      "  { key = \"tip_y_mm\"; left = 0.0; u = 0.02; },\n"
+	      "  { key = \"tip_z_mm\"; left = -2.0; u = 0.04; } );\n"
+	      "  covariance = [ 9e-4, 3e-4, 4e-4, -2e-4, 1e-4, 16e-4 ]; } );\n",
 	      out);
 }
 
@@ -360,9 +366,11 @@ static int write_whole(const char *path, const void *bytes, size_t n,
 
 /* ---- recordings ---- */
 
-static int record(const char *path, struct incise_error *err)
+static int record(const char *path, const char *calibration_path,
+		  struct incise_error *err)
 {
-	struct incise_recorder_setup setup = {.planned_s = 1};
+	struct incise_recorder_setup setup = {.planned_s = 1,
+					      .calibration_path = calibration_path};
 	struct incise_calibration calibration;
 	struct incise_rig *rig =
 		incise_rig_open("sim:clock=simulated,times=1,cut_s=0.5,pause_s=0.6,"
@@ -374,7 +382,8 @@ static int record(const char *path, struct incise_error *err)
 
 	if (!rig)
 		return -1;
-	incise_calibration_nominal(&calibration);
+	if (incise_calibration_load(calibration_path, &calibration, err))
+		return -1;
 	setup.calibration = &calibration;
 	recorder = incise_recorder_new(path, rig, &setup, err);
 	clock = incise_rig_clock(rig);
@@ -386,6 +395,30 @@ static int record(const char *path, struct incise_error *err)
 		rc = -1;
 	incise_rig_close(rig);
 	return rc < 0 ? -1 : 0;
+}
+
+/* 0: each part is a number or not stated, and own ones are not negative; else as @load. */
+static int try_budget(struct incise_recording *recording, struct incise_error *err)
+{
+	const struct incise_budget_row row = {.force_N = 1,
+					      .depth_rate_mm_s = 10,
+					      .acceleration_mm_s2 = 100,
+					      .direction = {1, 0, 0},
+					      .tip = {0, 0.1, -1},
+					      .tip_1_s = {0.1, 0, 0},
+					      .share = 0.5,
+					      .force_share = 1};
+	struct incise_budget *budget = incise_budget_new(recording, NULL, NULL, err);
+	double part[INCISE_BUDGET_PARTS];
+	int rc = budget ? 0 : 1;
+
+	if (budget)
+		incise_budget_row(budget, &row, part);
+	for (int i = 0; i < INCISE_BUDGET_PARTS && budget; i++)
+		if (incise_budget_parts()[i].scope == INCISE_BUDGET_OWN && part[i] < 0)
+			rc = -1;
+	incise_budget_free(budget);
+	return rc;
 }
 
 static int open_recording(const char *path, struct incise_error *err)
@@ -402,8 +435,9 @@ static int open_recording(const char *path, struct incise_error *err)
 		rc = -1;
 	free(values);
 	free(poses);
+	rc = rc ? 1 : try_budget(recording, err);
 	incise_recording_close(recording);
-	return rc ? 1 : 0;
+	return rc;
 }
 
 static void try_recordings(struct extremes_row *row, const struct property *property)
@@ -412,6 +446,7 @@ static void try_recordings(struct extremes_row *row, const struct property *prop
 	struct incise_error failed = {0};
 	struct bytes bytes = {.whole = malloc(SIZE_MAX_BYTES),
 			      .broken = malloc(2 * SIZE_MAX_BYTES + 64)};
+	struct bytes calibration;
 	int rc;
 
 	if (!bytes.whole || !bytes.broken)
@@ -420,8 +455,14 @@ static void try_recordings(struct extremes_row *row, const struct property *prop
 	cli_catch_signals();
 	folder_make(folder, sizeof(folder), "for a recording");
 	snprintf(path, sizeof(path), "%s/a.rec", folder);
+	snprintf(database, sizeof(database), "%s/calibration.conf", folder);
+	calibration = take(write_calibration);
+	rc = write_whole(database, calibration.whole, calibration.n, &failed);
+	free(calibration.whole);
+	free(calibration.broken);
+	if (!rc)
+		rc = record(path, database, &failed);
 	snprintf(database, sizeof(database), "%s/recording.db", path);
-	rc = record(path, &failed);
 	if (!rc)
 		rc = read_whole(database, bytes.whole, SIZE_MAX_BYTES, &bytes.n, &failed);
 	for (long k = extremes_cases(row, property->cases); k && !rc && !cli_stop; k--) {

@@ -7,6 +7,7 @@
 #include <incise/budget.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"
+#include "../../../lib/record/export/writers.h"
 
 #define G_U 1.5 /* mV/N */
 #define Z_U 2.0 /* mV */
@@ -259,6 +260,90 @@ static void given_calibration_replaces(void **state)
 	incise_budget_free(budget);
 }
 
+/* 300 samples between records of the tracker 8.3 ms apart: parts of their mean. */
+static void mean_of_rows(const struct incise_budget *budget,
+			 double part[INCISE_BUDGET_PARTS])
+{
+	struct incise_budget_mean mean = {0};
+
+	for (int i = 0; i < 300; i++) {
+		const int64_t before_ns = i / 83 * 8300000LL;
+
+		incise_budget_mean_add(
+			&mean, budget, 0,
+			(const int64_t[2]){before_ns, before_ns + 8300000},
+			&(struct incise_budget_row){.force_N = 1,
+						    .force_share = 1,
+						    .direction = {1, 0, 0},
+						    .share = (i % 83 + 0.5) / 83});
+	}
+	incise_budget_mean_parts(&mean, part);
+}
+
+/* Against 4000 draws of the records' noise, whose variance they give to 3 sd of 7 %. */
+static void mean_of_depths_has_the_noise_of_its_records(void **state)
+{
+	double one[INCISE_BUDGET_PARTS], part[INCISE_BUDGET_PARTS], drawn = 0;
+	struct incise_budget *budget;
+	const int noise = 10; /* depth_u_noise_mm */
+
+	assert_string_equal(incise_budget_parts()[noise].column, "depth_u_noise_mm");
+	make("b.rec", NULL);
+	budget = budget_of("b.rec", NULL, NULL);
+	incise_budget_row(budget,
+			  &(struct incise_budget_row){.force_share = 1,
+						      .direction = {1, 0, 0}},
+			  one);
+	mean_of_rows(budget, part);
+	for (int d = 0; d < 4000; d++) {
+		double sum = 0;
+
+		for (int i = 0; i < 300; i++) {
+			double s = (i % 83 + 0.5) / 83;
+			uint64_t at = (uint64_t)d * 10 + i / 83;
+
+			sum += (1 - s) * incise_random_normal(3, at) +
+			       s * incise_random_normal(3, at + 1);
+		}
+		drawn += sum / 300 * sum / 300 / 4000;
+	}
+	assert_float_equal(part[noise], one[noise] * sqrt(drawn), 0.035 * part[noise]);
+	/* white noise of the force */
+	assert_float_equal(part[3], one[3] / sqrt(300), 0.1 * part[3]);
+	incise_budget_free(budget);
+}
+
+/* Noise that is a sum over 8 samples counts an eighth of them; the window lasts 0.4 s, and gives
+ * the correlation to some 15 %. */
+static void mean_of_forces_counts_correlated_samples_as_fewer(void **state)
+{
+	double one[INCISE_BUDGET_PARTS], part[INCISE_BUDGET_PARTS];
+	struct incise_budget *budget;
+
+	make("b.rec", NULL);
+	change("b.rec/recording.db",
+	       "CREATE TABLE white AS SELECT seq, (sin(seq * 12.9898) * 43758.5453) - "
+	       "floor(sin(seq * 12.9898) * 43758.5453) AS x FROM force;"
+	       "CREATE TABLE red AS SELECT seq, sum(x) OVER (ORDER BY seq ROWS 7 "
+	       "PRECEDING) AS x FROM white; CREATE UNIQUE INDEX red_seq ON red (seq);"
+	       "UPDATE force SET code = 100 + round(10 * (SELECT x FROM red WHERE "
+	       "red.seq = force.seq)) WHERE seq < 5000;"
+	       "UPDATE meta SET value = 10 * sqrt(8 / 12.0) * 5000 / 4096 WHERE key = "
+	       "'force_zero_sd_mV'; DROP TABLE red; DROP TABLE white");
+	budget = budget_of("b.rec", NULL, NULL);
+	incise_budget_row(budget,
+			  &(struct incise_budget_row){.force_share = 1,
+						      .direction = {1, 0, 0}},
+			  one);
+	mean_of_rows(budget, part);
+	assert_float_equal(part[3], one[3] * sqrt(8 / 300.), 0.15 * part[3]);
+	/* and so does the zero */
+	assert_float_equal(incise_budget_u(budget, INCISE_BUDGET_ZERO),
+			   10 * sqrt(8 / 12.) * 5000 / 4096 * sqrt(8 / 5000.),
+			   0.15 * incise_budget_u(budget, INCISE_BUDGET_ZERO));
+	incise_budget_free(budget);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -268,6 +353,8 @@ int main(void)
 		IN_FOLDER(noise_is_that_of_the_rig),
 		IN_FOLDER(not_stated_is_not_a_number),
 		IN_FOLDER(given_calibration_replaces),
+		IN_FOLDER(mean_of_depths_has_the_noise_of_its_records),
+		IN_FOLDER(mean_of_forces_counts_correlated_samples_as_fewer),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
