@@ -13,7 +13,7 @@ setup() {
 @test "bench coverage: intervals hold the truth, in all and by part" {
 	quick_report coverage
 	[ "$(key r.json rigs) $(key r.json refused) $(key r.json seed)" = "12 0 1" ]
-	[ "$(of rows 'count(*)')" = 12 ]
+	[ "$(of rows 'count(*)')" = 24 ]
 	[ "$(of rows 'count(*)' "part = 'own' AND (coverage < 0.93 OR coverage > 0.975)")" = 0 ]
 	[ "$(of rows 'count(*)' "part = 'common' AND coverage < 0.66")" = 0 ]
 	[ "$(of rows 'count(*)' "part = 'total' AND coverage < 0.66")" = 0 ]

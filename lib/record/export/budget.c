@@ -27,6 +27,7 @@
 #include "../read/depth.h"
 #include "../read/recalibration.h"
 #include "../read/recording.h"
+#include "../read/session.h"
 #include "../schema.h"
 #include "interpolators.h"
 #include "writers.h"
@@ -670,7 +671,26 @@ static int read_tracker(struct tracker_sums *sums, struct incise_rows *rows,
 	return rc;
 }
 
-static void keep_tracker(struct incise_budget *budget, const struct tracker_sums *sums)
+/* In a session: of the clock of the force's member, s; that of the tracker's is in its rows. */
+static double force_clock_s(struct incise_recording *force)
+{
+	sqlite3_stmt *stmt = NULL;
+	double bound_ns = 0;
+
+	if (!force->map)
+		return 0;
+	if (sqlite3_prepare_v2(force->db, "SELECT t_ns FROM force ORDER BY seq LIMIT 1",
+			       -1, &stmt, NULL) == SQLITE_OK &&
+	    sqlite3_step(stmt) == SQLITE_ROW)
+		bound_ns =
+			incise_session_bound(force->map, sqlite3_column_int64(stmt, 0));
+	sqlite3_finalize(stmt);
+	/* Of a bounded error that is as likely anywhere within. */
+	return bound_ns / sqrt(3) * 1e-9;
+}
+
+static void keep_tracker(struct incise_budget *budget, const struct tracker_sums *sums,
+			 double clock_s)
 {
 	bool inside = sums->offs[1] > 0;
 	double off = sums->off_mm2_s2[inside] / sums->offs[inside], noise = 0;
@@ -689,7 +709,8 @@ static void keep_tracker(struct incise_budget *budget, const struct tracker_sums
 	/* Two filters of one motion differ by noise, and by what one of them flattens. */
 	off -= noise * pow(incise_smooth_line_noise(&sums->smooth, INCISE_DEPTH_HALF), 2);
 	budget->smoothing_mm_s = sqrt(fmax(off, 0));
-	set(budget, INCISE_BUDGET_LINE, sqrt(sums->line_s2 / sums->lines));
+	set(budget, INCISE_BUDGET_LINE,
+	    sqrt(sums->line_s2 / sums->lines + clock_s * clock_s));
 }
 
 static int measure_tracker(struct incise_budget *budget, const struct use *use,
@@ -719,7 +740,7 @@ static int measure_tracker(struct incise_budget *budget, const struct use *use,
 				  err);
 	incise_rows_close(&rows);
 	if (!rc)
-		keep_tracker(budget, &sums);
+		keep_tracker(budget, &sums, force_clock_s(use->force));
 	incise_smooth_free(&sums.smooth);
 	return rc;
 }
