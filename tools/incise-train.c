@@ -17,6 +17,7 @@
 #include <incise/factor.h>
 #include <incise/propagation.h>
 #include <incise/ranks.h>
+#include <incise/recalibration.h>
 #include <incise/train.h>
 #include <incise/version.h>
 #include "cli/cli.h"
@@ -1347,6 +1348,26 @@ static void save_model(const struct options *options, const struct incise_corpus
 		json_decref(warned);
 }
 
+/* Add the calibrations that recordings are read by: their own files stay as they are. */
+static char *add_calibrations(char *key, const struct source *sources, int n)
+{
+	for (int i = 0; i < n; i++) {
+		struct incise_recalibration *list = NULL;
+		int calibrations =
+			sources[i].recording
+				? incise_recalibrations(sources[i].path, &list, NULL)
+				: 0;
+		char *more =
+			cli_text("%s%s%s", key, calibrations > 1 ? "; " : "",
+				 calibrations > 1 ? list[calibrations - 1].file : "");
+
+		free(list);
+		free(key);
+		key = more;
+	}
+	return key;
+}
+
 /* All options that the surveys and sums depend on: free(3). */
 static char *progress_key(const struct options *options)
 {
@@ -1418,7 +1439,8 @@ int main(int argc, char **argv)
 	options.data = options.n_paths == 1 ? sources[0].path : data;
 	/* Weights are not kept in the progress. */
 	if (!options.mpi && !options.train.classic && !uncertainties.n) {
-		char *key = progress_key(&options);
+		char *key = add_calibrations(progress_key(&options), sources,
+					     options.n_paths);
 
 		progress = progress_new(options.factor ? options.factor : options.model,
 					key, sources, options.n_paths);

@@ -192,37 +192,20 @@ static void refused(const struct incise_model *model, const char *text, size_t s
 	assert_non_null(strstr(err.text, path));
 }
 
-/* Cut anywhere but in the last digits and line end; changed in any of its parts. */
-static void test_damage_is_refused(void **state)
-{
-	static const struct {
-		const char *from, *to;
-	} changes[] = {
-		{"incise-sd 1", "incise-sd 2"},
-		{"incise-sd 1", "incise-xd 1"},
-		{"model ", "model 0"},
-		{"model ", "model x"},
-		{"unknowns 60", "unknowns 59"},
-		{"unknowns 60", "unknowns 6e1"},
-		{"noise 0.25", "noise -0.25"},
-		{"noise 0.25", "noise nan"},
-		{"noise 0.25", "noise 0.25 1"},
-		{"noise 0.25", "noise 1e999"},
-		{"noise 0.25\n", "noise 0.25\n0 "},
-		{"noise 0.25\n", "noise 0.25\n1 "},
-		{"noise 0.25\n", "noise 0.25\nx "},
-	};
-	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
-	struct incise_uncertainty *u = make(model);
-	size_t size;
-	char *text, *changed = malloc(1 << 17);
+struct change {
+	const char *from, *to;
+};
 
-	assert_int_equal(incise_uncertainty_save(u, path, NULL), 0);
-	incise_uncertainty_free(u);
-	text = read_all(&size);
+/* Cut anywhere but in the last digits and line end; changed in any of its parts. */
+static void refuse_damage(const struct incise_model *model, const struct change *changes,
+			  size_t n)
+{
+	size_t size;
+	char *text = read_all(&size), *changed = malloc(1 << 17);
+
 	for (size_t cut = 0; cut + 30 < size; cut += 97)
 		refused(model, text, cut);
-	for (size_t i = 0; i < sizeof(changes) / sizeof(*changes); i++) {
+	for (size_t i = 0; i < n; i++) {
 		char *at = memmem(text, size, changes[i].from, strlen(changes[i].from));
 		size_t before = at - text, skip = strlen(changes[i].from);
 
@@ -240,6 +223,56 @@ static void test_damage_is_refused(void **state)
 	refused(model, changed, size + 1);
 	free(text);
 	free(changed);
+}
+
+static void test_damage_is_refused(void **state)
+{
+	static const struct change changes[] = {
+		{"incise-sd 1", "incise-sd 2"},
+		{"incise-sd 1", "incise-sd 0"},
+		{"incise-sd 1", "incise-sd 3"},
+		{"incise-sd 1", "incise-xd 1"},
+		{"model ", "model 0"},
+		{"model ", "model x"},
+		{"unknowns 60", "unknowns 59"},
+		{"unknowns 60", "unknowns 6e1"},
+		{"noise 0.25", "noise -0.25"},
+		{"noise 0.25", "noise nan"},
+		{"noise 0.25", "noise 0.25 1"},
+		{"noise 0.25", "noise 1e999"},
+		{"noise 0.25\n", "noise 0.25\n0 "},
+		{"noise 0.25\n", "noise 0.25\n1 "},
+		{"noise 0.25\n", "noise 0.25\nx "},
+	};
+	/* Of version 2, with three lines of calibrations, the last one of ones. */
+	static const struct change calibrations[] = {
+		{"incise-sd 2", "incise-sd 1"},
+		{"common 2", "common 61"},
+		{"common 2", "common -1"},
+		{"common 2", "common 3"},
+		{"common 2", "common 1"},
+		{"rig 1", "rig 65"},
+		{"rig 1", "rig 0"},
+		{"rig 1", "rog 1"},
+		{"\n1 1 1 ", "\n1 1 "},
+		{"\n1 1 1 ", "\n1 1 1 1 "},
+		{"\n1 1 1 ", "\n1 inf 1 "},
+		{"\n1 1 1 ", "\n1 x 1 "},
+	};
+	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
+	struct incise_uncertainty *u = make(model);
+	double rows[3 * N];
+
+	assert_int_equal(incise_uncertainty_save(u, path, NULL), 0);
+	refuse_damage(model, changes, sizeof(changes) / sizeof(*changes));
+	for (int i = 0; i < 3 * N; i++)
+		rows[i] = i < 2 * N ? 0.1 : 1;
+	assert_int_equal(incise_uncertainty_set_calibration(u, 0.25, rows, 2,
+							    rows + 2 * N, 1, NULL),
+			 0);
+	assert_int_equal(incise_uncertainty_save(u, path, NULL), 0);
+	refuse_damage(model, calibrations, sizeof(calibrations) / sizeof(*calibrations));
+	incise_uncertainty_free(u);
 	incise_model_free(model);
 }
 
