@@ -29,7 +29,7 @@
 #include "bench.h"
 
 #define RIGS 200
-#define QUICK_RIGS 12
+#define QUICK_RIGS 9
 #define K 2.0 /* 95 % */
 #define ASKED_LOW 0.93
 #define ASKED_HIGH 0.97
@@ -308,7 +308,7 @@ static struct incise_delay_point *points_of(struct incise_recording *recording,
 	return points;
 }
 
-#define DELAY_S 14
+#define DELAY_S 12
 
 /* As incise calibrate delay does against the force. */
 static int calibrate_delay(struct rig *rig)
@@ -823,8 +823,10 @@ static void run(struct bench_run *run)
 	char folder[150], why[200] = "";
 
 	totals = (struct totals){0};
+	/* An interrupted run removes the folder, too. */
+	cli_catch_signals();
 	folder_make(folder, sizeof(folder), "recordings of virtual rigs");
-	for (int i = 0; i < n; i++) {
+	for (int i = 0; i < n && !cli_stop; i++) {
 		struct rig rig;
 
 		cli_progress("rig %d of %d", i + 1, n);
@@ -838,6 +840,8 @@ static void run(struct bench_run *run)
 	}
 	cli_progress_end();
 	folder_remove(folder);
+	if (cli_stop)
+		cli_fail("interrupted");
 	if (totals.rigs < 2) {
 		bench_fail(run, "no rig could be calibrated: %s", why);
 		return;
