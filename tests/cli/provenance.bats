@@ -5,9 +5,9 @@ load cli
 
 setup_file() {
 	cd "$BATS_FILE_TMPDIR"
-	"$INCISE_BUILD/bin/incise" capture -o "a b;.rec" --rig sim:clock=simulated,times=2,seed=1 >/dev/null
+	"$INCISE_BUILD/bin/incise" capture -o "a b;.rec" --rig sim:clock=simulated,depth_mm=6,times=2,pause_s=1,cut_s=4 >/dev/null
 	"$INCISE_BUILD/bin/incise" export "a b;.rec" --average 6x6 --by-cut --min-count 5 --lineage -o p.csv >/dev/null
-	"$INCISE_BUILD/bin/incise" train p.csv -o m.fis >/dev/null 2>&1
+	"$INCISE_BUILD/bin/incise" train p.csv --mf 2,2 -o m.fis >/dev/null 2>&1
 }
 
 setup() {
@@ -57,8 +57,8 @@ setup() {
 		incise export "a b;.rec" -o e.h5
 		files+=" e.h5"
 	fi
-	incise train "a b;.rec" -o r.fis >/dev/null 2>&1
-	incise train "a b;.rec" --premises r.fis --factor r.fac >/dev/null 2>&1
+	incise train "a b;.rec" --rate 1000 --mf 2,2 --starts 1 -o r.fis >/dev/null 2>&1
+	incise train "a b;.rec" --rate 1000 --premises r.fis --factor r.fac >/dev/null 2>&1
 	incise merge r.fac -o merged.fis >/dev/null
 	for file in $files r.fis merged.fis; do
 		run -0 --separate-stderr incise provenance $file
