@@ -56,6 +56,8 @@ fuzz_scene_file := $(filter-out lib/fixed/%,$(call sources,incise))
 fuzz_libs_scene_file = $(pc_libs_incise) $(libs_incise) -pthread
 fuzz_calibration_text := $(fuzz_scene_file)
 fuzz_libs_calibration_text = $(fuzz_libs_scene_file)
+fuzz_sd_file := $(fuzz_scene_file)
+fuzz_libs_sd_file = $(fuzz_libs_scene_file)
 fuzz_session_file := $(fuzz_scene_file) $(addprefix tools/session/,digest.c judge.c \
 	session_file.c) tools/cli/json.c tools/cli/loop_report.c tools/cli/stopwatch.c
 fuzz_libs_session_file = $(fuzz_libs_scene_file) $(shell $(PKG_CONFIG) --libs jansson)

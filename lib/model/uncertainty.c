@@ -251,9 +251,12 @@ void incise_uncertainty_row(const struct incise_model *model, const double *x,
 static double square(const struct incise_uncertainty *u, const double *phi, int first,
 		     int n)
 {
-	const double *row = u->calibration + (size_t)first * (size_t)u->n;
+	const double *row;
 	double sum = 0;
 
+	if (!n)
+		return 0;
+	row = u->calibration + (size_t)first * (size_t)u->n;
 	for (int i = 0; i < n; i++) {
 		double product = 0;
 
