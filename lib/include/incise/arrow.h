@@ -85,7 +85,9 @@ struct incise_recording;
  * "table" | the columns of incise_export() with these options |
  *
  * t_ns is the best time of acquisition, CLOCK_MONOTONIC. Fields have the metadata "unit" and
- * "description", those that a calibration enters its values too; the table has the provenance of
+ * "description", those that a calibration enters its values too, with the uncertainties that it
+ * states and their covariances; those of a table with uncertainties "uncertainty_variables",
+ * "uncertainty_of" and "correlation". The table has the provenance of
  * an export. Memory is that of a few batches of at most 65536 rows, whatever the length.
  *
  * The stream reads by a connection of its own: the recording may be closed before, and several

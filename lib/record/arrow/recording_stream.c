@@ -12,6 +12,7 @@
 #include <string.h>
 #include <unistd.h>
 #include <incise/recording.h>
+#include "../export/writers.h"
 #include "../read/rows.h"
 #include "../read/session.h"
 #include "arrow_batch.h"
@@ -290,6 +291,51 @@ static int add_known(struct incise_provenance *to, const char *key, double value
 	return isnan(value) ? 0 : incise_provenance_add(to, key, "%.17g", value);
 }
 
+/* Standard uncertainties that the calibrations state, with their covariance. */
+static int describe_uncertainties(struct rows_source *source,
+				  const struct incise_export_options *options)
+{
+	static const struct {
+		const char *table, *key;
+		enum incise_budget_source a,
+			b; /* equal: an uncertainty, else a covariance */
+	} items[] = {
+		{"force", "force_mV_N_u", INCISE_BUDGET_GAIN, INCISE_BUDGET_GAIN},
+		{"force", "force_zero_mV_u", INCISE_BUDGET_ZERO, INCISE_BUDGET_ZERO},
+		{"force", "covariance_force_mV_N_force_zero_mV", INCISE_BUDGET_GAIN,
+		 INCISE_BUDGET_ZERO},
+		{"depth", "surface_u_mm", INCISE_BUDGET_SURFACE, INCISE_BUDGET_SURFACE},
+		{"depth", "tip_x_u_mm", INCISE_BUDGET_TIP_X, INCISE_BUDGET_TIP_X},
+		{"depth", "tip_y_u_mm", INCISE_BUDGET_TIP_Y, INCISE_BUDGET_TIP_Y},
+		{"depth", "tip_z_u_mm", INCISE_BUDGET_TIP_Z, INCISE_BUDGET_TIP_Z},
+		{"depth", "covariance_tip_x_tip_y_mm2", INCISE_BUDGET_TIP_X,
+		 INCISE_BUDGET_TIP_Y},
+		{"depth", "covariance_tip_x_tip_z_mm2", INCISE_BUDGET_TIP_X,
+		 INCISE_BUDGET_TIP_Z},
+		{"depth", "covariance_tip_y_tip_z_mm2", INCISE_BUDGET_TIP_Y,
+		 INCISE_BUDGET_TIP_Z},
+	};
+	struct incise_budget *budget;
+	int rc = 0;
+
+	if (strcmp(source->table->name, "force") != 0 &&
+	    strcmp(source->table->name, "depth") != 0)
+		return 0;
+	/* Rows are read even if the text of their calibration is damaged. */
+	budget = incise_budget_open(source->recording, options, false, NULL);
+	if (!budget)
+		return errno == ENOMEM ? -ENOMEM : 0;
+	for (size_t i = 0; i < sizeof(items) / sizeof(*items) && !rc; i++)
+		if (!strcmp(items[i].table, source->table->name))
+			rc = add_known(&source->value, items[i].key,
+				       items[i].a == items[i].b
+					       ? incise_budget_u(budget, items[i].a)
+					       : incise_budget_covariance(
+							 budget, items[i].a, items[i].b));
+	incise_budget_free(budget);
+	return rc;
+}
+
 /* The calibration of the values: scales, and the plane that depth is measured from. */
 static int describe_values(struct rows_source *source,
 			   const struct incise_calibration *given)
@@ -341,13 +387,16 @@ static int describe_times(struct rows_source *source)
 	return rc;
 }
 
-static int describe(struct rows_source *source, const struct incise_calibration *given)
+static int describe(struct rows_source *source,
+		    const struct incise_export_options *options)
 {
 	const struct table *table = source->table;
 	int rc = describe_times(source), n = 0;
 
 	if (!rc && table->calibrated)
-		rc = describe_values(source, given);
+		rc = describe_values(source, options->calibration);
+	if (!rc && table->calibrated)
+		rc = describe_uncertainties(source, options);
 	for (; table->fields[n].name; n++) {
 		struct incise_arrow_field *field = &source->fields[n];
 
@@ -394,7 +443,7 @@ static int rows_open(struct rows_source *source,
 	incise_recording_force(recording, given, &source->scale);
 	source->depth_scale =
 		given ? given->depth_mm_px / recording->meta.depth_mm_px : 1;
-	rc = describe(source, given);
+	rc = describe(source, options);
 	if (!rc)
 		rc = incise_arrow_batch_open(&source->batch, source->fields,
 					     source->base.n_fields, BATCH_ROWS);

@@ -173,6 +173,9 @@ static void fields_have_units_and_calibration(void **state)
 	assert_string_equal(schema.children[3]->format, "g");
 	assert_string_equal(metadata(schema.children[3], "unit"), "N");
 	assert_string_equal(metadata(schema.children[3], "force_mV_N"), "1240");
+	/* a nominal value states no uncertainty; the zero was measured */
+	assert_string_equal(metadata(schema.children[3], "force_mV_N_u"), "");
+	assert_true(atof(metadata(schema.children[3], "force_zero_mV_u")) > 0.01);
 	schema.release(&schema);
 	batch[0] = next(&stream);
 	stream.release(&stream);
