@@ -25,7 +25,9 @@ from .recording import Recording
 
 TEXT_MAX = 1000  # INCISE_FACTOR_TEXT_MAX
 ORIGINS = 480  # bytes of a recording's origins in its text, as in tools/train/sources.c
-_ORIGIN = re.compile(rb"incise:([1-9]):([a-z]{1,15}:[0-9a-f]{64}:[0-9]+:[-0-9A-Za-z]+:[-0-9A-Za-z._~%]+;)")
+_ORIGIN = re.compile(
+    rb"incise:([1-9]):([a-z]{1,15}:[0-9a-f]{64}:[0-9]+:[-0-9A-Za-z]+:[-0-9A-Za-z._~%]+;)"
+)
 SAMPLE = 20000  # INCISE_CORPUS_SAMPLE
 
 _Read = ctypes.CFUNCTYPE(c_int, c_void_p, c_void_p, c_void_p, c_void_p)
@@ -105,7 +107,7 @@ def _sha256(path: bytes) -> bytes:
 
 
 def _origins_of_file(path: bytes) -> List[bytes]:
-    """Those in the comments at the start of a CSV file, one deeper, each once; see incise/origin.h."""
+    """Those in the comments at the start of a CSV file, one deeper; see incise/origin.h."""
     found: List[bytes] = []
     with open(path, "rb") as file:
         for line in file:
@@ -183,13 +185,13 @@ class Source:
             digest = _sha256(os.path.join(_without_choice(self.path), b"recording.db"))
         else:
             text = os.path.basename(self.path)[:300]
+            digest = _sha256(self.path)
             between = b", "
             for origin in _origins_of_file(self.path):
                 if len(text) + len(origin) + 2 >= TEXT_MAX:
                     break
                 text += between + origin
                 between = b" "
-            digest = _sha256(self.path)
         # A group of all rows; else the text of a column.
         whole = {"recording": digest, "rig": rig if self.recording else None}.get(group or "")
         self.rows = (
