@@ -58,6 +58,8 @@ train() {
 	bad_usage "--parts goes with --sd"
 }
 
+# tests/unit/learn/propagation.c has it without programs.
+# bats test_tags=slow
 @test "a calibration does not average out over rows, and does over rigs" {
 	incise train a.csv --group cut --mf 2,2 -o one.fis --json >one.json 2>err
 	incise train a.csv b.csv c.csv --group cut --mf 2,2 -o three.fis --json >three.json 2>err
@@ -93,8 +95,6 @@ train() {
 	rm m.fis.sd
 	incise status ./m.state --json >s.json
 	[ -z "$(key s.json 'loops[0].model')" ]
-	incise plan m.scene --json >r.json
-	[ -z "$(key r.json rest)" ]
 }
 
 @test "figures of models and of pairs have bands" {
