@@ -174,12 +174,17 @@ not_vouched() {
 	echo 'force_mV_N = 1111.0;' >c.conf
 	incise recalibrate signed.rec -c c.conf
 	run -1 --separate-stderr incise verify signed.rec --signers signers
-	[[ "$output" == *"calibrations after the fact are not those in the statement"* ]]
-	[[ "$output" == *"signed by kim@lab "*", but not for what it is now, statement of commit "* ]]
+	[[ "$output" == *"calibration/0001-"*".conf, by which it is read, is not in the statement"* ]]
+	[[ "$output" == *"signed by kim@lab "*", what was recorded, but not its calibration, statement of commit "* ]]
 	[[ "$stderr" == *"signed.rec: nobody in signers signed what it is now" ]]
+	# by the calibration of its capture it is what was signed
+	incise recalibrate signed.rec --original
+	run -0 --separate-stderr incise verify signed.rec --signers signers
+	[[ "$output" == *", all of it, "* ]]
+	incise recalibrate signed.rec -c c.conf
 	incise sign signed.rec --key "$kim"
 	run -0 --separate-stderr incise verify signed.rec --signers signers
-	[[ "$output" == *", but not for what it is now, "*", all of it, "* ]]
+	[[ "$output" == *", what was recorded, but not its calibration, "*", all of it, "* ]]
 	sed -i 's/1111/1112/' signed.rec/calibration/*.conf
 	run -1 --separate-stderr incise verify signed.rec --signers signers
 }

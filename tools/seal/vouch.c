@@ -63,30 +63,45 @@ static int progress(void *user, double share)
 	return cli_stop;
 }
 
-/* Whether calibrations are those in the statement; it is a finding if not. */
-static bool compare_calibrations(struct vouch *vouch, const struct seal_file *file,
-				 const struct comparison *comparison)
+/*
+ * Whether the calibration by which the recording is read is that of its capture, or is named in the
+ * statement; it is a finding if not.
+ */
+static bool compare_calibration(struct vouch *vouch, const struct seal_file *file,
+				const struct comparison *comparison)
 {
 	struct incise_error err = {0};
 	char *now = cli_require(seal_calibrations(vouch->recording, &err), &err);
 	const char *then = file->bytes + seal_statement_length(file->bytes, file->n);
-	bool same = !strcmp(now, then);
-	struct incise_verify_finding finding = {
-		.kind = INCISE_VERIFY_SEAL,
-		.stream = "",
-		.first_block = -1,
-		.last_block = -1,
-		.last_seq = -1,
-		.first_ns = -1,
-		.last_ns = -1,
-		.count = 1,
-		.text = "calibrations after the fact are not those in the statement",
-	};
+	const char *active = now, *kind;
+	char name[200] = "", text[300];
+	bool known;
 
-	if (!same)
+	/* The last one is active. */
+	for (char *line = now; *line; line = strchr(line, '\n') + 1)
+		active = line;
+	sscanf(active, "calibration %199s", name);
+	kind = strrchr(name, '.');
+	known = !*name || (kind && !strcmp(kind, ".original")) || strstr(then, active);
+	if (!known) {
+		struct incise_verify_finding finding = {
+			.kind = INCISE_VERIFY_SEAL,
+			.stream = "",
+			.first_block = -1,
+			.last_block = -1,
+			.last_seq = -1,
+			.first_ns = -1,
+			.last_ns = -1,
+			.count = 1,
+			.text = text,
+		};
+
+		snprintf(text, sizeof(text),
+			 "%s, by which it is read, is not in the statement", name);
 		found((void *)(uintptr_t)comparison, &finding);
+	}
 	free(now);
-	return same;
+	return known;
 }
 
 /* Returns whether the recording was verified with it. */
@@ -118,8 +133,8 @@ static bool compare(struct vouch *vouch, const struct seal_file *file,
 					seal_statement_length(file->bytes, file->n), &own,
 					report, &err))
 			cli_fail_with(&err);
-		s->agrees =
-			compare_calibrations(vouch, file, &comparison) && report->sealed;
+		s->recorded = report->sealed;
+		s->agrees = compare_calibration(vouch, file, &comparison) && s->recorded;
 		s->reported = watch;
 	}
 	free(statement);
@@ -284,7 +299,8 @@ static char *extent(const struct vouch *vouch, int number)
 	if (!s || s->commit < 0)
 		return cli_text("statement %d", number);
 	return cli_text("%s, statement of commit %lld",
-			!s->agrees    ? "but not for what it is now"
+			!s->recorded  ? "but not for what it is now"
+			: !s->agrees  ? "what was recorded, but not its calibration"
 			: s->complete ? "all of it"
 				      : "all of it up to the interruption",
 			(long long)s->commit);

@@ -40,7 +40,8 @@ struct vouch_statement {
 	int number;
 	int64_t commit; /* -1: it is no statement */
 	bool complete;	/* of a recording that was closed */
-	bool agrees;
+	bool recorded;	/* what was recorded agrees */
+	bool agrees;	/* that, and the calibration by which it is read */
 	bool is_signed; /* by a signer that may */
 	bool reported;	/* differences were findings of the verification */
 	int n_differences;
