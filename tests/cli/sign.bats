@@ -185,8 +185,13 @@ not_vouched() {
 	incise sign signed.rec --key "$kim"
 	run -0 --separate-stderr incise verify signed.rec --signers signers
 	[[ "$output" == *", what was recorded, but not its calibration, "*", all of it, "* ]]
+	cp -r signed.rec other.rec
+	rm other.rec/calibration/0003-*
+	run -1 --separate-stderr incise verify other.rec --signers signers
+	[[ "$output" == *"calibrations that are in the statement were removed or changed"* ]]
 	sed -i 's/1111/1112/' signed.rec/calibration/*.conf
 	run -1 --separate-stderr incise verify signed.rec --signers signers
+	[[ "$output" == *"calibrations that are in the statement were removed or changed"* ]]
 }
 
 @test "the key of the rig signs at the end of a capture; without it the recording is whole and unsigned" {

@@ -64,8 +64,8 @@ static int progress(void *user, double share)
 }
 
 /*
- * Whether the calibration by which the recording is read is that of its capture, or is named in the
- * statement; it is a finding if not.
+ * Whether the recording is read by the calibration of the statement, or by that of its capture again
+ * after it; it is a finding if not.
  */
 static bool compare_calibration(struct vouch *vouch, const struct seal_file *file,
 				const struct comparison *comparison)
@@ -75,14 +75,15 @@ static bool compare_calibration(struct vouch *vouch, const struct seal_file *fil
 	const char *then = file->bytes + seal_statement_length(file->bytes, file->n);
 	const char *active = now, *kind;
 	char name[200] = "", text[300];
-	bool known;
+	bool kept, known;
 
 	/* The last one is active. */
 	for (char *line = now; *line; line = strchr(line, '\n') + 1)
 		active = line;
 	sscanf(active, "calibration %199s", name);
 	kind = strrchr(name, '.');
-	known = !*name || (kind && !strcmp(kind, ".original")) || strstr(then, active);
+	kept = !strncmp(now, then, strlen(then));
+	known = kept && (!now[strlen(then)] || (kind && !strcmp(kind, ".original")));
 	if (!known) {
 		struct incise_verify_finding finding = {
 			.kind = INCISE_VERIFY_SEAL,
@@ -97,7 +98,10 @@ static bool compare_calibration(struct vouch *vouch, const struct seal_file *fil
 		};
 
 		snprintf(text, sizeof(text),
-			 "%s, by which it is read, is not in the statement", name);
+			 kept ? "%s, by which it is read, is not in the statement"
+			      : "calibrations that are in the statement were removed or "
+				"changed",
+			 name);
 		found((void *)(uintptr_t)comparison, &finding);
 	}
 	free(now);
@@ -226,8 +230,11 @@ static const struct seal_file *statement_of(const struct seal_files *files, int 
 	return NULL;
 }
 
+/* Statements are newest first. An older state that was signed, too, does not replace a newer one. */
 static void judge(struct vouch *vouch)
 {
+	bool newest = true;
+
 	for (int i = 0; i < vouch->n_statements; i++) {
 		struct vouch_statement *s = &vouch->statements[i];
 
@@ -235,7 +242,8 @@ static void judge(struct vouch *vouch)
 			s->is_signed |= vouch->lines[k].number == s->number &&
 					vouch->lines[k].kind == SEAL_SIGNATURE &&
 					vouch->lines[k].verdict == VOUCH_GOOD;
-		vouch->vouched |= s->agrees && s->is_signed;
+		vouch->vouched |= newest && s->agrees && s->is_signed;
+		newest &= !s->is_signed;
 		vouch->bad += s->commit < 0;
 	}
 }

@@ -53,7 +53,7 @@ struct vouch {
 	struct vouch_statement *statements;
 	struct vouch_line *lines;
 	int n_statements, n_lines;
-	bool vouched; /* a signature that is good, over a statement that agrees */
+	bool vouched; /* the newest statement with a good signature agrees */
 	int bad;      /* signatures, time-stamps and statements that are not good */
 };
 

@@ -206,7 +206,6 @@ uint64_t incise_seal_walk_behind(struct incise_seal_walk *walk, bool *blocks)
 	*blocks = false;
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++) {
 		struct incise_seal_walk_stream *stream = &walk->streams[i];
-
 		struct incise_ledger_block block;
 
 		while (sqlite3_step(stream->blocks) == SQLITE_ROW) {
