@@ -215,6 +215,7 @@ setup() {
 	fi
 }
 
+# bats test_tags=slow
 @test "bench precision draws a chart" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
 	run -0 --separate-stderr incise bench precision --quick --plot "a folder/b/chart"
@@ -231,6 +232,7 @@ setup() {
 	[ -f c.png ] && [ -f c.svg ] && [ ! -e c.svg.svg ]
 }
 
+# bats test_tags=slow
 @test "bench precision measures a model of mine" {
 	made_pairs >pairs.csv
 	incise train pairs.csv -o m.fis 2>/dev/null

@@ -195,6 +195,7 @@ report_of() {
 	done
 }
 
+# bats test_tags=slow
 @test "a benchmark that fails stands in the report, and the others go on" {
 	mkdir modules
 	export INCISE_MODULE_PATH=$PWD/modules
@@ -217,6 +218,7 @@ report_of() {
 	[ "$(ls r/data)" = training.json ]
 }
 
+# bats test_tags=slow
 @test "what changed since another report stands in it" {
 	# figures that are exact, of the same program
 	incise bench all --quick --report r --only timeline
@@ -399,6 +401,7 @@ asked() {
 	done
 }
 
+# bats test_tags=slow
 @test "pictures of the report, and its pages" {
 	mkdir -p "$INCISE_BUILD/artefacts"
 	for size in 390,844 1280,2000; do

@@ -158,6 +158,7 @@ at_most() {
 	done
 }
 
+# bats test_tags=slow
 @test "bench pose and timeline draw" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
 	for word in pose timeline; do

@@ -29,6 +29,7 @@ setup() {
 	[ -z "$(find "${TMPDIR:-/tmp}" -maxdepth 1 -name 'incise-??????' -user "$(id -u)" -newer rep 2>/dev/null)" ]
 }
 
+# bats test_tags=slow
 @test "the camera too, and any of them is the reference" {
 	incise calibrate delay --rig $rig --duration 12s --with-camera --keep k.rec --json --dry-run >r.json </dev/null
 	[ ! -e calibration.conf ]

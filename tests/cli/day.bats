@@ -3,6 +3,7 @@
 
 load cli
 
+# bats test_tags=slow
 @test "an hour of ticks: no drift, no leak, no counter that wraps" {
 	run -0 "$INCISE_BUILD/tests/day" "$root/scenes/wall.scene" 1
 	[ "$(grep -c '^ok ' <<<"$output")" = 14 ]

@@ -117,6 +117,7 @@ wrote s.session" ]
 	[[ "$output" == *"frame 4 of 4 ["*"] 100 %"* ]]
 }
 
+# bats test_tags=slow
 @test "the demo leaves a film and a strip of a scene" {
 	[ -e "$INCISE_BUILD/lib/incise/film_mkv.so" ] || skip "film_mkv.so is not built"
 	# a wall neither bleeds nor is cut: that takes the least time
