@@ -79,11 +79,11 @@ in_parts = +@set -e; $(check_deps); mkdir -p $(O); rm -rf $(times) $(times).logs
 check: ## install what is missing, build, and test
 	@echo "left out, and run by make check-all: $$(cat tests/cli/*.bats | grep -c test_tags=slow) slow tests" \
 		"of benches, most unit tests again without sanitizers, most cases of the slowest properties," \
-		"ThreadSanitizer, three of four fuzz runs, full attacks on recordings, the test bed's own tests," \
+		"ThreadSanitizer, nine of ten fuzz runs, full attacks on recordings, the test bed's own tests," \
 		"the boots of the second kernel and of two processors, long tests of the first one, its modules, checkpatch," \
 		"the tests of Python once more under sanitizers, two guests with clocks of their own"
 	$(call in_parts,parts=check-unit-once cli_filter="--filter-tags '!slow'" \
-		FUZZ_RUNS=10000 vm_boots="main:deterministic main:service" vm_bed= INCISE_VM_SHORT=1 module_kernels=main)
+		FUZZ_RUNS=4000 vm_boots="main:deterministic main:service" vm_bed= INCISE_VM_SHORT=1 module_kernels=main)
 
 check-all: ## the same with all tests in all builds, on all kernels: an hour
 	$(call in_parts,parts="check-sanitize check-unit check-tsan check-clocks" ATTACK=full)

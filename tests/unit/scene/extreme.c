@@ -13,7 +13,7 @@ int main(int argc, char **argv)
 	static const struct property *const tables[] = {plan_properties, NULL};
 
 #ifdef __SANITIZE_ADDRESS__
-	tested_reduce(33);
+	tested_reduce(100);
 #endif
 	if (argc > 1)
 		tested_few.seed = tested_all.seed = strtoull(argv[1], NULL, 0);
