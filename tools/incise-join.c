@@ -55,7 +55,7 @@ static void print_note(void *context, const char *text)
 	cli_warn("%s", text);
 }
 
-/* Of what is written with --overwrite, name the file as the user did. */
+/* Name the file that --overwrite replaces as the user did. */
 static void fail(const struct incise_error *err, const char *target, const char *given)
 {
 	size_t n = strlen(target);

@@ -424,7 +424,7 @@ static void solve_tip(const struct incise_budget *budget, const double error[3],
 	}
 }
 
-/* How late the tracker's best times are in the mean, s. */
+/* Mean delay of the tracker's best times, s. */
 static double tracker_late_s(struct incise_recording *recording, int64_t start_ns,
 			     const struct incise_sim_config *config,
 			     struct incise_error *err)

@@ -32,7 +32,7 @@ static struct memory_file memory_of(const char *bytes, size_t n)
 	return file;
 }
 
-/* What a program wrote there, of at most ANSWER_MAX bytes: free(3). Closes it. */
+/* The text that a program wrote there, of at most ANSWER_MAX bytes: free(3). Closes it. */
 static char *answer_of(struct memory_file *file)
 {
 	char *text = cli_alloc(ANSWER_MAX + 1, 1);

@@ -184,7 +184,7 @@ static TS_RESP *parse(const struct der *reply)
 
 	if (reply->n && reply->n <= TIMESTAMP_MAX)
 		response = d2i_TS_RESP(NULL, &from, (long)reply->n);
-	/* What follows it would be stored and shown to nobody. */
+	/* Bytes behind it would be stored and shown to nobody. */
 	if (response && from != reply->bytes + reply->n) {
 		TS_RESP_free(response);
 		response = NULL;

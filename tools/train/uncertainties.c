@@ -60,7 +60,7 @@ static int next_line(struct incise_infile *in, char **line)
 	return rc > 0;
 }
 
-/* Which of all columns a file has; *stated: its first row has numbers there. */
+/* The columns that a file has; *stated: its first row has numbers there. */
 static void look(const char *path, const struct uncertainties *all, bool *has,
 		 bool *stated)
 {

@@ -102,7 +102,7 @@ INCISE_API int incise_propagation_end(struct incise_propagation *propagation,
 				      double rmse, double *scatter,
 				      struct incise_error *err);
 
-/** What the last pass found. */
+/** Results of the last pass. */
 struct incise_propagation_report {
 	double own; /**< root mean square of the own parts, in the unit of the output */
 	/** The same of the common parts' effect on the model, and of those of a rig on an output. */

@@ -231,7 +231,7 @@ struct incise_export_report {
 	int cuts;
 	uint64_t clipped; /**< force samples at an end of the converter; not averaged */
 	double depth_max_mm, velocity_max_mm_s;
-	/** Which uncertainties are not stated, so that columns are NaN; empty: all are. */
+	/** The uncertainties that are not stated, whose columns are NaN; empty: none. */
 	char unstated[500];
 };
 

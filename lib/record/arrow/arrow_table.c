@@ -92,7 +92,7 @@ static int hand_over(struct table_source *source, const struct ArrowArray *block
 	return stop ? -ECANCELED : 0;
 }
 
-/* What a field says of uncertainties: which are its own, or of which it is one. */
+/* Metadata of a field: the fields with its uncertainties, or the one whose uncertainty it is. */
 static int describe_field(struct table_source *source, const struct incise_table *table,
 			  int i)
 {

@@ -258,7 +258,7 @@ static void miss(struct incise_budget *budget, enum incise_budget_quantity quant
 #define BLOCK 256 /* samples */
 
 /*
- * How many samples in a row count as one: 1 + 2 Σ ρ of the recording's first @n samples, as long
+ * Number of samples in a row that count as one: 1 + 2 Σ ρ of the recording's first @n samples, as long
  * as the correlation is more than chance; ended as Sokal does, at 5 times the sum so far. They
  * were at rest if their standard deviation is that of the zero; else 1.
  */

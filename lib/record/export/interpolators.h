@@ -243,7 +243,7 @@ void incise_blade_pose_close(struct incise_blade_pose *blade);
 int incise_blade_pose_at(struct incise_blade_pose *blade, int64_t t_ns, double t_sd_s,
 			 struct incise_blade_pose_value *value, struct incise_error *err);
 
-/* What the uncertainty budget needs of the row of the last call, but its force. */
+/* The uncertainty budget's values of the row of the last call, but its force. */
 void incise_blade_pose_budget(const struct incise_blade_pose *blade, int64_t t_ns,
 			      const struct incise_blade_pose_value *value,
 			      struct incise_budget_row *row);
