@@ -35,12 +35,13 @@ fuzz_libs_vision_frame := $(libs_vision_opencv)
 fuzz_slcan_line := lib/device/can/bus/slcan_protocol.c
 fuzz_can_frames := lib/base/error.c $(wildcard lib/device/can/canopen/*.c lib/device/can/cia402/cia402*.c)
 
-fuzz_polhemus_records := lib/base/ring.c lib/device/pose_flags.c $(addprefix lib/device/polhemus/polhemus_,\
-	model.c records.c stream.c)
+fuzz_polhemus_records := lib/base/error.c lib/base/ring.c lib/device/pose_flags.c lib/device/tracker_feed.c \
+	$(addprefix lib/device/polhemus/polhemus_,model.c records.c stream.c)
 fuzz_polhemus_status := lib/base/error.c lib/device/polhemus/polhemus_dialogue.c
 
 fuzz_igtl_stream := lib/base/igtl.c
-fuzz_igtl_poses := lib/base/igtl.c lib/base/ring.c lib/device/pace.c lib/device/igtl/igtl_poses.c
+fuzz_igtl_poses := $(addprefix lib/base/,error.c igtl.c ring.c) \
+	$(addprefix lib/device/,pace.c tracker_feed.c igtl/igtl_poses.c)
 
 fuzz_wall_packets := $(addprefix lib/record/write/wall_,packets.c kernel.c)
 
