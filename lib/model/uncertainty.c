@@ -385,6 +385,16 @@ static int number(struct incise_lines *in, char **at, double *value)
 	return 0;
 }
 
+/* So many numbers of a line, from *at on. */
+static int numbers(struct incise_lines *in, char **at, double *to, int n)
+{
+	int rc = 0;
+
+	for (int k = 0; k < n && !rc; k++)
+		rc = number(in, at, to + k);
+	return rc;
+}
+
 /* The n numbers of a line of calibrations. */
 static int read_calibration(struct incise_lines *in, double *to, int n)
 {
@@ -397,11 +407,9 @@ static int read_calibration(struct incise_lines *in, double *to, int n)
 		return fail(in, EINVAL,
 			    "the file ends within its calibrations: it is truncated; "
 			    "train again");
-	for (int k = 0; k < n; k++) {
-		rc = number(in, &at, to + k);
-		if (rc)
-			return rc;
-	}
+	rc = numbers(in, &at, to, n);
+	if (rc)
+		return rc;
 	return *at ? fail(in, EINVAL, "a calibration has more than %d numbers", n) : 0;
 }
 
@@ -417,11 +425,9 @@ static int read_row(struct incise_lines *in, double *to, int n, int row)
 			    "the file ends after %d of %d rows: it is truncated; train "
 			    "again",
 			    row, n);
-	for (int k = row; k < n; k++) {
-		rc = number(in, &at, to + k - row);
-		if (rc)
-			return rc;
-	}
+	rc = numbers(in, &at, to, n - row);
+	if (rc)
+		return rc;
 	if (*at)
 		return fail(in, EINVAL, "row %d has more than %d numbers", row + 1,
 			    n - row);

@@ -13,7 +13,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -138,17 +137,6 @@ static int read_span(struct join *join, struct member *member)
 	return 0;
 }
 
-/* Whether a recorder holds the lock of the folder. */
-static bool is_written(const char *folder)
-{
-	int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-	bool is = fd >= 0 && flock(fd, LOCK_SH | LOCK_NB) && errno == EWOULDBLOCK;
-
-	if (fd >= 0)
-		close(fd);
-	return is;
-}
-
 static int open_member(struct join *join, const char *path)
 {
 	struct member *member = &join->members[join->n];
@@ -172,7 +160,7 @@ static int open_member(struct join *join, const char *path)
 			"%s: made by an older incise (format 1), which had "
 			"no ledger and no wall time; it cannot be joined",
 			recording->path);
-	if (!recording->meta.complete && is_written(recording->path))
+	if (!recording->meta.complete && incise_recording_is_written(recording->path))
 		return incise_error_set(join->err, EBUSY,
 					"%s: is being recorded; wait for its end",
 					recording->path);

@@ -5,12 +5,10 @@
  */
 #include <dirent.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
@@ -463,17 +461,6 @@ void incise_recording_recalibration(const struct incise_recording *rec,
 
 /* --- recalibrating -------------------------------------------------------------------- */
 
-/* Whether a recorder holds the lock of the folder. */
-static bool is_written(const char *folder)
-{
-	int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-	bool is = fd >= 0 && flock(fd, LOCK_SH | LOCK_NB) && errno == EWOULDBLOCK;
-
-	if (fd >= 0)
-		close(fd);
-	return is;
-}
-
 /* A recording that can be recalibrated. Returns 0 or -errno. */
 static int check(const char *path, struct incise_error *err)
 {
@@ -488,7 +475,7 @@ static int check(const char *path, struct incise_error *err)
 				      "calibrations of their own; give one of them, for "
 				      "example %s",
 				      path, rec->session->members[0]->path);
-	else if (!rec->meta.complete && is_written(rec->path))
+	else if (!rec->meta.complete && incise_recording_is_written(rec->path))
 		rc = incise_error_set(
 			err, EBUSY, "%s: is being recorded; wait for its end", rec->path);
 	incise_recording_close(rec);

@@ -43,6 +43,9 @@ struct incise_recording *incise_recording_open_original(const char *path,
 /* The folder of a recording, path or path.part; to be freed; NULL with ENOENT, ENOMEM. */
 char *incise_recording_folder(const char *path, struct incise_error *err);
 
+/* Whether a recorder holds the lock of the folder. */
+bool incise_recording_is_written(const char *folder);
+
 /* The recording that has the rows of a table: a member, or the recording itself. */
 struct incise_recording *incise_recording_member(const struct incise_recording *recording,
 						 const char *table);
