@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Who vouches for a recording; see vouch.h.
+ * Signers and authorities that vouch for a recording; see vouch.h.
  *
  *   statement ── compared with ── recording
  *       └─ signature ── its key ── file of signers, at the time of a time-stamp that is trusted, else now

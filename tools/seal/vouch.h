@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * Who vouches for a recording: its signatures and time-stamps, checked and reported by incise verify.
+ * Signers and authorities that vouch for a recording: its signatures and time-stamps, checked and
+ * reported by incise verify.
  */
 #ifndef INCISE_VOUCH_H
 #define INCISE_VOUCH_H
