@@ -107,12 +107,7 @@ made_points() {
 	incise calibrate stepper --rig ${bench/simulated/real} >out 2>err </dev/null &
 	pid=$!
 	# until it has handlers of its own, which is when the motor has power
-	for ((i = 0; i < 100; i++)); do
-		mask=$(awk '/^Name/ && $2 !~ /^incise-calib/ { exit } /^SigCgt/ { print $2 }' \
-			/proc/$pid/status)
-		((0x${mask:-0} & 2)) && break
-		sleep 0.05
-	done
+	until_it_catches $pid incise-calibrate 2
 	kill -INT $pid
 	code=0
 	wait $pid || code=$?

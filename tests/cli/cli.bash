@@ -80,6 +80,20 @@ machine_watched() {
 	[ "$(cat "$late")" -lt "$1" ] || BATS_TEST_RETRIES=3
 }
 
+# Wait until a program catches a signal: until_it_catches PID incise-haptic 2, of the mask's bits.
+# Before it is the program it is a shell, which may catch it as well, and forget it.
+until_it_catches() {
+	local i mask
+	for ((i = 0; i < 1200; i++)); do
+		mask=$(awk -v name="${2:0:15}" '/^Name/ && $2 != name { exit } /^SigCgt/ { print $2 }' \
+			"/proc/$1/status" 2>/dev/null) || :
+		! ((0x${mask:-0} & $3)) || return 0
+		kill -0 "$1" 2>/dev/null || complain "$2 ended before it caught signals" || return
+		sleep 0.05
+	done
+	complain "$2 does not catch $3 within 60 s"
+}
+
 complain() {
 	echo "$*"
 	return 1

@@ -21,18 +21,6 @@ teardown() {
 	[ -z "$pid" ] || kill -9 "$pid" 2>/dev/null || :
 }
 
-# Wait until the loop $pid catches a signal, given as a mask. Before it is the loop it is a
-# shell, which may catch it as well, and forget it.
-until_it_catches() {
-	for ((i = 0; i < 100; i++)); do
-		mask=$(awk '/^Name/ && $2 != "incise-haptic" { exit } /^SigCgt/ { print $2 }' \
-			/proc/$pid/status)
-		((0x${mask:-0} & $1)) && return
-		sleep 0.05
-	done
-	complain "it does not catch $1 within 5 s"
-}
-
 # The scene bad.scene is refused with these texts; nothing is printed.
 refuses() {
 	run --separate-stderr incise haptic bad.scene --rig $quick --duration 1s --log l.csv
@@ -222,7 +210,7 @@ beside_the_model() {
 @test "SIGTERM ends it as well" {
 	incise haptic liver.scene --rig sim: --no-rt --json >r.json 2>err 3>&- &
 	pid=$!
-	until_it_catches 0x4000
+	until_it_catches $pid incise-haptic 0x4000
 	kill -TERM $pid
 	wait $pid
 	pid=

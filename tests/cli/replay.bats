@@ -146,13 +146,7 @@ teardown() {
 	echo old >t.csv
 	incise replay liver.rec liver.scene --real-time --log t.csv --overwrite >out 2>err &
 	pid=$!
-	# before it is the replay it is a shell
-	for ((i = 0; i < 100; i++)); do
-		mask=$(awk '/^Name/ && $2 != "incise-replay" { exit } /^SigCgt/ { print $2 }' \
-			/proc/$pid/status)
-		((0x${mask:-0} & 2)) && break
-		sleep 0.02
-	done
+	until_it_catches $pid incise-replay 2
 	sleep 0.3
 	kill -INT $pid
 	status=0

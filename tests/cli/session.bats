@@ -56,15 +56,9 @@ teardown() {
 	cmp a.csv b.csv
 }
 
-# Wait until the loop $pid catches SIGINT. Before it is the loop it is a shell, which may, too.
+# Wait until the loop $pid runs.
 until_it_runs() {
-	for ((i = 0; i < 200; i++)); do
-		mask=$(awk '/^Name/ && $2 != "incise-haptic" { exit } /^SigCgt/ { print $2 }' \
-			/proc/$pid/status)
-		((0x${mask:-0} & 2)) && sleep 0.5 && return
-		sleep 0.05
-	done
-	complain "it does not run within 10 s"
+	until_it_catches $pid incise-haptic 2 && sleep 0.5
 }
 
 @test "in real time every tick is in the session, at 20 kHz too; SIGINT ends it with its reason" {

@@ -124,12 +124,7 @@ until_it_says() {
 	# 20 mm at 0.5 mm/s
 	incise stepper move 20 --rig sim:screw_mm_s=0.5 >out 2>err 3>&- &
 	pid=$!
-	for ((i = 0; i < 100; i++)); do
-		mask=$(awk '/^Name/ && $2 != "incise-stepper" { exit } /^SigCgt/ { print $2 }' \
-			/proc/$pid/status)
-		((0x${mask:-0} & 2)) && break
-		sleep 0.05
-	done
+	until_it_catches $pid incise-stepper 2
 	kill -INT $pid
 	wait $pid && complain "exit 0" || [ $? -eq 1 ]
 	pid=

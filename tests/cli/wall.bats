@@ -131,8 +131,13 @@ ask() { # RECORDING SQL
 		--start-at 2037-01-15T08:00:10Z
 	bad_usage "--start-at: needs the wall time, which --clock-source none leaves out"
 	# waiting ends by SIGINT, and leaves nothing
-	run -1 --separate-stderr timeout --preserve-status -s INT 1 incise capture -o a.rec \
-		--rig "$real" --start-at 2037-01-01T00:00:00Z
+	incise capture -o a.rec --rig "$real" --start-at 2037-01-01T00:00:00Z 2>err 3>&- &
+	until_it_catches $! incise-capture 2
+	kill -INT $!
+	status=0
+	wait $! || status=$?
+	stderr=$(cat err)
+	mapfile -t stderr_lines <err
 	failed_with "nothing was recorded"
 	[ ! -e a.rec ] && [ ! -e a.rec.part ]
 }
