@@ -80,10 +80,11 @@ check: ## install what is missing, build, and test
 	@echo "left out, and run by make check-all: $$(cat tests/cli/*.bats | grep -c test_tags=slow) slow tests" \
 		"of benches, most unit tests again without sanitizers, most cases of the slowest properties," \
 		"ThreadSanitizer, nine of ten fuzz runs, full attacks on recordings, the test bed's own tests," \
-		"the boots of the second kernel and of two processors, long tests of the first one, its modules, checkpatch," \
+		"the boots of the second kernel, of two processors and of systemd with the service, long tests of the" \
+		"first one, its modules, checkpatch," \
 		"the tests of Python once more under sanitizers, two guests with clocks of their own"
 	$(call in_parts,parts=check-unit-once cli_filter="--filter-tags '!slow'" \
-		FUZZ_RUNS=4000 vm_boots="main:deterministic main:service" vm_bed= INCISE_VM_SHORT=1 module_kernels=main)
+		FUZZ_RUNS=4000 vm_boots=main:deterministic vm_bed= INCISE_VM_SHORT=1 module_kernels=main)
 
 check-all: ## the same with all tests in all builds, on all kernels: an hour
 	$(call in_parts,parts="check-sanitize check-unit check-tsan check-clocks" ATTACK=full)
@@ -175,7 +176,8 @@ check-cli: cli-needs ## command-line tests of the real programs
 
 # Without building first; `check` starts with these. The tests of bench_all leave their reports to
 # those of each benchmark. Those that mostly wait, for buses, networks and disks, run beside the others.
-waiting_files = $(addprefix tests/cli/,can.bats capture_streams.bats serve.bats streams.bats wall.bats) tests/attack
+waiting_files = $(addprefix tests/cli/,can.bats capture_streams.bats infile.bats serve.bats sign.bats \
+	sources.bats status.bats streams.bats supervised.bats wall.bats) tests/attack
 cli_files = tests/cli/bench_all.bats $(filter-out %/bench_all.bats $(waiting_files),\
 	$(sort $(wildcard tests/cli/*.bats)))
 cli-tests:

@@ -4,17 +4,19 @@
 # Programs that the scripts in tests/vm/guest call; they reach into the library as unit
 # tests do, and share tests/vm/*.c.
 guest_shared := $(wildcard tests/vm/*.c)
+guest_objects := $(guest_shared:%.c=$(O)/obj/%.o)
+.SECONDARY: $(guest_objects)
 guest_headers := $(wildcard tests/vm/*.h driver/sim/incise_sim.h driver/uapi/*.h)
 guest_programs := $(patsubst tests/vm/guest/%.c,$(O)/tests/vm/%,\
 	$(filter-out $(if $(has_libmnl),,%/can_bus.c %/can_netlink.c) \
 		$(if $(has_libiio),,%/force_iio.c) $(if $(has_comedilib),,%/force_comedi.c),$(wildcard tests/vm/guest/*.c)))
 
-$(O)/tests/vm/%: tests/vm/guest/%.c $(guest_shared) $(guest_headers) \
+$(O)/tests/vm/%: tests/vm/guest/%.c $(guest_objects) $(guest_headers) \
 		$(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(call step,LD)
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) $(CFLAGS) \
-		$(LDFLAGS) -o $@ $< $(guest_shared) $(O)/lib/libincise-tests.a \
+		$(LDFLAGS) -o $@ $< $(guest_objects) $(O)/lib/libincise-tests.a \
 		$(test_libs)
 
 # The liver's model for the scripts in tests/vm/guest.

@@ -63,17 +63,21 @@ class Case(unittest.TestCase):
 
 @functools.lru_cache(maxsize=None)
 def _shared():
-    folder = tempfile.mkdtemp(prefix="incise-python-shared-")
-    import atexit
+    folder = os.environ.get("BATS_FILE_TMPDIR")  # for all of the tests that bats runs
+    if not folder:
+        folder = tempfile.mkdtemp(prefix="incise-python-shared-")
+        import atexit
 
-    pid = os.getpid()
+        pid = os.getpid()
 
-    def remove():  # not by a child of a fork
-        if os.getpid() == pid:
-            shutil.rmtree(folder)
+        def remove():  # not by a child of a fork
+            if os.getpid() == pid:
+                shutil.rmtree(folder)
 
-    atexit.register(remove)
+        atexit.register(remove)
     short = os.path.join(folder, "short.rec")
+    if os.path.exists(os.path.join(folder, "pairs.csv")):
+        return folder
     run("incise", "capture", "-o", short, "--rig", SHORT)
     run(
         "incise",

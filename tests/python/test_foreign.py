@@ -75,7 +75,8 @@ class Foreign(Case):
     def test_training_from_their_tables(self):
         stream = table = self.tables["bins"]
         self.assertIs(stream, table)
-        wanted = incise.train(table, group="cut", check=0.3)((5, 20))
+        options = {"group": "cut", "check": 0.3, "mf": (2, 2), "starts": 1, "epochs": 5}
+        wanted = incise.train(table, **options)((5, 20))
         for other in (
             pyarrow.table(table),
             polars.DataFrame(table),
@@ -87,7 +88,7 @@ class Foreign(Case):
             pyarrow.table(table).slice(3).combine_chunks(),
         ):
             sliced = getattr(other, "num_rows", None) == len(pyarrow.table(table)) - 3
-            model = incise.train(other, group="cut", check=0.3)
+            model = incise.train(other, **options)
             if not sliced:
                 self.assertEqual(model((5, 20)), wanted, type(other))
 

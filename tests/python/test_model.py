@@ -149,7 +149,7 @@ class Models(Case):
         """Pairs of a recording have all digits; from all forms the model is the same."""
         rec = incise.open(os.path.join(self.shared, "short.rec"))
         table = rec.pairs(depth_bins=12, velocity_bins=10, by_cut=True)
-        wanted = incise.train(rec, **OPTIONS)((5, 20))
+        wanted = incise.train(rec, **OPTIONS, **QUICK)((5, 20))
         columns = {field.name: [] for field in table.fields}
         for batch in table.batches():
             for field in batch.fields:
@@ -166,7 +166,7 @@ class Models(Case):
         if has("numpy", "pandas"):
             forms.append(table.pandas())
         for form in forms:
-            self.assertEqual(incise.train(form, **OPTIONS)((5, 20)), wanted, type(form))
+            self.assertEqual(incise.train(form, **OPTIONS, **QUICK)((5, 20)), wanted, type(form))
 
     def test_wrong_training(self):
         good = {"depth_mm": [1.0, 2], "velocity_mm_s": [1, 2], "force_N": [1, 2]}
@@ -243,8 +243,9 @@ class Models(Case):
         model.save(self.path("a.fis"))
         self.assertIn("bins\n", run("incise", "info", self.path("a.fis")))
         # pairs that are not sampled, in one source: the grid and its consequents are those of a table
-        one = incise.train([table], group="cut")
-        self.assertAlmostEqual(one((5, 20)), incise.train(table, group="cut")((5, 20)), places=9)
+        few = {"group": "cut", "starts": 1, "epochs": 5}
+        one = incise.train([table], **few)
+        self.assertAlmostEqual(one((5, 20)), incise.train(table, **few)((5, 20)), places=9)
 
     def test_wrong_sources(self):
         good = {"depth_mm": [1.0, 2], "velocity_mm_s": [1, 2], "force_N": [1, 2]}
