@@ -728,7 +728,7 @@ const double *incise_dataset_row(const struct incise_dataset *data, size_t row)
 	return data->values + row * data->columns;
 }
 
-void incise_dataset_sha256(const struct incise_dataset *data, char hex[65])
+int incise_dataset_sha256(const struct incise_dataset *data, char hex[65])
 {
 	struct incise_sha256 sha;
 
@@ -737,7 +737,7 @@ void incise_dataset_sha256(const struct incise_dataset *data, char hex[65])
 			  data->rows * data->columns * sizeof(*data->values));
 	if (data->group)
 		incise_sha256_add(&sha, data->group, data->rows * sizeof(*data->group));
-	incise_sha256_end(&sha, hex);
+	return incise_sha256_end(&sha, hex);
 }
 
 int incise_dataset_group(const struct incise_dataset *data, size_t row)

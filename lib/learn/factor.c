@@ -55,10 +55,11 @@ int incise_file_sha256(const char *path, char hex[65], struct incise_error *err)
 	code = errno;
 	if (fd >= 0)
 		close(fd);
-	if (n < 0)
-		return incise_error_set(err, code, "%s: %s", path, strerror(code));
-	incise_sha256_end(&sha, hex);
-	return 0;
+	if (incise_sha256_end(&sha, hex) && n >= 0) {
+		n = -1;
+		code = ENOMEM;
+	}
+	return n < 0 ? incise_error_set(err, code, "%s: %s", path, strerror(code)) : 0;
 }
 
 uint64_t incise_group_key(const char *source, const char *name)
@@ -180,6 +181,11 @@ struct incise_factor *incise_factor_new(const struct incise_model *premises,
 		if (!factor->fold[f])
 			rc = -ENOMEM;
 	}
+	if (!rc) {
+		incise_sha256_start(&sha);
+		incise_sha256_add(&sha, factor->premises, strlen(factor->premises));
+		rc = incise_sha256_end(&sha, factor->hash);
+	}
 	if (rc)
 		incise_error_set(
 			err, -rc,
@@ -192,9 +198,6 @@ out:
 		errno = -rc;
 		return NULL;
 	}
-	incise_sha256_start(&sha);
-	incise_sha256_add(&sha, factor->premises, strlen(factor->premises));
-	incise_sha256_end(&sha, factor->hash);
 	return factor;
 }
 

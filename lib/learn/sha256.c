@@ -1,86 +1,33 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-/* SHA-256; see sha256.h. */
-#include <endian.h>
+/* SHA-256 by libcrypto; see sha256.h. */
+#include <errno.h>
+#include <openssl/evp.h>
 #include <stdio.h>
-#include <string.h>
 #include "sha256.h"
-
-static const uint32_t constants[64] = {
-	0x428a2f98, 0x71374491, 0xb5c0fbcf, 0xe9b5dba5, 0x3956c25b, 0x59f111f1,
-	0x923f82a4, 0xab1c5ed5, 0xd807aa98, 0x12835b01, 0x243185be, 0x550c7dc3,
-	0x72be5d74, 0x80deb1fe, 0x9bdc06a7, 0xc19bf174, 0xe49b69c1, 0xefbe4786,
-	0x0fc19dc6, 0x240ca1cc, 0x2de92c6f, 0x4a7484aa, 0x5cb0a9dc, 0x76f988da,
-	0x983e5152, 0xa831c66d, 0xb00327c8, 0xbf597fc7, 0xc6e00bf3, 0xd5a79147,
-	0x06ca6351, 0x14292967, 0x27b70a85, 0x2e1b2138, 0x4d2c6dfc, 0x53380d13,
-	0x650a7354, 0x766a0abb, 0x81c2c92e, 0x92722c85, 0xa2bfe8a1, 0xa81a664b,
-	0xc24b8b70, 0xc76c51a3, 0xd192e819, 0xd6990624, 0xf40e3585, 0x106aa070,
-	0x19a4c116, 0x1e376c08, 0x2748774c, 0x34b0bcb5, 0x391c0cb3, 0x4ed8aa4a,
-	0x5b9cca4f, 0x682e6ff3, 0x748f82ee, 0x78a5636f, 0x84c87814, 0x8cc70208,
-	0x90befffa, 0xa4506ceb, 0xbef9a3f7, 0xc67178f2};
-
-static uint32_t turn(uint32_t x, int by)
-{
-	return x >> by | x << (32 - by);
-}
-
-static void add_block(struct incise_sha256 *sha)
-{
-	uint32_t w[64], v[8];
-
-	memcpy(w, sha->block, sizeof(sha->block));
-	for (int i = 0; i < 16; i++)
-		w[i] = be32toh(w[i]);
-	for (int i = 16; i < 64; i++)
-		w[i] = w[i - 16] + w[i - 7] +
-		       (turn(w[i - 15], 7) ^ turn(w[i - 15], 18) ^ w[i - 15] >> 3) +
-		       (turn(w[i - 2], 17) ^ turn(w[i - 2], 19) ^ w[i - 2] >> 10);
-	memcpy(v, sha->h, sizeof(v));
-	for (int i = 0; i < 64; i++) {
-		uint32_t a = v[7] + (turn(v[4], 6) ^ turn(v[4], 11) ^ turn(v[4], 25)) +
-			     ((v[4] & v[5]) ^ (~v[4] & v[6])) + constants[i] + w[i];
-		uint32_t b = (turn(v[0], 2) ^ turn(v[0], 13) ^ turn(v[0], 22)) +
-			     ((v[0] & v[1]) ^ (v[0] & v[2]) ^ (v[1] & v[2]));
-
-		memmove(v + 1, v, 7 * sizeof(*v));
-		v[4] += a;
-		v[0] = a + b;
-	}
-	for (int i = 0; i < 8; i++)
-		sha->h[i] += v[i];
-}
 
 void incise_sha256_start(struct incise_sha256 *sha)
 {
-	*sha = (struct incise_sha256){.h = {0x6a09e667, 0xbb67ae85, 0x3c6ef372,
-					    0xa54ff53a, 0x510e527f, 0x9b05688c,
-					    0x1f83d9ab, 0x5be0cd19}};
+	sha->digest = EVP_MD_CTX_new();
+	sha->failed = !sha->digest || !EVP_DigestInit_ex(sha->digest, EVP_sha256(), NULL);
 }
 
 void incise_sha256_add(struct incise_sha256 *sha, const void *bytes, size_t n)
 {
-	const uint8_t *from = bytes;
-
-	while (n) {
-		size_t at = sha->bytes % sizeof(sha->block);
-		size_t take = sizeof(sha->block) - at < n ? sizeof(sha->block) - at : n;
-
-		memcpy(sha->block + at, from, take);
-		from += take;
-		n -= take;
-		sha->bytes += take;
-		if (at + take == sizeof(sha->block))
-			add_block(sha);
-	}
+	if (!sha->failed)
+		sha->failed = !EVP_DigestUpdate(sha->digest, bytes, n);
 }
 
-void incise_sha256_end(struct incise_sha256 *sha, char hex[65])
+int incise_sha256_end(struct incise_sha256 *sha, char hex[65])
 {
-	uint64_t bits = htobe64(sha->bytes * 8);
+	unsigned char bytes[EVP_MAX_MD_SIZE];
 
-	incise_sha256_add(sha, "\x80", 1);
-	while (sha->bytes % sizeof(sha->block) != 56)
-		incise_sha256_add(sha, "", 1);
-	incise_sha256_add(sha, &bits, sizeof(bits));
-	for (int i = 0; i < 8; i++)
-		snprintf(hex + 8 * i, 9, "%08x", sha->h[i]);
+	if (!sha->failed)
+		sha->failed = !EVP_DigestFinal_ex(sha->digest, bytes, NULL);
+	EVP_MD_CTX_free(sha->digest);
+	hex[0] = 0;
+	if (sha->failed)
+		return -ENOMEM;
+	for (int i = 0; i < 32; i++)
+		snprintf(hex + 2 * i, 3, "%02x", bytes[i]);
+	return 0;
 }

@@ -3,19 +3,19 @@
 #ifndef INCISE_SHA256_H
 #define INCISE_SHA256_H
 
+#include <stdbool.h>
 #include <stddef.h>
-#include <stdint.h>
 
 struct incise_sha256 {
-	uint32_t h[8];
-	uint64_t bytes;
-	uint8_t block[64];
+	void *digest; /* EVP_MD_CTX of libcrypto */
+	bool failed;
 };
 
+/* What was started has to be ended. */
 void incise_sha256_start(struct incise_sha256 *sha);
 void incise_sha256_add(struct incise_sha256 *sha, const void *bytes, size_t n);
 
-/* 64 lower-case hexadecimal digits and a 0; the state is used up. */
-void incise_sha256_end(struct incise_sha256 *sha, char hex[65]);
+/* 64 lower-case hexadecimal digits and a 0; the state is freed. 0; or -ENOMEM and no digits. */
+int incise_sha256_end(struct incise_sha256 *sha, char hex[65]);
 
 #endif

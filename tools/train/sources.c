@@ -294,8 +294,10 @@ int source_open(struct source *source, struct incise_error *err)
 		if (!source->pipe)
 			return -errno;
 		source->left_out = left_out;
-		incise_dataset_sha256(source->pipe, source->hash);
-		return 0;
+		rc = incise_dataset_sha256(source->pipe, source->hash);
+		return rc ? incise_error_set(err, -rc, "%s: %s", source->path,
+					     strerror(-rc))
+			  : 0;
 	}
 	/* A file of another kind is refused before all of it is hashed. */
 	rc = incise_dataset_each(source->path, source->options->columns,

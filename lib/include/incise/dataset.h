@@ -106,8 +106,11 @@ INCISE_API const double *incise_dataset_row(const struct incise_dataset *data,
 /** Group of a row, counted from 0 in order of appearance; -1 without a group column. */
 INCISE_API int incise_dataset_group(const struct incise_dataset *data, size_t row);
 
-/** SHA-256 of its rows and groups as numbers, hexadecimal: equal for equal rows, whatever their file. */
-INCISE_API void incise_dataset_sha256(const struct incise_dataset *data, char hex[65]);
+/**
+ * SHA-256 of its rows and groups as numbers, hexadecimal: equal for equal rows, whatever their file.
+ * @return 0; or -ENOMEM and an empty text
+ */
+INCISE_API int incise_dataset_sha256(const struct incise_dataset *data, char hex[65]);
 
 INCISE_END_DECLS
 #endif

@@ -114,13 +114,13 @@ static int read_folder(const char *folder, struct incise_recalibration **list,
 	return n;
 }
 
-static void set_digest(struct incise_recalibration *entry, const char *text, size_t size)
+static int set_digest(struct incise_recalibration *entry, const char *text, size_t size)
 {
 	struct incise_sha256 sha;
 
 	incise_sha256_start(&sha);
 	incise_sha256_add(&sha, text, size);
-	incise_sha256_end(&sha, entry->sha256);
+	return incise_sha256_end(&sha, entry->sha256);
 }
 
 /* The text of a calibration in a recording, with its digest; to be freed; NULL with errno. */
@@ -136,8 +136,11 @@ static char *read_text(const char *folder, struct incise_recalibration *entry,
 	}
 	text = incise_infile_read(path, &file_kind, &size, err);
 	free(path);
-	if (text)
-		set_digest(entry, text, size);
+	if (text && set_digest(entry, text, size)) {
+		free(text);
+		no_memory(folder, err);
+		return NULL;
+	}
 	return text;
 }
 
@@ -551,10 +554,10 @@ static int add(const char *folder, const char *calibration,
 	}
 	if (!rc)
 		rc = next_name(folder, &list[n - 1], !calibration, made, err);
+	if (!rc && text && set_digest(made, text, size))
+		rc = no_memory(folder, err);
 	if (!rc)
 		rc = write_entry(folder, made, text ? text : "", size, err);
-	if (!rc && text)
-		set_digest(made, text, size);
 	free(text);
 	free(list);
 	return rc;
