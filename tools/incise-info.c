@@ -26,6 +26,7 @@
 #include "cli/stream_report.h"
 #include "cli/wall_report.h"
 #include "plot/figure.h"
+#include "seal/seal_report.h"
 #include "stepper/module.h"
 #include "train/dataset.h"
 
@@ -386,13 +387,13 @@ static json_t *adc_json(const struct incise_recording_info *info)
 
 static void recording_json(const struct incise_recording_info *info, bool intact,
 			   const struct incise_wall *wall, json_t *members,
-			   json_t *calibrations)
+			   json_t *calibrations, json_t *seals)
 {
 	bool force = has_stream(info, "force"), tracker = has_stream(info, "tracker");
 
 	json_print(json_pack(
-		"{so so so sb so ss sb sf so so s{sI sI sI} s{sI sI} sI so s{so so so} so so so}",
-		"calibrations", calibrations, "wall",
+		"{so so so so sb so ss sb sf so so s{sI sI sI} s{sI sI} sI so s{so so so} so so so}",
+		"seals", seals, "calibrations", calibrations, "wall",
 		wall ? wall_json(wall, info->start_ns, info->end_ns) : json_null(),
 		"members", members, "intact", intact, "streams",
 		stream_json(info->streams, info->n_streams), "kind", "recording",
@@ -491,7 +492,8 @@ static void force_text(const struct incise_recording_info *info)
 }
 
 static void recording_text(const char *path, const struct incise_recording_info *info,
-			   const struct incise_wall *wall, json_t *calibrations)
+			   const struct incise_wall *wall, json_t *calibrations,
+			   json_t *seals)
 {
 	bool tracker = has_stream(info, "tracker");
 
@@ -522,6 +524,8 @@ static void recording_text(const char *path, const struct incise_recording_info 
 		wall_text(wall, info->start_ns, info->end_ns);
 	else
 		puts("wall time  none");
+	seal_report_print(seals);
+	json_decref(seals);
 	stream_table(info->streams, info->n_streams);
 }
 
@@ -552,9 +556,10 @@ static void show_recording(const char *path, bool json, bool damaged)
 	if (json)
 		recording_json(&info, intact, wall,
 			       n ? joined_json(members, n) : json_null(),
-			       calibrations_json(path, members, n));
+			       calibrations_json(path, members, n), seal_report_json(path));
 	else
-		recording_text(path, &info, wall, calibrations_json(path, members, n));
+		recording_text(path, &info, wall, calibrations_json(path, members, n),
+			       seal_report_json(path));
 	if (!json)
 		joined_print(members, n);
 	incise_wall_free(wall);

@@ -36,6 +36,13 @@ setup() {
 		[[ "$(incise verify $form.rec)" == *"seal     none: made by an older incise"* ]]
 		[ "$(incise verify --json $form.rec | grep -c '"sealed": false')" -eq 1 ]
 	done
+	touch signers
+	for form in 2 3; do
+		run --separate-stderr incise verify $form.rec --signers signers
+		failed_with "$form.rec: not signed: an older incise made it, without a seal to sign"
+		[[ "$(incise info $form.rec)" == *"seal     none: made by an older incise"* ]]
+	done
+	[[ "$(incise info 4.rec)" == *"seal     commit 20, head "*"…, not signed"* ]]
 	[[ "$(incise verify 4.rec)" == *"seal     21 commits, chained"* ]]
 	for form in 1 2 3 4; do
 		incise info --json $form.rec >info.json

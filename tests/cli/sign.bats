@@ -330,7 +330,8 @@ not_vouched() {
 	run --separate-stderr incise sign a.rec --timestamp https://127.0.0.1/tsr
 	failed_with "https://127.0.0.1/tsr: https is not supported, and a time-stamp needs none"
 	run --separate-stderr incise sign a.rec --timestamp http://127.0.0.1:1/tsr
-	failed_with "http://127.0.0.1:1/tsr: no time-stamp: "
+	failed_with "http://127.0.0.1:1/tsr: no time-stamp: Connection refused"
+	[[ "$(incise info a.rec)" == *"seal     commit "*", head "*"…, 1 signature, 1 time-stamp, not checked: "* ]]
 }
 
 @test "an interrupted recording is signed up to its last commit, and one under way is not" {

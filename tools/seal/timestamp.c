@@ -39,9 +39,12 @@ static const char *reason(char text[160])
 	int flags = 0;
 
 	ERR_peek_last_error_data(&data, &flags);
-	snprintf(text, 160, "%s%s%s", said ? said : "not possible",
-		 flags & ERR_TXT_STRING && *data ? ": " : "",
-		 flags & ERR_TXT_STRING ? data : "");
+	if (ERR_SYSTEM_ERROR(ERR_peek_error()))
+		snprintf(text, 160, "%s", strerror(ERR_GET_REASON(ERR_peek_error())));
+	else
+		snprintf(text, 160, "%s%s%s", said ? said : "not possible",
+			 flags & ERR_TXT_STRING && *data ? ": " : "",
+			 flags & ERR_TXT_STRING ? data : "");
 	ERR_clear_error();
 	return text;
 }
@@ -133,11 +136,40 @@ static int read_all(BIO *bio, struct der *to)
 	return -EFBIG;
 }
 
+/*
+ * A connection to a server, at the first try: OSSL_HTTP_transfer() asks one that refuses again and
+ * again until its time is over. NULL and an error of libcrypto.
+ */
+static BIO *connect_once(const char *host, const char *port)
+{
+	const time_t end = time(NULL) + WAIT_S;
+	BIO *bio = BIO_new(BIO_s_connect());
+	int rc = -1;
+
+	if (!bio)
+		return NULL;
+	BIO_set_conn_hostname(bio, host);
+	BIO_set_conn_port(bio, port);
+	BIO_set_nbio(bio, 1);
+	ERR_set_mark();
+	while ((rc = BIO_do_connect(bio)) <= 0 && BIO_should_retry(bio) &&
+	       BIO_wait(bio, end, 100) > 0)
+		;
+	if (rc > 0) {
+		ERR_pop_to_mark();
+		return bio;
+	}
+	ERR_clear_last_mark();
+	BIO_free(bio);
+	return NULL;
+}
+
 int timestamp_ask(const char *server, const struct der *query, struct der *reply,
 		  struct incise_error *err)
 {
 	char *host = NULL, *port = NULL, *path = NULL, text[160];
-	BIO *in = NULL, *out = NULL;
+	BIO *in = NULL, *out = NULL, *line = NULL;
+	bool proxy;
 	int tls = 0, rc;
 
 	*reply = (struct der){0};
@@ -154,9 +186,11 @@ int timestamp_ask(const char *server, const struct der *query, struct der *reply
 			server);
 	} else {
 		in = BIO_new_mem_buf(query->bytes, (int)query->n);
-		if (in)
+		proxy = OSSL_HTTP_adapt_proxy(NULL, NULL, host, 0);
+		line = in && !proxy ? connect_once(host, port) : NULL;
+		if (in && (line || proxy))
 			out = OSSL_HTTP_transfer(NULL, host, port, path, 0, NULL, NULL,
-						 NULL, NULL, NULL, NULL, 0, NULL,
+						 line, NULL, NULL, NULL, 0, NULL,
 						 "application/timestamp-query", in,
 						 "application/timestamp-reply", 1,
 						 TIMESTAMP_MAX, WAIT_S, 0);
@@ -169,6 +203,7 @@ int timestamp_ask(const char *server, const struct der *query, struct der *reply
 	}
 	BIO_free(in);
 	BIO_free_all(out);
+	BIO_free(line);
 	OPENSSL_free(host);
 	OPENSSL_free(port);
 	OPENSSL_free(path);

@@ -6,9 +6,11 @@
  *       └─ signature ── its key ── file of signers, at the time of a time-stamp that is trusted, else now
  *       └─ time-stamp ── its certificate ── file of authorities
  */
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <incise/recording.h>
 #include "../cli/cli.h"
 #include "../cli/control_character.h"
 #include "../cli/json.h"
@@ -406,6 +408,17 @@ json_t *vouch_json(const struct vouch *vouch)
 			 "signatures", lines[0], "timestamps", lines[1]);
 }
 
+static bool has_seal(const char *path)
+{
+	struct incise_recording *recording = incise_recording_open(path, NULL);
+	struct incise_seal_head head;
+	char identity[33];
+	bool has = !recording || incise_seal_head(recording, identity, &head, NULL) != -ENODATA;
+
+	incise_recording_close(recording);
+	return has;
+}
+
 void vouch_fail(const struct vouch *vouch, const struct trust *trust)
 {
 	if (vouch->bad)
@@ -413,7 +426,10 @@ void vouch_fail(const struct vouch *vouch, const struct trust *trust)
 			 "time-stamps or statements: %d",
 			 vouch->recording, vouch->bad);
 	if (!vouch->n_lines)
-		cli_fail("%s: not signed: 'incise sign' signs it", vouch->recording);
+		cli_fail("%s: not signed: %s", vouch->recording,
+			 has_seal(vouch->recording)
+				 ? "'incise sign' signs it"
+				 : "an older incise made it, without a seal to sign");
 	cli_fail("%s: nobody in %s signed what it is now", vouch->recording,
 		 trust->signers.path);
 }

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/* What a recording says of its seal; see seal_report.h. */
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <incise/recording.h>
+#include "../cli/cli.h"
+#include "../cli/json.h"
+#include "members.h"
+#include "seal.h"
+#include "seal_report.h"
+
+static json_t *one(const char *path)
+{
+	struct incise_error err = {.text = ""};
+	struct incise_recording *recording =
+		cli_require(incise_recording_open(path, &err), &err);
+	struct incise_seal_head head;
+	struct seal_files files;
+	char identity[33];
+	int rc = incise_seal_head(recording, identity, &head, &err), n[3] = {0};
+
+	if (rc && rc != -ENODATA)
+		cli_fail_with(&err);
+	incise_recording_close(recording);
+	if (seal_files_read(&files, path, &err))
+		cli_fail_with(&err);
+	for (int i = 0; i < files.n; i++)
+		n[files.all[i].kind]++;
+	seal_files_free(&files);
+	return json_pack("{so so so so si si}", "path", json_text(path), "identity",
+			 rc ? json_null() : json_text(identity), "commit",
+			 rc ? json_null() : json_integer((json_int_t)head.commit), "head",
+			 rc ? json_null() : json_text(head.head), "signatures",
+			 n[SEAL_SIGNATURE], "timestamps", n[SEAL_TIMESTAMP]);
+}
+
+json_t *seal_report_json(const char *path)
+{
+	json_t *list = json_array();
+	struct members members;
+
+	members_find(&members, path);
+	for (int i = 0; i < members.n; i++)
+		json_array_append_new(list, one(members.path[i]));
+	members_free(&members);
+	return list;
+}
+
+static void count(const json_t *at, const char *key, const char *what)
+{
+	json_int_t n = json_integer_value(json_object_get(at, key));
+
+	if (n)
+		printf(", %d %s%s", (int)n, what, n == 1 ? "" : "s");
+}
+
+void seal_report_print(const json_t *list)
+{
+	size_t i;
+	json_t *at;
+
+	json_array_foreach(list, i, at)
+	{
+		const char *path = json_string_value(json_object_get(at, "path"));
+		const char *head = json_string_value(json_object_get(at, "head"));
+
+		fputs("seal     ", stdout);
+		if (json_array_size(list) > 1)
+			printf("%s: ", strrchr(path, '/') ? strrchr(path, '/') + 1 : path);
+		if (!head) {
+			puts("none: made by an older incise");
+			continue;
+		}
+		printf("commit %lld, head %.16s…",
+		       (long long)json_integer_value(json_object_get(at, "commit")), head);
+		count(at, "signatures", "signature");
+		count(at, "timestamps", "time-stamp");
+		puts(json_integer_value(json_object_get(at, "signatures")) +
+				     json_integer_value(json_object_get(at, "timestamps"))
+			     ? ", not checked: 'incise verify --signers FILE' checks them"
+			     : ", not signed");
+	}
+}
