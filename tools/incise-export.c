@@ -118,6 +118,19 @@ static const struct cli_command command = {
 		 "Exit codes: 0 success, 1 failure, 2 bad usage.",
 };
 
+/* A list of what is not stated. */
+static json_t *unstated(const struct incise_export_report *report)
+{
+	char *text = cli_text("%s", report->unstated), *rest = text, *line;
+	json_t *list = json_array();
+
+	while ((line = strsep(&rest, "\n")))
+		if (*line)
+			json_array_append_new(list, json_text(line));
+	free(text);
+	return list;
+}
+
 static void print_report(const struct incise_export_report *report, const char *output)
 {
 	json_print(
@@ -126,7 +139,18 @@ static void print_report(const struct incise_export_report *report, const char *
 			  (json_int_t)report->clipped, "depth_max_mm",
 			  json_number(report->depth_max_mm), "velocity_max_mm_s",
 			  json_number(report->velocity_max_mm_s), "unstated",
-			  *report->unstated ? json_text(report->unstated) : json_null()));
+			  unstated(report)));
+}
+
+static void warn_unstated(const struct incise_export_report *report)
+{
+	json_t *list = unstated(report), *at;
+	size_t i;
+
+	json_array_foreach(list, i, at)
+		cli_warn("not stated, and nan: the uncertainty of %s",
+			 json_string_value(at));
+	json_decref(list);
 }
 
 static int progress(void *context, double share)
@@ -203,9 +227,7 @@ int main(int argc, char **argv)
 
 	parse(&job, argc, argv);
 	export(argv + optind, argc - optind, &job, &report);
-	if (*report.unstated)
-		cli_warn("uncertainties that are not stated are nan: %s",
-			 report.unstated);
+	warn_unstated(&report);
 	if (job.json)
 		print_report(&report, job.output);
 	else if (strcmp(job.output, "-") && !report.cuts && !job.how.resample)

@@ -593,9 +593,13 @@ calibrated() {
 
 @test "export names the calibration that an uncertainty lacks" {
 	run -0 --separate-stderr incise export liver.rec --rate 10 --uncertainty total -o a.csv --json
-	[[ "$stderr" == "incise export: warning: uncertainties that are not stated are nan: force: the sensitivity "*"incise calibrate force"*"surface_u_mm"* ]]
-	[ "${#stderr_lines[@]}" -eq 1 ]
-	sqlite3 :memory: "SELECT json_extract('$(sed "s/'/''/g" <<<"$output")', '\$.unstated')" | grep -q 'calibrate tip'
+	line="incise export: warning: not stated, and nan: the uncertainty of"
+	[[ "${stderr_lines[0]}" == "$line force: the sensitivity "*"incise calibrate force"* ]]
+	[[ "${stderr_lines[1]}" == "$line depth: "*"surface_u_mm"* ]]
+	[[ "${stderr_lines[2]}" == "$line velocity: "*"incise calibrate delay"* ]]
+	[[ "${stderr_lines[3]}" == "$line time: "*"force_delay_sd_ms"* ]]
+	[ "${#stderr_lines[@]}" -eq 4 ]
+	sqlite3 :memory: "SELECT json_extract('$(sed "s/'/''/g" <<<"$output")', '\$.unstated[1]')" | grep -q 'calibrate tip'
 	awk -F, 'NR > 1 && ($11 != "nan" || $12 != "nan") { bad = 1 } END { exit bad || NR < 2 }' a.csv
 	run -2 incise export liver.rec --uncertainty parts --profile ros2 -o a.mcap
 	run -2 incise export liver.rec --uncertainty part -o a.csv

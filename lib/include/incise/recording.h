@@ -231,8 +231,11 @@ struct incise_export_report {
 	int cuts;
 	uint64_t clipped; /**< force samples at an end of the converter; not averaged */
 	double depth_max_mm, velocity_max_mm_s;
-	/** The uncertainties that are not stated, whose columns are NaN; empty: none. */
-	char unstated[500];
+	/**
+	 * The uncertainties that are not stated, whose columns are NaN: "QUANTITY: REASON; REASON…",
+	 * separated by newlines; empty: none.
+	 */
+	char unstated[1000];
 };
 
 /**

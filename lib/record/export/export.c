@@ -650,7 +650,7 @@ void incise_report_unstated(struct incise_export_report *report,
 
 		if (missing && !strstr(text, missing))
 			snprintf(text + n, sizeof(report->unstated) - n, "%s%s: %s",
-				 n ? "; " : "", incise_budget_values()[q].name, missing);
+				 n ? "\n" : "", incise_budget_values()[q].name, missing);
 	}
 }
 
