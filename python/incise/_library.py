@@ -414,11 +414,12 @@ def call_interruptible(call, cancel):
 
     Python handles signals between its own instructions only, and has none during a C call.
     """
+    import signal
     import threading
 
     if threading.current_thread() is not threading.main_thread():
         return call()
-    result, done, stopped = [], threading.Event(), False
+    result, done, stopped = [], threading.Event(), []
 
     def run():
         try:
@@ -428,17 +429,33 @@ def call_interruptible(call, cancel):
         finally:
             done.set()
 
-    threading.Thread(target=run, daemon=True).start()
-    # Not Thread.join(), which before Python 3.13 takes an interrupted wait for the thread's end; and
-    # through every Ctrl-C, since the caller frees what the call uses.
-    while not done.is_set():
+    def stop(failure):
+        stopped.append(failure)
+        cancel()
+
+    def interrupted(number, frame):
         try:
-            done.wait(0.1)
-        except KeyboardInterrupt:
-            stopped = True
-            cancel()
+            handler(number, frame)
+        except BaseException as failure:
+            stop(failure)
+
+    # The caller frees what the call uses, so nothing is raised before the call has ended. A handler of
+    # our own, since Python's may raise in Thread.start(), when the call runs already.
+    handler = signal.getsignal(signal.SIGINT)
+    if callable(handler):
+        signal.signal(signal.SIGINT, interrupted)
+    try:
+        threading.Thread(target=run, daemon=True).start()
+        while not done.is_set():
+            try:
+                done.wait()
+            except BaseException as failure:  # of another signal's handler
+                stop(failure)
+    finally:
+        if callable(handler):
+            signal.signal(signal.SIGINT, handler)
     if stopped:
-        raise KeyboardInterrupt
+        raise stopped[0]
     good, value = result[0]
     if not good:
         raise value

@@ -326,10 +326,16 @@ class Models(Case):
         self.interrupt(script, "stopped\n")
 
     def test_ctrl_c_waits_for_what_is_in_use(self):
-        """A source that cannot be stopped is at its end before anything is freed."""
+        """A source that cannot be stopped is at its end before anything is freed; two signals, of which
+        the first comes as soon as it is read, and so before anybody waits for it."""
         script = (
-            "import incise, time\n"
+            "import incise, signal, threading, time\n"
             "ended = []\n"
+            "start = threading.Thread.start\n"
+            "def start_and_signal(thread):\n"
+            "    start(thread)\n"
+            "    signal.raise_signal(signal.SIGINT)\n"
+            "threading.Thread.start = start_and_signal\n"
             "def slow():\n"
             "    print('ready', flush=True)\n"
             "    time.sleep(1)\n"

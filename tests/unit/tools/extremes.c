@@ -21,6 +21,6 @@ int main(void)
 		control_properties, motion_properties, wall_properties,
 		device_properties,  file_properties,   NULL};
 
-	tested_reduce(16);
+	tested_reduce(4);
 	return test_properties(tables);
 }
