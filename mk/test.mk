@@ -8,7 +8,8 @@ unit_sources := $(filter-out $(if $(has_libmnl),,tests/unit/can/socketcan%) \
 	$(if $(has_vision),,tests/unit/vision/%) $(if $(has_frames),,tests/unit/mkv/% tests/unit/film/%) \
 	$(if $(has_hdf5),,tests/unit/hdf5/%) $(if $(has_view),,tests/unit/view/%),\
 	$(wildcard tests/unit/*/*.c))
-unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
+# WITHOUT: names of some that are left out.
+unit_programs := $(filter-out $(WITHOUT:%=$(O)/tests/unit/%),$(patsubst tests/%.c,$(O)/tests/%,$(unit_sources)))
 
 # A tracker that is not there: some tests, and a program of its own.
 emulator := $(O)/obj/tests/polhemus/emulator.o
@@ -78,13 +79,14 @@ in_parts = +@set -e; $(check_deps); mkdir -p $(O); rm -rf $(times) $(times).logs
 
 check: ## install what is missing, build, and test
 	@echo "left out, and run by make check-all: $$(cat tests/cli/*.bats | grep -c test_tags=slow) slow tests" \
-		"of benches, most unit tests again without sanitizers, most cases of the slowest properties," \
+		"of benches, most unit tests again without sanitizers, the slowest again with them, most cases of their properties," \
+		"packages that are optimized," \
 		"ThreadSanitizer, nine of ten fuzz runs, full attacks on recordings, the test bed's own tests," \
 		"the boots of the second kernel, of two processors and of systemd with the service, long tests of the" \
 		"first one, its modules, checkpatch," \
 		"the tests of Python once more under sanitizers, two guests with clocks of their own"
 	$(call in_parts,parts=check-unit-once cli_filter="--filter-tags '!slow'" \
-		FUZZ_RUNS=4000 vm_boots=main:deterministic vm_bed= INCISE_VM_SHORT=1 module_kernels=main)
+		FUZZ_RUNS=4000 deb_options="noopt noautodbgsym" vm_boots=main:deterministic vm_bed= INCISE_VM_SHORT=1 module_kernels=main)
 
 check-all: ## the same with all tests in all builds, on all kernels: an hour
 	$(call in_parts,parts="check-sanitize check-unit check-tsan check-clocks" ATTACK=full)
@@ -210,16 +212,18 @@ check-python-sanitize: all ## tests of incise for Python on libraries under Addr
 
 # Plainly, after that, those that skipped something there, those that do less there and so
 # name __SANITIZE_ADDRESS__, and those about bits, which are of the flags that are shipped.
-plain_programs = $(sort $(filter $(O)/tests/unit/fixed/% $(O)/tests/unit/model/% \
+# Those of many ticks, the slowest, only plainly.
+plain_only := scene/extreme scene/choose scene/inputs scene/rest
+plain_programs = $(sort $(filter $(plain_only:%=$(O)/tests/unit/%) $(O)/tests/unit/fixed/% $(O)/tests/unit/model/% \
 	$(patsubst tests/%.c,$(O)/tests/%,$(shell grep -l __SANITIZE_ADDRESS__ $(unit_sources))) \
 	$(addprefix $(O)/tests/unit/,$(shell cat $(skipped_there))),$(unit_programs)))
 check-unit-once: ## check-unit-sanitized, and of check-unit what differs plainly
-	+@status=0; $(MAKE) --no-print-directory check-unit-sanitized || status=$$?; \
+	+@status=0; $(MAKE) --no-print-directory check-unit-sanitized WITHOUT="$(plain_only)" || status=$$?; \
 		$(MAKE) --no-print-directory check-unit-plain || status=$$?; exit $$status
 
 check-unit-plain:
-	@echo "unit tests: all ran under the sanitizers; plainly run $(words $(plain_programs)) that skip" \
-		"or do less there, or are about bits; make check-unit runs all"
+	@echo "unit tests: all but $(words $(plain_only)) ran under the sanitizers; plainly run $(words $(plain_programs)) that skip" \
+		"or do less there, are left out there, or are about bits; make check-unit runs all"
 	+@$(MAKE) --no-print-directory check-unit unit_programs="$(plain_programs)"
 
 # Threads that share memory without a lock, under ThreadSanitizer; what is not of the page
