@@ -133,13 +133,12 @@ static json_t *unstated(const struct incise_export_report *report)
 
 static void print_report(const struct incise_export_report *report, const char *output)
 {
-	json_print(
-		json_pack("{so sI si sI so so so}", "path", json_text(output), "rows",
-			  (json_int_t)report->rows, "cuts", report->cuts, "clipped",
-			  (json_int_t)report->clipped, "depth_max_mm",
-			  json_number(report->depth_max_mm), "velocity_max_mm_s",
-			  json_number(report->velocity_max_mm_s), "unstated",
-			  unstated(report)));
+	json_print(json_pack("{so sI si sI so so so}", "path", json_text(output), "rows",
+			     (json_int_t)report->rows, "cuts", report->cuts, "clipped",
+			     (json_int_t)report->clipped, "depth_max_mm",
+			     json_number(report->depth_max_mm), "velocity_max_mm_s",
+			     json_number(report->velocity_max_mm_s), "unstated",
+			     unstated(report)));
 }
 
 static void warn_unstated(const struct incise_export_report *report)
@@ -147,9 +146,8 @@ static void warn_unstated(const struct incise_export_report *report)
 	json_t *list = unstated(report), *at;
 	size_t i;
 
-	json_array_foreach(list, i, at)
-		cli_warn("not stated, and nan: the uncertainty of %s",
-			 json_string_value(at));
+	json_array_foreach(list, i, at) cli_warn(
+		"not stated, and nan: the uncertainty of %s", json_string_value(at));
 	json_decref(list);
 }
 

@@ -556,7 +556,8 @@ static void show_recording(const char *path, bool json, bool damaged)
 	if (json)
 		recording_json(&info, intact, wall,
 			       n ? joined_json(members, n) : json_null(),
-			       calibrations_json(path, members, n), seal_report_json(path));
+			       calibrations_json(path, members, n),
+			       seal_report_json(path));
 	else
 		recording_text(path, &info, wall, calibrations_json(path, members, n),
 			       seal_report_json(path));

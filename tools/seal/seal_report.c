@@ -67,13 +67,15 @@ void seal_report_print(const json_t *list)
 
 		fputs("seal     ", stdout);
 		if (json_array_size(list) > 1)
-			printf("%s: ", strrchr(path, '/') ? strrchr(path, '/') + 1 : path);
+			printf("%s: ",
+			       strrchr(path, '/') ? strrchr(path, '/') + 1 : path);
 		if (!head) {
 			puts("none: made by an older incise");
 			continue;
 		}
 		printf("commit %lld, head %.16s…",
-		       (long long)json_integer_value(json_object_get(at, "commit")), head);
+		       (long long)json_integer_value(json_object_get(at, "commit")),
+		       head);
 		count(at, "signatures", "signature");
 		count(at, "timestamps", "time-stamp");
 		puts(json_integer_value(json_object_get(at, "signatures")) +

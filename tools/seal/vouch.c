@@ -413,7 +413,8 @@ static bool has_seal(const char *path)
 	struct incise_recording *recording = incise_recording_open(path, NULL);
 	struct incise_seal_head head;
 	char identity[33];
-	bool has = !recording || incise_seal_head(recording, identity, &head, NULL) != -ENODATA;
+	bool has = !recording ||
+		   incise_seal_head(recording, identity, &head, NULL) != -ENODATA;
 
 	incise_recording_close(recording);
 	return has;
