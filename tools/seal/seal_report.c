@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/* What a recording says of its seal; see seal_report.h. */
+/* The seal of a recording, for people and as JSON; see seal_report.h. */
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>

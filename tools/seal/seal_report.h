@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * What a recording says of its seal, for people and as JSON. Nothing is verified: incise verify does that.
+ * The seal of a recording, for people and as JSON. It is read, not verified: incise verify does that.
  */
 #ifndef INCISE_SEAL_REPORT_H
 #define INCISE_SEAL_REPORT_H
