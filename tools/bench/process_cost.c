@@ -94,20 +94,24 @@ static json_t *open_files(pid_t pid)
 static void look(struct loop_process *process)
 {
 	json_t *libraries = mapped_libraries(process->pid);
+	json_t *files = open_files(process->pid);
+	long own_KiB = number(process->pid, "smaps_rollup", "Private_");
+	/* Last: of a process that has ended meanwhile it is none. */
 	long peak_KiB = number(process->pid, "status", "VmHWM");
 
 	/* Before it is the loop it is what starts it, and has less. */
 	if (!peak_KiB || !json_array_size(libraries) ||
 	    json_array_size(libraries) < json_array_size(process->libraries)) {
 		json_decref(libraries);
+		json_decref(files);
 		return;
 	}
 	json_decref(process->libraries);
 	json_decref(process->files);
 	process->libraries = libraries;
-	process->files = open_files(process->pid);
+	process->files = files;
 	process->peak_KiB = peak_KiB;
-	process->own_KiB = number(process->pid, "smaps_rollup", "Private_");
+	process->own_KiB = own_KiB;
 }
 
 /* Read from its report which devices its stages use. */

@@ -234,7 +234,7 @@ static void prepare(struct error_row *row)
 void stability_error(struct bench_run *run)
 {
 	struct harness_variant variants[N(rows)];
-	int n = run->quick ? N(rows) - 4 : N(rows);
+	int n = run->quick ? N(rows) - 2 : N(rows);
 
 	for (int i = 0; i < n; i++) {
 		cli_progress("forces: %d of %d", i + 1, n);
