@@ -14,6 +14,8 @@ int main(int argc, char **argv)
 
 #ifdef __SANITIZE_ADDRESS__
 	tested_reduce(100);
+#else
+	tested_reduce(4);
 #endif
 	if (argc > 1)
 		tested_few.seed = tested_all.seed = strtoull(argv[1], NULL, 0);
