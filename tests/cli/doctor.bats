@@ -129,6 +129,8 @@ group() {
 
 @test "doctor reports a denied limit with its command" {
 	[ "$(id -u)" = 0 ] || skip "root drops the right here"
+	setpriv --reuid=65534 --regid=65534 --clear-groups test -x "$INCISE_BUILD/bin/incise" ||
+		skip "the build folder is closed to other users"
 	run --separate-stderr setpriv --bounding-set=-sys_nice,-ipc_lock --inh-caps=-sys_nice,-ipc_lock \
 		--reuid=65534 --regid=65534 --clear-groups prlimit --rtprio=0:0 \
 		"$INCISE_BUILD/bin/incise" doctor --rig sim: --json

@@ -107,13 +107,19 @@ class Figure:
         self.shapes = []  # place, colour
         self.entries = []  # of legends: title, text, colours of its sample
         self.walk(self.root.find("./%sg[@id='gnuplot_canvas']" % SVG), "black", None)
+        # gnuplot 6 writes the labels of axes behind the series, where 5 has the next plot's title only:
+        # before the first tic there is what belongs to the plot before.
+        last = [t for t in self.texts if not getattr(t, "seen", False)]
+        for segment, behind in zip(self.segments, self.segments[1:] + [last]):
+            while behind and not behind[0].enhanced:
+                segment.append(behind.pop(0))
 
     def walk(self, element, colour, series):
         colour = colour_of(element, colour)
         name = element.get("id", "")
         if name.startswith("gnuplot_plot_"):
             series = {"title": element.find(SVG + "title").text, "texts": [], "shapes": []}
-            if name.startswith("gnuplot_plot_1"):
+            if re.fullmatch("gnuplot_plot_1[a-z]*", name):
                 self.segments.append([t for t in self.texts if not getattr(t, "seen", False)])
                 for text in self.texts:
                     text.seen = True
@@ -183,9 +189,6 @@ def check(path):
     # Turned texts are labels of axes; and so is the text below the tics of a plot's x axis.
     labels = [t for t in figure.texts if t.degrees]
     for segment in figure.segments:
-        # Before the first tic there is the title of the plot before.
-        while segment and not segment[0].enhanced:
-            segment = segment[1:]
         tics = [t.y for t in segment if t.enhanced and not t.degrees]
         labels += [t for t in segment if not t.degrees and not t.enhanced and tics and
                    t.y > max(tics) and t.anchor == "middle"]

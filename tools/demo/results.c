@@ -448,6 +448,10 @@ static void figure_lateness(const struct demo *demo, const json_t *haptic)
 		"median %s, 99.9th percentile %s, largest %.0f µs\"\n"
 		"set xlabel 'lateness / µs'\nset ylabel 'share of the ticks / 1'\n"
 		"set logscale xy\nset format xy power\nset style fill solid 0.8 noborder\n"
+		"stats 'lateness.dat' using 1 prefix 'low' nooutput\n"
+		"stats 'lateness.dat' using 2 prefix 'high' nooutput\n"
+		"if (high_max / low_min < 1e3) { set format x '%%g'; "
+		"eval 'set xtics ('.log_tics(low_min, high_max).')' }\n"
 		"set autoscale xfix\nset yrange [%g:1]\n"
 		"plot 'lateness.dat' using (sqrt($1*$2)):3:1:2:(%g):3 "
 		"with boxxyerror fc rgb blue\n",

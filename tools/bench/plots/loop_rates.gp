@@ -32,7 +32,7 @@ plot for [i=1:2*n] data index block(i) using "rate_hz":(error(i)) \
 		with linespoints ls 10+i, \
 	data index block(1) using "rate_hz":(mN("hold_N")) with lines lc rgb ink lw 1 dt 3
 set xrange [fast_min / 1.3:fast_max * 1.3]
-set xtics auto
+eval 'set xtics ('.log_tics(fast_min / 1.3, fast_max * 1.3).')'
 set xlabel 'run time for one second of the loop / µs'
 unset ylabel
 set format y ''

@@ -16,7 +16,7 @@ if (!rates) {
 	stats data using "ns_p5" prefix "fast" nooutput
 	stats data using "ns_p95" prefix "slow" nooutput
 }
-layout = panels(80, 10, below(0), above(1), 30, between)
+layout = panels(80, 20, below(0), above(1), 30, between)
 set multiplot layout 2,3 @layout \
 	title sprintf("Error of the shown pose over %s: tracker %g ms late, with %g mm of noise and %g %% lost", \
 	rates ? "the tracker's rate" : "its cost", delay_ms, noise_mm, lost * 100) noenhanced
@@ -28,6 +28,7 @@ if (rates) {
 	set xrange [50:1200]
 } else {
 	set xrange [fast_min / 1.3:slow_max * 1.3]
+	eval 'set xtics ('.log_tics(fast_min / 1.3, slow_max).')'
 }
 block(k) = panel.' '.word(data_name, k)
 x(none) = column(rates ? "tracker_hz" : "ns")

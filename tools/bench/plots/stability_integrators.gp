@@ -16,6 +16,7 @@ set yrange [1e-17:diverged * 3]
 set ylabel 'largest error relative to the amplitude / 1'
 set xlabel 'run time for 1 ms of motion / ns'
 set xrange [STATS_min / 2:STATS_max * 2]
+eval 'set xtics ('.log_tics(STATS_min / 2, STATS_max * 2).')'
 set key off
 error(none) = column("max_error") < diverged ? \
 	(column("max_error") > 1e-16 ? column("max_error") : 1e-16) : none
@@ -34,6 +35,7 @@ set title '(c) steps of 1 ms'
 set xlabel 'stiffness / (N/m)'
 set label 1 'diverged' at graph 0.02, first diverged * 0.3 font small
 set xrange [K_min / 2:K_max * 2]
+set xtics auto
 set format x power
 plot for [i=1:7] more index word(names, i) using "K_N_m":(error(diverged)) \
 	with linespoints lt i

@@ -30,6 +30,7 @@ if (windows) {
 } else {
 	set xlabel 'time per sample / ns'
 	set xrange [fast_min / 1.3:slow_max * 1.3]
+	if (slow_max / fast_min < 1e3) { set format x '%g'; eval 'set xtics ('.log_tics(fast_min / 1.3, slow_max).')' }
 }
 block(k) = word(data_late, i).' '.word(data_name, k)
 size(none) = 0.4 + 0.7 * log(column("window_s")) / log(120)
