@@ -18,8 +18,8 @@ train_by() {
 	local n=$1
 	shift
 	# As root too, and with more processes than processors.
-	OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1 \
-		OMPI_MCA_btl_base_warn_component_unused=0 mpirun -n "$n" incise train "$@" --mpi
+	OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_btl_base_warn_component_unused=0 \
+		mpirun --oversubscribe -n "$n" incise train "$@" --mpi
 }
 
 @test "1, 2, 3 and 8 processes give the model of one program, to the bit" {
