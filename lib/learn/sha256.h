@@ -11,7 +11,7 @@ struct incise_sha256 {
 	bool failed;
 };
 
-/* What was started has to be ended. */
+/* Each start needs its end, which frees it. */
 void incise_sha256_start(struct incise_sha256 *sha);
 void incise_sha256_add(struct incise_sha256 *sha, const void *bytes, size_t n);
 
