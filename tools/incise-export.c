@@ -146,8 +146,11 @@ static void warn_unstated(const struct incise_export_report *report)
 	json_t *list = unstated(report), *at;
 	size_t i;
 
-	json_array_foreach(list, i, at) cli_warn(
-		"not stated, and nan: the uncertainty of %s", json_string_value(at));
+	json_array_foreach(list, i, at)
+	{
+		cli_warn("not stated, and nan: the uncertainty of %s",
+			 json_string_value(at));
+	}
 	json_decref(list);
 }
 

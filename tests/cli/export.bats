@@ -599,6 +599,12 @@ calibrated() {
 	[[ "${stderr_lines[2]}" == "$line velocity: "*"incise calibrate delay"* ]]
 	[[ "${stderr_lines[3]}" == "$line time: "*"force_delay_sd_ms"* ]]
 	[ "${#stderr_lines[@]}" -eq 4 ]
+	# a reason that two share is said of both
+	cp -r liver.rec/ two.rec
+	run -0 --separate-stderr incise export liver.rec two.rec --rate 10 --uncertainty total -o b.csv
+	[ "$(grep -c 'calibrate tip' <<<"$stderr")" -eq 2 ]
+	[ "${#stderr_lines[@]}" -eq 4 ]
+	run -0 --separate-stderr incise export liver.rec --rate 10 --uncertainty total -o a.csv --json --overwrite
 	sqlite3 :memory: "SELECT json_extract('$(sed "s/'/''/g" <<<"$output")', '\$.unstated[1]')" | grep -q 'calibrate tip'
 	awk -F, 'NR > 1 && ($11 != "nan" || $12 != "nan") { bad = 1 } END { exit bad || NR < 2 }' a.csv
 	run -2 incise export liver.rec --uncertainty parts --profile ros2 -o a.mcap

@@ -39,9 +39,13 @@ setup() {
 	touch signers
 	for form in 2 3; do
 		run --separate-stderr incise verify $form.rec --signers signers
-		failed_with "$form.rec: not signed: an older incise made it, without a seal to sign"
+		failed_with "$form.rec: not signed: made by an older incise (format $form), it has no seal"
 		[[ "$(incise info $form.rec)" == *"seal     none: made by an older incise"* ]]
 	done
+	# one whose seal was taken away is no older one
+	cp -r 4.rec bare.rec
+	sqlite3 bare.rec/recording.db "DELETE FROM seal"
+	[[ "$(incise info bare.rec)" == *"seal     none: has no sealed commit"* ]]
 	[[ "$(incise info 4.rec)" == *"seal     commit 20, head "*"…, not signed"* ]]
 	[[ "$(incise verify 4.rec)" == *"seal     21 commits, chained"* ]]
 	for form in 1 2 3 4; do

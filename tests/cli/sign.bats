@@ -361,6 +361,7 @@ not_vouched() {
 	[ "$(grep -c "signed with" <<<"$output")" = 2 ]
 	run -0 --separate-stderr incise verify day.rec --signers signers
 	[[ "$output" == *"day.rec/a: signed by kim@lab "*"day.rec/b: signed by kim@lab "* ]]
+	[[ "$(incise info day.rec)" == *"seal     a: commit "*", 1 signature, "*"seal     b: commit "*", 1 signature, "* ]]
 	rm -r day.rec/b/seal
 	run --separate-stderr incise verify day.rec --signers signers
 	failed_with "day.rec/b: not signed"

@@ -183,6 +183,25 @@ static int check_idle(const char *recording, struct incise_error *err)
 	return rc;
 }
 
+bool seal_head(const char *path, char identity[33], struct incise_seal_head *head,
+	       char why[200])
+{
+	struct incise_error err = {.text = ""};
+	struct incise_recording *recording =
+		cli_require(incise_recording_open(path, &err), &err);
+	int rc = incise_seal_head(recording, identity, head, &err);
+	size_t name = strlen(path);
+
+	incise_recording_close(recording);
+	if (rc && rc != -ENODATA)
+		cli_fail_with(&err);
+	snprintf(why, 200, "%.199s",
+		 !strncmp(err.text, path, name) && !strncmp(err.text + name, ": ", 2)
+			 ? err.text + name + 2
+			 : err.text);
+	return !rc;
+}
+
 size_t seal_statement_length(const char *text, size_t n)
 {
 	const char *end = memmem(text, n, "\nend\n", 5);

@@ -50,6 +50,13 @@ int seal_files_read(struct seal_files *files, const char *recording,
 void seal_files_free(struct seal_files *files);
 
 /*
+ * Identity and last head of a recording, as its tables have them. False, and the reason without the
+ * recording's name: it has none. Every other failure ends the program.
+ */
+bool seal_head(const char *recording, char identity[33], struct incise_seal_head *head,
+	       char why[200]);
+
+/*
  * A file N.statement is a statement of incise/seal.h, and behind its end a line for each calibration
  * after the fact (incise/recalibration.h), by the last of which the recording is read:
  *

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /* The seal of a recording, for people and as JSON; see seal_report.h. */
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
-#include <incise/recording.h>
 #include "../cli/cli.h"
 #include "../cli/json.h"
 #include "members.h"
@@ -13,25 +11,22 @@
 static json_t *one(const char *path)
 {
 	struct incise_error err = {.text = ""};
-	struct incise_recording *recording =
-		cli_require(incise_recording_open(path, &err), &err);
 	struct incise_seal_head head;
 	struct seal_files files;
-	char identity[33];
-	int rc = incise_seal_head(recording, identity, &head, &err), n[3] = {0};
+	char identity[33], why[200];
+	bool has = seal_head(path, identity, &head, why);
+	int n[3] = {0};
 
-	if (rc && rc != -ENODATA)
-		cli_fail_with(&err);
-	incise_recording_close(recording);
 	if (seal_files_read(&files, path, &err))
 		cli_fail_with(&err);
 	for (int i = 0; i < files.n; i++)
 		n[files.all[i].kind]++;
 	seal_files_free(&files);
-	return json_pack("{so so so so si si}", "path", json_text(path), "identity",
-			 rc ? json_null() : json_text(identity), "commit",
-			 rc ? json_null() : json_integer((json_int_t)head.commit), "head",
-			 rc ? json_null() : json_text(head.head), "signatures",
+	return json_pack("{so so so so so si si}", "path", json_text(path), "identity",
+			 has ? json_text(identity) : json_null(), "commit",
+			 has ? json_integer((json_int_t)head.commit) : json_null(),
+			 "head", has ? json_text(head.head) : json_null(), "why",
+			 has ? json_null() : json_text(why), "signatures",
 			 n[SEAL_SIGNATURE], "timestamps", n[SEAL_TIMESTAMP]);
 }
 
@@ -70,7 +65,8 @@ void seal_report_print(const json_t *list)
 			printf("%s: ",
 			       strrchr(path, '/') ? strrchr(path, '/') + 1 : path);
 		if (!head) {
-			puts("none: made by an older incise");
+			printf("none: %s\n",
+			       json_string_value(json_object_get(at, "why")));
 			continue;
 		}
 		printf("commit %lld, head %.16s…",

@@ -173,6 +173,7 @@ int timestamp_ask(const char *server, const struct der *query, struct der *reply
 	int tls = 0, rc;
 
 	*reply = (struct der){0};
+	ERR_clear_error(); /* of others, before: reason() names the first */
 	if (!OSSL_HTTP_parse_url(server, &tls, NULL, &host, &port, NULL, &path, NULL,
 				 NULL))
 		return incise_error_set(err, EINVAL, "%s: %s; give http://HOST/PATH",

@@ -6,11 +6,9 @@
  *       └─ signature ── its key ── file of signers, at the time of a time-stamp that is trusted, else now
  *       └─ time-stamp ── its certificate ── file of authorities
  */
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/recording.h>
 #include "../cli/cli.h"
 #include "../cli/control_character.h"
 #include "../cli/json.h"
@@ -408,29 +406,20 @@ json_t *vouch_json(const struct vouch *vouch)
 			 "signatures", lines[0], "timestamps", lines[1]);
 }
 
-static bool has_seal(const char *path)
-{
-	struct incise_recording *recording = incise_recording_open(path, NULL);
-	struct incise_seal_head head;
-	char identity[33];
-	bool has = !recording ||
-		   incise_seal_head(recording, identity, &head, NULL) != -ENODATA;
-
-	incise_recording_close(recording);
-	return has;
-}
-
 void vouch_fail(const struct vouch *vouch, const struct trust *trust)
 {
+	struct incise_seal_head head;
+	char identity[33], why[200];
+
 	if (vouch->bad)
 		cli_fail("%s: not everyone who vouches for it may: bad signatures, "
 			 "time-stamps or statements: %d",
 			 vouch->recording, vouch->bad);
 	if (!vouch->n_lines)
 		cli_fail("%s: not signed: %s", vouch->recording,
-			 has_seal(vouch->recording)
+			 seal_head(vouch->recording, identity, &head, why)
 				 ? "'incise sign' signs it"
-				 : "an older incise made it, without a seal to sign");
+				 : why);
 	cli_fail("%s: nobody in %s signed what it is now", vouch->recording,
 		 trust->signers.path);
 }

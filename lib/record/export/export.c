@@ -647,10 +647,16 @@ void incise_report_unstated(struct incise_export_report *report,
 		const char *missing =
 			incise_budget_missing(budget, (enum incise_budget_quantity)q);
 		size_t n = strlen(text);
+		char line[400];
 
-		if (missing && !strstr(text, missing))
-			snprintf(text + n, sizeof(report->unstated) - n, "%s%s: %s",
-				 n ? "\n" : "", incise_budget_values()[q].name, missing);
+		if (!missing)
+			continue;
+		snprintf(line, sizeof(line), "%s: %s", incise_budget_values()[q].name,
+			 missing);
+		/* Several recordings may lack the same. */
+		if (!strstr(text, line))
+			snprintf(text + n, sizeof(report->unstated) - n, "%s%s",
+				 n ? "\n" : "", line);
 	}
 }
 
