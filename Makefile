@@ -49,7 +49,7 @@ unexport PKG_CONFIG
 endif
 
 # Goals that need no compiler or install it first; a kernel's headers name its own one.
-unbuilt_goals := help clean deps check check-all check-debian12 check-debian13 check-module-newest demo bench \
+unbuilt_goals := help clean deps check check-full check-debian12 check-debian13 check-module-newest demo bench \
 	deb check-deb doc check-doc dist wheel uninstall readme-figures \
 	module module_install module_uninstall dkms_install dkms_uninstall check-module
 ifneq ($(filter-out $(unbuilt_goals),$(or $(MAKECMDGOALS),all)),)
@@ -131,6 +131,7 @@ all: libs tools
 include mk/lib.mk
 include mk/tools.mk
 include mk/test.mk
+include mk/check.mk
 include mk/fuzz.mk
 include mk/rtsan.mk
 include mk/vm.mk

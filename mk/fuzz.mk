@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# Fuzz targets: tests/fuzz/NAME.c defines LLVMFuzzerTestOneInput() and is found by its name;
+# Fuzz targets: tests/fuzz/NAME.c defines LLVMFuzzerTestOneInput() and is found by its name
+# (tests/fuzz/mutate.c runs them without libFuzzer, for `make check`);
 # tests/fuzz/NAME/ holds inputs that are always tried first: starting points, and those that
 # once failed. A target is linked to all of lib/fixed; fuzz_NAME names sources beside that.
 #
@@ -10,8 +11,7 @@ FUZZ_RUNS ?= 40000
 CLANG ?= $(firstword $(foreach name,clang $(addprefix clang-,22 21 20 19 18 17 16 15 14),\
 	$(shell command -v $(name))))
 
-fuzz_sources := $(filter-out $(if $(has_vision),,%/vision_frame.c),$(wildcard tests/fuzz/*.c))
-fuzz_programs := $(patsubst tests/%.c,$(O)/tests/%,$(fuzz_sources))
+fuzz_programs := $(fuzz_targets:%=$(O)/tests/fuzz/%)
 
 fuzz_flags := -O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined \
 	-fno-sanitize-recover=all
@@ -73,7 +73,7 @@ $(O)/tests/fuzz/$1: $(O)/obj/fuzz/tests/fuzz/$1.o $(fuzz_core) \
 	$$(call step,LD)
 	$$(Q)$$(CLANG) $$(fuzz_flags) -fsanitize=fuzzer -o $$@ $$^ $$(fuzz_libs_$1) -lm
 endef
-$(foreach name,$(basename $(notdir $(fuzz_sources))),$(eval $(call fuzz_program,$(name))))
+$(foreach name,$(fuzz_targets),$(eval $(call fuzz_program,$(name))))
 
 # Whether there is a clang, and its libFuzzer with it, which is a package of its own.
 has_fuzzer = $(if $(CLANG),$(shell echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' | \

@@ -29,22 +29,49 @@ $(O)/obj/tests/%.o: tests/%.c
 	@mkdir -p $(@D)
 	$(call step,CC)
 	$(Q)$(CCACHE) $(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 -ffp-contract=off $(warnings) \
-		-Wno-missing-prototypes -Wno-unused-parameter $(test_cflags) $(CFLAGS) -MMD -MP -c -o $@ $<
+		-Wno-missing-prototypes -Wno-unused-parameter $(test_main) $(test_cflags) $(CFLAGS) -MMD -MP -c -o $@ $<
 
-# A test that defines __wrap_NAME plays NAME for all that it is linked to.
+# All tests of a layer are one program, LAYER/tests, and LAYER/NAME is a link to it; see
+# tests/unit/layer.c. A test that defines __wrap_NAME plays NAME for all that it is linked to, so it is
+# a program of its own, as one is that plays a function of the library.
+wrapping := $(notdir $(shell grep -l __wrap_ tests/unit/*/*.h))
+unit_apart := $(patsubst tests/%.c,$(O)/tests/%,$(filter $(addprefix tests/unit/,device/vision.c \
+	device/foot_switch.c daq/iio_force.c),$(unit_sources)) \
+	$(shell grep -l -e __wrap_ $(wrapping:%=-e 'include "%"') $(unit_sources)))
+unit_layers := $(sort $(patsubst tests/unit/%/,%,$(dir $(unit_sources))))
+unit_together := $(filter-out $(unit_apart),$(patsubst tests/%.c,$(O)/tests/%,$(unit_sources)))
+unit_objects = $(patsubst $(O)/tests/%,$(O)/obj/tests/%.o,$(filter $(O)/tests/unit/$1/%,$(unit_together)))
 wraps = $$(nm $(filter %/$*.o,$^) | sed -n 's/.* T __wrap_\(.*\)/-Wl,--wrap=\1/p')
-$(filter $(O)/tests/unit/tools/%,$(unit_programs)): $(tool_parts)
-$(filter $(O)/tests/unit/scene/% $(O)/tests/unit/tools/%,$(unit_programs)): $(extremes)
-$(filter $(O)/tests/unit/polhemus/%,$(unit_programs)): $(emulator)
-# Modules that only their own tests link, ahead of the archive: that of HDF5, and vision's,
-# which is then found without being loaded.
-$(filter $(O)/tests/unit/hdf5/%,$(unit_programs)): $(objects_export_hdf5)
-$(filter $(O)/tests/unit/vision/%,$(unit_programs)): $(O)/obj/tests/vision/linked.o
-$(O)/tests/unit/%: $(O)/obj/tests/unit/%.o $(O)/lib/libincise-tests.a
+$(unit_together:$(O)/tests/%=$(O)/obj/tests/%.o): test_main = -Dmain=unit_$(*F)
+
+# Parts that only some layers use, ahead of the archive: modules that only their own tests link, as
+# that of HDF5, and vision's, which is then found without being loaded.
+unit_parts_tools := $(tool_parts) $(extremes)
+unit_parts_scene := $(extremes)
+unit_parts_polhemus := $(emulator)
+unit_parts_hdf5 := $(objects_export_hdf5)
+unit_parts_vision := $(O)/obj/tests/vision/linked.o
+
+link_unit = $(Q)$(CC) $(CFLAGS) $(LDFLAGS) $1 -o $@ $(filter %.o,$^) $(filter %/extremes.a %/parts.a,$^) \
+	$(O)/lib/libincise-tests.a $(test_libs)
+define unit_layer
+$(O)/tests/unit/$1/tests: $$(call unit_objects,$1) $$(unit_parts_$1) $(O)/obj/tests/unit/layer.o \
+		$(O)/lib/libincise-tests.a
+	@mkdir -p $$(@D)
+	$$(call step,LD)
+	$$(call link_unit,-Wl$$(comma)--export-dynamic-symbol='unit_*')
+
+$$(filter $(O)/tests/unit/$1/%,$$(unit_together)): $(O)/tests/unit/$1/tests
+	@ln -sf tests $$@
+
+$$(filter $(O)/tests/unit/$1/%,$$(unit_apart)): $$(unit_parts_$1)
+endef
+$(foreach layer,$(unit_layers),$(eval $(call unit_layer,$(layer))))
+
+$(unit_apart): $(O)/tests/unit/%: $(O)/obj/tests/unit/%.o $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(call step,LD)
-	$(Q)$(CC) $(CFLAGS) $(LDFLAGS) $(wraps) -o $@ $(filter %.o,$^) $(filter %/extremes.a %/parts.a,$^) \
-		$(O)/lib/libincise-tests.a $(test_libs)
+	$(call link_unit,$(wraps))
 .SECONDARY: $(unit_programs:$(O)/tests/%=$(O)/obj/tests/%.o)
 
 $(O)/tests/polhemus/fastrak: $(wildcard tests/polhemus/*.[ch])
@@ -53,55 +80,6 @@ $(O)/tests/polhemus/fastrak: $(wildcard tests/polhemus/*.[ch])
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ \
 		$(filter %.c,$^) -lm -pthread
 
-# What `check` is made of: each part is a target, timed. Those of the first line build what the
-# others use, in one make: two would write the same objects. Of the others one more runs than there
-# are processors, as some wait for devices, or as many as -j says. A part that fails keeps none from
-# running but those that use what it builds.
-times := $(O)/times
-jobs = $(if $(findstring --jobserver,$(MAKEFLAGS)),,-j$(shell expr $$(nproc) + 1))
-check-parts:
-	+@status=0; \
-	$(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,check-style cli-needs) || status=$$?; \
-	$(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,$(parts) cli-tests check-vm check-layers \
-		waiting-tests check-fuzz check-rtsan check-deb check-module) || status=$$?; \
-	exit $$status
-timed-%:
-	+@$(if $(filter $*,cli-tests waiting-tests check-layers check-vm),NEEDS=cli-needs) tests/timed $(times) $* $(MAKE) -k --no-print-directory $*
-
-check_deps = mk/deps build check demo; \
-	mk/deps vm || echo "going on without what the test bed needs"; \
-	mk/deps module || echo "going on without what checking the module needs"; \
-	mk/deps rtsan || echo "going on without RealtimeSanitizer"; \
-	mk/deps deb debian || echo "going on without what building packages needs"
-in_parts = +@set -e; $(check_deps); mkdir -p $(O); rm -rf $(times) $(times).logs; status=0; \
-	tests/timed $(times) whole $(MAKE) --no-print-directory check-parts $1 || status=$$?; \
-	tests/timed $(times); exit $$status
-
-check: ## install what is missing, build, and test
-	@echo "left out, and run by make check-all: $$(cat tests/cli/*.bats | grep -c test_tags=slow) slow tests" \
-		"of benches, most unit tests again without sanitizers, the slowest again with them, most cases of their properties," \
-		"packages that are optimized," \
-		"ThreadSanitizer, nine of ten fuzz runs, full attacks on recordings, the test bed's own tests," \
-		"the boots of the second kernel, of two processors and of systemd with the service, long tests of the" \
-		"first one, its modules, checkpatch," \
-		"the tests of Python once more under sanitizers, two guests with clocks of their own"
-	$(call in_parts,parts=check-unit-once cli_filter="--filter-tags '!slow'" \
-		FUZZ_RUNS=4000 deb_options="noopt noautodbgsym" vm_boots=main:deterministic vm_bed= INCISE_VM_SHORT=1 module_kernels=main)
-
-check-all: ## the same with all tests in all builds, on all kernels: an hour
-	$(call in_parts,parts="check-sanitize check-unit check-tsan check-clocks" ATTACK=full)
-
-# For tests whose outcome may be left to chance; the load is whatever the machine has else to do.
-N ?= 20
-check-repeat: ## PART=check-fuzz N=20: a part of check so many times, with what failed
-	@mkdir -p $(O)/repeat
-	+@failed=0; for i in $$(seq $(N)); do \
-		log=$(O)/repeat/$(PART).$$i; \
-		if $(MAKE) --no-print-directory $(PART) >$$log 2>&1; then echo "$$i of $(N): passed"; \
-		else failed=$$((failed + 1)); echo "$$i of $(N): FAILED, see $$log"; \
-			grep -E '^(not ok|FAIL)' $$log; fi; \
-	done; echo "$(PART): $(N) times, $$failed failed"; [ $$failed = 0 ]
-
 # A locale with a decimal comma, to show that files do not depend on it.
 locale := $(O)/locale/de_DE.UTF-8
 $(locale):
@@ -109,12 +87,39 @@ $(locale):
 	$(Q)localedef -i de_DE -f UTF-8 $@
 
 # Programs that cannot be built are failures of their own; the others run.
+sanitizer_options := LSAN_OPTIONS=suppressions=$(abspath tests/unit/lsan.supp):print_suppressions=0
+run_units = LOCPATH=$(abspath $(O)/locale) LIMIT_S=$(LIMIT_S) tests/unit/run
 check-unit: $(locale) ## unit tests
 	+@status=0; $(MAKE) -k --no-print-directory unit-programs || status=$$?; \
-		LOCPATH=$(abspath $(O)/locale) LSAN_OPTIONS=suppressions=$(abspath tests/unit/lsan.supp):print_suppressions=0 \
-		tests/unit/run $(unit_programs) || status=$$?; exit $$status
+		$(run_units) $(unit_programs) || status=$$?; exit $$status
 
 unit-programs: $(unit_programs)
+
+# Fuzz targets by our own changes of the inputs that are kept; see tests/fuzz/mutate.c.
+fuzz_targets := $(patsubst tests/fuzz/%.c,%,$(filter-out tests/fuzz/mutate.c $(if $(has_vision),,%/vision_frame.c),\
+	$(wildcard tests/fuzz/*.c)))
+kept_programs := $(fuzz_targets:%=$(O)/tests/kept/%)
+kept_objects := $(fuzz_targets:%=$(O)/obj/tests/fuzz/%.o)
+$(kept_objects): test_main = -DLLVMFuzzerTestOneInput=fuzz_$(*F)
+link_kept = $(call link_unit,-Wl$(comma)--export-dynamic-symbol='fuzz_*')
+$(O)/tests/kept/tests: $(filter-out %/vision_frame.o,$(kept_objects)) $(O)/obj/tests/fuzz/mutate.o $(tool_parts) \
+		$(O)/lib/libincise-tests.a
+	@mkdir -p $(@D)
+	$(call step,LD)
+	$(link_kept)
+
+# It plays a function of the library, as its unit tests do.
+$(O)/tests/kept/vision_frame: $(O)/obj/tests/fuzz/vision_frame.o $(O)/obj/tests/fuzz/mutate.o \
+		$(O)/obj/tests/vision/linked.o $(O)/lib/libincise-tests.a
+	@mkdir -p $(@D)
+	$(call step,LD)
+	$(link_kept)
+
+$(filter-out %/vision_frame,$(kept_programs)): $(O)/tests/kept/tests
+	@ln -sf tests $@
+
+check-kept: $(kept_programs) ## untrusted bytes: the fuzz targets on kept inputs and seeded changes of them
+	@$(run_units) $(kept_programs)
 
 # The CAN drive that tests talk to is on python-canopen, in a folder of its own.
 can-drive: ## the CAN drive of the tests, $(O)/tests/can/drive; see tests/can/README.md
@@ -164,67 +169,27 @@ $(O)/tests/state/loop: tests/state/loop.c $(O)/lib/libincise-tests.a
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $^ \
 		$(test_libs)
 
-bats = LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" \
+bats = BATS_TEST_TIMEOUT=$(LIMIT_S) $(sanitizer_options) LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" \
 	bats --print-output-on-failure
-check-attack: all $(attack_programs) ## attacks on recordings with their full counts: 100 kills, thousands of faults
-	ATTACK=full $(bats) tests/attack
+# What the command-line tests call beside the programs. Those of other projects come by pip.
+cli-needs: all $(locale) $(O)/tests/polhemus/fastrak $(O)/tests/state/loop $(O)/tests/day $(attack_programs)
+peers: can-drive mcap-reader python-peers stream-peers
 
-# Benches measure for seconds: tests that are tagged slow are not in `check`.
-cli-needs: all $(locale) can-drive mcap-reader python-peers stream-peers $(O)/tests/polhemus/fastrak $(O)/tests/state/loop \
-		$(O)/tests/day $(attack_programs)
+# Tests that `make check` runs bear the tag check. Most wait now and then, so one more runs than there are processors.
+bats_jobs = --jobs $(shell expr $$(nproc) + 1) --no-parallelize-within-files
+check-cli: cli-needs peers ## command-line tests of the real programs
+	$(Q)$(bats) $(bats_jobs) tests/cli
 
-check-cli: cli-needs ## command-line tests of the real programs
-	+@$(MAKE) --no-print-directory cli-tests waiting-tests
-
-# Without building first; `check` starts with these. The tests of bench_all leave their reports to
-# those of each benchmark. Those that mostly wait, for buses, networks and disks, run beside the others.
-waiting_files = $(addprefix tests/cli/,can.bats capture_streams.bats infile.bats serve.bats sign.bats \
-	sources.bats status.bats streams.bats supervised.bats wall.bats) tests/attack
-cli_files = tests/cli/bench_all.bats $(filter-out %/bench_all.bats $(waiting_files),\
-	$(sort $(wildcard tests/cli/*.bats)))
-cli-tests:
-	@$(if $(cli_filter),echo "left out: slow tests of benches; make check-cli runs them; bench_all.bats runs each word once")
-	$(Q)$(bats) $(cli_filter) $(cli_files)
-
-waiting-tests:
-	$(Q)$(bats) $(cli_filter) $(waiting_files)
-
-# The unit tests once more, on a build that stops at any bad access or undefined operation.
-sanitize_flags := -fsanitize=address,undefined -fno-sanitize-recover=all
-skipped_there := $(O)/sanitize/skipped
-check-sanitize: ## unit tests and tests of Python under AddressSanitizer and UBSan
-	+@status=0; $(MAKE) --no-print-directory check-unit-sanitized || status=$$?; \
-		$(MAKE) --no-print-directory check-python-sanitize || status=$$?; exit $$status
-
-check-unit-sanitized:
-	@mkdir -p $(O)/sanitize
-	+@SKIPPED=$(abspath $(skipped_there)) $(MAKE) --no-print-directory O=$(O)/sanitize \
-		CFLAGS="-O1 -g1 $(sanitize_flags)" LDFLAGS="$(sanitize_flags)" check-unit
+check-attack: all $(attack_programs) ## attacks on recordings: 100 kills, thousands of faults; ATTACK=few for a few
+	ATTACK=$(or $(ATTACK),full) $(bats) tests/attack
 
 # Python's own memory is not of interest: its objects of the end of the program count as leaks.
-check-python-sanitize: all ## tests of incise for Python on libraries under AddressSanitizer and UBSan
-	+@$(MAKE) --no-print-directory O=$(O)/sanitize \
-		CFLAGS="-O1 -g1 $(sanitize_flags)" LDFLAGS="$(sanitize_flags)" libs
-	cd tests/python && INCISE_BUILD=$(abspath $(O)) INCISE_LIBDIR=$(abspath $(O))/sanitize/lib \
+check-python: all ## tests of incise for Python on libraries under AddressSanitizer and UBSan
+	+@$(MAKE) --no-print-directory O=$(O)/check $(sanitized) libs
+	cd tests/python && INCISE_BUILD=$(abspath $(O)) INCISE_LIBDIR=$(abspath $(O))/check/lib \
 		LD_PRELOAD=$$($(CC) -print-file-name=libasan.so) ASAN_OPTIONS=detect_leaks=0 \
 		PYTHONPATH=../../python PYTHONDONTWRITEBYTECODE=1 \
 		/usr/bin/python3 -m unittest test_recording test_model test_plan
-
-# Plainly, after that, those that skipped something there, those that do less there and so
-# name __SANITIZE_ADDRESS__, and those about bits, which are of the flags that are shipped.
-# Those of many ticks, the slowest, only plainly.
-plain_only := scene/extreme scene/choose scene/inputs scene/rest
-plain_programs = $(sort $(filter $(plain_only:%=$(O)/tests/unit/%) $(O)/tests/unit/fixed/% $(O)/tests/unit/model/% \
-	$(patsubst tests/%.c,$(O)/tests/%,$(shell grep -l __SANITIZE_ADDRESS__ $(unit_sources))) \
-	$(addprefix $(O)/tests/unit/,$(shell cat $(skipped_there))),$(unit_programs)))
-check-unit-once: ## check-unit-sanitized, and of check-unit what differs plainly
-	+@status=0; $(MAKE) --no-print-directory check-unit-sanitized WITHOUT="$(plain_only)" || status=$$?; \
-		$(MAKE) --no-print-directory check-unit-plain || status=$$?; exit $$status
-
-check-unit-plain:
-	@echo "unit tests: all but $(words $(plain_only)) ran under the sanitizers; plainly run $(words $(plain_programs)) that skip" \
-		"or do less there, are left out there, or are about bits; make check-unit runs all"
-	+@$(MAKE) --no-print-directory check-unit unit_programs="$(plain_programs)"
 
 # Threads that share memory without a lock, under ThreadSanitizer; what is not of the page
 # comes from the library as it is.
@@ -271,7 +236,8 @@ notebooks: all ## run doc/notebooks and write them with their figures to build/n
 
 check-doc: doc
 
-.PHONY: doc notebooks check-doc check check-all check-parts check-repeat check-style check-layers check-unit check-unit-once check-unit-plain unit-programs check-cli cli-needs cli-tests waiting-tests check-attack check-sanitize check-unit-sanitized check-python-sanitize check-tsan can-drive mcap-reader python-peers stream-peers
+.PHONY: doc notebooks check-doc check-style check-layers check-unit unit-programs check-kept check-cli cli-needs \
+	peers check-attack check-python check-tsan can-drive mcap-reader python-peers stream-peers
 
 # Sums of very many pairs: time and memory, next to numpy.
 $(O)/tests/corpus: tests/bench/corpus.c $(O)/lib/libincise-learn.so

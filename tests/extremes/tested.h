@@ -13,31 +13,20 @@
 #include <setjmp.h>
 #include <cmocka.h>
 #include "extremes.h"
+#include "../unit/cases.h"
 
 #define TESTED_MAX 64
-
-static struct extremes_setup tested_few = {.seed = 1, .part = 20, .scenes = "scenes"},
-			     tested_all = {.seed = 1, .part = 1, .scenes = "scenes"};
-
-/*
- * Of properties whose cases are all tried, try one of @part instead, as some take long; with
- * ATTACK=full in the environment, as in make check-all, try all of them.
- */
-static inline void tested_reduce(int part)
-{
-	const char *attack = getenv("ATTACK");
-
-	if (!attack || strcmp(attack, "full") != 0)
-		tested_all.part = part;
-}
 
 static void test_property(void **state)
 {
 	const struct property *property = *state;
+	struct extremes_setup setup = {
+		.seed = cases_seed(1), .part = 20, .scenes = "scenes"};
 	struct extremes_row row;
 
-	extremes_try(property, property->for_tests_only ? &tested_all : &tested_few,
-		     &row);
+	if (cases_are_all())
+		setup.part = 1;
+	extremes_try(property, &setup, &row);
 	print_message("%ld cases, %ld refused\n", row.tried, row.refused);
 	if (row.wrong)
 		fail_msg("%ld of %ld cases are wrong, the first: %s", row.wrong,

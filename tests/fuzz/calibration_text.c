@@ -9,14 +9,6 @@
 #include <string.h>
 #include <incise/calibration.h>
 
-/* As in scene_file.c: libconfig loses the string in hand at a syntax error. */
-const char *__lsan_default_suppressions(void);
-
-const char *__lsan_default_suppressions(void)
-{
-	return "leak:libconfig_yylex\nleak:strbuf_append\nleak:strvec_append\n";
-}
-
 static void check(const struct incise_calibration_record *record)
 {
 	int n = record->n;

@@ -15,14 +15,6 @@
 #include <incise/incision.h>
 #include <incise/scene.h>
 
-/* libconfig loses the string in hand at a syntax error: it is not ours to free. */
-const char *__lsan_default_suppressions(void);
-
-const char *__lsan_default_suppressions(void)
-{
-	return "leak:libconfig_yylex\nleak:strbuf_append\nleak:strvec_append\n";
-}
-
 static void wrong(const char *what)
 {
 	fprintf(stderr, "scene_file: %s\n", what);

@@ -56,6 +56,7 @@ static void check_answer(const struct run *run, const struct stepper_setpoint *b
 {
 	const struct incise_stepper_setpoint *page = &run->page;
 	const struct stepper_setpoint *setpoint = &run->setpoint;
+	struct stepper_setpoint expected = *before;
 	bool is_new = !(page->seq & 1) && page->seq != before->seq;
 	bool garbage = is_garbage(page);
 
@@ -66,10 +67,10 @@ static void check_answer(const struct run *run, const struct stepper_setpoint *b
 	if (setpoint->seq != (is_new ? page->seq : before->seq))
 		wrong("not the right seq");
 	if (answer == STEPPER_PAGE_TAKEN)
-		before = &(struct stepper_setpoint){
+		expected = (struct stepper_setpoint){
 			.mode = page->mode, .target = page->target, .t_ns = page->t_ns};
-	if (setpoint->mode != before->mode || setpoint->target != before->target ||
-	    setpoint->t_ns != before->t_ns)
+	if (setpoint->mode != expected.mode || setpoint->target != expected.target ||
+	    setpoint->t_ns != expected.t_ns)
 		wrong("not the right setpoint");
 }
 

@@ -17,6 +17,7 @@
 #include <incise/calibrate_delay.h>
 #include "../../../lib/calib/calibrate_delay.c"
 #include "../../../lib/base/random.h"
+#include "../cases.h"
 
 #define MOTION_MAX 20000
 #define OTHER_MAX 200000
@@ -24,14 +25,7 @@
 static struct incise_delay_point motion[MOTION_MAX], other[OTHER_MAX];
 static int n_motion, n_other;
 static uint64_t seed;
-/* A sanitizer slows them five times down, and sees in one data set what it sees in all. */
-#ifdef __SANITIZE_ADDRESS__
-static int force_runs = 10;
-static const int camera_runs = 40;
-#else
-static int force_runs = 40;
-static const int camera_runs = 200;
-#endif
+static int force_runs, camera_runs;
 
 static double uniform(void)
 {
@@ -351,7 +345,7 @@ static void what_says_nothing_gets_nothing(void **state)
 	assert_false(solve(&normal, x));
 }
 
-int main(int argc, char **argv)
+int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_force_intervals),
@@ -363,7 +357,7 @@ int main(int argc, char **argv)
 		cmocka_unit_test(what_says_nothing_gets_nothing),
 	};
 
-	if (argc > 1)
-		force_runs = atoi(argv[1]);
+	force_runs = cases_of(40, 10);
+	camera_runs = cases_of(200, 40);
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,6 +13,7 @@
 #include <stdlib.h>
 #include "../../../lib/base/random.h"
 #include "compiled.h"
+#include "../cases.h"
 
 static int32_t uniform32(uint64_t *seed)
 {
@@ -56,7 +57,7 @@ static void test_clamped_outside_the_support(void **state)
 		for (int a = 0; a < ARITHMETICS; a++) {
 			struct incise_fixed *fx = compiled(models[m], a, 32);
 
-			for (int n = 0; n < 20000; n++) {
+			for (int n = 0; n < cases_of(20000, 1000); n++) {
 				int32_t x[2], in[2];
 
 				for (int i = 0; i < 2; i++) {
@@ -164,7 +165,7 @@ static void test_between_the_rules(void **state)
 	for (int r = 0; r < 20; r++)
 		incise_model_set_consequent(model, r, (double[]){r % 2 ? 2 : -1, 0, 0});
 	fx = compiled(model, INCISE_FIXED_DIRECT, 0);
-	for (int n = 0; n < 100000; n++) {
+	for (int n = 0; n < cases_of(100000, 5000); n++) {
 		int32_t x[] = {(int32_t)(paper_random(&seed) * INT32_MAX),
 			       (int32_t)(paper_random(&seed) * INT32_MAX)};
 
@@ -219,7 +220,7 @@ static void test_error_falls_with_the_square(void **state)
 		struct incise_fixed *fx = compiled(model, arithmetic, k ? 128 : 32);
 		uint64_t seed = 1;
 
-		for (int n = 0; n < 50000; n++) {
+		for (int n = 0; n < cases_of(50000, 10000); n++) {
 			double x[] = {10 + 10 * paper_random(&seed),
 				      25 + 25 * paper_random(&seed)};
 

@@ -14,16 +14,13 @@
 #include <incise/train.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/average.h"
+#include "../cases.h"
 
 #define CUTS 6
 #define UNSEEN_CUTS 40
 #define PER_CUT 12
 #define ROWS ((CUTS + UNSEEN_CUTS) * PER_CUT)
-#ifdef __SANITIZE_ADDRESS__
-#define SETS 2 /* twenty times slower; the plain build has all of them */
-#else
-#define SETS 12
-#endif
+#define SETS cases_of(12, 2)
 
 static double rows[ROWS][3];
 static int groups[ROWS];

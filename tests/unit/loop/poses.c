@@ -9,8 +9,7 @@
  *                           └── last good pose ──────► compared ◄── force ─┘
  *
  * The force is within its limit at each tick, and 0 once the last good pose is older than
- * limits.pose_age_ms and the longest fade. With ATTACK=full in the environment, as in make
- * check-all, there are a million poses, else a tenth of them.
+ * limits.pose_age_ms and the longest fade.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -27,6 +26,7 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/device/polhemus/polhemus_stream.h"
 #include "../scene/felt.h"
+#include "../cases.h"
 
 #define POSES 1000000
 #define FORCE_N 3.0
@@ -212,9 +212,7 @@ static int look(void *context, const struct incise_tick *tick)
 
 static uint64_t number_of_poses(void)
 {
-	const char *attack = getenv("ATTACK");
-
-	return attack && !strcmp(attack, "full") ? POSES : POSES / 10;
+	return (uint64_t)cases_of(POSES, POSES / 20);
 }
 
 static struct incise_scene *make_scene(void)

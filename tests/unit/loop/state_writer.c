@@ -13,6 +13,7 @@
 #include <time.h>
 #include "../scene/felt.h"
 #include "state_made.h"
+#include "../cases.h"
 
 static struct incise_state_now now;
 static struct incise_tick ticks[INCISE_STATE_TICKS];
@@ -395,13 +396,14 @@ static void test_long_sum_of_work(void **state)
 {
 	struct made made = made_page();
 	struct incise_tick tick = at(0, 2);
+	const int n = cases_of(10000000, 500000);
 	double naive = 1e6;
 
 	incise_state_tick(made.writer, &tick, 0, 0, 0);
 	/* 1e6 mJ at once; another tool, and short ways to and fro, each against the force. */
 	tick = at(-5e5, 2);
 	incise_state_tick(made.writer, &tick, 0, 0, 0);
-	for (int i = 0; i <= 10000000; i++) {
+	for (int i = 0; i <= n; i++) {
 		tick = i % 2 ? at(-2.5e-11, -2) : at(0, 2);
 		tick.tool = INCISE_TOOL_HANDLE;
 		incise_state_tick(made.writer, &tick, 0, 0, 0);
@@ -410,7 +412,7 @@ static void test_long_sum_of_work(void **state)
 	look(&made);
 	assert_true(naive == 1e6);
 	/* The last bit of 1e6. */
-	assert_true(fabs(now.absorbed_mJ - 1e6 - 5e-4) <= 0x1p-33);
+	assert_true(fabs(now.absorbed_mJ - 1e6 - 5e-11 * n) <= 0x1p-33);
 	made_free(&made);
 }
 

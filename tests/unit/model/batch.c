@@ -14,6 +14,7 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/fixed/layout.h"
 #include "paper_model.h"
+#include "../cases.h"
 
 #define N 100000
 #define UNTOUCHED 0x5a5a5a5a
@@ -113,7 +114,7 @@ static void test_shapes(void **state)
 			compiled(cases[i].n_inputs, cases[i].n_a, cases[i].n_b,
 				 cases[i].arithmetic, cases[i].cells, i);
 
-		check(fx, N, i);
+		check(fx, (size_t)cases_of(N, 5000), i);
 		incise_fixed_free(fx);
 	}
 }
@@ -178,7 +179,7 @@ static void check_extreme(const struct incise_fixed *fx, int32_t shift_a, int32_
 	head->crc = incise_fx_le32(
 		incise_fx_crc(bytes + INCISE_FX_CRC_FROM, fx->size - INCISE_FX_CRC_FROM));
 	assert_int_equal(incise_fixed_open(&extreme, head, fx->size), 0);
-	check(&extreme, 20000, seed);
+	check(&extreme, (size_t)cases_of(20000, 2000), seed);
 	free(head);
 }
 

@@ -19,6 +19,7 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/model/model.h"
 #include "paper_model.h"
+#include "../cases.h"
 
 #define N 100000
 
@@ -83,7 +84,7 @@ static void compare(const struct incise_fixed *fx, int32_t (*eval)(const int32_t
 	static const int32_t ends[] = {INT32_MIN, INT32_MAX, 0, -1, 1};
 	uint64_t seed = 1;
 
-	for (int k = 0; k < N; k++) {
+	for (int k = 0; k < cases_of(N, 5000); k++) {
 		int32_t x[INCISE_FIXED_INPUTS_MAX] = {0};
 
 		for (int i = 0; i < fx->n_inputs; i++)

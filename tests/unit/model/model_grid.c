@@ -17,6 +17,7 @@
 #include "../../../lib/model/model_grid.h"
 #include "../fixed/compiled.h"
 #include "paper_model.h"
+#include "../cases.h"
 
 static bool holds(struct interval a, long double x)
 {
@@ -28,7 +29,7 @@ static void test_operations(void **state)
 {
 	uint64_t seed = 1;
 
-	for (int n = 0; n < 100000; n++) {
+	for (int n = 0; n < cases_of(100000, 5000); n++) {
 		double v[4], scale = pow(10, 6 * paper_random(&seed));
 		struct interval a, b;
 		long double x, y;
@@ -63,10 +64,10 @@ static void test_extremes(void **state)
 /* Derivatives by symmetric differences of the degrees. */
 static void test_degrees_over_an_interval(void **state)
 {
-	for (uint64_t seed = 1; seed <= 20; seed++) {
+	for (int seed = 1; seed <= cases_of(20, 3); seed++) {
 		struct incise_model *model = paper_model(INCISE_MF_GAUSS, seed, 1);
 		struct incise_axis axis;
-		uint64_t points = seed;
+		uint64_t points = (uint64_t)seed;
 
 		paper_disturb(model, seed, 0.6);
 		incise_axis_init(&axis, model, seed % 2);

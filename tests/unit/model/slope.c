@@ -14,6 +14,7 @@
 #include "../../../lib/model/slope.h"
 #include "../fixed/compiled.h"
 #include "any_model.h"
+#include "../cases.h"
 
 /* Points per input, both ends included. */
 #define DENSE 120
@@ -82,7 +83,7 @@ static void assert_encloses(const struct incise_slope *slope,
 
 static void test_certified(void **state)
 {
-	for (uint64_t seed = 1; seed <= 10; seed++) {
+	for (int seed = 1; seed <= cases_of(10, 4); seed++) {
 		struct incise_model *model =
 			seed % 4 ? paper_model(INCISE_MF_GAUSS, seed, 1 << seed % 5)
 				 : line_model(seed);
@@ -224,7 +225,7 @@ static void test_too_wild_to_certify(void **state)
 
 static void test_compiled(void **state)
 {
-	for (uint64_t seed = 1; seed <= 4; seed++)
+	for (int seed = 1; seed <= cases_of(4, 2); seed++)
 		for (int a = 0; a < ARITHMETICS; a++) {
 			struct incise_model *model =
 				seed % 4 ? paper_model(INCISE_MF_GAUSS, seed, 2)

@@ -15,6 +15,7 @@
 #include <incise/verify.h>
 #include "../../../lib/device/polhemus/polhemus_stream.h"
 #include "../../../lib/record/read/rows.h"
+#include "../cases.h"
 
 #define K 4
 #define S 1000000000LL
@@ -22,7 +23,7 @@
 #define RECORDS_MAX 8000
 #define SPANS_MAX 8
 #define SEEDS 60
-#define SEEDS_FULL 200 /* in make check-all */
+#define SEEDS_FULL 200 /* with CASES=all */
 
 struct span {
 	int64_t from_ns, to_ns; /* after the first record */
@@ -549,13 +550,9 @@ static void draw_scenario(struct scenario *s)
 /* The invariant, over whatever is drawn; and most rows of a good stream are well known. */
 static void no_time_is_worse_than_it_states(void **state)
 {
-	const char *only = getenv("SEED"), *attack = getenv("ATTACK");
-	bool full = attack && !strcmp(attack, "full");
+	const char *only = getenv("SEED");
 	int first = only ? atoi(only) : 1,
-	    last = only	  ? first
-		   : full ? SEEDS_FULL
-			  : SEEDS,
-	    bad = 0;
+	    last = only ? first : cases_of(SEEDS_FULL, SEEDS), bad = 0;
 	long rows = 0, beyond = 0;
 
 	for (int seed = first; seed <= last; seed++) {

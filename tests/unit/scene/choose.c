@@ -14,15 +14,9 @@
 #include <cmocka.h>
 #include "../../../lib/scene/forces.h"
 #include "fed.h"
+#include "../cases.h"
 
 #define TICKS 2500
-
-/* Ways to evaluate and surfaces of one stage; accesses are checked on one of them. */
-#ifdef __SANITIZE_ADDRESS__
-#define WAYS 1
-#else
-#define WAYS 4
-#endif
 
 static struct fed_folder folder;
 
@@ -99,8 +93,11 @@ static struct incise_scene *scene_of(const struct lacking *w,
 		 "effects = { average_ticks = %d; };\n"
 		 "device = { delay_ticks = 0; };\n"
 		 "limits = { force_N = 1.2; slew_N_s = 200.0; ramp_ms = 50.0; };\n%s",
-		 w->model ? "model = \"m.fis\";" : "", arithmetic, surface->text,
-		 w->no_gain ? 0.0 : 1.0, tissue, w->no_average ? 1 : 8,
+		 !w->model		       ? ""
+		 : strcmp(arithmetic, "fixed") ? "model = \"m.fis\";"
+					       : "model = \"m.fx\";",
+		 arithmetic, surface->text, w->no_gain ? 0.0 : 1.0, tissue,
+		 w->no_average ? 1 : 8,
 		 w->no_membrane ? ""
 				: "membrane = { point_mm = [0.0, 0.0, -2.5]; "
 				  "normal = [0.0, 0.1, 1.0]; radius_mm = 6.0; "
@@ -285,70 +282,64 @@ static int stages_of_a_loop(void)
 	return (int)n_all - 3;
 }
 
-static void test_lean_is_full_to_the_bit(const struct surface *surface,
-					 const char *arithmetic)
+/* What the scene lacks is left out, and the ticks are those of the whole pipeline. */
+static void lean_is_full_to_the_bit(const struct lack *lack,
+				    const struct surface *surface, const char *arithmetic,
+				    struct seen *seen)
 {
-	struct seen seen = {0};
+	struct incise_scene *scene = scene_of(&lack->lacking, surface, arithmetic);
+	struct incise_plan *lean = plan_of(scene), *full;
+
+	incise_scene_set_full(scene, true);
+	full = plan_of(scene);
+	assert_complete(lean);
+	assert_complete(full);
+	/* The rest, and the actuator of no rig, cannot be kept. */
+	assert_int_equal(stages(full), stages_of_a_loop());
+	assert_true(stages(lean) < stages(full));
+	/* What only a stage that is left out needs is not there. */
+	assert_true(incise_plan_memory(lean) <= incise_plan_memory(full));
+	if (!strcmp(lack->stage, "tool") || !strcmp(lack->stage, "normal"))
+		assert_true(incise_plan_memory(lean) < incise_plan_memory(full));
+	assert_false(keeps(lean, lack->stage));
+	if (!why_not(lean, lack->stage) || !strstr(why_not(lean, lack->stage), lack->why))
+		fail_msg("%s left out: %s", lack->stage, why_not(lean, lack->stage));
+	if (lack->also)
+		assert_non_null(strstr(why_not(lean, lack->also), lack->why));
+	assert_non_null(strstr(why_not(full, "actuate"), "no stepper"));
+	compare(lean, full, seen);
+	incise_plan_free(full);
+	incise_plan_free(lean);
+	incise_scene_free(scene);
+}
+
+/* Of the surfaces and evaluators each lack has one, and with CASES=all each. */
+static void test_lean_is_full_to_the_bit(void **state)
+{
 	const unsigned int met = INCISE_TICK_CONTACT | INCISE_TICK_STALE |
 				 INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED |
 				 INCISE_TICK_STARTING | INCISE_TICK_EXTRAPOLATED |
 				 INCISE_TICK_IN_CUT | INCISE_TICK_MEMBRANE |
 				 INCISE_TICK_LUMEN | INCISE_TICK_BACK_WALL;
+	struct seen seen = {0};
+	int compared = 0;
 
-	for (int i = 0; i < LACKS; i++) {
-		const struct lack one = lack_of(i), *lack = &one;
-		struct incise_scene *scene =
-			scene_of(&lack->lacking, surface, arithmetic);
-		struct incise_plan *lean = plan_of(scene), *full;
+	for (int i = 0; i < LACKS; i++)
+		for (int way = 0; way < 6; way++) {
+			const struct lack lack = lack_of(i);
 
-		incise_scene_set_full(scene, true);
-		full = plan_of(scene);
-		assert_complete(lean);
-		assert_complete(full);
-		/* The rest, and the actuator of no rig, cannot be kept. */
-		assert_int_equal(stages(full), stages_of_a_loop());
-		assert_true(stages(lean) < stages(full));
-		/* What only a stage that is left out needs is not there. */
-		assert_true(incise_plan_memory(lean) <= incise_plan_memory(full));
-		if (!strcmp(lack->stage, "tool") || !strcmp(lack->stage, "normal"))
-			assert_true(incise_plan_memory(lean) < incise_plan_memory(full));
-		assert_false(keeps(lean, lack->stage));
-		if (!why_not(lean, lack->stage) ||
-		    !strstr(why_not(lean, lack->stage), lack->why))
-			fail_msg("case %d: %s left out: %s", i, lack->stage,
-				 why_not(lean, lack->stage));
-		if (lack->also)
-			assert_non_null(strstr(why_not(lean, lack->also), lack->why));
-		assert_non_null(strstr(why_not(full, "actuate"), "no stepper"));
-		compare(lean, full, &seen);
-		incise_plan_free(full);
-		incise_plan_free(lean);
-		incise_scene_free(scene);
-	}
+			if (!cases_are_all() && way != i % 6)
+				continue;
+			lean_is_full_to_the_bit(&lack, &surfaces[way % 3],
+						evaluators[way / 3], &seen);
+			compared += TICKS;
+		}
 	/* It was a varied stroke. */
 	assert_int_equal(seen.flags & met, met);
 	assert_int_equal(seen.phases, 7);
 	assert_int_equal(seen.tools, 1 << INCISE_TOOL_BLADE | 1 << INCISE_TOOL_HANDLE |
 					     1 << INCISE_TOOL_TUBE);
-	assert_true(seen.ticks_with_force > TICKS * LACKS / 4);
-}
-
-static void test_plane(void **state)
-{
-	test_lean_is_full_to_the_bit(&surfaces[0], evaluators[0]);
-	test_lean_is_full_to_the_bit(&surfaces[0], evaluators[1]);
-}
-
-static void test_capsule(void **state)
-{
-	test_lean_is_full_to_the_bit(&surfaces[1], evaluators[0]);
-	test_lean_is_full_to_the_bit(&surfaces[1], evaluators[1]);
-}
-
-static void test_mesh(void **state)
-{
-	test_lean_is_full_to_the_bit(&surfaces[2], evaluators[0]);
-	test_lean_is_full_to_the_bit(&surfaces[2], evaluators[1]);
+	assert_true(seen.ticks_with_force > compared / 4);
 }
 
 /* A scene that lacks nothing keeps all, but for what no loop runs and what no rig has. */
@@ -434,8 +425,9 @@ static void test_one_force(void **state)
 		snprintf(text[1], sizeof(text[1]), "tissue = { %s %s = 0.0; };", other,
 			 number->key);
 		snprintf(text[2], sizeof(text[2]), "tissue = { %s };", other);
-		for (int way = 0; way < WAYS; way++)
-			one_effect(incise_tissue_forces[i].name, texts, way);
+		for (int way = 0; way < 4; way++)
+			if (cases_are_all() || way == i % 4)
+				one_effect(incise_tissue_forces[i].name, texts, way);
 	}
 }
 
@@ -447,7 +439,7 @@ static void test_one_effect(void **state)
 		"tissue = { reaction_N_mm = 0.3; }; effects = { average_ticks = 1; };",
 		tissue};
 
-	for (int way = 0; way < WAYS; way++)
+	for (int way = 0; way < (cases_are_all() ? 4 : 1); way++)
 		one_effect("normal", average, way);
 }
 
@@ -467,9 +459,10 @@ static int tear_down(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_plane),	   cmocka_unit_test(test_capsule),
-		cmocka_unit_test(test_mesh),	   cmocka_unit_test(test_everything),
-		cmocka_unit_test(test_picture),	   cmocka_unit_test(test_one_force),
+		cmocka_unit_test(test_lean_is_full_to_the_bit),
+		cmocka_unit_test(test_everything),
+		cmocka_unit_test(test_picture),
+		cmocka_unit_test(test_one_force),
 		cmocka_unit_test(test_one_effect),
 	};
 

@@ -13,7 +13,7 @@
 #define FED_PERIOD_NS 8333333
 
 struct fed_folder {
-	char dir[40], scene[64], model[64], mesh[64], heights[64];
+	char dir[40], scene[64], model[64], fixed[64], mesh[64], heights[64];
 };
 
 /* A hill 4 mm high on 80 by 80 mm, its top at 0 0 0. */
@@ -59,7 +59,9 @@ static inline void fed_folder_make(struct fed_folder *f)
 	snprintf(f->model, sizeof(f->model), "%s/m.fis", f->dir);
 	snprintf(f->mesh, sizeof(f->mesh), "%s/hill.obj", f->dir);
 	snprintf(f->heights, sizeof(f->heights), "%s/hill.asc", f->dir);
+	snprintf(f->fixed, sizeof(f->fixed), "%s/m.fx", f->dir);
 	felt_write_model(f->model);
+	felt_write_fixed(f->model, f->fixed);
 	fed_write_mesh(f->mesh);
 	fed_write_heights(f->heights);
 }
@@ -68,6 +70,7 @@ static inline void fed_folder_remove(struct fed_folder *f)
 {
 	unlink(f->scene);
 	unlink(f->model);
+	unlink(f->fixed);
 	unlink(f->mesh);
 	unlink(f->heights);
 	if (rmdir(f->dir))

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include <incise/fixed.h>
 #include <incise/plan.h>
 #include <incise/rig.h>
 #include <incise/scene.h>
@@ -20,7 +21,7 @@
 #define FELT_SLEW_N_S 300.0
 
 struct felt {
-	char dir[40], scene_path[64], model_path[64];
+	char dir[40], scene_path[64], model_path[64], fixed_path[64];
 	struct incise_scene *scene;
 	struct incise_rig *rig;
 	struct incise_plan *plan;
@@ -43,6 +44,21 @@ static inline void felt_write_model(const char *path)
 	incise_model_free(model);
 }
 
+/* Its fixed point, compiled once by a process: that would take most of the time of a plan's start. */
+static inline void felt_write_fixed(const char *model_path, const char *path)
+{
+	static struct incise_fixed *fx;
+
+	if (!fx) {
+		struct incise_model *model = incise_model_load(model_path, NULL);
+
+		fx = incise_fixed_compile(model, NULL, NULL);
+		incise_model_free(model);
+	}
+	if (!fx || incise_fixed_save(fx, path, NULL))
+		abort();
+}
+
 static inline void felt_start(struct felt *f, const char *arithmetic,
 			      unsigned int devices)
 {
@@ -54,12 +70,15 @@ static inline void felt_start(struct felt *f, const char *arithmetic,
 		abort();
 	snprintf(f->scene_path, sizeof(f->scene_path), "%s/x.scene", f->dir);
 	snprintf(f->model_path, sizeof(f->model_path), "%s/x.fis", f->dir);
+	snprintf(f->fixed_path, sizeof(f->fixed_path), "%s/x.fx", f->dir);
 	felt_write_model(f->model_path);
+	felt_write_fixed(f->model_path, f->fixed_path);
 	out = fopen(f->scene_path, "w");
 	fprintf(out,
-		"model = \"x.fis\"; arithmetic = \"%s\";\n"
+		"model = \"%s\"; arithmetic = \"%s\";\n"
 		"limits = { force_N = %g; slew_N_s = %g; pose_age_ms = 50.0; };\n",
-		arithmetic, FELT_LIMIT_N, FELT_SLEW_N_S);
+		strcmp(arithmetic, "fixed") ? "x.fis" : "x.fx", arithmetic, FELT_LIMIT_N,
+		FELT_SLEW_N_S);
 	fclose(out);
 	f->scene = incise_scene_load(f->scene_path, NULL, NULL);
 	f->rig = incise_rig_open("sim:clock=simulated,depth_mm=5,times=1", devices, NULL);
@@ -84,6 +103,7 @@ static inline void felt_end(struct felt *f)
 	incise_scene_free(f->scene);
 	unlink(f->scene_path);
 	unlink(f->model_path);
+	unlink(f->fixed_path);
 	rmdir(f->dir);
 }
 

@@ -17,16 +17,13 @@
 #include "../../../lib/base/vector.h"
 #include "../../../lib/scene/heights.h"
 #include "../../../lib/surface/surface.h"
+#include "../cases.h"
 
 #define ONE 65536.0
 #define UNIT 1073741824.0
 
 /* With seven surfaces more than 10⁶; accesses are the same at fewer. */
-#ifdef __SANITIZE_ADDRESS__
-#define PLACES 20000
-#else
-#define PLACES 300000
-#endif
+#define PLACES cases_of(300000, 20000)
 
 static const double up[3] = {0, 0, 1};
 

@@ -15,6 +15,7 @@
 #include "../../../lib/control/model_input.h"
 #include "../../../lib/scene/plan.h"
 #include "fed.h"
+#include "../cases.h"
 
 static const struct incise_tracker_info tracker = {
 	.name = "fed", .rate_hz = 120, .latency_ns = FED_LATENCY_NS};
@@ -153,11 +154,11 @@ static const struct {
 	 {INCISE_INPUT_TIME, INCISE_INPUT_ACCELERATION, INCISE_INPUT_DEPTH,
 	  INCISE_INPUT_TILT}},
 };
-#define CASES ((int)(sizeof(cases) / sizeof(*cases)))
+#define N_CASES ((int)(sizeof(cases) / sizeof(*cases)))
 
 static void forces_are_those_of_the_model(void **state)
 {
-	for (int i = 0; i < CASES; i++) {
+	for (int i = 0; i < N_CASES; i += cases_are_all() ? 1 : 2) {
 		struct incise_model *model;
 		struct incise_scene *scene;
 		struct incise_plan *plan;
@@ -183,7 +184,7 @@ static void integers_hold_their_bound(void **state)
 	const unsigned int other = INCISE_TICK_STARTING | INCISE_TICK_CLAMPED |
 				   INCISE_TICK_SLEWED | INCISE_TICK_STALE;
 
-	for (int i = 0; i < CASES; i++) {
+	for (int i = 0; i < N_CASES; i++) {
 		struct incise_scene *scene[2];
 		struct incise_plan *plan[2];
 		double worst_N = 0, bound_N;
@@ -277,11 +278,12 @@ static void wild_poses_give_forces_within_the_limits(void **state)
 			fed_plan(&folder, &tracker, &scene,
 				 fixed ? "model = \"m.fis\";"
 				       : "model = \"m.fis\"; arithmetic = \"double\";");
+		const int64_t n = cases_of(20000, 4000), apart = n * 19 / 20;
 		uint64_t seed = 1;
 
-		for (int64_t k = 1; k < 20000; k++) {
+		for (int64_t k = 1; k < n; k++) {
 			/* Some ticks are an age apart. */
-			int64_t t_ns = k < 19000 ? k * 1000000 : INT64_MAX - (20000 - k);
+			int64_t t_ns = k < apart ? k * 1000000 : INT64_MAX - (n - k);
 			struct incise_tracker_sample pose = {.t_ns = t_ns,
 							     .quaternion = {1}};
 			struct incise_tick tick;

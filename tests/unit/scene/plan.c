@@ -73,9 +73,13 @@ static void test_a_refused_model_names_its_scene(void **state)
 	struct incise_error err = {0};
 	struct incise_scene *scene;
 	struct felt f;
+	FILE *out;
 
 	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
 	assert_int_equal(incise_model_save(triangles, f.model_path, NULL), 0);
+	out = fopen(f.scene_path, "w");
+	fputs("model = \"x.fis\";\n", out);
+	fclose(out);
 	scene = incise_scene_load(f.scene_path, NULL, NULL);
 	assert_non_null(scene);
 	assert_null(incise_plan_new(scene, f.rig, &err));

@@ -16,13 +16,10 @@
 #include <incise/vision.h>
 #include "../../../lib/sim/sim.h"
 #include "../../vision/scalpel_picture.h"
+#include "../cases.h"
 
 /* A sanitizer slows them ten times down, and sees in a few what it sees in all. */
-#ifdef __SANITIZE_ADDRESS__
-#define FRAMES 4
-#else
-#define FRAMES 16
-#endif
+#define FRAMES cases_of(16, 4)
 
 static const struct incise_vision_setup black = {
 	.hue = {0, 179},

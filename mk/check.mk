@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# The two levels of the check, and what looks at the check itself.
+#
+#   make check                         before each commit, and on each submission: ten minutes
+#   make check-full                    everything: an hour and more
+#   make check-full PARTS="vm attack"  parts of it
+#
+# A part is a target that tests/timed runs: it keeps its time and what it prints. A part that fails
+# keeps none from running but those that use what it builds.
+times := $(O)/times
+jobs = $(if $(findstring --jobserver,$(MAKEFLAGS)),,-j$(shell expr $$(nproc) + 1))
+timed = $(MAKE) $(jobs) -k --no-print-directory $(addprefix timed-,$1)
+timed-%:
+	+@tests/timed $(times) $* $(MAKE) -k --no-print-directory $(part_$*)
+
+# A test that runs for longer is ended, with its name.
+LIMIT_S ?= 600
+
+# What is built for `check` is in a folder of its own: one build of library, programs and tests, which
+# stops at any bad access or undefined operation.
+sanitize_flags := -fsanitize=address,undefined -fno-sanitize-recover=all
+sanitized := CFLAGS="-O1 -g1 $(sanitize_flags)" LDFLAGS="$(sanitize_flags)"
+checked := O=$(O)/check $(sanitized)
+
+# Parts of check, and their commands where they differ from the name.
+part_style := check-style
+part_build := $(checked) check-build
+part_layers := $(checked) check-layers
+part_unit := $(checked) check-unit
+part_kept := $(checked) check-kept
+part_commands := $(checked) check-commands
+
+check-build: libs tools unit-programs $(kept_programs) cli-needs
+check-commands: cli-needs
+	$(Q)$(bats) $(bats_jobs) --filter-tags check tests/cli tests/attack
+
+check-quick:
+	+@status=0; $(call timed,style build) || status=$$?; \
+	NEEDS=build $(call timed,layers unit kept commands) || status=$$?; exit $$status
+
+check: ## install what is missing, build and test: ten minutes
+	+@mk/deps build check demo
+	$(call in_parts,check-quick)
+	@echo "make check-full runs everything (an hour and more): all cases, all tests of the commands, attacks, kernels, packages"
+
+# Parts of check-full beside those of check. Each installs what it needs.
+part_plain := check-unit CASES=all
+part_cli := check-cli
+part_attack := check-attack
+part_fuzz := check-fuzz
+part_python := check-python
+part_tsan := check-tsan
+part_rtsan := check-rtsan
+part_vm := check-vm
+part_service := check-service
+part_clocks := check-clocks
+part_deb := check-deb
+part_module := check-module
+part_bare := check-debian12 check-debian13
+part_all := all cli-needs peers unit-programs
+full_parts := check plain cli attack fuzz python tsan rtsan vm clocks module deb bare
+PARTS ?= $(full_parts)
+deps_rtsan := rtsan
+deps_vm := vm
+deps_clocks := vm
+deps_module := module
+deps_deb := deb debian
+deps_bare := debian
+
+# What measures or boots has the machine to itself as far as it can: parts of the last line come alone.
+check-parts:
+	+@status=0; \
+	$(if $(filter check,$(PARTS)),$(MAKE) --no-print-directory check-quick || status=$$?;) \
+	$(call timed,all) || status=$$?; \
+	NEEDS=all $(call timed,$(filter-out check clocks bare,$(PARTS))) || status=$$?; \
+	$(foreach part,$(filter clocks bare,$(PARTS)),$(call timed,$(part)) || status=$$?;) \
+	exit $$status
+
+check-full: ## everything; PARTS="vm attack" for some of: check plain cli attack fuzz python tsan rtsan vm clocks module deb bare
+	@$(if $(filter-out $(full_parts),$(PARTS)),echo "make check-full: no part $(filter-out $(full_parts),$(PARTS)); there are: $(full_parts)" >&2; exit 2)
+	+@mk/deps build check full demo; $(foreach part,$(PARTS),$(if $(deps_$(part)),\
+		mk/deps $(deps_$(part)) || echo "going on without what $(part) needs";))
+	$(call in_parts,check-parts)
+
+in_parts = +@mkdir -p $(O); rm -rf $(times) $(times).logs; status=0; \
+	tests/timed $(times) whole $(MAKE) --no-print-directory $1 || status=$$?; \
+	tests/timed $(times); exit $$status
+
+# Tests whose outcome may be left to chance, again and again; see tests/repeat.
+TIMES ?= 20
+check-repeat: ## PART=check-unit TIMES=20 [BUSY=2] [CPUS=0]: a part so often, beside busy programs; appends to build/repeat.log
+	+@BUSY="$(BUSY)" CPUS="$(CPUS)" MAKE="$(MAKE)" tests/repeat $(O)/repeat.log "$(PART)" $(TIMES)
+
+# Lines and branches of lib/ that a level runs: make coverage [LEVEL=full]. With both levels measured
+# it lists what check loses.
+LEVEL ?= check
+coverage: ## lines and branches per layer that check runs; LEVEL=full: check-full; lists what check loses
+	+@mk/deps build check $(if $(filter full,$(LEVEL)),full)
+	+@$(MAKE) --no-print-directory O=$(O)/coverage CFLAGS="-O0 -g --coverage" LDFLAGS="--coverage" coverage-$(LEVEL)
+
+coverage-begin:
+	@find $(O) -name '*.gcda' -delete 2>/dev/null; :
+coverage-check: coverage-begin
+	+@$(MAKE) -k --no-print-directory check-build && for part in check-unit check-kept check-commands; do \
+		$(MAKE) --no-print-directory $$part >$(O)/$$part.log || echo "$$part failed: see $(O)/$$part.log"; done
+	@tests/coverage $(O) check
+coverage-full: coverage-begin
+	+@$(MAKE) -k --no-print-directory check-build peers && for part in "check-unit CASES=all" check-kept check-cli check-attack; do \
+		$(MAKE) --no-print-directory $$part >$(O)/$${part%% *}.log || echo "$$part failed: see $(O)/$${part%% *}.log"; done
+	@tests/coverage $(O) full
+
+.PHONY: check check-quick check-build check-commands check-full check-parts check-repeat coverage coverage-begin coverage-check coverage-full

@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * How many cases a property tries: a twentieth, or all with CASES=all in the environment, as in
+ * `make check-full`. SEED=N draws other ones; the seed is printed.
+ */
+#ifndef TEST_CASES_H
+#define TEST_CASES_H
+
+#include <inttypes.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static inline bool cases_are_all(void)
+{
+	const char *cases = getenv("CASES");
+
+	return cases && strcmp(cases, "all") == 0;
+}
+
+/* @return of @all cases a twentieth, at least @least */
+static inline int cases_of(int all, int least)
+{
+	int few = all / 20 > least ? all / 20 : least;
+
+	return cases_are_all() || few > all ? all : few;
+}
+
+/* @return SEED, or @seed */
+static inline uint64_t cases_seed(uint64_t seed)
+{
+	const char *text = getenv("SEED");
+
+	if (text)
+		seed = strtoull(text, NULL, 0);
+	printf("seed %" PRIu64 "\n", seed);
+	return seed;
+}
+
+#endif
