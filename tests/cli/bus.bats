@@ -164,7 +164,6 @@ rig() { # ARGUMENTS
 	[ "${#lines[@]}" -eq 6 ]
 }
 
-# bats test_tags=check
 @test "info of a bus as JSON" {
 	incise info bench:bus0 --json >r.json
 	[ "$(key r.json kind)" = bus ]
@@ -339,7 +338,6 @@ rig() { # ARGUMENTS
 	incise stepper status
 }
 
-# bats test_tags=check
 @test "what rig.conf says of a drive on CAN is checked whatever the backend" {
 	rig bus0
 	sed -i 's/lead_mm = 3.0;/&\ncan = { mode = "torque"; };/' rig.conf

@@ -195,7 +195,6 @@ until_it_runs() {
 	[ -z "$(ls)" ]
 }
 
-# bats test_tags=check
 @test "capture takes ./rig.conf" {
 	cat >rig.conf <<-'EOF'
 		clock = "simulated";

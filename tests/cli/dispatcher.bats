@@ -98,7 +98,6 @@ setup() {
 	[ "$output" = "$PWD/bin/incise-weigh|a b|--x||" ]
 }
 
-# bats test_tags=check
 @test "a verb on PATH does not hide the one beside incise" {
 	mkdir bin
 	printf '#!/bin/sh\necho false friend\n' >bin/incise-train

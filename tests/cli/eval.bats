@@ -34,7 +34,6 @@ refuses() {
 	paste got want | awk '($1 - $2)^2 > 1e-18 { bad = 1; print } END { exit bad || NR != 4 }'
 }
 
-# bats test_tags=check
 @test "eval joins by min, and takes rules of a list" {
 	example_in "$root/man/incise-fis.5" "[Rules]" |
 		sed "s/^AndMethod='prod'/AndMethod='min'/; s/^1 2, 2 (1)/0 2, 2 (0.5)/" >min.fis
@@ -179,7 +178,6 @@ refuses() {
 	[ -z "$output" ]
 }
 
-# bats test_tags=check
 @test "eval --sd refuses what is missing, stale or damaged, by name" {
 	cp m.fis alone.fis
 	run --separate-stderr incise eval alone.fis --sd <<<'5 20'

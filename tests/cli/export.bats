@@ -347,7 +347,6 @@ read_mcap() {
 		{ for (i = 2; i < 15; i++) if ($i != $(i + 13)) bad = 1 } END { exit bad || NR < 4290 }'
 }
 
-# bats test_tags=check
 @test "export resampled with pictures" {
 	cp -r liver.rec/ seen.rec
 	sqlite3 seen.rec/recording.db "DELETE FROM knots;

@@ -335,7 +335,6 @@ turned_blade() {
 # Rms of an expression of awk over the ticks of a log.
 rms() { awk -F, "NR > 1 { sum += ($2) ^ 2 } END { printf \"%.9f\", sqrt(sum / (NR - 1)) }" "$1"; }
 
-# bats test_tags=check
 @test "two axes feel the plane constraint, and one counts it as not felt" {
 	turned_blade
 	for n in 1 2 3; do

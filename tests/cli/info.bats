@@ -81,7 +81,6 @@ setup() {
 		'\$.inputs[0].mfs[0].params')")" = 3 ]
 }
 
-# bats test_tags=check
 @test "info of a compiled model" {
 	for kind in direct table force; do
 		incise compile m.fis -o m.fx --overwrite --method $kind --budget 10mN --json >c.json

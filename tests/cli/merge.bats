@@ -43,7 +43,6 @@ shares() {
 	grep -q "groups: cut, 0.3 held out with seed 1" out
 }
 
-# bats test_tags=check
 @test "a source given twice is named, and a group may be a source" {
 	shares
 	cp s1.csv same.csv

@@ -56,7 +56,6 @@ setup() {
 	[[ "$(key r.json libraries)" == *libincise.so* ]]
 }
 
-# bats test_tags=check
 @test "with a rig its devices count" {
 	incise plan neck.scene --rig sim:tracker_hz=240,tracker_latency_ms=2 --json >r.json
 	[ "$(key r.json devices)" = '["tracker","stepper"]' ]
@@ -89,7 +88,6 @@ setup() {
 	holds "$(key r.json limit_N_mm) > 20 && $(key r.json limit_N_mm) < 22"
 }
 
-# bats test_tags=check
 @test "a full plan keeps every stage" {
 	incise plan wall.scene --json >few.json
 	incise plan wall.scene --full --json >all.json

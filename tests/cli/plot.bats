@@ -309,7 +309,6 @@ keep_data() {
 	[ ! -e b.png ]
 }
 
-# bats test_tags=check
 @test "a session: the path, depth and force, and the tools that were in the tissue" {
 	incise haptic neck --procedure --state none --session a.session >/dev/null
 	incise assess a.session --json >a.json

@@ -57,7 +57,6 @@ teardown() {
 	[ $(($(date +%s%N) - start)) -ge 2990000000 ]
 }
 
-# bats test_tags=check
 @test "what is predicted is what the live loop does on the same poses" {
 	incise haptic liver.scene --rig $quick --duration 3s --log live.csv >/dev/null
 	incise replay liver.rec liver.scene --log replay.csv >/dev/null
@@ -145,7 +144,6 @@ teardown() {
 	[[ "$output" == *"2999 ticks"* ]]
 }
 
-# bats test_tags=check
 @test "a signal ends it, and leaves an older file as it was" {
 	echo old >t.csv
 	incise replay liver.rec liver.scene --real-time --log t.csv --overwrite >out 2>err &

@@ -88,7 +88,6 @@ row() {
 	run ! grep -vE '([]0-9] (mm|s|N|Hz|ms|V|K|kg|°|ppm|px|mV)(/[a-zA-Z]+²?)?|N s/mm| -) +(default|sim:)$' named
 }
 
-# bats test_tags=check
 @test "rig --json has typed values" {
 	printf '%s\n' 'camera = "v4l2:a \"b\"";' 'camera_setup = { width = 640; };' >rig.conf
 	incise rig --show --json >report.json

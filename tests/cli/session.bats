@@ -172,7 +172,6 @@ print(max(math.dist(p, q) for i, p in ends for k, q in ends if i == k))')
 		'\$.sessions[0].difference') WHERE value != 0")" = 0 ]
 }
 
-# bats test_tags=check
 @test "a row for each of many, as table and CSV" {
 	run -0 --separate-stderr incise assess easy.session hard.session --csv all.csv
 	[ "${lines[1]%% *}" = easy.session ]

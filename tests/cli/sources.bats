@@ -183,7 +183,6 @@ in_the_tissue() {
 
 # The emulator takes what it is told before what a program sends to it later.
 
-# bats test_tags=check
 @test "poses that the tracker flags render no force, and give no depth" {
 	plug_in
 	in_the_tissue

@@ -79,7 +79,6 @@ until_ticks() {
 	[[ "${lines[0]}" == "other: stopped since "* ]]
 }
 
-# bats test_tags=check
 @test "a loop that runs is measured" {
 	play neck run
 	run -0 --separate-stderr incise status neck

@@ -31,7 +31,6 @@ until_it_says() {
 	[[ "$output" == *"limits     0 to 15 mm in steps of 0.625 um, up to 30 mm/s"* ]]
 }
 
-# bats test_tags=check
 @test "status as JSON" {
 	incise stepper status --rig $quick --json >s.json
 	[ "$(key s.json command)" = status ]
@@ -107,7 +106,6 @@ until_it_says() {
 	[ "$(key e.json faults)" = '[]' ]
 }
 
-# bats test_tags=check
 @test "disable and clear" {
 	run -0 --separate-stderr incise stepper disable --rig $quick
 	[[ "$output" == "simulated haptic scalpel: ready at 0.0000 mm, as it is always powered" ]]
@@ -117,7 +115,6 @@ until_it_says() {
 	[ "$(key c.json faults)" = '[]' ]
 }
 
-# bats test_tags=check
 @test "what makes no sense on the virtual rig is said in a line" {
 	run --separate-stderr incise stepper jog -2 --rig $quick
 	failed_with "simulated haptic scalpel cannot jog" "incise stepper move"

@@ -90,7 +90,6 @@ ended() {
 		END { print most, n; exit !(most > 2.5 && n > 4) }' told
 }
 
-# bats test_tags=check
 @test "SIGHUP reads the scene again, without a step; what is none is refused" {
 	listen
 	serve liver.scene --rig sim:depth_mm=10,times=1000,pause_s=0.2,cut_s=1 --state page

@@ -99,7 +99,6 @@ packets() {
 	[ "$output" = "neck: tube" ]
 }
 
-# bats test_tags=check
 @test "what is missing is said" {
 	run -1 --separate-stderr incise tool neck
 	[[ "$stderr" == "incise tool: neck: no loop of that name has run here; "* ]]

@@ -142,7 +142,6 @@ parameters() {
 	cmp <(parameters a.fis) <(parameters b.fis)
 }
 
-# bats test_tags=check
 @test "train writes the first model and the history" {
 	incise train pairs.csv --classic --check 0.5 --epochs 7 -o m.fis --initial first.fis \
 		--history epochs.csv --json >r.json 2>/dev/null
@@ -159,7 +158,6 @@ parameters() {
 	run ! cmp -s first.fis m.fis
 }
 
-# bats test_tags=check
 @test "train takes other columns, shapes and kinds" {
 	sed '1s/.*/cut,a,b,torque_mNm/' pairs.csv >other.csv
 	incise train other.csv --inputs b,a --target torque_mNm --mf 2,3 --mf-type gbellmf \
