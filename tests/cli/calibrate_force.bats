@@ -19,6 +19,7 @@ made_weights() {
 			print m \",\" r \",\" s \",\" d } }"
 }
 
+# bats test_tags=check
 @test "the virtual rig's sensitivity is found, kept, reported and put in force" {
 	command -v gnuplot || skip "gnuplot is not installed"
 	run -0 --separate-stderr incise calibrate force \
@@ -117,6 +118,7 @@ made_weights() {
 	[[ "$output" == *"3 saturated"* ]]
 }
 
+# bats test_tags=check
 @test "what cannot be is refused by name" {
 	made_weights "" | awk -F, -v OFS=, 'NR > 1 { t = $1; $1 = $2; $2 = t } 1' >swapped.csv
 	made_weights "m = 100; r = 1400" >one.csv
@@ -136,6 +138,7 @@ made_weights() {
 	[ ! -e calibration.conf ]
 }
 
+# bats test_tags=check
 @test "files that are no pairs are named with their line" {
 	while IFS='|' read -r text said; do
 		printf '%b' "$text" >w.csv
@@ -156,21 +159,6 @@ made_weights() {
 	made_weights "" >w.csv
 	run --separate-stderr incise calibrate force --from w.csv
 	failed_with "calibration.conf:1: force_mV_N: expected a number"
-}
-
-@test "what is not a wish" {
-	run --separate-stderr incise calibrate force --from w.csv --weights 0,1,2
-	bad_usage "--from does not go with --rig, --weights or --keep"
-	run --separate-stderr incise calibrate force --rig sim: </dev/null
-	bad_usage "missing --weights or --from"
-	run --separate-stderr incise calibrate force --rig sim: --weights 100g
-	bad_usage "the empty pan and 2 weights or more"
-	run --separate-stderr incise calibrate force --rig sim: --weights 100g,100g,50g
-	bad_usage "100 g is listed twice"
-	run --separate-stderr incise calibrate force --input-range 5,1
-	bad_usage "expected the lower voltage first"
-	run --separate-stderr incise calibrate force extra
-	bad_usage "unexpected argument 'extra'; did you mean --from extra?"
 }
 
 @test "stopped in the middle, the old calibration stays" {

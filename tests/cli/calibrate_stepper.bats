@@ -46,6 +46,7 @@ made_points() {
 	}"
 }
 
+# bats test_tags=check
 @test "finds what the virtual actuator is made of, and writes it" {
 	stepper --rig $bench,backlash_mm=0.04,stall_mm_s=9 --json --keep points.csv
 	[ "$status" -eq 0 ] || complain "$stderr"
@@ -117,6 +118,7 @@ made_points() {
 	cmp calibration.conf before.conf
 }
 
+# bats test_tags=check
 @test "refuses by name what it cannot bear" {
 	while IFS='|' read -r spoil text; do
 		made_points "$spoil" >p.csv
@@ -142,6 +144,8 @@ made_points() {
 	made_points '' | sed '9s/,[^,]*$/,x/' >p.csv
 	stepper --from p.csv
 	failed_with "p.csv:9" "force_N: expected a number, found 'x'"
+	stepper --rig $bench --range 0mm..50mm
+	failed_with "--range ends at 50 mm"
 	cmp calibration.conf before.conf
 }
 
@@ -154,6 +158,7 @@ made_points() {
 		"$output" == *"stiffness          2.000"* ]] || complain "$output"
 }
 
+# bats test_tags=check
 @test "what does not pass is kept, but is not in force" {
 	made_points 'F += 0.3 * x * x' >p.csv
 	stepper --from p.csv
@@ -173,21 +178,4 @@ made_points() {
 	head -n -2 out | cmp - bench/report.txt # the last lines name the files
 	grep -q 'sensitivity of the sensor *B' out
 	holds "($(key bench/report.json N_mm) - 2)^2 < 0.0001"
-}
-
-@test "bad usage" {
-	stepper --range 5mm
-	bad_usage "--range: expected two positions"
-	stepper --range 5mm..1mm
-	bad_usage "it ends at 1 mm, not above its start"
-	stepper --strokes 1
-	bad_usage "strokes"
-	stepper --from p.csv --range 0mm..1mm
-	bad_usage "--from does not go with --rig, --keep, --range"
-	stepper --step-mm 1
-	bad_usage "--step-mm goes with --from"
-	stepper now
-	bad_usage "unexpected argument 'now'"
-	stepper --rig $bench --range 0mm..50mm
-	failed_with "--range ends at 50 mm"
 }

@@ -16,6 +16,7 @@ on_terminal() { # STREAMS COMMAND…
 	python3 "$root/tests/cli/terminal.py" "$@"
 }
 
+# bats test_tags=check
 @test "an error has a red prefix on a terminal, and the same text without colour in a pipe" {
 	run -1 on_terminal 2 incise info none.rec
 	[[ "$output" == "${red}incise info:$plain none.rec: "* ]]
@@ -42,6 +43,7 @@ on_terminal() { # STREAMS COMMAND…
 	[[ "$(sed 's/\x1b\[[0-9;]*m//g' <<<"$output")" == *"$plainly"* ]]
 }
 
+# bats test_tags=check
 @test "NO_COLOR, TERM=dumb and no TERM turn colour off" {
 	export NO_COLOR=1
 	run -1 on_terminal 2 incise info none.rec

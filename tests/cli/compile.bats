@@ -8,6 +8,7 @@ setup() {
 	cp "$root/scenes/liver.fis" m.fis
 }
 
+# bats test_tags=check
 @test "compile holds the default budget and says so" {
 	run -0 --separate-stderr incise compile m.fis -o m.fx
 	[[ "${lines[0]}" == "m.fis: "*"certified to "*" mN" ]]
@@ -32,6 +33,7 @@ setup() {
 	done
 }
 
+# bats test_tags=check
 @test "a tighter budget makes a finer model, too tight a one is refused" {
 	incise compile m.fis -o a.fx --budget 0.09mN --json >a.json
 	incise compile m.fis -o b.fx --budget 20uN --json >b.json
@@ -68,6 +70,7 @@ setup() {
 	done
 }
 
+# bats test_tags=check
 @test "compile refuses by name" {
 	sed "s/'gaussmf',\[[^]]*\]/'gbellmf',[2 2 5]/" m.fis >bell.fis
 	run --separate-stderr incise compile bell.fis -o x.fx
@@ -98,17 +101,6 @@ setup() {
 	./main <q >c
 	awk '{ printf "%.17g %.17g\n", $1 / 65536, $2 / 65536 }' q | incise eval m.fx >fx 2>/dev/null
 	cmp c fx
-	run -2 --separate-stderr incise compile m.fis -o m.fx --overwrite --c-source 7.c
-}
-
-@test "compile: bad usage" {
-	for args in "" "m.fis" "m.fis -o" "m.fis -o x.fx --method float" "m.fis -o x.fx --cells 0" \
-		"m.fis -o x.fx --budget 0.1kN" "m.fis -o x.fx --budget -1" "m.fis m.fis -o x.fx" \
-		"m.fis -o - --json" "m.fis -o x.fx --cells 5000"; do
-		run -2 --separate-stderr incise compile $args
-		[ "${#stderr_lines[@]}" -eq 2 ]
-	done
-	[ ! -e x.fx ]
 }
 
 @test "the integer core builds without a library, for a kernel" {

@@ -7,6 +7,7 @@ setup() {
 	work_folder
 }
 
+# bats test_tags=check
 @test "--help and help list the verbs" {
 	run -0 --separate-stderr incise --help
 	[ -z "$stderr" ]
@@ -21,6 +22,7 @@ setup() {
 	[ "$output" = "$help" ]
 }
 
+# bats test_tags=check
 @test "every program that is built is a verb of --help, or a word of one" {
 	for program in "$INCISE_BUILD"/bin/incise-*; do
 		name=${program##*/incise-}
@@ -34,6 +36,7 @@ setup() {
 	done
 }
 
+# bats test_tags=check
 @test "--version is the header's" {
 	header=$(sed -n 's/^#define INCISE_VERSION "\(.*\)"/\1/p' \
 		"$root/lib/include/incise/version.h")
@@ -44,10 +47,6 @@ setup() {
 	features=$output
 	run -0 incise -V
 	[ "$output" = "$features" ]
-	for program in "$INCISE_BUILD"/bin/incise-*; do
-		run -0 "$program" --version
-		[ "$output" = "incise $header" ]
-	done
 }
 
 @test "--version lists the modules that are there, and why one cannot be loaded" {
@@ -75,16 +74,13 @@ setup() {
 	[ "${#stderr_lines[@]}" -eq 1 ]
 }
 
+# bats test_tags=check
 @test "no verb, and words that are none" {
 	# a folder that may not be searched would be another error
 	PATH=$INCISE_BUILD/bin:/usr/bin:/bin
 	run -2 --separate-stderr incise
 	[ -z "$output" ]
 	[[ "$stderr" == "Usage: incise COMMAND"*"  demo "* ]]
-	run -2 --separate-stderr incise trian
-	[ "$stderr" = "incise: 'trian': no such command; did you mean 'incise train'?" ]
-	run -2 --separate-stderr incise calibrate forse
-	[ "${stderr_lines[0]}" = "incise calibrate: unknown calibration 'forse'; did you mean 'force'?" ]
 	for word in nosuch --nosuch ../bin/incise-train "" "$(printf 'x%.0s' {1..5000})"; do
 		run -2 --separate-stderr incise "$word"
 		[ -z "$output" ]
@@ -93,6 +89,7 @@ setup() {
 	done
 }
 
+# bats test_tags=check
 @test "a verb of someone else's on PATH runs with its arguments" {
 	mkdir bin
 	printf '#!/bin/sh\nprintf "%%s|" "$0" "$@"\nexit 7\n' >bin/incise-weigh
@@ -125,6 +122,7 @@ setup() {
 	[[ "$output" == "incise "* ]]
 }
 
+# bats test_tags=check
 @test "help VERB opens the manual of the source tree" {
 	[ -e "$INCISE_BUILD/../man/incise-train.1" ] ||
 		skip "the build folder does not lie in the source tree"
@@ -159,6 +157,19 @@ setup() {
 	done
 }
 
+# What it measures is in bench*.bats.
+# bats test_tags=check
+@test "a report of a benchmark is compared with itself; what is none, and no benchmark, are refused" {
+	incise bench precision "$root/scenes/liver.fis" --quick --json >r.json 2>/dev/null
+	run -0 --separate-stderr incise bench compare r.json r.json
+	[ -z "$stderr" ]
+	run --separate-stderr incise bench compare r.json "$root/scenes/liver.fis"
+	failed_with liver.fis
+	run --separate-stderr incise bench nosuch
+	bad_usage "unknown benchmark 'nosuch'"
+}
+
+# bats test_tags=check
 @test "an output whose reader has gone is no full disk" {
 	(
 		trap '' PIPE

@@ -15,6 +15,7 @@ finding() { # GROUP NAME
 		inside && $2 == name { print; getline; if (/→/) print }' <<<"$output"
 }
 
+# bats test_tags=check
 @test "doctor checks a simulated rig and finds no problem in it" {
 	run --separate-stderr incise doctor --rig sim:
 	[ -z "$stderr" ]
@@ -37,6 +38,7 @@ finding() { # GROUP NAME
 	[ "$problems" -eq "$(awk '/^[a-z]/ { group = $0 } /^  problem / && group == "real time"' <<<"$output" | wc -l)" ]
 }
 
+# bats test_tags=check
 @test "doctor names the device that does not open, and a broken rig.conf" {
 	printf 'tracker = "tty:/dev/none:115200";\nforce = "sim:";\n' >rig.conf
 	run -1 --separate-stderr incise doctor
@@ -114,6 +116,7 @@ group() {
 	[[ "$(finding kernel module)" == "  warning "*"→ sudo modprobe incise_stepper"* ]]
 }
 
+# bats test_tags=check
 @test "doctor knows the age of each calibration" {
 	incise calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g --series 3 \
 		--duration 200ms >/dev/null

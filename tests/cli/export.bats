@@ -1,30 +1,17 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # incise export, as a user meets it.
 
-bats_require_minimum_version 1.5.0
+load cli
 
 setup_file() {
 	cd "$BATS_FILE_TMPDIR"
-	"$INCISE_BUILD/bin/incise" capture -o liver.rec \
+	incise capture -o liver.rec \
 		--rig sim:clock=simulated,cut_s=2,pause_s=1 >/dev/null
 }
 
 setup() {
-	PATH=$INCISE_BUILD/bin:$PATH
-	mkdir "$BATS_TEST_TMPDIR/work" # bats keeps files of its own beside it
-	cd "$BATS_TEST_TMPDIR/work"
+	work_folder
 	ln -s "$BATS_FILE_TMPDIR/liver.rec" liver.rec
-}
-
-key() {
-	[ "$(sqlite3 :memory: "SELECT json_valid(readfile('$1'))")" = 1 ]
-	sqlite3 :memory: "SELECT json_extract(readfile('$1'), '\$.$2')"
-}
-
-failed_with() {
-	[ "$status" -eq 1 ]
-	[ "${#stderr_lines[@]}" -eq 1 ]
-	[[ "$stderr" == "incise export: "*"$1"* ]] || { echo "$stderr"; false; }
 }
 
 # Every line has so many fields, all but the first column's numbers that are finite.
@@ -36,6 +23,7 @@ well_formed() {
 		END { exit bad || NR < 2 }' "$1"
 }
 
+# bats test_tags=check
 @test "export of what is not as it was recorded needs --damaged, and says what is wrong" {
 	cp -r liver.rec/ altered.rec
 	sqlite3 altered.rec/recording.db "UPDATE force SET code = code + 1 WHERE seq = 12345"
@@ -54,14 +42,7 @@ well_formed() {
 	[ ! -e b.csv ]
 }
 
-@test "export --help lists the options" {
-	run -0 --separate-stderr incise export --help
-	for option in --output --rate --average --by-cut --depth-max --velocity-max \
-		--min-count --resample --calibration --lineage --json; do
-		[[ "$output" == *"$option"* ]]
-	done
-}
-
+# bats test_tags=check
 @test "export raw at a rate, to standard output" {
 	run -0 --separate-stderr incise export liver.rec --rate 100
 	[ -z "$stderr" ]
@@ -97,6 +78,7 @@ well_formed() {
 	awk -F, 'NR > 1 && ($5 < 50 || $6 < 1 || $6 > 14) { bad = 1 } END { exit bad }' a.csv
 }
 
+# bats test_tags=check
 @test "export averaged by cut" {
 	incise export liver.rec -a 12x10 --by-cut -o a.csv
 	[ "$(head -n 1 a.csv)" = cut,depth_mm,velocity_mm_s,force_N,sd_N,count,cuts,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s ]
@@ -117,6 +99,7 @@ well_formed() {
 	[ ! -e b.csv ]
 }
 
+# bats test_tags=check
 @test "export reports as JSON" {
 	incise export liver.rec -a 12x10 -o a.csv --json >report.json
 	[ "$(key report.json path)" = a.csv ]
@@ -150,15 +133,6 @@ well_formed() {
 	well_formed a.csv 10 1
 }
 
-@test "export replaces an old dataset, and leaves it where it fails" {
-	echo old >a.csv
-	run --separate-stderr incise export none.rec -o a.csv --overwrite
-	failed_with "none.rec: no such recording"
-	[ "$(cat a.csv)" = old ]
-	incise export liver.rec -a 3x3 -o a.csv --overwrite
-	[ "$(wc -l <a.csv)" -gt 3 ]
-}
-
 @test "export of a recording without a cut" {
 	incise capture -o air.rec --rig sim:clock=simulated --duration 800ms >/dev/null
 	run --separate-stderr incise export air.rec -o a.csv
@@ -169,6 +143,7 @@ well_formed() {
 	[ -z "$output" ]
 }
 
+# bats test_tags=check
 @test "export of what is no recording" {
 	echo text >file.rec
 	mkdir empty.rec garbage.rec
@@ -188,40 +163,10 @@ well_formed() {
 	[ ! -e a.csv ]
 }
 
-@test "export: bad usage is 2" {
-	for arguments in "" "liver.rec --average 12" "liver.rec --average x" \
-		"liver.rec --average 0x5" "liver.rec --average 5x99999" \
-		"liver.rec --average 5x5x5" "liver.rec --rate 0" "liver.rec --rate fast" \
-		"liver.rec --rate 10 --average 3x3" "liver.rec --by-cut" \
-		"liver.rec --min-count 3" "liver.rec --json" "liver.rec --json -o -" \
-		"liver.rec --average 3x3 --depth-max -1" \
-		"liver.rec --resample --average 3x3" "liver.rec --resample --rate 0.5" "liver.rec --no-such"; do
-		# shellcheck disable=SC2086
-		run -2 --separate-stderr incise export $arguments
-		[ -z "$output" ]
-		[ "${#stderr_lines[@]}" -eq 2 ]
-		[[ "${stderr_lines[1]}" == *"incise export --help"* ]]
-	done
-}
-
-@test "export to a full disk" {
-	run --separate-stderr bash -c "incise export liver.rec --rate 100 >/dev/full"
-	failed_with "No space left"
-	run --separate-stderr incise export liver.rec -o /dev/full
-	failed_with "No space left"
-}
-
 @test "export killed by a closed pipe is quiet" {
 	bash -c "set -o pipefail; incise export liver.rec 2>err | head -n 1" >out || true
 	[ "$(cat out)" = cut,t_s,depth_mm,velocity_mm_s,force_N,clipped,advancing,acceleration_mm_s2,tilt_deg,time_in_tissue_s ]
 	[ ! -s err ]
-}
-
-@test "export feeds incise train" {
-	[ -x "$INCISE_BUILD/bin/incise-train" ] || skip "incise train is not built"
-	incise export liver.rec -a 12x10 -o a.csv
-	incise train a.csv -o a.fis
-	[ -s a.fis ]
 }
 
 @test "export as HDF5" {
@@ -334,6 +279,7 @@ read_mcap() {
 		WHERE key = 'force_zero_mV'")) / 1240) < 6e-6" | grep -qx 1
 }
 
+# bats test_tags=check
 @test "export as MCAP takes one recording as it is" {
 	for arguments in "liver.rec liver.rec" "liver.rec --rate 100" "liver.rec -a 3x3"; do
 		# shellcheck disable=SC2086
@@ -376,11 +322,7 @@ read_mcap() {
 	[ "$(key ros2.json compared)" -gt 19000 ]
 }
 
-@test "export as messages of ROS 2 needs MCAP and a time that ROS can have" {
-	for output in a.csv a.h5 -; do
-		run -2 --separate-stderr incise export liver.rec --profile ros2 -o "$output"
-		[[ "${stderr_lines[0]}" == *"--profile needs -o FILE.mcap" ]]
-	done
+@test "export as messages of ROS 2 needs a time that ROS can have" {
 	cp -r liver.rec/ late.rec
 	sqlite3 late.rec/recording.db "UPDATE meta SET value = '2039-01-01T00:00:00Z'
 		WHERE key = 'started'"
@@ -591,6 +533,7 @@ calibrated() {
 	END
 }
 
+# bats test_tags=check
 @test "export names the calibration that an uncertainty lacks" {
 	run -0 --separate-stderr incise export liver.rec --rate 10 --uncertainty total -o a.csv --json
 	line="incise export: warning: not stated, and nan: the uncertainty of"
@@ -607,8 +550,6 @@ calibrated() {
 	run -0 --separate-stderr incise export liver.rec --rate 10 --uncertainty total -o a.csv --json --overwrite
 	sqlite3 :memory: "SELECT json_extract('$(sed "s/'/''/g" <<<"$output")', '\$.unstated[1]')" | grep -q 'calibrate tip'
 	awk -F, 'NR > 1 && ($11 != "nan" || $12 != "nan") { bad = 1 } END { exit bad || NR < 2 }' a.csv
-	run -2 incise export liver.rec --uncertainty parts --profile ros2 -o a.mcap
-	run -2 incise export liver.rec --uncertainty part -o a.csv
 }
 
 @test "export of MCAP and HDF5 names uncertainties in the style of CF" {

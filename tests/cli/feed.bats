@@ -8,6 +8,7 @@ setup() {
 	work_folder
 }
 
+# bats test_tags=check
 @test "a scene becomes a plan, which info explains" {
 	run -0 --separate-stderr incise compile neck -o n.plan
 	[[ "${lines[0]}" == "plan of neck.scene: 1000 Hz, "*" bytes, CRC-32C "* ]]
@@ -53,6 +54,7 @@ setup() {
 	[ ! -e floors.plan ]
 }
 
+# bats test_tags=check
 @test "a plan that is damaged or none is refused" {
 	incise compile wall -o w.plan >/dev/null 2>&1
 	python3 - <<-'END'
@@ -72,31 +74,18 @@ setup() {
 	failed_with "other.plan: a .plan file of another version"
 }
 
-@test "options of a model are not of a scene, and the other way round" {
-	cp "$root/scenes/liver.fis" m.fis
-	run -2 --separate-stderr incise compile neck --budget 1mN -o n.plan
-	[[ "$stderr" == *"--budget, --method, --cells and --c-source go with a model"* ]]
-	run -2 --separate-stderr incise compile m.fis --rig sim: -o m.fx
-	[[ "$stderr" == *"go with a scene"* ]]
-	[ ! -e n.plan ]
-	[ ! -e m.fx ]
-}
-
 @test "an actuator that measures its handle stays in a program" {
 	run --separate-stderr incise compile wall --rig sim: -o w.plan
 	failed_with "it measures its handle"
 }
 
+# bats test_tags=check
 @test "without a stepper of the kernel module nothing is fed, and nothing is left" {
 	run --separate-stderr incise feed wall --rig sim: --state "$PWD/wall.state"
 	failed_with "it cannot run plans"
 	run --separate-stderr incise haptic wall --in-kernel --rig sim: --state "$PWD/wall.state"
 	[ "$status" -eq 1 ]
 	[[ "$stderr" == *"incise feed ended before it sent a pose" ]]
-	run -2 --separate-stderr incise haptic wall --in-kernel --procedure
-	[[ "$stderr" == *"--procedure runs on the simulated rig"* ]]
-	run -2 --separate-stderr incise haptic wall --in-kernel --arith double
-	[[ "$stderr" == *"the kernel computes in fixed point"* ]]
 	run --separate-stderr incise haptic wall --in-kernel --rig sim: --state none
 	failed_with "--in-kernel needs a status file"
 }

@@ -151,10 +151,3 @@ finds() {
 	calibrate depth depth line --from p.csv --nominal 0.125
 	grep -q '>outliers<' depth/fit.svg
 }
-
-@test "figures of a session" {
-	cp "$root/scenes/neck.scene" .
-	incise haptic neck.scene --rig sim:clock=simulated,depth_mm=6,times=1,pause_s=1,cut_s=4 --duration 8s --session a.session >/dev/null
-	incise plot a.session -o session.svg >/dev/null
-	measured session.svg
-}

@@ -24,6 +24,7 @@ setup() {
 	[ ! -e "$root/tests/forms/$((form + 1)).sql" ]
 }
 
+# bats test_tags=check
 @test "recordings of forms 1 to 4 are read, verified and exported" {
 	run --separate-stderr incise verify 1.rec
 	failed_with "made by an older incise (format 1) without a ledger"

@@ -36,6 +36,7 @@ refuses() {
 	[[ "${lines[1]}" =~ ^stages\ +pose\ predict\ contact\ reaction\ start\ limit\ actuate$ ]]
 }
 
+# bats test_tags=check
 @test "haptic reports as JSON" {
 	incise haptic liver.scene --rig $quick --duration 3s --json --log l.csv >r.json
 	[ "$(key r.json ticks)" = 3000 ]
@@ -63,6 +64,7 @@ refuses() {
 	holds "$(key r.json rendered_rms_error_N) < 0.05 * $largest"
 }
 
+# bats test_tags=check
 @test "the log has every tick, and its forces are the model's" {
 	incise haptic liver.scene --rig $quick --duration 3s --arith double --log l.csv
 	[ "$(head -n 1 l.csv)" = \
@@ -117,6 +119,7 @@ beside_the_model() {
 	run ! cmp -s a.csv c.csv
 }
 
+# bats test_tags=check
 @test "no force is over the limit, and none changes faster than it may" {
 	incise haptic liver.scene --rig $quick --duration 3s --log free.csv
 	cat >tight.scene <<-'EOF'
@@ -207,6 +210,7 @@ beside_the_model() {
 	[ ! -e l.csv ]
 }
 
+# bats test_tags=check
 @test "SIGTERM ends it as well" {
 	incise haptic liver.scene --rig sim: --no-rt --json >r.json 2>err 3>&- &
 	pid=$!
@@ -217,51 +221,7 @@ beside_the_model() {
 	[ "$(key r.json stopped_by)" = Terminated ]
 }
 
-@test "a scene with an unknown key names file, line and the keys there are" {
-	printf 'model = "liver.fis";\nrate = 50;\n' >bad.scene
-	refuses bad.scene:2: rate rate_hz
-	printf 'model = "liver.fis";\nlimits = {\n  force = 3.0;\n};\n' >bad.scene
-	refuses bad.scene:3: limits.force force_N
-	printf 'model = "liver.fis";\nsurface = {\n  up = 3.0;\n};\n' >bad.scene
-	refuses bad.scene:3: surface.up normal
-}
-
-@test "a scene with a value out of range names the range" {
-	while read -r key value range; do
-		case $key in
-		rate_hz) printf 'model = "liver.fis";\n%s = %s;\n' "$key" "$value" ;;
-		*) printf 'model = "liver.fis";\nlimits = { %s = %s; };\n' "$key" "$value" ;;
-		esac >bad.scene
-		refuses bad.scene:2: "$key" "from ${range/-/ to }"
-	done <<-'EOF'
-		rate_hz 99 100-20000
-		rate_hz 20001 100-20000
-		rate_hz -1000 100-20000
-		force_N 0 0.01-100
-		force_N 101.0 0.01-100
-		slew_N_s 0 1-100000
-		slew_N_s 1e300 1-100000
-		pose_age_ms 0 1-1000
-		pose_age_ms 1001 1-1000
-	EOF
-}
-
-@test "a scene with a value of another kind names file and line" {
-	for line in 'rate_hz = "fast";' 'arithmetic = "float";' 'arithmetic = 3;' \
-		'limits = 4.0;' 'limits = [1, 2];' 'limits = { force_N = "4"; };' 'surface = 3;' \
-		'surface = { normal = [0, 0, 0]; };' 'surface = { normal = [0, 0]; };' \
-		'surface = { point_mm = [0.0, 0.0, 1e9]; };' 'surface = { point_mm = "here"; };'; do
-		printf 'model = "liver.fis";\n%s\n' "$line" >bad.scene
-		refuses bad.scene || complain "for $line"
-	done
-	printf 'model = 7;\n' >bad.scene
-	refuses bad.scene:1: model
-	printf 'model = "liver.fis"\nrate_hz == 7;\n' >bad.scene
-	refuses bad.scene:2: syntax
-	head -c 4000 "$INCISE_BUILD/bin/incise" >bad.scene
-	refuses bad.scene
-}
-
+# bats test_tags=check
 @test "haptic: files that are not there, or not what they should be" {
 	run --separate-stderr incise haptic none.scene --rig $quick
 	failed_with none.scene "No such file"
@@ -322,6 +282,7 @@ beside_the_model() {
 	run -0 incise haptic bad.scene --rig $quick --duration 100ms --arith double
 }
 
+# bats test_tags=check
 @test "haptic: rigs that cannot be" {
 	run --separate-stderr incise haptic liver.scene --rig sim:colour=red
 	failed_with colour
@@ -336,35 +297,6 @@ beside_the_model() {
 	[ ! -e /etc/incise/rig.conf ] || skip "this machine has /etc/incise/rig.conf"
 	run --separate-stderr incise haptic liver.scene
 	failed_with "--rig sim:"
-}
-
-@test "haptic: bad usage" {
-	run --separate-stderr incise haptic
-	bad_usage "missing SCENE ("
-	run --separate-stderr incise haptic liver.scene more.scene
-	bad_usage "; give one SCENE at a time"
-	run --separate-stderr incise haptic liver.scene --rig $quick --log l.csv
-	bad_usage --duration
-	run --separate-stderr incise haptic liver.scene --rig $quick --duration 1s --json --log -
-	bad_usage "standard output"
-	for time in 0 -1s never 10x 1e9h 1ms nan inf ""; do
-		run --separate-stderr incise haptic liver.scene --rig $quick --duration "$time"
-		bad_usage --duration
-	done
-	run --separate-stderr incise haptic liver.scene --rig $quick --arith float
-	bad_usage "--arith: expected double or fixed"
-}
-
-@test "haptic: a log that cannot be written" {
-	for place in no/such.csv /dev/full .; do
-		run --separate-stderr incise haptic liver.scene --rig $quick --duration 100ms --log $place
-		failed_with "$place"
-	done
-	echo old >l.csv
-	run --separate-stderr bash -c "trap '' XFSZ; ulimit -f 1
-		incise haptic liver.scene --rig $quick --duration 1s --log l.csv"
-	failed_with l.csv
-	[ "$(cat l.csv)" = old ]
 }
 
 @test "haptic: a full disk loses the log, not the summary of the run" {

@@ -28,22 +28,7 @@ options_of_page() {
 		sed 's/ Fl /-/' | sort -u
 }
 
-@test "every verb explains itself" {
-	for verb in "${all[@]}"; do
-		# shellcheck disable=SC2086 # "calibrate force" is two words
-		run -0 --separate-stderr incise $verb --help
-		[ -z "$stderr" ]
-		[[ "${lines[0]}" == "Usage: incise $verb "* ]]
-		[[ "$output" == *"Options:"* ]]
-		help=$output
-		# shellcheck disable=SC2086
-		run -0 incise $verb -h
-		[ "$output" = "$help" ]
-		run -1 --separate-stderr bash -c "incise $verb --help >/dev/full"
-		[ "${#stderr_lines[@]}" -eq 1 ]
-	done
-}
-
+# bats test_tags=check
 @test "help and manual name the same options" {
 	for verb in "${all[@]}"; do
 		[ -f "$root/man/$(program "$verb").1" ]
@@ -53,6 +38,7 @@ options_of_page() {
 	done
 }
 
+# bats test_tags=check
 @test "every program is asked here, and every page of a program has one" {
 	# incise names its verbs, and words of verbs are what else is built
 	[ "$(printf 'incise-%s\n' "${all[@]}" | tr ' ' - | sort)" = \
@@ -99,25 +85,4 @@ options_of_page() {
 	while read -r _ name section; do
 		[ -f "$root/man/$name.$section" ] || complain "$name($section) does not exist"
 	done <"$BATS_TEST_TMPDIR/references"
-}
-
-@test "a wrong option is named, and where help is" {
-	for verb in "${all[@]}"; do
-		# shellcheck disable=SC2086
-		run --separate-stderr incise $verb --no-such-option
-		bad_usage --no-such-option
-		[ -z "$output" ]
-		# shellcheck disable=SC2086
-		run --separate-stderr incise $verb -%
-		bad_usage "-%"
-	done
-}
-
-@test "an option without its argument, and with one it does not take" {
-	run --separate-stderr incise train --mf
-	bad_usage "--mf: missing argument N,M"
-	run --separate-stderr incise train d.csv -o
-	bad_usage "-o: missing argument FILE"
-	run --separate-stderr incise train --json=yes
-	bad_usage "--json: this option takes no argument"
 }

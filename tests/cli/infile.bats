@@ -82,6 +82,17 @@ readers() {
 	done < <(readers)
 }
 
+# bats test_tags=check
+# bats test_tags=check
+@test "a file that may not be read is refused by name" {
+	while IFS='|' read -r suffix command; do
+		install -m 000 /dev/null "shut.$suffix"
+		# shellcheck disable=SC2086
+		run --separate-stderr "${plainly[@]}" incise ${command//FILE/shut.$suffix} </dev/null
+		refused "shut.$suffix: " "Permission denied" || complain "$command" || return
+	done < <(readers)
+}
+
 @test "a line without an end is refused by name" {
 	head -c 300M /dev/zero | tr '\0' 7 >long
 	while IFS='|' read -r suffix command; do
@@ -99,6 +110,7 @@ readers() {
 	failed_with "standard input:1: a NUL byte"
 }
 
+# bats test_tags=check
 @test "standard input and pipes with a writer are read" {
 	[ "$(incise eval m.fis - <<<'5 20')" = "$(incise eval m.fis <(sleep 0.2; echo '5 20'))" ]
 	mkfifo late
@@ -123,6 +135,7 @@ readers() {
 	[[ "$output" == *"camera.mkv: not a regular file"* ]] || complain "$output"
 }
 
+# bats test_tags=check
 @test "a hexadecimal number is none, in files and options" {
 	run --separate-stderr incise eval m.fis <<<'0x5 20'
 	failed_with "standard input:1: column 1" "'0x5' is not a number"

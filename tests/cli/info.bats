@@ -29,6 +29,7 @@ setup() {
 	[[ "$output" != *weight* ]] # all are 1
 }
 
+# bats test_tags=check
 @test "info of a model with min and weights" {
 	sed "s/^AndMethod='prod'/AndMethod='min'/; s/^5 4, 20 (1)/5 0, 20 (0.25)/" m.fis >min.fis
 	run -0 --separate-stderr incise info min.fis
@@ -43,6 +44,7 @@ setup() {
 	[[ "$(key r.json fixed_point_refused)" == *min* ]]
 }
 
+# bats test_tags=check
 @test "info of a model as JSON" {
 	incise info --json m.fis >r.json
 	[ "$(key r.json kind)" = model ]
@@ -145,6 +147,7 @@ setup() {
 	[[ "$output" != *incomplete* ]]
 }
 
+# bats test_tags=check
 @test "info of a recording that was altered shows it, and fails by its name" {
 	cp -r a.rec/ b.rec
 	sqlite3 b.rec/recording.db "UPDATE tracker SET z_mm = z_mm + 1 WHERE seq = 100"
@@ -160,6 +163,7 @@ setup() {
 	[ "$(key r.json intact)" = 1 ]
 }
 
+# bats test_tags=check
 @test "info of a recording as JSON is what the database holds" {
 	incise info --json a.rec >r.json
 	[ "$(key r.json kind)" = recording ]
@@ -222,6 +226,7 @@ setup() {
 	holds "$(key r.json rows.force) >= $rows"
 }
 
+# bats test_tags=check
 @test "info of what is neither" {
 	echo text >a.txt
 	: >empty.fis
@@ -236,25 +241,4 @@ setup() {
 		failed_with $file
 		[ -z "$output" ]
 	done
-}
-
-@test "info: bad usage" {
-	run --separate-stderr incise info
-	bad_usage "missing FILE ("
-	run --separate-stderr incise info m.fis a.rec
-	bad_usage "; give one FILE at a time"
-}
-
-@test "info to a full disk" {
-	run --separate-stderr bash -c "incise info m.fis >/dev/full"
-	failed_with "standard output: "
-	run --separate-stderr bash -c "incise info --json m.fis >/dev/full"
-	failed_with "standard output: "
-}
-
-@test "info --json of a name that is not UTF-8 is still JSON" {
-	printf "a\xff" >odd
-	sed "s/^Name='incise'/Name='$(cat odd)'/" m.fis >bad8.fis
-	incise info bad8.fis --json >r.json
-	[ "$(key r.json name)" = "a?" ]
 }

@@ -1,40 +1,29 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # incise join, as a user meets it; its arithmetic is in tests/unit/record/session.c.
 
-bats_require_minimum_version 1.5.0
+load cli
 
 # b's clock is 3 s behind and 50 ppm fast: TAI is 1000 s + t of a, and 1003 s + (1 + 50e-6) t of b.
 setup_file() {
 	cd "$BATS_FILE_TMPDIR"
 	rig=sim:clock=simulated,cut_s=2,pause_s=1
-	"$INCISE_BUILD/bin/incise" capture -o a.rec --rig $rig,seed=1 --duration 5s \
+	incise capture -o a.rec --rig $rig,seed=1 --duration 5s \
 		--clock-source sim:1000,0,20 >/dev/null
-	"$INCISE_BUILD/bin/incise" capture -o b.rec --rig $rig,seed=2 --duration 5s \
+	incise capture -o b.rec --rig $rig,seed=2 --duration 5s \
 		--clock-source sim:1003,50,30 >/dev/null
-	"$INCISE_BUILD/bin/incise" capture -o none.rec --rig $rig,seed=3 --duration 1s >/dev/null
+	incise capture -o none.rec --rig $rig,seed=3 --duration 1s >/dev/null
 }
 
 setup() {
-	PATH=$INCISE_BUILD/bin:$PATH
-	mkdir "$BATS_TEST_TMPDIR/work"
-	cd "$BATS_TEST_TMPDIR/work"
+	work_folder
 	cp -r "$BATS_FILE_TMPDIR"/*.rec .
-}
-
-failed_with() {
-	[ "$status" -eq 1 ]
-	[ "${#stderr_lines[@]}" -eq 1 ]
-	[[ "$stderr" == "incise join: "*"$1"* ]] || { echo "$stderr"; false; }
-}
-
-key() {
-	sqlite3 :memory: "SELECT json_extract(readfile('$1'), '\$.$2')"
 }
 
 sum() {
 	sha256sum "$@" | cut -d' ' -f1
 }
 
+# bats test_tags=check
 @test "join states offset, rate, uncertainty and overlap, and keeps the recordings to the bit" {
 	before=$(sum a.rec/recording.db b.rec/recording.db)
 	run -0 --separate-stderr incise join a.rec b.rec -o day.rec --within 1ms
@@ -103,6 +92,7 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	! grep -aq 'a: recording started' b.mcap || false
 }
 
+# bats test_tags=check
 @test "a stream of several machines needs a choice; the error lists them" {
 	incise join a.rec b.rec -o day.rec >/dev/null
 	for command in "export day.rec" "plot day.rec -o p.png" "train day.rec -o m.fis"; do
@@ -116,6 +106,7 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	[[ "$stderr" == *"member a has no camera; it has: force, tracker" ]]
 }
 
+# bats test_tags=check
 @test "join refuses what the clocks do not support, and writes nothing" {
 	run --separate-stderr incise join a.rec b.rec -o day.rec --within 10us
 	failed_with "b.rec: its times are uncertain by 0.05"
@@ -126,14 +117,6 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	run --separate-stderr incise join a.rec a.rec -o day.rec
 	failed_with "a.rec and a.rec: the same recording; give it once"
 	[ ! -e day.rec ] && [ ! -e day.rec.part ]
-	run --separate-stderr incise join a.rec b.rec -o missing/day.rec
-	failed_with "missing/day.rec: cannot be made: No such file or directory; make its folder, or give another name"
-	run --separate-stderr incise join a.rec b.rec -o missing/day.rec --overwrite
-	failed_with "missing/day.rec: cannot be made: No such file or directory; make its folder, or give another name"
-	run -1 --separate-stderr incise export a.rec b.rec -o x.mcap
-	[[ "$stderr" == "incise export: x.mcap: MCAP holds one recording, and 2 are given; export each "* ]]
-	run -1 --separate-stderr incise export a.rec --rate 10 -o x.mcap
-	[[ "$stderr" == "incise export: x.mcap: MCAP has every row as it was recorded; give -o FILE.csv or "* ]]
 	incise join a.rec b.rec -o day.rec >/dev/null
 	run --separate-stderr incise join day.rec none.rec -o two.rec
 	failed_with "day.rec: is a joined recording; give those in it, for example day.rec/a"
@@ -146,6 +129,7 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	[ "$(key info.json 'members[0].name')" = b ]
 }
 
+# bats test_tags=check
 @test "join names a recording that is damaged, and one that was interrupted" {
 	sqlite3 b.rec/recording.db "UPDATE force SET code = code + 1 WHERE seq = 77"
 	run --separate-stderr incise join a.rec b.rec -o day.rec
@@ -292,12 +276,6 @@ without_u() {
 		! grep -aq /force tracker.mcap || false
 		! grep -aqE '/(tip|tracker|depth)' force.mcap || false
 	done
-	run -2 --separate-stderr incise capture -o x.rec --rig $rig --only force --trigger button
-	[[ "${stderr_lines[0]}" == *"--trigger button: needs the tracker, which --only force leaves out"* ]]
-	run -2 --separate-stderr incise capture -o x.rec --rig $rig --only tracker --trigger 1N
-	[[ "${stderr_lines[0]}" == *"--trigger: a force needs the force channel"* ]]
-	run -2 --separate-stderr incise capture -o x.rec --rig $rig --only force --cuts
-	[[ "${stderr_lines[0]}" == *"--cuts: needs the tracker"* ]]
 	# the stream of each is that of the only machine that has it
 	incise join force.rec tracker.rec -o day.rec --within 0.1ms >/dev/null
 	incise export day.rec --resample --rate 100 -o day.csv

@@ -21,6 +21,7 @@ attributes() {
 		"$root"/driver/stepper_debugfs.c
 }
 
+# bats test_tags=check
 @test "every attribute of the kernel module stands in driver/abi, and nothing else" {
 	attributes | sort >there
 	[ "$(wc -l <there)" -ge 14 ]
@@ -29,6 +30,7 @@ attributes() {
 	diff there said
 }
 
+# bats test_tags=check
 @test "each entry of driver/abi has the tags that the kernel asks for" {
 	local file
 	for file in "$abi"/*; do

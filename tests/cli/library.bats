@@ -78,11 +78,13 @@ declared_by() {
 	done
 }
 
+# bats test_tags=check
 @test "the public headers say nothing of heavy libraries" {
 	run grep -rnE '#include <(sqlite3|lapacke|libconfig|jansson|libav|SDL|epoxy|opencv)' "$include"
 	[ "$status" -eq 1 ] # no match; 2 would be an error
 }
 
+# bats test_tags=check
 @test "tools use public headers only, but for benchmarks" {
 	for file in "$root"/tools/*.[ch] "$root"/tools/*/*.[ch]; do
 		[[ "$file" != "$root"/tools/bench/* ]] || continue

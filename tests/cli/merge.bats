@@ -53,6 +53,7 @@ shares() {
 	grep -q "(2 cuts), 1250 to check (1 cuts)" out
 }
 
+# bats test_tags=check
 @test "factors of shares merge to the model of all pairs, to the bit" {
 	shares
 	incise train s1.csv --group cut -o start.fis >/dev/null
@@ -75,6 +76,7 @@ shares() {
 	[ "$(key r.json pairs)" -eq 5000 ]
 }
 
+# bats test_tags=check
 @test "merge refuses what does not belong together, by name" {
 	shares
 	incise train s1.csv -o start.fis >/dev/null
@@ -126,6 +128,7 @@ shares() {
 	[ ! -e bad.fis ]
 }
 
+# bats test_tags=check
 @test "info --dataset tells rows, ranges, and the cut that differs" {
 	shares
 	awk -F, -v OFS=, '$1 == "c7" { $4 = $4 + 2 } 1' s2.csv >odd.csv
@@ -136,8 +139,6 @@ shares() {
 	grep -q "^outlier: group c7 of odd.csv: mean force_N " out
 	incise info --dataset s1.csv s3.csv --group recording >out
 	grep -q "outliers are sought from 5 groups on" out
-	run --separate-stderr incise info s1.csv --group cut
-	bad_usage "--dataset"
 }
 
 # Train from l?.csv into m.fis with options, killed when the first line of its progress is like $1, or

@@ -116,6 +116,7 @@ table() {
 	END
 }
 
+# bats test_tags=check
 @test "each mistake is answered with its message" {
 	[ "$(table | wc -l)" -ge 60 ]
 	while IFS='|' read -r code arguments message; do

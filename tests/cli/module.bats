@@ -10,6 +10,7 @@ setup() {
 	module_folder
 }
 
+# bats test_tags=check
 @test "a module from outside the tree is loaded when it is named, and drives" {
 	make_module stepper_mine mine INCISE_BACKEND_ABI
 	rig mine:42
@@ -60,6 +61,7 @@ setup() {
 	[[ "$stderr" == *mine ]]
 }
 
+# bats test_tags=check
 @test "a module that is none, or another's, is refused" {
 	make_module stepper_mine mine 99
 	rig mine:1

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# One option has one name and one meaning in all commands: the dictionary doc/options.md.
+# The options of all commands: each by itself, and one name and one meaning of each in all commands, which
+# is the dictionary doc/options.md.
 
 load cli
 
@@ -7,6 +8,16 @@ setup() {
 	work_folder
 }
 
+# bats test_tags=check
+@test "each option of each command takes what is legal, and refuses what is not by its name" {
+	cp "$root/scenes/liver.fis" a.fis
+	version=$(sed -n 's/^#define INCISE_VERSION "\(.*\)"/\1/p' "$root/lib/include/incise/version.h")
+	run -0 python3 "$root/tests/cli/option_tables.py" "$version" "$INCISE_BUILD"/bin/incise-*
+	[ -z "$output" ]
+	[ "$(ls -A)" = a.fis ]
+}
+
+# bats test_tags=check
 @test "every option of every command is in the dictionary, and nothing else is" {
 	run -0 python3 "$root/tests/cli/options.py" "$root/doc/options.md" "$INCISE_BUILD"/bin/incise-*
 	[ -z "$output" ]
@@ -23,6 +34,7 @@ setup() {
 	[[ "$output" == *"--frob: no command has it"* ]]
 }
 
+# bats test_tags=check
 @test "old spellings are refused, and the new one is named" {
 	while read -r old now command; do
 		# shellcheck disable=SC2086 # "calibrate delay" is two words
@@ -52,14 +64,4 @@ setup() {
 	[[ "${stderr_lines[0]}" == *"name the column to learn with --target"* ]]
 	run -2 --separate-stderr incise capture --camera pictures
 	[[ "${stderr_lines[0]}" == *"auto, off, frames or depth"* ]]
-}
-
-@test "a misspelt option names the nearest, or the ambiguous beginning" {
-	run -2 --separate-stderr incise capture --duraton 5s
-	[ "${stderr_lines[0]}" = \
-		"incise capture: --duraton: no such option; did you mean --duration?" ]
-	run -2 --separate-stderr incise train --m 3
-	[[ "${stderr_lines[0]}" == *"more than one option begins like this, for example --mf" ]]
-	run -2 --separate-stderr incise train --frequency 3
-	[ "${stderr_lines[0]}" = "incise train: --frequency: no such option" ]
 }

@@ -20,16 +20,21 @@ setup_file() {
 	cat >rig.conf <<-END
 		tracker = "sim"; force = "sim"; camera = "sim"; stepper = "sim";
 	END
+	incise haptic "$root/scenes/neck.scene" --rig $quick --duration 1s --session s.session >/dev/null
+	{ cat pairs.csv; for i in 1 2 3; do sed 1d pairs.csv; done; } >many.csv
+	incise train many.csv --premises m.fis --factor m.fac >/dev/null
+	incise capture -o n.rec --rig sim:clock=simulated,seed=2 --duration 1s --clock-source sim:1000 >/dev/null
+	incise capture -o w.rec --rig sim:clock=simulated,seed=3 --duration 1s --clock-source sim:1000 >/dev/null
 }
 
 setup() {
 	work_folder
-	cp -r "${BATS_FILE_TMPDIR:?}"/{pairs.csv,d.rec,m.fis,m.fis.sd,m.scene,s.obj,forces.csv,calibration.conf} .
+	cp -r "${BATS_FILE_TMPDIR:?}"/{pairs.csv,d.rec,m.fis,m.fis.sd,m.scene,s.obj,forces.csv,calibration.conf,s.session,m.fac} .
 }
 
 # Every byte, name and mode in this folder.
 content() {
-	find . -type f ! -name err ! -name out -exec sha256sum {} + | sort -k 2
+	find . -type f ! -name err ! -name out -exec cksum {} + | sort -k 3
 	find . -printf '%p %m %l\n' | sort
 }
 
@@ -45,6 +50,7 @@ spares_inputs() {
 	done
 }
 
+# bats test_tags=check
 @test "an output is never an input, by any name" {
 	ln -s m.fis link.fis
 	ln m.fis hard.fis
@@ -73,8 +79,15 @@ spares_inputs() {
 	mkdir report
 	ln -s ../forces.csv report/fit.png
 	spares_inputs calibrate force --from forces.csv -c calibration.conf --report report
+	ln -s m.scene link.session
+	spares_inputs haptic m.scene --rig $quick --duration 100ms --session link.session
+	spares_inputs assess s.session -o s.session
+	ln -s pairs.csv pairs.svg
+	spares_inputs plot pairs.csv -o pairs.svg
+	spares_inputs merge m.fac -o m.fac
 }
 
+# bats test_tags=check
 @test "an output is never inside a recording that is read" {
 	ln -s d.rec link.rec
 	mkdir -p d.rec/plot
@@ -83,6 +96,7 @@ spares_inputs() {
 		spares_inputs export link.rec -o $path
 		spares_inputs replay d.rec m.scene --log $path
 	done
+	spares_inputs plot d.rec -o d.rec/new.svg
 	ln -s d.rec/recording.db into.csv
 	spares_inputs export d.rec -o into.csv
 	spares_inputs calibrate tip --from d.rec --report d.rec/new
@@ -114,6 +128,7 @@ spares_inputs() {
 	[ "$(cat pairs.csv)" = "$before" ]
 }
 
+# bats test_tags=check
 @test "two outputs are two files" {
 	for more in a.fis ./a.fis "$PWD/a.fis"; do
 		run --separate-stderr incise train pairs.csv -o a.fis --initial $more --overwrite
@@ -144,7 +159,6 @@ replaces_when_told() {
 }
 
 @test "an existing file is replaced with --overwrite only, in each command" {
-	cp "$root/scenes/liver.scene" "$root/scenes/liver.fis" .
 	replaces_when_told a.fx compile m.fis -o a.fx
 	replaces_when_told b.c compile m.fis -o b.fx --c-source b.c
 	replaces_when_told a.csv export d.rec -o a.csv
@@ -152,8 +166,13 @@ replaces_when_told() {
 	replaces_when_told b.fis.sd train pairs.csv -o b.fis --epochs 2
 	replaces_when_told c0.fis train pairs.csv -o c.fis --epochs 2 --initial c0.fis
 	replaces_when_told dh.csv train pairs.csv -o d.fis --epochs 2 --history dh.csv
-	replaces_when_told r.csv replay d.rec liver.scene --log r.csv
-	replaces_when_told l.csv haptic liver.scene --rig $quick --duration 100ms --log l.csv
+	replaces_when_told r.csv replay d.rec wall --log r.csv
+	replaces_when_told l.csv haptic wall --rig $quick --duration 100ms --log l.csv
+	replaces_when_told a.session haptic wall --rig $quick --duration 100ms --session a.session
+	replaces_when_told sessions.csv assess s.session --csv sessions.csv
+	replaces_when_told new.fis merge m.fac -o new.fis
+	cp "$BATS_FILE_TMPDIR/many.csv" .
+	replaces_when_told new.fac train many.csv --premises m.fis --factor new.fac
 	replaces_when_told k.csv calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g \
 		--series 3 --duration 200ms -c k.conf --keep k.csv
 	replaces_when_told report/report.txt calibrate force --from forces.csv -c k.conf --report report
@@ -184,13 +203,13 @@ replaces_when_told() {
 
 @test "pictures are replaced with --overwrite only" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed"
-	cp "$root/scenes/liver.scene" "$root/scenes/liver.fis" .
 	for suffix in .png .svg; do
 		replaces_when_told i$suffix info m.fis --plot i
 		rm -f i.png i.svg plot/*
 	done
 	replaces_when_told plot/i.gp info m.fis --plot i
-	replaces_when_told r.png replay d.rec liver.scene --plot r
+	replaces_when_told r.png replay d.rec wall --plot r
+	replaces_when_told p.png plot d.rec -o p.png
 	replaces_when_told r3/fit.png calibrate force --from forces.csv -c k.conf --report r3
 }
 
@@ -229,7 +248,7 @@ replaces_when_told() {
 		incise compile m.fis -o /dev/null
 		incise export d.rec -o /dev/null
 		incise train pairs.csv -o /dev/null --epochs 2 --initial /dev/null --history /dev/null
-		incise haptic m.scene --rig $quick --duration 100ms --log /dev/null
+		incise haptic wall --rig $quick --duration 100ms --log /dev/null
 	done
 	[ -c /dev/null ]
 	mkfifo pipe
@@ -240,19 +259,115 @@ replaces_when_told() {
 	[ -p pipe ]
 }
 
-@test "--overwrite is there where something is written, and there is no --force" {
-	for command in "capture" "export" "train" "compile" "replay" "haptic" "info" "demo" "bench" "bench all" \
-		"calibrate force" "calibrate depth" "calibrate tip" "calibrate delay" "calibrate stepper"; do
-		incise $command --help | grep -q '^ *--overwrite  ' || complain "$command"
-		run ! grep -q -- --force <(incise $command --help)
-	done
-	for command in plan eval verify status stepper "calibrate check"; do
-		run ! grep -q -- --overwrite <(incise $command --help)
-		run --separate-stderr incise $command --overwrite
-		bad_usage overwrite
+# A line for each output of a command: its arguments, with PLACE for the path.
+writers() {
+	cat <<-END
+		compile m.fis -o PLACE
+		compile m.fis -o /dev/null --c-source PLACE
+		export d.rec -o PLACE
+		train pairs.csv --mf 2,2 --epochs 1 -o PLACE
+		train pairs.csv --mf 2,2 --epochs 1 -o /dev/null --initial PLACE
+		train pairs.csv --mf 2,2 --epochs 1 -o /dev/null --history PLACE
+		train many.csv --premises m.fis --factor PLACE
+		merge m.fac -o PLACE
+		replay d.rec wall --log PLACE
+		haptic wall --rig $quick --duration 100ms --log PLACE
+		haptic wall --rig $quick --duration 100ms --session PLACE
+		assess s.session --csv PLACE
+		calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g --series 3 --duration 200ms -c k.conf --keep PLACE
+	END
+}
+
+# cannot_write PLACE COMMAND…: the last line on stderr names the place; nothing is left.
+cannot_write() {
+	local place=$1 before
+	shift
+	before=$(content)
+	run --separate-stderr timeout 60 "$@" </dev/null
+	[ "$status" -eq 1 ] || complain "$*: exit $status: $stderr" || return
+	# Warnings of the data may come before.
+	[[ "${stderr_lines[-1]}" == "incise "*": "*"$place"* ]] || complain "$*: $stderr" || return
+	[ "$(content)" = "$before" ] || complain "$*: changed a file"
+}
+
+# What a command names when that place is full.
+full() {
+	[[ "$1" == "export "* ]] && echo "the dataset" || echo "$2"
+}
+
+# bats test_tags=check
+@test "where nothing can be written, each command names the place, and leaves what was there" {
+	cp "$BATS_FILE_TMPDIR/many.csv" .
+	mkdir folder shut
+	chmod 555 shut
+	echo old >file
+	while read -r command; do
+		for place in no/such/file folder; do
+			# shellcheck disable=SC2086 # words of a command
+			cannot_write $place incise ${command//PLACE/$place} || return
+		done
+		# shellcheck disable=SC2086
+		cannot_write "$(full "$command" /dev/full)" incise ${command//PLACE//dev/full} || return
+		# shellcheck disable=SC2086
+		cannot_write shut/file "${plainly[@]}" incise ${command//PLACE/shut/file} || return
+		# a disk that fills up, as EFBIG in place of ENOSPC
+		# shellcheck disable=SC2086,SC2016
+		cannot_write "$(full "$command" file)" bash -c 'trap "" XFSZ; set -o pipefail
+			{ ulimit -f 0; incise "$@" 2>&1 >/dev/null; } | cat >&2' - ${command//PLACE/file} --overwrite || return
+		[ "$(cat file)" = old ] || complain "$command: $(head -c 100 file)" || return
+	done < <(writers)
+	for name in no/such/a.rec shut/a.rec; do
+		for overwrite in "" --overwrite; do
+			# shellcheck disable=SC2086
+			cannot_write "${name%/*}/" "${plainly[@]}" incise capture -o $name --rig $quick --duration 1s $overwrite
+			# shellcheck disable=SC2086
+			cannot_write "$name" "${plainly[@]}" incise join "$BATS_FILE_TMPDIR"/{n,w}.rec -o $name $overwrite
+		done
 	done
 }
 
+# bats test_tags=check
+@test "a full standard output fails each command with one line" {
+	incise export d.rec --rate 100 --lineage -o l.csv >/dev/null
+	while read -r command; do
+		# shellcheck disable=SC2086
+		run --separate-stderr timeout 60 bash -c 'incise "$@" >/dev/full' - $command </dev/null
+		[ "$status" -eq 1 ] || complain "$command: exit $status: $stderr" || return
+		[[ "${stderr_lines[-1]}" == "incise "*": standard output: "* ]] || complain "$command: $stderr" || return
+		[ "$(grep -vc ': warning: ' <<<"$stderr")" = 1 ] || complain "$command: $stderr" || return
+	done <<-END
+		assess s.session
+		calibrate check
+		calibrate depth two-point --pixels 400 -c k.conf
+		capture -o c.rec --rig $quick --duration 1s
+		compile m.fis -o -
+		compile m.fis -o m.fx
+		doctor --rig sim:
+		eval m.fis --grid 3x3
+		haptic wall --rig $quick --duration 100ms
+		info m.fis
+		info m.fis --json
+		info d.rec
+		join $BATS_FILE_TMPDIR/n.rec $BATS_FILE_TMPDIR/w.rec -o j.rec
+		merge m.fac -o -
+		plan wall
+		provenance l.csv
+		recalibrate d.rec -c calibration.conf
+		replay d.rec wall
+		rig --rig sim:
+		serve --rig sim: --igtl 0 --duration 50ms
+		stepper status --rig sim:
+		stepper enable --duration 1s --rig sim:clock=simulated
+		train pairs.csv --mf 2,2 -o -
+		train pairs.csv --mf 2,2 -o n.fis
+		verify d.rec
+	END
+	# what was made is whole
+	incise verify c.rec >/dev/null
+	incise info n.fis >/dev/null
+}
+
+# bats test_tags=check
 @test "an extension that the command does not write is refused, and the possible ones are named" {
 	while IFS='|' read -r command said; do
 		# shellcheck disable=SC2086 # words of a command
@@ -302,7 +417,7 @@ replaces_when_told() {
 		--initial deep/i.fis --history h.csv
 	ends "wrote a.fis and a.fis.sd" train pairs.csv -o a.fis --epochs 2 --overwrite
 	ends "wrote m.fx and m.c" compile m.fis -o m.fx --c-source m.c
-	ends "wrote l.csv and s.session" haptic m.scene --rig $quick --duration 100ms --log l.csv --session s.session
+	ends "wrote l.csv and l.session" haptic m.scene --rig $quick --duration 100ms --log l.csv --session l.session
 	ends "wrote r.csv" replay d.rec m.scene --log r.csv
 	ends "wrote c.rec" capture -o c.rec --rig $quick --duration 1s
 	ends "wrote k.csv" calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g \

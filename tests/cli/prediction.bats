@@ -34,6 +34,7 @@ train() {
 	incise train "$@" --group cut --mf 2,2 >out 2>err || complain "$(cat err)"
 }
 
+# bats test_tags=check
 @test "parts of the columns are in the model's interval, and a model without them is as before" {
 	train a.csv b.csv c.csv -o m.fis
 	grep -q "uncertainties: own parts .* N; calibrations .* N on the model, .* N of another rig" out
@@ -54,8 +55,6 @@ train() {
 	diff none.fis.sd plain.fis.sd
 	head -n 1 plain.fis.sd | grep -qx "incise-sd 1"
 	incise eval plain.fis points --sd --parts | awk '$5 != 0 { exit 1 }'
-	run --separate-stderr incise eval m.fis points --parts
-	bad_usage "--parts goes with --sd"
 }
 
 # tests/unit/learn/propagation.c has it without programs.
@@ -114,6 +113,7 @@ train() {
 	run ! grep -q "95 % by the uncertainty" nan.svg
 }
 
+# bats test_tags=check
 @test "what cannot carry uncertainties is refused, and what lacks them is named" {
 	train a.csv -o m.fis
 	for way in "--classic -o x.fis" "--premises m.fis --factor x.fac" "--mpi -o x.fis"; do

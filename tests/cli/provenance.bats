@@ -18,6 +18,7 @@ setup() {
 	found="recording a b;.rec, commit $(sqlite3 "a b;.rec/recording.db" "SELECT max(number) FROM seal"), head ${head:0:16}…"
 }
 
+# bats test_tags=check
 @test "a figure leads over model and export back to the recording, in each of its forms" {
 	command -v gnuplot || skip "gnuplot is not installed"
 	for form in png svg pdf; do
@@ -66,6 +67,7 @@ setup() {
 	done
 }
 
+# bats test_tags=check
 @test "what differs, is missing or says nothing is named" {
 	mkdir away
 	cp m.fis away

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # incise for Python: its tests by the system's Python with Debian's numpy and pandas, by one without
 # any package, and with foreign readers of Arrow streams from pip.
-bats_require_minimum_version 1.5.0
-load cli.bash
+
+load cli
 
 setup() {
-	root="$BATS_TEST_DIRNAME/../.."
 	export PYTHONPATH="$root/python" PYTHONDONTWRITEBYTECODE=1
 	cd "$root/tests/python"
 	peers="$INCISE_BUILD/tests/python/venv/bin/python"
@@ -19,6 +18,7 @@ python_tests() {
 	[[ "$output" == *OK* ]]
 }
 
+# bats test_tags=check
 @test "python: structs are those of the headers" {
 	run -0 /usr/bin/python3 abi.py "${CC:-cc}"
 	[[ "$output" == *" structs, "*" fields" ]]

@@ -33,6 +33,7 @@ rows_of() {
 	cut -d, -f2- rows.csv
 }
 
+# bats test_tags=check
 @test "recalibrate gives what a capture by that calibration gives" {
 	before=$(sha256sum a.rec/recording.db)
 	rows_of a.rec >own
@@ -74,6 +75,7 @@ rows_of() {
 	[ "$status" -ne 0 ]
 }
 
+# bats test_tags=check
 @test "which calibration is active is said by info, verify, exports and models" {
 	sha=$(sha256sum new.conf | cut -d' ' -f1)
 	incise recalibrate a.rec -c new.conf >/dev/null
@@ -99,6 +101,7 @@ rows_of() {
 	[ ! -e a.rec/calibration ]
 }
 
+# bats test_tags=check
 @test "a calibration that is damaged is named, with the way back" {
 	echo "force_mV_N = none;" >bad.conf
 	run --separate-stderr incise recalibrate a.rec -c bad.conf

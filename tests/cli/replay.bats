@@ -23,6 +23,7 @@ teardown() {
 	[ -z "$pid" ] || kill -9 "$pid" 2>/dev/null || :
 }
 
+# bats test_tags=check
 @test "replay reports" {
 	run -0 --separate-stderr incise replay liver.rec liver.scene
 	[ -z "$stderr" ]
@@ -66,6 +67,7 @@ teardown() {
 		END { exit !(NR == 2999 && m > 0.3) }'
 }
 
+# bats test_tags=check
 @test "the table has every tick, and the report is the table's" {
 	incise replay liver.rec liver.scene --log t.csv --json >r.json
 	[ "$(head -n 1 t.csv)" = \
@@ -159,6 +161,7 @@ teardown() {
 	[ -z "$(find . -name '.*.csv*')" ]
 }
 
+# bats test_tags=check
 @test "what cannot be replayed" {
 	run --separate-stderr incise replay none.rec liver.scene --log t.csv
 	failed_with none.rec "no such recording"
@@ -174,24 +177,4 @@ teardown() {
 		UPDATE meta SET value = 0 WHERE key = 'tracker_rows'"
 	run --separate-stderr incise replay liver.rec liver.scene
 	failed_with "no pose"
-}
-
-@test "a full disk" {
-	run --separate-stderr incise replay liver.rec liver.scene --log /dev/full
-	failed_with /dev/full
-}
-
-@test "bad usage" {
-	run --separate-stderr incise replay
-	bad_usage "missing NAME.rec (recording)"
-	run --separate-stderr incise replay liver.rec
-	bad_usage "missing SCENE ("
-	run --separate-stderr incise replay liver.rec liver.scene more
-	bad_usage "; give one SCENE at a time"
-	run --separate-stderr incise replay liver.rec liver.scene --poses dawn
-	bad_usage dawn
-	run --separate-stderr incise replay liver.rec liver.scene --tool spoon
-	bad_usage spoon
-	run --separate-stderr incise replay liver.rec liver.scene --arith half
-	bad_usage half
 }

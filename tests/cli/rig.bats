@@ -12,6 +12,7 @@ row() {
 	grep -E "^${1//[/\\[} " <<<"$output" | tr -s ' '
 }
 
+# bats test_tags=check
 @test "rig names the file that is used, and those that were passed over" {
 	[ ! -e /etc/incise/rig.conf ] || skip "this machine has a rig"
 	run -1 --separate-stderr incise rig
@@ -40,6 +41,7 @@ row() {
 	[[ "$output" == *'"passed_over": ['*'"rig.conf: No such file or directory"'* ]]
 }
 
+# bats test_tags=check
 @test "every key has its value, unit and origin" {
 	cat >rig.conf <<-'END'
 		clock   = "real";
@@ -106,6 +108,7 @@ row() {
 	run ! grep keys report.json
 }
 
+# bats test_tags=check
 @test "a rig.conf with an error is refused with its line, and no device is opened" {
 	printf '\ntrakcer = "sim:";\n' >rig.conf
 	run --separate-stderr incise rig --show
@@ -116,6 +119,4 @@ row() {
 	printf 'tracker = "tty:/dev/none:115200";\n' >rig.conf
 	run -0 --separate-stderr incise rig --show
 	[ "$(row tracker)" = 'tracker "tty:/dev/none:115200" rig.conf:1' ]
-	run --separate-stderr incise rig rig.conf
-	bad_usage "--rig"
 }

@@ -34,12 +34,14 @@ good='[       OK ] test_a
 	[[ "$output" != *"not found"* ]]
 }
 
+# bats test_tags=check
 @test "a passing program passes" {
 	program a "$good" 0
 	run -0 "$root/tests/unit/run" ./a
 	[ "${lines[-1]}" = "1 passed, 0 failed, 0 skipped" ]
 }
 
+# bats test_tags=check
 @test "a leak reported at exit is a failure" {
 	program a "$good" 0
 	program b "$good" 23
@@ -79,6 +81,7 @@ $good" 0
 	[[ "$output" == *"ok    x/good"* ]]
 }
 
+# bats test_tags=check
 @test "a check ends with one summary: what took how long, failed, and was skipped with the reason" {
 	run -0 "$root/tests/timed" times first printf '%s\n' "ok    base/crc32c" \
 		"skipped: view/draw: no screen" "3 passed, 0 failed, 1 skipped"

@@ -32,6 +32,7 @@ teardown() {
 	[ -z "${pid:-}" ] || kill -9 "$pid" 2>/dev/null || :
 }
 
+# bats test_tags=check
 @test "in simulated time the same run gives the same session, and another one another" {
 	incise haptic neck --rig $quick --duration 8s --session a.session --code P07 >a.txt
 	incise haptic neck --rig $quick --duration 8s --session b.session --code P07 >b.txt
@@ -113,29 +114,6 @@ until_it_runs() {
 	[ "$(key a.session end.kind)" = signal ]
 }
 
-@test "a session is a file that is not there yet, and no input" {
-	echo mine >a.session
-	run --separate-stderr incise haptic neck --rig $quick --duration 1s --session a.session
-	failed_with "a.session: exists"
-	[ "$(cat a.session)" = mine ]
-	incise haptic neck --rig $quick --duration 1s --session a.session --overwrite >/dev/null
-	[ "$(key a.session ticks)" = 1000 ]
-	ln -s neck.scene link.session
-	run --separate-stderr incise haptic neck --rig $quick --duration 1s --session link.session --overwrite
-	failed_with "neck.scene"
-	run --separate-stderr incise haptic neck --rig $quick --duration 1s --session none/a.session
-	failed_with "none/a.session"
-	run --separate-stderr incise haptic neck --rig $quick --duration 1s --session -
-	bad_usage "expected a file"
-	run --separate-stderr incise haptic neck --rig $quick --duration 1s --code P07
-	bad_usage "--code needs --session"
-	for code in "A B" ABCDEFGHIJKLMNOPQ é ""; do
-		run --separate-stderr incise haptic neck --rig $quick --duration 1s --session b.session --code "$code"
-		bad_usage "--code: expected up to"
-	done
-	[ ! -e b.session ]
-}
-
 # Cell of a CSV file by the name of its column: cell FILE ROW NAME.
 cell() {
 	python3 -c 'import csv, sys
@@ -143,6 +121,7 @@ row = list(csv.DictReader(open(sys.argv[1], newline="")))[int(sys.argv[2])]
 print(row[sys.argv[3]])' "$@"
 }
 
+# bats test_tags=check
 @test "criteria that are met and that are not, each with its value" {
 	run -0 --separate-stderr incise assess easy.session
 	[ -z "$stderr" ]
@@ -237,10 +216,6 @@ print(max(math.dist(p, q) for i, p in ends for k, q in ends if i == k))')
 	incise assess x.session -o x.html >/dev/null
 	run ! grep -q '<script>' x.html
 	grep -qF '&lt;script&gt;alert(1)&lt;/script&gt; **a** | b' x.html
-	run --separate-stderr incise assess easy.session -o p.html
-	failed_with "p.html: exists"
-	run --separate-stderr incise assess easy.session -o easy.session --overwrite
-	failed_with easy.session
 }
 
 @test "a session without a tick, or without a contact, is reported too" {
@@ -271,21 +246,15 @@ refused() {
 	[ -z "$output" ] || complain "printed: $output"
 }
 
+# tests/unit/tools/session.c has the rest.
+# bats test_tags=check
 @test "damaged files are refused in one line that says where" {
 	head -c 1000 easy.session >bad.session
 	refused "not JSON"
-	: >bad.session
-	refused "not JSON"
 	echo '[]' >bad.session
 	refused incise_session
-	sed 's/"incise_session": 1/"incise_session": 7/' easy.session >bad.session
-	refused "form 7" "form 1"
-	sed 's/"ticks": 8000/"ticks": "8000"/' easy.session >bad.session
-	refused "ticks: expected a whole number"
 	sed 's/"duration_s": [0-9.]*/"duration_s": 1e300/' easy.session >bad.session
 	refused "duration_s: expected a number from 0 to"
-	sed 's/"tool": "blade"/"tool": "spade"/' easy.session >bad.session
-	refused "tool: expected"
 	sed 's/"path": "easy.scene"/"path": "\\u001b[2J"/' easy.session >bad.session
 	refused "scene.path"
 	python3 -c 'print("[" * 100000)' >bad.session
@@ -298,12 +267,8 @@ refused() {
 	refused "No such file"
 	mkdir bad.session
 	refused directory
-	run --separate-stderr incise assess
-	bad_usage "missing NAME.session"
 	run --separate-stderr incise assess easy.session --reference none.session
 	failed_with none.session
-	run --separate-stderr incise assess easy.session --json --csv -
-	bad_usage "standard output"
 }
 
 @test "the script meets every criterion of the neck, and without the tube all but one" {

@@ -34,11 +34,6 @@ until_records() {
 	complain "no $1 records after 10 s; capture said: $(cat err)"
 }
 
-# One value of a recording.
-ask() {
-	sqlite3 "$1/recording.db" "$2"
-}
-
 @test "a FASTRAK on a serial line is captured, by name, without loss" {
 	local code
 	plug_in
@@ -63,6 +58,7 @@ ask() {
 		FROM tracker) WHERE d <= 0")" = 0 ]
 }
 
+# bats test_tags=check
 @test "info asks a source that is named, of whatever kind" {
 	plug_in
 	incise info "tty:$PWD/tracker:115200" >told
@@ -145,6 +141,7 @@ ask() {
 	incise capture -o a.rec --duration 1s
 }
 
+# bats test_tags=check
 @test "a source that is absent is named, with what to do" {
 	local case
 	while IFS='|' read -r line text; do

@@ -49,6 +49,7 @@ until_ticks() {
 	failed_with "no loop of that name"
 }
 
+# bats test_tags=check
 @test "a loop that was stopped as asked is well" {
 	"$loop" incise/neck.state done
 	run -0 --separate-stderr incise status neck
@@ -197,6 +198,7 @@ until_ticks() {
 	incise status neck --prometheus | "$root/tests/state/prometheus.py" >/dev/null
 }
 
+# bats test_tags=check
 @test "a fault is told with its reason, and is no success" {
 	"$loop" incise/neck.state fault || true
 	run -1 --separate-stderr incise status neck
@@ -273,6 +275,7 @@ until_ticks() {
 	[ "$(grep -c '^[ab]: stopped' <<<"$output")" = 2 ]
 }
 
+# bats test_tags=check
 @test "JSON has the documented keys" {
 	"$loop" incise/neck.state done
 	incise status neck --json >report.json
@@ -297,6 +300,7 @@ until_ticks() {
 	holds "$(key report.json 'loops[0].since_unix_s') < $(date +%s) + 1"
 }
 
+# bats test_tags=check
 @test "Prometheus' text is as its format says" {
 	name='ne"c\k'
 	"$loop" incise/neck.state done
@@ -414,6 +418,7 @@ until_lines() {
 	[[ "$output" != *$'\e'* ]]
 }
 
+# bats test_tags=check
 @test "a page that is no page, or of another release, is refused" {
 	echo "rate_hz = 1000.0;" >a.state
 	run --separate-stderr incise status a.state
@@ -429,15 +434,6 @@ until_lines() {
 	truncate -s 1000 incise/other.state
 	run --separate-stderr incise status other
 	failed_with "damaged or truncated"
-}
-
-@test "status refuses bad usage" {
-	run --separate-stderr incise status a b
-	bad_usage "; give one NAME or FILE at a time"
-	run --separate-stderr incise status --prometheus --json
-	bad_usage "--prometheus cannot be combined with --follow or --json"
-	run --separate-stderr incise status --prometheus --follow
-	bad_usage "--prometheus cannot be combined with --follow or --json"
 }
 
 # Compiles what the manual says of the bytes, and reads a page by it and nothing else.

@@ -63,6 +63,7 @@ packets() {
 	PYTHON
 }
 
+# bats test_tags=check
 @test "it is printed, set, and set back, and status has it" {
 	serve neck.scene
 	run -0 incise tool neck
@@ -149,6 +150,7 @@ as() {
 	setpriv --reuid "$1" --regid "$2" --clear-groups "${@:3}"
 }
 
+# bats test_tags=check
 @test "requests are not trusted" {
 	serve neck.scene
 	packets <<-'PYTHON'
@@ -258,14 +260,6 @@ at_terminal() {
 	incise haptic neck.scene --rig sim: --no-rt --overruns 0 --state "$page" \
 		--duration 1s >out 2>err < <(yes t)
 	[ "$(incise status neck --json | sed -n 's/.*"tool": "\(.*\)".*/\1/p')" = blade ]
-}
-
-@test "tool refuses bad usage" {
-	run -2 --separate-stderr incise tool
-	[[ "${stderr_lines[0]}" == "incise tool: missing LOOP (name, as 'incise status' lists it)" ]]
-	run -2 --separate-stderr incise tool neck spoon
-	[[ "${stderr_lines[0]}" == "incise tool: unknown tool 'spoon'; expected auto, blade, handle or tube" ]]
-	run -2 incise tool neck tube more
 }
 
 # The virtual tube goes into the tissue once in 10 s, beside a scalpel that cuts for 8 s of each 9.

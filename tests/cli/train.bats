@@ -21,6 +21,7 @@ parameters() {
 	grep -v -e ^Name -e ^% "$1"
 }
 
+# bats test_tags=check
 @test "train learns, and says how well" {
 	run -0 --separate-stderr incise train pairs.csv --group cut --check 0.3 -o m.fis
 	[ "${lines[0]}" = "pairs.csv: 192 pairs to train (4 cuts), 96 to check (2 cuts)" ]
@@ -34,6 +35,7 @@ parameters() {
 	holds "$force > 0.73 * 1.2 * 0.93 && $force < 0.73 * 1.2 * 1.07"
 }
 
+# bats test_tags=check
 @test "train reports as JSON" {
 	incise train pairs.csv --group cut --check 0.3 --seed 1 -o m.fis --json >r.json 2>warned
 	[ "$(key r.json pairs)" = 288 ]
@@ -96,6 +98,7 @@ parameters() {
 	[ ! -e n.fis ]
 }
 
+# bats test_tags=check
 @test "the reported check error is the model's on the pairs kept back" {
 	# no group: the pairs kept back are those of a split we do not know, so keep one
 	# cut's worth by group of two: the model's error on one of them is the one reported
@@ -132,18 +135,10 @@ parameters() {
 	complain "no other seed gives another model"
 }
 
+# bats test_tags=check
 @test "train reads standard input and writes standard output" {
 	incise train pairs.csv --seed 2 -o a.fis 2>/dev/null
 	incise train - --seed 2 -o - <pairs.csv >b.fis 2>/dev/null
-	cmp <(parameters a.fis) <(parameters b.fis)
-}
-
-@test "train takes CR LF, quotes, comments and other columns" {
-	incise train pairs.csv --group cut -o a.fis 2>/dev/null
-	awk -F, 'NR == 1 { printf "# made\r\n\r\nnote,\"%s\",%s,\"%s\",%s\r\n", $1, $2, $3, $4; next }
-		{ printf "\"a, \"\"b\"\"\",\"%s\",%s,\"%s\",%s\r\n", $1, $2, $3, $4 }' \
-		pairs.csv >odd.csv
-	incise train odd.csv --group cut -o b.fis 2>/dev/null
 	cmp <(parameters a.fis) <(parameters b.fis)
 }
 
@@ -176,6 +171,7 @@ parameters() {
 	[ "$(grep -c gaussmf one.fis)" -eq 3 ]
 }
 
+# bats test_tags=check
 @test "train warns where a baseline is better and where data are thin" {
 	# a plane with noise: linear regression is right, and 78 parameters are too many
 	awk -v OFS=, 'BEGIN { print "depth_mm,velocity_mm_s,force_N"
@@ -197,15 +193,6 @@ parameters() {
 	holds "$(key r.json rules_unfired) >= 2"
 }
 
-@test "train on recordings made by others beats the mean on unseen cuts" {
-	data=$root/../shared/data/meniscus.csv
-	[ -f "$data" ] || skip "no $data: real data do not come with the source"
-	incise train "$data" --inputs depth_deg,velocity_deg_s --group cut --check 0.3 --seed 1 \
-		-o m.fis --json >r.json
-	holds "$(key r.json check.rmse_N) < $(key r.json baselines.mean.rmse_N)"
-	holds "$(key r.json check_groups) >= 2"
-}
-
 # Median of a key over splits of some data: median FILE KEY [OPTIONS], from the reports r1 …
 median_of() {
 	for seed in 1 2 3 4 5; do key r$seed.json "$1"; done | sort -g | sed -n 3p
@@ -223,14 +210,6 @@ holds_on_unseen_cuts() {
 	holds "$(median_of check.rmse_N) <= $(median_of baselines.knn.rmse_N)" || return
 	# 95 % on average; four cuts tell the share of one split to some 10 %
 	holds "$(median_of interval95_coverage) > 0.85"
-}
-
-@test "train holds on unseen cuts of recordings made by others" {
-	data=$root/../shared/data
-	[ -f "$data/skin.csv" ] || skip "no $data: real data do not come with the source"
-	for name in meniscus skin; do
-		holds_on_unseen_cuts "$data/$name.csv" --inputs depth_deg,velocity_deg_s
-	done
 }
 
 @test "train holds on unseen cuts of the virtual liver" {
@@ -288,8 +267,6 @@ holds_on_unseen_cuts() {
 	[ "$(key r.json 'mf[1]')" = 1 ]
 	[ "$(key r.json rules)" = "$(key r.json 'mf[0]')" ]
 	[ "$(sed -n 's/^NumRules=//p' m.fis)" = "$(key r.json rules)" ]
-	run --separate-stderr incise train wave.csv --mf auto,3 -o m.fis
-	bad_usage --mf
 }
 
 @test "train --sample sets how many pairs the search uses" {
@@ -305,8 +282,6 @@ holds_on_unseen_cuts() {
 		[ "$(key r.json pairs)" = 5000 ]
 	done
 	grep -q '^% incise: options: .*search on all pairs' m.fis
-	run --separate-stderr incise train some.csv --premises m.fis --sample 10 -o n.fis
-	bad_usage --sample
 }
 
 @test "train takes a million pairs within 300 MB" {
@@ -324,59 +299,6 @@ holds_on_unseen_cuts() {
 	holds "$(key r.json check.r2) > 0.9999"
 }
 
-@test "train: a file that is not there, or is a folder" {
-	run --separate-stderr incise train none.csv -o m.fis
-	failed_with none.csv "No such file"
-	mkdir folder
-	run --separate-stderr incise train folder -o m.fis
-	failed_with folder "Is a directory"
-	[[ "$stderr" != *:0:* ]] # there is no line 0
-	[ ! -e m.fis ]
-}
-
-@test "train: a file that may not be read" {
-	[ "$(id -u)" != 0 ] || skip "root reads everything"
-	chmod 000 pairs.csv
-	run --separate-stderr incise train pairs.csv -o m.fis
-	failed_with pairs.csv "Permission denied"
-}
-
-@test "train: fields that are no finite number are named by line and column" {
-	for value in nan NaN -inf infinity 1e999 "" abc "1 2" 1.2.3 0x; do
-		awk -F, -v value="$value" 'NR == 5 { $3 = value } 1' OFS=, pairs.csv >bad.csv
-		refuses "bad.csv:5: column 3" velocity_mm_s
-	done
-}
-
-@test "train: rows with too few or too many fields" {
-	sed '7s/,[^,]*$//' pairs.csv >bad.csv
-	refuses "bad.csv:7: column 4"
-	sed '7s/$/,1/' pairs.csv >bad.csv
-	refuses "bad.csv:7: column 5"
-	head -c 1000 pairs.csv | sed '$s/,[^,]*$//' >bad.csv
-	refuses "bad.csv:$(grep -c '' bad.csv)"
-	sed '7s/^/"/' pairs.csv >bad.csv
-	refuses "bad.csv:7" quote
-}
-
-@test "train: what is no table" {
-	: >bad.csv
-	refuses empty
-	head -n 1 pairs.csv >bad.csv
-	refuses "no rows"
-	printf 'depth_mm,velocity_mm_s,force_N\n1,2,3\n\0\0\n' >bad.csv
-	refuses "bad.csv:3" NUL
-	head -c 4000 "$INCISE_BUILD/bin/incise" >bad.csv
-	refuses
-}
-
-@test "train: a column that is not there lists those that are" {
-	sed '1s/.*/cut,depth,velocity_mm_s,force_N/' pairs.csv >bad.csv
-	refuses "'depth_mm'" "cut, depth, velocity_mm_s, force_N"
-	run --separate-stderr incise train pairs.csv --group stroke -o m.fis
-	failed_with "'stroke'" "cut, depth_mm"
-}
-
 @test "train: a constant input" {
 	awk -F, 'NR > 1 { $2 = 5 } 1' OFS=, pairs.csv >bad.csv
 	refuses depth_mm constant
@@ -390,6 +312,7 @@ holds_on_unseen_cuts() {
 	holds "($force - 0.7)^2 < 1e-12"
 }
 
+# bats test_tags=check
 @test "train: fewer pairs than parameters" {
 	head -n 60 pairs.csv >bad.csv # 59 pairs, 60 consequent parameters
 	refuses "59 training pairs" "60 consequent parameters"
@@ -398,6 +321,7 @@ holds_on_unseen_cuts() {
 	[ -s m.fis ]
 }
 
+# bats test_tags=check
 @test "train: three pairs say nothing" {
 	sed -n '1p;2p;60p;150p' pairs.csv >bad.csv
 	run --separate-stderr incise train bad.csv --mf 1,1 -o m.fis
@@ -414,61 +338,9 @@ holds_on_unseen_cuts() {
 	[ ! -e m.fis ]
 }
 
-@test "train: bad usage" {
-	run --separate-stderr incise train pairs.csv
-	bad_usage "-o MODEL.fis"
-	run --separate-stderr incise train -o m.fis
-	bad_usage "missing DATA.csv or NAME.rec (pairs to learn from)"
-	for wrong in "--check 0" "--check 1" "--check half" "--mf 0,3" "--mf 3" "--mf 3,3,3" \
-		"--mf 33,2" "--mf ," "--mf-type trimf" "--epochs 0" "--epochs 1.5" "--step 0" \
-		"--starts 0" "--starts x" "--ridge -1" "--ridge nan" "--seed -1" "--seed x" "--inputs ,"; do
-		# shellcheck disable=SC2086
-		run --separate-stderr incise train pairs.csv -o m.fis $wrong
-		bad_usage "${wrong%% *}"
-	done
-	run --separate-stderr incise train pairs.csv -o - --json
-	bad_usage "standard output"
-	run --separate-stderr incise train pairs.csv -o ""
-	bad_usage "-o"
-	[ ! -e m.fis ]
-}
-
 @test "train: more rules than there may be" {
 	run --separate-stderr incise train pairs.csv --mf 32,32 -o m.fis
 	failed_with 1024 256
-}
-
-@test "train: places that cannot be written" {
-	mkdir folder
-	for place in folder no/such/m.fis /dev/full; do
-		run --separate-stderr incise train pairs.csv --mf 2,2 -o $place
-		[ "$status" -eq 1 ]
-		# warnings may come before
-		[[ "${stderr_lines[-1]}" == "incise train: $place: "* ]]
-	done
-	run --separate-stderr bash -c "incise train pairs.csv --mf 2,2 -o - >/dev/full"
-	[ "$status" -eq 1 ]
-	[[ "${stderr_lines[-1]}" == *"No space left"* ]]
-	[ "$(ls -A)" = "$(printf '%s\n' folder pairs.csv)" ]
-	[ -z "$(ls -A folder)" ]
-}
-
-@test "train: a full disk leaves the old model and nothing else" {
-	echo old >m.fis
-	run --separate-stderr bash -c "trap '' XFSZ; ulimit -f 1
-		incise train pairs.csv -o m.fis --overwrite"
-	[ "$status" -eq 1 ]
-	[[ "${stderr_lines[-1]}" == "incise train: m.fis: not written: "* ]]
-	[ "$(cat m.fis)" = old ]
-	[ "$(ls -A)" = "$(printf '%s\n' m.fis pairs.csv)" ]
-}
-
-@test "train: bad data leave the old model" {
-	echo old >m.fis
-	sed '9s/,[^,]*$/,nan/' pairs.csv >bad.csv
-	run --separate-stderr incise train bad.csv -o m.fis --overwrite
-	failed_with "bad.csv:9: column 4"
-	[ "$(cat m.fis)" = old ]
 }
 
 @test "train replaces the data's neighbour and keeps odd names" {

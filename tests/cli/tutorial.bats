@@ -59,6 +59,7 @@ setup() {
 	fi
 }
 
+# bats test_tags=check
 @test "what the documents link to is there" {
 	cd "$root/doc"
 	for document in *.md ../README.md ../CONTRIBUTING.md ../CHANGELOG.md; do

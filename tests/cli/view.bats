@@ -89,6 +89,7 @@ teardown() {
 	[ "$(key session.json files)" = '["session.png","s.session"]' ]
 }
 
+# bats test_tags=check
 @test "view prints the files that it wrote" {
 	run -0 --separate-stderr incise view neck --procedure --frames f --strip n.png --at 0s,0.75s --session s.session \
 		--fps 4 --duration 1s $small
@@ -261,16 +262,8 @@ begin_view() {
 	[ "$(key r.json ticks_lost)" = 0 ]
 }
 
-@test "view: bad usage, and a screen that is not there" {
-	run --separate-stderr incise view
-	bad_usage "missing SCENE ("
-	for wrong in "--procedure --rig sim:" "--procedure --from x.rec" "--frames f" "--strip x.png" "--at 1s" \
-		"--size 10x10" "--size big" "--size 640x480x3" "--fps 0" "--viewpoint 1,2" "--procedure --at 2s,1s --strip x" \
-		"--procedure --video x --size 641x480"; do
-		# shellcheck disable=SC2086
-		run --separate-stderr incise view neck $wrong
-		[ "$status" -eq 2 ] || complain "$wrong: $status $stderr"
-	done
+# bats test_tags=check
+@test "view: a screen that is not there" {
 	run --separate-stderr incise view neck --rig sim:clock=simulated --duration 1s --frames f
 	failed_with "simulated time"
 	run --separate-stderr env -u DISPLAY -u WAYLAND_DISPLAY SDL_VIDEODRIVER=x11 incise view neck --procedure

@@ -294,6 +294,22 @@ static void test_refusals_name_line_and_word(void **state)
 		{"'linear'", "'quadratic'", ENOTSUP, 33, "quadratic"},
 		{"[System]", "hello", EINVAL, 1, ".fis"},
 		{"NumMFs=2\nMF1='low'", "MF1='low'", EINVAL, 17, "before NumMFs"},
+		{"Range=[0 10]", "Range=[5 5]", EINVAL, 16, ""},
+		{"Range=[0 10]", "Range=[nan 1]", EINVAL, 16, ""},
+		{"Range=[0 10]", "Range=[0 inf]", EINVAL, 16, ""},
+		{"Range=[0 10]", "Range=[-1e308 1e308]", EINVAL, 16, ""},
+		{"[2.5 0]", "[a b]", EINVAL, 18, ""},
+		{"[2.5 0]", "[]", EINVAL, 18, ""},
+		{"[2.5 0]", "[2.5 0", EINVAL, 18, ""},
+		{"[2.5 0]", "2.5 0", EINVAL, 18, ""},
+		{"NumRules=3", "NumRules=0", EINVAL, 7, ""},
+		{"NumRules=3", "NumRules=-1", EINVAL, 7, ""},
+		{"NumRules=3", "NumRules=257", E2BIG, 7, ""},
+		{"NumRules=3", "NumRules=99999999999999999999", E2BIG, 7, ""},
+		{"NumRules=3", "NumRules=x", EINVAL, 7, ""},
+		{"NumRules=3", "NumRules=", EINVAL, 7, ""},
+		{"NumInputs=2", "NumInputs=0", EINVAL, 5, ""},
+		{"NumInputs=2", "NumInputs=-1", EINVAL, 5, ""},
 	};
 
 	static const struct changed kinds[] = {

@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+"""The option tables of all commands, tried one by one.
+
+option_tables.py VERSION PROGRAM...: prints each row of --help that is not kept, and exits with 1; prints
+nothing and exits with 0 if all are. Of each program:
+
+* --help and -h print the same, exit 0, and fail with one line where nothing can be written;
+* --version is that of the header, and completion offers the options of --help;
+* an unknown option and an unknown letter are bad usage; each misspelt name gets the nearest one;
+* a flag takes no argument, and every other option must have one;
+* an option takes each of its legal values, as a choice those that completion offers, and refuses
+  each illegal one by its name.
+
+The parser reads options in their order: that one is legal is seen by the complaint about the
+unknown option behind it. Bad usage is exit 2 with two lines, and nothing on standard output.
+"""
+import concurrent.futures
+import os
+import re
+import subprocess
+import sys
+
+# What a command needs before it looks at a value that its parser takes as it is; a.fis is a model.
+OPERANDS = {
+    "bench": ["loop"], "compile": ["a.fis", "-o", "a.fx"], "eval": ["a.fis"],
+    "export": ["a.rec"], "haptic": ["neck", "--duration=1s"], "info": ["a.fis"], "plot": ["a.rec", "-o", "a.svg"],
+    "replay": ["a.rec", "neck"], "serve": ["--rig=sim:", "--duration=50ms"], "sign": ["a.rec"],
+    "train": ["a.csv", "-o", "m.fis"], "view": ["neck", "--procedure"],
+}
+
+# OPTION [COMMAND] | legal values | illegal values; a value of {} is empty. The row with a command wins.
+VALUES = """
+--against | old.json |
+--align | clocks tap sync | nosuch {}
+--altitude | -1000 10000 | -1001 high {}
+--arith | double fixed | float half {}
+--at | 500ms,2s,6s | 2s,1s now {}
+--average | 12x10 1x1 | 12 x 0x5 5x99999 5x5x5 {}
+--axis | 1 3 | 0 4 1.5 {}
+--board | 9x6 | 9 9x 2x2x2 {}
+--budget | 0.1mN 50uN 1e-4 | 5cm 0.1kN -1 0 {}
+--c-source | a.c | a.odd
+--ca | file |
+--calibration | any.conf |
+--calibration export | |
+--camera | off auto frames | on pictures frmaes {}
+--cells | 1 4096 | 0 4097 1.5 {}
+--check | 0.01 0.99 | 0 1 half 0x1p-2 nan {}
+--clock-source | auto none kernel ptp ptp:/x,3 chrony:323 sim:1000,0,20 | sundial kernel: ptp: ptp:/x,128 ptp:,1 chrony:0 chrony:x sim:x
+--code | P07 a-b_c ABCDEFGHIJKLMNOP | A,B ABCDEFGHIJKLMNOPQ é {}
+--cpu | 0 1023 | -1 1024 x {}
+--csv | a.csv - |
+--data | any.csv |
+--density | 7950 | 0 -1 heavy {}
+--depth-max | 0.1 1e6 | -1 0 deep {}
+--due | 7d 365d 100y | soon -1d {}
+--duration | 10 30s 0.5min | 0 -1s never 10x 5m nan inf {}
+--duration bench | 1s | 0 never {}
+--duration demo | 1s 2min | 1ms long {}
+--epochs | 1 100000 | 0 1.5 many {}
+--every | 10ms 1h | 0 never {}
+--factor | a.fac - | a.odd
+--fps | 1 240 | 0 241 fast {}
+--frames | folder |
+--from | any |
+--gauge-u | 0 100 | -1 101 fine {}
+--gravity | 9.81 | 0 -9.81 strong {}
+--grid | 2x2 20x15 | 20 3x 1x5 x 3x3x3 99999x2 -2x3 {}
+--group | cut |
+--handle | |
+--history | a.csv - | a.odd
+--idle | 1s 10min | 0 never {}
+--igtl | 0 18944 127.0.0.1:0 [::1]:0 | ::1:0 127.0.0.1:x 127.0.0.1 foo 65536 -1 :0
+--igtl-version | 1 2 auto | 0 3 new {}
+--images | 1 20 | 0 1.5 all {}
+--initial | a.fis - | a.odd
+--input-range | 0,5000 -5,5 | 5,1 5 a,b {}
+--inputs | a a,b | ,
+--keep | |
+--key | key |
+--latitude | -90 90 | 91 north {}
+--length | 47.5mm 4.75cm 100 | 47.5kg 0 long {}
+--length-u | 0 0.01mm | -1 1kg {}
+--load | idle cpu memory disk view | disc {}
+--log | a.csv - | a.odd
+--lsl | prefix | {}
+--max-delay | 10 1000 | 9 1001 long {}
+--max-force | 1N 500mN | 0 1kg strong {}
+--method | direct table force | tabel float {}
+--mf | 3,2 auto | 0,3 33,2 , auto,3 a,b
+--mf-type | gaussmf gbellmf | trimf gauss {}
+--min-count | 1 50 | 0 few {}
+--model | any.fis |
+--nominal calibrate depth | 0.1 10 | 0 11 wide {}
+--nominal calibrate force | 1 1e5 | 0 1e6 high {}
+--only bench all | precision,loop |
+--only calibrate check | force force,depth,tip,delay,stepper | forse knife {}
+--only capture | force tracker force,tracker | camera {}
+--output | |
+--overruns | 0 1000000 | -1 1.5 many {}
+--pick | |
+--pixels | |
+--pixels-u | 0 1000 | -1 fine {}
+--plane-u | 0 0.1mm | -1 1kg {}
+--plot | name name.png name.svg | name.odd
+--plot replay | name |
+--plot bench | name |
+--plot bench view | name |
+--policy | fifo deadline | rr {}
+--poses | arrival acquisition | dawn {}
+--premises | any.fis |
+--priority | 1 84 | 0 85 x {}
+--profile bench | |
+--profile export | plain ros2 | ros {}
+--range calibrate stepper | 0mm..1.5mm | 5mm 5mm..1mm {}
+--range plot | 2s..2500ms 5s.. ..1s | 5s 5s..4s {}
+--rate | 0.5 1000 | 0 -1 fast nan {}
+--rate serve | 1 1000 | 0 -1 fast {}
+--recording | any.rec |
+--reference | any.session |
+--reference-stream | force tracker camera | depth {}
+--region | |
+--repeat | 1 1000 | 0 1.5 {}
+--report | folder |
+--revoked | file |
+--ridge | 0 1e12 | -1 nan small {}
+--rig | sim: any.conf |
+--sample | 0 10 | -1 1.5 {}
+--scale | 0.5g 1kg | -1 1mm {}
+--scene | any |
+--seed | 0 7 | -1 x 1.5 {}
+--seed bench | 1 7 | 0 x {}
+--series | 1 100 | 0 1.5 {}
+--session | a.session | - a.odd
+--shard | 1/1 2/3 | 0/2 3/2 1 a/b {}
+--signers | file |
+--size | 160x120 1280x720 | 10x10 big 640x480x3 {}
+--speed | 0.01 100 | 0 -1 fast {}
+--square | 5mm 1cm | 0 5kg {}
+--square-u | 0 100 | -1 101 {}
+--start-at | 2037-01-15T08:00:10Z 2037-01-15T08:00:10.5TAI | 2020-02-30T00:00:00Z 2027-01-15T08:00:10 2027-01-15T08:00:10.Z now 2027-01-15T08:00:10+01:00 2027-01-15
+--starts | 1 100 | 0 101 x {}
+--state | none a.state |
+--step | 1e-9 10 | 0 11 x {}
+--step-mm | 0.001 | 0 -1 x {}
+--strip | a.png | a.odd
+--strokes | 2 100 | 1 101 {}
+--target | column |
+--timeout | 2s 1h | 0 never {}
+--timestamp | http://a/tsr a.tsq a.tsr | reply.der
+--tolerance | 0.1 5 | -1 x {}
+--tool | auto blade handle tube | spoon blad {}
+--trigger | button 0.2N 500mN sync sync:/dev/x | 0N knob -1N {}
+--uncertainty export | none total parts | part {}
+--uncertainty train | none parts | part {}
+--velocity-max | 0.1 1e6 | 0 -1 fast {}
+--video | a.mkv | a.mp4
+--viewpoint | 15,45,140 | 1,2 a,b,c {}
+--weights | 0,50g,100g,0.2kg | 1,a {}
+--within | 1ms 0.5s | 0 soon {}
+--zero-u | 0 0.02mm | -1 1kg {}
+"""
+
+
+def read_values():
+    values = {}
+    for line in VALUES.strip().splitlines():
+        name, legal, illegal = (cell.strip() for cell in line.split("|"))
+        values[name] = [[("" if v == "{}" else v) for v in cell.split()] for cell in (legal, illegal)]
+    return values
+
+
+def run(program, *arguments, out=subprocess.PIPE):
+    done = subprocess.run([program, *arguments], stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.PIPE,
+                          text=True, check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
+def rows_of_help(text):
+    """(option, letter, argument) of each option that --help lists."""
+    options = text.split("\nOptions:\n", 1)[1].split("\n\n", 1)[0]
+    for line in options.splitlines():
+        found = re.match(r" {2}(?:-(\w), |    )--([a-z0-9-]+)(?: (\S+))?", line)
+        if found:
+            yield "--" + found[2], found[1] or "", found[3] or ""
+
+
+class Command:
+    def __init__(self, program, values):
+        self.program, self.values = program, values
+        self.name = os.path.basename(program).split("-", 1)[1].replace("-", " ", 1)
+        self.wrong = []
+
+    def complain(self, *words):
+        self.wrong.append(f"incise {self.name}: " + " ".join(words))
+
+    def refused(self, arguments, *texts):
+        """These arguments are bad usage; the line holds the texts."""
+        code, out, err = run(self.program, *arguments)
+        lines = err.splitlines()
+        if (code != 2 or out or len(lines) != 2 or not lines[0].startswith(f"incise {self.name}: ") or
+                lines[1] != f"Try 'incise {self.name} --help'." or not all(t in lines[0] for t in texts)):
+            self.complain(" ".join(arguments), f"expected {texts}, found exit {code}:", out, err)
+
+    def help(self, version):
+        code, text, err = run(self.program, "--help")
+        if code or err or not text.startswith(f"Usage: incise {self.name} "):
+            self.complain("--help:", str(code), err, text[:80])
+        if run(self.program, "-h") != (0, text, ""):
+            self.complain("-h differs from --help")
+        with open("/dev/full", "w", encoding="utf-8") as full:
+            code, _, err = run(self.program, "--help", out=full)
+        if code != 1 or len(err.splitlines()) != 1:
+            self.complain("--help >/dev/full:", str(code), err)
+        for option in ("--version", "-V"):
+            if run(self.program, option) != (0, f"incise {version}\n", ""):
+                self.complain(option, run(self.program, option)[1])
+        return text
+
+    def legal(self, options):
+        """One value of each option after the other: all are taken, the unknown one behind them is not."""
+        left = {name: list(values) for name, values in options.items() if values}
+        while left:
+            arguments = [f"{name}={values.pop(0)}" for name, values in left.items()]
+            left = {name: values for name, values in left.items() if values}
+            self.refused([*arguments, "--nosuch"], "--nosuch: no such option")
+
+    def completed(self, *words):
+        """What completion offers for an empty word behind these."""
+        lines = run(self.program, "--complete", *words)[1].splitlines()
+        return [line.split("\t")[0] for line in lines]
+
+    def check(self, version):
+        rows = list(rows_of_help(self.help(version)))
+        self.refused(["--no-such-option"], "--no-such-option: no such option")
+        self.refused(["-%"], "-%")
+        legal, names = {}, [name for name, _, _ in rows]
+        for name, letter, argument in rows:
+            if name not in ("--help", "--version"):
+                middle = (len(name) + 2) // 2
+                self.refused([name[:middle] + "q" + name[middle:]], f"did you mean {name}?")
+            if not argument:
+                self.refused([name + "=yes"], f"{name}: this option takes no argument")
+                if name not in ("--help", "--version"):
+                    self.refused([*(["-" + letter] if letter else []), name, "--nosuch"], "--nosuch: no such option")
+                continue
+            self.refused([name], f"{name}: missing argument {argument}")
+            if letter:
+                self.refused(["-" + letter], f"-{letter}: missing argument {argument}")
+            values = self.values.get(f"{name} {self.name}", self.values.get(name))
+            if values is None:
+                self.complain(f"{name}: has no row in option_tables.py")
+                continue
+            legal[name] = list(dict.fromkeys(values[0] + (self.completed(name, "") if values[1] else [])))
+            for value in values[1]:
+                said = "clock source" if name == "--clock-source" else name
+                self.refused([*OPERANDS.get(self.name, []), f"{name}={value}"], said)
+        if sorted(self.completed("--")) != sorted(names):
+            self.complain("completion offers", *self.completed("--"))
+        # The beginning of several names is none of them.
+        for name in names:
+            if name[:-1] not in names and sum(n.startswith(name[:-1]) for n in names) > 1:
+                self.refused([name[:-1] + "="], "ambiguous")
+        self.legal(legal)
+        return self.wrong
+
+
+def main(version, programs):
+    values = read_values()
+    commands = [Command(program, values) for program in programs]
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        wrong = [line for lines in pool.map(lambda c: c.check(version), commands) for line in lines]
+    if wrong:
+        print("\n".join(wrong))
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1], sys.argv[2:]))
