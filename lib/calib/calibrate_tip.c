@@ -6,11 +6,11 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <lapacke.h>
 #include <incise/calibrate_tip.h>
 #include "../base/ascending.h"
 #include "../base/random.h"
 #include "../base/vector.h"
+#include "dense.h"
 
 /* The poses as the fit has them. */
 struct tip_poses {
@@ -90,8 +90,8 @@ static bool tip_solve(const struct tip_poses *poses, const int *list, int n,
 					 d[6 + a] * d[6 + b]) /
 					n;
 	}
-	if (LAPACKE_dsyev(LAPACK_ROW_MAJOR, 'V', 'L', 3, s->vectors, 3, s->values) ||
-	    !(s->values[0] > EIGENVALUE_MIN))
+	incise_eigen(s->vectors, 3, s->values);
+	if (!(s->values[0] > EIGENVALUE_MIN))
 		return false;
 	turn_back(step, s->vectors, right);
 	for (int k = 0; k < 3; k++)
@@ -397,9 +397,9 @@ static bool correct(struct tip_poses *poses, int n, const double *u,
 					w->left[a * m + b] += rows[e][a] * rows[e][b];
 			}
 	}
-	if (LAPACKE_dpotrf(LAPACK_ROW_MAJOR, 'L', m, w->left, m))
+	if (!incise_cholesky(w->left, m))
 		return false;
-	LAPACKE_dpotrs(LAPACK_ROW_MAJOR, 'L', m, 1, w->left, m, w->x, 1);
+	incise_cholesky_solve(w->left, m, w->x);
 	for (int i = 0; i < n; i++) {
 		double *r = poses->residual[poses->list[i]], rows[3][6];
 
@@ -437,7 +437,8 @@ static void sandwich(const struct tip_poses *poses, int n, const double *u,
 	}
 	/* middle = left⁻¹ middle left⁻¹, symmetric in between once it is transposed */
 	for (int side = 0; side < 2; side++) {
-		LAPACKE_dpotrs(LAPACK_ROW_MAJOR, 'L', m, m, w->left, m, w->middle, m);
+		for (int a = 0; a < m; a++)
+			incise_cholesky_solve(w->left, m, w->middle + a * m);
 		for (int a = 0; a < m; a++)
 			for (int b = 0; b < a; b++) {
 				double keep = w->middle[a * m + b];
@@ -488,9 +489,10 @@ static void tip_move(struct tip_poses *poses, int n, const double *u,
 	v3_copy(move, moving.x + 3);
 	fit->moved_mm = 2 * v3_length(move);
 	fit->moved_sd_mm = 2 * sqrt((c[0] + c[4] + c[8]) / 3);
-	if (n / block >= INCISE_TIP_POSES_MIN &&
-	    !LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', 3, 1, c, 3, move, 1))
+	if (n / block >= INCISE_TIP_POSES_MIN && incise_cholesky(c, 3)) {
+		incise_cholesky_solve(c, 3, move);
 		*chi2 = v3_dot(move, moving.x + 3);
+	}
 }
 
 /* --- judgement --- */
