@@ -101,7 +101,8 @@ declared_by() {
 
 @test "the haptic loop maps no heavy library" {
 	heavy='sqlite|libcrypto|lapack|blas|gfortran|libopencv|libav|hdf5|libGL|epoxy|SDL'
-	ldd "$INCISE_BUILD/bin/incise-haptic" >haptic
+	# names alone: a folder may be called blas
+	ldd "$INCISE_BUILD/bin/incise-haptic" | sed 's/ => .*//' >haptic
 	grep -q libincise.so haptic
 	run grep -E "$heavy" haptic
 	[ "$status" -eq 1 ]
@@ -109,7 +110,7 @@ declared_by() {
 	ldd "$INCISE_BUILD/bin/incise-train" | grep -q libcrypto
 	ldd "$INCISE_BUILD/bin/incise-export" | grep -q sqlite
 	for program in incise incise-eval incise-compile; do
-		ldd "$INCISE_BUILD/bin/$program" >mapped
+		ldd "$INCISE_BUILD/bin/$program" | sed 's/ => .*//' >mapped
 		run grep -E "$heavy" mapped
 		[ "$status" -eq 1 ]
 	done
