@@ -55,7 +55,7 @@ unbuilt_goals := help clean deps check check-full check-debian12 check-debian13 
 ifneq ($(filter-out $(unbuilt_goals),$(or $(MAKECMDGOALS),all)),)
 missing := $(foreach tool,$(firstword $(CC)) $(firstword $(AR)),$(if $(call there,$(tool)),,$(tool))) $(missing)
 ifeq ($(strip $(missing)),)
-needed := libconfig sqlite3 zlib libcrypto jansson lapacke lapack blas
+needed := libconfig sqlite3 zlib libcrypto jansson
 missing := $(if $(shell $(PKG_CONFIG) --exists $(needed) || echo some),$(foreach lib,$(needed),\
 	$(shell $(PKG_CONFIG) --exists $(lib) || echo $(lib))))
 endif
@@ -94,7 +94,7 @@ layers_incise-learn := learn calib
 layers_incise-record := $(addprefix record,/ /time /write /read /join /verify /export /arrow /replay)
 layers_incise-view := view
 pc_incise := libconfig
-pc_incise-learn := lapacke lapack blas libcrypto
+pc_incise-learn := libcrypto
 pc_incise-record := sqlite3 zlib libcrypto
 pc_incise-view := sdl2 epoxy cairo egl
 libs_incise := -lm -ldl

@@ -14,7 +14,8 @@ unit_programs := $(filter-out $(WITHOUT:%=$(O)/tests/unit/%),$(patsubst tests/%.
 # A tracker that is not there: some tests, and a program of its own.
 emulator := $(O)/obj/tests/polhemus/emulator.o
 
-test_packages := cmocka jansson $(if $(has_libmnl),libmnl) $(if $(has_libiio),libiio) \
+# LAPACK is the reference of numerical tests; nothing else links it.
+test_packages := cmocka jansson lapacke lapack blas $(if $(has_libmnl),libmnl) $(if $(has_libiio),libiio) \
 	$(if $(has_comedilib),comedilib) $(if $(has_libusb),libusb-1.0) \
 	$(if $(has_frames),$(pc_frames_mkv)) $(if $(has_hdf5),$(pc_export_hdf5)) \
 	$(foreach lib,$(libraries),$(pc_$(lib)))

@@ -45,7 +45,6 @@ static bool package_of(const char *soname, size_t length, char *package, size_t 
 		{"libhdf5_serial.so.310", "libhdf5-310"},
 		{"libcrypto.so.3", "libssl3"},
 		{"libjpeg.so.62", "libjpeg62-turbo"},
-		{"liblapacke.so.3", "liblapacke"},
 		{"libgcc_s.so.1", "libgcc-s1"},
 		{"libz.so.1", "zlib1g"},
 		{"libincise.so.2", "libincise2"},

@@ -10,11 +10,11 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <lapacke.h>
 #include <incise/calibrate_depth.h>
 #include "../base/vector.h"
 #include "board_lens.h"
 #include "../base/ascending.h"
+#include "dense.h"
 
 /* The fitted numbers. */
 struct solution {
@@ -47,8 +47,8 @@ static void corner_mm(const struct incise_board_views *views, int corner, double
  * Homography from mm to pixels off the middle. Both are scaled to about 1 (Hartley 1997);
  * the least singular vector of two rows per corner, by their normal matrix.
  */
-static int homography(const struct incise_board_views *views, const double *px,
-		      double h[9])
+static void homography(const struct incise_board_views *views, const double *px,
+		       double h[9])
 {
 	double wide = views->square_mm *
 		      (views->columns > views->rows ? views->columns : views->rows);
@@ -71,15 +71,13 @@ static int homography(const struct incise_board_views *views, const double *px,
 				for (int b = 0; b < 9; b++)
 					normal[9 * a + b] += row[k][a] * row[k][b];
 	}
-	if (LAPACKE_dsyev(LAPACK_ROW_MAJOR, 'V', 'U', 9, normal, 9, values))
-		return -EDOM;
+	incise_eigen(normal, 9, values);
 	for (int i = 0; i < 9; i++)
 		h[i] = normal[9 * i] * (i < 6 ? large : 1) / (i % 3 < 2 ? wide : 1);
 	/* Before the lens, not behind it. */
 	if (h[8] < 0)
 		for (int i = 0; i < 9; i++)
 			h[i] = -h[i];
-	return 0;
 }
 
 static int focal_length(double h[][9], int n, double *f)
@@ -139,12 +137,7 @@ static int find_start(const struct incise_board_views *views, struct solution *s
 	double h[INCISE_BOARD_VIEWS][9], f;
 
 	for (int v = 0; v < views->n; v++)
-		if (homography(views, views->corners + (size_t)2 * corners * v, h[v]))
-			return incise_error_set(err, EDOM,
-						"view %d has no homography: its "
-						"corners do not lie on a board; check "
-						"its order of corners",
-						v + 1);
+		homography(views, views->corners + (size_t)2 * corners * v, h[v]);
 	if (focal_length(h, views->n, &f))
 		return incise_error_set(
 			err, EDOM,
@@ -558,8 +551,9 @@ static int solve(const struct board *b, double damping, double *step)
 		return -EDOM;
 	for (int i = 0; i < n; i++)
 		step[i] = b->right[i] / unit_of(b, i);
-	if (LAPACKE_dposv(LAPACK_ROW_MAJOR, 'U', n, 1, b->work, n, step, 1))
+	if (!incise_cholesky(b->work, n))
 		return -EDOM;
+	incise_cholesky_solve(b->work, n, step);
 	for (int i = 0; i < n; i++)
 		step[i] /= unit_of(b, i);
 	return 0;
@@ -658,18 +652,20 @@ static int covariance(struct board *b, struct solution *s, double variance,
 	int n = b->n;
 
 	accumulate(b, s);
-	if (scale_normal(b, 0) || LAPACKE_dpotrf(LAPACK_ROW_MAJOR, 'U', n, b->work, n) ||
-	    LAPACKE_dpotri(LAPACK_ROW_MAJOR, 'U', n, b->work, n))
+	if (scale_normal(b, 0) || !incise_cholesky(b->work, n))
 		return incise_error_set(
 			err, EDOM,
 			"the views cannot separate lens and poses; tilt the board by "
 			"20 to 45 degrees, each time in another direction");
-	for (int i = 0; i < n; i++)
+	for (int i = 0; i < n; i++) {
+		double *row = s->covariance + (size_t)i * n;
+
+		memset(row, 0, n * sizeof(*row));
+		row[i] = variance / unit_of(b, i);
+		incise_cholesky_solve(b->work, n, row);
 		for (int j = 0; j < n; j++)
-			s->covariance[(size_t)i * n + j] =
-				variance *
-				b->work[(size_t)(i < j ? i : j) * n + (i < j ? j : i)] /
-				unit_of(b, i) / unit_of(b, j);
+			row[j] /= unit_of(b, j);
+	}
 	s->n_unknowns = n;
 	s->plane_at = b->at[b->views->plane];
 	return 0;

@@ -10,11 +10,11 @@
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
-#include <lapacke.h>
 #include <incise/calibrate_delay.h>
 #include "../base/ascending.h"
 #include "../base/random.h"
 #include "delay_grid.h"
+#include "dense.h"
 
 /* A fit under way. */
 struct delay {
@@ -87,8 +87,9 @@ static bool solve(const struct normal *normal, double *x)
 		a[i * m + i] = 1 + TINY;
 		x[i] = normal->b[i] * scale[i];
 	}
-	if (LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', m, 1, a, m, x, 1))
+	if (!incise_cholesky(a, m))
 		return false;
+	incise_cholesky_solve(a, m, x);
 	for (int i = 0; i < m; i++)
 		x[i] *= scale[i];
 	return true;

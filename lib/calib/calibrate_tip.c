@@ -6,11 +6,11 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <lapacke.h>
 #include <incise/calibrate_tip.h>
 #include "../base/ascending.h"
 #include "../base/random.h"
 #include "../base/vector.h"
+#include "dense.h"
 
 /* The poses as the fit has them. */
 struct tip_poses {
@@ -90,8 +90,8 @@ static bool tip_solve(const struct tip_poses *poses, const int *list, int n,
 					 d[6 + a] * d[6 + b]) /
 					n;
 	}
-	if (LAPACKE_dsyev(LAPACK_ROW_MAJOR, 'V', 'L', 3, s->vectors, 3, s->values) ||
-	    !(s->values[0] > EIGENVALUE_MIN))
+	incise_eigen(s->vectors, 3, s->values);
+	if (!(s->values[0] > EIGENVALUE_MIN))
 		return false;
 	turn_back(step, s->vectors, right);
 	for (int k = 0; k < 3; k++)
@@ -360,14 +360,15 @@ static double correction(int block, int blocks)
 }
 
 /*
- * Sandwich of the fit with a pivot that moves evenly: unknowns t and the pivot's move per
- * half of the run, w. Or without: w 0.
+ * Least squares of the residuals by a correction of t and, with 6 unknowns, the pivot's move
+ * per half of the run, w; their covariance is a sandwich.
  */
 struct sandwich {
 	int m; /* unknowns, 3 or 6 */
-	double left[36], middle[36], right[6];
+	double left[36], middle[36], x[6];
 };
 
+/* u: times of the listed poses, in halves of the run, that add up to 0. */
 static void score_rows(double rows[3][6], const struct tip_poses *poses, int at,
 		       const struct tip_solution *s, double u)
 {
@@ -378,16 +379,12 @@ static void score_rows(double rows[3][6], const struct tip_poses *poses, int at,
 		}
 }
 
-/* x = left⁻¹ right, and its covariance into middle. False: singular. */
-static bool sandwich(struct tip_poses *poses, int n, const double *u,
-		     const struct tip_solution *s, int block, struct sandwich *w)
+/* x, and the residuals that it leaves. False: singular. */
+static bool correct(struct tip_poses *poses, int n, const double *u,
+		    const struct tip_solution *s, struct sandwich *w)
 {
-	int m = w->m, blocks = n / block;
-	double sum[6] = {0}, x[6];
+	int m = w->m;
 
-	memset(w->left, 0, sizeof(w->left));
-	memset(w->right, 0, sizeof(w->right));
-	memset(w->middle, 0, sizeof(w->middle));
 	for (int i = 0; i < n; i++) {
 		const double *r = poses->residual[poses->list[i]];
 		double rows[3][6];
@@ -395,26 +392,41 @@ static bool sandwich(struct tip_poses *poses, int n, const double *u,
 		score_rows(rows, poses, poses->list[i], s, u[i]);
 		for (int e = 0; e < 3; e++)
 			for (int a = 0; a < m; a++) {
-				w->right[a] -= rows[e][a] * r[e];
+				w->x[a] -= rows[e][a] * r[e];
 				for (int b = 0; b < m; b++)
 					w->left[a * m + b] += rows[e][a] * rows[e][b];
 			}
 	}
-	if (LAPACKE_dpotrf(LAPACK_ROW_MAJOR, 'L', m, w->left, m))
+	if (!incise_cholesky(w->left, m))
 		return false;
-	memcpy(x, w->right, sizeof(x));
-	LAPACKE_dpotrs(LAPACK_ROW_MAJOR, 'L', m, 1, w->left, m, x, 1);
+	incise_cholesky_solve(w->left, m, w->x);
 	for (int i = 0; i < n; i++) {
-		double r[3], rows[3][6];
+		double *r = poses->residual[poses->list[i]], rows[3][6];
 
-		v3_copy(r, poses->residual[poses->list[i]]);
 		score_rows(rows, poses, poses->list[i], s, u[i]);
-		for (int e = 0; e < 3; e++) {
+		for (int e = 0; e < 3; e++)
 			for (int a = 0; a < m; a++)
-				r[e] += rows[e][a] * x[a];
+				r[e] += rows[e][a] * w->x[a];
+		poses->square[poses->list[i]] = v3_dot(r, r);
+	}
+	return true;
+}
+
+/* The covariance of x into middle, by blocks of the residuals. */
+static void sandwich(const struct tip_poses *poses, int n, const double *u,
+		     const struct tip_solution *s, int block, struct sandwich *w)
+{
+	int m = w->m, blocks = n / block;
+	double sum[6] = {0};
+
+	for (int i = 0; i < n; i++) {
+		const double *r = poses->residual[poses->list[i]];
+		double rows[3][6];
+
+		score_rows(rows, poses, poses->list[i], s, u[i]);
+		for (int e = 0; e < 3; e++)
 			for (int a = 0; a < m; a++)
 				sum[a] += rows[e][a] * r[e];
-		}
 		/* the remainder belongs to the last block */
 		if (i != n - 1 && ((i + 1) % block || (i + 1) / block == blocks))
 			continue;
@@ -425,7 +437,8 @@ static bool sandwich(struct tip_poses *poses, int n, const double *u,
 	}
 	/* middle = left⁻¹ middle left⁻¹, symmetric in between once it is transposed */
 	for (int side = 0; side < 2; side++) {
-		LAPACKE_dpotrs(LAPACK_ROW_MAJOR, 'L', m, m, w->left, m, w->middle, m);
+		for (int a = 0; a < m; a++)
+			incise_cholesky_solve(w->left, m, w->middle + a * m);
 		for (int a = 0; a < m; a++)
 			for (int b = 0; b < a; b++) {
 				double keep = w->middle[a * m + b];
@@ -436,34 +449,50 @@ static bool sandwich(struct tip_poses *poses, int n, const double *u,
 	}
 	for (int i = 0; i < m * m; i++)
 		w->middle[i] *= correction(block, blocks);
-	memcpy(w->right, x, sizeof(x));
-	return true;
+}
+
+/* The solution's covariance, by blocks of the residuals, which stay as they are. */
+static void tip_covariance(struct tip_poses *poses, int n, const double *u,
+			   const struct tip_solution *s, struct incise_tip_fit *fit)
+{
+	struct sandwich still = {.m = 3};
+
+	fit->block = tip_block(poses, n);
+	fit->blocks = n / fit->block;
+	if (!correct(poses, n, u, s, &still))
+		return;
+	sandwich(poses, n, u, s, fit->block, &still);
+	memcpy(fit->covariance, still.middle, sizeof(fit->covariance));
 }
 
 /*
- * The solution's covariance, and the way that the pivot moved, with its χ², by blocks of
- * fit->block; u: times of the listed poses, in halves of the run, that add up to 0.
+ * The way that the pivot moved, and its χ². Its blocks are those of what the move leaves: a
+ * pivot that moves evenly makes all residuals alike, and left in them it would leave two
+ * blocks, whose covariance is singular. Too few blocks have no χ²: 0.
  */
-static void tip_uncertainty(struct tip_poses *poses, int n, const double *u,
-			    const struct tip_solution *s, struct incise_tip_fit *fit,
-			    double *chi2)
+static void tip_move(struct tip_poses *poses, int n, const double *u,
+		     const struct tip_solution *s, struct incise_tip_fit *fit,
+		     double *chi2)
 {
-	struct sandwich still = {.m = 3}, moving = {.m = 6};
+	struct sandwich moving = {.m = 6};
 	double c[9], move[3];
+	int block;
 
-	if (sandwich(poses, n, u, s, fit->block, &still))
-		memcpy(fit->covariance, still.middle, sizeof(fit->covariance));
 	*chi2 = 0;
-	if (!sandwich(poses, n, u, s, fit->block, &moving))
+	if (!correct(poses, n, u, s, &moving))
 		return;
+	block = tip_block(poses, n);
+	sandwich(poses, n, u, s, block, &moving);
 	for (int a = 0; a < 3; a++)
 		for (int b = 0; b < 3; b++)
 			c[3 * a + b] = moving.middle[(3 + a) * 6 + 3 + b];
-	v3_copy(move, moving.right + 3);
+	v3_copy(move, moving.x + 3);
 	fit->moved_mm = 2 * v3_length(move);
 	fit->moved_sd_mm = 2 * sqrt((c[0] + c[4] + c[8]) / 3);
-	if (!LAPACKE_dposv(LAPACK_ROW_MAJOR, 'L', 3, 1, c, 3, move, 1))
-		*chi2 = v3_dot(move, moving.right + 3);
+	if (n / block >= INCISE_TIP_POSES_MIN && incise_cholesky(c, 3)) {
+		incise_cholesky_solve(c, 3, move);
+		*chi2 = v3_dot(move, moving.x + 3);
+	}
 }
 
 /* --- judgement --- */
@@ -660,8 +689,6 @@ static int fit_poses(struct tip_poses *poses, const struct incise_tip_pose *give
 	}
 	fit->rms_mm = sqrt(sum / n);
 	tip_motion(poses, n, &s, fit);
-	fit->block = tip_block(poses, n);
-	fit->blocks = n / fit->block;
 	u = malloc((size_t)n * sizeof(*u));
 	if (!u)
 		return incise_error_set(err, ENOMEM, "out of memory");
@@ -680,7 +707,8 @@ static int fit_poses(struct tip_poses *poses, const struct incise_tip_pose *give
 		sum += u[i] / n;
 	for (int i = 0; i < n; i++)
 		u[i] -= sum;
-	tip_uncertainty(poses, n, u, &s, fit, &chi2);
+	tip_covariance(poses, n, u, &s, fit);
+	tip_move(poses, n, u, &s, fit, &chi2);
 	free(u);
 	fit->held_out_mm = held_out(poses, n);
 	return tip_judge(poses, fit, chi2, err);

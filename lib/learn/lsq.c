@@ -11,16 +11,17 @@
  *       └────┴───┘
  *
  * Reflection j works on row j of the triangle and on the block, nothing else. Training
- * solves many problems of 60 unknowns, for which the reference BLAS spends its time on
- * calls; so the matrices lie row by row, a reflection is a sum of rows and a rank-one
- * update of rows, and both go through the columns in strips that stay in registers.
+ * solves many problems of 60 unknowns, for which a BLAS would spend its time on calls, and
+ * return other bits than the next BLAS; so the matrices lie row by row, a reflection is a sum
+ * of rows and a rank-one update of rows, and both go through the columns in strips that stay
+ * in registers.
  */
 #include <errno.h>
+#include <float.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
-#include <lapacke.h>
 #include "lsq.h"
 
 /* Rows folded in at a time: the block of 60 unknowns then fits the first-level cache. */
@@ -398,29 +399,125 @@ int incise_lsq_solve(struct incise_lsq *lsq, const struct incise_ridge *ridge, d
 	return factor ? incise_lsq_back(factor, stride, lsq->n, lsq->n, x) : -EDOM;
 }
 
+/* Upper bidiagonal: d on the diagonal, e above it. */
+struct bidiagonal {
+	int n;
+	double *d, *e; /* n each */
+};
+
+/*
+ * v becomes the vector of the reflection 1 - tau·v·vᵀ that makes all but the first of its n
+ * elements zero. Returns what the first becomes.
+ */
+static double make_reflection(double *v, int n, double *tau)
+{
+	double beta = -copysign(length(v[0], v + 1, n - 1), v[0]), over = v[0] - beta;
+
+	*tau = beta != 0 ? -over / beta : 0;
+	for (int i = 1; i < n && beta != 0; i++)
+		v[i] /= over;
+	v[0] = 1;
+	return beta;
+}
+
+/*
+ * Reflections from both sides (Golub and Van Loan, Matrix Computations, 5.4.8) make a, n × n,
+ * bidiagonal, with its singular values kept. v and sums are scratch, n each.
+ */
+static void make_bidiagonal(double *a, struct bidiagonal *to, double *v, double *sums)
+{
+	int n = to->n;
+	double tau;
+
+	for (int j = 0; j < n; j++) {
+		for (int i = j; i < n; i++)
+			v[i - j] = a[(size_t)i * n + j];
+		to->d[j] = make_reflection(v, n - j, &tau);
+		memset(sums, 0, n * sizeof(*sums));
+		for (int i = j; i < n; i++)
+			for (int k = j + 1; k < n; k++)
+				sums[k] += tau * v[i - j] * a[(size_t)i * n + k];
+		for (int i = j; i < n; i++)
+			for (int k = j + 1; k < n; k++)
+				a[(size_t)i * n + k] -= v[i - j] * sums[k];
+		if (j + 1 == n)
+			break;
+		memcpy(v, a + (size_t)j * n + j + 1, (n - j - 1) * sizeof(*v));
+		to->e[j] = make_reflection(v, n - j - 1, &tau);
+		for (int i = j + 1; i < n; i++) {
+			double *row = a + (size_t)i * n + j + 1, sum = 0;
+
+			for (int k = 0; k < n - j - 1; k++)
+				sum += v[k] * row[k];
+			for (int k = 0; k < n - j - 1; k++)
+				row[k] -= tau * sum * v[k];
+		}
+	}
+}
+
+/*
+ * Number of singular values below x > 0: they and their negatives are the eigenvalues of the
+ * tridiagonal matrix of zeros on the diagonal and d₀ e₀ d₁ … next to it, which Sturm's sequence
+ * counts.
+ */
+static int count_below(const struct bidiagonal *b, double x)
+{
+	double q = -x;
+	int count = 1;
+
+	for (int i = 0; i < 2 * b->n - 1; i++) {
+		double beside = i % 2 ? b->e[i / 2] : b->d[i / 2];
+
+		if (fabs(q) < DBL_MIN)
+			q = -DBL_MIN;
+		q = -x - beside * beside / q;
+		count += q < 0;
+	}
+	return count - b->n;
+}
+
+/* The singular value that k others are below, by bisection between 0 and `above`. */
+static double singular_value(const struct bidiagonal *b, int k, double above)
+{
+	double low = 0, middle;
+
+	while ((middle = low + (above - low) / 2) > low && middle < above)
+		if (count_below(b, middle) > k)
+			above = middle;
+		else
+			low = middle;
+	return low;
+}
+
 int incise_lsq_condition(struct incise_lsq *lsq, double *condition)
 {
-	int n = lsq->n, stride, rc = -ENOMEM;
+	int n = lsq->n, stride;
 	const double *factor = incise_lsq_factor(lsq, NULL, &stride);
-	double *copy, *values, dummy;
+	double *a, *lines, largest = 0, smallest;
+	struct bidiagonal b = {.n = n};
 
 	if (!factor)
 		return -EDOM;
-	copy = calloc((size_t)n * n, sizeof(double));
-	values = malloc(n * sizeof(double));
-	if (!copy || !values)
-		goto out;
+	a = calloc((size_t)n * n, sizeof(*a));
+	lines = calloc((size_t)4 * n, sizeof(*lines));
+	*condition = HUGE_VAL;
 	for (int i = 0; i < n; i++)
-		memcpy(copy + (size_t)i * n + i, factor + (size_t)i * stride + i,
-		       (n - i) * sizeof(double));
-	/* Row by row: LAPACK sees the transpose, whose singular values are the same. */
-	rc = LAPACKE_dgesdd(LAPACK_COL_MAJOR, 'N', n, n, copy, n, values, &dummy, 1,
-			    &dummy, 1)
-		     ? -EDOM
-		     : 0;
-	*condition = rc || !(values[n - 1] > 0) ? HUGE_VAL : values[0] / values[n - 1];
-out:
-	free(copy);
-	free(values);
-	return rc;
+		for (int k = i; k < n; k++)
+			largest = fmax(largest, fabs(factor[(size_t)i * stride + k]));
+	if (a && lines && largest > 0) {
+		for (int i = 0; i < n; i++)
+			for (int k = i; k < n; k++)
+				a[(size_t)i * n + k] =
+					factor[(size_t)i * stride + k] / largest;
+		b.d = lines;
+		b.e = lines + n;
+		make_bidiagonal(a, &b, lines + 2 * n, lines + 3 * n);
+		/* elements are at most 1, so no singular value is above n */
+		smallest = singular_value(&b, 0, n + 1);
+		if (smallest > 0)
+			*condition = singular_value(&b, n - 1, n + 1) / smallest;
+	}
+	free(a);
+	free(lines);
+	return a && lines ? 0 : -ENOMEM;
 }

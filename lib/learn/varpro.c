@@ -13,13 +13,12 @@
  *      │    │    │   │        │    │ R₂ │ g │   |P⊥(t - D u)|² = |g - R₂ u|² + ρ²
  *      └────┴────┴───┘        └────┴────┴─ρ─┘
  *
- * A step solves [R₂; √μ c] u = [g; 0], c the largest column of R₂, by LAPACK's QR (dgels).
+ * A step solves [R₂; √μ c] u = [g; 0], c the largest column of R₂: a ridge on R₂.
  */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <lapacke.h>
 #include "varpro.h"
 
 /* Damping: first, by success and failure, and where a search ends. */
@@ -39,9 +38,9 @@ struct state {
 	const struct incise_ridge *ridge;
 	int n, q;			 /* consequents, premises */
 	struct incise_lsq *linear, *all; /* of n and of n + q unknowns */
+	struct incise_lsq *damped;	 /* R₂ and g; of q unknowns */
 	double *kept;			 /* firing strengths of the last solution */
-	double *matrix;			 /* 2q × q, of a step */
-	double *right;			 /* 2q */
+	double *step;			 /* q */
 	double *scale;			 /* q */
 };
 
@@ -78,11 +77,11 @@ static void derivative(const struct state *s, const struct incise_basis *basis,
 				*to++ *= *share * *scale++;
 }
 
-/* R₂ and g, for the strengths and consequents of the last solution: g in column q. */
-static const double *project(struct state *s, const struct incise_basis *basis,
-			     const double *consequents, int *stride)
+/* R₂ and g for the strengths and consequents of the last solution. False: none. */
+static bool project(struct state *s, const struct incise_basis *basis,
+		    const double *consequents)
 {
-	int d = s->pairs->n_inputs;
+	int d = s->pairs->n_inputs, stride;
 	const double *factor;
 
 	incise_premises_scale(basis, s->scale);
@@ -96,11 +95,15 @@ static const double *project(struct state *s, const struct incise_basis *basis,
 		derivative(s, basis, w, x, consequents, row + s->n);
 		incise_lsq_add(s->all, x[d]);
 	}
-	factor = incise_lsq_factor(s->all, s->ridge, stride);
-	return factor ? factor + (size_t)s->n * (*stride + 1) : NULL;
+	factor = incise_lsq_factor(s->all, s->ridge, &stride);
+	for (int i = 0; i < s->q && factor; i++)
+		memcpy(incise_lsq_factor_row(s->damped, i) + i,
+		       factor + (size_t)(s->n + i) * (stride + 1),
+		       (s->q + 1 - i) * sizeof(double));
+	return factor;
 }
 
-static double largest_column(const double *r, int stride, int q)
+static double largest_column(struct incise_lsq *triangle, int q)
 {
 	double largest = 0;
 
@@ -108,45 +111,29 @@ static double largest_column(const double *r, int stride, int q)
 		double sum = 0;
 
 		for (int i = 0; i <= k; i++)
-			sum += r[(size_t)i * stride + k] * r[(size_t)i * stride + k];
+			sum += pow(incise_lsq_factor_row(triangle, i)[k], 2);
 		largest = fmax(largest, sqrt(sum));
 	}
 	return largest;
 }
 
-/* The damped step into s->right. */
-static int find_step(struct state *s, const double *r, int stride, double damping)
+/* The damped step into s->step. */
+static int find_step(struct state *s, double damping)
 {
-	int q = s->q;
+	struct incise_ridge ridge = {damping, 1, s->q, 1};
+	int rc = incise_lsq_solve(s->damped, &ridge, s->step);
 
-	memset(s->matrix, 0, (size_t)2 * q * q * sizeof(double));
-	for (int k = 0; k < q; k++) {
-		double *column = s->matrix + (size_t)k * 2 * q;
-
-		for (int i = 0; i <= k; i++)
-			column[i] = r[(size_t)i * stride + k];
-		column[q + k] = damping;
-		s->right[k] = r[(size_t)k * stride + q];
-		s->right[q + k] = 0;
-	}
-	if (LAPACKE_dgels(LAPACK_COL_MAJOR, 'N', 2 * q, q, 1, s->matrix, 2 * q, s->right,
-			  2 * q))
-		return -EDOM;
-	for (int k = 0; k < q; k++) {
-		if (!isfinite(s->right[k]))
-			return -EDOM;
-		s->right[k] = fmax(-STEP_MAX, fmin(STEP_MAX, s->right[k]));
-	}
-	return 0;
+	for (int k = 0; k < s->q && !rc; k++)
+		s->step[k] = fmax(-STEP_MAX, fmin(STEP_MAX, s->step[k]));
+	return rc;
 }
 
 /* One step downhill; false where there is none. */
 static bool improve(struct state *s, struct incise_basis *basis, double *consequents,
 		    double *trial_consequents, double *error, double *mu)
 {
-	int stride;
-	const double *r = project(s, basis, consequents, &stride);
-	double norm = r ? largest_column(r, stride, s->q) : 0;
+	double norm =
+		project(s, basis, consequents) ? largest_column(s->damped, s->q) : 0;
 
 	if (!(norm > 0))
 		return false;
@@ -154,9 +141,9 @@ static bool improve(struct state *s, struct incise_basis *basis, double *consequ
 		struct incise_basis trial = *basis;
 		double trial_error;
 
-		if (find_step(s, r, stride, sqrt(*mu) * norm))
+		if (find_step(s, *mu * norm * norm))
 			continue;
-		incise_premises_step(&trial, s->right);
+		incise_premises_step(&trial, s->step);
 		if (solve(s, &trial, trial_consequents, &trial_error) ||
 		    !(trial_error < *error * (1 - TOLERANCE)))
 			continue;
@@ -173,9 +160,9 @@ static void state_free(struct state *s)
 {
 	incise_lsq_free(s->linear);
 	incise_lsq_free(s->all);
+	incise_lsq_free(s->damped);
 	free(s->kept);
-	free(s->matrix);
-	free(s->right);
+	free(s->step);
 	free(s->scale);
 }
 
@@ -189,11 +176,11 @@ int incise_varpro_run(struct incise_basis *basis, double *consequents,
 
 	s.linear = incise_lsq_new(n);
 	s.all = incise_lsq_new(n + q);
+	s.damped = incise_lsq_new(q);
 	s.kept = malloc((varpro->pairs->n + 1) * basis->n_rules * sizeof(double));
-	s.matrix = malloc((size_t)2 * q * q * sizeof(double));
-	s.right = malloc((size_t)2 * q * sizeof(double));
+	s.step = malloc(q * sizeof(double));
 	s.scale = malloc(q * sizeof(double));
-	if (!trial || !s.linear || !s.all || !s.kept || !s.matrix || !s.right || !s.scale)
+	if (!trial || !s.linear || !s.all || !s.damped || !s.kept || !s.step || !s.scale)
 		goto out;
 	rc = solve(&s, basis, consequents, &error);
 	if (rc)

@@ -103,17 +103,28 @@ declared_by() {
 
 @test "the haptic loop maps no heavy library" {
 	heavy='sqlite|libcrypto|lapack|blas|gfortran|libopencv|libav|hdf5|libGL|epoxy|SDL'
-	ldd "$INCISE_BUILD/bin/incise-haptic" >haptic
+	# names alone: a folder may be called blas
+	ldd "$INCISE_BUILD/bin/incise-haptic" | sed 's/ => .*//' >haptic
 	grep -q libincise.so haptic
 	run grep -E "$heavy" haptic
 	[ "$status" -eq 1 ]
 	# what needs them has them: the pattern finds what it looks for
-	ldd "$INCISE_BUILD/bin/incise-train" | grep -q lapack
+	ldd "$INCISE_BUILD/bin/incise-train" | grep -q libcrypto
 	ldd "$INCISE_BUILD/bin/incise-export" | grep -q sqlite
 	for program in incise incise-eval incise-compile; do
-		ldd "$INCISE_BUILD/bin/$program" >mapped
+		ldd "$INCISE_BUILD/bin/$program" | sed 's/ => .*//' >mapped
 		run grep -E "$heavy" mapped
 		[ "$status" -eq 1 ]
+	done
+}
+
+# Each BLAS rounds in its own way, and some start threads and map 128 MB at a time.
+@test "no program depends on the BLAS that is installed" {
+	for file in "$INCISE_BUILD"/bin/incise* "$INCISE_BUILD"/lib/libincise*.so; do
+		readelf -d "$file" >needed
+		grep -q 'NEEDED.*libc\.so' needed || complain "$file: not read" || return
+		run grep -E 'NEEDED.*(lapack|blas|gfortran)' needed
+		[ "$status" -eq 1 ] || complain "$file: $output" || return
 	done
 }
 

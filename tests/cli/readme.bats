@@ -12,7 +12,7 @@ setup() {
 	[ "$(wc -w <"$root/README.md")" -le 900 ] || complain "$(wc -w <"$root/README.md") words"
 }
 
-# The numbers of a text with two digits: the last ones depend on the LAPACK that is installed.
+# The numbers of a text with two digits: the last ones depend on the C library.
 rounded() {
 	awk '{ line = ""
 		while (match($0, /[0-9]+\.[0-9]+(e[-+]?[0-9]+)?/)) {

@@ -290,6 +290,32 @@ static void test_refusals(void **state)
 	assert_non_null(strstr(err.text, "pose 42"));
 }
 
+/* A pivot that moves evenly is named, whatever the noise; one that stays in noise that lasts is not. */
+static void test_moving_pivot(void **state)
+{
+	struct motion moved = usual, slow = usual;
+	struct incise_tip_fit f;
+	struct incise_error err;
+
+	moved.moved_mm = 0.3;
+	slow.correlated = 0.995;
+	for (uint64_t run = 1; run <= 20; run++) {
+		seed = run;
+		move(&moved, 600);
+		assert_int_equal(fit(600, &f, &err), -EDOM);
+		if (!strstr(err.text, "the pivot moved"))
+			fail_msg("seed %d: %s", (int)run, err.text);
+		/* 0.04 mm of noise over √600 poses; an even move has √3 of that, twice */
+		assert_true(f.moved_sd_mm > 0.003 && f.moved_sd_mm < 0.01);
+		assert_true(fabs(f.moved_mm - 0.3) < 4 * f.moved_sd_mm);
+		seed = run;
+		move(&slow, 600);
+		assert_int_equal(fit(600, &f, &err), -EDOM);
+		if (!strstr(err.text, "independent"))
+			fail_msg("seed %d: %s", (int)run, err.text);
+	}
+}
+
 /* A tip that rig.conf's own has nearly right: the cone is that of what turned least. */
 static void test_short_tip(void **state)
 {
@@ -314,6 +340,7 @@ int main(void)
 		cmocka_unit_test(test_intervals_of_a_stream),
 		cmocka_unit_test(test_outliers),
 		cmocka_unit_test(test_refusals),
+		cmocka_unit_test(test_moving_pivot),
 		cmocka_unit_test(test_short_tip),
 	};
 
