@@ -31,8 +31,9 @@ part_kept := $(checked) check-kept
 part_commands := $(checked) check-commands
 
 check-build: libs tools unit-programs $(kept_programs) cli-needs
+# A sanitizer calls dlopen() for a program, which forgets that program's own search path.
 check-commands: cli-needs
-	$(Q)$(bats) $(bats_jobs) --filter-tags check tests/cli tests/attack
+	$(Q)LD_LIBRARY_PATH=$(abspath $(O))/lib $(bats) $(bats_jobs) --filter-tags check tests/cli tests/attack
 
 check-quick:
 	+@status=0; $(call timed,style build) || status=$$?; \
