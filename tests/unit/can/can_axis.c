@@ -80,7 +80,7 @@ static void it_takes_no_target_before_it_heard_where_it_is(void **state)
 	struct bench b;
 
 	start(&b);
-	b.led.drive.position = b.led.drive.demand = 4321;
+	b.led.drive.position = b.led.drive.target = 4321;
 	power(&b);
 	/* The first targets were its own position. */
 	assert_in_range(b.led.drive.least_target, 4320, 4322);
@@ -100,7 +100,7 @@ static void outside_of_its_travel_it_gets_no_power(void **state)
 		struct bench b;
 
 		start(&b);
-		b.led.drive.position = b.led.drive.demand = cases[i].at;
+		b.led.drive.position = b.led.drive.target = cases[i].at;
 		cycles(&b, 3, -1);
 		assert_int_equal(can_axis_power(&b.axis, b.led.drive.now_ns, 0),
 				 cases[i].rc);
@@ -265,11 +265,11 @@ static void cycles_that_stop_for_too_long_end_in_a_quick_stop(void **state)
 		assert_int_equal(b.axis.phase,
 				 homing ? CAN_AXIS_HOMING : CAN_AXIS_RUNNING);
 		/* A cycle behind the deadman is no fault: that is how long the last one lasts. */
-		b.led.drive.watching = b.led.drive.deadline_runs = false;
+		b.led.drive.watching = false;
 		drive_advance(&b.led.drive, 100 * MS);
 		cycles(&b, 1, 0);
 		assert_int_equal(b.slot.faults, 0);
-		b.led.drive.watching = b.led.drive.deadline_runs = false;
+		b.led.drive.watching = false;
 		drive_advance(&b.led.drive, 101 * MS);
 		assert_true(cia402_powered(b.led.drive.state));
 		cycles(&b, 1, 5000);
@@ -293,7 +293,8 @@ static void a_flood_is_taken_in_parts(void **state)
 		drive_say(&b.led.drive, &noise);
 	drive_advance(&b.led.drive, MS);
 	can_axis_cycle(&b.axis, b.led.drive.now_ns, 0, 0);
-	assert_int_equal(b.led.drive.to_master.n, 200 - 64);
+	/* And its answer to the SYNC. */
+	assert_int_equal(b.led.drive.queued, 200 - 64 + 1);
 }
 
 static void each_reason_has_its_own_line(void **state)

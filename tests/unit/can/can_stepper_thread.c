@@ -55,7 +55,7 @@ static int real_send(struct can_bus *bus, const struct can_frame *frame)
 
 static int real_wait(struct can_bus *bus, int64_t until_ns)
 {
-	while (real_now(bus) < until_ns && !((struct drive *)bus)->to_master.n) {
+	while (real_now(bus) < until_ns && !((struct drive *)bus)->queued) {
 		nanosleep(&(struct timespec){.tv_nsec = 200000}, NULL);
 		catch_up(bus);
 	}

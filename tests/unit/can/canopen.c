@@ -11,7 +11,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "../../../lib/device/can/canopen/canopen.h"
-#include "can_drive.h"
+#include "drive.h"
 
 #define OWN 0x7f
 #define N DRIVE_NODE
