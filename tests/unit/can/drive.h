@@ -174,11 +174,13 @@ struct drive {
 	bool blocked;	      /* the shaft does not turn */
 	bool fault_stays;     /* a fault cannot be reset */
 	bool homing_fails;
+	double gives_way;     /* counts that its shaft jumps when its brake opens */
 	bool no_tpdo;	      /* TPDO1 is not sent */
 	bool twice;	      /* each frame of it comes twice */
 	int send_error;	      /* of bus->ops->send, such as -ENOBUFS … */
 	uint32_t send_first;  /* so many frames are sent well before it starts */
 	uint32_t send_errors; /* … for so many frames; 0: until it is taken back */
+	int sync_error;	      /* likewise, of SYNCs alone */
 	int receive_error, wait_error; /* of the bus */
 	int can_state;		       /* of bus->ops->state */
 	uint32_t inputs;	       /* 60FD */
@@ -537,6 +539,10 @@ static inline void drive_turn(struct drive *d)
 
 static inline void drive_move(struct drive *d)
 {
+	if (d->enabling && d->enabled_at_ns - d->now_ns < 25 * DRIVE_MS) {
+		d->position += d->gives_way;
+		d->gives_way = 0;
+	}
 	if (d->enabling && d->now_ns >= d->enabled_at_ns) {
 		d->enabling = false;
 		drive_enter(d, CIA402_ENABLED);
@@ -970,6 +976,8 @@ static inline int drive_send(struct can_bus *bus, const struct can_frame *frame)
 	struct drive *d = (struct drive *)bus;
 	int rc = d->send_error;
 
+	if (frame->can_id == CANOPEN_SYNC && d->sync_error)
+		rc = d->sync_error;
 	if (rc && d->send_first) {
 		d->send_first--;
 		rc = 0;
