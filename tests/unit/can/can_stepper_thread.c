@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/cia402/can_stepper.c with its real thread, on the simulated drive's clock: that
- * goes on when both threads sleep, to the time for which the first of them waits. So the order is
- * the same every time, and no time of the computer counts.
+ * lib/device/can/cia402/can_stepper.c with its real thread, on the simulated drive's clock.
  */
 #include <stdarg.h>
 #include <stddef.h>
@@ -10,98 +8,14 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <math.h>
-#include <pthread.h>
-#include <time.h>
+#include "../virtual_time.h"
 #include "rig.h"
 
 static struct can_rig rig;
 
-/* The test's own thread, and the stepper's. */
-static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
-static pthread_cond_t woken = PTHREAD_COND_INITIALIZER;
-static struct {
-	bool lives, sleeps;
-	int64_t until_ns;
-} threads[2] = {{.lives = true}};
-static _Thread_local int self;
-static void *(*thread_run)(void *argument);
-
-/* If all sleep, let time go on, and wake those who waited for that. */
-static void advance(void)
+static void advance(int64_t now_ns)
 {
-	int64_t next = INT64_MAX;
-
-	for (int i = 0; i < 2; i++) {
-		if (threads[i].lives && !threads[i].sleeps)
-			return;
-		if (threads[i].lives && threads[i].until_ns < next)
-			next = threads[i].until_ns;
-	}
-	if (next == INT64_MAX)
-		return;
-	if (next > rig.drive.now_ns)
-		drive_advance(&rig.drive, next - rig.drive.now_ns);
-	for (int i = 0; i < 2; i++)
-		threads[i].sleeps &= threads[i].until_ns > rig.drive.now_ns;
-	pthread_cond_broadcast(&woken);
-}
-
-static void sleep_until(int64_t t_ns)
-{
-	pthread_mutex_lock(&lock);
-	threads[self].sleeps = true;
-	threads[self].until_ns = t_ns;
-	advance();
-	while (threads[self].sleeps)
-		pthread_cond_wait(&woken, &lock);
-	pthread_mutex_unlock(&lock);
-}
-
-int __wrap_clock_nanosleep(clockid_t clock, int flags, const struct timespec *t,
-			   struct timespec *left)
-{
-	assert_int_equal(flags, TIMER_ABSTIME);
-	sleep_until(t->tv_sec * 1000000000LL + t->tv_nsec);
-	return 0;
-}
-
-static void *start(void *argument)
-{
-	self = 1;
-	thread_run(argument);
-	pthread_mutex_lock(&lock);
-	threads[1].lives = false;
-	pthread_mutex_unlock(&lock);
-	return NULL;
-}
-
-int __real_pthread_create(pthread_t *thread, const pthread_attr_t *attr,
-			  void *(*run)(void *), void *argument);
-
-int __wrap_pthread_create(pthread_t *thread, const pthread_attr_t *attr,
-			  void *(*run)(void *), void *argument)
-{
-	thread_run = run;
-	threads[1].lives = true;
-	threads[1].sleeps = false;
-	return __real_pthread_create(thread, attr, start, argument);
-}
-
-int __real_pthread_join(pthread_t thread, void **result);
-
-/* Time goes on for the other one meanwhile. */
-int __wrap_pthread_join(pthread_t thread, void **result)
-{
-	int rc;
-
-	pthread_mutex_lock(&lock);
-	threads[0].sleeps = true;
-	threads[0].until_ns = INT64_MAX;
-	advance();
-	pthread_mutex_unlock(&lock);
-	rc = __real_pthread_join(thread, result);
-	threads[0].sleeps = false;
-	return rc;
+	drive_advance(&rig.drive, now_ns - rig.drive.now_ns);
 }
 
 /* For a frame: it can only be sent in a tick of the drive. */
@@ -111,7 +25,7 @@ static int wait_frame(struct can_bus *bus, int64_t until_ns)
 
 	while (d->now_ns < until_ns &&
 	       !(d->queued && d->queue[d->head].at_ns <= d->now_ns))
-		sleep_until(d->now_ns + DRIVE_TICK_NS);
+		virtual_sleep_until(d->now_ns + DRIVE_TICK_NS);
 	return 0;
 }
 
@@ -126,6 +40,7 @@ static struct incise_stepper *open_stepper(struct incise_error *err)
 		.actuator = &rig.actuator,
 	};
 
+	virtual_time_start(rig.drive.now_ns, advance);
 	ops = *rig.drive.bus.ops;
 	ops.wait = wait_frame;
 	rig.drive.bus.ops = &ops;
@@ -134,7 +49,7 @@ static struct incise_stepper *open_stepper(struct incise_error *err)
 
 static void nap(int64_t ns)
 {
-	sleep_until(rig.drive.now_ns + ns);
+	virtual_sleep_until(rig.drive.now_ns + ns);
 }
 
 static void it_runs_and_lends_the_bus(void **state)
