@@ -48,8 +48,7 @@ static void a_drive_is_listed_with_what_it_is(void **state)
 				 0);
 		assert_int_equal(list.n, 1);
 		assert_string_equal(list.device[0].device, "can:can-test:0x10");
-		assert_string_equal(list.device[0].what,
-				    "simulated drive: switch-on disabled");
+		assert_string_equal(list.device[0].what, "SIM1: switch-on disabled");
 		assert_string_equal(property(&list.device[0], "vendor_id"), "0x00000286");
 		assert_string_equal(property(&list.device[0], "serial"), "0x00001267");
 		assert_string_equal(property(&list.device[0], "drive_state"),
@@ -88,7 +87,7 @@ static void what_is_no_drive_is_listed_too(void **state)
 
 	can_rig_init(&rig);
 	rig.drive.od[OD_TYPE].value = 0x000f0191;
-	rig.drive.name = NULL;
+	drive_lacks(&rig.drive, 0x1008, 0);
 	assert_int_equal(can_stepper_scan(&can_rig_of, "can-test", found, &list, &err),
 			 0);
 	assert_int_equal(list.n, 1);

@@ -143,10 +143,8 @@ static void reboot(struct drive *d, bool on)
 		drive_reboot(d);
 }
 
-/* This side detects it before the drive does. */
 static void blocked(struct drive *d, bool on)
 {
-	d->od[OD_FOLLOWING].size = on ? 0 : 4;
 	d->blocked = on;
 }
 

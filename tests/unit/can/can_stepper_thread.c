@@ -8,7 +8,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <math.h>
-#include "../virtual_time.h"
+#include "../virtual_time.h" /* with __wrap_clock_gettime() and others */
 #include "rig.h"
 
 static struct can_rig rig;

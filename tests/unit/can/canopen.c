@@ -272,42 +272,6 @@ static void test_numbers(void **state)
 	assert_int_equal(w->master.abort, 0);
 }
 
-static void test_text(void **state)
-{
-	static const struct {
-		const char *name;
-		size_t size;
-		const char *text;
-	} cases[] = {
-		{"simulated drive", 64, "simulated drive"},
-		{"7 chars", 64, "7 chars"},
-		{"14 characters.", 64, "14 characters."},
-		{"", 64, ""},
-		{"a", 64, "a"},
-		{"new\nline \xc3\xa4 \x7f", 64, "new?line ?? ?"},
-		{"simulated drive", 8, "simulat"},
-		{"simulated drive", 9, "simulate"},
-		{"simulated drive", 2, "s"},
-		{"simulated drive", 1, ""},
-	};
-	struct world *w = *state;
-	char text[65];
-	uint32_t value;
-
-	for (size_t i = 0; i < COUNT(cases); i++) {
-		memset(text, 'x', sizeof(text));
-		w->drive.name = cases[i].name;
-		assert_int_equal(
-			canopen_read_text(&w->master, 0x1008, 0, text, cases[i].size), 0);
-		assert_string_equal(text, cases[i].text);
-		/* The next request works. */
-		assert_int_equal(canopen_read(&w->master, 0x1000, 0, 4, &value), 0);
-	}
-	w->drive.name = NULL;
-	assert_int_equal(canopen_read_text(&w->master, 0x1008, 0, text, 64), -EREMOTEIO);
-	assert_string_equal(text, "");
-}
-
 static void test_silence(void **state)
 {
 	struct world *w = *state;
@@ -424,28 +388,40 @@ static void test_segments(void **state)
 {
 	static const struct {
 		const char *answers;
+		size_t size;
 		int rc;
 		const char *text;
 	} cases[] = {
-		/* Nine letters: "ofwords" and "12". */
-		{"590#4108100009000000 590#006F66776F726473 590#1B31327878787878", 0,
+		/* Nine letters: "ofwords" and "12"; seven; none. */
+		{"590#4108100009000000 590#006F66776F726473 590#1B31327878787878", 64, 0,
 		 "ofwords12"},
+		{"590#4108100007000000 590#016F66776F726473", 64, 0, "ofwords"},
+		{"590#4108100000000000 590#0F00000000000000", 64, 0, ""},
+		/* There is less room. */
+		{"590#4108100009000000 590#006F66776F726473 590#1B31327878787878", 9, 0,
+		 "ofwords1"},
+		{"590#4108100009000000 590#006F66776F726473 590#1B31327878787878", 8, 0,
+		 "ofwords"},
+		{"590#4108100009000000 590#006F66776F726473", 2, 0, "o"},
+		{"590#4108100009000000 590#006F66776F726473", 1, 0, ""},
+		/* LF, an umlaut, a space and DEL. */
+		{"590#4108100006000000 590#03610AC3A4207F00", 64, 0, "a??? ?"},
 		/* The toggle bit stays, or is set at first. */
-		{"590#4108100009000000 590#006F66776F726473 590#0B31327878787878",
+		{"590#4108100009000000 590#006F66776F726473 590#0B31327878787878", 64,
 		 -EPROTO, ""},
-		{"590#4108100009000000 590#106F66776F726473 590#0B31327878787878",
+		{"590#4108100009000000 590#106F66776F726473 590#0B31327878787878", 64,
 		 -EPROTO, ""},
 		/* Nothing in it, and not the last. */
-		{"590#4108100009000000 590#0E6F66776F726473 590#1B31327878787878",
+		{"590#4108100009000000 590#0E6F66776F726473 590#1B31327878787878", 64,
 		 -EPROTO, ""},
-		/* It aborts half-way. */
-		{"590#4108100009000000 590#006F66776F726473 590#8008100000000008",
+		/* It aborts half-way, or at once. */
+		{"590#4108100009000000 590#006F66776F726473 590#8008100000000008", 64,
 		 -EREMOTEIO, ""},
+		{"590#8008100000000206", 64, -EREMOTEIO, ""},
 		/* Expedited: "wxyz". */
-		{"590#430810007778797A 590#017A7A7A7A7A7A7A 590#017A7A7A7A7A7A7A", 0,
-		 "wxyz"},
+		{"590#430810007778797A 590#017A7A7A7A7A7A7A", 64, 0, "wxyz"},
 		/* Another client's answer between; "zzz", 0, and more. */
-		{"590#4108100009000000 590#6008100000000000 590#097A7A7A007A7A7A", 0,
+		{"590#4108100009000000 590#6008100000000000 590#097A7A7A007A7A7A", 64, 0,
 		 "zzz"},
 	};
 	struct world *w = *state;
@@ -455,10 +431,14 @@ static void test_segments(void **state)
 	for (size_t i = 0; i < COUNT(cases); i++) {
 		canopen_await(&w->master, NULL, w->drive.now_ns + 50 * DRIVE_MS);
 		script(w, cases[i].answers);
+		memset(text, 'x', sizeof(text));
 		assert_int_equal(canopen_read_text(&w->master, 0x1008, 0, text,
-						   sizeof(text)),
+						   cases[i].size),
 				 cases[i].rc);
 		assert_string_equal(text, cases[i].text);
+		/* The second of the segments is requested with the toggle bit. */
+		if (!i)
+			assert_int_equal(w->drive.command, 0x70);
 	}
 }
 
@@ -558,7 +538,6 @@ int main(void)
 		cmocka_unit_test_setup(test_nmt, setup),
 		cmocka_unit_test_setup(test_await, setup),
 		cmocka_unit_test_setup(test_numbers, setup),
-		cmocka_unit_test_setup(test_text, setup),
 		cmocka_unit_test_setup(test_silence, setup),
 		cmocka_unit_test_setup(test_bus, setup),
 		cmocka_unit_test_setup(test_answers, setup),

@@ -428,7 +428,7 @@ static void test_identify(void **state)
 
 	assert_int_equal(cia402_identify(&led->client), 0);
 	/* All other objects may be absent. */
-	led->drive.name = NULL;
+	drive_lacks(&led->drive, 0x1008, 0);
 	drive_lacks(&led->drive, 0x1018, -1);
 	drive_lacks(&led->drive, 0x6502, -1);
 	assert_int_equal(cia402_identify(&led->client), 0);

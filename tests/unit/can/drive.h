@@ -35,9 +35,7 @@
 #define DRIVE_QUEUE 256
 #define DRIVE_LATENCY_NS 200000 /* of an answer */
 
-#define ABORT_TOGGLE 0x05030000
 #define ABORT_TIMEOUT 0x05040000
-#define ABORT_COMMAND 0x05040001
 #define ABORT_ACCESS 0x06010000
 #define ABORT_READ_ONLY 0x06010002
 #define ABORT_NO_OBJECT 0x06020000
@@ -72,6 +70,7 @@ enum { R_ = 1, W_ = 2, RW = 3, MAPPED = 4, OF_NODE = 8 /* its id is added */ };
 	X(SYNC_PERIOD, 0x1006, 0, 4, RW, 0)                                       \
 	X(SYNC_WINDOW, 0x1007, 0, 4, RW, 0)                                       \
 	X(EMCY_ID, 0x1014, 0, 4, RW | OF_NODE, 0x80)                              \
+	X(NAME, 0x1008, 0, 4, R_, 0x314d4953)                                     \
 	X(CONSUMER, 0x1016, 1, 4, RW, 0)                                          \
 	X(HEARTBEAT, 0x1017, 0, 2, RW, 0)                                         \
 	X(VENDOR, 0x1018, 1, 4, R_, 0x286)                                        \
@@ -155,7 +154,6 @@ struct drive {
 	struct drive_object od[OD_N];
 
 	/* Properties; drive_init() sets usual ones, a test may change them. */
-	const char *name;	 /* 1008; NULL: it has none */
 	int64_t latency_ns;	 /* of what it sends */
 	int64_t enable_ns;	 /* from "enable" to operation enabled: a brake */
 	double torque_counts_s2; /* CST: acceleration per ‰ … */
@@ -197,10 +195,11 @@ struct drive {
 	bool tripped;
 	uint64_t enabled_unasked;
 	double position, velocity;
-	double fastest, hardest; /* largest |velocity|, |acceleration| that it made */
+	double fastest; /* largest |velocity| that it made */
 	/* Of set-points that were applied while enabled. */
 	int32_t least_target, most_target;
 	uint32_t master_abort; /* code of the last SDO abort by the master */
+	uint8_t command;       /* of the last SDO request */
 	uint16_t aborted;      /* index of the last object whose SDO was aborted */
 	uint64_t master_beats;
 
@@ -210,14 +209,12 @@ struct drive {
 	struct can_filter filters[16];
 	int filters_n; /* 0: all */
 	int64_t tick_ns, heartbeat_ns, consumer_ns, inhibit_ns, timer_ns, enabled_at_ns;
-	bool watching, enabling, own_stop, homed, homing, homing_error;
+	bool watching, enabling, homed, homing, homing_error;
 	bool had_reset_bit, had_home_bit, booted;
 	struct can_frame rpdo; /* waits for a SYNC; of length 0: none */
 	uint32_t sent_inputs;
 	double origin; /* of the position, in the machine */
-	double target, off_ms;
-	size_t segment_at;
-	bool segmented, segment_toggle;
+	double target;
 };
 
 /* --- objects --- */
@@ -330,7 +327,6 @@ static inline void drive_enter(struct drive *d, enum cia402_state state)
 		d->least_target = INT32_MAX;
 		d->most_target = INT32_MIN;
 		d->target = d->position;
-		d->off_ms = 0;
 		d->od[OD_TARGET_VELOCITY].value = d->od[OD_TORQUE].value = 0;
 	} else {
 		d->homing = d->enabling = false;
@@ -352,7 +348,6 @@ static inline void drive_fault(struct drive *d, uint16_t code)
 static inline void drive_quick_stop(struct drive *d, bool by_itself)
 {
 	d->tripped |= by_itself;
-	d->own_stop = by_itself;
 	if (d->state == CIA402_ENABLED && d->od[OD_QUICK_STOP_OPTION].value)
 		drive_enter(d, CIA402_QUICK_STOP);
 	else if (d->state != CIA402_FAULT && d->state != CIA402_QUICK_STOP)
@@ -387,9 +382,6 @@ static inline void drive_control(struct drive *d, uint16_t word)
 			d->enabled_at_ns = d->now_ns + d->enable_ns;
 		d->state = CIA402_SWITCHED_ON;
 		d->enabling = true;
-	} else if (d->state == CIA402_QUICK_STOP && !d->own_stop &&
-		   drive_signed(d, OD_QUICK_STOP_OPTION) >= 5) {
-		drive_enter(d, CIA402_ENABLED);
 	}
 }
 
@@ -409,7 +401,6 @@ static inline uint16_t drive_statusword(const struct drive *d)
 		word |= d->homing_error ? CIA402_FOLLOWING_ERROR : 0;
 	} else if (d->state == CIA402_ENABLED) {
 		word |= CIA402_HOMED; /* follows its targets */
-		word |= d->off_ms > 0 ? CIA402_FOLLOWING_ERROR : 0;
 	}
 	return (uint16_t)word;
 }
@@ -500,18 +491,6 @@ static inline double drive_wanted(struct drive *d, double dt)
 	return to == d->position + v * dt ? v : (to - d->position) / dt;
 }
 
-static inline void drive_watch_following(struct drive *d)
-{
-	if (drive_signed(d, OD_MODE_NOW) != CIA402_CSP || !d->od[OD_FOLLOWING].size ||
-	    fabs(d->target - d->position) <= d->od[OD_FOLLOWING].value) {
-		d->off_ms = 0;
-		return;
-	}
-	d->off_ms += DRIVE_TICK_NS / 1e6;
-	if (d->off_ms > d->od[OD_FOLLOWING_TIME].value)
-		drive_fault(d, 0x8611);
-}
-
 static inline void drive_turn(struct drive *d)
 {
 	double dt = DRIVE_TICK_NS / 1e9, before = d->velocity, v = 0, most;
@@ -528,13 +507,9 @@ static inline void drive_turn(struct drive *d)
 	d->velocity = d->blocked ? 0 : v;
 	d->position += d->velocity * dt;
 	d->fastest = fmax(d->fastest, fabs(v));
-	if (d->state == CIA402_QUICK_STOP && !d->blocked)
-		d->hardest = fmax(d->hardest, fabs(v - before) / dt);
 	if (d->state == CIA402_QUICK_STOP && v == 0 &&
 	    drive_signed(d, OD_QUICK_STOP_OPTION) < 5)
 		drive_enter(d, CIA402_DISABLED);
-	if (d->state == CIA402_ENABLED)
-		drive_watch_following(d);
 }
 
 static inline void drive_move(struct drive *d)
@@ -728,44 +703,18 @@ static inline void drive_abort(struct drive *d, const uint8_t request[8], uint32
 	uint8_t bytes[8] = {0x80, request[1], request[2], request[3]};
 
 	d->aborted = (uint16_t)(request[1] | request[2] << 8);
-	d->segmented = false;
 	memcpy(bytes + 4, &code, 4);
-	drive_answer(d, bytes);
-}
-
-static inline void drive_segment(struct drive *d, const uint8_t request[8])
-{
-	size_t left = d->segmented ? strlen(d->name) - d->segment_at : 0;
-	size_t n = left < 7 ? left : 7;
-	uint8_t bytes[8] = {0};
-
-	if (!d->segmented || !!(request[0] & 0x10) != d->segment_toggle) {
-		drive_abort(d, request, d->segmented ? ABORT_TOGGLE : ABORT_COMMAND);
-		return;
-	}
-	bytes[0] = (uint8_t)((request[0] & 0x10) | (7 - n) << 1 | (n == left));
-	memcpy(bytes + 1, d->name + d->segment_at, n);
-	d->segment_at += n;
-	d->segment_toggle = !d->segment_toggle;
-	d->segmented = n != left;
 	drive_answer(d, bytes);
 }
 
 static inline void drive_upload(struct drive *d, const struct drive_object *o,
 				const uint8_t request[8])
 {
-	uint8_t bytes[8] = {0x41, request[1], request[2], request[3]};
+	uint8_t bytes[8] = {0, request[1], request[2], request[3]};
 
-	if (o) {
-		drive_refresh(d);
-		bytes[0] = (uint8_t)(0x43 | (4 - o->size) << 2);
-		memcpy(bytes + 4, &o->value, o->size); /* little-endian, as here */
-	} else {
-		bytes[4] = (uint8_t)strlen(d->name);
-		d->segmented = true;
-		d->segment_toggle = false;
-		d->segment_at = 0;
-	}
+	drive_refresh(d);
+	bytes[0] = (uint8_t)(0x43 | (4 - o->size) << 2);
+	memcpy(bytes + 4, &o->value, o->size); /* little-endian, as here */
 	drive_answer(d, bytes);
 }
 
@@ -793,15 +742,14 @@ static inline void drive_sdo(struct drive *d, const uint8_t request[8])
 {
 	uint16_t index = (uint16_t)(request[1] | request[2] << 8);
 	struct drive_object *o = drive_object(d, index, request[3]);
-	bool text = index == 0x1008 && !request[3] && d->name;
 	uint32_t code = ABORT_NO_OBJECT;
 
 	if (request[0] == 0x80) {
-		d->segmented = false;
 		memcpy(&d->master_abort, request + 4, 4);
 		return;
 	}
 	d->requests++;
+	d->command = request[0];
 	if (d->requests == d->drop_at || (o && o->lost))
 		return;
 	for (int i = 0; i < OD_N; i++)
@@ -811,9 +759,7 @@ static inline void drive_sdo(struct drive *d, const uint8_t request[8])
 	    (d->abort_index && index == d->abort_index &&
 	     (d->abort_sub < 0 || request[3] == d->abort_sub)))
 		drive_abort(d, request, d->abort_code ? d->abort_code : 0x08000000);
-	else if (request[0] >> 5 == 3)
-		drive_segment(d, request);
-	else if (request[0] == 0x40 && (o || text))
+	else if (request[0] == 0x40 && o)
 		drive_upload(d, o, request);
 	else if ((request[0] & 0xf3) == 0x23 && o)
 		drive_download(d, o, request);
@@ -833,7 +779,7 @@ static inline void drive_reboot(struct drive *d)
 	for (int i = 0; i < OD_N; i++)
 		d->od[i].value = d->od[i].initial;
 	drive_enter(d, CIA402_DISABLED);
-	d->watching = d->own_stop = d->segmented = false;
+	d->watching = false;
 	d->homed = d->absolute;
 	d->homing = d->homing_error = d->had_reset_bit = d->had_home_bit = false;
 	d->rpdo.len = 0;
@@ -1059,7 +1005,6 @@ static inline void drive_init(struct drive *d)
 	d->now_ns = 1000000000;
 	d->tick_ns = d->now_ns + DRIVE_TICK_NS;
 	d->node = DRIVE_NODE;
-	d->name = "simulated drive";
 	d->latency_ns = DRIVE_LATENCY_NS;
 	d->enable_ns = 5 * DRIVE_MS;
 	d->torque_counts_s2 = 100;

@@ -139,31 +139,6 @@ static void reply_frames(void **state)
 	assert_int_equal(polhemus_frame_read(bytes, 1, &f), -1);
 }
 
-static void models(void **state)
-{
-	static const struct {
-		uint16_t vendor, product;
-		bool known, ready;
-	} cases[] = {
-		{0x0f44, 0x0001, true, false},	{0x0f44, 0x0002, true, true},
-		{0x0f44, 0x0003, true, true},	{0x0f44, 0xff12, true, true},
-		{0x0f44, 0xff21, true, false},	{0x0f44, 0xef20, true, true},
-		{0x0f44, 0x1234, false, false}, {0x1d6b, 0x0002, false, false},
-	};
-
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		const struct polhemus_model *m =
-			polhemus_model_find(cases[i].vendor, cases[i].product);
-
-		assert_int_equal(m != NULL, cases[i].known);
-		assert_true(!m || m->ready == cases[i].ready);
-	}
-	/* 120 Hz for all, 240 and 60 for each. */
-	assert_true(polhemus_family_hz(POLHEMUS_FASTRAK, 4) == 120);
-	assert_true(polhemus_family_hz(POLHEMUS_LIBERTY, 2) == 480);
-	assert_true(polhemus_family_hz(POLHEMUS_PATRIOT, 1) == 60);
-}
-
 /* --- polhemus_dialogue --- */
 
 #define MS INT64_C(1000000)
@@ -367,12 +342,11 @@ static void printed(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_status), cmocka_unit_test(numbers),
-		cmocka_unit_test(fields),   cmocka_unit_test(reply_frames),
-		cmocka_unit_test(models),   cmocka_unit_test(draining_ends),
-		cmocka_unit_test(answers),  cmocka_unit_test(long_lines),
-		cmocka_unit_test(frames),   cmocka_unit_test(given_up),
-		cmocka_unit_test(printed),
+		cmocka_unit_test(a_status),	 cmocka_unit_test(numbers),
+		cmocka_unit_test(fields),	 cmocka_unit_test(reply_frames),
+		cmocka_unit_test(draining_ends), cmocka_unit_test(answers),
+		cmocka_unit_test(long_lines),	 cmocka_unit_test(frames),
+		cmocka_unit_test(given_up),	 cmocka_unit_test(printed),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -11,7 +11,7 @@
 #include <errno.h>
 #include <string.h>
 #include "../../../lib/device/polhemus/polhemus_tracker.h"
-#include "../virtual_time.h"
+#include "../virtual_time.h" /* with __wrap_clock_gettime() and others */
 #include "line.h"
 
 #define MS INT64_C(1000000)

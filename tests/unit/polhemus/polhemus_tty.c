@@ -80,9 +80,9 @@ static void there_and_back(void **state)
 	assert_int_equal(line->ops->read(line, bytes, sizeof(bytes), &t_ns, 1), 0);
 	before = t_ns;
 	assert_int_equal(write(master, "01 \r\n", 5), 5);
-	assert_int_equal(line->ops->read(line, bytes, 3, &t_ns, 1000), 3);
+	assert_int_equal(line->ops->read(line, bytes, 3, &t_ns, 20000), 3);
 	assert_true(t_ns > before);
-	assert_int_equal(line->ops->read(line, bytes + 3, 13, &t_ns, 1000), 2);
+	assert_int_equal(line->ops->read(line, bytes + 3, 13, &t_ns, 20000), 2);
 	assert_memory_equal(bytes, "01 \r\n", 5);
 	line->ops->close(line);
 }
@@ -97,7 +97,7 @@ static void pulled_out(void **state)
 	assert_non_null(line);
 	close(master);
 	master = -1;
-	assert_int_equal(line->ops->read(line, bytes, sizeof(bytes), &t_ns, 1000),
+	assert_int_equal(line->ops->read(line, bytes, sizeof(bytes), &t_ns, 20000),
 			 -ENODEV);
 	assert_int_equal(line->ops->write(line, "P", 1), -ENODEV);
 	assert_true(line->ops->reopen(line) < 0);
