@@ -3,11 +3,7 @@
  * lib/device/can/cia402/can_scan.c: a scan finds the nodes of a bus and writes nothing to
  * them.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include "rig.h"
 
 static struct can_rig rig;
@@ -34,7 +30,7 @@ static const char *property(const struct incise_scan_device *device, const char 
 	return "(there is none)";
 }
 
-static void a_drive_is_listed_with_what_it_is(void **state)
+TEST(a_drive_is_listed_with_what_it_is)
 {
 	static const char *const arguments[] = {"can-test", "can-test:0x10"};
 
@@ -64,7 +60,7 @@ static void a_drive_is_listed_with_what_it_is(void **state)
 	}
 }
 
-static void a_fault_is_told(void **state)
+TEST(a_fault_is_told)
 {
 	struct incise_error err = {0};
 	struct list list = {0};
@@ -80,7 +76,7 @@ static void a_fault_is_told(void **state)
 	assert_non_null(strstr(property(&list.device[0], "error"), "(4310h)"));
 }
 
-static void what_is_no_drive_is_listed_too(void **state)
+TEST(what_is_no_drive_is_listed_too)
 {
 	struct incise_error err = {0};
 	struct list list = {0};
@@ -96,7 +92,7 @@ static void what_is_no_drive_is_listed_too(void **state)
 }
 
 /* Missing objects are left out, and a node that stops answering gets no more requests. */
-static void what_is_not_told_is_not_made_up(void **state)
+TEST(what_is_not_told_is_not_made_up)
 {
 	struct incise_error err = {0};
 	struct list list = {0};
@@ -122,7 +118,7 @@ static void what_is_not_told_is_not_made_up(void **state)
 	assert_false(list.device[0].usable);
 }
 
-static void nobody_and_nothing(void **state)
+TEST(nobody_and_nothing)
 {
 	struct incise_error err = {0};
 	struct list list = {0};
@@ -146,17 +142,4 @@ static void nobody_and_nothing(void **state)
 	list.end = 7;
 	assert_int_equal(can_stepper_scan(&can_rig_of, "can-test", found, &list, &err),
 			 7);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_drive_is_listed_with_what_it_is),
-		cmocka_unit_test(a_fault_is_told),
-		cmocka_unit_test(what_is_no_drive_is_listed_too),
-		cmocka_unit_test(what_is_not_told_is_not_made_up),
-		cmocka_unit_test(nobody_and_nothing),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

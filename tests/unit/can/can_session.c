@@ -3,11 +3,7 @@
  * lib/device/can/cia402/can_session.c: how a drive is found and set up, what prevents that, and how a
  * drive is watched.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include "rig.h"
 
@@ -17,7 +13,7 @@
 static struct can_rig rig;
 
 /* The drive refuses or ignores the k-th request of the start, for every k. */
-static void no_step_of_the_start_hangs_or_gives_power(void **state)
+TEST(no_step_of_the_start_hangs_or_gives_power)
 {
 	uint32_t requests;
 
@@ -53,7 +49,7 @@ static void no_step_of_the_start_hangs_or_gives_power(void **state)
 		}
 }
 
-static void why_it_cannot_begin_is_said(void **state)
+TEST(why_it_cannot_begin_is_said)
 {
 	static const struct {
 		const char *arguments;
@@ -95,7 +91,7 @@ static void why_it_cannot_begin_is_said(void **state)
 	}
 }
 
-static void another_master_is_not_disturbed(void **state)
+TEST(another_master_is_not_disturbed)
 {
 	const struct can_frame sync = {.can_id = CANOPEN_SYNC};
 	struct incise_error err = {0};
@@ -109,7 +105,7 @@ static void another_master_is_not_disturbed(void **state)
 }
 
 /* Only an orderly close switches the drive's watch off. */
-static void who_goes_leaves_it_stopped_or_watched(void **state)
+TEST(who_goes_leaves_it_stopped_or_watched)
 {
 	static const struct {
 		bool unplugged, mute;
@@ -136,7 +132,7 @@ static void who_goes_leaves_it_stopped_or_watched(void **state)
 	}
 }
 
-static void a_watcher_looks_and_writes_nothing(void **state)
+TEST(a_watcher_looks_and_writes_nothing)
 {
 	struct incise_stepper_status s;
 	struct incise_error err = {0};
@@ -173,17 +169,4 @@ static void a_watcher_looks_and_writes_nothing(void **state)
 	assert_int_equal(rig.drive.enables, enables);
 	assert_int_equal(rig.drive.master_beats, 0);
 	can_rig_close(&rig);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(who_goes_leaves_it_stopped_or_watched),
-		cmocka_unit_test(no_step_of_the_start_hangs_or_gives_power),
-		cmocka_unit_test(why_it_cannot_begin_is_said),
-		cmocka_unit_test(another_master_is_not_disturbed),
-		cmocka_unit_test(a_watcher_looks_and_writes_nothing),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

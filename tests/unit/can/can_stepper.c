@@ -4,11 +4,7 @@
  * every stepper; each fault, also of drives and buses that fail in part, so that one way of
  * noticing is missing; homing by the drive; and no set-point is lost.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include "../device/conformance.h"
 #include "rig.h"
@@ -33,7 +29,7 @@ static void input(void *world, unsigned int input, bool active)
 	r->drive.inputs = active ? r->drive.inputs | bit : r->drive.inputs & ~bit;
 }
 
-static void every_case_of_a_stepper(void **state)
+TEST(every_case_of_a_stepper)
 {
 	static const struct {
 		bool invert, no_homing;
@@ -257,7 +253,7 @@ static const struct {
 	{"no inputs", no_inputs, LOST, "TPDO2", CSP, 0.1, 10 * 0.4 + 0.2},
 };
 
-static void each_fault_stops_the_drive_and_is_named(void **state)
+TEST(each_fault_stops_the_drive_and_is_named)
 {
 	for (size_t i = 0; i < sizeof(faults) / sizeof(*faults); i++) {
 		struct incise_stepper_status s;
@@ -307,7 +303,7 @@ static void each_fault_stops_the_drive_and_is_named(void **state)
 	can_rig_close(&rig);
 }
 
-static void a_program_that_hangs_is_stopped_by_the_drive(void **state)
+TEST(a_program_that_hangs_is_stopped_by_the_drive)
 {
 	double from_mm;
 
@@ -330,7 +326,7 @@ static void a_program_that_hangs_is_stopped_by_the_drive(void **state)
  * A program that stood still before a drive that ignores a lost master and holds its place:
  * what it is given afterwards moves nothing.
  */
-static void a_program_that_stood_still_does_not_go_on(void **state)
+TEST(a_program_that_stood_still_does_not_go_on)
 {
 	char cause[300];
 	double from_mm;
@@ -353,7 +349,7 @@ static void a_program_that_stood_still_does_not_go_on(void **state)
 }
 
 /* Off the bus, it uses up all the time that a stop has: disabling waits for that. */
-static void disabling_waits_for_the_end_of_a_stop(void **state)
+TEST(disabling_waits_for_the_end_of_a_stop)
 {
 	struct incise_error err = {0};
 
@@ -379,7 +375,7 @@ static uint64_t counter(const char *key)
 }
 
 /* 60 s at 1 kHz, each cycle another target. */
-static void no_set_point_is_lost(void **state)
+TEST(no_set_point_is_lost)
 {
 	uint64_t rpdos, sent;
 	int64_t end;
@@ -411,7 +407,7 @@ static void no_set_point_is_lost(void **state)
 }
 
 /* The loops closed here reach the target within their limits. */
-static void velocities_and_torques_go_there_too(void **state)
+TEST(velocities_and_torques_go_there_too)
 {
 	static const struct {
 		enum incise_actuator_mode mode;
@@ -444,7 +440,7 @@ static void velocities_and_torques_go_there_too(void **state)
 }
 
 /* Another program gives it power. */
-static void power_that_nobody_gave_is_a_fault(void **state)
+TEST(power_that_nobody_gave_is_a_fault)
 {
 	struct incise_error err = {0};
 
@@ -464,7 +460,7 @@ static void power_that_nobody_gave_is_a_fault(void **state)
 }
 
 /* The shortest accepted deadman: it must not expire at rest. */
-static void the_shortest_deadman_holds_at_rest(void **state)
+TEST(the_shortest_deadman_holds_at_rest)
 {
 	struct incise_error err = {0};
 
@@ -483,7 +479,7 @@ static void the_shortest_deadman_holds_at_rest(void **state)
 }
 
 /* Its brake opens while it gets power. */
-static void one_that_gives_way_gets_no_jump(void **state)
+TEST(one_that_gives_way_gets_no_jump)
 {
 	static const double way_mm[] = {-0.3, -2, 0.005};
 
@@ -508,7 +504,7 @@ static void one_that_gives_way_gets_no_jump(void **state)
 	}
 }
 
-static void it_homes_by_itself(void **state)
+TEST(it_homes_by_itself)
 {
 	static const double home_mm[] = {0, -0.5, 1.5};
 
@@ -548,7 +544,7 @@ static void it_homes_by_itself(void **state)
 	}
 }
 
-static void homing_can_fail_and_be_stopped(void **state)
+TEST(homing_can_fail_and_be_stopped)
 {
 	volatile int stop = 0;
 	struct incise_error err = {0};
@@ -585,24 +581,4 @@ static void homing_can_fail_and_be_stopped(void **state)
 	assert_int_equal(can_rig_look(&rig).faults, 0);
 	can_rig_enable_or_fail(&rig);
 	can_rig_close(&rig);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(every_case_of_a_stepper),
-		cmocka_unit_test(each_fault_stops_the_drive_and_is_named),
-		cmocka_unit_test(a_program_that_hangs_is_stopped_by_the_drive),
-		cmocka_unit_test(a_program_that_stood_still_does_not_go_on),
-		cmocka_unit_test(disabling_waits_for_the_end_of_a_stop),
-		cmocka_unit_test(no_set_point_is_lost),
-		cmocka_unit_test(velocities_and_torques_go_there_too),
-		cmocka_unit_test(power_that_nobody_gave_is_a_fault),
-		cmocka_unit_test(the_shortest_deadman_holds_at_rest),
-		cmocka_unit_test(one_that_gives_way_gets_no_jump),
-		cmocka_unit_test(it_homes_by_itself),
-		cmocka_unit_test(homing_can_fail_and_be_stopped),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 /*
  * lib/device/can/cia402/can_stepper.c with its real thread, on the simulated drive's clock.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include "../virtual_time.h" /* with __wrap_clock_gettime() and others */
 #include "rig.h"
@@ -52,7 +48,7 @@ static void nap(int64_t ns)
 	virtual_sleep_until(rig.drive.now_ns + ns);
 }
 
-static void it_runs_and_lends_the_bus(void **state)
+TEST(it_runs_and_lends_the_bus)
 {
 	struct incise_stepper_status s = {0};
 	struct incise_error err = {0};
@@ -85,7 +81,7 @@ static void it_runs_and_lends_the_bus(void **state)
 	assert_int_equal(rig.drive.enabled_unasked, 0);
 }
 
-static void a_watcher_has_a_thread_too(void **state)
+TEST(a_watcher_has_a_thread_too)
 {
 	struct incise_stepper_status s = {0};
 	struct incise_error err = {0};
@@ -103,14 +99,4 @@ static void a_watcher_has_a_thread_too(void **state)
 	incise_stepper_status(rig.stepper, &s);
 	assert_true(s.t_ns > t_ns);
 	rig.stepper->ops->close(rig.stepper);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(it_runs_and_lends_the_bus),
-		cmocka_unit_test(a_watcher_has_a_thread_too),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

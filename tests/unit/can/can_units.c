@@ -3,11 +3,7 @@
  * lib/device/can/cia402/can_units.c: rig.conf in the units of a drive, compared with
  * figures made by hand; the load of the bus, with frames that are stuffed here bit by bit.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include "../../../lib/device/can/cia402/can_units.h"
 #include "rig.h"
@@ -28,7 +24,7 @@ static void make(struct can_session *session, double counts_per_turn,
 	session->client = (struct cia402_client){&session->master, "here", err};
 }
 
-static void steps_are_as_fine_as_may_be(void **state)
+TEST(steps_are_as_fine_as_may_be)
 {
 	static const struct {
 		double counts_per_turn, velocity_mm_s;
@@ -63,7 +59,7 @@ static void steps_are_as_fine_as_may_be(void **state)
 	}
 }
 
-static void limits_are_the_drives_with_room(void **state)
+TEST(limits_are_the_drives_with_room)
 {
 	struct incise_error err = {0};
 	struct can_session session;
@@ -100,7 +96,7 @@ static void limits_are_the_drives_with_room(void **state)
 }
 
 /* 1 kHz fits at 500 kbit/s, not at 250. */
-static void a_bus_that_is_too_slow_is_refused(void **state)
+TEST(a_bus_that_is_too_slow_is_refused)
 {
 	static const struct {
 		uint32_t bitrate, cycle_ns;
@@ -151,7 +147,7 @@ static uint32_t stuffed_by_hand(unsigned int bytes)
 	return sent + 1 + 1 + 1 + 7 + 3; /* delimiters, acknowledge, end, gap */
 }
 
-static void the_load_is_that_of_stuffed_frames(void **state)
+TEST(the_load_is_that_of_stuffed_frames)
 {
 	static const struct {
 		uint32_t cycle_ns;
@@ -180,23 +176,10 @@ static void the_load_is_that_of_stuffed_frames(void **state)
 				 cases[i].load);
 }
 
-static void whole_units(void **state)
+TEST(whole_units)
 {
 	assert_int_equal(can_units_whole(0), 1);
 	assert_int_equal(can_units_whole(0.2), 1);
 	assert_int_equal(can_units_whole(1.2), 2);
 	assert_int_equal(can_units_whole(1e300), UINT32_MAX);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(steps_are_as_fine_as_may_be),
-		cmocka_unit_test(limits_are_the_drives_with_room),
-		cmocka_unit_test(a_bus_that_is_too_slow_is_refused),
-		cmocka_unit_test(the_load_is_that_of_stuffed_frames),
-		cmocka_unit_test(whole_units),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * lib/device/can/canopen/canopen.c with a simulated drive as the node: frames, heartbeats and NMT;
  * SDOs, with all the answers a node can give; the texts of codes.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <stdio.h>
 #include <string.h>
 #include "../../../lib/device/can/canopen/canopen.h"
@@ -56,7 +52,7 @@ static uint32_t handle(struct world *w, const char *text)
 }
 
 /* The function of each frame, and whether another master sent it. Node 10h, this side 7Fh. */
-static void test_functions(void **state)
+TEST(test_functions, setup)
 {
 	static const struct {
 		const char *frame;
@@ -101,7 +97,7 @@ static void test_functions(void **state)
 }
 
 /* Frames one after the other, and what is known after each. */
-static void test_reports(void **state)
+TEST(test_reports, setup)
 {
 	static const struct {
 		const char *frame;
@@ -146,7 +142,7 @@ static void test_reports(void **state)
 }
 
 /* This side's heartbeat: on time, not made up for, tried again when the queue was full. */
-static void test_own_heartbeat(void **state)
+TEST(test_own_heartbeat, setup)
 {
 	struct world *w = *state;
 	int64_t t = w->drive.now_ns;
@@ -182,7 +178,7 @@ static void test_own_heartbeat(void **state)
 	assert_int_equal(w->drive.master_beats, 52);
 }
 
-static void test_nmt(void **state)
+TEST(test_nmt, setup)
 {
 	struct world *w = *state;
 
@@ -202,7 +198,7 @@ static bool operational(const struct canopen *master)
 	return master->state == CANOPEN_OPERATIONAL;
 }
 
-static void test_await(void **state)
+TEST(test_await, setup)
 {
 	struct world *w = *state;
 	int64_t t = w->drive.now_ns;
@@ -241,7 +237,7 @@ static void test_await(void **state)
 	assert_int_equal(canopen_await(&w->master, NULL, t + 200 * DRIVE_MS), -ENETDOWN);
 }
 
-static void test_numbers(void **state)
+TEST(test_numbers, setup)
 {
 	struct world *w = *state;
 	uint32_t value = 0;
@@ -272,7 +268,7 @@ static void test_numbers(void **state)
 	assert_int_equal(w->master.abort, 0);
 }
 
-static void test_silence(void **state)
+TEST(test_silence, setup)
 {
 	struct world *w = *state;
 	int64_t t = w->drive.now_ns;
@@ -298,7 +294,7 @@ static void test_silence(void **state)
 	assert_int_equal(value, 0x286);
 }
 
-static void test_bus(void **state)
+TEST(test_bus, setup)
 {
 	struct world *w = *state;
 	int64_t t = w->drive.now_ns;
@@ -344,7 +340,7 @@ static void script(struct world *w, const char *answers)
 	w->drive.latency_ns = DRIVE_LATENCY_NS;
 }
 
-static void test_answers(void **state)
+TEST(test_answers, setup)
 {
 	static const struct {
 		const char *answer;
@@ -384,7 +380,7 @@ static void test_answers(void **state)
 	assert_int_equal(canopen_write(&w->master, 0x1000, 0, 4, 1), -EPROTO);
 }
 
-static void test_segments(void **state)
+TEST(test_segments, setup)
 {
 	static const struct {
 		const char *answers;
@@ -452,7 +448,7 @@ static const uint32_t aborts[] = {
 	0x08000024,
 };
 
-static void test_aborts(void **state)
+TEST(test_aborts)
 {
 	char text[100], other[100], number[20];
 
@@ -475,7 +471,7 @@ static void test_aborts(void **state)
 	assert_non_null(strstr(text, "not in CiA 301"));
 }
 
-static void test_emcys(void **state)
+TEST(test_emcys)
 {
 	static const struct {
 		uint16_t code;
@@ -501,7 +497,7 @@ static void test_emcys(void **state)
 }
 
 /* Any code in any size: the text ends with 0 and has the code. */
-static void test_all_emcys(void **state)
+TEST(test_all_emcys)
 {
 	char text[100], number[12];
 
@@ -519,7 +515,7 @@ static void test_all_emcys(void **state)
 	}
 }
 
-static void test_states(void **state)
+TEST(test_states)
 {
 	assert_string_equal(canopen_state_name(CANOPEN_PRE_OPERATIONAL),
 			    "pre-operational");
@@ -527,26 +523,4 @@ static void test_states(void **state)
 	assert_string_equal(canopen_state_name(CANOPEN_STOPPED), "stopped");
 	assert_string_equal(canopen_state_name(CANOPEN_BOOT_UP), "booting");
 	assert_string_equal(canopen_state_name(CANOPEN_UNKNOWN), "not heard");
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup(test_functions, setup),
-		cmocka_unit_test_setup(test_reports, setup),
-		cmocka_unit_test_setup(test_own_heartbeat, setup),
-		cmocka_unit_test_setup(test_nmt, setup),
-		cmocka_unit_test_setup(test_await, setup),
-		cmocka_unit_test_setup(test_numbers, setup),
-		cmocka_unit_test_setup(test_silence, setup),
-		cmocka_unit_test_setup(test_bus, setup),
-		cmocka_unit_test_setup(test_answers, setup),
-		cmocka_unit_test_setup(test_segments, setup),
-		cmocka_unit_test(test_aborts),
-		cmocka_unit_test(test_emcys),
-		cmocka_unit_test(test_all_emcys),
-		cmocka_unit_test(test_states),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

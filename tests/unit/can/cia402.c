@@ -4,11 +4,7 @@
  * units, with those of real drives; cia402_power.c, which never leads to operation enabled.
  * cia402_setup.c has a test of its own.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <float.h>
 #include <string.h>
 #include "led.h"
@@ -56,7 +52,7 @@ static bool matches(uint32_t word, const char *bits)
 	return true;
 }
 
-static void test_states(void **state)
+TEST(test_states)
 {
 	for (uint32_t word = 0; word <= UINT16_MAX; word++) {
 		enum cia402_state expected = CIA402_UNKNOWN;
@@ -76,7 +72,7 @@ static void test_states(void **state)
 	}
 }
 
-static void test_names(void **state)
+TEST(test_names)
 {
 	for (int i = 0; i <= CIA402_UNKNOWN; i++)
 		for (int j = 0; j < i; j++)
@@ -93,7 +89,7 @@ static void test_names(void **state)
 	assert_string_equal(cia402_mode_name(INT32_MAX), "unknown");
 }
 
-static void test_pack_rpdo(void **state)
+TEST(test_pack_rpdo)
 {
 	static const struct {
 		enum cia402_mode mode;
@@ -119,7 +115,7 @@ static void test_pack_rpdo(void **state)
 	}
 }
 
-static void test_parse_tpdos(void **state)
+TEST(test_parse_tpdos)
 {
 	struct can_frame frame = {.can_id = 0x190, .len = 6};
 	uint32_t inputs = 7;
@@ -168,7 +164,7 @@ static const struct cia402_object word = {0x605a, 0, 2, "quick-stop option"};
 static const struct cia402_object absent = {0x2000, 3, 4, "nothing"};
 
 /* The message has the place in rig.conf, the object and the reason. */
-static void test_messages(void **state)
+TEST(test_messages, setup)
 {
 	static const struct {
 		int rc, expected;
@@ -192,7 +188,7 @@ static void test_messages(void **state)
 	}
 }
 
-static void test_objects(void **state)
+TEST(test_objects, setup)
 {
 	struct led *led = *state;
 	struct drive_object *o = drive_object(&led->drive, 0x605a, 0);
@@ -237,7 +233,7 @@ static bool never(enum cia402_state state)
 	return false;
 }
 
-static void test_await_state(void **state)
+TEST(test_await_state, setup)
 {
 	struct led *led = *state;
 	enum cia402_state last = CIA402_UNKNOWN;
@@ -291,7 +287,7 @@ static void assert_near(double is, double expected)
 	assert_true(fabs(is - expected) <= ROUNDING * expected);
 }
 
-static void test_units(void **state)
+TEST(test_units, setup)
 {
 	static const struct {
 		const char *what;
@@ -360,7 +356,7 @@ static void test_units(void **state)
 	}
 }
 
-static void test_refused_units(void **state)
+TEST(test_refused_units, setup)
 {
 	static const struct {
 		struct factors factors;
@@ -407,7 +403,7 @@ static void test_refused_units(void **state)
 }
 
 /* Units from rig.conf are not read. */
-static void test_given(void **state)
+TEST(test_given, setup)
 {
 	struct cia402_units units = {200, 60, 1};
 	struct led *led = *state;
@@ -422,7 +418,7 @@ static void test_given(void **state)
 	assert_true(units.velocity_per_turn_s == 51200); /* its own increments/s */
 }
 
-static void test_identify(void **state)
+TEST(test_identify, setup)
 {
 	struct led *led = *state;
 
@@ -447,7 +443,7 @@ static void test_identify(void **state)
 
 /* --- power --- */
 
-static void test_power_off(void **state)
+TEST(test_power_off, setup)
 {
 	struct led *led = *state;
 	struct drive *d = &led->drive;
@@ -476,7 +472,7 @@ static void test_power_off(void **state)
 	assert_int_equal(cia402_power_off(&led->client), -ETIMEDOUT);
 }
 
-static void test_clear(void **state)
+TEST(test_clear, setup)
 {
 	struct led *led = *state;
 	struct drive *d = &led->drive;
@@ -517,7 +513,7 @@ static void test_clear(void **state)
 }
 
 /* The k-th SDO is refused or lost: it ends with a message, and never with power. */
-static void test_every_step_of_clear(void **state)
+TEST(test_every_step_of_clear, setup)
 {
 	struct led *led = *state;
 
@@ -541,7 +537,7 @@ static void test_every_step_of_clear(void **state)
 		}
 }
 
-static void test_set_mode(void **state)
+TEST(test_set_mode, setup)
 {
 	struct led *led = *state;
 	struct drive *d = &led->drive;
@@ -566,7 +562,7 @@ static bool homed(struct led *led, int rc)
 	return is;
 }
 
-static void test_homes(void **state)
+TEST(test_homes, setup)
 {
 	struct led *led = *state;
 	struct drive *d = &led->drive;
@@ -603,7 +599,7 @@ static void test_homes(void **state)
 }
 
 /* All three bits count. */
-static void test_homed_bits(void **state)
+TEST(test_homed_bits, setup)
 {
 	struct led *led = *state;
 	struct drive *d = &led->drive;
@@ -617,7 +613,7 @@ static void test_homed_bits(void **state)
 	}
 }
 
-static void test_homing_fails(void **state)
+TEST(test_homing_fails, setup)
 {
 	struct led *led = *state;
 	struct drive *d = &led->drive;
@@ -639,30 +635,4 @@ static void test_homing_fails(void **state)
 	drive_set(d, 0x6502, 0, 0x380);
 	assert_false(homed(led, -EOPNOTSUPP));
 	assert_int_equal(d->od[OD_MODE].value, CIA402_CSP);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_states),
-		cmocka_unit_test(test_names),
-		cmocka_unit_test(test_pack_rpdo),
-		cmocka_unit_test(test_parse_tpdos),
-		cmocka_unit_test_setup(test_messages, setup),
-		cmocka_unit_test_setup(test_objects, setup),
-		cmocka_unit_test_setup(test_await_state, setup),
-		cmocka_unit_test_setup(test_units, setup),
-		cmocka_unit_test_setup(test_refused_units, setup),
-		cmocka_unit_test_setup(test_given, setup),
-		cmocka_unit_test_setup(test_identify, setup),
-		cmocka_unit_test_setup(test_power_off, setup),
-		cmocka_unit_test_setup(test_clear, setup),
-		cmocka_unit_test_setup(test_every_step_of_clear, setup),
-		cmocka_unit_test_setup(test_set_mode, setup),
-		cmocka_unit_test_setup(test_homes, setup),
-		cmocka_unit_test_setup(test_homed_bits, setup),
-		cmocka_unit_test_setup(test_homing_fails, setup),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,11 +4,7 @@
  * sends only what is for this side; a failure at any step ends with a message, in bounded time and
  * without power.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <stdio.h>
 #include "led.h"
 
@@ -23,7 +19,7 @@ static int setup(void **state)
 	return 0;
 }
 
-static void test_objects(void **state)
+TEST(test_objects, setup)
 {
 	static const struct {
 		uint16_t index;
@@ -74,7 +70,7 @@ static void test_objects(void **state)
 }
 
 /* Optional and required objects. */
-static void test_absences(void **state)
+TEST(test_absences, setup)
 {
 	static const struct {
 		uint16_t index;
@@ -142,7 +138,7 @@ static void test_absences(void **state)
 }
 
 /* An object that takes a write and forgets it. */
-static void test_not_kept(void **state)
+TEST(test_not_kept, setup)
 {
 	static const enum drive_object_name cases[] = {
 		OD_CONSUMER,
@@ -183,7 +179,7 @@ static void test_not_kept(void **state)
 
 #define FIELD(field) offsetof(struct led, field), sizeof(((struct led *)0)->field)
 
-static void test_refused(void **state)
+TEST(test_refused, setup)
 {
 	static const struct {
 		size_t at, size;
@@ -233,7 +229,7 @@ static void test_refused(void **state)
 	}
 }
 
-static void test_cycles(void **state)
+TEST(test_cycles, setup)
 {
 	static const struct {
 		uint32_t ns;
@@ -255,7 +251,7 @@ static void test_cycles(void **state)
 }
 
 /* A failure at the k-th SDO, for every k: a message, or an object noted as absent. */
-static void test_every_step(void **state)
+TEST(test_every_step, setup)
 {
 	static const uint32_t codes[] = {0x08000000, ABORT_NO_OBJECT, ABORT_NO_SUB,
 					 0x08000022, ABORT_VALUE};
@@ -316,7 +312,7 @@ static void test_every_step(void **state)
 }
 
 /* The bus fails at the start or at the k-th frame, permanently or once. */
-static void test_bus_fails(void **state)
+TEST(test_bus_fails, setup)
 {
 	static const int errors[] = {-ENETDOWN, -ENODEV, -EIO};
 	struct led *led = *state;
@@ -374,7 +370,7 @@ static void test_bus_fails(void **state)
 }
 
 /* The target of each mode, after any other mode. */
-static void test_modes(void **state)
+TEST(test_modes, setup)
 {
 	static const struct {
 		enum cia402_mode mode;
@@ -397,7 +393,7 @@ static void test_modes(void **state)
 }
 
 /* Other ids, bits 30 and objects from before are replaced. */
-static void test_left_over(void **state)
+TEST(test_left_over, setup)
 {
 	struct led *led = *state;
 
@@ -415,7 +411,7 @@ static void test_left_over(void **state)
 }
 
 /* If a drive cannot map inputs, its TPDO2 stays off. */
-static void test_unmapped_inputs(void **state)
+TEST(test_unmapped_inputs, setup)
 {
 	struct led *led = *state;
 
@@ -427,7 +423,7 @@ static void test_unmapped_inputs(void **state)
 }
 
 /* Old limits do not stay: without homing there is no range. */
-static void test_unlimited(void **state)
+TEST(test_unlimited, setup)
 {
 	struct led *led = *state;
 
@@ -446,7 +442,7 @@ static void test_unlimited(void **state)
 }
 
 /* Limits that are not set here stay the drive's. */
-static void test_left_alone(void **state)
+TEST(test_left_alone, setup)
 {
 	struct led *led = *state;
 
@@ -462,24 +458,4 @@ static void test_left_alone(void **state)
 	assert_int_equal(led_value(led, 0x60c5, 0), 8);
 	assert_int_equal(led_value(led, 0x6065, 0), 9);
 	assert_int_equal(led_value(led, 0x6072, 0), 1000);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup(test_objects, setup),
-		cmocka_unit_test_setup(test_absences, setup),
-		cmocka_unit_test_setup(test_not_kept, setup),
-		cmocka_unit_test_setup(test_refused, setup),
-		cmocka_unit_test_setup(test_cycles, setup),
-		cmocka_unit_test_setup(test_every_step, setup),
-		cmocka_unit_test_setup(test_bus_fails, setup),
-		cmocka_unit_test_setup(test_modes, setup),
-		cmocka_unit_test_setup(test_left_over, setup),
-		cmocka_unit_test_setup(test_unmapped_inputs, setup),
-		cmocka_unit_test_setup(test_unlimited, setup),
-		cmocka_unit_test_setup(test_left_alone, setup),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

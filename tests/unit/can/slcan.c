@@ -3,11 +3,7 @@
  * lib/device/can/bus/slcan.c on a pseudo terminal: the test plays the adapter at the other end, on
  * a clock of its own. A pty passes its bytes on in a while: what is expected is waited for.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -192,7 +188,7 @@ static int teardown(void **state)
 }
 
 /* The rate is the request's, or follows the tty. */
-static void the_adapter_goes_on_the_bus_and_off(void **state)
+TEST(the_adapter_goes_on_the_bus_and_off)
 {
 	static const struct {
 		const char *behind;
@@ -253,7 +249,7 @@ static void the_adapter_goes_on_the_bus_and_off(void **state)
 	}
 }
 
-static void a_path_is_a_serial_port_of_any_name(void **state)
+TEST(a_path_is_a_serial_port_of_any_name)
 {
 	static char longest[10000];
 	char folder[] = "/tmp/incise-slcan-XXXXXX", file[64], pipe[64], at[64], rate[80];
@@ -297,7 +293,7 @@ static void a_path_is_a_serial_port_of_any_name(void **state)
 	rmdir(folder);
 }
 
-static void one_program_at_a_time(void **state)
+TEST(one_program_at_a_time, setup, teardown)
 {
 	struct can_bus *second;
 
@@ -307,7 +303,7 @@ static void one_program_at_a_time(void **state)
 	assert_int_equal(open_device(&bus, path, 0), 0);
 }
 
-static void frames_go_both_ways(void **state)
+TEST(frames_go_both_ways, setup, teardown)
 {
 	struct can_frame out = {
 		.can_id = 0x210, .can_dlc = 6, .data = {0x0f, 0, 0xff, 0xee, 0xdd, 0xcc}};
@@ -334,7 +330,7 @@ static void frames_go_both_ways(void **state)
 }
 
 /* No byte is translated, dropped or taken for flow control; junk is counted and skipped. */
-static void bytes_arrive_unchanged(void **state)
+TEST(bytes_arrive_unchanged, setup, teardown)
 {
 	static char junk[3000];
 	char all[256];
@@ -370,7 +366,7 @@ static void bytes_arrive_unchanged(void **state)
 	assert_int_equal(bus->counts.broken, 3 + 254 + 3);
 }
 
-static void filters_are_exact(void **state)
+TEST(filters_are_exact, setup, teardown)
 {
 	const canid_t mask = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
 	const struct can_filter exact[] = {{0x190, mask}, {0x7ee, mask}};
@@ -396,7 +392,7 @@ static void filters_are_exact(void **state)
 }
 
 /* Queries follow a frame each 100 ms; answers become error frames. */
-static void status_becomes_error_frames(void **state)
+TEST(status_becomes_error_frames, setup, teardown)
 {
 	static const struct {
 		const char *answer;
@@ -431,7 +427,7 @@ static void status_becomes_error_frames(void **state)
 }
 
 /* Of those of the start one each is none; an adapter without the query is left alone. */
-static void refusals_are_errors_but_for_the_start(void **state)
+TEST(refusals_are_errors_but_for_the_start, setup, teardown)
 {
 	SAY("\a\a\r\a\a");
 	expect_nothing();
@@ -452,7 +448,7 @@ static void refusals_are_errors_but_for_the_start(void **state)
 }
 
 /* An adapter that does not read for a while: accepted frames arrive whole and in order. */
-static void a_frame_is_sent_whole_or_not(void **state)
+TEST(a_frame_is_sent_whole_or_not, setup, teardown)
 {
 	struct can_frame frame = {.can_id = 0x210, .can_dlc = 4};
 	uint32_t sent = 0;
@@ -482,7 +478,7 @@ static void a_frame_is_sent_whole_or_not(void **state)
 	received("t0800.");
 }
 
-static void a_torn_line_is_finished_first(void **state)
+TEST(a_torn_line_is_finished_first, setup, teardown)
 {
 	write_most = 0;
 	assert_int_equal(bus->ops->send(bus, &sync_frame), -ENOBUFS);
@@ -508,7 +504,7 @@ static void a_torn_line_is_finished_first(void **state)
 	close_bus();
 }
 
-static void an_error_of_the_line_is_permanent(void **state)
+TEST(an_error_of_the_line_is_permanent)
 {
 	static const struct {
 		int error, rc;
@@ -530,7 +526,7 @@ static void an_error_of_the_line_is_permanent(void **state)
 }
 
 /* Found by receiving, or by sending. */
-static void an_adapter_that_is_unplugged_is_gone(void **state)
+TEST(an_adapter_that_is_unplugged_is_gone)
 {
 	for (int sends = 0; sends < 2; sends++) {
 		struct can_frame in;
@@ -548,7 +544,7 @@ static void an_adapter_that_is_unplugged_is_gone(void **state)
 }
 
 /* The speed that stty set stays; the default of a port that nobody set does not. */
-static void the_speed_is_the_users(void **state)
+TEST(the_speed_is_the_users, setup, teardown)
 {
 	static const struct {
 		speed_t set, is;
@@ -569,7 +565,7 @@ static void the_speed_is_the_users(void **state)
 }
 
 /* A late reader: frames sent before close() wait in the pty, and stay there. */
-static void the_last_frames_arrive(void **state)
+TEST(the_last_frames_arrive, setup, teardown)
 {
 	const struct can_frame last = {.can_id = 0x000, .can_dlc = 2, .data = {0x80, 16}};
 
@@ -583,7 +579,7 @@ static void the_last_frames_arrive(void **state)
 	received("t00028010.C.");
 }
 
-static void waiting_ends(void **state)
+TEST(waiting_ends, setup, teardown)
 {
 	int64_t begin = clock_ns, t_ns;
 	struct can_frame in;
@@ -601,29 +597,4 @@ static void waiting_ends(void **state)
 	assert_int_equal(bus->ops->wait(bus, INT64_MAX), 0);
 	assert_int_equal(bus->ops->receive(bus, &in, &t_ns), 1);
 	assert_int_equal(bus->ops->wait(bus, INT64_MAX), 0);
-}
-
-#define WITH(test) cmocka_unit_test_setup_teardown(test, setup, teardown)
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(the_adapter_goes_on_the_bus_and_off),
-		cmocka_unit_test(a_path_is_a_serial_port_of_any_name),
-		cmocka_unit_test(an_error_of_the_line_is_permanent),
-		cmocka_unit_test(an_adapter_that_is_unplugged_is_gone),
-		WITH(one_program_at_a_time),
-		WITH(frames_go_both_ways),
-		WITH(bytes_arrive_unchanged),
-		WITH(filters_are_exact),
-		WITH(status_becomes_error_frames),
-		WITH(refusals_are_errors_but_for_the_start),
-		WITH(a_frame_is_sent_whole_or_not),
-		WITH(a_torn_line_is_finished_first),
-		WITH(the_speed_is_the_users),
-		WITH(the_last_frames_arrive),
-		WITH(waiting_ends),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * lib/device/can/bus/slcan_protocol.c against lines written by hand from Lawicel's manual, and
  * against itself: formatted frames are parsed back. slcan.c tests the status over a pty.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
@@ -57,7 +53,7 @@ static const struct {
 	{"R000000018", {.can_id = 1 | CAN_EFF_FLAG | CAN_RTR_FLAG, .can_dlc = 8}},
 };
 
-static void frames_are_read(void **state)
+TEST(frames_are_read)
 {
 	for (size_t i = 0; i < sizeof(frames) / sizeof(*frames); i++) {
 		struct slcan_line line = {0};
@@ -124,7 +120,7 @@ static const struct {
 	{"T1FFFFFFF81122334455667788EA5F0\r", 32, SLCAN_BROKEN},
 };
 
-static void every_line_has_its_kind(void **state)
+TEST(every_line_has_its_kind)
 {
 	for (size_t i = 0; i < sizeof(lines) / sizeof(*lines); i++) {
 		struct slcan_line line = {0};
@@ -140,7 +136,7 @@ static void every_line_has_its_kind(void **state)
 	}
 }
 
-static void status_is_read(void **state)
+TEST(status_is_read)
 {
 	struct slcan_line line = {0};
 	struct slcan_message message;
@@ -158,7 +154,7 @@ static void status_is_read(void **state)
 }
 
 /* Junk of any length is one broken line, and the next line is parsed. */
-static void long_junk_is_one_line(void **state)
+TEST(long_junk_is_one_line)
 {
 	struct slcan_line line = {0};
 	struct slcan_message message;
@@ -170,7 +166,7 @@ static void long_junk_is_one_line(void **state)
 	assert_int_equal(receive(&line, "t1230\r", 6, &message), SLCAN_FRAME);
 }
 
-static void a_formatted_frame_is_parsed_back(void **state)
+TEST(a_formatted_frame_is_parsed_back)
 {
 	srand(1);
 	for (int i = 0; i < 20000; i++) {
@@ -198,7 +194,7 @@ static void a_formatted_frame_is_parsed_back(void **state)
 	}
 }
 
-static void a_line_is_that_of_the_manual(void **state)
+TEST(a_line_is_that_of_the_manual)
 {
 	struct can_frame frame = {
 		.can_id = 0x12abcdef | CAN_EFF_FLAG, .can_dlc = 2, .data = {0xaa, 0x55}};
@@ -225,7 +221,7 @@ static bool refused(struct slcan_status *status)
 	return slcan_status_update(status, SLCAN_REFUSED, &message, &frame);
 }
 
-static void a_query_is_due_each_100_ms(void **state)
+TEST(a_query_is_due_each_100_ms)
 {
 	struct slcan_status status;
 
@@ -241,7 +237,7 @@ static void a_query_is_due_each_100_ms(void **state)
 }
 
 /* Refusals answer first the start commands, then queries, then frames. */
-static void refusals_answer_in_order_of_sending(void **state)
+TEST(refusals_answer_in_order_of_sending)
 {
 	struct slcan_status status;
 	int64_t now = 0;
@@ -261,7 +257,7 @@ static void refusals_answer_in_order_of_sending(void **state)
 	assert_false(slcan_status_due(&status, now + 1000 * MS));
 }
 
-static void an_adapter_that_answered_is_queried_on(void **state)
+TEST(an_adapter_that_answered_is_queried_on)
 {
 	const struct slcan_message message = {.flags = 0};
 	struct slcan_status status;
@@ -281,7 +277,7 @@ static void an_adapter_that_answered_is_queried_on(void **state)
 }
 
 /* All 256 flags after all others: each change is reported once, by a valid frame. */
-static void a_change_is_reported_once(void **state)
+TEST(a_change_is_reported_once)
 {
 	struct slcan_status status;
 	struct can_frame frame;
@@ -322,7 +318,7 @@ static void a_change_is_reported_once(void **state)
 }
 
 /* Flags have no bus-off: they do not end it. */
-static void bus_off_ends_when_a_state_reports_it(void **state)
+TEST(bus_off_ends_when_a_state_reports_it)
 {
 	const struct slcan_message off = {.state = CAN_STATE_BUS_OFF},
 				   on = {.state = CAN_STATE_ERROR_ACTIVE},
@@ -338,23 +334,4 @@ static void bus_off_ends_when_a_state_reports_it(void **state)
 	assert_true(slcan_status_update(&status, SLCAN_STATE, &on, &frame));
 	assert_int_equal(frame.can_id, CAN_ERR_FLAG | CAN_ERR_CRTL | CAN_ERR_RESTARTED);
 	assert_false(slcan_status_update(&status, SLCAN_FRAME, &on, &frame));
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(frames_are_read),
-		cmocka_unit_test(every_line_has_its_kind),
-		cmocka_unit_test(status_is_read),
-		cmocka_unit_test(long_junk_is_one_line),
-		cmocka_unit_test(a_formatted_frame_is_parsed_back),
-		cmocka_unit_test(a_line_is_that_of_the_manual),
-		cmocka_unit_test(a_query_is_due_each_100_ms),
-		cmocka_unit_test(refusals_answer_in_order_of_sending),
-		cmocka_unit_test(an_adapter_that_answered_is_queried_on),
-		cmocka_unit_test(a_change_is_reported_once),
-		cmocka_unit_test(bus_off_ends_when_a_state_reports_it),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

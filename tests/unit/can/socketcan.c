@@ -4,11 +4,7 @@
  * and the query for the interface by functions here. tests/vm/guest/can_bus.c runs on the real
  * kernel. The lock of a node is real, and so are its names on this machine.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <poll.h>
 #include <stdio.h>
@@ -208,8 +204,12 @@ int __wrap_clock_gettime(clockid_t clock, struct timespec *t)
 	return 0;
 }
 
+/* Names of owners are real: these are of this process. */
+static char interface[IF_NAMESIZE];
+
 static void kernel_init(void)
 {
+	snprintf(interface, sizeof(interface), "vcan%ld", (long)getpid());
 	memset(&kernel, 0, sizeof(kernel));
 	kernel.now_ns = 1000 * S;
 	kernel.wall_ns = 1700000000 * S;
@@ -247,7 +247,7 @@ static int teardown(void **state)
 }
 
 /* The message has the place in rig.conf, and the interface or what to do. */
-static void a_failed_open_has_a_message(void **state)
+TEST(a_failed_open_has_a_message)
 {
 	static const struct {
 		const char *device;
@@ -294,7 +294,7 @@ static void a_failed_open_has_a_message(void **state)
 	}
 }
 
-static void settings_are_those_of_the_kernel(void **state)
+TEST(settings_are_those_of_the_kernel)
 {
 	static const struct {
 		const char *device;
@@ -324,7 +324,7 @@ static void settings_are_those_of_the_kernel(void **state)
 	}
 }
 
-static void the_socket_is_set_up(void **state)
+TEST(the_socket_is_set_up, setup, teardown)
 {
 	assert_int_equal(kernel.bound, INDEX);
 	assert_int_equal(kernel.errors, CAN_ERR_MASK);
@@ -333,7 +333,7 @@ static void the_socket_is_set_up(void **state)
 			 SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE);
 }
 
-static void filters_are_the_kernels(void **state)
+TEST(filters_are_the_kernels, setup, teardown)
 {
 	struct can_filter filter[CAN_BUS_FILTERS + 1] = {{0x190, 0xc00007ff}};
 
@@ -351,7 +351,7 @@ static void filters_are_the_kernels(void **state)
 	assert_int_equal(bus->ops->filter(bus, filter, 1), -ENOMEM);
 }
 
-static void sending_returns_its_errors(void **state)
+TEST(sending_returns_its_errors, setup, teardown)
 {
 	struct can_frame frame = {.can_id = 0x210, .can_dlc = 8, .data = {1, 2, 3}};
 	static const struct {
@@ -378,7 +378,7 @@ static void sending_returns_its_errors(void **state)
 	assert_int_equal(bus->ops->receive(bus, &frame, &kernel.now_ns), -ENETDOWN);
 }
 
-static void an_invalid_frame_is_not_sent(void **state)
+TEST(an_invalid_frame_is_not_sent, setup, teardown)
 {
 	struct can_frame frame = {.can_id = CAN_ERR_FLAG | CAN_ERR_BUSOFF, .can_dlc = 8};
 
@@ -409,7 +409,7 @@ static int64_t receive_aged(int64_t ago_ns)
 	return t_ns;
 }
 
-static void timestamps_are_monotonic(void **state)
+TEST(timestamps_are_monotonic, setup, teardown)
 {
 	int64_t now;
 
@@ -429,7 +429,7 @@ static void timestamps_are_monotonic(void **state)
 	assert_int_equal(receive_aged(kernel.wall_ns), now + S);
 }
 
-static void lost_frames_are_counted(void **state)
+TEST(lost_frames_are_counted, setup, teardown)
 {
 	static const struct {
 		uint32_t kernel;
@@ -449,7 +449,7 @@ static void lost_frames_are_counted(void **state)
 	}
 }
 
-static void error_frames_set_the_state(void **state)
+TEST(error_frames_set_the_state, setup, teardown)
 {
 	static const struct {
 		canid_t id;
@@ -485,7 +485,7 @@ static void error_frames_set_the_state(void **state)
 	assert_int_equal(bus->counts.received, 0);
 }
 
-static void an_invalid_frame_is_skipped(void **state)
+TEST(an_invalid_frame_is_skipped, setup, teardown)
 {
 	struct can_frame frame;
 	int64_t t_ns;
@@ -508,7 +508,7 @@ static void an_invalid_frame_is_skipped(void **state)
 	assert_true(kernel.next < 64);
 }
 
-static void receiving_finds_a_lost_interface(void **state)
+TEST(receiving_finds_a_lost_interface, setup, teardown)
 {
 	struct can_frame frame;
 	int64_t t_ns;
@@ -524,7 +524,7 @@ static void receiving_finds_a_lost_interface(void **state)
 	assert_int_equal(bus->ops->send(bus, &frame), -ENODEV);
 }
 
-static void waiting_has_an_end(void **state)
+TEST(waiting_has_an_end, setup, teardown)
 {
 	int64_t now = kernel.now_ns;
 
@@ -542,10 +542,7 @@ static void waiting_has_an_end(void **state)
 	assert_int_equal(bus->ops->wait(bus, now + 1), -EINTR);
 }
 
-/* Names of owners are real: these are of this process. */
-static char interface[IF_NAMESIZE];
-
-static void a_node_has_one_owner(void **state)
+TEST(a_node_has_one_owner)
 {
 	struct can_bus *first, *second = NULL;
 	struct incise_error err = {0};
@@ -576,7 +573,7 @@ static void a_node_has_one_owner(void **state)
 	assert_int_equal(kernel.opened, 0);
 }
 
-static void a_dead_process_owns_nothing(void **state)
+TEST(a_dead_process_owns_nothing)
 {
 	struct incise_error err = {0};
 	pid_t child;
@@ -591,29 +588,4 @@ static void a_dead_process_owns_nothing(void **state)
 	assert_int_equal(status, 0);
 	assert_int_equal(open_bus(&bus, interface, 0, 17, &err), 0);
 	bus->ops->close(bus);
-}
-
-#define WITH(test) cmocka_unit_test_setup_teardown(test, setup, teardown)
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_failed_open_has_a_message),
-		cmocka_unit_test(settings_are_those_of_the_kernel),
-		cmocka_unit_test(a_node_has_one_owner),
-		cmocka_unit_test(a_dead_process_owns_nothing),
-		WITH(the_socket_is_set_up),
-		WITH(filters_are_the_kernels),
-		WITH(sending_returns_its_errors),
-		WITH(an_invalid_frame_is_not_sent),
-		WITH(timestamps_are_monotonic),
-		WITH(lost_frames_are_counted),
-		WITH(error_frames_set_the_state),
-		WITH(an_invalid_frame_is_skipped),
-		WITH(receiving_finds_a_lost_interface),
-		WITH(waiting_has_an_end),
-	};
-
-	snprintf(interface, sizeof(interface), "vcan%ld", (long)getpid());
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * lib/device/can/bus/socketcan_netlink.c on an answer as the kernel gives it, with bytes of it
  * changed, and on the kernel's own answer for lo. tests/vm/guest/can_bus.sh queries a real controller.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <net/if.h>
 #include <net/if_arp.h>
@@ -112,7 +108,7 @@ static int parse_message(const struct message *m, struct can_netlink *link)
 	return parse(m->bytes, m->n, link);
 }
 
-static void a_controller_is_told(void **state)
+TEST(a_controller_is_told)
 {
 	const struct message usual = from_hex(can0);
 	struct message m = usual;
@@ -133,7 +129,7 @@ static void a_controller_is_told(void **state)
 	}
 }
 
-static void what_is_not_known_is_not_made_up(void **state)
+TEST(what_is_not_known_is_not_made_up)
 {
 	struct message m = from_hex(can0);
 	struct can_netlink link;
@@ -154,7 +150,7 @@ static void what_is_not_known_is_not_made_up(void **state)
 }
 
 /* Their data is not a controller's, though the numbers of its attributes are the same. */
-static void other_kinds_tell_no_rate(void **state)
+TEST(other_kinds_tell_no_rate)
 {
 	static const struct {
 		const char *kind;
@@ -187,7 +183,7 @@ static void other_kinds_tell_no_rate(void **state)
 	}
 }
 
-static void what_has_not_its_size_is_refused(void **state)
+TEST(what_has_not_its_size_is_refused)
 {
 	static const struct {
 		size_t at;
@@ -219,7 +215,7 @@ static void what_has_not_its_size_is_refused(void **state)
 }
 
 /* A datagram that ends early, and one that also says so in its header. */
-static void what_is_cut_off_is_refused(void **state)
+TEST(what_is_cut_off_is_refused)
 {
 	struct message m = from_hex(can0);
 	struct can_netlink link;
@@ -241,7 +237,7 @@ static void what_is_cut_off_is_refused(void **state)
 	assert_int_equal(whole, 6);
 }
 
-static void whatever_comes_is_read_within_it(void **state)
+TEST(whatever_comes_is_read_within_it)
 {
 	const struct message whole = from_hex(can0);
 	uint32_t seed = 1;
@@ -266,7 +262,7 @@ static void whatever_comes_is_read_within_it(void **state)
 	}
 }
 
-static void refusals_are_the_kernels(void **state)
+TEST(refusals_are_the_kernels)
 {
 	static const struct {
 		int code, rc;
@@ -287,7 +283,7 @@ static void refusals_are_the_kernels(void **state)
 	assert_int_equal(parse_message(&m, &link), -EBADMSG);
 }
 
-static void what_is_for_others_is_passed_over(void **state)
+TEST(what_is_for_others_is_passed_over)
 {
 	static const struct {
 		size_t at;
@@ -414,7 +410,7 @@ static int fake_end(void **state)
 	return 0;
 }
 
-static void the_question_is_by_name(void **state)
+TEST(the_question_is_by_name, fake_begin, fake_end)
 {
 	struct can_netlink link;
 	struct nlmsghdr header;
@@ -437,7 +433,7 @@ static void the_question_is_by_name(void **state)
 	assert_string_equal(fake.asked.bytes + fake.asked.n - 8, "can0");
 }
 
-static void what_is_no_name_is_not_asked(void **state)
+TEST(what_is_no_name_is_not_asked, fake_begin, fake_end)
 {
 	struct can_netlink link;
 
@@ -448,7 +444,7 @@ static void what_is_no_name_is_not_asked(void **state)
 	assert_true(fake.asked.n > 0);
 }
 
-static void what_fails_is_said(void **state)
+TEST(what_fails_is_said, fake_begin, fake_end)
 {
 	struct can_netlink link;
 	static const struct {
@@ -474,7 +470,7 @@ static void what_fails_is_said(void **state)
 }
 
 /* No answer, endless signals, or endless messages for others. */
-static void every_wait_has_a_limit(void **state)
+TEST(every_wait_has_a_limit, fake_begin, fake_end)
 {
 	struct can_netlink link;
 
@@ -499,7 +495,7 @@ static void every_wait_has_a_limit(void **state)
 	assert_int_equal(link.index, 5);
 }
 
-static void the_kernel_tells_of_lo(void **state)
+TEST(the_kernel_tells_of_lo)
 {
 	struct can_netlink link;
 
@@ -510,27 +506,4 @@ static void the_kernel_tells_of_lo(void **state)
 	assert_int_equal(link.index, if_nametoindex("lo"));
 	assert_false(link.is_can);
 	assert_int_equal(can_netlink_query("no-such-one", &link), -ENODEV);
-}
-
-#define ON_FAKE(test) cmocka_unit_test_setup_teardown(test, fake_begin, fake_end)
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_controller_is_told),
-		cmocka_unit_test(what_is_not_known_is_not_made_up),
-		cmocka_unit_test(other_kinds_tell_no_rate),
-		cmocka_unit_test(what_has_not_its_size_is_refused),
-		cmocka_unit_test(what_is_cut_off_is_refused),
-		cmocka_unit_test(whatever_comes_is_read_within_it),
-		cmocka_unit_test(refusals_are_the_kernels),
-		cmocka_unit_test(what_is_for_others_is_passed_over),
-		ON_FAKE(the_question_is_by_name),
-		ON_FAKE(what_is_no_name_is_not_asked),
-		ON_FAKE(what_fails_is_said),
-		ON_FAKE(every_wait_has_a_limit),
-		cmocka_unit_test(the_kernel_tells_of_lo),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * lib/device/polhemus/polhemus_stream.c: gaps between records of known losses, and whole streams compared
  * with the list that the emulator keeps of what it sent, on a clock of the test.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -54,7 +50,7 @@ static uint64_t take_all(uint64_t from, uint64_t n)
 }
 
 /* Bytes that were no record, and the time it took: what it makes of them at once. */
-static void damage(void **state)
+TEST(damage)
 {
 	static const struct {
 		uint64_t missing;
@@ -93,7 +89,7 @@ static void damage(void **state)
 }
 
 /* Stations show up to a round; the round itself only time does, a window later. */
-static void order(void **state)
+TEST(order)
 {
 	for (int n = 1; n <= 4; n++)
 		for (uint64_t missing = 0; missing < 12; missing++) {
@@ -110,7 +106,7 @@ static void order(void **state)
 }
 
 /* The count of frames says it at once, over its end as well. */
-static void counted(void **state)
+TEST(counted)
 {
 	for (int n = 1; n <= 4; n++)
 		for (uint64_t missing = 0; missing < 12; missing++) {
@@ -125,7 +121,7 @@ static void counted(void **state)
 }
 
 /* The same one twice: the second is refused, and the next one goes on. */
-static void doubled(void **state)
+TEST(doubled)
 {
 	for (int counts = 0; counts <= 1; counts++) {
 		uint64_t seq = 0;
@@ -140,7 +136,7 @@ static void doubled(void **state)
 }
 
 /* Pulses from outside come when they like: only order and damage count. */
-static void without_a_period(void **state)
+TEST(without_a_period)
 {
 	uint64_t seq = 0;
 
@@ -162,7 +158,7 @@ static void without_a_period(void **state)
 }
 
 /* A tracker that was started sends nothing, or no valid record. */
-static void before_the_first(void **state)
+TEST(before_the_first)
 {
 	static const struct {
 		int stations;
@@ -200,7 +196,7 @@ static void before_the_first(void **state)
 }
 
 /* The link was gone: the time it took is lost. */
-static void broken(void **state)
+TEST(broken)
 {
 	uint64_t seq = 0;
 
@@ -225,7 +221,7 @@ static void broken(void **state)
 }
 
 /* Records missing at the end count as well, never more than if the tracker returned. */
-static void silent(void **state)
+TEST(silent)
 {
 	for (int n = 1; n <= 4; n++)
 		for (uint64_t missing = 1; missing < 40; missing++) {
@@ -405,7 +401,7 @@ static size_t bench_touched(const struct bench *b)
  * Ten minutes, and bursts of damage, of each kind and of all at once, at 1 % of the bytes, and at
  * more; what vanishes without a trace only time shows, a window and its losses later.
  */
-static void loses_what_is_touched(void **state)
+TEST(loses_what_is_touched)
 {
 	static const struct {
 		enum emulator_kind kind;
@@ -468,7 +464,7 @@ static void loses_what_is_touched(void **state)
 }
 
 /* A longer gap is placed where it was, and counted before another round is over. */
-static void long_gaps_have_their_place(void **state)
+TEST(long_gaps_have_their_place)
 {
 	static const unsigned int missing[] = {2, 3, 7, 20, 84, 114};
 
@@ -490,7 +486,7 @@ static void long_gaps_have_their_place(void **state)
 }
 
 /* Poses that come after a gap wait no longer than for half a round. */
-static void what_waits_is_released(void **state)
+TEST(what_waits_is_released)
 {
 	unsigned char bytes[EMULATOR_ROOM];
 	struct bench b;
@@ -525,7 +521,7 @@ static void what_waits_is_released(void **state)
 }
 
 /* A host that looks rarely, and then gets many at once, lost nothing. */
-static void bursts_are_no_loss(void **state)
+TEST(bursts_are_no_loss)
 {
 	static const double pauses_ms[] = {16, 40, 130, 400};
 
@@ -549,7 +545,7 @@ static void bursts_are_no_loss(void **state)
  * After a pause of the program a terminal gives 4 kB, and the rest when the kernel's worker has run,
  * which other programs may hold up: nothing is lost. Where the rest is not there, it is.
  */
-static void rest_of_a_terminal_is_no_loss(void **state)
+TEST(rest_of_a_terminal_is_no_loss)
 {
 	static const int64_t worker_ms[] = {0, 3, 10, 45};
 
@@ -582,7 +578,7 @@ static void rest_of_a_terminal_is_no_loss(void **state)
  * Bytes from nowhere, and a host that is late just then: what they did not touch is there, and no
  * more is counted than they did.
  */
-static void bursts_and_new_bytes(void **state)
+TEST(bursts_and_new_bytes)
 {
 	static const double pauses_ms[] = {5, 16, 40, 130};
 
@@ -607,7 +603,7 @@ static void bursts_and_new_bytes(void **state)
 }
 
 /* Clocks that differ by 1000 ppm, for long enough to be 8 records apart. */
-static void drift_is_no_loss(void **state)
+TEST(drift_is_no_loss)
 {
 	static const double ppm[] = {-1000, 1000};
 
@@ -629,7 +625,7 @@ static void drift_is_no_loss(void **state)
 }
 
 /* The tip is where the quaternion turns it to, by a matrix that is written out. */
-static void the_tip(void **state)
+TEST(the_tip)
 {
 	struct bench b;
 
@@ -663,7 +659,7 @@ static void the_tip(void **state)
 }
 
 /* Nobody reads: what has no room is counted, and the rest in order. */
-static void no_room(void **state)
+TEST(no_room)
 {
 	struct bench b;
 	uint64_t dropped;
@@ -687,7 +683,7 @@ static void no_room(void **state)
 }
 
 /* Away for a while: all that time is lost, to the record. */
-static void pulled_out(void **state)
+TEST(pulled_out)
 {
 	for (int stations = 1; stations <= 3; stations++) {
 		struct bench b;
@@ -717,7 +713,7 @@ static void pulled_out(void **state)
 }
 
 /* A pose that stays the same to its last digit is flagged, from repeat_ms on; others are not. */
-static void one_pose_again_and_again(void **state)
+TEST(one_pose_again_and_again)
 {
 	static const struct {
 		enum emulator_kind kind;
@@ -764,31 +760,4 @@ static void one_pose_again_and_again(void **state)
 		assert_int_equal(polhemus_stream_lost(&b.stream), 0);
 		bench_free(&b);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(damage),
-		cmocka_unit_test(order),
-		cmocka_unit_test(counted),
-		cmocka_unit_test(doubled),
-		cmocka_unit_test(without_a_period),
-		cmocka_unit_test(broken),
-		cmocka_unit_test(silent),
-		cmocka_unit_test(before_the_first),
-		cmocka_unit_test(loses_what_is_touched),
-		cmocka_unit_test(long_gaps_have_their_place),
-		cmocka_unit_test(what_waits_is_released),
-		cmocka_unit_test(bursts_are_no_loss),
-		cmocka_unit_test(rest_of_a_terminal_is_no_loss),
-		cmocka_unit_test(bursts_and_new_bytes),
-		cmocka_unit_test(drift_is_no_loss),
-		cmocka_unit_test(the_tip),
-		cmocka_unit_test(no_room),
-		cmocka_unit_test(pulled_out),
-		cmocka_unit_test(one_pose_again_and_again),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

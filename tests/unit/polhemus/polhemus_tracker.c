@@ -3,11 +3,7 @@
  * lib/device/polhemus/polhemus_tracker.c through its interface, with its thread and the emulator,
  * on a clock of the test. polhemus_tty.c has it behind a pseudo terminal.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <string.h>
 #include "../../../lib/device/polhemus/polhemus_tracker.h"
@@ -82,7 +78,7 @@ static int read_all(struct incise_tracker *tracker, uint64_t *next)
 	return n;
 }
 
-static void through_the_door(void **state)
+TEST(through_the_door, begin, end)
 {
 	struct incise_tracker *tracker = open_tracker(&POLHEMUS_TIMES);
 	struct incise_tracker_info info;
@@ -103,7 +99,7 @@ static void through_the_door(void **state)
 	assert_int_equal(e.eeprom_writes, 0);
 }
 
-static void pulled_out_and_back(void **state)
+TEST(pulled_out_and_back, begin, end)
 {
 	struct incise_tracker *tracker =
 		open_tracker(&(struct polhemus_times){150, 20, 20000});
@@ -130,7 +126,7 @@ static void pulled_out_and_back(void **state)
 }
 
 /* Its line stays, and what comes through it is nothing, or nothing that was asked for. */
-static void switched_off_and_on(void **state)
+TEST(switched_off_and_on, begin, end)
 {
 	struct incise_tracker *tracker =
 		open_tracker(&(struct polhemus_times){150, 20, 20000});
@@ -156,7 +152,7 @@ static void switched_off_and_on(void **state)
 }
 
 /* A computer that slept for a while finds its tracker as it was: it does not set it up again. */
-static void stood_still(void **state)
+TEST(stood_still, begin, end)
 {
 	struct incise_tracker *tracker =
 		open_tracker(&(struct polhemus_times){250, 20, 20000});
@@ -173,7 +169,7 @@ static void stood_still(void **state)
 	tracker->ops->close(tracker);
 }
 
-static void gone_for_good(void **state)
+TEST(gone_for_good, begin, end)
 {
 	struct incise_tracker *tracker =
 		open_tracker(&(struct polhemus_times){200, 20, 100});
@@ -193,7 +189,7 @@ static void gone_for_good(void **state)
 	tracker->ops->close(tracker);
 }
 
-static void refuses(void **state)
+TEST(refuses, begin, end)
 {
 	static const struct incise_tracker_setup bad[] = {
 		{.n_stations = 0, .hemisphere = {1, 0, 0}},
@@ -220,18 +216,4 @@ static void refuses(void **state)
 						  "rig.conf", &err));
 		assert_int_equal(errno, EINVAL);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(through_the_door, begin, end),
-		cmocka_unit_test_setup_teardown(pulled_out_and_back, begin, end),
-		cmocka_unit_test_setup_teardown(switched_off_and_on, begin, end),
-		cmocka_unit_test_setup_teardown(stood_still, begin, end),
-		cmocka_unit_test_setup_teardown(gone_for_good, begin, end),
-		cmocka_unit_test_setup_teardown(refuses, begin, end),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }
