@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "../../../lib/device/can/canopen/canopen.h"
+#include "candump.h"
 #include "drive.h"
 
 #define OWN 0x7f
@@ -32,21 +33,9 @@ static int setup(void **state)
 	return 0;
 }
 
-/* A line of candump's, such as "590#4300100092010200". */
-static struct can_frame from_text(const char *text)
-{
-	struct can_frame frame = {.len = 0};
-	int n;
-
-	assert_int_equal(sscanf(text, "%x#%n", &frame.can_id, &n), 1);
-	for (text += n; *text && *text != ' '; text += 2)
-		assert_int_equal(sscanf(text, "%2hhx", &frame.data[frame.len++]), 1);
-	return frame;
-}
-
 static uint32_t handle(struct world *w, const char *text)
 {
-	struct can_frame frame = from_text(text);
+	struct can_frame frame = candump_read(text);
 
 	return canopen_handle(&w->master, &frame, 42);
 }
@@ -80,9 +69,9 @@ TEST(test_functions, setup)
 		{"710#00", 0, false},
 		{"790#00", 0, false},
 		{"110#0000000000000000", 0, false},
-		{"80000190#000000000000", 0, false}, /* of 29 bits */
-		{"40000190#000000000000", 0, false}, /* a remote one */
-		{"80000080#", 0, false},
+		{"00000190#000000000000", 0, false}, /* of 29 bits */
+		{"190#R6", 0, false},
+		{"00000080#", 0, false},
 	};
 	struct can_frame too_long = {.can_id = 0x190, .len = 64};
 	struct world *w = *state;
@@ -333,7 +322,7 @@ static void script(struct world *w, const char *answers)
 		struct can_frame frame;
 
 		answers += strspn(answers, " ");
-		frame = from_text(answers);
+		frame = candump_read(answers);
 		drive_say(&w->drive, &frame);
 		w->drive.latency_ns += 2 * DRIVE_MS;
 	}

@@ -10,6 +10,7 @@
 #include <linux/can/error.h>
 #include <linux/can/netlink.h>
 #include "../../../lib/device/can/bus/slcan_protocol.h"
+#include "candump.h"
 
 #define MS INT64_C(1000000)
 
@@ -31,31 +32,25 @@ static enum slcan_kind receive(struct slcan_line *line, const char *bytes, size_
 
 static const struct {
 	const char *text; /* without its CR */
-	struct can_frame frame;
+	const char *frame;
 } frames[] = {
-	{"t1230", {.can_id = 0x123}},
-	{"t7FF1a5", {.can_id = 0x7ff, .can_dlc = 1, .data = {0xa5}}},
-	{"t456311aAfF", {.can_id = 0x456, .can_dlc = 3, .data = {0x11, 0xaa, 0xff}}},
-	{"t18181122334455667788",
-	 {.can_id = 0x181,
-	  .can_dlc = 8,
-	  .data = {0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88}}},
-	{"t1801AAEA5F", {.can_id = 0x180, .can_dlc = 1, .data = {0xaa}}},
-	{"t0800ffff", {.can_id = 0x080}},
-	{"T12ABCDEF2AA55",
-	 {.can_id = 0x12abcdef | CAN_EFF_FLAG, .can_dlc = 2, .data = {0xaa, 0x55}}},
-	{"T1FFFFFFF81122334455667788EA5F",
-	 {.can_id = CAN_EFF_MASK | CAN_EFF_FLAG,
-	  .can_dlc = 8,
-	  .data = {0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88}}},
-	{"r1230", {.can_id = 0x123 | CAN_RTR_FLAG}},
-	{"r12380001", {.can_id = 0x123 | CAN_RTR_FLAG, .can_dlc = 8}},
-	{"R000000018", {.can_id = 1 | CAN_EFF_FLAG | CAN_RTR_FLAG, .can_dlc = 8}},
+	{"t1230", "123#"},
+	{"t7FF1a5", "7FF#A5"},
+	{"t456311aAfF", "456#11AAFF"},
+	{"t18181122334455667788", "181#1122334455667788"},
+	{"t1801AAEA5F", "180#AA"},
+	{"t0800ffff", "080#"},
+	{"T12ABCDEF2AA55", "12ABCDEF#AA55"},
+	{"T1FFFFFFF81122334455667788EA5F", "1FFFFFFF#1122334455667788"},
+	{"r1230", "123#R"},
+	{"r12380001", "123#R8"},
+	{"R000000018", "00000001#R8"},
 };
 
 TEST(frames_are_read)
 {
 	for (size_t i = 0; i < sizeof(frames) / sizeof(*frames); i++) {
+		struct can_frame frame = candump_read(frames[i].frame);
 		struct slcan_line line = {0};
 		struct slcan_message message;
 
@@ -63,8 +58,7 @@ TEST(frames_are_read)
 					 &message),
 				 SLCAN_NONE);
 		assert_int_equal(slcan_line_receive(&line, '\r', &message), SLCAN_FRAME);
-		assert_memory_equal(&message.frame, &frames[i].frame,
-				    sizeof(message.frame));
+		assert_memory_equal(&message.frame, &frame, sizeof(frame));
 		/* An LF after CR belongs to no line. */
 		assert_int_equal(slcan_line_receive(&line, '\n', &message), SLCAN_NONE);
 		assert_int_equal(receive(&line, "t1230\r", 6, &message), SLCAN_FRAME);
@@ -138,19 +132,24 @@ TEST(every_line_has_its_kind)
 
 TEST(status_is_read)
 {
+	static const struct {
+		const char *line;
+		int state;
+	} cases[] = {
+		{"sa057033\r", CAN_STATE_ERROR_ACTIVE},
+		{"sw100000\r", CAN_STATE_ERROR_WARNING},
+		{"sp000130\r", CAN_STATE_ERROR_PASSIVE},
+		{"sb256256\r", CAN_STATE_BUS_OFF},
+	};
 	struct slcan_line line = {0};
 	struct slcan_message message;
 
 	assert_int_equal(receive(&line, "FaF\r", 4, &message), SLCAN_FLAGS);
 	assert_int_equal(message.flags, 0xaf);
-	assert_int_equal(receive(&line, "sa057033\r", 9, &message), SLCAN_STATE);
-	assert_int_equal(message.state, CAN_STATE_ERROR_ACTIVE);
-	assert_int_equal(receive(&line, "sw100000\r", 9, &message), SLCAN_STATE);
-	assert_int_equal(message.state, CAN_STATE_ERROR_WARNING);
-	assert_int_equal(receive(&line, "sp000130\r", 9, &message), SLCAN_STATE);
-	assert_int_equal(message.state, CAN_STATE_ERROR_PASSIVE);
-	assert_int_equal(receive(&line, "sb256256\r", 9, &message), SLCAN_STATE);
-	assert_int_equal(message.state, CAN_STATE_BUS_OFF);
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		assert_int_equal(receive(&line, cases[i].line, 9, &message), SLCAN_STATE);
+		assert_int_equal(message.state, cases[i].state);
+	}
 }
 
 /* Junk of any length is one broken line, and the next line is parsed. */
@@ -196,20 +195,26 @@ TEST(a_formatted_frame_is_parsed_back)
 
 TEST(a_line_is_that_of_the_manual)
 {
-	struct can_frame frame = {
-		.can_id = 0x12abcdef | CAN_EFF_FLAG, .can_dlc = 2, .data = {0xaa, 0x55}};
+	static const struct {
+		const char *frame, *line;
+	} cases[] = {
+		{"12ABCDEF#AA55", "T12ABCDEF2AA55\r"},
+		{"080#", "t0800\r"},
+		{"123#R8", "r1238\r"},
+		{"20000000#0000000000000000", ""}, /* an error frame */
+	};
+	struct can_frame frame;
 	char text[SLCAN_LINE_MAX];
 
-	assert_int_equal(slcan_line_format(text, &frame), 15);
-	assert_memory_equal(text, "T12ABCDEF2AA55\r", 15);
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		size_t n = strlen(cases[i].line);
+
+		frame = candump_read(cases[i].frame);
+		assert_int_equal(slcan_line_format(text, &frame), n);
+		assert_memory_equal(text, cases[i].line, n);
+	}
 	frame.can_id = 0x080;
-	frame.can_dlc = 0;
-	assert_int_equal(slcan_line_format(text, &frame), 6);
-	assert_memory_equal(text, "t0800\r", 6);
 	frame.can_dlc = 9;
-	assert_int_equal(slcan_line_format(text, &frame), 0);
-	frame.can_dlc = 8;
-	frame.can_id = CAN_ERR_FLAG;
 	assert_int_equal(slcan_line_format(text, &frame), 0);
 }
 
