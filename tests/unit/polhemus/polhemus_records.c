@@ -101,55 +101,32 @@ TEST(what_is_no_record)
 TEST(text)
 {
 	static const struct polhemus_layout ascii = {POLHEMUS_FASTRAK, true, 2, 1};
+	static const char good[] = "02  -12.34   0.05 100.00"
+				   " 0.6000 0.0000-0.8000 0.0000"
+				   "1\r\n";
 	static const struct {
-		const char *text;
-		bool good;
-	} cases[] = {
-		{"02 "
-		 " -12.34   0.05 100.00"
-		 " 0.6000 0.0000-0.8000 0.0000"
-		 "1\r\n",
-		 true},
-		{"02 "
-		 " -12.34   0.05 10O.00"
-		 " 0.6000 0.0000-0.8000 0.0000"
-		 "1\r\n",
-		 false},
-		{"02 "
-		 " -12.34   0.05       "
-		 " 0.6000 0.0000-0.8000 0.0000"
-		 "1\r\n",
-		 false},
-		{"02 "
-		 " -12.34   0.05 1-0.00"
-		 " 0.6000 0.0000-0.8000 0.0000"
-		 "1\r\n",
-		 false},
-		{"02 "
-		 " -12.34   0.05 1.0.00"
-		 " 0.6000 0.0000-0.8000 0.0000"
-		 "1\r\n",
-		 false},
-		{"02 "
-		 " -12.34   0.05 100.00"
-		 " 0.6000 0.0000-0.9000 0.0000"
-		 "1\r\n",
-		 false},
+		size_t at;
+		const char *bytes;
+	} bad[] = {
+		{20, "O"},	{17, "       "}, {18, "1-"},
+		{18, "1.0.00"}, {41, "9"}, /* no unit quaternion */
 	};
+	struct polhemus_record r;
 
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct polhemus_record r;
-		const unsigned char *bytes = (const unsigned char *)cases[i].text;
+	assert_int_equal(strlen(good), polhemus_layout_length(&ascii));
+	assert_true(polhemus_record_read(&ascii, (const unsigned char *)good, &r));
+	/* Decimals are not exact; an ulp or two of 1000. */
+	assert_true(fabs(r.position_mm[0] + 123.4) < 1e-9 &&
+		    fabs(r.position_mm[2] - 1000) < 1e-9);
+	assert_true(fabs(r.quaternion[2] + 0.8) < 1e-9);
+	assert_true(r.button && r.station == 2);
+	for (size_t i = 0; i < sizeof(bad) / sizeof(*bad); i++) {
+		unsigned char bytes[sizeof(good)];
 
-		assert_int_equal(strlen(cases[i].text), polhemus_layout_length(&ascii));
-		assert_int_equal(polhemus_record_read(&ascii, bytes, &r), cases[i].good);
-		if (!cases[i].good)
-			continue;
-		/* Decimals are not exact; an ulp or two of 1000. */
-		assert_true(fabs(r.position_mm[0] + 123.4) < 1e-9 &&
-			    fabs(r.position_mm[2] - 1000) < 1e-9);
-		assert_true(fabs(r.quaternion[2] + 0.8) < 1e-9);
-		assert_true(r.button && r.station == 2);
+		memcpy(bytes, good, sizeof(good));
+		memcpy(bytes + bad[i].at, bad[i].bytes, strlen(bad[i].bytes));
+		if (polhemus_record_read(&ascii, bytes, &r))
+			fail_msg("\"%s\" at %zu", bad[i].bytes, bad[i].at);
 	}
 }
 
