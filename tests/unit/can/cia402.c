@@ -6,6 +6,7 @@
  */
 #include "../unit.h"
 #include <float.h>
+#include <stdio.h>
 #include <string.h>
 #include "led.h"
 
@@ -252,34 +253,28 @@ TEST(test_await_state, setup)
 
 /* --- units --- */
 
-#define NO 0xffffffffu /* the drive lacks the object */
 /* Some products and a power of ten, each rounded by half a unit in the last place. */
 #define ROUNDING (8 * DBL_EPSILON)
 
-struct factors {
-	uint32_t feed, feed_turns, encoder, encoder_turns, motor, shaft;
-	uint32_t position, velocity, acceleration; /* 60A8, 60A9, 60AA */
-};
-
-static void put(struct led *led, uint16_t index, uint8_t sub, uint32_t value)
+/* The drive has these and no other factors: "6092=51200/1 60A9=00B44700", ratios and units. */
+static void set_factors(struct led *led, const char *text)
 {
-	if (value == NO)
-		drive_lacks(&led->drive, index, sub);
-	else
-		drive_has(&led->drive, index, sub, 4, value);
-}
+	static const uint16_t all[] = {0x6092, 0x608f, 0x6091, 0x60a8, 0x60a9, 0x60aa};
+	unsigned int index, unit;
+	uint32_t a, b;
+	int n;
 
-static void put_all(struct led *led, const struct factors *f)
-{
-	put(led, 0x6092, 1, f->feed);
-	put(led, 0x6092, 2, f->feed_turns);
-	put(led, 0x608f, 1, f->encoder);
-	put(led, 0x608f, 2, f->encoder_turns);
-	put(led, 0x6091, 1, f->motor);
-	put(led, 0x6091, 2, f->shaft);
-	put(led, 0x60a8, 0, f->position);
-	put(led, 0x60a9, 0, f->velocity);
-	put(led, 0x60aa, 0, f->acceleration);
+	for (size_t i = 0; i < COUNT(all); i++)
+		drive_lacks(&led->drive, all[i], -1);
+	for (; sscanf(text, " %4x=%n", &index, &n) == 1; text += strcspn(text, " ")) {
+		text += n;
+		if (sscanf(text, "%u/%u", &a, &b) == 2) {
+			drive_has(&led->drive, (uint16_t)index, 1, 4, a);
+			drive_has(&led->drive, (uint16_t)index, 2, 4, b);
+		} else if (sscanf(text, "%x", &unit) == 1) {
+			drive_has(&led->drive, (uint16_t)index, 0, 4, unit);
+		}
+	}
 }
 
 static void assert_near(double is, double expected)
@@ -290,54 +285,37 @@ static void assert_near(double is, double expected)
 TEST(test_units, setup)
 {
 	static const struct {
-		const char *what;
-		struct factors factors;
+		const char *factors;
 		struct cia402_units units;
 	} cases[] = {
-		{"feed constant; counts/s",
-		 {51200, 1, NO, NO, NO, NO, NO, NO, NO},
-		 {51200, 51200, 51200}},
-		{"feed of several turns",
-		 {1000, 3, NO, NO, NO, NO, NO, NO, NO},
-		 {1000 / 3.0, 1000 / 3.0, 1000 / 3.0}},
-		{"encoder and gear",
-		 {NO, NO, 4000, 1, 5, 2, NO, NO, NO},
-		 {10000, 10000, 10000}},
-		{"encoder without a gear",
-		 {NO, NO, 4000, 2, NO, NO, NO, NO, NO},
-		 {2000, 2000, 2000}},
-		{"rpm, turns/s²",
-		 {51200, 1, NO, NO, NO, NO, NO, 0x00b44700, 0x00b45700},
-		 {51200, 60, 1}},
-		{"0.001 rpm, as Synapticon's",
-		 {51200, 1, NO, NO, NO, NO, NO, 0xfdb44700, 0x00b45700},
-		 {51200, 60000, 1}},
-		{"tenths of degrees, as Nanotec's",
-		 {1, 1, 2000, 1, 1, 1, 0xff410000, 0x00b44700, 0xff415700},
+		/* Feed constant; counts/s. Of several turns. */
+		{"6092=51200/1", {51200, 51200, 51200}},
+		{"6092=1000/3", {1000 / 3.0, 1000 / 3.0, 1000 / 3.0}},
+		/* Encoder, with a gear and without. */
+		{"608F=4000/1 6091=5/2", {10000, 10000, 10000}},
+		{"608F=4000/2", {2000, 2000, 2000}},
+		/* rpm, turns/s²; 0.001 rpm, as Synapticon's. */
+		{"6092=51200/1 60A9=00B44700 60AA=00B45700", {51200, 60, 1}},
+		{"6092=51200/1 60A9=FDB44700 60AA=00B45700", {51200, 60000, 1}},
+		/* Tenths of degrees, as Nanotec's. */
+		{"6092=1/1 608F=2000/1 6091=1/1 60A8=FF410000 60A9=00B44700 60AA=FF415700",
 		 {3600, 60, 3600}},
-		{"increments, rpm, rpm/s, as maxon's",
-		 {NO, NO, 4096, 1, 1, 1, 0x00b50000, 0x00b44700, 0x00c00300},
+		/* Increments, rpm, rpm/s, as maxon's. */
+		{"608F=4096/1 6091=1/1 60A8=00B50000 60A9=00B44700 60AA=00C00300",
 		 {4096, 60, 60}},
-		{"increments/s behind a gear",
-		 {1000, 1, 4000, 1, 3, 1, NO, 0x00b50300, 0x00b55700},
+		/* Increments/s behind a gear. */
+		{"6092=1000/1 608F=4000/1 6091=3/1 60A9=00B50300 60AA=00B55700",
 		 {1000, 12000, 12000}},
-		{"degrees/s, ten of them/s²",
-		 {51200, 1, NO, NO, NO, NO, NO, 0x00410300, 0x01415700},
-		 {51200, 360, 36}},
-		{"radians",
-		 {51200, 1, NO, NO, NO, NO, NO, 0x00100300, 0x00105700},
+		/* Degrees/s, ten of them/s²; radians; gon/min; minutes and seconds of arc. */
+		{"6092=51200/1 60A9=00410300 60AA=01415700", {51200, 360, 36}},
+		{"6092=51200/1 60A9=00100300 60AA=00105700",
 		 {51200, 2 * 3.14159265358979323846, 2 * 3.14159265358979323846}},
-		{"gon/min",
-		 {51200, 1, NO, NO, NO, NO, NO, 0x00404700, 0x00405700},
-		 {51200, 24000, 400}},
-		{"minutes and seconds of arc",
-		 {51200, 1, NO, NO, NO, NO, NO, 0x00420300, 0x00435700},
-		 {51200, 21600, 1296000}},
-		{"increments without an encoder",
-		 {800, 1, NO, NO, NO, NO, 0x00b50000, 0x00b50300, 0x00b55700},
-		 {800, 800, 800}},
-		{"metres: by the feed",
-		 {5000, 1, 4000, 1, 1, 1, 0xfa010000, 0x00b44700, 0x00b45700},
+		{"6092=51200/1 60A9=00404700 60AA=00405700", {51200, 24000, 400}},
+		{"6092=51200/1 60A9=00420300 60AA=00435700", {51200, 21600, 1296000}},
+		/* Increments without an encoder. */
+		{"6092=800/1 60A8=00B50000 60A9=00B50300 60AA=00B55700", {800, 800, 800}},
+		/* Metres: by the feed. */
+		{"6092=5000/1 608F=4000/1 6091=1/1 60A8=FA010000 60A9=00B44700 60AA=00B45700",
 		 {5000, 60, 1}},
 	};
 	struct led *led = *state;
@@ -346,7 +324,7 @@ TEST(test_units, setup)
 		struct cia402_units units = {0};
 
 		led_init(led);
-		put_all(led, &cases[i].factors);
+		set_factors(led, cases[i].factors);
 		assert_int_equal(cia402_read_units(&led->client, &units), 0);
 		assert_near(units.counts_per_turn, cases[i].units.counts_per_turn);
 		assert_near(units.velocity_per_turn_s,
@@ -359,35 +337,30 @@ TEST(test_units, setup)
 TEST(test_refused_units, setup)
 {
 	static const struct {
-		struct factors factors;
-		const char *key;
+		const char *factors, *key;
 	} cases[] = {
-		{{NO, NO, NO, NO, NO, NO, NO, NO, NO}, "counts_per_turn"},
-		{{0, 1, NO, NO, NO, NO, NO, NO, NO}, "counts_per_turn"},
-		{{1, 0, NO, NO, NO, NO, NO, NO, NO}, "counts_per_turn"},
-		{{1, 3, NO, NO, NO, NO, NO, NO, NO}, "counts_per_turn"},
-		{{NO, NO, 0, 1, NO, NO, NO, NO, NO}, "counts_per_turn"},
-		{{NO, NO, 4000, 1, 1, 0, NO, NO, NO}, "counts_per_turn"},
+		{"", "counts_per_turn"},
+		{"6092=0/1", "counts_per_turn"},
+		{"6092=1/0", "counts_per_turn"},
+		{"6092=1/3", "counts_per_turn"},
+		{"608F=0/1", "counts_per_turn"},
+		{"608F=4000/1 6091=1/0", "counts_per_turn"},
 		/* More than a position can hold. */
-		{{NO, NO, 0xfffffffe, 1, 0xfffffffe, 1, NO, NO, NO}, "counts_per_turn"},
-		{{1000, 1, 4000, 1, 1, 1, 0x00aa0000, NO, NO}, "counts_per_turn"},
-		{{1000, 1, 4000, 1, 1, 1, 0x80410000, NO, NO}, "counts_per_turn"},
-		{{1000, 1, 4000, 1, 1, 1, 0x7f410000, NO, NO}, "counts_per_turn"},
-		{{1000, 1, NO, NO, NO, NO, NO, 0x00000000, NO}, "velocity_per_turn_s"},
-		{{1000, 1, NO, NO, NO, NO, NO, 0x00b45700, NO}, "velocity_per_turn_s"},
-		{{1000, 1, NO, NO, NO, NO, NO, 0x00b44800, NO}, "velocity_per_turn_s"},
-		{{1000, 1, NO, NO, NO, NO, NO, 0x00010300, NO}, "velocity_per_turn_s"},
-		{{1000, 1, NO, NO, NO, NO, NO, 0x80b44700, NO}, "velocity_per_turn_s"},
-		{{1000, 1, NO, NO, NO, NO, NO, 0x00c00300, NO}, "velocity_per_turn_s"},
+		{"608F=4294967294/1 6091=4294967294/1", "counts_per_turn"},
+		{"6092=1000/1 608F=4000/1 6091=1/1 60A8=00AA0000", "counts_per_turn"},
+		{"6092=1000/1 608F=4000/1 6091=1/1 60A8=80410000", "counts_per_turn"},
+		{"6092=1000/1 608F=4000/1 6091=1/1 60A8=7F410000", "counts_per_turn"},
+		{"6092=1000/1 60A9=00000000", "velocity_per_turn_s"},
+		{"6092=1000/1 60A9=00B45700", "velocity_per_turn_s"},
+		{"6092=1000/1 60A9=00B44800", "velocity_per_turn_s"},
+		{"6092=1000/1 60A9=00010300", "velocity_per_turn_s"},
+		{"6092=1000/1 60A9=80B44700", "velocity_per_turn_s"},
+		{"6092=1000/1 60A9=00C00300", "velocity_per_turn_s"},
 		/* The unit of accelerations could be rpm/s. */
-		{{1000, 1, NO, NO, NO, NO, NO, 0x00b44700, NO},
-		 "acceleration_per_turn_s2"},
-		{{1000, 1, NO, NO, NO, NO, NO, NO, 0x00b44700},
-		 "acceleration_per_turn_s2"},
-		{{1000, 1, NO, NO, NO, NO, NO, NO, 0x00b40300},
-		 "acceleration_per_turn_s2"},
-		{{1000, 1, NO, NO, NO, NO, NO, NO, 0xffffff00},
-		 "acceleration_per_turn_s2"},
+		{"6092=1000/1 60A9=00B44700", "acceleration_per_turn_s2"},
+		{"6092=1000/1 60AA=00B44700", "acceleration_per_turn_s2"},
+		{"6092=1000/1 60AA=00B40300", "acceleration_per_turn_s2"},
+		{"6092=1000/1 60AA=FFFFFF00", "acceleration_per_turn_s2"},
 	};
 	struct led *led = *state;
 
@@ -395,7 +368,7 @@ TEST(test_refused_units, setup)
 		struct cia402_units units = {0};
 
 		led_init(led);
-		put_all(led, &cases[i].factors);
+		set_factors(led, cases[i].factors);
 		assert_int_equal(cia402_read_units(&led->client, &units), -EPROTO);
 		assert_non_null(strstr(led->err.text, cases[i].key));
 		assert_true(units.counts_per_turn == 0); /* nothing by halves */
