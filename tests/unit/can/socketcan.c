@@ -552,9 +552,7 @@ TEST(a_node_has_one_owner)
 	assert_int_equal(open_bus(&first, interface, 0, 113, &err), 0);
 	assert_int_equal(open_bus(&second, interface, 0, 113, &err), -EBUSY);
 	assert_int_equal(err.code, EBUSY);
-	assert_ptr_equal(strstr(err.text,
-				"rig.conf:1: stepper: another program drives it; "),
-			 err.text);
+	assert_ptr_equal(strstr(err.text, "rig.conf:1: stepper: "), err.text);
 	/* The message has the name that ss prints. */
 	snprintf(name, sizeof(name), "@incise-can/%s/113)", interface);
 	assert_non_null(strstr(err.text, name));
