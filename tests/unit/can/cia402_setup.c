@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * lib/device/can/cia402/cia402_setup.c: the drive then behaves as it was set up, holds its limits and
- * sends only what is for this side; a failure at any step ends with a message, in bounded time and
- * without power.
+ * sends only what is for this side. can_session.c has a failure at any step.
  */
 #include "../unit.h"
 #include <stdio.h>
@@ -224,67 +223,6 @@ TEST(test_cycles, setup)
 		assert_int_equal(led_value(led, 0x60c2, 1), cases[i].digit);
 		assert_int_equal((int8_t)led_value(led, 0x60c2, 2), cases[i].power);
 	}
-}
-
-/* A failure at the k-th SDO, for every k: a message, or an object noted as absent. */
-TEST(test_every_step, setup)
-{
-	static const uint32_t codes[] = {0x08000000, ABORT_NO_OBJECT, ABORT_NO_SUB,
-					 0x08000022, ABORT_VALUE};
-	struct led *led = *state;
-	uint64_t requests;
-	unsigned int failed = 0, went_on = 0;
-
-	assert_int_equal(led_configure(led), 0);
-	requests = led->drive.requests;
-	/* The last pass loses the request; each ends in bounded time. */
-	for (size_t c = 0; c <= COUNT(codes); c++)
-		for (uint32_t k = 1; k <= requests; k++) {
-			int64_t t;
-			int rc;
-
-			led_init(led);
-			t = led->drive.now_ns;
-			if (c < COUNT(codes)) {
-				led->drive.abort_at = k;
-				led->drive.abort_code = codes[c];
-			} else {
-				led->drive.drop_at = k;
-			}
-			rc = led_configure(led);
-			assert_true(led->drive.now_ns - t < 5000 * DRIVE_MS);
-			assert_false(cia402_powered(led->drive.state));
-			assert_int_equal(led->drive.enables, 0);
-			if (!rc) {
-				went_on++;
-				/*
-				 * Silence is always an error; a refusal other than
-				 * absence is not one for hints and inputs.
-				 */
-				assert_true(c < COUNT(codes));
-				if (codes[c] != ABORT_NO_OBJECT &&
-				    codes[c] != ABORT_NO_SUB)
-					assert_true(led->drive.aborted == 0x1006 ||
-						    led->drive.aborted == 0x1007 ||
-						    led->drive.aborted == 0x1a01);
-				if (led->drive.aborted == 0x1a01)
-					assert_false(led->supported.inputs);
-				continue;
-			}
-			failed++;
-			assert_memory_equal(led->err.text, "here: ", 6);
-			assert_non_null(strpbrk(led->err.text, ";"));
-			if (c < COUNT(codes)) {
-				assert_true(rc == -EOPNOTSUPP);
-			} else {
-				assert_int_equal(rc, -ETIMEDOUT);
-				drive_advance(&led->drive, DRIVE_MS);
-				assert_int_equal(led->drive.master_abort, ABORT_TIMEOUT);
-			}
-		}
-	/* At least four of six passes failed at nearly every step. */
-	assert_true(failed > requests * 4);
-	assert_int_equal(failed + went_on, requests * (COUNT(codes) + 1));
 }
 
 /* The bus fails at the start or at the k-th frame, permanently or once. */
