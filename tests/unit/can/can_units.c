@@ -105,7 +105,7 @@ TEST(a_bus_that_is_too_slow_is_refused)
 		{500000, 1000000, true}, {250000, 1000000, false},
 		{1000000, 500000, true}, {500000, 500000, false},
 		{250000, 2000000, true}, {125000, 2000000, false},
-		{0, 500000, true},
+		{10000, 2000000, false}, {0, 500000, true},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {

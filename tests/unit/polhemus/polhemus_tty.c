@@ -165,3 +165,25 @@ TEST(opens, tracker_begin, tracker_end)
 	assert_int_equal(errno, EBUSY);
 	tracker->ops->close(tracker);
 }
+
+TEST(back_again, tracker_begin, tracker_end)
+{
+	struct incise_error err = {0};
+	struct polhemus_line *line = polhemus_tty_open(pty.path, "rig.conf", &err);
+	unsigned char bytes[64];
+	int64_t t_ns;
+
+	if (!line)
+		fail_msg("%s", err.text);
+	pty_unplug(&pty);
+	while (line->ops->read(line, bytes, sizeof(bytes), &t_ns, 20000) > 0)
+		;
+	assert_int_equal(line->ops->write(line, "P", 1), -ENODEV);
+	assert_true(line->ops->reopen(line) < 0);
+	assert_int_equal(pty_plug(&pty), 0);
+	assert_int_equal(line->ops->reopen(line), 0);
+	/* It answers with a record. */
+	assert_int_equal(line->ops->write(line, "P", 1), 0);
+	assert_true(line->ops->read(line, bytes, sizeof(bytes), &t_ns, 20000) > 0);
+	line->ops->close(line);
+}
