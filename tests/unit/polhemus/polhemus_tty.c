@@ -180,6 +180,7 @@ TEST(back_again, tracker_begin, tracker_end)
 		;
 	assert_int_equal(line->ops->write(line, "P", 1), -ENODEV);
 	assert_true(line->ops->reopen(line) < 0);
+	assert_int_equal(line->ops->write(line, "P", 1), -ENODEV);
 	assert_int_equal(pty_plug(&pty), 0);
 	assert_int_equal(line->ops->reopen(line), 0);
 	/* It answers with a record. */
