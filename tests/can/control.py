@@ -84,20 +84,9 @@ class Control:
         made["events"] = self.drive.record.events
         return made
 
-    def events(self, _):
-        """what happened, ms since its start"""
-        return {"events": self.drive.record.events}
-
     def objects(self, _):
         """which objects SDOs wrote and read, in their order"""
         return {"written": listed(self.drive.sdo_writes), "read": listed(self.drive.sdo_reads)}
-
-    def get(self, words):
-        """INDEX SUB: the value of an object"""
-        index, sub = where(words)
-        drive = self.drive
-        live = drive.live.get(index)
-        return {"value": live() if live else drive.node.value(index, sub or 0)}
 
     # Faults.
 
@@ -155,17 +144,9 @@ class Control:
         """[off]: the shaft is held"""
         self.drive.machine.blocked = on(words)
 
-    def push(self, words):
-        """COUNTS: the shaft jumps"""
-        self.drive.machine.shaft += float(words[0])
-
     def inputs(self, words):
         """BITS|off: 60FD"""
         self.drive.machine.forced_inputs = int(words[0], 0) if on(words) else None
-
-    def warning(self, words):
-        """[off]: bit 7 of the statusword"""
-        self.drive.machine.warning = on(words)
 
     def abort(self, words):
         """INDEX [SUB|all [CODE]], or off: SDOs to it are aborted"""
@@ -200,10 +181,6 @@ class Control:
     def restart(self, _):
         """counters from 0"""
         self.drive.record.restart()
-
-    def quit(self, _):
-        """ends it"""
-        self.done = True
 
 
 COMMANDS = [name for name in vars(Control)

@@ -58,7 +58,6 @@ class Machine:
         self.blocked = False
         self.forced_inputs = None
         self.fault_stays = False
-        self.warning = False
         self.power_on()
 
     def power_on(self):
@@ -94,7 +93,6 @@ class Machine:
     @property
     def statusword(self):
         word = STATES[self.state] | 0x0210  # remote, voltage
-        word |= 0x0080 if self.warning else 0
         word |= 0x0800 if self.limit_active else 0
         if self.mode == HOMING:
             word |= 0 if self.homing else 0x0400

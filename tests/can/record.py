@@ -20,14 +20,12 @@ class Record:
         self.doubled = 0  # set-points of which only the last counted
         self.enabled_rpdos = 0  # that came with power
         self.largest_step = 0
-        self.largest_change = 0  # of the step, from one cycle to the next
         self.sdos = 0
         self.heartbeats = 0  # of the master
         self.emcys = 0
         self.gaps = array("d")
         self.last_sync = None
         self.last_target = None
-        self.last_step = 0
         self.pending = 0
         self.silence_ms = None  # from the last heartbeat to the reaction to its loss
         self.first_sdo = None
@@ -64,13 +62,11 @@ class Record:
             self.doubled += self.pending - 1
         self.pending = 0
         if not enabled or target is None:
-            self.last_target, self.last_step = None, 0
+            self.last_target = None
             return
         if self.last_target is not None:
             step = target - self.last_target
             self.largest_step = max(self.largest_step, abs(step))
-            self.largest_change = max(self.largest_change, abs(step - self.last_step))
-            self.last_step = step
         self.last_target = target
 
     def _gaps(self):
@@ -82,7 +78,7 @@ class Record:
 
     def report(self):
         names = ("syncs", "rpdos", "enabled_rpdos", "tpdos", "missing", "doubled",
-                 "largest_step", "largest_change", "sdos", "heartbeats", "emcys", "silence_ms",
+                 "largest_step", "sdos", "heartbeats", "emcys", "silence_ms",
                  "start_ms")
         made = {name: getattr(self, name) for name in names}
         made["between_syncs"] = self._gaps()

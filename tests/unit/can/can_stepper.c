@@ -4,11 +4,7 @@
  * every stepper; each fault, also of drives and buses that fail in part, so that one way of
  * noticing is missing; homing by the drive; and no set-point is lost.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include "../device/conformance.h"
 #include "rig.h"
@@ -33,7 +29,7 @@ static void input(void *world, unsigned int input, bool active)
 	r->drive.inputs = active ? r->drive.inputs | bit : r->drive.inputs & ~bit;
 }
 
-static void every_case_of_a_stepper(void **state)
+TEST(every_case_of_a_stepper)
 {
 	static const struct {
 		bool invert, no_homing;
@@ -67,14 +63,52 @@ static void every_case_of_a_stepper(void **state)
 			incise_stepper_info(c.stepper, &c.info);
 			conformance[i].run(&c);
 			assert_int_equal(rig.drive.enabled_unasked, 0);
-			/*
-			 * The drive interpolates linearly between targets and rounds
-			 * corners by its own ramp; it catches up within its limits.
-			 */
-			assert_true(rig.drive.fastest <= 1.25 * 10 * COUNTS_PER_MM + 1);
+			/* A target is a whole count: 1 of a cycle of 0.5 ms. */
+			assert_true(rig.drive.fastest <= 10 * COUNTS_PER_MM + 2000);
 			can_rig_close(&rig);
 			assert_false(drive_powered(&rig.drive));
 		}
+}
+
+static void start(enum incise_actuator_mode mode, double deadman_s)
+{
+	can_rig_init(&rig);
+	rig.actuator.deadman_s = deadman_s;
+	rig.actuator.can.mode = mode;
+	rig.actuator.can.stiffness_permille_mm = 50;
+	rig.actuator.can.damping_permille_s_mm = 5;
+	rig.actuator.can.torque_max_permille = 300;
+	rig.drive.torque_counts_s2 = 0.1 * 1000 * COUNTS_PER_MM / 10;
+}
+
+static void go(void)
+{
+	can_rig_open_or_fail(&rig);
+	can_rig_enable_or_fail(&rig);
+	can_rig_hold(&rig, 15, 300 * MS);
+	assert_true(rig.drive.velocity > 5 * COUNTS_PER_MM);
+}
+
+static double at_mm(void)
+{
+	return rig.drive.position / COUNTS_PER_MM;
+}
+
+/* It stopped permanently, for the given reason, without power. */
+static void stopped(const char *name, unsigned int fault, const char *says)
+{
+	struct incise_stepper_status s = can_rig_look(&rig);
+	char cause[300];
+
+	incise_stepper_cause(rig.stepper, cause, sizeof(cause));
+	if (s.state != INCISE_STEPPER_STATE_FAULT || !(s.faults & fault) ||
+	    !strstr(cause, says) || !strstr(cause, "drive 0x10 at can-test: "))
+		fail_msg("%s: %s, faults %#x, \"%s\"", name,
+			 incise_stepper_state_name(s.state), s.faults, cause);
+	if (rig.drive.velocity || drive_powered(&rig.drive))
+		fail_msg("%s: it goes on in %s", name,
+			 cia402_state_name(rig.drive.state));
+	assert_int_equal(rig.drive.enabled_unasked, 0);
 }
 
 /* Faults under way; each is undone before `clear`. */
@@ -126,6 +160,12 @@ static void queue_full(struct drive *d, bool on)
 	d->send_error = on ? -ENOBUFS : 0;
 }
 
+/* A queue that empties by a frame per cycle has room for set-points, not for SYNCs. */
+static void no_sync(struct drive *d, bool on)
+{
+	d->sync_error = on ? -ENOBUFS : 0;
+}
+
 static void adapter_gone(struct drive *d, bool on)
 {
 	d->receive_error = d->send_error = on ? -ENODEV : 0;
@@ -151,56 +191,89 @@ static void pre_operational(struct drive *d, bool on)
 		d->nmt = CANOPEN_PRE_OPERATIONAL;
 }
 
+/* It receives no set-points, but sends heartbeats and its position. */
+static void disobeys(struct drive *d, bool on)
+{
+	if (on)
+		d->od[OD_RPDO1_COB].value |= 0x80000000;
+}
+
+/* The PDO that would report the e-stop stops. */
+static void no_inputs(struct drive *d, bool on)
+{
+	if (on)
+		d->od[OD_TPDO2_COB].value |= 0x80000000;
+}
+
+#define CSP INCISE_ACTUATOR_CSP
+#define CSV INCISE_ACTUATOR_CSV
+#define CST INCISE_ACTUATOR_CST
+#define ALARM INCISE_STEPPER_FAULT_ALARM
+#define LOST INCISE_STEPPER_FAULT_LOST
+#define BUS INCISE_STEPPER_FAULT_BUS
+#define FOLLOWING INCISE_STEPPER_FAULT_FOLLOWING
+
+/*
+ * It goes 10 mm/s, and a ramp takes 0.1 mm. This side's own watch of heartbeats and status is the
+ * deadman and a half, and at most 20 ms where the loop is closed here; the drive's is the deadman
+ * and a heartbeat, a quarter of it.
+ */
 static const struct {
 	const char *name;
 	void (*inject)(struct drive *drive, bool on);
 	unsigned int fault;
 	const char *says;
+	enum incise_actuator_mode mode;
+	double deadman_s, most_mm; /* that it goes on */
 } faults[] = {
-	{"EMCY", emcy, INCISE_STEPPER_FAULT_ALARM, "(3210h)"},
-	{"no heartbeat", heartbeat, INCISE_STEPPER_FAULT_LOST, "no heartbeat from it"},
-	{"no TPDO", tpdo, INCISE_STEPPER_FAULT_LOST, "no status (TPDO1)"},
-	{"unplugged", unplugged, INCISE_STEPPER_FAULT_LOST, "check its power and cable"},
-	{"reboot", reboot, INCISE_STEPPER_FAULT_LOST, "it restarted"},
-	{"blocked", blocked, INCISE_STEPPER_FAULT_FOLLOWING, "off its target by"},
-	{"bus-off", bus_off, INCISE_STEPPER_FAULT_BUS, "the bus is off"},
-	{"queue full", queue_full, INCISE_STEPPER_FAULT_BUS, "queue is full"},
-	{"adapter gone", adapter_gone, INCISE_STEPPER_FAULT_BUS, "No such device"},
-	{"other master", other_master, INCISE_STEPPER_FAULT_SETPOINT, "another program"},
-	{"power taken", powered_off, INCISE_STEPPER_FAULT_ALARM,
-	 "left operation enabled"},
-	{"NMT", pre_operational, INCISE_STEPPER_FAULT_LOST, "pre-operational"},
+	{"EMCY", emcy, ALARM, "(3210h)", CSP, 0.1, 0},
+	{"no heartbeat", heartbeat, LOST, "heartbeat", CSP, 0.1, 10 * 0.18 + 0.2},
+	{"unplugged", unplugged, LOST, "", CSP, 0.1, 10 * 0.18 + 0.2},
+	{"reboot", reboot, LOST, "restarted", CSP, 0.1, 0},
+	{"blocked", blocked, FOLLOWING, "off its target", CSP, 0.1, 0},
+	{"bus-off", bus_off, BUS, "bus is off", CSP, 0.1, 10 * 0.125 + 0.2},
+	{"queue full", queue_full, BUS, "queue is full", CSP, 0.1, 10 * 0.125 + 0.2},
+	{"adapter gone", adapter_gone, BUS, "No such device", CSP, 0.1, 10 * 0.125 + 0.2},
+	{"other master", other_master, INCISE_STEPPER_FAULT_SETPOINT, "another program",
+	 CSP, 0.1, 0.2},
+	{"power taken", powered_off, ALARM, "operation enabled", CSP, 0.1, 0},
+	{"NMT", pre_operational, LOST, "pre-operational", CSP, 0.1, 10 * 0.125 + 0.2},
+	/* A loop closed here opens without answers, however long the deadman is. */
+	{"no TPDO", tpdo, LOST, "TPDO1", CSP, 0.1, 10 * 0.18 + 0.2},
+	{"no TPDO", tpdo, LOST, "TPDO1", CSP, 1, 10 * 1.8 + 0.2},
+	{"no TPDO, csv", tpdo, LOST, "TPDO1", CSV, 0.1, 10 * 0.125 + 0.2},
+	{"no TPDO, csv", tpdo, LOST, "TPDO1", CSV, 1, 10 * 0.125 + 0.2},
+	{"no TPDO, cst", tpdo, LOST, "TPDO1", CST, 0.1, 10 * 0.125 + 0.2},
+	{"no TPDO, cst", tpdo, LOST, "TPDO1", CST, 1, 10 * 0.125 + 0.2},
+	/* It is left to its own watch: in csv after following_mm and _ms, and 20 ms more. */
+	{"disobeys", disobeys, FOLLOWING | LOST | ALARM, "", CSP, 0.1, 0.1},
+	{"disobeys, csv", disobeys, FOLLOWING | LOST | ALARM, "", CSV, 0.1,
+	 1 + 10 * (0.05 + 0.02 + 0.125) + 0.2},
+	{"no SYNC", no_sync, BUS, "queue is full", CSV, 0.1, 10 * 0.125 + 0.3},
+	{"no inputs", no_inputs, LOST, "TPDO2", CSP, 0.1, 10 * 0.4 + 0.2},
 };
 
-static void each_fault_stops_the_drive_and_is_named(void **state)
+TEST(each_fault_stops_the_drive_and_is_named)
 {
 	for (size_t i = 0; i < sizeof(faults) / sizeof(*faults); i++) {
 		struct incise_stepper_status s;
 		struct incise_error err = {0};
-		char cause[300];
 		uint64_t enables;
+		double from_mm;
 
-		can_rig_init(&rig);
-		/* This side detects a blocked drive before the drive does. */
-		if (faults[i].inject == blocked)
-			rig.drive.od[OD_FOLLOWING].size = 0;
-		can_rig_open_or_fail(&rig);
-		can_rig_enable_or_fail(&rig);
-		can_rig_hold(&rig, 15, 200 * MS);
-		assert_true(rig.drive.velocity > 5 * COUNTS_PER_MM);
+		start(faults[i].mode, faults[i].deadman_s);
+		go();
+		from_mm = at_mm();
 		faults[i].inject(&rig.drive, true);
-		can_rig_hold(&rig, 15, 2000 * MS);
-		s = can_rig_look(&rig);
-		incise_stepper_cause(rig.stepper, cause, sizeof(cause));
-		if (s.state != INCISE_STEPPER_STATE_FAULT ||
-		    !(s.faults & faults[i].fault) || !strstr(cause, faults[i].says) ||
-		    !strstr(cause, "drive 0x10 at can-test: "))
-			fail_msg("%s: %s, faults %#x, \"%s\"", faults[i].name,
-				 incise_stepper_state_name(s.state), s.faults, cause);
-		/* Stopped, by us or by its own deadman, and without power. */
-		if (rig.drive.velocity || drive_powered(&rig.drive))
-			fail_msg("%s: it goes on in %s", faults[i].name,
-				 cia402_state_name(rig.drive.state));
+		/* One that disobeys shows it where it ought to stop, or to go. */
+		if (faults[i].inject == disobeys)
+			can_rig_hold(&rig, from_mm, 1000 * MS);
+		can_rig_hold(&rig, 15, 6000 * MS);
+		/* A reboot sets its count to 0. */
+		if (at_mm() - from_mm > faults[i].most_mm + 1e-6)
+			fail_msg("%s: it went on for %g mm", faults[i].name,
+				 at_mm() - from_mm);
+		stopped(faults[i].name, faults[i].fault, faults[i].says);
 		enables = rig.drive.enables;
 		faults[i].inject(&rig.drive, false);
 		assert_int_equal(incise_stepper_enable(rig.stepper, &err), -EPERM);
@@ -214,33 +287,33 @@ static void each_fault_stops_the_drive_and_is_named(void **state)
 		can_rig_enable_or_fail(&rig);
 		can_rig_hold(&rig, 5, 3000 * MS);
 		s = can_rig_look(&rig);
-		if (s.faults || fabs(s.position_mm - 5) > 1e-3)
+		if (s.faults ||
+		    fabs(s.position_mm - 5) > (faults[i].mode == CST ? 0.02 : 1e-3))
 			fail_msg("%s: afterwards %#x at %g mm", faults[i].name, s.faults,
 				 s.position_mm);
 		assert_int_equal(rig.drive.enabled_unasked, 0);
 		can_rig_close(&rig);
 	}
+	/* A drive without the event timer does not say that inputs are silent. */
+	start(CSP, 0.1);
+	rig.drive.od[OD_TPDO2_TIMER].size = 0;
+	go();
+	can_rig_hold(&rig, 10, 1000 * MS);
+	assert_int_equal(can_rig_look(&rig).faults, 0);
+	can_rig_close(&rig);
 }
 
-static void a_program_that_hangs_is_stopped_by_the_drive(void **state)
+TEST(a_program_that_hangs_is_stopped_by_the_drive)
 {
-	double at_mm, most_mm;
+	double from_mm;
 
-	can_rig_init(&rig);
-	can_rig_open_or_fail(&rig);
-	can_rig_enable_or_fail(&rig);
-	can_rig_hold(&rig, 15, 300 * MS);
-	assert_true(rig.drive.velocity > 5 * COUNTS_PER_MM);
-	at_mm = rig.drive.position / COUNTS_PER_MM;
+	start(CSP, 0.1);
+	go();
+	from_mm = at_mm();
 	drive_advance(&rig.drive, 1000 * MS);
 	assert_int_equal(rig.drive.velocity, 0);
 	assert_false(drive_powered(&rig.drive));
-	/*
-	 * It continues at the last speed for at most the deadman and a heartbeat, then on
-	 * its ramp, which is at least as steep as the profile's: v²/2a = 0.1 mm.
-	 */
-	most_mm = 10 * (0.1 + 0.025) + 0.1;
-	assert_true(rig.drive.position / COUNTS_PER_MM - at_mm <= most_mm);
+	assert_true(at_mm() - from_mm <= 10 * (0.1 + 0.025) + 0.1);
 	/* The program wakes up: nothing moves by itself. */
 	can_rig_hold(&rig, 15, 2000 * MS);
 	assert_int_equal(can_rig_look(&rig).state, INCISE_STEPPER_STATE_FAULT);
@@ -253,54 +326,35 @@ static void a_program_that_hangs_is_stopped_by_the_drive(void **state)
  * A program that stood still before a drive that ignores a lost master and holds its place:
  * what it is given afterwards moves nothing.
  */
-static void a_program_that_stood_still_does_not_go_on(void **state)
+TEST(a_program_that_stood_still_does_not_go_on)
 {
-	struct incise_stepper_status s;
 	char cause[300];
-	double at;
+	double from_mm;
 
-	can_rig_init(&rig);
-	can_rig_open_or_fail(&rig);
-	can_rig_enable_or_fail(&rig);
-	can_rig_hold(&rig, 15, 300 * MS);
-	assert_true(rig.drive.velocity > 5 * COUNTS_PER_MM);
-	rig.drive.watching = rig.drive.deadline_runs = false;
-	at = rig.drive.position;
+	start(CSP, 0.1);
+	go();
+	rig.drive.watching = false;
 	drive_advance(&rig.drive, 3000 * MS);
 	assert_true(drive_powered(&rig.drive));
-	rig.drive.velocity = 0;
-	rig.drive.position = rig.drive.demand = at;
+	from_mm = at_mm();
 	/* Whoever reads the status need not wait for the thread. */
-	s = can_rig_look(&rig);
-	assert_true(s.faults & INCISE_STEPPER_FAULT_DEADMAN);
+	assert_true(can_rig_look(&rig).faults & INCISE_STEPPER_FAULT_DEADMAN);
 	assert_true(incise_stepper_cause(rig.stepper, cause, sizeof(cause)) > 0);
-	assert_non_null(strstr(cause, "this program was stopped for 300"));
+	assert_non_null(strstr(cause, "stopped for 300"));
 	assert_int_equal(incise_stepper_set(rig.stepper, 15), -EIO);
 	can_rig_hold(&rig, 15, 2000 * MS);
-	s = can_rig_look(&rig);
-	incise_stepper_cause(rig.stepper, cause, sizeof(cause));
-	if (s.state != INCISE_STEPPER_STATE_FAULT ||
-	    !(s.faults & INCISE_STEPPER_FAULT_DEADMAN) ||
-	    !strstr(cause, "this program was stopped for 300"))
-		fail_msg("%s, faults %#x, \"%s\"", incise_stepper_state_name(s.state),
-			 s.faults, cause);
-	assert_false(drive_powered(&rig.drive));
-	/* Its quick stop, and nothing else. */
-	assert_true(fabs(rig.drive.position - at) < 0.2 * COUNTS_PER_MM);
-	assert_int_equal(rig.drive.enabled_unasked, 0);
+	stopped("stood still", INCISE_STEPPER_FAULT_DEADMAN, "stopped for 300");
+	assert_true(fabs(at_mm() - from_mm) < 1e-3);
 	can_rig_close(&rig);
 }
 
 /* Off the bus, it uses up all the time that a stop has: disabling waits for that. */
-static void disabling_waits_for_the_end_of_a_stop(void **state)
+TEST(disabling_waits_for_the_end_of_a_stop)
 {
 	struct incise_error err = {0};
 
-	can_rig_init(&rig);
-	rig.actuator.deadman_s = 0.2;
-	can_rig_open_or_fail(&rig);
-	can_rig_enable_or_fail(&rig);
-	can_rig_hold(&rig, 15, 300 * MS);
+	start(CSP, 0.2);
+	go();
 	pre_operational(&rig.drive, true);
 	rig.drive.no_tpdo = true;
 	if (incise_stepper_disable(rig.stepper, &err))
@@ -321,7 +375,7 @@ static uint64_t counter(const char *key)
 }
 
 /* 60 s at 1 kHz, each cycle another target. */
-static void no_set_point_is_lost(void **state)
+TEST(no_set_point_is_lost)
 {
 	uint64_t rpdos, sent;
 	int64_t end;
@@ -353,7 +407,7 @@ static void no_set_point_is_lost(void **state)
 }
 
 /* The loops closed here reach the target within their limits. */
-static void velocities_and_torques_go_there_too(void **state)
+TEST(velocities_and_torques_go_there_too)
 {
 	static const struct {
 		enum incise_actuator_mode mode;
@@ -361,25 +415,18 @@ static void velocities_and_torques_go_there_too(void **state)
 		double within_mm;
 	} cases[] = {
 		/* Exactly: an integrator leaves no error. */
-		{INCISE_ACTUATOR_CSV, false, 2e-4},
-		{INCISE_ACTUATOR_CSV, true, 2e-4},
-		/*
-		 * Up to the deflection of a spring of stiffness_permille_mm at half a ‰.
-		 */
-		{INCISE_ACTUATOR_CST, false, 0.02},
-		{INCISE_ACTUATOR_CST, true, 0.02},
+		{CSV, false, 2e-4},
+		{CSV, true, 2e-4},
+		/* The deflection of a spring of stiffness_permille_mm at half a ‰. */
+		{CST, false, 0.02},
+		{CST, true, 0.02},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_stepper_status s;
 
-		can_rig_init(&rig);
+		start(cases[i].mode, 0.1);
 		rig.actuator.invert = cases[i].invert;
-		rig.actuator.can.mode = cases[i].mode;
-		rig.actuator.can.stiffness_permille_mm = 50;
-		rig.actuator.can.damping_permille_s_mm = 5;
-		rig.actuator.can.torque_max_permille = 300;
-		rig.drive.torque_counts_s2 = 0.1 * 1000 * COUNTS_PER_MM / 10;
 		can_rig_open_or_fail(&rig);
 		can_rig_enable_or_fail(&rig);
 		can_rig_hold(&rig, 4, 3000 * MS);
@@ -392,149 +439,13 @@ static void velocities_and_torques_go_there_too(void **state)
 	}
 }
 
-static void start(enum incise_actuator_mode mode, double deadman_s)
-{
-	struct incise_error err = {0};
-
-	can_rig_init(&rig);
-	rig.actuator.deadman_s = deadman_s;
-	rig.actuator.can.mode = mode;
-	rig.actuator.can.stiffness_permille_mm = 50;
-	rig.actuator.can.damping_permille_s_mm = 5;
-	rig.actuator.can.torque_max_permille = 300;
-	rig.drive.torque_counts_s2 = 0.1 * 1000 * COUNTS_PER_MM / 10;
-	if (!can_rig_open(&rig, &err) || incise_stepper_enable(rig.stepper, &err))
-		fail_msg("%s", err.text);
-	rig.drive.tripped = false;
-}
-
-static double at_mm(void)
-{
-	return rig.drive.position / COUNTS_PER_MM;
-}
-
-/* Check that it stopped permanently, for the given reason. */
-static void stopped(unsigned int fault, const char *says)
-{
-	struct incise_stepper_status s;
-	char cause[300];
-
-	can_rig_hold(&rig, 10, 3000 * MS);
-	s = can_rig_look(&rig);
-	incise_stepper_cause(rig.stepper, cause, sizeof(cause));
-	if (s.state != INCISE_STEPPER_STATE_FAULT || !(s.faults & fault) ||
-	    !strstr(cause, says))
-		fail_msg("%s, faults %#x, \"%s\"", incise_stepper_state_name(s.state),
-			 s.faults, cause);
-	assert_false(drive_powered(&rig.drive));
-	assert_int_equal(rig.drive.velocity, 0);
-	assert_int_equal(rig.drive.enabled_unasked, 0);
-}
-
-/* A loop closed here opens without answers, however long the deadman is. */
-static void silence_of_the_drive_moves_nothing(void **state)
-{
-	for (int mode = INCISE_ACTUATOR_CSP; mode <= INCISE_ACTUATOR_CST; mode++)
-		for (int k = 0; k < 2; k++) {
-			start((enum incise_actuator_mode)mode, k ? 1.0 : 0.1);
-			can_rig_hold(&rig, 4, 300 * MS);
-			rig.drive.no_tpdo = true;
-			can_rig_hold(&rig, 4, 3000 * MS);
-			/*
-			 * It moves at most to its target; a swing in torque mode runs
-			 * out.
-			 */
-			assert_true(at_mm() < (mode == INCISE_ACTUATOR_CST ? 5 : 4.01));
-			assert_true(at_mm() > 0);
-			rig.drive.no_tpdo = mode == INCISE_ACTUATOR_CSP;
-			stopped(INCISE_STEPPER_FAULT_LOST, "no status (TPDO1)");
-			can_rig_close(&rig);
-		}
-}
-
-/* It receives no set-points, but sends heartbeats and its position. */
-static void a_drive_that_does_not_obey_is_left_to_its_own_watch(void **state)
-{
-	for (int mode = INCISE_ACTUATOR_CSP; mode <= INCISE_ACTUATOR_CSV; mode++) {
-		double from_mm;
-
-		start((enum incise_actuator_mode)mode, 0.1);
-		can_rig_hold(&rig, 10, 300 * MS);
-		from_mm = at_mm();
-		rig.drive.od[OD_RPDO1_COB].value |= 0x80000000u;
-		can_rig_hold(&rig, from_mm, 1000 * MS);
-		assert_int_equal(rig.drive.velocity, 0);
-		/*
-		 * In csv it continues at 10 mm/s for following_mm and following_ms, then
-		 * 20 ms without obeying, then the 100 ms of its own watch and a
-		 * heartbeat; the targets continue for v²/2a, and its ramp takes as much.
-		 */
-		assert_true(at_mm() - from_mm <
-			    1 + 10 * (0.05 + 0.02 + 0.125) + 2 * 0.1 + 0.1);
-		stopped(INCISE_STEPPER_FAULT_FOLLOWING | INCISE_STEPPER_FAULT_LOST |
-				INCISE_STEPPER_FAULT_ALARM,
-			"drive 0x10 at can-test: ");
-		can_rig_close(&rig);
-	}
-}
-
-static int (*all_sent)(struct can_bus *bus, const struct can_frame *frame);
-
-static int no_sync(struct can_bus *bus, const struct can_frame *frame)
-{
-	return frame->can_id == CANOPEN_SYNC ? -ENOBUFS : all_sent(bus, frame);
-}
-
-/* A queue that empties by a frame per cycle has room for set-points, not for SYNCs. */
-static void a_set_point_without_its_sync_is_none(void **state)
-{
-	static struct can_bus_ops ops;
-	const struct can_bus_ops *before;
-	double from_mm;
-
-	start(INCISE_ACTUATOR_CSV, 0.1);
-	can_rig_hold(&rig, 10, 300 * MS);
-	before = rig.drive.bus.ops;
-	ops = *before;
-	all_sent = ops.send;
-	ops.send = no_sync;
-	rig.drive.bus.ops = &ops;
-	from_mm = at_mm();
-	can_rig_hold(&rig, 5, 1000 * MS);
-	/* Its own watch, and a heartbeat that was on its way. */
-	assert_true(at_mm() - from_mm < 10 * 0.125 + 0.3);
-	rig.drive.bus.ops = before;
-	stopped(INCISE_STEPPER_FAULT_BUS, "queue is full");
-	can_rig_close(&rig);
-}
-
-/* The PDO that would report the e-stop stops. */
-static void inputs_that_fall_silent_are_a_fault(void **state)
-{
-	start(INCISE_ACTUATOR_CSP, 0.1);
-	can_rig_hold(&rig, 10, 300 * MS);
-	assert_int_equal(can_rig_look(&rig).faults, 0);
-	rig.drive.od[OD_TPDO2_COB].value |= 0x80000000u;
-	can_rig_hold(&rig, 10, 400 * MS);
-	stopped(INCISE_STEPPER_FAULT_LOST, "no inputs (TPDO2)");
-	can_rig_close(&rig);
-	/* A drive without the event timer gives no such indication. */
-	can_rig_init(&rig);
-	rig.drive.od[OD_TPDO2_TIMER].size = 0;
-	assert_non_null(can_rig_open(&rig, NULL));
-	assert_int_equal(incise_stepper_enable(rig.stepper, NULL), 0);
-	can_rig_hold(&rig, 10, 1000 * MS);
-	assert_int_equal(can_rig_look(&rig).faults, 0);
-	can_rig_close(&rig);
-}
-
 /* Another program gives it power. */
-static void power_that_nobody_gave_is_a_fault(void **state)
+TEST(power_that_nobody_gave_is_a_fault)
 {
 	struct incise_error err = {0};
 
-	start(INCISE_ACTUATOR_CSP, 0.1);
-	assert_int_equal(incise_stepper_disable(rig.stepper, NULL), 0);
+	start(CSP, 0.1);
+	can_rig_open_or_fail(&rig);
 	drive_enter(&rig.drive, CIA402_ENABLED);
 	can_rig_advance(&rig, 1000 * MS);
 	assert_int_equal(can_rig_look(&rig).state, INCISE_STEPPER_STATE_FAULT);
@@ -549,7 +460,7 @@ static void power_that_nobody_gave_is_a_fault(void **state)
 }
 
 /* The shortest accepted deadman: it must not expire at rest. */
-static void the_shortest_deadman_holds_at_rest(void **state)
+TEST(the_shortest_deadman_holds_at_rest)
 {
 	struct incise_error err = {0};
 
@@ -567,25 +478,10 @@ static void the_shortest_deadman_holds_at_rest(void **state)
 	can_rig_close(&rig);
 }
 
-static double gives_way_mm;
-
 /* Its brake opens while it gets power. */
-static int give_way(struct can_bus *bus, const struct can_frame *frame)
-{
-	struct drive *d = &rig.drive;
-
-	if (d->enabling && d->enabled_at_ns - d->now_ns < 25 * MS) {
-		d->position += gives_way_mm * COUNTS_PER_MM;
-		d->demand = d->position;
-		gives_way_mm = 0;
-	}
-	return all_sent(bus, frame);
-}
-
-static void one_that_gives_way_gets_no_jump(void **state)
+TEST(one_that_gives_way_gets_no_jump)
 {
 	static const double way_mm[] = {-0.3, -2, 0.005};
-	static struct can_bus_ops ops;
 
 	for (size_t i = 0; i < sizeof(way_mm) / sizeof(*way_mm); i++) {
 		struct incise_error err = {0};
@@ -593,14 +489,10 @@ static void one_that_gives_way_gets_no_jump(void **state)
 		can_rig_init(&rig);
 		rig.drive.enable_ns = 50 * MS;
 		assert_non_null(can_rig_open(&rig, &err));
-		ops = *rig.drive.bus.ops;
-		all_sent = ops.send;
-		ops.send = give_way;
-		rig.drive.bus.ops = &ops;
-		gives_way_mm = way_mm[i];
+		rig.drive.gives_way = way_mm[i] * COUNTS_PER_MM;
 		assert_int_equal(incise_stepper_enable(rig.stepper, &err),
 				 way_mm[i] < 0 ? -ERANGE : 0);
-		assert_true(gives_way_mm == 0);
+		assert_true(rig.drive.gives_way == 0);
 		can_rig_advance(&rig, 2000 * MS);
 		/*
 		 * Each target is within a cycle at 10 mm/s, and rounding, of its
@@ -612,7 +504,7 @@ static void one_that_gives_way_gets_no_jump(void **state)
 	}
 }
 
-static void it_homes_by_itself(void **state)
+TEST(it_homes_by_itself)
 {
 	static const double home_mm[] = {0, -0.5, 1.5};
 
@@ -652,7 +544,7 @@ static void it_homes_by_itself(void **state)
 	}
 }
 
-static void homing_can_fail_and_be_stopped(void **state)
+TEST(homing_can_fail_and_be_stopped)
 {
 	volatile int stop = 0;
 	struct incise_error err = {0};
@@ -660,11 +552,11 @@ static void homing_can_fail_and_be_stopped(void **state)
 	can_rig_init(&rig);
 	can_rig_open_or_fail(&rig);
 	assert_int_equal(incise_stepper_home(rig.stepper, NULL, NULL, &err), -EIO);
-	assert_non_null(strstr(err.text, "it is off"));
+	assert_true(*err.text);
 	can_rig_enable_or_fail(&rig);
 	rig.drive.homing_fails = true;
 	assert_int_equal(incise_stepper_home(rig.stepper, NULL, NULL, &err), -EIO);
-	assert_non_null(strstr(err.text, "its homing failed"));
+	assert_non_null(strstr(err.text, "homing"));
 	assert_false(drive_powered(&rig.drive));
 	assert_false(can_rig_look(&rig).homed);
 	assert_int_equal(incise_stepper_enable(rig.stepper, &err), -EPERM);
@@ -689,28 +581,4 @@ static void homing_can_fail_and_be_stopped(void **state)
 	assert_int_equal(can_rig_look(&rig).faults, 0);
 	can_rig_enable_or_fail(&rig);
 	can_rig_close(&rig);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(every_case_of_a_stepper),
-		cmocka_unit_test(each_fault_stops_the_drive_and_is_named),
-		cmocka_unit_test(a_program_that_hangs_is_stopped_by_the_drive),
-		cmocka_unit_test(a_program_that_stood_still_does_not_go_on),
-		cmocka_unit_test(disabling_waits_for_the_end_of_a_stop),
-		cmocka_unit_test(no_set_point_is_lost),
-		cmocka_unit_test(velocities_and_torques_go_there_too),
-		cmocka_unit_test(silence_of_the_drive_moves_nothing),
-		cmocka_unit_test(a_drive_that_does_not_obey_is_left_to_its_own_watch),
-		cmocka_unit_test(a_set_point_without_its_sync_is_none),
-		cmocka_unit_test(inputs_that_fall_silent_are_a_fault),
-		cmocka_unit_test(power_that_nobody_gave_is_a_fault),
-		cmocka_unit_test(the_shortest_deadman_holds_at_rest),
-		cmocka_unit_test(one_that_gives_way_gets_no_jump),
-		cmocka_unit_test(it_homes_by_itself),
-		cmocka_unit_test(homing_can_fail_and_be_stopped),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

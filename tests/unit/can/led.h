@@ -5,7 +5,7 @@
 #ifndef INCISE_TEST_LED_H
 #define INCISE_TEST_LED_H
 
-#include "can_drive.h"
+#include "drive.h"
 
 #define LED_MASTER 0x7f
 #define LED_DEADMAN_MS 100

@@ -15,7 +15,7 @@
 
 #include <incise/backend.h>
 #include "../../../lib/device/can/cia402/can_stepper.h"
-#include "can_drive.h"
+#include "drive.h"
 
 struct can_rig {
 	struct drive drive;

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/can/bus/slcan.c on a pseudo terminal: the test plays the adapter at the other end.
+ * lib/device/can/bus/slcan.c on a pseudo terminal: the test plays the adapter at the other end, on
+ * a clock of its own. A pty passes its bytes on in a while: what is expected is waited for.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -20,8 +17,31 @@
 #include <linux/can/error.h>
 #include <linux/can/netlink.h>
 #include "../../../lib/device/can/bus/can_bus.h"
+#include "candump.h"
 
-#define MS 1000000
+#define MS INT64_C(1000000)
+#define S (1000 * MS)
+#define COUNT(table) (sizeof(table) / sizeof(*(table)))
+
+static int64_t clock_ns;
+
+int __wrap_clock_gettime(clockid_t clock, struct timespec *t)
+{
+	*t = (struct timespec){clock_ns / S, clock_ns % S};
+	return 0;
+}
+
+static bool quiet; /* nothing comes: the wait is over at once */
+
+int __wrap_ppoll(struct pollfd *fds, nfds_t n, const struct timespec *timeout,
+		 const sigset_t *mask)
+{
+	int rc = poll(fds, n, quiet ? 0 : 10000);
+
+	if (!rc)
+		clock_ns += timeout->tv_sec * S + timeout->tv_nsec;
+	return rc;
+}
 
 /* write() takes at most so many bytes at once (-1: all), after so many signals, or fails. */
 static ssize_t write_most = -1;
@@ -35,14 +55,9 @@ ssize_t __wrap_write(int fd, const void *bytes, size_t n)
 {
 	ssize_t done;
 
-	if (write_interrupts-- > 0) {
-		errno = EINTR;
+	errno = write_interrupts-- > 0 ? EINTR : write_error;
+	if (errno)
 		return -1;
-	}
-	if (write_error) {
-		errno = write_error;
-		return -1;
-	}
 	if (write_most >= 0 && n > (size_t)write_most)
 		n = (size_t)write_most;
 	if (write_left >= 0 && n > (size_t)write_left)
@@ -63,740 +78,522 @@ static void write_all(void)
 	write_interrupts = write_error = 0;
 }
 
-struct adapter {
-	int fd;
-	char path[64];
-	struct can_bus *bus;
-};
+/* The adapter's end, and the bus behind it. */
+static int fd;
+static char path[64];
+static struct can_bus *bus;
+static struct incise_error err;
 
-static void adapter_new(struct adapter *a)
+static const struct can_frame sync_frame = {.can_id = 0x080},
+			      other_frame = {.can_id = 0x123};
+
+static void adapter_new(void)
 {
-	a->fd = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
-	assert_true(a->fd >= 0 && !grantpt(a->fd) && !unlockpt(a->fd));
-	assert_int_equal(ptsname_r(a->fd, a->path, sizeof(a->path)), 0);
-	a->bus = NULL;
+	fd = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+	assert_true(fd >= 0 && !grantpt(fd) && !unlockpt(fd));
+	assert_int_equal(ptsname_r(fd, path, sizeof(path)), 0);
 	write_all();
+	quiet = false;
+	clock_ns = 1000 * S;
 }
 
-static int open_device(struct adapter *a, const char *device, uint32_t bitrate,
-		       struct incise_error *err)
+static int open_device(struct can_bus **opened, const char *device, uint32_t bitrate)
 {
 	const struct can_bus_request request = {
 		.where = "rig.conf:1: stepper", .device = device, .bitrate = bitrate};
 
-	return can_transport_slcan.open(&a->bus, &request, err);
+	err = (struct incise_error){0};
+	return can_transport_slcan.open(opened, &request, &err);
 }
 
-static int adapter_open(struct adapter *a, uint32_t bitrate, struct incise_error *err)
+static void close_bus(void)
 {
-	return open_device(a, a->path, bitrate, err);
+	if (bus)
+		bus->ops->close(bus);
+	bus = NULL;
 }
 
-/* Returns the bytes that the adapter received, @least of them; CR is shown as a dot. */
-static const char *received(struct adapter *a, size_t least)
+/* The adapter received these bytes; CR is shown as a dot. */
+static void received(const char *expected)
 {
-	static char text[4096];
-	struct pollfd poll_fd = {.fd = a->fd, .events = POLLIN};
-	size_t n = 0;
+	char text[200];
+	size_t size = strlen(expected), n = 0;
 
-	/* A kernel worker passes the bytes of a pty on: wait for those that are expected. */
-	while (n < sizeof(text) - 1 && poll(&poll_fd, 1, n < least ? 10000 : 20) == 1) {
-		ssize_t got = read(a->fd, text + n, sizeof(text) - 1 - n);
+	while (n < size) {
+		struct pollfd waits = {.fd = fd, .events = POLLIN};
+		ssize_t got =
+			poll(&waits, 1, 10000) == 1 ? read(fd, text + n, size - n) : 0;
 
-		if (got <= 0)
-			break;
+		assert_true(got > 0);
 		n += (size_t)got;
 	}
-	text[n] = 0;
 	for (size_t i = 0; i < n; i++)
-		if (text[i] == '\r')
-			text[i] = '.';
-	return text;
+		text[i] = text[i] == '\r' ? '.' : text[i];
+	text[n] = '\0';
+	assert_string_equal(text, expected);
 }
 
-/* Likewise without queries, which follow a frame after 100 ms of any machine's stall. */
-static const char *frames_received(struct adapter *a, size_t least)
+static void say_bytes(const char *bytes, size_t n)
 {
-	static char frames[4096];
-	const char *text = received(a, least);
-	size_t n = 0;
-
-	for (; *text; text++)
-		if (!strncmp(text, "F.", 2))
-			text++;
-		else
-			frames[n++] = *text;
-	frames[n] = 0;
-	return frames;
+	assert_int_equal(__real_write(fd, bytes, n), n);
 }
 
-static void send_bytes(struct adapter *a, const char *bytes, size_t n)
-{
-	assert_int_equal(__real_write(a->fd, bytes, n), n);
-}
+#define SAY(text) say_bytes(text, sizeof(text) - 1)
 
-#define SEND(a, text) send_bytes(a, text, sizeof(text) - 1)
-
-/* The next frame or error frame; 0: none within 50 ms. */
-static int next(struct adapter *a, struct can_frame *frame)
+/* The next frame or error frame, or an error. */
+static int next(struct can_frame *frame)
 {
-	int64_t end = a->bus->ops->now(a->bus) + 50 * MS, t_ns;
+	int64_t t_ns = 0;
 	int rc;
 
-	do {
-		rc = a->bus->ops->receive(a->bus, frame, &t_ns);
-		if (rc)
-			break;
-		rc = a->bus->ops->wait(a->bus, end);
-		assert_true(rc == 0 || rc == -ENODEV);
-	} while (!rc && a->bus->ops->now(a->bus) < end);
+	while (!(rc = bus->ops->receive(bus, frame, &t_ns)))
+		assert_int_equal(bus->ops->wait(bus, clock_ns + 10 * S), 0);
 	if (rc == 1)
-		assert_true(t_ns <= a->bus->ops->now(a->bus) && t_ns > end - 1000 * MS);
+		assert_int_equal(t_ns, clock_ns);
 	return rc;
+}
+
+static void expect(const char *text)
+{
+	struct can_frame expected = candump_read(text), frame = {0};
+
+	assert_int_equal(next(&frame), 1);
+	assert_memory_equal(&frame, &expected, sizeof(frame));
+}
+
+/* Whatever was said before was no frame: one that follows is the next. */
+static void expect_nothing(void)
+{
+	uint64_t before = bus->counts.received;
+
+	SAY("t7EE0\r");
+	expect("7EE#");
+	bus->counts.received = before;
 }
 
 static int setup(void **state)
 {
-	static struct adapter a;
-	struct incise_error err = {0};
-
-	adapter_new(&a);
-	if (adapter_open(&a, 500000, &err))
+	adapter_new();
+	if (open_device(&bus, path, 500000))
 		fail_msg("%s", err.text);
-	assert_string_equal(received(&a, strlen(".C.S6.O.")), ".C.S6.O.");
-	*state = &a;
+	received(".C.S6.O.");
 	return 0;
 }
 
 static int teardown(void **state)
 {
-	struct adapter *a = *state;
-
 	write_all();
-	if (a->bus)
-		a->bus->ops->close(a->bus);
-	if (a->fd >= 0)
-		close(a->fd);
-	return 0;
+	close_bus();
+	return fd < 0 ? 0 : close(fd);
 }
 
-static void the_adapter_goes_on_the_bus_and_off(void **state)
-{
-	static const struct {
-		uint32_t bitrate, is;
-		const char *said;
-	} cases[] = {
-		{10000, 10000, ".C.S0.O."},	{20000, 20000, ".C.S1.O."},
-		{50000, 50000, ".C.S2.O."},	{100000, 100000, ".C.S3.O."},
-		{125000, 125000, ".C.S4.O."},	{250000, 250000, ".C.S5.O."},
-		{500000, 500000, ".C.S6.O."},	{800000, 800000, ".C.S7.O."},
-		{1000000, 1000000, ".C.S8.O."}, {0, 1000000, ".C.S8.O."},
-	};
-
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
-		struct termios t;
-		struct adapter a;
-
-		adapter_new(&a);
-		assert_int_equal(adapter_open(&a, cases[i].bitrate, &err), 0);
-		assert_string_equal(received(&a, strlen(cases[i].said)), cases[i].said);
-		assert_int_equal(a.bus->bitrate, cases[i].is);
-		assert_string_equal(a.bus->name, a.path);
-		assert_int_equal(a.bus->ops->state(a.bus), -EOPNOTSUPP);
-		assert_int_equal(tcgetattr(a.fd, &t), 0);
-		assert_int_equal(t.c_lflag & (ICANON | ECHO | ISIG), 0);
-		assert_int_equal(t.c_iflag & (IXON | IXOFF | ICRNL), 0);
-		assert_int_equal(t.c_oflag & OPOST, 0);
-		a.bus->ops->close(a.bus);
-		assert_string_equal(received(&a, strlen("C.")), "C.");
-		close(a.fd);
-	}
-}
-
-static void a_rate_that_none_has_is_refused(void **state)
-{
-	struct incise_error err = {0};
-	struct adapter a;
-
-	adapter_new(&a);
-	assert_int_equal(adapter_open(&a, 83333, &err), -EINVAL);
-	assert_non_null(
-		strstr(err.text, "rig.conf:1: stepper: no adapter supports 83333 bit/s"));
-	close(a.fd);
-}
-
-static void the_rate_may_follow_the_tty(void **state)
+/* The rate is the request's, or follows the tty. */
+TEST(the_adapter_goes_on_the_bus_and_off)
 {
 	static const struct {
 		const char *behind;
 		uint32_t bitrate;
 		int rc;
+		uint32_t is;
 		const char *said; /* received by the adapter; or part of the message */
 	} cases[] = {
-		{"@500000", 0, 0, ".C.S6.O."},
-		{"@500000", 500000, 0, ".C.S6.O."},
-		{"@1000000", 0, 0, ".C.S8.O."},
-		{"@10000", 0, 0, ".C.S0.O."},
-		{"@500000", 250000, -EINVAL,
-		 "has 500000 bit/s after its @, but bitrate is 250000"},
-		{"@83333", 0, -EINVAL, "no adapter supports 83333 bit/s"},
-		{"@0", 0, -EINVAL, "no adapter supports 0 bit/s"},
-		{"@500k", 0, -EINVAL, "no adapter supports 500k bit/s"},
-		{"@500000 ", 0, -EINVAL, "no adapter supports 500000  bit/s"},
-		{"@4295467296", 0, -EINVAL, "no adapter supports 4295467296 bit/s"},
-		{"@99999999999999999999", 0, -EINVAL,
-		 "no adapter supports 99999999999999999999 bit/s"},
-		{"@", 0, -ENODEV, "@; plug in the adapter"},
-		{"@-500000", 0, -ENODEV, "@-500000; plug in the adapter"},
-		{"@500000@", 0, -ENODEV, "@500000@; plug in the adapter"},
+		{"", 10000, 0, 10000, ".C.S0.O."},
+		{"", 20000, 0, 20000, ".C.S1.O."},
+		{"", 50000, 0, 50000, ".C.S2.O."},
+		{"", 100000, 0, 100000, ".C.S3.O."},
+		{"", 125000, 0, 125000, ".C.S4.O."},
+		{"", 250000, 0, 250000, ".C.S5.O."},
+		{"", 500000, 0, 500000, ".C.S6.O."},
+		{"", 800000, 0, 800000, ".C.S7.O."},
+		{"", 1000000, 0, 1000000, ".C.S8.O."},
+		{"", 0, 0, 1000000, ".C.S8.O."},
+		{"@500000", 0, 0, 500000, ".C.S6.O."},
+		{"@500000", 500000, 0, 500000, ".C.S6.O."},
+		{"@10000", 0, 0, 10000, ".C.S0.O."},
+		{"", 83333, -EINVAL, 0, "83333"},
+		{"@500000", 250000, -EINVAL, 0, "250000"},
+		{"@83333", 0, -EINVAL, 0, "83333"},
+		{"@0", 0, -EINVAL, 0, " 0 bit/s"},
+		{"@500k", 0, -EINVAL, 0, "500k"},
+		{"@500000 ", 0, -EINVAL, 0, "500000 "},
+		{"@4295467296", 0, -EINVAL, 0, "4295467296"},
+		{"@99999999999999999999", 0, -EINVAL, 0, "99999999999999999999"},
+		{"@", 0, -ENODEV, 0, "@"},
+		{"@-500000", 0, -ENODEV, 0, "@-500000"},
+		{"@500000@", 0, -ENODEV, 0, "@500000@"},
 	};
 
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
-		struct adapter a;
+	for (size_t i = 0; i < COUNT(cases); i++) {
+		struct termios t;
 		char device[100];
 		int rc;
 
-		adapter_new(&a);
-		snprintf(device, sizeof(device), "%s%s", a.path, cases[i].behind);
-		rc = open_device(&a, device, cases[i].bitrate, &err);
+		adapter_new();
+		snprintf(device, sizeof(device), "%s%s", path, cases[i].behind);
+		rc = open_device(&bus, device, cases[i].bitrate);
 		if (rc != cases[i].rc || (rc && !strstr(err.text, cases[i].said)))
 			fail_msg("case %zu: %d: %s", i, rc, err.text);
 		if (!rc) {
-			assert_string_equal(received(&a, strlen(cases[i].said)),
-					    cases[i].said);
-			assert_int_equal(a.bus->bitrate, atoi(cases[i].behind + 1));
-			assert_string_equal(a.bus->name, a.path);
-			a.bus->ops->close(a.bus);
+			received(cases[i].said);
+			assert_int_equal(bus->bitrate, cases[i].is);
+			assert_string_equal(bus->name, path);
+			assert_int_equal(bus->ops->state(bus), -EOPNOTSUPP);
+			assert_int_equal(tcgetattr(fd, &t), 0);
+			assert_int_equal(t.c_lflag & (ICANON | ECHO | ISIG), 0);
+			assert_int_equal(t.c_iflag & (IXON | IXOFF | ICRNL), 0);
+			assert_int_equal(t.c_oflag & OPOST, 0);
+			close_bus();
+			received("C.");
 		}
-		close(a.fd);
+		close(fd);
 	}
 }
 
-static void a_path_may_have_an_at(void **state)
+TEST(a_path_is_a_serial_port_of_any_name)
 {
-	char folder[] = "/tmp/incise-slcan-XXXXXX", path[64], device[80];
-	struct incise_error err = {0};
-	struct adapter a;
+	static char longest[10000];
+	char folder[] = "/tmp/incise-slcan-XXXXXX", file[64], pipe[64], at[64], rate[80];
+	const struct {
+		const char *device;
+		int code;
+		uint32_t bitrate;
+	} cases[] = {
+		{at, 0, 1000000},      {rate, 0, 250000},
+		{file, -EINVAL, 0},    {pipe, -EINVAL, 0},
+		{folder, -EINVAL, 0},  {"/dev/null", -EINVAL, 0},
+		{"", -ENODEV, 0},      {"/dev/ttyACM4711", -ENODEV, 0},
+		{longest, -ENODEV, 0},
+	};
 
-	adapter_new(&a);
+	adapter_new();
 	assert_non_null(mkdtemp(folder));
-	snprintf(path, sizeof(path), "%s/usb@home", folder);
-	snprintf(device, sizeof(device), "%s@250000", path);
-	assert_int_equal(symlink(a.path, path), 0);
-	assert_int_equal(open_device(&a, path, 0, &err), 0);
-	assert_int_equal(a.bus->bitrate, 1000000);
-	a.bus->ops->close(a.bus);
-	assert_int_equal(open_device(&a, device, 0, &err), 0);
-	assert_int_equal(a.bus->bitrate, 250000);
-	a.bus->ops->close(a.bus);
-	close(a.fd);
-	unlink(path);
+	snprintf(file, sizeof(file), "%s/file", folder);
+	snprintf(pipe, sizeof(pipe), "%s/pipe", folder);
+	snprintf(at, sizeof(at), "%s/usb@home", folder);
+	snprintf(rate, sizeof(rate), "%s@250000", at);
+	close(open(file, O_CREAT | O_WRONLY, 0600));
+	assert_int_equal(mkfifo(pipe, 0600), 0);
+	assert_int_equal(symlink(path, at), 0);
+	memset(longest, 'x', sizeof(longest) - 1);
+	for (size_t i = 0; i < COUNT(cases); i++) {
+		assert_int_equal(open_device(&bus, cases[i].device, 0), cases[i].code);
+		assert_int_equal(err.code, -cases[i].code);
+		if (cases[i].code)
+			continue;
+		assert_int_equal(bus->bitrate, cases[i].bitrate);
+		close_bus();
+	}
+	longest[9000] = '@';
+	memset(longest + 9001, '5', 900);
+	assert_int_equal(open_device(&bus, longest, 0), -EINVAL);
+	close(fd);
+	unlink(file);
+	unlink(pipe);
+	unlink(at);
 	rmdir(folder);
 }
 
-static void a_path_of_any_length_is_safe(void **state)
+TEST(one_program_at_a_time, setup, teardown)
 {
-	static char device[10000];
-	struct incise_error err = {0};
-	struct adapter a = {.fd = -1};
+	struct can_bus *second;
 
-	memset(device, 'x', sizeof(device) - 1);
-	assert_int_equal(open_device(&a, device, 0, &err), -ENODEV);
-	device[9000] = '@';
-	memset(device + 9001, '5', 900);
-	assert_int_equal(open_device(&a, device, 0, &err), -EINVAL);
+	assert_int_equal(open_device(&second, path, 0), -EBUSY);
+	assert_non_null(strstr(err.text, path));
+	close_bus();
+	assert_int_equal(open_device(&bus, path, 0), 0);
 }
 
-static void one_program_at_a_time(void **state)
+TEST(frames_go_both_ways, setup, teardown)
 {
-	struct adapter *a = *state, other = *a;
-	struct incise_error err = {0};
+	struct can_frame out = candump_read("210#0F00FFEEDDCC");
+	struct can_frame in;
+	int64_t t_ns;
 
-	assert_int_equal(adapter_open(&other, 0, &err), -EBUSY);
-	assert_ptr_equal(strstr(err.text,
-				"rig.conf:1: stepper: another program has /dev/pts/"),
-			 err.text);
-	a->bus->ops->close(a->bus);
-	a->bus = NULL;
-	assert_int_equal(adapter_open(a, 0, &err), 0);
-}
-
-static void frames_go_both_ways(void **state)
-{
-	struct adapter *a = *state;
-	struct can_frame out = {.can_id = 0x210,
-				.can_dlc = 6,
-				.data = {0x0f, 0, 0xff, 0xee, 0xdd, 0xcc}},
-			 in;
-
-	assert_int_equal(a->bus->ops->send(a->bus, &out), 0);
-	assert_string_equal(frames_received(a, strlen("t21060F00FFEEDDCC.")),
-			    "t21060F00FFEEDDCC.");
+	assert_int_equal(bus->ops->send(bus, &out), 0);
+	received("t21060F00FFEEDDCC.");
 	out.can_dlc = 9;
-	assert_int_equal(a->bus->ops->send(a->bus, &out), -EINVAL);
+	assert_int_equal(bus->ops->send(bus, &out), -EINVAL);
 	/* This side ignores C, S and O, which python-can sends. */
-	SEND(a, "C\rS8\rO\rz\rt190237AB12");
-	assert_int_equal(next(a, &in), 0);
-	SEND(a, "34\rT1FFFFFFF0\r");
-	assert_int_equal(next(a, &in), 1);
-	assert_int_equal(in.can_id, 0x190);
-	assert_int_equal(in.can_dlc, 2);
-	assert_memory_equal(in.data, "\x37\xab", 2);
-	assert_int_equal(next(a, &in), 1);
-	assert_int_equal(in.can_id, CAN_EFF_MASK | CAN_EFF_FLAG);
-	assert_int_equal(next(a, &in), 0);
-	assert_int_equal(a->bus->counts.sent, 1);
-	assert_int_equal(a->bus->counts.received, 2);
-	assert_int_equal(a->bus->counts.broken, 0);
-	assert_int_equal(a->bus->counts.errors, 0);
+	SAY("C\rS8\rO\rz\rt190237AB12");
+	assert_int_equal(bus->ops->wait(bus, clock_ns + S), 0);
+	assert_int_equal(bus->ops->receive(bus, &in, &t_ns), 0);
+	SAY("34\rT1FFFFFFF0\r");
+	expect("190#37AB");
+	expect("1FFFFFFF#");
+	assert_int_equal(bus->counts.sent, 1);
+	assert_int_equal(bus->counts.received, 2);
+	assert_int_equal(bus->counts.broken, 0);
+	assert_int_equal(bus->counts.errors, 0);
 }
 
-static void junk_is_counted_and_skipped(void **state)
+/* No byte is translated, dropped or taken for flow control; junk is counted and skipped. */
+TEST(bytes_arrive_unchanged, setup, teardown)
 {
-	static char junk[9000];
-	struct adapter *a = *state;
-	struct can_frame in;
-
-	memset(junk, 'x', sizeof(junk));
-	SEND(a, "\0\0t12\0\rt1231A\r");
-	for (size_t at = 0; at < sizeof(junk); at += 3000) {
-		send_bytes(a, junk + at, 3000);
-		assert_int_equal(next(a, &in), 0);
-	}
-	SEND(a, "\rt1230\r");
-	assert_int_equal(next(a, &in), 1);
-	assert_int_equal(in.can_id, 0x123);
-	assert_int_equal(a->bus->counts.broken, 3);
-}
-
-static void filters_are_exact(void **state)
-{
-	struct adapter *a = *state;
-	const canid_t mask = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
-	const struct can_filter exact[] = {{0x190, mask}, {0x710, mask}};
-	const struct can_filter other = {0x190 | CAN_INV_FILTER, mask};
-	struct can_filter many[CAN_BUS_FILTERS + 1] = {{0}};
-	static const char all[] = "t1900\rT000001900\rr1900\rt1910\rt7100\rt0000\r";
-	struct can_frame in;
-	int n = 0;
-
-	assert_int_equal(a->bus->ops->filter(a->bus, exact, 2), 0);
-	send_bytes(a, all, sizeof(all) - 1);
-	assert_int_equal(next(a, &in), 1);
-	assert_int_equal(in.can_id, 0x190);
-	assert_int_equal(next(a, &in), 1);
-	assert_int_equal(in.can_id, 0x710);
-	assert_int_equal(next(a, &in), 0);
-	assert_int_equal(a->bus->ops->filter(a->bus, &other, 1), 0);
-	send_bytes(a, all, sizeof(all) - 1);
-	while (next(a, &in)) {
-		assert_int_not_equal(in.can_id, 0x190);
-		n++;
-	}
-	assert_int_equal(n, 5);
-	assert_int_equal(a->bus->ops->filter(a->bus, NULL, 0), 0);
-	send_bytes(a, all, sizeof(all) - 1);
-	for (n = 0; next(a, &in); n++)
-		;
-	assert_int_equal(n, 6);
-	assert_int_equal(a->bus->ops->filter(a->bus, many, CAN_BUS_FILTERS + 1), -EINVAL);
-}
-
-/* Send until the adapter is queried for its status: 100 ms. */
-static void until_queried(struct adapter *a)
-{
-	const struct can_frame sync = {.can_id = 0x080};
-	int64_t query_ns;
-
-	nanosleep(&(struct timespec){.tv_nsec = 101 * MS}, NULL);
-	query_ns = a->bus->ops->now(a->bus);
-	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
-	assert_string_equal(received(a, strlen("t0800.F.")), "t0800.F.");
-	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
-	/* No further query, unless the machine stalled. */
-	if (a->bus->ops->now(a->bus) - query_ns < 100 * MS)
-		assert_string_equal(received(a, strlen("t0800.")), "t0800.");
-	else
-		assert_string_equal(frames_received(a, strlen("t0800.")), "t0800.");
-}
-
-static void status_becomes_error_frames(void **state)
-{
-	static const struct {
-		const char *answer;
-		int state;
-		canid_t id; /* 0: no frame */
-		uint8_t controller;
-	} cases[] = {
-		{"F00\r", CAN_STATE_ERROR_ACTIVE, 0, 0},
-		{"F40\r", CAN_STATE_ERROR_ACTIVE, 0, 0},
-		{"F04\r", CAN_STATE_ERROR_WARNING, CAN_ERR_CRTL,
-		 CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING},
-		{"F04\r", CAN_STATE_ERROR_WARNING, 0, 0},
-		{"FA4\r", CAN_STATE_ERROR_PASSIVE, CAN_ERR_CRTL | CAN_ERR_BUSERROR,
-		 CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE},
-		{"F09\r", CAN_STATE_ERROR_ACTIVE, CAN_ERR_CRTL,
-		 CAN_ERR_CRTL_ACTIVE | CAN_ERR_CRTL_RX_OVERFLOW},
-		{"F02\r", CAN_STATE_ERROR_ACTIVE, CAN_ERR_CRTL, CAN_ERR_CRTL_TX_OVERFLOW},
-		{"sb000256\r", CAN_STATE_BUS_OFF, CAN_ERR_BUSOFF, 0},
-		{"F02\r", CAN_STATE_BUS_OFF, 0, 0},
-		{"sa000000\r", CAN_STATE_ERROR_ACTIVE, CAN_ERR_CRTL | CAN_ERR_RESTARTED,
-		 CAN_ERR_CRTL_ACTIVE},
-	};
-	struct adapter *a = *state;
-	struct can_frame in;
-	uint64_t errors = 0;
-
-	until_queried(a);
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		send_bytes(a, cases[i].answer, strlen(cases[i].answer));
-		assert_int_equal(next(a, &in), !!cases[i].id);
-		assert_int_equal(a->bus->ops->state(a->bus), cases[i].state);
-		if (!cases[i].id)
-			continue;
-		errors++;
-		assert_int_equal(in.can_id, CAN_ERR_FLAG | cases[i].id);
-		assert_int_equal(in.can_dlc, CAN_ERR_DLC);
-		assert_int_equal(in.data[1], cases[i].controller);
-	}
-	assert_int_equal(a->bus->counts.errors, errors);
-	assert_int_equal(a->bus->counts.overflow, 1);
-	assert_int_equal(a->bus->counts.received, 0);
-}
-
-static void refusals_are_errors_but_for_the_start(void **state)
-{
-	struct adapter *a = *state;
-	struct can_frame in;
-
-	SEND(a, "\a\a\r\a");
-	assert_int_equal(next(a, &in), 0);
-	SEND(a, "\a\a");
-	assert_int_equal(next(a, &in), 1);
-	assert_int_equal(in.can_id, CAN_ERR_FLAG | CAN_ERR_CRTL);
-	assert_int_equal(in.data[1], CAN_ERR_CRTL_TX_OVERFLOW);
-	assert_int_equal(next(a, &in), 0);
-	assert_int_equal(a->bus->counts.errors, 1);
-}
-
-static void an_adapter_without_the_query_is_left_alone(void **state)
-{
-	const struct can_frame sync = {.can_id = 0x080};
-	struct adapter *a = *state;
-	struct can_frame in;
-
-	SEND(a, "\a\a\a\a");
-	assert_int_equal(next(a, &in), 0);
-	for (int i = 0; i < 3; i++) {
-		until_queried(a);
-		SEND(a, "\r\a");
-		assert_int_equal(next(a, &in), 0);
-	}
-	nanosleep(&(struct timespec){.tv_nsec = 101 * MS}, NULL);
-	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
-	assert_string_equal(received(a, strlen("t0800.")), "t0800.");
-	assert_int_equal(a->bus->counts.errors, 0);
-}
-
-/* An adapter that does not read for a while: accepted frames arrive whole and in order. */
-static void a_frame_is_sent_whole_or_not(void **state)
-{
-	struct adapter *a = *state;
-	struct can_frame frame = {.can_id = 0x210, .can_dlc = 4};
-	struct pollfd poll_fd = {.fd = a->fd, .events = POLLIN};
-	uint32_t sent = 0, seen = 0;
-	char line[64], byte;
-	size_t n = 0;
-	int rc;
-
-	do {
-		memcpy(frame.data, &sent, 4);
-		rc = a->bus->ops->send(a->bus, &frame);
-		sent += !rc;
-	} while (!rc && sent < 100000);
-	assert_int_equal(rc, -ENOBUFS);
-	assert_int_equal(a->bus->ops->send(a->bus, &frame), -ENOBUFS);
-	assert_int_equal(a->bus->counts.full, 2);
-	assert_int_equal(a->bus->counts.sent, sent);
-	while (poll(&poll_fd, 1, 100) == 1 && read(a->fd, &byte, 1) == 1) {
-		if (byte != '\r') {
-			line[n++] = byte;
-			assert_true(n < sizeof(line));
-			/* The last line may end here: now its rest goes out. */
-			if (seen == sent - 1)
-				a->bus->ops->wait(a->bus, 0);
-			continue;
-		}
-		line[n] = 0;
-		n = 0;
-		if (!strcmp(line, "F"))
-			continue;
-		frame.data[0] = (uint8_t)seen;
-		frame.data[1] = (uint8_t)(seen >> 8);
-		frame.data[2] = (uint8_t)(seen >> 16);
-		char expected[64];
-
-		snprintf(expected, sizeof(expected), "t2104%02X%02X%02X00", frame.data[0],
-			 frame.data[1], frame.data[2]);
-		assert_string_equal(line, expected);
-		seen++;
-	}
-	assert_int_equal(seen, sent);
-	assert_int_equal(n, 0);
-}
-
-static void a_torn_line_is_finished_first(void **state)
-{
-	struct adapter *a = *state;
-	const struct can_frame sync = {.can_id = 0x080}, other = {.can_id = 0x123};
-
-	write_most = 0;
-	assert_int_equal(a->bus->ops->send(a->bus, &sync), -ENOBUFS);
-	write_most = 3;
-	write_interrupts = 5;
-	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
-	assert_int_equal(a->bus->ops->send(a->bus, &other), 0);
-	assert_string_equal(frames_received(a, strlen("t0800.t1230.")), "t0800.t1230.");
-	/* Two bytes went out, and then none do: the rest is kept, ahead of later frames. */
-	write_left = 2;
-	assert_int_equal(a->bus->ops->send(a->bus, &sync), 0);
-	assert_int_equal(a->bus->ops->send(a->bus, &other), -ENOBUFS);
-	assert_int_equal(a->bus->ops->wait(a->bus, 0), 0);
-	assert_string_equal(frames_received(a, strlen("t0")), "t0");
-	write_all();
-	assert_int_equal(a->bus->ops->send(a->bus, &other), 0);
-	assert_string_equal(frames_received(a, strlen("800.t1230.")), "800.t1230.");
-	assert_int_equal(a->bus->counts.full, 2);
-	assert_int_equal(a->bus->counts.sent, 4);
-}
-
-static void an_error_of_the_line_is_permanent(void **state)
-{
-	static const struct {
-		int error, rc;
-	} cases[] = {{EIO, -ENODEV}, {ENXIO, -ENODEV}, {ENODEV, -ENODEV}, {EPERM, -EIO}};
-	const struct can_frame sync = {.can_id = 0x080};
-
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct can_frame in;
-		struct adapter a;
-		int64_t t_ns;
-
-		adapter_new(&a);
-		assert_int_equal(adapter_open(&a, 0, NULL), 0);
-		write_error = cases[i].error;
-		assert_int_equal(a.bus->ops->send(a.bus, &sync), cases[i].rc);
-		write_error = 0;
-		assert_int_equal(a.bus->ops->send(a.bus, &sync), cases[i].rc);
-		assert_int_equal(a.bus->ops->receive(a.bus, &in, &t_ns), cases[i].rc);
-		a.bus->ops->close(a.bus);
-		close(a.fd);
-	}
-}
-
-/* No byte is translated, dropped or taken for flow control. */
-static void bytes_arrive_unchanged(void **state)
-{
-	struct adapter *a = *state;
-	struct can_frame in;
+	static char junk[3000];
 	char all[256];
 
 	for (size_t i = 0; i < sizeof(all); i++)
 		all[i] = (char)i;
 	/* BEL and CR end broken lines; the line behind CR is too long. */
-	send_bytes(a, all, sizeof(all));
-	assert_int_equal(next(a, &in), 0);
-	assert_int_equal(a->bus->counts.broken, 2);
-	SEND(a, "\r");
-	assert_int_equal(next(a, &in), 0);
-	assert_int_equal(a->bus->counts.broken, 3);
+	say_bytes(all, sizeof(all));
+	SAY("\r");
+	expect_nothing();
+	assert_int_equal(bus->counts.broken, 3);
 	/* A byte that is dropped would leave a frame. */
 	for (int byte = 0; byte < 256; byte++) {
 		char line[] = {'t', '1', '2', '3', '0', (char)byte, '\r'};
 
 		if (byte != '\r' && byte != '\a')
-			send_bytes(a, line, sizeof(line));
+			say_bytes(line, sizeof(line));
 	}
-	assert_int_equal(next(a, &in), 0);
-	assert_int_equal(a->bus->counts.broken, 3 + 254);
+	expect_nothing();
+	assert_int_equal(bus->counts.broken, 3 + 254);
+	/* More than one call of receive takes. */
+	memset(junk, 'x', sizeof(junk));
+	SAY("\0\0t12\0\rt1231A\r");
+	for (int i = 0; i < 3; i++) {
+		struct can_frame in;
+		int64_t t_ns;
+
+		say_bytes(junk, sizeof(junk));
+		assert_int_equal(bus->ops->receive(bus, &in, &t_ns), 0);
+	}
+	SAY("\r");
+	expect_nothing();
+	assert_int_equal(bus->counts.broken, 3 + 254 + 3);
+}
+
+TEST(filters_are_exact, setup, teardown)
+{
+	const canid_t mask = CAN_SFF_MASK | CAN_EFF_FLAG | CAN_RTR_FLAG;
+	const struct can_filter exact[] = {{0x190, mask}, {0x7ee, mask}};
+	const struct can_filter inverse = {0x190 | CAN_INV_FILTER, mask};
+	struct can_filter many[CAN_BUS_FILTERS + 1] = {{0}};
+	static const char all[] = "t1900\rT000001900\rr1900\rt1910\rt0000\r";
+
+	assert_int_equal(bus->ops->filter(bus, exact, 2), 0);
+	SAY(all);
+	expect("190#");
+	expect_nothing();
+	assert_int_equal(bus->ops->filter(bus, &inverse, 1), 0);
+	SAY(all);
+	expect("00000190#");
+	expect("190#R");
+	expect("191#");
+	expect("000#");
+	assert_int_equal(bus->ops->filter(bus, NULL, 0), 0);
+	SAY("t1900\r");
+	expect("190#");
+	assert_int_equal(bus->ops->filter(bus, many, CAN_BUS_FILTERS + 1), -EINVAL);
+	assert_int_equal(bus->ops->filter(bus, many, -1), -EINVAL);
+}
+
+/* Queries follow a frame each 100 ms; answers become error frames. */
+TEST(status_becomes_error_frames, setup, teardown)
+{
+	static const struct {
+		const char *answer;
+		int state;
+		const char *frame; /* NULL: none */
+	} cases[] = {
+		{"F00\r", CAN_STATE_ERROR_ACTIVE, NULL},
+		{"F04\r", CAN_STATE_ERROR_WARNING, "20000004#000C000000000000"},
+		{"F04\r", CAN_STATE_ERROR_WARNING, NULL},
+		{"F09\r", CAN_STATE_ERROR_ACTIVE, "20000004#0041000000000000"},
+		{"sb000256\r", CAN_STATE_BUS_OFF, "20000040#0000000000000000"},
+		{"sa000000\r", CAN_STATE_ERROR_ACTIVE, "20000104#0040000000000000"},
+	};
+	uint64_t errors = 0;
+
+	clock_ns += 100 * MS;
+	bus->ops->send(bus, &sync_frame);
+	bus->ops->send(bus, &sync_frame);
+	received("t0800.F.t0800.");
+	for (size_t i = 0; i < COUNT(cases); i++) {
+		say_bytes(cases[i].answer, strlen(cases[i].answer));
+		if (cases[i].frame)
+			expect(cases[i].frame);
+		else
+			expect_nothing();
+		assert_int_equal(bus->ops->state(bus), cases[i].state);
+		errors += !!cases[i].frame;
+	}
+	assert_int_equal(bus->counts.errors, errors);
+	assert_int_equal(bus->counts.overflow, 1);
+	assert_int_equal(bus->counts.received, 0);
+}
+
+/* Of those of the start one each is none; an adapter without the query is left alone. */
+TEST(refusals_are_errors_but_for_the_start, setup, teardown)
+{
+	SAY("\a\a\r\a\a");
+	expect_nothing();
+	for (int i = 0; i < 4; i++) {
+		clock_ns += 100 * MS;
+		bus->ops->send(bus, &sync_frame);
+		received(i < 3 ? "t0800.F." : "t0800.");
+		if (i == 3)
+			break;
+		SAY("\r\a");
+		expect_nothing();
+	}
+	assert_int_equal(bus->counts.errors, 0);
+	SAY("\a");
+	expect("20000004#0002000000000000");
+	assert_int_equal(bus->counts.errors, 1);
+}
+
+/* An adapter that does not read for a while: accepted frames arrive whole and in order. */
+TEST(a_frame_is_sent_whole_or_not, setup, teardown)
+{
+	struct can_frame frame = {.can_id = 0x210, .can_dlc = 4};
+	uint32_t sent = 0;
+	int rc;
+
+	do {
+		memcpy(frame.data, &sent, 4);
+		rc = bus->ops->send(bus, &frame);
+		sent += !rc;
+	} while (!rc && sent < 100000);
+	assert_int_equal(rc, -ENOBUFS);
+	assert_int_equal(bus->ops->send(bus, &frame), -ENOBUFS);
+	assert_int_equal(bus->counts.full, 2);
+	assert_int_equal(bus->counts.sent, sent);
+	for (uint32_t seen = 0; seen < sent; seen++) {
+		char line[32];
+
+		/* The last line may have been cut: its rest goes out ahead of the next. */
+		for (int i = 0; seen == sent - 1 && i < 10000; i++) {
+			if (!bus->ops->send(bus, &sync_frame))
+				break;
+			poll(NULL, 0, 1);
+		}
+		snprintf(line, sizeof(line), "t2104%02X%02X%02X00.", seen & 0xff,
+			 seen >> 8 & 0xff, seen >> 16);
+		received(line);
+	}
+	received("t0800.");
+}
+
+TEST(a_torn_line_is_finished_first, setup, teardown)
+{
+	write_most = 0;
+	assert_int_equal(bus->ops->send(bus, &sync_frame), -ENOBUFS);
+	write_most = 3;
+	write_interrupts = 5;
+	assert_int_equal(bus->ops->send(bus, &sync_frame), 0);
+	assert_int_equal(bus->ops->send(bus, &other_frame), 0);
+	received("t0800.t1230.");
+	/* Two bytes went out, and then none do: the rest is kept, ahead of later frames. */
+	write_left = 2;
+	assert_int_equal(bus->ops->send(bus, &sync_frame), 0);
+	assert_int_equal(bus->ops->send(bus, &other_frame), -ENOBUFS);
+	assert_int_equal(bus->ops->wait(bus, 0), 0);
+	received("t0");
+	write_all();
+	assert_int_equal(bus->ops->wait(bus, 0), 0);
+	received("800.");
+	assert_int_equal(bus->ops->send(bus, &other_frame), 0);
+	received("t1230.");
+	assert_int_equal(bus->counts.full, 2);
+	assert_int_equal(bus->counts.sent, 4);
+	/* Closing a stuck line ends. */
+	write_most = 0;
+	assert_int_equal(bus->ops->send(bus, &sync_frame), -ENOBUFS);
+	close_bus();
+}
+
+TEST(an_error_of_the_line_is_permanent)
+{
+	static const struct {
+		int error, rc;
+	} cases[] = {{EIO, -ENODEV}, {ENXIO, -ENODEV}, {ENODEV, -ENODEV}, {EPERM, -EIO}};
+
+	for (size_t i = 0; i < COUNT(cases); i++) {
+		struct can_frame in;
+
+		adapter_new();
+		assert_int_equal(open_device(&bus, path, 0), 0);
+		write_error = cases[i].error;
+		assert_int_equal(bus->ops->send(bus, &sync_frame), cases[i].rc);
+		write_error = 0;
+		assert_int_equal(bus->ops->send(bus, &sync_frame), cases[i].rc);
+		assert_int_equal(next(&in), cases[i].rc);
+		close_bus();
+		close(fd);
+	}
+}
+
+/* Found by receiving, or by sending. */
+TEST(an_adapter_that_is_unplugged_is_gone)
+{
+	for (int sends = 0; sends < 2; sends++) {
+		struct can_frame in;
+
+		adapter_new();
+		assert_int_equal(open_device(&bus, path, 0), 0);
+		close(fd);
+		if (!sends)
+			assert_int_equal(next(&in), -ENODEV);
+		assert_int_equal(bus->ops->send(bus, &sync_frame), -ENODEV);
+		assert_int_equal(next(&in), -ENODEV);
+		assert_int_equal(bus->ops->wait(bus, INT64_MAX), -ENODEV);
+		close_bus();
+	}
 }
 
 /* The speed that stty set stays; the default of a port that nobody set does not. */
-static void the_speed_is_the_users(void **state)
+TEST(the_speed_is_the_users, setup, teardown)
 {
 	static const struct {
 		speed_t set, is;
 	} cases[] = {{B9600, B115200}, {B115200, B115200}, {B1000000, B1000000}};
-	struct adapter *a = *state;
-	struct incise_error err = {0};
 
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+	for (size_t i = 0; i < COUNT(cases); i++) {
 		struct termios t;
 
-		assert_int_equal(tcgetattr(a->fd, &t), 0);
+		assert_int_equal(tcgetattr(fd, &t), 0);
 		cfsetspeed(&t, cases[i].set);
-		assert_int_equal(tcsetattr(a->fd, TCSANOW, &t), 0);
-		a->bus->ops->close(a->bus);
-		a->bus = NULL;
-		assert_int_equal(adapter_open(a, 0, &err), 0);
-		assert_int_equal(tcgetattr(a->fd, &t), 0);
+		assert_int_equal(tcsetattr(fd, TCSANOW, &t), 0);
+		close_bus();
+		assert_int_equal(open_device(&bus, path, 0), 0);
+		assert_int_equal(tcgetattr(fd, &t), 0);
 		assert_int_equal(cfgetospeed(&t), cases[i].is);
 		assert_int_equal(t.c_lflag & (ICANON | ECHO | ISIG), 0);
 	}
 }
 
-static void a_path_that_is_no_tty_is_refused(void **state)
-{
-	char folder[] = "/tmp/incise-tty-XXXXXX", file[64], pipe[64];
-	struct {
-		const char *path;
-		int code;
-		const char *words;
-	} cases[] = {
-		{file, -EINVAL, "is not a serial port"},
-		{pipe, -EINVAL, "is not a serial port"},
-		{folder, -EINVAL, "is not a serial port"},
-		{"/dev/null", -EINVAL, "is not a serial port"},
-		{"", -ENODEV, "no such device"},
-		{"/dev/ttyACM4711", -ENODEV, "plug in the adapter"},
-	};
-	int fd;
-
-	assert_non_null(mkdtemp(folder));
-	snprintf(file, sizeof(file), "%s/file", folder);
-	snprintf(pipe, sizeof(pipe), "%s/pipe", folder);
-	fd = open(file, O_CREAT | O_WRONLY, 0600);
-	close(fd);
-	assert_int_equal(mkfifo(pipe, 0600), 0);
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
-		struct adapter a;
-
-		assert_int_equal(open_device(&a, cases[i].path, 0, &err), cases[i].code);
-		assert_int_equal(err.code, -cases[i].code);
-		assert_non_null(strstr(err.text, cases[i].words));
-	}
-	unlink(file);
-	unlink(pipe);
-	rmdir(folder);
-}
-
 /* A late reader: frames sent before close() wait in the pty, and stay there. */
-static void the_last_frames_arrive(void **state)
+TEST(the_last_frames_arrive, setup, teardown)
 {
 	const struct can_frame last = {.can_id = 0x000, .can_dlc = 2, .data = {0x80, 16}};
-	struct adapter *a = *state;
-	const char *text;
-	size_t frames = 0;
 
 	/* More than the 4096 bytes that the reader's side of a pty takes by itself. */
 	for (int i = 0; i < 700; i++)
-		assert_int_equal(a->bus->ops->send(a->bus,
-						   &(struct can_frame){.can_id = 0x080}),
-				 0);
-	assert_int_equal(a->bus->ops->send(a->bus, &last), 0);
-	a->bus->ops->close(a->bus);
-	a->bus = NULL;
-	do {
-		text = frames_received(a, 1);
-		for (const char *at = strchr(text, 't'); at; at = strchr(at + 1, 't'))
-			frames++;
-		if (strlen(text) >= 12 &&
-		    !strcmp(text + strlen(text) - 12, "t00028010.C."))
-			break;
-	} while (*text);
-	assert_true(*text);
-	assert_int_equal(frames, 701);
+		assert_int_equal(bus->ops->send(bus, &sync_frame), 0);
+	assert_int_equal(bus->ops->send(bus, &last), 0);
+	close_bus();
+	for (int i = 0; i < 700; i++)
+		received("t0800.");
+	received("t00028010.C.");
 }
 
-/* And it ends too where the line is gone: see an_error_of_the_line_is_permanent(). */
-static void closing_a_stuck_line_ends(void **state)
+TEST(waiting_ends, setup, teardown)
 {
-	struct adapter *a = *state;
-	const struct can_frame sync = {.can_id = 0x080};
-
-	write_most = 0;
-	assert_int_equal(a->bus->ops->send(a->bus, &sync), -ENOBUFS);
-	a->bus->ops->close(a->bus);
-	a->bus = NULL;
-}
-
-static void an_adapter_that_is_unplugged_is_gone(void **state)
-{
-	struct adapter *a = *state;
-	const struct can_frame sync = {.can_id = 0x080};
+	int64_t begin = clock_ns, t_ns;
 	struct can_frame in;
-
-	SEND(a, "t1230\r");
-	assert_int_equal(next(a, &in), 1);
-	close(a->fd);
-	a->fd = -1;
-	assert_int_equal(next(a, &in), -ENODEV);
-	assert_int_equal(next(a, &in), -ENODEV);
-	assert_int_equal(a->bus->ops->send(a->bus, &sync), -ENODEV);
-	assert_int_equal(a->bus->ops->wait(a->bus, INT64_MAX), -ENODEV);
-}
-
-static void sending_finds_a_lost_line(void **state)
-{
-	struct adapter *a = *state;
-	const struct can_frame sync = {.can_id = 0x080};
-
-	close(a->fd);
-	a->fd = -1;
-	assert_int_equal(a->bus->ops->send(a->bus, &sync), -ENODEV);
-}
-
-static void waiting_ends(void **state)
-{
-	struct adapter *a = *state;
-	int64_t begin = a->bus->ops->now(a->bus);
-	struct can_frame in;
-	int64_t t_ns;
 
 	/* A time in the past: at once, even without input. */
-	assert_int_equal(a->bus->ops->wait(a->bus, 0), 0);
-	assert_int_equal(a->bus->ops->wait(a->bus, INT64_MIN + begin), 0);
-	assert_int_equal(a->bus->ops->wait(a->bus, begin + 5 * MS), 0);
-	assert_true(a->bus->ops->now(a->bus) >= begin + 5 * MS);
+	quiet = true;
+	assert_int_equal(bus->ops->wait(bus, 0), 0);
+	assert_int_equal(bus->ops->wait(bus, INT64_MIN + begin), 0);
+	assert_int_equal(bus->ops->now(bus), begin);
+	assert_int_equal(bus->ops->wait(bus, begin + 5 * MS), 0);
+	assert_int_equal(bus->ops->now(bus), begin + 5 * MS);
 	/* Two frames arrive at once: the second one needs no wait. */
-	SEND(a, "t1230\rt1240\r");
-	assert_int_equal(a->bus->ops->wait(a->bus, INT64_MAX), 0);
-	assert_int_equal(a->bus->ops->receive(a->bus, &in, &t_ns), 1);
-	assert_int_equal(a->bus->ops->wait(a->bus, INT64_MAX), 0);
-}
-
-#define WITH(test) cmocka_unit_test_setup_teardown(test, setup, teardown)
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(the_adapter_goes_on_the_bus_and_off),
-		cmocka_unit_test(a_rate_that_none_has_is_refused),
-		cmocka_unit_test(the_rate_may_follow_the_tty),
-		cmocka_unit_test(a_path_may_have_an_at),
-		cmocka_unit_test(a_path_of_any_length_is_safe),
-		WITH(one_program_at_a_time),
-		WITH(frames_go_both_ways),
-		WITH(junk_is_counted_and_skipped),
-		WITH(filters_are_exact),
-		WITH(status_becomes_error_frames),
-		WITH(refusals_are_errors_but_for_the_start),
-		WITH(an_adapter_without_the_query_is_left_alone),
-		WITH(a_frame_is_sent_whole_or_not),
-		WITH(a_torn_line_is_finished_first),
-		cmocka_unit_test(an_error_of_the_line_is_permanent),
-		WITH(bytes_arrive_unchanged),
-		WITH(the_speed_is_the_users),
-		cmocka_unit_test(a_path_that_is_no_tty_is_refused),
-		WITH(the_last_frames_arrive),
-		WITH(closing_a_stuck_line_ends),
-		WITH(an_adapter_that_is_unplugged_is_gone),
-		WITH(sending_finds_a_lost_line),
-		WITH(waiting_ends),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
+	quiet = false;
+	SAY("t1230\rt1240\r");
+	assert_int_equal(bus->ops->wait(bus, INT64_MAX), 0);
+	assert_int_equal(bus->ops->receive(bus, &in, &t_ns), 1);
+	assert_int_equal(bus->ops->wait(bus, INT64_MAX), 0);
 }

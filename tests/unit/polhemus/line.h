@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * A line to an emulator in the same process, in a time of its own: a read that finds nothing
- * lets time go on to the next record, or to its end.
+ * lets time go on to the next record, or to its end. For a thread, @clock waits instead.
  */
 #ifndef INCISE_TEST_POLHEMUS_LINE_H
 #define INCISE_TEST_POLHEMUS_LINE_H
@@ -15,10 +15,13 @@ struct test_line {
 	struct polhemus_line line;
 	struct emulator *emulator;
 	int64_t now_ns;
-	size_t most;	 /* bytes of a read; 0: as many as fit */
+	int64_t (*clock)(int64_t until_ns); /* waits, and returns the time */
+	size_t most;			    /* bytes of a read; 0: as many as fit */
 	int64_t read_ns; /* that each takes, from the first command with slow_from on */
 	char slow_from;	 /* 0: from the beginning */
 	int gone;	 /* what all calls return */
+	bool mute;	 /* nothing comes through */
+	int reopened;
 	char said[2000]; /* all commands */
 	size_t n_said;
 };
@@ -39,29 +42,39 @@ static ssize_t test_line_read(struct polhemus_line *line, void *bytes, size_t si
 			      int64_t *t_ns, int timeout_ms)
 {
 	struct test_line *l = (struct test_line *)line;
-	int64_t end_ns = l->now_ns + timeout_ms * INT64_C(1000000);
-	int64_t next_ns = emulator_next_ns(l->emulator);
+	int64_t next_ns, end_ns;
 	size_t n;
 
 	if (l->gone)
 		return l->gone;
+	if (l->clock)
+		l->now_ns = l->clock(0);
+	end_ns = l->now_ns + timeout_ms * INT64_C(1000000);
 	if (l->most && size > l->most)
 		size = l->most;
 	if (!l->slow_from || memchr(l->said, l->slow_from, l->n_said))
 		l->now_ns += l->read_ns;
+	emulator_advance(l->emulator, l->now_ns);
 	n = emulator_take(l->emulator, bytes, size);
 	if (!n) {
-		l->now_ns = next_ns < end_ns ? next_ns : end_ns;
+		next_ns = emulator_next_ns(l->emulator);
+		l->now_ns = next_ns < end_ns && !l->mute ? next_ns : end_ns;
+		if (l->clock)
+			l->now_ns = l->clock(l->now_ns);
 		emulator_advance(l->emulator, l->now_ns);
 		n = emulator_take(l->emulator, bytes, size);
 	}
+	n = l->mute ? 0 : n;
 	*t_ns = l->now_ns;
 	return (ssize_t)n;
 }
 
 static int test_line_reopen(struct polhemus_line *line)
 {
-	return ((struct test_line *)line)->gone;
+	struct test_line *l = (struct test_line *)line;
+
+	l->reopened++;
+	return l->gone;
 }
 
 static void test_line_close(struct polhemus_line *line)

@@ -3,11 +3,7 @@
  * lib/device/polhemus/polhemus_dialogue.c: replies as the manual prints them, bytes that are none, and
  * devices that are no trackers. The dialogue with a tracker is in polhemus_setup.c.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <string.h>
 #include "../../../lib/device/polhemus/polhemus_dialogue.h"
@@ -23,7 +19,7 @@ static bool reads(const char *text, size_t n, struct polhemus_status *status)
 	return polhemus_status_read((const unsigned char *)text, n, status);
 }
 
-static void a_status(void **state)
+TEST(a_status)
 {
 	static const struct {
 		size_t at;
@@ -57,7 +53,7 @@ static void a_status(void **state)
 	assert_non_null(strchr(s.id, '?'));
 }
 
-static void numbers(void **state)
+TEST(numbers)
 {
 	static const struct {
 		const char *text;
@@ -90,7 +86,7 @@ static void numbers(void **state)
 	}
 }
 
-static void fields(void **state)
+TEST(fields)
 {
 	static const struct {
 		const char *text;
@@ -117,7 +113,7 @@ static void fields(void **state)
 	}
 }
 
-static void reply_frames(void **state)
+TEST(reply_frames)
 {
 	unsigned char bytes[] = {'L', 'Y', 2, 'H', 0, 0, 3, 0, 'a', 'b', 'c', 'd'};
 	struct polhemus_frame f;
@@ -137,31 +133,6 @@ static void reply_frames(void **state)
 	assert_int_equal(f.family, POLHEMUS_PATRIOT);
 	bytes[0] = 'x';
 	assert_int_equal(polhemus_frame_read(bytes, 1, &f), -1);
-}
-
-static void models(void **state)
-{
-	static const struct {
-		uint16_t vendor, product;
-		bool known, ready;
-	} cases[] = {
-		{0x0f44, 0x0001, true, false},	{0x0f44, 0x0002, true, true},
-		{0x0f44, 0x0003, true, true},	{0x0f44, 0xff12, true, true},
-		{0x0f44, 0xff21, true, false},	{0x0f44, 0xef20, true, true},
-		{0x0f44, 0x1234, false, false}, {0x1d6b, 0x0002, false, false},
-	};
-
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		const struct polhemus_model *m =
-			polhemus_model_find(cases[i].vendor, cases[i].product);
-
-		assert_int_equal(m != NULL, cases[i].known);
-		assert_true(!m || m->ready == cases[i].ready);
-	}
-	/* 120 Hz for all, 240 and 60 for each. */
-	assert_true(polhemus_family_hz(POLHEMUS_FASTRAK, 4) == 120);
-	assert_true(polhemus_family_hz(POLHEMUS_LIBERTY, 2) == 480);
-	assert_true(polhemus_family_hz(POLHEMUS_PATRIOT, 1) == 60);
 }
 
 /* --- polhemus_dialogue --- */
@@ -221,7 +192,7 @@ static void begin(const char *bytes, int64_t every_ms, long times)
 }
 
 /* Also what comes so rarely that its bytes would never be many has an end. */
-static void draining_ends(void **state)
+TEST(draining_ends)
 {
 	static const int64_t every_ms[] = {1, 20, 119};
 
@@ -247,7 +218,7 @@ static void draining_ends(void **state)
 	assert_int_equal(polhemus_collect(&dialogue), sizeof(dialogue.bytes));
 }
 
-static void answers(void **state)
+TEST(answers)
 {
 	static const struct {
 		const char *bytes;
@@ -277,7 +248,7 @@ static void answers(void **state)
 }
 
 /* A line longer than an answer may be is cut, and one that never ends is none. */
-static void long_lines(void **state)
+TEST(long_lines)
 {
 	char text[400], reply[POLHEMUS_REPLY_MAX];
 
@@ -294,7 +265,7 @@ static void long_lines(void **state)
 }
 
 /* Behind what looks like one; an error; one that is of another command; never one. */
-static void frames(void **state)
+TEST(frames)
 {
 	static const struct {
 		const char *bytes;
@@ -329,7 +300,7 @@ static void frames(void **state)
 }
 
 /* close() does not wait for a dialogue to end. */
-static void given_up(void **state)
+TEST(given_up)
 {
 	static const _Atomic bool stop = true;
 	char reply[POLHEMUS_REPLY_MAX];
@@ -344,7 +315,7 @@ static void given_up(void **state)
 	assert_int_equal(source.now_ns, 1000 * MS);
 }
 
-static void printed(void **state)
+TEST(printed)
 {
 	static const struct {
 		const char *command, *text;
@@ -362,18 +333,4 @@ static void printed(void **state)
 		polhemus_print(text, sizeof(text), cases[i].command);
 		assert_string_equal(text, cases[i].text);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_status), cmocka_unit_test(numbers),
-		cmocka_unit_test(fields),   cmocka_unit_test(reply_frames),
-		cmocka_unit_test(models),   cmocka_unit_test(draining_ends),
-		cmocka_unit_test(answers),  cmocka_unit_test(long_lines),
-		cmocka_unit_test(frames),   cmocka_unit_test(given_up),
-		cmocka_unit_test(printed),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

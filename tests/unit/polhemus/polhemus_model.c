@@ -2,15 +2,11 @@
 /*
  * lib/device/polhemus/polhemus_model.c: what is known, and what is not.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <string.h>
 #include "../../../lib/device/polhemus/polhemus_model.h"
 
-static void products(void **state)
+TEST(products)
 {
 	static const struct {
 		uint16_t vendor, product;
@@ -52,7 +48,7 @@ static void products(void **state)
 }
 
 /* A FASTRAK shares its 120 Hz; the others have their rate for each station. */
-static void rates(void **state)
+TEST(rates)
 {
 	static const double hz[] = {120, 240, 60};
 
@@ -60,14 +56,4 @@ static void rates(void **state)
 		for (int n = 1; n <= POLHEMUS_STATIONS; n++)
 			assert_true(polhemus_family_hz((enum polhemus_family)family, n) ==
 				    (family == POLHEMUS_FASTRAK ? 120 : hz[family] * n));
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(products),
-		cmocka_unit_test(rates),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

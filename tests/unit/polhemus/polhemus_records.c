@@ -2,11 +2,7 @@
 /*
  * lib/device/polhemus/polhemus_records.c: records made by hand, byte by byte.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -35,7 +31,7 @@ static float looks_like(const char bytes[4])
 	return value;
 }
 
-static void lengths(void **state)
+TEST(lengths)
 {
 	static const struct {
 		struct polhemus_layout layout;
@@ -59,7 +55,7 @@ static void lengths(void **state)
 				 cases[i].length);
 }
 
-static void one_record(void **state)
+TEST(one_record)
 {
 	unsigned char bytes[LENGTH];
 	struct polhemus_record r;
@@ -79,7 +75,7 @@ static void one_record(void **state)
 	assert_true(r.button);
 }
 
-static void what_is_no_record(void **state)
+TEST(what_is_no_record)
 {
 	static const struct {
 		size_t at;
@@ -102,62 +98,39 @@ static void what_is_no_record(void **state)
 	}
 }
 
-static void text(void **state)
+TEST(text)
 {
 	static const struct polhemus_layout ascii = {POLHEMUS_FASTRAK, true, 2, 1};
+	static const char good[] = "02  -12.34   0.05 100.00"
+				   " 0.6000 0.0000-0.8000 0.0000"
+				   "1\r\n";
 	static const struct {
-		const char *text;
-		bool good;
-	} cases[] = {
-		{"02 "
-		 " -12.34   0.05 100.00"
-		 " 0.6000 0.0000-0.8000 0.0000"
-		 "1\r\n",
-		 true},
-		{"02 "
-		 " -12.34   0.05 10O.00"
-		 " 0.6000 0.0000-0.8000 0.0000"
-		 "1\r\n",
-		 false},
-		{"02 "
-		 " -12.34   0.05       "
-		 " 0.6000 0.0000-0.8000 0.0000"
-		 "1\r\n",
-		 false},
-		{"02 "
-		 " -12.34   0.05 1-0.00"
-		 " 0.6000 0.0000-0.8000 0.0000"
-		 "1\r\n",
-		 false},
-		{"02 "
-		 " -12.34   0.05 1.0.00"
-		 " 0.6000 0.0000-0.8000 0.0000"
-		 "1\r\n",
-		 false},
-		{"02 "
-		 " -12.34   0.05 100.00"
-		 " 0.6000 0.0000-0.9000 0.0000"
-		 "1\r\n",
-		 false},
+		size_t at;
+		const char *bytes;
+	} bad[] = {
+		{20, "O"},	{17, "       "}, {18, "1-"},
+		{18, "1.0.00"}, {41, "9"}, /* no unit quaternion */
 	};
+	struct polhemus_record r;
 
-	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct polhemus_record r;
-		const unsigned char *bytes = (const unsigned char *)cases[i].text;
+	assert_int_equal(strlen(good), polhemus_layout_length(&ascii));
+	assert_true(polhemus_record_read(&ascii, (const unsigned char *)good, &r));
+	/* Decimals are not exact; an ulp or two of 1000. */
+	assert_true(fabs(r.position_mm[0] + 123.4) < 1e-9 &&
+		    fabs(r.position_mm[2] - 1000) < 1e-9);
+	assert_true(fabs(r.quaternion[2] + 0.8) < 1e-9);
+	assert_true(r.button && r.station == 2);
+	for (size_t i = 0; i < sizeof(bad) / sizeof(*bad); i++) {
+		unsigned char bytes[sizeof(good)];
 
-		assert_int_equal(strlen(cases[i].text), polhemus_layout_length(&ascii));
-		assert_int_equal(polhemus_record_read(&ascii, bytes, &r), cases[i].good);
-		if (!cases[i].good)
-			continue;
-		/* Decimals are not exact; an ulp or two of 1000. */
-		assert_true(fabs(r.position_mm[0] + 123.4) < 1e-9 &&
-			    fabs(r.position_mm[2] - 1000) < 1e-9);
-		assert_true(fabs(r.quaternion[2] + 0.8) < 1e-9);
-		assert_true(r.button && r.station == 2);
+		memcpy(bytes, good, sizeof(good));
+		memcpy(bytes + bad[i].at, bad[i].bytes, strlen(bad[i].bytes));
+		if (polhemus_record_read(&ascii, bytes, &r))
+			fail_msg("\"%s\" at %zu", bad[i].bytes, bad[i].at);
 	}
 }
 
-static void frames(void **state)
+TEST(frames)
 {
 	static const struct polhemus_layout patriot = {POLHEMUS_PATRIOT, false, 3, 0};
 	const float values[7] = {1, 2, 3, 1, 0, 0, 0};
@@ -186,7 +159,7 @@ static void frames(void **state)
 }
 
 /* Whatever is cut into whatever pieces, each of these records comes, at its last byte. */
-static void in_any_pieces(void **state)
+TEST(in_any_pieces)
 {
 	/* Floats whose bytes are headers, and one that is an end. */
 	const float xs[] = {looks_like("01 A"), looks_like("1 01"), looks_like("\r\n01"),
@@ -222,7 +195,7 @@ static void in_any_pieces(void **state)
 }
 
 /* Each single byte of a record in the middle damaged, lost or doubled: only that one goes. */
-static void loses_one(void **state)
+TEST(loses_one)
 {
 	for (int kind = 0; kind < 3; kind++)
 		for (size_t at = LENGTH; at < 2 * LENGTH; at++) {
@@ -250,19 +223,4 @@ static void loses_one(void **state)
 			if ((seen & 10) != 10)
 				fail_msg("kind %d, byte %zu: %#x", kind, at, seen);
 		}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(lengths),
-		cmocka_unit_test(one_record),
-		cmocka_unit_test(what_is_no_record),
-		cmocka_unit_test(text),
-		cmocka_unit_test(frames),
-		cmocka_unit_test(in_any_pieces),
-		cmocka_unit_test(loses_one),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

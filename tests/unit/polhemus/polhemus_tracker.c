@@ -1,262 +1,195 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/polhemus/polhemus_tracker.c through its interface, with the emulator behind a pseudo
- * terminal. Nothing is held to the clock: a host that is busy makes it wait longer.
+ * lib/device/polhemus/polhemus_tracker.c through its interface, with its thread and the emulator,
+ * on a clock of the test. polhemus_tty.c has it behind a pseudo terminal.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
-#include <sys/file.h>
+#include <string.h>
 #include "../../../lib/device/polhemus/polhemus_tracker.h"
-#include "../../../lib/device/polhemus/polhemus_tty.h"
-#include "pty.h"
+#include "../virtual_time.h" /* with __wrap_clock_gettime() and others */
+#include "line.h"
 
-#define PATIENCE_NS INT64_C(20000000000)
+#define MS INT64_C(1000000)
 
 static const struct incise_tracker_setup two = {
 	.n_stations = 2, .stations = {1, 3}, .tube_station = 3, .hemisphere = {1, 0, 0}};
-static struct pty pty;
+static struct emulator e;
+static struct test_line line;
+static struct incise_error err;
+
+static int64_t wait_until(int64_t until_ns)
+{
+	if (until_ns > virtual_time.now_ns)
+		virtual_sleep_until(until_ns);
+	return virtual_time.now_ns;
+}
+
+static void nap(int64_t ms)
+{
+	virtual_sleep_until(virtual_time.now_ns + ms * MS);
+}
+
+static void new_emulator(void)
+{
+	emulator_free(&e);
+	emulator_init(&e, EMULATOR_FASTRAK, virtual_time.now_ns);
+	e.present[2] = true;
+}
 
 static int begin(void **state)
 {
-	assert_int_equal(pty_begin(&pty, EMULATOR_FASTRAK), 0);
-	/* Its thread looks at it, once it runs. */
-	pty_unplug(&pty);
-	pty.emulator.present[2] = true;
-	assert_int_equal(pty_plug(&pty), 0);
+	virtual_time_start(1000 * MS, NULL);
+	new_emulator();
+	test_line_init(&line, &e, -1);
+	line.line.ns_per_byte = 86806; /* 10 bits at 115200 baud */
+	line.clock = wait_until;
 	return 0;
 }
 
 static int end(void **state)
 {
-	pty_unplug(&pty);
-	pty_end(&pty);
+	emulator_free(&e);
 	return 0;
 }
 
-static struct incise_tracker *open_it(const struct polhemus_times *times,
-				      struct incise_error *err)
+static struct incise_tracker *open_tracker(const struct polhemus_times *times)
 {
-	struct polhemus_line *line =
-		polhemus_tty_open(pty.path, "rig.conf:1: tracker", err);
-
-	assert_non_null(line);
-	return polhemus_tracker_open(line, &two, times, "rig.conf:1: tracker", err);
-}
-
-/* Read until @n more came; each follows the one before. */
-static int read_some(struct incise_tracker *tracker, uint64_t *next, int n)
-{
-	int64_t end_ns = pty_now_ns() + PATIENCE_NS;
-
-	while (n > 0 && pty_now_ns() < end_ns) {
-		struct incise_tracker_sample samples[16];
-		int m = incise_tracker_read(tracker, samples, 16);
-
-		if (m < 0)
-			return m;
-		for (int i = 0; i < m; i++) {
-			assert_true(samples[i].seq >= *next);
-			assert_true(samples[i].station == 1 || samples[i].station == 3);
-			assert_true(samples[i].t_ns <= pty_now_ns());
-			*next = samples[i].seq + 1;
-		}
-		n -= m;
-		if (!m)
-			usleep(2000);
-	}
-	return n > 0 ? -ETIMEDOUT : 0;
-}
-
-static void through_the_door(void **state)
-{
-	struct incise_error err = {0};
-	struct incise_tracker *tracker = open_it(&POLHEMUS_TIMES, &err);
-	struct incise_tracker_info info;
-	uint64_t next = 0;
-	int fd;
+	struct incise_tracker *tracker = polhemus_tracker_open(
+		&line.line, &two, times, "rig.conf:1: tracker", &err);
 
 	if (!tracker)
 		fail_msg("%s", err.text);
+	return tracker;
+}
+
+/* Read what there is; each follows the one before. Returns how many. */
+static int read_all(struct incise_tracker *tracker, uint64_t *next)
+{
+	struct incise_tracker_sample s;
+	int n = 0;
+
+	for (; incise_tracker_read(tracker, &s, 1) > 0; n++) {
+		assert_true(s.seq >= *next);
+		assert_true(s.station == 1 || s.station == 3);
+		assert_true(s.t_ns <= virtual_time.now_ns);
+		*next = s.seq + 1;
+	}
+	return n;
+}
+
+TEST(through_the_door, begin, end)
+{
+	struct incise_tracker *tracker = open_tracker(&POLHEMUS_TIMES);
+	struct incise_tracker_info info;
+	uint64_t next = 0;
+
 	incise_tracker_info(tracker, &info);
 	assert_string_equal(info.name, "FASTRAK 3.02 OutputCompensat CPG2030-003-10");
 	assert_true(info.rate_hz == 120 && info.stations == 2);
 	assert_true(incise_tracker_station_hz(&info) == 60);
 	assert_true(info.scalpel_station == 1 && info.tube_station == 3);
-	/* 4 ms of the device, and 34 bytes of 10 bits at 115200. */
-	assert_in_range(info.latency_ns, 6950000, 6952000);
-	assert_int_equal(read_some(tracker, &next, 12), 0);
-	/* Ours alone. */
-	fd = open(pty.path, O_RDWR | O_NOCTTY);
-	assert_true(fd < 0 || flock(fd, LOCK_EX | LOCK_NB) < 0);
-	if (fd >= 0)
-		close(fd);
+	/* 4 ms of the device, and 34 bytes. */
+	assert_int_equal(info.latency_ns, 4000000 + 34 * 86806);
+	nap(105);
+	assert_in_range(read_all(tracker, &next), 11, 13);
+	assert_int_equal(incise_tracker_lost(tracker), 0);
 	tracker->ops->close(tracker);
-	assert_int_equal(pty.emulator.eeprom_writes, 0);
+	assert_false(e.continuous);
+	assert_int_equal(e.eeprom_writes, 0);
 }
 
-/* Read all samples up to now. */
-static void read_all(struct incise_tracker *tracker, uint64_t *next)
+TEST(pulled_out_and_back, begin, end)
 {
+	struct incise_tracker *tracker =
+		open_tracker(&(struct polhemus_times){150, 20, 20000});
 	struct incise_tracker_sample sample;
+	uint64_t next = 0, away;
 
-	while (incise_tracker_read(tracker, &sample, 1) > 0)
-		*next = sample.seq + 1;
-}
-
-static void pulled_out_and_back(void **state)
-{
-	const struct polhemus_times times = {150, 20, 20000};
-	struct incise_error err = {0};
-	struct incise_tracker *tracker = open_it(&times, &err);
-	struct incise_tracker_sample sample;
-	uint64_t next = 0, before, away;
-
-	if (!tracker)
-		fail_msg("%s", err.text);
-	assert_int_equal(read_some(tracker, &next, 6), 0);
-	before = incise_tracker_lost(tracker);
-	pty_unplug(&pty);
-	/* What came before is still taken; then there is nothing. */
-	read_all(tracker, &next);
-	usleep(100000);
+	nap(50);
+	assert_true(read_all(tracker, &next) > 4);
+	line.gone = -ENODEV;
+	nap(400);
 	read_all(tracker, &next);
 	assert_int_equal(incise_tracker_read(tracker, &sample, 1), 0);
-	/* It may never come back: what is missing so far counts, 0.4 s of it. */
-	usleep(300000);
+	/* It may never come back: what is missing so far counts, 48 of 0.4 s. */
 	away = incise_tracker_lost(tracker);
-	assert_true(away >= before + 36);
+	assert_in_range(away, 40, 48);
 	/* As switched off and on: as it was delivered. */
-	emulator_free(&pty.emulator);
-	emulator_init(&pty.emulator, EMULATOR_FASTRAK, pty_now_ns());
-	pty.emulator.present[2] = true;
-	assert_int_equal(pty_plug(&pty), 0);
-	assert_int_equal(read_some(tracker, &next, 6), 0);
-	/* It was away for 0.4 s at least: 48 records. */
-	assert_true(incise_tracker_lost(tracker) >= before + 48);
+	new_emulator();
+	line.gone = 0;
+	nap(3000);
+	assert_true(read_all(tracker, &next) > 6);
+	assert_true(incise_tracker_lost(tracker) >= 48);
 	assert_true(incise_tracker_lost(tracker) >= away);
 	tracker->ops->close(tracker);
 }
 
 /* Its line stays, and what comes through it is nothing, or nothing that was asked for. */
-static void switched_off_and_on(void **state)
+TEST(switched_off_and_on, begin, end)
 {
-	const struct polhemus_times times = {150, 20, 20000};
-	struct incise_error err = {0};
-	struct incise_tracker *tracker = open_it(&times, &err);
+	struct incise_tracker *tracker =
+		open_tracker(&(struct polhemus_times){150, 20, 20000});
 	uint64_t next = 0, before;
 
-	if (!tracker)
-		fail_msg("%s", err.text);
-	assert_int_equal(read_some(tracker, &next, 6), 0);
-	before = incise_tracker_lost(tracker);
-	atomic_store(&pty.deaf, true);
-	usleep(250000);
+	nap(50);
 	read_all(tracker, &next);
-	atomic_store(&pty.deaf, false);
-	assert_int_equal(read_some(tracker, &next, 6), 0);
-	/* 30 periods, less one on its way at each end. */
-	assert_true(incise_tracker_lost(tracker) >= before + 28);
-	/* It streams in ASCII, as its EEPROM may have it. */
-	before = incise_tracker_lost(tracker);
-	atomic_store(&pty.injected, "F");
-	while (atomic_load(&pty.injected))
-		usleep(1000);
-	usleep(50000);
+	line.mute = e.deaf = true;
+	nap(250);
 	read_all(tracker, &next);
-	assert_int_equal(read_some(tracker, &next, 6), 0);
-	/* Silent for 0.15 s, and then it was set up. */
+	line.mute = e.deaf = false;
+	nap(3000);
+	assert_true(read_all(tracker, &next) > 6);
+	before = incise_tracker_lost(tracker);
+	assert_true(before >= 28);
+	/* It streams in ASCII, as its EEPROM may have it: silent for 0.15 s, then set up. */
+	emulator_write(&e, "F", 1);
+	nap(3000);
+	assert_true(read_all(tracker, &next) > 6);
+	assert_true(e.binary);
 	assert_true(incise_tracker_lost(tracker) >= before + 18);
 	tracker->ops->close(tracker);
 }
 
-static const struct polhemus_line_ops *tty_ops;
-static _Atomic bool streams, stands_still;
-static _Atomic int reopened;
-
-static ssize_t slow_read(struct polhemus_line *line, void *bytes, size_t size,
-			 int64_t *t_ns, int timeout_ms)
-{
-	ssize_t n;
-
-	if (atomic_exchange(&stands_still, false)) {
-		usleep(300000);
-		return 0;
-	}
-	/* Else it is a busy host that makes it silent. */
-	do
-		n = tty_ops->read(line, bytes, size, t_ns, timeout_ms);
-	while (!n && atomic_load(&streams));
-	return n;
-}
-
-static int counted_reopen(struct polhemus_line *line)
-{
-	atomic_fetch_add(&reopened, 1);
-	return tty_ops->reopen(line);
-}
-
 /* A computer that slept for a while finds its tracker as it was: it does not set it up again. */
-static void stood_still(void **state)
+TEST(stood_still, begin, end)
 {
-	const struct polhemus_times times = {250, 20, 20000};
-	struct incise_error err = {0};
-	struct polhemus_line *line =
-		polhemus_tty_open(pty.path, "rig.conf:1: tracker", &err);
-	struct polhemus_line_ops slow;
-	struct incise_tracker *tracker;
+	struct incise_tracker *tracker =
+		open_tracker(&(struct polhemus_times){250, 20, 20000});
 	uint64_t next = 0;
 
-	assert_non_null(line);
-	tty_ops = line->ops;
-	slow = *tty_ops;
-	slow.read = slow_read;
-	slow.reopen = counted_reopen;
-	line->ops = &slow;
-	tracker = polhemus_tracker_open(line, &two, &times, "rig.conf:1: tracker", &err);
-	if (!tracker)
-		fail_msg("%s", err.text);
-	atomic_store(&streams, true);
-	assert_int_equal(read_some(tracker, &next, 6), 0);
-	atomic_store(&reopened, 0);
-	atomic_store(&stands_still, true);
-	while (atomic_load(&stands_still))
-		usleep(1000);
+	nap(50);
+	read_all(tracker, &next);
+	virtual_time.now_ns += 300 * MS;
 	/* What came meanwhile waits in the line. */
-	assert_int_equal(read_some(tracker, &next, 40), 0);
-	atomic_store(&streams, false);
-	assert_int_equal(atomic_load(&reopened), 0);
+	nap(100);
+	assert_in_range(read_all(tracker, &next), 46, 50);
+	assert_int_equal(incise_tracker_lost(tracker), 0);
+	assert_int_equal(line.reopened, 0);
 	tracker->ops->close(tracker);
 }
 
-static void gone_for_good(void **state)
+TEST(gone_for_good, begin, end)
 {
-	const struct polhemus_times times = {200, 20, 100};
-	struct incise_error err = {0};
-	struct incise_tracker *tracker = open_it(&times, &err);
-	int64_t end_ns = pty_now_ns() + PATIENCE_NS;
+	struct incise_tracker *tracker =
+		open_tracker(&(struct polhemus_times){200, 20, 100});
 	struct incise_tracker_sample sample;
+	uint64_t next = 0;
 	char cause[200];
-	int rc = 0;
 
-	assert_non_null(tracker);
-	pty_unplug(&pty);
-	while (rc >= 0 && pty_now_ns() < end_ns) {
-		rc = incise_tracker_read(tracker, &sample, 1);
-		usleep(1000);
-	}
-	assert_int_equal(rc, -ENODEV);
-	assert_int_equal(incise_tracker_read(tracker, &sample, 1), -ENODEV);
+	line.gone = -ENODEV;
+	nap(90);
+	read_all(tracker, &next);
+	assert_int_equal(incise_tracker_read(tracker, &sample, 1), 0);
+	nap(200);
+	for (int i = 0; i < 2; i++)
+		assert_int_equal(incise_tracker_read(tracker, &sample, 1), -ENODEV);
 	assert_true(incise_tracker_cause(tracker, cause, sizeof(cause)) > 0);
-	assert_non_null(strstr(cause, "disconnected and was not back"));
+	assert_non_null(strstr(cause, "FASTRAK"));
 	tracker->ops->close(tracker);
-	assert_int_equal(pty_plug(&pty), 0);
 }
 
-static void refuses(void **state)
+TEST(refuses, begin, end)
 {
 	static const struct incise_tracker_setup bad[] = {
 		{.n_stations = 0, .hemisphere = {1, 0, 0}},
@@ -278,29 +211,9 @@ static void refuses(void **state)
 		 .hemisphere = {1, 0, 0},
 		 .offset_mm = {0, 1 / 0.0, 0}},
 	};
-	struct incise_error err;
-
 	for (size_t i = 0; i < sizeof(bad) / sizeof(*bad); i++) {
-		struct polhemus_line *line =
-			polhemus_tty_open(pty.path, "rig.conf", &err);
-
-		assert_non_null(line);
-		assert_null(polhemus_tracker_open(line, &bad[i], &POLHEMUS_TIMES,
+		assert_null(polhemus_tracker_open(&line.line, &bad[i], &POLHEMUS_TIMES,
 						  "rig.conf", &err));
 		assert_int_equal(errno, EINVAL);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(through_the_door, begin, end),
-		cmocka_unit_test_setup_teardown(pulled_out_and_back, begin, end),
-		cmocka_unit_test_setup_teardown(switched_off_and_on, begin, end),
-		cmocka_unit_test_setup_teardown(stood_still, begin, end),
-		cmocka_unit_test_setup_teardown(gone_for_good, begin, end),
-		cmocka_unit_test_setup_teardown(refuses, begin, end),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * lib/device/polhemus/polhemus_tty.c: names that are no line, bytes over a line whose other end the test has,
  * and the backend "tty" with the emulator behind a pseudo terminal.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -34,7 +30,7 @@ static int end(void **state)
 	return master < 0 ? 0 : close(master);
 }
 
-static void names(void **state)
+TEST(names)
 {
 	static const struct {
 		const char *arguments;
@@ -60,7 +56,7 @@ static void names(void **state)
 	}
 }
 
-static void there_and_back(void **state)
+TEST(there_and_back, begin, end)
 {
 	struct incise_error err = {0};
 	struct polhemus_line *line = polhemus_tty_open(path, "rig.conf", &err);
@@ -80,14 +76,14 @@ static void there_and_back(void **state)
 	assert_int_equal(line->ops->read(line, bytes, sizeof(bytes), &t_ns, 1), 0);
 	before = t_ns;
 	assert_int_equal(write(master, "01 \r\n", 5), 5);
-	assert_int_equal(line->ops->read(line, bytes, 3, &t_ns, 1000), 3);
+	assert_int_equal(line->ops->read(line, bytes, 3, &t_ns, 20000), 3);
 	assert_true(t_ns > before);
-	assert_int_equal(line->ops->read(line, bytes + 3, 13, &t_ns, 1000), 2);
+	assert_int_equal(line->ops->read(line, bytes + 3, 13, &t_ns, 20000), 2);
 	assert_memory_equal(bytes, "01 \r\n", 5);
 	line->ops->close(line);
 }
 
-static void pulled_out(void **state)
+TEST(pulled_out, begin, end)
 {
 	struct incise_error err = {0};
 	struct polhemus_line *line = polhemus_tty_open(path, "rig.conf", &err);
@@ -97,7 +93,7 @@ static void pulled_out(void **state)
 	assert_non_null(line);
 	close(master);
 	master = -1;
-	assert_int_equal(line->ops->read(line, bytes, sizeof(bytes), &t_ns, 1000),
+	assert_int_equal(line->ops->read(line, bytes, sizeof(bytes), &t_ns, 20000),
 			 -ENODEV);
 	assert_int_equal(line->ops->write(line, "P", 1), -ENODEV);
 	assert_true(line->ops->reopen(line) < 0);
@@ -130,7 +126,7 @@ static int count_found(void *context, const struct incise_scan_device *device)
 	return 0;
 }
 
-static void a_scan(void **state)
+TEST(a_scan, tracker_begin, tracker_end)
 {
 	struct incise_scan_device found = {0};
 	struct incise_error err = {0};
@@ -150,7 +146,7 @@ static void a_scan(void **state)
 	assert_int_equal(incise_tracker_tty.scan("", count_found, &found, &err), 0);
 }
 
-static void opens(void **state)
+TEST(opens, tracker_begin, tracker_end)
 {
 	static const struct incise_tracker_setup setup = {
 		.n_stations = 1, .stations = {1}, .hemisphere = {1, 0, 0}};
@@ -170,15 +166,25 @@ static void opens(void **state)
 	tracker->ops->close(tracker);
 }
 
-int main(void)
+TEST(back_again, tracker_begin, tracker_end)
 {
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(names),
-		cmocka_unit_test_setup_teardown(there_and_back, begin, end),
-		cmocka_unit_test_setup_teardown(pulled_out, begin, end),
-		cmocka_unit_test_setup_teardown(a_scan, tracker_begin, tracker_end),
-		cmocka_unit_test_setup_teardown(opens, tracker_begin, tracker_end),
-	};
+	struct incise_error err = {0};
+	struct polhemus_line *line = polhemus_tty_open(pty.path, "rig.conf", &err);
+	unsigned char bytes[64];
+	int64_t t_ns;
 
-	return cmocka_run_group_tests(tests, NULL, NULL);
+	if (!line)
+		fail_msg("%s", err.text);
+	pty_unplug(&pty);
+	while (line->ops->read(line, bytes, sizeof(bytes), &t_ns, 20000) > 0)
+		;
+	assert_int_equal(line->ops->write(line, "P", 1), -ENODEV);
+	assert_true(line->ops->reopen(line) < 0);
+	assert_int_equal(line->ops->write(line, "P", 1), -ENODEV);
+	assert_int_equal(pty_plug(&pty), 0);
+	assert_int_equal(line->ops->reopen(line), 0);
+	/* It answers with a record. */
+	assert_int_equal(line->ops->write(line, "P", 1), 0);
+	assert_true(line->ops->read(line, bytes, sizeof(bytes), &t_ns, 20000) > 0);
+	line->ops->close(line);
 }

@@ -3,11 +3,7 @@
  * lib/device/polhemus/polhemus_usb.c over a simulated bus, in place of libusb: names of trackers, which
  * device is taken, and packets with what may go wrong with them. Over the USB of the kernel it is in tests/vm.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +17,7 @@
 /* The longest that there is: 7 hubs behind one another, 255 of everything. */
 #define LONGEST "255-255.255.255.255.255.255.255"
 
-static void good_names(void **state)
+TEST(good_names)
 {
 	static const struct {
 		const char *text;
@@ -55,7 +51,7 @@ static void good_names(void **state)
 	}
 }
 
-static void bad_names(void **state)
+TEST(bad_names)
 {
 	static const char *const cases[] = {
 		"",
@@ -115,7 +111,7 @@ static void bad_names(void **state)
 	}
 }
 
-static void places(void **state)
+TEST(places)
 {
 	static const struct {
 		unsigned int bus;
@@ -183,7 +179,7 @@ static void plug(const struct libusb_device *devices, size_t n)
 	bus.n = (int)n;
 }
 
-static void which_one(void **state)
+TEST(which_one)
 {
 	static const struct {
 		const struct libusb_device *devices;
@@ -243,7 +239,7 @@ static void which_one(void **state)
 	}
 }
 
-static void what_is_wanted(void **state)
+TEST(what_is_wanted)
 {
 	static const struct {
 		const char *name;
@@ -286,7 +282,7 @@ static int enough(void *context, const struct incise_scan_device *device)
 	return 7;
 }
 
-static void a_scan(void **state)
+TEST(a_scan)
 {
 	static const struct {
 		const struct libusb_device *devices;
@@ -397,7 +393,7 @@ static ssize_t read_some(void *bytes, size_t size, int timeout_ms)
 }
 
 /* However many come while nobody reads: each is there, in order; the device waited. */
-static void none_is_thrown_away(void **state)
+TEST(none_is_thrown_away, begin, end)
 {
 	bus.events = flood;
 	to_send = 1000;
@@ -416,7 +412,7 @@ static void none_is_thrown_away(void **state)
 }
 
 /* A reader with less room than a packet. */
-static void a_small_reader(void **state)
+TEST(a_small_reader, begin, end)
 {
 	char bytes[8] = "";
 
@@ -438,7 +434,7 @@ static void come_empty(void)
 		bus_complete(IN, LIBUSB_TRANSFER_COMPLETED, "x", 1);
 }
 
-static void empty_packets(void **state)
+TEST(empty_packets, begin, end)
 {
 	char byte = 0;
 
@@ -449,7 +445,7 @@ static void empty_packets(void **state)
 	assert_int_equal(sent, 500);
 }
 
-static void pulled_out(void **state)
+TEST(pulled_out, begin, end)
 {
 	static const enum libusb_transfer_status ends[] = {LIBUSB_TRANSFER_NO_DEVICE,
 							   LIBUSB_TRANSFER_ERROR,
@@ -480,7 +476,7 @@ static void pulled_out(void **state)
 	assert_int_equal(line->ops->write(line, "c", 1), -ENODEV);
 }
 
-static void refuses(void **state)
+TEST(refuses)
 {
 	static const struct {
 		int claim_error, open_error, submit_error, endpoints;
@@ -517,7 +513,7 @@ static void refuses(void **state)
 }
 
 /* Sizes that a descriptor may have, true or not; and commands through an interrupt OUT. */
-static void descriptors(void **state)
+TEST(descriptors)
 {
 	static const struct {
 		int packet, length;
@@ -535,24 +531,4 @@ static void descriptors(void **state)
 		line->ops->close(line);
 		assert_int_equal(bus.flights, 0);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(good_names),
-		cmocka_unit_test(bad_names),
-		cmocka_unit_test(places),
-		cmocka_unit_test(which_one),
-		cmocka_unit_test(what_is_wanted),
-		cmocka_unit_test(a_scan),
-		cmocka_unit_test_setup_teardown(none_is_thrown_away, begin, end),
-		cmocka_unit_test_setup_teardown(a_small_reader, begin, end),
-		cmocka_unit_test_setup_teardown(empty_packets, begin, end),
-		cmocka_unit_test_setup_teardown(pulled_out, begin, end),
-		cmocka_unit_test(refuses),
-		cmocka_unit_test(descriptors),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }
