@@ -99,6 +99,7 @@ pairs() {
 	[[ "$output" == *"for rig.conf:"*"value = ["*"full_px = 365."* ]]
 }
 
+# bats test_tags=check
 @test "two points on pictures, with a pixel to learn the colour from" {
 	need_vision
 	need_converter
@@ -200,6 +201,7 @@ pairs() {
 	[ "$(in_force depth_mm_px)" = 0.075 ]
 }
 
+# bats test_tags=check
 @test "a recording gives both" {
 	need_vision
 	need_recording

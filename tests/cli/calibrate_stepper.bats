@@ -168,6 +168,7 @@ made_points() {
 	grep -q 'pass = false' calibration.conf
 }
 
+# bats test_tags=check
 @test "a report with pictures, text and JSON" {
 	command -v gnuplot >/dev/null || skip "needs gnuplot"
 	made_points '' >p.csv

@@ -143,6 +143,7 @@ END
 	[ "$(ask b.rec "SELECT count(*) FROM events WHERE kind = 'cut'")" = 0 ]
 }
 
+# bats test_tags=check
 @test "keys on a terminal: markers, the end, and what is shown" {
 	on_a_terminal 1:m,1.5:7,2:q incise capture -o a.rec --rig sim: --duration 60s >out
 	ask a.rec "SELECT text FROM events WHERE kind = 'marker' ORDER BY t_ns" >marks

@@ -105,6 +105,7 @@ sorted() {
 	[ "${COMPREPLY[*]}" = neck ]
 }
 
+# bats test_tags=check
 @test "recordings, calibrations, models and data are files with such names" {
 	touch pairs.csv "two words.csv" my.conf m.fis m.fx p.plan old.json s.session
 	mkdir cuts.rec folder
@@ -133,6 +134,7 @@ sorted() {
 	[ "$(sorted)" = "m.fis m.fx" ]
 }
 
+# bats test_tags=check
 @test "rigs are files, and keys of the simulated one" {
 	touch rig.conf
 	complete_words incise capture --rig ""

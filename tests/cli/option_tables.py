@@ -6,9 +6,9 @@ nothing and exits with 0 if all are. Of each program:
 
 * --help and -h print the same, exit 0, and fail with one line where nothing can be written;
 * --version is that of the header, and completion offers the options of --help;
-* an unknown option and an unknown letter are bad usage; each misspelt name gets the nearest one;
-* a flag takes no argument, and every other option must have one;
-* an option takes each of its legal values, as a choice those that completion offers, and refuses
+* an unknown option and an unknown letter are bad usage, a misspelt one gets the nearest name;
+* a flag takes no argument, and an option that has one must be given it;
+* every option takes each of its legal values, as a choice those that completion offers, and refuses
   each illegal one by its name.
 
 The parser reads options in their order: that one is legal is seen by the complaint about the
@@ -226,32 +226,38 @@ class Command:
             self.refused([*arguments, "--nosuch"], "--nosuch: no such option")
 
     def completed(self, *words):
-        """What completion offers for an empty word behind these."""
+        """What completion offers for the last of these words, without what it leaves to the shell (":files *.c")."""
         lines = run(self.program, "--complete", *words)[1].splitlines()
-        return [line.split("\t")[0] for line in lines]
+        return [line.split("\t")[0] for line in lines if not line.startswith(":")]
 
     def check(self, version):
         rows = list(rows_of_help(self.help(version)))
         self.refused(["--no-such-option"], "--no-such-option: no such option")
         self.refused(["-%"], "-%")
-        legal, names = {}, [name for name, _, _ in rows]
-        for name, letter, argument in rows:
-            if name not in ("--help", "--version"):
-                middle = (len(name) + 2) // 2
-                self.refused([name[:middle] + "q" + name[middle:]], f"did you mean {name}?")
-            if not argument:
-                self.refused([name + "=yes"], f"{name}: this option takes no argument")
-                if name not in ("--help", "--version"):
-                    self.refused([*(["-" + letter] if letter else []), name, "--nosuch"], "--nosuch: no such option")
-                continue
+        names = [name for name, _, _ in rows]
+        flags = [f for name, letter, argument in rows if not argument and name not in ("--help", "--version")
+                 for f in (name, letter and "-" + letter) if f]
+        # The parser is the same for all options of a command: one of each kind.
+        longest = max(names, key=len)
+        middle = (len(longest) + 2) // 2
+        self.refused([longest[:middle] + "q" + longest[middle:]], f"did you mean {longest}?")
+        self.refused(["--help=yes"], "--help: this option takes no argument")
+        self.refused([*flags, "--nosuch"], "--nosuch: no such option")
+        for name, letter, argument in [row for row in rows if row[2]][:1]:
             self.refused([name], f"{name}: missing argument {argument}")
             if letter:
                 self.refused(["-" + letter], f"-{letter}: missing argument {argument}")
+        legal = {}
+        for name, letter, argument in rows:
+            if not argument:
+                continue
             values = self.values.get(f"{name} {self.name}", self.values.get(name))
             if values is None:
                 self.complain(f"{name}: has no row in option_tables.py")
                 continue
             legal[name] = list(dict.fromkeys(values[0] + (self.completed(name, "") if values[1] else [])))
+            if letter and values[0]:
+                self.refused(["-" + letter, values[0][0], "--nosuch"], "--nosuch: no such option")
             for value in values[1]:
                 said = "clock source" if name == "--clock-source" else name
                 self.refused([*OPERANDS.get(self.name, []), f"{name}={value}"], said)
