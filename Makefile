@@ -131,6 +131,7 @@ all: libs tools
 include mk/lib.mk
 include mk/tools.mk
 include mk/test.mk
+include mk/golden.mk
 include mk/fuzz.mk
 include mk/rtsan.mk
 include mk/vm.mk

@@ -26,6 +26,7 @@
 #include <incise/recording.h>
 #include <incise/rig.h>
 #include <incise/sim.h>
+#include "../message.h"
 
 /* All 14 cuts of the paper, but short: 43 s. */
 #define SHORT_SCRIPT "sim:clock=simulated,cut_s=2,pause_s=1"
