@@ -16,6 +16,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include "../../../lib/view/window.h"
+#include "../message.h"
 #include "look.h"
 
 static struct incise_window *window;
@@ -185,7 +186,7 @@ static void test_no_screen(void **state)
 	window = incise_window_new("test", 320, 200, &err);
 	assert_null(window);
 	assert_int_equal(errno, ENODEV);
-	assert_non_null(strstr(err.text, "DISPLAY"));
+	assert_says(err.text, "DISPLAY");
 }
 
 int main(void)
