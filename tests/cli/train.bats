@@ -418,7 +418,7 @@ holds_on_unseen_cuts() {
 	run --separate-stderr incise train pairs.csv
 	bad_usage "-o MODEL.fis"
 	run --separate-stderr incise train -o m.fis
-	bad_usage "missing DATA.csv or NAME.rec (pairs to learn from)"
+	bad_usage "missing DATA.csv"
 	for wrong in "--check 0" "--check 1" "--check half" "--mf 0,3" "--mf 3" "--mf 3,3,3" \
 		"--mf 33,2" "--mf ," "--mf-type trimf" "--epochs 0" "--epochs 1.5" "--step 0" \
 		"--starts 0" "--starts x" "--ridge -1" "--ridge nan" "--seed -1" "--seed x" "--inputs ,"; do
