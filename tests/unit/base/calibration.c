@@ -3,11 +3,6 @@
  * lib/base/calibration.c: the paper's figures; what is appended is read back the same, what
  * failed is not in force, what is damaged is refused; the text of a file, to the letter.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <locale.h>
 #include <math.h>

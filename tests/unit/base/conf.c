@@ -2,11 +2,6 @@
 /*
  * lib/base/conf.c: what strict reading takes, and what it says of what it refuses.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <string.h>

@@ -2,11 +2,6 @@
 /*
  * incise/infile.h: lines and whole files, their limits, pipes, devices, decimal numbers.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>

@@ -2,11 +2,6 @@
 /*
  * lib/base/lines.h: lines without their ends, a NUL byte, errors of file and line.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include "../../../lib/base/lines.h"
 #include "../message.h"

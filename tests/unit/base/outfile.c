@@ -2,11 +2,6 @@
 /*
  * Files that appear whole or not at all.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <dirent.h>
 #include <errno.h>
 #include <grp.h>

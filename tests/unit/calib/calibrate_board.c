@@ -4,11 +4,6 @@
  * corners, stated intervals on 200 random cameras, a view that is wrong, what is refused.
  * The camera here is written apart from lib/calib.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>

@@ -4,11 +4,6 @@
  * viscosity that are not known; each motion that is not sufficient is refused with its reason. An
  * argument is the number of data sets, 200 or what is given.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>

@@ -3,11 +3,6 @@
  * Scale from two points and from a line: planted truth, stated intervals on 2000
  * random rigs, outliers that are named, and what is refused.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>

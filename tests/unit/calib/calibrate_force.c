@@ -3,11 +3,6 @@
  * lib/calib/calibrate_force.c: figures of made data with known truth; what is wrong is named; the stated
  * interval holds the truth as often as it says.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>

@@ -4,11 +4,6 @@
  * is not the virtual rig's: its turns are written down in closed form, from the way since the
  * turn.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>

@@ -3,11 +3,6 @@
  * Pivot calibration: truth within the stated intervals over 200 tools, accuracy, outliers
  * by name, and each motion that cannot carry it is refused with its reason.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdbool.h>

@@ -3,11 +3,6 @@
  * Tests of lib/calib/delay_grid.c: two streams on one grid are what they were made of, with
  * derivatives that are known; rows near what is missing are not good.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <string.h>

@@ -2,11 +2,6 @@
 /*
  * lib/calib/redundancy.c: made pairs of depths, alike, shifted, bent and scaled.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <string.h>

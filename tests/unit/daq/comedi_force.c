@@ -3,11 +3,6 @@
  * lib/device/daq/comedi_force.c on a card that a test simulates, whose file is a pipe: its set-up, times
  * from the arrival of blocks, samples, and the search.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <math.h>
 #include <sched.h>
 #include <stdlib.h>

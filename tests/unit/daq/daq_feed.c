@@ -3,11 +3,6 @@
  * lib/device/daq/daq_feed.c: what is read, clipped, lost and reported at the end; what is asked
  * for and cannot be; the thread.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>

@@ -4,11 +4,6 @@
  * channel that cannot be opened, the search. A channel that samples needs a kernel:
  * tests/vm/guest/force_iio.c.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <dirent.h>
 #include <math.h>
 #include <stdlib.h>

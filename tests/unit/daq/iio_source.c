@@ -3,11 +3,6 @@
  * lib/device/daq/iio_source.c on a converter that a test simulates: formats, triggers in a folder that stands
  * for configfs, rates, set-up and its refusals, and the buffer on files that stand for a device.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <ftw.h>

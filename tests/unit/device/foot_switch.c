@@ -3,11 +3,6 @@
  * lib/device/foot_switch.c: names of keys, refusals, and the bytes of an input device. A named pipe
  * takes its place, and this program answers the ioctls; tests/vm has the kernel's own.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/input.h>

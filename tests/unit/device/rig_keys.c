@@ -3,11 +3,6 @@
  * lib/device/rig_keys.c: the list of a rig's keys, written as a rig.conf, makes the same rig
  * again, and has every key that a rig.conf may have.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <locale.h>
 #include <string.h>

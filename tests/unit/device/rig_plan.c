@@ -3,11 +3,6 @@
  * lib/device/rig_plan.c: what rig.conf and the shorthand set, each key with its range and default, and the
  * message for each that is wrong.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <locale.h>
 #include <math.h>

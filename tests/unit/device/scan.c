@@ -3,11 +3,6 @@
  * lib/device/scan.c: what it says where there is nothing to scan. What it finds is in the
  * tests of the backends that can.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <string.h>
 #include <incise/scan.h>

@@ -3,11 +3,6 @@
  * lib/device/stepper.c: calls reach the backend; homing makes the count of a simulated machine the
  * position of the machine, wherever it started, or reports why not and stops it.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>

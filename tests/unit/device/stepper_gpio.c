@@ -5,11 +5,6 @@
  * should. No time is judged here: pulses of 1 ms let any machine keep up. Times are those
  * of the pulser's tests and of tests/vm.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <stdatomic.h>
 #include <stdbool.h>

@@ -4,11 +4,6 @@
  * calls to functions here, behind which a pulser and a machine play the module, on a clock
  * that goes when one sleeps. The real module is asked in tests/vm.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <stdbool.h>

@@ -3,11 +3,6 @@
  * lib/device/vision.c: the module is asked for by its name, every call reaches it with its
  * arguments, and what is said where it is not installed. This file is the finder of modules.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>

@@ -3,11 +3,6 @@
  * Films, read back by libavformat and libavcodec: the number of frames, their times, and their
  * colours up to coding losses; and files that cannot be written.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdbool.h>

@@ -4,11 +4,6 @@
  */
 /* before cmocka.h, which has a macro fail() */
 #include "../../../lib/learn/dataset.c"
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <string.h>
 #include <incise/dataset.h>

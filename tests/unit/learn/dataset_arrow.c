@@ -3,11 +3,6 @@
  * Reading a dataset from an Arrow stream: types, offsets, nulls, dictionaries, several batches;
  * errors name row and column, and the stream is released in any case.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdbool.h>

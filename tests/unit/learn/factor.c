@@ -3,11 +3,6 @@
  * Factors: any division of the pairs gives the same bytes, a file is read as it was written, and
  * the solution is that of a QR of the same rows.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>

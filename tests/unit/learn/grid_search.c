@@ -2,11 +2,6 @@
 /*
  * Choosing how many membership functions there should be: as many as the data need.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <string.h>

@@ -3,11 +3,6 @@
  * Training pairs: units there and back, what cannot be learnt from, samples, spread explained,
  * and rows kept back: the share, whole groups, both sides filled.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <float.h>
 #include <math.h>

@@ -4,11 +4,6 @@
  * implementation of Jang's rule, against data where the right answer is known, and against
  * data where there is none.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>

@@ -3,11 +3,6 @@
  * The loop on a simulated clock: number of ticks, overruns, stopping, statistics. On a
  * real one only order is asserted: times belong to benches.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <string.h>

@@ -6,11 +6,6 @@
  *
  *     test ── fork ──▶ child: rights away? ──▶ prepare ──▶ new ──▶ threads ──▶ exit status
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <linux/capability.h>
 #include <pthread.h>

@@ -2,11 +2,6 @@
 /*
  * lib/loop/realtime_checks.c with given answers and files in a folder; it asks this machine nothing.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include "../../../lib/loop/realtime.h"
 #include "../message.h"
 #include "root_folder.h"

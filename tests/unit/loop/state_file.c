@@ -2,11 +2,6 @@
 /*
  * lib/loop/state_file.c: paths that may be replaced, and the lock of a living writer.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>

@@ -3,11 +3,6 @@
  * lib/loop/state_reader.c: a reader next to a living and a dead writer, and malformed
  * pages.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>

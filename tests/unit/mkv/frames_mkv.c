@@ -4,11 +4,6 @@
  * at any byte gives all whole frames before it; a disk that is full, writes short, or fails;
  * kill -9, also of the pump of the virtual camera.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <signal.h>
 #include <stdio.h>

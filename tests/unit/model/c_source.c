@@ -3,11 +3,6 @@
  * The exported C file: strict C99 without a warning, and the library's results to the
  * bit. It is compiled as a user would, and loaded.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <dlfcn.h>
 #include <errno.h>
 #include <limits.h>

@@ -2,11 +2,6 @@
 /*
  * Compiling: the cheapest arithmetic within the budget, refusals, and files.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>

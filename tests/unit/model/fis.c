@@ -2,11 +2,6 @@
 /*
  * .fis files: exact round trips, errors by line, and files that were tampered with.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <locale.h>
 #include <math.h>

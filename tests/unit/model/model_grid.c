@@ -4,11 +4,6 @@
  * they enclose, checked against long double and differences; certified bounds are never below
  * an error that is found, and not uselessly far above.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>

@@ -3,11 +3,6 @@
  * lib/record/write/frame_pump.c, with a simulated camera, file and vision: every frame is in
  * the file or in a count, whichever of them is slow, ends or hangs.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <semaphore.h>

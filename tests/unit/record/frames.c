@@ -2,11 +2,6 @@
 /*
  * lib/record/frames.c: the module is found where it is, and what is said where it is not.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <limits.h>
 #include <stdio.h>

@@ -5,10 +5,6 @@
 #ifndef TEST_RECORDED_H
 #define TEST_RECORDED_H
 
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
 #include <errno.h>
 #include <ftw.h>
 #include <limits.h>
@@ -19,7 +15,6 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <cmocka.h>
 #include <sqlite3.h>
 #include <incise/calibration.h>
 #include <incise/recorder.h>

@@ -3,11 +3,6 @@
  * lib/scene/actuate.c, and the duals of lib/device/axes.c: one actuator on a plan made by hand,
  * then several against an independent least-squares solution.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>

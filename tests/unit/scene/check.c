@@ -7,11 +7,6 @@
  *                  ▲                                                                     │
  *                  ╰─────────────────────────────────────────────────────────────────────╯
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>

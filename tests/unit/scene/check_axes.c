@@ -3,11 +3,6 @@
  * Stability of a scene along each actuator of a rig: its own lateness counts, and directions that
  * are not at right angles.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>

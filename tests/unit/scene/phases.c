@@ -3,11 +3,6 @@
  * A scene with models of its own for puncture, cut and withdrawal: which of them the force is of, that
  * it does not leap between them, and scenes that cannot be.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include "../../../lib/scene/plan.h"

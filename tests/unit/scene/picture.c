@@ -2,11 +2,6 @@
 /*
  * The group `picture` of a scene: what it says, what it does not say, what it cannot say.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>

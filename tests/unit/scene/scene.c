@@ -2,11 +2,6 @@
 /*
  * Scene files: defaults, paths, and errors that name file, line and range.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include "../../../lib/scene/scene.h"

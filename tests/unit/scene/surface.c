@@ -3,11 +3,6 @@
  * Surfaces that a scene names: each kind with what it needs and may have, files beside the
  * scene, and errors that name file and line.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <sys/stat.h>
 #include "../../../lib/scene/scene.h"

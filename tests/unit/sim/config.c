@@ -2,11 +2,6 @@
 /*
  * lib/sim/config.c: defaults, setting by name, ranges.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include "../../../lib/sim/sim.h"

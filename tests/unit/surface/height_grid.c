@@ -2,11 +2,6 @@
 /*
  * Reading ESRI ASCII grids: where heights lie, what is refused, damaged files.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include "../../../lib/surface/surface.h"
 #include "../message.h"

@@ -2,11 +2,6 @@
 /*
  * Making surfaces of each kind, and asking what they are.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <float.h>
 #include "../../../lib/surface/surface.h"

@@ -3,11 +3,6 @@
  * tools/session: ticks of a made procedure, whose every figure is known, through the digest, the
  * file and the criteria.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>

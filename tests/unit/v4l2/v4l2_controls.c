@@ -4,11 +4,6 @@
  * itself is off and stays so, values are what was asked for or what they were, and all that
  * does not hold is refused.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include "../../../lib/device/v4l2/v4l2_controls.h"
 #include "../message.h"
 #include "driver.h"

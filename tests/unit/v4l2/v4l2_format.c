@@ -3,11 +3,6 @@
  * lib/device/v4l2/v4l2_format.c on a driver that the test plays: the nearest on offer is
  * taken, what is given is reported, and what cannot be is refused.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <math.h>
 #include "../../../lib/device/v4l2/v4l2_format.h"
 #include "../message.h"

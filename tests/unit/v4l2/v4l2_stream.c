@@ -4,11 +4,6 @@
  * lost or damaged is counted, what a caller holds is left alone, and what a driver says
  * wrongly is refused.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>

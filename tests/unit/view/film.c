@@ -3,11 +3,6 @@
  * A film's file: invalid options and a missing module are reported, and no partial file is left.
  * tests/unit/film tests its contents.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>

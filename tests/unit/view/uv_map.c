@@ -3,11 +3,6 @@
  * Maps of all kinds of surface: there and back, compared with finite differences and with the
  * surface itself; and their triangles.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"

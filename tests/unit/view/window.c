@@ -3,11 +3,6 @@
  * A window of SDL's driver `offscreen`, with a context and no screen; events are pushed into SDL's
  * queue. tests/cli has a real window under Xvfb.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #define SDL_MAIN_HANDLED
 #include <SDL.h>
 #include <epoxy/gl.h>
