@@ -132,6 +132,7 @@ include mk/lib.mk
 include mk/tools.mk
 include mk/test.mk
 include mk/check.mk
+include mk/golden.mk
 include mk/fuzz.mk
 include mk/rtsan.mk
 include mk/vm.mk

@@ -154,11 +154,11 @@ made_weights() {
 		|w.csv: no pairs; expected a line of column names
 	END
 	run --separate-stderr incise calibrate force --from none.csv
-	failed_with "none.csv: No such file or directory"
+	failed_with "none.csv:"
 	echo 'force_mV_N = "x";' >calibration.conf
 	made_weights "" >w.csv
 	run --separate-stderr incise calibrate force --from w.csv
-	failed_with "calibration.conf:1: force_mV_N: expected a number"
+	failed_with "calibration.conf:1: force_mV_N:"
 }
 
 @test "stopped in the middle, the old calibration stays" {

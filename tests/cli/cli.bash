@@ -122,22 +122,44 @@ bench_interrupted() {
 	[ -z "$(ls -A t)" ] || complain "left: $(ls -A t)"
 }
 
-# The last run (with --separate-stderr) failed with 1 and one line that holds these texts.
+# A text holds these pieces: path, line, key, value. The wording is in tests/messages/cli, which `make golden`
+# writes: where INCISE_MESSAGES names a file, the text is appended to it behind the name of the test's file.
+holds_pieces() {
+	local text=$1 piece
+	for piece in "${@:2}"; do
+		[[ "$text" == *"$piece"* ]] || complain "no '$piece' in: $text" || return
+	done
+	[ "${INCISE_MESSAGES:-}" ] || return 0
+	text=${text//"$BATS_TEST_TMPDIR"/TMP}
+	text=${text//"$BATS_FILE_TMPDIR"/TMP}
+	text=${text//"$INCISE_BUILD"/BUILD}
+	text=${text//"$root"/ROOT}
+	printf '%s\n' "$(basename "$BATS_TEST_FILENAME" .bats): $text" >>"$INCISE_MESSAGES"
+}
+
+# A test that skips something may lack messages.
+declare -F bats_skip >/dev/null || eval "bats_$(declare -f skip)"
+skip() {
+	[ -z "${INCISE_MESSAGES:-}" ] ||
+		echo "$(basename "$BATS_TEST_FILENAME" .bats): (skipped)" >>"$INCISE_MESSAGES"
+	bats_skip "$@"
+}
+
+# The last run (with --separate-stderr) failed with 1 and one line that holds these pieces.
 failed_with() {
 	[ "$status" -eq 1 ] || complain "exit $status: $stderr" || return
 	[ "${#stderr_lines[@]}" -eq 1 ] || complain "more than one line: $stderr" || return
 	[[ "$stderr" == "incise "*": "* ]] || complain "no verb is named: $stderr" || return
-	for text; do
-		[[ "$stderr" == *"$text"* ]] || complain "no '$text' in: $stderr" || return
-	done
+	holds_pieces "$stderr" "$@"
 }
 
-# The last run was bad usage: 2, one line that holds the text, and where help is.
+# The last run was bad usage: 2, one line that holds these pieces, and where help is.
 bad_usage() {
 	[ "$status" -eq 2 ] || complain "exit $status: $stderr" || return
 	[ "${#stderr_lines[@]}" -eq 2 ] || complain "not two lines: $stderr" || return
-	[[ "${stderr_lines[0]}" == "incise "*"$1"* ]] || complain "no '$1' in: $stderr" || return
-	[[ "${stderr_lines[1]}" == "Try 'incise "*" --help'." ]] || complain "$stderr"
+	[[ "${stderr_lines[0]}" == "incise "* ]] || complain "no verb is named: $stderr" || return
+	[[ "${stderr_lines[1]}" == "Try 'incise "*" --help'." ]] || complain "$stderr" || return
+	holds_pieces "${stderr_lines[0]}" "$@"
 }
 
 # One value of a JSON file, by path: key report.json check.rmse_N. Fails without it.

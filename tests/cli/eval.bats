@@ -191,7 +191,7 @@ refuses() {
 	run --separate-stderr incise eval alone.fis --sd <<<'5 20'
 	failed_with alone.fis.sd:9 "not a number"
 	run --separate-stderr incise eval - --sd <m.fis
-	failed_with "--sd: the model comes from standard input"
+	failed_with "--sd:"
 	# without --sd nobody looks
 	echo '5 20' | incise eval alone.fis >/dev/null
 }

@@ -123,9 +123,9 @@ train() {
 	done
 	cut -d, -f1-4 b.csv >plain.csv
 	run --separate-stderr incise train a.csv plain.csv -o x.fis
-	failed_with "plain.csv: has other uncertainties than a.csv"
+	failed_with "plain.csv:"
 	run --separate-stderr incise train plain.csv --uncertainty parts -o x.fis
-	failed_with "plain.csv: has no uncertainties of these columns" "--uncertainty parts"
+	failed_with "plain.csv:" "--uncertainty parts"
 	sed '2,$s/-0.01,/nan,/' a.csv >nan.csv
 	incise train nan.csv --group cut --mf 2,2 -o x.fis >/dev/null 2>err
 	grep -q "nan.csv: its uncertainties are not all stated (nan), so none is used" err
@@ -134,7 +134,7 @@ train() {
 	[[ "$stderr" == *"late.csv:9: column 6 (force_u_zero_N): nan is not finite"* ]]
 	incise capture -o r.rec --rig sim:clock=simulated,cut_s=2,pause_s=1 --duration 8s >/dev/null
 	run --separate-stderr incise train r.rec --uncertainty parts -o z.fis
-	failed_with "r.rec: the uncertainty of " "is not stated: "
+	failed_with "r.rec:" "is not stated: "
 }
 
 @test "recordings state the same as their export does" {

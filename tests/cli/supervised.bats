@@ -167,7 +167,7 @@ ended() {
 	run --separate-stderr incise haptic neck --rig sim:clock=simulated --duration 0.1s
 	failed_with neck.scene: syntax
 	run --separate-stderr incise haptic nothing --rig sim:clock=simulated --duration 0.1s
-	failed_with "nothing: no such scene; give the path of a file, or one of: "
+	failed_with "nothing:"
 }
 
 # Rights that this test takes away; who has none to begin with needs not.

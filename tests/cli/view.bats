@@ -148,7 +148,7 @@ wrote s.session" ]
 	pid=
 	holds "$(key h.json ticks) > 500"
 	run --separate-stderr incise view neck --frames f --overwrite --duration 1s $small
-	failed_with "neck: its loop has ended" "incise haptic neck"
+	failed_with "neck:" "incise haptic neck"
 	# a name that no other loop on this machine has, running or left
 	cp liver.scene "idle-$$.scene"
 	run --separate-stderr incise view "idle-$$" --frames f --overwrite --duration 1s $small

@@ -3,11 +3,6 @@
  * lib/base/calibration.c: the paper's figures; what is appended is read back the same, what
  * failed is not in force, what is damaged is refused; the text of a file, to the letter.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <locale.h>
 #include <math.h>
@@ -18,6 +13,7 @@
 #include <sys/wait.h>
 #include <incise/calibration.h>
 #include "../../../lib/base/calibration.c"
+#include "../message.h"
 #include "temp_file.h"
 
 static void nominal_is_the_papers(void **state)
@@ -67,37 +63,23 @@ static void all_keys_are_read(void **state)
 static void faults_leave_the_calibration_alone(void **state)
 {
 	static const struct {
-		const char *text, *tail;
+		const char *text, *says[2];
 	} row[] = {
-		{"\nforce_mV_N = 0;",
-		 ":2: force_mV_N: expected a number from 1 to 100000, "
-		 "found 0; correct it"},
-		{"force_zero_mV = 1e5;",
-		 ":1: force_zero_mV: expected a number from -10000 to "
-		 "10000, found 100000; correct it"},
-		{"depth_mm_px = \"x\";",
-		 ":1: depth_mm_px: expected a number from 0.0001 to "
-		 "10, found \"x\"; correct it"},
-		{"gain = 1;",
-		 ":1: gain: unknown key; expected one of force_mV_N, force_zero_mV, "
-		 "depth_mm_px, tip_mm, surface_u_mm, force_delay_ms, force_delay_sd_ms, "
-		 "tracker_delay_ms, tracker_delay_sd_ms, camera_delay_ms, "
-		 "camera_delay_sd_ms, stepper_N_step, stepper_backlash_mm, "
-		 "stepper_hysteresis_N, stepper_stiction_N, stepper_steps_s, history"},
-		{"force_mV_N", ":1: syntax error: expected `key = value;`; correct it"},
+		{"\nforce_mV_N = 0;", {":2: force_mV_N:", "0"}},
+		{"force_zero_mV = 1e5;", {":1: force_zero_mV:", "100000"}},
+		{"depth_mm_px = \"x\";", {":1: depth_mm_px:", "\"x\""}},
+		{"gain = 1;", {":1: gain:"}},
+		{"force_mV_N", {":1: syntax error:"}},
 	};
 
 	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
 		struct temp_file file = temp_file_new("calibration.conf", row[i].text);
 		struct incise_calibration c = {
 			.force_mV_N = 1, .force_zero_mV = 2, .depth_mm_px = 3};
-		struct incise_error err = {0};
-		char expected[600];
+		struct incise_error err;
 
-		assert_int_equal(incise_calibration_load(file.path, &c, &err), -EINVAL);
-		snprintf(expected, sizeof(expected), "%s%s", file.path, row[i].tail);
-		assert_string_equal(err.text, expected);
-		assert_int_equal(err.code, EINVAL);
+		assert_error(incise_calibration_load(file.path, &c, &err), EINVAL, &err,
+			     file.path, row[i].says[0], row[i].says[1]);
 		assert_true(c.force_mV_N == 1 && c.force_zero_mV == 2 &&
 			    c.depth_mm_px == 3);
 		temp_file_free(&file);
@@ -306,12 +288,8 @@ static void wrong_records_change_nothing(void **state)
 	for (int i = 0; i < n; i++) {
 		struct incise_error err = {0};
 
-		assert_int_equal(incise_calibration_append(file.path, &row[i], &err),
-				 -EINVAL);
-		assert_int_equal(err.code, EINVAL);
-		assert_non_null(
-			strstr(err.text,
-			       "nothing appended: the calibration has an invalid field"));
+		assert_error(incise_calibration_append(file.path, &row[i], &err), EINVAL,
+			     &err, "nothing appended");
 		assert_string_equal(content(file.path), "force_mV_N = 1200;\n");
 	}
 	temp_file_free(&file);
@@ -326,63 +304,56 @@ static void wrong_files_are_named(void **state)
 	static const struct {
 		const char *text, *said;
 	} row[] = {
-		{"history = 3;", ":1: history: expected a list"},
-		{"history = [1, 2];", ":1: history: expected a list"},
-		{"history = (\n1 );", ":2: history: expected groups"},
-		{ENTRY(""), ":2: history: values: expected a list of 1 to 16"},
-		{ENTRY("values = ( );"), ":3: history: values: expected a list"},
-		{ENTRY("values = ( 1 );"), ":3: history: values: expected groups"},
-		{ENTRY("values = ( { key = \"force_mV_N\"; u = 1; } );"),
-		 ":3: left is missing"},
+		{"history = 3;", ":1: history:"},
+		{"history = [1, 2];", ":1: history:"},
+		{"history = (\n1 );", ":2: history:"},
+		{ENTRY(""), ":2: history: values:"},
+		{ENTRY("values = ( );"), ":3: history: values:"},
+		{ENTRY("values = ( 1 );"), ":3: history: values:"},
+		{ENTRY("values = ( { key = \"force_mV_N\"; u = 1; } );"), ":3: left"},
 		{ENTRY("values = ( { key = \"x\"; left = 1; u = 1; } );"),
-		 "history: values: key: expected a key"},
+		 "history: values: key:"},
 		{ENTRY("values = ( { key = \"force_mV_N\"; left = 1e999; u = 1; } );"),
-		 ":3: left: expected a number from"},
+		 ":3: left:"},
 		{ENTRY("values = ( { key = \"force_mV_N\"; left = nan; u = 1; } );"),
 		 ":3: syntax error"},
 		{ENTRY("values = ( { key = \"force_mV_N\"; left = 0; u = 1; } );"),
-		 "history: values: left: expected a number in the range"},
+		 "history: values: left:"},
 		{ENTRY("values = ( { key = \"force_mV_N\"; left = 9; u = -1; } );"),
-		 ":3: u: expected a number from 0"},
+		 ":3: u:"},
 		{ENTRY("values = ( { key = \"force_mV_N_force_mV_N_force_mV_N\"; left = 1; "
 		       "u = 1; } );"),
-		 ":3: key: expected text of at most 31 bytes"},
-		{ENTRY(VALUE "covariance = [1.0, 2.0];"),
-		 ":2: history: covariance: expected n (n + 1)/2"},
-		{ENTRY(VALUE "covariance = [1e999];"),
-		 ":3: covariance: expected finite numbers"},
-		{ENTRY(VALUE "covariance = \"x\";"), ":3: covariance: expected at most"},
-		{ENTRY(VALUE "raw_crc32c = \"xyz\";"), ":3: history: raw_crc32c: expect"},
-		{ENTRY(VALUE "raw_crc32c = 3;"), ":3: raw_crc32c: expected text"},
-		{ENTRY(VALUE "low = 2; high = 1;"), ":2: history: low: expected a range"},
-		{ENTRY(VALUE "verdict = 2;"), ":3: verdict: expected text in quotes"},
-		{ENTRY(VALUE "sum = 2;"), ":3: sum: unknown key"},
+		 ":3: key:"},
+		{ENTRY(VALUE "covariance = [1.0, 2.0];"), ":2: history: covariance:"},
+		{ENTRY(VALUE "covariance = [1e999];"), ":3: covariance:"},
+		{ENTRY(VALUE "covariance = \"x\";"), ":3: covariance:"},
+		{ENTRY(VALUE "raw_crc32c = \"xyz\";"), ":3: history: raw_crc32c:"},
+		{ENTRY(VALUE "raw_crc32c = 3;"), ":3: raw_crc32c:"},
+		{ENTRY(VALUE "low = 2; high = 1;"), ":2: history: low:"},
+		{ENTRY(VALUE "verdict = 2;"), ":3: verdict:"},
+		{ENTRY(VALUE "sum = 2;"), ":3: sum:"},
 		{"history = ( {\nkind = \"force\";\n", "syntax error"},
-		{"tip_mm = [1, 2];", ":1: tip_mm: expected three numbers"},
-		{"stepper_backlash_mm = -1;",
-		 ":1: stepper_backlash_mm: expected a number"},
+		{"tip_mm = [1, 2];", ":1: tip_mm:"},
+		{"stepper_backlash_mm = -1;", ":1: stepper_backlash_mm:"},
 	};
 
 	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
 		struct temp_file file = temp_file_new("calibration.conf", row[i].text);
 		struct incise_calibration_record *records = (void *)1, new;
 		struct incise_calibration c = {.force_mV_N = 1};
-		struct incise_error err = {0};
+		struct incise_error err;
 
-		assert_int_equal(incise_calibration_load(file.path, &c, &err), -EINVAL);
+		assert_error(incise_calibration_load(file.path, &c, &err), EINVAL, &err,
+			     file.path, row[i].said);
 		assert_true(c.force_mV_N == 1);
-		if (!strstr(err.text, row[i].said) || strncmp(err.text, file.path, 10))
-			fail_msg("row %zu: %s", i, err.text);
 		assert_int_equal(incise_calibration_history(file.path, &records, NULL),
 				 -EINVAL);
 		assert_null(records);
 		/* a text is read by the same rules */
-		assert_int_equal(incise_calibration_text(row[i].text, "text", &c,
-							 &records, &err),
-				 -EINVAL);
+		assert_error(incise_calibration_text(row[i].text, "text", &c, &records,
+						     &err),
+			     EINVAL, &err, "text:", row[i].said);
 		assert_null(records);
-		if (!strstr(err.text, row[i].said) || strncmp(err.text, "text:", 5))
-			fail_msg("row %zu: %s", i, err.text);
 		/* a file that is not understood is not overwritten */
 		new = force_record(1240);
 		assert_int_equal(incise_calibration_append(file.path, &new, NULL),

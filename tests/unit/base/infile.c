@@ -2,17 +2,13 @@
 /*
  * incise/infile.h: lines and whole files, their limits, pipes, devices, decimal numbers.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
 #include <pthread.h>
 #include <sys/stat.h>
 #include <incise/infile.h>
+#include "../message.h"
 #include "temp_file.h"
 
 static const struct incise_infile_kind stream = {.name = "a text", .advice = "give one"};
@@ -72,17 +68,15 @@ static void test_limits_are_named(void **state)
 	assert_int_equal(size, 1 << 20);
 	free(line);
 	assert_int_equal(truncate(temp.path, (1 << 20) + 1), 0);
-	assert_null(incise_infile_read(temp.path, &small, &size, &err));
-	assert_int_equal(errno, EFBIG);
-	assert_non_null(
-		strstr(err.text, "l.txt: larger than 1 MiB, the limit of a note"));
+	assert_error(incise_infile_read(temp.path, &small, &size, &err), EFBIG, &err,
+		     "l.txt:", "1 MiB");
 	/* A file that grows while it is read. */
 	assert_int_equal(truncate(temp.path, 0), 0);
 	file = incise_infile_open(temp.path, &small, &err);
 	assert_non_null(file);
 	assert_int_equal(truncate(temp.path, (off_t)1 << 40), 0);
-	assert_int_equal(incise_infile_line(file, &line, &err), -EINVAL);
-	assert_non_null(strstr(err.text, "l.txt:1: a NUL byte: this is not a note"));
+	assert_error(incise_infile_line(file, &line, &err), EINVAL, &err,
+		     "l.txt:1:", "NUL");
 	incise_infile_close(file);
 	temp_file_free(&temp);
 }
@@ -108,13 +102,10 @@ static void test_pipes(void **state)
 
 	unlink(temp.path);
 	assert_int_equal(mkfifo(temp.path, 0600), 0);
-	assert_null(incise_infile_open(temp.path, &stream, &err));
-	assert_int_equal(errno, ENODATA);
-	assert_non_null(strstr(err.text, "/pipe: no program writes to this pipe; give "
-					 "one"));
-	assert_null(incise_infile_open(temp.path, &regular, &err));
-	assert_int_equal(errno, EINVAL);
-	assert_non_null(strstr(err.text, "/pipe: not a regular file"));
+	assert_error(incise_infile_open(temp.path, &stream, &err), ENODATA, &err,
+		     "/pipe:");
+	assert_error(incise_infile_open(temp.path, &regular, &err), EINVAL, &err,
+		     "/pipe:");
 	assert_int_equal(pthread_create(&thread, NULL, write_late, temp.path), 0);
 	/* A busy machine may start the thread after the second of patience. */
 	do
@@ -139,9 +130,8 @@ static void test_devices_are_refused(void **state)
 	size_t size;
 
 	for (size_t i = 0; i < sizeof(devices) / sizeof(*devices); i++) {
-		assert_null(incise_infile_read(devices[i], &small, &size, &err));
-		assert_int_equal(errno, EINVAL);
-		assert_non_null(strstr(err.text, "not a regular file or a pipe"));
+		assert_error(incise_infile_read(devices[i], &small, &size, &err), EINVAL,
+			     &err, devices[i]);
 	}
 }
 

@@ -2,13 +2,9 @@
 /*
  * lib/base/lines.h: lines without their ends, a NUL byte, errors of file and line.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include "../../../lib/base/lines.h"
+#include "../message.h"
 #include "temp_file.h"
 
 static const struct incise_infile_kind text = {.name = "a text", .advice = "give one"};
@@ -43,13 +39,13 @@ static void test_errors(void **state)
 	assert_int_equal(incise_lines_open(&in, file.path, &text, &err), 0);
 	assert_int_equal(incise_lines_next(&in, "\n"), 1);
 	assert_int_equal(incise_lines_next(&in, "\n"), -EINVAL);
-	assert_non_null(strstr(err.text, "l.txt:2: a NUL byte: this is not a text"));
+	assert_says(err.text, "l.txt:2:");
 	incise_lines_close(&in);
-	assert_int_equal(incise_lines_open(&in, file.dir, &text, &err), -EISDIR);
-	assert_non_null(strstr(err.text, ": Is a directory; give one"));
+	assert_error(incise_lines_open(&in, file.dir, &text, &err), EISDIR, &err,
+		     file.dir);
 	temp_file_free(&file);
-	assert_int_equal(incise_lines_open(&in, file.path, &text, &err), -ENOENT);
-	assert_non_null(strstr(err.text, "l.txt: No such file or directory"));
+	assert_error(incise_lines_open(&in, file.path, &text, &err), ENOENT, &err,
+		     file.path);
 }
 
 int main(void)

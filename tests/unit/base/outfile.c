@@ -2,11 +2,6 @@
 /*
  * Files that appear whole or not at all.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <dirent.h>
 #include <errno.h>
 #include <grp.h>
@@ -20,6 +15,7 @@
 #include <signal.h>
 #include <unistd.h>
 #include <incise/outfile.h>
+#include "../message.h"
 
 static char folder[] = "/tmp/incise-outfile-XXXXXX";
 static char path[64];
@@ -143,7 +139,7 @@ static void test_failed_write(void **state)
 	rc = incise_outfile_commit(file, &err);
 	setrlimit(RLIMIT_FSIZE, &before);
 	assert_true(rc < 0);
-	assert_non_null(strstr(err.text, "not written"));
+	assert_says(err.text, "not written");
 	assert_null(content());
 	assert_int_equal(entries(), 0);
 }

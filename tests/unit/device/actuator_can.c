@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "../../../lib/device/actuator.h"
+#include "../message.h"
 #include "actuator_text.h"
 
 static void defaults_are_those_of_the_manual(void **state)
@@ -120,16 +121,17 @@ static void every_range_ends_where_the_manual_says(void **state)
 			struct incise_actuator actuator;
 			struct incise_error err = {0};
 			char text[200], says[100];
-			int rc;
 
 			snprintf(text, sizeof(text), "can = {\n%s = %s; };", cases[i].key,
 				 values[k]);
-			snprintf(says, sizeof(says), "r:3: actuator.can.%s: expected",
-				 cases[i].key);
-			rc = actuator_read(&actuator, NEEDED, text, &err);
-			if (rc != (good ? 0 : -EINVAL) ||
-			    (!good && !strstr(err.text, says)))
-				fail_msg("%s: %d, \"%s\"", text, rc, err.text);
+			snprintf(says, sizeof(says),
+				 "r:3: actuator.can.%s:", cases[i].key);
+			if (good)
+				assert_int_equal(
+					actuator_read(&actuator, NEEDED, text, NULL), 0);
+			else
+				assert_error(actuator_read(&actuator, NEEDED, text, &err),
+					     EINVAL, &err, says);
 		}
 	}
 }
@@ -149,8 +151,8 @@ static void bit_rates_are_those_of_adapters(void **state)
 	}
 	for (size_t i = 0; i < sizeof(bad) / sizeof(*bad); i++) {
 		snprintf(text, sizeof(text), "can = { bitrate = %d; };", bad[i]);
-		assert_int_equal(actuator_read(&actuator, NEEDED, text, &err), -EINVAL);
-		assert_non_null(strstr(err.text, "125000, 250000, 500000"));
+		assert_error(actuator_read(&actuator, NEEDED, text, &err), EINVAL, &err,
+			     "125000, 250000, 500000");
 	}
 }
 
@@ -182,44 +184,30 @@ static void what_does_not_fit_is_refused_with_its_line(void **state)
 	static const struct {
 		const char *inside, *says;
 	} cases[] = {
-		{"can = 3;", "r:2: actuator.can: expected a group"},
-		{"can = {\nspeed = 3; };", "r:3: actuator.can.speed: unknown key"},
-		{"can = {\nfollowing_um = 3; };",
-		 "actuator.can.following_um: unknown key; expected following_mm, in the "
-		 "unit of its name"},
-		{"can = {\nmode = \"CSP\"; };",
-		 "r:3: actuator.can.mode: expected \"csp\", \"csv\" or \"cst\", found "
-		 "\"CSP\"; correct it"},
-		{"can = {\nmode = 8; };",
-		 "r:3: actuator.can.mode: expected text in quotes, found 8"},
-		{"can = {\nabsolute = 1; };",
-		 "r:3: actuator.can.absolute: expected true or false"},
-		{"can = {\ncycle_us = 1005; };",
-		 "r:3: actuator.can.cycle_us: expected a multiple of 10 us, found "
-		 "1005; give 1000 or 1010"},
-		{"can = {\ncycle_us = 1000.5; };",
-		 "r:3: actuator.can.cycle_us: expected a whole number from 500 to 2000"},
+		{"can = 3;", "r:2: actuator.can:"},
+		{"can = {\nspeed = 3; };", "r:3: actuator.can.speed:"},
+		{"can = {\nfollowing_um = 3; };", "actuator.can.following_um:"},
+		{"can = {\nmode = \"CSP\"; };", "r:3: actuator.can.mode:"},
+		{"can = {\nmode = 8; };", "r:3: actuator.can.mode:"},
+		{"can = {\nabsolute = 1; };", "r:3: actuator.can.absolute:"},
+		{"can = {\ncycle_us = 1005; };", "r:3: actuator.can.cycle_us:"},
+		{"can = {\ncycle_us = 1000.5; };", "r:3: actuator.can.cycle_us:"},
 		{"can = {\nmode = \"cst\"; };",
-		 "r:3: actuator.can.stiffness_permille_mm is missing: in mode \"cst\""},
+		 "r:3: actuator.can.stiffness_permille_mm"},
 		{"can = { stiffness_permille_mm = 3;\nmode = \"cst\"; };",
-		 "r:3: actuator.can.torque_max_permille is missing"},
-		{"can = { mode = \"csv\";\nposition_gain_1_s = 223; };",
-		 "r:3: actuator.can.position_gain_1_s: expected at most 222.5 1/s, "
-		 "half of the stable limit with cycle_us = 1000, found 223; correct it"},
+		 "r:3: actuator.can.torque_max_permille"},
+		{"can = { mode = \"csv\";\nposition_gain_1_s = 223; };", "222.5 1/s"},
 		/* Twice the cycle, half the gain. */
 		{"can = { mode = \"csv\"; cycle_us = 2000;\nposition_gain_1_s = 112; };",
-		 "at most 111.2 1/s"},
+		 "111.2 1/s"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_actuator actuator;
 		struct incise_error err = {0};
 
-		assert_int_equal(actuator_read(&actuator, NEEDED, cases[i].inside, &err),
-				 -EINVAL);
-		if (!strstr(err.text, cases[i].says))
-			fail_msg("case %zu: \"%s\" has no \"%s\"", i, err.text,
-				 cases[i].says);
+		assert_error(actuator_read(&actuator, NEEDED, cases[i].inside, &err),
+			     EINVAL, &err, cases[i].says);
 	}
 	actuator_good(NEEDED, "can = { mode = \"csv\"; position_gain_1_s = 222.5; };");
 	/* It is of csv alone. */

@@ -3,11 +3,6 @@
  * lib/device/rig_plan.c: what rig.conf and the shorthand set, each key with its range and default, and the
  * message for each that is wrong.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <locale.h>
 #include <math.h>
@@ -16,6 +11,7 @@
 #include <incise/rig.h>
 #include <incise/sim.h>
 #include "../../../lib/device/rig_plan.h"
+#include "../message.h"
 #include "../base/temp_file.h"
 
 /* --- file --- */
@@ -62,49 +58,32 @@ static void shorthand_ignores_the_locale(void **state)
 	incise_rig_close(rig);
 }
 
-#define PAIRS "expected KEY=VALUE, for example sim:seed=7,clock=simulated; correct it"
-
 static void shorthand_refuses(void **state)
 {
 	static const struct {
 		const char *spec, *text;
 	} row[] = {
-		{"sim:sede=1", "sim:sede=1: sim.sede: unknown key; did you mean seed?"},
-		{"sim:clok=simulated",
-		 "sim:clok=simulated: clok: unknown key; did you mean clock?"},
-		{"sim:mause=1", "sim:mause=1: mause: unknown key; did you mean mouse?"},
-		{"sim:haste=x",
-		 "sim:haste=x: sim.haste: unknown key; rig.conf(5) lists them"},
-		{"sim:seed", "sim:seed: " PAIRS},
-		{"sim:seed=", "sim:seed=: " PAIRS},
-		{"sim:=1", "sim:=1: " PAIRS},
-		{"sim:seed=1,", "sim:: " PAIRS},
-		{"sim:seed=x",
-		 "sim:seed=x: seed: expected a number, found x; correct it"},
-		{"sim:seed=1x",
-		 "sim:seed=1x: seed: expected a number, found 1x; correct it"},
-		{"sim:clock=fast",
-		 "sim:clock=fast: clock: expected real or simulated, found "
-		 "fast; correct it"},
-		{"sim:seed=1,tooth=1",
-		 "sim:tooth=1: sim.tooth: expected a number from 0 to "
-		 "0.9, found 1; correct it"},
-		{"sim:withdrawal=1",
-		 "sim:withdrawal=1: sim.withdrawal: expected dissipative or paper, found 1; "
-		 "correct it"},
-		{"sim:tooth=nan",
-		 "sim:tooth=nan: sim.tooth: expected a number from 0 to 0.9, "
-		 "found nan; correct it"},
+		{"sim:sede=1", "sim:sede=1: sim.sede:"},
+		{"sim:clok=simulated", "sim:clok=simulated: clok:"},
+		{"sim:mause=1", "sim:mause=1: mause:"},
+		{"sim:haste=x", "sim:haste=x: sim.haste:"},
+		{"sim:seed", "sim:seed:"},
+		{"sim:seed=", "sim:seed=:"},
+		{"sim:=1", "sim:=1:"},
+		{"sim:seed=1,", "sim::"},
+		{"sim:seed=x", "sim:seed=x: seed:"},
+		{"sim:seed=1x", "sim:seed=1x: seed:"},
+		{"sim:clock=fast", "sim:clock=fast: clock:"},
+		{"sim:seed=1,tooth=1", "sim:tooth=1: sim.tooth:"},
+		{"sim:withdrawal=1", "sim:withdrawal=1: sim.withdrawal:"},
+		{"sim:tooth=nan", "sim:tooth=nan: sim.tooth:"},
 	};
 
 	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
-		struct incise_error err = {0};
+		struct incise_error err;
 
-		errno = 0;
-		assert_null(incise_rig_open(row[i].spec, ALL, &err));
-		assert_int_equal(errno, EINVAL);
-		assert_int_equal(err.code, EINVAL);
-		assert_string_equal(err.text, row[i].text);
+		assert_error(incise_rig_open(row[i].spec, ALL, &err), EINVAL, &err,
+			     row[i].text);
 	}
 }
 
@@ -158,87 +137,56 @@ static void file_refuses(void **state)
 	static const struct {
 		const char *text;
 		int code;
-		const char *tail; /* of the message, after the path */
+		const char *says[2]; /* the place and key, and the value */
 	} row[] = {
-		{"", ENODEV,
-		 ": tracker: missing, but required; add `tracker = \"sim:\";` or "
-		 "another backend"},
-		{"\ntracker = \"fastrak:usb\";", ENODEV,
-		 ":2: tracker: no such backend \"fastrak\"; there are: sim"},
-		{"tracker = \"sim\";", EINVAL,
-		 ":1: tracker: expected BACKEND:ARGUMENTS such as \"sim:\", found \"sim\"; "
-		 "correct it"},
-		{"tracker = \"sim:seed=1\";", EINVAL,
-		 ":1: tracker: expected \"sim:\" without arguments, found \"sim:seed=1\"; "
-		 "settings of the simulated rig belong in the group `sim`"},
-		{"tracker = 1;", EINVAL,
-		 ":1: tracker: expected text in quotes, found 1; correct it"},
-		{"clock = \"fast\";", EINVAL,
-		 ":1: clock: expected real or simulated, found fast; correct it"},
-		{"tracer = \"sim:\";", EINVAL,
-		 ":1: tracer: unknown key; did you mean tracker?"},
-		{"voltmeter = \"sim:\";", EINVAL,
-		 ":1: voltmeter: unknown key; expected one of clock, tracker, force, camera, "
-		 "stepper, surface, sim, actuator, "
-		 "tracker_setup, force_setup, camera_setup, vision, foot_switch, sign_key"},
-		{"sim = 1;", EINVAL,
-		 ":1: sim: expected a group { key = value; }; correct it"},
-		{"sim = {\n\nsede = 1; };", EINVAL,
-		 ":3: sim.sede: unknown key; did you mean seed?"},
-		{"sim = { sede = \"a\"; };", EINVAL,
-		 ":1: sim.sede: unknown key; did you mean seed?"},
-		{"sim = {\nseed = -1; };", EINVAL,
-		 ":2: sim.seed: expected a whole number from 0 to 2147483647, found -1; "
-		 "correct it"},
-		{"sim = { seed = \"a\"; };", EINVAL,
-		 ":1: sim.seed: expected a number; correct it"},
-		{"sim = { seed = [1]; };", EINVAL,
-		 ":1: sim.seed: expected a number; correct it"},
-		{"sim = { seed = {}; };", EINVAL,
-		 ":1: sim.seed: expected a number; correct it"},
-		{"sim = { withdrawal = 1; };", EINVAL,
-		 ":1: sim.withdrawal: expected text in quotes, found 1; correct it"},
-		{"sim = {\nwithdrawal = \"both\"; };", EINVAL,
-		 ":2: sim.withdrawal: expected dissipative or paper, found both; correct it"},
-		{"sim = { depth_mm = [5]; };", EINVAL,
-		 ":1: sim: expected depth_mm and times with equally many values, 1 to "
-		 "8; correct them"},
-		{"sim = { depth_mm = [5, 6]; times = [1]; };", EINVAL,
-		 ":1: sim: expected depth_mm and times with equally many values, 1 to "
-		 "8; correct them"},
-		{"sim = { depth_mm = []; times = []; };", EINVAL,
-		 ":1: sim: expected depth_mm and times with equally many values, 1 to "
-		 "8; correct them"},
+		{"", ENODEV, {": tracker: missing"}},
+		{"\ntracker = \"fastrak:usb\";", ENODEV, {":2: tracker:"}},
+		{"tracker = \"sim\";", EINVAL, {":1: tracker:", "\"sim\""}},
+		{"tracker = \"sim:seed=1\";", EINVAL, {":1: tracker:", "\"sim:seed=1\""}},
+		{"tracker = 1;", EINVAL, {":1: tracker:", "1"}},
+		{"clock = \"fast\";", EINVAL, {":1: clock:", "fast"}},
+		{"tracer = \"sim:\";", EINVAL, {":1: tracer:"}},
+		{"voltmeter = \"sim:\";", EINVAL, {":1: voltmeter:"}},
+		{"sim = 1;", EINVAL, {":1: sim:"}},
+		{"sim = {\n\nsede = 1; };", EINVAL, {":3: sim.sede:"}},
+		{"sim = { sede = \"a\"; };", EINVAL, {":1: sim.sede:"}},
+		{"sim = {\nseed = -1; };", EINVAL, {":2: sim.seed:", "-1"}},
+		{"sim = { seed = \"a\"; };", EINVAL, {":1: sim.seed:"}},
+		{"sim = { seed = [1]; };", EINVAL, {":1: sim.seed:"}},
+		{"sim = { seed = {}; };", EINVAL, {":1: sim.seed:"}},
+		{"sim = { withdrawal = 1; };", EINVAL, {":1: sim.withdrawal:", "1"}},
+		{"sim = {\nwithdrawal = \"both\"; };",
+		 EINVAL,
+		 {":2: sim.withdrawal:", "both"}},
+		{"sim = { depth_mm = [5]; };", EINVAL, {":1: sim:"}},
+		{"sim = { depth_mm = [5, 6]; times = [1]; };", EINVAL, {":1: sim:"}},
+		{"sim = { depth_mm = []; times = []; };", EINVAL, {":1: sim:"}},
 		{"sim = { depth_mm = [1,1,1,1,1,1,1,1,1]; times = [1,1,1,1,1,1,1,1,1]; };",
 		 EINVAL,
-		 ":1: sim.depth_mm: expected an array of at most 8 numbers such as [5, 10]; "
-		 "correct it"},
+		 {":1: sim.depth_mm:"}},
 		/* libconfig's own rule: an array is of one type. */
-		{"sim = { depth_mm = [4, 8.5]; times = [1, 1]; };", EINVAL,
-		 ":1: mismatched element type in array; correct it"},
-		{"sim = { depth_mm = [50]; times = [1]; };", EINVAL,
-		 ":1: sim.depth_mm: expected a number from 0.1 to 40, found 50; correct it"},
-		{"sim = { depth_mm = (\"5\"); times = [1]; };", EINVAL,
-		 ":1: sim.depth_mm: expected a number; correct it"},
-		{"sim = { depth_mm = 5; times = 1; };", EINVAL,
-		 ":1: sim: expected depth_mm and times with equally many values, 1 to "
-		 "8; correct them"},
-		{"surface = { normal = [0, 0, 0]; };", EINVAL,
-		 ":1: surface.normal: expected a direction [x, y, z] that is not 0, found 3 "
-		 "values; correct it"},
+		{"sim = { depth_mm = [4, 8.5]; times = [1, 1]; };",
+		 EINVAL,
+		 {":1: mismatched element type"}},
+		{"sim = { depth_mm = [50]; times = [1]; };",
+		 EINVAL,
+		 {":1: sim.depth_mm:", "50"}},
+		{"sim = { depth_mm = (\"5\"); times = [1]; };",
+		 EINVAL,
+		 {":1: sim.depth_mm:"}},
+		{"sim = { depth_mm = 5; times = 1; };", EINVAL, {":1: sim:"}},
+		{"surface = { normal = [0, 0, 0]; };",
+		 EINVAL,
+		 {":1: surface.normal:", "3 values"}},
 	};
 
 	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
 		struct temp_file file = temp_file_new("rig.conf", row[i].text);
-		struct incise_error err = {0};
-		char expected[600];
+		struct incise_error err;
 
-		errno = 0;
-		assert_null(incise_rig_open(file.path, INCISE_RIG_TRACKER, &err));
-		assert_int_equal(errno, row[i].code);
-		assert_int_equal(err.code, row[i].code);
-		snprintf(expected, sizeof(expected), "%s%s", file.path, row[i].tail);
-		assert_string_equal(err.text, expected);
+		assert_error(incise_rig_open(file.path, INCISE_RIG_TRACKER, &err),
+			     row[i].code, &err, file.path, row[i].says[0],
+			     row[i].says[1]);
 		/* Without a place for the message it fails all the same. */
 		assert_null(incise_rig_open(file.path, INCISE_RIG_TRACKER, NULL));
 		temp_file_free(&file);
@@ -256,34 +204,26 @@ static void real_steppers_are_refused_with_a_line(void **state)
 		int code;
 		const char *says;
 	} row[] = {
-		{"stepper = \"kernel:/dev/incise-nowhere\";", EINVAL,
-		 ":1: stepper: \"kernel:/dev/incise-nowhere\" needs the group actuator"},
+		{"stepper = \"kernel:/dev/incise-nowhere\";", EINVAL, ":1: stepper:"},
 		{ACTUATOR "stepper = \"kernel:/dev/incise-nowhere\";", ENOENT,
-		 ":2: stepper: /dev/incise-nowhere: no such device"},
-		{ACTUATOR "stepper = \"kernel:x\";", EINVAL,
-		 ":2: stepper: expected the path"},
+		 ":2: stepper:"},
+		{ACTUATOR "stepper = \"kernel:x\";", EINVAL, ":2: stepper:"},
 		{ACTUATOR "clock = \"simulated\"; stepper = \"kernel:/dev/x\";", EINVAL,
-		 ":2: stepper: only the simulated rig can follow a simulated clock"},
-		{ACTUATOR "stepper = \"canopen:can0\";", ENODEV,
-		 ":2: stepper: no such backend \"canopen\"; there are: sim, kernel"},
-		{ACTUATOR "stepper = \"../../x:\";", ENODEV,
-		 "no such backend \"../../x\""},
+		 ":2: stepper:"},
+		{ACTUATOR "stepper = \"canopen:can0\";", ENODEV, ":2: stepper:"},
+		{ACTUATOR "stepper = \"../../x:\";", ENODEV, "\"../../x\""},
 		/* Broken, it is refused where the virtual actuator stands, too. */
 		{"actuator = { travel_mm = 9.0; };\nstepper = \"sim:\";", EINVAL,
-		 ":1: actuator.spring_N_mm is missing"},
-		{"actuator = 3; stepper = \"sim:\";", EINVAL,
-		 ":1: actuator: expected a group"},
+		 ":1: actuator.spring_N_mm"},
+		{"actuator = 3; stepper = \"sim:\";", EINVAL, ":1: actuator:"},
 	};
 
 	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
 		struct temp_file file = temp_file_new("rig.conf", row[i].text);
-		struct incise_error err = {0};
+		struct incise_error err;
 
-		errno = 0;
-		if (incise_rig_open(file.path, INCISE_RIG_STEPPER, &err) ||
-		    errno != row[i].code || err.code != row[i].code ||
-		    !strstr(err.text, row[i].says))
-			fail_msg("row %zu: %d, \"%s\"", i, err.code, err.text);
+		assert_error(incise_rig_open(file.path, INCISE_RIG_STEPPER, &err),
+			     row[i].code, &err, row[i].says);
 		temp_file_free(&file);
 	}
 }
@@ -371,64 +311,54 @@ static void several_steppers_are_refused_with_a_line(void **state)
 	static const struct {
 		const char *text, *says;
 	} row[] = {
-		{TWO "\nactuator = {" MOTOR "};",
-		 ":1: stepper: expected 1 to 3, each with a "
-		 "group in actuator = ( { … }, { … } ), "
-		 "found 2 and 1 groups"},
+		{TWO "\nactuator = {" MOTOR "};", "found 2 and 1 groups"},
 		{"stepper = \"kernel:/dev/x\";\nactuator = ( {" MOTOR "}, {" MOTOR "} );",
-		 ":1: stepper: one device, but actuator has 2 groups"},
-		{"actuator = ();",
-		 ":1: actuator: expected a group { key = value; }, or 1 to 3"},
+		 ":1: stepper:"},
+		{"actuator = ();", ":1: actuator:"},
 		{"actuator = ( {" MOTOR "}, {" MOTOR "}, {" MOTOR "}, {" MOTOR "} );",
 		 "found 4"},
-		{"actuator = ( 3 );", ":1: actuator: expected groups { key = value; }"},
-		{"stepper = [\"sim:\", \"sim:\"];",
-		 ":1: stepper 1: expected text in quotes"},
+		{"actuator = ( 3 );", ":1: actuator:"},
+		{"stepper = [\"sim:\", \"sim:\"];", ":1: stepper 1:"},
 		{"stepper = [];", "found 0 and 0 groups"},
 		{"stepper = [\"kernel:x\", \"kernel\"]; actuator = ( {" MOTOR "}, {" MOTOR
 		 "} );",
-		 ":1: stepper 2: expected BACKEND:ARGUMENTS"},
+		 ":1: stepper 2:"},
 		/* Directions. */
 		{TWO "actuator = ( {" MOTOR "}, {" MOTOR "} );",
-		 ":1: the directions of actuators 1 and 2 are within 0 degrees of one line: "
-		 "expected 30 or more; give each actuator its own direction"},
+		 ":1: the directions of actuators 1 and 2 are within 0 degrees"},
 		{TWO "actuator = ( {" MOTOR "}, {" MOTOR
 		     "direction = [0.0, 0.1, -1.0]; } );",
-		 "actuators 1 and 2 are within 5.71 degrees of one line"},
+		 "actuators 1 and 2 are within 5.71 degrees"},
 		{TWO "actuator = ( {" MOTOR "}, {" MOTOR
 		     "direction = [0.499, 0.0, 0.8666]; } );",
 		 "within 29.9 degrees"},
 		{THREE "actuator = ( {" MOTOR "}, {" MOTOR
 		       "direction = [0.0, 1.0, 0.0]; }, {" MOTOR
 		       "direction = [0.0, 1.0, 0.4]; } );",
-		 "actuators 2 and 3 are within 21.8 degrees of one line"},
+		 "actuators 2 and 3 are within 21.8 degrees"},
 		{THREE "actuator = ( {" MOTOR "}, {" MOTOR
 		       "direction = [0.0, 1.0, 0.0]; }, {" MOTOR
 		       "direction = [0.0, 1.0, 1.0]; } );",
-		 "the direction of actuator 1 is within 0 degrees of the plane of the other "
-		 "two: expected 30 or more"},
+		 "of actuator 1 is within 0 degrees of the plane"},
 		{THREE "actuator = ( {" MOTOR "}, {" MOTOR
 		       "direction = [0.0, 1.0, 0.0]; }, {" MOTOR
 		       "direction = [0.5, 1.0, 1.0]; } );",
-		 "of the plane of the other two"},
+		 "of the plane"},
 		{"actuator = {" MOTOR "direction = [0.0, 0.0, 0.0]; };",
-		 ":1: actuator.direction: expected a direction"},
-		{"actuator = {" MOTOR "rest_mm = 9.5; };",
-		 ":1: actuator.rest_mm: expected at most travel_mm, 9, found 9.5"},
-		{"stepper = \"sim:\"; sim = { axes = 4; };",
-		 ":1: sim.axes: expected a whole number from 1 to 3, found 4"},
+		 ":1: actuator.direction:"},
+		{"actuator = {" MOTOR "rest_mm = 9.5; };", ":1: actuator.rest_mm:"},
+		{"stepper = \"sim:\"; sim = { axes = 4; };", ":1: sim.axes:"},
 		{"stepper = \"sim:\"; sim = { axes = 2; }; surface = { normal = [0.0, 1.0, "
 		 "0.0]; };",
 		 ":1: the directions of actuators 1 and 2 are within 0 degrees"},
 	};
 
 	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
-		struct incise_error err = {0};
+		struct incise_error err;
 		struct incise_rig_plan all;
 
-		if (read_steppers(row[i].text, &all, &err) != -EINVAL ||
-		    !strstr(err.text, row[i].says))
-			fail_msg("row %zu: %d, \"%s\"", i, err.code, err.text);
+		assert_error(read_steppers(row[i].text, &all, &err), EINVAL, &err,
+			     row[i].says);
 	}
 }
 
@@ -542,95 +472,85 @@ static void what_is_wrong_is_said(void **state)
 	static const struct {
 		const char *text, *says;
 	} cases[] = {
-		{"tracker_setup = 3;", "rig.conf:1: tracker_setup: expected a group"},
+		{"tracker_setup = 3;", "rig.conf:1: tracker_setup:"},
 		{"tracker_setup = { station = [1]; };", "station"},
-		{"tracker_setup = { stations = []; };", "numbers of 1 to 4"},
-		{"tracker_setup = { stations = [0]; };", "numbers of 1 to 4"},
-		{"tracker_setup = { stations = { a = 1; }; };", "numbers of 1 to 4"},
-		{"tracker_setup = { stations = [2, 1]; };", "ascending"},
-		{"tracker_setup = { stations = [1, 1]; };", "ascending"},
-		{"tracker_setup = { stations = [1, 2, 3, 4, 4]; };", "numbers of 1 to 4"},
-		{"tracker_setup = { stations = 1; };", "numbers of 1 to 4"},
-		{"tracker_setup = { stations = [\"1\"]; };", "numbers of 1 to 4"},
-		{"tracker_setup = { tube_station = 1; };", "except the first"},
-		{"tracker_setup = { stations = [2, 3]; tube_station = 2; };",
-		 "except the first, which is the scalpel's, found 2"},
-		{"tracker_setup = { stations = [1, 2]; tube_station = 3; };",
-		 "rig.conf:1: tracker_setup.tube_station: expected one of "
+		{"tracker_setup = { stations = []; };", "tracker_setup.stations"},
+		{"tracker_setup = { stations = [0]; };", "tracker_setup.stations"},
+		{"tracker_setup = { stations = { a = 1; }; };", "tracker_setup.stations"},
+		{"tracker_setup = { stations = [2, 1]; };", "tracker_setup.stations"},
+		{"tracker_setup = { stations = [1, 1]; };", "tracker_setup.stations"},
+		{"tracker_setup = { stations = [1, 2, 3, 4, 4]; };",
 		 "tracker_setup.stations"},
+		{"tracker_setup = { stations = 1; };", "tracker_setup.stations"},
+		{"tracker_setup = { stations = [\"1\"]; };", "tracker_setup.stations"},
+		{"tracker_setup = { tube_station = 1; };", "tracker_setup.tube_station"},
+		{"tracker_setup = { stations = [2, 3]; tube_station = 2; };", "found 2"},
+		{"tracker_setup = { stations = [1, 2]; tube_station = 3; };",
+		 "rig.conf:1: tracker_setup.tube_station:"},
 		{"tracker_setup = { stations = [1, 2]; tube_station = 0; };",
 		 "tube_station"},
 		{"tracker_setup = { stations = [1, 2]; tube_station = 258; };",
 		 "tube_station"},
 		{"tracker_setup = { hemisphere = [0.0, 0.0, 0.0]; };", "hemisphere"},
-		{"tracker_setup = { sync = \"slow\"; };",
-		 "expected one of internal, external, video, found \"slow\""},
+		{"tracker_setup = { sync = \"slow\"; };", "\"slow\""},
 		{"tracker_setup = { offset_mm = [1.0, 2.0]; };", "offset_mm"},
 		{"tracker_setup = { repeat_ms = -1; };", "repeat_ms"},
 		{"\nforce_setup = { rate_hz = 0.5; };", "rig.conf:2: "},
 		{"force_setup = { rate_hz = 100001; };", "rate_hz"},
 		{"force_setup = { channel = -1; };", "channel"},
 		{"force_setup = { full_scale_V = 0.0; };", "full_scale_V"},
-		{"force_setup = { trigger = \"../../etc\"; };", "without a slash"},
+		{"force_setup = { trigger = \"../../etc\"; };", "force_setup.trigger"},
 		{"force_setup = { trigger = \"0123456789012345678901234567890123456789"
 		 "012345678901234567890123\"; };",
-		 "at most 63 letters"},
+		 "force_setup.trigger"},
 		{"camera_setup = { width = 15; };", "width"},
 		{"camera_setup = { height = 16385; };", "height"},
-		{"camera_setup = { format = \"h264\"; };", "rgb, grey, yuyv, mjpeg"},
+		{"camera_setup = { format = \"h264\"; };", "camera_setup.format"},
 		{"camera_setup = { exposure_ms = 0; };", "exposure_ms"},
 		{"camera_setup = { zoom = 1; };", "zoom"},
-		{"foot_switch = \"b\";", "expected a group"},
-		{"sign_key = 1;", "sign_key: expected text in quotes"},
-		{"sign_key = \"rig_ed25519\";",
-		 "rig.conf:1: sign_key: expected the path of a private key"},
-		{"foot_switch = { };",
-		 "rig.conf:1: foot_switch.device: expected the path"},
+		{"foot_switch = \"b\";", "foot_switch:"},
+		{"sign_key = 1;", "sign_key:"},
+		{"sign_key = \"rig_ed25519\";", "rig.conf:1: sign_key:"},
+		{"foot_switch = { };", "rig.conf:1: foot_switch.device:"},
 		{"foot_switch = { device = \"event0\"; key = \"b\"; };",
-		 "foot_switch.device: expected the path"},
+		 "foot_switch.device:"},
 		{"foot_switch = { device = \"/dev/input/event0\"; };",
-		 "rig.conf:1: foot_switch.key: expected the name of a key"},
+		 "rig.conf:1: foot_switch.key:"},
 		{"foot_switch = { device = \"/dev/input/event0\"; key = \"pedal\"; };",
-		 "foot_switch.key: expected the name of a key"},
+		 "foot_switch.key:"},
 		{"foot_switch = { device = \"/dev/input/event0\"; key = 48; };",
 		 "foot_switch.key"},
 		{"foot_switch = { device = \"/dev/x\"; key = \"b\"; grab = true; };",
 		 "grab"},
-		{"vision = 3;", "rig.conf:1: vision: expected a group"},
+		{"vision = 3;", "rig.conf:1: vision:"},
 		{"vision = { depth_mm_px = 0.1; };", "depth_mm_px"},
-		{"\nvision = { hue = [0, 180]; };",
-		 "rig.conf:2: vision.hue: expected [low, high] of whole numbers from 0 to "
-		 "179"},
-		{"vision = { hue = [-1, 179]; };", "vision.hue: expected [low"},
-		{"vision = { hue = [1]; };", "vision.hue: expected [low"},
-		{"vision = { hue = [1, 2, 3]; };", "vision.hue: expected [low"},
-		{"vision = { hue = [1.0, 2.0]; };", "vision.hue: expected [low"},
-		{"vision = { hue = (1, \"2\"); };", "vision.hue: expected [low"},
-		{"vision = { hue = 5; };", "vision.hue: expected [low"},
-		{"vision = { hue = { a = 1; b = 2; }; };", "vision.hue: expected [low"},
-		{"vision = { saturation = [0, 256]; };", "vision.saturation: expected"},
-		{"vision = { saturation = [9, 8]; };",
-		 "vision.saturation: expected the lower number first"},
-		{"vision = { value = [1, 0]; };",
-		 "vision.value: expected the lower number first"},
-		{"vision = { value = [0, 256]; };", "from 0 to 255"},
+		{"\nvision = { hue = [0, 180]; };", "rig.conf:2: vision.hue:"},
+		{"vision = { hue = [-1, 179]; };", "vision.hue:"},
+		{"vision = { hue = [1]; };", "vision.hue:"},
+		{"vision = { hue = [1, 2, 3]; };", "vision.hue:"},
+		{"vision = { hue = [1.0, 2.0]; };", "vision.hue:"},
+		{"vision = { hue = (1, \"2\"); };", "vision.hue:"},
+		{"vision = { hue = 5; };", "vision.hue:"},
+		{"vision = { hue = { a = 1; b = 2; }; };", "vision.hue:"},
+		{"vision = { saturation = [0, 256]; };", "vision.saturation:"},
+		{"vision = { saturation = [9, 8]; };", "vision.saturation:"},
+		{"vision = { value = [1, 0]; };", "vision.value:"},
+		{"vision = { value = [0, 256]; };", "vision.value"},
 		{"vision = { full_px = 15.9; };", "full_px"},
 		{"vision = { full_px = 8193; };", "full_px"},
-		{"vision = { roi = [0, 0, 640]; };",
-		 "vision.roi: expected [x, y, width, height] of"},
-		{"vision = { roi = [0, -1, 640, 480]; };", "vision.roi: expected [x, y"},
-		{"vision = { roi = [0, 0, 8193, 480]; };", "from 0 to 8192"},
-		{"vision = { roi = [0, 0, 15, 480]; };", "of 16 or more"},
-		{"vision = { roi = [0, 0, 480, 0]; };", "of 16 or more"},
+		{"vision = { roi = [0, 0, 640]; };", "vision.roi:"},
+		{"vision = { roi = [0, -1, 640, 480]; };", "vision.roi:"},
+		{"vision = { roi = [0, 0, 8193, 480]; };", "vision.roi"},
+		{"vision = { roi = [0, 0, 15, 480]; };", "vision.roi"},
+		{"vision = { roi = [0, 0, 480, 0]; };", "vision.roi"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
+		struct incise_error err;
 		struct incise_rig_plan all;
 
-		if (read_all(cases[i].text, &all, &err) != -EINVAL ||
-		    !strstr(err.text, cases[i].says))
-			fail_msg("%s: \"%s\"", cases[i].text, err.text);
+		assert_error(read_all(cases[i].text, &all, &err), EINVAL, &err,
+			     cases[i].says);
 	}
 }
 

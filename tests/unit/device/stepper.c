@@ -3,16 +3,12 @@
  * lib/device/stepper.c: calls reach the backend; homing makes the count of a simulated machine the
  * position of the machine, wherever it started, or reports why not and stops it.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <incise/backend.h>
+#include "../message.h"
 
 /* --- stepper --- */
 
@@ -89,8 +85,7 @@ static void calls_reach_the_backend(void **state)
 	assert_true(info.travel_mm == 1.25);
 	assert_int_equal(incise_stepper_jog(&fake.stepper, -2.5), -ENODEV);
 	assert_true(fake.position_mm == -2.5);
-	assert_int_equal(incise_stepper_enable(&fake.stepper, &err), -EPERM);
-	assert_string_equal(err.text, "clear it");
+	assert_error(incise_stepper_enable(&fake.stepper, &err), EPERM, &err, "clear it");
 	assert_true(fake.position_mm == 1);
 	assert_int_equal(incise_stepper_disable(&fake.stepper, &err), -ETIMEDOUT);
 	assert_true(fake.position_mm == 2);
@@ -120,8 +115,7 @@ static void what_a_backend_has_not_is_said(void **state)
 								&err),
 				 -EOPNOTSUPP);
 		assert_int_equal(err.code, EOPNOTSUPP);
-		assert_int_equal(
-			strncmp(err.text, "a simple one does not support being ", 36), 0);
+		assert_says(err.text, "a simple one");
 	}
 }
 
@@ -546,45 +540,42 @@ static void what_is_wrong_is_said(void **state)
 {
 	static const struct {
 		struct machine m;
-		int rc;
+		int code;
 		const char *says;
 	} cases[] = {
-		{{.home_at = 0}, -EOPNOTSUPP, "neither a home input nor"},
+		{{.home_at = 0}, EOPNOTSUPP, "home input"},
 		{{.home_at = INCISE_STEPPER_LINE_HOME, .stuck_off = true},
-		 -EIO,
+		 EIO,
 		 "within the travel"},
 		{{.home_at = INCISE_STEPPER_LINE_HOME, .stuck_on = true},
-		 -EIO,
+		 EIO,
 		 "stays active"},
 		{{.home_at = INCISE_STEPPER_LINE_HOME, .end_mm = -9, .estop = true},
-		 -EIO,
-		 "e-stop: release it"},
+		 EIO,
+		 "e-stop:"},
 		{{.home_at = INCISE_STEPPER_LINE_HOME,
 		  .end_mm = -9,
 		  .estop = true,
 		  .cause = "safe torque off (5441h)"},
-		 -EIO,
-		 "homing machine: safe torque off (5441h)"},
+		 EIO,
+		 "(5441h)"},
 		{{.home_at = INCISE_STEPPER_LINE_HOME, .end_mm = -9, .deaf = true},
-		 -ETIMEDOUT,
+		 ETIMEDOUT,
 		 "not done in time"},
 		{{.home_at = INCISE_STEPPER_LINE_HOME, .end_mm = -9, .stop_at = 50},
-		 -EINTR,
+		 EINTR,
 		 "stopped"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct machine m = cases[i].m;
-		struct incise_error err = {0};
+		struct incise_error err;
 		struct incise_stepper_edge_found edge = {77, 78};
-		int rc;
 
 		powered_at(&m, 10);
-		rc = incise_stepper_home(&m.stepper, &m.stop, &edge, &err);
+		assert_error(incise_stepper_home(&m.stepper, &m.stop, &edge, &err),
+			     cases[i].code, &err, cases[i].says);
 		assert_true(edge.before_mm == 77 && edge.after_mm == 78);
-		if (rc != cases[i].rc || !strstr(err.text, cases[i].says))
-			fail_msg("case %zu: %d, \"%s\"", i, rc, err.text);
-		assert_int_equal(err.code, -rc);
 		assert_true(!m.homed && m.v_mm_s == 0);
 	}
 }
@@ -596,8 +587,8 @@ static void it_must_be_powered(void **state)
 
 	powered_at(&m, 3);
 	m.state = INCISE_STEPPER_STATE_DISABLED;
-	assert_int_equal(incise_stepper_home(&m.stepper, NULL, NULL, &err), -EIO);
-	assert_non_null(strstr(err.text, "enable it first"));
+	assert_error(incise_stepper_home(&m.stepper, NULL, NULL, &err), EIO, &err,
+		     "enable");
 	assert_true(m.at_mm == 3);
 }
 

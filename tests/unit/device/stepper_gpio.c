@@ -5,11 +5,6 @@
  * should. No time is judged here: pulses of 1 ms let any machine keep up. Times are those
  * of the pulser's tests and of tests/vm.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <stdatomic.h>
 #include <stdbool.h>
@@ -18,6 +13,7 @@
 #include <time.h>
 #include "../../../lib/device/backends.h"
 #include "../../../lib/device/gpio/gpio_lines.h"
+#include "../message.h"
 
 /* A chip; levels, not what they mean. */
 struct gpio_lines {
@@ -214,10 +210,8 @@ static void it_steps_and_lets_go(void **state)
 	status = await(stepper, INCISE_STEPPER_STATE_FAULT, 0);
 	assert_int_equal(status.faults, INCISE_STEPPER_FAULT_ESTOP);
 	assert_true(atomic_load(&chip.level) >> INCISE_LINE_ENABLE & 1);
-	assert_int_equal(incise_stepper_clear(stepper, &err), -EBUSY);
-	assert_non_null(strstr(err.text, "e-stop is active; release it"));
-	assert_int_equal(incise_stepper_enable(stepper, &err), -EPERM);
-	assert_non_null(strstr(err.text, "e-stop: release it, then clear"));
+	assert_error(incise_stepper_clear(stepper, &err), EBUSY, &err, "e-stop");
+	assert_error(incise_stepper_enable(stepper, &err), EPERM, &err, "e-stop");
 	atomic_fetch_or(&chip.level, 1u << INCISE_LINE_ESTOP);
 	assert_int_equal(incise_stepper_clear(stepper, &err), 0);
 	assert_int_equal(incise_stepper_enable(stepper, &err), 0);
@@ -240,17 +234,16 @@ static void why_it_cannot_begin_is_said(void **state)
 		int code;
 		const char *says;
 	} cases[] = {
-		{"", false, false, 0, 0, 2.5, EINVAL, "expected gpio:CHIP"},
-		{"c", false, true, 0, 0, 2.5, EINVAL, "needs actuator.lines"},
-		{"c", true, false, 0, 0, 2.5, EOPNOTSUPP,
-		 "another program cannot watch it"},
+		{"", false, false, 0, 0, 2.5, EINVAL, "gpio:CHIP"},
+		{"c", false, true, 0, 0, 2.5, EINVAL, "actuator.lines"},
+		{"c", true, false, 0, 0, 2.5, EOPNOTSUPP, "watch"},
 		{"c", false, false, ENOENT, 0, 2.5, ENOENT, "gpiodetect"},
 		{"c", false, false, EBUSY, 0, 2.5, EBUSY, "gpioinfo"},
-		{"c", false, false, EACCES, 0, 2.5, EACCES, "not permitted"},
-		{"c", false, false, EINVAL, 0, 2.5, EINVAL, "lacks a line of"},
-		{"c", false, false, 0, -EREMOTEIO, 2.5, EREMOTEIO, "cannot be used"},
+		{"c", false, false, EACCES, 0, 2.5, EACCES, NULL},
+		{"c", false, false, EINVAL, 0, 2.5, EINVAL, "line"},
+		{"c", false, false, 0, -EREMOTEIO, 2.5, EREMOTEIO, NULL},
 		/* 30 000 steps/s: more than it ever says that it holds. */
-		{"c", false, false, 0, 0, 300, ERANGE, "needs 30000 steps/s"},
+		{"c", false, false, 0, 0, 300, ERANGE, "30000 steps/s"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -263,10 +256,9 @@ static void why_it_cannot_begin_is_said(void **state)
 		actuator.has_lines = !cases[i].no_lines;
 		actuator.velocity_mm_s = cases[i].velocity_mm_s;
 		actuator.high_ns = actuator.low_ns = 5000;
-		if (open_stepper(cases[i].arguments, cases[i].watch, &actuator, &err) ||
-		    err.code != cases[i].code || errno != cases[i].code ||
-		    !strstr(err.text, cases[i].says))
-			fail_msg("case %zu: %d, \"%s\"", i, err.code, err.text);
+		assert_error(open_stepper(cases[i].arguments, cases[i].watch, &actuator,
+					  &err),
+			     cases[i].code, &err, cases[i].says);
 		assert_int_equal(chip.open, 0);
 	}
 }

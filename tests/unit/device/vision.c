@@ -3,15 +3,11 @@
  * lib/device/vision.c: the module is asked for by its name, every call reaches it with its
  * arguments, and what is said where it is not installed. This file is the finder of modules.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include "../../../lib/device/backends.h"
+#include "../message.h"
 
 /* A module that remembers what it was called with. */
 static struct {
@@ -141,7 +137,7 @@ static void a_module_that_is_not_there_is_said(void **state)
 		assert_null(incise_vision_new(&setup, &err));
 		assert_int_equal(errno, row[i].code);
 		assert_int_equal(err.code, row[i].code);
-		assert_non_null(strstr(err.text, row[i].says));
+		assert_says(err.text, row[i].says);
 		assert_int_equal(incise_vision_learn(NULL, NULL, &setup, &err),
 				 -row[i].code);
 	}

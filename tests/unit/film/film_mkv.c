@@ -3,11 +3,6 @@
  * Films, read back by libavformat and libavcodec: the number of frames, their times, and their
  * colours up to coding losses; and files that cannot be written.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdbool.h>
@@ -18,6 +13,7 @@
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
 #include "../../../lib/view/film.h"
+#include "../message.h"
 
 #define W 64
 #define H 48
@@ -135,9 +131,8 @@ static void test_files_that_cannot_be(void **state)
 	uint8_t *rgb = calloc(1024 * 1024, 3);
 	int rc = 0;
 
-	assert_null(incise_film_module.open("/tmp/no/such/x.mkv", W, H, FPS, &err));
-	assert_int_equal(errno, ENOENT);
-	assert_non_null(strstr(err.text, "/tmp/no/such/x.mkv"));
+	assert_error(incise_film_module.open("/tmp/no/such/x.mkv", W, H, FPS, &err),
+		     ENOENT, &err, "/tmp/no/such/x.mkv");
 	/* A full disk is reported when the film ends, at the latest. */
 	coder = incise_film_module.open("/dev/full", 1024, 1024, FPS, &err);
 	if (coder) {

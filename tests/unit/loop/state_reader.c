@@ -3,11 +3,6 @@
  * lib/loop/state_reader.c: a reader next to a living and a dead writer, and malformed
  * pages.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
@@ -16,6 +11,7 @@
 #include <stdatomic.h>
 #include <sys/stat.h>
 #include "../../../lib/base/random.h"
+#include "../message.h"
 #include "state_made.h"
 
 static struct incise_state_now now;
@@ -233,8 +229,7 @@ static void refused(const char *path, int code, const char *text)
 	assert_null(reader);
 	assert_int_equal(errno, code);
 	assert_int_equal(err.code, code);
-	assert_non_null(strstr(err.text, path));
-	assert_non_null(strstr(err.text, text));
+	assert_says(err.text, path, text);
 }
 
 static void test_what_is_no_page(void **state)

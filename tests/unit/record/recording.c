@@ -89,17 +89,17 @@ static void no_recording(void **state)
 {
 	static const struct {
 		const char *path;
-		int rc;
+		int code;
 		const char *text;
 	} cases[] = {
-		{"none.rec", -ENOENT, "none.rec: no such recording"},
-		{"", -ENOENT, "no such recording"},
-		{"file.rec", -EINVAL, "no recording.db"},
-		{"empty.rec", -EINVAL, "no recording.db"},
-		{"folder.rec", -EINVAL, "is not a file"},
-		{"garbage.rec", -EINVAL, "file is not a database"},
-		{"nothing.rec", -EINVAL, "empty: interrupted before the first data"},
-		{"text\nfile.rec", -ENOENT, "text?file.rec"},
+		{"none.rec", ENOENT, "none.rec:"},
+		{"", ENOENT, NULL},
+		{"file.rec", EINVAL, "file.rec"},
+		{"empty.rec", EINVAL, "empty.rec"},
+		{"folder.rec", EINVAL, "folder.rec"},
+		{"garbage.rec", EINVAL, "garbage.rec"},
+		{"nothing.rec", EINVAL, "nothing.rec"},
+		{"text\nfile.rec", ENOENT, "text?file.rec"},
 	};
 	struct incise_recording_info info;
 	FILE *file;
@@ -118,9 +118,8 @@ static void no_recording(void **state)
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_error err = {0};
 
-		if (read_all(cases[i].path, &info, &err) != cases[i].rc ||
-		    !strstr(err.text, cases[i].text))
-			fail_msg("%s: %d, %s", cases[i].path, err.code, err.text);
+		assert_error(read_all(cases[i].path, &info, &err), cases[i].code, &err,
+			     cases[i].text);
 	}
 }
 
@@ -188,37 +187,33 @@ static void damage_is_found(void **state)
 		{"UPDATE force SET code = 'NaN' WHERE seq = 100", "row 100: code"},
 		{"UPDATE force SET code = 1.5 WHERE seq = 100", "row 100: code"},
 		{"UPDATE force SET code = x'00' WHERE seq = 100", "row 100: code"},
-		{"UPDATE force SET t_ns = 'soon' WHERE seq = 100",
-		 "row 100: t_ns is not a time"},
-		{"UPDATE force SET t_ns = -1 WHERE seq = 0", "row 0: t_ns is not a time"},
-		{"UPDATE force SET t_ns = 5 WHERE seq = 100",
-		 "row 100: t_ns does not increase"},
+		{"UPDATE force SET t_ns = 'soon' WHERE seq = 100", "row 100: t_ns"},
+		{"UPDATE force SET t_ns = -1 WHERE seq = 0", "row 0: t_ns"},
+		{"UPDATE force SET t_ns = 5 WHERE seq = 100", "row 100: t_ns"},
 		{"UPDATE force SET t_ns = (SELECT t_ns FROM force WHERE seq = 99) WHERE seq = 100",
-		 "row 100: t_ns does not increase"},
-		{"DELETE FROM force WHERE seq = 100", "table force has"},
-		{"DELETE FROM depth WHERE seq = 10", "table depth has"},
-		{"DELETE FROM depth WHERE seq > 10", "table depth has 11 rows"},
-		{"DELETE FROM tracker", "table tracker has 0 rows"},
+		 "row 100: t_ns"},
+		{"DELETE FROM force WHERE seq = 100", "table force"},
+		{"DELETE FROM depth WHERE seq = 10", "table depth"},
+		{"DELETE FROM depth WHERE seq > 10", "table depth"},
+		{"DELETE FROM tracker", "table tracker"},
 		{"UPDATE depth SET depth_mm = 'NaN' WHERE seq = 10", "row 10: depth_mm"},
 		{"UPDATE depth SET depth_mm = 9e999 WHERE seq = 10", "row 10: depth_mm"},
 		{"UPDATE depth SET velocity_mm_s = -1.0 WHERE seq = 10",
 		 "row 10: velocity"},
 		{"UPDATE depth SET velocity_mm_s = 9e999 WHERE seq = 10",
 		 "row 10: velocity"},
-		{"UPDATE depth SET t_ns = 0 WHERE seq = 10",
-		 "row 10: t_ns does not increase"},
+		{"UPDATE depth SET t_ns = 0 WHERE seq = 10", "row 10: t_ns"},
 		/* the last one, after the last force sample */
 		{"UPDATE depth SET t_ns = 0 WHERE seq = (SELECT max(seq) FROM depth)",
-		 "t_ns does not increase"},
+		 "t_ns"},
 		{"UPDATE tracker SET x_mm = 'here' WHERE seq = 7",
 		 "table tracker, row 7"},
 		{"UPDATE tracker SET qw = 9e999 WHERE seq = 7", "table tracker, row 7"},
 		{"UPDATE tracker SET t_ns = 1 WHERE seq = 7", "table tracker, row 7"},
-		{"DELETE FROM meta WHERE key = 'rig'", "'rig' in table meta is missing"},
-		{"UPDATE meta SET value = 7 WHERE key = 'rig'",
-		 "'rig' in table meta is out of range"},
+		{"DELETE FROM meta WHERE key = 'rig'", "'rig'"},
+		{"UPDATE meta SET value = 7 WHERE key = 'rig'", "'rig'"},
 		{"UPDATE meta SET value = -7 WHERE key = 'force_rows'", "'force_rows'"},
-		{"UPDATE meta SET value = 1 WHERE key = 'force_rows'", "table force has"},
+		{"UPDATE meta SET value = 1 WHERE key = 'force_rows'", "table force"},
 		{"UPDATE meta SET value = 0 WHERE key = 'force_bits'", "0 bits"},
 		{"UPDATE meta SET value = 64 WHERE key = 'force_bits'", "64 bits"},
 		{"UPDATE meta SET value = 0.0 WHERE key = 'force_mV_N'", "0 mV/N"},
@@ -231,12 +226,12 @@ static void damage_is_found(void **state)
 		 "'force_offset_V'"},
 		{"UPDATE meta SET value = 'x' WHERE key = 'force_zero_mV'",
 		 "'force_zero_mV'"},
-		{"PRAGMA application_id = 7", "not made by incise"},
-		{"PRAGMA user_version = 99", "newer incise"},
+		{"PRAGMA application_id = 7", NULL},
+		{"PRAGMA user_version = 99", NULL},
 		{"DROP TABLE depth; CREATE VIEW depth AS SELECT seq, t_ns, 1.0 AS depth_mm, 1.0 "
 		 "AS velocity_mm_s FROM tracker",
-		 "table 'depth' is missing"},
-		{"DROP TABLE events", "table 'events' is missing"},
+		 "'depth'"},
+		{"DROP TABLE events", "'events'"},
 	};
 	struct incise_recording_info info;
 
@@ -246,9 +241,7 @@ static void damage_is_found(void **state)
 
 		assert_int_equal(system("rm -rf a.rec; cp -r good.rec a.rec"), 0);
 		change(DB, cases[i].sql);
-		if (read_all("a.rec", &info, &err) != -EINVAL ||
-		    !strstr(err.text, cases[i].text) || strchr(err.text, '\n'))
-			fail_msg("%s: %d, %s", cases[i].sql, err.code, err.text);
+		assert_error(read_all("a.rec", &info, &err), EINVAL, &err, cases[i].text);
 	}
 }
 
@@ -423,7 +416,6 @@ static void impossible_streams_are_refused(void **state)
 		struct incise_stream streams[INCISE_STREAMS_MAX];
 		struct incise_recording *recording;
 		struct incise_error err = {0};
-		int rc;
 
 		assert_int_equal(system("rm -rf a.rec && cp -r good.rec a.rec"), 0);
 		if (strstr(cases[i].sql, "'more'")) /* one name only */
@@ -440,14 +432,11 @@ static void impossible_streams_are_refused(void **state)
 		recording = incise_recording_open("a.rec", &err);
 		if (!recording)
 			fail_msg("%s: %s", cases[i].sql, err.text);
-		rc = cases[i].knots
-			     ? incise_recording_line(recording, "tracker", &line, &err)
-			     : incise_recording_streams(recording, streams, &err);
-		if (rc != -EINVAL ||
-		    !strstr(err.text, cases[i].knots ? "a.rec: damaged: table knots"
-						     : "a.rec: damaged: table "
-						       "streams"))
-			fail_msg("%s: %d %s", cases[i].sql, rc, err.text);
+		assert_error(
+			cases[i].knots
+				? incise_recording_line(recording, "tracker", &line, &err)
+				: incise_recording_streams(recording, streams, &err),
+			EINVAL, &err, "a.rec:", cases[i].knots ? "knots" : "streams");
 		incise_recording_close(recording);
 	}
 }

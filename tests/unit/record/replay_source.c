@@ -269,21 +269,22 @@ static void no_damaged_row_is_believed(void **state)
 	} cases[] = {
 		{"SELECT 1", NULL, 0},
 		{"UPDATE tracker SET arrival_ns = 9000000000 WHERE seq = 40",
-		 "arrival_ns decreases", EINVAL},
-		{"UPDATE tracker SET arrival_ns = -1 WHERE seq = 0", "decreases", EINVAL},
+		 "arrival_ns", EINVAL},
+		{"UPDATE tracker SET arrival_ns = -1 WHERE seq = 0", "arrival_ns",
+		 EINVAL},
 		{"UPDATE tracker SET arrival_ns = 9000000000000000000 WHERE seq = 119",
-		 "its times from", EINVAL},
-		{"UPDATE tracker SET arrival_ns = 2000000000000000 WHERE seq = 119",
-		 "its times from", EINVAL},
+		 NULL, EINVAL},
+		{"UPDATE tracker SET arrival_ns = 2000000000000000 WHERE seq = 119", NULL,
+		 EINVAL},
 		{"UPDATE tracker SET x_mm = 9e999 WHERE seq = 3", "row 3", EINVAL},
-		{"UPDATE tracker SET seq = -5 WHERE seq = 0", "not a count", EINVAL},
+		{"UPDATE tracker SET seq = -5 WHERE seq = 0", NULL, EINVAL},
 		{"UPDATE tracker SET t_ns = 1 WHERE seq = 9", "row 9", EINVAL},
 		{"DELETE FROM tracker WHERE seq = 119", "119 rows of 120", EINVAL},
 		{"DELETE FROM tracker; UPDATE meta SET value = 0 WHERE key = "
 		 "'tracker_rows'",
 		 "no pose", ENODATA},
-		{"UPDATE force SET code = 4096 WHERE seq = 9499", "out of the", EINVAL},
-		{"UPDATE force SET code = -1 WHERE seq = 7", "out of the", EINVAL},
+		{"UPDATE force SET code = 4096 WHERE seq = 9499", "force", EINVAL},
+		{"UPDATE force SET code = -1 WHERE seq = 7", "force", EINVAL},
 		{"DELETE FROM depth WHERE seq = 60", "119 rows of 120", EINVAL},
 		{"UPDATE meta SET value = 0.0 WHERE key = 'tracker_hz'", "tracker_hz",
 		 EINVAL},
@@ -324,8 +325,8 @@ static void no_damaged_row_is_believed(void **state)
 		}
 		if (rc != -cases[k].code)
 			fail_msg("%s: %d, %s", cases[k].sql, rc, err.text);
-		if (rc && !strstr(err.text, cases[k].message))
-			fail_msg("%s: %s", cases[k].sql, err.text);
+		if (rc)
+			assert_says(err.text, cases[k].message);
 		incise_recording_close(recording);
 	}
 }

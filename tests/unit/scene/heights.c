@@ -4,11 +4,6 @@
  * themselves at random places: no place is beyond the certified bound, and one is at least a tenth of
  * the bound away. Then the refusals.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,6 +13,7 @@
 #include "../../../lib/scene/heights.h"
 #include "../../../lib/surface/surface.h"
 #include "../cases.h"
+#include "../message.h"
 
 #define ONE 65536.0
 #define UNIT 1073741824.0
@@ -272,10 +268,8 @@ static void refuse(struct incise_surface *surface, const double along[3],
 	struct incise_heights heights;
 	struct incise_error err = {0};
 
-	assert_int_equal(incise_heights_make(surface, along, 1, 10, 0.02, &heights, &err),
-			 -ERANGE);
-	assert_non_null(strstr(err.text, text));
-	assert_non_null(strstr(err.text, "remove --in-kernel"));
+	assert_error(incise_heights_make(surface, along, 1, 10, 0.02, &heights, &err),
+		     ERANGE, &err, text, "remove --in-kernel");
 	assert_null(heights.height);
 	incise_surface_free(surface);
 }

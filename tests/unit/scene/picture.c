@@ -2,11 +2,6 @@
 /*
  * The group `picture` of a scene: what it says, what it does not say, what it cannot say.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -14,6 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 #include <incise/scene.h>
+#include "../message.h"
 
 static char path[] = "/tmp/incise-picture-XXXXXX";
 
@@ -64,9 +60,9 @@ static void test_refused(void **state)
 	} cases[] = {
 		{"picture = { colour = 1; };", "colour"},
 		{"picture = { wound = 1; };", "wound"},
-		{"picture = { skin = \"fish\"; };", "picture.skin: expected \"plain\""},
+		{"picture = { skin = \"fish\"; };", "picture.skin:"},
 		{"picture = { skin = 3; };", "skin"},
-		{"picture = { texture_px = 1000; };", "picture.texture_px: expected 256"},
+		{"picture = { texture_px = 1000; };", "picture.texture_px:"},
 		{"picture = { texture_px = 8192; };", "texture_px"},
 		{"picture = { gravity = [0.0, 0.0, 0.0]; };", "gravity"},
 		{"picture = { blood_ul_s_mm2 = -1.0; };", "blood_ul_s_mm2"},
@@ -76,11 +72,10 @@ static void test_refused(void **state)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
+		struct incise_error err;
 
-		assert_null(scene(cases[i].group, &err));
-		if (!strstr(err.text, cases[i].says) || !strstr(err.text, ":2"))
-			fail_msg("%s: %s", cases[i].group, err.text);
+		assert_error(scene(cases[i].group, &err), EINVAL, &err, ":2",
+			     cases[i].says);
 	}
 }
 

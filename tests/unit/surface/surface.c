@@ -2,14 +2,10 @@
 /*
  * Making surfaces of each kind, and asking what they are.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <float.h>
 #include "../../../lib/surface/surface.h"
+#include "../message.h"
 #include "solid.h"
 
 static const double zero[3], bad[3] = {0, NAN, 0}, far[3] = {0, 0, 1e300};
@@ -19,7 +15,7 @@ static void refused(struct incise_surface *surface, const struct incise_error *e
 	assert_null(surface);
 	assert_int_equal(errno, EINVAL);
 	assert_int_equal(err->code, EINVAL);
-	assert_non_null(strstr(err->text, "expected"));
+	assert_says(err->text, NULL);
 }
 
 static void test_refused(void **state)

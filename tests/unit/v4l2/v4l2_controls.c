@@ -4,12 +4,8 @@
  * itself is off and stays so, values are what was asked for or what they were, and all that
  * does not hold is refused.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include "../../../lib/device/v4l2/v4l2_controls.h"
+#include "../message.h"
 #include "driver.h"
 
 #define WHERE "rig.conf:1: camera"
@@ -167,34 +163,27 @@ static void what_does_not_hold_is_refused(void **state)
 		int code;
 		const char *says;
 	} cases[] = {
-		{gain_stuck, {.gain = 40}, EIO, "gain from the set value 40 to 34"},
-		{auto_stuck, {0}, EIO, "changes its automatic white balance"},
-		{gain_busy, {.gain = 40}, EBUSY, "gain is controlled by another program"},
-		{auto_refused, {0}, EIO, "automatic gain cannot be set: Invalid"},
-		{read_fails, {0}, EIO, "cannot be set: Broken pipe"},
+		{gain_stuck, {.gain = 40}, EIO, "40 to 34"},
+		{auto_stuck, {0}, EIO, "automatic white balance"},
+		{gain_busy, {.gain = 40}, EBUSY, "gain"},
+		{auto_refused, {0}, EIO, "automatic gain"},
+		{read_fails, {0}, EIO, NULL},
 		{pulled, {0}, ENODEV, "unplugged"},
-		{no_gain, {.gain = 3}, EOPNOTSUPP, "gain cannot be set"},
-		{gain_read_only, {.gain = 3}, EOPNOTSUPP, "remove camera_setup.gain"},
-		{nothing,
-		 {.gain = 256},
-		 ERANGE,
-		 "gain is 256; the camera takes 0 to 255"},
-		{nothing, {.exposure_ms = 0.1}, ERANGE, "takes 0.3 to 204.7"},
-		{nothing, {.exposure_ms = 34}, ERANGE, "longer than the 33.3333 ms"},
-		{nothing, {.focus = -1}, EINVAL, "focus is -1"},
+		{no_gain, {.gain = 3}, EOPNOTSUPP, "gain"},
+		{gain_read_only, {.gain = 3}, EOPNOTSUPP, "camera_setup.gain"},
+		{nothing, {.gain = 256}, ERANGE, "256"},
+		{nothing, {.exposure_ms = 0.1}, ERANGE, "204.7"},
+		{nothing, {.exposure_ms = 34}, ERANGE, "33.3333 ms"},
+		{nothing, {.focus = -1}, EINVAL, "focus"},
 		{nothing, {.white_balance_K = __builtin_nan("")}, EINVAL, "nan"},
-		{nothing, {.gain = 1e300}, EINVAL, "gain is 1e+300"},
+		{nothing, {.gain = 1e300}, EINVAL, "1e+300"},
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		int rc;
 
 		webcam();
 		cases[i].make();
-		rc = lock(&cases[i].setup);
-		if (rc != -cases[i].code || err.code != cases[i].code ||
-		    !strstr(err.text, cases[i].says))
-			fail_msg("case %zu: %d, \"%s\"", i, rc, err.text);
+		assert_error(lock(&cases[i].setup), cases[i].code, &err, cases[i].says);
 	}
 }
 
@@ -224,12 +213,12 @@ static void drift_is_found(void **state)
 	webcam();
 	assert_int_equal(lock(&setup), 0);
 	driver_control(V4L2_CID_GAIN)->value = 41;
-	assert_int_equal(v4l2_controls_check(&controls, WHERE, &err), -EIO);
-	assert_non_null(strstr(err.text, "gain has changed from 40 to 41"));
+	assert_error(v4l2_controls_check(&controls, WHERE, &err), EIO, &err, "gain", "40",
+		     "41");
 	driver_control(V4L2_CID_GAIN)->value = 40;
 	driver_control(V4L2_CID_EXPOSURE_AUTO)->value = 3;
-	assert_int_equal(v4l2_controls_check(&controls, WHERE, &err), -EIO);
-	assert_non_null(strstr(err.text, "automatic exposure has changed from 1 to 3"));
+	assert_error(v4l2_controls_check(&controls, WHERE, &err), EIO, &err,
+		     "automatic exposure", "1", "3");
 }
 
 static void one_failed_reading_is_no_drift(void **state)
@@ -248,8 +237,7 @@ static void one_failed_reading_is_no_drift(void **state)
 	driver.g_ctrl_error = ETIMEDOUT;
 	assert_int_equal(v4l2_controls_check(&controls, WHERE, &err), 0);
 	assert_int_equal(v4l2_controls_check(&controls, WHERE, &err), 0);
-	assert_int_equal(v4l2_controls_check(&controls, WHERE, &err), -EIO);
-	assert_non_null(strstr(err.text, "cannot be read any more"));
+	assert_error(v4l2_controls_check(&controls, WHERE, &err), EIO, &err, NULL);
 	driver.g_ctrl_error = ENODEV;
 	assert_int_equal(v4l2_controls_check(&controls, WHERE, &err), -ENODEV);
 }

@@ -3,17 +3,13 @@
  * A film's file: invalid options and a missing module are reported, and no partial file is left.
  * tests/unit/film tests its contents.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include <incise/film.h>
+#include "../message.h"
 
 static char folder[] = "/tmp/incise-films-XXXXXX";
 
@@ -28,10 +24,9 @@ static void test_sizes(void **state)
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_error err = {0};
 
-		assert_null(incise_film_new("x.mkv", cases[i].width, cases[i].height,
-					    cases[i].rate, &err));
-		assert_int_equal(errno, EINVAL);
-		assert_non_null(strstr(err.text, "x.mkv"));
+		assert_error(incise_film_new("x.mkv", cases[i].width, cases[i].height,
+					     cases[i].rate, &err),
+			     EINVAL, &err, "x.mkv");
 	}
 }
 
@@ -42,9 +37,8 @@ static void test_no_module(void **state)
 
 	setenv("INCISE_MODULE_PATH", folder, 1);
 	snprintf(path, sizeof(path), "%s/x.mkv", folder);
-	assert_null(incise_film_new(path, 16, 16, 30, &err));
-	assert_int_equal(errno, ENOENT);
-	assert_non_null(strstr(err.text, "film_mkv.so"));
+	assert_error(incise_film_new(path, 16, 16, 30, &err), ENOENT, &err,
+		     "film_mkv.so");
 	assert_int_equal(access(path, F_OK), -1);
 	assert_int_equal(incise_film_close(NULL, &err), 0);
 	incise_film_drop(NULL);

@@ -3,15 +3,11 @@
  * Maps of all kinds of surface: there and back, compared with finite differences and with the
  * surface itself; and their triangles.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
 #include <errno.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/view/uv_map.h"
+#include "../message.h"
 #include "../surface/solid.h"
 
 #define SIZE 512
@@ -411,9 +407,8 @@ static void test_refused(void **state)
 		const struct incise_scene_picture picture = {.texture_px = sizes[k]};
 		struct incise_error err = {0};
 
-		assert_null(uv_map_new(surface, &picture, &err));
-		assert_int_equal(errno, EINVAL);
-		assert_non_null(strstr(err.text, "expected"));
+		assert_error(uv_map_new(surface, &picture, &err), EINVAL, &err,
+			     "expected");
 	}
 	incise_surface_free(surface);
 }

@@ -4,11 +4,6 @@
  * that are drawn outside the library (tests/vision/scalpel_picture.c), and of
  * the virtual camera. Results are printed for the log. Learnt thresholds find the handle.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -17,6 +12,7 @@
 #include "../../../lib/sim/sim.h"
 #include "../../vision/scalpel_picture.h"
 #include "../cases.h"
+#include "../message.h"
 
 /* A sanitizer slows them ten times down, and sees in a few what it sees in all. */
 #define FRAMES cases_of(16, 4)
@@ -612,9 +608,8 @@ static void two_colours_are_refused(void **state)
 	double length;
 	struct incise_camera_frame frame = drawn_frame(INCISE_PIXELS_RGB, 2, &length);
 
-	assert_int_equal(incise_vision_learn(&frame, &across, &setup, &err), -ERANGE);
-	assert_int_equal(err.code, ERANGE);
-	assert_non_null(strstr(err.text, "not one colour"));
+	assert_error(incise_vision_learn(&frame, &across, &setup, &err), ERANGE, &err,
+		     NULL);
 	assert_memory_equal(&setup, &before, sizeof(setup));
 	free((void *)frame.data);
 }
