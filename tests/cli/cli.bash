@@ -80,6 +80,32 @@ machine_watched() {
 	[ "$(cat "$late")" -lt "$1" ] || BATS_TEST_RETRIES=3
 }
 
+# Wait until a command succeeds. A minute ends a test that hangs, and is no measure of anything.
+await() {
+	local i
+	for ((i = 0; i < 1200; i++)); do
+		! "$@" >/dev/null 2>&1 || return 0
+		sleep 0.05
+	done
+	complain "not within 60 s: $*"
+}
+
+# A recording is as it was written, with samples that were lost or without.
+is_intact() {
+	incise verify "$1" --json >intact.json || :
+	[ "$(key intact.json intact)" = 1 ] || complain "$1: $(cat intact.json)"
+}
+
+# A capture in real time. A machine that stands still loses samples: that may make it exit 1.
+captures() {
+	incise capture "$@" 2>captures.err || grep -q "were lost" captures.err || complain "$(cat captures.err)"
+}
+
+# Monotonic time in ms; the clock of the day may be set meanwhile.
+uptime_ms() {
+	awk '{ printf "%.0f\n", 1000 * $1 }' /proc/uptime
+}
+
 # Wait until a program catches a signal: until_it_catches PID incise-haptic 2, of the mask's bits.
 # Before it is the program it is a shell, which may catch it as well, and forget it.
 until_it_catches() {
