@@ -36,7 +36,7 @@ stop_server() {
 }
 
 client() {
-	timeout 120 python3 -B "$root/tests/streams/igtl_client.py" "$@"
+	timeout 400 python3 -B "$root/tests/streams/igtl_client.py" "$@"
 }
 
 # An expression of Python about a file of JSON, or lines of it, as j.
@@ -54,7 +54,7 @@ sys.exit(not eval(sys.argv[2]))' "$@" || complain "$2: $(head -c 2000 "$1")"
 @test "pyigtl receives poses, forces, data and frames with times of acquisition" {
 	[ -e "$INCISE_BUILD/tests/streams/ready" ] || skip "pip could not install pyigtl; see tests/venv"
 	start_server --rig sim: --camera frames
-	timeout 90 "$INCISE_BUILD/tests/streams/venv/bin/python" -B "$root/tests/streams/igtl_receive.py" "$port" 5 TipToTracker Force ForceData Camera >found.json
+	timeout 400 "$INCISE_BUILD/tests/streams/venv/bin/python" -B "$root/tests/streams/igtl_receive.py" "$port" 5 TipToTracker Force ForceData Camera >found.json
 	stop_server
 	holds found.json 'all(a[0] < b[0] for rows in j.values() for a, b in zip(rows, rows[1:]))'
 	# rotations of unit determinant: columns at right angles

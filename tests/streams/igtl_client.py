@@ -40,7 +40,7 @@ def pack(kind, name="", content=b"", version=1):
 
 
 def connect(port):
-    return socket.create_connection(("127.0.0.1", port), timeout=60)
+    return socket.create_connection(("127.0.0.1", port), timeout=300)
 
 
 def exactly(sock, n):
