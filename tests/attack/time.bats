@@ -257,7 +257,7 @@ reads() {
 @test "at a terminal: suspended, in the background, ended, failed" {
 	local scene pids=()
 	for scene in suspend background terminate quit full; do
-		timeout 300 "$root/tests/attack/terminal" $scene incise capture -o $scene.rec \
+		timeout 900 "$root/tests/attack/terminal" $scene incise capture -o $scene.rec \
 			--rig sim:force_hz=1000 --duration 1h >$scene.out 2>$scene.err 3>&- &
 		pids+=($!)
 	done

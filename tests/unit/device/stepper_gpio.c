@@ -92,7 +92,7 @@ static struct incise_actuator slow(void)
 		.microsteps = 1,
 		.velocity_mm_s = 2.5,
 		.acceleration_mm_s2 = 1000,
-		.deadman_s = 10,
+		.deadman_s = 3600, /* more than a busy machine stands still */
 		.tick_ns = 2000000,
 		.high_ns = 1000000,
 		.low_ns = 1000000,
