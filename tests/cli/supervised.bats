@@ -195,11 +195,10 @@ as_nobody() {
 	chrt -f 80 true 2>/dev/null || skip "this machine gives no SCHED_FIFO"
 	incise haptic wall.scene --rig sim: --overruns 0 --state page --json >r.json 3>&- &
 	pid=$!
-	for ((i = 0; i < 600; i++)); do
-		ticks=$(incise status ./page --prometheus 2>/dev/null | sed -n 's/^incise_loop_ticks_total{.*} //p')
-		[ "${ticks:-0}" -lt 1000 ] || break
-		sleep 0.05
-	done
+	has_ticks() {
+		[ "$(incise status ./page --prometheus | sed -n 's/^incise_loop_ticks_total{.*} //p')" -ge 1000 ]
+	}
+	await has_ticks
 	awk '/^VmRSS/ { print; exit !($2 > 0 && $2 <= 12 * 1024) }' /proc/$pid/status
 	awk '/^VmLck/ { print; exit !($2 > 1000) }' /proc/$pid/status
 	# Only what the scene needs, to the last library.
