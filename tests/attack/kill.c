@@ -66,13 +66,13 @@ static void attack(struct round *round, int count)
 			 delay_ns * 1e-9);
 		clear(round);
 		pid = start(round, "sim:clock=real", NULL);
-		for (int i = 0; stat("a.rec.part", &st) && i < 20000; i++)
+		for (int i = 0; stat("a.rec.part", &st) && i < 120000; i++)
 			nap(MS / 2);
 		if (stat("a.rec.part", &st))
 			fail(round, "does not begin: %s", text_of("err"));
 		/* Every other one is killed after its first rows came to the disk. */
 		for (int i = 0;
-		     round->number % 2 && round->page->seq[WATCH_FORCE] < 0 && i < 40000;
+		     round->number % 2 && round->page->seq[WATCH_FORCE] < 0 && i < 120000;
 		     i++)
 			nap(MS / 2);
 		canary.late_ns = 0;

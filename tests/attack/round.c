@@ -69,7 +69,7 @@ pid_t start(const struct round *round, const char *rig, const char *duration)
 	snprintf(library, sizeof(library), "%s/tests/attack/watch.so", build);
 	setenv("ATTACK_PAGE", "page", 1);
 	setenv("LD_PRELOAD", library, 1);
-	alarm(60); /* one that hangs ends by a signal */
+	alarm(300); /* one that hangs ends by a signal */
 	if (!freopen("out", "w", stdout) || !freopen("err", "w", stderr))
 		_exit(126);
 	if (duration) {

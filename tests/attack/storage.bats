@@ -107,7 +107,7 @@ with_camera() {
 	mount -t tmpfs -o size=40m tmpfs disk 2>/dev/null ||
 		skip "mounting a small tmpfs is not permitted; that of so many bytes stands in"
 	mounted=$PWD/disk
-	incise capture -o disk/a.rec --rig sim:clock=real --duration 60s >out 2>err 3>&- &
+	incise capture -o disk/a.rec --rig sim:clock=real --duration 1h >out 2>err 3>&- &
 	pid=$!
 	until incise info disk/a.rec.part --json >rows.json 2>/dev/null &&
 		[ "$(key rows.json rows.force)" -gt 1000 ]; do

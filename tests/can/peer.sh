@@ -3,13 +3,14 @@
 # $INCISE_BUILD and work in the folder of the moment.
 # shellcheck shell=sh
 
-# drive_start OPTIONS…: starts it; $drive is its name for rig.conf, such as slcan:/dev/pts/5:0x10.
+# drive_start OPTIONS…: starts it, behind $drive_ahead; $drive is its name for rig.conf, such as
+# slcan:/dev/pts/5:0x10.
 drive_start()
 {
 	drive=
 	rm -f drive.in drive.out
 	mkfifo drive.in
-	"$INCISE_BUILD/tests/can/drive" "$@" <drive.in >drive.out 2>drive.err 3>&- &
+	${drive_ahead:-} "$INCISE_BUILD/tests/can/drive" "$@" <drive.in >drive.out 2>drive.err 3>&- &
 	drive_pid=$!
 	exec 7>drive.in
 	drive_answer 0 || return
@@ -17,13 +18,13 @@ drive_start()
 	[ -n "$drive" ]
 }
 
-# drive_answer BEFORE: the answer after so many, within 20 s: an emulated machine is slow.
+# drive_answer BEFORE: the answer after so many, within 60 s: an emulated machine is slow.
 drive_answer()
 {
 	drive_tries=0
 	until [ "$(wc -l <drive.out)" -gt "$1" ]; do
 		drive_tries=$((drive_tries + 1))
-		if [ $drive_tries -gt 1000 ] || ! kill -0 "$drive_pid" 2>/dev/null; then
+		if [ $drive_tries -gt 3000 ] || ! kill -0 "$drive_pid" 2>/dev/null; then
 			echo "the drive does not answer:" "$(cat drive.err)"
 			return 1
 		fi
@@ -62,13 +63,13 @@ drive_is()
 	}
 }
 
-# drive_until STATE: waits for it, 10 s at most.
+# drive_until STATE: waits for it, a minute at most.
 drive_until()
 {
 	drive_rounds=0
 	until drive_is "$1" >/dev/null; do
 		drive_rounds=$((drive_rounds + 1))
-		if [ $drive_rounds -gt 500 ] || ! kill -0 "$drive_pid" 2>/dev/null; then
+		if [ $drive_rounds -gt 3000 ] || ! kill -0 "$drive_pid" 2>/dev/null; then
 			echo "the drive never was $1: $drive_line $(cat drive.err)"
 			return 1
 		fi

@@ -92,7 +92,7 @@ today=$(date -u +%Y-%m-%dT00:00:00Z)
 	END
 	run -1 incise calibrate check
 	[[ "$output" == *"6 calibrations"* ]]
-	grep -q "^force    good, ${today%T*}, 0 days old" <<<"$output"
+	grep -q "^force    good, ${today%T*}, [01] days\? old" <<<"$output"
 	grep -q 'force_mV_N  *1250.0 ± 1.0 x (k = 2)' <<<"$output"
 	grep -q "^depth    due, 2020-01-01, .*: older than 365 days" <<<"$output"
 	grep -q "^delay    FAILED, .*: the last one, of ${today%T*}, failed" <<<"$output"

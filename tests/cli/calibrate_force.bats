@@ -166,10 +166,7 @@ made_weights() {
 	cp calibration.conf before
 	incise calibrate force --rig sim: --weights 50g,100g,200g </dev/null 2>said &
 	pid=$!
-	for _ in $(seq 100); do
-		! grep -q "50 g" said || break
-		sleep 0.1
-	done
+	await grep -q "50 g" said
 	kill -INT "$pid"
 	status=0
 	wait "$pid" || status=$?

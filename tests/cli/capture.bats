@@ -16,12 +16,12 @@ teardown() {
 
 # Wait until a capture in the background has written something.
 until_it_runs() {
-	for _ in $(seq 100); do
+	for _ in $(seq 600); do
 		incise info "$1" --json >rows.json 2>/dev/null &&
 			[ "$(key rows.json rows.force)" -gt "${2:-0}" ] && return
 		sleep 0.1
 	done
-	echo "$1: no rows after 10 s; capture said: $(cat err)"
+	echo "$1: no rows after 60 s; capture said: $(cat err)"
 	false
 }
 
@@ -120,7 +120,7 @@ until_it_runs() {
 
 @test "a log that is cut off while it is written ends the capture with one line" {
 	for what in "truncate -s 0" rm; do
-		incise capture -o a.rec --rig sim:clock=real --duration 60s >out 2>err 3>&- &
+		incise capture -o a.rec --rig sim:clock=real --duration 1h >out 2>err 3>&- &
 		pid=$!
 		until_it_runs a.rec.part 6000
 		[ ! -e a.rec.part/recording.db-shm ]
@@ -236,7 +236,7 @@ small_disk() {
 
 @test "capture ends while there is room to end in" {
 	small_disk 40m
-	incise capture -o disk/a.rec --rig sim: --duration 60s >out 2>err 3>&- &
+	incise capture -o disk/a.rec --rig sim: --duration 1h >out 2>err 3>&- &
 	until_it_runs disk/a.rec.part 1000
 	head -c 24m /dev/zero >disk/more # as another program does
 	status=0
@@ -268,10 +268,10 @@ small_disk() {
 	for n in {3..12}; do
 		status=0
 		(exec 3>&- 4>&-
-		exec timeout 20 prlimit --nofile="$n" "$INCISE_BUILD/bin/incise-capture" -o "$n.rec" \
+		exec timeout 60 prlimit --nofile="$n" "$INCISE_BUILD/bin/incise-capture" -o "$n.rec" \
 			--rig sim: --duration 500ms </dev/null >/dev/null 2>err) || status=$?
-		# too few for the program's libraries; or enough
-		[ $status -eq 1 ] || continue
+		# too few for the program's libraries; or enough, also where a busy machine loses samples
+		[ $status -eq 1 ] && ! grep -q "were lost" err || continue
 		seen=1
 		grep -q "Too many open files" err || { echo "$n: $(cat err)"; false; }
 		if grep -q "the committed data" err; then
@@ -286,7 +286,7 @@ small_disk() {
 @test "capture whose folder is removed or moved says what is left of it" {
 	local pid how
 	for how in rm mv; do
-		incise capture -o $how.rec --rig sim: --duration 60s </dev/null 2>err 3>&- &
+		incise capture -o $how.rec --rig sim: --duration 1h </dev/null 2>err 3>&- &
 		pid=$!
 		# before rows are committed nothing is kept
 		until_it_runs $how.rec.part

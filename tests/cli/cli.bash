@@ -50,13 +50,16 @@ watch_machine() {
 	late=$BATS_FILE_TMPDIR/late.$BATS_TEST_NUMBER
 	[ "${BATS_TEST_TRY_NUMBER:-1}" -le 3 ] ||
 		skip "failed three times on a machine that stood still for up to $(cat "$late") ms each time"
-	rm -f "$late"
+	rm -f "$late" "$late.end"
 	# No job of this shell, whose tests may wait for all of theirs.
 	witness=$(
 		python3 - "$late" $$ >/dev/null 3>&- <<-'END' &
-			import os, sys, time
-			most = -1
-			next = time.monotonic()
+			import os, signal, sys, time
+			most, next, ends = -1, time.monotonic(), False
+			def asked(*_):
+			    global ends
+			    ends = True
+			signal.signal(signal.SIGTERM, asked)
 			while os.path.exists('/proc/' + sys.argv[2]):
 			    now = time.monotonic()
 			    if int(1000 * (now - next)) > most:
@@ -64,6 +67,9 @@ watch_machine() {
 			        with open(sys.argv[1] + '.new', 'w') as file:
 			            file.write(str(most))
 			        os.rename(sys.argv[1] + '.new', sys.argv[1])
+			    if ends:
+			        os.rename(sys.argv[1], sys.argv[1] + '.end')
+			        break
 			    next = max(next, now) + 0.005
 			    time.sleep(max(0, next - time.monotonic()))
 		END
@@ -74,10 +80,38 @@ watch_machine() {
 
 machine_watched() {
 	[ -n "${witness:-}" ] || return 0
-	sleep 0.02 # it counts a wait that just ended
-	kill "$witness" 2>/dev/null || :
+	# it counts a wait that just ended
+	kill "$witness" 2>/dev/null || return 0
+	await test -e "$late.end" || return
+	mv "$late.end" "$late"
 	BATS_TEST_RETRIES=0
 	[ "$(cat "$late")" -lt "$1" ] || BATS_TEST_RETRIES=3
+}
+
+# Wait until a command succeeds. A minute ends a test that hangs, and is no measure of anything.
+await() {
+	local i
+	for ((i = 0; i < 1200; i++)); do
+		! "$@" >/dev/null 2>&1 || return 0
+		sleep 0.05
+	done
+	complain "not within 60 s: $*"
+}
+
+# A recording is as it was written, with samples that were lost or without.
+is_intact() {
+	incise verify "$1" --json >intact.json || :
+	[ "$(key intact.json intact)" = 1 ] || complain "$1: $(cat intact.json)"
+}
+
+# A capture in real time. A machine that stands still loses samples: that may make it exit 1.
+captures() {
+	incise capture "$@" 2>captures.err || grep -q "were lost" captures.err || complain "$(cat captures.err)"
+}
+
+# Monotonic time in ms; the clock of the day may be set meanwhile.
+uptime_ms() {
+	awk '{ printf "%.0f\n", 1000 * $1 }' /proc/uptime
 }
 
 # Wait until a program catches a signal: until_it_catches PID incise-haptic 2, of the mask's bits.

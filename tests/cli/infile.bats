@@ -16,9 +16,9 @@ setup() {
 	echo '{}' >r.json
 }
 
-# A command that reads FILE; it has 2 GB of addresses and 20 s.
+# A command that reads FILE; it has 2 GB of addresses and a minute.
 incise_in_bounds() {
-	timeout -k 1 20 prlimit --as=2000000000 incise "$@"
+	timeout -k 1 60 prlimit --as=2000000000 incise "$@"
 }
 
 # The last run failed; its last line names this file and holds the text. A warning may precede it.
@@ -110,13 +110,23 @@ readers() {
 	failed_with "standard input:1: a NUL byte"
 }
 
+# opened PID FILE: whether that process has it open.
+opened() {
+	[ -n "$(find "/proc/$1/fd" -lname "$2")" ]
+}
+
 # bats test_tags=check
 @test "standard input and pipes with a writer are read" {
 	[ "$(incise eval m.fis - <<<'5 20')" = "$(incise eval m.fis <(sleep 0.2; echo '5 20'))" ]
+	# a writer that has nothing yet when the pipe is opened
 	mkfifo late
-	(sleep 0.3; echo '5 20' >late) &
-	[ "$(incise eval m.fis late)" = "$(incise eval m.fis <<<'5 20')" ]
-	wait
+	exec 5<>late
+	incise eval m.fis late >got 3>&- 5>&- &
+	await opened $! "$PWD/late"
+	echo '5 20' >&5
+	exec 5>&-
+	wait $!
+	[ "$(cat got)" = "$(incise eval m.fis <<<'5 20')" ]
 	incise train <(cat pairs.csv) --mf 2,2 -o again.fis 2>/dev/null
 	cmp <(grep -v ^% m.fis) <(grep -v ^% again.fis)
 	[ "$(incise eval <(cat m.fx) <<<'5 20')" = "$(incise eval m.fx <<<'5 20')" ] ||
@@ -130,7 +140,7 @@ readers() {
 	incise capture -o a.rec -r rig.conf 2>/dev/null
 	rm a.rec/camera.mkv
 	mkfifo a.rec/camera.mkv
-	run --separate-stderr timeout -k 1 20 incise verify a.rec
+	run --separate-stderr timeout -k 1 60 incise verify a.rec
 	[ "$status" -eq 1 ]
 	[[ "$output" == *"camera.mkv: not a regular file"* ]] || complain "$output"
 }

@@ -210,12 +210,9 @@ setup() {
 	incise capture -o b.rec --rig sim: 2>/dev/null 3>&- &
 	pid=$!
 	# rows are committed every 100 ms
-	for ((i = 0; i < 100; i++)); do
-		sleep 0.1
-		incise info b.rec --json >r.json 2>/dev/null || continue
-		rows=$(key r.json rows.force)
-		[ "$rows" -eq 0 ] || break
-	done
+	has_rows() { incise info b.rec --json >r.json && [ "$(key r.json rows.force)" -gt 0 ]; }
+	await has_rows
+	rows=$(key r.json rows.force)
 	kill -9 $pid
 	wait $pid || [ $? -eq 137 ]
 	[ ! -e b.rec ]

@@ -145,7 +145,7 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	[[ "$stderr" == *"warning: killed.rec.part: was interrupted; it is joined up to its last commit" ]]
 	[[ "${lines[1]}" == "killed: force, tracker, 4.000 to 9.000 s, on "*", interrupted" ]]
 	# one that is being recorded
-	incise capture -o now.rec --rig sim:clock=real --duration 60s >/dev/null 2>&1 3>&- &
+	incise capture -o now.rec --rig sim:clock=real --duration 1h >/dev/null 2>&1 3>&- &
 	pid=$!
 	for ((i = 0; i < 600; i++)); do
 		[ ! -e now.rec.part/recording.db ] || ! incise info now.rec >/dev/null 2>&1 || break

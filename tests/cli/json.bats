@@ -66,7 +66,7 @@ loops() {
 	report plan plan liver.scene
 	report plan.rig plan neck.scene --rig "$short"
 	report haptic haptic neck.scene --rig "$short" --duration 4s --session s.session
-	report haptic.real_time haptic liver.scene --rig sim: --no-rt --duration 1s
+	report haptic.real_time haptic liver.scene --rig sim: --no-rt --overruns 0 --duration 1s
 	cp s.session out/session.json
 	report assess assess s.session
 	report assess.reference assess s.session --reference s.session
@@ -75,17 +75,20 @@ loops() {
 }
 
 running_loop() {
-	local i
-	incise haptic neck.scene --rig sim: --no-rt --duration 60s --state neck.state >/dev/null 2>&1 3>&- &
+	local i loop
+	incise haptic neck.scene --rig sim: --no-rt --overruns 0 --duration 1h --state neck.state >/dev/null 2>&1 3>&- &
+	loop=$!
 	for ((i = 0; i < 600; i++)); do
 		! incise status ./neck.state 2>/dev/null | grep -q running || break
 		sleep 0.1
 	done
 	report status status ./neck.state
 	report tool tool ./neck.state handle
-	timeout 3 incise status ./neck.state --follow --json >out/status.follow.json || [ $? = 124 ]
-	kill -TERM $!
-	wait $! || :
+	incise status ./neck.state --follow --json >out/status.follow.json 3>&- &
+	await test -s out/status.follow.json
+	# which ends the other as well
+	kill -TERM $loop
+	wait
 }
 
 devices() {

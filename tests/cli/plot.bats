@@ -366,13 +366,13 @@ entry() {
 	gnuplot -e "set print '-'; print GPVAL_TERMINALS" | grep -qwE 'qt|wxt|x11' || skip "gnuplot has no windows"
 	Xvfb -displayfd 5 -screen 0 1280x1024x24 5>display >/dev/null 2>&1 3>&- &
 	server=$!
-	for ((i = 0; i < 500; i++)); do [ -s display ] && break || sleep 0.02; done
+	await test -s display
 	DISPLAY=:$(cat display)
 	export DISPLAY
 	incise plot m.fis >out 2>err 3>&- &
 	pid=$!
 	# hidden windows of gnuplot have its name too, and a key before the plot is drawn is lost
-	for ((i = 0; i < 300; i++)); do
+	for ((i = 0; i < 600; i++)); do
 		kill -0 $pid 2>/dev/null || break
 		for id in $(xdotool search --name Gnuplot 2>/dev/null); do
 			seen=yes
@@ -400,7 +400,7 @@ entry() {
 	export STARTED=$PWD/started
 	PATH=$PWD/bin:$PATH DISPLAY=:7 incise plot m.fis >out 2>err 3>&- &
 	pid=$!
-	for ((i = 0; i < 500; i++)); do [ -s started ] && break || sleep 0.02; done
+	await test -s started
 	kill -INT $pid
 	status=0
 	wait $pid || status=$?

@@ -86,7 +86,7 @@ setup() {
 	# a pipe of that name is not waited for
 	rm -r "a b;.rec"
 	mkfifo p.csv "a b;.rec"
-	run -0 --separate-stderr timeout 10 incise provenance m.fis
+	run -0 --separate-stderr timeout 60 incise provenance m.fis
 
 	run --separate-stderr incise provenance away
 	failed_with "away:"

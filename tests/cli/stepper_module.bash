@@ -12,8 +12,8 @@ module_folder() {
 
 # A stepper that stands where it was told to, and says when it is loaded. Words in its
 # arguments make it another one: lost (its 0 is not known), switch, pressed (an e-stop after 20
-# targets), left (a fault of a program that died), latched (an e-stop), hangs (for 3 s at its
-# 500th target), slow (2.5 ms a target).
+# targets), left (a fault of a program that died), latched (an e-stop), hangs (at its
+# 500th target, from then on there is a file hangs, until there is a file goes), slow (2.5 ms a target).
 make_module() { # FILE NAME ABI
 	cat >mine.c <<-END
 		#include <errno.h>
@@ -32,8 +32,11 @@ make_module() { # FILE NAME ABI
 			sets++;
 			if (has("pressed") && sets > 20)
 				faults = INCISE_STEPPER_FAULT_ESTOP;
-			if (has("hangs") && sets == 500)
-				sleep(3);
+			if (has("hangs") && sets == 500) {
+				fclose(fopen("hangs", "w"));
+				while (access("goes", F_OK))
+					usleep(1000);
+			}
 			if (has("slow") && sets > 20)
 				usleep(2500);
 			return faults ? -EIO : 0;

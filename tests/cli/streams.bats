@@ -5,14 +5,14 @@
 load cli
 
 setup() {
-	watch_machine
 	work_folder
 	peers="$INCISE_BUILD/tests/streams"
 }
 
 teardown() {
-	machine_watched 100
-	[ -z "$sender" ] || kill "$sender" 2>/dev/null || true
+	for one in $sender $capture; do
+		kill -KILL "$one" 2>/dev/null || :
+	done
 }
 
 # A session of the test's own on this machine alone: others send, too, and of several streams
@@ -41,6 +41,8 @@ rig() {
 		tracker = "$1";
 		force = "$2";
 		surface = { point_mm = [0.0, 0.0, 0.0]; normal = [0.0, 0.0, 1.0]; };
+		# in the air while the zero of the force is measured, however late that is
+		sim = { pause_s = 3600.0; };
 	END
 }
 
@@ -48,11 +50,51 @@ rig() {
 send() {
 	"$peers/$1" "${@:2}" >began 2>send.err 3>&- &
 	sender=$!
-	for _ in $(seq 100); do
-		[ ! -s began ] || return 0
-		sleep 0.1
-	done
-	complain "$1 does not start: $(cat send.err)"
+	await test -s began || complain "$1 does not start: $(cat send.err)"
+}
+
+# The program before is gone.
+no_more() {
+	kill "$sender"
+	wait "$sender" || true
+}
+
+# begin_capture NAME: in the background as $capture, into NAME.rec.
+begin_capture() {
+	recording=$1
+	rm -rf "$1.rec"
+	incise capture -o "$1.rec" --duration 1h >out 2>err 3>&- &
+	capture=$!
+}
+
+# Until it has more rows of a stream than that.
+until_rows() {
+	has_rows() {
+		kill -0 $capture || return 0
+		incise info "$recording.rec.part" --json >rows.json && [ "$(key rows.json "rows.$1")" -gt "$2" ]
+	}
+	await has_rows "$1" "$2"
+	kill -0 $capture || complain "$(cat err)"
+}
+
+# fails TEXT: one of its streams ends, and this is said of it at its own end.
+fails() {
+	has_failed() {
+		rm -rf seen
+		cp -r "$recording.rec.part" seen
+		[ "$(sqlite3 seen/recording.db "SELECT count(*) FROM events WHERE kind = 'failed'")" = 1 ]
+	}
+	await has_failed
+	kill -INT $capture
+	ends_with 1 || return
+	grep -qF "$1" err || complain "$(cat err)"
+}
+
+# ends_with CODE: its exit code at its end.
+ends_with() {
+	local status=0
+	wait $capture || status=$?
+	[ "$status" = "$1" ] || complain "$status: $(cat err)"
 }
 
 ask() {
@@ -61,34 +103,40 @@ ask() {
 
 @test "an LSL stream in newtons is captured: values, times and losses are those sent" {
 	lsl
-	send lsl_send "$name" --seconds 20 --hole 3500:5 --nan 3000 --ahead 3200
+	# 3 s are enough to begin
+	send lsl_send "$name" --wait --hole 3500:5 --nan 3000 --ahead 3200
+	begin_capture a
+	until_rows force 4500
+	kill -INT $capture
 	# some samples are missing on purpose
-	run -1 --separate-stderr incise capture -o a.rec --duration 4.5s
-	[[ "$stderr" == *"force samples were lost"* ]]
-	# Exact in steps of 2^-17 N; times to the sender's clock within the bound that LSL states,
-	# tenths of a millisecond on one machine, and a tenth of the period at most.
-	python3 - "$(cat began)" <<-'END'
+	ends_with 1
+	grep -q "force samples were lost" err
+	# Exact in steps of 2^-17 N; times to the sender's clock within the uncertainty that LSL states,
+	# and a tenth of the period.
+	python3 - "$(tail -n 1 began)" <<-'END'
 		import sqlite3, sys
 		start = int(sys.argv[1])
 		db = sqlite3.connect("a.rec/recording.db")
 		rows = db.execute("SELECT seq, t_ns, code FROM force ORDER BY seq").fetchall()
-		assert len(rows) > 4000, len(rows)
+		sd, = db.execute("SELECT delay_sd_ns FROM streams WHERE name = 'force'").fetchone()
+		assert sd > 0, sd
 		sent = []
 		for seq, t_ns, code in rows:
-		    i = round((t_ns - start) / 1e6)
-		    assert abs(t_ns - start - i * 1e6) < 1e5, (seq, t_ns - start)
-		    assert (code - 2**30) / 2**17 == i % 1000 / 32768, (seq, i, code)
+		    value = (code - 2**30) / 2**17 * 32768
+		    assert value in range(1000), (seq, code)
+		    i = 1000 * round(((t_ns - start) / 1e6 - value) / 1000) + int(value)
+		    assert abs(t_ns - start - i * 1e6) < 1e5 + 5 * sd, (seq, t_ns - start, sd)
 		    sent.append(i)
 		missing = set(range(sent[0], sent[-1] + 1)) - set(sent)
-		assert missing == {3000, 3200, *range(3500, 3505)}, missing
+		# and more, if this machine stood still for seconds
+		assert missing >= {3000, 3200, *range(3500, 3505)}, missing
 		meta = dict(db.execute("SELECT key, value FROM meta"))
 		assert meta["force_newtons"] == 1 and meta["force_mV_N"] == 1000, meta
 		assert meta["force_lost"] == len(missing), (meta["force_lost"], missing)
-		sd, = db.execute("SELECT delay_sd_ns FROM streams WHERE name = 'force'").fetchone()
-		assert 0 < sd < 1e6, sd
+		print(len(missing))
 	END
 	run -1 incise verify a.rec
-	[[ "$output" == *"7 samples were lost during the capture; the rest is as it was written" ]]
+	[[ "$output" == *"$(ask "SELECT value FROM meta WHERE key = 'force_lost'") samples were lost during the capture; the rest is as it was written" ]]
 	# mV/N of an amplifier does not apply
 	echo "force_mV_N = 620.0; force_zero_mV = 99.0;" >calibration.conf
 	incise export a.rec -o own.csv
@@ -115,7 +163,7 @@ ask() {
 	run -1 --separate-stderr incise capture -o a.rec
 	[[ "$stderr" == *"force: no LSL stream \"$name\" found within 5 s; start the program that sends it"* ]]
 	[ "${#stderr_lines[@]}" = 1 ]
-	send lsl_send "$name" --unit N --seconds 8
+	send lsl_send "$name" --unit N
 	[[ "$(incise info devices)" == *'force '*' = "lsl:'"$name"'";'*'Mx (Nm), Fz (N), t (no unit)'* ]]
 	for channel in Mx:"channel 0 of the stream has the unit \"Nm\"; expected N, mN, kN, V or mV" \
 		t:"channel 2 of the stream has no unit" \
@@ -129,65 +177,60 @@ ask() {
 	# The only channel in newtons needs no name; without a source id, LSL does not look for it
 	# again when it ends.
 	rig "sim:" "lsl:$name"
-	run -1 --separate-stderr incise capture -o a.rec --duration 30s
-	[[ "$stderr" == *"LSL $name, channel 1: the stream ended; start its program, and start again"* ]] ||
-		complain "$stderr"
-	send lsl_send "$name" --irregular --seconds 20
+	begin_capture c
+	until_rows force 100
+	no_more
+	fails "LSL $name, channel 1: the stream ended; start its program, and start again"
+	send lsl_send "$name" --irregular
 	run -1 --separate-stderr incise capture -o b.rec
 	[[ "$stderr" == *"has a nominal rate of 0 Hz; expected 1 to 100000 Hz (a regular stream)" ]]
 }
 
 @test "an LSL stream whose program starts again goes on, and the hole is counted" {
 	lsl
-	send lsl_send "$name" --recover --seconds 3
-	first=$(cat began)
-	incise capture -o a.rec --duration 7s --json >report.json 2>err &
-	capture=$!
-	wait "$sender"
-	send lsl_send "$name" --recover --seconds 20
-	# exit 1: some are lost
-	status=0
-	wait "$capture" || status=$?
-	[ "$status" = 1 ] || complain "$status: $(cat err)"
-	# The first one ended 3 s after it began; the second one is found again by its source id.
-	python3 - "$first" "$(cat began)" <<-'END'
+	send lsl_send "$name" --recover
+	begin_capture a
+	until_rows force 1000
+	no_more
+	send lsl_send "$name" --recover
+	until_rows force "$(($(key rows.json rows.force) + 1000))"
+	kill -INT $capture
+	# some are lost
+	ends_with 1
+	# The second one is found again by its source id.
+	python3 - "$(cat began)" <<-'END'
 		import sqlite3, sys
-		first, second = map(int, sys.argv[1:])
+		second = int(sys.argv[1])
 		rows = sqlite3.connect("a.rec/recording.db").execute("SELECT seq, t_ns FROM force ORDER BY seq").fetchall()
 		hole = max(range(1, len(rows)), key=lambda i: rows[i][1] - rows[i - 1][1])
 		(before, a), (after, b) = rows[hole - 1], rows[hole]
-		assert a < first + 3e9 + 1e6 and b > second - 1e6, (first, second, a, b)
+		assert a < second < b + 1e6, (second, a, b)
 		# the number goes on as 1000 a second would
 		assert abs((b - a) * 1e-6 - (after - before)) <= 2, (before, a, after, b)
 		assert len(rows) - hole > 100, (len(rows), hole)
 	END
 	# and where it does not, the capture ends after 10 s
-	kill "$sender"
-	wait "$sender" || true
-	send lsl_send "$name" --recover --seconds 3
-	run -1 --separate-stderr incise capture -o b.rec --duration 60s
-	[[ "$stderr" == *"LSL $name, channel 1: no more samples arrived; see the program that sends them, and start again"* ]] ||
-		complain "$stderr"
+	begin_capture b
+	until_rows force 100
+	no_more
+	fails "LSL $name, channel 1: no more samples arrived; see the program that sends them, and start again"
 }
 
 # A server of poses on a port of its own.
 poses() {
 	[ -e "$peers/ready" ] || skip "pyigtl is not there; see build/tests/streams/venv.log"
-	port=$((20000 + BATS_TEST_NUMBER * 1000 + $$ % 1000))
-	send igtl_send $port "$@"
+	send igtl_send "$@"
+	port=$(cat began)
 	rig "igtl:127.0.0.1:$port:Stylus" "sim:"
 }
 
-# The server before is gone, and its port with it.
-no_more_poses() {
-	kill "$sender"
-	wait "$sender" || true
-}
-
 @test "poses of pyigtl are captured, and the loop is warned of the network" {
-	poses --seconds 30
-	incise capture -o a.rec --duration 2s --json >report.json
-	[ "$(key report.json tracker_lost)" = 0 ]
+	poses
+	begin_capture a
+	until_rows tracker 150
+	kill -INT $capture
+	wait $capture || grep -q "force samples were lost" err
+	[ "$(ask "SELECT value FROM meta WHERE key='tracker_lost'")" = 0 ]
 	[ "$(ask "SELECT value FROM meta WHERE key='tracker_name'")" = "OpenIGTLink Stylus at 127.0.0.1" ]
 	# Poses are those of the sender in their order, turned by 90 degrees about z; of a busy
 	# machine pyigtl leaves some out. Singles, and rounding.
@@ -195,20 +238,19 @@ no_more_poses() {
 		import sqlite3
 		db = sqlite3.connect("a.rec/recording.db")
 		rows = db.execute("SELECT seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz FROM tracker").fetchall()
-		assert len(rows) > 100, len(rows)
 		for a, b in zip(rows, rows[1:]):
 		    assert b[0] == a[0] + 1 and b[1] > a[1], (a, b)
-		    assert 0 < (b[2] - a[2]) * 64 % 1000 < 100 and b[3:5] == (2, 10), (a, b)
+		    assert (b[2] - a[2]) * 64 % 1000 > 0 and b[3:5] == (2, 10), (a, b)
 		    assert abs(b[5] - 0.5**0.5) < 1e-7 and abs(b[8] - 0.5**0.5) < 1e-7, b
 		    assert b[6] == b[7] == 0, b
 	END
-	incise verify a.rec
+	is_intact a.rec
 	# the arrival is kept next to the sender's time: on no machine are all delays the least
 	[ "$(ask "SELECT min(arrival_ns >= t_ns) AND max(arrival_ns > t_ns) FROM tracker")" = 1 ]
 	[ "$(ask "SELECT stamped = 1 AND rate_hz > 1 FROM streams WHERE name = 'tracker'")" = 1 ]
-	no_more_poses
+	no_more
 	# without a name, it must be clear whose poses are meant
-	poses --name Stylus --name Probe --seconds 60
+	poses --name Stylus --name Probe
 	rig "igtl:127.0.0.1:$port" "sim:"
 	run -1 --separate-stderr incise capture -o b.rec
 	[[ "$stderr" == *"tracker: the server at 127.0.0.1 port $port sends several poses: "*"; name one, as in igtl:HOST:PORT:DEVICE" ]]
@@ -219,25 +261,29 @@ no_more_poses() {
 	run incise doctor --rig rig.conf
 	[[ "$output" == *"the haptic loop fades the force whenever the network delays poses of OpenIGTLink Stylus"* ]]
 	echo 'stepper = "sim:";' >>rig.conf
-	run --separate-stderr incise haptic "$root/scenes/liver.scene" --rig rig.conf --no-rt --duration 0.3s
+	run --separate-stderr incise haptic "$root/scenes/liver.scene" --rig rig.conf --no-rt --overruns 0 --duration 0.3s
 	[[ "$stderr" == *"poses come over a network, whose delay has no bound"* ]]
 }
 
 @test "what a hostile server sends is flagged or counted" {
 	for what in nan:'~' mirror:'~' unseen:'!'; do
 		poses --do "${what%:*}"
-		rm -rf a.rec
-		incise capture -o a.rec --duration 2s --json >report.json
-		[ "$(key report.json tracker_lost)" = 0 ]
+		begin_capture a
+		until_rows tracker 150
+		kill -INT $capture
+		wait $capture || grep -q "force samples were lost" err
+		[ "$(ask "SELECT value FROM meta WHERE key='tracker_lost'")" = 0 ]
 		# one of ten, and a pose at either end
 		[ "$(ask "SELECT abs(count(*) * 10 - (SELECT count(*) FROM tracker)) <= 20 AND count(*) > 5
 			FROM tracker WHERE status = '${what#*:}'")" = 1 ] ||
 			complain "$what: $(ask "SELECT status, count(*) FROM tracker GROUP BY status")"
-		no_more_poses
+		no_more
 	done
 	poses --do crc
-	rm -rf a.rec
-	run -1 incise capture -o a.rec --duration 2s --json
+	begin_capture a
+	until_rows tracker 150
+	kill -INT $capture
+	ends_with 1
 	[ "$(ask "SELECT abs(value * 10 - (SELECT value FROM meta WHERE key = 'tracker_rows') * 10 / 9) <= 20
 		FROM meta WHERE key = 'tracker_lost'")" = 1 ] || complain "$(ask 'SELECT * FROM meta')"
 }
@@ -265,43 +311,37 @@ no_more_poses() {
 		run -1 --separate-stderr incise capture -o a.rec
 		[[ "$stderr" == *"${what#*:}" ]] || complain "$stderr"
 		[ "${#stderr_lines[@]}" = 1 ]
-		no_more_poses
+		no_more
 	done
 }
 
 @test "a server of poses that goes away is connected again, and its poses count as lost" {
-	poses --do drop --seconds 30
+	poses --do drop
 	# Each connection has 150 poses; some are sent while there is none.
-	run -1 --separate-stderr incise capture -o a.rec --duration 4s
-	[[ "$stderr" == *"tracker samples were lost"* ]] || complain "$stderr; $(ask "SELECT seq, arrival_ns, x_mm * 64 FROM tracker")"
-	[ "$(ask "SELECT count(*) > 100 FROM tracker")" = 1 ]
+	begin_capture a
+	until_rows tracker 400
+	kill -INT $capture
+	ends_with 1
+	grep -q "tracker samples were lost" err || complain "$(cat err); $(ask "SELECT seq, arrival_ns, x_mm * 64 FROM tracker")"
 	[ "$(ask "SELECT count(*) >= 2 FROM events WHERE kind = 'lost'")" = 1 ] ||
 		complain "$(ask 'SELECT * FROM events')"
 	# pose i was sent at i / 100 s: numbers go on as they do
 	[ "$(ask "SELECT max(abs((b.x_mm - a.x_mm) * 64 - (b.seq - a.seq))) <= 1 FROM tracker a, tracker b
 		WHERE b.rowid = a.rowid + 1 AND b.x_mm > a.x_mm")" = 1 ] ||
 		complain "$(ask 'SELECT seq, x_mm * 64 FROM tracker')"
-	no_more_poses
-	poses --do drop --seconds 2
-	run -1 --separate-stderr incise capture -o b.rec --duration 30s
-	[[ "$stderr" == *"OpenIGTLink Stylus at 127.0.0.1 disconnected and was not back after 10 s; start its server again"* ]]
+	begin_capture b
+	until_rows tracker 100
+	no_more
+	fails "OpenIGTLink Stylus at 127.0.0.1 disconnected and was not back after 10 s; start its server again"
 }
 
 @test "a server of poses that stands still ends the capture" {
-	poses --do nan --seconds 60
-	incise capture -o a.rec --duration 60s >out 2>err &
-	capture=$!
-	for _ in $(seq 100); do
-		! incise info a.rec.part --json >rows.json 2>/dev/null || break
-		sleep 0.1
-	done
+	poses --do nan
+	begin_capture a
+	until_rows tracker 10
 	kill -STOP "$sender"
-	status=0
-	wait "$capture" || status=$?
+	fails "OpenIGTLink Stylus at 127.0.0.1 sent no message for 10 s; start its server again, check the network"
 	kill -CONT "$sender"
-	[ "$status" = 1 ]
-	grep -q "OpenIGTLink Stylus at 127.0.0.1 sent no message for 10 s; start its server again, check the network" err ||
-		complain "$(cat err)"
 }
 
 @test "incise serve --lsl: pylsl reads poses, forces and events with their units and times" {
@@ -310,7 +350,7 @@ no_more_poses() {
 	incise capture -o $cut --rig "sim:clock=simulated,cut_s=1,pause_s=0.6,seed=3" --duration 5s
 	incise serve $cut --lsl "$name" --rate 200 --igtl 0 --endless -v --json >report.json 2>serve.err 3>&- &
 	sender=$!
-	"$peers/lsl_receive" 2.5 "$name-pose" "$name-force" "$name-events" >read.json 2>read.err ||
+	"$peers/lsl_receive" 500 "$name-pose" "$name-force" "$name-events" >read.json 2>read.err ||
 		complain "$(cat read.err serve.err)"
 	kill -INT "$sender"
 	wait "$sender"
@@ -335,7 +375,6 @@ no_more_poses() {
 		samples, times = pose["samples"], pose["times"]
 		# The samples are in the recording to the last bit, and apart by as much; the clock of the
 		# player and the line of the whole recording differ by less than 1 ms.
-		assert len(samples) > 200, len(samples)
 		known = [(at[tuple(s[:3])], t) for s, t in zip(samples, times)]
 		for (a, s), (b, t) in zip(known, known[1:]):
 		    if b > a:  # else it starts again
@@ -345,12 +384,14 @@ no_more_poses() {
 		assert sum(abs(g - 0.005) < 2e-4 for g in gaps) > 0.95 * len(gaps), gaps[:20]
 		# The first of a play is a single sample, without a deviation: NaN.
 		assert all(abs(s[2]) < 20 and not s[3] < 0 for s in force["samples"])
-		assert sum(s[3] != s[3] for s in force["samples"]) <= 2
+		assert sum(s[3] != s[3] for s in force["samples"]) <= 2 + len(force["samples"]) // 900
 	END
 	# and what one rig offers is a force of another
 	incise serve --rig "sim:clock=real" --lsl "$name" --rate 500 --igtl 0 >out 2>serve.err 3>&- &
 	sender=$!
 	rig "sim:" "lsl:$name-force:Fz"
-	incise capture -o b.rec --duration 1s --json >report.json || complain "$(cat serve.err)"
-	[ "$(key report.json force)" -gt 400 ]
+	begin_capture b
+	until_rows force 400 || complain "$(cat serve.err)"
+	kill -INT $capture
+	wait $capture || grep -q "were lost" err
 }

@@ -28,7 +28,7 @@ serve() {
 }
 
 until_runs() {
-	for ((i = 0; i < 600; i++)); do
+	for ((i = 0; i < 1200; i++)); do
 		[ "$(incise status "$page" --json 2>/dev/null |
 			sed -n 's/.*"state": "\(.*\)".*/\1/p')" != running ] || return 0
 		sleep 0.05
@@ -54,7 +54,7 @@ packets() {
 		def connect():
 		    s = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 		    s.connect(sys.argv[1])
-		    s.settimeout(10)
+		    s.settimeout(60)
 		    return s
 		def ask(s, request):
 		    s.send(request)
@@ -86,7 +86,7 @@ packets() {
 	# shellcheck disable=SC2016
 	setsid --fork --wait sh -c 'echo $$ >pid; exec incise haptic "$@"' sh neck.scene \
 		--rig sim: --no-rt --overruns 0 --state "$page" --verbose >out 2>err 3>&- &
-	until [ -s pid ]; do sleep 0.02; done
+	await test -s pid
 	pid=$(cat pid)
 	until_runs
 	incise tool neck tube
@@ -199,7 +199,7 @@ as() {
 # Runs incise haptic neck.scene on a terminal of its own: the keys of $1, then the signal of $2.
 # Prints its output and how it ended; fails if the terminal is not as before.
 at_terminal() {
-	timeout 60 python3 - "$1" "$2" "$page" <<-'PYTHON'
+	timeout 300 python3 - "$1" "$2" "$page" <<-'PYTHON'
 		import os, pty, subprocess, sys, termios, time
 		keys, number, page = sys.argv[1], int(sys.argv[2]), sys.argv[3]
 		master, slave = pty.openpty()
@@ -212,7 +212,7 @@ at_terminal() {
 		    os.execvp('incise', ['incise', 'haptic', 'neck.scene', '--rig', 'sim:',
 		                         '--no-rt', '--overruns', '0', '--state', page])
 		def until(condition):
-		    for i in range(600):
+		    for i in range(1200):
 		        if condition():
 		            return
 		        time.sleep(0.05)

@@ -29,7 +29,7 @@ setup() {
 		sed -i '/^incise calibrate depth/d; /^incise capture -o look/d; s/^incise calibrate check$/& --only force,tip,delay,stepper/' commands
 	fi
 	# a machine that has else to do takes longer to begin
-	sed -i 's/^sleep 2$/for i in $(seq 200); do incise status liver >seen 2>\&1 || :; ! grep -q "^liver: running since" seen || break; sleep 0.1; done/' commands
+	sed -i 's/^sleep 2$/for i in $(seq 600); do incise status liver >seen 2>\&1 || :; ! grep -q "^liver: running since" seen || break; sleep 0.1; done/' commands
 	grep -q seq commands
 	bash -euo pipefail commands >out 2>err </dev/null || complain "$(tail -n 5 out err)"
 	# the liver's force at 5 mm and 20 mm/s, as its formula has it (incise/sim.h)

@@ -39,15 +39,20 @@ setup() {
 }
 
 @test "a recording of a real clock has the time of this computer" {
-	before=$(date +%s)
-	incise capture -o a.rec --rig "$real" --duration 500ms
-	after=$(date +%s)
+	# again, if the clock was set meanwhile
+	set_s=
+	until [ "$set_s" = 0 ]; do
+		before=$(date +%s) from_ms=$(uptime_ms)
+		captures -o a.rec --rig "$real" --duration 500ms --overwrite
+		after=$(date +%s)
+		set_s=$(((after - before - ($(uptime_ms) - from_ms) / 1000) / 2))
+	done
 	run -0 --separate-stderr incise info a.rec --json
 	# a source may correct the clock; a second is more than any here does
 	jq -e --argjson a "$before" --argjson b "$after" '.wall as $w |
 		$w.start.tai_ns / 1e9 - $w.utc_offset_s |
 		. >= $a - 2 and . <= $b + 2' <<<"$output"
-	incise verify a.rec
+	is_intact a.rec
 }
 
 # bats test_tags=check
@@ -80,7 +85,8 @@ setup() {
 	incise capture -o c.rec --rig "$quick" --duration 2s --json >c.json
 	jq -e '.wall == null' c.json
 	# the kernel of a test machine is synchronised or not, and the warnings say so
-	incise capture -o k.rec --rig "$real" --duration 200ms --clock-source kernel --json >k.json 2>err
+	captures -o k.rec --rig "$real" --duration 200ms --clock-source kernel --json >k.json
+	grep -v "were lost" captures.err >err || :
 	if jq -e '.wall.sources == ["kernel"]' k.json; then
 		[ ! -s err ]
 	else
@@ -141,7 +147,7 @@ setup() {
 		    except BrokenPipeError:
 		        pass
 	END
-	incise capture -o a.rec --rig "$real" --trigger sync:events --duration 300ms
+	captures -o a.rec --rig "$real" --trigger sync:events --duration 300ms
 	wait
 	[ "$(ask a.rec "SELECT text FROM events WHERE kind = 'sync' ORDER BY rowid LIMIT 1")" = "pulse 7" ]
 	# noted at its edge, a poll or more before the trigger was seen

@@ -8,7 +8,7 @@
 #include "../../lib/device/polhemus/polhemus_tty.h"
 #include "../unit/polhemus/pty.h"
 
-#define PATIENCE_NS INT64_C(30000000000)
+#define PATIENCE_NS INT64_C(60000000000)
 
 static const struct incise_tracker_setup setup = {
 	.n_stations = 1, .stations = {1}, .hemisphere = {1, 0, 0}};

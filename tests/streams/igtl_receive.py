@@ -22,10 +22,10 @@ def value_of(message):
 def main(port, count, *names):
     client = pyigtl.OpenIGTLinkClient("127.0.0.1", int(port))
     found = {name: [] for name in names}
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while any(len(rows) < int(count) for rows in found.values()):
         if time.monotonic() > deadline:
-            sys.exit(f"only {({name: len(rows) for name, rows in found.items()})} in 60 s")
+            sys.exit(f"only {({name: len(rows) for name, rows in found.items()})} in 300 s")
         for message in client.get_latest_messages():
             if message.device_name in found:
                 found[message.device_name].append([message.timestamp, value_of(message)])

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """An OpenIGTLink server on 127.0.0.1 that sends poses, by pyigtl or, hostile, by hand.
 
-    igtl_send.py PORT [--seconds S] [--rate HZ] [--name NAME]… [--do WHAT]
+    igtl_send.py [--seconds S] [--rate HZ] [--name NAME]… [--do WHAT]
 
 Pose i of each NAME is at (i % 1000) / 64, 2, 10 mm, turned by 90 degrees about z. WHAT:
 
@@ -15,7 +15,7 @@ Pose i of each NAME is at (i % 1000) / 64, 2, 10 mm, turned by 90 degrees about 
     unseen    one of 10 follows a STATUS that it is not there
     drop      closes the connection after each 150 poses; poses go on without a listener
 
-It prints the line "ready" when it listens. By hand, pose i has the timestamp START + i / rate.
+It prints its port when it listens. By hand, pose i has the timestamp START + i / rate.
 """
 import argparse
 import os
@@ -100,8 +100,8 @@ def by_pyigtl(options):
     import numpy
     import pyigtl
 
-    server = pyigtl.OpenIGTLinkServer(port=options.port, local_server=True)
-    print("ready", flush=True)
+    server = pyigtl.OpenIGTLinkServer(port=0, local_server=True)
+    print(server.server_address[1], flush=True)
     start = time.time()
     for i in range(int(options.seconds * options.rate)):
         pose = numpy.eye(4)
@@ -116,8 +116,7 @@ def by_pyigtl(options):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("port", type=int)
-    parser.add_argument("--seconds", type=float, default=20)
+    parser.add_argument("--seconds", type=float, default=3600)
     parser.add_argument("--rate", type=float, default=100)
     parser.add_argument("--name", action="append")
     parser.add_argument("--do", default="poses")
@@ -127,11 +126,10 @@ def main():
         by_pyigtl(options)
         return
     server = socket.socket()
-    server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    server.bind(("127.0.0.1", options.port))
+    server.bind(("127.0.0.1", 0))
     server.listen()
     server.settimeout(0.2)
-    print("ready", flush=True)
+    print(server.getsockname()[1], flush=True)
     by_hand(options, server)
 
 

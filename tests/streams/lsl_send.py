@@ -2,10 +2,10 @@
 """An outlet of the Lab Streaming Layer, by pylsl: a force whose value is its own sample's number.
 
     lsl_send.py NAME [--rate HZ] [--seconds S] [--unit UNIT] [--hole I:N] [--nan I] [--ahead I]
-                     [--irregular] [--recover]
+                     [--irregular] [--recover] [--wait]
 
 Sample i has the timestamp T0 + i/rate and the force (i % 1000) / 32768 N; it prints T0 in ns, and
-ends after S seconds. The samples I … I + N - 1 are not sent; one is stamped 60 s later.
+ends after S seconds. With --wait it prints 0 first, and T0 is when the first inlet is there. The samples I … I + N - 1 are not sent; one is stamped 60 s later.
 """
 import argparse
 import time
@@ -17,13 +17,14 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("name")
     parser.add_argument("--rate", type=float, default=1000)
-    parser.add_argument("--seconds", type=float, default=5)
+    parser.add_argument("--seconds", type=float, default=3600)
     parser.add_argument("--unit", default="N")
     parser.add_argument("--hole", default="0:0")
     parser.add_argument("--nan", type=int, default=-1)
     parser.add_argument("--ahead", type=int, default=-1)
     parser.add_argument("--irregular", action="store_true")
     parser.add_argument("--recover", action="store_true")
+    parser.add_argument("--wait", action="store_true")
     options = parser.parse_args()
     first, missing = map(int, options.hole.split(":"))
     info = pylsl.StreamInfo(
@@ -42,6 +43,10 @@ def main():
         if unit:
             channel.append_child_value("unit", unit)
     outlet = pylsl.StreamOutlet(info)
+    if options.wait:
+        print(0, flush=True)
+        while not outlet.wait_for_consumers(60):
+            pass
     start = pylsl.local_clock()
     print(round(start * 1e9), flush=True)
     sent = 0

@@ -88,7 +88,7 @@ static struct incise_actuator slow(void)
 		.microsteps = 1,
 		.velocity_mm_s = 2.5,
 		.acceleration_mm_s2 = 1000,
-		.deadman_s = 10,
+		.deadman_s = 3600, /* more than a busy machine stands still */
 		.tick_ns = 2000000,
 		.high_ns = 1000000,
 		.low_ns = 1000000,
@@ -152,6 +152,8 @@ static struct incise_stepper *open_stepper(const char *arguments, bool watch,
 	return stepper;
 }
 
+#define NAPS 30000 /* end a test that hangs: a minute */
+
 static void nap(void)
 {
 	nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL);
@@ -166,7 +168,7 @@ static struct incise_stepper_status await(struct incise_stepper *stepper,
 {
 	struct incise_stepper_status status = {0};
 
-	for (int i = 0; i < 10000; i++) {
+	for (int i = 0; i < NAPS; i++) {
 		assert_int_equal(incise_stepper_status(stepper, &status), 0);
 		if (status.state == state && status.position_mm >= past_mm)
 			return status;
@@ -215,9 +217,12 @@ static void it_steps_and_lets_go(void **state)
 	atomic_fetch_or(&chip.level, 1u << INCISE_LINE_ESTOP);
 	assert_int_equal(incise_stepper_clear(stepper, &err), 0);
 	assert_int_equal(incise_stepper_enable(stepper, &err), 0);
-	/* Closed under way: 2 s of it. */
+	/* Closed under way: 2 s of it, from a step on that a slow thread cannot miss. */
 	assert_int_equal(incise_stepper_set(stepper, 5), 0);
-	await(stepper, INCISE_STEPPER_STATE_MOVING, 0);
+	for (int i = 0; atomic_load(&chip.steps) == 10; i++) {
+		assert_true(i < NAPS);
+		nap();
+	}
 	stepper->ops->close(stepper);
 	assert_int_equal(chip.open, 0);
 	assert_true(atomic_load(&chip.level) >> INCISE_LINE_ENABLE & 1);

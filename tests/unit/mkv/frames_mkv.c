@@ -681,14 +681,17 @@ static const struct incise_frames_shape live_shapes[] = {
 	{64, 48, INCISE_PIXELS_MJPEG, 200},
 };
 
-/* 200 frames of the film a second, each at its time; then none. */
+/* Frames of the film, a few ahead of the rows; then none. */
 struct film_camera {
 	struct incise_camera camera;
 	const struct incise_frames_shape *shape;
+	const _Atomic uint64_t *rows;
 	int64_t from_ns; /* since the first read */
 	uint64_t next, end;
 	uint8_t bytes[64 * 48 * 3];
 };
+
+#define AHEAD 8 /* so few always find a slot */
 
 static int64_t clock_ns(void)
 {
@@ -701,15 +704,13 @@ static int64_t clock_ns(void)
 static int camera_read(struct incise_camera *camera, struct incise_camera_frame *frame)
 {
 	struct film_camera *c = (struct film_camera *)camera;
-	int64_t t_ns;
 
 	if (!c->from_ns)
 		c->from_ns = clock_ns();
-	t_ns = c->from_ns + (int64_t)c->next * 5 * MS;
-	if (t_ns > clock_ns() || c->next == c->end)
+	if (c->next == c->end || c->next >= *c->rows + AHEAD)
 		return 0;
-	*frame = film_frame(c->shape, c->next++, 0, c->bytes);
-	frame->t_ns = t_ns;
+	*frame = film_frame(c->shape, c->next, 0, c->bytes);
+	frame->t_ns = c->from_ns + (int64_t)c->next++ * 5 * MS;
 	return 1;
 }
 
@@ -746,6 +747,7 @@ static void record(const char *path, const struct incise_frames_shape *shape,
 	struct incise_frame_pump *pump;
 
 	camera.shape = shape;
+	camera.rows = rows;
 	camera.end = end;
 	pump = incise_frame_pump_new(
 		&(struct incise_frame_pump_setup){

@@ -16,6 +16,7 @@
 
 #define SIDE 16
 #define MS 1000000LL
+#define PATIENCE_NS (60000 * MS) /* ends a test that hangs */
 
 /* A frame every 1/hz s of the clock; all wait until they are read. */
 struct fake_camera {
@@ -225,7 +226,7 @@ static void nothing_is_lost_where_time_waits(void **state)
 		assert_int_equal(incise_frame_pump_step(pump), 1);
 		assert_int_equal(incise_frame_pump_step(pump), 0);
 		if (i == 199)
-			assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, NULL),
+			assert_int_equal(incise_frame_pump_stop(pump, PATIENCE_NS, NULL),
 					 0);
 		while ((n = incise_frame_pump_take(pump, record, 7)) > 0)
 			for (int k = 0; k < n; k++, seq++) {
@@ -287,7 +288,7 @@ static void what_was_shot_before_is_passed_over(void **state)
 	}
 	camera.lost++;
 	assert_int_equal(incise_frame_pump_step(pump), 0);
-	assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, NULL), 0);
+	assert_int_equal(incise_frame_pump_stop(pump, PATIENCE_NS, NULL), 0);
 	assert_int_equal(incise_frame_pump_take(pump, record, 30), 9);
 	for (int i = 0; i < 9; i++) {
 		assert_int_equal(record[i].seq, 21 + i);
@@ -316,7 +317,7 @@ static void a_stall_is_bridged(void **state)
 	assert_int_equal(stats.capacity, 150);
 	/* Frames 6 … 98 at least; one more may be on its way. */
 	assert_true(stats.waiting_most >= 93);
-	assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, NULL), 0);
+	assert_int_equal(incise_frame_pump_stop(pump, PATIENCE_NS, NULL), 0);
 	for (uint64_t seq = 0; seq < 120; seq++) {
 		assert_int_equal(incise_frame_pump_take(pump, &record, 1), 1);
 		assert_int_equal(record.seq, seq);
@@ -382,7 +383,7 @@ static void a_full_disk_ends_the_file_alone(void **state)
 	assert_int_equal(stats.file.code, ENOSPC);
 	assert_string_equal(stats.file.text, "the file:");
 	assert_int_equal(stats.camera.code, 0);
-	assert_error(incise_frame_pump_stop(pump, 5000 * MS, &err), ENOSPC, &err,
+	assert_error(incise_frame_pump_stop(pump, PATIENCE_NS, &err), ENOSPC, &err,
 		     "the file:");
 	assert_int_equal(file.closed, 1);
 	incise_frame_pump_free(pump);
@@ -403,7 +404,7 @@ static void a_wrong_frame_is_passed_over(void **state)
 	assert_int_equal(stats.written, 49);
 	assert_int_equal(stats.unwritten, 1);
 	assert_int_equal(stats.file.code, 0);
-	assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, NULL), 0);
+	assert_int_equal(incise_frame_pump_stop(pump, PATIENCE_NS, NULL), 0);
 	assert_int_equal(incise_frame_pump_take(pump, record, 50), 49);
 	/* Vision's results stay with their frames behind the gap. */
 	for (int i = 0; i < 49; i++) {
@@ -433,7 +434,7 @@ static void a_camera_that_ends_says_why(void **state)
 	assert_int_equal(stats.camera.code, ENODEV);
 	assert_string_equal(stats.camera.text, "it was unplugged");
 	assert_int_equal(stats.written, 50);
-	assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, NULL), 0);
+	assert_int_equal(incise_frame_pump_stop(pump, PATIENCE_NS, NULL), 0);
 	incise_frame_pump_free(pump);
 	incise_clock_free(clock);
 }
@@ -455,7 +456,7 @@ static void slow_vision_holds_nobody(void **state)
 	stats = wait_for(pump, 200);
 	assert_int_equal(stats.written, 200);
 	assert_true(stats.unlooked > 0);
-	assert_int_equal(incise_frame_pump_stop(pump, 5000 * MS, NULL), 0);
+	assert_int_equal(incise_frame_pump_stop(pump, PATIENCE_NS, NULL), 0);
 	incise_frame_pump_stats(pump, &stats);
 	assert_int_equal(incise_frame_pump_take(pump, record, 200), 200);
 	for (int i = 0; i < 200; i++) {

@@ -267,7 +267,10 @@ static void name_taken_meanwhile_is_kept(void **state)
 
 /* --- kills -------------------------------------------------------------------------- */
 
-/* Record in another process, which reports the start of each poll and never closes. */
+/*
+ * Record in another process, which reports the start of each poll and never closes. A full pipe
+ * holds it up, so that it gets not far in simulated time before the signal comes.
+ */
 static pid_t record_forever(const char *spec, int64_t duration_ns, int *polls)
 {
 	int pipes[2];
@@ -341,7 +344,7 @@ static void exit_without_close(void **state)
 
 static void sigkill(void **state)
 {
-	killed_recording_is_readable("sim:clock=real", 20000 * MS, SIGKILL);
+	killed_recording_is_readable(SIM, INT64_MAX / 2, SIGKILL);
 }
 
 static void interrupted_recording_knows_its_losses(void **state)
@@ -957,14 +960,19 @@ static void reader_does_not_stop_the_start(void **state)
 	assert_int_equal(waitpid(reader, NULL, 0), reader);
 }
 
-/* Verify a.rec again and again while it is written: each copy is whole. Returns the exit code. */
-static int verify_on(void)
+/*
+ * Verify a.rec again and again while it is written, and write a byte before each: each copy is
+ * whole. Returns the exit code.
+ */
+static int verify_on(int begins)
 {
 	for (int i = 0; i < 10; i++) {
 		struct incise_verify_report report;
 		struct incise_error err = {0};
-		int rc = incise_verify("a.rec", NULL, &report, &err);
+		int rc = write(begins, "", 1) != 1;
 
+		if (!rc)
+			rc = incise_verify("a.rec", NULL, &report, &err);
 		if (rc || !report.interrupted || !report.intact) {
 			print_error("verify %d: %d %s\n", i, rc, err.text);
 			return 1;
@@ -978,20 +986,25 @@ static void copies_of_it_are_whole(void **state)
 	struct incise_rig *rig = open_rig(SIM);
 	struct incise_recorder *rec = start_recorder("a.rec", rig);
 	struct incise_error err = {0};
+	int status, begins[2];
 	pid_t reader;
-	int status;
+	char begun;
 
 	assert_int_equal(poll_for(rec, rig, 200 * MS, &err), 0);
+	assert_int_equal(pipe(begins), 0);
 	reader = fork();
 	assert_true(reader >= 0);
-	if (!reader)
-		_exit(prctl(PR_SET_PDEATHSIG, SIGKILL) ? 2 : verify_on());
-	while (!waitpid(reader, &status, WNOHANG)) {
-		if (poll_for(rec, rig, 100 * MS, &err))
-			fail_msg("%s", err.text);
-		/* Much faster than any rig, but no faster than it can be copied. */
-		usleep(20000);
+	if (!reader) {
+		close(begins[0]);
+		_exit(prctl(PR_SET_PDEATHSIG, SIGKILL) ? 2 : verify_on(begins[1]));
 	}
+	close(begins[1]);
+	/* Five commits a copy: those of two do not spoil all of its 20 tries. */
+	while (read(begins[0], &begun, 1) == 1)
+		if (poll_for(rec, rig, 500 * MS, &err))
+			fail_msg("%s", err.text);
+	close(begins[0]);
+	assert_int_equal(waitpid(reader, &status, 0), reader);
 	assert_int_equal(status, 0);
 	if (incise_recorder_close(rec, &err))
 		fail_msg("%s", err.text);

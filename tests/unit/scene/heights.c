@@ -8,7 +8,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include "../../../lib/base/vector.h"
 #include "../../../lib/scene/heights.h"
 #include "../../../lib/surface/surface.h"
@@ -188,14 +187,6 @@ static void compare(const struct incise_surface *surface,
 	see(&seen->normal_rad, 2 * asin(v3_length(off) / 2));
 }
 
-static double now_s(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static void check(const char *name, struct incise_surface *surface, double reach,
 		  double wanted, double most_ratio)
 {
@@ -203,12 +194,10 @@ static void check(const char *name, struct incise_surface *surface, double reach
 	struct incise_fixed_grid grid;
 	struct incise_error err = {0};
 	struct seen seen = {0};
-	double start = now_s();
 	int rc = incise_heights_make(surface, up, 1, reach, wanted, &heights, &err);
 
 	if (rc)
 		fail_msg("%s: %s", name, err.text);
-	start = now_s() - start;
 	assert_int_equal(
 		incise_fixed_grid_open(
 			&grid, &heights.frame, heights.height,
@@ -218,15 +207,15 @@ static void check(const char *name, struct incise_surface *surface, double reach
 		compare(surface, &grid, fmin(1, heights.frame.reach / ONE),
 			heights.depth_bound_mm, &seen);
 	print_message(
-		"%s: %d x %d knots %.3g mm apart, %.2f s; reach %.2f of %.0f mm; %d places; depth "
+		"%s: %d x %d knots %.3g mm apart; reach %.2f of %.0f mm; %d places; depth "
 		"%.2g of %.2g mm (1:%.1f), point %.2g of %.2g mm (1:%.1f), normal %.2g of %.2g rad (1:%.1f)\n",
 		name, heights.frame.columns, heights.frame.rows,
-		ldexp(1 / ONE, heights.frame.cell_shift), start,
-		heights.frame.reach / ONE, reach, seen.places, seen.depth_mm,
-		heights.depth_bound_mm, heights.depth_bound_mm / seen.depth_mm,
-		seen.point_mm, heights.point_bound_mm,
-		heights.point_bound_mm / seen.point_mm, seen.normal_rad,
-		heights.normal_bound_rad, heights.normal_bound_rad / seen.normal_rad);
+		ldexp(1 / ONE, heights.frame.cell_shift), heights.frame.reach / ONE,
+		reach, seen.places, seen.depth_mm, heights.depth_bound_mm,
+		heights.depth_bound_mm / seen.depth_mm, seen.point_mm,
+		heights.point_bound_mm, heights.point_bound_mm / seen.point_mm,
+		seen.normal_rad, heights.normal_bound_rad,
+		heights.normal_bound_rad / seen.normal_rad);
 	assert_true(seen.places > PLACES / 100);
 	assert_true(seen.depth_mm <= heights.depth_bound_mm);
 	assert_true(seen.point_mm <= heights.point_bound_mm);

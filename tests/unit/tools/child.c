@@ -60,7 +60,7 @@ static void test_output_goes_to_its_descriptor(void **state)
 
 	assert_int_equal(pipe(to), 0);
 	pid = child_start(says, to[1], -1);
-	status = child_end(pid, 10);
+	status = child_end(pid, 60);
 	close(to[1]);
 	assert_int_equal(status, 0);
 	assert_int_equal(read(to[0], text, sizeof(text) - 1), 4);

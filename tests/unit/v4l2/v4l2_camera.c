@@ -14,7 +14,7 @@
 
 /* --- v4l2_camera --- */
 
-#define PATIENCE 20000 /* looks, about a millisecond apart when the thread waits */
+#define PATIENCE 60000 /* looks, about a millisecond apart when the thread waits */
 
 static struct incise_error err;
 
