@@ -17,9 +17,9 @@ $(O)/obj/tools/stepper/%.o $(O)/obj/tools/capture/%.o: cppflags += -Idriver
 $(O)/obj/tools/bench/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst ",,$(filter-out \
 	-ffile-prefix-map=% -fdebug-prefix-map=% -fmacro-prefix-map=%,$(CFLAGS))))"'
 
-# Frames that incise bench capture codes before it measures, and that incise serve decodes.
+# Frames that incise serve decodes.
 has_jpeg := $(shell $(CC) -E -x c -include stdio.h -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes)
-$(O)/obj/tools/bench/bench_capture.o $(O)/obj/tools/serve/pixels.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
+$(O)/obj/tools/serve/pixels.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
 
 # Reports as HTML.
 has_cmark := $(shell $(PKG_CONFIG) --exists libcmark-gfm && echo yes)
@@ -67,20 +67,8 @@ $(O)/lib/incise/peer_%.py: tools/bench/references/%.py
 	@mkdir -p $(@D)
 	$(Q)cp $< $@
 
-# Properties of the library under extreme inputs: incise bench extremes tries all cases, unit tests
-# some. They build without what only tests need.
-extremes := $(O)/obj/tests/extremes.a
-$(O)/obj/tests/extremes/%.o: test_cflags =
-$(extremes): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tests/extremes/*.c $(addprefix tools/cli/,cli.c complete.c f*.c output.c scene_argument.c state_folder.c)))
-	@rm -f $@
-	$(call step,AR)
-	$(Q)$(AR) rcs $@ $^
-
-# Benchmarks also measure parts that the shared objects do not export; the linker takes those
-# from the archive.
-$(filter $(O)/bin/incise-bench%,$(programs)): tool_inside = $(extremes) $(O)/lib/libincise-tests.a $(shell $(PKG_CONFIG) \
-	--libs $(foreach lib,$(libraries),$(pc_$(lib)))) -ldl -pthread
-$(filter $(O)/bin/incise-bench%,$(programs)): $(extremes) $(O)/lib/libincise-tests.a
+# The benchmarks simulate a device exactly, which the library itself has no use for.
+$(O)/bin/incise-bench: $(O)/obj/lib/control/plant.o
 tool_libs := $(patsubst %,-l%,$(libraries))
 tool_more_libs := $(if $(has_png),-lpng) $(if $(has_jpeg),-ljpeg) -lm
 $(O)/bin/incise-bench-all $(O)/bin/incise-assess: tool_more_libs += $(if $(has_cmark),$(shell $(PKG_CONFIG) --libs libcmark-gfm))
@@ -92,8 +80,8 @@ $(programs): $(O)/bin/%: $(O)/obj/tools/%.o $(tool_parts) $(foreach lib,$(librar
 	@mkdir -p $(@D)
 	$(call step,LD)
 	$(Q)$(CC) $(CFLAGS) $(LDFLAGS) -Wl,--as-needed $(call runpath,/../lib) \
-		-Wl,-rpath-link,$(O)/lib -L$(O)/lib -o $@ $< $(tool_parts) $(tool_libs) \
-		$(tool_inside) $(tool_more_libs) $(shell $(PKG_CONFIG) --libs jansson)
+		-Wl,-rpath-link,$(O)/lib -L$(O)/lib -o $@ $(filter %.o,$^) $(tool_parts) $(tool_libs) \
+		$(tool_more_libs) $(shell $(PKG_CONFIG) --libs jansson)
 
 # Scenes by name, as after installation.
 $(O)/share/incise/scenes:

@@ -95,8 +95,8 @@ sorted() {
 	complete_words incise bench loop --load ""
 	[ "${COMPREPLY[*]}" = "idle cpu memory disk view" ]
 	# lists: the item behind the last comma
-	complete_words incise bench all --only pose,stab
-	[ "${COMPREPLY[*]}" = pose,stability ]
+	complete_words incise bench all --only loop,stab
+	[ "${COMPREPLY[*]}" = loop,stability ]
 	# as bash takes "--policy=fi" apart
 	complete_words incise haptic neck --policy=fi
 	[ "${COMPREPLY[*]}" = fifo ]

@@ -122,11 +122,10 @@ struct bench_plot {
 	struct bench_data data, more;
 };
 
-extern const char text_extremes_gp[], text_integers_gp[], text_loop_rates_gp[],
-	text_loop_wakeups_gp[], text_pose_gp[], text_precision_gp[], text_scenes_gp[],
-	text_stability_guard_gp[], text_stability_integrators_gp[],
-	text_stability_map_gp[], text_stability_rest_gp[], text_timeline_gp[],
-	text_training_gp[], text_view_gp[], text_view_frames_gp[], text_vision_gp[];
+extern const char text_loop_wakeups_gp[], text_precision_gp[], text_scenes_gp[],
+	text_stability_integrators_gp[], text_stability_map_gp[],
+	text_stability_rest_gp[], text_training_gp[], text_view_gp[],
+	text_view_frames_gp[];
 
 struct bench_run;
 
@@ -139,9 +138,8 @@ struct bench {
 	struct bench_plot plots[5]; /* end with {0}; none: --plot is bad usage */
 };
 
-extern const struct bench bench_capture, bench_coverage, bench_extremes, bench_integers,
-	bench_loop, bench_pose, bench_precision, bench_prediction, bench_scenes,
-	bench_serve, bench_stability, bench_timeline, bench_training, bench_vision;
+extern const struct bench bench_loop, bench_precision, bench_scenes, bench_stability,
+	bench_training;
 
 /* --- a run --- */
 

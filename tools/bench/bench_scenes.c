@@ -15,7 +15,6 @@
 #include "../cli/mapped_libraries.h"
 #include "../cli/scene_argument.h"
 #include "../cli/stopwatch.h"
-#include "all_forces.h"
 #include "bench.h"
 #include "process_cost.h"
 #include "sheet.h"
@@ -102,6 +101,10 @@ static void add_shipped(struct scenes *s)
 	"radius_mm = 50.0; };\n"
 #define DOUBLE "arithmetic = \"double\";\n"
 #define REACTION "tissue = { reaction_N_mm = 0.14; };\n"
+#define FORCES                                                                  \
+	"tissue = { reaction_N_mm = 0.14; friction = 0.1; plane_N_mm = 0.17;\n" \
+	"  damping_N_s_mm = 0.0005; insertion_N_mm = 0.28; aligned = 0.2;\n"    \
+	"  spread_N_mm = 0.22; };\n"
 /*
  * All that is no force: the membrane lies below the sphere's top and the sheet's waves, and is so small
  * that the depth below these hardly changes round it, as for one that lies aslant the limit is lower.
@@ -132,17 +135,13 @@ static void add_made(struct scenes *s)
 {
 	for (int i = 0; i < N(made); i++) {
 		struct memory_file *file = cli_alloc(2, sizeof(*file));
-		char tissue[1000] = "";
 
 		file[0] = memory_file_begin(made[i].name);
-		if (made[i].all)
-			all_forces(tissue, sizeof(tissue), 1, NULL, "");
 		if (strchr(made[i].text, '%'))
 			file[1] = sheet_of_waves(100);
 		fprintf(file[0].file, made[i].text, file[1].path);
-		fputs(tissue, file[0].file);
 		if (made[i].all)
-			fputs(EFFECTS, file[0].file);
+			fputs(FORCES EFFECTS, file[0].file);
 		memory_file_written(&file[0]);
 		add(s, made[i].name, strlen(made[i].name), file[0].path)->kept =
 			made[i].kept;

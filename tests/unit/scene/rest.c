@@ -16,7 +16,7 @@
 #include <unistd.h>
 #include <incise/model.h>
 #include <incise/plan.h>
-#include "../../extremes/closed_loop.h"
+#include "../../../tools/bench/closed_loop.h"
 
 struct loop {
 	const char *tissue; /* of the scene, beside the model */

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench timeline: error of the times that late samples are given, over how much of the
+ * error of the times that late samples are given, over how much of the
  * stream was seen and over the cost.
  *
  *   window    ├───────────────────────────────────┤ 1 … 120 s, from the first sample on
@@ -10,9 +10,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include "../../lib/record/time/timeline.h"
-#include "bench.h"
-#include "../cli/stopwatch.h"
-#include "noise.h"
+#include "program.h"
+#include "../../tools/cli/stopwatch.h"
+#include "../../tools/bench/noise.h"
 
 static const double windows_s[] = {1, 2, 5, 10, 30, 60, 120};
 static const double drifts_ppm[] = {-200, 0, 200};
@@ -540,18 +540,9 @@ static void run(struct bench_run *run)
 		       "* {name}, {late}, {drift_ppm:%+g} ppm, {window_s} s");
 }
 
-const struct bench bench_timeline = {
+const struct bench bench_program = {
 	.name = "timeline",
 	.summary = "error of reconstructed timestamps over window and run\n"
 		   "time",
 	.run = run,
-	.plots = {{.script = text_timeline_gp,
-		   .width = 1000,
-		   .height = 640,
-		   .data = {&rows_table, "late,name", "drift_ppm=200"}},
-		  {.suffix = "windows",
-		   .script = text_timeline_gp,
-		   .width = 1000,
-		   .height = 660,
-		   .data = {&rows_table, "late,name", "drift_ppm=200"}}},
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench extremes: properties of the library under any input (tests/extremes), and walls of
+ * properties of the library under any input (tests/extremes), and walls of
  * 10 N/m to 1 GN/m: whether a scene with one is accepted, and what a device makes of it all the
  * same, behind the limit of force.
  *
@@ -14,10 +14,11 @@
 #include <incise/plan.h>
 #include "../../lib/control/plant.h"
 #include "../../lib/control/stability.h"
-#include "../../tests/extremes/extremes.h"
-#include "../cli/file.h"
-#include "../cli/scene_argument.h"
-#include "stability.h"
+#include "../extremes/extremes.h"
+#include "../../tools/cli/file.h"
+#include "../../tools/cli/scene_argument.h"
+#include "../../tools/bench/stability.h"
+#include "program.h"
 
 /* --- properties --- */
 
@@ -438,14 +439,10 @@ static void run_extremes(struct bench_run *run)
 	report_walls(run, walls, each);
 }
 
-const struct bench bench_extremes = {
+const struct bench bench_program = {
 	.name = "extremes",
 	.summary = "extreme numbers and corrupt bytes at each interface;\n"
 		   "walls of 10 N/m to 1 GN/m",
 	.takes_seed = true,
 	.run = run_extremes,
-	.plots = {{.script = text_extremes_gp,
-		   .width = 900,
-		   .height = 860,
-		   .data = {&stiff, "path"}}},
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench serve: the time from a pose to a client of incise serve, next to a bare socket, and
+ * the time from a pose to a client of incise serve, next to a bare socket, and
  * the wake-ups of the loop while eight clients receive.
  *
  *     pose at a source ─▶ incise serve ─ TCP ─▶ client here      latency: arrival - acquisition
@@ -20,11 +20,11 @@
 #include <unistd.h>
 #include <incise/igtl.h>
 #include <incise/state.h>
-#include "../cli/child.h"
-#include "../cli/folder.h"
-#include "bench.h"
-#include "harness.h"
-#include "wakeup.h"
+#include "../../tools/cli/child.h"
+#include "../../tools/cli/folder.h"
+#include "program.h"
+#include "../../tools/bench/harness.h"
+#include "../../tools/bench/wakeup.h"
 
 #define RATE_HZ 1000
 #define PERIOD_NS (1000000000LL / RATE_HZ)
@@ -505,7 +505,7 @@ static void run(struct bench_run *run)
 	bench_table(run, &wakes_table, wakes, N(wakes));
 }
 
-const struct bench bench_serve = {
+const struct bench bench_program = {
 	.name = "serve",
 	.summary = "time from a pose to a client of incise serve,\n"
 		   "and wake-up latency of the loop meanwhile",

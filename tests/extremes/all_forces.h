@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * The group `tissue` of a scene with every force that the library has, for benchmarks and
+ * The group `tissue` of a scene with every force that the library has, for
  * tests that exercise all of them.
  */
-#ifndef INCISE_BENCH_ALL_FORCES_H
-#define INCISE_BENCH_ALL_FORCES_H
+#ifndef INCISE_TEST_ALL_FORCES_H
+#define INCISE_TEST_ALL_FORCES_H
 
 #include <stdio.h>
 #include <string.h>

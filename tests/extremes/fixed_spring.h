@@ -1,13 +1,16 @@
-// SPDX-License-Identifier: LGPL-2.1-or-later
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Floating-point companions of lib/fixed/spring.c: take a spring from
- * double, and bound its error; see spring.h.
+ * What tests need of lib/fixed/spring.c in floating point: take a spring from double, and bound the
+ * error of its force.
  */
+#ifndef INCISE_TEST_FIXED_SPRING_H
+#define INCISE_TEST_FIXED_SPRING_H
+
 #include <errno.h>
 #include <math.h>
 #include <incise/fixed.h>
-#include "../fixed/spring.h"
-#include "../base/vector.h"
+#include "../../lib/fixed/spring.h"
+#include "../../lib/base/vector.h"
 
 /* Q16.16 ends a little above. */
 #define LARGEST 32767.0
@@ -18,8 +21,19 @@
 /* Tolerance of a direction's length 1. */
 #define UNIT 1e-6
 
-int incise_fixed_spring_set(struct incise_fixed_spring *spring, double stiffness_N_mm,
-			    const double anchor_mm[3], const double direction[3])
+/*
+ * Take a spring's numbers from double, each rounded to the nearest.
+ *
+ * @param stiffness_N_mm 0 … 32767
+ * @param anchor_mm      within ±32767
+ * @param direction      unit vector, within 1e-6; made one in full
+ * @return 0; -EINVAL (not finite, a stiffness below 0, not a unit vector), -ERANGE (more
+ *         than the format holds). @spring is left as it was then.
+ */
+static inline int incise_fixed_spring_set(struct incise_fixed_spring *spring,
+					  double stiffness_N_mm,
+					  const double anchor_mm[3],
+					  const double direction[3])
 {
 	struct incise_fixed_spring set;
 	double length = v3_length(direction);
@@ -62,7 +76,17 @@ int incise_fixed_spring_set(struct incise_fixed_spring *spring, double stiffness
  * Pushing only, x is min(x, 0) and x^ is min(x^, 0): they are no farther apart than
  * before, so that the same holds.
  */
-double incise_fixed_spring_bound(double stiffness_N_mm, double reach_mm)
+/*
+ * The certified error of either force: the length of its difference, as a vector, from
+ * the formula in real numbers, hence of each component too. It holds for every P with
+ * |P - P0| ≤ @reach_mm, every P0 and u that incise_fixed_spring_set() takes (u made a
+ * unit vector in full), and covers the rounding of P (to the nearest LSB), of P0, u and
+ * K, and of all steps, as long as the sum in force[] is not held.
+ *
+ * @return bound, N; HUGE_VAL where the spring may be held (more than 32767 N, or reach
+ *         beyond 16383 mm), or for what is no number.
+ */
+static inline double incise_fixed_spring_bound(double stiffness_N_mm, double reach_mm)
 {
 	const double h = 0x1p-17, m = 0x1p-31;
 	double stretch, force, bound;
@@ -79,3 +103,5 @@ double incise_fixed_spring_bound(double stiffness_N_mm, double reach_mm)
 	/* Double rounds too: here, in making u a unit vector, and in scaling by it. */
 	return bound * (1 + 1e-9) + stiffness_N_mm * reach_mm * 0x1p-48;
 }
+
+#endif

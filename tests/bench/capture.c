@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench capture: how much of a core a capture of all streams takes in real time, and the
+ * how much of a core a capture of all streams takes in real time, and the
  * same with parts left out; the cost of a part is the difference. Force and tracker are
  * simulated by the process that is measured, which is no part of a real capture: a run that
  * reads all and keeps nothing has that cost alone.
@@ -21,9 +21,9 @@
 #include <incise/rig.h>
 #include <incise/verify.h>
 #include <incise/vision.h>
-#include "bench.h"
-#include "../cli/folder.h"
-#include "../cli/stopwatch.h"
+#include "program.h"
+#include "../../tools/cli/folder.h"
+#include "../../tools/cli/stopwatch.h"
 #include "../../lib/record/seal_chain.h"
 #ifdef HAVE_JPEG
 #include <jpeglib.h>
@@ -587,7 +587,7 @@ static void run(struct bench_run *run)
 				 done[i].name, 100 * done[i].held_up);
 }
 
-const struct bench bench_capture = {
+const struct bench bench_program = {
 	.name = "capture",
 	.operands = "[RUN]",
 	.summary = "processor load of a capture of all streams",

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench coverage: whether the stated uncertainties hold the truth. Virtual rigs with random
+ * whether the stated uncertainties hold the truth. Virtual rigs with random
  * truth are each calibrated by the library's own functions, and record a cut; the errors of the
  * exported rows are compared with their intervals.
  *
@@ -25,8 +25,8 @@
 #include "../../lib/base/random.h"
 #include "../../lib/base/vector.h"
 #include "../../lib/sim/sim.h"
-#include "../cli/folder.h"
-#include "bench.h"
+#include "../../tools/cli/folder.h"
+#include "program.h"
 
 #define RIGS 200
 #define QUICK_RIGS 9
@@ -867,7 +867,7 @@ static void run(struct bench_run *run)
 		       "* {name}, {form}, {part}");
 }
 
-const struct bench bench_coverage = {
+const struct bench bench_program = {
 	.name = "coverage",
 	.summary = "whether stated uncertainties hold the truth, on virtual\n"
 		   "rigs that are calibrated anew",

@@ -10,8 +10,8 @@
  *
  * Tissue is the plane z = 0; ticks are of 1 kHz.
  */
-#ifndef INCISE_TEST_CLOSED_LOOP_H
-#define INCISE_TEST_CLOSED_LOOP_H
+#ifndef INCISE_CLOSED_LOOP_H
+#define INCISE_CLOSED_LOOP_H
 
 #include <stdbool.h>
 #include <incise/plan.h>

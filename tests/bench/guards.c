@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench stability: what a guard behind the tissue's forces would add. The stages of the
+ * guards: what a guard behind the tissue's forces would add. The stages of the
  * real plan in a closed loop with a late tracker and a late actuator, at gains that plans accept
  * and above, with each guard and with none.
  *
@@ -27,8 +27,9 @@
 #include "../../lib/control/plant.h"
 #include "../../lib/control/pose_loop.h"
 #include "../../lib/scene/rest.h"
-#include "../cli/scene_argument.h"
-#include "stability.h"
+#include "../../tools/cli/scene_argument.h"
+#include "../../tools/bench/stability.h"
+#include "program.h"
 
 enum guard { NONE, PASSIVITY, DELAYED, ENERGY_BOUNDING, COUPLING, GUARDS };
 static const char *const guard_names[GUARDS] = {"none", "passivity", "delayed",
@@ -342,7 +343,7 @@ static const struct bench_table cost_table = {
 	.metrics = {METRIC(TIME, cost, time, "ns", "tick with guard {guard}")},
 };
 
-const struct bench_table stability_guard_table = {
+static const struct bench_table guard_table = {
 	.key = "guards",
 	.row_bytes = sizeof(struct row),
 	.columns = {COLUMN(row, "guard", guard, "%-16s", "controller"),
@@ -703,7 +704,7 @@ static void judge(struct bench_run *run)
 		run,
 		"passivity controllers in the real plan with delayed tracker and actuator; gain "
 		"relative to the largest accepted one, - is the scene's own\n");
-	bench_table(run, &stability_guard_table, rows, N(rows));
+	bench_table(run, &guard_table, rows, N(rows));
 	bench_text(
 		run,
 		"stiffest cut at rest under every hand force, with a force error of at most %g %%\n",
@@ -722,7 +723,7 @@ static void judge(struct bench_run *run)
 	}
 }
 
-void stability_guard(struct bench_run *run)
+static void run_guards(struct bench_run *run)
 {
 	bool quick = run->quick;
 
@@ -735,3 +736,9 @@ void stability_guard(struct bench_run *run)
 	cli_progress_end();
 	judge(run);
 }
+
+const struct bench bench_program = {
+	.name = "guards",
+	.summary = "passivity controllers in the real plan, with delays",
+	.run = run_guards,
+};

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench vision: error of the exposed length against run time per frame. Frames whose
+ * error of the exposed length against run time per frame. Frames whose
  * truth is known, of VGA's size and others, are measured one after the other on one core;
  * with a region of interest that follows, and with each frame searched as a whole.
  */
 #include <stdio.h>
 #include <stdlib.h>
 #include <incise/vision.h>
-#include "bench.h"
-#include "../cli/stopwatch.h"
-#include "../../tests/vision/scalpel_picture.h"
+#include "program.h"
+#include "../../tools/cli/stopwatch.h"
+#include "../vision/scalpel_picture.h"
 
 #define FRAMES 40
 #define ROUNDS 10
@@ -240,12 +240,8 @@ static void run(struct bench_run *run)
 	bench_table(run, &rows_table, rows, N(kinds) * REGIONS);
 }
 
-const struct bench bench_vision = {
+const struct bench bench_program = {
 	.name = "vision",
 	.summary = "error of the exposed length over the time per frame",
 	.run = run,
-	.plots = {{.script = text_vision_gp,
-		   .width = 1000,
-		   .height = 720,
-		   .data = {&rows_table, "region", "failed="}}},
 };

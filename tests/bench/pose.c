@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench pose: error of the pose that the loop is given, over the tracker's rate and
+ * error of the pose that the loop is given, over the tracker's rate and
  * delay and over its cost.
  *
  *   true      ────────────────────────────────────────
@@ -17,9 +17,9 @@
 #include <incise/tracker.h>
 #include "../../lib/base/vector.h"
 #include "../../lib/control/predict.h"
-#include "bench.h"
-#include "../cli/stopwatch.h"
-#include "noise.h"
+#include "program.h"
+#include "../../tools/cli/stopwatch.h"
+#include "../../tools/bench/noise.h"
 
 #define TICKS 16000
 #define QUICK_TICKS 3500
@@ -858,17 +858,8 @@ static void run(struct bench_run *run)
 	report(run, repeats, c.ticks);
 }
 
-const struct bench bench_pose = {
+const struct bench bench_program = {
 	.name = "pose",
 	.summary = "error of the predicted pose over tracker rate and delay",
 	.run = run,
-	.plots = {{.script = text_pose_gp,
-		   .width = 1000,
-		   .height = 800,
-		   .data = {&rows_table, "panel,name", "delay_ms=4"}},
-		  {.suffix = "rates",
-		   .script = text_pose_gp,
-		   .width = 1000,
-		   .height = 800,
-		   .data = {&rows_table, "panel,name", "delay_ms=4"}}},
 };

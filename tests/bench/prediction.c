@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench prediction: how often the 95 % interval of a model holds new cuts on new rigs. Rigs
+ * how often the 95 % interval of a model holds new cuts on new rigs. Rigs
  * are virtual: each has its own errors of calibration, drawn from what it states, and measures the
  * force of the simulated tissue, which differs from cut to cut.
  *
@@ -14,8 +14,8 @@
 #include <string.h>
 #include <incise/corpus.h>
 #include <incise/sim.h>
-#include "bench.h"
-#include "noise.h"
+#include "program.h"
+#include "../../tools/bench/noise.h"
 
 #define CUTS 12	   /* of a rig */
 #define ROWS 40	   /* of a cut */
@@ -344,7 +344,7 @@ static void run_prediction(struct bench_run *run)
 				   rows[i].rigs, rows[i].covered_percent);
 }
 
-const struct bench bench_prediction = {
+const struct bench bench_program = {
 	.name = "prediction",
 	.summary = "95 % interval of a model: share of new cuts on new rigs",
 	.run = run_prediction,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench stability: work that the tissue of the shipped scenes gives back over closed motions.
+ * work: work that the tissue of the shipped scenes gives back over closed motions.
  * A hand goes a random way in and above the tissue and back to where it began, in the air:
  *
  *     ┌──●──╮          taken = -∮ F·dx, from tick to tick by the trapezoid rule
@@ -16,8 +16,8 @@
 #include <incise/plan.h>
 #include "../../lib/base/random.h"
 #include "../../lib/base/vector.h"
-#include "../cli/scene_argument.h"
-#include "stability.h"
+#include "../../tools/cli/scene_argument.h"
+#include "program.h"
 
 #define MOTIONS 10000
 #define QUICK_MOTIONS 300
@@ -271,7 +271,7 @@ static void add(const char *path, const struct tool *tool, bool quick)
 	incise_scene_free(scene);
 }
 
-void stability_work(struct bench_run *run)
+static void run_work(struct bench_run *run)
 {
 	double returned = 0;
 	glob_t found;
@@ -294,3 +294,9 @@ void stability_work(struct bench_run *run)
 		bench_fail(run, "work: %.0f closed paths returned work: please report it",
 			   returned);
 }
+
+const struct bench bench_program = {
+	.name = "work",
+	.summary = "work that the shipped scenes give back over closed motions",
+	.run = run_work,
+};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench integers: the plan in integers, which the kernel runs, against the same plan in double:
+ * the plan in integers, which the kernel runs, against the same plan in double:
  * time of a tick, and how far their forces are from each other over time, next to the certified bound.
  *
  * Both walk along the same varied strokes (trajectory.h). Where one of them is in another phase, with
@@ -13,10 +13,10 @@
 #include <string.h>
 #include <incise/plan.h>
 #include "../../lib/base/vector.h"
-#include "../cli/scene_argument.h"
-#include "bench.h"
-#include "harness.h"
-#include "trajectory.h"
+#include "../../tools/cli/scene_argument.h"
+#include "program.h"
+#include "../../tools/bench/harness.h"
+#include "../../tools/bench/trajectory.h"
 
 #define SCENES_MAX 16
 #define WINDOW_S 1.0
@@ -302,14 +302,10 @@ static void run_integers(struct bench_run *run)
 	}
 }
 
-const struct bench bench_integers = {
+const struct bench bench_program = {
 	.name = "integers",
 	.operands = "[SCENE...]",
 	.summary = "fixed-point plan of the kernel compared with double",
 	.n_operands = SCENES_MAX,
 	.run = run_integers,
-	.plots = {{.script = text_integers_gp,
-		   .width = 900,
-		   .height = 500,
-		   .data = {&bench_points, "block"}}},
 };
