@@ -21,10 +21,6 @@ $(O)/obj/tools/bench/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst "
 has_jpeg := $(shell $(CC) -E -x c -include stdio.h -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes)
 $(O)/obj/tools/serve/pixels.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
 
-# Reports as HTML.
-has_cmark := $(shell $(PKG_CONFIG) --exists libcmark-gfm && echo yes)
-$(O)/obj/tools/cli/document.o: cppflags += $(if $(has_cmark),-DHAVE_CMARK)
-
 # Image files: those that depth is calibrated from, and frames of a view.
 has_png := $(shell $(CC) -E -x c -include png.h /dev/null >/dev/null 2>&1 && echo yes)
 $(O)/obj/tools/cli/image.o: cppflags += $(if $(has_png),-DHAVE_PNG)
@@ -32,13 +28,13 @@ $(O)/obj/tools/cli/image.o: cppflags += $(if $(has_png),-DHAVE_PNG)
 # The parts of all programs. The linker takes of them, and of the libraries, what a program
 # uses: a new part, command or benchmark is found by its place.
 tool_parts := $(O)/obj/tools/parts.a
-tool_texts := $(wildcard tools/bench/*.md tools/cli/*.css tools/cli/*.gp tools/bench/plots/*.gp)
+tool_texts := $(wildcard tools/cli/*.gp tools/bench/plots/*.gp)
 $(tool_parts): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tools/*/*.c)) $(tool_texts:%=$(O)/obj/%.o)
 	@rm -f $@
 	$(call step,AR)
 	$(Q)$(AR) rcs $@ $^
 
-# A text that reports are made of: report.md becomes the string text_report_md.
+# A script of gnuplot: scenes.gp becomes the string text_scenes_gp.
 $(tool_texts:%=$(O)/obj/%.o): $(O)/obj/%.o: %
 	@mkdir -p $(@D)
 	$(call step,CC)
@@ -71,7 +67,6 @@ $(O)/lib/incise/peer_%.py: tools/bench/references/%.py
 $(O)/bin/incise-bench: $(O)/obj/lib/control/plant.o
 tool_libs := $(patsubst %,-l%,$(libraries))
 tool_more_libs := $(if $(has_png),-lpng) $(if $(has_jpeg),-ljpeg) -lm
-$(O)/bin/incise-bench-all $(O)/bin/incise-assess: tool_more_libs += $(if $(has_cmark),$(shell $(PKG_CONFIG) --libs libcmark-gfm))
 
 # SHA-256 and time-stamps.
 $(O)/bin/incise-sign $(O)/bin/incise-verify: tool_more_libs += $(shell $(PKG_CONFIG) --libs libcrypto)
@@ -83,12 +78,14 @@ $(programs): $(O)/bin/%: $(O)/obj/tools/%.o $(tool_parts) $(foreach lib,$(librar
 		-Wl,-rpath-link,$(O)/lib -L$(O)/lib -o $@ $(filter %.o,$^) $(tool_parts) $(tool_libs) \
 		$(tool_more_libs) $(shell $(PKG_CONFIG) --libs jansson)
 
-# Scenes by name, as after installation.
-$(O)/share/incise/scenes:
+# Scenes by name, and the script of reports, as after installation.
+$(O)/share/incise/scenes: shared = scenes
+$(O)/share/incise/report: shared = tools/report
+$(O)/share/incise/scenes $(O)/share/incise/report:
 	@mkdir -p $(@D)
-	$(Q)ln -s $(abspath scenes) $@
+	$(Q)ln -s $(abspath $(shared)) $@
 
-tools: $(programs) $(peer) | $(O)/share/incise/scenes
+tools: $(programs) $(peer) | $(O)/share/incise/scenes $(O)/share/incise/report
 
 DEMO ?= demo.out
 
