@@ -486,19 +486,17 @@ static double seal_percent(void)
 static const struct bench_table rows_table = {
 	.key = "rows",
 	.row_bytes = sizeof(struct row),
-	.columns = {COLUMN(row, "name", name, "%-15s", "run"),
-		    COLUMN(row, "cpu_percent", cpu_percent, "%6.2f", "CPU %"),
-		    COLUMN(row, "net_percent", net_percent, "%6.2f", "net %"),
-		    COLUMN(row, "force", stats.force, "%9.0f", "force"),
-		    COLUMN(row, "force_lost", stats.force_lost, "%5.0f", "lost"),
-		    COLUMN(row, "tracker", stats.tracker, "%8.0f", "tracker"),
-		    COLUMN(row, "tracker_lost", stats.tracker_lost, "%5.0f", "lost"),
-		    COLUMN(row, "frames", stats.frames, "%7.0f", "frames"),
-		    COLUMN(row, "frames_lost", stats.frames_lost, "%5.0f", "lost"),
-		    COLUMN(row, "late_ms", late_ms, "%8.1f", "late ms"),
-		    COLUMN(row, "quarter_MB", rss_MB[0], "%7.1f", "MB 1/4"),
-		    COLUMN(row, "end_MB", rss_MB[1], "%7.1f", "MB end"),
-		    COLUMN(row, "verify_MB_s", verify_MB_s, "%6.0f", "MB/s"),
+	.columns = {COLUMN(row, "name", name), COLUMN(row, "cpu_percent", cpu_percent),
+		    COLUMN(row, "net_percent", net_percent),
+		    COLUMN(row, "force", stats.force),
+		    COLUMN(row, "force_lost", stats.force_lost),
+		    COLUMN(row, "tracker", stats.tracker),
+		    COLUMN(row, "tracker_lost", stats.tracker_lost),
+		    COLUMN(row, "frames", stats.frames),
+		    COLUMN(row, "frames_lost", stats.frames_lost),
+		    COLUMN(row, "late_ms", late_ms), COLUMN(row, "quarter_MB", rss_MB[0]),
+		    COLUMN(row, "end_MB", rss_MB[1]),
+		    COLUMN(row, "verify_MB_s", verify_MB_s),
 		    COLUMN(row, "failed", failed)},
 	.metrics = {METRIC(MEASURED, row, cpu, "%", "{name} processor"),
 		    METRIC(MEASURED, row, memory, "MB", "{name} memory")},
@@ -534,29 +532,13 @@ static void report(struct bench_run *run, const struct row *rows, int n, double 
 {
 	const struct incise_camera_info *info = &rows->camera_info;
 	const double percent = seal_percent();
-	double bytes = 0;
 
-	for (int i = 0; i < FRAMES; i++)
-		bytes += (double)camera.frame[i].size;
 	bench_values(run, "{sf sf sf sf si si sI sf}", "seconds", seconds, "force_hz",
 		     rows->force_info.rate_hz, "tracker_hz", rows->tracker_info.rate_hz,
 		     "camera_hz", info->rate_hz, "width", info->width, "height",
 		     info->height, "unlooked", (json_int_t)rows->stats.frames_unlooked,
 		     "seal_percent", percent);
-	bench_text(run,
-		   "%s\nforce %.0f Hz, tracker %.0f Hz, camera %d x %d at %.0f Hz, JPEG "
-		   "of %.0f kB; %.2g s each, in real time\n",
-		   bench_machine(run, "cpu"), rows->force_info.rate_hz,
-		   rows->tracker_info.rate_hz, info->width, info->height, info->rate_hz,
-		   bytes / FRAMES / 1e3, seconds);
-	bench_table(run, &rows_table, rows, n);
-	bench_text(run,
-		   "net: without the load of the simulation, as in the runs "
-		   "virtual_*\n"
-		   "MB/s: verify, by its processor time\n"
-		   "seal of all streams, part of the load: %.2f %% of a core\n"
-		   "frames that vision skipped for lack of time: %llu\n",
-		   percent, (unsigned long long)rows->stats.frames_unlooked);
+	bench_rows(run, &rows_table, rows, n);
 }
 
 static void run(struct bench_run *run)
@@ -569,7 +551,7 @@ static void run(struct bench_run *run)
 	while (only && n < N(parts) && strcmp(only, parts[n].name))
 		n++;
 	if (n == N(parts))
-		cli_usage("'%s' is no run of capture; see incise-bench-capture(1)", only);
+		cli_usage("'%s' is no run of capture", only);
 	if (run->seconds > 0)
 		seconds = run->seconds;
 	/* Coding frames takes a second where others are busy. */

@@ -739,12 +739,11 @@ static struct correlation_row {
 static const struct bench_table coverage_table = {
 	.key = "rows",
 	.row_bytes = sizeof(struct coverage_row),
-	.columns = {COLUMN(coverage_row, "name", name, "%-10s", "quantity"),
-		    COLUMN(coverage_row, "form", form, "%-10s", "rows"),
-		    COLUMN(coverage_row, "part", part, "%-8s", "part"),
-		    COLUMN(coverage_row, "coverage", coverage, "%9.2f %%", "held",
-			   .text_scale = 100),
-		    COLUMN(coverage_row, "sd", sd, "%6.2f %%", "sd", .text_scale = 100),
+	.columns = {COLUMN(coverage_row, "name", name),
+		    COLUMN(coverage_row, "form", form),
+		    COLUMN(coverage_row, "part", part),
+		    COLUMN(coverage_row, "coverage", coverage),
+		    COLUMN(coverage_row, "sd", sd),
 		    COLUMN(coverage_row, "failed", failed, .optional = true)},
 	.metrics = {METRIC(EXACT, coverage_row, coverage, "1",
 			   "{name}, {form}, {part}: held")},
@@ -753,18 +752,17 @@ static const struct bench_table coverage_table = {
 static const struct bench_table source_table = {
 	.key = "sources",
 	.row_bytes = sizeof(struct source_row),
-	.columns = {COLUMN(source_row, "name", name, "%-10s", "source"),
-		    COLUMN(source_row, "coverage", coverage, "%9.2f %%", "held",
-			   .text_scale = 100),
-		    COLUMN(source_row, "rms", rms, "%8.3f", "rms error/u")},
+	.columns = {COLUMN(source_row, "name", name),
+		    COLUMN(source_row, "coverage", coverage),
+		    COLUMN(source_row, "rms", rms)},
 };
 
 static const struct bench_table correlation_table = {
 	.key = "correlations",
 	.row_bytes = sizeof(struct correlation_row),
-	.columns = {COLUMN(correlation_row, "name", name, "%-10s", "quantity"),
-		    COLUMN(correlation_row, "measured", measured, "%9.4f", "measured"),
-		    COLUMN(correlation_row, "stated", stated, "%9.4f", "stated")},
+	.columns = {COLUMN(correlation_row, "name", name),
+		    COLUMN(correlation_row, "measured", measured),
+		    COLUMN(correlation_row, "stated", stated)},
 };
 
 static double sd_of(const struct tally *tally, int rigs)
@@ -849,22 +847,9 @@ static void run(struct bench_run *run)
 	fill_rows();
 	bench_values(run, "{si si sI sf}", "rigs", totals.rigs, "refused", totals.refused,
 		     "seed", (json_int_t)seed, "k", K);
-	bench_text(
-		run,
-		"%d rigs with random truth, calibrated and recorded; truth within ±%g u\n",
-		totals.rigs, K);
-	if (totals.refused)
-		bench_text(run, "%d more were refused, the last one: %s\n",
-			   totals.refused, why);
-	bench_text(run, "\nRows whose truth is held\n");
-	bench_table(run, &coverage_table, coverage_rows, N(coverage_rows));
-	bench_text(run, "\nErrors of calibrations that are held\n");
-	bench_table(run, &source_table, source_rows, N(source_rows));
-	bench_text(run,
-		   "\nCorrelation of the errors of two rows, half a recording apart\n");
-	bench_table(run, &correlation_table, correlation_rows, N(correlation_rows));
-	bench_failures(run, &coverage_table, coverage_rows, N(coverage_rows),
-		       "* {name}, {form}, {part}");
+	bench_rows(run, &coverage_table, coverage_rows, N(coverage_rows));
+	bench_rows(run, &source_table, source_rows, N(source_rows));
+	bench_rows(run, &correlation_table, correlation_rows, N(correlation_rows));
 }
 
 const struct bench bench_program = {

@@ -60,24 +60,6 @@ static int try_all(const struct extremes_setup *setup, struct extremes_row *rows
 	return n;
 }
 
-/* Text within a column, broken between words. */
-static void print_what(const struct bench_run *run, const char *what)
-{
-	const int width = 96;
-
-	while (*what) {
-		int n = (int)strlen(what);
-
-		if (n > width)
-			for (n = width; n > 1 && what[n] != ' ';)
-				n--;
-		bench_text(run, "    %.*s\n", n, what);
-		what += n;
-		while (*what == ' ')
-			what++;
-	}
-}
-
 static void report_properties(struct bench_run *run, const struct extremes_row *rows,
 			      int n)
 {
@@ -85,23 +67,15 @@ static void report_properties(struct bench_run *run, const struct extremes_row *
 	long wrong = 0;
 
 	bench_rows(run, &properties, rows, n);
-	bench_text(run, "%-20s %10s %10s %10s %8s\n", "cases", "tried", "held", "refused",
-		   "wrong");
 	for (int i = 0; i < n; i++) {
 		const struct extremes_row *r = &rows[i];
 
 		metrics_add(run->metrics, METRIC_EXACT, &(double){(double)r->wrong},
 			    "cases", "%s wrong", r->name);
-		bench_text(run, "%-20s %10ld %10ld %10ld %8ld\n", r->name, r->tried,
-			   r->held, r->refused, r->wrong);
-		print_what(run, r->what);
-		if (*r->failed)
-			bench_text(run, "    WRONG: %s\n", r->failed);
 		wrong += r->wrong;
 		if (r->wrong && !first)
 			first = r->name;
 	}
-	bench_text(run, "\n");
 	if (wrong)
 		bench_fail(run,
 			   "%ld cases are wrong, the first in %s: a fault of "
@@ -370,38 +344,8 @@ static const struct bench_table stiff = {
 			   "{path}, {K_N_m:%.4g} N/m, largest", "largest_mm!=nan")},
 };
 
-#define PRESSED_TEXT " %-9s %8s %9s %9s"
-
-/* Each stiffness is a line. */
-static void print_path(const struct bench_run *run, const char *title,
-		       const struct wall *walls, int n)
-{
-	bench_text(run, "%s\n%10s %-9s", title, "K_N_m", "");
-	bench_text(run, PRESSED_TEXT, "", "largest", "largest", "at last");
-	bench_text(run, "\n%10s %-9s", "", "");
-	bench_text(run, PRESSED_TEXT, "", "N", "mm", "mm");
-	for (const struct wall *w = walls; w < walls + n; w++) {
-		bench_text(run, "\n%10.4g %-9s", w->K_N_mm * 1e3,
-			   w->accepted ? "accepted" : "refused");
-		if (!isnan(w->largest_mm))
-			bench_text(run, " %-9s %8.3g %9.3g %9.2g",
-				   w->bounded ? "bounded" : "GROWS", w->largest_N,
-				   w->largest_mm, w->late_mm);
-		else
-			bench_text(run, PRESSED_TEXT, "not run", "-", "-", "-");
-	}
-	bench_text(run, "\n");
-	for (int k = 0; k < n; k++)
-		if (*walls[k].failed)
-			bench_text(run, "%.4g N/m: %s\n", walls[k].K_N_mm * 1e3,
-				   walls[k].failed);
-}
-
 static void report_walls(struct bench_run *run, struct wall *walls, int each)
 {
-	static const char *const titles[PATHS] = {
-		"whole plan, tracker of 120 Hz with 4.2 ms delay",
-		"wall alone, exact position at each tick"};
 	int missed = 0;
 
 	for (int i = 0; i < PATHS * each; i++) {
@@ -410,14 +354,6 @@ static void report_walls(struct bench_run *run, struct wall *walls, int each)
 			walls[i].bounded_json = json_boolean(walls[i].bounded);
 	}
 	bench_rows(run, &stiff, walls, PATHS * each);
-	bench_text(run,
-		   "stiff walls: 50 g and 0.01 N s/mm, pressed by 1 N, fall 1 mm onto a "
-		   "wall at 1 kHz; force limited to 4 N; 12 s\n");
-	for (int path = 0; path < PATHS; path++)
-		print_path(run, titles[path], walls + path * each, each);
-	for (int i = 0; i < PATHS * each; i += each)
-		bench_text(run, "limit by theory, %s: %.4g N/m\n", walls[i].path,
-			   walls[i].limit_N_mm * 1e3);
 	if (missed)
 		bench_fail(run, "%d walls contradict theory: see 'failed'", missed);
 }
@@ -434,7 +370,6 @@ static void run_extremes(struct bench_run *run)
 	if (cli_stop)
 		cli_fail("interrupted");
 	bench_value(run, "seed", json_integer((json_int_t)setup.seed));
-	bench_text(run, "seed %llu\n", (unsigned long long)setup.seed);
 	report_properties(run, rows, n);
 	report_walls(run, walls, each);
 }

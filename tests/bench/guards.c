@@ -338,35 +338,30 @@ static struct cost costs[GUARDS];
 static const struct bench_table cost_table = {
 	.key = "guards_ns",
 	.row_bytes = sizeof(struct cost),
-	.columns = {COLUMN(cost, "guard", guard, "%-16s", "controller"),
-		    COLUMN(cost, "ns", time.ns.median, "%8.1f", "ns/tick")},
+	.columns = {COLUMN(cost, "guard", guard), COLUMN(cost, "ns", time.ns.median)},
 	.metrics = {METRIC(TIME, cost, time, "ns", "tick with guard {guard}")},
 };
 
 static const struct bench_table guard_table = {
 	.key = "guards",
 	.row_bytes = sizeof(struct row),
-	.columns = {COLUMN(row, "guard", guard, "%-16s", "controller"),
-		    COLUMN(row, "gain", gain, "%6.2f", "gain"), COLUMN(row, "own", own),
-		    COLUMN(row, "cases", cases, "%7.0f", "cases"),
-		    COLUMN(row, "rests", rests, "%7.0f", "rest"),
-		    COLUMN(row, "rest_share", rest_share, "%7.3f", "share"),
-		    COLUMN(row, "swing_mm", swing_mm, "%10.3g", "osc., mm"),
-		    COLUMN(row, "force_N", force_N, "%9.4f", "force, N"),
-		    COLUMN(row, "error_N", error_N, "%9.4f", "error, N"),
-		    COLUMN(row, "error_share", error_share, "%7.3f", "of it")},
+	.columns = {COLUMN(row, "guard", guard), COLUMN(row, "gain", gain),
+		    COLUMN(row, "own", own), COLUMN(row, "cases", cases),
+		    COLUMN(row, "rests", rests), COLUMN(row, "rest_share", rest_share),
+		    COLUMN(row, "swing_mm", swing_mm), COLUMN(row, "force_N", force_N),
+		    COLUMN(row, "error_N", error_N),
+		    COLUMN(row, "error_share", error_share)},
 };
 
 static const struct bench_table stiffest_table = {
 	.key = "guards_stiffest",
 	.row_bytes = sizeof(struct stiffest),
-	.columns = {COLUMN(stiffest, "guard", guard, "%-16s", "controller"),
-		    COLUMN(stiffest, "scene", scene, " %-12s", " scene"),
-		    COLUMN(stiffest, "setups", setups, "%7.0f", "setups"),
-		    COLUMN(stiffest, "felt_N_mm", felt_N_mm, "%8.4f", "N/mm"),
-		    COLUMN(stiffest, "of_none", of_none, "%8.3f", "of none"),
-		    COLUMN(stiffest, "stiffer", stiffer, "%8.0f", "stiffer"),
-		    COLUMN(stiffest, "softer", softer, "%8.0f", "softer")},
+	.columns = {COLUMN(stiffest, "guard", guard), COLUMN(stiffest, "scene", scene),
+		    COLUMN(stiffest, "setups", setups),
+		    COLUMN(stiffest, "felt_N_mm", felt_N_mm),
+		    COLUMN(stiffest, "of_none", of_none),
+		    COLUMN(stiffest, "stiffer", stiffer),
+		    COLUMN(stiffest, "softer", softer)},
 };
 
 /* A scene on a device, with a tracker and an actuator. */
@@ -700,18 +695,9 @@ static void judge(struct bench_run *run)
 	bench_value(run, "guards_verdict", json_string(verdict));
 	bench_value(run, "guards_winner",
 		    json_string(most > wins ? best : guard_names[NONE]));
-	bench_text(
-		run,
-		"passivity controllers in the real plan with delayed tracker and actuator; gain "
-		"relative to the largest accepted one, - is the scene's own\n");
-	bench_table(run, &guard_table, rows, N(rows));
-	bench_text(
-		run,
-		"stiffest cut at rest under every hand force, with a force error of at most %g %%\n",
-		100 * FORCE_NOTICED);
-	bench_table(run, &stiffest_table, stiffests, N(stiffests));
-	bench_table(run, &cost_table, costs, GUARDS);
-	bench_text(run, "%s\n\n", verdict);
+	bench_rows(run, &guard_table, rows, N(rows));
+	bench_rows(run, &stiffest_table, stiffests, N(stiffests));
+	bench_rows(run, &cost_table, costs, GUARDS);
 	for (enum guard kind = NONE; kind < GUARDS; kind++) {
 		double rests = 0;
 

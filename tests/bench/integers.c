@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * the plan in integers, which the kernel runs, against the same plan in double:
- * time of a tick, and how far their forces are from each other over time, next to the certified bound.
+ * time of a tick, and how far their forces are from each other, next to the certified bound.
  *
  * Both walk along the same varied strokes (trajectory.h). Where one of them is in another phase, with
  * another tool, or on the other side of a flag than the other, as at the tick at which a contact
@@ -19,7 +19,6 @@
 #include "../../tools/bench/trajectory.h"
 
 #define SCENES_MAX 16
-#define WINDOW_S 1.0
 
 /* A hand's reach around where a contact began, mm: as incise compile certifies. */
 #define REACH_MM 20
@@ -47,9 +46,6 @@ struct row {
 struct rows {
 	struct row row[SCENES_MAX];
 	int n;
-	struct bench_point
-		*point; /* of the plot: the largest difference of each window */
-	int points, room;
 };
 
 static bool open_plan(struct row *row, int i, struct incise_error *err)
@@ -107,21 +103,6 @@ static bool decide_alike(const struct incise_tick *a, const struct incise_tick *
 		v3_dot(a->normal, b->normal) > SAME_SIDE);
 }
 
-static void add_point(struct rows *all, const struct row *row, double t_s, double mN)
-{
-	struct bench_point *point;
-
-	if (all->points == all->room) {
-		all->room = 2 * all->room + 256;
-		all->point = realloc(all->point, (size_t)all->room * sizeof(*all->point));
-		if (!all->point)
-			cli_fail("no memory");
-	}
-	point = &all->point[all->points++];
-	*point = (struct bench_point){.x = t_s, .y = mN, .z = row->bound_mN};
-	snprintf(point->block, sizeof(point->block), "%.40s", row->name);
-}
-
 /* Rest of a difference that a decision made, as part of the bound. */
 #define ALIKE 0.1
 
@@ -131,7 +112,6 @@ static void add_point(struct rows *all, const struct row *row, double t_s, doubl
  */
 struct judge {
 	bool apart;
-	double window_mN;
 };
 
 static void compare_tick(struct row *row, struct judge *judge,
@@ -154,14 +134,11 @@ static void compare_tick(struct row *row, struct judge *judge,
 	}
 	row->sum2 += mN * mN;
 	row->most_mN = fmax(row->most_mN, mN);
-	judge->window_mN = fmax(judge->window_mN, mN);
 }
 
-static void compare(struct rows *all, struct row *row, long ticks)
+static void compare(struct row *row, long ticks)
 {
 	long each = row->timed.ticks / row->timed.strokes;
-	double rate_hz = incise_scene_rate_hz(row->scene[0]);
-	long window = lrint(WINDOW_S * rate_hz);
 	struct trajectory trajectory;
 	struct judge judge = {0};
 
@@ -177,10 +154,6 @@ static void compare(struct rows *all, struct row *row, long ticks)
 			incise_plan_tick(row->plan[i], walk_feed(&row->walk[i]),
 					 &tick[i]);
 		compare_tick(row, &judge, &tick[0], &tick[1]);
-		if (k % window == window - 1) {
-			add_point(all, row, (double)(k + 1) / rate_hz, judge.window_mN);
-			judge.window_mN = 0;
-		}
 	}
 	for (int i = 0; i < 2; i++)
 		walk_change(&row->walk[i], &row->timed);
@@ -212,23 +185,20 @@ static void time_all(struct rows *all, bool quick)
 static const struct bench_table table = {
 	.key = "rows",
 	.row_bytes = sizeof(struct row),
-	.failed_after = 1,
 	.columns =
 		{
-			COLUMN(row, "name", name, "%-10s", "scene"),
-			COLUMN(row, "double_ns", time[0].ns.median, "%7.1f", "double ns"),
-			COLUMN(row, "integers_ns", time[1].ns.median, "%7.1f", "fixed"),
-			COLUMN(row, "ratio", ratio, "%5.2f", "ratio"),
-			COLUMN(row, "rms_error_N", rms_mN, "%7.4f", "rms mN", 1e-3, 1e3),
-			COLUMN(row, "max_error_N", most_mN, "%7.4f", "largest", 1e-3,
-			       1e3),
-			COLUMN(row, "bound_N", bound_mN, "%7.3f", "certified", 1e-3, 1e3),
+			COLUMN(row, "name", name),
+			COLUMN(row, "double_ns", time[0].ns.median),
+			COLUMN(row, "integers_ns", time[1].ns.median),
+			COLUMN(row, "ratio", ratio),
+			COLUMN(row, "rms_error_N", rms_mN, .scale = 1e-3),
+			COLUMN(row, "max_error_N", most_mN, .scale = 1e-3),
+			COLUMN(row, "bound_N", bound_mN, .scale = 1e-3),
 			COLUMN(row, "holds", holds),
-			COLUMN(row, "ticks", ticks, "%9.0f", "ticks"),
-			COLUMN(row, "contact", contact, "%9.0f", "contact"),
-			COLUMN(row, "apart", apart, "%8.0f", "separate"),
-			COLUMN(row, "apart_max_error_N", apart_most_mN, "%8.3f", "by mN",
-			       1e-3, 1e3),
+			COLUMN(row, "ticks", ticks),
+			COLUMN(row, "contact", contact),
+			COLUMN(row, "apart", apart),
+			COLUMN(row, "apart_max_error_N", apart_most_mN, .scale = 1e-3),
 			COLUMN(row, "failed", failed),
 		},
 	.metrics =
@@ -278,18 +248,10 @@ static void run_integers(struct bench_run *run)
 		cli_progress("%s: forces", row->name);
 		open_row(row);
 		if (!*row->failed)
-			compare(all, row, run->quick ? QUICK_TICKS : TICKS);
+			compare(row, run->quick ? QUICK_TICKS : TICKS);
 	}
 	time_all(all, run->quick);
-	bench_text(run,
-		   "fixed-point and double tick, and their forces along the same test "
-		   "path\n%s\n\n",
-		   bench_machine(run, NULL));
-	bench_table(run, &table, all->row, all->n);
-	bench_rows(run, &bench_points, all->point, all->points);
-	bench_text(run,
-		   "\nseparate: ticks after only one variant began or ended a contact or "
-		   "changed\nthe tool, until the forces agree again\n");
+	bench_rows(run, &table, all->row, all->n);
 	for (int i = 0; i < all->n; i++) {
 		if (*all->row[i].failed)
 			bench_fail(run, "%s", all->row[i].failed);

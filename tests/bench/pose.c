@@ -759,76 +759,16 @@ static const struct bench_table rows_table = {
 		    COLUMN(row, "ns_p5", time.ns.p5),
 		    COLUMN(row, "ns_p95", time.ns.p95),
 		    COLUMN(row, "gap_ms", gap_ms),
-		    COLUMN(row, "failed", failed),
-		    COLUMN(row, "panel", panel, .data = true)},
+		    COLUMN(row, "failed", failed)},
 	.metrics = {METRIC(TIME, row, time, "ns", "{name}, {tracker_hz} Hz",
 			   "motion=line,delay_ms=4"),
 		    METRIC(EXACT, row, place_mm.rms, "mm", "{name}, {motion}, rms",
 			   "tracker_hz=120,delay_ms=4")},
 };
 
-static const struct bench_block rows_block = {
-	.corner = "rms / mm at",
-	.line = COLUMN(row, NULL, name, "%-16s"),
-	.across = COLUMN(row, NULL, tracker_hz, "%6g Hz"),
-	.cell = COLUMN(row, NULL, place_mm.rms, "%8.4f"),
-	.failed = offsetof(struct row, failed),
-	.mark = true,
-	.between = "   120 Hz:",
-	.columns = {COLUMN(row, NULL, place_mm.p99, "%7.3f", "99 %"),
-		    COLUMN(row, NULL, place_mm.max, "%7.3f", "largest"),
-		    COLUMN(row, NULL, jump_mm, "%7.3f", "jump"),
-		    COLUMN(row, NULL, velocity_mm_s.rms, "%8.2f", "mm/s"),
-		    COLUMN(row, NULL, turn_deg.rms, "%7.3f", "deg"),
-		    COLUMN(row, NULL, time.ns.median, "%6.1f", "ns")},
-};
-
-static const struct bench_block losses_block = {
-	.corner = "rms / mm",
-	.line = COLUMN(row, NULL, name, "%-16s"),
-	.across = COLUMN(row, NULL, gap_ms, "%6g ms"),
-	.cell = COLUMN(row, NULL, place_mm.rms, "%8.3f"),
-	.failed = offsetof(struct row, failed),
-	.mark = true,
-	.columns = {COLUMN(row, NULL, place_mm.max, " %8.2f",
-			   " largest / mm, and the largest jump, at the last"),
-		    COLUMN(row, NULL, jump_mm, "%8.2f", "")},
-};
-
-static void report(struct bench_run *run, int repeats, int ticks)
-{
-	static struct bench_table losses_table;
-	const int per_block = N(rates_hz) * ROWS;
-
-	bench_text(run,
-		   "poses with %g mm of noise, %g ms of jitter, %g %% lost; %g s at 1000 "
-		   "ticks a second; times of %d runs in turn\n%s\n",
-		   NOISE_MM, JITTER_MS, LOST * 100, ticks * 1e-3, repeats,
-		   bench_machine(run, NULL));
-	for (const struct row *block = rows; block < rows + N(rows); block += per_block) {
-		bench_text(run, "\n%s; %g ms late\n", block->panel, block->delay_ms);
-		bench_block(run, &rows_block, sizeof(*rows), block, ROWS, N(rates_hz),
-			    USUAL_RATE);
-	}
-	bench_text(run, "\n%s, %d Hz, %d ms late, and nothing comes for\n", STROKE->name,
-		   USUAL_HZ, USUAL_MS);
-	bench_block(run, &losses_block, sizeof(*losses), losses, ROWS, N(gaps_ms),
-		    N(gaps_ms) - 1);
-	bench_text(run, "\n");
-	losses_table = rows_table;
-	losses_table.key = "losses";
-	memset(losses_table.metrics, 0, sizeof(losses_table.metrics));
-	bench_rows(run, &rows_table, rows, N(rows));
-	bench_rows(run, &losses_table, losses, N(losses));
-	bench_failures(run, &rows_table, rows, N(rows),
-		       "* {name}, {motion}, {tracker_hz} Hz, {delay_ms} ms late");
-	bench_failures(run, &losses_table, losses, N(losses),
-		       "* {name}, {motion}, {tracker_hz} Hz, {delay_ms} ms late, "
-		       "gaps of {gap_ms} ms");
-}
-
 static void run(struct bench_run *run)
 {
+	static struct bench_table losses_table;
 	int repeats = run->quick ? QUICK_REPEATS : REPEATS, i = 0;
 	struct condition c = {.gap_ms = NAN, .ticks = run->quick ? QUICK_TICKS : TICKS};
 
@@ -854,8 +794,11 @@ static void run(struct bench_run *run)
 	bench_values(run, "{sf sf sf sf si}", "noise_mm", NOISE_MM, "jitter_ms",
 		     JITTER_MS, "lost", LOST, "seconds", c.ticks * 1e-3, "repeats",
 		     repeats);
-	bench_scalars(run, "{sf}", "delay_ms", delays_ms[0]);
-	report(run, repeats, c.ticks);
+	losses_table = rows_table;
+	losses_table.key = "losses";
+	memset(losses_table.metrics, 0, sizeof(losses_table.metrics));
+	bench_rows(run, &rows_table, rows, N(rows));
+	bench_rows(run, &losses_table, losses, N(losses));
 }
 
 const struct bench bench_program = {

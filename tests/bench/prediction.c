@@ -56,21 +56,16 @@ static const struct bench_table table = {
 	.row_bytes = sizeof(struct row),
 	.columns =
 		{
-			COLUMN(row, "rigs", rigs, "%5.0f", " rigs"),
-			COLUMN(row, "models", models, "%7.0f", " models"),
-			COLUMN(row, "covered_percent", covered_percent, "%9.2f",
-			       "  held, %"),
-			COLUMN(row, "covered_low_percent", low_percent, "%7.1f",
-			       "    5 %"),
-			COLUMN(row, "covered_high_percent", high_percent, "%7.1f",
-			       "   95 %"),
-			COLUMN(row, "without_percent", without_percent, "%10.2f",
-			       " without, %"),
-			COLUMN(row, "sd_N", sd_N, "%8.4f", "    sd N"),
-			COLUMN(row, "sd_data_N", data_N, "%8.4f", "    data"),
-			COLUMN(row, "sd_model_N", model_N, "%8.4f", "   model"),
-			COLUMN(row, "sd_calibration_N", calibration_N, "%12.4f",
-			       " calibration"),
+			COLUMN(row, "rigs", rigs),
+			COLUMN(row, "models", models),
+			COLUMN(row, "covered_percent", covered_percent),
+			COLUMN(row, "covered_low_percent", low_percent),
+			COLUMN(row, "covered_high_percent", high_percent),
+			COLUMN(row, "without_percent", without_percent),
+			COLUMN(row, "sd_N", sd_N),
+			COLUMN(row, "sd_data_N", data_N),
+			COLUMN(row, "sd_model_N", model_N),
+			COLUMN(row, "sd_calibration_N", calibration_N),
 			COLUMN(row, "failed", failed),
 		},
 };
@@ -331,11 +326,7 @@ static void run_prediction(struct bench_run *run)
 		measure_row(&rows[i], rigs[i], models, 1);
 	if (cli_stop)
 		cli_fail("interrupted");
-	bench_text(run,
-		   "%d cuts of each rig train; %d cuts on each of %d other rigs are "
-		   "predicted; nominal 95 %%\n",
-		   CUTS, NEW_CUTS, NEW_RIGS);
-	bench_table(run, &table, rows, n);
+	bench_rows(run, &table, rows, n);
 	for (int i = 0; i < n && !run->quick; i++)
 		if (!(rows[i].covered_percent >= 92 && rows[i].covered_percent <= 98))
 			bench_fail(run,

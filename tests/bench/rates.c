@@ -265,31 +265,19 @@ static void measure_rates(bool quick)
 static const struct bench_table rates_table = {
 	.key = "rates",
 	.row_bytes = sizeof(struct rate_row),
-	.failed_after = 3,
-	.columns = {COLUMN(rate_row, "wall", wall, "%-6s", "wall"),
-		    COLUMN(rate_row, "poses", poses, "%-8s", "poses"),
-		    COLUMN(rate_row, "rate_hz", rate_hz, "%6g", "Hz"),
+	.columns = {COLUMN(rate_row, "wall", wall), COLUMN(rate_row, "poses", poses),
+		    COLUMN(rate_row, "rate_hz", rate_hz),
 		    COLUMN(rate_row, "stiffness_N_mm", stiffness_N_mm),
 		    COLUMN(rate_row, "limit_N_mm", limit_N_mm),
-		    COLUMN(rate_row, "command.rms_error_N", command.rms_N, "%8.3f", "rms",
-			   .text_scale = 1e3),
-		    COLUMN(rate_row, "command.max_error_N", command.max_N, "%8.2f", "max",
-			   .text_scale = 1e3),
-		    COLUMN(rate_row, "command.relative", command.relative, "%6.3f", "%",
-			   .text_scale = 100),
-		    COLUMN(rate_row, "rendered.rms_error_N", rendered.rms_N, "%8.2f",
-			   "rms", .text_scale = 1e3),
-		    COLUMN(rate_row, "rendered.max_error_N", rendered.max_N, "%8.2f",
-			   "max", .text_scale = 1e3),
-		    COLUMN(rate_row, "rendered.relative", rendered.relative, "%6.3f", "%",
-			   .text_scale = 100),
-		    COLUMN(rate_row, "hold_N", hold_N, "%8.3f", "hold",
-			   .text_scale = 1e3),
-		    COLUMN(rate_row, "tick_ns", tick_ns, "%8.0f", "ns/tick"),
-		    COLUMN(rate_row, "ns_per_s", ns_per_s, "%9.1f", "us/s",
-			   .text_scale = 1e-3),
-		    COLUMN(rate_row, "rms_N", command.rms_N, .data = true),
-		    COLUMN(rate_row, "rendered_rms_N", rendered.rms_N, .data = true),
+		    COLUMN(rate_row, "command.rms_error_N", command.rms_N),
+		    COLUMN(rate_row, "command.max_error_N", command.max_N),
+		    COLUMN(rate_row, "command.relative", command.relative),
+		    COLUMN(rate_row, "rendered.rms_error_N", rendered.rms_N),
+		    COLUMN(rate_row, "rendered.max_error_N", rendered.max_N),
+		    COLUMN(rate_row, "rendered.relative", rendered.relative),
+		    COLUMN(rate_row, "hold_N", hold_N),
+		    COLUMN(rate_row, "tick_ns", tick_ns),
+		    COLUMN(rate_row, "ns_per_s", ns_per_s),
 		    COLUMN(rate_row, "failed", failed)},
 	.metrics = {METRIC(EXACT, rate_row, command.rms_N, "N",
 			   "{wall} {poses} command rms at 1 kHz", "rate_hz=1000"),
@@ -302,9 +290,7 @@ static const struct bench_table rates_table = {
 static void run_rates(struct bench_run *run)
 {
 	measure_rates(run->quick);
-	bench_text(run, "force error over a cut, mN           commanded              "
-			"rendered        ideal\n");
-	bench_table(run, &rates_table, rates, N(rates));
+	bench_rows(run, &rates_table, rates, N(rates));
 }
 
 const struct bench bench_program = {

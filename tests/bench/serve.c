@@ -458,25 +458,19 @@ static void measure_loop(struct latency *row, struct wakes wakes[2], double seco
 static const struct bench_table latency_table = {
 	.key = "rows",
 	.row_bytes = sizeof(struct latency),
-	.columns = {COLUMN(latency, "name", name, "%-15s", "pose"),
-		    COLUMN(latency, "messages", messages, "%9.0f", "messages"),
-		    COLUMN(latency, "rate_hz", hz, "%8.1f", "per s"),
-		    COLUMN(latency, "p50_us", p50, "%8.0f", "50 % us"),
-		    COLUMN(latency, "p99_us", p99, "%8.0f", "99 % us"),
-		    COLUMN(latency, "p999_us", p999, "%9.0f", "99.9 % us"),
-		    COLUMN(latency, "max_us", max, "%8.0f", "largest")},
+	.columns = {COLUMN(latency, "name", name), COLUMN(latency, "messages", messages),
+		    COLUMN(latency, "rate_hz", hz), COLUMN(latency, "p50_us", p50),
+		    COLUMN(latency, "p99_us", p99), COLUMN(latency, "p999_us", p999),
+		    COLUMN(latency, "max_us", max)},
 	.metrics = {METRIC(MEASURED, latency, spread, "us", "{name}: 99 %")},
 };
 
 static const struct bench_table wakes_table = {
 	.key = "loop",
 	.row_bytes = sizeof(struct wakes),
-	.columns = {COLUMN(wakes, "name", name, "%-15s", "loop"),
-		    COLUMN(wakes, "ticks", ticks, "%9.0f", "ticks"),
-		    COLUMN(wakes, "skipped", skipped, "%8.0f", "skipped"),
-		    COLUMN(wakes, "p50_us", p50, "%8.1f", "50 % us"),
-		    COLUMN(wakes, "p99_us", p99, "%8.1f", "99 % us"),
-		    COLUMN(wakes, "p999_us", p999, "%9.1f", "99.9 % us")},
+	.columns = {COLUMN(wakes, "name", name), COLUMN(wakes, "ticks", ticks),
+		    COLUMN(wakes, "skipped", skipped), COLUMN(wakes, "p50_us", p50),
+		    COLUMN(wakes, "p99_us", p99), COLUMN(wakes, "p999_us", p999)},
 	.metrics = {METRIC(MEASURED, wakes, spread, "us", "wake-up, {name}: 99 %")},
 };
 
@@ -498,11 +492,8 @@ static void run(struct bench_run *run)
 	cli_progress_end();
 	bench_values(run, "{sf si si ss}", "seconds", seconds * rounds, "rate_hz",
 		     RATE_HZ, "clients", CLIENTS, "policy", wakeups_policy(realtime));
-	bench_text(run, "%s\n%d poses a second, %.3g s each; loop: %s\n",
-		   bench_machine(run, "cpu"), RATE_HZ, seconds * rounds,
-		   realtime ? "SCHED_FIFO" : "normal scheduling");
-	bench_table(run, &latency_table, latencies, N(latencies));
-	bench_table(run, &wakes_table, wakes, N(wakes));
+	bench_rows(run, &latency_table, latencies, N(latencies));
+	bench_rows(run, &wakes_table, wakes, N(wakes));
 }
 
 const struct bench bench_program = {

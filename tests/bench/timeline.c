@@ -489,25 +489,8 @@ static const struct bench_table rows_table = {
 			   "late=uniform,drift_ppm=-200")},
 };
 
-/* A lateness and a drift. */
-static const struct bench_block block = {
-	.corner = "rms / us after",
-	.line = COLUMN(row, NULL, name, "%-16s"),
-	.across = COLUMN(row, NULL, window_s, "%7g s"),
-	.cell = COLUMN(row, NULL, rms_us, "%8.1f"),
-	.failed = offsetof(struct row, failed),
-	.mark = true,
-	.between = " at the last:",
-	.columns = {COLUMN(row, NULL, p99_us, "%8.1f", "99 %"),
-		    COLUMN(row, NULL, max_us, "%8.1f", "largest"),
-		    COLUMN(row, NULL, stated_us, "%8.1f", "stated"),
-		    COLUMN(row, NULL, within, "%7.1f %%", "within 2", 100),
-		    COLUMN(row, NULL, time.ns.median, "%8.1f", "ns")},
-};
-
 static void run(struct bench_run *run)
 {
-	const int per_block = N(windows_s) * METHODS;
 	int repeats = run->quick ? QUICK_REPEATS : REPEATS, i = 0;
 
 	measure_times(repeats);
@@ -522,22 +505,7 @@ static void run(struct bench_run *run)
 	cli_progress_end();
 	bench_values(run, "{si sf si si}", "rate_hz", RATE_HZ, "lost", LOST, "streams",
 		     streams_of(run->quick, 120), "repeats", repeats);
-	bench_scalars(run, "{sf si}", "drift_ppm", drifts_ppm[N(drifts_ppm) - 1],
-		      "late_ms", LATE_MS);
-	bench_text(run,
-		   "%d Hz, up to %d ms late, %g %% lost; %d streams or more of each; "
-		   "times of %d runs in turn\n%s\n",
-		   RATE_HZ, LATE_MS, LOST * 100, streams_of(run->quick, 120), repeats,
-		   bench_machine(run, NULL));
-	for (const struct row *r = rows; r < rows + N(rows); r += per_block) {
-		bench_text(run, "\n%s lateness, %+g ppm\n", r->late, r->drift_ppm);
-		bench_block(run, &block, sizeof(*rows), r, METHODS, N(windows_s),
-			    N(windows_s) - 1);
-	}
-	bench_text(run, "\n");
 	bench_rows(run, &rows_table, rows, N(rows));
-	bench_failures(run, &rows_table, rows, N(rows),
-		       "* {name}, {late}, {drift_ppm:%+g} ppm, {window_s} s");
 }
 
 const struct bench bench_program = {

@@ -197,27 +197,17 @@ static void measure(const struct kind *kind, const struct frames *f, int rounds,
 static const struct bench_table rows_table = {
 	.key = "rows",
 	.row_bytes = sizeof(struct row),
-	.columns = {COLUMN(row, "name", name, "%-12s", "frames"),
-		    COLUMN(row, "region", region, "%-8s", "region"),
-		    COLUMN(row, NULL, size, "%-9s", "size"),
-		    COLUMN(row, "width", width),
-		    COLUMN(row, "height", height),
-		    COLUMN(row, "pictures", frames),
-		    COLUMN(row, "found", found),
-		    COLUMN(row, NULL, share, "%7s", "found"),
-		    COLUMN(row, "bias_px", bias_px, "%+9.3f", "bias px"),
-		    COLUMN(row, "sd_px", sd_px, "%7.3f", "sd px"),
-		    COLUMN(row, "rms_error_px", rms_px, "%7.3f", "rms px"),
-		    COLUMN(row, "max_error_px", max_px, "%7.3f", "max px"),
-		    COLUMN(row, "said_sd_px", stated_px, "%7.3f", "stated"),
-		    COLUMN(row, "us", us, "%8.0f", "us"),
-		    COLUMN(row, "us_p99", us_p99, "%8.0f", "us p99"),
+	.columns = {COLUMN(row, "name", name), COLUMN(row, "region", region),
+		    COLUMN(row, "width", width), COLUMN(row, "height", height),
+		    COLUMN(row, "pictures", frames), COLUMN(row, "found", found),
+		    COLUMN(row, "bias_px", bias_px), COLUMN(row, "sd_px", sd_px),
+		    COLUMN(row, "rms_error_px", rms_px),
+		    COLUMN(row, "max_error_px", max_px),
+		    COLUMN(row, "said_sd_px", stated_px), COLUMN(row, "us", us),
+		    COLUMN(row, "us_p99", us_p99),
 		    COLUMN(row, "us_low", time.ns.low, .scale = 1e-3),
 		    COLUMN(row, "us_high", time.ns.high, .scale = 1e-3),
-		    COLUMN(row, "failed", failed),
-		    COLUMN(row, "ms", time.ns.median, .scale = 1e-6, .data = true),
-		    COLUMN(row, "ms_p5", time.ns.p5, .scale = 1e-6, .data = true),
-		    COLUMN(row, "ms_p95", time.ns.p95, .scale = 1e-6, .data = true)},
+		    COLUMN(row, "failed", failed)},
 	.metrics = {METRIC(TIME, row, time, "us", "{name}, {region}"),
 		    METRIC(EXACT, row, rms_px, "px", "{name}, {region}, error")},
 };
@@ -236,8 +226,7 @@ static void run(struct bench_run *run)
 	}
 	cli_progress_end();
 	bench_values(run, "{si si si}", "width", 640, "height", 480, "rounds", rounds);
-	bench_text(run, "%s\none thread; %d rounds\n", bench_machine(run, "cpu"), rounds);
-	bench_table(run, &rows_table, rows, N(kinds) * REGIONS);
+	bench_rows(run, &rows_table, rows, N(kinds) * REGIONS);
 }
 
 const struct bench bench_program = {

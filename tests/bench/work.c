@@ -43,19 +43,14 @@ struct work_row {
 static const struct bench_table work_table = {
 	.key = "work",
 	.row_bytes = sizeof(struct work_row),
-	.columns = {COLUMN(work_row, "scene", name, "%12s", "scene"),
-		    COLUMN(work_row, "tool", tool, "%8s", "tool"),
-		    COLUMN(work_row, "motions", motions, "%9.0f", "paths", .whole = true),
-		    COLUMN(work_row, "in_contact", in_contact, "%12.0f", "in contact",
-			   .whole = true),
-		    COLUMN(work_row, "returned", returned, "%13.0f", "return work",
-			   .whole = true),
-		    COLUMN(work_row, "least_N_mm", least_N_mm, "%15.3g", "least taken"),
-		    COLUMN(work_row, "rounding_N_mm", rounding_N_mm, "%10.1g",
-			   "rounding"),
-		    COLUMN(work_row, "median_N_mm", median_N_mm, "%11.3g", "median"),
-		    COLUMN(work_row, "least_held_N_mm", least_held_N_mm, "%14.3g",
-			   "least, held")},
+	.columns = {COLUMN(work_row, "scene", name), COLUMN(work_row, "tool", tool),
+		    COLUMN(work_row, "motions", motions, .whole = true),
+		    COLUMN(work_row, "in_contact", in_contact, .whole = true),
+		    COLUMN(work_row, "returned", returned, .whole = true),
+		    COLUMN(work_row, "least_N_mm", least_N_mm),
+		    COLUMN(work_row, "rounding_N_mm", rounding_N_mm),
+		    COLUMN(work_row, "median_N_mm", median_N_mm),
+		    COLUMN(work_row, "least_held_N_mm", least_held_N_mm)},
 };
 
 /* A way to and fro: a sum of waves that is 0 at both ends. */
@@ -284,10 +279,7 @@ static void run_work(struct bench_run *run)
 	cli_progress_end();
 	for (int i = 0; i < n_rows; i++)
 		returned += rows[i].returned;
-	bench_text(run, "work taken by the tissue along random closed paths, N mm; held: "
-			"with forces held for a tick, as on a device\n");
-	bench_table(run, &work_table, rows, n_rows);
-	bench_text(run, "\n");
+	bench_rows(run, &work_table, rows, n_rows);
 	metrics_add(run->metrics, METRIC_EXACT, &returned, "1",
 		    "closed motions that give work back");
 	if (returned > 0)

@@ -378,6 +378,20 @@ static void add_metric(json_t *metrics, const struct bench_table *table,
 		metrics_more_is_better(added);
 }
 
+static void write_line(FILE *out, const struct bench_table *table, const void *row)
+{
+	char word[TEXT_BYTES];
+
+	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
+		if (c->key) {
+			if (row)
+				word_of(c, row, "%.10g", word, sizeof(word));
+			fprintf(out, "%s%s", c == table->columns ? "" : "\t",
+				row ? word : c->key);
+		}
+	fputc('\n', out);
+}
+
 void bench_rows(struct bench_run *run, const struct bench_table *table, const void *rows,
 		int n)
 {
@@ -393,6 +407,12 @@ void bench_rows(struct bench_run *run, const struct bench_table *table, const vo
 		for (const struct bench_metric *m = table->metrics; m->name; m++)
 			if (matches(table, m->where, row))
 				add_metric(run->metrics, table, m, row);
+	}
+	if (run->tabs && !run->json) {
+		printf("\n%s\n", table->key);
+		write_line(stdout, table, NULL);
+		for (int i = 0; i < n; i++)
+			write_line(stdout, table, row_at(table, rows, i));
 	}
 	if (table->key)
 		bench_value(run, table->key, list);
@@ -464,20 +484,6 @@ static json_t *words_of(const struct bench_data *data, const char *key,
 		json_object_set_new_nocheck(words, word, json_true());
 	}
 	return words;
-}
-
-static void write_line(FILE *out, const struct bench_table *table, const void *row)
-{
-	char word[TEXT_BYTES];
-
-	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
-		if (c->key) {
-			if (row)
-				word_of(c, row, "%.10g", word, sizeof(word));
-			fprintf(out, "%s%s", c == table->columns ? "" : "\t",
-				row ? word : c->key);
-		}
-	fputc('\n', out);
 }
 
 static void write_data(const struct bench_run *run, const char *file,

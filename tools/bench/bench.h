@@ -7,7 +7,7 @@
  *                                 ├─▶ JSON, metrics     (--json, compare, bench all)
  *                                 └─▶ data, bench_plot  (--plot)
  *
- * Places in the report of incise bench all are in report.md, by keys of the JSON.
+ * The report of incise bench all is made of the JSON, by tools/report.
  */
 #ifndef INCISE_BENCH_H
 #define INCISE_BENCH_H
@@ -147,9 +147,9 @@ extern const struct bench bench_loop, bench_precision, bench_scenes, bench_stabi
 
 struct bench_run {
 	const struct bench *bench;
-	bool json, quick;
-	double seconds;				     /* 0: not given */
-	long seed;				     /* the same */
+	bool json, quick, tabs; /* tabs: the text has all columns of the JSON */
+	double seconds;		/* 0: not given */
+	long seed;		/* the same */
 	const char *plot, *load, *profile, *against; /* NULL: not given */
 	char **operands;
 	int n_operands;
