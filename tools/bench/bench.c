@@ -258,47 +258,6 @@ void bench_failures(const struct bench_run *run, const struct bench_table *table
 	}
 }
 
-void bench_block(const struct bench_run *run, const struct bench_block *block,
-		 size_t row_bytes, const void *rows, int n, int n_across, int usual)
-{
-	const char *row = rows, *between = block->between ? block->between : "";
-
-	if (run->json)
-		return;
-	printf("%*s", width_of(block->line.format), block->corner);
-	for (int k = 0; k < n_across; k++) {
-		putchar(' ');
-		print_cell(&block->across, row + (size_t)k * n * row_bytes);
-	}
-	fputs(between, stdout);
-	for (const struct bench_column *c = block->columns; c->heading; c++)
-		if (*c->heading)
-			printf(" %*s", width_of(c->format), c->heading);
-	putchar('\n');
-	for (int i = 0; i < n; i++, row += row_bytes) {
-		print_cell(&block->line, row);
-		for (int k = 0; k < n_across; k++) {
-			const char *cell = row + (size_t)k * n * row_bytes;
-			const char *failed = block->failed ? cell + block->failed : "";
-
-			putchar(' ');
-			if (*failed && !block->mark)
-				printf("%*s", width_of(block->cell.format), failed);
-			else
-				print_cell(&block->cell, cell);
-			if (block->mark)
-				putchar(*failed ? '*' : ' ');
-		}
-		if (block->columns->heading)
-			printf("%*s", (int)strlen(between), "");
-		for (const struct bench_column *c = block->columns; c->heading; c++) {
-			putchar(' ');
-			print_cell(c, row + (size_t)usual * n * row_bytes);
-		}
-		putchar('\n');
-	}
-}
-
 /* --- JSON and metrics --- */
 
 /* "a.b" is b of the object a, which is made where it is missing. */

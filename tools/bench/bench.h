@@ -199,29 +199,6 @@ void bench_lines(const struct bench_run *run, const struct bench_table *table,
 void bench_failures(const struct bench_run *run, const struct bench_table *table,
 		    const void *rows, int n, const char *template);
 
-/*
- * A block of text with a line for each of n rows, and the same rows under n_across
- * conditions side by side:
- *
- *   corner           60 Hz   120 Hz     120 Hz:  99 %  largest
- *   held            0.1234   0.0612              0.23     0.31
- *
- * Rows stand condition by condition. A cell that failed is marked with '*', or without a mark
- * holds the reason. Behind the cells stand columns of the condition @usual, @between in
- * front of their headings.
- */
-struct bench_block {
-	const char *corner;
-	struct bench_column line, across,
-		cell;  /* with formats of name, condition and cell */
-	size_t failed; /* the reason: a char[] */
-	bool mark;
-	const char *between;
-	struct bench_column columns[8];
-};
-void bench_block(const struct bench_run *run, const struct bench_block *block,
-		 size_t row_bytes, const void *rows, int n, int n_across, int usual);
-
 /* After the report fail the program with this line; the first one counts. */
 void bench_fail(struct bench_run *run, const char *fmt, ...) INCISE_PRINTF(2, 3);
 
