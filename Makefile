@@ -130,6 +130,7 @@ all: libs tools
 
 include mk/lib.mk
 include mk/tools.mk
+include mk/bench.mk
 include mk/test.mk
 include mk/check.mk
 include mk/golden.mk

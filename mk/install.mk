@@ -5,6 +5,7 @@ headers := $(wildcard lib/include/incise/*.h)
 man_pages := $(wildcard man/*.[1-8])
 scenes := $(wildcard scenes/*.scene scenes/*.fis)
 schemas := $(wildcard schema/*.json)
+report_files := $(addprefix tools/report/,report.py bench.j2 assess.j2 document.css)
 examples := $(wildcard doc/*.example)
 # All but the main page of the headers' reference, which is in that.
 documents := README.md CHANGELOG.md $(filter-out doc/reference.md,$(wildcard doc/*.md doc/*.svg doc/*.png))
@@ -30,6 +31,7 @@ installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(foreach page,$(notdir $(man_pages)),$(mandir)/man$(subst .,,$(suffix $(page)))/$(page)) \
 	$(addprefix $(datadir)/incise/scenes/,$(notdir $(scenes))) \
 	$(addprefix $(datadir)/incise/schema/,$(notdir $(schemas))) \
+	$(addprefix $(datadir)/incise/report/,$(notdir $(report_files))) \
 	$(addprefix $(datadir)/incise/,$(notdir $(examples))) \
 	$(addprefix $(docdir)/,$(notdir $(documents)) $(example_files) $(example_scripts)) \
 	$(addprefix $(pythondir)/incise/,$(notdir $(python_files)) $(python_installed)) \
@@ -73,6 +75,7 @@ install: all ## install below $(DESTDIR)$(prefix)
 	done
 	$(INSTALL) -m 644 $(scenes) $(DESTDIR)$(datadir)/incise/scenes
 	$(INSTALL) -m 644 $(schemas) $(DESTDIR)$(datadir)/incise/schema
+	$(INSTALL) -m 644 $(report_files) $(DESTDIR)$(datadir)/incise/report
 	$(INSTALL) -m 644 $(examples) $(DESTDIR)$(datadir)/incise
 	$(INSTALL) -m 644 $(documents) $(DESTDIR)$(docdir)
 	$(INSTALL) -m 644 $(example_files) $(DESTDIR)$(docdir)/examples
@@ -100,7 +103,7 @@ install: all ## install below $(DESTDIR)$(prefix)
 
 uninstall: ## remove what install installed
 	@made=$$(sort -ru $(DESTDIR)$(made_folders) 2>/dev/null) || \
-		made="$(libdir)/incise $(includedir)/incise $(datadir)/incise/scenes $(datadir)/incise/schema $(datadir)/incise"; \
+		made="$(libdir)/incise $(includedir)/incise $(datadir)/incise/scenes $(datadir)/incise/schema $(datadir)/incise/report $(datadir)/incise"; \
 	rm -f $(addprefix $(DESTDIR),$(installed) $(made_folders)); \
 	rm -rf $(DESTDIR)$(pythondir)/incise/__pycache__; \
 	for folder in $$made; do \

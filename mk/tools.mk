@@ -17,13 +17,9 @@ $(O)/obj/tools/stepper/%.o $(O)/obj/tools/capture/%.o: cppflags += -Idriver
 $(O)/obj/tools/bench/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst ",,$(filter-out \
 	-ffile-prefix-map=% -fdebug-prefix-map=% -fmacro-prefix-map=%,$(CFLAGS))))"'
 
-# Frames that incise bench capture codes before it measures, and that incise serve decodes.
+# Frames that incise serve decodes.
 has_jpeg := $(shell $(CC) -E -x c -include stdio.h -include jpeglib.h /dev/null >/dev/null 2>&1 && echo yes)
-$(O)/obj/tools/bench/bench_capture.o $(O)/obj/tools/serve/pixels.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
-
-# Reports as HTML.
-has_cmark := $(shell $(PKG_CONFIG) --exists libcmark-gfm && echo yes)
-$(O)/obj/tools/cli/document.o: cppflags += $(if $(has_cmark),-DHAVE_CMARK)
+$(O)/obj/tools/serve/pixels.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
 
 # Image files: those that depth is calibrated from, and frames of a view.
 has_png := $(shell $(CC) -E -x c -include png.h /dev/null >/dev/null 2>&1 && echo yes)
@@ -32,13 +28,13 @@ $(O)/obj/tools/cli/image.o: cppflags += $(if $(has_png),-DHAVE_PNG)
 # The parts of all programs. The linker takes of them, and of the libraries, what a program
 # uses: a new part, command or benchmark is found by its place.
 tool_parts := $(O)/obj/tools/parts.a
-tool_texts := $(wildcard tools/bench/*.md tools/cli/*.css tools/cli/*.gp tools/bench/plots/*.gp)
+tool_texts := $(wildcard tools/cli/*.gp tools/bench/plots/*.gp)
 $(tool_parts): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tools/*/*.c)) $(tool_texts:%=$(O)/obj/%.o)
 	@rm -f $@
 	$(call step,AR)
 	$(Q)$(AR) rcs $@ $^
 
-# A text that reports are made of: report.md becomes the string text_report_md.
+# A script of gnuplot: scenes.gp becomes the string text_scenes_gp.
 $(tool_texts:%=$(O)/obj/%.o): $(O)/obj/%.o: %
 	@mkdir -p $(@D)
 	$(call step,CC)
@@ -67,23 +63,10 @@ $(O)/lib/incise/peer_%.py: tools/bench/references/%.py
 	@mkdir -p $(@D)
 	$(Q)cp $< $@
 
-# Properties of the library under extreme inputs: incise bench extremes tries all cases, unit tests
-# some. They build without what only tests need.
-extremes := $(O)/obj/tests/extremes.a
-$(O)/obj/tests/extremes/%.o: test_cflags =
-$(extremes): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tests/extremes/*.c $(addprefix tools/cli/,cli.c complete.c f*.c output.c scene_argument.c state_folder.c)))
-	@rm -f $@
-	$(call step,AR)
-	$(Q)$(AR) rcs $@ $^
-
-# Benchmarks also measure parts that the shared objects do not export; the linker takes those
-# from the archive.
-$(filter $(O)/bin/incise-bench%,$(programs)): tool_inside = $(extremes) $(O)/lib/libincise-tests.a $(shell $(PKG_CONFIG) \
-	--libs $(foreach lib,$(libraries),$(pc_$(lib)))) -ldl -pthread
-$(filter $(O)/bin/incise-bench%,$(programs)): $(extremes) $(O)/lib/libincise-tests.a
+# The benchmarks simulate a device exactly, which the library itself has no use for.
+$(O)/bin/incise-bench: $(O)/obj/lib/control/plant.o
 tool_libs := $(patsubst %,-l%,$(libraries))
 tool_more_libs := $(if $(has_png),-lpng) $(if $(has_jpeg),-ljpeg) -lm
-$(O)/bin/incise-bench-all $(O)/bin/incise-assess: tool_more_libs += $(if $(has_cmark),$(shell $(PKG_CONFIG) --libs libcmark-gfm))
 
 # SHA-256 and time-stamps.
 $(O)/bin/incise-sign $(O)/bin/incise-verify: tool_more_libs += $(shell $(PKG_CONFIG) --libs libcrypto)
@@ -92,15 +75,17 @@ $(programs): $(O)/bin/%: $(O)/obj/tools/%.o $(tool_parts) $(foreach lib,$(librar
 	@mkdir -p $(@D)
 	$(call step,LD)
 	$(Q)$(CC) $(CFLAGS) $(LDFLAGS) -Wl,--as-needed $(call runpath,/../lib) \
-		-Wl,-rpath-link,$(O)/lib -L$(O)/lib -o $@ $< $(tool_parts) $(tool_libs) \
-		$(tool_inside) $(tool_more_libs) $(shell $(PKG_CONFIG) --libs jansson)
+		-Wl,-rpath-link,$(O)/lib -L$(O)/lib -o $@ $(filter %.o,$^) $(tool_parts) $(tool_libs) \
+		$(tool_more_libs) $(shell $(PKG_CONFIG) --libs jansson)
 
-# Scenes by name, as after installation.
-$(O)/share/incise/scenes:
+# Scenes by name, and the script of reports, as after installation.
+$(O)/share/incise/scenes: shared = scenes
+$(O)/share/incise/report: shared = tools/report
+$(O)/share/incise/scenes $(O)/share/incise/report:
 	@mkdir -p $(@D)
-	$(Q)ln -s $(abspath scenes) $@
+	$(Q)ln -s $(abspath $(shared)) $@
 
-tools: $(programs) $(peer) | $(O)/share/incise/scenes
+tools: $(programs) $(peer) | $(O)/share/incise/scenes $(O)/share/incise/report
 
 DEMO ?= demo.out
 

@@ -9,13 +9,13 @@
 #include <stdlib.h>
 #include <string.h>
 #include "cli/cli.h"
-#include "cli/document.h"
 #include "cli/file.h"
 #include "cli/file_kind.h"
 #include "cli/folder.h"
 #include "cli/json.h"
 #include "cli/loop_report.h"
 #include "cli/plot.h"
+#include "cli/report_script.h"
 #include "session/session.h"
 
 struct job {
@@ -542,140 +542,81 @@ static void draw_force(const struct session *s, const struct session *reference,
 
 /* --- the page -------------------------------------------------------------------------- */
 
-static void put_overview(FILE *out, const struct job *job)
+static json_t *cells_json(const struct assessed *a)
 {
+	json_t *list = json_array();
 	char text[40];
 
-	fputs("\n"
-	      "## All sessions\n"
-	      "\n"
-	      "Values; **bold** marks a criterion that is not met.\n"
-	      "\n"
-	      "| session | code | met |",
-	      out);
-	for (int k = 0; k < INCISE_CRITERIA; k++)
-		fprintf(out, " %s |", session_criterion_head(k));
-	fputs("\n|---|---|---:|", out);
-	for (int k = 0; k < INCISE_CRITERIA; k++)
-		fputs("---:|", out);
-	fputc('\n', out);
-	for (int i = 0; i < rows(job); i++) {
-		const struct assessed *a = &job->session[i];
+	for (int k = 0; k < INCISE_CRITERIA; k++) {
+		const struct session_verdict *verdict = &a->verdict[k];
 
-		fputs("| ", out);
-		document_text(out, a->path);
-		fprintf(out, "%s | ", a == job->reference ? " (reference)" : "");
-		document_text(out, *a->session->code ? a->session->code : "-");
-		fprintf(out, " | %d of %d", a->met, a->judged);
-		for (int k = 0; k < INCISE_CRITERIA; k++) {
-			const struct session_verdict *verdict = &a->verdict[k];
-			const char *mark = verdict->judged && !verdict->met ? "**" : "";
-
-			session_criterion_value(k, verdict->value, text, sizeof(text));
-			fprintf(out, " | %s%s%s", mark, text, mark);
-		}
-		fputs(" |\n", out);
+		session_criterion_value(k, verdict->value, text, sizeof(text));
+		json_array_append_new(list, json_pack("{ss sb}", "value", text, "bad",
+						      verdict->judged && !verdict->met));
 	}
+	return list;
 }
 
-static void put_lines(FILE *out, const struct assessed *a,
-		      const struct assessed *reference)
+static json_t *lines_json(const struct assessed *a, const struct assessed *reference)
 {
-	fprintf(out,
-		"\n"
-		"Criteria of the scene, and other values: %d of %d criteria met.\n"
-		"\n"
-		"| | value | | required | met |%s\n"
-		"|---|---:|---|---|---|%s\n",
-		a->met, a->judged, reference ? " reference | difference |" : "",
-		reference ? "---:|---:|" : "");
+	json_t *list = json_array();
+
 	for (int i = 0; i < LINES; i++) {
 		struct line line = line_of(a, reference, i);
-		const char *mark = !strcmp(line.met, "no") ? "**" : "";
 
-		fprintf(out, "| %s | %s%s%s | %s | %s | %s%s%s |", line.label, mark,
-			line.value, mark, line.unit, line.asked, mark, line.met, mark);
-		if (reference)
-			fprintf(out, " %s | %s |", line.reference, line.difference);
-		fputc('\n', out);
+		json_array_append_new(
+			list, json_pack("{ss ss ss ss ss ss ss sb}", "label", line.label,
+					"value", line.value, "unit", line.unit, "asked",
+					line.asked, "met", line.met, "reference",
+					line.reference, "difference", line.difference,
+					"bad", !strcmp(line.met, "no")));
 	}
+	return list;
 }
 
-static void put_cuts_table(FILE *out, const struct session *s)
+static json_t *cuts_json(const struct session *s)
 {
-	if (!s->n_cuts)
-		return;
-	fputs("\n"
-	      "Cuts; those with the same incision number are joined.\n"
-	      "\n"
-	      "| cut | incision | from, mm | to, mm | length, mm | direction, ° | "
-	      "depth, mm | median, mm | open, mm | off target, mm |\n"
-	      "|---:|---:|---|---|---:|---:|---:|---:|---:|---:|\n",
-	      out);
+	json_t *list = json_array();
+
 	for (int i = 0; i < s->n_cuts; i++) {
 		struct cut_text cut = cut_text(&s->cut[i]);
 
-		fprintf(out, "| %d | %d | %s | %s | %s | %s | %s | %s | %s | %s |\n",
-			i + 1, s->cut[i].incision + 1, cut.from, cut.to, cut.length,
-			cut.direction, cut.depth, cut.median, cut.open, cut.off);
+		json_array_append_new(list,
+				      json_pack("{si si ss ss ss ss ss ss ss ss}", "cut",
+						i + 1, "incision", s->cut[i].incision + 1,
+						"from", cut.from, "to", cut.to, "length",
+						cut.length, "direction", cut.direction,
+						"depth", cut.depth, "median", cut.median,
+						"open", cut.open, "off", cut.off));
 	}
+	return list;
 }
 
-static void put_phases_table(FILE *out, const struct session *s)
+static json_t *phases_json(const struct session *s)
 {
-	if (!s->n_phases)
-		return;
-	fputs("\nPhases: times in which one tool was in the tissue.\n\n"
-	      "| tool | from, s | to, s | depth, mm | force, N |\n"
-	      "|---|---:|---:|---:|---:|\n",
-	      out);
-	for (int i = 0; i < s->n_phases; i++)
-		fprintf(out, "| %s | %.2f | %.2f | %.1f | %.2f |\n",
-			loop_tool_names[s->phase[i].tool], s->phase[i].from_s,
-			s->phase[i].to_s, s->phase[i].depth_mm, s->phase[i].force_N);
+	json_t *list = json_array();
+
+	for (int i = 0; i < s->n_phases; i++) {
+		const struct session_phase *phase = &s->phase[i];
+
+		json_array_append_new(
+			list, json_pack("{ss so so so so}", "tool",
+					loop_tool_names[phase->tool], "from",
+					json_sprintf("%.2f", phase->from_s), "to",
+					json_sprintf("%.2f", phase->to_s), "depth",
+					json_sprintf("%.1f", phase->depth_mm), "force",
+					json_sprintf("%.2f", phase->force_N)));
+	}
+	return list;
 }
 
-static void put_figures(FILE *out, const struct assessed *a,
-			const struct assessed *reference, int number)
+/* Its scene, its length, how it ended, and what may be wrong. */
+static json_t *about_json(const struct session *s)
 {
-	const struct session *s = a->session,
-			     *expert = reference ? reference->session : NULL;
-	char path[20], force[20];
-
-	/* A session that ended before its first tick has none. */
-	if (!s->n_trace)
-		return;
-	snprintf(path, sizeof(path), "path-%d", number);
-	snprintf(force, sizeof(force), "force-%d", number);
-	draw_path(s, expert, path);
-	draw_force(s, expert, force);
-	fprintf(out,
-		"\n"
-		"![Path of the tool from above](%s.svg)\n"
-		"\n"
-		"Path of the tool from above, the cuts%s.\n"
-		"\n"
-		"![Force over time](%s.svg)\n"
-		"\n"
-		"Largest force in each interval over time; shaded while a tool was in "
-		"the tissue.\n",
-		path, s->has_membrane ? ", and the membrane" : "", force);
-}
-
-static const char *base_name(const char *path)
-{
-	const char *slash = strrchr(path, '/');
-
-	return slash ? slash + 1 : path;
-}
-
-static void put_session(FILE *out, const struct assessed *a,
-			const struct assessed *reference, int number)
-{
-	const struct session *s = a->session;
-	char *doubts = NULL;
+	char *about = NULL;
 	size_t size;
-	FILE *line = open_memstream(&doubts, &size);
+	FILE *line = open_memstream(&about, &size);
+	json_t *text;
 
 	if (!line)
 		cli_fail("no memory");
@@ -684,67 +625,69 @@ static void put_session(FILE *out, const struct assessed *a,
 	put_doubts(line, s, "; ", "");
 	fputc('.', line);
 	fclose(line);
-	fprintf(out, "\n## %d. ", number);
-	document_text(out, base_name(a->path));
-	fputs("\n\n", out);
-	document_text(out, doubts);
-	fputc('\n', out);
-	free(doubts);
-	put_lines(out, a, reference);
-	put_figures(out, a, reference, number);
-	put_cuts_table(out, s);
-	put_phases_table(out, s);
+	text = json_text(about);
+	free(about);
+	return text;
 }
 
-static void put_contents(FILE *out, const struct job *job)
+/* A session that ended before its first tick has none. */
+static void draw_figures(const struct assessed *a, const struct assessed *reference,
+			 int number)
 {
-	fputs("# Sessions\n\nEach session against the criteria of its scene. incise is not "
-	      "a medical device.\n\n- [All sessions](#all-sessions)\n",
-	      out);
-	for (int i = 0; i < job->n; i++) {
-		char *title = cli_text("%d. %s", i + 1, base_name(job->session[i].path));
-		char anchor[200];
+	const struct session *expert = reference ? reference->session : NULL;
+	char name[20];
 
-		document_anchor(title, anchor, sizeof(anchor));
-		fprintf(out, "- [%d\\. ", i + 1);
-		document_text(out, base_name(job->session[i].path));
-		fprintf(out, "](#%s)\n", anchor);
-		free(title);
-	}
+	if (!a->session->n_trace)
+		return;
+	snprintf(name, sizeof(name), "path-%d", number);
+	draw_path(a->session, expert, name);
+	snprintf(name, sizeof(name), "force-%d", number);
+	draw_force(a->session, expert, name);
+}
+
+static json_t *shown_json(const struct job *job, const struct assessed *a)
+{
+	const struct session *s = a->session;
+	const char *slash = strrchr(a->path, '/');
+
+	return json_pack("{so so sb so so so so so sb so so}", "file", json_text(a->path),
+			 "name", json_text(slash ? slash + 1 : a->path), "reference",
+			 a == job->reference, "code", json_text(s->code), "met",
+			 json_sprintf("%d of %d", a->met, a->judged), "cells",
+			 cells_json(a), "about", about_json(s), "lines",
+			 lines_json(a, job->reference), "membrane", s->has_membrane,
+			 "cuts", cuts_json(s), "phases", phases_json(s));
 }
 
 static void write_page(const struct job *job)
 {
+	json_t *sessions = json_array(), *heads = json_array(), *page;
 	struct incise_error err = {0};
 	struct incise_outfile *file;
-	char *markdown = NULL;
-	size_t size;
-	FILE *page, *out;
-	int rc;
+	FILE *out;
 
-	page = whole_file_begin(job->page, &file);
+	out = whole_file_begin(job->page, &file);
 	folder_make(folder, sizeof(folder), "for the figures");
 	atexit(remove_folder);
 	cli_catch_signals();
 	plot_folder(folder);
-	out = open_memstream(&markdown, &size);
-	if (!out)
-		cli_fail("no memory");
-	put_contents(out, job);
-	put_overview(out, job);
-	for (int i = 0; i < job->n; i++) {
+	for (int i = 0; i < rows(job); i++) {
 		if (cli_stop)
 			cli_fail("%s: interrupted; %s is unchanged", strsignal(cli_stop),
 				 job->page);
 		cli_progress("figures %d of %d", i + 1, job->n);
-		put_session(out, &job->session[i], job->reference, i + 1);
+		if (i < job->n)
+			draw_figures(&job->session[i], job->reference, i + 1);
+		json_array_append_new(sessions, shown_json(job, &job->session[i]));
 	}
-	fclose(out);
+	for (int k = 0; k < INCISE_CRITERIA; k++)
+		json_array_append_new(heads, json_string(session_criterion_head(k)));
 	cli_progress_end();
-	rc = document_html(markdown, folder, page, &err);
-	free(markdown);
-	if (rc)
+	page = json_pack("{ss so so sb}", "title", "Sessions", "heads", heads, "sessions",
+			 sessions, "compared", job->reference != NULL);
+	if (report_script("page", folder, page, out, &err))
 		cli_fail("%s: %s", job->page, err.text);
+	json_decref(page);
 	whole_file_end(file);
 }
 

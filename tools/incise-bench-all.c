@@ -23,21 +23,23 @@
 #include <incise/version.h>
 #include "bench/metrics.h"
 #include "bench/machine.h"
-#include "bench/report.h"
-#include "cli/document.h"
 #include "cli/child.h"
 #include "cli/cli.h"
 #include "cli/file.h"
 #include "cli/folder.h"
 #include "cli/json.h"
 #include "cli/plot.h"
+#include "cli/report_script.h"
 #include "cli/stopwatch.h"
 
-#define BENCHMARKS_MAX 32
+/* In the order of the report. */
+static const char *const benchmarks[] = {"precision", "training", "stability", "loop",
+					 "view",      "scenes",	  NULL};
+#define BENCHMARKS (int)(sizeof(benchmarks) / sizeof(*benchmarks) - 1)
 
 struct job {
 	const char *folder, *from, *against;
-	char *only[BENCHMARKS_MAX];
+	char *only[BENCHMARKS];
 	int n_only;
 	bool quick, json;
 };
@@ -46,18 +48,9 @@ static void parse_only(void *options, char *text)
 {
 	struct job *job = options;
 
-	job->n_only = cli_list("only", text, job->only, BENCHMARKS_MAX);
-	for (int i = 0; i < job->n_only; i++) {
-		const char *names[BENCHMARKS_MAX] = {0};
-		const struct report_section *s = report_sections();
-		int n = 0;
-
-		for (; *s->benchmark && strcmp(s->benchmark, job->only[i]); s++)
-			if (n < BENCHMARKS_MAX - 1)
-				names[n++] = s->benchmark;
-		if (!*s->benchmark)
-			cli_unknown("benchmark", job->only[i], names);
-	}
+	job->n_only = cli_list("only", text, job->only, BENCHMARKS);
+	for (int i = 0; i < job->n_only; i++)
+		cli_choice("only", job->only[i], benchmarks);
 }
 
 static const struct cli_option options[] = {
@@ -198,182 +191,27 @@ static json_t *load_report(const char *path)
 	return report;
 }
 
-static struct incise_outfile *open_part(const char *path, const char *name,
-					struct incise_error *err)
-{
-	char *file = cli_text("%s/%s", path, name);
-	struct incise_outfile *part = incise_outfile_open(file, err);
+/* --- the report --- */
 
-	free(file);
-	return part;
-}
-
-/* --- the text of the report --- */
-
-#define FAILED_MAX 40 /* rows of a benchmark in the text; the JSON has all */
-
-/* The keys that tell a row from its neighbours: its texts, and its settings. */
-static void failed_name(const json_t *row, char *name, size_t size)
-{
-	static const char settings[] = " rate_hz tracker_hz delay_ms gap_ms window_s "
-				       "drift_ppm K_N_m K_N_mm stiffness_N_mm ";
-	const json_t *value;
-	const char *key;
-	size_t n = 0;
-
-	*name = 0;
-	json_object_foreach((json_t *)row, key, value)
-	{
-		const char *text = json_string_value(value);
-		char padded[80], number[64];
-
-		snprintf(padded, sizeof(padded), " %s ", key);
-		if (n >= size || !strcmp(key, "failed") ||
-		    (!text && !(json_is_number(value) && strstr(settings, padded))))
-			continue;
-		report_number(json_number_value(value), 4, number, sizeof(number));
-		n += (size_t)snprintf(name + n, size - n, "%s%s%s%s", n ? ", " : "",
-				      text ? "" : key, text ? "" : " ",
-				      text ? text : number);
-	}
-}
-
-/* Rows with a reason why they failed, wherever they are, as {"benchmark", "row", "why"}. */
-static void find_failed(const char *benchmark, const json_t *value, json_t *rows)
-{
-	const char *why = json_string_value(json_object_get(value, "failed")), *key;
-	const json_t *member;
-	char name[200];
-	size_t i;
-
-	if (why && *why) {
-		failed_name(value, name, sizeof(name));
-		json_array_append_new(rows,
-				      json_pack("{ss so ss}", "benchmark", benchmark,
-						"row", json_text(name), "why", why));
-	}
-	json_array_foreach((json_t *)value, i, member)
-		find_failed(benchmark, member, rows);
-	json_object_foreach((json_t *)value, key, member)
-	{
-		if (strcmp(key, "integrators"))
-			find_failed(benchmark, member, rows);
-	}
-}
-
-static const char *text_at(const json_t *object, const char *key)
-{
-	const char *text = json_string_value(json_object_get(object, key));
-
-	return text ? text : "";
-}
-
-/* {"lines", "rows"}: benchmarks that failed and warnings; rows. */
-static json_t *failures(const json_t *report)
-{
-	json_t *lines = json_array(), *all = json_array();
-	const json_t *run, *json, *line;
-	const char *benchmark;
-	size_t i;
-
-	json_object_foreach(json_object_get(report, "runs"), benchmark, run)
-	{
-		if (strcmp(text_at(run, "state"), "measured"))
-			json_array_append_new(lines, json_sprintf("%s: %s: %s", benchmark,
-								  text_at(run, "state"),
-								  text_at(run, "why")));
-		json_array_foreach(json_object_get(run, "warnings"), i, line)
-			json_array_append_new(lines,
-					      json_sprintf("%s: %s", benchmark,
-							   json_string_value(line)));
-	}
-	json_object_foreach(json_object_get(report, "benchmarks"), benchmark, json)
-	{
-		json_t *rows = json_array();
-		int more;
-
-		find_failed(benchmark, json, rows);
-		more = (int)json_array_size(rows) - FAILED_MAX;
-		while (json_array_size(rows) > FAILED_MAX)
-			json_array_remove(rows, FAILED_MAX);
-		if (more > 0)
-			json_array_append_new(
-				rows, json_pack("{ss so ss}", "benchmark", benchmark,
-						"row", json_sprintf("%d more", more),
-						"why", "see its JSON"));
-		json_array_extend(all, rows);
-		json_decref(rows);
-	}
-	return json_pack("{so so}", "lines", lines, "rows", all);
-}
-
-/* One that cannot be made stays away, and the line says why. */
-static int write_html(const char *path, const char *markdown, struct incise_error *err)
-{
-	struct incise_outfile *file = open_part(path, "report.html", err);
-	int rc;
-
-	if (!file)
-		return -errno;
-	rc = document_html(markdown, path, incise_outfile_stream(file), err);
-	if (!rc)
-		return incise_outfile_commit(file, err);
-	incise_outfile_abort(file);
-	if (rc != -EOPNOTSUPP)
-		return rc;
-	cli_warn("%s/report.html is left out: %s", path, err->text);
-	return 0;
-}
-
+/* report.json, whole or not at all. */
 static int write_json(const char *path, json_t *report, struct incise_error *err)
 {
-	struct incise_outfile *file = open_part(path, "report.json", err);
+	char *name = cli_text("%s/report.json", path);
+	struct incise_outfile *file = incise_outfile_open(name, err);
 
+	free(name);
 	if (!file)
 		return -errno;
 	json_write(incise_outfile_stream(file), report, JSON_INDENT(1));
 	return incise_outfile_commit(file, err);
 }
 
-/* report.html and report.md of report.json. */
-static int write_texts(const char *path, struct incise_error *err)
-{
-	struct incise_outfile *file;
-	char *markdown = NULL;
-	size_t size;
-	json_t *read;
-	FILE *out;
-	int rc;
-
-	read = load_report(path);
-	out = open_memstream(&markdown, &size);
-	if (!out)
-		cli_fail("no memory");
-	json_object_set_new(read, "failures", failures(read));
-	report_markdown(read, path, out);
-	fclose(out);
-	json_decref(read);
-	rc = write_html(path, markdown, err);
-	file = rc ? NULL : open_part(path, "report.md", err);
-	if (file) {
-		fputs(markdown, incise_outfile_stream(file));
-		rc = incise_outfile_commit(file, err);
-	} else if (!rc) {
-		rc = -errno;
-	}
-	free(markdown);
-	return rc;
-}
-
-/*
- * report.json, and report.md and report.html of it, each of them whole or not at all. They are
- * of what a reader of report.json gets, rounded as it is.
- */
+/* report.json, and report.md and report.html of it. */
 static int write_report(const char *path, json_t *report, struct incise_error *err)
 {
 	int rc = write_json(path, report, err);
 
-	return rc ? rc : write_texts(path, err);
+	return rc ? rc : report_script("bench", path, NULL, NULL, err);
 }
 
 /* --- measurement --- */
@@ -462,11 +300,16 @@ static void add_report(json_t *report, const char *benchmark, json_t *json)
 	}
 }
 
+static bool has_program(const char *benchmark)
+{
+	return !strcmp(benchmark, "view");
+}
+
 /* Start it, and wait; its JSON into a file. */
-static int run(const struct report_section *s, const char *program, const char *folder,
+static int run(const char *benchmark, const char *program, const char *folder,
 	       const char *data, bool quick, FILE *said, int number, int of)
 {
-	char *plot = cli_text("%s/plots/%s", folder, s->benchmark);
+	char *plot = cli_text("%s/plots/%s", folder, benchmark);
 	const char *argv[8] = {program};
 	int n = 1, status;
 	FILE *out = fopen(data, "we");
@@ -474,28 +317,30 @@ static int run(const struct report_section *s, const char *program, const char *
 	if (!out)
 		cli_fail("%s: %s", data, strerror(errno));
 	/* A benchmark with a program of its own is not named once more. */
-	if (!strcmp(s->program, "incise-bench"))
-		argv[n++] = s->benchmark;
+	if (!has_program(benchmark))
+		argv[n++] = benchmark;
 	argv[n++] = "--json";
 	if (quick)
 		argv[n++] = "--quick";
-	if (s->plots && plot_possible()) {
+	if (plot_possible()) {
 		argv[n++] = "--plot";
 		argv[n++] = plot;
 	}
 	status = wait_for(child_start((char *const *)argv, fileno(out), fileno(said)),
-			  s->benchmark, number, of);
+			  benchmark, number, of);
 	fclose(out);
 	free(plot);
 	return status;
 }
 
 /* A benchmark that fails is in the report with its last line, and the others go on. */
-static void measure_one(const struct report_section *s, const char *folder, bool quick,
+static void measure_one(const char *benchmark, const char *folder, bool quick,
 			json_t *report, int number, int of)
 {
-	char *program = cli_text("%s/%s", cli_folder(), s->program),
-	     *data = cli_text("%s/data/%s.json", folder, s->benchmark);
+	char *program = cli_text("%s/incise-bench%s%s", cli_folder(),
+				 has_program(benchmark) ? "-" : "",
+				 has_program(benchmark) ? benchmark : ""),
+	     *data = cli_text("%s/data/%s.json", folder, benchmark);
 	struct memory_file said = memory_file_begin("said");
 	double begin_ns = stopwatch_ns();
 	struct incise_error err = {0};
@@ -506,11 +351,11 @@ static void measure_one(const struct report_section *s, const char *folder, bool
 	if (access(program, X_OK)) {
 		snprintf(why, sizeof(why),
 			 "%s is missing: it is built if its libraries are installed",
-			 s->program);
-		note(report, s->benchmark, "left out", 0, why, json_array());
+			 strrchr(program, '/') + 1);
+		note(report, benchmark, "left out", 0, why, json_array());
 		goto out_free;
 	}
-	status = run(s, program, folder, data, quick, said.file, number, of);
+	status = run(benchmark, program, folder, data, quick, said.file, number, of);
 	json = json_read(data, &err);
 	warnings = read_warnings(said.file, status != 0, why, sizeof(why));
 	if (WIFSIGNALED(status))
@@ -521,10 +366,10 @@ static void measure_one(const struct report_section *s, const char *folder, bool
 			 *err.text ? err.text : "no object");
 	else if (!status)
 		*why = 0;
-	note(report, s->benchmark, *why ? "failed" : "measured",
+	note(report, benchmark, *why ? "failed" : "measured",
 	     (stopwatch_ns() - begin_ns) * 1e-9, why, warnings);
 	if (json_is_object(json))
-		add_report(report, s->benchmark, json);
+		add_report(report, benchmark, json);
 	else
 		unlink(data);
 	json_decref(json);
@@ -596,17 +441,21 @@ static void compare(const char *path, const json_t *old, json_t *report)
 static json_t *measure(const struct job *job)
 {
 	json_t *old = job->against ? compare_load(job->against) : NULL, *report;
-	struct folder folder = folder_begin(job->folder);
 	struct incise_error err = {0};
+	struct folder folder;
 	int n = 0, of = 0;
 
+	/* Before minutes of work. */
+	if (report_script("check", NULL, NULL, NULL, &err))
+		cli_fail_with(&err);
+	folder = folder_begin(job->folder);
 	report = begin_report(job);
-	for (const struct report_section *s = report_sections(); *s->benchmark; s++)
-		of += wanted(job, s->benchmark);
-	for (const struct report_section *s = report_sections();
-	     *s->benchmark && !cli_stop; s++)
-		if (wanted(job, s->benchmark))
-			measure_one(s, folder.unfinished, job->quick, report, ++n, of);
+	for (int i = 0; i < BENCHMARKS; i++)
+		of += wanted(job, benchmarks[i]);
+	for (int i = 0; i < BENCHMARKS && !cli_stop; i++)
+		if (wanted(job, benchmarks[i]))
+			measure_one(benchmarks[i], folder.unfinished, job->quick, report,
+				    ++n, of);
 	if (cli_stop) {
 		folder_abandon(&folder);
 		cli_fail("%s: %s is unchanged", strsignal(cli_stop), job->folder);
@@ -673,7 +522,7 @@ int main(int argc, char **argv)
 	if (job.from) {
 		report = load_report(job.from);
 		reserve_files(job.from, true);
-		if (write_texts(job.from, &err))
+		if (report_script("bench", job.from, NULL, NULL, &err))
 			cli_fail_with(&err);
 	} else {
 		report = measure(&job);

@@ -1,31 +1,21 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench view [SCENE]: the time of a frame, by sizes of the texture and of the frame; how far what a
- * screen shows is from the frame of that very moment; whether the view gets all cuts of a fast
- * loop; and whether the loop is later for it. It is a program of its own, as it maps libraries that
- * draw, which other benchmarks do not.
+ * incise bench view [SCENE]: the time of a frame, by sizes of the texture and of the frame, and how far
+ * what a screen shows is from the frame of that very moment. It is a program of its own, as it maps
+ * libraries that draw, which other benchmarks do not.
  */
 #include <stdio.h>
 #include <stdlib.h>
-#include <unistd.h>
-#include <incise/loop.h>
-#include <incise/realtime.h>
-#include <incise/sim.h>
 #include "cli/file.h"
-#include "cli/json.h"
 #include "cli/scene_argument.h"
 #include "cli/stopwatch.h"
-#include "view/live.h"
 #include "view/script.h"
 #include "bench/bench.h"
-#include "bench/wakeup.h"
 
 #define UNTIL_S 14.0 /* of the procedure: cut, bleeding, enlarging */
 #define QUICK_UNTIL_S 1.5
 #define ERROR_UNTIL_S 8.0
 #define QUICK_ERROR_UNTIL_S 2.5
-#define LIVE_S 4.0
-#define QUICK_LIVE_S 0.5
 
 /* The script bleeds from its first second to its end. */
 #define FRAMES_FROM_S 1.0
@@ -524,272 +514,6 @@ static void report_shown(struct bench_run *run, const struct shown_rows *rows)
 	bench_table(run, &shown_table, rows->row, rows->n);
 }
 
-/* --- cuts at 5 kHz: whether the view gets all of them --- */
-
-#define CUTS_HZ 5000
-#define DEEP_MM 3.0
-
-/* A loop in a thread, in real time where that is granted, and a view of it. */
-struct cutting {
-	struct incise_scene *scene;
-	struct incise_rig *rig;
-	struct incise_plan *plan;
-	struct incise_view *view;
-	struct view_live *live;
-	struct incise_touch top;
-	struct incise_realtime *realtime; /* or NULL */
-};
-
-/* To and fro, some 40 mm/s, each time next to the last; where the surface bends down the cut is
- * shallower. */
-static void sweep(const struct cutting *c, double t_s)
-{
-	static const double upright[4] = {1, 0, 0, 0};
-	double along = 2 * t_s, across = 0.3 * t_s;
-	double tip[3] = {c->top.point_mm[0] + 15 * sin(along),
-			 c->top.point_mm[1] + 5 * sin(across),
-			 c->top.point_mm[2] - DEEP_MM};
-	double velocity[3] = {30 * cos(along), 1.5 * cos(across), 0};
-
-	incise_sim_hold(incise_rig_sim(c->rig), tip, velocity, upright);
-}
-
-static void open_cutting(struct cutting *c, const char *path)
-{
-	const struct incise_view_setup setup = {
-		.width = 1280, .height = 720, .live = true};
-	struct incise_error err = {0};
-
-	c->scene = cli_require(incise_scene_load(path, NULL, &err), &err);
-	c->rig =
-		cli_require(incise_rig_open("sim:mouse", INCISE_RIG_TRACKER, &err), &err);
-	c->plan = cli_require(incise_plan_new(c->scene, c->rig, &err), &err);
-	incise_plan_top(c->plan, &c->top);
-	sweep(c, 0);
-	c->view = cli_require(incise_view_new(c->scene, c->plan, &setup, &err), &err);
-	c->realtime = wakeup_realtime(harness_cpu());
-	c->live = cli_require(
-		view_live_begin(c->plan, c->rig, CUTS_HZ, c->realtime, &err), &err);
-}
-
-static void close_cutting(struct cutting *c)
-{
-	view_live_close(c->live);
-	incise_realtime_free(c->realtime);
-	incise_view_free(c->view);
-	incise_plan_free(c->plan);
-	incise_rig_close(c->rig);
-	incise_scene_free(c->scene);
-}
-
-struct absorbed {
-	struct incise_view_report view;
-	double seconds;
-	int frames;
-	uint64_t lost; /* ticks */
-	bool realtime;
-	struct frame_times whole; /* with the ticks' */
-};
-
-static void measure_absorbed(const char *scene, double seconds, struct absorbed *a)
-{
-	struct incise_view_status status = {0};
-	struct incise_error err = {0};
-	int most = (int)(seconds * FPS) + 2;
-	double *ms = cli_alloc(most, sizeof(*ms)), begin;
-	struct cutting c = {0};
-
-	cli_progress("cuts at %d Hz, %.3g s", CUTS_HZ, seconds);
-	open_cutting(&c, scene);
-	begin = stopwatch_ns();
-	while (a->seconds < seconds && !cli_stop) {
-		double due_us, from;
-
-		sweep(&c, a->seconds);
-		from = stopwatch_ns();
-		if (view_live_take(c.live, c.view, NULL, &status, &err) < 0 ||
-		    incise_view_frame(c.view, &status, &err))
-			cli_fail_with(&err);
-		if (a->frames < most)
-			ms[a->frames] = (stopwatch_ns() - from) * 1e-6;
-		a->frames++;
-		due_us = (double)a->frames / FPS * 1e6 - (stopwatch_ns() - begin) * 1e-3;
-		if (due_us > 0)
-			usleep((useconds_t)due_us);
-		a->seconds = (stopwatch_ns() - begin) * 1e-9;
-	}
-	incise_view_report(c.view, &a->view);
-	/* Textures of the first frame, and shaders compiled at the second, are not of a frame. */
-	if (a->frames > 2)
-		a->whole = times_of(ms + 2, (a->frames < most ? a->frames : most) - 2);
-	free(ms);
-	a->lost = status.lost;
-	a->realtime = c.realtime;
-	close_cutting(&c);
-	cli_progress_end();
-	if (cli_stop)
-		cli_fail("interrupted");
-}
-
-static void report_absorbed(struct bench_run *run, const struct absorbed *a)
-{
-	const struct incise_view_report *view = &a->view;
-	double ticks = (double)view->ticks, tick_us = view->ticks_s * 1e6 / ticks;
-
-	bench_values(run, "{s{so so so so ss sI sI sI so so so so}}", "absorbed",
-		     "seconds", json_number(a->seconds), "whole_median_ms",
-		     json_number(a->whole.median), "whole_p99_ms",
-		     json_number(a->whole.p99), "in_20_ms_percent",
-		     json_number(a->whole.in_time), "policy", wakeups_policy(a->realtime),
-		     "ticks", (json_int_t)view->ticks, "lost", (json_int_t)a->lost,
-		     "stamps", (json_int_t)view->stamps, "ticks_hz",
-		     json_number(ticks / a->seconds), "cut_mm", json_number(view->cut_mm),
-		     "effects_us_tick", json_number(tick_us), "frames_hz",
-		     json_number(a->frames / a->seconds));
-	/* However busy the machine is, none may be lost. */
-	metrics_add(run->metrics, METRIC_EXACT, &(double){(double)a->lost}, "1",
-		    "cuts lost");
-	bench_text(
-		run,
-		"\ncontinuous cut at %d Hz (%s): %llu ticks in %.1f s (%.0f per "
-		"second), %llu lost; %.0f mm cut,\n%llu segments; %.2f us per tick for "
-		"wound and blood, %.1f frames per second; a frame takes\n%.1f ms median, "
-		"%.1f ms 99 %%: %.1f %% within %.0f ms\n",
-		CUTS_HZ, a->realtime ? "SCHED_FIFO" : "SCHED_OTHER",
-		(unsigned long long)view->ticks, a->seconds, ticks / a->seconds,
-		(unsigned long long)a->lost, view->cut_mm,
-		(unsigned long long)view->stamps, tick_us, a->frames / a->seconds,
-		a->whole.median, a->whole.p99, a->whole.in_time, 1e3 / PAPER_HZ);
-}
-
-/* --- a loop, without and with the view: A B B A --- */
-
-#define BESIDE_MAX 4
-
-struct beside {
-	struct wakeup run[BESIDE_MAX];
-	int n;
-	double seconds; /* of each */
-	bool realtime;
-	/* Of all runs of a kind: without, with. */
-	double p999_us[2], cyclictest_us[2];
-};
-
-static bool has_view(const struct wakeup *run)
-{
-	return run->load == load_names[LOAD_VIEW];
-}
-
-/* Of the lateness of all runs of a kind together. */
-static double pooled(const struct beside *beside, bool view, bool cyclictest)
-{
-	uint64_t *bins = cli_alloc(INCISE_LOOP_BINS, sizeof(*bins)), ticks = 0;
-	double p999;
-
-	for (int i = 0; i < beside->n; i++) {
-		const struct wakeup *run = &beside->run[i];
-		const struct lateness *l = cyclictest ? &run->cyclictest : &run->loop;
-
-		if (has_view(run) == view && l->bins)
-			for (int k = 0; k < INCISE_LOOP_BINS; k++)
-				bins[k] += l->bins[k], ticks += l->bins[k];
-	}
-	p999 = incise_loop_quantile(bins, 0.999);
-	free(bins);
-	return p999 > 0 && stopwatch_resolves(ticks, 0.999) ? p999 : NAN;
-}
-
-static void measure_beside(const char *scene, double seconds, bool quick,
-			   struct beside *beside)
-{
-	static const enum load_kind order[BESIDE_MAX] = {LOAD_IDLE, LOAD_VIEW, LOAD_VIEW,
-							 LOAD_IDLE};
-
-	*beside = (struct beside){.n = quick ? 2 : BESIDE_MAX, .seconds = seconds};
-	for (int i = 0; i < beside->n; i++) {
-		static struct wakeups wakeups;
-
-		wakeups_measure(scene, NULL, order[i], false, seconds, &wakeups);
-		beside->run[i] = wakeups.row[0];
-		beside->realtime = wakeups.realtime;
-		if (wakeups.row[0].no_load)
-			cli_fail("rendering with a loop: %s", wakeups.row[0].no_load);
-	}
-	for (int view = 0; view < 2; view++) {
-		beside->p999_us[view] = pooled(beside, view, false);
-		beside->cyclictest_us[view] = pooled(beside, view, true);
-	}
-}
-
-static const struct bench_table beside_table = {
-	.key = "beside.runs",
-	.row_bytes = sizeof(struct wakeup),
-	.columns =
-		{
-			COLUMN(wakeup, "load", load, "%-6s", "load"),
-			COLUMN(wakeup, "lateness_us", loop.json),
-			COLUMN(wakeup, NULL, loop.median, "%7.0f", "median"),
-			COLUMN(wakeup, NULL, loop.p99, "%7.0f", "99 %"),
-			COLUMN(wakeup, NULL, loop.p999, "%7.0f", "99.9 %"),
-			COLUMN(wakeup, NULL, loop.p9999, "%7.0f", "99.99 %"),
-			COLUMN(wakeup, NULL, loop.max, "%8.0f", "max"),
-			COLUMN(wakeup, NULL, frames_hz, "%8.1f", "fps", .optional = true,
-			       .blank = true),
-			COLUMN(wakeup, NULL, cyclictest.p999, "%12.0f", "cyclictest",
-			       .blank = true),
-			COLUMN(wakeup, "cyclictest_us", cyclictest.json),
-			COLUMN(wakeup, "frames_hz", frames_hz),
-			COLUMN(wakeup, "skipped", skipped),
-		},
-};
-
-static void print_beside(struct bench_run *run, const struct beside *beside, double ratio,
-			 double cyclictest_ratio)
-{
-	bench_text(run,
-		   "\nwake-up latency without and with rendering, us; %.3g s each, %s\n",
-		   beside->seconds,
-		   beside->realtime ? "SCHED_FIFO"
-				    : "SCHED_OTHER, without real-time permission");
-	bench_table(run, &beside_table, beside->run, beside->n);
-	bench_text(run, "99.9 %% of all: %.0f without, %.0f with: %.2f times",
-		   beside->p999_us[0], beside->p999_us[1], ratio);
-	if (beside->cyclictest_us[0] > 0)
-		bench_text(run, "; cyclictest %.0f and %.0f: %.2f times",
-			   beside->cyclictest_us[0], beside->cyclictest_us[1],
-			   cyclictest_ratio);
-	bench_text(run, "\n");
-}
-
-static void report_beside(struct bench_run *run, const struct beside *beside)
-{
-	const double *p999 = beside->p999_us, *cyclictest = beside->cyclictest_us;
-	double ratio = p999[1] / p999[0],
-	       cyclictest_ratio = cyclictest[1] / cyclictest[0];
-
-	bench_values(run, "{s{sf ss so so so so so so}}", "beside", "seconds",
-		     beside->seconds, "policy", wakeups_policy(beside->realtime),
-		     "p999_us", json_number(p999[0]), "p999_view_us",
-		     json_number(p999[1]), "ratio_p999", json_number(ratio),
-		     "cyclictest_p999_us", json_number(cyclictest[0]),
-		     "cyclictest_p999_view_us", json_number(cyclictest[1]),
-		     "cyclictest_ratio_p999", json_number(cyclictest_ratio));
-	for (int view = 0; view < 2; view++) {
-		double median[BESIDE_MAX];
-		struct harness_spread spread;
-		int n = 0;
-
-		for (int i = 0; i < beside->n; i++)
-			if (has_view(&beside->run[i]) == view)
-				median[n++] = beside->run[i].loop.median;
-		harness_spread(median, n, &spread);
-		metrics_add(run->metrics, METRIC_MEASURED, &spread, "us",
-			    "loop late %s the picture, median",
-			    view ? "with" : "without");
-	}
-	print_beside(run, beside, ratio, cyclictest_ratio);
-}
-
 /* --- the benchmark --- */
 
 static const char neck[] =
@@ -806,13 +530,8 @@ static const char neck[] =
 
 static void run_view(struct bench_run *run)
 {
-	double seconds = run->seconds > 0 ? run->seconds
-			 : run->quick	  ? QUICK_LIVE_S
-					  : LIVE_S;
 	static struct frame_rows frames;
 	static struct shown_rows shown;
-	static struct absorbed absorbed;
-	static struct beside beside;
 	const char *scene = run->operands[0];
 	struct view_script script;
 
@@ -825,19 +544,14 @@ static void run_view(struct bench_run *run)
 		scene = own.path;
 	}
 	cli_catch_signals();
-	/* First: this one locks what memory there is. */
-	measure_beside(scene, seconds, run->quick, &beside);
 	view_script_begin(&script, scene, run->quick ? QUICK_ERROR_UNTIL_S : UNTIL_S);
 	measure_frames(&script, run->quick, &frames);
 	measure_shown(&script, run->quick, &frames, &shown);
 	view_script_end(&script);
-	measure_absorbed(scene, seconds, &absorbed);
 	bench_text(run, "%s, %s\n\n", bench_machine(run, "cpu"),
 		   bench_machine(run, "kernel"));
 	report_frames(run, &frames);
 	report_shown(run, &shown);
-	report_absorbed(run, &absorbed);
-	report_beside(run, &beside);
 }
 
 static const struct bench bench_view = {
@@ -863,9 +577,6 @@ static const struct cli_option options[] = {
 	{0, "plot", "NAME",
 	 "plot error over run time as NAME.png and NAME.svg,\nand run times of frames as NAME-frames",
 	 CLI_OUTPUTS(struct bench_run, plot)},
-	{0, "duration", "TIME",
-	 "of each run with a loop and of the test of cuts\n(default: 4s)",
-	 CLI_DURATION(struct bench_run, seconds, 0.5, 86400)},
 	{0, "quick", NULL, "smoke test with fewer frames and runs",
 	 CLI_FLAG(struct bench_run, quick)},
 	{0},
@@ -876,9 +587,8 @@ static const struct cli_command command = {
 	.synopsis = "[SCENE] [OPTIONS]",
 	.summary =
 		"Measure the image of a scene, rendered off-screen while a cut bleeds: run time of a\n"
-		"frame by sizes of texture and image; error against a finer texture; lost cuts of a\n"
-		"loop of 5 kHz; wake-up latency of a loop without and with rendering. Without SCENE\n"
-		"it renders the neck of Bhasin et al. (2005).",
+		"frame by sizes of texture and image; error against a finer texture. Without SCENE it\n"
+		"renders the neck of Bhasin et al. (2005).",
 	.options = options,
 	.notes = "Exit: 0 success; 1 failure or worse metrics; 2 bad usage.\n"
 		 "See incise-bench-view(1).",
@@ -896,7 +606,6 @@ int main(int argc, char **argv)
 	if (run.n_operands)
 		scene_argument_operand(&argument, argc, argv, optind);
 	run.operands = (char *[]){(char *)argument.path};
-	incise_realtime_prepare();
 	bench_measure(&run);
 	return 0;
 }

@@ -2,7 +2,6 @@
 /*
  * incise bench NAME: the benchmarks of bench/bench.h by their names.
  */
-#include <limits.h>
 #include <stdio.h>
 #include <string.h>
 #include "bench/bench.h"
@@ -17,11 +16,6 @@ static void parse_profile(void *profile, char *text)
 	*(const char **)profile = names[cli_choice("profile", text, names)];
 }
 
-static void parse_seed(void *seed, char *text)
-{
-	*(long *)seed = cli_integer("seed", text, 1, LONG_MAX);
-}
-
 static const struct cli_option options[] = {
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct bench_run, json)},
 	{0, "against", "OLD.json",
@@ -29,12 +23,11 @@ static const struct cli_option options[] = {
 	 CLI_INPUT(struct bench_run, against)},
 	{0, "plot", "NAME",
 	 "plot error over run time as NAME.png and NAME.svg;\n"
-	 "stability: NAME-map, -rest, -guard, -integrators;\n"
-	 "loop: NAME-wakeups, NAME-rates;\n"
-	 "pose: NAME, NAME-rates; timeline: NAME, NAME-windows",
+	 "stability: NAME-map, -rest, -integrators;\n"
+	 "loop: NAME-wakeups",
 	 CLI_OUTPUTS(struct bench_run, plot)},
 	{0, "duration", "TIME",
-	 "capture: of each run (default: 7s); loop and serve:\nof each measurement of wake-up latency (default: 5s)",
+	 "loop: of each measurement of wake-up latency\n(default: 5s)",
 	 CLI_DURATION(struct bench_run, seconds, 1, 86400)},
 	{0, "load", "NAME",
 	 "loop: wake-up latency under one load only: idle,\ncpu, memory, disk or view",
@@ -42,19 +35,13 @@ static const struct cli_option options[] = {
 	{0, "profile", "STAGES",
 	 "scenes: run one test path of one scene for perf stat\nor callgrind, with its stages or with all: needed\nor full",
 	 CLI_PARSED(struct bench_run, profile, parse_profile)},
-	{0, "seed", "N",
-	 "extremes: seed of the cases, coverage: of the rigs (default: 1)",
-	 CLI_PARSED(struct bench_run, seed, parse_seed)},
 	{0, "quick", NULL, "smoke test with fewer points and repeats",
 	 CLI_FLAG(struct bench_run, quick)},
 	{0},
 };
 
 static const struct bench *const benches[] = {
-	&bench_precision, &bench_training, &bench_prediction, &bench_stability,
-	&bench_loop,	  &bench_pose,	   &bench_timeline,   &bench_vision,
-	&bench_capture,	  &bench_serve,	   &bench_scenes,     &bench_integers,
-	&bench_extremes,  &bench_coverage,
+	&bench_precision, &bench_training, &bench_stability, &bench_loop, &bench_scenes,
 };
 
 /* --- help --- */
@@ -119,7 +106,7 @@ static _Noreturn void compare(const struct bench_run *run, int argc, char **argv
 	if (argc != 3)
 		cli_usage("expected 'compare' and two reports");
 	if (run->plot || run->load || run->profile || run->against || run->quick ||
-	    run->seed || run->seconds > 0)
+	    run->seconds > 0)
 		cli_usage("'compare' takes no option but --json");
 	for (int i = 0; i < 2; i++) {
 		file_expect(argv[1 + i], FILE_REPORT);
@@ -184,7 +171,6 @@ int main(int argc, char **argv)
 	allow(bench, run.seconds > 0, bench->takes_duration, "duration");
 	allow(bench, run.load, bench->takes_load, "load");
 	allow(bench, run.profile, bench->takes_profile, "profile");
-	allow(bench, run.seed, bench->takes_seed, "seed");
 	run.operands = argv + 1;
 	run.n_operands = argc - 1;
 	bench_measure(&run);

@@ -50,31 +50,4 @@ int32_t incise_fixed_spring_pull(const struct incise_fixed_spring *spring,
 int32_t incise_fixed_spring_push(const struct incise_fixed_spring *spring,
 				 const int32_t p[3], int32_t force[3]) INCISE_REALTIME;
 
-#ifndef __KERNEL__
-/*
- * Take a spring's numbers from double, each rounded to the nearest.
- *
- * @param stiffness_N_mm 0 … 32767
- * @param anchor_mm      within ±32767
- * @param direction      unit vector, within 1e-6; made one in full
- * @return 0; -EINVAL (not finite, a stiffness below 0, not a unit vector), -ERANGE (more
- *         than the format holds). @spring is left as it was then.
- */
-int incise_fixed_spring_set(struct incise_fixed_spring *spring, double stiffness_N_mm,
-			    const double anchor_mm[3],
-			    const double direction[3]) INCISE_REALTIME;
-
-/*
- * The certified error of either force: the length of its difference, as a vector, from
- * the formula in real numbers, hence of each component too. It holds for every P with
- * |P - P0| ≤ @reach_mm, every P0 and u that incise_fixed_spring_set() takes (u made a
- * unit vector in full), and covers the rounding of P (to the nearest LSB), of P0, u and
- * K, and of all steps, as long as the sum in force[] is not held.
- *
- * @return bound, N; HUGE_VAL where the spring may be held (more than 32767 N, or reach
- *         beyond 16383 mm), or for what is no number.
- */
-double incise_fixed_spring_bound(double stiffness_N_mm, double reach_mm);
-#endif
-
 #endif

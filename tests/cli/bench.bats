@@ -173,19 +173,19 @@ setup() {
 }
 
 @test "bench --against compares what was just measured" {
-	quick_report timeline
+	quick_report training
 	# what is exact is the same in every run; of times nothing is judged here
-	run --separate-stderr incise bench timeline --quick --against r.json
+	run --separate-stderr incise bench training --quick --against r.json
 	[[ "$output" == *"same, "*" 0 gone, 0 new"* ]]
 	[[ "$output" != *" 1, worse"* && "$output" != *" 1, better"* ]]
-	incise bench timeline --quick --against r.json --json >both.json || true
+	incise bench training --quick --against r.json --json >both.json || true
 	[ "$(key both.json against.gone)" = "[]" ]
 	[ "$(key both.json quick)" = 1 ]
 	# said before the work
 	echo '{}' >bad.json
-	run --separate-stderr incise bench timeline --against bad.json
+	run --separate-stderr incise bench training --against bad.json
 	failed_with bad.json "no metrics"
-	run --separate-stderr incise bench timeline --against r.json --load cpu
+	run --separate-stderr incise bench training --against r.json --load cpu
 	bad_usage "--load"
 }
 
@@ -391,58 +391,13 @@ in_order() {
 	bench_interrupted loop --quick --load disk --duration 1min "$root/scenes/wall.scene"
 }
 
-# One value of a row of `rates`: rate wall exact 1000 hold_N.
-rate() {
-	sqlite3 :memory: "SELECT json_extract(value, '\$.$4')
-		FROM json_each(readfile('r.json'), '\$.rates')
-		WHERE json_extract(value, '\$.wall') = '$1' AND json_extract(value, '\$.poses') = '$2'
-		AND json_extract(value, '\$.rate_hz') = $3"
-}
-
-# In simulated time, the same on each machine.
 # bats test_tags=slow
-@test "bench loop: the error of the force falls with the rate, as theory says" {
-	incise bench loop --quick --load view --json "$root/scenes/wall.scene" >r.json
-	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'), '$.rates')")" = 18 ]
-	# of a mean slope T/sqrt(3); the predictor's noise of some 50 uN is beside it
-	for hz in 250 500 1000 2000; do
-		hold=$(rate wall exact $hz hold_N)
-		holds "$(rate wall exact $hz command.rms_error_N) > 0.99 * $hold"
-		holds "$(rate wall exact $hz command.rms_error_N) < 1.03 * $hold + 5e-5"
-		holds "($(rate wall exact 250 hold_N) * 250 / $hz / $hold - 1) ^ 2 < 1e-18"
-	done
-	for poses in tracker exact; do
-		last=1
-		for hz in 250 500 1000 2000 4000 8000; do
-			holds "$(rate wall $poses $hz command.rms_error_N) < $last"
-			last=$(rate wall $poses $hz command.rms_error_N)
-			# of 3.4 N at most
-			holds "$(rate wall $poses $hz command.max_error_N) < 0.1"
-			holds "$(rate wall $poses $hz rendered.rms_error_N) > $last"
-			holds "$(rate wall $poses $hz rendered.max_error_N) < 0.2"
-			holds "$(rate wall $poses $hz command.relative) > $last / 3.5"
-			holds "$(rate wall $poses $hz tick_ns) > 0"
-			[ -z "$(rate wall $poses $hz failed)" ]
-		done
-	done
-	for hz in 250 500; do
-		[[ "$(rate stiff exact $hz failed)" == "not stable: "* ]]
-		[ -z "$(rate stiff exact $hz command.rms_error_N)" ]
-	done
-	holds "$(rate stiff exact 1000 limit_N_mm) > $(rate stiff exact 1000 stiffness_N_mm)"
-}
-
-# bats test_tags=slow
-@test "bench loop draws lateness and error" {
+@test "bench loop draws lateness" {
 	command -v gnuplot >/dev/null || skip "gnuplot is not installed, it draws the chart"
 	run -0 --separate-stderr incise bench loop --quick --load idle --plot "a folder/w" \
 		"$root/scenes/wall.scene"
 	[ -z "$stderr" ]
-	for part in wakeups rates; do
-		[ "$(head -c 8 "a folder/w-$part.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
-		grep -q '<svg' "a folder/w-$part.svg"
-	done
-	grep -q 'exact poses' "a folder/w-rates.svg"
+	[ "$(head -c 8 "a folder/w-wakeups.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
 	grep -q '1 kHz, idle' "a folder/w-wakeups.svg"
 }
 
@@ -461,8 +416,7 @@ rate() {
 @test "bench stability finds in time what theory says" {
 	quick_report stability
 	# the tolerances of the manual
-	for list in exact_limit:0.01 colgate:0.01 gil:0.02 amplitude:0.03 quantisation:0.01 \
-		leak:0.03 break_even:0.03; do
+	for list in exact_limit:0.01 colgate:0.01 quantisation:0.01; do
 		holds "$(of ${list%:*} 'count(*)') >= 3"
 		holds "$(of ${list%:*} 'min(ratio)') >= 1 - ${list#*:}"
 		holds "$(of ${list%:*} 'max(ratio)' 'NOT at_least') <= 1 + ${list#*:}"
@@ -484,27 +438,7 @@ rate() {
 	[ -n "$(key r.json machine.cpu)" ]
 }
 
-@test "bench stability: guards in the real plan, and whether one wins" {
-	quick_report stability
-	for guard in none passivity delayed energy_bounding coupling; do
-		[ "$(of guards 'count(*)' "guard = '$guard'")" = 5 ]
-		[ "$(of guards_stiffest 'count(*)' "guard = '$guard'")" = 4 ]
-		holds "$(of guards_ns ns "guard = '$guard'") > 0"
-	done
-	# scenes rest at their own gain without a guard, and at most half do at twice the largest
-	holds "$(of guards rest_share "guard = 'none' AND own") == 1"
-	holds "$(of guards rest_share "guard = 'none' AND gain = 2") <= 0.5"
-	# a coupling makes that rest by another force; below its limit it does nothing
-	holds "$(of guards rests "guard = 'coupling' AND gain = 2") > $(of guards rests "guard = 'none' AND gain = 2")"
-	holds "$(of guards error_share "guard = 'coupling' AND gain = 2") > 0.07"
-	holds "$(of guards error_N "guard = 'coupling' AND gain = 1") == 0"
-	# damping that comes late takes rest away
-	holds "$(of guards rests "guard = 'delayed' AND own") < $(of guards rests "guard = 'none' AND own")"
-	[ "$(key r.json guards_winner)" = none ]
-	[[ "$(key r.json guards_verdict)" == "none wins: "* ]]
-}
-
-@test "bench stability: what the plan accepts comes to rest, and no closed motion gives work back" {
+@test "bench stability: what the plan accepts comes to rest" {
 	quick_report stability
 	holds "$(of rest 'count(*)') >= 16"
 	[ "$(of rest 'min(rests)' "verdict = 'accepted'")" = 1 ]
@@ -519,14 +453,6 @@ rate() {
 	[ "$(of rest 'count(*)' "why LIKE '%/proc/%'")" = 0 ]
 	holds "$(of rest 'max(swing_mm)' "verdict = 'refused'") > 0.1"
 	[ "$(of rest_sums 'sum(cases)')" = "$(of rest 'count(*)')" ]
-	[ "$(of work 'sum(returned)')" = 0 ]
-	for scene in liver neck wall; do
-		holds "$(of work in_contact "scene = '$scene' AND tool = 'blade'") > 100"
-	done
-	# the liver takes work, a wall gives back what it took
-	holds "$(of work median_N_mm "scene = 'liver'") > 0.1"
-	holds "$(of work 'abs(median_N_mm)' "scene = 'wall'") < 1e-3"
-	[ "$(of work 'count(*)' "scene = 'neck'")" = 4 ]
 }
 
 @test "bench stability: paper 2's forces, their error and time" {
@@ -567,12 +493,11 @@ rate() {
 	run -0 --separate-stderr incise bench stability --quick "${plot[@]}"
 	[ -z "$stderr" ]
 	[[ "$output" == *"quick: a part of each grid"* ]]
-	[[ "$output" == *"none wins: "* ]]
 	[[ "$output" == *"diverged"* ]]
-	[ "$(grep -c '  ok$' <<<"$output")" -ge 30 ]
+	[ "$(grep -c '  ok$' <<<"$output")" -ge 15 ]
 	[[ "$output" != *MISSED* ]]
 	[ -n "${plot[*]}" ] || skip "gnuplot is not installed, it draws the chart"
-	for part in map rest guard integrators; do
+	for part in map rest integrators; do
 		[ "$(head -c 8 "a folder/w-$part.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
 		grep -q '<svg' "a folder/w-$part.svg"
 	done
@@ -590,101 +515,3 @@ rate() {
 	bad_usage "--plot"
 }
 
-# bats test_tags=slow
-@test "bench vision reports error and time of each kind of picture" {
-	[ -e "$INCISE_BUILD/lib/incise/vision_opencv.so" ] || skip "OpenCV's headers were absent"
-	quick_report vision
-	for k in {0..17}; do
-		holds "$(key r.json "rows[$k].found") >= 7 && $(key r.json "rows[$k].pictures") == 10"
-		holds "$(key r.json "rows[$k].bias_px") < 0.1 && $(key r.json "rows[$k].bias_px") > -0.1"
-		holds "$(key r.json "rows[$k].us") > 0"
-		holds "$(key r.json "rows[$k].rms_error_px") <= $(key r.json "rows[$k].max_error_px")"
-		holds "$(key r.json "rows[$k].max_error_px") < 2"
-		holds "$(key r.json "rows[$k].us") <= $(key r.json "rows[$k].us_p99")"
-	done
-	[ "$(key r.json "rows[0].region") $(key r.json "rows[1].region")" = "follows whole" ]
-	if command -v gnuplot >/dev/null; then
-		incise bench vision --quick --plot x
-		grep -q '>rgb 1280<' x.svg
-	fi
-	run -2 --separate-stderr incise bench capture --plot x
-	bad_usage "--plot does not go with 'capture'"
-}
-
-# Pictures need modules: OpenCV's for the run `full`, libavformat's and libjpeg for all.
-needs_pictures() {
-	for module in vision_opencv frames_mkv; do
-		[ -e "$INCISE_BUILD/lib/incise/$module.so" ] || skip "$module.so was not built"
-	done
-}
-
-# bats test_tags=slow
-@test "bench capture tells what a whole capture takes, and leaves nothing behind" {
-	needs_pictures
-	mkdir t
-	TMPDIR=$PWD/t incise bench capture --quick --json >r.json
-	[ -z "$(ls -A t)" ]
-	for run in full without_vision without_camera force_100_kHz virtual_rig virtual_100_kHz; do
-		holds "$(row r.json $run cpu_percent) > 0 && $(row r.json $run late_ms) > 0"
-		holds "$(row r.json $run quarter_MB) > 1 && $(row r.json $run end_MB) > 1"
-		# of 0.8 s at least; the tracker's last record may be under way, and a stream has
-		# room for 2.5 s
-		hz=10000
-		case $run in *100_kHz) hz=100000 ;; esac
-		holds "$(row r.json $run force) + $(row r.json $run force_lost) >= 0.8 * $hz - 1"
-		holds "$(row r.json $run tracker) + $(row r.json $run tracker_lost) >= 190"
-		frames=$(($(row r.json $run frames) + $(row r.json $run frames_lost)))
-		[ "$run" = without_camera ] && [ "$frames" = 0 ] || [ "$frames" -ge 47 ]
-	done
-	[ "$(row r.json virtual_rig net_percent)" = 0.0 ]
-	holds "$(row r.json full net_percent) == $(row r.json full cpu_percent) - \
-		$(row r.json virtual_rig cpu_percent)" || holds "$(row r.json full net_percent) > 0"
-	[ "$(key r.json force_hz) $(key r.json tracker_hz) $(key r.json camera_hz)" = "10000.0 240.0 60.0" ]
-	[ "$(key r.json width) $(key r.json height) $(key r.json seconds)" = "640 480 0.8" ]
-}
-
-@test "bench capture of one run, for a given time" {
-	needs_pictures
-	mkdir t
-	TMPDIR=$PWD/t incise bench capture without_camera --duration 1s --json >r.json
-	[ "$(key r.json 'rows[0].name') $(key r.json seconds)" = "without_camera 1.0" ]
-	[ "$(sqlite3 :memory: "SELECT json_array_length(readfile('r.json'), '$.rows')")" = 1 ]
-	TMPDIR=$PWD/t incise bench capture without_camera --duration 1s >text
-	grep -q '^without_camera ' text
-	run --separate-stderr incise bench vision --duration 1s
-	bad_usage "--duration does not go with 'vision'"
-}
-
-@test "bench capture that is interrupted, or has no room, leaves nothing behind" {
-	needs_pictures
-	mkdir t
-	bench_interrupted capture
-	TMPDIR=$PWD/none run --separate-stderr incise bench capture --quick
-	failed_with "$PWD/none/" TMPDIR
-	run --separate-stderr incise bench capture more
-	bad_usage "'more' is no run of capture"
-}
-
-@test "bench capture without vision's module says so at once" {
-	mkdir t modules
-	TMPDIR=$PWD/t INCISE_MODULE_PATH=$PWD/modules run --separate-stderr incise bench capture
-	failed_with vision_opencv.so
-	[ -z "$(ls -A t)" ]
-}
-
-@test "bench serve: poses reach a client next to a bare socket, and the loop ticks meanwhile" {
-	quick_report serve
-	for name in "bare socket" "rig to client" "loop to client"; do
-		# a second of 1 kHz, on a machine that may be busy
-		holds "$(row r.json "$name" messages) >= 100"
-		holds "0 <= $(row r.json "$name" p50_us) && $(row r.json "$name" p50_us) <= $(row r.json "$name" max_us)"
-	done
-	for i in 0 1; do
-		holds "$(key r.json "loop[$i].ticks") >= 100 && $(key r.json "loop[$i].p50_us") > 0"
-	done
-	[ "$(key r.json 'loop[0].name') $(key r.json 'loop[1].name')" = "alone 8 clients" ]
-	mkdir t
-	bench_interrupted serve --quick
-	run --separate-stderr incise bench serve --plot x
-	bad_usage "--plot does not go with 'serve'"
-}

@@ -70,24 +70,6 @@ in_plan() {
 	[[ "$(row r.json neck files_open)" != */dev/* ]]
 }
 
-@test "the full pipeline takes more instructions where stages are left out" {
-	command -v valgrind >/dev/null || skip "valgrind is not installed, it counts instructions"
-	incise bench scenes --json wall >r.json
-	[ -n "$(key r.json instructions_by)" ] || skip "$(key r.json instructions_failed)"
-	holds "$(row r.json wall instructions) > 100"
-	holds "$(row r.json wall full_instructions) > 1.1 * $(row r.json wall instructions)"
-}
-
-@test "without a counter and valgrind instructions are null, and why is said" {
-	mkdir bin
-	PATH="$PWD/bin" "$INCISE_BUILD/bin/incise" bench scenes --json wall >r.json
-	[ "$(key r.json instructions_by)" != callgrind ]
-	if [ -z "$(key r.json instructions_by)" ]; then
-		[[ "$(key r.json instructions_failed)" == *valgrind* ]]
-		[ -z "$(row r.json wall instructions)" ]
-	fi
-}
-
 @test "a scene that cannot be is a row with the reason, and a failure after the report" {
 	echo 'tissue = { reaction_N_mm = 50.0; };' >stiff.scene
 	run -1 --separate-stderr incise bench scenes --quick --json stiff.scene none wall

@@ -56,18 +56,10 @@ draws() {
 	holds "$(exact 1024 rms_error 15) > $(exact 1024 rms_error 60) && $(exact 1024 rms_error 60) > 0"
 	holds "$(exact 512 rms_error 15) > $(exact 512 rms_error)"
 	incise bench compare r.json r.json
-	# no cut is lost, however busy the machine
-	[ "$(key r.json absorbed.lost)" = 0 ]
-	holds "$(key r.json absorbed.ticks) > 0 && $(key r.json absorbed.stamps) > 0"
-	[ "$(key r.json beside.runs[0].load) $(key r.json beside.runs[1].load)" = "idle view" ]
-	holds "$(key r.json beside.runs[1].frames_hz) > 0"
-	holds "$(key r.json beside.p999_us) > 0 && $(key r.json beside.p999_view_us) > 0"
 	[ "$(head -c 8 "a folder/v.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
 	grep -q 'texture of 1024' "a folder/v.svg"
 	grep -q '50 Hz' "a folder/v-frames.svg"
 	holds "$(key r.json frames[0].in_20_ms_percent) >= 0 && $(key r.json frames[0].in_20_ms_percent) <= 100"
-	holds "$(key r.json absorbed.whole_median_ms) > 0"
-	holds "$(key r.json absorbed.whole_median_ms) <= $(key r.json absorbed.whole_p99_ms)"
 }
 
 @test "bench view: bad usage" {

@@ -85,10 +85,11 @@ running_loop() {
 	report status status ./neck.state
 	report tool tool ./neck.state handle
 	incise status ./neck.state --follow --json >out/status.follow.json 3>&- &
+	follow=$!
 	await test -s out/status.follow.json
 	# which ends the other as well
 	kill -TERM $loop
-	wait
+	wait $loop $follow
 }
 
 devices() {

@@ -197,7 +197,7 @@ print(max(math.dist(p, q) for i, p in ends for k, q in ends if i == k))')
 	mkdir t
 	export TMPDIR=$PWD/t
 	incise assess easy.session hard.session --reference easy.session -o p.html 2>why >out ||
-		{ grep -q "without libcmark-gfm" why && skip "$(cat why)"; false; }
+		{ grep -q "python3-jinja2 is not installed" why && skip "$(cat why)"; false; }
 	[ "$(tail -n 1 out)" = "wrote p.html" ]
 	# two figures each
 	[ "$(grep -o 'src="data:image/svg+xml;base64,' p.html | wc -l)" -eq 4 ]
@@ -224,7 +224,7 @@ print(max(math.dist(p, q) for i, p in ends for k, q in ends if i == k))')
 	run -0 --separate-stderr incise assess a.session
 	[ -z "$stderr" ]
 	[[ "$output" =~ time\ needed\ +-\ +at\ most\ 40\ +no ]]
-	incise assess a.session -o a.html >/dev/null 2>why || grep -qE "gnuplot is not installed|without libcmark-gfm" why
+	incise assess a.session -o a.html >/dev/null 2>why || grep -qE "gnuplot is not installed|python3-jinja2 is not installed" why
 	python3 - <<-'END'
 		import json
 		s = json.load(open('a.session'))
@@ -236,7 +236,7 @@ print(max(math.dist(p, q) for i, p in ends for k, q in ends if i == k))')
 	run -0 --separate-stderr incise assess b.session
 	[ -z "$stderr" ]
 	[[ "$output" == *"5 of 5 ticks were lost"* ]]
-	incise assess b.session -o b.html >/dev/null 2>why || grep -qE "gnuplot is not installed|without libcmark-gfm" why
+	incise assess b.session -o b.html >/dev/null 2>why || grep -qE "gnuplot is not installed|python3-jinja2 is not installed" why
 }
 
 # refused TEXT…: bad.session is, in one line.
@@ -284,7 +284,7 @@ refused() {
 	[ "$(key b.json 'sessions[0].met')" = 8 ]
 	[ "$(key b.json 'sessions[0].criteria.insertion_depth_mm.met')" = 0 ]
 	# the page has the membrane
-	incise assess a.session -o a.html >/dev/null 2>why || { grep -qE "gnuplot is not installed|without libcmark-gfm" why && skip "$(cat why)"; }
+	incise assess a.session -o a.html >/dev/null 2>why || { grep -qE "gnuplot is not installed|python3-jinja2 is not installed" why && skip "$(cat why)"; }
 	python3 - a.html <<-'END'
 		import base64, re, sys
 		figures = re.findall('base64,([A-Za-z0-9+/=]+)', open(sys.argv[1]).read())

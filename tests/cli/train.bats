@@ -385,6 +385,6 @@ peak_kb() {
 	mkfifo pipe
 	timeout 60 cat pipe >got &
 	timeout 60 "$INCISE_BUILD/bin/incise" train d.csv --mf 2,2 -o pipe >/dev/null 2>&1
-	wait
+	wait $!
 	grep -q '^\[Rules\]' got
 }

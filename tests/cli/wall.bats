@@ -148,7 +148,7 @@ setup() {
 		        pass
 	END
 	captures -o a.rec --rig "$real" --trigger sync:events --duration 300ms
-	wait
+	wait $!
 	[ "$(ask a.rec "SELECT text FROM events WHERE kind = 'sync' ORDER BY rowid LIMIT 1")" = "pulse 7" ]
 	# noted at its edge, a poll or more before the trigger was seen
 	[ "$(ask a.rec "SELECT (SELECT t_ns FROM events WHERE kind = 'trigger') >

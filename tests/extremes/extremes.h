@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * Properties of the library that hold whatever comes in. Each generates cases, the same ones by
- * seed, and checks them. Unit tests try a part of the cases, incise bench extremes all of them.
+ * seed, and checks them. Unit tests try a part of the cases, tests/bench/extremes all of them.
  *
  *     case ──▶ held     the result is as it must be, and within its limits
  *          ├─▶ refused  with a line that gives the reason
@@ -36,7 +36,7 @@ struct property {
 	void (*all)(struct extremes_row *row, const struct property *property);
 	int kind;	     /* of several properties that share a function */
 	const void *of;	     /* the same */
-	bool for_tests_only; /* incise bench extremes has no row for it */
+	bool for_tests_only; /* tests/bench/extremes has no row for it */
 };
 
 /* By interface; each ends with a property without a name. */

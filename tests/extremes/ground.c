@@ -4,7 +4,7 @@
  */
 #include <math.h>
 #include <string.h>
-#include "../../tools/bench/all_forces.h"
+#include "all_forces.h"
 #include "../../tools/cli/cli.h"
 #include "../../tools/cli/file.h"
 #include "ground.h"

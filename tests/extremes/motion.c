@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../../lib/fixed/profile.h"
-#include "../../lib/fixed/spring.h"
 #include "../unit/fixed/profile_watch.h"
 #include "extremes.h"
+#include "fixed_spring.h"
 #include "numbers.h"
 
 #define TICKS 300

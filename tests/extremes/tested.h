@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * Properties as unit tests, one each: of those that incise bench extremes tries a part of the cases.
+ * Properties as unit tests, one each: of those that tests/bench/extremes tries a part of the cases.
  */
 #ifndef INCISE_EXTREMES_TESTED_H
 #define INCISE_EXTREMES_TESTED_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
  * Pictures of a black scalpel over liver whose truth is known to a hundredth of a pixel:
- * for incise bench vision and the tests of lib/vision. Apart from the virtual camera of
+ * for tests/bench/vision and the tests of lib/vision. Apart from the virtual camera of
  * the library on purpose.
  *
  *          ┌──┐             Edges are sampled 256 times per pixel. angle_deg turns the

@@ -258,47 +258,6 @@ void bench_failures(const struct bench_run *run, const struct bench_table *table
 	}
 }
 
-void bench_block(const struct bench_run *run, const struct bench_block *block,
-		 size_t row_bytes, const void *rows, int n, int n_across, int usual)
-{
-	const char *row = rows, *between = block->between ? block->between : "";
-
-	if (run->json)
-		return;
-	printf("%*s", width_of(block->line.format), block->corner);
-	for (int k = 0; k < n_across; k++) {
-		putchar(' ');
-		print_cell(&block->across, row + (size_t)k * n * row_bytes);
-	}
-	fputs(between, stdout);
-	for (const struct bench_column *c = block->columns; c->heading; c++)
-		if (*c->heading)
-			printf(" %*s", width_of(c->format), c->heading);
-	putchar('\n');
-	for (int i = 0; i < n; i++, row += row_bytes) {
-		print_cell(&block->line, row);
-		for (int k = 0; k < n_across; k++) {
-			const char *cell = row + (size_t)k * n * row_bytes;
-			const char *failed = block->failed ? cell + block->failed : "";
-
-			putchar(' ');
-			if (*failed && !block->mark)
-				printf("%*s", width_of(block->cell.format), failed);
-			else
-				print_cell(&block->cell, cell);
-			if (block->mark)
-				putchar(*failed ? '*' : ' ');
-		}
-		if (block->columns->heading)
-			printf("%*s", (int)strlen(between), "");
-		for (const struct bench_column *c = block->columns; c->heading; c++) {
-			putchar(' ');
-			print_cell(c, row + (size_t)usual * n * row_bytes);
-		}
-		putchar('\n');
-	}
-}
-
 /* --- JSON and metrics --- */
 
 /* "a.b" is b of the object a, which is made where it is missing. */
@@ -378,6 +337,20 @@ static void add_metric(json_t *metrics, const struct bench_table *table,
 		metrics_more_is_better(added);
 }
 
+static void write_line(FILE *out, const struct bench_table *table, const void *row)
+{
+	char word[TEXT_BYTES];
+
+	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
+		if (c->key) {
+			if (row)
+				word_of(c, row, "%.10g", word, sizeof(word));
+			fprintf(out, "%s%s", c == table->columns ? "" : "\t",
+				row ? word : c->key);
+		}
+	fputc('\n', out);
+}
+
 void bench_rows(struct bench_run *run, const struct bench_table *table, const void *rows,
 		int n)
 {
@@ -393,6 +366,12 @@ void bench_rows(struct bench_run *run, const struct bench_table *table, const vo
 		for (const struct bench_metric *m = table->metrics; m->name; m++)
 			if (matches(table, m->where, row))
 				add_metric(run->metrics, table, m, row);
+	}
+	if (run->tabs && !run->json) {
+		printf("\n%s\n", table->key);
+		write_line(stdout, table, NULL);
+		for (int i = 0; i < n; i++)
+			write_line(stdout, table, row_at(table, rows, i));
 	}
 	if (table->key)
 		bench_value(run, table->key, list);
@@ -464,20 +443,6 @@ static json_t *words_of(const struct bench_data *data, const char *key,
 		json_object_set_new_nocheck(words, word, json_true());
 	}
 	return words;
-}
-
-static void write_line(FILE *out, const struct bench_table *table, const void *row)
-{
-	char word[TEXT_BYTES];
-
-	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
-		if (c->key) {
-			if (row)
-				word_of(c, row, "%.10g", word, sizeof(word));
-			fprintf(out, "%s%s", c == table->columns ? "" : "\t",
-				row ? word : c->key);
-		}
-	fputc('\n', out);
 }
 
 static void write_data(const struct bench_run *run, const char *file,

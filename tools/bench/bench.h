@@ -7,7 +7,7 @@
  *                                 ├─▶ JSON, metrics     (--json, compare, bench all)
  *                                 └─▶ data, bench_plot  (--plot)
  *
- * Places in the report of incise bench all are in report.md, by keys of the JSON.
+ * The report of incise bench all is made of the JSON, by tools/report.
  */
 #ifndef INCISE_BENCH_H
 #define INCISE_BENCH_H
@@ -122,11 +122,10 @@ struct bench_plot {
 	struct bench_data data, more;
 };
 
-extern const char text_extremes_gp[], text_integers_gp[], text_loop_rates_gp[],
-	text_loop_wakeups_gp[], text_pose_gp[], text_precision_gp[], text_scenes_gp[],
-	text_stability_guard_gp[], text_stability_integrators_gp[],
-	text_stability_map_gp[], text_stability_rest_gp[], text_timeline_gp[],
-	text_training_gp[], text_view_gp[], text_view_frames_gp[], text_vision_gp[];
+extern const char text_loop_wakeups_gp[], text_precision_gp[], text_scenes_gp[],
+	text_stability_integrators_gp[], text_stability_map_gp[],
+	text_stability_rest_gp[], text_training_gp[], text_view_gp[],
+	text_view_frames_gp[];
 
 struct bench_run;
 
@@ -139,9 +138,8 @@ struct bench {
 	struct bench_plot plots[5]; /* end with {0}; none: --plot is bad usage */
 };
 
-extern const struct bench bench_capture, bench_coverage, bench_extremes, bench_integers,
-	bench_loop, bench_pose, bench_precision, bench_prediction, bench_scenes,
-	bench_serve, bench_stability, bench_timeline, bench_training, bench_vision;
+extern const struct bench bench_loop, bench_precision, bench_scenes, bench_stability,
+	bench_training;
 
 /* --- a run --- */
 
@@ -149,9 +147,9 @@ extern const struct bench bench_capture, bench_coverage, bench_extremes, bench_i
 
 struct bench_run {
 	const struct bench *bench;
-	bool json, quick;
-	double seconds;				     /* 0: not given */
-	long seed;				     /* the same */
+	bool json, quick, tabs; /* tabs: the text has all columns of the JSON */
+	double seconds;		/* 0: not given */
+	long seed;		/* the same */
 	const char *plot, *load, *profile, *against; /* NULL: not given */
 	char **operands;
 	int n_operands;
@@ -200,29 +198,6 @@ void bench_lines(const struct bench_run *run, const struct bench_table *table,
 /* A line of text for each row that failed: a template as of a metric's name, and the reason. */
 void bench_failures(const struct bench_run *run, const struct bench_table *table,
 		    const void *rows, int n, const char *template);
-
-/*
- * A block of text with a line for each of n rows, and the same rows under n_across
- * conditions side by side:
- *
- *   corner           60 Hz   120 Hz     120 Hz:  99 %  largest
- *   held            0.1234   0.0612              0.23     0.31
- *
- * Rows stand condition by condition. A cell that failed is marked with '*', or without a mark
- * holds the reason. Behind the cells stand columns of the condition @usual, @between in
- * front of their headings.
- */
-struct bench_block {
-	const char *corner;
-	struct bench_column line, across,
-		cell;  /* with formats of name, condition and cell */
-	size_t failed; /* the reason: a char[] */
-	bool mark;
-	const char *between;
-	struct bench_column columns[8];
-};
-void bench_block(const struct bench_run *run, const struct bench_block *block,
-		 size_t row_bytes, const void *rows, int n, int n_across, int usual);
 
 /* After the report fail the program with this line; the first one counts. */
 void bench_fail(struct bench_run *run, const char *fmt, ...) INCISE_PRINTF(2, 3);

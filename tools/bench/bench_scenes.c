@@ -2,20 +2,17 @@
 /*
  * incise bench scenes: a scene's plan, with the stages that it needs only, compared with the full
  * pipeline, which is the same scene with every stage kept and those neutral that it does not need
- * (incise_scene_set_full()): time, instructions and memory of both, and whether their forces are
+ * (incise_scene_set_full()): time and memory of both, and whether their forces are
  * the same to the bit.
  */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include <incise/plan.h>
-#include "../cli/child.h"
 #include "../cli/json.h"
 #include "../cli/mapped_libraries.h"
 #include "../cli/scene_argument.h"
 #include "../cli/stopwatch.h"
-#include "all_forces.h"
 #include "bench.h"
 #include "process_cost.h"
 #include "sheet.h"
@@ -31,8 +28,6 @@ struct variant {
 	struct incise_plan *plan;
 	struct walk walk;
 	struct harness_time time; /* of a tick, ns */
-	double instructions;	  /* of a tick; NaN: not counted */
-	double rounded;		  /* the same */
 	double p99_ns;		  /* of single ticks */
 	double memory_KiB;
 	double stage_ns[INCISE_PLAN_STAGES_MAX]; /* means of the middle half */
@@ -44,7 +39,7 @@ struct scene {
 	bool kept;	  /* the full pipeline is its own */
 	bool measured;	  /* its plans can be */
 	struct variant few, full;
-	struct trajectory trajectory; /* that is timed and counted */
+	struct trajectory trajectory; /* that is timed */
 	long ticks_compared, ticks_in_contact;
 	long first_difference; /* number of the tick; -1: none */
 	double times_cheaper;
@@ -60,7 +55,6 @@ struct scene {
 struct scenes {
 	struct scene scene[SCENES_MAX];
 	int n;
-	const char *counted_by, *not_counted; /* instructions; the other is NULL */
 };
 
 static struct scene *add(struct scenes *s, const char *name, size_t length,
@@ -102,6 +96,10 @@ static void add_shipped(struct scenes *s)
 	"radius_mm = 50.0; };\n"
 #define DOUBLE "arithmetic = \"double\";\n"
 #define REACTION "tissue = { reaction_N_mm = 0.14; };\n"
+#define FORCES                                                                  \
+	"tissue = { reaction_N_mm = 0.14; friction = 0.1; plane_N_mm = 0.17;\n" \
+	"  damping_N_s_mm = 0.0005; insertion_N_mm = 0.28; aligned = 0.2;\n"    \
+	"  spread_N_mm = 0.22; };\n"
 /*
  * All that is no force: the membrane lies below the sphere's top and the sheet's waves, and is so small
  * that the depth below these hardly changes round it, as for one that lies aslant the limit is lower.
@@ -132,17 +130,13 @@ static void add_made(struct scenes *s)
 {
 	for (int i = 0; i < N(made); i++) {
 		struct memory_file *file = cli_alloc(2, sizeof(*file));
-		char tissue[1000] = "";
 
 		file[0] = memory_file_begin(made[i].name);
-		if (made[i].all)
-			all_forces(tissue, sizeof(tissue), 1, NULL, "");
 		if (strchr(made[i].text, '%'))
 			file[1] = sheet_of_waves(100);
 		fprintf(file[0].file, made[i].text, file[1].path);
-		fputs(tissue, file[0].file);
 		if (made[i].all)
-			fputs(EFFECTS, file[0].file);
+			fputs(FORCES EFFECTS, file[0].file);
 		memory_file_written(&file[0]);
 		add(s, made[i].name, strlen(made[i].name), file[0].path)->kept =
 			made[i].kept;
@@ -151,7 +145,7 @@ static void add_made(struct scenes *s)
 
 /* --- plans and forces --- */
 
-/* Blade, handle and tube once each: what is timed and counted. */
+/* Blade, handle and tube once each: what is timed. */
 #define TIMED_STROKES 3
 #define COMPARED_TICKS 120000
 #define COMPARED_STROKES_MAX 1000 /* of a scene with few ticks a second */
@@ -186,15 +180,14 @@ static bool inserts(const struct scene *s)
 	return !s->kept && stage_of(s->few.plan, "tool") >= 0;
 }
 
-/* Make both plans, at the start of the trajectory that is timed and counted. */
+/* Make both plans, at the start of the trajectory that is timed. */
 static void open_scene(struct scene *s)
 {
 	struct variant *variants[] = {&s->few, &s->full};
 	struct incise_error err = {0};
 
 	for (int i = 0; i < 2; i++)
-		variants[i]->memory_KiB = variants[i]->p99_ns =
-			variants[i]->instructions = NAN;
+		variants[i]->memory_KiB = variants[i]->p99_ns = NAN;
 	if (!s->path) {
 		snprintf(s->failed, sizeof(s->failed),
 			 "no file and no scene of that name: %s", s->name);
@@ -329,81 +322,9 @@ static void time_all(struct scenes *s, bool quick)
 	cli_progress_end();
 }
 
-/* --- instructions --- */
+/* --- for a profiler --- */
 
-static bool count(struct variant *v)
-{
-	const int ticks = v->walk.trajectory->ticks;
-	int counter = instructions_open();
-	uint64_t empty, sum = 0;
-	struct incise_tick tick;
-
-	if (counter < 0)
-		return false;
-	empty = instructions_now(counter);
-	empty = instructions_now(counter) - empty;
-	for (int i = 0; i < ticks; i++) {
-		int64_t t_ns = walk_feed(&v->walk);
-		uint64_t before = instructions_now(counter);
-
-		incise_plan_tick(v->plan, t_ns, &tick);
-		sum += instructions_now(counter) - before - empty;
-	}
-	close(counter);
-	v->instructions = (double)sum / ticks;
-	return true;
-}
-
-/* Both at the same time. */
-static void count_by_callgrind(struct scene *s)
-{
-	struct variant *variants[] = {&s->few, &s->full};
-	struct callgrind callgrind[2];
-
-	for (int i = 0; i < 2; i++) {
-		char *argv[] = {cli_text("%s/incise-bench", cli_folder()),
-				"scenes",
-				(char *)s->path,
-				"--profile",
-				i || s->kept ? "full" : "needed",
-				NULL};
-
-		callgrind_start(&callgrind[i], "incise_plan_tick", argv);
-	}
-	for (int i = 0; i < 2; i++)
-		variants[i]->instructions =
-			callgrind_end(&callgrind[i]) / s->trajectory.ticks;
-}
-
-#define NO_COUNTER "the kernel gives no counter of them (perf_event_open(2)), and "
-
-/* @return "counter" or "callgrind", or NULL with the reason @why there are none */
-static const char *count_all(struct scenes *s, bool quick, const char **why)
-{
-	bool by_counter = false;
-
-	for (int i = 0; i < s->n && !cli_stop; i++) {
-		struct scene *scene = &s->scene[i];
-
-		if (!scene->measured)
-			continue;
-		cli_progress("instructions of scene %d of %d", i + 1, s->n);
-		by_counter = count(&scene->few) && count(&scene->full);
-		if (by_counter)
-			continue;
-		if (quick || !child_possible("valgrind")) {
-			*why = quick ? NO_COUNTER "callgrind takes too long for --quick"
-				     : NO_COUNTER "valgrind is not installed";
-			return NULL;
-		}
-		count_by_callgrind(scene);
-		if (isnan(scene->few.instructions))
-			*why = "callgrind does not run this program";
-	}
-	return by_counter ? "counter" : "callgrind";
-}
-
-/* Run the ticks that are counted, and nothing else, for another program that counts. */
+/* Run the ticks that are timed, and nothing else, for another program that counts. */
 static void profile(const char *name, bool full)
 {
 	struct scene_argument argument = {0};
@@ -416,7 +337,6 @@ static void profile(const char *name, bool full)
 	open_scene(&scene);
 	if (!scene.measured)
 		cli_fail("%s", scene.failed);
-	callgrind_here();
 	walk_run(full ? &scene.full.walk : &scene.few.walk);
 }
 
@@ -435,10 +355,6 @@ static const struct bench_table table = {
 			COLUMN(scene, "tick_ns_p99", few.p99_ns, "%7.0f", "99 %"),
 			COLUMN(scene, "full_ns", full.time.ns.median, "%7.1f", "full ns"),
 			COLUMN(scene, "times_cheaper", times_cheaper, "%7.2f", "times"),
-			COLUMN(scene, "instructions", few.instructions, "%7.0f",
-			       "instr."),
-			COLUMN(scene, "full_instructions", full.instructions, "%7.0f",
-			       "full"),
 			COLUMN(scene, "plan_memory_KiB", few.memory_KiB, "%9.1f",
 			       "plan KiB"),
 			COLUMN(scene, "process_memory_KiB", process.peak_KiB, "%9.0f",
@@ -464,10 +380,6 @@ static const struct bench_table table = {
 			METRIC(TIME, scene, few.time, "ns", "{name} tick", "measured=1"),
 			METRIC(TIME, scene, full.time, "ns", "{name} full tick",
 			       "measured=1"),
-			METRIC(EXACT, scene, few.rounded, "instructions",
-			       "{name} instructions", "measured=1"),
-			METRIC(EXACT, scene, full.rounded, "instructions",
-			       "{name} full instructions", "measured=1"),
 		},
 };
 
@@ -535,8 +447,6 @@ static int complete(struct scene *s, struct left_out *left)
 	struct loop_process *process = &s->process;
 	bool same = s->first_difference < 0;
 
-	s->few.rounded = round(s->few.instructions);
-	s->full.rounded = round(s->full.instructions);
 	if (process->libraries) {
 		s->libraries_mapped = (int)json_array_size(process->libraries);
 		s->not_mapped = joined(unmapped_libraries(process->libraries));
@@ -590,9 +500,7 @@ static void print_notes(const struct bench_run *run, const struct scenes *all)
 
 	for (int i = 0; i < all->n; i++)
 		compared += all->scene[i].ticks_compared;
-	bench_text(run, "\nforces of %ld ticks compared bit by bit; instructions %s%s\n",
-		   compared, all->counted_by ? "by " : "not counted: ",
-		   all->counted_by ? all->counted_by : all->not_counted);
+	bench_text(run, "\nforces of %ld ticks compared bit by bit\n", compared);
 	for (int i = 0; i < all->n; i++) {
 		const struct scene *s = &all->scene[i];
 
@@ -621,8 +529,6 @@ static void report(struct bench_run *run, struct scenes *all)
 		   "a tick of each scene, and of the full pipeline, which has all "
 		   "stages\n%s\n\n",
 		   bench_machine(run, NULL));
-	bench_values(run, "{ss? ss?}", "instructions_by", all->counted_by,
-		     "instructions_failed", all->not_counted);
 	bench_table(run, &table, all->scene, all->n);
 	bench_rows(run, &left_table, left, n);
 	print_notes(run, all);
@@ -665,9 +571,6 @@ static void run_scenes(struct bench_run *run)
 		if (all->scene[i].measured)
 			compare(&all->scene[i]);
 	}
-	all->counted_by = count_all(all, run->quick, &all->not_counted);
-	if (all->not_counted)
-		all->counted_by = NULL;
 	time_all(all, run->quick);
 	report(run, all);
 	judge(run, all);

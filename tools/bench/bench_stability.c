@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * incise bench stability: how stiff a virtual wall may be, simulated in time next to what
- * theory says; guards in the real plan; integrators of a stiff spring. The device is light, in
- * a loop of 1 kHz.
+ * theory says; learned models under a leaning hand; error against run time of forces and of
+ * integrators of a stiff spring. The device is light, in a loop of 1 kHz.
  */
 #include <stdio.h>
 #include <string.h>
 #include <incise/model.h>
 #include "../../lib/control/plant.h"
-#include "../../lib/control/stability.h"
+#include <incise/stability.h>
 #include "stability.h"
 
 /* --- a row of a simulation next to theory --- */
@@ -202,19 +202,6 @@ static void exact_limit(struct ratios *ratios, bool quick)
 	sweep(ratios, quick ? &few : &full, incise_stability_limit);
 }
 
-static void gil(struct ratios *ratios, bool quick)
-{
-	static const struct grid full = {{0.002, 0.01},
-					 {0, 0.005, -0.001},
-					 {0, 1, 5},
-					 2,
-					 3,
-					 3},
-				 few = {{0.01}, {0, 0.005}, {0, 1}, 1, 2, 2};
-
-	sweep(ratios, quick ? &few : &full, incise_stability_gil);
-}
-
 /* The hand adds mass, so that little damping is left per mass, and a spring, so that the
  * whole swings at an angle per tick: a passive hand, and the worst of its kind. */
 static double limit_in_hand(struct sampled_wall sim, double angle)
@@ -263,67 +250,7 @@ static void colgate(struct ratios *ratios, bool quick)
 	}
 }
 
-/* --- energy that a sampled wall makes, and friction that takes it --- */
-
-/* An oscillation at a sampled spring. It begins at rest, some part of a period before the
- * next sample. */
-struct swing {
-	struct incise_haptic_device device;
-	double K, phase;
-};
-
-static bool swing_grows(const void *context, double start)
-{
-	const struct swing *s = context;
-	struct incise_plant plant = {.mass_kg = s->device.mass_kg,
-				     .damping_N_s_mm = s->device.damping_N_s_mm,
-				     .coulomb_N = s->device.coulomb_N,
-				     .position_mm = start};
-	double omega = sqrt(s->K / DEVICE);
-
-	incise_plant_step(&plant, -s->K * start, s->phase * PERIOD_S);
-	/* By then the slowest case below has grown or died e^20 times. */
-	for (int k = 0; k < 2000000; k++) {
-		double x = plant.position_mm, v = plant.velocity_mm_s / omega;
-		double norm = x * x + v * v;
-
-		if (norm > 4 * start * start)
-			return true;
-		if (norm < start * start / 4)
-			return false;
-		incise_plant_step(&plant, -s->K * x, PERIOD_S);
-	}
-	return false;
-}
-
-static void amplitude(struct ratios *ratios, bool quick)
-{
-	static const double angles[] = {0.1, 0.2, 0.32, 0.02, 0.05, 0.14, 0.26};
-	static const double parts[] = {0, 0.5}; /* of K T/2 that viscous friction takes */
-	const int phases = quick ? 2 : 4;
-
-	for (int b = 0; b < (quick ? 1 : N(parts)); b++)
-		for (int i = 0; i < (quick ? 3 : N(angles)); i++) {
-			double omega = angles[i] / PERIOD_S, K = omega * omega * DEVICE;
-			struct swing swing = {
-				.device = {.mass_kg = DEVICE_KG,
-					   .damping_N_s_mm = parts[b] * K * PERIOD_S / 2,
-					   .coulomb_N = 0.05,
-					   .period_s = PERIOD_S},
-				.K = K};
-			double sum = 0;
-
-			for (int p = 0; p < phases; p++) {
-				cli_progress("amplitude: wT %g", angles[i]);
-				swing.phase = (double)p / phases;
-				sum += threshold(swing_grows, &swing, 1e-3, 1e9, 1e-3);
-			}
-			add(ratios, (struct ratio){.param = {angles[i], parts[b]},
-						   .simulated = sum / phases,
-						   .theory = incise_stability_amplitude(
-							   &swing.device, K)});
-		}
-}
+/* --- energy that an encoder makes, and friction that takes it --- */
 
 /* The stiffness at which a hand that goes to and fro by @way in each tick, about @centre,
  * gets as much energy as friction takes. */
@@ -384,90 +311,6 @@ static void quantisation(struct ratios *ratios, bool quick)
 	}
 }
 
-/* Energy given to a hand that goes in to @depth at one speed and out again; contact comes
- * @phase of a period before a sample. */
-static double pressed(double K, double speed, double depth, double phase)
-{
-	double turn = depth / speed, made = 0, force = 0, was = 0, t = phase * PERIOD_S;
-
-	/* Until the last held force was taken back outside. */
-	for (bool out = false; !out; t += PERIOD_S) {
-		double x = t < turn ? -speed * t : -2 * depth + speed * t;
-
-		made += force * (x - was);
-		out = x >= 0 && t > turn;
-		force = x < 0 ? -K * x : 0;
-		was = x;
-	}
-	return made;
-}
-
-static void leak(struct ratios *ratios, bool quick)
-{
-	static const struct {
-		double K_N_mm, u_mm_s, X_mm;
-	} cases[] = {{1, 20, 2}, {10, 50, 3}, {5, 200, 10}, {50, 10, 1}};
-	const int phases = quick ? 32 : 256;
-
-	for (int i = 0; i < N(cases); i++) {
-		double K = cases[i].K_N_mm, u = cases[i].u_mm_s, X = cases[i].X_mm,
-		       sum = 0;
-		struct incise_haptic_device d = {.mass_kg = DEVICE_KG,
-						 .period_s = PERIOD_S};
-
-		for (int p = 0; p < phases; p++)
-			sum += pressed(K, u, X, (p + 0.5) / phases);
-		add(ratios, (struct ratio){.param = {K, u, X},
-					   .simulated = sum / phases,
-					   .theory = incise_stability_leak(&d, K, u, X)});
-	}
-}
-
-/* Speed after a bounce, squared, as part of that before; mean over where between two
- * samples the contact begins. */
-static double bounced(double K, double damping, int phases)
-{
-	double sum = 0;
-
-	for (int p = 0; p < phases; p++) {
-		struct incise_plant plant = {.mass_kg = DEVICE_KG,
-					     .damping_N_s_mm = damping,
-					     .velocity_mm_s = -100};
-
-		/* Damping acts within the contact: before it there is none, and the last
-		 * step outside is a part of what sampling does. */
-		incise_plant_step(&plant, 0, (p + 0.5) / phases * PERIOD_S);
-		for (int k = 0; k < 1000000 && plant.position_mm < 0; k++)
-			incise_plant_step(&plant, -K * plant.position_mm, PERIOD_S);
-		sum += plant.velocity_mm_s * plant.velocity_mm_s / 1e4;
-	}
-	return sum / phases;
-}
-
-static void break_even(struct ratios *ratios, bool quick)
-{
-	static const double angles[] = {0.05, 0.02, 0.01};
-	const int phases = quick ? 16 : 64;
-
-	for (int i = 0; i < N(angles); i++) {
-		double omega = angles[i] / PERIOD_S, K = omega * omega * DEVICE;
-		double low = 0, high = 10 * K * PERIOD_S;
-
-		cli_progress("break-even: wT %g", angles[i]);
-		while (high - low > 1e-4 * high) {
-			double middle = (low + high) / 2;
-
-			if (bounced(K, middle, phases) > 1)
-				low = middle;
-			else
-				high = middle;
-		}
-		add(ratios, (struct ratio){.param = {angles[i], K},
-					   .simulated = (low + high) / 2,
-					   .theory = K * PERIOD_S / 2});
-	}
-}
-
 /* --- experiments --- */
 
 /* A simulation next to theory: how near they shall come, and why not nearer. */
@@ -497,23 +340,6 @@ static const struct experiment {
 	 0.01,
 	 "at least: with a damper in the wall only a hand with many modes reaches the "
 	 "bound"},
-	{gil,
-	 "gil",
-	 "little damping: compared with the linear law of Gil and Hulin",
-	 {"bT_m", "BT_m", "delay"},
-	 "sim_KT2_m",
-	 "theory_KT2_m",
-	 0.02,
-	 "the law is the limit for b T/m to 0, without the next term"},
-	{amplitude,
-	 "amplitude",
-	 "amplitude above which Coulomb friction does not stop an oscillation, mm: "
-	 "compared with the describing function",
-	 {"omega_T", "viscous_part"},
-	 "sim_mm",
-	 "theory_mm",
-	 0.03,
-	 NULL},
 	{quantisation,
 	 "quantisation",
 	 "stiffness above which motion across an encoder's steps gains energy, N/mm: "
@@ -523,23 +349,6 @@ static const struct experiment {
 	 "theory_N_mm",
 	 0.01,
 	 NULL},
-	{leak,
-	 "leak",
-	 "energy generated by a press to a depth and back, N mm: compared with K T u X",
-	 {"K_N_mm", "speed_mm_s", "depth_mm"},
-	 "sim_N_mm",
-	 "theory_N_mm",
-	 0.03,
-	 NULL},
-	{break_even,
-	 "break_even",
-	 "damping that dissipates the energy of a bounce, N s/mm: compared with K T/2",
-	 {"omega_T", "K_N_mm"},
-	 "sim_N_s_mm",
-	 "theory_N_s_mm",
-	 0.03,
-	 "lower by a third of omega T, because the wall exerts no force in the first "
-	 "part of a period"},
 };
 
 static struct ratios results[N(experiments)];
@@ -686,9 +495,7 @@ static void run(struct bench_run *run)
 	report_ratios(run);
 	add_curves(run);
 	stability_rest(run);
-	stability_work(run);
 	stability_error(run);
-	stability_guard(run);
 	stability_integrators(run);
 }
 
@@ -697,7 +504,7 @@ const struct bench bench_stability = {
 	.operands = "[MODEL.fis]",
 	.n_operands = 1,
 	.summary = "stability limits, simulated and computed; learned\n"
-		   "models; passivity controllers; integrators",
+		   "models; forces; integrators",
 	.run = run,
 	.plots = {{.suffix = "map",
 		   .script = text_stability_map_gp,
@@ -711,11 +518,6 @@ const struct bench bench_stability = {
 		   .width = 900,
 		   .height = 560,
 		   .data = {&stability_rest_table, "verdict"}},
-		  {.suffix = "guard",
-		   .script = text_stability_guard_gp,
-		   .width = 960,
-		   .height = 540,
-		   .data = {&stability_guard_table, "guard"}},
 		  {.suffix = "integrators",
 		   .script = text_stability_integrators_gp,
 		   .width = 1000,

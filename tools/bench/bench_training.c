@@ -15,7 +15,6 @@
 #include "bench.h"
 #include "../cli/child.h"
 #include "../cli/file.h"
-#include "../../lib/learn/tune.h"
 #include "../cli/json.h"
 #include "noise.h"
 
@@ -171,9 +170,11 @@ static void add_all(struct training *t, bool quick)
 
 static struct incise_model *train(const struct row *row, const struct data *data)
 {
-	static const struct incise_variable in[] = {{"depth_mm", 0, DEPTH_mm},
-						    {"velocity_mm_s", 0, SPEED_mm_s}};
-	static const struct incise_variable out = {"force_N", 0, 3};
+	static const struct incise_variable variables[] = {{"depth_mm", 0, DEPTH_mm},
+							   {"velocity_mm_s", 0,
+							    SPEED_mm_s},
+							   {"force_N", 0, 3}};
+	static const char *const names[] = {"depth_mm", "velocity_mm_s", "force_N"};
 	struct incise_pairs pairs = {data->row[0], PAIRS, 2};
 	struct incise_train_options options;
 	int mfs[2] = {row->mfs[0], row->mfs[1]};
@@ -184,11 +185,14 @@ static struct incise_model *train(const struct row *row, const struct data *data
 	options.classic = row->kind == classic;
 	options.epochs = row->epochs;
 	options.groups = data->group;
-	if (row->fit == FIT_CHOSEN &&
-	    incise_choose_grid(&pairs, in, INCISE_MF_GAUSS, &options, mfs, &err))
-		cli_fail_with(&err);
-	model = cli_require(
-		incise_model_new_grid(2, in, mfs, INCISE_MF_GAUSS, &out, &err), &err);
+	options.ranges = variables;
+	if (row->fit == FIT_CHOSEN)
+		model = incise_train_start(&pairs, names, INCISE_MF_GAUSS, mfs, &options,
+					   &err);
+	else
+		model = incise_model_new_grid(2, variables, mfs, INCISE_MF_GAUSS,
+					      &variables[2], &err);
+	cli_require(model, &err);
 	if (incise_train(model, &pairs, NULL, &options, NULL, &err))
 		cli_fail_with(&err);
 	return model;

@@ -1,19 +1,13 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Memory, mapped libraries and instructions of programs; see process_cost.h.
+ * Memory and mapped libraries of programs; see process_cost.h.
  */
 #include <dirent.h>
-#include <linux/perf_event.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#if __has_include(<valgrind/callgrind.h>)
-#include <valgrind/callgrind.h>
-#endif
 #include "../cli/child.h"
 #include "../cli/cli.h"
 #include "../cli/json.h"
@@ -174,73 +168,4 @@ void loop_processes_watch(struct loop_process *const *processes, int n)
 	for (int i = 0; i < n; i++)
 		if (processes[i]->pid)
 			ended(processes[i], child_end(processes[i]->pid, 0));
-}
-
-/* --- instructions --- */
-
-#define ARGUMENTS_MOST 16
-/* Without its header at hand the program cannot say where to begin: it takes longer. */
-#ifdef CALLGRIND_START_INSTRUMENTATION
-#define FROM "--instr-atstart=no"
-#else
-#define FROM "--instr-atstart=yes"
-#define CALLGRIND_START_INSTRUMENTATION
-#endif
-
-#define WAIT_S 120 /* callgrind takes some fifty times as long as the program */
-
-int instructions_open(void)
-{
-	struct perf_event_attr attr = {
-		.type = PERF_TYPE_HARDWARE,
-		.size = sizeof(attr),
-		.config = PERF_COUNT_HW_INSTRUCTIONS,
-		.exclude_kernel = 1,
-		.exclude_hv = 1,
-	};
-
-	return (int)syscall(SYS_perf_event_open, &attr, 0, -1, -1, PERF_FLAG_FD_CLOEXEC);
-}
-
-uint64_t instructions_now(int counter)
-{
-	uint64_t value = 0;
-
-	return read(counter, &value, sizeof(value)) == sizeof(value) ? value : 0;
-}
-
-void callgrind_start(struct callgrind *callgrind, const char *function,
-		     char *const argv[])
-{
-	/* Without vgdb there are no files of it in TMPDIR, which stay where it is killed. */
-	char *all[ARGUMENTS_MOST] = {"valgrind", "-q", "--tool=callgrind", "--vgdb=no",
-				     FROM};
-	int n = 5;
-
-	callgrind->report = memory_file_begin("callgrind");
-	all[n++] = cli_text("--toggle-collect=%s", function);
-	/* Of this process: valgrind makes its files out of the program's sight. */
-	all[n++] = cli_text("--callgrind-out-file=/proc/%d/fd/%d", (int)getpid(),
-			    fileno(callgrind->report.file));
-	for (int i = 0; argv[i] && n < ARGUMENTS_MOST - 1; i++)
-		all[n++] = argv[i];
-	callgrind->pid = child_start(all, -1, -1);
-}
-
-void callgrind_here(void)
-{
-	CALLGRIND_START_INSTRUMENTATION;
-}
-
-double callgrind_end(struct callgrind *callgrind)
-{
-	int status = child_end(callgrind->pid, WAIT_S);
-	double count = NAN;
-	char line[1000];
-
-	rewind(callgrind->report.file);
-	while (fgets(line, sizeof(line), callgrind->report.file))
-		sscanf(line, "totals: %lf", &count);
-	fclose(callgrind->report.file);
-	return WIFEXITED(status) && !WEXITSTATUS(status) && count > 0 ? count : NAN;
 }

@@ -14,12 +14,10 @@
 #define PERIOD_S 1e-3
 
 void stability_rest(struct bench_run *run);
-void stability_work(struct bench_run *run);
 void stability_error(struct bench_run *run);
-void stability_guard(struct bench_run *run);
 void stability_integrators(struct bench_run *run);
 
 extern const struct bench_table stability_rest_table, stability_error_table,
-	stability_guard_table, stability_integrator_table;
+	stability_integrator_table;
 
 #endif

@@ -128,7 +128,7 @@ struct row {
 };
 
 static struct row rows[ROWS_MAX];
-static int n_rows, n_whole_ticks; /* behind these are smaller steps */
+static int n_rows;
 
 /* At rest. */
 static struct integration start_integration(const struct row *row)
@@ -286,7 +286,6 @@ static void measure(bool quick)
 		for (int k = 0; k < N(integrators); k++)
 			add(&integrators[k], springs[i], 1, truth);
 	}
-	n_whole_ticks = n_rows;
 	/* Work against precision: smaller and smaller steps. */
 	for (int i = 0; i < N(swept); i++) {
 		true_places(swept[i], truth);
@@ -298,46 +297,17 @@ static void measure(bool quick)
 	measure_times(quick ? QUICK_REPEATS : REPEATS);
 }
 
-/* The cheapest way to each error; all of them are in the JSON. */
-struct work {
-	const char *name;
-	double K_N_m, ns[4];
-};
-
-static const struct bench_table work_table = {
-	.row_bytes = sizeof(struct work),
-	.columns = {COLUMN(work, NULL, name, "%21s", ""),
-		    COLUMN(work, NULL, K_N_m, "%9g", "N/m"),
-		    COLUMN(work, NULL, ns[0], "%11.1f", "1e-2"),
-		    COLUMN(work, NULL, ns[1], "%11.1f", "1e-4"),
-		    COLUMN(work, NULL, ns[2], "%11.1f", "1e-6"),
-		    COLUMN(work, NULL, ns[3], "%11.1f", "1e-9")},
-};
-
-static struct work work_of(const struct integrator *integrator, double K)
-{
-	static const double errors[] = {1e-2, 1e-4, 1e-6, 1e-9};
-	struct work work = {integrator->name, K, {NAN, NAN, NAN, NAN}};
-
-	for (int e = 0; e < N(errors); e++)
-		for (int i = 0; i < n_rows; i++) {
-			const struct row *row = &rows[i];
-
-			if (row->integrator == integrator && row->K_N_m == K &&
-			    row->max_error <= errors[e])
-				work.ns[e] = fmin(work.ns[e], row->time.ns.median);
-		}
-	return work;
-}
-
 const struct bench_table stability_integrator_table = {
 	.key = "integrators",
 	.row_bytes = sizeof(struct row),
-	.columns = {COLUMN(row, "integrator", name), COLUMN(row, "K_N_m", K_N_m),
-		    COLUMN(row, "step_s", step_s), COLUMN(row, "max_error", max_error),
-		    COLUMN(row, "rms_error", rms_error),
-		    COLUMN(row, "ns_per_step", ns_per_step),
-		    COLUMN(row, "ns_per_ms", time.ns.median),
+	.failed_after = 3,
+	.columns = {COLUMN(row, "integrator", name, "%21s", "integrator"),
+		    COLUMN(row, "K_N_m", K_N_m, "%9g", "N/m"),
+		    COLUMN(row, "step_s", step_s, "%9.3g", "step, s"),
+		    COLUMN(row, "max_error", max_error, "%9.2g", "largest"),
+		    COLUMN(row, "rms_error", rms_error, "%9.2g", "rms"),
+		    COLUMN(row, "ns_per_step", ns_per_step, "%9.1f", "ns/step"),
+		    COLUMN(row, "ns_per_ms", time.ns.median, "%11.1f", "ns/ms"),
 		    COLUMN(row, "ns_per_ms_p5", time.ns.p5),
 		    COLUMN(row, "ns_per_ms_p95", time.ns.p95),
 		    COLUMN(row, "failed", failed)},
@@ -349,38 +319,17 @@ const struct bench_table stability_integrator_table = {
 			   "step_s=0.001,K_N_m=1000|100000")},
 };
 
-static const struct bench_block places_block = {
-	.corner = "N/m",
-	.line = COLUMN(row, NULL, name, "%21s"),
-	.across = COLUMN(row, NULL, K_N_m, "%9g"),
-	.cell = COLUMN(row, NULL, max_error, "%9.2g"),
-	.failed = offsetof(struct row, failed),
-	.columns = {COLUMN(row, NULL, ns_per_step, "%9.1f", "ns/step")},
-};
-
 void stability_integrators(struct bench_run *run)
 {
-	struct work work[N(swept) * N(integrators)];
 	int missed = 0;
 
 	measure(run->quick);
 	bench_text(
 		run,
-		"integrators of a spring: %g kg, damping ratio %g, steps of 1 ms; largest "
-		"error relative to the largest displacement\n",
+		"integrators of a spring: %g kg, damping ratio %g; errors relative to the "
+		"largest displacement\n",
 		DEVICE_KG, DAMPING_RATIO);
-	/* Steps are of the second stiffness: nothing overflows there. */
-	bench_block(run, &places_block, sizeof(*rows), rows, N(integrators),
-		    n_whole_ticks / N(integrators), 1);
-	bench_text(run,
-		   "ns per 1 ms of motion for a given largest error, with the fastest "
-		   "step\n");
-	for (int i = 0; i < N(work); i++)
-		work[i] = work_of(&integrators[i % N(integrators)],
-				  swept[i / N(integrators)]);
-	bench_lines(run, &work_table, work, N(work));
-	bench_text(run, "\n");
-	bench_rows(run, &stability_integrator_table, rows, n_rows);
+	bench_table(run, &stability_integrator_table, rows, n_rows);
 	for (int i = 0; i < n_rows; i++)
 		missed += rows[i].integrator->exact && !(rows[i].max_error <= EXACT);
 	if (missed)

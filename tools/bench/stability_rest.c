@@ -19,7 +19,7 @@
 #include <unistd.h>
 #include <incise/model.h>
 #include <incise/plan.h>
-#include "../../tests/extremes/closed_loop.h"
+#include "closed_loop.h"
 #include "../cli/child.h"
 #include "../cli/file.h"
 #include "../cli/folder.h"

@@ -5,7 +5,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <getopt.h>
-#include <libgen.h>
 #include <limits.h>
 #include <math.h>
 #include <poll.h>
@@ -708,15 +707,6 @@ struct incise_rig *cli_open_rig(const char *given, unsigned int devices)
 const char *cli_command_name(void)
 {
 	return current ? current->name : "";
-}
-
-const char *cli_folder(void)
-{
-	static char path[PATH_MAX];
-	ssize_t n = readlink("/proc/self/exe", path, sizeof(path) - 1);
-
-	path[n > 0 ? n : 0] = 0;
-	return dirname(path);
 }
 
 void *cli_alloc(size_t n, size_t size)

@@ -8,7 +8,7 @@
  * With timestamps of the kernel: the timestamp less the delay. Without: the line of the
  * device's own clock below all arrivals (the envelope), less the expected error of the line, less
  * the delay. The delay is that of the quickest samples; it comes from calibration, with its
- * standard deviation. `incise bench timeline` measures the error.
+ * standard deviation. tests/bench/timeline measures the error.
  *
  * Times increase strictly, whatever the device sends. The work per sample is bounded; nothing
  * here allocates, locks or calls the system. For one thread at a time.

@@ -11,7 +11,7 @@
 #include <unistd.h>
 #include <incise/model.h>
 #include <incise/plan.h>
-#include "../../extremes/closed_loop.h"
+#include "../../../tools/bench/closed_loop.h"
 #include "../cases.h"
 #include "../message.h"
 

@@ -13,8 +13,8 @@
 #include <math.h>
 #include <string.h>
 #include <incise/fixed.h>
-#include "../../../lib/fixed/spring.h"
 #include "../../../lib/base/vector.h"
+#include "../../extremes/fixed_spring.h"
 #include "../model/paper_model.h"
 
 static void any_direction(double u[3], uint64_t *seed)

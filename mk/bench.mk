@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# Benchmarks for developers: programs of tests/bench that are not installed, each next to what
+# `incise bench` has for users. tests/bench/README.md says what each measures.
+
+# Properties of the library under extreme inputs: tests/bench/extremes tries all cases, unit tests
+# some. They build without what only tests need.
+extremes := $(O)/obj/tests/extremes.a
+$(O)/obj/tests/extremes/%.o: test_cflags =
+$(extremes): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tests/extremes/*.c $(addprefix tools/cli/,cli.c complete.c f*.c output.c scene_argument.c state_folder.c)) tools/bench/closed_loop.c)
+	@rm -f $@
+	$(call step,AR)
+	$(Q)$(AR) rcs $@ $^
+
+bench_names := capture coverage extremes guards integers pose prediction rates serve timeline vision work
+bench_programs := $(bench_names:%=$(O)/tests/bench/%)
+bench_objects := $(bench_names:%=$(O)/obj/tests/bench/%.o) $(O)/obj/tests/bench/main.o
+$(bench_objects): test_cflags = $(shell $(PKG_CONFIG) --cflags jansson)
+$(O)/obj/tests/bench/main.o: cppflags += -DBUILD_FOLDER='"$(abspath $(O))"'
+$(O)/obj/tests/bench/capture.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
+
+# They also measure parts that the shared objects do not export; the linker takes those from the
+# archive.
+$(bench_programs): $(O)/tests/bench/%: $(O)/obj/tests/bench/%.o $(O)/obj/tests/bench/main.o $(tool_parts) $(extremes) \
+		$(O)/lib/libincise-tests.a $(foreach lib,$(libraries),$(O)/lib/lib$(lib).so)
+	@mkdir -p $(@D)
+	$(call step,LD)
+	$(Q)$(CC) $(CFLAGS) $(LDFLAGS) -Wl,--as-needed -Wl,-rpath,'$$ORIGIN/../../lib' -Wl,-rpath-link,$(O)/lib -L$(O)/lib -o $@ \
+		$(filter %.o,$^) $(tool_parts) $(tool_libs) $(extremes) $(O)/lib/libincise-tests.a \
+		$(tool_more_libs) $(shell $(PKG_CONFIG) --libs jansson $(foreach lib,$(libraries),$(pc_$(lib)))) -ldl -pthread
+
+bench-all: all $(bench_programs) ## build the benchmarks for developers, build/tests/bench/NAME
+
+# Their tests are slow ones.
+check-cli: $(bench_programs)
+
+.PHONY: bench-all

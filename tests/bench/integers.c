@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * the plan in integers, which the kernel runs, against the same plan in double:
+ * time of a tick, and how far their forces are from each other, next to the certified bound.
+ *
+ * Both walk along the same varied strokes (trajectory.h). Where one of them is in another phase, with
+ * another tool, or on the other side of a flag than the other, as at the tick at which a contact
+ * begins, the difference is no error of a force: such ticks are counted apart, and their largest
+ * difference is shown.
+ */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/plan.h>
+#include "../../lib/base/vector.h"
+#include "../../tools/cli/scene_argument.h"
+#include "program.h"
+#include "../../tools/bench/harness.h"
+#include "../../tools/bench/trajectory.h"
+
+#define SCENES_MAX 16
+
+/* A hand's reach around where a contact began, mm: as incise compile certifies. */
+#define REACH_MM 20
+
+#define TICKS 1000000
+#define QUICK_TICKS 60000
+#define TURNS 101
+#define QUICK_TURNS 9
+#define TIMED_STROKES 3
+
+struct row {
+	const char *name, *path;
+	struct incise_scene *scene[2]; /* double, integers */
+	struct incise_plan *plan[2];
+	struct walk walk[2];
+	struct trajectory timed;
+	struct harness_time time[2];
+	double ratio;
+	long ticks, contact, apart;
+	double sum2, rms_mN, most_mN, bound_mN, apart_most_mN;
+	bool holds;
+	char failed[520];
+};
+
+struct rows {
+	struct row row[SCENES_MAX];
+	int n;
+};
+
+static bool open_plan(struct row *row, int i, struct incise_error *err)
+{
+	row->scene[i] = incise_scene_load(row->path, NULL, err);
+	if (!row->scene[i] ||
+	    incise_scene_set_arithmetic(row->scene[i], i ? "fixed" : "double", err))
+		return false;
+	row->plan[i] = incise_plan_new(row->scene[i], NULL, err);
+	return row->plan[i];
+}
+
+static bool inserts(const struct incise_plan *plan)
+{
+	const char *name;
+
+	for (int i = 0; (name = incise_plan_stage(plan, i)); i++)
+		if (!strcmp(name, "tool"))
+			return true;
+	return false;
+}
+
+static void open_row(struct row *row)
+{
+	struct incise_error err = {0};
+
+	row->time[0].ns.median = row->time[1].ns.median = NAN;
+	row->ratio = row->rms_mN = row->most_mN = row->bound_mN = row->apart_most_mN =
+		NAN;
+	if (!open_plan(row, 0, &err) || !open_plan(row, 1, &err)) {
+		snprintf(row->failed, sizeof(row->failed), "%s", err.text);
+		return;
+	}
+	row->bound_mN = 1e3 * incise_plan_bound(row->plan[1], REACH_MM);
+	trajectory_make(&row->timed, row->scene[0], row->plan[0], TIMED_STROKES,
+			inserts(row->plan[0]), false);
+	for (int i = 0; i < 2; i++)
+		row->walk[i] =
+			(struct walk){.trajectory = &row->timed, .plan = row->plan[i]};
+}
+
+/* cos 60°: normals farther apart are of two sides of a tissue, as where it was gone through. */
+#define SAME_SIDE 0.5
+
+/* Whether both are on the same side of all that is decided at a tick. */
+static bool decide_alike(const struct incise_tick *a, const struct incise_tick *b)
+{
+	/* Limits follow from the force: they may be reached by one first. */
+	const unsigned int limits =
+		INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED | INCISE_TICK_EXTRAPOLATED;
+
+	return a->phase == b->phase && a->tool == b->tool &&
+	       !((a->flags ^ b->flags) & ~limits) &&
+	       (a->phase == INCISE_PHASE_FREE ||
+		v3_dot(a->normal, b->normal) > SAME_SIDE);
+}
+
+/* Rest of a difference that a decision made, as part of the bound. */
+#define ALIKE 0.1
+
+/*
+ * After a tick that was decided otherwise the force of one is late by a tick's slew: the two are
+ * apart until they decide alike, with forces well within the bound, once more.
+ */
+struct judge {
+	bool apart;
+};
+
+static void compare_tick(struct row *row, struct judge *judge,
+			 const struct incise_tick *a, const struct incise_tick *b)
+{
+	double off[3], mN;
+
+	v3_sub(off, a->command_N, b->command_N);
+	mN = 1e3 * v3_length(off);
+	row->ticks++;
+	row->contact += !!(a->flags & INCISE_TICK_CONTACT);
+	if (!decide_alike(a, b))
+		judge->apart = true;
+	else if (judge->apart && mN <= ALIKE * row->bound_mN)
+		judge->apart = false;
+	if (judge->apart) {
+		row->apart++;
+		row->apart_most_mN = fmax(row->apart_most_mN, mN);
+		return;
+	}
+	row->sum2 += mN * mN;
+	row->most_mN = fmax(row->most_mN, mN);
+}
+
+static void compare(struct row *row, long ticks)
+{
+	long each = row->timed.ticks / row->timed.strokes;
+	struct trajectory trajectory;
+	struct judge judge = {0};
+
+	row->most_mN = row->apart_most_mN = 0;
+	trajectory_make(&trajectory, row->scene[0], row->plan[0], (int)(ticks / each) + 1,
+			inserts(row->plan[0]), true);
+	for (int i = 0; i < 2; i++)
+		walk_change(&row->walk[i], &trajectory);
+	for (long k = 0; k < trajectory.ticks; k++) {
+		struct incise_tick tick[2];
+
+		for (int i = 0; i < 2; i++)
+			incise_plan_tick(row->plan[i], walk_feed(&row->walk[i]),
+					 &tick[i]);
+		compare_tick(row, &judge, &tick[0], &tick[1]);
+	}
+	for (int i = 0; i < 2; i++)
+		walk_change(&row->walk[i], &row->timed);
+	row->rms_mN = sqrt(row->sum2 / (double)(row->ticks - row->apart));
+	row->holds = row->most_mN <= row->bound_mN;
+	free(trajectory.poses);
+}
+
+static void time_all(struct rows *all, bool quick)
+{
+	struct harness_variant variants[2 * SCENES_MAX];
+
+	for (int i = 0; i < 2 * all->n; i++) {
+		struct row *row = &all->row[i / 2];
+
+		variants[i] = (struct harness_variant){
+			.run = walk_run,
+			.context = &row->walk[i % 2],
+			.units = *row->failed ? 0 : row->timed.ticks,
+			.time = &row->time[i % 2],
+		};
+	}
+	harness_times(variants, 2 * all->n, quick ? QUICK_TURNS : TURNS);
+	for (int i = 0; i < all->n; i++)
+		all->row[i].ratio =
+			all->row[i].time[1].ns.median / all->row[i].time[0].ns.median;
+}
+
+static const struct bench_table table = {
+	.key = "rows",
+	.row_bytes = sizeof(struct row),
+	.columns =
+		{
+			COLUMN(row, "name", name),
+			COLUMN(row, "double_ns", time[0].ns.median),
+			COLUMN(row, "integers_ns", time[1].ns.median),
+			COLUMN(row, "ratio", ratio),
+			COLUMN(row, "rms_error_N", rms_mN, .scale = 1e-3),
+			COLUMN(row, "max_error_N", most_mN, .scale = 1e-3),
+			COLUMN(row, "bound_N", bound_mN, .scale = 1e-3),
+			COLUMN(row, "holds", holds),
+			COLUMN(row, "ticks", ticks),
+			COLUMN(row, "contact", contact),
+			COLUMN(row, "apart", apart),
+			COLUMN(row, "apart_max_error_N", apart_most_mN, .scale = 1e-3),
+			COLUMN(row, "failed", failed),
+		},
+	.metrics =
+		{
+			METRIC(TIME, row, time[0], .unit = "ns",
+			       .name = "{name}, double"),
+			METRIC(TIME, row, time[1], .unit = "ns",
+			       .name = "{name}, integers"),
+		},
+};
+
+static void add(struct rows *all, const char *name, size_t length, const char *path)
+{
+	all->row[all->n++] =
+		(struct row){.name = cli_text("%.*s", (int)length, name), .path = path};
+}
+
+static void add_scenes(struct rows *all, const struct bench_run *run)
+{
+	glob_t found;
+
+	for (int i = 0; i < run->n_operands; i++) {
+		struct scene_argument argument = {0};
+
+		if (!scene_argument_find(&argument, run->operands[i]))
+			scene_argument_missing(run->operands[i]);
+		add(all, run->operands[i], strlen(run->operands[i]), argument.path);
+	}
+	if (run->n_operands)
+		return;
+	scene_argument_list_shipped(&found);
+	for (size_t i = 0; i < found.gl_pathc && all->n < SCENES_MAX; i++) {
+		const char *name = strrchr(found.gl_pathv[i], '/') + 1;
+
+		add(all, name, strlen(name) - strlen(".scene"), found.gl_pathv[i]);
+	}
+}
+
+static void run_integers(struct bench_run *run)
+{
+	struct rows *all = cli_alloc(1, sizeof(*all));
+
+	add_scenes(all, run);
+	for (int i = 0; i < all->n; i++) {
+		struct row *row = &all->row[i];
+
+		cli_progress("%s: forces", row->name);
+		open_row(row);
+		if (!*row->failed)
+			compare(row, run->quick ? QUICK_TICKS : TICKS);
+	}
+	time_all(all, run->quick);
+	bench_rows(run, &table, all->row, all->n);
+	for (int i = 0; i < all->n; i++) {
+		if (*all->row[i].failed)
+			bench_fail(run, "%s", all->row[i].failed);
+		else if (!all->row[i].holds)
+			bench_fail(
+				run,
+				"%s: a force is off by more than certified: a fault of "
+				"incise, please report it with the scene",
+				all->row[i].name);
+	}
+}
+
+const struct bench bench_program = {
+	.name = "integers",
+	.operands = "[SCENE...]",
+	.summary = "fixed-point plan of the kernel compared with double",
+	.n_operands = SCENES_MAX,
+	.run = run_integers,
+};

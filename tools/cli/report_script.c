@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Runs the script of reports; see report_script.h. It is that of Debian's Python, whose packages
+ * have jinja2, and not one that a virtual environment puts first in PATH.
+ */
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include "child.h"
+#include "cli.h"
+#include "file.h"
+#include "report_script.h"
+
+#define PYTHON "/usr/bin/python3"
+
+/* The last line that it said. */
+static int failed(FILE *said, struct incise_error *err)
+{
+	char line[400] = "it failed", text[400];
+
+	rewind(said);
+	while (fgets(text, sizeof(text), said)) {
+		text[strcspn(text, "\n")] = 0;
+		if (*text)
+			strcpy(line, text);
+	}
+	return incise_error_set(err, EIO, "report: %s", line);
+}
+
+int report_script(const char *what, const char *folder, const json_t *data, FILE *out,
+		  struct incise_error *err)
+{
+	char *script = cli_text("%s/../share/incise/report/report.py", cli_folder());
+	char *const argv[] = {PYTHON, "-B", script, (char *)what, (char *)folder, NULL};
+	struct memory_file in = memory_file_begin("page"),
+			   said = memory_file_begin("said");
+	int status, rc = 0;
+
+	if (data)
+		json_dumpf(data, in.file, JSON_COMPACT);
+	rewind(in.file);
+	if (out)
+		fflush(out);
+	status = child_run(argv, fileno(in.file), out ? fileno(out) : -1,
+			   fileno(said.file));
+	if (status < 0)
+		rc = incise_error_set(err, errno,
+				      "report: %s: %s; install python3-jinja2", PYTHON,
+				      strerror(errno));
+	else if (status)
+		rc = failed(said.file, err);
+	fclose(in.file);
+	fclose(said.file);
+	free(script);
+	return rc;
+}

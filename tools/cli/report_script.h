@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: GPL-2.0-or-later */
+/*
+ * The script that makes reports of JSON, tools/report/report.py: Python with jinja2.
+ */
+#ifndef INCISE_REPORT_SCRIPT_H
+#define INCISE_REPORT_SCRIPT_H
+
+#include <jansson.h>
+#include <stdio.h>
+#include <incise/error.h>
+
+/*
+ * Run it until it ends. @what: "check", whether it can run; "bench", report.json of a folder as
+ * report.md and report.html; "page", @data as HTML into @out, with the plots of the folder.
+ * Returns 0, or a negative errno with the script's last line.
+ */
+int report_script(const char *what, const char *folder, const json_t *data, FILE *out,
+		  struct incise_error *err);
+
+#endif
