@@ -19,7 +19,7 @@
 #define REACH_MAX 16383.0
 
 /* Tolerance of a direction's length 1. */
-#define UNIT 1e-6
+#define SPRING_UNIT_MM 1e-6
 
 /*
  * Take a spring's numbers from double, each rounded to the nearest.
@@ -39,7 +39,7 @@ static inline int incise_fixed_spring_set(struct incise_fixed_spring *spring,
 	double length = v3_length(direction);
 
 	if (!isfinite(stiffness_N_mm) || stiffness_N_mm < 0 || !v3_finite(anchor_mm) ||
-	    !(fabs(length - 1) <= UNIT))
+	    !(fabs(length - 1) <= SPRING_UNIT_MM))
 		return -EINVAL;
 	if (stiffness_N_mm > LARGEST)
 		return -ERANGE;

@@ -11,6 +11,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../../extremes/fixed_spring.h"
 #include "trial_plan.h"
 
 #define CASES 20000

@@ -9,6 +9,7 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/fixed/spring.h"
+#include "../../extremes/fixed_spring.h"
 #include "../../../lib/tissue/front.h"
 #include <time.h>
 #include "../message.h"
