@@ -14,9 +14,10 @@
 #include <incise/calibration.h>
 #include "../../../lib/base/calibration.c"
 #include "../message.h"
+#include "../unit.h"
 #include "temp_file.h"
 
-static void nominal_is_the_papers(void **state)
+TEST(nominal_is_the_papers)
 {
 	struct incise_calibration c = {0};
 
@@ -28,7 +29,7 @@ static void nominal_is_the_papers(void **state)
 		    isnan(c.camera_delay_ms) && isnan(c.tracker_delay_sd_ms));
 }
 
-static void absent_keys_are_nominal(void **state)
+TEST(absent_keys_are_nominal)
 {
 	struct temp_file file =
 		temp_file_new("calibration.conf", "force_zero_mV = 175.5;\n");
@@ -40,7 +41,7 @@ static void absent_keys_are_nominal(void **state)
 	temp_file_free(&file);
 }
 
-static void all_keys_are_read(void **state)
+TEST(all_keys_are_read)
 {
 	struct temp_file file = temp_file_new(
 		"calibration.conf",
@@ -60,7 +61,7 @@ static void all_keys_are_read(void **state)
 	temp_file_free(&file);
 }
 
-static void faults_leave_the_calibration_alone(void **state)
+TEST(faults_leave_the_calibration_alone)
 {
 	static const struct {
 		const char *text, *says[2];
@@ -154,7 +155,7 @@ static char *content(const char *path)
 	return text;
 }
 
-static void what_is_appended_is_read(void **state)
+TEST(what_is_appended_is_read)
 {
 	struct temp_file file = temp_file_new("calibration.conf", "");
 	const struct incise_calibration_record record[] = {force_record(1238.0 + 1.0 / 7),
@@ -181,7 +182,7 @@ static void what_is_appended_is_read(void **state)
 	temp_file_free(&file);
 }
 
-static void what_failed_is_not_in_force(void **state)
+TEST(what_failed_is_not_in_force)
 {
 	struct temp_file file =
 		temp_file_new("calibration.conf", "force_mV_N = 1200; # by hand\n"
@@ -210,7 +211,7 @@ static void what_failed_is_not_in_force(void **state)
 	temp_file_free(&file);
 }
 
-static void every_key_comes_back(void **state)
+TEST(every_key_comes_back)
 {
 	struct temp_file file = temp_file_new("calibration.conf", "");
 	struct incise_calibration_record record = {
@@ -250,7 +251,7 @@ static void every_key_comes_back(void **state)
 	temp_file_free(&file);
 }
 
-static void raw_data_are_named_and_sealed(void **state)
+TEST(raw_data_are_named_and_sealed)
 {
 	/* RFC 3720, B.4: check value of CRC32C */
 	struct temp_file file = temp_file_new("pairs.csv", "123456789");
@@ -265,7 +266,7 @@ static void raw_data_are_named_and_sealed(void **state)
 	temp_file_free(&file);
 }
 
-static void wrong_records_change_nothing(void **state)
+TEST(wrong_records_change_nothing)
 {
 	struct temp_file file = temp_file_new("calibration.conf", "force_mV_N = 1200;\n");
 	struct incise_calibration_record row[12];
@@ -295,7 +296,7 @@ static void wrong_records_change_nothing(void **state)
 	temp_file_free(&file);
 }
 
-static void wrong_files_are_named(void **state)
+TEST(wrong_files_are_named)
 {
 #define ENTRY(rest)                                                                             \
 	"history = ( {\nkind = \"force\"; date = \"2026-11-21T14:48:16Z\";\npass = true; " rest \
@@ -367,7 +368,7 @@ static void wrong_files_are_named(void **state)
  * Whenever the writer dies, the file is whole and its history as long as what the writer reported,
  * or one longer. It has written once at least, however late it started.
  */
-static void a_killed_writer_leaves_a_whole_file(void **state)
+TEST(a_killed_writer_leaves_a_whole_file)
 {
 	struct temp_file file = temp_file_new("calibration.conf", "");
 	const struct incise_calibration_record record = force_record(1239);
@@ -427,7 +428,7 @@ static char *written(const struct file_content *file, const char *notes)
 	return text;
 }
 
-static void what_is_empty_is_said(void **state)
+TEST(what_is_empty_is_said)
 {
 	struct file_content file = {0};
 	char *text;
@@ -443,7 +444,7 @@ static void what_is_empty_is_said(void **state)
 	free(text);
 }
 
-static void text_is_as_documented(void **state)
+TEST(text_is_as_documented)
 {
 	struct incise_calibration_record records[] = {
 		{
@@ -509,25 +510,4 @@ static void text_is_as_documented(void **state)
 			       "  range_unit = \"N\";\n  pass = true;\n}, {\n"));
 	assert_non_null(strstr(text, "  pass = false;\n  verdict = \"no\";\n}\n);\n"));
 	free(text);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(nominal_is_the_papers),
-		cmocka_unit_test(absent_keys_are_nominal),
-		cmocka_unit_test(all_keys_are_read),
-		cmocka_unit_test(faults_leave_the_calibration_alone),
-		cmocka_unit_test(what_is_appended_is_read),
-		cmocka_unit_test(what_failed_is_not_in_force),
-		cmocka_unit_test(every_key_comes_back),
-		cmocka_unit_test(raw_data_are_named_and_sealed),
-		cmocka_unit_test(wrong_records_change_nothing),
-		cmocka_unit_test(wrong_files_are_named),
-		cmocka_unit_test(a_killed_writer_leaves_a_whole_file),
-		cmocka_unit_test(what_is_empty_is_said),
-		cmocka_unit_test(text_is_as_documented),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,18 +2,14 @@
 /*
  * Real and simulated clocks.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <signal.h>
 #include <sys/time.h>
 #include <time.h>
 #include <incise/clock.h>
 
-static void test_simulated_time_stands_still(void **state)
+TEST(test_simulated_time_stands_still)
 {
 	struct incise_clock *clock = incise_clock_new_simulated(5);
 
@@ -28,7 +24,7 @@ static void test_simulated_time_stands_still(void **state)
 }
 
 /* Its steps are those of a simulated one, and no wait ends before its time. */
-static void test_paced_time_is_simulated_time_that_takes_time(void **state)
+TEST(test_paced_time_is_simulated_time_that_takes_time)
 {
 	struct incise_clock *clock = incise_clock_new_paced(5);
 	struct timespec before, after;
@@ -52,7 +48,7 @@ static void test_paced_time_is_simulated_time_that_takes_time(void **state)
 	incise_clock_free(clock);
 }
 
-static void test_real_time_is_monotonic_clock(void **state)
+TEST(test_real_time_is_monotonic_clock)
 {
 	struct incise_clock *clock = incise_clock_new_real();
 	struct timespec before, after;
@@ -76,7 +72,7 @@ static void on_alarm(int number)
 {
 }
 
-static void test_a_signal_ends_the_wait(void **state)
+TEST(test_a_signal_ends_the_wait)
 {
 	struct incise_clock *clock = incise_clock_new_real();
 	/* Again every 5 ms, should the first one come before the wait has begun. */
@@ -90,16 +86,4 @@ static void test_a_signal_ends_the_wait(void **state)
 			 -EINTR);
 	setitimer(ITIMER_REAL, &never, NULL);
 	incise_clock_free(clock);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_simulated_time_stands_still),
-		cmocka_unit_test(test_paced_time_is_simulated_time_that_takes_time),
-		cmocka_unit_test(test_real_time_is_monotonic_clock),
-		cmocka_unit_test(test_a_signal_ends_the_wait),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

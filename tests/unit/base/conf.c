@@ -7,6 +7,7 @@
 #include <string.h>
 #include "../../../lib/base/conf.h"
 #include "../message.h"
+#include "../unit.h"
 #include "temp_file.h"
 
 /* Everything a file may hold here: a group `sim` with `seed`, `name`, and a surface. */
@@ -52,7 +53,7 @@ static int read_content(const char *path, config_t *config, struct content *cont
 	return rc;
 }
 
-static void refused_with_file_line_and_cause(void **state)
+TEST(refused_with_file_line_and_cause)
 {
 	static const struct {
 		const char *text, *says[2]; /* the place and key, and the value */
@@ -100,7 +101,7 @@ static void refused_with_file_line_and_cause(void **state)
 	}
 }
 
-static void a_refused_value_leaves_what_was_there(void **state)
+TEST(a_refused_value_leaves_what_was_there)
 {
 	struct temp_file file =
 		temp_file_new("a.conf",
@@ -120,7 +121,7 @@ static void a_refused_value_leaves_what_was_there(void **state)
 	temp_file_free(&file);
 }
 
-static void taken(void **state)
+TEST(taken)
 {
 	struct temp_file file =
 		temp_file_new("a.conf",
@@ -147,7 +148,7 @@ static void taken(void **state)
 	temp_file_free(&file);
 }
 
-static void absent_keys_change_nothing(void **state)
+TEST(absent_keys_change_nothing)
 {
 	struct temp_file file = temp_file_new("a.conf", "sim = {};");
 	struct content content = {.seed = 7, .name = "kept", .normal = {0, 0, 1}};
@@ -161,7 +162,7 @@ static void absent_keys_change_nothing(void **state)
 	temp_file_free(&file);
 }
 
-static void unreadable_files_are_named(void **state)
+TEST(unreadable_files_are_named)
 {
 	struct incise_error err;
 	config_t config;
@@ -172,17 +173,4 @@ static void unreadable_files_are_named(void **state)
 	/* As a disk that fails: nothing is at address 0. */
 	assert_error(incise_conf_read(&config, "/proc/self/mem", &err), EIO, &err,
 		     "/proc/self/mem:");
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(refused_with_file_line_and_cause),
-		cmocka_unit_test(a_refused_value_leaves_what_was_there),
-		cmocka_unit_test(taken),
-		cmocka_unit_test(absent_keys_change_nothing),
-		cmocka_unit_test(unreadable_files_are_named),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,15 +3,11 @@
  * Tests of lib/base/crc32c.c, against the vectors of RFC 3720, appendix B.4, and against
  * the division bit by bit.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
+#include "../unit.h"
 #include <string.h>
-#include <cmocka.h>
 #include "../../../lib/base/crc32c.h"
 
-static void vectors_of_rfc_3720(void **state)
+TEST(vectors_of_rfc_3720)
 {
 	/* a SCSI read (10) command, as it stands there */
 	static const uint8_t command[48] = {0x01, 0xc0, 0,    0, 0, 0, 0,    0,	 0, 0,
@@ -35,7 +31,7 @@ static void vectors_of_rfc_3720(void **state)
 	assert_int_equal(incise_crc32c(0, "123456789", 9), 0xe3069283);
 }
 
-static void nothing_changes_nothing(void **state)
+TEST(nothing_changes_nothing)
 {
 	assert_int_equal(incise_crc32c(0, NULL, 0), 0);
 	assert_int_equal(incise_crc32c(0x12345678, NULL, 0), 0x12345678);
@@ -55,7 +51,7 @@ static uint32_t divide(const uint8_t *bytes, size_t n)
 	return ~crc;
 }
 
-static void parts_and_the_whole_agree(void **state)
+TEST(parts_and_the_whole_agree)
 {
 	uint8_t bytes[300];
 	uint32_t random = 1;
@@ -73,15 +69,4 @@ static void parts_and_the_whole_agree(void **state)
 						       bytes + part, n - part),
 					 whole);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(vectors_of_rfc_3720),
-		cmocka_unit_test(nothing_changes_nothing),
-		cmocka_unit_test(parts_and_the_whole_agree),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

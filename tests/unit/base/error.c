@@ -2,18 +2,14 @@
 /*
  * Errors as values: the code, errno and a single clean line.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <stdio.h>
 #include <errno.h>
 #include <string.h>
 #include <incise/error.h>
 #include <incise/version.h>
 
-static void test_code_line_and_errno(void **state)
+TEST(test_code_line_and_errno)
 {
 	struct incise_error err = {0};
 
@@ -25,7 +21,7 @@ static void test_code_line_and_errno(void **state)
 	assert_string_equal(err.text, "a.fis:7: gone");
 }
 
-static void test_without_a_place_to_leave_it(void **state)
+TEST(test_without_a_place_to_leave_it)
 {
 	errno = 0;
 	assert_int_equal(incise_error_set(NULL, EIO, "lost"), -EIO);
@@ -33,7 +29,7 @@ static void test_without_a_place_to_leave_it(void **state)
 }
 
 /* Text from a file must not end the line, move the cursor or overrun. */
-static void test_hostile_text(void **state)
+TEST(test_hostile_text)
 {
 	struct incise_error err = {0};
 	char longer[2000];
@@ -46,13 +42,13 @@ static void test_hostile_text(void **state)
 	assert_int_equal(strlen(err.text), sizeof(err.text) - 1);
 }
 
-static void test_version(void **state)
+TEST(test_version)
 {
 	assert_string_equal(incise_version(), INCISE_VERSION);
 }
 
 /* Packages of Debian 12 and 13, as `dpkg -S` names them. */
-static void test_a_missing_library_is_named_with_its_package(void **state)
+TEST(test_a_missing_library_is_named_with_its_package)
 {
 	static const char *const cases[][2] = {
 		{"libSDL2-2.0.so.0", "libsdl2-2.0-0"},
@@ -100,7 +96,7 @@ static void test_a_missing_library_is_named_with_its_package(void **state)
 }
 
 /* The fewest edits win; more than a third of the letters, and nothing is meant. */
-static void test_nearest_name(void **state)
+TEST(test_nearest_name)
 {
 	static const char *const names[] = {"duration", "rate",	 "output", "overwrite",
 					    "o",	"state", NULL};
@@ -130,18 +126,4 @@ static void test_nearest_name(void **state)
 	memset(longer, 'a', sizeof(longer) - 1);
 	assert_null(incise_nearest_name(longer, names));
 	assert_null(incise_nearest_name("rate", (const char *const[]){longer, NULL}));
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_a_missing_library_is_named_with_its_package),
-		cmocka_unit_test(test_code_line_and_errno),
-		cmocka_unit_test(test_without_a_place_to_leave_it),
-		cmocka_unit_test(test_hostile_text),
-		cmocka_unit_test(test_version),
-		cmocka_unit_test(test_nearest_name),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

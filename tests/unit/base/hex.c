@@ -2,16 +2,12 @@
 /*
  * lib/base/hex.h over all bytes, against the C library in its own locale.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <ctype.h>
 #include <stdlib.h>
 #include "../../../lib/base/hex.h"
 
-static void all_bytes(void **state)
+TEST(all_bytes)
 {
 	for (int c = -128; c < 256; c++) {
 		char text[2] = {(char)c, 0};
@@ -19,13 +15,4 @@ static void all_bytes(void **state)
 
 		assert_int_equal(incise_hex_digit(c), digit);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(all_bytes),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,12 +9,13 @@
 #include <sys/stat.h>
 #include <incise/infile.h>
 #include "../message.h"
+#include "../unit.h"
 #include "temp_file.h"
 
 static const struct incise_infile_kind stream = {.name = "a text", .advice = "give one"};
 static const struct incise_infile_kind small = {.name = "a note", .size_max = 1 << 20};
 
-static void test_lines_of_all_lengths(void **state)
+TEST(test_lines_of_all_lengths)
 {
 	/* Around the sizes of the buffer, twice it, and the limit of a line. */
 	static const size_t lengths[] = {0,	 1,	 65534,	 65535,	  65536, 65537, 3,
@@ -50,7 +51,7 @@ static void test_lines_of_all_lengths(void **state)
 	}
 }
 
-static void test_limits_are_named(void **state)
+TEST(test_limits_are_named)
 {
 	struct temp_file temp = temp_file_new("l.txt", "one\n");
 	struct incise_error err = {0};
@@ -91,7 +92,7 @@ static void *write_late(void *path)
 	return NULL;
 }
 
-static void test_pipes(void **state)
+TEST(test_pipes)
 {
 	struct temp_file temp = temp_file_new("pipe", "");
 	const struct incise_infile_kind regular = {.name = "a note", .regular = true};
@@ -122,7 +123,7 @@ static void test_pipes(void **state)
 	temp_file_free(&temp);
 }
 
-static void test_devices_are_refused(void **state)
+TEST(test_devices_are_refused)
 {
 	static const char *const devices[] = {"/dev/zero", "/dev/urandom", "/dev/full",
 					      "/dev/null", "/dev/tty"};
@@ -135,7 +136,7 @@ static void test_devices_are_refused(void **state)
 	}
 }
 
-static void test_decimals(void **state)
+TEST(test_decimals)
 {
 	static const struct {
 		const char *text;
@@ -154,17 +155,4 @@ static void test_decimals(void **state)
 		assert_ptr_equal(end, cases[i].text + cases[i].taken);
 	}
 	assert_true(isinf(incise_decimal("-inf", &end)));
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_lines_of_all_lengths),
-		cmocka_unit_test(test_limits_are_named),
-		cmocka_unit_test(test_pipes),
-		cmocka_unit_test(test_devices_are_refused),
-		cmocka_unit_test(test_decimals),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -5,11 +5,12 @@
 #include <errno.h>
 #include "../../../lib/base/lines.h"
 #include "../message.h"
+#include "../unit.h"
 #include "temp_file.h"
 
 static const struct incise_infile_kind text = {.name = "a text", .advice = "give one"};
 
-static void test_lines(void **state)
+TEST(test_lines)
 {
 	struct temp_file file = temp_file_new("l.txt", " one \r\n\ntwo");
 	struct incise_lines in;
@@ -27,7 +28,7 @@ static void test_lines(void **state)
 	temp_file_free(&file);
 }
 
-static void test_errors(void **state)
+TEST(test_errors)
 {
 	struct temp_file file = temp_file_new("l.txt", "one\n");
 	struct incise_error err = {0};
@@ -46,14 +47,4 @@ static void test_errors(void **state)
 	temp_file_free(&file);
 	assert_error(incise_lines_open(&in, file.path, &text, &err), ENOENT, &err,
 		     file.path);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_lines),
-		cmocka_unit_test(test_errors),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -16,6 +16,7 @@
 #include <unistd.h>
 #include <incise/outfile.h>
 #include "../message.h"
+#include "../unit.h"
 
 static char folder[] = "/tmp/incise-outfile-XXXXXX";
 static char path[64];
@@ -63,7 +64,7 @@ static const char *content(void)
 	return text;
 }
 
-static void test_appears_at_commit(void **state)
+TEST(test_appears_at_commit, set_up, tear_down)
 {
 	struct incise_outfile *file = incise_outfile_open(path, NULL);
 	struct stat st;
@@ -81,7 +82,7 @@ static void test_appears_at_commit(void **state)
 	assert_int_equal(st.st_mode & 0777, 0666 & ~mask);
 }
 
-static void test_abort_keeps_the_old(void **state)
+TEST(test_abort_keeps_the_old, set_up, tear_down)
 {
 	struct incise_outfile *file;
 
@@ -101,7 +102,7 @@ static void test_abort_keeps_the_old(void **state)
 }
 
 /* kill -9 with half of it written: the old file stands, and nothing else. */
-static void test_killed_writer(void **state)
+TEST(test_killed_writer, set_up, tear_down)
 {
 	struct incise_outfile *file = incise_outfile_open(path, NULL);
 	pid_t child;
@@ -122,7 +123,7 @@ static void test_killed_writer(void **state)
 }
 
 /* A file size limit fails writes as a full disk does (EFBIG in place of ENOSPC). */
-static void test_failed_write(void **state)
+TEST(test_failed_write, set_up, tear_down)
 {
 	struct rlimit before, small;
 	struct incise_error err = {0};
@@ -144,7 +145,7 @@ static void test_failed_write(void **state)
 	assert_int_equal(entries(), 0);
 }
 
-static void test_refusals(void **state)
+TEST(test_refusals)
 {
 	static const struct {
 		const char *path;
@@ -160,7 +161,7 @@ static void test_refusals(void **state)
 }
 
 /* A link goes on being one; the file it leads to is replaced. */
-static void test_link_is_written_through(void **state)
+TEST(test_link_is_written_through, set_up, tear_down)
 {
 	struct incise_outfile *file = incise_outfile_open(path, NULL);
 	char link[80], to[80];
@@ -179,7 +180,7 @@ static void test_link_is_written_through(void **state)
 }
 
 /* A file that is replaced keeps its mode, owner and group, through a link too. */
-static void test_mode_and_owner_stay(void **state)
+TEST(test_mode_and_owner_stay, set_up, tear_down)
 {
 	static const mode_t modes[] = {0640, 0600, 0664, 0444};
 	const bool root = !geteuid();
@@ -213,7 +214,7 @@ static void test_mode_and_owner_stay(void **state)
  * Who may not keep the group, as the folder is theirs but the file is not, gives the new group
  * no more than everyone has.
  */
-static void test_another_group_gets_no_more(void **state)
+TEST(test_another_group_gets_no_more, set_up, tear_down)
 {
 	struct incise_outfile *file;
 	struct stat st;
@@ -244,7 +245,7 @@ static void test_another_group_gets_no_more(void **state)
 }
 
 /* Devices and pipes are written in place: there is nothing to rename. */
-static void test_special_files(void **state)
+TEST(test_special_files)
 {
 	struct incise_error err = {0};
 	struct incise_outfile *file = incise_outfile_open("/dev/null", NULL);
@@ -257,26 +258,4 @@ static void test_special_files(void **state)
 	file = incise_outfile_open("/dev/full", NULL);
 	fputs("lost", incise_outfile_stream(file));
 	assert_int_equal(incise_outfile_commit(file, &err), -ENOSPC);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(test_appears_at_commit, set_up,
-						tear_down),
-		cmocka_unit_test_setup_teardown(test_abort_keeps_the_old, set_up,
-						tear_down),
-		cmocka_unit_test_setup_teardown(test_killed_writer, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(test_failed_write, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(test_link_is_written_through, set_up,
-						tear_down),
-		cmocka_unit_test_setup_teardown(test_mode_and_owner_stay, set_up,
-						tear_down),
-		cmocka_unit_test_setup_teardown(test_another_group_gets_no_more, set_up,
-						tear_down),
-		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_special_files),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

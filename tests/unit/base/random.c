@@ -3,18 +3,14 @@
  * lib/base/random.h: distributions, and independence of streams. The seeds are fixed, so
  * that a bound of 5 sd does not depend on luck.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <string.h>
 #include "../../../lib/base/random.h"
 
 #define N 200000
 
-static void normal_moments(void **state)
+TEST(normal_moments)
 {
 	uint64_t key = incise_random_key(3, INCISE_RANDOM_FORCE);
 	double sum[5] = {0};
@@ -33,7 +29,7 @@ static void normal_moments(void **state)
 	assert_true(fabs(sum[4] - 3) < 5 * sqrt(96.0 / N));
 }
 
-static void uniform_fills_its_range(void **state)
+TEST(uniform_fills_its_range)
 {
 	uint64_t key = incise_random_key(3, INCISE_RANDOM_TOOTH);
 	int bin[100] = {0};
@@ -60,7 +56,7 @@ static double correlation(uint64_t a, uint64_t b, int shift)
 	return sum;
 }
 
-static void streams_are_independent(void **state)
+TEST(streams_are_independent)
 {
 	uint64_t force = incise_random_key(1, INCISE_RANDOM_FORCE);
 	uint64_t tracker = incise_random_key(1, INCISE_RANDOM_TRACKER);
@@ -74,7 +70,7 @@ static void streams_are_independent(void **state)
 	assert_true(fabs(correlation(force, force, 0) - 1) < 5 * sqrt(2.0 / N));
 }
 
-static void test_is_a_permutation(void **state)
+TEST(test_is_a_permutation)
 {
 	for (size_t n = 0; n < 40; n++) {
 		size_t order[40];
@@ -88,7 +84,7 @@ static void test_is_a_permutation(void **state)
 	}
 }
 
-static void test_depends_on_the_seed_only(void **state)
+TEST(test_depends_on_the_seed_only)
 {
 	size_t a[30], b[30];
 
@@ -100,7 +96,7 @@ static void test_depends_on_the_seed_only(void **state)
 }
 
 /* Every item comes to every place equally often, within 5 sigma of a binomial. */
-static void test_fair(void **state)
+TEST(test_fair)
 {
 	const int rounds = 20000, n = 6;
 	int count[6][6] = {0};
@@ -118,7 +114,7 @@ static void test_fair(void **state)
 }
 
 /* Uniform in [-1, 1): mean and variance within five standard errors, and by seed. */
-static void test_random(void **state)
+TEST(test_random)
 {
 	uint64_t a = 5, b = 5;
 	double mean = 0, square = 0;
@@ -135,19 +131,4 @@ static void test_random(void **state)
 	assert_true(fabs(mean) < 5 * sqrt(1.0 / 3 / n));
 	/* The variance of x² is 4/45. */
 	assert_true(fabs(square - 1.0 / 3) < 5 * sqrt(4.0 / 45 / n));
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(normal_moments),
-		cmocka_unit_test(uniform_fills_its_range),
-		cmocka_unit_test(streams_are_independent),
-		cmocka_unit_test(test_random),
-		cmocka_unit_test(test_is_a_permutation),
-		cmocka_unit_test(test_depends_on_the_seed_only),
-		cmocka_unit_test(test_fair),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

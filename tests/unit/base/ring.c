@@ -2,11 +2,7 @@
 /*
  * lib/base/ring.c: order, what is full, counts that wrap round the array, and two threads.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <pthread.h>
 #include <sched.h>
@@ -30,7 +26,7 @@ static void is(const struct record *r, uint64_t i)
 	assert_int_equal(r->c, i * 3);
 }
 
-static void refuses(void **state)
+TEST(refuses)
 {
 	struct incise_ring ring;
 
@@ -40,7 +36,7 @@ static void refuses(void **state)
 	assert_int_equal(incise_ring_init(&ring, SIZE_MAX / 2, 8), -ENOMEM);
 }
 
-static void in_order_and_counted_when_full(void **state)
+TEST(in_order_and_counted_when_full)
 {
 	struct incise_ring ring;
 	struct record records[10];
@@ -97,7 +93,7 @@ static void *write_all(void *argument)
 }
 
 /* Whatever is taken is whole and in order, and what is missing is what was dropped. */
-static void between_two_threads(void **state)
+TEST(between_two_threads)
 {
 	struct incise_ring ring;
 	struct record records[16];
@@ -129,15 +125,4 @@ static void between_two_threads(void **state)
 	assert_int_equal(taken + incise_ring_dropped(&ring), SENT);
 	assert_true(taken > 0);
 	incise_ring_free(&ring);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(refuses),
-		cmocka_unit_test(in_order_and_counted_when_full),
-		cmocka_unit_test(between_two_threads),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

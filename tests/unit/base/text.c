@@ -2,11 +2,7 @@
 /*
  * Numbers in text against strtod(), which rounds correctly.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <locale.h>
 #include <math.h>
 #include <stdio.h>
@@ -14,7 +10,7 @@
 #include <string.h>
 #include "../../../lib/base/text.h"
 
-static void test_numbers_are_rounded_correctly(void **state)
+TEST(test_numbers_are_rounded_correctly)
 {
 	static const char *const formats[] = {"%.3f",  "%.6f",	"%.17g", "%.9e",
 					      "%.20f", "%+.1f", "%.0f",	 "%.15g"};
@@ -32,7 +28,7 @@ static void test_numbers_are_rounded_correctly(void **state)
 	}
 }
 
-static void test_what_is_a_number(void **state)
+TEST(test_what_is_a_number)
 {
 	static const char *const good[] = {
 		"0",	"-0",	 "1.",	   ".5",    "-.5e-3",
@@ -66,7 +62,7 @@ static void test_what_is_a_number(void **state)
 }
 
 /* The slow way asks the C library, which knows a locale. */
-static void test_a_decimal_comma_changes_nothing(void **state)
+TEST(test_a_decimal_comma_changes_nothing)
 {
 	static const char word[] = "0.1000000000000000055511151231257827";
 	double value = 0;
@@ -80,7 +76,7 @@ static void test_a_decimal_comma_changes_nothing(void **state)
 	assert_true(value == 0.1);
 }
 
-static void test_integers(void **state)
+TEST(test_integers)
 {
 	static const struct {
 		const char *word;
@@ -104,16 +100,4 @@ static void test_integers(void **state)
 			assert_true(value == cases[k].value);
 		}
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_numbers_are_rounded_correctly),
-		cmocka_unit_test(test_what_is_a_number),
-		cmocka_unit_test(test_a_decimal_comma_changes_nothing),
-		cmocka_unit_test(test_integers),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

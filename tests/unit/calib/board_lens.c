@@ -3,11 +3,7 @@
  * Tests of lib/calib/board_lens.c: rotations there and back, a lens there and back, and the
  * place on a board that a pixel shows.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <string.h>
 #include "../../../lib/calib/board_lens.h"
@@ -16,7 +12,7 @@ static const union board_lens lens = {
 	.by_name = {1000, 1010, 322, 238, -0.25, 0.1, 0.001, -0.001}};
 
 /* R is a rotation, turns about its vector, and comes back; also near 0 and half a turn. */
-static void test_rotation(void **state)
+TEST(test_rotation)
 {
 	static const double vectors[][3] = {
 		{0, 0, 0},	{1e-9, 0, 0},  {1e-5, -2e-5, 3e-5}, {0.3, -0.2, 0.1},
@@ -55,7 +51,7 @@ static void test_rotation(void **state)
 }
 
 /* Each pixel of a frame, through the lens and back. */
-static void test_back(void **state)
+TEST(test_back)
 {
 	static const double straight[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 	static const double at[3] = {0, 0, 100};
@@ -72,7 +68,7 @@ static void test_back(void **state)
 }
 
 /* board_meet() returns the point of a tilted board that board_project() projected. */
-static void test_meet(void **state)
+TEST(test_meet)
 {
 	static const double pose[BOARD_POSE] = {0.4, -0.3, 0.8, -20, 5, 130};
 	double r[9];
@@ -85,15 +81,4 @@ static void test_meet(void **state)
 		board_meet(&lens, pose, px, met);
 		assert_true(fabs(met[0] - mm[0]) < 1e-9 && fabs(met[1] - mm[1]) < 1e-9);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_rotation),
-		cmocka_unit_test(test_back),
-		cmocka_unit_test(test_meet),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

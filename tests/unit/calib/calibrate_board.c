@@ -11,6 +11,7 @@
 #include <incise/calibrate_depth.h>
 #include "../../../lib/base/random.h"
 #include "../message.h"
+#include "../unit.h"
 
 #define RIGS 200
 #define VIEWS 7
@@ -169,7 +170,7 @@ static void begin(int rig)
 }
 
 /* Exact corners give the camera back to what differences of steps leave. */
-static void test_exact(void **state)
+TEST(test_exact)
 {
 	for (int n = 1; n <= 20; n++) {
 		struct incise_board_fit fit;
@@ -207,7 +208,7 @@ static void test_exact(void **state)
 	}
 }
 
-static void test_truth(void **state)
+TEST(test_truth)
 {
 	int held = 0, held_f = 0, held_tilt = 0;
 	double worst = 0;
@@ -240,7 +241,7 @@ static void test_truth(void **state)
 }
 
 /* A view of another board position under the same name: the board slipped. */
-static void test_wrong_view(void **state)
+TEST(test_wrong_view)
 {
 	struct incise_board_fit fit;
 	struct incise_error err = {0};
@@ -308,7 +309,7 @@ static void all_at_one_place(struct rig *rig)
 		(&rig->px[0][0][0][0])[i] = 100;
 }
 
-static void test_refused(void **state)
+TEST(test_refused)
 {
 	static const struct {
 		void (*spoil)(struct rig *);
@@ -334,16 +335,4 @@ static void test_refused(void **state)
 		assert_says(err.text, cases[i].text);
 		assert_true(*err.text);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_exact),
-		cmocka_unit_test(test_truth),
-		cmocka_unit_test(test_wrong_view),
-		cmocka_unit_test(test_refused),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,6 +11,7 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/calib/calibrate_depth.c"
 #include "../message.h"
+#include "../unit.h"
 
 #define RIGS 2000
 #define PAIRS 60
@@ -55,7 +56,7 @@ static struct incise_depth_points points_of(const double *px, int n)
 }
 
 /* The paper's figures, to the last digit; the budget by hand. */
-static void test_paper(void **state)
+TEST(test_paper)
 {
 	const double px[] = {400};
 	struct incise_depth_points points = points_of(px, 1);
@@ -100,7 +101,7 @@ static void points_truth(int n, double correlation)
 	in_interval(held);
 }
 
-static void test_points_truth(void **state)
+TEST(test_points_truth)
 {
 	points_truth(10, 0);
 	points_truth(50, 0);
@@ -108,7 +109,7 @@ static void test_points_truth(void **state)
 }
 
 /* Few repeats and nothing else that is uncertain: the interval is Student's. */
-static void test_few_repeats(void **state)
+TEST(test_few_repeats)
 {
 	for (int n = 2; n <= 6; n++) {
 		int held = 0;
@@ -131,7 +132,7 @@ static void test_few_repeats(void **state)
 	}
 }
 
-static void test_points_outliers(void **state)
+TEST(test_points_outliers)
 {
 	double px[20];
 	struct incise_depth_points points = points_of(px, 20);
@@ -155,7 +156,7 @@ static void test_points_outliers(void **state)
 		     &err, "8 of 20");
 }
 
-static void test_points_refused(void **state)
+TEST(test_points_refused)
 {
 	static const struct {
 		double px, mm, u;
@@ -209,7 +210,7 @@ static struct incise_depth_lengths pairs_of(const struct line_data *d, int n)
 }
 
 /* Without noise: the line itself. */
-static void test_exact_line(void **state)
+TEST(test_exact_line)
 {
 	struct line_data d;
 	struct incise_depth_lengths pairs = pairs_of(&d, 10);
@@ -226,7 +227,7 @@ static void test_exact_line(void **state)
 	assert_int_equal(fit.inliers, 10);
 }
 
-static void test_line_truth(void **state)
+TEST(test_line_truth)
 {
 	static const struct {
 		int n;
@@ -277,7 +278,7 @@ static void test_line_truth(void **state)
 }
 
 /* A camera that looks on askance bends the line: it is reported with its uncertainty. */
-static void test_bend(void **state)
+TEST(test_bend)
 {
 	struct line_data d;
 	struct incise_depth_lengths pairs = pairs_of(&d, PAIRS);
@@ -334,7 +335,7 @@ static void half_wrong(struct line_data *d)
 		d->px[i] -= 30 + i;
 }
 
-static void test_line_refused(void **state)
+TEST(test_line_refused)
 {
 	static const struct {
 		void (*spoil)(struct line_data *);
@@ -368,7 +369,7 @@ static void test_line_refused(void **state)
 }
 
 /* Quantiles of a normal distribution, of sd 1: the table is exact but for its steps. */
-static void test_sd(void **state)
+TEST(test_sd)
 {
 	double absolute[1000];
 
@@ -394,7 +395,7 @@ static void test_sd(void **state)
 }
 
 /* Two values ± 1: sd √2, over √2; and Student's 13.97 over 2 for one degree of freedom. */
-static void test_two(void **state)
+TEST(test_two)
 {
 	const double residual[] = {1, -1};
 	int effective;
@@ -406,7 +407,7 @@ static void test_two(void **state)
 }
 
 /* Each value five times: a fifth of them count, which is √5 in the uncertainty. */
-static void test_correlated(void **state)
+TEST(test_correlated)
 {
 	double apart[200], alike[1000], u;
 	uint64_t seed = 1;
@@ -423,24 +424,4 @@ static void test_correlated(void **state)
 	/* the correlation is itself an estimate: to a fifth */
 	assert_true(fabs(repeats_u(alike, 1000, 1, &effective) / u - 1) < 0.2);
 	assert_in_range(effective, 140, 280);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_paper),
-		cmocka_unit_test(test_points_truth),
-		cmocka_unit_test(test_few_repeats),
-		cmocka_unit_test(test_points_outliers),
-		cmocka_unit_test(test_points_refused),
-		cmocka_unit_test(test_exact_line),
-		cmocka_unit_test(test_line_truth),
-		cmocka_unit_test(test_bend),
-		cmocka_unit_test(test_line_refused),
-		cmocka_unit_test(test_sd),
-		cmocka_unit_test(test_two),
-		cmocka_unit_test(test_correlated),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

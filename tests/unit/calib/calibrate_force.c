@@ -10,6 +10,7 @@
 #include <incise/calibrate_force.h>
 #include "../../../lib/base/random.h"
 #include "../message.h"
+#include "../unit.h"
 
 #define MAX 64
 
@@ -71,7 +72,7 @@ static int run(const struct rig *rig, const struct incise_calibrate_force_setup 
 				      states, err);
 }
 
-static void exact_data_give_exact_figures(void **state)
+TEST(exact_data_give_exact_figures)
 {
 	struct rig rig = plain_rig(1);
 	struct incise_calibrate_force result;
@@ -105,7 +106,7 @@ static void exact_data_give_exact_figures(void **state)
 }
 
 /* Against the formula of weighted least squares, solved otherwise: by its two equations. */
-static void uncertainty_is_that_of_the_weighted_line(void **state)
+TEST(uncertainty_is_that_of_the_weighted_line)
 {
 	struct rig rig = plain_rig(2);
 	struct incise_calibrate_force result;
@@ -141,7 +142,7 @@ static void uncertainty_is_that_of_the_weighted_line(void **state)
 	assert_true(fabs(result.sensitivity_mV_N - 1240) < 4 * u);
 }
 
-static void figures_are_those_put_in(void **state)
+TEST(figures_are_those_put_in)
 {
 	struct rig rig = plain_rig(3);
 	struct incise_calibrate_force result;
@@ -169,7 +170,7 @@ static void figures_are_those_put_in(void **state)
 }
 
 /* A sensor that bends by 0.6 % in the middle: no line explains it, and U says so. */
-static void what_is_not_straight_widens_the_interval(void **state)
+TEST(what_is_not_straight_widens_the_interval)
 {
 	struct rig straight = plain_rig(8), bent;
 	struct incise_calibrate_force a, b;
@@ -194,7 +195,7 @@ static void what_is_not_straight_widens_the_interval(void **state)
 }
 
 /* Means over noise are finer than a code; without it, the code is a source of its own. */
-static void a_code_counts_where_no_noise_dithers(void **state)
+TEST(a_code_counts_where_no_noise_dithers)
 {
 	struct rig rig = plain_rig(9);
 	struct incise_calibrate_force_setup setup;
@@ -211,7 +212,7 @@ static void a_code_counts_where_no_noise_dithers(void **state)
 	assert_true(coarse.zero_u_mV > fine.zero_u_mV);
 }
 
-static void one_in_ten_wrong_is_found(void **state)
+TEST(one_in_ten_wrong_is_found)
 {
 	for (int seed = 1; seed <= 50; seed++) {
 		struct rig rig = plain_rig(seed);
@@ -241,7 +242,7 @@ static void one_in_ten_wrong_is_found(void **state)
 	}
 }
 
-static void a_weight_noted_wrong_is_no_plateau(void **state)
+TEST(a_weight_noted_wrong_is_no_plateau)
 {
 	struct rig rig = plain_rig(4);
 	enum incise_calibrate_force_state states[MAX];
@@ -254,7 +255,7 @@ static void a_weight_noted_wrong_is_no_plateau(void **state)
 	assert_int_equal(result.used, 27);
 }
 
-static void saturated_readings_are_left_out(void **state)
+TEST(saturated_readings_are_left_out)
 {
 	for (int told = 0; told < 2; told++) {
 		struct rig rig = plain_rig(5);
@@ -282,7 +283,7 @@ static void saturated_readings_are_left_out(void **state)
 	}
 }
 
-static void what_cannot_be_is_named(void **state)
+TEST(what_cannot_be_is_named)
 {
 	static const struct {
 		const char *said;
@@ -350,7 +351,7 @@ static void what_cannot_be_is_named(void **state)
  * 200 rigs of any sensitivity, zero, noise, place and weights: the interval of k = 2 holds the
  * truth in 95 %, by chance of 200 in 92 to 98 %.
  */
-static void the_interval_holds_the_truth(void **state)
+TEST(the_interval_holds_the_truth)
 {
 	int held = 0, zeros = 0;
 	double worst = 0;
@@ -401,7 +402,7 @@ static void the_interval_holds_the_truth(void **state)
 }
 
 /* Values of the formula as published: 9.7803253359 at the equator, 9.8321849378 at the pole. */
-static void gravity_is_that_of_wgs84(void **state)
+TEST(gravity_is_that_of_wgs84)
 {
 	assert_float_equal(incise_calibrate_gravity(0, 0), 9.7803253359, 1e-10);
 	assert_float_equal(incise_calibrate_gravity(90, 0), 9.8321849378, 1e-9);
@@ -410,23 +411,4 @@ static void gravity_is_that_of_wgs84(void **state)
 	assert_float_equal(incise_calibrate_gravity(45, 1000) -
 				   incise_calibrate_gravity(45, 0),
 			   -3.086e-3, 2e-6);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(exact_data_give_exact_figures),
-		cmocka_unit_test(uncertainty_is_that_of_the_weighted_line),
-		cmocka_unit_test(figures_are_those_put_in),
-		cmocka_unit_test(what_is_not_straight_widens_the_interval),
-		cmocka_unit_test(a_code_counts_where_no_noise_dithers),
-		cmocka_unit_test(one_in_ten_wrong_is_found),
-		cmocka_unit_test(a_weight_noted_wrong_is_no_plateau),
-		cmocka_unit_test(saturated_readings_are_left_out),
-		cmocka_unit_test(what_cannot_be_is_named),
-		cmocka_unit_test(the_interval_holds_the_truth),
-		cmocka_unit_test(gravity_is_that_of_wgs84),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

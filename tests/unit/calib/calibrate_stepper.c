@@ -12,6 +12,7 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/calib/calibrate_stepper.c"
 #include "../message.h"
+#include "../unit.h"
 
 #define STEP_MM 0.000625
 #define POINTS_MAX 2000
@@ -87,7 +88,7 @@ static int run(const struct truth *t, struct incise_calibrate_stepper *result,
 	return incise_calibrate_stepper(points, n, &setup, result, NULL, err);
 }
 
-static void finds_what_is_there(void **state)
+TEST(finds_what_is_there)
 {
 	/* backlash mm, loss N, stiction N */
 	static const double row[][3] = {
@@ -128,7 +129,7 @@ static double uniform(uint64_t key, int i, double low, double high)
  * both sides (of seeds up to 1000: 95.0 %); that of the backlash, whose shape is searched for,
  * may be too wide.
  */
-static void intervals_hold_the_truth(void **state)
+TEST(intervals_hold_the_truth)
 {
 	int held = 0, held_backlash = 0;
 
@@ -160,7 +161,7 @@ static void intervals_hold_the_truth(void **state)
 	assert_in_range(held_backlash, 184, 200);
 }
 
-static void names_outliers(void **state)
+TEST(names_outliers)
 {
 	static struct incise_calibrate_stepper_point points[POINTS_MAX];
 	static enum incise_calibrate_stepper_state states[POINTS_MAX];
@@ -243,7 +244,7 @@ static void not_a_number(struct incise_calibrate_stepper_point *p, int n)
 	p[n / 2].force_N = NAN;
 }
 
-static void refuses_by_name(void **state)
+TEST(refuses_by_name)
 {
 	static const struct {
 		void (*spoil)(struct incise_calibrate_stepper_point *p, int n);
@@ -283,7 +284,7 @@ static void refuses_by_name(void **state)
 	assert_true(r.saturated > 10);
 }
 
-static void passes_or_not(void **state)
+TEST(passes_or_not)
 {
 	static struct incise_calibrate_stepper_point points[POINTS_MAX];
 	struct incise_calibrate_stepper_setup setup;
@@ -348,7 +349,7 @@ static struct work make_lines(double noise_N)
 	};
 }
 
-static void exact_lines_are_found(void **state)
+TEST(exact_lines_are_found)
 {
 	struct work w = make_lines(0);
 
@@ -367,7 +368,7 @@ static void exact_lines_are_found(void **state)
 }
 
 /* A fifth of the points far off, all to one side; what is saturated is not even looked at. */
-static void outliers_do_not_bend_them(void **state)
+TEST(outliers_do_not_bend_them)
 {
 	struct work w = make_lines(1e-3);
 
@@ -389,7 +390,7 @@ static void outliers_do_not_bend_them(void **state)
 	assert_true(fabs(w.sd - 1e-3) < 0.18e-3);
 }
 
-static void too_few_are_no_line(void **state)
+TEST(too_few_are_no_line)
 {
 	struct work w = make_lines(0);
 
@@ -399,20 +400,4 @@ static void too_few_are_no_line(void **state)
 	for (int i = POINTS; i < 2 * POINTS; i++)
 		states[i] = INCISE_CALIBRATE_STEPPER_SATURATED;
 	assert_int_equal(fit_lines(&w, SKIP_MM), -EDOM);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(finds_what_is_there),
-		cmocka_unit_test(intervals_hold_the_truth),
-		cmocka_unit_test(names_outliers),
-		cmocka_unit_test(refuses_by_name),
-		cmocka_unit_test(passes_or_not),
-		cmocka_unit_test(exact_lines_are_found),
-		cmocka_unit_test(outliers_do_not_bend_them),
-		cmocka_unit_test(too_few_are_no_line),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,6 +12,7 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"
 #include "../message.h"
+#include "../unit.h"
 
 #define POSES_MAX 2400
 #define DEG (M_PI / 180)
@@ -109,7 +110,7 @@ static int fit(int n, struct incise_tip_fit *out, struct incise_error *err)
 }
 
 /* Exact poses give the exact tip. */
-static void test_exact(void **state)
+TEST(test_exact)
 {
 	struct motion m = usual;
 	struct incise_tip_fit f;
@@ -185,19 +186,19 @@ static void hold_truth(double correlated, int n)
 	assert_true(worst < 0.1); /* asked, at 0.02 mm and 0.025 degrees */
 }
 
-static void test_intervals(void **state)
+TEST(test_intervals)
 {
 	hold_truth(0, 240);
 }
 
 /* Noise that stays alike over 10 poses. */
-static void test_intervals_of_a_stream(void **state)
+TEST(test_intervals_of_a_stream)
 {
 	hold_truth(0.8, 1200);
 }
 
 /* Every tenth pose is wrong: by something, or by a lot. All are listed, and none else. */
-static void test_outliers(void **state)
+TEST(test_outliers)
 {
 	for (int kind = 0; kind < 3; kind++) {
 		static const double off_mm[] = {0.6, 5, 300};
@@ -236,7 +237,7 @@ static void swap(int n, size_t a, size_t b)
 	}
 }
 
-static void test_refusals(void **state)
+TEST(test_refusals)
 {
 	struct motion small = usual, plane = usual, still = usual, moved = usual,
 		      jumped = usual, slow = usual;
@@ -280,7 +281,7 @@ static void test_refusals(void **state)
 }
 
 /* A pivot that moves evenly is named, whatever the noise; one that stays in noise that lasts is not. */
-static void test_moving_pivot(void **state)
+TEST(test_moving_pivot)
 {
 	struct motion moved = usual, slow = usual;
 	struct incise_tip_fit f;
@@ -306,7 +307,7 @@ static void test_moving_pivot(void **state)
 }
 
 /* A tip that rig.conf's own has nearly right: the cone is that of what turned least. */
-static void test_short_tip(void **state)
+TEST(test_short_tip)
 {
 	struct motion m = usual;
 	struct incise_tip_fit f;
@@ -319,19 +320,4 @@ static void test_short_tip(void **state)
 	assert_int_equal(fit(600, &f, &err), 0);
 	assert_true(fabs(f.tip_mm[0] - 0.3) <= 4 * sqrt(f.covariance[0]));
 	assert_true(f.cone_deg == f.least_deg);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_exact),
-		cmocka_unit_test(test_intervals),
-		cmocka_unit_test(test_intervals_of_a_stream),
-		cmocka_unit_test(test_outliers),
-		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_moving_pivot),
-		cmocka_unit_test(test_short_tip),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

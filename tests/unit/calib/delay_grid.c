@@ -8,6 +8,7 @@
 #include <string.h>
 #include "../../../lib/calib/delay_grid.h"
 #include "../message.h"
+#include "../unit.h"
 
 #define SPAN_S 12
 #define SLOW (SPAN_S * 100)   /* each 10 ms: cubics */
@@ -29,7 +30,7 @@ static void make_streams(void)
 		quick[i] = (struct incise_delay_point){i * 250000LL, value(i * 0.00025)};
 }
 
-static void streams_keep_their_values(void **state)
+TEST(streams_keep_their_values)
 {
 	struct delay_grid grid;
 	struct incise_error err;
@@ -55,7 +56,7 @@ static void streams_keep_their_values(void **state)
 	delay_grid_free(&grid);
 }
 
-static void a_shift_is_a_cubic(void **state)
+TEST(a_shift_is_a_cubic)
 {
 	double column[10];
 
@@ -69,7 +70,7 @@ static void a_shift_is_a_cubic(void **state)
 }
 
 /* A second without values: nothing is made up there, and nothing lost elsewhere. */
-static void gaps_are_not_good(void **state)
+TEST(gaps_are_not_good)
 {
 	const double gap_s[] = {5, 6};
 	struct delay_grid grid;
@@ -99,7 +100,7 @@ static void gaps_are_not_good(void **state)
 	delay_grid_free(&grid);
 }
 
-static void what_cannot_be_compared_is_refused(void **state)
+TEST(what_cannot_be_compared_is_refused)
 {
 	struct delay_grid grid;
 	struct incise_error err;
@@ -119,16 +120,4 @@ static void what_cannot_be_compared_is_refused(void **state)
 		quick[i].t_ns = i * 5000000LL;
 	assert_error(delay_grid_make(&grid, slow, SLOW, quick, QUICK, &err), EDOM, &err,
 		     "too slow");
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(streams_keep_their_values),
-		cmocka_unit_test(a_shift_is_a_cubic),
-		cmocka_unit_test(gaps_are_not_good),
-		cmocka_unit_test(what_cannot_be_compared_is_refused),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

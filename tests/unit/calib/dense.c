@@ -3,11 +3,7 @@
  * Small symmetric matrices, against LAPACK: random ones of all sizes, of any condition, and those
  * with equal eigenvalues or none.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <float.h>
 #include <lapacke.h>
 #include <math.h>
@@ -72,7 +68,7 @@ static void compare_eigen(const double *a, int n)
 	}
 }
 
-static void test_eigen(void **state)
+TEST(test_eigen)
 {
 	static const double grades[] = {1, 0.1, 1e-3};
 	double a[81];
@@ -90,7 +86,7 @@ static void test_eigen(void **state)
 }
 
 /* The residual of a solution is rounding, whatever the condition; LAPACK agrees by the condition. */
-static void test_cholesky(void **state)
+TEST(test_cholesky)
 {
 	static double a[MAX * MAX], l[MAX * MAX], lapack[MAX * MAX];
 	static const double shifts[] = {1, 1e-3, 1e-6};
@@ -134,7 +130,7 @@ static void test_cholesky(void **state)
 }
 
 /* No factor of what is not positive definite, or not finite. */
-static void test_refused(void **state)
+TEST(test_refused)
 {
 	static const double cases[][4] = {
 		{0, 0, 0, 1},	{1, 0, 0, -1},	{1, 0, 2, 1},	     {1, 0, 1, 1},
@@ -147,15 +143,4 @@ static void test_refused(void **state)
 		memcpy(a, cases[i], sizeof(a));
 		assert_false(incise_cholesky(a, 2));
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_eigen),
-		cmocka_unit_test(test_cholesky),
-		cmocka_unit_test(test_refused),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

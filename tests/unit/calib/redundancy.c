@@ -8,6 +8,7 @@
 #include <incise/redundancy.h>
 #include "../../../lib/base/random.h"
 #include "../message.h"
+#include "../unit.h"
 
 #define PAIRS 1000
 
@@ -41,7 +42,7 @@ static void make(struct incise_depth_pair *pairs, int how, uint64_t seed)
 	}
 }
 
-static void what_differs_is_named(void **state)
+TEST(what_differs_is_named)
 {
 	static struct incise_depth_pair pairs[PAIRS];
 
@@ -70,7 +71,7 @@ static void what_differs_is_named(void **state)
 		}
 }
 
-static void too_little_is_refused(void **state)
+TEST(too_little_is_refused)
 {
 	static struct incise_depth_pair pairs[PAIRS];
 	struct incise_redundancy r;
@@ -88,7 +89,7 @@ static void too_little_is_refused(void **state)
 }
 
 /* One place and one depth: nothing is said of trend, and no place differs. */
-static void no_travel_is_no_fault(void **state)
+TEST(no_travel_is_no_fault)
 {
 	static struct incise_depth_pair pairs[PAIRS];
 	struct incise_redundancy r;
@@ -102,15 +103,4 @@ static void no_travel_is_no_fault(void **state)
 	assert_int_equal(incise_redundancy(pairs, PAIRS, &r, NULL), 0);
 	assert_true(isnan(r.trend) && !r.trend_bad && !r.place_bad && !r.bias_bad);
 	assert_true(r.place_mm == 0 && r.travel_mm == 0);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(what_differs_is_named),
-		cmocka_unit_test(too_little_is_refused),
-		cmocka_unit_test(no_travel_is_no_fault),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * lib/calib/robust_line.c: nearly half of the points may be anywhere; without outliers it is
  * the line of least squares.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <math.h>
 #include "../../../lib/calib/robust_line.h"
@@ -31,7 +27,7 @@ static void make(struct points *p, int n, uint64_t seed, double noise)
 	}
 }
 
-static void clean_points_give_least_squares(void **state)
+TEST(clean_points_give_least_squares)
 {
 	struct robust_line line;
 	struct points p;
@@ -57,7 +53,7 @@ static void clean_points_give_least_squares(void **state)
 	}
 }
 
-static void wild_points_do_not_bend_it(void **state)
+TEST(wild_points_do_not_bend_it)
 {
 	for (int n = 20; n <= 380; n += 60) {
 		struct robust_line line;
@@ -77,7 +73,7 @@ static void wild_points_do_not_bend_it(void **state)
 	}
 }
 
-static void small_outliers_are_borne(void **state)
+TEST(small_outliers_are_borne)
 {
 	struct robust_line line;
 	struct points p;
@@ -91,7 +87,7 @@ static void small_outliers_are_borne(void **state)
 	assert_false(outlier[7]);
 }
 
-static void no_line_is_told(void **state)
+TEST(no_line_is_told)
 {
 	struct robust_line line;
 	double x[4] = {1, 1, 1, 1}, y[4] = {1, 2, 3, 4};
@@ -100,16 +96,4 @@ static void no_line_is_told(void **state)
 	assert_int_equal(incise_robust_line(x, y, 4, 0, &line, outlier), -EDOM);
 	x[0] = 2;
 	assert_int_equal(incise_robust_line(x, y, 2, 0, &line, outlier), -EDOM);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(clean_points_give_least_squares),
-		cmocka_unit_test(wild_points_do_not_bend_it),
-		cmocka_unit_test(small_outliers_are_borne),
-		cmocka_unit_test(no_line_is_told),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

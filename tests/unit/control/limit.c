@@ -2,11 +2,7 @@
 /*
  * Limits: force, slew, and nothing but numbers.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -22,7 +18,7 @@
 #define TOLERANCE_N 1e-14
 
 /* A walk of ticks, each from where the one before ended: 2 N, and 0.7 N a tick. */
-static void test_walk(void **state)
+TEST(test_walk)
 {
 	/* The share of a turn from (1.2 0 1.6) to (0 2 0), √8 N away, in one tick. */
 	const double k = 0.7 / sqrt(8);
@@ -57,7 +53,7 @@ static void test_walk(void **state)
 }
 
 /* One tick each, no slew to speak of: the limit alone, at the ends of what doubles hold. */
-static void test_size(void **state)
+TEST(test_size)
 {
 	static const struct {
 		double asked[3], rendered[3];
@@ -93,7 +89,7 @@ static void test_size(void **state)
 }
 
 /* Settings that make no sense render no force, or none that changes. */
-static void test_settings(void **state)
+TEST(test_settings)
 {
 	static const double none[] = {0, -1, NAN, -INFINITY};
 
@@ -141,7 +137,7 @@ static double any(uint64_t *seed)
 }
 
 /* Never above the limit, not by rounding either, whatever is asked and whatever it is. */
-static void test_whatever_is_asked(void **state)
+TEST(test_whatever_is_asked)
 {
 	uint64_t seed = 1;
 	int events[8] = {0};
@@ -188,7 +184,7 @@ static void test_whatever_is_asked(void **state)
 		assert_true((events[i] > 100) == !(i & FORCE && i & NOT_FINITE));
 }
 
-static void test_zero_is_at_once(void **state)
+TEST(test_zero_is_at_once)
 {
 	struct incise_limit limit = {2, 0.1, {0.5, 1.5, -1}};
 	double force[3] = {0, 0, 0};
@@ -196,17 +192,4 @@ static void test_zero_is_at_once(void **state)
 	incise_limit_zero(&limit);
 	assert_int_equal(incise_limit_apply(&limit, force), 0);
 	assert_true(v3_length(force) == 0);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_walk),
-		cmocka_unit_test(test_size),
-		cmocka_unit_test(test_settings),
-		cmocka_unit_test(test_whatever_is_asked),
-		cmocka_unit_test(test_zero_is_at_once),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

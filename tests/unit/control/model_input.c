@@ -2,18 +2,14 @@
 /*
  * Inputs of a model: acceleration, tilt and time in tissue against what they are by definition.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include <incise/clock.h>
 #include "../../../lib/control/model_input.h"
 #include "../../../lib/control/predict.h"
 
-static void names_are_found(void **state)
+TEST(names_are_found)
 {
 	for (int i = 0; i < INCISE_MODEL_INPUT_KINDS; i++)
 		assert_int_equal(
@@ -23,7 +19,7 @@ static void names_are_found(void **state)
 }
 
 /* d|v|/dt of a motion; below 5 mm/s less, without a leap. */
-static void acceleration_is_that_of_the_speed(void **state)
+TEST(acceleration_is_that_of_the_speed)
 {
 	double last = 0;
 
@@ -40,7 +36,7 @@ static void acceleration_is_that_of_the_speed(void **state)
 					      (double[]){4, -3, 9}) == 0);
 }
 
-static void tilt_is_the_angle(void **state)
+TEST(tilt_is_the_angle)
 {
 	const double normal[] = {0, 0.6, 0.8}, axis[] = {0, 0.6, 0.8};
 
@@ -55,7 +51,7 @@ static void tilt_is_the_angle(void **state)
 	assert_true(isnan(incise_input_tilt_deg((double[]){NAN, 0, 0, 0}, axis, normal)));
 }
 
-static void a_stay_begins_at_the_surface(void **state)
+TEST(a_stay_begins_at_the_surface)
 {
 	/* ms, mm; since when it is inside, ms, or -1 */
 	static const struct {
@@ -83,7 +79,7 @@ static void a_stay_begins_at_the_surface(void **state)
 }
 
 /* A hand that is pushed evenly: the filter finds it; and between two ticks nothing leaps. */
-static void filter_finds_an_even_acceleration(void **state)
+TEST(filter_finds_an_even_acceleration)
 {
 	const struct incise_tracker_info tracker = {
 		.name = "t", .rate_hz = 120, .latency_ns = 4200000};
@@ -112,17 +108,4 @@ static void filter_finds_an_even_acceleration(void **state)
 			assert_true(fabs(a[0] - push_mm_s2) < 1);
 		last = a[0];
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(names_are_found),
-		cmocka_unit_test(acceleration_is_that_of_the_speed),
-		cmocka_unit_test(tilt_is_the_angle),
-		cmocka_unit_test(a_stay_begins_at_the_surface),
-		cmocka_unit_test(filter_finds_an_even_acceleration),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * Plant: closed forms, energy, a matrix exponential in long double, one step against many,
  * and a brute-force integration.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <float.h>
 #include <math.h>
 #include "../../../lib/control/plant.h"
@@ -22,7 +18,7 @@ static void near(double got, double want, double within)
 	assert_true(fabs(got - want) <= within);
 }
 
-static void test_closed_forms(void **state)
+TEST(test_closed_forms)
 {
 	struct incise_plant p = {.mass_kg = 0.05, .velocity_mm_s = 100};
 	double m = 0.05 * G, omega;
@@ -120,7 +116,7 @@ static void exponential(long double a2, long double omega2, long double push,
 	*v = E[1][0] * x0 + E[1][1] * v0 + E[1][2];
 }
 
-static void test_any_rate(void **state)
+TEST(test_any_rate)
 {
 	/* Of a period: damping b T/m and angle ωT, from nothing to far beyond one. */
 	static const double damping[] = {0, 1e-9, 1e-6, 1e-3, 0.1, 0.5, 0.99,
@@ -171,7 +167,7 @@ static double force(int tick)
 }
 
 /* A period in one go or in many is the same motion, events and all. */
-static void test_one_step_is_many(void **state)
+TEST(test_one_step_is_many)
 {
 	for (size_t i = 0; i < N(kinds); i++) {
 		struct incise_plant one = kinds[i], many = kinds[i];
@@ -217,7 +213,7 @@ static void brute(struct incise_plant *p, double f, double period, int steps)
 	}
 }
 
-static void test_brute_force(void **state)
+TEST(test_brute_force)
 {
 	for (size_t i = 0; i < N(kinds); i++) {
 		struct incise_plant exact = kinds[i], rough = kinds[i];
@@ -235,7 +231,7 @@ static void test_brute_force(void **state)
 }
 
 /* Friction never gives energy back: without a force the energy only falls. */
-static void test_energy_falls(void **state)
+TEST(test_energy_falls)
 {
 	for (size_t i = 0; i < N(kinds); i++) {
 		struct incise_plant p = kinds[i];
@@ -261,7 +257,7 @@ static void test_energy_falls(void **state)
 	}
 }
 
-static void test_no_such_plant(void **state)
+TEST(test_no_such_plant)
 {
 	struct incise_plant p = {.mass_kg = 0};
 
@@ -278,18 +274,4 @@ static void test_no_such_plant(void **state)
 	p = (struct incise_plant){.mass_kg = 1, .position_mm = 3};
 	incise_plant_step(&p, 1, 0);
 	assert_true(p.position_mm == 3 && p.velocity_mm_s == 0);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_closed_forms),
-		cmocka_unit_test(test_any_rate),
-		cmocka_unit_test(test_one_step_is_many),
-		cmocka_unit_test(test_brute_force),
-		cmocka_unit_test(test_energy_falls),
-		cmocka_unit_test(test_no_such_plant),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

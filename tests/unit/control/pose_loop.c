@@ -3,11 +3,7 @@
  * The limit of a wall felt through a tracker: against runs in time whose poses and ticks
  * have no common period, and against theory where the predictor only interpolates.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <incise/clock.h>
 #include "../../../lib/control/plant.h"
@@ -125,7 +121,7 @@ static const struct row {
 	{37, 20e-3, 0.05, 0.2, 0.1, 0.211, 8},
 };
 
-static void test_against_time(void **state)
+TEST(test_against_time)
 {
 	for (size_t i = 0; i < N(rows); i++) {
 		const struct row *row = &rows[i];
@@ -165,7 +161,7 @@ static void test_against_time(void **state)
  * from pose to pose in a straight line, which is the motion latency + P ago, but for its
  * curvature. So the limit is that of a delay, the nearer the slower it is at the limit.
  */
-static void test_interpolation_is_a_delay(void **state)
+TEST(test_interpolation_is_a_delay)
 {
 	static const struct {
 		double bT_m, within;
@@ -187,7 +183,7 @@ static void test_interpolation_is_a_delay(void **state)
 }
 
 /* More acceleration of the mass by the same force and time is the same wall. */
-static void test_units(void **state)
+TEST(test_units)
 {
 	struct incise_haptic_device a = device_of(0.05, 0.2), b = device_of(5, 0.2);
 	struct incise_predict predict;
@@ -197,7 +193,7 @@ static void test_units(void **state)
 		    1e-4);
 }
 
-static void test_nothing_holds(void **state)
+TEST(test_nothing_holds)
 {
 	struct incise_haptic_device bad, device = device_of(0.05, 0.2);
 	struct incise_predict predict;
@@ -217,7 +213,7 @@ static void test_nothing_holds(void **state)
 }
 
 /* Whatever a tracker says of itself, there is an answer, and one that is a number. */
-static void test_strange_trackers(void **state)
+TEST(test_strange_trackers)
 {
 	static const double rates_hz[] = {-1, 0, 1, 999, 1001, 1e4, 1e9, NAN, INFINITY};
 	static const double ticks_s[] = {5e-5, 1e-2};
@@ -234,17 +230,4 @@ static void test_strange_trackers(void **state)
 			/* Less than by the latency alone, with as much again for lead. */
 			assert_true(limit >= 0 && limit < 2 * 0.01 / 7e-3);
 		}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_against_time),
-		cmocka_unit_test(test_interpolation_is_a_delay),
-		cmocka_unit_test(test_units),
-		cmocka_unit_test(test_nothing_holds),
-		cmocka_unit_test(test_strange_trackers),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * The pose predictor: gains against the Riccati equation, no jump whatever comes when,
  * nothing but numbers. How far it is off is in reference_path.c.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <string.h>
 #include <incise/clock.h>
@@ -93,7 +89,7 @@ static void riccati(double index, double k[3])
 	}
 }
 
-static void test_gains_are_kalmans(void **state)
+TEST(test_gains_are_kalmans)
 {
 	static const double hz[] = {30, 60, 120, 240, 1000};
 	static const double noise_mm[] = {0.002, 0.02, 0.2};
@@ -125,7 +121,7 @@ static void test_gains_are_kalmans(void **state)
 }
 
 /* A hand that accelerates evenly is where the filter says; it has no lag. */
-static void test_even_acceleration_is_exact(void **state)
+TEST(test_even_acceleration_is_exact)
 {
 	struct incise_predict p = start();
 	int64_t now = 240 * PERIOD_NS + 1234567;
@@ -168,7 +164,7 @@ static double uniform(uint64_t *seed)
  * Poses at any time, in bursts and with pauses: at the time when one arrives all that is
  * shown is the same before and after it is taken in.
  */
-static void test_arrival_moves_nothing(void **state)
+TEST(test_arrival_moves_nothing)
 {
 	struct incise_predict p = start();
 	int64_t t_ns = 0;
@@ -202,7 +198,7 @@ static void test_arrival_moves_nothing(void **state)
 }
 
 /* A hand at rest, then a pose elsewhere: the way there takes one period, evenly. */
-static void test_blend_takes_one_period(void **state)
+TEST(test_blend_takes_one_period)
 {
 	struct incise_predict p = start();
 	int64_t arrival = 20 * PERIOD_NS + LATENCY_NS;
@@ -234,7 +230,7 @@ static void test_blend_takes_one_period(void **state)
 }
 
 /* Three poses in one tick, after a stall of the wire: no more of a step than of one. */
-static void test_many_poses_in_one_tick(void **state)
+TEST(test_many_poses_in_one_tick)
 {
 	struct incise_predict p = start();
 	int64_t t_ns = 20 * PERIOD_NS;
@@ -255,7 +251,7 @@ static void test_many_poses_in_one_tick(void **state)
 	assert_true(after.x[0] > 0);
 }
 
-static void test_attitude_that_is_none(void **state)
+TEST(test_attitude_that_is_none)
 {
 	static const double hostile[][4] = {
 		{NAN, 0, 0, 0},
@@ -293,7 +289,7 @@ static void test_attitude_that_is_none(void **state)
 	assert_true(fabs(pose.q[0] - 1) < 1e-12);
 }
 
-static void test_nonsense_is_passed_over(void **state)
+TEST(test_nonsense_is_passed_over)
 {
 	static const double hostile[] = {NAN, INFINITY, -INFINITY, 1e300, -1e5};
 	struct incise_predict p = start(), before;
@@ -316,7 +312,7 @@ static void test_nonsense_is_passed_over(void **state)
 }
 
 /* After a gap the hand may be anywhere: no velocity is made up across it. */
-static void test_gap_starts_anew(void **state)
+TEST(test_gap_starts_anew)
 {
 	static const struct {
 		int periods;
@@ -355,7 +351,7 @@ static void test_gap_starts_anew(void **state)
 }
 
 /* An old pose is not carried on for ever. */
-static void test_never_further_ahead_than_a_gap(void **state)
+TEST(test_never_further_ahead_than_a_gap)
 {
 	struct incise_predict p = start();
 	struct pose end, later;
@@ -374,7 +370,7 @@ static void test_never_further_ahead_than_a_gap(void **state)
 }
 
 /* 12 ms are more than five periods of 1000 Hz, and are made up for all the same. */
-static void test_latency_of_many_periods(void **state)
+TEST(test_latency_of_many_periods)
 {
 	struct incise_tracker_info info = {
 		.name = "test", .rate_hz = 1000, .latency_ns = 12000000};
@@ -392,7 +388,7 @@ static void test_latency_of_many_periods(void **state)
 }
 
 /* Poses a nanosecond apart, each 9 mm on: 9 000 km/s. */
-static void test_speed_is_bounded(void **state)
+TEST(test_speed_is_bounded)
 {
 	struct incise_predict p = start();
 	double fastest = 0;
@@ -415,7 +411,7 @@ static void test_speed_is_bounded(void **state)
 }
 
 /* Any bits as poses, times and trackers: numbers only, and unit quaternions. */
-static void test_only_numbers(void **state)
+TEST(test_only_numbers)
 {
 	static const double hz[] = {120, 60, 1000, 0, NAN, INFINITY, -5, 1e-300, 1e300};
 	static const int64_t latency[] = {LATENCY_NS, 0, INT64_MAX, INT64_MIN, -1};
@@ -454,24 +450,4 @@ static void test_only_numbers(void **state)
 			assert_true(incise_predict_age(&p, s.t_ns) >= 0);
 		}
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_gains_are_kalmans),
-		cmocka_unit_test(test_even_acceleration_is_exact),
-		cmocka_unit_test(test_arrival_moves_nothing),
-		cmocka_unit_test(test_blend_takes_one_period),
-		cmocka_unit_test(test_many_poses_in_one_tick),
-		cmocka_unit_test(test_attitude_that_is_none),
-		cmocka_unit_test(test_nonsense_is_passed_over),
-		cmocka_unit_test(test_gap_starts_anew),
-		cmocka_unit_test(test_never_further_ahead_than_a_gap),
-		cmocka_unit_test(test_latency_of_many_periods),
-		cmocka_unit_test(test_speed_is_bounded),
-		cmocka_unit_test(test_only_numbers),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

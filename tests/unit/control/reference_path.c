@@ -22,11 +22,7 @@
  * and corrections of up to 0.3 mm at 120 Hz (0.2). Only at 240 Hz, where noise decides,
  * is this tracker worse than that of the figures.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <incise/clock.h>
 #include <incise/rig.h>
@@ -182,7 +178,7 @@ static struct result run(int rate)
 	return sum;
 }
 
-static void test_reference_path(void **state)
+TEST(test_reference_path)
 {
 	static const struct {
 		int rate;
@@ -224,7 +220,7 @@ static void test_reference_path(void **state)
  * of this kind are 4.9, 1.7 and 0.7 % of the rms speed, and for finite differences 44,
  * 7.5 and 1.7 %.
  */
-static void test_velocity_from_quantised_position(void **state)
+TEST(test_velocity_from_quantised_position)
 {
 	static const struct {
 		double step_mm, filtered, difference;
@@ -263,7 +259,7 @@ static void test_velocity_from_quantised_position(void **state)
 }
 
 /* The virtual surgeon at 120 Hz: jitter of 0.2 ms, a clock 50 ppm off, three axes. */
-static void test_virtual_rig(void **state)
+TEST(test_virtual_rig)
 {
 	struct incise_rig *rig = incise_rig_open(
 		"sim:clock=simulated,depth_mm=10,times=1", INCISE_RIG_TRACKER, NULL);
@@ -307,15 +303,4 @@ static void test_virtual_rig(void **state)
 	assert_true(step < 0.04);
 	assert_true(sqrt(speed) < 5);
 	incise_rig_close(rig);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_reference_path),
-		cmocka_unit_test(test_velocity_from_quantised_position),
-		cmocka_unit_test(test_virtual_rig),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * Stability: the limit against LAPACK's eigenvalues, closed forms, known figures and a run
  * in time; the laws of one line against their figures.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <float.h>
 #include <lapacke.h>
 #include <math.h>
@@ -79,7 +75,7 @@ static double radius(double delta, double beta, int delay, double kappa)
 	return largest;
 }
 
-static void test_eigenvalues(void **state)
+TEST(test_eigenvalues)
 {
 	static const double deltas[] = {1e-6, 1e-3, 0.01, 0.1, 1, 3, 10, 100};
 	static const double betas[] = {0, 0.1, 0.3, 0.8, -0.05};
@@ -111,7 +107,7 @@ static void test_eigenvalues(void **state)
 	assert_true(stable > 150);
 }
 
-static void test_long_delays(void **state)
+TEST(test_long_delays)
 {
 	static const int delays[] = {40, INCISE_STABILITY_DELAY_MAX};
 
@@ -123,7 +119,7 @@ static void test_long_delays(void **state)
 	}
 }
 
-static void test_closed_form(void **state)
+TEST(test_closed_form)
 {
 	double largest = 0, at = 0;
 
@@ -149,7 +145,7 @@ static void test_closed_form(void **state)
 	assert_true(fabs(limit(3.709, 0, 0) / 3.709 - 4.0900) < 0.51e-4);
 }
 
-static void test_known_figures(void **state)
+TEST(test_known_figures)
 {
 	static const struct {
 		double delta, beta;
@@ -194,7 +190,7 @@ static bool dies(double delta, double beta, int delay, double kappa)
 	return late < early;
 }
 
-static void test_run_in_time(void **state)
+TEST(test_run_in_time)
 {
 	static const struct {
 		double delta, beta;
@@ -213,7 +209,7 @@ static void test_run_in_time(void **state)
 }
 
 /* A device in its own units: 1000 times the mass is 1000 times the stiffness, and so on. */
-static void test_units(void **state)
+TEST(test_units)
 {
 	struct incise_haptic_device device = {.mass_kg = 0.05,
 					      .damping_N_s_mm = 0.005,
@@ -246,7 +242,7 @@ static void test_units(void **state)
 }
 
 /* The linear law is where the exact limit tends to: Gil, and Colgate at half of K c. */
-static void test_small_damping(void **state)
+TEST(test_small_damping)
 {
 	for (int delay = 0; delay <= 20; delay += 5) {
 		struct incise_haptic_device device = unit(1e-5, delay);
@@ -259,7 +255,7 @@ static void test_small_damping(void **state)
 	}
 }
 
-static void test_no_such_device(void **state)
+TEST(test_no_such_device)
 {
 	static const struct incise_haptic_device bad[] = {
 		{0, 0.1, 0, 0, 1, 0},	   {-1, 0.1, 0, 0, 1, 0},
@@ -286,20 +282,4 @@ static void test_no_such_device(void **state)
 	/* No damping at all: every wall is unstable. */
 	assert_true(limit(0, 0, 0) == 0);
 	assert_true(limit(0.1, -0.1, 0) == 0);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_eigenvalues),
-		cmocka_unit_test(test_long_delays),
-		cmocka_unit_test(test_closed_form),
-		cmocka_unit_test(test_known_figures),
-		cmocka_unit_test(test_run_in_time),
-		cmocka_unit_test(test_units),
-		cmocka_unit_test(test_small_damping),
-		cmocka_unit_test(test_no_such_device),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

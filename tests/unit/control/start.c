@@ -3,11 +3,7 @@
  * Start-up and fading: nothing before a small force, ramps of the right length, no harm
  * from any time or force.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <string.h>
 #include "../../../lib/base/random.h"
@@ -20,7 +16,7 @@ static struct incise_start settings(double gain, bool released)
 }
 
 /* Ticks in a row: what each lot of @ticks with the same input ends in. */
-static void test_course(void **state)
+TEST(test_course)
 {
 	static const struct {
 		int ticks;
@@ -58,7 +54,7 @@ static void test_course(void **state)
 }
 
 /* One tick from half way, with times and settings that make little sense. */
-static void test_times(void **state)
+TEST(test_times)
 {
 	static const struct {
 		double ramp_s, fade_s, dt_s;
@@ -94,7 +90,7 @@ static void test_times(void **state)
 }
 
 /* Any bits: the gain is a number from 0 to 1, and rises by no more than a tenth. */
-static void test_any_bits(void **state)
+TEST(test_any_bits)
 {
 	struct incise_start s = settings(0, false);
 	uint64_t seed = 1;
@@ -122,15 +118,4 @@ static void test_any_bits(void **state)
 		last = gain;
 	}
 	assert_true(started);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_course),
-		cmocka_unit_test(test_times),
-		cmocka_unit_test(test_any_bits),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

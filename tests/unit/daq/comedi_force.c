@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include "../../../lib/device/daq/comedi_force.c"
 #include "../message.h"
+#include "../unit.h"
 #include "card.h"
 #include "found.h"
 
@@ -19,7 +20,7 @@ static int card_setup(void **state)
 	return 0;
 }
 
-static void bits(void **state)
+TEST(bits, card_setup)
 {
 	static const struct {
 		lsampl_t maxdata;
@@ -31,7 +32,7 @@ static void bits(void **state)
 		assert_int_equal(bits_of(cases[i].maxdata), cases[i].bits);
 }
 
-static void ranges(void **state)
+TEST(ranges, card_setup)
 {
 	static const comedi_range all[] = {
 		{-10, 10, UNIT_volt},  {-5, 5, UNIT_volt}, {-2.5, 2.5, UNIT_volt},
@@ -60,7 +61,7 @@ static int open_card(struct card *c, const char *arguments, double rate_hz,
 	return card_open(c, arguments, err);
 }
 
-static void is_set_up(void **state)
+TEST(is_set_up, card_setup)
 {
 	struct incise_error err = {0};
 	struct card c;
@@ -83,7 +84,7 @@ static void is_set_up(void **state)
 }
 
 /* The accepted rate is reported; the buffer grows up to its limit. */
-static void the_rest_of_a_card(void **state)
+TEST(the_rest_of_a_card, card_setup)
 {
 	struct incise_error err = {0};
 	struct card c;
@@ -101,7 +102,7 @@ static void the_rest_of_a_card(void **state)
 	card_close(&c);
 }
 
-static void refusals(void **state)
+TEST(refusals, card_setup)
 {
 	static const struct {
 		const char *arguments;
@@ -147,7 +148,7 @@ static void refusals(void **state)
 	}
 }
 
-static void card_does_not_start(void **state)
+TEST(card_does_not_start, card_setup)
 {
 	struct incise_error err = {0};
 	struct card c;
@@ -198,7 +199,7 @@ static double error_of(int block, double delay_ns, double jitter_ns, double ppm,
 	return most;
 }
 
-static void times(void **state)
+TEST(times)
 {
 	static const struct {
 		int block;
@@ -227,7 +228,7 @@ static void times(void **state)
 }
 
 /* Started again: timestamps go on behind those before. */
-static void again(void **state)
+TEST(again)
 {
 	struct times timestamps;
 	int64_t last;
@@ -249,7 +250,7 @@ static void again(void **state)
 }
 
 /* A reader that was held for 5 s finds blocks of 4096 waiting: their timestamps stay true. */
-static void held_up(void **state)
+TEST(held_up)
 {
 	struct times timestamps;
 	int n = 0;
@@ -347,7 +348,7 @@ static void send_codes(int from, int n)
 	}
 }
 
-static void samples_come(void **state)
+TEST(samples_come, setup, teardown)
 {
 	struct incise_force_sample samples[100];
 	struct incise_error err = {0};
@@ -375,7 +376,7 @@ static void samples_come(void **state)
 	assert_int_equal(card.opened, 0);
 }
 
-static void wide_samples(void **state)
+TEST(wide_samples, setup, teardown)
 {
 	static const lsampl_t codes[] = {0, 0x123456, 0xffffff, 0x1234567};
 	struct incise_force_sample samples[4];
@@ -402,7 +403,7 @@ static void wait_for_command(int n)
 }
 
 /* EPIPE: the command was ended for want of room. It is started again, with a gap. */
-static void overflow(void **state)
+TEST(overflow, setup, teardown)
 {
 	static const int reasons[] = {EPIPE, -1};
 
@@ -434,7 +435,7 @@ static void overflow(void **state)
 	}
 }
 
-static void unplugged(void **state)
+TEST(unplugged, setup, teardown)
 {
 	static const struct {
 		int code, reported;
@@ -455,7 +456,7 @@ static void unplugged(void **state)
 }
 
 /* A command that ends again and again without a sample is given up. */
-static void never_goes_on(void **state)
+TEST(never_goes_on, setup, teardown)
 {
 	struct incise_force_sample sample;
 	struct incise_error err = {0};
@@ -473,7 +474,7 @@ static void never_goes_on(void **state)
 	force->ops->close(force);
 }
 
-static void does_not_start(void **state)
+TEST(does_not_start, setup, teardown)
 {
 	struct incise_error err = {0};
 
@@ -504,7 +505,7 @@ static int scan(const char *arguments)
 	return rc;
 }
 
-static void a_card_is_told_of(void **state)
+TEST(a_card_is_told_of, scan_setup)
 {
 	static const char *const properties[][2] = {
 		{"path", "/dev/null"},
@@ -528,7 +529,7 @@ static void a_card_is_told_of(void **state)
 				    properties[i][1]);
 }
 
-static void what_cannot_be_used_is_told_as_such(void **state)
+TEST(what_cannot_be_used_is_told_as_such, scan_setup)
 {
 	card.flags |= SDF_BUSY;
 	assert_int_equal(scan("/dev/null"), 0);
@@ -544,7 +545,7 @@ static void what_cannot_be_used_is_told_as_such(void **state)
 	assert_false(found.device[0].usable);
 }
 
-static void none(void **state)
+TEST(none, scan_setup)
 {
 	assert_int_equal(scan("/dev/not-there:0"), 0);
 	card.open_error = EACCES;
@@ -558,35 +559,8 @@ static void none(void **state)
 	assert_int_equal(found.n, 0);
 }
 
-static void it_ends_when_it_is_told_to(void **state)
+TEST(it_ends_when_it_is_told_to, scan_setup)
 {
 	found.answer = -ENOMEM;
 	assert_int_equal(scan("/dev/null"), -ENOMEM);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup(bits, card_setup),
-		cmocka_unit_test_setup(ranges, card_setup),
-		cmocka_unit_test_setup(is_set_up, card_setup),
-		cmocka_unit_test_setup(the_rest_of_a_card, card_setup),
-		cmocka_unit_test_setup(refusals, card_setup),
-		cmocka_unit_test_setup(card_does_not_start, card_setup),
-		cmocka_unit_test(times),
-		cmocka_unit_test(again),
-		cmocka_unit_test(held_up),
-		cmocka_unit_test_setup_teardown(samples_come, setup, teardown),
-		cmocka_unit_test_setup_teardown(wide_samples, setup, teardown),
-		cmocka_unit_test_setup_teardown(overflow, setup, teardown),
-		cmocka_unit_test_setup_teardown(unplugged, setup, teardown),
-		cmocka_unit_test_setup_teardown(never_goes_on, setup, teardown),
-		cmocka_unit_test_setup_teardown(does_not_start, setup, teardown),
-		cmocka_unit_test_setup(a_card_is_told_of, scan_setup),
-		cmocka_unit_test_setup(what_cannot_be_used_is_told_as_such, scan_setup),
-		cmocka_unit_test_setup(none, scan_setup),
-		cmocka_unit_test_setup(it_ends_when_it_is_told_to, scan_setup),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -8,6 +8,7 @@
 #include <string.h>
 #include "../../../lib/device/daq/daq_feed.h"
 #include "../message.h"
+#include "../unit.h"
 
 static struct daq_feed *feed;
 
@@ -35,7 +36,7 @@ static uint64_t overflows(void)
 	return info.overflows;
 }
 
-static void both_ends_are_clipped(void **state)
+TEST(both_ends_are_clipped, setup, teardown)
 {
 	static const struct {
 		int32_t code;
@@ -56,7 +57,7 @@ static void both_ends_are_clipped(void **state)
 	assert_int_equal(info.clipped, 4);
 }
 
-static void losses_are_gaps(void **state)
+TEST(losses_are_gaps, setup, teardown)
 {
 	struct incise_force_sample samples[4];
 
@@ -74,7 +75,7 @@ static void losses_are_gaps(void **state)
 }
 
 /* Nobody reads: what is new is dropped, and each time counted once. */
-static void no_room(void **state)
+TEST(no_room, setup, teardown)
 {
 	struct incise_force_sample samples[1024];
 
@@ -93,7 +94,7 @@ static void no_room(void **state)
 	assert_int_equal(overflows(), 2);
 }
 
-static void the_end_is_told_last(void **state)
+TEST(the_end_is_told_last, setup, teardown)
 {
 	struct incise_force_sample sample;
 	char cause[200] = "?";
@@ -113,7 +114,7 @@ static void the_end_is_told_last(void **state)
 	assert_non_null(strstr(cause, ": its clock stands still; see to it"));
 }
 
-static void what_is_asked_for(void **state)
+TEST(what_is_asked_for, setup, teardown)
 {
 	static const struct {
 		struct incise_force_setup setup;
@@ -147,7 +148,7 @@ static void *run(void *card)
 }
 
 /* A thread that waits is ended at once, and only once. */
-static void the_thread_ends(void **state)
+TEST(the_thread_ends, setup, teardown)
 {
 	int count = 0;
 
@@ -155,18 +156,4 @@ static void the_thread_ends(void **state)
 	daq_feed_stop(feed);
 	assert_int_equal(count, 0);
 	daq_feed_stop(feed);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(both_ends_are_clipped, setup, teardown),
-		cmocka_unit_test_setup_teardown(losses_are_gaps, setup, teardown),
-		cmocka_unit_test_setup_teardown(no_room, setup, teardown),
-		cmocka_unit_test_setup_teardown(the_end_is_told_last, setup, teardown),
-		cmocka_unit_test_setup_teardown(what_is_asked_for, setup, teardown),
-		cmocka_unit_test_setup_teardown(the_thread_ends, setup, teardown),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,6 +10,7 @@
 #include <string.h>
 #include "../../../lib/device/daq/iio_force.c"
 #include "../message.h"
+#include "../unit.h"
 #include "converter.h"
 #include "found.h"
 
@@ -54,7 +55,7 @@ static void numbers_are_right(void)
 		assert_int_equal(sample.code, sample.seq & 4095);
 }
 
-static void gaps(void **state)
+TEST(gaps, spacing_setup, teardown)
 {
 	static const int lengths[] = {1, 2, 3, 10, 1000, 19999, 1000000};
 	uint64_t lost = 0, overflows = 0;
@@ -77,7 +78,7 @@ static void gaps(void **state)
 }
 
 /* Up to just below a period late: distinguished from a loss by what follows. */
-static void lateness_is_no_gap(void **state)
+TEST(lateness_is_no_gap, spacing_setup, teardown)
 {
 	for (int64_t n = 0; n < 20000; n++)
 		put(n, n % 7 == 3 ? (n % 100) * T / 101 : 0);
@@ -86,7 +87,7 @@ static void lateness_is_no_gap(void **state)
 }
 
 /* And a loss is one, when the sample behind it is late, too. */
-static void late_behind_a_gap(void **state)
+TEST(late_behind_a_gap, spacing_setup, teardown)
 {
 	int64_t n = 0;
 
@@ -101,7 +102,7 @@ static void late_behind_a_gap(void **state)
 }
 
 /* An oscillator that is 1 % off: after it has been seen, long gaps are right, too. */
-static void clock_is_off(void **state)
+TEST(clock_is_off, spacing_setup, teardown)
 {
 	static const double factors[] = {0.99, 1.01};
 
@@ -121,7 +122,7 @@ static void clock_is_off(void **state)
 }
 
 /* Nothing is computed beyond what numbers hold, and no sample is left out. */
-static void nonsense(void **state)
+TEST(nonsense, spacing_setup, teardown)
 {
 	static const int64_t timestamps[] = {
 		0, INT64_MAX, INT64_MIN, -1, 1, INT64_MAX / 2, 0, 5, 5, 3};
@@ -162,7 +163,7 @@ static int open_files(void)
 	return n;
 }
 
-static void refusals(void **state)
+TEST(refusals)
 {
 	static const struct {
 		const char *arguments;
@@ -222,7 +223,7 @@ static int scan(const char *arguments)
 	return rc;
 }
 
-static void a_converter_is_told_of(void **state)
+TEST(a_converter_is_told_of, scan_setup)
 {
 	const struct incise_scan_device *adc = &found.device[0];
 	static const char *const properties[][2] = {
@@ -240,7 +241,7 @@ static void a_converter_is_told_of(void **state)
 		assert_string_equal(property_of(adc, properties[i][0]), properties[i][1]);
 }
 
-static void two_of_a_name_go_by_number(void **state)
+TEST(two_of_a_name_go_by_number, scan_setup)
 {
 	world.devices[1] = world.devices[0];
 	world.devices[1].id = "iio:device7";
@@ -250,7 +251,7 @@ static void two_of_a_name_go_by_number(void **state)
 	assert_string_equal(found.device[1].device, "iio:iio:device7");
 }
 
-static void what_cannot_be_used_is_told_as_such(void **state)
+TEST(what_cannot_be_used_is_told_as_such, scan_setup)
 {
 	struct iio_device *adc = &world.devices[0];
 
@@ -272,7 +273,7 @@ static void what_cannot_be_used_is_told_as_such(void **state)
 	assert_string_equal(property_of(&found.device[0], "range_V"), "");
 }
 
-static void by_name_and_without_any(void **state)
+TEST(by_name_and_without_any, scan_setup)
 {
 	static const struct {
 		const char *arguments;
@@ -294,24 +295,4 @@ static void by_name_and_without_any(void **state)
 	found.answer = -ENOMEM;
 	assert_int_equal(scan(""), -ENOMEM);
 	assert_int_equal(found.n, 1);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(gaps, spacing_setup, teardown),
-		cmocka_unit_test_setup_teardown(lateness_is_no_gap, spacing_setup,
-						teardown),
-		cmocka_unit_test_setup_teardown(late_behind_a_gap, spacing_setup,
-						teardown),
-		cmocka_unit_test_setup_teardown(clock_is_off, spacing_setup, teardown),
-		cmocka_unit_test_setup_teardown(nonsense, spacing_setup, teardown),
-		cmocka_unit_test(refusals),
-		cmocka_unit_test_setup(a_converter_is_told_of, scan_setup),
-		cmocka_unit_test_setup(two_of_a_name_go_by_number, scan_setup),
-		cmocka_unit_test_setup(what_cannot_be_used_is_told_as_such, scan_setup),
-		cmocka_unit_test_setup(by_name_and_without_any, scan_setup),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

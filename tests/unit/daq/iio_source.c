@@ -15,6 +15,7 @@
 #include <unistd.h>
 #include "../../../lib/device/daq/iio_source.c"
 #include "../message.h"
+#include "../unit.h"
 #include "converter.h"
 
 /* --- format --- */
@@ -35,7 +36,7 @@ static struct iio_data_format data_of(const char *type)
 	return data;
 }
 
-static void codes(void **state)
+TEST(codes)
 {
 	static const struct {
 		const char *type;
@@ -75,7 +76,7 @@ static void codes(void **state)
 	}
 }
 
-static void timestamps(void **state)
+TEST(timestamps)
 {
 	static const unsigned char le[8] = {8, 7, 6, 5, 4, 3, 2, 1};
 	struct iio_data_format data = data_of("le:s64/64>>0");
@@ -89,7 +90,7 @@ static void timestamps(void **state)
 }
 
 /* A signed code grows with the voltage, through all of its range. */
-static void order(void **state)
+TEST(order)
 {
 	struct iio_data_format data = data_of("be:s10/16>>3");
 	struct iio_format format = {0};
@@ -103,7 +104,7 @@ static void order(void **state)
 	}
 }
 
-static void formats_refused(void **state)
+TEST(formats_refused)
 {
 	static const char *const types[] = {
 		"le:u0/16>>0",	 "le:u12/12>>0",   "le:u17/16>>0",
@@ -151,7 +152,7 @@ static void make(const char *name)
 	assert_int_equal(mkdir(path, 0755), 0);
 }
 
-static void comes_and_goes(void **state)
+TEST(comes_and_goes, trigger_setup, trigger_teardown)
 {
 	char one[64], two[64], expected[64];
 
@@ -170,7 +171,7 @@ static void comes_and_goes(void **state)
 	assert_false(there(one) || there(two));
 }
 
-static void kernel_without(void **state)
+TEST(kernel_without, trigger_setup, trigger_teardown)
 {
 	char name[64];
 
@@ -179,7 +180,7 @@ static void kernel_without(void **state)
 	sweep_triggers("/nonexistent");
 }
 
-static void too_many(void **state)
+TEST(too_many, trigger_setup, trigger_teardown)
 {
 	char names[17][64];
 	int n = 0;
@@ -192,7 +193,7 @@ static void too_many(void **state)
 }
 
 /* Only those of the dead, and only what has the form of ours. */
-static void sweep(void **state)
+TEST(sweep, trigger_setup, trigger_teardown)
 {
 	static const char *const others[] = {"timer",	   "incise-",	 "incise-1",
 					     "incise-x-0", "incise-0-0", "incise--5-0",
@@ -251,7 +252,7 @@ static int set_to(double rate_hz, const struct iio_device *trigger,
 }
 
 /* Whole numbers without a point: some drivers take no other. */
-static void how_it_is_written(void **state)
+TEST(how_it_is_written, rate_setup)
 {
 	static const struct {
 		double rate_hz;
@@ -273,7 +274,7 @@ static void how_it_is_written(void **state)
 }
 
 /* A trigger's before the device's, that before the channel's. */
-static void where_it_is(void **state)
+TEST(where_it_is, rate_setup)
 {
 	struct incise_error err;
 
@@ -297,7 +298,7 @@ static void where_it_is(void **state)
 }
 
 /* Converters divide a clock: within 1 % it is the rate that was asked for. */
-static void how_far_off_it_may_be(void **state)
+TEST(how_far_off_it_may_be, rate_setup)
 {
 	static const struct {
 		const char *is;
@@ -374,7 +375,7 @@ static const char *text(const char *key)
 	return device_attribute(adc(), key)->text;
 }
 
-static void is_set_up(void **state)
+TEST(is_set_up, setup)
 {
 	struct incise_error err = {0};
 	struct iio_source s;
@@ -393,7 +394,7 @@ static void is_set_up(void **state)
 	assert_int_equal(world.made, 0);
 }
 
-static void named_trigger(void **state)
+TEST(named_trigger, setup)
 {
 	struct incise_error err = {0};
 	struct iio_source s;
@@ -411,7 +412,7 @@ static void named_trigger(void **state)
 }
 
 /* Where there is a folder for them, one is made, and goes again. */
-static void own_trigger(void **state)
+TEST(own_trigger, setup)
 {
 	struct incise_error err = {0};
 	char made[100];
@@ -437,7 +438,7 @@ static void own_trigger(void **state)
 }
 
 /* Configfs is root's. */
-static void no_right_to_a_trigger(void **state)
+TEST(no_right_to_a_trigger, setup)
 {
 	struct incise_error err = {0};
 	bool root = !geteuid();
@@ -454,7 +455,7 @@ static void no_right_to_a_trigger(void **state)
 	assert_says(err.text, "mkdir //incise");
 }
 
-static void volts(void **state)
+TEST(volts, setup)
 {
 	static const struct {
 		const char *scale, *offset;
@@ -496,7 +497,7 @@ static void volts(void **state)
 }
 
 /* Without a scale the set-up's is taken; a rate may be the channel's. */
-static void what_the_driver_does_not_say(void **state)
+TEST(what_the_driver_does_not_say, setup)
 {
 	struct incise_error err = {0};
 	struct iio_source s = {.where = "rig.conf:3: force",
@@ -514,7 +515,7 @@ static void what_the_driver_does_not_say(void **state)
 	iio_source_close(&s);
 }
 
-static void channels(void **state)
+TEST(channels, setup)
 {
 	static const struct {
 		const char *id;
@@ -587,7 +588,7 @@ static void broken(int what)
 	}
 }
 
-static void refusals(void **state)
+TEST(refusals, setup)
 {
 	static const struct {
 		int what;
@@ -714,7 +715,7 @@ static struct iio_source source_of(struct iio_channel *voltage,
 	};
 }
 
-static void starts_and_stops(void **state)
+TEST(starts_and_stops, buffer_setup, buffer_teardown)
 {
 	struct iio_channel voltage, timestamp;
 	struct iio_source source = source_of(&voltage, &timestamp);
@@ -732,7 +733,7 @@ static void starts_and_stops(void **state)
 	iio_source_stop(&source);
 }
 
-static void does_not_start(void **state)
+TEST(does_not_start, buffer_setup, buffer_teardown)
 {
 	struct iio_channel voltage, timestamp;
 	struct iio_source source = source_of(&voltage, &timestamp);
@@ -744,7 +745,7 @@ static void does_not_start(void **state)
 }
 
 /* Elements stand on multiples of their size, in the order of their index. */
-static void layouts(void **state)
+TEST(layouts, buffer_setup, buffer_teardown)
 {
 	static const struct {
 		unsigned int bytes;
@@ -770,7 +771,7 @@ static void layouts(void **state)
 	}
 }
 
-static void scans_are_read(void **state)
+TEST(scans_are_read, buffer_setup, buffer_teardown)
 {
 	static const struct {
 		uint32_t volts;
@@ -795,41 +796,4 @@ static void scans_are_read(void **state)
 	source.fd = -1;
 	assert_int_equal(iio_source_read(&source), -EBADF);
 	iio_source_stop(&source);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(codes),
-		cmocka_unit_test(timestamps),
-		cmocka_unit_test(order),
-		cmocka_unit_test(formats_refused),
-		cmocka_unit_test_setup_teardown(comes_and_goes, trigger_setup,
-						trigger_teardown),
-		cmocka_unit_test_setup_teardown(kernel_without, trigger_setup,
-						trigger_teardown),
-		cmocka_unit_test_setup_teardown(too_many, trigger_setup,
-						trigger_teardown),
-		cmocka_unit_test_setup_teardown(sweep, trigger_setup, trigger_teardown),
-		cmocka_unit_test_setup(how_it_is_written, rate_setup),
-		cmocka_unit_test_setup(where_it_is, rate_setup),
-		cmocka_unit_test_setup(how_far_off_it_may_be, rate_setup),
-		cmocka_unit_test_setup(is_set_up, setup),
-		cmocka_unit_test_setup(named_trigger, setup),
-		cmocka_unit_test_setup(own_trigger, setup),
-		cmocka_unit_test_setup(no_right_to_a_trigger, setup),
-		cmocka_unit_test_setup(volts, setup),
-		cmocka_unit_test_setup(what_the_driver_does_not_say, setup),
-		cmocka_unit_test_setup(channels, setup),
-		cmocka_unit_test_setup(refusals, setup),
-		cmocka_unit_test_setup_teardown(starts_and_stops, buffer_setup,
-						buffer_teardown),
-		cmocka_unit_test_setup_teardown(does_not_start, buffer_setup,
-						buffer_teardown),
-		cmocka_unit_test_setup_teardown(layouts, buffer_setup, buffer_teardown),
-		cmocka_unit_test_setup_teardown(scans_are_read, buffer_setup,
-						buffer_teardown),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -7,10 +7,11 @@
 #include <math.h>
 #include <string.h>
 #include "../message.h"
+#include "../unit.h"
 #include "actuator_text.h"
 #include "../../../lib/device/motor.h"
 
-static void defaults_are_those_of_the_manual(void **state)
+TEST(defaults_are_those_of_the_manual)
 {
 	struct incise_actuator a = actuator_good("", NEEDED);
 
@@ -26,7 +27,7 @@ static void defaults_are_those_of_the_manual(void **state)
 	assert_true(actuator_good("", NEEDED "velocity_mm_s = 0.5;").home_mm_s == 0.5);
 }
 
-static void every_key_is_taken_in_its_unit(void **state)
+TEST(every_key_is_taken_in_its_unit)
 {
 	struct incise_actuator a = actuator_good(
 		"",
@@ -54,7 +55,7 @@ static void every_key_is_taken_in_its_unit(void **state)
 	assert_int_equal(a.active_low, 1 << INCISE_LINE_ENABLE | 1 << INCISE_LINE_ESTOP);
 }
 
-static void what_does_not_fit_is_refused_with_its_line(void **state)
+TEST(what_does_not_fit_is_refused_with_its_line)
 {
 	static const struct {
 		const char *inside, *says;
@@ -106,7 +107,7 @@ static void what_does_not_fit_is_refused_with_its_line(void **state)
 	actuator_good("", NEEDED "jerk_mm_s3 = 15790.0;");
 }
 
-static void millimetres_become_steps(void **state)
+TEST(millimetres_become_steps)
 {
 	static const struct {
 		double mm;
@@ -139,7 +140,7 @@ static void millimetres_become_steps(void **state)
 	assert_int_equal(incise_actuator_steps(&a, 0.3), 3);
 }
 
-static void the_machine_must_hold_the_rate(void **state)
+TEST(the_machine_must_hold_the_rate)
 {
 	struct incise_actuator a = actuator_good("", NEEDED);
 	struct incise_stepper_config config;
@@ -164,17 +165,4 @@ static void the_machine_must_hold_the_rate(void **state)
 		     "12500");
 	a = actuator_good("", NEEDED "high_us = 7.0;");
 	assert_error(incise_motor_fit(&a, "m", 20000, 8000, &err), ERANGE, &err, "8");
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(defaults_are_those_of_the_manual),
-		cmocka_unit_test(every_key_is_taken_in_its_unit),
-		cmocka_unit_test(what_does_not_fit_is_refused_with_its_line),
-		cmocka_unit_test(millimetres_become_steps),
-		cmocka_unit_test(the_machine_must_hold_the_rate),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,9 +9,10 @@
 #include <string.h>
 #include "../../../lib/device/actuator.h"
 #include "../message.h"
+#include "../unit.h"
 #include "actuator_text.h"
 
-static void defaults_are_those_of_the_manual(void **state)
+TEST(defaults_are_those_of_the_manual)
 {
 	/* A rig.conf of before there was the group; an empty one; one of other wires. */
 	static const char *const cases[] = {
@@ -40,7 +41,7 @@ static void defaults_are_those_of_the_manual(void **state)
 	}
 }
 
-static void following_is_a_tenth_of_the_travel_up_to_a_millimetre(void **state)
+TEST(following_is_a_tenth_of_the_travel_up_to_a_millimetre)
 {
 	static const struct {
 		double travel_mm, following_mm;
@@ -62,7 +63,7 @@ static void following_is_a_tenth_of_the_travel_up_to_a_millimetre(void **state)
 	}
 }
 
-static void every_key_is_taken_in_its_unit(void **state)
+TEST(every_key_is_taken_in_its_unit)
 {
 	struct incise_actuator a = actuator_good(
 		NEEDED,
@@ -92,7 +93,7 @@ static void every_key_is_taken_in_its_unit(void **state)
 }
 
 /* Both ends are taken, and what lies just beyond is refused. */
-static void every_range_ends_where_the_manual_says(void **state)
+TEST(every_range_ends_where_the_manual_says)
 {
 	static const struct {
 		const char *key, *below, *least, *most, *above;
@@ -136,7 +137,7 @@ static void every_range_ends_where_the_manual_says(void **state)
 	}
 }
 
-static void bit_rates_are_those_of_adapters(void **state)
+TEST(bit_rates_are_those_of_adapters)
 {
 	static const int good[] = {10000,  20000,  50000,  100000, 125000,
 				   250000, 500000, 800000, 1000000};
@@ -166,7 +167,7 @@ static bool fits_60C2(int us)
 	return false;
 }
 
-static void cycles_are_those_that_a_drive_can_keep(void **state)
+TEST(cycles_are_those_that_a_drive_can_keep)
 {
 	for (int us = 500; us <= 2000; us++) {
 		struct incise_actuator actuator;
@@ -179,7 +180,7 @@ static void cycles_are_those_that_a_drive_can_keep(void **state)
 	}
 }
 
-static void what_does_not_fit_is_refused_with_its_line(void **state)
+TEST(what_does_not_fit_is_refused_with_its_line)
 {
 	static const struct {
 		const char *inside, *says;
@@ -235,7 +236,7 @@ static double left_over(double k, int cycles)
 	return largest;
 }
 
-static void half_of_the_gain_that_is_stable_is_taken(void **state)
+TEST(half_of_the_gain_that_is_stable_is_taken)
 {
 	static const double cycles_s[] = {0.0005, 0.001, 0.002};
 	double low = 0, high = 2;
@@ -257,20 +258,4 @@ static void half_of_the_gain_that_is_stable_is_taken(void **state)
 		/* With half of it a deviation is gone, to a millionth, in 200 cycles. */
 		assert_true(left_over(k, 300) < 1e-6);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(defaults_are_those_of_the_manual),
-		cmocka_unit_test(following_is_a_tenth_of_the_travel_up_to_a_millimetre),
-		cmocka_unit_test(every_key_is_taken_in_its_unit),
-		cmocka_unit_test(every_range_ends_where_the_manual_says),
-		cmocka_unit_test(bit_rates_are_those_of_adapters),
-		cmocka_unit_test(cycles_are_those_that_a_drive_can_keep),
-		cmocka_unit_test(what_does_not_fit_is_refused_with_its_line),
-		cmocka_unit_test(half_of_the_gain_that_is_stable_is_taken),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

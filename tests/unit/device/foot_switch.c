@@ -14,6 +14,7 @@
 #include <unistd.h>
 #include <incise/foot_switch.h>
 #include "../message.h"
+#include "../unit.h"
 
 #define LONG_BITS (8 * sizeof(long))
 
@@ -127,7 +128,7 @@ static void release(struct pedal *pedal, int key)
 	happens(pedal, EV_SYN, SYN_REPORT, 0);
 }
 
-static void test_names(void **state)
+TEST(test_names)
 {
 	static const struct {
 		const char *name;
@@ -155,7 +156,7 @@ static void test_names(void **state)
 				 incise_foot_switch_key(cases[i].name));
 }
 
-static void test_refused(void **state)
+TEST(test_refused)
 {
 	static const struct {
 		int key, pressed, no_input, grab, code;
@@ -190,7 +191,7 @@ static void test_refused(void **state)
 }
 
 /* Presses of the key count, and nothing else. */
-static void test_presses(void **state)
+TEST(test_presses)
 {
 	struct pedal pedal;
 
@@ -220,7 +221,7 @@ static void test_presses(void **state)
 }
 
 /* After an overrun of the kernel's buffer the rest of that report is not to be trusted. */
-static void test_dropped(void **state)
+TEST(test_dropped)
 {
 	struct pedal pedal;
 
@@ -237,7 +238,7 @@ static void test_dropped(void **state)
 	end(&pedal);
 }
 
-static void test_unplugged(void **state)
+TEST(test_unplugged)
 {
 	struct pedal pedal;
 
@@ -254,15 +255,4 @@ static void test_unplugged(void **state)
 	assert_int_equal(incise_foot_switch_read(pedal.foot), -EIO);
 	end(&pedal);
 	incise_foot_switch_close(NULL);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_names),	  cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_presses),	  cmocka_unit_test(test_dropped),
-		cmocka_unit_test(test_unplugged),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

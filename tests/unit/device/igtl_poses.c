@@ -5,12 +5,9 @@
  */
 #include <errno.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
+#include "../unit.h"
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 #include "../../../lib/device/igtl/igtl_poses.h"
 
 #define SECOND 1000000000LL
@@ -62,12 +59,11 @@ static struct incise_tracker_sample taken(struct igtl_poses *poses)
 	return sample;
 }
 
-static void a_rotation_becomes_its_quaternion(void **state)
+TEST(a_rotation_becomes_its_quaternion)
 {
 	struct igtl_poses poses;
 	double m[3][4], q[4];
 
-	(void)state;
 	assert_int_equal(igtl_poses_init(&poses, &setup, "Tip"), 0);
 	for (int i = 0; i < 100; i++) {
 		struct incise_tracker_sample s;
@@ -91,7 +87,7 @@ static void a_rotation_becomes_its_quaternion(void **state)
 	igtl_poses_free(&poses);
 }
 
-static void what_is_no_pose_is_flagged(void **state)
+TEST(what_is_no_pose_is_flagged)
 {
 	static const struct {
 		double factor[3]; /* of the columns */
@@ -106,7 +102,6 @@ static void what_is_no_pose_is_flagged(void **state)
 	};
 	struct igtl_poses poses;
 
-	(void)state;
 	assert_int_equal(igtl_poses_init(&poses, &setup, ""), 0);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_tracker_sample s;
@@ -132,13 +127,12 @@ static void what_is_no_pose_is_flagged(void **state)
 }
 
 /* Arrivals up to 20 ms late of timestamps of a wall clock that is off, runs fast and is set. */
-static void timestamps_lead_to_times_here(void **state)
+TEST(timestamps_lead_to_times_here)
 {
 	struct igtl_poses poses;
 	double m[3][4], q[4];
 	int64_t last_ns = 0;
 
-	(void)state;
 	srand(1);
 	assert_int_equal(igtl_poses_init(&poses, &setup, "Tip"), 0);
 	for (int i = 0; i < 5000; i++) {
@@ -172,13 +166,12 @@ static void timestamps_lead_to_times_here(void **state)
 	igtl_poses_free(&poses);
 }
 
-static void losses_are_counted(void **state)
+TEST(losses_are_counted)
 {
 	struct igtl_poses poses;
 	struct incise_tracker_sample s = {0};
 	double m[3][4], q[4];
 
-	(void)state;
 	assert_int_equal(igtl_poses_init(&poses, &setup, "Tip"), 0);
 	for (int i = 0; i < 1000; i++) {
 		int64_t t_ns = SECOND + i * SECOND / 100;
@@ -201,7 +194,7 @@ static void losses_are_counted(void **state)
 	igtl_poses_free(&poses);
 }
 
-static void what_is_unseen_or_stuck_is_flagged(void **state)
+TEST(what_is_unseen_or_stuck_is_flagged)
 {
 	static const struct incise_igtl_pair gone = {"ToolStatus", "OUT_OF_VIEW", 10, 3,
 						     11};
@@ -214,7 +207,6 @@ static void what_is_unseen_or_stuck_is_flagged(void **state)
 	uint8_t bytes[300];
 	ssize_t n;
 
-	(void)state;
 	turn(1, m, q);
 	assert_int_equal(igtl_poses_init(&poses, &setup, "Tip"), 0);
 	for (int i = 1; i <= 20; i++) {
@@ -246,17 +238,4 @@ static void what_is_unseen_or_stuck_is_flagged(void **state)
 	assert_int_equal(put(&poses, "Tip", m, 0, 4 * SECOND, false), 0);
 	assert_true(taken(&poses).restarted);
 	igtl_poses_free(&poses);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_rotation_becomes_its_quaternion),
-		cmocka_unit_test(what_is_no_pose_is_flagged),
-		cmocka_unit_test(timestamps_lead_to_times_here),
-		cmocka_unit_test(losses_are_counted),
-		cmocka_unit_test(what_is_unseen_or_stuck_is_flagged),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * lib/device/motion.c, on no lines and no bus: what it says to who owns it. What comes of
  * that on lines is in pulser.c, on a bus in tests/unit/can/can_axis.c.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include "../../../lib/device/motion.h"
 #include "../../../lib/device/page.h"
@@ -67,7 +63,7 @@ static void want(struct bench *b, unsigned int mode, int64_t target)
 	incise_page_put_setpoint(&b->setpoint, mode, target, b->now_ns);
 }
 
-static void without_targets_it_ends(void **state)
+TEST(without_targets_it_ends)
 {
 	/* Where it then goes: on by v²/2a = 25 steps and a tick's at most, or back. */
 	static const struct {
@@ -111,7 +107,7 @@ static void without_targets_it_ends(void **state)
 }
 
 /* Its owner stood still, with or without a set-point behind it. */
-static void an_owner_that_stood_still_is_noticed(void **state)
+TEST(an_owner_that_stood_still_is_noticed)
 {
 	struct bench b;
 
@@ -130,7 +126,7 @@ static void an_owner_that_stood_still_is_noticed(void **state)
 	assert_int_equal(incise_motion_awake(&b.motion, b.now_ns), 0);
 }
 
-static void a_fault_ends_it_at_once_or_within_its_limits(void **state)
+TEST(a_fault_ends_it_at_once_or_within_its_limits)
 {
 	for (unsigned int bit = 0; bit < 19; bit++) {
 		uint32_t fault = 1u << bit;
@@ -150,7 +146,7 @@ static void a_fault_ends_it_at_once_or_within_its_limits(void **state)
 	}
 }
 
-static void what_forbids_power_is_told(void **state)
+TEST(what_forbids_power_is_told)
 {
 	struct bench b;
 
@@ -173,7 +169,7 @@ static void what_forbids_power_is_told(void **state)
 	assert_int_equal(incise_motion_clear(&b.motion), 0);
 }
 
-static void a_set_point_that_nobody_should_write_is_a_fault(void **state)
+TEST(a_set_point_that_nobody_should_write_is_a_fault)
 {
 	struct bench b;
 
@@ -189,17 +185,4 @@ static void a_set_point_that_nobody_should_write_is_a_fault(void **state)
 	go(&b, 1);
 	assert_int_equal(b.slot.target, 5000);
 	assert_true(b.slot.flags & INCISE_STEPPER_FLAG_HELD);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(without_targets_it_ends),
-		cmocka_unit_test(an_owner_that_stood_still_is_noticed),
-		cmocka_unit_test(a_fault_ends_it_at_once_or_within_its_limits),
-		cmocka_unit_test(what_forbids_power_is_told),
-		cmocka_unit_test(a_set_point_that_nobody_should_write_is_a_fault),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,11 +4,7 @@
  * makes: all cases of the conformance table, exactly in time and with a thread that is
  * late; the same table for the virtual rig.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include "../../../lib/base/random.h"
 #include "../../../lib/device/motor.h"
 #include "../../../lib/sim/sim.h"
@@ -175,7 +171,7 @@ static void bench_start(struct bench *b, bool home, bool limits, bool invert,
 	assert_int_equal(incise_pulser_init(&b->pulser, &b->config), 0);
 }
 
-static void every_case_on_a_made_clock(void **state)
+TEST(every_case_on_a_made_clock)
 {
 	static const struct {
 		bool home, limits, invert;
@@ -239,7 +235,7 @@ static void virtual_advance(void *world, int64_t ns)
 	incise_clock_wait_until(v->clock, v->now);
 }
 
-static void every_case_on_the_virtual_rig(void **state)
+TEST(every_case_on_the_virtual_rig)
 {
 	for (int i = 0; conformance[i].name; i++) {
 		struct virtual_rig v = {incise_clock_new_simulated(1000000000),
@@ -262,14 +258,4 @@ static void every_case_on_the_virtual_rig(void **state)
 		incise_sim_free(sim);
 		incise_clock_free(v.clock);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(every_case_on_a_made_clock),
-		cmocka_unit_test(every_case_on_the_virtual_rig),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

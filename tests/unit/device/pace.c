@@ -3,11 +3,8 @@
  * Losses found by times alone (lib/device/pace.h): each source here knows what it left out.
  */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
+#include "../unit.h"
 #include <stdlib.h>
-#include <cmocka.h>
 #include "../../../lib/device/pace.h"
 
 struct source {
@@ -26,7 +23,7 @@ static double uniform(void)
 	return (double)rand() / RAND_MAX;
 }
 
-static void counts_what_is_missing(void **state)
+TEST(counts_what_is_missing)
 {
 	static const struct source sources[] = {
 		{"exact", 1000, 1000, 0, 1, 0, 0, 0, 0},
@@ -45,7 +42,6 @@ static void counts_what_is_missing(void **state)
 		{"slow, and five lost", 10, 10, 0, 1, 100, 5, -1, 0},
 	};
 
-	(void)state;
 	for (size_t k = 0; k < sizeof(sources) / sizeof(*sources); k++) {
 		const struct source *s = &sources[k];
 		int found = 0, expected = s->found < 0 ? s->missing : s->found;
@@ -68,12 +64,11 @@ static void counts_what_is_missing(void **state)
 	}
 }
 
-static void takes_any_time(void **state)
+TEST(takes_any_time)
 {
 	static const int64_t times[] = {0, INT64_MAX, INT64_MIN, -1, 1, INT64_MAX / 2, 0};
 	struct incise_pace pace;
 
-	(void)state;
 	incise_pace_init(&pace, 1000);
 	for (int i = 0; i < 7000; i++)
 		assert_true(incise_pace_add(&pace, times[i % 7]) <= 1000000000);
@@ -83,14 +78,4 @@ static void takes_any_time(void **state)
 	assert_int_equal(incise_pace_add(&pace, INT64_C(1000000000)), 0);
 	assert_int_equal(incise_pace_add(&pace, INT64_C(1001000000)), 0);
 	assert_true(isfinite(pace.period_ns));
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(counts_what_is_missing),
-		cmocka_unit_test(takes_any_time),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * lib/device/page.c: what is read is one that was written, whole, and nothing that makes
  * no sense comes through; with a thread on the other side too.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -15,7 +11,7 @@
 #include "../../../lib/fixed/profile.h"
 #include "../../../lib/device/page.h"
 
-static void a_set_point_is_taken_once(void **state)
+TEST(a_set_point_is_taken_once)
 {
 	struct incise_stepper_setpoint slot = {.seq = 4}, copy;
 	uint32_t seq = 4;
@@ -43,7 +39,7 @@ static void a_set_point_is_taken_once(void **state)
 	assert_int_equal(copy.target, 6);
 }
 
-static void garbage_in_a_set_point_is_told_once(void **state)
+TEST(garbage_in_a_set_point_is_told_once)
 {
 	for (int i = 0; i < 3; i++) {
 		struct incise_stepper_setpoint slot = {.seq = 2}, copy;
@@ -60,7 +56,7 @@ static void garbage_in_a_set_point_is_told_once(void **state)
 	}
 }
 
-static void a_status_must_make_sense(void **state)
+TEST(a_status_must_make_sense)
 {
 	const struct incise_stepper_motor_status good = {
 		.seq = 8,
@@ -133,7 +129,7 @@ static void *write_many(void *argument)
 	return NULL;
 }
 
-static void a_copy_is_never_torn(void **state)
+TEST(a_copy_is_never_torn)
 {
 	static struct shared s;
 	struct incise_stepper_motor_status copy = {0};
@@ -159,16 +155,4 @@ static void a_copy_is_never_torn(void **state)
 	pthread_join(thread, NULL);
 	assert_int_equal(incise_page_get_status(&s.slot, &copy), 0);
 	assert_int_equal(copy.t_ns, s.writes);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_set_point_is_taken_once),
-		cmocka_unit_test(garbage_in_a_set_point_is_told_once),
-		cmocka_unit_test(a_status_must_make_sense),
-		cmocka_unit_test(a_copy_is_never_torn),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,15 +3,11 @@
  * lib/device/pose_flags.c: which flags make a pose unusable, and how they are counted. The
  * lists are those of rig.conf(5).
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <string.h>
 #include <incise/tracker.h>
 
-static void only_some_flags_leave_a_pose_usable(void **state)
+TEST(only_some_flags_leave_a_pose_usable)
 {
 	for (int status = -128; status < 128; status++) {
 		bool usable = !status || (status > 0 && strchr(" mtuvw", status));
@@ -21,7 +17,7 @@ static void only_some_flags_leave_a_pose_usable(void **state)
 	}
 }
 
-static void flags_are_counted_and_named(void **state)
+TEST(flags_are_counted_and_named)
 {
 	struct incise_pose_counts counts = {0}, sum = {0};
 	char text[400], some[20];
@@ -58,14 +54,4 @@ static void flags_are_counted_and_named(void **state)
 	assert_int_equal(sum.poses, 14);
 	assert_int_equal(sum.unusable, 8);
 	assert_int_equal(sum.flagged['x'], 6);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(only_some_flags_leave_a_pose_usable),
-		cmocka_unit_test(flags_are_counted_and_named),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * lib/device/gpio/pulser.c: what it does when something is wrong, on lines and a clock that
  * a test makes. What it does when all is well is in tests/unit/device/motor.c.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <string.h>
 #include "../../../lib/device/page.h"
@@ -100,7 +96,7 @@ static void over(struct bench *b)
 	assert_int_equal(b->machine.at, b->status.position);
 }
 
-static void a_deadman_brakes_or_retracts(void **state)
+TEST(a_deadman_brakes_or_retracts)
 {
 	/* flags, homed, where it ends: at once, or 0 */
 	static const struct {
@@ -142,7 +138,7 @@ static void a_deadman_brakes_or_retracts(void **state)
 	}
 }
 
-static void some_faults_halt_at_once(void **state)
+TEST(some_faults_halt_at_once)
 {
 	static const struct {
 		unsigned int forced;
@@ -174,7 +170,7 @@ static void some_faults_halt_at_once(void **state)
 }
 
 /* The other limit is behind it: it may go on. */
-static void a_limit_stops_one_direction(void **state)
+TEST(a_limit_stops_one_direction)
 {
 	struct bench b;
 
@@ -192,7 +188,7 @@ static void a_limit_stops_one_direction(void **state)
 	over(&b);
 }
 
-static void some_faults_brake(void **state)
+TEST(some_faults_brake)
 {
 	static const unsigned int faults[] = {INCISE_STEPPER_FAULT_OWNER,
 					      INCISE_STEPPER_FAULT_SUSPEND,
@@ -216,7 +212,7 @@ static void some_faults_brake(void **state)
 	}
 }
 
-static void a_thread_that_is_late_goes_slower_and_then_stops(void **state)
+TEST(a_thread_that_is_late_goes_slower_and_then_stops)
 {
 	struct bench b;
 
@@ -241,7 +237,7 @@ static void a_thread_that_is_late_goes_slower_and_then_stops(void **state)
 }
 
 /* Times so long that the profile alone would not keep one of them, and a late thread. */
-static void shortest_times_hold_where_the_profile_would_not_keep_them(void **state)
+TEST(shortest_times_hold_where_the_profile_would_not_keep_them)
 {
 	uint64_t random = 88172645463325252ULL, reversals = 0;
 	int64_t target = 3000;
@@ -280,7 +276,7 @@ static void shortest_times_hold_where_the_profile_would_not_keep_them(void **sta
 }
 
 /* A stall of 30 ms: the motion goes on where it was, with no burst. */
-static void a_stall_shifts_the_motion(void **state)
+TEST(a_stall_shifts_the_motion)
 {
 	struct bench b;
 	int64_t at;
@@ -302,7 +298,7 @@ static void a_stall_shifts_the_motion(void **state)
  * A stop of the whole program for 3 s, in motion or at rest, a new target or none behind it:
  * no step follows but those back to the safe position, and those only from rest.
  */
-static void a_stop_beyond_the_deadman_ends_the_motion(void **state)
+TEST(a_stop_beyond_the_deadman_ends_the_motion)
 {
 	/* flags, at rest, a target is written before the thread runs again */
 	static const struct {
@@ -345,7 +341,7 @@ static void a_stop_beyond_the_deadman_ends_the_motion(void **state)
 	}
 }
 
-static void a_count_is_named_only_at_rest(void **state)
+TEST(a_count_is_named_only_at_rest)
 {
 	struct bench b;
 
@@ -361,22 +357,4 @@ static void a_count_is_named_only_at_rest(void **state)
 	assert_int_equal(b.status.position, 20000);
 	assert_true(b.status.flags & INCISE_STEPPER_FLAG_HOMED);
 	assert_int_equal(b.machine.too_short, 0);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_deadman_brakes_or_retracts),
-		cmocka_unit_test(some_faults_halt_at_once),
-		cmocka_unit_test(a_limit_stops_one_direction),
-		cmocka_unit_test(some_faults_brake),
-		cmocka_unit_test(a_thread_that_is_late_goes_slower_and_then_stops),
-		cmocka_unit_test(
-			shortest_times_hold_where_the_profile_would_not_keep_them),
-		cmocka_unit_test(a_stall_shifts_the_motion),
-		cmocka_unit_test(a_stop_beyond_the_deadman_ends_the_motion),
-		cmocka_unit_test(a_count_is_named_only_at_rest),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

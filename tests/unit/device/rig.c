@@ -2,11 +2,7 @@
 /*
  * lib/device/rig.c: what is asked for is opened, on one clock and in one world.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <math.h>
 #include <incise/rig.h>
@@ -15,7 +11,7 @@
 #define ALL \
 	(INCISE_RIG_TRACKER | INCISE_RIG_FORCE | INCISE_RIG_CAMERA | INCISE_RIG_STEPPER)
 
-static void only_what_is_asked_for_is_open(void **state)
+TEST(only_what_is_asked_for_is_open)
 {
 	for (unsigned int devices = 0; devices <= ALL; devices++) {
 		struct incise_rig *rig = incise_rig_open("sim:", devices, NULL);
@@ -35,7 +31,7 @@ static void only_what_is_asked_for_is_open(void **state)
 	incise_rig_close(NULL);
 }
 
-static void devices_share_one_world(void **state)
+TEST(devices_share_one_world)
 {
 	struct incise_rig *rig = incise_rig_open("sim:clock=simulated", ALL, NULL);
 	static struct incise_force_sample force[30000];
@@ -67,7 +63,7 @@ static struct incise_vision_setup vision_of(const char *spec)
 	return setup;
 }
 
-static void vision_is_that_of_rig_conf_or_of_the_virtual_camera(void **state)
+TEST(vision_is_that_of_rig_conf_or_of_the_virtual_camera)
 {
 	/* full_px: 47.5 mm over camera_mm_px, which is 0.11875 unless it is given */
 	static const struct {
@@ -98,15 +94,4 @@ static void vision_is_that_of_rig_conf_or_of_the_virtual_camera(void **state)
 		assert_true(setup.depth_mm_px == row[i].depth_mm_px);
 		temp_file_free(&file);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(only_what_is_asked_for_is_open),
-		cmocka_unit_test(devices_share_one_world),
-		cmocka_unit_test(vision_is_that_of_rig_conf_or_of_the_virtual_camera),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,6 +10,7 @@
 #include "../../../lib/device/actuator.h"
 #include "../../../lib/device/rig_plan.h"
 #include "../message.h"
+#include "../unit.h"
 #include "../base/temp_file.h"
 
 /* Every key of rig.conf, in two actuators; the virtual rig is the force channel. */
@@ -179,7 +180,7 @@ static void same_again(const char *spec)
 	temp_file_free(&file);
 }
 
-static void the_list_is_a_rig_conf(void **state)
+TEST(the_list_is_a_rig_conf)
 {
 	static const char *const texts[] = {
 		everything,
@@ -217,7 +218,7 @@ static void has(const struct keys *keys, const char *group, const char *name)
 	fail_msg("%s.%s is not listed", group, name);
 }
 
-static void every_key_is_listed(void **state)
+TEST(every_key_is_listed)
 {
 	struct temp_file file = temp_file_new("rig.conf", everything);
 	struct keys keys = keys_of(file.path);
@@ -240,7 +241,7 @@ static void every_key_is_listed(void **state)
 	temp_file_free(&file);
 }
 
-static void values_are_those_of_the_file(void **state)
+TEST(values_are_those_of_the_file)
 {
 	static const struct {
 		const char *name, *value;
@@ -287,7 +288,7 @@ static void values_are_those_of_the_file(void **state)
 	temp_file_free(&file);
 }
 
-static void the_shorthand_gives_its_words(void **state)
+TEST(the_shorthand_gives_its_words)
 {
 	struct keys keys = keys_of("sim:mouse,seed=1,clock=simulated");
 
@@ -307,7 +308,7 @@ static int stop_at_third(void *context, const struct incise_rig_key *key)
 	return ++*(int *)context == 3 ? 42 : 0;
 }
 
-static void errors_and_stops(void **state)
+TEST(errors_and_stops)
 {
 	struct temp_file file = temp_file_new("rig.conf", "\nclokc = \"real\";\n");
 	struct incise_error err = {0};
@@ -323,17 +324,4 @@ static void errors_and_stops(void **state)
 	assert_int_equal(incise_rig_keys("sim:", stop_at_third, &calls, &err), 42);
 	assert_int_equal(calls, 3);
 	temp_file_free(&file);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(the_list_is_a_rig_conf),
-		cmocka_unit_test(every_key_is_listed),
-		cmocka_unit_test(values_are_those_of_the_file),
-		cmocka_unit_test(the_shorthand_gives_its_words),
-		cmocka_unit_test(errors_and_stops),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

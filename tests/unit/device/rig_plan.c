@@ -12,6 +12,7 @@
 #include <incise/sim.h>
 #include "../../../lib/device/rig_plan.h"
 #include "../message.h"
+#include "../unit.h"
 #include "../base/temp_file.h"
 
 /* --- file --- */
@@ -19,7 +20,7 @@
 #define ALL \
 	(INCISE_RIG_TRACKER | INCISE_RIG_FORCE | INCISE_RIG_CAMERA | INCISE_RIG_STEPPER)
 
-static void shorthand_sets_keys(void **state)
+TEST(shorthand_sets_keys)
 {
 	struct incise_rig *rig = incise_rig_open(
 		"sim:seed=7,cut_s=2.5,depth_mm=5,times=3,withdrawal=paper,clock=simulated",
@@ -44,7 +45,7 @@ static void shorthand_sets_keys(void **state)
 	incise_rig_close(rig);
 }
 
-static void shorthand_ignores_the_locale(void **state)
+TEST(shorthand_ignores_the_locale)
 {
 	struct incise_rig *rig;
 
@@ -58,7 +59,7 @@ static void shorthand_ignores_the_locale(void **state)
 	incise_rig_close(rig);
 }
 
-static void shorthand_refuses(void **state)
+TEST(shorthand_refuses)
 {
 	static const struct {
 		const char *spec, *text;
@@ -87,7 +88,7 @@ static void shorthand_refuses(void **state)
 	}
 }
 
-static void file_is_read(void **state)
+TEST(file_is_read)
 {
 	struct temp_file file = temp_file_new(
 		"rig.conf",
@@ -120,7 +121,7 @@ static void file_is_read(void **state)
 	temp_file_free(&file);
 }
 
-static void empty_file_is_a_rig_without_devices(void **state)
+TEST(empty_file_is_a_rig_without_devices)
 {
 	struct temp_file file = temp_file_new("rig.conf", "");
 	struct incise_rig *rig = incise_rig_open(file.path, 0, NULL);
@@ -132,7 +133,7 @@ static void empty_file_is_a_rig_without_devices(void **state)
 	temp_file_free(&file);
 }
 
-static void file_refuses(void **state)
+TEST(file_refuses)
 {
 	static const struct {
 		const char *text;
@@ -196,7 +197,7 @@ static void file_refuses(void **state)
 }
 
 /* A real actuator: what it needs besides its string. */
-static void real_steppers_are_refused_with_a_line(void **state)
+TEST(real_steppers_are_refused_with_a_line)
 {
 #define ACTUATOR "actuator = { spring_N_mm = 2.0; travel_mm = 9.0; lead_mm = 2.0; };\n"
 	static const struct {
@@ -245,7 +246,7 @@ static int read_steppers(const char *text, struct incise_rig_plan *all,
 	return rc;
 }
 
-static void each_stepper_has_its_group(void **state)
+TEST(each_stepper_has_its_group)
 {
 	struct incise_error err = {0};
 	struct incise_rig_plan all;
@@ -281,7 +282,7 @@ static void each_stepper_has_its_group(void **state)
 			 0);
 }
 
-static void the_virtual_rig_has_up_to_three(void **state)
+TEST(the_virtual_rig_has_up_to_three)
 {
 	for (int n = 1; n <= 3; n++) {
 		char spec[] = "sim:clock=simulated,axes=1";
@@ -306,7 +307,7 @@ static void the_virtual_rig_has_up_to_three(void **state)
 	}
 }
 
-static void several_steppers_are_refused_with_a_line(void **state)
+TEST(several_steppers_are_refused_with_a_line)
 {
 	static const struct {
 		const char *text, *says;
@@ -363,7 +364,7 @@ static void several_steppers_are_refused_with_a_line(void **state)
 }
 
 /* Its text is checked whole, whatever is opened of it. */
-static void the_example_is_a_good_one(void **state)
+TEST(the_example_is_a_good_one)
 {
 	struct incise_error err = {0};
 	struct incise_rig *rig;
@@ -389,7 +390,7 @@ static int read_all(const char *text, struct incise_rig_plan *all,
 	return rc;
 }
 
-static void without_groups_all_is_by_default(void **state)
+TEST(without_groups_all_is_by_default)
 {
 	struct incise_error err = {0};
 	struct incise_rig_plan all;
@@ -409,7 +410,7 @@ static void without_groups_all_is_by_default(void **state)
 	assert_false(all.has_vision);
 }
 
-static void an_empty_vision_is_of_a_black_handle(void **state)
+TEST(an_empty_vision_is_of_a_black_handle)
 {
 	struct incise_error err = {0};
 	struct incise_rig_plan all;
@@ -423,7 +424,7 @@ static void an_empty_vision_is_of_a_black_handle(void **state)
 	assert_int_equal(all.vision.roi.width, 0);
 }
 
-static void all_keys_are_read(void **state)
+TEST(all_keys_are_read)
 {
 	struct incise_error err = {0};
 	struct incise_rig_plan all;
@@ -467,7 +468,7 @@ static void all_keys_are_read(void **state)
 		    all.vision.roi.width == 16 && all.vision.roi.height == 8192);
 }
 
-static void what_is_wrong_is_said(void **state)
+TEST(what_is_wrong_is_said)
 {
 	static const struct {
 		const char *text, *says;
@@ -552,27 +553,4 @@ static void what_is_wrong_is_said(void **state)
 		assert_error(read_all(cases[i].text, &all, &err), EINVAL, &err,
 			     cases[i].says);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(shorthand_sets_keys),
-		cmocka_unit_test(shorthand_ignores_the_locale),
-		cmocka_unit_test(shorthand_refuses),
-		cmocka_unit_test(file_is_read),
-		cmocka_unit_test(empty_file_is_a_rig_without_devices),
-		cmocka_unit_test(file_refuses),
-		cmocka_unit_test(real_steppers_are_refused_with_a_line),
-		cmocka_unit_test(each_stepper_has_its_group),
-		cmocka_unit_test(the_virtual_rig_has_up_to_three),
-		cmocka_unit_test(several_steppers_are_refused_with_a_line),
-		cmocka_unit_test(the_example_is_a_good_one),
-		cmocka_unit_test(without_groups_all_is_by_default),
-		cmocka_unit_test(an_empty_vision_is_of_a_black_handle),
-		cmocka_unit_test(all_keys_are_read),
-		cmocka_unit_test(what_is_wrong_is_said),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -7,6 +7,7 @@
 #include <string.h>
 #include <incise/scan.h>
 #include "../message.h"
+#include "../unit.h"
 
 static int found(void *context, const struct incise_scan_device *device)
 {
@@ -14,7 +15,7 @@ static int found(void *context, const struct incise_scan_device *device)
 	return 0;
 }
 
-static void what_cannot_be_scanned_is_said(void **state)
+TEST(what_cannot_be_scanned_is_said)
 {
 	static const struct {
 		const char *spec;
@@ -36,13 +37,4 @@ static void what_cannot_be_scanned_is_said(void **state)
 		assert_error(incise_scan("stepper", cases[i].spec, found, NULL, &err),
 			     cases[i].code, &err, cases[i].says);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(what_cannot_be_scanned_is_said),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * lib/device/sources.c: every call reaches the backend with its arguments and returns what the
  * backend returns.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -43,7 +39,7 @@ static uint64_t tracker_fake_lost(const struct incise_tracker *tracker)
 	return ((const struct tracker_fake *)tracker)->n * 10000000000ULL;
 }
 
-static void tracker_calls_reach_the_backend(void **state)
+TEST(tracker_calls_reach_the_backend)
 {
 	static const struct incise_tracker_ops ops = {.read = tracker_fake_read,
 						      .info = tracker_fake_info,
@@ -90,7 +86,7 @@ static uint64_t force_fake_lost(const struct incise_force *force)
 	return ((const struct force_fake *)force)->n * 10000000000ULL;
 }
 
-static void force_calls_reach_the_backend(void **state)
+TEST(force_calls_reach_the_backend)
 {
 	static const struct incise_force_ops ops = {.read = force_fake_read,
 						    .info = force_fake_info,
@@ -108,7 +104,7 @@ static void force_calls_reach_the_backend(void **state)
 }
 
 /* The part of a calibration that applies to a channel in volts, and to one in newtons. */
-static void a_channel_in_newtons_has_no_sensitivity(void **state)
+TEST(a_channel_in_newtons_has_no_sensitivity)
 {
 	static const struct {
 		bool newtons;
@@ -119,7 +115,6 @@ static void a_channel_in_newtons_has_no_sensitivity(void **state)
 		{true, 1000, NAN, 1000, NAN},
 	};
 
-	(void)state;
 	for (size_t i = 0; i < sizeof(row) / sizeof(*row); i++) {
 		struct incise_force_info info = {.newtons = row[i].newtons};
 		struct incise_calibration c = {.force_mV_N = row[i].mV_N,
@@ -165,7 +160,7 @@ static int fake_cause(struct incise_camera *camera, char *text, size_t size)
 			((struct camera_fake *)camera)->frame->width);
 }
 
-static void camera_calls_reach_the_backend(void **state)
+TEST(camera_calls_reach_the_backend)
 {
 	static const struct incise_camera_ops ops = {.read = camera_fake_read,
 						     .info = camera_fake_info,
@@ -186,7 +181,7 @@ static void camera_calls_reach_the_backend(void **state)
 	assert_string_equal(text, "picture 77");
 }
 
-static void a_backend_that_tells_no_cause_has_an_empty_one(void **state)
+TEST(a_backend_that_tells_no_cause_has_an_empty_one)
 {
 	static const struct incise_camera_ops ops = {0};
 	struct camera_fake camera_fake = {.camera.ops = &ops};
@@ -213,7 +208,7 @@ static int queue_read(struct incise_camera *camera, struct incise_camera_frame *
 	return 1;
 }
 
-static void the_newest_is_the_last_that_waits(void **state)
+TEST(the_newest_is_the_last_that_waits)
 {
 	static const struct incise_camera_ops ops = {.read = queue_read};
 	static const struct {
@@ -240,18 +235,4 @@ static void the_newest_is_the_last_that_waits(void **state)
 				 cases[i].second);
 		assert_true(frame.seq == cases[i].seq);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(tracker_calls_reach_the_backend),
-		cmocka_unit_test(force_calls_reach_the_backend),
-		cmocka_unit_test(a_channel_in_newtons_has_no_sensitivity),
-		cmocka_unit_test(camera_calls_reach_the_backend),
-		cmocka_unit_test(a_backend_that_tells_no_cause_has_an_empty_one),
-		cmocka_unit_test(the_newest_is_the_last_that_waits),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <incise/backend.h>
 #include "../message.h"
+#include "../unit.h"
 
 /* --- stepper --- */
 
@@ -61,7 +62,7 @@ static void fake_info(const struct incise_stepper *stepper,
 	info->travel_mm = ((const struct fake *)stepper)->position_mm;
 }
 
-static void calls_reach_the_backend(void **state)
+TEST(calls_reach_the_backend)
 {
 	static const struct incise_stepper_ops ops = {
 		.set = fake_set,
@@ -99,7 +100,7 @@ static void named_info(const struct incise_stepper *stepper,
 	*info = (struct incise_stepper_info){.name = "a simple one"};
 }
 
-static void what_a_backend_has_not_is_said(void **state)
+TEST(what_a_backend_has_not_is_said)
 {
 	static const struct incise_stepper_ops ops = {.info = named_info};
 	struct incise_stepper stepper = {.ops = &ops};
@@ -119,7 +120,7 @@ static void what_a_backend_has_not_is_said(void **state)
 	}
 }
 
-static void states_and_faults_have_words(void **state)
+TEST(states_and_faults_have_words)
 {
 	static const char *const states[] = {"disabled", "ready", "moving",
 					     "stopping", "fault", "unknown"};
@@ -171,7 +172,7 @@ static int teller_counter(struct incise_stepper *stepper, int i,
 	return 0;
 }
 
-static void the_cause_is_the_device_s_own_or_the_first_fault(void **state)
+TEST(the_cause_is_the_device_s_own_or_the_first_fault)
 {
 	static const struct incise_stepper_ops ops[] = {
 		{.status = teller_status},
@@ -211,7 +212,7 @@ static void the_cause_is_the_device_s_own_or_the_first_fault(void **state)
 		}
 }
 
-static void counters_are_the_backend_s(void **state)
+TEST(counters_are_the_backend_s)
 {
 	static const struct incise_stepper_ops ops = {.counter = teller_counter}, none;
 	struct teller teller = {.stepper.ops = &ops};
@@ -458,7 +459,7 @@ static void powered_at(struct machine *m, double at_mm)
 	assert_int_equal(incise_stepper_enable(&m->stepper, NULL), 0);
 }
 
-static void the_count_becomes_the_position(void **state)
+TEST(the_count_becomes_the_position)
 {
 	static const double starts_mm[] = {0.01, 3, 11.7, 19.9, -1, 22};
 	static const struct {
@@ -509,7 +510,7 @@ static void the_count_becomes_the_position(void **state)
 }
 
 /* The count at the edge, read before homing names places again; as well as homing reads. */
-static void the_edge_is_told_in_the_old_count(void **state)
+TEST(the_edge_is_told_in_the_old_count)
 {
 	static const unsigned int inputs[] = {INCISE_STEPPER_LINE_HOME,
 					      INCISE_STEPPER_LINE_LIMIT_MIN};
@@ -536,7 +537,7 @@ static void the_edge_is_told_in_the_old_count(void **state)
 	}
 }
 
-static void what_is_wrong_is_said(void **state)
+TEST(what_is_wrong_is_said)
 {
 	static const struct {
 		struct machine m;
@@ -580,7 +581,7 @@ static void what_is_wrong_is_said(void **state)
 	}
 }
 
-static void it_must_be_powered(void **state)
+TEST(it_must_be_powered)
 {
 	struct machine m = {.home_at = INCISE_STEPPER_LINE_HOME};
 	struct incise_error err = {0};
@@ -590,21 +591,4 @@ static void it_must_be_powered(void **state)
 	assert_error(incise_stepper_home(&m.stepper, NULL, NULL, &err), EIO, &err,
 		     "enable");
 	assert_true(m.at_mm == 3);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(calls_reach_the_backend),
-		cmocka_unit_test(what_a_backend_has_not_is_said),
-		cmocka_unit_test(states_and_faults_have_words),
-		cmocka_unit_test(the_cause_is_the_device_s_own_or_the_first_fault),
-		cmocka_unit_test(counters_are_the_backend_s),
-		cmocka_unit_test(the_count_becomes_the_position),
-		cmocka_unit_test(the_edge_is_told_in_the_old_count),
-		cmocka_unit_test(what_is_wrong_is_said),
-		cmocka_unit_test(it_must_be_powered),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -14,6 +14,7 @@
 #include "../../../lib/device/backends.h"
 #include "../../../lib/device/gpio/gpio_lines.h"
 #include "../message.h"
+#include "../unit.h"
 
 /* A chip; levels, not what they mean. */
 struct gpio_lines {
@@ -179,7 +180,7 @@ static struct incise_stepper_status await(struct incise_stepper *stepper,
 	return status;
 }
 
-static void it_steps_and_lets_go(void **state)
+TEST(it_steps_and_lets_go)
 {
 	struct incise_actuator actuator = slow();
 	struct incise_stepper_status status;
@@ -229,7 +230,7 @@ static void it_steps_and_lets_go(void **state)
 	assert_false(atomic_load(&chip.level) >> INCISE_LINE_STEP & 1);
 }
 
-static void why_it_cannot_begin_is_said(void **state)
+TEST(why_it_cannot_begin_is_said)
 {
 	static const struct {
 		const char *arguments;
@@ -266,14 +267,4 @@ static void why_it_cannot_begin_is_said(void **state)
 			     cases[i].code, &err, cases[i].says);
 		assert_int_equal(chip.open, 0);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(it_steps_and_lets_go),
-		cmocka_unit_test(why_it_cannot_begin_is_said),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -14,6 +14,7 @@
 #include "../../../lib/device/backends.h"
 #include "../../../lib/device/motor.h"
 #include "../message.h"
+#include "../unit.h"
 #include "conformance.h"
 #include "machine.h"
 
@@ -240,7 +241,7 @@ static void raise(void *world, unsigned int input, bool active)
 		module.machine.forced &= ~line;
 }
 
-static void every_case(void **state)
+TEST(every_case)
 {
 	for (int i = 0; conformance[i].name; i++) {
 		struct conformance c = {
@@ -269,7 +270,7 @@ static void every_case(void **state)
 }
 
 /* Two motors through one open file are asked of the real module, in tests/vm. */
-static void a_motor_is_one_actuator_of_a_rig(void **state)
+TEST(a_motor_is_one_actuator_of_a_rig)
 {
 	struct incise_error err = {0};
 	struct incise_stepper *owner;
@@ -293,7 +294,7 @@ static void a_motor_is_one_actuator_of_a_rig(void **state)
 	assert_int_equal(module.opened, 0);
 }
 
-static void a_watcher_only_looks(void **state)
+TEST(a_watcher_only_looks)
 {
 	struct incise_stepper_status status;
 	struct incise_stepper *owner, *watcher;
@@ -326,7 +327,7 @@ static void a_watcher_only_looks(void **state)
 	owner->ops->close(owner);
 }
 
-static void why_it_does_not_open_is_said(void **state)
+TEST(why_it_does_not_open_is_said)
 {
 	static const struct {
 		const char *arguments;
@@ -374,7 +375,7 @@ static void why_it_does_not_open_is_said(void **state)
 	}
 }
 
-static void what_the_last_owner_left_is_waited_for(void **state)
+TEST(what_the_last_owner_left_is_waited_for)
 {
 	struct incise_stepper *stepper;
 
@@ -386,7 +387,7 @@ static void what_the_last_owner_left_is_waited_for(void **state)
 }
 
 /* 4000 steps are the travel. */
-static void a_count_outside_the_travel_begins_anew(void **state)
+TEST(a_count_outside_the_travel_begins_anew)
 {
 	static const struct {
 		int64_t before, after;
@@ -410,7 +411,7 @@ static void a_count_outside_the_travel_begins_anew(void **state)
 }
 
 /* Unbound while it is open: the page says so, and all calls do. */
-static void a_device_that_goes_away(void **state)
+TEST(a_device_that_goes_away)
 {
 	struct incise_stepper_status status;
 	struct incise_stepper *stepper;
@@ -429,7 +430,7 @@ static void a_device_that_goes_away(void **state)
 }
 
 /* A status that is never finished is not waited for, and is reported after a while. */
-static void a_page_that_makes_no_sense(void **state)
+TEST(a_page_that_makes_no_sense)
 {
 	struct incise_stepper_motor_status *slot =
 		(struct incise_stepper_motor_status *)module.status + MOTOR;
@@ -449,20 +450,4 @@ static void a_page_that_makes_no_sense(void **state)
 	assert_int_equal(incise_stepper_status(stepper, &status), -EIO);
 	assert_int_equal(incise_stepper_set(stepper, 1), -EIO);
 	stepper->ops->close(stepper);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(every_case),
-		cmocka_unit_test(a_motor_is_one_actuator_of_a_rig),
-		cmocka_unit_test(a_watcher_only_looks),
-		cmocka_unit_test(why_it_does_not_open_is_said),
-		cmocka_unit_test(what_the_last_owner_left_is_waited_for),
-		cmocka_unit_test(a_count_outside_the_travel_begins_anew),
-		cmocka_unit_test(a_device_that_goes_away),
-		cmocka_unit_test(a_page_that_makes_no_sense),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

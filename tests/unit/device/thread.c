@@ -3,11 +3,7 @@
  * lib/device/thread.c: the thread runs with all signals blocked, and the caller's own mask
  * stays what it was.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <signal.h>
 #include "../../../lib/device/thread.h"
 
@@ -17,7 +13,7 @@ static void *look(void *argument)
 	return argument;
 }
 
-static void signals_are_the_programs(void **state)
+TEST(signals_are_the_programs)
 {
 	sigset_t within, before, after;
 	bool real_time;
@@ -34,13 +30,4 @@ static void signals_are_the_programs(void **state)
 		    sigismember(&within, SIGUSR1));
 	assert_int_equal(sigismember(&after, SIGINT), sigismember(&before, SIGINT));
 	assert_int_equal(sigismember(&after, SIGTERM), sigismember(&before, SIGTERM));
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(signals_are_the_programs),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

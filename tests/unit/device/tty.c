@@ -2,11 +2,7 @@
 /*
  * lib/device/tty.c on pseudo terminals. A line's speed means nothing there, but is kept.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -37,7 +33,7 @@ static void let_go(int fd)
 	close(fd);
 }
 
-static void bytes_are_as_they_are(void **state)
+TEST(bytes_are_as_they_are, make, drop)
 {
 	/* what a terminal that is not raw would change, hold back or answer */
 	static const unsigned char bytes[] = {0,    3,	  4,	'\r', '\n',
@@ -58,7 +54,7 @@ static void bytes_are_as_they_are(void **state)
 	let_go(fd);
 }
 
-static void speeds(void **state)
+TEST(speeds, make, drop)
 {
 	static const struct {
 		speed_t before, asked, is;
@@ -85,7 +81,7 @@ static void speeds(void **state)
 	}
 }
 
-static void what_lies_there_is_of_another_time(void **state)
+TEST(what_lies_there_is_of_another_time, make, drop)
 {
 	int keep = open(path, O_RDWR | O_NOCTTY), fd;
 	char got[4];
@@ -99,7 +95,7 @@ static void what_lies_there_is_of_another_time(void **state)
 	close(keep);
 }
 
-static void one_program_at_a_time(void **state)
+TEST(one_program_at_a_time, make, drop)
 {
 	int fd = incise_tty_open(path, B115200);
 	int second = incise_tty_open(path, B115200);
@@ -113,7 +109,7 @@ static void one_program_at_a_time(void **state)
 	let_go(fd);
 }
 
-static void what_is_no_line(void **state)
+TEST(what_is_no_line, make, drop)
 {
 	char file[] = "/tmp/incise-test-XXXXXX";
 
@@ -127,19 +123,4 @@ static void what_is_no_line(void **state)
 	assert_int_equal(incise_tty_open(file, B115200), -ENOENT);
 	assert_int_equal(incise_tty_open("/dev/null", B115200), -ENOTTY);
 	assert_int_equal(incise_tty_open("/", B115200), -ENOTTY);
-}
-
-#define ON_A_LINE(test) cmocka_unit_test_setup_teardown(test, make, drop)
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		ON_A_LINE(bytes_are_as_they_are),
-		ON_A_LINE(speeds),
-		ON_A_LINE(what_lies_there_is_of_another_time),
-		ON_A_LINE(one_program_at_a_time),
-		ON_A_LINE(what_is_no_line),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -8,6 +8,7 @@
 #include <string.h>
 #include "../../../lib/device/backends.h"
 #include "../message.h"
+#include "../unit.h"
 
 /* A module that remembers what it was called with. */
 static struct {
@@ -74,7 +75,7 @@ static int forget(void **state)
 	return setenv("INCISE_MODULE_PATH", "/some/folder", 1);
 }
 
-static void calls_reach_the_module(void **state)
+TEST(calls_reach_the_module, forget)
 {
 	const struct incise_vision_setup setup = {.hue = {3, 4}};
 	struct incise_camera_frame frame = {0};
@@ -92,7 +93,7 @@ static void calls_reach_the_module(void **state)
 	assert_int_equal(seen.closed, 1);
 }
 
-static void learning_needs_no_valid_setup(void **state)
+TEST(learning_needs_no_valid_setup, forget)
 {
 	struct incise_vision_setup setup = {.hue = {-1, 4000}};
 	struct incise_vision_box box = {0};
@@ -109,7 +110,7 @@ static void learning_needs_no_valid_setup(void **state)
 	assert_int_equal(seen.closed, 1);
 }
 
-static void what_it_refuses_comes_back(void **state)
+TEST(what_it_refuses_comes_back, forget)
 {
 	const struct incise_vision_setup setup = {0};
 
@@ -118,7 +119,7 @@ static void what_it_refuses_comes_back(void **state)
 	assert_int_equal(errno, EINVAL);
 }
 
-static void a_module_that_is_not_there_is_said(void **state)
+TEST(a_module_that_is_not_there_is_said, forget)
 {
 	static const struct {
 		int found, code;
@@ -142,16 +143,4 @@ static void a_module_that_is_not_there_is_said(void **state)
 				 -row[i].code);
 	}
 	assert_int_equal(seen.opened, 0);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup(calls_reach_the_module, forget),
-		cmocka_unit_test_setup(learning_needs_no_valid_setup, forget),
-		cmocka_unit_test_setup(what_it_refuses_comes_back, forget),
-		cmocka_unit_test_setup(a_module_that_is_not_there_is_said, forget),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,11 +4,7 @@
  * that writes between any two reads, in all ways there are, and a config that is wrong in one
  * field at a time.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <string.h>
 
 /*
@@ -105,7 +101,7 @@ static bool merged(void)
 	return taken;
 }
 
-static void test_any_merge(void **state)
+TEST(test_any_merge)
 {
 	int n = 0, taken = 0, i;
 
@@ -126,7 +122,7 @@ static void test_any_merge(void **state)
 	assert_in_range(taken, 1, n - 1);
 }
 
-static void test_answers(void **state)
+TEST(test_answers)
 {
 	static const struct {
 		struct incise_stepper_setpoint slot;
@@ -181,7 +177,7 @@ static void test_answers(void **state)
 	}
 }
 
-static void test_clamp(void **state)
+TEST(test_clamp)
 {
 	static const struct incise_stepper_config config = {
 		.velocity = 1000, .position_min = -50, .position_max = 70};
@@ -225,7 +221,7 @@ static const struct incise_stepper_config good = {
 };
 
 /* One field at a time. */
-static void test_config(void **state)
+TEST(test_config)
 {
 	static const struct {
 		size_t offset, size;
@@ -303,7 +299,7 @@ static void test_config(void **state)
 }
 
 /* The profile's own limit holds where a machine could do more. */
-static void test_fast_machine(void **state)
+TEST(test_fast_machine)
 {
 	const struct incise_stepper_controller fast = {.n_motors = 2,
 						       .rate_max = UINT32_MAX};
@@ -314,15 +310,4 @@ static void test_fast_machine(void **state)
 	assert_int_equal(stepper_page_config(&config, &fast), 0);
 	config.velocity++;
 	assert_int_equal(stepper_page_config(&config, &fast), -ERANGE);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_any_merge),    cmocka_unit_test(test_answers),
-		cmocka_unit_test(test_clamp),	     cmocka_unit_test(test_config),
-		cmocka_unit_test(test_fast_machine),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * Blobs from strangers: refused, or harmless. The sanitizers' run of this test sees any
  * read outside of the blob, which stands at the end of its memory, and any overflow.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
@@ -50,12 +46,12 @@ static void seal(void *blob, uint32_t size)
 }
 
 /* CRC-32C's check value, from its specification. */
-static void test_crc(void **state)
+TEST(test_crc)
 {
 	assert_int_equal(incise_fx_crc((const uint8_t *)"123456789", 9), 0xe3069283);
 }
 
-static void test_good_blobs_open(void **state)
+TEST(test_good_blobs_open)
 {
 	for (size_t k = 0; k < KINDS; k++) {
 		struct incise_fixed fx;
@@ -71,7 +67,7 @@ static void test_good_blobs_open(void **state)
 	}
 }
 
-static void test_any_single_damage_is_seen(void **state)
+TEST(test_any_single_damage_is_seen)
 {
 	for (size_t k = 0; k < KINDS; k++) {
 		struct incise_fixed fx;
@@ -90,7 +86,7 @@ static void test_any_single_damage_is_seen(void **state)
 	}
 }
 
-static void test_versions(void **state)
+TEST(test_versions)
 {
 	struct incise_fixed fx;
 	uint32_t size;
@@ -134,7 +130,7 @@ static void same_in_batches(const struct incise_fixed *fx, uint64_t *seed)
 }
 
 /* Unused fields that must be zero, a bound that every input has, and names that must be valid. */
-static void test_unused_fields(void **state)
+TEST(test_unused_fields)
 {
 	static const struct {
 		int kind;
@@ -162,7 +158,7 @@ static void test_unused_fields(void **state)
 }
 
 /* A sum of weights just over 1 is floored away from 0: found by a reviewer. */
-static void test_weights_over_one(void **state)
+TEST(test_weights_over_one)
 {
 	struct incise_fixed fx;
 	uint32_t size;
@@ -180,7 +176,7 @@ static void test_weights_over_one(void **state)
 }
 
 /* Sizes that wrap when multiplied must not pass for small ones. */
-static void test_huge_counts(void **state)
+TEST(test_huge_counts)
 {
 	struct incise_fixed fx;
 	uint32_t size;
@@ -195,19 +191,4 @@ static void test_huge_counts(void **state)
 	seal(head, size);
 	assert_int_equal(incise_fixed_open(&fx, head, size), -EINVAL);
 	free(head);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_crc),
-		cmocka_unit_test(test_good_blobs_open),
-		cmocka_unit_test(test_any_single_damage_is_seen),
-		cmocka_unit_test(test_versions),
-		cmocka_unit_test(test_unused_fields),
-		cmocka_unit_test(test_weights_over_one),
-		cmocka_unit_test(test_huge_counts),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 /*
  * Inputs of a model in integers against those in double; and numbers at their ends.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/control/model_input.h"
@@ -26,7 +22,7 @@ static double any(void)
 	return (double)(seed >> 11) * 0x1p-52 - 1;
 }
 
-static void acceleration_is_that_in_double(void **state)
+TEST(acceleration_is_that_in_double)
 {
 	for (int k = 0; k < CASES; k++) {
 		double size = pow(10, 2 + 2 * any()), v[3], a[3];
@@ -70,7 +66,7 @@ static void any_unit(int32_t to[3], double unit[3])
 		unit[i] = to[i] / UNIT;
 }
 
-static void tilt_is_that_in_double(void **state)
+TEST(tilt_is_that_in_double)
 {
 	const double as_it_is[] = {1, 0, 0, 0};
 
@@ -104,7 +100,7 @@ static void tilt_is_that_in_double(void **state)
 	}
 }
 
-static void time_is_held(void **state)
+TEST(time_is_held)
 {
 	assert_int_equal(incise_fixed_input_time(5, 5), 0);
 	assert_int_equal(incise_fixed_input_time(4, 5), 0);
@@ -112,15 +108,4 @@ static void time_is_held(void **state)
 	assert_int_equal(incise_fixed_input_time(1500000000, 0), 98304);
 	assert_int_equal(incise_fixed_input_time(INT64_MAX, INT64_MIN), INT32_MAX);
 	assert_int_equal(incise_fixed_input_time(INT64_MAX, 0), INT32_MAX);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(acceleration_is_that_in_double),
-		cmocka_unit_test(tilt_is_that_in_double),
-		cmocka_unit_test(time_is_held),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

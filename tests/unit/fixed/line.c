@@ -3,11 +3,7 @@
  * Lines and cuts in the surface, in integers, compared with lib/tissue: a blade that goes to and fro
  * over a skin, turns and leaves it, and the handle and tube that open its cuts.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include <incise/scene.h>
@@ -64,7 +60,7 @@ static void step(struct blade *b, double far)
 }
 
 /* New tissue, tick for tick: the along of a line is off by some 2^-30, a product by 2^-17. */
-static void test_new_tissue(void **state)
+TEST(test_new_tissue)
 {
 	int apart = 0;
 
@@ -96,7 +92,7 @@ static void test_new_tissue(void **state)
 	assert_int_equal(apart, 0);
 }
 
-static void test_along(void **state)
+TEST(test_along)
 {
 	trial.seed = 2;
 	for (int k = 0; k < 100000; k++) {
@@ -184,7 +180,7 @@ static int compare_cuts(const struct incise_fixed_incision *got,
 static struct incise_fixed_incision cuts;
 
 /* The same cuts, joined in the same way; the same openings, as tight. */
-static void test_cuts(void **state)
+TEST(test_cuts)
 {
 	int most = 0, met = 0, full = 0, apart = 0, all = 0;
 
@@ -258,15 +254,4 @@ static void test_cuts(void **state)
 	 */
 	if (apart * 100 > all)
 		fail_msg("%d of %d cuts are apart", apart, all);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_new_tissue),
-		cmocka_unit_test(test_along),
-		cmocka_unit_test(test_cuts),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * The check of plans: random good ones are accepted; with any one number beyond its range, any byte
  * changed, cut short or of another version they are refused.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -40,7 +36,7 @@ static int open_sealed(uint8_t *bytes, uint32_t size)
 }
 
 /* All kinds of surfaces, with a model and without, as wide as may be and not. */
-static void test_good_plans_are_accepted(void **state)
+TEST(test_good_plans_are_accepted)
 {
 	int kinds[3] = {0}, models = 0, membranes = 0, tubes = 0, axes[4] = {0};
 
@@ -159,7 +155,7 @@ static int with(uint8_t *bytes, uint32_t size, size_t at, int64_t value)
 	return rc;
 }
 
-static void test_ends_of_ranges(void **state)
+TEST(test_ends_of_ranges)
 {
 	for (size_t k = 0; k < sizeof(ranges) / sizeof(*ranges); k++) {
 		uint8_t *bytes = NULL;
@@ -190,7 +186,7 @@ static void test_ends_of_ranges(void **state)
 }
 
 /* A direction that is none: shorter, longer, or all 0. */
-static void test_directions_are_unit(void **state)
+TEST(test_directions_are_unit)
 {
 	static const struct {
 		size_t at;
@@ -238,7 +234,7 @@ static void test_directions_are_unit(void **state)
 }
 
 /* Numbers that are good one by one. */
-static void test_numbers_fit_together(void **state)
+TEST(test_numbers_fit_together)
 {
 	for (uint64_t seed = 1; seed <= PLANS; seed++) {
 		uint32_t size;
@@ -277,7 +273,7 @@ static void test_numbers_fit_together(void **state)
 }
 
 /* A height that is a cliff, or too high; one that is none is good. */
-static void test_heights(void **state)
+TEST(test_heights)
 {
 	for (uint64_t seed = 1; seed <= PLANS; seed++) {
 		uint32_t size;
@@ -304,7 +300,7 @@ static void test_heights(void **state)
 	}
 }
 
-static void test_bytes(void **state)
+TEST(test_bytes)
 {
 	struct incise_fixed_plan plan;
 
@@ -342,7 +338,7 @@ static void test_bytes(void **state)
 }
 
 /* Parts lie behind the header and before the end, at multiples of 8. */
-static void test_parts(void **state)
+TEST(test_parts)
 {
 	for (uint64_t seed = 1; seed <= PLANS; seed++) {
 		uint32_t size, at;
@@ -371,7 +367,7 @@ static void test_parts(void **state)
 }
 
 /* The model's inputs: known ones, once each, as many as it has, in a version of their own. */
-static void test_inputs(void **state)
+TEST(test_inputs)
 {
 	const int32_t depth = INCISE_FIXED_INPUT_DEPTH, tilt = INCISE_FIXED_INPUT_TILT,
 		      time = INCISE_FIXED_INPUT_TIME;
@@ -409,20 +405,4 @@ static void test_inputs(void **state)
 		free(bytes);
 	}
 	assert_true(seen[0] && seen[1] && seen[2]);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_good_plans_are_accepted),
-		cmocka_unit_test(test_ends_of_ranges),
-		cmocka_unit_test(test_directions_are_unit),
-		cmocka_unit_test(test_numbers_fit_together),
-		cmocka_unit_test(test_heights),
-		cmocka_unit_test(test_bytes),
-		cmocka_unit_test(test_parts),
-		cmocka_unit_test(test_inputs),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

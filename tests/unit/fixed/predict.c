@@ -3,11 +3,7 @@
  * The predictor in integers compared with lib/control/predict.c: a hand with noise, gaps, leaps and
  * late poses; then what no hand does.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include "../../../lib/control/predict.h"
@@ -86,7 +82,7 @@ static void compare(const struct incise_predict *want,
 			 incise_predict_age(want, t_ns));
 }
 
-static void test_a_hand(void **state)
+TEST(test_a_hand)
 {
 	static const double rates[] = {30, 60, 120, 240};
 	uint64_t seed = 1;
@@ -128,7 +124,7 @@ static void test_a_hand(void **state)
 }
 
 /* Nothing overflows (under UBSan), and what is shown stays within what a place can be. */
-static void test_any_numbers(void **state)
+TEST(test_any_numbers)
 {
 	uint64_t seed = 2;
 
@@ -168,14 +164,4 @@ static void test_any_numbers(void **state)
 				assert_true(abs(v[i]) <= 10000 << 16);
 		}
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_a_hand),
-		cmocka_unit_test(test_any_numbers),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

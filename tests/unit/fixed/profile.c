@@ -3,11 +3,7 @@
  * The motion profile: every promise of lib/fixed/profile.h over motions by chance (see
  * profile_watch.h), arrival and stops against closed forms, the average against adding up.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include "profile_watch.h"
 #include "../model/paper_model.h"
@@ -145,7 +141,7 @@ static void any_command(struct motion *m, uint64_t *seed)
 	incise_profile_target(&m->profile, mode, any_target(l, at, mode, seed));
 }
 
-static void test_any_motion(void **state)
+TEST(test_any_motion)
 {
 	uint64_t seed = 1, averaged = 0, steps = 0, ends = 0;
 
@@ -172,7 +168,7 @@ static void test_any_motion(void **state)
 }
 
 /* From any motion, the last target is reached to the last bit. */
-static void test_any_end(void **state)
+TEST(test_any_end)
 {
 	uint64_t seed = 2;
 
@@ -212,7 +208,7 @@ static void test_any_end(void **state)
 }
 
 /* The average of the ramp's last N positions, added up. */
-static void test_average_is_exact(void **state)
+TEST(test_average_is_exact)
 {
 	uint64_t seed = 3;
 	int met = 0;
@@ -250,7 +246,7 @@ static void test_average_is_exact(void **state)
  * already and so is the last: at most 2 ticks more, and never fewer than it needs but for
  * that same tick.
  */
-static void test_arrival(void **state)
+TEST(test_arrival)
 {
 	static const struct {
 		uint32_t tick_ns, velocity, acceleration;
@@ -317,7 +313,7 @@ static void stop(struct motion *m, uint64_t *steps, uint64_t *ns)
 }
 
 /* Any motion whatever stops within what is stated for the fastest. */
-static void test_stops_as_stated(void **state)
+TEST(test_stops_as_stated)
 {
 	uint64_t seed = 4, met = 0;
 
@@ -348,7 +344,7 @@ static void test_stops_as_stated(void **state)
 }
 
 /* The stated stopping time is a stop's from full speed to the tick, the stated way to one step. */
-static void test_stops_no_earlier(void **state)
+TEST(test_stops_no_earlier)
 {
 	static const struct incise_profile_limits rows[] = {
 		{1000000, 20000, 400000, -2000000, 2000000, 0},
@@ -374,7 +370,7 @@ static void test_stops_no_earlier(void **state)
 		}
 }
 
-static void test_stopping_extremes(void **state)
+TEST(test_stopping_extremes)
 {
 	struct incise_profile_limits l = {50000, 200000, 1, -1000000000, 1000000000, 0};
 
@@ -399,7 +395,7 @@ static void test_stopping_extremes(void **state)
 
 #define GOOD .tick_ns = 50000, .velocity = 1, .acceleration = 1
 
-static void test_init(void **state)
+TEST(test_init)
 {
 	static const struct {
 		struct incise_profile_limits limits;
@@ -445,7 +441,7 @@ static void test_init(void **state)
 	}
 }
 
-static void test_targets_are_clamped(void **state)
+TEST(test_targets_are_clamped)
 {
 	static const struct {
 		int mode;
@@ -483,7 +479,7 @@ static void test_targets_are_clamped(void **state)
 }
 
 /* A set-point takes effect in the tick behind it, at the limits. */
-static void test_next_tick(void **state)
+TEST(test_next_tick)
 {
 	struct incise_profile_limits l = {1000000, 20000, 2000000, -100000, 100000, 0};
 	static struct motion m;
@@ -502,7 +498,7 @@ static void test_next_tick(void **state)
 }
 
 /* Nearer than it can stop: past it, no farther than it must, and back. */
-static void test_comes_back(void **state)
+TEST(test_comes_back)
 {
 	struct incise_profile_limits l = {1000000, 20000,  400000,
 					  -100000, 100000, 20000000};
@@ -525,7 +521,7 @@ static void test_comes_back(void **state)
 	assert_in_range(most - at, 400, incise_profile_stopping_steps(&l, 20000));
 }
 
-static void test_halt(void **state)
+TEST(test_halt)
 {
 	struct incise_profile_limits l = {1000000, 20000, 400000, -1000, 1000, 20000000};
 	static struct motion m;
@@ -555,7 +551,7 @@ static void test_halt(void **state)
 }
 
 /* The same target again and again, as a page gives it each tick, lets it rest. */
-static void test_target_again(void **state)
+TEST(test_target_again)
 {
 	struct incise_profile_limits l = {1000000, 20000, 400000, -1000, 1000, 20000000};
 	static struct motion m;
@@ -576,7 +572,7 @@ static void test_target_again(void **state)
 }
 
 /* In a motion of constant velocity all gaps are 1/v to the ns, at every tick. */
-static void test_step_rates(void **state)
+TEST(test_step_rates)
 {
 	static const uint32_t ticks_ns[] = {50000, 100000, 333333, 1000000, 2000000};
 	static const uint32_t rates[] = {1, 1000, 40000, 123457, 200000};
@@ -617,7 +613,7 @@ static void test_step_rates(void **state)
 }
 
 /* Under 1 step/s² the largest way: there in the closed form's time. */
-static void test_slowest(void **state)
+TEST(test_slowest)
 {
 	struct incise_profile_limits l = {2000000, 1, 1, 0, 100, 1};
 	static struct motion m;
@@ -633,7 +629,7 @@ static void test_slowest(void **state)
 		    2 + seconds / 2e-3 * 1e-3);
 }
 
-static void test_step_of_no_slot(void **state)
+TEST(test_step_of_no_slot)
 {
 	struct incise_profile_slot none = {.tick_ns = 50000},
 				   slot = {.to = 2 * WATCH_STEP,
@@ -649,7 +645,7 @@ static void test_step_of_no_slot(void **state)
 	assert_int_equal(incise_profile_step_ns(&slot, INT32_MAX), 50000);
 }
 
-static void test_size(void **state)
+TEST(test_size)
 {
 	/* Eight motors within five pages of a kernel's memory. */
 	assert_true(8 * sizeof(struct incise_profile) <= 5 * 4096);
@@ -667,29 +663,4 @@ static void test_size(void **state)
 		incise_profile_tick(&b, &of_b);
 		assert_memory_equal(&of_a, &of_b, sizeof(of_a));
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_any_motion),
-		cmocka_unit_test(test_any_end),
-		cmocka_unit_test(test_average_is_exact),
-		cmocka_unit_test(test_arrival),
-		cmocka_unit_test(test_stops_as_stated),
-		cmocka_unit_test(test_stops_no_earlier),
-		cmocka_unit_test(test_stopping_extremes),
-		cmocka_unit_test(test_init),
-		cmocka_unit_test(test_targets_are_clamped),
-		cmocka_unit_test(test_next_tick),
-		cmocka_unit_test(test_comes_back),
-		cmocka_unit_test(test_halt),
-		cmocka_unit_test(test_target_again),
-		cmocka_unit_test(test_step_rates),
-		cmocka_unit_test(test_slowest),
-		cmocka_unit_test(test_step_of_no_slot),
-		cmocka_unit_test(test_size),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

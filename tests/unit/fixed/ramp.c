@@ -4,11 +4,7 @@
  * tick by tick, ends in time; and against the fewest ticks that any motion needs. Small
  * numbers are tried in full, the largest that exist by chance, in 128 bits.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <stdlib.h>
 #include <string.h>
 #include "../../../lib/fixed/ramp.h"
@@ -53,7 +49,7 @@ static struct incise_ramp ramp_at(int64_t p, int64_t v, int64_t target, uint64_t
 	return ramp;
 }
 
-static void test_all_small(void **state)
+TEST(test_all_small)
 {
 	int n = 0;
 
@@ -116,7 +112,7 @@ static int ticks_of(int p, int v, int a, int top)
 }
 
 /* At rest on the target as early as any motion within the limits can be, from anywhere. */
-static void test_fewest_ticks(void **state)
+TEST(test_fewest_ticks)
 {
 	for (int a = 1; a <= 4; a++)
 		for (int top = 1; top <= FAST; top++) {
@@ -181,7 +177,7 @@ static uint64_t any_up_to(uint64_t most, uint64_t *seed)
  * One tick from anywhere that a profile can be in: so near a limit of the longest travel, and
  * so fast, that it can just stop.
  */
-static void test_largest(void **state)
+TEST(test_largest)
 {
 	uint64_t seed = 3;
 	int braked = 0, longest = 0;
@@ -222,7 +218,7 @@ static void test_largest(void **state)
 	assert_true(longest > CASES / 100);
 }
 
-static void test_way(void **state)
+TEST(test_way)
 {
 	uint64_t seed = 4;
 
@@ -240,16 +236,4 @@ static void test_way(void **state)
 		else
 			assert_true(right >= (wide)1 << 62);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_all_small),
-		cmocka_unit_test(test_fewest_ticks),
-		cmocka_unit_test(test_largest),
-		cmocka_unit_test(test_way),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,11 +4,7 @@
  * of a plane, and the proxy of a tool that goes in and out. tests/unit/scene/heights.c has grids of
  * all that is curved.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include "trial_plan.h"
@@ -77,7 +73,7 @@ static struct incise_surface *any_capsule(struct incise_fixed_shape *shape)
 	return incise_surface_new_capsule(a, b, shape->radius / ONE, NULL);
 }
 
-static void test_nearest(void **state)
+TEST(test_nearest)
 {
 	trial.seed = 1;
 	for (int k = 0; k < CASES; k++) {
@@ -104,7 +100,7 @@ static void test_nearest(void **state)
 }
 
 /* A grid of a plane is that plane, whatever way it lies. */
-static void test_grid_of_a_plane(void **state)
+TEST(test_grid_of_a_plane)
 {
 	static int32_t height[33 * 33];
 	struct incise_fixed_grid_frame frame = {
@@ -172,7 +168,7 @@ static void test_grid_of_a_plane(void **state)
 }
 
 /* In and out: contacts begin and end in the same ticks, and begin at the same place. */
-static void test_proxy(void **state)
+TEST(test_proxy)
 {
 	int began = 0, apart = 0, ticks = 0;
 
@@ -228,7 +224,7 @@ static void test_proxy(void **state)
 }
 
 /* On its axis all directions of a capsule are as near: the last one stays. */
-static void test_axis_keeps_the_normal(void **state)
+TEST(test_axis_keeps_the_normal)
 {
 	struct incise_fixed_shape shape = {.kind = INCISE_FIXED_CAPSULE,
 					   .normal = {INCISE_FIXED_UNIT},
@@ -241,16 +237,4 @@ static void test_axis_keeps_the_normal(void **state)
 	assert_int_equal(touch.depth, 5 << 16);
 	assert_int_equal(touch.point[1], 5 << 16);
 	assert_memory_equal(touch.normal, last, sizeof(last));
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_nearest),
-		cmocka_unit_test(test_grid_of_a_plane),
-		cmocka_unit_test(test_proxy),
-		cmocka_unit_test(test_axis_keeps_the_normal),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 /*
  * The spring in integers, by hand; tests/extremes/motion.c tries any numbers.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <stdlib.h>
 #include "../../../lib/fixed/layout.h"
 #include "../../../lib/fixed/trial.h"
@@ -16,7 +12,7 @@
 #define N (1 << 16)
 
 /* 0.5 N/mm along (0.6, 0, 0.8), which Q2.30 holds to an LSB: forces are off by none. */
-static void test_pulls_and_pushes(void **state)
+TEST(test_pulls_and_pushes)
 {
 	static const struct incise_fixed_spring s = {
 		.stiffness = N_MM / 2,
@@ -53,7 +49,7 @@ static void test_pulls_and_pushes(void **state)
 }
 
 /* The known answer of any compiler, a kernel's too: driver/kunit/fixed.c. */
-static void test_known_answer(void **state)
+TEST(test_known_answer)
 {
 	const uint32_t n = 10000;
 	int32_t(*result)[5] = calloc(n, sizeof(*result));
@@ -71,14 +67,4 @@ static void test_known_answer(void **state)
 				       n * (uint32_t)sizeof(*result)),
 			 INCISE_FX_TRIAL_SPRINGS);
 	free(result);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_pulls_and_pushes),
-		cmocka_unit_test(test_known_answer),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * Arithmetic and vectors in integers compared with 128 bits and with long double, on random numbers
  * of all sizes and at the ends of their ranges.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include "../../../lib/fixed/trial.h"
@@ -28,7 +24,7 @@ static int64_t any(uint64_t *seed, int bits)
 	       (random >> 8) % (unsigned)bits;
 }
 
-static void test_rounding(void **state)
+TEST(test_rounding)
 {
 	uint64_t seed = 1;
 
@@ -45,7 +41,7 @@ static void test_rounding(void **state)
 	assert_int_equal(incise_fx_rounded(-3, 1), -2);
 }
 
-static void test_products_and_quotients(void **state)
+TEST(test_products_and_quotients)
 {
 	uint64_t seed = 2;
 
@@ -65,7 +61,7 @@ static void test_products_and_quotients(void **state)
 	assert_int_equal(incise_fx_times(INT32_MIN, INT64_MIN), INT32_MAX);
 }
 
-static void test_roots_and_lengths(void **state)
+TEST(test_roots_and_lengths)
 {
 	uint64_t seed = 3;
 
@@ -86,7 +82,7 @@ static void test_roots_and_lengths(void **state)
 }
 
 /* A unit vector is off by no more than an LSB in each component, whatever the size. */
-static void test_units(void **state)
+TEST(test_units)
 {
 	uint64_t seed = 4;
 
@@ -126,7 +122,7 @@ static void any_unit(uint64_t *seed, int32_t *unit, int n)
 	} while (!incise_fx_unit(unit, a, n, 1000));
 }
 
-static void test_turns_and_products(void **state)
+TEST(test_turns_and_products)
 {
 	uint64_t seed = 5;
 
@@ -164,7 +160,7 @@ static void test_turns_and_products(void **state)
 	}
 }
 
-static void test_places(void **state)
+TEST(test_places)
 {
 	uint64_t seed = 6;
 
@@ -191,18 +187,4 @@ static void test_places(void **state)
 		}
 		assert_true(fabsl(incise_fx_along(off, unit) - along) <= 0.5L + 1e-6L);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_rounding),
-		cmocka_unit_test(test_products_and_quotients),
-		cmocka_unit_test(test_roots_and_lengths),
-		cmocka_unit_test(test_units),
-		cmocka_unit_test(test_turns_and_products),
-		cmocka_unit_test(test_places),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * Jang's engine: its gradient against finite differences, and which epoch it keeps. What
  * it computes is held against published tables in train.c.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -43,7 +39,7 @@ static double squared_error(const struct incise_model *model,
  * One epoch moves the premises by a step of length k against the gradient, consequents
  * held. So (moved - before)/k must be the direction that finite differences find.
  */
-static void test_gradient(void **state)
+TEST(test_gradient)
 {
 	struct incise_pairs pairs = {rows, PAIRS, 2};
 
@@ -109,7 +105,7 @@ static void count_epoch(void *user, int epoch, double train_rmse, double check_r
 }
 
 /* The epoch of the least training error is returned, not the last. */
-static void test_best_epoch_is_kept(void **state)
+TEST(test_best_epoch_is_kept)
 {
 	struct incise_pairs pairs = {rows, PAIRS, 2};
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
@@ -129,14 +125,4 @@ static void test_best_epoch_is_kept(void **state)
 	assert_true(fabs(incise_pairs_rmse(model, &pairs) - anfis.train_rmse) <
 		    1e-9 * anfis.train_rmse);
 	incise_model_free(model);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_gradient),
-		cmocka_unit_test(test_best_epoch_is_kept),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * Learning from few cuts: on unseen cuts the default is not worse than a plane or the mean by
  * more than 2 %, and the 95 % interval holds its share. A single rule averages to linear regression.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <math.h>
 #include <string.h>
@@ -88,7 +84,7 @@ static double rmse(const struct incise_model *model)
 }
 
 /* These seeds are fixed; of the first 20 of each truth, one has a ratio of 1.03. */
-static void test_never_worse_than_plane_or_mean(void **state)
+TEST(test_never_worse_than_plane_or_mean)
 {
 	static const int mfs[] = {4, 3};
 
@@ -118,7 +114,7 @@ static void test_never_worse_than_plane_or_mean(void **state)
  * those inside is that of cuts: sd √(0.95·0.05/cuts) for one model. Models of six cuts differ
  * more than that; three times it for the sets' number of training cuts is the tolerance.
  */
-static void test_interval_holds(void **state)
+TEST(test_interval_holds)
 {
 	static const int mfs[] = {4, 3};
 	const double tolerance = 3 * sqrt(0.95 * 0.05 / (SETS * CUTS));
@@ -147,7 +143,7 @@ static void test_interval_holds(void **state)
 }
 
 /* Without neighbours there is no penalty, but for cuts: the plane and the mean remain. */
-static void test_one_rule_is_a_plane(void **state)
+TEST(test_one_rule_is_a_plane)
 {
 	static const int mfs[] = {1, 1};
 	struct incise_train_report report;
@@ -165,7 +161,7 @@ static void test_one_rule_is_a_plane(void **state)
 }
 
 /* A ridge that is given is the only one. */
-static void test_given_ridge_is_not_averaged(void **state)
+TEST(test_given_ridge_is_not_averaged)
 {
 	static const struct incise_variable in[] = {{"x", 0, 20}, {"y", 0, 50}};
 	static const int mfs[] = {3, 2};
@@ -185,7 +181,7 @@ static void test_given_ridge_is_not_averaged(void **state)
 }
 
 /* Weights are shares; what takes too long is refused. */
-static void test_shares(void **state)
+TEST(test_shares)
 {
 	static const struct incise_variable in[] = {{"x", 0, 1}, {"y", 0, 1}};
 	static double scaled[ROWS][3];
@@ -222,17 +218,4 @@ static void test_shares(void **state)
 	}
 	assert_null(average);
 	incise_folds_free(&folds);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_never_worse_than_plane_or_mean),
-		cmocka_unit_test(test_interval_holds),
-		cmocka_unit_test(test_one_rule_is_a_plane),
-		cmocka_unit_test(test_given_ridge_is_not_averaged),
-		cmocka_unit_test(test_shares),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 /*
  * Baselines where the right answer is known.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <math.h>
 #include <incise/train.h>
@@ -33,7 +29,7 @@ static double stairs(double x, double y)
 	return (x > 9) + 2 * (y > 9000);
 }
 
-static void test_plane(void **state)
+TEST(test_plane)
 {
 	struct incise_pairs pairs = {rows, 400, 2};
 	struct incise_baselines b;
@@ -51,7 +47,7 @@ static void test_plane(void **state)
 }
 
 /* On stairs the neighbours know and the line does not. */
-static void test_stairs(void **state)
+TEST(test_stairs)
 {
 	struct incise_pairs pairs = {rows, 400, 2};
 	struct incise_baselines b;
@@ -67,7 +63,7 @@ static void test_stairs(void **state)
  * rule the neighbours cannot be better than the mean (a pair predicting itself would
  * give 0). With groups the whole cut is left out.
  */
-static void test_no_peeking(void **state)
+TEST(test_no_peeking)
 {
 	struct incise_pairs pairs = {rows, 400, 2};
 	struct incise_baselines b;
@@ -90,7 +86,7 @@ static void test_no_peeking(void **state)
 	assert_true(b.knn > 0.95 * b.mean);
 }
 
-static void test_refusals(void **state)
+TEST(test_refusals)
 {
 	struct incise_pairs pairs = {rows, 400, 2}, none = {rows, 0, 2},
 			    other = {rows, 10, 3};
@@ -99,16 +95,4 @@ static void test_refusals(void **state)
 	assert_int_equal(incise_baselines(&none, NULL, &pairs, &b, NULL), -EINVAL);
 	assert_int_equal(incise_baselines(&pairs, NULL, &none, &b, NULL), -EINVAL);
 	assert_int_equal(incise_baselines(&pairs, NULL, &other, &b, NULL), -EINVAL);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_plane),
-		cmocka_unit_test(test_stairs),
-		cmocka_unit_test(test_no_peeking),
-		cmocka_unit_test(test_refusals),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

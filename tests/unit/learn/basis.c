@@ -3,11 +3,7 @@
  * Premises laid out for learning: firing strengths, outputs and slopes against the model
  * and against finite differences, and what is no grid.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -18,7 +14,7 @@
 #include "../../../lib/learn/basis.h"
 #include "../model/paper_model.h"
 
-static void test_firing_is_the_model_s(void **state)
+TEST(test_firing_is_the_model_s)
 {
 	static const double far[] = {-200, -20, -3, 0, 7.7, 20, 60, 200};
 	static const double further[] = {-1e300, -1e9, 1e9, 1e300};
@@ -55,7 +51,7 @@ static void test_firing_is_the_model_s(void **state)
 	}
 }
 
-static void test_output_is_the_model_s(void **state)
+TEST(test_output_is_the_model_s)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 5, 1);
 	double w[20], f[20], consequents[60];
@@ -83,7 +79,7 @@ static void test_output_is_the_model_s(void **state)
 }
 
 /* slope·share = ∂y/∂p, by central differences. */
-static void test_derivative(void **state)
+TEST(test_derivative)
 {
 	for (int type = 0; type < 2; type++) {
 		struct incise_model *model = paper_model(type, 5, 1);
@@ -124,7 +120,7 @@ static void test_derivative(void **state)
 	}
 }
 
-static void test_store(void **state)
+TEST(test_store)
 {
 	for (int type = 0; type < 2; type++) {
 		struct incise_model *a = paper_model(type, 5, 1);
@@ -147,7 +143,7 @@ static void test_store(void **state)
 }
 
 /* A weight, an input left out, or rules in another order: not a plain grid. */
-static void test_what_is_no_grid(void **state)
+TEST(test_what_is_no_grid)
 {
 	static const char *const rules[] = {"1, 1 (0.5) : 1\n2, 2 (1) : 1\n",
 					    "1, 1 (1) : 1\n0, 2 (1) : 1\n",
@@ -226,7 +222,7 @@ static void check_bounds(const struct incise_basis *basis)
 	}
 }
 
-static void test_even_grid_is_left_alone(void **state)
+TEST(test_even_grid_is_left_alone)
 {
 	for (int type = 0; type < 2; type++)
 		for (int n = 1; n <= 6; n++) {
@@ -241,7 +237,7 @@ static void test_even_grid_is_left_alone(void **state)
 		}
 }
 
-static void test_any_step_ends_within_bounds(void **state)
+TEST(test_any_step_ends_within_bounds)
 {
 	uint64_t seed = 4;
 
@@ -261,7 +257,7 @@ static void test_any_step_ends_within_bounds(void **state)
 }
 
 /* Functions on one spot are pulled apart, in their order. */
-static void test_collapsed(void **state)
+TEST(test_collapsed)
 {
 	for (int type = 0; type < 2; type++) {
 		struct incise_basis basis;
@@ -277,7 +273,7 @@ static void test_collapsed(void **state)
 }
 
 /* The scale is the derivative of a step, away from bounds. */
-static void test_scale(void **state)
+TEST(test_scale)
 {
 	for (int type = 0; type < 2; type++) {
 		struct incise_basis basis, moved;
@@ -299,7 +295,7 @@ static void test_scale(void **state)
 	}
 }
 
-static void test_jitter_depends_on_seed_alone(void **state)
+TEST(test_jitter_depends_on_seed_alone)
 {
 	struct incise_basis a, b, c;
 
@@ -311,22 +307,4 @@ static void test_jitter_depends_on_seed_alone(void **state)
 	assert_memory_equal(a.p, b.p, sizeof(a.p));
 	assert_true(memcmp(a.p, c.p, sizeof(a.p)));
 	check_bounds(&a);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_firing_is_the_model_s),
-		cmocka_unit_test(test_output_is_the_model_s),
-		cmocka_unit_test(test_derivative),
-		cmocka_unit_test(test_store),
-		cmocka_unit_test(test_what_is_no_grid),
-		cmocka_unit_test(test_even_grid_is_left_alone),
-		cmocka_unit_test(test_any_step_ends_within_bounds),
-		cmocka_unit_test(test_collapsed),
-		cmocka_unit_test(test_scale),
-		cmocka_unit_test(test_jitter_depends_on_seed_alone),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

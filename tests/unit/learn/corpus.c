@@ -3,11 +3,7 @@
  * A corpus: counts and ranges, the same sides and sample for any order and division of the
  * sources, and what is refused. Includes the source, to reach its parts.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include "../../../lib/learn/corpus.c"
 
 #define SOURCES 3
@@ -82,7 +78,7 @@ static void same(const struct incise_corpus *a, const struct incise_corpus *b)
 }
 
 /* Rows, cuts of each source, and cuts whose names mean the same in all sources. */
-static void test_division(void **state)
+TEST(test_division)
 {
 	static const int one[] = {0, 1, 2}, other[] = {2, 0, 1};
 
@@ -131,7 +127,7 @@ static void test_division(void **state)
 	}
 }
 
-static void test_refused(void **state)
+TEST(test_refused)
 {
 	static const int one[] = {0, 1};
 	struct incise_corpus *corpus = survey(one, 1, true, true);
@@ -160,14 +156,4 @@ static void test_refused(void **state)
 	incise_corpus_free(corpus);
 	incise_factor_free(fit);
 	incise_model_free(model);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_division),
-		cmocka_unit_test(test_refused),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

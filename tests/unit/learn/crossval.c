@@ -2,11 +2,7 @@
 /*
  * Cross-validation: whole groups are held out, and errors are those of fits without them.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -52,7 +48,7 @@ static int group_of(const double *row)
 }
 
 /* Every pair is held out as often as there are divisions, never beside its own group. */
-static void test_groups_stay_together(void **state)
+TEST(test_groups_stay_together)
 {
 	static const struct {
 		int per_group, n, units;
@@ -86,7 +82,7 @@ static void test_groups_stay_together(void **state)
 }
 
 /* One rule is a line: held-out errors are those of lines through the other pairs. */
-static void test_errors(void **state)
+TEST(test_errors)
 {
 	struct incise_ridge ridge = {1e-12, 1, 2, 1};
 	struct incise_folds folds;
@@ -122,7 +118,7 @@ static void test_errors(void **state)
 }
 
 /* The first epoch of a search is the fixed premises; ratios are errors, a bit shrunk. */
-static void test_search(void **state)
+TEST(test_search)
 {
 	struct incise_ridge ridge = {0.01, 1, 8, 4};
 	double *error, *fixed, *ratios, sum = 0, total;
@@ -155,7 +151,7 @@ static void test_search(void **state)
 	incise_folds_free(&folds);
 }
 
-static void test_spread(void **state)
+TEST(test_spread)
 {
 	struct incise_folds folds = {.n_units = 4};
 	const double a[] = {3, 5, 4, 8}, b[] = {1, 4, 4, 5};
@@ -164,16 +160,4 @@ static void test_spread(void **state)
 	assert_true(fabs(incise_crossval_spread(&folds, a, b) - sqrt(20.0 / 3)) < 1e-15);
 	assert_true(incise_crossval_spread(&folds, a, a) == 0);
 	assert_true(incise_crossval_total(&folds, a) == 20);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_groups_stay_together),
-		cmocka_unit_test(test_errors),
-		cmocka_unit_test(test_search),
-		cmocka_unit_test(test_spread),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

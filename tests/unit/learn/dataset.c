@@ -8,6 +8,7 @@
 #include <string.h>
 #include <incise/dataset.h>
 #include "../message.h"
+#include "../unit.h"
 #include "../base/temp_file.h"
 
 static const char *const columns[] = {"force_N", "depth_mm"};
@@ -23,7 +24,7 @@ static struct incise_dataset *read_text(const char *text, const char *group,
 	return data;
 }
 
-static void test_values_in_the_order_asked_for(void **state)
+TEST(test_values_in_the_order_asked_for)
 {
 	/* Byte-order mark, CR LF, comments, quotes, an empty line, no final newline. */
 	struct incise_dataset *data = read_text("\xef\xbb\xbf# liver\r\n"
@@ -47,7 +48,7 @@ static void test_values_in_the_order_asked_for(void **state)
 	incise_dataset_free(data);
 }
 
-static void test_without_groups(void **state)
+TEST(test_without_groups)
 {
 	struct incise_dataset *data = read_text("depth_mm,force_N\n1,2\n", NULL, NULL);
 
@@ -57,7 +58,7 @@ static void test_without_groups(void **state)
 }
 
 /* More rows and groups than the first allocation has room for. */
-static void test_many_rows(void **state)
+TEST(test_many_rows)
 {
 	static char text[200000];
 	size_t used = sprintf(text, "cut,depth_mm,force_N\n");
@@ -76,7 +77,7 @@ static void test_many_rows(void **state)
 	incise_dataset_free(data);
 }
 
-static void test_errors_say_where(void **state)
+TEST(test_errors_say_where)
 {
 	static const struct {
 		const char *text, *group;
@@ -117,7 +118,7 @@ static void test_errors_say_where(void **state)
 	}
 }
 
-static void test_where(void **state)
+TEST(test_where)
 {
 	static const struct {
 		const char *text, *where;
@@ -148,7 +149,7 @@ static void test_where(void **state)
 	}
 }
 
-static void test_where_refuses(void **state)
+TEST(test_where_refuses)
 {
 	static const struct {
 		const char *text;
@@ -173,7 +174,7 @@ static void test_where_refuses(void **state)
 	}
 }
 
-static void test_missing_and_binary_files(void **state)
+TEST(test_missing_and_binary_files)
 {
 	struct incise_error err = {0};
 	struct temp_file file = temp_file_new("d.csv", "");
@@ -191,7 +192,7 @@ static void test_missing_and_binary_files(void **state)
 }
 
 /* Four cuts of three rows: both sides hold whole cuts, and the rows as they were. */
-static void test_split(void **state)
+TEST(test_split)
 {
 	struct incise_dataset *data = read_text(
 		"cut,depth_mm,force_N\np,1,10\np,2,20\np,3,30\nq,4,40\nq,5,50\nq,6,60\n"
@@ -223,20 +224,4 @@ static void test_split(void **state)
 	incise_train_side_free(&fit);
 	assert_int_equal(incise_train_split(data, 1, 1, &fit, &check, NULL), -EINVAL);
 	incise_dataset_free(data);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_values_in_the_order_asked_for),
-		cmocka_unit_test(test_without_groups),
-		cmocka_unit_test(test_many_rows),
-		cmocka_unit_test(test_errors_say_where),
-		cmocka_unit_test(test_missing_and_binary_files),
-		cmocka_unit_test(test_where),
-		cmocka_unit_test(test_where_refuses),
-		cmocka_unit_test(test_split),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,6 +11,7 @@
 #include <incise/arrow.h>
 #include <incise/dataset.h>
 #include "../message.h"
+#include "../unit.h"
 
 #define COLUMNS 4
 #define BATCHES 2
@@ -129,7 +130,7 @@ static struct made pairs(void)
 	return made;
 }
 
-static void numbers_of_batches(void **state)
+TEST(numbers_of_batches)
 {
 	struct made made = pairs();
 	struct incise_dataset *data = read_made(&made, NULL, "advancing", NULL, NULL);
@@ -153,7 +154,7 @@ static void numbers_of_batches(void **state)
 	incise_dataset_free(data);
 }
 
-static void each_type_of_number(void **state)
+TEST(each_type_of_number)
 {
 	static const union {
 		int8_t c[2];
@@ -191,7 +192,7 @@ static void each_type_of_number(void **state)
 	}
 }
 
-static void groups_by_text_number_and_dictionary(void **state)
+TEST(groups_by_text_number_and_dictionary)
 {
 	static const int32_t offsets[] = {0, 1, 3, 4}, places[] = {1, 0, 1};
 	static const int64_t long_offsets[] = {0, 1, 3, 4}, numbers[] = {12, -1, 12};
@@ -230,7 +231,7 @@ static void groups_by_text_number_and_dictionary(void **state)
 	}
 }
 
-static void rows_are_left_out_where_asked(void **state)
+TEST(rows_are_left_out_where_asked)
 {
 	static const uint8_t advancing[] = {5};
 	const void *buffers[] = {NULL, advancing};
@@ -246,7 +247,7 @@ static void rows_are_left_out_where_asked(void **state)
 	incise_dataset_free(data);
 }
 
-static void refuses_what_is_no_number(void **state)
+TEST(refuses_what_is_no_number)
 {
 	static const double bad[] = {1, NAN, 2};
 	static const uint8_t valid[] = {5}, none[] = {0};
@@ -306,7 +307,7 @@ static void refuses_what_is_no_number(void **state)
 	}
 }
 
-static void an_empty_stream_has_no_rows(void **state)
+TEST(an_empty_stream_has_no_rows)
 {
 	struct made made = pairs();
 
@@ -317,18 +318,4 @@ static void an_empty_stream_has_no_rows(void **state)
 	made.schema.format = "g";
 	assert_null(read_made(&made, NULL, NULL, NULL, NULL));
 	assert_int_equal(errno, EINVAL);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(numbers_of_batches),
-		cmocka_unit_test(each_type_of_number),
-		cmocka_unit_test(groups_by_text_number_and_dictionary),
-		cmocka_unit_test(rows_are_left_out_where_asked),
-		cmocka_unit_test(refuses_what_is_no_number),
-		cmocka_unit_test(an_empty_stream_has_no_rows),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,6 +12,7 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/design.h"
 #include "../message.h"
+#include "../unit.h"
 
 #define ROWS 3000
 
@@ -65,7 +66,7 @@ static void same(struct incise_factor *a, struct incise_factor *b)
 	free(q);
 }
 
-static void test_division(void **state)
+TEST(test_division)
 {
 	struct incise_model *model = premises();
 	struct incise_factor *whole = incise_factor_new(model, NULL), *read;
@@ -104,7 +105,7 @@ static void test_division(void **state)
 }
 
 /* Without a ridge, against a QR of the rows: R and the consequents to 1e-10. */
-static void test_solution(void **state)
+TEST(test_solution)
 {
 	struct incise_model *model = premises(), *solved;
 	struct incise_factor *factor = incise_factor_new(model, NULL);
@@ -156,7 +157,7 @@ static void test_solution(void **state)
 	incise_design_free(&design);
 }
 
-static void test_hash(void **state)
+TEST(test_hash)
 {
 	char hex[65];
 	FILE *file = fopen("/tmp/incise-test-sha256", "w");
@@ -168,15 +169,4 @@ static void test_hash(void **state)
 		hex, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
 	remove("/tmp/incise-test-sha256");
 	assert_int_equal(incise_file_sha256("/tmp", hex, NULL), -EISDIR);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_division),
-		cmocka_unit_test(test_solution),
-		cmocka_unit_test(test_hash),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,11 +4,7 @@
  * bit, both kernels, the factor next to a QR, dependent columns, limits. Includes the source, to
  * reach the kernels.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/gram.c"
 
@@ -37,7 +33,7 @@ static void same(struct incise_gram *a, struct incise_gram *b)
 }
 
 /* Each sum is the integers' own, for widths around the tiles and rows around the blocks. */
-static void test_sums(void **state)
+TEST(test_sums)
 {
 	static const int widths[] = {3, 4, 5, 8, 13, 62}, rows[] = {1, 15, 16, 17, 200};
 
@@ -67,7 +63,7 @@ static void test_sums(void **state)
 }
 
 /* More rows than 64 bits hold without a flush; parts in any order, and less a part. */
-static void test_parts(void **state)
+TEST(test_parts)
 {
 	enum { N = 9, ROWS = FLUSH + 1000 };
 	struct incise_gram *whole = incise_gram_new(N), *parts = incise_gram_new(N);
@@ -91,7 +87,7 @@ static void test_parts(void **state)
 	incise_gram_free(rest);
 }
 
-static void test_kernels(void **state)
+TEST(test_kernels)
 {
 #ifdef __x86_64__
 	struct incise_gram *gram = incise_gram_new(23);
@@ -113,7 +109,7 @@ static void test_kernels(void **state)
 }
 
 /* The largest and smallest elements, and those outside, which leave no trace. */
-static void test_limits(void **state)
+TEST(test_limits)
 {
 	struct incise_gram *gram = incise_gram_new(1);
 	double last = nextafter(2, 0);
@@ -147,7 +143,7 @@ static void cosines(int r, int rows, double *row)
 }
 
 /* As a QR of the same rows, to a double's last digits. */
-static void test_factor(void **state)
+TEST(test_factor)
 {
 	enum { N = 13, ROWS = 500 };
 	struct incise_gram *gram = incise_gram_new(N + 2);
@@ -192,7 +188,7 @@ static void test_factor(void **state)
 }
 
 /* Columns that repeat others, or are 0, have a row of zeros; with a ridge there is an answer. */
-static void test_dependent(void **state)
+TEST(test_dependent)
 {
 	enum { N = 6 };
 	struct incise_ridge ridge = {1e-6, 1, N, 1};
@@ -227,15 +223,4 @@ static void test_dependent(void **state)
 	assert_int_equal(incise_lsq_solve(lsq, &ridge, x), 0);
 	incise_gram_free(gram);
 	incise_lsq_free(lsq);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_sums),	cmocka_unit_test(test_parts),
-		cmocka_unit_test(test_kernels), cmocka_unit_test(test_limits),
-		cmocka_unit_test(test_factor),	cmocka_unit_test(test_dependent),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

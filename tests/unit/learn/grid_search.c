@@ -9,6 +9,7 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/tune.h"
 #include "../message.h"
+#include "../unit.h"
 
 static double rows[400 * 3];
 
@@ -37,7 +38,7 @@ static void choose(double bends, double noise, size_t n, int *n_mfs, int want)
 		assert_says(err.text, "pairs");
 }
 
-static void test_as_many_as_needed(void **state)
+TEST(test_as_many_as_needed)
 {
 	int flat[2], wavy[2], noise[2];
 
@@ -50,7 +51,7 @@ static void test_as_many_as_needed(void **state)
 	assert_true(noise[0] * noise[1] == 1);
 }
 
-static void test_few_pairs(void **state)
+TEST(test_few_pairs)
 {
 	int n_mfs[2];
 
@@ -62,7 +63,7 @@ static void test_few_pairs(void **state)
 }
 
 /* Ranges are those of the pairs; functions are counted where no number is given. */
-static void test_start(void **state)
+TEST(test_start)
 {
 	static const char *const names[] = {"a", "b", "y"};
 	struct incise_pairs pairs = {rows, 400, 2};
@@ -91,15 +92,4 @@ static void test_start(void **state)
 	assert_null(incise_train_start(&pairs, names, INCISE_MF_GAUSS, given, &options,
 				       &err));
 	assert_says(err.text, "column y");
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_as_many_as_needed),
-		cmocka_unit_test(test_few_pairs),
-		cmocka_unit_test(test_start),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

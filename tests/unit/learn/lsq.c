@@ -4,11 +4,7 @@
  * failures, and the same bits from every instruction set. Includes the source, to reach
  * the kernels.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <lapacke.h>
 #include <math.h>
@@ -24,7 +20,7 @@ static double uniform(void)
 }
 
 /* Any number of rows, below, at and beyond the blocks, gives back the planted x. */
-static void test_planted_solution(void **state)
+TEST(test_planted_solution)
 {
 	static const int rows[] = {7, 8, 9, 63, 64, 65, 128, 1000};
 	const double planted[] = {1, -2, 3, 0.5, 0, 1e3, -1e-3};
@@ -52,7 +48,7 @@ static void test_planted_solution(void **state)
 }
 
 /* One unknown: x = Σat/(Σa²+λ). Several ridges from one factor, in any order. */
-static void test_ridge(void **state)
+TEST(test_ridge)
 {
 	static const double ridges[] = {10, 0, 1e-6, 1e6, 10};
 	struct incise_lsq *lsq = incise_lsq_new(1);
@@ -77,7 +73,7 @@ static void test_ridge(void **state)
 }
 
 /* Two equal columns: singular without ridge; with a little, the weight is shared. */
-static void test_rank_deficient(void **state)
+TEST(test_rank_deficient)
 {
 	struct incise_lsq *lsq = incise_lsq_new(2);
 	struct incise_ridge little = {1e-6, 1, 2, 1}, one = {1, 1, 2, 1};
@@ -106,7 +102,7 @@ static void test_rank_deficient(void **state)
 	incise_lsq_free(lsq);
 }
 
-static void test_condition(void **state)
+TEST(test_condition)
 {
 	struct incise_lsq *lsq = incise_lsq_new(3);
 	double condition;
@@ -122,7 +118,7 @@ static void test_condition(void **state)
 }
 
 /* Condition numbers of random matrices whose columns shrink, against LAPACK's. */
-static void test_condition_of_lapack(void **state)
+TEST(test_condition_of_lapack)
 {
 	static double a[80 * 80];
 	double values[80], none, condition;
@@ -154,7 +150,7 @@ static void test_condition_of_lapack(void **state)
 }
 
 /* A row far below the first still counts: 1e-9 of it is not rounding. */
-static void test_small_entries_count(void **state)
+TEST(test_small_entries_count)
 {
 	struct incise_lsq *lsq = incise_lsq_new(2);
 	double x[2];
@@ -170,7 +166,7 @@ static void test_small_entries_count(void **state)
 }
 
 /* Squares that overflow or vanish are no obstacle; what is not finite is reported. */
-static void test_extreme_sizes(void **state)
+TEST(test_extreme_sizes)
 {
 	static const double sizes[] = {1e-300, 1e-160, 1, 1e160, 1e300};
 	struct incise_lsq *lsq = incise_lsq_new(2);
@@ -197,7 +193,7 @@ static void test_extreme_sizes(void **state)
  * The ridge on blocks against the same penalty written out as rows: for each block
  * √ridge (p_b - p̄), and √(ridge·mean) p̄ as often as there are blocks.
  */
-static void test_ridge_of_blocks(void **state)
+TEST(test_ridge_of_blocks)
 {
 	static const double means[] = {1, 0.25, 1e-3};
 
@@ -244,7 +240,7 @@ static void test_ridge_of_blocks(void **state)
 }
 
 /* |R⁻ᵀa|² = aᵀ(AᵀA)⁻¹a, which for a row of orthogonal columns is Σ a²/|column|². */
-static void test_leverage(void **state)
+TEST(test_leverage)
 {
 	struct incise_lsq *lsq = incise_lsq_new(3);
 	double a[] = {1, 2, 3};
@@ -263,7 +259,7 @@ static void test_leverage(void **state)
 }
 
 /* The vector kernel and the plain one do the same operations in the same order. */
-static void test_same_bits_everywhere(void **state)
+TEST(test_same_bits_everywhere)
 {
 #ifdef __x86_64__
 	_Alignas(32) double r[2][92], a[2][BLOCK * 92];
@@ -288,22 +284,4 @@ static void test_same_bits_everywhere(void **state)
 #else
 	skip();
 #endif
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_planted_solution),
-		cmocka_unit_test(test_ridge),
-		cmocka_unit_test(test_rank_deficient),
-		cmocka_unit_test(test_condition),
-		cmocka_unit_test(test_condition_of_lapack),
-		cmocka_unit_test(test_small_entries_count),
-		cmocka_unit_test(test_extreme_sizes),
-		cmocka_unit_test(test_ridge_of_blocks),
-		cmocka_unit_test(test_leverage),
-		cmocka_unit_test(test_same_bits_everywhere),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,10 +10,11 @@
 #include <string.h>
 #include "../../../lib/learn/pairs.h"
 #include "../message.h"
+#include "../unit.h"
 #include "../model/paper_model.h"
 
 /* Outputs of any size come out with mean 0 and variance 1. */
-static void test_output(void **state)
+TEST(test_output)
 {
 	static const double sizes[] = {1e-300, 1e-9, 1, 1e9, 1e300};
 	static const struct incise_variable in[] = {{"x", 2, 6}};
@@ -39,7 +40,7 @@ static void test_output(void **state)
 }
 
 /* A constant has no spread, whatever rounding makes of its mean. */
-static void test_constant_output(void **state)
+TEST(test_constant_output)
 {
 	static const struct incise_variable in[] = {{"x", 0, 1}};
 	double rows[] = {0, 0.7, 0.3, 0.7, 1, 0.7}, row[2];
@@ -53,7 +54,7 @@ static void test_constant_output(void **state)
 }
 
 /* Scaled premises fire as the raw ones do, and come back. */
-static void test_premises(void **state)
+TEST(test_premises)
 {
 	for (int type = 0; type < 2; type++) {
 		struct incise_scaling scaling = {2, {-3, 5, 0}, {20, 1e-3, 1}};
@@ -80,7 +81,7 @@ static void test_premises(void **state)
 }
 
 /* The same plane in both units; what overflows is reported. */
-static void test_consequents(void **state)
+TEST(test_consequents)
 {
 	struct incise_scaling scaling = {2, {-3, 5, 7}, {20, 0.5, 3}};
 	double p[] = {0.4, -1, 2}, x[] = {4, 5.2, 0}, s[3], y;
@@ -94,7 +95,7 @@ static void test_consequents(void **state)
 			 -EDOM);
 }
 
-static void test_refusals(void **state)
+TEST(test_refusals)
 {
 	static const struct incise_variable in[] = {{"depth_mm", 0, 1},
 						    {"velocity_mm_s", 0, 1}};
@@ -119,7 +120,7 @@ static void test_refusals(void **state)
 }
 
 /* Each pair at most once, in order, with its group; all of them where there is room. */
-static void test_sample(void **state)
+TEST(test_sample)
 {
 	static double rows[2000];
 	static int groups[1000];
@@ -156,7 +157,7 @@ static void test_sample(void **state)
 	}
 }
 
-static void test_r2(void **state)
+TEST(test_r2)
 {
 	static const double sizes[] = {1e-200, 1, 1e200};
 
@@ -172,7 +173,7 @@ static void test_r2(void **state)
 	}
 }
 
-static void test_rows(void **state)
+TEST(test_rows)
 {
 	bool check[120];
 	int n = 0;
@@ -184,7 +185,7 @@ static void test_rows(void **state)
 	assert_int_equal(n, 60);
 }
 
-static void test_groups_stay_whole(void **state)
+TEST(test_groups_stay_whole)
 {
 	for (uint64_t seed = 0; seed < 50; seed++) {
 		int groups[500], side[20], n = 0;
@@ -207,7 +208,7 @@ static void test_groups_stay_whole(void **state)
 	}
 }
 
-static void test_both_sides_keep_something(void **state)
+TEST(test_both_sides_keep_something)
 {
 	const int groups[] = {0, 0, 0, 0, 0, 0, 0, 0, 0, 1};
 
@@ -224,7 +225,7 @@ static void test_both_sides_keep_something(void **state)
 		}
 }
 
-static void test_split_refusals(void **state)
+TEST(test_split_refusals)
 {
 	const int one[] = {0, 0, 0};
 	bool check[3];
@@ -235,23 +236,4 @@ static void test_split_refusals(void **state)
 	assert_int_equal(incise_split(3, NULL, 0, 1, check, &err), -EINVAL);
 	assert_int_equal(incise_split(3, NULL, 1, 1, check, &err), -EINVAL);
 	assert_int_equal(incise_split(3, NULL, NAN, 1, check, &err), -EINVAL);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_output),
-		cmocka_unit_test(test_constant_output),
-		cmocka_unit_test(test_premises),
-		cmocka_unit_test(test_consequents),
-		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_sample),
-		cmocka_unit_test(test_r2),
-		cmocka_unit_test(test_rows),
-		cmocka_unit_test(test_groups_stay_whole),
-		cmocka_unit_test(test_both_sides_keep_something),
-		cmocka_unit_test(test_split_refusals),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

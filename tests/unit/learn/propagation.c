@@ -3,11 +3,7 @@
  * Uncertainties of pairs: weights by their formula, and the effect of a common error compared with
  * that of a fit to pairs that have this error.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -121,7 +117,7 @@ static struct incise_uncertainty *of_rigs(int rigs, struct incise_model **model,
 	return u;
 }
 
-static void test_effect_is_that_of_pairs_with_the_error(void **state)
+TEST(test_effect_is_that_of_pairs_with_the_error)
 {
 	/* Gain and zero as one source: their parts add up with their signs. */
 	static const struct incise_propagation_part one[] = {
@@ -158,7 +154,7 @@ static void test_effect_is_that_of_pairs_with_the_error(void **state)
 	incise_model_free(moved);
 }
 
-static void test_one_rig_does_not_average_out_and_many_do(void **state)
+TEST(test_one_rig_does_not_average_out_and_many_do)
 {
 	struct incise_propagation_report one, many;
 	struct incise_model *model;
@@ -181,7 +177,7 @@ static void test_one_rig_does_not_average_out_and_many_do(void **state)
 	incise_model_free(model);
 }
 
-static void test_weights_are_those_of_the_effective_variance(void **state)
+TEST(test_weights_are_those_of_the_effective_variance)
 {
 	static const struct incise_propagation_part own[] = {
 		{2, -1, false}, {0, -1, false}, {1, -1, false}, {0, -1, false}};
@@ -205,7 +201,7 @@ static void test_weights_are_those_of_the_effective_variance(void **state)
 	incise_model_free(model);
 }
 
-static void test_what_cannot_be(void **state)
+TEST(test_what_cannot_be)
 {
 	static const struct incise_propagation_part bad[] = {
 		{3, -1, false}, {-1, -1, false}, {0, INCISE_UNCERTAINTY_SOURCES, true}};
@@ -231,16 +227,4 @@ static void test_what_cannot_be(void **state)
 	incise_uncertainty_free(u);
 	incise_model_free(model);
 	incise_model_free(fitted);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_effect_is_that_of_pairs_with_the_error),
-		cmocka_unit_test(test_one_rig_does_not_average_out_and_many_do),
-		cmocka_unit_test(test_weights_are_those_of_the_effective_variance),
-		cmocka_unit_test(test_what_cannot_be),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -14,6 +14,7 @@
 #include "../../../lib/learn/pairs.h"
 #include "../cases.h"
 #include "../message.h"
+#include "../unit.h"
 
 static struct incise_model *grid(int n_inputs, const double *min, const double *max,
 				 const int *n_mfs, enum incise_mf_type type)
@@ -112,7 +113,7 @@ static void train_mackey_glass(int first, int epochs, struct curve *curve,
 }
 
 /* MATLAB's anfis on its own demo: ten epochs, printed with eight decimals. */
-static void test_matlab_mackey_glass(void **state)
+TEST(test_matlab_mackey_glass)
 {
 	static const double want[] = {.00296046, .00290346, .00285048, .00280117,
 				      .00275517, .00271214, .00266783, .00262626,
@@ -254,7 +255,7 @@ static void move(struct second *a, double g[4][2][3], int epoch)
 }
 
 /* Two ways to the same 30 training errors, to 1e-9; the step has changed by then. */
-static void test_second_implementation(void **state)
+TEST(test_second_implementation)
 {
 	static double rows[500 * 5];
 	static struct second a;
@@ -283,7 +284,7 @@ static void test_second_implementation(void **state)
 }
 
 /* Jang 1993, example 4: 500 epochs; published .0016, .0015 and NDEI .007. */
-static void test_jang_example_4(void **state)
+TEST(test_jang_example_4)
 {
 	static double rows[500 * 5];
 	struct incise_train_report report;
@@ -339,7 +340,7 @@ static double ape(struct incise_model *model, const double *rows, size_t n)
 }
 
 /* Jang 1993, example 2: published .043 % and 1.066 %. */
-static void test_jang_example_2(void **state)
+TEST(test_jang_example_2)
 {
 	static double rows[216 * 4], check[125 * 4];
 	const int mfs[] = {2, 2, 2};
@@ -361,7 +362,7 @@ static void test_jang_example_2(void **state)
 }
 
 /* A plane lies within reach of any first-order model: both ways must find it. */
-static void test_plane_is_learnt(void **state)
+TEST(test_plane_is_learnt)
 {
 	double rows[400 * 3];
 	const int mfs[] = {3, 2};
@@ -397,7 +398,7 @@ static void test_plane_is_learnt(void **state)
  * no harm in following each cut; the default mode must not do worse on a third cut than
  * the mean does.
  */
-static void test_default_holds_on_unseen_cut(void **state)
+TEST(test_default_holds_on_unseen_cut)
 {
 	static double rows[300 * 3];
 	int groups[200];
@@ -436,7 +437,7 @@ static void test_default_holds_on_unseen_cut(void **state)
 }
 
 /* Same seed, same model to the bit; the units of the data do not matter. */
-static void test_deterministic_and_scale_free(void **state)
+TEST(test_deterministic_and_scale_free)
 {
 	static const double scales[] = {1, 1, 1e-9, 1e9};
 	double rmse[4];
@@ -469,7 +470,7 @@ static void test_deterministic_and_scale_free(void **state)
 	assert_true(fabs(rmse[3] / rmse[0] - 1) < 1e-6);
 }
 
-static void test_refusals(void **state)
+TEST(test_refusals)
 {
 	double rows[60 * 3];
 	const int mfs[] = {5, 4};
@@ -504,7 +505,7 @@ static void test_refusals(void **state)
 }
 
 /* Kinds without a gradient here, and min, are refused by name before anything moves. */
-static void test_kinds_that_cannot_be_trained(void **state)
+TEST(test_kinds_that_cannot_be_trained)
 {
 	static const struct {
 		enum incise_mf_type type;
@@ -538,7 +539,7 @@ static void test_kinds_that_cannot_be_trained(void **state)
 }
 
 /* A model that joins by min comes from a file only. */
-static void test_min_cannot_be_trained(void **state)
+TEST(test_min_cannot_be_trained)
 {
 	static const char text[] =
 		"[System]\nType='sugeno'\nNumInputs=1\nNumOutputs=1\nNumRules=1\n"
@@ -634,7 +635,7 @@ static void make_extreme(enum extreme what, double *rows, size_t n, double *size
  * Whatever the data, training ends in a model of numbers that is no worse on them than
  * their mean, or refuses and leaves the model as it was.
  */
-static void test_extreme_data(void **state)
+TEST(test_extreme_data)
 {
 	const int mfs[] = {4, 3};
 
@@ -696,7 +697,7 @@ static void test_extreme_data(void **state)
 }
 
 /* Pairs that leave nothing to learn are refused in one line that names the cause. */
-static void test_too_little_data(void **state)
+TEST(test_too_little_data)
 {
 	double rows[60 * 3];
 	const int three[] = {3, 3}, one[] = {1, 1};
@@ -728,7 +729,7 @@ static void test_too_little_data(void **state)
 }
 
 /* The report agrees with itself and with the model. */
-static void test_report(void **state)
+TEST(test_report)
 {
 	double rows[200 * 3], check_rows[100 * 3], mean = 0, sum = 0;
 	const int mfs[] = {4, 3};
@@ -785,7 +786,7 @@ static void stop_after_two(void *user, int epoch, double train_rmse, double chec
 }
 
 /* Stopped before it begins, or between two epochs, training fails and changes nothing. */
-static void test_training_can_be_stopped(void **state)
+TEST(test_training_can_be_stopped)
 {
 	double rows[200 * 3];
 	const int mfs[] = {4, 3};
@@ -841,7 +842,7 @@ static double normal(uint64_t *seed)
  * Half of the groups train, half are new. Each has a level of its own (0.3) beside the
  * noise of its pairs (0.1): the noise of residuals alone would hold a third as much.
  */
-static void test_new_groups_are_covered(void **state)
+TEST(test_new_groups_are_covered)
 {
 	static const struct incise_variable in = {"x", 0, 1}, out = {"y", -1, 1};
 	const int n_mfs = 3, half = GROUPS * PER_GROUP;
@@ -887,7 +888,7 @@ static void test_new_groups_are_covered(void **state)
 }
 
 /* Where there were no data the model knows less. */
-static void test_sd_grows_where_data_are_missing(void **state)
+TEST(test_sd_grows_where_data_are_missing)
 {
 	static const struct incise_variable in = {"x", 0, 1}, out = {"y", -1, 1};
 	const int n_mfs = 4;
@@ -911,28 +912,4 @@ static void test_sd_grows_where_data_are_missing(void **state)
 		    2 * incise_uncertainty_sd(uncertainty, model, &here));
 	incise_uncertainty_free(uncertainty);
 	incise_model_free(model);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_matlab_mackey_glass),
-		cmocka_unit_test(test_second_implementation),
-		cmocka_unit_test(test_jang_example_4),
-		cmocka_unit_test(test_jang_example_2),
-		cmocka_unit_test(test_plane_is_learnt),
-		cmocka_unit_test(test_default_holds_on_unseen_cut),
-		cmocka_unit_test(test_deterministic_and_scale_free),
-		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_kinds_that_cannot_be_trained),
-		cmocka_unit_test(test_min_cannot_be_trained),
-		cmocka_unit_test(test_extreme_data),
-		cmocka_unit_test(test_too_little_data),
-		cmocka_unit_test(test_report),
-		cmocka_unit_test(test_training_can_be_stopped),
-		cmocka_unit_test(test_new_groups_are_covered),
-		cmocka_unit_test(test_sd_grows_where_data_are_missing),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 /*
  * Tuning: more noise asks for a larger ridge, planted premises are found, same seed, same choice.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <string.h>
 #include "../../../lib/learn/basis.h"
@@ -46,7 +42,7 @@ static void tune(double noise, double shift, uint64_t seed, struct incise_tuning
 	tuning->average = NULL;
 }
 
-static void test_noise_asks_for_ridge(void **state)
+TEST(test_noise_asks_for_ridge)
 {
 	struct incise_train_options options;
 	struct incise_tuning quiet, loud;
@@ -60,7 +56,7 @@ static void test_noise_asks_for_ridge(void **state)
 }
 
 /* A step in the middle of nowhere is worth moving functions for; a given ridge stays. */
-static void test_search_pays(void **state)
+TEST(test_search_pays)
 {
 	struct incise_train_options options;
 	struct incise_tuning still, moved;
@@ -78,7 +74,7 @@ static void test_search_pays(void **state)
 	assert_true(moved.ridge.ridge == 0.01);
 }
 
-static void test_same_seed_same_choice(void **state)
+TEST(test_same_seed_same_choice)
 {
 	struct incise_train_options options;
 	struct incise_tuning a, b;
@@ -88,15 +84,4 @@ static void test_same_seed_same_choice(void **state)
 	tune(0.1, 0.4, 7, &b, &options);
 	assert_true(a.rmse == b.rmse && a.epochs == b.epochs && a.start == b.start);
 	assert_memory_equal(a.basis.p, b.basis.p, sizeof(a.basis.p));
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_noise_asks_for_ridge),
-		cmocka_unit_test(test_search_pays),
-		cmocka_unit_test(test_same_seed_same_choice),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * Variable projection: it goes downhill, finds planted premises, and its step solves the
  * projected problem.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <string.h>
 #include "../../../lib/learn/basis.h"
@@ -75,7 +71,7 @@ static bool on_epoch(void *user, int epoch, const struct incise_basis *basis,
 	return true;
 }
 
-static void test_finds_planted_premises(void **state)
+TEST(test_finds_planted_premises)
 {
 	for (int type = 0; type < 2; type++) {
 		struct incise_pairs pairs = {rows, PAIRS, 2};
@@ -109,7 +105,7 @@ static void test_finds_planted_premises(void **state)
  * order; a Jacobian of the wrong sign or of the unprojected problem would not. Here seen
  * as convergence: few epochs reduce the error by many orders.
  */
-static void test_converges_fast_near_the_minimum(void **state)
+TEST(test_converges_fast_near_the_minimum)
 {
 	struct incise_pairs pairs = {rows, PAIRS, 2};
 	struct trace trace = {0};
@@ -149,7 +145,7 @@ static bool stop_at_3(void *user, int epoch, const struct incise_basis *basis,
 	return epoch < 3;
 }
 
-static void test_ends_when_told(void **state)
+TEST(test_ends_when_told)
 {
 	struct incise_pairs pairs = {rows, PAIRS, 2};
 	struct incise_varpro varpro = {
@@ -163,15 +159,4 @@ static void test_ends_when_told(void **state)
 	plant(&planted);
 	assert_int_equal(incise_varpro_run(&basis, consequents, &varpro), 0);
 	assert_int_equal(varpro.run, 3);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_finds_planted_premises),
-		cmocka_unit_test(test_converges_fast_near_the_minimum),
-		cmocka_unit_test(test_ends_when_told),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

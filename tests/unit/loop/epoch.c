@@ -5,11 +5,7 @@
  * clock starts: at 0, across 32 bits of ns, µs and ms, across 2^53 ns, where a
  * double loses precision, and close to the end of 64 bits.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <string.h>
 #include <incise/loop.h>
 #include "../scene/felt.h"
@@ -50,7 +46,7 @@ static void run(int64_t from_ns, struct incise_tick *log)
 	felt_end(&f);
 }
 
-static void test_same_to_the_bit(void **state)
+TEST(test_same_to_the_bit)
 {
 	static const int64_t second = INCISE_NS_PER_S;
 	static struct incise_tick usual[TICKS], log[TICKS];
@@ -78,13 +74,4 @@ static void test_same_to_the_bit(void **state)
 			assert_memory_equal(&log[k], &usual[k], TICK_BYTES);
 		}
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_same_to_the_bit),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,11 +10,12 @@
 #include "../../../lib/loop/loop_control.h"
 #include <incise/loop.h>
 #include "../message.h"
+#include "../unit.h"
 #include "../scene/felt.h"
 
 static struct incise_loop_stats stats;
 
-static void test_number_of_ticks(void **state)
+TEST(test_number_of_ticks)
 {
 	static const double rates[] = {1, 333, 1000, 8000};
 
@@ -36,7 +37,7 @@ static void test_number_of_ticks(void **state)
 	}
 }
 
-static void test_log_and_times(void **state)
+TEST(test_log_and_times)
 {
 	static struct incise_tick log[300];
 	struct incise_loop_options options = {.rate_hz = 1000,
@@ -81,7 +82,7 @@ static int slow_tracker(struct incise_tracker *tracker,
 	return 0;
 }
 
-static void test_overrun_skips_and_counts(void **state)
+TEST(test_overrun_skips_and_counts)
 {
 	static struct incise_tick log[100];
 	struct incise_loop_options options = {
@@ -107,7 +108,7 @@ static void test_overrun_skips_and_counts(void **state)
 }
 
 /* The same stall over the end: 12 were due, the two behind the tenth are left out. */
-static void test_overrun_over_the_end(void **state)
+TEST(test_overrun_over_the_end)
 {
 	struct incise_loop_options options = {.rate_hz = 1000, .duration_ns = 12000000};
 	struct incise_tracker_ops ops;
@@ -151,7 +152,7 @@ static int dropping_status(struct incise_stepper *stepper,
 }
 
 /* No tick finds it any more, as the loop is over: letting go does. */
-static void test_overrun_over_the_end_drops_the_actuator(void **state)
+TEST(test_overrun_over_the_end_drops_the_actuator)
 {
 	struct incise_loop_options options = {
 		.rate_hz = 1000, .duration_ns = 12000000, .ticked = stall};
@@ -183,7 +184,7 @@ static int stopping_tracker(struct incise_tracker *tracker,
 	return 0;
 }
 
-static void test_stop_flag(void **state)
+TEST(test_stop_flag)
 {
 	struct incise_loop_options options = {.rate_hz = 1000, .stop = &stop};
 	struct incise_tracker_ops ops;
@@ -206,7 +207,7 @@ static int failing_tracker(struct incise_tracker *tracker,
 }
 
 /* The actuator is released at each kind of end. */
-static void test_end_lets_go(void **state)
+TEST(test_end_lets_go)
 {
 	struct incise_loop_options options = {.rate_hz = 1000,
 					      .duration_ns = 5 * INCISE_NS_PER_S};
@@ -225,7 +226,7 @@ static void test_end_lets_go(void **state)
 	felt_end(&f);
 }
 
-static void test_device_failure_ends_the_loop(void **state)
+TEST(test_device_failure_ends_the_loop)
 {
 	struct incise_loop_options options = {.rate_hz = 1000, .duration_ns = 50000000};
 	struct incise_error err = {0};
@@ -243,7 +244,7 @@ static void test_device_failure_ends_the_loop(void **state)
 	felt_end(&f);
 }
 
-static void test_refused_options(void **state)
+TEST(test_refused_options)
 {
 	static const double rates[] = {0, -1, 0.5, 20001, NAN, INFINITY};
 	struct incise_loop_options options = {.duration_ns = 1000000};
@@ -260,7 +261,7 @@ static void test_refused_options(void **state)
 }
 
 /* In real time ticks come in order and none before its time. */
-static void test_real_clock(void **state)
+TEST(test_real_clock)
 {
 	static struct incise_tick log[200];
 	struct incise_loop_options options = {
@@ -296,7 +297,7 @@ static int ticked(void *context, const struct incise_tick *tick)
 	return listener->ticks == listener->end_at ? listener->end_by : 0;
 }
 
-static void test_callback_ends_the_loop(void **state)
+TEST(test_callback_ends_the_loop)
 {
 	struct listener listener = {.end_at = 17, .end_by = -ENOSPC};
 	struct incise_loop_options options = {.rate_hz = 1000,
@@ -319,7 +320,7 @@ static void test_callback_ends_the_loop(void **state)
 }
 
 /* On a paced clock a stall of many periods costs no tick, and each has its own time. */
-static void test_paced_clock(void **state)
+TEST(test_paced_clock)
 {
 	struct listener listener = {.begin_ns = 777, .stall_ns = 12000000};
 	struct incise_loop_options options = {.rate_hz = 1000,
@@ -341,7 +342,7 @@ static void test_paced_clock(void **state)
 	felt_end(&f);
 }
 
-static void test_quantile(void **state)
+TEST(test_quantile)
 {
 	static uint64_t histogram[INCISE_LOOP_BINS];
 
@@ -442,7 +443,7 @@ static void held_start(struct felt *f, struct incise_tracker_ops *ops, struct se
 	seen->slew_N = FELT_SLEW_N_S / 1000;
 }
 
-static void test_stop_fades(void **state)
+TEST(test_stop_fades)
 {
 	struct seen seen = {.stop_at = 600};
 	struct incise_loop_options options = {
@@ -465,7 +466,7 @@ static void test_stop_fades(void **state)
 }
 
 /* In the tissue: the old force fades, the new plan waits for a small one. */
-static void test_another_plan(void **state)
+TEST(test_another_plan)
 {
 	struct seen seen = {.offer_at = 600};
 	struct incise_loop_options options = {.rate_hz = 1000,
@@ -547,7 +548,7 @@ static void let_insert(struct felt *f)
  * A tool that is set in the tissue is held once the force has faded, comes back with a ramp, and
  * stays the tool of a plan that takes over.
  */
-static void test_another_tool(void **state)
+TEST(test_another_tool)
 {
 	struct tool_seen own = {.seen = {.offer_at = 1400}, .tool_at = 600};
 	struct incise_loop_options options = {.rate_hz = 1000,
@@ -603,7 +604,7 @@ static int look_and_withdraw(void *context, const struct incise_tick *tick)
 	return rc;
 }
 
-static void test_a_plan_withdrawn(void **state)
+TEST(test_a_plan_withdrawn)
 {
 	struct seen seen = {.offer_at = 600};
 	struct incise_loop_options options = {.rate_hz = 1000,
@@ -627,7 +628,7 @@ static void test_a_plan_withdrawn(void **state)
 	felt_end(&f);
 }
 
-static void test_events(void **state)
+TEST(test_events)
 {
 	static const enum incise_loop_event_kind expected[] = {INCISE_LOOP_STALE,
 							       INCISE_LOOP_FRESH};
@@ -658,7 +659,7 @@ static void test_events(void **state)
 }
 
 /* A pose that its tracker flags ages as a missing one does, and the force fades. */
-static void test_flagged_poses_are_no_poses(void **state)
+TEST(test_flagged_poses_are_no_poses)
 {
 	static const struct {
 		char flag;
@@ -695,7 +696,7 @@ static void test_flagged_poses_are_no_poses(void **state)
 }
 
 /* A tracker that flags all its poses is given up as one that is lost: after 10 s. */
-static void test_a_stream_of_flagged_poses_ends(void **state)
+TEST(test_a_stream_of_flagged_poses_ends)
 {
 	struct seen seen = {.flag_at = 600, .flag = 'x'};
 	struct incise_loop_options options = {.rate_hz = 1000,
@@ -725,7 +726,7 @@ static int always_slow(struct incise_tracker *tracker,
 	return 0;
 }
 
-static void test_too_many_overruns(void **state)
+TEST(test_too_many_overruns)
 {
 	struct incise_loop_options options = {
 		.rate_hz = 1000, .duration_ns = INCISE_NS_PER_S, .overruns_most = 5};
@@ -744,33 +745,4 @@ static void test_too_many_overruns(void **state)
 	assert_int_equal(stats.ticks, 14);
 	assert_says(err.text, "5 ticks");
 	felt_end(&f);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_number_of_ticks),
-		cmocka_unit_test(test_log_and_times),
-		cmocka_unit_test(test_overrun_skips_and_counts),
-		cmocka_unit_test(test_overrun_over_the_end),
-		cmocka_unit_test(test_overrun_over_the_end_drops_the_actuator),
-		cmocka_unit_test(test_stop_flag),
-		cmocka_unit_test(test_end_lets_go),
-		cmocka_unit_test(test_device_failure_ends_the_loop),
-		cmocka_unit_test(test_refused_options),
-		cmocka_unit_test(test_real_clock),
-		cmocka_unit_test(test_callback_ends_the_loop),
-		cmocka_unit_test(test_paced_clock),
-		cmocka_unit_test(test_quantile),
-		cmocka_unit_test(test_stop_fades),
-		cmocka_unit_test(test_another_plan),
-		cmocka_unit_test(test_another_tool),
-		cmocka_unit_test(test_a_plan_withdrawn),
-		cmocka_unit_test(test_events),
-		cmocka_unit_test(test_too_many_overruns),
-		cmocka_unit_test(test_flagged_poses_are_no_poses),
-		cmocka_unit_test(test_a_stream_of_flagged_poses_ends),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * lib/loop/loop_control.c: an offered plan is taken once or withdrawn once, events keep their order
  * and dropped ones are counted. tests/unit/loop/loop.c tests the loop with it.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -21,7 +17,7 @@ static struct incise_plan *plan(int i)
 	return (struct incise_plan *)&plans[i];
 }
 
-static void test_one_place(void **state)
+TEST(test_one_place)
 {
 	struct incise_loop_control *control = incise_loop_control_new();
 
@@ -56,7 +52,7 @@ static void test_one_place(void **state)
 	incise_loop_control_free(NULL);
 }
 
-static void test_events(void **state)
+TEST(test_events)
 {
 	struct incise_loop_control *control = incise_loop_control_new();
 	struct incise_loop_event events[100];
@@ -75,7 +71,7 @@ static void test_events(void **state)
 	incise_loop_control_free(control);
 }
 
-static void test_ticks(void **state)
+TEST(test_ticks)
 {
 	struct incise_loop_control *control = incise_loop_control_new();
 	struct incise_tick ticks[100];
@@ -104,7 +100,7 @@ static void test_ticks(void **state)
 }
 
 /* The last one that was set counts, for any number of ticks; none that is no tool. */
-static void test_tool(void **state)
+TEST(test_tool)
 {
 	struct incise_loop_control *control = incise_loop_control_new();
 	enum incise_tool tool = INCISE_TOOL_HANDLE;
@@ -158,7 +154,7 @@ static void *change(void *argument)
 }
 
 /* No interleaving of the two threads loses or doubles a plan. */
-static void test_two_threads(void **state)
+TEST(test_two_threads)
 {
 	struct changer changer = {.control = incise_loop_control_new()};
 	struct incise_plan *owned = plan(1), *retired;
@@ -188,15 +184,4 @@ static void test_two_threads(void **state)
 	assert_int_equal(changer.swaps, taken);
 	assert_int_equal(incise_loop_control_ticks(changer.control), taken);
 	incise_loop_control_free(changer.control);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_one_place),   cmocka_unit_test(test_events),
-		cmocka_unit_test(test_ticks),	    cmocka_unit_test(test_tool),
-		cmocka_unit_test(test_two_threads),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

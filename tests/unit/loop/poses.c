@@ -11,11 +11,7 @@
  * The force is within its limit at each tick, and 0 once the last good pose is older than
  * limits.pose_age_ms and the longest fade.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -323,22 +319,12 @@ static void run(enum polhemus_family family, uint64_t poses)
 	incise_scene_free(scene);
 }
 
-static void test_fastrak(void **state)
+TEST(test_fastrak)
 {
 	run(POLHEMUS_FASTRAK, number_of_poses() / 2);
 }
 
-static void test_liberty(void **state)
+TEST(test_liberty)
 {
 	run(POLHEMUS_LIBERTY, number_of_poses() / 2);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_fastrak),
-		cmocka_unit_test(test_liberty),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

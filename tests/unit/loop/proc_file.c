@@ -2,16 +2,12 @@
 /*
  * lib/loop/proc_file.c: any file becomes a string, a number or a list, or is rejected.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <limits.h>
 #include "../../../lib/loop/proc_file.h"
 #include "root_folder.h"
 
-static void test_reads(void **state)
+TEST(test_reads)
 {
 	static const struct {
 		const char *data;
@@ -55,7 +51,7 @@ static void test_reads(void **state)
 	root_folder_remove(&root);
 }
 
-static void test_integers(void **state)
+TEST(test_integers)
 {
 	static const struct {
 		const char *text;
@@ -87,7 +83,7 @@ static void test_integers(void **state)
 	}
 }
 
-static void test_lists(void **state)
+TEST(test_lists)
 {
 	static const struct {
 		const char *list;
@@ -116,15 +112,4 @@ static void test_lists(void **state)
 	for (size_t i = 0; i < sizeof(rows) / sizeof(*rows); i++)
 		if (proc_file_lists(rows[i].list, rows[i].cpu) != rows[i].has)
 			fail_msg("\"%s\" and %d", rows[i].list, rows[i].cpu);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_reads),
-		cmocka_unit_test(test_integers),
-		cmocka_unit_test(test_lists),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -21,6 +21,7 @@
 #include <unistd.h>
 #include "../../../lib/loop/realtime.h"
 #include "../message.h"
+#include "../unit.h"
 #include "root_folder.h"
 
 #if defined(__SANITIZE_ADDRESS__)
@@ -65,7 +66,7 @@ static bool in_child(void (*run)(void))
 	return true;
 }
 
-static void test_refused_setups(void **state)
+TEST(test_refused_setups)
 {
 	static const struct {
 		struct incise_realtime_setup setup;
@@ -109,7 +110,7 @@ static void test_refused_setups(void **state)
 }
 
 /* Checks change nothing. */
-static void test_checks_leave_nothing(void **state)
+TEST(test_checks_leave_nothing)
 {
 	struct incise_realtime_check checks[INCISE_REALTIME_CHECKS];
 	struct sched_param before, after;
@@ -172,7 +173,7 @@ static void without_rights(void)
 	CHECK(!checks[0].ok && checks[0].needed && strstr(checks[0].fix, "sys_nice"));
 }
 
-static void test_denied(void **state)
+TEST(test_denied)
 {
 	assert_true(in_child(without_rights));
 }
@@ -192,7 +193,7 @@ static void with_soft_limits(void)
 	CHECK(limit.rlim_cur == limit.rlim_max);
 }
 
-static void test_soft_limits(void **state)
+TEST(test_soft_limits)
 {
 	assert_true(in_child(with_soft_limits));
 }
@@ -363,7 +364,7 @@ static void granted_deadline(void)
 	granted(&deadline);
 }
 
-static void test_granted(void **state)
+TEST(test_granted)
 {
 	static const struct {
 		const char *name;
@@ -397,7 +398,7 @@ static void on_no_cpu(void)
 	CHECK(errno == EINVAL || errno == EPERM);
 }
 
-static void test_no_such_cpu(void **state)
+TEST(test_no_such_cpu)
 {
 	assert_true(in_child(on_no_cpu));
 }
@@ -442,7 +443,7 @@ static void large_stack(void)
 	CHECK(HAS_ASAN || status_kB("VmStk") < 500);
 }
 
-static void test_stacks(void **state)
+TEST(test_stacks)
 {
 	if (!in_child(small_stack) || !in_child(large_stack))
 		skip();
@@ -453,7 +454,7 @@ static void test_stacks(void **state)
 	"Name:\tx\nvoluntary_ctxt_switches:\t150\n" \
 	"nonvoluntary_ctxt_switches:\t545\n"
 
-static void test_counts_table(void **state)
+TEST(test_counts_table)
 {
 	static const struct {
 		const char *stat, *status;
@@ -508,7 +509,7 @@ static void test_counts_table(void **state)
 	root_folder_remove(&root);
 }
 
-static void test_counts_of_own_thread(void **state)
+TEST(test_counts_of_own_thread)
 {
 	const size_t size = 100 * (size_t)sysconf(_SC_PAGESIZE);
 	struct incise_realtime_counts before, after;
@@ -542,7 +543,7 @@ static void test_counts_of_own_thread(void **state)
 	assert_true(after.major_faults >= before.major_faults);
 }
 
-static void test_counts_of_no_thread(void **state)
+TEST(test_counts_of_no_thread)
 {
 	static const int none[] = {-1, 0, INT32_MAX};
 	struct incise_realtime_counts counts;
@@ -551,22 +552,4 @@ static void test_counts_of_no_thread(void **state)
 		assert_int_equal(incise_realtime_count(none[i], &counts), -ESRCH);
 	/* A thread of another process is not found. */
 	assert_int_equal(incise_realtime_count(1, &counts), -ESRCH);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_refused_setups),
-		cmocka_unit_test(test_checks_leave_nothing),
-		cmocka_unit_test(test_denied),
-		cmocka_unit_test(test_soft_limits),
-		cmocka_unit_test(test_granted),
-		cmocka_unit_test(test_no_such_cpu),
-		cmocka_unit_test(test_stacks),
-		cmocka_unit_test(test_counts_table),
-		cmocka_unit_test(test_counts_of_own_thread),
-		cmocka_unit_test(test_counts_of_no_thread),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

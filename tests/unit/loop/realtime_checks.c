@@ -4,6 +4,7 @@
  */
 #include "../../../lib/loop/realtime.h"
 #include "../message.h"
+#include "../unit.h"
 #include "root_folder.h"
 
 #define CPUS "/sys/devices/system/cpu/"
@@ -246,7 +247,7 @@ static void assert_words(const struct incise_realtime_check *check)
 		assert_true(!*check->keep);
 }
 
-static void test_table(void **state)
+TEST(test_table)
 {
 	for (size_t i = 0; i < sizeof(rows) / sizeof(*rows); i++) {
 		const struct row *row = &rows[i];
@@ -274,7 +275,7 @@ static void test_table(void **state)
 }
 
 /* Required checks come first; a smaller array is allowed. */
-static void test_order_and_capacity(void **state)
+TEST(test_order_and_capacity)
 {
 	static const char *const order[] = {"scheduling", "memory",	"cpu",
 					    "kernel",	  "throttling", "governor",
@@ -298,7 +299,7 @@ static void test_order_and_capacity(void **state)
 	}
 }
 
-static void test_denied(void **state)
+TEST(test_denied)
 {
 	static const struct {
 		const char *name;
@@ -367,7 +368,7 @@ static void test_denied(void **state)
 }
 
 /* Files of random bytes: each check has a text that fits its buffer. */
-static void test_garbage(void **state)
+TEST(test_garbage)
 {
 	static const char *const paths[] = {"/sys/kernel/realtime",
 					    RUNTIME,
@@ -429,16 +430,4 @@ static void test_garbage(void **state)
 		}
 	}
 	root_folder_remove(&root);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_table),
-		cmocka_unit_test(test_order_and_capacity),
-		cmocka_unit_test(test_denied),
-		cmocka_unit_test(test_garbage),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

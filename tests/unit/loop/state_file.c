@@ -9,6 +9,7 @@
 #include <sys/wait.h>
 #include "../../../lib/loop/state_file.h"
 #include "../message.h"
+#include "../unit.h"
 #include "state_made.h"
 
 static void put(const char *path, const char *text)
@@ -28,7 +29,7 @@ static ino_t inode(const char *path)
 	return st.st_ino;
 }
 
-static void test_a_second_writer_is_refused(void **state)
+TEST(test_a_second_writer_is_refused)
 {
 	struct made made = made_page();
 	struct incise_error err = {0};
@@ -41,7 +42,7 @@ static void test_a_second_writer_is_refused(void **state)
 	made_free(&made);
 }
 
-static void test_a_dead_one_is_replaced(void **state)
+TEST(test_a_dead_one_is_replaced)
 {
 	struct made made = made_page();
 	ino_t old = inode(made.path);
@@ -62,7 +63,7 @@ static void test_a_dead_one_is_replaced(void **state)
 }
 
 /* The lock goes with the process, however it ends. */
-static void test_killed(void **state)
+TEST(test_killed)
 {
 	struct made made = made_folder();
 	struct incise_state *reader;
@@ -97,7 +98,7 @@ static void test_killed(void **state)
 }
 
 /* A reader's lock does not count as a writer's. */
-static void test_readers_do_not_hold_it(void **state)
+TEST(test_readers_do_not_hold_it)
 {
 	struct made made = made_page();
 	struct flock lock = {.l_type = F_RDLCK, .l_whence = SEEK_SET};
@@ -113,7 +114,7 @@ static void test_readers_do_not_hold_it(void **state)
 	made_free(&made);
 }
 
-static void test_what_is_no_page_is_kept(void **state)
+TEST(test_what_is_no_page_is_kept)
 {
 	static const char *const texts[] = {"rate_hz = 1000.0;", "INCSTAT", "x"};
 	struct made made = made_folder();
@@ -148,7 +149,7 @@ static void test_what_is_no_page_is_kept(void **state)
 }
 
 /* Two that start at once: both found nothing, or a page with a dead writer. */
-static void test_two_at_once(void **state)
+TEST(test_two_at_once)
 {
 	for (int dead = 0; dead < 2; dead++) {
 		struct made made = made_folder();
@@ -173,7 +174,7 @@ static void test_two_at_once(void **state)
 	}
 }
 
-static void test_anybody_may_look(void **state)
+TEST(test_anybody_may_look)
 {
 	mode_t before = umask(0077);
 	struct made made = made_page();
@@ -187,7 +188,7 @@ static void test_anybody_may_look(void **state)
 	made_free(&made);
 }
 
-static void test_places_that_are_none(void **state)
+TEST(test_places_that_are_none)
 {
 	struct incise_error err = {0};
 	struct incise_state_setup setup = made_setup;
@@ -202,20 +203,4 @@ static void test_places_that_are_none(void **state)
 		assert_null(incise_state_new("/tmp/a.state", &setup, &err));
 		assert_int_equal(errno, EINVAL);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_a_second_writer_is_refused),
-		cmocka_unit_test(test_a_dead_one_is_replaced),
-		cmocka_unit_test(test_killed),
-		cmocka_unit_test(test_readers_do_not_hold_it),
-		cmocka_unit_test(test_what_is_no_page_is_kept),
-		cmocka_unit_test(test_two_at_once),
-		cmocka_unit_test(test_anybody_may_look),
-		cmocka_unit_test(test_places_that_are_none),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * lib/loop/state_page.c: buckets without gaps, quantiles compared with sorted times; a tick there
  * and back.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <math.h>
 #include "../../../lib/base/random.h"
@@ -15,7 +11,7 @@
 
 static struct incise_state_histogram histogram;
 
-static void test_buckets_follow_each_other(void **state)
+TEST(test_buckets_follow_each_other)
 {
 	assert_int_equal(incise_state_bucket(INT64_MIN), 0);
 	assert_int_equal(incise_state_bucket(-1), 0);
@@ -45,7 +41,7 @@ static int by_size(const void *a, const void *b)
 	return (*x > *y) - (*x < *y);
 }
 
-static void test_quantiles(void **state)
+TEST(test_quantiles)
 {
 	enum { N = 20000 };
 	static const double shares[] = {0, 0.001, 0.5, 0.9, 0.99, 0.999, 0.9999, 1};
@@ -72,7 +68,7 @@ static void test_quantiles(void **state)
 	}
 }
 
-static void test_nothing_and_too_much(void **state)
+TEST(test_nothing_and_too_much)
 {
 	memset(&histogram, 0, sizeof(histogram));
 	assert_int_equal(incise_state_total(&histogram), 0);
@@ -86,7 +82,7 @@ static void test_nothing_and_too_much(void **state)
 	assert_true(incise_state_quantile(&histogram, NAN) >= 0);
 }
 
-static void test_there_and_back(void **state)
+TEST(test_there_and_back)
 {
 	for (int64_t n = 0; n < 5000; n++) {
 		struct incise_tick tick = made_tick(n), back;
@@ -101,7 +97,7 @@ static void test_there_and_back(void **state)
 	}
 }
 
-static void test_what_is_no_tick(void **state)
+TEST(test_what_is_no_tick)
 {
 	struct incise_tick tick = made_tick(7), back;
 	struct state_tick packed;
@@ -117,17 +113,4 @@ static void test_what_is_no_tick(void **state)
 	packed.flags = ~0u;
 	assert_int_equal(incise_state_unpack(&back, &packed), 0);
 	assert_int_equal(back.flags, (1 << INCISE_TICK_FLAGS) - 1);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_buckets_follow_each_other),
-		cmocka_unit_test(test_quantiles),
-		cmocka_unit_test(test_nothing_and_too_much),
-		cmocka_unit_test(test_there_and_back),
-		cmocka_unit_test(test_what_is_no_tick),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

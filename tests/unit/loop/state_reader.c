@@ -12,6 +12,7 @@
 #include <sys/stat.h>
 #include "../../../lib/base/random.h"
 #include "../message.h"
+#include "../unit.h"
 #include "state_made.h"
 
 static struct incise_state_now now;
@@ -36,7 +37,7 @@ static void store(const char *path, size_t size)
 	fclose(file);
 }
 
-static void test_ring(void **state)
+TEST(test_ring)
 {
 	struct made made = made_page();
 	struct incise_state *reader = incise_state_open(made.path, NULL);
@@ -67,7 +68,7 @@ static void test_ring(void **state)
 	made_free(&made);
 }
 
-static void test_ring_that_went_round(void **state)
+TEST(test_ring_that_went_round)
 {
 	enum { N = 3 * INCISE_STATE_TICKS + 11 };
 	struct made made = made_page();
@@ -127,7 +128,7 @@ static void whole(void)
 	assert_int_equal(now.cost_max_ns, 2 * now.tick.t_ns);
 }
 
-static void test_beside_a_writer(void **state)
+TEST(test_beside_a_writer)
 {
 	struct busy busy = {.made = made_page()};
 	struct incise_state *reader = incise_state_open(busy.made.path, NULL);
@@ -176,7 +177,7 @@ static void test_beside_a_writer(void **state)
 }
 
 /* In the middle of a write: the reader waits for a living writer, not for a dead one. */
-static void test_half_written(void **state)
+TEST(test_half_written)
 {
 	static const size_t parts[] = {offsetof(struct state_page, run),
 				       offsetof(struct state_page, live)};
@@ -203,7 +204,7 @@ static void test_half_written(void **state)
 }
 
 /* An odd seq is repaired by the next write. */
-static void test_healed(void **state)
+TEST(test_healed)
 {
 	struct made made = made_page();
 	struct incise_state *reader = incise_state_open(made.path, NULL);
@@ -232,7 +233,7 @@ static void refused(const char *path, int code, const char *text)
 	assert_says(err.text, path, text);
 }
 
-static void test_what_is_no_page(void **state)
+TEST(test_what_is_no_page)
 {
 	struct made made = made_page();
 	struct state_page good;
@@ -268,7 +269,7 @@ static void test_what_is_no_page(void **state)
 }
 
 /* Each offset, size and count of the head, changed. */
-static void test_places_astray(void **state)
+TEST(test_places_astray)
 {
 	static const uint64_t values[] = {0,
 					  1,
@@ -314,7 +315,7 @@ static void test_places_astray(void **state)
 }
 
 /* A later minor version has larger parts. */
-static void test_larger_parts(void **state)
+TEST(test_larger_parts)
 {
 	struct made made = made_page();
 	struct incise_tick made_one = made_tick(2);
@@ -349,7 +350,7 @@ static void test_larger_parts(void **state)
 }
 
 /* Cut off after it was opened: an errno, and no SIGBUS. */
-static void test_cut_off_later(void **state)
+TEST(test_cut_off_later)
 {
 	struct made made = made_page();
 	struct incise_state *reader = incise_state_open(made.path, NULL);
@@ -371,7 +372,7 @@ static void test_cut_off_later(void **state)
 }
 
 /* Garbage in some places of a good page, a thousand times. */
-static void test_garbage(void **state)
+TEST(test_garbage)
 {
 	struct made made = made_page();
 	struct state_page good;
@@ -425,22 +426,4 @@ static void test_garbage(void **state)
 	assert_true(read > 10 && bad > 10);
 	close(fd);
 	made_free(&made);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_ring),
-		cmocka_unit_test(test_ring_that_went_round),
-		cmocka_unit_test(test_beside_a_writer),
-		cmocka_unit_test(test_half_written),
-		cmocka_unit_test(test_healed),
-		cmocka_unit_test(test_what_is_no_page),
-		cmocka_unit_test(test_places_astray),
-		cmocka_unit_test(test_larger_parts),
-		cmocka_unit_test(test_cut_off_later),
-		cmocka_unit_test(test_garbage),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

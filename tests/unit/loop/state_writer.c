@@ -3,11 +3,7 @@
  * lib/loop/state_writer.c: a reader gets back every value, text that is too long is cut; the work
  * of a spring and of friction.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include <time.h>
@@ -38,7 +34,7 @@ static int64_t clock_ns(clockid_t clock)
 	return t.tv_sec * 1000000000LL + t.tv_nsec;
 }
 
-static void test_before_the_first_tick(void **state)
+TEST(test_before_the_first_tick)
 {
 	int64_t mono = clock_ns(CLOCK_MONOTONIC), real = clock_ns(CLOCK_REALTIME);
 	struct made made = made_page();
@@ -60,7 +56,7 @@ static void test_before_the_first_tick(void **state)
 	made_free(&made);
 }
 
-static void test_ticks(void **state)
+TEST(test_ticks)
 {
 	struct made made = made_page();
 	struct incise_tick tick = {.t_ns = 1000, .tool = INCISE_TOOL_BLADE};
@@ -104,7 +100,7 @@ static void test_ticks(void **state)
 }
 
 /* Much longer than the ring: counts are exact, and the ring goes round. */
-static void test_many_ticks(void **state)
+TEST(test_many_ticks)
 {
 	struct made made = made_page();
 	const int64_t n = 5 * INCISE_STATE_TICKS + 7;
@@ -121,7 +117,7 @@ static void test_many_ticks(void **state)
 	made_free(&made);
 }
 
-static void test_states(void **state)
+TEST(test_states)
 {
 	struct made made = made_page();
 	int64_t since;
@@ -162,7 +158,7 @@ static void test_states(void **state)
 	made_free(&made);
 }
 
-static void test_scene(void **state)
+TEST(test_scene)
 {
 	struct made made = made_page();
 	struct felt f;
@@ -193,7 +189,7 @@ static void test_scene(void **state)
 	made_free(&made);
 }
 
-static void test_counts(void **state)
+TEST(test_counts)
 {
 	struct incise_realtime_counts counts = {1, 2, 3, 4};
 	struct made made = made_page();
@@ -207,7 +203,7 @@ static void test_counts(void **state)
 	made_free(&made);
 }
 
-static void test_what_is_too_long(void **state)
+TEST(test_what_is_too_long)
 {
 	struct made made = made_page();
 	char text[2001], *end;
@@ -236,7 +232,7 @@ static void test_what_is_too_long(void **state)
 }
 
 /* The file may be cut off by anybody who may write it: the loop goes on, and the page is mended. */
-static void test_cut_off(void **state)
+TEST(test_cut_off)
 {
 	static const off_t sizes[] = {0,    1,	     sizeof(struct state_head),
 				      4096, 1000000, sizeof(struct state_page) - 1};
@@ -271,7 +267,7 @@ static void test_cut_off(void **state)
 }
 
 /* A loop without a page makes the same calls with NULL. */
-static void test_without_a_page(void **state)
+TEST(test_without_a_page)
 {
 	struct incise_tick tick = made_tick(1);
 	struct incise_realtime_counts counts = {0};
@@ -285,7 +281,7 @@ static void test_without_a_page(void **state)
 	incise_state_close(NULL);
 }
 
-static void test_names(void **state)
+TEST(test_names)
 {
 	assert_string_equal(incise_run_name(INCISE_RUN_STARTING), "starting");
 	assert_string_equal(incise_run_name(INCISE_RUN_FAULT), "fault");
@@ -301,7 +297,7 @@ static struct incise_tick at(double x_mm, double force_N)
 }
 
 /* In and out of a spring of 0.5 N/mm, along -z: k x²/2 each way. */
-static void test_work_of_a_spring(void **state)
+TEST(test_work_of_a_spring)
 {
 	struct made made = made_page();
 	const int n = 10000;
@@ -322,7 +318,7 @@ static void test_work_of_a_spring(void **state)
 }
 
 /* Friction returns no work. */
-static void test_work_of_friction(void **state)
+TEST(test_work_of_friction)
 {
 	struct made made = made_page();
 
@@ -338,7 +334,7 @@ static void test_work_of_friction(void **state)
 	made_free(&made);
 }
 
-static void test_changes_that_are_no_motion(void **state)
+TEST(test_changes_that_are_no_motion)
 {
 	static const struct {
 		unsigned int flags[2];
@@ -372,7 +368,7 @@ static void test_changes_that_are_no_motion(void **state)
 	}
 }
 
-static void test_work_without_numbers(void **state)
+TEST(test_work_without_numbers)
 {
 	static const double ways[] = {NAN, INFINITY, -INFINITY, 1e300};
 	struct made made = made_page();
@@ -392,7 +388,7 @@ static void test_work_without_numbers(void **state)
  * As after years: each addition lies below the last bit of the sum, and would be lost without
  * the correction. Ten million times 5e-11 are 5e-4.
  */
-static void test_long_sum_of_work(void **state)
+TEST(test_long_sum_of_work)
 {
 	struct made made = made_page();
 	struct incise_tick tick = at(0, 2);
@@ -414,27 +410,4 @@ static void test_long_sum_of_work(void **state)
 	/* The last bit of 1e6. */
 	assert_true(fabs(now.absorbed_mJ - 1e6 - 5e-11 * n) <= 0x1p-33);
 	made_free(&made);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_before_the_first_tick),
-		cmocka_unit_test(test_ticks),
-		cmocka_unit_test(test_many_ticks),
-		cmocka_unit_test(test_states),
-		cmocka_unit_test(test_scene),
-		cmocka_unit_test(test_counts),
-		cmocka_unit_test(test_what_is_too_long),
-		cmocka_unit_test(test_cut_off),
-		cmocka_unit_test(test_without_a_page),
-		cmocka_unit_test(test_names),
-		cmocka_unit_test(test_work_of_a_spring),
-		cmocka_unit_test(test_work_of_friction),
-		cmocka_unit_test(test_changes_that_are_no_motion),
-		cmocka_unit_test(test_work_without_numbers),
-		cmocka_unit_test(test_long_sum_of_work),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

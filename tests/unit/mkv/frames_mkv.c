@@ -21,6 +21,7 @@
 #include "../../../lib/record/frames.h"
 #include "../../../lib/record/write/frame_pump.h"
 #include "../message.h"
+#include "../unit.h"
 
 #define ROOM (1 << 20)
 #define MS 1000000LL
@@ -204,7 +205,7 @@ static void is_digest(const struct incise_camera_frame *frame,
 	assert_string_equal(text, hex);
 }
 
-static void comes_back_to_the_byte(void **state)
+TEST(comes_back_to_the_byte)
 {
 	static const uint8_t no_digest[INCISE_FRAMES_DIGEST];
 	static uint8_t bytes[ROOM];
@@ -259,7 +260,7 @@ static void comes_back_to_the_byte(void **state)
 }
 
 /* Times that no camera should give: what is noted is exact, pts goes on. */
-static void any_time_is_kept(void **state)
+TEST(any_time_is_kept)
 {
 	static const struct {
 		int64_t t_ns, pts_ms;
@@ -304,7 +305,7 @@ static void any_time_is_kept(void **state)
 	film_remove(path);
 }
 
-static void refuses(void **state)
+TEST(refuses)
 {
 	static const struct incise_frames_shape none[] = {
 		{15, 48, INCISE_PIXELS_GREY, 60},	{48, 15, INCISE_PIXELS_MJPEG, 60},
@@ -374,7 +375,7 @@ static void write_film(const char *path, const struct incise_frames_shape *shape
 	assert_int_equal(writer->ops->close(writer, NULL), 0);
 }
 
-static void cut_off_anywhere(void **state)
+TEST(cut_off_anywhere)
 {
 	for (size_t i = 0; i < 4; i++) {
 		off_t ends[6];
@@ -397,7 +398,7 @@ static void cut_off_anywhere(void **state)
 	}
 }
 
-static void altered_bytes_are_found(void **state)
+TEST(altered_bytes_are_found)
 {
 	/* decoded, and by the CRC alone */
 	for (size_t i = 0; i < 8; i++) {
@@ -438,7 +439,7 @@ static void altered_bytes_are_found(void **state)
 }
 
 /* Any byte may be any: it must come to an end, and a sanitizer have nothing to say. */
-static void noise_ends(void **state)
+TEST(noise_ends)
 {
 	for (uint64_t round = 0; round < 60; round++) {
 		const struct incise_frames_shape *shape = &shapes[round % 4];
@@ -477,7 +478,7 @@ static void noise_ends(void **state)
 }
 
 /* A limit on the file's size stands for a full disk: write(2) gets short, then fails. */
-static void full_disk(void **state)
+TEST(full_disk)
 {
 	const struct rlimit limit = {100000, RLIM_INFINITY};
 	struct rlimit before;
@@ -512,7 +513,7 @@ static void full_disk(void **state)
 	}
 }
 
-static void short_writes_are_gone_on_with(void **state)
+TEST(short_writes_are_gone_on_with)
 {
 	off_t ends[6];
 	char path[64];
@@ -526,7 +527,7 @@ static void short_writes_are_gone_on_with(void **state)
 }
 
 /* Wherever it fails, what was put before is there, and the rest is cut off. */
-static void a_disk_that_fails(void **state)
+TEST(a_disk_that_fails)
 {
 	static uint8_t bytes[ROOM];
 
@@ -563,7 +564,7 @@ static void a_disk_that_fails(void **state)
 }
 
 /* 20 writers are killed, each after a number of frames: every frame that was put is there. */
-static void killed(void **state)
+TEST(killed)
 {
 	volatile uint64_t *done = mmap(NULL, 4096, PROT_READ | PROT_WRITE,
 				       MAP_SHARED | MAP_ANONYMOUS, -1, 0);
@@ -611,7 +612,7 @@ static void killed(void **state)
 
 /* --- the pump and the file ----------------------------------------------------------- */
 
-static void virtual_camera_comes_back(void **state)
+TEST(virtual_camera_comes_back)
 {
 	struct incise_rig *rig =
 		incise_rig_open("sim:clock=simulated", INCISE_RIG_CAMERA, NULL);
@@ -766,7 +767,7 @@ static void record(const char *path, const struct incise_frames_shape *shape,
  * Killed after a number of rows, while more frames come or when no more do: a frame that has a row
  * is in the file, and the last frame has its row without another one behind it.
  */
-static void a_kill_costs_no_row(void **state)
+TEST(a_kill_costs_no_row)
 {
 	_Atomic uint64_t *rows = mmap(NULL, sizeof(*rows), PROT_READ | PROT_WRITE,
 				      MAP_SHARED | MAP_ANONYMOUS, -1, 0);
@@ -811,24 +812,4 @@ static void a_kill_costs_no_row(void **state)
 		film_remove(path);
 	}
 	munmap((void *)rows, sizeof(*rows));
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(comes_back_to_the_byte),
-		cmocka_unit_test(any_time_is_kept),
-		cmocka_unit_test(refuses),
-		cmocka_unit_test(cut_off_anywhere),
-		cmocka_unit_test(altered_bytes_are_found),
-		cmocka_unit_test(noise_ends),
-		cmocka_unit_test(full_disk),
-		cmocka_unit_test(short_writes_are_gone_on_with),
-		cmocka_unit_test(a_disk_that_fails),
-		cmocka_unit_test(killed),
-		cmocka_unit_test(virtual_camera_comes_back),
-		cmocka_unit_test(a_kill_costs_no_row),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * The batch evaluator: what the scalar one says, to the bit, whatever the model, the
  * arithmetic, the inputs, their number and where they lie in memory.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
@@ -93,7 +89,7 @@ static void check(const struct incise_fixed *fx, size_t n, uint64_t seed)
 }
 
 /* Counts of functions with every rest of a division by four; 32 is the most. */
-static void test_shapes(void **state)
+TEST(test_shapes)
 {
 	static const struct {
 		int n_inputs, n_a, n_b, arithmetic, cells;
@@ -120,7 +116,7 @@ static void test_shapes(void **state)
 }
 
 /* Consequents from tiny to the largest that compile: every number format. */
-static void test_formats(void **state)
+TEST(test_formats)
 {
 	int compiled_models = 0;
 
@@ -183,7 +179,7 @@ static void check_extreme(const struct incise_fixed *fx, int32_t shift_a, int32_
 	free(head);
 }
 
-static void test_extreme_blobs(void **state)
+TEST(test_extreme_blobs)
 {
 	struct incise_fixed *line = compiled(1, 5, 4, INCISE_FIXED_TABLE, 8, 1),
 			    *line_force = compiled(1, 5, 4, INCISE_FIXED_FORCE, 8, 1),
@@ -222,7 +218,7 @@ static void check_shifted(const struct incise_fixed *fx, int shift_x, int shift_
 }
 
 /* Ends of a run that are no multiple of the vector, none at all, and no alignment. */
-static void test_lengths_and_alignment(void **state)
+TEST(test_lengths_and_alignment)
 {
 	for (int arithmetic = 0; arithmetic < 3; arithmetic++)
 		for (int n_inputs = 1; n_inputs <= 2; n_inputs++) {
@@ -236,16 +232,4 @@ static void test_lengths_and_alignment(void **state)
 			incise_fixed_eval_batch(fx, NULL, NULL, 0);
 			incise_fixed_free(fx);
 		}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_shapes),
-		cmocka_unit_test(test_formats),
-		cmocka_unit_test(test_extreme_blobs),
-		cmocka_unit_test(test_lengths_and_alignment),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

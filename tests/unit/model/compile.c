@@ -8,6 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 #include "../message.h"
+#include "../unit.h"
 #include "../base/temp_file.h"
 #include "../fixed/compiled.h"
 
@@ -23,7 +24,7 @@ static struct incise_model *smooth_model(void)
 }
 
 /* A looser budget takes a cheaper form; a tighter one a finer. */
-static void test_budget_chooses(void **state)
+TEST(test_budget_chooses)
 {
 	static const struct {
 		double budget;
@@ -47,7 +48,7 @@ static void test_budget_chooses(void **state)
 }
 
 /* The default budget certifies 0.1 mN for models of the paper's size over 0–20 mm × 0–50 mm/s. */
-static void test_default_budget_holds(void **state)
+TEST(test_default_budget_holds)
 {
 	for (uint64_t seed = 1; seed <= 10; seed++) {
 		struct incise_model *model = paper_model(INCISE_MF_GAUSS, seed, 3);
@@ -63,7 +64,7 @@ static void test_default_budget_holds(void **state)
 }
 
 /* Three and four inputs: within the bound that is certified, and as good as two. */
-static void test_many_inputs_hold_their_bound(void **state)
+TEST(test_many_inputs_hold_their_bound)
 {
 	for (uint64_t seed = 1; seed <= 12; seed++) {
 		int n = 3 + (int)(seed % 2);
@@ -99,7 +100,7 @@ static void test_many_inputs_hold_their_bound(void **state)
 	}
 }
 
-static void test_refusals(void **state)
+TEST(test_refusals)
 {
 	struct incise_fixed_options o = {.budget = 1e-6, .arithmetic = -1};
 	struct incise_model *model = smooth_model();
@@ -118,7 +119,7 @@ static void test_refusals(void **state)
 }
 
 /* Sizes that no format holds, up to those that are not even finite once added up. */
-static void test_extreme_consequents(void **state)
+TEST(test_extreme_consequents)
 {
 	static const double sizes[] = {1e6, 1e12, 1e100, 1e308, 1.7e308};
 
@@ -137,7 +138,7 @@ static void test_extreme_consequents(void **state)
 }
 
 /* Functions so narrow that between them the nearest cannot be determined by 128 widths. */
-static void test_narrow_functions(void **state)
+TEST(test_narrow_functions)
 {
 	struct incise_fixed_options o = {.arithmetic = INCISE_FIXED_DIRECT};
 	struct incise_model *model = smooth_model();
@@ -151,7 +152,7 @@ static void test_narrow_functions(void **state)
 	incise_model_free(model);
 }
 
-static void test_files(void **state)
+TEST(test_files)
 {
 	struct temp_file file = temp_file_new("m.fx", "");
 	struct incise_model *model = smooth_model();
@@ -179,19 +180,4 @@ static void test_files(void **state)
 	assert_null(incise_fixed_load(file.path, &err));
 	assert_int_equal(err.code, ENOENT);
 	incise_model_free(model);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_budget_chooses),
-		cmocka_unit_test(test_default_budget_holds),
-		cmocka_unit_test(test_many_inputs_hold_their_bound),
-		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_extreme_consequents),
-		cmocka_unit_test(test_narrow_functions),
-		cmocka_unit_test(test_files),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

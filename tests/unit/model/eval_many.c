@@ -3,11 +3,7 @@
  * Many evaluations at once: outputs are those of single ones, to the bit; gradients are the
  * difference quotients of the formulas in long double; sd the same as one by one.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -31,7 +27,7 @@ static double quotient(const struct incise_model *model, const double *x, int i,
 			((long double)to[i] - x[i]));
 }
 
-static void outputs_are_those_of_single_points(void **state)
+TEST(outputs_are_those_of_single_points)
 {
 	struct incise_model *model = calloc(1, sizeof(*model));
 	uint64_t seed = 5;
@@ -66,7 +62,7 @@ static void outputs_are_those_of_single_points(void **state)
  * gradient has to be what they are: to 1e-4 of the largest, as their own error is some 1e-5 at
  * h = 1e-7 for widths from 0.1 on, and second differences tell that it is.
  */
-static void gradients_are_difference_quotients(void **state)
+TEST(gradients_are_difference_quotients)
 {
 	struct incise_model *model = calloc(1, sizeof(*model));
 	int compared = 0, kinks = 0;
@@ -109,7 +105,7 @@ static void gradients_are_difference_quotients(void **state)
 	free(model);
 }
 
-static void sd_is_that_of_single_points(void **state)
+TEST(sd_is_that_of_single_points)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
 	enum { N = 60 };
@@ -130,15 +126,4 @@ static void sd_is_that_of_single_points(void **state)
 	incise_uncertainty_free(uncertainty);
 	incise_model_free(model);
 	free(factor);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(outputs_are_those_of_single_points),
-		cmocka_unit_test(gradients_are_difference_quotients),
-		cmocka_unit_test(sd_is_that_of_single_points),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

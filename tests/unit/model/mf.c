@@ -3,18 +3,14 @@
  * Membership functions against their formulas, and where the formulas overflow, divide
  * by zero or have no logarithm.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <float.h>
 #include <math.h>
 #include <string.h>
 #include "any_model.h"
 
 /* Worked out by hand. */
-static void test_degrees(void **state)
+TEST(test_degrees)
 {
 	static const struct {
 		struct incise_mf mf;
@@ -91,7 +87,7 @@ static void test_degrees(void **state)
  * Against the formulas in long double, for widths from 1e-12 to 1e12 and inputs that are
  * within a few of them.
  */
-static void test_against_formulas(void **state)
+TEST(test_against_formulas)
 {
 	int seen[ANY_KINDS] = {0};
 	uint64_t seed = 1;
@@ -133,7 +129,7 @@ static void test_against_formulas(void **state)
 }
 
 /* Whatever comes in, the logarithm is within its bounds and the gap is a number. */
-static void test_log_is_always_a_number(void **state)
+TEST(test_log_is_always_a_number)
 {
 	static const double xs[] = {0,	      -1,      1e300,  -1e300,	 DBL_MAX,
 				    -DBL_MAX, DBL_MIN, 5e-324, INFINITY, -INFINITY};
@@ -170,7 +166,7 @@ static void test_log_is_always_a_number(void **state)
 }
 
 /* Further away is less, also where the square of the distance overflows. */
-static void test_log_falls_with_distance(void **state)
+TEST(test_log_falls_with_distance)
 {
 	static const struct incise_mf mfs[] = {
 		{INCISE_MF_GAUSS, "", {1e-12, 0}},
@@ -196,7 +192,7 @@ static void test_log_falls_with_distance(void **state)
 }
 
 /* Where a triangle or trapezoid is zero, the distance to its foot counts instead. */
-static void test_gaps(void **state)
+TEST(test_gaps)
 {
 	static const struct {
 		struct incise_mf mf;
@@ -243,7 +239,7 @@ static void test_gaps(void **state)
 	assert_true(wide < thin && thin < gap);
 }
 
-static void test_names(void **state)
+TEST(test_names)
 {
 	static const struct {
 		enum incise_mf_type type;
@@ -268,7 +264,7 @@ static void test_names(void **state)
 	assert_int_equal(incise_mf_type_find("pimf"), -1);
 }
 
-static void test_faults(void **state)
+TEST(test_faults)
 {
 	static const struct {
 		enum incise_mf_type type;
@@ -311,19 +307,4 @@ static void test_faults(void **state)
 		if (cases[i].word ? !fault || !strstr(fault, cases[i].word) : !!fault)
 			fail_msg("case %zu: '%s'", i, fault ? fault : "none");
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_degrees),
-		cmocka_unit_test(test_against_formulas),
-		cmocka_unit_test(test_log_is_always_a_number),
-		cmocka_unit_test(test_log_falls_with_distance),
-		cmocka_unit_test(test_gaps),
-		cmocka_unit_test(test_names),
-		cmocka_unit_test(test_faults),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * The model in double against a plain long-double evaluation of eq. (3), and where that
  * one breaks down.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <float.h>
 #include <math.h>
@@ -44,7 +40,7 @@ static long double plain(const struct incise_model *model, const double *x)
 	return sum / weights;
 }
 
-static void test_against_plain(void **state)
+TEST(test_against_plain)
 {
 	for (int type = INCISE_MF_GAUSS; type <= INCISE_MF_GBELL; type++)
 		for (uint64_t seed = 1; seed <= 20; seed++) {
@@ -70,7 +66,7 @@ static void test_against_plain(void **state)
  * Any model within its ranges: all kinds, free lists, weights, prod and min, up to 8 inputs
  * and 256 rules.
  */
-static void test_against_formulas(void **state)
+TEST(test_against_formulas)
 {
 	static const struct {
 		int n_inputs, n_rules, rounds;
@@ -143,7 +139,7 @@ static void any_grid(struct incise_model *model, uint64_t *seed)
  * The way of grids gives what the general one gives, also far outside where nothing
  * fires. Weights add up to 1, so their difference is one relative to the consequents.
  */
-static void test_grids_go_a_way_of_their_own(void **state)
+TEST(test_grids_go_a_way_of_their_own)
 {
 	struct incise_model *model = calloc(1, sizeof(*model));
 	double w[2][INCISE_MODEL_RULES_MAX], apart = 0;
@@ -191,7 +187,7 @@ static void test_grids_go_a_way_of_their_own(void **state)
 }
 
 /* Rules in any order are a grid; a list with a rule missing, repeated or altered is none. */
-static void test_grids_are_told_from_lists(void **state)
+TEST(test_grids_are_told_from_lists)
 {
 	enum { NONE, SWAP, TWICE, LEAVE_OUT, WEIGHT, MIN, FEWER };
 	static const bool want[] = {true, true, false, false, false, false, false};
@@ -227,7 +223,7 @@ static void test_grids_are_told_from_lists(void **state)
 	}
 }
 
-static void test_firing_adds_up_to_one(void **state)
+TEST(test_firing_adds_up_to_one)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
 	static const double xs[][2] = {{10, 25}, {0, 0}, {1e4, -1e4}, {1e300, 1e300}};
@@ -246,7 +242,7 @@ static void test_firing_adds_up_to_one(void **state)
 }
 
 /* Far out every firing strength is zero: the nearest rule answers. */
-static void test_nearest_rule_takes_over(void **state)
+TEST(test_nearest_rule_takes_over)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
 	const double far[] = {1000, 5000};
@@ -288,7 +284,7 @@ static struct incise_model *with_gaps(void)
 	return model;
 }
 
-static void test_nearest_rule_of_triangles(void **state)
+TEST(test_nearest_rule_of_triangles)
 {
 	/* Rules: near wide, near narrow, far wide, far narrow. */
 	static const struct {
@@ -346,7 +342,7 @@ static void test_nearest_rule_of_triangles(void **state)
 }
 
 /* Whatever fires at all goes before what is only near. */
-static void test_firing_goes_before_near(void **state)
+TEST(test_firing_goes_before_near)
 {
 	struct incise_model *model = with_gaps();
 	const struct incise_mf far = {INCISE_MF_GAUSS, "far", {1, 0}};
@@ -372,7 +368,7 @@ static void test_firing_goes_before_near(void **state)
 }
 
 /* With min, the input that is furthest off decides which rule is nearest. */
-static void test_nearest_rule_by_min(void **state)
+TEST(test_nearest_rule_by_min)
 {
 	struct incise_model *model = with_gaps();
 	double w[4];
@@ -409,7 +405,7 @@ static void test_nearest_rule_by_min(void **state)
 }
 
 /* min is the least degree, not their product; a weight comes after it. */
-static void test_min_and_weights_by_hand(void **state)
+TEST(test_min_and_weights_by_hand)
 {
 	struct incise_model *model = with_gaps();
 	double w[4];
@@ -457,7 +453,7 @@ static double any_input(uint64_t *seed)
  * 10^5 models of all kinds with widths from 1e-12 to 1e12: whatever comes in, the output is
  * a number and the weights add up to 1; and they are right wherever long double can say.
  */
-static void test_nothing_yields_nan(void **state)
+TEST(test_nothing_yields_nan)
 {
 	struct incise_model *model = calloc(1, sizeof(*model));
 	int compared = 0, compared_far = 0, nowhere = 0;
@@ -518,7 +514,7 @@ static void test_nothing_yields_nan(void **state)
 	free(model);
 }
 
-static void test_no_input_yields_nan(void **state)
+TEST(test_no_input_yields_nan)
 {
 	static const double hostile[] = {0,	   -0.0,     1e300,	-1e300,
 					 NAN,	   INFINITY, -INFINITY, DBL_MAX,
@@ -546,7 +542,7 @@ static void test_no_input_yields_nan(void **state)
 		}
 }
 
-static void test_grid_shape(void **state)
+TEST(test_grid_shape)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
 
@@ -577,7 +573,7 @@ static void test_grid_shape(void **state)
 }
 
 /* Names say where a function lies, and none is negative over a depth. */
-static void test_names(void **state)
+TEST(test_names)
 {
 	static const struct incise_variable out = {"force_N", 0, 4};
 	static const struct {
@@ -617,7 +613,7 @@ static void test_names(void **state)
 	}
 }
 
-static void test_refusals(void **state)
+TEST(test_refusals)
 {
 	static const struct {
 		int n_inputs, mfs;
@@ -665,7 +661,7 @@ static void test_refusals(void **state)
 	}
 }
 
-static void test_setters_refuse_what_is_no_number(void **state)
+TEST(test_setters_refuse_what_is_no_number)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
 	struct incise_model *copy = incise_model_copy(model);
@@ -690,7 +686,7 @@ static void test_setters_refuse_what_is_no_number(void **state)
 }
 
 /* A zero-order rule that is given slopes is one of first order, in the file too. */
-static void test_constant_rule_takes_slopes(void **state)
+TEST(test_constant_rule_takes_slopes)
 {
 	char path[] = "/tmp/incise-model-XXXXXX";
 	static const char text[] =
@@ -714,29 +710,4 @@ static void test_constant_rule_takes_slopes(void **state)
 	assert_true(incise_model_eval(model, (double[]){5}, NULL) == 11);
 	incise_model_free(model);
 	unlink(path);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_against_plain),
-		cmocka_unit_test(test_against_formulas),
-		cmocka_unit_test(test_grids_go_a_way_of_their_own),
-		cmocka_unit_test(test_grids_are_told_from_lists),
-		cmocka_unit_test(test_firing_adds_up_to_one),
-		cmocka_unit_test(test_nearest_rule_takes_over),
-		cmocka_unit_test(test_nearest_rule_of_triangles),
-		cmocka_unit_test(test_firing_goes_before_near),
-		cmocka_unit_test(test_nearest_rule_by_min),
-		cmocka_unit_test(test_min_and_weights_by_hand),
-		cmocka_unit_test(test_nothing_yields_nan),
-		cmocka_unit_test(test_no_input_yields_nan),
-		cmocka_unit_test(test_grid_shape),
-		cmocka_unit_test(test_names),
-		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_constant_rule_takes_slopes),
-		cmocka_unit_test(test_setters_refuse_what_is_no_number),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

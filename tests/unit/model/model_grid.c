@@ -11,6 +11,7 @@
 #include "../../../lib/model/model.h"
 #include "../../../lib/model/model_grid.h"
 #include "../message.h"
+#include "../unit.h"
 #include "../fixed/compiled.h"
 #include "paper_model.h"
 #include "../cases.h"
@@ -21,7 +22,7 @@ static bool holds(struct interval a, long double x)
 }
 
 /* Long double sees what outward rounding has to make room for. */
-static void test_operations(void **state)
+TEST(test_operations)
 {
 	uint64_t seed = 1;
 
@@ -49,7 +50,7 @@ static void test_operations(void **state)
 	}
 }
 
-static void test_extremes(void **state)
+TEST(test_extremes)
 {
 	/* Overflow opens the interval, it does not lose it. */
 	assert_true(isinf(iv_exp(iv(1000)).hi));
@@ -58,7 +59,7 @@ static void test_extremes(void **state)
 }
 
 /* Derivatives by symmetric differences of the degrees. */
-static void test_degrees_over_an_interval(void **state)
+TEST(test_degrees_over_an_interval)
 {
 	for (int seed = 1; seed <= cases_of(20, 3); seed++) {
 		struct incise_model *model = paper_model(INCISE_MF_GAUSS, seed, 1);
@@ -126,7 +127,7 @@ static void refused(struct incise_model *model, int code, const char *says)
 	free(grid);
 }
 
-static void test_refusals(void **state)
+TEST(test_refusals)
 {
 	struct incise_model *model;
 
@@ -145,7 +146,7 @@ static void test_refusals(void **state)
 	refused(model, ERANGE, "low: its centre");
 }
 
-static void test_same_model(void **state)
+TEST(test_same_model)
 {
 	struct incise_model *models[] = {paper_model(INCISE_MF_GAUSS, 2, 3),
 					 line_model(3)};
@@ -177,7 +178,7 @@ static void test_same_model(void **state)
 	free(grid);
 }
 
-static void test_sizes(void **state)
+TEST(test_sizes)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 0);
 	struct incise_grid *grid = malloc(sizeof(*grid));
@@ -216,7 +217,7 @@ static void differences(const struct incise_model *model, double a, double b, do
 		 (4 * h * h);
 }
 
-static void test_encloses_differences(void **state)
+TEST(test_encloses_differences)
 {
 	uint64_t seed = 1;
 
@@ -282,7 +283,7 @@ static double found(const struct incise_fixed *fx, const struct incise_model *mo
 	return largest;
 }
 
-static void test_never_below_an_error(void **state)
+TEST(test_never_below_an_error)
 {
 	for (uint64_t seed = 1; seed <= 12; seed++)
 		for (int a = 0; a < ARITHMETICS; a++) {
@@ -312,7 +313,7 @@ static void test_never_below_an_error(void **state)
  * Supports end anywhere, and are compiled to the nearest LSB: what holds for every real
  * input has to hold at the very ends, and for functions that cross just outside.
  */
-static void test_ends_between_lsbs(void **state)
+TEST(test_ends_between_lsbs)
 {
 	static const struct incise_variable out = {"y", 0, 1};
 	static const int mfs[] = {2};
@@ -354,7 +355,7 @@ static void test_ends_between_lsbs(void **state)
 }
 
 /* A plane has no second derivative: interpolation is exact and the bound knows it. */
-static void test_plane_needs_no_cells(void **state)
+TEST(test_plane_needs_no_cells)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
 	struct incise_fixed *fx;
@@ -368,7 +369,7 @@ static void test_plane_needs_no_cells(void **state)
 	incise_model_free(model);
 }
 
-static void test_finer_cells_lower_bound(void **state)
+TEST(test_finer_cells_lower_bound)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 5, 4);
 	struct incise_grid *grid = malloc(sizeof(*grid));
@@ -388,23 +389,4 @@ static void test_finer_cells_lower_bound(void **state)
 	incise_survey_free(survey);
 	free(grid);
 	incise_model_free(model);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_operations),
-		cmocka_unit_test(test_extremes),
-		cmocka_unit_test(test_degrees_over_an_interval),
-		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_same_model),
-		cmocka_unit_test(test_sizes),
-		cmocka_unit_test(test_encloses_differences),
-		cmocka_unit_test(test_never_below_an_error),
-		cmocka_unit_test(test_ends_between_lsbs),
-		cmocka_unit_test(test_plane_needs_no_cells),
-		cmocka_unit_test(test_finer_cells_lower_bound),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * Slopes of models: certified ones are never exceeded by finite differences on a dense
  * grid and are close to them; estimates are held against models whose slopes are known.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include <incise/fixed.h>
@@ -81,7 +77,7 @@ static void assert_encloses(const struct incise_slope *slope,
 /* 1 % of tolerance, and what a grid of 1/120 misses of a peak: 1 %, says one of 1/1500. */
 #define TIGHT 0.03
 
-static void test_certified(void **state)
+TEST(test_certified)
 {
 	for (int seed = 1; seed <= cases_of(10, 4); seed++) {
 		struct incise_model *model =
@@ -101,7 +97,7 @@ static void test_certified(void **state)
 	}
 }
 
-static void test_shipped_model(void **state)
+TEST(test_shipped_model)
 {
 	struct incise_model *model = incise_model_load("scenes/liver.fis", NULL);
 	struct incise_slope slopes[2], found[2];
@@ -117,7 +113,7 @@ static void test_shipped_model(void **state)
 }
 
 /* Whatever the functions are, rules that agree make a plane. */
-static void test_plane(void **state)
+TEST(test_plane)
 {
 	static const enum incise_mf_type types[] = {INCISE_MF_GAUSS, INCISE_MF_GBELL,
 						    INCISE_MF_GAUSS2, INCISE_MF_TRI,
@@ -145,7 +141,7 @@ static void test_plane(void **state)
 }
 
 /* Triangles with constant consequents are linear interpolation between their peaks. */
-static void test_known_estimates(void **state)
+TEST(test_known_estimates)
 {
 	static const struct incise_variable in[] = {{"x", -3, 7}, {"z", 0, 8}};
 	static const int mfs[] = {11, 9};
@@ -188,7 +184,7 @@ static void test_known_estimates(void **state)
 }
 
 /* Shapes of any kind, up to eight inputs: numbers in order, a step as steep as it is. */
-static void test_any_shape(void **state)
+TEST(test_any_shape)
 {
 	struct incise_model *model = calloc(1, sizeof(*model));
 	uint64_t seed = 1;
@@ -209,7 +205,7 @@ static void test_any_shape(void **state)
 }
 
 /* Consequents beyond all formats, and functions that are next to steps. */
-static void test_too_wild_to_certify(void **state)
+TEST(test_too_wild_to_certify)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
 	struct incise_slope slopes[2];
@@ -223,7 +219,7 @@ static void test_too_wild_to_certify(void **state)
 	incise_model_free(model);
 }
 
-static void test_compiled(void **state)
+TEST(test_compiled)
 {
 	for (int seed = 1; seed <= cases_of(4, 2); seed++)
 		for (int a = 0; a < ARITHMETICS; a++) {
@@ -252,7 +248,7 @@ static void test_compiled(void **state)
 }
 
 /* The narrowest support that compiles is 64 LSB: one secant, and no rounding of two. */
-static void test_narrow_compiled(void **state)
+TEST(test_narrow_compiled)
 {
 	static const struct incise_variable in = {"x", 1, 1 + 64.0 / INCISE_FIXED_ONE};
 	static const int mfs[] = {1};
@@ -297,7 +293,7 @@ static double slope(const void *of, const double *x, int i)
 	return sum;
 }
 
-static void test_finds_the_highest_hill(void **state)
+TEST(test_finds_the_highest_hill)
 {
 	for (int n = 1; n <= INCISE_MODEL_INPUTS_MAX; n++) {
 		struct incise_slope slopes[INCISE_MODEL_INPUTS_MAX];
@@ -326,21 +322,4 @@ static void test_finds_the_highest_hill(void **state)
 			assert_true(slopes[i].lowest < -0.8);
 		}
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_certified),
-		cmocka_unit_test(test_shipped_model),
-		cmocka_unit_test(test_plane),
-		cmocka_unit_test(test_known_estimates),
-		cmocka_unit_test(test_any_shape),
-		cmocka_unit_test(test_too_wild_to_certify),
-		cmocka_unit_test(test_compiled),
-		cmocka_unit_test(test_narrow_compiled),
-		cmocka_unit_test(test_finds_the_highest_hill),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

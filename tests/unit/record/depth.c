@@ -2,13 +2,9 @@
 /*
  * Tests of lib/record/read/depth.c.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
+#include "../unit.h"
 #include <math.h>
 #include <string.h>
-#include <cmocka.h>
 #include "../../../lib/record/read/depth.h"
 
 #define RECORDS 2000
@@ -39,7 +35,7 @@ static int trace(void (*path)(double t_s, double position_mm[3]), int n,
 	return got;
 }
 
-static void depth_is_along_the_normal(void **state)
+TEST(depth_is_along_the_normal)
 {
 	static const struct {
 		double point[3], normal[3], position[3], depth;
@@ -68,7 +64,7 @@ static void straight(double t_s, double p[3])
 	p[2] = -3;
 }
 
-static void straight_path_has_its_speed(void **state)
+TEST(straight_path_has_its_speed)
 {
 	int n = trace(straight, 50, NULL);
 
@@ -82,7 +78,7 @@ static void straight_path_has_its_speed(void **state)
 	}
 }
 
-static void row_comes_after_half_the_window(void **state)
+TEST(row_comes_after_half_the_window)
 {
 	struct incise_depth depth;
 	struct incise_depth_row row;
@@ -117,7 +113,7 @@ static void noisy(double t_s, double p[3])
 	p[2] = -5 + 0.02 * noise();
 }
 
-static void noise_of_the_tracker_gives_a_sane_speed(void **state)
+TEST(noise_of_the_tracker_gives_a_sane_speed)
 {
 	double sum = 0, sum2 = 0;
 	int n = trace(noisy, RECORDS, NULL), inner = n - 2 * INCISE_DEPTH_HALF;
@@ -141,7 +137,7 @@ static void swing(double t_s, double p[3])
 	p[1] = p[2] = 0;
 }
 
-static void swing_is_flattened_little(void **state)
+TEST(swing_is_flattened_little)
 {
 	int n = trace(swing, 240, NULL);
 
@@ -154,7 +150,7 @@ static void swing_is_flattened_little(void **state)
 	}
 }
 
-static void records_across_a_gap_are_not_mixed(void **state)
+TEST(records_across_a_gap_are_not_mixed)
 {
 	/* Two stretches of 5 at 8 ms, a second apart; the path jumps in between. */
 	int64_t times[10];
@@ -173,22 +169,7 @@ static void records_across_a_gap_are_not_mixed(void **state)
 	assert_true(rows[0].velocity_mm_s == 0 && rows[1].velocity_mm_s == 0);
 }
 
-static void nothing_in_nothing_out(void **state)
+TEST(nothing_in_nothing_out)
 {
 	assert_int_equal(trace(straight, 0, NULL), 0);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(depth_is_along_the_normal),
-		cmocka_unit_test(straight_path_has_its_speed),
-		cmocka_unit_test(row_comes_after_half_the_window),
-		cmocka_unit_test(noise_of_the_tracker_gives_a_sane_speed),
-		cmocka_unit_test(swing_is_flattened_little),
-		cmocka_unit_test(records_across_a_gap_are_not_mixed),
-		cmocka_unit_test(nothing_in_nothing_out),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -5,12 +5,8 @@
  */
 #include <float.h>
 #include <math.h>
-#include <stdarg.h>
+#include "../unit.h"
 #include <stdbool.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
 #include "../../../lib/record/time/timeline.h"
 #include "stream.h"
 
@@ -49,7 +45,7 @@ static double highest(const struct incise_envelope *env, double x_ns)
 	return best_ns;
 }
 
-static void highest_of_all_lines(void **state)
+TEST(highest_of_all_lines)
 {
 	for (int seed = 0; seed < 30; seed++) {
 		struct stream random = {.random = (uint64_t)seed};
@@ -82,7 +78,7 @@ static void highest_of_all_lines(void **state)
 }
 
 /* Below 64 exponential excesses the line is too high by 2/64 of their mean, on average. */
-static void gap_is_known(void **state)
+TEST(gap_is_known)
 {
 	const int seeds = 400;
 	double before = 0, after = 0, covered = 0;
@@ -111,7 +107,7 @@ static void gap_is_known(void **state)
 }
 
 /* Blocks double up to 0.5 s; then the oldest go. */
-static void blocks_are_bounded(void **state)
+TEST(blocks_are_bounded)
 {
 	struct incise_envelope env;
 	bool was_full = false;
@@ -134,7 +130,7 @@ static void blocks_are_bounded(void **state)
 }
 
 /* 1000 Hz on frames of 1 ms: a device with the host's own rate may be 1 ms off, unseen. */
-static void grid_is_doubted(void **state)
+TEST(grid_is_doubted)
 {
 	static const struct {
 		double grain_ns, slope, least_ns, most_ns;
@@ -157,16 +153,4 @@ static void grid_is_doubted(void **state)
 		assert_true(env.gap_sd_ns >= cases[c].least_ns);
 		assert_true(env.gap_sd_ns <= cases[c].most_ns);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(highest_of_all_lines),
-		cmocka_unit_test(gap_is_known),
-		cmocka_unit_test(blocks_are_bounded),
-		cmocka_unit_test(grid_is_doubted),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,6 +13,7 @@
 #include <incise/backend.h>
 #include "../../../lib/record/write/frame_pump.h"
 #include "../message.h"
+#include "../unit.h"
 
 #define SIDE 16
 #define MS 1000000LL
@@ -209,7 +210,7 @@ static struct incise_frame_pump_stats wait_for(struct incise_frame_pump *pump,
 }
 
 /* On a clock that stands still all is written and looked at, however slow vision is. */
-static void nothing_is_lost_where_time_waits(void **state)
+TEST(nothing_is_lost_where_time_waits)
 {
 	struct incise_clock *clock = incise_clock_new_simulated(1000 * MS);
 	struct fake_camera camera = camera_of(clock, 100, 200);
@@ -267,7 +268,7 @@ static void nothing_is_lost_where_time_waits(void **state)
 }
 
 /* Frames that waited in the camera before the pump started are not recorded, and not lost. */
-static void what_was_shot_before_is_passed_over(void **state)
+TEST(what_was_shot_before_is_passed_over)
 {
 	struct incise_clock *clock = incise_clock_new_simulated(1000 * MS);
 	struct fake_camera camera = camera_of(clock, 100, 30);
@@ -303,7 +304,7 @@ static void what_was_shot_before_is_passed_over(void **state)
 }
 
 /* A disk that does not answer for 95 frames, of the 150 that the slots bridge. */
-static void a_stall_is_bridged(void **state)
+TEST(a_stall_is_bridged)
 {
 	struct incise_clock *clock = incise_clock_new_real();
 	struct fake_camera camera = camera_of(clock, 60, 120);
@@ -331,7 +332,7 @@ static void a_stall_is_bridged(void **state)
 }
 
 /* A disk that hangs: frames without a slot are counted, and the end does not wait for it. */
-static void a_disk_that_hangs_holds_nobody(void **state)
+TEST(a_disk_that_hangs_holds_nobody)
 {
 	/* Memory that the hanging thread may use is never freed. */
 	static struct incise_frame_pump *left;
@@ -368,7 +369,7 @@ static void a_disk_that_hangs_holds_nobody(void **state)
 	incise_clock_free(clock);
 }
 
-static void a_full_disk_ends_the_file_alone(void **state)
+TEST(a_full_disk_ends_the_file_alone)
 {
 	struct incise_clock *clock = incise_clock_new_real();
 	struct fake_camera camera = camera_of(clock, 1000, 50);
@@ -391,7 +392,7 @@ static void a_full_disk_ends_the_file_alone(void **state)
 }
 
 /* A frame of a wrong shape does not affect the others. */
-static void a_wrong_frame_is_passed_over(void **state)
+TEST(a_wrong_frame_is_passed_over)
 {
 	struct incise_clock *clock = incise_clock_new_real();
 	struct fake_camera camera = camera_of(clock, 1000, 50);
@@ -418,7 +419,7 @@ static void a_wrong_frame_is_passed_over(void **state)
 	incise_clock_free(clock);
 }
 
-static void a_camera_that_ends_says_why(void **state)
+TEST(a_camera_that_ends_says_why)
 {
 	struct incise_clock *clock = incise_clock_new_real();
 	struct fake_camera camera = camera_of(clock, 1000, 50);
@@ -440,7 +441,7 @@ static void a_camera_that_ends_says_why(void **state)
 }
 
 /* Vision that is slower than the camera: frames without a depth, but all of them. */
-static void slow_vision_holds_nobody(void **state)
+TEST(slow_vision_holds_nobody)
 {
 	struct incise_clock *clock = incise_clock_new_real();
 	struct fake_camera camera = camera_of(clock, 1000, 200);
@@ -468,20 +469,4 @@ static void slow_vision_holds_nobody(void **state)
 	assert_int_equal(looked, 200 - stats.unlooked);
 	incise_frame_pump_free(pump);
 	incise_clock_free(clock);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(nothing_is_lost_where_time_waits),
-		cmocka_unit_test(what_was_shot_before_is_passed_over),
-		cmocka_unit_test(a_stall_is_bridged),
-		cmocka_unit_test(a_disk_that_hangs_holds_nobody),
-		cmocka_unit_test(a_full_disk_ends_the_file_alone),
-		cmocka_unit_test(a_wrong_frame_is_passed_over),
-		cmocka_unit_test(a_camera_that_ends_says_why),
-		cmocka_unit_test(slow_vision_holds_nobody),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

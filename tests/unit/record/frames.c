@@ -10,10 +10,11 @@
 #include <unistd.h>
 #include "../../../lib/record/frames.h"
 #include "../message.h"
+#include "../unit.h"
 
 static const struct incise_frames_shape shape = {32, 16, INCISE_PIXELS_GREY, 60};
 
-static void a_module_that_is_not_there_is_said(void **state)
+TEST(a_module_that_is_not_there_is_said)
 {
 	char folder[] = "/tmp/incise-frames-XXXXXX", path[100];
 	struct incise_error err = {0};
@@ -39,7 +40,7 @@ static void a_module_that_is_not_there_is_said(void **state)
 	assert_int_equal(access("/tmp/none.mkv", F_OK), -1);
 }
 
-static void the_module_is_found(void **state)
+TEST(the_module_is_found)
 {
 	char folder[] = "/tmp/incise-frames-XXXXXX", own[PATH_MAX], path[PATH_MAX + 40];
 	struct incise_frames_reader *reader;
@@ -90,14 +91,4 @@ static void the_module_is_found(void **state)
 	assert_int_equal(incise_frames_writer_close(NULL, NULL), 0);
 	unlink(path);
 	rmdir(folder);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_module_that_is_not_there_is_said),
-		cmocka_unit_test(the_module_is_found),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

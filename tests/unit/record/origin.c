@@ -3,14 +3,10 @@
  * Tests of lib/record/export/origin.c: tokens against a table written by hand, found in other bytes,
  * and each single change of one.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
+#include "../unit.h"
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 #include <incise/origin.h>
 
 #define A "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef"
@@ -39,7 +35,7 @@ static void assert_same(const struct incise_origin *a, const struct incise_origi
 	assert_string_equal(a->name, b->name);
 }
 
-static void tokens_are_those_of_the_table(void **state)
+TEST(tokens_are_those_of_the_table)
 {
 	for (size_t i = 0; i < GOOD; i++) {
 		char text[INCISE_ORIGIN_TEXT];
@@ -56,7 +52,7 @@ static void tokens_are_those_of_the_table(void **state)
 	}
 }
 
-static void the_longest_one_fits(void **state)
+TEST(the_longest_one_fits)
 {
 	struct incise_origin origin = {
 		INCISE_ORIGIN_DEPTH_MAX, "abcdefghijklmno", A, UINT64_MAX, A, ""};
@@ -66,7 +62,7 @@ static void the_longest_one_fits(void **state)
 	assert_in_range(incise_origin_text(&origin, text), 1, sizeof(text) - 1);
 }
 
-static void what_is_no_origin_is_refused(void **state)
+TEST(what_is_no_origin_is_refused)
 {
 	const struct incise_origin bad[] = {
 		{0, "recording", A, 0, "", "x"},  {10, "recording", A, 0, "", "x"},
@@ -82,7 +78,7 @@ static void what_is_no_origin_is_refused(void **state)
 }
 
 /* Among zeros, other tokens that are none, and starts of one. */
-static void tokens_are_found_in_any_bytes(void **state)
+TEST(tokens_are_found_in_any_bytes)
 {
 	static const char bytes[] =
 		"\0\xff incise:incise:1:recording:" A ":97:4e1b-02:liver.rec;"
@@ -101,7 +97,7 @@ static void tokens_are_found_in_any_bytes(void **state)
 }
 
 /* A changed byte, or a missing end, is another token that is well formed, or none. */
-static void changed_tokens_are_others_or_none(void **state)
+TEST(changed_tokens_are_others_or_none)
 {
 	for (size_t i = 0; i < GOOD; i++) {
 		size_t n = strlen(good[i].text);
@@ -126,17 +122,4 @@ static void changed_tokens_are_others_or_none(void **state)
 				free(text);
 			}
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(tokens_are_those_of_the_table),
-		cmocka_unit_test(the_longest_one_fits),
-		cmocka_unit_test(what_is_no_origin_is_refused),
-		cmocka_unit_test(tokens_are_found_in_any_bytes),
-		cmocka_unit_test(changed_tokens_are_others_or_none),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * Tests of lib/record/export/interpolators.c: where a blade advances, on motions that are known,
  * and what noise makes of it.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <incise/clock.h>
 #include "../../../lib/base/random.h"
@@ -142,7 +138,7 @@ static int wrong(const struct motion *motion, double noise_mm, uint64_t key, int
  * Both conditions are at 95 %: of the records on each motion one in twenty is wrong at most, with
  * much noise or little.
  */
-static void test_motions(void **state)
+TEST(test_motions)
 {
 	static const double noises_mm[] = {0.002, 0.02, 0.05};
 
@@ -160,7 +156,7 @@ static void test_motions(void **state)
 }
 
 /* The velocity's noise is what is said of it. */
-static void test_velocity_noise(void **state)
+TEST(test_velocity_noise)
 {
 	static const double rates[] = {60, 120, 240};
 	const double noise_mm = 0.02;
@@ -197,7 +193,7 @@ static void test_velocity_noise(void **state)
 	}
 }
 
-static void test_unknown(void **state)
+TEST(test_unknown)
 {
 	struct incise_progress progress = {.normal = {0, 0, 1}};
 	struct incise_smooth_record record = {.depth_mm = 1,
@@ -215,15 +211,4 @@ static void test_unknown(void **state)
 	assert_true(incise_progress_add(&progress, &record, 100));
 	record.depth_mm = NAN;
 	assert_false(incise_progress_add(&progress, &record, 100));
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_motions),
-		cmocka_unit_test(test_velocity_noise),
-		cmocka_unit_test(test_unknown),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

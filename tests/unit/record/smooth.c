@@ -3,11 +3,7 @@
  * Tests of lib/record/export/interpolators.c: the smoother: velocity against what theory says of it, for sines, straight
  * ways, gaps and noise.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include "../../../lib/record/export/interpolators.h"
@@ -68,7 +64,7 @@ static double gain(double rate_hz, double hz)
 	       (1 + pow(2 * sin(half), 6) / pow(index * cos(half), 2));
 }
 
-static void a_sine_comes_out_as_theory_says(void **state)
+TEST(a_sine_comes_out_as_theory_says)
 {
 	static const struct sine cases[] = {
 		{60, 1},  {60, 9},     {120, 2},  {120, 10}, {120, 16.8}, {120, 30},
@@ -116,7 +112,7 @@ static struct incise_smooth_record straight(int i, void *way)
 	return record;
 }
 
-static void a_straight_way_is_exact(void **state)
+TEST(a_straight_way_is_exact)
 {
 	run(240, RECORDS, straight, NULL);
 	for (int i = 0; i < RECORDS; i++) {
@@ -133,7 +129,7 @@ static void a_straight_way_is_exact(void **state)
 	}
 }
 
-static void few_records_are_enough(void **state)
+TEST(few_records_are_enough)
 {
 	for (int n = 0; n < 12; n++) {
 		run(240, n, straight, NULL);
@@ -164,7 +160,7 @@ static struct incise_smooth_record noisy(int i, void *way)
 	return record;
 }
 
-static void noise_is_told(void **state)
+TEST(noise_is_told)
 {
 	double noise = 0, depth = 0, v = 0;
 	int n = 600;
@@ -188,16 +184,4 @@ static void noise_is_told(void **state)
 		/* 600 records have some 100 independent velocities: 7 % of the sd */
 		assert_true(fabs(sqrt(v / sum) / 0.02 - 1) < 0.2);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_sine_comes_out_as_theory_says),
-		cmocka_unit_test(a_straight_way_is_exact),
-		cmocka_unit_test(few_records_are_enough),
-		cmocka_unit_test(noise_is_told),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

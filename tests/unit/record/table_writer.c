@@ -3,15 +3,11 @@
  * Tests of lib/record/export/table_writer.c and of the CSV that comes of it: numbers are held
  * against printf(3), blocks against rows given one by one.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
+#include "../unit.h"
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/record/export/table_writer.h"
 
@@ -67,7 +63,7 @@ static void end(struct incise_table *table, FILE *out)
 }
 
 /* Ties, carries, signs, what does not fit the fast way, and a random walk over sizes. */
-static void numbers_are_those_of_printf(void **state)
+TEST(numbers_are_those_of_printf)
 {
 	static const double special[] = {
 		0,	  -0.0,	     0.5,	   0.00005,	0.00015,    0.00025,
@@ -104,7 +100,7 @@ static void numbers_are_those_of_printf(void **state)
 	free(text);
 }
 
-static void names_are_quoted_and_provenance_is_comments(void **state)
+TEST(names_are_quoted_and_provenance_is_comments)
 {
 	struct incise_provenance provenance = {0};
 	struct incise_table table;
@@ -128,7 +124,7 @@ static void names_are_quoted_and_provenance_is_comments(void **state)
 	free(text);
 }
 
-static void nothing_is_written_before_a_row(void **state)
+TEST(nothing_is_written_before_a_row)
 {
 	struct incise_table table;
 	FILE *out = begin(&table, NULL);
@@ -138,7 +134,7 @@ static void nothing_is_written_before_a_row(void **state)
 	free(text);
 }
 
-static void a_full_disk_is_told(void **state)
+TEST(a_full_disk_is_told)
 {
 	struct incise_error err = {0};
 	struct incise_table table;
@@ -152,16 +148,4 @@ static void a_full_disk_is_told(void **state)
 	assert_int_equal(err.code, ENOSPC);
 	incise_table_close(&table);
 	fclose(out);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(numbers_are_those_of_printf),
-		cmocka_unit_test(names_are_quoted_and_provenance_is_comments),
-		cmocka_unit_test(nothing_is_written_before_a_row),
-		cmocka_unit_test(a_full_disk_is_told),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

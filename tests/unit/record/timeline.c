@@ -6,11 +6,7 @@
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include "../../../lib/record/time/timeline.h"
 #include "stream.h"
 
@@ -70,7 +66,7 @@ static bool line_of(const struct incise_timeline *timeline, struct line *line)
 	return true;
 }
 
-static void latency_is_taken_off(void **state)
+TEST(latency_is_taken_off)
 {
 	struct incise_timeline timeline;
 
@@ -79,7 +75,7 @@ static void latency_is_taken_off(void **state)
 	assert_int_equal(incise_timeline_sample(&timeline, 1, 1008333333), 1004133333);
 }
 
-static void times_always_increase(void **state)
+TEST(times_always_increase)
 {
 	static const struct {
 		int64_t arrival_ns, acquired_ns;
@@ -207,7 +203,7 @@ static struct stream stream_of(double rate_hz, enum jitter jitter, uint64_t seed
  * Issue 8: ±200 ppm, 0 to 20 ms of jitter, 4 to 40 ms of delay: 0.5 ms root mean square, and
  * the stated uncertainty covers 95 %.
  */
-static void arrivals_are_enough(void **state)
+TEST(arrivals_are_enough)
 {
 	static const double rates_hz[] = {60, 120, 240, 1000, 10000};
 	struct errors all_live = {0}, all_after = {0};
@@ -254,7 +250,7 @@ static void arrivals_are_enough(void **state)
 }
 
 /* A grid of 20 ms hides up to 3.3 ms of a camera of 60 Hz: that is said, not hidden. */
-static void grids_are_admitted(void **state)
+TEST(grids_are_admitted)
 {
 	struct errors live = {0}, after = {0};
 	struct incise_timeline timeline;
@@ -277,7 +273,7 @@ static void grids_are_admitted(void **state)
  * arrives unhindered, and the shape of the lower end shows it. (With 10000 Hz and jitter of
  * its own for each sample the queue could not be distinguished from a longer delay.)
  */
-static void queues_are_seen(void **state)
+TEST(queues_are_seen)
 {
 	struct errors live = {0}, after = {0};
 	struct incise_timeline timeline;
@@ -296,7 +292,7 @@ static void queues_are_seen(void **state)
 }
 
 /* Kernel timestamps with the jitter of an interrupt: 0.1 ms, most of it the delay's. */
-static void timestamps_are_used(void **state)
+TEST(timestamps_are_used)
 {
 	for (int seed = 0; seed < 8; seed++) {
 		struct stream stream = stream_of(1000, EXPONENTIAL, (uint64_t)seed);
@@ -332,7 +328,7 @@ static void timestamps_are_used(void **state)
 }
 
 /* The delay's own uncertainty is part of what is said. */
-static void delay_is_uncertain(void **state)
+TEST(delay_is_uncertain)
 {
 	struct errors live = {0}, after = {0};
 	struct incise_timeline timeline;
@@ -353,7 +349,7 @@ static void delay_is_uncertain(void **state)
 }
 
 /* A crystal that warms up by 20 ppm in 10 minutes; more knots than one line's. */
-static void drift_is_followed(void **state)
+TEST(drift_is_followed)
 {
 	struct stream stream = stream_of(240, UNIFORM, 7);
 	struct errors live = {0}, after = {0};
@@ -378,7 +374,7 @@ static void drift_is_followed(void **state)
 }
 
 /* Numbers that are missing do not shift the line, nor does a latency of 10 s. */
-static void gaps_and_stalls(void **state)
+TEST(gaps_and_stalls)
 {
 	struct stream stream = stream_of(120, EXPONENTIAL, 11);
 	struct incise_timeline_setup setup = setup_of(&stream);
@@ -414,7 +410,7 @@ static void gaps_and_stalls(void **state)
 }
 
 /* Plugged in again: numbers go on, the phase is another, and the rate is still known. */
-static void new_line_after_replug(void **state)
+TEST(new_line_after_replug)
 {
 	struct stream stream = stream_of(240, UNIFORM, 12);
 	struct incise_timeline_setup setup = setup_of(&stream);
@@ -456,7 +452,7 @@ static void new_line_after_replug(void **state)
 }
 
 /* Records that were lost uncounted: after the blocks' length the new level is believed. */
-static void level_changes_for_good(void **state)
+TEST(level_changes_for_good)
 {
 	struct stream stream = stream_of(120, EXPONENTIAL, 13);
 	struct incise_timeline_setup setup = setup_of(&stream);
@@ -483,7 +479,7 @@ static void level_changes_for_good(void **state)
 }
 
 /* An hour, and lines without end: memory is bounded, knots go on in number and time. */
-static void memory_is_bounded(void **state)
+TEST(memory_is_bounded)
 {
 	struct incise_timeline_setup setup = {.rate_hz = 10};
 	struct incise_timeline_knot knots[KNOTS];
@@ -514,7 +510,7 @@ static void memory_is_bounded(void **state)
 }
 
 /* Whatever comes, times go on. */
-static void hostile_streams(void **state)
+TEST(hostile_streams)
 {
 	static const double rates_hz[] = {NAN,	   INFINITY, -INFINITY, 0,   -1, 1e-3,
 					  DBL_MIN, DBL_MAX,  1e7,	100, 1e4};
@@ -590,7 +586,7 @@ static void hostile_streams(void **state)
 }
 
 /* Unknown values are NaN, and there is no line without samples. */
-static void nothing_is_made_up(void **state)
+TEST(nothing_is_made_up)
 {
 	struct incise_timeline_setup setup = {.rate_hz = NAN};
 	struct incise_timeline_knot knots[KNOTS];
@@ -617,7 +613,7 @@ static void nothing_is_made_up(void **state)
 
 /* --- times between knots ------------------------------------------------------------- */
 
-static void between_and_beyond(void **state)
+TEST(between_and_beyond)
 {
 	/*  one line: 100 ns, then 110 ns a sample     plugged in again at 300 */
 	static const struct incise_timeline_knot knots[] = {
@@ -640,7 +636,7 @@ static void between_and_beyond(void **state)
 }
 
 /* A device that is exact: its knots and its line are exact, too. */
-static void exact_device(void **state)
+TEST(exact_device)
 {
 	struct incise_timeline_setup setup = {.rate_hz = 100, .delay_ns = 5000000};
 	struct incise_timeline_knot knots[INCISE_TIMELINE_KNOTS + 3];
@@ -668,28 +664,4 @@ static void exact_device(void **state)
 	assert_int_equal(line.seq, 50);
 	assert_in_range(line.ns - 6995000000 + 100, 90, 110);
 	assert_in_range((int64_t)(line.period_ns * 1000), 10000999990, 10001000010);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(latency_is_taken_off),
-		cmocka_unit_test(times_always_increase),
-		cmocka_unit_test(arrivals_are_enough),
-		cmocka_unit_test(grids_are_admitted),
-		cmocka_unit_test(queues_are_seen),
-		cmocka_unit_test(timestamps_are_used),
-		cmocka_unit_test(delay_is_uncertain),
-		cmocka_unit_test(drift_is_followed),
-		cmocka_unit_test(gaps_and_stalls),
-		cmocka_unit_test(new_line_after_replug),
-		cmocka_unit_test(level_changes_for_good),
-		cmocka_unit_test(memory_is_bounded),
-		cmocka_unit_test(hostile_streams),
-		cmocka_unit_test(nothing_is_made_up),
-		cmocka_unit_test(between_and_beyond),
-		cmocka_unit_test(exact_device),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

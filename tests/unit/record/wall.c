@@ -9,14 +9,10 @@
  */
 #include <errno.h>
 #include <math.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
+#include "../unit.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 #include <incise/wall.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/record/time/wall_follow.h"
@@ -261,7 +257,7 @@ static int64_t check_truth(const struct recorded *r, uint64_t seed, int *small)
  * Two machines 50 ppm and 3 s apart see the same events. The bounds: 20 µs of the source, held for
  * up to 60 s at 10 ppm, 2 s after a suspend of 30 s, which itself is the hull of both parts.
  */
-static void events_of_two_machines_agree(void **state)
+TEST(events_of_two_machines_agree)
 {
 	for (uint64_t seed = 1; seed <= 100; seed++) {
 		static struct recorded a, b;
@@ -349,7 +345,7 @@ static void bound_holds(const struct incise_wall *wall, double mono_s, double ta
 }
 
 /* One of both parts is wrong by 1 s, and nothing says which. */
-static void step_of_a_synchronised_clock_widens_all(void **state)
+TEST(step_of_a_synchronised_clock_widens_all)
 {
 	const struct incise_wall_point points[] = {
 		point(0, 0, 5e6, ""),
@@ -368,7 +364,7 @@ static void step_of_a_synchronised_clock_widens_all(void **state)
 }
 
 /* A correction within its bounds contradicts nothing. */
-static void correction_within_the_bounds_widens_nothing(void **state)
+TEST(correction_within_the_bounds_widens_nothing)
 {
 	const struct incise_wall_point points[] = {
 		point(0, 0, 5e6, ""),
@@ -384,7 +380,7 @@ static void correction_within_the_bounds_widens_nothing(void **state)
 	incise_wall_free(wall);
 }
 
-static void unknown_and_far_times(void **state)
+TEST(unknown_and_far_times)
 {
 	const struct incise_wall_point points[] = {
 		point(0, 0, INFINITY, ""),
@@ -412,7 +408,7 @@ static void unknown_and_far_times(void **state)
 }
 
 /* After a step backwards two times have the same TAI. */
-static void inverse_contains_both_times(void **state)
+TEST(inverse_contains_both_times)
 {
 	const struct incise_wall_point points[] = {
 		point(0, 0, 1000, ""),
@@ -433,7 +429,7 @@ static void inverse_contains_both_times(void **state)
 	incise_wall_free(wall);
 }
 
-static void text_of_utc(void **state)
+TEST(text_of_utc)
 {
 	char text[INCISE_WALL_TEXT];
 
@@ -441,18 +437,4 @@ static void text_of_utc(void **state)
 	assert_string_equal(text, "2027-01-15T08:00:00.000000005Z");
 	incise_wall_utc_text(-1, 0, text);
 	assert_string_equal(text, "1969-12-31T23:59:59.999999999Z");
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(step_of_a_synchronised_clock_widens_all),
-		cmocka_unit_test(correction_within_the_bounds_widens_nothing),
-		cmocka_unit_test(unknown_and_far_times),
-		cmocka_unit_test(inverse_contains_both_times),
-		cmocka_unit_test(text_of_utc),
-		cmocka_unit_test(events_of_two_machines_agree),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,6 +12,7 @@
 #include "../../../lib/device/axes.h"
 #include "../../../lib/scene/plan.h"
 #include "../message.h"
+#include "../unit.h"
 
 /* An actuator that keeps its requests, and reports the status that a test gives it. */
 struct reported {
@@ -69,7 +70,7 @@ static struct incise_plan plan_on(struct reported *reported)
 	};
 }
 
-static void test_the_nut_goes_where_its_spring_gives_the_force(void **state)
+TEST(test_the_nut_goes_where_its_spring_gives_the_force)
 {
 	static const struct {
 		double handle_mm, force_N[3], target_mm;
@@ -111,7 +112,7 @@ static void test_the_nut_goes_where_its_spring_gives_the_force(void **state)
 }
 
 /* Where the actuator does not measure its handle, the tracker does. */
-static void test_the_pose_says_where_the_handle_is(void **state)
+TEST(test_the_pose_says_where_the_handle_is)
 {
 	static const struct {
 		double tool_mm[3], nut_mm;
@@ -146,7 +147,7 @@ static void test_the_pose_says_where_the_handle_is(void **state)
 }
 
 /* A latched fault ends the ticks, and is reported. */
-static void test_a_fault_of_the_actuator_is_named(void **state)
+TEST(test_a_fault_of_the_actuator_is_named)
 {
 	static const struct {
 		int status_rc, set_rc;
@@ -193,7 +194,7 @@ static void test_a_fault_of_the_actuator_is_named(void **state)
 	}
 }
 
-static void test_an_actuator_that_lies_or_fails(void **state)
+TEST(test_an_actuator_that_lies_or_fails)
 {
 	struct reported reported;
 	struct incise_plan plan = plan_on(&reported);
@@ -311,7 +312,7 @@ static void put_axes(struct incise_plan *plan, struct reported *reported, int n,
  */
 #define ROUNDING_N 1e-12
 
-static void test_forces_are_the_least_squares_solution(void **state)
+TEST(test_forces_are_the_least_squares_solution)
 {
 	uint64_t seed = 5;
 
@@ -359,7 +360,7 @@ static void test_forces_are_the_least_squares_solution(void **state)
 }
 
 /* To the bit: right angles, and one direction of any rounding. */
-static void test_no_rounding_where_none_is_needed(void **state)
+TEST(test_no_rounding_where_none_is_needed)
 {
 	static const double frame[3][3] = {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}};
 	double dual[3][3], one[1][3];
@@ -379,7 +380,7 @@ static void test_no_rounding_where_none_is_needed(void **state)
 }
 
 /* One of two fails: all go to rest, and it is the one that is named. */
-static void test_a_fault_of_one_is_the_end_of_all(void **state)
+TEST(test_a_fault_of_one_is_the_end_of_all)
 {
 	static const double frame[2][3] = {{0, 0, 1}, {0, 1, 0}};
 	static const struct {
@@ -438,7 +439,7 @@ static void test_a_fault_of_one_is_the_end_of_all(void **state)
 }
 
 /* After the last tick: each is released, and a refusal is named. */
-static void test_all_are_released(void **state)
+TEST(test_all_are_released)
 {
 	static const double frame[3][3] = {{0, 0, 1}, {0, 1, 0}, {1, 0, 0}};
 	struct reported reported[3];
@@ -453,20 +454,4 @@ static void test_all_are_released(void **state)
 		assert_true(reported[i].sets == 1 && reported[i].target_mm == 10);
 	incise_plan_cause(&plan, text, sizeof(text));
 	assert_says(text, "motor 2:");
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_the_nut_goes_where_its_spring_gives_the_force),
-		cmocka_unit_test(test_the_pose_says_where_the_handle_is),
-		cmocka_unit_test(test_a_fault_of_the_actuator_is_named),
-		cmocka_unit_test(test_an_actuator_that_lies_or_fails),
-		cmocka_unit_test(test_forces_are_the_least_squares_solution),
-		cmocka_unit_test(test_no_rounding_where_none_is_needed),
-		cmocka_unit_test(test_a_fault_of_one_is_the_end_of_all),
-		cmocka_unit_test(test_all_are_released),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,6 +10,7 @@
 #include <incise/backend.h>
 #include <incise/plan.h>
 #include "../message.h"
+#include "../unit.h"
 #include "../base/temp_file.h"
 
 #define DEVICES (INCISE_RIG_TRACKER | INCISE_RIG_STEPPER)
@@ -69,7 +70,7 @@ static int plan_wall(const char *rig_text, double wall_N_mm, int late_ticks, dou
 #define VIRTUAL "clock = \"simulated\"; tracker = \"sim:\"; stepper = \"sim:\"; "
 static const char one[] = VIRTUAL, two[] = VIRTUAL "sim = { axes = 2; };";
 
-static void each_actuator_has_its_own_limit(void **state)
+TEST(each_actuator_has_its_own_limit)
 {
 	struct incise_plan_stability s, alone;
 	struct incise_error err = {0};
@@ -96,7 +97,7 @@ static void each_actuator_has_its_own_limit(void **state)
 }
 
 /* A wall that the first actuator holds, and the second does not. */
-static void the_worst_actuator_decides(void **state)
+TEST(the_worst_actuator_decides)
 {
 	struct incise_plan_stability s;
 	struct incise_error err = {0};
@@ -117,7 +118,7 @@ static void the_worst_actuator_decides(void **state)
 }
 
 /* At 60 degrees each pushes up to 1 / sin 60° times the force. */
-static void actuators_that_push_against_each_other(void **state)
+TEST(actuators_that_push_against_each_other)
 {
 	static const char text[] =
 		VIRTUAL "surface = { normal = [0.0, 0.5, 0.8660254037844386]; };"
@@ -136,15 +137,4 @@ static void actuators_that_push_against_each_other(void **state)
 	assert_int_equal(plan_wall(one, wall_N_mm, 0, 0, &s, &err), 0);
 	assert_int_equal(plan_wall(text, wall_N_mm, 0, 0, &s, &err), -EDOM);
 	assert_int_equal(plan_wall(text, wall_N_mm / more, 0, 0, &s, &err), 0);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(each_actuator_has_its_own_limit),
-		cmocka_unit_test(the_worst_actuator_decides),
-		cmocka_unit_test(actuators_that_push_against_each_other),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -5,11 +5,7 @@
  * formula stands here and shows why. Then the phases of each force, and the manual pages. Those in
  * integers are compared with these in tests/unit/fixed.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -181,7 +177,7 @@ static void printed_fxz(double f[3], double k, const double p[3], const double q
 }
 
 /* Each adds to what is there already. */
-static void test_formulas(void **state)
+TEST(test_formulas)
 {
 	srand(1);
 	for (int c = 0; c < CASES; c++) {
@@ -228,7 +224,7 @@ static void test_formulas(void **state)
 }
 
 /* "The user feels greater resistance as the scalpel is penetrated deeper into the skin." */
-static void test_reaction_is_outward_and_grows(void **state)
+TEST(test_reaction_is_outward_and_grows)
 {
 	srand(2);
 	for (int c = 0; c < CASES; c++) {
@@ -246,7 +242,7 @@ static void test_reaction_is_outward_and_grows(void **state)
 }
 
 /* "A correction force is applied whenever the scalpel drifts from the plane." */
-static void test_plane_is_free_within_and_opposes_leaving(void **state)
+TEST(test_plane_is_free_within_and_opposes_leaving)
 {
 	srand(3);
 	for (int c = 0; c < CASES; c++) {
@@ -270,7 +266,7 @@ static void test_plane_is_free_within_and_opposes_leaving(void **state)
 }
 
 /* As printed, +Kd V, it would drive the blade on: F·v = Kd v² > 0. */
-static void test_damping_takes_power(void **state)
+TEST(test_damping_takes_power)
 {
 	srand(4);
 	for (int c = 0; c < CASES; c++) {
@@ -287,7 +283,7 @@ static void test_damping_takes_power(void **state)
  * across the cut. Turned by t about the normal of the surface it is aligned +
  * (1 - aligned) |sin t|.
  */
-static void test_orientation(void **state)
+TEST(test_orientation)
 {
 	static const double along[3] = {1, 0, 0};
 
@@ -308,7 +304,7 @@ static void test_orientation(void **state)
 }
 
 /* "Proportional to the distance of the instrument from its initial contact position." */
-static void test_spread_is_proportional(void **state)
+TEST(test_spread_is_proportional)
 {
 	static const double n[3] = {0, 0, 1}, p0[3] = {3, -2, 0};
 
@@ -327,7 +323,7 @@ static void test_spread_is_proportional(void **state)
  * The print of Fxz: contact starts on the surface, Q(0) = P(0), so its last factor is 0
  * and the force is zero for ever, wherever the instrument goes. Ours is not.
  */
-static void test_printed_spread_is_zero_for_ever(void **state)
+TEST(test_printed_spread_is_zero_for_ever)
 {
 	static const double n[3] = {0, 0, 1}, p0[3] = {3, -2, 0};
 	double f[3], ours[3] = {0}, late[3] = {3, -2, -0.1};
@@ -352,7 +348,7 @@ static void test_printed_spread_is_zero_for_ever(void **state)
 }
 
 /* On a plane the printed depth is ours: P(0) lies in it, whatever the way. */
-static void test_printed_depth_on_a_plane(void **state)
+TEST(test_printed_depth_on_a_plane)
 {
 	srand(6);
 	for (int c = 0; c < CASES; c++) {
@@ -376,7 +372,7 @@ static void test_printed_depth_on_a_plane(void **state)
  * blade in with 0.90 N. Pressed in by 3 mm there, it still pulls, with 0.15 N, where skin
  * pushes with 0.75 N.
  */
-static void test_printed_depth_on_a_sphere_pulls_in(void **state)
+TEST(test_printed_depth_on_a_sphere_pulls_in)
 {
 	static const struct {
 		double depth_mm, printed_N, ours_N;
@@ -430,7 +426,7 @@ static struct incise_tick tick_in(enum incise_phase phase)
 }
 
 /* Also that no force is without a case here. */
-static void test_each_force_has_its_phases(void **state)
+TEST(test_each_force_has_its_phases)
 {
 	static const struct {
 		const char *name;
@@ -480,7 +476,7 @@ static void test_each_force_has_its_phases(void **state)
 }
 
 /* 2 mm deep with 0.75 N/mm, in a cut of 1.5 mm. */
-static void test_insertion_by_turn_and_opening(void **state)
+TEST(test_insertion_by_turn_and_opening)
 {
 	/* A quarter turn about z lays the flat across the cut. */
 	static const double as_is[4] = {1, 0, 0, 0},
@@ -527,7 +523,7 @@ static void test_insertion_by_turn_and_opening(void **state)
 	}
 }
 
-static void test_tissue_does_not_pull_and_gain_counts(void **state)
+TEST(test_tissue_does_not_pull_and_gain_counts)
 {
 	const struct incise_scene scene = {
 		.cut[INCISE_CUT] = {.n_inputs = 2,
@@ -574,7 +570,7 @@ static char *page(const char *name)
 }
 
 /* Each number of a force is in incise-scene(5), its stage there and in incise-haptic(1). */
-static void test_manual_has_each_force(void **state)
+TEST(test_manual_has_each_force)
 {
 	char *scene = page("incise-scene.5"), *haptic = page("incise-haptic.1"), item[64];
 
@@ -596,25 +592,4 @@ static void test_manual_has_each_force(void **state)
 	}
 	free(scene);
 	free(haptic);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_formulas),
-		cmocka_unit_test(test_reaction_is_outward_and_grows),
-		cmocka_unit_test(test_plane_is_free_within_and_opposes_leaving),
-		cmocka_unit_test(test_damping_takes_power),
-		cmocka_unit_test(test_orientation),
-		cmocka_unit_test(test_spread_is_proportional),
-		cmocka_unit_test(test_printed_spread_is_zero_for_ever),
-		cmocka_unit_test(test_printed_depth_on_a_plane),
-		cmocka_unit_test(test_printed_depth_on_a_sphere_pulls_in),
-		cmocka_unit_test(test_each_force_has_its_phases),
-		cmocka_unit_test(test_insertion_by_turn_and_opening),
-		cmocka_unit_test(test_tissue_does_not_pull_and_gain_counts),
-		cmocka_unit_test(test_manual_has_each_force),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

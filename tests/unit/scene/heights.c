@@ -13,6 +13,7 @@
 #include "../../../lib/surface/surface.h"
 #include "../cases.h"
 #include "../message.h"
+#include "../unit.h"
 
 #define ONE 65536.0
 #define UNIT 1073741824.0
@@ -227,7 +228,7 @@ static void check(const char *name, struct incise_surface *surface, double reach
 	incise_surface_free(surface);
 }
 
-static void test_bounds_hold(void **state)
+TEST(test_bounds_hold)
 {
 	static const struct {
 		const char *name;
@@ -291,7 +292,7 @@ static struct incise_surface *layers(void)
 	return surface;
 }
 
-static void test_refusals(void **state)
+TEST(test_refusals)
 {
 	static const struct sheet steep = {60, 60, 60, 60, cliff},
 				  flat = {60, 60, 4, 4, wide},
@@ -310,7 +311,7 @@ static void test_refusals(void **state)
 }
 
 /* Where the mesh has a hole there is no height, and beyond its border neither. */
-static void test_holes_have_no_height(void **state)
+TEST(test_holes_have_no_height)
 {
 	static const struct sheet flat = {60, 60, 60, 60, wide};
 	struct incise_surface *surface = sheet_surface(&flat);
@@ -351,15 +352,4 @@ static void test_holes_have_no_height(void **state)
 	incise_heights_free(&heights);
 	mesh_free(hole.mesh);
 	incise_surface_free(surface);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_bounds_hold),
-		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_holes_have_no_height),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,11 +9,7 @@
  *
  * mk/test.mk lets the linker send the allocations of this program here (--wrap).
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <signal.h>
 #include <string.h>
@@ -152,7 +148,7 @@ static int run_jailed(struct prepared *prepared, int n, bool break_out,
 	return status;
 }
 
-static void test_ticks_in_jail(void **state)
+TEST(test_ticks_in_jail)
 {
 	static const char *const names[] = {"plane", "large mesh"};
 	struct prepared prepared[4];
@@ -199,13 +195,4 @@ static void test_ticks_in_jail(void **state)
 	assert_true(WIFSIGNALED(broken));
 	assert_int_equal(WTERMSIG(broken), SIGKILL);
 	assert_int_equal(none.ticks, 0);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_ticks_in_jail),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

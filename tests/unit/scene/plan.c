@@ -13,6 +13,7 @@
 #include "../../../lib/tissue/front.h"
 #include <time.h>
 #include "../message.h"
+#include "../unit.h"
 #include "fed.h"
 #include "../../../lib/sim/sim.h"
 
@@ -33,7 +34,7 @@ static double size(const double v[3])
 	return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-static void test_stages(void **state)
+TEST(test_stages)
 {
 	static const char *const want[] = {"pose",  "predict", "contact", "reaction",
 					   "start", "limit",   "actuate"};
@@ -49,7 +50,7 @@ static void test_stages(void **state)
 	}
 }
 
-static void test_needs_a_tracker(void **state)
+TEST(test_needs_a_tracker)
 {
 	struct incise_error err = {0};
 	struct incise_rig *none =
@@ -64,7 +65,7 @@ static void test_needs_a_tracker(void **state)
 }
 
 /* The line that refuses a model names the scene that asks for it. */
-static void test_a_refused_model_names_its_scene(void **state)
+TEST(test_a_refused_model_names_its_scene)
 {
 	struct incise_model *triangles = paper_model(INCISE_MF_TRI, 1, 0.1);
 	struct incise_error err = {0};
@@ -104,7 +105,7 @@ static double front_N(struct incise_front *front, const struct incise_plan_stabi
 }
 
 /* One whole cut of the virtual surgeon, in both evaluators. */
-static void test_against_truth(void **state)
+TEST(test_against_truth)
 {
 	static const char *const evaluators[] = {"double", "fixed"};
 
@@ -207,7 +208,7 @@ static int lying_tracker(struct incise_tracker *tracker,
 	return 2;
 }
 
-static void test_any_pose_gives_a_force_within_limits(void **state)
+TEST(test_any_pose_gives_a_force_within_limits)
 {
 	static const char *const evaluators[] = {"double", "fixed"};
 
@@ -257,7 +258,7 @@ static void press(struct felt *f)
 	assert_true(t.command_N[2] > 0.1);
 }
 
-static void test_stalled_tracker_fades_out(void **state)
+TEST(test_stalled_tracker_fades_out)
 {
 	struct incise_tracker_ops ops;
 	struct incise_tick t;
@@ -297,7 +298,7 @@ static int gone_stepper(struct incise_stepper *stepper,
 	return -EIO;
 }
 
-static void test_fault_is_zero_force_for_good(void **state)
+TEST(test_fault_is_zero_force_for_good)
 {
 	for (int which = 0; which < 2; which++) {
 		struct incise_tracker_ops tracker;
@@ -367,7 +368,7 @@ static void fed_end(struct fed *fed)
 	incise_scene_free(fed->scene);
 }
 
-static void test_feed(void **state)
+TEST(test_feed)
 {
 	struct fed fed = fed_start("scenes/neck.scene", true);
 	struct incise_tracker_sample poses[40];
@@ -406,7 +407,7 @@ static void test_feed(void **state)
 }
 
 /* A whole stroke in one call is the same, to the bit, as feeding and ticking one by one. */
-static void test_run_is_feed_and_tick(void **state)
+TEST(test_run_is_feed_and_tick)
 {
 	enum { POSES = 240, TICKS = 2000 };
 	struct fed fed = fed_start("scenes/neck.scene", true);
@@ -456,7 +457,7 @@ static void test_run_is_feed_and_tick(void **state)
 }
 
 /* The scalpel's attitude is reported with each tick, whichever end of it is held. */
-static void test_attitude(void **state)
+TEST(test_attitude)
 {
 	static const double turned[4] = {0.6, 0, 0.8, 0};
 	static const enum incise_tool tools[] = {INCISE_TOOL_BLADE, INCISE_TOOL_HANDLE};
@@ -485,7 +486,7 @@ static void test_attitude(void **state)
 }
 
 /* A pose from the future is one of now: it does not keep the later ones out. */
-static void test_feed_from_the_future(void **state)
+TEST(test_feed_from_the_future)
 {
 	struct fed fed = fed_start("scenes/wall.scene", true);
 	struct incise_tracker_sample pose = {.t_ns = INT64_MAX, .quaternion = {1}};
@@ -504,7 +505,7 @@ static void test_feed_from_the_future(void **state)
 	fed_end(&fed);
 }
 
-static void test_set_tool(void **state)
+TEST(test_set_tool)
 {
 	struct fed neck = fed_start("scenes/neck.scene", true);
 	struct fed wall = fed_start("scenes/wall.scene", true);
@@ -536,7 +537,7 @@ static void test_set_tool(void **state)
 }
 
 /* The handle's end stays where it is while poses are missing, and the tip too. */
-static void test_stale_handle(void **state)
+TEST(test_stale_handle)
 {
 	struct fed fed = fed_start("scenes/neck.scene", true);
 	struct incise_tracker_sample pose = {.position_mm = {10, 0, 40},
@@ -561,7 +562,7 @@ static void test_stale_handle(void **state)
 	fed_end(&fed);
 }
 
-static void test_getters(void **state)
+TEST(test_getters)
 {
 	struct fed fixed = fed_start("scenes/neck.scene", true);
 	struct fed exact = fed_start("scenes/neck.scene", false);
@@ -612,7 +613,7 @@ static void test_getters(void **state)
 }
 
 /* A faster tracker holds more; what is no tracker is refused. */
-static void test_fed_tracker(void **state)
+TEST(test_fed_tracker)
 {
 	static const struct incise_tracker_info fast = {
 		.name = "fast", .rate_hz = 240, .latency_ns = 2000000};
@@ -663,7 +664,7 @@ static void test_fed_tracker(void **state)
 }
 
 /* Without a surface in the scene the tissue is where it is said to be. */
-static void test_fed_plane(void **state)
+TEST(test_fed_plane)
 {
 	static const struct incise_tracker_info tracker = {
 		.name = "t", .rate_hz = 120, .stations = 1};
@@ -724,7 +725,7 @@ static int64_t now_ns(void)
 	return t.tv_sec * INT64_C(1000000000) + t.tv_nsec;
 }
 
-static void test_timed_tick_is_the_same(void **state)
+TEST(test_timed_tick_is_the_same)
 {
 	struct fed a = fed_start("scenes/neck.scene", true);
 	struct fed b = fed_start("scenes/neck.scene", true);
@@ -768,7 +769,7 @@ static void test_timed_tick_is_the_same(void **state)
 }
 
 /* Stages that a fault keeps from running take no time. */
-static void test_timed_fault(void **state)
+TEST(test_timed_fault)
 {
 	int64_t ns[INCISE_PLAN_STAGES_MAX];
 	struct incise_tracker_ops ops;
@@ -805,7 +806,7 @@ static double any_number(void)
 }
 
 /* Any poses and attitudes, and any tool, on the scene that has all of paper 2. */
-static void test_any_fed_pose_gives_a_force_within_limits(void **state)
+TEST(test_any_fed_pose_gives_a_force_within_limits)
 {
 	for (int fixed = 0; fixed < 2; fixed++) {
 		struct fed fed = fed_start("scenes/neck.scene", fixed);
@@ -851,31 +852,4 @@ static void test_any_fed_pose_gives_a_force_within_limits(void **state)
 		assert_true(phases[INCISE_PHASE_INSERTION] > 1000);
 		fed_end(&fed);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_stages),
-		cmocka_unit_test(test_needs_a_tracker),
-		cmocka_unit_test(test_a_refused_model_names_its_scene),
-		cmocka_unit_test(test_against_truth),
-		cmocka_unit_test(test_any_pose_gives_a_force_within_limits),
-		cmocka_unit_test(test_stalled_tracker_fades_out),
-		cmocka_unit_test(test_fault_is_zero_force_for_good),
-		cmocka_unit_test(test_feed),
-		cmocka_unit_test(test_run_is_feed_and_tick),
-		cmocka_unit_test(test_attitude),
-		cmocka_unit_test(test_feed_from_the_future),
-		cmocka_unit_test(test_set_tool),
-		cmocka_unit_test(test_stale_handle),
-		cmocka_unit_test(test_getters),
-		cmocka_unit_test(test_fed_plane),
-		cmocka_unit_test(test_fed_tracker),
-		cmocka_unit_test(test_timed_tick_is_the_same),
-		cmocka_unit_test(test_timed_fault),
-		cmocka_unit_test(test_any_fed_pose_gives_a_force_within_limits),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,11 +10,7 @@
  *       │      └──── cut ────┘
  *       └─────10─────────────30──────────▶ x
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include "../../../lib/scene/plan.h"
 #include "fed.h"
 
@@ -252,7 +248,7 @@ static void turn_to(struct theatre *th, double about_z)
 	move(th, &to, 0.4, true);
 }
 
-static void test_procedure(void **state)
+TEST(test_procedure)
 {
 	struct theatre th;
 	struct held to;
@@ -343,7 +339,7 @@ static void test_procedure(void **state)
 }
 
 /* In the tissue a turn does not change the tool. A word does, when the force has faded. */
-static void test_change_in_the_tissue(void **state)
+TEST(test_change_in_the_tissue)
 {
 	struct theatre th;
 	struct held to;
@@ -371,7 +367,7 @@ static void test_change_in_the_tissue(void **state)
  * The tool changes out of the tissue while a force of the tissue is still on its way down. The way from one end of the scalpel to the other, 120 mm, is no
  * work of that force.
  */
-static void test_change_is_no_work(void **state)
+TEST(test_change_is_no_work)
 {
 	struct theatre th;
 	struct held to;
@@ -460,7 +456,7 @@ static double tube_N(double share, double cut_mm, double depth_mm, double membra
  * easier; the hardest where there is none. Beside the airway the tissue below the cut holds up like
  * skin.
  */
-static void test_tube_where_and_after_what(void **state)
+TEST(test_tube_where_and_after_what)
 {
 	const double tight = ALIGNED + (1 - ALIGNED) * (TUBE_MM - STRETCH_MM) / TUBE_MM;
 	const double on_N = PUNCTURE_N / YIELDS_MM * (12 - MEMBRANE_MM);
@@ -498,7 +494,7 @@ static void test_tube_where_and_after_what(void **state)
 }
 
 /* Through the membrane, which yields at 0.8 N and stays open; in the airway; on its back wall. */
-static void test_through_the_membrane(void **state)
+TEST(test_through_the_membrane)
 {
 	const double skin_N = tube_N(ALIGNED, 6, MEMBRANE_MM, 0);
 	struct theatre th;
@@ -529,7 +525,7 @@ static void test_through_the_membrane(void **state)
 }
 
 /* A cut too short for the tube, or none, stops it like skin; so does a shallow one below its floor. */
-static void test_stopped_like_skin(void **state)
+TEST(test_stopped_like_skin)
 {
 	static const struct {
 		double half_mm, cut_mm, cut_felt_mm;
@@ -552,7 +548,7 @@ static void test_stopped_like_skin(void **state)
 }
 
 /* A plan that replaces another one has its cuts, and its open membrane, in either arithmetic. */
-static void test_another_plan(void **state)
+TEST(test_another_plan)
 {
 	static const char *const arithmetics[] = {"fixed", "double", "double", "fixed"};
 	struct theatre th;
@@ -591,7 +587,7 @@ static void test_another_plan(void **state)
  * cut, to the bit. No poses come for 0.1 s after it, so that the
  * filter starts again and has no memory of where the hand was.
  */
-static void test_touch_elsewhere(void **state)
+TEST(test_touch_elsewhere)
 {
 	double force_N[3][3];
 
@@ -630,7 +626,7 @@ static void set_out(struct theatre *th, const struct held *to, double time_s)
  * The handle is leant over in the cut, its end at rest: at most 0.94 rad/s, with which the
  * tip 120 mm above goes at 113 mm/s. What is felt is the end's.
  */
-static void test_leaning_the_handle(void **state)
+TEST(test_leaning_the_handle)
 {
 	struct theatre th;
 	struct held to;
@@ -659,7 +655,7 @@ static void test_leaning_the_handle(void **state)
 }
 
 /* Snavg is the average over 8 ticks of this contact, and of no other. */
-static void test_averaged_normal(void **state)
+TEST(test_averaged_normal)
 {
 	static const double ways[][2] = {{-30, -12}, {-20, 8}, {30, -14}, {30, 10}};
 	double ring[8][3];
@@ -703,7 +699,7 @@ static void test_averaged_normal(void **state)
  * Half way along 40 mm in 2 s the blade goes at 10 π mm/s, and no faster a little before
  * or after. Damping opposes that with Kd v = 31.4 mN; the filter sees the speed to 1 %.
  */
-static void test_damping_on_the_way(void **state)
+TEST(test_damping_on_the_way)
 {
 	for (int way = 1; way >= -1; way -= 2) {
 		struct theatre th;
@@ -725,7 +721,7 @@ static void test_damping_on_the_way(void **state)
 }
 
 /* A contact ends leave_mm = 0.2 mm above the skin, and starts at it. */
-static void test_hysteresis(void **state)
+TEST(test_hysteresis)
 {
 	struct theatre th;
 	double begun = NAN, ended = NAN;
@@ -812,7 +808,7 @@ static int count_contacts(double z, const char *leave)
  * Extrapolation over 4 to 13 ms shows the noise of the poses three times as large: sd
  * 0.055 mm of 0.029, and at most 0.154 of 0.05. Each new contact would be a new cut.
  */
-static void test_noise_does_not_end_contacts(void **state)
+TEST(test_noise_does_not_end_contacts)
 {
 	int with = count_contacts(0, ""), half = count_contacts(0, "leave_mm = 0.1;");
 	int without = count_contacts(0, "leave_mm = 0.0;");
@@ -825,25 +821,4 @@ static void test_noise_does_not_end_contacts(void **state)
 	assert_true(without > 50 && half > 10);
 	/* Above the skin by more than the noise there is no contact at all. */
 	assert_int_equal(count_contacts(0.2, ""), 0);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_procedure),
-		cmocka_unit_test(test_change_in_the_tissue),
-		cmocka_unit_test(test_change_is_no_work),
-		cmocka_unit_test(test_tube_where_and_after_what),
-		cmocka_unit_test(test_through_the_membrane),
-		cmocka_unit_test(test_another_plan),
-		cmocka_unit_test(test_stopped_like_skin),
-		cmocka_unit_test(test_touch_elsewhere),
-		cmocka_unit_test(test_leaning_the_handle),
-		cmocka_unit_test(test_averaged_normal),
-		cmocka_unit_test(test_damping_on_the_way),
-		cmocka_unit_test(test_hysteresis),
-		cmocka_unit_test(test_noise_does_not_end_contacts),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -14,6 +14,7 @@
 #include "../../../tools/bench/closed_loop.h"
 #include "../cases.h"
 #include "../message.h"
+#include "../unit.h"
 
 struct loop {
 	const char *tissue; /* of the scene, beside the model */
@@ -120,7 +121,7 @@ static const double all_leans[] = {0.2, 0.6, 1.2, 1.8, 1.9, 2.0, 2.1, 2.2, 2.4, 
 #define N(array) ((int)(sizeof(array) / sizeof(*(array))))
 
 /* The leans on which the paper's formula swings for ever, and those around them. */
-static void test_liver_rests(void **state)
+TEST(test_liver_rests)
 {
 	struct loop loop = liver("");
 
@@ -130,7 +131,7 @@ static void test_liver_rests(void **state)
 }
 
 /* Devices and trackers: what is accepted rests, and of both there are some. */
-static void test_accepted_rests(void **state)
+TEST(test_accepted_rests)
 {
 	static const double leans[] = {0.3, 1.9};
 	static const struct {
@@ -179,7 +180,7 @@ static double after(const char *text, const char *words)
 }
 
 /* The paper's formula is refused with a gain and a damping that do rest. */
-static void test_refused_with_a_way_out(void **state)
+TEST(test_refused_with_a_way_out)
 {
 	struct loop paper = liver("withdrawal = \"paper\";"), loop = paper;
 	struct incise_error err = {0}, none = {0};
@@ -204,7 +205,7 @@ static void test_refused_with_a_way_out(void **state)
 }
 
 /* A lean above the scene's limit: it sinks, and never comes out again. */
-static void test_above_the_limit(void **state)
+TEST(test_above_the_limit)
 {
 	struct loop loop = liver("");
 	struct incise_error err = {0};
@@ -227,7 +228,7 @@ static void test_above_the_limit(void **state)
  * A wall of 0.14 N/mm with a membrane 2 mm below, which yields at 0.8 N more, and a back wall: a
  * blade rests in front of it, on it, and behind the airway; also at the step where it yields.
  */
-static void test_membrane(void **state)
+TEST(test_membrane)
 {
 	static const double leans_N[] = {0.1, 0.27, 0.29, 0.6, 1.05, 1.1, 1.5, 2, 3};
 	const double front_N = 2 * 0.14, slope_N_mm = 0.8 / 5;
@@ -269,7 +270,7 @@ static void test_membrane(void **state)
 	incise_scene_free(scene);
 }
 
-static void test_wrong_words(void **state)
+TEST(test_wrong_words)
 {
 	static const char *const wrong[] = {"withdrawal = \"Paper\";", "withdrawal = 1;",
 					    "friction = 1.1;", "unloading_N_mm = -1.0;"};
@@ -286,18 +287,4 @@ static void test_wrong_words(void **state)
 			     ":1");
 		unlink(path);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_liver_rests),
-		cmocka_unit_test(test_accepted_rests),
-		cmocka_unit_test(test_refused_with_a_way_out),
-		cmocka_unit_test(test_above_the_limit),
-		cmocka_unit_test(test_membrane),
-		cmocka_unit_test(test_wrong_words),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

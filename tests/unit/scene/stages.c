@@ -2,11 +2,7 @@
 /*
  * lib/scene/stages.c, stage by stage, on a plan made by hand.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <math.h>
 #include <string.h>
@@ -33,7 +29,7 @@ static int told_read(struct incise_tracker *tracker,
 
 static const struct incise_tracker_ops ops = {.read = told_read};
 
-static void test_poses_of_the_future_are_of_now(void **state)
+TEST(test_poses_of_the_future_are_of_now)
 {
 	struct incise_tracker tracker = {.ops = &ops};
 	struct incise_plan plan = {.tracker = &tracker, .pose_age_ns = 20000000};
@@ -74,7 +70,7 @@ static int told_stations(struct incise_tracker *tracker,
 }
 
 /* A scalpel that is put away unusable for long is no failure while the tube is seen. */
-static void test_blind_is_every_station(void **state)
+TEST(test_blind_is_every_station)
 {
 	static const struct incise_tracker_ops both = {.read = told_stations};
 	static const struct {
@@ -104,7 +100,7 @@ static void test_blind_is_every_station(void **state)
 }
 
 /* A quarter turn about x takes the tip's y to z. */
-static void test_tip_of_the_calibration(void **state)
+TEST(test_tip_of_the_calibration)
 {
 	struct incise_tracker_sample sample = {
 		.t_ns = 1000000000,
@@ -151,7 +147,7 @@ static struct incise_surface *ground(void)
 	return incise_surface_new_plane(point, up, NULL);
 }
 
-static void test_a_cut_from_its_begin_to_its_end(void **state)
+TEST(test_a_cut_from_its_begin_to_its_end)
 {
 	static const struct {
 		double z_mm, depth_mm;
@@ -179,7 +175,7 @@ static void test_a_cut_from_its_begin_to_its_end(void **state)
 	incise_surface_free(surface);
 }
 
-static void test_an_instrument_has_no_edge(void **state)
+TEST(test_an_instrument_has_no_edge)
 {
 	struct incise_surface *surface = ground();
 	struct incise_plan plan = plan_over(surface);
@@ -194,7 +190,7 @@ static void test_an_instrument_has_no_edge(void **state)
 }
 
 /* Another tool in the hand, also while no poses come: its end is where it is said to be. */
-static void test_the_end_of_what_is_held(void **state)
+TEST(test_the_end_of_what_is_held)
 {
 	struct incise_surface *surface = ground();
 	struct incise_predict handle;
@@ -233,7 +229,7 @@ static void test_the_end_of_what_is_held(void **state)
 	incise_surface_free(surface);
 }
 
-static void test_each_limit_is_an_event_of_its_own(void **state)
+TEST(test_each_limit_is_an_event_of_its_own)
 {
 	static const struct {
 		double asked_N[3];
@@ -255,7 +251,7 @@ static void test_each_limit_is_an_event_of_its_own(void **state)
 	}
 }
 
-static void test_without_poses_the_last_force_fades(void **state)
+TEST(test_without_poses_the_last_force_fades)
 {
 	struct incise_plan plan = {
 		.force_N = {0, 0, 2},
@@ -281,20 +277,4 @@ static void test_without_poses_the_last_force_fades(void **state)
 		last = tick.command_N[2];
 	}
 	assert_true(last == 0);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_poses_of_the_future_are_of_now),
-		cmocka_unit_test(test_blind_is_every_station),
-		cmocka_unit_test(test_tip_of_the_calibration),
-		cmocka_unit_test(test_a_cut_from_its_begin_to_its_end),
-		cmocka_unit_test(test_an_instrument_has_no_edge),
-		cmocka_unit_test(test_the_end_of_what_is_held),
-		cmocka_unit_test(test_each_limit_is_an_event_of_its_own),
-		cmocka_unit_test(test_without_poses_the_last_force_fades),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

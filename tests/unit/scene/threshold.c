@@ -3,11 +3,7 @@
  * Thresholds to the ulp and to the ns: where a contact starts and ends, and when a pose is too
  * old; and jumps, which are no way.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <float.h>
 #include "../../extremes/fed_run.h"
@@ -44,7 +40,7 @@ static bool touches_at(struct fed_run *run, double z)
 	return run->tick.flags & INCISE_TICK_CONTACT;
 }
 
-static void test_thresholds_of_contact(void **state)
+TEST(test_thresholds_of_contact)
 {
 	const double leave = GROUND_LEAVE_MM;
 	struct fed_run run;
@@ -69,7 +65,7 @@ static void test_thresholds_of_contact(void **state)
 	end(&run);
 }
 
-static void test_threshold_of_age(void **state)
+TEST(test_threshold_of_age)
 {
 	struct fed_run run;
 
@@ -82,7 +78,7 @@ static void test_threshold_of_age(void **state)
 }
 
 /* From blade to handle, and by a jump of the tracker's, the end of the tool goes no way. */
-static void test_no_debt_without_a_way(void **state)
+TEST(test_no_debt_without_a_way)
 {
 	struct fed_run run;
 
@@ -104,15 +100,4 @@ static void test_no_debt_without_a_way(void **state)
 		}
 		end(&run);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_thresholds_of_contact),
-		cmocka_unit_test(test_threshold_of_age),
-		cmocka_unit_test(test_no_debt_without_a_way),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

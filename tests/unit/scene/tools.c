@@ -7,11 +7,7 @@
  *       │          │ tip                  ○ end
  *     0 ┼──────────┴──────────────────────┴───── plane, or the highest line of a capsule
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include "../../../lib/base/random.h"
 #include "fed.h"
@@ -123,7 +119,7 @@ static void steps(struct room *room, int n)
 /* --- stations --------------------------------------------------------------------------- */
 
 /* Two stations that share 120 Hz are as a tracker of 60 Hz with one. */
-static void test_stations_share_the_rate(void **state)
+TEST(test_stations_share_the_rate)
 {
 	struct incise_tracker_info shared = two, one = two;
 	struct incise_plan_stability a, b;
@@ -163,7 +159,7 @@ static void test_stations_share_the_rate(void **state)
 }
 
 /* Poses of a station that is neither scalpel nor tube move nothing, and are not counted. */
-static void test_other_stations(void **state)
+TEST(test_other_stations)
 {
 	struct incise_tracker_sample deep = {
 		.position_mm = {0, 0, -10}, .quaternion = {1}, .station = OTHER};
@@ -185,7 +181,7 @@ static void test_other_stations(void **state)
 }
 
 /* Without insertion there is no tube: its poses are not the blade's. */
-static void test_no_tube_without_insertion(void **state)
+TEST(test_no_tube_without_insertion)
 {
 	struct room room;
 
@@ -199,7 +195,7 @@ static void test_no_tube_without_insertion(void **state)
 }
 
 /* The tip of the calibration is the scalpel's alone. */
-static void test_tip_is_the_scalpels(void **state)
+TEST(test_tip_is_the_scalpels)
 {
 	static const double tip_mm[3] = {1, 2, 3};
 	struct room room;
@@ -236,7 +232,7 @@ static enum incise_tool held_at(struct room *room, double scalpel_mm, double tub
 	return room->tick.tool;
 }
 
-static void test_nearer_tool(void **state)
+TEST(test_nearer_tool)
 {
 	const double more = NEARER_MM + 0.01, less = NEARER_MM - 0.01;
 	struct room room;
@@ -259,7 +255,7 @@ static void test_nearer_tool(void **state)
 }
 
 /* A tool that is asked for by name is held wherever the other one is. */
-static void test_by_name(void **state)
+TEST(test_by_name)
 {
 	struct room room;
 
@@ -276,7 +272,7 @@ static void test_by_name(void **state)
 }
 
 /* In the tissue the held one stays, however near the other comes. */
-static void test_no_change_in_the_tissue(void **state)
+TEST(test_no_change_in_the_tissue)
 {
 	struct room room;
 
@@ -294,7 +290,7 @@ static void test_no_change_in_the_tissue(void **state)
 }
 
 /* A tube that is taken in hand far off the membrane is not in it because the blade was. */
-static void test_membrane_is_of_one_tool(void **state)
+TEST(test_membrane_is_of_one_tool)
 {
 	static const char airway[] = TISSUE
 		"membrane = { point_mm = [0.0, 0.0, -8.0]; normal = [0.0, 0.0, 1.0]; "
@@ -318,7 +314,7 @@ static void test_membrane_is_of_one_tool(void **state)
 }
 
 /* A silent station takes its own tool away, and not the other's. */
-static void test_silence(void **state)
+TEST(test_silence)
 {
 	struct room room;
 
@@ -351,7 +347,7 @@ static void test_silence(void **state)
 }
 
 /* A blade that goes silent in the tissue, with the tube at hand: the tube. */
-static void test_silence_in_the_tissue(void **state)
+TEST(test_silence_in_the_tissue)
 {
 	struct room room;
 
@@ -444,7 +440,7 @@ static void run_at_random(const char *scene, const char *arithmetic, bool statio
 	leave(&room);
 }
 
-static void test_continuous(void **state)
+TEST(test_continuous)
 {
 	static const char *const scenes[] = {plane, capsule};
 	static const char *const arithmetics[] = {"fixed", "double"};
@@ -462,23 +458,4 @@ static void test_continuous(void **state)
 					"run %d: tool %d for %d ticks, %d of them in tissue",
 					i, tool, seen.held[tool], seen.loaded[tool]);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_stations_share_the_rate),
-		cmocka_unit_test(test_other_stations),
-		cmocka_unit_test(test_no_tube_without_insertion),
-		cmocka_unit_test(test_tip_is_the_scalpels),
-		cmocka_unit_test(test_nearer_tool),
-		cmocka_unit_test(test_by_name),
-		cmocka_unit_test(test_no_change_in_the_tissue),
-		cmocka_unit_test(test_membrane_is_of_one_tool),
-		cmocka_unit_test(test_silence),
-		cmocka_unit_test(test_silence_in_the_tissue),
-		cmocka_unit_test(test_continuous),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -6,8 +6,9 @@
 #include <math.h>
 #include "../../../lib/sim/sim.h"
 #include "../message.h"
+#include "../unit.h"
 
-static void defaults_are_those_of_the_header(void **state)
+TEST(defaults_are_those_of_the_header)
 {
 	struct incise_sim_config c;
 
@@ -40,7 +41,7 @@ static void defaults_are_those_of_the_header(void **state)
 	assert_int_equal(incise_sim_config_check(&c, NULL), 0);
 }
 
-static void set_reaches_its_field(void **state)
+TEST(set_reaches_its_field)
 {
 	struct incise_sim_config c;
 
@@ -61,7 +62,7 @@ static void set_reaches_its_field(void **state)
 	assert_int_equal(c.n_depths, 1);
 }
 
-static void set_refuses(void **state)
+TEST(set_refuses)
 {
 	static const struct {
 		const char *key;
@@ -90,7 +91,7 @@ static void set_refuses(void **state)
 	}
 }
 
-static void words(void **state)
+TEST(words)
 {
 	struct incise_error err = {0};
 	struct incise_sim_config c;
@@ -111,7 +112,7 @@ static void words(void **state)
 	assert_int_equal(c.withdrawal, 0);
 }
 
-static void check_finds_what_was_put_past_set(void **state)
+TEST(check_finds_what_was_put_past_set)
 {
 	struct incise_error err = {0};
 	struct incise_sim_config c;
@@ -128,17 +129,4 @@ static void check_finds_what_was_put_past_set(void **state)
 		     "sim.depth_mm:", "nan");
 	c.n_depths = 3; /* the bad one is no longer in use */
 	assert_int_equal(incise_sim_config_check(&c, &err), 0);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(defaults_are_those_of_the_header),
-		cmocka_unit_test(set_reaches_its_field),
-		cmocka_unit_test(set_refuses),
-		cmocka_unit_test(words),
-		cmocka_unit_test(check_finds_what_was_put_past_set),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

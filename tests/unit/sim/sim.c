@@ -8,6 +8,7 @@
 #include "../../../lib/sim/sim.h"
 #include "../../../lib/sim/world.h"
 #include "../message.h"
+#include "../unit.h"
 
 #define START_NS INCISE_NS_PER_S
 #define MAX 120000
@@ -113,7 +114,7 @@ static bool tracker_equal(const struct log *a, const struct log *b, int n)
 	return true;
 }
 
-static void same_seed_same_samples(void **state)
+TEST(same_seed_same_samples)
 {
 	run(1, 4, &plain, &first);
 	run(1, 4, &plain, &second);
@@ -127,7 +128,7 @@ static void same_seed_same_samples(void **state)
 	assert_false(tracker_equal(&first, &second, first.n_tracker));
 }
 
-static void reading_changes_nothing(void **state)
+TEST(reading_changes_nothing)
 {
 	static const struct manner row[] = {
 		{true, false, false, {10000000, 10000000, 10000000}, 1000},
@@ -148,7 +149,7 @@ static void reading_changes_nothing(void **state)
 	}
 }
 
-static void what_is_not_taken_is_lost_and_counted(void **state)
+TEST(what_is_not_taken_is_lost_and_counted)
 {
 	static const struct manner late = {
 		true, true, false, {10000000000, 10000000000, 10000000000}, MAX};
@@ -190,7 +191,7 @@ static int run_in_real_time(struct log *log, int64_t *start_ns)
 	return n;
 }
 
-static void real_time_gives_the_same_samples(void **state)
+TEST(real_time_gives_the_same_samples)
 {
 	int64_t start_ns;
 	int n;
@@ -208,7 +209,7 @@ static void real_time_gives_the_same_samples(void **state)
 	}
 }
 
-static void late_device_counts_from_0_in_the_same_world(void **state)
+TEST(late_device_counts_from_0_in_the_same_world)
 {
 	struct incise_clock *clock = incise_clock_new_simulated(START_NS);
 	struct incise_sim_config config;
@@ -286,13 +287,13 @@ static void look_at_truth(int withdrawal)
 	incise_clock_free(clock);
 }
 
-static void truth_is_the_law_without_disturbance(void **state)
+TEST(truth_is_the_law_without_disturbance)
 {
 	look_at_truth(INCISE_TISSUE_PAPER);
 	look_at_truth(INCISE_TISSUE_DISSIPATIVE);
 }
 
-static void tooth_goes_on_between_ticks(void **state)
+TEST(tooth_goes_on_between_ticks)
 {
 	struct incise_clock *clock = incise_clock_new_simulated(START_NS);
 	struct incise_sim_config config;
@@ -321,7 +322,7 @@ static void tooth_goes_on_between_ticks(void **state)
 	incise_clock_free(clock);
 }
 
-static void bad_configuration_is_refused(void **state)
+TEST(bad_configuration_is_refused)
 {
 	struct incise_clock *clock = incise_clock_new_simulated(START_NS);
 	struct incise_error err = {0};
@@ -335,7 +336,7 @@ static void bad_configuration_is_refused(void **state)
 	incise_clock_free(clock);
 }
 
-static void ring_keeps_order_and_counts_losses(void **state)
+TEST(ring_keeps_order_and_counts_losses)
 {
 	struct incise_sim_ring ring;
 	int next = 0, expected = 0, taken = 0;
@@ -367,21 +368,4 @@ static void ring_keeps_order_and_counts_losses(void **state)
 	assert_true(ring.lost > 0);
 	assert_int_equal(taken + ring.lost, next);
 	incise_sim_ring_free(&ring);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(same_seed_same_samples),
-		cmocka_unit_test(reading_changes_nothing),
-		cmocka_unit_test(what_is_not_taken_is_lost_and_counted),
-		cmocka_unit_test(real_time_gives_the_same_samples),
-		cmocka_unit_test(late_device_counts_from_0_in_the_same_world),
-		cmocka_unit_test(truth_is_the_law_without_disturbance),
-		cmocka_unit_test(tooth_goes_on_between_ticks),
-		cmocka_unit_test(bad_configuration_is_refused),
-		cmocka_unit_test(ring_keeps_order_and_counts_losses),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * lib/sim/sim_camera.c: the scalpel in the frame has its true length, measured
  * from pixels alone; frames keep their times and count their losses.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -124,7 +120,7 @@ static double measure_px(const struct incise_camera_frame *frame)
 	return (edge[1] - edge[0]) / 4;
 }
 
-static void picture_shows_the_true_length(void **state)
+TEST(picture_shows_the_true_length)
 {
 	/* Protocol time, s: at rest in the air, entering, deep at 5 mm, at 20 mm, leaving. */
 	static const double at_s[] = {0,   0.5,	  1.5,	 2.5, 4,   6,
@@ -163,7 +159,7 @@ static void picture_shows_the_true_length(void **state)
 	assert_true(shortest < 28.5 && shortest > 26.8);
 }
 
-static void geometry_is_the_papers(void **state)
+TEST(geometry_is_the_papers)
 {
 	struct rig rig = rig_new(1, 47.5 / 400);
 	struct incise_sim_truth truth;
@@ -179,7 +175,7 @@ static void geometry_is_the_papers(void **state)
 }
 
 /* The pixels within what is given for vision, value alone: the scalpel's area, no more. */
-static void setup_for_vision_is_of_the_scalpel(void **state)
+TEST(setup_for_vision_is_of_the_scalpel)
 {
 	static const double scale[] = {47.5 / 400, 0.25, 0.5};
 
@@ -210,7 +206,7 @@ static void setup_for_vision_is_of_the_scalpel(void **state)
 	}
 }
 
-static void pictures_wait_and_are_lost(void **state)
+TEST(pictures_wait_and_are_lost)
 {
 	/* ms, whether there is a frame, its number, losses so far */
 	static const int row[][4] = {
@@ -271,7 +267,7 @@ static uint8_t *picture(uint64_t seed, int ms, int skip_ms)
 	return copy;
 }
 
-static void pictures_are_the_seeds(void **state)
+TEST(pictures_are_the_seeds)
 {
 	uint8_t *a = picture(1, 3000, 0), *b = picture(1, 3000, 500),
 		*c = picture(2, 3000, 0);
@@ -293,7 +289,7 @@ static void pictures_are_the_seeds(void **state)
 	free(c);
 }
 
-static void info_names_the_camera(void **state)
+TEST(info_names_the_camera)
 {
 	struct rig rig = rig_new(1, 47.5 / 400);
 	struct incise_camera_info info;
@@ -304,18 +300,4 @@ static void info_names_the_camera(void **state)
 	assert_int_equal(info.height, 480);
 	assert_string_equal(info.name, "virtual camera");
 	rig_free(&rig);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(picture_shows_the_true_length),
-		cmocka_unit_test(geometry_is_the_papers),
-		cmocka_unit_test(setup_for_vision_is_of_the_scalpel),
-		cmocka_unit_test(pictures_wait_and_are_lost),
-		cmocka_unit_test(pictures_are_the_seeds),
-		cmocka_unit_test(info_names_the_camera),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 /*
  * lib/sim/sim_force.c: codes against the true force, noise, clipping, the grid of times.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <string.h>
 #include "../../../lib/sim/sim.h"
@@ -35,7 +31,7 @@ static int run(const struct incise_sim_config *config, double seconds)
 	return n;
 }
 
-static void codes_follow_the_truth(void **state)
+TEST(codes_follow_the_truth)
 {
 	static const double rate[] = {1, 3000, 10000, 12345.678, 20000};
 	struct incise_sim_config config;
@@ -72,7 +68,7 @@ static void codes_follow_the_truth(void **state)
 	}
 }
 
-static void noise_is_as_configured(void **state)
+TEST(noise_is_as_configured)
 {
 	struct incise_sim_config config;
 	double mean = 0, squares = 0, sd;
@@ -92,7 +88,7 @@ static void noise_is_as_configured(void **state)
 	assert_true(fabs(sqrt(squares) - sd) < 5 * sd / sqrt(2 * n));
 }
 
-static void codes_stay_in_range(void **state)
+TEST(codes_stay_in_range)
 {
 	static const struct {
 		double zero_mV, elastic_N_mm;
@@ -122,7 +118,7 @@ static void codes_stay_in_range(void **state)
 	}
 }
 
-static void info_names_the_channel(void **state)
+TEST(info_names_the_channel)
 {
 	struct incise_clock *clock = incise_clock_new_simulated(START_NS);
 	struct incise_sim_config config;
@@ -143,7 +139,7 @@ static void info_names_the_channel(void **state)
 }
 
 /* A weight takes the place of the blade, until it is taken off and the blade is back. */
-static void a_weight_hangs_in_place_of_the_blade(void **state)
+TEST(a_weight_hangs_in_place_of_the_blade)
 {
 	/* in the middle of the first cut */
 	static const struct {
@@ -190,17 +186,4 @@ static void a_weight_hangs_in_place_of_the_blade(void **state)
 	force->ops->close(force);
 	incise_sim_free(sim);
 	incise_clock_free(clock);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(codes_follow_the_truth),
-		cmocka_unit_test(noise_is_as_configured),
-		cmocka_unit_test(codes_stay_in_range),
-		cmocka_unit_test(a_weight_hangs_in_place_of_the_blade),
-		cmocka_unit_test(info_names_the_channel),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * lib/sim/sim_stepper.c: limits, faults, and a handle that obeys the equation of motion at any
  * stiffness; on the bench backlash, loss, friction and lost steps, and the force channel.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <math.h>
 #include "../../../lib/base/random.h"
@@ -61,7 +57,7 @@ static struct incise_stepper_status rig_hold(struct rig *rig, double mm, double 
 	return rig_after(rig, 0);
 }
 
-static void spring_law_at_rest(void **state)
+TEST(spring_law_at_rest)
 {
 	static const double target_mm[] = {0, 0.5, 5, 12.3456789, 20};
 	struct incise_sim_config config;
@@ -81,7 +77,7 @@ static void spring_law_at_rest(void **state)
 	}
 }
 
-static void limits_are_never_exceeded(void **state)
+TEST(limits_are_never_exceeded)
 {
 	/* screw_mm_s, screw_mm_s2, steps_per_turn */
 	static const double row[][3] = {
@@ -124,7 +120,7 @@ static void limits_are_never_exceeded(void **state)
 	}
 }
 
-static void target_is_reached_in_the_time_of_a_trapezoid(void **state)
+TEST(target_is_reached_in_the_time_of_a_trapezoid)
 {
 	struct incise_sim_config config;
 	struct rig rig;
@@ -149,7 +145,7 @@ static void target_is_reached_in_the_time_of_a_trapezoid(void **state)
 	rig_free(&rig);
 }
 
-static void faults_are_reported(void **state)
+TEST(faults_are_reported)
 {
 	struct incise_sim_config config;
 	struct incise_stepper_status s;
@@ -214,7 +210,7 @@ static void runge_kutta(const struct incise_sim_config *c, double nut, double h,
 		y[j] += h / 6 * (k[0][j] + 2 * k[1][j] + 2 * k[2][j] + k[3][j]);
 }
 
-static void handle_moves_as_the_equation_says(void **state)
+TEST(handle_moves_as_the_equation_says)
 {
 	struct incise_sim_config config;
 	double y[2] = {0}, before = 0, farthest = 0;
@@ -245,7 +241,7 @@ static void handle_moves_as_the_equation_says(void **state)
 	rig_free(&rig);
 }
 
-static void friction_holds(void **state)
+TEST(friction_holds)
 {
 	struct incise_sim_config config;
 	struct incise_stepper_status s;
@@ -263,7 +259,7 @@ static void friction_holds(void **state)
 	rig_free(&rig);
 }
 
-static void bounded_however_stiff(void **state)
+TEST(bounded_however_stiff)
 {
 	/* spring, hand N/mm; hand N s/mm; kg; friction N */
 	static const double row[][5] = {
@@ -303,7 +299,7 @@ static void bounded_however_stiff(void **state)
 	}
 }
 
-static void asking_changes_nothing(void **state)
+TEST(asking_changes_nothing)
 {
 	struct incise_stepper_status end[2];
 
@@ -328,7 +324,7 @@ static void asking_changes_nothing(void **state)
 	assert_int_equal(end[0].t_ns, end[1].t_ns);
 }
 
-static void it_is_always_powered_and_reports_its_motion(void **state)
+TEST(it_is_always_powered_and_reports_its_motion)
 {
 	struct incise_sim_config config;
 	struct incise_stepper_status s;
@@ -366,7 +362,7 @@ static void it_is_always_powered_and_reports_its_motion(void **state)
 	rig_free(&rig);
 }
 
-static void info_is_the_configuration(void **state)
+TEST(info_is_the_configuration)
 {
 	struct incise_sim_config config;
 	struct incise_stepper_info info;
@@ -401,7 +397,7 @@ static bool same(double a, double b)
 	return fabs(a - b) < 1e-9;
 }
 
-static void bench_agrees_with_hand_calculation(void **state)
+TEST(bench_agrees_with_hand_calculation)
 {
 	struct incise_sim_config config;
 	struct incise_bench b = {0};
@@ -455,7 +451,7 @@ static double channel_N(struct incise_force *force,
 	return (sum / all * 5000 / 4096 - config->force_zero_mV) / config->force_mV_N;
 }
 
-static void force_channel_shows_the_bench(void **state)
+TEST(force_channel_shows_the_bench)
 {
 	struct incise_clock *clock = incise_clock_new_simulated(0);
 	struct incise_stepper *stepper;
@@ -497,7 +493,7 @@ static void force_channel_shows_the_bench(void **state)
 	incise_clock_free(clock);
 }
 
-static void jog_is_for_the_bench_only(void **state)
+TEST(jog_is_for_the_bench_only)
 {
 	struct incise_clock *clock = incise_clock_new_simulated(0);
 	struct incise_stepper *stepper;
@@ -511,25 +507,4 @@ static void jog_is_for_the_bench_only(void **state)
 	stepper->ops->close(stepper);
 	incise_sim_free(sim);
 	incise_clock_free(clock);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(spring_law_at_rest),
-		cmocka_unit_test(limits_are_never_exceeded),
-		cmocka_unit_test(target_is_reached_in_the_time_of_a_trapezoid),
-		cmocka_unit_test(faults_are_reported),
-		cmocka_unit_test(handle_moves_as_the_equation_says),
-		cmocka_unit_test(friction_holds),
-		cmocka_unit_test(bounded_however_stiff),
-		cmocka_unit_test(asking_changes_nothing),
-		cmocka_unit_test(it_is_always_powered_and_reports_its_motion),
-		cmocka_unit_test(info_is_the_configuration),
-		cmocka_unit_test(bench_agrees_with_hand_calculation),
-		cmocka_unit_test(force_channel_shows_the_bench),
-		cmocka_unit_test(jog_is_for_the_bench_only),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

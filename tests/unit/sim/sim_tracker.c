@@ -2,11 +2,7 @@
 /*
  * lib/sim/sim_tracker.c: rate, drift, latency and noise against what was configured.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <string.h>
 #include "../../../lib/sim/sim.h"
@@ -58,7 +54,7 @@ static int64_t acquired_ns(int i)
 	return START_NS + llround(i * (1e9 / (120 * (1 + 50e-6))));
 }
 
-static void rate_drifts_and_latency_is_exact_without_jitter(void **state)
+TEST(rate_drifts_and_latency_is_exact_without_jitter)
 {
 	struct incise_sim_config config;
 	struct rig rig;
@@ -78,7 +74,7 @@ static void rate_drifts_and_latency_is_exact_without_jitter(void **state)
 	rig_free(&rig);
 }
 
-static void jitter_only_adds(void **state)
+TEST(jitter_only_adds)
 {
 	struct incise_sim_config config;
 	double mean_ms = 0;
@@ -100,7 +96,7 @@ static void jitter_only_adds(void **state)
 	rig_free(&rig);
 }
 
-static void records_come_when_they_arrive_and_in_order(void **state)
+TEST(records_come_when_they_arrive_and_in_order)
 {
 	/* Jitter below and far above the time between records. */
 	static const double jitter_ms[] = {0.2, 100};
@@ -135,7 +131,7 @@ static void records_come_when_they_arrive_and_in_order(void **state)
 	}
 }
 
-static void noise_is_as_configured(void **state)
+TEST(noise_is_as_configured)
 {
 	struct incise_sim_config config;
 	double mean[3] = {0}, squares[3] = {0}, angle2 = 0, angle_sd;
@@ -176,7 +172,7 @@ static void noise_is_as_configured(void **state)
 	rig_free(&rig);
 }
 
-static void info_is_nominal(void **state)
+TEST(info_is_nominal)
 {
 	struct incise_sim_config config;
 	struct incise_tracker_info info;
@@ -195,7 +191,7 @@ static void info_is_nominal(void **state)
  * With a tube the two stations take turns at the same rate. The tube goes down from above to below
  * and back; the scalpel is where it is without it.
  */
-static void tube_is_the_second_station(void **state)
+TEST(tube_is_the_second_station)
 {
 	static struct incise_tracker_sample alone[MAX];
 	struct incise_sim_config config;
@@ -240,18 +236,4 @@ static void tube_is_the_second_station(void **state)
 	assert_true(least >= -10 && least < -10 + 2e-3);
 	assert_true(most <= 200 && most > 200 - 2e-3);
 	rig_free(&rig);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(rate_drifts_and_latency_is_exact_without_jitter),
-		cmocka_unit_test(jitter_only_adds),
-		cmocka_unit_test(records_come_when_they_arrive_and_in_order),
-		cmocka_unit_test(noise_is_as_configured),
-		cmocka_unit_test(info_is_nominal),
-		cmocka_unit_test(tube_is_the_second_station),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,18 +3,14 @@
  * lib/sim/tissue.c: the stated law, a saw-tooth about 1, a boundary of the stated size; the way
  * back out of a cut, and closed motions, which take work.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/sim/world.h"
 
 static const struct incise_blade air = {.cut = 0, .speed_mm_s = 25, .slab = 0.5};
 
-static void mean_force_is_the_law(void **state)
+TEST(mean_force_is_the_law)
 {
 	static const struct {
 		double depth_mm, velocity_mm_s, force_N;
@@ -39,7 +35,7 @@ static void mean_force_is_the_law(void **state)
 	}
 }
 
-static void no_force_and_no_tooth_in_the_air(void **state)
+TEST(no_force_and_no_tooth_in_the_air)
 {
 	struct incise_sim_config config;
 	struct incise_tissue tissue;
@@ -52,7 +48,7 @@ static void no_force_and_no_tooth_in_the_air(void **state)
 	assert_true(tissue.path_mm == 0);
 }
 
-static void saw_tooth_builds_up_and_drops(void **state)
+TEST(saw_tooth_builds_up_and_drops)
 {
 	struct incise_sim_config config;
 	struct incise_tissue tissue;
@@ -91,7 +87,7 @@ static void saw_tooth_builds_up_and_drops(void **state)
 	assert_true(high <= 1.2 + 1e-12 && high > 1.2 - 0.4 * 0.0025 / 0.75);
 }
 
-static void ahead_continues_the_tooth(void **state)
+TEST(ahead_continues_the_tooth)
 {
 	struct incise_sim_config config;
 	struct incise_tissue tissue, moved;
@@ -109,7 +105,7 @@ static void ahead_continues_the_tooth(void **state)
 		    incise_tissue_force(&tissue, &blade, 0));
 }
 
-static void boundary_has_its_size(void **state)
+TEST(boundary_has_its_size)
 {
 	struct incise_sim_config config;
 	struct incise_blade blade = air;
@@ -173,7 +169,7 @@ static void near(double is, double should)
 		fail_msg("%.12g, expected %.12g", is, should);
 }
 
-static void drawing_back_unloads_and_then_rubs(void **state)
+TEST(drawing_back_unloads_and_then_rubs)
 {
 	struct incise_sim_config config;
 	struct incise_tissue tissue;
@@ -199,7 +195,7 @@ static void drawing_back_unloads_and_then_rubs(void **state)
 	near(go(&tissue, &blade, 4), incise_sim_mean_force(&config, 4, 0));
 }
 
-static void each_cut_of_the_script_is_new(void **state)
+TEST(each_cut_of_the_script_is_new)
 {
 	struct incise_sim_config config;
 	struct incise_tissue tissue;
@@ -217,7 +213,7 @@ static void each_cut_of_the_script_is_new(void **state)
 	     config.friction * incise_sim_mean_force(&config, 3, 0));
 }
 
-static void paper_is_the_law_both_ways(void **state)
+TEST(paper_is_the_law_both_ways)
 {
 	static const int motions[] = {INCISE_SURGEON_CUTS, INCISE_SURGEON_PRESSES,
 				      INCISE_SURGEON_HAND};
@@ -242,7 +238,7 @@ static void paper_is_the_law_both_ways(void **state)
 	}
 }
 
-static void asking_changes_nothing(void **state)
+TEST(asking_changes_nothing)
 {
 	struct incise_sim_config config;
 	struct incise_tissue tissue;
@@ -260,7 +256,7 @@ static void asking_changes_nothing(void **state)
 }
 
 /* A law that is steeper than the tissue unloads: the force rises no faster. */
-static void unloading_limits_the_force(void **state)
+TEST(unloading_limits_the_force)
 {
 	struct incise_sim_config config;
 	struct incise_tissue tissue;
@@ -276,7 +272,7 @@ static void unloading_limits_the_force(void **state)
  * where the surgeon cuts: more work goes in than comes back, by the trapezium rule, and by hand,
  * where nothing tears, as held forces too.
  */
-static void closed_motions_take_work(void **state)
+TEST(closed_motions_take_work)
 {
 	static const int motions[] = {INCISE_SURGEON_CUTS, INCISE_SURGEON_PRESSES,
 				      INCISE_SURGEON_HAND};
@@ -319,23 +315,4 @@ static void closed_motions_take_work(void **state)
 			fail_msg("motion %d, number %d: %g and %g N mm", config.motion,
 				 (int)n, work, held);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(mean_force_is_the_law),
-		cmocka_unit_test(no_force_and_no_tooth_in_the_air),
-		cmocka_unit_test(saw_tooth_builds_up_and_drops),
-		cmocka_unit_test(ahead_continues_the_tooth),
-		cmocka_unit_test(boundary_has_its_size),
-		cmocka_unit_test(drawing_back_unloads_and_then_rubs),
-		cmocka_unit_test(each_cut_of_the_script_is_new),
-		cmocka_unit_test(paper_is_the_law_both_ways),
-		cmocka_unit_test(asking_changes_nothing),
-		cmocka_unit_test(unloading_limits_the_force),
-		cmocka_unit_test(closed_motions_take_work),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

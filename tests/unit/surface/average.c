@@ -2,11 +2,7 @@
 /*
  * The averaged normal: against the sum made again each tick, opposed normals, nonsense.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -24,7 +20,7 @@ static void unit_at_random(uint64_t n, double normal[3])
 	assert_true(v3_unit(normal, v, 0));
 }
 
-static void test_against_the_sum(void **state)
+TEST(test_against_the_sum)
 {
 	static const int ns[] = {1, 2, 3, 10, 63, 64};
 
@@ -58,7 +54,7 @@ static void test_against_the_sum(void **state)
 }
 
 /* Rounding does not pile up: after a turn of equal normals nothing old is left. */
-static void test_rounding_is_forgotten(void **state)
+TEST(test_rounding_is_forgotten)
 {
 	static const double up[3] = {0, 0, 1};
 	struct incise_average a;
@@ -77,7 +73,7 @@ static void test_rounding_is_forgotten(void **state)
 	assert_memory_equal(a.sum, ((double[3]){0, 0, 7}), sizeof(a.sum));
 }
 
-static void test_one_is_the_normal_itself(void **state)
+TEST(test_one_is_the_normal_itself)
 {
 	struct incise_average a;
 
@@ -91,7 +87,7 @@ static void test_one_is_the_normal_itself(void **state)
 	}
 }
 
-static void test_opposed_normals(void **state)
+TEST(test_opposed_normals)
 {
 	struct incise_average a;
 	double averaged[3], first[3], back[3];
@@ -121,7 +117,7 @@ static void test_opposed_normals(void **state)
 	}
 }
 
-static void test_what_is_no_normal(void **state)
+TEST(test_what_is_no_normal)
 {
 	static const double none[][3] = {
 		{0, 0, 0},	  {NAN, 0, 1},		{INFINITY, 0, 0},
@@ -149,7 +145,7 @@ static void test_what_is_no_normal(void **state)
 	assert_true(fabs(averaged[0] - 2 / sqrt(5)) < 4 * DBL_EPSILON);
 }
 
-static void test_reset_forgets(void **state)
+TEST(test_reset_forgets)
 {
 	static const struct {
 		int asked, n;
@@ -175,18 +171,4 @@ static void test_reset_forgets(void **state)
 		for (int c = 0; c < 3; c++)
 			assert_true(fabs(averaged[c] - normal[c]) < 4 * DBL_EPSILON);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_against_the_sum),
-		cmocka_unit_test(test_rounding_is_forgotten),
-		cmocka_unit_test(test_one_is_the_normal_itself),
-		cmocka_unit_test(test_opposed_normals),
-		cmocka_unit_test(test_what_is_no_normal),
-		cmocka_unit_test(test_reset_forgets),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

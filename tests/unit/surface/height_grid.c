@@ -5,6 +5,7 @@
 #include <errno.h>
 #include "../../../lib/surface/surface.h"
 #include "../message.h"
+#include "../unit.h"
 #include "../base/temp_file.h"
 #include "solid.h"
 
@@ -38,7 +39,7 @@ static double height(const struct incise_surface *surface, double x, double y)
 								    : NAN;
 }
 
-static void test_heights_lie_where_they_belong(void **state)
+TEST(test_heights_lie_where_they_belong)
 {
 	static const struct {
 		const char *text;
@@ -70,7 +71,7 @@ static void test_heights_lie_where_they_belong(void **state)
 	}
 }
 
-static void test_bad_files(void **state)
+TEST(test_bad_files)
 {
 	static const struct {
 		const char *text;
@@ -115,14 +116,4 @@ static void test_bad_files(void **state)
 		assert_error(load(cases[k].text, here, &err), cases[k].code, &err,
 			     cases[k].line ? place : NULL, cases[k].what);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_heights_lie_where_they_belong),
-		cmocka_unit_test(test_bad_files),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 /*
  * From points and triangles to a mesh: welding, neighbours, fans, order.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -53,7 +49,7 @@ static void check(const struct solid *s, const struct mesh *mesh)
 	free(corners);
 }
 
-static void test_closed_open_and_bow_tie(void **state)
+TEST(test_closed_open_and_bow_tie)
 {
 	struct solid *s[] = {solid_cube(), solid_sphere(2, 3), solid_new(), solid_new()};
 	static const uint32_t vertices[] = {8, 258, 4, 6};
@@ -83,7 +79,7 @@ static void test_closed_open_and_bow_tie(void **state)
 }
 
 /* Two faces back to back enclose nothing: normals are still unit vectors. */
-static void test_two_back_to_back(void **state)
+TEST(test_two_back_to_back)
 {
 	struct solid *s = solid_new();
 	struct incise_surface *surface;
@@ -105,7 +101,7 @@ static void test_two_back_to_back(void **state)
 }
 
 /* A fan of 5000 triangles around one point, and a proxy that goes around on it. */
-static void test_a_large_fan(void **state)
+TEST(test_a_large_fan)
 {
 	struct solid *s = solid_new();
 	struct incise_surface *surface;
@@ -132,7 +128,7 @@ static void test_a_large_fan(void **state)
 	free(s);
 }
 
-static void test_refusals(void **state)
+TEST(test_refusals)
 {
 	struct solid *s = solid_cube();
 	struct mesh_draft draft = {.path = "x", .point = s->point, .corner = s->corner};
@@ -190,7 +186,7 @@ static void walk(struct count *count, uint32_t child, const float lo[3],
 	count->seen += BVH_COUNT(child);
 }
 
-static void test_every_box_once(void **state)
+TEST(test_every_box_once)
 {
 	static const uint32_t sizes[] = {1, 2, 3, 4, 5, 7, 8, 9, 100, 5000};
 	static const float all[2][3] = {{-INFINITY, -INFINITY, -INFINITY},
@@ -237,7 +233,7 @@ static void test_every_box_once(void **state)
 	}
 }
 
-static void test_outwards(void **state)
+TEST(test_outwards)
 {
 	static const double values[] = {0, 1e-300, 1 / 3.0, -1 / 3.0, 1e5, -1e5, 1e-7};
 
@@ -248,18 +244,4 @@ static void test_outwards(void **state)
 		assert_true(lo < x - 5e-7 && hi > x + 5e-7);
 		assert_true(hi - lo < 1e-5 + fabs(x) * 1e-6);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_closed_open_and_bow_tie),
-		cmocka_unit_test(test_two_back_to_back),
-		cmocka_unit_test(test_a_large_fan),
-		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_every_box_once),
-		cmocka_unit_test(test_outwards),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

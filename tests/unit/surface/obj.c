@@ -6,6 +6,7 @@
 #include <errno.h>
 #include "../../../lib/surface/surface.h"
 #include "../message.h"
+#include "../unit.h"
 #include "../base/temp_file.h"
 #include "solid.h"
 
@@ -28,7 +29,7 @@ static struct incise_surface *load(const char *text, const double at[3],
 #define TRIANGLE "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 #define SQUARE TRIANGLE "v 1 1 0\n"
 
-static void test_good_files(void **state)
+TEST(test_good_files)
 {
 	static const struct {
 		const char *text;
@@ -68,7 +69,7 @@ static void test_good_files(void **state)
 	}
 }
 
-static void test_bad_files(void **state)
+TEST(test_bad_files)
 {
 	static const struct {
 		const char *text;
@@ -124,7 +125,7 @@ static void test_bad_files(void **state)
 	}
 }
 
-static void test_files_that_are_none(void **state)
+TEST(test_files_that_are_none)
 {
 	struct incise_error err = {0};
 
@@ -139,7 +140,7 @@ static void test_files_that_are_none(void **state)
 	assert_int_equal(err.code, EINVAL);
 }
 
-static void test_placed_and_numbered(void **state)
+TEST(test_placed_and_numbered)
 {
 	struct incise_error err = {0};
 	struct incise_surface *surface =
@@ -159,16 +160,4 @@ static void test_placed_and_numbered(void **state)
 	assert_true(touch.depth_mm == 1);
 	assert_true(fabs(touch.uv[0] - 0.25) < 1e-7 && fabs(touch.uv[1] - 0.375) < 1e-7);
 	incise_surface_free(surface);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_good_files),
-		cmocka_unit_test(test_bad_files),
-		cmocka_unit_test(test_files_that_are_none),
-		cmocka_unit_test(test_placed_and_numbered),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

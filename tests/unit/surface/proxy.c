@@ -3,11 +3,7 @@
  * Contacts: where they begin and end, on every kind of surface; ridges, creases, corners,
  * folds, borders and slivers; and any pose whatever.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <float.h>
 #include "../../../lib/surface/surface.h"
 #include "solid.h"
@@ -69,7 +65,7 @@ static struct incise_surface *of_kind(int kind)
 #define N_KINDS 5
 
 /* Down onto the top of a plane, a sphere, a capsule and a cube, and up again. */
-static void test_begins_and_ends(void **state)
+TEST(test_begins_and_ends)
 {
 	for (int kind = 0; kind < N_KINDS; kind++) {
 		struct incise_surface *surface = of_kind(kind);
@@ -107,7 +103,7 @@ static void test_begins_and_ends(void **state)
 	}
 }
 
-static void test_first_place_of_all(void **state)
+TEST(test_first_place_of_all)
 {
 	for (int kind = 0; kind < N_KINDS; kind++) {
 		struct incise_surface *surface = of_kind(kind);
@@ -126,7 +122,7 @@ static void test_first_place_of_all(void **state)
 }
 
 /* Through a sphere in one tick: the way entered it and has left it. */
-static void test_through_a_ball(void **state)
+TEST(test_through_a_ball)
 {
 	struct incise_surface *surface = of_kind(1);
 	struct incise_proxy proxy;
@@ -143,7 +139,7 @@ static void test_through_a_ball(void **state)
 }
 
 /* Through a cube in one tick: the proxy stays on the side that was entered. */
-static void test_through_a_cube(void **state)
+TEST(test_through_a_cube)
 {
 	struct incise_surface *surface = of_kind(4);
 	struct incise_proxy proxy;
@@ -161,7 +157,7 @@ static void test_through_a_cube(void **state)
 }
 
 /* Over an edge and around a corner of a cube, along an edge, exactly on it. */
-static void test_cube(void **state)
+TEST(test_cube)
 {
 	struct incise_surface *surface = of_kind(4);
 	struct incise_proxy proxy;
@@ -211,7 +207,7 @@ static void test_cube(void **state)
  *         ╲  ╱
  *          ╲╱
  */
-static void test_crease(void **state)
+TEST(test_crease)
 {
 	static const double profile[][2] = {
 		{10, 0}, {1, 0}, {0, -1.7320508075688772}, {-1, 0}, {-10, 0}};
@@ -251,7 +247,7 @@ static void test_crease(void **state)
 }
 
 /* A ridge of 60° and a saw of such: the tool below is never lost. */
-static void test_ridge_and_saw(void **state)
+TEST(test_ridge_and_saw)
 {
 	static const double ridge[][2] = {
 		{10, 0}, {1, 0}, {0, 1.7320508075688772}, {-1, 0}, {-10, 0}};
@@ -297,7 +293,7 @@ static void test_ridge_and_saw(void **state)
 }
 
 /* A wedge, 0.2 mm thick 2 mm behind its edge: the proxy does not go through it. */
-static void test_thin_wedge(void **state)
+TEST(test_thin_wedge)
 {
 	static const double wedge[][2] = {{0, -0.1}, {2, 0}, {0, 0.1}};
 	struct solid *s = solid_profile(wedge, 3, 5);
@@ -319,7 +315,7 @@ static void test_thin_wedge(void **state)
 }
 
 /* A sheet that ends: over its border contact ends, below it none starts from the side. */
-static void test_open_border(void **state)
+TEST(test_open_border)
 {
 	static const double flat[][2] = {{2, 0}, {0, 0}, {-2, 0}};
 	struct solid *s = solid_profile(flat, 3, 10);
@@ -353,7 +349,7 @@ static void test_open_border(void **state)
 }
 
 /* Strips 20 mm long and 20 nm wide: over, along and across them. */
-static void test_slivers(void **state)
+TEST(test_slivers)
 {
 	struct solid *s = solid_new();
 	struct incise_surface *surface;
@@ -390,7 +386,7 @@ static void test_slivers(void **state)
 }
 
 /* A tool on the mesh itself, on a face, on edges and on corners. */
-static void test_on_the_surface(void **state)
+TEST(test_on_the_surface)
 {
 	struct solid *s = solid_sphere(10 / 3.0, 2);
 	struct incise_surface *surface = solid_surface(s);
@@ -427,7 +423,7 @@ static void test_on_the_surface(void **state)
  * Walks in and out of a potato: whoever is inside has come in, and is in contact; whoever
  * has been outside for long is not.
  */
-static void test_inside_is_in_contact(void **state)
+TEST(test_inside_is_in_contact)
 {
 	struct solid *s = solid_sphere(5, 4);
 	struct incise_surface *surface;
@@ -488,7 +484,7 @@ static void test_inside_is_in_contact(void **state)
 }
 
 /* Any pose whatever, jumps of metres and the ends of double: all results are numbers. */
-static void test_any_pose(void **state)
+TEST(test_any_pose)
 {
 	static const double odd[] = {0,	   -0.0,    1e-300,   5e-324,	1e300, -1e300,
 				     1e15, DBL_MAX, -DBL_MAX, INFINITY, NAN,   1,
@@ -524,25 +520,4 @@ static void test_any_pose(void **state)
 		}
 		incise_surface_free(surface);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_begins_and_ends),
-		cmocka_unit_test(test_first_place_of_all),
-		cmocka_unit_test(test_through_a_ball),
-		cmocka_unit_test(test_through_a_cube),
-		cmocka_unit_test(test_cube),
-		cmocka_unit_test(test_crease),
-		cmocka_unit_test(test_ridge_and_saw),
-		cmocka_unit_test(test_thin_wedge),
-		cmocka_unit_test(test_open_border),
-		cmocka_unit_test(test_slivers),
-		cmocka_unit_test(test_on_the_surface),
-		cmocka_unit_test(test_inside_is_in_contact),
-		cmocka_unit_test(test_any_pose),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -6,6 +6,7 @@
 #include <float.h>
 #include "../../../lib/surface/surface.h"
 #include "../message.h"
+#include "../unit.h"
 #include "solid.h"
 
 static const double zero[3], bad[3] = {0, NAN, 0}, far[3] = {0, 0, 1e300};
@@ -18,7 +19,7 @@ static void refused(struct incise_surface *surface, const struct incise_error *e
 	assert_says(err->text, NULL);
 }
 
-static void test_refused(void **state)
+TEST(test_refused)
 {
 	static const double radii[] = {0, -1, NAN, INFINITY, 1e300, 5e-324};
 	struct incise_error err = {0};
@@ -38,7 +39,7 @@ static void test_refused(void **state)
 }
 
 /* Normals of any length, however odd. */
-static void test_normals_of_any_length(void **state)
+TEST(test_normals_of_any_length)
 {
 	static const double lengths[] = {1, 5e-324, 1e-200, 1e200, DBL_MAX};
 
@@ -56,7 +57,7 @@ static void test_normals_of_any_length(void **state)
 }
 
 /* Squares of such places overflow; on a mesh no triangle was near one, and one was read. */
-static void test_places_beyond_all(void **state)
+TEST(test_places_beyond_all)
 {
 	static const double places[][3] = {{1e308, 0, 0},     {0, -DBL_MAX, DBL_MAX},
 					   {1e155, 1e155, 3}, {INFINITY, 0, 0},
@@ -87,7 +88,7 @@ static void test_places_beyond_all(void **state)
 	free(cube);
 }
 
-static void test_tops_and_kinds(void **state)
+TEST(test_tops_and_kinds)
 {
 	struct {
 		struct incise_surface *surface;
@@ -150,7 +151,7 @@ static double axis_distance(const struct capsule *c, const double p[3])
 	return best;
 }
 
-static void test_capsule_nearest(void **state)
+TEST(test_capsule_nearest)
 {
 	static const struct capsule capsules[] = {
 		{{1, 2, 3}, {1, 2, 3}, 2},
@@ -184,7 +185,7 @@ static void test_capsule_nearest(void **state)
 }
 
 /* On the axis: a unit normal across it, the last one where that is one of the nearest. */
-static void test_on_the_axis(void **state)
+TEST(test_on_the_axis)
 {
 	static const struct {
 		struct capsule capsule;
@@ -213,7 +214,7 @@ static void test_on_the_axis(void **state)
 	}
 }
 
-static void test_capsule_enters(void **state)
+TEST(test_capsule_enters)
 {
 	static const struct capsule capsules[] = {
 		{{1, 2, 3}, {1, 2, 3}, 2},
@@ -257,7 +258,7 @@ static void test_capsule_enters(void **state)
 }
 
 /* A way that ends or starts on the surface itself: it starts the contact just once. */
-static void test_ways_from_and_to_the_surface(void **state)
+TEST(test_ways_from_and_to_the_surface)
 {
 	const struct capsule ball = {{0, 0, 0}, {0, 0, 0}, 3};
 	const struct plane plane = {{0, 0, 0}, {0, 0, 1}};
@@ -291,7 +292,7 @@ static void test_ways_from_and_to_the_surface(void **state)
 }
 
 /* From 1000 km away the ball is still hit where it is, as precisely as a double can be. */
-static void test_far_away(void **state)
+TEST(test_far_away)
 {
 	const struct capsule ball = {{0, 0, 0}, {0, 0, 0}, 3};
 	struct incise_touch touch;
@@ -299,21 +300,4 @@ static void test_far_away(void **state)
 	assert_true(capsule_enters(&ball, (double[3]){2e8, 3e8, 1e9},
 				   (double[3]){0, 0, 0}, &touch));
 	assert_true(fabs(v3_length(touch.point_mm) - 3) < 1e-6);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_normals_of_any_length),
-		cmocka_unit_test(test_places_beyond_all),
-		cmocka_unit_test(test_tops_and_kinds),
-		cmocka_unit_test(test_capsule_nearest),
-		cmocka_unit_test(test_on_the_axis),
-		cmocka_unit_test(test_capsule_enters),
-		cmocka_unit_test(test_ways_from_and_to_the_surface),
-		cmocka_unit_test(test_far_away),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

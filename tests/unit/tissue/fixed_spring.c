@@ -4,11 +4,7 @@
  * is not uselessly far above. The forces are measured against paper 2's formula in long
  * double, which has no formats.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <math.h>
 #include <string.h>
@@ -89,7 +85,7 @@ static double worst_share(double stiffness, double reach, int n, uint64_t *seed)
 	return worst;
 }
 
-static void test_never_above_the_bound(void **state)
+TEST(test_never_above_the_bound)
 {
 	static const struct {
 		double stiffness, reach;
@@ -111,7 +107,7 @@ static void test_never_above_the_bound(void **state)
 	}
 }
 
-static void test_no_bound_where_it_may_be_held(void **state)
+TEST(test_no_bound_where_it_may_be_held)
 {
 	static const double cases[][2] = {
 		{-1, 1},    {1, -1},	   {NAN, 1},  {1, NAN},	  {32768, 0},
@@ -124,7 +120,7 @@ static void test_no_bound_where_it_may_be_held(void **state)
 	assert_true(isfinite(incise_fixed_spring_bound(32767, 0)));
 }
 
-static void test_refused(void **state)
+TEST(test_refused)
 {
 	static const struct {
 		int rc;
@@ -157,15 +153,4 @@ static void test_refused(void **state)
 				 cases[c].rc);
 		assert_true(!cases[c].rc == !!memcmp(&s, &before, sizeof(s)));
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_never_above_the_bound),
-		cmocka_unit_test(test_no_bound_where_it_may_be_held),
-		cmocka_unit_test(test_refused),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

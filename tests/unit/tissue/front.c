@@ -3,11 +3,7 @@
  * The front of a cut: forces on the way in, back and in again; no closed motion gives work back;
  * integers next to double.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/fixed/front.h"
@@ -46,7 +42,7 @@ static void near(double is, double should)
 		fail_msg("%.12g, expected %.12g", is, should);
 }
 
-static void test_in_back_and_in_again(void **state)
+TEST(test_in_back_and_in_again)
 {
 	struct incise_front front = {0};
 	double c = law(15, 0);
@@ -67,7 +63,7 @@ static void test_in_back_and_in_again(void **state)
 	near(go(&front, 16, FRICTION), law(16, 0));
 }
 
-static void test_without_friction(void **state)
+TEST(test_without_friction)
 {
 	struct incise_front front = {0};
 
@@ -79,7 +75,7 @@ static void test_without_friction(void **state)
 }
 
 /* The blade leaves the skin and comes back: into its cut, beside it, beyond its end. */
-static void test_place(void **state)
+TEST(test_place)
 {
 	static const struct {
 		double at[3];
@@ -104,7 +100,7 @@ static void test_place(void **state)
 }
 
 /* Sideways out of its line: new tissue, and a new line from there on. */
-static void test_sideways(void **state)
+TEST(test_sideways)
 {
 	struct incise_front front = {0};
 
@@ -115,7 +111,7 @@ static void test_sideways(void **state)
 }
 
 /* New tissue along the skin: the model's force at once, at any speed, while work was put in. */
-static void test_along(void **state)
+TEST(test_along)
 {
 	struct incise_front front = {0};
 	double force;
@@ -180,7 +176,7 @@ static struct taken take(struct incise_front *front, uint64_t n)
  * goes in only, without a tolerance. The same of a second one in the cut of the first, which pays
  * for nothing.
  */
-static void test_takes_work(void **state)
+TEST(test_takes_work)
 {
 	int worse = 0, again = 0;
 
@@ -199,7 +195,7 @@ static void test_takes_work(void **state)
 }
 
 /* Accumulated work is that of the held forces, and what is paid for is never more. */
-static void test_account(void **state)
+TEST(test_account)
 {
 	struct incise_front front = {0};
 	double work;
@@ -221,7 +217,7 @@ static int32_t q16(double x)
 }
 
 /* Next to double on random motions, with a cutting force that is wrong by a bound of its own. */
-static void test_integers(void **state)
+TEST(test_integers)
 {
 	const uint64_t key = incise_random_key(2, 99);
 	const double wrong_N = 0.01;
@@ -259,7 +255,7 @@ static void test_integers(void **state)
 }
 
 /* Without an error of the model: some bits. */
-static void test_integers_alone(void **state)
+TEST(test_integers_alone)
 {
 	double bound = incise_fixed_front_bound(K, FRICTION, 4, 0), worst = 0;
 	struct incise_fixed_front fixed = {0};
@@ -283,7 +279,7 @@ static void test_integers_alone(void **state)
 }
 
 /* Any numbers: nothing wraps (the sanitizers' build sees that), and the force keeps its range. */
-static void test_any_integers(void **state)
+TEST(test_any_integers)
 {
 	static const int32_t ends[] = {INT32_MIN, INT32_MIN + 1, -65536,  -1,	    0,
 				       1,	  65536,	 1 << 30, INT32_MAX};
@@ -300,22 +296,4 @@ static void test_any_integers(void **state)
 		assert_true(force <= (v[4] > 0 ? v[4] : 0));
 		assert_true(force >= (v[4] > 0 ? -v[4] : 0));
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_in_back_and_in_again),
-		cmocka_unit_test(test_without_friction),
-		cmocka_unit_test(test_place),
-		cmocka_unit_test(test_sideways),
-		cmocka_unit_test(test_along),
-		cmocka_unit_test(test_takes_work),
-		cmocka_unit_test(test_account),
-		cmocka_unit_test(test_integers),
-		cmocka_unit_test(test_integers_alone),
-		cmocka_unit_test(test_any_integers),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 /*
  * lib/tissue/instrument.c: the tool that is held, by attitude and by name, and its end.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include "../../../lib/tissue/instrument.h"
 
@@ -32,7 +28,7 @@ static struct incise_instrument scalpel(enum incise_tool wanted, enum incise_too
  * The axis' share along the normal decides: given by the normal here, with the scalpel as
  * it is, so that it is exact.
  */
-static void test_turn(void **state)
+TEST(test_turn)
 {
 	static const struct {
 		enum incise_tool held;
@@ -78,7 +74,7 @@ static void test_turn(void **state)
 }
 
 /* A tool that is asked for by name is held in any attitude, once out of the tissue. */
-static void test_by_name(void **state)
+TEST(test_by_name)
 {
 	static const enum incise_tool tools[] = {BLADE, HANDLE, TUBE};
 
@@ -102,7 +98,7 @@ static void test_by_name(void **state)
 }
 
 /* A tube that has a station is held while it is nearer, whatever the scalpel's turn. */
-static void test_nearer_tube(void **state)
+TEST(test_nearer_tube)
 {
 	static const enum incise_tool tools[] = {BLADE, HANDLE, TUBE};
 
@@ -132,7 +128,7 @@ static void test_nearer_tube(void **state)
 }
 
 /* A hand that trembles by less than the 12° to either side of level changes nothing. */
-static void test_tremor_does_not_switch(void **state)
+TEST(test_tremor_does_not_switch)
 {
 	struct incise_instrument s = scalpel(AUTO, BLADE);
 	int changes = 0;
@@ -147,7 +143,7 @@ static void test_tremor_does_not_switch(void **state)
 	assert_int_equal(changes, 0);
 }
 
-static void test_end(void **state)
+TEST(test_end)
 {
 	static const double tip[3] = {1, 2, 3};
 	const double h = sqrt(0.5);
@@ -174,17 +170,4 @@ static void test_end(void **state)
 		for (int k = 0; k < 3; k++)
 			assert_true(fabs(end[k] - cases[i].end[k]) < 1e-12);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_turn),
-		cmocka_unit_test(test_by_name),
-		cmocka_unit_test(test_nearer_tube),
-		cmocka_unit_test(test_tremor_does_not_switch),
-		cmocka_unit_test(test_end),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 /*
  * The cut as a line: its direction, its extent, and what lies within reach of it.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include "../../../lib/tissue/line.h"
 
@@ -24,7 +20,7 @@ static double dot(const double a[3], const double b[3])
 #define S2 2e-3
 #define S05 0.5e-3
 
-static void test_direction(void **state)
+TEST(test_direction)
 {
 	static const double at[3] = {7, 8, 9};
 	static const struct {
@@ -67,7 +63,7 @@ static void test_direction(void **state)
 }
 
 /* A cut from x = 0 that runs along x, to where these places are. */
-static void test_extent(void **state)
+TEST(test_extent)
 {
 	static const struct {
 		double at[3], from, to;
@@ -90,7 +86,7 @@ static void test_extent(void **state)
 }
 
 /* The cut from -2 to 20 has the shape of a capsule around it that is in reach. */
-static void test_reach(void **state)
+TEST(test_reach)
 {
 	static const struct {
 		double at[3];
@@ -118,15 +114,4 @@ static void test_reach(void **state)
 			fail_msg("case %zu", i);
 	/* Its very points are in reach of 0. */
 	assert_true(incise_line_holds(&cut, (double[]){20, 0, 0}, 0));
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_direction),
-		cmocka_unit_test(test_extent),
-		cmocka_unit_test(test_reach),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 /*
  * tools/cli/child.c: a child ends with the program that started it.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -15,7 +11,7 @@
 
 static char *const sleeps[] = {"sleep", "1000", NULL};
 
-static void test_ends_when_asked(void **state)
+TEST(test_ends_when_asked)
 {
 	pid_t pid = child_start(sleeps, -1, -1);
 	int status;
@@ -26,7 +22,7 @@ static void test_ends_when_asked(void **state)
 	assert_true(WIFSIGNALED(status) && WTERMSIG(status) == SIGTERM);
 }
 
-static void test_ends_with_its_killed_parent(void **state)
+TEST(test_ends_with_its_killed_parent)
 {
 	int to[2], status;
 	pid_t parent, pid;
@@ -51,7 +47,7 @@ static void test_ends_with_its_killed_parent(void **state)
 	close(to[1]);
 }
 
-static void test_output_goes_to_its_descriptor(void **state)
+TEST(test_output_goes_to_its_descriptor)
 {
 	char *const says[] = {"sh", "-c", "cat; echo out; echo err >&2", NULL};
 	char text[20] = "";
@@ -66,15 +62,4 @@ static void test_output_goes_to_its_descriptor(void **state)
 	assert_int_equal(read(to[0], text, sizeof(text) - 1), 4);
 	assert_string_equal(text, "out\n");
 	close(to[0]);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_ends_when_asked),
-		cmocka_unit_test(test_ends_with_its_killed_parent),
-		cmocka_unit_test(test_output_goes_to_its_descriptor),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * tools/bench/harness.c: whether the interval of a median holds the median as often as it says, on
  * values whose median is known; and that variants take turns.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <string.h>
 #include "../../../lib/base/random.h"
@@ -54,7 +50,7 @@ static double covered(int n)
 	return (double)held / TRIALS;
 }
 
-static void test_intervals_hold_the_median(void **state)
+TEST(test_intervals_hold_the_median)
 {
 	/* By ranks: 1 - 2 sum C(n, i) / 2^n; from 24 on 96.1 % by 12 medians, which lean a
 	 * little where the distribution does. Four sd of 4000 trials are 1.2 %. */
@@ -75,7 +71,7 @@ static void test_intervals_hold_the_median(void **state)
 
 /* A machine that is slow for a while makes neighbours alike; an interval by the ranks of all
  * values would take them for as many witnesses. */
-static void test_a_slow_while_widens_it(void **state)
+TEST(test_a_slow_while_widens_it)
 {
 	double steady[120], slow[120];
 	struct harness_spread a, b;
@@ -90,7 +86,7 @@ static void test_a_slow_while_widens_it(void **state)
 	assert_true(b.high / b.low > 1.2 * a.high / a.low);
 }
 
-static void test_few_values(void **state)
+TEST(test_few_values)
 {
 	static const double values[] = {3, 1, 2};
 	struct harness_spread s;
@@ -112,7 +108,7 @@ static double say(void *context)
 }
 
 /* One value in twenty lies beyond the 95th percentile, one in a thousand beyond the 99.9th. */
-static void test_percentiles_take_values(void **state)
+TEST(test_percentiles_take_values)
 {
 	static const struct {
 		double share;
@@ -121,7 +117,6 @@ static void test_percentiles_take_values(void **state)
 		     {0.99, 100}, {0.999, 1000}, {0.9999, 10000}};
 	double values[1000];
 
-	(void)state;
 	for (int i = 0; i < 1000; i++)
 		values[i] = i;
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -132,7 +127,7 @@ static void test_percentiles_take_values(void **state)
 	assert_true(isnan(stopwatch_quantile(values, 999, 0.999)));
 }
 
-static void test_variants_take_turns(void **state)
+TEST(test_variants_take_turns)
 {
 	struct harness_time times[3];
 	const struct harness_variant variants[] = {
@@ -149,17 +144,4 @@ static void test_variants_take_turns(void **state)
 	for (int w = 0; w < WORKLOADS; w++)
 		assert_true(times[2].by[w].low > 0 &&
 			    times[2].by[w].low <= times[2].by[w].high);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_intervals_hold_the_median),
-		cmocka_unit_test(test_a_slow_while_widens_it),
-		cmocka_unit_test(test_few_values),
-		cmocka_unit_test(test_percentiles_take_values),
-		cmocka_unit_test(test_variants_take_turns),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * tools/bench/metrics.c, on reports that are made: how often it calls two runs of one distribution
  * different, and what it finds.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include "../../../lib/base/random.h"
 #include "../../../tools/bench/metrics.h"
@@ -100,7 +96,7 @@ static void tally(const struct made *was, const struct made *is, int *worse, int
 
 static const struct made steady = {1, 1, 1, 1};
 
-static void test_the_same_is_the_same(void **state)
+TEST(test_the_same_is_the_same)
 {
 	int worse, better;
 
@@ -110,7 +106,7 @@ static void test_the_same_is_the_same(void **state)
 	assert_true(worse + better <= PAIRS / 20);
 }
 
-static void test_slower_is_found(void **state)
+TEST(test_slower_is_found)
 {
 	struct made slow = {1.15, 1, 1, 1};
 	int worse, better;
@@ -142,7 +138,7 @@ static json_t *sharp(double value, double chain, double wide, double memory)
 	return report_of(metrics);
 }
 
-static void test_sharp_times(void **state)
+TEST(test_sharp_times)
 {
 	static const struct {
 		double slower, chain, wide, memory;
@@ -181,7 +177,7 @@ static json_t *exact(double a, double b, bool more)
 	return report_of(metrics);
 }
 
-static void test_exact_ones(void **state)
+TEST(test_exact_ones)
 {
 	static const struct {
 		double was, is;
@@ -218,7 +214,7 @@ static void test_exact_ones(void **state)
 	}
 }
 
-static void test_another_unit_is_another_metric(void **state)
+TEST(test_another_unit_is_another_metric)
 {
 	json_t *was = json_array(), *is = json_array(), *c;
 	double one = 1;
@@ -235,7 +231,7 @@ static void test_another_unit_is_another_metric(void **state)
 }
 
 /* A word that is not there is one line; of many that takes no more than one look each. */
-static void test_many_words(void **state)
+TEST(test_many_words)
 {
 	enum { WORDS = 20000 };
 	json_t *was = json_object(), *is = json_object(), *c;
@@ -255,18 +251,4 @@ static void test_many_words(void **state)
 	assert_int_equal(count(c, "gone"), WORDS);
 	assert_int_equal(count(c, "new"), WORDS);
 	json_decref(c);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_the_same_is_the_same),
-		cmocka_unit_test(test_slower_is_found),
-		cmocka_unit_test(test_sharp_times),
-		cmocka_unit_test(test_exact_ones),
-		cmocka_unit_test(test_another_unit_is_another_metric),
-		cmocka_unit_test(test_many_words),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

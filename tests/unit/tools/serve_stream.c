@@ -2,16 +2,12 @@
 /*
  * Tests of tools/serve/stream.c: rates, means and times of what reaches a sink.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
+#include "../unit.h"
 #include <math.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
-#include <cmocka.h>
 #include "../../../tools/cli/cli.h"
 #include "../../../tools/serve/stream.h"
 
@@ -59,7 +55,7 @@ static struct serve_stream *start(double rate_hz)
 static const double here[3] = {1, 2, 3}, turned[4] = {M_SQRT1_2, 0, 0, M_SQRT1_2},
 		    none[3];
 
-static void a_source_of_the_very_rate_keeps_all(void **state)
+TEST(a_source_of_the_very_rate_keeps_all)
 {
 	struct serve_stream *stream = start(1000);
 
@@ -74,7 +70,7 @@ static void a_source_of_the_very_rate_keeps_all(void **state)
 	serve_stream_free(stream);
 }
 
-static void a_faster_one_is_thinned_and_a_gap_starts_again(void **state)
+TEST(a_faster_one_is_thinned_and_a_gap_starts_again)
 {
 	struct serve_stream *stream = start(100);
 
@@ -94,7 +90,7 @@ static void a_faster_one_is_thinned_and_a_gap_starts_again(void **state)
 	serve_stream_free(stream);
 }
 
-static void forces_are_means_with_their_deviation(void **state)
+TEST(forces_are_means_with_their_deviation)
 {
 	struct serve_stream *stream = start(100);
 	double sum = 0, squares = 0;
@@ -130,7 +126,7 @@ static void forces_are_means_with_their_deviation(void **state)
 	serve_stream_free(stream);
 }
 
-static void the_tip_turns_with_the_scalpel(void **state)
+TEST(the_tip_turns_with_the_scalpel)
 {
 	static const double tip[3] = {10, 0, 5};
 	struct serve_stream *stream = start(100);
@@ -152,7 +148,7 @@ static void the_tip_turns_with_the_scalpel(void **state)
 	serve_stream_free(stream);
 }
 
-static void a_state_is_sent_when_it_changes(void **state)
+TEST(a_state_is_sent_when_it_changes)
 {
 	struct serve_stream *stream = start(100);
 
@@ -167,7 +163,7 @@ static void a_state_is_sent_when_it_changes(void **state)
 	serve_stream_free(stream);
 }
 
-static void a_recording_is_played_at_its_speed(void **state)
+TEST(a_recording_is_played_at_its_speed)
 {
 	struct serve_stream *stream = start(100);
 
@@ -182,7 +178,7 @@ static void a_recording_is_played_at_its_speed(void **state)
 	serve_stream_free(stream);
 }
 
-static void utc_is_that_of_the_clock(void **state)
+TEST(utc_is_that_of_the_clock)
 {
 	struct timespec before, after;
 	int64_t start_ns, took_ns, ours;
@@ -198,19 +194,4 @@ static void utc_is_that_of_the_clock(void **state)
 	} while (cli_now_ns() - start_ns > NS || took_ns < 0 || took_ns > NS);
 	assert_in_range(ours, before.tv_sec * NS + before.tv_nsec - NS,
 			after.tv_sec * NS + after.tv_nsec + NS);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_source_of_the_very_rate_keeps_all),
-		cmocka_unit_test(a_faster_one_is_thinned_and_a_gap_starts_again),
-		cmocka_unit_test(forces_are_means_with_their_deviation),
-		cmocka_unit_test(the_tip_turns_with_the_scalpel),
-		cmocka_unit_test(a_state_is_sent_when_it_changes),
-		cmocka_unit_test(a_recording_is_played_at_its_speed),
-		cmocka_unit_test(utc_is_that_of_the_clock),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

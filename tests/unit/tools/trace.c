@@ -3,11 +3,7 @@
  * Tests of tools/capture/trace.c: dots are where the values are, extremes stay, the line is whole,
  * nothing is wider or higher than asked.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,12 +36,11 @@ static int dots(const char *line, int x)
 	return (c[1] & 3) << 6 | (c[2] & 0x3f);
 }
 
-static void values_are_where_they_belong(void **state)
+TEST(values_are_where_they_belong)
 {
 	struct trace trace;
 	char *text, *lines[16];
 
-	(void)state;
 	trace_begin(&trace, "N", 0.1);
 	/* four columns of dots: 0, 0, 4 N, 4 N; the axis is 0 to 4 N */
 	for (int i = 0; i < 4; i++)
@@ -69,12 +64,11 @@ static void values_are_where_they_belong(void **state)
 	free(text);
 }
 
-static void a_short_peak_stays(void **state)
+TEST(a_short_peak_stays)
 {
 	struct trace trace;
 	char *text, *lines[16];
 
-	(void)state;
 	trace_begin(&trace, "N", 0.1);
 	for (int i = 0; i < 100; i++)
 		trace_add(&trace, 0.01 * i, i == 37 ? 8 : 0);
@@ -86,12 +80,11 @@ static void a_short_peak_stays(void **state)
 	free(text);
 }
 
-static void old_values_go_and_gaps_are_empty(void **state)
+TEST(old_values_go_and_gaps_are_empty)
 {
 	struct trace trace;
 	char *text, *lines[16];
 
-	(void)state;
 	trace_begin(&trace, "mm", 1);
 	trace_add(&trace, 0.05, 100);
 	trace_add(&trace, 0.15, NAN);
@@ -112,14 +105,13 @@ static void old_values_go_and_gaps_are_empty(void **state)
 }
 
 /* For any input, lines have the width and the height that was asked for. */
-static void any_value_fits(void **state)
+TEST(any_value_fits)
 {
 	static const double values[] = {0,	  -1e-300,   1e300, -1e300,
 					INFINITY, -INFINITY, NAN,   1e-9};
 	char *text, *lines[16];
 	struct trace trace;
 
-	(void)state;
 	trace_begin(&trace, "N", 0.1);
 	for (int width = 0; width < 120; width += 7)
 		for (int height = 0; height < 20; height++) {
@@ -137,16 +129,4 @@ static void any_value_fits(void **state)
 		}
 	assert_true(trace_span_s(79) == 14);
 	assert_true(trace_span_s(3) == 0);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(values_are_where_they_belong),
-		cmocka_unit_test(a_short_peak_stays),
-		cmocka_unit_test(old_values_go_and_gaps_are_empty),
-		cmocka_unit_test(any_value_fits),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

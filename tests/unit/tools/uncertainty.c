@@ -2,11 +2,7 @@
 /*
  * tools/cli/uncertainty.c: digits of a value and of its uncertainty.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -14,7 +10,7 @@
 #include <string.h>
 #include "../../../tools/cli/uncertainty.h"
 
-static void digits_follow_the_uncertainty(void **state)
+TEST(digits_follow_the_uncertainty)
 {
 	static const struct {
 		double value, U;
@@ -42,7 +38,6 @@ static void digits_follow_the_uncertainty(void **state)
 	};
 	char text[UNCERTAINTY_TEXT];
 
-	(void)state;
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
 		assert_string_equal(uncertainty_text(cases[i].value, cases[i].U,
 						     cases[i].unit, text),
@@ -50,11 +45,10 @@ static void digits_follow_the_uncertainty(void **state)
 }
 
 /* Both numbers are off by at most half of their last digit, over all magnitudes. */
-static void what_is_printed_is_the_value(void **state)
+TEST(what_is_printed_is_the_value)
 {
 	char text[UNCERTAINTY_TEXT], *rest;
 
-	(void)state;
 	for (double U = 1e-8; U < 1e8; U *= 1.7)
 		for (double ratio = -3000; ratio < 3000; ratio += 7.3) {
 			double value = ratio * U, printed;
@@ -70,14 +64,4 @@ static void what_is_printed_is_the_value(void **state)
 			assert_true(fabs(printed - U) <= 0.0503 * U);
 			assert_string_equal(rest, "");
 		}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(digits_follow_the_uncertainty),
-		cmocka_unit_test(what_is_printed_is_the_value),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

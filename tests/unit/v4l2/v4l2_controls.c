@@ -6,6 +6,7 @@
  */
 #include "../../../lib/device/v4l2/v4l2_controls.h"
 #include "../message.h"
+#include "../unit.h"
 #include "driver.h"
 
 #define WHERE "rig.conf:1: camera"
@@ -48,7 +49,7 @@ static void nothing_is_adjusted(void)
 	assert_int_equal(value(V4L2_CID_FOCUS_AUTO), 0);
 }
 
-static void what_was_asked_for_is_set(void **state)
+TEST(what_was_asked_for_is_set)
 {
 	struct incise_camera_setup setup = {
 		.exposure_ms = 8, .gain = 40, .white_balance_K = 5004, .focus = 33};
@@ -66,7 +67,7 @@ static void what_was_asked_for_is_set(void **state)
 	assert_int_equal(v4l2_controls_check(&controls, WHERE, &err), 0);
 }
 
-static void what_was_not_asked_for_stays(void **state)
+TEST(what_was_not_asked_for_stays)
 {
 	struct incise_camera_setup setup = {0};
 
@@ -80,7 +81,7 @@ static void what_was_not_asked_for_stays(void **state)
 	assert_true(controls.exposure_ns == 15600000);
 }
 
-static void a_camera_without_controls_is_one_too(void **state)
+TEST(a_camera_without_controls_is_one_too)
 {
 	struct incise_camera_setup setup = {0};
 
@@ -97,7 +98,7 @@ static void a_camera_without_controls_is_one_too(void **state)
 	assert_int_equal(controls.n, 0);
 }
 
-static void the_iris_may_stay_automatic(void **state)
+TEST(the_iris_may_stay_automatic)
 {
 	struct incise_camera_setup setup = {0};
 
@@ -155,7 +156,7 @@ static void nothing(void)
 {
 }
 
-static void what_does_not_hold_is_refused(void **state)
+TEST(what_does_not_hold_is_refused)
 {
 	static const struct {
 		void (*make)(void);
@@ -187,7 +188,7 @@ static void what_does_not_hold_is_refused(void **state)
 	}
 }
 
-static void ranges_that_cannot_be_do_no_harm(void **state)
+TEST(ranges_that_cannot_be_do_no_harm)
 {
 	struct incise_camera_setup setup = {.gain = 7};
 
@@ -206,7 +207,7 @@ static void ranges_that_cannot_be_do_no_harm(void **state)
 	assert_int_equal(value(V4L2_CID_GAIN), 0);
 }
 
-static void drift_is_found(void **state)
+TEST(drift_is_found)
 {
 	struct incise_camera_setup setup = {.gain = 40};
 
@@ -221,7 +222,7 @@ static void drift_is_found(void **state)
 		     "automatic exposure", "1", "3");
 }
 
-static void one_failed_reading_is_no_drift(void **state)
+TEST(one_failed_reading_is_no_drift)
 {
 	struct incise_camera_setup setup = {0};
 
@@ -240,20 +241,4 @@ static void one_failed_reading_is_no_drift(void **state)
 	assert_error(v4l2_controls_check(&controls, WHERE, &err), EIO, &err, NULL);
 	driver.g_ctrl_error = ENODEV;
 	assert_int_equal(v4l2_controls_check(&controls, WHERE, &err), -ENODEV);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(what_was_asked_for_is_set),
-		cmocka_unit_test(what_was_not_asked_for_stays),
-		cmocka_unit_test(a_camera_without_controls_is_one_too),
-		cmocka_unit_test(the_iris_may_stay_automatic),
-		cmocka_unit_test(what_does_not_hold_is_refused),
-		cmocka_unit_test(ranges_that_cannot_be_do_no_harm),
-		cmocka_unit_test(drift_is_found),
-		cmocka_unit_test(one_failed_reading_is_no_drift),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,15 +2,11 @@
 /*
  * lib/device/v4l2/v4l2_file.c on a driver that the test plays.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include "../../../lib/device/v4l2/v4l2_file.h"
 #include "driver.h"
 
-static void what_a_driver_names_is_made_safe(void **state)
+TEST(what_a_driver_names_is_made_safe)
 {
 	struct v4l2_identity identity;
 
@@ -25,7 +21,7 @@ static void what_a_driver_names_is_made_safe(void **state)
 	assert_int_equal(identity.capabilities, driver.capabilities);
 }
 
-static void letters_are_printable(void **state)
+TEST(letters_are_printable)
 {
 	char text[5];
 
@@ -34,7 +30,7 @@ static void letters_are_printable(void **state)
 	assert_string_equal(v4l2_letters(0x000a41ff, text), "?A??");
 }
 
-static void signals_are_outlived(void **state)
+TEST(signals_are_outlived)
 {
 	struct v4l2_capability reported;
 
@@ -49,7 +45,7 @@ static void signals_are_outlived(void **state)
 	assert_int_equal(v4l2_open("/dev/video0"), -EINTR);
 }
 
-static void errors_come_as_they_are(void **state)
+TEST(errors_come_as_they_are)
 {
 	struct v4l2_identity identity;
 
@@ -61,16 +57,4 @@ static void errors_come_as_they_are(void **state)
 	/* Other devices answer so. */
 	driver.querycap_error = EINVAL;
 	assert_int_equal(v4l2_identify(DRIVER_FD, &identity), -ENOTTY);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(what_a_driver_names_is_made_safe),
-		cmocka_unit_test(letters_are_printable),
-		cmocka_unit_test(signals_are_outlived),
-		cmocka_unit_test(errors_come_as_they_are),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

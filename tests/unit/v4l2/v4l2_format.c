@@ -6,6 +6,7 @@
 #include <math.h>
 #include "../../../lib/device/v4l2/v4l2_format.h"
 #include "../message.h"
+#include "../unit.h"
 #include "driver.h"
 
 #define WHERE "rig.conf:1: camera"
@@ -20,7 +21,7 @@ static int set(const struct incise_camera_setup *setup)
 	return v4l2_format_set(DRIVER_FD, setup, WHERE, &shape, &err);
 }
 
-static void the_nearest_is_taken(void **state)
+TEST(the_nearest_is_taken)
 {
 	static const struct {
 		bool stepwise;
@@ -62,7 +63,7 @@ static void the_nearest_is_taken(void **state)
 	}
 }
 
-static void each_kind_of_pixels_has_its_rows(void **state)
+TEST(each_kind_of_pixels_has_its_rows)
 {
 	static const struct {
 		uint32_t fourcc;
@@ -90,7 +91,7 @@ static void each_kind_of_pixels_has_its_rows(void **state)
 	}
 }
 
-static void rows_may_be_padded(void **state)
+TEST(rows_may_be_padded)
 {
 	struct incise_camera_setup setup = {.pixels = INCISE_PIXELS_YUYV};
 
@@ -103,7 +104,7 @@ static void rows_may_be_padded(void **state)
 	assert_int_equal(shape.least, 64 * 7 + 32);
 }
 
-static void what_cannot_be_is_refused(void **state)
+TEST(what_cannot_be_is_refused)
 {
 	static const struct {
 		struct v4l2_pix_format lie;
@@ -137,7 +138,7 @@ static void what_cannot_be_is_refused(void **state)
 	}
 }
 
-static void a_missing_format_names_those_there_are(void **state)
+TEST(a_missing_format_names_those_there_are)
 {
 	struct incise_camera_setup setup = {.pixels = INCISE_PIXELS_GREY};
 
@@ -149,7 +150,7 @@ static void a_missing_format_names_those_there_are(void **state)
 	assert_says(err.text, "none");
 }
 
-static void refusals_of_the_driver_are_reported(void **state)
+TEST(refusals_of_the_driver_are_reported)
 {
 	struct incise_camera_setup setup = {.pixels = INCISE_PIXELS_YUYV};
 
@@ -163,7 +164,7 @@ static void refusals_of_the_driver_are_reported(void **state)
 	assert_int_equal(set(&setup), -ENODEV);
 }
 
-static void a_rate_may_be_unknown(void **state)
+TEST(a_rate_may_be_unknown)
 {
 	struct incise_camera_setup setup = {.pixels = INCISE_PIXELS_YUYV, .rate_hz = 30};
 
@@ -180,7 +181,7 @@ static void a_rate_may_be_unknown(void **state)
 	assert_true(shape.rate_hz == 0);
 }
 
-static void signals_do_not_matter(void **state)
+TEST(signals_do_not_matter)
 {
 	struct incise_camera_setup setup = {.pixels = INCISE_PIXELS_YUYV};
 
@@ -190,20 +191,4 @@ static void signals_do_not_matter(void **state)
 	/* Without end they do not hold it for ever. */
 	driver.interrupted = 1000000;
 	assert_int_equal(set(&setup), -EINTR);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(the_nearest_is_taken),
-		cmocka_unit_test(each_kind_of_pixels_has_its_rows),
-		cmocka_unit_test(rows_may_be_padded),
-		cmocka_unit_test(what_cannot_be_is_refused),
-		cmocka_unit_test(a_missing_format_names_those_there_are),
-		cmocka_unit_test(refusals_of_the_driver_are_reported),
-		cmocka_unit_test(a_rate_may_be_unknown),
-		cmocka_unit_test(signals_do_not_matter),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,6 +11,7 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/device/v4l2/v4l2_stream.h"
 #include "../message.h"
+#include "../unit.h"
 #include "driver.h"
 
 #define WHERE "rig.conf:1: camera"
@@ -73,7 +74,7 @@ static void losses(uint64_t lost, uint64_t damaged)
 	assert_true(atomic_load(&stream.damaged) == damaged);
 }
 
-static void frames_come_in_order_with_their_timestamps(void **state)
+TEST(frames_come_in_order_with_their_timestamps)
 {
 	struct incise_camera_frame frame;
 
@@ -98,7 +99,7 @@ static void frames_come_in_order_with_their_timestamps(void **state)
 	end();
 }
 
-static void what_is_held_is_not_written_to(void **state)
+TEST(what_is_held_is_not_written_to)
 {
 	struct incise_camera_frame held, next;
 
@@ -138,7 +139,7 @@ static void read_three(void)
 }
 
 /* v4l2loopback, which was outrun, goes on with a buffer that came back a moment before. */
-static void what_comes_back_while_it_waits_is_the_drivers(void **state)
+TEST(what_comes_back_while_it_waits_is_the_drivers)
 {
 	struct incise_camera_frame frame;
 
@@ -159,7 +160,7 @@ static void what_comes_back_while_it_waits_is_the_drivers(void **state)
 	end();
 }
 
-static void four_buffers_suffice(void **state)
+TEST(four_buffers_suffice)
 {
 	struct incise_camera_frame frame;
 
@@ -175,7 +176,7 @@ static void four_buffers_suffice(void **state)
 	end();
 }
 
-static void as_many_wait_as_there_is_room(void **state)
+TEST(as_many_wait_as_there_is_room)
 {
 	/* Of so many buffers so many frames: all but a quarter, and but 3 at most. */
 	static const struct {
@@ -234,7 +235,7 @@ static void *read_all(void *argument)
 	}
 }
 
-static void two_threads_take_each_once(void **state)
+TEST(two_threads_take_each_once)
 {
 	/* Of few buffers they meet at the same frame more often. */
 	static const uint32_t buffers[] = {4, 32};
@@ -261,7 +262,7 @@ static void two_threads_take_each_once(void **state)
 	}
 }
 
-static void all_that_is_lost_is_counted(void **state)
+TEST(all_that_is_lost_is_counted)
 {
 	struct incise_camera_frame frame;
 
@@ -283,7 +284,7 @@ static void all_that_is_lost_is_counted(void **state)
 	end();
 }
 
-static void damage_that_a_driver_does_not_count(void **state)
+TEST(damage_that_a_driver_does_not_count)
 {
 	struct incise_camera_frame frame;
 
@@ -304,7 +305,7 @@ static void damage_that_a_driver_does_not_count(void **state)
 	end();
 }
 
-static void stamps_that_cannot_be_are_damage(void **state)
+TEST(stamps_that_cannot_be_are_damage)
 {
 	static const struct {
 		int64_t from_now_ns, from_last_ns;
@@ -340,7 +341,7 @@ static void stamps_that_cannot_be_are_damage(void **state)
 	}
 }
 
-static void the_middle_of_the_exposure_is_reported(void **state)
+TEST(the_middle_of_the_exposure_is_reported)
 {
 	static const struct {
 		uint32_t source;
@@ -366,7 +367,7 @@ static void the_middle_of_the_exposure_is_reported(void **state)
 	}
 }
 
-static void a_jpeg_is_whole_from_first_to_last_marker(void **state)
+TEST(a_jpeg_is_whole_from_first_to_last_marker)
 {
 	static const struct {
 		uint8_t bytes[8];
@@ -478,7 +479,7 @@ static void fall_silent(void)
 {
 }
 
-static void every_end_has_its_cause(void **state)
+TEST(every_end_has_its_cause)
 {
 	static const struct {
 		void (*make)(void);
@@ -523,7 +524,7 @@ static void every_end_has_its_cause(void **state)
 	}
 }
 
-static void one_error_ends_nothing(void **state)
+TEST(one_error_ends_nothing)
 {
 	struct incise_camera_frame frame;
 
@@ -539,7 +540,7 @@ static void one_error_ends_nothing(void **state)
 	end();
 }
 
-static void slow_cameras_may_be_silent_longer(void **state)
+TEST(slow_cameras_may_be_silent_longer)
 {
 	begin();
 	stream.shape.rate_hz = 1;
@@ -552,7 +553,7 @@ static void slow_cameras_may_be_silent_longer(void **state)
 	end();
 }
 
-static void why_it_cannot_begin_is_said(void **state)
+TEST(why_it_cannot_begin_is_said)
 {
 	static const struct {
 		size_t error; /* field of the driver */
@@ -593,7 +594,7 @@ static uint32_t draw(uint32_t below)
 	return (uint32_t)(state >> 33) % below;
 }
 
-static void a_driver_that_lies_at_random_does_no_harm(void **state)
+TEST(a_driver_that_lies_at_random_does_no_harm)
 {
 	struct incise_camera_frame frame;
 	unsigned int frames = 0, ends = 0;
@@ -648,36 +649,11 @@ static void a_driver_that_lies_at_random_does_no_harm(void **state)
 	assert_in_range(ends, 30, 270);
 }
 
-static void more_buffers_than_asked_for_are_not_overrun(void **state)
+TEST(more_buffers_than_asked_for_are_not_overrun)
 {
 	driver_reset();
 	driver.count = 33;
 	assert_int_equal(start(INCISE_PIXELS_YUYV, 0), 0);
 	assert_int_equal(stream.n, 32);
 	end();
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(frames_come_in_order_with_their_timestamps),
-		cmocka_unit_test(what_is_held_is_not_written_to),
-		cmocka_unit_test(what_comes_back_while_it_waits_is_the_drivers),
-		cmocka_unit_test(four_buffers_suffice),
-		cmocka_unit_test(as_many_wait_as_there_is_room),
-		cmocka_unit_test(two_threads_take_each_once),
-		cmocka_unit_test(all_that_is_lost_is_counted),
-		cmocka_unit_test(damage_that_a_driver_does_not_count),
-		cmocka_unit_test(stamps_that_cannot_be_are_damage),
-		cmocka_unit_test(the_middle_of_the_exposure_is_reported),
-		cmocka_unit_test(a_jpeg_is_whole_from_first_to_last_marker),
-		cmocka_unit_test(every_end_has_its_cause),
-		cmocka_unit_test(one_error_ends_nothing),
-		cmocka_unit_test(slow_cameras_may_be_silent_longer),
-		cmocka_unit_test(why_it_cannot_begin_is_said),
-		cmocka_unit_test(a_driver_that_lies_at_random_does_no_harm),
-		cmocka_unit_test(more_buffers_than_asked_for_are_not_overrun),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

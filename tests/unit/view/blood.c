@@ -3,11 +3,7 @@
  * Blood: its volume balances in whole units, drops run downhill only, memory is bounded, and a seed
  * determines the result.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <stdlib.h>
 #include "allocated.h"
 #include "ground.h"
@@ -52,7 +48,7 @@ static void assert_balance(const struct blood *blood)
 }
 
 /* Two minutes on ground of some tilts, with cuts now and then. */
-static void test_balance(void **state)
+TEST(test_balance)
 {
 	static const double tilts[] = {0, 40, -1};
 
@@ -86,7 +82,7 @@ static void test_balance(void **state)
  * A fresh cut emits k L D tau in total, 99 % of it in five tau. On level ground: a source emits
  * every 80 ms at the rate of their start, so half of 80 ms / 18 s too much.
  */
-static void test_emits_what_it_should(void **state)
+TEST(test_emits_what_it_should)
 {
 	struct blood_volumes v;
 	struct blood *blood;
@@ -127,7 +123,7 @@ static double height_mm(const struct field *field, const double px[2])
 }
 
 /* No drop rises in any step, and some run far. With and without a larynx. */
-static void test_downhill(void **state)
+TEST(test_downhill)
 {
 	for (int k = 0; k < 3; k++) {
 		double was[DROPS] = {0}, first[DROPS] = {0}, farthest = 0;
@@ -181,7 +177,7 @@ static void test_downhill(void **state)
 }
 
 /* On level ground nothing runs. */
-static void test_level_stays(void **state)
+TEST(test_level_stays)
 {
 	struct blood *blood;
 	struct field field;
@@ -202,7 +198,7 @@ static void test_level_stays(void **state)
 }
 
 /* A drop below the critical volume hangs; a steeper slope releases smaller ones. */
-static void test_pinned_below_a_volume(void **state)
+TEST(test_pinned_below_a_volume)
 {
 	double let_go_ul[2] = {0};
 
@@ -264,7 +260,7 @@ static void painted_new(struct painted *p, const struct field *field, int seed)
 }
 
 /* The same seed gives identical textures, painted often or once; another seed another one. */
-static void test_repeats(void **state)
+TEST(test_repeats)
 {
 	static const int seeds[] = {1, 1, 2};
 	struct painted p[3];
@@ -310,7 +306,7 @@ static void test_repeats(void **state)
 }
 
 /* After a long time nothing moves and nothing is painted. */
-static void test_dries(void **state)
+TEST(test_dries)
 {
 	struct incise_upload uploads[256];
 	struct painted p;
@@ -336,7 +332,7 @@ static void test_dries(void **state)
 }
 
 /* More than the capacity: strokes anywhere, much blood, thin and thick. */
-static void test_much(void **state)
+TEST(test_much)
 {
 	static const double viscosities[] = {0.5, 1000};
 
@@ -361,20 +357,4 @@ static void test_much(void **state)
 		blood_free(blood);
 		field_free(&field);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_balance),
-		cmocka_unit_test(test_emits_what_it_should),
-		cmocka_unit_test(test_downhill),
-		cmocka_unit_test(test_level_stays),
-		cmocka_unit_test(test_pinned_below_a_volume),
-		cmocka_unit_test(test_repeats),
-		cmocka_unit_test(test_dries),
-		cmocka_unit_test(test_much),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

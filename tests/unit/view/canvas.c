@@ -3,11 +3,7 @@
  * The canvas: composing dirty tiles gives the same bits as composing everything; its levels are
  * means in linear light.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <limits.h>
 #include <math.h>
@@ -80,7 +76,7 @@ static void assert_same(const struct incise_canvas *a, const struct incise_canva
 }
 
 /* A canvas that composes after each change, compared with one that composes at the end. */
-static void test_as_anew(void **state)
+TEST(test_as_anew)
 {
 	const int capacities[] = {CANVAS_UPLOADS_MIN, UPLOADS};
 
@@ -110,7 +106,7 @@ static void test_as_anew(void **state)
 }
 
 /* A copy that follows the uploads, as in a graphics card, equals the canvas. */
-static void test_uploads_tell_all(void **state)
+TEST(test_uploads_tell_all)
 {
 	uint8_t *base = any_base(SIDE), *copy[9];
 	struct incise_canvas *canvas = canvas_of(SIDE, base, 1);
@@ -152,7 +148,7 @@ static void test_uploads_tell_all(void **state)
 }
 
 /* A small change gives small rectangles: a tile, and its parts of the other levels. */
-static void test_small_stays_small(void **state)
+TEST(test_small_stays_small)
 {
 	uint8_t *base = any_base(SIDE);
 	struct incise_canvas *canvas = canvas_of(SIDE, base, 1);
@@ -173,7 +169,7 @@ static void test_small_stays_small(void **state)
 }
 
 /* Compared with the formula of "over" in doubles. */
-static void test_over(void **state)
+TEST(test_over)
 {
 	uint8_t *base = any_base(32);
 	struct incise_canvas *canvas = canvas_of(32, base, 2);
@@ -203,7 +199,7 @@ static void test_over(void **state)
 }
 
 /* One colour is the same at all levels; black and white side by side are 188, not 128. */
-static void test_levels(void **state)
+TEST(test_levels)
 {
 	for (int value = 0; value < 256; value += 5) {
 		uint8_t base[32 * 32 * 4];
@@ -233,7 +229,7 @@ static void test_levels(void **state)
 	}
 }
 
-static void test_refused(void **state)
+TEST(test_refused)
 {
 	static const int sides[] = {0, -1, 16, 33, 96, 32768, INT_MIN};
 	uint8_t base[32 * 32 * 4] = {0};
@@ -275,7 +271,7 @@ static void test_refused(void **state)
  * With few texels a call all tiles come in turn: none waits longer than once round, however often the
  * first ones change again. In the end it is as if composed at once.
  */
-static void test_few_texels_a_call(void **state)
+TEST(test_few_texels_a_call)
 {
 	const int tiles = SIDE / CANVAS_TILE, few = 4 * CANVAS_TILE * CANVAS_TILE;
 	const int rounds = tiles * tiles / 4;
@@ -307,19 +303,4 @@ static void test_few_texels_a_call(void **state)
 	incise_canvas_free(canvas);
 	incise_canvas_free(whole);
 	free(base);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_as_anew),
-		cmocka_unit_test(test_uploads_tell_all),
-		cmocka_unit_test(test_small_stays_small),
-		cmocka_unit_test(test_over),
-		cmocka_unit_test(test_levels),
-		cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_few_texels_a_call),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,15 +2,11 @@
 /*
  * Contexts without a screen.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <epoxy/gl.h>
 #include "look.h"
 
-static void test_two_do_not_meddle(void **state)
+TEST(test_two_do_not_meddle)
 {
 	struct incise_egl *a = look_context(), *b;
 	unsigned texture = 0;
@@ -34,7 +30,7 @@ static void test_two_do_not_meddle(void **state)
 	incise_egl_free(NULL);
 }
 
-static void test_again_and_again(void **state)
+TEST(test_again_and_again)
 {
 	for (int i = 0; i < 5; i++) {
 		struct incise_egl *egl = look_context();
@@ -44,14 +40,4 @@ static void test_again_and_again(void **state)
 		assert_int_equal(incise_egl_current(egl, NULL), 0);
 		incise_egl_free(egl);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_two_do_not_meddle),
-		cmocka_unit_test(test_again_and_again),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,11 +3,7 @@
  * The injury: a function of the ticks alone, whenever it is painted; only the parts that the scene
  * requests; and invalid ticks do no harm.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <errno.h>
 #include <stdlib.h>
 #include "allocated.h"
@@ -80,7 +76,7 @@ static void assert_same(const struct scene *a, const struct scene *b)
 }
 
 /* Frames at each tick, at 60 Hz, at random, or one at the end: the same to the bit. */
-static void test_frames_do_not_matter(void **state)
+TEST(test_frames_do_not_matter)
 {
 	static const int every[] = {3, 17, 0, 100000};
 	struct scene s[4];
@@ -106,7 +102,7 @@ static void test_frames_do_not_matter(void **state)
 }
 
 /* Repeated ticks of one time, as from a reader that reads twice, change nothing. */
-static void test_ticks_twice(void **state)
+TEST(test_ticks_twice)
 {
 	struct scene s[2];
 	struct field field;
@@ -129,7 +125,7 @@ static void test_ticks_twice(void **state)
 }
 
 /* The blood of a cut depends on its length and depth, not on the tick rate. */
-static void test_rates(void **state)
+TEST(test_rates)
 {
 	static const double rates[] = {1000, 5000, 100, 20};
 	double ul[4];
@@ -161,7 +157,7 @@ static void test_rates(void **state)
 }
 
 /* There are only the parts that the scene requests. */
-static void test_only_what_is_asked_for(void **state)
+TEST(test_only_what_is_asked_for)
 {
 	static const struct {
 		bool wound, bleeding;
@@ -207,7 +203,7 @@ static void test_only_what_is_asked_for(void **state)
 }
 
 /* Up to a second of a gap in the ticks is caught up, the rest skipped. */
-static void test_gaps(void **state)
+TEST(test_gaps)
 {
 	static const struct {
 		int64_t gap_ns;
@@ -265,7 +261,7 @@ static double any_double(void)
 }
 
 /* Any ticks give premultiplied colours and volumes that balance, in bounded time. */
-static void test_hostile(void **state)
+TEST(test_hostile)
 {
 	static const double tilts[] = {40, -1};
 
@@ -333,7 +329,7 @@ static void test_hostile(void **state)
 	}
 }
 
-static void test_refused(void **state)
+TEST(test_refused)
 {
 	struct incise_error err = {0};
 	struct incise_canvas *canvas;
@@ -348,19 +344,4 @@ static void test_refused(void **state)
 	incise_canvas_free(canvas);
 	incise_injury_free(NULL);
 	field_free(&field);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_frames_do_not_matter),
-		cmocka_unit_test(test_ticks_twice),
-		cmocka_unit_test(test_rates),
-		cmocka_unit_test(test_only_what_is_asked_for),
-		cmocka_unit_test(test_gaps),
-		cmocka_unit_test(test_hostile),
-		cmocka_unit_test(test_refused),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 /*
  * Meshes of instruments, and their frames from ticks.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <string.h>
 #include "../../../lib/base/vector.h"
@@ -57,7 +53,7 @@ static void check(const struct instrument_mesh *mesh, double low[3], double high
 		assert_true(mesh->indices[i] < (uint32_t)mesh->n_vertices);
 }
 
-static void test_scalpel(void **state)
+TEST(test_scalpel)
 {
 	static const double lengths[] = {1, 40, 120, 1000};
 	struct instrument_mesh mesh;
@@ -84,7 +80,7 @@ static void test_scalpel(void **state)
 	}
 }
 
-static void test_tube(void **state)
+TEST(test_tube)
 {
 	struct instrument_mesh mesh;
 	double low[3], high[3];
@@ -121,7 +117,7 @@ static void expect(const struct instrument_place *place, const double x[3],
 		assert_true(fabs(place->y[k] - y[k]) < 1e-12);
 }
 
-static void test_place(void **state)
+TEST(test_place)
 {
 	struct instrument_place place;
 	struct incise_tick tick = {.position_mm = {1, 2, 3},
@@ -143,7 +139,7 @@ static void test_place(void **state)
 	assert_true(place.tube && place.origin_mm[0] == 4);
 }
 
-static void test_nowhere(void **state)
+TEST(test_nowhere)
 {
 	static const struct incise_scene_scalpel odd = {{0, 0, 1}, {0, 0, 1}, 120,
 							10,	   3,	      7};
@@ -166,16 +162,4 @@ static void test_nowhere(void **state)
 	assert_false(instrument_place(&scalpel, &tick, &place));
 	tick.position_mm[1] = 1e7;
 	assert_false(instrument_place(&scalpel, &tick, &place));
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_scalpel),
-		cmocka_unit_test(test_tube),
-		cmocka_unit_test(test_place),
-		cmocka_unit_test(test_nowhere),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,18 +2,14 @@
 /*
  * The larynx: its shape, and the surface as drawn with it.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/surface/surface.h"
 #include "../../../lib/view/uv_map.h"
 
 #define SIZE 512
 
-static void test_landmarks(void **state)
+TEST(test_landmarks)
 {
 	double prominence = larynx_height_mm(-20, 0), notch = larynx_height_mm(-30, 0);
 	double beside_notch = larynx_height_mm(-30, 6), membrane = larynx_height_mm(0, 0);
@@ -36,7 +32,7 @@ static void test_landmarks(void **state)
 }
 
 /* Within 0 to 5 mm, slopes of skin over cartilage, and no edge. */
-static void test_smooth(void **state)
+TEST(test_smooth)
 {
 	const double h = 0.25;
 
@@ -70,7 +66,7 @@ static struct uv_map *neck(struct incise_surface **surface, bool larynx)
 }
 
 /* The surface is drawn with the relief, and normals follow it. */
-static void test_drawn(void **state)
+TEST(test_drawn)
 {
 	struct incise_surface *surface;
 	struct uv_map *map = neck(&surface, true);
@@ -118,7 +114,7 @@ static void test_drawn(void **state)
 }
 
 /* There is none unless requested, and none on a texture that is too small. */
-static void test_none(void **state)
+TEST(test_none)
 {
 	struct incise_surface *surface;
 	struct uv_map *map = neck(&surface, false);
@@ -140,16 +136,4 @@ static void test_none(void **state)
 	assert_true(most == 0);
 	uv_map_free(map);
 	incise_surface_free(surface);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_landmarks),
-		cmocka_unit_test(test_smooth),
-		cmocka_unit_test(test_drawn),
-		cmocka_unit_test(test_none),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 /*
  * Noise compared with the sum over its lattice by the closed form of the B-spline; cells.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include "../../../lib/view/noise.h"
@@ -23,7 +19,7 @@ static double spline(double x)
 	return (3 * x * x * x - 6 * x * x + 4) / 6;
 }
 
-static void test_is_a_spline(void **state)
+TEST(test_is_a_spline)
 {
 	static const double cells[][2] = {{3, 3}, {7.3, 4.1}, {40, 90}, {1000, 333}};
 	float row[SIZE];
@@ -55,7 +51,7 @@ static void test_is_a_spline(void **state)
 	noise_free(NULL);
 }
 
-static void test_mean_and_deviation(void **state)
+TEST(test_mean_and_deviation)
 {
 	struct noise *noise = noise_new(4, SIZE, 4, 4);
 	double sum = 0, square = 0;
@@ -77,7 +73,7 @@ static void test_mean_and_deviation(void **state)
 }
 
 /* Noise finer than texels fades, and an invalid size gives none. */
-static void test_fades(void **state)
+TEST(test_fades)
 {
 	static const struct {
 		double cell;
@@ -106,7 +102,7 @@ static void test_fades(void **state)
 }
 
 /* Numbers of neighbouring places, or of seeds, are independent. */
-static void test_places(void **state)
+TEST(test_places)
 {
 	double sum = 0, product[3] = {0};
 
@@ -140,7 +136,7 @@ static void rows(const struct cells *cells, float warp, float (*near)[SIZE],
 }
 
 /* A step of a texel changes a distance by its length at most: no square has an edge. */
-static void test_distances(void **state)
+TEST(test_distances)
 {
 	static const double cell[2] = {12, 9};
 	static float near[SIZE][SIZE], far[SIZE][SIZE];
@@ -173,7 +169,7 @@ static void test_distances(void **state)
 }
 
 /* Moved by one cell both ways all of it is moved by that. */
-static void test_warp(void **state)
+TEST(test_warp)
 {
 	static float near[SIZE][SIZE], moved[SIZE][SIZE], far[SIZE][SIZE];
 	struct cells *cells = cells_new(3, SIZE, 16, 16);
@@ -190,7 +186,7 @@ static void test_warp(void **state)
 	cells_free(cells);
 }
 
-static void test_none(void **state)
+TEST(test_none)
 {
 	static const double sizes[] = {0, -1, 2, NAN};
 	static float near[SIZE][SIZE], far[SIZE][SIZE];
@@ -204,19 +200,4 @@ static void test_none(void **state)
 		assert_true(near[9][9] == 0.4F && far[9][9] == 0.3F);
 		cells_free(cells);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_is_a_spline),
-		cmocka_unit_test(test_mean_and_deviation),
-		cmocka_unit_test(test_fades),
-		cmocka_unit_test(test_places),
-		cmocka_unit_test(test_distances),
-		cmocka_unit_test(test_warp),
-		cmocka_unit_test(test_none),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 /*
  * The panels: contents and times of redrawing; any tick is harmless.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -33,7 +29,7 @@ static int curve(const struct incise_overlay_image *image, bool depth, int from,
 	return n;
 }
 
-static void test_graphs(void **state)
+TEST(test_graphs)
 {
 	struct incise_overlay *overlay = incise_overlay_new(NULL);
 	const struct incise_overlay_image *image;
@@ -60,7 +56,7 @@ static void test_graphs(void **state)
 	incise_overlay_free(overlay);
 }
 
-static void test_redrawn_15_times_a_second(void **state)
+TEST(test_redrawn_15_times_a_second)
 {
 	const struct incise_view_status status = {"running", 1000, 3, 40, 0};
 	struct incise_overlay *overlay = incise_overlay_new(NULL);
@@ -84,7 +80,7 @@ static void test_redrawn_15_times_a_second(void **state)
 	incise_overlay_free(overlay);
 }
 
-static void test_anything(void **state)
+TEST(test_anything)
 {
 	static const double odd[] = {0, -1, NAN, INFINITY, -INFINITY, 1e308, 1e-320};
 	static const int64_t times[] = {INT64_MIN, -1, 0, 1, INT64_MAX, 5, INT64_MIN + 1};
@@ -111,7 +107,7 @@ static void test_anything(void **state)
 	incise_overlay_free(NULL);
 }
 
-static void test_keys(void **state)
+TEST(test_keys)
 {
 	const char *const lines[30] = {"a\tone", "two", "", "\t", "b\tthree"};
 	const struct incise_overlay_image *image;
@@ -131,16 +127,4 @@ static void test_keys(void **state)
 	assert_int_equal(incise_overlay_set_keys(overlay, NULL, 0), 0);
 	assert_non_null(incise_overlay_keys(overlay));
 	incise_overlay_free(overlay);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_graphs),
-		cmocka_unit_test(test_redrawn_15_times_a_second),
-		cmocka_unit_test(test_anything),
-		cmocka_unit_test(test_keys),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 /*
  * Painted tissue: plausible colours, no seams, and one texture per seed. Its beauty is not tested.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -72,7 +68,7 @@ static void well_formed(const struct picture *picture)
 	assert_true(fabs(slope[0] / TEXELS) < 0.01 && fabs(slope[1] / TEXELS) < 0.01);
 }
 
-static void test_plain(void **state)
+TEST(test_plain)
 {
 	struct picture *picture = paint(INCISE_SKIN_PLAIN, 0.1, 3);
 
@@ -90,7 +86,7 @@ static void test_plain(void **state)
  * The rule of Kovač, Peer and Solina (EUROCON 2003) that distinguishes skin in daylight, and the
  * range of means of light to tanned skin.
  */
-static void test_neck_is_skin(void **state)
+TEST(test_neck_is_skin)
 {
 	for (uint64_t seed = 0; seed < 4; seed++) {
 		struct picture *picture = paint(INCISE_SKIN_NECK, 0.3, seed);
@@ -114,7 +110,7 @@ static void test_neck_is_skin(void **state)
 	}
 }
 
-static void test_liver_is_dark(void **state)
+TEST(test_liver_is_dark)
 {
 	for (uint64_t seed = 0; seed < 4; seed++) {
 		struct picture *picture = paint(INCISE_SKIN_LIVER, 0.23, seed);
@@ -130,7 +126,7 @@ static void test_liver_is_dark(void **state)
 }
 
 /* Neither one colour nor pure noise: differences of texels, of 255. */
-static void test_has_texture(void **state)
+TEST(test_has_texture)
 {
 	for (int skin = INCISE_SKIN_NECK; skin <= INCISE_SKIN_LIVER; skin++) {
 		struct picture *picture = paint((enum incise_skin)skin, 0.075, 1);
@@ -167,7 +163,7 @@ static double step(const struct picture *picture, size_t at, bool across)
 }
 
 /* No line between two columns or rows stands out, at any possible tile border. */
-static void test_no_seam(void **state)
+TEST(test_no_seam)
 {
 	for (int skin = INCISE_SKIN_NECK; skin <= INCISE_SKIN_LIVER; skin++) {
 		struct picture *picture = paint((enum incise_skin)skin, 0.15, 5);
@@ -196,7 +192,7 @@ static double fine(const struct picture *picture, size_t x, size_t y)
 }
 
 /* Nothing repeats after an eighth, a quarter or a half of the side, as tiles would. */
-static void test_no_tile(void **state)
+TEST(test_no_tile)
 {
 	for (int skin = INCISE_SKIN_NECK; skin <= INCISE_SKIN_LIVER; skin++) {
 		struct picture *picture = paint((enum incise_skin)skin, 0.15, 6);
@@ -222,7 +218,7 @@ static void test_no_tile(void **state)
 	}
 }
 
-static void test_seed(void **state)
+TEST(test_seed)
 {
 	for (int skin = INCISE_SKIN_NECK; skin <= INCISE_SKIN_LIVER; skin++) {
 		struct picture *a = paint((enum incise_skin)skin, 0.1, 1);
@@ -242,7 +238,7 @@ static void test_seed(void **state)
 }
 
 /* Textures of the size of a body, of a cell, and of invalid sizes. */
-static void test_any_scale(void **state)
+TEST(test_any_scale)
 {
 	static const double scales[] = {0,   1e-300, 1e-9,  1e-3,     1,  3,
 					300, 1e9,    1e300, INFINITY, -1, NAN};
@@ -261,16 +257,4 @@ static void test_any_scale(void **state)
 				assert_true(rgba[4 * i + 3] == 255 &&
 					    normal[3 * i + 2] > 128);
 		}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_plain),	      cmocka_unit_test(test_neck_is_skin),
-		cmocka_unit_test(test_liver_is_dark), cmocka_unit_test(test_has_texture),
-		cmocka_unit_test(test_no_seam),	      cmocka_unit_test(test_no_tile),
-		cmocka_unit_test(test_seed),	      cmocka_unit_test(test_any_scale),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

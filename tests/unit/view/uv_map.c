@@ -8,6 +8,7 @@
 #include "../../../lib/base/vector.h"
 #include "../../../lib/view/uv_map.h"
 #include "../message.h"
+#include "../unit.h"
 #include "../surface/solid.h"
 
 #define SIZE 512
@@ -256,7 +257,7 @@ static void drawn_in_place(const struct uv_map *map)
 	}
 }
 
-static void test_all_kinds(void **state)
+TEST(test_all_kinds)
 {
 	struct incise_surface *surface;
 
@@ -276,7 +277,7 @@ static void test_all_kinds(void **state)
 }
 
 /* The top is in the middle, right is +x and the image is not mirrored. */
-static void test_lies_as_it_should(void **state)
+TEST(test_lies_as_it_should)
 {
 	static const int kinds[] = {0, 3, 6};
 
@@ -300,7 +301,7 @@ static void test_lies_as_it_should(void **state)
 }
 
 /* A neck's texels are squares to within a twentieth. */
-static void test_neck_is_not_stretched(void **state)
+TEST(test_neck_is_not_stretched)
 {
 	struct incise_surface *surface = make(6);
 	struct uv_map *map = map_of(surface, true);
@@ -319,7 +320,7 @@ static void test_neck_is_not_stretched(void **state)
 }
 
 /* The texture is on a mesh as far as possible, with the top on it. */
-static void test_fits_a_mesh(void **state)
+TEST(test_fits_a_mesh)
 {
 	struct incise_surface *surface = hill(0);
 	struct uv_map *map = map_of(surface, false);
@@ -348,7 +349,7 @@ static void test_fits_a_mesh(void **state)
 }
 
 /* Places outside of the texture, or not finite, have no texel and no point. */
-static void test_outside(void **state)
+TEST(test_outside)
 {
 	static const double nowhere[][3] = {
 		{NAN, 0, 0},	{0, INFINITY, 0},   {0, 0, -INFINITY}, {1e300, 0, 0},
@@ -385,7 +386,7 @@ static void test_outside(void **state)
 }
 
 /* The lower side of a ball is not on its texture. */
-static void test_underside(void **state)
+TEST(test_underside)
 {
 	struct incise_surface *surface = make(3);
 	struct uv_map *map = map_of(surface, false);
@@ -398,7 +399,7 @@ static void test_underside(void **state)
 	incise_surface_free(surface);
 }
 
-static void test_refused(void **state)
+TEST(test_refused)
 {
 	static const int sizes[] = {0, -1, 8, 100, 32768, INT32_MIN, INT32_MAX};
 	struct incise_surface *surface = make(0);
@@ -414,7 +415,7 @@ static void test_refused(void **state)
 }
 
 /* A mesh whose coordinates have no area is seen from above. */
-static void test_useless_coordinates(void **state)
+TEST(test_useless_coordinates)
 {
 	static const float values[] = {0, 0.5F, 1e6F};
 
@@ -435,7 +436,7 @@ static void test_useless_coordinates(void **state)
 }
 
 /* All triangles over all of the texture: the cells' lists stay within bounds. */
-static void test_crowded_coordinates(void **state)
+TEST(test_crowded_coordinates)
 {
 	static const float corner[3][2] = {{-1e6F, -1e6F}, {1e6F, -1e6F}, {0, 1e6F}};
 	struct incise_surface *surface = hill(1);
@@ -454,7 +455,7 @@ static void test_crowded_coordinates(void **state)
 }
 
 /* Seams: a corner of the mesh has a vertex for each of its texture coordinates. */
-static void test_seam(void **state)
+TEST(test_seam)
 {
 	struct incise_surface *surface = hill(1);
 	struct mesh *mesh = surface->mesh;
@@ -477,22 +478,4 @@ static void test_seam(void **state)
 	uv_map_free(parted);
 	uv_map_free(whole);
 	incise_surface_free(surface);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_all_kinds),
-		cmocka_unit_test(test_lies_as_it_should),
-		cmocka_unit_test(test_neck_is_not_stretched),
-		cmocka_unit_test(test_fits_a_mesh),
-		cmocka_unit_test(test_outside),
-		cmocka_unit_test(test_underside),
-		cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_useless_coordinates),
-		cmocka_unit_test(test_crowded_coordinates),
-		cmocka_unit_test(test_seam),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,11 +2,7 @@
 /*
  * The camera: rays of pixels and back, compared with OpenGL's matrix; control by mouse and keys.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -22,7 +18,7 @@ static const struct incise_view_camera cameras[] = {
 #define CAMERAS (sizeof(cameras) / sizeof(cameras[0]))
 
 /* The middle of the frame is the target; directions are as documented. */
-static void test_directions(void **state)
+TEST(test_directions)
 {
 	struct view_projection projection;
 	double px[2], to_right[3] = {1, 0, 0}, over[3] = {0, 0, 1};
@@ -43,7 +39,7 @@ static void test_directions(void **state)
 	assert_false(project(&projection, 200, 100, (double[]){101, 0, 0}, px));
 }
 
-static void test_pixel_and_back(void **state)
+TEST(test_pixel_and_back)
 {
 	srand(5);
 	for (size_t i = 0; i < CAMERAS; i++)
@@ -63,7 +59,7 @@ static void test_pixel_and_back(void **state)
 		}
 }
 
-static void test_matrix_says_the_same(void **state)
+TEST(test_matrix_says_the_same)
 {
 	for (size_t i = 0; i < CAMERAS; i++)
 		for (int k = 0; k < 50; k++) {
@@ -92,7 +88,7 @@ static void test_matrix_says_the_same(void **state)
 		}
 }
 
-static void test_hold(void **state)
+TEST(test_hold)
 {
 	struct incise_view_camera c = {{1e300, -1e300, 0}, 725, 200, -3, 1e9};
 
@@ -122,7 +118,7 @@ static struct incise_view_event motion(double x, double y, unsigned buttons)
 		.type = INCISE_VIEW_MOTION, .x_px = x, .y_px = y, .buttons = buttons};
 }
 
-static void test_home_sees_all(void **state)
+TEST(test_home_sees_all)
 {
 	struct view_orbit orbit = start(), turned = {0};
 	const struct incise_view_camera *c = &orbit.camera;
@@ -141,7 +137,7 @@ static void test_home_sees_all(void **state)
 }
 
 /* With the middle button, the place under the mouse follows it. */
-static void test_moves_with_the_mouse(void **state)
+TEST(test_moves_with_the_mouse)
 {
 	struct view_orbit orbit = start();
 	struct incise_view_event event = motion(640, 360, 0);
@@ -157,7 +153,7 @@ static void test_moves_with_the_mouse(void **state)
 	assert_true(fabs(px[0] - 700) < 1e-6 && fabs(px[1] - 300) < 1e-6);
 }
 
-static void test_turns_and_comes_home(void **state)
+TEST(test_turns_and_comes_home)
 {
 	struct view_orbit orbit = start();
 	const struct incise_view_camera home = orbit.camera;
@@ -189,7 +185,7 @@ static void test_turns_and_comes_home(void **state)
 	assert_false(view_orbit_event(&orbit, &event, 720));
 }
 
-static void test_stays_within_range(void **state)
+TEST(test_stays_within_range)
 {
 	static const double odd[] = {1e300, -1e300, NAN, INFINITY};
 	struct view_orbit orbit = start();
@@ -209,20 +205,4 @@ static void test_stays_within_range(void **state)
 		assert_true(orbit.camera.distance_mm >= 1 &&
 			    orbit.camera.distance_mm <= 1e5);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_directions),
-		cmocka_unit_test(test_pixel_and_back),
-		cmocka_unit_test(test_matrix_says_the_same),
-		cmocka_unit_test(test_hold),
-		cmocka_unit_test(test_home_sees_all),
-		cmocka_unit_test(test_moves_with_the_mouse),
-		cmocka_unit_test(test_turns_and_comes_home),
-		cmocka_unit_test(test_stays_within_range),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

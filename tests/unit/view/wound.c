@@ -3,11 +3,7 @@
  * The wound: without gaps at any speed and tick rate, opened by an instrument, closed after it,
  * independent of the times of painting; invalid ticks cut nothing.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <stdlib.h>
 #include "allocated.h"
 #include "ground.h"
@@ -62,7 +58,7 @@ static double inside(const struct wound *wound, const struct field *field, doubl
 }
 
 /* Every texel under the way is well inside of the lips, from the first to the last. */
-static void test_no_gap(void **state)
+TEST(test_no_gap)
 {
 	static const struct {
 		double s, rate_hz;
@@ -112,7 +108,7 @@ static void test_no_gap(void **state)
 }
 
 /* Deeper is wider, and a second cut over the first is the union of both. */
-static void test_union(void **state)
+TEST(test_union)
 {
 	struct field field;
 	struct wound *wound, *both;
@@ -215,7 +211,7 @@ static void straight(struct painted *p, const struct field *field, double *t_s)
  * The cut opens to the tool's extent across it at its place, less next to it; out of it, it closes
  * by what is elastic, and the rest stays.
  */
-static void test_opens_and_closes(void **state)
+TEST(test_opens_and_closes)
 {
 	/* Of a handle 10 mm wide and 3 thick: flat side along the cut, then a quarter turned. */
 	static const struct {
@@ -257,7 +253,7 @@ static void test_opens_and_closes(void **state)
 }
 
 /* Painted at each tick or at the end only: the same to the bit. */
-static void test_painting_changes_nothing(void **state)
+TEST(test_painting_changes_nothing)
 {
 	struct field field;
 	struct painted p[2];
@@ -297,7 +293,7 @@ static void test_painting_changes_nothing(void **state)
 }
 
 /* Endless cutting: the number of points is bounded, and no cut disappears. */
-static void test_endless(void **state)
+TEST(test_endless)
 {
 	struct field field;
 	struct wound *wound;
@@ -328,7 +324,7 @@ static void test_endless(void **state)
 }
 
 /* No cut: by flags, phases, tools, discontinuities, gaps, and values that are not finite. */
-static void test_no_cut(void **state)
+TEST(test_no_cut)
 {
 	struct field field;
 	struct wound *wound;
@@ -396,7 +392,7 @@ static void test_no_cut(void **state)
 }
 
 /* Pricks too far apart for a hand are not joined. */
-static void test_jumps(void **state)
+TEST(test_jumps)
 {
 	static const int64_t after_ns[] = {1000000, -1000000, 600000000, INT64_MAX / 2,
 					   INT64_MIN};
@@ -420,19 +416,4 @@ static void test_jumps(void **state)
 		wound_free(wound);
 	}
 	field_free(&field);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_no_gap),
-		cmocka_unit_test(test_union),
-		cmocka_unit_test(test_opens_and_closes),
-		cmocka_unit_test(test_painting_changes_nothing),
-		cmocka_unit_test(test_endless),
-		cmocka_unit_test(test_no_cut),
-		cmocka_unit_test(test_jumps),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

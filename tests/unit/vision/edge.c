@@ -20,11 +20,7 @@
  * better than that bound, and is (of 300 frames 0.071 px for 0.082; grey at 4 levels
  * 0.048 for 0.051).
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdlib.h>
 #include <incise/vision.h>
@@ -164,7 +160,7 @@ static struct step step_of(const struct scalpel_picture *p)
 }
 
 /* Compared with the formula, which nearly holds if almost everything is known. */
-static void the_bound_is_that_of_the_formula(void **state)
+TEST(the_bound_is_that_of_the_formula)
 {
 	struct step s = {.height = 97.3, .noise = 8, .blur_px = 1};
 	double known = all_known_px(&s), all = bound_px(&s);
@@ -176,7 +172,7 @@ static void the_bound_is_that_of_the_formula(void **state)
 	assert_true(bound_px(&s) > 1.1 * all);
 }
 
-static void the_edge_is_as_good_as_can_be(void **state)
+TEST(the_edge_is_as_good_as_can_be)
 {
 	static const struct {
 		enum incise_pixels pixels;
@@ -239,14 +235,4 @@ static void the_edge_is_as_good_as_can_be(void **state)
 	print_message("all: %.2f times the bound\n", pooled);
 	/* 1.1: limit of chance for the rms of 240; far below the bound it would be wrong */
 	assert_true(pooled < 1.15 * 1.1 && pooled > 1 / 1.15);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(the_bound_is_that_of_the_formula),
-		cmocka_unit_test(the_edge_is_as_good_as_can_be),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,12 +2,8 @@
 /*
  * lib/vision/jpeg.c, image.cc: JPEG frames, whole, truncated at any byte, damaged.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
+#include "../unit.h"
 #include <stdio.h>
-#include <cmocka.h>
 #include <errno.h>
 #include <jpeglib.h>
 #include <math.h>
@@ -76,7 +72,7 @@ static struct incise_camera_frame drawn(int i, double *length)
 	return jpeg;
 }
 
-static void length_is_that_of_the_picture(void **state)
+TEST(length_is_that_of_the_picture)
 {
 	enum { FRAMES = 16 };
 	struct incise_vision *vision = incise_vision_new(&black, NULL);
@@ -105,7 +101,7 @@ static void length_is_that_of_the_picture(void **state)
 	incise_vision_free(vision);
 }
 
-static void what_ends_early_is_refused(void **state)
+TEST(what_ends_early_is_refused)
 {
 	struct incise_vision_result r;
 	double length;
@@ -130,7 +126,7 @@ static void what_ends_early_is_refused(void **state)
 	free((void *)whole.data);
 }
 
-static void garbage_does_no_harm(void **state)
+TEST(garbage_does_no_harm)
 {
 	struct incise_vision *vision = incise_vision_new(&black, NULL);
 	uint64_t random = 3;
@@ -161,7 +157,7 @@ static void garbage_does_no_harm(void **state)
 	incise_vision_free(vision);
 }
 
-static void other_sizes_and_progressive_ones_are_refused(void **state)
+TEST(other_sizes_and_progressive_ones_are_refused)
 {
 	struct incise_vision *vision = incise_vision_new(&black, NULL);
 	struct incise_vision_result r;
@@ -182,7 +178,7 @@ static void other_sizes_and_progressive_ones_are_refused(void **state)
 }
 
 /* Cameras leave out the standard tables. */
-static void huffman_tables_may_be_missing(void **state)
+TEST(huffman_tables_may_be_missing)
 {
 	struct incise_vision *vision = incise_vision_new(&black, NULL);
 	struct incise_vision_result r;
@@ -205,17 +201,4 @@ static void huffman_tables_may_be_missing(void **state)
 	assert_true(r.found && fabs(r.length_px - length) < 0.3);
 	free(data);
 	incise_vision_free(vision);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(length_is_that_of_the_picture),
-		cmocka_unit_test(what_ends_early_is_refused),
-		cmocka_unit_test(garbage_does_no_harm),
-		cmocka_unit_test(other_sizes_and_progressive_ones_are_refused),
-		cmocka_unit_test(huffman_tables_may_be_missing),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,6 +13,7 @@
 #include "../../vision/scalpel_picture.h"
 #include "../cases.h"
 #include "../message.h"
+#include "../unit.h"
 
 /* A sanitizer slows them ten times down, and sees in a few what it sees in all. */
 #define FRAMES cases_of(16, 4)
@@ -130,7 +131,7 @@ static const struct condition conditions[] = {
 	 0},
 };
 
-static void length_is_that_of_the_picture(void **state)
+TEST(length_is_that_of_the_picture)
 {
 	for (size_t k = 0; k < sizeof(conditions) / sizeof(*conditions); k++) {
 		const struct condition *c = &conditions[k];
@@ -200,7 +201,7 @@ static void assert_not_found(const struct incise_vision_result *r, const char *w
 	assert_non_null(strstr(r->why, why));
 }
 
-static void without_a_scalpel_it_says_so(void **state)
+TEST(without_a_scalpel_it_says_so)
 {
 	for (int i = 0; i < 4; i++) {
 		struct incise_vision_result r;
@@ -216,7 +217,7 @@ static void without_a_scalpel_it_says_so(void **state)
 	}
 }
 
-static void what_reaches_the_border_is_not_measured(void **state)
+TEST(what_reaches_the_border_is_not_measured)
 {
 	/* above, below, and at an angle through a side */
 	static const double y[] = {180, 340, 300}, angle[] = {0, 0, 50};
@@ -243,7 +244,7 @@ static void blacken(struct incise_camera_frame *frame, int x, int y, int width,
 		       3 * (size_t)width);
 }
 
-static void of_several_dark_things_the_handle_is_taken(void **state)
+TEST(of_several_dark_things_the_handle_is_taken)
 {
 	struct incise_vision *vision = vision_of(&black);
 	struct incise_vision_result r;
@@ -282,7 +283,7 @@ static void paint(struct incise_camera_frame *frame, int x, int y, int width, in
  * A length that is wrong by tens of pixels must not have a good quality. The handle is
  * upright, 67 pixels wide, from row 100 to row 400.
  */
-static void what_only_looks_like_the_handle_costs_quality(void **state)
+TEST(what_only_looks_like_the_handle_costs_quality)
 {
 	static const struct {
 		const char *name;
@@ -341,7 +342,7 @@ static void what_only_looks_like_the_handle_costs_quality(void **state)
 }
 
 /* The region of interest does not affect the result, wherever the handle jumps. */
-static void the_region_follows(void **state)
+TEST(the_region_follows)
 {
 	struct incise_vision *vision = vision_of(&black);
 	struct scalpel_picture p;
@@ -376,7 +377,7 @@ static void the_region_follows(void **state)
 }
 
 /* The virtual rig: over a cut, every 10th frame. */
-static void the_virtual_cameras_truth(void **state)
+TEST(the_virtual_cameras_truth)
 {
 	struct incise_clock *clock = incise_clock_new_simulated(INCISE_NS_PER_S);
 	struct incise_vision *vision = vision_of(&black);
@@ -422,7 +423,7 @@ static void the_virtual_cameras_truth(void **state)
 	incise_vision_free(vision);
 }
 
-static void sizes_that_do_not_fit_are_refused(void **state)
+TEST(sizes_that_do_not_fit_are_refused)
 {
 	static uint8_t data[64 * 64 * 3];
 	static const struct incise_camera_frame good = {.width = 64,
@@ -462,7 +463,7 @@ static void sizes_that_do_not_fit_are_refused(void **state)
 	incise_vision_free(vision);
 }
 
-static void a_setup_out_of_range_is_refused(void **state)
+TEST(a_setup_out_of_range_is_refused)
 {
 	struct incise_vision_setup bad[10];
 
@@ -489,7 +490,7 @@ static void a_setup_out_of_range_is_refused(void **state)
 	incise_vision_free(NULL);
 }
 
-static void any_region_will_do(void **state)
+TEST(any_region_will_do)
 {
 	static const struct incise_vision_box roi[] = {
 		{0, 0, 1, 1},	     {INT32_MAX, INT32_MAX, INT32_MAX, INT32_MAX},
@@ -531,7 +532,7 @@ static struct incise_camera_frame drawn_frame(enum incise_pixels pixels, double 
 /* On the handle, which is 67 wide at 320, 80 to 440. */
 static const struct incise_vision_box box = {301, 201, 35, 91}, click = {320, 250, 1, 1};
 
-static void learnt_thresholds_find_the_handle(void **state)
+TEST(learnt_thresholds_find_the_handle)
 {
 	static const enum incise_pixels formats[] = {
 		INCISE_PIXELS_RGB, INCISE_PIXELS_GREY, INCISE_PIXELS_YUYV};
@@ -578,7 +579,7 @@ static struct incise_camera_frame plain_frame(uint8_t *data, int red, int green,
 					    .size = 64 * 64 * 3};
 }
 
-static void colours_have_a_hue(void **state)
+TEST(colours_have_a_hue)
 {
 	static uint8_t data[64 * 64 * 3];
 	static const struct incise_vision_box all = {0, 0, 64, 64};
@@ -600,7 +601,7 @@ static void colours_have_a_hue(void **state)
 	assert_true(setup.saturation[1] < 40 && setup.value[0] > 60);
 }
 
-static void two_colours_are_refused(void **state)
+TEST(two_colours_are_refused)
 {
 	static const struct incise_vision_box across = {260, 200, 60, 60};
 	struct incise_vision_setup setup = {.value = {1, 2}}, before = setup;
@@ -614,7 +615,7 @@ static void two_colours_are_refused(void **state)
 	free((void *)frame.data);
 }
 
-static void a_box_elsewhere_is_refused(void **state)
+TEST(a_box_elsewhere_is_refused)
 {
 	static const struct incise_vision_box bad[] = {
 		{-1, 0, 5, 5},	{0, 0, 0, 5},	      {636, 0, 5, 5},
@@ -631,26 +632,4 @@ static void a_box_elsewhere_is_refused(void **state)
 	frame.stride = 5;
 	assert_int_equal(incise_vision_learn(&frame, &box, &setup, NULL), -EINVAL);
 	free((void *)frame.data);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(length_is_that_of_the_picture),
-		cmocka_unit_test(without_a_scalpel_it_says_so),
-		cmocka_unit_test(what_reaches_the_border_is_not_measured),
-		cmocka_unit_test(of_several_dark_things_the_handle_is_taken),
-		cmocka_unit_test(what_only_looks_like_the_handle_costs_quality),
-		cmocka_unit_test(the_region_follows),
-		cmocka_unit_test(the_virtual_cameras_truth),
-		cmocka_unit_test(sizes_that_do_not_fit_are_refused),
-		cmocka_unit_test(a_setup_out_of_range_is_refused),
-		cmocka_unit_test(any_region_will_do),
-		cmocka_unit_test(learnt_thresholds_find_the_handle),
-		cmocka_unit_test(colours_have_a_hue),
-		cmocka_unit_test(two_colours_are_refused),
-		cmocka_unit_test(a_box_elsewhere_is_refused),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

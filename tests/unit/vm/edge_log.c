@@ -4,11 +4,7 @@
  * doctored copy of it is caught for what was done to it. The motion is made here, by the
  * closed formula of constant acceleration, not by the code that the judge is to judge.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
@@ -336,7 +332,7 @@ static const struct {
 	{"the e-stop is not obeyed", estop_ignored, EDGE_LOG_STOP},
 };
 
-static void test_each_fault_is_caught_for_what_it_is(void **state)
+TEST(test_each_fault_is_caught_for_what_it_is)
 {
 	static struct edge_log judge;
 
@@ -356,7 +352,7 @@ static void test_each_fault_is_caught_for_what_it_is(void **state)
 	}
 }
 
-static void test_steps_are_counted(void **state)
+TEST(test_steps_are_counted)
 {
 	struct log *log = good(motor.velocity, motor.acceleration);
 	static struct edge_log judge;
@@ -375,7 +371,7 @@ static void test_steps_are_counted(void **state)
 }
 
 /* A motion with a little more acceleration than allowed does not pass, with less it does. */
-static void test_acceleration_is_seen_to_a_hundredth(void **state)
+TEST(test_acceleration_is_seen_to_a_hundredth)
 {
 	static const struct {
 		double factor;
@@ -398,7 +394,7 @@ static void test_acceleration_is_seen_to_a_hundredth(void **state)
 }
 
 /* Steps that are late by any time up to lateness_ns are no fault, and later ones are. */
-static void test_lateness_is_allowed_for(void **state)
+TEST(test_lateness_is_allowed_for)
 {
 	struct edge_log_motor loose = motor;
 	static struct edge_log judge;
@@ -424,16 +420,4 @@ static void test_lateness_is_allowed_for(void **state)
 		assert_int_equal(!judge.faults[EDGE_LOG_ACCELERATION], !slow);
 		free(log);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_each_fault_is_caught_for_what_it_is),
-		cmocka_unit_test(test_steps_are_counted),
-		cmocka_unit_test(test_acceleration_is_seen_to_a_hundredth),
-		cmocka_unit_test(test_lateness_is_allowed_for),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }
