@@ -26,9 +26,10 @@ checked := O=$(O)/check $(sanitized)
 part_style := check-style
 part_build := $(checked) check-build
 part_layers := $(checked) check-layers
-part_unit := $(checked) check-unit
+part_unit := $(checked) INCISE_MESSAGES=$(abspath $(O))/check/messages/unit check-unit
 part_kept := $(checked) check-kept
-part_commands := $(checked) check-commands
+part_commands := $(checked) INCISE_MESSAGES=$(abspath $(O))/check/messages/cli check-commands
+part_messages := $(checked) SOME=yes check-messages
 
 check-build: libs tools unit-programs $(kept_programs) cli-needs
 # A sanitizer calls dlopen() for a program, which forgets that program's own search path.
@@ -36,8 +37,10 @@ check-commands: cli-needs
 	$(Q)LD_LIBRARY_PATH=$(abspath $(O))/lib $(bats) $(bats_jobs) --filter-tags check tests/cli tests/attack
 
 check-quick:
-	+@status=0; $(call timed,style build) || status=$$?; \
-	NEEDS=build $(call timed,layers unit kept commands) || status=$$?; exit $$status
+	+@rm -rf $(O)/check/messages; mkdir -p $(O)/check/messages; \
+	status=0; $(call timed,style build) || status=$$?; \
+	NEEDS=build $(call timed,layers unit kept commands) || status=$$?; \
+	$(call timed,messages) || status=$$?; exit $$status
 
 check: ## install what is missing, build and test: ten minutes
 	+@mk/deps build check demo

@@ -10,7 +10,6 @@ setup() {
 	work_folder
 }
 
-# bats test_tags=check
 @test "a tracker's delay that is wrong by 4 ms is found" {
 	for latency in 4.2 11; do
 		echo 'tracker_delay_ms = 1.5;' >calibration.conf
@@ -43,7 +42,6 @@ setup() {
 	holds "($(key c.json 'values[2].left') - 4.2)^2 < 0.3^2"
 }
 
-# bats test_tags=check
 @test "what cannot tell a delay is refused, and nothing is changed" {
 	run --separate-stderr incise calibrate delay --rig sim:clock=simulated --duration 20s </dev/null
 	failed_with "correlate too little"

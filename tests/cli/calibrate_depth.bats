@@ -201,7 +201,6 @@ pairs() {
 	[ "$(in_force depth_mm_px)" = 0.075 ]
 }
 
-# bats test_tags=check
 @test "a recording gives both" {
 	need_vision
 	need_recording

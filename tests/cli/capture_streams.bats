@@ -43,7 +43,6 @@ sys.exit(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
 END
 }
 
-# bats test_tags=check
 @test "the camera of a sim: rig is recorded when it is asked for" {
 	incise capture -o a.rec --rig $quick --duration 1s
 	[ "$(ask a.rec "SELECT count(*) FROM streams WHERE name IN ('force', 'tracker')")" = 2 ]
@@ -141,7 +140,6 @@ END
 	[ "$(ask b.rec "SELECT count(*) FROM events WHERE kind = 'cut'")" = 0 ]
 }
 
-# bats test_tags=check
 @test "keys on a terminal: markers, the end, and what is shown" {
 	on_a_terminal 10:m,15:7,20:q incise capture -o a.rec --rig sim: --duration 1h
 	ask a.rec "SELECT text FROM events WHERE kind = 'marker' ORDER BY t_ns" >marks

@@ -23,7 +23,6 @@ well_formed() {
 		END { exit bad || NR < 2 }' "$1"
 }
 
-# bats test_tags=check
 @test "export of what is not as it was recorded needs --damaged, and says what is wrong" {
 	cp -r liver.rec/ altered.rec
 	sqlite3 altered.rec/recording.db "UPDATE force SET code = code + 1 WHERE seq = 12345"

@@ -64,7 +64,6 @@ refuses() {
 	holds "$(key r.json rendered_rms_error_N) < 0.05 * $largest"
 }
 
-# bats test_tags=check
 @test "the log has every tick, and its forces are the model's" {
 	incise haptic liver.scene --rig $quick --duration 3s --arith double --log l.csv
 	[ "$(head -n 1 l.csv)" = \
@@ -119,7 +118,6 @@ beside_the_model() {
 	run ! cmp -s a.csv c.csv
 }
 
-# bats test_tags=check
 @test "no force is over the limit, and none changes faster than it may" {
 	incise haptic liver.scene --rig $quick --duration 3s --log free.csv
 	cat >tight.scene <<-'EOF'
@@ -211,7 +209,6 @@ beside_the_model() {
 	[ ! -e l.csv ]
 }
 
-# bats test_tags=check
 @test "SIGTERM ends it as well" {
 	incise haptic liver.scene --rig sim: --no-rt --overruns 0 --json >r.json 2>err 3>&- &
 	pid=$!

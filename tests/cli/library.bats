@@ -85,7 +85,6 @@ declared_by() {
 }
 
 # Benchmarks also use headers without code behind them, and the plant, whose object they link.
-# bats test_tags=check
 @test "tools use public headers only" {
 	for file in "$root"/tools/*.[ch] "$root"/tools/*/*.[ch]; do
 		names=$(cd "${file%/*}" && sed -n 's/^#include "\(.*\)"/\1/p' "$file" | xargs -r realpath -e) ||

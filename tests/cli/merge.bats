@@ -76,7 +76,6 @@ shares() {
 	[ "$(key r.json pairs)" -eq 5000 ]
 }
 
-# bats test_tags=check
 @test "merge refuses what does not belong together, by name" {
 	shares
 	incise train s1.csv -o start.fis >/dev/null

@@ -10,7 +10,6 @@ setup() {
 	module_folder
 }
 
-# bats test_tags=check
 @test "a module from outside the tree is loaded when it is named, and drives" {
 	make_module stepper_mine mine INCISE_BACKEND_ABI
 	rig mine:42

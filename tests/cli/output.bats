@@ -87,7 +87,6 @@ spares_inputs() {
 	spares_inputs merge m.fac -o m.fac
 }
 
-# bats test_tags=check
 @test "an output is never inside a recording that is read" {
 	ln -s d.rec link.rec
 	mkdir -p d.rec/plot

@@ -34,7 +34,6 @@ train() {
 	incise train "$@" --group cut --mf 2,2 >out 2>err || complain "$(cat err)"
 }
 
-# bats test_tags=check
 @test "parts of the columns are in the model's interval, and a model without them is as before" {
 	train a.csv b.csv c.csv -o m.fis
 	grep -q "uncertainties: own parts .* N; calibrations .* N on the model, .* N of another rig" out

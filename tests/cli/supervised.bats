@@ -182,7 +182,6 @@ as_nobody() {
 	fi
 }
 
-# bats test_tags=check
 @test "real time that is denied is refused with the command that grants it" {
 	run --separate-stderr incise haptic liver.scene --rig sim: --cpu 1000 --duration 0.1s
 	[ "$status" -eq 1 ]

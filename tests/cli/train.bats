@@ -135,7 +135,6 @@ parameters() {
 	complain "no other seed gives another model"
 }
 
-# bats test_tags=check
 @test "train reads standard input and writes standard output" {
 	incise train pairs.csv --seed 2 -o a.fis 2>/dev/null
 	incise train - --seed 2 -o - <pairs.csv >b.fis 2>/dev/null

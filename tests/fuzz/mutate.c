@@ -160,7 +160,7 @@ static void change_input(void)
 static void test_target(void **unused)
 {
 	const char *text = getenv("FUZZ_RUNS");
-	long runs = text ? atol(text) : 10000;
+	long runs = text ? atol(text) : 6000;
 	int (*run)(const uint8_t *data, size_t size);
 	char symbol[256];
 
