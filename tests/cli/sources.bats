@@ -7,6 +7,7 @@ load cli
 load fastrak
 
 setup() {
+	unset INCISE_MESSAGES # what the machine's kernel lacks is named
 	work_folder
 	cat >rig.conf <<-END
 		clock = "real";
