@@ -236,7 +236,7 @@ small_disk() {
 
 @test "capture ends while there is room to end in" {
 	small_disk 40m
-	incise capture -o disk/a.rec --rig sim: --duration 1h >out 2>err 3>&- &
+	incise capture -o disk/a.rec --rig sim: --duration 100s >out 2>err 3>&- &
 	until_it_runs disk/a.rec.part 1000
 	head -c 24m /dev/zero >disk/more # as another program does
 	status=0

@@ -206,7 +206,7 @@ maps() {
 
 @test "no program and no library has a part of the tests" {
 	nm --defined-only "$INCISE_BUILD"/obj/tests/extremes.a "$INCISE_BUILD"/obj/tests/bench/*.o 2>/dev/null |
-		awk '$2 == "T" && $3 !~ /^(cli_|file_|folder_|whole_|memory_|scene_|state_|complete|closed_loop_|main$)/ { print $3 }' |
+		awk '$2 == "T" && $3 !~ /^(cli_|features_|file_|folder_|whole_|memory_|scene_|state_|complete|closed_loop_|main$)/ { print $3 }' |
 		sort -u >tests
 	grep -qx extremes_try tests
 	for file in "$INCISE_BUILD"/lib/lib*.so "$INCISE_BUILD"/lib/incise/*.so "$INCISE_BUILD"/bin/*; do
