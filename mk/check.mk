@@ -56,12 +56,11 @@ part_python := check-python
 part_tsan := check-tsan
 part_rtsan := check-rtsan
 part_vm := check-vm
-part_service := check-service
 part_clocks := check-clocks
 part_deb := check-deb
 part_module := check-module
 part_bare := check-debian12 check-debian13
-part_all := all cli-needs peers unit-programs
+part_programs := all cli-needs peers unit-programs
 full_parts := check plain cli attack fuzz python tsan rtsan vm clocks module deb bare
 PARTS ?= $(full_parts)
 deps_rtsan := rtsan
@@ -71,12 +70,12 @@ deps_module := module
 deps_deb := deb debian
 deps_bare := debian
 
-# What measures or boots has the machine to itself as far as it can: parts of the last line come alone.
+# Guests in real time, and the check on other Debians, run alone at the end.
 check-parts:
 	+@status=0; \
 	$(if $(filter check,$(PARTS)),$(MAKE) --no-print-directory check-quick || status=$$?;) \
-	$(call timed,all) || status=$$?; \
-	NEEDS=all $(call timed,$(filter-out check clocks bare,$(PARTS))) || status=$$?; \
+	$(call timed,programs) || status=$$?; \
+	NEEDS=programs $(call timed,$(filter-out check clocks bare,$(PARTS))) || status=$$?; \
 	$(foreach part,$(filter clocks bare,$(PARTS)),$(call timed,$(part)) || status=$$?;) \
 	exit $$status
 

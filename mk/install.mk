@@ -128,7 +128,7 @@ deb: ## Debian packages of the tree as it is, in build/deb
 
 check-deb: ## the packages: lintian, then installed, tried and purged in a clean Debian
 	@if mk/deps build deb; then \
-		$(if $(deb_options),DEB_BUILD_OPTIONS="$(deb_options)" )mk/deb $(abspath $(O))/deb $(version) && tests/debian/packages $(abspath $(O))/deb; \
+		mk/deb $(abspath $(O))/deb $(version) && tests/debian/packages $(abspath $(O))/deb; \
 	else \
 		echo "skipped: Debian packages, for what builds them is missing"; \
 	fi

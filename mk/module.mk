@@ -67,7 +67,7 @@ dkms_uninstall: ## remove them
 
 module_kernels := main second
 check-module: ## the modules for each kernel: W=1, sparse, checkpatch, dkms
-	@INCISE_BUILD=$(abspath $(O)) INCISE_VM_SHORT=$(INCISE_VM_SHORT) tests/module/check $(module_kernels)
+	@INCISE_BUILD=$(abspath $(O)) tests/module/check $(module_kernels)
 
 check-module-newest: ## the modules for the newest kernel in Debian, in a chroot
 	@mk/deps debian

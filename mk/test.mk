@@ -8,8 +8,7 @@ unit_sources := $(filter-out $(if $(has_libmnl),,tests/unit/can/socketcan%) \
 	$(if $(has_vision),,tests/unit/vision/%) $(if $(has_frames),,tests/unit/mkv/% tests/unit/film/%) \
 	$(if $(has_hdf5),,tests/unit/hdf5/%) $(if $(has_view),,tests/unit/view/%),\
 	$(wildcard tests/unit/*/*.c))
-# WITHOUT: names of some that are left out.
-unit_programs := $(filter-out $(WITHOUT:%=$(O)/tests/unit/%),$(patsubst tests/%.c,$(O)/tests/%,$(unit_sources)))
+unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
 
 # A tracker that is not there: some tests, and a program of its own.
 emulator := $(O)/obj/tests/polhemus/emulator.o
@@ -40,7 +39,7 @@ unit_apart := $(patsubst tests/%.c,$(O)/tests/%,$(filter $(addprefix tests/unit/
 	device/foot_switch.c daq/iio_force.c),$(unit_sources)) \
 	$(shell grep -l -e __wrap_ $(wrapping:%=-e 'include "%"') $(unit_sources)))
 unit_layers := $(sort $(patsubst tests/unit/%/,%,$(dir $(unit_sources))))
-unit_together := $(filter-out $(unit_apart),$(patsubst tests/%.c,$(O)/tests/%,$(unit_sources)))
+unit_together := $(filter-out $(unit_apart),$(unit_programs))
 unit_objects = $(patsubst $(O)/tests/%,$(O)/obj/tests/%.o,$(filter $(O)/tests/unit/$1/%,$(unit_together)))
 wraps = $$(nm $(filter %/$*.o,$^) | sed -n 's/.* T __wrap_\(.*\)/-Wl,--wrap=\1/p')
 $(unit_together:$(O)/tests/%=$(O)/obj/tests/%.o): test_main = -Dmain=unit_$(*F)

@@ -27,7 +27,6 @@ $(guest_model): scenes/liver.fis $(O)/bin/incise $(O)/bin/incise-compile
 
 # Virtual time for whatever asserts on time, two processors for races.
 vm_boots := main:deterministic second:deterministic main:service main:smp
-vm_bed := --bed
 
 # For tests/vm/system, in a Debian that systemd has booted.
 system_programs := $(patsubst tests/vm/system/%.c,$(O)/tests/vm/%,$(wildcard tests/vm/system/*.c))
@@ -39,7 +38,7 @@ $(system_programs): $(O)/tests/vm/%: tests/vm/system/%.c tests/vm/simulator.c \
 	$(Q)$(CC) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< tests/vm/simulator.c
 
 check-vm: all $(guest_programs) $(guest_model) $(system_programs) $(O)/tests/polhemus/fastrak ## tests of the kernel modules, on Debian's kernels in QEMU
-	+@INCISE_BUILD=$(abspath $(O)) INCISE_VM_SHORT=$(INCISE_VM_SHORT) MAKE="$(MAKE)" tests/vm/check $(vm_bed) $(vm_boots)
+	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check --bed $(vm_boots)
 
 check-service: all $(system_programs) $(O)/tests/polhemus/fastrak ## of check-vm the boot of systemd, with our packages and the service
 	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check main:service

@@ -306,8 +306,8 @@ static bool has_program(const char *benchmark)
 }
 
 /* Start it, and wait; its JSON into a file. */
-static int run(const char *benchmark, const char *program, const char *folder,
-	       const char *data, bool quick, FILE *said, int number, int of)
+static int run_benchmark(const char *benchmark, const char *program, const char *folder,
+			 const char *data, bool quick, FILE *said, int number, int of)
 {
 	char *plot = cli_text("%s/plots/%s", folder, benchmark);
 	const char *argv[8] = {program};
@@ -355,7 +355,8 @@ static void measure_one(const char *benchmark, const char *folder, bool quick,
 		note(report, benchmark, "left out", 0, why, json_array());
 		goto out_free;
 	}
-	status = run(benchmark, program, folder, data, quick, said.file, number, of);
+	status = run_benchmark(benchmark, program, folder, data, quick, said.file, number,
+			       of);
 	json = json_read(data, &err);
 	warnings = read_warnings(said.file, status != 0, why, sizeof(why));
 	if (WIFSIGNALED(status))

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * What tests need of lib/fixed/spring.c in floating point: take a spring from double, and bound the
+ * Tests use lib/fixed/spring.c in floating point by these: take a spring from double, and bound the
  * error of its force.
  */
 #ifndef INCISE_TEST_FIXED_SPRING_H

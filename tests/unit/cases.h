@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * How many cases a property tries: a twentieth, or all with CASES=all in the environment, as in
+ * A property tries a twentieth of its cases, or all with CASES=all in the environment, as in
  * `make check-full`. SEED=N draws other ones; the seed is printed.
  */
 #ifndef TEST_CASES_H

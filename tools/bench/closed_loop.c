@@ -46,7 +46,7 @@ struct incise_tracker_info closed_loop_tracker(const struct closed_loop *loop)
 	};
 }
 
-static void measure(struct running *r, double t_s)
+static void take_pose(struct running *r, double t_s)
 {
 	double noise_mm = t_s < NOISE_SHARE * r->loop->run_s ? r->loop->noise_mm : 0;
 
@@ -116,7 +116,7 @@ bool closed_loop_run(struct incise_plan *plan, const struct closed_loop *loop, i
 		double t_s = (double)i * STEP_S;
 
 		if (t_s >= r.next_pose_s)
-			measure(&r, t_s);
+			take_pose(&r, t_s);
 		if (i % STEPS == 0)
 			force_N = tick(&r, t_s);
 		if (t_s > AIR_S) {

@@ -159,7 +159,7 @@ struct drive {
 	double torque_counts_s2; /* CST: acceleration per ‰ … */
 	bool absolute;		 /* it is homed from power-on on */
 
-	/* What goes wrong. */
+	/* Faults. */
 	bool mute;	      /* SDOs are not answered */
 	int64_t answer_ns;    /* later than usual, each SDO */
 	uint32_t abort_at;    /* the k-th SDO request, counted from 1, is aborted … */

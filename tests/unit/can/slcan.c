@@ -161,7 +161,7 @@ static void expect(const char *text)
 	assert_memory_equal(&frame, &expected, sizeof(frame));
 }
 
-/* Whatever was said before was no frame: one that follows is the next. */
+/* Earlier text was no frame: one that follows is the next. */
 static void expect_nothing(void)
 {
 	uint64_t before = bus->counts.received;

@@ -24,7 +24,7 @@
 #define S INT64_C(1000000000)
 #define COUNT(table) (sizeof(table) / sizeof(*(table)))
 
-/* What the kernel says of can0 on a little-endian machine; cases change some bytes of it. */
+/* The kernel's answer about can0 on a little-endian machine; cases change some bytes of it. */
 static const char can0[] =
 	"b4000000 1000 0000 01000000 67120000" /* RTM_NEWLINK, SEQUENCE, PORT */
 	"0000 1801 05000000 41000000 00000000" /* ARPHRD_CAN, index 5, up and running */

@@ -532,7 +532,7 @@ TEST(test_counts_of_own_thread)
 	} while (to.ru_nvcsw == from.ru_nvcsw);
 	assert_int_equal(incise_realtime_count(tid, &after), 0);
 	munmap((void *)memory, size);
-	/* What is between the two readings is in ours only. */
+	/* Our count alone has the sleeps between the two readings. */
 	assert_true(after.minor_faults - before.minor_faults >=
 		    (uint64_t)(to.ru_minflt - from.ru_minflt));
 	assert_true(to.ru_minflt - from.ru_minflt >= 100);

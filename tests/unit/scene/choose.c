@@ -282,7 +282,7 @@ static int stages_of_a_loop(void)
 	return (int)n_all - 3;
 }
 
-/* What the scene lacks is left out, and the ticks are those of the whole pipeline. */
+/* The plan leaves out the stages that the scene lacks; its ticks are those of the whole pipeline. */
 static void lean_is_full_to_the_bit(const struct lack *lack,
 				    const struct surface *surface, const char *arithmetic,
 				    struct seen *seen)
@@ -297,7 +297,7 @@ static void lean_is_full_to_the_bit(const struct lack *lack,
 	/* The rest, and the actuator of no rig, cannot be kept. */
 	assert_int_equal(stages(full), stages_of_a_loop());
 	assert_true(stages(lean) < stages(full));
-	/* What only a stage that is left out needs is not there. */
+	/* Memory that only an omitted stage uses is not allocated. */
 	assert_true(incise_plan_memory(lean) <= incise_plan_memory(full));
 	if (!strcmp(lack->stage, "tool") || !strcmp(lack->stage, "normal"))
 		assert_true(incise_plan_memory(lean) < incise_plan_memory(full));

@@ -1,7 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-2.0-or-later
 # Every picture of a camera, byte by byte and with its stamp: v4l2loopback, fed by the test.
-# Long: all bytes of all pictures take 7 s of an emulated processor.
 . tests/vm/tap
 
 [ -e "${INCISE_VM_LOOPBACK:-}" ] || skip "v4l2loopback" "tests/vm/loopback has not built it"

@@ -3,7 +3,6 @@
 # The real programs on a CAN interface, against the independent drive of tests/can;
 # tests/cli/can.bats has much more of it, over a serial adapter. 500 Hz: the drive is Python,
 # which needs 1.5 ms a cycle on an emulated processor.
-# Long: the drive in Python takes 9 s of an emulated processor.
 . tests/vm/tap
 . tests/can/peer.sh
 in_virtual_time "CAN drive"

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # A capture with a camera of the kernel: CLOCK_REALTIME is set meanwhile, one hour on and
 # back, and nothing comes of it; then the camera goes, and the rest is recorded.
-# Long: to record pictures takes 11 s of an emulated processor.
 . tests/vm/tap
 
 [ -e "$INCISE_BUILD/lib/incise/frames_mkv.so" ] || skip "a capture" "frames_mkv.so was not built"

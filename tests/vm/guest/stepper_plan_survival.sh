@@ -1,7 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-2.0-or-later
 # A plan in the kernel ticks on, whatever becomes of programs.
-# Long: memory that is taken, page by page.
 . tests/vm/tap
 in_virtual_time "a plan survives"
 # The shortage of memory takes 8 s of a processor.
