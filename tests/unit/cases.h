@@ -7,6 +7,7 @@
 #define TEST_CASES_H
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -37,6 +38,25 @@ static inline uint64_t cases_seed(uint64_t seed)
 		seed = strtoull(text, NULL, 0);
 	printf("seed %" PRIu64 "\n", seed);
 	return seed;
+}
+
+/* @return log of the binomial probability of @k of @n with a share of @p */
+static inline double cases_log_chance(int k, int n, double p)
+{
+	return lgamma(n + 1.0) - lgamma(k + 1.0) - lgamma(n - k + 1.0) + k * log(p) +
+	       (n - k) * log1p(-p);
+}
+
+/* @return whether @held of @n cases are within the binomial 99.9 % range about a share of @p */
+static inline bool cases_hold(int held, int n, double p)
+{
+	double below = 0, above = 0;
+
+	for (int k = 0; k <= held; k++)
+		below += exp(cases_log_chance(k, n, p));
+	for (int k = held; k <= n; k++)
+		above += exp(cases_log_chance(k, n, p));
+	return below > 0.0005 && above > 0.0005;
 }
 
 #endif

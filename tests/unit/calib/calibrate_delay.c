@@ -125,17 +125,12 @@ static int fit(enum incise_delay_relation relation, double range_ms,
 				      range_ms, f, err);
 }
 
-/* Binomial: 2.6 sd about 95 % of n; of 200 that is 92 to 98 %, said with the issue. */
 static void check_share(const char *what, int in, int by_u, int n, double worst)
 {
-	double slack = 2.6 * sqrt(0.95 * 0.05 / n) * n;
-
-	if (n == 200)
-		slack = 6;
 	print_message("%s: %d data sets, 95 %% interval holds %.1f %%, ±2 u %.1f %%, "
 		      "farthest %.3f ms\n",
 		      what, n, 100.0 * in / n, 100.0 * by_u / n, worst);
-	assert_true(in >= 0.95 * n - slack - 0.5 && in <= 0.95 * n + slack + 0.5);
+	assert_true(cases_hold(in, n, 0.95));
 	assert_true(worst < 0.3); /* asked */
 }
 
