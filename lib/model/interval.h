@@ -54,6 +54,13 @@ static inline struct interval iv_mul(struct interval a, struct interval b)
 		      iv_most(iv_most(p, q), iv_most(r, s)));
 }
 
+/* share·b for a share ≥ 0: the same ends as iv_mul(), of two products. */
+static inline struct interval iv_share(struct interval share, struct interval b)
+{
+	return iv_out(b.lo * (b.lo < 0 ? share.hi : share.lo),
+		      b.hi * (b.hi < 0 ? share.lo : share.hi));
+}
+
 static inline struct interval iv_scale(struct interval a, double k)
 {
 	return iv_mul(a, iv(k));

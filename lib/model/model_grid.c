@@ -316,45 +316,47 @@ static struct interval rule_difference(const struct incise_grid *grid, int i, in
 	return iv_add(d, iv_mul(iv_sub(iv(p[2]), iv(q[2])), b->x));
 }
 
-/* Σij ā(i) b̄(j) p(i,j,k), about the main rule's. */
-static struct interval mean_slope(const struct incise_grid *grid,
-				  const struct incise_block *a,
-				  const struct incise_block *b, int k)
+/* Σij ā(i) b̄(j) p(i,j,k) for slopes 1 and 2, about the main rule's. */
+static void mean_slopes(struct incise_patch *patch, const struct incise_grid *grid,
+			const struct incise_block *a, const struct incise_block *b)
 {
-	struct interval sum = iv(grid->p[a->main][b->main][k]);
+	const double *main = grid->p[a->main][b->main];
 
+	patch->f1 = iv(main[1]);
+	patch->f2 = iv(main[2]);
 	for (int i = 0; i < grid->a.n; i++)
 		for (int j = 0; j < grid->b.n; j++) {
-			struct interval off = iv_sub(iv(grid->p[i][j][k]),
-						     iv(grid->p[a->main][b->main][k]));
+			const double *p = grid->p[i][j];
+			struct interval weight =
+				iv_share(a->range.a[i], b->range.a[j]);
 
-			sum = iv_add(sum,
-				     iv_mul(iv_mul(a->range.a[i], b->range.a[j]), off));
+			patch->f1 = iv_add(patch->f1,
+					   iv_share(weight, iv_sub(iv(p[1]), iv(main[1]))));
+			patch->f2 = iv_add(patch->f2,
+					   iv_share(weight, iv_sub(iv(p[2]), iv(main[2]))));
 		}
-	return sum;
 }
 
 void incise_patch_slopes(struct incise_patch *patch, const struct incise_grid *grid,
 			 const struct incise_block *a, const struct incise_block *b)
 {
-	patch->f1 = mean_slope(grid, a, b, 1);
-	patch->f2 = mean_slope(grid, a, b, 2);
+	mean_slopes(patch, grid, a, b);
 	for (int i = 0; i < grid->a.n; i++) {
 		patch->t[i] = iv(0);
 		for (int j = 0; j < grid->b.n; j++)
 			patch->t[i] = iv_add(
 				patch->t[i],
-				iv_mul(b->range.a[j],
-				       rule_difference(grid, i, j, a->main, j, a, b)));
+				iv_share(b->range.a[j],
+					 rule_difference(grid, i, j, a->main, j, a, b)));
 		patch->f1 = iv_add(patch->f1, iv_mul(a->range.d1[i], patch->t[i]));
 	}
 	for (int j = 0; j < grid->b.n; j++) {
 		struct interval s = iv(0);
 
-		for (int i = 0; i < grid->a.n; i++)
-			s = iv_add(s,
-				   iv_mul(a->range.a[i],
-					  rule_difference(grid, i, j, i, b->main, a, b)));
+		for (int i = 0; i < grid->a.n; i++) {
+			patch->r[i][j] = rule_difference(grid, i, j, i, b->main, a, b);
+			s = iv_add(s, iv_share(a->range.a[i], patch->r[i][j]));
+		}
 		patch->f2 = iv_add(patch->f2, iv_mul(b->range.d1[j], s));
 	}
 }
@@ -364,20 +366,18 @@ static void rule_sums(struct incise_patch *patch, const struct incise_grid *grid
 		      const struct incise_block *a, const struct incise_block *b, int i)
 {
 	const struct incise_axis_range *rb = &b->range;
-	int m = b->main;
 
 	patch->t2[i] = patch->h[i] = iv(0);
 	for (int j = 0; j < grid->b.n; j++) {
 		const double *p = grid->p[i][j];
-		struct interval r = rule_difference(grid, i, j, i, m, a, b);
-		struct interval slope = iv_sub(iv(p[2]), iv(grid->p[i][m][2]));
+		struct interval slope = iv_sub(iv(p[2]), iv(grid->p[i][b->main][2]));
 
 		patch->t2[i] = iv_add(patch->t2[i],
-				      iv_add(iv_mul(rb->d2[j], r),
+				      iv_add(iv_mul(rb->d2[j], patch->r[i][j]),
 					     iv_scale(iv_mul(rb->d1[j], slope), 2)));
-		patch->h[i] = iv_add(
-			patch->h[i],
-			iv_mul(rb->a[j], iv_sub(iv(p[1]), iv(grid->p[a->main][j][1]))));
+		patch->h[i] = iv_add(patch->h[i],
+				     iv_share(rb->a[j], iv_sub(iv(p[1]),
+							       iv(grid->p[a->main][j][1]))));
 	}
 }
 
@@ -393,11 +393,12 @@ void incise_patch_over(struct incise_patch *patch, const struct incise_grid *gri
 		patch->f11 = iv_add(patch->f11,
 				    iv_add(iv_mul(ra->d2[i], patch->t[i]),
 					   iv_scale(iv_mul(ra->d1[i], patch->h[i]), 2)));
-		patch->f22 = iv_add(patch->f22, iv_mul(ra->a[i], patch->t2[i]));
+		patch->f22 = iv_add(patch->f22, iv_share(ra->a[i], patch->t2[i]));
 	}
 }
 
-struct interval incise_patch_mixed(const struct incise_grid *grid,
+struct interval incise_patch_mixed(const struct incise_patch *patch,
+				   const struct incise_grid *grid,
 				   const struct incise_block *a,
 				   const struct incise_block *b)
 {
@@ -409,9 +410,7 @@ struct interval incise_patch_mixed(const struct incise_grid *grid,
 			const double *p = grid->p[i][j];
 			/* The parts of r that depend on i or j alone add up to 0 as well. */
 			struct interval r =
-				iv_sub(rule_difference(grid, i, j, i, b->main, a, b),
-				       rule_difference(grid, a->main, j, a->main, b->main,
-						       a, b));
+				iv_sub(patch->r[i][j], patch->r[a->main][j]);
 			struct interval by_b =
 				iv_sub(iv(p[2]), iv(grid->p[a->main][j][2]));
 			struct interval by_a =
@@ -439,6 +438,11 @@ struct interval incise_patch_mixed(const struct incise_grid *grid,
 
 #define N INCISE_FIXED_MFS_MAX
 
+struct blocks {
+	int n;
+	struct incise_block *block;
+};
+
 /*
  * The largest of each, over the whole support. They are added up though they need not meet
  * in one place: a cell of a table reaches over several blocks.
@@ -451,12 +455,8 @@ struct incise_survey {
 	double outputs;	 /* times wb²/8 */
 	double bends,
 		worst; /* weights that are off meet outputs that are: wa²/8 · wb²/8 */
-	double direct;
-};
-
-struct blocks {
-	int n;
-	struct incise_block *block;
+	const struct incise_grid *grid;
+	struct blocks a, b;
 };
 
 static int make_blocks(struct blocks *blocks, const struct incise_axis *axis,
@@ -541,7 +541,7 @@ static void degree_errors(const struct incise_axis *axis,
 static double direct_error(const struct incise_grid *grid, const struct incise_block *a,
 			   const struct incise_block *b)
 {
-	double ea[N], eb[N], sum = 0, spread = 0;
+	double ea[N], eb[N], d[N][N], sum = 0, spread = 0;
 
 	degree_errors(&grid->a, a, ea);
 	degree_errors(&grid->b, b, eb);
@@ -550,19 +550,14 @@ static double direct_error(const struct incise_grid *grid, const struct incise_b
 	/* |r - F| is at most the distance between the farthest two rules here. */
 	for (int i = 0; i < grid->a.n; i++)
 		for (int j = 0; j < grid->b.n; j++) {
-			double d = iv_mag(
+			d[i][j] = iv_mag(
 				rule_difference(grid, i, j, a->main, b->main, a, b));
-
-			spread = fmax(spread,
-				      a->range.a[i].hi * b->range.a[j].hi > 1e-9 ? d : 0);
+			if (a->range.a[i].hi * b->range.a[j].hi > 1e-9)
+				spread = fmax(spread, d[i][j]);
 		}
 	for (int i = 0; i < grid->a.n; i++)
-		for (int j = 0; j < grid->b.n; j++) {
-			double d = iv_mag(
-				rule_difference(grid, i, j, a->main, b->main, a, b));
-
-			sum += (ea[i] + eb[j] + 0x1p-29) * (d + spread);
-		}
+		for (int j = 0; j < grid->b.n; j++)
+			sum += (ea[i] + eb[j] + 0x1p-29) * (d[i][j] + spread);
 	/* The largest weight is 1 within 1e-6. */
 	return sum * 1.001;
 }
@@ -570,35 +565,38 @@ static double direct_error(const struct incise_grid *grid, const struct incise_b
 struct incise_survey *incise_survey_new(const struct incise_grid *grid)
 {
 	struct incise_survey *survey = calloc(1, sizeof(*survey));
-	struct blocks ba = {0}, bb = {0};
 
-	if (!survey || make_blocks(&ba, &grid->a, grid->one) ||
-	    make_blocks(&bb, &grid->b, false)) {
-		free(survey);
-		survey = NULL;
-		goto out;
+	if (!survey)
+		return NULL;
+	survey->grid = grid;
+	if (make_blocks(&survey->a, &grid->a, grid->one) ||
+	    make_blocks(&survey->b, &grid->b, false)) {
+		incise_survey_free(survey);
+		return NULL;
 	}
-	for (int k = 0; k < ba.n * bb.n; k++) {
-		const struct incise_block *a = &ba.block[k / bb.n],
-					  *b = &bb.block[k % bb.n];
-		struct incise_patch patch;
+	for (int k = 0; k < survey->a.n; k++)
+		for (int l = 0; l < survey->b.n; l++) {
+			const struct incise_block *a = &survey->a.block[k],
+						  *b = &survey->b.block[l];
+			struct incise_patch patch;
 
-		incise_patch_over(&patch, grid, a, b);
-		survey->input = larger(survey->input,
+			incise_patch_over(&patch, grid, a, b);
+			survey->input =
+				larger(survey->input,
 				       (iv_mag(patch.f1) + iv_mag(patch.f2)) * HALF_LSB);
-		survey->f11 = larger(survey->f11, iv_mag(patch.f11));
-		survey->f22 = larger(survey->f22, iv_mag(patch.f22));
-		survey->direct = larger(survey->direct, direct_error(grid, a, b));
-		table_errors(grid, a, &patch, survey);
-	}
-out:
-	free(ba.block);
-	free(bb.block);
+			survey->f11 = larger(survey->f11, iv_mag(patch.f11));
+			survey->f22 = larger(survey->f22, iv_mag(patch.f22));
+			table_errors(grid, a, &patch, survey);
+		}
 	return survey;
 }
 
 void incise_survey_free(struct incise_survey *survey)
 {
+	if (!survey)
+		return;
+	free(survey->a.block);
+	free(survey->b.block);
 	free(survey);
 }
 
@@ -620,9 +618,16 @@ double incise_survey_force(const struct incise_survey *s, double wa, double wb)
 		      (s->input + s->f11 * wa * wa / 8 + s->f22 * wb * wb / 8) * SLACK);
 }
 
+/* Not part of the survey: most models are tables. */
 double incise_survey_direct(const struct incise_survey *s)
 {
-	return larger(0, (s->input + s->direct) * SLACK);
+	double direct = 0;
+
+	for (int k = 0; k < s->a.n; k++)
+		for (int l = 0; l < s->b.n; l++)
+			direct = larger(direct, direct_error(s->grid, &s->a.block[k],
+							     &s->b.block[l]));
+	return larger(0, (s->input + direct) * SLACK);
 }
 
 /* --- three inputs and more --- */

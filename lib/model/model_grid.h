@@ -83,10 +83,12 @@ struct incise_patch {
 	struct interval t[INCISE_FIXED_MFS_MAX];  /* T(i) - T(main) */
 	struct interval t2[INCISE_FIXED_MFS_MAX]; /* T(i)'' */
 	struct interval h[INCISE_FIXED_MFS_MAX];  /* h(i) - h(main) */
+	/* r(i,j) - r(i,main) */
+	struct interval r[INCISE_FIXED_MFS_MAX][INCISE_FIXED_MFS_MAX];
 	struct interval f1, f2, f11, f22;
 };
 
-/* The slopes f1 and f2 alone, and t on the way to them. */
+/* The slopes f1 and f2 alone, and t and r on the way to them. */
 void incise_patch_slopes(struct incise_patch *patch, const struct incise_grid *grid,
 			 const struct incise_block *a, const struct incise_block *b);
 
@@ -94,8 +96,9 @@ void incise_patch_slopes(struct incise_patch *patch, const struct incise_grid *g
 void incise_patch_over(struct incise_patch *patch, const struct incise_grid *grid,
 		       const struct incise_block *a, const struct incise_block *b);
 
-/* ∂²F/∂a∂b */
-struct interval incise_patch_mixed(const struct incise_grid *grid,
+/* ∂²F/∂a∂b over the blocks of a patch */
+struct interval incise_patch_mixed(const struct incise_patch *patch,
+				   const struct incise_grid *grid,
 				   const struct incise_block *a,
 				   const struct incise_block *b);
 
@@ -108,7 +111,7 @@ struct incise_survey;
 /* Fewest cells per input that a table may have: how far one cell may reach. */
 #define INCISE_SURVEY_CELLS 32
 
-/* NULL without memory. */
+/* Of a grid that outlives it. NULL without memory. */
 struct incise_survey *incise_survey_new(const struct incise_grid *grid);
 void incise_survey_free(struct incise_survey *survey);
 

@@ -90,7 +90,7 @@ static void look(struct branches *b, struct box *box)
 	at[1] = patch.f2;
 	blocks_over(b->grid, block, box->x);
 	incise_patch_over(&patch, b->grid, &block[0], &block[1]);
-	mixed = incise_patch_mixed(b->grid, &block[0], &block[1]);
+	mixed = incise_patch_mixed(&patch, b->grid, &block[0], &block[1]);
 	box->f[0] =
 		iv_add(at[0], iv_add(iv_mul(patch.f11, off[0]), iv_mul(mixed, off[1])));
 	box->f[1] =

@@ -240,7 +240,7 @@ TEST(test_encloses_differences)
 		got[F2] = patch.f2;
 		got[F11] = patch.f11;
 		got[F22] = patch.f22;
-		got[F12] = incise_patch_mixed(grid, &ba, &bb);
+		got[F12] = incise_patch_mixed(&patch, grid, &ba, &bb);
 		for (int k = 0; k <= 8; k++) {
 			differences(model, a + width * (k % 3) / 2,
 				    b + width * (k / 3) / 2, d);
