@@ -327,13 +327,14 @@ static void mean_slopes(struct incise_patch *patch, const struct incise_grid *gr
 	for (int i = 0; i < grid->a.n; i++)
 		for (int j = 0; j < grid->b.n; j++) {
 			const double *p = grid->p[i][j];
-			struct interval weight =
-				iv_share(a->range.a[i], b->range.a[j]);
+			struct interval weight = iv_share(a->range.a[i], b->range.a[j]);
 
-			patch->f1 = iv_add(patch->f1,
-					   iv_share(weight, iv_sub(iv(p[1]), iv(main[1]))));
-			patch->f2 = iv_add(patch->f2,
-					   iv_share(weight, iv_sub(iv(p[2]), iv(main[2]))));
+			patch->f1 =
+				iv_add(patch->f1,
+				       iv_share(weight, iv_sub(iv(p[1]), iv(main[1]))));
+			patch->f2 =
+				iv_add(patch->f2,
+				       iv_share(weight, iv_sub(iv(p[2]), iv(main[2]))));
 		}
 }
 
@@ -375,9 +376,9 @@ static void rule_sums(struct incise_patch *patch, const struct incise_grid *grid
 		patch->t2[i] = iv_add(patch->t2[i],
 				      iv_add(iv_mul(rb->d2[j], patch->r[i][j]),
 					     iv_scale(iv_mul(rb->d1[j], slope), 2)));
-		patch->h[i] = iv_add(patch->h[i],
-				     iv_share(rb->a[j], iv_sub(iv(p[1]),
-							       iv(grid->p[a->main][j][1]))));
+		patch->h[i] = iv_add(
+			patch->h[i],
+			iv_share(rb->a[j], iv_sub(iv(p[1]), iv(grid->p[a->main][j][1]))));
 	}
 }
 
@@ -409,8 +410,7 @@ struct interval incise_patch_mixed(const struct incise_patch *patch,
 		for (int j = 0; j < grid->b.n; j++) {
 			const double *p = grid->p[i][j];
 			/* The parts of r that depend on i or j alone add up to 0 as well. */
-			struct interval r =
-				iv_sub(patch->r[i][j], patch->r[a->main][j]);
+			struct interval r = iv_sub(patch->r[i][j], patch->r[a->main][j]);
 			struct interval by_b =
 				iv_sub(iv(p[2]), iv(grid->p[a->main][j][2]));
 			struct interval by_a =
@@ -430,51 +430,83 @@ struct interval incise_patch_mixed(const struct incise_patch *patch,
  * cell of width w is off by at most w²/8 times the largest second derivative.
  */
 
-/* Blocks per input: more give a tighter bound and take time, with the square. */
+/*
+ * Blocks per input of the finest patches: more give a tighter bound and take time, with the square.
+ * Coarser ones of 2, 4 … blocks enclose the same and more: where a coarse patch adds nothing, the finer
+ * ones within it are not looked at.
+ */
+#define LEVELS 5
 #define BLOCKS 128
+
+/* Each so manyth of the finest patches is looked at first: what coarse ones are compared with. */
+#define SAMPLE 8
 
 /* Rounding an input to Q16.16. */
 #define HALF_LSB (0.5 / INCISE_FIXED_ONE)
 
 #define N INCISE_FIXED_MFS_MAX
 
+/* One input's support in blocks, n at level 0 and half as many at each next one; an input that is
+ * trivial has one at each. */
 struct blocks {
 	int n;
-	struct incise_block *block;
+	struct incise_block *level[LEVELS];
 };
 
 /*
  * The largest of each, over the whole support. They are added up though they need not meet
  * in one place: a cell of a table reaches over several blocks.
  */
+enum largest {
+	INPUT, /* rounding of the inputs */
+	F11,   /* second derivatives */
+	F22,
+	WEIGHTS, /* table: times wa²/8 */
+	SLOPES,	 /* the same for an output wa further on: times wa³/8 */
+	OUTPUTS, /* times wb²/8 */
+	WORST, /* outputs that are off, times wb²/8, meet weights that are: the survey's bends */
+	N_LARGEST,
+};
+
 struct incise_survey {
-	double input;	 /* rounding of the inputs */
-	double f11, f22; /* second derivatives */
-	double weights;	 /* table: times wa²/8 */
-	double slopes;	 /* the same for an output wa further on: times wa³/8 */
-	double outputs;	 /* times wb²/8 */
-	double bends,
-		worst; /* weights that are off meet outputs that are: wa²/8 · wb²/8 */
+	double largest[N_LARGEST];
+	double bends; /* of the weights of input a, times wa²/8 */
 	const struct incise_grid *grid;
 	struct blocks a, b;
 };
 
-static int make_blocks(struct blocks *blocks, const struct incise_axis *axis,
-		       bool trivial)
+static void free_blocks(struct blocks *blocks)
+{
+	for (int level = 0; level < LEVELS; level++)
+		free(blocks->level[level]);
+}
+
+static int count_blocks(const struct blocks *blocks, int level)
+{
+	return blocks->n > 1 ? blocks->n >> level : 1;
+}
+
+static int make_blocks(struct blocks *blocks, const struct incise_axis *axis, int n,
+		       int levels)
 {
 	double from = axis->min;
 	double to = axis->max + (axis->max - axis->min) / (INCISE_SURVEY_CELLS - 2);
 
-	blocks->n = trivial ? 1 : BLOCKS;
-	blocks->block = calloc(blocks->n, sizeof(*blocks->block));
-	if (!blocks->block)
-		return -1;
-	for (int k = 0; k < blocks->n; k++) {
-		struct interval x = {from + (to - from) * k / blocks->n,
-				     from + (to - from) * (k + 1) / blocks->n};
+	blocks->n = n;
+	for (int level = 0; level < levels; level++) {
+		int count = count_blocks(blocks, level);
 
-		/* Ends that round inwards would leave gaps. */
-		incise_block_over(&blocks->block[k], axis, iv_out(x.lo, x.hi));
+		blocks->level[level] = calloc(count, sizeof(struct incise_block));
+		if (!blocks->level[level])
+			return -1;
+		for (int k = 0; k < count; k++) {
+			struct interval x = {from + (to - from) * k / count,
+					     from + (to - from) * (k + 1) / count};
+
+			/* Ends that round inwards would leave gaps. */
+			incise_block_over(&blocks->level[level][k], axis,
+					  iv_out(x.lo, x.hi));
+		}
 	}
 	return 0;
 }
@@ -487,26 +519,48 @@ static double larger(double largest, double e)
 	return e > largest ? e : largest;
 }
 
-/* Errors of the weights' table and the folded one: see lib/fixed/eval.c. */
-static void table_errors(const struct incise_grid *grid, const struct incise_block *a,
-			 const struct incise_patch *patch, struct incise_survey *survey)
+/* What a patch has of each that the survey looks for. */
+static void look_at(const struct incise_grid *grid, const struct incise_block *a,
+		    const struct incise_block *b, double found[N_LARGEST])
 {
 	struct interval of_a = iv(0), of_h = iv(0), of_b = iv(0);
-	double bends = 0;
+	struct incise_patch patch;
 
+	incise_patch_over(&patch, grid, a, b);
+	found[INPUT] = (iv_mag(patch.f1) + iv_mag(patch.f2)) * HALF_LSB;
+	found[F11] = iv_mag(patch.f11);
+	found[F22] = iv_mag(patch.f22);
+	/* Errors of the weights' table and the folded one: see lib/fixed/eval.c. */
+	found[WORST] = 0;
 	for (int i = 0; i < grid->a.n; i++) {
-		double e = iv_mag(patch->t2[i]);
+		double e = iv_mag(patch.t2[i]);
 
-		of_a = iv_add(of_a, iv_mul(a->range.d2[i], patch->t[i]));
-		of_h = iv_add(of_h, iv_mul(a->range.d2[i], patch->h[i]));
+		of_a = iv_add(of_a, iv_mul(a->range.d2[i], patch.t[i]));
+		of_h = iv_add(of_h, iv_mul(a->range.d2[i], patch.h[i]));
 		of_b = iv_add(of_b, iv_mul(a->range.a[i], (struct interval){0, e}));
-		bends += iv_mag(a->range.d2[i]);
-		survey->worst = larger(survey->worst, e);
+		found[WORST] = larger(found[WORST], e);
 	}
-	survey->weights = larger(survey->weights, iv_mag(of_a));
-	survey->slopes = larger(survey->slopes, iv_mag(of_h));
-	survey->outputs = larger(survey->outputs, iv_mag(of_b));
-	survey->bends = larger(survey->bends, bends);
+	found[WEIGHTS] = iv_mag(of_a);
+	found[SLOPES] = iv_mag(of_h);
+	found[OUTPUTS] = iv_mag(of_b);
+}
+
+static void survey_patch(struct incise_survey *survey, int level, int k, int l)
+{
+	int wide = survey->a.n > 1 ? 2 : 1;
+	double found[N_LARGEST];
+	bool adds = false;
+
+	look_at(survey->grid, &survey->a.level[level][k], &survey->b.level[level][l],
+		found);
+	for (int i = 0; i < N_LARGEST; i++)
+		adds = adds || !(found[i] <= survey->largest[i]);
+	if (!adds)
+		return;
+	for (int i = 0; i < N_LARGEST && !level; i++)
+		survey->largest[i] = larger(survey->largest[i], found[i]);
+	for (int i = 0; i < 2 * wide && level; i++)
+		survey_patch(survey, level - 1, wide * k + i / 2, 2 * l + i % 2);
 }
 
 /*
@@ -569,25 +623,24 @@ struct incise_survey *incise_survey_new(const struct incise_grid *grid)
 	if (!survey)
 		return NULL;
 	survey->grid = grid;
-	if (make_blocks(&survey->a, &grid->a, grid->one) ||
-	    make_blocks(&survey->b, &grid->b, false)) {
+	if (make_blocks(&survey->a, &grid->a, grid->one ? 1 : BLOCKS, LEVELS) ||
+	    make_blocks(&survey->b, &grid->b, BLOCKS, LEVELS)) {
 		incise_survey_free(survey);
 		return NULL;
 	}
-	for (int k = 0; k < survey->a.n; k++)
-		for (int l = 0; l < survey->b.n; l++) {
-			const struct incise_block *a = &survey->a.block[k],
-						  *b = &survey->b.block[l];
-			struct incise_patch patch;
+	for (int k = 0; k < survey->a.n; k++) {
+		double bends = 0;
 
-			incise_patch_over(&patch, grid, a, b);
-			survey->input =
-				larger(survey->input,
-				       (iv_mag(patch.f1) + iv_mag(patch.f2)) * HALF_LSB);
-			survey->f11 = larger(survey->f11, iv_mag(patch.f11));
-			survey->f22 = larger(survey->f22, iv_mag(patch.f22));
-			table_errors(grid, a, &patch, survey);
-		}
+		for (int i = 0; i < grid->a.n; i++)
+			bends += iv_mag(survey->a.level[0][k].range.d2[i]);
+		survey->bends = larger(survey->bends, bends);
+	}
+	for (int k = 0; k < survey->a.n; k += SAMPLE)
+		for (int l = 0; l < survey->b.n; l += SAMPLE)
+			survey_patch(survey, 0, k, l);
+	for (int k = 0; k < count_blocks(&survey->a, LEVELS - 1); k++)
+		for (int l = 0; l < count_blocks(&survey->b, LEVELS - 1); l++)
+			survey_patch(survey, LEVELS - 1, k, l);
 	return survey;
 }
 
@@ -595,8 +648,8 @@ void incise_survey_free(struct incise_survey *survey)
 {
 	if (!survey)
 		return;
-	free(survey->a.block);
-	free(survey->b.block);
+	free_blocks(&survey->a);
+	free_blocks(&survey->b);
 	free(survey);
 }
 
@@ -605,17 +658,20 @@ void incise_survey_free(struct incise_survey *survey)
 
 double incise_survey_table(const struct incise_survey *s, double wa, double wb)
 {
+	const double *of = s->largest;
 	double a2 = wa * wa / 8, b2 = wb * wb / 8;
-	double bound = s->input + (s->weights + s->slopes * wa) * a2 + s->outputs * b2 +
-		       s->bends * a2 * s->worst * b2;
+	double bound = of[INPUT] + (of[WEIGHTS] + of[SLOPES] * wa) * a2 +
+		       of[OUTPUTS] * b2 + s->bends * a2 * of[WORST] * b2;
 
 	return larger(0, bound * SLACK);
 }
 
 double incise_survey_force(const struct incise_survey *s, double wa, double wb)
 {
-	return larger(0,
-		      (s->input + s->f11 * wa * wa / 8 + s->f22 * wb * wb / 8) * SLACK);
+	const double *of = s->largest;
+
+	return larger(0, (of[INPUT] + of[F11] * wa * wa / 8 + of[F22] * wb * wb / 8) *
+				 SLACK);
 }
 
 /* Not part of the survey: most models are tables. */
@@ -625,9 +681,9 @@ double incise_survey_direct(const struct incise_survey *s)
 
 	for (int k = 0; k < s->a.n; k++)
 		for (int l = 0; l < s->b.n; l++)
-			direct = larger(direct, direct_error(s->grid, &s->a.block[k],
-							     &s->b.block[l]));
-	return larger(0, (s->input + direct) * SLACK);
+			direct = larger(direct, direct_error(s->grid, &s->a.level[0][k],
+							     &s->b.level[0][l]));
+	return larger(0, (s->largest[INPUT] + direct) * SLACK);
 }
 
 /* --- three inputs and more --- */
@@ -690,27 +746,28 @@ double incise_many_direct(const struct incise_model *model)
 	for (int i = 0; i < n; i++) {
 		struct incise_axis axis;
 		struct blocks blocks = {0};
+		const struct incise_block *block;
 		double worst = 0, steepest = 0, slope = 0;
 
 		incise_axis_init(&axis, model, i);
-		if (make_blocks(&blocks, &axis, false)) {
-			free(blocks.block);
+		if (make_blocks(&blocks, &axis, BLOCKS, 1)) {
+			free_blocks(&blocks);
 			return HUGE_VAL;
 		}
-		support[i] = (struct interval){blocks.block[0].x.lo,
-					       blocks.block[blocks.n - 1].x.hi};
-		for (int b = 0; b < blocks.n; b++) {
+		block = blocks.level[0];
+		support[i] = (struct interval){block[0].x.lo, block[BLOCKS - 1].x.hi};
+		for (int b = 0; b < BLOCKS; b++) {
 			double e[N], sum = 0, turns = 0;
 
-			degree_errors(&axis, &blocks.block[b], e);
+			degree_errors(&axis, &block[b], e);
 			for (int k = 0; k < axis.n; k++) {
 				sum += e[k];
-				turns += iv_mag(blocks.block[b].range.d1[k]);
+				turns += iv_mag(block[b].range.d1[k]);
 			}
 			worst = larger(worst, sum);
 			steepest = larger(steepest, turns);
 		}
-		free(blocks.block);
+		free_blocks(&blocks);
 		for (int r = 0; r < model->info.n_rules; r++)
 			slope = fmax(slope, fabs(incise_model_rule(model, r)->p[i + 1]));
 		degrees += worst;
