@@ -160,7 +160,7 @@ $good" 0
 	C
 	leaks() {
 		# The frames of the library have to be in the report.
-		env LSAN_OPTIONS="suppressions=$root/tests/unit/lsan.supp:print_suppressions=0" "./$1"
+		env -u ASAN_OPTIONS LSAN_OPTIONS="suppressions=$root/tests/unit/lsan.supp:print_suppressions=0" "./$1"
 	}
 	for name in gallium-25.0.7 other; do
 		${CC:-cc} -g -fsanitize=address -fPIC -shared -o "lib$name.so" driver.c
