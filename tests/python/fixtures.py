@@ -19,11 +19,11 @@ SHORT = "sim:seed=1,clock=simulated,cut_s=2,pause_s=1"  # all 14 cuts, in 43 s
 
 
 def run(*command, **options):
-    """Run an incise program; its standard output."""
+    """Run an incise program; its standard output. What it says of a failure is shown."""
     environment = {**os.environ, "PATH": os.path.join(BUILD, "bin") + ":" + os.environ["PATH"]}
     environment.pop("LD_PRELOAD", None)  # of a sanitizer, which is Python's
     return subprocess.run(
-        command, check=True, capture_output=True, env=environment, text=True, **options
+        command, check=True, stdout=subprocess.PIPE, env=environment, text=True, **options
     ).stdout
 
 
