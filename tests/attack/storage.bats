@@ -33,7 +33,7 @@ tell() {
 	[ "$ATTACK" != full ] || echo "# $output" >&3
 }
 
-@test "kill -9 at random moments: at most 200 ms are lost, and nothing that was committed" {
+@test "kill -9 at random moments: nothing is lost that was committed" {
 	run -0 attack 20 100 kill
 	tell
 }
@@ -107,7 +107,8 @@ with_camera() {
 	mount -t tmpfs -o size=40m tmpfs disk 2>/dev/null ||
 		skip "mounting a small tmpfs is not permitted; that of so many bytes stands in"
 	mounted=$PWD/disk
-	incise capture -o disk/a.rec --rig sim:clock=real --duration 1h >out 2>err 3>&- &
+	# 1 min is what the disk has room for at the start
+	incise capture -o disk/a.rec --rig sim:clock=real --duration 1min >out 2>err 3>&- &
 	pid=$!
 	until incise info disk/a.rec.part --json >rows.json 2>/dev/null &&
 		[ "$(key rows.json rows.force)" -gt 1000 ]; do
