@@ -56,7 +56,7 @@ shares() {
 # bats test_tags=check
 @test "factors of shares merge to the model of all pairs, to the bit" {
 	shares
-	incise train s1.csv --group cut -o start.fis >/dev/null
+	incise train s1.csv --group cut --mf 3,3 -o start.fis >/dev/null
 	incise train s?.csv --premises start.fis --group cut -o all.fis >/dev/null
 	incise train s1.csv --premises start.fis --group cut --factor a.fac >/dev/null
 	incise train s4.csv s3.csv --premises start.fis --group cut --factor b.fac >/dev/null
