@@ -627,7 +627,7 @@ TEST(between_and_beyond)
 		{100, 10000},  {150, 15000},  {200, 20000},  {205, 20550},
 		{210, 21100},  {220, 22200}, /* the old line goes on up to the new one */
 		{299, 30890},  {300, 900000}, {350, 905000}, {400, 910000},
-		{500, 920000}, {0, 0}, /* before the first */
+		{500, 920000}, {50, 5000},    {0, 0}, /* before the first */
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
