@@ -435,6 +435,7 @@ static void compare(const char *path, const json_t *old, json_t *report)
 
 	if (!comparison)
 		comparison = json_pack("{so}", "failed", json_text(err.text));
+	json_object_del(comparison, "text");
 	json_object_set_new(comparison, "file", json_text(path));
 	json_object_set_new(report, "against", comparison);
 }

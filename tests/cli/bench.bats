@@ -105,6 +105,11 @@ setup() {
 	holds "$(key c.json same) > 30"
 }
 
+# bats test_tags=check
+@test "bench compare: how often two runs of one distribution differ, and what is found" {
+	run -0 /usr/bin/python3 -B "$BATS_TEST_DIRNAME/compare_reports.py"
+}
+
 @test "bench compare takes reports of several words" {
 	figure() {
 		echo "{\"name\": \"$1\", \"kind\": \"exact\", \"unit\": \"N\", \"value\": $2}"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Runs the script of reports; see report_script.h. It is that of Debian's Python, whose packages
- * have jinja2, and not one that a virtual environment puts first in PATH.
+ * Runs the scripts of reports; see report_script.h. They run in Debian's Python, whose packages
+ * have jinja2, and not in one that a virtual environment puts first in PATH.
  */
 #include <errno.h>
 #include <stdlib.h>
@@ -30,7 +30,8 @@ static int failed(FILE *said, struct incise_error *err)
 int report_script(const char *what, const char *folder, const json_t *data, FILE *out,
 		  struct incise_error *err)
 {
-	char *script = cli_text("%s/../share/incise/report/report.py", cli_folder());
+	char *script = cli_text("%s/../share/incise/report/%s.py", cli_folder(),
+				strcmp(what, "compare") ? "report" : what);
 	char *const argv[] = {PYTHON, "-B", script, (char *)what, (char *)folder, NULL};
 	struct memory_file in = memory_file_begin("page"),
 			   said = memory_file_begin("said");
