@@ -5,14 +5,10 @@
  */
 #include <errno.h>
 #include <math.h>
-#include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
-#include <unistd.h>
 #include "../cli/cli.h"
 #include "../cli/json.h"
 #include "../cli/file.h"
@@ -140,7 +136,7 @@ int compare_worse(const json_t *comparison)
 	       (int)json_array_size(json_object_get(comparison, "gone"));
 }
 
-void compare_finish(json_t *comparison, bool json)
+int compare_print(json_t *comparison, bool json)
 {
 	int worse = compare_worse(comparison);
 
@@ -152,65 +148,11 @@ void compare_finish(json_t *comparison, bool json)
 		json_decref(comparison);
 		cli_finish();
 	}
-	if (worse)
-		cli_fail("%d metric%s worse or gone, see above", worse,
-			 worse > 1 ? "s are" : " is");
+	return worse;
 }
 
-/* --- --against --- */
-
-/* In the first process: compare what the other one reported, and end as it did. */
-static _Noreturn void wait_and_compare(pid_t pid, const struct memory_file *said,
-				       const char *path, json_t *old_report, bool json)
+void compare_fail(int worse)
 {
-	struct incise_error err = {0};
-	json_t *report, *comparison;
-	int status, worse;
-
-	/* A Ctrl-C is for the process that measures. */
-	signal(SIGINT, SIG_IGN);
-	while (waitpid(pid, &status, 0) < 0)
-		if (errno != EINTR)
-			cli_fail("the measuring process is lost: %s", strerror(errno));
-	rewind(said->file);
-	/* One that failed before it had a report has said why. */
-	report = json_read_from(said->file, "the report", &err);
-	if (!report && status)
-		_exit(WIFEXITED(status) ? WEXITSTATUS(status) : 1);
-	cli_require(report, &err);
-	comparison = cli_require(
-		compare_reports(old_report, path, report, "this run", &err), &err);
-	if (json) {
-		worse = compare_worse(comparison);
-		json_object_del(comparison, "text");
-		json_object_set_new(report, "against", comparison);
-		json_print(report);
-		if (worse)
-			cli_fail("%d metrics are worse or gone compared with %s", worse,
-				 path);
-	} else {
-		compare_finish(comparison, false);
-	}
-	exit(WIFEXITED(status) ? WEXITSTATUS(status) : 1);
-}
-
-void compare_against(const char *path, bool json)
-{
-	struct memory_file said = memory_file_begin("report");
-	json_t *old_report = compare_load(path);
-	pid_t parent = getpid(), pid;
-
-	fflush(stdout);
-	pid = fork();
-	if (pid < 0)
-		cli_fail("no process to measure in: %s", strerror(errno));
-	if (pid)
-		wait_and_compare(pid, &said, path, old_report, json);
-	prctl(PR_SET_PDEATHSIG, SIGTERM);
-	if (getppid() != parent)
-		_exit(1);
-	if (dup2(fileno(said.file), STDOUT_FILENO) < 0)
-		cli_fail("no output to report to: %s", strerror(errno));
-	fclose(said.file);
-	json_decref(old_report);
+	cli_fail("%d metric%s worse or gone, see above", worse,
+		 worse > 1 ? "s are" : " is");
 }

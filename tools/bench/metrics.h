@@ -50,12 +50,10 @@ json_t *compare_load(const char *path);
 /* The number of metrics that got worse or are gone. */
 int compare_worse(const json_t *comparison);
 
-/* Print a comparison as text, or as JSON. Fails the program when something got worse. */
-void compare_finish(json_t *comparison, bool json);
+/* Print a comparison as text, or as JSON, and release it. Returns the same number. */
+int compare_print(json_t *comparison, bool json);
 
-/* --against: call it before anything is measured, and report as JSON thereafter. It returns
- * in a process that measures; the first one compares that one's report, prints the comparison,
- * or with @json the report with `against` in it, and does not return. */
-void compare_against(const char *path, bool json);
+/* Fail the program for so many. */
+_Noreturn void compare_fail(int worse);
 
 #endif
