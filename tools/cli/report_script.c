@@ -11,8 +11,6 @@
 #include "file.h"
 #include "report_script.h"
 
-#define PYTHON "/usr/bin/python3"
-
 /* The last line that it said. */
 static int failed(FILE *said, struct incise_error *err)
 {
@@ -27,12 +25,17 @@ static int failed(FILE *said, struct incise_error *err)
 	return incise_error_set(err, EIO, "report: %s", line);
 }
 
+char *report_script_path(const char *name)
+{
+	return cli_text("%s/../share/incise/report/%s.py", cli_folder(), name);
+}
+
 int report_script(const char *what, const char *folder, const json_t *data, FILE *out,
 		  struct incise_error *err)
 {
-	char *script = cli_text("%s/../share/incise/report/%s.py", cli_folder(),
-				strcmp(what, "compare") ? "report" : what);
-	char *const argv[] = {PYTHON, "-B", script, (char *)what, (char *)folder, NULL};
+	char *script = report_script_path(strcmp(what, "compare") ? "report" : what);
+	char *const argv[] = {REPORT_PYTHON, "-B",	     script,
+			      (char *)what,  (char *)folder, NULL};
 	struct memory_file in = memory_file_begin("page"),
 			   said = memory_file_begin("said");
 	int status, rc = 0;
@@ -46,8 +49,8 @@ int report_script(const char *what, const char *folder, const json_t *data, FILE
 			   fileno(said.file));
 	if (status < 0)
 		rc = incise_error_set(err, errno,
-				      "report: %s: %s; install python3-jinja2", PYTHON,
-				      strerror(errno));
+				      "report: %s: %s; install python3-jinja2",
+				      REPORT_PYTHON, strerror(errno));
 	else if (status)
 		rc = failed(said.file, err);
 	fclose(in.file);

@@ -10,6 +10,11 @@
 #include <stdio.h>
 #include <incise/error.h>
 
+#define REPORT_PYTHON "/usr/bin/python3"
+
+/* Of a script, "measure": free(3). */
+char *report_script_path(const char *name);
+
 /*
  * Run it until it ends. @what: "check", whether it can run; "bench", report.json of a folder as
  * report.md and report.html; "page", @data as HTML into @out, with the plots of the folder;
