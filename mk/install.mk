@@ -5,7 +5,7 @@ headers := $(wildcard lib/include/incise/*.h)
 man_pages := $(wildcard man/*.[1-8])
 scenes := $(wildcard scenes/*.scene scenes/*.fis)
 schemas := $(wildcard schema/*.json)
-report_files := $(addprefix tools/report/,report.py bench.j2 assess.j2 document.css)
+report_files := $(addprefix tools/report/,report.py compare.py measure.py bench.j2 assess.j2 document.css)
 examples := $(wildcard doc/*.example)
 # All but the main page of the headers' reference, which is in that.
 documents := README.md CHANGELOG.md $(filter-out doc/reference.md,$(wildcard doc/*.md doc/*.svg doc/*.png))

@@ -262,16 +262,6 @@ $(O)/tests/tracker_line: tests/bench/tracker_line.c $(emulator) $(O)/lib/libinci
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
 		$(LDFLAGS) -o $@ $^ $(test_libs)
 
-# Pictures into a file, what they cost.
-$(O)/tests/frames: tests/bench/frames.c $(O)/lib/libincise-tests.a
-	@mkdir -p $(@D)
-	$(call step,LD)
-	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
-		$(LDFLAGS) -o $@ $(filter %.c %.a,$^) $(test_libs)
-
-check-frames: $(O)/tests/frames ## CPU per picture and bytes per hour of each format
-	$(O)/tests/frames $(O)/tests
-
 # Virtual rigs with known truth, seen through the module of vision.
 $(O)/tests/calibrate_depth: tests/bench/calibrate_depth.c $(O)/lib/libincise-tests.a | libs
 	@mkdir -p $(@D)
@@ -281,21 +271,6 @@ $(O)/tests/calibrate_depth: tests/bench/calibrate_depth.c $(O)/lib/libincise-tes
 
 check-depth: $(O)/tests/calibrate_depth ## whether stated intervals of depth hold the truth on 200 virtual rigs
 	INCISE_MODULE_PATH=$(O)/lib/incise $(O)/tests/calibrate_depth
-
-# Time that the loop needs to publish its state.
-$(O)/tests/state_tick: tests/bench/state_tick.c $(O)/lib/libincise-tests.a
-	@mkdir -p $(@D)
-	$(call step,LD)
-	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $^ \
-		$(test_libs)
-
-check-state: $(O)/tests/state_tick ## what it costs the loop to tell its state, ns
-	$(O)/tests/state_tick
-
-ROWS ?= 10000000
-check-python-speed: all ## rows/s and memory of streams in Python next to sqlite3; ROWS=100000000
-	INCISE_BUILD=$(abspath $(O)) PYTHONPATH=python PYTHONDONTWRITEBYTECODE=1 \
-		/usr/bin/python3 tests/bench/python_streams.py $(ROWS)
 
 DATA ?=
 SPLITS ?= 4
@@ -327,4 +302,4 @@ check-exhaustive: $(O)/tests/exhaustive ## every pair of 16-bit inputs of the sh
 	$(O)/tests/exhaustive scenes/liver.fis
 	$(O)/tests/exhaustive scenes/liver.fis force
 
-.PHONY: check-corpus check-few-cuts check-python-speed check-exhaustive check-frames check-tracker check-depth check-day check-state
+.PHONY: check-corpus check-few-cuts check-exhaustive check-tracker check-depth check-day

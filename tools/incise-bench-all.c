@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * incise bench all --report DIR: every benchmark of incise bench, one after the other, as one
- * report that anyone can repeat. Each is a program of its own, so that none meets what another
- * has left in memory. A new report is made within the folder, hidden, and takes the old one's
- * place when it is whole.
+ * report that anyone can repeat. tools/report/measure.py runs them. A new report is made within
+ * the folder, hidden, and takes the old one's place when it is whole.
  *
- *   incise-bench WORD --json ─▶ data/WORD.json ─┐
- *                     --plot ─▶ plots/       ├─▶ report.{json,html,md}
+ *   incise-bench NAME --json ─▶ data/NAME.json ─┐
+ *                     --plot ─▶ plots/         ├─▶ report.{json,html,md}
  *
  *   DIR/.unfinished/{data,plots,report.*}  ─▶  DIR/{data,plots,report.*}
  */
@@ -28,9 +27,7 @@
 #include "cli/file.h"
 #include "cli/folder.h"
 #include "cli/json.h"
-#include "cli/plot.h"
 #include "cli/report_script.h"
-#include "cli/stopwatch.h"
 
 /* In the order of the report. */
 static const char *const benchmarks[] = {"precision", "training", "stability", "loop",
@@ -217,167 +214,36 @@ static int write_report(const char *path, json_t *report, struct incise_error *e
 /* --- measurement --- */
 
 #define POLL_US 50000
-#define ASKED_S 20 /* to end what it has started, and itself */
-#define LINES 20   /* of warnings that are kept */
 
-/* Wait for its end, or for ours. */
-static int wait_for(pid_t pid, const char *benchmark, int number, int of)
+/* Into the folder; adds to the report. NULL where it was interrupted, or failed. */
+static json_t *run_benchmarks(const char *folder, json_t *names, bool quick,
+			      json_t *report)
 {
-	double begin_ns = stopwatch_ns();
-	int status = 0;
-
-	while (!child_ended(pid, &status)) {
-		if (cli_stop) {
-			kill(-pid, SIGTERM);
-			return child_end(pid, ASKED_S);
-		}
-		cli_progress("%s (%d of %d): %.0f s", benchmark, number, of,
-			     (stopwatch_ns() - begin_ns) * 1e-9);
-		usleep(POLL_US);
-	}
-	cli_progress_end();
-	return status;
-}
-
-/* Lines of its standard error: warnings, but for the last line of one that failed, which goes to
- * @why. "incise bench: " is clear from where a line stands. */
-static json_t *read_warnings(FILE *said, bool failed, char *why, size_t size)
-{
-	json_t *lines = json_array();
-	char line[600];
-
-	rewind(said);
-	while (fgets(line, sizeof(line), said)) {
-		char *text = line, *colon;
-
-		line[strcspn(line, "\n")] = 0;
-		colon = strncmp(line, "incise ", 7) ? NULL : strstr(line, ": ");
-		text = colon ? colon + 2 : line;
-		if (!strncmp(text, "warning: ", 9))
-			text += 9;
-		/* A hint to --help is for a person at a shell. */
-		if (!*text || !strncmp(text, "Try 'incise ", 12))
-			continue;
-		snprintf(why, size, "%s", text);
-		if (json_array_size(lines) < LINES)
-			json_array_append_new(lines, json_text(text));
-	}
-	if (failed && json_array_size(lines))
-		json_array_remove(lines, json_array_size(lines) - 1);
-	return lines;
-}
-
-static void note(json_t *report, const char *benchmark, const char *state, double seconds,
-		 const char *why, json_t *warnings)
-{
-	if (!strcmp(state, "failed"))
-		json_array_append_new(json_object_get(report, "failed"),
-				      json_string(benchmark));
-	json_object_set_new(json_object_get(report, "runs"), benchmark,
-			    json_pack("{ss sf so so}", "state", state, "seconds", seconds,
-				      "why", *why ? json_text(why) : json_null(),
-				      "warnings", warnings));
-}
-
-/* Its report, and its metrics once more among those of all, named with the benchmark. */
-static void add_report(json_t *report, const char *benchmark, json_t *json)
-{
-	const json_t *metric;
-	size_t i;
-
-	json_object_set(json_object_get(report, "benchmarks"), benchmark, json);
-	json_array_foreach(json_object_get(json, "figures"), i, metric)
-	{
-		const char *name = json_string_value(json_object_get(metric, "name"));
-		json_t *copy;
-
-		if (!json_is_object(metric))
-			continue;
-		copy = json_copy((json_t *)metric);
-		json_object_set_new(copy, "name",
-				    json_sprintf("%s: %s", benchmark, name ? name : ""));
-		json_array_append_new(json_object_get(report, "figures"), copy);
-	}
-}
-
-static bool has_program(const char *benchmark)
-{
-	return !strcmp(benchmark, "view");
-}
-
-/* Start it, and wait; its JSON into a file. */
-static int run_benchmark(const char *benchmark, const char *program, const char *folder,
-			 const char *data, bool quick, FILE *said, int number, int of)
-{
-	char *plot = cli_text("%s/plots/%s", folder, benchmark);
-	const char *argv[8] = {program};
-	int n = 1, status;
-	FILE *out = fopen(data, "we");
-
-	if (!out)
-		cli_fail("%s: %s", data, strerror(errno));
-	/* A benchmark with a program of its own is not named once more. */
-	if (!has_program(benchmark))
-		argv[n++] = benchmark;
-	argv[n++] = "--json";
-	if (quick)
-		argv[n++] = "--quick";
-	if (plot_possible()) {
-		argv[n++] = "--plot";
-		argv[n++] = plot;
-	}
-	status = wait_for(child_start((char *const *)argv, fileno(out), fileno(said)),
-			  benchmark, number, of);
-	fclose(out);
-	free(plot);
-	return status;
-}
-
-/* A benchmark that fails is in the report with its last line, and the others go on. */
-static void measure_one(const char *benchmark, const char *folder, bool quick,
-			json_t *report, int number, int of)
-{
-	char *program = cli_text("%s/incise-bench%s%s", cli_folder(),
-				 has_program(benchmark) ? "-" : "",
-				 has_program(benchmark) ? benchmark : ""),
-	     *data = cli_text("%s/data/%s.json", folder, benchmark);
-	struct memory_file said = memory_file_begin("said");
-	double begin_ns = stopwatch_ns();
-	struct incise_error err = {0};
-	json_t *json, *warnings;
-	char why[600] = "";
+	struct memory_file job = memory_file_begin("job"),
+			   out = memory_file_begin("report");
+	json_t *all = json_pack("{so sO sb so}", "programs", json_text(cli_folder()),
+				"benchmarks", names, "quick", quick, "report", report),
+	       *measured;
+	char *script = report_script_path("measure");
+	char *argv[] = {REPORT_PYTHON, "-B", script, job.path, (char *)folder, NULL};
+	bool ended;
 	int status;
+	pid_t pid;
 
-	if (access(program, X_OK)) {
-		snprintf(why, sizeof(why),
-			 "%s is missing: it is built if its libraries are installed",
-			 strrchr(program, '/') + 1);
-		note(report, benchmark, "left out", 0, why, json_array());
-		goto out_free;
-	}
-	status = run_benchmark(benchmark, program, folder, data, quick, said.file, number,
-			       of);
-	json = json_read(data, &err);
-	warnings = read_warnings(said.file, status != 0, why, sizeof(why));
-	if (WIFSIGNALED(status))
-		snprintf(why, sizeof(why), "ended by a signal: %s",
-			 strsignal(WTERMSIG(status)));
-	else if (!json_is_object(json) && !status)
-		snprintf(why, sizeof(why), "its output is not JSON: %s",
-			 *err.text ? err.text : "no object");
-	else if (!status)
-		*why = 0;
-	note(report, benchmark, *why ? "failed" : "measured",
-	     (stopwatch_ns() - begin_ns) * 1e-9, why, warnings);
-	if (json_is_object(json))
-		add_report(report, benchmark, json);
-	else
-		unlink(data);
-	json_decref(json);
-out_free:
-	fclose(said.file);
-	free(program);
-	free(data);
+	json_dumpf(all, job.file, JSON_COMPACT);
+	memory_file_written(&job);
+	pid = child_start(argv, fileno(out.file), STDERR_FILENO);
+	while (!(ended = child_ended(pid, &status)) && !cli_stop)
+		usleep(POLL_US);
+	if (!ended)
+		child_end(pid, 0);
+	rewind(out.file);
+	measured = !ended || status ? NULL : json_loadf(out.file, 0, NULL);
+	fclose(job.file);
+	fclose(out.file);
+	free(script);
+	json_decref(all);
+	return measured;
 }
 
 static bool wanted(const struct job *job, const char *benchmark)
@@ -435,31 +301,32 @@ static void compare(const char *path, const json_t *old, json_t *report)
 
 	if (!comparison)
 		comparison = json_pack("{so}", "failed", json_text(err.text));
+	json_object_del(comparison, "text");
 	json_object_set_new(comparison, "file", json_text(path));
 	json_object_set_new(report, "against", comparison);
 }
 
 static json_t *measure(const struct job *job)
 {
-	json_t *old = job->against ? compare_load(job->against) : NULL, *report;
+	json_t *old = job->against ? compare_load(job->against) : NULL;
+	json_t *names = json_array(), *report;
 	struct incise_error err = {0};
 	struct folder folder;
-	int n = 0, of = 0;
 
 	/* Before minutes of work. */
 	if (report_script("check", NULL, NULL, NULL, &err))
 		cli_fail_with(&err);
 	folder = folder_begin(job->folder);
-	report = begin_report(job);
 	for (int i = 0; i < BENCHMARKS; i++)
-		of += wanted(job, benchmarks[i]);
-	for (int i = 0; i < BENCHMARKS && !cli_stop; i++)
 		if (wanted(job, benchmarks[i]))
-			measure_one(benchmarks[i], folder.unfinished, job->quick, report,
-				    ++n, of);
-	if (cli_stop) {
+			json_array_append_new(names, json_string(benchmarks[i]));
+	report = run_benchmarks(folder.unfinished, names, job->quick, begin_report(job));
+	json_decref(names);
+	if (!report) {
 		folder_abandon(&folder);
-		cli_fail("%s: %s is unchanged", strsignal(cli_stop), job->folder);
+		cli_fail("%s: %s is unchanged",
+			 cli_stop ? strsignal(cli_stop) : "its script failed",
+			 job->folder);
 	}
 	if (old)
 		compare(job->against, old, report);

@@ -102,6 +102,7 @@ static _Noreturn void compare(const struct bench_run *run, int argc, char **argv
 {
 	struct incise_error err = {0};
 	json_t *reports[2], *comparison;
+	int worse;
 
 	if (argc != 3)
 		cli_usage("expected 'compare' and two reports");
@@ -116,7 +117,9 @@ static _Noreturn void compare(const struct bench_run *run, int argc, char **argv
 		compare_reports(reports[0], argv[1], reports[1], argv[2], &err), &err);
 	json_decref(reports[0]);
 	json_decref(reports[1]);
-	compare_finish(comparison, run->json);
+	worse = compare_print(comparison, run->json);
+	if (worse)
+		compare_fail(worse);
 	exit(0);
 }
 

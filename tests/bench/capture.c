@@ -209,7 +209,6 @@ struct row {
 	double held_up; /* share of the time that wakes were late, by a period or more */
 	double rss_MB[2];   /* memory at a quarter of the time, and at its end */
 	double verify_MB_s; /* of its recording; NAN: it made none */
-	bool done;
 	struct incise_recorder_stats stats; /* without a recorder only counts */
 	struct incise_tracker_info tracker_info;
 	struct incise_force_info force_info;
@@ -411,12 +410,11 @@ static int run_part(struct row *row, const struct part *part, const char *folder
 		rc = verify(row, path, err);
 	}
 	row->name = part->name;
-	row->done = true;
 	return rc ? rc : ended;
 }
 
 /* All runs; the recordings go into a folder that is gone afterwards, come what may. */
-static void run_all(struct row *rows, const char *only, double seconds)
+static void run_all(struct row *rows, double seconds)
 {
 	struct incise_error err = {0};
 	char folder[PATH_MAX - 80];
@@ -424,8 +422,6 @@ static void run_all(struct row *rows, const char *only, double seconds)
 
 	folder_make(folder, sizeof(folder), "for the recording");
 	for (int i = 0; i < N(parts) && !rc && !cli_stop; i++) {
-		if (only && strcmp(only, parts[i].name))
-			continue;
 		cli_progress("%s, %.2g s", parts[i].name, seconds);
 		rc = run_part(&rows[i], &parts[i], folder, seconds, &err);
 	}
@@ -502,33 +498,23 @@ static const struct bench_table rows_table = {
 		    METRIC(MEASURED, row, memory, "MB", "{name} memory")},
 };
 
-/* Rows of runs that were done, one after the other. Returns how many. */
-static int set_rows(struct row *rows, struct row *done)
+static void set_rows(struct row *rows)
 {
-	int n = 0;
-
 	for (int i = 0; i < N(parts); i++) {
-		const struct row *base = &rows[parts[i].base];
-		struct row *row = &done[n];
+		struct row *row = &rows[i];
 
-		if (!rows[i].done)
-			continue;
-		*row = rows[i];
 		/* Of the capture alone: without the cost of the virtual rig. */
-		row->net_percent =
-			base->done ? row->cpu_percent - base->cpu_percent : NAN;
+		row->net_percent = row->cpu_percent - rows[parts[i].base].cpu_percent;
 		harness_spread(row->part_percent, row->parts, &row->cpu);
 		row->memory = (struct harness_spread){
 			.median = row->rss_MB[1],
 			.low = fmin(row->rss_MB[0], row->rss_MB[1]),
 			.high = fmax(row->rss_MB[0], row->rss_MB[1]),
 		};
-		n++;
 	}
-	return n;
 }
 
-static void report(struct bench_run *run, const struct row *rows, int n, double seconds)
+static void report(struct bench_run *run, const struct row *rows, double seconds)
 {
 	const struct incise_camera_info *info = &rows->camera_info;
 	const double percent = seal_percent();
@@ -538,42 +524,34 @@ static void report(struct bench_run *run, const struct row *rows, int n, double 
 		     "camera_hz", info->rate_hz, "width", info->width, "height",
 		     info->height, "unlooked", (json_int_t)rows->stats.frames_unlooked,
 		     "seal_percent", percent);
-	bench_rows(run, &rows_table, rows, n);
+	bench_rows(run, &rows_table, rows, N(parts));
 }
 
 static void run(struct bench_run *run)
 {
-	static struct row rows[N(parts)], done[N(parts)]; /* large */
-	const char *only = run->n_operands ? run->operands[0] : NULL;
+	static struct row rows[N(parts)]; /* large */
 	double seconds = run->quick ? QUICK_SECONDS : SECONDS;
-	int n = 0;
 
-	while (only && n < N(parts) && strcmp(only, parts[n].name))
-		n++;
-	if (n == N(parts))
-		cli_usage("'%s' is no run of capture", only);
 	if (run->seconds > 0)
 		seconds = run->seconds;
 	/* Coding frames takes a second where others are busy. */
 	cli_catch_signals();
 	code_all();
-	run_all(rows, only, seconds);
-	n = set_rows(rows, done);
-	report(run, done, n, seconds);
+	run_all(rows, seconds);
+	set_rows(rows);
+	report(run, rows, seconds);
 	for (int i = 0; i < FRAMES; i++)
 		free(camera.frame[i].bytes);
-	for (int i = 0; i < n; i++)
-		if (done[i].held_up > HELD_UP)
+	for (int i = 0; i < N(parts); i++)
+		if (rows[i].held_up > HELD_UP)
 			cli_warn("%s: the machine held it up for %.0f %% of the time; "
 				 "close other programs and measure again",
-				 done[i].name, 100 * done[i].held_up);
+				 rows[i].name, 100 * rows[i].held_up);
 }
 
 const struct bench bench_program = {
 	.name = "capture",
-	.operands = "[RUN]",
 	.summary = "processor load of a capture of all streams",
-	.n_operands = 1,
 	.takes_duration = true,
 	.run = run,
 };

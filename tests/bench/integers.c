@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * the plan in integers, which the kernel runs, against the same plan in double:
- * time of a tick, and how far their forces are from each other, next to the certified bound.
+ * the plan in integers, which the kernel runs, against the same plan in double: how far their
+ * forces are from each other, next to the certified bound.
  *
  * Both walk along the same varied strokes (trajectory.h). Where one of them is in another phase, with
  * another tool, or on the other side of a flag than the other, as at the tick at which a contact
@@ -15,7 +15,6 @@
 #include "../../lib/base/vector.h"
 #include "../../tools/cli/scene_argument.h"
 #include "program.h"
-#include "../../tools/bench/harness.h"
 #include "../../tools/bench/trajectory.h"
 
 #define SCENES_MAX 16
@@ -25,18 +24,11 @@
 
 #define TICKS 1000000
 #define QUICK_TICKS 60000
-#define TURNS 101
-#define QUICK_TURNS 9
-#define TIMED_STROKES 3
 
 struct row {
 	const char *name, *path;
 	struct incise_scene *scene[2]; /* double, integers */
 	struct incise_plan *plan[2];
-	struct walk walk[2];
-	struct trajectory timed;
-	struct harness_time time[2];
-	double ratio;
 	long ticks, contact, apart;
 	double sum2, rms_mN, most_mN, bound_mN, apart_most_mN;
 	bool holds;
@@ -72,19 +64,12 @@ static void open_row(struct row *row)
 {
 	struct incise_error err = {0};
 
-	row->time[0].ns.median = row->time[1].ns.median = NAN;
-	row->ratio = row->rms_mN = row->most_mN = row->bound_mN = row->apart_most_mN =
-		NAN;
+	row->rms_mN = row->most_mN = row->bound_mN = row->apart_most_mN = NAN;
 	if (!open_plan(row, 0, &err) || !open_plan(row, 1, &err)) {
 		snprintf(row->failed, sizeof(row->failed), "%s", err.text);
 		return;
 	}
 	row->bound_mN = 1e3 * incise_plan_bound(row->plan[1], REACH_MM);
-	trajectory_make(&row->timed, row->scene[0], row->plan[0], TIMED_STROKES,
-			inserts(row->plan[0]), false);
-	for (int i = 0; i < 2; i++)
-		row->walk[i] =
-			(struct walk){.trajectory = &row->timed, .plan = row->plan[i]};
 }
 
 /* cos 60°: normals farther apart are of two sides of a tissue, as where it was gone through. */
@@ -138,48 +123,26 @@ static void compare_tick(struct row *row, struct judge *judge,
 
 static void compare(struct row *row, long ticks)
 {
-	long each = row->timed.ticks / row->timed.strokes;
+	int strokes = (int)(ticks / incise_scene_rate_hz(row->scene[0])) + 1;
 	struct trajectory trajectory;
+	struct walk walk[2];
 	struct judge judge = {0};
 
 	row->most_mN = row->apart_most_mN = 0;
-	trajectory_make(&trajectory, row->scene[0], row->plan[0], (int)(ticks / each) + 1,
+	trajectory_make(&trajectory, row->scene[0], row->plan[0], strokes,
 			inserts(row->plan[0]), true);
 	for (int i = 0; i < 2; i++)
-		walk_change(&row->walk[i], &trajectory);
+		walk[i] = (struct walk){.trajectory = &trajectory, .plan = row->plan[i]};
 	for (long k = 0; k < trajectory.ticks; k++) {
 		struct incise_tick tick[2];
 
 		for (int i = 0; i < 2; i++)
-			incise_plan_tick(row->plan[i], walk_feed(&row->walk[i]),
-					 &tick[i]);
+			incise_plan_tick(row->plan[i], walk_feed(&walk[i]), &tick[i]);
 		compare_tick(row, &judge, &tick[0], &tick[1]);
 	}
-	for (int i = 0; i < 2; i++)
-		walk_change(&row->walk[i], &row->timed);
 	row->rms_mN = sqrt(row->sum2 / (double)(row->ticks - row->apart));
 	row->holds = row->most_mN <= row->bound_mN;
 	free(trajectory.poses);
-}
-
-static void time_all(struct rows *all, bool quick)
-{
-	struct harness_variant variants[2 * SCENES_MAX];
-
-	for (int i = 0; i < 2 * all->n; i++) {
-		struct row *row = &all->row[i / 2];
-
-		variants[i] = (struct harness_variant){
-			.run = walk_run,
-			.context = &row->walk[i % 2],
-			.units = *row->failed ? 0 : row->timed.ticks,
-			.time = &row->time[i % 2],
-		};
-	}
-	harness_times(variants, 2 * all->n, quick ? QUICK_TURNS : TURNS);
-	for (int i = 0; i < all->n; i++)
-		all->row[i].ratio =
-			all->row[i].time[1].ns.median / all->row[i].time[0].ns.median;
 }
 
 static const struct bench_table table = {
@@ -188,9 +151,6 @@ static const struct bench_table table = {
 	.columns =
 		{
 			COLUMN(row, "name", name),
-			COLUMN(row, "double_ns", time[0].ns.median),
-			COLUMN(row, "integers_ns", time[1].ns.median),
-			COLUMN(row, "ratio", ratio),
 			COLUMN(row, "rms_error_N", rms_mN, .scale = 1e-3),
 			COLUMN(row, "max_error_N", most_mN, .scale = 1e-3),
 			COLUMN(row, "bound_N", bound_mN, .scale = 1e-3),
@@ -201,13 +161,7 @@ static const struct bench_table table = {
 			COLUMN(row, "apart_max_error_N", apart_most_mN, .scale = 1e-3),
 			COLUMN(row, "failed", failed),
 		},
-	.metrics =
-		{
-			METRIC(TIME, row, time[0], .unit = "ns",
-			       .name = "{name}, double"),
-			METRIC(TIME, row, time[1], .unit = "ns",
-			       .name = "{name}, integers"),
-		},
+	.metrics = {METRIC(EXACT, row, most_mN, "mN", "{name}, largest")},
 };
 
 static void add(struct rows *all, const char *name, size_t length, const char *path)
@@ -250,7 +204,6 @@ static void run_integers(struct bench_run *run)
 		if (!*row->failed)
 			compare(row, run->quick ? QUICK_TICKS : TICKS);
 	}
-	time_all(all, run->quick);
 	bench_rows(run, &table, all->row, all->n);
 	for (int i = 0; i < all->n; i++) {
 		if (*all->row[i].failed)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * error of the pose that the loop is given, over the tracker's rate and
- * delay and over its cost.
+ * delay.
  *
  *   true      ────────────────────────────────────────
  *   poses       |       |       x       |                x: lost
@@ -18,21 +18,16 @@
 #include "../../lib/base/vector.h"
 #include "../../lib/control/predict.h"
 #include "program.h"
-#include "../../tools/cli/stopwatch.h"
 #include "../../tools/bench/noise.h"
 
 #define TICKS 16000
 #define QUICK_TICKS 3500
-#define TIMED_TICKS 2000
-#define REPEATS 101
-#define QUICK_REPEATS 21 /* 20 resolve the 5th and the 95th percentile */
 
 static const double rates_hz[] = {60, 120, 240, 1000};
 static const double delays_ms[] = {4, 12};
 static const double gaps_ms[] = {25, 50, 100, 200, 500};
 
-/* Losses and costs are measured at these, and metrics are of them. */
-#define USUAL_RATE 1
+/* Losses are measured at these, and metrics are of them. */
 #define USUAL_HZ 120
 #define USUAL_MS 4
 
@@ -41,7 +36,6 @@ static const double gaps_ms[] = {25, 50, 100, 200, 500};
  *   line      ╱        30 mm/s, for ever
  *   tremor    ∿∿∿∿     ±0.1 mm at 8, 10 and 12 Hz, one on each axis
  *   stroke    ╭─╮_╭─   40 mm and back, 10 mm deep, up to 94 mm/s; the hand leans
- *   wall      ╲__╱     60 mm/s, and stopped dead in no time
  *   surgeon            two cuts of the virtual rig, with its tremor
  */
 
@@ -105,35 +99,14 @@ static void stroke_motion(double t_s, struct state *state)
 	lean(state, 1, 0.3 * way.at);
 }
 
-/* Faster and faster for 0.2 s, evenly for another, stopped; from 0.6 s on back. */
-static void wall_motion(double t_s, struct state *state)
-{
-	double u = fmod(t_s, 1), *z = &state->position_mm[2],
-	       *v = &state->velocity_mm_s[2];
-
-	if (u < 0.2) {
-		*z = 18 - 150 * u * u;
-		*v = -300 * u;
-	} else if (u < 0.4) {
-		*z = 12 - 60 * (u - 0.2);
-		*v = -60;
-	} else if (u >= 0.6) {
-		struct curve way = least_jerk(fmin((u - 0.6) / 0.35, 1));
-
-		*z = 18 * way.at;
-		*v = 18 * way.slope / 0.35;
-	}
-}
-
 static const struct motion {
-	const char *name, *panel;		     /* of a plot: name and what it is */
+	const char *name;
 	void (*at)(double t_s, struct state *state); /* NULL: the virtual surgeon's */
 } motions[] = {
-	{"line", "line: 30 mm/s", line_motion},
-	{"tremor", "tremor: 0.1 mm at 8, 10 and 12 Hz", tremor_motion},
-	{"stroke", "stroke: 40 mm and back, up to 94 mm/s", stroke_motion},
-	{"wall", "wall: 60 mm/s, stopped dead", wall_motion},
-	{"surgeon", "surgeon: two cuts of the simulated rig", NULL},
+	{"line", line_motion},
+	{"tremor", tremor_motion},
+	{"stroke", stroke_motion},
+	{"surgeon", NULL},
 };
 #define STROKE (&motions[2])
 
@@ -362,12 +335,9 @@ static void track_end(struct track *track)
 struct method {
 	const char *name;
 	/* Returns a state that free(3) releases. */
-	void *(*start)(const struct method *method,
-		       const struct incise_tracker_info *info);
+	void *(*start)(const struct incise_tracker_info *info);
 	void (*add)(void *state, const struct incise_tracker_sample *sample);
 	void (*at)(const void *state, int64_t t_ns, struct state *shown);
-	double noise_mm; /* given to the library; 0: it is not */
-	bool punctual;	 /* it assumes that the tracker is not late */
 };
 
 #define LAST 6
@@ -384,12 +354,10 @@ struct last {
 	double x[3], v[3], a[3];
 };
 
-static void *last_start(const struct method *method,
-			const struct incise_tracker_info *info)
+static void *last_start(const struct incise_tracker_info *info)
 {
 	struct last *last = cli_alloc(1, sizeof(*last));
 
-	(void)method;
 	last->rate_hz = info->rate_hz;
 	last->latency_ns = info->latency_ns;
 	last->quaternion[0] = 1;
@@ -423,19 +391,6 @@ static void held_at(const void *state, int64_t t_ns, struct state *shown)
 	v3_copy(shown->position_mm, last->x);
 	memset(shown->velocity_mm_s, 0, sizeof(shown->velocity_mm_s));
 	memcpy(shown->quaternion, last->quaternion, sizeof(last->quaternion));
-}
-
-static void line_add(void *state, const struct incise_tracker_sample *sample)
-{
-	struct last *last = state;
-	double per_s;
-
-	last_take(last, sample, 2);
-	if (last->n < 2)
-		return;
-	per_s = last->rate_hz / (double)(last->seq[0] - last->seq[1]);
-	for (int i = 0; i < 3; i++)
-		last->v[i] = (last->x[i] - last->position_mm[1][i]) * per_s;
 }
 
 /* Least squares in time and its square, through the normal equations: six points in about
@@ -488,15 +443,11 @@ static void last_at(const void *state, int64_t t_ns, struct state *shown)
 	memcpy(shown->quaternion, last->quaternion, sizeof(last->quaternion));
 }
 
-static void *library_start(const struct method *method,
-			   const struct incise_tracker_info *info)
+static void *library_start(const struct incise_tracker_info *info)
 {
-	struct incise_tracker_info assumed = *info;
 	struct incise_predict *predict = cli_alloc(1, sizeof(*predict));
 
-	if (method->punctual)
-		assumed.latency_ns = 0;
-	incise_predict_init(predict, &assumed, method->noise_mm);
+	incise_predict_init(predict, info, 0);
 	return predict;
 }
 
@@ -511,29 +462,24 @@ static void library_at(const void *state, int64_t t_ns, struct state *shown)
 			  shown->quaternion);
 }
 
-#define METHODS 7
-static const struct method methods[METHODS + 1] = {
-	{"held", last_start, held_add, held_at, 0, false},
-	{"line", last_start, line_add, last_at, 0, false},
-	{"parabola", last_start, fit_add, last_at, 0, false},
-	{"library", library_start, library_add, library_at, 0, false},
-	{"library_5um", library_start, library_add, library_at, 0.005, false},
-	{"library_100um", library_start, library_add, library_at, 0.1, false},
-	{"library_punctual", library_start, library_add, library_at, 0, true},
+static const struct method methods[] = {
+	{"held", last_start, held_add, held_at},
+	{"parabola", last_start, fit_add, last_at},
+	{"library", library_start, library_add, library_at},
 	{.name = "exact_delayed"}, /* the true pose of the delay before */
 };
 
-/* Show all ticks of a track; into one state, or with @all into one for each. */
+/* What it shows at each tick of a track. */
 static void show(const struct track *track, const struct method *method,
-		 struct state *shown, bool all)
+		 struct state *shown)
 {
-	void *state = method->start(method, &track->info);
+	void *state = method->start(&track->info);
 	int come = 0;
 
 	for (int k = 0; k < track->condition.ticks; k++) {
 		while (come < track->n && track->samples[come].t_ns <= track->t_ns[k])
 			method->add(state, &track->samples[come++]);
-		method->at(state, track->t_ns[k], &shown[all ? k : 0]);
+		method->at(state, track->t_ns[k], &shown[k]);
 	}
 	free(state);
 }
@@ -541,21 +487,17 @@ static void show(const struct track *track, const struct method *method,
 /* --- error --- */
 
 struct norms {
-	double rms, p99, max;
+	double rms, max;
 };
 
 /* Rows of a condition stand together, a row per method. */
-#define ROWS (METHODS + 1)
+#define ROWS N(methods)
 
 struct row {
-	const char *name, *motion, *panel;
+	const char *name, *motion;
 	double tracker_hz, delay_ms, gap_ms;
-	struct harness_time time; /* of a tick, with the poses that come meanwhile */
 	struct norms place_mm, velocity_mm_s, turn_deg;
-	double jump_mm; /* from tick to tick, against the true motion: the largest */
 	double theory_mm; /* rms of velocity · age and of noise: the error of a held pose */
-	double spread_mm; /* rms of the motion about its mean */
-	char failed[160]; /* why it is of no use, or empty */
 };
 
 static double distance(const double a[3], const double b[3])
@@ -577,96 +519,41 @@ static double angle_deg(const double p[4], const double q[4])
 	return 4 * asin(fmin(sqrt(sum) / 2, 1)) * 180 / M_PI;
 }
 
-/* Of n errors, which are sorted. */
-static struct norms norms(double *errors, int n)
+static void add_error(struct norms *norms, double error, int n)
 {
-	double sum2 = 0;
-
-	for (int i = 0; i < n; i++)
-		sum2 += errors[i] * errors[i];
-	stopwatch_sort(errors, n);
-	return (struct norms){sqrt(sum2 / n), stopwatch_quantile(errors, n, 0.99),
-			      errors[n - 1]};
+	norms->rms = sqrt(norms->rms * norms->rms + error * error / n);
+	norms->max = fmax(norms->max, error);
 }
 
-/* Of the ticks that count, whatever is shown. */
-static void measure_truth(const struct track *track, struct row *row)
+/* Of the ticks that count. */
+static void measure_row(const struct track *track, const struct method *method,
+			struct row *row)
 {
 	static const double rest[3];
-	double mean[3] = {0}, theory2 = 0, spread2 = 0;
-	int n = 0;
+	int ticks = track->condition.ticks, n = 0;
+	struct state *own = cli_alloc(ticks, sizeof(*own)),
+		     *shown = method->start ? own : track->late;
+	double theory2 = 3 * NOISE_MM * NOISE_MM;
 
-	for (int k = 0; k < track->condition.ticks; k++)
-		if (track->counts[k]) {
-			v3_add(mean, mean, 1, track->truth[k].position_mm);
-			n++;
-		}
-	for (int i = 0; i < 3; i++)
-		mean[i] /= n;
-	for (int k = 0; k < track->condition.ticks; k++) {
-		double gone =
-			distance(track->truth[k].velocity_mm_s, rest) * track->age_s[k];
+	if (method->start)
+		show(track, method, shown);
+	for (int k = 0; k < ticks; k++)
+		n += track->counts[k];
+	for (int k = 0; k < ticks; k++) {
+		const struct state *is = &track->truth[k];
+		double gone = distance(is->velocity_mm_s, rest) * track->age_s[k];
 
 		if (!track->counts[k])
 			continue;
 		theory2 += gone * gone / n;
-		spread2 += pow(distance(track->truth[k].position_mm, mean), 2) / n;
+		add_error(&row->place_mm, distance(shown[k].position_mm, is->position_mm),
+			  n);
+		add_error(&row->velocity_mm_s,
+			  distance(shown[k].velocity_mm_s, is->velocity_mm_s), n);
+		add_error(&row->turn_deg, angle_deg(shown[k].quaternion, is->quaternion),
+			  n);
 	}
-	row->theory_mm = sqrt(theory2 + 3 * NOISE_MM * NOISE_MM);
-	row->spread_mm = sqrt(spread2);
-}
-
-static double jump_mm(const struct track *track, const struct state *shown)
-{
-	const struct state *truth = track->truth;
-	double most = 0;
-
-	for (int k = 1; k < track->condition.ticks; k++) {
-		double stepped[3], gone[3];
-
-		v3_sub(stepped, shown[k].position_mm, shown[k - 1].position_mm);
-		v3_sub(gone, truth[k].position_mm, truth[k - 1].position_mm);
-		if (track->counts[k] && track->counts[k - 1])
-			most = fmax(most, distance(stepped, gone));
-	}
-	return most;
-}
-
-static void measure_row(const struct track *track, const struct method *method,
-			struct row *row)
-{
-	int ticks = track->condition.ticks, n = 0;
-	struct state *own = cli_alloc(ticks, sizeof(*own)),
-		     *shown = method->start ? own : track->late;
-	double *place = cli_alloc(3 * (size_t)ticks, sizeof(*place)),
-	       *speed = place + ticks, *turn = speed + ticks;
-
-	if (method->start)
-		show(track, method, shown, true);
-	for (int k = 0; k < ticks; k++) {
-		const struct state *is = &track->truth[k];
-
-		if (!track->counts[k])
-			continue;
-		place[n] = distance(shown[k].position_mm, is->position_mm);
-		speed[n] = distance(shown[k].velocity_mm_s, is->velocity_mm_s);
-		turn[n] = angle_deg(shown[k].quaternion, is->quaternion);
-		n++;
-	}
-	measure_truth(track, row);
-	row->place_mm = norms(place, n);
-	row->velocity_mm_s = norms(speed, n);
-	row->turn_deg = norms(turn, n);
-	row->jump_mm = jump_mm(track, shown);
-	if (!isfinite(row->place_mm.rms + row->velocity_mm_s.rms + row->turn_deg.rms))
-		snprintf(row->failed, sizeof(row->failed), "a pose is not a number");
-	else if (row->place_mm.rms > row->spread_mm)
-		snprintf(
-			row->failed, sizeof(row->failed),
-			"worse than no tracker: error %.3g mm, that of the constant mean "
-			"position %.3g mm",
-			row->place_mm.rms, row->spread_mm);
-	free(place);
+	row->theory_mm = sqrt(theory2);
 	free(own);
 }
 
@@ -674,105 +561,46 @@ static void measure_row(const struct track *track, const struct method *method,
 
 static struct row rows[N(motions) * N(delays_ms) * N(rates_hz) * ROWS];
 static struct row losses[N(gaps_ms) * ROWS];
-static struct harness_time times[N(rates_hz)][METHODS];
-
 /* A row per method. */
-static void measure(const struct condition *c, int rate, struct row *row)
+static void measure(const struct condition *c, struct row *row)
 {
 	struct track track = track_begin(c);
 
 	for (int i = 0; i < ROWS; i++, row++) {
 		*row = (struct row){.name = methods[i].name,
 				    .motion = c->motion->name,
-				    .panel = c->motion->panel,
 				    .tracker_hz = c->tracker_hz,
 				    .delay_ms = c->delay_ms,
 				    .gap_ms = c->gap_ms};
-		if (i < METHODS)
-			row->time = times[rate][i];
-		else
-			row->time.ns = HARNESS_SPREAD_NONE;
 		measure_row(&track, &methods[i], row);
 	}
 	track_end(&track);
 }
 
-struct timed {
-	const struct track *track;
-	const struct method *method;
-};
-
-static void run_timed(void *context)
-{
-	const struct timed *timed = context;
-	struct state shown;
-
-	show(timed->track, timed->method, &shown, false);
-}
-
-static void measure_times(int repeats)
-{
-	struct harness_variant variants[N(rates_hz) * METHODS];
-	struct timed timed[N(variants)];
-	struct track tracks[N(rates_hz)];
-
-	for (int r = 0; r < N(rates_hz); r++)
-		tracks[r] = track_begin(&(struct condition){.motion = STROKE,
-							    .delay_ms = USUAL_MS,
-							    .tracker_hz = rates_hz[r],
-							    .gap_ms = NAN,
-							    .ticks = TIMED_TICKS});
-	for (int i = 0; i < N(variants); i++) {
-		timed[i] = (struct timed){&tracks[i / METHODS], &methods[i % METHODS]};
-		variants[i] = (struct harness_variant){
-			.run = run_timed,
-			.context = &timed[i],
-			.units = TIMED_TICKS,
-			.time = &times[i / METHODS][i % METHODS],
-		};
-	}
-	harness_times(variants, N(variants), repeats);
-	for (int r = 0; r < N(rates_hz); r++)
-		track_end(&tracks[r]);
-}
-
 static const struct bench_table rows_table = {
 	.key = "rows",
 	.row_bytes = sizeof(struct row),
-	.columns = {COLUMN(row, "name", name),
-		    COLUMN(row, "motion", motion),
+	.columns = {COLUMN(row, "name", name), COLUMN(row, "motion", motion),
 		    COLUMN(row, "tracker_hz", tracker_hz),
 		    COLUMN(row, "delay_ms", delay_ms),
 		    COLUMN(row, "rms_error_mm", place_mm.rms),
-		    COLUMN(row, "p99_error_mm", place_mm.p99),
 		    COLUMN(row, "max_error_mm", place_mm.max),
-		    COLUMN(row, "jump_mm", jump_mm),
 		    COLUMN(row, "rms_error_mm_s", velocity_mm_s.rms),
-		    COLUMN(row, "p99_error_mm_s", velocity_mm_s.p99),
 		    COLUMN(row, "max_error_mm_s", velocity_mm_s.max),
 		    COLUMN(row, "rms_error_deg", turn_deg.rms),
-		    COLUMN(row, "p99_error_deg", turn_deg.p99),
 		    COLUMN(row, "max_error_deg", turn_deg.max),
 		    COLUMN(row, "held_theory_mm", theory_mm),
-		    COLUMN(row, "spread_mm", spread_mm),
-		    COLUMN(row, "ns", time.ns.median),
-		    COLUMN(row, "ns_p5", time.ns.p5),
-		    COLUMN(row, "ns_p95", time.ns.p95),
-		    COLUMN(row, "gap_ms", gap_ms),
-		    COLUMN(row, "failed", failed)},
-	.metrics = {METRIC(TIME, row, time, "ns", "{name}, {tracker_hz} Hz",
-			   "motion=line,delay_ms=4"),
-		    METRIC(EXACT, row, place_mm.rms, "mm", "{name}, {motion}, rms",
+		    COLUMN(row, "gap_ms", gap_ms)},
+	.metrics = {METRIC(EXACT, row, place_mm.rms, "mm", "{name}, {motion}, rms",
 			   "tracker_hz=120,delay_ms=4")},
 };
 
 static void run(struct bench_run *run)
 {
 	static struct bench_table losses_table;
-	int repeats = run->quick ? QUICK_REPEATS : REPEATS, i = 0;
+	int i = 0;
 	struct condition c = {.gap_ms = NAN, .ticks = run->quick ? QUICK_TICKS : TICKS};
 
-	measure_times(repeats);
 	for (int m = 0; m < N(motions); m++)
 		for (int d = 0; d < N(delays_ms); d++)
 			for (int r = 0; r < N(rates_hz); r++, i += ROWS) {
@@ -781,19 +609,18 @@ static void run(struct bench_run *run)
 				c.tracker_hz = rates_hz[r];
 				cli_progress("%s, %g ms late, %g Hz", c.motion->name,
 					     c.delay_ms, c.tracker_hz);
-				measure(&c, r, &rows[i]);
+				measure(&c, &rows[i]);
 			}
 	c.motion = STROKE;
 	c.delay_ms = USUAL_MS;
 	c.tracker_hz = USUAL_HZ;
 	for (int g = 0; g < N(gaps_ms); g++) {
 		c.gap_ms = gaps_ms[g];
-		measure(&c, USUAL_RATE, &losses[g * ROWS]);
+		measure(&c, &losses[g * ROWS]);
 	}
 	cli_progress_end();
-	bench_values(run, "{sf sf sf sf si}", "noise_mm", NOISE_MM, "jitter_ms",
-		     JITTER_MS, "lost", LOST, "seconds", c.ticks * 1e-3, "repeats",
-		     repeats);
+	bench_values(run, "{sf sf sf sf}", "noise_mm", NOISE_MM, "jitter_ms", JITTER_MS,
+		     "lost", LOST, "seconds", c.ticks * 1e-3);
 	losses_table = rows_table;
 	losses_table.key = "losses";
 	memset(losses_table.metrics, 0, sizeof(losses_table.metrics));

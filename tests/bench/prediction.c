@@ -16,6 +16,7 @@
 #include <incise/sim.h>
 #include "program.h"
 #include "../../tools/bench/noise.h"
+#include "../../tools/cli/stopwatch.h"
 
 #define CUTS 12	   /* of a rig */
 #define ROWS 40	   /* of a cut */
@@ -280,13 +281,6 @@ static double share_within(struct rig *rigs, int n, bool with, uint64_t seed,
 	return (double)inside / NEW_RIGS / pairs;
 }
 
-static int ascending(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
 static void measure_row(struct row *row, int rigs, int models, uint64_t seed)
 {
 	struct rig *train = cli_alloc(RIGS_MAX, sizeof(*train));
@@ -309,7 +303,7 @@ static void measure_row(struct row *row, int rigs, int models, uint64_t seed)
 	row->data_N /= models;
 	row->model_N /= models;
 	row->calibration_N /= models;
-	qsort(share, (size_t)models, sizeof(*share), ascending);
+	stopwatch_sort(share, models);
 	row->low_percent = 100 * share[models / 20];
 	row->high_percent = 100 * share[models - 1 - models / 20];
 	free(share);

@@ -19,16 +19,11 @@
 #include <incise/plan.h>
 #include "../../lib/sim/sim.h"
 #include "../../tools/cli/file.h"
-#include "../../tools/cli/tick_cost.h"
 #include "program.h"
 
 /* Whole numbers of ns, and multiples of all rates. */
 #define POINT_HZ 64000
 #define QUICK_POINT_HZ 16000
-
-/* Of the stroke's time that the cost of a tick is taken of. */
-#define COST_S 20
-#define QUICK_COST_S 2
 
 static const int rates_hz[] = {250, 500, 1000, 2000, 4000, 8000};
 
@@ -54,8 +49,6 @@ struct rate_row {
 	double stiffness_N_mm, limit_N_mm; /* limit: NaN where it is not known */
 	struct rate_error command, rendered;
 	double hold_N;	  /* rms of an ideal sample and hold */
-	double tick_ns;	  /* median */
-	double ns_per_s;  /* of haptics */
 	char failed[512]; /* why it was not measured; else empty */
 };
 
@@ -206,10 +199,8 @@ static void measure_rate(const struct cut_series *s, bool quick, struct rate_row
 {
 	struct exact_tracker tracker = {.rate_hz = row->rate_hz};
 	struct incise_error err = {0};
-	struct incise_tracker_info info;
 	struct incise_scene *scene = plain_wall(row);
 	struct incise_rig *rig;
-	struct tick_cost cost;
 	char spec[80];
 
 	snprintf(spec, sizeof(spec), "sim:clock=simulated,depth_mm=%g,times=1",
@@ -226,15 +217,9 @@ static void measure_rate(const struct cut_series *s, bool quick, struct rate_row
 		exact = &tracker;
 		incise_rig_tracker(rig)->ops = &tracker.ops;
 	}
-	incise_tracker_info(incise_rig_tracker(rig), &info);
 	run_plan(scene, rig, quick ? QUICK_POINT_HZ : POINT_HZ, row);
-	if (*row->failed) {
+	if (*row->failed)
 		row->command = row->rendered = (struct rate_error){NAN, NAN, NAN};
-	} else {
-		tick_cost(scene, &info, 0, quick ? QUICK_COST_S : COST_S, &cost);
-		row->tick_ns = cost.median;
-		row->ns_per_s = cost.median * row->rate_hz;
-	}
 	if (s->exact)
 		incise_rig_tracker(rig)->ops = tracker.before;
 	incise_rig_close(rig);
@@ -253,9 +238,7 @@ static void measure_rates(bool quick)
 					     .rate_hz = rates_hz[i % N(rates_hz)],
 					     .stiffness_N_mm = s->stiffness_N_mm,
 					     .limit_N_mm = NAN,
-					     .hold_N = NAN,
-					     .tick_ns = NAN,
-					     .ns_per_s = NAN};
+					     .hold_N = NAN};
 		cli_progress("%s, %s poses, %g Hz", s->wall, s->poses, rates[i].rate_hz);
 		measure_rate(s, quick, &rates[i]);
 	}
@@ -276,8 +259,6 @@ static const struct bench_table rates_table = {
 		    COLUMN(rate_row, "rendered.max_error_N", rendered.max_N),
 		    COLUMN(rate_row, "rendered.relative", rendered.relative),
 		    COLUMN(rate_row, "hold_N", hold_N),
-		    COLUMN(rate_row, "tick_ns", tick_ns),
-		    COLUMN(rate_row, "ns_per_s", ns_per_s),
 		    COLUMN(rate_row, "failed", failed)},
 	.metrics = {METRIC(EXACT, rate_row, command.rms_N, "N",
 			   "{wall} {poses} command rms at 1 kHz", "rate_hz=1000"),

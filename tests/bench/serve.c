@@ -22,8 +22,8 @@
 #include <incise/state.h>
 #include "../../tools/cli/child.h"
 #include "../../tools/cli/folder.h"
+#include "../../tools/cli/stopwatch.h"
 #include "program.h"
-#include "../../tools/bench/harness.h"
 #include "../../tools/bench/wakeup.h"
 
 #define RATE_HZ 1000
@@ -260,19 +260,6 @@ struct latency {
 	struct harness_spread spread;	/* of the 99 % of parts of the time */
 };
 
-static int by_value(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
-/* A percentile of sorted values; NAN if there are too few for it. */
-static double percentile(const double *sorted, int n, double share)
-{
-	return n * (1 - share) < 1 ? NAN : sorted[(int)(share * n)];
-}
-
 static void evaluate(struct latency *row, const char *name, double *us, int n,
 		     double seconds)
 {
@@ -284,15 +271,15 @@ static void evaluate(struct latency *row, const char *name, double *us, int n,
 	row->hz = n / seconds;
 	row->spread = HARNESS_SPREAD_NONE;
 	for (int i = 0; i < PARTS && part >= 100; i++) {
-		qsort(us + i * part, (size_t)part, sizeof(*us), by_value);
-		parts[i] = percentile(us + i * part, part, 0.99);
+		stopwatch_sort(us + i * part, part);
+		parts[i] = stopwatch_quantile(us + i * part, part, 0.99);
 	}
 	if (part >= 100)
 		harness_spread(parts, PARTS, &row->spread);
-	qsort(us, (size_t)n, sizeof(*us), by_value);
-	row->p50 = percentile(us, n, 0.5);
-	row->p99 = percentile(us, n, 0.99);
-	row->p999 = percentile(us, n, 0.999);
+	stopwatch_sort(us, n);
+	row->p50 = stopwatch_quantile(us, n, 0.5);
+	row->p99 = stopwatch_quantile(us, n, 0.99);
+	row->p999 = stopwatch_quantile(us, n, 0.999);
 	row->max = n ? us[n - 1] : NAN;
 }
 

@@ -49,7 +49,7 @@ struct row {
 	int width, height, frames, found;
 	double bias_px, sd_px, rms_px, max_px, stated_px, us, us_p99;
 	struct harness_time time; /* of a frame, processor time */
-	char failed[60], size[16], share[16];
+	char failed[60];
 };
 
 /* Measurements of a region, in rounds that take turns. */
@@ -163,8 +163,6 @@ static void set_row(struct row *row, struct measurements *s)
 	row->stated_px = sqrt(s->stated / n);
 	if (!s->found)
 		snprintf(row->failed, sizeof(row->failed), "nothing found");
-	snprintf(row->size, sizeof(row->size), "%dx%d", row->width, row->height);
-	snprintf(row->share, sizeof(row->share), "%3d/%-3d", row->found, row->frames);
 	harness_time_of(s->ns, s->n, &row->time);
 	stopwatch_sort(s->ns, s->n);
 	row->us = 1e-3 * stopwatch_quantile(s->ns, s->n, 0.5);

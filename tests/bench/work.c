@@ -17,6 +17,7 @@
 #include "../../lib/base/random.h"
 #include "../../lib/base/vector.h"
 #include "../../tools/cli/scene_argument.h"
+#include "../../tools/cli/stopwatch.h"
 #include "program.h"
 
 #define MOTIONS 10000
@@ -34,7 +35,6 @@ struct work_row {
 	const char *tool;
 	double motions, in_contact;
 	double least_N_mm, median_N_mm; /* taken */
-	double least_beyond_N_mm;	/* with the rounding of its motion added */
 	double rounding_N_mm;		/* the largest */
 	double least_held_N_mm;		/* taken from a device: forces held for a tick */
 	double returned;		/* motions */
@@ -161,13 +161,6 @@ static void go(struct hand *hand, double along_mm, double across_mm, double out_
 	hand->known = true;
 }
 
-static int by_size(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
 static void take(struct hand *hand, const struct tool *tool)
 {
 	hand->tool = tool;
@@ -193,7 +186,7 @@ static void measure(struct hand *hand, const struct tool *tool, struct work_row 
 	uint64_t key = incise_random_key(1, INCISE_RANDOM_TOOTH), n = 0;
 	double ignored[3] = {0};
 
-	row->least_N_mm = row->least_beyond_N_mm = row->least_held_N_mm = INFINITY;
+	row->least_N_mm = row->least_held_N_mm = INFINITY;
 	find_ends(hand);
 	take(hand, tool);
 	for (int i = 0; i < row->motions; i++) {
@@ -220,13 +213,12 @@ static void measure(struct hand *hand, const struct tool *tool, struct work_row 
 		row->in_contact += contact;
 		row->returned += taken < -rounding;
 		row->least_N_mm = fmin(row->least_N_mm, taken);
-		row->least_beyond_N_mm = fmin(row->least_beyond_N_mm, taken + rounding);
 		row->least_held_N_mm = fmin(row->least_held_N_mm, held);
 		row->rounding_N_mm = fmax(row->rounding_N_mm, rounding);
 		if (i % 100 == 0)
 			cli_progress("work: %s, %s, %d", row->name, row->tool, i);
 	}
-	qsort(all, (size_t)row->in_contact, sizeof(*all), by_size);
+	stopwatch_sort(all, (int)row->in_contact);
 	row->median_N_mm = row->in_contact > 0 ? all[(int)row->in_contact / 2] : NAN;
 }
 

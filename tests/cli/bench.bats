@@ -105,6 +105,11 @@ setup() {
 	holds "$(key c.json same) > 30"
 }
 
+# bats test_tags=check
+@test "bench compare: how often two runs of one distribution differ, and what is found" {
+	run -0 /usr/bin/python3 -B "$BATS_TEST_DIRNAME/compare_reports.py"
+}
+
 @test "bench compare takes reports of several words" {
 	figure() {
 		echo "{\"name\": \"$1\", \"kind\": \"exact\", \"unit\": \"N\", \"value\": $2}"
@@ -317,6 +322,8 @@ in_order() {
 	local q last
 	last=$(key r.json "$1.min")
 	for q in median p99 p999 p9999; do
+		# too few wake-ups resolve no such percentile
+		[ -n "$(key r.json "$1.$q")" ] || continue
 		holds "$last <= $(key r.json "$1.$q")"
 		last=$(key r.json "$1.$q")
 	done
@@ -336,9 +343,7 @@ in_order() {
 	[ "$(key r.json "rows[5].triangles") $(key r.json "rows[5].cuts")" = "500000 32" ]
 	holds "$(key r.json "rows[4].memory_bytes") > 10 * $(key r.json "rows[3].memory_bytes")"
 	[ "$(key r.json tick_ns)" = "$(key r.json "rows[0].tick_ns")" ]
-	for name in ns_p5 ns ns_p95; do
-		holds "$(key r.json "rows[0].$name") > 0"
-	done
+	holds "$(key r.json "rows[0].ns") > 0"
 	[ "$(key r.json wakeups.seconds)" = 0.5 ]
 	for i in 0 1; do
 		hz=$((i ? 4000 : 1000))

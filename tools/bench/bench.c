@@ -133,11 +133,16 @@ static const void *row_at(const struct bench_table *table, const void *rows, int
 
 /* --- text --- */
 
+static bool prints_text(const struct bench_run *run)
+{
+	return !run->json && !run->against;
+}
+
 void bench_text(const struct bench_run *run, const char *fmt, ...)
 {
 	va_list args;
 
-	if (run->json)
+	if (!prints_text(run))
 		return;
 	va_start(args, fmt);
 	vprintf(fmt, args);
@@ -212,7 +217,7 @@ static void print_line(const struct bench_table *table, const void *row)
 void bench_lines(const struct bench_run *run, const struct bench_table *table,
 		 const void *rows, int n)
 {
-	if (run->json)
+	if (!prints_text(run))
 		return;
 	print_headings(table->columns);
 	for (int i = 0; i < n; i++)
@@ -248,7 +253,7 @@ void bench_failures(const struct bench_run *run, const struct bench_table *table
 {
 	char text[TEXT_BYTES];
 
-	for (int i = 0; i < n && !run->json; i++) {
+	for (int i = 0; i < n && prints_text(run); i++) {
 		const void *row = row_at(table, rows, i);
 
 		if (!failed_of(table, row))
@@ -598,14 +603,28 @@ void bench_fail(struct bench_run *run, const char *fmt, ...)
 	va_end(args);
 }
 
+/* With --against the comparison takes the place of the text, and goes into the JSON. Returns the
+ * number of metrics that are worse or gone. */
+static int print_comparison(const struct bench_run *run, const json_t *old)
+{
+	struct incise_error err = {0};
+	json_t *comparison = cli_require(
+		compare_reports(old, run->against, run->report, "this run", &err), &err);
+
+	if (!run->json)
+		return compare_print(comparison, false);
+	json_object_del(comparison, "text");
+	json_object_set_new(run->report, "against", comparison);
+	json_print(json_incref(run->report));
+	return compare_worse(comparison);
+}
+
 void bench_measure(struct bench_run *run)
 {
+	json_t *old = run->against ? compare_load(run->against) : NULL;
 	char command[40];
+	int worse = 0;
 
-	if (run->against) {
-		compare_against(run->against, run->json);
-		run->json = true;
-	}
 	/* A wrong name fails before the work, not after. */
 	if (run->plot)
 		plot_place("plot", run->plot, &run->folder, &run->name);
@@ -621,17 +640,22 @@ void bench_measure(struct bench_run *run)
 	run->bench->run(run);
 	cli_progress_end();
 	json_object_set_new(run->report, "figures", run->metrics);
-	if (run->json)
+	if (run->json && !old)
 		json_print(json_incref(run->report));
 	cli_finish();
 	for (const struct bench_plot *p = run->bench->plots; run->plot && p->script; p++)
 		draw(run, p);
-	if (!run->json) {
+	if (old) {
+		worse = print_comparison(run, old);
+	} else if (!run->json) {
 		cli_written();
 		cli_finish();
 	}
 	if (*run->failed)
 		cli_fail("%s", run->failed);
+	if (worse)
+		compare_fail(worse);
+	json_decref(old);
 	json_decref(run->report);
 	json_decref(run->machine);
 }

@@ -100,7 +100,8 @@ bool closed_loop_run(struct incise_plan *plan, const struct closed_loop *loop, i
 {
 	const double m = loop->mass_kg * 1e-3; /* N s²/mm */
 	const long steps = lround(loop->run_s / STEP_S);
-	struct range last = {INFINITY, -INFINITY, 0, 0}, last_N = last, shaken = last;
+	struct range last = {INFINITY, -INFINITY, 0, 0}, last_N = last, shaken = last,
+		     earlier = last, all = last, all_N = last;
 	struct running r = {
 		.loop = loop,
 		.plan = plan,
@@ -125,6 +126,10 @@ bool closed_loop_run(struct incise_plan *plan, const struct closed_loop *loop, i
 			r.x += STEP_S * r.v;
 			r.y += STEP_S * loop->along_mm_s;
 		}
+		see(&all, r.x);
+		see(&all_N, force_N);
+		if (4 * i > steps && 4 * i <= 2 * steps)
+			see(&earlier, r.x);
 		if (4 * i > 3 * steps) {
 			see(&last, r.x);
 			see(&last_N, force_N);
@@ -135,6 +140,9 @@ bool closed_loop_run(struct incise_plan *plan, const struct closed_loop *loop, i
 	*end = (struct closed_loop_end){
 		.swing_mm = fmin(last.up, last.down),
 		.moved_mm = last.high - last.low,
+		.earlier_mm = earlier.high - earlier.low,
+		.largest_mm = fmax(all.high, -all.low),
+		.largest_N = fmax(all_N.high, -all_N.low),
 		.swing_N = last_N.high - last_N.low,
 		.shaken_mm = fmin(shaken.up, shaken.down),
 		.depth_mm = -r.x,

@@ -32,6 +32,8 @@ struct closed_loop_end {
 	/* Over the last quarter: the way to and fro, which is none of a device that only sinks
 	 * or creeps, the range of places and that of forces. */
 	double swing_mm, moved_mm, swing_N;
+	double earlier_mm;	      /* the range of places over the second quarter */
+	double largest_mm, largest_N; /* of all, to either side */
 	double shaken_mm; /* to and fro in the last eighth before the noise ends */
 	double depth_mm, force_N; /* at the end */
 };

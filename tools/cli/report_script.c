@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Runs the script of reports; see report_script.h. It is that of Debian's Python, whose packages
- * have jinja2, and not one that a virtual environment puts first in PATH.
+ * Runs the scripts of reports; see report_script.h. They run in Debian's Python, whose packages
+ * have jinja2, and not in one that a virtual environment puts first in PATH.
  */
 #include <errno.h>
 #include <stdlib.h>
@@ -10,8 +10,6 @@
 #include "cli.h"
 #include "file.h"
 #include "report_script.h"
-
-#define PYTHON "/usr/bin/python3"
 
 /* The last line that it said. */
 static int failed(FILE *said, struct incise_error *err)
@@ -27,11 +25,17 @@ static int failed(FILE *said, struct incise_error *err)
 	return incise_error_set(err, EIO, "report: %s", line);
 }
 
+char *report_script_path(const char *name)
+{
+	return cli_text("%s/../share/incise/report/%s.py", cli_folder(), name);
+}
+
 int report_script(const char *what, const char *folder, const json_t *data, FILE *out,
 		  struct incise_error *err)
 {
-	char *script = cli_text("%s/../share/incise/report/report.py", cli_folder());
-	char *const argv[] = {PYTHON, "-B", script, (char *)what, (char *)folder, NULL};
+	char *script = report_script_path(strcmp(what, "compare") ? "report" : what);
+	char *const argv[] = {REPORT_PYTHON, "-B",	     script,
+			      (char *)what,  (char *)folder, NULL};
 	struct memory_file in = memory_file_begin("page"),
 			   said = memory_file_begin("said");
 	int status, rc = 0;
@@ -45,8 +49,8 @@ int report_script(const char *what, const char *folder, const json_t *data, FILE
 			   fileno(said.file));
 	if (status < 0)
 		rc = incise_error_set(err, errno,
-				      "report: %s: %s; install python3-jinja2", PYTHON,
-				      strerror(errno));
+				      "report: %s: %s; install python3-jinja2",
+				      REPORT_PYTHON, strerror(errno));
 	else if (status)
 		rc = failed(said.file, err);
 	fclose(in.file);

@@ -447,7 +447,7 @@ static int open_encoder(struct writer *w, int threads)
 	c->thread_count = threads > 1 ? threads < SLICES ? threads : SLICES : 1;
 	c->thread_type = FF_THREAD_SLICE;
 	av_opt_set_int(c->priv_data, "slicecrc", 1, 0);
-	/* Golomb-Rice: 60 % of the range coder's CPU, and frames no larger (check-frames). */
+	/* Golomb-Rice: 60 % of the range coder's CPU, and frames no larger. */
 	av_opt_set_int(c->priv_data, "coder", 0, 0);
 	rc = avcodec_open2(c, ffv1, NULL);
 	return rc ? rc : av_frame_get_buffer(w->planes, 0);
