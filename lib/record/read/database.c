@@ -144,18 +144,23 @@ static int copy_bytes(int from, int to)
 }
 
 /* Returns 0 or -errno. */
-static int copy_file(int in, const char *to)
+static int copy_file(int in, const char *to, mode_t mode)
 {
 	int out, rc;
 
 	if (in < 0)
 		return in;
-	out = open(to, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0600);
+	out = open(to, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, mode);
 	rc = out < 0 ? -errno : copy_bytes(in, out);
 	if (out >= 0 && close(out) && !rc)
 		rc = -errno;
 	close(in);
 	return rc;
+}
+
+int incise_database_bring(const char *from, const char *to)
+{
+	return copy_file(open_regular(from), to, 0666);
 }
 
 static void read_log_head(const char *log, char head[LOG_HEAD])
@@ -205,9 +210,9 @@ static int try_copy(const struct found *from, enum beside with, const char *file
 	int rc;
 
 	read_log_head(from->beside[LOG], before);
-	rc = copy_file(open(from->file, O_RDONLY | O_NONBLOCK | O_CLOEXEC), file);
+	rc = copy_file(open(from->file, O_RDONLY | O_NONBLOCK | O_CLOEXEC), file, 0666);
 	if (!rc && (written || from->beside_size[with]))
-		rc = copy_file(open_regular(from->beside[with]), copied);
+		rc = copy_file(open_regular(from->beside[with]), copied, 0666);
 	read_log_head(from->beside[LOG], after);
 	/* No log: the recording is just being closed, or does not have one yet. */
 	if (rc == -ENOENT || (!rc && memcmp(before, after, LOG_HEAD)))

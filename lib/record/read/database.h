@@ -31,4 +31,7 @@ int incise_database_open(const char *path, sqlite3 **db, struct incise_error *er
  */
 int incise_database_recover(const char *path, const char *file, struct incise_error *err);
 
+/* Copy a regular file, not by a link, to @to. 0 or -errno; EINVAL: it is none. */
+int incise_database_bring(const char *from, const char *to);
+
 #endif
