@@ -26,6 +26,16 @@ pythondir ?= $(prefix)/lib/python$(if $(filter-out /usr,$(prefix)),$(python_vers
 completiondir ?= $(datadir)/bash-completion/completions
 zshcompletiondir ?= $(datadir)/zsh/site-functions
 
+# These go to the shell, and to make's own lists: a name of two words would be two others.
+paths := CURDIR O DESTDIR prefix bindir libdir includedir datadir mandir docdir udevrulesdir sysusersdir \
+	tmpfilesdir unitdir pythondir completiondir zshcompletiondir srcdir KDIR INSTALL_MOD_PATH
+open := (
+close := )
+hash := \#
+awkward := ' " ` ; & | < > * ? $$ % $(hash) \ $(open) $(close) [ ]
+$(foreach path,$(paths),$(if $(word 2,[$($(path))])$(strip $(foreach c,$(awkward),$(findstring $(c),$($(path))))),\
+	$(error $(path) is "$($(path))": a blank, or one of $(awkward), is in this path; choose another)))
+
 # Programs and libraries find each other by where they are, whatever the prefix. With rpath=no
 # the system's own folders are all that is searched, as distributions want it.
 rpath ?= yes
@@ -145,7 +155,10 @@ help:
 		awk '{ name = $$1; $$1 = ""; printf "%-21s%s\n", name, $$0 }'
 
 clean: ## remove what was built
-	rm -rf $(O)
+	@if [ -e "$(O)" ] && [ ! -d "$(O)/obj" ] && [ "$(O)" != build ]; then \
+		echo "$(O) is no build folder: it has no obj/; remove it yourself" >&2; exit 1; \
+	fi
+	rm -rf "$(O)"
 
 # Not of the packages' own build, nor folders of that name, which come and go beside this make.
 -include $(shell find $(O) -path $(O)/deb -prune -o -name '*.d' -type f -print 2>/dev/null)

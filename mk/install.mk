@@ -21,7 +21,7 @@ python_files := $(wildcard python/incise/*.py) python/incise/py.typed
 # The libraries of this installation, unless they are where the system looks.
 python_installed := $(if $(filter-out no,$(rpath)),_installed.py)
 
-# Every file that `install` makes, relative to nothing: uninstall removes just these.
+# Every file that `install` makes. It records their names, and uninstall removes just what is recorded.
 installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(foreach lib,$(libraries),$(addprefix $(libdir)/lib$(lib).so,.$(version) .$(soversion)) \
 		$(libdir)/lib$(lib).so) \
@@ -43,9 +43,15 @@ installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 
 folders = $(patsubst %/,%,$(sort $(dir $(installed))))
 
+record = $(datadir)/incise/.installed
+
 # The folders that install had to make, so that uninstall removes just these, be
 # they empty: /usr/local of a fresh Debian is full of empty ones.
 made_folders = $(datadir)/incise/.folders
+
+# $1: a list of files in $(DESTDIR), and itself.
+remove_recorded = while IFS= read -r file; do rm -f -- "$(DESTDIR)$$file"; done <"$(DESTDIR)$1" && \
+	rm -f -- "$(DESTDIR)$1"
 
 install: all ## install below $(DESTDIR)$(prefix)
 	@made=$$(for folder in $(folders); do \
@@ -53,60 +59,63 @@ install: all ## install below $(DESTDIR)$(prefix)
 			echo "$$folder"; folder=$$(dirname "$$folder"); \
 		done; \
 	done | sort -u) && \
-	$(INSTALL) -d $(addprefix $(DESTDIR),$(folders)) && \
-	printf '%s\n' $$made >>$(DESTDIR)$(made_folders)
-	$(INSTALL) -m 755 $(programs) $(DESTDIR)$(bindir)
+	$(INSTALL) -d $(foreach folder,$(folders),"$(DESTDIR)$(folder)") && \
+	printf '%s\n' $$made >>"$(DESTDIR)$(made_folders)" && \
+	printf '%s\n' $(installed) >>"$(DESTDIR)$(record)"
+	$(INSTALL) -m 755 $(programs) "$(DESTDIR)$(bindir)"
 	for lib in $(libraries); do \
-		$(INSTALL) -m 644 $(O)/lib/lib$$lib.so.$(version) $(DESTDIR)$(libdir) && \
-		ln -sf lib$$lib.so.$(version) $(DESTDIR)$(libdir)/lib$$lib.so.$(soversion) && \
-		ln -sf lib$$lib.so.$(soversion) $(DESTDIR)$(libdir)/lib$$lib.so || exit 1; \
+		$(INSTALL) -m 644 $(O)/lib/lib$$lib.so.$(version) "$(DESTDIR)$(libdir)" && \
+		ln -sf lib$$lib.so.$(version) "$(DESTDIR)$(libdir)/lib$$lib.so.$(soversion)" && \
+		ln -sf lib$$lib.so.$(soversion) "$(DESTDIR)$(libdir)/lib$$lib.so" || exit 1; \
 	done
 	for module in $(device_modules); do \
-		$(INSTALL) -m 644 $(O)/lib/incise/$$module.so $(DESTDIR)$(libdir)/incise || exit 1; \
+		$(INSTALL) -m 644 $(O)/lib/incise/$$module.so "$(DESTDIR)$(libdir)/incise" || exit 1; \
 	done
-	$(INSTALL) -m 644 $(headers) $(DESTDIR)$(includedir)/incise
+	$(INSTALL) -m 644 $(headers) "$(DESTDIR)$(includedir)/incise"
 	$(foreach lib,$(libraries),sed -e 's|@prefix@|$(prefix)|' -e 's|@libdir@|$(libdir)|' \
 		-e 's|@includedir@|$(includedir)|' -e 's|@version@|$(version)|' \
 		-e 's|@name@|$(lib)|' -e 's|@about@|$(about_$(lib))|' \
 		-e 's|@requires@|$(needs_$(lib))|' \
-		mk/library.pc.in >$(DESTDIR)$(libdir)/pkgconfig/$(lib).pc &&) :
+		mk/library.pc.in >"$(DESTDIR)$(libdir)/pkgconfig/$(lib).pc" &&) :
 	for page in $(man_pages); do \
-		$(INSTALL) -m 644 $$page $(DESTDIR)$(mandir)/man$${page##*.} || exit 1; \
+		$(INSTALL) -m 644 $$page "$(DESTDIR)$(mandir)/man$${page##*.}" || exit 1; \
 	done
-	$(INSTALL) -m 644 $(scenes) $(DESTDIR)$(datadir)/incise/scenes
-	$(INSTALL) -m 644 $(schemas) $(DESTDIR)$(datadir)/incise/schema
-	$(INSTALL) -m 644 $(report_files) $(DESTDIR)$(datadir)/incise/report
-	$(INSTALL) -m 644 $(examples) $(DESTDIR)$(datadir)/incise
-	$(INSTALL) -m 644 $(documents) $(DESTDIR)$(docdir)
-	$(INSTALL) -m 644 $(example_files) $(DESTDIR)$(docdir)/examples
-	$(INSTALL) -m 755 $(example_scripts) $(DESTDIR)$(docdir)/examples
-	$(INSTALL) -m 644 tools/incise.bash $(DESTDIR)$(completiondir)/incise
-	$(INSTALL) -m 644 $(python_files) $(DESTDIR)$(pythondir)/incise
+	$(INSTALL) -m 644 $(scenes) "$(DESTDIR)$(datadir)/incise/scenes"
+	$(INSTALL) -m 644 $(schemas) "$(DESTDIR)$(datadir)/incise/schema"
+	$(INSTALL) -m 644 $(report_files) "$(DESTDIR)$(datadir)/incise/report"
+	$(INSTALL) -m 644 $(examples) "$(DESTDIR)$(datadir)/incise"
+	$(INSTALL) -m 644 $(documents) "$(DESTDIR)$(docdir)"
+	$(INSTALL) -m 644 $(example_files) "$(DESTDIR)$(docdir)/examples"
+	$(INSTALL) -m 755 $(example_scripts) "$(DESTDIR)$(docdir)/examples"
+	$(INSTALL) -m 644 tools/incise.bash "$(DESTDIR)$(completiondir)/incise"
+	$(INSTALL) -m 644 $(python_files) "$(DESTDIR)$(pythondir)/incise"
 	$(if $(python_installed),printf '# Written by make install.\nLIBDIR = "%s"\nDATADIR = "%s"\n' \
-		'$(libdir)' '$(datadir)' >$(DESTDIR)$(pythondir)/incise/_installed.py)
-	$(INSTALL) -m 644 tools/_incise $(DESTDIR)$(zshcompletiondir)
-	$(INSTALL) -m 644 $(udev_rules) $(DESTDIR)$(udevrulesdir)
+		'$(libdir)' '$(datadir)' >"$(DESTDIR)$(pythondir)/incise/_installed.py")
+	$(INSTALL) -m 644 tools/_incise "$(DESTDIR)$(zshcompletiondir)"
+	$(INSTALL) -m 644 $(udev_rules) "$(DESTDIR)$(udevrulesdir)"
 	for file in $(sysusers); do \
 		$(INSTALL) -m 644 $$file \
-			$(DESTDIR)$(sysusersdir)/$$(basename $$file .sysusers).conf || exit 1; \
+			"$(DESTDIR)$(sysusersdir)/$$(basename $$file .sysusers).conf" || exit 1; \
 	done
 	for file in $(tmpfiles); do \
 		$(INSTALL) -m 644 $$file \
-			$(DESTDIR)$(tmpfilesdir)/$$(basename $$file .tmpfiles).conf || exit 1; \
+			"$(DESTDIR)$(tmpfilesdir)/$$(basename $$file .tmpfiles).conf" || exit 1; \
 	done
 	for file in $(units); do \
 		sed 's|@bindir@|$(bindir)|' $$file \
-			>$(DESTDIR)$(unitdir)/$$(basename $$file .in) || exit 1; \
+			>"$(DESTDIR)$(unitdir)/$$(basename $$file .in)" || exit 1; \
 	done
-	sed -f udev/incise-feed@.service.sed $(DESTDIR)$(unitdir)/incise-haptic@.service \
-		>$(DESTDIR)$(unitdir)/incise-feed@.service
+	sed -f udev/incise-feed@.service.sed "$(DESTDIR)$(unitdir)/incise-haptic@.service" \
+		>"$(DESTDIR)$(unitdir)/incise-feed@.service"
 
-uninstall: ## remove what install installed
-	@made=$$(sort -ru $(DESTDIR)$(made_folders) 2>/dev/null) || \
-		made="$(libdir)/incise $(includedir)/incise $(datadir)/incise/scenes $(datadir)/incise/schema $(datadir)/incise/report $(datadir)/incise"; \
-	rm -f $(addprefix $(DESTDIR),$(installed) $(made_folders)); \
-	rm -rf $(DESTDIR)$(pythondir)/incise/__pycache__; \
-	for folder in $$made; do \
+uninstall: ## remove what install recorded as installed
+	@if [ ! -e "$(DESTDIR)$(record)" ]; then \
+		echo "nothing to remove: $(DESTDIR)$(record) is missing, which 'make install' writes" >&2; exit 0; \
+	fi; \
+	made=$$(sort -ru "$(DESTDIR)$(made_folders)") && $(call remove_recorded,$(record)) && \
+	rm -f "$(DESTDIR)$(made_folders)" $(foreach file,$(python_files:.py=),\
+		"$(DESTDIR)$(pythondir)/incise/__pycache__/$(notdir $(file))".*.pyc); \
+	for folder in "$(pythondir)/incise/__pycache__" $$made; do \
 		rmdir "$(DESTDIR)$$folder" 2>/dev/null || :; \
 	done
 

@@ -40,7 +40,7 @@ module_install: module ## install the module for that kernel, below $(DESTDIR)$(
 	$(depmod)
 
 module_uninstall: module_headers ## remove what module_install installed
-	rm -f $(module_installed)/incise_stepper.ko* $(module_installed)/incise_source.ko*
+	rm -f "$(module_installed)"/incise_stepper.ko* "$(module_installed)"/incise_source.ko*
 	$(depmod)
 
 # A source tree for dkms, which then builds the module for each kernel that is installed.
@@ -52,16 +52,23 @@ dkms_sources = $(addprefix driver/,Kbuild Makefile compat/probe) \
 	$(wildcard driver/source/*) $(filter-out %/trial.h,$(wildcard lib/fixed/*.[ch])) \
 	$(shell grep -l __KERNEL__ lib/include/incise/*.h) \
 	$(addprefix lib/include/incise/,export.h stepper_state.h tick_flags.h tool.h)
+dkms_folders = $(patsubst %/,%,$(sort $(dir $(dkms_sources))))
+dkms_record = $(dkms_dir)/installed-files
 
 dkms_install: ## install the module's sources for dkms in $(DESTDIR)$(srcdir)
-	$(INSTALL) -d $(addprefix $(DESTDIR)$(dkms_dir)/,$(sort $(dir $(dkms_sources))))
+	$(INSTALL) -d $(foreach folder,$(dkms_folders),"$(DESTDIR)$(dkms_dir)/$(folder)")
 	for file in $(dkms_sources); do \
-		$(INSTALL) -m 644 $$file $(DESTDIR)$(dkms_dir)/$$file || exit 1; \
+		$(INSTALL) -m 644 $$file "$(DESTDIR)$(dkms_dir)/$$file" || exit 1; \
 	done
-	sed 's|@version@|$(version)|' driver/dkms.conf.in >$(DESTDIR)$(dkms_dir)/dkms.conf
+	sed 's|@version@|$(version)|' driver/dkms.conf.in >"$(DESTDIR)$(dkms_dir)/dkms.conf"
+	printf '%s\n' $(addprefix $(dkms_dir)/,$(dkms_sources) dkms.conf) >"$(DESTDIR)$(dkms_record)"
 
-dkms_uninstall: ## remove them
-	rm -rf $(DESTDIR)$(dkms_dir)
+dkms_uninstall: ## remove what was recorded as installed there
+	@if [ ! -e "$(DESTDIR)$(dkms_record)" ]; then \
+		echo "nothing to remove: $(DESTDIR)$(dkms_record) is missing, which 'make dkms_install' writes" >&2; exit 0; \
+	fi; \
+	$(call remove_recorded,$(dkms_record)); \
+	find "$(DESTDIR)$(dkms_dir)" -depth -type d -empty -delete
 
 .PHONY: module module_headers module_install module_uninstall dkms_install dkms_uninstall
 

@@ -191,7 +191,7 @@ check-python: all ## tests of incise for Python on libraries under AddressSaniti
 	cd tests/python && INCISE_BUILD=$(abspath $(O)) INCISE_LIBDIR=$(abspath $(O))/check/lib \
 		LD_PRELOAD=$$($(CC) -print-file-name=libasan.so) ASAN_OPTIONS=detect_leaks=0 \
 		PYTHONPATH=../../python PYTHONDONTWRITEBYTECODE=1 \
-		/usr/bin/python3 -m unittest test_recording test_model test_plan
+		/usr/bin/python3 -m unittest test_recording test_model test_plan test_names
 
 # Threads that share memory without a lock, under ThreadSanitizer; what is not of the page
 # comes from the library as it is.

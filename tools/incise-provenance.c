@@ -6,13 +6,16 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 #include <incise/factor.h>
+#include <incise/recalibration.h>
 #include <incise/recording.h>
 #include <incise/seal.h>
 #include "cli/cli.h"
 #include "cli/control_character.h"
 #include "cli/file_kind.h"
 #include "cli/json.h"
+#include "cli/recording.h"
 #include "origin/origins.h"
 
 struct job {
@@ -49,6 +52,7 @@ static const char *const states[STATES] = {"same", "other", "later", "missing"};
 struct step {
 	const struct incise_origin *origin;
 	enum state state;
+	char *why; /* of a recording with this head that is not what it was; NULL: none */
 	char *found;	/* path; NULL: none */
 	int64_t commit; /* of the recording that was found */
 };
@@ -76,6 +80,43 @@ static bool compare_recording(struct step *step, const char *path)
 	else
 		step->state = (uint64_t)head.commit > origin->commit ? LATER : OTHER;
 	return !strcmp(identity, origin->identity);
+}
+
+/* SHA-256 of the calibration by which a recording is read; "": that of its capture. */
+static void find_active(const char *path, char sha256[65])
+{
+	struct incise_recalibration *list = NULL;
+	int n = incise_recalibrations(path, &list, NULL);
+
+	strcpy(sha256, n > 1 ? list[n - 1].sha256 : "");
+	free(list);
+}
+
+/*
+ * A head stays when rows are changed, and when another calibration is given: the rows of a recording that was
+ * found, and the calibration by which it was read then, of which there is a step behind its own.
+ */
+static void compare_rows(struct step *step, const struct step *next)
+{
+	struct incise_error err = {0};
+	char active[65], *advice;
+	const char *then = "";
+
+	if (next && !strcmp(next->origin->kind, "calibration") &&
+	    next->origin->depth == step->origin->depth + 1)
+		then = next->origin->sha256;
+	find_active(step->found, active);
+	if (!recording_intact(step->found, false, &err)) {
+		advice = strstr(err.text, "; 'incise verify");
+		if (advice)
+			*advice = 0;
+		step->why = cli_text("%s", err.text);
+	} else if (strcmp(active, then)) {
+		step->why =
+			cli_text("%s: is read by another calibration now", step->found);
+	}
+	if (step->why)
+		step->state = OTHER;
 }
 
 static void compare_file(struct step *step, const char *path)
@@ -127,6 +168,33 @@ static void compare(struct step *step, const struct job *job, const char *file)
 		step->state = OTHER;
 }
 
+/* The recording that a calibration is of: the step before. NULL: it is of none, but a file. */
+static struct step *find_recording(struct step *steps, int i)
+{
+	return i && !strcmp(steps[i].origin->kind, "calibration") &&
+			       !strcmp(steps[i - 1].origin->kind, "recording") &&
+			       steps[i].origin->depth == steps[i - 1].origin->depth + 1
+		       ? &steps[i - 1]
+		       : NULL;
+}
+
+/* It is in the recording's own folder, where it stays when another one becomes active. */
+static void compare_calibration(struct step *step, const struct step *recording)
+{
+	char *path;
+
+	step->state = MISSING;
+	if (!recording->found)
+		return;
+	path = cli_text("%s/calibration/%s", recording->found, step->origin->name);
+	if (access(path, F_OK)) {
+		free(path);
+		return;
+	}
+	step->found = path;
+	compare_file(step, path);
+}
+
 /* --- report ------------------------------------------------------------------------------- */
 
 static char *shown(const char *text)
@@ -154,6 +222,13 @@ static void print_step(const struct step *step)
 		printf(recording ? "%s has this head\n" : "%s is this file\n", found);
 		break;
 	case OTHER:
+		if (step->why) {
+			char *why = shown(step->why);
+
+			printf("%s\n", why);
+			free(why);
+			break;
+		}
 		printf(recording ? "%s is another recording, or was changed\n"
 				 : "%s is another file, or was changed\n",
 		       found);
@@ -249,9 +324,18 @@ int main(int argc, char **argv)
 	if (!origins.n)
 		fail_without(path);
 	steps = cli_alloc((size_t)origins.n, sizeof(*steps));
-	for (int i = 0; i < origins.n && !cli_stop; i++) {
+	for (int i = 0; i < origins.n; i++)
 		steps[i].origin = &origins.all[i];
-		compare(&steps[i], &job, path);
+	for (int i = 0; i < origins.n && !cli_stop; i++) {
+		struct step *recording = find_recording(steps, i);
+
+		if (recording)
+			compare_calibration(&steps[i], recording);
+		else
+			compare(&steps[i], &job, path);
+		if (!strcmp(origins.all[i].kind, "recording") && steps[i].found &&
+		    steps[i].state != OTHER)
+			compare_rows(&steps[i], i + 1 < origins.n ? &steps[i + 1] : NULL);
 		recorded |= !strcmp(origins.all[i].kind, "recording");
 		differs |= steps[i].state == OTHER;
 	}

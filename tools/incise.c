@@ -28,6 +28,7 @@ static const struct {
 	{"capture", "record the streams of a rig in sync"},
 	{"verify", "check that a recording is complete"},
 	{"sign", "sign and time-stamp a recording"},
+	{"recover", "copy an interrupted recording to one that is read like any other"},
 	{"join", "put recordings of several machines on one timeline"},
 	{"recalibrate", "give a recording another calibration after the fact"},
 	{"export", "make a dataset from recordings, raw or averaged"},

@@ -148,12 +148,6 @@ int incise_schema_fail(sqlite3 *db, const char *path, struct incise_error *err)
 			"%s: damaged (%s); copy it; `sqlite3 %s/%s .recover` may save "
 			"rows",
 			path, sqlite3_errmsg(db), path, INCISE_SCHEMA_DB);
-	if (code == EACCES || code == EROFS)
-		return incise_error_set(
-			err, code,
-			"%s: cannot be opened (%s); an interrupted recording needs a "
-			"writable folder; copy it to one",
-			path, sqlite3_errmsg(db));
 	return incise_error_set(err, code, "%s: cannot be read: %s", path,
 				db ? sqlite3_errmsg(db) : strerror(ENOMEM));
 }

@@ -304,7 +304,7 @@ class Corpus:
         function("incise_corpus_ranges")(self.corpus, *ends)
         options.ranges = (VariableStruct * n)(*((b"", *range_) for range_ in zip(*ends)))
         options.groups = self.fit.sample.groups
-        return Model(start(self.fit.sample.pairs, self.columns, mf_type, counts, options))
+        return Model._of(start(self.fit.sample.pairs, self.columns, mf_type, counts, options))
 
     def _factor(self, premises: int) -> _library.Handle:
         factor = self.failure.require(

@@ -110,9 +110,15 @@ class _Reader:
 class Batch:
     """Some rows of a table. Views of its columns keep it alive; nothing is copied."""
 
-    def __init__(self, array: ArrowArray, fields: List[Field]):
-        self._array = array
-        self.fields = fields
+    def __init__(self) -> None:
+        raise TypeError("a Batch comes of a table: table.batches()")
+
+    @classmethod
+    def _of(cls, array: ArrowArray, fields: List[Field]) -> "Batch":
+        batch = cls.__new__(cls)
+        batch._array = array
+        batch.fields = fields
+        return batch
 
     def __len__(self) -> int:
         return self._array.length
@@ -236,10 +242,16 @@ def _capsule(open_stream: Callable[[ArrowArrayStream], None]) -> Any:
 class Table:
     """Rows that can be read again and again, each time in batches and with bounded memory."""
 
-    def __init__(self, open_stream: Callable[[ArrowArrayStream], None], about: str):
-        self._open = open_stream
-        self._about = about
-        self._schema: Any = None
+    def __init__(self) -> None:
+        raise TypeError("a Table comes of a recording: incise.open(path).pairs() and the like")
+
+    @classmethod
+    def _of(cls, open_stream: Callable[[ArrowArrayStream], None], about: str) -> "Table":
+        table = cls.__new__(cls)
+        table._open = open_stream
+        table._about = about
+        table._schema = None
+        return table
 
     def __repr__(self) -> str:
         return f"<incise.Table {self._about}>"
@@ -274,7 +286,7 @@ class Table:
         fields, _ = reader.schema()
         array = reader.next()
         while array is not None:
-            yield Batch(array, fields)
+            yield Batch._of(array, fields)
             array = reader.next()
         reader.close()
 

@@ -362,24 +362,31 @@ class Points:
 
 
 class CompiledModel:
-    """A model in fixed point, with a certified bound of its error: a .fx file."""
+    """The model of a .fx file: in fixed point, with a certified bound of its error."""
 
-    def __init__(self, pointer: Any):
+    def __init__(self, path: PathLike):
+        failure = Failure()
+        name = _library.path_bytes(path)
+        self._own(failure.require(function("incise_fixed_load")(name, failure.ref)))
+
+    def _own(self, pointer: Any) -> None:
         self._pointer = _library.Handle(pointer, "incise_fixed_free")
         self._struct = pointer.contents
+
+    @classmethod
+    def _of(cls, pointer: Any) -> "CompiledModel":
+        """Of a pointer that it frees."""
+        compiled = cls.__new__(cls)
+        compiled._own(pointer)
+        return compiled
 
     def __reduce__(self) -> Any:
         return _compiled_of_bytes, (ctypes.string_at(self._struct.blob, self._struct.size),)
 
     @classmethod
     def load(cls, path: PathLike) -> "CompiledModel":
-        """Read a .fx file."""
-        failure = Failure()
-        return cls(
-            failure.require(
-                function("incise_fixed_load")(_library.path_bytes(path), failure.ref)
-            )
-        )
+        """Read a .fx file: the same as CompiledModel(path)."""
+        return cls(path)
 
     @property
     def bound(self) -> float:
@@ -435,33 +442,43 @@ class TrainReport(NamedTuple):
 
 
 class Model:
-    """A fuzzy model: call it with inputs in the order of :attr:`inputs`.
+    """The fuzzy model of a .fis file, with its standard deviation if PATH.sd is there: call it with
+    inputs in the order of :attr:`inputs`.
 
     model((5, 20)) is one force; model(x) of an array (…, inputs) an array; with sd=True a pair of
     these, the output and its standard deviation for a new cut.
     """
 
-    def __init__(self, pointer: int, uncertainty: Optional[int] = None):
+    def __init__(self, path: PathLike):
+        failure = Failure()
+        name = _library.path_bytes(path)
+        self._own(failure.require(function("incise_model_load")(name, failure.ref)))
+        if os.path.exists(name + b".sd"):
+            self._set_uncertainty(
+                failure.require(
+                    function("incise_uncertainty_load")(
+                        name + b".sd", self._pointer, failure.ref
+                    )
+                )
+            )
+
+    def _own(self, pointer: int) -> None:
         self._pointer = _library.Handle(pointer, "incise_model_free")
-        self._set_uncertainty(uncertainty)
+        self._set_uncertainty(None)
         self.report: Optional[TrainReport] = None  #: of the training, if it was trained here
         self._notes = b""  # of a training from many sources: version, options and sources
 
     @classmethod
-    def load(cls, path: PathLike) -> "Model":
-        """Read a .fis file, and its standard deviation if PATH.sd is there."""
-        failure = Failure()
-        name = _library.path_bytes(path)
-        model = cls(failure.require(function("incise_model_load")(name, failure.ref)))
-        if os.path.exists(name + b".sd"):
-            model._set_uncertainty(
-                failure.require(
-                    function("incise_uncertainty_load")(
-                        name + b".sd", model._pointer, failure.ref
-                    )
-                )
-            )
+    def _of(cls, pointer: int) -> "Model":
+        """Of a pointer that it frees."""
+        model = cls.__new__(cls)
+        model._own(pointer)
         return model
+
+    @classmethod
+    def load(cls, path: PathLike) -> "Model":
+        """The same as Model(path)."""
+        return cls(path)
 
     def _set_uncertainty(self, pointer: Optional[int]) -> None:
         self._uncertainty = pointer and _library.Handle(pointer, "incise_uncertainty_free")
@@ -585,7 +602,7 @@ class Model:
         function("incise_fixed_options_init")(ctypes.byref(options))
         options.budget = budget_mN * 1e-3
         failure = Failure()
-        return CompiledModel(
+        return CompiledModel._of(
             failure.require(
                 function("incise_fixed_compile")(
                     self._pointer, ctypes.byref(options), failure.ref
@@ -853,7 +870,7 @@ def train(
     training = _Training(dataset, check, options)
 
     def learn() -> Model:
-        model = Model(start(training.fit.pairs, names, _mf_types[mf_type], counts, options))
+        model = Model._of(start(training.fit.pairs, names, _mf_types[mf_type], counts, options))
         report = training.run(model)
         model.report = report_of(
             report,

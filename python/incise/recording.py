@@ -359,7 +359,7 @@ class Recording:
             finally:
                 function("incise_recording_close")(recording)
 
-        return Table(open_stream, f"{about} of {self.path}")
+        return Table._of(open_stream, f"{about} of {self.path}")
 
     @property
     def force(self) -> Table:

@@ -83,8 +83,15 @@ class WallPoint(NamedTuple):
 class Wall:
     """The mapping of one recording, ``rec.wall``; it can be used after the recording is closed."""
 
-    def __init__(self, pointer: int):
-        self._handle = Handle(pointer, "incise_wall_free")
+    def __init__(self) -> None:
+        raise TypeError("a Wall comes of a recording: incise.open(path).wall")
+
+    @classmethod
+    def _of(cls, pointer: int) -> "Wall":
+        """Of a pointer that it frees."""
+        wall = cls.__new__(cls)
+        wall._handle = Handle(pointer, "incise_wall_free")
+        return wall
 
     @property
     def points(self) -> Tuple[WallPoint, ...]:
@@ -142,4 +149,4 @@ def read(recording: int, failure: _library.Failure) -> Optional[Wall]:
     pointer = function("incise_recording_wall")(recording, failure.ref)
     if not pointer and failure.struct.code == errno.ENODATA:
         return None
-    return Wall(failure.require(pointer))
+    return Wall._of(failure.require(pointer))

@@ -160,3 +160,30 @@ setup() {
 	done
 	run ! grep -v "^incise-$version/" list
 }
+
+# Of three forms that once removed another folder; and characters that a shell reads.
+@test "a path with a blank is refused before anything is done, by each target that removes" {
+	mkdir -p "$PWD/lab" && touch "$PWD/lab/data.rec"
+	for setting in DESTDIR="$PWD/lab x" prefix="$PWD/lab x" srcdir="$PWD/lab x" pythondir="$PWD/lab x" \
+		DESTDIR="$PWD/lab;x" "prefix=$PWD/lab'x" "O=$PWD/lab\"x" 'prefix=/lab*'; do
+		for target in install uninstall dkms_install dkms_uninstall module_uninstall clean; do
+			run -2 --separate-stderr project -s $target "$setting"
+			[[ "$stderr" == *"*** ${setting%%=*} is \"${setting#*=}\": "*"choose another.  Stop." ]] ||
+				[ "$setting" = ] || complain "$stderr"
+		done
+	done
+	[ "$(find lab*)" = lab$'\n'lab/data.rec ]
+}
+
+@test "uninstall without a record removes nothing, and clean no folder that is not of a build" {
+	project -s install DESTDIR="$dest" prefix=/usr
+	rm "$dest/usr/share/incise/.installed"
+	find "$dest" | sort >before
+	run -0 --separate-stderr project -s uninstall DESTDIR="$dest" prefix=/usr
+	[[ "$stderr" == "nothing to remove: $dest/usr/share/incise/.installed is missing"* ]]
+	find "$dest" | sort | cmp before -
+	mkdir mine && touch mine/data.rec
+	run -2 --separate-stderr project -s clean O="$PWD/mine"
+	[[ "$stderr" == *"mine is no build folder"* ]]
+	[ -e mine/data.rec ]
+}

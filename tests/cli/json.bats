@@ -58,6 +58,7 @@ recordings() {
 	report export export a.rec -o a.csv
 	echo 'force_mV_N = 1234.0;' >new.conf
 	report recalibrate recalibrate a.rec -c new.conf
+	report recover recover a.rec -o recovered.rec
 	report replay replay a.rec liver.scene
 	report replay.real_time replay a.rec liver.scene --real-time
 }

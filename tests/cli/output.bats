@@ -352,6 +352,7 @@ full() {
 		plan wall
 		provenance l.csv
 		recalibrate d.rec -c calibration.conf
+		recover d.rec -o r.rec
 		replay d.rec wall
 		rig --rig sim:
 		serve --rig sim: --igtl 0 --duration 50ms

@@ -103,3 +103,24 @@ setup() {
 	[[ "${lines[1]}" == "  model ?[31m.fis, SHA-256 aaaaaaaaaaaaaaaa…: not here" ]]
 	[[ "$stderr" == *"odd: its way back ends before a recording"* ]]
 }
+
+# bats test_tags=check
+@test "a head that is the same does not hide rows that were changed, nor another calibration" {
+	cp -r "a b;.rec" here.rec
+	incise export here.rec --lineage -o then.csv >/dev/null
+	run -0 incise provenance then.csv
+	echo 'force_mV_N = 1111.0;' >c.conf
+	incise recalibrate here.rec -c c.conf >/dev/null
+	run -1 --separate-stderr incise provenance then.csv
+	[[ "$output" == *"here.rec: is read by another calibration now"* ]]
+	incise export here.rec --lineage -o now.csv >/dev/null
+	run -0 incise provenance now.csv
+	[[ "$output" == *"calibration 0001-"*".conf is this file"* ]]
+	incise recalibrate here.rec --original >/dev/null
+	run -1 --separate-stderr incise provenance now.csv --json
+	[ "$(jq -r '.origins[] | .state' <<<"$output" | paste -sd' ')" = "other same" ]
+	run -0 incise provenance then.csv
+	sqlite3 here.rec/recording.db "UPDATE force SET code = code + 1 WHERE seq = 5"
+	run -1 --separate-stderr incise provenance then.csv
+	[[ "$output" == *"here.rec: not as it was recorded: force: block 0 is altered"* ]]
+}

@@ -29,7 +29,7 @@ python_tests() {
 }
 
 @test "python: models, scenes and calibrations, with Debian's packages" {
-	python_tests /usr/bin/python3 -m unittest -v test_model test_plan
+	python_tests /usr/bin/python3 -m unittest -v test_model test_plan test_names
 }
 
 @test "python: without any package" {

@@ -185,6 +185,13 @@ not_vouched() {
 	incise sign signed.rec --key "$kim"
 	run -0 --separate-stderr incise verify signed.rec --signers signers
 	[[ "$output" == *", what was recorded, but not its calibration, "*", all of it, "* ]]
+	# anyone can make an empty file, but not that what was signed is read by another calibration
+	cp -r signed.rec other.rec
+	touch other.rec/calibration/0004-20990101T000000Z.original
+	run -1 --separate-stderr incise verify other.rec --signers signers
+	[[ "$output" == *"calibration/0004-"*".original, by which it is read, is not in the statement"* ]]
+	[[ "$stderr" == *"other.rec: nobody in signers signed what it is now" ]]
+	rm -r other.rec
 	cp -r signed.rec other.rec
 	rm other.rec/calibration/0003-*
 	run -1 --separate-stderr incise verify other.rec --signers signers

@@ -63,27 +63,30 @@ static int progress(void *user, double share)
 	return cli_stop;
 }
 
-/*
- * Whether the recording is read by the calibration of the statement, or by that of its capture again
- * after it; it is a finding if not.
- */
+/* SHA-256 of the last calibration of a list, which is the active one; "": that of the capture. */
+static void find_active(const char *list, char sha256[65])
+{
+	*sha256 = 0;
+	for (const char *line = list; *line; line = strchr(line, '\n') + 1)
+		if (sscanf(line, "calibration %*s %64[0-9a-f]", sha256) != 1)
+			*sha256 = 0;
+}
+
+/* Whether the recording is read by the calibration of the statement; it is a finding if not. */
 static bool compare_calibration(struct vouch *vouch, const struct seal_file *file,
 				const struct comparison *comparison)
 {
 	struct incise_error err = {0};
 	char *now = cli_require(seal_calibrations(vouch->recording, &err), &err);
 	const char *then = file->bytes + seal_statement_length(file->bytes, file->n);
-	const char *active = now, *kind;
-	char name[200] = "", text[300];
-	bool kept, known;
+	bool kept = !strncmp(now, then, strlen(then)), known;
+	char read_by[65], signed_as[65], name[200] = "", text[300];
 
-	/* The last one is active. */
 	for (char *line = now; *line; line = strchr(line, '\n') + 1)
-		active = line;
-	sscanf(active, "calibration %199s", name);
-	kind = strrchr(name, '.');
-	kept = !strncmp(now, then, strlen(then));
-	known = kept && (!now[strlen(then)] || (kind && !strcmp(kind, ".original")));
+		sscanf(line, "calibration %199s", name);
+	find_active(now, read_by);
+	find_active(then, signed_as);
+	known = kept && !strcmp(read_by, signed_as);
 	if (!known) {
 		struct incise_verify_finding finding = {
 			.kind = INCISE_VERIFY_SEAL,

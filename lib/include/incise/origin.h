@@ -67,8 +67,9 @@ INCISE_API bool incise_origin_next(const char *bytes, size_t n, size_t *at,
 struct incise_recording;
 
 /**
- * Write the origin of an open recording: its head at its last commit, of depth 1; of a joined one that
- * of each member, named "day.rec:a". One of an older format, without a seal, has none.
+ * Write the origin of an open recording: its head at its last commit, of depth 1, and of depth 2 the
+ * calibration by which it is read, if it is not that of its capture; of a joined one those of each member,
+ * named "day.rec:a". One of an older format, without a seal, has none.
  *
  * @param text tokens with a blank between them, as many as fit, and a NUL
  * @param size at least 1

@@ -92,6 +92,17 @@ INCISE_API struct incise_recording *incise_recording_open(const char *path,
 /** NULL is accepted. */
 INCISE_API void incise_recording_close(struct incise_recording *recording);
 
+/**
+ * Copy an interrupted recording to a folder that does not exist: its database with what its log has, or
+ * without what its journal takes back, and all else bit for bit. It is as incomplete as it was; reading
+ * it needs no private copy. The recording that is read stays as it is.
+ *
+ * @return 0; -EEXIST (@p output), -EBUSY (it is being written), -EINVAL (no recording, damaged, or one with
+ *         files that none has), those of mkdir(2) and write(2).
+ */
+INCISE_API int incise_recording_recover(const char *path, const char *output,
+					struct incise_error *err);
+
 /** Get the contents. @return 0, -EINVAL (an invalid row), -EIO. */
 INCISE_API int incise_recording_info(struct incise_recording *recording,
 				     struct incise_recording_info *info,

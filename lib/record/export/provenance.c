@@ -117,12 +117,27 @@ static const char *name_of(const char *path)
 	return slash ? slash + 1 : path;
 }
 
-/* Append the head of a recording as an origin; nothing of one that has none, or if it does not fit. */
+/* Append an origin; nothing if it does not fit. */
+static size_t put_token(const struct incise_origin *origin, char *text, size_t size,
+			size_t at)
+{
+	char token[INCISE_ORIGIN_TEXT];
+
+	if (incise_origin_text(origin, token) <= 0 ||
+	    at + (at > 0) + strlen(token) >= size)
+		return at;
+	return at + (size_t)sprintf(text + at, "%s%s", at ? " " : "", token);
+}
+
+/*
+ * Append the head of a recording, and the calibration by which it is read, if it is not that of its
+ * capture. Nothing of one that has no head.
+ */
 static size_t put_origin(struct incise_recording *recording, const char *name, char *text,
 			 size_t size, size_t at)
 {
-	struct incise_origin origin = {.depth = 1, .kind = "recording"};
-	char token[INCISE_ORIGIN_TEXT];
+	struct incise_origin origin = {.depth = 1, .kind = "recording"},
+			     calibration = {.depth = 2, .kind = "calibration"};
 	struct incise_seal_head head;
 
 	if (incise_seal_head(recording, origin.identity, &head, NULL))
@@ -130,10 +145,14 @@ static size_t put_origin(struct incise_recording *recording, const char *name, c
 	strcpy(origin.sha256, head.head);
 	origin.commit = (uint64_t)head.commit;
 	snprintf(origin.name, sizeof(origin.name), "%s", name);
-	if (incise_origin_text(&origin, token) <= 0 ||
-	    at + (at > 0) + strlen(token) >= size)
+	at = put_token(&origin, text, size, at);
+	if (!recording->recalibrated)
 		return at;
-	return at + (size_t)sprintf(text + at, "%s%s", at ? " " : "", token);
+	memcpy(calibration.sha256, recording->recalibrated->entry.sha256,
+	       sizeof(calibration.sha256));
+	snprintf(calibration.name, sizeof(calibration.name), "%s",
+		 name_of(recording->recalibrated->entry.file));
+	return put_token(&calibration, text, size, at);
 }
 
 size_t incise_recording_origins(struct incise_recording *recording, char *text,

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A copy of an interrupted recording that is read like any other: its database without log and journal, and
+ * all else that is in its folder, bit for bit; see incise/recording.h.
+ *
+ *     OLD.rec.part/                                NEW.rec/
+ *       recording.db, -wal or -journal   ──▶        recording.db
+ *       camera.mkv, calibration/…, seal/…  ──▶      the same
+ */
+#include <dirent.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include "database.h"
+#include "recording.h"
+#include "../schema.h"
+
+static bool is_hidden(const char *name)
+{
+	return !strcmp(name, ".") || !strcmp(name, "..");
+}
+
+/* What was made of a copy that failed. */
+static void remove_folder(const char *path)
+{
+	DIR *folder = opendir(path);
+	struct dirent *entry;
+
+	while (folder && (entry = readdir(folder))) {
+		char *name;
+
+		if (is_hidden(entry->d_name) ||
+		    asprintf(&name, "%s/%s", path, entry->d_name) < 0)
+			continue;
+		if (unlink(name) && (errno == EISDIR || errno == EPERM))
+			remove_folder(name);
+		free(name);
+	}
+	if (folder)
+		closedir(folder);
+	rmdir(path);
+}
+
+static int bring_folder(const char *from, const char *to, bool top,
+			struct incise_error *err);
+
+static int bring(const char *from, const char *to, bool top, struct incise_error *err)
+{
+	struct stat st;
+	int rc;
+
+	if (lstat(from, &st))
+		return incise_error_set(err, errno, "%s: %s", from, strerror(errno));
+	if (top && S_ISDIR(st.st_mode)) {
+		if (mkdir(to, 0777))
+			return incise_error_set(err, errno, "%s: cannot be made: %s", to,
+						strerror(errno));
+		return bring_folder(from, to, false, err);
+	}
+	if (!S_ISREG(st.st_mode))
+		return incise_error_set(err, EINVAL,
+					"%s: no file: no recorder makes it; remove it",
+					from);
+	rc = incise_database_bring(from, to);
+	return rc ? incise_error_set(err, -rc, "%s: cannot be written: %s", to,
+				     strerror(-rc))
+		  : 0;
+}
+
+/* All but the database. A recording has folders of files, and these have none. */
+static int bring_folder(const char *from, const char *to, bool top,
+			struct incise_error *err)
+{
+	DIR *folder = opendir(from);
+	struct dirent *entry;
+	int rc = 0;
+
+	if (!folder)
+		return incise_error_set(err, errno, "%s: %s", from, strerror(errno));
+	while (!rc && (entry = readdir(folder))) {
+		const char *name = entry->d_name;
+		char *old = NULL, *new = NULL;
+
+		if (is_hidden(name) ||
+		    (top && !strncmp(name, INCISE_SCHEMA_DB, strlen(INCISE_SCHEMA_DB))))
+			continue;
+		if (asprintf(&old, "%s/%s", from, name) < 0 ||
+		    asprintf(&new, "%s/%s", to, name) < 0)
+			rc = incise_error_set(err, ENOMEM, "%s: out of memory", from);
+		else
+			rc = bring(old, new, top, err);
+		free(old);
+		free(new);
+	}
+	closedir(folder);
+	return rc;
+}
+
+/* Nothing that cannot be read gets the final name. */
+static int try_it(const char *path, struct incise_error *err)
+{
+	struct incise_recording *recording = incise_recording_open_any(path, err);
+
+	if (!recording)
+		return -errno;
+	incise_recording_close(recording);
+	return 0;
+}
+
+static int recover_to(const char *from, const char *to, struct incise_error *err)
+{
+	char *file;
+	int rc;
+
+	if (asprintf(&file, "%s/%s", to, INCISE_SCHEMA_DB) < 0)
+		return incise_error_set(err, ENOMEM, "%s: out of memory", to);
+	rc = incise_database_recover(from, file, err);
+	free(file);
+	if (!rc)
+		rc = bring_folder(from, to, true, err);
+	return rc ? rc : try_it(to, err);
+}
+
+int incise_recording_recover(const char *path, const char *output,
+			     struct incise_error *err)
+{
+	char *folder, *part;
+	int rc = 0;
+
+	if (!access(output, F_OK))
+		return incise_error_set(err, EEXIST, "%s: exists; give another name",
+					output);
+	folder = incise_recording_folder(path, err);
+	if (!folder)
+		return -errno;
+	if (asprintf(&part, "%s.part", output) < 0) {
+		free(folder);
+		return incise_error_set(err, ENOMEM, "%s: out of memory", output);
+	}
+	if (mkdir(part, 0777))
+		rc = incise_error_set(err, errno,
+				      "%s: cannot be made: %s; give another name", part,
+				      strerror(errno));
+	if (!rc) {
+		rc = recover_to(folder, part, err);
+		if (!rc && rename(part, output))
+			rc = incise_error_set(err, errno, "%s: %s", output,
+					      strerror(errno));
+		if (rc)
+			remove_folder(part);
+	}
+	free(part);
+	free(folder);
+	return rc;
+}
