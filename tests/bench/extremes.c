@@ -13,7 +13,7 @@
 #include <string.h>
 #include <incise/plan.h>
 #include "../../lib/control/plant.h"
-#include "../../lib/control/stability.h"
+#include <incise/stability.h>
 #include "../extremes/extremes.h"
 #include "../../tools/cli/file.h"
 #include "../../tools/cli/scene_argument.h"
