@@ -4,7 +4,6 @@
  * different, and what it finds.
  */
 #include "../unit.h"
-#include <math.h>
 #include "../../../lib/base/random.h"
 #include "../../../tools/bench/metrics.h"
 
@@ -59,11 +58,9 @@ static json_t *made_report(const struct made *made, uint64_t *random)
 
 static json_t *compared(json_t *was, json_t *is)
 {
-	struct incise_error err = {0};
 	json_t *comparison = compare_reports(was, "OLD", is, "NEW", &err);
 
-	if (!comparison)
-		fail_msg("%s", err.text);
+	succeeds(comparison);
 	json_decref(was);
 	json_decref(is);
 	return comparison;
