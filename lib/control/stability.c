@@ -15,7 +15,7 @@
 #include <complex.h>
 #include <math.h>
 #include <stdbool.h>
-#include "stability.h"
+#include <incise/stability.h>
 #include "../base/units.h"
 
 /* glibc 2.36 has it for gcc alone. */
@@ -236,11 +236,6 @@ double incise_stability_colgate(const struct incise_haptic_device *d,
 			: 0;
 }
 
-double incise_stability_gil(const struct incise_haptic_device *d, double damping_N_s_mm)
-{
-	return valid(d) ? fmax(0, (d->damping_N_s_mm + damping_N_s_mm) / lag_s(d)) : 0;
-}
-
 double incise_stability_quantisation(const struct incise_haptic_device *d)
 {
 	double sampled;
@@ -250,22 +245,4 @@ double incise_stability_quantisation(const struct incise_haptic_device *d)
 	sampled = 2 * d->damping_N_s_mm / d->period_s;
 	return d->encoder_mm > 0 ? fmin(sampled, 2 * d->coulomb_N / d->encoder_mm)
 				 : sampled;
-}
-
-double incise_stability_amplitude(const struct incise_haptic_device *d,
-				  double stiffness_N_mm)
-{
-	double made, omega;
-
-	if (!valid(d) || !(stiffness_N_mm > 0))
-		return 0;
-	made = stiffness_N_mm * lag_s(d) - d->damping_N_s_mm;
-	omega = sqrt(stiffness_N_mm / (d->mass_kg * N_S2_PER_MM_KG));
-	return made > 0 ? 4 * d->coulomb_N / (M_PI * omega * made) : INFINITY;
-}
-
-double incise_stability_leak(const struct incise_haptic_device *d, double stiffness_N_mm,
-			     double speed_mm_s, double depth_mm)
-{
-	return valid(d) ? stiffness_N_mm * 2 * lag_s(d) * speed_mm_s * depth_mm : 0;
 }

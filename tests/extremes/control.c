@@ -5,7 +5,7 @@
 #include <string.h>
 #include "../../lib/base/vector.h"
 #include "../../lib/control/plant.h"
-#include "../../lib/control/stability.h"
+#include <incise/stability.h>
 #include "extremes.h"
 #include "numbers.h"
 
@@ -85,21 +85,19 @@ static void try_stability(struct extremes_row *row, const struct property *prope
 	double damping = below(3) ? 0 : special();
 	double exact = incise_stability_limit(&d, damping);
 	double passive = incise_stability_colgate(&d, damping);
-	double linear = incise_stability_gil(&d, damping);
 	double steps = incise_stability_quantisation(&d);
 	/* b T/m within the range of the exact limit, and a device that can be. */
 	double x = d.damping_N_s_mm * d.period_s / (d.mass_kg * 1e-3);
 	bool exactly = x > 1e-6 && x < 100 && damping == 0 && d.delay_ticks >= 0 &&
 		       d.delay_ticks <= INCISE_STABILITY_DELAY_MAX && isfinite(passive);
 
-	extremes_check(
-		row,
-		exact >= 0 && passive >= 0 && linear >= 0 && steps >= 0 &&
-			(!exactly || passive <= exact * (1 + 1e-6)),
-		"limit %a, passive %a, linear %a, quantised %a: mass %a, damping %a, "
-		"coulomb %a, encoder %a, period %a, delay %d, wall's damping %a",
-		exact, passive, linear, steps, d.mass_kg, d.damping_N_s_mm, d.coulomb_N,
-		d.encoder_mm, d.period_s, d.delay_ticks, damping);
+	extremes_check(row,
+		       exact >= 0 && passive >= 0 && steps >= 0 &&
+			       (!exactly || passive <= exact * (1 + 1e-6)),
+		       "limit %a, passive %a, quantised %a: mass %a, damping %a, "
+		       "coulomb %a, encoder %a, period %a, delay %d, wall's damping %a",
+		       exact, passive, steps, d.mass_kg, d.damping_N_s_mm, d.coulomb_N,
+		       d.encoder_mm, d.period_s, d.delay_ticks, damping);
 }
 
 const struct property control_properties[] = {

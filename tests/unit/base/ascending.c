@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * lib/base/ascending.h: the median of odd and even counts.
- */
+/* lib/base/ascending.h: the median of odd and even counts. */
 #include "../unit.h"
 #include "../../../lib/base/ascending.h"
 

@@ -3,18 +3,13 @@
  * lib/base/calibration.c: the paper's figures; what is appended is read back the same, what
  * failed is not in force, what is damaged is refused; the text of a file, to the letter.
  */
-#include <errno.h>
+#include "../unit.h"
 #include <locale.h>
-#include <math.h>
 #include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/wait.h>
 #include <incise/calibration.h>
 #include "../../../lib/base/calibration.c"
 #include "../message.h"
-#include "../unit.h"
 #include "temp_file.h"
 
 TEST(nominal_is_the_papers)
@@ -77,7 +72,6 @@ TEST(faults_leave_the_calibration_alone)
 		struct temp_file file = temp_file_new("calibration.conf", row[i].text);
 		struct incise_calibration c = {
 			.force_mV_N = 1, .force_zero_mV = 2, .depth_mm_px = 3};
-		struct incise_error err;
 
 		assert_error(incise_calibration_load(file.path, &c, &err), EINVAL, &err,
 			     file.path, row[i].says[0], row[i].says[1]);
@@ -287,8 +281,6 @@ TEST(wrong_records_change_nothing)
 	row[10].covariance[1] = NAN;
 	row[11].low = 5; /* above high */
 	for (int i = 0; i < n; i++) {
-		struct incise_error err = {0};
-
 		assert_error(incise_calibration_append(file.path, &row[i], &err), EINVAL,
 			     &err, "nothing appended");
 		assert_string_equal(content(file.path), "force_mV_N = 1200;\n");
@@ -342,7 +334,6 @@ TEST(wrong_files_are_named)
 		struct temp_file file = temp_file_new("calibration.conf", row[i].text);
 		struct incise_calibration_record *records = (void *)1, new;
 		struct incise_calibration c = {.force_mV_N = 1};
-		struct incise_error err;
 
 		assert_error(incise_calibration_load(file.path, &c, &err), EINVAL, &err,
 			     file.path, row[i].said);

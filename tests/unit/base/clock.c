@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Real and simulated clocks.
- */
+/* Real and simulated clocks. */
 #include "../unit.h"
-#include <errno.h>
 #include <signal.h>
 #include <sys/time.h>
 #include <time.h>

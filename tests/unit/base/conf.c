@@ -1,13 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * lib/base/conf.c: what strict reading takes, and what it says of what it refuses.
- */
-#include <errno.h>
-#include <math.h>
-#include <string.h>
+/* lib/base/conf.c: what strict reading takes, and what it says of what it refuses. */
+#include "../unit.h"
 #include "../../../lib/base/conf.h"
 #include "../message.h"
-#include "../unit.h"
 #include "temp_file.h"
 
 /* Everything a file may hold here: a group `sim` with `seed`, `name`, and a surface. */
@@ -92,7 +87,6 @@ TEST(refused_with_file_line_and_cause)
 	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
 		struct temp_file file = temp_file_new("a.conf", row[i].text);
 		struct content content = {.normal = {0, 0, 1}};
-		struct incise_error err;
 		config_t config;
 
 		assert_error(read_content(file.path, &config, &content, &err), EINVAL,
@@ -164,7 +158,6 @@ TEST(absent_keys_change_nothing)
 
 TEST(unreadable_files_are_named)
 {
-	struct incise_error err;
 	config_t config;
 
 	assert_error(incise_conf_read(&config, "/nowhere/a.conf", &err), ENOENT, &err,

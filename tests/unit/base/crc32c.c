@@ -4,7 +4,6 @@
  * the division bit by bit.
  */
 #include "../unit.h"
-#include <string.h>
 #include "../../../lib/base/crc32c.h"
 
 TEST(vectors_of_rfc_3720)

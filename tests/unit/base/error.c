@@ -1,18 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Errors as values: the code, errno and a single clean line.
- */
+/* Errors as values: the code, errno and a single clean line. */
 #include "../unit.h"
-#include <stdio.h>
-#include <errno.h>
-#include <string.h>
 #include <incise/error.h>
 #include <incise/version.h>
 
 TEST(test_code_line_and_errno)
 {
-	struct incise_error err = {0};
-
 	errno = 0;
 	assert_int_equal(incise_error_set(&err, ENOENT, "%s:%d: gone", "a.fis", 7),
 			 -ENOENT);
@@ -31,7 +24,6 @@ TEST(test_without_a_place_to_leave_it)
 /* Text from a file must not end the line, move the cursor or overrun. */
 TEST(test_hostile_text)
 {
-	struct incise_error err = {0};
 	char longer[2000];
 
 	incise_error_set(&err, EINVAL, "a\nb\033[2Jc\x7f");
@@ -72,7 +64,6 @@ TEST(test_a_missing_library_is_named_with_its_package)
 		{"libsqlite3.so.0", "libsqlite3-0"},
 		{"libincise-view.so.2", "libincise2"},
 	};
-	struct incise_error err = {0};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		char said[200], want[200];

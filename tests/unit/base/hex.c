@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * lib/base/hex.h over all bytes, against the C library in its own locale.
- */
+/* lib/base/hex.h over all bytes, against the C library in its own locale. */
 #include "../unit.h"
 #include <ctype.h>
-#include <stdlib.h>
 #include "../../../lib/base/hex.h"
 
 TEST(all_bytes)

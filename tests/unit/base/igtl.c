@@ -3,15 +3,7 @@
  * Tests of lib/base/igtl.c: bytes next to those of libopenigtlink's C functions, all that is
  * packed is parsed back, and what is wrong is found.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <errno.h>
-#include <math.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include <incise/igtl.h>
 
 #if __has_include(<openigtlink/igtl_header.h>)
@@ -55,7 +47,7 @@ static uint64_t divide(uint64_t crc, const uint8_t *bytes, size_t n)
 	return crc;
 }
 
-static void crc_is_that_of_ecma_182(void **state)
+TEST(crc_is_that_of_ecma_182)
 {
 	uint8_t bytes[300];
 
@@ -73,7 +65,7 @@ static void crc_is_that_of_ecma_182(void **state)
 			    divide(0, bytes, sizeof(bytes)));
 }
 
-static void times_survive(void **state)
+TEST(times_survive)
 {
 	static const int64_t seconds[] = {0, 1, 1795740000, UINT32_MAX};
 
@@ -108,7 +100,7 @@ static void peer_header(uint8_t *bytes, const char *type, const char *name, uint
 	memcpy(bytes, &header, sizeof(header));
 }
 
-static void transform_equals_libopenigtlink(void **state)
+TEST(transform_equals_libopenigtlink)
 {
 	igtl_float32 body[12];
 	uint8_t ours[200], peers[IGTL_HEADER_SIZE + IGTL_TRANSFORM_SIZE];
@@ -124,7 +116,7 @@ static void transform_equals_libopenigtlink(void **state)
 	assert_memory_equal(ours, peers, sizeof(peers));
 }
 
-static void string_equals_libopenigtlink(void **state)
+TEST(string_equals_libopenigtlink)
 {
 	static const char text[] = "{\"force_N\":[0,1.5,-2]}";
 	igtl_string_header head = {.encoding = 3, .length = sizeof(text) - 1};
@@ -188,7 +180,7 @@ static void check_image(int components)
 	assert_memory_equal(ours, peers, IGTL_HEADER_SIZE + size);
 }
 
-static void images_equal_libopenigtlink(void **state)
+TEST(images_equal_libopenigtlink)
 {
 	check_image(1);
 	check_image(3);
@@ -206,7 +198,7 @@ void igtl_status_convert_byte_order(struct peer_status *status);
 igtl_uint64 igtl_status_get_crc(struct peer_status *status, igtl_uint32 n,
 				const char *text);
 
-static void status_equals_libopenigtlink(void **state)
+TEST(status_equals_libopenigtlink)
 {
 	static const char text[] = "scene neck runs";
 	const struct incise_igtl_status status = {
@@ -224,7 +216,7 @@ static void status_equals_libopenigtlink(void **state)
 	assert_memory_equal(ours, peers, sizeof(peers));
 }
 
-static void trackers_of_libopenigtlink_are_read(void **state)
+TEST(trackers_of_libopenigtlink_are_read)
 {
 	igtl_tdata_element element[2] = {{.name = "Probe", .type = IGTL_TDATA_TYPE_6D},
 					 {.name = "Tip", .type = IGTL_TDATA_TYPE_6D}};
@@ -262,7 +254,7 @@ static void trackers_of_libopenigtlink_are_read(void **state)
 }
 
 /* It adds 32 halves, each rounded to 1 ns: up to 12 ns off. */
-static void times_are_near_those_of_libopenigtlink(void **state)
+TEST(times_are_near_those_of_libopenigtlink)
 {
 	for (uint32_t ns = 0; ns < 1000000000; ns += 999983) {
 		int64_t exact = (int64_t)incise_igtl_time(ns);
@@ -273,7 +265,7 @@ static void times_are_near_those_of_libopenigtlink(void **state)
 	}
 }
 #else
-static void no_peer(void **state)
+TEST(no_peer)
 {
 	skip(); /* libopenigtlink-dev is not installed */
 }
@@ -365,7 +357,7 @@ static void check_message(const struct incise_igtl_message *message, int i)
 }
 
 /* As they come: all at once, or in parts of each size. */
-static void streams_find_all_messages(void **state)
+TEST(streams_find_all_messages)
 {
 	static uint8_t bytes[4096];
 	size_t size = all_messages(bytes, sizeof(bytes));
@@ -392,7 +384,7 @@ static void streams_find_all_messages(void **state)
 	}
 }
 
-static void each_changed_bit_of_a_body_is_found(void **state)
+TEST(each_changed_bit_of_a_body_is_found)
 {
 	uint8_t bytes[300];
 	struct incise_igtl_message message;
@@ -410,7 +402,7 @@ static void each_changed_bit_of_a_body_is_found(void **state)
 }
 
 /* A stream goes on behind a message that is too large or damaged, and not behind junk. */
-static void streams_pass_over_what_is_wrong(void **state)
+TEST(streams_pass_over_what_is_wrong)
 {
 	static uint8_t bytes[4096];
 	struct incise_igtl_stream *stream = incise_igtl_stream_new(100);
@@ -439,7 +431,7 @@ static void streams_pass_over_what_is_wrong(void **state)
 	incise_igtl_stream_free(NULL);
 }
 
-static void wrong_arguments_are_refused(void **state)
+TEST(wrong_arguments_are_refused)
 {
 	struct incise_igtl_label wrong = label;
 	const struct incise_igtl_image image = {.components = 1,
@@ -494,28 +486,4 @@ static void wrong_arguments_are_refused(void **state)
 	assert_int_equal(incise_igtl_parse(bytes, 70, &message), 70);
 	assert_int_equal(incise_igtl_position(&message, matrix), 0);
 	assert_true(matrix[0][0] == 1 && matrix[1][1] == 1 && matrix[2][1] == 0);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-#ifdef PEER
-		cmocka_unit_test(transform_equals_libopenigtlink),
-		cmocka_unit_test(string_equals_libopenigtlink),
-		cmocka_unit_test(images_equal_libopenigtlink),
-		cmocka_unit_test(status_equals_libopenigtlink),
-		cmocka_unit_test(trackers_of_libopenigtlink_are_read),
-		cmocka_unit_test(times_are_near_those_of_libopenigtlink),
-#else
-		cmocka_unit_test(no_peer),
-#endif
-		cmocka_unit_test(crc_is_that_of_ecma_182),
-		cmocka_unit_test(times_survive),
-		cmocka_unit_test(streams_find_all_messages),
-		cmocka_unit_test(each_changed_bit_of_a_body_is_found),
-		cmocka_unit_test(streams_pass_over_what_is_wrong),
-		cmocka_unit_test(wrong_arguments_are_refused),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

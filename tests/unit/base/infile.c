@@ -2,14 +2,12 @@
 /*
  * incise/infile.h: lines and whole files, their limits, pipes, devices, decimal numbers.
  */
-#include <errno.h>
+#include "../unit.h"
 #include <fcntl.h>
-#include <math.h>
 #include <pthread.h>
 #include <sys/stat.h>
 #include <incise/infile.h>
 #include "../message.h"
-#include "../unit.h"
 #include "temp_file.h"
 
 static const struct incise_infile_kind stream = {.name = "a text", .advice = "give one"};
@@ -54,7 +52,6 @@ TEST(test_lines_of_all_lengths)
 TEST(test_limits_are_named)
 {
 	struct temp_file temp = temp_file_new("l.txt", "one\n");
-	struct incise_error err = {0};
 	struct incise_infile *file;
 	char *line;
 	size_t size;
@@ -96,7 +93,6 @@ TEST(test_pipes)
 {
 	struct temp_file temp = temp_file_new("pipe", "");
 	const struct incise_infile_kind regular = {.name = "a note", .regular = true};
-	struct incise_error err = {0};
 	struct incise_infile *file;
 	pthread_t thread;
 	char *line;
@@ -127,7 +123,6 @@ TEST(test_devices_are_refused)
 {
 	static const char *const devices[] = {"/dev/zero", "/dev/urandom", "/dev/full",
 					      "/dev/null", "/dev/tty"};
-	struct incise_error err = {0};
 	size_t size;
 
 	for (size_t i = 0; i < sizeof(devices) / sizeof(*devices); i++) {

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * lib/base/lines.h: lines without their ends, a NUL byte, errors of file and line.
- */
-#include <errno.h>
+/* lib/base/lines.h: lines without their ends, a NUL byte, errors of file and line. */
+#include "../unit.h"
 #include "../../../lib/base/lines.h"
 #include "../message.h"
-#include "../unit.h"
 #include "temp_file.h"
 
 static const struct incise_infile_kind text = {.name = "a text", .advice = "give one"};
@@ -31,7 +28,6 @@ TEST(test_lines)
 TEST(test_errors)
 {
 	struct temp_file file = temp_file_new("l.txt", "one\n");
-	struct incise_error err = {0};
 	struct incise_lines in;
 	FILE *out = fopen(file.path, "w");
 

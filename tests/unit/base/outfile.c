@@ -1,22 +1,14 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Files that appear whole or not at all.
- */
+/* Files that appear whole or not at all. */
+#include "../unit.h"
 #include <dirent.h>
-#include <errno.h>
 #include <grp.h>
-#include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <signal.h>
-#include <unistd.h>
 #include <incise/outfile.h>
 #include "../message.h"
-#include "../unit.h"
 
 static char folder[] = "/tmp/incise-outfile-XXXXXX";
 static char path[64];
@@ -126,7 +118,6 @@ TEST(test_killed_writer, set_up, tear_down)
 TEST(test_failed_write, set_up, tear_down)
 {
 	struct rlimit before, small;
-	struct incise_error err = {0};
 	struct incise_outfile *file = incise_outfile_open(path, NULL);
 	char block[4096] = {0};
 	int rc;
@@ -247,7 +238,6 @@ TEST(test_another_group_gets_no_more, set_up, tear_down)
 /* Devices and pipes are written in place: there is nothing to rename. */
 TEST(test_special_files)
 {
-	struct incise_error err = {0};
 	struct incise_outfile *file = incise_outfile_open("/dev/null", NULL);
 	struct stat st;
 

@@ -4,8 +4,6 @@
  * that a bound of 5 sd does not depend on luck.
  */
 #include "../unit.h"
-#include <math.h>
-#include <string.h>
 #include "../../../lib/base/random.h"
 
 #define N 200000

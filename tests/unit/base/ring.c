@@ -3,10 +3,8 @@
  * lib/base/ring.c: order, what is full, counts that wrap round the array, and two threads.
  */
 #include "../unit.h"
-#include <errno.h>
 #include <pthread.h>
 #include <sched.h>
-#include <stdlib.h>
 #include "../../../lib/base/ring.h"
 
 /* Three words of one value: a torn record shows. */

@@ -1,13 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Numbers in text against strtod(), which rounds correctly.
- */
+/* Numbers in text against strtod(), which rounds correctly. */
 #include "../unit.h"
 #include <locale.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/base/text.h"
 
 TEST(test_numbers_are_rounded_correctly)

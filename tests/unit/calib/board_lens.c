@@ -4,8 +4,6 @@
  * place on a board that a pixel shows.
  */
 #include "../unit.h"
-#include <math.h>
-#include <string.h>
 #include "../../../lib/calib/board_lens.h"
 
 static const union board_lens lens = {

@@ -4,34 +4,17 @@
  * corners, stated intervals on 200 random cameras, a view that is wrong, what is refused.
  * The camera here is written apart from lib/calib.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-#include <incise/calibrate_depth.h>
-#include "../../../lib/base/random.h"
-#include "../message.h"
 #include "../unit.h"
+#include <incise/calibrate_depth.h>
+#include "../message.h"
 #include "../cases.h"
+#include "draws.h"
 
 #define RIGS cases_of(200, 40)
 #define VIEWS 7
 #define COLUMNS 9
 #define ROWS 6
 #define SQUARE 5.0
-
-static uint64_t seed;
-
-static double uniform(void)
-{
-	incise_random_step(&seed);
-	return ((seed >> 11) + 0.5) * 0x1p-53;
-}
-
-static double normal(void)
-{
-	return sqrt(-2 * log(uniform())) * cos(2 * M_PI * uniform());
-}
 
 /* Tilts about x and y, a turn about the line of sight, and where the middle is. */
 struct pose {
@@ -175,7 +158,6 @@ TEST(test_exact)
 {
 	for (int n = 1; n <= 20; n++) {
 		struct incise_board_fit fit;
-		struct incise_error err = {0};
 		struct rig rig;
 		double mm[2], truth[2], corner[2], lean;
 
@@ -244,7 +226,6 @@ TEST(test_truth)
 TEST(test_wrong_view)
 {
 	struct incise_board_fit fit;
-	struct incise_error err = {0};
 	struct rig rig;
 
 	begin(1);

@@ -4,35 +4,20 @@
  * viscosity that are not known; each motion that is not sufficient is refused with its reason. An
  * argument is the number of data sets, 200 or what is given.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "../unit.h"
 #include <lapacke.h>
 #include <incise/calibrate_delay.h>
 #include "../../../lib/calib/calibrate_delay.c"
-#include "../../../lib/base/random.h"
 #include "../cases.h"
 #include "../message.h"
+#include "draws.h"
 
 #define MOTION_MAX 20000
 #define OTHER_MAX 200000
 
 static struct incise_delay_point motion[MOTION_MAX], other[OTHER_MAX];
 static int n_motion, n_other;
-static uint64_t seed;
 static int force_runs, camera_runs;
-
-static double uniform(void)
-{
-	incise_random_step(&seed);
-	return ((seed >> 11) + 0.5) * 0x1p-53;
-}
-
-static double normal(void)
-{
-	return sqrt(-2 * log(uniform())) * cos(2 * M_PI * uniform());
-}
 
 /* A tool that is moved up and down, by hand; mm and mm/s, into the tissue is positive. */
 struct hand {
@@ -142,7 +127,7 @@ static void draw_hand(struct hand *h)
 	h->phase = 2 * M_PI * uniform();
 }
 
-static void test_force_intervals(void **state)
+TEST(test_force_intervals)
 {
 	int in = 0, by_u = 0;
 	double worst = 0;
@@ -150,7 +135,6 @@ static void test_force_intervals(void **state)
 	for (int run = 1; run <= force_runs; run++) {
 		struct link l = force_link;
 		struct incise_delay_fit f;
-		struct incise_error err;
 		struct hand h;
 
 		seed = (uint64_t)run;
@@ -169,7 +153,7 @@ static void test_force_intervals(void **state)
 	check_share("force", in, by_u, force_runs, worst);
 }
 
-static void test_camera_intervals(void **state)
+TEST(test_camera_intervals)
 {
 	int in = 0, by_u = 0;
 	double worst = 0;
@@ -177,7 +161,6 @@ static void test_camera_intervals(void **state)
 	for (int run = 1; run <= camera_runs; run++) {
 		struct link l = force_link;
 		struct incise_delay_fit f;
-		struct incise_error err;
 		struct hand h;
 
 		seed = (uint64_t)run;
@@ -197,12 +180,11 @@ static void test_camera_intervals(void **state)
 }
 
 /* A delay that grows is found to, and one that does not is not. */
-static void test_drift(void **state)
+TEST(test_drift)
 {
 	for (int drifts = 0; drifts < 2; drifts++) {
 		struct link l = force_link;
 		struct incise_delay_fit f;
-		struct incise_error err;
 
 		seed = 9;
 		l.delay_ms = 5;
@@ -216,13 +198,12 @@ static void test_drift(void **state)
 	}
 }
 
-static void test_refusals(void **state)
+TEST(test_refusals)
 {
 	const struct hand even = {8, 0, 5.5, 2.5, 0}, small = {2, 1.1, 0.2, 2.5, 0};
 	struct link brief = force_link, loud = force_link, late = force_link,
 		    clipped = force_link;
 	struct incise_delay_fit f;
-	struct incise_error err;
 
 	brief.span_s = 5;
 	loud.noise = 5;
@@ -277,7 +258,7 @@ static struct normal normal_of(int from, int to)
 	return normal;
 }
 
-static void solution_is_that_of_the_rows(void **state)
+TEST(solution_is_that_of_the_rows)
 {
 	struct normal normal;
 	double a[ROWS][M], x[UNKNOWNS], b[ROWS];
@@ -294,7 +275,7 @@ static void solution_is_that_of_the_rows(void **state)
 		assert_true(fabs(x[j] - b[j]) < 1e-10 * fabs(b[j]) + 1e-15);
 }
 
-static void parts_add_up(void **state)
+TEST(parts_add_up)
 {
 	struct normal whole, parts;
 
@@ -318,7 +299,7 @@ static void parts_add_up(void **state)
 	}
 }
 
-static void what_says_nothing_gets_nothing(void **state)
+TEST(what_says_nothing_gets_nothing)
 {
 	struct normal normal;
 	double x[UNKNOWNS];
@@ -335,19 +316,11 @@ static void what_says_nothing_gets_nothing(void **state)
 	assert_false(solve(&normal, x));
 }
 
-int main(void)
+static int set_cases(void **state)
 {
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_force_intervals),
-		cmocka_unit_test(test_camera_intervals),
-		cmocka_unit_test(test_drift),
-		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(solution_is_that_of_the_rows),
-		cmocka_unit_test(parts_add_up),
-		cmocka_unit_test(what_says_nothing_gets_nothing),
-	};
-
 	force_runs = cases_of(40, 10);
 	camera_runs = cases_of(200, 40);
-	return cmocka_run_group_tests(tests, NULL, NULL);
+	return 0;
 }
+
+GROUP(set_cases, NULL);

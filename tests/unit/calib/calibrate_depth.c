@@ -3,26 +3,14 @@
  * Scale from two points and from a line: planted truth, stated intervals on 2000
  * random rigs, outliers that are named, and what is refused.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "../unit.h"
 #include <incise/calibrate_depth.h>
-#include "../../../lib/base/random.h"
 #include "../../../lib/calib/calibrate_depth.c"
 #include "../message.h"
-#include "../unit.h"
+#include "draws.h"
 
 #define RIGS 2000
 #define PAIRS 60
-
-static uint64_t seed;
-
-static double uniform(void)
-{
-	incise_random_step(&seed);
-	return ((seed >> 11) + 0.5) * 0x1p-53;
-}
 
 /* Seeds that follow each other would have much in common. */
 static void begin(uint64_t rig)
@@ -31,11 +19,6 @@ static void begin(uint64_t rig)
 	seed ^= seed >> 29;
 	for (int i = 0; i < 10; i++)
 		uniform();
-}
-
-static double normal(void)
-{
-	return sqrt(-2 * log(uniform())) * cos(2 * M_PI * uniform());
 }
 
 /* 95.45 % of 2000 are 1909, with a standard deviation of 9.3: three of these. */
@@ -137,7 +120,6 @@ TEST(test_points_outliers)
 	double px[20];
 	struct incise_depth_points points = points_of(px, 20);
 	struct incise_depth_fit fit;
-	struct incise_error err = {0};
 	bool inlier[20];
 
 	seed = 5;
@@ -241,7 +223,6 @@ TEST(test_line_truth)
 			struct line_data d;
 			struct incise_depth_lengths pairs = pairs_of(&d, n);
 			struct incise_depth_fit fit;
-			struct incise_error err = {0};
 			bool inlier[PAIRS];
 			double gauge;
 			int wrong = (int)(cases[c].wrong * n);

@@ -3,14 +3,10 @@
  * lib/calib/calibrate_force.c: figures of made data with known truth; what is wrong is named; the stated
  * interval holds the truth as often as it says.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdio.h>
-#include <string.h>
+#include "../unit.h"
 #include <incise/calibrate_force.h>
 #include "../../../lib/base/random.h"
 #include "../message.h"
-#include "../unit.h"
 
 #define MAX 64
 
@@ -299,7 +295,6 @@ TEST(what_cannot_be_is_named)
 	for (int r = 0; r < (int)(sizeof(row) / sizeof(row[0])); r++) {
 		struct rig rig = plain_rig(6);
 		struct incise_calibrate_force result;
-		struct incise_error err = {0};
 
 		for (int i = 0; i < rig.n; i++) {
 			struct incise_calibrate_force_pair *p = &rig.pair[i];
@@ -360,7 +355,6 @@ TEST(the_interval_holds_the_truth)
 		struct rig rig = {.key = incise_random_key(seed, 123)};
 		struct incise_calibrate_force_setup setup;
 		struct incise_calibrate_force result;
-		struct incise_error err = {0};
 		int n = 5 + seed % 4, series = 2 + seed % 3;
 		double latitude_deg = uniform(&rig, -90, 90), true_g[9];
 

@@ -4,15 +4,11 @@
  * is not the virtual rig's: its turns are written down in closed form, from the way since the
  * turn.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "../unit.h"
 #include <incise/calibrate_stepper.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/calib/calibrate_stepper.c"
 #include "../message.h"
-#include "../unit.h"
 
 #define STEP_MM 0.000625
 #define POINTS_MAX 2000
@@ -100,7 +96,6 @@ TEST(finds_what_is_there)
 	for (size_t i = 0; i < sizeof(row) / sizeof(*row); i++) {
 		struct truth t = usual;
 		struct incise_calibrate_stepper r;
-		struct incise_error err = {0};
 
 		t.backlash_mm = row[i][0];
 		t.loss_N = row[i][1];
@@ -137,7 +132,6 @@ TEST(intervals_hold_the_truth)
 		const uint64_t key = incise_random_key(seed, INCISE_RANDOM_SURGEON);
 		struct truth t = usual;
 		struct incise_calibrate_stepper r;
-		struct incise_error err = {0};
 
 		t.seed = seed;
 		t.N_mm = uniform(key, 0, 0.5, 4);

@@ -3,12 +3,9 @@
  * Tests of lib/calib/delay_grid.c: two streams on one grid are what they were made of, with
  * derivatives that are known; rows near what is missing are not good.
  */
-#include <errno.h>
-#include <math.h>
-#include <string.h>
+#include "../unit.h"
 #include "../../../lib/calib/delay_grid.h"
 #include "../message.h"
-#include "../unit.h"
 
 #define SPAN_S 12
 #define SLOW (SPAN_S * 100)   /* each 10 ms: cubics */
@@ -33,7 +30,6 @@ static void make_streams(void)
 TEST(streams_keep_their_values)
 {
 	struct delay_grid grid;
-	struct incise_error err;
 	int good = 0;
 
 	make_streams();
@@ -74,7 +70,6 @@ TEST(gaps_are_not_good)
 {
 	const double gap_s[] = {5, 6};
 	struct delay_grid grid;
-	struct incise_error err;
 	int n = 0;
 
 	make_streams();
@@ -103,7 +98,6 @@ TEST(gaps_are_not_good)
 TEST(what_cannot_be_compared_is_refused)
 {
 	struct delay_grid grid;
-	struct incise_error err;
 
 	make_streams();
 	assert_int_equal(delay_grid_make(&grid, slow, 9, quick, QUICK, &err), -EDOM);

@@ -6,8 +6,6 @@
 #include "../unit.h"
 #include <float.h>
 #include <lapacke.h>
-#include <math.h>
-#include <string.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/calib/dense.h"
 

@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * lib/calib/redundancy.c: made pairs of depths, alike, shifted, bent and scaled.
- */
-#include <errno.h>
-#include <math.h>
-#include <string.h>
+/* lib/calib/redundancy.c: made pairs of depths, alike, shifted, bent and scaled. */
+#include "../unit.h"
 #include <incise/redundancy.h>
 #include "../../../lib/base/random.h"
 #include "../message.h"
-#include "../unit.h"
 
 #define PAIRS 1000
 
@@ -75,7 +70,6 @@ TEST(too_little_is_refused)
 {
 	static struct incise_depth_pair pairs[PAIRS];
 	struct incise_redundancy r;
-	struct incise_error err = {0};
 
 	make(pairs, PLAIN, 1);
 	assert_error(incise_redundancy(pairs, 34, &r, &err), ENODATA, &err, "29 frames");

@@ -4,8 +4,6 @@
  * the line of least squares.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <math.h>
 #include "../../../lib/calib/robust_line.h"
 #include "../../../lib/base/random.h"
 

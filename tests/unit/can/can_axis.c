@@ -4,8 +4,6 @@
  * each cause of a stop has a text that says what to do. can_stepper.c tests faults as a whole.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <string.h>
 #include "../../../lib/device/can/cia402/can_axis.h"
 #include "../../../lib/device/page.h"
 #include "led.h"

@@ -4,7 +4,6 @@
  * drive is watched.
  */
 #include "../unit.h"
-#include <math.h>
 #include "rig.h"
 
 #define MS DRIVE_MS
@@ -108,7 +107,6 @@ TEST(why_it_cannot_begin_is_said)
 TEST(another_master_is_not_disturbed)
 {
 	const struct can_frame sync = {.can_id = CANOPEN_SYNC};
-	struct incise_error err = {0};
 
 	can_rig_init(&rig);
 	drive_say(&rig.drive, &sync);
@@ -149,7 +147,6 @@ TEST(who_goes_leaves_it_stopped_or_watched)
 TEST(a_watcher_looks_and_writes_nothing)
 {
 	struct incise_stepper_status s;
-	struct incise_error err = {0};
 	uint64_t enables;
 
 	can_rig_init(&rig);

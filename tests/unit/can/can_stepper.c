@@ -5,7 +5,6 @@
  * noticing is missing; homing by the drive; and no set-point is lost.
  */
 #include "../unit.h"
-#include <math.h>
 #include "../device/conformance.h"
 #include "rig.h"
 
@@ -351,14 +350,11 @@ TEST(a_program_that_stood_still_does_not_go_on)
 /* Off the bus, it uses up all the time that a stop has: disabling waits for that. */
 TEST(disabling_waits_for_the_end_of_a_stop)
 {
-	struct incise_error err = {0};
-
 	start(CSP, 0.2);
 	go();
 	pre_operational(&rig.drive, true);
 	rig.drive.no_tpdo = true;
-	if (incise_stepper_disable(rig.stepper, &err))
-		fail_msg("%s", err.text);
+	succeeds(!incise_stepper_disable(rig.stepper, &err));
 	assert_int_equal(can_rig_look(&rig).state, INCISE_STEPPER_STATE_FAULT);
 	can_rig_close(&rig);
 }
@@ -442,8 +438,6 @@ TEST(velocities_and_torques_go_there_too)
 /* Another program gives it power. */
 TEST(power_that_nobody_gave_is_a_fault)
 {
-	struct incise_error err = {0};
-
 	start(CSP, 0.1);
 	can_rig_open_or_fail(&rig);
 	drive_enter(&rig.drive, CIA402_ENABLED);
@@ -451,27 +445,22 @@ TEST(power_that_nobody_gave_is_a_fault)
 	assert_int_equal(can_rig_look(&rig).state, INCISE_STEPPER_STATE_FAULT);
 	/* And its watch ends that. */
 	assert_false(drive_powered(&rig.drive));
-	if (incise_stepper_clear(rig.stepper, &err))
-		fail_msg("%s", err.text);
+	succeeds(!incise_stepper_clear(rig.stepper, &err));
 	rig.drive.tripped = false;
-	if (incise_stepper_enable(rig.stepper, &err))
-		fail_msg("%s", err.text);
+	succeeds(!incise_stepper_enable(rig.stepper, &err));
 	can_rig_close(&rig);
 }
 
 /* The shortest accepted deadman: it must not expire at rest. */
 TEST(the_shortest_deadman_holds_at_rest)
 {
-	struct incise_error err = {0};
-
 	can_rig_init(&rig);
 	rig.actuator.deadman_s = 0.02;
 	assert_non_null(can_rig_open(&rig, &err));
 	for (int i = 0; i < 3; i++) {
 		can_rig_advance(&rig, 2000 * MS);
 		rig.drive.tripped = false;
-		if (incise_stepper_enable(rig.stepper, &err))
-			fail_msg("%s", err.text);
+		succeeds(!incise_stepper_enable(rig.stepper, &err));
 		assert_int_equal(incise_stepper_disable(rig.stepper, NULL), 0);
 	}
 	assert_int_equal(rig.drive.quick_stops, 0);
@@ -484,8 +473,6 @@ TEST(one_that_gives_way_gets_no_jump)
 	static const double way_mm[] = {-0.3, -2, 0.005};
 
 	for (size_t i = 0; i < sizeof(way_mm) / sizeof(*way_mm); i++) {
-		struct incise_error err = {0};
-
 		can_rig_init(&rig);
 		rig.drive.enable_ns = 50 * MS;
 		assert_non_null(can_rig_open(&rig, &err));
@@ -511,15 +498,13 @@ TEST(it_homes_by_itself)
 	for (size_t i = 0; i < sizeof(home_mm) / sizeof(*home_mm); i++) {
 		struct incise_stepper_edge_found edge = {0, 0};
 		struct incise_stepper_status s;
-		struct incise_error err = {0};
 
 		can_rig_init(&rig);
 		rig.actuator.home_mm = home_mm[i];
 		can_rig_open_or_fail(&rig);
 		assert_false(can_rig_look(&rig).homed);
 		can_rig_enable_or_fail(&rig);
-		if (incise_stepper_home(rig.stepper, NULL, &edge, &err))
-			fail_msg("%s", err.text);
+		succeeds(!incise_stepper_home(rig.stepper, NULL, &edge, &err));
 		s = can_rig_look(&rig);
 		assert_true(s.homed && s.state == INCISE_STEPPER_STATE_READY &&
 			    !s.faults);
@@ -547,7 +532,6 @@ TEST(it_homes_by_itself)
 TEST(homing_can_fail_and_be_stopped)
 {
 	volatile int stop = 0;
-	struct incise_error err = {0};
 
 	can_rig_init(&rig);
 	can_rig_open_or_fail(&rig);

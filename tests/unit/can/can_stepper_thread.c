@@ -3,7 +3,6 @@
  * lib/device/can/cia402/can_stepper.c with its real thread, on the simulated drive's clock.
  */
 #include "../unit.h"
-#include <math.h>
 #include "../virtual_time.h" /* with __wrap_clock_gettime() and others */
 #include "rig.h"
 
@@ -51,11 +50,9 @@ static void nap(int64_t ns)
 TEST(it_runs_and_lends_the_bus)
 {
 	struct incise_stepper_status s = {0};
-	struct incise_error err = {0};
 
 	can_rig_init(&rig);
-	if (!open_stepper(&err))
-		fail_msg("%s", err.text);
+	succeeds(open_stepper(&err));
 	assert_int_equal(incise_stepper_enable(rig.stepper, &err), 0);
 	/* 0.5 mm at 10 mm/s and 500 mm/s². */
 	for (int i = 0; i < 50; i++) {
@@ -66,10 +63,9 @@ TEST(it_runs_and_lends_the_bus)
 	assert_true(fabs(s.position_mm - 0.5) < 1e-3);
 	/* Borrowed again and again: disable, SDOs, enable. */
 	for (int i = 0; i < 3; i++) {
-		if (incise_stepper_disable(rig.stepper, &err) ||
-		    incise_stepper_clear(rig.stepper, &err) ||
-		    incise_stepper_enable(rig.stepper, &err))
-			fail_msg("%s", err.text);
+		succeeds(!incise_stepper_disable(rig.stepper, &err) &&
+			 !incise_stepper_clear(rig.stepper, &err) &&
+			 !incise_stepper_enable(rig.stepper, &err));
 	}
 	incise_stepper_set(rig.stepper, 15);
 	nap(40 * DRIVE_MS);
@@ -84,13 +80,11 @@ TEST(it_runs_and_lends_the_bus)
 TEST(a_watcher_has_a_thread_too)
 {
 	struct incise_stepper_status s = {0};
-	struct incise_error err = {0};
 	int64_t t_ns;
 
 	can_rig_init(&rig);
 	rig.watch = true;
-	if (!open_stepper(&err))
-		fail_msg("%s", err.text);
+	succeeds(open_stepper(&err));
 	/* The first status is valid at once. */
 	assert_int_equal(incise_stepper_status(rig.stepper, &s), 0);
 	assert_true(s.t_ns && s.state == INCISE_STEPPER_STATE_DISABLED);

@@ -4,7 +4,6 @@
  * figures made by hand; the load of the bus, with frames that are stuffed here bit by bit.
  */
 #include "../unit.h"
-#include <math.h>
 #include "../../../lib/device/can/cia402/can_units.h"
 #include "rig.h"
 
@@ -41,7 +40,6 @@ TEST(steps_are_as_fine_as_may_be)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
 		struct can_session session;
 
 		make(&session, cases[i].counts_per_turn, &err);
@@ -61,7 +59,6 @@ TEST(steps_are_as_fine_as_may_be)
 
 TEST(limits_are_the_drives_with_room)
 {
-	struct incise_error err = {0};
 	struct can_session session;
 
 	make(&session, 51200, &err);

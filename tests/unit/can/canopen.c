@@ -4,8 +4,6 @@
  * SDOs, with all the answers a node can give; the texts of codes.
  */
 #include "../unit.h"
-#include <stdio.h>
-#include <string.h>
 #include "../../../lib/device/can/canopen/canopen.h"
 #include "candump.h"
 #include "drive.h"
@@ -14,26 +12,23 @@
 #define N DRIVE_NODE
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
 
-struct world {
+static struct world {
 	struct drive drive;
 	struct canopen master;
-};
+} world, *const w = &world;
 
 static int setup(void **state)
 {
-	static struct world w;
-
-	drive_init(&w.drive);
-	w.master = (struct canopen){.bus = &w.drive.bus,
-				    .node = N,
-				    .own = OWN,
-				    .heartbeat_ns = 20 * DRIVE_MS,
-				    .state = CANOPEN_UNKNOWN};
-	*state = &w;
+	drive_init(&w->drive);
+	w->master = (struct canopen){.bus = &w->drive.bus,
+				     .node = N,
+				     .own = OWN,
+				     .heartbeat_ns = 20 * DRIVE_MS,
+				     .state = CANOPEN_UNKNOWN};
 	return 0;
 }
 
-static uint32_t handle(struct world *w, const char *text)
+static uint32_t handle(const char *text)
 {
 	struct can_frame frame = candump_read(text);
 
@@ -74,12 +69,11 @@ TEST(test_functions, setup)
 		{"00000080#", 0, false},
 	};
 	struct can_frame too_long = {.can_id = 0x190, .len = 64};
-	struct world *w = *state;
 
 	for (size_t i = 0; i < COUNT(cases); i++) {
 		uint32_t before = w->master.foreign;
 
-		assert_int_equal(handle(w, cases[i].frame), cases[i].function);
+		assert_int_equal(handle(cases[i].frame), cases[i].function);
 		assert_int_equal(w->master.foreign - before, cases[i].foreign);
 	}
 	assert_int_equal(canopen_handle(&w->master, &too_long, 42), 0);
@@ -115,11 +109,10 @@ TEST(test_reports, setup)
 		{"20000040#01", CANOPEN_BOOT_UP, 1, 0x8611, 1, 1},
 		{"20000040#0102030405060708", CANOPEN_BOOT_UP, 1, 0x8611, 1, 2},
 	};
-	struct world *w = *state;
 
 	w->master.state = CANOPEN_UNKNOWN;
 	for (size_t i = 0; i < COUNT(cases); i++) {
-		handle(w, cases[i].frame);
+		handle(cases[i].frame);
 		assert_int_equal(w->master.state, cases[i].state);
 		assert_int_equal(w->master.boots, cases[i].boots);
 		assert_int_equal(w->master.emcy.code, cases[i].code);
@@ -133,7 +126,6 @@ TEST(test_reports, setup)
 /* This side's heartbeat: on time, not made up for, tried again when the queue was full. */
 TEST(test_own_heartbeat, setup)
 {
-	struct world *w = *state;
 	int64_t t = w->drive.now_ns;
 
 	w->drive.od[OD_CONSUMER].value = (uint32_t)OWN << 16 | 50;
@@ -169,8 +161,6 @@ TEST(test_own_heartbeat, setup)
 
 TEST(test_nmt, setup)
 {
-	struct world *w = *state;
-
 	assert_int_equal(canopen_send_nmt(&w->master, CANOPEN_START), 0);
 	drive_advance(&w->drive, DRIVE_MS);
 	assert_int_equal(w->drive.nmt, CANOPEN_OPERATIONAL);
@@ -189,7 +179,6 @@ static bool operational(const struct canopen *master)
 
 TEST(test_await, setup)
 {
-	struct world *w = *state;
 	int64_t t = w->drive.now_ns;
 
 	assert_int_equal(canopen_await(&w->master, operational, t + 100 * DRIVE_MS),
@@ -228,7 +217,6 @@ TEST(test_await, setup)
 
 TEST(test_numbers, setup)
 {
-	struct world *w = *state;
 	uint32_t value = 0;
 
 	assert_int_equal(canopen_read(&w->master, 0x1000, 0, 4, &value), 0);
@@ -259,7 +247,6 @@ TEST(test_numbers, setup)
 
 TEST(test_silence, setup)
 {
-	struct world *w = *state;
 	int64_t t = w->drive.now_ns;
 	uint32_t value;
 
@@ -285,7 +272,6 @@ TEST(test_silence, setup)
 
 TEST(test_bus, setup)
 {
-	struct world *w = *state;
 	int64_t t = w->drive.now_ns;
 	uint32_t value;
 
@@ -351,7 +337,6 @@ TEST(test_answers, setup)
 		/* Announces segments that do not come. */
 		{"590#41001000FFFFFFFF", -ETIMEDOUT, 0},
 	};
-	struct world *w = *state;
 	uint32_t value;
 
 	for (size_t i = 0; i < COUNT(cases); i++) {
@@ -409,7 +394,6 @@ TEST(test_segments, setup)
 		{"590#4108100009000000 590#6008100000000000 590#097A7A7A007A7A7A", 64, 0,
 		 "zzz"},
 	};
-	struct world *w = *state;
 	char text[64];
 
 	w->master.answer_ns = 20 * DRIVE_MS;

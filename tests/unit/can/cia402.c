@@ -6,18 +6,15 @@
  */
 #include "../unit.h"
 #include <float.h>
-#include <stdio.h>
-#include <string.h>
 #include "led.h"
 
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
 
+static struct led led_of_test, *const led = &led_of_test;
+
 static int setup(void **state)
 {
-	static struct led led;
-
-	led_init(&led);
-	*state = &led;
+	led_init(led);
 	return 0;
 }
 
@@ -177,7 +174,6 @@ TEST(test_messages, setup)
 		{-EINTR, -EINTR, "stopped"},
 		{-ENETDOWN, -ENETDOWN, "can-test"},
 	};
-	struct led *led = *state;
 
 	led->master.abort = 0x06090030;
 	for (size_t i = 0; i < COUNT(cases); i++) {
@@ -191,7 +187,6 @@ TEST(test_messages, setup)
 
 TEST(test_objects, setup)
 {
-	struct led *led = *state;
 	struct drive_object *o = drive_object(&led->drive, 0x605a, 0);
 	uint32_t value = 0;
 	uint64_t asked;
@@ -236,7 +231,6 @@ static bool never(enum cia402_state state)
 
 TEST(test_await_state, setup)
 {
-	struct led *led = *state;
 	enum cia402_state last = CIA402_UNKNOWN;
 	int64_t t = led->drive.now_ns;
 
@@ -318,7 +312,6 @@ TEST(test_units, setup)
 		{"6092=5000/1 608F=4000/1 6091=1/1 60A8=FA010000 60A9=00B44700 60AA=00B45700",
 		 {5000, 60, 1}},
 	};
-	struct led *led = *state;
 
 	for (size_t i = 0; i < COUNT(cases); i++) {
 		struct cia402_units units = {0};
@@ -362,7 +355,6 @@ TEST(test_refused_units, setup)
 		{"6092=1000/1 60AA=00B40300", "acceleration_per_turn_s2"},
 		{"6092=1000/1 60AA=FFFFFF00", "acceleration_per_turn_s2"},
 	};
-	struct led *led = *state;
 
 	for (size_t i = 0; i < COUNT(cases); i++) {
 		struct cia402_units units = {0};
@@ -379,7 +371,6 @@ TEST(test_refused_units, setup)
 TEST(test_given, setup)
 {
 	struct cia402_units units = {200, 60, 1};
-	struct led *led = *state;
 
 	led->drive.mute = true;
 	assert_int_equal(cia402_read_units(&led->client, &units), 0);
@@ -393,8 +384,6 @@ TEST(test_given, setup)
 
 TEST(test_identify, setup)
 {
-	struct led *led = *state;
-
 	assert_int_equal(cia402_identify(&led->client), 0);
 	/* All other objects may be absent. */
 	drive_lacks(&led->drive, 0x1008, 0);
@@ -418,7 +407,6 @@ TEST(test_identify, setup)
 
 TEST(test_power_off, setup)
 {
-	struct led *led = *state;
 	struct drive *d = &led->drive;
 
 	assert_int_equal(cia402_power_off(&led->client), 0);
@@ -447,7 +435,6 @@ TEST(test_power_off, setup)
 
 TEST(test_clear, setup)
 {
-	struct led *led = *state;
 	struct drive *d = &led->drive;
 
 	assert_int_equal(cia402_clear(&led->client), 0);
@@ -488,8 +475,6 @@ TEST(test_clear, setup)
 /* The k-th SDO is refused or lost: it ends with a message, and never with power. */
 TEST(test_every_step_of_clear, setup)
 {
-	struct led *led = *state;
-
 	for (uint32_t k = 1; k <= 8; k++)
 		for (int drop = 0; drop < 2; drop++) {
 			int64_t t;
@@ -512,7 +497,6 @@ TEST(test_every_step_of_clear, setup)
 
 TEST(test_set_mode, setup)
 {
-	struct led *led = *state;
 	struct drive *d = &led->drive;
 
 	assert_int_equal(cia402_set_mode(&led->client, CIA402_CSV), 0);
@@ -537,7 +521,6 @@ static bool homed(struct led *led, int rc)
 
 TEST(test_homes, setup)
 {
-	struct led *led = *state;
 	struct drive *d = &led->drive;
 
 	assert_int_equal(led_configure(led), 0);
@@ -574,7 +557,6 @@ TEST(test_homes, setup)
 /* All three bits count. */
 TEST(test_homed_bits, setup)
 {
-	struct led *led = *state;
 	struct drive *d = &led->drive;
 
 	for (int bits = 0; bits < 8; bits++) {
@@ -588,7 +570,6 @@ TEST(test_homed_bits, setup)
 
 TEST(test_homing_fails, setup)
 {
-	struct led *led = *state;
 	struct drive *d = &led->drive;
 
 	d->homing_fails = true;

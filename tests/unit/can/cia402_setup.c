@@ -4,18 +4,15 @@
  * sends only what is for this side. can_session.c has a failure at any step.
  */
 #include "../unit.h"
-#include <stdio.h>
-#include <stdlib.h>
 #include "led.h"
 
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
 
+static struct led led_of_test, *const led = &led_of_test;
+
 static int setup(void **state)
 {
-	static struct led led;
-
-	led_init(&led);
-	*state = &led;
+	led_init(led);
 	return 0;
 }
 
@@ -47,7 +44,6 @@ TEST(test_objects, setup)
 		{0x1801, 5, 100},	 {0x1a01, 0, 1},
 		{0x1a01, 1, 0x60fd0020}, {0x1802, 1, 0xc0000390},
 	};
-	struct led *led = *state;
 	int64_t t = led->drive.now_ns;
 
 	led->drive.od[OD_SYNC_ID].value = 0x40000080; /* it would send SYNCs itself */
@@ -99,7 +95,6 @@ TEST(test_absences, setup)
 		{"1005 1016 1017 1400 1800 6007 605A 6060 6064 607A 60C2", -EOPNOTSUPP,
 		 0},
 	};
-	struct led *led = *state;
 	uint16_t index;
 	int sub;
 
@@ -135,7 +130,6 @@ TEST(test_not_kept, setup)
 	const char *objects = "1016:1 1017:0 1400:1 1400:2 1401:1 1600:0 1600:2 1800:2 "
 			      "1A00:0 1A00:2 6007:0 605A:0 6060:0 6065:0 6066:0 607D:1 "
 			      "607D:2 607F:0 6085:0 60C5:0";
-	struct led *led = *state;
 	uint16_t index;
 	int sub;
 
@@ -175,7 +169,6 @@ TEST(test_refused, setup)
 		{FIELD(master.heartbeat_ns), 0},
 		{FIELD(master.heartbeat_ns), LED_DEADMAN_MS * DRIVE_MS},
 	};
-	struct led *led = *state;
 	uint64_t asked;
 
 	/* It has power. */
@@ -214,7 +207,6 @@ TEST(test_cycles, setup)
 		{1000000, 1, -3}, {2000000, 2, -3},  {10000000, 10, -3},  {500000, 5, -4},
 		{250000, 25, -5}, {1500000, 15, -4}, {300000000, 30, -2},
 	};
-	struct led *led = *state;
 
 	for (size_t i = 0; i < COUNT(cases); i++) {
 		led_init(led);
@@ -229,7 +221,6 @@ TEST(test_cycles, setup)
 TEST(test_bus_fails, setup)
 {
 	static const int errors[] = {-ENETDOWN, -ENODEV, -EIO};
-	struct led *led = *state;
 	uint64_t frames;
 
 	assert_int_equal(led_configure(led), 0);
@@ -295,7 +286,6 @@ TEST(test_modes, setup)
 		{CIA402_CST, 0x60710010},
 		{CIA402_CSP, 0x607a0020},
 	};
-	struct led *led = *state;
 
 	/* One after the other on the same drive, whose PDOs are on already. */
 	for (size_t i = 0; i < COUNT(cases); i++) {
@@ -309,8 +299,6 @@ TEST(test_modes, setup)
 /* Other ids, bits 30 and objects from before are replaced. */
 TEST(test_left_over, setup)
 {
-	struct led *led = *state;
-
 	drive_set(&led->drive, 0x1400, 1, 0x40000234);
 	drive_set(&led->drive, 0x1800, 1, 0x000001b4);
 	drive_set(&led->drive, 0x1801, 1, 0x80000280);
@@ -327,8 +315,6 @@ TEST(test_left_over, setup)
 /* If a drive cannot map inputs, its TPDO2 stays off. */
 TEST(test_unmapped_inputs, setup)
 {
-	struct led *led = *state;
-
 	led->drive.od[OD_INPUTS].access = R_;
 	assert_int_equal(led_configure(led), 0);
 	assert_false(led->supported.inputs);
@@ -339,8 +325,6 @@ TEST(test_unmapped_inputs, setup)
 /* Old limits do not stay: without homing there is no range. */
 TEST(test_unlimited, setup)
 {
-	struct led *led = *state;
-
 	drive_set(&led->drive, 0x607d, 1, 5);
 	drive_set(&led->drive, 0x607d, 2, 9);
 	led->setup.limited = false;
@@ -358,8 +342,6 @@ TEST(test_unlimited, setup)
 /* Limits that are not set here stay the drive's. */
 TEST(test_left_alone, setup)
 {
-	struct led *led = *state;
-
 	drive_set(&led->drive, 0x607f, 0, 7);
 	drive_set(&led->drive, 0x60c5, 0, 8);
 	drive_set(&led->drive, 0x6065, 0, 9);

@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/*
- * A simulated drive with a CANopen master: the fixture of the CAN tests.
- */
+/* A simulated drive with a CANopen master: the fixture of the CAN tests. */
 #ifndef INCISE_TEST_LED_H
 #define INCISE_TEST_LED_H
 
@@ -68,18 +66,6 @@ static inline void led_enable(struct led *led)
 static inline uint32_t led_value(struct led *led, uint16_t index, uint8_t sub)
 {
 	return drive_object(&led->drive, index, sub)->value;
-}
-
-/* One cycle of PDOs, and a millisecond. */
-static inline void led_cycle(struct led *led, uint16_t word, int32_t target)
-{
-	const struct can_frame sync = {.can_id = CANOPEN_SYNC};
-	struct can_frame frame;
-
-	cia402_pack_rpdo(&frame, DRIVE_NODE, led->setup.mode, word, target);
-	led->drive.bus.ops->send(&led->drive.bus, &frame);
-	led->drive.bus.ops->send(&led->drive.bus, &sync);
-	canopen_await(&led->master, NULL, led->drive.now_ns + DRIVE_MS);
 }
 
 #endif

@@ -4,9 +4,6 @@
  * against itself: formatted frames are parsed back. slcan.c tests the status over a pty.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <stdlib.h>
-#include <string.h>
 #include <linux/can/error.h>
 #include <linux/can/netlink.h>
 #include "../../../lib/device/can/bus/slcan_protocol.h"

@@ -5,14 +5,10 @@
  * kernel. The lock of a node is real, and so are its names on this machine.
  */
 #include "../unit.h"
-#include <errno.h>
 #include <poll.h>
-#include <stdio.h>
-#include <string.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <time.h>
-#include <unistd.h>
 #include <linux/can/error.h>
 #include <linux/can/netlink.h>
 #include <linux/can/raw.h>
@@ -233,8 +229,6 @@ static struct can_bus *bus;
 
 static int setup(void **state)
 {
-	struct incise_error err = {0};
-
 	kernel_init();
 	return open_bus(&bus, "can0", 0, 0, &err);
 }
@@ -310,8 +304,6 @@ TEST(settings_are_those_of_the_kernel)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
-
 		kernel_init();
 		kernel.bitrate = cases[i].set;
 		assert_int_equal(
@@ -545,7 +537,6 @@ TEST(waiting_has_an_end, setup, teardown)
 TEST(a_node_has_one_owner)
 {
 	struct can_bus *first, *second = NULL;
-	struct incise_error err = {0};
 	char longer[sizeof(interface) + 1], name[64];
 
 	kernel_init();
@@ -573,7 +564,6 @@ TEST(a_node_has_one_owner)
 
 TEST(a_dead_process_owns_nothing)
 {
-	struct incise_error err = {0};
 	pid_t child;
 	int status;
 

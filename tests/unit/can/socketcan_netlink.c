@@ -4,12 +4,8 @@
  * changed, and on the kernel's own answer for lo. tests/vm/guest/can_bus.sh queries a real controller.
  */
 #include "../unit.h"
-#include <errno.h>
 #include <net/if.h>
 #include <net/if_arp.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/socket.h>
 #include <sys/time.h>
 #include <time.h>

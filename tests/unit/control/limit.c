@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Limits: force, slew, and nothing but numbers.
- */
+/* Limits: force, slew, and nothing but numbers. */
 #include "../unit.h"
 #include <float.h>
-#include <math.h>
-#include <string.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/control/limit.h"

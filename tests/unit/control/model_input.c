@@ -3,8 +3,6 @@
  * Inputs of a model: acceleration, tilt and time in tissue against what they are by definition.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
 #include <incise/clock.h>
 #include "../../../lib/control/model_input.h"
 #include "../../../lib/control/predict.h"

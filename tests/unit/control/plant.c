@@ -5,7 +5,6 @@
  */
 #include "../unit.h"
 #include <float.h>
-#include <math.h>
 #include "../../../lib/control/plant.h"
 
 #define N(array) (sizeof(array) / sizeof(*(array)))

@@ -4,7 +4,6 @@
  * have no common period, and against theory where the predictor only interpolates.
  */
 #include "../unit.h"
-#include <math.h>
 #include <incise/clock.h>
 #include "../../../lib/control/plant.h"
 #include "../../../lib/control/pose_loop.h"

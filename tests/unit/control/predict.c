@@ -4,8 +4,6 @@
  * nothing but numbers. How far it is off is in reference_path.c.
  */
 #include "../unit.h"
-#include <math.h>
-#include <string.h>
 #include <incise/clock.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"

@@ -23,7 +23,6 @@
  * is this tracker worse than that of the figures.
  */
 #include "../unit.h"
-#include <math.h>
 #include <incise/clock.h>
 #include <incise/rig.h>
 #include <incise/tracker.h>

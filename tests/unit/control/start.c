@@ -4,8 +4,6 @@
  * from any time or force.
  */
 #include "../unit.h"
-#include <math.h>
-#include <string.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/control/start.h"
 

@@ -3,10 +3,9 @@
  * lib/device/daq/comedi_force.c on a card that a test simulates, whose file is a pipe: its set-up, times
  * from the arrival of blocks, samples, and the search.
  */
-#include <math.h>
+#include "../unit.h"
 #include <sched.h>
 #include <stdatomic.h>
-#include <stdlib.h>
 #include "../../../lib/base/monotonic.h"
 
 /* The clock stands unless a test moves it: a busy machine is no silent card. */
@@ -14,7 +13,6 @@ static _Atomic int64_t clock_ns;
 #define incise_monotonic_ns() atomic_load(&clock_ns)
 #include "../../../lib/device/daq/comedi_force.c"
 #include "../message.h"
-#include "../unit.h"
 #include "card.h"
 #include "found.h"
 
@@ -69,7 +67,6 @@ static int open_card(struct card *c, const char *arguments, double rate_hz,
 
 TEST(is_set_up, card_setup)
 {
-	struct incise_error err = {0};
 	struct card c;
 
 	assert_int_equal(open_card(&c, "/dev/comedi0:0", 10000, &err), 0);
@@ -92,7 +89,6 @@ TEST(is_set_up, card_setup)
 /* The accepted rate is reported; the buffer grows up to its limit. */
 TEST(the_rest_of_a_card, card_setup)
 {
-	struct incise_error err = {0};
 	struct card c;
 
 	card.flags = SDF_CMD_READ | SDF_DIFF | SDF_LSAMPL;
@@ -139,7 +135,6 @@ TEST(refusals, card_setup)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
 		struct card c;
 
 		card_reset();
@@ -156,7 +151,6 @@ TEST(refusals, card_setup)
 
 TEST(card_does_not_start, card_setup)
 {
-	struct incise_error err = {0};
 	struct card c;
 
 	assert_int_equal(open_card(&c, "/dev/comedi0:0", 10000, &err), 0);
@@ -358,7 +352,6 @@ static void send_codes(int from, int n)
 TEST(samples_come, setup, teardown)
 {
 	struct incise_force_sample samples[100];
-	struct incise_error err = {0};
 	struct incise_force *force = open_force(&err);
 	struct incise_force_info info;
 	sampl_t dirty = 0xf123;
@@ -387,7 +380,6 @@ TEST(wide_samples, setup, teardown)
 {
 	static const lsampl_t codes[] = {0, 0x123456, 0xffffff, 0x1234567};
 	struct incise_force_sample samples[4];
-	struct incise_error err = {0};
 	struct incise_force *force;
 
 	card.flags |= SDF_LSAMPL;
@@ -416,7 +408,6 @@ TEST(overflow, setup, teardown)
 
 	for (size_t i = 0; i < 2; i++) {
 		struct incise_force_sample samples[20];
-		struct incise_error err = {0};
 		struct incise_force_info info;
 		struct incise_force *force;
 
@@ -450,7 +441,6 @@ TEST(unplugged, setup, teardown)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_force_sample samples[10];
-		struct incise_error err = {0};
 		struct incise_force *force = open_force(&err);
 
 		assert_non_null(force);
@@ -481,7 +471,6 @@ TEST(silent, setup, teardown)
 TEST(never_goes_on, setup, teardown)
 {
 	struct incise_force_sample sample;
-	struct incise_error err = {0};
 	struct incise_force *force = open_force(&err);
 	int rc = 0;
 
@@ -498,8 +487,6 @@ TEST(never_goes_on, setup, teardown)
 
 TEST(does_not_start, setup, teardown)
 {
-	struct incise_error err = {0};
-
 	card.command_error = EBUSY;
 	assert_error(open_force(&err), EBUSY, &err, "rig.conf:3: force: /dev/comedi0");
 	assert_int_equal(card.opened, 0);
@@ -518,7 +505,6 @@ static int scan_setup(void **state)
 
 static int scan(const char *arguments)
 {
-	struct incise_error err = {0};
 	int rc = incise_force_comedi.scan(arguments, keep, &found, &err);
 
 	assert_int_equal(card.opened, 0);

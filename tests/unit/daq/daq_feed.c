@@ -3,12 +3,9 @@
  * lib/device/daq/daq_feed.c: what is read, clipped, lost and reported at the end; what is asked
  * for and cannot be; the thread.
  */
-#include <errno.h>
-#include <stdlib.h>
-#include <string.h>
+#include "../unit.h"
 #include "../../../lib/device/daq/daq_feed.h"
 #include "../message.h"
-#include "../unit.h"
 
 static struct daq_feed *feed;
 
@@ -129,7 +126,6 @@ TEST(what_is_asked_for, setup, teardown)
 	};
 	struct incise_backend_request request = {.where = "r.conf:1: force"};
 	struct incise_force_setup setup;
-	struct incise_error err = {0};
 
 	assert_int_equal(daq_feed_setup(&request, &setup, &err), 0);
 	assert_true(setup.rate_hz == 10000);

@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/*
- * Devices found by a scan, kept for a test.
- */
+/* Devices found by a scan, kept for a test. */
 #ifndef INCISE_TEST_DAQ_FOUND_H
 #define INCISE_TEST_DAQ_FOUND_H
 

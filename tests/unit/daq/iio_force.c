@@ -4,13 +4,10 @@
  * channel that cannot be opened, the search. A channel that samples needs a kernel:
  * tests/vm/guest/force_iio.c.
  */
+#include "../unit.h"
 #include <dirent.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/device/daq/iio_force.c"
 #include "../message.h"
-#include "../unit.h"
 #include "converter.h"
 #include "found.h"
 
@@ -186,7 +183,6 @@ TEST(refusals)
 			.where = "rig.conf:3: force",
 			.force = &asked,
 		};
-		struct incise_error err = {0};
 		int before = open_files();
 
 		setup(NULL);
@@ -215,7 +211,6 @@ static int scan_setup(void **state)
 
 static int scan(const char *arguments)
 {
-	struct incise_error err = {0};
 	int rc = incise_force_iio.scan(arguments, keep, &found, &err);
 
 	/* The source leaves nothing open, with any result. */

@@ -3,19 +3,13 @@
  * lib/device/daq/iio_source.c on a converter that a test simulates: formats, triggers in a folder that stands
  * for configfs, rates, set-up and its refusals, and the buffer on files that stand for a device.
  */
-#include <errno.h>
+#include "../unit.h"
 #include <fcntl.h>
 #include <ftw.h>
-#include <math.h>
-#include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <unistd.h>
 #include "../../../lib/device/daq/iio_source.c"
 #include "../message.h"
-#include "../unit.h"
 #include "converter.h"
 
 /* --- format --- */
@@ -35,6 +29,9 @@ static struct iio_data_format data_of(const char *type)
 	data.is_signed = sign == 's' || sign == 'S';
 	return data;
 }
+
+/* Of the test that runs. */
+static struct iio_source s;
 
 TEST(codes)
 {
@@ -264,7 +261,6 @@ TEST(how_it_is_written, rate_setup)
 		{99999.9996, "100000"},
 		{0.001, "0.001"},
 	};
-	struct incise_error err;
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		rate_setup(NULL);
@@ -276,8 +272,6 @@ TEST(how_it_is_written, rate_setup)
 /* A trigger's before the device's, that before the channel's. */
 TEST(where_it_is, rate_setup)
 {
-	struct incise_error err;
-
 	assert_int_equal(set_to(5000, &world.devices[2], &err), 0);
 	assert_string_equal(timer()->text, "5000");
 	assert_string_equal(own()->text, "5000");
@@ -308,7 +302,6 @@ TEST(how_far_off_it_may_be, rate_setup)
 		{"9899", false}, {"0", false},	 {"", false},
 		{"nan", false},	 {"inf", false}, {"-10000", false},
 	};
-	struct incise_error err;
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		rate_setup(NULL);
@@ -377,9 +370,6 @@ static const char *text(const char *key)
 
 TEST(is_set_up, setup)
 {
-	struct incise_error err = {0};
-	struct iio_source s;
-
 	/* as Linux 6.1 answers */
 	device_attribute(adc(), "current_timestamp_clock")->line = true;
 	assert_int_equal(open_source(&s, "adc", 10000, "", &err), 0);
@@ -396,9 +386,6 @@ TEST(is_set_up, setup)
 
 TEST(named_trigger, setup)
 {
-	struct incise_error err = {0};
-	struct iio_source s;
-
 	device_attribute(adc(), "sampling_frequency")->stuck = true;
 	snprintf(device_attribute(adc(), "sampling_frequency")->text, 64, "20000");
 	assert_int_equal(open_source(&s, "null", 1234.5, "timer", &err), 0);
@@ -414,9 +401,7 @@ TEST(named_trigger, setup)
 /* Where there is a folder for them, one is made, and goes again. */
 TEST(own_trigger, setup)
 {
-	struct incise_error err = {0};
 	char made[100];
-	struct iio_source s;
 
 	snprintf(folder, sizeof(folder), "/tmp/incise-test-XXXXXX");
 	assert_non_null(mkdtemp(folder));
@@ -440,9 +425,7 @@ TEST(own_trigger, setup)
 /* Configfs is root's. */
 TEST(no_right_to_a_trigger, setup)
 {
-	struct incise_error err = {0};
 	bool root = !geteuid();
-	struct iio_source s;
 
 	snprintf(folder, sizeof(folder), "/");
 	snprintf(device_attribute(adc(), "trigger/current_trigger")->text, 2, "%s", "");
@@ -499,7 +482,6 @@ TEST(volts, setup)
 /* Without a scale the set-up's is taken; a rate may be the channel's. */
 TEST(what_the_driver_does_not_say, setup)
 {
-	struct incise_error err = {0};
 	struct iio_source s = {.where = "rig.conf:3: force",
 			       .fd = -1,
 			       .trigger_folder = folder,
@@ -619,9 +601,6 @@ TEST(refusals, setup)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
-		struct iio_source s;
-
 		setup(NULL);
 		broken(cases[i].what);
 		assert_error(open_source(&s, cases[i].name, 10000, cases[i].trigger,

@@ -3,11 +3,8 @@
  * lib/device/actuator.c: what the group says becomes steps and limits, what does not fit
  * is refused with its line.
  */
-#include <errno.h>
-#include <math.h>
-#include <string.h>
-#include "../message.h"
 #include "../unit.h"
+#include "../message.h"
 #include "actuator_text.h"
 #include "../../../lib/device/motor.h"
 
@@ -98,7 +95,6 @@ TEST(what_does_not_fit_is_refused_with_its_line)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_actuator actuator;
-		struct incise_error err = {0};
 
 		assert_error(actuator_read(&actuator, "", cases[i].inside, &err), EINVAL,
 			     &err, cases[i].says);
@@ -144,7 +140,6 @@ TEST(the_machine_must_hold_the_rate)
 {
 	struct incise_actuator a = actuator_good("", NEEDED);
 	struct incise_stepper_config config;
-	struct incise_error err = {0};
 
 	/* 16 000 steps/s asked, and pulses that are not given become the shortest. */
 	assert_int_equal(incise_motor_fit(&a, "m", 16000, 8000, &err), 0);

@@ -3,13 +3,9 @@
  * The group actuator.can, lib/device/actuator.c: each key in its unit and up to its ends, each refusal with its
  * line, and that the gain that csv may have is half of what a loop with that delay holds.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdio.h>
-#include <string.h>
+#include "../unit.h"
 #include "../../../lib/device/actuator.h"
 #include "../message.h"
-#include "../unit.h"
 #include "actuator_text.h"
 
 TEST(defaults_are_those_of_the_manual)
@@ -120,7 +116,6 @@ TEST(every_range_ends_where_the_manual_says)
 		for (int k = 0; k < 4; k++) {
 			bool good = k == 1 || k == 2;
 			struct incise_actuator actuator;
-			struct incise_error err = {0};
 			char text[200], says[100];
 
 			snprintf(text, sizeof(text), "can = {\n%s = %s; };", cases[i].key,
@@ -143,7 +138,6 @@ TEST(bit_rates_are_those_of_adapters)
 				   250000, 500000, 800000, 1000000};
 	static const int bad[] = {1, 9999, 83333, 400000, 999999};
 	struct incise_actuator actuator;
-	struct incise_error err;
 	char text[100];
 
 	for (size_t i = 0; i < sizeof(good) / sizeof(*good); i++) {
@@ -171,7 +165,6 @@ TEST(cycles_are_those_that_a_drive_can_keep)
 {
 	for (int us = 500; us <= 2000; us++) {
 		struct incise_actuator actuator;
-		struct incise_error err;
 		char text[100];
 
 		snprintf(text, sizeof(text), "can = { cycle_us = %d; };", us);
@@ -205,7 +198,6 @@ TEST(what_does_not_fit_is_refused_with_its_line)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_actuator actuator;
-		struct incise_error err = {0};
 
 		assert_error(actuator_read(&actuator, NEEDED, cases[i].inside, &err),
 			     EINVAL, &err, cases[i].says);

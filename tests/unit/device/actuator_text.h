@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/*
- * The group `actuator` of a rig.conf, from text: as a person meets it.
- */
+/* The group `actuator` of a rig.conf, from text: as a person meets it. */
 #ifndef TEST_ACTUATOR_TEXT_H
 #define TEST_ACTUATOR_TEXT_H
 

@@ -3,18 +3,13 @@
  * lib/device/foot_switch.c: names of keys, refusals, and the bytes of an input device. A named pipe
  * takes its place, and this program answers the ioctls; tests/vm has the kernel's own.
  */
-#include <errno.h>
+#include "../unit.h"
 #include <fcntl.h>
 #include <linux/input.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 #include <incise/foot_switch.h>
 #include "../message.h"
-#include "../unit.h"
 
 #define LONG_BITS (8 * sizeof(long))
 
@@ -83,12 +78,9 @@ static void plug_in(struct pedal *pedal)
 
 static void start(struct pedal *pedal)
 {
-	struct incise_error err = {0};
-
 	plug_in(pedal);
 	pedal->foot = incise_foot_switch_open(&pedal->setup, &err);
-	if (!pedal->foot)
-		fail_msg("%s", err.text);
+	succeeds(pedal->foot);
 	assert_int_equal(device.grabs, 1);
 }
 
@@ -173,8 +165,6 @@ TEST(test_refused)
 	struct pedal pedal;
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
-
 		plug_in(&pedal);
 		device.key = cases[i].key;
 		device.pressed = cases[i].pressed;

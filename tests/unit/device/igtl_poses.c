@@ -3,17 +3,26 @@
  * lib/device/igtl/igtl_poses.h: samples from messages that incise/igtl.h packs, with times of
  * the test's own.
  */
-#include <errno.h>
-#include <math.h>
 #include "../unit.h"
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/device/igtl/igtl_poses.h"
 
 #define SECOND 1000000000LL
 #define UTC0 (1790000000 * SECOND)
 
 static const struct incise_tracker_setup setup = {.repeat_ms = 100};
+static struct igtl_poses poses;
+static double m[3][4], q[4];
+
+static int begin(void **state)
+{
+	return igtl_poses_init(&poses, &setup, "Tip");
+}
+
+static int end(void **state)
+{
+	igtl_poses_free(&poses);
+	return 0;
+}
 
 /* A turn by @angle about (1, 2, 3) / √14, and its quaternion, after Rodrigues. */
 static void turn(double angle, double matrix[3][4], double q[4])
@@ -37,8 +46,8 @@ static void turn(double angle, double matrix[3][4], double q[4])
 	}
 }
 
-static int put(struct igtl_poses *poses, const char *name, const double matrix[3][4],
-	       int64_t utc_ns, int64_t t_ns, bool damage)
+static int put(const char *name, const double matrix[3][4], int64_t utc_ns, int64_t t_ns,
+	       bool damage)
 {
 	struct incise_igtl_label label = {.version = 1, .name = name, .utc_ns = utc_ns};
 	uint8_t bytes[200];
@@ -47,33 +56,28 @@ static int put(struct igtl_poses *poses, const char *name, const double matrix[3
 	assert_true(n > 0);
 	bytes[n - 1] ^= damage;
 	/* In two parts, as a network may cut it. */
-	assert_int_equal(igtl_poses_put(poses, bytes, 70, t_ns - 1000), 0);
-	return igtl_poses_put(poses, bytes + 70, (size_t)n - 70, t_ns);
+	assert_int_equal(igtl_poses_put(&poses, bytes, 70, t_ns - 1000), 0);
+	return igtl_poses_put(&poses, bytes + 70, (size_t)n - 70, t_ns);
 }
 
-static struct incise_tracker_sample taken(struct igtl_poses *poses)
+static struct incise_tracker_sample taken(void)
 {
 	struct incise_tracker_sample sample;
 
-	assert_int_equal(incise_ring_take(&poses->ring, &sample, 1), 1);
+	assert_int_equal(incise_ring_take(&poses.ring, &sample, 1), 1);
 	return sample;
 }
 
-TEST(a_rotation_becomes_its_quaternion)
+TEST(a_rotation_becomes_its_quaternion, begin, end)
 {
-	struct igtl_poses poses;
-	double m[3][4], q[4];
-
-	assert_int_equal(igtl_poses_init(&poses, &setup, "Tip"), 0);
 	for (int i = 0; i < 100; i++) {
 		struct incise_tracker_sample s;
 		double dot = 0;
 
 		turn(i * 0.13 - 6, m, q);
-		assert_int_equal(put(&poses, "Other", m, 0, (i + 1) * SECOND - 5, false),
-				 0);
-		assert_int_equal(put(&poses, "Tip", m, 0, (i + 1) * SECOND, false), 0);
-		s = taken(&poses);
+		assert_int_equal(put("Other", m, 0, (i + 1) * SECOND - 5, false), 0);
+		assert_int_equal(put("Tip", m, 0, (i + 1) * SECOND, false), 0);
+		s = taken();
 		assert_int_equal(s.status, ' ');
 		for (int k = 0; k < 4; k++)
 			dot += s.quaternion[k] * q[k];
@@ -84,7 +88,6 @@ TEST(a_rotation_becomes_its_quaternion)
 		assert_int_equal(s.t_ns, (i + 1) * SECOND);
 	}
 	assert_int_equal(poses.n_names, 2);
-	igtl_poses_free(&poses);
 }
 
 TEST(what_is_no_pose_is_flagged)
@@ -100,7 +103,6 @@ TEST(what_is_no_pose_is_flagged)
 		{{1, 1, NAN}, 0, '~'},	{{1, 1, 1}, 2e6, '~'},
 		{{1e30, 1, 1}, 0, '~'}, {{1.0005, 1, 1}, 0, ' '},
 	};
-	struct igtl_poses poses;
 
 	assert_int_equal(igtl_poses_init(&poses, &setup, ""), 0);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -112,9 +114,8 @@ TEST(what_is_no_pose_is_flagged)
 			for (int r = 0; r < 3; r++)
 				m[r][c] *= cases[i].factor[c];
 		m[0][3] += cases[i].x;
-		assert_int_equal(
-			put(&poses, "Tip", m, 0, (int64_t)(i + 1) * SECOND, false), 0);
-		s = taken(&poses);
+		assert_int_equal(put("Tip", m, 0, (int64_t)(i + 1) * SECOND, false), 0);
+		s = taken();
 		assert_int_equal(s.status, cases[i].status);
 		assert_int_equal(incise_pose_usable(s.status), cases[i].status == ' ');
 		for (int k = 0; k < 4; k++)
@@ -127,14 +128,11 @@ TEST(what_is_no_pose_is_flagged)
 }
 
 /* Arrivals up to 20 ms late of timestamps of a wall clock that is off, runs fast and is set. */
-TEST(timestamps_lead_to_times_here)
+TEST(timestamps_lead_to_times_here, begin, end)
 {
-	struct igtl_poses poses;
-	double m[3][4], q[4];
 	int64_t last_ns = 0;
 
 	srand(1);
-	assert_int_equal(igtl_poses_init(&poses, &setup, "Tip"), 0);
 	for (int i = 0; i < 5000; i++) {
 		int64_t true_ns = 100 * SECOND + i * SECOND / 100;
 		/* 50 ppm fast; set back by 3 s and ahead by 3 s. */
@@ -144,12 +142,10 @@ TEST(timestamps_lead_to_times_here)
 		struct incise_tracker_sample s;
 
 		turn(i * 0.01, m, q);
-		assert_int_equal(put(&poses, "Tip", m, utc_ns, true_ns + late_ns, false),
-				 0);
+		assert_int_equal(put("Tip", m, utc_ns, true_ns + late_ns, false), 0);
 		/* The same pose sent again is not another. */
-		assert_int_equal(
-			put(&poses, "Tip", m, utc_ns, true_ns + late_ns + 9, false), 0);
-		s = taken(&poses);
+		assert_int_equal(put("Tip", m, utc_ns, true_ns + late_ns + 9, false), 0);
+		s = taken();
 		assert_int_equal(incise_ring_take(&poses.ring, &s, 1), 0);
 		assert_true(s.t_ns > last_ns && s.t_ns <= true_ns + late_ns + 1);
 		/* The arrival is kept; a pose that was put after the one before may be later. */
@@ -163,16 +159,12 @@ TEST(timestamps_lead_to_times_here)
 			assert_true(llabs(s.t_ns - true_ns) < 2500000);
 		last_ns = s.t_ns;
 	}
-	igtl_poses_free(&poses);
 }
 
-TEST(losses_are_counted)
+TEST(losses_are_counted, begin, end)
 {
-	struct igtl_poses poses;
 	struct incise_tracker_sample s = {0};
-	double m[3][4], q[4];
 
-	assert_int_equal(igtl_poses_init(&poses, &setup, "Tip"), 0);
 	for (int i = 0; i < 1000; i++) {
 		int64_t t_ns = SECOND + i * SECOND / 100;
 
@@ -184,58 +176,52 @@ TEST(losses_are_counted)
 		/* Three are missing, one is damaged: its time shows the same one, once. */
 		if (i >= 400 && i < 403)
 			continue;
-		assert_int_equal(
-			put(&poses, "Tip", m, UTC0 + t_ns, t_ns + 1000, i == 700), 0);
+		assert_int_equal(put("Tip", m, UTC0 + t_ns, t_ns + 1000, i == 700), 0);
 	}
 	while (incise_ring_take(&poses.ring, &s, 1) == 1)
 		;
 	assert_int_equal(atomic_load(&poses.lost), 4);
 	assert_int_equal(s.seq, 999 - 60);
-	igtl_poses_free(&poses);
 }
 
-TEST(what_is_unseen_or_stuck_is_flagged)
+TEST(what_is_unseen_or_stuck_is_flagged, begin, end)
 {
 	static const struct incise_igtl_pair gone = {"ToolStatus", "OUT_OF_VIEW", 10, 3,
 						     11};
 	struct incise_igtl_label label = {
 		.version = 2, .name = "Tip", .metadata = &gone, .n_metadata = 1};
 	struct incise_igtl_status status = {.code = INCISE_IGTL_NOT_PRESENT, .text = ""};
-	struct igtl_poses poses;
-	double m[3][4], q[4];
 	float body[12] = {0};
 	uint8_t bytes[300];
 	ssize_t n;
 
 	turn(1, m, q);
-	assert_int_equal(igtl_poses_init(&poses, &setup, "Tip"), 0);
 	for (int i = 1; i <= 20; i++) {
-		assert_int_equal(put(&poses, "Tip", m, 0, i * SECOND / 50, false), 0);
+		assert_int_equal(put("Tip", m, 0, i * SECOND / 50, false), 0);
 		/* A pose that came for 100 ms, and comes again. */
-		assert_int_equal(taken(&poses).status, i > 6 ? '=' : ' ');
+		assert_int_equal(taken().status, i > 6 ? '=' : ' ');
 	}
 	turn(2, m, q);
 	n = incise_igtl_pack_status(bytes, sizeof(bytes), &label, &status);
 	assert_true(n > 0 && !igtl_poses_put(&poses, bytes, (size_t)n, SECOND));
-	assert_int_equal(put(&poses, "Tip", m, 0, SECOND, false), 0);
-	assert_int_equal(taken(&poses).status, '!');
+	assert_int_equal(put("Tip", m, 0, SECOND, false), 0);
+	assert_int_equal(taken().status, '!');
 	status.code = INCISE_IGTL_OK;
 	n = incise_igtl_pack_status(bytes, sizeof(bytes), &label, &status);
 	assert_true(n > 0 && !igtl_poses_put(&poses, bytes, (size_t)n, SECOND));
-	assert_int_equal(put(&poses, "Tip", m, 0, SECOND + 1, false), 0);
-	assert_int_equal(taken(&poses).status, ' ');
+	assert_int_equal(put("Tip", m, 0, SECOND + 1, false), 0);
+	assert_int_equal(taken().status, ' ');
 	/* As metadata, with a pose of zeros behind it. */
 	n = incise_igtl_pack(bytes, sizeof(bytes), &label, "TRANSFORM", body,
 			     sizeof(body));
 	assert_true(n > 0 && !igtl_poses_put(&poses, bytes, (size_t)n, 2 * SECOND));
-	assert_int_equal(taken(&poses).status, '!');
+	assert_int_equal(taken().status, '!');
 	/* Bytes that are not OpenIGTLink end it, until there is another connection. */
 	memset(bytes, 0xff, sizeof(bytes));
 	assert_int_equal(igtl_poses_put(&poses, bytes, sizeof(bytes), 3 * SECOND),
 			 -EPROTO);
 	assert_int_equal(igtl_poses_reconnected(&poses), 0);
 	turn(3, m, q);
-	assert_int_equal(put(&poses, "Tip", m, 0, 4 * SECOND, false), 0);
-	assert_true(taken(&poses).restarted);
-	igtl_poses_free(&poses);
+	assert_int_equal(put("Tip", m, 0, 4 * SECOND, false), 0);
+	assert_true(taken().restarted);
 }

@@ -4,7 +4,6 @@
  * that on lines is in pulser.c, on a bus in tests/unit/can/can_axis.c.
  */
 #include "../unit.h"
-#include <errno.h>
 #include "../../../lib/device/motion.h"
 #include "../../../lib/device/page.h"
 

@@ -2,9 +2,7 @@
 /*
  * Losses found by times alone (lib/device/pace.h): each source here knows what it left out.
  */
-#include <math.h>
 #include "../unit.h"
-#include <stdlib.h>
 #include "../../../lib/device/pace.h"
 
 struct source {

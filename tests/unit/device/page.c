@@ -4,10 +4,8 @@
  * no sense comes through; with a thread on the other side too.
  */
 #include "../unit.h"
-#include <errno.h>
 #include <pthread.h>
 #include <stdatomic.h>
-#include <string.h>
 #include "../../../lib/fixed/profile.h"
 #include "../../../lib/device/page.h"
 

@@ -4,7 +4,6 @@
  * lists are those of rig.conf(5).
  */
 #include "../unit.h"
-#include <string.h>
 #include <incise/tracker.h>
 
 TEST(only_some_flags_leave_a_pose_usable)

@@ -4,8 +4,6 @@
  * a test makes. What it does when all is well is in tests/unit/device/motor.c.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <string.h>
 #include "../../../lib/device/page.h"
 #include "machine.h"
 

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * lib/device/rig.c: what is asked for is opened, on one clock and in one world.
- */
+/* lib/device/rig.c: what is asked for is opened, on one clock and in one world. */
 #include "../unit.h"
-#include <errno.h>
-#include <math.h>
 #include <incise/rig.h>
 #include "../base/temp_file.h"
 

@@ -3,14 +3,12 @@
  * lib/device/rig_keys.c: the list of a rig's keys, written as a rig.conf, makes the same rig
  * again, and has every key that a rig.conf may have.
  */
-#include <errno.h>
+#include "../unit.h"
 #include <locale.h>
-#include <string.h>
 #include <incise/rig.h>
 #include "../../../lib/device/actuator.h"
 #include "../../../lib/device/rig_plan.h"
 #include "../message.h"
-#include "../unit.h"
 #include "../base/temp_file.h"
 
 /* Every key of rig.conf, in two actuators; the virtual rig is the force channel. */
@@ -59,7 +57,6 @@ static int keep(void *context, const struct incise_rig_key *key)
 
 static struct keys keys_of(const char *spec)
 {
-	struct incise_error err = {0};
 	struct keys keys = {.n = 0};
 
 	if (incise_rig_keys(spec, keep, &keys, &err))
@@ -311,7 +308,6 @@ static int stop_at_third(void *context, const struct incise_rig_key *key)
 TEST(errors_and_stops)
 {
 	struct temp_file file = temp_file_new("rig.conf", "\nclokc = \"real\";\n");
-	struct incise_error err = {0};
 	int calls = 0;
 
 	assert_error(incise_rig_keys(file.path, stop_at_third, &calls, &err), EINVAL,

@@ -3,11 +3,9 @@
  * lib/device/scan.c: what it says where there is nothing to scan. What it finds is in the
  * tests of the backends that can.
  */
-#include <errno.h>
-#include <string.h>
+#include "../unit.h"
 #include <incise/scan.h>
 #include "../message.h"
-#include "../unit.h"
 
 static int found(void *context, const struct incise_scan_device *device)
 {
@@ -32,8 +30,6 @@ TEST(what_cannot_be_scanned_is_said)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err;
-
 		assert_error(incise_scan("stepper", cases[i].spec, found, NULL, &err),
 			     cases[i].code, &err, cases[i].says);
 	}

@@ -4,9 +4,6 @@
  * backend returns.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <math.h>
-#include <stdio.h>
 #include <incise/backend.h>
 
 /* --- tracker --- */

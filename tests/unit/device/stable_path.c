@@ -1,17 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * lib/device/stable_path.c, with files and links that stand for those in /dev.
- */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+/* lib/device/stable_path.c, with files and links that stand for those in /dev. */
+#include "../unit.h"
 #include <fcntl.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 #include "../../../lib/device/stable_path.h"
 
 static char home[] = "/tmp/incise-test-XXXXXX";
@@ -36,7 +26,7 @@ static int leave(void **state)
 	return chdir("/") || system(command);
 }
 
-static void the_first_link_that_leads_there(void **state)
+TEST(the_first_link_that_leads_there)
 {
 	static const struct {
 		const char *pattern, *path;
@@ -64,11 +54,4 @@ static void the_first_link_that_leads_there(void **state)
 	}
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(the_first_link_that_leads_there),
-	};
-
-	return cmocka_run_group_tests(tests, enter, leave);
-}
+GROUP(enter, leave);

@@ -3,13 +3,9 @@
  * lib/device/stepper.c: calls reach the backend; homing makes the count of a simulated machine the
  * position of the machine, wherever it started, or reports why not and stops it.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdio.h>
-#include <string.h>
+#include "../unit.h"
 #include <incise/backend.h>
 #include "../message.h"
-#include "../unit.h"
 
 /* --- stepper --- */
 
@@ -76,7 +72,6 @@ TEST(calls_reach_the_backend)
 	struct fake fake = {.stepper.ops = &ops};
 	struct incise_stepper_status status = {0};
 	struct incise_stepper_info info = {0};
-	struct incise_error err = {0};
 
 	assert_int_equal(incise_stepper_set(&fake.stepper, 1.25), -EDOM);
 	assert_true(fake.position_mm == 1.25);
@@ -104,7 +99,6 @@ TEST(what_a_backend_has_not_is_said)
 {
 	static const struct incise_stepper_ops ops = {.info = named_info};
 	struct incise_stepper stepper = {.ops = &ops};
-	struct incise_error err;
 
 	assert_int_equal(incise_stepper_jog(&stepper, 1), -EOPNOTSUPP);
 	for (int i = 0; i < 4; i++) {
@@ -484,7 +478,6 @@ TEST(the_count_becomes_the_position)
 				.end_mm = cases[i].end_mm,
 				.home_mm = cases[i].home_mm,
 			};
-			struct incise_error err = {0};
 			double rest_mm = fmax(0, m.home_mm), off;
 			int rc;
 
@@ -570,7 +563,6 @@ TEST(what_is_wrong_is_said)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct machine m = cases[i].m;
-		struct incise_error err;
 		struct incise_stepper_edge_found edge = {77, 78};
 
 		powered_at(&m, 10);
@@ -584,7 +576,6 @@ TEST(what_is_wrong_is_said)
 TEST(it_must_be_powered)
 {
 	struct machine m = {.home_at = INCISE_STEPPER_LINE_HOME};
-	struct incise_error err = {0};
 
 	powered_at(&m, 3);
 	m.state = INCISE_STEPPER_STATE_DISABLED;

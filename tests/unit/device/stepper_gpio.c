@@ -5,16 +5,12 @@
  * should. No time is judged here: pulses of 1 ms let any machine keep up. Times are those
  * of the pulser's tests and of tests/vm.
  */
-#include <errno.h>
+#include "../unit.h"
 #include <stdatomic.h>
-#include <stdbool.h>
-#include <stdlib.h>
-#include <string.h>
 #include <time.h>
 #include "../../../lib/device/backends.h"
 #include "../../../lib/device/gpio/gpio_lines.h"
 #include "../message.h"
-#include "../unit.h"
 
 /* A chip; levels, not what they mean. */
 struct gpio_lines {
@@ -186,14 +182,12 @@ TEST(it_steps_and_lets_go)
 	struct incise_stepper_status status;
 	struct incise_stepper_info info;
 	struct incise_stepper *stepper;
-	struct incise_error err = {0};
 
 	memset(&chip, 0, sizeof(chip));
 	/* The e-stop rests high: released. */
 	atomic_store(&chip.level, 1u << INCISE_LINE_ESTOP);
 	stepper = open_stepper("pinctrl", false, &actuator, &err);
-	if (!stepper)
-		fail_msg("%s", err.text);
+	succeeds(stepper);
 	assert_string_equal(chip.chip, "pinctrl");
 	assert_int_equal(chip.idle, actuator.active_low);
 	incise_stepper_info(stepper, &info);
@@ -254,7 +248,6 @@ TEST(why_it_cannot_begin_is_said)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_actuator actuator = slow();
-		struct incise_error err = {0};
 
 		memset(&chip, 0, sizeof(chip));
 		chip.open_error = cases[i].open_error;

@@ -4,17 +4,14 @@
  * calls to functions here, behind which a pulser and a machine play the module, on a clock
  * that goes when one sleeps. The real module is asked in tests/vm.
  */
-#include <errno.h>
+#include "../unit.h"
 #include <fcntl.h>
-#include <stdbool.h>
-#include <string.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <time.h>
 #include "../../../lib/device/backends.h"
 #include "../../../lib/device/motor.h"
 #include "../message.h"
-#include "../unit.h"
 #include "conformance.h"
 #include "machine.h"
 
@@ -246,13 +243,11 @@ TEST(every_case)
 	for (int i = 0; conformance[i].name; i++) {
 		struct conformance c = {
 			.advance = sleep_for, .input = raise, .say = failed};
-		struct incise_error err = {0};
 
 		module_load();
 		c.stepper =
 			open_stepper("/dev/incise-stepper0:2", false, &actuator, &err);
-		if (!c.stepper)
-			fail_msg("%s", err.text);
+		succeeds(c.stepper);
 		incise_stepper_info(c.stepper, &c.info);
 		assert_string_equal(c.info.name, "bench motor 2 at incise-stepper0");
 		assert_true(c.info.rate_max_hz == 20000);
@@ -272,7 +267,6 @@ TEST(every_case)
 /* Two motors through one open file are asked of the real module, in tests/vm. */
 TEST(a_motor_is_one_actuator_of_a_rig)
 {
-	struct incise_error err = {0};
 	struct incise_stepper *owner;
 	struct incise_backend_request request = {
 		.arguments = "/dev/incise-stepper0:2",
@@ -299,7 +293,6 @@ TEST(a_watcher_only_looks)
 	struct incise_stepper_status status;
 	struct incise_stepper *owner, *watcher;
 	struct incise_stepper_info info;
-	struct incise_error err = {0};
 
 	module_load();
 	owner = open_stepper("/dev/incise-stepper0:2", false, &actuator, NULL);
@@ -359,8 +352,6 @@ TEST(why_it_does_not_open_is_said)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
-
 		module_load();
 		module.open_error = cases[i].open_error;
 		module.info_error = cases[i].info_error;
@@ -415,7 +406,6 @@ TEST(a_device_that_goes_away)
 {
 	struct incise_stepper_status status;
 	struct incise_stepper *stepper;
-	struct incise_error err = {0};
 
 	module_load();
 	stepper = open_stepper("/dev/incise-stepper0:2", false, &actuator, NULL);

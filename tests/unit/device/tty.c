@@ -3,13 +3,9 @@
  * lib/device/tty.c on pseudo terminals. A line's speed means nothing there, but is kept.
  */
 #include "../unit.h"
-#include <errno.h>
 #include <fcntl.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 #include "../../../lib/device/tty.h"
 
 static int master;

@@ -3,12 +3,9 @@
  * lib/device/vision.c: the module is asked for by its name, every call reaches it with its
  * arguments, and what is said where it is not installed. This file is the finder of modules.
  */
-#include <errno.h>
-#include <stdlib.h>
-#include <string.h>
+#include "../unit.h"
 #include "../../../lib/device/backends.h"
 #include "../message.h"
-#include "../unit.h"
 
 /* A module that remembers what it was called with. */
 static struct {
@@ -98,7 +95,6 @@ TEST(learning_needs_no_valid_setup, forget)
 	struct incise_vision_setup setup = {.hue = {-1, 4000}};
 	struct incise_vision_box box = {0};
 	struct incise_camera_frame frame = {0};
-	struct incise_error err = {0};
 
 	assert_int_equal(incise_vision_learn(&frame, &box, &setup, &err), -ERANGE);
 	assert_ptr_equal(seen.frame, &frame);

@@ -5,7 +5,6 @@
  * field at a time.
  */
 #include "../unit.h"
-#include <string.h>
 
 /*
  * Before each read of the page the owner does what its schedule says. A read without

@@ -3,13 +3,7 @@
  * Films, read back by libavformat and libavcodec: the number of frames, their times, and their
  * colours up to coding losses; and files that cannot be written.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
+#include "../unit.h"
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
 #include "../../../lib/view/film.h"
@@ -94,17 +88,15 @@ static int decode(AVFormatContext *format, AVCodecContext *codec)
 	return n;
 }
 
-static void test_what_is_put_is_there(void **state)
+TEST(test_what_is_put_is_there)
 {
 	AVFormatContext *format = NULL;
 	struct incise_film_coder *coder;
-	struct incise_error err = {0};
 	uint8_t rgb[W * H * 3];
 	AVCodecContext *codec;
 
 	coder = incise_film_module.open(path, W, H, FPS, &err);
-	if (!coder)
-		fail_msg("%s", err.text);
+	succeeds(coder);
 	for (int n = 0; n < N; n++) {
 		picture(n, rgb);
 		assert_int_equal(incise_film_module.add(coder, rgb, &err), 0);
@@ -124,9 +116,8 @@ static void test_what_is_put_is_there(void **state)
 	avformat_close_input(&format);
 }
 
-static void test_files_that_cannot_be(void **state)
+TEST(test_files_that_cannot_be)
 {
-	struct incise_error err = {0};
 	struct incise_film_coder *coder;
 	uint8_t *rgb = calloc(1024 * 1024, 3);
 	int rc = 0;
@@ -159,12 +150,4 @@ static int end(void **state)
 	return unlink(path);
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_what_is_put_is_there),
-		cmocka_unit_test(test_files_that_cannot_be),
-	};
-
-	return cmocka_run_group_tests(tests, begin, end);
-}
+GROUP(begin, end);

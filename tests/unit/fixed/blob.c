@@ -4,9 +4,6 @@
  * read outside of the blob, which stands at the end of its memory, and any overflow.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/fixed/layout.h"
 #include "compiled.h"

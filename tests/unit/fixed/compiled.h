@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/*
- * Compiled models for tests: an arithmetic asked for, without a budget.
- */
+/* Compiled models for tests: an arithmetic asked for, without a budget. */
 #ifndef INCISE_TEST_COMPILED_H
 #define INCISE_TEST_COMPILED_H
 

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Inputs of a model in integers against those in double; and numbers at their ends.
- */
+/* Inputs of a model in integers against those in double; and numbers at their ends. */
 #include "../unit.h"
-#include <math.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/control/model_input.h"
 #include "../../../lib/fixed/input.h"

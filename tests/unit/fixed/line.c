@@ -4,8 +4,6 @@
  * over a skin, turns and leaves it, and the handle and tube that open its cuts.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
 #include <incise/scene.h>
 #include "../../../lib/fixed/incision.h"
 #include "../../../lib/fixed/line.h"

@@ -4,10 +4,6 @@
  * changed, cut short or of another version they are refused.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include "trial_plan.h"
 
 #define PLANS 400

@@ -4,8 +4,6 @@
  * late poses; then what no hand does.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
 #include "../../../lib/control/predict.h"
 #include "../../../lib/fixed/predict.h"
 #include "../../../lib/fixed/trial.h"

@@ -4,7 +4,6 @@
  * profile_watch.h), arrival and stops against closed forms, the average against adding up.
  */
 #include "../unit.h"
-#include <math.h>
 #include "profile_watch.h"
 #include "../model/paper_model.h"
 

@@ -5,8 +5,6 @@
  * numbers are tried in full, the largest that exist by chance, in 128 bits.
  */
 #include "../unit.h"
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/fixed/ramp.h"
 #include "../model/paper_model.h"
 

@@ -5,8 +5,6 @@
  * all that is curved.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
 #include "trial_plan.h"
 #include "../../../lib/surface/surface.h"
 

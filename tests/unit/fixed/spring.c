@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * The spring in integers, by hand; tests/extremes/motion.c tries any numbers.
- */
+/* The spring in integers, by hand; tests/extremes/motion.c tries any numbers. */
 #include "../unit.h"
-#include <stdlib.h>
 #include "../../../lib/fixed/layout.h"
 #include "../../../lib/fixed/trial.h"
 

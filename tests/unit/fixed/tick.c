@@ -3,14 +3,7 @@
  * The stages of a tick in integers: each force compared with its formula, written out here in double;
  * start, limits and targets; then random plans at work, and numbers at their ends.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "../unit.h"
 #include "../../extremes/fixed_spring.h"
 #include "trial_plan.h"
 
@@ -20,7 +13,7 @@
 #define LSB (1 / ONE)
 
 static struct incise_fx_trial trial;
-static struct incise_fixed_state state;
+static struct incise_fixed_state tick_state;
 
 static int32_t fixed(double v)
 {
@@ -54,11 +47,12 @@ static double dot(const double a[3], const double b[3])
 	return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static void begin(void **unused)
+static int begin(void **state)
 {
-	memset(&state, 0, sizeof(state));
+	memset(&tick_state, 0, sizeof(tick_state));
 	if (!trial.seed)
 		trial.seed = 1;
+	return 0;
 }
 
 /* Run a stage; the force that it adds, N. */
@@ -68,10 +62,10 @@ static void effect(double force[3], const struct incise_fixed_plan *plan,
 	int32_t was[3];
 
 	for (int i = 0; i < 3; i++)
-		was[i] = state.force[i] = fixed(any(-4, 4));
-	stage(plan, &state, tick);
+		was[i] = tick_state.force[i] = fixed(any(-4, 4));
+	stage(plan, &tick_state, tick);
 	for (int i = 0; i < 3; i++)
-		force[i] = (state.force[i] - was[i]) / ONE;
+		force[i] = (tick_state.force[i] - was[i]) / ONE;
 }
 
 static void assert_force(const double got[3], const double want[3], double most)
@@ -88,36 +82,34 @@ static struct incise_fixed_tick tick_in(enum incise_phase phase)
 }
 
 /* K depth n: the product and each part are rounded once. */
-static void test_reaction(void **unused)
+TEST(test_reaction, begin)
 {
-	begin(unused);
 	for (int k = 0; k < CASES; k++) {
 		struct incise_fixed_plan plan = {.numbers.reaction = fixed(any(0, 5))};
 		struct incise_fixed_tick tick = tick_in(INCISE_PHASE_CUTTING);
 		double n[3], want[3], got[3];
 
-		any_unit(state.normal, n);
-		state.depth = fixed(any(0, 50));
+		any_unit(tick_state.normal, n);
+		tick_state.depth = fixed(any(0, 50));
 		effect(got, &plan, incise_fixed_stage_reaction, &tick);
 		for (int i = 0; i < 3; i++)
-			want[i] =
-				plan.numbers.reaction / ONE * (state.depth / ONE) * n[i];
+			want[i] = plan.numbers.reaction / ONE * (tick_state.depth / ONE) *
+				  n[i];
 		assert_force(got, want, LSB);
 	}
 }
 
 /* Against the spring in double, within the bound that is certified for it. */
-static void test_plane(void **unused)
+TEST(test_plane, begin)
 {
-	begin(unused);
 	for (int k = 0; k < CASES; k++) {
 		double K = any(0, 5), p[3], p0[3], s[3], off[3], want[3], got[3];
 		struct incise_fixed_plan plan = {.numbers.plane = fixed(K)};
 		struct incise_fixed_tick tick = tick_in(INCISE_PHASE_CUTTING);
 
 		any_place(tick.tool, p, 20);
-		any_place(state.p0, p0, 20);
-		any_unit(state.side, s);
+		any_place(tick_state.p0, p0, 20);
+		any_unit(tick_state.side, s);
 		effect(got, &plan, incise_fixed_stage_plane, &tick);
 		for (int i = 0; i < 3; i++)
 			off[i] = p[i] - p0[i];
@@ -128,9 +120,8 @@ static void test_plane(void **unused)
 	}
 }
 
-static void test_damping(void **unused)
+TEST(test_damping, begin)
 {
-	begin(unused);
 	for (int k = 0; k < CASES; k++) {
 		struct incise_fixed_plan plan = {
 			.numbers.damping = (int32_t)lrint(any(0, 0.01) * 268435456)};
@@ -138,7 +129,7 @@ static void test_damping(void **unused)
 			tick_in(k & 1 ? INCISE_PHASE_CUTTING : INCISE_PHASE_INSERTION);
 		double v[3], want[3], got[3];
 
-		any_place(state.velocity, v, 500);
+		any_place(tick_state.velocity, v, 500);
 		effect(got, &plan, incise_fixed_stage_damping, &tick);
 		for (int i = 0; i < 3; i++)
 			want[i] = -plan.numbers.damping / 268435456.0 * v[i];
@@ -147,9 +138,8 @@ static void test_damping(void **unused)
 }
 
 /* -K (off - (off·n) n): the part along n, the vector across and the product are rounded. */
-static void test_spread(void **unused)
+TEST(test_spread, begin)
 {
-	begin(unused);
 	for (int k = 0; k < CASES; k++) {
 		struct incise_fixed_plan plan = {.numbers.spread = fixed(any(0, 2))};
 		struct incise_fixed_tick tick = tick_in(INCISE_PHASE_INSERTION);
@@ -157,8 +147,8 @@ static void test_spread(void **unused)
 		       got[3];
 
 		any_place(tick.tool, p, 20);
-		any_place(state.p0, p0, 20);
-		any_unit(state.normal, n);
+		any_place(tick_state.p0, p0, 20);
+		any_unit(tick_state.normal, n);
 		effect(got, &plan, incise_fixed_stage_spread, &tick);
 		for (int i = 0; i < 3; i++)
 			off[i] = p[i] - p0[i];
@@ -169,9 +159,8 @@ static void test_spread(void **unused)
 }
 
 /* Beside the cut K depth; in it only Fort of that as deep as the cut is; below it K again. */
-static void test_insertion(void **unused)
+TEST(test_insertion, begin)
 {
-	begin(unused);
 	for (int k = 0; k < CASES; k++) {
 		struct incise_fixed_plan plan = {
 			.numbers = {.insertion = fixed(any(0, 2)),
@@ -181,21 +170,22 @@ static void test_insertion(void **unused)
 		       aligned = plan.numbers.aligned / ONE;
 		double n[3], flat[3], along[3], tight, eased, depth, cut, want[3], got[3];
 
-		any_unit(state.normal, n);
-		any_unit(state.flat, flat);
-		any_unit(state.opening.along, along);
-		state.held = k % 3 ? INCISE_TOOL_HANDLE : INCISE_TOOL_TUBE;
-		state.opening.in = k & 1;
-		state.opening.depth = fixed(any(0, 20));
-		state.tightness = fixed(any(0, 1));
-		state.depth = fixed(any(0, 30));
-		tight = state.tightness / ONE;
+		any_unit(tick_state.normal, n);
+		any_unit(tick_state.flat, flat);
+		any_unit(tick_state.opening.along, along);
+		tick_state.held = k % 3 ? INCISE_TOOL_HANDLE : INCISE_TOOL_TUBE;
+		tick_state.opening.in = k & 1;
+		tick_state.opening.depth = fixed(any(0, 20));
+		tick_state.tightness = fixed(any(0, 1));
+		tick_state.depth = fixed(any(0, 30));
+		tight = tick_state.tightness / ONE;
 		eased = aligned + (1 - aligned) * tight *
-					  (state.held == INCISE_TOOL_TUBE
+					  (tick_state.held == INCISE_TOOL_TUBE
 						   ? 1
 						   : fabs(dot(flat, along)));
-		depth = state.depth / ONE;
-		cut = state.opening.in ? fmin(depth, state.opening.depth / ONE) : 0;
+		depth = tick_state.depth / ONE;
+		cut = tick_state.opening.in ? fmin(depth, tick_state.opening.depth / ONE)
+					    : 0;
 		effect(got, &plan, incise_fixed_stage_insertion, &tick);
 		for (int i = 0; i < 3; i++)
 			want[i] = K * (depth - cut + eased * cut) * n[i];
@@ -205,7 +195,7 @@ static void test_insertion(void **unused)
 }
 
 /* Until it yields a spring, then nothing down to the wall behind. */
-static void test_membrane(void **unused)
+TEST(test_membrane, begin)
 {
 	struct incise_fixed_plan plan = {
 		.numbers.membrane = {.normal = {0, 0, INCISE_FIXED_UNIT},
@@ -226,24 +216,23 @@ static void test_membrane(void **unused)
 		{16, 0.5, INCISE_TICK_LUMEN | INCISE_TICK_BACK_WALL},
 	};
 
-	begin(unused);
 	for (size_t k = 0; k < sizeof(way) / sizeof(*way); k++) {
 		struct incise_fixed_tick tick = tick_in(INCISE_PHASE_CUTTING);
 		double got[3], want[3] = {0, 0, way[k].force};
 
-		state.depth = fixed(10 + way[k].beyond);
+		tick_state.depth = fixed(10 + way[k].beyond);
 		tick.tool[2] = -fixed(way[k].beyond);
 		effect(got, &plan, incise_fixed_stage_membrane, &tick);
 		assert_force(got, want, 0);
 		assert_int_equal(tick.flags, way[k].flag);
 		/* The tissue above stays as deep as it was. */
 		if (way[k].beyond > 0)
-			assert_int_equal(state.depth, 10 << 16);
+			assert_int_equal(tick_state.depth, 10 << 16);
 	}
 }
 
 /* No force acts in a phase that is not its own. */
-static void test_phases(void **unused)
+TEST(test_phases, begin)
 {
 	static const struct {
 		incise_fixed_stage_fn *stage;
@@ -262,18 +251,17 @@ static void test_phases(void **unused)
 						     .aligned = 1 << 16,
 						     .spread = 1 << 16}};
 
-	begin(unused);
 	for (size_t k = 0; k < sizeof(stages) / sizeof(*stages); k++)
 		for (int phase = 0; phase < 3; phase++) {
 			struct incise_fixed_tick tick = tick_in((enum incise_phase)phase);
 			double got[3];
 
-			state.depth = 3 << 16;
-			state.held = INCISE_TOOL_HANDLE;
+			tick_state.depth = 3 << 16;
+			tick_state.held = INCISE_TOOL_HANDLE;
 			for (int i = 0; i < 3; i++) {
-				state.normal[i] = state.side[i] =
+				tick_state.normal[i] = tick_state.side[i] =
 					i == 2 ? INCISE_FIXED_UNIT : 0;
-				state.velocity[i] = tick.tool[i] = 5 << 16;
+				tick_state.velocity[i] = tick.tool[i] = 5 << 16;
 			}
 			effect(got, &plan, stages[k].stage, &tick);
 			assert_int_equal(got[0] != 0 || got[1] != 0 || got[2] != 0,
@@ -282,7 +270,7 @@ static void test_phases(void **unused)
 }
 
 /* A force waits for a small one, rises in a tenth each tick at most, and goes in fade_ns. */
-static void test_start(void **unused)
+TEST(test_start, begin)
 {
 	struct incise_fixed_plan plan = {
 		.numbers = {.small = 1 << 12, .ramp_ns = 20000000, .fade_ns = 50000000}};
@@ -290,19 +278,18 @@ static void test_start(void **unused)
 	int64_t t_ns = 1000000;
 	int ticks = 0;
 
-	begin(unused);
-	state.force[2] = 1 << 16;
+	tick_state.force[2] = 1 << 16;
 	for (int k = 0; k < 100; k++, t_ns += 1000000) {
 		tick = (struct incise_fixed_tick){.t_ns = t_ns};
-		incise_fixed_stage_start(&plan, &state, &tick);
+		incise_fixed_stage_start(&plan, &tick_state, &tick);
 		assert_int_equal(tick.command[2], 0);
 		assert_true(tick.flags & INCISE_TICK_STARTING);
 	}
-	state.force[2] = 1 << 12;
+	tick_state.force[2] = 1 << 12;
 	do {
 		tick = (struct incise_fixed_tick){.t_ns = t_ns += 1000000};
-		incise_fixed_stage_start(&plan, &state, &tick);
-		state.force[2] = 1 << 16;
+		incise_fixed_stage_start(&plan, &tick_state, &tick);
+		tick_state.force[2] = 1 << 16;
 		ticks++;
 	} while (tick.flags & INCISE_TICK_STARTING);
 	/* 20 ticks, and what rounding down of each leaves. */
@@ -311,12 +298,12 @@ static void test_start(void **unused)
 	for (ticks = 0; tick.command[2]; ticks++) {
 		tick = (struct incise_fixed_tick){.t_ns = t_ns += 1000000,
 						  .flags = INCISE_TICK_STALE};
-		incise_fixed_stage_start(&plan, &state, &tick);
+		incise_fixed_stage_start(&plan, &tick_state, &tick);
 	}
 	assert_in_range(ticks, 50, 51);
 	/* A tick that comes late is no reason for a leap. */
 	tick = (struct incise_fixed_tick){.t_ns = t_ns += 1000000000};
-	incise_fixed_stage_start(&plan, &state, &tick);
+	incise_fixed_stage_start(&plan, &tick_state, &tick);
 	assert_in_range(tick.command[2], 1, (1 << 16) / 10 + 1);
 }
 
@@ -326,9 +313,8 @@ static double length_of(const int32_t v[3])
 }
 
 /* The same as in real numbers, but for rounding: towards 0 in each of three steps. */
-static void test_limit(void **unused)
+TEST(test_limit, begin)
 {
-	begin(unused);
 	for (int k = 0; k < CASES; k++) {
 		struct incise_fixed_plan plan = {
 			.numbers = {.force = 1 + (int32_t)any(0, 1 << 20),
@@ -339,7 +325,7 @@ static void test_limit(void **unused)
 		int32_t last[3], moved[3];
 
 		for (int i = 0; i < 3; i++) {
-			last[i] = state.last[i] = (int32_t)any(-most / 2, most / 2);
+			last[i] = tick_state.last[i] = (int32_t)any(-most / 2, most / 2);
 			tick.command[i] = (int32_t)any(-2 * most, 2 * most);
 		}
 		length = length_of(tick.command);
@@ -348,12 +334,12 @@ static void test_limit(void **unused)
 		length = sqrt(dot(change, change));
 		for (int i = 0; i < 3; i++)
 			want[i] = last[i] + change[i] * fmin(1, slew / length);
-		incise_fixed_stage_limit(&plan, &state, &tick);
+		incise_fixed_stage_limit(&plan, &tick_state, &tick);
 		for (int i = 0; i < 3; i++) {
 			moved[i] = tick.command[i] - last[i];
 			step[i] = tick.command[i] - want[i];
 			assert_true(fabs(step[i]) <= 4);
-			assert_int_equal(state.last[i], tick.command[i]);
+			assert_int_equal(tick_state.last[i], tick.command[i]);
 		}
 		assert_true(length_of(tick.command) <= most);
 		assert_true(length_of(moved) <= slew + 2 * sqrt(3));
@@ -361,7 +347,7 @@ static void test_limit(void **unused)
 }
 
 /* The nut goes where the spring pushes with the force along its axis. */
-static void test_targets(void **unused)
+TEST(test_targets, begin)
 {
 	struct incise_fixed_plan plan = {
 		.numbers = {.n_axes = 1,
@@ -386,31 +372,31 @@ static void test_targets(void **unused)
 					 .position = {0, 0, -(6 << 16)}};
 	struct incise_fixed_tick tick;
 
-	begin(unused);
-	incise_fixed_plan_begin(&plan, &state);
-	incise_fixed_plan_tick(&plan, &state, 1000000, &tick);
+	incise_fixed_plan_begin(&plan, &tick_state);
+	incise_fixed_plan_tick(&plan, &tick_state, 1000000, &tick);
 	/* Without a pose it is at rest. */
 	assert_int_equal(tick.target[0], 1000);
 	assert_true(tick.flags & INCISE_TICK_STALE);
 	for (int k = 2; k < 40; k++) {
 		pose.t_ns = (int64_t)k * 1000000;
-		assert_int_equal(incise_fixed_plan_pose(&plan, &state, &pose, pose.t_ns),
+		assert_int_equal(incise_fixed_plan_pose(&plan, &tick_state, &pose,
+							pose.t_ns),
 				 INCISE_FIXED_POSE_TAKEN);
-		incise_fixed_plan_tick(&plan, &state, pose.t_ns, &tick);
+		incise_fixed_plan_tick(&plan, &tick_state, pose.t_ns, &tick);
 	}
 	/* 6 mm deep are 3 N, which are 6 mm of the spring: 44 + 6 mm from the origin. */
 	assert_int_equal(tick.command[2], 3 << 16);
 	assert_int_equal(tick.along[0], 3 << 16);
 	assert_int_equal(tick.target[0], 5000);
 	assert_false(tick.flags & INCISE_TICK_TRAVEL);
-	assert_int_equal(incise_fixed_plan_pose(&plan, &state, &pose, pose.t_ns),
+	assert_int_equal(incise_fixed_plan_pose(&plan, &tick_state, &pose, pose.t_ns),
 			 INCISE_FIXED_POSE_OLD);
 	pose.t_ns += 1000000;
 	pose.position[0] = INT32_MAX;
-	assert_int_equal(incise_fixed_plan_pose(&plan, &state, &pose, pose.t_ns),
+	assert_int_equal(incise_fixed_plan_pose(&plan, &tick_state, &pose, pose.t_ns),
 			 INCISE_FIXED_POSE_FAR);
 	pose.tool = INCISE_FIXED_POSE_TUBE;
-	assert_int_equal(incise_fixed_plan_pose(&plan, &state, &pose, pose.t_ns),
+	assert_int_equal(incise_fixed_plan_pose(&plan, &tick_state, &pose, pose.t_ns),
 			 INCISE_FIXED_POSE_UNKNOWN);
 }
 
@@ -423,8 +409,8 @@ static uint32_t play(const struct incise_fixed_plan *plan, uint64_t seed, bool h
 	uint32_t digest = 0;
 	int32_t last[3] = {0};
 
-	memset(&state, (int)seed, sizeof(state));
-	incise_fixed_plan_begin(plan, &state);
+	memset(&tick_state, (int)seed, sizeof(tick_state));
+	incise_fixed_plan_begin(plan, &tick_state);
 	for (int k = 0; k < 400; k++) {
 		struct incise_fixed_tick tick;
 		struct incise_fixed_pose pose;
@@ -440,8 +426,8 @@ static uint32_t play(const struct incise_fixed_plan *plan, uint64_t seed, bool h
 				pose.quaternion[i] = end;
 				pose.position[i % 3] = k & 1 ? end : pose.position[i % 3];
 			}
-		incise_fixed_plan_pose(plan, &state, &pose, hand.t_ns);
-		incise_fixed_plan_tick(plan, &state, hand.t_ns, &tick);
+		incise_fixed_plan_pose(plan, &tick_state, &pose, hand.t_ns);
+		incise_fixed_plan_tick(plan, &tick_state, hand.t_ns, &tick);
 		for (int i = 0; i < 3; i++)
 			moved[i] = tick.command[i] - last[i];
 		incise_fx_copy(last, tick.command);
@@ -459,7 +445,7 @@ static uint32_t play(const struct incise_fixed_plan *plan, uint64_t seed, bool h
 }
 
 /* The same again gives the same bits, and what can happen does. */
-static void test_random_plans(void **unused)
+TEST(test_random_plans, begin)
 {
 	uint8_t *bytes = calloc(1, INCISE_FX_TRIAL_PLAN_SIZE);
 	uint32_t flags = 0;
@@ -483,18 +469,4 @@ static void test_random_plans(void **unused)
 			INCISE_TICK_SLEWED | INCISE_TICK_TRAVEL | INCISE_TICK_STARTING |
 			INCISE_TICK_STALE | INCISE_TICK_IN_CUT);
 	free(bytes);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_reaction),     cmocka_unit_test(test_plane),
-		cmocka_unit_test(test_damping),	     cmocka_unit_test(test_spread),
-		cmocka_unit_test(test_insertion),    cmocka_unit_test(test_membrane),
-		cmocka_unit_test(test_phases),	     cmocka_unit_test(test_start),
-		cmocka_unit_test(test_limit),	     cmocka_unit_test(test_targets),
-		cmocka_unit_test(test_random_plans),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,8 +4,6 @@
  * of all sizes and at the ends of their ranges.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
 #include "../../../lib/fixed/trial.h"
 #include "../../../lib/fixed/vector.h"
 

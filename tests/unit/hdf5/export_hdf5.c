@@ -3,17 +3,9 @@
  * Tests of lib/record/export/hdf5/export_hdf5.c: what it wrote is read back through libhdf5's
  * own interface.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <errno.h>
-#include <stdlib.h>
-#include <string.h>
+#include "../unit.h"
 #include <sys/resource.h>
 #include <signal.h>
-#include <unistd.h>
-#include <cmocka.h>
 #include <hdf5.h>
 #include <incise/backend.h>
 #include <incise/outfile.h>
@@ -129,7 +121,7 @@ static double *read_column(hid_t file, const char *name, hsize_t n, const char *
 	return values;
 }
 
-static void rows_come_back(void **state)
+TEST(rows_come_back)
 {
 	/* none, one, a block, one more, and several with a rest */
 	static const int64_t sizes[] = {0, 1, INCISE_TABLE_BLOCK, INCISE_TABLE_BLOCK + 1,
@@ -138,13 +130,11 @@ static void rows_come_back(void **state)
 
 	assert_int_equal(incise_provenance_add(&provenance, "source", "liver.rec"), 0);
 	for (size_t k = 0; k < sizeof(sizes) / sizeof(*sizes); k++) {
-		struct incise_error err = {0};
 		int64_t n = sizes[k];
 		double *cut, *t_s, *force, *count, *clipped;
 		hid_t file;
 
-		if (write_rows(n, &provenance, &err))
-			fail_msg("%s", err.text);
+		succeeds(!write_rows(n, &provenance, &err));
 		file = H5Fopen(FILE_NAME, H5F_ACC_RDONLY, H5P_DEFAULT);
 		assert_true(file >= 0);
 		text_attribute(file, "source", "liver.rec");
@@ -172,9 +162,8 @@ static void rows_come_back(void **state)
 	incise_provenance_free(&provenance);
 }
 
-static void names_stand_beside_their_column(void **state)
+TEST(names_stand_beside_their_column)
 {
-	struct incise_error err = {0};
 	char names[3][8];
 	hid_t file, set, type;
 
@@ -192,7 +181,7 @@ static void names_stand_beside_their_column(void **state)
 }
 
 /* No more than so many bytes of a file, as on a full disk. */
-static void no_room_leaves_nothing(void **state)
+TEST(no_room_leaves_nothing)
 {
 	static const rlim_t sizes[] = {100, 5000, 300000};
 	struct rlimit before, limit;
@@ -216,13 +205,4 @@ static void no_room_leaves_nothing(void **state)
 	}
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(rows_come_back),
-		cmocka_unit_test(names_stand_beside_their_column),
-		cmocka_unit_test(no_room_leaves_nothing),
-	};
-
-	return cmocka_run_group_tests(tests, enter, leave);
-}
+GROUP(enter, leave);

@@ -4,9 +4,6 @@
  * it computes is held against published tables in train.c.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/learn/anfis.h"
 #include "../../../lib/learn/pairs.h"
 #include "../model/paper_model.h"

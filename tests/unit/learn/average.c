@@ -4,9 +4,6 @@
  * more than 2 %, and the 95 % interval holds its share. A single rule averages to linear regression.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <math.h>
-#include <string.h>
 #include <incise/train.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/average.h"

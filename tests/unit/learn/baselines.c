@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Baselines where the right answer is known.
- */
+/* Baselines where the right answer is known. */
 #include "../unit.h"
-#include <errno.h>
-#include <math.h>
 #include <incise/train.h>
 #include "../../../lib/base/random.h"
 

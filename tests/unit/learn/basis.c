@@ -4,12 +4,6 @@
  * and against finite differences, and what is no grid.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/basis.h"
 #include "../model/paper_model.h"

@@ -136,7 +136,6 @@ TEST(test_refused)
 	struct incise_model *model =
 		incise_model_new_grid(2, inputs, n_mfs, INCISE_MF_GAUSS, &out, NULL);
 	struct incise_factor *fit = incise_factor_new(model, NULL);
-	struct incise_error err = {0};
 	struct made made;
 
 	make(&made, 0, true);

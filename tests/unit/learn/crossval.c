@@ -3,9 +3,6 @@
  * Cross-validation: whole groups are held out, and errors are those of fits without them.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/learn/crossval.h"
 #include "../../../lib/base/random.h"
 

@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Reading CSV: values, groups, and errors that name line and column.
- */
+/* Reading CSV: values, groups, and errors that name line and column. */
+#include "../unit.h"
 /* before cmocka.h, which has a macro fail() */
 #include "../../../lib/learn/dataset.c"
-#include <errno.h>
-#include <string.h>
 #include <incise/dataset.h>
 #include "../message.h"
-#include "../unit.h"
 #include "../base/temp_file.h"
 
 static const char *const columns[] = {"force_N", "depth_mm"};
@@ -111,8 +107,6 @@ TEST(test_errors_say_where)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
-
 		assert_error(read_text(cases[i].text, cases[i].group, &err),
 			     cases[i].code, &err, cases[i].says[0], cases[i].says[1]);
 	}
@@ -176,7 +170,6 @@ TEST(test_where_refuses)
 
 TEST(test_missing_and_binary_files)
 {
-	struct incise_error err = {0};
 	struct temp_file file = temp_file_new("d.csv", "");
 	FILE *out = fopen(file.path, "w");
 

@@ -3,15 +3,10 @@
  * Reading a dataset from an Arrow stream: types, offsets, nulls, dictionaries, several batches;
  * errors name row and column, and the stream is released in any case.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdbool.h>
-#include <stdio.h>
-#include <string.h>
+#include "../unit.h"
 #include <incise/arrow.h>
 #include <incise/dataset.h>
 #include "../message.h"
-#include "../unit.h"
 
 #define COLUMNS 4
 #define BATCHES 2

@@ -3,16 +3,11 @@
  * Factors: any division of the pairs gives the same bytes, a file is read as it was written, and
  * the solution is that of a QR of the same rows.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "../unit.h"
 #include <incise/factor.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/design.h"
 #include "../message.h"
-#include "../unit.h"
 
 #define ROWS 3000
 
@@ -72,7 +67,6 @@ TEST(test_division)
 	struct incise_factor *whole = incise_factor_new(model, NULL), *read;
 	struct incise_factor *a = incise_factor_new(model, NULL);
 	struct incise_factor *b = incise_factor_new(model, NULL);
-	struct incise_error err = {0};
 	size_t size;
 	void *bytes;
 

@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Choosing how many membership functions there should be: as many as the data need.
- */
-#include <errno.h>
-#include <math.h>
-#include <string.h>
+/* Choosing how many membership functions there should be: as many as the data need. */
+#include "../unit.h"
 #include <incise/train.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/tune.h"
 #include "../message.h"
-#include "../unit.h"
 
 static double rows[400 * 3];
 
@@ -69,7 +64,6 @@ TEST(test_start)
 	struct incise_pairs pairs = {rows, 400, 2};
 	struct incise_train_options options;
 	struct incise_model *model;
-	struct incise_error err = {0};
 	int n_mfs[2], chosen[2] = {0}, given[2] = {3, 2};
 
 	choose(4, 0.1, 400, n_mfs, 0);

@@ -5,9 +5,7 @@
  * the kernels.
  */
 #include "../unit.h"
-#include <errno.h>
 #include <lapacke.h>
-#include <math.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/lsq.c"
 

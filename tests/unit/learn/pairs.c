@@ -3,14 +3,10 @@
  * Training pairs: units there and back, what cannot be learnt from, samples, spread explained,
  * and rows kept back: the share, whole groups, both sides filled.
  */
-#include <errno.h>
+#include "../unit.h"
 #include <float.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/learn/pairs.h"
 #include "../message.h"
-#include "../unit.h"
 #include "../model/paper_model.h"
 
 /* Outputs of any size come out with mean 0 and variance 1. */
@@ -102,7 +98,6 @@ TEST(test_refusals)
 	double rows[30];
 	struct incise_pairs pairs = {rows, 10, 2}, few = {rows, 4, 2},
 			    none = {rows, 0, 2};
-	struct incise_error err = {0};
 
 	for (int i = 0; i < 30; i++)
 		rows[i] = i;
@@ -229,7 +224,6 @@ TEST(test_split_refusals)
 {
 	const int one[] = {0, 0, 0};
 	bool check[3];
-	struct incise_error err = {0};
 
 	assert_int_equal(incise_split(3, one, 0.5, 1, check, &err), -EINVAL);
 	assert_int_equal(incise_split(1, NULL, 0.5, 1, check, &err), -EINVAL);

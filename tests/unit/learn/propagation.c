@@ -4,11 +4,6 @@
  * that of a fit to pairs that have this error.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <incise/factor.h>
 #include <incise/propagation.h>
 #include "../../../lib/base/random.h"

@@ -4,17 +4,12 @@
  * implementation of Jang's rule, against data where the right answer is known, and against
  * data where there is none.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
+#include "../unit.h"
 #include <incise/train.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/pairs.h"
 #include "../cases.h"
 #include "../message.h"
-#include "../unit.h"
 
 static struct incise_model *grid(int n_inputs, const double *min, const double *max,
 				 const int *n_mfs, enum incise_mf_type type)
@@ -112,13 +107,16 @@ static void train_mackey_glass(int first, int epochs, struct curve *curve,
 	incise_model_free(model);
 }
 
+/* Of the test that runs. */
+static struct incise_train_report report;
+static struct incise_train_options options;
+
 /* MATLAB's anfis on its own demo: ten epochs, printed with eight decimals. */
 TEST(test_matlab_mackey_glass)
 {
 	static const double want[] = {.00296046, .00290346, .00285048, .00280117,
 				      .00275517, .00271214, .00266783, .00262626,
 				      .00258702, .00254972};
-	struct incise_train_report report;
 	struct curve curve;
 
 	train_mackey_glass(117, 10, &curve, &report);
@@ -260,7 +258,6 @@ TEST(test_second_implementation)
 	static double rows[500 * 5];
 	static struct second a;
 	static struct curve curve;
-	struct incise_train_report report;
 	double min[4], max[4], g[4][2][3];
 
 	train_mackey_glass(117, 30, &curve, &report);
@@ -287,7 +284,6 @@ TEST(test_second_implementation)
 TEST(test_jang_example_4)
 {
 	static double rows[500 * 5];
-	struct incise_train_report report;
 	static struct curve curve;
 	double mean = 0, sum = 0;
 
@@ -347,7 +343,6 @@ TEST(test_jang_example_2)
 	const double min[] = {1, 1, 1}, max[] = {6, 6, 6};
 	struct incise_model *model = grid(3, min, max, mfs, INCISE_MF_GBELL);
 	struct incise_pairs pairs = {rows, cube(rows, 1, 6), 3};
-	struct incise_train_options options;
 
 	cube(check, 1.5, 5);
 	incise_train_options_init(&options);
@@ -368,8 +363,6 @@ TEST(test_plane_is_learnt)
 	const int mfs[] = {3, 2};
 	const double min[] = {0, 10}, max[] = {20, 60};
 	struct incise_pairs pairs = {rows, 400, 2};
-	struct incise_train_options options;
-	struct incise_train_report report;
 
 	for (int i = 0; i < 400; i++) {
 		double *row = rows + 3 * i;
@@ -405,8 +398,6 @@ TEST(test_default_holds_on_unseen_cut)
 	const int mfs[] = {5, 4};
 	double min[2], max[2];
 	struct incise_pairs train = {rows, 200, 2}, check = {rows + 200 * 3, 100, 2};
-	struct incise_train_options options;
-	struct incise_train_report report;
 	struct incise_baselines baselines;
 	struct incise_model *model;
 	uint32_t seed = 7;
@@ -448,8 +439,6 @@ TEST(test_deterministic_and_scale_free)
 		double rows[100 * 3];
 		struct incise_pairs pairs = {rows, 100, 2};
 		struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
-		struct incise_train_options options;
-		struct incise_train_report report;
 
 		for (int i = 0; i < 100; i++) {
 			rows[3 * i] = i % 10 / 9.0;
@@ -477,8 +466,6 @@ TEST(test_refusals)
 	const double min[] = {0, 0}, max[] = {1, 1};
 	struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
 	struct incise_model *before = incise_model_copy(model);
-	struct incise_train_options options;
-	struct incise_error err = {0};
 
 	for (int i = 0; i < 180; i++)
 		rows[i] = i * 37 % 180 / 180.0;
@@ -517,7 +504,6 @@ TEST(test_kinds_that_cannot_be_trained)
 	};
 	double rows[40 * 2];
 	struct incise_pairs pairs = {rows, 40, 1};
-	struct incise_train_options options;
 
 	for (int i = 0; i < 40; i++)
 		rows[2 * i] = rows[2 * i + 1] = i;
@@ -527,7 +513,6 @@ TEST(test_kinds_that_cannot_be_trained)
 			struct incise_model *model =
 				grid(1, (double[]){0}, (double[]){39}, (int[]){2},
 				     cases[i].type);
-			struct incise_error err = {0};
 
 			options.classic = classic;
 			assert_error(incise_train(model, &pairs, NULL, &options, NULL,
@@ -549,8 +534,6 @@ TEST(test_min_cannot_be_trained)
 	static const double rows[] = {0, 0, 0.5, 1, 1, 2};
 	struct incise_pairs pairs = {rows, 3, 1};
 	char path[] = "/tmp/incise-train-XXXXXX";
-	struct incise_train_options options;
-	struct incise_error err = {0};
 	struct incise_model *model;
 	int fd = mkstemp(path);
 
@@ -644,8 +627,6 @@ TEST(test_extreme_data)
 			double rows[120 * 3], min[2], max[2], size;
 			struct incise_pairs pairs = {rows, 120, 2};
 			struct incise_uncertainty *uncertainty = NULL;
-			struct incise_train_options options;
-			struct incise_train_report report;
 			struct incise_error err = {0};
 			struct incise_model *model, *before;
 			int rc;
@@ -702,8 +683,6 @@ TEST(test_too_little_data)
 	double rows[60 * 3];
 	const int three[] = {3, 3}, one[] = {1, 1};
 	const double min[] = {0, 0}, max[] = {1, 1};
-	struct incise_train_options options;
-	struct incise_error err = {0};
 
 	for (int i = 0; i < 60; i++) {
 		rows[3 * i] = 0.4;
@@ -736,8 +715,6 @@ TEST(test_report)
 	const double min[] = {0, 0}, max[] = {1, 1};
 	struct incise_pairs train = {rows, 200, 2}, check = {check_rows, 100, 2};
 	struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
-	struct incise_train_options options;
-	struct incise_train_report report;
 	static struct curve curve;
 	int unfired = 0;
 
@@ -793,8 +770,6 @@ TEST(test_training_can_be_stopped)
 	const double min[] = {0, 0}, max[] = {1, 1};
 	struct incise_pairs train = {rows, 200, 2};
 	struct incise_model *model = grid(2, min, max, mfs, INCISE_MF_GAUSS);
-	struct incise_train_options options;
-	struct incise_error err = {0};
 	int chosen[] = {0, 0};
 	static const char *const names[] = {"a", "b", "y"};
 
@@ -848,7 +823,6 @@ TEST(test_new_groups_are_covered)
 	const int n_mfs = 3, half = GROUPS * PER_GROUP;
 	struct incise_pairs train = {rows, half, 1};
 	struct incise_uncertainty *uncertainty = NULL;
-	struct incise_train_options options;
 	struct incise_model *model =
 		incise_model_new_grid(1, &in, &n_mfs, INCISE_MF_GAUSS, &out, NULL);
 	uint64_t seed = 11;
@@ -894,7 +868,6 @@ TEST(test_sd_grows_where_data_are_missing)
 	const int n_mfs = 4;
 	struct incise_pairs train = {rows, 200, 1};
 	struct incise_uncertainty *uncertainty = NULL;
-	struct incise_train_options options;
 	struct incise_model *model =
 		incise_model_new_grid(1, &in, &n_mfs, INCISE_MF_GAUSS, &out, NULL);
 	uint64_t seed = 3;

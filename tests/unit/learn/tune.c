@@ -3,8 +3,6 @@
  * Tuning: more noise asks for a larger ridge, planted premises are found, same seed, same choice.
  */
 #include "../unit.h"
-#include <math.h>
-#include <string.h>
 #include "../../../lib/learn/basis.h"
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/tune.h"

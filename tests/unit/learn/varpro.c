@@ -4,8 +4,6 @@
  * projected problem.
  */
 #include "../unit.h"
-#include <math.h>
-#include <string.h>
 #include "../../../lib/learn/basis.h"
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/varpro.h"

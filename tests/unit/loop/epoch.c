@@ -5,9 +5,8 @@
  * clock starts: at 0, across 32 bits of ns, µs and ms, across 2^53 ns, where a
  * double loses precision, and close to the end of 64 bits.
  */
-#include "../cases.h"
 #include "../unit.h"
-#include <string.h>
+#include "../cases.h"
 #include <incise/loop.h>
 #include "../scene/felt.h"
 

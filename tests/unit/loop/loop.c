@@ -3,75 +3,81 @@
  * The loop on a simulated clock: number of ticks, overruns, stopping, statistics. On a
  * real one only order is asserted: times belong to benches.
  */
-#include <errno.h>
-#include <math.h>
-#include <string.h>
+#include "../unit.h"
 #include <time.h>
 #include "../../../lib/loop/loop_control.h"
 #include <incise/loop.h>
 #include "../message.h"
-#include "../unit.h"
 #include "../scene/felt.h"
 
 static struct incise_loop_stats stats;
+#define LOG 300
+static struct incise_tick ticks[LOG];
+static struct incise_loop_options options;
+static struct incise_tracker_ops ops;
+static struct felt f;
+static int calls;
 
-TEST(test_number_of_ticks)
+static int begin(void **state)
+{
+	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+	options = (struct incise_loop_options){
+		.rate_hz = 1000, .log = ticks, .log_size = LOG};
+	err = (struct incise_error){0};
+	calls = 0;
+	return 0;
+}
+
+static int end(void **state)
+{
+	felt_end(&f);
+	incise_loop_control_free(options.control);
+	return 0;
+}
+
+static int run(int64_t duration_ns)
+{
+	options.duration_ns = duration_ns;
+	return incise_loop_run(f.plan, incise_rig_clock(f.rig), &options, &stats, &err);
+}
+
+TEST(test_number_of_ticks, begin, end)
 {
 	static const double rates[] = {1, 333, 1000, 8000};
 
 	for (size_t i = 0; i < 4; i++) {
-		struct incise_loop_options options = {.rate_hz = rates[i],
-						      .duration_ns = 2 * INCISE_NS_PER_S};
-		struct felt f;
-
-		felt_start(&f, "fixed", INCISE_RIG_TRACKER);
-		assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig),
-						 &options, &stats, NULL),
-				 0);
+		options.rate_hz = rates[i];
+		assert_int_equal(run(2 * INCISE_NS_PER_S), 0);
 		/* A period of whole ns: 333 Hz is 3003003 ns, one tick more fits in. */
 		assert_int_equal(stats.ticks, llrint(ceil(2e9 / rint(1e9 / rates[i]))));
 		assert_int_equal(stats.skipped, 0);
 		assert_int_equal(stats.lateness_max_ns, 0);
 		assert_int_equal(stats.lateness_us[0], stats.ticks);
-		felt_end(&f);
 	}
 }
 
-TEST(test_log_and_times)
+TEST(test_log_and_times, begin, end)
 {
-	static struct incise_tick log[300];
-	struct incise_loop_options options = {.rate_hz = 1000,
-					      .duration_ns = INCISE_NS_PER_S / 2,
-					      .log = log,
-					      .log_size = 300};
-	struct felt f;
-	int64_t begin;
+	int64_t begin_ns = incise_clock_now(incise_rig_clock(f.rig));
 
-	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
-	begin = incise_clock_now(incise_rig_clock(f.rig));
-	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
-					 &stats, NULL),
-			 0);
+	assert_int_equal(run(INCISE_NS_PER_S / 2), 0);
 	/* More ticks than the log holds: it keeps the first. */
 	assert_int_equal(stats.ticks, 500);
 	assert_int_equal(stats.logged, 300);
 	for (int i = 0; i < 300; i++)
-		assert_int_equal(log[i].t_ns, begin + (i + 1) * 1000000LL);
-	felt_end(&f);
+		assert_int_equal(ticks[i].t_ns, begin_ns + (i + 1) * 1000000LL);
 }
 
 /* Replace the read function of the rig's tracker. */
-static void read_by(struct felt *f, struct incise_tracker_ops *ops,
-		    int (*read)(struct incise_tracker *, struct incise_tracker_sample *,
+static void read_by(int (*read)(struct incise_tracker *, struct incise_tracker_sample *,
 				int))
 {
-	*ops = *f->tracker_ops;
-	ops->read = read;
-	incise_rig_tracker(f->rig)->ops = ops;
+	ops = *f.tracker_ops;
+	ops.read = read;
+	incise_rig_tracker(f.rig)->ops = &ops;
 }
 
 static struct incise_clock *stalled;
-static int calls;
 
 /* The tenth tick takes 3.4 periods, like a stall of the machine. */
 static int slow_tracker(struct incise_tracker *tracker,
@@ -82,46 +88,30 @@ static int slow_tracker(struct incise_tracker *tracker,
 	return 0;
 }
 
-TEST(test_overrun_skips_and_counts)
+TEST(test_overrun_skips_and_counts, begin, end)
 {
-	static struct incise_tick log[100];
-	struct incise_loop_options options = {
-		.rate_hz = 1000, .duration_ns = 50000000, .log = log, .log_size = 100};
-	struct incise_tracker_ops ops;
-	struct felt f;
-
-	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
-	read_by(&f, &ops, slow_tracker);
+	read_by(slow_tracker);
 	stalled = incise_rig_clock(f.rig);
-	calls = 0;
-	assert_int_equal(incise_loop_run(f.plan, stalled, &options, &stats, NULL), 0);
+	assert_int_equal(run(50000000), 0);
 	/* Tick 10 ends 3.4 periods on. The next, 2.4 late, skips two and runs; the one after
 	 * is on time again. 50 were due. */
 	assert_int_equal(stats.skipped, 2);
 	assert_int_equal(stats.ticks, 48);
 	assert_int_equal(stats.lateness_max_ns, 2400000);
 	assert_int_equal(stats.tick_max_ns, 3400000);
-	assert_int_equal(log[10].t_ns - log[9].t_ns, 3400000);
-	assert_int_equal(log[11].t_ns - log[9].t_ns, 4000000);
+	assert_int_equal(ticks[10].t_ns - ticks[9].t_ns, 3400000);
+	assert_int_equal(ticks[11].t_ns - ticks[9].t_ns, 4000000);
 	assert_int_equal(stats.flagged[2], 48);
-	felt_end(&f);
 }
 
 /* The same stall over the end: 12 were due, the two behind the tenth are left out. */
-TEST(test_overrun_over_the_end)
+TEST(test_overrun_over_the_end, begin, end)
 {
-	struct incise_loop_options options = {.rate_hz = 1000, .duration_ns = 12000000};
-	struct incise_tracker_ops ops;
-	struct felt f;
-
-	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
-	read_by(&f, &ops, slow_tracker);
+	read_by(slow_tracker);
 	stalled = incise_rig_clock(f.rig);
-	calls = 0;
-	assert_int_equal(incise_loop_run(f.plan, stalled, &options, &stats, NULL), 0);
+	assert_int_equal(run(12000000), 0);
 	assert_int_equal(stats.ticks, 10);
 	assert_int_equal(stats.skipped, 2);
-	felt_end(&f);
 }
 
 static const struct incise_stepper_ops *felt_ops;
@@ -152,14 +142,12 @@ static int dropping_status(struct incise_stepper *stepper,
 }
 
 /* No tick finds it any more, as the loop is over: letting go does. */
-TEST(test_overrun_over_the_end_drops_the_actuator)
+TEST(test_overrun_over_the_end_drops_the_actuator, begin, end)
 {
-	struct incise_loop_options options = {
-		.rate_hz = 1000, .duration_ns = 12000000, .ticked = stall};
 	struct incise_stepper_ops stepper_ops;
-	struct incise_error err = {0};
-	struct felt f;
 
+	options.ticked = stall;
+	felt_end(&f);
 	felt_start(&f, "fixed", INCISE_RIG_TRACKER | INCISE_RIG_STEPPER);
 	felt_ops = f.stepper_ops;
 	stepper_ops = *felt_ops;
@@ -167,12 +155,10 @@ TEST(test_overrun_over_the_end_drops_the_actuator)
 	stepper_ops.status = dropping_status;
 	incise_rig_stepper(f.rig)->ops = &stepper_ops;
 	stalled = incise_rig_clock(f.rig);
-	calls = 0;
 	dropped = false;
-	assert_int_equal(incise_loop_run(f.plan, stalled, &options, &stats, &err), -EIO);
+	assert_int_equal(run(12000000), -EIO);
 	assert_int_equal(stats.ticks, 10);
 	assert_says(err.text, "tick 10:");
-	felt_end(&f);
 }
 
 static volatile sig_atomic_t stop;
@@ -184,20 +170,14 @@ static int stopping_tracker(struct incise_tracker *tracker,
 	return 0;
 }
 
-TEST(test_stop_flag)
+TEST(test_stop_flag, begin, end)
 {
-	struct incise_loop_options options = {.rate_hz = 1000, .stop = &stop};
-	struct incise_tracker_ops ops;
-	struct felt f;
+	options.stop = &stop;
 
-	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
-	read_by(&f, &ops, stopping_tracker);
-	calls = stop = 0;
-	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
-					 &stats, NULL),
-			 0);
+	read_by(stopping_tracker);
+	stop = 0;
+	assert_int_equal(run(0), 0);
 	assert_int_equal(stats.ticks, 25);
-	felt_end(&f);
 }
 
 static int failing_tracker(struct incise_tracker *tracker,
@@ -207,14 +187,13 @@ static int failing_tracker(struct incise_tracker *tracker,
 }
 
 /* The actuator is released at each kind of end. */
-TEST(test_end_lets_go)
+TEST(test_end_lets_go, begin, end)
 {
-	struct incise_loop_options options = {.rate_hz = 1000,
-					      .duration_ns = 5 * INCISE_NS_PER_S};
 	struct incise_stepper_status status;
 	struct incise_clock *clock;
-	struct felt f;
 
+	options.duration_ns = 5 * INCISE_NS_PER_S;
+	felt_end(&f);
 	felt_start(&f, "fixed", INCISE_RIG_TRACKER | INCISE_RIG_STEPPER);
 	clock = incise_rig_clock(f.rig);
 	assert_int_equal(incise_loop_run(f.plan, clock, &options, &stats, NULL), 0);
@@ -223,62 +202,40 @@ TEST(test_end_lets_go)
 	incise_clock_wait_until(clock, incise_clock_now(clock) + 90000000);
 	assert_int_equal(incise_stepper_status(incise_rig_stepper(f.rig), &status), 0);
 	assert_true(fabs(status.force_N) < 0.1 * stats.force_N);
-	felt_end(&f);
 }
 
-TEST(test_device_failure_ends_the_loop)
+TEST(test_device_failure_ends_the_loop, begin, end)
 {
-	struct incise_loop_options options = {.rate_hz = 1000, .duration_ns = 50000000};
-	struct incise_error err = {0};
-	struct incise_tracker_ops ops;
-	struct felt f;
-
-	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
-	read_by(&f, &ops, failing_tracker);
-	calls = 0;
-	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
-					 &stats, &err),
-			 -ENODEV);
+	read_by(failing_tracker);
+	assert_int_equal(run(50000000), -ENODEV);
 	assert_int_equal(stats.ticks, 5);
 	assert_says(err.text, "tick 5");
-	felt_end(&f);
 }
 
-TEST(test_refused_options)
+TEST(test_refused_options, begin, end)
 {
 	static const double rates[] = {0, -1, 0.5, 20001, NAN, INFINITY};
-	struct incise_loop_options options = {.duration_ns = 1000000};
-	struct felt f;
 
-	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
 	for (size_t i = 0; i < sizeof(rates) / sizeof(*rates); i++) {
 		options.rate_hz = rates[i];
-		assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig),
-						 &options, &stats, NULL),
-				 -EINVAL);
+		assert_int_equal(run(1000000), -EINVAL);
 	}
-	felt_end(&f);
 }
 
 /* In real time ticks come in order and none before its time. */
-TEST(test_real_clock)
+TEST(test_real_clock, begin, end)
 {
-	static struct incise_tick log[200];
-	struct incise_loop_options options = {
-		.rate_hz = 1000, .duration_ns = 100000000, .log = log, .log_size = 200};
 	struct incise_clock *clock = incise_clock_new_real();
-	struct felt f;
-	int64_t begin = incise_clock_now(clock);
+	int64_t begin_ns = incise_clock_now(clock);
 
-	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+	options.duration_ns = 100000000;
 	assert_int_equal(incise_loop_run(f.plan, clock, &options, &stats, NULL), 0);
 	assert_int_equal(stats.ticks + stats.skipped, 100);
 	for (size_t i = 0; i < stats.logged; i++)
-		assert_true(log[i].t_ns >= begin + ((int64_t)i + 1) * 1000000);
+		assert_true(ticks[i].t_ns >= begin_ns + ((int64_t)i + 1) * 1000000);
 	for (size_t i = 1; i < stats.logged; i++)
-		assert_true(log[i].t_ns > log[i - 1].t_ns);
+		assert_true(ticks[i].t_ns > ticks[i - 1].t_ns);
 	incise_clock_free(clock);
-	felt_end(&f);
 }
 
 struct listener {
@@ -297,40 +254,29 @@ static int ticked(void *context, const struct incise_tick *tick)
 	return listener->ticks == listener->end_at ? listener->end_by : 0;
 }
 
-TEST(test_callback_ends_the_loop)
+TEST(test_callback_ends_the_loop, begin, end)
 {
 	struct listener listener = {.end_at = 17, .end_by = -ENOSPC};
-	struct incise_loop_options options = {.rate_hz = 1000,
-					      .duration_ns = INCISE_NS_PER_S,
-					      .ticked = ticked,
-					      .context = &listener};
-	struct incise_error err = {0};
-	struct felt f;
 
-	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+	options.ticked = ticked;
+	options.context = &listener;
 	listener.begin_ns = incise_clock_now(incise_rig_clock(f.rig));
-	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
-					 &stats, &err),
-			 -ENOSPC);
+	assert_int_equal(run(INCISE_NS_PER_S), -ENOSPC);
 	assert_int_equal(listener.ticks, 17);
 	assert_int_equal(stats.ticks, 17);
 	/* no device is blamed */
 	assert_int_equal(err.code, 0);
-	felt_end(&f);
 }
 
 /* On a paced clock a stall of many periods costs no tick, and each has its own time. */
-TEST(test_paced_clock)
+TEST(test_paced_clock, begin, end)
 {
 	struct listener listener = {.begin_ns = 777, .stall_ns = 12000000};
-	struct incise_loop_options options = {.rate_hz = 1000,
-					      .duration_ns = 40000000,
-					      .ticked = ticked,
-					      .context = &listener};
 	struct incise_clock *clock = incise_clock_new_paced(777);
-	struct felt f;
 
-	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
+	options.duration_ns = 40000000;
+	options.ticked = ticked;
+	options.context = &listener;
 	assert_int_equal(incise_loop_run(f.plan, clock, &options, &stats, NULL), 0);
 	assert_int_equal(listener.ticks, 40);
 	assert_int_equal(stats.ticks, 40);
@@ -339,7 +285,6 @@ TEST(test_paced_clock)
 	assert_true(stats.lateness_max_ns >= 11000000);
 	assert_int_equal(stats.tick_max_ns, 0);
 	incise_clock_free(clock);
-	felt_end(&f);
 }
 
 TEST(test_quantile)
@@ -379,7 +324,6 @@ static int held_tracker(struct incise_tracker *tracker,
 
 /* Observations from inside a run. */
 struct seen {
-	struct felt *f;
 	struct incise_loop_control *control;
 	struct incise_plan *next;
 	volatile sig_atomic_t stop;
@@ -427,64 +371,49 @@ static int look(void *context, const struct incise_tick *tick)
 	return 0;
 }
 
-static void held_start(struct felt *f, struct incise_tracker_ops *ops, struct seen *seen)
+static void held_start(struct seen *seen)
 {
-	felt_start(f, "double", INCISE_RIG_TRACKER);
-	*ops = *f->tracker_ops;
-	ops->read = held_tracker;
-	incise_rig_tracker(f->rig)->ops = ops;
-	held_clock = incise_rig_clock(f->rig);
+	felt_end(&f);
+	felt_start(&f, "double", INCISE_RIG_TRACKER);
+	read_by(held_tracker);
+	held_clock = incise_rig_clock(f.rig);
 	held_seq = 0;
 	held_mm = 0;
 	silent = false;
 	held_status = ' ';
-	seen->f = f;
-
 	seen->slew_N = FELT_SLEW_N_S / 1000;
+	options.ticked = look;
+	options.context = seen;
 }
 
-TEST(test_stop_fades)
+TEST(test_stop_fades, begin, end)
 {
 	struct seen seen = {.stop_at = 600};
-	struct incise_loop_options options = {
-		.rate_hz = 1000, .stop = &seen.stop, .ticked = look, .context = &seen};
-	struct incise_tracker_ops ops;
-	struct felt f;
 	int64_t most_ms;
 
-	held_start(&f, &ops, &seen);
-	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
-					 &stats, NULL),
-			 0);
+	options.stop = &seen.stop;
+	held_start(&seen);
+	assert_int_equal(run(0), 0);
 	/* There was a force, it went in steps within the slew, and is 0. */
 	assert_true(seen.at_stop_N > 0.5);
 	assert_true(seen.most_change_N <= seen.slew_N * (1 + 1e-9));
 	assert_true(seen.last_N == 0);
 	most_ms = incise_plan_fade_ns(f.plan) / 1000000;
 	assert_in_range(stats.ticks, 602, 600 + most_ms + 1);
-	felt_end(&f);
 }
 
 /* In the tissue: the old force fades, the new plan waits for a small one. */
-TEST(test_another_plan)
+TEST(test_another_plan, begin, end)
 {
 	struct seen seen = {.offer_at = 600};
-	struct incise_loop_options options = {.rate_hz = 1000,
-					      .duration_ns = 2 * INCISE_NS_PER_S,
-					      .ticked = look,
-					      .context = &seen};
 	struct incise_loop_event events[20];
-	struct incise_tracker_ops ops;
-	struct felt f;
 	int n;
 
-	held_start(&f, &ops, &seen);
+	held_start(&seen);
 	seen.control = options.control = incise_loop_control_new();
 	seen.next = incise_plan_new(f.scene, f.rig, NULL);
 	assert_non_null(seen.next);
-	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
-					 &stats, NULL),
-			 0);
+	assert_int_equal(run(2 * INCISE_NS_PER_S), 0);
 	assert_true(seen.at_stop_N > 0.5);
 	assert_true(seen.changed);
 	assert_true(seen.most_change_N <= seen.slew_N * (1 + 1e-9));
@@ -498,8 +427,6 @@ TEST(test_another_plan)
 					601 + incise_plan_fade_ns(seen.next) / 1000000 +
 						1);
 	incise_plan_free(seen.next);
-	incise_loop_control_free(options.control);
-	felt_end(&f);
 }
 
 /* Set the tool at a tick, another plan some ticks later; the force before each change. */
@@ -530,43 +457,37 @@ static int look_at_tool(void *context, const struct incise_tick *tick)
 }
 
 /* The same scene, with insertion. */
-static void let_insert(struct felt *f)
+static void let_insert(void)
 {
-	FILE *out = fopen(f->scene_path, "a");
+	FILE *out = fopen(f.scene_path, "a");
 
 	fputs("tissue = { insertion_N_mm = 0.28; };\n", out);
 	fclose(out);
-	incise_plan_free(f->plan);
-	incise_scene_free(f->scene);
-	f->scene = incise_scene_load(f->scene_path, NULL, NULL);
-	assert_non_null(f->scene);
-	f->plan = incise_plan_new(f->scene, f->rig, NULL);
-	assert_non_null(f->plan);
+	incise_plan_free(f.plan);
+	incise_scene_free(f.scene);
+	f.scene = incise_scene_load(f.scene_path, NULL, NULL);
+	assert_non_null(f.scene);
+	f.plan = incise_plan_new(f.scene, f.rig, NULL);
+	assert_non_null(f.plan);
 }
 
 /*
  * A tool that is set in the tissue is held once the force has faded, comes back with a ramp, and
  * stays the tool of a plan that takes over.
  */
-TEST(test_another_tool)
+TEST(test_another_tool, begin, end)
 {
 	struct tool_seen own = {.seen = {.offer_at = 1400}, .tool_at = 600};
-	struct incise_loop_options options = {.rate_hz = 1000,
-					      .duration_ns = 2 * INCISE_NS_PER_S,
-					      .ticked = look_at_tool,
-					      .context = &own};
 	struct incise_loop_event events[20];
-	struct incise_tracker_ops ops;
 	int tools = 0, n;
-	struct felt f;
 
-	held_start(&f, &ops, &own.seen);
-	let_insert(&f);
+	held_start(&own.seen);
+	options.ticked = look_at_tool;
+	options.context = &own;
+	let_insert();
 	own.seen.control = options.control = incise_loop_control_new();
 	own.seen.next = incise_plan_new(f.scene, f.rig, NULL);
-	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
-					 &stats, NULL),
-			 0);
+	assert_int_equal(run(2 * INCISE_NS_PER_S), 0);
 	assert_true(own.seen.changed);
 	assert_int_equal(own.changes, 1);
 	assert_true(own.at_change_N[0] == 0);
@@ -586,8 +507,6 @@ TEST(test_another_tool)
 	}
 	assert_int_equal(tools, 1);
 	incise_plan_free(own.seen.next);
-	incise_loop_control_free(options.control);
-	felt_end(&f);
 }
 
 /* A plan that is withdrawn during the fade leaves the old plan, and its force returns. */
@@ -604,48 +523,31 @@ static int look_and_withdraw(void *context, const struct incise_tick *tick)
 	return rc;
 }
 
-TEST(test_a_plan_withdrawn)
+TEST(test_a_plan_withdrawn, begin, end)
 {
 	struct seen seen = {.offer_at = 600};
-	struct incise_loop_options options = {.rate_hz = 1000,
-					      .duration_ns = 2 * INCISE_NS_PER_S,
-					      .ticked = look_and_withdraw,
-					      .context = &seen};
-	struct incise_tracker_ops ops;
-	struct felt f;
 
-	held_start(&f, &ops, &seen);
+	held_start(&seen);
+	options.ticked = look_and_withdraw;
 	withdrawn_from = seen.control = options.control = incise_loop_control_new();
 	seen.next = incise_plan_new(f.scene, f.rig, NULL);
-	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
-					 &stats, NULL),
-			 0);
+	assert_int_equal(run(2 * INCISE_NS_PER_S), 0);
 	assert_false(seen.changed);
 	assert_true(seen.last_N > 0.9 * seen.at_stop_N);
 	assert_true(seen.most_change_N <= seen.slew_N * (1 + 1e-9));
 	incise_plan_free(seen.next);
-	incise_loop_control_free(options.control);
-	felt_end(&f);
 }
 
-TEST(test_events)
+TEST(test_events, begin, end)
 {
 	static const enum incise_loop_event_kind expected[] = {INCISE_LOOP_STALE,
 							       INCISE_LOOP_FRESH};
 	struct seen seen = {.silent_at = 600, .back_at = 700};
-	struct incise_loop_options options = {.rate_hz = 1000,
-					      .duration_ns = INCISE_NS_PER_S,
-					      .ticked = look,
-					      .context = &seen};
 	struct incise_loop_event events[20];
-	struct incise_tracker_ops ops;
-	struct felt f;
 
-	held_start(&f, &ops, &seen);
+	held_start(&seen);
 	options.control = incise_loop_control_new();
-	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
-					 &stats, NULL),
-			 0);
+	assert_int_equal(run(INCISE_NS_PER_S), 0);
 	assert_int_equal(incise_loop_control_events(options.control, events, 20), 2);
 	for (int i = 0; i < 2; i++)
 		assert_int_equal(events[i].kind, expected[i]);
@@ -654,12 +556,10 @@ TEST(test_events)
 	assert_in_range(events[0].tick, 600, 600 + 100);
 	assert_int_equal(events[1].tick, 700 + 1);
 	assert_int_equal(incise_loop_control_events_lost(options.control), 0);
-	incise_loop_control_free(options.control);
-	felt_end(&f);
 }
 
 /* A pose that its tracker flags ages as a missing one does, and the force fades. */
-TEST(test_flagged_poses_are_no_poses)
+TEST(test_flagged_poses_are_no_poses, begin, end)
 {
 	static const struct {
 		char flag;
@@ -673,17 +573,9 @@ TEST(test_flagged_poses_are_no_poses)
 				    .flag = cases[i].flag,
 				    .stop_at = 1490,
 				    .back_at = 1500};
-		struct incise_loop_options options = {.rate_hz = 1000,
-						      .duration_ns = 2 * INCISE_NS_PER_S,
-						      .ticked = look,
-						      .context = &seen};
-		struct incise_tracker_ops ops;
-		struct felt f;
 
-		held_start(&f, &ops, &seen);
-		assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig),
-						 &options, &stats, NULL),
-				 0);
+		held_start(&seen);
+		assert_int_equal(run(2 * INCISE_NS_PER_S), 0);
 		if (cases[i].usable ? !(seen.at_stop_N > 0.5) : seen.at_stop_N != 0)
 			fail_msg("flag '%c': %g N", cases[i].flag, seen.at_stop_N);
 		assert_true(seen.most_change_N <= seen.slew_N * (1 + 1e-9));
@@ -691,30 +583,19 @@ TEST(test_flagged_poses_are_no_poses)
 		if (!cases[i].usable)
 			assert_in_range(stats.flagged[2], 850, 860);
 		assert_true(seen.last_N > 0.5);
-		felt_end(&f);
 	}
 }
 
 /* A tracker that flags all its poses is given up as one that is lost: after 10 s. */
-TEST(test_a_stream_of_flagged_poses_ends)
+TEST(test_a_stream_of_flagged_poses_ends, begin, end)
 {
 	struct seen seen = {.flag_at = 600, .flag = 'x'};
-	struct incise_loop_options options = {.rate_hz = 1000,
-					      .duration_ns = 30 * INCISE_NS_PER_S,
-					      .ticked = look,
-					      .context = &seen};
-	struct incise_tracker_ops ops;
-	struct incise_error err = {0};
-	struct felt f;
 
-	held_start(&f, &ops, &seen);
-	assert_int_equal(incise_loop_run(f.plan, incise_rig_clock(f.rig), &options,
-					 &stats, &err),
-			 -ENODEV);
+	held_start(&seen);
+	assert_int_equal(run(30 * INCISE_NS_PER_S), -ENODEV);
 	assert_in_range(stats.ticks, 10600, 10602);
 	assert_says(err.text, "'x'", "10 s");
 	assert_true(seen.last_N == 0);
-	felt_end(&f);
 }
 
 /* Takes two and a half periods at each tick from the tenth on. */
@@ -726,23 +607,15 @@ static int always_slow(struct incise_tracker *tracker,
 	return 0;
 }
 
-TEST(test_too_many_overruns)
+TEST(test_too_many_overruns, begin, end)
 {
-	struct incise_loop_options options = {
-		.rate_hz = 1000, .duration_ns = INCISE_NS_PER_S, .overruns_most = 5};
-	struct incise_tracker_ops ops;
-	struct incise_error err = {0};
-	struct felt f;
+	options.overruns_most = 5;
 
-	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
-	read_by(&f, &ops, always_slow);
+	read_by(always_slow);
 	stalled = incise_rig_clock(f.rig);
-	calls = 0;
-	assert_int_equal(incise_loop_run(f.plan, stalled, &options, &stats, &err),
-			 -ETIME);
+	assert_int_equal(run(INCISE_NS_PER_S), -ETIME);
 	/* Ticks 10 to 14 are slow, and the wake-up after each is an overrun. */
 	assert_int_equal(stats.overruns, 5);
 	assert_int_equal(stats.ticks, 14);
 	assert_says(err.text, "5 ticks");
-	felt_end(&f);
 }

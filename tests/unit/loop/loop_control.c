@@ -4,7 +4,6 @@
  * and dropped ones are counted. tests/unit/loop/loop.c tests the loop with it.
  */
 #include "../unit.h"
-#include <errno.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include "../../../lib/loop/loop_control.h"

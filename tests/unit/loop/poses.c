@@ -12,11 +12,6 @@
  * limits.pose_age_ms and the longest fade.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 #include <incise/backend.h>
 #include <incise/loop.h>
 #include "../../../lib/base/random.h"
@@ -215,7 +210,6 @@ static struct incise_scene *make_scene(void)
 {
 	char folder[] = "/tmp/incise-poses-XXXXXX", path[40], model[40];
 	struct incise_scene *scene;
-	struct incise_error err = {0};
 	FILE *out;
 
 	if (!mkdtemp(folder))
@@ -235,8 +229,7 @@ static struct incise_scene *make_scene(void)
 	unlink(path);
 	unlink(model);
 	rmdir(folder);
-	if (!scene)
-		fail_msg("%s", err.text);
+	succeeds(scene);
 	return scene;
 }
 
@@ -256,7 +249,6 @@ static void run(enum polhemus_family family, uint64_t poses)
 	struct incise_tracker_ops ops;
 	const struct incise_tracker_ops *own;
 	struct incise_tracker *tracker;
-	struct incise_error err = {0};
 	struct seen seen = {0};
 	struct incise_loop_options options = {.rate_hz = 1000,
 					      .duration_ns = (int64_t)(poses + 1) *
@@ -269,11 +261,9 @@ static void run(enum polhemus_family family, uint64_t poses)
 
 	snprintf(spec, sizeof(spec), "sim:clock=simulated,tracker_hz=%d", hz);
 	rig = incise_rig_open(spec, INCISE_RIG_TRACKER | INCISE_RIG_STEPPER, &err);
-	if (!rig)
-		fail_msg("%s", err.text);
+	succeeds(rig);
 	plan = incise_plan_new(scene, rig, &err);
-	if (!plan)
-		fail_msg("%s", err.text);
+	succeeds(plan);
 	tracker = incise_rig_tracker(rig);
 	incise_tracker_info(tracker, &info);
 	sender = (struct sender){
@@ -294,8 +284,7 @@ static void run(enum polhemus_family family, uint64_t poses)
 	seen.step_N = stepper.spring_N_mm * stepper.step_mm;
 	seen.rest_N = seen.step_N + FRICTION_N;
 	seen.most_ns = POSE_AGE_MS * MS + incise_plan_fade_ns(plan) + 2 * MS;
-	if (incise_loop_run(plan, sender.clock, &options, &stats, &err))
-		fail_msg("%s", err.text);
+	succeeds(!incise_loop_run(plan, sender.clock, &options, &stats, &err));
 	print_message(
 		"%s: %llu poses, %llu not used; %llu ticks with a force of %llu, at most "
 		"%.3f N (rendered %.3f of %.3f); %llu times no pose, %llu ticks of it\n",

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * lib/loop/proc_file.c: any file becomes a string, a number or a list, or is rejected.
- */
+/* lib/loop/proc_file.c: any file becomes a string, a number or a list, or is rejected. */
 #include "../unit.h"
 #include <limits.h>
 #include "../../../lib/loop/proc_file.h"

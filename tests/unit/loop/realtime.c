@@ -6,22 +6,17 @@
  *
  *     test ── fork ──▶ child: rights away? ──▶ prepare ──▶ new ──▶ threads ──▶ exit status
  */
-#include <errno.h>
+#include "../unit.h"
 #include <linux/capability.h>
 #include <pthread.h>
 #include <sched.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <time.h>
-#include <unistd.h>
 #include "../../../lib/loop/realtime.h"
 #include "../message.h"
-#include "../unit.h"
 #include "root_folder.h"
 
 #if defined(__SANITIZE_ADDRESS__)
@@ -87,7 +82,6 @@ TEST(test_refused_setups)
 
 	for (size_t i = 0; i < sizeof(rows) / sizeof(*rows); i++) {
 		struct incise_realtime_check checks[INCISE_REALTIME_CHECKS];
-		struct incise_error err;
 
 		assert_error(incise_realtime_new(&rows[i].setup, &err), rows[i].error,
 			     &err, NULL);

@@ -2,9 +2,9 @@
 /*
  * lib/loop/realtime_checks.c with given answers and files in a folder; it asks this machine nothing.
  */
+#include "../unit.h"
 #include "../../../lib/loop/realtime.h"
 #include "../message.h"
-#include "../unit.h"
 #include "root_folder.h"
 
 #define CPUS "/sys/devices/system/cpu/"

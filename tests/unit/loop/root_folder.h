@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/*
- * A folder in the place of /, with files of /proc and /sys that a test chooses.
- */
+/* A folder in the place of /, with files of /proc and /sys that a test chooses. */
 #ifndef INCISE_TEST_ROOT_FOLDER_H
 #define INCISE_TEST_ROOT_FOLDER_H
 

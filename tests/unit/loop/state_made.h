@@ -12,42 +12,45 @@
 #include <unistd.h>
 #include "../../../lib/loop/state_page.h"
 
-struct made {
+/* Of the test that runs. */
+static struct {
 	char dir[200], path[256];
 	struct incise_state_writer *writer;
-};
+} made;
 
-static inline struct made made_folder(void)
+static inline int made_folder(void **state)
 {
 	const char *base = getenv("TMPDIR");
-	struct made made = {.writer = NULL};
 
 	snprintf(made.dir, sizeof(made.dir), "%s/incise-XXXXXX", base ? base : "/tmp");
 	if (!mkdtemp(made.dir))
 		abort();
 	snprintf(made.path, sizeof(made.path), "%s/neck.state", made.dir);
-	return made;
+	made.writer = NULL;
+	return 0;
 }
 
 static const struct incise_state_setup made_setup = {
 	.rate_hz = 1000, .rig = "sim:", .policy = "SCHED_FIFO 80, CPU 1"};
 
-static inline struct made made_page(void)
+static inline int made_page(void **state)
 {
-	struct made made = made_folder();
-
+	made_folder(state);
 	made.writer = incise_state_new(made.path, &made_setup, NULL);
-	if (!made.writer)
-		abort();
-	return made;
+	return made.writer ? 0 : -1;
 }
 
-static inline void made_free(struct made *made)
+static inline void made_close(void)
 {
-	incise_state_free(made->writer);
-	unlink(made->path);
-	if (rmdir(made->dir))
-		abort(); /* something was left there */
+	incise_state_free(made.writer);
+	made.writer = NULL;
+}
+
+static inline int made_end(void **state)
+{
+	made_close();
+	unlink(made.path);
+	return rmdir(made.dir); /* fails where something was left there */
 }
 
 /* Tick number n, from 0 on. */

@@ -4,8 +4,6 @@
  * and back.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <math.h>
 #include "../../../lib/base/random.h"
 #include "state_made.h"
 

@@ -3,44 +3,58 @@
  * lib/loop/state_reader.c: a reader next to a living and a dead writer, and malformed
  * pages.
  */
-#include <errno.h>
+#include "../unit.h"
 #include <fcntl.h>
-#include <math.h>
 #include <pthread.h>
 #include <sched.h>
 #include <stdatomic.h>
 #include <sys/stat.h>
 #include "../../../lib/base/random.h"
 #include "../message.h"
-#include "../unit.h"
 #include "state_made.h"
 
 static struct incise_state_now now;
 static struct incise_tick ticks[INCISE_STATE_TICKS + 10];
-static struct state_page page;
+static struct state_page page, good;
+static struct incise_state *reader;
 
-static void load(const char *path)
+static int begin(void **state)
 {
-	FILE *file = fopen(path, "r");
+	int rc = made_page(state);
+
+	reader = incise_state_open(made.path, NULL);
+	return rc;
+}
+
+static int end(void **state)
+{
+	incise_state_close(reader);
+	return made_end(state);
+}
+
+/* The page as it is, which nobody writes any more. */
+static void load(void)
+{
+	FILE *file = fopen(made.path, "r");
 
 	assert_non_null(file);
 	assert_int_equal(fread(&page, sizeof(page), 1, file), 1);
 	fclose(file);
+	good = page;
+	made_close();
 }
 
-static void store(const char *path, size_t size)
+static void store(size_t size)
 {
-	FILE *file = fopen(path, "w");
+	FILE *file = fopen(made.path, "w");
 
 	assert_non_null(file);
 	assert_int_equal(fwrite(&page, 1, size, file), size);
 	fclose(file);
 }
 
-TEST(test_ring)
+TEST(test_ring, begin, end)
 {
-	struct made made = made_page();
-	struct incise_state *reader = incise_state_open(made.path, NULL);
 	uint64_t early = 0, late = INCISE_STATE_NEWEST, lost = 0;
 
 	assert_int_equal(incise_state_ticks(reader, &early, ticks, 10, &lost), 0);
@@ -64,15 +78,11 @@ TEST(test_ring)
 	assert_int_equal(incise_state_ticks(reader, &late, ticks, 10, &lost), 3);
 	assert_int_equal(ticks[0].t_ns, 100);
 	assert_int_equal(lost, 0);
-	incise_state_close(reader);
-	made_free(&made);
 }
 
-TEST(test_ring_that_went_round)
+TEST(test_ring_that_went_round, begin, end)
 {
 	enum { N = 3 * INCISE_STATE_TICKS + 11 };
-	struct made made = made_page();
-	struct incise_state *reader = incise_state_open(made.path, NULL);
 	uint64_t cursor = 5, lost = 1;
 	int n;
 
@@ -88,12 +98,9 @@ TEST(test_ring_that_went_round)
 	cursor = N + 1;
 	assert_int_equal(incise_state_ticks(reader, &cursor, ticks, 10, &lost), 0);
 	assert_int_equal(cursor, N);
-	incise_state_close(reader);
-	made_free(&made);
 }
 
 struct busy {
-	struct made made;
 	atomic_bool stop;
 	int64_t written;
 };
@@ -106,7 +113,7 @@ static void *publish(void *arg)
 	while (!atomic_load(&busy->stop)) {
 		int64_t more = 1 + busy->written % 50;
 
-		made_ticks(busy->made.writer, busy->written, busy->written + more);
+		made_ticks(made.writer, busy->written, busy->written + more);
 		busy->written += more;
 		for (int i = 0; i < 4; i++)
 			sched_yield();
@@ -128,16 +135,15 @@ static void whole(void)
 	assert_int_equal(now.cost_max_ns, 2 * now.tick.t_ns);
 }
 
-TEST(test_beside_a_writer)
+TEST(test_beside_a_writer, begin, end)
 {
-	struct busy busy = {.made = made_page()};
-	struct incise_state *reader = incise_state_open(busy.made.path, NULL);
+	struct busy busy = {0};
 	uint64_t cursor = 0, lost = 0, got = 0;
 	enum incise_run run = INCISE_RUN_STARTING;
 	int64_t next = 0;
 	pthread_t thread;
 
-	incise_state_run(busy.made.writer, run, incise_run_name(run));
+	incise_state_run(made.writer, run, incise_run_name(run));
 	pthread_create(&thread, NULL, publish, &busy);
 	for (int good = 0; good < 2000;) {
 		int rc = incise_state_read(reader, &now), n;
@@ -149,7 +155,7 @@ TEST(test_beside_a_writer)
 			assert_true(now.alive && !now.torn);
 			/* Another thread writes the other half. */
 			assert_string_equal(now.reason, incise_run_name(now.run));
-			incise_state_run(busy.made.writer, run, incise_run_name(run));
+			incise_state_run(made.writer, run, incise_run_name(run));
 			run = (enum incise_run)((run + 1) % INCISE_RUNS);
 		}
 		/* Not each time: then some are lost. */
@@ -172,19 +178,15 @@ TEST(test_beside_a_writer)
 	assert_int_equal(incise_state_read(reader, &now), 0);
 	assert_int_equal(now.ticks, busy.written);
 	whole();
-	incise_state_close(reader);
-	made_free(&busy.made);
 }
 
 /* In the middle of a write: the reader waits for a living writer, not for a dead one. */
-TEST(test_half_written)
+TEST(test_half_written, begin, end)
 {
 	static const size_t parts[] = {offsetof(struct state_page, run),
 				       offsetof(struct state_page, live)};
 
 	for (int i = 0; i < 2; i++) {
-		struct made made = made_page();
-		struct incise_state *reader = incise_state_open(made.path, NULL);
 		int fd = open(made.path, O_WRONLY);
 		uint64_t odd = 77;
 
@@ -192,22 +194,18 @@ TEST(test_half_written)
 		/* All is in the file: the writer writes no part of it again. */
 		assert_int_equal(pwrite(fd, &odd, sizeof(odd), (off_t)parts[i]), 8);
 		assert_int_equal(incise_state_read(reader, &now), -EAGAIN);
-		incise_state_free(made.writer);
-		made.writer = NULL;
+		made_close();
 		assert_int_equal(incise_state_read(reader, &now), 0);
 		assert_true(now.torn && !now.alive);
 		assert_int_equal(now.ticks, 3);
 		close(fd);
-		incise_state_close(reader);
-		made_free(&made);
+		assert_int_equal(end(NULL) || begin(NULL), 0);
 	}
 }
 
 /* An odd seq is repaired by the next write. */
-TEST(test_healed)
+TEST(test_healed, begin, end)
 {
-	struct made made = made_page();
-	struct incise_state *reader = incise_state_open(made.path, NULL);
 	int fd = open(made.path, O_WRONLY);
 	uint64_t odd = 77;
 
@@ -216,8 +214,6 @@ TEST(test_healed)
 	assert_int_equal(incise_state_read(reader, &now), 0);
 	assert_int_equal(now.ticks, 1);
 	close(fd);
-	incise_state_close(reader);
-	made_free(&made);
 }
 
 static void refused(const char *path, int code, const char *text)
@@ -233,43 +229,36 @@ static void refused(const char *path, int code, const char *text)
 	assert_says(err.text, path, text);
 }
 
-TEST(test_what_is_no_page)
+TEST(test_what_is_no_page, begin, end)
 {
-	struct made made = made_page();
-	struct state_page good;
-
-	load(made.path);
-	good = page;
-	incise_state_free(made.writer);
-	made.writer = NULL;
+	load();
 	refused("/nosuch/a.state", ENOENT, "No such file");
 	refused("/dev/null", EINVAL, "not a status file");
 	refused(made.dir, EINVAL, "not a status file");
-	store(made.path, 0);
+	store(0);
 	refused(made.path, EINVAL, "not a status file");
-	store(made.path, sizeof(page.head) - 1);
+	store(sizeof(page.head) - 1);
 	refused(made.path, EINVAL, "not a status file");
-	store(made.path, sizeof(page) - 8);
+	store(sizeof(page) - 8);
 	refused(made.path, EINVAL, "truncated");
 	page.head.magic[3]++;
-	store(made.path, sizeof(page));
+	store(sizeof(page));
 	refused(made.path, EINVAL, "not a status file");
 	page = good;
 	page.head.major++;
-	store(made.path, sizeof(page));
+	store(sizeof(page));
 	refused(made.path, EPROTO, "version 2.0");
 	page = good;
 	page.head.rate_hz = NAN;
-	store(made.path, sizeof(page));
+	store(sizeof(page));
 	refused(made.path, EINVAL, "damaged");
 	unlink(made.path);
 	assert_int_equal(mkfifo(made.path, 0600), 0);
 	refused(made.path, EINVAL, "not a status file"); /* and does not wait */
-	made_free(&made);
 }
 
 /* Each offset, size and count of the head, changed. */
-TEST(test_places_astray)
+TEST(test_places_astray, begin, end)
 {
 	static const uint64_t values[] = {0,
 					  1,
@@ -281,17 +270,12 @@ TEST(test_places_astray)
 					  sizeof(struct state_page),
 					  sizeof(struct state_page) + 8,
 					  sizeof(struct state_page) - 8};
-	struct made made = made_page();
-	struct state_page good;
 	size_t begin = offsetof(struct state_head, head);
 	size_t end = offsetof(struct state_head, pid);
 	int opened = 0;
 
 	made_ticks(made.writer, 0, 100);
-	load(made.path);
-	good = page;
-	incise_state_free(made.writer);
-	made.writer = NULL;
+	load();
 	for (size_t at = begin; at < end; at += 8)
 		for (size_t i = 0; i < sizeof(values) / sizeof(*values); i++) {
 			struct incise_state *reader;
@@ -299,7 +283,7 @@ TEST(test_places_astray)
 
 			page = good;
 			memcpy((char *)&page + at, &values[i], 8);
-			store(made.path, sizeof(page));
+			store(sizeof(page));
 			reader = incise_state_open(made.path, NULL);
 			if (!reader)
 				continue;
@@ -311,23 +295,18 @@ TEST(test_places_astray)
 		}
 	/* Nearly every changed number is rejected. */
 	assert_true(opened < 30);
-	made_free(&made);
 }
 
 /* A later minor version has larger parts. */
-TEST(test_larger_parts)
+TEST(test_larger_parts, begin, end)
 {
-	struct made made = made_page();
 	struct incise_tick made_one = made_tick(2);
 	struct state_head *head = &page.head;
 	uint64_t cursor = 0, lost = 0;
-	struct incise_state *reader;
 	static unsigned char ring[64 + 3 * 512];
 
 	made_ticks(made.writer, 0, 3);
-	load(made.path);
-	incise_state_free(made.writer);
-	made.writer = NULL;
+	load();
 	/* Slots of 512 bytes, 3 of them, in the place of what was there. */
 	memcpy(ring, &page.written, 8);
 	for (int i = 0; i < 3; i++)
@@ -337,7 +316,8 @@ TEST(test_larger_parts)
 	head->ring.size = 512;
 	head->ring.count = 3;
 	head->head.size += 8;
-	store(made.path, sizeof(page));
+	store(sizeof(page));
+	incise_state_close(reader);
 	reader = incise_state_open(made.path, NULL);
 	assert_non_null(reader);
 	assert_int_equal(incise_state_read(reader, &now), 0);
@@ -345,21 +325,16 @@ TEST(test_larger_parts)
 	assert_int_equal(incise_state_ticks(reader, &cursor, ticks, 10, &lost), 2);
 	assert_true(made_same(&ticks[1], &made_one));
 	assert_int_equal(lost, 1);
-	incise_state_close(reader);
-	made_free(&made);
 }
 
 /* Cut off after it was opened: an errno, and no SIGBUS. */
-TEST(test_cut_off_later)
+TEST(test_cut_off_later, begin, end)
 {
-	struct made made = made_page();
-	struct incise_state *reader = incise_state_open(made.path, NULL);
 	const off_t all = offsetof(struct state_page, cost) + sizeof(page.cost);
 	uint64_t cursor = 0;
 
 	made_ticks(made.writer, 0, 3);
-	incise_state_free(made.writer);
-	made.writer = NULL;
+	made_close();
 	for (off_t size = sizeof(page) - 8; size > -4000; size -= 4000) {
 		assert_int_equal(truncate(made.path, size > 0 ? size : 0), 0);
 		cursor = 0;
@@ -367,25 +342,18 @@ TEST(test_cut_off_later)
 		assert_int_equal(incise_state_read(reader, &now), size < all ? -EIO : 0);
 	}
 	assert_int_equal(incise_state_ticks(reader, &cursor, ticks, 10, NULL), -EIO);
-	incise_state_close(reader);
-	made_free(&made);
 }
 
 /* Garbage in some places of a good page, a thousand times. */
-TEST(test_garbage)
+TEST(test_garbage, begin, end)
 {
-	struct made made = made_page();
-	struct state_page good;
 	uint64_t seed = 1;
 	int read = 0, bad = 0;
 	int fd;
 
 	made_ticks(made.writer, 0, INCISE_STATE_TICKS + 100);
 	incise_state_run(made.writer, INCISE_RUN_RUNNING, "all is well");
-	load(made.path);
-	good = page;
-	incise_state_free(made.writer);
-	made.writer = NULL;
+	load();
 	fd = open(made.path, O_WRONLY);
 	for (int round = 0; round < 1000; round++) {
 		struct incise_state *reader;
@@ -425,5 +393,4 @@ TEST(test_garbage)
 	/* Both ways were taken. */
 	assert_true(read > 10 && bad > 10);
 	close(fd);
-	made_free(&made);
 }

@@ -4,8 +4,6 @@
  * of a spring and of friction.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
 #include <time.h>
 #include "../scene/felt.h"
 #include "state_made.h"
@@ -14,13 +12,13 @@
 static struct incise_state_now now;
 static struct incise_tick ticks[INCISE_STATE_TICKS];
 
-static void look(const struct made *made)
+static void look(void)
 {
 	struct incise_state *state;
 
-	if (made->writer)
-		incise_state_mirror(made->writer);
-	state = incise_state_open(made->path, NULL);
+	if (made.writer)
+		incise_state_mirror(made.writer);
+	state = incise_state_open(made.path, NULL);
 	assert_non_null(state);
 	assert_int_equal(incise_state_read(state, &now), 0);
 	incise_state_close(state);
@@ -34,12 +32,12 @@ static int64_t clock_ns(clockid_t clock)
 	return t.tv_sec * 1000000000LL + t.tv_nsec;
 }
 
-TEST(test_before_the_first_tick)
+TEST(test_before_the_first_tick, made_folder, made_end)
 {
 	int64_t mono = clock_ns(CLOCK_MONOTONIC), real = clock_ns(CLOCK_REALTIME);
-	struct made made = made_page();
 
-	look(&made);
+	made.writer = incise_state_new(made.path, &made_setup, NULL);
+	look();
 	assert_true(now.alive && !now.torn);
 	assert_int_equal(now.pid, getpid());
 	assert_true(now.start_ns >= mono && now.start_ns <= clock_ns(CLOCK_MONOTONIC));
@@ -53,12 +51,10 @@ TEST(test_before_the_first_tick)
 	assert_string_equal(now.scene, "");
 	assert_int_equal(now.ticks, 0);
 	assert_int_equal(incise_state_total(&now.lateness), 0);
-	made_free(&made);
 }
 
-TEST(test_ticks)
+TEST(test_ticks, made_page, made_end)
 {
-	struct made made = made_page();
 	struct incise_tick tick = {.t_ns = 1000, .tool = INCISE_TOOL_BLADE};
 
 	tick.command_N[0] = 3;
@@ -70,7 +66,7 @@ TEST(test_ticks)
 	tick.flags = INCISE_TICK_CONTACT;
 	tick.tool_mm[0] = -2; /* against the 3 N of before */
 	incise_state_tick(made.writer, &tick, -5, 700, 2);
-	look(&made);
+	look();
 	assert_int_equal(now.ticks, 2);
 	assert_int_equal(now.skipped, 2);
 	assert_int_equal(now.overruns, 1);
@@ -96,78 +92,71 @@ TEST(test_ticks)
 	assert_int_equal(incise_state_total(&now.lateness), 2);
 	assert_int_equal(now.lateness.count[incise_state_bucket(12000)], 1);
 	assert_int_equal(now.cost.count[incise_state_bucket(700)], 1);
-	made_free(&made);
 }
 
 /* Much longer than the ring: counts are exact, and the ring goes round. */
-TEST(test_many_ticks)
+TEST(test_many_ticks, made_page, made_end)
 {
-	struct made made = made_page();
 	const int64_t n = 5 * INCISE_STATE_TICKS + 7;
 	struct incise_tick last = made_tick(n - 1);
 
 	made_ticks(made.writer, 0, n);
-	look(&made);
+	look();
 	assert_int_equal(now.ticks, n);
 	assert_int_equal(incise_state_total(&now.lateness), n);
 	assert_int_equal(incise_state_total(&now.cost), n);
 	assert_int_equal(now.lateness_max_ns, n - 1);
 	assert_int_equal(now.cost_max_ns, 2 * (n - 1));
 	assert_true(made_same(&now.tick, &last));
-	made_free(&made);
 }
 
-TEST(test_states)
+TEST(test_states, made_page, made_end)
 {
-	struct made made = made_page();
 	int64_t since;
 
 	incise_state_run(made.writer, INCISE_RUN_RUNNING, "as asked");
-	look(&made);
+	look();
 	assert_int_equal(now.run, INCISE_RUN_RUNNING);
 	assert_string_equal(now.reason, "as asked");
 	since = now.since_ns;
 	/* Another reason does not change the time of the state. */
 	incise_state_run(made.writer, INCISE_RUN_RUNNING, NULL);
-	look(&made);
+	look();
 	assert_int_equal(now.since_ns, since);
 	assert_string_equal(now.reason, "");
 	/* A reload does not change that. */
 	incise_state_run(made.writer, INCISE_RUN_RELOADING, NULL);
-	look(&made);
+	look();
 	assert_true(now.since_ns > since);
 	incise_state_run(made.writer, INCISE_RUN_RUNNING, NULL);
-	look(&made);
+	look();
 	assert_int_equal(now.since_ns, since);
 	incise_state_refused(made.writer, "neck.scene:3: syntax error");
-	look(&made);
+	look();
 	assert_int_equal(now.run, INCISE_RUN_RUNNING);
 	assert_int_equal(now.refused, 1);
 	assert_string_equal(now.reason, "neck.scene:3: syntax error");
 	incise_state_run(made.writer, INCISE_RUN_FAULT, "e-stop\nwas\x1b[2J pressed");
-	look(&made);
+	look();
 	assert_true(now.since_ns > since);
 	assert_string_equal(now.reason, "e-stop?was?[2J pressed");
 	/* The state stays after the writer has closed the page. */
-	incise_state_free(made.writer);
-	made.writer = NULL;
-	look(&made);
+	made_close();
+	look();
 	assert_false(now.alive);
 	assert_false(now.torn);
 	assert_int_equal(now.run, INCISE_RUN_FAULT);
-	made_free(&made);
 }
 
-TEST(test_scene)
+TEST(test_scene, made_page, made_end)
 {
-	struct made made = made_page();
 	struct felt f;
 	const char *why;
 	int n = 0, out = 0;
 
 	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
 	incise_state_scene(made.writer, "/etc/incise/scenes/neck.scene", f.plan);
-	look(&made);
+	look();
 	assert_string_equal(now.scene, "/etc/incise/scenes/neck.scene");
 	while (incise_plan_stage(f.plan, n)) {
 		assert_string_equal(now.stage[n], incise_plan_stage(f.plan, n));
@@ -181,31 +170,27 @@ TEST(test_scene)
 	/* The first scene is no reload. */
 	assert_int_equal(now.reloads, 0);
 	incise_state_scene(made.writer, "b.scene", NULL);
-	look(&made);
+	look();
 	assert_int_equal(now.reloads, 1);
 	assert_int_equal(now.n_stages, 0);
 	assert_string_equal(now.scene, "b.scene");
 	felt_end(&f);
-	made_free(&made);
 }
 
-TEST(test_counts)
+TEST(test_counts, made_page, made_end)
 {
 	struct incise_realtime_counts counts = {1, 2, 3, 4};
-	struct made made = made_page();
 
 	incise_state_counts(made.writer, &counts);
-	look(&made);
+	look();
 	assert_int_equal(now.minor_faults, 1);
 	assert_int_equal(now.major_faults, 2);
 	assert_int_equal(now.voluntary, 3);
 	assert_int_equal(now.involuntary, 4);
-	made_free(&made);
 }
 
-TEST(test_what_is_too_long)
+TEST(test_what_is_too_long, made_page, made_end)
 {
-	struct made made = made_page();
 	char text[2001], *end;
 
 	/* A character of two bytes that would be cut in the middle is left out. */
@@ -213,12 +198,12 @@ TEST(test_what_is_too_long)
 	text[2000] = 0;
 	memcpy(text + 298, "\xc3\xa4", 2);
 	incise_state_run(made.writer, INCISE_RUN_RUNNING, text);
-	look(&made);
+	look();
 	assert_int_equal(strlen(now.reason), 298);
 	memset(text, 'a', 2000);
 	memcpy(text + 1990, "neck.scene", 10);
 	incise_state_scene(made.writer, text, NULL);
-	look(&made);
+	look();
 	assert_int_equal(strlen(now.scene), 511);
 	end = now.scene + 511 - 10;
 	assert_string_equal(end, "neck.scene");
@@ -226,18 +211,16 @@ TEST(test_what_is_too_long)
 	/* 511 bytes just fit. */
 	text[511] = 0;
 	incise_state_scene(made.writer, text, NULL);
-	look(&made);
+	look();
 	assert_string_equal(now.scene, text);
-	made_free(&made);
 }
 
 /* The file may be cut off by anybody who may write it: the loop goes on, and the page is mended. */
-TEST(test_cut_off)
+TEST(test_cut_off, made_page, made_end)
 {
 	static const off_t sizes[] = {0,    1,	     sizeof(struct state_head),
 				      4096, 1000000, sizeof(struct state_page) - 1};
 	const int64_t n = INCISE_STATE_TICKS + 100;
-	struct made made = made_page();
 	struct incise_state *reader = incise_state_open(made.path, NULL);
 
 	incise_state_run(made.writer, INCISE_RUN_RUNNING, "as asked");
@@ -250,7 +233,7 @@ TEST(test_cut_off)
 
 		assert_int_equal(truncate(made.path, sizes[i]), 0);
 		made_ticks(made.writer, all - 10, all);
-		look(&made);
+		look();
 		assert_int_equal(now.run, INCISE_RUN_RUNNING);
 		assert_string_equal(now.reason, "as asked");
 		assert_int_equal(now.ticks, all);
@@ -263,7 +246,6 @@ TEST(test_cut_off)
 		assert_true(made_same(&ticks[got - 1], &last));
 	}
 	incise_state_close(reader);
-	made_free(&made);
 }
 
 /* A loop without a page makes the same calls with NULL. */
@@ -297,9 +279,8 @@ static struct incise_tick at(double x_mm, double force_N)
 }
 
 /* In and out of a spring of 0.5 N/mm, along -z: k x²/2 each way. */
-TEST(test_work_of_a_spring)
+TEST(test_work_of_a_spring, made_page, made_end)
 {
-	struct made made = made_page();
 	const int n = 10000;
 	const double k = 0.5, depth_mm = 10, exact = k * depth_mm * depth_mm / 2;
 
@@ -309,32 +290,28 @@ TEST(test_work_of_a_spring)
 
 		incise_state_tick(made.writer, &tick, 0, 0, 0);
 	}
-	look(&made);
+	look();
 	/* The force is held over a way of depth/n: less on the way in, more out. */
 	assert_true(fabs(now.absorbed_mJ - exact) <= exact / n * 1.01);
 	assert_true(fabs(now.returned_mJ - exact) <= exact / n * 1.01);
 	assert_true(now.returned_mJ > now.absorbed_mJ);
-	made_free(&made);
 }
 
 /* Friction returns no work. */
-TEST(test_work_of_friction)
+TEST(test_work_of_friction, made_page, made_end)
 {
-	struct made made = made_page();
-
 	for (int i = 0; i <= 2000; i++) {
 		struct incise_tick tick = at(i < 1000 ? i : 2000 - i, i < 1000 ? -2 : 2);
 
 		incise_state_tick(made.writer, &tick, 0, 0, 0);
 	}
-	look(&made);
+	look();
 	/* 1000 mm there and 1000 mm back against 2 N; whole numbers are exact. */
 	assert_true(now.absorbed_mJ == 4000);
 	assert_true(now.returned_mJ == 0);
-	made_free(&made);
 }
 
-TEST(test_changes_that_are_no_motion)
+TEST(test_changes_that_are_no_motion, made_page, made_end)
 {
 	static const struct {
 		unsigned int flags[2];
@@ -352,8 +329,6 @@ TEST(test_changes_that_are_no_motion)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct made made = made_page();
-
 		for (int k = 0; k < 2; k++) {
 			struct incise_tick tick = at(-10 * k, 2);
 
@@ -361,17 +336,17 @@ TEST(test_changes_that_are_no_motion)
 			tick.tool = cases[i].tool[k];
 			incise_state_tick(made.writer, &tick, 0, 0, 0);
 		}
-		look(&made);
+		look();
 		assert_true(now.absorbed_mJ == cases[i].work_mJ);
 		assert_true(now.returned_mJ == 0);
-		made_free(&made);
+		made_end(NULL);
+		made_page(NULL);
 	}
 }
 
-TEST(test_work_without_numbers)
+TEST(test_work_without_numbers, made_page, made_end)
 {
 	static const double ways[] = {NAN, INFINITY, -INFINITY, 1e300};
-	struct made made = made_page();
 
 	for (size_t i = 0; i < sizeof(ways) / sizeof(*ways); i++) {
 		struct incise_tick bad = at(ways[i], 1e300), good = at(0, -1);
@@ -379,18 +354,16 @@ TEST(test_work_without_numbers)
 		incise_state_tick(made.writer, &bad, 0, 0, 0);
 		incise_state_tick(made.writer, &good, 0, 0, 0);
 	}
-	look(&made);
+	look();
 	assert_true(isfinite(now.absorbed_mJ) && isfinite(now.returned_mJ));
-	made_free(&made);
 }
 
 /*
  * As after years: each addition lies below the last bit of the sum, and would be lost without
  * the correction. Ten million times 5e-11 are 5e-4.
  */
-TEST(test_long_sum_of_work)
+TEST(test_long_sum_of_work, made_page, made_end)
 {
-	struct made made = made_page();
 	struct incise_tick tick = at(0, 2);
 	const int n = cases_of(10000000, 500000);
 	double naive = 1e6;
@@ -405,9 +378,8 @@ TEST(test_long_sum_of_work)
 		incise_state_tick(made.writer, &tick, 0, 0, 0);
 		naive += i ? 5e-11 : 0;
 	}
-	look(&made);
+	look();
 	assert_true(naive == 1e6);
 	/* The last bit of 1e6. */
 	assert_true(fabs(now.absorbed_mJ - 1e6 - 5e-11 * n) <= 0x1p-33);
-	made_free(&made);
 }

@@ -4,24 +4,19 @@
  * at any byte gives all whole frames before it; a disk that is full, writes short, or fails;
  * kill -9, also of the pump of the virtual camera.
  */
-#include <errno.h>
+#include "../unit.h"
 #include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <time.h>
-#include <unistd.h>
 #include <incise/backend.h>
 #include <incise/rig.h>
 #include "../../../lib/learn/sha256.h"
 #include "../../../lib/record/frames.h"
 #include "../../../lib/record/write/frame_pump.h"
 #include "../message.h"
-#include "../unit.h"
 
 #define ROOM (1 << 20)
 #define MS 1000000LL
@@ -121,12 +116,10 @@ ssize_t __wrap_write(int fd, const void *bytes, size_t n)
 static struct incise_frames_writer *begin(const char *path,
 					  const struct incise_frames_shape *shape)
 {
-	struct incise_error err = {0};
 	struct incise_frames_writer *writer =
 		incise_frames.create(path, shape, NULL, &err);
 
-	if (!writer)
-		fail_msg("%s", err.text);
+	succeeds(writer);
 	return writer;
 }
 
@@ -134,10 +127,7 @@ static void put(struct incise_frames_writer *writer,
 		const struct incise_camera_frame *frame,
 		struct incise_frames_stored *stored)
 {
-	struct incise_error err = {0};
-
-	if (writer->ops->put(writer, frame, stored, &err))
-		fail_msg("%s", err.text);
+	succeeds(!writer->ops->put(writer, frame, stored, &err));
 }
 
 /* That @frame is frame @n of the film, row by row. */
@@ -178,8 +168,7 @@ static uint64_t count(const char *path, const struct incise_frames_shape *shape)
 	/* Killed before there was a file. */
 	if (!reader && err.code == ENOENT)
 		return 0;
-	if (!reader)
-		fail_msg("%s", err.text);
+	succeeds(reader);
 	while ((rc = reader->ops->next(reader, &frame, &stored, &err)) == 1)
 		is_frame(&frame, shape, n++, 0);
 	/* The last may be torn, and then says so. */
@@ -205,6 +194,12 @@ static void is_digest(const struct incise_camera_frame *frame,
 	assert_string_equal(text, hex);
 }
 
+/* Of the test that runs. */
+static struct incise_camera_frame frame;
+static struct incise_frames_reader *reader;
+static struct incise_frames_writer *writer;
+static struct incise_frames_stored stored;
+
 TEST(comes_back_to_the_byte)
 {
 	static const uint8_t no_digest[INCISE_FRAMES_DIGEST];
@@ -214,10 +209,6 @@ TEST(comes_back_to_the_byte)
 		const struct incise_frames_shape *shape = &shapes[i];
 		int pad = i % 2 ? 0 : 13, frames = shape->height > 1000 ? 2 : 12;
 		struct incise_frames_stored put_as[12], stored;
-		struct incise_frames_writer *writer;
-		struct incise_frames_reader *reader;
-		struct incise_camera_frame frame;
-		struct incise_error err = {0};
 		struct stat before, after;
 		char path[64];
 
@@ -236,8 +227,7 @@ TEST(comes_back_to_the_byte)
 		assert_int_equal(stat(path, &after), 0);
 		assert_int_equal(after.st_size, before.st_size);
 		reader = incise_frames.open(path, &err);
-		if (!reader)
-			fail_msg("%s", err.text);
+		succeeds(reader);
 		for (int n = 0; n < frames; n++) {
 			reader->digests = n % 2;
 			assert_int_equal(reader->ops->next(reader, &frame, &stored, &err),
@@ -276,10 +266,6 @@ TEST(any_time_is_kept)
 		{7200000000000LL + 1000, 7200000}, /* two hours on: one cluster each */
 	};
 	const struct incise_frames_shape *shape = &shapes[3];
-	struct incise_frames_stored stored;
-	struct incise_frames_reader *reader;
-	struct incise_frames_writer *writer;
-	struct incise_camera_frame frame;
 	uint8_t bytes[6000];
 	char path[64];
 
@@ -313,10 +299,6 @@ TEST(refuses)
 		{64, 48, (enum incise_pixels)9, 0},	{64, 48, INCISE_PIXELS_RGB, -1},
 		{64, 48, INCISE_PIXELS_RGB, 0.0 / 0.0},
 	};
-	struct incise_frames_writer *writer;
-	struct incise_frames_stored stored;
-	struct incise_camera_frame frame;
-	struct incise_error err = {0};
 	static uint8_t bytes[ROOM];
 	char path[64];
 
@@ -404,9 +386,6 @@ TEST(altered_bytes_are_found)
 	for (size_t i = 0; i < 8; i++) {
 		const struct incise_frames_shape *shape = &shapes[i % 4];
 		bool undecoded = i >= 4 && shape->pixels != INCISE_PIXELS_MJPEG;
-		struct incise_frames_stored stored;
-		struct incise_frames_reader *reader;
-		struct incise_camera_frame frame;
 		off_t ends[6];
 		char path[64];
 		FILE *file;
@@ -425,7 +404,6 @@ TEST(altered_bytes_are_found)
 		assert_non_null(reader);
 		reader->undecoded = i >= 4;
 		for (uint64_t n = 0; n < 6; n++) {
-			struct incise_error err = {0};
 			int rc = reader->ops->next(reader, &frame, &stored, &err);
 
 			assert_int_equal(rc, n == 3 ? -EBADMSG : 1);
@@ -443,9 +421,6 @@ TEST(noise_ends)
 {
 	for (uint64_t round = 0; round < 60; round++) {
 		const struct incise_frames_shape *shape = &shapes[round % 4];
-		struct incise_frames_stored stored;
-		struct incise_frames_reader *reader;
-		struct incise_camera_frame frame;
 		off_t ends[3];
 		char path[64];
 		FILE *file;
@@ -487,9 +462,6 @@ TEST(full_disk)
 	signal(SIGXFSZ, SIG_IGN);
 	assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
 	for (size_t i = 0; i < 4; i++) {
-		struct incise_frames_writer *writer;
-		struct incise_frames_stored stored;
-		struct incise_camera_frame frame;
 		struct incise_error err = {0};
 		static uint8_t bytes[ROOM];
 		uint64_t n = 0;
@@ -532,8 +504,6 @@ TEST(a_disk_that_fails)
 	static uint8_t bytes[ROOM];
 
 	for (int64_t capacity = 0; capacity < 20000; capacity += 777) {
-		struct incise_frames_writer *writer;
-		struct incise_frames_stored stored;
 		struct incise_error err = {0};
 		uint64_t n = 0;
 		char path[64];
@@ -588,7 +558,6 @@ TEST(killed)
 			for (uint64_t n = 0; writer; n++) {
 				struct incise_camera_frame frame =
 					film_frame(shape, n, 0, bytes);
-				struct incise_frames_stored stored;
 
 				if (writer->ops->put(writer, &frame, &stored, NULL))
 					break;
@@ -618,13 +587,9 @@ TEST(virtual_camera_comes_back)
 		incise_rig_open("sim:clock=simulated", INCISE_RIG_CAMERA, NULL);
 	struct incise_frame_record record[FRAMES];
 	struct incise_frame_pump_setup setup = {0};
-	struct incise_frames_stored stored;
 	struct incise_frames_shape shape;
-	struct incise_frames_reader *reader;
-	struct incise_camera_frame frame;
 	struct incise_camera_info info;
 	struct incise_frame_pump *pump;
-	struct incise_error err = {0};
 	int64_t from_ns;
 	char path[64];
 	int read = 0;
@@ -778,10 +743,6 @@ TEST(a_kill_costs_no_row)
 		static uint8_t bytes[64 * 48 * 3];
 		uint64_t n = 0, least = 1 + round * 7 % 20;
 		bool rests = round / 2 % 2;
-		struct incise_frames_reader *reader;
-		struct incise_frames_stored stored;
-		struct incise_camera_frame frame;
-		struct incise_error err = {0};
 		char path[64];
 		pid_t child;
 
@@ -796,8 +757,7 @@ TEST(a_kill_costs_no_row)
 		assert_int_equal(kill(child, SIGKILL), 0);
 		assert_int_equal(waitpid(child, NULL, 0), child);
 		reader = incise_frames.open(path, &err);
-		if (!reader)
-			fail_msg("%s", err.text);
+		succeeds(reader);
 		while (reader->ops->next(reader, &frame, &stored, &err) == 1) {
 			struct incise_camera_frame want = film_frame(shape, n, 0, bytes);
 

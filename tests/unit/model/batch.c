@@ -5,8 +5,6 @@
  */
 #include "../unit.h"
 #include <limits.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/fixed/layout.h"
 #include "paper_model.h"

@@ -3,13 +3,9 @@
  * The exported C file: strict C99 without a warning, and the library's results to the
  * bit. It is compiled as a user would, and loaded.
  */
+#include "../unit.h"
 #include <dlfcn.h>
-#include <errno.h>
 #include <limits.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 #include <incise/fixed.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/model/model.h"
@@ -91,7 +87,7 @@ static void compare(const struct incise_fixed *fx, int32_t (*eval)(const int32_t
 }
 
 /* Every arithmetic, one input to four, small numbers and large, an awkward name. */
-static void test_same_to_the_bit(void **state)
+TEST(test_same_to_the_bit)
 {
 	static const double sizes[] = {1e-6, 3, 50};
 
@@ -122,7 +118,7 @@ static void test_same_to_the_bit(void **state)
 }
 
 /* Nothing is needed of a C library but stdint.h. */
-static void test_self_contained(void **state)
+TEST(test_self_contained)
 {
 	for (int arithmetic = 0; arithmetic < 3; arithmetic++) {
 		struct incise_fixed *fx = compiled(2, arithmetic, 3, "liver");
@@ -143,7 +139,7 @@ static void test_self_contained(void **state)
 	}
 }
 
-static void test_refused(void **state)
+TEST(test_refused)
 {
 	static const char *const bad[] = {
 		"",
@@ -154,7 +150,6 @@ static void test_refused(void **state)
 		"a;",
 		"aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"};
 	struct incise_fixed *fx = compiled(1, INCISE_FIXED_DIRECT, 3, "liver");
-	struct incise_error err;
 
 	for (size_t i = 0; i < sizeof(bad) / sizeof(*bad); i++) {
 		err = (struct incise_error){0};
@@ -168,13 +163,4 @@ static void test_refused(void **state)
 	incise_fixed_free(fx);
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_same_to_the_bit),
-		cmocka_unit_test(test_self_contained),
-		cmocka_unit_test(test_refused),
-	};
-
-	return cmocka_run_group_tests(tests, enter_folder, leave_folder);
-}
+GROUP(enter_folder, leave_folder);

@@ -5,8 +5,6 @@
  */
 #include "../unit.h"
 #include <float.h>
-#include <math.h>
-#include <stdlib.h>
 #include <incise/uncertainty.h>
 #include "any_model.h"
 

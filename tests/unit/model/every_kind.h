@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/*
- * A .fis file with every kind of function, weights, a free input and min for AND.
- */
+/* A .fis file with every kind of function, weights, a free input and min for AND. */
 #ifndef INCISE_TEST_EVERY_KIND_H
 #define INCISE_TEST_EVERY_KIND_H
 

@@ -1,14 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * .fis files: exact round trips, errors by line, and files that were tampered with.
- */
-#include <errno.h>
+/* .fis files: exact round trips, errors by line, and files that were tampered with. */
+#include "../unit.h"
 #include <locale.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 #include <float.h>
 #include "../message.h"
 #include "any_model.h"
@@ -66,7 +59,7 @@ static void assert_same(const struct incise_model *a, const struct incise_model 
 }
 
 /* 17 digits carry every bit of a double. */
-static void test_round_trip_is_exact(void **state)
+TEST(test_round_trip_is_exact)
 {
 	for (int type = INCISE_MF_GAUSS; type <= INCISE_MF_GBELL; type++)
 		for (uint64_t seed = 1; seed < 10; seed++) {
@@ -116,7 +109,7 @@ static void assert_same_inside(const struct incise_model *a, const struct incise
 }
 
 /* Of any model, to the bit: all kinds, lists, weights and methods, and the largest. */
-static void test_any_model_round_trips(void **state)
+TEST(test_any_model_round_trips)
 {
 	static const double extreme[] = {5e-324, DBL_MAX, -DBL_MIN, -0.0, 1e300, 0.1};
 	struct incise_model *model = calloc(1, sizeof(*model)), *back;
@@ -141,7 +134,7 @@ static void test_any_model_round_trips(void **state)
 }
 
 /* A constant that was given a slope keeps it. */
-static void test_constants_become_linear(void **state)
+TEST(test_constants_become_linear)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1), *back;
 
@@ -160,7 +153,7 @@ static void test_constants_become_linear(void **state)
 }
 
 /* A program that has set a locale with a decimal comma writes and reads the same file. */
-static void test_locale_does_not_matter(void **state)
+TEST(test_locale_does_not_matter)
 {
 	static const char *const names[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8",
 					    "nb_NO.UTF-8"};
@@ -196,7 +189,7 @@ static const char matlab[] =
 	"MF1='weak':'constant',[3]\nMF2='strong':'linear',[1 2 0.5]\n\n"
 	"[Rules]\n1 1, 1 (1) : 1\n2 0, 2 (0.5) : 1\n0 1, 2 (1) : 1\n";
 
-static void test_matlab_file(void **state)
+TEST(test_matlab_file)
 {
 	struct incise_model *model;
 	const double x[] = {4, 1};
@@ -220,7 +213,7 @@ static void test_matlab_file(void **state)
 }
 
 /* Every kind of function, min, a weight of 0, and an 'or' of one input. */
-static void test_every_kind(void **state)
+TEST(test_every_kind)
 {
 	struct incise_model *model;
 	const double x[] = {3, 0.5};
@@ -254,7 +247,7 @@ static void load_changed(const char *whole, const char *from, const char *to,
 	assert_null(incise_model_load(path, err));
 }
 
-static void test_refusals_name_line_and_word(void **state)
+TEST(test_refusals_name_line_and_word)
 {
 	struct changed {
 		const char *from, *to;
@@ -346,16 +339,14 @@ static void test_refusals_name_line_and_word(void **state)
 	}
 }
 
-static void test_missing_file(void **state)
+TEST(test_missing_file)
 {
-	struct incise_error err = {0};
-
 	assert_error(incise_model_load("/nonexistent/m.fis", &err), ENOENT, &err,
 		     "/nonexistent/m.fis");
 }
 
 /* Cut anywhere but before the last line's end, a file is refused. */
-static void test_truncation(void **state)
+TEST(test_truncation)
 {
 	const char *const texts[] = {matlab, every_kind};
 
@@ -366,19 +357,4 @@ static void test_truncation(void **state)
 		}
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_round_trip_is_exact),
-		cmocka_unit_test(test_any_model_round_trips),
-		cmocka_unit_test(test_constants_become_linear),
-		cmocka_unit_test(test_locale_does_not_matter),
-		cmocka_unit_test(test_matlab_file),
-		cmocka_unit_test(test_every_kind),
-		cmocka_unit_test(test_refusals_name_line_and_word),
-		cmocka_unit_test(test_missing_file),
-		cmocka_unit_test(test_truncation),
-	};
-
-	return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+GROUP(set_up, tear_down);

@@ -5,8 +5,6 @@
  */
 #include "../unit.h"
 #include <float.h>
-#include <math.h>
-#include <string.h>
 #include "any_model.h"
 
 /* Worked out by hand. */

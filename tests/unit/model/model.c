@@ -4,12 +4,7 @@
  * one breaks down.
  */
 #include "../unit.h"
-#include <errno.h>
 #include <float.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 #include "any_model.h"
 
 /* Eq. (1)–(3) as printed, with σ = √2 s. */

@@ -4,8 +4,6 @@
  * grid and are close to them; estimates are held against models whose slopes are known.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
 #include <incise/fixed.h>
 #include "../../../lib/model/slope.h"
 #include "../fixed/compiled.h"

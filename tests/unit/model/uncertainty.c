@@ -2,12 +2,7 @@
 /*
  * The standard deviation: its formula, and a file that is the same to the bit or refused.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
+#include "../unit.h"
 #include <incise/uncertainty.h>
 #include "../message.h"
 #include "paper_model.h"
@@ -59,10 +54,25 @@ static double by_formula(const struct incise_model *model, const double *x)
 	return 0.25 * sqrt(sum);
 }
 
-static void test_formula(void **state)
+static struct incise_model *model;
+static struct incise_uncertainty *u;
+
+static int begin(void **state)
 {
-	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
-	struct incise_uncertainty *u = make(model);
+	model = paper_model(INCISE_MF_GAUSS, 1, 1);
+	u = make(model);
+	return 0;
+}
+
+static int end(void **state)
+{
+	incise_uncertainty_free(u);
+	incise_model_free(model);
+	return 0;
+}
+
+TEST(test_formula, begin, end)
+{
 	uint64_t seed = 8;
 
 	assert_non_null(u);
@@ -74,15 +84,11 @@ static void test_formula(void **state)
 		assert_true(fabs(incise_uncertainty_sd(u, model, x) -
 				 by_formula(model, x)) < 1e-13);
 	}
-	incise_uncertainty_free(u);
-	incise_model_free(model);
 }
 
-static void test_any_input(void **state)
+TEST(test_any_input, begin, end)
 {
 	static const double odd[] = {0, -1e308, 1e308, 1e-310, NAN, INFINITY, -INFINITY};
-	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
-	struct incise_uncertainty *u = make(model);
 	const double corner[] = {20, 0}, outside[] = {1e9, -5}, middle[] = {10, 25},
 		     none[] = {NAN, NAN};
 
@@ -99,14 +105,10 @@ static void test_any_input(void **state)
 	}
 	assert_true(incise_uncertainty_sd(u, model, outside) ==
 		    incise_uncertainty_sd(u, model, corner));
-	incise_uncertainty_free(u);
-	incise_model_free(model);
 }
 
-static void test_what_is_no_factor(void **state)
+TEST(test_what_is_no_factor, begin, end)
 {
-	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
-
 	incise_uncertainty_free(make(model));
 	assert_null(incise_uncertainty_new(model, -1, factor, N, NULL));
 	assert_null(incise_uncertainty_new(model, NAN, factor, N, NULL));
@@ -116,14 +118,12 @@ static void test_what_is_no_factor(void **state)
 	factor[7 * N + 7] = 0;
 	assert_null(incise_uncertainty_new(model, 1, factor, N, NULL));
 	assert_int_equal(errno, EINVAL);
-	incise_model_free(model);
 }
 
-static void test_round_trip(void **state)
+TEST(test_round_trip)
 {
 	struct incise_model *model = paper_model(INCISE_MF_GBELL, 1, 1e-9);
 	struct incise_uncertainty *a = make(model), *b;
-	struct incise_error err = {0};
 	uint64_t seed = 8;
 
 	assert_int_equal(incise_uncertainty_save(a, path, &err), 0);
@@ -142,15 +142,13 @@ static void test_round_trip(void **state)
 }
 
 /* One bit of one parameter, and it is another model. */
-static void test_stale(void **state)
+TEST(test_stale, begin, end)
 {
-	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
-	struct incise_uncertainty *u = make(model);
-	struct incise_error err = {0};
 	double p[3];
 
 	assert_int_equal(incise_uncertainty_save(u, path, NULL), 0);
 	incise_uncertainty_free(u);
+	u = NULL;
 	memcpy(p, incise_model_rule(model, 19)->p, sizeof(p));
 	p[2] = nextafter(p[2], 10);
 	incise_model_set_consequent(model, 19, p);
@@ -161,7 +159,6 @@ static void test_stale(void **state)
 	incise_model_set_mf(model, 1, 3, (double[]){9, 50, 0, 0});
 	assert_null(incise_uncertainty_load(path, model, NULL));
 	assert_int_equal(errno, ESTALE);
-	incise_model_free(model);
 }
 
 static char *read_all(size_t *size)
@@ -220,7 +217,7 @@ static void refuse_damage(const struct incise_model *model, const struct change 
 	free(changed);
 }
 
-static void test_damage_is_refused(void **state)
+TEST(test_damage_is_refused, begin, end)
 {
 	static const struct change changes[] = {
 		{"incise-sd 1", "incise-sd 2"},
@@ -254,8 +251,6 @@ static void test_damage_is_refused(void **state)
 		{"\n1 1 1 ", "\n1 inf 1 "},
 		{"\n1 1 1 ", "\n1 x 1 "},
 	};
-	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
-	struct incise_uncertainty *u = make(model);
 	double rows[3 * N];
 
 	assert_int_equal(incise_uncertainty_save(u, path, NULL), 0);
@@ -267,8 +262,6 @@ static void test_damage_is_refused(void **state)
 			 0);
 	assert_int_equal(incise_uncertainty_save(u, path, NULL), 0);
 	refuse_damage(model, calibrations, sizeof(calibrations) / sizeof(*calibrations));
-	incise_uncertainty_free(u);
-	incise_model_free(model);
 }
 
 static int make_path(void **state)
@@ -284,10 +277,9 @@ static int remove_path(void **state)
 }
 
 /* Calibrations: in a file of version 2, the same to the bit; without them the file is version 1. */
-static void test_calibrations(void **state)
+TEST(test_calibrations, begin, end)
 {
-	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
-	struct incise_uncertainty *u = make(model), *read;
+	struct incise_uncertainty *read;
 	struct incise_uncertainty_parts a, b;
 	double rows[3 * N], v[N], x[] = {7, 31}, phi[N], square = 0;
 	uint64_t seed = 5;
@@ -339,21 +331,6 @@ static void test_calibrations(void **state)
 	assert_string_equal(line, "incise-sd 1\n");
 	fclose(file);
 	incise_uncertainty_free(read);
-	incise_uncertainty_free(u);
-	incise_model_free(model);
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_formula),
-		cmocka_unit_test(test_any_input),
-		cmocka_unit_test(test_what_is_no_factor),
-		cmocka_unit_test(test_round_trip),
-		cmocka_unit_test(test_stale),
-		cmocka_unit_test(test_damage_is_refused),
-		cmocka_unit_test(test_calibrations),
-	};
-
-	return cmocka_run_group_tests(tests, make_path, remove_path);
-}
+GROUP(make_path, remove_path);

@@ -4,8 +4,6 @@
  * devices that are no trackers. The dialogue with a tracker is in polhemus_setup.c.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <string.h>
 #include "../../../lib/device/polhemus/polhemus_dialogue.h"
 #include "../../../lib/device/polhemus/polhemus_model.h"
 

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * lib/device/polhemus/polhemus_model.c: what is known, and what is not.
- */
+/* lib/device/polhemus/polhemus_model.c: what is known, and what is not. */
 #include "../unit.h"
-#include <string.h>
 #include "../../../lib/device/polhemus/polhemus_model.h"
 
 TEST(products)

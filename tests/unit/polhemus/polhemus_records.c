@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * lib/device/polhemus/polhemus_records.c: records made by hand, byte by byte.
- */
+/* lib/device/polhemus/polhemus_records.c: records made by hand, byte by byte. */
 #include "../unit.h"
-#include <math.h>
-#include <stdio.h>
-#include <string.h>
 #include "../../../lib/device/polhemus/polhemus_records.h"
 
 static const struct polhemus_layout fastrak = {

@@ -4,8 +4,6 @@
  * that it gets, and the message for each that it does not take.
  */
 #include "../unit.h"
-#include <stdio.h>
-#include <string.h>
 #include "../../../lib/device/polhemus/polhemus_setup.h"
 #include "line.h"
 

@@ -4,8 +4,6 @@
  * on a clock of the test. polhemus_tty.c has it behind a pseudo terminal.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <string.h>
 #include "../../../lib/device/polhemus/polhemus_tracker.h"
 #include "../virtual_time.h" /* with __wrap_clock_gettime() and others */
 #include "line.h"
@@ -58,8 +56,7 @@ static struct incise_tracker *open_tracker(const struct polhemus_times *times)
 	struct incise_tracker *tracker = polhemus_tracker_open(
 		&line.line, &two, times, "rig.conf:1: tracker", &err);
 
-	if (!tracker)
-		fail_msg("%s", err.text);
+	succeeds(tracker);
 	return tracker;
 }
 

@@ -4,11 +4,7 @@
  * and the backend "tty" with the emulator behind a pseudo terminal.
  */
 #include "../unit.h"
-#include <errno.h>
 #include <fcntl.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 #include "../../../lib/device/backends.h"
 #include "../../../lib/device/polhemus/polhemus_tty.h"
 #include "pty.h"
@@ -46,7 +42,6 @@ TEST(names)
 		{"/dev/not:there:9600", ENODEV},
 		{"/dev/null/x", ENODEV},
 	};
-	struct incise_error err;
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		err = (struct incise_error){0};
@@ -58,13 +53,11 @@ TEST(names)
 
 TEST(there_and_back, begin, end)
 {
-	struct incise_error err = {0};
 	struct polhemus_line *line = polhemus_tty_open(path, "rig.conf", &err);
 	unsigned char bytes[16];
 	int64_t t_ns = 0, before;
 
-	if (!line)
-		fail_msg("%s", err.text);
+	succeeds(line);
 	assert_int_equal(line->family, -1);
 	/* ten bits a byte at the usual rate */
 	assert_int_equal(line->ns_per_byte, 10 * INT64_C(1000000000) / 115200);
@@ -85,7 +78,6 @@ TEST(there_and_back, begin, end)
 
 TEST(pulled_out, begin, end)
 {
-	struct incise_error err = {0};
 	struct polhemus_line *line = polhemus_tty_open(path, "rig.conf", &err);
 	unsigned char bytes[16];
 	int64_t t_ns;
@@ -129,12 +121,10 @@ static int count_found(void *context, const struct incise_scan_device *device)
 TEST(a_scan, tracker_begin, tracker_end)
 {
 	struct incise_scan_device found = {0};
-	struct incise_error err = {0};
 	char arguments[80];
 
 	snprintf(arguments, sizeof(arguments), "%s:115200", pty.path);
-	if (incise_tracker_tty.scan(arguments, count_found, &found, &err))
-		fail_msg("%s", err.text);
+	succeeds(!incise_tracker_tty.scan(arguments, count_found, &found, &err));
 	assert_non_null(strstr(found.device, arguments));
 	assert_string_equal(found.what, "FASTRAK 3.02 OutputCompensat CPG2030-003-10");
 	assert_int_equal(found.n, 3);
@@ -150,14 +140,12 @@ TEST(opens, tracker_begin, tracker_end)
 {
 	static const struct incise_tracker_setup setup = {
 		.n_stations = 1, .stations = {1}, .hemisphere = {1, 0, 0}};
-	struct incise_error err = {0};
 	struct incise_backend_request request = {
 		.arguments = pty.path, .where = "rig.conf:1: tracker", .tracker = &setup};
 	struct incise_tracker *tracker = incise_tracker_tty.open(&request, &err);
 	struct incise_tracker_info info;
 
-	if (!tracker)
-		fail_msg("%s", err.text);
+	succeeds(tracker);
 	incise_tracker_info(tracker, &info);
 	assert_true(info.rate_hz == 120 && info.stations == 1);
 	/* It is ours alone. */
@@ -168,13 +156,11 @@ TEST(opens, tracker_begin, tracker_end)
 
 TEST(back_again, tracker_begin, tracker_end)
 {
-	struct incise_error err = {0};
 	struct polhemus_line *line = polhemus_tty_open(pty.path, "rig.conf", &err);
 	unsigned char bytes[64];
 	int64_t t_ns;
 
-	if (!line)
-		fail_msg("%s", err.text);
+	succeeds(line);
 	pty_unplug(&pty);
 	while (line->ops->read(line, bytes, sizeof(bytes), &t_ns, 20000) > 0)
 		;

@@ -4,10 +4,6 @@
  * device is taken, and packets with what may go wrong with them. Over the USB of the kernel it is in tests/vm.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/device/polhemus/polhemus_usb.c"
 #include "usb_bus.h"
 
@@ -304,7 +300,6 @@ TEST(a_scan)
 		{BUS(locked), "",
 		 "usb:0f44:0002@1-1 FASTRAK\nusb:0f44:0002@1-2 FASTRAK\n"},
 	};
-	struct incise_error err = {0};
 	int n = 0;
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -364,8 +359,6 @@ static void describe(int out_type, int packet)
 
 static int begin(void **state)
 {
-	struct incise_error err = {0};
-
 	describe(LIBUSB_TRANSFER_TYPE_BULK, 64);
 	line = usb_open("0f44:0002", "rig.conf:1", &err);
 	return line ? 0 : -1;

@@ -3,6 +3,7 @@
  * Streams of a recording: rows are those of the tables at their best times, to the bit, tables
  * those of the exported CSV; types, units and calibration; damage, forks and early ends.
  */
+#include "../unit.h"
 #include "recorded.h"
 #include <sys/wait.h>
 #include <incise/arrow.h>
@@ -11,11 +12,9 @@
 
 static struct incise_recording *open_it(void)
 {
-	struct incise_error err = {0};
 	struct incise_recording *recording = incise_recording_open("a.rec", &err);
 
-	if (!recording)
-		fail_msg("%s", err.text);
+	succeeds(recording);
 	return recording;
 }
 
@@ -24,7 +23,6 @@ static struct ArrowArrayStream open_stream(const char *what,
 {
 	struct incise_recording *recording = open_it();
 	struct ArrowArrayStream stream;
-	struct incise_error err = {0};
 
 	if (incise_recording_stream(recording, what, options, &stream, &err))
 		fail_msg("%s: %s", what, err.text);
@@ -54,12 +52,11 @@ static bool flag(const struct ArrowArray *array, int column, int64_t row)
 	return ((const uint8_t *)data(array, column))[row / 8] >> row % 8 & 1;
 }
 
-static void force_is_that_of_the_table(void **state)
+TEST(force_is_that_of_the_table, IN_FOLDER)
 {
 	struct incise_recording_value *values;
 	struct incise_recording *recording;
 	struct ArrowArrayStream stream;
-	struct incise_error err = {0};
 	struct ArrowArray batch;
 	int n, row = 0, clipped = 0, batches = 0;
 
@@ -95,7 +92,7 @@ static void force_is_that_of_the_table(void **state)
 	free(values);
 }
 
-static void poses_are_those_of_the_table(void **state)
+TEST(poses_are_those_of_the_table, IN_FOLDER)
 {
 	struct incise_tracker_sample *poses;
 	struct incise_recording *recording;
@@ -153,7 +150,7 @@ static const char *metadata(const struct ArrowSchema *schema, const char *key)
 	return "";
 }
 
-static void fields_have_units_and_calibration(void **state)
+TEST(fields_have_units_and_calibration, IN_FOLDER)
 {
 	struct incise_calibration calibration;
 	struct incise_export_options options;
@@ -227,7 +224,7 @@ static int count_rows(const struct incise_export_options *options, double *force
 	return rows;
 }
 
-static void tables_are_those_of_an_export(void **state)
+TEST(tables_are_those_of_an_export, IN_FOLDER)
 {
 	static const struct {
 		struct incise_export_options options;
@@ -245,14 +242,12 @@ static void tables_are_those_of_an_export(void **state)
 	recording = open_it();
 	for (size_t c = 0; c < sizeof(cases) / sizeof(*cases); c++) {
 		struct incise_export_report report;
-		struct incise_error err = {0};
 		double sum = 0, csv_sum = 0;
 		int rows = count_rows(&cases[c].options, &sum), force = 0;
 		char *text, *line;
 
-		if (incise_export(&recording, 1, &cases[c].options, "a.csv", &report,
-				  &err))
-			fail_msg("%s", err.text);
+		succeeds(!incise_export(&recording, 1, &cases[c].options, "a.csv",
+					&report, &err));
 		assert_true(rows > 50);
 		assert_int_equal(rows, report.rows);
 		text = text_of("a.csv");
@@ -277,7 +272,7 @@ static int stop_at_once(void *context, double share)
 	return 1;
 }
 
-static void table_streams_end_early(void **state)
+TEST(table_streams_end_early, IN_FOLDER)
 {
 	struct incise_export_options options = {.resample = true};
 	struct ArrowArrayStream stream, other;
@@ -304,7 +299,7 @@ static void table_streams_end_early(void **state)
 	stream.release(&stream);
 }
 
-static void refuses_what_cannot_be(void **state)
+TEST(refuses_what_cannot_be, IN_FOLDER)
 {
 	static const struct {
 		const char *what, *sql;
@@ -370,7 +365,7 @@ static void refuses_what_cannot_be(void **state)
 	}
 }
 
-static void an_older_form_has_its_streams(void **state)
+TEST(an_older_form_has_its_streams, IN_FOLDER)
 {
 	struct ArrowArrayStream stream;
 	struct ArrowArray batch;
@@ -385,7 +380,7 @@ static void an_older_form_has_its_streams(void **state)
 	stream.release(&stream);
 }
 
-static void texts_are_utf8(void **state)
+TEST(texts_are_utf8, IN_FOLDER)
 {
 	struct ArrowArrayStream stream;
 	struct ArrowArray batch;
@@ -407,7 +402,7 @@ static void texts_are_utf8(void **state)
 }
 
 /* A child has no thread of its parent, and must not use its connections. */
-static void streams_stay_in_their_process(void **state)
+TEST(streams_stay_in_their_process, IN_FOLDER)
 {
 	static const char *const names[] = {"force", "table"};
 	struct incise_export_options options = {.resample = true};
@@ -435,21 +430,4 @@ static void streams_stay_in_their_process(void **state)
 		batch.release(&batch);
 		stream.release(&stream);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		IN_FOLDER(force_is_that_of_the_table),
-		IN_FOLDER(poses_are_those_of_the_table),
-		IN_FOLDER(fields_have_units_and_calibration),
-		IN_FOLDER(tables_are_those_of_an_export),
-		IN_FOLDER(table_streams_end_early),
-		IN_FOLDER(refuses_what_cannot_be),
-		IN_FOLDER(an_older_form_has_its_streams),
-		IN_FOLDER(texts_are_utf8),
-		IN_FOLDER(streams_stay_in_their_process),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

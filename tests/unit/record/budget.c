@@ -3,6 +3,7 @@
  * Tests of lib/record/export/budget.c: the parts against draws of the calibrations' values from
  * their covariance, noise against the simulated rig's, and what is not stated.
  */
+#include "../unit.h"
 #include "recorded.h"
 #include <incise/budget.h>
 #include "../../../lib/base/random.h"
@@ -38,8 +39,6 @@ static void make(const char *path, const char *text)
 	struct incise_rig *rig = open_rig("sim:clock=simulated,cut_s=2,pause_s=1");
 	struct incise_recorder_setup setup = {.calibration_path = text ? "c.conf" : NULL};
 	struct incise_calibration calibration;
-	struct incise_recorder *recorder;
-	struct incise_error err = {0};
 	FILE *file;
 
 	incise_calibration_nominal(&calibration);
@@ -47,33 +46,26 @@ static void make(const char *path, const char *text)
 		file = fopen("c.conf", "w");
 		fputs(text, file);
 		fclose(file);
-		if (incise_calibration_load("c.conf", &calibration, &err))
-			fail_msg("%s", err.text);
+		succeeds(!incise_calibration_load("c.conf", &calibration, &err));
 	}
 	setup.calibration = &calibration;
-	recorder = incise_recorder_new(path, rig, &setup, &err);
-	if (!recorder || poll_for(recorder, rig, 4000 * MS, &err) ||
-	    incise_recorder_close(recorder, &err))
-		fail_msg("%s", err.text);
-	incise_rig_close(rig);
+	end_recorder(start_recorder_by(path, rig, setup), rig, 4000 * MS);
 }
 
 static struct incise_budget *budget_of(const char *path,
 				       const struct incise_calibration *given,
 				       const char *given_path)
 {
-	struct incise_error err = {0};
 	struct incise_recording *recording = incise_recording_open(path, &err);
 	struct incise_budget *budget =
 		recording ? incise_budget_new(recording, given, given_path, &err) : NULL;
 
-	if (!budget)
-		fail_msg("%s", err.text);
+	succeeds(budget);
 	incise_recording_close(recording);
 	return budget;
 }
 
-static void table_is_consistent(void **state)
+TEST(table_is_consistent)
 {
 	const struct incise_budget_part *parts = incise_budget_parts();
 	const struct incise_budget_value *values = incise_budget_values();
@@ -92,7 +84,7 @@ static void table_is_consistent(void **state)
 	assert_int_equal(n, INCISE_BUDGET_PARTS);
 }
 
-static void uncertainties_are_those_of_the_calibrations(void **state)
+TEST(uncertainties_are_those_of_the_calibrations, IN_FOLDER)
 {
 	struct incise_budget *budget;
 
@@ -115,7 +107,7 @@ static void uncertainties_are_those_of_the_calibrations(void **state)
 }
 
 /* Columns of rows in 8 attitudes: parts against 20000 draws; 4 sd of a drawn variance are 4 %. */
-static void parts_are_the_spread_of_draws(void **state)
+TEST(parts_are_the_spread_of_draws, IN_FOLDER)
 {
 	enum { ROWS = 8, DRAWS = 20000 };
 	const double c[3][3] = {
@@ -194,7 +186,7 @@ static void parts_are_the_spread_of_draws(void **state)
 }
 
 /* The rig's own: 3 mV and 0.02 mm; 5000 and 480 samples give them to 3 sd of 1 % and 5 %. */
-static void noise_is_that_of_the_rig(void **state)
+TEST(noise_is_that_of_the_rig, IN_FOLDER)
 {
 	double part[INCISE_BUDGET_PARTS];
 	struct incise_budget *budget;
@@ -216,7 +208,7 @@ static void noise_is_that_of_the_rig(void **state)
 	incise_budget_free(budget);
 }
 
-static void not_stated_is_not_a_number(void **state)
+TEST(not_stated_is_not_a_number, IN_FOLDER)
 {
 	const struct incise_budget_row row = {
 		.force_N = 1, .force_share = 1, .direction = {1, 0, 0}};
@@ -238,7 +230,7 @@ static void not_stated_is_not_a_number(void **state)
 
 /* A calibration for the export replaces those of force; a value that was changed by hand since
  * its calibration has none. */
-static void given_calibration_replaces(void **state)
+TEST(given_calibration_replaces, IN_FOLDER)
 {
 	struct incise_calibration given;
 	struct incise_budget *budget;
@@ -281,7 +273,7 @@ static void mean_of_rows(const struct incise_budget *budget,
 }
 
 /* Against 4000 draws of the records' noise, whose variance they give to 3 sd of 7 %. */
-static void mean_of_depths_has_the_noise_of_its_records(void **state)
+TEST(mean_of_depths_has_the_noise_of_its_records, IN_FOLDER)
 {
 	double one[INCISE_BUDGET_PARTS], part[INCISE_BUDGET_PARTS], drawn = 0;
 	struct incise_budget *budget;
@@ -315,7 +307,7 @@ static void mean_of_depths_has_the_noise_of_its_records(void **state)
 
 /* Noise that is a sum over 8 samples counts an eighth of them; the window lasts 0.4 s, and gives
  * the correlation to some 15 %. */
-static void mean_of_forces_counts_correlated_samples_as_fewer(void **state)
+TEST(mean_of_forces_counts_correlated_samples_as_fewer, IN_FOLDER)
 {
 	double one[INCISE_BUDGET_PARTS], part[INCISE_BUDGET_PARTS];
 	struct incise_budget *budget;
@@ -342,20 +334,4 @@ static void mean_of_forces_counts_correlated_samples_as_fewer(void **state)
 			   10 * sqrt(8 / 12.) * 5000 / 4096 * sqrt(8 / 5000.),
 			   0.15 * incise_budget_u(budget, INCISE_BUDGET_ZERO));
 	incise_budget_free(budget);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(table_is_consistent),
-		IN_FOLDER(uncertainties_are_those_of_the_calibrations),
-		IN_FOLDER(parts_are_the_spread_of_draws),
-		IN_FOLDER(noise_is_that_of_the_rig),
-		IN_FOLDER(not_stated_is_not_a_number),
-		IN_FOLDER(given_calibration_replaces),
-		IN_FOLDER(mean_of_depths_has_the_noise_of_its_records),
-		IN_FOLDER(mean_of_forces_counts_correlated_samples_as_fewer),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

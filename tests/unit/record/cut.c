@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Tests of lib/record/read/cut.c; the stream of samples is tested by export.c too.
- */
+/* Tests of lib/record/read/cut.c; the stream of samples is tested by export.c too. */
+#include "../unit.h"
 #include "recorded.h"
 #include "../../../lib/record/read/cut.h"
 #include "../../../lib/record/read/depth.h"
 
-static void hysteresis(void **state)
+TEST(hysteresis)
 {
 	static const struct {
 		const char *what;
@@ -41,23 +40,20 @@ static void hysteresis(void **state)
 /* All samples inside cuts, by the stream. Returns how many. */
 static int stream(struct incise_cut_sample *samples, int max)
 {
-	struct incise_error err = {0};
 	struct incise_recording *recording = incise_recording_open("cut.rec", &err);
 	struct incise_cuts cuts;
 	int n = 0, rc;
 
-	if (!recording || incise_cuts_open(&cuts, recording, &err))
-		fail_msg("%s", err.text);
+	succeeds(recording && !incise_cuts_open(&cuts, recording, &err));
 	while ((rc = incise_cuts_next(&cuts, &samples[n], &err)) > 0)
 		assert_true(++n < max);
-	if (rc)
-		fail_msg("%s", err.text);
+	succeeds(!rc);
 	incise_cuts_close(&cuts);
 	incise_recording_close(recording);
 	return n;
 }
 
-static void samples_are_interpolated(void **state)
+TEST(samples_are_interpolated, IN_FOLDER)
 {
 	struct incise_cut_sample s[20];
 	int n;
@@ -91,14 +87,4 @@ static void samples_are_interpolated(void **state)
 	assert_true(s[2].clipped && s[3].clipped); /* both ends of the converter */
 	for (int i = 0; i < n; i++)
 		assert_int_equal(s[i].cut, 1);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(hysteresis),
-		IN_FOLDER(samples_are_interpolated),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Tests of lib/record/read/depth.c.
- */
+/* Tests of lib/record/read/depth.c. */
 #include "../unit.h"
-#include <math.h>
-#include <string.h>
 #include "../../../lib/record/read/depth.h"
 
 #define RECORDS 2000

@@ -3,10 +3,8 @@
  * Tests of lib/record/time/timeline.c: the envelope against a search through all lines, and
  * against theory.
  */
-#include <float.h>
-#include <math.h>
 #include "../unit.h"
-#include <stdbool.h>
+#include <float.h>
 #include "../../../lib/record/time/timeline.h"
 #include "stream.h"
 

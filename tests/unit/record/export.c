@@ -3,6 +3,7 @@
  * Tests of lib/record/export/export.c: against the same done by brute force from the tables,
  * all in memory, with nothing of the library.
  */
+#include "../unit.h"
 #include "recorded.h"
 #include <locale.h>
 #include <sys/resource.h>
@@ -151,11 +152,9 @@ static char *export_liver(const struct incise_export_options *how,
 			  struct incise_export_report *report)
 {
 	const char *path = "liver.rec";
-	struct incise_error err = {0};
 	char *text = export(&path, 1, how, report, &err);
 
-	if (!text)
-		fail_msg("%s", err.text);
+	succeeds(text);
 	return text;
 }
 
@@ -282,7 +281,7 @@ static int compare(char **text, const struct mean bins[2 * BINS], int min_count,
 	return rows;
 }
 
-static void averages_are_those_of_brute_force(void **state)
+TEST(averages_are_those_of_brute_force)
 {
 	static const struct {
 		double depth_max, velocity_max;
@@ -326,7 +325,7 @@ static void averages_are_those_of_brute_force(void **state)
 	}
 }
 
-static void averages_by_cut(void **state)
+TEST(averages_by_cut)
 {
 	struct incise_export_options how = {.depth_bins = DEPTH_BINS,
 					    .velocity_bins = VELOCITY_BINS,
@@ -353,11 +352,10 @@ static void averages_by_cut(void **state)
 	free(text);
 }
 
-static void clipped_samples_are_left_out(void **state)
+TEST(clipped_samples_are_left_out)
 {
 	struct incise_export_options how = {.depth_bins = 4, .velocity_bins = 4};
 	struct incise_export_report report;
-	struct incise_error err = {0};
 	const char *path = "clipped.rec";
 	char *text, *line, *rest;
 	uint64_t clipped = 0, flagged = 0;
@@ -393,7 +391,7 @@ static void clipped_samples_are_left_out(void **state)
 
 /* --- raw ---------------------------------------------------------------------------------- */
 
-static void raw_rows_are_the_samples(void **state)
+TEST(raw_rows_are_the_samples)
 {
 	struct incise_export_options how;
 	struct incise_export_report report;
@@ -428,7 +426,7 @@ static void raw_rows_are_the_samples(void **state)
 	free(text);
 }
 
-static void raw_rows_at_a_rate(void **state)
+TEST(raw_rows_at_a_rate)
 {
 	static const double rates[] = {1, 50, 120, 1000, 3333, 20000};
 
@@ -477,12 +475,11 @@ static void raw_rows_at_a_rate(void **state)
 
 /* --- several recordings, names, faults ------------------------------------------------------ */
 
-static void recordings_are_pooled_and_kept_apart(void **state)
+TEST(recordings_are_pooled_and_kept_apart)
 {
 	const char *paths[] = {"liver.rec", "b/liver.rec", "a \"b\", c.rec"};
 	struct incise_export_options how = {.depth_bins = 2, .velocity_bins = 1};
 	struct incise_export_report one, three;
-	struct incise_error err = {0};
 	char *text;
 
 	assert_int_equal(system("mkdir -p b; cp -r liver.rec b; "
@@ -503,11 +500,10 @@ static void recordings_are_pooled_and_kept_apart(void **state)
 	free(text);
 }
 
-static void nothing_to_export(void **state)
+TEST(nothing_to_export)
 {
 	const char *air[] = {"air.rec"};
 	struct incise_export_options how;
-	struct incise_error err = {0};
 
 	incise_export_options_init(&how);
 	record("air.rec", "sim:clock=simulated", 800 * MS);
@@ -524,11 +520,10 @@ static void nothing_to_export(void **state)
 	assert_error(export(air, 1, &how, NULL, &err), EINVAL, &err, "zero");
 }
 
-static void damage_stops_the_export(void **state)
+TEST(damage_stops_the_export)
 {
 	const char *path = "hurt.rec";
 	struct incise_export_options how;
-	struct incise_error err = {0};
 
 	assert_int_equal(system("cp -r liver.rec hurt.rec"), 0);
 	change("hurt.rec/recording.db",
@@ -538,7 +533,7 @@ static void damage_stops_the_export(void **state)
 		     "row 4000");
 }
 
-static void options_out_of_range(void **state)
+TEST(options_out_of_range)
 {
 	static const struct incise_export_options cases[] = {
 		{.rate_hz = -1},
@@ -566,9 +561,8 @@ static void options_out_of_range(void **state)
 			 -EINVAL);
 }
 
-static void full_disk_is_told(void **state)
+TEST(full_disk_is_told)
 {
-	struct incise_error err = {0};
 	struct incise_recording *recording = incise_recording_open("liver.rec", &err);
 	struct incise_export_options how;
 
@@ -581,7 +575,7 @@ static void full_disk_is_told(void **state)
 	incise_recording_close(recording);
 }
 
-static void commas_of_a_locale_stay_out(void **state)
+TEST(commas_of_a_locale_stay_out)
 {
 	struct incise_export_options how = {.depth_bins = 2, .velocity_bins = 2};
 	char *plain = export_liver(&how, NULL), *other;
@@ -598,21 +592,4 @@ static void commas_of_a_locale_stay_out(void **state)
 	free(other);
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(averages_are_those_of_brute_force),
-		cmocka_unit_test(averages_by_cut),
-		cmocka_unit_test(clipped_samples_are_left_out),
-		cmocka_unit_test(raw_rows_are_the_samples),
-		cmocka_unit_test(raw_rows_at_a_rate),
-		cmocka_unit_test(recordings_are_pooled_and_kept_apart),
-		cmocka_unit_test(nothing_to_export),
-		cmocka_unit_test(damage_stops_the_export),
-		cmocka_unit_test(options_out_of_range),
-		cmocka_unit_test(full_disk_is_told),
-		cmocka_unit_test(commas_of_a_locale_stay_out),
-	};
-
-	return cmocka_run_group_tests(tests, record_once, forget);
-}
+GROUP(record_once, forget);

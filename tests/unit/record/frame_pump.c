@@ -3,17 +3,12 @@
  * lib/record/write/frame_pump.c, with a simulated camera, file and vision: every frame is in
  * the file or in a count, whichever of them is slow, ends or hangs.
  */
-#include <errno.h>
-#include <math.h>
+#include "../unit.h"
 #include <semaphore.h>
 #include <stdatomic.h>
-#include <stdio.h>
-#include <string.h>
-#include <unistd.h>
 #include <incise/backend.h>
 #include "../../../lib/record/write/frame_pump.h"
 #include "../message.h"
-#include "../unit.h"
 
 #define SIDE 16
 #define MS 1000000LL
@@ -86,17 +81,6 @@ static const struct incise_camera_ops camera_ops = {
 	.lost = camera_lost,
 	.cause = camera_cause,
 };
-
-static struct fake_camera camera_of(struct incise_clock *clock, double hz, uint64_t last)
-{
-	return (struct fake_camera){
-		.camera = {&camera_ops},
-		.clock = clock,
-		.hz = hz,
-		.last = last,
-		.lost = 7, /* before it was recorded */
-	};
-}
 
 /* A file that stalls, fails or hangs at one frame. */
 struct fake_file {
@@ -178,50 +162,80 @@ static int vision_measure(struct incise_vision *vision,
 
 static const struct incise_vision_ops vision_ops = {.measure = vision_measure};
 
-static struct incise_frame_pump *begin(struct fake_camera *camera, struct fake_file *file,
-				       struct fake_vision *vision)
+static struct incise_clock *clock;
+static struct fake_camera camera;
+static struct fake_file file;
+static struct fake_vision vision;
+static struct incise_frame_pump *pump;
+/* Memory that a hanging thread may use is never freed. */
+static struct incise_frame_pump *left;
+static struct incise_frame_pump_stats stats;
+static struct incise_frame_record record[200];
+
+static int on(struct incise_clock *new)
 {
-	struct incise_error err = {0};
-	struct incise_frame_pump *pump = incise_frame_pump_new(
+	clock = new;
+	camera = (struct fake_camera){
+		.camera = {&camera_ops}, .clock = clock, .lost = 7 /* before */};
+	file = (struct fake_file){.writer = {&file_ops}, .at = UINT64_MAX};
+	vision = (struct fake_vision){.vision = {&vision_ops}};
+	pump = NULL;
+	return 0;
+}
+
+static int on_real_clock(void **state)
+{
+	return on(incise_clock_new_real());
+}
+
+static int on_simulated_clock(void **state)
+{
+	return on(incise_clock_new_simulated(1000 * MS));
+}
+
+static int end(void **state)
+{
+	if (pump != left)
+		incise_frame_pump_free(pump);
+	incise_clock_free(clock);
+	return 0;
+}
+
+/* Of a camera of @hz that gives @last frames. */
+static void begin(double hz, uint64_t last, bool looks)
+{
+	camera.hz = hz;
+	camera.last = last;
+	pump = incise_frame_pump_new(
 		&(struct incise_frame_pump_setup){
-			.camera = &camera->camera,
-			.clock = camera->clock,
-			.vision = vision ? &vision->vision : NULL,
-			.writer = &file->writer,
+			.camera = &camera.camera,
+			.clock = clock,
+			.vision = looks ? &vision.vision : NULL,
+			.writer = &file.writer,
 		},
 		&err);
-
-	if (!pump)
-		fail_msg("%s", err.text);
-	return pump;
+	succeeds(pump);
 }
 
 /* Until the camera has given its last and all of it went through. */
-static struct incise_frame_pump_stats wait_for(struct incise_frame_pump *pump,
-					       uint64_t frames)
+static void await_last(void)
 {
-	struct incise_frame_pump_stats s;
-
 	do {
 		usleep(1000);
-		incise_frame_pump_stats(pump, &s);
-	} while (s.written + s.dropped + s.unwritten < frames);
-	return s;
+		incise_frame_pump_stats(pump, &stats);
+	} while (stats.written + stats.dropped + stats.unwritten < camera.last);
 }
 
 /* On a clock that stands still all is written and looked at, however slow vision is. */
-TEST(nothing_is_lost_where_time_waits)
+TEST(nothing_is_lost_where_time_waits, on_simulated_clock, end)
 {
-	struct incise_clock *clock = incise_clock_new_simulated(1000 * MS);
-	struct fake_camera camera = camera_of(clock, 100, 200);
-	struct fake_file file = {.writer = {&file_ops}, .at = 3, .stall = 50000};
-	struct fake_vision vision = {.vision = {&vision_ops}, .takes = 500};
-	struct incise_frame_pump *pump = begin(&camera, &file, &vision);
-	struct incise_frame_record record[7];
-	struct incise_frame_pump_stats stats;
 	uint64_t seq = 0;
 	int n;
 
+	file.at = 3;
+	file.stall = 50000;
+	vision.takes = 500;
+	begin(100, 200, true);
 	for (int i = 0; i < 200; i++) {
 		incise_clock_wait_until(clock, 1000 * MS + i * 10 * MS);
 		assert_int_equal(incise_frame_pump_step(pump), 1);
@@ -263,24 +277,15 @@ TEST(nothing_is_lost_where_time_waits)
 	assert_false(file.wrong);
 	assert_int_equal(file.closed, 1);
 	assert_int_equal(incise_frame_pump_step(pump), 0);
-	incise_frame_pump_free(pump);
-	incise_clock_free(clock);
 }
 
 /* Frames that waited in the camera before the pump started are not recorded, and not lost. */
-TEST(what_was_shot_before_is_passed_over)
+TEST(what_was_shot_before_is_passed_over, on_simulated_clock, end)
 {
-	struct incise_clock *clock = incise_clock_new_simulated(1000 * MS);
-	struct fake_camera camera = camera_of(clock, 100, 30);
-	struct fake_file file = {.writer = {&file_ops}, .at = UINT64_MAX};
-	struct incise_frame_pump_stats stats;
-	struct incise_frame_record record[30];
-	struct incise_frame_pump *pump;
-
 	/* Frames 0 … 20 are before. */
 	camera.from_ns = 1000 * MS;
 	incise_clock_wait_until(clock, 1205 * MS);
-	pump = begin(&camera, &file, NULL);
+	begin(100, 30, false);
 	incise_clock_wait_until(clock, 1290 * MS);
 	/* It loses while those before are read. */
 	for (int i = 0; i < 30; i++) {
@@ -299,85 +304,68 @@ TEST(what_was_shot_before_is_passed_over)
 	assert_int_equal(stats.read, 9);
 	assert_int_equal(stats.written, 9);
 	assert_int_equal(stats.lost + stats.dropped + stats.unwritten, 0);
-	incise_frame_pump_free(pump);
-	incise_clock_free(clock);
 }
 
 /* A disk that does not answer for 95 frames, of the 150 that the slots bridge. */
-TEST(a_stall_is_bridged)
+TEST(a_stall_is_bridged, on_real_clock, end)
 {
-	struct incise_clock *clock = incise_clock_new_real();
-	struct fake_camera camera = camera_of(clock, 60, 120);
-	struct fake_file file = {
-		.writer = {&file_ops}, .at = 5, .camera = &camera, .given = 100};
-	struct incise_frame_pump *pump = begin(&camera, &file, NULL);
-	struct incise_frame_pump_stats stats = wait_for(pump, 120);
-	struct incise_frame_record record;
-
+	file.at = 5;
+	file.camera = &camera;
+	file.given = 100;
+	begin(60, 120, false);
+	await_last();
 	assert_int_equal(stats.written, 120);
 	assert_int_equal(stats.capacity, 150);
 	/* Frames 6 … 98 at least; one more may be on its way. */
 	assert_true(stats.waiting_most >= 93);
 	assert_int_equal(incise_frame_pump_stop(pump, PATIENCE_NS, NULL), 0);
 	for (uint64_t seq = 0; seq < 120; seq++) {
-		assert_int_equal(incise_frame_pump_take(pump, &record, 1), 1);
-		assert_int_equal(record.seq, seq);
-		assert_true(record.arrival_ns >= record.t_ns);
-		assert_true(isnan(record.length_px) && isnan(record.quality));
+		assert_int_equal(incise_frame_pump_take(pump, record, 1), 1);
+		assert_int_equal(record->seq, seq);
+		assert_true(record->arrival_ns >= record->t_ns);
+		assert_true(isnan(record->length_px) && isnan(record->quality));
 	}
-	assert_int_equal(incise_frame_pump_take(pump, &record, 1), 0);
+	assert_int_equal(incise_frame_pump_take(pump, record, 1), 0);
 	assert_false(file.wrong);
-	incise_frame_pump_free(pump);
-	incise_clock_free(clock);
 }
 
 /* A disk that hangs: frames without a slot are counted, and the end does not wait for it. */
-TEST(a_disk_that_hangs_holds_nobody)
+TEST(a_disk_that_hangs_holds_nobody, on_real_clock, end)
 {
-	/* Memory that the hanging thread may use is never freed. */
-	static struct incise_frame_pump *left;
-	static struct fake_file file = {.writer = {&file_ops}, .at = 5};
 	static sem_t hang;
-	struct incise_clock *clock = incise_clock_new_real();
-	struct fake_camera camera = camera_of(clock, 1000, 3000);
-	struct incise_frame_pump_stats stats;
-	struct incise_frame_record record[10];
-	struct incise_error err = {0};
 
 	camera.ahead_ns = 3000 * MS; /* all at once */
 	sem_init(&hang, 0, 0);
+	file.at = 5;
 	file.hang = &hang;
-	left = begin(&camera, &file, NULL);
+	begin(1000, 3000, false);
 	do {
 		usleep(1000);
-		incise_frame_pump_stats(left, &stats);
+		incise_frame_pump_stats(pump, &stats);
 	} while (stats.read < 3000 || stats.written < 5);
-	assert_error(incise_frame_pump_stop(left, 20 * MS, &err), ETIMEDOUT, &err, "2");
-	incise_frame_pump_stats(left, &stats);
+	assert_error(incise_frame_pump_stop(pump, 20 * MS, &err), ETIMEDOUT, &err, "2");
+	incise_frame_pump_stats(pump, &stats);
 	/* 5 are in the file, one is in the hand of who hangs and in its slot still. */
 	assert_int_equal(stats.written, 5);
 	/* Each is counted once. The hang may start before or after the slots are full. */
 	assert_in_range(stats.waiting, 2495, 2500);
 	assert_int_equal(stats.written + stats.waiting + stats.dropped, 3000);
-	assert_int_equal(incise_frame_pump_take(left, record, 10), 5);
-	incise_frame_pump_free(left);
+	assert_int_equal(incise_frame_pump_take(pump, record, 10), 5);
+	incise_frame_pump_free(pump);
+	left = pump;
 	/* It comes back, to nothing that was taken from under it. */
 	sem_post(&hang);
 	while (!file.closed)
 		usleep(1000);
 	assert_int_equal(file.puts, 6);
-	incise_clock_free(clock);
 }
 
-TEST(a_full_disk_ends_the_file_alone)
+TEST(a_full_disk_ends_the_file_alone, on_real_clock, end)
 {
-	struct incise_clock *clock = incise_clock_new_real();
-	struct fake_camera camera = camera_of(clock, 1000, 50);
-	struct fake_file file = {.writer = {&file_ops}, .at = 20, .fail = ENOSPC};
-	struct incise_frame_pump *pump = begin(&camera, &file, NULL);
-	struct incise_frame_pump_stats stats = wait_for(pump, 50);
-	struct incise_error err = {0};
-
+	file.at = 20;
+	file.fail = ENOSPC;
+	begin(1000, 50, false);
+	await_last();
 	assert_int_equal(stats.read, 50);
 	assert_int_equal(stats.written, 20);
 	assert_int_equal(stats.unwritten, 30);
@@ -387,21 +375,15 @@ TEST(a_full_disk_ends_the_file_alone)
 	assert_error(incise_frame_pump_stop(pump, PATIENCE_NS, &err), ENOSPC, &err,
 		     "the file:");
 	assert_int_equal(file.closed, 1);
-	incise_frame_pump_free(pump);
-	incise_clock_free(clock);
 }
 
 /* A frame of a wrong shape does not affect the others. */
-TEST(a_wrong_frame_is_passed_over)
+TEST(a_wrong_frame_is_passed_over, on_real_clock, end)
 {
-	struct incise_clock *clock = incise_clock_new_real();
-	struct fake_camera camera = camera_of(clock, 1000, 50);
-	struct fake_file file = {.writer = {&file_ops}, .at = 20, .fail = EINVAL};
-	struct fake_vision vision = {.vision = {&vision_ops}};
-	struct incise_frame_pump *pump = begin(&camera, &file, &vision);
-	struct incise_frame_pump_stats stats = wait_for(pump, 50);
-	struct incise_frame_record record[50];
-
+	file.at = 20;
+	file.fail = EINVAL;
+	begin(1000, 50, true);
+	await_last();
 	assert_int_equal(stats.written, 49);
 	assert_int_equal(stats.unwritten, 1);
 	assert_int_equal(stats.file.code, 0);
@@ -415,46 +397,31 @@ TEST(a_wrong_frame_is_passed_over)
 		assert_true(isnan(record[i].length_px) ||
 			    record[i].length_px == 100.0 + (double)seq);
 	}
-	incise_frame_pump_free(pump);
-	incise_clock_free(clock);
 }
 
-TEST(a_camera_that_ends_says_why)
+TEST(a_camera_that_ends_says_why, on_real_clock, end)
 {
-	struct incise_clock *clock = incise_clock_new_real();
-	struct fake_camera camera = camera_of(clock, 1000, 50);
-	struct fake_file file = {.writer = {&file_ops}, .at = UINT64_MAX};
-	struct incise_frame_pump_stats stats;
-	struct incise_frame_pump *pump;
-
 	camera.end = -ENODEV;
-	pump = begin(&camera, &file, NULL);
+	begin(1000, 50, false);
 	do {
-		stats = wait_for(pump, 50);
+		await_last();
 	} while (!stats.camera.code);
 	assert_int_equal(stats.camera.code, ENODEV);
 	assert_string_equal(stats.camera.text, "it was unplugged");
 	assert_int_equal(stats.written, 50);
 	assert_int_equal(incise_frame_pump_stop(pump, PATIENCE_NS, NULL), 0);
-	incise_frame_pump_free(pump);
-	incise_clock_free(clock);
 }
 
 /* Vision that is slower than the camera: frames without a depth, but all of them. */
-TEST(slow_vision_holds_nobody)
+TEST(slow_vision_holds_nobody, on_real_clock, end)
 {
-	struct incise_clock *clock = incise_clock_new_real();
-	struct fake_camera camera = camera_of(clock, 1000, 200);
-	struct fake_file file = {.writer = {&file_ops}, .at = UINT64_MAX};
-	struct fake_vision vision = {.vision = {&vision_ops}, .file = &file, .puts = 200};
-	struct incise_frame_record record[200];
-	struct incise_frame_pump_stats stats;
-	struct incise_frame_pump *pump;
 	uint64_t looked = 0;
 
+	vision.file = &file;
+	vision.puts = 200;
 	camera.ahead_ns = 200 * MS; /* all at once */
-	pump = begin(&camera, &file, &vision);
-	stats = wait_for(pump, 200);
+	begin(1000, 200, true);
+	await_last();
 	assert_int_equal(stats.written, 200);
 	assert_true(stats.unlooked > 0);
 	assert_int_equal(incise_frame_pump_stop(pump, PATIENCE_NS, NULL), 0);
@@ -467,6 +434,4 @@ TEST(slow_vision_holds_nobody)
 			assert_true(record[i].length_px == 100.0 + i);
 	}
 	assert_int_equal(looked, 200 - stats.unlooked);
-	incise_frame_pump_free(pump);
-	incise_clock_free(clock);
 }

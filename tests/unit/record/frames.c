@@ -2,22 +2,16 @@
 /*
  * lib/record/frames.c: the module is found where it is, and what is said where it is not.
  */
-#include <errno.h>
+#include "../unit.h"
 #include <limits.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 #include "../../../lib/record/frames.h"
 #include "../message.h"
-#include "../unit.h"
 
 static const struct incise_frames_shape shape = {32, 16, INCISE_PIXELS_GREY, 60};
 
 TEST(a_module_that_is_not_there_is_said)
 {
 	char folder[] = "/tmp/incise-frames-XXXXXX", path[100];
-	struct incise_error err = {0};
 	FILE *file;
 
 	assert_non_null(mkdtemp(folder));
@@ -47,7 +41,6 @@ TEST(the_module_is_found)
 	struct incise_frames_writer *writer;
 	struct incise_frames_stored stored;
 	struct incise_camera_frame frame;
-	struct incise_error err = {0};
 	uint8_t bytes[32 * 16];
 
 	/* O/tests/unit/record/frames, O/lib/incise */
@@ -64,8 +57,7 @@ TEST(the_module_is_found)
 	assert_non_null(mkdtemp(folder));
 	snprintf(path, sizeof(path), "%s/" INCISE_FRAMES_FILE, folder);
 	writer = incise_frames_writer_new(path, &shape, NULL, &err);
-	if (!writer)
-		fail_msg("%s", err.text);
+	succeeds(writer);
 	for (size_t i = 0; i < sizeof(bytes); i++)
 		bytes[i] = (uint8_t)(i * i);
 	frame = (struct incise_camera_frame){

@@ -3,6 +3,7 @@
  * Tests of lib/record/ledger.c: bytes as written down in incise-recording(5), and a CRC that
  * is divided bit by bit.
  */
+#include "../unit.h"
 #include "recorded.h"
 #include <fcntl.h>
 #include "../../../lib/base/crc32c.h"
@@ -68,7 +69,7 @@ static const uint8_t frame_bytes[] = {
 
 #define DIGEST "x'3031323334353637383930313233343536373839303132333435363738393031'"
 
-static void rows_are_these_bytes(void **state)
+TEST(rows_are_these_bytes)
 {
 	static const uint8_t force[] = {5, 1, 0, 0, 0,	 0,  0, 0, 0, 202, 154, 59,
 					0, 0, 0, 0, 255, 15, 0, 0, 0, 0,   0,	0};
@@ -91,7 +92,7 @@ static void rows_are_these_bytes(void **state)
 }
 
 /* A SELECT of these values gives such bytes, or no row. */
-static void read_from_SQLite(void **state)
+TEST(read_from_SQLite)
 {
 	static const struct {
 		int form;
@@ -184,7 +185,7 @@ static void add(struct incise_ledger *ledger, const int64_t *seq, int n)
 	}
 }
 
-static void blocks_are_chained_and_count(void **state)
+TEST(blocks_are_chained_and_count)
 {
 	/* gaps: of 1 and 2 in the first block, of 4 before the second */
 	static const int64_t first[] = {40, 41, 43, 46}, second[] = {51, 52};
@@ -214,7 +215,7 @@ static void blocks_are_chained_and_count(void **state)
 	assert_int_equal(end.crc, expected(b.crc, NULL, 0, &end));
 }
 
-static void stream_without_rows(void **state)
+TEST(stream_without_rows)
 {
 	struct incise_ledger ledger;
 	struct incise_ledger_block end;
@@ -249,7 +250,7 @@ static uint32_t with_fields(uint32_t crc, uint8_t count)
 	return incise_crc32c(crc, fields, sizeof(fields));
 }
 
-static void a_seal_is_of_these_bytes(void **state)
+TEST(a_seal_is_of_these_bytes)
 {
 	static const char bytes[] = "t\1\0\0\0\0\0\0\0ai\xfe\xff\xff\xff\xff\xff\xff\xff"
 				    "t\1\0\0\0\0\0\0\0br\0\0\0\0\0\0\xe0\x3f"
@@ -275,7 +276,7 @@ static void a_seal_is_of_these_bytes(void **state)
 }
 
 /* Each table that is sealed, with two rows; what is done to it, and whether that shows. */
-static void any_change_shows(void **state)
+TEST(any_change_shows)
 {
 	static const char rows[] =
 		"INSERT INTO meta VALUES('a', 1), ('b', 'text');"
@@ -343,7 +344,7 @@ static void any_change_shows(void **state)
 }
 
 /* Every column of the tables that are sealed is in the seal. */
-static void no_column_is_left_out(void **state)
+TEST(no_column_is_left_out)
 {
 	for (int i = 0; incise_ledger_sealed[i]; i++) {
 		const char *table = incise_ledger_sealed[i];
@@ -382,7 +383,7 @@ static void no_column_is_left_out(void **state)
 	}
 }
 
-static void head_of_a_file(void **state)
+TEST(head_of_a_file, IN_FOLDER)
 {
 	static const char file[] = "head\x1f\x43\xb6\x75 and a cluster";
 	struct incise_ledger_block block, other;
@@ -406,20 +407,4 @@ static void head_of_a_file(void **state)
 	assert_int_equal(other.count, 3);
 	close(fd);
 	assert_int_equal(incise_ledger_seal_file(fd, 0, &other), -EBADF);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(rows_are_these_bytes),
-		cmocka_unit_test(read_from_SQLite),
-		cmocka_unit_test(blocks_are_chained_and_count),
-		cmocka_unit_test(stream_without_rows),
-		cmocka_unit_test(a_seal_is_of_these_bytes),
-		cmocka_unit_test(any_change_shows),
-		cmocka_unit_test(no_column_is_left_out),
-		IN_FOLDER(head_of_a_file),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,9 +4,6 @@
  * and each single change of one.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <stdlib.h>
-#include <string.h>
 #include <incise/origin.h>
 
 #define A "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef"

@@ -4,7 +4,6 @@
  * and what noise makes of it.
  */
 #include "../unit.h"
-#include <math.h>
 #include <incise/clock.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/record/export/interpolators.h"

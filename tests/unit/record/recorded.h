@@ -1,20 +1,11 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/*
- * A recording of the virtual rig in a folder of its own, for the tests of lib/record.
- */
+/* A recording of the virtual rig in a folder of its own, for the tests of lib/record. */
 #ifndef TEST_RECORDED_H
 #define TEST_RECORDED_H
 
-#include <errno.h>
 #include <ftw.h>
 #include <limits.h>
-#include <math.h>
-#include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 #include <sqlite3.h>
 #include <incise/calibration.h>
 #include <incise/recorder.h>
@@ -22,6 +13,7 @@
 #include <incise/rig.h>
 #include <incise/sim.h>
 #include "../message.h"
+#include "../unit.h"
 
 /* All 14 cuts of the paper, but short: 43 s. */
 #define SHORT_SCRIPT "sim:clock=simulated,cut_s=2,pause_s=1"
@@ -66,7 +58,8 @@ __attribute__((unused)) static int enter_folder(void **state)
 	return 0;
 }
 
-#define IN_FOLDER(test) cmocka_unit_test_setup_teardown(test, enter_folder, leave_folder)
+#define IN_FOLDER enter_folder, leave_folder
+#define WITH_MODULES enter_with_modules, leave_folder
 
 /* And with the modules that are in O/lib/incise, beside O/tests/unit/record/. */
 __attribute__((unused)) static int enter_with_modules(void **state)
@@ -101,11 +94,9 @@ __attribute__((unused)) static int leave_folder(void **state)
 
 __attribute__((unused)) static struct incise_rig *open_rig(const char *spec)
 {
-	struct incise_error err = {0};
 	struct incise_rig *rig = incise_rig_open(spec, BOTH, &err);
 
-	if (!rig)
-		fail_msg("%s", err.text);
+	succeeds(rig);
 	return rig;
 }
 
@@ -125,20 +116,35 @@ __attribute__((unused)) static int poll_for(struct incise_recorder *recorder,
 	return rc;
 }
 
-__attribute__((unused)) static struct incise_recorder *start_recorder(
-	const char *path, struct incise_rig *rig)
+/* @setup without a calibration: with the nominal one */
+__attribute__((unused)) static struct incise_recorder *start_recorder_by(
+	const char *path, struct incise_rig *rig, struct incise_recorder_setup setup)
 {
 	struct incise_calibration calibration;
-	struct incise_error err = {0};
 	struct incise_recorder *recorder;
 
 	incise_calibration_nominal(&calibration);
-	recorder = incise_recorder_new(
-		path, rig, &(struct incise_recorder_setup){.calibration = &calibration},
-		&err);
-	if (!recorder)
-		fail_msg("%s", err.text);
+	if (!setup.calibration)
+		setup.calibration = &calibration;
+	recorder = incise_recorder_new(path, rig, &setup, &err);
+	succeeds(recorder);
 	return recorder;
+}
+
+__attribute__((unused)) static struct incise_recorder *start_recorder(
+	const char *path, struct incise_rig *rig)
+{
+	return start_recorder_by(path, rig, (struct incise_recorder_setup){0});
+}
+
+/* Poll for so long, and close both. */
+__attribute__((unused)) static void end_recorder(struct incise_recorder *recorder,
+						 struct incise_rig *rig,
+						 int64_t duration_ns)
+{
+	succeeds(!poll_for(recorder, rig, duration_ns, &err) &&
+		 !incise_recorder_close(recorder, &err));
+	incise_rig_close(rig);
 }
 
 /* Record a whole script, or the first duration_ns of it. */
@@ -146,15 +152,18 @@ __attribute__((unused)) static void record(const char *path, const char *spec,
 					   int64_t duration_ns)
 {
 	struct incise_rig *rig = open_rig(spec);
-	struct incise_recorder *recorder = start_recorder(path, rig);
-	struct incise_error err = {0};
 
-	if (!duration_ns)
-		duration_ns = incise_sim_duration(incise_rig_sim(rig));
-	if (poll_for(recorder, rig, duration_ns, &err) ||
-	    incise_recorder_close(recorder, &err))
-		fail_msg("%s", err.text);
-	incise_rig_close(rig);
+	end_recorder(start_recorder(path, rig), rig,
+		     duration_ns ? duration_ns
+				 : incise_sim_duration(incise_rig_sim(rig)));
+}
+
+__attribute__((unused)) static struct incise_recording *open_recording(const char *path)
+{
+	struct incise_recording *recording = incise_recording_open(path, &err);
+
+	succeeds(recording);
+	return recording;
 }
 
 /* A whole file as a text, to be freed. */
@@ -181,6 +190,21 @@ __attribute__((unused)) static void change(const char *file, const char *sql)
 	if (sqlite3_exec(db, sql, NULL, NULL, &text) != SQLITE_OK)
 		fail_msg("%s: %s", sql, text);
 	sqlite3_close(db);
+}
+
+/* The same, with a format. */
+__attribute__((unused, format(printf, 2, 3))) static void change_by(const char *file,
+								    const char *format,
+								    ...)
+{
+	va_list arguments;
+	char *sql;
+
+	va_start(arguments, format);
+	assert_true(vasprintf(&sql, format, arguments) > 0);
+	va_end(arguments);
+	change(file, sql);
+	free(sql);
 }
 
 /* One number by SQL. */

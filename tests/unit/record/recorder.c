@@ -3,6 +3,7 @@
  * Tests of lib/record/write/recorder.c: on the virtual rig, whose devices are made to fail by
  * putting other functions before theirs.
  */
+#include "../unit.h"
 #include <incise/verify.h>
 #include "recorded.h"
 #include <signal.h>
@@ -15,9 +16,36 @@
 #define SIM "sim:clock=simulated"
 #define DB "a.rec/recording.db"
 
+static struct incise_rig *rig;
+static struct incise_recorder *rec;
+static struct incise_recorder_stats stats;
+static struct incise_recording *recording;
+static struct incise_recording_info info;
+
+static int start(void **state)
+{
+	int rc = enter_folder(state);
+
+	rig = open_rig(SIM);
+	rec = start_recorder("a.rec", rig);
+	return rc;
+}
+
+static int stop(void **state)
+{
+	incise_rig_close(rig);
+	return leave_folder(state);
+}
+
+static void open_info(void)
+{
+	recording = open_recording("a.rec");
+	succeeds(!incise_recording_info(recording, &info, &err));
+}
+
 /* --- values ------------------------------------------------------------------------ */
 
-static void rows_are_the_samples(void **state)
+TEST(rows_are_the_samples, IN_FOLDER)
 {
 	struct incise_rig *rig = open_rig(SIM);
 	struct incise_tracker_info info;
@@ -86,7 +114,7 @@ static void rows_are_the_samples(void **state)
 	incise_rig_close(rig);
 }
 
-static void ledger_counts_the_rows(void **state)
+TEST(ledger_counts_the_rows, IN_FOLDER)
 {
 	record("a.rec", SIM, 1000 * MS);
 	for (int i = 0; i < 2; i++) {
@@ -121,7 +149,7 @@ static void ledger_counts_the_rows(void **state)
 	assert_int_equal((int)ask(DB, "SELECT count(*) FROM frames"), 0);
 }
 
-static void closed_recording_is_one_file(void **state)
+TEST(closed_recording_is_one_file, IN_FOLDER)
 {
 	record("a.rec", SIM, 700 * MS);
 	assert_int_equal(access("a.rec.part", F_OK), -1);
@@ -136,7 +164,7 @@ static void closed_recording_is_one_file(void **state)
 			 1);
 }
 
-static void zero_is_the_mean_at_rest(void **state)
+TEST(zero_is_the_mean_at_rest, IN_FOLDER)
 {
 	record("a.rec", SIM, 1500 * MS);
 	/* Noise of 3 mV over 5000 samples: sd of the mean 0.042 mV; five of them, and the
@@ -154,16 +182,14 @@ static void zero_is_the_mean_at_rest(void **state)
 		1e-9);
 }
 
-static void given_zero_is_taken(void **state)
+TEST(given_zero_is_taken, IN_FOLDER)
 {
 	struct incise_rig *rig = open_rig(SIM);
 	struct incise_calibration calibration = {
 		.force_mV_N = 1000, .force_zero_mV = 200, .depth_mm_px = 0.1};
-	struct incise_error err = {0};
 	struct incise_recorder *rec = incise_recorder_new(
 		"a.rec", rig,
 		&(struct incise_recorder_setup){.calibration = &calibration}, &err);
-	struct incise_recorder_stats stats;
 
 	assert_non_null(rec);
 	incise_recorder_stats(rec, &stats);
@@ -178,7 +204,7 @@ static void given_zero_is_taken(void **state)
 	incise_rig_close(rig);
 }
 
-static void short_recording_makes_do(void **state)
+TEST(short_recording_makes_do, IN_FOLDER)
 {
 	record("a.rec", SIM, 100 * MS);
 	/* 1000 samples: sd of the mean 0.095 mV, five of them */
@@ -186,13 +212,8 @@ static void short_recording_makes_do(void **state)
 			 180) < 0.5);
 }
 
-static void stats_count_what_is_written(void **state)
+TEST(stats_count_what_is_written, start, stop)
 {
-	struct incise_rig *rig = open_rig(SIM);
-	struct incise_recorder *rec = start_recorder("a.rec", rig);
-	struct incise_recorder_stats stats;
-	struct incise_error err = {0};
-
 	incise_recorder_stats(rec, &stats);
 	assert_true(!stats.force && !stats.tracker && isnan(stats.zero_mV));
 	assert_int_equal(poll_for(rec, rig, 4000 * MS, &err), 0);
@@ -204,7 +225,6 @@ static void stats_count_what_is_written(void **state)
 	assert_int_equal(stats.force, (int)ask(DB, "SELECT count(*) FROM force"));
 	assert_int_equal(stats.tracker, (int)ask(DB, "SELECT count(*) FROM tracker"));
 	assert_int_equal(stats.depth, (int)ask(DB, "SELECT count(*) FROM depth"));
-	incise_rig_close(rig);
 }
 
 /* --- names -------------------------------------------------------------------------- */
@@ -212,7 +232,6 @@ static void stats_count_what_is_written(void **state)
 static void refused(const char *path, struct incise_rig *rig, int code, const char *text)
 {
 	struct incise_calibration calibration;
-	struct incise_error err = {0};
 
 	incise_calibration_nominal(&calibration);
 	assert_error(incise_recorder_new(
@@ -222,7 +241,7 @@ static void refused(const char *path, struct incise_rig *rig, int code, const ch
 		     code, &err, text);
 }
 
-static void existing_names_are_refused(void **state)
+TEST(existing_names_are_refused, IN_FOLDER)
 {
 	struct incise_rig *rig = open_rig(SIM);
 	struct incise_rig *bare = incise_rig_open(SIM, INCISE_RIG_CAMERA, NULL);
@@ -249,20 +268,13 @@ static void existing_names_are_refused(void **state)
 	incise_rig_close(bare);
 }
 
-static void name_taken_meanwhile_is_kept(void **state)
+TEST(name_taken_meanwhile_is_kept, start, stop)
 {
-	struct incise_rig *rig = open_rig(SIM);
-	struct incise_recorder *rec = start_recorder("a.rec", rig);
-	struct incise_error err = {0};
-	struct incise_recording *recording;
-
 	assert_int_equal(poll_for(rec, rig, 600 * MS, &err), 0);
 	mkdir("a.rec", 0777);
 	assert_error(incise_recorder_close(rec, &err), EEXIST, &err, "a.rec.part");
-	recording = incise_recording_open("a.rec.part", &err);
-	assert_non_null(recording);
+	recording = open_recording("a.rec.part");
 	incise_recording_close(recording);
-	incise_rig_close(rig);
 }
 
 /* --- kills -------------------------------------------------------------------------- */
@@ -304,9 +316,6 @@ static void killed_recording_is_readable(const char *spec, int64_t duration_ns,
 					 int signal)
 {
 	int64_t first = 0, last = 0, t;
-	struct incise_recording_info info;
-	struct incise_recording *recording;
-	struct incise_error err = {0};
 	int status, polls;
 	pid_t pid = record_forever(spec, duration_ns, &polls);
 
@@ -325,9 +334,7 @@ static void killed_recording_is_readable(const char *spec, int64_t duration_ns,
 	close(polls);
 
 	assert_int_equal(access("a.rec", F_OK), -1);
-	recording = incise_recording_open("a.rec", &err); /* finds a.rec.part */
-	if (!recording || incise_recording_info(recording, &info, &err))
-		fail_msg("%s", err.text);
+	open_info();
 	assert_false(info.complete);
 	assert_int_equal(info.force_lost, 0);
 	/* One commit per 100 ms, one more force period because samples lie on a grid. */
@@ -337,23 +344,18 @@ static void killed_recording_is_readable(const char *spec, int64_t duration_ns,
 	incise_recording_close(recording);
 }
 
-static void exit_without_close(void **state)
+TEST(exit_without_close, IN_FOLDER)
 {
 	killed_recording_is_readable(SIM, 3050 * MS, 0);
 }
 
-static void sigkill(void **state)
+TEST(sigkill, IN_FOLDER)
 {
 	killed_recording_is_readable(SIM, INT64_MAX / 2, SIGKILL);
 }
 
-static void interrupted_recording_knows_its_losses(void **state)
+TEST(interrupted_recording_knows_its_losses, start, stop)
 {
-	struct incise_rig *rig = open_rig(SIM);
-	struct incise_recorder *rec = start_recorder("a.rec", rig);
-	struct incise_recording_info info;
-	struct incise_recording *recording;
-	struct incise_error err = {0};
 	pid_t pid = fork();
 
 	if (!pid) {
@@ -366,9 +368,7 @@ static void interrupted_recording_knows_its_losses(void **state)
 		_exit(0);
 	}
 	waitpid(pid, NULL, 0);
-	recording = incise_recording_open("a.rec", &err);
-	if (!recording || incise_recording_info(recording, &info, &err))
-		fail_msg("%s", err.text);
+	open_info();
 	/* At least half of the 600000 and 7200. */
 	assert_true(info.force_lost > 300000 && info.tracker_lost > 3600);
 	/* The numbers show the same; the recorder has locked its own. */
@@ -381,7 +381,6 @@ static void interrupted_recording_knows_its_losses(void **state)
 			 2);
 	incise_recording_close(recording);
 	incise_recorder_close(rec, NULL); /* the parent's own, of no further use */
-	incise_rig_close(rig);
 }
 
 /* --- faults of devices --------------------------------------------------------------- */
@@ -486,10 +485,9 @@ static void from_minus_2_5_V(const struct incise_force *force,
 }
 
 /* A range that does not begin at 0 V moves the zero, not the force. */
-static void force_is_that_of_the_voltage(void **state)
+TEST(force_is_that_of_the_voltage, IN_FOLDER)
 {
 	struct incise_recording_info at_0, moved, old;
-	struct incise_error err = {0};
 
 	record("a.rec", SIM, 4000 * MS);
 	for (int i = 0; i < 3; i++) {
@@ -497,7 +495,6 @@ static void force_is_that_of_the_voltage(void **state)
 		struct incise_recording_info *info = i == 0   ? &at_0
 						     : i == 1 ? &moved
 							      : &old;
-		struct incise_recording *recording;
 
 		if (i == 1) {
 			struct incise_rig *rig = faulty_rig();
@@ -515,8 +512,7 @@ static void force_is_that_of_the_voltage(void **state)
 			change("b.rec/recording.db",
 			       "DELETE FROM meta WHERE key = 'force_offset_V'");
 		recording = incise_recording_open(path, &err);
-		if (!recording || incise_recording_info(recording, info, &err))
-			fail_msg("%s", err.text);
+		succeeds(recording && !incise_recording_info(recording, info, &err));
 		incise_recording_close(recording);
 	}
 	assert_true(at_0.force_max_N > 0.1);
@@ -528,7 +524,7 @@ static void force_is_that_of_the_voltage(void **state)
 }
 
 /* A device that fails ends its stream; the other goes on, and the recording is whole. */
-static void failures_of_devices(void **state)
+TEST(failures_of_devices, IN_FOLDER)
 {
 	static const struct {
 		const char *what;
@@ -545,8 +541,6 @@ static void failures_of_devices(void **state)
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_rig *rig = faulty_rig();
 		struct incise_recorder *rec = start_recorder("a.rec", rig);
-		struct incise_recorder_stats stats;
-		struct incise_error err = {0};
 		char sql[300];
 
 		force_fault = cases[i].force;
@@ -580,11 +574,10 @@ static int tracker_gone(struct incise_tracker_sample *samples, int n)
 	return samples[0].seq > 100 ? -ENODEV : n;
 }
 
-static void ends_when_no_device_is_left(void **state)
+TEST(ends_when_no_device_is_left, IN_FOLDER)
 {
 	struct incise_rig *rig = faulty_rig();
 	struct incise_recorder *rec = start_recorder("a.rec", rig);
-	struct incise_error err = {0};
 
 	force_fault = gone;
 	tracker_fault = tracker_gone;
@@ -597,7 +590,7 @@ static void ends_when_no_device_is_left(void **state)
 	incise_rig_close(rig);
 }
 
-static void refuses_a_zero_that_is_none(void **state)
+TEST(refuses_a_zero_that_is_none, IN_FOLDER)
 {
 	static const struct {
 		const char *what;
@@ -613,7 +606,6 @@ static void refuses_a_zero_that_is_none(void **state)
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_rig *rig = faulty_rig();
 		struct incise_recorder *rec = start_recorder("a.rec", rig);
-		struct incise_error err = {0};
 
 		force_fault = cases[i].force;
 		tracker_fault = cases[i].tracker;
@@ -646,12 +638,10 @@ static int doubtful(struct incise_tracker_sample *samples, int n)
 	return n;
 }
 
-static void losses_are_counted_and_doubts_kept(void **state)
+TEST(losses_are_counted_and_doubts_kept, IN_FOLDER)
 {
 	struct incise_rig *rig = faulty_rig();
 	struct incise_recorder *rec = start_recorder("a.rec", rig);
-	struct incise_recorder_stats stats;
-	struct incise_error err = {0};
 
 	force_fault = lossy;
 	tracker_fault = doubtful;
@@ -677,13 +667,9 @@ static void losses_are_counted_and_doubts_kept(void **state)
  * fails with EFBIG instead of ENOSPC, and the recorder takes both for the same. That
  * SQLITE_FULL becomes ENOSPC is tested in schema.c.
  */
-static void full_disk_keeps_what_was_committed(void **state)
+TEST(full_disk_keeps_what_was_committed, start, stop)
 {
 	struct rlimit before, limit;
-	struct incise_rig *rig = open_rig(SIM);
-	struct incise_recorder *rec = start_recorder("a.rec", rig);
-	struct incise_recording_info info;
-	struct incise_recording *recording;
 	struct incise_error err = {0}, second = {0};
 
 	signal(SIGXFSZ, SIG_IGN);
@@ -696,23 +682,16 @@ static void full_disk_keeps_what_was_committed(void **state)
 	setrlimit(RLIMIT_FSIZE, &before);
 	assert_says(err.text, "a.rec:", "a.rec.part");
 
-	recording = incise_recording_open("a.rec", &err);
-	if (!recording || incise_recording_info(recording, &info, &err))
-		fail_msg("%s", err.text);
+	open_info();
 	assert_false(info.complete);
 	assert_true(info.force >= 1000); /* at least one commit of 100 ms */
 	incise_recording_close(recording);
-	incise_rig_close(rig);
 }
 
 /* The script that records most: what is full only at the end fails there, and stays. */
-static void full_disk_at_the_end(void **state)
+TEST(full_disk_at_the_end, start, stop)
 {
 	struct rlimit before, limit;
-	struct incise_rig *rig = open_rig(SIM);
-	struct incise_recorder *rec = start_recorder("a.rec", rig);
-	struct incise_recording *recording;
-	struct incise_error err = {0};
 	struct stat st;
 
 	signal(SIGXFSZ, SIG_IGN);
@@ -725,11 +704,8 @@ static void full_disk_at_the_end(void **state)
 	assert_int_equal(incise_recorder_close(rec, &err), -ENOSPC);
 	setrlimit(RLIMIT_FSIZE, &before);
 	assert_int_equal(access("a.rec", F_OK), -1);
-	recording = incise_recording_open("a.rec", &err);
-	if (!recording)
-		fail_msg("%s", err.text);
+	recording = open_recording("a.rec");
 	incise_recording_close(recording);
-	incise_rig_close(rig);
 }
 
 /* --- what a kill costs --------------------------------------------------------------- */
@@ -774,7 +750,7 @@ int __wrap_sqlite3_exec(sqlite3 *db, const char *text,
 }
 
 /* Commits that take this long, polls that far apart: the bound of incise-recording(5) holds. */
-static void kill_costs_100_ms(void **state)
+TEST(kill_costs_100_ms, IN_FOLDER)
 {
 	static const struct {
 		int64_t takes_ns, apart_ns;
@@ -785,7 +761,6 @@ static void kill_costs_100_ms(void **state)
 		struct incise_rig *rig = open_rig(SIM);
 		struct incise_clock *clock = incise_rig_clock(rig);
 		struct incise_recorder *rec = start_recorder("a.rec", rig);
-		struct incise_error err = {0};
 		int64_t next = incise_clock_now(clock);
 
 		memset(&disk, 0, sizeof(disk));
@@ -803,8 +778,7 @@ static void kill_costs_100_ms(void **state)
 			if (!disk.clock)
 				disk.whole_ns = disk.polled_ns;
 			disk.clock = clock;
-			if (incise_recorder_poll(rec, &err))
-				fail_msg("%s", err.text);
+			succeeds(!incise_recorder_poll(rec, &err));
 		}
 		disk.clock = NULL;
 		assert_int_equal(incise_recorder_close(rec, &err), 0);
@@ -819,7 +793,7 @@ static void kill_costs_100_ms(void **state)
 }
 
 /* What others do to a file of a recording that is written is noticed at the next commit. */
-static void files_that_others_change(void **state)
+TEST(files_that_others_change, IN_FOLDER)
 {
 	static const struct {
 		const char *command, *text;
@@ -854,7 +828,7 @@ static void files_that_others_change(void **state)
 	}
 }
 
-static void files_that_others_change_in_a_commit(void **state)
+TEST(files_that_others_change_in_a_commit, IN_FOLDER)
 {
 	static const char *const commands[] = {
 		"truncate -s 0 a.rec.part/recording.db-wal",
@@ -878,12 +852,8 @@ static void files_that_others_change_in_a_commit(void **state)
 }
 
 /* SQLite's index of the log is no file, in which a cut would be a SIGBUS. */
-static void nothing_of_it_is_mapped(void **state)
+TEST(nothing_of_it_is_mapped, start, stop)
 {
-	struct incise_rig *rig = open_rig(SIM);
-	struct incise_recorder *rec = start_recorder("a.rec", rig);
-	struct incise_error err = {0};
-
 	assert_int_equal(poll_for(rec, rig, 500 * MS, &err), 0);
 	if (!truncate("a.rec.part/recording.db-shm", 0)) {
 		assert_int_equal(poll_for(rec, rig, 500 * MS, &err), 0);
@@ -891,33 +861,20 @@ static void nothing_of_it_is_mapped(void **state)
 	}
 	assert_int_not_equal(system("grep -q a.rec.part /proc/$PPID/maps"), 0);
 	assert_int_equal(incise_recorder_close(rec, &err), 0);
-	incise_rig_close(rig);
 }
 
-static void reader_does_not_stop_the_end(void **state)
+TEST(reader_does_not_stop_the_end, start, stop)
 {
-	struct incise_rig *rig = open_rig(SIM);
-	struct incise_recorder *rec = start_recorder("a.rec", rig);
-	struct incise_recording_info info;
-	struct incise_recording *recording;
-	struct incise_error err = {0};
-
 	assert_int_equal(poll_for(rec, rig, 600 * MS, &err), 0);
-	recording = incise_recording_open("a.rec", &err); /* live */
-	if (!recording || incise_recording_info(recording, &info, &err))
-		fail_msg("%s", err.text);
+	open_info();
 	assert_false(info.complete);
 	assert_int_equal(poll_for(rec, rig, 600 * MS, &err), 0);
-	if (incise_recorder_close(rec, &err))
-		fail_msg("%s", err.text);
+	succeeds(!incise_recorder_close(rec, &err));
 	incise_recording_close(recording);
-	recording = incise_recording_open("a.rec", &err);
-	if (!recording || incise_recording_info(recording, &info, &err))
-		fail_msg("%s", err.text);
+	open_info();
 	assert_true(info.complete);
 	assert_true(info.force >= 12000); /* 1.2 s */
 	incise_recording_close(recording);
-	incise_rig_close(rig);
 }
 
 /* Look into a.rec.part again and again, as someone does who waits for a recording. */
@@ -937,7 +894,7 @@ static void look_on(void)
  * The moments in which SQLite lets no reader and writer be side by side are short: of
  * 40 recordings that did not wait for a reader a third failed.
  */
-static void reader_does_not_stop_the_start(void **state)
+TEST(reader_does_not_stop_the_start, IN_FOLDER)
 {
 	pid_t reader = fork();
 
@@ -948,7 +905,6 @@ static void reader_does_not_stop_the_start(void **state)
 	for (int i = 0; i < 40; i++) {
 		struct incise_rig *rig = open_rig(SIM);
 		struct incise_recorder *rec = start_recorder("a.rec", rig);
-		struct incise_error err = {0};
 
 		if (poll_for(rec, rig, 100 * MS, &err) ||
 		    incise_recorder_close(rec, &err))
@@ -968,7 +924,6 @@ static int verify_on(int begins)
 {
 	for (int i = 0; i < 10; i++) {
 		struct incise_verify_report report;
-		struct incise_error err = {0};
 		int rc = write(begins, "", 1) != 1;
 
 		if (!rc)
@@ -981,11 +936,8 @@ static int verify_on(int begins)
 	return 0;
 }
 
-static void copies_of_it_are_whole(void **state)
+TEST(copies_of_it_are_whole, start, stop)
 {
-	struct incise_rig *rig = open_rig(SIM);
-	struct incise_recorder *rec = start_recorder("a.rec", rig);
-	struct incise_error err = {0};
 	int status, begins[2];
 	pid_t reader;
 	char begun;
@@ -1001,17 +953,14 @@ static void copies_of_it_are_whole(void **state)
 	close(begins[1]);
 	/* Five commits a copy: those of two do not spoil all of its 20 tries. */
 	while (read(begins[0], &begun, 1) == 1)
-		if (poll_for(rec, rig, 500 * MS, &err))
-			fail_msg("%s", err.text);
+		succeeds(!poll_for(rec, rig, 500 * MS, &err));
 	close(begins[0]);
 	assert_int_equal(waitpid(reader, &status, 0), reader);
 	assert_int_equal(status, 0);
-	if (incise_recorder_close(rec, &err))
-		fail_msg("%s", err.text);
-	incise_rig_close(rig);
+	succeeds(!incise_recorder_close(rec, &err));
 }
 
-static void closing_nothing(void **state)
+TEST(closing_nothing)
 {
 	assert_int_equal(incise_recorder_close(NULL, NULL), 0);
 }
@@ -1019,7 +968,7 @@ static void closing_nothing(void **state)
 /* --- free space ---------------------------------------------------------------------- */
 
 /* Not too little, so that the disk is not full before the end; not twice too much. */
-static void expects_what_it_takes(void **state)
+TEST(expects_what_it_takes, IN_FOLDER)
 {
 	static const char *const specs[] = {SIM, SIM ",force_hz=50000",
 					    SIM ",force_hz=100,tracker_hz=1000"};
@@ -1028,16 +977,13 @@ static void expects_what_it_takes(void **state)
 		struct incise_rig *rig = open_rig(specs[i]);
 		struct incise_calibration calibration;
 		struct incise_recorder_setup setup = {.calibration = &calibration};
-		struct incise_recorder_stats stats;
-		struct incise_error err = {0};
 		struct incise_recorder *rec;
 		double expected_s;
 		struct stat st;
 
 		incise_calibration_nominal(&calibration);
 		rec = incise_recorder_new("a.rec", rig, &setup, &err);
-		if (!rec)
-			fail_msg("%s", err.text);
+		succeeds(rec);
 		incise_recorder_stats(rec, &stats);
 		expected_s = stats.bytes_per_s;
 		assert_true(stats.disk_s > 0);
@@ -1053,15 +999,12 @@ static void expects_what_it_takes(void **state)
 }
 
 /* The same rate as that of a recorder on this rig. */
-static void capacity_is_that_of_a_recorder(void **state)
+TEST(capacity_is_that_of_a_recorder, start, stop)
 {
-	struct incise_rig *rig = open_rig(SIM);
 	struct incise_tracker_info tracker;
 	struct incise_force_info force;
 	struct incise_camera_info camera = {
 		.rate_hz = 50, .width = 640, .height = 480, .pixels = INCISE_PIXELS_YUYV};
-	struct incise_recorder *rec = start_recorder("a.rec", rig);
-	struct incise_recorder_stats stats;
 	double reserved, s;
 
 	incise_tracker_info(incise_rig_tracker(rig), &tracker);
@@ -1079,59 +1022,19 @@ static void capacity_is_that_of_a_recorder(void **state)
 		    50.0 * 640 * 480 * 2);
 	assert_true(isinf(incise_recorder_capacity_s(1e12, NULL, NULL, NULL)));
 	assert_int_equal(incise_recorder_close(rec, NULL), 0);
-	incise_rig_close(rig);
 }
 
-static void refuses_what_no_disk_holds(void **state)
+TEST(refuses_what_no_disk_holds, IN_FOLDER)
 {
 	struct incise_rig *rig = open_rig(SIM);
 	struct incise_calibration calibration;
 	/* 31 years of some 200 kB/s: 200 TB */
 	struct incise_recorder_setup setup = {.calibration = &calibration,
 					      .planned_s = 1e9};
-	struct incise_error err = {0};
 
 	incise_calibration_nominal(&calibration);
 	assert_error(incise_recorder_new("a.rec", rig, &setup, &err), ENOSPC, &err,
 		     "a.rec");
 	assert_int_equal(access("a.rec.part", F_OK), -1);
 	incise_rig_close(rig);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		IN_FOLDER(rows_are_the_samples),
-		IN_FOLDER(ledger_counts_the_rows),
-		IN_FOLDER(closed_recording_is_one_file),
-		IN_FOLDER(zero_is_the_mean_at_rest),
-		IN_FOLDER(given_zero_is_taken),
-		IN_FOLDER(short_recording_makes_do),
-		IN_FOLDER(stats_count_what_is_written),
-		IN_FOLDER(existing_names_are_refused),
-		IN_FOLDER(name_taken_meanwhile_is_kept),
-		IN_FOLDER(exit_without_close),
-		IN_FOLDER(sigkill),
-		IN_FOLDER(interrupted_recording_knows_its_losses),
-		IN_FOLDER(force_is_that_of_the_voltage),
-		IN_FOLDER(failures_of_devices),
-		IN_FOLDER(ends_when_no_device_is_left),
-		IN_FOLDER(refuses_a_zero_that_is_none),
-		IN_FOLDER(losses_are_counted_and_doubts_kept),
-		IN_FOLDER(full_disk_keeps_what_was_committed),
-		IN_FOLDER(full_disk_at_the_end),
-		IN_FOLDER(kill_costs_100_ms),
-		IN_FOLDER(files_that_others_change),
-		IN_FOLDER(files_that_others_change_in_a_commit),
-		IN_FOLDER(nothing_of_it_is_mapped),
-		IN_FOLDER(reader_does_not_stop_the_start),
-		IN_FOLDER(reader_does_not_stop_the_end),
-		IN_FOLDER(copies_of_it_are_whole),
-		cmocka_unit_test(closing_nothing),
-		IN_FOLDER(expects_what_it_takes),
-		IN_FOLDER(capacity_is_that_of_a_recorder),
-		IN_FOLDER(refuses_what_no_disk_holds),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

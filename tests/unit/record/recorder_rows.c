@@ -5,6 +5,7 @@
  * acquisition; the last second before a trigger, and no more; a camera, one that dies, and one
  * whose file is removed.
  */
+#include "../unit.h"
 #include "recorded.h"
 #include <incise/backend.h>
 #include <incise/verify.h>
@@ -51,7 +52,6 @@ static void measure(double hz, double drift_ppm, double jitter_ms, double latenc
 	struct incise_recording_line line;
 	struct incise_recording *recording;
 	struct incise_stream streams[INCISE_STREAMS_MAX];
-	struct incise_error err = {0};
 	int64_t duration_ns = (int64_t)(seconds * 1e9), *t_ns;
 	char spec[300], still[300];
 	double sum2 = 0;
@@ -67,9 +67,8 @@ static void measure(double hz, double drift_ppm, double jitter_ms, double latenc
 	record("a.rec", spec, duration_ns);
 	t_ns = truth(still, duration_ns, &n);
 	recording = incise_recording_open("a.rec", &err);
-	if (!recording || incise_recording_line(recording, "tracker", &line, &err) ||
-	    incise_recording_streams(recording, streams, &err) != 2)
-		fail_msg("%s", err.text);
+	succeeds(recording && !incise_recording_line(recording, "tracker", &line, &err) &&
+		 incise_recording_streams(recording, streams, &err) == 2);
 	*out = (struct errors){.force = streams[0], .tracker = streams[1]};
 	assert_int_equal(sqlite3_prepare_v2(recording->db,
 					    "SELECT seq, t_ns FROM tracker ORDER BY seq",
@@ -95,7 +94,7 @@ static void measure(double hz, double drift_ppm, double jitter_ms, double latenc
 }
 
 /* Required: 0.5 ms rms without timestamps, and 95 % of errors within the stated uncertainty. */
-static void times_without_timestamps_are_near_the_truth(void **state)
+TEST(times_without_timestamps_are_near_the_truth, IN_FOLDER)
 {
 	static const struct {
 		double hz, drift_ppm, jitter_ms, latency_ms;
@@ -129,7 +128,7 @@ static void times_without_timestamps_are_near_the_truth(void **state)
 }
 
 /* Timestamps are used as they are: exact on the virtual rig. */
-static void table_says_what_is_known(void **state)
+TEST(table_says_what_is_known, IN_FOLDER)
 {
 	struct errors errors;
 	const struct incise_stream *force = &errors.force, *tracker = &errors.tracker;
@@ -158,7 +157,7 @@ static void table_says_what_is_known(void **state)
 
 /* --- pretrigger ---------------------------------------------------------------------------- */
 
-static void last_second_is_there(void **state)
+TEST(last_second_is_there, IN_FOLDER)
 {
 	/* after so long; what is there from before, ms */
 	static const struct {
@@ -172,15 +171,12 @@ static void last_second_is_there(void **state)
 						      .armed = true};
 		struct incise_verify_report report;
 		struct incise_recorder_stats stats;
-		struct incise_error err = {0};
 		struct incise_recorder *rec;
 		double before_ms, after_ms;
 
 		incise_calibration_nominal(&calibration);
 		calibration.force_zero_mV = 180;
-		rec = incise_recorder_new("a.rec", rig, &setup, &err);
-		if (!rec)
-			fail_msg("%s", err.text);
+		rec = start_recorder_by("a.rec", rig, setup);
 		assert_int_equal(poll_for(rec, rig, cases[i].wait_ms * MS, &err), 0);
 		incise_recorder_stats(rec, &stats);
 		assert_true(stats.armed && !stats.force && !stats.tracker);
@@ -240,7 +236,6 @@ static int why(struct incise_camera *camera, char *text, size_t size)
 
 static struct incise_rig *open_camera(const char *spec)
 {
-	struct incise_error err = {0};
 	struct incise_rig *rig;
 	struct incise_camera *camera;
 
@@ -251,8 +246,7 @@ static struct incise_rig *open_camera(const char *spec)
 	}
 	rig = incise_rig_open(spec, BOTH | INCISE_RIG_CAMERA, &err);
 
-	if (!rig)
-		fail_msg("%s", err.text);
+	succeeds(rig);
 	camera = incise_rig_camera(rig);
 	real = camera->ops;
 	ops = *real;
@@ -263,56 +257,35 @@ static struct incise_rig *open_camera(const char *spec)
 	return rig;
 }
 
-static struct incise_recorder *start(struct incise_rig *rig, bool armed)
-{
-	struct incise_calibration calibration;
-	struct incise_error err = {0};
-	struct incise_recorder *recorder;
-
-	incise_calibration_nominal(&calibration);
-	recorder =
-		incise_recorder_new("a.rec", rig,
-				    &(struct incise_recorder_setup){
-					    .calibration = &calibration, .armed = armed},
-				    &err);
-	if (!recorder)
-		fail_msg("%s", err.text);
-	return recorder;
-}
-
 /* Ends it; the streams as they were at the end. */
 static void end(struct incise_recorder *recorder, struct incise_rig *rig,
 		struct incise_stream streams[INCISE_STREAMS_MAX])
 {
 	struct incise_recorder_stats stats;
-	struct incise_error err = {0};
 
-	if (incise_recorder_end(recorder, &err))
-		fail_msg("%s", err.text);
+	succeeds(!incise_recorder_end(recorder, &err));
 	incise_recorder_stats(recorder, &stats);
 	assert_int_equal(stats.n_streams, 3);
 	memcpy(streams, stats.streams, sizeof(stats.streams));
 	assert_string_equal(streams[2].name, "camera");
-	if (incise_recorder_close(recorder, &err))
-		fail_msg("%s", err.text);
+	succeeds(!incise_recorder_close(recorder, &err));
 	incise_rig_close(rig);
 }
 
 static void verified(bool complete)
 {
 	struct incise_verify_report report;
-	struct incise_error err = {0};
 
-	if (incise_verify("a.rec", NULL, &report, &err))
-		fail_msg("%s", err.text);
+	succeeds(!incise_verify("a.rec", NULL, &report, &err));
 	assert_int_equal(report.complete, complete);
 	assert_true(report.intact);
 }
 
-static void frames_are_rows(void **state)
+TEST(frames_are_rows, WITH_MODULES)
 {
 	struct incise_rig *rig = open_camera(SIM);
-	struct incise_recorder *recorder = start(rig, false);
+	struct incise_recorder *recorder = start_recorder_by(
+		"a.rec", rig, (struct incise_recorder_setup){.armed = false});
 	struct incise_stream streams[INCISE_STREAMS_MAX];
 
 	assert_int_equal(poll_for(recorder, rig, 1000 * MS, NULL), 0);
@@ -329,10 +302,11 @@ static void frames_are_rows(void **state)
 }
 
 /* The other streams continue; all earlier frames are there. */
-static void camera_that_dies(void **state)
+TEST(camera_that_dies, WITH_MODULES)
 {
 	struct incise_rig *rig = open_camera(SIM);
-	struct incise_recorder *recorder = start(rig, false);
+	struct incise_recorder *recorder = start_recorder_by(
+		"a.rec", rig, (struct incise_recorder_setup){.armed = false});
 	struct incise_stream streams[INCISE_STREAMS_MAX];
 
 	dies_at = 20;
@@ -351,7 +325,7 @@ static void camera_that_dies(void **state)
 }
 
 /* A silent camera shoots nothing, so its numbers have no gap. 10 Hz; silence is 2 s. */
-static void silent_camera(void **state)
+TEST(silent_camera, WITH_MODULES)
 {
 	static const struct {
 		uint64_t from, to;
@@ -365,7 +339,8 @@ static void silent_camera(void **state)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_rig *rig = open_camera(SIM ",camera_hz=10");
-		struct incise_recorder *recorder = start(rig, false);
+		struct incise_recorder *recorder = start_recorder_by(
+			"a.rec", rig, (struct incise_recorder_setup){.armed = false});
 		struct incise_stream streams[INCISE_STREAMS_MAX];
 
 		silent_from = cases[i].from;
@@ -381,10 +356,11 @@ static void silent_camera(void **state)
 	}
 }
 
-static void lost_frame_is_counted(void **state)
+TEST(lost_frame_is_counted, WITH_MODULES)
 {
 	struct incise_rig *rig = open_camera(SIM);
-	struct incise_recorder *recorder = start(rig, false);
+	struct incise_recorder *recorder = start_recorder_by(
+		"a.rec", rig, (struct incise_recorder_setup){.armed = false});
 	struct incise_stream streams[INCISE_STREAMS_MAX];
 
 	skips_at = 10;
@@ -395,10 +371,11 @@ static void lost_frame_is_counted(void **state)
 	verified(false);
 }
 
-static void armed_camera_begins_with_the_trigger(void **state)
+TEST(armed_camera_begins_with_the_trigger, WITH_MODULES)
 {
 	struct incise_rig *rig = open_camera(SIM);
-	struct incise_recorder *recorder = start(rig, true);
+	struct incise_recorder *recorder = start_recorder_by(
+		"a.rec", rig, (struct incise_recorder_setup){.armed = true});
 	struct incise_stream streams[INCISE_STREAMS_MAX];
 
 	assert_int_equal(poll_for(recorder, rig, 1000 * MS, NULL), 0);
@@ -410,10 +387,11 @@ static void armed_camera_begins_with_the_trigger(void **state)
 	verified(true);
 }
 
-static void never_triggered_is_empty_and_whole(void **state)
+TEST(never_triggered_is_empty_and_whole, WITH_MODULES)
 {
 	struct incise_rig *rig = open_camera(SIM);
-	struct incise_recorder *recorder = start(rig, true);
+	struct incise_recorder *recorder = start_recorder_by(
+		"a.rec", rig, (struct incise_recorder_setup){.armed = true});
 	struct incise_stream streams[INCISE_STREAMS_MAX];
 
 	assert_int_equal(poll_for(recorder, rig, 700 * MS, NULL), 0);
@@ -422,15 +400,12 @@ static void never_triggered_is_empty_and_whole(void **state)
 	verified(true);
 }
 
-#define TEST(name) cmocka_unit_test_setup_teardown(name, enter_with_modules, leave_folder)
-
 /* While a device was opened, the other one's samples waited: they are of the time before. */
-static void samples_from_before_are_left_out(void **state)
+TEST(samples_from_before_are_left_out, IN_FOLDER)
 {
 	struct incise_rig *rig = open_rig(SIM);
 	struct incise_clock *clock = incise_rig_clock(rig);
 	struct incise_recorder *rec;
-	struct incise_error err = {0};
 	static const char *const tables[] = {"force", "tracker"};
 
 	incise_clock_wait_until(clock, incise_clock_now(clock) + 700 * MS);
@@ -452,22 +427,4 @@ static void samples_from_before_are_left_out(void **state)
 	}
 	assert_int_equal(ask(DB, "SELECT sum(lost) FROM streams"), 0);
 	incise_rig_close(rig);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		IN_FOLDER(times_without_timestamps_are_near_the_truth),
-		IN_FOLDER(table_says_what_is_known),
-		IN_FOLDER(last_second_is_there),
-		IN_FOLDER(samples_from_before_are_left_out),
-		TEST(frames_are_rows),
-		TEST(camera_that_dies),
-		TEST(silent_camera),
-		TEST(lost_frame_is_counted),
-		TEST(armed_camera_begins_with_the_trigger),
-		TEST(never_triggered_is_empty_and_whole),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

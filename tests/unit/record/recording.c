@@ -3,6 +3,7 @@
  * Tests of lib/record/read/recording.c: the contents of a recording, and errors for a damaged
  * one.
  */
+#include "../unit.h"
 #include "recorded.h"
 #include <endian.h>
 #include <fcntl.h>
@@ -28,14 +29,12 @@ static int read_all(const char *path, struct incise_recording_info *info,
 	return rc;
 }
 
-static void info_tells_what_the_tables_hold(void **state)
+TEST(info_tells_what_the_tables_hold, IN_FOLDER)
 {
 	struct incise_recording_info info;
-	struct incise_error err = {0};
 
 	record("a.rec", SHORT_SCRIPT, 0);
-	if (read_all("a.rec", &info, &err))
-		fail_msg("%s", err.text);
+	succeeds(!read_all("a.rec", &info, &err));
 	assert_true(info.complete);
 	assert_int_equal(info.force, (int)ask(DB, "SELECT count(*) FROM force"));
 	assert_int_equal(info.tracker, (int)ask(DB, "SELECT count(*) FROM tracker"));
@@ -56,25 +55,22 @@ static void info_tells_what_the_tables_hold(void **state)
 	assert_true(info.force_max_N > 1); /* 2.6 N by the model at 20 mm and 25 mm/s */
 }
 
-static void form_1_is_read(void **state)
+TEST(form_1_is_read, IN_FOLDER)
 {
 	struct incise_recording_info now, before;
-	struct incise_error err = {0};
 
 	record("a.rec", SHORT_SCRIPT, 8000 * MS); /* two cuts */
 	assert_int_equal(read_all("a.rec", &now, &err), 0);
 	change(DB, TO_FORM_1);
-	if (read_all("a.rec", &before, &err))
-		fail_msg("%s", err.text);
+	succeeds(!read_all("a.rec", &before, &err));
 	assert_true(before.cuts > 0 && before.cuts == now.cuts);
 	assert_true(before.tracker == now.tracker &&
 		    before.force_max_N == now.force_max_N);
 }
 
-static void paths_that_lead_to_a_recording(void **state)
+TEST(paths_that_lead_to_a_recording, IN_FOLDER)
 {
 	struct incise_recording_info info;
-	struct incise_error err = {0};
 	char path[300];
 
 	record("a.rec", "sim:clock=simulated", 100 * MS);
@@ -88,7 +84,7 @@ static void paths_that_lead_to_a_recording(void **state)
 	assert_int_equal(read_all("a.rec.part", &info, &err), 0);
 }
 
-static void no_recording(void **state)
+TEST(no_recording, IN_FOLDER)
 {
 	static const struct {
 		const char *path;
@@ -119,8 +115,6 @@ static void no_recording(void **state)
 		fputs("garbage ", file);
 	fclose(file);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
-
 		assert_error(read_all(cases[i].path, &info, &err), cases[i].code, &err,
 			     cases[i].text);
 	}
@@ -177,17 +171,15 @@ static void add_victim(const char *path)
 	assert_int_equal(fclose(file), 0);
 }
 
-static void journal_is_rolled_back_in_a_copy(void **state)
+TEST(journal_is_rolled_back_in_a_copy, IN_FOLDER)
 {
 	struct incise_recording_info info;
-	struct incise_error err = {0};
 
 	make_journal();
 	assert_int_equal(system("touch victim; mkdir tmp"), 0);
 	setenv("TMPDIR", "tmp", 1);
 	keep_state("before");
-	if (read_all("b.rec", &info, &err))
-		fail_msg("%s", err.text);
+	succeeds(!read_all("b.rec", &info, &err));
 	assert_int_equal(info.force, 10000);
 	assert_true(info.start_ns > 0);
 	keep_state("after");
@@ -197,10 +189,9 @@ static void journal_is_rolled_back_in_a_copy(void **state)
 	unsetenv("TMPDIR");
 }
 
-static void journal_that_names_a_file_is_refused(void **state)
+TEST(journal_that_names_a_file_is_refused, IN_FOLDER)
 {
 	struct incise_recording_info info;
-	struct incise_error err = {0};
 	char victim[PATH_MAX];
 
 	make_journal();
@@ -215,7 +206,7 @@ static void journal_that_names_a_file_is_refused(void **state)
 }
 
 /* A pipe would be waited for, a link be followed, an index be mapped. */
-static void what_no_recorder_makes_is_refused(void **state)
+TEST(what_no_recorder_makes_is_refused, IN_FOLDER)
 {
 	static const char *const names[] = {"recording.db-journal", "recording.db-wal",
 					    "recording.db-shm", "camera.mkv"};
@@ -244,20 +235,13 @@ static void what_no_recorder_makes_is_refused(void **state)
 }
 
 /* The log has the page that did not come to the file as a whole. */
-static void half_a_page_beside_a_log(void **state)
+TEST(half_a_page_beside_a_log, IN_FOLDER)
 {
-	struct incise_calibration calibration;
 	struct incise_recording_info info;
 	struct incise_rig *rig = open_rig("sim:clock=simulated");
-	struct incise_recorder *recorder;
-	struct incise_error err = {0};
+	struct incise_recorder *recorder = start_recorder("a.rec", rig);
 	struct stat st;
 
-	incise_calibration_nominal(&calibration);
-	recorder = incise_recorder_new(
-		"a.rec", rig,
-		&(struct incise_recorder_setup){.calibration = &calibration}, &err);
-	assert_non_null(recorder);
 	assert_int_equal(poll_for(recorder, rig, 700 * MS, &err), 0);
 	assert_int_equal(system("cp -r a.rec.part b.rec.part"), 0);
 	assert_int_equal(incise_recorder_close(recorder, &err), 0);
@@ -269,8 +253,7 @@ static void half_a_page_beside_a_log(void **state)
 	for (int i = 0; i < 2; i++) {
 		assert_int_equal(system("touch victim; mv b.rec.part b.rec"), 0);
 		keep_state("before");
-		if (read_all("b.rec", &info, &err))
-			fail_msg("%s", err.text);
+		succeeds(!read_all("b.rec", &info, &err));
 		assert_true(info.force > 5000 && !info.complete);
 		keep_state("after");
 		assert_int_equal(system("cmp before after; mv b.rec b.rec.part"), 0);
@@ -279,7 +262,7 @@ static void half_a_page_beside_a_log(void **state)
 }
 
 /* Each change alone, on a fresh copy of a good recording. */
-static void damage_is_found(void **state)
+TEST(damage_is_found, IN_FOLDER)
 {
 	static const struct {
 		const char *sql, *text;
@@ -342,15 +325,13 @@ static void damage_is_found(void **state)
 
 	record("good.rec", "sim:clock=simulated", 300 * MS);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
-
 		assert_int_equal(system("rm -rf a.rec; cp -r good.rec a.rec"), 0);
 		change(DB, cases[i].sql);
 		assert_error(read_all("a.rec", &info, &err), EINVAL, &err, cases[i].text);
 	}
 }
 
-static void truncated_file_is_found(void **state)
+TEST(truncated_file_is_found, IN_FOLDER)
 {
 	struct incise_recording_info info;
 	struct stat st;
@@ -360,7 +341,6 @@ static void truncated_file_is_found(void **state)
 	/* Any length short of the whole: odd ones, whole pages, the bare header. */
 	for (off_t size = st.st_size - 1; size > 0;
 	     size = size > 8192 ? size - 8191 : size - 97) {
-		struct incise_error err = {0};
 		int rc;
 
 		assert_int_equal(truncate(DB, size), 0);
@@ -374,7 +354,7 @@ static void truncated_file_is_found(void **state)
  * Bytes at random places: often harmless (unused space, a digit of a number), but never
  * a crash, an endless loop or a number that is not finite. Run under sanitizers too.
  */
-static void flipped_bytes_do_no_harm(void **state)
+TEST(flipped_bytes_do_no_harm, IN_FOLDER)
 {
 	uint32_t seed = 7;
 	struct stat st;
@@ -410,10 +390,9 @@ static void flipped_bytes_do_no_harm(void **state)
 	assert_true(found > 20); /* the check itself works: most bytes matter */
 }
 
-static void text_of_a_stranger_is_harmless(void **state)
+TEST(text_of_a_stranger_is_harmless, IN_FOLDER)
 {
 	struct incise_recording_info info;
-	struct incise_error err = {0};
 
 	record("a.rec", "sim:clock=simulated", 100 * MS);
 	change(DB, "UPDATE meta SET value = 'sim:' || char(27) || '[2J' || char(10) || "
@@ -423,10 +402,9 @@ static void text_of_a_stranger_is_harmless(void **state)
 	assert_int_equal(strlen(info.rig), sizeof(info.rig) - 1);
 }
 
-static void interrupted_before_the_zero(void **state)
+TEST(interrupted_before_the_zero, IN_FOLDER)
 {
 	struct incise_recording_info info;
-	struct incise_error err = {0};
 
 	record("a.rec", "sim:clock=simulated", 100 * MS);
 	change(DB, "UPDATE meta SET value = NULL WHERE key = 'force_zero_mV'");
@@ -434,10 +412,9 @@ static void interrupted_before_the_zero(void **state)
 	assert_true(isnan(info.zero_mV) && info.force_max_N == 0);
 }
 
-static void read_only_medium(void **state)
+TEST(read_only_medium, IN_FOLDER)
 {
 	struct incise_recording_info info;
-	struct incise_error err = {0};
 	int rc;
 
 	record("a.rec", "sim:clock=simulated", 100 * MS);
@@ -448,18 +425,17 @@ static void read_only_medium(void **state)
 	assert_int_equal(rc, 0);
 }
 
-static void closing_nothing(void **state)
+TEST(closing_nothing)
 {
 	incise_recording_close(NULL);
 }
 
 /* --- streams ------------------------------------------------------------------------- */
 
-static void line_is_read_and_used(void **state)
+TEST(line_is_read_and_used, IN_FOLDER)
 {
 	struct incise_recording_line line;
 	struct incise_recording *recording;
-	struct incise_error err = {0};
 
 	record("a.rec", "sim:clock=simulated", 700 * MS);
 	/* The arrivals of its rows would show that this is not their line. */
@@ -484,7 +460,7 @@ static void line_is_read_and_used(void **state)
 	incise_recording_close(recording);
 }
 
-static void impossible_streams_are_refused(void **state)
+TEST(impossible_streams_are_refused, IN_FOLDER)
 {
 	static const struct {
 		const char *sql;
@@ -520,7 +496,6 @@ static void impossible_streams_are_refused(void **state)
 		struct incise_recording_line line;
 		struct incise_stream streams[INCISE_STREAMS_MAX];
 		struct incise_recording *recording;
-		struct incise_error err = {0};
 
 		assert_int_equal(system("rm -rf a.rec && cp -r good.rec a.rec"), 0);
 		if (strstr(cases[i].sql, "'more'")) /* one name only */
@@ -546,48 +521,18 @@ static void impossible_streams_are_refused(void **state)
 	}
 }
 
-static void old_recordings_have_none(void **state)
+TEST(old_recordings_have_none, IN_FOLDER)
 {
 	struct incise_recording_line line;
 	struct incise_stream streams[INCISE_STREAMS_MAX];
 	struct incise_recording *recording;
-	struct incise_error err = {0};
 
 	record("a.rec", "sim:clock=simulated", 700 * MS);
 	change(DB, TO_FORM_1);
 	recording = incise_recording_open("a.rec", &err);
-	if (!recording)
-		fail_msg("%s", err.text);
+	succeeds(recording);
 	assert_int_equal(incise_recording_streams(recording, streams, &err), 0);
 	assert_int_equal(incise_recording_line(recording, "tracker", &line, &err), 0);
 	assert_int_equal(line.n, 0);
 	incise_recording_close(recording);
-}
-
-#define TEST(name) IN_FOLDER(name)
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		IN_FOLDER(info_tells_what_the_tables_hold),
-		IN_FOLDER(form_1_is_read),
-		IN_FOLDER(paths_that_lead_to_a_recording),
-		IN_FOLDER(no_recording),
-		IN_FOLDER(journal_is_rolled_back_in_a_copy),
-		IN_FOLDER(journal_that_names_a_file_is_refused),
-		IN_FOLDER(what_no_recorder_makes_is_refused),
-		IN_FOLDER(half_a_page_beside_a_log),
-		IN_FOLDER(damage_is_found),
-		IN_FOLDER(truncated_file_is_found),
-		IN_FOLDER(flipped_bytes_do_no_harm),
-		IN_FOLDER(text_of_a_stranger_is_harmless),
-		IN_FOLDER(interrupted_before_the_zero),
-		IN_FOLDER(read_only_medium),
-		cmocka_unit_test(closing_nothing),
-		TEST(line_is_read_and_used),
-		TEST(impossible_streams_are_refused),
-		TEST(old_recordings_have_none),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

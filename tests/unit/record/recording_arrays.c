@@ -3,33 +3,23 @@
  * Tests of lib/record/read/recording_arrays.c: arrays hold the rows of the tables, at the best
  * times; depth is the calibrated tip's; damaged rows are errors.
  */
+#include "../unit.h"
 #include "recorded.h"
 #include <incise/depth_pairs.h>
 
 #define DB "a.rec/recording.db"
 #define TIPPED "sim:clock=simulated,tip_x_mm=3,tip_y_mm=-20,tip_z_mm=60"
 
-static struct incise_recording *open_it(void)
-{
-	struct incise_error err = {0};
-	struct incise_recording *recording = incise_recording_open("a.rec", &err);
-
-	if (!recording)
-		fail_msg("%s", err.text);
-	return recording;
-}
-
-static void arrays_are_the_tables(void **state)
+TEST(arrays_are_the_tables, IN_FOLDER)
 {
 	struct incise_recording_value *values;
 	struct incise_tracker_sample *poses;
 	struct incise_recording *recording;
-	struct incise_error err = {0};
 	double sum = 0;
 	int n;
 
 	record("a.rec", SHORT_SCRIPT, 4000 * MS);
-	recording = open_it();
+	recording = open_recording("a.rec");
 	n = incise_recording_values(recording, "force", &values, &err);
 	assert_int_equal(n, (int)ask(DB, "SELECT count(*) FROM force"));
 	for (int i = 0; i < n; i++)
@@ -65,16 +55,15 @@ static void arrays_are_the_tables(void **state)
 	incise_recording_close(recording);
 }
 
-static void clipped_force_is_none(void **state)
+TEST(clipped_force_is_none, IN_FOLDER)
 {
 	struct incise_recording_value *values;
 	struct incise_recording *recording;
-	struct incise_error err = {0};
 
 	record("a.rec", SHORT_SCRIPT, 1000 * MS);
 	change(DB, "UPDATE force SET code = 4095 WHERE seq = 5; "
 		   "UPDATE force SET code = 0 WHERE seq = 6");
-	recording = open_it();
+	recording = open_recording("a.rec");
 	assert_true(incise_recording_values(recording, "force", &values, &err) > 6);
 	assert_true(isnan(values[5].value) && isnan(values[6].value));
 	assert_true(isfinite(values[4].value) && isfinite(values[7].value));
@@ -82,17 +71,16 @@ static void clipped_force_is_none(void **state)
 	incise_recording_close(recording);
 }
 
-static void a_row_that_cannot_be_is_named(void **state)
+TEST(a_row_that_cannot_be_is_named, IN_FOLDER)
 {
 	struct incise_recording_value *values;
 	struct incise_tracker_sample *poses;
 	struct incise_recording *recording;
-	struct incise_error err = {0};
 
 	record("a.rec", SHORT_SCRIPT, 1000 * MS);
 	change(DB, "UPDATE tracker SET qx = 'none' WHERE seq = 7; "
 		   "UPDATE depth SET depth_mm = 9e999 WHERE seq = 7");
-	recording = open_it();
+	recording = open_recording("a.rec");
 	assert_error(incise_recording_poses(recording, &poses, &err), EINVAL, &err,
 		     "table tracker, row 7");
 	assert_error(incise_recording_values(recording, "depth", &values, &err), EINVAL,
@@ -101,28 +89,22 @@ static void a_row_that_cannot_be_is_named(void **state)
 }
 
 /* Rows stay what the device gave; depth is of the calibrated tip. */
-static void depth_is_of_the_tip(void **state)
+TEST(depth_is_of_the_tip, IN_FOLDER)
 {
 	struct incise_rig *rig = open_rig(TIPPED);
 	struct incise_recording_info info;
 	struct incise_recording *recording;
 	struct incise_calibration calibration;
-	struct incise_recorder *recorder;
-	struct incise_error err = {0};
 
 	incise_calibration_nominal(&calibration);
 	calibration.tip_mm[0] = 3;
 	calibration.tip_mm[1] = -20;
 	calibration.tip_mm[2] = 60;
-	recorder = incise_recorder_new(
-		"a.rec", rig,
-		&(struct incise_recorder_setup){.calibration = &calibration}, &err);
-	assert_non_null(recorder);
-	if (poll_for(recorder, rig, 900 * MS, &err) ||
-	    incise_recorder_close(recorder, &err))
-		fail_msg("%s", err.text);
-	incise_rig_close(rig);
-	recording = open_it();
+	end_recorder(start_recorder_by(
+			     "a.rec", rig,
+			     (struct incise_recorder_setup){.calibration = &calibration}),
+		     rig, 900 * MS);
+	recording = open_recording("a.rec");
 	assert_int_equal(incise_recording_info(recording, &info, &err), 0);
 	assert_true(info.tip_mm[0] == 3 && info.tip_mm[1] == -20 && info.tip_mm[2] == 60);
 	incise_recording_close(recording);
@@ -141,11 +123,9 @@ static void depth_is_of_the_tip(void **state)
 static int values_of(const char *name, struct incise_recording_value **values,
 		     struct incise_error *err)
 {
-	struct incise_recording *recording = incise_recording_open("a.rec", err);
-	int n;
+	struct incise_recording *recording = open_recording("a.rec");
+	int n = incise_recording_values(recording, name, values, err);
 
-	assert_non_null(recording);
-	n = incise_recording_values(recording, name, values, err);
 	incise_recording_close(recording);
 	return n;
 }
@@ -153,10 +133,9 @@ static int values_of(const char *name, struct incise_recording_value **values,
 #define NUMBERS \
 	"WITH RECURSIVE i(n) AS (SELECT 0 UNION ALL SELECT n + 1 FROM i WHERE n < 9999) "
 
-static void elements_are_rows(void **state)
+TEST(elements_are_rows, IN_FOLDER)
 {
 	struct incise_recording_value *values;
-	struct incise_error err = {0};
 
 	record("a.rec", "sim:clock=simulated", 600 * MS);
 	/* more than the first capacity, and than twice of it */
@@ -179,10 +158,9 @@ static void elements_are_rows(void **state)
 	assert_null(values);
 }
 
-static void after_a_failure_there_is_none(void **state)
+TEST(after_a_failure_there_is_none, IN_FOLDER)
 {
 	struct incise_recording_value *values;
-	struct incise_error err = {0};
 
 	record("a.rec", "sim:clock=simulated", 600 * MS);
 	change(DB, "UPDATE force SET code = 'x' WHERE seq = 5000");
@@ -206,11 +184,9 @@ static void put_frames(const char *frames)
 
 static int lengths_of(struct incise_recording_length **rows, struct incise_error *err)
 {
-	struct incise_recording *recording = incise_recording_open("a.rec", err);
-	int n;
+	struct incise_recording *recording = open_recording("a.rec");
+	int n = incise_recording_lengths(recording, rows, err);
 
-	assert_non_null(recording);
-	n = incise_recording_lengths(recording, rows, err);
 	incise_recording_close(recording);
 	return n;
 }
@@ -219,10 +195,9 @@ static int lengths_of(struct incise_recording_length **rows, struct incise_error
 	"INSERT INTO frames VALUES(" #seq ", " #t ", " #t ", 0, 1, 1, " #length \
 	", 0.1, 1.0, " #quality ", zeroblob(32));"
 
-static void depths_are_interpolated(void **state)
+TEST(depths_are_interpolated, IN_FOLDER)
 {
 	struct incise_recording_length *rows;
-	struct incise_error err = {0};
 
 	put_frames(FRAME(0, 900000000, 300.0, 0.9)    /* before the first depth */
 		   FRAME(1, 1025000000, 310.0, 0.8)   /* half way from row 2 to row 3 */
@@ -242,10 +217,9 @@ static void depths_are_interpolated(void **state)
 }
 
 /* No length has a depth across a gap in the tracker's records. */
-static void gaps_are_left_out(void **state)
+TEST(gaps_are_left_out, IN_FOLDER)
 {
 	struct incise_recording_length *rows;
-	struct incise_error err = {0};
 
 	put_frames("UPDATE depth SET t_ns = t_ns + 200000000 WHERE seq > 5; " FRAME(
 		0, 1055000000, 300.0, 0.9) FRAME(1, 1150000000, 300.0, 0.9)
@@ -255,7 +229,7 @@ static void gaps_are_left_out(void **state)
 	free(rows);
 }
 
-static void impossible_lengths_are_refused(void **state)
+TEST(impossible_lengths_are_refused, IN_FOLDER)
 {
 	static const char *const cases[] = {
 		FRAME(0, 1025000000, 'long', 0.9),
@@ -277,10 +251,9 @@ static void impossible_lengths_are_refused(void **state)
 	}
 }
 
-static void old_recordings_have_no_frames(void **state)
+TEST(old_recordings_have_no_frames, IN_FOLDER)
 {
 	struct incise_recording_length *rows;
-	struct incise_error err = {0};
 
 	record("a.rec", "sim:clock=simulated", 700 * MS);
 	change(DB, TO_FORM_1);
@@ -300,19 +273,16 @@ static void old_recordings_have_no_frames(void **state)
 
 static int pairs_of(struct incise_depth_pair **pairs, struct incise_error *err)
 {
-	struct incise_recording *recording = incise_recording_open("a.rec", err);
-	int n;
+	struct incise_recording *recording = open_recording("a.rec");
+	int n = incise_depth_pairs(recording, pairs, err);
 
-	assert_non_null(recording);
-	n = incise_depth_pairs(recording, pairs, err);
 	incise_recording_close(recording);
 	return n;
 }
 
-static void frames_meet_the_tracker(void **state)
+TEST(frames_meet_the_tracker, IN_FOLDER)
 {
 	struct incise_depth_pair *pairs;
-	struct incise_error err = {0};
 	double along = 0;
 	int n;
 
@@ -341,7 +311,7 @@ static void frames_meet_the_tracker(void **state)
 	free(pairs);
 }
 
-static void what_is_no_depth_is_left_out(void **state)
+TEST(what_is_no_depth_is_left_out, IN_FOLDER)
 {
 	static const struct {
 		const char *sql;
@@ -361,7 +331,6 @@ static void what_is_no_depth_is_left_out(void **state)
 
 	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
 		struct incise_depth_pair *pairs = (void *)1;
-		struct incise_error err = {0};
 		char copy[60];
 		int n;
 
@@ -379,24 +348,4 @@ static void what_is_no_depth_is_left_out(void **state)
 			assert_null(pairs);
 		free(pairs);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		IN_FOLDER(arrays_are_the_tables),
-		IN_FOLDER(clipped_force_is_none),
-		IN_FOLDER(a_row_that_cannot_be_is_named),
-		IN_FOLDER(depth_is_of_the_tip),
-		IN_FOLDER(elements_are_rows),
-		IN_FOLDER(after_a_failure_there_is_none),
-		IN_FOLDER(depths_are_interpolated),
-		IN_FOLDER(gaps_are_left_out),
-		IN_FOLDER(impossible_lengths_are_refused),
-		IN_FOLDER(old_recordings_have_no_frames),
-		IN_FOLDER(frames_meet_the_tracker),
-		IN_FOLDER(what_is_no_depth_is_left_out),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,6 +2,7 @@
 /*
  * Wall time through a recorder, its ledger and a reader: table wall, incise_recording_wall().
  */
+#include "../unit.h"
 #include "recorded.h"
 #include <time.h>
 #include <incise/verify.h>
@@ -13,20 +14,11 @@
 static void record_by(const char *spec, const char *source, int64_t duration_ns)
 {
 	struct incise_rig *rig = open_rig(spec);
-	struct incise_calibration calibration;
-	struct incise_recorder *recorder;
-	struct incise_error err = {0};
 
-	incise_calibration_nominal(&calibration);
-	recorder = incise_recorder_new(
-		"a.rec", rig,
-		&(struct incise_recorder_setup){.calibration = &calibration,
-						.clock_source = source},
-		&err);
-	if (!recorder || poll_for(recorder, rig, duration_ns, &err) ||
-	    incise_recorder_close(recorder, &err))
-		fail_msg("%s", err.text);
-	incise_rig_close(rig);
+	end_recorder(
+		start_recorder_by("a.rec", rig,
+				  (struct incise_recorder_setup){.clock_source = source}),
+		rig, duration_ns);
 }
 
 static struct incise_wall *read_wall(int code)
@@ -52,14 +44,12 @@ static struct incise_wall *read_wall(int code)
 static bool is_intact(void)
 {
 	struct incise_verify_report report;
-	struct incise_error err = {0};
 
-	if (incise_verify("a.rec", NULL, &report, &err))
-		fail_msg("%s", err.text);
+	succeeds(!incise_verify("a.rec", NULL, &report, &err));
 	return report.intact;
 }
 
-static void stated_time_of_a_simulated_clock(void **state)
+TEST(stated_time_of_a_simulated_clock, IN_FOLDER)
 {
 	const struct incise_wall_point *points;
 	struct incise_wall *wall;
@@ -84,7 +74,7 @@ static void stated_time_of_a_simulated_clock(void **state)
 	assert_true(is_intact());
 }
 
-static void rows_are_protected(void **state)
+TEST(rows_are_protected, IN_FOLDER)
 {
 	static const char *const changes[] = {
 		"UPDATE wall SET tai_ns = tai_ns + 1 WHERE seq = 2",
@@ -112,7 +102,7 @@ static void rows_are_protected(void **state)
 	}
 }
 
-static void damaged_rows_are_refused(void **state)
+TEST(damaged_rows_are_refused, IN_FOLDER)
 {
 	static const char *const changes[] = {
 		"UPDATE wall SET tai_ns = 9223372036854775807 WHERE seq = 2",
@@ -135,7 +125,7 @@ static void damaged_rows_are_refused(void **state)
 	}
 }
 
-static void older_and_simulated_ones_have_none(void **state)
+TEST(older_and_simulated_ones_have_none, IN_FOLDER)
 {
 	record_by(SHORT_SCRIPT, NULL, 2 * S);
 	read_wall(ENODATA);
@@ -156,7 +146,7 @@ static int64_t clock_ns(clockid_t clock)
 }
 
 /* The clock of this machine, whatever sets it: TAI is CLOCK_REALTIME plus the leap seconds. */
-static void time_of_a_real_clock(void **state)
+TEST(time_of_a_real_clock, IN_FOLDER)
 {
 	const struct incise_wall_point *points;
 	int64_t before_ns, after_ns, set_ns, tai;
@@ -188,7 +178,7 @@ static void time_of_a_real_clock(void **state)
 	assert_true(ask(DB, "SELECT count(*) FROM events WHERE kind = 'clock'") >= 1);
 }
 
-static void sources_of_another_clock_are_refused(void **state)
+TEST(sources_of_another_clock_are_refused, IN_FOLDER)
 {
 	static const struct {
 		const char *rig, *source, *text;
@@ -205,7 +195,6 @@ static void sources_of_another_clock_are_refused(void **state)
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_rig *rig = open_rig(cases[i].rig);
 		struct incise_calibration calibration;
-		struct incise_error err = {0};
 
 		incise_calibration_nominal(&calibration);
 		assert_error(incise_recorder_new("a.rec", rig,
@@ -217,18 +206,4 @@ static void sources_of_another_clock_are_refused(void **state)
 		assert_int_equal(access("a.rec.part", F_OK), -1);
 		incise_rig_close(rig);
 	}
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		IN_FOLDER(stated_time_of_a_simulated_clock),
-		IN_FOLDER(rows_are_protected),
-		IN_FOLDER(damaged_rows_are_refused),
-		IN_FOLDER(older_and_simulated_ones_have_none),
-		IN_FOLDER(time_of_a_real_clock),
-		IN_FOLDER(sources_of_another_clock_are_refused),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,6 +3,7 @@
  * Tests of lib/record/replay/replay.c: the forces are those that the live loop had on the same
  * poses, to the bit; the report is the same as by plain sums.
  */
+#include "../unit.h"
 #include "recorded.h"
 #include <incise/replay.h>
 #include "../scene/felt.h"
@@ -110,7 +111,7 @@ static int replay(const char *path, const struct felt *f,
 	return rc;
 }
 
-static void forces_are_those_of_the_live_loop(void **state)
+TEST(forces_are_those_of_the_live_loop)
 {
 	static const char *const evaluators[] = {"fixed", "double"};
 
@@ -121,7 +122,6 @@ static void forces_are_those_of_the_live_loop(void **state)
 						   .log_size = TICKS};
 		struct seen seen = {.as_live = true};
 		struct incise_replay_report report;
-		struct incise_error err = {0};
 		struct felt f;
 
 		felt_start(&f, evaluators[k], INCISE_RIG_TRACKER);
@@ -144,10 +144,9 @@ static void forces_are_those_of_the_live_loop(void **state)
 	}
 }
 
-static void the_report_is_that_of_its_ticks(void **state)
+TEST(the_report_is_that_of_its_ticks)
 {
 	struct incise_replay_report report;
-	struct incise_error err = {0};
 	struct seen seen = {0};
 	struct felt f;
 
@@ -169,7 +168,7 @@ static void the_report_is_that_of_its_ticks(void **state)
 }
 
 /* Runs that must have the same forces, and some that must not. */
-static void what_forces_depend_on(void **state)
+TEST(what_forces_depend_on)
 {
 	struct incise_calibration calibration;
 	const struct {
@@ -215,7 +214,6 @@ static void what_forces_depend_on(void **state)
 	record("b.rec", QUICK, 1100 * MS);
 	for (size_t k = 0; k < sizeof(cases) / sizeof(*cases); k++) {
 		struct incise_replay_report report;
-		struct incise_error err = {0};
 		struct seen seen = {0};
 
 		if (cases[k].sql) {
@@ -239,12 +237,11 @@ static void what_forces_depend_on(void **state)
 	felt_end(&f);
 }
 
-static void who_is_told_ends_it(void **state)
+TEST(who_is_told_ends_it)
 {
 	volatile sig_atomic_t stop = 0;
 	struct incise_replay_options how = {.stop = &stop};
 	struct incise_replay_report report;
-	struct incise_error err = {0};
 	struct seen seen = {.end_at = 40}, stopped = {.end_at = 40, .stop = &stop};
 	struct felt f;
 
@@ -259,7 +256,7 @@ static void who_is_told_ends_it(void **state)
 	felt_end(&f);
 }
 
-static void what_cannot_be_replayed(void **state)
+TEST(what_cannot_be_replayed)
 {
 	static const struct {
 		const char *sql, *message;
@@ -301,10 +298,9 @@ static void what_cannot_be_replayed(void **state)
 }
 
 /* Without its zero a recording has poses, but no force in newtons. */
-static void a_recording_without_zero_is_replayed(void **state)
+TEST(a_recording_without_zero_is_replayed)
 {
 	struct incise_replay_report report;
-	struct incise_error err = {0};
 	struct seen seen = {0};
 	struct felt f;
 
@@ -322,16 +318,4 @@ static void a_recording_without_zero_is_replayed(void **state)
 	felt_end(&f);
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(forces_are_those_of_the_live_loop),
-		cmocka_unit_test(the_report_is_that_of_its_ticks),
-		cmocka_unit_test(what_forces_depend_on),
-		cmocka_unit_test(who_is_told_ends_it),
-		cmocka_unit_test(what_cannot_be_replayed),
-		cmocka_unit_test(a_recording_without_zero_is_replayed),
-	};
-
-	return cmocka_run_group_tests(tests, record_once, leave_folder);
-}
+GROUP(record_once, leave_folder);

@@ -3,6 +3,7 @@
  * Tests of lib/record/replay/replay_source.c: what a recording of hand-written rows says at each
  * tick, compared with plain sums over the rows.
  */
+#include "../unit.h"
 #include "recorded.h"
 #include "../../../lib/record/replay/replay_source.h"
 
@@ -39,11 +40,9 @@ static int record_once(void **state)
 static void open_source(struct incise_replay_source *source,
 			struct incise_recording **recording, enum incise_replay_at at)
 {
-	struct incise_error err = {0};
-
 	*recording = incise_recording_open("known.rec", &err);
-	if (!*recording || incise_replay_source_open(source, *recording, at, NULL, &err))
-		fail_msg("%s", err.text);
+	succeeds(*recording &&
+		 !incise_replay_source_open(source, *recording, at, NULL, &err));
 }
 
 static int64_t arrival(int seq)
@@ -52,7 +51,7 @@ static int64_t arrival(int seq)
 }
 
 /* Each pose is returned at the first tick that is not before it, and never again. */
-static void poses_are_told_when_they_had_come(void **state)
+TEST(poses_are_told_when_they_had_come)
 {
 	static const enum incise_replay_at ats[] = {INCISE_REPLAY_ARRIVAL,
 						    INCISE_REPLAY_ACQUISITION};
@@ -61,7 +60,6 @@ static void poses_are_told_when_they_had_come(void **state)
 		struct incise_tracker_sample poses[32];
 		struct incise_replay_source source;
 		struct incise_recording *recording;
-		struct incise_error err = {0};
 		int seq = 0;
 
 		open_source(&source, &recording, ats[k]);
@@ -96,12 +94,11 @@ static void poses_are_told_when_they_had_come(void **state)
 	}
 }
 
-static void more_poses_than_there_is_room_wait(void **state)
+TEST(more_poses_than_there_is_room_wait)
 {
 	struct incise_tracker_sample poses[7];
 	struct incise_replay_source source;
 	struct incise_recording *recording;
-	struct incise_error err = {0};
 
 	open_source(&source, &recording, INCISE_REPLAY_ARRIVAL);
 	for (int seq = 0; seq < RECORDS;) {
@@ -116,7 +113,7 @@ static void more_poses_than_there_is_room_wait(void **state)
 }
 
 /* The mean over all rows that are nearest, by a sum over all numbers. */
-static void force_is_the_mean_around_the_tick(void **state)
+TEST(force_is_the_mean_around_the_tick)
 {
 	static const int64_t periods[] = {MS, MS / 2, 3 * MS, 50000, 1700001};
 	double zero = ask(DB, "SELECT value FROM meta WHERE key = 'force_zero_mV'");
@@ -124,7 +121,6 @@ static void force_is_the_mean_around_the_tick(void **state)
 	for (size_t k = 0; k < sizeof(periods) / sizeof(*periods); k++) {
 		struct incise_replay_source source;
 		struct incise_recording *recording;
-		struct incise_error err = {0};
 
 		open_source(&source, &recording, INCISE_REPLAY_ARRIVAL);
 		for (int64_t t = START_NS + periods[k]; t < START_NS + 970 * MS;
@@ -159,11 +155,10 @@ static void force_is_the_mean_around_the_tick(void **state)
 	}
 }
 
-static void depth_and_cuts_are_those_of_the_table(void **state)
+TEST(depth_and_cuts_are_those_of_the_table)
 {
 	struct incise_replay_source source;
 	struct incise_recording *recording;
-	struct incise_error err = {0};
 	struct incise_replay_measure m;
 
 	open_source(&source, &recording, INCISE_REPLAY_ARRIVAL);
@@ -186,14 +181,13 @@ static void depth_and_cuts_are_those_of_the_table(void **state)
 }
 
 /* Another calibration; clipped samples; a gap in each stream; best times by a line. */
-static void gaps_clips_and_lines(void **state)
+TEST(gaps_clips_and_lines)
 {
 	struct incise_calibration calibration;
 	struct incise_replay_source source;
 	struct incise_recording *recording;
 	struct incise_tracker_sample pose;
 	struct incise_replay_measure m;
-	struct incise_error err = {0};
 
 	change(DB,
 	       "UPDATE force SET code = 4095 WHERE seq = 3000;"
@@ -261,7 +255,7 @@ static void gaps_clips_and_lines(void **state)
 }
 
 /* Damage and its message: on opening, or while reading. */
-static void no_damaged_row_is_believed(void **state)
+TEST(no_damaged_row_is_believed)
 {
 	static const struct {
 		const char *sql, *message;
@@ -331,16 +325,4 @@ static void no_damaged_row_is_believed(void **state)
 	}
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(poses_are_told_when_they_had_come),
-		cmocka_unit_test(more_poses_than_there_is_room_wait),
-		cmocka_unit_test(force_is_the_mean_around_the_tick),
-		cmocka_unit_test(depth_and_cuts_are_those_of_the_table),
-		cmocka_unit_test(gaps_clips_and_lines),
-		cmocka_unit_test(no_damaged_row_is_believed),
-	};
-
-	return cmocka_run_group_tests(tests, record_once, leave_folder);
-}
+GROUP(record_once, leave_folder);

@@ -3,6 +3,7 @@
  * Tests of lib/record/export/resample.c: the filter against what is said of it, rows against
  * signals that are put into a recording and known at any time.
  */
+#include "../unit.h"
 #include "recorded.h"
 #include "../../../lib/record/export/interpolators.h"
 #include "../../../lib/record/export/writers.h"
@@ -35,15 +36,14 @@ static char *resample(const char *path, double rate_hz,
 	struct incise_recording *recording;
 	struct incise_export_options how;
 	struct incise_export_report report;
-	struct incise_error err = {0};
 
 	incise_export_options_init(&how);
 	how.resample = true;
 	how.rate_hz = rate_hz;
 	how.calibration = calibration;
 	recording = incise_recording_open(path, &err);
-	if (!recording || incise_export(&recording, 1, &how, "out.csv", &report, &err))
-		fail_msg("%s", err.text);
+	succeeds(recording &&
+		 !incise_export(&recording, 1, &how, "out.csv", &report, &err));
 	incise_recording_close(recording);
 	return text_of("out.csv");
 }
@@ -81,7 +81,7 @@ static double gain(double frequency)
 	return sum / all;
 }
 
-static void the_filter_is_as_it_says(void **state)
+TEST(the_filter_is_as_it_says)
 {
 	assert_true(fabs(gain(1 / 3.) - 0.5) < 1e-3);
 	for (double f = 0; f < 0.15; f += 0.01)
@@ -93,7 +93,7 @@ static void the_filter_is_as_it_says(void **state)
 }
 
 /* 170 Hz is above half of all rates at which it is filtered. */
-static void rows_are_those_of_the_signals(void **state)
+TEST(rows_are_those_of_the_signals)
 {
 	static const struct {
 		double rate;
@@ -166,7 +166,7 @@ static double at(const char *sql)
  * Noise on the records, frames on a saw, times that are uncertain by 1 ms of the tracker's
  * and 2 ms of the camera's: what is said of each is what was put in.
  */
-static void uncertainties_are_what_was_put_in(void **state)
+TEST(uncertainties_are_what_was_put_in)
 {
 	struct incise_calibration calibration;
 	struct row r, other;
@@ -249,7 +249,7 @@ static void uncertainties_are_what_was_put_in(void **state)
 }
 
 /* Of before the tracker's station was known. */
-static void a_recording_of_form_1_has_no_station(void **state)
+TEST(a_recording_of_form_1_has_no_station)
 {
 	char *text, *rest;
 	struct row r;
@@ -267,7 +267,7 @@ static void a_recording_of_form_1_has_no_station(void **state)
 	free(text);
 }
 
-static void damage_is_told(void **state)
+TEST(damage_is_told)
 {
 	static const struct {
 		const char *sql, *message;
@@ -291,7 +291,6 @@ static void damage_is_told(void **state)
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_export_options how = {.resample = true, .rate_hz = 100};
 		struct incise_recording *recording;
-		struct incise_error err = {0};
 
 		assert_int_equal(system("rm -rf hurt.rec; cp -r known.rec hurt.rec"), 0);
 		change("hurt.rec/recording.db", cases[i].sql);
@@ -307,15 +306,4 @@ static void damage_is_told(void **state)
 	}
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(the_filter_is_as_it_says),
-		cmocka_unit_test(rows_are_those_of_the_signals),
-		cmocka_unit_test(uncertainties_are_what_was_put_in),
-		cmocka_unit_test(a_recording_of_form_1_has_no_station),
-		cmocka_unit_test(damage_is_told),
-	};
-
-	return cmocka_run_group_tests(tests, record_once, leave_folder);
-}
+GROUP(record_once, leave_folder);

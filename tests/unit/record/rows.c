@@ -3,6 +3,7 @@
  * Tests of lib/record/read/rows.c: which time a row gets, and that times increase whatever
  * a file says.
  */
+#include "../unit.h"
 #include "recorded.h"
 #include "../../../lib/record/read/rows.h"
 
@@ -37,17 +38,15 @@ static void set_knots(const char *values)
 
 static struct incise_row_times open_times(const char *table)
 {
-	struct incise_error err = {0};
 	struct incise_recording *recording = incise_recording_open("times.rec", &err);
 	struct incise_row_times times;
 
-	if (!recording || incise_row_times_open(&times, recording, table, &err))
-		fail_msg("%s", err.text);
+	succeeds(recording && !incise_row_times_open(&times, recording, table, &err));
 	incise_recording_close(recording);
 	return times;
 }
 
-static void a_row_is_on_its_line(void **state)
+TEST(a_row_is_on_its_line)
 {
 	static const struct {
 		const char *table;
@@ -77,7 +76,7 @@ static void a_row_is_on_its_line(void **state)
 	}
 }
 
-static void another_delay_shifts(void **state)
+TEST(another_delay_shifts)
 {
 	static const struct {
 		const char *table;
@@ -111,7 +110,7 @@ static void another_delay_shifts(void **state)
 	}
 }
 
-static void times_increase_whatever_knots_say(void **state)
+TEST(times_increase_whatever_knots_say)
 {
 	static const char *const cases[] = {
 		"",
@@ -143,13 +142,4 @@ static void times_increase_whatever_knots_say(void **state)
 	}
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_row_is_on_its_line),
-		cmocka_unit_test(another_delay_shifts),
-		cmocka_unit_test(times_increase_whatever_knots_say),
-	};
-
-	return cmocka_run_group_tests(tests, record_once, leave_folder);
-}
+GROUP(record_once, leave_folder);

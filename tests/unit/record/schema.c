@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Tests of lib/record/schema.c.
- */
+/* Tests of lib/record/schema.c. */
+#include "../unit.h"
 #include "recorded.h"
 #include "../../../lib/record/schema.h"
 
 /* A new schema, changed by some SQL, is checked. */
 static void check(const char *sql, int code, const char *text)
 {
-	struct incise_error err = {0};
 	sqlite3 *db;
 	int form = 0;
 
@@ -28,7 +26,7 @@ static void check(const char *sql, int code, const char *text)
 	sqlite3_close(db);
 }
 
-static void only_the_own_form_is_taken(void **state)
+TEST(only_the_own_form_is_taken)
 {
 	static const struct {
 		const char *sql;
@@ -60,7 +58,7 @@ static void only_the_own_form_is_taken(void **state)
 		check(cases[i].sql, cases[i].code, cases[i].text);
 }
 
-static void errors_have_their_errno(void **state)
+TEST(errors_have_their_errno)
 {
 	sqlite3_stmt *stmt;
 	sqlite3 *db;
@@ -84,14 +82,4 @@ static void errors_have_their_errno(void **state)
 			 SQLITE_CANTOPEN);
 	assert_int_equal(incise_schema_errno(db), ENOENT);
 	sqlite3_close(db);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(only_the_own_form_is_taken),
-		cmocka_unit_test(errors_have_their_errno),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

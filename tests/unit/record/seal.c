@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Tests of the seal: the statement of a recording, its text, and what differs from it.
- */
+/* Tests of the seal: the statement of a recording, its text, and what differs from it. */
+#include "../unit.h"
 #include "recorded.h"
 #include <incise/seal.h>
 #include "../../../lib/record/seal_chain.h"
@@ -9,54 +8,46 @@
 #define SIM "sim:clock=simulated"
 #define DB "a.rec/recording.db"
 
-struct findings {
+static struct {
 	char text[4000]; /* lines "part: text" of the kind seal */
 	struct incise_verify_finding first;
 	int n;
-};
+} findings;
+static struct incise_verify_report report;
 
 static void found(void *user, const struct incise_verify_finding *finding)
 {
-	struct findings *findings = user;
-	size_t n = strlen(findings->text);
+	size_t n = strlen(findings.text);
 
 	if (finding->kind != INCISE_VERIFY_SEAL)
 		return;
-	if (!findings->n++)
-		findings->first = *finding;
-	snprintf(findings->text + n, sizeof(findings->text) - n, "%s: %s\n",
+	if (!findings.n++)
+		findings.first = *finding;
+	snprintf(findings.text + n, sizeof(findings.text) - n, "%s: %s\n",
 		 finding->stream, finding->text);
 }
 
 static char *statement_of(const char *path)
 {
-	struct incise_error err = {0};
 	char *text = incise_seal_statement(path, &err);
 
-	if (!text)
-		fail_msg("%s", err.text);
+	succeeds(text);
 	return text;
 }
 
-static void compare(const char *path, const char *text, struct findings *findings,
-		    struct incise_verify_report *report)
+static void compare(const char *path, const char *text)
 {
-	struct incise_verify_watch watch = {.found = found, .user = findings};
-	struct incise_error err = {0};
+	struct incise_verify_watch watch = {.found = found};
 
-	*findings = (struct findings){0};
-	if (incise_seal_compare(path, text, strlen(text), &watch, report, &err))
-		fail_msg("%s", err.text);
+	memset(&findings, 0, sizeof(findings));
+	succeeds(!incise_seal_compare(path, text, strlen(text), &watch, &report, &err));
 }
 
-static void statement_says_what_is_recorded(void **state)
+TEST(statement_says_what_is_recorded, IN_FOLDER)
 {
 	struct incise_seal_statement statement;
-	struct incise_verify_report report;
 	struct incise_recording *recording;
 	struct incise_seal_head head;
-	struct findings findings;
-	struct incise_error err = {0};
 	char *text, *again, identity[33];
 
 	record("a.rec", SIM, 2000 * MS);
@@ -85,23 +76,21 @@ static void statement_says_what_is_recorded(void **state)
 	assert_int_equal(head.commit, statement.last.commit);
 	incise_recording_close(recording);
 
-	compare("a.rec", text, &findings, &report);
+	compare("a.rec", text);
 	assert_string_equal(findings.text, "");
 	assert_true(report.sealed && report.complete);
 	free(text);
 }
 
 /* Two recordings of the same script have different identities, and so all heads are others. */
-static void heads_are_of_one_recording(void **state)
+TEST(heads_are_of_one_recording, IN_FOLDER)
 {
-	struct incise_verify_report report;
-	struct findings findings;
 	char *text;
 
 	record("a.rec", SIM, 500 * MS);
 	record("b.rec", SIM, 500 * MS);
 	text = statement_of("b.rec");
-	compare("a.rec", text, &findings, &report);
+	compare("a.rec", text);
 	assert_int_equal(findings.n, 1);
 	assert_says(findings.text, "start:");
 	assert_false(report.sealed);
@@ -109,7 +98,7 @@ static void heads_are_of_one_recording(void **state)
 	free(text);
 }
 
-static void statement_is_read_strictly(void **state)
+TEST(statement_is_read_strictly, IN_FOLDER)
 {
 	static const struct {
 		const char *from, *to; /* the first place is replaced */
@@ -138,7 +127,6 @@ static void statement_is_read_strictly(void **state)
 		{"end\n", ""},
 	};
 	struct incise_seal_statement statement;
-	struct incise_error err = {0};
 	char *text, *forged;
 
 	record("a.rec", SIM, 500 * MS);
@@ -168,28 +156,25 @@ static void statement_is_read_strictly(void **state)
  * Rows changed by someone who recomputes the ledger: here the seal is what is left, and its
  * own head too may be recomputed. tests/attack/forgeries.py has all kinds.
  */
-static void older_and_longer_recordings_are_named(void **state)
+TEST(older_and_longer_recordings_are_named, IN_FOLDER)
 {
-	struct incise_verify_report report;
-	struct findings findings;
-	struct incise_error err = {0};
 	struct incise_rig *rig = open_rig(SIM);
 	struct incise_recorder *recorder = start_recorder("a.rec", rig);
 	char *text, *later;
 
 	assert_int_equal(poll_for(recorder, rig, 1000 * MS, &err), 0);
 	text = statement_of("a.rec"); /* of the .part, which is written */
-	compare("a.rec", text, &findings, &report);
+	compare("a.rec", text);
 	assert_string_equal(findings.text, "");
 	assert_true(report.sealed && report.interrupted && report.intact);
 	assert_int_equal(poll_for(recorder, rig, 1000 * MS, &err), 0);
 	later = statement_of("a.rec");
-	compare("a.rec", text, &findings, &report);
+	compare("a.rec", text);
 	assert_int_equal(findings.n, 1);
 	assert_says(findings.text, "signed");
 	assert_int_equal(incise_recorder_close(recorder, &err), 0);
 	incise_rig_close(rig);
-	compare("a.rec", later, &findings, &report);
+	compare("a.rec", later);
 	assert_int_equal(findings.n, 1);
 	assert_says(findings.text, "signed");
 	free(text);
@@ -216,7 +201,7 @@ static void older_and_longer_recordings_are_named(void **state)
 	       "UPDATE meta SET value = (SELECT count(*) FROM depth) WHERE key = "
 	       "'depth_rows'; "
 	       "UPDATE meta SET value = 0 WHERE key = 'complete'");
-	compare("a.rec", text, &findings, &report);
+	compare("a.rec", text);
 	assert_true(report.intact == false && !report.sealed);
 	assert_int_equal(findings.n, 1);
 	assert_says(findings.text, "commit 10 of the 22");
@@ -225,36 +210,32 @@ static void older_and_longer_recordings_are_named(void **state)
 }
 
 /* Row by row the ledger agrees: only the seal shows it. */
-static void rows_that_the_ledger_covers_are_found(void **state)
+TEST(rows_that_the_ledger_covers_are_found, IN_FOLDER)
 {
-	struct incise_verify_report report;
-	struct findings findings;
 	char *text;
 
 	record("a.rec", SIM, 1000 * MS);
 	text = statement_of("a.rec");
 	change(DB, "UPDATE seal SET t_ns = t_ns + 1 WHERE number = 3");
-	compare("a.rec", text, &findings, &report);
+	compare("a.rec", text);
 	assert_int_equal(findings.n, 1);
 	assert_says(findings.text, "commit 3");
 	change(DB,
 	       "UPDATE seal SET t_ns = t_ns - 1 WHERE number = 3; UPDATE seal SET head "
 	       "= zeroblob(32) WHERE number IN (5, 6)");
-	compare("a.rec", text, &findings, &report);
+	compare("a.rec", text);
 	assert_says(findings.text, "commits 5 to 7");
 	change(DB, "DELETE FROM seal");
-	compare("a.rec", text, &findings, &report);
+	compare("a.rec", text);
 	assert_false(report.sealed);
 	assert_null(incise_seal_statement("a.rec", NULL));
 	free(text);
 }
 
-static void older_forms_have_none(void **state)
+TEST(older_forms_have_none, IN_FOLDER)
 {
-	struct incise_verify_report report;
 	struct incise_recording *recording;
 	struct incise_seal_head head;
-	struct incise_error err = {0};
 	char *text, identity[33];
 
 	record("a.rec", SIM, 500 * MS);
@@ -274,7 +255,7 @@ static void older_forms_have_none(void **state)
 }
 
 /* The parts of table meta: a new key is covered whatever it is called. */
-static void every_key_of_meta_is_in_one_part(void **state)
+TEST(every_key_of_meta_is_in_one_part, IN_FOLDER)
 {
 	uint64_t rows, sum = 0;
 	uint8_t digest[INCISE_SEAL_BYTES];
@@ -295,19 +276,4 @@ static void every_key_of_meta_is_in_one_part(void **state)
 	assert_int_equal(sum, ask(DB, "SELECT count(*) FROM meta"));
 	incise_seal_free(&seal);
 	sqlite3_close(db);
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		IN_FOLDER(statement_says_what_is_recorded),
-		IN_FOLDER(heads_are_of_one_recording),
-		IN_FOLDER(statement_is_read_strictly),
-		IN_FOLDER(older_and_longer_recordings_are_named),
-		IN_FOLDER(rows_that_the_ledger_covers_are_found),
-		IN_FOLDER(older_forms_have_none),
-		IN_FOLDER(every_key_of_meta_is_in_one_part),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

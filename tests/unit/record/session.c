@@ -8,6 +8,7 @@
  * Both record the same motion (the same seed); b's rows are put on b's clock by SQL here, with a
  * formula that the code under test never sees.
  */
+#include "../unit.h"
 #include "recorded.h"
 #include <incise/session.h>
 #include <incise/verify.h>
@@ -15,6 +16,8 @@
 #include "../../../lib/record/join/align.h"
 #include "../../../lib/record/read/session.h"
 
+#define A "a.rec/recording.db"
+#define B "b.rec/recording.db"
 #define SPEC "sim:clock=simulated,cut_s=2,pause_s=1"
 #define S 1000000000LL
 #define BOUND_NS 20000.0 /* that each clock states */
@@ -33,9 +36,10 @@ static void move_to_b(const char *file)
 	change(file, "UPDATE events SET t_ns = " ON_B("t_ns"));
 }
 
+static uint64_t random_state;
+
 /* Give a recording points of wall time, a second apart, each wrong by less than its bound. */
-static void set_wall(const char *file, bool is_b, const char *reference, uint64_t *random,
-		     double bound_ns)
+static void set_wall(const char *file, bool is_b, const char *reference)
 {
 	char *sql = NULL;
 	size_t size;
@@ -48,20 +52,26 @@ static void set_wall(const char *file, bool is_b, const char *reference, uint64_
 			is_b ? llround((double)(true_ns + 3 * S) / 1.00005) : true_ns;
 		int64_t tai_ns =
 			1000 * S + true_ns +
-			llround(0.9 * bound_ns * incise_random_symmetric(random));
+			llround(0.9 * BOUND_NS * incise_random_symmetric(&random_state));
 
 		fprintf(out,
 			"INSERT INTO wall(seq, t_ns, tai_ns, uncertainty_ns, rate_ppb, "
 			"rate_uncertainty_ppb, utc_offset_s, held, source, reference, "
 			"leap, restart) VALUES(%d, %lld, %lld, %.1f, %.1f, 1000.0, 37, 0, "
 			"'ptp', '%s', 'ptp', '');",
-			i, (long long)t_ns, (long long)tai_ns, bound_ns,
+			i, (long long)t_ns, (long long)tai_ns, BOUND_NS,
 			is_b ? 50000.0 : 0.0, reference);
 	}
 	fprintf(out, "COMMIT");
 	fclose(out);
 	change(file, sql);
 	free(sql);
+}
+
+static void set_walls(bool moved)
+{
+	set_wall(A, false, "TAI");
+	set_wall(B, moved, "TAI");
 }
 
 static void remove_session(const char *name)
@@ -76,7 +86,7 @@ static void two_machines(int64_t duration_ns)
 {
 	record("a.rec", SPEC, duration_ns);
 	record("b.rec", SPEC ",seed=1", duration_ns);
-	move_to_b("b.rec/recording.db");
+	move_to_b(B);
 }
 
 static const char *const both[] = {"a.rec", "b.rec"};
@@ -87,20 +97,11 @@ static int join(const struct incise_session_options *options, struct incise_erro
 	return incise_session_join(both, 2, options, "s.rec", err);
 }
 
-static struct incise_recording *open_it(const char *path)
-{
-	struct incise_error err = {0};
-	struct incise_recording *recording = incise_recording_open(path, &err);
-
-	if (!recording)
-		fail_msg("%s", err.text);
-	return recording;
-}
-
 /* Compare b's poses and forces, by the session, with a's: largest difference, ns. */
 static double largest_error_ns(void)
 {
-	struct incise_recording *a = open_it("a.rec"), *s = open_it("s.rec:b");
+	struct incise_recording *a = open_recording("a.rec"),
+				*s = open_recording("s.rec:b");
 	struct incise_tracker_sample *expected, *found;
 	struct incise_recording_value *force, *force_found;
 	int n = incise_recording_poses(a, &expected, NULL);
@@ -132,7 +133,7 @@ static double largest_error_ns(void)
 
 static struct incise_session_info info_of(int at)
 {
-	struct incise_recording *s = open_it("s.rec:*");
+	struct incise_recording *s = open_recording("s.rec:*");
 	const struct incise_session_info *members;
 	struct incise_session_info info;
 
@@ -143,10 +144,8 @@ static struct incise_session_info info_of(int at)
 }
 
 /* 100 times, with other errors of the clocks: no time is wrong by more than is stated. */
-static void test_clocks(void **state)
+TEST(test_clocks, IN_FOLDER)
 {
-	struct incise_error err;
-	uint64_t random = 1;
 	double worst = 0;
 
 	two_machines(2 * S);
@@ -154,8 +153,7 @@ static void test_clocks(void **state)
 		struct incise_session_info b;
 		double error_ns;
 
-		set_wall("a.rec/recording.db", false, "TAI", &random, BOUND_NS);
-		set_wall("b.rec/recording.db", true, "TAI", &random, BOUND_NS);
+		set_walls(true);
 		if (join(&(struct incise_session_options){.within_s = 400e-6}, &err))
 			fail_msg("%s", err.text);
 		b = info_of(1);
@@ -176,34 +174,31 @@ static void test_clocks(void **state)
 }
 
 /* A bound that --within asks for and that is not reached is refused. */
-static void test_refusals(void **state)
+TEST(test_refusals, IN_FOLDER)
 {
 	const char *const twice[] = {"a.rec", "a.rec"}, *const nested[] = {"s.rec",
 									   "b.rec"};
 	const struct incise_session_options any = {0}, close = {.within_s = 10e-6};
-	struct incise_error err;
-	uint64_t random = 1;
 
 	two_machines(2 * S);
 	/* No wall time at all. */
 	assert_error(join(&any, &err), ENODATA, &err, "a.rec:");
-	set_wall("a.rec/recording.db", false, "TAI", &random, BOUND_NS);
-	set_wall("b.rec/recording.db", true, "ptp:001122", &random, BOUND_NS);
+	set_wall(A, false, "TAI");
+	set_wall(B, true, "ptp:001122");
 	assert_error(join(&any, &err), ENODATA, &err, "TAI", "ptp:001122");
-	set_wall("b.rec/recording.db", true, "TAI", &random, BOUND_NS);
+	set_wall(B, true, "TAI");
 	assert_error(join(&close, &err), ERANGE, &err, "b.rec:");
 	/* Not synchronised: whatever it says, its error is not known. */
-	change("b.rec/recording.db", "UPDATE wall SET uncertainty_ns = NULL");
+	change(B, "UPDATE wall SET uncertainty_ns = NULL");
 	assert_true(join(&any, &err) < 0);
 	assert_says(err.text, "b.rec");
-	set_wall("b.rec/recording.db", true, "TAI", &random, BOUND_NS);
+	set_wall(B, true, "TAI");
 	/* A clock that went back. */
-	change("b.rec/recording.db",
-	       "UPDATE wall SET tai_ns = tai_ns - 2000000000, restart "
-	       "= CASE seq WHEN 1 THEN 'step' ELSE '' END WHERE seq > 0");
+	change(B, "UPDATE wall SET tai_ns = tai_ns - 2000000000, restart "
+		  "= CASE seq WHEN 1 THEN 'step' ELSE '' END WHERE seq > 0");
 	assert_true(join(&close, &err) < 0);
 	assert_true(access("s.rec", F_OK) && access("s.rec.part", F_OK));
-	set_wall("b.rec/recording.db", true, "TAI", &random, BOUND_NS);
+	set_wall(B, true, "TAI");
 	assert_int_equal(incise_session_join(twice, 2, &any, "s.rec", &err), -EINVAL);
 	assert_int_equal(join(&any, &err), 0);
 	assert_int_equal(join(&any, &err), -EEXIST);
@@ -220,26 +215,20 @@ static void test_refusals(void **state)
 }
 
 /* A clock that is stepped meanwhile: refused, or no time is wrong by more than is stated. */
-static void test_steps(void **state)
+TEST(test_steps, IN_FOLDER)
 {
 	static const double steps_s[] = {1, -1, 0.01, -0.01, 1e-5, -1e-5};
-	struct incise_error err;
-	uint64_t random = 11;
 	int joined = 0;
 
 	two_machines(4 * S);
 	for (size_t i = 0; i < sizeof(steps_s) / sizeof(*steps_s); i++) {
-		char sql[300];
-
-		set_wall("a.rec/recording.db", false, "TAI", &random, BOUND_NS);
-		set_wall("b.rec/recording.db", true, "TAI", &random, BOUND_NS);
+		set_walls(true);
 		/* The wall clock is wrong from the third point on, and its source notices. */
-		snprintf(
-			sql, sizeof(sql),
+		change_by(
+			B,
 			"UPDATE wall SET tai_ns = tai_ns + %.0f, restart = CASE seq WHEN 3 "
 			"THEN 'step' ELSE '' END WHERE seq >= 3",
 			steps_s[i] * 1e9);
-		change("b.rec/recording.db", sql);
 		if (join(&(struct incise_session_options){0}, &err)) {
 			assert_says(err.text, "b.rec");
 			continue;
@@ -252,19 +241,16 @@ static void test_steps(void **state)
 }
 
 /* Verification covers the members and the session's own tables. */
-static void test_verify(void **state)
+TEST(test_verify, IN_FOLDER)
 {
 	struct incise_verify_report report;
-	struct incise_error err;
-	uint64_t random = 1;
 
 	record("a.rec", SPEC, 2 * S);
 	record("b.rec", SPEC ",seed=2", 2 * S);
-	set_wall("a.rec/recording.db", false, "TAI", &random, BOUND_NS);
-	set_wall("b.rec/recording.db", false, "TAI", &random, BOUND_NS);
+	set_walls(false);
 	/* As if they had been written so. */
 	for (int i = 0; i < 2; i++) {
-		const char *file = i ? "b.rec/recording.db" : "a.rec/recording.db";
+		const char *file = i ? B : A;
 
 		change(file, "DELETE FROM ledger WHERE stream = 'wall'");
 	}
@@ -306,7 +292,7 @@ static void forge(const char *sql)
 }
 
 /* Whatever is in the tables: an error, or times that increase and stay in range. */
-static void test_forged(void **state)
+TEST(test_forged, IN_FOLDER)
 {
 	static const char *const refused[] = {
 		"UPDATE members SET name = '../../etc' WHERE member = 1",
@@ -332,13 +318,10 @@ static void test_forged(void **state)
 		"DROP TABLE maps; CREATE VIEW maps AS SELECT 1 AS member, 1 AS knot, 1 AS t_ns, "
 		"1 AS session_ns, 1.0 AS bound_ns",
 	};
-	struct incise_error err;
-	uint64_t random = 5;
 
 	record("a.rec", SPEC, S);
 	record("b.rec", SPEC ",seed=2", S);
-	set_wall("a.rec/recording.db", false, "TAI", &random, BOUND_NS);
-	set_wall("b.rec/recording.db", false, "TAI", &random, BOUND_NS);
+	set_walls(false);
 	for (size_t i = 0; i < sizeof(refused) / sizeof(*refused); i++) {
 		assert_int_equal(join(&(struct incise_session_options){0}, &err), 0);
 		forge(refused[i]);
@@ -359,8 +342,8 @@ static void test_forged(void **state)
 			sql, sizeof(sql),
 			"UPDATE maps SET session_ns = %.0f + CAST(t_ns * %.4f AS INTEGER) "
 			"WHERE member = 1",
-			2e18 * incise_random_symmetric(&random),
-			1 + 0.24 * incise_random_symmetric(&random));
+			2e18 * incise_random_symmetric(&random_state),
+			1 + 0.24 * incise_random_symmetric(&random_state));
 		forge(sql);
 		recording = incise_recording_open("s.rec:b", &err);
 		if (!recording)
@@ -375,24 +358,21 @@ static void test_forged(void **state)
 }
 
 /* The force of one machine with the tracker of the other is as from one machine. */
-static void test_pairs(void **state)
+TEST(test_pairs, IN_FOLDER)
 {
 	struct incise_export_options options;
 	struct incise_recording *recordings[2];
-	struct incise_error err;
-	uint64_t random = 7;
 	double largest = 0, stated = 0;
 	int rows = 0;
 	FILE *files[2];
 	char lines[2][500];
 
 	two_machines(10 * S);
-	set_wall("a.rec/recording.db", false, "TAI", &random, BOUND_NS);
-	set_wall("b.rec/recording.db", true, "TAI", &random, BOUND_NS);
+	set_walls(true);
 	if (join(&(struct incise_session_options){0}, &err))
 		fail_msg("%s", err.text);
-	recordings[0] = open_it("a.rec");
-	recordings[1] = open_it("s.rec:force=a,tracker=b");
+	recordings[0] = open_recording("a.rec");
+	recordings[1] = open_recording("s.rec:force=a,tracker=b");
 	incise_export_options_init(&options);
 	options.resample = true;
 	options.rate_hz = 100;
@@ -440,22 +420,18 @@ static const double taps_s[] = {2.0123, 2.6371, 4.1034, 8.5219};
 /* Knock: the force rises by half of the range within a sample and falls in 20 ms. */
 static void knock_force(const char *file, int taps)
 {
-	char sql[300];
-
-	for (int i = 0; i < taps; i++) {
-		snprintf(
-			sql, sizeof(sql),
+	for (int i = 0; i < taps; i++)
+		change_by(
+			file,
 			"UPDATE force SET code = code + CAST(1500 * (1 - (t_ns - %.0f) / 2e7) "
 			"AS INTEGER) WHERE t_ns >= %.0f AND t_ns < %.0f",
 			taps_s[i] * 1e9, taps_s[i] * 1e9, taps_s[i] * 1e9 + 2e7);
-		change(file, sql);
-	}
 }
 
 /* And the scalpel, which moves at 200 mm/s, bounces: at the times of the tracker's line. */
 static void knock_tracker(const char *file, int taps)
 {
-	struct incise_recording *recording = open_it("b.rec");
+	struct incise_recording *recording = open_recording("b.rec");
 	struct incise_tracker_sample *poses;
 	int n = incise_recording_poses(recording, &poses, NULL);
 
@@ -463,45 +439,40 @@ static void knock_tracker(const char *file, int taps)
 	for (int i = 0; i < taps; i++)
 		for (int k = 0; k < n; k++) {
 			double far_s = fabs((double)poses[k].t_ns * 1e-9 - taps_s[i]);
-			char sql[200];
 
 			if (far_s > 0.05)
 				continue;
-			snprintf(sql, sizeof(sql),
-				 "UPDATE tracker SET x_mm = x_mm + %.9f WHERE seq = %llu",
-				 400 * (0.05 - far_s), (unsigned long long)poses[k].seq);
-			change(file, sql);
+			change_by(
+				file,
+				"UPDATE tracker SET x_mm = x_mm + %.9f WHERE seq = %llu",
+				400 * (0.05 - far_s), (unsigned long long)poses[k].seq);
 		}
 	free(poses);
 }
 
 /* A force and a tracker without any wall time, four taps: offset and rate within the bound. */
-static void test_taps(void **state)
+TEST(test_taps, IN_FOLDER)
 {
 	const struct incise_session_options taps = {.align = INCISE_ALIGN_TAP};
 	struct incise_session_info b;
-	struct incise_error err;
 	double error_ns;
 
 	record("a.rec", SPEC, 10 * S);
 	record("b.rec", SPEC ",seed=1", 10 * S);
-	knock_force("a.rec/recording.db", TAPS);
-	knock_tracker("b.rec/recording.db", TAPS);
-	move_to_b("b.rec/recording.db");
+	knock_force(A, TAPS);
+	knock_tracker(B, TAPS);
+	move_to_b(B);
 	/* Only the tracker of b is used: its force knows of no tap. */
-	change("b.rec/recording.db",
-	       "DELETE FROM force; UPDATE meta SET value = 0 WHERE key "
-	       "= 'force_rows'");
-	if (join(&taps, &err))
-		fail_msg("%s", err.text);
+	change(B, "DELETE FROM force; UPDATE meta SET value = 0 WHERE key "
+		  "= 'force_rows'");
+	succeeds(!join(&taps, &err));
 	b = info_of(1);
 	assert_int_equal(b.matches, TAPS);
 	assert_string_equal(b.method, "tap");
 	assert_true(isnan(b.agreement_ns));
 	/* b's first row is that of a time of a that the formula says. */
-	error_ns =
-		fabs((double)b.first_ns -
-		     ask("a.rec/recording.db", "SELECT t_ns FROM tracker ORDER BY seq"));
+	error_ns = fabs((double)b.first_ns -
+			ask(A, "SELECT t_ns FROM tracker ORDER BY seq"));
 	if (error_ns > b.uncertainty_ns)
 		fail_msg("wrong by %g ms, stated %g ms", error_ns * 1e-6,
 			 b.uncertainty_ns * 1e-6);
@@ -510,22 +481,18 @@ static void test_taps(void **state)
 }
 
 /* Three taps of two forces, at 10 kHz; and clocks that agree with it, or do not. */
-static void test_agreement(void **state)
+TEST(test_agreement, IN_FOLDER)
 {
 	const struct incise_session_options taps = {.align = INCISE_ALIGN_TAP};
 	struct incise_session_info b;
-	struct incise_error err;
-	uint64_t random = 3;
 
 	record("a.rec", SPEC, 5 * S);
 	record("b.rec", SPEC ",seed=2", 5 * S);
-	knock_force("a.rec/recording.db", 3);
-	knock_force("b.rec/recording.db", 3);
-	move_to_b("b.rec/recording.db");
-	set_wall("a.rec/recording.db", false, "TAI", &random, BOUND_NS);
-	set_wall("b.rec/recording.db", true, "TAI", &random, BOUND_NS);
-	if (join(&taps, &err))
-		fail_msg("%s", err.text);
+	knock_force(A, 3);
+	knock_force(B, 3);
+	move_to_b(B);
+	set_walls(true);
+	succeeds(!join(&taps, &err));
 	b = info_of(1);
 	assert_int_equal(b.matches, 3);
 	assert_true(fabs(b.agreement_ns) <= b.agreement_bound_ns);
@@ -533,35 +500,29 @@ static void test_agreement(void **state)
 	/* 0.1 ms between samples; 100 ppm over 3 s from the taps: the rate is not known. */
 	assert_true(b.uncertainty_ns < 1 * MS);
 	remove_session("s.rec");
-	change("b.rec/recording.db", "UPDATE wall SET tai_ns = tai_ns + 50000000");
+	change(B, "UPDATE wall SET tai_ns = tai_ns + 50000000");
 	assert_error(join(&taps, &err), ERANGE, &err, "b.rec");
 	/* And no tap at all. */
-	change("b.rec/recording.db", "DELETE FROM force; DELETE FROM tracker");
+	change(B, "DELETE FROM force; DELETE FROM tracker");
 	assert_true(join(&taps, &err) < 0);
 }
 
 /* Pulses of a line that goes to both machines, among other events; no wall time. */
-static void test_sync(void **state)
+TEST(test_sync, IN_FOLDER)
 {
 	const struct incise_session_options sync = {.align = INCISE_ALIGN_EVENTS};
 	struct incise_session_info b;
-	struct incise_error err;
 	double error_ns;
 
 	record("a.rec", SPEC, 10 * S);
 	record("b.rec", SPEC ",seed=1", 10 * S);
 	for (int i = 0; i < TAPS; i++)
-		for (int k = 0; k < 2; k++) {
-			char sql[200];
-
-			snprintf(sql, sizeof(sql),
-				 "INSERT INTO events VALUES(%.0f, 'sync', 'pulse')",
-				 taps_s[i] * 1e9);
-			change(k ? "b.rec/recording.db" : "a.rec/recording.db", sql);
-		}
-	move_to_b("b.rec/recording.db");
-	if (join(&sync, &err))
-		fail_msg("%s", err.text);
+		for (int k = 0; k < 2; k++)
+			change_by(k ? B : A,
+				  "INSERT INTO events VALUES(%.0f, 'sync', 'pulse')",
+				  taps_s[i] * 1e9);
+	move_to_b(B);
+	succeeds(!join(&sync, &err));
 	b = info_of(1);
 	assert_string_equal(b.method, "sync");
 	assert_int_equal(b.matches, TAPS);
@@ -571,12 +532,11 @@ static void test_sync(void **state)
 	assert_true(error_ns < b.uncertainty_ns);
 	/* The other machine sees the line at its force channel. */
 	remove_session("s.rec");
-	change("b.rec/recording.db", "DELETE FROM events");
-	change("b.rec/recording.db", "UPDATE force SET t_ns = seq * 100000 + 1000000000");
-	knock_force("b.rec/recording.db", TAPS);
-	change("b.rec/recording.db", "UPDATE force SET t_ns = " ON_B("t_ns"));
-	if (join(&sync, &err))
-		fail_msg("%s", err.text);
+	change(B, "DELETE FROM events");
+	change(B, "UPDATE force SET t_ns = seq * 100000 + 1000000000");
+	knock_force(B, TAPS);
+	change(B, "UPDATE force SET t_ns = " ON_B("t_ns"));
+	succeeds(!join(&sync, &err));
 	b = info_of(1);
 	assert_int_equal(b.matches, TAPS);
 	/* 0.1 ms between two samples; 4 standard deviations at the ends. */
@@ -588,11 +548,10 @@ static void test_sync(void **state)
 #define TAP INCISE_ALIGN_TAP
 
 /* Marks in a steady rhythm match at several offsets; in an irregular one at one. */
-static void test_marks(void **state)
+TEST(test_marks)
 {
 	struct incise_mark a[8], b[8];
 	struct incise_align_fit fit;
-	struct incise_error err = {0};
 	double bound_ns;
 
 	for (int i = 0; i < 8; i++) {
@@ -622,11 +581,10 @@ static void test_marks(void **state)
 }
 
 /* Marks without anything in common: hands at work, a peak or two, a rhythm that all have. */
-static void test_chance(void **state)
+TEST(test_chance)
 {
 	struct incise_mark a[60], b[60];
 	struct incise_align_fit fit;
-	struct incise_error err = {0};
 	uint64_t random = 5;
 	int64_t t_ns[2] = {S, 70 * S};
 	int n;
@@ -663,18 +621,4 @@ static void test_chance(void **state)
 	}
 	assert_int_equal(incise_align_fit(a, 6, b, 6, TAP, &fit, &err), -EDOM);
 	assert_says(err.text, "-160 ppm");
-}
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		IN_FOLDER(test_clocks),	       IN_FOLDER(test_refusals),
-		IN_FOLDER(test_steps),	       IN_FOLDER(test_verify),
-		IN_FOLDER(test_forged),	       IN_FOLDER(test_pairs),
-		IN_FOLDER(test_taps),	       IN_FOLDER(test_agreement),
-		IN_FOLDER(test_sync),	       cmocka_unit_test(test_marks),
-		cmocka_unit_test(test_chance),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,8 +4,6 @@
  * ways, gaps and noise.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
 #include "../../../lib/record/export/interpolators.h"
 
 #define RECORDS 4000

@@ -9,6 +9,7 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
+#include "../../../lib/base/random.h"
 
 enum jitter {
 	NO_JITTER,
@@ -37,14 +38,9 @@ struct stream {
 	uint64_t seq;
 };
 
-/* splitmix64: Steele, Lea and Flood, OOPSLA 2014 */
 static inline double stream_random(struct stream *s)
 {
-	uint64_t z = s->random += 0x9e3779b97f4a7c15;
-
-	z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
-	z = (z ^ z >> 27) * 0x94d049bb133111eb;
-	return (double)((z ^ z >> 31) >> 11) * 0x1p-53;
+	return (double)(incise_random_next(&s->random) >> 11) * 0x1p-53;
 }
 
 static inline double stream_normal(struct stream *s)

@@ -4,10 +4,6 @@
  * against printf(3), blocks against rows given one by one.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/record/export/table_writer.h"
 
@@ -28,7 +24,6 @@ static size_t size;
 static FILE *begin(struct incise_table *table, const struct incise_provenance *provenance)
 {
 	FILE *out = open_memstream(&text, &size);
-	struct incise_error err = {0};
 
 	assert_int_equal(incise_table_open(table, &incise_table_csv, out, columns,
 					   N_COLUMNS, provenance, &err),
@@ -38,7 +33,6 @@ static FILE *begin(struct incise_table *table, const struct incise_provenance *p
 
 static void add(struct incise_table *table, const char *name, double value, int64_t n)
 {
-	struct incise_error err = {0};
 	int number = incise_table_name(table, name);
 
 	assert_true(number > 0);
@@ -55,8 +49,6 @@ static void add(struct incise_table *table, const char *name, double value, int6
 
 static void end(struct incise_table *table, FILE *out)
 {
-	struct incise_error err = {0};
-
 	assert_int_equal(incise_table_finish(table, &err), 0);
 	incise_table_close(table);
 	fclose(out);
@@ -136,7 +128,6 @@ TEST(nothing_is_written_before_a_row)
 
 TEST(a_full_disk_is_told)
 {
-	struct incise_error err = {0};
 	struct incise_table table;
 	FILE *out = fopen("/dev/full", "w");
 

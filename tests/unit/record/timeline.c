@@ -3,10 +3,8 @@
  * Tests of lib/record/time/timeline.c, with all that it is made of, on streams whose
  * truth is known (stream.h).
  */
-#include <float.h>
-#include <math.h>
-#include <stdlib.h>
 #include "../unit.h"
+#include <float.h>
 #include "../../../lib/record/time/timeline.h"
 #include "stream.h"
 

@@ -10,9 +10,11 @@
  * standard uncertainty. K is 4: the largest error of an even distribution is √12 = 3.5
  * standard deviations, and of a normal one 4 are exceeded once in 16000.
  */
+#include "../unit.h"
 #include "recorded.h"
 #include <incise/backend.h>
 #include <incise/verify.h>
+#include "../../../lib/base/random.h"
 #include "../../../lib/device/polhemus/polhemus_stream.h"
 #include "../../../lib/record/read/rows.h"
 #include "../cases.h"
@@ -57,14 +59,10 @@ static struct {
 	uint64_t random;
 } device;
 
-/* Of 0 to 1; splitmix64. */
+/* Of 0 to 1. */
 static double draw(void)
 {
-	uint64_t z = device.random += 0x9e3779b97f4a7c15;
-
-	z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9;
-	z = (z ^ z >> 27) * 0x94d049bb133111eb;
-	return (double)((z ^ z >> 31) >> 11) * 0x1p-53;
+	return (double)(incise_random_next(&device.random) >> 11) * 0x1p-53;
 }
 
 static const struct span *within(const struct span *spans, int64_t t_ns)
@@ -220,7 +218,6 @@ static void capture(const struct scenario *s)
 		.sync = s->external ? INCISE_TRACKER_EXTERNAL : INCISE_TRACKER_INTERNAL,
 	};
 	struct incise_recorder *recorder;
-	struct incise_error err = {0};
 
 	the_clock = incise_rig_clock(rig);
 	plan(s, incise_clock_now(the_clock) + 100 * MS);
@@ -229,9 +226,8 @@ static void capture(const struct scenario *s)
 	device.real = tracker->ops;
 	tracker->ops = &device_ops;
 	recorder = start_recorder("a.rec", rig);
-	if (poll_for(recorder, rig, (int64_t)((s->seconds + 0.3) * 1e9), &err) ||
-	    incise_recorder_close(recorder, &err))
-		fail_msg("%s", err.text);
+	succeeds(!poll_for(recorder, rig, (int64_t)((s->seconds + 0.3) * 1e9), &err) &&
+		 !incise_recorder_close(recorder, &err));
 	incise_rig_close(rig);
 	polhemus_stream_free(&device.stream);
 }
@@ -246,16 +242,14 @@ struct errors {
 
 static void measure(struct errors *out)
 {
-	struct incise_error err = {0};
 	struct incise_recording *recording = incise_recording_open("a.rec", &err);
 	struct incise_rows rows;
 	int rc;
 
 	*out = (struct errors){0};
-	if (!recording ||
-	    incise_rows_open(&rows, recording, "tracker", "seq, t_ns, x_mm, y_mm", "iirr",
-			     recording->meta.tracker, &err))
-		fail_msg("%s", err.text);
+	succeeds(recording &&
+		 !incise_rows_open(&rows, recording, "tracker", "seq, t_ns, x_mm, y_mm",
+				   "iirr", recording->meta.tracker, &err));
 	while ((rc = incise_rows_next(&rows, &err)) > 0) {
 		double position_mm[3] = {sqlite3_column_double(rows.stmt, 2),
 					 sqlite3_column_double(rows.stmt, 3)};
@@ -276,8 +270,7 @@ static void measure(struct errors *out)
 			out->worst_at = i;
 		}
 	}
-	if (rc)
-		fail_msg("%s", err.text);
+	succeeds(!rc);
 	out->trusted /= out->rows;
 	incise_rows_close(&rows);
 	incise_recording_close(recording);
@@ -290,36 +283,6 @@ static void run(const struct scenario *s, struct errors *out)
 }
 
 /* --- what was found --------------------------------------------------------------------- */
-
-/* 60 Hz where the device can do 120: t_ns was up to 3.27 s wrong. */
-static void pulses_from_outside(void **state)
-{
-	struct errors errors;
-
-	run(
-		&(struct scenario){
-			.hz = 60, .external = true, .jitter_ms = 0.3, .seconds = 6},
-		&errors);
-	if (errors.worst_ms > 5 || errors.beyond)
-		fail_msg("%.1f ms wrong, %d rows beyond %d times what they state",
-			 errors.worst_ms, errors.beyond, K);
-}
-
-/* Everything after the pause was 1.2 s wrong. */
-static void pulses_that_pause(void **state)
-{
-	struct errors errors;
-
-	run(&(struct scenario){.hz = 100,
-			       .external = true,
-			       .jitter_ms = 0.3,
-			       .pauses = {{2 * S, 3200 * MS}},
-			       .seconds = 6},
-	    &errors);
-	if (errors.worst_ms > 5 || errors.beyond)
-		fail_msg("%.1f ms wrong, %d rows beyond %d times what they state",
-			 errors.worst_ms, errors.beyond, K);
-}
 
 /* What a scenario must come to: the invariant, and no error beyond @worst_ms. */
 static void hold(const struct scenario *s, double worst_ms, const char *name)
@@ -339,7 +302,7 @@ static void hold(const struct scenario *s, double worst_ms, const char *name)
 }
 
 /* 0.5 s of poses were as early as the loss was long. */
-static void losses_that_time_shows(void **state)
+TEST(losses_that_time_shows, IN_FOLDER)
 {
 	static const int64_t lengths_ms[] = {8, 17, 25, 42, 100, 300, 700, 950};
 	char name[40];
@@ -364,7 +327,7 @@ static void losses_that_time_shows(void **state)
 	}
 }
 
-static void stalls_of_the_host(void **state)
+TEST(stalls_of_the_host, IN_FOLDER)
 {
 	static const int64_t lengths_ms[] = {5, 12, 30, 200, 1200};
 	char name[40];
@@ -387,7 +350,7 @@ static void stalls_of_the_host(void **state)
 }
 
 /* A rate that was not configured ends the tracker's stream at its start; later it is an event. */
-static void other_rates_are_named(void **state)
+TEST(other_rates_are_named, IN_FOLDER)
 {
 	static const struct {
 		struct scenario s;
@@ -436,7 +399,7 @@ static void count_times(void *user, const struct incise_verify_finding *finding)
 }
 
 /* A recording of a rate that was not configured is none that is complete; all others are. */
-static void verify_says_so(void **state)
+TEST(verify_says_so, IN_FOLDER)
 {
 	static const struct {
 		struct scenario s;
@@ -477,13 +440,11 @@ static void verify_says_so(void **state)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct incise_verify_report report;
-		struct incise_error err = {0};
 		uint64_t rows = 0;
 		struct incise_verify_watch watch = {.found = count_times, .user = &rows};
 
 		capture(&cases[i].s);
-		if (incise_verify("a.rec", &watch, &report, &err))
-			fail_msg("%s", err.text);
+		succeeds(!incise_verify("a.rec", &watch, &report, &err));
 		if (report.complete != cases[i].complete || !report.intact ||
 		    (int)rows < cases[i].least || (int)rows > cases[i].most)
 			fail_msg("case %zu: %d rows, complete %d", i, (int)rows,
@@ -492,14 +453,30 @@ static void verify_says_so(void **state)
 	}
 }
 
-static void another_rate(void **state)
+TEST(another_rate, IN_FOLDER)
 {
-	hold(&(struct scenario){.hz = 240, .jitter_ms = 0.2, .seconds = 5}, 5, "240 Hz");
-	hold(&(struct scenario){.hz = 60, .jitter_ms = 0.2, .seconds = 5}, 5, "60 Hz");
-	hold(&(struct scenario){.hz = 120, .to_hz = 240, .jitter_ms = 0.2, .seconds = 8},
-	     5, "120 to 240 Hz");
-	hold(&(struct scenario){.hz = 120, .to_hz = 60, .jitter_ms = 0.2, .seconds = 8},
-	     5, "120 to 60 Hz");
+	static const struct {
+		struct scenario s;
+		const char *name;
+	} cases[] = {
+		/* 60 Hz where the device can do 120: t_ns was up to 3.27 s wrong. */
+		{{.hz = 60, .external = true, .jitter_ms = 0.3, .seconds = 6}, "pulses"},
+		/* Everything after the pause was 1.2 s wrong. */
+		{{.hz = 100,
+		  .external = true,
+		  .jitter_ms = 0.3,
+		  .pauses = {{2 * S, 3200 * MS}},
+		  .seconds = 6},
+		 "pulses that pause"},
+		{{.hz = 240, .jitter_ms = 0.2, .seconds = 5}, "240 Hz"},
+		{{.hz = 60, .jitter_ms = 0.2, .seconds = 5}, "60 Hz"},
+		{{.hz = 120, .to_hz = 240, .jitter_ms = 0.2, .seconds = 8}, "120 to 240"},
+		{{.hz = 120, .to_hz = 60, .jitter_ms = 0.2, .seconds = 8},
+		 "120 to 60 Hz"},
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
+		hold(&cases[i].s, 5, cases[i].name);
 }
 
 /* --- any of it ---------------------------------------------------------------------------- */
@@ -548,7 +525,7 @@ static void draw_scenario(struct scenario *s)
 }
 
 /* The invariant, over whatever is drawn; and most rows of a good stream are well known. */
-static void no_time_is_worse_than_it_states(void **state)
+TEST(no_time_is_worse_than_it_states, IN_FOLDER)
 {
 	const char *only = getenv("SEED");
 	int first = only ? atoi(only) : 1,
@@ -579,18 +556,4 @@ static void no_time_is_worse_than_it_states(void **state)
 		      beyond, rows, last - first + 1, K);
 	assert_int_equal(beyond, 0);
 	assert_true(only || !bad);
-}
-
-#define TEST(name) IN_FOLDER(name)
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		TEST(pulses_from_outside),    TEST(pulses_that_pause),
-		TEST(losses_that_time_shows), TEST(stalls_of_the_host),
-		TEST(another_rate),	      TEST(other_rates_are_named),
-		TEST(verify_says_so),	      TEST(no_time_is_worse_than_it_states),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,6 +3,7 @@
  * Tests of lib/record/verify: a good recording is proved, and each kind of tampering is reported
  * with its place.
  */
+#include "../unit.h"
 #include "recorded.h"
 #include <fcntl.h>
 #include <incise/verify.h>
@@ -12,51 +13,46 @@
 #define SIM "sim:clock=simulated"
 #define DB "a.rec/recording.db"
 
-struct findings {
+static struct {
 	struct incise_verify_finding first;
 	char text[2000]; /* all lines */
-};
+} findings;
+static struct incise_verify_report report;
 
 static void found(void *user, const struct incise_verify_finding *finding)
 {
-	struct findings *findings = user;
-	size_t n = strlen(findings->text);
+	size_t n = strlen(findings.text);
 
 	assert_null(strchr(finding->text, '\n'));
-	snprintf(findings->text + n, sizeof(findings->text) - n, "%s\n", finding->text);
+	snprintf(findings.text + n, sizeof(findings.text) - n, "%s\n", finding->text);
 	if (n == 0)
-		findings->first = *finding;
+		findings.first = *finding;
 }
 
-static void verify(const char *path, struct incise_verify_report *report,
-		   struct findings *findings)
+static void verify(const char *path)
 {
-	struct incise_verify_watch watch = {.found = found, .user = findings};
-	struct incise_error err = {0};
+	struct incise_verify_watch watch = {.found = found};
 
-	memset(findings, 0, sizeof(*findings));
-	if (incise_verify(path, &watch, report, &err))
-		fail_msg("%s", err.text);
+	memset(&findings, 0, sizeof(findings));
+	succeeds(!incise_verify(path, &watch, &report, &err));
 }
 
-static void good_recording_is_complete(void **state)
+TEST(good_recording_is_complete, WITH_MODULES)
 {
-	struct incise_verify_report report;
-	struct findings findings;
 
 	record("a.rec", SIM, 1000 * MS);
-	verify("a.rec", &report, &findings);
+	verify("a.rec");
 	if (!report.complete)
 		fail_msg("%s", findings.text);
 	assert_true(report.intact && !report.interrupted && !report.findings);
 	assert_int_equal(report.n_streams, 2);
 	for (int i = 0; i < 2; i++) {
 		const struct incise_verify_stream *stream = &report.streams[i];
-		char sql[80];
 
 		assert_string_equal(stream->name, i ? "tracker" : "force");
-		snprintf(sql, sizeof(sql), "SELECT count(*) FROM %s", stream->name);
-		assert_int_equal(stream->present, (int)ask(DB, sql));
+		assert_int_equal(stream->present,
+				 (int)ask(DB, i ? "SELECT count(*) FROM tracker"
+						: "SELECT count(*) FROM force"));
 		assert_int_equal(stream->expected, stream->present);
 		assert_int_equal(stream->lost + stream->lost_at_capture + stream->altered,
 				 0);
@@ -65,7 +61,7 @@ static void good_recording_is_complete(void **state)
 }
 
 /* Force has 1000 rows a block, the tracker 12 or so; 3000 ms, 30 blocks and the end. */
-static void tampering_is_found(void **state)
+TEST(tampering_is_found, WITH_MODULES)
 {
 	static const struct {
 		const char *sql, *text;
@@ -180,13 +176,11 @@ static void tampering_is_found(void **state)
 
 	record("good.rec", SIM, 3000 * MS);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_verify_report report;
-		struct findings findings;
 		uint64_t lost = 0, altered = 0;
 
 		assert_int_equal(system("rm -rf a.rec; cp -r good.rec a.rec"), 0);
 		change(DB, cases[i].sql);
-		verify("a.rec", &report, &findings);
+		verify("a.rec");
 		for (int j = 0; j < report.n_streams; j++) {
 			lost += report.streams[j].lost;
 			altered += report.streams[j].altered;
@@ -204,13 +198,10 @@ static void tampering_is_found(void **state)
 }
 
 /* Samples lost before they were written are reported, but are no alteration. */
-static void losses_are_no_alteration(void **state)
+TEST(losses_are_no_alteration, WITH_MODULES)
 {
 	struct incise_rig *rig = open_rig(SIM);
-	struct incise_verify_report report;
 	struct incise_force_sample drop[2000];
-	struct findings findings;
-	struct incise_error err = {0};
 	struct incise_recorder *recorder;
 
 	recorder = start_recorder("a.rec", rig);
@@ -223,7 +214,7 @@ static void losses_are_no_alteration(void **state)
 	assert_int_equal(incise_recorder_close(recorder, &err), 0);
 	incise_rig_close(rig);
 
-	verify("a.rec", &report, &findings);
+	verify("a.rec");
 	assert_true(!report.complete && report.intact && report.findings == 1);
 	assert_int_equal(report.streams[0].lost, 300);
 	assert_int_equal(report.streams[0].lost_at_capture, 300);
@@ -236,19 +227,16 @@ static void losses_are_no_alteration(void **state)
 			 301 * 100000LL);
 }
 
-static void interrupted_is_intact(void **state)
+TEST(interrupted_is_intact, WITH_MODULES)
 {
 	struct incise_rig *rig = open_rig(SIM);
-	struct incise_verify_report report;
-	struct findings findings;
-	struct incise_error err = {0};
 	struct incise_recorder *recorder;
 
 	recorder = start_recorder("a.rec", rig);
-	verify("a.rec", &report, &findings); /* not a row */
+	verify("a.rec"); /* not a row */
 	assert_true(report.interrupted && report.intact && report.findings == 1);
 	assert_int_equal(poll_for(recorder, rig, 750 * MS, &err), 0);
-	verify("a.rec", &report, &findings); /* as it is written */
+	verify("a.rec"); /* as it is written */
 	assert_true(report.interrupted && report.intact && !report.complete);
 	assert_int_equal(report.findings, 1);
 	assert_int_equal(findings.first.kind, INCISE_VERIFY_INTERRUPTED);
@@ -257,39 +245,35 @@ static void interrupted_is_intact(void **state)
 	assert_int_equal(system("cp -r a.rec.part b.rec.part"), 0); /* as kill -9 */
 	assert_int_equal(incise_recorder_close(recorder, &err), 0);
 	incise_rig_close(rig);
-	verify("b.rec", &report, &findings);
+	verify("b.rec");
 	assert_true(report.interrupted && report.intact);
 	assert_says(findings.text, "not verified");
 	/* of them no change is found, but that rows of depth are missing */
 	change("b.rec.part/recording.db", "UPDATE events SET text = 'else'");
-	verify("b.rec", &report, &findings);
+	verify("b.rec");
 	assert_true(report.interrupted && report.intact);
 	change("b.rec.part/recording.db", "DELETE FROM depth WHERE seq = 7");
-	verify("b.rec", &report, &findings);
+	verify("b.rec");
 	assert_false(report.intact);
 	change("b.rec.part/recording.db", "DELETE FROM force WHERE seq = 77");
-	verify("b.rec", &report, &findings);
+	verify("b.rec");
 	assert_true(report.interrupted && !report.intact);
 	assert_int_equal(report.streams[0].lost, 1);
 }
 
 /* Marking a recording as interrupted does not avoid its seals. */
-static void closed_and_not_complete(void **state)
+TEST(closed_and_not_complete, WITH_MODULES)
 {
-	struct incise_verify_report report;
-	struct findings findings;
 
 	record("a.rec", SIM, 600 * MS);
 	change(DB, "UPDATE meta SET value = 0 WHERE key = 'complete'");
-	verify("a.rec", &report, &findings);
+	verify("a.rec");
 	assert_true(report.interrupted && !report.intact);
 	assert_says(findings.text, "unknown streams");
 }
 
-static void what_cannot_be_verified(void **state)
+TEST(what_cannot_be_verified, WITH_MODULES)
 {
-	struct incise_verify_report report;
-	struct incise_error err = {0};
 
 	assert_int_equal(incise_verify("none.rec", NULL, &report, &err), -ENOENT);
 	record("a.rec", SIM, 600 * MS);
@@ -299,7 +283,7 @@ static void what_cannot_be_verified(void **state)
 }
 
 /* A page in the middle is garbage: found, and no crash, wherever it is. */
-static void damaged_pages_are_found(void **state)
+TEST(damaged_pages_are_found, WITH_MODULES)
 {
 	struct stat st;
 
@@ -307,8 +291,6 @@ static void damaged_pages_are_found(void **state)
 	assert_int_equal(stat("good.rec/recording.db", &st), 0);
 	assert_true(st.st_size > 40 * 4096);
 	for (int page = 1; page < st.st_size / 4096; page += 2) {
-		struct incise_verify_report report;
-		struct incise_error err = {0};
 		char command[200];
 
 		snprintf(command, sizeof(command),
@@ -323,7 +305,7 @@ static void damaged_pages_are_found(void **state)
 	}
 }
 
-static void truncated_file(void **state)
+TEST(truncated_file, WITH_MODULES)
 {
 	struct stat st;
 
@@ -331,8 +313,6 @@ static void truncated_file(void **state)
 	assert_int_equal(stat(DB, &st), 0);
 	for (off_t size = st.st_size - 1; size > 0; size -= 40000) {
 		for (int whole = 0; whole < 2; whole++) { /* pages */
-			struct incise_verify_report report;
-			struct incise_error err = {0};
 
 			if (whole)
 				size -= size % 4096;
@@ -351,12 +331,10 @@ static int stop(void *user, double share)
 	return 1;
 }
 
-static void can_be_stopped(void **state)
+TEST(can_be_stopped, WITH_MODULES)
 {
 	int calls = 0;
 	struct incise_verify_watch watch = {.progress = stop, .user = &calls};
-	struct incise_verify_report report;
-	struct incise_error err = {0};
 
 	record("a.rec", SIM, 1000 * MS);
 	assert_int_equal(incise_verify("a.rec", &watch, &report, &err), -ECANCELED);
@@ -398,12 +376,10 @@ static void write_frames(int n, const struct change *change,
 	static const struct incise_frames_shape shape = {32, 16, INCISE_PIXELS_MJPEG, 60};
 	struct incise_frames_stored stored;
 	struct incise_frames_writer *writer;
-	struct incise_error err = {0};
 
 	unlink(FILE_NAME);
 	writer = incise_frames_writer_new(FILE_NAME, &shape, NULL, &err);
-	if (!writer)
-		fail_msg("%s", err.text);
+	succeeds(writer);
 	for (int i = 0; i < n; i++) {
 		bool here = i == change->at;
 		uint8_t bytes[SIZE(FRAMES)];
@@ -451,32 +427,29 @@ static void write_frames(int n, const struct change *change,
 
 static void put_block(const char *stream, const struct incise_ledger_block *block)
 {
-	char sql[300];
 
-	snprintf(sql, sizeof(sql),
-		 "INSERT INTO ledger VALUES('%s', %lld, %lld, %lld, %lld, %lld, %lld, "
-		 "%lld, %lld)",
-		 stream, (long long)block->block, (long long)block->first_seq,
-		 (long long)block->last_seq, (long long)block->first_ns,
-		 (long long)block->last_ns, (long long)block->count,
-		 (long long)block->lost, (long long)block->crc);
-	change(DB, sql);
+	change_by(DB,
+		  "INSERT INTO ledger VALUES('%s', %lld, %lld, %lld, %lld, %lld, %lld, "
+		  "%lld, %lld)",
+		  stream, (long long)block->block, (long long)block->first_seq,
+		  (long long)block->last_seq, (long long)block->first_ns,
+		  (long long)block->last_ns, (long long)block->count,
+		  (long long)block->lost, (long long)block->crc);
 }
 
 /* A row whose columns of vision are reals or NULL. */
 static void put_row(const struct incise_frame_record *row)
 {
-	char sql[300], length[40] = "NULL";
+	char length[40] = "NULL";
 
 	if (!isnan(row->length_px))
 		snprintf(length, sizeof(length), "%.1f", row->length_px);
-	snprintf(
-		sql, sizeof(sql),
+	change_by(
+		DB,
 		"INSERT INTO frames VALUES(%lld, %lld, %lld, %lld, %u, %u, %s, NULL, NULL, "
 		"%.2f)",
 		(long long)row->seq, (long long)row->t_ns, (long long)row->arrival_ns,
 		(long long)row->pts_ms, row->bytes, row->crc, length, row->quality);
-	change(DB, sql);
 }
 
 /* a.rec gets a camera of @n rows. */
@@ -485,7 +458,6 @@ static void add_camera(const struct incise_frame_record *rows, int n, bool end)
 	struct incise_ledger_block block;
 	struct incise_ledger_row row;
 	struct incise_ledger ledger;
-	char sql[300];
 
 	incise_ledger_init(&ledger);
 	for (int i = 0; i < n; i++) {
@@ -501,13 +473,12 @@ static void add_camera(const struct incise_frame_record *rows, int n, bool end)
 	incise_ledger_close(&ledger, 0, &block);
 	if (end)
 		put_block("camera", &block);
-	snprintf(
-		sql, sizeof(sql),
+	change_by(
+		DB,
 		"INSERT INTO streams(name, device, stamped, delay_ns, grain_ns, rows, lost, "
 		"late) VALUES('camera', 'test', 1, %lld, 0, %d, 0, 0); INSERT INTO meta "
 		"VALUES('frames_rows', %d), ('frames_lost', 0)",
 		DELAY_NS, n, n);
-	change(DB, sql);
 }
 
 /* As a recorder does at last; not @whole: it did not come to that. */
@@ -553,7 +524,7 @@ static void record_frames(int n, bool closed)
 	seal(closed);
 }
 
-static void frames_are_held_against_their_rows(void **state)
+TEST(frames_are_held_against_their_rows, WITH_MODULES)
 {
 	static const struct {
 		struct change change;
@@ -619,13 +590,11 @@ static void frames_are_held_against_their_rows(void **state)
 		 .seq = 1000,
 		 .extra = 1},
 	};
-	struct incise_verify_report report;
-	struct findings findings;
 
 	if (!has_frames())
 		skip();
 	record_frames(FRAMES, true);
-	verify("a.rec", &report, &findings);
+	verify("a.rec");
 	if (!report.complete || !report.intact)
 		fail_msg("%s", findings.text);
 	assert_int_equal(report.n_streams, 3);
@@ -637,7 +606,7 @@ static void frames_are_held_against_their_rows(void **state)
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		write_frames(FRAMES, &cases[i].change, NULL);
 		seal(true); /* a file's head has a random number of its own */
-		verify("a.rec", &report, &findings);
+		verify("a.rec");
 		assert_true(!report.complete && !report.intact && report.findings == 1);
 		assert_says(findings.text, cases[i].text);
 		assert_int_equal(findings.first.kind, INCISE_VERIFY_FRAMES);
@@ -652,7 +621,7 @@ static void frames_are_held_against_their_rows(void **state)
 	}
 }
 
-static void rows_of_frames_are_in_the_ledger(void **state)
+TEST(rows_of_frames_are_in_the_ledger, WITH_MODULES)
 {
 	static const struct {
 		const char *sql, *text;
@@ -672,8 +641,6 @@ static void rows_of_frames_are_in_the_ledger(void **state)
 		 "FROM ledger WHERE stream = 'camera'",
 		 "camera: 30 rows"},
 	};
-	struct incise_verify_report report;
-	struct findings findings;
 
 	if (!has_frames())
 		skip();
@@ -682,17 +649,15 @@ static void rows_of_frames_are_in_the_ledger(void **state)
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		assert_int_equal(system("rm -rf a.rec; cp -r good.rec a.rec"), 0);
 		change(DB, cases[i].sql);
-		verify("a.rec", &report, &findings);
+		verify("a.rec");
 		assert_true(!report.complete && !report.intact);
 		assert_says(findings.text, cases[i].text);
 	}
 }
 
 /* Any byte of the frames is some frame's, or of the form of the file. */
-static void damaged_file(void **state)
+TEST(damaged_file, WITH_MODULES)
 {
-	struct incise_verify_report report;
-	struct findings findings;
 	uint8_t first[64];
 	struct stat st;
 	FILE *file;
@@ -720,7 +685,7 @@ static void damaged_file(void **state)
 		}
 	}
 	fclose(file);
-	verify("a.rec", &report, &findings);
+	verify("a.rec");
 	assert_false(report.intact);
 	assert_says(findings.text, "number 12,");
 
@@ -731,7 +696,7 @@ static void damaged_file(void **state)
 		fseek(file, at, SEEK_SET);
 		fputc(0x55, file); /* no byte there is */
 		fclose(file);
-		verify("a.rec", &report, &findings);
+		verify("a.rec");
 		if (report.intact)
 			fail_msg("byte %ld", at);
 	}
@@ -740,7 +705,7 @@ static void damaged_file(void **state)
 	for (off_t size = st.st_size - 1; size > 0; size -= 397) {
 		assert_int_equal(system("cp good.mkv " FILE_NAME), 0);
 		assert_int_equal(truncate(FILE_NAME, size), 0);
-		verify("a.rec", &report, &findings);
+		verify("a.rec");
 		if (report.intact ||
 		    report.frames.present + report.frames.missing +
 				    report.frames.altered !=
@@ -749,49 +714,45 @@ static void damaged_file(void **state)
 			fail_msg("%ld bytes: %s", (long)size, findings.text);
 	}
 	assert_int_equal(system("echo nothing >" FILE_NAME), 0);
-	verify("a.rec", &report, &findings);
+	verify("a.rec");
 	assert_false(report.intact);
 	assert_says(findings.text, "frames");
 	assert_int_equal(findings.first.kind, INCISE_VERIFY_DAMAGED);
 	unlink(FILE_NAME);
-	verify("a.rec", &report, &findings);
+	verify("a.rec");
 	assert_false(report.intact);
 	assert_says(findings.text, "camera.mkv", "30 frames");
 	assert_int_equal(report.frames.missing, FRAMES);
 }
 
 /* A kill comes after a frame and before its row. */
-static void file_is_ahead_of_an_interrupted_recording(void **state)
+TEST(file_is_ahead_of_an_interrupted_recording, WITH_MODULES)
 {
-	struct incise_verify_report report;
-	struct findings findings;
 
 	if (!has_frames())
 		skip();
 	record_frames(FRAMES - 4, false);
-	verify("a.rec", &report, &findings);
+	verify("a.rec");
 	if (!report.interrupted || !report.intact || report.findings != 1)
 		fail_msg("%s", findings.text);
 	assert_int_equal(report.frames.present, FRAMES - 4);
 	assert_int_equal(report.frames.ahead, 4);
 
 	seal(true);
-	verify("a.rec", &report, &findings);
+	verify("a.rec");
 	assert_false(report.intact);
 	assert_says(findings.text, "camera.mkv", "numbers 31 to 34");
 	assert_int_equal(report.frames.extra, 4);
 }
 
-static void without_the_module_it_is_said(void **state)
+TEST(without_the_module_it_is_said, WITH_MODULES)
 {
-	struct incise_verify_report report;
-	struct findings findings;
 
 	if (!has_frames())
 		skip();
 	record_frames(FRAMES, true);
 	setenv("INCISE_MODULE_PATH", "/nonexistent", 1);
-	verify("a.rec", &report, &findings);
+	verify("a.rec");
 	assert_false(report.complete);
 	assert_false(report.intact);
 	assert_true(report.unverified);
@@ -802,34 +763,28 @@ static void without_the_module_it_is_said(void **state)
 }
 
 /* A recording of the recorder, with a calibrated delay. */
-static void recorder_and_verification_agree(void **state)
+TEST(recorder_and_verification_agree, WITH_MODULES)
 {
-	struct incise_error err = {0};
 	struct incise_calibration calibration;
-	struct incise_verify_report report;
 	struct incise_recorder *recorder;
-	struct findings findings;
 	struct incise_rig *rig;
 
 	if (!has_frames())
 		skip();
 	rig = incise_rig_open("sim:clock=simulated", BOTH | INCISE_RIG_CAMERA, &err);
-	if (!rig)
-		fail_msg("%s", err.text);
+	succeeds(rig);
 	incise_calibration_nominal(&calibration);
 	calibration.camera_delay_ms = 2.5;
-	recorder = incise_recorder_new(
+	recorder = start_recorder_by(
 		"a.rec", rig,
-		&(struct incise_recorder_setup){.calibration = &calibration}, &err);
-	if (!recorder)
-		fail_msg("%s", err.text);
+		(struct incise_recorder_setup){.calibration = &calibration});
 	assert_int_equal(poll_for(recorder, rig, 550 * MS, &err), 0);
-	verify("a.rec", &report, &findings); /* as it is written */
+	verify("a.rec"); /* as it is written */
 	if (!report.interrupted || !report.intact || report.findings != 1)
 		fail_msg("%s", findings.text);
 	assert_int_equal(incise_recorder_close(recorder, &err), 0);
 	incise_rig_close(rig);
-	verify("a.rec", &report, &findings);
+	verify("a.rec");
 	if (!report.complete || !report.intact)
 		fail_msg("%s", findings.text);
 	assert_int_equal(report.n_streams, 3);
@@ -839,33 +794,7 @@ static void recorder_and_verification_agree(void **state)
 	assert_int_equal(ask(DB, "SELECT delay_ns FROM streams WHERE name = 'camera'"),
 			 2500000);
 	change(DB, "UPDATE streams SET delay_ns = 0 WHERE name = 'camera'");
-	verify("a.rec", &report, &findings);
+	verify("a.rec");
 	assert_false(report.intact);
 	assert_says(findings.text, "time", "table streams");
-}
-
-#define WITH_MODULES(test) \
-	cmocka_unit_test_setup_teardown(test, enter_with_modules, leave_folder)
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		WITH_MODULES(good_recording_is_complete),
-		WITH_MODULES(tampering_is_found),
-		WITH_MODULES(losses_are_no_alteration),
-		WITH_MODULES(interrupted_is_intact),
-		WITH_MODULES(closed_and_not_complete),
-		WITH_MODULES(what_cannot_be_verified),
-		WITH_MODULES(damaged_pages_are_found),
-		WITH_MODULES(truncated_file),
-		WITH_MODULES(can_be_stopped),
-		WITH_MODULES(frames_are_held_against_their_rows),
-		WITH_MODULES(rows_of_frames_are_in_the_ledger),
-		WITH_MODULES(damaged_file),
-		WITH_MODULES(file_is_ahead_of_an_interrupted_recording),
-		WITH_MODULES(recorder_and_verification_agree),
-		WITH_MODULES(without_the_module_it_is_said),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -7,12 +7,7 @@
  *                                                └─► REALTIME  = MONOTONIC + steps
  *           └► source: REALTIME less UTC, with noise below the bound that it states
  */
-#include <errno.h>
-#include <math.h>
 #include "../unit.h"
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <incise/wall.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/record/time/wall_follow.h"

@@ -3,22 +3,12 @@
  * Tests of lib/record/write/wall_peers.c with sockets of a chronyd and a ptp4l that are made here, on
  * simulated clocks: the master is 3 s and 50 ppm from this machine, which is never set right.
  */
+#include "../unit.h"
 #include <arpa/inet.h>
-#include <errno.h>
-#include <math.h>
 #include <poll.h>
 #include <pthread.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/socket.h>
 #include <sys/un.h>
-#include <unistd.h>
-#include <cmocka.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/record/write/wall_sources.h"
 
@@ -34,7 +24,7 @@
 
 enum manner { GOOD, SILENT, GARBAGE, WRONG_SEQUENCE, LOST, MASTER, HARDWARE };
 
-struct daemon {
+static struct daemon {
 	pthread_t thread;
 	int fd, stop[2];
 	enum manner manner;
@@ -45,7 +35,9 @@ struct daemon {
 	uint8_t flags; /* of TIME_PROPERTIES */
 	uint8_t gm;
 	_Atomic int requests;
-};
+} d;
+static struct incise_wall_peer peer;
+static struct incise_wall_statement statement;
 
 static void put(uint8_t *to, uint64_t value, int n)
 {
@@ -67,7 +59,7 @@ static void put_float(uint8_t *to, double value)
 	    4);
 }
 
-static size_t answer_chrony(const struct daemon *d, const uint8_t *request, uint8_t *out)
+static size_t answer_chrony(const uint8_t *request, uint8_t *out)
 {
 	memset(out, 0, 104);
 	out[0] = 6;
@@ -75,11 +67,11 @@ static size_t answer_chrony(const struct daemon *d, const uint8_t *request, uint
 	put(out + 4, 33, 2);
 	put(out + 6, 5, 2);
 	memcpy(out + 16, request + 8, 4);
-	put(out + 28, d->manner == LOST ? 0x7f7f0101 : 0xc0a80001, 4);
+	put(out + 28, d.manner == LOST ? 0x7f7f0101 : 0xc0a80001, 4);
 	put(out + 52, 2, 2);
-	put(out + 60, (uint64_t)(d->ref_ns / S), 4);
-	put(out + 64, (uint64_t)(d->ref_ns % S), 4);
-	put_float(out + 68, (double)d->correction_ns * 1e-9);
+	put(out + 60, (uint64_t)(d.ref_ns / S), 4);
+	put(out + 64, (uint64_t)(d.ref_ns % S), 4);
+	put_float(out + 68, (double)d.correction_ns * 1e-9);
 	put_float(out + 84, 0.01);
 	put_float(out + 88, 0.05);
 	put_float(out + 92, 400e-6);
@@ -87,7 +79,7 @@ static size_t answer_chrony(const struct daemon *d, const uint8_t *request, uint
 	return 104;
 }
 
-static size_t answer_ptp(const struct daemon *d, const uint8_t *request, uint8_t *out)
+static size_t answer_ptp(const uint8_t *request, uint8_t *out)
 {
 	int id = request[52] << 8 | request[53];
 	uint8_t *data = out + 54;
@@ -98,30 +90,30 @@ static size_t answer_ptp(const struct daemon *d, const uint8_t *request, uint8_t
 	out[46] = 2;
 	switch (id) {
 	case 0xc000:
-		put(data, (uint64_t)d->offset_ns, 8);
-		put(data + 8, (uint64_t)d->ingress_ns, 8);
-		data[41] = d->manner != LOST && d->manner != MASTER;
-		memset(data + 42, d->gm, 8);
+		put(data, (uint64_t)d.offset_ns, 8);
+		put(data + 8, (uint64_t)d.ingress_ns, 8);
+		data[41] = d.manner != LOST && d.manner != MASTER;
+		memset(data + 42, d.gm, 8);
 		size = 50;
 		break;
 	case 0x2001:
-		put(data + 10, d->no_delay ? 0 : (uint64_t)PATH_NS << 16, 8);
+		put(data + 10, d.no_delay ? 0 : (uint64_t)PATH_NS << 16, 8);
 		size = 18;
 		break;
 	case 0x2003:
 		put(data, UTC_S, 2);
-		data[2] = d->flags;
+		data[2] = d.flags;
 		size = 4;
 		break;
 	case 0xc004:
-		data[11] = d->manner == HARDWARE;
+		data[11] = d.manner == HARDWARE;
 		data[12] = 4;
 		memcpy(data + 13, "eth0", 4);
 		size = 17;
 		break;
 	case 0x2004:
 		/* as ptp4l with free_running: uncalibrated */
-		data[10] = d->manner == LOST || d->manner == MASTER ? 6 : 8;
+		data[10] = d.manner == LOST || d.manner == MASTER ? 6 : 8;
 		size = 26;
 		break;
 	}
@@ -132,30 +124,29 @@ static size_t answer_ptp(const struct daemon *d, const uint8_t *request, uint8_t
 
 static void *run(void *argument)
 {
-	struct daemon *d = argument;
-	struct pollfd wait[] = {{.fd = d->fd, .events = POLLIN},
-				{.fd = d->stop[0], .events = POLLIN}};
+	struct pollfd wait[] = {{.fd = d.fd, .events = POLLIN},
+				{.fd = d.stop[0], .events = POLLIN}};
 	uint8_t request[1500], reply[1500];
 
 	while (poll(wait, 2, -1) > 0 && !wait[1].revents) {
 		struct sockaddr_storage from;
 		socklen_t length = sizeof(from);
-		ssize_t n = recvfrom(d->fd, request, sizeof(request), 0,
+		ssize_t n = recvfrom(d.fd, request, sizeof(request), 0,
 				     (struct sockaddr *)&from, &length);
 		size_t size;
 
 		if (n < 54)
 			continue;
-		d->requests++;
-		size = d->chrony ? answer_chrony(d, request, reply)
-				 : answer_ptp(d, request, reply);
-		if (d->manner == WRONG_SEQUENCE)
-			reply[d->chrony ? 19 : 31] ^= 1;
-		if (d->manner == GARBAGE)
+		d.requests++;
+		size = d.chrony ? answer_chrony(request, reply)
+				: answer_ptp(request, reply);
+		if (d.manner == WRONG_SEQUENCE)
+			reply[d.chrony ? 19 : 31] ^= 1;
+		if (d.manner == GARBAGE)
 			for (size_t i = 0; i < size; i++)
-				reply[i] = incise_random_next(&d->random) & 0xff;
-		if (d->manner != SILENT)
-			sendto(d->fd, reply, size, 0, (struct sockaddr *)&from, length);
+				reply[i] = incise_random_next(&d.random) & 0xff;
+		if (d.manner != SILENT)
+			sendto(d.fd, reply, size, 0, (struct sockaddr *)&from, length);
 	}
 	return NULL;
 }
@@ -163,45 +154,58 @@ static void *run(void *argument)
 static char folder[] = "/tmp/incise-peers-XXXXXX";
 static char path[64];
 
-static void start(struct daemon *d, bool chrony, struct incise_wall_peer *peer)
+static void start(bool chrony)
 {
 	struct sockaddr_un name = {.sun_family = AF_UNIX};
 	struct sockaddr_in address = {.sin_family = AF_INET,
 				      .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
 	socklen_t length = sizeof(address);
 
-	*d = (struct daemon){.chrony = chrony, .random = 1, .gm = 0xaa};
-	incise_wall_peer_init(peer);
-	peer->patience_ns = PATIENCE_NS;
-	d->fd = socket(chrony ? AF_INET : AF_UNIX, SOCK_DGRAM, 0);
+	d = (struct daemon){.chrony = chrony, .random = 1, .gm = 0xaa};
+	incise_wall_peer_init(&peer);
+	peer.patience_ns = PATIENCE_NS;
+	d.fd = socket(chrony ? AF_INET : AF_UNIX, SOCK_DGRAM, 0);
 	if (chrony) {
-		assert_int_equal(bind(d->fd, (struct sockaddr *)&address, length), 0);
-		getsockname(d->fd, (struct sockaddr *)&address, &length);
-		peer->port = ntohs(address.sin_port);
+		assert_int_equal(bind(d.fd, (struct sockaddr *)&address, length), 0);
+		getsockname(d.fd, (struct sockaddr *)&address, &length);
+		peer.port = ntohs(address.sin_port);
 	} else {
 		strcpy(name.sun_path, path);
-		strcpy(peer->path, path);
-		assert_int_equal(bind(d->fd, (struct sockaddr *)&name, sizeof(name)), 0);
+		strcpy(peer.path, path);
+		assert_int_equal(bind(d.fd, (struct sockaddr *)&name, sizeof(name)), 0);
 	}
-	assert_int_equal(pipe(d->stop), 0);
-	assert_int_equal(pthread_create(&d->thread, NULL, run, d), 0);
+	assert_int_equal(pipe(d.stop), 0);
+	assert_int_equal(pthread_create(&d.thread, NULL, run, NULL), 0);
 }
 
-static void stop(struct daemon *d, struct incise_wall_peer *peer)
+static int start_ptp(void **state)
 {
-	assert_int_equal(write(d->stop[1], "", 1), 1);
-	pthread_join(d->thread, NULL);
-	close(d->fd);
-	close(d->stop[0]);
-	close(d->stop[1]);
+	start(false);
+	return 0;
+}
+
+static int start_chrony(void **state)
+{
+	start(true);
+	return 0;
+}
+
+static int stop(void **state)
+{
+	assert_int_equal(write(d.stop[1], "", 1), 1);
+	pthread_join(d.thread, NULL);
+	close(d.fd);
+	close(d.stop[0]);
+	close(d.stop[1]);
 	unlink(path);
-	incise_wall_peer_close(peer);
+	incise_wall_peer_close(&peer);
+	return 0;
 }
 
 /* The daemon's thread may run later than those who gave its answer up. */
-static void await_request(struct daemon *d)
+static void await_request(void)
 {
-	for (int ms = 0; !d->requests; ms++) {
+	for (int ms = 0; !d.requests; ms++) {
 		if (ms == PATIENCE_NS / 1000000)
 			fail_msg("no request came");
 		usleep(1000);
@@ -229,22 +233,21 @@ static int64_t master_ns(double s)
 }
 
 /* A sync a third of a second ago; the offset has the asymmetry of the path, and noise. */
-static void sync_at(struct daemon *d, double s)
+static void sync_at(double s)
 {
 	struct incise_wall_clocks clocks = clocks_at(s - 0.3);
 
-	d->ingress_ns = clocks.real_ns;
-	d->offset_ns =
+	d.ingress_ns = clocks.real_ns;
+	d.offset_ns =
 		clocks.real_ns - master_ns(s - 0.3) +
-		llrint(ASYMMETRY_NS + NOISE_NS * incise_random_symmetric(&d->random));
+		llrint(ASYMMETRY_NS + NOISE_NS * incise_random_symmetric(&d.random));
 }
 
-static struct incise_wall_statement ask_at(struct incise_wall_peer *peer, double s)
+static struct incise_wall_statement ask_at(double s)
 {
 	struct incise_wall_clocks clocks = clocks_at(s);
-	struct incise_wall_statement statement;
 
-	incise_wall_ptp_read(peer, &clocks, &statement);
+	incise_wall_ptp_read(&peer, &clocks, &statement);
 	return statement;
 }
 
@@ -262,108 +265,85 @@ static void check_ptp(const struct incise_wall_reading *r, double s, double most
  * Free running: the offset is applied. The bound is the path's delay, twice the largest distance
  * from the line, 15 µs of noise, and what 0.3 s at 200 ppm are until the rate is known.
  */
-static void offset_of_ptp4l_is_applied(void **state)
+TEST(offset_of_ptp4l_is_applied, start_ptp, stop)
 {
-	struct incise_wall_peer peer;
-	struct daemon d;
-
-	start(&d, false, &peer);
 	d.no_delay = true;
-	sync_at(&d, 0.5);
-	assert_false(ask_at(&peer, 0.5).reading.good);
+	sync_at(0.5);
+	assert_false(ask_at(0.5).reading.good);
 	d.no_delay = false;
 	for (int s = 1; s < 60; s++) {
-		struct incise_wall_statement statement;
-
-		sync_at(&d, s);
-		statement = ask_at(&peer, s);
+		sync_at(s);
+		ask_at(s);
 		check_ptp(&statement.reading, s,
 			  PATH_NS + (s < 4 ? 60100 : 2 * 2 * NOISE_NS + 2000));
 		assert_string_equal(statement.reading.source, "ptp");
 		assert_string_equal(statement.reading.reference, "ptp:aaaaaaaaaaaaaaaa");
 	}
-	stop(&d, &peer);
 }
 
-static void timescale_and_traceability(void **state)
+TEST(timescale_and_traceability, start_ptp, stop)
 {
-	struct incise_wall_statement statement;
-	struct incise_wall_peer peer;
-	struct daemon d;
-
-	start(&d, false, &peer);
 	d.flags = 1 << 2 | 1 << 3 | 1 << 4;
-	sync_at(&d, 1);
-	statement = ask_at(&peer, 1);
+	sync_at(1);
+	ask_at(1);
 	assert_string_equal(statement.reading.reference, "TAI");
 	assert_string_equal(statement.reading.leap, "ptp");
 	check_ptp(&statement.reading, 1, 1e6);
-	stop(&d, &peer);
 }
 
-static void lost_master_is_no_master(void **state)
+TEST(lost_master_is_no_master, start_ptp, stop)
 {
-	struct incise_wall_statement statement;
-	struct incise_wall_peer peer;
-	struct daemon d;
-
-	start(&d, false, &peer);
 	for (int s = 1; s < 10; s++) {
-		sync_at(&d, s);
-		statement = ask_at(&peer, s);
+		sync_at(s);
+		ask_at(s);
 	}
 	assert_true(statement.reading.good);
 	/* No sync for 5 s, though the daemon says that it is a slave. */
-	assert_true(ask_at(&peer, 12).reading.good);
-	assert_false(ask_at(&peer, 15.5).reading.good);
+	assert_true(ask_at(12).reading.good);
+	assert_false(ask_at(15.5).reading.good);
 	/* It makes itself the master: the time of another source and reference. */
 	d.manner = LOST;
 	d.gm = 0xbb;
-	statement = ask_at(&peer, 16);
+	ask_at(16);
 	assert_string_equal(statement.reading.source, "ptp-master");
 	assert_string_equal(statement.reading.reference, "ptp:bbbbbbbbbbbbbbbb");
 	/* Back again. */
 	d.manner = GOOD;
 	d.gm = 0xaa;
-	sync_at(&d, 17);
-	statement = ask_at(&peer, 17);
+	sync_at(17);
+	ask_at(17);
 	check_ptp(&statement.reading, 17, 1e6);
 	/* The time of a hardware clock is not that of CLOCK_REALTIME, however near. */
 	d.manner = HARDWARE;
-	statement = ask_at(&peer, 17);
+	ask_at(17);
 	assert_false(statement.reading.good);
 	assert_true(statement.answered && statement.of_card);
 	d.manner = GOOD;
-	statement = ask_at(&peer, 17);
+	ask_at(17);
 	assert_true(statement.reading.good);
 	assert_true(statement.answered && !statement.of_card);
 	d.ingress_ns += UTC_S * S;
-	assert_false(ask_at(&peer, 18).reading.good);
-	stop(&d, &peer);
+	assert_false(ask_at(18).reading.good);
 }
 
 /* The first sync after a step may be from before it. */
-static void syncs_around_a_step(void **state)
+TEST(syncs_around_a_step, start_ptp, stop)
 {
-	struct incise_wall_statement statement;
 	struct incise_wall_clocks clocks;
-	struct incise_wall_peer peer;
-	struct daemon d;
 
-	start(&d, false, &peer);
 	for (int s = 1; s < 10; s++) {
-		sync_at(&d, s);
-		ask_at(&peer, s);
+		sync_at(s);
+		ask_at(s);
 	}
 	/* A sync at 9.7 s, a step by 1 s at 9.8 s, read at 10 s. */
-	sync_at(&d, 10);
+	sync_at(10);
 	clocks = clocks_at(10);
 	clocks.real_ns += S;
 	incise_wall_ptp_read(&peer, &clocks, &statement);
 	if (statement.reading.good)
 		check_ptp(&statement.reading, 10, 1e6);
 	for (int s = 11; s < 15; s++) {
-		sync_at(&d, s);
+		sync_at(s);
 		d.ingress_ns += S;
 		d.offset_ns += S;
 		clocks = clocks_at(s);
@@ -371,24 +351,20 @@ static void syncs_around_a_step(void **state)
 		incise_wall_ptp_read(&peer, &clocks, &statement);
 		check_ptp(&statement.reading, s, PATH_NS + 4 * NOISE_NS + 2000);
 	}
-	stop(&d, &peer);
 }
 
-static void bad_answers_are_none(void **state)
+TEST(bad_answers_are_none)
 {
 	static const enum manner manners[] = {SILENT, GARBAGE, WRONG_SEQUENCE};
 	struct incise_wall_clocks clocks = clocks_at(1);
-	struct incise_wall_statement statement;
-	struct incise_wall_peer peer;
-	struct daemon d;
 
 	for (int chrony = 0; chrony < 2; chrony++)
 		for (int i = 0; i < 3; i++) {
-			start(&d, chrony, &peer);
+			start(chrony);
 			d.manner = manners[i];
 			/* It waits for all of this, however busy the machine is. */
 			peer.patience_ns = S / 20;
-			sync_at(&d, 1);
+			sync_at(1);
 			for (int k = 0; k < 3; k++) {
 				if (chrony)
 					incise_wall_chrony_read(&peer, &clocks,
@@ -397,7 +373,7 @@ static void bad_answers_are_none(void **state)
 					incise_wall_ptp_read(&peer, &clocks, &statement);
 				assert_false(statement.reading.good);
 			}
-			await_request(&d);
+			await_request();
 			/* And then it answers. */
 			d.manner = GOOD;
 			peer.patience_ns = PATIENCE_NS;
@@ -406,7 +382,7 @@ static void bad_answers_are_none(void **state)
 			else
 				incise_wall_ptp_read(&peer, &clocks, &statement);
 			assert_true(statement.reading.good);
-			stop(&d, &peer);
+			stop(NULL);
 		}
 	/* Nobody is there. */
 	incise_wall_peer_init(&peer);
@@ -415,14 +391,10 @@ static void bad_answers_are_none(void **state)
 	assert_false(statement.reading.good);
 }
 
-static void tracking_of_chronyd(void **state)
+TEST(tracking_of_chronyd, start_chrony, stop)
 {
 	struct incise_wall_clocks clocks = clocks_at(1);
-	struct incise_wall_statement statement;
-	struct incise_wall_peer peer;
-	struct daemon d;
 
-	start(&d, true, &peer);
 	d.correction_ns = -2500000; /* the clock is fast */
 	d.ref_ns = REAL_NS + 123456789;
 	incise_wall_chrony_read(&peer, &clocks, &statement);
@@ -437,10 +409,9 @@ static void tracking_of_chronyd(void **state)
 	incise_wall_chrony_read(&peer, &clocks, &statement);
 	assert_false(statement.reading.good);
 	assert_true(statement.answered); /* without a time, which is no silence */
-	stop(&d, &peer);
 }
 
-static void list_of_leap_seconds(void **state)
+TEST(list_of_leap_seconds)
 {
 	char good[] = "#\tcomment\n#@\t3991593600\n2272060800\t10\t# 1 Jan 1972\n"
 		      "3692217600\t37\n",
@@ -471,17 +442,4 @@ static int remove_folder(void **state)
 	return rmdir(folder);
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(offset_of_ptp4l_is_applied),
-		cmocka_unit_test(timescale_and_traceability),
-		cmocka_unit_test(lost_master_is_no_master),
-		cmocka_unit_test(syncs_around_a_step),
-		cmocka_unit_test(bad_answers_are_none),
-		cmocka_unit_test(tracking_of_chronyd),
-		cmocka_unit_test(list_of_leap_seconds),
-	};
-
-	return cmocka_run_group_tests(tests, make_folder, remove_folder);
-}
+GROUP(make_folder, remove_folder);

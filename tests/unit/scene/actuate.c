@@ -3,16 +3,12 @@
  * lib/scene/actuate.c, and the duals of lib/device/axes.c: one actuator on a plan made by hand,
  * then several against an independent least-squares solution.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdio.h>
-#include <string.h>
+#include "../unit.h"
 #include <incise/backend.h>
 #include "../../../lib/base/vector.h"
 #include "../../../lib/device/axes.h"
 #include "../../../lib/scene/plan.h"
 #include "../message.h"
-#include "../unit.h"
 
 /* An actuator that keeps its requests, and reports the status that a test gives it. */
 struct reported {

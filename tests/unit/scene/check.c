@@ -7,12 +7,7 @@
  *                  ▲                                                                     │
  *                  ╰─────────────────────────────────────────────────────────────────────╯
  */
-#include <errno.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
+#include "../unit.h"
 #include <incise/clock.h>
 #include <incise/plan.h>
 #include "../../../lib/control/plant.h"
@@ -143,7 +138,7 @@ static struct swing press(const struct wall *wall, double seconds)
  * Of each device the limit that the check claims. Own delay_ticks = 0 lets walls through
  * that the check would refuse.
  */
-static void test_limit_is_that_of_the_loop(void **state)
+TEST(test_limit_is_that_of_the_loop)
 {
 	static const struct wall walls[] = {
 		{.mass_kg = 0.05, .b = 0.0005},		  /* 3.1 of the delay alone */
@@ -175,7 +170,7 @@ static void test_limit_is_that_of_the_loop(void **state)
 }
 
 /* The gain that a refusal names is safe, and a little more is not. */
-static void test_refusal_names_a_gain(void **state)
+TEST(test_refusal_names_a_gain)
 {
 	static const struct wall walls[] = {
 		{.K = 0.9, .mass_kg = 0.05, .b = 0.01, .delay_ticks = -1},
@@ -216,7 +211,7 @@ static void test_refusal_names_a_gain(void **state)
 
 /* A delay of its own is that of a wall without a predictor. */
 /* Tissue and a membrane that lies aslant push at once, and one below a plane in turn. */
-static void test_membrane_aslant(void **state)
+TEST(test_membrane_aslant)
 {
 	static const struct {
 		const char *normal;
@@ -252,7 +247,7 @@ static void test_membrane_aslant(void **state)
 	}
 }
 
-static void test_own_delay(void **state)
+TEST(test_own_delay)
 {
 	struct wall wall = {.mass_kg = 0.05, .b = 0.01, .delay_ticks = 5};
 	struct incise_haptic_device device = {
@@ -266,7 +261,7 @@ static void test_own_delay(void **state)
 }
 
 /* A kick dies out at nine tenths of the limit. */
-static void test_rests_below_the_limit(void **state)
+TEST(test_rests_below_the_limit)
 {
 	static const struct wall walls[] = {
 		{.mass_kg = 0.05, .b = 0.01},
@@ -284,7 +279,7 @@ static void test_rests_below_the_limit(void **state)
 	}
 }
 
-static void test_shipped_scenes(void **state)
+TEST(test_shipped_scenes)
 {
 	static const char *const names[] = {"liver", "neck", "wall"};
 
@@ -307,7 +302,7 @@ static void test_shipped_scenes(void **state)
 }
 
 /* The depth from which the force goes on with a slope of its own is the model's, compiled or not. */
-static void test_support_is_the_models(void **state)
+TEST(test_support_is_the_models)
 {
 	static const char *const arithmetics[] = {"double", "fixed"};
 	struct incise_plan_stability s[2];
@@ -330,17 +325,4 @@ static void test_support_is_the_models(void **state)
 	assert_true(fabs(s[0].beyond_N_mm - s[1].beyond_N_mm) < 2 * 1e-4);
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_limit_is_that_of_the_loop),
-		cmocka_unit_test(test_refusal_names_a_gain),
-		cmocka_unit_test(test_membrane_aslant),
-		cmocka_unit_test(test_own_delay),
-		cmocka_unit_test(test_rests_below_the_limit),
-		cmocka_unit_test(test_shipped_scenes),
-		cmocka_unit_test(test_support_is_the_models),
-	};
-
-	return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+GROUP(set_up, tear_down);

@@ -3,14 +3,10 @@
  * Stability of a scene along each actuator of a rig: its own lateness counts, and directions that
  * are not at right angles.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdio.h>
-#include <string.h>
+#include "../unit.h"
 #include <incise/backend.h>
 #include <incise/plan.h>
 #include "../message.h"
-#include "../unit.h"
 #include "../base/temp_file.h"
 
 #define DEVICES (INCISE_RIG_TRACKER | INCISE_RIG_STEPPER)
@@ -73,7 +69,6 @@ static const char one[] = VIRTUAL, two[] = VIRTUAL "sim = { axes = 2; };";
 TEST(each_actuator_has_its_own_limit)
 {
 	struct incise_plan_stability s, alone;
-	struct incise_error err = {0};
 
 	assert_int_equal(plan_wall(two, SOFT_N_mm, 0, 0.008, &s, &err), 0);
 	assert_int_equal(s.n_axes, 2);
@@ -100,7 +95,6 @@ TEST(each_actuator_has_its_own_limit)
 TEST(the_worst_actuator_decides)
 {
 	struct incise_plan_stability s;
-	struct incise_error err = {0};
 	double wall_N_mm;
 
 	assert_int_equal(plan_wall(two, SOFT_N_mm, 0, 0.008, &s, &err), 0);
@@ -124,7 +118,6 @@ TEST(actuators_that_push_against_each_other)
 		VIRTUAL "surface = { normal = [0.0, 0.5, 0.8660254037844386]; };"
 			"sim = { axes = 2; };";
 	struct incise_plan_stability s, alone;
-	struct incise_error err = {0};
 	double more = 2 / sqrt(3), wall_N_mm;
 
 	assert_int_equal(plan_wall(one, SOFT_N_mm, 0, 0, &alone, &err), 0);

@@ -7,11 +7,7 @@
  * The time that leaving out saves cannot be tested: the test counts the stages that run.
  * `incise plan` shows their ns.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
+#include "../unit.h"
 #include "../../../lib/scene/forces.h"
 #include "fed.h"
 #include "../cases.h"
@@ -76,7 +72,6 @@ static struct incise_scene *scene_of(const struct lacking *w,
 				     const char *arithmetic)
 {
 	char text[1600], tissue[800] = "";
-	struct incise_error err = {0};
 	struct incise_scene *scene;
 
 	for (int i = 0; i < incise_n_tissue_forces; i++) {
@@ -104,18 +99,15 @@ static struct incise_scene *scene_of(const struct lacking *w,
 				  "thickness_mm = 1.0; puncture_N = 0.3; "
 				  "back_wall_mm = 1.2; };\n");
 	scene = fed_scene(&folder, text, &err);
-	if (!scene)
-		fail_msg("%s", err.text);
+	succeeds(scene);
 	return scene;
 }
 
 static struct incise_plan *plan_of(const struct incise_scene *scene)
 {
-	struct incise_error err = {0};
 	struct incise_plan *plan = incise_plan_new(scene, NULL, &err);
 
-	if (!plan)
-		fail_msg("%s", err.text);
+	succeeds(plan);
 	return plan;
 }
 
@@ -314,7 +306,7 @@ static void lean_is_full_to_the_bit(const struct lack *lack,
 }
 
 /* Of the surfaces and evaluators each lack has one, and with CASES=all each. */
-static void test_lean_is_full_to_the_bit(void **state)
+TEST(test_lean_is_full_to_the_bit)
 {
 	const unsigned int met = INCISE_TICK_CONTACT | INCISE_TICK_STALE |
 				 INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED |
@@ -343,7 +335,7 @@ static void test_lean_is_full_to_the_bit(void **state)
 }
 
 /* A scene that lacks nothing keeps all, but for what no loop runs and what no rig has. */
-static void test_everything(void **state)
+TEST(test_everything)
 {
 	struct incise_scene *scene = scene_of(&(struct lacking){0}, CAPSULE, "fixed");
 	struct incise_plan *plan = plan_of(scene);
@@ -364,7 +356,7 @@ static void test_everything(void **state)
 }
 
 /* Pictures are nobody's force: asked for or not, the loop has no stage for them. */
-static void test_picture(void **state)
+TEST(test_picture)
 {
 	struct incise_scene *scene = fed_scene(&folder,
 					       "tissue = { reaction_N_mm = 0.3; };\n"
@@ -412,7 +404,7 @@ static void one_effect(const char *stage, const char *const text[3], int way)
 	}
 }
 
-static void test_one_force(void **state)
+TEST(test_one_force)
 {
 	for (int i = 0; i < incise_n_tissue_forces; i++) {
 		const struct incise_force_number *number = incise_tissue_forces[i].number;
@@ -431,7 +423,7 @@ static void test_one_force(void **state)
 	}
 }
 
-static void test_one_effect(void **state)
+TEST(test_one_effect)
 {
 	static const char tissue[] = "tissue = { reaction_N_mm = 0.3; };";
 	static const char *const average[] = {
@@ -456,15 +448,4 @@ static int tear_down(void **state)
 	return 0;
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_lean_is_full_to_the_bit),
-		cmocka_unit_test(test_everything),
-		cmocka_unit_test(test_picture),
-		cmocka_unit_test(test_one_force),
-		cmocka_unit_test(test_one_effect),
-	};
-
-	return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+GROUP(set_up, tear_down);

@@ -4,14 +4,7 @@
  * the plane constraint is felt where an actuator pushes across the blade, and counted as not felt
  * where none does.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
-#include <errno.h>
-#include <math.h>
-#include <string.h>
+#include "../unit.h"
 #include <incise/backend.h>
 #include <incise/loop.h>
 #include <incise/plan.h>
@@ -109,7 +102,7 @@ static int run_all(void **state)
 }
 
 /* The paper's Fx = -Kx (P - P0)·Sx Sx on the hand: aside by 5 mm, towards the cut. */
-static void the_plane_constraint_is_felt_with_two_axes(void **state)
+TEST(the_plane_constraint_is_felt_with_two_axes)
 {
 	double want_N = -PLANE_N_mm * ASIDE_MM;
 	const struct incise_tick *tick = &of[1].tick[AT_TICK];
@@ -124,7 +117,7 @@ static void the_plane_constraint_is_felt_with_two_axes(void **state)
 	assert_true(of[2].tick[AT_TICK].unfelt_N < 1e-12);
 }
 
-static void with_one_axis_it_is_reported_as_not_felt(void **state)
+TEST(with_one_axis_it_is_reported_as_not_felt)
 {
 	const struct incise_tick *tick = &of[0].tick[AT_TICK];
 
@@ -136,7 +129,7 @@ static void with_one_axis_it_is_reported_as_not_felt(void **state)
 }
 
 /* More axes change nothing of the first one, to the bit. */
-static void the_first_axis_is_as_if_alone(void **state)
+TEST(the_first_axis_is_as_if_alone)
 {
 	for (int n = 1; n < 3; n++) {
 		assert_memory_equal(of[n].target_mm, of[0].target_mm,
@@ -154,13 +147,4 @@ static void the_first_axis_is_as_if_alone(void **state)
 	assert_true(of[0].target_mm[AT_TICK] > 0.1);
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(the_plane_constraint_is_felt_with_two_axes),
-		cmocka_unit_test(with_one_axis_it_is_reported_as_not_felt),
-		cmocka_unit_test(the_first_axis_is_as_if_alone),
-	};
-
-	return cmocka_run_group_tests(tests, run_all, NULL);
-}
+GROUP(run_all, NULL);

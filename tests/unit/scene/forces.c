@@ -6,9 +6,6 @@
  * integers are compared with these in tests/unit/fixed.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/base/vector.h"
 #include "../../../lib/scene/plan.h"
 #include "felt.h"

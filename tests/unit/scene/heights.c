@@ -4,16 +4,12 @@
  * themselves at random places: no place is beyond the certified bound, and one is at least a tenth of
  * the bound away. Then the refusals.
  */
-#include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "../unit.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/scene/heights.h"
 #include "../../../lib/surface/surface.h"
 #include "../cases.h"
 #include "../message.h"
-#include "../unit.h"
 
 #define ONE 65536.0
 #define UNIT 1073741824.0
@@ -193,7 +189,6 @@ static void check(const char *name, struct incise_surface *surface, double reach
 {
 	struct incise_heights heights;
 	struct incise_fixed_grid grid;
-	struct incise_error err = {0};
 	struct seen seen = {0};
 	int rc = incise_heights_make(surface, up, 1, reach, wanted, &heights, &err);
 
@@ -256,7 +251,6 @@ static void refuse(struct incise_surface *surface, const double along[3],
 		   const char *text)
 {
 	struct incise_heights heights;
-	struct incise_error err = {0};
 
 	assert_error(incise_heights_make(surface, along, 1, 10, 0.02, &heights, &err),
 		     ERANGE, &err, text, "remove --in-kernel");

@@ -10,14 +10,11 @@
  * mk/test.mk lets the linker send the allocations of this program here (--wrap).
  */
 #include "../unit.h"
-#include <math.h>
 #include <signal.h>
-#include <string.h>
 #include <linux/seccomp.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
-#include <unistd.h>
 #include "../../extremes/ground.h"
 
 #define MS 1000000

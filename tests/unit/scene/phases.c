@@ -3,8 +3,7 @@
  * A scene with models of its own for puncture, cut and withdrawal: which of them the force is of, that
  * it does not leap between them, and scenes that cannot be.
  */
-#include <errno.h>
-#include <math.h>
+#include "../unit.h"
 #include "../../../lib/scene/plan.h"
 #include "../message.h"
 #include "fed.h"
@@ -104,7 +103,7 @@ static void run(const char *text, bool paper, struct seen *seen)
 	incise_scene_free(scene);
 }
 
-static void skin_gives_way_to_the_cut(void **state)
+TEST(skin_gives_way_to_the_cut)
 {
 	struct seen seen;
 
@@ -117,7 +116,7 @@ static void skin_gives_way_to_the_cut(void **state)
 }
 
 /* Drag is what the model says, where that is no more than what the blade would need to cut. */
-static void withdrawal_drags(void **state)
+TEST(withdrawal_drags)
 {
 	struct seen seen, plain, both;
 
@@ -134,7 +133,7 @@ static void withdrawal_drags(void **state)
 	assert_true(seen.leap_N < 5e-3 && both.leap_N < 5e-3);
 }
 
-static void stability_counts_each_model(void **state)
+TEST(stability_counts_each_model)
 {
 	struct incise_plan_stability s;
 	struct incise_plan_model model;
@@ -168,7 +167,7 @@ static void stability_counts_each_model(void **state)
 	incise_scene_free(scene);
 }
 
-static void refusals(void **state)
+TEST(refusals)
 {
 	static const struct {
 		const char *text;
@@ -202,14 +201,4 @@ static void refusals(void **state)
 	}
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(skin_gives_way_to_the_cut),
-		cmocka_unit_test(withdrawal_drags),
-		cmocka_unit_test(stability_counts_each_model),
-		cmocka_unit_test(refusals),
-	};
-
-	return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+GROUP(set_up, tear_down);

@@ -2,12 +2,7 @@
 /*
  * The group `picture` of a scene: what it says, what it does not say, what it cannot say.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
+#include "../unit.h"
 #include <incise/scene.h>
 #include "../message.h"
 
@@ -23,7 +18,7 @@ static struct incise_scene *scene(const char *group, struct incise_error *err)
 	return incise_scene_load(path, NULL, err);
 }
 
-static void test_said_and_not_said(void **state)
+TEST(test_said_and_not_said)
 {
 	struct incise_scene_picture p;
 	struct incise_scene *s = scene("", NULL);
@@ -53,7 +48,7 @@ static void test_said_and_not_said(void **state)
 	incise_scene_free(s);
 }
 
-static void test_refused(void **state)
+TEST(test_refused)
 {
 	static const struct {
 		const char *group, *says;
@@ -72,20 +67,17 @@ static void test_refused(void **state)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err;
-
 		assert_error(scene(cases[i].group, &err), EINVAL, &err, ":2",
 			     cases[i].says);
 	}
 }
 
-static void test_texture_is_set(void **state)
+TEST(test_texture_is_set)
 {
 	static const struct {
 		int px, rc;
 	} cases[] = {{256, 0},	      {4096, 0},       {2048, 0},    {128, -EINVAL},
 		     {8192, -EINVAL}, {1000, -EINVAL}, {0, -EINVAL}, {-512, -EINVAL}};
-	struct incise_error err = {0};
 	struct incise_scene *s = scene("picture = { texture_px = 512; };", &err);
 	struct incise_scene_picture p;
 	int now = 512;
@@ -112,13 +104,4 @@ static int end(void **state)
 	return unlink(path);
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_said_and_not_said),
-		cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_texture_is_set),
-	};
-
-	return cmocka_run_group_tests(tests, begin, end);
-}
+GROUP(begin, end);

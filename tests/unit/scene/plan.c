@@ -3,8 +3,7 @@
  * The plan at work: against the virtual rig's truth, with devices that lie or fail, and
  * without a rig, fed with poses.
  */
-#include <errno.h>
-#include <math.h>
+#include "../unit.h"
 #include <incise/fixed.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"
@@ -13,7 +12,6 @@
 #include "../../../lib/tissue/front.h"
 #include <time.h>
 #include "../message.h"
-#include "../unit.h"
 #include "fed.h"
 #include "../../../lib/sim/sim.h"
 
@@ -34,11 +32,15 @@ static double size(const double v[3])
 	return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
+/* Of the test that runs. */
+static struct felt f;
+static struct incise_tick t;
+static struct incise_tracker_ops ops;
+
 TEST(test_stages)
 {
 	static const char *const want[] = {"pose",  "predict", "contact", "reaction",
 					   "start", "limit",   "actuate"};
-	struct felt f;
 
 	for (int stepper = 0; stepper < 2; stepper++) {
 		felt_start(&f, "fixed", stepper ? BOTH : INCISE_RIG_TRACKER);
@@ -52,10 +54,8 @@ TEST(test_stages)
 
 TEST(test_needs_a_tracker)
 {
-	struct incise_error err = {0};
 	struct incise_rig *none =
 		incise_rig_open("sim:clock=simulated", INCISE_RIG_FORCE, NULL);
-	struct felt f;
 
 	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
 	assert_null(incise_plan_new(f.scene, none, &err));
@@ -68,9 +68,7 @@ TEST(test_needs_a_tracker)
 TEST(test_a_refused_model_names_its_scene)
 {
 	struct incise_model *triangles = paper_model(INCISE_MF_TRI, 1, 0.1);
-	struct incise_error err = {0};
 	struct incise_scene *scene;
-	struct felt f;
 	FILE *out;
 
 	felt_start(&f, "fixed", INCISE_RIG_TRACKER);
@@ -117,14 +115,12 @@ TEST(test_against_truth)
 		struct incise_front front = {0};
 		double side[3] = {0};
 		bool touched = false;
-		struct felt f;
 
 		felt_start(&f, evaluators[a], BOTH);
 		model = incise_model_load(f.model_path, NULL);
 		incise_plan_stability(f.plan, &stability);
 		for (int i = 0; i < 9500; i++) {
 			struct incise_sim_truth truth;
-			struct incise_tick t;
 			double x[2], want, cutting, tolerance_N;
 			bool began;
 
@@ -213,17 +209,14 @@ TEST(test_any_pose_gives_a_force_within_limits)
 	static const char *const evaluators[] = {"double", "fixed"};
 
 	for (int a = 0; a < 2; a++) {
-		struct incise_tracker_ops ops;
 		double last = 0;
 		int contacts = 0;
-		struct felt f;
 
 		felt_start(&f, evaluators[a], BOTH);
 		ops = *f.tracker_ops;
 		ops.read = lying_tracker;
 		incise_rig_tracker(f.rig)->ops = &ops;
 		for (int i = 0; i < 30000; i++) {
-			struct incise_tick t;
 			double force;
 
 			assert_int_equal(tick(&f, &t), 0);
@@ -260,9 +253,6 @@ static void press(struct felt *f)
 
 TEST(test_stalled_tracker_fades_out)
 {
-	struct incise_tracker_ops ops;
-	struct incise_tick t;
-	struct felt f;
 	int zero_at = 0;
 
 	felt_start(&f, "fixed", BOTH);
@@ -303,8 +293,6 @@ TEST(test_fault_is_zero_force_for_good)
 	for (int which = 0; which < 2; which++) {
 		struct incise_tracker_ops tracker;
 		struct incise_stepper_ops stepper;
-		struct incise_tick t;
-		struct felt f;
 		int want = which ? -EIO : -ENODEV;
 
 		felt_start(&f, "fixed", BOTH);
@@ -350,15 +338,12 @@ struct fed {
 
 static struct fed fed_start(const char *path, bool fixed)
 {
-	struct incise_error err = {0};
 	struct fed fed = {.scene = incise_scene_load(path, NULL, &err)};
 
-	if (!fed.scene)
-		fail_msg("%s", err.text);
+	succeeds(fed.scene);
 	incise_scene_set_arithmetic(fed.scene, fixed ? "fixed" : "double", NULL);
 	fed.plan = incise_plan_new(fed.scene, NULL, &err);
-	if (!fed.plan)
-		fail_msg("%s", err.text);
+	succeeds(fed.plan);
 	return fed;
 }
 
@@ -372,8 +357,6 @@ TEST(test_feed)
 {
 	struct fed fed = fed_start("scenes/neck.scene", true);
 	struct incise_tracker_sample poses[40];
-	struct incise_tick t;
-	struct felt f;
 
 	for (int i = 0; i < 40; i++)
 		poses[i] = (struct incise_tracker_sample){
@@ -416,7 +399,6 @@ TEST(test_run_is_feed_and_tick)
 	struct incise_tick *ticks = calloc(TICKS, sizeof(*ticks)), one = {0};
 	int in_contact = 0;
 	size_t next = 0;
-	struct felt f;
 
 	for (int i = 0; i < POSES; i++)
 		poses[i] = (struct incise_tracker_sample){
@@ -465,7 +447,6 @@ TEST(test_attitude)
 	for (int k = 0; k < 2; k++) {
 		struct fed fed = fed_start("scenes/neck.scene", true);
 		struct incise_tracker_sample pose = {.position_mm = {0, 0, 300}};
-		struct incise_tick t;
 
 		memcpy(pose.quaternion, turned, sizeof(turned));
 		assert_int_equal(incise_plan_set_tool(fed.plan, tools[k]), 0);
@@ -490,7 +471,6 @@ TEST(test_feed_from_the_future)
 {
 	struct fed fed = fed_start("scenes/wall.scene", true);
 	struct incise_tracker_sample pose = {.t_ns = INT64_MAX, .quaternion = {1}};
-	struct incise_tick t;
 
 	assert_int_equal(incise_plan_feed(fed.plan, &pose, 1), 1);
 	assert_int_equal(incise_plan_tick(fed.plan, 10000000, &t), 0);
@@ -513,7 +493,6 @@ TEST(test_set_tool)
 					     .quaternion = {1}};
 	static const enum incise_tool tools[] = {INCISE_TOOL_TUBE, INCISE_TOOL_BLADE,
 						 INCISE_TOOL_HANDLE, INCISE_TOOL_AUTO};
-	struct incise_tick t;
 
 	for (int i = 0; i < 4; i++) {
 		pose.t_ns = (i + 1) * INT64_C(10000000);
@@ -542,7 +521,6 @@ TEST(test_stale_handle)
 	struct fed fed = fed_start("scenes/neck.scene", true);
 	struct incise_tracker_sample pose = {.position_mm = {10, 0, 40},
 					     .quaternion = {1}};
-	struct incise_tick t;
 	int stale = 0;
 
 	assert_int_equal(incise_plan_set_tool(fed.plan, INCISE_TOOL_HANDLE), 0);
@@ -570,7 +548,6 @@ TEST(test_getters)
 	struct incise_touch top;
 	const char *name, *why = "none";
 	bool actuate = false;
-	struct felt f;
 
 	/* The highest line of the neck, in the middle of its length. */
 	incise_plan_top(fixed.plan, &top);
@@ -631,7 +608,6 @@ TEST(test_fed_tracker)
 	struct incise_plan *plan, *slow;
 	struct incise_scene *often;
 	struct fed_folder folder;
-	struct incise_error err;
 
 	fed_folder_make(&folder);
 	often = fed_scene(&folder,
@@ -674,7 +650,6 @@ TEST(test_fed_plane)
 	struct fed_folder folder;
 	struct incise_scene *scene;
 	struct incise_plan *plan;
-	struct incise_error err;
 	struct incise_tick tick;
 
 	fed_folder_make(&folder);
@@ -772,9 +747,6 @@ TEST(test_timed_tick_is_the_same)
 TEST(test_timed_fault)
 {
 	int64_t ns[INCISE_PLAN_STAGES_MAX];
-	struct incise_tracker_ops ops;
-	struct incise_tick t;
-	struct felt f;
 
 	felt_start(&f, "fixed", BOTH);
 	press(&f);
@@ -817,7 +789,6 @@ TEST(test_any_fed_pose_gives_a_force_within_limits)
 		for (int i = 1; i < 20000; i++) {
 			struct incise_tracker_sample pose = {.t_ns = i *
 								     INT64_C(1000000)};
-			struct incise_tick t;
 			double change[3];
 
 			for (int k = 0; k < 3; k++)

@@ -143,15 +143,11 @@ static void go(struct theatre *th, double x, double y, double z, double time_s)
 
 static void start_at(struct theatre *th, double z)
 {
-	struct incise_error err = {0};
-
 	memset(th, 0, sizeof(*th));
 	th->scene = incise_scene_load(NECK, NULL, &err);
-	if (!th->scene)
-		fail_msg("%s", err.text);
+	succeeds(th->scene);
 	th->plan = incise_plan_new(th->scene, NULL, &err);
-	if (!th->plan)
-		fail_msg("%s", err.text);
+	succeeds(th->plan);
 	th->bound_N = incise_plan_bound(th->plan, REACH_MM);
 	assert_true(th->bound_N > 0 && th->bound_N < 0.01);
 	th->t_ns = 1000000000;
@@ -248,11 +244,12 @@ static void turn_to(struct theatre *th, double about_z)
 	move(th, &to, 0.4, true);
 }
 
+/* Of the test that runs. */
+static struct theatre th;
+static struct held to;
+
 TEST(test_procedure)
 {
-	struct theatre th;
-	struct held to;
-
 	/* Approach, and cut 20 mm along x, 4 mm deep. */
 	start_at(&th, 15);
 	assert_free(&th);
@@ -341,9 +338,6 @@ TEST(test_procedure)
 /* In the tissue a turn does not change the tool. A word does, when the force has faded. */
 TEST(test_change_in_the_tissue)
 {
-	struct theatre th;
-	struct held to;
-
 	start_at(&th, 5);
 	go(&th, 10, 0, -2, 0.4);
 	to = th.to;
@@ -369,8 +363,6 @@ TEST(test_change_in_the_tissue)
  */
 TEST(test_change_is_no_work)
 {
-	struct theatre th;
-	struct held to;
 	int changed = 0, since = 0;
 	double force_N;
 
@@ -475,8 +467,6 @@ TEST(test_tube_where_and_after_what)
 	double before_N = 0;
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct theatre th;
-
 		cut_at(&th, cases[i].x, cases[i].cut_mm);
 		if (cases[i].enlarged)
 			enlarge_at(&th, cases[i].x);
@@ -497,7 +487,6 @@ TEST(test_tube_where_and_after_what)
 TEST(test_through_the_membrane)
 {
 	const double skin_N = tube_N(ALIGNED, 6, MEMBRANE_MM, 0);
-	struct theatre th;
 
 	cut_at(&th, 50, 6);
 	enlarge_at(&th, 50);
@@ -533,8 +522,6 @@ TEST(test_stopped_like_skin)
 	const double tight = ALIGNED + (1 - ALIGNED) * (TUBE_MM - STRETCH_MM) / TUBE_MM;
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct theatre th;
-
 		start_at(&th, 15);
 		go(&th, 20 - cases[i].half_mm, 0, -cases[i].cut_mm, 1);
 		go(&th, 20 + cases[i].half_mm, 0, -cases[i].cut_mm, 1);
@@ -551,7 +538,6 @@ TEST(test_stopped_like_skin)
 TEST(test_another_plan)
 {
 	static const char *const arithmetics[] = {"fixed", "double", "double", "fixed"};
-	struct theatre th;
 
 	cut_at(&th, 50, 6);
 	enlarge_at(&th, 50);
@@ -592,8 +578,6 @@ TEST(test_touch_elsewhere)
 	double force_N[3][3];
 
 	for (int other = 0; other < 3; other++) {
-		struct theatre th;
-
 		cut_at(&th, 50, 6);
 		go(&th, 20, 0, 15, 1);
 		go(&th, 20, 0, other == 0 ? 15 : other == 1 ? -0.05 : -3, 1);
@@ -628,8 +612,6 @@ static void set_out(struct theatre *th, const struct held *to, double time_s)
  */
 TEST(test_leaning_the_handle)
 {
-	struct theatre th;
-	struct held to;
 	double off_mm = 0, force_N = 0;
 
 	start_at(&th, 15);
@@ -659,8 +641,6 @@ TEST(test_averaged_normal)
 {
 	static const double ways[][2] = {{-30, -12}, {-20, 8}, {30, -14}, {30, 10}};
 	double ring[8][3];
-	struct theatre th;
-	struct held to;
 	int n = 0, most = 0;
 
 	start_at(&th, 10);
@@ -702,9 +682,6 @@ TEST(test_averaged_normal)
 TEST(test_damping_on_the_way)
 {
 	for (int way = 1; way >= -1; way -= 2) {
-		struct theatre th;
-		struct held to;
-
 		start_at(&th, 10);
 		go(&th, 10, 0, -4, 0.8);
 		to = th.to;
@@ -723,9 +700,7 @@ TEST(test_damping_on_the_way)
 /* A contact ends leave_mm = 0.2 mm above the skin, and starts at it. */
 TEST(test_hysteresis)
 {
-	struct theatre th;
 	double begun = NAN, ended = NAN;
-	struct held to;
 
 	start_at(&th, 1);
 	for (int way = 0; way < 2; way++) {

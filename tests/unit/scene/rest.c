@@ -3,18 +3,12 @@
  * A plan that is accepted comes to rest, and its message is right where it is not: in a closed
  * loop that shares no line with the search for swings.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
+#include "../unit.h"
 #include <incise/model.h>
 #include <incise/plan.h>
 #include "../../../tools/bench/closed_loop.h"
 #include "../cases.h"
 #include "../message.h"
-#include "../unit.h"
 
 struct loop {
 	const char *tissue; /* of the scene, beside the model */
@@ -25,7 +19,6 @@ struct loop {
 static struct incise_scene *scene_of(const struct loop *loop)
 {
 	char path[] = "/tmp/incise-rest-XXXXXX", model[4096];
-	struct incise_error err = {0};
 	struct incise_scene *scene;
 	FILE *file;
 	int fd;
@@ -42,8 +35,7 @@ static struct incise_scene *scene_of(const struct loop *loop)
 	assert_int_equal(fclose(file), 0);
 	scene = incise_scene_load(path, NULL, &err);
 	unlink(path);
-	if (!scene)
-		fail_msg("%s", err.text);
+	succeeds(scene);
 	return scene;
 }
 
@@ -102,13 +94,11 @@ static struct closed_loop_end rests(struct incise_plan *plan, const struct loop 
 static void lean_on(const struct loop *as, const double *leans, int n)
 {
 	struct loop loop = *as;
-	struct incise_error err = {0};
 	struct incise_scene *scene;
 
 	struct incise_plan *plan = plan_of(&loop, &scene, &err);
 
-	if (!plan)
-		fail_msg("%s", err.text);
+	succeeds(plan);
 	for (int i = 0; i < n; i++) {
 		loop.is.lean_N = leans[i];
 		rests(plan, &loop, i);
@@ -151,7 +141,6 @@ TEST(test_accepted_rests)
 	};
 	for (int k = 0; k < N(cases); k += cases_are_all() ? 1 : 3) {
 		struct loop loop = liver(cases[k].tissue);
-		struct incise_error err = {0};
 		struct incise_scene *scene;
 		struct incise_plan *plan;
 
@@ -208,7 +197,6 @@ TEST(test_refused_with_a_way_out)
 TEST(test_above_the_limit)
 {
 	struct loop loop = liver("");
-	struct incise_error err = {0};
 	struct incise_scene *scene;
 	struct incise_plan *plan = plan_of(&loop, &scene, &err);
 	struct closed_loop_end end;
@@ -235,7 +223,6 @@ TEST(test_membrane)
 	struct loop loop = liver("");
 	struct incise_tracker_info tracker = closed_loop_tracker(&loop.is);
 	char path[] = "/tmp/incise-rest-XXXXXX";
-	struct incise_error err = {0};
 	struct incise_scene *scene;
 	struct incise_plan *plan;
 	int fd = mkstemp(path);
@@ -247,11 +234,9 @@ TEST(test_membrane)
 	close(fd);
 	scene = incise_scene_load(path, NULL, &err);
 	unlink(path);
-	if (!scene)
-		fail_msg("%s", err.text);
+	succeeds(scene);
 	plan = incise_plan_new_fed(scene, &tracker, &err);
-	if (!plan)
-		fail_msg("%s", err.text);
+	succeeds(plan);
 	for (int i = 0; i < N(leans_N); i++) {
 		double over_N = leans_N[i] - front_N, want_mm;
 		struct closed_loop_end end;
@@ -277,7 +262,6 @@ TEST(test_wrong_words)
 
 	for (int i = 0; i < N(wrong); i++) {
 		char path[] = "/tmp/incise-rest-XXXXXX";
-		struct incise_error err = {0};
 		int fd = mkstemp(path);
 
 		assert_true(fd >= 0);

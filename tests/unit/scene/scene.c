@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Scene files: defaults, paths, and errors that name file, line and range.
- */
-#include <errno.h>
-#include <math.h>
+/* Scene files: defaults, paths, and errors that name file, line and range. */
+#include "../unit.h"
 #include "../../../lib/scene/scene.h"
 #include "../message.h"
 #include "felt.h"
@@ -52,7 +49,7 @@ static struct incise_scene *load(const char *text, const char *model,
 	return incise_scene_load(path, model, err);
 }
 
-static void test_defaults(void **state)
+TEST(test_defaults)
 {
 	struct incise_scene *scene = load("model = \"m.fis\";\n", NULL, NULL);
 
@@ -82,7 +79,7 @@ static void test_defaults(void **state)
 	incise_scene_free(scene);
 }
 
-static void test_everything_set(void **state)
+TEST(test_everything_set)
 {
 	struct incise_touch top;
 	struct incise_scene *scene = load(
@@ -104,9 +101,8 @@ static void test_everything_set(void **state)
 }
 
 /* Each key goes to its own place: no two values are alike. */
-static void test_every_new_key(void **state)
+TEST(test_every_new_key)
 {
-	struct incise_error err = {0};
 	struct incise_scene *scene = load(
 		"tissue = { gain = 0.5; reaction_N_mm = 0.11; plane_N_mm = 0.12;\n"
 		"  damping_N_s_mm = 0.013; insertion_N_mm = 0.14; aligned = 0.15;\n"
@@ -119,8 +115,7 @@ static void test_every_new_key(void **state)
 		"picture = { wound = true; bleeding = false; };\n",
 		NULL, &err);
 
-	if (!scene)
-		fail_msg("%s", err.text);
+	succeeds(scene);
 	assert_true(scene->tissue.gain == 0.5 && number(scene, "reaction_N_mm") == 0.11);
 	assert_true(number(scene, "plane_N_mm") == 0.12);
 	assert_true(number(scene, "damping_N_s_mm") == 0.013);
@@ -163,7 +158,7 @@ static bool takes(const char *group, const char *key, const char *value,
 }
 
 /* Both ends of each range are taken, what is just beyond is not, nor is another type. */
-static void test_ranges(void **state)
+TEST(test_ranges)
 {
 	static const struct {
 		const char *group, *key, *below, *least, *most, *above;
@@ -206,14 +201,10 @@ static void test_ranges(void **state)
 		const char *line = *cases[i].group ? "a.scene:3" : "a.scene:2";
 
 		for (int k = 0; k < 2; k++) {
-			struct incise_error err = {0};
-
 			if (!takes(cases[i].group, cases[i].key, good[k], &err))
 				fail_msg("%s = %s: %s", cases[i].key, good[k], err.text);
 		}
 		for (int k = 0; k < 7; k++) {
-			struct incise_error err;
-
 			assert_error(takes(cases[i].group, cases[i].key, bad[k], &err),
 				     EINVAL, &err, line, cases[i].key);
 		}
@@ -221,7 +212,7 @@ static void test_ranges(void **state)
 }
 
 /* Values that are no number. */
-static void test_other_types(void **state)
+TEST(test_other_types)
 {
 	static const struct {
 		const char *group, *key;
@@ -255,15 +246,11 @@ static void test_other_types(void **state)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		for (int k = 0; k < 2; k++) {
-			struct incise_error err = {0};
-
 			if (!takes(cases[i].group, cases[i].key, cases[i].good[k], &err))
 				fail_msg("%s = %s: %s", cases[i].key, cases[i].good[k],
 					 err.text);
 		}
 		for (int k = 0; k < 5; k++) {
-			struct incise_error err;
-
 			assert_error(takes(cases[i].group, cases[i].key, cases[i].bad[k],
 					   &err),
 				     EINVAL, &err, "a.scene:3", cases[i].key);
@@ -272,7 +259,7 @@ static void test_other_types(void **state)
 }
 
 /* Keys that there are not; one in another unit gets the right one. */
-static void test_unknown_keys(void **state)
+TEST(test_unknown_keys)
 {
 	static const struct {
 		const char *group, *key, *says;
@@ -306,7 +293,6 @@ static void test_unknown_keys(void **state)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err;
 		char name[60];
 
 		snprintf(name, sizeof(name), "%s.%s", cases[i].group, cases[i].key);
@@ -316,7 +302,7 @@ static void test_unknown_keys(void **state)
 }
 
 /* Groups that are none. */
-static void test_groups(void **state)
+TEST(test_groups)
 {
 	static const char *const groups[] = {"tissue", "effects", "tool",   "device",
 					     "limits", "picture", "surface"};
@@ -324,8 +310,6 @@ static void test_groups(void **state)
 
 	for (size_t i = 0; i < sizeof(groups) / sizeof(*groups); i++) {
 		for (size_t k = 0; k < sizeof(values) / sizeof(*values); k++) {
-			struct incise_error err;
-
 			assert_error(takes("", groups[i], values[k], &err), EINVAL, &err,
 				     "a.scene:2", groups[i]);
 		}
@@ -342,7 +326,6 @@ struct text_case {
 static void check_texts(const struct text_case *cases, size_t n)
 {
 	for (size_t i = 0; i < n; i++) {
-		struct incise_error err;
 		struct incise_scene *scene;
 
 		if (cases[i].says) {
@@ -362,7 +345,7 @@ static void check_texts(const struct text_case *cases, size_t n)
 	"; puncture_N = 0.5; back_wall_mm = " wall "; };\n"
 #define POINT "point_mm = [1.0, 2.0, -8.0]; "
 
-static void test_membrane(void **state)
+TEST(test_membrane)
 {
 	static const struct text_case cases[] = {
 		{MEMBRANE(POINT, "4.0", "14.0"), NULL},
@@ -390,7 +373,7 @@ static void test_membrane(void **state)
 	"tissue = { insertion_N_mm = 0.1; };\n" \
 	"criteria = { " text " };\n"
 
-static void test_criteria(void **state)
+TEST(test_criteria)
 {
 	static const struct text_case cases[] = {
 		{CRITERIA(""), NULL},
@@ -429,7 +412,7 @@ static void test_criteria(void **state)
 }
 
 /* Every byte of every file counts. */
-static void test_checksum(void **state)
+TEST(test_checksum)
 {
 	uint32_t one, same, other;
 	struct incise_scene *scene = load(CRITERIA(""), NULL, NULL);
@@ -445,7 +428,7 @@ static void test_checksum(void **state)
 }
 
 /* One reaction, of the model or of a constant, and any force at all. */
-static void test_forces(void **state)
+TEST(test_forces)
 {
 	static const struct {
 		const char *text;
@@ -471,7 +454,6 @@ static void test_forces(void **state)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		const char *model = cases[i].with_model ? model_path : NULL;
-		struct incise_error err;
 		struct incise_scene *scene;
 
 		if (cases[i].says) {
@@ -486,10 +468,9 @@ static void test_forces(void **state)
 }
 
 /* By name, as the command line does. */
-static void test_set_arithmetic(void **state)
+TEST(test_set_arithmetic)
 {
 	struct incise_scene *scene = load("model = \"m.fis\";", NULL, NULL);
-	struct incise_error err = {0};
 
 	assert_int_equal(incise_scene_set_arithmetic(scene, "double", NULL), 0);
 	assert_false(scene->fixed);
@@ -502,7 +483,7 @@ static void test_set_arithmetic(void **state)
 	incise_scene_free(NULL);
 }
 
-static void test_other_model(void **state)
+TEST(test_other_model)
 {
 	struct incise_scene *scene = load("model = \"absent.fis\";\n", model_path, NULL);
 
@@ -514,7 +495,7 @@ static void test_other_model(void **state)
 }
 
 /* Each file that was read, so that no output takes its place. */
-static void test_files(void **state)
+TEST(test_files)
 {
 	static const char text[] = "model = \"m.fis\";\n"
 				   "surface = { kind = \"mesh\"; file = \"a.obj\"; };\n";
@@ -541,7 +522,7 @@ static void test_files(void **state)
 	incise_scene_free(scene);
 }
 
-static void test_refusals(void **state)
+TEST(test_refusals)
 {
 	static const struct {
 		const char *text;
@@ -573,15 +554,13 @@ static void test_refusals(void **state)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err;
-
 		assert_error(load(cases[i].text, NULL, &err), cases[i].code, &err,
 			     cases[i].says[0], cases[i].says[1], cases[i].says[2]);
 	}
 }
 
 /* Inputs whose names are not all of a loop, once each, with depth_mm among them, at most four. */
-static void test_inputs_of_a_model(void **state)
+TEST(test_inputs_of_a_model)
 {
 	static const struct {
 		const char *inputs[5];
@@ -606,7 +585,6 @@ static void test_inputs_of_a_model(void **state)
 		struct incise_variable in[5];
 		struct incise_model *model;
 		struct incise_scene *scene;
-		struct incise_error err;
 		int n = 0;
 
 		for (; n < 5 && cases[i].inputs[n]; n++) {
@@ -628,26 +606,4 @@ static void test_inputs_of_a_model(void **state)
 	felt_write_model(model_path);
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_defaults),
-		cmocka_unit_test(test_everything_set),
-		cmocka_unit_test(test_every_new_key),
-		cmocka_unit_test(test_ranges),
-		cmocka_unit_test(test_other_types),
-		cmocka_unit_test(test_unknown_keys),
-		cmocka_unit_test(test_groups),
-		cmocka_unit_test(test_membrane),
-		cmocka_unit_test(test_criteria),
-		cmocka_unit_test(test_checksum),
-		cmocka_unit_test(test_forces),
-		cmocka_unit_test(test_set_arithmetic),
-		cmocka_unit_test(test_other_model),
-		cmocka_unit_test(test_files),
-		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_inputs_of_a_model),
-	};
-
-	return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+GROUP(set_up, tear_down);

@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * lib/scene/stages.c, stage by stage, on a plan made by hand.
- */
+/* lib/scene/stages.c, stage by stage, on a plan made by hand. */
 #include "../unit.h"
-#include <errno.h>
-#include <math.h>
-#include <string.h>
 #include <incise/backend.h>
 #include "../../../lib/base/vector.h"
 #include "../../../lib/scene/plan.h"

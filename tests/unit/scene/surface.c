@@ -3,7 +3,7 @@
  * Surfaces that a scene names: each kind with what it needs and may have, files beside the
  * scene, and errors that name file and line.
  */
-#include <errno.h>
+#include "../unit.h"
 #include <sys/stat.h>
 #include "../../../lib/scene/scene.h"
 #include "../message.h"
@@ -20,7 +20,7 @@ static struct incise_scene *load(const char *surface, struct incise_error *err)
 }
 
 /* Each kind, and a point that is 1 mm deep in it just where it was put. */
-static void test_kinds(void **state)
+TEST(test_kinds)
 {
 	static const struct {
 		const char *text;
@@ -57,7 +57,6 @@ static void test_kinds(void **state)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
 		struct incise_scene *scene = load(cases[i].text, &err);
 		struct incise_touch touch;
 
@@ -74,7 +73,7 @@ static void test_kinds(void **state)
 }
 
 /* A hill of 16 by 16 squares, its top at 0 0 0 in the file. */
-static void test_files(void **state)
+TEST(test_files)
 {
 	char absolute[200];
 	const struct {
@@ -101,7 +100,6 @@ static void test_files(void **state)
 	snprintf(absolute, sizeof(absolute),
 		 "surface = { kind = \"mesh\"; file = \"%s\"; };", folder.mesh);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
 		struct incise_scene *scene = load(cases[i].text, &err);
 		struct incise_touch top;
 
@@ -118,7 +116,7 @@ static void test_files(void **state)
 }
 
 /* A file is looked for beside the scene, not where the program was started. */
-static void test_from_within_the_folder(void **state)
+TEST(test_from_within_the_folder)
 {
 	char before[512];
 	struct incise_scene *scene;
@@ -135,7 +133,7 @@ static void test_from_within_the_folder(void **state)
 	incise_scene_free(scene);
 }
 
-static void test_refusals(void **state)
+TEST(test_refusals)
 {
 	static const struct {
 		const char *text;
@@ -239,15 +237,13 @@ static void test_refusals(void **state)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err;
-
 		assert_error(load(cases[i].text, &err), cases[i].code, &err,
 			     cases[i].says[0], cases[i].says[1], cases[i].says[2]);
 	}
 }
 
 /* A folder, or none: refused, and nothing waits or ends. */
-static void test_a_folder_is_no_file(void **state)
+TEST(test_a_folder_is_no_file)
 {
 	static const char *const names[] = {".", "", "..", "/"};
 
@@ -277,15 +273,4 @@ static int tear_down(void **state)
 	return 0;
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_kinds),
-		cmocka_unit_test(test_files),
-		cmocka_unit_test(test_from_within_the_folder),
-		cmocka_unit_test(test_refusals),
-		cmocka_unit_test(test_a_folder_is_no_file),
-	};
-
-	return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+GROUP(set_up, tear_down);

@@ -4,7 +4,6 @@
  * old; and jumps, which are no way.
  */
 #include "../unit.h"
-#include <math.h>
 #include <float.h>
 #include "../../extremes/fed_run.h"
 

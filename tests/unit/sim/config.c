@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * lib/sim/config.c: defaults, setting by name, ranges.
- */
-#include <errno.h>
-#include <math.h>
+/* lib/sim/config.c: defaults, setting by name, ranges. */
+#include "../unit.h"
 #include "../../../lib/sim/sim.h"
 #include "../message.h"
-#include "../unit.h"
 
 TEST(defaults_are_those_of_the_header)
 {
@@ -79,7 +75,6 @@ TEST(set_refuses)
 	struct incise_sim_config c;
 
 	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
-		struct incise_error err;
 		char key[40];
 
 		snprintf(key, sizeof(key), "sim.%s:", row[i].key);
@@ -93,7 +88,6 @@ TEST(set_refuses)
 
 TEST(words)
 {
-	struct incise_error err = {0};
 	struct incise_sim_config c;
 
 	incise_sim_config_init(&c);
@@ -114,7 +108,6 @@ TEST(words)
 
 TEST(check_finds_what_was_put_past_set)
 {
-	struct incise_error err = {0};
 	struct incise_sim_config c;
 
 	incise_sim_config_init(&c);

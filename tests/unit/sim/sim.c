@@ -2,13 +2,10 @@
 /*
  * lib/sim/sim.c: one world, independent of readers, their rate and their clock; its rings.
  */
-#include <errno.h>
-#include <math.h>
-#include <string.h>
+#include "../unit.h"
 #include "../../../lib/sim/sim.h"
 #include "../../../lib/sim/world.h"
 #include "../message.h"
-#include "../unit.h"
 
 #define START_NS INCISE_NS_PER_S
 #define MAX 120000
@@ -325,7 +322,6 @@ TEST(tooth_goes_on_between_ticks)
 TEST(bad_configuration_is_refused)
 {
 	struct incise_clock *clock = incise_clock_new_simulated(START_NS);
-	struct incise_error err = {0};
 	struct incise_sim_config config;
 
 	incise_sim_config_init(&config);

@@ -4,9 +4,6 @@
  * from pixels alone; frames keep their times and count their losses.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/sim/sim.h"
 
 #define START_NS INCISE_NS_PER_S

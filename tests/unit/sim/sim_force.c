@@ -3,8 +3,6 @@
  * lib/sim/sim_force.c: codes against the true force, noise, clipping, the grid of times.
  */
 #include "../unit.h"
-#include <math.h>
-#include <string.h>
 #include "../../../lib/sim/sim.h"
 
 #define START_NS INCISE_NS_PER_S

@@ -4,8 +4,6 @@
  * stiffness; on the bench backlash, loss, friction and lost steps, and the force channel.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <math.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/sim/sim.h"
 #include "../../../lib/sim/world.h"
@@ -13,59 +11,69 @@
 #define START_NS INCISE_NS_PER_S
 #define TICK_NS 100000
 
-struct rig {
+static struct incise_sim_config config;
+static struct incise_stepper_status s;
+static struct {
 	struct incise_clock *clock;
 	struct incise_sim *sim;
 	struct incise_stepper *stepper;
 	int64_t now;
-};
+} rig;
 
-static struct rig rig_new(const struct incise_sim_config *config)
+static void rig_new(void)
 {
-	struct rig rig = {.clock = incise_clock_new_simulated(START_NS), .now = START_NS};
-
-	rig.sim = incise_sim_new(config, rig.clock, NULL);
+	rig.clock = incise_clock_new_simulated(START_NS);
+	rig.now = START_NS;
+	rig.sim = incise_sim_new(&config, rig.clock, NULL);
 	assert_non_null(rig.sim);
 	rig.stepper = incise_sim_stepper_new(rig.sim, 0);
-	return rig;
 }
 
-static void rig_free(struct rig *rig)
+static void rig_free(void)
 {
-	rig->stepper->ops->close(rig->stepper);
-	incise_sim_free(rig->sim);
-	incise_clock_free(rig->clock);
+	rig.stepper->ops->close(rig.stepper);
+	incise_sim_free(rig.sim);
+	incise_clock_free(rig.clock);
 }
 
-static struct incise_stepper_status rig_after(struct rig *rig, int64_t ns)
+/* A test sets the configuration that it begins with, and has the rig until its end. */
+static int begin(void **state)
 {
-	struct incise_stepper_status status;
+	incise_sim_config_init(&config);
+	return 0;
+}
 
-	rig->now += ns;
-	incise_clock_wait_until(rig->clock, rig->now);
-	assert_int_equal(incise_stepper_status(rig->stepper, &status), 0);
-	return status;
+static int end(void **state)
+{
+	rig_free();
+	return 0;
+}
+
+static struct incise_stepper_status rig_after(int64_t ns)
+{
+	rig.now += ns;
+	incise_clock_wait_until(rig.clock, rig.now);
+	assert_int_equal(incise_stepper_status(rig.stepper, &s), 0);
+	return s;
 }
 
 /* Hold a target for some time, renewed before the deadman acts. */
-static struct incise_stepper_status rig_hold(struct rig *rig, double mm, double seconds)
+static struct incise_stepper_status rig_hold(double mm, double seconds)
 {
 	for (int i = 0; i < seconds * 20; i++) {
-		incise_stepper_set(rig->stepper, mm);
-		rig_after(rig, 50000000);
+		incise_stepper_set(rig.stepper, mm);
+		rig_after(50000000);
 	}
-	return rig_after(rig, 0);
+	return rig_after(0);
 }
 
-TEST(spring_law_at_rest)
+TEST(spring_law_at_rest, begin)
 {
 	static const double target_mm[] = {0, 0.5, 5, 12.3456789, 20};
-	struct incise_sim_config config;
 
-	incise_sim_config_init(&config);
 	for (size_t i = 0; i < sizeof(target_mm) / sizeof(target_mm[0]); i++) {
-		struct rig rig = rig_new(&config);
-		struct incise_stepper_status s = rig_hold(&rig, target_mm[i], 2);
+		rig_new();
+		rig_hold(target_mm[i], 2);
 
 		/* To the nearest microstep. */
 		assert_true(fabs(s.position_mm - target_mm[i]) <= 2.0 / 3200 / 2 + 1e-12);
@@ -73,11 +81,11 @@ TEST(spring_law_at_rest)
 		/* Springs 2 and 1 N/mm in series, less what friction of 0.01 N holds. */
 		assert_true(fabs(s.handle_mm - s.position_mm * 2 / 3) <= 0.01 / 3 + 1e-9);
 		assert_int_equal(s.faults, 0);
-		rig_free(&rig);
+		rig_free();
 	}
 }
 
-TEST(limits_are_never_exceeded)
+TEST(limits_are_never_exceeded, begin)
 {
 	/* screw_mm_s, screw_mm_s2, steps_per_turn */
 	static const double row[][3] = {
@@ -91,23 +99,19 @@ TEST(limits_are_never_exceeded)
 	for (size_t k = 0; k < sizeof(row) / sizeof(row[0]); k++) {
 		double step = 2 / row[k][2], v = row[k][0] * 1e-4, dv = row[k][1] * 1e-8;
 		double before = 0, moved = 0;
-		struct incise_sim_config config;
-		struct rig rig;
 
 		incise_sim_config_init(&config);
 		config.screw_mm_s = row[k][0];
 		config.screw_mm_s2 = row[k][1];
 		config.steps_per_turn = (int)row[k][2];
-		rig = rig_new(&config);
+		rig_new();
 		for (int i = 0; i < 20000; i++) {
-			struct incise_stepper_status s;
-
 			/* Targets in and out of the travel, often while it still moves. */
 			if (i % 97 == 0)
 				incise_stepper_set(rig.stepper,
 						   40 * incise_random_uniform(key, i) -
 							   10);
-			s = rig_after(&rig, TICK_NS);
+			rig_after(TICK_NS);
 			assert_true(s.position_mm >= 0 && s.position_mm <= 20);
 			/* A position is off by half a step: a difference by one, a second by two. */
 			assert_true(fabs(s.position_mm - before) <= v + step + 1e-12);
@@ -116,24 +120,21 @@ TEST(limits_are_never_exceeded)
 			moved = s.position_mm - before;
 			before = s.position_mm;
 		}
-		rig_free(&rig);
+		rig_free();
 	}
 }
 
-TEST(target_is_reached_in_the_time_of_a_trapezoid)
+TEST(target_is_reached_in_the_time_of_a_trapezoid, begin, end)
 {
-	struct incise_sim_config config;
-	struct rig rig;
 	int ticks = 0;
 
-	incise_sim_config_init(&config);
-	rig = rig_new(&config);
+	rig_new();
 	for (double mm = 0; mm != 10; ticks++) {
 		double last = mm;
 
 		if (ticks % 500 == 0)
 			incise_stepper_set(rig.stepper, 10);
-		mm = rig_after(&rig, TICK_NS).position_mm;
+		mm = rig_after(TICK_NS).position_mm;
 		assert_true(mm >= last && mm <= 10); /* neither back nor beyond */
 	}
 	/*
@@ -141,48 +142,41 @@ TEST(target_is_reached_in_the_time_of_a_trapezoid)
 	 * shows before it is gone, √(2·0.3 µm/3000 mm/s²) = 0.5 ms early.
 	 */
 	assert_true(fabs(ticks * 0.1 - 343.3) < 0.7);
-	assert_true(rig_after(&rig, 10000000).position_mm == 10);
-	rig_free(&rig);
+	assert_true(rig_after(10000000).position_mm == 10);
 }
 
-TEST(faults_are_reported)
+TEST(faults_are_reported, begin, end)
 {
-	struct incise_sim_config config;
-	struct incise_stepper_status s;
-	struct rig rig;
-
-	incise_sim_config_init(&config);
-	rig = rig_new(&config);
+	rig_new();
 	/* Not yet in use. */
-	assert_int_equal(rig_after(&rig, INCISE_NS_PER_S).faults, 0);
-	s = rig_hold(&rig, 25, 1);
+	assert_int_equal(rig_after(INCISE_NS_PER_S).faults, 0);
+	rig_hold(25, 1);
 	assert_int_equal(s.faults, INCISE_STEPPER_FAULT_TRAVEL);
 	assert_true(s.position_mm == 20);
-	s = rig_hold(&rig, -1, 1);
+	rig_hold(-1, 1);
 	assert_int_equal(s.faults, INCISE_STEPPER_FAULT_TRAVEL);
 	assert_true(s.position_mm == 0);
-	s = rig_hold(&rig, 1, 1);
+	rig_hold(1, 1);
 	assert_int_equal(s.faults, 0);
 	/* A NaN is neither a target nor a heartbeat. */
 	assert_int_equal(incise_stepper_set(rig.stepper, 1), 0);
-	rig_after(&rig, 60000000);
+	rig_after(60000000);
 	assert_int_equal(incise_stepper_set(rig.stepper, NAN), -EDOM);
 	assert_int_equal(incise_stepper_set(rig.stepper, INFINITY), -EDOM);
 	assert_int_equal(incise_stepper_set(rig.stepper, -INFINITY), -EDOM);
-	s = rig_after(&rig, 39900000);
+	rig_after(39900000);
 	assert_int_equal(s.faults, 0);
 	assert_true(s.position_mm == 1);
 	/* The tick that starts 100 ms after the target is the first to act. */
-	assert_int_equal(rig_after(&rig, 100000).faults, 0);
-	assert_int_equal(rig_after(&rig, 100000).faults, INCISE_STEPPER_FAULT_DEADMAN);
-	s = rig_after(&rig, INCISE_NS_PER_S);
+	assert_int_equal(rig_after(100000).faults, 0);
+	assert_int_equal(rig_after(100000).faults, INCISE_STEPPER_FAULT_DEADMAN);
+	rig_after(INCISE_NS_PER_S);
 	assert_int_equal(s.faults, INCISE_STEPPER_FAULT_DEADMAN);
 	assert_true(s.position_mm == 0);
 	/* What friction of 0.01 N holds against both springs. */
 	assert_true(fabs(s.handle_mm) <= 0.01 / 3 + 1e-9);
 	assert_int_equal(incise_stepper_set(rig.stepper, 2), 0);
-	assert_int_equal(rig_after(&rig, 0).faults, 0);
-	rig_free(&rig);
+	assert_int_equal(rig_after(0).faults, 0);
 }
 
 /* Handle in mm and mm/s under m x'' = k (nut - x) - k_h x - b x'. */
@@ -210,21 +204,16 @@ static void runge_kutta(const struct incise_sim_config *c, double nut, double h,
 		y[j] += h / 6 * (k[0][j] + 2 * k[1][j] + 2 * k[2][j] + k[3][j]);
 }
 
-TEST(handle_moves_as_the_equation_says)
+TEST(handle_moves_as_the_equation_says, begin, end)
 {
-	struct incise_sim_config config;
 	double y[2] = {0}, before = 0, farthest = 0;
-	struct rig rig;
 
-	incise_sim_config_init(&config);
 	config.handle_friction_N = 0;
-	rig = rig_new(&config);
+	rig_new();
 	for (int i = 0; i < 6000; i++) {
-		struct incise_stepper_status s;
-
 		if (i % 500 == 0)
 			incise_stepper_set(rig.stepper, i < 3000 ? 8 : 2);
-		s = rig_after(&rig, TICK_NS);
+		rig_after(TICK_NS);
 		/* Ten steps a tick: its own error is 1e-4 of what is looked for. */
 		for (int k = 0; k < 10; k++)
 			runge_kutta(&config, (before + s.position_mm) / 2, 1e-5, y);
@@ -238,28 +227,21 @@ TEST(handle_moves_as_the_equation_says)
 		before = s.position_mm;
 	}
 	assert_true(farthest > 5.3); /* 2/3 of 8 mm: it has moved at all */
-	rig_free(&rig);
 }
 
-TEST(friction_holds)
+TEST(friction_holds, begin, end)
 {
-	struct incise_sim_config config;
-	struct incise_stepper_status s;
-	struct rig rig;
-
-	incise_sim_config_init(&config);
 	config.handle_friction_N = 1;
-	rig = rig_new(&config);
-	s = rig_hold(&rig, 0.4, 1); /* 0.8 N */
+	rig_new();
+	rig_hold(0.4, 1); /* 0.8 N */
 	assert_true(s.handle_mm == 0);
 	assert_true(s.force_N == 2 * s.position_mm);
-	s = rig_hold(&rig, 0.6, 1); /* 1.2 N: away, until within 1 N of balance */
+	rig_hold(0.6, 1); /* 1.2 N: away, until within 1 N of balance */
 	assert_true(s.handle_mm > 0);
 	assert_true(fabs(2 * (s.position_mm - s.handle_mm) - s.handle_mm) <= 1 + 1e-9);
-	rig_free(&rig);
 }
 
-TEST(bounded_however_stiff)
+TEST(bounded_however_stiff, begin)
 {
 	/* spring, hand N/mm; hand N s/mm; kg; friction N */
 	static const double row[][5] = {
@@ -269,9 +251,6 @@ TEST(bounded_however_stiff)
 	};
 
 	for (size_t k = 0; k < sizeof(row) / sizeof(row[0]); k++) {
-		struct incise_sim_config config;
-		struct rig rig;
-
 		incise_sim_config_init(&config);
 		config.spring_N_mm = row[k][0];
 		config.hand_N_mm = row[k][1];
@@ -280,14 +259,12 @@ TEST(bounded_however_stiff)
 		config.handle_friction_N = row[k][4];
 		config.screw_mm_s = 10000;
 		config.screw_mm_s2 = 1e7;
-		rig = rig_new(&config);
+		rig_new();
 		for (int i = 0; i < 20000; i++) {
-			struct incise_stepper_status s;
-
 			/* Ten moves in all over the whole travel. */
 			if (i % 500 == 0)
 				incise_stepper_set(rig.stepper, i / 2000 % 2 ? 0 : 20);
-			s = rig_after(&rig, TICK_NS);
+			rig_after(TICK_NS);
 			/*
 			 * Without any damping, each move adds an oscillation no larger than
 			 * the travel about a rest within it: (10 + 1)·20 mm. An unstable
@@ -295,88 +272,75 @@ TEST(bounded_however_stiff)
 			 */
 			assert_true(fabs(s.handle_mm) <= 11 * 20);
 		}
-		rig_free(&rig);
+		rig_free();
 	}
 }
 
-TEST(asking_changes_nothing)
+TEST(asking_changes_nothing, begin)
 {
 	struct incise_stepper_status end[2];
 
 	for (int k = 0; k < 2; k++) {
-		struct incise_sim_config config;
-		struct rig rig;
-
 		incise_sim_config_init(&config);
-		rig = rig_new(&config);
+		rig_new();
 		for (int i = 0; i < 300; i++) {
 			incise_stepper_set(rig.stepper, i % 40);
 			/* 1.2345 ms at once, or in parts. */
 			for (int part = 0; k && part < 5; part++)
-				rig_after(&rig, 200000);
-			rig_after(&rig, k ? 234500 : 1234500);
+				rig_after(200000);
+			rig_after(k ? 234500 : 1234500);
 		}
-		end[k] = rig_after(&rig, 0);
-		rig_free(&rig);
+		end[k] = rig_after(0);
+		rig_free();
 	}
 	assert_true(end[0].handle_mm == end[1].handle_mm && end[0].handle_mm != 0);
 	assert_true(end[0].position_mm == end[1].position_mm);
 	assert_int_equal(end[0].t_ns, end[1].t_ns);
 }
 
-TEST(it_is_always_powered_and_reports_its_motion)
+TEST(it_is_always_powered_and_reports_its_motion, begin, end)
 {
-	struct incise_sim_config config;
-	struct incise_stepper_status s;
-	struct rig rig;
-
-	incise_sim_config_init(&config);
-	rig = rig_new(&config);
-	s = rig_after(&rig, 0);
+	rig_new();
+	rig_after(0);
 	assert_int_equal(s.state, INCISE_STEPPER_STATE_READY);
 	assert_true(s.homed && !s.inputs && !s.late && s.velocity_mm_s == 0);
 	assert_int_equal(incise_stepper_set(rig.stepper, 10), 0);
 	/* 30 mm/s are reached after 10 ms. */
-	s = rig_after(&rig, 20000000);
+	rig_after(20000000);
 	assert_int_equal(s.state, INCISE_STEPPER_STATE_MOVING);
 	assert_true(s.velocity_mm_s == 30);
 	/* Enabled, it stays where it is, and the deadman runs from there on. */
 	assert_int_equal(incise_stepper_enable(rig.stepper, NULL), 0);
-	s = rig_after(&rig, 90000000);
+	rig_after(90000000);
 	assert_int_equal(s.state, INCISE_STEPPER_STATE_READY);
 	assert_true(s.position_mm > 0.3 && s.position_mm < 1 && !s.faults);
-	s = rig_after(&rig, 10200000);
+	rig_after(10200000);
 	assert_int_equal(s.faults, INCISE_STEPPER_FAULT_DEADMAN);
 	assert_int_equal(s.state, INCISE_STEPPER_STATE_STOPPING);
-	s = rig_after(&rig, INCISE_NS_PER_S);
+	rig_after(INCISE_NS_PER_S);
 	assert_int_equal(s.state, INCISE_STEPPER_STATE_READY);
 	assert_int_equal(incise_stepper_clear(rig.stepper, NULL), 0);
-	assert_int_equal(rig_after(&rig, 0).faults, 0);
+	assert_int_equal(rig_after(0).faults, 0);
 	/* Disabled, it moves to zero force, without a deadman. */
-	rig_hold(&rig, 5, 1);
+	rig_hold(5, 1);
 	assert_int_equal(incise_stepper_disable(rig.stepper, NULL), 0);
-	s = rig_after(&rig, INCISE_NS_PER_S);
+	rig_after(INCISE_NS_PER_S);
 	assert_true(s.position_mm == 0 && !s.faults);
 	assert_int_equal(incise_stepper_jog(rig.stepper, 1), -EOPNOTSUPP);
 	assert_int_equal(incise_stepper_home(rig.stepper, NULL, NULL, NULL), -EOPNOTSUPP);
-	rig_free(&rig);
 }
 
-TEST(info_is_the_configuration)
+TEST(info_is_the_configuration, begin, end)
 {
-	struct incise_sim_config config;
 	struct incise_stepper_info info;
-	struct rig rig;
 
-	incise_sim_config_init(&config);
-	rig = rig_new(&config);
+	rig_new();
 	incise_stepper_info(rig.stepper, &info);
 	assert_true(info.spring_N_mm == 2 && info.travel_mm == 20);
 	assert_true(info.step_mm == 2.0 / 3200);
 	assert_true(info.velocity_mm_s == 30 && info.acceleration_mm_s2 == 3000);
 	assert_true(info.deadman_s == 0.1 && info.measures_handle && !info.inputs);
 	assert_string_equal(info.name, "simulated haptic scalpel");
-	rig_free(&rig);
 }
 
 /* Move in microsteps; returns the force. */
@@ -397,12 +361,10 @@ static bool same(double a, double b)
 	return fabs(a - b) < 1e-9;
 }
 
-TEST(bench_agrees_with_hand_calculation)
+TEST(bench_agrees_with_hand_calculation, begin)
 {
-	struct incise_sim_config config;
 	struct incise_bench b = {0};
 
-	incise_sim_config_init(&config);
 	config.handle_friction_N = 0;
 	assert_true(same(go(&b, &config, 1, 0), 2) && same(go(&b, &config, 0.5, 0), 1));
 
@@ -451,15 +413,13 @@ static double channel_N(struct incise_force *force,
 	return (sum / all * 5000 / 4096 - config->force_zero_mV) / config->force_mV_N;
 }
 
-TEST(force_channel_shows_the_bench)
+TEST(force_channel_shows_the_bench, begin)
 {
 	struct incise_clock *clock = incise_clock_new_simulated(0);
 	struct incise_stepper *stepper;
-	struct incise_sim_config config;
 	struct incise_force *force;
 	struct incise_sim *sim;
 
-	incise_sim_config_init(&config);
 	config.bench = 1;
 	config.handle_friction_N = 0;
 	config.backlash_mm = 0.1;
@@ -493,14 +453,12 @@ TEST(force_channel_shows_the_bench)
 	incise_clock_free(clock);
 }
 
-TEST(jog_is_for_the_bench_only)
+TEST(jog_is_for_the_bench_only, begin)
 {
 	struct incise_clock *clock = incise_clock_new_simulated(0);
 	struct incise_stepper *stepper;
-	struct incise_sim_config config;
 	struct incise_sim *sim;
 
-	incise_sim_config_init(&config);
 	sim = incise_sim_new(&config, clock, NULL);
 	stepper = incise_sim_stepper_new(sim, 0);
 	assert_int_equal(stepper->ops->jog(stepper, 1), -EOPNOTSUPP);

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * lib/sim/sim_tracker.c: rate, drift, latency and noise against what was configured.
- */
+/* lib/sim/sim_tracker.c: rate, drift, latency and noise against what was configured. */
 #include "../unit.h"
-#include <math.h>
-#include <string.h>
 #include "../../../lib/sim/sim.h"
 #include "../../../lib/sim/world.h"
 
@@ -14,39 +10,46 @@
 static struct incise_tracker_sample sample[MAX];
 
 /* A virtual rig with its tracker only. */
-struct rig {
+static struct incise_sim_config config;
+static struct {
 	struct incise_clock *clock;
 	struct incise_sim *sim;
 	struct incise_tracker *tracker;
-};
+} rig;
+static int n;
 
-static struct rig rig_new(const struct incise_sim_config *config)
+static void rig_new(void)
 {
-	struct rig rig = {.clock = incise_clock_new_simulated(START_NS)};
-
-	rig.sim = incise_sim_new(config, rig.clock, NULL);
+	rig.clock = incise_clock_new_simulated(START_NS);
+	rig.sim = incise_sim_new(&config, rig.clock, NULL);
 	assert_non_null(rig.sim);
 	rig.tracker = incise_sim_tracker_new(rig.sim);
-	return rig;
 }
 
-static void rig_free(struct rig *rig)
+static void rig_free(void)
 {
-	rig->tracker->ops->close(rig->tracker);
-	incise_sim_free(rig->sim);
-	incise_clock_free(rig->clock);
+	rig.tracker->ops->close(rig.tracker);
+	incise_sim_free(rig.sim);
+	incise_clock_free(rig.clock);
 }
 
-static int rig_read(struct rig *rig, int seconds)
+static int begin(void **state)
 {
-	int n = 0;
+	incise_sim_config_init(&config);
+	return 0;
+}
+
+/* Make a rig, and read all of its first seconds. */
+static void rig_read(int seconds)
+{
+	rig_new();
+	n = 0;
 
 	for (int i = 1; i <= seconds; i++) {
-		incise_clock_wait_until(rig->clock, START_NS + i * INCISE_NS_PER_S);
-		n += incise_tracker_read(rig->tracker, sample + n, MAX - n);
+		incise_clock_wait_until(rig.clock, START_NS + i * INCISE_NS_PER_S);
+		n += incise_tracker_read(rig.tracker, sample + n, MAX - n);
 	}
-	assert_int_equal(incise_tracker_lost(rig->tracker), 0);
-	return n;
+	assert_int_equal(incise_tracker_lost(rig.tracker), 0);
 }
 
 static int64_t acquired_ns(int i)
@@ -54,16 +57,10 @@ static int64_t acquired_ns(int i)
 	return START_NS + llround(i * (1e9 / (120 * (1 + 50e-6))));
 }
 
-TEST(rate_drifts_and_latency_is_exact_without_jitter)
+TEST(rate_drifts_and_latency_is_exact_without_jitter, begin)
 {
-	struct incise_sim_config config;
-	struct rig rig;
-	int n;
-
-	incise_sim_config_init(&config);
 	config.tracker_jitter_ms = 0;
-	rig = rig_new(&config);
-	n = rig_read(&rig, 100);
+	rig_read(100);
 	/* 100 s of 120 Hz that runs 50 ppm fast, and of which the last is on its way. */
 	assert_in_range(n, 12000, 12001);
 	for (int i = 0; i < n; i++) {
@@ -71,19 +68,14 @@ TEST(rate_drifts_and_latency_is_exact_without_jitter)
 		assert_int_equal(sample[i].t_ns, acquired_ns(i) + 4200000);
 		assert_int_equal(sample[i].status, ' ');
 	}
-	rig_free(&rig);
+	rig_free();
 }
 
-TEST(jitter_only_adds)
+TEST(jitter_only_adds, begin)
 {
-	struct incise_sim_config config;
 	double mean_ms = 0;
-	struct rig rig;
-	int n;
 
-	incise_sim_config_init(&config);
-	rig = rig_new(&config);
-	n = rig_read(&rig, 100);
+	rig_read(100);
 	for (int i = 0; i < n; i++) {
 		double extra_ms = (double)(sample[i].t_ns - acquired_ns(i)) * 1e-6 - 4.2;
 
@@ -93,23 +85,20 @@ TEST(jitter_only_adds)
 	/* |normal| of sd 0.2: mean 0.2·√(2/π), sd 0.2·√(1 - 2/π); 5 sd of the mean. */
 	assert_true(fabs(mean_ms - 0.2 * sqrt(2 / M_PI)) <
 		    5 * 0.2 * sqrt((1 - 2 / M_PI) / n));
-	rig_free(&rig);
+	rig_free();
 }
 
-TEST(records_come_when_they_arrive_and_in_order)
+TEST(records_come_when_they_arrive_and_in_order, begin)
 {
 	/* Jitter below and far above the time between records. */
 	static const double jitter_ms[] = {0.2, 100};
-	struct incise_sim_config config;
 
 	for (int k = 0; k < 2; k++) {
 		int64_t before = START_NS, arrival = 0;
 		uint64_t seq = 0;
-		struct rig rig;
 
-		incise_sim_config_init(&config);
 		config.tracker_jitter_ms = jitter_ms[k];
-		rig = rig_new(&config);
+		rig_new();
 		for (int64_t t = START_NS; t < START_NS + 3 * INCISE_NS_PER_S;
 		     t += 130000) {
 			int n;
@@ -127,20 +116,15 @@ TEST(records_come_when_they_arrive_and_in_order)
 		}
 		/* All but those that are on their way: at most 700 ms of 120 Hz. */
 		assert_true(seq >= 3 * 120 - 84 - 2);
-		rig_free(&rig);
+		rig_free();
 	}
 }
 
-TEST(noise_is_as_configured)
+TEST(noise_is_as_configured, begin)
 {
-	struct incise_sim_config config;
 	double mean[3] = {0}, squares[3] = {0}, angle2 = 0, angle_sd;
-	struct rig rig;
-	int n;
 
-	incise_sim_config_init(&config);
-	rig = rig_new(&config);
-	n = rig_read(&rig, 100);
+	rig_read(100);
 	for (int i = 0; i < n; i++) {
 		struct incise_blade blade;
 		double q[4], dot = 0, norm = 0;
@@ -169,50 +153,44 @@ TEST(noise_is_as_configured)
 	/* Three axes of 0.025° each; 3n squares in the mean. */
 	angle_sd = 0.025 * M_PI / 180 * sqrt(3);
 	assert_true(fabs(sqrt(angle2) / angle_sd - 1) < 5 / sqrt(6 * n));
-	rig_free(&rig);
+	rig_free();
 }
 
-TEST(info_is_nominal)
+TEST(info_is_nominal, begin)
 {
-	struct incise_sim_config config;
 	struct incise_tracker_info info;
-	struct rig rig;
 
-	incise_sim_config_init(&config);
-	rig = rig_new(&config);
+	rig_new();
 	incise_tracker_info(rig.tracker, &info);
 	assert_true(info.rate_hz == 120); /* the drift is not reported */
 	assert_int_equal(info.latency_ns, 4200000);
 	assert_string_equal(info.name, "virtual tracker");
-	rig_free(&rig);
+	rig_free();
 }
 
 /*
  * With a tube the two stations take turns at the same rate. The tube goes down from above to below
  * and back; the scalpel is where it is without it.
  */
-TEST(tube_is_the_second_station)
+TEST(tube_is_the_second_station, begin)
 {
 	static struct incise_tracker_sample alone[MAX];
-	struct incise_sim_config config;
 	struct incise_tracker_info info;
+	int n_alone;
 	double least = INFINITY, most = -INFINITY;
-	struct rig rig;
-	int n;
 
-	incise_sim_config_init(&config);
 	config.tracker_noise_mm = 0;
-	rig = rig_new(&config);
-	n = rig_read(&rig, 20);
+	rig_read(20);
 	memcpy(alone, sample, (size_t)n * sizeof(*alone));
 	incise_tracker_info(rig.tracker, &info);
 	assert_true(info.stations == 1 && info.scalpel_station == 1);
 	assert_int_equal(info.tube_station, 0);
-	rig_free(&rig);
+	rig_free();
 
 	config.tube_s = 10;
-	rig = rig_new(&config);
-	assert_int_equal(rig_read(&rig, 20), n);
+	n_alone = n;
+	rig_read(20);
+	assert_int_equal(n, n_alone);
 	incise_tracker_info(rig.tracker, &info);
 	assert_true(info.stations == 2 && info.scalpel_station == 1);
 	assert_int_equal(info.tube_station, 2);
@@ -235,5 +213,5 @@ TEST(tube_is_the_second_station)
 	 * 2 um, and two runs of it. */
 	assert_true(least >= -10 && least < -10 + 2e-3);
 	assert_true(most <= 200 && most > 200 - 2e-3);
-	rig_free(&rig);
+	rig_free();
 }

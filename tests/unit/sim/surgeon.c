@@ -3,13 +3,7 @@
  * lib/sim/surgeon.c: smooth motion, the protocol, every depth at every speed; a pose that a program
  * holds reaches the tracker whole, and bad ones are refused.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
-#include <errno.h>
-#include <math.h>
+#include "../unit.h"
 #include <pthread.h>
 #include <sched.h>
 #include <stdatomic.h>
@@ -20,13 +14,13 @@
 
 #define TREMOR_MM 0.035 /* a little over the amplitude in y and z */
 
-static void velocity_is_the_derivative(void **state)
+static void check_velocity(int motion)
 {
 	struct incise_sim_config config;
 	struct incise_surgeon surgeon;
 
 	incise_sim_config_init(&config);
-	config.motion = *(const int *)*state;
+	config.motion = motion;
 	incise_surgeon_init(&surgeon, &config);
 	/*
 	 * Central difference over ±50 µs: its error is h²/6·jerk ≈ 4e-10·jerk, and at
@@ -53,7 +47,14 @@ static void velocity_is_the_derivative(void **state)
 	}
 }
 
-static void protocol_is_kept(void **state)
+TEST(velocity_is_the_derivative)
+{
+	check_velocity(INCISE_SURGEON_CUTS);
+	check_velocity(INCISE_SURGEON_TURNS);
+	check_velocity(INCISE_SURGEON_PRESSES);
+}
+
+TEST(protocol_is_kept)
 {
 	static const double nominal[14] = {5,  5,  5,  10, 10, 10, 10,
 					   15, 15, 15, 15, 20, 20, 20};
@@ -96,7 +97,7 @@ static void protocol_is_kept(void **state)
 	assert_true(blade.velocity_mm_s[0] == 0);
 }
 
-static void every_depth_at_every_speed(void **state)
+TEST(every_depth_at_every_speed)
 {
 	struct incise_sim_config config;
 	struct incise_surgeon surgeon;
@@ -124,7 +125,7 @@ static void every_depth_at_every_speed(void **state)
 	}
 }
 
-static void grip_is_a_rotation(void **state)
+TEST(grip_is_a_rotation)
 {
 	struct incise_sim_config config;
 	struct incise_surgeon surgeon;
@@ -143,7 +144,7 @@ static void grip_is_a_rotation(void **state)
 }
 
 /* The tip rests while the tool sweeps the configured cone, and no more. */
-static void a_turn_is_about_the_tip(void **state)
+TEST(a_turn_is_about_the_tip)
 {
 	struct incise_sim_config config;
 	struct incise_surgeon surgeon;
@@ -171,7 +172,7 @@ static void a_turn_is_about_the_tip(void **state)
 	assert_true(farthest < cos(42 * M_PI / 180));
 }
 
-static void pressing_goes_into_the_tissue_and_out(void **state)
+TEST(pressing_goes_into_the_tissue_and_out)
 {
 	struct incise_sim_config config;
 	struct incise_surgeon surgeon;
@@ -197,7 +198,7 @@ static void pressing_goes_into_the_tissue_and_out(void **state)
 	assert_in_range(strokes, 15, 25); /* about twice a second */
 }
 
-static void a_held_pose_reaches_the_tracker(void **state)
+TEST(a_held_pose_reaches_the_tracker)
 {
 	struct incise_rig *rig = incise_rig_open(
 		"sim:mouse,clock=simulated,tracker_noise_mm=0", INCISE_RIG_TRACKER, NULL);
@@ -222,7 +223,7 @@ static void a_held_pose_reaches_the_tracker(void **state)
 	incise_rig_close(rig);
 }
 
-static void bad_poses_are_refused(void **state)
+TEST(bad_poses_are_refused)
 {
 	struct incise_rig *rig =
 		incise_rig_open("sim:clock=simulated", INCISE_RIG_TRACKER, NULL);
@@ -272,7 +273,7 @@ static void *move_hand(void *argument)
 }
 
 /* No pose is a mix of two, whatever the interleaving; poses move until 200 differ. */
-static void held_poses_are_whole(void **state)
+TEST(held_poses_are_whole)
 {
 	struct moved moved = {.end = false};
 	pthread_t thread;
@@ -297,7 +298,7 @@ static void held_poses_are_whole(void **state)
 	assert_int_equal(backwards, 0);
 }
 
-static void cuts_lie_side_by_side(void **state)
+TEST(cuts_lie_side_by_side)
 {
 	for (int paper = 0; paper < 2; paper++) {
 		struct incise_sim_config config;
@@ -325,26 +326,4 @@ static void cuts_lie_side_by_side(void **state)
 				assert_true(fabs(y_mm[cut]) < 0.1);
 		}
 	}
-}
-
-int main(void)
-{
-	static int cuts = INCISE_SURGEON_CUTS, turns = INCISE_SURGEON_TURNS,
-		   presses = INCISE_SURGEON_PRESSES;
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_prestate(velocity_is_the_derivative, &cuts),
-		cmocka_unit_test_prestate(velocity_is_the_derivative, &turns),
-		cmocka_unit_test_prestate(velocity_is_the_derivative, &presses),
-		cmocka_unit_test(a_turn_is_about_the_tip),
-		cmocka_unit_test(pressing_goes_into_the_tissue_and_out),
-		cmocka_unit_test(protocol_is_kept),
-		cmocka_unit_test(every_depth_at_every_speed),
-		cmocka_unit_test(grip_is_a_rotation),
-		cmocka_unit_test(a_held_pose_reaches_the_tracker),
-		cmocka_unit_test(bad_poses_are_refused),
-		cmocka_unit_test(held_poses_are_whole),
-		cmocka_unit_test(cuts_lie_side_by_side),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,13 +4,23 @@
  * back out of a cut, and closed motions, which take work.
  */
 #include "../unit.h"
-#include <math.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/sim/world.h"
 
 static const struct incise_blade air = {.cut = 0, .speed_mm_s = 25, .slab = 0.5};
+static struct incise_sim_config config;
+static struct incise_tissue tissue;
+static struct incise_blade blade;
 
-TEST(mean_force_is_the_law)
+static int begin(void **state)
+{
+	incise_sim_config_init(&config);
+	incise_tissue_init(&tissue, &config);
+	blade = air;
+	return 0;
+}
+
+TEST(mean_force_is_the_law, begin)
 {
 	static const struct {
 		double depth_mm, velocity_mm_s, force_N;
@@ -24,9 +34,7 @@ TEST(mean_force_is_the_law)
 		{20, 45, 2.02 * 1.2625},  /* 0.9 + 1.12; 45/60 of c */
 		{20, 1e300, 2.02 * 1.35}, /* all of c */
 	};
-	struct incise_sim_config config;
 
-	incise_sim_config_init(&config);
 	for (size_t i = 0; i < sizeof(row) / sizeof(row[0]); i++) {
 		double f = incise_sim_mean_force(&config, row[i].depth_mm,
 						 row[i].velocity_mm_s);
@@ -35,28 +43,19 @@ TEST(mean_force_is_the_law)
 	}
 }
 
-TEST(no_force_and_no_tooth_in_the_air)
+TEST(no_force_and_no_tooth_in_the_air, begin)
 {
-	struct incise_sim_config config;
-	struct incise_tissue tissue;
-
-	incise_sim_config_init(&config);
-	incise_tissue_init(&tissue, &config);
 	for (int i = 0; i < 10000; i++)
 		incise_tissue_advance(&tissue, &air, 1e-3);
 	assert_true(incise_tissue_force(&tissue, &air, 0) == 0);
 	assert_true(tissue.path_mm == 0);
 }
 
-TEST(saw_tooth_builds_up_and_drops)
+TEST(saw_tooth_builds_up_and_drops, begin)
 {
-	struct incise_sim_config config;
-	struct incise_tissue tissue;
-	struct incise_blade blade = air;
 	double sum = 0, low = 9, high = 0, previous = 0, mean;
 	int drops = 0, n = 400000;
 
-	incise_sim_config_init(&config);
 	config.boundary = 0;
 	incise_tissue_init(&tissue, &config);
 	blade.depth_mm = 10;
@@ -87,14 +86,10 @@ TEST(saw_tooth_builds_up_and_drops)
 	assert_true(high <= 1.2 + 1e-12 && high > 1.2 - 0.4 * 0.0025 / 0.75);
 }
 
-TEST(ahead_continues_the_tooth)
+TEST(ahead_continues_the_tooth, begin)
 {
-	struct incise_sim_config config;
-	struct incise_tissue tissue, moved;
-	struct incise_blade blade = air;
+	struct incise_tissue moved;
 
-	incise_sim_config_init(&config);
-	incise_tissue_init(&tissue, &config);
 	blade.depth_mm = 10;
 	moved = tissue;
 	incise_tissue_advance(&moved, &blade, 1e-4);
@@ -105,19 +100,15 @@ TEST(ahead_continues_the_tooth)
 		    incise_tissue_force(&tissue, &blade, 0));
 }
 
-TEST(boundary_has_its_size)
+TEST(boundary_has_its_size, begin)
 {
-	struct incise_sim_config config;
-	struct incise_blade blade = air;
 	double sum = 0, squares = 0, mean;
 	const int n = 4000;
 
-	incise_sim_config_init(&config);
 	config.tooth = 0;
 	blade.depth_mm = 10;
 	mean = incise_sim_mean_force(&config, blade.depth_mm, blade.speed_mm_s);
 	for (blade.boundary = 0; blade.boundary < n; blade.boundary++) {
-		struct incise_tissue tissue;
 		double at, fixed, loose;
 
 		incise_tissue_init(&tissue, &config);
@@ -140,26 +131,25 @@ TEST(boundary_has_its_size)
 }
 
 /* A hand's blade goes straight to a depth in small steps; the force there. */
-static double go(struct incise_tissue *tissue, struct incise_blade *blade,
-		 double depth_mm)
+static double go(double depth_mm)
 {
-	double from = blade->depth_mm, way = depth_mm - from;
+	double from = blade.depth_mm, way = depth_mm - from;
 
 	for (int i = 1; i <= 1000; i++) {
-		blade->depth_mm = from + way * i / 1000;
-		incise_tissue_advance(tissue, blade, 1e-4);
+		blade.depth_mm = from + way * i / 1000;
+		incise_tissue_advance(&tissue, &blade, 1e-4);
 	}
-	return incise_tissue_force(tissue, blade, 0);
+	return incise_tissue_force(&tissue, &blade, 0);
 }
 
-static void begin_by_hand(struct incise_sim_config *config, struct incise_tissue *tissue,
-			  struct incise_blade *blade)
+static int begin_by_hand(void **state)
 {
-	incise_sim_config_init(config);
-	config->motion = INCISE_SURGEON_HAND;
-	config->boundary = 0;
-	incise_tissue_init(tissue, config);
-	*blade = (struct incise_blade){.cut = -1, .slab = 0.5, .side = {0, 1, 0}};
+	incise_sim_config_init(&config);
+	config.motion = INCISE_SURGEON_HAND;
+	config.boundary = 0;
+	incise_tissue_init(&tissue, &config);
+	blade = (struct incise_blade){.cut = -1, .slab = 0.5, .side = {0, 1, 0}};
+	return 0;
 }
 
 /* 1e-9: a thousand roundings of numbers of some mm and N. */
@@ -169,48 +159,36 @@ static void near(double is, double should)
 		fail_msg("%.12g, expected %.12g", is, should);
 }
 
-TEST(drawing_back_unloads_and_then_rubs)
+TEST(drawing_back_unloads_and_then_rubs, begin_by_hand)
 {
-	struct incise_sim_config config;
-	struct incise_tissue tissue;
-	struct incise_blade blade;
 	double c, back_mm;
 
-	begin_by_hand(&config, &tissue, &blade);
 	c = incise_sim_mean_force(&config, 15, 0);
 	back_mm = c / config.unloading_N_mm;
-	near(go(&tissue, &blade, 15), c);
-	near(go(&tissue, &blade, 15 - back_mm / 2), c / 2);
-	near(go(&tissue, &blade, 15 - back_mm), 0);
-	near(go(&tissue, &blade, 4),
-	     -config.friction * incise_sim_mean_force(&config, 4, 0));
+	near(go(15), c);
+	near(go(15 - back_mm / 2), c / 2);
+	near(go(15 - back_mm), 0);
+	near(go(4), -config.friction * incise_sim_mean_force(&config, 4, 0));
 	/* Out of the tissue and in again at the same place: the cut is open up to its front. */
-	assert_true(go(&tissue, &blade, 0) == 0);
-	near(go(&tissue, &blade, 4),
-	     config.friction * incise_sim_mean_force(&config, 4, 0));
-	near(go(&tissue, &blade, 16), incise_sim_mean_force(&config, 16, 0));
+	assert_true(go(0) == 0);
+	near(go(4), config.friction * incise_sim_mean_force(&config, 4, 0));
+	near(go(16), incise_sim_mean_force(&config, 16, 0));
 	/* Elsewhere it is new tissue. */
-	go(&tissue, &blade, 0);
+	go(0);
 	blade.position_mm[1] = 3;
-	near(go(&tissue, &blade, 4), incise_sim_mean_force(&config, 4, 0));
+	near(go(4), incise_sim_mean_force(&config, 4, 0));
 }
 
-TEST(each_cut_of_the_script_is_new)
+TEST(each_cut_of_the_script_is_new, begin_by_hand)
 {
-	struct incise_sim_config config;
-	struct incise_tissue tissue;
-	struct incise_blade blade;
-
-	begin_by_hand(&config, &tissue, &blade);
 	config.motion = INCISE_SURGEON_CUTS;
 	config.tooth = 0;
 	for (blade.cut = 0; blade.cut < 2; blade.cut++) {
-		near(go(&tissue, &blade, 10), incise_sim_mean_force(&config, 10, 0));
-		go(&tissue, &blade, 0);
+		near(go(10), incise_sim_mean_force(&config, 10, 0));
+		go(0);
 	}
 	blade.cut--; /* the blade touched the surface on its way: the same cut */
-	near(go(&tissue, &blade, 3),
-	     config.friction * incise_sim_mean_force(&config, 3, 0));
+	near(go(3), config.friction * incise_sim_mean_force(&config, 3, 0));
 }
 
 TEST(paper_is_the_law_both_ways)
@@ -219,11 +197,7 @@ TEST(paper_is_the_law_both_ways)
 				      INCISE_SURGEON_HAND};
 
 	for (size_t i = 0; i < sizeof(motions) / sizeof(*motions); i++) {
-		struct incise_sim_config config;
-		struct incise_tissue tissue;
-		struct incise_blade blade;
-
-		begin_by_hand(&config, &tissue, &blade);
+		begin_by_hand(NULL);
 		config.withdrawal = INCISE_TISSUE_PAPER;
 		config.motion = motions[i];
 		config.tooth = 0;
@@ -238,15 +212,11 @@ TEST(paper_is_the_law_both_ways)
 	}
 }
 
-TEST(asking_changes_nothing)
+TEST(asking_changes_nothing, begin_by_hand)
 {
-	struct incise_sim_config config;
-	struct incise_tissue tissue;
-	struct incise_blade blade;
 	double force_N;
 
-	begin_by_hand(&config, &tissue, &blade);
-	go(&tissue, &blade, 10);
+	go(10);
 	blade.depth_mm = 9;
 	force_N = incise_tissue_force(&tissue, &blade, 0);
 	blade.depth_mm = 12;
@@ -256,15 +226,10 @@ TEST(asking_changes_nothing)
 }
 
 /* A law that is steeper than the tissue unloads: the force rises no faster. */
-TEST(unloading_limits_the_force)
+TEST(unloading_limits_the_force, begin_by_hand)
 {
-	struct incise_sim_config config;
-	struct incise_tissue tissue;
-	struct incise_blade blade;
-
-	begin_by_hand(&config, &tissue, &blade);
 	config.unloading_N_mm = 0.02;
-	near(go(&tissue, &blade, 10), 0.02 * 10);
+	near(go(10), 0.02 * 10);
 }
 
 /*
@@ -280,13 +245,10 @@ TEST(closed_motions_take_work)
 	const int steps = 4000;
 
 	for (uint64_t n = 0; n < 900; n++) {
-		struct incise_sim_config config;
-		struct incise_tissue tissue;
-		struct incise_blade blade;
 		double work = 0, held = 0, force = 0, u[6];
 		double dt = 1e-3 * (0.1 + incise_random_uniform(key + 1, n));
 
-		begin_by_hand(&config, &tissue, &blade);
+		begin_by_hand(NULL);
 		config.motion = motions[n % 3];
 		config.boundary = 0.1;
 		for (int k = 0; k < 6; k++)

@@ -4,8 +4,6 @@
  */
 #include "../unit.h"
 #include <float.h>
-#include <math.h>
-#include <string.h>
 #include "../../../lib/base/vector.h"
 #include "../../../lib/base/random.h"
 #include "../../../lib/surface/average.h"

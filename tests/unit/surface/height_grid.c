@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Reading ESRI ASCII grids: where heights lie, what is refused, damaged files.
- */
-#include <errno.h>
+/* Reading ESRI ASCII grids: where heights lie, what is refused, damaged files. */
+#include "../unit.h"
 #include "../../../lib/surface/surface.h"
 #include "../message.h"
-#include "../unit.h"
 #include "../base/temp_file.h"
 #include "solid.h"
 
@@ -52,7 +49,6 @@ TEST(test_heights_lie_where_they_belong)
 	};
 
 	for (size_t k = 0; k < sizeof(cases) / sizeof(*cases); k++) {
-		struct incise_error err = {0};
 		struct incise_surface *surface =
 			load(cases[k].text, (double[3]){100, 0, 0.5}, &err);
 		double x0 = cases[k].x0 + 100, y0 = cases[k].y0;
@@ -109,7 +105,6 @@ TEST(test_bad_files)
 	};
 
 	for (size_t k = 0; k < sizeof(cases) / sizeof(*cases); k++) {
-		struct incise_error err;
 		char place[32];
 
 		snprintf(place, sizeof(place), "a.asc:%d: ", cases[k].line);

@@ -1,18 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Places on a mesh: normals, texture coordinates, fans, highest place.
- */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <stdint.h>
-#include <cmocka.h>
+/* Places on a mesh: normals, texture coordinates, fans, highest place. */
+#include "../unit.h"
 #include "../../../lib/surface/surface.h"
 #include "solid.h"
 #include "wavy.h"
 
 /* On a cube the normals of edges and corners are known, however its sides are cut. */
-static void test_normals_of_a_cube(void **state)
+TEST(test_normals_of_a_cube)
 {
 	struct solid *s = solid_cube();
 	struct incise_surface *surface = solid_surface(s);
@@ -41,7 +35,7 @@ static void test_normals_of_a_cube(void **state)
  * The case for normals weighted by angle (Bærentzen & Aanæs): a corner with many small
  * faces on one side. The sign is right all around it.
  */
-static void test_sign_at_a_lopsided_corner(void **state)
+TEST(test_sign_at_a_lopsided_corner)
 {
 	struct solid *s = solid_new();
 	struct incise_surface *surface;
@@ -90,7 +84,7 @@ static void test_sign_at_a_lopsided_corner(void **state)
 }
 
 /* A map of the plane onto texture: u and v follow the proxy linearly. */
-static void test_texture_follows_the_proxy(void **state)
+TEST(test_texture_follows_the_proxy)
 {
 	struct solid *s = solid_new();
 	struct incise_surface *surface;
@@ -138,7 +132,7 @@ static void test_texture_follows_the_proxy(void **state)
 	free(s);
 }
 
-static void test_top(void **state)
+TEST(test_top)
 {
 	static const double ridge[][2] = {{2, 0}, {0.5, 1}, {-1, 0}};
 	struct solid *s = solid_cube();
@@ -168,7 +162,7 @@ static void test_top(void **state)
 }
 
 /* Triangles down to a height of 1e-7 of their length, against points tried on them. */
-static void test_slivers_nearest(void **state)
+TEST(test_slivers_nearest)
 {
 	uint64_t random = 88172645463325252u;
 
@@ -207,9 +201,7 @@ static void test_slivers_nearest(void **state)
 	}
 }
 
-/*
- * Searches by the tree of boxes against searches through all triangles.
- */
+/* Searches by the tree of boxes against searches through all triangles. */
 
 /* Coordinates of some 10 mm, and formulas of some ten operations. */
 #define ROUNDING_MM 1e-12
@@ -233,7 +225,7 @@ static struct solid *soup(uint64_t *random, int n)
 	return s;
 }
 
-static void test_nearest_is_nearest(void **state)
+TEST(test_nearest_is_nearest)
 {
 	static const int sizes[] = {1, 2, 3, 4, 5, 8, 9, 100, 1000};
 	uint64_t random = 88172645463325252u;
@@ -266,7 +258,7 @@ static void test_nearest_is_nearest(void **state)
 	}
 }
 
-static void test_enters_where_all_triangles_say(void **state)
+TEST(test_enters_where_all_triangles_say)
 {
 	static const int sizes[] = {1, 4, 5, 100, 1000};
 	uint64_t random = 88172645463325252u;
@@ -307,7 +299,7 @@ static void test_enters_where_all_triangles_say(void **state)
 }
 
 /* A closed mesh against the sphere that it is cut of: sign, distance and normal. */
-static void test_sphere_of_triangles(void **state)
+TEST(test_sphere_of_triangles)
 {
 	struct solid *s = solid_sphere(10, 5);
 	struct incise_surface *surface = solid_surface(s);
@@ -359,7 +351,7 @@ static void test_sphere_of_triangles(void **state)
  * Nothing slips through: ways aimed exactly at corners and along edges, from corners'
  * own places and with coordinates that no double holds exactly.
  */
-static void test_no_way_slips_through(void **state)
+TEST(test_no_way_slips_through)
 {
 	struct solid *s = solid_sphere(10 / 3.0, 3);
 	struct incise_surface *surface = solid_surface(s);
@@ -534,7 +526,7 @@ static struct sweep sweep(size_t mesh, enum path path, double depth)
 	return result;
 }
 
-static void test_waves_at_five_resolutions(void **state)
+TEST(test_waves_at_five_resolutions)
 {
 	static const double depths[] = {0.3, 3, 9};
 
@@ -570,7 +562,7 @@ static void test_waves_at_five_resolutions(void **state)
 }
 
 /* However the tool jumps, the proxy stays in reach; a tool at rest leaves it at rest. */
-static void test_never_farther_than_the_reach(void **state)
+TEST(test_never_farther_than_the_reach)
 {
 	uint64_t random = 88172645463325252u;
 	struct incise_proxy proxy;
@@ -605,21 +597,4 @@ static void test_never_farther_than_the_reach(void **state)
 	assert_true(moved > 15000);
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_normals_of_a_cube),
-		cmocka_unit_test(test_sign_at_a_lopsided_corner),
-		cmocka_unit_test(test_texture_follows_the_proxy),
-		cmocka_unit_test(test_top),
-		cmocka_unit_test(test_slivers_nearest),
-		cmocka_unit_test(test_nearest_is_nearest),
-		cmocka_unit_test(test_enters_where_all_triangles_say),
-		cmocka_unit_test(test_sphere_of_triangles),
-		cmocka_unit_test(test_no_way_slips_through),
-		cmocka_unit_test(test_waves_at_five_resolutions),
-		cmocka_unit_test(test_never_farther_than_the_reach),
-	};
-
-	return cmocka_run_group_tests(tests, setup, teardown);
-}
+GROUP(setup, teardown);

@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * From points and triangles to a mesh: welding, neighbours, fans, order.
- */
+/* From points and triangles to a mesh: welding, neighbours, fans, order. */
 #include "../unit.h"
-#include <errno.h>
-#include <math.h>
-#include <stdlib.h>
 #include "../../../lib/surface/surface.h"
 #include "solid.h"
 
@@ -132,7 +127,6 @@ TEST(test_refusals)
 {
 	struct solid *s = solid_cube();
 	struct mesh_draft draft = {.path = "x", .point = s->point, .corner = s->corner};
-	struct incise_error err = {0};
 
 	assert_null(mesh_new(&draft, &err));
 	assert_int_equal(errno, EINVAL);
@@ -143,9 +137,7 @@ TEST(test_refusals)
 	free(s);
 }
 
-/*
- * The tree of boxes: each box in one leaf, within all boxes above it, not too deep.
- */
+/* The tree of boxes: each box in one leaf, within all boxes above it, not too deep. */
 
 struct count {
 	const struct bvh *bvh;

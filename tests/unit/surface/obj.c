@@ -3,10 +3,9 @@
  * Reading OBJ files: what is taken, what is refused and with which words, and that no
  * damage to a file does more than that.
  */
-#include <errno.h>
+#include "../unit.h"
 #include "../../../lib/surface/surface.h"
 #include "../message.h"
-#include "../unit.h"
 #include "../base/temp_file.h"
 #include "solid.h"
 
@@ -58,7 +57,6 @@ TEST(test_good_files)
 	};
 
 	for (size_t k = 0; k < sizeof(cases) / sizeof(*cases); k++) {
-		struct incise_error err = {0};
 		struct incise_surface *surface = load(cases[k].text, here, &err);
 
 		if (!surface)
@@ -116,7 +114,6 @@ TEST(test_bad_files)
 	};
 
 	for (size_t k = 0; k < sizeof(cases) / sizeof(*cases); k++) {
-		struct incise_error err;
 		char place[32];
 
 		snprintf(place, sizeof(place), "a.obj:%d: ", cases[k].line);
@@ -127,8 +124,6 @@ TEST(test_bad_files)
 
 TEST(test_files_that_are_none)
 {
-	struct incise_error err = {0};
-
 	assert_null(incise_surface_load_mesh("/nowhere/a.obj", here, &err));
 	assert_int_equal(err.code, ENOENT);
 	assert_int_equal(errno, ENOENT);
@@ -142,7 +137,6 @@ TEST(test_files_that_are_none)
 
 TEST(test_placed_and_numbered)
 {
-	struct incise_error err = {0};
 	struct incise_surface *surface =
 		load(SQUARE
 		     "vt 0 0\nvt 1 0\nvt 1 0.5\nvt 0 0.5\nf 1/1 2/2 4/3\nf 1/1 4/3 3/4\n",

@@ -64,12 +64,15 @@ static struct incise_surface *of_kind(int kind)
 
 #define N_KINDS 5
 
+/* Of the test that runs. */
+static struct incise_proxy proxy;
+static struct incise_surface *surface;
+
 /* Down onto the top of a plane, a sphere, a capsule and a cube, and up again. */
 TEST(test_begins_and_ends)
 {
 	for (int kind = 0; kind < N_KINDS; kind++) {
 		struct incise_surface *surface = of_kind(kind);
-		struct incise_proxy proxy;
 
 		if (kind == 3) {
 			incise_surface_free(surface);
@@ -107,7 +110,6 @@ TEST(test_first_place_of_all)
 {
 	for (int kind = 0; kind < N_KINDS; kind++) {
 		struct incise_surface *surface = of_kind(kind);
-		struct incise_proxy proxy;
 
 		incise_proxy_init(&proxy, surface, 0);
 		move(&proxy, 0.2, 0.1, -0.3);
@@ -125,7 +127,6 @@ TEST(test_first_place_of_all)
 TEST(test_through_a_ball)
 {
 	struct incise_surface *surface = of_kind(1);
-	struct incise_proxy proxy;
 
 	incise_proxy_init(&proxy, surface, 0.05);
 	move(&proxy, 0, 0, 5);
@@ -142,7 +143,6 @@ TEST(test_through_a_ball)
 TEST(test_through_a_cube)
 {
 	struct incise_surface *surface = of_kind(4);
-	struct incise_proxy proxy;
 
 	incise_proxy_init(&proxy, surface, 0.05);
 	move(&proxy, 0.25, 0.5, 5);
@@ -160,7 +160,6 @@ TEST(test_through_a_cube)
 TEST(test_cube)
 {
 	struct incise_surface *surface = of_kind(4);
-	struct incise_proxy proxy;
 
 	incise_proxy_init(&proxy, surface, 0.05);
 	move(&proxy, 0, 0, 1.5);
@@ -213,7 +212,6 @@ TEST(test_crease)
 		{10, 0}, {1, 0}, {0, -1.7320508075688772}, {-1, 0}, {-10, 0}};
 	struct solid *s = solid_profile(profile, 5, 3);
 	struct incise_surface *surface = solid_surface(s);
-	struct incise_proxy proxy;
 	int began = 0;
 
 	incise_proxy_init(&proxy, surface, 0.02);
@@ -252,8 +250,6 @@ TEST(test_ridge_and_saw)
 	static const double ridge[][2] = {
 		{10, 0}, {1, 0}, {0, 1.7320508075688772}, {-1, 0}, {-10, 0}};
 	double saw[40][2];
-	struct incise_surface *surface;
-	struct incise_proxy proxy;
 	struct solid *s = solid_profile(ridge, 5, 4);
 
 	surface = solid_surface(s);
@@ -298,7 +294,6 @@ TEST(test_thin_wedge)
 	static const double wedge[][2] = {{0, -0.1}, {2, 0}, {0, 0.1}};
 	struct solid *s = solid_profile(wedge, 3, 5);
 	struct incise_surface *surface = solid_surface(s);
-	struct incise_proxy proxy;
 
 	incise_proxy_init(&proxy, surface, 0.02);
 	move(&proxy, 0.5, 0, 1);
@@ -320,7 +315,6 @@ TEST(test_open_border)
 	static const double flat[][2] = {{2, 0}, {0, 0}, {-2, 0}};
 	struct solid *s = solid_profile(flat, 3, 10);
 	struct incise_surface *surface = solid_surface(s);
-	struct incise_proxy proxy;
 
 	incise_proxy_init(&proxy, surface, 0.02);
 	move(&proxy, 1, 0.5, 1);
@@ -352,8 +346,6 @@ TEST(test_open_border)
 TEST(test_slivers)
 {
 	struct solid *s = solid_new();
-	struct incise_surface *surface;
-	struct incise_proxy proxy;
 
 	for (int i = 0; i <= 200; i++) {
 		/* 2 mm, 100 strips of 20 nm, 2 mm */
@@ -390,7 +382,6 @@ TEST(test_on_the_surface)
 {
 	struct solid *s = solid_sphere(10 / 3.0, 2);
 	struct incise_surface *surface = solid_surface(s);
-	struct incise_proxy proxy;
 
 	incise_proxy_init(&proxy, surface, 0.01);
 	move(&proxy, 0, 0, 5);
@@ -426,9 +417,7 @@ TEST(test_on_the_surface)
 TEST(test_inside_is_in_contact)
 {
 	struct solid *s = solid_sphere(5, 4);
-	struct incise_surface *surface;
 	uint64_t random = 88172645463325252u;
-	struct incise_proxy proxy;
 	int inside = 0, outside = 0;
 
 	for (uint32_t k = 0; k < s->n_points; k++) {
@@ -493,7 +482,6 @@ TEST(test_any_pose)
 
 	for (int kind = 0; kind < N_KINDS; kind++) {
 		struct incise_surface *surface = of_kind(kind);
-		struct incise_proxy proxy;
 
 		incise_proxy_init(&proxy, surface, kind & 1 ? 0 : 0.05);
 		for (int k = 0; k < 200000; k++) {

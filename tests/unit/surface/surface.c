@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Making surfaces of each kind, and asking what they are.
- */
-#include <errno.h>
+/* Making surfaces of each kind, and asking what they are. */
+#include "../unit.h"
 #include <float.h>
 #include "../../../lib/surface/surface.h"
 #include "../message.h"
-#include "../unit.h"
 #include "solid.h"
 
 static const double zero[3], bad[3] = {0, NAN, 0}, far[3] = {0, 0, 1e300};
@@ -22,7 +19,6 @@ static void refused(struct incise_surface *surface, const struct incise_error *e
 TEST(test_refused)
 {
 	static const double radii[] = {0, -1, NAN, INFINITY, 1e300, 5e-324};
-	struct incise_error err = {0};
 
 	refused(incise_surface_new_plane(bad, zero, &err), &err);
 	refused(incise_surface_new_plane(zero, zero, &err), &err);

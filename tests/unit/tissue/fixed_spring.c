@@ -5,9 +5,6 @@
  * double, which has no formats.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <math.h>
-#include <string.h>
 #include <incise/fixed.h>
 #include "../../../lib/base/vector.h"
 #include "../../extremes/fixed_spring.h"

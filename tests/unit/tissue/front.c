@@ -4,7 +4,6 @@
  * integers next to double.
  */
 #include "../unit.h"
-#include <math.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/fixed/front.h"
 #include "../../../lib/tissue/front.h"

@@ -3,14 +3,7 @@
  * The cuts that ticks leave: what makes one, how they join, and what opens them. Ticks are
  * written out here, of a blade, handle or tube on the plane z = 0.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-#include <setjmp.h>
-#include <cmocka.h>
-#include <math.h>
+#include "../unit.h"
 #include "../../../lib/base/random.h"
 #include "../../../lib/tissue/incision.h"
 
@@ -102,7 +95,7 @@ static struct incise_opening opening(enum incise_tool tool, double x, double y)
 }
 
 /* A blade that is not deeper than the threshold leaves nothing; one that is leaves a line. */
-static void test_a_scratch_is_no_cut(void **state)
+TEST(test_a_scratch_is_no_cut, setup, teardown)
 {
 	const struct incise_cut *c;
 
@@ -122,7 +115,7 @@ static void test_a_scratch_is_no_cut(void **state)
 }
 
 /* Again along the same line: deeper, and longer at both ends; never shallower. */
-static void test_lengthened_and_deepened(void **state)
+TEST(test_lengthened_and_deepened, setup, teardown)
 {
 	const struct incise_cut *c;
 
@@ -138,7 +131,7 @@ static void test_lengthened_and_deepened(void **state)
 }
 
 /* The blade starts beyond the end, and goes on along the line when it comes to it. */
-static void test_no_line_twice(void **state)
+TEST(test_no_line_twice, setup, teardown)
 {
 	assert_true(cut(0, 0, 20, 0, 3));
 	assert_true(cut(25, 0.5, 3, 0.5, 4));
@@ -151,7 +144,7 @@ static void test_no_line_twice(void **state)
 }
 
 /* Cuts that cross or touch are one incision, whichever was first; others stay apart. */
-static void test_joined_where_they_meet(void **state)
+TEST(test_joined_where_they_meet, setup, teardown)
 {
 	assert_true(cut(0, 0, 0, 20, 3));
 	assert_true(cut(30, 0, 30, 20, 3));
@@ -168,7 +161,7 @@ static void test_joined_where_they_meet(void **state)
 }
 
 /* A fast blade crosses between two ticks. */
-static void test_crossed_between_two_ticks(void **state)
+TEST(test_crossed_between_two_ticks, setup, teardown)
 {
 	assert_true(cut(0, 0, 20, 0, 3));
 	assert_true(put(INCISE_TOOL_BLADE, 10, -4, 3, M_PI_2));
@@ -191,7 +184,7 @@ static void test_crossed_between_two_ticks(void **state)
  * direction that is 10° off halves that. Its pieces follow the arc: of 3.2 mm 14 at most, each within
  * 30°, and together as long but for a place at each end.
  */
-static void test_along_an_arc_with_noise(void **state)
+TEST(test_along_an_arc_with_noise, setup, teardown)
 {
 	uint64_t key = incise_random_key(1, INCISE_RANDOM_TRACKER), n = 0;
 	double length_mm = ARC * ARC_MM;
@@ -218,7 +211,7 @@ static void test_along_an_arc_with_noise(void **state)
 }
 
 /* A way round a corner goes on as another cut, of the same incision. */
-static void test_round_a_corner(void **state)
+TEST(test_round_a_corner, setup, teardown)
 {
 	for (int i = 0; i <= 100; i++)
 		assert_true(put(INCISE_TOOL_BLADE, 0.1 * i, 0, 3, 0));
@@ -236,7 +229,7 @@ static void test_round_a_corner(void **state)
 }
 
 /* More cuts than there is capacity for are not made, and change nothing. */
-static void test_no_more_than_the_bound(void **state)
+TEST(test_no_more_than_the_bound, setup, teardown)
 {
 	struct incise_cut before[CUTS_MOST];
 
@@ -256,7 +249,7 @@ static void test_no_more_than_the_bound(void **state)
 }
 
 /* As wide as it is deep, up to its extent across; less what stretches. It never closes. */
-static void test_opened_by_handle_and_tube(void **state)
+TEST(test_opened_by_handle_and_tube, setup, teardown)
 {
 	static const struct {
 		enum incise_tool tool;
@@ -287,7 +280,7 @@ static void test_opened_by_handle_and_tube(void **state)
 }
 
 /* Tightness of a handle is 1 in a cut that is not opened, and 0 in one that is wide enough. */
-static void test_tightness(void **state)
+TEST(test_tightness, setup, teardown)
 {
 	static const struct {
 		enum incise_tool tool;
@@ -308,7 +301,7 @@ static void test_tightness(void **state)
 }
 
 /* Two stretched lips go round a tube of 7 mm from 7π/2 - 2 = 8.996 mm on, a handle from 11. */
-static void test_too_short_for_the_tool(void **state)
+TEST(test_too_short_for_the_tool, setup, teardown)
 {
 	static const struct {
 		double length_mm;
@@ -333,7 +326,7 @@ static void test_too_short_for_the_tool(void **state)
 }
 
 /* Where cuts cross a tool goes into the deeper one, wherever it is within a line's width. */
-static void test_the_deeper_of_two(void **state)
+TEST(test_the_deeper_of_two, setup, teardown)
 {
 	assert_true(cut(-15, 0, 15, 0, 4));
 	assert_true(cut(0, -15, 0, 15, 9));
@@ -347,7 +340,7 @@ static void test_the_deeper_of_two(void **state)
 }
 
 /* A touch, or a whole cut elsewhere, leaves an opening as it was, to the bit. */
-static void test_elsewhere_changes_nothing(void **state)
+TEST(test_elsewhere_changes_nothing, setup, teardown)
 {
 	struct incise_opening before, after;
 
@@ -363,7 +356,7 @@ static void test_elsewhere_changes_nothing(void **state)
 }
 
 /* Numbers that no hand makes cut nothing. */
-static void test_impossible_ticks(void **state)
+TEST(test_impossible_ticks, setup, teardown)
 {
 	static const double bad[] = {NAN, INFINITY, -INFINITY, 1e300, -1e7};
 
@@ -389,7 +382,7 @@ static void test_impossible_ticks(void **state)
  * Random strokes of every tool: depth and opening never fall, a cut's ends only go apart, and the
  * same ticks give the same incision to the bit.
  */
-static void test_grows_only(void **state)
+TEST(test_grows_only, setup, teardown)
 {
 	struct incise_incision *first = incision;
 	struct incise_cut was[CUTS_MOST] = {0};
@@ -426,28 +419,4 @@ static void test_grows_only(void **state)
 				    incise_incision_cut(incision, k),
 				    sizeof(struct incise_cut));
 	incise_incision_free(first);
-}
-
-int main(void)
-{
-#define TEST(f) cmocka_unit_test_setup_teardown(f, setup, teardown)
-	const struct CMUnitTest tests[] = {
-		TEST(test_a_scratch_is_no_cut),
-		TEST(test_lengthened_and_deepened),
-		TEST(test_no_line_twice),
-		TEST(test_joined_where_they_meet),
-		TEST(test_crossed_between_two_ticks),
-		TEST(test_round_a_corner),
-		TEST(test_along_an_arc_with_noise),
-		TEST(test_no_more_than_the_bound),
-		TEST(test_opened_by_handle_and_tube),
-		TEST(test_tightness),
-		TEST(test_too_short_for_the_tool),
-		TEST(test_the_deeper_of_two),
-		TEST(test_elsewhere_changes_nothing),
-		TEST(test_impossible_ticks),
-		TEST(test_grows_only),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
 }

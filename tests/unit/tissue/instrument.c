@@ -3,7 +3,6 @@
  * lib/tissue/instrument.c: the tool that is held, by attitude and by name, and its end.
  */
 #include "../unit.h"
-#include <math.h>
 #include "../../../lib/tissue/instrument.h"
 
 #define AUTO INCISE_TOOL_AUTO

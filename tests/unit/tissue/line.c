@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * The cut as a line: its direction, its extent, and what lies within reach of it.
- */
+/* The cut as a line: its direction, its extent, and what lies within reach of it. */
 #include "../unit.h"
-#include <math.h>
 #include "../../../lib/tissue/line.h"
 
 static double dot(const double a[3], const double b[3])

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * tools/cli/child.c: a child ends with the program that started it.
- */
+/* tools/cli/child.c: a child ends with the program that started it. */
 #include "../unit.h"
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
-#include <unistd.h>
 #include "../../../tools/cli/child.h"
 
 static char *const sleeps[] = {"sleep", "1000", NULL};

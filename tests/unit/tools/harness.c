@@ -4,8 +4,6 @@
  * values whose median is known; and that variants take turns.
  */
 #include "../unit.h"
-#include <math.h>
-#include <string.h>
 #include "../../../lib/base/random.h"
 #include "../../../tools/bench/harness.h"
 #include "../../../tools/cli/stopwatch.h"

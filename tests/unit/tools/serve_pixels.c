@@ -2,15 +2,7 @@
 /*
  * Tests of tools/serve/pixels.c: frames of all formats as rows without gaps, and damaged ones.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <errno.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
+#include "../unit.h"
 #if __has_include(<jpeglib.h>)
 #include <jpeglib.h>
 #define PEER 1
@@ -19,7 +11,7 @@
 
 enum { WIDTH = 6, HEIGHT = 3, STRIDE = 24 };
 
-static void rows_lose_their_gaps(void **state)
+TEST(rows_lose_their_gaps)
 {
 	static const struct {
 		enum incise_pixels pixels;
@@ -98,7 +90,7 @@ static size_t encode(int components, uint8_t **bytes)
 	return n;
 }
 
-static void a_jpeg_is_decoded_as_it_is(void **state)
+TEST(a_jpeg_is_decoded_as_it_is)
 {
 	for (int components = 1; components <= 3; components += 2) {
 		uint8_t *bytes;
@@ -138,18 +130,8 @@ static void a_jpeg_is_decoded_as_it_is(void **state)
 	}
 }
 #else
-static void a_jpeg_is_decoded_as_it_is(void **state)
+TEST(a_jpeg_is_decoded_as_it_is)
 {
 	skip(); /* libjpeg-dev is not installed */
 }
 #endif
-
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(rows_lose_their_gaps),
-		cmocka_unit_test(a_jpeg_is_decoded_as_it_is),
-	};
-
-	return cmocka_run_group_tests(tests, NULL, NULL);
-}

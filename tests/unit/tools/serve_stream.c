@@ -1,12 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Tests of tools/serve/stream.c: rates, means and times of what reaches a sink.
- */
+/* Tests of tools/serve/stream.c: rates, means and times of what reaches a sink. */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
-#include <stdio.h>
-#include <string.h>
 #include <time.h>
 #include "../../../tools/cli/cli.h"
 #include "../../../tools/serve/stream.h"

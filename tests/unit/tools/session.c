@@ -3,11 +3,7 @@
  * tools/session: ticks of a made procedure, whose every figure is known, through the digest, the
  * file and the criteria.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
+#include "../unit.h"
 #include <incise/clock.h>
 #include "../../../tools/session/session.h"
 #include "../message.h"
@@ -37,108 +33,118 @@ static struct incise_scene *load(const char *scene)
 }
 
 /* Where the made procedure is: a tick follows the last one by 1 ms. */
-struct hand {
+static struct hand {
 	struct session_digest *digest;
 	int64_t t_ns;
 	enum incise_tool tool;
 	double x_mm, y_mm, depth_mm, force_N;
 	double turn_deg; /* about z */
 	unsigned int flags;
-};
+} hand;
 
-static void tick(struct hand *hand)
+static void tick(void)
 {
-	double half = hand->turn_deg * M_PI / 360;
+	double half = hand.turn_deg * M_PI / 360;
 	struct incise_tick now = {
-		.t_ns = hand->t_ns,
-		.tool_mm = {hand->x_mm, hand->y_mm, -hand->depth_mm},
+		.t_ns = hand.t_ns,
+		.tool_mm = {hand.x_mm, hand.y_mm, -hand.depth_mm},
 		.quaternion = {cos(half), 0, 0, sin(half)},
-		.tool = hand->tool,
-		.command_N = {0, 0, hand->force_N},
+		.tool = hand.tool,
+		.command_N = {0, 0, hand.force_N},
 	};
 
-	if (hand->depth_mm >= 0) {
-		now.phase = hand->tool == INCISE_TOOL_BLADE ? INCISE_PHASE_CUTTING
-							    : INCISE_PHASE_INSERTION;
-		now.flags = INCISE_TICK_CONTACT | hand->flags;
-		now.depth_mm = hand->depth_mm;
-		now.proxy_mm[0] = hand->x_mm;
-		now.proxy_mm[1] = hand->y_mm;
+	if (hand.depth_mm >= 0) {
+		now.phase = hand.tool == INCISE_TOOL_BLADE ? INCISE_PHASE_CUTTING
+							   : INCISE_PHASE_INSERTION;
+		now.flags = INCISE_TICK_CONTACT | hand.flags;
+		now.depth_mm = hand.depth_mm;
+		now.proxy_mm[0] = hand.x_mm;
+		now.proxy_mm[1] = hand.y_mm;
 		now.normal[2] = 1;
 	}
-	session_digest_tick(hand->digest, &now);
-	hand->t_ns += INCISE_NS_PER_S / HZ;
+	session_digest_tick(hand.digest, &now);
+	hand.t_ns += INCISE_NS_PER_S / HZ;
 }
 
 /* Go somewhere evenly in a whole number of ticks. */
-static void go(struct hand *hand, double x_mm, double y_mm, double depth_mm, int ticks)
+static void go(double x_mm, double y_mm, double depth_mm, int ticks)
 {
-	double from[3] = {hand->x_mm, hand->y_mm, hand->depth_mm};
+	double from[3] = {hand.x_mm, hand.y_mm, hand.depth_mm};
 
 	for (int i = 1; i <= ticks; i++) {
 		double share = (double)i / ticks;
 
-		hand->x_mm = from[0] + share * (x_mm - from[0]);
-		hand->y_mm = from[1] + share * (y_mm - from[1]);
-		hand->depth_mm = from[2] + share * (depth_mm - from[2]);
-		tick(hand);
+		hand.x_mm = from[0] + share * (x_mm - from[0]);
+		hand.y_mm = from[1] + share * (y_mm - from[1]);
+		hand.depth_mm = from[2] + share * (depth_mm - from[2]);
+		tick();
 	}
 }
 
-static void lift(struct hand *hand, enum incise_tool next)
+static void lift(enum incise_tool next)
 {
-	hand->depth_mm = -5;
-	hand->flags = 0;
+	hand.depth_mm = -5;
+	hand.flags = 0;
 	for (int i = 0; i < HZ; i++)
-		tick(hand);
-	hand->tool = next;
+		tick();
+	hand.tool = next;
 }
 
 /* A second in the air, a cut of 30 mm along x, three turns of the handle, a tube 16 mm deep. */
-static void procedure(struct hand *hand)
+static void procedure(void)
 {
-	hand->tool = INCISE_TOOL_BLADE;
-	lift(hand, INCISE_TOOL_BLADE);
-	hand->x_mm = 0;
-	hand->depth_mm = 3;
-	hand->force_N = 1;
-	go(hand, 30, 0, 3, HZ);
-	lift(hand, INCISE_TOOL_HANDLE);
-	hand->x_mm = 10;
-	hand->depth_mm = 5;
-	hand->force_N = 2.5;
+	hand.tool = INCISE_TOOL_BLADE;
+	lift(INCISE_TOOL_BLADE);
+	hand.x_mm = 0;
+	hand.depth_mm = 3;
+	hand.force_N = 1;
+	go(30, 0, 3, HZ);
+	lift(INCISE_TOOL_HANDLE);
+	hand.x_mm = 10;
+	hand.depth_mm = 5;
+	hand.force_N = 2.5;
 	for (int i = 0; i < 3 * HZ; i++) {
-		hand->turn_deg = 50 * sin(2 * M_PI * i / (3.0 * HZ));
-		tick(hand);
+		hand.turn_deg = 50 * sin(2 * M_PI * i / (3.0 * HZ));
+		tick();
 	}
-	hand->turn_deg = 0;
-	lift(hand, INCISE_TOOL_TUBE);
-	hand->depth_mm = 0;
-	hand->force_N = 1.5;
-	go(hand, 10, 0, 8, HZ);
-	hand->flags = INCISE_TICK_MEMBRANE;
-	go(hand, 10, 0, 12, HZ);
-	hand->flags = INCISE_TICK_LUMEN;
-	go(hand, 10, 0, 16, HZ);
+	hand.turn_deg = 0;
+	lift(INCISE_TOOL_TUBE);
+	hand.depth_mm = 0;
+	hand.force_N = 1.5;
+	go(10, 0, 8, HZ);
+	hand.flags = INCISE_TICK_MEMBRANE;
+	go(10, 0, 12, HZ);
+	hand.flags = INCISE_TICK_LUMEN;
+	go(10, 0, 16, HZ);
 }
 
-static struct hand begin(const char *scene_text)
+static void begin(const char *scene_text)
 {
 	struct incise_scene *scene = load(scene_text);
-	struct hand hand = {.digest = session_digest_new(scene, NULL), .t_ns = 7};
 
+	hand = (struct hand){.digest = session_digest_new(scene, NULL), .t_ns = 7};
 	/* The scene is not needed any more. */
 	incise_scene_free(scene);
 	assert_non_null(hand.digest);
-	return hand;
 }
 
-static void test_procedure(void **state)
+static int begin_text(void **state)
 {
-	struct hand hand = begin(text);
+	begin(text);
+	return 0;
+}
+
+static int end(void **state)
+{
+	session_digest_free(hand.digest);
+	return 0;
+}
+
+TEST(test_procedure, begin_text, end)
+{
 	struct session *s;
 
-	procedure(&hand);
+	procedure();
 	s = session_digest_now(hand.digest);
 	assert_true(s->ticks == 10000 && s->lost == 0 && s->unusable == 0);
 	assert_float_equal(s->duration_s, 9.999, 1e-9);
@@ -170,39 +176,37 @@ static void test_procedure(void **state)
 	/* The tube goes on by 4 mm/s, and 0.5 mm count as another place. */
 	assert_true(s->insertion.placed_s <= s->duration_s &&
 		    s->insertion.placed_s > s->duration_s - 0.5 / 4 - 2e-3);
-	session_digest_free(hand.digest);
 }
 
 /* Two cuts that meet are one incision; a tool beside the membrane; the wall behind. */
-static void test_mistakes(void **state)
+TEST(test_mistakes, begin_text, end)
 {
 	struct session_verdict verdicts[INCISE_CRITERIA];
-	struct hand hand = begin(text);
 	struct session *s;
 
 	hand.tool = INCISE_TOOL_BLADE;
 	hand.depth_mm = 2;
-	go(&hand, 12, 0, 2, HZ);
-	lift(&hand, INCISE_TOOL_BLADE);
+	go(12, 0, 2, HZ);
+	lift(INCISE_TOOL_BLADE);
 	hand.x_mm = 12;
 	hand.depth_mm = 2;
 	hand.turn_deg = 90;
-	go(&hand, 12, 12, 2, HZ);
-	lift(&hand, INCISE_TOOL_BLADE);
+	go(12, 12, 2, HZ);
+	lift(INCISE_TOOL_BLADE);
 	hand.x_mm = 60;
 	hand.depth_mm = 0.6;
 	hand.turn_deg = 0;
-	go(&hand, 66, 12, 9, HZ);
-	lift(&hand, INCISE_TOOL_TUBE);
+	go(66, 12, 9, HZ);
+	lift(INCISE_TOOL_TUBE);
 	hand.x_mm = 10;
 	hand.y_mm = 0;
 	hand.depth_mm = 0;
-	go(&hand, 10, 0, 8, HZ);
+	go(10, 0, 8, HZ);
 	hand.flags = INCISE_TICK_LUMEN;
-	go(&hand, 10, 0, 22, HZ);
+	go(10, 0, 22, HZ);
 	hand.flags |= INCISE_TICK_BACK_WALL;
-	go(&hand, 10, 0, 23, HZ);
-	lift(&hand, INCISE_TOOL_TUBE);
+	go(10, 0, 23, HZ);
+	lift(INCISE_TOOL_TUBE);
 	s = session_digest_now(hand.digest);
 	session_judge(s, verdicts);
 	assert_true(s->target.missed == 1);
@@ -221,33 +225,31 @@ static void test_mistakes(void **state)
 	assert_false(verdicts[INCISE_CRITERION_BACK_WALL].met);
 	assert_true(verdicts[INCISE_CRITERION_MEMBRANE].met);
 	assert_false(verdicts[INCISE_CRITERION_FORCE].judged);
-	session_digest_free(hand.digest);
 }
 
 /* A cut across another one: one incision, as long as before. */
-static void test_cross(void **state)
+TEST(test_cross, begin_text, end)
 {
 	struct session_verdict verdicts[INCISE_CRITERIA];
-	struct hand hand = begin(text);
 	struct session *s;
 
 	hand.tool = INCISE_TOOL_BLADE;
 	hand.depth_mm = 3;
-	go(&hand, 30, 0, 3, HZ);
-	lift(&hand, INCISE_TOOL_BLADE);
+	go(30, 0, 3, HZ);
+	lift(INCISE_TOOL_BLADE);
 	hand.x_mm = 15;
 	hand.y_mm = -6;
 	hand.depth_mm = 3;
 	hand.turn_deg = 90;
-	go(&hand, 15, 6, 3, HZ);
-	lift(&hand, INCISE_TOOL_HANDLE);
+	go(15, 6, 3, HZ);
+	lift(INCISE_TOOL_HANDLE);
 	/* Over the crossing, where the nearest cut is now this one and now that. */
 	for (int i = 0; i < 2 * HZ; i++) {
 		hand.x_mm = 15 + 0.1 * sin(2 * M_PI * i / 7.0);
 		hand.y_mm = 0.1 * cos(2 * M_PI * i / 11.0);
 		hand.depth_mm = 5;
 		hand.turn_deg = 90 + 40 * sin(2 * M_PI * i / (2.0 * HZ));
-		tick(&hand);
+		tick();
 	}
 	s = session_digest_now(hand.digest);
 	assert_true(s->enlarging.turns == 3);
@@ -255,16 +257,15 @@ static void test_cross(void **state)
 	assert_true(verdicts[INCISE_CRITERION_INCISIONS].value == 1);
 	assert_float_equal(verdicts[INCISE_CRITERION_CUT_LENGTH].value, 30 - 0.03, 1e-9);
 	assert_true(verdicts[INCISE_CRITERION_CUT_LENGTH].met);
-	session_digest_free(hand.digest);
 }
 
 /* Without a membrane its criteria are not judged, met or not. */
-static void test_no_membrane(void **state)
+TEST(test_no_membrane)
 {
 	struct session_verdict verdicts[INCISE_CRITERIA];
-	struct hand hand = begin("tissue = { insertion_N_mm = 0.1; };\n"
-				 "criteria = { membrane = true; back_wall = false; "
-				 "off_target_mm = 5.0; cut_length_mm = [1.0, 2.0]; };\n");
+	begin("tissue = { insertion_N_mm = 0.1; };\n"
+	      "criteria = { membrane = true; back_wall = false; "
+	      "off_target_mm = 5.0; cut_length_mm = [1.0, 2.0]; };\n");
 
 	session_judge(session_digest_now(hand.digest), verdicts);
 	for (int i = 0; i < INCISE_CRITERIA; i++)
@@ -274,9 +275,8 @@ static void test_no_membrane(void **state)
 }
 
 /* A day in which blade and handle take turns: the lists stay within their bounds and say so. */
-static void test_bounded(void **state)
+TEST(test_bounded, begin_text, end)
 {
-	struct hand hand = begin(text);
 	struct session *s;
 	double force_N = 0;
 
@@ -284,10 +284,10 @@ static void test_bounded(void **state)
 		hand.tool = i % 2 ? INCISE_TOOL_HANDLE : INCISE_TOOL_BLADE;
 		hand.depth_mm = 0.1;
 		hand.force_N = i == 12345 ? 3 : 1;
-		tick(&hand);
+		tick();
 		hand.t_ns += INCISE_NS_PER_S;
 		hand.depth_mm = -1;
-		tick(&hand);
+		tick();
 		hand.t_ns += INCISE_NS_PER_S;
 	}
 	s = session_digest_now(hand.digest);
@@ -302,22 +302,20 @@ static void test_bounded(void **state)
 		assert_true(!i || s->trace[i].t_s > s->trace[i - 1].t_s);
 	}
 	assert_true(force_N == 3);
-	session_digest_free(hand.digest);
 }
 
 /* Contacts of one tool grow together where they are too many. */
-static void test_joined_phases(void **state)
+TEST(test_joined_phases, begin_text, end)
 {
-	struct hand hand = begin(text);
 	struct session *s;
 
 	hand.tool = INCISE_TOOL_BLADE;
 	for (int i = 0; i < 1000; i++) {
 		hand.depth_mm = 0.1;
-		tick(&hand);
+		tick();
 		/* Pauses of 0.1 s, and each tenth of 10 s. */
 		hand.depth_mm = -1;
-		tick(&hand);
+		tick();
 		hand.t_ns += INCISE_NS_PER_S / (i % 10 ? 10 : 1) * (i % 10 ? 1 : 10);
 	}
 	s = session_digest_now(hand.digest);
@@ -325,16 +323,14 @@ static void test_joined_phases(void **state)
 	assert_true(s->phases_apart_s > 0.1 && s->phases_apart_s < 10);
 	/* A group ends behind each long pause: the first contact, 99 groups, the last nine. */
 	assert_int_equal(s->n_phases, 101);
-	session_digest_free(hand.digest);
 }
 
-static void test_unusable(void **state)
+TEST(test_unusable, begin_text, end)
 {
-	struct hand hand = begin(text);
 	struct incise_tick bad = {.t_ns = 7};
 	struct session *s;
 
-	procedure(&hand);
+	procedure();
 	session_digest_tick(hand.digest, &bad); /* of the past */
 	bad.t_ns = hand.t_ns;
 	bad.depth_mm = NAN;
@@ -348,7 +344,6 @@ static void test_unusable(void **state)
 	s = session_digest_now(hand.digest);
 	assert_true(s->unusable == 4 && s->ticks == 10004);
 	assert_float_equal(s->duration_s, 9.999, 1e-9);
-	session_digest_free(hand.digest);
 }
 
 static char *written(struct session *session)
@@ -365,22 +360,19 @@ static char *written(struct session *session)
 }
 
 /* It is read as it was, and written again to the same bytes. */
-static void test_file(void **state)
+TEST(test_file, begin_text, end)
 {
-	struct hand hand = begin(text);
-	struct incise_error err = {0};
 	struct session *s, *read;
 	char *first, *second;
 
-	procedure(&hand);
+	procedure();
 	s = session_digest_now(hand.digest);
 	strcpy(s->code, "P07");
 	strcpy(s->scene.path, "a\nb\xff");
 	s->lost = 12;
 	first = written(s);
 	read = session_parse(first, strlen(first), "a.session", &err);
-	if (!read)
-		fail_msg("%s", err.text);
+	succeeds(read);
 	assert_string_equal(read->code, "P07");
 	assert_string_equal(read->scene.path, "a?b?");
 	assert_true(read->lost == 12 && isnan(read->start_unix_s));
@@ -395,11 +387,10 @@ static void test_file(void **state)
 	free(first);
 	free(second);
 	free(read);
-	session_digest_free(hand.digest);
 }
 
 /* A member's value becomes another: refused by a line that names the member. */
-static void test_damaged(void **state)
+TEST(test_damaged, begin_text, end)
 {
 	static const struct {
 		const char *from, *to, *says;
@@ -431,15 +422,12 @@ static void test_damaged(void **state)
 		 "criteria.cut_length_mm", EINVAL},
 		{"\"phases\": [", "\"phases\": 1, \"more\": [", "phases", EINVAL},
 	};
-	struct hand hand = begin(text);
 	char *good, *bad, *at;
 
-	procedure(&hand);
+	procedure();
 	good = written(session_digest_now(hand.digest));
 	bad = malloc(2 * strlen(good));
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err;
-
 		at = strstr(good, cases[i].from);
 		if (!at)
 			fail_msg("case %zu: no %s", i, cases[i].from);
@@ -450,10 +438,9 @@ static void test_damaged(void **state)
 	}
 	free(good);
 	free(bad);
-	session_digest_free(hand.digest);
 }
 
-static void test_codes(void **state)
+TEST(test_codes)
 {
 	assert_true(session_is_code("P07") && session_is_code("a-b_c"));
 	assert_true(session_is_code("ABCDEFGHIJKLMNOP"));
@@ -462,21 +449,16 @@ static void test_codes(void **state)
 	assert_false(session_is_code("\xc3\xa9"));
 }
 
-int main(void)
+static int make_file(void **state)
 {
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_procedure), cmocka_unit_test(test_mistakes),
-		cmocka_unit_test(test_cross),	  cmocka_unit_test(test_no_membrane),
-		cmocka_unit_test(test_bounded),	  cmocka_unit_test(test_joined_phases),
-		cmocka_unit_test(test_unusable),  cmocka_unit_test(test_file),
-		cmocka_unit_test(test_damaged),	  cmocka_unit_test(test_codes),
-	};
-	int fd = mkstemp(path), rc;
+	int fd = mkstemp(path);
 
-	if (fd < 0)
-		return 1;
-	close(fd);
-	rc = cmocka_run_group_tests(tests, NULL, NULL);
-	unlink(path);
-	return rc;
+	return fd < 0 || close(fd);
 }
+
+static int remove_file(void **state)
+{
+	return unlink(path);
+}
+
+GROUP(make_file, remove_file);

@@ -4,9 +4,6 @@
  * nothing is wider or higher than asked.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../tools/capture/trace.h"
 
 #define HEIGHT 4

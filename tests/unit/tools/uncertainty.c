@@ -1,13 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * tools/cli/uncertainty.c: digits of a value and of its uncertainty.
- */
+/* tools/cli/uncertainty.c: digits of a value and of its uncertainty. */
 #include "../unit.h"
 #include <float.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../tools/cli/uncertainty.h"
 
 TEST(digits_follow_the_uncertainty)

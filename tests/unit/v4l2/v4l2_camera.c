@@ -3,11 +3,10 @@
  * lib/device/v4l2/v4l2_camera.c on a driver that the test simulates: a camera from open to close, or to
  * its end; and the search, in a folder that the test fills as udev does.
  */
+#include "../unit.h"
 #include <fcntl.h>
 #include <glob.h>
-#include <stdio.h>
 #include <sys/stat.h>
-#include <unistd.h>
 #include "../../../lib/device/backends.h"
 #include "../message.h"
 #include "driver.h"
@@ -55,7 +54,7 @@ static void close_camera(struct incise_camera *camera)
 	assert_int_equal(driver.mapped, 0);
 }
 
-static void frames_come_through_the_interface(void **state)
+TEST(frames_come_through_the_interface)
 {
 	static const struct incise_camera_setup setup = {.width = 32,
 							 .height = 24,
@@ -70,8 +69,7 @@ static void frames_come_through_the_interface(void **state)
 	reset();
 	driver_add(V4L2_CID_EXPOSURE_ABSOLUTE, 1, 1000, 50);
 	camera = open_camera("/dev/video7", &setup);
-	if (!camera)
-		fail_msg("%s", err.text);
+	succeeds(camera);
 	incise_camera_info(camera, &info);
 	assert_int_equal(strncmp(info.name, "C?CCC", 5), 0);
 	assert_int_equal(strlen(info.name), 32);
@@ -94,7 +92,7 @@ static void frames_come_through_the_interface(void **state)
 	close_camera(camera);
 }
 
-static void an_unplugged_camera_says_so(void **state)
+TEST(an_unplugged_camera_says_so)
 {
 	struct incise_camera_frame frame;
 	struct incise_camera *camera;
@@ -119,7 +117,7 @@ static void an_unplugged_camera_says_so(void **state)
 	close_camera(camera);
 }
 
-static void controls_that_drift_end_it(void **state)
+TEST(controls_that_drift_end_it)
 {
 	struct incise_camera_frame frame;
 	struct incise_camera *camera;
@@ -158,7 +156,7 @@ static void forget_when_beginning(void)
 	driver.streamon_error = EIO;
 }
 
-static void why_it_cannot_be_opened_is_said(void **state)
+TEST(why_it_cannot_be_opened_is_said)
 {
 	static const struct {
 		const char *path;
@@ -198,7 +196,7 @@ static void why_it_cannot_be_opened_is_said(void **state)
 	}
 }
 
-static void a_camera_may_be_opened_and_closed_at_once(void **state)
+TEST(a_camera_may_be_opened_and_closed_at_once)
 {
 	for (int i = 0; i < 20; i++) {
 		struct incise_camera *camera;
@@ -282,7 +280,7 @@ static int empty(void **state)
 	return system(command);
 }
 
-static void cameras_are_named_by_what_stays(void **state)
+TEST(cameras_are_named_by_what_stays)
 {
 	char expected[200];
 
@@ -305,7 +303,7 @@ static void cameras_are_named_by_what_stays(void **state)
 	assert_int_equal(driver.opened, 0);
 }
 
-static void one_may_be_asked_for(void **state)
+TEST(one_may_be_asked_for)
 {
 	driver_reset();
 	answer = 0;
@@ -318,7 +316,7 @@ static void one_may_be_asked_for(void **state)
 	assert_int_equal(scan(in_dev("video2")), -EIO);
 }
 
-static void who_has_seen_enough_ends_it(void **state)
+TEST(who_has_seen_enough_ends_it)
 {
 	driver_reset();
 	answer = -77;
@@ -329,7 +327,7 @@ static void who_has_seen_enough_ends_it(void **state)
 	assert_int_equal(n, 1);
 }
 
-static void what_is_no_camera_is_passed_over(void **state)
+TEST(what_is_no_camera_is_passed_over)
 {
 	driver_reset();
 	answer = 0;
@@ -342,7 +340,7 @@ static void what_is_no_camera_is_passed_over(void **state)
 	assert_int_equal(driver.opened, 0);
 }
 
-static void who_may_not_look_is_reported(void **state)
+TEST(who_may_not_look_is_reported)
 {
 	driver_reset();
 	driver.open_error = EACCES;
@@ -351,20 +349,4 @@ static void who_may_not_look_is_reported(void **state)
 	assert_int_equal(n, 0);
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(frames_come_through_the_interface),
-		cmocka_unit_test(an_unplugged_camera_says_so),
-		cmocka_unit_test(controls_that_drift_end_it),
-		cmocka_unit_test(why_it_cannot_be_opened_is_said),
-		cmocka_unit_test(a_camera_may_be_opened_and_closed_at_once),
-		cmocka_unit_test(cameras_are_named_by_what_stays),
-		cmocka_unit_test(one_may_be_asked_for),
-		cmocka_unit_test(who_has_seen_enough_ends_it),
-		cmocka_unit_test(what_is_no_camera_is_passed_over),
-		cmocka_unit_test(who_may_not_look_is_reported),
-	};
-
-	return cmocka_run_group_tests(tests, fill, empty);
-}
+GROUP(fill, empty);

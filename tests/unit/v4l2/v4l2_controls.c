@@ -4,9 +4,9 @@
  * itself is off and stays so, values are what was asked for or what they were, and all that
  * does not hold is refused.
  */
+#include "../unit.h"
 #include "../../../lib/device/v4l2/v4l2_controls.h"
 #include "../message.h"
-#include "../unit.h"
 #include "driver.h"
 
 #define WHERE "rig.conf:1: camera"

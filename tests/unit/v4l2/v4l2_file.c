@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * lib/device/v4l2/v4l2_file.c on a driver that the test plays.
- */
+/* lib/device/v4l2/v4l2_file.c on a driver that the test plays. */
 #include "../unit.h"
 #include "../../../lib/device/v4l2/v4l2_file.h"
 #include "driver.h"

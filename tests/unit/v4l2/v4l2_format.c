@@ -3,10 +3,9 @@
  * lib/device/v4l2/v4l2_format.c on a driver that the test plays: the nearest on offer is
  * taken, what is given is reported, and what cannot be is refused.
  */
-#include <math.h>
+#include "../unit.h"
 #include "../../../lib/device/v4l2/v4l2_format.h"
 #include "../message.h"
-#include "../unit.h"
 #include "driver.h"
 
 #define WHERE "rig.conf:1: camera"

@@ -4,18 +4,15 @@
  * lost or damaged is counted, what a caller holds is left alone, and what a driver says
  * wrongly is refused.
  */
+#include "../unit.h"
 #include <pthread.h>
 #include <stdatomic.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include "../../../lib/base/random.h"
 #include "../../../lib/device/v4l2/v4l2_stream.h"
 #include "../message.h"
-#include "../unit.h"
 #include "driver.h"
 
 #define WHERE "rig.conf:1: camera"
-#define PERIOD_NS 33333333
 #define WAIT_MOST 24 /* of 32 buffers */
 #define SPINS 1000   /* of a reader between two looks; a step takes about as long */
 
@@ -74,10 +71,11 @@ static void losses(uint64_t lost, uint64_t damaged)
 	assert_true(atomic_load(&stream.damaged) == damaged);
 }
 
+/* Of the test that runs. */
+static struct incise_camera_frame frame;
+
 TEST(frames_come_in_order_with_their_timestamps)
 {
-	struct incise_camera_frame frame;
-
 	begin();
 	assert_int_equal(v4l2_stream_read(&stream, &frame), 0);
 	assert_int_equal(step(), 0);
@@ -141,8 +139,6 @@ static void read_three(void)
 /* v4l2loopback, which was outrun, goes on with a buffer that came back a moment before. */
 TEST(what_comes_back_while_it_waits_is_the_drivers)
 {
-	struct incise_camera_frame frame;
-
 	begin();
 	for (uint32_t i = 0; i < 3; i++) {
 		driver_shoot(i);
@@ -162,8 +158,6 @@ TEST(what_comes_back_while_it_waits_is_the_drivers)
 
 TEST(four_buffers_suffice)
 {
-	struct incise_camera_frame frame;
-
 	driver_reset();
 	driver.count = 4;
 	assert_int_equal(start(INCISE_PIXELS_YUYV, 0), 0);
@@ -182,7 +176,6 @@ TEST(as_many_wait_as_there_is_room)
 	static const struct {
 		uint32_t buffers, waiting;
 	} cases[] = {{4, 1}, {5, 2}, {8, 5}, {12, 9}, {13, 10}, {16, 12}, {32, 24}};
-	struct incise_camera_frame frame;
 
 	for (size_t k = 0; k < sizeof(cases) / sizeof(cases[0]); k++) {
 		uint32_t n = cases[k].waiting;
@@ -264,8 +257,6 @@ TEST(two_threads_take_each_once)
 
 TEST(all_that_is_lost_is_counted)
 {
-	struct incise_camera_frame frame;
-
 	begin();
 	driver_shoot(0);
 	driver_shoot(1);
@@ -286,8 +277,6 @@ TEST(all_that_is_lost_is_counted)
 
 TEST(damage_that_a_driver_does_not_count)
 {
-	struct incise_camera_frame frame;
-
 	begin();
 	/* Before the first one; its count may be anything. */
 	driver_shoot(99999999)->flags |= V4L2_BUF_FLAG_ERROR;
@@ -317,7 +306,6 @@ TEST(stamps_that_cannot_be_are_damage)
 		{-20000000000, 0, false}, /* long ago, and before the last one */
 		{0, -1, false},		  /* the same as before */
 	};
-	struct incise_camera_frame frame;
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct driver_frame *shot;
@@ -350,7 +338,6 @@ TEST(the_middle_of_the_exposure_is_reported)
 		{V4L2_BUF_FLAG_TSTAMP_SRC_SOE, 4000000},
 		{V4L2_BUF_FLAG_TSTAMP_SRC_EOF, -4000000},
 	};
-	struct incise_camera_frame frame;
 
 	for (size_t i = 0; i < 2; i++) {
 		struct driver_frame *shot;
@@ -381,7 +368,6 @@ TEST(a_jpeg_is_whole_from_first_to_last_marker)
 		{{0xff, 0xd8, 0xff}, 3, false},
 		{{0xff, 0xd8, 0xd9, 0}, 4, false},
 	};
-	struct incise_camera_frame frame;
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		driver_reset();
@@ -502,7 +488,6 @@ TEST(every_end_has_its_cause)
 		{be_ready_and_not, EIO, "5 s"},
 		{fall_silent, EIO, "5 s"},
 	};
-	struct incise_camera_frame frame;
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		int rc = 0, steps = 0;
@@ -526,8 +511,6 @@ TEST(every_end_has_its_cause)
 
 TEST(one_error_ends_nothing)
 {
-	struct incise_camera_frame frame;
-
 	begin();
 	for (int i = 0; i < 20; i++) {
 		driver.dqbuf_error = i % 2 ? 0 : EIO;
@@ -596,7 +579,6 @@ static uint32_t draw(uint32_t below)
 
 TEST(a_driver_that_lies_at_random_does_no_harm)
 {
-	struct incise_camera_frame frame;
 	unsigned int frames = 0, ends = 0;
 
 	for (int run = 0; run < 300; run++) {

@@ -4,7 +4,6 @@
  * determines the result.
  */
 #include "../unit.h"
-#include <stdlib.h>
 #include "allocated.h"
 #include "ground.h"
 #include "../../../lib/view/blood.h"
@@ -47,6 +46,10 @@ static void assert_balance(const struct blood *blood)
 	assert_true(v.drops >= 0 && v.films >= 0 && v.off >= 0);
 }
 
+/* Of the test that runs. */
+static struct field field;
+static struct blood *blood;
+
 /* Two minutes on ground of some tilts, with cuts now and then. */
 TEST(test_balance)
 {
@@ -54,8 +57,6 @@ TEST(test_balance)
 
 	for (int k = 0; k < 3; k++) {
 		struct blood_volumes v;
-		struct blood *blood;
-		struct field field;
 
 		field_new(&field, COARSE, tilts[k]);
 		blood = blood_new(field.map, &field.picture, NULL);
@@ -85,8 +86,6 @@ TEST(test_balance)
 TEST(test_emits_what_it_should)
 {
 	struct blood_volumes v;
-	struct blood *blood;
-	struct field field;
 	double all;
 
 	field_new(&field, COARSE, 0);
@@ -128,8 +127,6 @@ TEST(test_downhill)
 	for (int k = 0; k < 3; k++) {
 		double was[DROPS] = {0}, first[DROPS] = {0}, farthest = 0;
 		bool there[DROPS] = {false};
-		struct field field;
-		struct blood *blood;
 		struct incise_scene_picture picture;
 
 		field_new(&field, SIDE, k ? -1 : 40);
@@ -179,8 +176,6 @@ TEST(test_downhill)
 /* On level ground nothing runs. */
 TEST(test_level_stays)
 {
-	struct blood *blood;
-	struct field field;
 	double px[2], ul;
 
 	field_new(&field, SIDE, 0);
@@ -203,8 +198,6 @@ TEST(test_pinned_below_a_volume)
 	double let_go_ul[2] = {0};
 
 	for (int k = 0; k < 2; k++) {
-		struct blood *blood;
-		struct field field;
 		double begin[2] = {0}, px[2], ul;
 		bool there = false;
 
@@ -264,7 +257,6 @@ TEST(test_repeats)
 {
 	static const int seeds[] = {1, 1, 2};
 	struct painted p[3];
-	struct field field;
 	const uint8_t *layer[3];
 
 	field_new(&field, SIDE, 50);
@@ -310,7 +302,6 @@ TEST(test_dries)
 {
 	struct incise_upload uploads[256];
 	struct painted p;
-	struct field field;
 
 	field_new(&field, SIDE, 50);
 	painted_new(&p, &field, 1);
@@ -337,8 +328,6 @@ TEST(test_much)
 	static const double viscosities[] = {0.5, 1000};
 
 	for (int k = 0; k < 2; k++) {
-		struct blood *blood;
-		struct field field;
 		size_t memory;
 
 		field_new(&field, COARSE, -1);

@@ -4,11 +4,7 @@
  * means in linear light.
  */
 #include "../unit.h"
-#include <errno.h>
 #include <limits.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/view/canvas.h"
 
 #define SIDE 256

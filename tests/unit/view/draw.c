@@ -5,13 +5,7 @@
  *
  *     INCISE_GOLDEN=write build/tests/unit/view/draw    stores new ones: look at them
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
-#include <errno.h>
-#include <math.h>
+#include "../unit.h"
 #include "../../../lib/surface/surface.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/view/draw.h"
@@ -108,13 +102,33 @@ static struct incise_draw *draw_new(const struct incise_canvas *canvas, int samp
 				      .look = INCISE_SKIN_NECK,
 				      .scalpel = {{0, 0, 1}, {0, 1, 0}, 120, 10, 3, 7},
 				      .samples = samples};
-	struct incise_error err = {0};
 	struct incise_draw *draw = incise_draw_new(&s, &err);
 
 	if (!draw)
 		print_message("%s\n", err.text);
 	assert_non_null(draw);
 	return draw;
+}
+
+static struct incise_canvas *canvas;
+static struct incise_draw *draw;
+
+static int begin(void **state)
+{
+	if (egl) {
+		canvas = canvas_new();
+		draw = draw_new(canvas, 1);
+	}
+	return 0;
+}
+
+static int end(void **state)
+{
+	if (egl) {
+		incise_draw_free(draw);
+		incise_canvas_free(canvas);
+	}
+	return 0;
 }
 
 /* Held like a pen, with its tip 2 mm below the skin. */
@@ -134,8 +148,6 @@ static struct incise_tick held(enum incise_tool tool)
 static void frame(struct incise_draw *draw, const struct incise_view_camera *camera,
 		  const struct incise_tick *tick, uint8_t *rgb)
 {
-	struct incise_error err = {0};
-
 	assert_int_equal(incise_draw_frame(draw, camera, tick, W, H, &err), 0);
 	assert_int_equal(incise_draw_read(draw, rgb, W, H), 0);
 }
@@ -148,7 +160,7 @@ static void frame(struct incise_draw *draw, const struct incise_view_camera *cam
  */
 #define ALIKE 0.975
 
-static void test_golden(void **state)
+TEST(test_golden, begin, end)
 {
 	static const struct {
 		const char *name;
@@ -159,12 +171,10 @@ static void test_golden(void **state)
 		{"tube", &aside, INCISE_TOOL_TUBE},
 		{"above", &above, INCISE_TOOL_AUTO},
 	};
-	struct incise_canvas *canvas;
-	struct incise_draw *draw;
 
 	if (!egl)
 		skip();
-	canvas = canvas_new();
+	incise_draw_free(draw);
 	draw = draw_new(canvas, 4);
 	for (int i = 0; i < 3; i++) {
 		struct incise_tick tick = held(cases[i].tool);
@@ -193,18 +203,14 @@ static void test_golden(void **state)
 		assert_true(alike < ALIKE);
 		free(golden);
 	}
-	incise_draw_free(draw);
-	incise_canvas_free(canvas);
 }
 
-static void test_same_input_same_picture(void **state)
+TEST(test_same_input_same_picture, begin, end)
 {
 	struct incise_tick tick = held(INCISE_TOOL_BLADE);
-	struct incise_canvas *canvas;
 
 	if (!egl)
 		skip();
-	canvas = canvas_new();
 	for (int i = 0; i < 2; i++) {
 		struct incise_draw *draw = draw_new(canvas, 1);
 
@@ -215,7 +221,6 @@ static void test_same_input_same_picture(void **state)
 		incise_draw_free(draw);
 	}
 	assert_memory_equal(one, two, sizeof(one));
-	incise_canvas_free(canvas);
 }
 
 static bool differs(int x, int y)
@@ -231,23 +236,19 @@ static int darker(int x, int y)
 	return a[0] + a[1] + a[2] - b[0] - b[1] - b[2];
 }
 
-static void test_instrument_is_where_its_pose_says(void **state)
+TEST(test_instrument_is_where_its_pose_says, begin, end)
 {
 	static const struct incise_scene_scalpel scalpel = {{0, 0, 1}, {0, 1, 0}, 120,
 							    10,	       3,	  7};
 	struct incise_tick tick = held(INCISE_TOOL_BLADE);
 	struct instrument_place place;
 	struct instrument_mesh mesh;
-	struct incise_canvas *canvas;
-	struct incise_draw *draw;
 	struct view_projection projection;
 	double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
 	int shaded = 0;
 
 	if (!egl)
 		skip();
-	canvas = canvas_new();
-	draw = draw_new(canvas, 1);
 	frame(draw, &aside, NULL, one);
 	frame(draw, &aside, &tick, two);
 	assert_true(instrument_place(&scalpel, &tick, &place));
@@ -287,17 +288,14 @@ static void test_instrument_is_where_its_pose_says(void **state)
 		}
 	assert_true(shaded > 20);
 	instrument_free(&mesh);
-	incise_draw_free(draw);
-	incise_canvas_free(canvas);
 }
 
 /* Uploads by rectangles give the same texture as a complete one, and no more changes. */
-static void test_dirty_rectangle(void **state)
+TEST(test_dirty_rectangle, begin, end)
 {
 	static const struct incise_rect rect = {300, 220, 17, 9};
 	struct incise_upload uploads[CANVAS_UPLOADS_MIN];
-	struct incise_canvas *canvas;
-	struct incise_draw *draw, *anew;
+	struct incise_draw *anew;
 	struct view_projection projection;
 	double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
 	int changed = 0, n;
@@ -305,8 +303,6 @@ static void test_dirty_rectangle(void **state)
 
 	if (!egl)
 		skip();
-	canvas = canvas_new();
-	draw = draw_new(canvas, 1);
 	frame(draw, &aside, NULL, one);
 	layer = incise_canvas_layer(canvas, 0);
 	for (int y = rect.y; y < rect.y + rect.h; y++)
@@ -343,20 +339,14 @@ static void test_dirty_rectangle(void **state)
 	frame(anew, &aside, NULL, one);
 	assert_memory_equal(one, two, sizeof(one));
 	incise_draw_free(anew);
-	incise_draw_free(draw);
-	incise_canvas_free(canvas);
 }
 
-static void test_overlay(void **state)
+TEST(test_overlay, begin, end)
 {
 	static uint8_t image[20 * 10 * 4];
-	struct incise_canvas *canvas;
-	struct incise_draw *draw;
 
 	if (!egl)
 		skip();
-	canvas = canvas_new();
-	draw = draw_new(canvas, 1);
 	assert_int_equal(incise_draw_overlay(draw, 0, image, 20, 10, 1, 0, 0), -EINVAL);
 	frame(draw, &aside, NULL, one);
 	/* The upper half a colour, the lower one clear. Blue, green, red, alpha. */
@@ -373,11 +363,9 @@ static void test_overlay(void **state)
 				assert_false(differs(x, y));
 	assert_int_equal(incise_draw_overlay(draw, 4, image, 20, 10, 1, 0, 0), -EINVAL);
 	assert_int_equal(incise_draw_overlay(draw, 0, image, 0, 10, 1, 0, 0), -EINVAL);
-	incise_draw_free(draw);
-	incise_canvas_free(canvas);
 }
 
-static void test_what_comes_from_outside(void **state)
+TEST(test_what_comes_from_outside, begin, end)
 {
 	static const struct incise_upload bad[] = {
 		{-1, {0, 0, 1, 1}},	  {99, {0, 0, 1, 1}},	{0, {-1, 0, 4, 4}},
@@ -386,14 +374,9 @@ static void test_what_comes_from_outside(void **state)
 	};
 	struct incise_tick tick = held(INCISE_TOOL_TUBE);
 	struct incise_view_camera camera = aside;
-	struct incise_error err = {0};
-	struct incise_canvas *canvas;
-	struct incise_draw *draw;
 
 	if (!egl)
 		skip();
-	canvas = canvas_new();
-	draw = draw_new(canvas, 1);
 	assert_int_equal(incise_draw_read(draw, one, W, H), -EINVAL);
 	frame(draw, &aside, NULL, one);
 	incise_draw_upload(draw, canvas, bad, sizeof(bad) / sizeof(bad[0]));
@@ -416,20 +399,6 @@ static void test_what_comes_from_outside(void **state)
 	frame(draw, &aside, NULL, two);
 	assert_memory_equal(one, two, sizeof(one));
 	assert_int_equal(incise_draw_read(draw, one, W - 1, H), -EINVAL);
-	incise_draw_free(draw);
-	incise_canvas_free(canvas);
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_golden),
-		cmocka_unit_test(test_same_input_same_picture),
-		cmocka_unit_test(test_instrument_is_where_its_pose_says),
-		cmocka_unit_test(test_dirty_rectangle),
-		cmocka_unit_test(test_overlay),
-		cmocka_unit_test(test_what_comes_from_outside),
-	};
-
-	return cmocka_run_group_tests(tests, setup, teardown);
-}
+GROUP(setup, teardown);

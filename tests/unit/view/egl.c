@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Contexts without a screen.
- */
+/* Contexts without a screen. */
 #include "../unit.h"
 #include <epoxy/gl.h>
 #include "look.h"

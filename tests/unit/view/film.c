@@ -3,17 +3,13 @@
  * A film's file: invalid options and a missing module are reported, and no partial file is left.
  * tests/unit/film tests its contents.
  */
-#include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
+#include "../unit.h"
 #include <incise/film.h>
 #include "../message.h"
 
 static char folder[] = "/tmp/incise-films-XXXXXX";
 
-static void test_sizes(void **state)
+TEST(test_sizes)
 {
 	static const struct {
 		int width, height, rate;
@@ -22,17 +18,14 @@ static void test_sizes(void **state)
 		     {0, 0, 0},	     {1 << 30, 16, 1}};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_error err = {0};
-
 		assert_error(incise_film_new("x.mkv", cases[i].width, cases[i].height,
 					     cases[i].rate, &err),
 			     EINVAL, &err, "x.mkv");
 	}
 }
 
-static void test_no_module(void **state)
+TEST(test_no_module)
 {
-	struct incise_error err = {0};
 	char path[100];
 
 	setenv("INCISE_MODULE_PATH", folder, 1);
@@ -54,12 +47,4 @@ static int end(void **state)
 	return rmdir(folder);
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_sizes),
-		cmocka_unit_test(test_no_module),
-	};
-
-	return cmocka_run_group_tests(tests, begin, end);
-}
+GROUP(begin, end);

@@ -4,8 +4,6 @@
  * requests; and invalid ticks do no harm.
  */
 #include "../unit.h"
-#include <errno.h>
-#include <stdlib.h>
 #include "allocated.h"
 #include "ground.h"
 
@@ -331,7 +329,6 @@ TEST(test_hostile)
 
 TEST(test_refused)
 {
-	struct incise_error err = {0};
 	struct incise_canvas *canvas;
 	struct field field;
 	uint8_t base[32 * 32 * 4] = {0};

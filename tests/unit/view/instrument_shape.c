@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * Meshes of instruments, and their frames from ticks.
- */
+/* Meshes of instruments, and their frames from ticks. */
 #include "../unit.h"
-#include <math.h>
-#include <string.h>
 #include "../../../lib/base/vector.h"
 #include "../../../lib/view/instrument_shape.h"
 

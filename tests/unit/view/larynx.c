@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * The larynx: its shape, and the surface as drawn with it.
- */
+/* The larynx: its shape, and the surface as drawn with it. */
 #include "../unit.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/surface/surface.h"

@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/*
- * Images of tests: a context or a skip, PNG files by cairo, and similarity of two.
- */
+/* Images of tests: a context or a skip, PNG files by cairo, and similarity of two. */
 #ifndef INCISE_TEST_LOOK_H
 #define INCISE_TEST_LOOK_H
 

@@ -3,8 +3,6 @@
  * Noise compared with the sum over its lattice by the closed form of the B-spline; cells.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
 #include "../../../lib/view/noise.h"
 
 #define SIZE 256

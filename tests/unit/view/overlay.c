@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * The panels: contents and times of redrawing; any tick is harmless.
- */
+/* The panels: contents and times of redrawing; any tick is harmless. */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/view/overlay.h"
 
 static struct incise_tick at(int64_t ms, double force_N, double depth_mm)

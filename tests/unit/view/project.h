@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
-/*
- * The pixel of a place: the inverse of view_camera_ray().
- */
+/* The pixel of a place: the inverse of view_camera_ray(). */
 #ifndef INCISE_TEST_PROJECT_H
 #define INCISE_TEST_PROJECT_H
 

@@ -3,9 +3,6 @@
  * Painted tissue: plausible colours, no seams, and one texture per seed. Its beauty is not tested.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/base/ascending.h"
 #include "../../../lib/view/skin.h"
 

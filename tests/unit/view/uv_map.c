@@ -3,12 +3,11 @@
  * Maps of all kinds of surface: there and back, compared with finite differences and with the
  * surface itself; and their triangles.
  */
-#include <errno.h>
+#include "../unit.h"
 #include "../../../lib/base/random.h"
 #include "../../../lib/base/vector.h"
 #include "../../../lib/view/uv_map.h"
 #include "../message.h"
-#include "../unit.h"
 #include "../surface/solid.h"
 
 #define SIZE 512
@@ -406,7 +405,6 @@ TEST(test_refused)
 
 	for (size_t k = 0; k < sizeof(sizes) / sizeof(*sizes); k++) {
 		const struct incise_scene_picture picture = {.texture_px = sizes[k]};
-		struct incise_error err = {0};
 
 		assert_error(uv_map_new(surface, &picture, &err), EINVAL, &err,
 			     "expected");

@@ -3,14 +3,7 @@
  * The view: the same ticks give the same image for any number of frames, and no input breaks it.
  * Neck with a small texture.
  */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
-#include <errno.h>
-#include <math.h>
-#include <unistd.h>
+#include "../unit.h"
 #include <incise/view.h>
 #include "../../../lib/base/vector.h"
 #include "../../../lib/view/uv_map.h"
@@ -58,7 +51,6 @@ static int teardown(void **state)
 static struct incise_view *view_new(void)
 {
 	const struct incise_view_setup setup = {.width = W, .height = H};
-	struct incise_error err = {0};
 	struct incise_view *view = incise_view_new(scene, plan, &setup, &err);
 
 	if (!view)
@@ -109,7 +101,7 @@ static void film(int every, uint8_t *rgb)
 	incise_view_free(view);
 }
 
-static void test_frames_do_not_matter(void **state)
+TEST(test_frames_do_not_matter)
 {
 	uint8_t *bare = two;
 	struct incise_view *view;
@@ -128,7 +120,7 @@ static void test_frames_do_not_matter(void **state)
 	incise_view_free(view);
 }
 
-static void test_ticks_that_are_no_numbers(void **state)
+TEST(test_ticks_that_are_no_numbers)
 {
 	static const double odd[] = {NAN, INFINITY, -INFINITY, 1e300, -1e7};
 	struct incise_view *view;
@@ -190,7 +182,7 @@ static struct incise_view_ray ray_of(const struct incise_view *view,
 }
 
 /* The ray of a pixel meets the surface as drawn there, including the larynx. */
-static void test_rays(void **state)
+TEST(test_rays)
 {
 	struct incise_view_ray ray;
 	struct incise_scene_picture picture;
@@ -231,12 +223,11 @@ static void test_rays(void **state)
 	incise_view_free(view);
 }
 
-static void test_camera_and_sizes(void **state)
+TEST(test_camera_and_sizes)
 {
 	static const int sizes[][2] = {{0, 100}, {15, 100}, {100, -1}, {8193, 100}};
 	struct incise_view_camera camera, kept;
 	struct incise_view_event event;
-	struct incise_error err = {0};
 	struct incise_view *view;
 	int w, h;
 
@@ -270,7 +261,7 @@ static void test_camera_and_sizes(void **state)
 }
 
 /* Two views in a thread are independent. */
-static void test_two_views(void **state)
+TEST(test_two_views)
 {
 	struct incise_tick tick = cut(3);
 	struct incise_view *a, *b;
@@ -292,15 +283,4 @@ static void test_two_views(void **state)
 	incise_view_free(b);
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_frames_do_not_matter),
-		cmocka_unit_test(test_ticks_that_are_no_numbers),
-		cmocka_unit_test(test_rays),
-		cmocka_unit_test(test_camera_and_sizes),
-		cmocka_unit_test(test_two_views),
-	};
-
-	return cmocka_run_group_tests(tests, setup, teardown);
-}
+GROUP(setup, teardown);

@@ -3,9 +3,6 @@
  * The camera: rays of pixels and back, compared with OpenGL's matrix; control by mouse and keys.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../../../lib/base/vector.h"
 #include "project.h"
 

@@ -3,13 +3,10 @@
  * A window of SDL's driver `offscreen`, with a context and no screen; events are pushed into SDL's
  * queue. tests/cli has a real window under Xvfb.
  */
+#include "../unit.h"
 #define SDL_MAIN_HANDLED
 #include <SDL.h>
 #include <epoxy/gl.h>
-#include <errno.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include "../../../lib/view/window.h"
 #include "../message.h"
 #include "look.h"
@@ -54,7 +51,7 @@ static struct incise_view_event sent(SDL_Event from)
 	return event;
 }
 
-static void test_context_and_size(void **state)
+TEST(test_context_and_size)
 {
 	int w, h;
 
@@ -70,7 +67,7 @@ static void test_context_and_size(void **state)
 	assert_int_equal(glGetError(), GL_NO_ERROR);
 }
 
-static void test_keys(void **state)
+TEST(test_keys)
 {
 	static const struct {
 		SDL_Keycode from;
@@ -101,7 +98,7 @@ static void test_keys(void **state)
 	}
 }
 
-static void test_mouse(void **state)
+TEST(test_mouse)
 {
 	struct incise_view_event event;
 
@@ -128,7 +125,7 @@ static void test_mouse(void **state)
 	assert_true(event.type == INCISE_VIEW_WHEEL && event.wheel == -1.5);
 }
 
-static void test_finger(void **state)
+TEST(test_finger)
 {
 	struct incise_view_event event;
 
@@ -145,7 +142,7 @@ static void test_finger(void **state)
 	assert_int_equal(event.buttons, 0);
 }
 
-static void test_others(void **state)
+TEST(test_others)
 {
 	struct incise_view_event event;
 	SDL_Event unknown = {.type = SDL_USEREVENT};
@@ -170,10 +167,8 @@ static void test_others(void **state)
 	assert_int_equal(incise_window_event(window, &event), 0);
 }
 
-static void test_no_screen(void **state)
+TEST(test_no_screen)
 {
-	struct incise_error err = {0};
-
 	if (!window)
 		skip();
 	incise_window_free(window);
@@ -184,16 +179,4 @@ static void test_no_screen(void **state)
 	assert_says(err.text, "DISPLAY");
 }
 
-int main(void)
-{
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_context_and_size),
-		cmocka_unit_test(test_keys),
-		cmocka_unit_test(test_mouse),
-		cmocka_unit_test(test_finger),
-		cmocka_unit_test(test_others),
-		cmocka_unit_test(test_no_screen),
-	};
-
-	return cmocka_run_group_tests(tests, setup, teardown);
-}
+GROUP(setup, teardown);

@@ -4,7 +4,6 @@
  * independent of the times of painting; invalid ticks cut nothing.
  */
 #include "../unit.h"
-#include <stdlib.h>
 #include "allocated.h"
 #include "ground.h"
 #include "../../../lib/tissue/incision.h"

@@ -21,8 +21,6 @@
  * 0.048 for 0.051).
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdlib.h>
 #include <incise/vision.h>
 #include "../../vision/scalpel_picture.h"
 

@@ -1,14 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
-/*
- * lib/vision/jpeg.c, image.cc: JPEG frames, whole, truncated at any byte, damaged.
- */
+/* lib/vision/jpeg.c, image.cc: JPEG frames, whole, truncated at any byte, damaged. */
 #include "../unit.h"
-#include <stdio.h>
-#include <errno.h>
 #include <jpeglib.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include <incise/vision.h>
 #include "../../vision/scalpel_picture.h"
 

@@ -4,16 +4,12 @@
  * that are drawn outside the library (tests/vision/scalpel_picture.c), and of
  * the virtual camera. Results are printed for the log. Learnt thresholds find the handle.
  */
-#include <errno.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
+#include "../unit.h"
 #include <incise/vision.h>
 #include "../../../lib/sim/sim.h"
 #include "../../vision/scalpel_picture.h"
 #include "../cases.h"
 #include "../message.h"
-#include "../unit.h"
 
 /* A sanitizer slows them ten times down, and sees in a few what it sees in all. */
 #define FRAMES cases_of(16, 4)
@@ -131,6 +127,11 @@ static const struct condition conditions[] = {
 	 0},
 };
 
+/* Of the test that runs. */
+static struct scalpel_picture p;
+static struct incise_vision_result r;
+static struct incise_camera_frame frame;
+
 TEST(length_is_that_of_the_picture)
 {
 	for (size_t k = 0; k < sizeof(conditions) / sizeof(*conditions); k++) {
@@ -141,8 +142,6 @@ TEST(length_is_that_of_the_picture)
 		uint64_t random = 100 + k;
 
 		for (int i = 0; i < FRAMES; i++) {
-			struct incise_vision_result r;
-			struct scalpel_picture p;
 			double error;
 
 			small(&p);
@@ -204,9 +203,6 @@ static void assert_not_found(const struct incise_vision_result *r, const char *w
 TEST(without_a_scalpel_it_says_so)
 {
 	for (int i = 0; i < 4; i++) {
-		struct incise_vision_result r;
-		struct scalpel_picture p;
-
 		small(&p);
 		p.length_px = 0;
 		p.noise = 2 * i;
@@ -223,9 +219,6 @@ TEST(what_reaches_the_border_is_not_measured)
 	static const double y[] = {180, 340, 300}, angle[] = {0, 0, 50};
 
 	for (int i = 0; i < 3; i++) {
-		struct incise_vision_result r;
-		struct scalpel_picture p;
-
 		small(&p);
 		p.x += i == 2 ? 30 : 0;
 		p.y = y[i];
@@ -247,9 +240,6 @@ static void blacken(struct incise_camera_frame *frame, int x, int y, int width,
 TEST(of_several_dark_things_the_handle_is_taken)
 {
 	struct incise_vision *vision = vision_of(&black);
-	struct incise_vision_result r;
-	struct incise_camera_frame frame;
-	struct scalpel_picture p;
 
 	scalpel_picture_init(&p);
 	p.angle_deg = 8;
@@ -306,9 +296,6 @@ TEST(what_only_looks_like_the_handle_costs_quality)
 
 	for (size_t k = 0; k < sizeof(cases) / sizeof(*cases); k++) {
 		struct incise_vision *vision = vision_of(&black);
-		struct incise_vision_result r;
-		struct incise_camera_frame frame;
-		struct scalpel_picture p;
 
 		scalpel_picture_init(&p);
 		p.y = 400;
@@ -345,7 +332,6 @@ TEST(what_only_looks_like_the_handle_costs_quality)
 TEST(the_region_follows)
 {
 	struct incise_vision *vision = vision_of(&black);
-	struct scalpel_picture p;
 	double last = 0;
 
 	scalpel_picture_init(&p);
@@ -353,7 +339,6 @@ TEST(the_region_follows)
 	p.blur_px = 1;
 	for (int i = 0; i < 8; i++) {
 		struct incise_vision_result r, alone;
-		struct incise_camera_frame frame;
 
 		p.x = i == 4 ? 100 : 320 + 8 * i;
 		p.angle_deg = 2 * i;
@@ -393,8 +378,6 @@ TEST(the_virtual_cameras_truth)
 	camera = incise_sim_camera_new(sim);
 	assert_non_null(camera);
 	for (int i = 0; i < 40; i++) {
-		struct incise_camera_frame frame;
-		struct incise_vision_result r;
 		double error;
 
 		incise_clock_wait_until(
@@ -433,7 +416,6 @@ TEST(sizes_that_do_not_fit_are_refused)
 							.size = sizeof(data)};
 	struct incise_vision *vision = vision_of(&black);
 	struct incise_camera_frame bad[12];
-	struct incise_vision_result r;
 
 	assert_int_equal(incise_vision_measure(vision, &good, &r), 0);
 	for (int i = 0; i < 12; i++)
@@ -500,8 +482,6 @@ TEST(any_region_will_do)
 
 	for (size_t i = 0; i < sizeof(roi) / sizeof(*roi); i++) {
 		struct incise_vision_setup setup = black;
-		struct incise_vision_result r;
-		struct scalpel_picture p;
 
 		scalpel_picture_init(&p);
 		p.pixels = i % 2 ? YUYV : INCISE_PIXELS_RGB;
@@ -542,7 +522,6 @@ TEST(learnt_thresholds_find_the_handle)
 		double length;
 		struct incise_camera_frame frame =
 			drawn_frame(formats[k % 3], k < 6 ? 2 : 4, &length);
-		struct incise_vision_result r;
 		struct incise_vision *vision;
 
 		assert_int_equal(incise_vision_learn(&frame, k % 2 ? &box : &click,
@@ -605,7 +584,6 @@ TEST(two_colours_are_refused)
 {
 	static const struct incise_vision_box across = {260, 200, 60, 60};
 	struct incise_vision_setup setup = {.value = {1, 2}}, before = setup;
-	struct incise_error err = {0};
 	double length;
 	struct incise_camera_frame frame = drawn_frame(INCISE_PIXELS_RGB, 2, &length);
 

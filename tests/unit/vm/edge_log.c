@@ -5,10 +5,6 @@
  * closed formula of constant acceleration, not by the code that the judge is to judge.
  */
 #include "../unit.h"
-#include <math.h>
-#include <stdbool.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "../../vm/edge_log.h"
 #include "../../vm/edge_log.c"
