@@ -66,7 +66,7 @@ PARTS ?= $(full_parts)
 deps_rtsan := rtsan
 deps_vm := vm
 deps_clocks := vm
-deps_module := module
+deps_module := module vm
 deps_deb := deb debian
 deps_bare := debian
 

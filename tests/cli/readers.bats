@@ -13,7 +13,8 @@ setup_file() {
 	rows() {
 		incise info killed.rec --json 2>/dev/null | jq .rows.force
 	}
-	until [ "$(rows)" -gt 3000 ] 2>/dev/null; do
+	# behind the zero of the force, which takes 0.5 s
+	until [ "$(rows)" -gt 9000 ] 2>/dev/null; do
 		sleep 0.1
 	done
 	kill -KILL $!
