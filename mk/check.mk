@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # The two levels of the check, and what looks at the check itself.
 #
-#   make check                         before each commit, and on each submission: some twelve minutes
+#   make check                         before each commit, and on each submission: some ten minutes
 #   make check-full                    everything: an hour and more
 #   make check-full PARTS="vm attack"  parts of it
 #
@@ -42,7 +42,7 @@ check-quick:
 	NEEDS=build $(call timed,layers unit kept commands) || status=$$?; \
 	$(call timed,messages) || status=$$?; exit $$status
 
-check: ## install what is missing, build and test: some twelve minutes
+check: ## install what is missing, build and test: some ten minutes
 	+@mk/deps build check demo
 	$(call in_parts,check-quick)
 	@echo "make check-full runs everything (an hour and more): all cases, all tests of the commands, attacks, kernels, packages"
