@@ -91,11 +91,11 @@ machine_watched() {
 # Wait until a command succeeds. A minute ends a test that hangs, and is no measure of anything.
 await() {
 	local i
-	for ((i = 0; i < 1200; i++)); do
+	for ((i = 0; i < 9600; i++)); do
 		! "$@" >/dev/null 2>&1 || return 0
 		sleep 0.05
 	done
-	complain "not within 60 s: $*"
+	complain "not within 8 min: $*"
 }
 
 # A recording is as it was written, with samples that were lost or without.
@@ -118,14 +118,14 @@ uptime_ms() {
 # Before it is the program it is a shell, which may catch it as well, and forget it.
 until_it_catches() {
 	local i mask
-	for ((i = 0; i < 1200; i++)); do
+	for ((i = 0; i < 9600; i++)); do
 		mask=$(awk -v name="${2:0:15}" '/^Name/ && $2 != name { exit } /^SigCgt/ { print $2 }' \
 			"/proc/$1/status" 2>/dev/null) || :
 		! ((0x${mask:-0} & $3)) || return 0
 		kill -0 "$1" 2>/dev/null || complain "$2 ended before it caught signals" || return
 		sleep 0.05
 	done
-	complain "$2 does not catch $3 within 60 s"
+	complain "$2 does not catch $3 within 8 min"
 }
 
 # In front of a command: without the rights by which root opens what file modes deny.
@@ -148,7 +148,7 @@ bench_interrupted() {
 		[ -z "$(ls -A t)" ] || break
 		sleep 0.02
 	done
-	[ -n "$(ls -A t)" ] || complain "no file within 60 s: $(cat err)" || return
+	[ -n "$(ls -A t)" ] || complain "no file within 8 min: $(cat err)" || return
 	kill -INT $pid
 	wait $pid || status=$?
 	[ "$status" -eq 1 ] || complain "exit $status: $(cat err)" || return

@@ -172,7 +172,7 @@ beside_the_model() {
 	incise haptic liver.scene --rig sim: --no-rt --overruns 0 --state page --json >r.json 2>err 3>&- &
 	pid=$!
 	# a signal before the program listens would not be the case in question
-	for ((i = 0; i < 1200; i++)); do
+	for ((i = 0; i < 9600; i++)); do
 		ticks=$(incise status ./page --prometheus 2>/dev/null | sed -n 's/^incise_loop_ticks_total{.*} //p')
 		[ "${ticks:-0}" -lt 200 ] || break
 		sleep 0.05

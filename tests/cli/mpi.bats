@@ -57,7 +57,7 @@ train_by() {
 	done
 	train_by 3 s?.csv -o m.fis >/dev/null 2>&1 3>&- &
 	mpirun=$!
-	for ((i = 0; i < 1200; i++)); do
+	for ((i = 0; i < 9600; i++)); do
 		victim=$(pgrep -P $mpirun -n -f 'train s1.csv' || pgrep -P "$(pgrep -P $mpirun | head -n 1)" -n || :)
 		[ -z "$victim" ] || break
 		sleep 0.05

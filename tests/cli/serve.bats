@@ -14,15 +14,16 @@ teardown() {
 # Start incise serve on a free port, and wait for it: sets server and port.
 start_server() {
 	local i
+	: >log
 	incise-serve "$@" --igtl 0 -v --json >report.json 2>log 3>&- &
 	server=$!
-	for ((i = 0; i < 1200; i++)); do
+	for ((i = 0; i < 9600; i++)); do
 		port=$(sed -n 's/.*OpenIGTLink on 127.0.0.1:\([0-9]*\):.*/\1/p' log)
 		[ -z "$port" ] || return 0
 		kill -0 "$server" || complain "$(cat log)"
 		sleep 0.05
 	done
-	complain "no port in 60 s: $(cat log)"
+	complain "no port in 8 min: $(cat log)"
 }
 
 # End it as Ctrl-C does: exit 0 and a report.

@@ -15,11 +15,11 @@ teardown() {
 
 # Wait until a line that holds a text stands in a file.
 until_it_says() {
-	for ((i = 0; i < 1200; i++)); do
+	for ((i = 0; i < 9600; i++)); do
 		grep -q "$1" "$2" && return
 		sleep 0.05
 	done
-	complain "$2 does not say $1 within 60 s: $(cat "$2")"
+	complain "$2 does not say $1 within 8 min: $(cat "$2")"
 }
 
 # bats test_tags=check

@@ -27,9 +27,9 @@ listen() {
 	awaits listening
 }
 
-# Until what was told has a line with this, at most 60 s.
+# Until what was told has a line with this, at most 8 min: less than the limit of a test.
 awaits() {
-	for ((i = 0; i < 1200; i++)); do
+	for ((i = 0; i < 9600; i++)); do
 		grep -qE -e "$1" told && return
 		sleep 0.05
 	done

@@ -28,7 +28,7 @@ serve() {
 }
 
 until_runs() {
-	for ((i = 0; i < 1200; i++)); do
+	for ((i = 0; i < 9600; i++)); do
 		[ "$(incise status "$page" --json 2>/dev/null |
 			sed -n 's/.*"state": "\(.*\)".*/\1/p')" != running ] || return 0
 		sleep 0.05

@@ -229,7 +229,7 @@ begin_view() {
 		>r.json 2>err 3>&- &
 	pid=$!
 	window=
-	for ((i = 0; i < 1200; i++)); do
+	for ((i = 0; i < 9600; i++)); do
 		window=$(xdotool search --name neck.scene 2>/dev/null | head -n 1)
 		[ -n "$window" ] && break
 		sleep 0.05
