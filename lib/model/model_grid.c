@@ -446,8 +446,10 @@ struct interval incise_patch_mixed(const struct incise_patch *patch,
 
 #define N INCISE_FIXED_MFS_MAX
 
-/* One input's support in blocks, n at level 0 and half as many at each next one; an input that is
- * trivial has one at each. */
+/*
+ * One input's support in blocks, n at level 0 and half as many at each next one; an input that is
+ * trivial has one at each.
+ */
 struct blocks {
 	int n;
 	struct incise_block *level[LEVELS];
@@ -519,7 +521,7 @@ static double larger(double largest, double e)
 	return e > largest ? e : largest;
 }
 
-/* What a patch has of each that the survey looks for. */
+/* Find of a patch each quantity whose largest the survey keeps. */
 static void look_at(const struct incise_grid *grid, const struct incise_block *a,
 		    const struct incise_block *b, double found[N_LARGEST])
 {

@@ -5,8 +5,8 @@
  *     ├ commit ─ 100 ms ─ commit ─ 100 ms ─ ┤ kill
  *                         └──── lost ───────┘
  *
- * What is lost is at most 200 ms on a machine that does little else. It is printed and not judged, since
- * beside other programs it says more of them; in simulated time the bound is a unit test's.
+ * A machine that does little else loses at most 200 ms. The figure is printed and not judged, since beside
+ * other programs it says more of them; in simulated time the bound is a unit test's.
  */
 #include <pthread.h>
 #include <signal.h>

@@ -469,7 +469,7 @@ static const struct method methods[] = {
 	{.name = "exact_delayed"}, /* the true pose of the delay before */
 };
 
-/* What it shows at each tick of a track. */
+/* Its pose at each tick of a track. */
 static void show(const struct track *track, const struct method *method,
 		 struct state *shown)
 {

@@ -10,13 +10,11 @@ setup_file() {
 	incise capture -o closed.rec --rig sim:seed=3,clock=simulated,cut_s=1,pause_s=0.5 --duration 9s >/dev/null
 	# a recorder that is killed leaves its log
 	incise capture -o killed.rec --rig sim:clock=real --duration 1h >/dev/null 2>&1 3>&- &
-	rows() {
-		incise info killed.rec --json 2>/dev/null | jq .rows.force
-	}
 	# behind the zero of the force, which takes 0.5 s
-	until [ "$(rows)" -gt 9000 ] 2>/dev/null; do
-		sleep 0.1
-	done
+	has_rows() {
+		[ "$(incise info killed.rec --json | jq .rows.force)" -gt 9000 ]
+	}
+	await has_rows
 	kill -KILL $!
 	wait $! || true
 	mv killed.rec.part killed.rec

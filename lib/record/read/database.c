@@ -51,7 +51,7 @@ static int open_regular(const char *path)
 	return fd;
 }
 
-static int look_beside(struct found *found, const char *path, struct incise_error *err)
+static int find_beside(struct found *found, const char *path, struct incise_error *err)
 {
 	struct stat st;
 
@@ -74,7 +74,7 @@ static int look_beside(struct found *found, const char *path, struct incise_erro
 	return 0;
 }
 
-static int look(struct found *found, const char *path, struct incise_error *err)
+static int find_files(struct found *found, const char *path, struct incise_error *err)
 {
 	static const char magic[16] = "SQLite format 3";
 	unsigned char head[20];
@@ -118,7 +118,7 @@ static int look(struct found *found, const char *path, struct incise_error *err)
 		found->needs_log = head[18] == 2 || head[19] == 2;
 	}
 	close(fd);
-	return look_beside(found, path, err);
+	return find_beside(found, path, err);
 }
 
 /* --- copies --- */
@@ -353,7 +353,7 @@ int incise_database_open(const char *path, sqlite3 **db, struct incise_error *er
 {
 	bool written = incise_recording_is_written(path);
 	struct found found;
-	int rc = look(&found, path, err), code = SQLITE_BUSY, why = 0;
+	int rc = find_files(&found, path, err), code = SQLITE_BUSY, why = 0;
 
 	*db = NULL;
 	if (rc)
@@ -385,8 +385,9 @@ int incise_database_open(const char *path, sqlite3 **db, struct incise_error *er
 		code = open_copy(&found, written ? LOG : needed(&found), written, db,
 				 &why);
 		/* Held for a moment only, or just closed. */
-		if (why == -EAGAIN && !look(&found, path, NULL) && !found.needs_log &&
-		    !found.beside_size[LOG] && !found.beside_size[JOURNAL]) {
+		if (why == -EAGAIN && !find_files(&found, path, NULL) &&
+		    !found.needs_log && !found.beside_size[LOG] &&
+		    !found.beside_size[JOURNAL]) {
 			why = 0;
 			code = open_read_only(found.file, db, 1000);
 		}
@@ -399,7 +400,7 @@ int incise_database_open(const char *path, sqlite3 **db, struct incise_error *er
 int incise_database_recover(const char *path, const char *file, struct incise_error *err)
 {
 	struct found found;
-	int rc = look(&found, path, err), code = SQLITE_OK;
+	int rc = find_files(&found, path, err), code = SQLITE_OK;
 
 	if (rc)
 		return rc;

@@ -23,7 +23,7 @@ static bool is_hidden(const char *name)
 	return !strcmp(name, ".") || !strcmp(name, "..");
 }
 
-/* What was made of a copy that failed. */
+/* Remove a copy that failed, with all that is in it. */
 static void remove_folder(const char *path)
 {
 	DIR *folder = opendir(path);

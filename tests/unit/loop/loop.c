@@ -289,7 +289,7 @@ TEST(test_paced_clock, begin, end)
 
 TEST(test_quantile)
 {
-	/* What is behind the last one is of somebody else. */
+	/* The bytes behind the last bin are somebody else's. */
 	static uint64_t histogram[INCISE_LOOP_BINS + 1] = {[INCISE_LOOP_BINS] = 1000};
 
 	assert_true(incise_loop_quantile(histogram, 0.5) == 0);

@@ -184,7 +184,7 @@ TEST(journal_is_rolled_back_in_a_copy, IN_FOLDER)
 	assert_true(info.start_ns > 0);
 	keep_state("after");
 	assert_int_equal(system("cmp before after"), 0);
-	/* What was copied is gone. */
+	/* The copy is gone. */
 	assert_int_equal(system("rmdir tmp"), 0);
 	unsetenv("TMPDIR");
 }
