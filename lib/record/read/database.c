@@ -198,26 +198,39 @@ static bool names_a_file(const char *journal)
 	return does;
 }
 
+/* What SQLite needs of the files beside a database: of one that is being written its log alone. */
+static bool needs(const struct found *found, enum beside with, bool written)
+{
+	return with == LOG ? written || found->beside_size[LOG]
+			   : with == JOURNAL && !written && found->beside_size[JOURNAL];
+}
+
 /*
  * The database, and then what it needs. While the log has not started over, it has all pages that are
  * written to the database meanwhile. Returns 0, -EAGAIN (it did start over), -EPERM (a journal that is
  * none of a recorder's), -errno.
  */
-static int try_copy(const struct found *from, enum beside with, const char *file,
-		    const char *copied, bool written)
+static int try_copy(const struct found *from, const char *file, bool written)
 {
-	char before[LOG_HEAD], after[LOG_HEAD];
+	char before[LOG_HEAD], after[LOG_HEAD], copied[PATH_MAX + 20];
 	int rc;
 
 	read_log_head(from->beside[LOG], before);
 	rc = copy_file(open(from->file, O_RDONLY | O_NONBLOCK | O_CLOEXEC), file, 0666);
-	if (!rc && (written || from->beside_size[with]))
-		rc = copy_file(open_regular(from->beside[with]), copied, 0666);
+	for (int i = LOG; i <= JOURNAL && !rc; i++) {
+		if (!needs(from, i, written))
+			continue;
+		snprintf(copied, sizeof(copied), "%s%s", file,
+			 names[i] + strlen(INCISE_SCHEMA_DB));
+		rc = copy_file(open_regular(from->beside[i]), copied, 0666);
+		if (!rc && i == JOURNAL && names_a_file(copied))
+			rc = -EPERM;
+	}
 	read_log_head(from->beside[LOG], after);
 	/* No log: the recording is just being closed, or does not have one yet. */
 	if (rc == -ENOENT || (!rc && memcmp(before, after, LOG_HEAD)))
 		return -EAGAIN;
-	return !rc && with == JOURNAL && names_a_file(copied) ? -EPERM : rc;
+	return rc;
 }
 
 /* SQLite detects the state of a file when it first reads from it. */
@@ -260,19 +273,15 @@ static int close_copy(const char *file)
 }
 
 /* As often as the log starts over. 0 or -errno. */
-static int copy_database(const struct found *from, enum beside with, const char *file,
-			 bool written)
+static int copy_database(const struct found *from, const char *file, bool written)
 {
 	const struct timespec pause = {.tv_nsec = 10000000};
-	char copied[PATH_MAX + 20];
 	int rc = -EAGAIN;
 
-	snprintf(copied, sizeof(copied), "%s%s", file,
-		 names[with] + strlen(INCISE_SCHEMA_DB));
 	for (int i = 0; i < COPIES && rc == -EAGAIN; i++) {
 		if (i)
 			nanosleep(&pause, NULL);
-		rc = try_copy(from, with, file, copied, written);
+		rc = try_copy(from, file, written);
 	}
 	return rc;
 }
@@ -293,8 +302,7 @@ static void remove_copy(const char *file)
  * Open a copy, which has no name then. An interrupt waits for that. Returns an SQLite code; SQLITE_BUSY
  * with a negative errno in @why: it cannot be copied.
  */
-static int open_copy(const struct found *found, enum beside with, bool written,
-		     sqlite3 **db, int *why)
+static int open_copy(const struct found *found, bool written, sqlite3 **db, int *why)
 {
 	const char *temporary = getenv("TMPDIR");
 	char folder[PATH_MAX], copy[PATH_MAX + 20];
@@ -308,8 +316,8 @@ static int open_copy(const struct found *found, enum beside with, bool written,
 	*why = mkdtemp(folder) ? 0 : -errno;
 	if (!*why) {
 		snprintf(copy, sizeof(copy), "%s/copy.db", folder);
-		*why = copy_database(found, with, copy, written);
-		if (!*why && with == JOURNAL)
+		*why = copy_database(found, copy, written);
+		if (!*why && needs(found, JOURNAL, written))
 			close_copy(copy);
 		if (!*why)
 			code = open_read_only(copy, db, 0);
@@ -344,11 +352,6 @@ static int say_why(const char *path, bool written, int why, struct incise_error 
 		strerror(-why));
 }
 
-static enum beside needed(const struct found *found)
-{
-	return found->beside_size[JOURNAL] ? JOURNAL : LOG;
-}
-
 int incise_database_open(const char *path, sqlite3 **db, struct incise_error *err)
 {
 	bool written = incise_recording_is_written(path);
@@ -372,7 +375,8 @@ int incise_database_open(const char *path, sqlite3 **db, struct incise_error *er
 	/* A recorder on a file system without locks of folders. */
 	written = written || (*db && (code & 0xff) == SQLITE_BUSY);
 	if (!written && !*db &&
-	    found.size + found.beside_size[needed(&found)] > INCISE_DATABASE_COPY_MAX)
+	    found.size + found.beside_size[LOG] + found.beside_size[JOURNAL] >
+		    INCISE_DATABASE_COPY_MAX)
 		return incise_error_set(
 			err, EFBIG,
 			"%s: its recorder was interrupted, and it is too "
@@ -382,8 +386,7 @@ int incise_database_open(const char *path, sqlite3 **db, struct incise_error *er
 	if ((code & 0xff) == SQLITE_BUSY || code == SQLITE_READONLY_ROLLBACK) {
 		sqlite3_close(*db);
 		*db = NULL;
-		code = open_copy(&found, written ? LOG : needed(&found), written, db,
-				 &why);
+		code = open_copy(&found, written, db, &why);
 		/* Held for a moment only, or just closed. */
 		if (why == -EAGAIN && !find_files(&found, path, NULL) &&
 		    !found.needs_log && !found.beside_size[LOG] &&
@@ -407,7 +410,7 @@ int incise_database_recover(const char *path, const char *file, struct incise_er
 	if (incise_recording_is_written(path))
 		return incise_error_set(err, EBUSY,
 					"%s: is being written; wait for its end", path);
-	rc = copy_database(&found, needed(&found), file, false);
+	rc = copy_database(&found, file, false);
 	if (!rc)
 		code = close_copy(file);
 	if (!rc && code == SQLITE_OK)
