@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include <incise/infile.h>
 #include <incise/outfile.h>
 #include "cli/cli.h"
@@ -46,10 +47,11 @@ static const struct cli_command command = {
 		 "Exit codes: 0 signed, 1 failure, 2 bad usage. See incise-sign(1).",
 };
 
-/* "of all of it", or up to where. */
-static const char *extent(const struct seal *seal)
+/* Commit of the statement; null: it is that of a join. */
+static json_t *commit(const struct seal *seal)
 {
-	return seal->statement.complete ? "all of it" : "up to where it was interrupted";
+	return seal->joined ? json_null()
+			    : json_integer((json_int_t)seal->statement.last.commit);
 }
 
 static void store(struct seal *seal, const char *path, const void *bytes, size_t n)
@@ -68,25 +70,28 @@ static void store(struct seal *seal, const char *path, const void *bytes, size_t
 		cli_fail_with(&err);
 }
 
-static void sign(struct job *job, struct seal *seal)
+/* @member: of a joined recording; one that the same key has signed keeps that signature. */
+static void sign(struct job *job, struct seal *seal, bool member)
 {
 	struct incise_error err = {0};
 	struct signature signature;
 	char *bytes = cli_require(seal_sign(seal, job->key, &signature, &err), &err);
 	char *path = seal_signature_path(seal, &signature);
+	char *extent = seal_extent(seal);
 
-	store(seal, path, bytes, strlen(bytes));
+	if (!member || cli_overwrite() || access(path, F_OK))
+		store(seal, path, bytes, strlen(bytes));
 	if (job->json)
 		json_array_append_new(job->signed_by,
-				      json_pack("{so ss so sI}", "path", json_text(path),
+				      json_pack("{so ss so so}", "path", json_text(path),
 						"key", signature.key, "recording",
 						json_text(seal->recording), "commit",
-						(json_int_t)seal->statement.last.commit));
+						commit(seal)));
 	else
-		printf("%s: signed with %s, %s, statement of commit %lld\n",
-		       seal->recording, signature.key, extent(seal),
-		       (long long)seal->statement.last.commit);
+		printf("%s: signed with %s, %s\n", seal->recording, signature.key,
+		       extent);
 	free(bytes);
+	free(extent);
 	free(path);
 }
 
@@ -127,7 +132,7 @@ static void take_reply(struct job *job, struct seal *seal, const struct der *rep
 	unsigned char digest[TIMESTAMP_DIGEST];
 	struct timestamp timestamp;
 	struct incise_error err = {0};
-	char *path;
+	char *path, *extent = seal_extent(seal);
 
 	timestamp_digest(seal->text, seal->n, digest);
 	if (timestamp_read(reply, job->timestamp, digest, query, &timestamp, &err))
@@ -137,19 +142,19 @@ static void take_reply(struct job *job, struct seal *seal, const struct der *rep
 	if (job->json)
 		json_array_append_new(
 			job->stamped,
-			json_pack("{so ss so so sI}", "path", json_text(path), "utc",
+			json_pack("{so ss so so so}", "path", json_text(path), "utc",
 				  timestamp.utc, "authority",
 				  *timestamp.authority ? json_text(timestamp.authority)
 						       : json_null(),
 				  "recording", json_text(seal->recording), "commit",
 				  (json_int_t)seal->statement.last.commit));
 	else
-		printf("%s: time-stamped %s by %s, %s, statement of commit %lld\n",
-		       seal->recording, timestamp.utc,
+		printf("%s: time-stamped %s by %s, %s\n", seal->recording, timestamp.utc,
 		       *timestamp.authority ? timestamp.authority
 					    : "an unnamed authority",
-		       extent(seal), (long long)seal->statement.last.commit);
+		       extent);
 	free(path);
+	free(extent);
 }
 
 static void stamp(struct job *job, struct seal *seal)
@@ -220,7 +225,7 @@ int main(int argc, char **argv)
 		if (seal_open(&seal, members.path[i], true, &err))
 			cli_fail_with(&err);
 		if (job.key)
-			sign(&job, &seal);
+			sign(&job, &seal, i < members.n - 1);
 		if (job.timestamp)
 			stamp(&job, &seal);
 		seal_close(&seal);

@@ -234,7 +234,8 @@ static void seals_check(struct seals *seals, const char *path,
 		cli_fail_with(&err);
 	for (int i = 0; i < members->n; i++)
 		vouch_check(&seals->vouches[i], members->joined ? members->path[i] : path,
-			    &seals->trust, members->joined ? NULL : watch,
+			    i < members->n - 1, &seals->trust,
+			    members->joined ? NULL : watch,
 			    members->joined ? NULL : report);
 }
 

@@ -70,11 +70,16 @@ not_vouched() {
 	failed_with "$sig:"
 	incise sign a.rec --key "$kim" --overwrite
 	[ "$(find a.rec/seal -type f | wc -l)" = 3 ]
-	# it may be renamed, and is replaced with its seal
+	# its name, which is that of its cuts in an export, was signed too; it is replaced with its seal
 	mv a.rec renamed.rec
-	rm renamed.rec/seal/"$(basename "$sig")"
+	run -1 --separate-stderr incise verify renamed.rec --signers signers
+	[[ "$output" == *"it was signed under the name a;"*"but under another name"* ]]
+	(cd renamed.rec && run -1 --separate-stderr incise verify . --signers ../signers)
 	run -0 --separate-stderr incise sign renamed.rec --key "$kim"
-	[ "${lines[1]}" = "wrote ${sig/a.rec/renamed.rec}" ]
+	[ "${lines[1]}" = "wrote renamed.rec/seal/2.statement and renamed.rec/seal/2${sig#a.rec/seal/1}" ]
+	echo "lee@lab $(cat "$lee.pub")" >>signers
+	incise verify renamed.rec --signers signers
+	(cd renamed.rec && incise verify . --signers ../signers)
 	incise capture -o renamed.rec --rig sim:clock=simulated --duration 300ms --overwrite
 	[ ! -e renamed.rec/seal ]
 }
@@ -358,18 +363,67 @@ not_vouched() {
 	[[ "$stderr" == *"interrupted: its end is missing"* ]]
 }
 
-@test "each member of a joined recording is signed" {
+# join_signed: a.rec, signed, and b.rec, which is not, as day.rec.
+join_signed() {
 	for n in a b; do
 		incise capture -o $n.rec --rig sim:clock=simulated --duration 1s --overwrite \
 			--clock-source sim:1000,0,20 >/dev/null
 	done
+	incise sign a.rec --key "$kim" >/dev/null
 	incise join a.rec b.rec -o day.rec >/dev/null
-	run -0 --separate-stderr incise sign day.rec --key "$kim"
-	[ "$(grep -c "signed with" <<<"$output")" = 2 ]
-	run -0 --separate-stderr incise verify day.rec --signers signers
-	[[ "$output" == *"day.rec/a: signed by kim@lab "*"day.rec/b: signed by kim@lab "* ]]
-	[[ "$(incise info day.rec)" == *"seal     a: commit "*", 1 signature, "*"seal     b: commit "*", 1 signature, "* ]]
-	rm -r day.rec/b/seal
+}
+
+@test "a join is signed with its members, which keep their seals" {
+	join_signed
+	cmp a.rec/seal/1.statement day.rec/a/seal/1.statement
 	run --separate-stderr incise verify day.rec --signers signers
 	failed_with "day.rec/b:"
+	incise sign day.rec/b --key "$kim"
+	run --separate-stderr incise verify day.rec --signers signers
+	failed_with "day.rec:"
+	[[ "$stderr" == *"the times of the join are not"* ]]
+	run -0 --separate-stderr incise sign day.rec --key "$kim"
+	[ "$(grep -c "signed with" <<<"$output")" = 3 ]
+	[[ "$output" == *"wrote day.rec/seal/1.statement and day.rec/seal/1."* ]]
+	run -0 --separate-stderr incise verify day.rec --signers signers
+	[[ "$output" == *"day.rec/a: signed by kim@lab "*"day.rec/b: signed by kim@lab "* ]]
+	[[ "$output" == *"day.rec: signed by kim@lab ("*"), the times of the join"* ]]
+	[[ "$(incise info day.rec)" == *"seal     a: commit "*", 1 signature, "*"seal     b: commit "*", 1 signature, "*"seal     the join, 1 signature, "* ]]
+	# its members and its tables may not come from elsewhere, and it may have any name
+	mv day.rec moved.rec
+	incise verify moved.rec --signers signers
+	rm -r moved.rec/b/seal
+	run --separate-stderr incise verify moved.rec --signers signers
+	failed_with "moved.rec/b:"
+}
+
+# forged_joins COUNT: so many with one value changed and the right checksum; none is good.
+forged_joins() {
+	join_signed
+	incise sign day.rec --key "$kim" >/dev/null
+	for i in $(seq "$1"); do
+		rm -rf forged.rec
+		cp -r day.rec forged.rec
+		what=$(/usr/bin/python3 "$BATS_TEST_DIRNAME/../attack/forge_join.py" forged.rec "$i")
+		run -1 --separate-stderr incise verify forged.rec --signers signers
+		[[ "$output" == *"forged.rec: statement 1: member "* || "$stderr" == *"forged.rec"*[:/]* ]] ||
+			complain "$what: $output $stderr"
+		[[ "$output" != *"the times of the join"* ]] || complain "$what: $output"
+	done
+}
+
+# bats test_tags=check
+@test "a join with a value changed and the right checksum is not what was signed: 20" {
+	forged_joins 20
+	# a member that was signed, too, but is not the one that was joined
+	incise capture -o c.rec --rig sim:clock=simulated --duration 1s --clock-source sim:1000,0,20 >/dev/null
+	incise sign c.rec --key "$kim" >/dev/null
+	incise join a.rec c.rec -o other.rec >/dev/null
+	cp -r day.rec/seal other.rec/
+	run -1 --separate-stderr incise verify other.rec --signers signers
+	[[ "$output" == *"other.rec: statement 1: member c: 'member b' was signed, and is 'member c' now"* ]] || complain "$output"
+}
+
+@test "a join with a value changed and the right checksum is not what was signed: 200" {
+	forged_joins 200
 }

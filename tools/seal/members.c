@@ -16,14 +16,12 @@ void members_find(struct members *members, const char *path)
 	struct incise_recording *recording = incise_recording_open(all, NULL);
 	int n = recording ? incise_session_members(recording, &info) : 0;
 
-	*members = (struct members){.joined = n > 0, .n = n ? n : 1};
+	*members = (struct members){.joined = n > 0, .n = n + 1};
 	members->path = cli_alloc((size_t)members->n, sizeof(*members->path));
 	for (int i = 0; i < n; i++)
 		members->path[i] = cli_text("%s/%s", folder, info[i].name);
-	if (!n)
-		members->path[0] = cli_text("%s", folder);
+	members->path[n] = folder;
 	incise_recording_close(recording);
-	free(folder);
 	free(all);
 }
 

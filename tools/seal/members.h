@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * The recordings of a joined recording, each of which has a seal of its own.
+ * The recordings of a joined recording, each of which has a seal of its own, and behind them the
+ * joined recording itself, whose seal is that of the join.
  */
 #ifndef INCISE_MEMBERS_H
 #define INCISE_MEMBERS_H

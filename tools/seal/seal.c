@@ -15,6 +15,7 @@
 #include <unistd.h>
 #include <incise/outfile.h>
 #include <incise/recalibration.h>
+#include <incise/session.h>
 #include "../cli/cli.h"
 #include "../cli/file_kind.h"
 #include "seal.h"
@@ -202,6 +203,20 @@ bool seal_head(const char *path, char identity[33], struct incise_seal_head *hea
 	return !rc;
 }
 
+char *seal_join(const char *path)
+{
+	struct incise_error err = {.text = ""};
+	char *all = cli_text("%s:*", path), *text = NULL;
+	struct incise_recording *recording = incise_recording_open(all, NULL);
+	const struct incise_session_info *members;
+
+	if (recording && incise_session_members(recording, &members))
+		text = cli_require(incise_session_statement(recording, &err), &err);
+	incise_recording_close(recording);
+	free(all);
+	return text;
+}
+
 size_t seal_statement_length(const char *text, size_t n)
 {
 	const char *end = memmem(text, n, "\nend\n", 5);
@@ -263,22 +278,7 @@ static int check_all(const struct seal *seal, struct incise_error *err)
 				seal->recording, first.text);
 }
 
-/* Whether a file says the same but for the name of the folder, which may have changed. */
-static bool says_the_same(const struct seal_file *file, const struct seal *seal)
-{
-	struct incise_seal_statement *stored = cli_alloc(1, sizeof(*stored));
-	size_t length = seal_statement_length(file->bytes, file->n);
-	bool same = !incise_seal_read(stored, file->bytes, length, NULL);
-
-	memcpy(stored->name, seal->statement.name, sizeof(stored->name));
-	same = same && !memcmp(stored, &seal->statement, sizeof(*stored)) &&
-	       !strcmp(file->bytes + length,
-		       seal->text + seal_statement_length(seal->text, seal->n));
-	free(stored);
-	return same;
-}
-
-/* A stored statement that says the same takes its place. Returns 0 or -errno. */
+/* Its number is that of a stored statement that says the same. Returns 0 or -errno. */
 static int find_stored(struct seal *seal, struct incise_error *err)
 {
 	struct seal_files files;
@@ -290,15 +290,11 @@ static int find_stored(struct seal *seal, struct incise_error *err)
 
 		if (file->number >= seal->number)
 			seal->number = file->number + 1;
-		if (file->kind != SEAL_STATEMENT || !file->bytes ||
-		    !says_the_same(file, seal))
+		if (file->kind != SEAL_STATEMENT || !file->bytes || file->n != seal->n ||
+		    memcmp(file->bytes, seal->text, seal->n))
 			continue;
-		free(seal->text);
-		seal->text = file->bytes;
-		seal->n = file->n;
 		seal->number = file->number;
 		seal->stored = true;
-		file->bytes = NULL;
 	}
 	if (!rc && seal->number > NUMBER_MAX)
 		rc = incise_error_set(err, E2BIG, "%s/seal: too many statements",
@@ -310,8 +306,15 @@ static int find_stored(struct seal *seal, struct incise_error *err)
 /* Set text and statement. Returns 0 or -errno. */
 static int make(struct seal *seal, struct incise_error *err)
 {
-	char *text = incise_seal_statement(seal->recording, err), *calibrations;
+	char *text = seal_join(seal->recording), *calibrations;
 
+	if (text) {
+		seal->joined = true;
+		seal->text = text;
+		seal->n = strlen(text);
+		return 0;
+	}
+	text = incise_seal_statement(seal->recording, err);
 	if (!text)
 		return -errno;
 	calibrations = seal_calibrations(seal->recording, err);
@@ -342,7 +345,17 @@ int seal_open(struct seal *seal, const char *recording, bool frames,
 		rc = make(seal, err);
 	if (!rc)
 		rc = find_stored(seal, err);
-	return rc || !frames ? rc : check_all(seal, err);
+	return rc || !frames || seal->joined ? rc : check_all(seal, err);
+}
+
+char *seal_extent(const struct seal *seal)
+{
+	if (seal->joined)
+		return cli_text("the times of the join");
+	return cli_text("%s, statement of commit %lld",
+			seal->statement.complete ? "all of it"
+						 : "up to where it was interrupted",
+			(long long)seal->statement.last.commit);
 }
 
 void seal_close(struct seal *seal)

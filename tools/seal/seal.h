@@ -69,14 +69,21 @@ size_t seal_statement_length(const char *text, size_t n);
 /* These lines for a recording as it is now: free(3). NULL and the reason. */
 char *seal_calibrations(const char *recording, struct incise_error *err);
 
-/* The present statement of a recording. */
+/*
+ * The statement of a join, incise_session_statement(), of a joined recording as it is now: free(3).
+ * NULL: it is a plain one. Every failure ends the program.
+ */
+char *seal_join(const char *recording);
+
+/* The present statement of a recording, or of a join. */
 struct seal {
 	char *recording; /* its folder */
 	int number;
 	bool stored; /* it is in seal/ already */
+	bool joined;
 	char *text;
 	size_t n;
-	struct incise_seal_statement statement;
+	struct incise_seal_statement statement; /* not of a join */
 };
 
 /*
@@ -88,6 +95,9 @@ int seal_open(struct seal *seal, const char *recording, bool frames,
 	      struct incise_error *err);
 
 void seal_close(struct seal *seal);
+
+/* "all of it, statement of commit 97", or of what else: free(3). */
+char *seal_extent(const struct seal *seal);
 
 /* Path of the statement, and of a signature or a time-stamp of it: free(3). */
 char *seal_statement_path(const struct seal *seal);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /* The seal of a recording, for people and as JSON; see seal_report.h. */
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "../cli/cli.h"
 #include "../cli/json.h"
@@ -8,14 +9,18 @@
 #include "seal.h"
 #include "seal_report.h"
 
+#define JOIN "the seal of the join"
+
 static json_t *one(const char *path)
 {
 	struct incise_error err = {.text = ""};
 	struct incise_seal_head head;
 	struct seal_files files;
-	char identity[33], why[200];
-	bool has = seal_head(path, identity, &head, why);
+	char identity[33], why[200] = JOIN, *join = seal_join(path);
+	bool has = !join && seal_head(path, identity, &head, why);
 	int n[3] = {0};
+
+	free(join);
 
 	if (seal_files_read(&files, path, &err))
 		cli_fail_with(&err);
@@ -60,18 +65,24 @@ void seal_report_print(const json_t *list)
 		const char *path = json_string_value(json_object_get(at, "path"));
 		const char *head = json_string_value(json_object_get(at, "head"));
 
+		const char *why = json_string_value(json_object_get(at, "why"));
+		bool join = why && !strcmp(why, JOIN);
+
 		fputs("seal     ", stdout);
-		if (json_array_size(list) > 1)
+		if (json_array_size(list) > 1 && !join)
 			printf("%s: ",
 			       strrchr(path, '/') ? strrchr(path, '/') + 1 : path);
-		if (!head) {
-			printf("none: %s\n",
-			       json_string_value(json_object_get(at, "why")));
+		if (join) {
+			printf("the join");
+		} else if (!head) {
+			printf("none: %s\n", why);
 			continue;
+		} else {
+			printf("commit %lld, head %.16s…",
+			       (long long)json_integer_value(
+				       json_object_get(at, "commit")),
+			       head);
 		}
-		printf("commit %lld, head %.16s…",
-		       (long long)json_integer_value(json_object_get(at, "commit")),
-		       head);
 		count(at, "signatures", "signature");
 		count(at, "timestamps", "time-stamp");
 		puts(json_integer_value(json_object_get(at, "signatures")) +

@@ -6,9 +6,12 @@
  *       └─ signature ── its key ── file of signers, at the time of a time-stamp that is trusted, else now
  *       └─ time-stamp ── its certificate ── file of authorities
  */
+#include <ctype.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <incise/recording.h>
 #include "../cli/cli.h"
 #include "../cli/control_character.h"
 #include "../cli/json.h"
@@ -63,6 +66,31 @@ static int progress(void *user, double share)
 	return cli_stop;
 }
 
+/* A finding of ours about a statement. */
+static void differs(const struct comparison *comparison, const char *fmt, ...)
+	INCISE_PRINTF(2, 3);
+static void differs(const struct comparison *comparison, const char *fmt, ...)
+{
+	char text[600];
+	struct incise_verify_finding finding = {
+		.kind = INCISE_VERIFY_SEAL,
+		.stream = "",
+		.first_block = -1,
+		.last_block = -1,
+		.last_seq = -1,
+		.first_ns = -1,
+		.last_ns = -1,
+		.count = 1,
+		.text = text,
+	};
+	va_list args;
+
+	va_start(args, fmt);
+	vsnprintf(text, sizeof(text), fmt, args);
+	va_end(args);
+	found((void *)(uintptr_t)comparison, &finding);
+}
+
 /* SHA-256 of the last calibration of a list, which is the active one; "": that of the capture. */
 static void find_active(const char *list, char sha256[65])
 {
@@ -80,41 +108,83 @@ static bool compare_calibration(struct vouch *vouch, const struct seal_file *fil
 	char *now = cli_require(seal_calibrations(vouch->recording, &err), &err);
 	const char *then = file->bytes + seal_statement_length(file->bytes, file->n);
 	bool kept = !strncmp(now, then, strlen(then)), known;
-	char read_by[65], signed_as[65], name[200] = "", text[300];
+	char read_by[65], signed_as[65], name[200] = "";
 
 	for (char *line = now; *line; line = strchr(line, '\n') + 1)
 		sscanf(line, "calibration %199s", name);
 	find_active(now, read_by);
 	find_active(then, signed_as);
 	known = kept && !strcmp(read_by, signed_as);
-	if (!known) {
-		struct incise_verify_finding finding = {
-			.kind = INCISE_VERIFY_SEAL,
-			.stream = "",
-			.first_block = -1,
-			.last_block = -1,
-			.last_seq = -1,
-			.first_ns = -1,
-			.last_ns = -1,
-			.count = 1,
-			.text = text,
-		};
-
-		snprintf(text, sizeof(text),
-			 kept ? "%s, by which it is read, is not in the statement"
-			      : "calibrations that are in the statement were removed or "
-				"changed",
-			 name);
-		found((void *)(uintptr_t)comparison, &finding);
-	}
+	if (!kept)
+		differs(comparison, "calibrations that are in the statement were removed "
+				    "or changed");
+	else if (!known)
+		differs(comparison, "%s, by which it is read, is not in the statement",
+			name);
 	free(now);
 	return known;
 }
 
+/* The name is that of the cuts in what is exported. A member's is in the statement of the join. */
+static bool compare_name(struct vouch *vouch, const char *name,
+			 const struct comparison *comparison)
+{
+	struct incise_error err = {0};
+	struct incise_recording *recording =
+		cli_require(incise_recording_open(vouch->recording, &err), &err);
+	const char *now = incise_recording_name(recording), *then = name;
+	bool same;
+
+	/* A statement has '?' for characters that are not printed. */
+	for (; *now && (*now == *then || (*then == '?' && iscntrl((unsigned char)*now)));
+	     now++)
+		then++;
+	same = vouch->member || *now == *then;
+	incise_recording_close(recording);
+	if (!same)
+		differs(comparison,
+			"it was signed under the name %s; give it that name again, or "
+			"sign it under this one",
+			name);
+	return same;
+}
+
+/* The text says all: the first line that differs does where. */
+static void compare_join(struct vouch *vouch, const struct seal_file *file)
+{
+	static const char first[] = "incise join statement 1\n";
+	struct vouch_statement *s = &vouch->statements[vouch->n_statements++];
+	struct comparison comparison = {NULL, s};
+	const char *then = file->bytes, *now = vouch->join, *member = "";
+	size_t n = strlen(first);
+
+	*s = (struct vouch_statement){.number = file->number, .commit = -1};
+	if (!file->bytes || strncmp(then, first, n)) {
+		differs(&comparison, "seal/%s: %s", file->name,
+			file->bytes ? "no statement of a join" : file->why);
+		return;
+	}
+	s->commit = 0;
+	s->complete = true;
+	s->agrees = s->calibrated = s->recorded =
+		file->n == strlen(now) && !memcmp(then, now, file->n);
+	if (s->agrees)
+		return;
+	for (; *now && !strncmp(now, then, n); n = strcspn(now, "\n") + 1) {
+		now += n;
+		then += n;
+		if (!strncmp(now, "member ", 7))
+			member = now;
+	}
+	differs(&comparison, "%.*s: '%.*s' was signed, and is '%.*s' now",
+		(int)strcspn(member, "\n"), member, (int)strcspn(then, "\n"), then,
+		(int)strcspn(now, "\n"), now);
+}
+
 /* Returns whether the recording was verified with it. */
-static bool compare(struct vouch *vouch, const struct seal_file *file,
-		    const struct incise_verify_watch *watch,
-		    struct incise_verify_report *report)
+static bool compare_recording(struct vouch *vouch, const struct seal_file *file,
+			      const struct incise_verify_watch *watch,
+			      struct incise_verify_report *report)
 {
 	struct vouch_statement *s = &vouch->statements[vouch->n_statements++];
 	struct comparison comparison = {watch, s};
@@ -141,7 +211,10 @@ static bool compare(struct vouch *vouch, const struct seal_file *file,
 					report, &err))
 			cli_fail_with(&err);
 		s->recorded = report->sealed;
-		s->agrees = compare_calibration(vouch, file, &comparison) && s->recorded;
+		strcpy(s->name, statement->name);
+		s->calibrated = compare_calibration(vouch, file, &comparison);
+		s->agrees = compare_name(vouch, s->name, &comparison) && s->calibrated &&
+			    s->recorded;
 		s->reported = watch;
 	}
 	free(statement);
@@ -251,24 +324,30 @@ static void judge(struct vouch *vouch)
 	}
 }
 
-void vouch_check(struct vouch *vouch, const char *recording, const struct trust *trust,
-		 const struct incise_verify_watch *watch,
+void vouch_check(struct vouch *vouch, const char *recording, bool member,
+		 const struct trust *trust, const struct incise_verify_watch *watch,
 		 struct incise_verify_report *report)
 {
 	struct incise_error err = {0};
 	struct seal_files files;
 	bool verified = !report;
 
-	*vouch = (struct vouch){.recording = seal_recording(recording)};
+	*vouch = (struct vouch){.recording = seal_recording(recording), .member = member};
+	vouch->join = seal_join(vouch->recording);
 	if (seal_files_read(&files, vouch->recording, &err))
 		cli_fail_with(&err);
 	vouch->statements = cli_alloc((size_t)files.n + 1, sizeof(*vouch->statements));
 	vouch->lines = cli_alloc((size_t)files.n + 1, sizeof(*vouch->lines));
 	/* The last one is that of the present: the recording is verified with it. */
 	for (int i = files.n - 1; i >= 0 && trust->signers.path; i--)
-		if (files.all[i].kind == SEAL_STATEMENT)
-			verified |= compare(vouch, &files.all[i], verified ? NULL : watch,
-					    verified ? NULL : report);
+		if (files.all[i].kind != SEAL_STATEMENT)
+			continue;
+		else if (vouch->join)
+			compare_join(vouch, &files.all[i]);
+		else
+			verified |= compare_recording(vouch, &files.all[i],
+						      verified ? NULL : watch,
+						      verified ? NULL : report);
 	if (!verified && incise_verify(recording, watch, report, &err))
 		cli_fail_with(&err);
 	/* Time-stamps first: they say when a key had to be valid. */
@@ -290,6 +369,7 @@ void vouch_free(struct vouch *vouch)
 	free(vouch->statements);
 	free(vouch->lines);
 	free(vouch->recording);
+	free(vouch->join);
 }
 
 /* --- report -------------------------------------------------------------------------------- */
@@ -309,11 +389,17 @@ static char *extent(const struct vouch *vouch, int number)
 
 	if (!s || s->commit < 0)
 		return cli_text("statement %d", number);
-	return cli_text("%s, statement of commit %lld",
-			!s->recorded  ? "but not for what it is now"
-			: !s->agrees  ? "what was recorded, but not its calibration"
-			: s->complete ? "all of it"
-				      : "all of it up to the interruption",
+	if (vouch->join)
+		return cli_text(s->agrees ? "the times of the join"
+					  : "but not for what it is now");
+	return cli_text("%s%s, statement of commit %lld",
+			!s->recorded	 ? "but not for what it is now"
+			: !s->calibrated ? "what was recorded, but not its calibration"
+			: s->complete	 ? "all of it"
+					 : "all of it up to the interruption",
+			s->recorded && s->calibrated && !s->agrees
+				? ", but under another name"
+				: "",
 			(long long)s->commit);
 }
 
@@ -383,8 +469,9 @@ json_t *vouch_json(const struct vouch *vouch)
 		json_array_append_new(
 			statements,
 			json_pack("{si so sb sb so}", "statement", s->number, "commit",
-				  s->commit < 0 ? json_null()
-						: json_integer((json_int_t)s->commit),
+				  s->commit < 0 || vouch->join
+					  ? json_null()
+					  : json_integer((json_int_t)s->commit),
 				  "agrees", s->agrees, "signed", s->is_signed,
 				  "differences", differences));
 	}
@@ -414,6 +501,10 @@ void vouch_fail(const struct vouch *vouch, const struct trust *trust)
 	struct incise_seal_head head;
 	char identity[33], why[200];
 
+	if (vouch->join && !vouch->n_lines)
+		cli_fail("%s: its members are signed, the times of the join are not: "
+			 "'incise sign %s' signs them",
+			 vouch->recording, vouch->recording);
 	if (vouch->bad)
 		cli_fail("%s: not everyone who vouches for it may: bad signatures, "
 			 "time-stamps or statements: %d",

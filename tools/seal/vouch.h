@@ -39,18 +39,22 @@ struct vouch_line {
 /* A statement, and how the recording differs from it. */
 struct vouch_statement {
 	int number;
-	int64_t commit; /* -1: it is no statement */
-	bool complete;	/* of a recording that was closed */
-	bool recorded;	/* what was recorded agrees */
-	bool agrees;	/* that, and the calibration by which it is read */
-	bool is_signed; /* by a signer that may */
-	bool reported;	/* differences were findings of the verification */
+	int64_t commit;	 /* -1: it is no statement */
+	bool complete;	 /* of a recording that was closed */
+	bool recorded;	 /* what was recorded agrees */
+	bool calibrated; /* and the calibration by which it is read */
+	bool agrees;	 /* all of it does, with the name */
+	bool is_signed;	 /* by a signer that may */
+	bool reported;	 /* differences were findings of the verification */
+	char name[256];	 /* of the recording when it was signed; "": of a join */
 	int n_differences;
 	char *differences[20]; /* texts; there may be more */
 };
 
 struct vouch {
 	char *recording;
+	char *join; /* the statement of the join as it is now; NULL: it is a plain recording */
+	bool member; /* of a join, whose statement has its name */
 	struct vouch_statement *statements;
 	struct vouch_line *lines;
 	int n_statements, n_lines;
@@ -59,12 +63,14 @@ struct vouch {
 };
 
 /*
- * Verify a recording, which is not a joined one, as incise_verify() does, and check its seal. If
- * @report is NULL, it was verified before. Without signers to trust, signatures are not checked.
+ * Verify a recording as incise_verify() does, and check its seal. If @report is NULL, as for a joined
+ * one it must be, it was verified before. Without signers to trust, signatures are not checked.
  * Every failure ends the program.
+ *
+ * @member: of a joined recording
  */
-void vouch_check(struct vouch *vouch, const char *recording, const struct trust *trust,
-		 const struct incise_verify_watch *watch,
+void vouch_check(struct vouch *vouch, const char *recording, bool member,
+		 const struct trust *trust, const struct incise_verify_watch *watch,
 		 struct incise_verify_report *report);
 
 void vouch_free(struct vouch *vouch);

@@ -103,6 +103,9 @@ INCISE_API void incise_recording_close(struct incise_recording *recording);
 INCISE_API int incise_recording_recover(const char *path, const char *output,
 					struct incise_error *err);
 
+/** Its name, which cuts and origins have: that of its folder without .rec. It belongs to the recording. */
+INCISE_API const char *incise_recording_name(const struct incise_recording *recording);
+
 /** Get the contents. @return 0, -EINVAL (an invalid row), -EIO. */
 INCISE_API int incise_recording_info(struct incise_recording *recording,
 				     struct incise_recording_info *info,

@@ -84,5 +84,28 @@ INCISE_API int incise_session_join(const char *const *paths, int n,
 INCISE_API int incise_session_members(const struct incise_recording *recording,
 				      const struct incise_session_info **members);
 
+/**
+ * State a join: its members by identity and head, in their order, their hosts, how the clocks were
+ * aligned, and the maps of the clocks with their bounds. With the members' own statements
+ * (incise/seal.h) it says all that is read of the recording. Its text is
+ *
+ *     incise join statement 1
+ *     member a                              for each member
+ *     identity 0123456789abcdef0123456789abcdef
+ *     commit 97 1234567890 0123…            number, t_ns, head
+ *     host rig2
+ *     method clocks
+ *     signals 0 nan nan                     number, agreement and its bound, ns
+ *     map 12 0123…                          knots, SHA-256 of a line "t_ns session_ns bound_ns" of each
+ *     end
+ *
+ * with numbers as "%.17g" writes them.
+ *
+ * @return text, to be freed with free(3); the same recording gives the same. NULL with errno EINVAL
+ *         (not joined), ENODATA (a member of an older format, which has no seal), EIO, ENOMEM.
+ */
+INCISE_API char *incise_session_statement(const struct incise_recording *recording,
+					  struct incise_error *err);
+
 INCISE_END_DECLS
 #endif

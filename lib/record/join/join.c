@@ -5,8 +5,11 @@
  *     a's clock ─ wall ─► TAI ─ first's wall, backwards ─► session
  *     a's clock ─ marks that the first recorded too ─────► session
  */
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <ftw.h>
+#include <limits.h>
 #include <linux/fs.h>
 #include <math.h>
 #include <stdarg.h>
@@ -20,7 +23,6 @@
 #include <incise/wall.h>
 #include "../frames.h"
 #include "../ledger.h"
-#include "../read/recalibration.h"
 #include "../read/session.h"
 #include "../schema.h"
 #include "align.h"
@@ -606,89 +608,76 @@ static int bring(const char *from, const char *to, bool complete)
 static const char *const files[] = {INCISE_SCHEMA_DB, INCISE_SCHEMA_DB "-wal",
 				    INCISE_FRAMES_FILE};
 
-/* Remove what was written of a session that failed. */
-static void remove_part(const struct join *join, const char *folder)
+static int remove_one(const char *path, const struct stat *st, int type, struct FTW *at)
 {
-	char *path;
-
-	for (int i = 0; i < join->n; i++) {
-		for (size_t k = 0; k < sizeof(files) / sizeof(*files); k++)
-			if (asprintf(&path, "%s/%s/%s", folder, join->members[i].name,
-				     files[k]) >= 0) {
-				unlink(path);
-				free(path);
-			}
-		if (asprintf(&path, "%s/%s", folder, join->members[i].name) >= 0) {
-			incise_recalibrations_remove(path);
-			free(path);
-		}
-		if (asprintf(&path, "%s/%s", folder, join->members[i].name) >= 0) {
-			rmdir(path);
-			free(path);
-		}
-	}
-	if (asprintf(&path, "%s/%s", folder, INCISE_SCHEMA_DB) >= 0) {
-		unlink(path);
-		free(path);
-	}
-	rmdir(folder);
+	(void)st, (void)type, (void)at;
+	return remove(path) && errno != ENOENT;
 }
 
-/* The calibrations that a member got after its capture, copied or linked. Returns 0 or -errno. */
-static int bring_calibrations(const struct member *member, const char *own)
+/* A file of a member. Returns 0, also if there is none, or -errno. */
+static int bring_file(const struct member *member, const char *own, const char *name,
+		      bool complete)
 {
-	struct incise_recalibration *list;
-	int n = incise_recalibrations(member->recording->path, &list, NULL), rc = 0;
-	char *to, *from;
+	char *from = NULL, *to = NULL;
+	int rc = -ENOMEM;
 
-	if (n > 1 && asprintf(&to, "%s/calibration", own) >= 0) {
-		rc = mkdir(to, 0777) ? -errno : 0;
-		free(to);
+	if (asprintf(&from, "%s/%s", member->recording->path, name) < 0)
+		from = NULL;
+	else if (asprintf(&to, "%s/%s", own, name) < 0)
+		to = NULL;
+	else
+		rc = bring(from, to, complete);
+	free(from);
+	free(to);
+	return rc;
+}
+
+/*
+ * The regular files of a folder in a member: its seal, and the calibrations that it got after its
+ * capture. A recording may come from anybody: no link is followed. Returns 0 or -errno.
+ */
+static int bring_folder(const struct member *member, const char *own, const char *name)
+{
+	char path[PATH_MAX], file[sizeof(((struct dirent *)0)->d_name) + 20];
+	struct dirent *entry;
+	struct stat st;
+	DIR *folder;
+	int rc, fd;
+
+	snprintf(path, sizeof(path), "%s/%s", member->recording->path, name);
+	fd = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+	folder = fd < 0 ? NULL : fdopendir(fd);
+	if (!folder)
+		return errno == ENOENT ? 0 : -errno;
+	snprintf(path, sizeof(path), "%s/%s", own, name);
+	rc = mkdir(path, 0777) ? -errno : 0;
+	while (!rc && (entry = readdir(folder))) {
+		if (fstatat(fd, entry->d_name, &st, AT_SYMLINK_NOFOLLOW) ||
+		    !S_ISREG(st.st_mode))
+			continue;
+		snprintf(file, sizeof(file), "%s/%s", name, entry->d_name);
+		rc = bring_file(member, own, file, true);
 	}
-	for (int i = 1; i < n && !rc; i++) {
-		if (asprintf(&from, "%s/%s", member->recording->path, list[i].file) < 0) {
-			rc = -ENOMEM;
-			break;
-		}
-		if (asprintf(&to, "%s/%s", own, list[i].file) < 0) {
-			rc = -ENOMEM;
-		} else {
-			rc = bring(from, to, true);
-			free(to);
-		}
-		free(from);
-	}
-	if (n > 0)
-		free(list);
-	return n < 0 ? n : rc;
+	closedir(folder);
+	return rc;
 }
 
 static int bring_member(struct join *join, const struct member *member,
 			const char *folder)
 {
-	char *to, *from, *own;
+	char *own;
 	int rc = 0;
 
 	if (asprintf(&own, "%s/%s", folder, member->name) < 0)
 		return no_memory(join, folder);
 	if (mkdir(own, 0777))
 		rc = -errno;
-	for (size_t i = 0; i < sizeof(files) / sizeof(*files) && !rc; i++) {
-		if (asprintf(&from, "%s/%s", member->recording->path, files[i]) < 0) {
-			rc = -ENOMEM;
-			break;
-		}
-		if (asprintf(&to, "%s/%s", own, files[i]) < 0) {
-			free(from);
-			rc = -ENOMEM;
-			break;
-		}
-		rc = bring(from, to, member->recording->meta.complete);
-		free(from);
-		free(to);
-	}
+	for (size_t i = 0; i < sizeof(files) / sizeof(*files) && !rc; i++)
+		rc = bring_file(member, own, files[i], member->recording->meta.complete);
 	if (!rc)
-		rc = bring_calibrations(member, own);
+		rc = bring_folder(member, own, "calibration");
+	if (!rc)
+		rc = bring_folder(member, own, "seal");
 	if (rc)
 		rc = incise_error_set(join->err, -rc, "%s: cannot be written: %s", own,
 				      strerror(-rc));
@@ -844,7 +833,7 @@ static int write_session(struct join *join, const char *output)
 		rc = incise_error_set(join->err, errno, "%s: %s", output,
 				      strerror(errno));
 	if (rc && made)
-		remove_part(join, part);
+		nftw(part, remove_one, 16, FTW_DEPTH | FTW_PHYS);
 	free(part);
 	return rc;
 }

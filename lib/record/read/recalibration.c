@@ -171,23 +171,6 @@ int incise_recalibrations(const char *path, struct incise_recalibration **list,
 	return n;
 }
 
-void incise_recalibrations_remove(const char *folder)
-{
-	struct incise_recalibration *list = NULL;
-	int n = read_folder(folder, &list, NULL);
-	char *path;
-
-	for (int i = n - 1; i >= 0; i--)
-		if (asprintf(&path, "%s/%s", folder, i ? list[i].file : FOLDER) >= 0) {
-			if (i)
-				unlink(path);
-			else
-				rmdir(path);
-			free(path);
-		}
-	free(list);
-}
-
 /* --- reading by the active one -------------------------------------------------------- */
 
 /* The tip of each pose in table depth, which has the usable ones. */

@@ -32,9 +32,6 @@ int incise_recalibration_apply(struct incise_recording *rec, struct incise_error
 void incise_recalibration_stream(const struct incise_recording *rec,
 				 struct incise_stream *stream);
 
-/* Remove all calibrations that a recording got after its capture, as far as that is possible. */
-void incise_recalibrations_remove(const char *folder);
-
 /* "of the recording", or which one since when, for people; to be freed; NULL: no memory. */
 char *incise_recalibration_text(const struct incise_recording *rec);
 

@@ -327,10 +327,15 @@ bool incise_recording_is_written(const char *folder)
 static char *find_name(const char *folder)
 {
 	const char *slash = strrchr(folder, '/');
-	char *name = strdup(slash && slash[1] ? slash + 1 : folder);
-	static const char *const ends[] = {".part", ".rec"};
+	const char *last = slash && slash[1] ? slash + 1 : folder;
+	bool dots = !strcmp(last, ".") || !strcmp(last, "..");
+	char *real = dots ? realpath(folder, NULL) : NULL, *name;
 
+	last = real ? strrchr(real, '/') + 1 : last;
+	name = strdup(last);
+	free(real);
 	for (int i = 0; i < 2 && name; i++) {
+		static const char *const ends[] = {".part", ".rec"};
 		size_t n = strlen(name), end = strlen(ends[i]);
 
 		if (n > end && !strcmp(name + n - end, ends[i]))
@@ -453,6 +458,11 @@ struct incise_recording *incise_recording_open_original(const char *path,
 							struct incise_error *err)
 {
 	return open_path(path, true, true, err);
+}
+
+const char *incise_recording_name(const struct incise_recording *rec)
+{
+	return rec->name;
 }
 
 void incise_recording_close(struct incise_recording *rec)
