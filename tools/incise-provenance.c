@@ -99,22 +99,18 @@ static void find_active(const char *path, char sha256[65])
 static void compare_rows(struct step *step, const struct step *next)
 {
 	struct incise_error err = {0};
-	char active[65], *advice;
+	char active[65];
 	const char *then = "";
 
 	if (next && !strcmp(next->origin->kind, "calibration") &&
 	    next->origin->depth == step->origin->depth + 1)
 		then = next->origin->sha256;
 	find_active(step->found, active);
-	if (!recording_intact(step->found, false, &err)) {
-		advice = strstr(err.text, "; 'incise verify");
-		if (advice)
-			*advice = 0;
+	if (recording_altered(step->found, &err))
 		step->why = cli_text("%s", err.text);
-	} else if (strcmp(active, then)) {
+	else if (strcmp(active, then))
 		step->why =
 			cli_text("%s: is read by another calibration now", step->found);
-	}
 	if (step->why)
 		step->state = OTHER;
 }

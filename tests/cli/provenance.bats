@@ -120,6 +120,13 @@ setup() {
 	run -1 --separate-stderr incise provenance now.csv --json
 	[ "$(jq -r '.origins[] | .state' <<<"$output" | paste -sd' ')" = "other same" ]
 	run -0 incise provenance then.csv
+	# one that was given for the export
+	incise export here.rec -c c.conf --lineage -o given.csv >/dev/null
+	run -0 incise provenance given.csv
+	[[ "$output" == *"calibration c.conf, SHA-256 "*": c.conf is this file"* ]]
+	echo 'force_mV_N = 1112.0;' >c.conf
+	run -1 --separate-stderr incise provenance given.csv --json
+	[ "$(jq -r '.origins[] | .state' <<<"$output" | paste -sd' ')" = "same other" ]
 	sqlite3 here.rec/recording.db "UPDATE force SET code = code + 1 WHERE seq = 5"
 	run -1 --separate-stderr incise provenance then.csv
 	[[ "$output" == *"here.rec: not as it was recorded: force: block 0 is altered"* ]]

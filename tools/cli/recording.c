@@ -52,7 +52,7 @@ static void find_first(void *user, const struct incise_verify_finding *finding)
 	}
 }
 
-bool recording_intact(const char *path, bool damaged, struct incise_error *err)
+int recording_altered(const char *path, struct incise_error *err)
 {
 	struct first first = {0};
 	const struct incise_verify_watch watch = {.found = find_first, .user = &first};
@@ -61,19 +61,30 @@ bool recording_intact(const char *path, bool damaged, struct incise_error *err)
 
 	if (rc == -ENODATA) {
 		*err = (struct incise_error){0};
-		return true;
+		return 0;
 	}
-	if (rc)
-		return false;
-	if (!first.found)
+	if (!rc && first.found)
+		incise_error_set(err, EINVAL, "%s: not as it was recorded: %s", path,
+				 first.text);
+	return rc ? rc : first.found;
+}
+
+bool recording_intact(const char *path, bool damaged, struct incise_error *err)
+{
+	struct incise_error found = {0};
+	int altered = recording_altered(path, &found);
+
+	if (!altered)
 		return true;
-	if (damaged)
-		cli_warn("%s: not as it was recorded: %s", path, first.text);
+	if (altered < 0)
+		*err = found;
+	else if (damaged)
+		cli_warn("%s", found.text);
 	else
 		incise_error_set(err, EINVAL,
-				 "%s: not as it was recorded: %s; 'incise verify %s' "
-				 "lists all; --damaged uses it as it is",
-				 path, first.text, path);
+				 "%s; 'incise verify %s' lists all; --damaged uses it as "
+				 "it is",
+				 found.text, path);
 	return false;
 }
 

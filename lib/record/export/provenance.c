@@ -8,12 +8,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <incise/origin.h>
 #include <incise/seal.h>
 #include <incise/version.h>
 #include <incise/wall.h>
 #include "writers.h"
+#include "../../learn/sha256.h"
 #include "../read/recalibration.h"
 #include "../read/recording.h"
 #include "../read/session.h"
@@ -173,12 +175,35 @@ size_t incise_recording_origins(struct incise_recording *recording, char *text,
 	return at;
 }
 
+/* Append a calibration that was given for the export, a file; one that is a pipe was read already. */
+static size_t put_given(const char *path, char *text, size_t size, size_t at)
+{
+	struct incise_origin origin = {.depth = 1, .kind = "calibration"};
+	struct incise_sha256 sha;
+	char bytes[4096];
+	struct stat st;
+	FILE *in = stat(path, &st) || !S_ISREG(st.st_mode) ? NULL : fopen(path, "re");
+	size_t n;
+
+	if (!in)
+		return at;
+	incise_sha256_start(&sha);
+	while ((n = fread(bytes, 1, sizeof(bytes), in)) > 0)
+		incise_sha256_add(&sha, bytes, n);
+	fclose(in);
+	snprintf(origin.name, sizeof(origin.name), "%s", name_of(path));
+	return incise_sha256_end(&sha, origin.sha256)
+		       ? at
+		       : put_token(&origin, text, size, at);
+}
+
 /* The origins of an export. */
 static int add_origins(struct incise_provenance *provenance,
-		       struct incise_recording *const *recordings, int n)
+		       struct incise_recording *const *recordings, int n,
+		       const char *calibration_path)
 {
 	const size_t most = INCISE_SESSION_MEMBERS_MAX * INCISE_ORIGIN_TEXT;
-	char *all = malloc((size_t)n * most), *to = all;
+	char *all = malloc((size_t)n * most + INCISE_ORIGIN_TEXT), *to = all;
 	int rc;
 
 	if (!all)
@@ -189,6 +214,9 @@ static int add_origins(struct incise_provenance *provenance,
 			*to++ = ' ';
 		to += incise_recording_origins(recordings[i], to, most);
 	}
+	if (calibration_path)
+		put_given(calibration_path, all, (size_t)n * most + INCISE_ORIGIN_TEXT,
+			  (size_t)(to - all));
 	rc = incise_provenance_add(provenance, "origin", "%s", all);
 	free(all);
 	return rc;
@@ -497,7 +525,8 @@ int incise_provenance_of(struct incise_provenance *provenance,
 	if (!rc)
 		rc = add_sources(provenance, recordings, n);
 	if (!rc)
-		rc = add_origins(provenance, recordings, n);
+		rc = add_origins(provenance, recordings, n,
+				 table ? NULL : options->calibration_path);
 	if (!rc)
 		rc = table ? incise_provenance_add(provenance, "options",
 						   "rows of table %s", table)
