@@ -10,6 +10,7 @@
 #include <time.h>
 #include <incise/calibration.h>
 #include <incise/redundancy.h>
+#include "cli/calibration.h"
 #include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/recording.h"
@@ -59,7 +60,9 @@ static const struct cli_unit ages[] = {
 	{"d", 86400}, {"h", 3600}, {"w", 7 * 86400}, {"y", 365.25 * 86400}, {0}};
 
 static const struct cli_option option_table[] = {
-	{'c', "calibration", "FILE", "file to check (default: calibration.conf)",
+	{'c', "calibration", "FILE",
+	 "file to check (default: ./calibration.conf, else\n"
+	 "/etc/incise/calibration.conf)",
 	 CLI_INPUT(struct options, calibration)},
 	{0, "due", "AGE", "age at which a calibration expires (default: 365d)",
 	 CLI_QUANTITY(struct options, due_s, ages, 0, 1e10)},
@@ -334,6 +337,8 @@ int main(int argc, char **argv)
 	cli_no_operands(argc, argv, "--recording");
 	named = options.calibration;
 	if (!named)
+		options.calibration = calibration_default();
+	if (!options.calibration)
 		options.calibration = "calibration.conf";
 	n = incise_calibration_history(options.calibration, &records, &err);
 	rc = n < 0 ? n : incise_calibration_load(options.calibration, &calibration, &err);

@@ -15,6 +15,7 @@
 #include <incise/sim.h>
 #include "capture/start.h"
 #include "capture/terminal.h"
+#include "cli/calibration.h"
 #include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/recording.h"
@@ -93,8 +94,7 @@ static const struct cli_option option_table[] = {
 	 "one, NAME.rec.part",
 	 CLI_OUTPUTS(struct options, output)},
 	{CLI_RIG_OPTION(struct options, rig)},
-	{'c', "calibration", "FILE", "calibration.conf (default: nominal values)",
-	 CLI_INPUT(struct options, calibration)},
+	CALIBRATION_OPTION(struct options, calibration),
 	{0, "duration", "TIME",
 	 "end after this time, for example 10s, 500ms, 2min or 1h (default:\n"
 	 "at Ctrl-C; on the simulated rig at the end of its cuts)",
@@ -552,6 +552,7 @@ static struct incise_wall *read_wall(const char *path)
 }
 
 static void report(const struct options *options, const struct result *result,
+		   const struct calibration_used *calibration,
 		   const struct incise_wall *wall, const struct signing *signing)
 {
 	const struct incise_recorder_stats *stats = &result->stats;
@@ -565,8 +566,9 @@ static void report(const struct options *options, const struct result *result,
 
 	if (options->json) {
 		json_print(json_pack(
-			"{so so so sI sI sI sI sI sI sI sI sI so so so so}", "path",
-			json_text(path), "wall",
+			"{so so so so sI sI sI sI sI sI sI sI sI so so so so}", "path",
+			json_text(path), "calibration", calibration_json(calibration),
+			"wall",
 			wall ? wall_json(wall, result->start_ns, end_ns) : json_null(),
 			"seconds", json_number(result->seconds), "force",
 			(json_int_t)stats->force, "tracker", (json_int_t)stats->tracker,
@@ -594,6 +596,7 @@ static void report(const struct options *options, const struct result *result,
 	putchar('\n');
 	if (incise_pose_counts_text(&stats->poses, text, sizeof(text)))
 		puts(text);
+	printf("calibration %s\n", calibration_text(calibration));
 	if (wall)
 		wall_text(wall, result->start_ns, end_ns);
 	stream_table(streams, n);
@@ -688,8 +691,8 @@ static void judge(const char *path, const struct result *result)
 
 int main(int argc, char **argv)
 {
-	struct incise_calibration calibration;
-	struct incise_recorder_setup setup = {.calibration = &calibration};
+	struct calibration_used calibration;
+	struct incise_recorder_setup setup = {.calibration = &calibration.values};
 	struct incise_vision_setup vision;
 	struct incise_force_info force = {0};
 	struct incise_error err = {0};
@@ -700,12 +703,9 @@ int main(int argc, char **argv)
 	char *target;
 
 	parse(&options, argc, argv);
-	incise_calibration_nominal(&calibration);
-	if (options.calibration &&
-	    incise_calibration_load(options.calibration, &calibration, &err))
-		cli_fail_with(&err);
-	setup.calibration_path = options.calibration;
 	run.rig = open_rig(&options);
+	calibration_use(&calibration, options.calibration, cli_rig(options.rig));
+	setup.calibration_path = calibration.path;
 	if (options.start_at.given && !options.clock_source &&
 	    !incise_clock_is_real(incise_rig_clock(run.rig)))
 		cli_fail("--start-at: the clock of this rig is simulated and has no wall "
@@ -720,8 +720,8 @@ int main(int argc, char **argv)
 	run.sync = options.trigger_sync ? start_sync_open(options.trigger_sync) : -1;
 	if (incise_rig_force(run.rig))
 		incise_force_info(incise_rig_force(run.rig), &force);
-	incise_force_calibration(&force, &calibration);
-	run.view.full_scale_N = force.full_scale_V * 1e3 / calibration.force_mV_N;
+	incise_force_calibration(&force, &calibration.values);
+	run.view.full_scale_N = force.full_scale_V * 1e3 / calibration.values.force_mV_N;
 	run.view.depth = setup.vision;
 
 	target = recording_target(options.output);
@@ -748,7 +748,7 @@ int main(int argc, char **argv)
 	free(target);
 	wall = read_wall(options.output);
 	sign(options.output, &signing);
-	report(&options, &run.result, wall, &signing);
+	report(&options, &run.result, &calibration, wall, &signing);
 	judge_wall(&options, wall);
 	incise_wall_free(wall);
 	if (signing.err.code)

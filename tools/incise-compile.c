@@ -12,6 +12,7 @@
 #include <incise/infile.h>
 #include <incise/model.h>
 #include <incise/plan_file.h>
+#include "cli/calibration.h"
 #include "cli/cli.h"
 #include "cli/file_kind.h"
 #include "cli/json.h"
@@ -84,10 +85,7 @@ static const struct cli_option options[] = {
 	 "scene: rig.conf with the tracker and the actuators of the plan\n"
 	 "(default: a tracker of 120 Hz and no actuator, which no kernel loads)",
 	 CLI_INPUT(struct job, rig)},
-	{'c', "calibration", "FILE",
-	 "scene: calibration.conf with the position of the "
-	 "tip",
-	 CLI_INPUT(struct job, calibration)},
+	CALIBRATION_OPTION(struct job, calibration),
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
 	{0},
 };
@@ -177,23 +175,20 @@ static struct incise_rig *open_rig(const char *spec)
 static void compile_scene(const struct job *job)
 {
 	struct incise_rig *rig = job->rig ? open_rig(job->rig) : NULL;
-	struct incise_calibration calibration;
+	struct calibration_used calibration;
 	struct incise_plan_file_info info;
 	struct incise_error err = {0};
 	struct incise_plan_file *file;
 	struct incise_scene *scene;
 	struct incise_plan *plan;
 
-	incise_calibration_nominal(&calibration);
-	if (job->calibration &&
-	    incise_calibration_load(job->calibration, &calibration, &err))
-		cli_fail_with(&err);
+	calibration_use(&calibration, job->calibration, job->rig);
 	scene = scene_argument_load(&job->scene);
 	plan = cli_require(incise_plan_new(scene, rig, &err), &err);
-	if (incise_plan_set_tip(plan, calibration.tip_mm))
+	if (incise_plan_set_tip(plan, calibration.values.tip_mm))
 		cli_fail("%s: tip_mm is too far from the tracked point; run incise "
 			 "calibrate tip",
-			 job->calibration);
+			 calibration.path);
 	file = cli_require(incise_plan_file_new(plan, &err), &err);
 	if (incise_plan_file_save(file, job->output, &err))
 		cli_fail_with(&err);
@@ -202,6 +197,7 @@ static void compile_scene(const struct job *job)
 		json_print(plan_report_json(&info));
 	} else if (strcmp(job->output, "-")) {
 		plan_report_text(&info);
+		printf("calibration %s\n", calibration_text(&calibration));
 		cli_written();
 	}
 	if (!info.n_axes)

@@ -306,7 +306,8 @@ static void walk(struct demo *demo, const char *loop_time)
 	print_step(demo,
 		   "Cut the virtual liver: 3, 4, 4 and 3 times at 5, 10, 15 and 20 mm");
 	json_object_set_new(demo->summary, "capture",
-			    RUN(demo, "capture", "-o", rec, "--rig", sim, "--json"));
+			    RUN(demo, "capture", "-o", rec, "--rig", sim, "-c", "none",
+				"--json"));
 	print_step(demo,
 		   "Make datasets of the recording: raw, averaged, averaged cut by cut");
 	json_object_set_new(demo->summary, "export_raw",
@@ -329,8 +330,8 @@ static void walk(struct demo *demo, const char *loop_time)
 				initial, "--json"));
 	print_step(demo, "Cut another liver once, 5 mm deep, to compare with");
 	json_object_set_new(demo->summary, "capture_new_cut",
-			    RUN(demo, "capture", "-o", new_rec, "--rig", new_sim,
-				"--json"));
+			    RUN(demo, "capture", "-o", new_rec, "--rig", new_sim, "-c",
+				"none", "--json"));
 	json_object_set_new(demo->summary, "export_new_cut",
 			    RUN(demo, "export", new_rec, "-o", new_csv, "--rate", "1000",
 				"--json"));
@@ -340,8 +341,9 @@ static void walk(struct demo *demo, const char *loop_time)
 				"--log", replay, "--json"));
 	print_step(demo, "Run the haptic loop in real time, in fixed point");
 	json_object_set_new(demo->summary, "haptic",
-			    RUN(demo, "haptic", scene, "--rig", live, "--no-rt",
-				"--duration", duration, "--log", log, "--json"));
+			    RUN(demo, "haptic", scene, "--rig", live, "-c", "none",
+				"--no-rt", "--duration", duration, "--log", log,
+				"--json"));
 	free(rec), free(new_rec), free(raw), free(pairs), free(by_cut), free(new_csv);
 	free(paper), free(model), free(initial), free(scene), free(history), free(log);
 	free(replay), free(sim), free(seed_text), free(new_sim), free(live),

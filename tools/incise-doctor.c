@@ -18,6 +18,7 @@
 #include <incise/recorder.h>
 #include <incise/rig.h>
 #include <incise/scan.h>
+#include "cli/calibration.h"
 #include "cli/child.h"
 #include "cli/cli.h"
 #include "cli/features.h"
@@ -54,7 +55,9 @@ struct doctor {
 
 static const struct cli_option option_table[] = {
 	{CLI_RIG_OPTION(struct doctor, rig)},
-	{'c', "calibration", "FILE", "calibration to check (default: calibration.conf)",
+	{'c', "calibration", "FILE",
+	 "calibration to check (default: ./calibration.conf, else\n"
+	 "/etc/incise/calibration.conf)",
 	 CLI_INPUT(struct doctor, calibration)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct doctor, json)},
 	{0},
@@ -438,7 +441,9 @@ static json_t *calibration_report(const char *path)
 
 static void check_calibration(struct doctor *doctor)
 {
-	const char *path = doctor->calibration ? doctor->calibration : "calibration.conf";
+	const char *path = doctor->calibration	   ? doctor->calibration
+			   : calibration_default() ? calibration_default()
+						   : "calibration.conf";
 	json_t *report, *kind;
 	size_t i;
 

@@ -7,6 +7,7 @@
 #include <string.h>
 #include <incise/calibration.h>
 #include <incise/recording.h>
+#include "cli/calibration.h"
 #include "cli/cli.h"
 #include "cli/file_kind.h"
 #include "cli/json.h"
@@ -21,7 +22,7 @@ struct job {
 	int percent;   /* of the bar */
 	enum { PLAIN, ROS2 } profile;
 	int uncertainty; /* enum incise_export_uncertainty */
-	struct incise_calibration calibration;
+	struct calibration_used calibration;
 	struct incise_export_options how;
 };
 
@@ -43,14 +44,10 @@ static void parse_bins(void *options, char *text)
 static void load_calibration(void *options, char *path)
 {
 	struct job *job = options;
-	struct incise_error err = {0};
 
-	cli_input(path);
-	file_expect(path, FILE_CALIBRATION);
-	if (incise_calibration_load(path, &job->calibration, &err))
-		cli_fail_with(&err);
-	job->how.calibration = &job->calibration;
-	job->how.calibration_path = path;
+	calibration_use(&job->calibration, path, NULL);
+	job->how.calibration = &job->calibration.values;
+	job->how.calibration_path = job->calibration.path;
 }
 
 static const char *const profiles[] = {"plain", "ros2", NULL};
@@ -86,7 +83,7 @@ static const struct cli_option options[] = {
 	 CLI_INTEGER(struct job, min_count, 1, 1000000000)},
 	{'c', "calibration", "FILE",
 	 "use this calibration of force, camera and delays instead of that\n"
-	 "of the recordings",
+	 "of the recordings; none: nominal values",
 	 CLI_PARSED_BY(load_calibration)},
 	{0, "profile", "NAME",
 	 "messages of MCAP: plain (JSON, default) or ros2 (ROS 2, as rosbag2\n"

@@ -8,6 +8,7 @@
 #include <string.h>
 #include <incise/calibration.h>
 #include <incise/replay.h>
+#include "cli/calibration.h"
 #include "cli/cli.h"
 #include "cli/file_kind.h"
 #include "cli/json.h"
@@ -42,7 +43,8 @@ static const struct cli_option options[] = {
 	 "acquisition (default: arrival)",
 	 CLI_CHOICE(struct job, how.at, times)},
 	{'c', "calibration", "FILE",
-	 "use this calibration of force instead of that of the recording",
+	 "use this calibration of force instead of that of the recording;\n"
+	 "none: nominal values",
 	 CLI_INPUT(struct job, calibration)},
 	SCENE_ARGUMENT_OPTIONS(struct job, scene),
 	{0, "tool", "KIND",
@@ -271,7 +273,7 @@ static void report_text(const struct job *job, double rate_hz,
 int main(int argc, char **argv)
 {
 	static struct incise_loop_stats stats;
-	struct incise_calibration calibration;
+	struct calibration_used calibration;
 	struct incise_replay_report report;
 	struct incise_recording *recording;
 	struct incise_outfile *file = NULL;
@@ -283,11 +285,10 @@ int main(int argc, char **argv)
 	int rc;
 
 	parse(&job, argc, argv);
-	if (job.calibration &&
-	    incise_calibration_load(job.calibration, &calibration, &err))
-		cli_fail_with(&err);
-	if (job.calibration)
-		job.how.calibration = &calibration;
+	if (job.calibration) {
+		calibration_use(&calibration, job.calibration, NULL);
+		job.how.calibration = &calibration.values;
+	}
 	scene = scene_argument_load(&job.scene);
 	rate_hz = incise_scene_rate_hz(scene);
 	recording = recording_open(job.recording);

@@ -9,6 +9,7 @@
 #include <sys/epoll.h>
 #include <sys/timerfd.h>
 #include <unistd.h>
+#include "cli/calibration.h"
 #include "cli/cli.h"
 #include "cli/file_kind.h"
 #include "cli/json.h"
@@ -38,9 +39,7 @@ static const struct cli_option options[] = {
 	 "serve the devices of this rig: file rig.conf, or sim:KEY=VALUE,… for\n"
 	 "the simulated rig",
 	 CLI_INPUT(struct job, rig)},
-	{'c', "calibration", "FILE",
-	 "calibration of the rig (default: the values of Song et al., 2006)",
-	 CLI_INPUT(struct job, calibration)},
+	CALIBRATION_OPTION(struct job, calibration),
 	{0, "igtl", "[ADDR:]PORT",
 	 "serve OpenIGTLink there (default: 127.0.0.1:18944); without ADDR\n"
 	 "to this machine only; there is no authentication",
@@ -104,7 +103,7 @@ static bool is_recording(const char *operand)
 
 static void open_source(struct run *run, struct job *job)
 {
-	struct incise_error err = {0};
+	struct calibration_used calibration;
 	const char *operand = job->source.operand;
 	bool recording = !job->rig && operand && is_recording(operand);
 	enum file_kind kind = operand ? file_kind_of(operand) : FILE_UNKNOWN;
@@ -125,10 +124,11 @@ static void open_source(struct run *run, struct job *job)
 			  job->source.endless ? "endless" : "speed");
 	if (job->lsl && !*job->lsl)
 		cli_usage("--lsl: '' is no PREFIX; give one, for example rig");
-	incise_calibration_nominal(&job->source.calibration);
-	if (job->calibration &&
-	    incise_calibration_load(job->calibration, &job->source.calibration, &err))
-		cli_fail_with(&err);
+	if (job->rig) {
+		calibration_use(&calibration, job->calibration, job->rig);
+		job->source.calibration = calibration.values;
+		cli_note("calibration: %s", calibration_text(&calibration));
+	}
 	run->info.rate_hz = job->source.rate_hz;
 	run->info.kinds[SERVE_STATUS] = true;
 	run->source = job->rig	  ? serve_rig_open(&job->source, &run->info)

@@ -46,17 +46,17 @@ within() {
 @test "capture, and the loop, take the calibrated tip" {
 	incise calibrate tip --rig $rig --duration 20s </dev/null
 	cut=${rig/motion=1/motion=0}
-	incise capture -o a.rec --rig "$cut" --duration 4s -c calibration.conf
-	incise capture -o b.rec --rig sim:clock=simulated --duration 4s
+	incise capture -o a.rec --rig "$cut" --duration 4s
+	incise capture -o b.rec --rig sim:clock=simulated --duration 4s -c none
 	# raw rows are without the tip
 	holds "$(sqlite3 a.rec/recording.db 'SELECT abs(max(z_mm)) FROM tracker') > 40"
 	# depth of the same cut, to 6 sd of two records' noise and the tip's 0.01 mm
 	holds "$(sqlite3 a.rec/recording.db "ATTACH 'b.rec/recording.db' AS b;
 		SELECT max(abs(d.depth_mm - e.depth_mm)) FROM depth d JOIN b.depth e
 		USING (seq)") < 0.35"
-	incise haptic "$root/scenes/liver.scene" --rig "$cut" --duration 3s -c calibration.conf \
+	incise haptic "$root/scenes/liver.scene" --rig "$cut" --duration 3s \
 		--log a.csv
-	incise haptic "$root/scenes/liver.scene" --rig sim:clock=simulated --duration 3s --log b.csv
+	incise haptic "$root/scenes/liver.scene" --rig sim:clock=simulated --duration 3s -c none --log b.csv
 	holds "$(paste -d, a.csv b.csv | awk -F, 'NR == 1 {
 			for (i = 1; i <= NF / 2; i++) if ($i == "depth_mm") c = i
 			n = NF / 2; next }

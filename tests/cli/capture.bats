@@ -31,12 +31,13 @@ until_it_runs() {
 	[ -z "$stderr" ]
 	[[ "${lines[0]}" == "a.rec: 1.5 s, "*" 0 lost"* ]]
 	# a line per stream, below a heading
-	[[ "${lines[1]}" == "stream "*"drift ppm"* ]]
-	[[ "${lines[2]}" == "force "* ]]
-	[[ "${lines[3]}" == "tracker "* ]]
-	[ "${lines[4]}" = "warning: no delay calibration for force, tracker (run 'incise calibrate delay')" ]
-	[ "${lines[5]}" = "wrote a.rec" ]
-	[ "${#lines[@]}" -eq 6 ]
+	[ "${lines[1]}" = "calibration nominal values" ]
+	[[ "${lines[2]}" == "stream "*"drift ppm"* ]]
+	[[ "${lines[3]}" == "force "* ]]
+	[[ "${lines[4]}" == "tracker "* ]]
+	[ "${lines[5]}" = "warning: no delay calibration for force, tracker (run 'incise calibrate delay')" ]
+	[ "${lines[6]}" = "wrote a.rec" ]
+	[ "${#lines[@]}" -eq 7 ]
 	[ ! -e a.rec.part ]
 	[ "$(ls a.rec)" = recording.db ]
 	[ "$(ask a.rec "SELECT value FROM meta WHERE key='complete'")" = 1 ]
@@ -303,4 +304,24 @@ small_disk() {
 			incise info mv-away >/dev/null ;;
 		esac
 	done
+}
+
+# bats test_tags=check
+@test "a calibration that lies here is used and named, and nominal values of a real rig are warned of" {
+	printf '%s\n' 'clock = "simulated";' 'tracker = "sim:";' 'force = "sim:";' >rig.conf
+	run -0 --separate-stderr incise capture -o a.rec --duration 200ms
+	[[ "$stderr" == *"warning: nominal values: not calibrated"* ]]
+	run -0 --separate-stderr incise capture -o b.rec --duration 200ms -c none
+	[ -z "$stderr" ]
+	printf 'mass_g,reading_mV\n' >masses.csv
+	for n in {0..14}; do echo "$((n % 5 * 100)),$((180 + n % 5 * 1250))"; done >>masses.csv
+	incise calibrate force --from masses.csv >/dev/null
+	# another new file of a similar name is no mistake
+	incise calibrate force --from masses.csv -c calibration-b.conf >/dev/null
+	run -0 --separate-stderr incise capture -o c.rec --duration 200ms
+	[ -z "$stderr" ]
+	[ "${lines[1]}" = "calibration calibration.conf of $(date -u +%F)" ]
+	[[ "$(incise info c.rec)" == *"calibration  1274"* ]] || incise info c.rec
+	[ "$(incise haptic liver --duration 200ms --rig sim:clock=simulated --json | jq -r .calibration.path)" = calibration.conf ]
+	[ "$(incise capture -o d.rec --duration 200ms -c none --json | jq .calibration)" = null ]
 }

@@ -8,6 +8,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include "../cli/calibration.h"
 #include "../cli/file_kind.h"
 #include "../cli/json.h"
 #include "../cli/plot.h"
@@ -34,6 +35,8 @@ void calibrate_find(struct calibrate_options *options)
 	struct incise_error err = {0};
 	int rc;
 
+	if (!options->calibration)
+		options->calibration = calibration_default();
 	if (!options->calibration)
 		options->calibration = "calibration.conf";
 	/* It is written again if it is there, and else made. */

@@ -9,6 +9,7 @@
 #include <incise/realtime.h>
 #include <incise/rig.h>
 #include <incise/state.h>
+#include "../cli/calibration.h"
 #include "../cli/scene_argument.h"
 #include "../session/log.h"
 #include "feeder.h"
@@ -21,7 +22,7 @@ struct haptic {
 	struct feeder feeder; /* of HAPTIC_WATCH */
 	struct scene_argument argument;
 	enum incise_tool tool;
-	double tip_mm[3];
+	struct calibration_used calibration;
 
 	struct incise_rig *rig;
 	struct incise_scene *scene; /* that of the plan */

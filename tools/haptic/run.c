@@ -10,7 +10,6 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <incise/calibration.h>
 #include <incise/outfile.h>
 #include "../cli/cli.h"
 #include "../cli/json.h"
@@ -133,18 +132,6 @@ static void advise(const struct incise_realtime_setup *setup)
 				 *checks[i].fix ? "; better: " : "", checks[i].fix);
 }
 
-static void take_calibration(struct haptic_job *job)
-{
-	struct incise_calibration calibration;
-	struct incise_error err = {0};
-
-	incise_calibration_nominal(&calibration);
-	if (job->calibration &&
-	    incise_calibration_load(job->calibration, &calibration, &err))
-		cli_fail_with(&err);
-	memcpy(job->haptic.tip_mm, calibration.tip_mm, sizeof(calibration.tip_mm));
-}
-
 /* Checked before a device is opened: a refusal must not have moved anything. */
 static bool has_real_clock(const char *spec)
 {
@@ -228,6 +215,14 @@ static void test_scene(struct haptic *haptic)
 		 test.contact, test.force_max_N, test.silent_ms, test.silent_max_ms);
 }
 
+/* The scripted hand moves the tip itself. */
+static void take_calibration(struct haptic_job *job, const char *rig)
+{
+	calibration_use(&job->haptic.calibration,
+			job->scripted && !job->calibration ? "none" : job->calibration,
+			rig);
+}
+
 /* Everything but power: scene, real time, devices, plan, self-test. */
 static void set_up(struct haptic_job *job)
 {
@@ -236,7 +231,6 @@ static void set_up(struct haptic_job *job)
 	struct incise_error err = {0};
 	bool real;
 
-	take_calibration(job);
 	if (haptic->mode != HAPTIC_LOOP)
 		haptic->argument.arith = "fixed";
 	haptic->scene = scene_argument_load(&haptic->argument);
@@ -245,14 +239,16 @@ static void set_up(struct haptic_job *job)
 		haptic->loop.rate_hz = fmin(haptic->loop.rate_hz, LOOKS_HZ);
 	haptic->loop.duration_ns = (int64_t)(job->duration * INCISE_NS_PER_S);
 	haptic->scheduling = "simulated time";
+	real = has_real_clock(spec);
 	if (haptic->mode == HAPTIC_WATCH) {
+		take_calibration(job, NULL);
 		watch(job);
 		return;
 	}
-	real = has_real_clock(spec);
 	if (real)
 		enter_real_time(job);
 	haptic->rig = cli_open_rig(spec, INCISE_RIG_TRACKER | INCISE_RIG_STEPPER);
+	take_calibration(job, spec);
 	test_scene(haptic);
 	haptic->plan = cli_require(haptic_plan(haptic, haptic->scene, &err), &err);
 	if (haptic->mode == HAPTIC_FEED &&
@@ -488,7 +484,7 @@ static void report_json(const struct haptic *haptic)
 		json_array_append_new(stages,
 				      json_string(incise_plan_stage(haptic->plan, i)));
 	json_print(json_pack(
-		"{sI sI sI sf so so sI sI sI sI so so sf so so so so so ss so so so so}",
+		"{sI sI sI sf so so sI sI sI sI so so sf so so so so so ss so so so so so}",
 		"ticks", (json_int_t)s->ticks, "skipped", (json_int_t)s->skipped,
 		"overruns", (json_int_t)s->overruns, "rate_hz", haptic->loop.rate_hz,
 		"lateness_us", real ? loop_lateness_json(s) : json_null(), "tick_ns",
@@ -505,7 +501,8 @@ static void report_json(const struct haptic *haptic)
 		"scheduling", haptic->scheduling, "thread", counts_json(&haptic->counts),
 		"stages", stages, "stopped_by",
 		cli_stop ? json_string(strsignal(cli_stop)) : json_null(), "kernel",
-		kernel_json(haptic)));
+		kernel_json(haptic), "calibration",
+		calibration_json(&haptic->calibration)));
 }
 
 /* Directions that can be felt, and the part of the force that cannot. */
@@ -535,7 +532,7 @@ static void report_text(const struct haptic *haptic)
 	       haptic->scheduling);
 	for (int i = 0; incise_plan_stage(haptic->plan, i); i++)
 		printf(" %s", incise_plan_stage(haptic->plan, i));
-	putchar('\n');
+	printf("\ncalibration %s\n", calibration_text(&haptic->calibration));
 	/* In simulated time a tick takes no time and is never late. */
 	if (is_real(haptic)) {
 		loop_lateness_line(s);

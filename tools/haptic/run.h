@@ -25,13 +25,7 @@ struct haptic_job {
 };
 
 /* Rows of the tables of options that both commands have. */
-#define HAPTIC_TIP_OPTION                                                                     \
-	{                                                                                     \
-		'c', "calibration", "FILE",                                                   \
-			"calibration.conf with the position of the tip (default: where the\n" \
-			"tracker reports it)",                                                \
-			CLI_INPUT(struct haptic_job, calibration)                             \
-	}
+#define HAPTIC_TIP_OPTION CALIBRATION_OPTION(struct haptic_job, calibration)
 #define HAPTIC_HOLD_OPTIONS                                                       \
 	{0, "duration", "TIME",                                                   \
 	 "stop after this time, for example 10s (default: at Ctrl-C)",            \

@@ -225,7 +225,7 @@ struct incise_plan *haptic_plan(const struct haptic *haptic,
 
 	if (plan) {
 		incise_plan_set_tool(plan, haptic->tool);
-		incise_plan_set_tip(plan, haptic->tip_mm);
+		incise_plan_set_tip(plan, haptic->calibration.values.tip_mm);
 	}
 	return plan;
 }

@@ -152,7 +152,7 @@ static bool compare_name(struct vouch *vouch, const char *name,
 /* The text says all: the first line that differs does where. */
 static void compare_join(struct vouch *vouch, const struct seal_file *file)
 {
-	static const char first[] = "incise join statement 1\n";
+	static const char first[] = "incise statement 1 of a join\n";
 	struct vouch_statement *s = &vouch->statements[vouch->n_statements++];
 	struct comparison comparison = {NULL, s};
 	const char *then = file->bytes, *now = vouch->join, *member = "";

@@ -89,7 +89,7 @@ INCISE_API int incise_session_members(const struct incise_recording *recording,
  * aligned, and the maps of the clocks with their bounds. With the members' own statements
  * (incise/seal.h) it says all that is read of the recording. Its text is
  *
- *     incise join statement 1
+ *     incise statement 1 of a join
  *     member a                              for each member
  *     identity 0123456789abcdef0123456789abcdef
  *     commit 97 1234567890 0123…            number, t_ns, head

@@ -80,7 +80,7 @@ char *incise_session_statement(const struct incise_recording *recording,
 		rc = incise_error_set(err, EINVAL, "%s: is no joined recording",
 				      recording->path);
 	if (!rc)
-		fputs("incise join statement 1\n", out);
+		fputs("incise statement 1 of a join\n", out);
 	for (int i = 0; !rc && i < session->n; i++)
 		rc = write_member(out, session, i, err);
 	if (!rc)

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * The calibration that a command uses; see calibration.h.
+ */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "calibration.h"
+#include "file_kind.h"
+#include "json.h"
+
+const char *calibration_default(void)
+{
+	static const char *const places[] = {"calibration.conf",
+					     "/etc/incise/calibration.conf", NULL};
+	const char *const *place = places;
+
+	while (*place && access(*place, F_OK))
+		place++;
+	return *place;
+}
+
+void calibration_use(struct calibration_used *used, const char *given, const char *rig)
+{
+	struct incise_calibration_record *records = NULL;
+	struct incise_error err = {0};
+	int n;
+
+	*used = (struct calibration_used){.path = given ? given : calibration_default()};
+	incise_calibration_nominal(&used->values);
+	if (used->path && !strcmp(used->path, "none"))
+		used->path = NULL;
+	if (!used->path) {
+		if (rig && !given && strncmp(rig, "sim:", 4))
+			cli_warn("nominal values: not calibrated; 'incise calibrate' "
+				 "makes calibration.conf, and -c none accepts them");
+		return;
+	}
+	cli_input(used->path);
+	file_expect(used->path, FILE_CALIBRATION);
+	if (incise_calibration_load(used->path, &used->values, &err))
+		cli_fail_with(&err);
+	n = incise_calibration_history(used->path, &records, &err);
+	if (n > 0)
+		snprintf(used->date, sizeof(used->date), "%s", records[n - 1].date);
+	free(records);
+}
+
+const char *calibration_text(const struct calibration_used *used)
+{
+	static char text[400];
+
+	if (!used->path)
+		return "nominal values";
+	snprintf(text, sizeof(text), "%.300s%s%.10s", used->path,
+		 *used->date ? " of " : "", used->date);
+	return text;
+}
+
+json_t *calibration_json(const struct calibration_used *used)
+{
+	if (!used->path)
+		return json_null();
+	return json_pack("{so so}", "path", json_text(used->path), "date",
+			 *used->date ? json_string(used->date) : json_null());
+}
