@@ -300,9 +300,9 @@ static void note_paths(const struct cli_command *command, enum cli_kind kind,
 /* "none", and what calibrations write, need not be there. */
 static bool is_new_calibration(const struct cli_command *command, const char *path)
 {
-	return !strcmp(path, "none") || (!strncmp(command->name, "calibrate ", 10) &&
-					 strcmp(command->name, "calibrate check") != 0 &&
-					 access(path, F_OK));
+	return !strcmp(path, "none") ||
+	       (!strncmp(command->name, "calibrate ", 10) &&
+		strcmp(command->name, "calibrate check") != 0 && access(path, F_OK));
 }
 
 /* The kind of file that an option names, which is the same in all commands. */
