@@ -130,7 +130,8 @@ int64_t ask(const struct round *round, const char *sql)
 	int64_t value = -1;
 	sqlite3 *db;
 
-	if (sqlite3_open_v2(recording(), &db, SQLITE_OPEN_READONLY, NULL) != SQLITE_OK ||
+	/* After incise has read it: SQLite takes back a journal where it is. */
+	if (sqlite3_open_v2(recording(), &db, SQLITE_OPEN_READWRITE, NULL) != SQLITE_OK ||
 	    sqlite3_prepare_v2(db, sql, -1, &stmt, NULL) != SQLITE_OK)
 		fail(round, "%s: %s", sql, sqlite3_errmsg(db));
 	if (sqlite3_step(stmt) == SQLITE_ROW &&

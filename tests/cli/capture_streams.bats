@@ -88,7 +88,7 @@ END
 	[ "$(ask a.rec "SELECT value FROM meta WHERE key = 'force_mV_N'")" = 1250.0 ]
 	[ "$(ask a.rec "SELECT value FROM meta WHERE key = 'force_zero_mV'")" = 180.0 ]
 	incise verify a.rec
-	incise capture -o b.rec --rig sim:clock=simulated --duration 600ms
+	incise capture -o b.rec --rig sim:clock=simulated --duration 600ms -c none
 	[ "$(ask b.rec "SELECT count(*) FROM meta WHERE key = 'calibration_conf'")" = 0 ]
 	run --separate-stderr incise capture -o c.rec --rig $quick --calibration none.conf
 	failed_with none.conf
@@ -236,7 +236,7 @@ views_fit() {
 @test "delays of calibration move the times" {
 	printf 'tracker_delay_ms = 14.2;\ntracker_delay_sd_ms = 0.3;\nforce_delay_ms = 1.0;\n' \
 		>calibration.conf
-	incise capture -o a.rec --rig $quick --duration 3s
+	incise capture -o a.rec --rig $quick --duration 3s -c none
 	incise capture -o b.rec --rig $quick --duration 3s -c calibration.conf --json >b.json
 	# 4.2 ms is what the virtual tracker says of itself
 	[ "$(sqlite3 :memory: "ATTACH 'a.rec/recording.db' AS a; ATTACH 'b.rec/recording.db' AS b;

@@ -187,6 +187,34 @@ ask() {
 	[[ "$stderr" == *"has a nominal rate of 0 Hz; expected 1 to 100000 Hz (a regular stream)" ]]
 }
 
+@test "an LSL stream that falls silent, or whose times are wrong, is not complete" {
+	lsl
+	# silent after 1.5 s of 4: what is missing is lost, though no sample comes that shows it
+	send lsl_send "$name" --wait --pause 1500
+	run -1 --separate-stderr incise capture -o a.rec --only force --duration 4s
+	[[ "$stderr" == *"force samples were lost"* ]] || complain "$stderr"
+	holds "$(ask "SELECT value FROM meta WHERE key = 'force_lost'") > 1000"
+	[ "$(ask "SELECT count(*) FROM events WHERE kind = 'lost' AND text LIKE '%silent for the last%'")" = 1 ]
+	no_more
+	send lsl_send "$name" --wait --offset 1790000000
+	run -1 --separate-stderr incise capture -o b.rec --only force --duration 60s
+	[[ "$stderr" == *"its timestamps are 1.79e+09 s ahead of LSL's clock; "* ]] || complain "$stderr"
+	no_more
+	send lsl_send "$name" --wait --times 2
+	run -1 --separate-stderr incise capture -o c.rec --only force --duration 60s
+	[[ "$stderr" == *"it sends each sample more than once; "* ]] || complain "$stderr"
+	no_more
+	# one in a hundred is stamped 5 s back: it gets the time of its place
+	send lsl_send "$name" --wait --back 100
+	begin_capture d
+	until_rows force 3000
+	kill -INT $capture
+	wait $capture || true
+	[ "$(sqlite3 d.rec/recording.db "SELECT count(*) FROM events WHERE kind = 'lost' AND text LIKE '%number%'")" -lt 20 ]
+	holds "$(sqlite3 d.rec/recording.db "SELECT value FROM meta WHERE key = 'force_lost'") < 3000"
+	holds "$(sqlite3 d.rec/recording.db "SELECT max(t_ns) - min(t_ns) FROM force") < 1e9 * $(sqlite3 d.rec/recording.db "SELECT count(*) FROM force") / 500"
+}
+
 @test "an LSL stream whose program starts again goes on, and the hole is counted" {
 	lsl
 	send lsl_send "$name" --recover

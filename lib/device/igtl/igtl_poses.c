@@ -12,6 +12,7 @@
 
 #define BODY_MAX 65536 /* of a TDATA of 900 instruments; images are passed over */
 #define CAPACITY 4096  /* of the ring: 4 s at 1 kHz */
+#define ALTERNATE_MM 5 /* a step that a tool makes at hardly any pose */
 #define LIMIT_MM 1e6
 /* Of products of columns: a sender may print three digits; a scale of 1 % is an error. */
 #define ORTHONORMAL 2e-3
@@ -169,6 +170,30 @@ static bool quaternion_of(const double m[3][4], double q[4])
 	return true;
 }
 
+static void note_pose(struct igtl_poses *poses, const double (*matrix)[4])
+{
+	double *before = poses->before_mm[0], *before2 = poses->before_mm[1];
+	double step2 = 0, step = 0;
+
+	for (int i = 0; i < 3; i++) {
+		step += pow(matrix[i][3] - before[i], 2);
+		step2 += pow(matrix[i][3] - before2[i], 2);
+		before2[i] = before[i];
+		before[i] = matrix[i][3];
+	}
+	if (poses->n >= 2) {
+		poses->step_mm += sqrt(step);
+		poses->step2_mm += sqrt(step2);
+	}
+	memcpy(poses->matrix, matrix, sizeof(poses->matrix));
+}
+
+bool igtl_poses_alternate(const struct igtl_poses *poses)
+{
+	return poses->n > 10 && poses->step_mm > ALTERNATE_MM * (double)poses->n &&
+	       poses->step2_mm < poses->step_mm / 5;
+}
+
 /* @matrix NULL: it is not finite. @seen: the sender does not flag it. */
 static void take(struct igtl_poses *poses, const double (*matrix)[4], bool seen,
 		 int64_t stamp_ns, int64_t t_ns)
@@ -177,10 +202,15 @@ static void take(struct igtl_poses *poses, const double (*matrix)[4], bool seen,
 		.t_ns = t_ns, .status = INVALID, .station = 1, .quaternion = {1}};
 	double offset[3];
 
-	/* The same timestamp is the same pose, sent again. */
-	if (stamp_ns && stamp_ns == poses->stamp_ns)
-		return;
-	if (stamp_ns)
+	/* The same pose with the same timestamp is sent again; another one has a clock of coarse steps. */
+	if (stamp_ns && stamp_ns == poses->stamp_ns) {
+		if (!matrix || !memcmp(matrix, poses->matrix, sizeof(poses->matrix)))
+			return;
+		poses->coarse = true;
+	}
+	if (matrix)
+		note_pose(poses, matrix);
+	if (stamp_ns && !poses->coarse)
 		sample.t_ns = map(poses, stamp_ns, t_ns);
 	poses->stamp_ns = stamp_ns;
 	if (poses->n && sample.t_ns <= poses->last_ns)
@@ -284,7 +314,9 @@ int igtl_poses_put(struct igtl_poses *poses, const uint8_t *bytes, size_t n, int
 			return found;
 		if (found == 1) {
 			take_message(poses, &message, t_ns);
-		} else if (found == -EBADMSG && poses->counts) {
+		} else if (found == -EBADMSG && !poses->counts) {
+			poses->damaged++;
+		} else if (found == -EBADMSG) {
 			/* A damaged message may have been a pose. */
 			incise_pace_skip(&poses->pace);
 			lose(poses, 1);

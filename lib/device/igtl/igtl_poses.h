@@ -49,6 +49,11 @@ struct igtl_poses {
 	/* Timestamps: of the last pose; arrival less timestamp, least of two windows of 5 s. */
 	int64_t stamp_ns, window_ns, least_ns[2];
 	bool is_mapped;
+	double matrix[3][4]; /* of the last pose */
+	bool coarse; /* other poses came with an equal timestamp: arrivals are used */
+	uint64_t damaged; /* messages with a wrong CRC before igtl_poses_start() */
+	/* Steps of the poses to the one before, and to that before it. */
+	double before_mm[2][3], step_mm, step2_mm;
 	struct tracker_repeat repeat;
 };
 
@@ -59,6 +64,9 @@ void igtl_poses_free(struct igtl_poses *poses);
 
 /* Poses per second of those so far; 0: there are too few, or the device of "" is not clear. */
 double igtl_poses_hz(const struct igtl_poses *poses);
+
+/* Whether the poses so far go to and fro between two places, as those of two senders of one name do. */
+bool igtl_poses_alternate(const struct igtl_poses *poses);
 
 /* Forget the samples so far, number from 0, and count losses from here, at @rate_hz. */
 void igtl_poses_start(struct igtl_poses *poses, double rate_hz);

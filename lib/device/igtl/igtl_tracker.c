@@ -317,6 +317,12 @@ static int no_poses(const struct igtl_tracker *t, const char *where,
 		snprintf(list + strlen(list), sizeof(list) - strlen(list), "%s%s",
 			 i ? ", " : "",
 			 *poses->names[i] ? poses->names[i] : "one without a name");
+	if (!poses->messages && poses->damaged)
+		return incise_error_set(
+			err, EBADMSG,
+			"%s: the messages of the server at %.100s port %s have a wrong "
+			"checksum (CRC-64); use another version of it",
+			where, t->host, t->port);
 	if (!poses->messages)
 		return incise_error_set(
 			err, EIO,
@@ -343,6 +349,16 @@ static int no_poses(const struct igtl_tracker *t, const char *where,
 		*list ? list : "no device");
 }
 
+static int two_senders(const struct igtl_tracker *t, const char *where,
+		       struct incise_error *err)
+{
+	return incise_error_set(
+		err, EINVAL,
+		"%s: the poses \"%s\" of the server at %.100s port %s go to and fro "
+		"between two places, as of two senders; give each its own name",
+		where, t->poses.device, t->host, t->port);
+}
+
 /* Receive until the rate is known. */
 static int learn(struct igtl_tracker *t, const char *where, struct incise_error *err)
 {
@@ -356,7 +372,9 @@ static int learn(struct igtl_tracker *t, const char *where, struct incise_error 
 		if (hz >= RATE_LEAST && hz <= RATE_MOST &&
 		    (double)(t->poses.last_ns - t->poses.first_ns) >= LEARN_NS) {
 			t->rate_hz = hz;
-			return 0;
+			return igtl_poses_alternate(&t->poses)
+				       ? two_senders(t, where, err)
+				       : 0;
 		}
 	}
 	if (rc == -EPROTO)
@@ -397,8 +415,12 @@ static int begin(struct igtl_tracker *t, const struct incise_backend_request *re
 	if (rc)
 		return rc;
 	igtl_poses_start(&t->poses, t->rate_hz);
-	snprintf(t->name, sizeof(t->name), "OpenIGTLink %s at %.24s", t->poses.device,
-		 t->host);
+	if (t->poses.coarse)
+		snprintf(t->name, sizeof(t->name), "OpenIGTLink %.20s, times of arrival",
+			 t->poses.device);
+	else
+		snprintf(t->name, sizeof(t->name), "OpenIGTLink %s at %.24s",
+			 t->poses.device, t->host);
 	rc = incise_thread_start(&t->thread, run, t, &real_time);
 	t->runs = !rc;
 	return rc ? incise_error_set(err, -rc,

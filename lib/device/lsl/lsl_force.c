@@ -34,6 +34,9 @@
 #define STREAMS_MAX 64
 #define OLD_S (QUEUE_S + 5.0) /* in the queue here, and some in the sender's */
 #define AHEAD_S 0.5	      /* a correction that is off by more is none */
+#define BACK_NS 250e6	      /* no clock is set back by less */
+#define STRAYS 8   /* samples in a row of another time, after which it is the right one */
+#define DOUBTS 100 /* samples after which a sender is wrong, not one sample */
 
 /* Units in which a force comes; the range is ± half of 2^BITS steps. */
 static const struct unit {
@@ -58,7 +61,13 @@ struct lsl_force {
 	struct incise_pace pace;
 	int n_channels, channel;
 	const struct unit *unit;
-	double step; /* N or V per code */
+	double step;	 /* N or V per code */
+	int64_t last_ns; /* of the last sample; 0: none */
+	double last_value;
+	int strays;
+	/* Samples that were taken; of no time in the queue, and how far that was off; of an equal time. */
+	uint64_t taken, timeless, equal, repeated;
+	double off_s;
 	double correction_s;
 	double values[CHUNK], times[CHUNK];
 };
@@ -81,17 +90,51 @@ static void take(struct lsl_force *f, double value, double stamp_s, int64_t now_
 
 	/* No time that a sample in the queue can have: it is lost, as is a force that is no number. */
 	if (!(t_s >= 0 && t_s > now_s - OLD_S && t_s < now_s + AHEAD_S)) {
+		f->timeless++;
+		f->off_s = t_s - now_s;
 		incise_pace_skip(&f->pace);
 		daq_feed_lose(&f->feed, 1);
 		return;
 	}
 	t_ns = (int64_t)(t_s * 1e9);
+	/* A single time that runs back is wrong, and a regular stream has one to put in its place. */
+	if (f->taken && (double)(f->last_ns - t_ns) > BACK_NS && f->strays++ < STRAYS)
+		t_ns = f->last_ns + llround(f->pace.period_ns);
+	else
+		f->strays = 0;
+	if (f->taken && t_ns == f->last_ns) {
+		f->equal++;
+		f->repeated += value == f->last_value;
+	}
+	f->taken++;
+	f->last_ns = t_ns;
+	f->last_value = value;
 	missing = incise_pace_add(&f->pace, t_ns);
 	daq_feed_lose(&f->feed, missing);
 	if (isfinite(value))
 		daq_feed_put(&f->feed, t_ns, code_of(f, value));
 	else
 		daq_feed_lose(&f->feed, 1);
+}
+
+/* What is wrong with most samples, which no loss would say; NULL: nothing. */
+static const char *doubt(struct lsl_force *f, char text[200])
+{
+	if (f->timeless >= DOUBTS && !f->taken)
+		snprintf(text, 200,
+			 "its timestamps are %.9g s %s LSL's clock; let the sender stamp "
+			 "samples by local_clock()",
+			 fabs(f->off_s), f->off_s > 0 ? "ahead of" : "behind");
+	else if (f->equal < DOUBTS || f->equal < f->taken / 3)
+		return NULL;
+	else if (f->repeated == f->equal)
+		snprintf(text, 200,
+			 "it sends each sample more than once; mend the sender");
+	else
+		snprintf(text, 200,
+			 "many samples in a row have one timestamp; let the sender stamp "
+			 "samples by local_clock()");
+	return text;
 }
 
 /* Samples taken, or a negative error of liblsl. */
@@ -130,10 +173,12 @@ static void *run(void *argument)
 {
 	struct lsl_force *f = argument;
 	int64_t last_ns = incise_clock_now(f->clock), corrected_ns = last_ns;
+	const char *wrong = NULL;
 	double uncertainty_s;
+	char text[200];
 	int error = 0; /* of liblsl, or LSL_TIMEOUT: nothing comes */
 
-	while (!error && daq_feed_wait(&f->feed, -1, PULL_MS) != DAQ_STOP) {
+	while (!error && !wrong && daq_feed_wait(&f->feed, -1, PULL_MS) != DAQ_STOP) {
 		int64_t now_ns = incise_clock_now(f->clock);
 		int got;
 
@@ -142,6 +187,7 @@ static void *run(void *argument)
 			corrected_ns = now_ns;
 		}
 		got = pull(f, now_ns);
+		wrong = doubt(f, text);
 		if (got > 0)
 			last_ns = now_ns;
 		else if (got < 0)
@@ -150,8 +196,9 @@ static void *run(void *argument)
 			error = LSL_TIMEOUT;
 	}
 	daq_feed_end(
-		&f->feed, error ? -EIO : 0,
-		error == LSL_TIMEOUT
+		&f->feed, error || wrong ? -EIO : 0,
+		wrong ? wrong
+		: error == LSL_TIMEOUT
 			? "no more samples arrived; see the program that sends them, "
 			  "and start again"
 			: "the stream ended; start its program, and start again");

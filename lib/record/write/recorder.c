@@ -568,6 +568,8 @@ int incise_recorder_poll(struct incise_recorder *rec, struct incise_error *err)
 	if (rec->failed)
 		return incise_error_set(err, -rec->failed, "%s: has failed before",
 					rec->path);
+	if (!rec->began_ns)
+		rec->began_ns = now;
 	rc = read_force(rec, err);
 	if (!rc)
 		rc = read_tracker(rec, err);
@@ -629,6 +631,8 @@ int incise_recorder_end(struct incise_recorder *rec, struct incise_error *err)
 		return 0;
 	rec->ended = true;
 	rc = end_camera(rec, err);
+	if (!rc && !rec->stats.armed)
+		rc = incise_recorder_find_silence(rec, err);
 	/* A recording that is too short for the zero uses the samples that it has. */
 	if (!rc && isnan(rec->stats.zero_mV) && rec->streams[INCISE_LEDGER_FORCE].started)
 		rc = incise_recorder_settle_zero(rec, err);

@@ -51,13 +51,15 @@ struct incise_recorder_stream {
 	struct incise_ledger ledger;
 	uint64_t rows;
 	bool started;
-	int64_t first_ns;
+	int64_t first_ns; /* of all samples */
+	int64_t first_row_ns;
 	uint64_t next;		/* sequence number expected */
 	uint64_t gaps;		/* samples missing by the numbers */
 	uint64_t gaps_held;	/* of them, from before the trigger */
 	uint64_t lost_at_start; /* by the device, before this recording */
 	uint64_t device_lost;	/* since then */
-	char ended[200];	/* cause of the end; empty: it has not ended */
+	uint64_t silent; /* samples that did not come at the start and at the end */
+	char ended[200]; /* cause of the end; empty: it has not ended */
 };
 
 /* Windows of the tracker's records, by which its rate is compared with what it says. */
@@ -155,6 +157,7 @@ struct incise_recorder {
 	int64_t commit_ns;		 /* all that was read until then is committed */
 	int64_t polled_ns;		 /* last poll */
 	int64_t started_ns;		 /* its streams, by the rig's clock */
+	int64_t began_ns;		 /* its rows: first poll, or before the trigger */
 	int64_t takes_ns;		 /* a commit, lately at most */
 	int commits;
 	bool ended;	     /* reads no more samples */
@@ -174,6 +177,12 @@ void incise_recorder_start_streams(struct incise_recorder *rec);
 
 /* Losses by the numbers, or by the device's own count, which includes the last ones. */
 uint64_t incise_recorder_lost(const struct incise_recorder *rec, int stream);
+
+/*
+ * Losses that no later sample shows: of force and tracker, where the recording is longer than their
+ * rows by more than they may be apart. Returns 0 or a disk error.
+ */
+int incise_recorder_find_silence(struct incise_recorder *rec, struct incise_error *err);
 
 /* Returns the number of streams. */
 int incise_recorder_describe_streams(const struct incise_recorder *rec,

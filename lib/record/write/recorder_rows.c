@@ -30,6 +30,9 @@
 #define ZERO_PATIENCE_NS (2 * ZERO_NS)
 /* The noise of the channel is some mN; a touch is tenths of N. */
 #define ZERO_SD_MAX_N 0.03
+/* Longer than devices and networks hold samples back. */
+#define SILENT_NS 250000000LL
+#define SILENT_PERIODS 4
 
 /* --- streams ------------------------------------------------------------------------- */
 
@@ -130,8 +133,57 @@ uint64_t incise_recorder_lost(const struct incise_recorder *rec, int i)
 	const struct incise_recorder_stream *stream = &rec->streams[i];
 	uint64_t since = stream->gaps - stream->gaps_held;
 
-	return stream->gaps_held +
+	return stream->gaps_held + stream->silent +
 	       (since > stream->device_lost ? since : stream->device_lost);
+}
+
+/* Samples that are missing in @silent_ns at an end of a stream; more of a hole than a device makes. */
+static uint64_t missing_in(int64_t silent_ns, double rate_hz)
+{
+	const double periods = (double)silent_ns * 1e-9 * rate_hz;
+
+	return silent_ns > SILENT_NS && periods > SILENT_PERIODS
+		       ? (uint64_t)llround(periods) - 1
+		       : 0;
+}
+
+int incise_recorder_find_silence(struct incise_recorder *rec, struct incise_error *err)
+{
+	const struct incise_tracker_info *tracker = &rec->tracker_info;
+	/* Pulses from outside may pause; a sender over a network has a rate. */
+	const double rates_hz[] = {
+		[INCISE_LEDGER_FORCE] = rec->force_info.rate_hz,
+		[INCISE_LEDGER_TRACKER] = tracker->external_sync && !tracker->network
+						  ? 0
+						  : tracker->rate_hz,
+	};
+	int rc = SQLITE_OK;
+
+	for (int i = INCISE_LEDGER_FORCE; i <= INCISE_LEDGER_TRACKER; i++) {
+		struct incise_recorder_stream *stream = &rec->streams[i];
+		uint64_t since = stream->gaps - stream->gaps_held, counted, late, early;
+
+		if (!stream->rows || *stream->ended || !rec->began_ns)
+			continue;
+		/* Of those at the end the device may have counted some. */
+		counted = stream->device_lost > since ? stream->device_lost - since : 0;
+		late = missing_in(stream->first_row_ns - rec->began_ns, rates_hz[i]);
+		early = missing_in(rec->polled_ns - stream->ledger.last_ns, rates_hz[i]);
+		if (late)
+			rc |= incise_recorder_note_at(
+				rec, stream->first_row_ns, "lost",
+				"%s: %llu samples: it began %.3f s after the recording",
+				stream->device, (unsigned long long)late,
+				(double)(stream->first_row_ns - rec->began_ns) * 1e-9);
+		if (early)
+			rc |= incise_recorder_note(
+				rec, "lost",
+				"%s: %llu samples: it was silent for the last %.3f s",
+				stream->device, (unsigned long long)early,
+				(double)(rec->polled_ns - stream->ledger.last_ns) * 1e-9);
+		stream->silent = late + (early > counted ? early - counted : 0);
+	}
+	return rc == SQLITE_OK ? 0 : incise_recorder_fail(rec, err);
 }
 
 static void describe(const struct incise_recorder *rec, int i, struct incise_stream *out)
@@ -313,6 +365,8 @@ static int enter(struct incise_recorder *rec, struct incise_recorder_stream *str
 	uint64_t missing =
 		stream->rows ? (uint64_t)row->seq - (uint64_t)ledger->last_seq - 1 : 0;
 
+	if (!stream->rows)
+		stream->first_row_ns = row->t_ns;
 	incise_ledger_add(ledger, row);
 	incise_seal_row(&rec->seal, (int)(stream - rec->streams), row);
 	stream->rows++;
@@ -565,6 +619,8 @@ int incise_recorder_release(struct incise_recorder *rec, struct incise_error *er
 
 	rec->stats.armed = false;
 	rec->not_finite = 0;
+	if (from_ns > rec->began_ns)
+		rec->began_ns = from_ns;
 	incise_recorder_count_losses(rec);
 	if (incise_recorder_note(rec, "trigger",
 				 "triggered; the recording starts 1 s "

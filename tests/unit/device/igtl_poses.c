@@ -161,6 +161,50 @@ TEST(timestamps_lead_to_times_here, begin, end)
 	}
 }
 
+/* Other poses with an equal timestamp are other poses, of a clock with coarse steps: 1 s, 0.1 s, none. */
+TEST(coarse_timestamps_lose_no_pose, begin, end)
+{
+	static const int64_t steps_ns[] = {SECOND, SECOND / 10, 1000 * SECOND};
+
+	for (size_t k = 0; k < 3; k++) {
+		struct incise_tracker_sample s = {0};
+		int n = 0;
+
+		for (int i = 0; i < 240; i++) {
+			int64_t t_ns = 100 * SECOND + i * SECOND / 60;
+			int64_t utc_ns = UTC0 + t_ns / steps_ns[k] * steps_ns[k];
+
+			turn(i * 0.01, m, q);
+			assert_int_equal(put("Tip", m, utc_ns, t_ns, false), 0);
+			/* sent again: the same pose at the same time */
+			assert_int_equal(put("Tip", m, utc_ns, t_ns + 9, false), 0);
+			for (; incise_ring_take(&poses.ring, &s, 1) == 1; n++)
+				assert_true(i < 30 || llabs(s.t_ns - t_ns) < 10);
+		}
+		assert_int_equal(n, 240);
+		assert_true(poses.coarse);
+		igtl_poses_free(&poses);
+		begin(NULL);
+	}
+}
+
+/* Two senders of one name are seen; a tool that moves as fast as one can is not two. */
+TEST(two_senders_are_seen, begin, end)
+{
+	for (int two = 0; two < 2; two++) {
+		for (int i = 0; i < 60; i++) {
+			int64_t t_ns = 100 * SECOND + i * SECOND / 60;
+
+			turn(0, m, q);
+			m[0][3] = two && i % 2 ? 499 + 0.1 * i : 80 * sin(0.8 * i * !two);
+			assert_int_equal(put("Tip", m, UTC0 + t_ns, t_ns, false), 0);
+		}
+		assert_int_equal(igtl_poses_alternate(&poses), two);
+		igtl_poses_free(&poses);
+		begin(NULL);
+	}
+}
+
 TEST(losses_are_counted, begin, end)
 {
 	struct incise_tracker_sample s = {0};

@@ -5,6 +5,7 @@
  */
 #include "../unit.h"
 #include <incise/verify.h>
+#include "../../../lib/base/random.h"
 #include "recorded.h"
 #include <signal.h>
 #include <sys/prctl.h>
@@ -658,6 +659,76 @@ TEST(losses_are_counted_and_doubts_kept, IN_FOLDER)
 	assert_int_equal((int)ask(DB, "SELECT count(*) FROM depth WHERE seq IN (50, 60)"),
 			 0);
 	incise_rig_close(rig);
+}
+
+/* Samples before and after these times do not come; of both devices. */
+static int64_t comes_ns, goes_ns;
+
+static int for_a_while(struct incise_force_sample *samples, int n)
+{
+	int kept = 0;
+
+	for (int i = 0; i < n; i++)
+		if (samples[i].t_ns >= comes_ns && samples[i].t_ns < goes_ns)
+			samples[kept++] = samples[i];
+	return kept;
+}
+
+static int poses_for_a_while(struct incise_tracker_sample *samples, int n)
+{
+	int kept = 0;
+
+	for (int i = 0; i < n; i++)
+		if (samples[i].t_ns >= comes_ns && samples[i].t_ns < goes_ns)
+			samples[kept++] = samples[i];
+	return kept;
+}
+
+/* What no later sample shows: a device that begins late, or is silent before the end. */
+TEST(silence_at_the_ends_is_lost, IN_FOLDER)
+{
+	uint64_t random = 20261128;
+
+	for (int i = 0; i < 24; i++) {
+		struct incise_rig *rig = faulty_rig();
+		struct incise_recorder *rec = start_recorder("a.rec", rig);
+		int64_t start_ns = incise_clock_now(incise_rig_clock(rig));
+		int64_t late_ns = (int64_t)(incise_random_next(&random) % (600 * MS));
+		int64_t early_ns = (int64_t)(incise_random_next(&random) % (900 * MS));
+		double missing_s = (late_ns > 270 * MS ? late_ns : 0) * 1e-9 +
+				   (early_ns > 270 * MS ? early_ns : 0) * 1e-9;
+		bool clear = llabs(late_ns - 250 * MS) > 20 * MS &&
+			     llabs(early_ns - 250 * MS) > 20 * MS;
+		const uint64_t force = (uint64_t)(missing_s * 10000),
+			       poses = (uint64_t)(missing_s * 120);
+
+		force_fault = for_a_while;
+		tracker_fault = poses_for_a_while;
+		comes_ns = start_ns + late_ns;
+		goes_ns = start_ns + 2200 * MS - early_ns;
+		assert_int_equal(poll_for(rec, rig, 2200 * MS, &err), 0);
+		succeeds(!incise_recorder_end(rec, &err));
+		incise_recorder_stats(rec, &stats);
+		assert_int_equal(incise_recorder_close(rec, &err), 0);
+		incise_rig_close(rig);
+		/* polls are 10 ms apart, and a pose is underway for 4 */
+		if (clear &&
+		    (stats.force_lost + 210 < force || stats.force_lost > force + 210 ||
+		     stats.tracker_lost + 4 < poses || stats.tracker_lost > poses + 4))
+			fail_msg("late %lld, early %lld ms: %llu and %llu lost, not %llu "
+				 "and %llu",
+				 (long long)(late_ns / MS), (long long)(early_ns / MS),
+				 (unsigned long long)stats.force_lost,
+				 (unsigned long long)stats.tracker_lost,
+				 (unsigned long long)force, (unsigned long long)poses);
+		assert_int_equal((int)ask(DB, "SELECT value FROM meta WHERE key = "
+					      "'force_lost'"),
+				 (int)stats.force_lost);
+		assert_int_equal((int)ask(DB, "SELECT sum(lost) FROM ledger WHERE stream "
+					      "= 'force'"),
+				 (int)stats.force_lost);
+		assert_int_equal(system("rm -r a.rec"), 0);
+	}
 }
 
 /* --- full disk ----------------------------------------------------------------------- */
