@@ -11,6 +11,7 @@
 #include <incise/infile.h>
 #include "c_locale.h"
 #include "text.h"
+#include "utf8.h"
 
 int text_open(struct text *text, const char *path, struct incise_error *err)
 {
@@ -25,7 +26,7 @@ int text_open(struct text *text, const char *path, struct incise_error *err)
 	text->data = incise_infile_read(path, &mesh, &size, err);
 	if (!text->data)
 		return -errno;
-	text->at = text->data;
+	text->at = text->data + utf8_mark(text->data);
 	text->end = text->data + size;
 	return 0;
 }

@@ -85,12 +85,8 @@ static int next_row(struct reader *in)
 	int rc;
 
 	while ((rc = incise_lines_next(&in->lines, "\r\n")) > 0) {
-		char *c = in->lines.text;
-
-		if (in->lines.line == 1 && !strncmp(c, "\xef\xbb\xbf", 3))
-			c += 3;
-		if (*c && *c != '#')
-			return split_row(in, c);
+		if (*in->lines.text && *in->lines.text != '#')
+			return split_row(in, in->lines.text);
 	}
 	return rc;
 }
