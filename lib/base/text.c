@@ -37,12 +37,24 @@ void text_close(struct text *text)
 	text->data = NULL;
 }
 
+/* Bytes of an end of a line with a backslash before it: the line goes on. */
+static size_t hidden_end(const char *at)
+{
+	if (*at != '\\')
+		return 0;
+	return at[1] == '\n' ? 2 : at[1] == '\r' && at[2] == '\n' ? 3 : 0;
+}
+
 size_t text_word(struct text *text, const char **word)
 {
 	const char *at = text->at;
+	size_t hidden;
 
-	while (at < text->end && (*at == ' ' || *at == '\t' || *at == '\r'))
-		at++;
+	while (at < text->end &&
+	       ((hidden = hidden_end(at)) || *at == ' ' || *at == '\t' || *at == '\r')) {
+		text->line += hidden > 0;
+		at += hidden ? hidden : 1;
+	}
 	*word = at;
 	while (at < text->end && *at != ' ' && *at != '\t' && *at != '\r' && *at != '\n')
 		at++;

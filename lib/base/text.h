@@ -22,7 +22,8 @@ int text_open(struct text *text, const char *path, struct incise_error *err);
 void text_close(struct text *text);
 
 /*
- * The next word of the line, up to blank or end of line: its length, 0 at the line's end.
+ * The next word of the line, up to blank or end of line: its length, 0 at the line's end. A line
+ * goes on behind a backslash at its end.
  */
 size_t text_word(struct text *text, const char **word);
 

@@ -6,7 +6,8 @@
  * the ones of the faces.
  *
  * A face refers to what stands before it. One with more corners is cut into a fan from
- * its first corner. A line that ends in a backslash does not go on in the next one.
+ * its first corner. Statements that hold no surface are passed over; those that are not
+ * known, or describe one in another way, are errors.
  */
 #include <errno.h>
 #include <stdlib.h>
@@ -156,13 +157,15 @@ static int read_corner(struct obj *obj, const char *word, size_t length,
 	corner->vt = UV_NONE;
 	if (!rc && at < end && *at == '/') {
 		at++;
-		if (at == end || *at != '/') {
+		/* Some writers leave the slashes of indices that there are not: 1/ and 1//. */
+		if (at < end && *at != '/') {
 			obj->textured = true;
 			rc = read_index(obj, &at, end, "vt", obj->n_vt, &corner->vt);
 		}
 		if (!rc && at < end && *at == '/') {
 			at++;
-			rc = read_index(obj, &at, end, "vn", obj->n_vn, &vn);
+			if (at < end)
+				rc = read_index(obj, &at, end, "vn", obj->n_vn, &vn);
 		}
 	}
 	if (!rc && at != end)
@@ -224,9 +227,16 @@ static int read_face(struct obj *obj)
 
 static int read_line(struct obj *obj)
 {
+	/* Names, materials, display, lines and points. */
+	static const char *const others[] = {
+		"g",   "o",	 "s",	   "mg",       "usemtl",     "mtllib",
+		"lod", "usemap", "maplib", "bevel",    "shadow_obj", "trace_obj",
+		"l",   "p",	 "vp",	   "c_interp", "d_interp"};
 	const char *word;
 	size_t length = text_word(&obj->text, &word);
 
+	if (!length || *word == '#')
+		return 0;
 	if (length == 1 && *word == 'v')
 		return read_point(obj);
 	if (length == 1 && *word == 'f')
@@ -239,7 +249,17 @@ static int read_line(struct obj *obj)
 		obj->n_vn++;
 		return numbers(obj, "vn", 3, 3, value);
 	}
-	return 0;
+	for (size_t i = 0; i < sizeof(others) / sizeof(*others); i++) {
+		if (strlen(others[i]) != length || memcmp(word, others[i], length))
+			continue;
+		while (text_word(&obj->text, &word))
+			;
+		return 0;
+	}
+	return text_error(&obj->text, obj->err,
+			  "'%.*s' is no statement of an OBJ that is read; correct it, or "
+			  "remove the line if it holds no part of the surface",
+			  (int)(length < 40 ? length : 40), word);
 }
 
 /* Texture coordinates of each triangle's corners; 0, 0 where it has none. */

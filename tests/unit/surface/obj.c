@@ -51,6 +51,12 @@ TEST(test_good_files)
 		{"v 0 0 0 1 0 0\nv 1 0 0 1\nv 0 1 0\nvp 1\ng a\nusemtl b\nl 1 2\ns 1\nf 1 "
 		 "2 3\n",
 		 1},
+		/* a mark of the encoding, indices left out, a line that goes on, colours of MRGB */
+		{"\xef\xbb\xbf" TRIANGLE "f 1/ 2// 3//\n", 1},
+		{TRIANGLE "f 1 2 \\\n3\n", 1},
+		{TRIANGLE "f 1 \\\r\n \\\r\n2 3\r\n", 1},
+		{TRIANGLE "g a \\\nb\nf 1 2 3\n#MRGB ffff\n", 1},
+		{TRIANGLE "mtllib a b.mtl\no \xc3\xa4\nf 1 2 3", 1},
 		/* two fans that share a point only */
 		{TRIANGLE "v -1 0 0\nv 0 -1 0\nf 1 2 3\nf 1 4 5\n", 2},
 		{"v 0 0 0\nv 1 0 0\nv 0.5 1e-6 0\nf 1 2 3\n", 1},
@@ -98,11 +104,23 @@ TEST(test_bad_files)
 		{TRIANGLE "f 99999999999 1 2\n", 4, "99999999999"},
 		{TRIANGLE "f 1 2 3/1\n", 4, "no vt 1"},
 		{TRIANGLE "f 1 2 3//1\n", 4, "no vn 1"},
-		{TRIANGLE "f 1 2 3/\n", 4, "''"},
 		{TRIANGLE "vt 0 0\nvn 0 0 1\nf 1/1/1/1 2 3\n", 6, "'1/1/1/1'"},
 		{TRIANGLE "f 1 2 three\n", 4, "'three'"},
 		{TRIANGLE "f 1 2 3.0\n", 4, "'3.0'"},
-		{TRIANGLE "f 1 2 \\\n3\n", 4, "'\\'"},
+		{TRIANGLE "f 1 2 \\\n4\n", 5, "no v 4"},
+		{TRIANGLE "f 1 2\\\n3\n", 4, "expected v, v/vt"},
+		/* a statement that is not understood may hold a part of the surface */
+		{TRIANGLE "f\xc2\xa0"
+			  "1 2 3\n",
+		 4,
+		 "'f\xc2\xa0"
+		 "1' is no"},
+		{TRIANGLE "F 1 2 3\n", 4, "'F' is no"},
+		{"V 0 0 0\n", 1, "'V' is no"},
+		{TRIANGLE "f 1 2 3\nfo 1 2 3\n", 5, "'fo' is no"},
+		{TRIANGLE "f 1 2 3\nsurf 0 1 0 1 1 2 3\n", 5, "'surf' is no"},
+		{TRIANGLE "f 1 2 3\ncall b.obj\n", 5, "'call' is no"},
+		{"solid a\n", 1, "'solid' is no"},
 		{TRIANGLE "f 1 2 2\n", 4, "area"},
 		{TRIANGLE "v 2 0 0\nf 1 2 3\nf 1 2 4\n", 6, "area"},
 		{TRIANGLE "v 1 0 0\nf 1 2 4\n", 5, "area"},
