@@ -75,6 +75,14 @@ bool text_next_line(struct text *text)
 	return true;
 }
 
+bool text_next_word(struct text *text, const char **word, size_t *length)
+{
+	while (!(*length = text_word(text, word)))
+		if (!text_next_line(text))
+			return false;
+	return true;
+}
+
 static bool is_digit(char c)
 {
 	return c >= '0' && c <= '9';

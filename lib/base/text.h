@@ -27,6 +27,9 @@ void text_close(struct text *text);
  */
 size_t text_word(struct text *text, const char **word);
 
+/* The same over ends of lines; false at the end of the file. */
+bool text_next_word(struct text *text, const char **word, size_t *length);
+
 /* Go to the next line; false at the end of the file. */
 bool text_next_line(struct text *text);
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Reading a Wavefront OBJ: `v`, `vt` and `f`. A face's corner is v, v/vt, v//vn or
+ * Reading a file of triangles: a Wavefront OBJ, or an STL, text or binary.
+ *
+ * Of an OBJ: `v`, `vt` and `f`. A face's corner is v, v/vt, v//vn or
  * v/vt/vn, counted from 1, or from -1 backwards for the last one before the face. Normals
  * (`vn`) are counted, so that their indices can be checked, and not used: a proxy needs
  * the ones of the faces.
@@ -8,14 +10,24 @@
  * A face refers to what stands before it. One with more corners is cut into a fan from
  * its first corner. Statements that hold no surface are passed over; those that are not
  * known, or describe one in another way, are errors.
+ *
+ * Of an STL: each facet has three corners of its own, which the mesh welds. Those of which
+ * two are the same are no part of the surface. Normals are not used. In messages on a binary
+ * one the number of the facet, from 1, stands for the line.
+ *
+ *     binary   80 bytes │ n, uint32 │ n × (12 floats: normal, 3 corners │ 2 bytes)
  */
+#include <endian.h>
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include "../base/text.h"
 #include "mesh.h"
 
 #define UV_NONE UINT32_MAX
+#define STL_HEAD 84
+#define STL_FACET 50
 #define POINTS_MAX (3 * (size_t)INCISE_SURFACE_TRIANGLES_MAX)
 
 struct index {
@@ -79,13 +91,12 @@ static int numbers(struct obj *obj, const char *what, int least, int most, doubl
 	return 0;
 }
 
-static int read_point(struct obj *obj)
+static int add_point(struct obj *obj, const char *what, const double value[3])
 {
 	struct mesh_draft *draft = &obj->draft;
-	double value[7]; /* some writers add a weight, or a colour */
-	int rc = numbers(obj, "v", 3, 7, value);
+	int rc = 0;
 
-	if (!rc && draft->n_points == POINTS_MAX)
+	if (draft->n_points == POINTS_MAX)
 		rc = too_many(obj, "points", POINTS_MAX);
 	if (!rc)
 		rc = grow(obj, &draft->point, draft->n_points, &obj->capacity_v,
@@ -97,14 +108,22 @@ static int read_point(struct obj *obj)
 
 		if (!(fabs(x) <= MESH_COORDINATE_MAX_MM))
 			return text_error(&obj->text, obj->err,
-					  "v: %g mm is farther than %g mm from the "
+					  "%s: %g mm is farther than %g mm from the "
 					  "origin; check that its unit is mm",
-					  x, MESH_COORDINATE_MAX_MM);
+					  what, x, MESH_COORDINATE_MAX_MM);
 		/* A sum with +0 is never -0, so that equal ones compare equal. */
 		draft->point[draft->n_points][i] = x + 0.0;
 	}
 	draft->n_points++;
 	return 0;
+}
+
+static int read_point(struct obj *obj)
+{
+	double value[7]; /* some writers add a weight, or a colour */
+	int rc = numbers(obj, "v", 3, 7, value);
+
+	return rc ? rc : add_point(obj, "v", value);
 }
 
 static int read_uv(struct obj *obj)
@@ -262,6 +281,124 @@ static int read_line(struct obj *obj)
 			  (int)(length < 40 ? length : 40), word);
 }
 
+static int add_facet(struct obj *obj, double (*value)[3])
+{
+	uint32_t n = (uint32_t)obj->draft.n_points;
+	const struct index corner[3] = {{n, UV_NONE}, {n + 1, UV_NONE}, {n + 2, UV_NONE}};
+	int rc = 0;
+
+	for (int i = 0; i < 3; i++)
+		if (!memcmp(value[i], value[(i + 1) % 3], sizeof(*value)))
+			return 0;
+	for (int i = 0; i < 3 && !rc; i++)
+		rc = add_point(obj, "vertex", value[i]);
+	return rc ? rc : add_triangle(obj, corner);
+}
+
+static uint32_t word_of(const char *bytes)
+{
+	uint32_t word;
+
+	memcpy(&word, bytes, sizeof(word));
+	return le32toh(word);
+}
+
+static int read_binary_stl(struct obj *obj)
+{
+	const char *at = obj->text.data + STL_HEAD;
+	int rc = 0;
+
+	for (obj->text.line = 1; !rc && at < obj->text.end; at += STL_FACET) {
+		double value[3][3];
+
+		for (int i = 0; i < 9; i++) {
+			uint32_t bits = word_of(at + 12 + 4 * i);
+			float number;
+
+			memcpy(&number, &bits, sizeof(number));
+			value[i / 3][i % 3] = number;
+		}
+		rc = add_facet(obj, value);
+		obj->text.line++;
+	}
+	return rc;
+}
+
+static int read_text_stl(struct obj *obj)
+{
+	/* A number is '0'; the numbers of a normal may be nan. */
+	static const char *const form[] = {"facet",   "normal", "*",	  "*", "*",
+					   "outer",   "loop",	"vertex", "0", "0",
+					   "0",	      "vertex", "0",	  "0", "0",
+					   "vertex",  "0",	"0",	  "0", "endloop",
+					   "endfacet"};
+	const size_t n_words = sizeof(form) / sizeof(*form);
+	double value[9];
+	const char *word;
+	size_t length, at = 0, n = 0;
+	int rc = 0;
+
+	while (!rc && text_next_word(&obj->text, &word, &length)) {
+		bool number = *form[at] == '0';
+
+		if (!at && ((length == 5 && !strncasecmp(word, "solid", 5)) ||
+			    (length == 8 && !strncasecmp(word, "endsolid", 8)))) {
+			/* its name */
+			while (text_word(&obj->text, &word))
+				;
+			continue;
+		}
+		if (number ? !text_number(word, length, value + n)
+			   : *form[at] != '*' && (strlen(form[at]) != length ||
+						  strncasecmp(word, form[at], length)))
+			return text_error(&obj->text, obj->err,
+					  "expected %s, found '%.*s'",
+					  number ? "a number" : form[at],
+					  (int)(length < 40 ? length : 40), word);
+		n += number;
+		if (++at < n_words)
+			continue;
+		rc = add_facet(obj, (double(*)[3])value);
+		at = n = 0;
+	}
+	if (!rc && at)
+		return text_error(&obj->text, obj->err, "the file ends within a facet");
+	return rc;
+}
+
+/* A file by its content. Formats that are not read are named. */
+static int read_any(struct obj *obj)
+{
+	static const char *const others[][2] = {{"ply", "a PLY file"},
+						{"OFF", "an OFF file"},
+						{"# vtk", "a VTK file"},
+						{"glTF", "a glTF file"},
+						{"PK\003\004",
+						 "a 3MF file or an archive"}};
+	const struct text *text = &obj->text;
+	size_t size = (size_t)(text->end - text->data), length;
+	struct text copy = *text;
+	const char *word;
+	int rc;
+
+	if (size >= STL_HEAD &&
+	    size - STL_HEAD == (uint64_t)STL_FACET * word_of(text->data + STL_HEAD - 4))
+		return read_binary_stl(obj);
+	if (text_next_word(&copy, &word, &length) && length == 5 &&
+	    !strncasecmp(word, "solid", 5))
+		return read_text_stl(obj);
+	for (size_t i = 0; i < sizeof(others) / sizeof(*others); i++)
+		if (!strncmp(text->at, others[i][0], strlen(others[i][0])))
+			return incise_error_set(
+				obj->err, EINVAL,
+				"%s: this is %s; convert it to STL or OBJ", text->path,
+				others[i][1]);
+	do {
+		rc = read_line(obj);
+	} while (!rc && text_next_line(&obj->text));
+	return rc;
+}
+
 /* Texture coordinates of each triangle's corners; 0, 0 where it has none. */
 static int take_uv(struct obj *obj)
 {
@@ -288,11 +425,8 @@ struct mesh *obj_load(const char *path, const double at_mm[3], struct incise_err
 	struct mesh *mesh = NULL;
 	int rc = text_open(&obj.text, path, err);
 
-	if (!rc) {
-		do {
-			rc = read_line(&obj);
-		} while (!rc && text_next_line(&obj.text));
-	}
+	if (!rc)
+		rc = read_any(&obj);
 	if (!rc)
 		rc = take_uv(&obj);
 	text_close(&obj.text);

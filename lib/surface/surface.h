@@ -86,8 +86,8 @@ struct incise_surface *incise_surface_new_capsule(const double a_mm[3],
 						  struct incise_error *err);
 
 /*
- * Read a triangle mesh: a Wavefront OBJ with `v`, `vt` and `f`; other statements are
- * passed over. Faces turn counter-clockwise seen from outside; those with more than three
+ * Read a triangle mesh: an STL, or a Wavefront OBJ with `v`, `vt` and `f`; statements that
+ * hold no surface are passed over. Faces turn counter-clockwise seen from outside; those with more than three
  * corners are cut into fans. Corners with equal coordinates are one. The mesh may be open;
  * where parts of it meet in a point only, no proxy passes through that point.
  *

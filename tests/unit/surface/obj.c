@@ -120,7 +120,16 @@ TEST(test_bad_files)
 		{TRIANGLE "f 1 2 3\nfo 1 2 3\n", 5, "'fo' is no"},
 		{TRIANGLE "f 1 2 3\nsurf 0 1 0 1 1 2 3\n", 5, "'surf' is no"},
 		{TRIANGLE "f 1 2 3\ncall b.obj\n", 5, "'call' is no"},
-		{"solid a\n", 1, "'solid' is no"},
+		{"ply\nformat ascii 1.0\n", 0, "a PLY file; convert it to STL or OBJ"},
+		{"OFF\n3 1 0\n", 0, "an OFF file; convert"},
+		{"solid a\n", 0, "no triangle"},
+		{"solid a\n facet normal 0 0 1\n outer loop\n vertex 0 0 0\n", 4,
+		 "within a facet"},
+		{"solid a\n facet normal 0 0 1\n outer loop\n vertex 0 0 x\n", 4, "'x'"},
+		{"solid a\n facet normal 0 0 1\n vertex 0 0 0\n", 3, "expected outer"},
+		{"solid a\n facet normal 0 0 1\n outer loop\n vertex 0 0 1e6\n vertex 0 0 0\n vertex 1 "
+		 "0 0\n endloop\n endfacet\n",
+		 8, "1e+06"},
 		{TRIANGLE "f 1 2 2\n", 4, "area"},
 		{TRIANGLE "v 2 0 0\nf 1 2 3\nf 1 2 4\n", 6, "area"},
 		{TRIANGLE "v 1 0 0\nf 1 2 4\n", 5, "area"},
@@ -138,6 +147,77 @@ TEST(test_bad_files)
 		assert_error(load(cases[k].text, here, &err), EINVAL, &err,
 			     cases[k].line ? place : NULL, cases[k].what);
 	}
+}
+
+/* A mesh of STL, in text or in bytes, is that of OBJ: facets come in any order and name. */
+TEST(test_stl)
+{
+	static const double p[5][3] = {
+		{0, 0, 0}, {2, 0, 0.5}, {2.25, 3, 0}, {0, 3.5, -1}, {1, 1, 4}};
+	static const int corner[6][3] = {{3, 1, 0}, {3, 2, 1}, {0, 1, 4},
+					 {1, 2, 4}, {2, 3, 4}, {3, 0, 4}};
+	char obj[1000] = "", stl[4000] = "solid of a test\r\n",
+	     bytes[84 + 7 * 50] = "solid";
+	struct incise_surface *surface[3];
+	uint32_t n = 7;
+
+	for (int i = 0; i < 5; i++)
+		sprintf(obj + strlen(obj), "v %g %g %g\n", p[i][0], p[i][1], p[i][2]);
+	memcpy(bytes + 80, &n, sizeof(n));
+	for (int k = 0; k < 7; k++) {
+		/* The last one has no area, as those of many programs. */
+		const int none[] = {1, 1, 2}, *c = k < 6 ? corner[k] : none;
+
+		if (k < 6)
+			sprintf(obj + strlen(obj), "f %d %d %d\n", c[0] + 1, c[1] + 1,
+				c[2] + 1);
+		strcat(stl, k % 2 ? "  facet normal nan nan nan\n\touter loop\n"
+				  : " FACET NORMAL 0 0 1 OUTER LOOP\n");
+		for (int i = 0; i < 3; i++) {
+			const double *v = p[c[i]];
+
+			sprintf(stl + strlen(stl), "vertex %.7e %g %.3f\n", v[0], v[1],
+				v[2]);
+			for (int j = 0; j < 3; j++) {
+				float f = (float)v[j];
+
+				memcpy(bytes + 84 + 50 * k + 12 + 12 * i + 4 * j, &f, 4);
+			}
+		}
+		strcat(stl, "endloop\nendfacet\n");
+	}
+	strcat(stl, "endsolid of a test\n");
+	for (int k = 0; k < 3; k++) {
+		struct temp_file file = temp_file_new("m", k ? "" : obj);
+		FILE *out = k ? fopen(file.path, "w") : NULL;
+
+		if (k)
+			fwrite(k == 1 ? stl : bytes, 1,
+			       k == 1 ? strlen(stl) : sizeof(bytes), out);
+		if (k)
+			fclose(out);
+		surface[k] =
+			incise_surface_load_mesh(file.path, (double[3]){1, 2, 3}, &err);
+		if (!surface[k])
+			fail_msg("%s", err.text);
+		temp_file_free(&file);
+		assert_int_equal(incise_surface_triangles(surface[k]), 6);
+	}
+	for (int k = 0; k < 1000; k++) {
+		const double at[3] = {1 + k % 10 * 0.3, 2 + k / 10 % 10 * 0.4,
+				      2 + k / 100 * 0.6};
+		struct incise_touch touch[3];
+
+		for (int i = 0; i < 3; i++)
+			incise_surface_nearest(surface[i], at, &touch[i]);
+		for (int i = 1; i < 3; i++) {
+			assert_true(touch[i].depth_mm == touch[0].depth_mm);
+			assert_memory_equal(touch[i].normal, touch[0].normal,
+					    sizeof(touch->normal));
+		}
+	}
+	for (int i = 0; i < 3; i++)
+		incise_surface_free(surface[i]);
 }
 
 TEST(test_files_that_are_none)
