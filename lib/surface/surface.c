@@ -194,7 +194,7 @@ bool incise_surface_enters(const struct incise_surface *surface, const double fr
 		return plane_enters(&surface->plane, from, to, touch);
 	if (!surface->mesh)
 		return capsule_enters(&surface->capsule, from, to, touch);
-	if (!mesh_enters(surface->mesh, from, to, 0, &spot))
+	if (!mesh_enters(surface->mesh, from, to, 0, 0, &spot))
 		return false;
 	mesh_touch(surface->mesh, &spot, spot.point, touch);
 	touch->depth_mm = 0;
