@@ -221,6 +221,74 @@ void mesh_top(const struct mesh *mesh, struct incise_touch *touch)
 	mesh_touch(mesh, &top, top.point, touch);
 }
 
+/* Widen a box by a point. */
+static void widen(double lo[3], double hi[3], const double p[3])
+{
+	for (int i = 0; i < 3; i++) {
+		lo[i] = fmin(lo[i], p[i]);
+		hi[i] = fmax(hi[i], p[i]);
+	}
+}
+
+/* The middle of a face and twice its area; whether the face has a border. */
+static bool face_middle(const struct mesh *mesh, uint32_t face, double middle[3],
+			double *area)
+{
+	const uint32_t *behind = mesh->neighbour[face];
+	const double *corner[3];
+	double n[3];
+
+	corners(mesh, face, corner);
+	for (int i = 0; i < 3; i++)
+		middle[i] = (corner[0][i] + corner[1][i] + corner[2][i]) / 3;
+	triangle_area_normal(n, corner[0], corner[1], corner[2]);
+	*area = v3_length(n);
+	return behind[0] == MESH_NONE || behind[1] == MESH_NONE || behind[2] == MESH_NONE;
+}
+
+void mesh_size(const struct mesh *mesh, struct incise_surface_size *size)
+{
+	double middle[3], mean[3] = {0}, whole = 0, area, best = INFINITY;
+	struct mesh_spot spot = {.part = TRIANGLE_FACE};
+	bool best_open = true;
+
+	*size = (struct incise_surface_size){.open_edges = 0};
+	for (int i = 0; i < 3; i++) {
+		size->lo_mm[i] = size->open_lo_mm[i] = INFINITY;
+		size->hi_mm[i] = size->open_hi_mm[i] = -INFINITY;
+	}
+	for (uint32_t face = 0; face < mesh->n_triangles; face++) {
+		const double *corner[3];
+
+		corners(mesh, face, corner);
+		face_middle(mesh, face, middle, &area);
+		v3_add(mean, mean, area, middle);
+		whole += area;
+		for (int i = 0; i < 3; i++) {
+			widen(size->lo_mm, size->hi_mm, corner[i]);
+			if (mesh->neighbour[face][i] != MESH_NONE)
+				continue;
+			size->open_edges++;
+			widen(size->open_lo_mm, size->open_hi_mm, corner[i]);
+			widen(size->open_lo_mm, size->open_hi_mm, corner[(i + 1) % 3]);
+		}
+	}
+	for (int i = 0; i < 3; i++)
+		mean[i] /= whole;
+	for (uint32_t face = 0; face < mesh->n_triangles; face++) {
+		bool open = face_middle(mesh, face, middle, &area);
+		double d = v3_distance2(middle, mean);
+
+		if (open > best_open || (open == best_open && d >= best))
+			continue;
+		best_open = open;
+		best = d;
+		spot.face = face;
+		v3_copy(spot.point, middle);
+	}
+	mesh_touch(mesh, &spot, spot.point, &size->inner);
+}
+
 /*
  * Searches through the whole mesh by its tree of boxes: the nearest place, and where a
  * straight way enters first. Lengths in mm; no allocation.

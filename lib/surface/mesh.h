@@ -193,6 +193,7 @@ struct mesh_draft {
 	uint32_t (*corner)[3];
 	float (*uv)[3][2]; /* or NULL */
 	int *line;	   /* of each triangle, for messages; or NULL */
+	bool cavity;	   /* closed pieces may have the tissue around them */
 };
 
 /* A place on a mesh. */
@@ -208,7 +209,8 @@ void mesh_free(struct mesh *mesh);
 size_t mesh_memory(const struct mesh *mesh);
 
 /* Readers of files. NULL with errno as in incise_surface_load_mesh(). */
-struct mesh *obj_load(const char *path, const double at_mm[3], struct incise_error *err);
+struct mesh *obj_load(const char *path, const double at_mm[3], bool cavity,
+		      struct incise_error *err);
 struct mesh *height_grid_load(const char *path, const double at_mm[3],
 			      struct incise_error *err);
 
@@ -228,6 +230,8 @@ bool mesh_beyond_border(const struct mesh *mesh, const struct mesh_spot *spot,
 
 /* The highest place; of many the one nearest to the middle. */
 void mesh_top(const struct mesh *mesh, struct incise_touch *touch);
+
+void mesh_size(const struct mesh *mesh, struct incise_surface_size *size);
 
 /*
  * The nearest spot to p. Boxes beyond @share of the best distance so far are left out:

@@ -290,6 +290,63 @@ static int weld_seams(struct mesh_builder *b)
 	return rc;
 }
 
+/*
+ * A closed piece of the mesh holds its tissue within: the sum of the tetrahedra from a point to
+ * its faces is a positive volume. @stack has room for all faces.
+ */
+static int check_piece(const struct mesh_builder *b, uint32_t first, bool *seen,
+		       uint32_t *stack)
+{
+	const double(*point)[3] = (const double(*)[3])b->draft->point;
+	const double *origin = point[b->corner[first][0]];
+	double volume = 0, rounding = 0;
+	bool closed = true;
+	uint32_t depth = 0;
+
+	stack[depth++] = first;
+	seen[first] = true;
+	while (depth) {
+		const uint32_t face = stack[--depth], *c = b->corner[face];
+		double n[3], out[3], part;
+
+		triangle_area_normal(n, point[c[0]], point[c[1]], point[c[2]]);
+		v3_sub(out, point[c[0]], origin);
+		part = v3_dot(out, n) / 6;
+		volume += part;
+		rounding += 1e-9 * fabs(part);
+		for (int i = 0; i < 3; i++) {
+			uint32_t other = b->neighbour[face][i];
+
+			closed &= other != MESH_NONE;
+			if (other == MESH_NONE || seen[other])
+				continue;
+			seen[other] = true;
+			stack[depth++] = other;
+		}
+	}
+	if (!closed || volume >= -rounding)
+		return 0;
+	return incise_error_set(
+		b->err, EINVAL,
+		"%s:%d: the closed piece of this face is turned inside out (%.3g mm3); "
+		"reverse its faces, or give cavity = true if the tissue is around it",
+		b->draft->path, line_of(b, first), volume);
+}
+
+static int check_volumes(const struct mesh_builder *b)
+{
+	bool *seen = calloc(b->n, sizeof(*seen));
+	uint32_t *stack = malloc(b->n * sizeof(*stack));
+	int rc = seen && stack ? 0 : no_memory(b);
+
+	for (uint32_t face = 0; !rc && face < b->n; face++)
+		if (!seen[face])
+			rc = check_piece(b, face, seen, stack);
+	free(seen);
+	free(stack);
+	return rc;
+}
+
 /* Build the tree, and take over the triangles in its order. */
 static int order_triangles(struct mesh_builder *b)
 {
@@ -461,6 +518,8 @@ struct mesh *mesh_new(const struct mesh_draft *draft, struct incise_error *err)
 		rc = find_neighbours(&b);
 	if (!rc)
 		rc = weld_seams(&b);
+	if (!rc && !draft->cavity)
+		rc = check_volumes(&b);
 	if (!rc)
 		rc = order_triangles(&b);
 	if (!rc)

@@ -419,9 +419,11 @@ static int take_uv(struct obj *obj)
 	return 0;
 }
 
-struct mesh *obj_load(const char *path, const double at_mm[3], struct incise_error *err)
+struct mesh *obj_load(const char *path, const double at_mm[3], bool cavity,
+		      struct incise_error *err)
 {
-	struct obj obj = {.err = err, .at_mm = at_mm, .draft.path = path};
+	struct obj obj = {
+		.err = err, .at_mm = at_mm, .draft = {.path = path, .cavity = cavity}};
 	struct mesh *mesh = NULL;
 	int rc = text_open(&obj.text, path, err);
 

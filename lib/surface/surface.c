@@ -97,7 +97,8 @@ struct incise_surface *incise_surface_new_capsule(const double a_mm[3],
 }
 
 static struct incise_surface *load(enum incise_surface_kind kind, const char *path,
-				   const double at_mm[3], struct incise_error *err)
+				   const double at_mm[3], bool cavity,
+				   struct incise_error *err)
 {
 	struct incise_surface *surface;
 
@@ -106,7 +107,7 @@ static struct incise_surface *load(enum incise_surface_kind kind, const char *pa
 	surface = surface_new(kind, err);
 	if (!surface)
 		return NULL;
-	surface->mesh = kind == INCISE_SURFACE_MESH ? obj_load(path, at_mm, err)
+	surface->mesh = kind == INCISE_SURFACE_MESH ? obj_load(path, at_mm, cavity, err)
 						    : height_grid_load(path, at_mm, err);
 	if (!surface->mesh) {
 		int code = errno;
@@ -119,16 +120,16 @@ static struct incise_surface *load(enum incise_surface_kind kind, const char *pa
 }
 
 struct incise_surface *incise_surface_load_mesh(const char *path, const double at_mm[3],
-						struct incise_error *err)
+						bool cavity, struct incise_error *err)
 {
-	return load(INCISE_SURFACE_MESH, path, at_mm, err);
+	return load(INCISE_SURFACE_MESH, path, at_mm, cavity, err);
 }
 
 struct incise_surface *incise_surface_load_heights(const char *path,
 						   const double at_mm[3],
 						   struct incise_error *err)
 {
-	return load(INCISE_SURFACE_HEIGHTS, path, at_mm, err);
+	return load(INCISE_SURFACE_HEIGHTS, path, at_mm, false, err);
 }
 
 void incise_surface_free(struct incise_surface *surface)
@@ -162,6 +163,14 @@ void incise_surface_top(const struct incise_surface *surface, struct incise_touc
 		mesh_top(surface->mesh, touch);
 	else
 		capsule_top(&surface->capsule, touch);
+}
+
+bool incise_surface_size(const struct incise_surface *surface,
+			 struct incise_surface_size *size)
+{
+	if (surface->mesh)
+		mesh_size(surface->mesh, size);
+	return surface->mesh;
 }
 
 void incise_surface_nearest(const struct incise_surface *surface,

@@ -96,13 +96,15 @@ struct incise_surface *incise_surface_new_capsule(const double a_mm[3],
  *
  * @param path   file
  * @param at_mm  added to all its coordinates
+ * @param cavity closed pieces may be turned inside out: the tissue is around them
  * @return surface, to be freed with incise_surface_free(); NULL with errno of incise_infile_open(),
  *         EINVAL (malformed, no triangle, a triangle less than 1e-9 mm high, an edge with
- *         more than two triangles or with two that turn opposite ways), E2BIG, EFBIG (2 GB
+ *         more than two triangles or with two that turn opposite ways, a closed piece that is turned inside
+ *         out), E2BIG, EFBIG (2 GB
  *         and more), ENOMEM.
  */
 struct incise_surface *incise_surface_load_mesh(const char *path, const double at_mm[3],
-						struct incise_error *err);
+						bool cavity, struct incise_error *err);
 
 /*
  * Read a height field: an ESRI ASCII grid (`ncols nrows xllcorner|xllcenter

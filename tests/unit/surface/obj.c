@@ -7,6 +7,7 @@
 #include "../../../lib/surface/surface.h"
 #include "../message.h"
 #include "../base/temp_file.h"
+#include "../cases.h"
 #include "solid.h"
 
 static const double here[3];
@@ -18,7 +19,7 @@ static struct incise_surface *load(const char *text, const double at[3],
 	struct incise_surface *surface;
 
 	errno = 0;
-	surface = incise_surface_load_mesh(file.path, at, err);
+	surface = incise_surface_load_mesh(file.path, at, false, err);
 	if (!surface)
 		assert_int_equal(errno, err->code);
 	temp_file_free(&file);
@@ -196,8 +197,8 @@ TEST(test_stl)
 			       k == 1 ? strlen(stl) : sizeof(bytes), out);
 		if (k)
 			fclose(out);
-		surface[k] =
-			incise_surface_load_mesh(file.path, (double[3]){1, 2, 3}, &err);
+		surface[k] = incise_surface_load_mesh(file.path, (double[3]){1, 2, 3},
+						      false, &err);
 		if (!surface[k])
 			fail_msg("%s", err.text);
 		temp_file_free(&file);
@@ -220,16 +221,62 @@ TEST(test_stl)
 		incise_surface_free(surface[i]);
 }
 
+/* Pieces that are closed, turned inside out or not, in any place; and an open one. */
+TEST(test_inside_out)
+{
+	uint64_t seed = cases_seed(3);
+
+	for (int n = 0; n < cases_of(200, 20); n++) {
+		char text[4000] = "";
+		int pieces = 1 + n % 4, wrong = 0;
+
+		for (int k = 0; k < pieces; k++) {
+			bool turned = solid_random(&seed) < 0.3,
+			     open = solid_random(&seed) < 0.3;
+			double x = 1e3 * k, y = 2e4 * (2 * solid_random(&seed) - 1),
+			       z = 0.01 + solid_random(&seed);
+			int a = 4 * k + 1;
+			const int face[4][3] = {{a, a + 2, a + 1},
+						{a, a + 1, a + 3},
+						{a + 1, a + 2, a + 3},
+						{a + 2, a, a + 3}};
+
+			sprintf(text + strlen(text),
+				"v %g %g 0\nv %g %g 0\nv %g %g 0\nv %g %g %g\n", x, y,
+				x + 1, y, x, y + 1, x, y, z);
+			for (int f = 0; f < (open ? 3 : 4); f++)
+				sprintf(text + strlen(text), "f %d %d %d\n", face[f][0],
+					face[f][turned ? 2 : 1], face[f][turned ? 1 : 2]);
+			wrong += turned && !open;
+		}
+		for (int cavity = 0; cavity < 2; cavity++) {
+			struct temp_file file = temp_file_new("a.obj", text);
+			struct incise_surface *surface;
+
+			err = (struct incise_error){0};
+			surface = incise_surface_load_mesh(file.path, here, cavity, &err);
+			if (!surface != (wrong && !cavity))
+				fail_msg("%d of %d turned: %s\n%s", wrong, pieces,
+					 err.text, text);
+			if (!surface)
+				assert_says(err.text, "a.obj:", "inside out");
+			incise_surface_free(surface);
+			temp_file_free(&file);
+		}
+	}
+}
+
 TEST(test_files_that_are_none)
 {
-	assert_null(incise_surface_load_mesh("/nowhere/a.obj", here, &err));
+	assert_null(incise_surface_load_mesh("/nowhere/a.obj", here, false, &err));
 	assert_int_equal(err.code, ENOENT);
 	assert_int_equal(errno, ENOENT);
-	assert_null(incise_surface_load_mesh("/tmp", here, &err));
+	assert_null(incise_surface_load_mesh("/tmp", here, false, &err));
 	assert_int_equal(err.code, EISDIR);
-	assert_null(incise_surface_load_mesh("/dev/null", here, NULL));
+	assert_null(incise_surface_load_mesh("/dev/null", here, false, NULL));
 	assert_int_equal(errno, EINVAL);
-	assert_null(incise_surface_load_mesh("/dev/null", (double[3]){NAN, 0, 0}, &err));
+	assert_null(incise_surface_load_mesh("/dev/null", (double[3]){NAN, 0, 0}, false,
+					     &err));
 	assert_int_equal(err.code, EINVAL);
 }
 
