@@ -376,9 +376,8 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 		printf("surface     %s\n", size);
 	if (strstr(size, "open edges"))
 		cli_warn(
-			"%s: its surface is open: a contact ends at the border, and the "
-			"tool can get more work out than it put in; close it, or keep cuts "
-			"away from there",
+			"%s: its surface is open: a contact ends at the border, which is "
+			"not passive; close it, or keep cuts away from there",
 			job->scene.path);
 	free(size);
 	printf("devices     %s; not touched: %s\n",
