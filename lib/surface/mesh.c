@@ -230,40 +230,48 @@ static void widen(double lo[3], double hi[3], const double p[3])
 	}
 }
 
-/* The middle of a face and twice its area; whether the face has a border. */
-static bool face_middle(const struct mesh *mesh, uint32_t face, double middle[3],
-			double *area)
+/* The middle of the face that is nearest to a place; one at a border only if all are. */
+static void inner_spot(const struct mesh *mesh, const double place[3],
+		       struct mesh_spot *spot)
 {
-	const uint32_t *behind = mesh->neighbour[face];
-	const double *corner[3];
-	double n[3];
+	double best = INFINITY;
 
-	corners(mesh, face, corner);
-	for (int i = 0; i < 3; i++)
-		middle[i] = (corner[0][i] + corner[1][i] + corner[2][i]) / 3;
-	triangle_area_normal(n, corner[0], corner[1], corner[2]);
-	*area = v3_length(n);
-	return behind[0] == MESH_NONE || behind[1] == MESH_NONE || behind[2] == MESH_NONE;
+	for (uint32_t face = 0; face < mesh->n_triangles; face++) {
+		const uint32_t *behind = mesh->neighbour[face];
+		const double *corner[3];
+		double middle[3], d;
+
+		corners(mesh, face, corner);
+		for (int i = 0; i < 3; i++)
+			middle[i] = (corner[0][i] + corner[1][i] + corner[2][i]) / 3;
+		d = v3_distance2(middle, place);
+		/* Farther than any place of a mesh. */
+		if (behind[0] == MESH_NONE || behind[1] == MESH_NONE ||
+		    behind[2] == MESH_NONE)
+			d += 1e12;
+		if (d >= best)
+			continue;
+		best = d;
+		*spot = (struct mesh_spot){.face = face, .part = TRIANGLE_FACE};
+		v3_copy(spot->point, middle);
+	}
 }
 
 void mesh_size(const struct mesh *mesh, struct incise_surface_size *size)
 {
-	double middle[3], mean[3] = {0}, whole = 0, area, best = INFINITY;
-	struct mesh_spot spot = {.part = TRIANGLE_FACE};
-	bool best_open = true;
+	struct mesh_spot spot;
+	double middle[3];
 
-	*size = (struct incise_surface_size){.open_edges = 0};
-	for (int i = 0; i < 3; i++) {
-		size->lo_mm[i] = size->open_lo_mm[i] = INFINITY;
-		size->hi_mm[i] = size->open_hi_mm[i] = -INFINITY;
-	}
+	*size = (struct incise_surface_size){
+		.lo_mm = {INFINITY, INFINITY, INFINITY},
+		.hi_mm = {-INFINITY, -INFINITY, -INFINITY},
+		.open_lo_mm = {INFINITY, INFINITY, INFINITY},
+		.open_hi_mm = {-INFINITY, -INFINITY, -INFINITY},
+	};
 	for (uint32_t face = 0; face < mesh->n_triangles; face++) {
 		const double *corner[3];
 
 		corners(mesh, face, corner);
-		face_middle(mesh, face, middle, &area);
-		v3_add(mean, mean, area, middle);
-		whole += area;
 		for (int i = 0; i < 3; i++) {
 			widen(size->lo_mm, size->hi_mm, corner[i]);
 			if (mesh->neighbour[face][i] != MESH_NONE)
@@ -274,18 +282,8 @@ void mesh_size(const struct mesh *mesh, struct incise_surface_size *size)
 		}
 	}
 	for (int i = 0; i < 3; i++)
-		mean[i] /= whole;
-	for (uint32_t face = 0; face < mesh->n_triangles; face++) {
-		bool open = face_middle(mesh, face, middle, &area);
-		double d = v3_distance2(middle, mean);
-
-		if (open > best_open || (open == best_open && d >= best))
-			continue;
-		best_open = open;
-		best = d;
-		spot.face = face;
-		v3_copy(spot.point, middle);
-	}
+		middle[i] = size->lo_mm[i] / 2 + size->hi_mm[i] / 2;
+	inner_spot(mesh, middle, &spot);
 	mesh_touch(mesh, &spot, spot.point, &size->inner);
 }
 

@@ -239,33 +239,27 @@ static int find_neighbours(struct mesh_builder *b)
 
 /*
  * Copies of a corner that differ in the last digits leave a seam: two borders side by side.
- * Points of borders nearer than this part of the mesh's size, and of its edges' mean
+ * Points of borders nearer than this part of the farthest coordinate, and of the edges' mean
  * length, become one.
  */
-#define SEAM_SIZE 1e-6
+#define SEAM_SIZE 2e-6
 #define SEAM_EDGE 0.05
 
 static double seam_mm(const struct mesh_builder *b)
 {
-	double lo[3], hi[3], farthest = 0, edges = 0;
+	double farthest = 0, edges = 0;
 
-	v3_copy(lo, b->draft->point[b->corner[0][0]]);
-	v3_copy(hi, lo);
 	for (uint32_t face = 0; face < b->n; face++) {
 		for (int i = 0; i < 3; i++) {
 			const double *p = b->draft->point[b->corner[face][i]];
+			const double *q = b->draft->point[b->corner[face][(i + 1) % 3]];
 
-			edges += sqrt(v3_distance2(
-				p, b->draft->point[b->corner[face][(i + 1) % 3]]));
-			for (int k = 0; k < 3; k++) {
-				lo[k] = fmin(lo[k], p[k]);
-				hi[k] = fmax(hi[k], p[k]);
+			edges += sqrt(v3_distance2(p, q));
+			for (int k = 0; k < 3; k++)
 				farthest = fmax(farthest, fabs(p[k]));
-			}
 		}
 	}
-	return fmin(SEAM_SIZE * fmax(farthest, sqrt(v3_distance2(lo, hi))),
-		    SEAM_EDGE * edges / (3.0 * b->n));
+	return fmin(SEAM_SIZE * farthest, SEAM_EDGE * edges / (3.0 * b->n));
 }
 
 /* A mesh that this would break, by a third triangle at an edge, stays as it is. */

@@ -244,6 +244,22 @@ static int read_face(struct obj *obj)
 	return 0;
 }
 
+static bool is_one_of(const char *word, size_t length, const char *const *names, size_t n)
+{
+	for (size_t i = 0; i < n; i++)
+		if (strlen(names[i]) == length && !strncasecmp(names[i], word, length))
+			return true;
+	return false;
+}
+
+static void skip_line(struct obj *obj)
+{
+	const char *word;
+
+	while (text_word(&obj->text, &word))
+		;
+}
+
 static int read_line(struct obj *obj)
 {
 	/* Names, materials, display, lines and points. */
@@ -268,11 +284,8 @@ static int read_line(struct obj *obj)
 		obj->n_vn++;
 		return numbers(obj, "vn", 3, 3, value);
 	}
-	for (size_t i = 0; i < sizeof(others) / sizeof(*others); i++) {
-		if (strlen(others[i]) != length || memcmp(word, others[i], length))
-			continue;
-		while (text_word(&obj->text, &word))
-			;
+	if (is_one_of(word, length, others, sizeof(others) / sizeof(*others))) {
+		skip_line(obj);
 		return 0;
 	}
 	return text_error(&obj->text, obj->err,
@@ -326,42 +339,31 @@ static int read_binary_stl(struct obj *obj)
 
 static int read_text_stl(struct obj *obj)
 {
-	/* A number is '0'; the numbers of a normal may be nan. */
-	static const char *const form[] = {"facet",   "normal", "*",	  "*", "*",
-					   "outer",   "loop",	"vertex", "0", "0",
-					   "0",	      "vertex", "0",	  "0", "0",
-					   "vertex",  "0",	"0",	  "0", "endloop",
-					   "endfacet"};
-	const size_t n_words = sizeof(form) / sizeof(*form);
-	double value[9];
-	const char *word;
-	size_t length, at = 0, n = 0;
-	int rc = 0;
+	static const char *const others[] = {"solid", "facet", "outer", "endloop",
+					     "endsolid"};
+	double value[3][3];
+	int n = 0, rc = 0;
 
-	while (!rc && text_next_word(&obj->text, &word, &length)) {
-		bool number = *form[at] == '0';
+	do {
+		const char *word;
+		size_t length = text_word(&obj->text, &word);
 
-		if (!at && ((length == 5 && !strncasecmp(word, "solid", 5)) ||
-			    (length == 8 && !strncasecmp(word, "endsolid", 8)))) {
-			/* its name */
-			while (text_word(&obj->text, &word))
-				;
-			continue;
-		}
-		if (number ? !text_number(word, length, value + n)
-			   : *form[at] != '*' && (strlen(form[at]) != length ||
-						  strncasecmp(word, form[at], length)))
+		if (!length || is_one_of(word, length, others, 5)) {
+			skip_line(obj); /* names and normals */
+		} else if (is_one_of(word, length, (const char *[]){"vertex"}, 1) &&
+			   n < 3) {
+			rc = numbers(obj, "vertex", 3, 3, value[n++]);
+		} else if (is_one_of(word, length, (const char *[]){"endfacet"}, 1) &&
+			   n == 3) {
+			rc = add_facet(obj, value);
+			n = 0;
+		} else {
 			return text_error(&obj->text, obj->err,
-					  "expected %s, found '%.*s'",
-					  number ? "a number" : form[at],
-					  (int)(length < 40 ? length : 40), word);
-		n += number;
-		if (++at < n_words)
-			continue;
-		rc = add_facet(obj, (double(*)[3])value);
-		at = n = 0;
-	}
-	if (!rc && at)
+					  "'%.*s' after %d corners of a facet",
+					  (int)(length < 40 ? length : 40), word, n);
+		}
+	} while (!rc && text_next_line(&obj->text));
+	if (!rc && n)
 		return text_error(&obj->text, obj->err, "the file ends within a facet");
 	return rc;
 }

@@ -45,7 +45,7 @@ struct incise_surface_size {
 	 */
 	size_t open_edges;
 	double open_lo_mm[3], open_hi_mm[3];
-	/** A point well within it: the middle of a face near the middle of the area. */
+	/** A point well within it: the middle of a face near its middle. */
 	struct incise_touch inner;
 };
 

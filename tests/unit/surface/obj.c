@@ -127,7 +127,9 @@ TEST(test_bad_files)
 		{"solid a\n facet normal 0 0 1\n outer loop\n vertex 0 0 0\n", 4,
 		 "within a facet"},
 		{"solid a\n facet normal 0 0 1\n outer loop\n vertex 0 0 x\n", 4, "'x'"},
-		{"solid a\n facet normal 0 0 1\n vertex 0 0 0\n", 3, "expected outer"},
+		{"solid a\n facet normal 0 0 1\n vertex 0 0 0\nendfacet\n", 4,
+		 "after 1 corners"},
+		{"solid a\nfacets\n", 2, "'facets' after 0"},
 		{"solid a\n facet normal 0 0 1\n outer loop\n vertex 0 0 1e6\n vertex 0 0 0\n vertex 1 "
 		 "0 0\n endloop\n endfacet\n",
 		 8, "1e+06"},
