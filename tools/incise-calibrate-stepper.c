@@ -140,20 +140,12 @@ struct reader {
 
 static void read_header(struct reader *r, char **columns)
 {
-	r->position = r->steps = r->force = r->time = -1;
-	for (int i = 0; i < r->columns; i++) {
-		int *at = !strcmp(columns[i], "position_mm") ? &r->position
-			  : !strcmp(columns[i], "steps")     ? &r->steps
-			  : !strcmp(columns[i], "force_N")   ? &r->force
-			  : !strcmp(columns[i], "t_s")	     ? &r->time
-							     : NULL;
+	int n = r->columns;
 
-		if (at && *at >= 0)
-			cli_fail("%s:%d: two columns are called %s; rename one", r->path,
-				 r->line, columns[i]);
-		if (at)
-			*at = i;
-	}
+	r->position = calibrate_column(r->path, r->line, columns, n, "position_mm");
+	r->steps = calibrate_column(r->path, r->line, columns, n, "steps");
+	r->force = calibrate_column(r->path, r->line, columns, n, "force_N");
+	r->time = calibrate_column(r->path, r->line, columns, n, "t_s");
 	if (r->force < 0 || (r->position < 0 && r->steps < 0))
 		cli_fail(
 			"%s:%d: expected a line of column names: force_N, and position_mm "
@@ -224,17 +216,14 @@ static void read_series(struct stepper_series *series, const char *path, double 
 		r.line++;
 		if (line[strspn(line, " \t\r\n")] == 0 || *line == '#')
 			continue;
-		n = calibrate_cut(line, columns, COLUMNS, " \t", " \t");
+		n = calibrate_cut(path, r.line, line, columns, COLUMNS, " \t", " \t");
 		if (header) {
 			r.columns = n;
 			read_header(&r, columns);
 			header = false;
 			continue;
 		}
-		if (n != r.columns)
-			cli_fail("%s:%d: %d fields, but the first line names %d columns; "
-				 "correct the line, or remove it",
-				 path, r.line, n, r.columns);
+		calibrate_width(path, r.line, n, r.columns);
 		read_point(&r, columns, series);
 	}
 	incise_infile_close(in);

@@ -133,10 +133,7 @@ static void find_columns(const char *path, int line, char **fields, int n,
 			 int at[COLUMNS])
 {
 	for (int c = 0; c < COLUMNS; c++) {
-		at[c] = -1;
-		for (int i = 0; i < n; i++)
-			if (!strcmp(fields[i], names[c]))
-				at[c] = i;
+		at[c] = calibrate_column(path, line, fields, n, names[c]);
 		if (at[c] < 0 && c)
 			cli_fail(
 				"%s:%d: there is no column '%s'; expected a line of column "
@@ -149,8 +146,7 @@ static void read_csv(struct list *list, const char *path)
 {
 	struct incise_infile *in = calibrate_open(path);
 	char *line, *fields[CSV_MAX];
-	int at[COLUMNS], number = 0;
-	bool header = false;
+	int at[COLUMNS], number = 0, columns = 0;
 
 	while (calibrate_line(in, &line)) {
 		int n;
@@ -158,12 +154,13 @@ static void read_csv(struct list *list, const char *path)
 		number++;
 		if (*line == '#' || !line[strspn(line, " \t\r\n")])
 			continue;
-		n = calibrate_cut(line, fields, CSV_MAX, " \t", "");
-		if (!header) {
+		n = calibrate_cut(path, number, line, fields, CSV_MAX, " \t", "");
+		if (!columns) {
 			find_columns(path, number, fields, n, at);
-			header = true;
+			columns = n;
 			continue;
 		}
+		calibrate_width(path, number, n, columns);
 		double values[COLUMNS] = {list->n};
 
 		for (int c = 0; c < COLUMNS; c++) {
@@ -171,10 +168,6 @@ static void read_csv(struct list *list, const char *path)
 
 			if (at[c] < 0)
 				continue;
-			if (at[c] >= n)
-				cli_fail(
-					"%s:%d: %s is missing; add it, or remove the line",
-					path, number, names[c]);
 			values[c] = incise_decimal(fields[at[c]], &end);
 			if (end == fields[at[c]] || end[strspn(end, " \t")] ||
 			    !isfinite(values[c]) || (!c && fabs(values[c]) > 1e9))

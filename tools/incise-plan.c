@@ -349,6 +349,7 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 			struct incise_rig *rig, const struct tick_cost *cost)
 {
 	json_t *mapped = mapped_libraries(0), *absent = unmapped_libraries(mapped);
+	char *size = scene_argument_size(job->scene.path, incise_plan_surface(plan));
 	const char *name, *why;
 	double bound_N = incise_plan_bound(plan, REACH_MM);
 	struct incise_plan_stability stability;
@@ -357,7 +358,7 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 		printf("%s: %.0f ns a tick (99.9 %% below %.0f), ", job->scene.path,
 		       cost->median, cost->p999);
 	else
-		printf("%s: a stroke over its top met no tissue, so no tick was timed; ",
+		printf("%s: a stroke over it met no tissue, so no tick was timed; ",
 		       job->scene.path);
 	printf("%.1f KiB\n\nkept\n", (double)incise_plan_memory(plan) / 1024);
 	for (int i = 0; (name = incise_plan_stage(plan, i)); i++)
@@ -370,7 +371,16 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 	puts("left out");
 	for (int i = 0; (name = incise_plan_left_out(plan, i, &why)); i++)
 		printf("  %-10s %s\n", name, why);
-	printf("\ndevices     %s; not touched: %s\n",
+	putchar('\n');
+	if (*size)
+		printf("surface     %s\n", size);
+	if (strstr(size, "open edges"))
+		cli_warn(
+			"%s: its surface is open: a contact ends at the border, which is "
+			"not passive; close it, or keep cuts away from there",
+			job->scene.path);
+	free(size);
+	printf("devices     %s; not touched: %s\n",
 	       job->rig ? "tracker, stepper" : "none without --rig",
 	       job->rig ? "force, camera" : "tracker, stepper, force, camera");
 	printf("libraries   not mapped: ");

@@ -11,6 +11,7 @@
 #include <string.h>
 #include <incise/infile.h>
 #include "conf.h"
+#include "utf8.h"
 #include "vector.h"
 
 #define UNIT_LETTERS 3 /* of each part, as in mPa_s */
@@ -145,7 +146,8 @@ int incise_conf_read_text(config_t *config, const char *path, char *text, size_t
 			  struct incise_error *err)
 {
 	/* The parser ends the process where a disk fails to read; memory does not fail. */
-	FILE *stream = fmemopen(text, size, "r");
+	int mark = utf8_mark(text);
+	FILE *stream = fmemopen(text + mark, size - (size_t)mark, "r");
 	int line = stream ? include_line(stream) : 0, rc;
 
 	if (line)

@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include <incise/infile.h>
+#include "utf8.h"
 
 #define BUFFER_FIRST (1 << 16)
 /* Time for the writer of a named pipe to open it, when both are started together. */
@@ -229,6 +230,8 @@ int incise_infile_line(struct incise_infile *file, char **line, struct incise_er
 	file->at = (size_t)(newline - file->data) + 1;
 	if (file->at > file->end)
 		file->at = file->end;
+	if (file->line == 1)
+		*line += utf8_mark(*line);
 	return 1;
 }
 

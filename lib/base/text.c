@@ -11,6 +11,7 @@
 #include <incise/infile.h>
 #include "c_locale.h"
 #include "text.h"
+#include "utf8.h"
 
 int text_open(struct text *text, const char *path, struct incise_error *err)
 {
@@ -25,7 +26,7 @@ int text_open(struct text *text, const char *path, struct incise_error *err)
 	text->data = incise_infile_read(path, &mesh, &size, err);
 	if (!text->data)
 		return -errno;
-	text->at = text->data;
+	text->at = text->data + utf8_mark(text->data);
 	text->end = text->data + size;
 	return 0;
 }
@@ -36,12 +37,24 @@ void text_close(struct text *text)
 	text->data = NULL;
 }
 
+/* Bytes of an end of a line with a backslash before it: the line goes on. */
+static size_t hidden_end(const char *at)
+{
+	if (*at != '\\')
+		return 0;
+	return at[1] == '\n' ? 2 : at[1] == '\r' && at[2] == '\n' ? 3 : 0;
+}
+
 size_t text_word(struct text *text, const char **word)
 {
 	const char *at = text->at;
+	size_t hidden;
 
-	while (at < text->end && (*at == ' ' || *at == '\t' || *at == '\r'))
-		at++;
+	while (at < text->end &&
+	       ((hidden = hidden_end(at)) || *at == ' ' || *at == '\t' || *at == '\r')) {
+		text->line += hidden > 0;
+		at += hidden ? hidden : 1;
+	}
 	*word = at;
 	while (at < text->end && *at != ' ' && *at != '\t' && *at != '\r' && *at != '\n')
 		at++;
@@ -59,6 +72,14 @@ bool text_next_line(struct text *text)
 	}
 	text->at = end + 1;
 	text->line++;
+	return true;
+}
+
+bool text_next_word(struct text *text, const char **word, size_t *length)
+{
+	while (!(*length = text_word(text, word)))
+		if (!text_next_line(text))
+			return false;
 	return true;
 }
 

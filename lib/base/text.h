@@ -22,9 +22,13 @@ int text_open(struct text *text, const char *path, struct incise_error *err);
 void text_close(struct text *text);
 
 /*
- * The next word of the line, up to blank or end of line: its length, 0 at the line's end.
+ * The next word of the line, up to blank or end of line: its length, 0 at the line's end. A line
+ * goes on behind a backslash at its end.
  */
 size_t text_word(struct text *text, const char **word);
+
+/* The same over ends of lines; false at the end of the file. */
+bool text_next_word(struct text *text, const char **word, size_t *length);
 
 /* Go to the next line; false at the end of the file. */
 bool text_next_line(struct text *text);

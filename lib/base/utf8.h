@@ -6,6 +6,13 @@
 #define INCISE_UTF8_H
 
 #include <stdbool.h>
+#include <string.h>
+
+/* Bytes of the byte order mark that Windows' programs write before a text, or 0. */
+static inline int utf8_mark(const char *text)
+{
+	return strncmp(text, "\xef\xbb\xbf", 3) ? 0 : 3;
+}
 
 /*
  * Bytes of the character at @text, which ends with NUL: 1 to 4; 0 if it is no character of UTF-8:

@@ -85,23 +85,29 @@ static int next_row(struct reader *in)
 	int rc;
 
 	while ((rc = incise_lines_next(&in->lines, "\r\n")) > 0) {
-		char *c = in->lines.text;
+		char *text = in->lines.text;
 
-		if (in->lines.line == 1 && !strncmp(c, "\xef\xbb\xbf", 3))
-			c += 3;
-		if (*c && *c != '#')
-			return split_row(in, c);
+		if (text[strspn(text, " \t")] && *text != '#')
+			return split_row(in, text);
 	}
 	return rc;
 }
 
-/* -1: there is none. */
-static int look_for_column(const struct reader *in, const char *name)
+/* -ENOENT: there is none. */
+static int look_for_column(struct reader *in, const char *name)
 {
-	for (int i = 0; name && i < in->n_fields; i++)
-		if (!strcmp(in->field[i], name))
-			return i;
-	return -1;
+	int at = -ENOENT;
+
+	for (int i = 0; name && i < in->n_fields; i++) {
+		if (strcmp(in->field[i], name))
+			continue;
+		if (at >= 0)
+			return incise_lines_error(&in->lines, EINVAL,
+						  "two columns are called %s; rename one",
+						  name);
+		at = i;
+	}
+	return at;
 }
 
 static int find_column(struct reader *in, const char *name)
@@ -111,7 +117,7 @@ static int find_column(struct reader *in, const char *name)
 	size_t used = 0;
 	int at = look_for_column(in, name);
 
-	if (at >= 0)
+	if (at != -ENOENT)
 		return at;
 	for (int i = 0; i < in->n_fields; i++)
 		names[i] = in->field[i];
@@ -138,12 +144,12 @@ static int number(struct reader *in, int field, const char *column, double *valu
 
 	*value = incise_decimal(text, &end);
 	if (end == text || end[strspn(end, " \t")])
-		return incise_lines_error(&in->lines, EINVAL,
-					  "column %d (%s): '%.40s' is not a number; %s",
-					  field + 1, column, text,
-					  strchr(text, ',')
-						  ? "write a decimal point, not a comma"
-						  : "correct it, or remove the row");
+		return incise_lines_error(
+			&in->lines, EINVAL, "column %d (%s): '%.40s' is not a number; %s",
+			field + 1, column, text,
+			!strchr(text, ',')  ? "correct it, or remove the row"
+			: strchr(text, '.') ? "leave out the commas of thousands"
+					    : "write a decimal point, not a comma");
 	if (!isfinite(*value))
 		return incise_lines_error(
 			&in->lines, EINVAL,
@@ -248,6 +254,8 @@ static int read_rows(struct reader *in, struct sink *sink)
 			return group_at;
 	}
 	where_at = look_for_column(in, sink->where);
+	if (where_at == -EINVAL)
+		return where_at;
 	rc = in->n_fields;
 	for (int header = rc; (rc = next_row(in)) > 0;) {
 		double wanted = 1;
@@ -260,7 +268,8 @@ static int read_rows(struct reader *in, struct sink *sink)
 				in->n_fields, header,
 				in->n_fields < header
 					? "add the missing fields, or remove the row"
-					: "write decimal points, not commas");
+					: "end it with its last field, and write decimal "
+					  "points, not commas");
 		rc = where_at >= 0 ? number(in, where_at, sink->where, &wanted) : 0;
 		if (rc)
 			return rc;
@@ -415,13 +424,14 @@ static int arrow_find(struct arrow_reader *in, const struct ArrowSchema *schema,
 
 		if (strcmp(child->name ? child->name : "", name))
 			continue;
+		if (column->at >= 0)
+			return arrow_fail(in, column, "is there twice; rename one");
 		column->at = (int)i;
 		column->format =
 			child->dictionary ? child->dictionary->format : child->format;
 		column->index_format = child->dictionary ? child->format : NULL;
-		return 0;
 	}
-	if (optional)
+	if (optional || column->at >= 0)
 		return 0;
 	for (int64_t i = 0; i < schema->n_children && used < sizeof(list); i++)
 		used += snprintf(list + used, sizeof(list) - used, "%s%s", i ? ", " : "",

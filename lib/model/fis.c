@@ -25,16 +25,24 @@ struct consequent {
 	double p[INCISE_MODEL_INPUTS_MAX + 1];
 };
 
+/* Keys of a section; MFs are counted on their own. */
+enum system_key { NAME, TYPE, NUM_INPUTS, NUM_RULES, NUM_OUTPUTS, AND, DEFUZZ };
+static const char *const system_keys[] = {
+	"Name",	     "Type",	     "NumInputs", "NumRules",  "NumOutputs",
+	"AndMethod", "DefuzzMethod", /* the others do not change the output of a Sugeno model */
+	"Version",   "OrMethod",     "ImpMethod", "AggMethod", NULL};
+enum variable_key { VARIABLE_NAME, RANGE, NUM_MFS };
+static const char *const variable_keys[] = {"Name", "Range", "NumMFs", NULL};
+
 struct reader {
 	struct incise_lines lines;
-	char *text; /* of the line, without white space at its ends */
+	char *text; /* of the line, without white space at its ends and comment */
 	struct incise_model *model;
-	/* Sections and keys read so far; bits of MFs by number. */
-	bool system, output, rules;
+	/* Sections read so far; bits of their keys, and of MFs by number. */
+	bool system, rules;
+	unsigned system_seen, input_seen[INCISE_MODEL_INPUTS_MAX], output_seen;
 	int n_rules; /* by NumRules */
 	int n_out_mfs;
-	uint32_t inputs_seen;
-	uint32_t ranges_seen;
 	uint64_t mfs_seen[INCISE_MODEL_INPUTS_MAX];
 	struct consequent out[INCISE_MODEL_RULES_MAX];
 };
@@ -43,40 +51,73 @@ struct reader {
 
 #define fail(in, ...) incise_lines_error(&(in)->lines, __VA_ARGS__)
 
+#define BLANKS " \t\r\n"
+
+/* End a text at its comment, which begins outside quotes, and at the white space before it. */
+static void cut(char *text)
+{
+	bool quoted = false;
+	char *end = text;
+
+	for (; *text && (quoted || (*text != '%' && *text != '#')); text++) {
+		quoted ^= *text == '\'';
+		if (!strchr(BLANKS, *text))
+			end = text + 1;
+	}
+	*end = 0;
+}
+
 /* Next line that is not empty or a comment: 1, or 0 at the end of the file. */
 static int next_line(struct reader *in)
 {
 	int rc;
 
-	while ((rc = incise_lines_next(&in->lines, " \t\r\n")) > 0) {
-		in->text = in->lines.text + strspn(in->lines.text, " \t\r\n");
-		if (*in->text && *in->text != '%' && *in->text != '#')
+	while ((rc = incise_lines_next(&in->lines, BLANKS)) > 0) {
+		in->text = in->lines.text + strspn(in->lines.text, BLANKS);
+		cut(in->text);
+		if (*in->text)
 			break;
 	}
 	return rc;
 }
 
-/* 'NAME' at *text, which moves behind it. */
+/* 'NAME' at *text, which moves behind it; '' within it is a quote. */
 static int read_quoted(struct reader *in, const char **text, char *name)
 {
-	const char *end = **text == '\'' ? strchr(*text + 1, '\'') : NULL;
+	const char *at = *text;
+	int n = 0;
 
-	if (!end)
+	if (*at != '\'')
 		return fail(in, EINVAL, "expected a name in single quotes at '%.20s'",
 			    *text);
-	if (end - *text - 1 >= INCISE_MODEL_NAME_MAX)
-		return fail(in, EINVAL, "a name is longer than %d bytes",
-			    INCISE_MODEL_NAME_MAX - 1);
-	memcpy(name, *text + 1, end - *text - 1);
-	name[end - *text - 1] = 0;
-	*text = end + 1;
+	while (*++at != '\'' || *++at == '\'') {
+		if (!*at)
+			return fail(in, EINVAL, "the name at '%.20s' has no end", *text);
+		if (n == INCISE_MODEL_NAME_MAX - 1)
+			return fail(in, EINVAL, "a name is longer than %d bytes", n);
+		name[n++] = *at;
+	}
+	name[n] = 0;
+	*text = at;
 	return 0;
 }
 
-/* [a b c]: just n finite numbers, then the end of the line. */
+/* 'NAME', then the end of the line. */
+static int read_name(struct reader *in, const char *text, char *name)
+{
+	int rc = read_quoted(in, &text, name);
+
+	if (!rc && *text)
+		rc = fail(in, EINVAL, "expected the end of the line at '%.20s'", text);
+	return rc;
+}
+
+/* [a b c]: just n finite numbers, then the end of the line; one may lack its brackets. */
 static int read_numbers(struct reader *in, const char *text, double *values, int n)
 {
-	if (*text++ != '[')
+	bool bare = n == 1 && *text != '[';
+
+	if (!bare && *text++ != '[')
 		return fail(in, EINVAL, "expected %d numbers in brackets", n);
 	for (int i = 0; i < n; i++) {
 		char *end;
@@ -91,7 +132,7 @@ static int read_numbers(struct reader *in, const char *text, double *values, int
 			return fail(in, EINVAL, "number %d is not finite", i + 1);
 		text = end + strspn(end, " \t,;");
 	}
-	if (strcmp(text, "]"))
+	if (strcmp(text, bare ? "" : "]"))
 		return fail(in, EINVAL, "expected ']' after %d numbers, found '%.20s'", n,
 			    text);
 	return 0;
@@ -113,31 +154,45 @@ static int read_whole(struct reader *in, const char *key, const char *text, int 
 
 /* --- keys of the sections --- */
 
-/* A key of [System]; those that do not change a Sugeno model's output are ignored. */
+/* The place of a key among @known, each of which is given once at most. */
+static int find_key(struct reader *in, const char *key, const char *const known[],
+		    unsigned *seen)
+{
+	const char *near = incise_nearest_name(key, known);
+	int i = 0;
+
+	while (known[i] && strcmp(known[i], key))
+		i++;
+	if (!known[i])
+		return fail(in, EINVAL, "unknown key '%.40s'%s%s%s", key,
+			    near ? "; did you mean " : "", near ? near : "",
+			    near ? "?" : "");
+	if (*seen & 1u << i)
+		return fail(in, EINVAL, "%s is given twice; remove one", key);
+	*seen |= 1u << i;
+	return i;
+}
+
 static int system_key(struct reader *in, const char *key, const char *value)
 {
-	static const struct {
-		const char *key, *value;
-	} must[] = {
-		{"Type", "sugeno"},
-		{"DefuzzMethod", "wtaver"},
-	};
 	struct incise_model *model = in->model;
+	int i = find_key(in, key, system_keys, &in->system_seen), n, rc;
 	char word[INCISE_MODEL_NAME_MAX];
-	int n, rc;
+	const char *must = i == TYPE ? "sugeno" : "wtaver";
 
-	if (!strcmp(key, "Name"))
-		return read_quoted(in, &value, model->info.name);
-	if (!strcmp(key, "NumInputs"))
+	switch (i) {
+	case NAME:
+		return read_name(in, value, model->info.name);
+	case NUM_INPUTS:
 		return read_whole(in, key, value, 1, INCISE_MODEL_INPUTS_MAX,
 				  &model->info.n_inputs);
-	if (!strcmp(key, "NumOutputs"))
+	case NUM_OUTPUTS:
 		return read_whole(in, key, value, 1, 1, &n);
-	if (!strcmp(key, "NumRules"))
+	case NUM_RULES:
 		return read_whole(in, key, value, 1, INCISE_MODEL_RULES_MAX,
 				  &in->n_rules);
-	if (!strcmp(key, "AndMethod")) {
-		rc = read_quoted(in, &value, word);
+	case AND:
+		rc = read_name(in, value, word);
 		if (!rc && strcmp(word, "prod") && strcmp(word, "min"))
 			rc = fail(in, ENOTSUP,
 				  "AndMethod='%s': only 'prod' and 'min' are supported",
@@ -145,19 +200,28 @@ static int system_key(struct reader *in, const char *key, const char *value)
 		model->info.and_method =
 			!rc && !strcmp(word, "min") ? INCISE_AND_MIN : INCISE_AND_PROD;
 		return rc;
-	}
-	for (size_t i = 0; i < sizeof(must) / sizeof(*must); i++) {
-		if (strcmp(key, must[i].key))
-			continue;
-		rc = read_quoted(in, &value, word);
-		if (!rc && strcmp(word, must[i].value))
+	case TYPE:
+	case DEFUZZ:
+		rc = read_name(in, value, word);
+		if (!rc && strcmp(word, must))
 			rc = fail(in, ENOTSUP,
 				  "%s='%s': only '%s' is supported; convert the model to "
 				  "Sugeno with wtaver",
-				  key, word, must[i].value);
+				  key, word, must);
 		return rc;
 	}
-	return 0;
+	return i < 0 ? i : 0;
+}
+
+/* One character between white space; *text moves behind all. */
+static bool skip(const char **text, char c)
+{
+	const char *at = *text + strspn(*text, BLANKS);
+
+	if (*at != c)
+		return false;
+	*text = at + 1 + strspn(at + 1, BLANKS);
+	return true;
 }
 
 /* MFn='name':'kind',[…]: name and kind; *value moves to the bracket. */
@@ -171,36 +235,49 @@ static int mf_head(struct reader *in, const char *key, const char **value, int n
 	rc = read_whole(in, "MF", key + 2, 1, n_mfs, number);
 	if (!rc)
 		rc = read_quoted(in, value, name);
-	if (!rc && *(*value)++ != ':')
+	if (!rc && !skip(value, ':'))
 		rc = fail(in, EINVAL, "expected ':' after the function's name");
 	if (!rc)
 		rc = read_quoted(in, value, kind);
-	if (!rc && *(*value)++ != ',')
+	if (!rc && !skip(value, ','))
 		rc = fail(in, EINVAL, "expected ',' after the function's kind");
-	*value += rc ? 0 : strspn(*value, " \t");
 	--*number;
 	return rc;
 }
 
+/* @n_min and @n_max of @n functions; the ends of an output's range may be equal. */
 static int variable_key(struct reader *in, struct incise_variable *v, const char *key,
-			const char *value)
+			const char *value, unsigned *seen, int n_min, int n_max, int *n)
 {
+	bool output = v == &in->model->info.output;
 	double range[2];
-	int rc;
+	int rc = find_key(in, key, variable_keys, seen);
 
-	if (!strcmp(key, "Name"))
-		return read_quoted(in, &value, v->name);
-	if (strcmp(key, "Range"))
-		return 0;
-	rc = read_numbers(in, value, range, 2);
+	if (rc == VARIABLE_NAME)
+		return read_name(in, value, v->name);
+	if (rc == NUM_MFS)
+		return read_whole(in, key, value, n_min, n_max, n);
+	if (rc == RANGE)
+		rc = read_numbers(in, value, range, 2);
 	if (rc)
 		return rc;
 	v->min = range[0];
 	v->max = range[1];
-	if (!(v->min < v->max) || !isfinite(v->max - v->min))
+	if ((!(v->min < v->max) && !(output && v->min == v->max)) ||
+	    !isfinite(v->max - v->min))
 		return fail(in, EINVAL,
 			    "Range: the first number must be the smaller one");
 	return 0;
+}
+
+/* MATLAB's anfis() writes widths of either sign: only their squares count. */
+static void take_widths(struct incise_mf *mf)
+{
+	if (mf->type == INCISE_MF_GAUSS || mf->type == INCISE_MF_GAUSS2 ||
+	    mf->type == INCISE_MF_GBELL)
+		mf->p[0] = fabs(mf->p[0]);
+	if (mf->type == INCISE_MF_GAUSS2)
+		mf->p[2] = fabs(mf->p[2]);
 }
 
 /* A key of an input's section, i from 0 on. */
@@ -212,16 +289,15 @@ static int input_key(struct reader *in, int i, const char *key, const char *valu
 	const char *fault;
 	int k, type, rc;
 
-	if (!strcmp(key, "Range"))
-		in->ranges_seen |= 1u << i;
-	if (!strcmp(key, "NumMFs"))
-		return read_whole(in, key, value, 1, INCISE_MODEL_MFS_MAX,
-				  &model->info.n_mfs[i]);
 	if (strncmp(key, "MF", 2))
-		return variable_key(in, &model->info.input[i], key, value);
+		return variable_key(in, &model->info.input[i], key, value,
+				    &in->input_seen[i], 0, INCISE_MODEL_MFS_MAX,
+				    &model->info.n_mfs[i]);
 	rc = mf_head(in, key, &value, model->info.n_mfs[i], &k, name, kind);
 	if (rc)
 		return rc;
+	if (in->mfs_seen[i] & 1ull << k)
+		return fail(in, EINVAL, "%s is given twice; remove one", key);
 	type = incise_mf_type_find(kind);
 	if (type < 0)
 		return fail(
@@ -233,6 +309,7 @@ static int input_key(struct reader *in, int i, const char *key, const char *valu
 	mf->type = type;
 	strcpy(mf->name, name);
 	rc = read_numbers(in, value, mf->p, incise_mf_n_params(type));
+	take_widths(mf);
 	fault = rc ? NULL : incise_mf_fault(type, mf->p);
 	if (fault)
 		rc = fail(in, EINVAL, "function %s, a %s: %s", name, kind, fault);
@@ -248,15 +325,15 @@ static int output_key(struct reader *in, const char *key, const char *value)
 	struct consequent *out;
 	int k, rc;
 
-	if (!strcmp(key, "NumMFs"))
-		return read_whole(in, key, value, 1, INCISE_MODEL_RULES_MAX,
-				  &in->n_out_mfs);
 	if (strncmp(key, "MF", 2))
-		return variable_key(in, &model->info.output, key, value);
+		return variable_key(in, &model->info.output, key, value, &in->output_seen,
+				    1, INCISE_MODEL_RULES_MAX, &in->n_out_mfs);
 	rc = mf_head(in, key, &value, in->n_out_mfs, &k, name, kind);
 	if (rc)
 		return rc;
 	out = &in->out[k];
+	if (out->seen)
+		return fail(in, EINVAL, "%s is given twice; remove one", key);
 	out->constant = !strcmp(kind, "constant");
 	if (!out->constant && strcmp(kind, "linear"))
 		return fail(in, ENOTSUP,
@@ -283,19 +360,35 @@ static int check_variables(struct reader *in)
 	if (!in->system || !model->info.n_inputs || !in->n_rules)
 		return fail(in, EINVAL,
 			    "[Rules] before NumInputs and NumRules in [System]");
+	if (!(in->system_seen & 1u << TYPE))
+		return fail(in, EINVAL,
+			    "[System] lacks its Type; write Type='sugeno' if it is one");
 	for (int i = 0; i < model->info.n_inputs; i++) {
-		if (!(in->inputs_seen & 1u << i) || !(in->ranges_seen & 1u << i))
+		if (!(in->input_seen[i] & 1u << RANGE))
 			return fail(in, EINVAL, "[Rules] before [Input%d] with its Range",
 				    i + 1);
-		if (!model->info.n_mfs[i] ||
+		if (!(in->input_seen[i] & 1u << NUM_MFS) ||
 		    in->mfs_seen[i] != (1ull << model->info.n_mfs[i]) - 1)
 			return fail(in, EINVAL,
 				    "[Input%d] lacks some of its NumMFs=%d functions",
 				    i + 1, model->info.n_mfs[i]);
 	}
-	if (!in->output)
-		return fail(in, EINVAL, "[Rules] before [Output1]");
+	if (!in->n_out_mfs)
+		return fail(in, EINVAL, "[Rules] before [Output1] with its NumMFs");
 	return 0;
+}
+
+/* A whole number, which fuzzylite writes as 1.000; *text moves behind it. */
+static bool read_index(const char **text, long *index)
+{
+	char *end;
+	double value = incise_decimal(*text, &end);
+
+	if (end == *text || !(fabs(value) <= 1000) || value != rint(value))
+		return false;
+	*text = end;
+	*index = lrint(value);
+	return true;
 }
 
 /* "1 2, 3 (1) : 1" */
@@ -304,58 +397,48 @@ static int read_rule(struct reader *in)
 	struct incise_model *model = in->model;
 	struct incise_rule *rule = &model->rule[model->info.n_rules];
 	const char *text = in->text;
-	int n_used = 0;
+	int n_used = 0, number = model->info.n_rules + 1;
 	long v;
 	char *end;
 
 	if (model->info.n_rules == in->n_rules)
 		return fail(in, EINVAL, "more rules than NumRules=%d", in->n_rules);
 	for (int i = 0; i < model->info.n_inputs; i++) {
-		v = strtol(text, &end, 10);
-		if (end == text || v > model->info.n_mfs[i])
+		if (!read_index(&text, &v) || v > model->info.n_mfs[i])
 			return fail(in, EINVAL,
 				    "rule %d: input %d: expected a number from 0 to %d",
-				    model->info.n_rules + 1, i + 1, model->info.n_mfs[i]);
+				    number, i + 1, model->info.n_mfs[i]);
 		if (v < 0)
 			return fail(in, ENOTSUP, "rule %d: 'not' (%ld) is not supported",
-				    model->info.n_rules + 1, v);
+				    number, v);
 		rule->mf[i] = v - 1;
 		n_used += v > 0;
-		text = end;
 	}
-	text += strspn(text, " \t");
-	if (*text++ != ',')
-		return fail(in, EINVAL, "rule %d: expected ',' after %d inputs",
-			    model->info.n_rules + 1, model->info.n_inputs);
-	v = strtol(text, &end, 10);
-	if (end == text || v < 1 || v > in->n_out_mfs)
+	if (!skip(&text, ','))
+		return fail(in, EINVAL, "rule %d: expected ',' after %d inputs", number,
+			    model->info.n_inputs);
+	if (!read_index(&text, &v) || v < 1 || v > in->n_out_mfs)
 		return fail(in, EINVAL, "rule %d: expected a consequent from 1 to %d",
-			    model->info.n_rules + 1, in->n_out_mfs);
+			    number, in->n_out_mfs);
 	if (!in->out[v - 1].seen)
-		return fail(in, EINVAL, "rule %d: consequent MF%ld is missing",
-			    model->info.n_rules + 1, v);
+		return fail(in, EINVAL, "rule %d: consequent MF%ld is missing", number,
+			    v);
 	memcpy(rule->p, in->out[v - 1].p, sizeof(rule->p));
 	model->constant[model->info.n_rules] = in->out[v - 1].constant;
-	text = end + strspn(end, " \t");
-	if (*text++ != '(')
+	if (!skip(&text, '('))
 		return fail(in, EINVAL, "rule %d: expected a weight in parentheses",
-			    model->info.n_rules + 1);
+			    number);
 	rule->weight = incise_decimal(text, &end);
-	if (end == text || *end != ')' || !(rule->weight >= 0 && rule->weight <= 1))
-		return fail(in, EINVAL, "rule %d: expected a weight from 0 to 1",
-			    model->info.n_rules + 1);
-	text = end + 1 + strspn(end + 1, " \t");
-	if (*text++ != ':')
-		return fail(in, EINVAL, "rule %d: expected ': 1' at the end",
-			    model->info.n_rules + 1);
-	v = strtol(text, &end, 10);
-	if (end == text || *end || (v != 1 && v != 2))
-		return fail(in, EINVAL, "rule %d: expected ': 1' at the end",
-			    model->info.n_rules + 1);
+	if (end == text || !(rule->weight >= 0 && rule->weight <= 1))
+		return fail(in, EINVAL, "rule %d: expected a weight from 0 to 1", number);
+	text = end;
+	if (!skip(&text, ')') || !skip(&text, ':') || !read_index(&text, &v) || *text ||
+	    (v != 1 && v != 2))
+		return fail(in, EINVAL, "rule %d: expected ') : 1' behind the weight",
+			    number);
 	/* 'or' and 'and' of a single input are the same. */
 	if (v == 2 && n_used != 1)
-		return fail(in, ENOTSUP, "rule %d: 'or' (: 2) is not supported",
-			    model->info.n_rules + 1);
+		return fail(in, ENOTSUP, "rule %d: 'or' (: 2) is not supported", number);
 	model->info.n_rules++;
 	return 0;
 }
@@ -383,11 +466,10 @@ static int read_file(struct reader *in)
 				if (input < 1 || input > in->model->info.n_inputs)
 					return fail(in, EINVAL, "%.20s: NumInputs is %d",
 						    in->text, in->model->info.n_inputs);
-				in->inputs_seen |= 1u << --input;
+				input--;
 				section = INPUT;
 			} else if (!strcmp(in->text, "[Output1]")) {
 				section = OUTPUT;
-				in->output = true;
 			} else if (!strcmp(in->text, "[Rules]")) {
 				section = RULES;
 				in->rules = true;
@@ -414,7 +496,8 @@ static int read_file(struct reader *in)
 				".fis file",
 				in->text);
 		*equals = 0;
-		value = equals + 1;
+		cut(in->text);
+		value = equals + 1 + strspn(equals + 1, BLANKS);
 		rc = section == SYSTEM	? system_key(in, in->text, value)
 		     : section == INPUT ? input_key(in, input, in->text, value)
 					: output_key(in, in->text, value);

@@ -123,6 +123,7 @@ static char *beside(const struct incise_scene *scene, const char *name)
 struct named {
 	double point_mm[3], to_mm[3], normal[3], radius_mm;
 	const char *file;
+	bool cavity;
 };
 
 static struct incise_surface *plane(const struct named *n, struct incise_error *err)
@@ -147,7 +148,7 @@ static struct incise_surface *heights(const struct named *n, struct incise_error
 
 static struct incise_surface *mesh(const struct named *n, struct incise_error *err)
 {
-	return incise_surface_load_mesh(n->file, n->point_mm, err);
+	return incise_surface_load_mesh(n->file, n->point_mm, n->cavity, err);
 }
 
 /* The keys of each kind; those without an @optional mark must be there. */
@@ -163,7 +164,7 @@ static const struct kind {
 	{"sphere", "centre_mm", false, {"kind", "centre_mm", "radius_mm"}, sphere},
 	{"capsule", "from_mm", false, {"kind", "from_mm", "to_mm", "radius_mm"}, capsule},
 	{"heights", "at_mm", true, {"kind", "file", "at_mm"}, heights},
-	{"mesh", "at_mm", true, {"kind", "file", "at_mm"}, mesh},
+	{"mesh", "at_mm", true, {"kind", "file", "at_mm", "cavity"}, mesh},
 };
 #define KINDS (sizeof(kinds) / sizeof(*kinds))
 
@@ -208,6 +209,8 @@ static int read_named(struct named *named, const struct kind *kind,
 		rc = incise_conf_need(group, path, "file", err);
 	if (!rc && has(kind, "file"))
 		rc = incise_conf_string(group, path, "file", &named->file, err);
+	if (!rc && has(kind, "cavity"))
+		rc = incise_conf_bool(group, path, "cavity", &named->cavity, err);
 	return rc;
 }
 

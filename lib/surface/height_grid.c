@@ -36,22 +36,13 @@ struct grid {
 	struct mesh_draft draft;
 };
 
-/* The next word of the file, over ends of lines; false at the end of the file. */
-static bool next_word(struct text *text, const char **word, size_t *length)
-{
-	while (!(*length = text_word(text, word)))
-		if (!text_next_line(text))
-			return false;
-	return true;
-}
-
 /* The header's lines, up to the first that does not begin with a letter. */
 static int read_header(struct grid *grid)
 {
 	const char *word;
 	size_t length;
 
-	while (next_word(&grid->text, &word, &length)) {
+	while (text_next_word(&grid->text, &word, &length)) {
 		size_t key = 0;
 
 		/* A height may not be a number either; but then it is no key. */
@@ -124,7 +115,7 @@ static int read_height(struct grid *grid, size_t column, size_t row, double *hei
 	const char *word;
 	size_t length;
 
-	if (!next_word(&grid->text, &word, &length))
+	if (!text_next_word(&grid->text, &word, &length))
 		return text_error(&grid->text, grid->err,
 				  "the file ends before height %zu of row %zu of %zu",
 				  column + 1, row + 1, grid->rows);
@@ -175,7 +166,7 @@ static int read_heights(struct grid *grid, const double at_mm[3])
 			}
 		}
 	}
-	if (next_word(&grid->text, &word, &length))
+	if (text_next_word(&grid->text, &word, &length))
 		return text_error(&grid->text, grid->err,
 				  "'%.*s' after the last of %zu × %zu heights",
 				  (int)(length < 40 ? length : 40), word, grid->columns,

@@ -115,38 +115,49 @@ void mesh_touch(const struct mesh *mesh, const struct mesh_spot *spot, const dou
 	}
 }
 
-/* p lies over the border at an edge of a face: within its plane, outside of the edge. */
-static bool over_edge(const struct mesh *mesh, uint32_t face, int edge, const double p[3])
+/*
+ * p lies over the border at an edge of a face: within its plane, outside of the edge. The unit
+ * vector over it is added to @out.
+ */
+static bool over_edge(const struct mesh *mesh, uint32_t face, int edge, const double p[3],
+		      double out[3])
 {
 	const double *corner[3];
-	double n[3];
+	double n[3], along[3], over[3];
 
 	if (mesh->neighbour[face][edge] != MESH_NONE)
 		return false;
 	corners(mesh, face, corner);
 	triangle_area_normal(n, corner[0], corner[1], corner[2]);
-	return triangle_side(n, corner[edge], corner[(edge + 1) % 3], p) < 0;
+	if (!(triangle_side(n, corner[edge], corner[(edge + 1) % 3], p) < 0))
+		return false;
+	v3_sub(along, corner[(edge + 1) % 3], corner[edge]);
+	v3_cross(over, along, n);
+	v3_add(out, out, 1 / v3_length(over), over);
+	return true;
 }
 
-bool mesh_beyond_border(const struct mesh *mesh, const struct mesh_spot *spot,
-			const double p[3])
+/* The same at a spot; @out points over the border. */
+static bool over_border(const struct mesh *mesh, const struct mesh_spot *spot,
+			const double p[3], double out[3])
 {
 	struct mesh_fan fan;
 	uint32_t face, vertex;
+	bool over = false;
 
 	if (spot->part == TRIANGLE_FACE)
 		return false;
 	if (spot->part < TRIANGLE_CORNER)
-		return over_edge(mesh, spot->face, spot->part - TRIANGLE_EDGE, p);
+		return over_edge(mesh, spot->face, spot->part - TRIANGLE_EDGE, p, out);
 	vertex = mesh->corner[spot->face][spot->part - TRIANGLE_CORNER];
 	fan = mesh_fan(spot->face, vertex);
 	while (mesh_fan_face(mesh, &fan, &face)) {
 		int i = mesh_corner_of(mesh, face, vertex);
 
-		if (over_edge(mesh, face, i, p) || over_edge(mesh, face, (i + 2) % 3, p))
-			return true;
+		over |= over_edge(mesh, face, i, p, out);
+		over |= over_edge(mesh, face, (i + 2) % 3, p, out);
 	}
-	return false;
+	return over;
 }
 
 /* The place nearest to @middle among those of a face that are @top high; false if none. */
@@ -208,6 +219,72 @@ void mesh_top(const struct mesh *mesh, struct incise_touch *touch)
 		top = spot;
 	}
 	mesh_touch(mesh, &top, top.point, touch);
+}
+
+/* Widen a box by a point. */
+static void widen(double lo[3], double hi[3], const double p[3])
+{
+	for (int i = 0; i < 3; i++) {
+		lo[i] = fmin(lo[i], p[i]);
+		hi[i] = fmax(hi[i], p[i]);
+	}
+}
+
+/* The middle of the face that is nearest to a place; one at a border only if all are. */
+static void inner_spot(const struct mesh *mesh, const double place[3],
+		       struct mesh_spot *spot)
+{
+	double best = INFINITY;
+
+	for (uint32_t face = 0; face < mesh->n_triangles; face++) {
+		const uint32_t *behind = mesh->neighbour[face];
+		const double *corner[3];
+		double middle[3], d;
+
+		corners(mesh, face, corner);
+		for (int i = 0; i < 3; i++)
+			middle[i] = (corner[0][i] + corner[1][i] + corner[2][i]) / 3;
+		d = v3_distance2(middle, place);
+		/* Farther than any place of a mesh. */
+		if (behind[0] == MESH_NONE || behind[1] == MESH_NONE ||
+		    behind[2] == MESH_NONE)
+			d += 1e12;
+		if (d >= best)
+			continue;
+		best = d;
+		*spot = (struct mesh_spot){.face = face, .part = TRIANGLE_FACE};
+		v3_copy(spot->point, middle);
+	}
+}
+
+void mesh_size(const struct mesh *mesh, struct incise_surface_size *size)
+{
+	struct mesh_spot spot;
+	double middle[3];
+
+	*size = (struct incise_surface_size){
+		.lo_mm = {INFINITY, INFINITY, INFINITY},
+		.hi_mm = {-INFINITY, -INFINITY, -INFINITY},
+		.open_lo_mm = {INFINITY, INFINITY, INFINITY},
+		.open_hi_mm = {-INFINITY, -INFINITY, -INFINITY},
+	};
+	for (uint32_t face = 0; face < mesh->n_triangles; face++) {
+		const double *corner[3];
+
+		corners(mesh, face, corner);
+		for (int i = 0; i < 3; i++) {
+			widen(size->lo_mm, size->hi_mm, corner[i]);
+			if (mesh->neighbour[face][i] != MESH_NONE)
+				continue;
+			size->open_edges++;
+			widen(size->open_lo_mm, size->open_hi_mm, corner[i]);
+			widen(size->open_lo_mm, size->open_hi_mm, corner[(i + 1) % 3]);
+		}
+	}
+	for (int i = 0; i < 3; i++)
+		middle[i] = size->lo_mm[i] / 2 + size->hi_mm[i] / 2;
+	inner_spot(mesh, middle, &spot);
+	mesh_touch(mesh, &spot, spot.point, &size->inner);
 }
 
 /*
@@ -283,6 +360,73 @@ double mesh_nearest(const struct mesh *mesh, const double p[3], uint32_t hint,
 	return sqrt(fmin(best, least)) * (1 - 1e-9);
 }
 
+/* Where another part that begins at a border goes on: straight or upwards, or down a ridge. */
+#define AHEAD 0.01
+
+/*
+ * A face beside the border at a spot, on the other side of it: one that is nearer to p, which
+ * is then @next, or one that goes on from there. False: there is none, the surface ends.
+ */
+static bool goes_on(const struct mesh *mesh, const struct mesh_spot *spot,
+		    const double p[3], const double out[3], uint32_t face,
+		    double *nearest, struct mesh_spot *next)
+{
+	const double *corner[3];
+	double at[3], x[3], middle[3], ahead, d;
+	int part = mesh_on_face(mesh, face, spot->point, at);
+
+	if (face == spot->face ||
+	    v3_distance2(at, spot->point) > MESH_SEAM_MM * MESH_SEAM_MM)
+		return false;
+	corners(mesh, face, corner);
+	for (int i = 0; i < 3; i++) {
+		middle[i] =
+			(corner[0][i] + corner[1][i] + corner[2][i]) / 3 - spot->point[i];
+		if (spot->part >= TRIANGLE_CORNER &&
+		    mesh->corner[face][i] ==
+			    mesh->corner[spot->face][spot->part - TRIANGLE_CORNER])
+			return false;
+	}
+	ahead = v3_dot(middle, out) / (v3_length(middle) * v3_length(out));
+	mesh_on_face(mesh, face, p, x);
+	d = v3_distance2(x, p);
+	if (ahead > -AHEAD && d < *nearest) {
+		*nearest = d;
+		*next = (struct mesh_spot){.face = face, .part = part};
+		v3_copy(next->point, at);
+	}
+	return ahead > AHEAD;
+}
+
+bool mesh_beyond_border(const struct mesh *mesh, const struct mesh_spot *spot,
+			const double p[3], struct mesh_spot *next)
+{
+	uint32_t stack[2 * BVH_DEPTH_MAX], child = 0;
+	double out[3] = {0}, nearest = v3_distance2(spot->point, p) * (1 - 1e-9);
+	bool on = false;
+	int depth = 0;
+
+	*next = *spot;
+	if (!over_border(mesh, spot, p, out))
+		return false;
+	for (;;) {
+		for (uint32_t k = 0; child & BVH_LEAF && k < BVH_COUNT(child); k++)
+			on |= goes_on(mesh, spot, p, out, BVH_FIRST(child) + k, &nearest,
+				      next);
+		for (int side = 0; !(child & BVH_LEAF) && side < 2; side++) {
+			const struct bvh_node *node = mesh->bvh.node + child;
+
+			if (box_distance2(node->lo[side], node->hi[side], spot->point) <=
+			    MESH_SEAM_MM * MESH_SEAM_MM)
+				stack[depth++] = node->child[side];
+		}
+		if (!depth)
+			break;
+		child = stack[--depth];
+	}
+	return !on && next->face == spot->face;
+}
+
 /*
  * A straight way, and what a watertight test with triangles needs of it (Woop, Benthin,
  * Wald 2013): axes with the longest one last, and a shear that lays the way along it. A
@@ -294,6 +438,7 @@ struct way {
 	double along[3], inverse[3], shear[3];
 	int axis[3];
 	double least; /* part of the way */
+	double slack; /* mm beyond a border that count as met */
 };
 
 static bool way_new(struct way *way, const double from[3], const double to[3],
@@ -330,14 +475,29 @@ static double way_box(const struct way *way, const float lo[3], const float hi[3
 
 	/* No NaN comes here, so no fmin(): it would be a call. */
 	for (int i = 0; i < 3; i++) {
-		double a = (lo[i] - way->from[i]) * way->inverse[i];
-		double b = (hi[i] - way->from[i]) * way->inverse[i];
+		double a = (lo[i] - way->slack - way->from[i]) * way->inverse[i];
+		double b = (hi[i] + way->slack - way->from[i]) * way->inverse[i];
 		double near = a < b ? a : b, far = a < b ? b : a;
 
 		in = near > in ? near : in;
 		out = far < out ? far : out;
 	}
 	return in <= out ? in : 2;
+}
+
+/* Past the face at borders only, and no farther than the slack; areas by edges. */
+static bool along_border(const struct way *way, const struct mesh *mesh, uint32_t face,
+			 const double x[3], const double y[3], const double area[3])
+{
+	for (int i = 0; i < 3; i++) {
+		int next = (i + 1) % 3;
+
+		if (area[i] < 0 &&
+		    (mesh->neighbour[face][i] != MESH_NONE ||
+		     -area[i] > way->slack * hypot(x[next] - x[i], y[next] - y[i])))
+			return false;
+	}
+	return way->slack > 0;
 }
 
 static void way_face(const struct way *way, const struct mesh *mesh, uint32_t face,
@@ -359,7 +519,8 @@ static void way_face(const struct way *way, const struct mesh *mesh, uint32_t fa
 	w = x[1] * y[0] - y[1] * x[0];
 	sum = u + v + w;
 	/* From the back, past it, or along it. */
-	if (u < 0 || v < 0 || w < 0 || !(sum > 0))
+	if (!(sum > 0) || ((u < 0 || v < 0 || w < 0) &&
+			   !along_border(way, mesh, face, x, y, (double[3]){w, u, v})))
 		return;
 	t = (u * z[0] + v * z[1] + w * z[2]) / sum;
 	if (t < way->least || t > 1 || t >= *first)
@@ -369,8 +530,9 @@ static void way_face(const struct way *way, const struct mesh *mesh, uint32_t fa
 }
 
 bool mesh_enters(const struct mesh *mesh, const double from[3], const double to[3],
-		 double least, struct mesh_spot *spot)
+		 double least, double slack, struct mesh_spot *spot)
 {
+	struct mesh_spot next;
 	struct {
 		uint32_t child;
 		double in;
@@ -382,6 +544,7 @@ bool mesh_enters(const struct mesh *mesh, const double from[3], const double to[
 
 	if (!way_new(&way, from, to, least))
 		return false;
+	way.slack = slack;
 	for (;;) {
 		if (in > 1 || in > first) {
 			;
@@ -411,7 +574,7 @@ bool mesh_enters(const struct mesh *mesh, const double from[3], const double to[
 	v3_add(point, from, first, way.along);
 	spot->face = found;
 	spot->part = mesh_on_face(mesh, found, point, spot->point);
-	return true;
+	return !slack || !mesh_beyond_border(mesh, spot, point, &next);
 }
 
 /*

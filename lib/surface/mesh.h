@@ -175,6 +175,7 @@ void bvh_free(struct bvh *bvh);
 
 struct mesh {
 	uint32_t n_vertices, n_triangles;
+	bool open; /* it has a border */
 	double (*vertex)[3];
 	double (*normal)[3];	  /* of vertices: unit, weighted by angle */
 	uint32_t (*corner)[3];	  /* vertices of a triangle */
@@ -192,6 +193,7 @@ struct mesh_draft {
 	uint32_t (*corner)[3];
 	float (*uv)[3][2]; /* or NULL */
 	int *line;	   /* of each triangle, for messages; or NULL */
+	bool cavity;	   /* closed pieces may have the tissue around them */
 };
 
 /* A place on a mesh. */
@@ -207,7 +209,8 @@ void mesh_free(struct mesh *mesh);
 size_t mesh_memory(const struct mesh *mesh);
 
 /* Readers of files. NULL with errno as in incise_surface_load_mesh(). */
-struct mesh *obj_load(const char *path, const double at_mm[3], struct incise_error *err);
+struct mesh *obj_load(const char *path, const double at_mm[3], bool cavity,
+		      struct incise_error *err);
 struct mesh *height_grid_load(const char *path, const double at_mm[3],
 			      struct incise_error *err);
 
@@ -215,12 +218,20 @@ struct mesh *height_grid_load(const char *path, const double at_mm[3],
 void mesh_touch(const struct mesh *mesh, const struct mesh_spot *spot, const double p[3],
 		struct incise_touch *touch) INCISE_REALTIME;
 
-/* The nearest spot is at the border of an open mesh, and p lies over that border. */
+/* A border this near to another part of the mesh, such as at a seam, is none. */
+#define MESH_SEAM_MM 0.1
+
+/*
+ * The nearest spot is at the border of an open mesh, p lies over that border, and no other part
+ * goes on there. Where one does, @next is a place on it that is nearer to p, or the spot itself.
+ */
 bool mesh_beyond_border(const struct mesh *mesh, const struct mesh_spot *spot,
-			const double p[3]) INCISE_REALTIME;
+			const double p[3], struct mesh_spot *next) INCISE_REALTIME;
 
 /* The highest place; of many the one nearest to the middle. */
 void mesh_top(const struct mesh *mesh, struct incise_touch *touch);
+
+void mesh_size(const struct mesh *mesh, struct incise_surface_size *size);
 
 /*
  * The nearest spot to p. Boxes beyond @share of the best distance so far are left out:
@@ -232,10 +243,11 @@ double mesh_nearest(const struct mesh *mesh, const double p[3], uint32_t hint,
 
 /*
  * The first front face that the straight way meets at @least mm from its start or later.
- * It goes through no edge and no corner: what lies on them counts as met.
+ * It goes through no edge and no corner: what lies on them counts as met. With @slack, the gap
+ * of a seam counts as well, if it is no wider on each side.
  */
 bool mesh_enters(const struct mesh *mesh, const double from[3], const double to[3],
-		 double least, struct mesh_spot *spot) INCISE_REALTIME;
+		 double least, double slack, struct mesh_spot *spot) INCISE_REALTIME;
 
 /*
  * Glide over the surface from a spot towards where p is nearest, at most @reach mm from

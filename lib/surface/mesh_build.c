@@ -2,8 +2,8 @@
 /*
  * From a reader's points and triangles to a mesh:
  *
- *   weld equal points ─▶ check areas ─▶ find neighbours ─▶ tree of boxes, whose order the
- *   triangles take ─▶ number the fans around points: they are the vertices
+ *   weld equal points ─▶ check areas ─▶ find neighbours ─▶ weld seams ─▶ tree of boxes,
+ *   whose order the triangles take ─▶ number the fans around points: they are the vertices
  */
 #include <errno.h>
 #include <math.h>
@@ -31,56 +31,98 @@ static int line_of(const struct mesh_builder *b, uint32_t face)
 	return b->draft->line ? b->draft->line[face] : 0;
 }
 
-struct located {
-	double point[3];
-	uint32_t index;
+/* So many points before one are compared with it; far fewer have a key as near. */
+#define WINDOW 256
+
+struct keyed {
+	double key; /* mm along a direction that few meshes have a face across */
+	uint32_t point;
 };
 
-static int compare_located(const void *a, const void *b)
+static int compare_keys(const void *a, const void *b)
 {
-	const struct located *p = a, *q = b;
+	const struct keyed *p = a, *q = b;
 
-	for (int i = 0; i < 3; i++)
-		if (p->point[i] != q->point[i])
-			return p->point[i] < q->point[i] ? -1 : 1;
-	return p->index < q->index ? -1 : p->index > q->index;
+	if (p->key != q->key)
+		return p->key < q->key ? -1 : 1;
+	return p->point < q->point ? -1 : p->point > q->point;
 }
 
-/* Points with equal coordinates become the first one of them. */
-static int weld(struct mesh_builder *b)
+/* The points that are welded: all of them, or those of borders; the others are MESH_NONE. */
+static size_t sort_points(const struct mesh_builder *b, bool borders,
+			  struct keyed *sorted, uint32_t *to)
 {
-	size_t n = b->draft->n_points;
-	struct located *sorted = malloc(n * sizeof(*sorted));
-	uint32_t *first = malloc(n * sizeof(*first));
+	static const double direction[3] = {0.61273451928, 0.52330182737, 0.59219273645};
+	size_t n = 0;
 
-	if (!sorted || !first) {
+	for (size_t k = 0; k < b->draft->n_points; k++)
+		to[k] = borders ? MESH_NONE : (uint32_t)k;
+	for (uint32_t face = 0; borders && face < b->n; face++) {
+		for (int i = 0; i < 3; i++) {
+			uint32_t p = b->corner[face][i], q = b->corner[face][(i + 1) % 3];
+
+			if (b->neighbour[face][i] != MESH_NONE)
+				continue;
+			to[p] = p;
+			to[q] = q;
+		}
+	}
+	for (size_t k = 0; k < b->draft->n_points; k++)
+		if (to[k] != MESH_NONE)
+			sorted[n++] = (struct keyed){
+				v3_dot(b->draft->point[k], direction), (uint32_t)k};
+	qsort(sorted, n, sizeof(*sorted), compare_keys);
+	return n;
+}
+
+/* Points within a tolerance of each other become the first one of them. */
+static int weld(const struct mesh_builder *b, bool borders, double tolerance,
+		uint32_t (*corner)[3])
+{
+	const double(*point)[3] = (const double(*)[3])b->draft->point;
+	size_t n_points = b->draft->n_points, n;
+	struct keyed *sorted = malloc(n_points * sizeof(*sorted));
+	uint32_t *to = malloc(n_points * sizeof(*to));
+
+	if (!sorted || !to) {
 		free(sorted);
-		free(first);
+		free(to);
 		return no_memory(b);
 	}
+	n = sort_points(b, borders, sorted, to);
 	for (size_t k = 0; k < n; k++) {
-		v3_copy(sorted[k].point, b->draft->point[k]);
-		sorted[k].index = (uint32_t)k;
-	}
-	qsort(sorted, n, sizeof(*sorted), compare_located);
-	for (size_t k = 0; k < n; k++) {
-		const struct located *before = sorted + (k ? k - 1 : 0);
-		bool equal = k && before->point[0] == sorted[k].point[0] &&
-			     before->point[1] == sorted[k].point[1] &&
-			     before->point[2] == sorted[k].point[2];
+		const double least = sorted[k].key - 2 * tolerance;
+		const uint32_t p = sorted[k].point;
 
-		first[sorted[k].index] = equal ? first[before->index] : sorted[k].index;
+		for (size_t j = k; j-- && k - j < WINDOW && sorted[j].key >= least;) {
+			const uint32_t q = to[sorted[j].point];
+
+			if (v3_distance2(point[p], point[q]) > tolerance * tolerance)
+				continue;
+			to[p] = q;
+			break;
+		}
 	}
-	for (uint32_t face = 0; face < b->n; face++)
+	for (uint32_t face = 0; face < b->n; face++) {
+		const uint32_t *from = b->corner[face];
+		uint32_t c[3];
+
 		for (int i = 0; i < 3; i++)
-			b->corner[face][i] = first[b->draft->corner[face][i]];
+			c[i] = to[from[i]] == MESH_NONE ? from[i] : to[from[i]];
+		/* A triangle as small as that stays, with its borders. */
+		if (borders && (c[0] == c[1] || c[1] == c[2] || c[2] == c[0]))
+			memcpy(c, from, sizeof(c));
+		memcpy(corner[face], c, sizeof(c));
+	}
 	free(sorted);
-	free(first);
+	free(to);
 	return 0;
 }
 
 static int check_areas(const struct mesh_builder *b)
 {
+	uint32_t first = 0, n_bad = 0;
+
 	for (uint32_t face = 0; face < b->n; face++) {
 		const double *corner[3];
 		double n[3], longest = 0;
@@ -93,13 +135,15 @@ static int check_areas(const struct mesh_builder *b)
 				       v3_distance2(corner[i], corner[(i + 1) % 3]));
 		if (v3_length(n) > MESH_HEIGHT_MIN_MM * sqrt(longest))
 			continue;
-		return incise_error_set(
-			b->err, EINVAL,
-			"%s:%d: a triangle without area (its corners coincide or lie on "
-			"one line); remove it",
-			b->draft->path, line_of(b, face));
+		first = n_bad++ ? first : face;
 	}
-	return 0;
+	if (!n_bad)
+		return 0;
+	return incise_error_set(
+		b->err, EINVAL,
+		"%s:%d: a triangle without area (its corners coincide or lie on one "
+		"line), the first of %u; remove them",
+		b->draft->path, line_of(b, first), n_bad);
 }
 
 /* A side of a triangle, kept with the smaller of its two points. */
@@ -193,6 +237,110 @@ static int find_neighbours(struct mesh_builder *b)
 	return rc;
 }
 
+/*
+ * Copies of a corner that differ in the last digits leave a seam: two borders side by side.
+ * Points of borders nearer than this part of the farthest coordinate, and of the edges' mean
+ * length, become one.
+ */
+#define SEAM_SIZE 2e-6
+#define SEAM_EDGE 0.05
+
+static double seam_mm(const struct mesh_builder *b)
+{
+	double farthest = 0, edges = 0;
+
+	for (uint32_t face = 0; face < b->n; face++) {
+		for (int i = 0; i < 3; i++) {
+			const double *p = b->draft->point[b->corner[face][i]];
+			const double *q = b->draft->point[b->corner[face][(i + 1) % 3]];
+
+			edges += sqrt(v3_distance2(p, q));
+			for (int k = 0; k < 3; k++)
+				farthest = fmax(farthest, fabs(p[k]));
+		}
+	}
+	return fmin(SEAM_SIZE * farthest, SEAM_EDGE * edges / (3.0 * b->n));
+}
+
+/* A mesh that this would break, by a third triangle at an edge, stays as it is. */
+static int weld_seams(struct mesh_builder *b)
+{
+	struct mesh_builder welded = *b;
+	struct incise_error unused;
+	int rc;
+
+	welded.err = &unused;
+	welded.corner = malloc(b->n * sizeof(*welded.corner));
+	rc = welded.corner ? weld(b, true, seam_mm(b), welded.corner) : no_memory(b);
+	if (!rc && memcmp(b->corner, welded.corner, b->n * sizeof(*b->corner)) &&
+	    !check_areas(&welded)) {
+		rc = find_neighbours(&welded);
+		if (rc)
+			rc = find_neighbours(b);
+		else
+			memcpy(b->corner, welded.corner, b->n * sizeof(*b->corner));
+	}
+	free(welded.corner);
+	return rc;
+}
+
+/*
+ * A closed piece of the mesh holds its tissue within: the sum of the tetrahedra from a point to
+ * its faces is a positive volume. @stack has room for all faces.
+ */
+static int check_piece(const struct mesh_builder *b, uint32_t first, bool *seen,
+		       uint32_t *stack)
+{
+	const double(*point)[3] = (const double(*)[3])b->draft->point;
+	const double *origin = point[b->corner[first][0]];
+	double volume = 0, rounding = 0;
+	bool closed = true;
+	uint32_t depth = 0;
+
+	stack[depth++] = first;
+	seen[first] = true;
+	while (depth) {
+		const uint32_t face = stack[--depth], *c = b->corner[face];
+		double n[3], out[3], part;
+
+		triangle_area_normal(n, point[c[0]], point[c[1]], point[c[2]]);
+		v3_sub(out, point[c[0]], origin);
+		part = v3_dot(out, n) / 6;
+		volume += part;
+		rounding += 1e-9 * fabs(part);
+		for (int i = 0; i < 3; i++) {
+			uint32_t other = b->neighbour[face][i];
+
+			closed &= other != MESH_NONE;
+			if (other == MESH_NONE || seen[other])
+				continue;
+			seen[other] = true;
+			stack[depth++] = other;
+		}
+	}
+	if (!closed || volume >= -rounding)
+		return 0;
+	return incise_error_set(
+		b->err, EINVAL,
+		"%s:%d: the closed piece of this face is turned inside out (%.3g mm3); "
+		"reverse its faces, or give cavity = true if the tissue is around it",
+		b->draft->path, line_of(b, first), volume);
+}
+
+static int check_volumes(const struct mesh_builder *b)
+{
+	bool *seen = calloc(b->n, sizeof(*seen));
+	uint32_t *stack = malloc(b->n * sizeof(*stack));
+	int rc = seen && stack ? 0 : no_memory(b);
+
+	for (uint32_t face = 0; !rc && face < b->n; face++)
+		if (!seen[face])
+			rc = check_piece(b, face, seen, stack);
+	free(seen);
+	free(stack);
+	return rc;
+}
+
 /* Build the tree, and take over the triangles in its order. */
 static int order_triangles(struct mesh_builder *b)
 {
@@ -228,6 +376,7 @@ static int order_triangles(struct mesh_builder *b)
 			uint32_t other = b->neighbour[face][i];
 
 			mesh->neighbour[k][i] = other == MESH_NONE ? other : place[other];
+			mesh->open |= other == MESH_NONE;
 		}
 		if (mesh->uv)
 			memcpy(mesh->uv[k], b->draft->uv[face], sizeof(*mesh->uv));
@@ -326,7 +475,7 @@ struct mesh *mesh_new(const struct mesh_draft *draft, struct incise_error *err)
 	struct mesh_builder b = {.draft = draft, .err = err};
 	struct mesh *mesh;
 	size_t n = draft->n_triangles;
-	int rc;
+	int rc = 0;
 
 	if (!n) {
 		incise_error_set(err, EINVAL, "%s: no triangle: expected at least one",
@@ -354,11 +503,17 @@ struct mesh *mesh_new(const struct mesh_draft *draft, struct incise_error *err)
 	    !mesh->number || (draft->uv && !mesh->uv))
 		rc = no_memory(&b);
 	else
-		rc = weld(&b);
+		memcpy(b.corner, draft->corner, n * sizeof(*b.corner));
+	if (!rc)
+		rc = weld(&b, false, 0, b.corner);
 	if (!rc)
 		rc = check_areas(&b);
 	if (!rc)
 		rc = find_neighbours(&b);
+	if (!rc)
+		rc = weld_seams(&b);
+	if (!rc && !draft->cavity)
+		rc = check_volumes(&b);
 	if (!rc)
 		rc = order_triangles(&b);
 	if (!rc)

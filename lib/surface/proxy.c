@@ -118,14 +118,14 @@ static bool is_dent(const struct incise_proxy *proxy, const struct mesh_spot *sp
 		    const double tool[3])
 {
 	const struct mesh *mesh = proxy->surface->mesh;
-	struct mesh_spot other;
+	struct mesh_spot other, next;
 	struct incise_touch touch;
 
-	if (mesh_enters(mesh, spot->point, tool, 0, &other))
+	if (mesh_enters(mesh, spot->point, tool, 0, 0, &other))
 		return true;
 	mesh_nearest(mesh, tool, spot->face, 1, &other);
 	mesh_touch(mesh, &other, tool, &touch);
-	return touch.depth_mm >= 0 && !mesh_beyond_border(mesh, &other, tool);
+	return touch.depth_mm >= 0 && !mesh_beyond_border(mesh, &other, tool, &next);
 }
 
 /*
@@ -139,8 +139,10 @@ static void follow(struct incise_proxy *proxy, const double tool[3], double reac
 	struct mesh_spot spot = spot_of(proxy), entry;
 
 	for (int part = 0; part < PARTS_MAX; part++) {
-		double way[3], above;
+		double way[3], above, last[3];
+		bool beyond;
 
+		v3_copy(last, spot.point);
 		proxy->settled = mesh_glide(mesh, tool, reach, &spot);
 		proxy->at_face = spot.face;
 		mesh_touch(mesh, &spot, tool, &proxy->touch);
@@ -157,11 +159,17 @@ static void follow(struct incise_proxy *proxy, const double tool[3], double reac
 				proxy->touch.depth_mm = -above;
 			return;
 		}
-		if (!(proxy->touch.depth_mm < -leave) &&
-		    !mesh_beyond_border(mesh, &spot, tool))
+		beyond = mesh_beyond_border(mesh, &spot, tool, &entry);
+		if (entry.face != spot.face) {
+			/* Over a seam, as over any edge. */
+			reach = fmax(reach - sqrt(v3_distance2(spot.point, last)), 0);
+			spot = entry;
+			continue;
+		}
+		if (!(proxy->touch.depth_mm < -leave) && !beyond)
 			return;
 		/* At the nearest place around, it is rounding that enters where it starts. */
-		if (!mesh_enters(mesh, spot.point, tool, ON_MM, &entry)) {
+		if (!mesh_enters(mesh, spot.point, tool, ON_MM, 0, &entry)) {
 			end(proxy);
 			return;
 		}
@@ -197,12 +205,14 @@ static void look(struct incise_proxy *proxy, const double tool[3])
 	proxy->at_face = near.face;
 	if (proxy->clear_mm > length)
 		return;
-	if (mesh_enters(mesh, proxy->tool_mm, tool, 0, &spot)) {
+	if (mesh_enters(mesh, proxy->tool_mm, tool, 0, 0, &spot) ||
+	    (mesh->open &&
+	     mesh_enters(mesh, proxy->tool_mm, tool, 0, MESH_SEAM_MM, &spot))) {
 		begin_at(proxy, &spot, spot.point);
 		v3_sub(way, tool, spot.point);
 		follow(proxy, tool, BUDGET * v3_length(way));
 	} else if (v3_distance2(near.point, tool) <= ON_MM * ON_MM &&
-		   !mesh_beyond_border(mesh, &near, tool)) {
+		   !mesh_beyond_border(mesh, &near, tool, &spot)) {
 		begin_at(proxy, &near, tool);
 		follow(proxy, tool, 0);
 	}
@@ -213,13 +223,13 @@ static void place(struct incise_proxy *proxy, const double tool[3])
 {
 	const struct mesh *mesh = proxy->surface->mesh;
 	struct incise_touch touch;
-	struct mesh_spot spot;
+	struct mesh_spot spot, next;
 
 	proxy->clear_mm = mesh_nearest(mesh, tool, 0, 1, &spot);
 	v3_copy(proxy->clear_at_mm, tool);
 	proxy->at_face = spot.face;
 	mesh_touch(mesh, &spot, tool, &touch);
-	if (touch.depth_mm < -ON_MM || mesh_beyond_border(mesh, &spot, tool))
+	if (touch.depth_mm < -ON_MM || mesh_beyond_border(mesh, &spot, tool, &next))
 		return;
 	proxy->settled = true;
 	begin_at(proxy, &spot, tool);

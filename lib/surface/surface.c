@@ -97,7 +97,8 @@ struct incise_surface *incise_surface_new_capsule(const double a_mm[3],
 }
 
 static struct incise_surface *load(enum incise_surface_kind kind, const char *path,
-				   const double at_mm[3], struct incise_error *err)
+				   const double at_mm[3], bool cavity,
+				   struct incise_error *err)
 {
 	struct incise_surface *surface;
 
@@ -106,7 +107,7 @@ static struct incise_surface *load(enum incise_surface_kind kind, const char *pa
 	surface = surface_new(kind, err);
 	if (!surface)
 		return NULL;
-	surface->mesh = kind == INCISE_SURFACE_MESH ? obj_load(path, at_mm, err)
+	surface->mesh = kind == INCISE_SURFACE_MESH ? obj_load(path, at_mm, cavity, err)
 						    : height_grid_load(path, at_mm, err);
 	if (!surface->mesh) {
 		int code = errno;
@@ -119,16 +120,16 @@ static struct incise_surface *load(enum incise_surface_kind kind, const char *pa
 }
 
 struct incise_surface *incise_surface_load_mesh(const char *path, const double at_mm[3],
-						struct incise_error *err)
+						bool cavity, struct incise_error *err)
 {
-	return load(INCISE_SURFACE_MESH, path, at_mm, err);
+	return load(INCISE_SURFACE_MESH, path, at_mm, cavity, err);
 }
 
 struct incise_surface *incise_surface_load_heights(const char *path,
 						   const double at_mm[3],
 						   struct incise_error *err)
 {
-	return load(INCISE_SURFACE_HEIGHTS, path, at_mm, err);
+	return load(INCISE_SURFACE_HEIGHTS, path, at_mm, false, err);
 }
 
 void incise_surface_free(struct incise_surface *surface)
@@ -164,6 +165,14 @@ void incise_surface_top(const struct incise_surface *surface, struct incise_touc
 		capsule_top(&surface->capsule, touch);
 }
 
+bool incise_surface_size(const struct incise_surface *surface,
+			 struct incise_surface_size *size)
+{
+	if (surface->mesh)
+		mesh_size(surface->mesh, size);
+	return surface->mesh;
+}
+
 void incise_surface_nearest(const struct incise_surface *surface,
 			    const double place_mm[3], struct incise_touch *touch)
 {
@@ -194,7 +203,7 @@ bool incise_surface_enters(const struct incise_surface *surface, const double fr
 		return plane_enters(&surface->plane, from, to, touch);
 	if (!surface->mesh)
 		return capsule_enters(&surface->capsule, from, to, touch);
-	if (!mesh_enters(surface->mesh, from, to, 0, &spot))
+	if (!mesh_enters(surface->mesh, from, to, 0, 0, &spot))
 		return false;
 	mesh_touch(surface->mesh, &spot, spot.point, touch);
 	touch->depth_mm = 0;

@@ -86,8 +86,8 @@ struct incise_surface *incise_surface_new_capsule(const double a_mm[3],
 						  struct incise_error *err);
 
 /*
- * Read a triangle mesh: a Wavefront OBJ with `v`, `vt` and `f`; other statements are
- * passed over. Faces turn counter-clockwise seen from outside; those with more than three
+ * Read a triangle mesh: an STL, or a Wavefront OBJ with `v`, `vt` and `f`; statements that
+ * hold no surface are passed over. Faces turn counter-clockwise seen from outside; those with more than three
  * corners are cut into fans. Corners with equal coordinates are one. The mesh may be open;
  * where parts of it meet in a point only, no proxy passes through that point.
  *
@@ -96,13 +96,15 @@ struct incise_surface *incise_surface_new_capsule(const double a_mm[3],
  *
  * @param path   file
  * @param at_mm  added to all its coordinates
+ * @param cavity closed pieces may be turned inside out: the tissue is around them
  * @return surface, to be freed with incise_surface_free(); NULL with errno of incise_infile_open(),
  *         EINVAL (malformed, no triangle, a triangle less than 1e-9 mm high, an edge with
- *         more than two triangles or with two that turn opposite ways), E2BIG, EFBIG (2 GB
+ *         more than two triangles or with two that turn opposite ways, a closed piece that is turned inside
+ *         out), E2BIG, EFBIG (2 GB
  *         and more), ENOMEM.
  */
 struct incise_surface *incise_surface_load_mesh(const char *path, const double at_mm[3],
-						struct incise_error *err);
+						bool cavity, struct incise_error *err);
 
 /*
  * Read a height field: an ESRI ASCII grid (`ncols nrows xllcorner|xllcenter

@@ -147,7 +147,10 @@ made_weights() {
 	done <<-'END'
 		mass,reading_mV\n1,2\n|w.csv:1: expected a line of column names
 		mass_g,reading_mV\n1,2\n1,x\n|w.csv:3: reading_mV: expected a number, found 'x'
-		mass_g,reading_mV\n1\n|w.csv:2: reading_mV: expected a number, found ''
+		mass_g,reading_mV\n1,\n|w.csv:2: reading_mV: expected a number, found ''
+		mass_g,reading_mV\n1\n|w.csv:2: 1 fields, but the first line names 2 columns
+		mass_g,reading_mV\n1,5,2,5\n|w.csv:2: 4 fields, but the first line names 2 columns
+		mass_g,reading_mV,mass_g\n1,5,2\n|w.csv:1: two columns are called mass_g
 		mass_g,reading_mV\nnan,1\n|w.csv:2: mass_g: expected a number
 		mass_g,reading_mV,direction\n1,1,left\n|w.csv:2: direction: expected up or down
 		mass_g,reading_mV,series\n1,1,1.5\n|w.csv:2: series: expected a whole number

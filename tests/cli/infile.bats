@@ -158,3 +158,22 @@ opened() {
 	bad_usage "--check:" "'0x1p-2'"
 	[ ! -e out.fis ]
 }
+
+# bats test_tags=check
+@test "a byte order mark of UTF-8 before a text, and comments before a model, are no content" {
+	mark=$'\xef\xbb\xbf'
+	for file in m.fis pairs.csv soft.scene r.json; do
+		{ printf %s "$mark" && cat "$file"; } >"marked-$file"
+	done
+	[ "$(echo 5 20 | incise eval marked-m.fis)" = "$(echo 5 20 | incise eval m.fis)" ]
+	run -0 --separate-stderr incise plan marked-soft.scene
+	incise train marked-pairs.csv --mf 2,2 -o n.fis
+	printf '%s5 20\n' "$mark" | incise eval m.fis >one
+	[ "$(<one)" = "$(echo 5 20 | incise eval m.fis)" ]
+	run -1 --separate-stderr incise bench compare marked-r.json r.json
+	[[ "$stderr" != *"not JSON"* ]]
+	{ echo '# a note' && echo '## another' && cat m.fis; } >hash.fis
+	incise plot hash.fis -o hash.svg
+	run -1 --separate-stderr incise verify hash.fis
+	[[ "$stderr" == *"this is a model"* ]]
+}

@@ -193,3 +193,38 @@ setup() {
 	incise plan wall.scene --json >none.json
 	[ "$(key none.json axes)" = '[]' ]
 }
+
+# Sheet LENGTH [TILT]: of 20 x 10 squares, along x and, by sin TILT, z, to LENGTH mm.
+sheet() {
+	awk -v mm="$1" -v up="${2:-0}" 'BEGIN {
+		for (j = 0; j <= 10; j++) for (i = 0; i <= 20; i++)
+			printf "v %.6f %.6f %.6f\n", i * mm / 20 * sqrt(1 - up * up), j * mm / 20, i * mm / 20 * up
+		for (j = 0; j < 10; j++) for (i = 1; i <= 20; i++)
+			print "f", 21 * j + i, 21 * j + i + 1, 21 * j + i + 22, 21 * j + i + 21
+	}'
+}
+
+# bats test_tags=check
+@test "a sheet at any angle is timed; its size and its border are printed, and metres are named" {
+	for up in 0 0.0871557 0.8 0.999; do
+		sheet 80 $up >m.obj
+		printf 'surface = { kind = "mesh"; file = "m.obj"; };\ntissue = { reaction_N_mm = 0.1; };\n' >m.scene
+		run -0 --separate-stderr incise plan m.scene
+		[[ "${lines[0]}" == "m.scene: "*" ns a tick"* ]]
+		[[ "$output" == *$'\nsurface     '*" x 40 x "*" mm, 400 triangles, 60 open edges from (0, 0, 0) to ("* ]]
+		[[ "$stderr" == *"warning: m.scene: its surface is open"* ]]
+		incise haptic m.scene --rig sim:clock=simulated --duration 0.1s
+	done
+	sheet 0.08 >m.obj
+	run -0 --separate-stderr incise plan m.scene
+	[[ "$stderr" == *"its surface is 0.08 mm wide; is it in metres?"* ]]
+}
+
+@test "a mesh that is turned inside out is refused, unless it is a cavity" {
+	printf 'v 0 0 0\nv 40 0 0\nv 0 40 0\nv 0 0 40\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n' >m.obj
+	printf 'surface = { kind = "mesh"; file = "m.obj"; };\ntissue = { reaction_N_mm = 0.1; };\n' >m.scene
+	run --separate-stderr incise plan m.scene
+	failed_with "m.obj:5:" "turned inside out"
+	sed -i 's/file/cavity = true; file/' m.scene
+	run -0 --separate-stderr incise plan m.scene
+}

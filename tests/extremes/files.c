@@ -131,7 +131,7 @@ static int try_surface(struct incise_surface *surface)
 
 static int load_mesh(const char *path, struct incise_error *err)
 {
-	return try_surface(incise_surface_load_mesh(path, (double[3]){0}, err));
+	return try_surface(incise_surface_load_mesh(path, (double[3]){0}, false, err));
 }
 
 static int load_heights(const char *path, struct incise_error *err)

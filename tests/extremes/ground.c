@@ -96,7 +96,7 @@ const struct ground grounds[GROUNDS] = {
 	{"mesh", "kind = \"mesh\"; file = \"%s\"; at_mm = [0.0, 0.0, -40.0];", 80,
 	 write_solid, "[0.0, 0.0, -3.0]; normal = [0.0, 0.0, 1.0]"},
 	/* A mesh with all its normals reversed: tissue around a cavity. */
-	{"cavity", "kind = \"mesh\"; file = \"%s\";", 50, write_cavity,
+	{"cavity", "kind = \"mesh\"; cavity = true; file = \"%s\";", 50, write_cavity,
 	 "[0.0, 0.0, -63.0]; normal = [0.0, 0.0, 1.0]"},
 	{"large mesh", "kind = \"mesh\"; file = \"%s\";", 80, write_large,
 	 "[0.0, 0.0, 37.0]; normal = [0.0, 0.0, 1.0]"},

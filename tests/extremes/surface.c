@@ -210,8 +210,8 @@ static void try_file(struct extremes_row *row, const struct property *property)
 	(heights ? write_heights : write_mesh)(file.file);
 	memory_file_written(&file);
 	try_surface(row,
-		    (heights ? incise_surface_load_heights
-			     : incise_surface_load_mesh)(file.path, at, &err),
+		    heights ? incise_surface_load_heights(file.path, at, &err)
+			    : incise_surface_load_mesh(file.path, at, true, &err),
 		    &err);
 	fclose(file.file);
 }

@@ -328,19 +328,46 @@ bool calibrate_line(struct incise_infile *file, char **line)
 	return rc;
 }
 
-int calibrate_cut(char *line, char **fields, int max, const char *before,
-		  const char *after)
+int calibrate_cut(const char *path, int number, char *line, char **fields, int max,
+		  const char *before, const char *after)
 {
 	int n = 0;
 
 	line[strcspn(line, "\r\n")] = 0;
-	for (char *field; n < max && (field = strsep(&line, ","));) {
+	for (char *field; (field = strsep(&line, ","));) {
 		char *end;
 
+		if (n == max)
+			cli_fail("%s:%d: more than %d columns; leave out those that are "
+				 "not needed",
+				 path, number, max);
 		field += strspn(field, before);
 		for (end = field + strlen(field); end > field && strchr(after, end[-1]);)
 			*--end = 0;
 		fields[n++] = field;
 	}
 	return n;
+}
+
+int calibrate_column(const char *path, int line, char **fields, int n, const char *name)
+{
+	int at = -1;
+
+	for (int i = 0; i < n; i++) {
+		if (strcmp(fields[i], name))
+			continue;
+		if (at >= 0)
+			cli_fail("%s:%d: two columns are called %s; rename one", path,
+				 line, name);
+		at = i;
+	}
+	return at;
+}
+
+void calibrate_width(const char *path, int line, int n, int columns)
+{
+	if (n != columns)
+		cli_fail("%s:%d: %d fields, but the first line names %d columns; "
+			 "correct the line, or remove it",
+			 path, line, n, columns);
 }

@@ -82,9 +82,15 @@ bool calibrate_line(struct incise_infile *file, char **line);
 
 /*
  * Cut a line of CSV at its commas, in place, and strip the characters of @before and @after
- * around each field. Returns the number of fields; further ones than @max are ignored.
+ * around each field. Returns the number of fields; more than @max end the program.
  */
-int calibrate_cut(char *line, char **fields, int max, const char *before,
-		  const char *after);
+int calibrate_cut(const char *path, int number, char *line, char **fields, int max,
+		  const char *before, const char *after);
+
+/* The place of a column among the names of a header, or -1; ends the program if it is there twice. */
+int calibrate_column(const char *path, int line, char **fields, int n, const char *name);
+
+/* End the program unless a row has a field for each column. */
+void calibrate_width(const char *path, int line, int n, int columns);
 
 #endif

@@ -43,10 +43,8 @@ static void add_pair(struct pairs *pairs, const struct incise_calibrate_force_pa
 static void read_header(struct table *table, char **fields, int n)
 {
 	for (int c = 0; c < COLUMNS; c++) {
-		table->column[c] = -1;
-		for (int i = 0; i < n; i++)
-			if (!strcmp(fields[i], names[c]))
-				table->column[c] = i;
+		table->column[c] =
+			calibrate_column(table->path, table->line, fields, n, names[c]);
 	}
 	if (table->column[READING] < 0 ||
 	    (table->column[MASS] < 0) == (table->column[FORCE] < 0))
@@ -56,10 +54,9 @@ static void read_header(struct table *table, char **fields, int n)
 			table->path, table->line);
 }
 
-static double number_of(const struct table *table, int column, char **fields, int n)
+static double number_of(const struct table *table, int column, char **fields)
 {
-	const int i = table->column[column];
-	const char *text = i < n ? fields[i] : "";
+	const char *text = fields[table->column[column]];
 	char *end;
 	double value = incise_decimal(text, &end);
 
@@ -69,10 +66,9 @@ static double number_of(const struct table *table, int column, char **fields, in
 	return value;
 }
 
-static bool descends(const struct table *table, char **fields, int n)
+static bool descends(const struct table *table, char **fields)
 {
-	const int i = table->column[DIRECTION];
-	const char *text = i < n ? fields[i] : "";
+	const char *text = fields[table->column[DIRECTION]];
 
 	if (!strcmp(text, "down") || !strcmp(text, "descending"))
 		return true;
@@ -83,18 +79,18 @@ static bool descends(const struct table *table, char **fields, int n)
 }
 
 static struct incise_calibrate_force_pair read_pair(const struct table *table,
-						    char **fields, int n)
+						    char **fields)
 {
 	struct incise_calibrate_force_pair pair = {.mass_g = NAN};
 	double series;
 
 	if (table->column[MASS] >= 0)
-		pair.mass_g = number_of(table, MASS, fields, n);
+		pair.mass_g = number_of(table, MASS, fields);
 	else
-		pair.force_N = number_of(table, FORCE, fields, n);
-	pair.reading_mV = number_of(table, READING, fields, n);
+		pair.force_N = number_of(table, FORCE, fields);
+	pair.reading_mV = number_of(table, READING, fields);
 	if (table->column[SERIES] >= 0) {
-		series = number_of(table, SERIES, fields, n);
+		series = number_of(table, SERIES, fields);
 		if (series != floor(series) || fabs(series) > 1e6)
 			cli_fail("%s:%d: series: expected a whole number from -1000000 "
 				 "to 1000000; correct it",
@@ -102,7 +98,7 @@ static struct incise_calibrate_force_pair read_pair(const struct table *table,
 		pair.series = (int)series;
 	}
 	if (table->column[DIRECTION] >= 0)
-		pair.descending = descends(table, fields, n);
+		pair.descending = descends(table, fields);
 	return pair;
 }
 
@@ -111,7 +107,7 @@ void pairs_read(struct pairs *pairs, const char *path)
 	struct table table = {.path = path};
 	char *line, *fields[COLUMNS_MAX];
 	struct incise_infile *in = calibrate_open(path);
-	bool header = false;
+	int columns = 0;
 
 	*pairs = (struct pairs){0};
 	while (calibrate_line(in, &line)) {
@@ -119,15 +115,17 @@ void pairs_read(struct pairs *pairs, const char *path)
 		int n;
 
 		table.line++;
-		n = calibrate_cut(line, fields, COLUMNS_MAX, " \t\"", " \t\"");
+		n = calibrate_cut(path, table.line, line, fields, COLUMNS_MAX, " \t\"",
+				  " \t\"");
 		if (fields[0][0] == '#' || (n == 1 && !*fields[0]))
 			continue;
-		if (!header) {
+		if (!columns) {
 			read_header(&table, fields, n);
-			header = true;
+			columns = n;
 			continue;
 		}
-		pair = read_pair(&table, fields, n);
+		calibrate_width(path, table.line, n, columns);
+		pair = read_pair(&table, fields);
 		add_pair(pairs, &pair);
 	}
 	incise_infile_close(in);

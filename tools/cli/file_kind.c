@@ -206,7 +206,8 @@ static enum file_kind kind_of_text(const char *text)
 	/* The notes of a model may be longer than what is looked at. */
 	if (!strncmp(text, "% incise: ", 10))
 		return FILE_MODEL;
-	while (*text == '%') {
+	/* The comments of a model; those of a file of libconfig begin with '#' too. */
+	while (*text == '%' || *text == '#') {
 		text += strcspn(text, "\n");
 		text += strspn(text, " \t\r\n");
 	}

@@ -117,7 +117,10 @@ void json_print(json_t *object)
 json_t *json_parse(const char *text, size_t n, const char *path, struct incise_error *err)
 {
 	json_error_t wrong;
-	json_t *report = json_loadb(text, n, JSON_REJECT_DUPLICATES, &wrong);
+	/* A byte order mark of a Windows editor is no content. */
+	size_t mark = n > 3 && !memcmp(text, "\xef\xbb\xbf", 3) ? 3 : 0;
+	json_t *report =
+		json_loadb(text + mark, n - mark, JSON_REJECT_DUPLICATES, &wrong);
 
 	if (report)
 		return report;

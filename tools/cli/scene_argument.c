@@ -4,6 +4,7 @@
  */
 #include <errno.h>
 #include <limits.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -136,4 +137,33 @@ struct incise_scene *scene_argument_load(const struct scene_argument *argument)
 	for (int i = 0; incise_scene_file(scene, i); i++)
 		cli_input(incise_scene_file(scene, i));
 	return scene;
+}
+
+char *scene_argument_size(const char *path, const struct incise_surface *surface)
+{
+	struct incise_surface_size s;
+	double mm[3];
+	char *text;
+
+	if (!incise_surface_size(surface, &s))
+		return cli_text("%s", "");
+	for (int i = 0; i < 3; i++)
+		mm[i] = s.hi_mm[i] - s.lo_mm[i];
+	if (fmax(fmax(mm[0], mm[1]), mm[2]) < 1)
+		cli_warn("%s: its surface is %.2g mm wide; is it in metres? write its "
+			 "coordinates in mm",
+			 path, fmax(fmax(mm[0], mm[1]), mm[2]));
+	text = cli_text("%.4g x %.4g x %.4g mm, %zu triangles", mm[0], mm[1], mm[2],
+			incise_surface_triangles(surface));
+	if (s.open_edges) {
+		char *before = text;
+
+		text = cli_text("%s, %zu open edges from (%.4g, %.4g, %.4g) to (%.4g, "
+				"%.4g, %.4g)",
+				before, s.open_edges, s.open_lo_mm[0], s.open_lo_mm[1],
+				s.open_lo_mm[2], s.open_hi_mm[0], s.open_hi_mm[1],
+				s.open_hi_mm[2]);
+		free(before);
+	}
+	return text;
 }

@@ -8,6 +8,7 @@
 #include <glob.h>
 #include <stdbool.h>
 #include <incise/scene.h>
+#include <incise/surface.h>
 #include "cli.h"
 
 struct scene_argument {
@@ -57,5 +58,11 @@ struct incise_scene *scene_argument_read(const struct scene_argument *argument,
 
 /* Read it, or fail the program. incise_scene_free(). */
 struct incise_scene *scene_argument_load(const struct scene_argument *argument);
+
+/*
+ * The size of a mesh or height field in words, "" of another surface: free(3). Warns if its unit
+ * looks like metres.
+ */
+char *scene_argument_size(const char *path, const struct incise_surface *surface);
 
 #endif

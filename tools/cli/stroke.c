@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * A stroke over the top of a plan's surface; see stroke.h.
+ * A stroke over a plan's surface; see stroke.h.
  */
 #include <math.h>
 #include <string.h>
@@ -16,10 +16,14 @@ void stroke_begin(struct stroke *stroke, const struct incise_plan *plan,
 		  const struct incise_tracker_info *tracker)
 {
 	const double *n = stroke->top.normal;
+	struct incise_surface_size shape;
 	double size;
 
 	stroke->tracker = tracker;
 	incise_plan_top(plan, &stroke->top);
+	/* The top of a sheet may lie on its border, where a contact ends. */
+	if (incise_surface_size(incise_plan_surface(plan), &shape) && shape.open_edges)
+		stroke->top = shape.inner;
 	/* Across the normal, in the plane of its largest part and the next axis. */
 	memset(stroke->along, 0, sizeof(stroke->along));
 	for (int i = 0; i < 3; i++)

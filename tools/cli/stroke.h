@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * A stroke over the top of a plan's surface, as poses for incise_plan_feed(): from above into
+ * A stroke over the top of a plan's surface, of a sheet over its middle, as poses for incise_plan_feed(): from above into
  * the tissue in 0.2 s, then to and fro below it.
  *
  *     \                     5 mm above

@@ -229,6 +229,7 @@ static void set_up(struct haptic_job *job)
 	struct haptic *haptic = &job->haptic;
 	const char *spec = job->scripted ? PROCEDURE_RIG : cli_rig(job->rig);
 	struct incise_error err = {0};
+	char *size;
 	bool real;
 
 	if (haptic->mode != HAPTIC_LOOP)
@@ -249,8 +250,13 @@ static void set_up(struct haptic_job *job)
 		enter_real_time(job);
 	haptic->rig = cli_open_rig(spec, INCISE_RIG_TRACKER | INCISE_RIG_STEPPER);
 	take_calibration(job, spec);
-	test_scene(haptic);
 	haptic->plan = cli_require(haptic_plan(haptic, haptic->scene, &err), &err);
+	size = scene_argument_size(haptic->argument.path,
+				   incise_plan_surface(haptic->plan));
+	if (*size)
+		cli_note("surface: %s", size);
+	free(size);
+	test_scene(haptic);
 	if (haptic->mode == HAPTIC_FEED &&
 	    incise_plan_feed_kernel(haptic->plan, haptic->rig, &err))
 		cli_fail_with(&err);

@@ -8,6 +8,7 @@
 #include "haptic.h"
 
 #define STROKE_S 0.6
+#define ABOVE_NS 20000000 /* so long it is 4 mm above or more */
 
 static double size(const double v[3])
 {
@@ -47,6 +48,13 @@ static int run_tick(struct trajectory *trajectory, bool fed, struct self_test *t
 			"self-test: at a depth of %g mm and %g mm/s the force is not a "
 			"number; check the scene's model with incise eval",
 			tick.depth_mm, tick.velocity_mm_s);
+	if (trajectory->t_ns < ABOVE_NS &&
+	    (tick.flags & INCISE_TICK_CONTACT || trajectory->force_N > 0))
+		return incise_error_set(
+			err, EPROTO,
+			"self-test: contact and a force of %g N 4 mm above the surface; "
+			"check whether its outside is inside",
+			trajectory->force_N);
 	test->contact += !!(tick.flags & INCISE_TICK_CONTACT);
 	test->force_max_N = fmax(test->force_max_N, trajectory->force_N);
 	return 0;
@@ -63,9 +71,14 @@ static int run(struct trajectory *trajectory, double force_N, struct self_test *
 	if (rc)
 		return rc;
 	if (!test->contact)
-		return incise_error_set(err, EPROTO,
-					"self-test: a stroke over the top of the scene "
-					"met no tissue; check the scene's surface");
+		return incise_error_set(
+			err, EPROTO,
+			"self-test: a stroke over the surface at (%g, %g, %g) mm met no "
+			"tissue; check its size and place, which must be within 10 m of "
+			"the tracker's origin",
+			trajectory->stroke.top.point_mm[0],
+			trajectory->stroke.top.point_mm[1],
+			trajectory->stroke.top.point_mm[2]);
 	if (test->force_max_N > force_N)
 		return incise_error_set(
 			err, EPROTO, "self-test: a force of %g N, above limits.force_N",

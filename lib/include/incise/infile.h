@@ -42,7 +42,7 @@ INCISE_API struct incise_infile *incise_infile_open(const char *path,
 						    struct incise_error *err);
 
 /**
- * Read the next line.
+ * Read the next line. A byte order mark of UTF-8 before the first one is passed over.
  *
  * @param line set to the line without its newline; it may be modified and is valid until the
  *             next call

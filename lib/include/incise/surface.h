@@ -36,6 +36,23 @@ INCISE_API size_t incise_surface_triangles(const struct incise_surface *surface)
 INCISE_API void incise_surface_top(const struct incise_surface *surface,
 				   struct incise_touch *touch);
 
+/** Size of a mesh or height field, and where it is open. */
+struct incise_surface_size {
+	double lo_mm[3], hi_mm[3];
+	/**
+	 * Edges with a triangle on one side only, of borders, holes and seams; between which
+	 * coordinates they lie.
+	 */
+	size_t open_edges;
+	double open_lo_mm[3], open_hi_mm[3];
+	/** A point well within it: the middle of a face near its middle. */
+	struct incise_touch inner;
+};
+
+/** @return false: neither a mesh nor a height field */
+INCISE_API bool incise_surface_size(const struct incise_surface *surface,
+				    struct incise_surface_size *size);
+
 /**
  * Find the nearest point of the whole surface.
  *

@@ -27,6 +27,7 @@ TEST(test_values_in_the_order_asked_for)
 						"cut,depth_mm,other,force_N\r\n"
 						"\"a, \"\"1\"\"\",1.5,x,-2e-3\r\n"
 						"\r\n"
+						" \t\r\n"
 						"b,2,y, 4 \n"
 						"\"a, \"\"1\"\"\",3,,5",
 						"cut", NULL);
@@ -103,6 +104,16 @@ TEST(test_errors_say_where)
 		 {":3: column 2", "1 fields"}},
 		{"depth_mm,force_N\n1,2,3\n", NULL, EINVAL, {":2: column 3", "3 fields"}},
 		{"depth_mm,force_N\n\"1,2\n", NULL, EINVAL, {":2:", "closed"}},
+		{"depth_mm,force_N,x,force_N\n1,2,3,4\n",
+		 NULL,
+		 EINVAL,
+		 {":1:", "two columns are called force_N"}},
+		{"cut,depth_mm,cut,force_N\n1,2,3,4\n",
+		 "cut",
+		 EINVAL,
+		 {":1:", "two columns are called cut"}},
+		{"depth_mm,force_N\n1,\"1,002.0\"\n", NULL, EINVAL, {":2:", "thousands"}},
+		{"depth_mm,force_N\n1,2,\n", NULL, EINVAL, {":2:", "last field"}},
 		{"depth_mm,force_N\n\"1\"2,3\n", NULL, EINVAL, {":2:", "quote"}},
 	};
 

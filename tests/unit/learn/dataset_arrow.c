@@ -242,6 +242,17 @@ TEST(rows_are_left_out_where_asked)
 	incise_dataset_free(data);
 }
 
+TEST(refuses_two_columns_of_a_name)
+{
+	const void *buffers[] = {NULL, forces};
+	struct made made = pairs();
+
+	add_column(&made, "force_N", "g", buffers, 0, 0);
+	assert_error(read_made(&made, NULL, NULL, NULL, &err), EINVAL, &err,
+		     "column force_N", "twice");
+	assert_true(made.released);
+}
+
 TEST(refuses_what_is_no_number)
 {
 	static const double bad[] = {1, NAN, 2};

@@ -300,6 +300,27 @@ TEST(test_refusals_name_line_and_word)
 		{"NumRules=3", "NumRules=", EINVAL, 7, ""},
 		{"NumInputs=2", "NumInputs=0", EINVAL, 5, ""},
 		{"NumInputs=2", "NumInputs=-1", EINVAL, 5, ""},
+		/* A key that is not understood, a key twice, a key that lacks. */
+		{"AndMethod", "andmethod", EINVAL, 8, "did you mean AndMethod"},
+		{"Version=2.0", "Vision=2.0", EINVAL, 4, "'Vision'"},
+		{"Version=2.0", "Range=[0 1]", EINVAL, 4, "unknown key"},
+		{"Name='depth'", "Units='mm'", EINVAL, 15, "'Units'"},
+		{"Name='force'", "NumRules=2", EINVAL, 29, "'NumRules'"},
+		{"Version=2.0", "Type='sugeno'", EINVAL, 4, "Type is given twice"},
+		{"Name='depth'", "Range=[0 1]", EINVAL, 16, "Range is given twice"},
+		{"Name='force'", "Range=[0 1]", EINVAL, 30, "Range is given twice"},
+		{"MF2='high'", "MF1='high'", EINVAL, 19, "MF1 is given twice"},
+		{"MF2='strong'", "MF1='strong'", EINVAL, 33, "MF1 is given twice"},
+		{"[Input2]", "[Input1]", EINVAL, 23, "Name is given twice"},
+		{"Type='sugeno'\n", "", EINVAL, 34, "Type"},
+		{"'sugeno'", " 'mamdani' % no", ENOTSUP, 3, "mamdani"},
+		{"AndMethod='prod'", "AndMethod = 'max'", ENOTSUP, 8, "'max'"},
+		{"Name='depth'", "Name='pig's'", EINVAL, 15, "end of the line"},
+		{"Name='depth'", "Name='depth", EINVAL, 15, "no end"},
+		{"1 1, 1 (1)", "1.5 1, 1 (1)", EINVAL, 36, "input 1"},
+		{"1 1, 1 (1)", "1 1, 1.000 (1) 2", EINVAL, 36, "') : 1'"},
+		{"Range=[0 30]", "Range=[3 2]", EINVAL, 30, "smaller"},
+		{"Range=[-5 5]", "Range=[5 5]", EINVAL, 24, "smaller"},
 	};
 
 	static const struct changed kinds[] = {
@@ -338,6 +359,76 @@ TEST(test_refusals_name_line_and_word)
 		assert_int_equal(err.code, c->code);
 		assert_says(err.text, where, c->word);
 	}
+}
+
+/* Load the file of MATLAB with other words for the same, and return its output. */
+static double eval_changed(const char *from, const char *to)
+{
+	const char *at = strstr(matlab, from);
+	struct incise_error err = {0};
+	struct incise_model *model;
+	char text[2048];
+	double y;
+
+	assert_non_null(at);
+	snprintf(text, sizeof(text), "%.*s%s%s", (int)(at - matlab), matlab, to,
+		 at + strlen(from));
+	put(text, strlen(text));
+	model = incise_model_load(path, &err);
+	if (!model)
+		fail_msg("%s", err.text);
+	y = incise_model_eval(model, (double[]){4, 1}, NULL);
+	incise_model_free(model);
+	return y;
+}
+
+/* Other programs' ways to write the same model. */
+TEST(test_spellings_mean_the_same)
+{
+	static const char *const cases[][2] = {
+		{"AndMethod='prod'", "  AndMethod \t=\t 'prod'  "},
+		{"Range=[0 10]", "Range = [ 0, 10 ]"},
+		{"MF1='low':'gaussmf',[2.5 0]", "MF1 = 'low' : 'gaussmf' , [2.5, 0]"},
+		{"[System]", "\xef\xbb\xbf[System]"},
+		{"[System]", "## Octave\n# writes\n[System]"},
+		{"NumRules=3", "NumRules=3 % three"},
+		{"Name='depth'", "Name='50 % # deep' # a comment"},
+		{"Name='depth'", "Name='pig''s'"},
+		{"1 1, 1 (1) : 1", "1.000 1.0, 1.000 (1.000) : 1 % first"},
+		{"1 1, 1 (1) : 1", "1 1 , 1 ( 1 ) :1"},
+		{"[2.5 0]", "[-2.5 0]"},
+		{"[2.5 2 10]", "[-2.5 2 10]"},
+		{"Range=[0 30]", "Range=[2 2]"},
+		{"'constant',[3]", "'constant',3"},
+	};
+	double want = eval_changed("[System]", "[System]");
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++)
+		if (eval_changed(cases[i][0], cases[i][1]) != want)
+			fail_msg("%s: another output", cases[i][1]);
+	assert_true(eval_changed("AndMethod='prod'", "AndMethod = 'min'") != want);
+}
+
+/* An input that no rule uses may have no function. */
+TEST(test_no_functions)
+{
+	static const char text[] =
+		"[System]\nName='one'\nType='sugeno'\nNumInputs=2\nNumOutputs=1\n"
+		"NumRules=1\n[Input1]\nRange=[0 1]\nNumMFs=0\n[Input2]\nRange=[0 1]\n"
+		"NumMFs=1\nMF1='a':'gaussmf',[1 0]\n[Output1]\nNumMFs=1\n"
+		"MF1='a':'linear',[2 3 4]\n[Rules]\n0 1, 1 (1) : 1\n";
+	struct incise_model *model, *back;
+
+	put(text, strlen(text));
+	model = incise_model_load(path, NULL);
+	assert_non_null(model);
+	assert_true(incise_model_eval(model, (double[]){0.5, 1}, NULL) == 8);
+	assert_int_equal(incise_model_save(model, path, NULL), 0);
+	back = incise_model_load(path, NULL);
+	assert_non_null(back);
+	assert_same_inside(model, back);
+	incise_model_free(model);
+	incise_model_free(back);
 }
 
 TEST(test_missing_file)

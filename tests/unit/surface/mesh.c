@@ -597,4 +597,58 @@ TEST(test_never_farther_than_the_reach)
 	assert_true(moved > 15000);
 }
 
+/* The size, the border, and a place within: of a sheet that stands at any angle. */
+TEST(test_size)
+{
+	uint64_t seed = 11;
+	struct incise_surface *plane =
+		incise_surface_new_plane((double[3]){0}, (double[3]){0, 0, 1}, NULL);
+	struct incise_surface_size size;
+
+	assert_false(incise_surface_size(plane, &size));
+	incise_surface_free(plane);
+	for (int n = 0; n < 50; n++) {
+		struct solid *s = n % 2 ? solid_cube() : solid_new();
+		double axis[3] = {solid_random(&seed) - 0.5, solid_random(&seed) - 0.5,
+				  solid_random(&seed) - 0.5};
+		double side[3], up[3], in[3];
+		struct incise_surface *surface;
+
+		v3_unit(up, axis, 0);
+		v3_cross(side, up, (double[3]){1, 0, 0});
+		v3_unit(side, side, 0);
+		v3_cross(in, up, side);
+		for (int j = 0; j <= 10 && n % 2 == 0; j++)
+			for (int i = 0; i <= 20; i++)
+				solid_point(s, 3 + i * side[0] + j * in[0],
+					    i * side[1] + j * in[1],
+					    i * side[2] + j * in[2]);
+		for (uint32_t j = 0; j < 10 && n % 2 == 0; j++)
+			for (uint32_t i = 0; i < 20; i++)
+				solid_square(s, 21 * j + i, 21 * j + i + 1,
+					     21 * j + i + 22, 21 * j + i + 21);
+		surface = solid_surface(s);
+		assert_true(incise_surface_size(surface, &size));
+		assert_int_equal(size.open_edges, n % 2 ? 0 : 60);
+		for (uint32_t k = 0; k < s->n_points; k++)
+			for (int i = 0; i < 3; i++) {
+				assert_true(size.lo_mm[i] <= s->point[k][i] &&
+					    s->point[k][i] <= size.hi_mm[i]);
+				/* a sheet's border reaches as far as the sheet */
+				assert_true(n % 2 ||
+					    (size.open_lo_mm[i] == size.lo_mm[i] &&
+					     size.open_hi_mm[i] == size.hi_mm[i]));
+			}
+		if (n % 2 == 0) {
+			const double middle[3] = {3 + 10 * side[0] + 5 * in[0],
+						  10 * side[1] + 5 * in[1],
+						  10 * side[2] + 5 * in[2]};
+
+			assert_true(v3_distance2(size.inner.point_mm, middle) < 1);
+			assert_true(fabs(v3_dot(size.inner.normal, up)) > 1 - 1e-9);
+		}
+		incise_surface_free(surface);
+		free(s);
+	}
+}
 GROUP(setup, teardown);

@@ -5,6 +5,7 @@
  */
 #include "../unit.h"
 #include <float.h>
+#include "../cases.h"
 #include "../../../lib/surface/surface.h"
 #include "solid.h"
 #include "wavy.h"
@@ -508,4 +509,184 @@ TEST(test_any_pose)
 		}
 		incise_surface_free(surface);
 	}
+}
+/* Each triangle with corners of its own, each moved by up to @by along each axis. */
+static struct incise_surface *apart(const struct solid *whole, double by, uint64_t *seed)
+{
+	struct solid *s = solid_new();
+	struct incise_surface *surface;
+
+	for (uint32_t f = 0; f < whole->n_triangles; f++) {
+		for (int i = 0; i < 3; i++) {
+			const double *p = whole->point[whole->corner[f][i]];
+			double at[3];
+
+			for (int k = 0; k < 3; k++)
+				at[k] = p[k] + by * (2 * solid_random(seed) - 1);
+			solid_point(s, at[0], at[1], at[2]);
+		}
+		solid_face(s, 3 * f, 3 * f + 1, 3 * f + 2);
+	}
+	surface = solid_surface(s);
+	free(s);
+	return surface;
+}
+
+/* Strokes into a ball that is in one piece and one that is in pieces: the same contacts. */
+static void assert_same_strokes(const struct incise_surface *whole,
+				const struct incise_surface *pieces, double within,
+				uint64_t *seed)
+{
+	struct incise_proxy a, b;
+
+	for (int stroke = 0; stroke < 20; stroke++) {
+		double from[3], to[3], way[3];
+
+		for (int k = 0; k < 3; k++) {
+			from[k] = 2 * solid_random(seed) - 1;
+			to[k] = 2 * solid_random(seed) - 1;
+		}
+		v3_unit(way, from, 0);
+		v3_add(from, origin, 22, way);
+		/* Deeper in, two faces are nearest places at once, and either may hold. */
+		v3_add(to, origin, 18 + 1.5 * solid_random(seed), way);
+		for (int k = 0; k < 3; k++)
+			to[k] += 2 * solid_random(seed) - 1;
+		incise_proxy_init(&a, whole, 0.2);
+		incise_proxy_init(&b, pieces, 0.2);
+		for (int i = 0; i <= 400; i++) {
+			/* in, along, and out */
+			double t = sin(M_PI * i / 400), u = i / 400.0, p[3];
+
+			for (int k = 0; k < 3; k++)
+				p[k] = from[k] + t * (to[k] - from[k]) +
+				       u * (k == stroke % 3 ? 3 : 0);
+			incise_proxy_move(&a, p);
+			incise_proxy_move(&b, p);
+			/* On their way they are at different places of it. */
+			if (!a.settled || !b.settled)
+				continue;
+			/* Where it begins and ends within the tolerance, either is right. */
+			if (a.touching != b.touching &&
+			    fmax(fabs(a.touch.depth_mm), fabs(b.touch.depth_mm)) >
+				    0.2 + within)
+				fail_msg("tick %d: touching %d, not %d, at %g mm", i,
+					 b.touching, a.touching, a.touch.depth_mm);
+			if (a.touching && b.touching &&
+			    fabs(a.touch.depth_mm - b.touch.depth_mm) > within)
+				fail_msg("tick %d: %g mm deep, not %g", i,
+					 b.touch.depth_mm, a.touch.depth_mm);
+		}
+	}
+}
+
+/* Copies of a corner that differ by rounding are one; the mesh has no border. */
+TEST(test_rounded_copies_are_welded)
+{
+	uint64_t seed = cases_seed(5);
+
+	for (int n = 0; n < cases_of(100, 6); n++) {
+		struct solid *ball = solid_sphere(20, 2 + n % 2);
+		struct incise_surface *whole = solid_surface(ball);
+		/* of 20 mm: copies lie within 4e-5 mm of each other */
+		double by = 1e-5 * pow(solid_random(&seed), 4);
+		struct incise_surface *pieces = apart(ball, by, &seed);
+
+		assert_false(pieces->mesh->open);
+		assert_int_equal(pieces->mesh->n_vertices, whole->mesh->n_vertices);
+		assert_same_strokes(whole, pieces, 1e-3, &seed);
+		incise_surface_free(whole);
+		incise_surface_free(pieces);
+		free(ball);
+	}
+}
+
+/* Wider seams stay open; a contact passes over them, and none is missed between them. */
+TEST(test_seams_are_passed)
+{
+	uint64_t seed = cases_seed(6);
+
+	for (int n = 0; n < cases_of(100, 6); n++) {
+		struct solid *ball = solid_sphere(20, 2 + n % 2);
+		struct incise_surface *whole = solid_surface(ball);
+		double by = 1e-4 * pow(150, solid_random(&seed));
+		struct incise_surface *pieces = apart(ball, by, &seed);
+
+		assert_true(pieces->mesh->open);
+		/* a slope of the surface of a few degrees, and the seam's width */
+		assert_same_strokes(whole, pieces, 0.05 + 4 * by, &seed);
+		incise_surface_free(whole);
+		incise_surface_free(pieces);
+		free(ball);
+	}
+}
+
+/* A sheet of which one half has finer triangles: their corners lie on the other's edges. */
+TEST(test_t_junctions_are_passed)
+{
+	uint64_t seed = cases_seed(7);
+	struct solid *s = solid_new();
+	struct incise_surface *sheet;
+
+	for (int half = 0; half < 2; half++) {
+		int n = half ? 21 : 7; /* thirds are no numbers of a double */
+		uint32_t first = s->n_points;
+
+		for (int j = 0; j <= n; j++)
+			for (int i = 0; i <= n; i++)
+				solid_point(s, -10 + 20.0 * i / n,
+					    half ? 10.0 * j / n : -10 + 10.0 * j / n, 0);
+		for (int j = 0; j < n; j++)
+			for (int i = 0; i < n; i++) {
+				uint32_t a = first + (uint32_t)(j * (n + 1) + i),
+					 b = a + (uint32_t)n + 1;
+
+				solid_square(s, a, a + 1, b + 1, b);
+			}
+	}
+	sheet = solid_surface(s);
+	for (int n = 0; n < cases_of(2000, 200); n++) {
+		double x = 18 * solid_random(&seed) - 9, y = 9 * solid_random(&seed);
+		double to = 18 * solid_random(&seed) - 9, deep = 3 * solid_random(&seed);
+
+		incise_proxy_init(&proxy, sheet, 0.05);
+		move(&proxy, x, y, 0.5);
+		drag(&proxy, x, n % 4 ? y : 0, -deep, 20);
+		for (int i = 0; i < 40; i++) {
+			move(&proxy, x + (to - x) * i / 40, (n % 4 ? y : 0) - y * i / 40,
+			     -deep);
+			assert_true(proxy.touching && !proxy.began);
+			assert_true(fabs(proxy.touch.depth_mm - deep) < 1e-9);
+		}
+	}
+	incise_surface_free(sheet);
+	free(s);
+}
+
+/* A border without another part beside it is one: the contact ends there, as before. */
+TEST(test_borders_stay)
+{
+	struct solid *s = solid_new();
+
+	solid_square(s, solid_point(s, 0, 0, 0), solid_point(s, 5, 0, 0),
+		     solid_point(s, 5, 5, 0), solid_point(s, 0, 5, 0));
+	/* one that is a little too far */
+	solid_square(s, solid_point(s, 5.11, 0, 0), solid_point(s, 9, 0, 0),
+		     solid_point(s, 9, 5, 0), solid_point(s, 5.11, 5, 0));
+	surface = solid_surface(s);
+	incise_proxy_init(&proxy, surface, 0.2);
+	move(&proxy, 4, 2, 1);
+	drag(&proxy, 4.98, 2, -1, 10);
+	assert_true(proxy.touching);
+	move(&proxy, 5.02, 2, -1);
+	assert_false(proxy.touching);
+	/* past it, and through the gap */
+	move(&proxy, 5.05, -0.05, 1);
+	drag(&proxy, 5.05, -0.05, -1, 10);
+	assert_false(proxy.touching);
+	move(&proxy, 5.05, 2, 1);
+	drag(&proxy, 5.05, 2, -1, 10);
+	assert_false(proxy.touching);
+	incise_surface_free(surface);
+	free(s);
 }
