@@ -1298,20 +1298,18 @@ static void save_factor(const struct options *options, struct incise_factor *fac
 	struct incise_factor_info info;
 	struct incise_error err = {0};
 
-	incise_factor_info(factor, &info);
-	if (info.rows < INCISE_FACTOR_PAIRS_MIN)
-		cli_fail(
-			"%s: a factor of %llu pairs would reveal them; expected at least "
-			"%d",
-			options->data, (unsigned long long)info.rows,
-			INCISE_FACTOR_PAIRS_MIN);
 	if (incise_factor_save(factor, options->factor, &err))
 		cli_fail_with(&err);
+	incise_factor_info(factor, &info);
 	if (!strcmp(options->factor, "-"))
 		return;
 	printf("%s: %llu pairs of %llu groups, premises %.12s\n", options->data,
 	       (unsigned long long)info.rows, (unsigned long long)info.groups,
 	       info.premises);
+	if (info.parts < INCISE_FACTOR_FOLDS)
+		printf("%d of %d parts, as small ones would reveal their pairs: a merge "
+		       "cross-validates over these\n",
+		       info.parts, INCISE_FACTOR_FOLDS);
 	cli_written();
 }
 

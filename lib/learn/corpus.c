@@ -742,7 +742,6 @@ int incise_corpus_fold(const struct incise_corpus *corpus,
 			   .check = check,
 			   .number = source_number(source->hash)};
 	const struct incise_corpus_survey *survey = NULL;
-	uint64_t groups = 0;
 	int rc;
 
 	for (int i = 0; i < corpus->n_surveys; i++)
@@ -763,8 +762,9 @@ int incise_corpus_fold(const struct incise_corpus *corpus,
 				      "file that nobody writes",
 				      source->name);
 	for (int g = 0; g < (survey && corpus->grouped ? survey->n_groups : 0); g++)
-		groups += !survey->groups[g].check;
-	incise_factor_add_groups(fit, groups);
+		if (!survey->groups[g].check)
+			incise_factor_count(fit, survey->groups[g].key, 1,
+					    survey->groups[g].rows);
 	if (left_out)
 		*left_out += f.left_out;
 	return rc;
