@@ -269,6 +269,37 @@ static int insert_source(struct incise_factor *factor,
 	return at;
 }
 
+/* The identity in the next token of a recording (incise/origin.h), and its length; or NULL. */
+static const char *next_identity(const char **text, size_t *n)
+{
+	static const char kind[] = "incise:1:recording:";
+	const char *at = *text;
+
+	while ((at = strstr(at, kind))) {
+		at += sizeof(kind) - 1;
+		at += strcspn(at, ":;"); /* head */
+		at += *at == ':' ? 1 + strcspn(at + 1, ":;") : 0;
+		at += *at == ':';
+		*n = strcspn(at, ":;");
+		*text = at;
+		if (*n > 1)
+			return at;
+	}
+	return NULL;
+}
+
+bool incise_is_same_recording(const char *a, const char *b)
+{
+	const char *p, *q, *rest;
+	size_t n, m;
+
+	while ((p = next_identity(&a, &n)))
+		for (rest = b; (q = next_identity(&rest, &m));)
+			if (n == m && !memcmp(p, q, n))
+				return true;
+	return false;
+}
+
 int incise_factor_start(struct incise_factor *factor, const char *hash, const char *text,
 			struct incise_error *err)
 {
@@ -435,9 +466,11 @@ static uint64_t least_pairs(const struct incise_factor *factor)
 
 static bool is_revealing(const struct incise_factor *factor, int part)
 {
-	return incise_gram_rows(factor->fold[part]) &&
-	       (factor->different[part] < least_pairs(factor) ||
-		factor->groups[part] < INCISE_FACTOR_GROUPS_MIN);
+	uint64_t rows = incise_gram_rows(factor->fold[part]);
+
+	return rows && (rows < least_pairs(factor) ||
+			factor->different[part] < least_pairs(factor) ||
+			factor->groups[part] < INCISE_FACTOR_GROUPS_MIN);
 }
 
 static bool reveals_any(const struct incise_factor *factor)
@@ -486,6 +519,16 @@ static int close_parts(struct incise_factor *factor, const char *path,
 
 /* --- merging ------------------------------------------------------------------------- */
 
+static bool has_recording(const struct incise_factor *factor,
+			  const struct incise_factor_source *source)
+{
+	bool has = find_source(factor, source->hash) >= 0;
+
+	for (int i = 0; i < factor->n_sources && !has; i++)
+		has = incise_is_same_recording(factor->sources[i].text, source->text);
+	return has;
+}
+
 /* The reason, in words, why premises differ, or NULL. */
 static const char *difference(const struct incise_factor *a,
 			      const struct incise_factor *b)
@@ -520,7 +563,7 @@ int incise_factor_merge(struct incise_factor *factor, struct incise_factor *othe
 			err, EINVAL, "%s: %s of its own; give factors of one --premises",
 			name, differs);
 	for (int i = 0; i < other->n_sources; i++)
-		if (find_source(factor, other->sources[i].hash) >= 0)
+		if (has_recording(factor, &other->sources[i]))
 			return incise_error_set(
 				err, EEXIST,
 				"%s: the recording %.200s (SHA-256 %.12s) is in another "
@@ -574,11 +617,13 @@ static void encode_text(const struct incise_factor *factor, FILE *out)
 	for (int r = 0; r < factor->design.basis.n_rules; r++)
 		fprintf(out, "fired %.17g\n", factor->design.largest[r]);
 	for (int f = 0, next; f < FOLDS; f = next) {
+		uint64_t different = factor->different[f], least = least_pairs(factor);
+
 		for (next = f + 1; next < FOLDS && factor->joined[next];)
 			next++;
 		fprintf(out, "part %d %llu %llu %llu\n", next - f,
 			(unsigned long long)incise_gram_rows(factor->fold[f]),
-			(unsigned long long)factor->different[f],
+			(unsigned long long)(different < least ? different : least),
 			(unsigned long long)factor->groups[f]);
 	}
 	fprintf(out, "sums %zu\n", incise_gram_count(factor->design.gram));
@@ -846,7 +891,7 @@ static int decode_statistics(struct decoder *in, struct incise_factor *factor,
 		line = next_line(in, "part");
 		if (!line || !whole(&line, FOLDS - f, &folds) || !folds ||
 		    !whole(&line, GRAM_ROWS_MAX - 1, &count) ||
-		    !whole(&line, count, &different) ||
+		    !whole(&line, GRAM_ROWS_MAX, &different) ||
 		    !whole(&line, GRAM_ROWS_MAX, &groups) || *line)
 			return damaged(in, "expected folds, pairs and groups of a part");
 		incise_factor_count(factor, (uint64_t)f, groups, different);

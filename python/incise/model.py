@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+import csv
 import ctypes
 import errno
 import math
 import os
 import tempfile
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 from . import _library
 from ._library import ArrowArrayStream, Failure, Invalid, c_bool, c_char, c_double, c_int, c_void_p
@@ -654,6 +655,20 @@ def is_recording(data: Any) -> bool:
     return is_path(data) and _library.path_bytes(data).rstrip(b"/").endswith((b".rec", b".part"))
 
 
+def has_cuts(data: Any) -> bool:
+    """Whether it is a recording, or a file or a table with the column cut."""
+    if isinstance(data, Recording) or is_recording(data):
+        return True
+    if not is_path(data):
+        names = getattr(data, "column_names", getattr(data, "columns", data))
+        return isinstance(names, Iterable) and "cut" in list(names)
+    if not os.path.isfile(data):
+        return False
+    with open(data, newline="", encoding="utf-8-sig", errors="replace") as lines:
+        rows = (line for line in lines if line.strip() and not line.startswith("#"))
+        return "cut" in (field.strip() for field in next(csv.reader(rows), []))
+
+
 def _read_dataset(
     data: Any, columns: Sequence[str], group: Optional[str], where: Optional[str]
 ) -> Tuple[int, int]:
@@ -836,8 +851,8 @@ def train(
     holds out other single rows where check is given without group; so does a list, [source] too.
 
     group: column that names the cut; cross-validation and check keep whole cuts together. In a list
-    also "recording" or "rig"; cuts of different sources are different ones, and a list of recordings
-    only is grouped by "cut" unless told otherwise.
+    also "recording" or "rig"; cuts of different sources are different ones. Without it data are
+    grouped by "cut" where all have it; "none" takes each row by itself.
     check: share that is kept back, 0 to 1; its error is in ``model.report``.
     mf: membership functions of each input (default 5, 4; else 3 each), or "auto".
     classic: the method of MATLAB's anfis; not for a list.
@@ -862,6 +877,9 @@ def train(
         return train_sources(
             data, names, options, group, check, all_rows, _mf_types[mf_type], counts
         )
+    if group is None and has_cuts(data):
+        group = "cut"
+    group = None if group == "none" else group
     # Not in this thread, whose KeyboardInterrupt a callback of the reading would swallow.
     dataset, left_out = _library.call_interruptible(
         lambda: _read_dataset(data, names, group, None if all_rows else "advancing"),

@@ -89,7 +89,7 @@ large_shares() {
 	incise train s1.csv --group cut --mf 3,3 -o start.fis >/dev/null
 	incise train s1.csv --premises start.fis --group cut --factor a.fac >out
 	grep -q "^1 of 5 parts, as small ones would reveal their pairs" out
-	grep -aq "^part 5 1250 1250 5$" a.fac
+	grep -aq "^part 5 1250 1000 5$" a.fac
 	incise train s2.csv --premises start.fis --group cut --factor b.fac >/dev/null
 	incise merge a.fac b.fac -o m.fis >out
 	grep -q "^1 of 5 parts: the factors have small ones joined$" out
@@ -207,6 +207,75 @@ train_killed_at() {
 	train_killed_at incise
 	incise train l?.csv --group cut --check 0.3 --seed 2 --mf 3,3 -o m.fis --overwrite >out 2>err
 	run ! grep -q "goes on" err
+}
+
+@test "sources that change while they are read, or before a training goes on, are found" {
+	for i in 1 2; do
+		cuts l$i.csv $((20 * i - 19)) $((20 * i)) 2000
+	done
+	incise train l?.csv --group cut --mf 3,3 -o m.fis >/dev/null 2>err 3>&- &
+	until grep -qa "incise progress 1 [0-9]* [1-9]" m.fis.progress 2>/dev/null; do
+		kill -0 $! || break
+		sleep 0.01
+	done
+	if kill -STOP $! 2>/dev/null && [ ! -e m.fis ]; then
+		sed -i '7s/.$/7/' l1.csv
+		kill -CONT $!
+		! wait $! || complain "trained"
+		grep -q "l1.csv: has changed while it was read" err
+	fi
+	[ ! -e m.fis.progress ]
+}
+
+# A joined recording is read by the calibrations of its members.
+@test "a training does not go on with rows of another calibration" {
+	printf 'force_mV_N = 300.0;\n' >one.conf
+	printf 'force_mV_N = 5000.0;\n' >other.conf
+	for seed in 1 2; do
+		incise capture -o $seed.rec \
+			--rig "sim:clock=simulated,seed=$seed,depth_mm=6,times=2,pause_s=1,cut_s=1" >/dev/null
+	done
+	incise recalibrate 1.rec -c one.conf >/dev/null
+	mkdir part
+	for way in recalibrated replaced; do
+		incise train 1.rec 2.rec --rate 200 --mf 2,2 -o m.fis >/dev/null 2>&1 3>&- &
+		until [ -e m.fis.progress ]; do
+			kill -0 $! || break
+			sleep 0.01
+		done
+		kill -KILL $! 2>/dev/null || :
+		wait $! || :
+		rm -f m.fis m.fis.sd
+		if [ $way = recalibrated ]; then
+			incise recalibrate 1.rec -c other.conf >/dev/null
+		else
+			cp one.conf 1.rec/calibration/0002-*.conf
+		fi
+		incise train 1.rec 2.rec --rate 200 --mf 2,2 -o m.fis >/dev/null 2>err
+		run ! grep -q "goes on" err
+		incise train 1.rec 2.rec --rate 200 --mf 2,2 -o n.fis >/dev/null 2>&1
+		cmp m.fis n.fis
+		rm m.fis n.fis ./*.sd
+	done
+}
+
+@test "a recording is the same after its database was written anew" {
+	for seed in 1 2; do
+		incise capture -o $seed.rec \
+			--rig "sim:clock=simulated,seed=$seed,depth_mm=6,times=6,pause_s=0.7,cut_s=0.5" >/dev/null
+	done
+	cp -r 1.rec copy.rec
+	sqlite3 copy.rec/recording.db vacuum
+	run ! cmp -s 1.rec/recording.db copy.rec/recording.db
+	run --separate-stderr incise train 1.rec copy.rec 2.rec -o m.fis
+	failed_with copy.rec "the same content as 1.rec"
+	incise train 2.rec --mf 2,2 -o start.fis >/dev/null 2>&1
+	for name in 1 copy; do
+		incise train $name.rec --premises start.fis --factor $name.fac >/dev/null
+	done
+	run --separate-stderr incise merge 1.fac copy.fac -o m.fis
+	failed_with copy.fac "the recording copy.rec"
+	[ ! -e m.fis ]
 }
 
 @test "a factor goes to a pipe, pipes are told apart by their rows, and options that differ are noted" {

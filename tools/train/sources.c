@@ -48,17 +48,49 @@ static int count_row(void *user, const double *row, const char *group,
 	return source->take(source->taker, row, group, err);
 }
 
+/* The file itself; of a recording, its rows: free(3). */
+static char *file_of(const struct source *source)
+{
+	char *whole = file_without_choice(source->path);
+	char *file = cli_text(source->recording ? "%s/recording.db" : "%s", whole);
+
+	free(whole);
+	return file;
+}
+
+/* Fail if the file is another one, or was written, since it was first looked at. */
+static int check_unchanged(struct source *source, struct incise_error *err)
+{
+	char *file = file_of(source);
+	struct stat st = {0}, *seen = &source->seen;
+
+	stat(file, &st);
+	free(file);
+	if (!seen->st_ino)
+		*seen = st;
+	if (st.st_ino == seen->st_ino && st.st_size == seen->st_size &&
+	    st.st_mtim.tv_sec == seen->st_mtim.tv_sec &&
+	    st.st_mtim.tv_nsec == seen->st_mtim.tv_nsec)
+		return 0;
+	return incise_error_set(
+		err, ESTALE,
+		"%s: has changed while it was read; train from a file that "
+		"nobody writes",
+		source->path);
+}
+
 static void begin(struct source *source, incise_row_taker take, void *taker)
 {
+	check_unchanged(source, NULL);
 	source->take = take;
 	source->taker = taker;
 	source->taken = 0;
 }
 
-static int end(struct source *source, int rc)
+static int end(struct source *source, int rc, struct incise_error *err)
 {
 	report(source, source->taken % PROGRESS_ROWS);
-	return rc;
+	return rc ? rc : check_unchanged(source, err);
 }
 
 static int read_file(void *user, incise_row_taker take, void *taker,
@@ -71,7 +103,8 @@ static int read_file(void *user, incise_row_taker take, void *taker,
 		   incise_dataset_each(source->path, source->options->columns,
 				       source->options->n_columns, group_column(source),
 				       where(source), count_row, source,
-				       &source->left_out, err));
+				       &source->left_out, err),
+		   err);
 }
 
 /* Rows of a pipe; its groups have numbers for names. */
@@ -131,7 +164,7 @@ static int read_recording(void *user, incise_row_taker take, void *taker,
 					       source->options->n_columns,
 					       group_column(source), where(source),
 					       count_row, source, &source->left_out, err);
-	return name_it(source, end(source, rc), err);
+	return name_it(source, end(source, rc, err), err);
 }
 
 static const char *name_of(const char *path)
@@ -165,18 +198,39 @@ static const char *find(const char *path)
 	return file_operand(path, recording ? FILE_RECORDING : FILE_TABLE);
 }
 
+static int stop(void *user, const double *row, const char *group,
+		struct incise_error *err)
+{
+	(void)user;
+	(void)row;
+	(void)group;
+	(void)err;
+	return 1;
+}
+
+/* A file has the column "cut". A pipe can be read once only. */
+static bool has_cuts(const struct source *source)
+{
+	return !is_pipe(source->path) &&
+	       incise_dataset_each(source->path, source->options->columns,
+				   source->options->n_columns, "cut", where(source), stop,
+				   NULL, NULL, NULL) == 0;
+}
+
 struct source *sources_new(char **paths, int n, struct source_options *options)
 {
 	struct source *sources = cli_alloc(n, sizeof(*sources));
-	bool all = true;
+	bool all = !options->group; /* have cuts */
 
+	if (options->group && !strcmp(options->group, "none"))
+		options->group = NULL;
 	for (int i = 0; i < n; i++) {
 		struct source *source = &sources[i];
 
 		source->path = find(paths[i]);
 		source->recording = file_kind_of(source->path) == FILE_RECORDING;
 		source->options = options;
-		all &= source->recording;
+		all = all && (source->recording || has_cuts(source));
 		source->corpus = (struct incise_corpus_source){
 			.name = source->path,
 			.hash = source->hash,
@@ -187,7 +241,7 @@ struct source *sources_new(char **paths, int n, struct source_options *options)
 			.user = source,
 		};
 	}
-	if (!options->group && all)
+	if (all)
 		options->group = "cut";
 	for (int i = 0; i < n && options->group; i++) {
 		struct source *source = &sources[i];
@@ -207,7 +261,7 @@ static int open_recording(struct source *source, struct incise_error *err)
 	struct incise_recalibration active;
 	struct incise_recording_info info;
 	struct incise_recording *recording;
-	char *database, *whole, *text, origins[ORIGINS_TEXT];
+	char *database, *text, origins[ORIGINS_TEXT];
 	int rc;
 
 	/* Says itself what is wrong, as a warning, where damaged ones are used. */
@@ -222,10 +276,8 @@ static int open_recording(struct source *source, struct incise_error *err)
 	incise_recording_close(recording);
 	if (rc)
 		return name_it(source, rc, err);
-	whole = file_without_choice(source->path);
-	database = cli_text("%s/recording.db", whole);
+	database = file_of(source);
 	rc = incise_file_sha256(database, source->hash, err);
-	free(whole);
 	free(database);
 	snprintf(source->rig, sizeof(source->rig), "%s", info.rig);
 	text = cli_text(
@@ -244,16 +296,6 @@ static int open_recording(struct source *source, struct incise_error *err)
 	source->corpus.calibration = source->calibration;
 	free(text);
 	return rc;
-}
-
-static int stop(void *user, const double *row, const char *group,
-		struct incise_error *err)
-{
-	(void)user;
-	(void)row;
-	(void)group;
-	(void)err;
-	return 1;
 }
 
 /* Its name, and the origins that the file carries, as many as fit. */
@@ -282,6 +324,7 @@ int source_open(struct source *source, struct incise_error *err)
 	size_t left_out;
 	int rc;
 
+	check_unchanged(source, NULL);
 	if (source->recording)
 		return open_recording(source, err);
 	if (source->corpus.read == read_pipe) {

@@ -7,6 +7,7 @@
 #define TRAIN_SOURCES_H
 
 #include <stdbool.h>
+#include <sys/stat.h>
 #include <incise/corpus.h>
 #include <incise/error.h>
 
@@ -15,7 +16,7 @@ struct source_options {
 	const char *const *columns; /* inputs, then output */
 	int n_columns;
 	bool uncertainty; /* columns of parts are among them */
-	/* cut, recording, rig, or a column; NULL: cut where all are recordings, else none. */
+	/* none, cut, recording, rig, or a column; NULL: cut where all sources have it, else none. */
 	const char *group;
 	bool all_rows;	/* also where the blade did not advance */
 	bool damaged;	/* also recordings that failed verification */
@@ -33,6 +34,7 @@ struct source {
 	char hash[65], text[INCISE_FACTOR_TEXT_MAX];
 	char rig[256], calibration[512]; /* the latter: the same where it is the same */
 	uint64_t left_out;		 /* rows in the last reading */
+	struct stat seen; /* of the file, before it was read; st_ino 0: not yet */
 	struct incise_dataset *pipe; /* that can be read once only: its rows, or NULL */
 	incise_row_taker take;	     /* of the present reading, and the rows it took */
 	void *taker;

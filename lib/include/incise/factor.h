@@ -121,7 +121,7 @@ INCISE_API void incise_factor_info(const struct incise_factor *factor,
  *
  * @param name name of @other for messages
  * @return 0, -EINVAL (other inputs or units, ranges or membership functions), -EEXIST (a source is
- *         in both), -EOVERFLOW, -ENOMEM.
+ *         in both, by its hash or by the identity of a recording in its text), -EOVERFLOW, -ENOMEM.
  */
 INCISE_API int incise_factor_merge(struct incise_factor *factor,
 				   struct incise_factor *other, const char *name,
