@@ -146,14 +146,13 @@ static uint64_t row_key(const struct incise_corpus *corpus, enum use use, uint64
 static int by_row_key(const void *a, const void *b)
 {
 	const struct candidate *p = a, *q = b;
+	const uint64_t x[] = {p->key, p->group, p->source, p->row};
+	const uint64_t y[] = {q->key, q->group, q->source, q->row};
+	int i = 0;
 
-	if (p->key != q->key)
-		return p->key < q->key ? -1 : 1;
-	if (p->group != q->group)
-		return p->group < q->group ? -1 : 1;
-	if (p->source != q->source)
-		return p->source < q->source ? -1 : 1;
-	return (p->row > q->row) - (p->row < q->row);
+	while (i < 3 && x[i] == y[i])
+		i++;
+	return (x[i] > y[i]) - (x[i] < y[i]);
 }
 
 /* Keep the different rows with the smallest keys. */

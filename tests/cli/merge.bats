@@ -227,33 +227,40 @@ train_killed_at() {
 	[ ! -e m.fis.progress ]
 }
 
+# Train from $1 and 2.rec into m.fis, killed when it has surveyed one of them.
+train_killed_soon() {
+	incise train $1 2.rec --rate 200 --mf 2,2 -o m.fis >/dev/null 2>&1 3>&- &
+	until [ -e m.fis.progress ]; do
+		kill -0 $! || break
+		sleep 0.01
+	done
+	kill -KILL $! 2>/dev/null || :
+	wait $! || :
+	rm -f m.fis m.fis.sd
+}
+
 # A joined recording is read by the calibrations of its members.
 @test "a training does not go on with rows of another calibration" {
+	local quick=sim:clock=simulated,depth_mm=6,times=2,pause_s=1,cut_s=1
 	printf 'force_mV_N = 300.0;\n' >one.conf
 	printf 'force_mV_N = 5000.0;\n' >other.conf
 	for seed in 1 2; do
-		incise capture -o $seed.rec \
-			--rig "sim:clock=simulated,seed=$seed,depth_mm=6,times=2,pause_s=1,cut_s=1" >/dev/null
+		incise capture -o $seed.rec --rig $quick,seed=$seed >/dev/null
 	done
+	for stream in force tracker; do
+		incise capture -o $stream.rec --rig $quick,seed=3 --only $stream --clock-source sim:1000,5,100 >/dev/null
+	done
+	incise join force.rec tracker.rec -o joined.rec >/dev/null
 	incise recalibrate 1.rec -c one.conf >/dev/null
-	mkdir part
-	for way in recalibrated replaced; do
-		incise train 1.rec 2.rec --rate 200 --mf 2,2 -o m.fis >/dev/null 2>&1 3>&- &
-		until [ -e m.fis.progress ]; do
-			kill -0 $! || break
-			sleep 0.01
-		done
-		kill -KILL $! 2>/dev/null || :
-		wait $! || :
-		rm -f m.fis m.fis.sd
-		if [ $way = recalibrated ]; then
-			incise recalibrate 1.rec -c other.conf >/dev/null
-		else
-			cp one.conf 1.rec/calibration/0002-*.conf
-		fi
-		incise train 1.rec 2.rec --rate 200 --mf 2,2 -o m.fis >/dev/null 2>err
+	for change in "incise recalibrate 1.rec -c other.conf" "cp one.conf 1.rec/calibration/0002-*.conf" \
+		"incise recalibrate joined.rec/force -c other.conf"; do
+		name=1.rec
+		[[ "$change" != *joined* ]] || name=joined.rec
+		train_killed_soon $name
+		eval "$change" >/dev/null
+		incise train $name 2.rec --rate 200 --mf 2,2 -o m.fis >/dev/null 2>err
 		run ! grep -q "goes on" err
-		incise train 1.rec 2.rec --rate 200 --mf 2,2 -o n.fis >/dev/null 2>&1
+		incise train $name 2.rec --rate 200 --mf 2,2 -o n.fis >/dev/null 2>&1
 		cmp m.fis n.fis
 		rm m.fis n.fis ./*.sd
 	done

@@ -4,7 +4,6 @@
  * key and of each part, then these. The key has the version, the options, and path, size and time of
  * each source, of members of recordings too, with the content of the calibrations in use.
  */
-#include <glob.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,10 +13,8 @@
 #include <unistd.h>
 #include <incise/infile.h>
 #include <incise/outfile.h>
-#include <incise/recalibration.h>
 #include <incise/version.h>
 #include "../cli/cli.h"
-#include "../cli/file_kind.h"
 #include "progress.h"
 
 #define SHARE 10.0 /* of the time between two writings, at least, to that of one */
@@ -42,41 +39,6 @@ static void remove_file(void)
 	unlink(of_program->path);
 }
 
-static void print_file(FILE *out, const char *file)
-{
-	struct stat st = {0};
-
-	stat(file, &st);
-	fprintf(out, "%s %jd %jd.%09ld %ju\n", file, (intmax_t)st.st_size,
-		(intmax_t)st.st_mtim.tv_sec, st.st_mtim.tv_nsec, (uintmax_t)st.st_ino);
-}
-
-/* Its rows and the calibration by which they are read, and those of its members. */
-static void print_recording(FILE *out, const char *path)
-{
-	char *pattern = cli_text("%s/*/recording.db", path);
-	char *files[] = {cli_text("%s/recording.db", path),
-			 cli_text("%s/recording.db-wal", path)};
-	struct incise_recalibration *list = NULL;
-	int n = incise_recalibrations(path, &list, NULL);
-	glob_t found = {0};
-
-	for (size_t i = 0; i < 2; i++) {
-		print_file(out, files[i]);
-		free(files[i]);
-	}
-	fprintf(out, "%s %s\n", n > 0 ? list[n - 1].file : "",
-		n > 0 ? list[n - 1].sha256 : "");
-	free(list);
-	if (!glob(pattern, 0, NULL, &found))
-		for (size_t i = 0; i < found.gl_pathc; i++) {
-			*strrchr(found.gl_pathv[i], '/') = 0;
-			print_recording(out, found.gl_pathv[i]);
-		}
-	globfree(&found);
-	free(pattern);
-}
-
 static char *make_key(const char *options, const struct source *sources, int n,
 		      size_t *size)
 {
@@ -87,14 +49,10 @@ static char *make_key(const char *options, const struct source *sources, int n,
 		cli_fail("no memory");
 	fprintf(out, "%s\n%s\n", incise_version(), options);
 	for (int i = 0; i < n; i++) {
-		char *whole = file_without_choice(sources[i].path);
+		char *state = source_state(&sources[i]);
 
-		fprintf(out, "%s\n", sources[i].path);
-		if (sources[i].recording)
-			print_recording(out, whole);
-		else
-			print_file(out, whole);
-		free(whole);
+		fprintf(out, "%s\n%s", sources[i].path, state);
+		free(state);
 	}
 	if (fclose(out))
 		cli_fail("no memory");

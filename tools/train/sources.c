@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /* Sources of pairs; see sources.h. */
 #include <errno.h>
+#include <glob.h>
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -48,40 +50,76 @@ static int count_row(void *user, const double *row, const char *group,
 	return source->take(source->taker, row, group, err);
 }
 
-/* The file itself; of a recording, its rows: free(3). */
-static char *file_of(const struct source *source)
+static void print_file(FILE *out, const char *file)
 {
-	char *whole = file_without_choice(source->path);
-	char *file = cli_text(source->recording ? "%s/recording.db" : "%s", whole);
-
-	free(whole);
-	return file;
-}
-
-/* Fail if the file is another one, or was written, since it was first looked at. */
-static int check_unchanged(struct source *source, struct incise_error *err)
-{
-	char *file = file_of(source);
-	struct stat st = {0}, *seen = &source->seen;
+	struct stat st = {0};
 
 	stat(file, &st);
-	free(file);
-	if (!seen->st_ino)
-		*seen = st;
-	if (st.st_ino == seen->st_ino && st.st_size == seen->st_size &&
-	    st.st_mtim.tv_sec == seen->st_mtim.tv_sec &&
-	    st.st_mtim.tv_nsec == seen->st_mtim.tv_nsec)
-		return 0;
-	return incise_error_set(
-		err, ESTALE,
-		"%s: has changed while it was read; train from a file that "
-		"nobody writes",
-		source->path);
+	fprintf(out, "%s %jd %jd.%09ld %ju\n", file, (intmax_t)st.st_size,
+		(intmax_t)st.st_mtim.tv_sec, st.st_mtim.tv_nsec, (uintmax_t)st.st_ino);
+}
+
+/* Its rows and the calibration by which they are read, and those of its members. */
+static void print_recording(FILE *out, const char *path)
+{
+	char *pattern = cli_text("%s/*/recording.db", path);
+	char *files[] = {cli_text("%s/recording.db", path),
+			 cli_text("%s/recording.db-wal", path)};
+	struct incise_recalibration *list = NULL;
+	int n = incise_recalibrations(path, &list, NULL);
+	glob_t found = {0};
+
+	for (size_t i = 0; i < 2; i++) {
+		print_file(out, files[i]);
+		free(files[i]);
+	}
+	fprintf(out, "%s %s\n", n > 0 ? list[n - 1].file : "",
+		n > 0 ? list[n - 1].sha256 : "");
+	free(list);
+	if (!glob(pattern, 0, NULL, &found))
+		for (size_t i = 0; i < found.gl_pathc; i++) {
+			*strrchr(found.gl_pathv[i], '/') = 0;
+			print_recording(out, found.gl_pathv[i]);
+		}
+	globfree(&found);
+	free(pattern);
+}
+
+char *source_state(const struct source *source)
+{
+	char *whole = file_without_choice(source->path), *text = NULL;
+	size_t size;
+	FILE *out = open_memstream(&text, &size);
+
+	if (!out)
+		cli_fail("no memory");
+	if (source->recording)
+		print_recording(out, whole);
+	else
+		print_file(out, whole);
+	free(whole);
+	fclose(out);
+	return text;
+}
+
+/* Fail if it is not what it was before it was first read. */
+static int check_unchanged(const struct source *source, struct incise_error *err)
+{
+	char *state = source_state(source);
+	bool same = !strcmp(source->state, state);
+
+	free(state);
+	return same ? 0
+		    : incise_error_set(err, ESTALE,
+				       "%s: has changed while it was read; train from a "
+				       "file that nobody writes",
+				       source->path);
 }
 
 static void begin(struct source *source, incise_row_taker take, void *taker)
 {
-	check_unchanged(source, NULL);
+	if (!source->state)
+		source->state = source_state(source);
 	source->take = take;
 	source->taker = taker;
 	source->taken = 0;
@@ -261,7 +299,7 @@ static int open_recording(struct source *source, struct incise_error *err)
 	struct incise_recalibration active;
 	struct incise_recording_info info;
 	struct incise_recording *recording;
-	char *database, *text, origins[ORIGINS_TEXT];
+	char *database, *whole, *text, origins[ORIGINS_TEXT];
 	int rc;
 
 	/* Says itself what is wrong, as a warning, where damaged ones are used. */
@@ -276,8 +314,10 @@ static int open_recording(struct source *source, struct incise_error *err)
 	incise_recording_close(recording);
 	if (rc)
 		return name_it(source, rc, err);
-	database = file_of(source);
+	whole = file_without_choice(source->path);
+	database = cli_text("%s/recording.db", whole);
 	rc = incise_file_sha256(database, source->hash, err);
+	free(whole);
 	free(database);
 	snprintf(source->rig, sizeof(source->rig), "%s", info.rig);
 	text = cli_text(
@@ -324,7 +364,7 @@ int source_open(struct source *source, struct incise_error *err)
 	size_t left_out;
 	int rc;
 
-	check_unchanged(source, NULL);
+	source->state = source_state(source);
 	if (source->recording)
 		return open_recording(source, err);
 	if (source->corpus.read == read_pipe) {
@@ -353,7 +393,9 @@ int source_open(struct source *source, struct incise_error *err)
 
 void sources_free(struct source *sources, int n)
 {
-	for (int i = 0; i < n; i++)
+	for (int i = 0; i < n; i++) {
 		incise_dataset_free(sources[i].pipe);
+		free(sources[i].state);
+	}
 	free(sources);
 }

@@ -7,7 +7,6 @@
 #define TRAIN_SOURCES_H
 
 #include <stdbool.h>
-#include <sys/stat.h>
 #include <incise/corpus.h>
 #include <incise/error.h>
 
@@ -34,7 +33,7 @@ struct source {
 	char hash[65], text[INCISE_FACTOR_TEXT_MAX];
 	char rig[256], calibration[512]; /* the latter: the same where it is the same */
 	uint64_t left_out;		 /* rows in the last reading */
-	struct stat seen; /* of the file, before it was read; st_ino 0: not yet */
+	char *state;			 /* before it was first read; NULL: not yet */
 	struct incise_dataset *pipe; /* that can be read once only: its rows, or NULL */
 	incise_row_taker take;	     /* of the present reading, and the rows it took */
 	void *taker;
@@ -45,6 +44,12 @@ struct source {
 struct source *sources_new(char **paths, int n, struct source_options *options);
 
 void sources_free(struct source *sources, int n);
+
+/*
+ * Path, size and time of all files of a source, and the content of the calibrations by which a
+ * recording is read, also of its members: free(3).
+ */
+char *source_state(const struct source *source);
 
 /*
  * Hash a source, and verify it if it is a recording; its provenance is known afterwards. 0, or a
