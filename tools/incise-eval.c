@@ -60,8 +60,8 @@ struct evaluator {
 	struct incise_fixed *fixed; /* NULL: double */
 	struct incise_uncertainty *uncertainty; /* NULL: none */
 	int n_inputs;
-	const char *input[INCISE_MODEL_INPUTS_MAX], *output;
-	double min[INCISE_MODEL_INPUTS_MAX], max[INCISE_MODEL_INPUTS_MAX];
+	struct incise_variable input[INCISE_MODEL_INPUTS_MAX];
+	const char *output;
 	unsigned long outside; /* of the support */
 	unsigned long unfired; /* inside, where no rule fires */
 	json_t *rows;	       /* NULL: text */
@@ -91,7 +91,7 @@ static void add_row(struct evaluator *e, const double *x, double y, bool outside
 
 	snprintf(key, sizeof(key), "sd%s", unit ? unit : "");
 	for (int i = 0; i < e->n_inputs; i++)
-		json_object_set_new(row, e->input[i], json_number(x[i]));
+		json_object_set_new(row, e->input[i].name, json_number(x[i]));
 	json_object_set_new(row, e->output, json_number(y));
 	if (e->uncertainty)
 		json_object_set_new(
@@ -108,14 +108,11 @@ static void add_row(struct evaluator *e, const double *x, double y, bool outside
 }
 
 /* Evaluate and print; a grid's text has its inputs in front. */
-static void evaluate(struct evaluator *e, const double *x, bool inputs)
+static void evaluate(struct evaluator *e, const double *x, size_t outside, bool inputs)
 {
 	unsigned int flags = 0;
-	bool outside = false;
 	double y, parts[3];
 
-	for (int i = 0; i < e->n_inputs; i++)
-		outside |= !(x[i] >= e->min[i] && x[i] <= e->max[i]);
 	y = e->model ? incise_model_eval(e->model, x, &flags) : 0;
 	if (e->fixed)
 		y = incise_fixed_eval_double(e->fixed, x);
@@ -156,7 +153,7 @@ static void parse_line(const struct evaluator *e, const char *path, unsigned lon
 	int n = e->n_inputs;
 
 	for (int i = 0; i < n; i++) {
-		const char *name = e->input[i];
+		const char *name = e->input[i].name;
 		size_t length;
 		char *end;
 
@@ -172,10 +169,6 @@ static void parse_line(const struct evaluator *e, const char *path, unsigned lon
 				 "%d numbers without units, and '#' before a heading",
 				 path, line, i + 1, name,
 				 (int)(length < 20 ? length : 20), at, n);
-		if (!isfinite(x[i]))
-			cli_fail("%s:%lu: column %d (%s): %.*s is not finite; remove the "
-				 "line",
-				 path, line, i + 1, name, (int)length, at);
 		at = end;
 	}
 	at += strspn(at, SEPARATORS);
@@ -218,10 +211,10 @@ static void eval_grid(struct evaluator *e, const char *size)
 		for (int j = 0; j < m; j++) {
 			/* Weighted so that both ends are met to the digit. */
 			double u = (double)i / (n - 1), v = (double)j / (m - 1);
-			double x[] = {e->min[0] * (1 - u) + e->max[0] * u,
-				      e->min[1] * (1 - v) + e->max[1] * v};
+			double x[] = {e->input[0].min * (1 - u) + e->input[0].max * u,
+				      e->input[1].min * (1 - v) + e->input[1].max * v};
 
-			evaluate(e, x, true);
+			evaluate(e, x, 0, true);
 		}
 		if (!e->rows)
 			putchar('\n');
@@ -236,9 +229,10 @@ static void open_compiled(struct evaluator *e, const char *path)
 	e->n_inputs = e->fixed->n_inputs;
 	e->output = e->fixed->output;
 	for (int i = 0; i < e->n_inputs; i++) {
-		e->input[i] = e->fixed->input[i].name;
-		e->min[i] = e->fixed->input[i].min / (double)INCISE_FIXED_ONE;
-		e->max[i] = e->fixed->input[i].max / (double)INCISE_FIXED_ONE;
+		snprintf(e->input[i].name, sizeof(e->input[i].name), "%s",
+			 e->fixed->input[i].name);
+		e->input[i].min = e->fixed->input[i].min / (double)INCISE_FIXED_ONE;
+		e->input[i].max = e->fixed->input[i].max / (double)INCISE_FIXED_ONE;
 	}
 }
 
@@ -265,11 +259,7 @@ static void open_model(struct evaluator *e, const char *path, const char *arith,
 	incise_model_set_clamp(e->model, clamp);
 	e->n_inputs = incise_model_info(e->model)->n_inputs;
 	e->output = incise_model_info(e->model)->output.name;
-	for (int i = 0; i < e->n_inputs; i++) {
-		e->input[i] = incise_model_info(e->model)->input[i].name;
-		e->min[i] = incise_model_info(e->model)->input[i].min;
-		e->max[i] = incise_model_info(e->model)->input[i].max;
-	}
+	memcpy(e->input, incise_model_info(e->model)->input, sizeof(e->input));
 	if (!arith || strcmp(arith, "fixed"))
 		return;
 	e->fixed = incise_fixed_compile(e->model, NULL, &err);
@@ -289,6 +279,7 @@ static void eval_file(struct evaluator *e, const char *path)
 	struct incise_error err = {0};
 	struct incise_infile *in;
 	unsigned long line = 0;
+	size_t outside;
 	char *text;
 	int rc;
 
@@ -301,7 +292,9 @@ static void eval_file(struct evaluator *e, const char *path)
 		if (!text[strspn(text, " \t")] || *text == '#')
 			continue;
 		parse_line(e, name, line, text, x);
-		evaluate(e, x, false);
+		if (incise_inputs_check(e->input, e->n_inputs, x, 1, &outside, &err))
+			cli_fail("%s:%lu: %s", name, line, err.text);
+		evaluate(e, x, outside, false);
 	}
 	if (rc)
 		cli_fail_with(&err);
@@ -334,8 +327,8 @@ static void warn_outside(const struct evaluator *e, bool no_clamp)
 
 	for (int i = 0; i < e->n_inputs; i++)
 		n += snprintf(support + n, sizeof(support) - (size_t)n,
-			      "%s%.40s %.4g to %.4g", i ? ", " : "", e->input[i],
-			      e->min[i], e->max[i]);
+			      "%s%.40s %.4g to %.4g", i ? ", " : "", e->input[i].name,
+			      e->input[i].min, e->input[i].max);
 	cli_warn("%lu inputs were out of the training range (%s) and were %s", e->outside,
 		 support, no_clamp ? "extrapolated" : "clamped to it");
 }

@@ -53,7 +53,7 @@ static const struct cli_option options[] = {
 	 CLI_FLAG(struct job, dataset)},
 	{0, "group", "GROUP",
 	 "dataset: recording, rig, or a column that names the groups\n"
-	 "(default: cut for recordings)",
+	 "(default: cut, where all sources have it), or none",
 	 CLI_TEXT(struct job, group)},
 	{0, "inputs", "A,B", "dataset: input columns (default: depth_mm,velocity_mm_s)",
 	 CLI_PARSED_BY(parse_inputs)},

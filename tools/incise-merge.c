@@ -125,6 +125,9 @@ static void print_report(const struct options *options,
 	printf("%d factors: %llu pairs of %llu groups from %d sources\n", options->n,
 	       (unsigned long long)info->rows, (unsigned long long)info->groups,
 	       info->n_sources);
+	if (info->parts < INCISE_FACTOR_FOLDS)
+		printf("%d of %d parts: the factors have small ones joined\n",
+		       info->parts, INCISE_FACTOR_FOLDS);
 	if (!isnan(report->train_rmse))
 		printf("RMSE %.5g, R² %.5g, ridge %g\n", report->train_rmse,
 		       report->train_r2, report->ridge);

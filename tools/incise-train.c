@@ -17,7 +17,6 @@
 #include <incise/factor.h>
 #include <incise/propagation.h>
 #include <incise/ranks.h>
-#include <incise/recalibration.h>
 #include <incise/train.h>
 #include <incise/version.h>
 #include "cli/cli.h"
@@ -48,7 +47,7 @@ struct options {
 	int n_mfs;
 	bool auto_mfs;
 	enum incise_mf_type type;
-	bool all_rows, json, mpi;
+	bool given_group, all_rows, json, mpi;
 	enum uncertainties_wanted uncertainty;
 	const struct incise_ranks *ranks; /* NULL: a single process */
 	struct incise_train_options train;
@@ -125,7 +124,8 @@ static const struct cli_option option_table[] = {
 	 CLI_TEXT(struct options, target)},
 	{0, "group", "GROUP",
 	 "hold out whole groups: recording, rig, or a column that\n"
-	 "names them, such as cut (default: cut for recordings)",
+	 "names them, such as cut (default: cut, where all sources\n"
+	 "have it), or none",
 	 CLI_TEXT(struct options, group)},
 	{0, "rate", "HZ",
 	 "rows per second of a recording, each the mean of its samples\n"
@@ -302,9 +302,10 @@ struct result {
 	struct incise_baselines baselines;
 	struct interval interval;
 	struct incise_propagation_report propagated;
-	bool weighed;		/* by uncertainties; propagated says how */
-	uint64_t left_out;	/* rows */
-	uint64_t check_outside; /* rows kept back, outside the training ranges */
+	bool weighed;		 /* by uncertainties; propagated says how */
+	uint64_t left_out;	 /* rows */
+	uint64_t rows, repeated; /* rows; those that are equal to another one */
+	uint64_t check_outside;	 /* rows kept back, outside the training ranges */
 };
 
 /* --- training ------------------------------------------------------------------------ */
@@ -485,6 +486,17 @@ static struct incise_factor *new_factor(const struct options *options,
 	return factor;
 }
 
+/* End the program; few different rows may be why. */
+static void fail_training(const struct result *result, const struct incise_error *err)
+{
+	if (result->repeated)
+		cli_fail("%s: %s (%llu of %llu rows repeat another row)",
+			 result->options->data, err->text,
+			 (unsigned long long)result->repeated,
+			 (unsigned long long)result->rows);
+	cli_fail("%s: %s", result->options->data, err->text);
+}
+
 /* The consequents of all pairs at given premises. */
 static struct incise_model *solve(const struct options *options,
 				  struct incise_factor *fit, struct result *result)
@@ -495,7 +507,7 @@ static struct incise_model *solve(const struct options *options,
 		fit, &ridge, &result->report, &result->interval.uncertainty, &err);
 
 	if (!model)
-		cli_fail("%s: %s", options->data, err.text);
+		fail_training(result, &err);
 	return model;
 }
 
@@ -524,6 +536,9 @@ static char *classic_notes(const struct incise_corpus *corpus, const char *how)
 
 /* A smaller ratio to a baseline's error may be by chance of the split. */
 #define WORSE 1.02
+
+/* A smaller share of repeated rows is by chance, and within the estimate of many. */
+#define REPEATED 0.05
 
 /* Pairs per parameter below which a model follows noise rather than tissue. */
 #define PAIRS_PER_PARAMETER 3
@@ -578,7 +593,7 @@ static json_t *warnings(const struct result *result)
 	const struct incise_model *model = result->model;
 	const struct incise_train_report *report = &result->report;
 	const struct incise_baselines *baselines = &result->baselines;
-	const uint64_t pairs = result->fit->rows;
+	const uint64_t pairs = result->fit->different;
 	const double rmse = result->check ? report->check_rmse : report->train_rmse;
 	const struct {
 		const char *name;
@@ -597,6 +612,11 @@ static json_t *warnings(const struct result *result)
 	double rounding = 1e-13 * fmax(fabs(out->min), fabs(out->max));
 	json_t *list = json_array();
 
+	if (result->repeated > REPEATED * (double)result->rows)
+		warn(list,
+		     "%llu of %llu rows repeat another row, and count once as pairs",
+		     (unsigned long long)result->repeated,
+		     (unsigned long long)result->rows);
 	for (size_t i = 0; i < sizeof(others) / sizeof(*others); i++)
 		if (rmse > WORSE * others[i].rmse && rmse > rounding)
 			warn(list,
@@ -660,6 +680,9 @@ static void report_json(const struct result *result, json_t *warned)
 
 	json_set_integer(object, "pairs", fit->rows + (check ? check->rows : 0));
 	json_set_integer(object, "left_out", result->left_out);
+	json_set_integer(object, "repeated", result->repeated);
+	json_object_set_new(object, "group",
+			    options->group ? json_text(options->group) : json_null());
 	json_object_set_new(object, "train",
 			    error_object(options, report->train_rmse, report->train_r2,
 					 fit->rows));
@@ -740,6 +763,9 @@ static void report_text(const struct result *result)
 		       (unsigned long long)result->left_out,
 		       (unsigned long long)(result->left_out + fit->rows +
 					    (check ? check->rows : 0)));
+	if (options->group && !options->given_group)
+		printf("\ngrouped by %s, as no --group is given (none: each pair by itself)",
+		       options->group);
 	printf("\n%d rules, %d parameters, %d epochs (kept %d), ",
 	       incise_model_info(model)->n_rules, report->parameters, report->epochs,
 	       report->best_epoch);
@@ -769,7 +795,7 @@ static void report_text(const struct result *result)
 		       result->propagated.own, unit_of(options->target),
 		       result->propagated.calibration, unit_of(options->target),
 		       result->propagated.rig, unit_of(options->target));
-	if (report->pairs_tuned && report->pairs_tuned < fit->rows)
+	if (report->pairs_tuned && report->pairs_tuned < fit->different)
 		printf("  membership functions from a random %zu of the pairs, consequents "
 		       "from all\n",
 		       report->pairs_tuned);
@@ -1287,7 +1313,7 @@ static void search(struct options *options, struct incise_model *model,
 			 check && check->n ? check : NULL, &options->train,
 			 &result->report, &err)) {
 		incise_outfile_abort(file);
-		cli_fail("%s: %s", options->data, err.text);
+		fail_training(result, &err);
 	}
 	cli_progress_end();
 	whole_file_end(file);
@@ -1298,20 +1324,18 @@ static void save_factor(const struct options *options, struct incise_factor *fac
 	struct incise_factor_info info;
 	struct incise_error err = {0};
 
-	incise_factor_info(factor, &info);
-	if (info.rows < INCISE_FACTOR_PAIRS_MIN)
-		cli_fail(
-			"%s: a factor of %llu pairs would reveal them; expected at least "
-			"%d",
-			options->data, (unsigned long long)info.rows,
-			INCISE_FACTOR_PAIRS_MIN);
 	if (incise_factor_save(factor, options->factor, &err))
 		cli_fail_with(&err);
+	incise_factor_info(factor, &info);
 	if (!strcmp(options->factor, "-"))
 		return;
 	printf("%s: %llu pairs of %llu groups, premises %.12s\n", options->data,
 	       (unsigned long long)info.rows, (unsigned long long)info.groups,
 	       info.premises);
+	if (info.parts < INCISE_FACTOR_FOLDS)
+		printf("%d of %d parts, as small ones would reveal their pairs: a merge "
+		       "cross-validates over these\n",
+		       info.parts, INCISE_FACTOR_FOLDS);
 	cli_written();
 }
 
@@ -1346,26 +1370,6 @@ static void save_model(const struct options *options, const struct incise_corpus
 		report_text(result);
 	if (!options->json)
 		json_decref(warned);
-}
-
-/* Add the calibrations that recordings are read by: their own files stay as they are. */
-static char *add_calibrations(char *key, const struct source *sources, int n)
-{
-	for (int i = 0; i < n; i++) {
-		struct incise_recalibration *list = NULL;
-		int calibrations =
-			sources[i].recording
-				? incise_recalibrations(sources[i].path, &list, NULL)
-				: 0;
-		char *more =
-			cli_text("%s%s%s", key, calibrations > 1 ? "; " : "",
-				 calibrations > 1 ? list[calibrations - 1].file : "");
-
-		free(list);
-		free(key);
-		key = more;
-	}
-	return key;
 }
 
 /* All options that the surveys and sums depend on: free(3). */
@@ -1434,13 +1438,13 @@ int main(int argc, char **argv)
 		.user = &reading,
 	};
 	sources = sources_new(options.paths, options.n_paths, &how);
+	options.given_group = options.group;
 	options.group = how.group;
 	data = cli_text("%d sources", options.n_paths);
 	options.data = options.n_paths == 1 ? sources[0].path : data;
 	/* Weights are not kept in the progress. */
 	if (!options.mpi && !options.train.classic && !uncertainties.n) {
-		char *key = add_calibrations(progress_key(&options), sources,
-					     options.n_paths);
+		char *key = progress_key(&options);
 
 		progress = progress_new(options.factor ? options.factor : options.model,
 					key, sources, options.n_paths);
@@ -1450,6 +1454,9 @@ int main(int argc, char **argv)
 	result.fit = incise_corpus_side(corpus, false);
 	result.check = options.check > 0 ? incise_corpus_side(corpus, true) : NULL;
 	options.train.groups = result.fit->sample.groups;
+	result.rows = result.fit->rows + (result.check ? result.check->rows : 0);
+	result.repeated = result.rows - result.fit->different -
+			  (result.check ? result.check->different : 0);
 	folding = (struct folding){.options = &options,
 				   .corpus = corpus,
 				   .sources = sources,

@@ -2,9 +2,10 @@
 /*
  * Training from many sources; see incise/corpus.h.
  *
- * A row has a random number that is a function of the seed, of its source's hash and of its
- * place there. The sample are the rows with the smallest ones; without groups, so are the rows
- * that are held out, by another number. So both are the same for any order of the sources.
+ * A row has a random number that is a function of the seed and of its values. The sample are the
+ * different rows with the smallest ones; without groups, so are the rows that are held out, by
+ * another number. So both are the same for any order of the sources, and rows that are equal are
+ * on one side, and in one fold.
  */
 #include <errno.h>
 #include <math.h>
@@ -18,9 +19,14 @@
 
 #define COLUMNS_MAX (INCISE_MODEL_INPUTS_MAX + 1)
 
-/* A row that may be in the sample. */
+/* Without groups, numbers of rows are counted by their first bits. */
+#define BINS (1 << 16)
+#define BIN(key) ((key) >> 48)
+
+/* A row that may be in the sample, the first of those that are equal. */
 struct candidate {
 	uint64_t key, source, row, group; /* source: as of source_number() */
+	uint64_t hash;			  /* of the values */
 	double values[COLUMNS_MAX];
 };
 
@@ -37,14 +43,17 @@ struct incise_corpus {
 	uint64_t seed;
 	struct incise_corpus_survey *surveys;
 	int n_surveys, survey_capacity;
-	struct candidate *heap; /* the largest key first, until it is settled */
-	size_t n_heap, heap_capacity, sample;
+	struct candidate *rows; /* those of the smallest keys first, then more */
+	size_t n_rows, capacity, sample;
+	uint64_t limit; /* keys above it are not in the sample */
+	uint64_t *bins; /* rows by their number for checking; NULL with groups */
 	const volatile int *stop;		/* or NULL */
 	struct incise_propagation *propagation; /* or NULL */
 	/* After settling: */
 	struct group *groups; /* by key */
 	int n_groups;
-	uint64_t threshold; /* of rows held out, without groups */
+	uint64_t
+		threshold; /* bin of the first row that is not held out, without groups */
 	bool held, settled;
 	struct incise_corpus_side sides[2]; /* fit, check */
 };
@@ -60,6 +69,12 @@ struct incise_corpus *incise_corpus_new(int n_inputs, bool grouped, uint64_t see
 	corpus->grouped = grouped;
 	corpus->seed = seed;
 	corpus->sample = sample;
+	corpus->limit = UINT64_MAX;
+	corpus->bins = grouped ? NULL : calloc(BINS, sizeof(*corpus->bins));
+	if (!grouped && !corpus->bins) {
+		free(corpus);
+		return NULL;
+	}
 	return corpus;
 }
 
@@ -70,7 +85,8 @@ void incise_corpus_free(struct incise_corpus *corpus)
 	for (int i = 0; i < corpus->n_surveys; i++)
 		free(corpus->surveys[i].groups);
 	free(corpus->surveys);
-	free(corpus->heap);
+	free(corpus->rows);
+	free(corpus->bins);
 	free(corpus->groups);
 	for (int side = 0; side < 2; side++)
 		incise_train_side_free(&corpus->sides[side].sample);
@@ -107,62 +123,82 @@ static uint64_t source_number(const char *hash)
 
 enum use { FOR_SAMPLE, FOR_CHECK };
 
-static uint64_t row_key(const struct incise_corpus *corpus, enum use use, uint64_t source,
-			uint64_t row)
+static uint64_t hash_row(const struct incise_corpus *corpus, const double *row)
 {
-	uint64_t key = incise_random_mix(corpus->seed * 2 + use + 1) ^ source;
+	uint64_t hash = 0, bits;
 
-	return incise_random_bits(incise_random_mix(key), row);
+	for (int i = 0; i < corpus->columns; i++) {
+		double value = row[i] + 0.0; /* of -0, 0 */
+
+		memcpy(&bits, &value, sizeof(bits));
+		hash = incise_random_bits(hash, bits);
+	}
+	return hash;
+}
+
+static uint64_t row_key(const struct incise_corpus *corpus, enum use use, uint64_t hash)
+{
+	return incise_random_bits(incise_random_mix(corpus->seed * 2 + use + 1), hash);
 }
 
 /* --- the sample ---------------------------------------------------------------------- */
 
-static bool before(const struct candidate *a, const struct candidate *b)
+static int by_row_key(const void *a, const void *b)
 {
-	if (a->key != b->key)
-		return a->key < b->key;
-	return a->source != b->source ? a->source < b->source : a->row < b->row;
+	const struct candidate *p = a, *q = b;
+	const uint64_t x[] = {p->key, p->group, p->source, p->row};
+	const uint64_t y[] = {q->key, q->group, q->source, q->row};
+	int i = 0;
+
+	while (i < 3 && x[i] == y[i])
+		i++;
+	return (x[i] > y[i]) - (x[i] < y[i]);
 }
 
-static void sift_down(struct candidate *heap, size_t n)
+/* Keep the different rows with the smallest keys. */
+static void squeeze(struct incise_corpus *corpus)
 {
-	struct candidate moved = heap[0];
-	size_t at = 0;
+	struct candidate *rows = corpus->rows;
+	size_t n = 0;
 
-	for (size_t child; (child = 2 * at + 1) < n; at = child) {
-		child += child + 1 < n && before(&heap[child], &heap[child + 1]);
-		if (!before(&moved, &heap[child]))
-			break;
-		heap[at] = heap[child];
-	}
-	heap[at] = moved;
+	if (corpus->n_rows)
+		qsort(rows, corpus->n_rows, sizeof(*rows), by_row_key);
+	for (size_t i = 0; i < corpus->n_rows; i++)
+		if (!n || rows[n - 1].key != rows[i].key ||
+		    rows[n - 1].group != rows[i].group)
+			rows[n++] = rows[i];
+	corpus->n_rows = n;
+	if (n <= corpus->sample)
+		return;
+	corpus->n_rows = corpus->sample;
+	corpus->limit = rows[corpus->sample - 1].key;
+}
+
+/* Squeeze, and have at least half of the capacity free. */
+static int make_room(struct incise_corpus *corpus)
+{
+	size_t capacity;
+	void *rows;
+
+	squeeze(corpus);
+	if (2 * corpus->n_rows < corpus->capacity)
+		return 0;
+	capacity = corpus->n_rows ? 4 * corpus->n_rows : 1024;
+	rows = realloc(corpus->rows, capacity * sizeof(*corpus->rows));
+	if (!rows)
+		return -ENOMEM;
+	corpus->rows = rows;
+	corpus->capacity = capacity;
+	return 0;
 }
 
 static int offer(struct incise_corpus *corpus, const struct candidate *c)
 {
-	struct candidate *heap = corpus->heap;
-	size_t at = corpus->n_heap;
-
-	if (corpus->n_heap == corpus->sample) {
-		if (!before(c, &heap[0]))
-			return 0;
-		heap[0] = *c;
-		sift_down(heap, corpus->n_heap);
+	if (c->key > corpus->limit)
 		return 0;
-	}
-	if (at == corpus->heap_capacity) {
-		size_t capacity = at ? 2 * at : 1024;
-
-		heap = realloc(heap, capacity * sizeof(*heap));
-		if (!heap)
-			return -ENOMEM;
-		corpus->heap = heap;
-		corpus->heap_capacity = capacity;
-	}
-	corpus->n_heap++;
-	for (; at && before(&heap[(at - 1) / 2], c); at = (at - 1) / 2)
-		heap[at] = heap[(at - 1) / 2];
-	heap[at] = *c;
+	if (corpus->n_rows == corpus->capacity && make_room(corpus))
+		return -ENOMEM;
+	corpus->rows[corpus->n_rows++] = *c;
 	return 0;
 }
 
@@ -244,7 +280,8 @@ static int survey_row(void *user, const double *row, const char *name,
 	struct incise_corpus_survey *survey = s->survey;
 	struct candidate c = {.source = s->number,
 			      .row = survey->rows,
-			      .group = key_of(s->source, name)};
+			      .group = key_of(s->source, name),
+			      .hash = hash_row(corpus, row)};
 	struct incise_corpus_group *group =
 		find_survey_group(s, c.group,
 				  s->source->group ? s->source->group
@@ -269,7 +306,10 @@ static int survey_row(void *user, const double *row, const char *name,
 	}
 	group->rows++;
 	survey->rows++;
-	c.key = row_key(corpus, FOR_SAMPLE, c.source, c.row);
+	survey->digest = incise_random_bits(survey->digest ^ c.group, c.hash);
+	c.key = row_key(corpus, FOR_SAMPLE, c.hash);
+	if (corpus->bins)
+		corpus->bins[BIN(row_key(corpus, FOR_CHECK, c.hash))]++;
 	return offer(corpus, &c)
 		       ? incise_error_set(err, ENOMEM, "no memory for more rows")
 		       : 0;
@@ -279,7 +319,8 @@ static int add_survey(struct incise_corpus *corpus, const char *hash, const char
 		      struct incise_error *err)
 {
 	for (int i = 0; i < corpus->n_surveys; i++)
-		if (!strcmp(corpus->surveys[i].hash, hash))
+		if (!strcmp(corpus->surveys[i].hash, hash) ||
+		    incise_is_same_recording(corpus->surveys[i].text, text))
 			return incise_error_set(
 				err, EEXIST,
 				"%s: has the same content as %s; give each recording once",
@@ -325,18 +366,26 @@ int incise_corpus_survey(struct incise_corpus *corpus,
 struct header {
 	char magic[8];
 	int32_t columns, n_surveys;
-	uint64_t n_heap, size;
+	uint64_t n_rows, limit, size;
 };
 
-void *incise_corpus_encode(const struct incise_corpus *corpus, size_t *size)
+static size_t size_of_bins(const struct incise_corpus *corpus)
 {
-	struct header header = {.magic = "survey1",
+	return corpus->bins ? BINS * sizeof(*corpus->bins) : 0;
+}
+
+void *incise_corpus_encode(struct incise_corpus *corpus, size_t *size)
+{
+	struct header header = {.magic = "survey2",
 				.columns = corpus->columns,
-				.n_surveys = corpus->n_surveys,
-				.n_heap = corpus->n_heap};
+				.n_surveys = corpus->n_surveys};
 	char *bytes, *at;
 
-	*size = sizeof(header) + corpus->n_heap * sizeof(*corpus->heap);
+	squeeze(corpus);
+	header.n_rows = corpus->n_rows;
+	header.limit = corpus->limit;
+	*size = sizeof(header) + size_of_bins(corpus) +
+		corpus->n_rows * sizeof(*corpus->rows);
 	for (int i = 0; i < corpus->n_surveys; i++)
 		*size += sizeof(*corpus->surveys) +
 			 corpus->surveys[i].n_groups * sizeof(struct incise_corpus_group);
@@ -346,8 +395,12 @@ void *incise_corpus_encode(const struct incise_corpus *corpus, size_t *size)
 		return NULL;
 	memcpy(at, &header, sizeof(header));
 	at += sizeof(header);
-	memcpy(at, corpus->heap, corpus->n_heap * sizeof(*corpus->heap));
-	at += corpus->n_heap * sizeof(*corpus->heap);
+	if (corpus->bins)
+		memcpy(at, corpus->bins, size_of_bins(corpus));
+	at += size_of_bins(corpus);
+	if (corpus->n_rows)
+		memcpy(at, corpus->rows, corpus->n_rows * sizeof(*corpus->rows));
+	at += corpus->n_rows * sizeof(*corpus->rows);
 	for (int i = 0; i < corpus->n_surveys; i++) {
 		const struct incise_corpus_survey *survey = &corpus->surveys[i];
 		size_t n = survey->n_groups * sizeof(*survey->groups);
@@ -373,11 +426,21 @@ int incise_corpus_add(struct incise_corpus *corpus, const void *bytes, size_t si
 		return incise_error_set(err, EINVAL, "%s", damaged);
 	memcpy(&header, at, sizeof(header));
 	at += sizeof(header);
-	if (memcmp(header.magic, "survey1", 8) || header.columns != corpus->columns ||
+	if (memcmp(header.magic, "survey2", 8) || header.columns != corpus->columns ||
 	    header.size != size || header.n_surveys < 0 ||
-	    (size_t)(end - at) / sizeof(struct candidate) < header.n_heap)
+	    (size_t)(end - at) < size_of_bins(corpus) ||
+	    ((size_t)(end - at) - size_of_bins(corpus)) / sizeof(struct candidate) <
+		    header.n_rows)
 		return incise_error_set(err, EINVAL, "%s", damaged);
-	for (uint64_t i = 0; i < header.n_heap; i++, at += sizeof(struct candidate)) {
+	for (int i = 0; i < BINS && corpus->bins; i++, at += sizeof(*corpus->bins)) {
+		uint64_t count;
+
+		memcpy(&count, at, sizeof(count));
+		corpus->bins[i] += count;
+	}
+	if (header.limit < corpus->limit)
+		corpus->limit = header.limit;
+	for (uint64_t i = 0; i < header.n_rows; i++, at += sizeof(struct candidate)) {
 		struct candidate c;
 
 		memcpy(&c, at, sizeof(c));
@@ -521,42 +584,35 @@ static int hold_out_groups(struct incise_corpus *corpus, double share,
 	return rc;
 }
 
-/* Find the key of the n-th row by counting keys, 16 bits at a time. */
-static void hold_out_rows(struct incise_corpus *corpus, uint64_t n)
+/* Hold out as near to @n rows as equal ones and bins allow, and some on either side. */
+static int hold_out_rows(struct incise_corpus *corpus, uint64_t rows, double n,
+			 struct incise_error *err)
 {
-	static const int bits = 16;
-	uint64_t prefix = 0;
+	uint64_t below = 0, best = 0;
 
-	for (int done = 0; done < 64; done += bits) {
-		uint64_t count[1 << 16] = {0}, below = 0;
-		int bin = 0;
-
-		for (int i = 0; i < corpus->n_surveys; i++) {
-			uint64_t source = source_number(corpus->surveys[i].hash);
-
-			for (uint64_t r = 0; r < corpus->surveys[i].rows; r++) {
-				uint64_t key = row_key(corpus, FOR_CHECK, source, r);
-
-				if (!done || key >> (64 - done) == prefix)
-					count[key >> (48 - done) & 0xffff]++;
-			}
-		}
-		while (below + count[bin] < n)
-			below += count[bin++];
-		n -= below;
-		prefix = prefix << bits | (uint64_t)bin;
+	for (uint64_t bin = 0; bin < BINS; bin++) {
+		below += corpus->bins[bin];
+		if (!below || below == rows ||
+		    (best && fabs((double)below - n) >= fabs((double)best - n)))
+			continue;
+		best = below;
+		corpus->threshold = bin + 1;
 	}
-	corpus->threshold = prefix;
+	corpus->sides[1].rows = best;
+	return best ? 0
+		    : incise_error_set(err, EINVAL,
+				       "%llu rows: at least two that differ are required "
+				       "to hold out some for checking",
+				       (unsigned long long)rows);
 }
 
-static bool is_check(const struct incise_corpus *corpus, uint64_t source, uint64_t row,
-		     uint64_t group)
+static bool is_check(const struct incise_corpus *corpus, uint64_t hash, uint64_t group)
 {
 	if (!corpus->held)
 		return false;
 	return corpus->grouped
 		       ? find_group(corpus, group)->check
-		       : row_key(corpus, FOR_CHECK, source, row) <= corpus->threshold;
+		       : BIN(row_key(corpus, FOR_CHECK, hash)) < corpus->threshold;
 }
 
 static int take_sample(struct incise_corpus *corpus)
@@ -564,21 +620,20 @@ static int take_sample(struct incise_corpus *corpus)
 	for (int side = 0; side < 2; side++) {
 		struct incise_train_side *to = &corpus->sides[side].sample;
 		double *rows =
-			malloc((corpus->n_heap + 1) * corpus->columns * sizeof(*rows));
+			malloc((corpus->n_rows + 1) * corpus->columns * sizeof(*rows));
 
 		to->groups = corpus->grouped
-				     ? malloc((corpus->n_heap + 1) * sizeof(*to->groups))
+				     ? malloc((corpus->n_rows + 1) * sizeof(*to->groups))
 				     : NULL;
 		to->pairs = (struct incise_pairs){rows, 0, corpus->columns - 1};
 		if (!rows || (corpus->grouped && !to->groups))
 			return -ENOMEM;
 	}
-	qsort(corpus->heap, corpus->n_heap, sizeof(*corpus->heap), by_source_and_row);
-	for (size_t i = 0; i < corpus->n_heap; i++) {
-		const struct candidate *c = &corpus->heap[i];
+	qsort(corpus->rows, corpus->n_rows, sizeof(*corpus->rows), by_source_and_row);
+	for (size_t i = 0; i < corpus->n_rows; i++) {
+		const struct candidate *c = &corpus->rows[i];
 		struct incise_train_side *to =
-			&corpus->sides[is_check(corpus, c->source, c->row, c->group)]
-				 .sample;
+			&corpus->sides[is_check(corpus, c->hash, c->group)].sample;
 
 		memcpy((double *)to->pairs.rows + to->pairs.n * corpus->columns,
 		       c->values, corpus->columns * sizeof(double));
@@ -611,6 +666,14 @@ static void count_sides(struct incise_corpus *corpus)
 	check->sample.n_groups = check->n_groups;
 }
 
+/* Of all different rows, from those in the sample: keys are spread evenly. */
+static uint64_t scale_up(const struct incise_corpus *corpus, size_t n)
+{
+	if (corpus->limit == UINT64_MAX)
+		return n;
+	return (uint64_t)((double)n * 0x1p64 / ((double)corpus->limit + 1));
+}
+
 int incise_corpus_settle(struct incise_corpus *corpus, double share,
 			 struct incise_error *err)
 {
@@ -630,14 +693,7 @@ int incise_corpus_settle(struct incise_corpus *corpus, double share,
 	if (share > 0 && corpus->grouped) {
 		rc = hold_out_groups(corpus, share, err);
 	} else if (share > 0) {
-		double n = fmax(1, fmin(nearbyint(share * rows), rows - 1));
-
-		if (rows < 2)
-			return incise_error_set(err, EINVAL,
-						"1 rows: at least two are required to "
-						"hold out some for checking");
-		hold_out_rows(corpus, (uint64_t)n);
-		corpus->sides[1].rows = (uint64_t)n;
+		rc = hold_out_rows(corpus, rows, share * (double)rows, err);
 	}
 	if (rc)
 		return rc;
@@ -645,9 +701,16 @@ int incise_corpus_settle(struct incise_corpus *corpus, double share,
 	count_sides(corpus);
 	corpus->sides[0].rows -= corpus->sides[1].rows;
 	corpus->settled = true;
-	return take_sample(corpus)
-		       ? incise_error_set(err, ENOMEM, "no memory for a sample of rows")
-		       : 0;
+	squeeze(corpus);
+	if (take_sample(corpus))
+		return incise_error_set(err, ENOMEM, "no memory for a sample of rows");
+	for (int side = 0; side < 2; side++) {
+		struct incise_corpus_side *of = &corpus->sides[side];
+
+		of->different = scale_up(corpus, of->sample.pairs.n);
+		of->different = of->different < of->rows ? of->different : of->rows;
+	}
+	return 0;
 }
 
 int incise_corpus_sources(const struct incise_corpus *corpus)
@@ -694,7 +757,7 @@ struct folder {
 	const struct incise_corpus *corpus;
 	const struct incise_corpus_source *source;
 	struct incise_factor *fit, *check;
-	uint64_t number, row, left_out;
+	uint64_t row, digest, left_out;
 };
 
 static int fold_row(void *user, const double *row, const char *name,
@@ -702,13 +765,15 @@ static int fold_row(void *user, const double *row, const char *name,
 {
 	struct folder *f = user;
 	uint64_t group = key_of(f->source, name), at = f->row++;
+	uint64_t hash = hash_row(f->corpus, row);
 	struct incise_error own;
 	int rc;
 
 	if (is_stopped(f->corpus))
 		return incise_error_set(err, ECANCELED, "canceled");
-	/* Without groups each row is in a part of cross-validation by itself. */
-	if (is_check(f->corpus, f->number, at, group)) {
+	f->digest = incise_random_bits(f->digest ^ group, hash);
+	/* Without groups each row is in a part of cross-validation by itself, with its equals. */
+	if (is_check(f->corpus, hash, group)) {
 		rc = incise_factor_add(f->check, row, group, &own);
 		f->left_out += rc == -ERANGE;
 		rc = rc == -ERANGE ? 0 : rc;
@@ -718,12 +783,10 @@ static int fold_row(void *user, const double *row, const char *name,
 				? incise_propagation_add(f->corpus->propagation, row)
 				: 1;
 
-		rc = incise_factor_add_weighted(f->fit, row,
-						f->corpus->grouped
-							? group
-							: row_key(f->corpus, FOR_SAMPLE,
-								  f->number, at),
-						weight, &own);
+		rc = incise_factor_add_weighted(
+			f->fit, row,
+			f->corpus->grouped ? group : row_key(f->corpus, FOR_SAMPLE, hash),
+			weight, &own);
 	}
 	return rc ? incise_error_set(err, -rc, "%s: row %llu of those used: %.300s",
 				     f->source->name, (unsigned long long)at + 1,
@@ -731,18 +794,34 @@ static int fold_row(void *user, const double *row, const char *name,
 		  : 0;
 }
 
+/* Count the groups and the different rows of a source, by the folds that they are in. */
+static void count_parts(const struct incise_corpus *corpus,
+			const struct incise_corpus_survey *survey,
+			struct incise_factor *fit)
+{
+	uint64_t n[INCISE_FACTOR_FOLDS] = {0}, source = source_number(survey->hash);
+
+	for (int g = 0; g < survey->n_groups && corpus->grouped; g++)
+		if (!survey->groups[g].check)
+			incise_factor_count(fit, survey->groups[g].key, 1, 0);
+	for (size_t i = 0; i < corpus->n_rows; i++) {
+		const struct candidate *c = &corpus->rows[i];
+
+		if (c->source == source && !is_check(corpus, c->hash, c->group))
+			n[(corpus->grouped ? c->group : c->key) % INCISE_FACTOR_FOLDS]++;
+	}
+	for (uint64_t f = 0; f < INCISE_FACTOR_FOLDS; f++)
+		incise_factor_count(fit, f, 0, scale_up(corpus, n[f]));
+}
+
 int incise_corpus_fold(const struct incise_corpus *corpus,
 		       const struct incise_corpus_source *source,
 		       struct incise_factor *fit, struct incise_factor *check,
 		       uint64_t *left_out, struct incise_error *err)
 {
-	struct folder f = {.corpus = corpus,
-			   .source = source,
-			   .fit = fit,
-			   .check = check,
-			   .number = source_number(source->hash)};
+	struct folder f = {
+		.corpus = corpus, .source = source, .fit = fit, .check = check};
 	const struct incise_corpus_survey *survey = NULL;
-	uint64_t groups = 0;
 	int rc;
 
 	for (int i = 0; i < corpus->n_surveys; i++)
@@ -757,14 +836,13 @@ int incise_corpus_fold(const struct incise_corpus *corpus,
 		rc = incise_factor_start(check, source->hash, source->text, err);
 	if (!rc)
 		rc = source->read(source->user, fold_row, &f, err);
-	if (!rc && (!survey || f.row != survey->rows))
+	if (!rc && (!survey || f.row != survey->rows || f.digest != survey->digest))
 		rc = incise_error_set(err, ESTALE,
 				      "%s: has changed while it was read; train from a "
 				      "file that nobody writes",
 				      source->name);
-	for (int g = 0; g < (survey && corpus->grouped ? survey->n_groups : 0); g++)
-		groups += !survey->groups[g].check;
-	incise_factor_add_groups(fit, groups);
+	if (survey)
+		count_parts(corpus, survey, fit);
 	if (left_out)
 		*left_out += f.left_out;
 	return rc;

@@ -49,6 +49,9 @@ void incise_design_target(const struct incise_design *design, struct incise_gram
 
 struct incise_factor;
 
+/* Whether texts of sources name the same recording by its identity, though its bytes may differ. */
+bool incise_is_same_recording(const char *a, const char *b);
+
 /* As incise_factor_add(), with a weight above 0 and at most 1; the factor cannot be encoded then. */
 int incise_factor_add_weighted(struct incise_factor *factor, const double *row,
 			       uint64_t group, double weight, struct incise_error *err);

@@ -22,18 +22,26 @@
 #include "sha256.h"
 #include "tune.h"
 
-#define FORM 1 /* of the file */
+#define FORM 2 /* of the file */
 #define FOLDS INCISE_FACTOR_FOLDS
 #define SOURCES_MAX 1000000
 
+/*
+ * A group is in a fold by its hash. A part is a fold, or some in a row whose sums are in the first:
+ *
+ *     fold      0   1   2   3   4
+ *     joined    -   -   x   x   -
+ *     part     |0| |1         | |4|
+ */
 struct incise_factor {
 	struct incise_design design; /* its gram is used for sums over folds */
 	struct incise_gram *fold[FOLDS];
+	bool joined[FOLDS]; /* with the one before */
+	uint64_t groups[FOLDS], different[FOLDS];
 	struct incise_model *model; /* of the premises, without consequents */
 	char *premises;		    /* their text, and its hash */
 	char hash[65];
 	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
-	uint64_t groups;
 	struct incise_factor_source *sources;
 	int n_sources, capacity;
 	int at; /* the source that pairs are added to */
@@ -261,6 +269,37 @@ static int insert_source(struct incise_factor *factor,
 	return at;
 }
 
+/* The identity in the next token of a recording (incise/origin.h), and its length; or NULL. */
+static const char *next_identity(const char **text, size_t *n)
+{
+	static const char kind[] = "incise:1:recording:";
+	const char *at = *text;
+
+	while ((at = strstr(at, kind))) {
+		at += sizeof(kind) - 1;
+		at += strcspn(at, ":;"); /* head */
+		at += *at == ':' ? 1 + strcspn(at + 1, ":;") : 0;
+		at += *at == ':';
+		*n = strcspn(at, ":;");
+		*text = at;
+		if (*n > 1)
+			return at;
+	}
+	return NULL;
+}
+
+bool incise_is_same_recording(const char *a, const char *b)
+{
+	const char *p, *q, *rest;
+	size_t n, m;
+
+	while ((p = next_identity(&a, &n)))
+		for (rest = b; (q = next_identity(&rest, &m));)
+			if (n == m && !memcmp(p, q, n))
+				return true;
+	return false;
+}
+
 int incise_factor_start(struct incise_factor *factor, const char *hash, const char *text,
 			struct incise_error *err)
 {
@@ -286,6 +325,15 @@ static uint64_t rows_of(const struct incise_factor *factor)
 	return rows;
 }
 
+static int part_of(const struct incise_factor *factor, uint64_t group)
+{
+	int f = (int)(group % FOLDS);
+
+	while (factor->joined[f])
+		f--;
+	return f;
+}
+
 int incise_factor_add(struct incise_factor *factor, const double *row, uint64_t group,
 		      struct incise_error *err)
 {
@@ -299,8 +347,8 @@ int incise_factor_add_weighted(struct incise_factor *factor, const double *row,
 	const struct incise_scaling *scaling = &factor->design.scaling;
 	int d = info->n_inputs;
 	bool first = !rows_of(factor);
-	int rc = incise_design_add_to(&factor->design, factor->fold[group % FOLDS], row,
-				      weight);
+	int rc = incise_design_add_to(&factor->design,
+				      factor->fold[part_of(factor, group)], row, weight);
 
 	if (rc == -EOVERFLOW)
 		return incise_error_set(err, EOVERFLOW, "more than 2^33 pairs");
@@ -328,9 +376,22 @@ int incise_factor_add_weighted(struct incise_factor *factor, const double *row,
 	return 0;
 }
 
-void incise_factor_add_groups(struct incise_factor *factor, uint64_t groups)
+void incise_factor_count(struct incise_factor *factor, uint64_t group, uint64_t groups,
+			 uint64_t different)
 {
-	factor->groups += groups;
+	int f = part_of(factor, group);
+
+	factor->groups[f] += groups;
+	factor->different[f] += different;
+}
+
+static uint64_t sum_of(const uint64_t *counts)
+{
+	uint64_t sum = 0;
+
+	for (int f = 0; f < FOLDS; f++)
+		sum += counts[f];
+	return sum;
 }
 
 void incise_factor_info(const struct incise_factor *factor,
@@ -338,7 +399,9 @@ void incise_factor_info(const struct incise_factor *factor,
 {
 	*info = (struct incise_factor_info){
 		.rows = rows_of(factor),
-		.groups = factor->groups,
+		.groups = sum_of(factor->groups),
+		.different = sum_of(factor->different),
+		.parts = FOLDS,
 		.n_inputs = factor->design.basis.n_inputs,
 		.n_rules = factor->design.basis.n_rules,
 		.n_sources = factor->n_sources,
@@ -347,6 +410,8 @@ void incise_factor_info(const struct incise_factor *factor,
 		.version = factor->version,
 		.options = factor->options,
 	};
+	for (int f = 0; f < FOLDS; f++)
+		info->parts -= factor->joined[f];
 	memcpy(info->min, factor->min, sizeof(info->min));
 	memcpy(info->max, factor->max, sizeof(info->max));
 }
@@ -372,7 +437,97 @@ char *incise_factor_notes(const struct incise_factor *factor)
 	return text;
 }
 
+/* --- parts --------------------------------------------------------------------------- */
+
+/* Move the sums of joined folds to the first of their part. */
+static void gather_parts(struct incise_factor *factor)
+{
+	for (int f = FOLDS - 1; f > 0; f--) {
+		if (!factor->joined[f])
+			continue;
+		incise_gram_merge(factor->fold[f - 1], factor->fold[f]);
+		incise_gram_reset(factor->fold[f]);
+		factor->groups[f - 1] += factor->groups[f];
+		factor->different[f - 1] += factor->different[f];
+		factor->groups[f] = factor->different[f] = 0;
+	}
+}
+
+/*
+ * Pairs below which a part may reveal them. A pair has n inputs and an output unknown, so that
+ * sums of fewer pairs than sums/(n + 1) determine them by counting; this is n + 1 times as many.
+ */
+static uint64_t least_pairs(const struct incise_factor *factor)
+{
+	uint64_t sums = incise_gram_count(factor->design.gram);
+
+	return sums > INCISE_FACTOR_PAIRS_MIN ? sums : INCISE_FACTOR_PAIRS_MIN;
+}
+
+static bool is_revealing(const struct incise_factor *factor, int part)
+{
+	uint64_t rows = incise_gram_rows(factor->fold[part]);
+
+	return rows && (rows < least_pairs(factor) ||
+			factor->different[part] < least_pairs(factor) ||
+			factor->groups[part] < INCISE_FACTOR_GROUPS_MIN);
+}
+
+static bool reveals_any(const struct incise_factor *factor)
+{
+	bool any = !rows_of(factor);
+
+	for (int f = 0; f < FOLDS; f++)
+		any |= is_revealing(factor, f);
+	return any;
+}
+
+/* Join a part that reveals its pairs with the next ones, the last with those before it. */
+static void join_parts(struct incise_factor *factor)
+{
+	int at = 0;
+
+	for (int f = 1; f < FOLDS; f++) {
+		if (!factor->joined[f] && !is_revealing(factor, at))
+			at = f;
+		factor->joined[f] |= at < f;
+		gather_parts(factor);
+	}
+	while (at > 0 && is_revealing(factor, at)) {
+		factor->joined[at] = true;
+		gather_parts(factor);
+		at = part_of(factor, (uint64_t)at);
+	}
+}
+
+static int close_parts(struct incise_factor *factor, const char *path,
+		       struct incise_error *err)
+{
+	join_parts(factor);
+	if (!reveals_any(factor))
+		return 0;
+	return incise_error_set(
+		err, ENODATA,
+		"%s: %llu different pairs of %llu groups would be revealed; expected at "
+		"least %llu pairs, for %zu sums, of %d groups (--group): add sources, or "
+		"take fewer membership functions",
+		path, (unsigned long long)sum_of(factor->different),
+		(unsigned long long)sum_of(factor->groups),
+		(unsigned long long)least_pairs(factor),
+		incise_gram_count(factor->design.gram), INCISE_FACTOR_GROUPS_MIN);
+}
+
 /* --- merging ------------------------------------------------------------------------- */
+
+static bool has_recording(const struct incise_factor *factor,
+			  const struct incise_factor_source *source)
+{
+	bool has = find_source(factor, source->hash) >= 0;
+
+	for (int i = 0; i < factor->n_sources && !has; i++)
+		has = incise_is_same_recording(factor->sources[i].text, source->text);
+	return has;
+}
 
 /* The reason, in words, why premises differ, or NULL. */
 static const char *difference(const struct incise_factor *a,
@@ -408,7 +563,7 @@ int incise_factor_merge(struct incise_factor *factor, struct incise_factor *othe
 			err, EINVAL, "%s: %s of its own; give factors of one --premises",
 			name, differs);
 	for (int i = 0; i < other->n_sources; i++)
-		if (find_source(factor, other->sources[i].hash) >= 0)
+		if (has_recording(factor, &other->sources[i]))
 			return incise_error_set(
 				err, EEXIST,
 				"%s: the recording %.200s (SHA-256 %.12s) is in another "
@@ -420,8 +575,13 @@ int incise_factor_merge(struct incise_factor *factor, struct incise_factor *othe
 	for (int i = 0; i < other->n_sources; i++)
 		if (insert_source(factor, &other->sources[i]) < 0)
 			return incise_error_set(err, ENOMEM, "%s: no memory", name);
-	for (int f = 0; f < FOLDS; f++)
+	for (int f = 0; f < FOLDS; f++) {
 		incise_gram_merge(factor->fold[f], other->fold[f]);
+		factor->joined[f] |= other->joined[f];
+		factor->groups[f] += other->groups[f];
+		factor->different[f] += other->different[f];
+	}
+	gather_parts(factor);
 	for (int r = 0; r < factor->design.basis.n_rules; r++)
 		factor->design.largest[r] =
 			fmax(factor->design.largest[r], other->design.largest[r]);
@@ -431,7 +591,6 @@ int incise_factor_merge(struct incise_factor *factor, struct incise_factor *othe
 		factor->max[i] =
 			had ? fmax(factor->max[i], other->max[i]) : other->max[i];
 	}
-	factor->groups += other->groups;
 	if (!had)
 		memcpy(factor->options, other->options, sizeof(factor->options));
 	else if (more && strcmp(factor->options, other->options))
@@ -448,8 +607,7 @@ static void encode_text(const struct incise_factor *factor, FILE *out)
 
 	fprintf(out, "incise factor %d\nversion %s\npremises %s\n%soptions %s\n", FORM,
 		factor->version, factor->hash, factor->premises, factor->options);
-	fprintf(out, "groups %llu\nsources %d\n", (unsigned long long)factor->groups,
-		factor->n_sources);
+	fprintf(out, "sources %d\n", factor->n_sources);
 	for (int i = 0; i < factor->n_sources; i++)
 		fprintf(out, "source %s %llu %s\n", factor->sources[i].hash,
 			(unsigned long long)factor->sources[i].rows,
@@ -458,9 +616,16 @@ static void encode_text(const struct incise_factor *factor, FILE *out)
 		fprintf(out, "range %.17g %.17g\n", factor->min[i], factor->max[i]);
 	for (int r = 0; r < factor->design.basis.n_rules; r++)
 		fprintf(out, "fired %.17g\n", factor->design.largest[r]);
-	for (int f = 0; f < FOLDS; f++)
-		fprintf(out, "fold %llu\n",
-			(unsigned long long)incise_gram_rows(factor->fold[f]));
+	for (int f = 0, next; f < FOLDS; f = next) {
+		uint64_t different = factor->different[f], least = least_pairs(factor);
+
+		for (next = f + 1; next < FOLDS && factor->joined[next];)
+			next++;
+		fprintf(out, "part %d %llu %llu %llu\n", next - f,
+			(unsigned long long)incise_gram_rows(factor->fold[f]),
+			(unsigned long long)(different < least ? different : least),
+			(unsigned long long)factor->groups[f]);
+	}
 	fprintf(out, "sums %zu\n", incise_gram_count(factor->design.gram));
 }
 
@@ -483,7 +648,8 @@ void *incise_factor_encode(struct incise_factor *factor, size_t *size)
 	for (int f = 0; f < FOLDS && out; f++) {
 		const incise_gram_sum *sum = incise_gram_sums(factor->fold[f]);
 
-		for (size_t i = 0; i < incise_gram_count(factor->fold[f]); i++) {
+		for (size_t i = 0;
+		     i < incise_gram_count(factor->fold[f]) && !factor->joined[f]; i++) {
 			put_u64(out, (uint64_t)sum[i]);
 			put_u64(out, (uint64_t)(sum[i] >> 64));
 		}
@@ -504,10 +670,12 @@ int incise_factor_save(struct incise_factor *factor, const char *path,
 		       struct incise_error *err)
 {
 	size_t size;
-	void *bytes = incise_factor_encode(factor, &size);
+	int rc = close_parts(factor, path, err);
+	void *bytes = rc ? NULL : incise_factor_encode(factor, &size);
 	struct incise_outfile *file;
-	int rc;
 
+	if (rc)
+		return rc;
 	if (!bytes)
 		return incise_error_set(err, ENOMEM, "%s: no memory to write it", path);
 	file = incise_outfile_open(path, err);
@@ -561,14 +729,18 @@ static bool number(char **text, double *value)
 	return true;
 }
 
-/* A count up to a limit at the end of a line. */
-static bool whole(const char *text, uint64_t max, uint64_t *value)
+/* A count up to a limit, at the end of a line or with the next behind a space. */
+static bool whole(char **text, uint64_t max, uint64_t *value)
 {
+	bool digit = **text >= '0' && **text <= '9';
 	char *end;
 
 	errno = 0;
-	*value = strtoull(text, &end, 10);
-	return *text >= '0' && *text <= '9' && !*end && !errno && *value <= max;
+	*value = strtoull(*text, &end, 10);
+	if (!digit || errno || *value > max || (*end && *end != ' '))
+		return false;
+	*text = *end ? end + 1 : end;
+	return true;
 }
 
 static bool is_hash(const char *text)
@@ -667,11 +839,8 @@ static int decode_sources(struct decoder *in, struct incise_factor *factor,
 	if (!line)
 		return damaged(in, "expected the options");
 	incise_factor_set_options(factor, line);
-	line = next_line(in, "groups");
-	if (!line || !whole(line, GRAM_ROWS_MAX, &factor->groups))
-		return damaged(in, "expected a number of groups");
 	line = next_line(in, "sources");
-	if (!line || !whole(line, SOURCES_MAX, &n))
+	if (!line || !whole(&line, SOURCES_MAX, &n) || *line)
 		return damaged(in, "expected a number of sources");
 	for (uint64_t i = 0; i < n; i++) {
 		struct incise_factor_source source = {0};
@@ -699,6 +868,7 @@ static int decode_statistics(struct decoder *in, struct incise_factor *factor,
 {
 	uint64_t count, sum = 0;
 	char *line;
+	int next;
 
 	for (int i = 0; i <= factor->design.basis.n_inputs; i++) {
 		line = next_line(in, "range");
@@ -715,17 +885,26 @@ static int decode_statistics(struct decoder *in, struct incise_factor *factor,
 		    *largest > 1)
 			return damaged(in, "expected the firing of a rule, 0 to 1");
 	}
-	for (int f = 0; f < FOLDS; f++) {
-		line = next_line(in, "fold");
-		if (!line || !whole(line, GRAM_ROWS_MAX - 1, &count))
-			return damaged(in, "expected a number of pairs");
+	for (int f = 0; f < FOLDS; f = next) {
+		uint64_t folds, different, groups;
+
+		line = next_line(in, "part");
+		if (!line || !whole(&line, FOLDS - f, &folds) || !folds ||
+		    !whole(&line, GRAM_ROWS_MAX - 1, &count) ||
+		    !whole(&line, GRAM_ROWS_MAX, &different) ||
+		    !whole(&line, GRAM_ROWS_MAX, &groups) || *line)
+			return damaged(in, "expected folds, pairs and groups of a part");
+		incise_factor_count(factor, (uint64_t)f, groups, different);
 		incise_gram_set_rows(factor->fold[f], count);
 		sum += count;
+		for (next = f + (int)folds; --next > f;)
+			factor->joined[next] = true;
+		next = f + (int)folds;
 	}
 	if (sum != rows || sum > GRAM_ROWS_MAX)
 		return damaged(in, "sources and folds have different numbers of pairs");
 	line = next_line(in, "sums");
-	if (!line || !whole(line, SIZE_MAX, &count) ||
+	if (!line || !whole(&line, SIZE_MAX, &count) || *line ||
 	    count != incise_gram_count(factor->design.gram))
 		return damaged(in, "expected another number of sums");
 	return 0;
@@ -734,15 +913,19 @@ static int decode_statistics(struct decoder *in, struct incise_factor *factor,
 /* No sum is larger than its rows allow, and the column of ones counts them. */
 static int decode_sums(struct decoder *in, struct incise_factor *factor)
 {
-	size_t count = incise_gram_count(factor->design.gram);
+	size_t count = incise_gram_count(factor->design.gram), parts = 0;
 	const char *from = in->at;
 
-	if ((size_t)(in->end - in->at) != FOLDS * count * 2 * sizeof(uint64_t))
+	for (int f = 0; f < FOLDS; f++)
+		parts += !factor->joined[f];
+	if ((size_t)(in->end - in->at) != parts * count * 2 * sizeof(uint64_t))
 		return damaged(in, "the sums are not as long as expected");
 	for (int f = 0; f < FOLDS; f++) {
 		incise_gram_sum *sum = incise_gram_sums(factor->fold[f]);
 		incise_gram_sum rows = incise_gram_rows(factor->fold[f]);
 
+		if (factor->joined[f])
+			continue;
 		for (size_t i = 0; i < count; i++, from += 16) {
 			uint64_t word[2];
 
@@ -769,8 +952,16 @@ static struct incise_factor *decode(struct decoder *in, size_t size)
 	/* First, so that no line reaches into it. */
 	in->end -= sizeof(crc);
 	line = next_line(in, "incise factor");
-	if (!line || !whole(line, UINT32_MAX, &form)) {
+	if (!line || !whole(&line, UINT32_MAX, &form) || *line) {
 		damaged(in, "expected 'incise factor'");
+		return NULL;
+	}
+	if (form == 1) {
+		incise_error_set(
+			in->err, ENOTSUP,
+			"%s: is of form 1, whose small parts reveal their pairs: "
+			"delete it, and write it again by incise train --factor",
+			in->name);
 		return NULL;
 	}
 	if (form != FORM) {
@@ -782,7 +973,7 @@ static struct incise_factor *decode(struct decoder *in, size_t size)
 		return NULL;
 	}
 	memcpy(&crc, in->end, sizeof(crc));
-	line[strlen(line)] = '\n';
+	*line = '\n';
 	if (le32toh(crc) !=
 	    incise_crc32c(0, in->end - (size - sizeof(crc)), size - sizeof(crc))) {
 		damaged(in, "the checksum does not fit");
@@ -862,6 +1053,17 @@ struct incise_factor *incise_factor_load(const char *path, struct incise_error *
 		return NULL;
 	factor = incise_factor_decode(bytes, size, path, err);
 	free(bytes);
+	if (factor && reveals_any(factor)) {
+		incise_error_set(err, EINVAL,
+				 "%s: a part of it reveals its pairs: expected at least "
+				 "%llu different pairs of %d groups; write it again by "
+				 "incise train --factor",
+				 path, (unsigned long long)least_pairs(factor),
+				 INCISE_FACTOR_GROUPS_MIN);
+		incise_factor_free(factor);
+		errno = EINVAL;
+		return NULL;
+	}
 	return factor;
 }
 
@@ -1041,7 +1243,8 @@ struct incise_model *incise_factor_solve(struct incise_factor *factor,
 	const struct incise_basis *basis = &factor->design.basis;
 	struct solver s = {.factor = factor, .n = basis->n_rules * (basis->n_inputs + 1)};
 	struct incise_model *model = incise_model_copy(factor->model);
-	uint64_t rows = rows_of(factor);
+	uint64_t different = sum_of(factor->different);
+	uint64_t rows = different ? different : rows_of(factor);
 	int rc = -ENODATA;
 
 	s.lsq = incise_lsq_new(s.n);

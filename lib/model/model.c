@@ -472,6 +472,33 @@ static double output(const struct incise_model *model, const double *in, const d
 	return isnan(y) ? 0 : fmax(-DBL_MAX, fmin(DBL_MAX, y));
 }
 
+int incise_inputs_check(const struct incise_variable *inputs, int n_inputs,
+			const double *x, size_t n, size_t *outside,
+			struct incise_error *err)
+{
+	char point[60] = "";
+	bool out;
+
+	*outside = 0;
+	for (size_t k = 0; k < n; k++, *outside += out) {
+		out = false;
+		for (int i = 0; i < n_inputs; i++, x++) {
+			out |= !(*x >= inputs[i].min && *x <= inputs[i].max);
+			if (isfinite(*x))
+				continue;
+			if (n > 1)
+				snprintf(point, sizeof(point),
+					 "point %zu of %zu: ", k + 1, n);
+			return incise_error_set(
+				err, EINVAL,
+				"%scolumn %d (%s): %g is not finite; remove the "
+				"point",
+				point, i + 1, inputs[i].name, *x);
+		}
+	}
+	return 0;
+}
+
 double incise_model_eval(const struct incise_model *model, const double *x,
 			 unsigned int *flags)
 {

@@ -20,7 +20,7 @@ from ._library import c_uint64, c_void_p, function
 from ._producer import open_stream
 from .model import Model, PairsStruct, SideStruct, TrainOptionsStruct, TrainReport
 from .model import TrainReportStruct, VariableStruct, all_sums, baselines, name_array, start
-from .model import is_path, is_recording, report_of
+from .model import has_cuts, is_path, is_recording, report_of
 from .recording import Recording
 
 TEXT_MAX = 1000  # INCISE_FACTOR_TEXT_MAX
@@ -60,7 +60,12 @@ class SourceStruct(ctypes.Structure):
 class CorpusSideStruct(ctypes.Structure):
     """struct incise_corpus_side"""
 
-    _fields_ = [("sample", SideStruct), ("rows", c_uint64), ("n_groups", c_int)]
+    _fields_ = [
+        ("sample", SideStruct),
+        ("rows", c_uint64),
+        ("different", c_uint64),
+        ("n_groups", c_int),
+    ]
     c_name = "struct incise_corpus_side"
 
 
@@ -256,8 +261,11 @@ class Corpus:
                 raise Invalid(
                     errno.EINVAL, f"name {name!r}: is given twice; give each table its own"
                 )
-        if group is None and self.sources and all(s.recording for s in self.sources):
+        if group is None and self.sources and all(
+            source.recording or has_cuts(source.path or source.table) for source in self.sources
+        ):
             group = "cut"
+        group = None if group == "none" else group
         self.columns, self.group, self.all_rows = columns, group, all_rows
         self.stop = c_int(0)
         self.failure = Failure()

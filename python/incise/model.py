@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import csv
 import ctypes
 import errno
 import math
 import os
 import tempfile
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
+import warnings
+from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 from . import _library
 from ._library import ArrowArrayStream, Failure, Invalid, c_bool, c_char, c_double, c_int, c_void_p
@@ -17,6 +19,8 @@ from .recording import PathLike, Recording
 
 INPUTS_MAX, RULES_MAX, NAME_MAX = 8, 256, 64
 _doubles = ctypes.POINTER(c_double)
+
+FIXED_ONE = 1 << 16  # 1.0 in a compiled model
 
 
 class VariableStruct(ctypes.Structure):
@@ -166,6 +170,9 @@ _library.declare(
         "incise_model_free": (None, c_void_p),
         "incise_model_info": (ctypes.POINTER(ModelInfoStruct), c_void_p),
         "incise_model_set_clamp": (None, c_void_p, c_bool),
+        "incise_inputs_check": (
+            c_int, c_void_p, c_int, c_void_p, ctypes.c_size_t, c_void_p, c_void_p
+        ),
         "incise_model_eval_many": (None, c_void_p, c_void_p, ctypes.c_size_t, c_void_p, c_void_p),
         "incise_uncertainty_load": (c_void_p, _path, c_void_p, c_void_p),
         "incise_uncertainty_save": (c_int, c_void_p, _path, c_void_p),
@@ -285,20 +292,86 @@ class Variable(NamedTuple):
 
 
 class Points:
-    """Inputs of a model as one block of doubles, in the form that they came in."""
+    """Inputs of a model as one block of doubles, in the form that they came in.
 
-    def __init__(self, x: Any, n_inputs: int):
+    Columns of tables go by their names. Values have to be finite; a warning counts the points
+    outside the ranges.
+    """
+
+    def __init__(self, x: Any, inputs: Any):
+        """inputs: structs of the variables, in the order of the model."""
+        n_inputs = len(inputs)
+        columns = self._by_name(x, [text(variable.name) for variable in inputs])
+        if columns is not None:
+            x = self._join(columns)
         self.array = self._of_numpy(x)
         if self.array is not None:
             self._check_shape(self.array.shape, n_inputs)
             self.shape = self.array.shape[:-1]
             self.n = math.prod(self.shape)
             self.address = self.array.ctypes.data
-            return
-        rows, self.shape = self._of_lists(x, n_inputs)
-        self.n = len(rows) // n_inputs
-        self._block = (c_double * max(len(rows), 1))(*rows)
-        self.address = ctypes.addressof(self._block)
+        else:
+            rows, self.shape = self._of_lists(x, n_inputs)
+            self.n = len(rows) // n_inputs
+            self._block = (c_double * max(len(rows), 1))(*rows)
+            self.address = ctypes.addressof(self._block)
+        self._check(inputs)
+
+    def _check(self, inputs: Any) -> None:
+        failure, outside = Failure(), ctypes.c_size_t()
+        failure.check(
+            function("incise_inputs_check")(
+                (VariableStruct * len(inputs))(*inputs),
+                len(inputs),
+                self.address,
+                self.n,
+                ctypes.byref(outside),
+                failure.ref,
+            )
+        )
+        if outside.value:
+            ranges = ", ".join(f"{text(v.name)} {v.min:.4g} to {v.max:.4g}" for v in inputs)
+            warnings.warn(
+                f"{outside.value} of {self.n} points are outside the training range ({ranges}) and "
+                "are clamped to it",
+                stacklevel=4,
+            )
+
+    @staticmethod
+    def _by_name(x: Any, names: List[str]) -> Optional[List[Any]]:
+        """The columns of a table, {column: values} or structured array; None: it is none."""
+        found = getattr(getattr(x, "dtype", None), "names", None)
+        for attribute in ("column_names", "columns"):
+            found = getattr(x, attribute, None) if found is None else found
+        if found is None and hasattr(x, "keys"):
+            found = x.keys()
+        if found is None or not any(isinstance(name, str) for name in found):
+            return None
+        missing = [name for name in names if name not in list(found)]
+        if missing:
+            raise Invalid(
+                errno.EINVAL,
+                f"inputs have no column {', '.join(missing)}; the columns are "
+                f"{', '.join(map(str, found))}",
+            )
+        return [x[name] for name in names]
+
+    @classmethod
+    def _join(cls, columns: List[Any]) -> Any:
+        """One array, or rows without numpy."""
+        arrays = [cls._of_numpy(column) for column in columns]
+        if all(array is not None for array in arrays):
+            import numpy
+
+            try:
+                return numpy.stack(arrays, axis=-1)
+            except ValueError as failure:
+                raise Invalid(errno.EINVAL, f"inputs of a model: {failure}") from None
+        if not all(hasattr(column, "__len__") for column in columns):
+            return columns
+        if len({len(column) for column in columns}) > 1:
+            raise Invalid(errno.EINVAL, "inputs of a model: columns of different lengths")
+        return list(zip(*columns))
 
     @staticmethod
     def _of_numpy(x: Any) -> Any:
@@ -315,7 +388,9 @@ class Points:
         try:
             if numpy.iscomplexobj(x):
                 raise TypeError("complex numbers")
-            return numpy.ascontiguousarray(x, dtype=numpy.float64)
+            if numpy.ma.isMaskedArray(x):
+                x = x.astype(numpy.float64).filled(math.nan)
+            return numpy.ascontiguousarray(x, dtype=numpy.float64).reshape(numpy.shape(x))
         except (TypeError, ValueError) as failure:
             raise Invalid(errno.EINVAL, f"inputs of a model: {failure}") from None
 
@@ -372,6 +447,10 @@ class CompiledModel:
     def _own(self, pointer: Any) -> None:
         self._pointer = _library.Handle(pointer, "incise_fixed_free")
         self._struct = pointer.contents
+        self._inputs = [
+            VariableStruct(v.name, v.min / FIXED_ONE, v.max / FIXED_ONE)
+            for v in self._struct.input[: self._struct.n_inputs]
+        ]
 
     @classmethod
     def _of(cls, pointer: Any) -> "CompiledModel":
@@ -405,7 +484,7 @@ class CompiledModel:
 
     def __call__(self, x: Any) -> Any:
         """The output at one point, or at each point of an array (…, inputs)."""
-        points = Points(x, self._struct.n_inputs)
+        points = Points(x, self._inputs)
         block, address = points.results()
         one = function("incise_fixed_eval_double")
         step = 8 * self._struct.n_inputs
@@ -443,10 +522,12 @@ class TrainReport(NamedTuple):
 
 class Model:
     """The fuzzy model of a .fis file, with its standard deviation if PATH.sd is there: call it with
-    inputs in the order of :attr:`inputs`.
+    inputs in the order of :attr:`inputs`, or with a table, {column: values} or structured array that
+    has columns of their names.
 
     model((5, 20)) is one force; model(x) of an array (…, inputs) an array; with sd=True a pair of
-    these, the output and its standard deviation for a new cut.
+    these, the output and its standard deviation for a new cut. A value that is not finite or is masked
+    is an error; points outside the ranges are clamped to them, with a warning.
     """
 
     def __init__(self, path: PathLike):
@@ -497,6 +578,9 @@ class Model:
         inputs = ", ".join(variable.name for variable in self.inputs)
         return f"<incise.Model {self.output.name} of {inputs}, {self.n_rules} rules>"
 
+    def _inputs(self) -> Any:
+        return self._info().input[: self._info().n_inputs]
+
     def _info(self) -> ModelInfoStruct:
         return function("incise_model_info")(self._pointer).contents
 
@@ -526,7 +610,7 @@ class Model:
             return math.nan
         return function("incise_uncertainty_noise")(self._uncertainty)
 
-    def __call__(self, x: Any, sd: bool = False, parts: bool = False) -> Any:
+    def __call__(self, x: Any, *, sd: bool = False, parts: bool = False) -> Any:
         """The output; with sd=True (output, standard deviation).
 
         With parts=True too (output, standard deviation, parts): in the last dimension of the parts
@@ -534,7 +618,7 @@ class Model:
         """
         if parts and not sd:
             raise Invalid(errno.EINVAL, "parts are those of the standard deviation; give sd=True")
-        points = Points(x, self._info().n_inputs)
+        points = Points(x, self._inputs())
         block, address = points.results()
         function("incise_model_eval_many")(
             self._pointer, points.address, points.n, address, None
@@ -570,7 +654,7 @@ class Model:
     def gradient(self, x: Any) -> Any:
         """Slopes of the output by each input, in the last dimension; 0 outside the ranges."""
         n_inputs = self._info().n_inputs
-        points = Points(x, n_inputs)
+        points = Points(x, self._inputs())
         _, address = values = points.results()
         block, gradient_address = points.results(n_inputs)
         function("incise_model_eval_many")(
@@ -596,7 +680,7 @@ class Model:
                 )
             )
 
-    def compile(self, budget_mN: float = 0.1) -> CompiledModel:
+    def compile(self, *, budget_mN: float = 0.1) -> CompiledModel:
         """Compile to fixed point; the certified error is at most budget_mN (0: any)."""
         options = FixedOptionsStruct()
         function("incise_fixed_options_init")(ctypes.byref(options))
@@ -652,6 +736,20 @@ def is_path(data: Any) -> bool:
 def is_recording(data: Any) -> bool:
     """Whether it is a path with the name of a recording."""
     return is_path(data) and _library.path_bytes(data).rstrip(b"/").endswith((b".rec", b".part"))
+
+
+def has_cuts(data: Any) -> bool:
+    """Whether it is a recording, or a file or a table with the column cut."""
+    if isinstance(data, Recording) or is_recording(data):
+        return True
+    if not is_path(data):
+        names = getattr(data, "column_names", getattr(data, "columns", data))
+        return isinstance(names, Iterable) and "cut" in list(names)
+    if not os.path.isfile(data):
+        return False
+    with open(data, newline="", encoding="utf-8-sig", errors="replace") as lines:
+        rows = (line for line in lines if line.strip() and not line.startswith("#"))
+        return "cut" in (field.strip() for field in next(csv.reader(rows), []))
 
 
 def _read_dataset(
@@ -836,8 +934,8 @@ def train(
     holds out other single rows where check is given without group; so does a list, [source] too.
 
     group: column that names the cut; cross-validation and check keep whole cuts together. In a list
-    also "recording" or "rig"; cuts of different sources are different ones, and a list of recordings
-    only is grouped by "cut" unless told otherwise.
+    also "recording" or "rig"; cuts of different sources are different ones. Without it data are
+    grouped by "cut" where all have it; "none" takes each row by itself.
     check: share that is kept back, 0 to 1; its error is in ``model.report``.
     mf: membership functions of each input (default 5, 4; else 3 each), or "auto".
     classic: the method of MATLAB's anfis; not for a list.
@@ -862,6 +960,9 @@ def train(
         return train_sources(
             data, names, options, group, check, all_rows, _mf_types[mf_type], counts
         )
+    if group is None and has_cuts(data):
+        group = "cut"
+    group = None if group == "none" else group
     # Not in this thread, whose KeyboardInterrupt a callback of the reading would swallow.
     dataset, left_out = _library.call_interruptible(
         lambda: _read_dataset(data, names, group, None if all_rows else "advancing"),

@@ -6,6 +6,7 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
+import threading
 from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 from . import _library
@@ -347,6 +348,8 @@ class Plan:
             raise Invalid(errno.EINVAL, f"tip_mm={tuple(tip_mm)!r}: not within 1e6 mm")
         self._tick = TickStruct()
         self._sample = SampleStruct()
+        self._last_ns = -(1 << 63)
+        self._use = threading.Lock()
 
     def __reduce__(self) -> Any:
         raise TypeError("a Plan is at work and cannot be copied or pickled; make another one")
@@ -408,12 +411,32 @@ class Plan:
         function("incise_plan_cause")(self._plan, cause, len(cause))
         raise _library.make_error(-rc, text(cause.value) or os.strerror(-rc))
 
+    def _begin(self) -> None:
+        """Mark it as in use: the C library runs without Python's lock."""
+        if not self._use.acquire(blocking=False):
+            raise Invalid(
+                errno.EBUSY, "another thread uses this Plan at this moment; give each thread its own"
+            )
+
     def step(self, t: float, pose: Any) -> Tick:
         """Feed a pose, (x, y, z) in mm or that and a quaternion, and run the tick at t seconds.
 
-        t grows from call to call. pose may be None: none has come.
+        t grows from call to call. pose may be None: none has come. A second thread at once is an
+        error.
         """
+        self._begin()
+        try:
+            return self._step(t, pose)
+        finally:
+            self._use.release()
+
+    def _step(self, t: float, pose: Any) -> Tick:
+        if not -9e9 < t < 9e9:
+            raise Invalid(errno.EINVAL, f"t={t!r}: not within 9e9 seconds")
         t_ns = round(t * 1e9)
+        if t_ns < self._last_ns:
+            raise Invalid(errno.EINVAL, f"t={t!r}: earlier than the step before")
+        self._last_ns = t_ns
         if pose is not None:
             _fill_pose(self._sample, t_ns, pose)
             function("incise_plan_feed")(self._plan, ctypes.byref(self._sample), 1)
@@ -436,7 +459,7 @@ class Plan:
             TOOLS[tick.tool],
         )
 
-    def run(self, poses: Any, arrival: Optional[str] = None) -> Dict[str, Any]:
+    def run(self, poses: Any, *, arrival: Optional[str] = None) -> Dict[str, Any]:
         """Run the whole stroke in one C call; needs numpy.
 
         poses: a table such as ``rec.tracker``, a DataFrame, or {t_ns, x_mm, y_mm, z_mm[, qw, qx, qy,
@@ -475,15 +498,19 @@ class Plan:
         if not 0 < n < 1 << 28:
             raise Invalid(errno.EINVAL, f"poses: {n} ticks from the first to the last; sort them")
         ticks = numpy.zeros(n, dtype=numpy.dtype(TickStruct))
-        done = function("incise_plan_run")(
-            self._plan,
-            samples.ctypes.data,
-            len(samples),
-            start,
-            self._period_ns,
-            ticks.ctypes.data,
-            n,
-        )
+        self._begin()
+        try:
+            done = function("incise_plan_run")(
+                self._plan,
+                samples.ctypes.data,
+                len(samples),
+                start,
+                self._period_ns,
+                ticks.ctypes.data,
+                n,
+            )
+        finally:
+            self._use.release()
         if done < 0:
             raise Invalid(errno.EINVAL, f"poses: {arrival} has to rise from row to row")
         return {name: ticks[name] for name in ticks.dtype.names}

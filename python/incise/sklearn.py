@@ -48,6 +48,7 @@ class ForceRegressor(RegressorMixin, BaseEstimator):
 
     def __init__(
         self,
+        *,
         mf: Union[str, Sequence[int]] = "auto",
         mf_type: str = "gaussmf",
         epochs: int = 80,

@@ -233,6 +233,13 @@ made_pairs() {
 	}'
 }
 
+# $1 times the pairs of made_pairs, each time of other cuts and forces.
+many_pairs() {
+	made_pairs | awk -F, -v OFS=, -v times="$1" '
+		NR == 1 { print; next }
+		{ for (k = 1; k <= times; k++) print $1 "-" k, $2, $3, sprintf("%.6f", $4 + k / 1000) }'
+}
+
 # The file between .Bd -literal and .Ed of a manual page that holds a word.
 example_in() {
 	awk -v word="$2" '

@@ -117,7 +117,7 @@ finds() {
 
 @test "figures of a model, with few and many functions" {
 	incise info m.fis --plot model >/dev/null
-	incise train pairs.csv -o many.fis --mf 9,7 --epochs 1 2>/dev/null
+	incise train pairs.csv --group none -o many.fis --mf 9,7 --epochs 1 2>/dev/null
 	incise info many.fis --plot many >/dev/null
 	sed "s/'very_shallow'/'a name that is far too long for its place'/" m.fis >named.fis
 	incise info named.fis --plot named >/dev/null

@@ -127,7 +127,7 @@ opened() {
 	exec 5>&-
 	wait $!
 	[ "$(cat got)" = "$(incise eval m.fis <<<'5 20')" ]
-	incise train <(cat pairs.csv) --mf 2,2 -o again.fis 2>/dev/null
+	incise train <(cat pairs.csv) --group cut --mf 2,2 -o again.fis 2>/dev/null
 	cmp <(grep -v ^% m.fis) <(grep -v ^% again.fis)
 	[ "$(incise eval <(cat m.fx) <<<'5 20')" = "$(incise eval m.fx <<<'5 20')" ] ||
 		incise eval - <<<'5 20' <m.fx || true

@@ -7,12 +7,12 @@ setup() {
 	work_folder
 }
 
-# Cuts $2 … $3 of about 250 pairs each into the file $1.
+# Cuts $2 … $3 of $4 pairs each, 250 by default, into the file $1.
 cuts() {
-	awk -v from="$2" -v to="$3" 'BEGIN {
+	awk -v from="$2" -v to="$3" -v pairs="${4:-250}" 'BEGIN {
 		print "cut,depth_mm,velocity_mm_s,force_N"
 		for (c = from; c <= to; c++)
-			for (i = 0; i < 250; i++) {
+			for (i = 0; i < pairs; i++) {
 				d = (i * 7919 + c * 13) % 1000 / 50; v = (i * 104729 + c * 7) % 997 / 20
 				noise = (c * 7919 + i * 1299709) % 1000 / 1000 - 0.5
 				force = (0.045 * d + 0.0028 * d * d) * (1 + 0.35 * v / (v + 15))
@@ -25,6 +25,13 @@ cuts() {
 shares() {
 	for i in 1 2 3 4; do
 		cuts "s$i.csv" $((5 * i - 4)) $((5 * i))
+	done
+}
+
+# Of 80 cuts each: each fifth of them is large enough for a part of a factor.
+large_shares() {
+	for i in 1 2 3 4; do
+		cuts "s$i.csv" $((80 * i - 79)) $((80 * i)) 100
 	done
 }
 
@@ -55,14 +62,14 @@ shares() {
 
 # bats test_tags=check
 @test "factors of shares merge to the model of all pairs, to the bit" {
-	shares
+	large_shares
 	incise train s1.csv --group cut --mf 3,3 -o start.fis >/dev/null
 	incise train s?.csv --premises start.fis --group cut -o all.fis >/dev/null
 	incise train s1.csv --premises start.fis --group cut --factor a.fac >/dev/null
 	incise train s4.csv s3.csv --premises start.fis --group cut --factor b.fac >/dev/null
 	incise train s2.csv --premises start.fis --group cut --factor c.fac >/dev/null
 	incise merge c.fac a.fac b.fac -o merged.fis >out
-	grep -q "3 factors: 5000 pairs of 20 groups from 4 sources" out
+	grep -q "3 factors: 32000 pairs of 320 groups from 4 sources" out
 	cmp all.fis merged.fis
 	cmp all.fis.sd merged.fis.sd
 	incise merge a.fac b.fac -o ab.fac >/dev/null
@@ -73,43 +80,66 @@ shares() {
 	cmp all.fac abc.fac
 	[ "$(stat -c %s all.fac)" -lt 160000 ]
 	incise merge ab.fac c.fac -o j.fis --json >r.json
-	[ "$(key r.json pairs)" -eq 5000 ]
+	[ "$(key r.json pairs)" -eq 32000 ]
+}
+
+@test "small parts of a factor are joined, and too small a share is refused" {
+	shares
+	cuts tiny.csv 90 93 400
+	incise train s1.csv --group cut --mf 3,3 -o start.fis >/dev/null
+	incise train s1.csv --premises start.fis --group cut --factor a.fac >out
+	grep -q "^1 of 5 parts, as small ones would reveal their pairs" out
+	grep -aq "^part 5 1250 1000 5$" a.fac
+	incise train s2.csv --premises start.fis --group cut --factor b.fac >/dev/null
+	incise merge a.fac b.fac -o m.fis >out
+	grep -q "^1 of 5 parts: the factors have small ones joined$" out
+	# 4 cuts; 41 elements of a row have 1711 sums; rows without cuts may be of one
+	run --separate-stderr incise train tiny.csv --premises start.fis --group cut --factor few.fac
+	failed_with few.fac "1600 different pairs of 4 groups" "of 5 groups"
+	incise train s1.csv --group cut --mf 5,4 -o big.fis >/dev/null 2>&1
+	run --separate-stderr incise train s1.csv --premises big.fis --group cut --factor few.fac
+	failed_with few.fac "1250 different pairs of 5 groups" "1953 pairs"
+	sed 's/^cut/number/' s1.csv >plain.csv
+	run --separate-stderr incise train plain.csv --premises start.fis --factor few.fac
+	failed_with few.fac "of 0 groups"
+	[ ! -e few.fac ]
+	# of before
+	sed 's/^incise factor 2/incise factor 1/' a.fac >old.fac
+	run --separate-stderr incise merge a.fac old.fac -o m.fis --overwrite
+	failed_with old.fac "form 1" "reveal their pairs"
 }
 
 @test "merge refuses what does not belong together, by name" {
 	shares
-	incise train s1.csv -o start.fis >/dev/null
-	incise train s1.csv --premises start.fis --factor a.fac >/dev/null
+	incise train s1.csv --mf 3,3 -o start.fis >/dev/null
+	incise train s1.csv --premises start.fis --group cut --factor a.fac >/dev/null
 	run --separate-stderr incise merge a.fac a.fac -o m.fis
 	failed_with a.fac "the recording s1.csv"
 	# another ridge of the premises, another range, another unit
 	sed '/MF2/s/\[\([0-9]\)/[1\1/' start.fis >mf.fis
 	awk '/^Range/ && !done { sub(/\[.* /, "[-1 "); done = 1 } 1' start.fis >range.fis
-	incise train s2.csv --premises mf.fis --factor mf.fac >/dev/null
-	incise train s2.csv --premises range.fis --factor range.fac >/dev/null
+	incise train s2.csv --premises mf.fis --group cut --factor mf.fac >/dev/null
+	incise train s2.csv --premises range.fis --group cut --factor range.fac >/dev/null
 	sed 's/depth_mm/depth_cm/' s2.csv >cm.csv
 	sed 's/depth_mm/depth_cm/' start.fis >cm.fis
-	incise train cm.csv --premises cm.fis --factor cm.fac >/dev/null
+	incise train cm.csv --premises cm.fis --group cut --factor cm.fac >/dev/null
 	for other in "mf.fac:has other membership functions" "range.fac:has other ranges" \
 		"cm.fac:has other inputs, or other units"; do
 		run --separate-stderr incise merge a.fac "${other%%:*}" -o m.fis
 		failed_with "${other%%:*}" "${other#*:}"
 	done
-	head -c 90000 a.fac >cut.fac
+	head -c 3000 a.fac >cut.fac
 	sed 's/^version .*/version 9.9.9/' a.fac >version.fac
 	for bad in cut.fac version.fac s1.csv; do
 		run --separate-stderr incise merge a.fac $bad -o m.fis
 		failed_with $bad
 	done
 	[ ! -e m.fis ]
-	# few pairs would be revealed; values far outside have no place
-	head -n 200 s3.csv >few.csv
-	run --separate-stderr incise train few.csv --premises start.fis --factor few.fac
-	failed_with few.csv "199 pairs would reveal them"
+	# values far outside have no place
 	sed '5s/,[^,]*,/,99,/' s3.csv >far.csv
 	run --separate-stderr incise train far.csv --premises start.fis --factor far.fac
 	failed_with far.csv "depth_mm = 99"
-	[ ! -e few.fac ] && [ ! -e far.fac ]
+	[ ! -e far.fac ]
 }
 
 @test "train reads recordings, and names a damaged one" {
@@ -177,6 +207,82 @@ train_killed_at() {
 	train_killed_at incise
 	incise train l?.csv --group cut --check 0.3 --seed 2 --mf 3,3 -o m.fis --overwrite >out 2>err
 	run ! grep -q "goes on" err
+}
+
+@test "sources that change while they are read, or before a training goes on, are found" {
+	for i in 1 2; do
+		cuts l$i.csv $((20 * i - 19)) $((20 * i)) 2000
+	done
+	incise train l?.csv --group cut --mf 3,3 -o m.fis >/dev/null 2>err 3>&- &
+	until grep -qa "incise progress 1 [0-9]* [1-9]" m.fis.progress 2>/dev/null; do
+		kill -0 $! || break
+		sleep 0.01
+	done
+	if kill -STOP $! 2>/dev/null && [ ! -e m.fis ]; then
+		sed -i '7s/.$/7/' l1.csv
+		kill -CONT $!
+		! wait $! || complain "trained"
+		grep -q "l1.csv: has changed while it was read" err
+	fi
+	[ ! -e m.fis.progress ]
+}
+
+# Train from $1 and 2.rec into m.fis, killed when it has surveyed one of them.
+train_killed_soon() {
+	incise train $1 2.rec --rate 200 --mf 2,2 -o m.fis >/dev/null 2>&1 3>&- &
+	until [ -e m.fis.progress ]; do
+		kill -0 $! || break
+		sleep 0.01
+	done
+	kill -KILL $! 2>/dev/null || :
+	wait $! || :
+	rm -f m.fis m.fis.sd
+}
+
+# A joined recording is read by the calibrations of its members.
+@test "a training does not go on with rows of another calibration" {
+	local quick=sim:clock=simulated,depth_mm=6,times=2,pause_s=1,cut_s=1
+	printf 'force_mV_N = 300.0;\n' >one.conf
+	printf 'force_mV_N = 5000.0;\n' >other.conf
+	for seed in 1 2; do
+		incise capture -o $seed.rec --rig $quick,seed=$seed >/dev/null
+	done
+	for stream in force tracker; do
+		incise capture -o $stream.rec --rig $quick,seed=3 --only $stream --clock-source sim:1000,5,100 >/dev/null
+	done
+	incise join force.rec tracker.rec -o joined.rec >/dev/null
+	incise recalibrate 1.rec -c one.conf >/dev/null
+	for change in "incise recalibrate 1.rec -c other.conf" "cp one.conf 1.rec/calibration/0002-*.conf" \
+		"incise recalibrate joined.rec/force -c other.conf"; do
+		name=1.rec
+		[[ "$change" != *joined* ]] || name=joined.rec
+		train_killed_soon $name
+		eval "$change" >/dev/null
+		incise train $name 2.rec --rate 200 --mf 2,2 -o m.fis >/dev/null 2>err
+		run ! grep -q "goes on" err
+		incise train $name 2.rec --rate 200 --mf 2,2 -o n.fis >/dev/null 2>&1
+		cmp m.fis n.fis
+		rm m.fis n.fis ./*.sd
+	done
+}
+
+@test "a recording is the same after its database was written anew" {
+	for seed in 1 2; do
+		incise capture -o $seed.rec \
+			--rig "sim:clock=simulated,seed=$seed,depth_mm=6,times=6,pause_s=0.7,cut_s=0.5" >/dev/null
+	done
+	cp -r 1.rec copy.rec
+	sqlite3 copy.rec/recording.db vacuum
+	run ! cmp -s 1.rec/recording.db copy.rec/recording.db
+	run --separate-stderr incise train 1.rec copy.rec 2.rec -o m.fis
+	failed_with copy.rec "the same content as 1.rec"
+	incise train 2.rec --mf 2,2 -o start.fis >/dev/null 2>&1
+	for name in 1 copy; do
+		incise train $name.rec --premises start.fis --factor $name.fac >/dev/null
+	done
+	run --separate-stderr incise merge 1.fac copy.fac -o m.fis
+	failed_with copy.fac "the recording copy.rec"
+	[ ! -e m.fis ]
 }
 
 @test "a factor goes to a pipe, pipes are told apart by their rows, and options that differ are noted" {

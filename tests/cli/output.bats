@@ -21,8 +21,8 @@ setup_file() {
 		tracker = "sim"; force = "sim"; camera = "sim"; stepper = "sim";
 	END
 	incise haptic "$root/scenes/neck.scene" --rig $quick --duration 1s --session s.session >/dev/null
-	{ cat pairs.csv; for i in 1 2 3; do sed 1d pairs.csv; done; } >many.csv
-	incise train many.csv --premises m.fis --factor m.fac >/dev/null
+	many_pairs 8 >many.csv
+	incise train many.csv --premises m.fis --group cut --factor m.fac >/dev/null
 	incise capture -o n.rec --rig sim:clock=simulated,seed=2 --duration 1s --clock-source sim:1000 >/dev/null
 	incise capture -o w.rec --rig sim:clock=simulated,seed=3 --duration 1s --clock-source sim:1000 >/dev/null
 }
@@ -171,7 +171,7 @@ replaces_when_told() {
 	replaces_when_told sessions.csv assess s.session --csv sessions.csv
 	replaces_when_told new.fis merge m.fac -o new.fis
 	cp "$BATS_FILE_TMPDIR/many.csv" .
-	replaces_when_told new.fac train many.csv --premises m.fis --factor new.fac
+	replaces_when_told new.fac train many.csv --premises m.fis --group cut --factor new.fac
 	replaces_when_told k.csv calibrate force --rig sim:clock=simulated --weights 0,50g,100g,200g \
 		--series 3 --duration 200ms -c k.conf --keep k.csv
 	replaces_when_told report/report.txt calibrate force --from forces.csv -c k.conf --report report
@@ -267,7 +267,7 @@ writers() {
 		train pairs.csv --mf 2,2 --epochs 1 -o PLACE
 		train pairs.csv --mf 2,2 --epochs 1 -o /dev/null --initial PLACE
 		train pairs.csv --mf 2,2 --epochs 1 -o /dev/null --history PLACE
-		train many.csv --premises m.fis --factor PLACE
+		train many.csv --premises m.fis --group cut --factor PLACE
 		merge m.fac -o PLACE
 		replay d.rec wall --log PLACE
 		haptic wall --rig $quick --duration 100ms --log PLACE

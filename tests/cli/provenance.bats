@@ -5,7 +5,7 @@ load cli
 
 setup_file() {
 	cd "$BATS_FILE_TMPDIR"
-	"$INCISE_BUILD/bin/incise" capture -o "a b;.rec" --rig sim:clock=simulated,depth_mm=6,times=2,pause_s=1,cut_s=4 >/dev/null
+	"$INCISE_BUILD/bin/incise" capture -o "a b;.rec" --rig sim:clock=simulated,depth_mm=6,times=5,pause_s=0.5,cut_s=2 >/dev/null
 	"$INCISE_BUILD/bin/incise" export "a b;.rec" --average 6x6 --by-cut --min-count 5 --lineage -o p.csv >/dev/null
 	"$INCISE_BUILD/bin/incise" train p.csv --mf 2,2 -o m.fis >/dev/null 2>&1
 }

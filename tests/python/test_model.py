@@ -6,10 +6,12 @@ import ctypes
 import math
 import os
 import pickle
+import random
 import signal
 import subprocess
 import sys
 import unittest
+import warnings
 
 import incise
 from fixtures import SANITIZED, SOURCE, Case, has, run
@@ -48,7 +50,6 @@ class Models(Case):
         self.assertEqual(self.model([[5, 20], [6, 20]])[0], one)
         self.assertEqual(len(self.model([])) if self.model.inputs == () else 0, 0)
         self.assertEqual(self.model((5, 20), sd=True)[0], one)
-        self.assertTrue(math.isfinite(self.model((math.nan, math.inf))))
         slope = (self.model((5.0001, 20)) - self.model((4.9999, 20))) / 2e-4
         # the second difference of a force over 2e-4 mm is below 1e-7 of it
         self.assertAlmostEqual(self.model.gradient((5, 20))[0], slope, delta=1e-6)
@@ -86,7 +87,8 @@ class Models(Case):
             ("ab", "inputs of a model"),
             ([["a", 2]], "inputs of a model"),
             (None, "inputs"),
-            ({"depth_mm": 5}, "inputs of a model"),
+            ({"depth_mm": 5}, "inputs have no column velocity_mm_s; the columns are depth_mm"),
+            ({"depth_mm": [5, 6], "velocity_mm_s": [20]}, "inputs of a model"),
         ):
             self.says(incise.Invalid, said, self.model, bad)
         if has("numpy"):
@@ -96,6 +98,81 @@ class Models(Case):
             self.says(incise.Invalid, "inputs", self.model, numpy.zeros(()))
             self.says(incise.Invalid, "inputs", self.model, numpy.array(["a", "b"]))
             self.says(incise.Invalid, "inputs", self.model, numpy.zeros((1, 2), complex) * 1j)
+
+    def test_values_that_are_not_finite(self):
+        """At any place of any form, with the point and the input in the message."""
+        chance = random.Random(41)
+        names = [variable.name for variable in self.model.inputs]
+        for thing in (self.model, self.model.compile()):
+            for bad in (math.nan, math.inf, -math.inf, None) * 5:
+                n = chance.randrange(1, 9)
+                point, at = chance.randrange(n), chance.randrange(2)
+                rows = [[5.0, 20.0] for _ in range(n)]
+                rows[point][at] = bad
+                forms = [rows, tuple(map(tuple, rows)), rows[point]]
+                forms.append({names[i]: [row[i] for row in rows] for i in (1, 0)})
+                for form in forms:
+                    said = "inputs of a model" if bad is None else f"({names[at]}): {bad} is not finite"
+                    if bad is None and has("numpy"):
+                        said = ""
+                    self.says(incise.Invalid, said, thing, form)
+                if not has("numpy"):
+                    continue
+                import numpy
+
+                masked = numpy.ma.masked_array(numpy.full((n, 2), 5.0), mask=False)
+                masked[point, at] = numpy.ma.masked
+                said = f"column {at + 1} ({names[at]}): nan is not finite"
+                said = f"point {point + 1} of {n}: {said}" if n > 1 else said
+                self.says(incise.Invalid, said, thing, masked)
+                self.says(incise.Invalid, said, thing, {k: masked[:, i] for i, k in enumerate(names)})
+        self.says(incise.Invalid, "not finite", self.model.gradient, (math.nan, 20))
+        self.says(incise.Invalid, "not finite", self.model, (5, math.nan), sd=True)
+
+    def test_columns_by_name(self):
+        """Any order of the columns, and others beside them, as of the ordered pairs."""
+        rows = [(chance.uniform(1, 20), chance.uniform(5, 50)) for chance in [random.Random(5)] * 20]
+        expected = list(self.model(rows))
+        table = {"cut": ["a"] * 20, "velocity_mm_s": [v for _, v in rows], "depth_mm": [d for d, _ in rows]}
+        self.assertEqual(list(self.model(table)), expected)
+        self.assertEqual(list(self.model.compile()(table)), list(self.model.compile()(rows)))
+        one = self.model({"velocity_mm_s": rows[3][1], "depth_mm": rows[3][0]})
+        self.assertEqual(one, expected[3])
+        forms = []
+        if has("pandas"):
+            import pandas
+
+            forms += [pandas.DataFrame(table), pandas.DataFrame(table)[["velocity_mm_s", "depth_mm"]]]
+            self.says(incise.Invalid, "no column depth_mm", self.model, forms[0][["velocity_mm_s"]])
+            self.assertEqual(float(self.model(forms[0].iloc[3])), expected[3])
+        if has("numpy"):
+            import numpy
+
+            forms.append(numpy.zeros(20, dtype=[("velocity_mm_s", "f8"), ("depth_mm", "f4")]))
+            for name in ("velocity_mm_s", "depth_mm"):
+                forms[-1][name] = table[name]
+        if has("pyarrow"):
+            import pyarrow
+
+            forms.append(pyarrow.table(table))
+        for form in forms:
+            for value, wanted in zip(self.model(form), expected):
+                self.assertAlmostEqual(float(value), wanted, places=5)
+
+    def test_options_have_names(self):
+        for call in (lambda: self.model(5, 20), lambda: self.model((5, 20), True)):
+            self.assertRaises(TypeError, call)
+        self.assertRaises(TypeError, self.model.compile, 0.1)
+
+    def test_points_outside_are_counted(self):
+        low, high = self.model.inputs[0].min, self.model.inputs[0].max
+        for thing in (self.model, self.model.compile()):
+            with self.assertWarnsRegex(UserWarning, "^2 of 4 points are outside .*depth_mm"):
+                values = thing([(low - 1, 20), (5, 20), (high + 500, 20), (7, 20)])
+            self.assertEqual(values[1], thing((5, 20)))
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                thing([(5, 20), (7, 20)])
 
     def test_files(self):
         self.model.save(self.path("a.fis"))

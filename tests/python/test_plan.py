@@ -3,6 +3,7 @@
 
 import math
 import os
+import threading
 import unittest
 
 import incise
@@ -46,6 +47,36 @@ class Plans(Case):
             tick = plan.step(k * 1e-3, ((x, x, -x), (x, 0, 0, 1)))
             for value in (*tick.command_N, *tick.position_mm, tick.depth_mm):
                 self.assertTrue(math.isfinite(value))
+
+    def test_two_threads_at_once(self):
+        """The second one is refused, while the first is at work; its ticks stay its own."""
+        plan = incise.Plan("wall")
+        inside, go_on, ticks = threading.Event(), threading.Event(), []
+
+        class Slow(tuple):
+            def __iter__(self):
+                inside.set()
+                go_on.wait(30)
+                return super().__iter__()
+
+        thread = threading.Thread(target=lambda: ticks.append(plan.step(1, Slow((1, 2, 3)))))
+        thread.start()
+        self.assertTrue(inside.wait(30))
+        self.says(incise.Invalid, "another thread uses this Plan", plan.step, 1, (7, 8, 9))
+        if has("numpy"):
+            poses = {"t_ns": [0, 10**7], "x_mm": [0, 0], "y_mm": [0, 0], "z_mm": [5, 4]}
+            self.says(incise.Invalid, "another thread uses this Plan", plan.run, poses)
+        go_on.set()
+        thread.join()
+        self.assertEqual(ticks[0].position_mm, (1, 2, 3))
+        plan.step(2, (7, 8, 9))
+
+    def test_time_goes_on(self):
+        plan = incise.Plan("wall")
+        plan.step(1, (0, 0, 5))
+        for t in (0.999, math.nan, math.inf, 1e30, -1e30):
+            self.says(incise.Invalid, "t=", plan.step, t, None)
+        plan.step(1.001, None)
 
     def test_errors(self):
         plan = incise.Plan("wall")

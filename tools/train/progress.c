@@ -2,7 +2,7 @@
 /*
  * Progress of a training; see progress.h. The file: a line with the kind, the number of bytes of the
  * key and of each part, then these. The key has the version, the options, and path, size and time of
- * each source.
+ * each source, of members of recordings too, with the content of the calibrations in use.
  */
 #include <inttypes.h>
 #include <stdio.h>
@@ -15,7 +15,6 @@
 #include <incise/outfile.h>
 #include <incise/version.h>
 #include "../cli/cli.h"
-#include "../cli/file_kind.h"
 #include "progress.h"
 
 #define SHARE 10.0 /* of the time between two writings, at least, to that of one */
@@ -50,17 +49,10 @@ static char *make_key(const char *options, const struct source *sources, int n,
 		cli_fail("no memory");
 	fprintf(out, "%s\n%s\n", incise_version(), options);
 	for (int i = 0; i < n; i++) {
-		char *whole = file_without_choice(sources[i].path);
-		char *file =
-			cli_text(sources[i].recording ? "%s/recording.db" : "%s", whole);
-		struct stat st = {0};
+		char *state = source_state(&sources[i]);
 
-		stat(file, &st);
-		fprintf(out, "%s %jd %jd.%09ld %ju\n", sources[i].path,
-			(intmax_t)st.st_size, (intmax_t)st.st_mtim.tv_sec,
-			st.st_mtim.tv_nsec, (uintmax_t)st.st_ino);
-		free(file);
-		free(whole);
+		fprintf(out, "%s\n%s", sources[i].path, state);
+		free(state);
 	}
 	if (fclose(out))
 		cli_fail("no memory");

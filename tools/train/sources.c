@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /* Sources of pairs; see sources.h. */
 #include <errno.h>
+#include <glob.h>
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -48,17 +50,85 @@ static int count_row(void *user, const double *row, const char *group,
 	return source->take(source->taker, row, group, err);
 }
 
+static void print_file(FILE *out, const char *file)
+{
+	struct stat st = {0};
+
+	stat(file, &st);
+	fprintf(out, "%s %jd %jd.%09ld %ju\n", file, (intmax_t)st.st_size,
+		(intmax_t)st.st_mtim.tv_sec, st.st_mtim.tv_nsec, (uintmax_t)st.st_ino);
+}
+
+/* Its rows and the calibration by which they are read, and those of its members. */
+static void print_recording(FILE *out, const char *path)
+{
+	char *pattern = cli_text("%s/*/recording.db", path);
+	char *files[] = {cli_text("%s/recording.db", path),
+			 cli_text("%s/recording.db-wal", path)};
+	struct incise_recalibration *list = NULL;
+	int n = incise_recalibrations(path, &list, NULL);
+	glob_t found = {0};
+
+	for (size_t i = 0; i < 2; i++) {
+		print_file(out, files[i]);
+		free(files[i]);
+	}
+	fprintf(out, "%s %s\n", n > 0 ? list[n - 1].file : "",
+		n > 0 ? list[n - 1].sha256 : "");
+	free(list);
+	if (!glob(pattern, 0, NULL, &found))
+		for (size_t i = 0; i < found.gl_pathc; i++) {
+			*strrchr(found.gl_pathv[i], '/') = 0;
+			print_recording(out, found.gl_pathv[i]);
+		}
+	globfree(&found);
+	free(pattern);
+}
+
+char *source_state(const struct source *source)
+{
+	char *whole = file_without_choice(source->path), *text = NULL;
+	size_t size;
+	FILE *out = open_memstream(&text, &size);
+
+	if (!out)
+		cli_fail("no memory");
+	if (source->recording)
+		print_recording(out, whole);
+	else
+		print_file(out, whole);
+	free(whole);
+	fclose(out);
+	return text;
+}
+
+/* Fail if it is not what it was before it was first read. */
+static int check_unchanged(const struct source *source, struct incise_error *err)
+{
+	char *state = source_state(source);
+	bool same = !strcmp(source->state, state);
+
+	free(state);
+	return same ? 0
+		    : incise_error_set(err, ESTALE,
+				       "%s: has changed while it was read; train from a "
+				       "file that nobody writes",
+				       source->path);
+}
+
 static void begin(struct source *source, incise_row_taker take, void *taker)
 {
+	if (!source->state)
+		source->state = source_state(source);
 	source->take = take;
 	source->taker = taker;
 	source->taken = 0;
 }
 
-static int end(struct source *source, int rc)
+static int end(struct source *source, int rc, struct incise_error *err)
 {
 	report(source, source->taken % PROGRESS_ROWS);
-	return rc;
+	return rc ? rc : check_unchanged(source, err);
 }
 
 static int read_file(void *user, incise_row_taker take, void *taker,
@@ -71,7 +141,8 @@ static int read_file(void *user, incise_row_taker take, void *taker,
 		   incise_dataset_each(source->path, source->options->columns,
 				       source->options->n_columns, group_column(source),
 				       where(source), count_row, source,
-				       &source->left_out, err));
+				       &source->left_out, err),
+		   err);
 }
 
 /* Rows of a pipe; its groups have numbers for names. */
@@ -131,7 +202,7 @@ static int read_recording(void *user, incise_row_taker take, void *taker,
 					       source->options->n_columns,
 					       group_column(source), where(source),
 					       count_row, source, &source->left_out, err);
-	return name_it(source, end(source, rc), err);
+	return name_it(source, end(source, rc, err), err);
 }
 
 static const char *name_of(const char *path)
@@ -165,18 +236,39 @@ static const char *find(const char *path)
 	return file_operand(path, recording ? FILE_RECORDING : FILE_TABLE);
 }
 
+static int stop(void *user, const double *row, const char *group,
+		struct incise_error *err)
+{
+	(void)user;
+	(void)row;
+	(void)group;
+	(void)err;
+	return 1;
+}
+
+/* A file has the column "cut". A pipe can be read once only. */
+static bool has_cuts(const struct source *source)
+{
+	return !is_pipe(source->path) &&
+	       incise_dataset_each(source->path, source->options->columns,
+				   source->options->n_columns, "cut", where(source), stop,
+				   NULL, NULL, NULL) == 0;
+}
+
 struct source *sources_new(char **paths, int n, struct source_options *options)
 {
 	struct source *sources = cli_alloc(n, sizeof(*sources));
-	bool all = true;
+	bool all = !options->group; /* have cuts */
 
+	if (options->group && !strcmp(options->group, "none"))
+		options->group = NULL;
 	for (int i = 0; i < n; i++) {
 		struct source *source = &sources[i];
 
 		source->path = find(paths[i]);
 		source->recording = file_kind_of(source->path) == FILE_RECORDING;
 		source->options = options;
-		all &= source->recording;
+		all = all && (source->recording || has_cuts(source));
 		source->corpus = (struct incise_corpus_source){
 			.name = source->path,
 			.hash = source->hash,
@@ -187,7 +279,7 @@ struct source *sources_new(char **paths, int n, struct source_options *options)
 			.user = source,
 		};
 	}
-	if (!options->group && all)
+	if (all)
 		options->group = "cut";
 	for (int i = 0; i < n && options->group; i++) {
 		struct source *source = &sources[i];
@@ -246,16 +338,6 @@ static int open_recording(struct source *source, struct incise_error *err)
 	return rc;
 }
 
-static int stop(void *user, const double *row, const char *group,
-		struct incise_error *err)
-{
-	(void)user;
-	(void)row;
-	(void)group;
-	(void)err;
-	return 1;
-}
-
 /* Its name, and the origins that the file carries, as many as fit. */
 static int name_file(struct source *source, struct incise_error *err)
 {
@@ -282,6 +364,7 @@ int source_open(struct source *source, struct incise_error *err)
 	size_t left_out;
 	int rc;
 
+	source->state = source_state(source);
 	if (source->recording)
 		return open_recording(source, err);
 	if (source->corpus.read == read_pipe) {
@@ -310,7 +393,9 @@ int source_open(struct source *source, struct incise_error *err)
 
 void sources_free(struct source *sources, int n)
 {
-	for (int i = 0; i < n; i++)
+	for (int i = 0; i < n; i++) {
 		incise_dataset_free(sources[i].pipe);
+		free(sources[i].state);
+	}
 	free(sources);
 }

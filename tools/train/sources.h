@@ -15,7 +15,7 @@ struct source_options {
 	const char *const *columns; /* inputs, then output */
 	int n_columns;
 	bool uncertainty; /* columns of parts are among them */
-	/* cut, recording, rig, or a column; NULL: cut where all are recordings, else none. */
+	/* none, cut, recording, rig, or a column; NULL: cut where all sources have it, else none. */
 	const char *group;
 	bool all_rows;	/* also where the blade did not advance */
 	bool damaged;	/* also recordings that failed verification */
@@ -33,6 +33,7 @@ struct source {
 	char hash[65], text[INCISE_FACTOR_TEXT_MAX];
 	char rig[256], calibration[512]; /* the latter: the same where it is the same */
 	uint64_t left_out;		 /* rows in the last reading */
+	char *state;			 /* before it was first read; NULL: not yet */
 	struct incise_dataset *pipe; /* that can be read once only: its rows, or NULL */
 	incise_row_taker take;	     /* of the present reading, and the rows it took */
 	void *taker;
@@ -43,6 +44,12 @@ struct source {
 struct source *sources_new(char **paths, int n, struct source_options *options);
 
 void sources_free(struct source *sources, int n);
+
+/*
+ * Path, size and time of all files of a source, and the content of the calibrations by which a
+ * recording is read, also of its members: free(3).
+ */
+char *source_state(const struct source *source);
 
 /*
  * Hash a source, and verify it if it is a recording; its provenance is known afterwards. 0, or a

@@ -58,6 +58,7 @@ struct incise_corpus_group {
 struct incise_corpus_survey {
 	char hash[65], text[INCISE_FACTOR_TEXT_MAX];
 	uint64_t rows;
+	uint64_t digest; /**< of its rows and their groups in their order */
 	int n_groups;
 	struct incise_corpus_group *groups; /**< in order of appearance */
 	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
@@ -69,7 +70,7 @@ struct incise_corpus_survey {
  * @param n_inputs columns of a row are those and the output
  * @param grouped  hold out whole groups, not rows
  * @param seed     of the sample and of the rows or groups held out
- * @param sample   rows of the sample at most; SIZE_MAX: all rows
+ * @param sample   rows of the sample at most; SIZE_MAX: all different rows
  * @return corpus, to be freed with incise_corpus_free(); NULL with errno ENOMEM
  */
 INCISE_API struct incise_corpus *incise_corpus_new(int n_inputs, bool grouped,
@@ -100,7 +101,7 @@ INCISE_API void incise_corpus_weigh(struct incise_corpus *corpus,
 /**
  * Survey a source.
  *
- * @return 0; -EEXIST (its hash is there already), -ENOMEM, or the negative errno of its read: the
+ * @return 0; -EEXIST (its hash is there already, or a recording that its text names), -ENOMEM, or the negative errno of its read: the
  *         corpus is then of no further use
  */
 INCISE_API int incise_corpus_survey(struct incise_corpus *corpus,
@@ -108,7 +109,7 @@ INCISE_API int incise_corpus_survey(struct incise_corpus *corpus,
 				    struct incise_error *err);
 
 /** The surveys as bytes, for another process; to be freed with free(3). NULL: ENOMEM. */
-INCISE_API void *incise_corpus_encode(const struct incise_corpus *corpus, size_t *size);
+INCISE_API void *incise_corpus_encode(struct incise_corpus *corpus, size_t *size);
 
 /**
  * Add the surveys of another process. @return 0, -EEXIST, -EINVAL (no such bytes), -ENOMEM: the
@@ -120,8 +121,8 @@ INCISE_API int incise_corpus_add(struct incise_corpus *corpus, const void *bytes
 /**
  * All sources are surveyed: choose what is held out, and the sample.
  *
- * @param share held out, 0 ≤ share < 1, as near as groups allow
- * @return 0; -EINVAL (fewer than two groups or rows to share), -ENODATA (no rows), -ENOMEM
+ * @param share held out, 0 ≤ share < 1, as near as groups and equal rows allow
+ * @return 0; -EINVAL (fewer than two groups or different rows to share), -ENODATA (no rows), -ENOMEM
  */
 INCISE_API int incise_corpus_settle(struct incise_corpus *corpus, double share,
 				    struct incise_error *err);
@@ -135,8 +136,11 @@ INCISE_API const struct incise_corpus_survey *incise_corpus_source(
 
 /** Rows, groups and ranges of a side. */
 struct incise_corpus_side {
-	struct incise_train_side sample; /**< of its rows, owned by the corpus */
+	/** Of its rows, equal ones of a group once; owned by the corpus. */
+	struct incise_train_side sample;
 	uint64_t rows;
+	/** Rows, equal ones of a group counted once; an estimate beyond the size of the sample. */
+	uint64_t different;
 	int n_groups;
 };
 
@@ -153,7 +157,7 @@ INCISE_API void incise_corpus_ranges(const struct incise_corpus *corpus, double 
  *
  * @param check    factor of the rows held out, or NULL where there are none
  * @param left_out rows held out that are a whole range or more outside; or NULL
- * @return 0; -ESTALE (the source has changed since its survey), the negative errno of
+ * @return 0; -ESTALE (its rows are not those of its survey), the negative errno of
  *         incise_factor_add() with the source's name, or of its read
  */
 INCISE_API int incise_corpus_fold(const struct incise_corpus *corpus,

@@ -25,8 +25,11 @@ INCISE_BEGIN_DECLS
 /** Parts of a factor for cross-validation; a group is in one of them, by the hash of its name. */
 #define INCISE_FACTOR_FOLDS 5
 
-/** Fewer pairs, or groups, than this reveal too much of a single one. */
+/** A part of a file has at least this many different pairs, and as many as it has sums. */
 #define INCISE_FACTOR_PAIRS_MIN 1000
+
+/** A part of a file has pairs of at least this many groups. */
+#define INCISE_FACTOR_GROUPS_MIN 5
 
 /** Length of the text of a source, with its 0. */
 #define INCISE_FACTOR_TEXT_MAX 1000
@@ -42,6 +45,8 @@ struct incise_factor_source {
 /** Contents of a factor, without its sums. */
 struct incise_factor_info {
 	uint64_t rows, groups; /**< pairs; groups, which are counted by source */
+	uint64_t different;    /**< pairs, equal ones counted once; 0: not counted */
+	int parts; /**< for cross-validation; fewer than INCISE_FACTOR_FOLDS if some are joined */
 	int n_inputs, n_rules;
 	int n_sources;
 	const struct incise_factor_source *sources; /**< by hash */
@@ -94,8 +99,15 @@ INCISE_API int incise_factor_start(struct incise_factor *factor, const char *has
 INCISE_API int incise_factor_add(struct incise_factor *factor, const double *row,
 				 uint64_t group, struct incise_error *err);
 
-/** Count groups of the source. */
-INCISE_API void incise_factor_add_groups(struct incise_factor *factor, uint64_t groups);
+/**
+ * Count what is in the part of a group: a factor that is to be saved has all its groups counted.
+ *
+ * @param group     as in incise_factor_add()
+ * @param groups    number of groups
+ * @param different pairs of them, equal ones counted once
+ */
+INCISE_API void incise_factor_count(struct incise_factor *factor, uint64_t group,
+				    uint64_t groups, uint64_t different);
 
 /** A group's number, from its name; @source: a source's hash, for a name of its own, or "". */
 INCISE_API uint64_t incise_group_key(const char *source, const char *name);
@@ -109,7 +121,7 @@ INCISE_API void incise_factor_info(const struct incise_factor *factor,
  *
  * @param name name of @other for messages
  * @return 0, -EINVAL (other inputs or units, ranges or membership functions), -EEXIST (a source is
- *         in both), -EOVERFLOW, -ENOMEM.
+ *         in both, by its hash or by the identity of a recording in its text), -EOVERFLOW, -ENOMEM.
  */
 INCISE_API int incise_factor_merge(struct incise_factor *factor,
 				   struct incise_factor *other, const char *name,
@@ -121,18 +133,28 @@ INCISE_API int incise_factor_merge(struct incise_factor *factor,
  */
 INCISE_API char *incise_factor_notes(const struct incise_factor *factor);
 
-/** Write NAME.fac; see incise-fac(5). @return 0; the negative errno of incise_outfile_open(). */
+/**
+ * Write NAME.fac; see incise-fac(5). Parts of fewer than INCISE_FACTOR_PAIRS_MIN different pairs,
+ * fewer than sums, or fewer than INCISE_FACTOR_GROUPS_MIN groups are joined with others before, in
+ * @factor too.
+ *
+ * @return 0; -ENODATA (all together are fewer), the negative errno of incise_outfile_open().
+ */
 INCISE_API int incise_factor_save(struct incise_factor *factor, const char *path,
 				  struct incise_error *err);
 
 /**
  * Read NAME.fac. @return factor, to be freed with incise_factor_free(); NULL with errno of
- * incise_infile_open(), EINVAL (no such file, damaged), ENOTSUP (of another version), ENOMEM.
+ * incise_infile_open(), EINVAL (no such file, damaged, or a part of it reveals its pairs),
+ * ENOTSUP (of another form or version), ENOMEM.
  */
 INCISE_API struct incise_factor *incise_factor_load(const char *path,
 						    struct incise_error *err);
 
-/** The bytes of that file, to be freed with free(3). NULL with errno ENOMEM. */
+/**
+ * The bytes of such a file with its parts as they are, for processes of one training: they may
+ * reveal pairs. To be freed with free(3). NULL with errno ENOMEM.
+ */
 INCISE_API void *incise_factor_encode(struct incise_factor *factor, size_t *size);
 
 /** A factor of such bytes; @name for messages. NULL with errno as incise_factor_load(). */

@@ -218,6 +218,20 @@ INCISE_API int incise_mf_n_params(enum incise_mf_type type);
 INCISE_API const char *incise_mf_type_name(enum incise_mf_type type);
 
 /**
+ * Check points that a person or a program gives, before they are evaluated: a model answers for
+ * any number, as a loop needs it to.
+ *
+ * @param inputs  n_inputs names and ranges
+ * @param x       n × n_inputs values, the inputs of one point next to each other
+ * @param outside set to the number of points that lie outside the ranges, whose inputs are clamped
+ *                to them or extrapolated
+ * @return 0; -EINVAL: a value is not finite, with its point and input in the message
+ */
+INCISE_API int incise_inputs_check(const struct incise_variable *inputs, int n_inputs,
+				   const double *x, size_t n, size_t *outside,
+				   struct incise_error *err);
+
+/**
  * Evaluate eq. (3). Firing strengths are normalised in the log domain, so that the rule with
  * the largest one decides even if all of them underflow.
  *

@@ -5,6 +5,8 @@
  */
 #include "../unit.h"
 #include <float.h>
+#include "../cases.h"
+#include "../message.h"
 #include "any_model.h"
 
 /* Eq. (1)–(3) as printed, with σ = √2 s. */
@@ -705,4 +707,38 @@ TEST(test_constant_rule_takes_slopes)
 	assert_true(incise_model_eval(model, (double[]){5}, NULL) == 11);
 	incise_model_free(model);
 	unlink(path);
+}
+
+/* Of random points, some of them outside or not finite: the count, and the first that is bad. */
+TEST(test_inputs_check)
+{
+	const struct incise_variable inputs[] = {{"depth_mm", 0, 20},
+						 {"velocity_mm_s", -5, 50}};
+	const double bad[] = {NAN, INFINITY, -INFINITY};
+	uint64_t seed = cases_seed(41);
+
+	for (int c = 0; c < cases_of(2000, 100); c++) {
+		size_t n = 1 + c % 7, outside = 0, found;
+		double x[14];
+		char text[60];
+
+		for (size_t k = 0; k < n; k++) {
+			x[2 * k] = -10 + 40 * paper_random(&seed);
+			x[2 * k + 1] = -20 + 90 * paper_random(&seed);
+			outside += x[2 * k] < 0 || x[2 * k] > 20 || x[2 * k + 1] < -5 ||
+				   x[2 * k + 1] > 50;
+		}
+		assert_int_equal(incise_inputs_check(inputs, 2, x, n, &found, &err), 0);
+		assert_int_equal(found, outside);
+		for (size_t i = 0; i < 2 * n; i++) {
+			double kept = x[i];
+
+			x[i] = bad[(size_t)c % 3];
+			snprintf(text, sizeof(text), "point %zu of %zu: ", i / 2 + 1, n);
+			assert_error(incise_inputs_check(inputs, 2, x, n, &found, &err),
+				     EINVAL, &err, inputs[i % 2].name, "not finite",
+				     n > 1 ? text : NULL);
+			x[i] = kept;
+		}
+	}
 }
