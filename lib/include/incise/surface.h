@@ -38,15 +38,11 @@ INCISE_API void incise_surface_top(const struct incise_surface *surface,
 
 /** Size of a mesh or height field, and where it is open. */
 struct incise_surface_size {
-	double lo_mm[3], hi_mm[3];
-	/**
-	 * Edges with a triangle on one side only, of borders, holes and seams; between which
-	 * coordinates they lie.
-	 */
-	size_t open_edges;
-	double open_lo_mm[3], open_hi_mm[3];
-	/** A point well within it: the middle of a face near its middle. */
-	struct incise_touch inner;
+	double lo_mm[3], hi_mm[3]; /**< smallest and largest coordinates */
+	size_t open_edges; /**< with one triangle only: of borders, holes and seams */
+	double open_lo_mm[3], open_hi_mm[3]; /**< the same of those edges */
+	struct incise_touch
+		inner; /**< well within it: the middle of a face near its middle */
 };
 
 /** @return false: neither a mesh nor a height field */

@@ -3,6 +3,7 @@
 #include "../unit.h"
 #include <locale.h>
 #include <float.h>
+#include "../cases.h"
 #include "../message.h"
 #include "any_model.h"
 #include "every_kind.h"
@@ -407,6 +408,58 @@ TEST(test_spellings_mean_the_same)
 		if (eval_changed(cases[i][0], cases[i][1]) != want)
 			fail_msg("%s: another output", cases[i][1]);
 	assert_true(eval_changed("AndMethod='prod'", "AndMethod = 'min'") != want);
+}
+
+/* Blanks, comments and empty lines wherever they may be change no bit of any model. */
+TEST(test_any_spelling_is_the_same_model)
+{
+	static const char *const blanks[] = {"", " ", "\t", "  \t "};
+	struct incise_model *model = calloc(1, sizeof(*model)), *back;
+	uint64_t seed = cases_seed(9);
+	char line[1000];
+
+	for (int n = 0; n < cases_of(400, 40); n++) {
+		char *text = NULL;
+		size_t size;
+		FILE *in, *out = open_memstream(&text, &size);
+
+		any_model(model, &seed, 1 + any_below(&seed, 8), 1 + any_below(&seed, 20),
+			  12);
+		assert_int_equal(incise_model_save(model, path, NULL), 0);
+		in = fopen(path, "r");
+		if (any_below(&seed, 2))
+			fputs("\xef\xbb\xbf", out);
+		while (fgets(line, sizeof(line), in)) {
+			bool key = strchr(line, '=');
+
+			line[strcspn(line, "\n")] = 0;
+			if (!any_below(&seed, 4))
+				fputs("# MF1='x' % [Rules]\n \t\n", out);
+			fputs(blanks[any_below(&seed, 4)], out);
+			for (const char *c = line; *c; c++) {
+				bool sign = strchr("=:,()", *c) && (key || *line != '[');
+
+				if (sign)
+					fputs(blanks[any_below(&seed, 4)], out);
+				fputc(*c, out);
+				if (sign)
+					fputs(blanks[any_below(&seed, 4)], out);
+			}
+			fputs(blanks[any_below(&seed, 4)], out);
+			fputs(any_below(&seed, 2) ? "% '= a comment\r\n" : "\n", out);
+		}
+		fclose(in);
+		fclose(out);
+		put(text, strlen(text));
+		err = (struct incise_error){0};
+		back = incise_model_load(path, &err);
+		if (!back)
+			fail_msg("%s\n%s", err.text, text);
+		assert_same_inside(model, back);
+		incise_model_free(back);
+		free(text);
+	}
+	free(model);
 }
 
 /* An input that no rule uses may have no function. */
