@@ -14,6 +14,7 @@
 #include "cli/recording.h"
 
 #define BINS_MAX 1000
+#define CAMERA_OFF_MM 1.0 /* of depths by two devices that may differ */
 
 struct job {
 	const char *output;
@@ -138,6 +139,15 @@ static void print_report(const struct incise_export_report *report, const char *
 			     unstated(report)));
 }
 
+static void warn_camera(const struct incise_export_report *report)
+{
+	if (report->camera_off_mm > CAMERA_OFF_MM)
+		cli_warn(
+			"the camera's depths are %.2f times the tracker's, which is up to "
+			"%.1f mm: 'incise calibrate depth' measures its scale",
+			report->camera_ratio, report->camera_off_mm);
+}
+
 static void warn_unstated(const struct incise_export_report *report)
 {
 	json_t *list = unstated(report), *at;
@@ -226,6 +236,7 @@ int main(int argc, char **argv)
 	parse(&job, argc, argv);
 	export(argv + optind, argc - optind, &job, &report);
 	warn_unstated(&report);
+	warn_camera(&report);
 	if (job.json)
 		print_report(&report, job.output);
 	else if (strcmp(job.output, "-") && !report.cuts && !job.how.resample)

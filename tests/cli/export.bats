@@ -576,3 +576,35 @@ calibrated() {
 		    assert "surface_mm 0.05 mm" in text(file, "calibration_u")
 	END
 }
+
+@test "the camera's depth between frames is within what is stated, and a wrong scale is warned of" {
+	printf '%s\n' 'clock = "simulated"; tracker = "sim:"; force = "sim:"; camera = "sim:";' \
+		'sim = { depth_mm = [5.0, 12.0]; times = [2, 2]; camera_hz = 200.0; force_hz = 1000.0; };' >cam.conf
+	incise capture -o all.rec -r cam.conf -c none --camera depth >/dev/null
+	incise export all.rec --resample --rate 500 -o all.csv >/dev/null
+	# every fourth and eighth frame, at 50 and 25 Hz, against all
+	for k in 4 8; do
+		rm -rf some.rec
+		cp -r all.rec some.rec
+		sqlite3 some.rec/recording.db "DELETE FROM frames WHERE seq % $k"
+		incise export some.rec --resample --rate 500 --damaged --overwrite -o some.csv >/dev/null 2>&1
+		/usr/bin/python3 - <<-'END'
+			import csv, math
+			rows = [list(csv.DictReader(line for line in open(name) if line[0] != "#"))
+			        for name in ("all.csv", "some.csv")]
+			n = held = 0
+			for true, row in zip(*rows, strict=True):
+			    off = float(row["camera_depth_mm"]) - float(true["camera_depth_mm"])
+			    u = float(row["camera_depth_u_mm"])
+			    if not math.isnan(off + u):
+			        n, held = n + 1, held + (abs(off) <= 1.96 * u)
+			assert n > 10000 and held > 0.95 * n, (n, held)
+		END
+	done
+	echo 'depth_mm_px = 0.07;' >other.conf
+	run -0 --separate-stderr incise export all.rec --resample --rate 100 -o x.csv
+	[ -z "$stderr" ]
+	incise capture -o off.rec -r cam.conf -c other.conf --camera depth >/dev/null
+	run -0 --separate-stderr incise export off.rec --resample --rate 100 -o y.csv
+	[[ "$stderr" == *"warning: the camera's depths are 0."*" times the tracker's"* ]] || complain "$stderr"
+}

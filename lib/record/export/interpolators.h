@@ -262,14 +262,16 @@ struct incise_camera_interpolator {
 	struct incise_camera_depth {
 		int64_t t_ns; /* INCISE_TIME_NONE: none */
 		double depth_mm, sd_mm, quality, t_sd_s;
-	} frame[2]; /* before and after the row */
+	} frame[4];   /* two before and two after the row */
+	double bend2; /* mean square of second differences of late, mm² */
+	bool ended;   /* no frame is left to be read */
 };
 
 /* NAN: not seen. */
 struct incise_camera_value {
 	double depth_mm;
 	double sd_mm; /* of the edge in the frame */
-	double u_mm;  /* with the uncertainty of times */
+	double u_mm;  /* with the uncertainty of times, and motion between frames */
 	double quality;
 	bool low_quality; /* of either frame, or not seen */
 };

@@ -64,6 +64,8 @@ const struct incise_column incise_resample_columns[INCISE_RESAMPLE_COLUMNS +
 
 /* A hundred days: longer than any session; a grid over forged times would not end. */
 #define SPAN_MAX_NS 1e16
+/* Depths of less say little of a scale. */
+#define COMPARED_LEAST_MM 3.0
 
 struct resample {
 	struct incise_force_interpolator force;
@@ -83,8 +85,40 @@ struct resample {
 	bool has_force;
 	int64_t name, first_ns;
 	uint64_t samples, all;
+	struct {
+		double n, depth, camera, depth2, both, least_mm, most_mm;
+	} compared; /* sums over rows with both depths */
 	struct incise_error *err;
 };
+
+/* Depth of the camera, whose zero is its own, over that of the tracker. */
+static void compare_depths(struct resample *r, double depth_mm, double camera_mm)
+{
+	if (!(depth_mm > 0) || isnan(camera_mm))
+		return;
+	if (!r->compared.n++)
+		r->compared.least_mm = r->compared.most_mm = depth_mm;
+	r->compared.least_mm = fmin(r->compared.least_mm, depth_mm);
+	r->compared.most_mm = fmax(r->compared.most_mm, depth_mm);
+	r->compared.depth += depth_mm;
+	r->compared.camera += camera_mm;
+	r->compared.depth2 += depth_mm * depth_mm;
+	r->compared.both += depth_mm * camera_mm;
+}
+
+static void report_camera(const struct resample *r)
+{
+	const double n = r->compared.n,
+		     span_mm = r->compared.most_mm - r->compared.least_mm;
+	const double mean_mm = r->compared.depth / n;
+
+	r->report->camera_ratio = r->report->camera_off_mm = NAN;
+	if (!(n > 100) || span_mm < COMPARED_LEAST_MM)
+		return;
+	r->report->camera_ratio = (r->compared.both - mean_mm * r->compared.camera) /
+				  (r->compared.depth2 - mean_mm * r->compared.depth);
+	r->report->camera_off_mm = fabs(r->report->camera_ratio - 1) * span_mm;
+}
 
 int incise_resample_width(struct incise_recording *const *recordings, int n,
 			  struct incise_error *err)
@@ -141,6 +175,8 @@ static int put_row(struct resample *r, int64_t t_ns,
 		camera = (struct incise_camera_value){0};
 	if (rc)
 		return rc;
+	if (r->camera_columns)
+		compare_depths(r, blade.depth_mm, camera.depth_mm);
 	report->clipped += force->clipped;
 	report->depth_max_mm = least(report->depth_max_mm, blade.depth_mm);
 	report->velocity_max_mm_s = least(report->velocity_max_mm_s, blade.velocity_mm_s);
@@ -363,6 +399,7 @@ int incise_resample(struct incise_recording *recording, const char *name,
 	else if (!rc && r.force.n)
 		rc = on_samples(&r, recording);
 	report->cuts += r.blade.cut.count;
+	report_camera(&r);
 	incise_force_interpolator_close(&r.force);
 	incise_blade_pose_close(&r.blade);
 	incise_camera_interpolator_close(&r.camera);
