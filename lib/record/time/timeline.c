@@ -32,6 +32,8 @@
 
 #define SLOPE_MAX INCISE_ENVELOPE_SLOPE_MAX
 #define SLOPE_SD_FIRST 300e-6
+#define SLOPE_SD_NONE 1e-2 /* nothing is known */
+#define FAR_OFF (2.5 * SLOPE_SD_FIRST)
 /* Largest change of a known rate while there are few blocks. */
 #define SLOPE_SD_KNOWN 20e-6
 
@@ -300,8 +302,14 @@ static void draw(struct incise_envelope *env)
 	if (hull_slope(chosen, n, x_ns, &slope)) {
 		/* A short line defines the rate less well than the device's type. */
 		double sd = n < SHAPE_BLOCKS || env->slope_sd <= 0 ? 1e-2 : env->slope_sd;
-		double prior = env->prior_slope_sd * env->prior_slope_sd;
+		double prior;
 
+		/* The data contradict the type: a clock as far off as this is of none. */
+		if (n >= SHAPE_BLOCKS && env->measured_sd > 0 &&
+		    fabs(slope - env->prior_slope) >
+			    3 * hypot(env->prior_slope_sd, env->measured_sd))
+			env->prior_slope_sd = SLOPE_SD_NONE;
+		prior = env->prior_slope_sd * env->prior_slope_sd;
 		slope = env->prior_slope +
 			(slope - env->prior_slope) * prior / (prior + sd * sd);
 	} else {
@@ -320,7 +328,9 @@ static void draw(struct incise_envelope *env)
 	if (env->grain_ns > 0)
 		measure_grain(env, span_ns);
 	env->gap_sd_ns = hypot(env->gap_sd_ns, incise_envelope_bend(span_ns));
-	env->slope_sd = fmin(env->slope_sd, env->prior_slope_sd);
+	env->measured_sd = env->slope_sd;
+	env->slope_sd = fabs(slope) < SLOPE_MAX ? fmin(env->slope_sd, env->prior_slope_sd)
+						: SLOPE_SD_NONE;
 	if (env->slope_sd < SLOPE_SD_KNOWN) {
 		env->prior_slope = slope;
 		env->prior_slope_sd = SLOPE_SD_KNOWN;
@@ -742,9 +752,13 @@ void incise_timeline_report(const struct incise_timeline *timeline,
 	if (timeline->jitter_n > 1)
 		report->jitter_ns =
 			sqrt(timeline->jitter_sum2 / (timeline->jitter_n - 1));
-	/* At the limit of the line's slope the true rate is not known. */
+	/*
+	 * At the limit of the line's slope the true rate is not known, nor where a clock that is as far off
+	 * as none of its type has not yet shown its rate.
+	 */
 	if (measure_slope(timeline, &slope, &slope_sd) &&
-	    fabs(slope) < 0.99 * INCISE_ENVELOPE_SLOPE_MAX) {
+	    fabs(slope) < 0.99 * INCISE_ENVELOPE_SLOPE_MAX &&
+	    (fabs(slope) < FAR_OFF || slope_sd < FAR_OFF / 4)) {
 		/* periods are longer by the slope, so the rate is lower */
 		report->rate_hz = 1e9 / (timeline->period_ns * (1 + slope));
 		report->drift_ppm = (1 / (1 + slope) - 1) * 1e6;

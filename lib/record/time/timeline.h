@@ -46,6 +46,7 @@ struct incise_envelope {
 	double x_ns, y_ns, slope;
 	/* The true line is expected to be lower by the gap. */
 	double gap_ns, gap_sd_ns, slope_sd;
+	double measured_sd; /* of the slope, by the samples alone */
 	/* The slope expected while there are few blocks. */
 	double prior_slope, prior_slope_sd;
 	/* The excess of the blocks' lowest is Weibull: shape and scale near its lower end. */

@@ -371,6 +371,44 @@ TEST(drift_is_followed)
 			 1) < 1e-6);
 }
 
+/* A clock that is as far off as none of its type: its drift is within what is stated, or not stated. */
+TEST(far_drifts_are_stated_or_not)
+{
+	uint64_t random = 20261128;
+	int stated = 0, held = 0;
+
+	for (int i = 0; i < 120; i++) {
+		static const enum jitter kinds[] = {UNIFORM, EXPONENTIAL, GAMMA};
+		struct stream stream = stream_of(120, kinds[i % 3], (uint64_t)i);
+		struct incise_timeline_report report;
+		struct incise_timeline_setup setup;
+		struct incise_timeline timeline;
+		double draw = (double)(incise_random_next(&random) >> 11) * 0x1p-53;
+
+		stream.length_s = 4 + 16 * stream_random(&stream);
+		stream.size_ns = (i % 4) * 8e6;
+		stream.drift_ppm = 6000 * draw - 3000;
+		setup = setup_of(&stream);
+		incise_timeline_init(&timeline, &setup);
+		for (int k = 0; k < stream.length_s * stream.rate_hz; k++) {
+			int64_t arrival_ns;
+
+			stream_next(&stream, &arrival_ns);
+			incise_timeline_sample(&timeline, FIRST + (uint64_t)k,
+					       arrival_ns);
+		}
+		incise_timeline_report(&timeline, &report);
+		if (isnan(report.drift_ppm) || fabs(stream.drift_ppm) < 1000)
+			continue;
+		stated++;
+		held += fabs(report.drift_ppm - stream.drift_ppm) <=
+			3 * report.drift_sd_ppm + 1;
+	}
+	/* 3 sd, of which the binomial 99.9 % range for 48 is 46 and more */
+	if (stated < 20 || held < stated - 2)
+		fail_msg("%d of %d drifts beyond 1000 ppm are as stated", held, stated);
+}
+
 /* Numbers that are missing do not shift the line, nor does a latency of 10 s. */
 TEST(gaps_and_stalls)
 {
