@@ -223,9 +223,11 @@ int main(int argc, char **argv)
 {
 	struct job job = {.scene.arith = "fixed"};
 	const char *path;
+	struct incise_fixed_options usual;
 	bool found; /* a scene, by its path or name */
 
 	incise_fixed_options_init(&job.options);
+	incise_fixed_options_init(&usual);
 	cli_parse(&command, argc, argv, &job);
 	path = cli_operand(argc, argv, "MODEL.fis or SCENE", "model or scene to compile");
 	if (!job.output || !*job.output)
@@ -243,6 +245,11 @@ int main(int argc, char **argv)
 				  "scene, this is a model",
 				  path);
 		cli_extension("output", job.output, ".fx");
+		if (job.options.budget > 100 * usual.budget)
+			cli_warn("--budget: an error of %g N, %.3g times the default of "
+				 "%g mN; a number without a unit is newtons",
+				 job.options.budget, job.options.budget / usual.budget,
+				 usual.budget * 1e3);
 		compile_model(&job, path);
 	} else {
 		if (is_of_model(&job))

@@ -498,6 +498,8 @@ static void tip_move(struct tip_poses *poses, int n, const double *u,
 /* --- judgement --- */
 
 #define OUTLIERS_MAX 0.3
+#define METRES_TIP_MM 1.0
+#define METRES_RMS_MM 0.002
 #define RMS_MAX_MM 1.0
 #define CHI2_MOVED 16.27 /* of three, which chance exceeds once in 1000 */
 #define MOVED_MIN_MM 0.1
@@ -526,6 +528,13 @@ static int tip_judge(const struct tip_poses *poses, const struct incise_tip_fit 
 			"%.2f %.2f) of the sensor swept %.0f degrees; rotate it in all "
 			"directions",
 			fit->least[0], fit->least[1], fit->least[2], fit->least_deg);
+	/* No tracker measures so, and hardly a tip is so near to its sensor. */
+	if (v3_length(fit->tip_mm) < METRES_TIP_MM && fit->rms_mm < METRES_RMS_MM)
+		return incise_error_set(
+			err, EDOM,
+			"a tip %.3g mm from the sensor, and residuals of %.2g mm: the "
+			"positions seem to be in m; multiply them by 1000",
+			v3_length(fit->tip_mm), fit->rms_mm);
 	if (fit->n - fit->inliers > OUTLIERS_MAX * fit->n) {
 		if (outliers_at_end(poses))
 			return incise_error_set(

@@ -255,6 +255,12 @@ TEST(test_refusals)
 		assert_says(err.text, cases[i].said);
 	}
 	seed = 3;
+	move(&usual, 600);
+	for (int i = 0; i < 600; i++)
+		for (int k = 0; k < 3; k++)
+			poses[i].position_mm[k] *= 1e-3;
+	assert_error(fit(600, &f, &err), EDOM, &err, "in m;");
+	seed = 3;
 	move(&usual, 100);
 	poses[41].position_mm[1] = NAN;
 	assert_error(fit(100, &f, &err), EINVAL, &err, "pose 42");
