@@ -10,6 +10,7 @@
 #include <incise/factor.h>
 #include <incise/version.h>
 #include "cli/cli.h"
+#include "cli/file_kind.h"
 #include "cli/json.h"
 
 struct options {
@@ -61,15 +62,21 @@ static void parse(struct options *options, int argc, char **argv)
 	free(sd);
 }
 
+static struct incise_factor *load(const char *path)
+{
+	struct incise_error err = {0};
+
+	file_expect(path, FILE_FACTOR);
+	return cli_require(incise_factor_load(path, &err), &err);
+}
+
 static struct incise_factor *merge_all(const struct options *options)
 {
 	struct incise_error err = {0};
-	struct incise_factor *all =
-		cli_require(incise_factor_load(options->paths[0], &err), &err);
+	struct incise_factor *all = load(options->paths[0]);
 
 	for (int i = 1; i < options->n; i++) {
-		struct incise_factor *other =
-			cli_require(incise_factor_load(options->paths[i], &err), &err);
+		struct incise_factor *other = load(options->paths[i]);
 
 		if (incise_factor_merge(all, other, options->paths[i], &err))
 			cli_fail_with(&err);

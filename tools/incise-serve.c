@@ -125,7 +125,7 @@ static void open_source(struct run *run, struct job *job)
 	if (job->lsl && !*job->lsl)
 		cli_usage("--lsl: '' is no PREFIX; give one, for example rig");
 	if (job->rig) {
-		calibration_use(&calibration, job->calibration, job->rig);
+		calibration_use(&calibration, job->calibration, NULL);
 		job->source.calibration = calibration.values;
 		cli_note("calibration: %s", calibration_text(&calibration));
 	}
@@ -134,6 +134,8 @@ static void open_source(struct run *run, struct job *job)
 	run->source = job->rig	  ? serve_rig_open(&job->source, &run->info)
 		      : recording ? serve_recording_open(&job->source, &run->info)
 				  : serve_loop_open(&job->source, &run->info);
+	if (job->rig && !calibration.path)
+		calibration_use(&calibration, job->calibration, job->rig);
 	run->stream = serve_stream_new(run->source, job->source.rate_hz);
 }
 

@@ -31,7 +31,9 @@ struct incise_infile {
 static int fail(const struct incise_infile *file, struct incise_error *err, int code,
 		const char *why)
 {
-	const char *advice = file->kind->advice;
+	const char *advice = code == EACCES ? "change its permissions (chmod), or run as "
+					      "its owner"
+					    : file->kind->advice;
 
 	return incise_error_set(err, code, "%.200s: %s%s%s", file->path, why,
 				advice ? "; " : "", advice ? advice : "");

@@ -188,11 +188,13 @@ int incise_outfile_commit(struct incise_outfile *file, struct incise_error *err)
 	if (!rc && file->temp && rename(file->temp, file->target))
 		rc = -errno;
 	if (rc) {
-		rc = incise_error_set(
-			err, -rc, "%s: not written: %s%s",
-			strcmp(file->path, "-") ? file->path : "standard output",
-			strerror(-rc),
-			file->temp ? "; the previous file is unchanged" : "");
+		rc = incise_error_set(err, -rc, "%s: not written: %s%s",
+				      strcmp(file->path, "-") ? file->path
+							      : "standard output",
+				      strerror(-rc),
+				      file->temp && !access(file->target, F_OK)
+					      ? "; the previous file is unchanged"
+					      : "");
 		incise_outfile_abort(file);
 		return rc;
 	}

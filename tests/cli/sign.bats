@@ -221,7 +221,7 @@ not_vouched() {
 	[ "$(find r.rec/seal -type f | wc -l)" = 2 ]
 	incise rig --show --rig rig.conf | grep "sign_key.*kim"
 	sed -i "s|$kim|$PWD/none|" rig.conf
-	run -1 --separate-stderr incise capture -o r2.rec --rig rig.conf --duration 1s
+	run -1 --separate-stderr incise capture -o r2.rec --rig rig.conf --duration 1s -c none
 	[ "${#stderr_lines[@]}" = 1 ]
 	[[ "$stderr" == *"incise capture: r2.rec: recorded, but not signed: $PWD/none: No such file or directory; "*"'incise sign' signs it" ]]
 	incise verify r2.rec

@@ -21,6 +21,7 @@
 #include <incise/rig.h>
 #include <incise/version.h>
 #include "cli.h"
+#include "control_character.h"
 #include "complete.h"
 #include "file_kind.h"
 
@@ -452,9 +453,7 @@ static void say(int level, const char *fmt, va_list args)
 	cli_progress_end();
 	vsnprintf(text, sizeof(text), fmt, args);
 	/* Text from outside must not break the line or control the terminal. */
-	for (char *c = text; *c; c++)
-		if ((unsigned char)*c < ' ' || *c == 0x7f)
-			*c = '?';
+	control_characters_hide(text);
 	fflush(stdout);
 	if (to_journal())
 		snprintf(prefix, sizeof(prefix), "<%d>", level);

@@ -62,14 +62,23 @@ int stream_line(const struct incise_stream *s, char *text, size_t size)
 static void not_calibrated(const struct incise_stream *streams, int n)
 {
 	const char *before = "warning: no delay calibration for ";
+	bool any = false;
 
+	/* A calibration of delays is relative to a stream whose own delay it does not know. */
+	for (int i = 0; i < n; i++)
+		any |= !isnan(streams[i].delay_sd_ms);
 	for (int i = 0; i < n; i++) {
 		if (!isnan(streams[i].delay_sd_ms))
 			continue;
-		printf("%s%s", before, streams[i].name);
+		if (any)
+			printf("warning: the delay of %s is not stated: %s_delay_sd_ms in "
+			       "calibration.conf states it\n",
+			       streams[i].name, streams[i].name);
+		else
+			printf("%s%s", before, streams[i].name);
 		before = ", ";
 	}
-	if (*before == ',')
+	if (*before == ',' && !any)
 		puts(" (run 'incise calibrate delay')");
 }
 

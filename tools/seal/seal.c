@@ -128,9 +128,15 @@ int seal_files_read(struct seal_files *files, const char *recording,
 	DIR *folder = fd < 0 ? NULL : fdopendir(fd);
 	struct seal_file file;
 	struct dirent *entry;
+	struct stat st;
 
 	*files = (struct seal_files){0};
-	if (!folder && errno != ENOENT)
+	if (!folder && errno == ENOTDIR && !stat(recording, &st) && !S_ISDIR(st.st_mode))
+		rc = incise_error_set(err, ENOTDIR,
+				      "%s: not a recording, which is a folder; unpack it "
+				      "if it is an archive of one",
+				      recording);
+	else if (!folder && errno != ENOENT)
 		rc = incise_error_set(err, errno, "%s: %s", path,
 				      errno == ELOOP || errno == ENOTDIR
 					      ? "not a folder; remove it"
