@@ -1014,10 +1014,16 @@ static double column(sqlite3_stmt *stmt, int i)
 		       : sqlite3_column_double(stmt, i);
 }
 
-/* Of a frame and its neighbours; NAN: not known. */
-static double second_difference(const struct incise_camera_depth *frame)
+/* Second derivative of the depth at a frame by its neighbours, mm/s²; NAN: not known. */
+static double bend_at(const struct incise_camera_depth *frame)
 {
-	return fabs(frame[-1].depth_mm - 2 * frame->depth_mm + frame[1].depth_mm);
+	/* Of no frame the time is far off, and the depth not a number. */
+	double before_s = ((double)frame->t_ns - (double)frame[-1].t_ns) * 1e-9;
+	double after_s = ((double)frame[1].t_ns - (double)frame->t_ns) * 1e-9;
+	double to = (frame[1].depth_mm - frame->depth_mm) / after_s;
+	double from = (frame->depth_mm - frame[-1].depth_mm) / before_s;
+
+	return 2 * fabs(to - from) / (before_s + after_s);
 }
 
 static int more(struct incise_camera_interpolator *camera, struct incise_error *err)
@@ -1041,7 +1047,7 @@ static int more(struct incise_camera_interpolator *camera, struct incise_error *
 		column(stmt, 4),
 		incise_row_times_sd(&camera->rows.times, sqlite3_column_int64(stmt, 0)),
 	};
-	bend = second_difference(&camera->frame[2]);
+	bend = bend_at(&camera->frame[2]);
 	if (!isnan(bend))
 		camera->bend2 += (bend * bend - camera->bend2) / BEND_FRAMES;
 	return 1;
@@ -1093,7 +1099,7 @@ int incise_camera_interpolator_at(struct incise_camera_interpolator *camera, int
 				  struct incise_error *err)
 {
 	const struct incise_camera_depth *a = &camera->frame[1], *b = &camera->frame[2];
-	double s, slope, line, time, bend;
+	double s, slope, line, time, bend, span_s;
 	int rc = 0;
 
 	*value = (struct incise_camera_value){NAN, NAN, NAN, NAN, true};
@@ -1104,15 +1110,15 @@ int incise_camera_interpolator_at(struct incise_camera_interpolator *camera, int
 	s = incise_row_share(a->t_ns, b->t_ns, t_ns);
 	if (isnan(s) || isnan(a->depth_mm) || isnan(b->depth_mm))
 		return 0;
-	slope = (b->depth_mm - a->depth_mm) / ((double)(b->t_ns - a->t_ns) * 1e-9);
+	span_s = (double)(b->t_ns - a->t_ns) * 1e-9;
+	slope = (b->depth_mm - a->depth_mm) / span_s;
 	line = (1 - s) * (1 - s) * a->sd_mm * a->sd_mm + s * s * b->sd_mm * b->sd_mm;
 	time = (b->t_sd_s * b->t_sd_s + t_sd_s * t_sd_s) * slope * slope;
 	value->depth_mm = a->depth_mm + s * (b->depth_mm - a->depth_mm);
-	bend = fmax(fmax(second_difference(a), second_difference(b)),
-		    sqrt(camera->bend2));
-	if (isnan(bend))
-		bend = fabs(b->depth_mm - a->depth_mm);
-	bend *= BEND * s * (1 - s);
+	bend = fmax(bend_at(a), bend_at(b));
+	if (isnan(bend) && !camera->bend2)
+		bend = fabs(slope) / span_s;
+	bend = fmax(bend, sqrt(camera->bend2)) * span_s * span_s * BEND * s * (1 - s);
 	value->sd_mm = sqrt(line);
 	value->u_mm = sqrt(line + time + bend * bend);
 	value->quality = a->quality + s * (b->quality - a->quality);

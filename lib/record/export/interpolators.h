@@ -263,7 +263,7 @@ struct incise_camera_interpolator {
 		int64_t t_ns; /* INCISE_TIME_NONE: none */
 		double depth_mm, sd_mm, quality, t_sd_s;
 	} frame[4];   /* two before and two after the row */
-	double bend2; /* mean square of second differences of late, mm² */
+	double bend2; /* mean square of second derivatives of late, (mm/s²)² */
 	bool ended;   /* no frame is left to be read */
 };
 
