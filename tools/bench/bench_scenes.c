@@ -9,7 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/plan.h>
-#include "../cli/json.h"
 #include "../cli/mapped_libraries.h"
 #include "../cli/scene_argument.h"
 #include "../cli/stopwatch.h"

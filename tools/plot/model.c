@@ -11,7 +11,6 @@
  */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include <incise/dataset.h>
 #include <incise/uncertainty.h>
 #include "../../lib/base/ascending.h"
