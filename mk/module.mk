@@ -49,7 +49,7 @@ srcdir ?= $(prefix)/src
 dkms_dir = $(srcdir)/incise-$(version)
 dkms_sources = $(addprefix driver/,Kbuild Makefile compat/probe) \
 	$(filter-out %.mod.c,$(wildcard $(addprefix driver/,*.[ch] uapi/*.h compat/*.c))) \
-	$(wildcard driver/source/*) $(filter-out %/trial.h,$(wildcard lib/fixed/*.[ch])) \
+	$(wildcard driver/source/*) $(wildcard lib/fixed/*.[ch]) \
 	$(shell grep -l __KERNEL__ lib/include/incise/*.h) \
 	$(addprefix lib/include/incise/,export.h stepper_state.h tick_flags.h tool.h)
 dkms_folders = $(patsubst %/,%,$(sort $(dir $(dkms_sources))))

@@ -3,7 +3,6 @@
  * incise calibrate stepper: force per microstep of the actuator, its backlash, hysteresis and
  * stiction, and the largest step rate that loses no step.
  */
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -9,7 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/calibration.h>
 #include <incise/recorder.h>
 #include <incise/rig.h>
 #include <incise/sim.h>

@@ -7,9 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/calibration.h>
 #include <incise/fixed.h>
-#include <incise/infile.h>
 #include <incise/model.h>
 #include <incise/plan_file.h>
 #include "cli/calibration.h"

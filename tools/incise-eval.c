@@ -2,7 +2,6 @@
 /*
  * incise eval MODEL.fis: reads lines of inputs (depth velocity), prints the force.
  */
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

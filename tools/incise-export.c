@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/calibration.h>
 #include <incise/recording.h>
 #include "cli/calibration.h"
 #include "cli/cli.h"

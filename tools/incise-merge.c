@@ -8,7 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/factor.h>
-#include <incise/version.h>
 #include "cli/cli.h"
 #include "cli/file_kind.h"
 #include "cli/json.h"

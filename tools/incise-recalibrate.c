@@ -5,7 +5,6 @@
  */
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 #include <incise/recalibration.h>
 #include "cli/cli.h"
 #include "cli/file_kind.h"

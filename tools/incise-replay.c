@@ -6,7 +6,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <incise/calibration.h>
 #include <incise/replay.h>
 #include "cli/calibration.h"
 #include "cli/cli.h"

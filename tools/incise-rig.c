@@ -3,11 +3,9 @@
  * incise rig: prints which rig.conf the commands use here, and with --show every key that
  * applies, with its value, its unit and where it comes from. No device is opened.
  */
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include <incise/rig.h>
 #include "cli/cli.h"
 #include "cli/json.h"

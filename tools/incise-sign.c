@@ -2,7 +2,6 @@
 /*
  * incise sign: signs and time-stamps a recording, so that anyone can see later who vouches for it.
  */
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -12,7 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <incise/corpus.h>
 #include <incise/factor.h>
 #include <incise/propagation.h>
@@ -21,7 +20,6 @@
 #include <incise/version.h>
 #include "cli/cli.h"
 #include "cli/file.h"
-#include "cli/file_kind.h"
 #include "cli/json.h"
 #include "cli/recording.h"
 #include "train/progress.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-only
 /*
  * The integer force model, as the kernel's compiler makes it: the same bits as in a
- * program. Random inputs of lib/fixed/trial.h go in, a CRC-32C of all results comes out; a
+ * program. Random inputs of trial.h go in, a CRC-32C of all results comes out; a
  * program (tests/vm/guest/fixed_bits.c) computes the same and hands over what it has found:
  *
  *   insmod incise_kunit.ko blob=MODEL.fx count=N seed=S digest=CRC
@@ -14,7 +14,7 @@
 #include <linux/sched.h>
 #include <linux/vmalloc.h>
 
-#include "../../lib/fixed/trial.h"
+#include "trial.h"
 #include "fixed.h"
 
 static char *blob;

@@ -2,7 +2,6 @@
 /*
  * Real, simulated and paced time; see incise/clock.h.
  */
-#include <errno.h>
 #include <stdlib.h>
 #include <time.h>
 #include <incise/clock.h>

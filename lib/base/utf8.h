@@ -5,7 +5,6 @@
 #ifndef INCISE_UTF8_H
 #define INCISE_UTF8_H
 
-#include <stdbool.h>
 #include <string.h>
 
 /* Bytes of the byte order mark that Windows' programs write before a text, or 0. */

@@ -11,8 +11,6 @@
 #ifndef INCISE_MODULE_H
 #define INCISE_MODULE_H
 
-#include <stdbool.h>
-#include <stddef.h>
 #include <incise/backend.h>
 #include <incise/error.h>
 

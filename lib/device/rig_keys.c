@@ -3,7 +3,6 @@
  * The keys of a rig with their values; see incise/rig.h. Names of keys are those that the
  * readers accept, and values are those of the plan that they read.
  */
-#include <errno.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdio.h>

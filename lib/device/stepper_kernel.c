@@ -19,7 +19,6 @@
 #include <unistd.h>
 #include <incise/clock.h>
 #include "../base/monotonic.h"
-#include "backends.h"
 #include "motor.h"
 #include "page.h"
 

@@ -328,11 +328,6 @@ static size_t place(const struct incise_gram *gram, int i, int j)
 	return (size_t)i * gram->n - (size_t)i * (i + 1) / 2 + j;
 }
 
-double incise_gram_at(struct incise_gram *gram, int i, int j)
-{
-	return (double)incise_gram_sums(gram)[place(gram, i, j)] * UNIT;
-}
-
 /* --- twice the digits ---------------------------------------------------------------- */
 
 /*

@@ -50,9 +50,6 @@ incise_gram_sum *incise_gram_sums(struct incise_gram *gram);
 size_t incise_gram_count(const struct incise_gram *gram);
 void incise_gram_set_rows(struct incise_gram *gram, uint64_t rows);
 
-/* Σ vᵢ·vⱼ, i ≤ j, to double precision. */
-double incise_gram_at(struct incise_gram *gram, int i, int j);
-
 /*
  * Put the triangular factor of a matrix into lsq: of its n rows (w, 1, t), with n - 2 unknowns
  * of lsq as w, a column of ones, and t, for the target (t - mean)/scale. It is the factor that a

@@ -10,8 +10,6 @@
 #ifndef INCISE_LSQ_H
 #define INCISE_LSQ_H
 
-#include <stddef.h>
-
 struct incise_lsq;
 
 /*

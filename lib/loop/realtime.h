@@ -10,7 +10,6 @@
 #ifndef INCISE_LOOP_REALTIME_H
 #define INCISE_LOOP_REALTIME_H
 
-#include <stddef.h>
 #include <stdint.h>
 #include <sys/resource.h>
 #include <incise/realtime.h>

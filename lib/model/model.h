@@ -5,7 +5,6 @@
 #ifndef INCISE_MODEL_INTERNAL_H
 #define INCISE_MODEL_INTERNAL_H
 
-#include <stdint.h>
 #include <incise/model.h>
 
 /* No log of a degree is below this: the sum over all inputs stays finite. */

@@ -15,7 +15,6 @@
 #include "../base/vector.h"
 #include "../fixed/front.h"
 #include "../fixed/input.h"
-#include "../fixed/spring.h"
 #include "plan.h"
 
 /* A hand's speed at most, mm/s, and its largest acceleration that the filter lets pass, mm/s². */

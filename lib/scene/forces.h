@@ -8,7 +8,6 @@
 #ifndef INCISE_FORCES_H
 #define INCISE_FORCES_H
 
-#include <stdbool.h>
 #include <incise/export.h>
 #include "../fixed/plan.h"
 #include "../tissue/front.h"

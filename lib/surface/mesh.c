@@ -7,7 +7,6 @@
  * inside from outside exactly (Bærentzen & Aanæs 2005), which a face's does not.
  */
 #include <stdlib.h>
-#include <string.h>
 #include "mesh.h"
 
 size_t mesh_memory(const struct mesh *mesh)

@@ -15,7 +15,6 @@
 #ifndef INCISE_VIEW_BLOOD_H
 #define INCISE_VIEW_BLOOD_H
 
-#include <stddef.h>
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/scene.h>

@@ -17,7 +17,6 @@
 #define INCISE_VIEW_CANVAS_H
 
 #include <stdbool.h>
-#include <stddef.h>
 #include <stdint.h>
 #include <incise/error.h>
 

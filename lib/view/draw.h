@@ -10,7 +10,6 @@
 #ifndef INCISE_VIEW_DRAW_H
 #define INCISE_VIEW_DRAW_H
 
-#include <stdbool.h>
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/plan.h>

@@ -14,7 +14,6 @@
 #ifndef INCISE_VIEW_OVERLAY_H
 #define INCISE_VIEW_OVERLAY_H
 
-#include <stdbool.h>
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/plan.h>

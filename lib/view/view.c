@@ -9,7 +9,6 @@
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include <incise/incision.h>
 #include <incise/view.h>
 #include "../base/monotonic.h"

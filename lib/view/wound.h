@@ -31,7 +31,6 @@
 #define INCISE_VIEW_WOUND_H
 
 #include <stdbool.h>
-#include <stddef.h>
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/incision.h>

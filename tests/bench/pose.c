@@ -18,7 +18,7 @@
 #include "../../lib/base/vector.h"
 #include "../../lib/control/predict.h"
 #include "program.h"
-#include "../../tools/bench/noise.h"
+#include "noise.h"
 
 #define TICKS 16000
 #define QUICK_TICKS 3500

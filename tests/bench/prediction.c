@@ -15,7 +15,7 @@
 #include <incise/corpus.h>
 #include <incise/sim.h>
 #include "program.h"
-#include "../../tools/bench/noise.h"
+#include "noise.h"
 #include "../../tools/cli/stopwatch.h"
 
 #define CUTS 12	   /* of a rig */

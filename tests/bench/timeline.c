@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include "../../lib/record/time/timeline.h"
 #include "program.h"
-#include "../../tools/bench/noise.h"
+#include "noise.h"
 
 static const double windows_s[] = {1, 2, 5, 10, 30, 60, 120};
 static const double drifts_ppm[] = {-200, 0, 200};

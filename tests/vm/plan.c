@@ -7,7 +7,7 @@
 #include <sys/ioctl.h>
 
 #include "../../lib/fixed/layout.h"
-#include "../../lib/fixed/trial.h"
+#include "../../driver/kunit/trial.h"
 #include "../../lib/fixed/vector.h"
 #include "plan.h"
 

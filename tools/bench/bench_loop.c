@@ -4,7 +4,6 @@
  * (wakeup.h).
  */
 #include <stdio.h>
-#include <string.h>
 #include <incise/loop.h>
 #include <incise/plan.h>
 #include "bench.h"

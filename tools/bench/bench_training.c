@@ -15,7 +15,6 @@
 #include "bench.h"
 #include "../cli/child.h"
 #include "../cli/file.h"
-#include "../cli/json.h"
 #include "noise.h"
 
 #define EPOCHS 80

@@ -7,7 +7,6 @@
  *   F = Kn d n - Kx ((P - P0)·s) s        P0: where the tool went in, s: the blade's side
  */
 #include <stdio.h>
-#include <string.h>
 #include <incise/plan.h>
 #include "../../lib/base/vector.h"
 #include "../cli/file.h"

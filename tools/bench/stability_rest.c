@@ -17,7 +17,6 @@
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
-#include <incise/model.h>
 #include <incise/plan.h>
 #include "closed_loop.h"
 #include "../cli/child.h"

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 #include <incise/sim.h>
+#include "../../lib/base/ascending.h"
 #include "../cli/cli.h"
 #include "../cli/file.h"
 #include "calibrate.h"
@@ -170,13 +171,6 @@ struct mean {
 	long n, clipped;
 };
 
-static int by_mass(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
 void weights_parse(struct weights *weights, char *list)
 {
 	char *items[WEIGHTS_MAX];
@@ -186,7 +180,7 @@ void weights_parse(struct weights *weights, char *list)
 	for (int i = 0; i < n; i++)
 		weights->mass_g[weights->n++] =
 			cli_quantity("--weights", items[i], masses, 0, 1e6);
-	qsort(weights->mass_g, n, sizeof(*weights->mass_g), by_mass);
+	qsort(weights->mass_g, n, sizeof(*weights->mass_g), ascending);
 	/* The empty pan is a load without error. */
 	if (weights->mass_g[0] > 0) {
 		memmove(weights->mass_g + 1, weights->mass_g,

@@ -25,7 +25,6 @@
 #include <string.h>
 #include <termios.h>
 #include <unistd.h>
-#include <incise/clock.h>
 #include "../cli/cli.h"
 #include "../cli/stopwatch.h"
 #include "../cli/stream_report.h"

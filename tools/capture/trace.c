@@ -3,7 +3,6 @@
  * A trace in characters; see trace.h.
  */
 #include <math.h>
-#include <string.h>
 #include "trace.h"
 
 #define HEIGHT_MOST 16 /* characters */

@@ -356,14 +356,6 @@ static char *with_path(const char *hint, const char *path)
 	}
 }
 
-/* Only a name's end. */
-static const char *base_of(const char *path)
-{
-	const char *slash = strrchr(path, '/');
-
-	return slash ? slash + 1 : path;
-}
-
 static char *stem_of(const char *name)
 {
 	const char *dot = strrchr(name, '.');
@@ -391,13 +383,13 @@ static bool meant(const char *typed, const char *name)
 /* A file next to @path whose name is near, with its folder: free(3); NULL: there is none. */
 static char *near(const char *path, unsigned int expected)
 {
-	char *pattern = cli_text("%.*s*", (int)(base_of(path) - path), path);
+	char *pattern = cli_text("%.*s*", (int)(basename(path) - path), path);
 	char *found = NULL;
 	glob_t files;
 
 	if (!glob(pattern, 0, NULL, &files)) {
 		for (size_t i = 0; i < files.gl_pathc && !found; i++)
-			if (meant(base_of(path), base_of(files.gl_pathv[i])) &&
+			if (meant(basename(path), basename(files.gl_pathv[i])) &&
 			    file_kind_of(files.gl_pathv[i]) & expected)
 				found = cli_text("%s", files.gl_pathv[i]);
 		globfree(&files);

@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "cli.h"
-#include "json.h"
 #include "model_force.h"
 
 /* Depth and speed in the order of the model's inputs; false: it has others. */

@@ -4,6 +4,7 @@
  */
 #include <math.h>
 #include <stdlib.h>
+#include "../../lib/base/ascending.h"
 #include "stopwatch.h"
 
 double stopwatch_of(clockid_t clock)
@@ -19,16 +20,9 @@ double stopwatch_ns(void)
 	return stopwatch_of(CLOCK_MONOTONIC);
 }
 
-static int by_value(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
 void stopwatch_sort(double *times, int n)
 {
-	qsort(times, n, sizeof(*times), by_value);
+	qsort(times, n, sizeof(*times), ascending);
 }
 
 double stopwatch_own_ns(void)

@@ -5,8 +5,6 @@
 #ifndef INCISE_UNCERTAINTY_H
 #define INCISE_UNCERTAINTY_H
 
-#include <stddef.h>
-
 #define UNCERTAINTY_TEXT 64
 
 /*

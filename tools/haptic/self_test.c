@@ -4,16 +4,12 @@
  */
 #include <errno.h>
 #include <math.h>
+#include "../../lib/base/vector.h"
 #include "../cli/stroke.h"
 #include "haptic.h"
 
 #define STROKE_S 0.6
 #define ABOVE_NS 20000000 /* so long it is 4 mm above or more */
-
-static double size(const double v[3])
-{
-	return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
 
 /* A plan that is fed with the poses of a stroke. */
 struct trajectory {
@@ -41,7 +37,7 @@ static int run_tick(struct trajectory *trajectory, bool fed, struct self_test *t
 	if (rc)
 		return incise_error_set(err, -rc,
 					"self-test: a tick failed without devices");
-	trajectory->force_N = size(tick.command_N);
+	trajectory->force_N = v3_length(tick.command_N);
 	if (tick.flags & INCISE_TICK_NOT_FINITE || !isfinite(trajectory->force_N))
 		return incise_error_set(
 			err, EPROTO,

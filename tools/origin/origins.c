@@ -130,13 +130,6 @@ int origins_read(struct origins *origins, const char *path, struct incise_error 
 
 /* --- adding ----------------------------------------------------------------------------- */
 
-static const char *name_of(const char *path)
-{
-	const char *slash = strrchr(path, '/');
-
-	return slash ? slash + 1 : path;
-}
-
 /* Of a format that has no head, and of one that cannot be read, there is nothing to say. */
 static void add_recording(struct origins *origins, const char *path)
 {
@@ -187,7 +180,7 @@ static void add_file(struct origins *origins, const char *path, enum file_kind k
 		return;
 	origin = (struct incise_origin){.depth = 1};
 	strcpy(origin.kind, kind_of(kind));
-	snprintf(origin.name, sizeof(origin.name), "%s", name_of(path));
+	snprintf(origin.name, sizeof(origin.name), "%s", basename(path));
 	if (incise_file_sha256(path, origin.sha256, &err) ||
 	    origins_read(&below, path, &err))
 		cli_fail_with(&err);

@@ -3,7 +3,6 @@
  * The figure of a calibration: each coefficient of its history over the date, with U (k = 2), a
  * panel each; and its value before it was calibrated first. See figure.h.
  */
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -11,9 +11,9 @@
  */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include <incise/dataset.h>
 #include <incise/uncertainty.h>
+#include "../../lib/base/ascending.h"
 #include "../cli/cli.h"
 #include "../cli/model_plot.h"
 #include "../cli/plot.h"
@@ -108,13 +108,6 @@ static void write_residuals(const struct residuals *r, const char *folder,
 			fprintf(data, "%.6g %.6g\n", r->at[i], r->value[i]);
 	scatter_end(&scatter);
 	plot_data_end(data, folder);
-}
-
-static int ascending(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
 }
 
 /* Shares and quantiles; both ends are there, however many are left out between. */

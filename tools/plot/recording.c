@@ -252,37 +252,61 @@ static void widen(struct range *range, const struct line *line)
 	range->high = fmax(range->high, line->largest);
 }
 
-static void read_force(struct recorded *r)
+/* The lines of a stream, each of a column, less the coordinate of the surface's point if any. */
+struct shown {
+	int stream, panel, n, column;
+	const char *files[3];
+};
+
+static void read_lines(struct recorded *r, struct ArrowArrayStream *stream,
+		       const struct shown *shown, const double *zero,
+		       struct line *clipped)
 {
-	struct ArrowArrayStream stream = open_stream(r, "force");
 	const char *folder = r->figure->folder;
-	struct line force, clipped;
 	struct ArrowArray batch;
+	struct line lines[3];
 	int64_t last_seq = 0;
 	double last_s = 0;
 
-	line_open(&force, &r->span, folder, "force.dat");
-	line_open(&clipped, &r->span, folder, "clipped.dat");
-	for (; last_s <= r->span.to_s && next_batch(r, &stream, &batch);
+	for (int k = 0; k < shown->n; k++)
+		line_open(&lines[k], &r->span, folder, shown->files[k]);
+	for (; stream && last_s <= r->span.to_s && next_batch(r, stream, &batch);
 	     batch.release(&batch))
 		for (int64_t i = 0; i < batch.length; i++) {
 			double t_s = seconds(&r->span, whole_at(&batch, 1, i));
-			double value = real_at(&batch, 3, i);
+			bool lost = note_sample(r, shown->stream, whole_at(&batch, 0, i),
+						t_s, &last_seq, &last_s);
 
-			if (note_sample(r, FORCE, whole_at(&batch, 0, i), t_s, &last_seq,
-					&last_s))
-				line_gap(&force);
-			line_add(&force, t_s, value);
-			if (flag_at(&batch, 4, i)) {
-				line_add(&clipped, t_s, value);
+			for (int k = 0; k < shown->n; k++) {
+				double value = real_at(&batch, shown->column + k, i);
+
+				if (lost)
+					line_gap(&lines[k]);
+				line_add(&lines[k], t_s, zero ? value - zero[k] : value);
+			}
+			if (clipped && flag_at(&batch, 4, i)) {
+				line_add(clipped, t_s, real_at(&batch, shown->column, i));
 				r->clipped +=
 					t_s >= r->span.from_s && t_s <= r->span.to_s;
 			}
 		}
-	stream.release(&stream);
-	line_close(&force, folder);
-	line_close(&clipped, folder);
-	widen(&r->range[PANEL_FORCE], &force);
+	if (stream)
+		stream->release(stream);
+	for (int k = 0; k < shown->n; k++) {
+		line_close(&lines[k], folder);
+		widen(&r->range[shown->panel], &lines[k]);
+	}
+}
+
+static void read_force(struct recorded *r)
+{
+	static const struct shown force = {FORCE, PANEL_FORCE, 1, 3, {"force.dat"}};
+	struct ArrowArrayStream stream = open_stream(r, "force");
+	struct line clipped;
+
+	line_open(&clipped, &r->span, r->figure->folder, "clipped.dat");
+	read_lines(r, &stream, &force, NULL, &clipped);
+	line_close(&clipped, r->figure->folder);
 }
 
 /* A cut starts at the first depth and ends at the second one, as in incise-export(1). */
@@ -332,67 +356,24 @@ static void read_depth(struct recorded *r)
 
 static void read_tracker(struct recorded *r)
 {
-	static const char *const names[] = {"x.dat", "y.dat", "z.dat"};
+	static const struct shown position = {
+		TRACKER, PANEL_POSITION, 3, 3, {"x.dat", "y.dat", "z.dat"}};
 	struct ArrowArrayStream stream = open_stream(r, "tracker");
-	const char *folder = r->figure->folder;
-	struct ArrowArray batch;
-	struct line axis[3];
-	int64_t last_seq = 0;
-	double last_s = 0;
 
-	for (int k = 0; k < 3; k++)
-		line_open(&axis[k], &r->span, folder, names[k]);
-	for (; last_s <= r->span.to_s && next_batch(r, &stream, &batch);
-	     batch.release(&batch))
-		for (int64_t i = 0; i < batch.length; i++) {
-			double t_s = seconds(&r->span, whole_at(&batch, 1, i));
-			bool lost = note_sample(r, TRACKER, whole_at(&batch, 0, i), t_s,
-						&last_seq, &last_s);
-
-			for (int k = 0; k < 3; k++) {
-				if (lost)
-					line_gap(&axis[k]);
-				line_add(&axis[k], t_s,
-					 real_at(&batch, 3 + k, i) -
-						 r->info.surface_point_mm[k]);
-			}
-		}
-	stream.release(&stream);
-	for (int k = 0; k < 3; k++) {
-		line_close(&axis[k], folder);
-		widen(&r->range[PANEL_POSITION], &axis[k]);
-	}
+	read_lines(r, &stream, &position, r->info.surface_point_mm, NULL);
 }
 
 /* Recordings of form 1 have no frames, and no stream of them. */
 static void read_frames(struct recorded *r)
 {
-	const char *folder = r->figure->folder;
+	static const struct shown depth = {CAMERA, PANEL_DEPTH, 1, 7, {"camera.dat"}};
 	struct ArrowArrayStream stream;
 	struct incise_error err = {0};
-	struct ArrowArray batch;
-	struct line depth;
-	int64_t last_seq = 0;
-	double last_s = 0;
 	int rc = incise_recording_stream(r->recording, "frames", NULL, &stream, &err);
 
 	if (rc && rc != -ENOTSUP)
 		cli_fail_with(&err);
-	line_open(&depth, &r->span, folder, "camera.dat");
-	for (; !rc && last_s <= r->span.to_s && next_batch(r, &stream, &batch);
-	     batch.release(&batch))
-		for (int64_t i = 0; i < batch.length; i++) {
-			double t_s = seconds(&r->span, whole_at(&batch, 1, i));
-
-			if (note_sample(r, CAMERA, whole_at(&batch, 0, i), t_s, &last_seq,
-					&last_s))
-				line_gap(&depth);
-			line_add(&depth, t_s, real_at(&batch, 7, i));
-		}
-	if (!rc)
-		stream.release(&stream);
-	line_close(&depth, folder);
-	widen(&r->range[PANEL_DEPTH], &depth);
+	read_lines(r, rc ? NULL : &stream, &depth, NULL, NULL);
 }
 
 /* Losses are seen in the streams, cuts in the depth. */

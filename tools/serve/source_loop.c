@@ -2,10 +2,8 @@
 /*
  * A running loop as a source: the ticks of its status file. The loop's process does not notice.
  */
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <incise/state.h>
 #include "../cli/cli.h"
 #include "../status/pages.h"

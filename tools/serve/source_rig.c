@@ -4,7 +4,6 @@
  */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include <incise/rig.h>
 #include "../cli/cli.h"
 #include "serve.h"

@@ -10,6 +10,8 @@
 #include <incise/clock.h>
 #include <incise/incision.h>
 #include <incise/version.h>
+#include "../../lib/base/ascending.h"
+#include "../../lib/base/vector.h"
 #include "../cli/quaternion.h"
 #include "session.h"
 
@@ -36,32 +38,6 @@ struct session_digest {
 	bool at_wall;
 	double placed_mm; /* depth of the tube at session.insertion.placed_s */
 };
-
-/* --- vectors --------------------------------------------------------------------------- */
-
-static double dot(const double a[3], const double b[3])
-{
-	return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static double size(const double a[3])
-{
-	return sqrt(dot(a, a));
-}
-
-/* to = a + s b; to may be either. */
-static void add(double to[3], const double a[3], double s, const double b[3])
-{
-	for (int i = 0; i < 3; i++)
-		to[i] = a[i] + s * b[i];
-}
-
-/* to is neither a nor b. */
-static void cross(double to[3], const double a[3], const double b[3])
-{
-	for (int i = 0; i < 3; i++)
-		to[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
-}
 
 bool session_is_code(const char *text)
 {
@@ -253,9 +229,9 @@ static void see_handle(struct session_digest *digest, const struct incise_tick *
 	if (!digest->turning)
 		memcpy(digest->line, opening.along, sizeof(digest->line));
 	quaternion_turn(flat, tick->quaternion, digest->scalpel.side);
-	cross(across, tick->normal, digest->line);
-	along_part = dot(flat, digest->line);
-	across_part = dot(flat, across);
+	v3_cross(across, tick->normal, digest->line);
+	along_part = v3_dot(flat, digest->line);
+	across_part = v3_dot(flat, across);
 	if (across_part < 0) {
 		along_part = -along_part;
 		across_part = -across_part;
@@ -302,15 +278,15 @@ static void see_membrane(struct session_digest *digest, const struct incise_tick
 	double off[3], across[3], beyond_mm;
 	bool at_wall;
 
-	add(off, tick->tool_mm, -1, s->membrane.point_mm);
-	beyond_mm = -dot(off, s->membrane.normal);
+	v3_add(off, tick->tool_mm, -1, s->membrane.point_mm);
+	beyond_mm = -v3_dot(off, s->membrane.normal);
 	if (tick->phase == INCISE_PHASE_FREE || !(beyond_mm > 0)) {
 		digest->met = digest->at_wall = false;
 		return;
 	}
-	add(across, off, beyond_mm, s->membrane.normal);
+	v3_add(across, off, beyond_mm, s->membrane.normal);
 	if (!digest->met)
-		meet(digest, tick, t_s, size(across));
+		meet(digest, tick, t_s, v3_length(across));
 	digest->met = true;
 	s->target.punctured |= digest->hit && tick->flags & INCISE_TICK_LUMEN;
 	at_wall = tick->flags & INCISE_TICK_BACK_WALL;
@@ -414,7 +390,7 @@ void session_digest_tick(struct session_digest *digest, const struct incise_tick
 	digest->started = true;
 	digest->last_ns = tick->t_ns;
 	t_s = (double)(tick->t_ns - digest->first_ns) / INCISE_NS_PER_S;
-	force_N = size(tick->command_N);
+	force_N = v3_length(tick->command_N);
 	s->duration_s = t_s;
 	incise_incision_tick(digest->incision, tick);
 	s->cuts_full |= tick->flags & INCISE_TICK_FULL;
@@ -449,14 +425,14 @@ static double off_axis_mm(const struct incise_scene_membrane *membrane,
 {
 	double way[3], off[3], length2, share;
 
-	add(way, to_mm, -1, from_mm);
-	add(off, membrane->point_mm, -1, from_mm);
-	add(way, way, -dot(way, membrane->normal), membrane->normal);
-	add(off, off, -dot(off, membrane->normal), membrane->normal);
-	length2 = dot(way, way);
-	share = length2 > 0 ? fmax(0, fmin(dot(off, way) / length2, 1)) : 0;
-	add(off, off, -share, way);
-	return size(off);
+	v3_add(way, to_mm, -1, from_mm);
+	v3_add(off, membrane->point_mm, -1, from_mm);
+	v3_add(way, way, -v3_dot(way, membrane->normal), membrane->normal);
+	v3_add(off, off, -v3_dot(off, membrane->normal), membrane->normal);
+	length2 = v3_dot(way, way);
+	share = length2 > 0 ? fmax(0, fmin(v3_dot(off, way) / length2, 1)) : 0;
+	v3_add(off, off, -share, way);
+	return v3_length(off);
 }
 
 static double direction_deg(const double along[3])
@@ -466,13 +442,6 @@ static double direction_deg(const double along[3])
 	if (deg <= -90)
 		return deg + 180;
 	return deg > 90 ? deg - 180 : deg;
-}
-
-static int ascending(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
 }
 
 static void sum_up_cut(const struct session *s, const struct incise_cut *cut,
@@ -486,15 +455,14 @@ static void sum_up_cut(const struct session *s, const struct incise_cut *cut,
 				   .length_mm = cut->to_mm - cut->from_mm,
 				   .direction_deg = direction_deg(cut->along),
 				   .off_target_mm = NAN};
-	add(to->from_mm, cut->at_mm, cut->from_mm, cut->along);
-	add(to->to_mm, cut->at_mm, cut->to_mm, cut->along);
+	v3_add(to->from_mm, cut->at_mm, cut->from_mm, cut->along);
+	v3_add(to->to_mm, cut->at_mm, cut->to_mm, cut->along);
 	for (int i = first; i <= last; i++) {
 		depth_mm[n++] = cut->place[i].depth_mm;
 		to->depth_mm = fmax(to->depth_mm, cut->place[i].depth_mm);
 		to->open_mm = fmax(to->open_mm, cut->place[i].open_mm);
 	}
-	qsort(depth_mm, (size_t)n, sizeof(*depth_mm), ascending);
-	to->depth_median_mm = (depth_mm[n / 2] + depth_mm[(n - 1) / 2]) / 2;
+	to->depth_median_mm = median(depth_mm, n);
 	if (s->has_membrane)
 		to->off_target_mm = off_axis_mm(&s->membrane, to->from_mm, to->to_mm);
 }

@@ -6,7 +6,6 @@
 #include <math.h>
 #include <string.h>
 #include <time.h>
-#include <incise/clock.h>
 #include "../cli/cli.h"
 #include "../cli/json.h"
 #include "../cli/loop_report.h"

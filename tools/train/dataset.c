@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../../lib/base/ascending.h"
 #include "../cli/cli.h"
 #include "../cli/json.h"
 #include "dataset.h"
@@ -35,19 +36,6 @@ struct dataset {
 	uint64_t left_out;
 	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
 };
-
-static int ascending(const void *a, const void *b)
-{
-	double p = *(const double *)a, q = *(const double *)b;
-
-	return (p > q) - (p < q);
-}
-
-static double median(double *values, int n)
-{
-	qsort(values, n, sizeof(*values), ascending);
-	return (values[(n - 1) / 2] + values[n / 2]) / 2;
-}
 
 static void find_outliers(struct dataset *data)
 {

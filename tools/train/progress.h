@@ -7,7 +7,6 @@
 #ifndef TRAIN_PROGRESS_H
 #define TRAIN_PROGRESS_H
 
-#include <stdint.h>
 #include "sources.h"
 
 struct progress;

@@ -4,7 +4,6 @@
  * at any time, and nothing is done twice.
  */
 #include <errno.h>
-#include <stddef.h>
 #include "pulser.h"
 
 #define CATCH_UP 3	/* an interval may be 1/2^3 shorter than the profile's */

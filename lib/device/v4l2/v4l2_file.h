@@ -6,7 +6,6 @@
 #ifndef INCISE_V4L2_FILE_H
 #define INCISE_V4L2_FILE_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 /* Identity of a device; the text is printable. */

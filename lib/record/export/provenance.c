@@ -112,13 +112,6 @@ static int add_sources(struct incise_provenance *provenance,
 	return rc;
 }
 
-static const char *name_of(const char *path)
-{
-	const char *slash = strrchr(path, '/');
-
-	return slash ? slash + 1 : path;
-}
-
 /* Append an origin; nothing if it does not fit. */
 static size_t put_token(const struct incise_origin *origin, char *text, size_t size,
 			size_t at)
@@ -153,7 +146,7 @@ static size_t put_origin(struct incise_recording *recording, const char *name, c
 	memcpy(calibration.sha256, recording->recalibrated->entry.sha256,
 	       sizeof(calibration.sha256));
 	snprintf(calibration.name, sizeof(calibration.name), "%s",
-		 name_of(recording->recalibrated->entry.file));
+		 basename(recording->recalibrated->entry.file));
 	return put_token(&calibration, text, size, at);
 }
 
@@ -161,7 +154,7 @@ size_t incise_recording_origins(struct incise_recording *recording, char *text,
 				size_t size)
 {
 	const struct incise_session *session = recording->session;
-	const char *whole = name_of(recording->path);
+	const char *whole = basename(recording->path);
 	char name[512];
 	size_t at = 0;
 
@@ -191,7 +184,7 @@ static size_t put_given(const char *path, char *text, size_t size, size_t at)
 	while ((n = fread(bytes, 1, sizeof(bytes), in)) > 0)
 		incise_sha256_add(&sha, bytes, n);
 	fclose(in);
-	snprintf(origin.name, sizeof(origin.name), "%s", name_of(path));
+	snprintf(origin.name, sizeof(origin.name), "%s", basename(path));
 	return incise_sha256_end(&sha, origin.sha256)
 		       ? at
 		       : put_token(&origin, text, size, at);

@@ -11,7 +11,6 @@
 #ifndef INCISE_TABLE_WRITER_H
 #define INCISE_TABLE_WRITER_H
 
-#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>

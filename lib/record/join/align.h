@@ -12,7 +12,6 @@
 #ifndef INCISE_ALIGN_H
 #define INCISE_ALIGN_H
 
-#include <stddef.h>
 #include <stdint.h>
 #include <incise/error.h>
 #include <incise/session.h>

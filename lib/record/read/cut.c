@@ -8,7 +8,6 @@
 #include <time.h>
 #include <incise/clock.h>
 #include "cut.h"
-#include "depth.h"
 #include "recalibration.h"
 #include "session.h"
 #include "../schema.h"

@@ -11,7 +11,6 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <time.h>
-#include <unistd.h>
 #include <incise/infile.h>
 #include <incise/outfile.h>
 #include "../../base/vector.h"

@@ -6,7 +6,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include "../read/depth.h"
 #include "../read/session.h"
 #include "replay_source.h"
 #include "../schema.h"

@@ -5,8 +5,8 @@
 #include <errno.h>
 #include <math.h>
 #include <stdbool.h>
-#include <stdlib.h>
 #include <string.h>
+#include "../../base/ascending.h"
 #include "fit.h"
 
 #define WINDOW INCISE_FIT_WINDOW
@@ -41,18 +41,11 @@ struct fit {
 	double noise;	/* median lateness above the level */
 };
 
-static int compare(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
 static double quantile(double *values, size_t n, double share)
 {
 	if (!n)
 		return 0;
-	qsort(values, n, sizeof(*values), compare);
+	qsort(values, n, sizeof(*values), ascending);
 	return values[(size_t)(share * (double)(n - 1))];
 }
 

@@ -8,7 +8,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include "../../base/c_locale.h"
 #include "../read/session.h"
 #include "seal_walk.h"

@@ -4,7 +4,6 @@
  * the line in table knots, is not to be trusted; see lib/record/time/fit.h.
  */
 #include <math.h>
-#include <stdio.h>
 #include "verify.h"
 
 /* Whether two rows are reported as one: of one kind, in a row but for some in between. */

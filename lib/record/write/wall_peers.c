@@ -7,7 +7,6 @@
  *                                    ╱ ── ── ── now    offset has the noise of its timestamps
  */
 #include <arpa/inet.h>
-#include <errno.h>
 #include <math.h>
 #include <poll.h>
 #include <stdio.h>

@@ -6,7 +6,7 @@
 #include "../unit.h"
 #include "../../../lib/control/predict.h"
 #include "../../../lib/fixed/predict.h"
-#include "../../../lib/fixed/trial.h"
+#include "../../../driver/kunit/trial.h"
 #include "../../../lib/fixed/vector.h"
 
 #define ONE 65536.0

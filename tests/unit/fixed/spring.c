@@ -2,7 +2,7 @@
 /* The spring in integers, by hand; tests/extremes/motion.c tries any numbers. */
 #include "../unit.h"
 #include "../../../lib/fixed/layout.h"
-#include "../../../lib/fixed/trial.h"
+#include "../../../driver/kunit/trial.h"
 
 #define MM (1 << 16)
 #define N_MM (1 << 16)

@@ -12,7 +12,7 @@
 
 #include "../../../lib/fixed/layout.h"
 #include "../../../lib/fixed/plan.h"
-#include "../../../lib/fixed/trial.h"
+#include "../../../driver/kunit/trial.h"
 #include "../../../lib/fixed/vector.h"
 
 /* The longest plan: the header, a model of 17 × 17 knots, a grid of 33 × 33. */

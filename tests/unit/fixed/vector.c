@@ -4,7 +4,7 @@
  * of all sizes and at the ends of their ranges.
  */
 #include "../unit.h"
-#include "../../../lib/fixed/trial.h"
+#include "../../../driver/kunit/trial.h"
 #include "../../../lib/fixed/vector.h"
 
 #define CASES 200000

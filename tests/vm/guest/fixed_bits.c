@@ -4,7 +4,7 @@
  *
  *   fixed_bits MODEL.fis N DIR    compiles the model for each arithmetic into DIR and prints
  *                                 the parameters of incise_kunit.ko: the file, N random
- *                                 inputs, see lib/fixed/trial.h, and the CRC-32C of results
+ *                                 inputs, see driver/kunit/trial.h, and the CRC-32C of results
  */
 #include <stdbool.h>
 #include <stdio.h>
@@ -15,7 +15,7 @@
 #include <incise/model.h>
 
 #include "../../../lib/fixed/layout.h"
-#include "../../../lib/fixed/trial.h"
+#include "../../../driver/kunit/trial.h"
 
 /* As driver/kunit/fixed.c: output, force and stretch of each input. */
 static uint32_t digest(const struct incise_fixed *fx, uint32_t n, uint64_t state)

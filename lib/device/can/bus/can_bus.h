@@ -12,7 +12,6 @@
 #ifndef INCISE_CAN_BUS_H
 #define INCISE_CAN_BUS_H
 
-#include <stdbool.h>
 #include <stdint.h>
 #include <linux/can.h>
 #include <incise/error.h>

@@ -11,7 +11,7 @@
 
 #include <incise/fixed.h>
 
-#include "spring.h"
+#include "../../lib/fixed/spring.h"
 
 /* CRC-32C of 10 000 results of seed 1 without an evaluator: 0, force, stretch; 5 int32. */
 #define INCISE_FX_TRIAL_SPRINGS 0x35716354u
