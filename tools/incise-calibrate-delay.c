@@ -33,6 +33,7 @@ static const char *const stream_names[] = {"force", "tracker", "camera", NULL};
 struct options {
 	struct calibrate_options common;
 	double time_s, max_delay_ms; /* time_s 0: not given */
+	double u_reference_ms;	     /* NAN: not given */
 	int reference;
 	bool camera;
 };
@@ -46,6 +47,10 @@ static const struct cli_option option_table[] = {
 	 "stream whose delay is taken as known: force (default),\n"
 	 "tracker or camera",
 	 CLI_CHOICE(struct options, reference, stream_names)},
+	{0, "u-reference", "MS",
+	 "standard uncertainty of that stream's own delay, which is not\n"
+	 "measured: the others' is relative to it",
+	 CLI_NUMBER(struct options, u_reference_ms, 0, 1000)},
 	{0, "max-delay", "MS", "largest delay to look for, in ms (default: 150)",
 	 CLI_NUMBER(struct options, max_delay_ms, 10, 1000)},
 	{0, "with-camera", NULL, "on the simulated rig, record its camera too",
@@ -413,6 +418,21 @@ static void fill_verdict(const struct pair *pairs,
 		 INCISE_DELAY_CORRELATION_MIN, DRIFT_MAX_MS, DRIFT_SIGMAS);
 }
 
+static void state_reference(const struct options *options,
+			    struct incise_calibration_record *record)
+{
+	const char *name = stream_names[options->reference];
+	char key[32], question[120];
+
+	snprintf(key, sizeof(key), "%s_delay_sd_ms", name);
+	snprintf(question, sizeof(question),
+		 "Standard uncertainty of the own delay of the %s (a converter that "
+		 "timestamps: 0.01)",
+		 name);
+	calibrate_stated(&options->common, record, options->u_reference_ms, key, "ms",
+			 question);
+}
+
 static void fill_record(const struct options *options, const struct stream *streams,
 			const struct pair *pairs,
 			struct incise_calibration_record *record)
@@ -455,6 +475,7 @@ static void fill_record(const struct options *options, const struct stream *stre
 				uncertainty_text(delay + late.ms, 2 * u, "ms", text),
 				delay, late.ms, u, late.fits_u, late.lines_u);
 	}
+	state_reference(options, record);
 	if (out)
 		calibrate_result_text(&options->common, record, out);
 	whole_file_end(file);
@@ -468,7 +489,11 @@ int main(int argc, char **argv)
 		.kind = "delay", .low = NAN, .high = NAN, .pass = true};
 	struct stream streams[STREAMS];
 	struct pair pairs[STREAMS] = {0};
-	struct options options = {.max_delay_ms = 150, .reference = FORCE};
+	struct options options = {
+		.max_delay_ms = 150,
+		.reference = FORCE,
+		.u_reference_ms = NAN,
+	};
 	const char *raw;
 
 	parse(&options, argc, argv);

@@ -29,7 +29,8 @@
 
 struct options {
 	struct calibrate_options common;
-	double time_s; /* 0: not given */
+	double time_s;	     /* 0: not given */
+	double u_surface_mm; /* NAN: not given */
 };
 
 static const struct cli_option option_table[] = {
@@ -39,6 +40,10 @@ static const struct cli_option option_table[] = {
 	 "longest recording (default: 20s); ends earlier when the tip is\n"
 	 "known well enough",
 	 CLI_DURATION(struct options, time_s, 1, 600)},
+	{0, "u-surface", "MM",
+	 "standard uncertainty of the tissue surface of rig.conf along its\n"
+	 "normal, which is not measured: for the uncertainty of depths",
+	 CLI_NUMBER(struct options, u_surface_mm, 0, 1000)},
 	{0, "from", "FILE",
 	 "take the poses from a CSV file or a recording instead of "
 	 "a rig",
@@ -490,7 +495,7 @@ int main(int argc, char **argv)
 {
 	struct incise_calibration_record record = {
 		.kind = "tip", .low = NAN, .high = NAN, .pass = true};
-	struct options options = {0};
+	struct options options = {.u_surface_mm = NAN};
 	struct calibrate_options *common = &options.common;
 	struct incise_tip_fit fit;
 	struct incise_error err = {0};
@@ -514,6 +519,9 @@ int main(int argc, char **argv)
 		cli_warn("%d samples were left out that the tracker marks as doubtful",
 			 list.doubtful);
 	fill_record(&common->found, &fit, &record);
+	calibrate_stated(common, &record, options.u_surface_mm, "surface_u_mm", "mm",
+			 "Standard uncertainty of the tissue surface of rig.conf along "
+			 "its normal");
 	/* a recording is a folder, and has its own checksums */
 	if (raw && incise_calibration_raw(&record, raw, &err))
 		snprintf(record.raw, sizeof(record.raw), "%s", raw);

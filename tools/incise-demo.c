@@ -288,7 +288,7 @@ static void walk(struct demo *demo, const char *loop_time)
 	char *by_cut = demo_path(demo, "pairs-by-cut.csv"),
 	     *new_csv = demo_path(demo, "new-cut.csv");
 	char *paper = demo_path(demo, "paper.fis"), *model = demo_path(demo, "liver.fis");
-	char *initial = demo_path(demo, "liver-initial.fis"),
+	char *initial = demo_path(demo, "paper-initial.fis"),
 	     *scene = demo_path(demo, "liver.scene");
 	char *history = demo_path(demo, "paper-epochs.csv"),
 	     *log = demo_path(demo, "haptic.csv");
@@ -323,11 +323,10 @@ static void walk(struct demo *demo, const char *loop_time)
 	json_object_set_new(demo->summary, "train_random_halves",
 			    RUN(demo, "train", pairs, "-o", paper, "--classic", "--check",
 				"0.5", "--seed", seed_text, "--history", history,
-				"--json"));
+				"--initial", initial, "--json"));
 	json_object_set_new(demo->summary, "train_unseen_cuts",
 			    RUN(demo, "train", by_cut, "-o", model, "--group", "cut",
-				"--check", "0.3", "--seed", seed_text, "--initial",
-				initial, "--json"));
+				"--check", "0.3", "--seed", seed_text, "--json"));
 	print_step(demo, "Cut another liver once, 5 mm deep, to compare with");
 	json_object_set_new(demo->summary, "capture_new_cut",
 			    RUN(demo, "capture", "-o", new_rec, "--rig", new_sim, "-c",

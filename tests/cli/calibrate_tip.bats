@@ -107,3 +107,16 @@ within() {
 	[ "$(key r.json details.inliers)" -le $((n - n / 10)) ]
 	[ "$(key r.json 'details.outliers[0]')" = 4 ]
 }
+
+# bats test_tags=check
+@test "uncertainties that are not measured are taken as options, and asked for on a terminal" {
+	incise calibrate tip --rig sim:clock=simulated,motion=1 --duration 20s --u-surface 0.1 </dev/null
+	incise calibrate delay --rig sim:clock=simulated,motion=2 --duration 15s --u-reference 0.01 </dev/null
+	grep -q '^surface_u_mm = 0.1;' calibration.conf
+	grep -q '^force_delay_sd_ms = 0.01;' calibration.conf
+	# after both, depth and time have theirs; nothing leads back to a calibration that is there
+	run -0 --separate-stderr incise capture -o a.rec --rig sim:clock=simulated --duration 25s
+	[[ "$output" != *warning* ]] || complain "$output"
+	run -0 --separate-stderr incise export a.rec --uncertainty total --rate 100 -o a.csv
+	[[ "$stderr" != *depth* && "$stderr" != *delay* ]] || complain "$stderr"
+}

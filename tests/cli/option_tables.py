@@ -151,6 +151,8 @@ VALUES = """
 --tolerance | 0.1 5 | -1 x {}
 --tool | auto blade handle tube | spoon blad {}
 --trigger | button 0.2N 500mN sync sync:/dev/x | 0N knob -1N {}
+--u-reference | 0 0.01 1000 | -1 1001 long {}
+--u-surface | 0 0.1 1000 | -1 1001 far {}
 --uncertainty export | none total parts | part {}
 --uncertainty train | none parts | part {}
 --velocity-max | 0.1 1e6 | 0 -1 fast {}

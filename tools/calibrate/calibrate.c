@@ -80,6 +80,31 @@ void calibrate_value(struct incise_calibration_record *record, const char *key,
 	snprintf(value->unit, sizeof(value->unit), "%s", unit);
 }
 
+void calibrate_stated(const struct calibrate_options *options,
+		      struct incise_calibration_record *record, double given,
+		      const char *key, const char *unit, const char *question)
+{
+	double found = incise_calibration_get(&options->found, key);
+	char line[100], *end;
+
+	if (isnan(given) && isnan(found) && !options->json && isatty(STDIN_FILENO) &&
+	    isatty(STDERR_FILENO)) {
+		fprintf(stderr, "%s, in %s [not stated] ", question, unit);
+		if (fgets(line, sizeof(line), stdin) && *line != '\n') {
+			given = strtod(line, &end);
+			if (end == line || *end != '\n' || !(given >= 0 && given <= 1000))
+				cli_fail("expected a number of %s from 0 to 1000; the "
+					 "previous calibration stays active",
+					 unit);
+		}
+	}
+	if (isnan(given))
+		return;
+	for (int i = 0; i <= record->n && record->n_covariance; i++)
+		record->covariance[record->n_covariance++] = 0;
+	calibrate_value(record, key, unit, found, given, 0);
+}
+
 static FILE *begin_file(const char *folder, const char *name,
 			struct incise_outfile **file)
 {

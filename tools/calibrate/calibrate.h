@@ -40,6 +40,14 @@ void calibrate_begin(struct calibrate_options *options);
 void calibrate_value(struct incise_calibration_record *record, const char *key,
 		     const char *unit, double found, double left, double u);
 
+/*
+ * Add a standard uncertainty that is not measured here, but known to who calibrates: @given, or, if
+ * that is NAN and the file does not state it, the answer on a terminal, where an empty line leaves it out.
+ */
+void calibrate_stated(const struct calibrate_options *options,
+		      struct incise_calibration_record *record, double given,
+		      const char *key, const char *unit, const char *question);
+
 /* DIR/report.txt, for whole_file_end(); both NULL without a DIR. Each file appears whole. */
 FILE *calibrate_report_text(const char *folder, struct incise_outfile **file);
 

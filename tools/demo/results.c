@@ -289,16 +289,18 @@ static void figure_force(const struct demo *demo)
 
 /* ---- Figure 3: membership functions and the force surface ---- */
 
-static void figure_membership(const struct demo *demo, const struct incise_model *model)
+/* Of the training of the paper, which moves them; the default one keeps them. */
+static void figure_membership(const struct demo *demo)
 {
-	struct incise_model *before = demo_model(demo, "liver-initial.fis");
+	struct incise_model *before = demo_model(demo, "paper-initial.fis");
+	struct incise_model *model = demo_model(demo, "paper.fis");
 	FILE *script;
 
 	model_plot_write_functions(before, demo->folder, "membership-before.dat");
 	model_plot_write_functions(model, demo->folder, "membership-after.dat");
 	script = plot_begin(demo->folder, "fig3a-membership", 1000, 680);
-	fputs("set multiplot layout 2,2 title 'Membership functions of depth and velocity "
-	      "(compare figure 3a of Song et al., 2006)'\nset key outside right center\n",
+	fputs("set multiplot layout 2,2 title 'Membership functions of depth and velocity, "
+	      "train --classic (compare figure 3a of Song et al., 2006)'\nset key outside right center\n",
 	      script);
 	for (int i = 0; i < 2; i++)
 		model_plot_functions(script, before, i, "membership-before.dat",
@@ -309,6 +311,7 @@ static void figure_membership(const struct demo *demo, const struct incise_model
 	fputs("unset multiplot\n", script);
 	draw(demo, script, "fig3a-membership");
 	incise_model_free(before);
+	incise_model_free(model);
 }
 
 static void figure_surface(const struct demo *demo, const struct incise_model *model)
@@ -566,7 +569,7 @@ void demo_figures(struct demo *demo, const struct incise_model *model)
 
 	write_pairs(demo);
 	figure_force(demo);
-	figure_membership(demo, model);
+	figure_membership(demo);
 	figure_surface(demo, model);
 	figure_prediction(demo);
 	figure_lateness(demo, json_object_get(demo->summary, "haptic"));
