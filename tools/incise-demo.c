@@ -279,6 +279,40 @@ static void write_scene(const struct demo *demo)
 	free(path);
 }
 
+/*
+ * The check of one split says little: of the paper's, and of others of the same pairs. A list of mean
+ * square errors, N².
+ */
+static json_t *other_splits(struct demo *demo, char *pairs, const json_t *first)
+{
+	char *model = demo_path(demo, "split.fis"), *beside = cli_text("%s.sd", model);
+	json_t *errors = json_array();
+	const bool quiet = demo->quiet;
+
+	for (int i = 0; i < DEMO_SPLITS && !cli_stop; i++) {
+		char *seed = cli_text("%ld", demo->seed + i);
+		json_t *report = NULL;
+
+		demo->quiet = true;
+		if (i)
+			report = RUN(demo, "train", pairs, "-o", model, "--overwrite",
+				     "--classic", "--check", "0.5", "--seed", seed,
+				     "--json");
+		json_array_append(
+			errors,
+			json_object_get(json_object_get(i ? report : first, "check"),
+					"mse_N2"));
+		json_decref(report);
+		free(seed);
+	}
+	demo->quiet = quiet;
+	unlink(model);
+	unlink(beside);
+	free(model);
+	free(beside);
+	return errors;
+}
+
 /* Run the commands of paper 1; their reports go into the summary. */
 static void walk(struct demo *demo, const char *loop_time)
 {
@@ -324,6 +358,10 @@ static void walk(struct demo *demo, const char *loop_time)
 			    RUN(demo, "train", pairs, "-o", paper, "--classic", "--check",
 				"0.5", "--seed", seed_text, "--history", history,
 				"--initial", initial, "--json"));
+	json_object_set_new(
+		demo->summary, "check_mse_N2_of_splits",
+		other_splits(demo, pairs,
+			     json_object_get(demo->summary, "train_random_halves")));
 	json_object_set_new(demo->summary, "train_unseen_cuts",
 			    RUN(demo, "train", by_cut, "-o", model, "--group", "cut",
 				"--check", "0.3", "--seed", seed_text, "--json"));

@@ -10,6 +10,8 @@
 #include <jansson.h>
 #include <incise/model.h>
 
+#define DEMO_SPLITS 12 /* of the paper's protocol */
+
 struct demo {
 	const char *folder; /* all is left in it */
 	long seed;	    /* of the virtual rig */

@@ -13,6 +13,7 @@
 #include <incise/sim.h>
 #include <incise/version.h>
 #include <incise/vision.h>
+#include "../../lib/base/ascending.h"
 #include "../cli/cli.h"
 #include "../cli/file.h"
 #include "../cli/json.h"
@@ -603,7 +604,13 @@ void demo_summary_print(const struct demo *demo, FILE *out, double seconds)
 	char *late999 = quantile_us(haptic, "lateness_us", "p999", 1);
 	char *tick50 = quantile_us(haptic, "tick_ns", "median", 1e-3);
 	char *tick999 = quantile_us(haptic, "tick_ns", "p999", 1e-3);
+	double splits[DEMO_SPLITS];
 
+	for (int i = 0; i < DEMO_SPLITS; i++)
+		splits[i] = json_number_value(json_array_get(
+			json_object_get(demo->summary, "check_mse_N2_of_splits"),
+			(size_t)i));
+	qsort(splits, DEMO_SPLITS, sizeof(*splits), ascending);
 	fprintf(out,
 		"incise demo, version %s, simulated rig with seed %ld\n"
 		"\n"
@@ -618,6 +625,7 @@ void demo_summary_print(const struct demo *demo, FILE *out, double seconds)
 		"the figures, not the values.\n"
 		"                         training      check\n"
 		"  MSE here / N^2     %12.5f %10.5f\n"
+		"  of %d splits                    %10.5f median, %.5f to %.5f\n"
 		"  MSE in the paper   %12.5f %10.5f   (its unit is not stated)\n"
 		"\n"
 		"On held-out cuts, settings by cross-validation, RMSE / N:\n"
@@ -643,7 +651,9 @@ void demo_summary_print(const struct demo *demo, FILE *out, double seconds)
 			number_of(capture, "tracker_lost", NULL),
 		number_of(capture, "force_clipped", NULL),
 		number_of(halves, "pairs", NULL), number_of(halves, "train", "mse_N2"),
-		number_of(halves, "check", "mse_N2"), PAPER_MSE_TRAIN, PAPER_MSE_CHECK,
+		number_of(halves, "check", "mse_N2"), DEMO_SPLITS,
+		(splits[DEMO_SPLITS / 2 - 1] + splits[DEMO_SPLITS / 2]) / 2, splits[0],
+		splits[DEMO_SPLITS - 1], PAPER_MSE_TRAIN, PAPER_MSE_CHECK,
 		number_of(unseen, "train", "rms_error_N"),
 		number_of(unseen, "check", "rms_error_N"),
 		number_of(lines, "mean", "rms_error_N"),
