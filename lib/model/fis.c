@@ -31,8 +31,8 @@ static const char *const system_keys[] = {
 	"Name",	     "Type",	     "NumInputs", "NumRules",  "NumOutputs",
 	"AndMethod", "DefuzzMethod", /* the others do not change the output of a Sugeno model */
 	"Version",   "OrMethod",     "ImpMethod", "AggMethod", NULL};
-enum variable_key { VARIABLE_NAME, RANGE, NUM_MFS };
-static const char *const variable_keys[] = {"Name", "Range", "NumMFs", NULL};
+enum variable_key { VARIABLE_NAME, RANGE, NUM_MFS, ENABLED };
+static const char *const variable_keys[] = {"Name", "Range", "NumMFs", "Enabled", NULL};
 
 struct reader {
 	struct incise_lines lines;
@@ -112,8 +112,12 @@ static int read_name(struct reader *in, const char *text, char *name)
 	return rc;
 }
 
-/* [a b c]: just n finite numbers, then the end of the line; one may lack its brackets. */
-static int read_numbers(struct reader *in, const char *text, double *values, int n)
+/*
+ * [a b c]: just n finite numbers, then the end of the line; one may lack its brackets. @padded: zeros may
+ * follow, with which MATLAB once filled the numbers of each function up to four.
+ */
+static int read_numbers(struct reader *in, const char *text, double *values, int n,
+			bool padded)
 {
 	bool bare = n == 1 && *text != '[';
 
@@ -132,6 +136,8 @@ static int read_numbers(struct reader *in, const char *text, double *values, int
 			return fail(in, EINVAL, "number %d is not finite", i + 1);
 		text = end + strspn(end, " \t,;");
 	}
+	while (padded && !bare && *text == '0' && strspn(text + 1, " \t,;]"))
+		text += 1 + strspn(text + 1, " \t,;");
 	if (strcmp(text, bare ? "" : "]"))
 		return fail(in, EINVAL, "expected ']' after %d numbers, found '%.20s'", n,
 			    text);
@@ -257,8 +263,12 @@ static int variable_key(struct reader *in, struct incise_variable *v, const char
 		return read_name(in, value, v->name);
 	if (rc == NUM_MFS)
 		return read_whole(in, key, value, n_min, n_max, n);
+	if (rc == ENABLED && strcmp(value, "1") != 0) /* fuzzylite's */
+		return fail(in, EINVAL, "Enabled=%.20s: only 1 is supported", value);
+	if (rc == ENABLED)
+		return 0;
 	if (rc == RANGE)
-		rc = read_numbers(in, value, range, 2);
+		rc = read_numbers(in, value, range, 2, false);
 	if (rc)
 		return rc;
 	v->min = range[0];
@@ -308,7 +318,7 @@ static int input_key(struct reader *in, int i, const char *key, const char *valu
 	mf = &model->mf[i][k];
 	mf->type = type;
 	strcpy(mf->name, name);
-	rc = read_numbers(in, value, mf->p, incise_mf_n_params(type));
+	rc = read_numbers(in, value, mf->p, incise_mf_n_params(type), true);
 	take_widths(mf);
 	fault = rc ? NULL : incise_mf_fault(type, mf->p);
 	if (fault)
@@ -340,7 +350,8 @@ static int output_key(struct reader *in, const char *key, const char *value)
 			    "consequent '%s' is not supported; linear and constant are",
 			    kind);
 	/* The file has the constant last. */
-	rc = read_numbers(in, value, p, out->constant ? 1 : model->info.n_inputs + 1);
+	rc = read_numbers(in, value, p, out->constant ? 1 : model->info.n_inputs + 1,
+			  out->constant);
 	if (rc)
 		return rc;
 	out->seen = true;

@@ -401,6 +401,11 @@ TEST(test_spellings_mean_the_same)
 		{"[2.5 2 10]", "[-2.5 2 10]"},
 		{"Range=[0 30]", "Range=[2 2]"},
 		{"'constant',[3]", "'constant',3"},
+		/* MATLAB once filled up to four numbers; fuzzylite says what is on */
+		{"[2.5 2 10]", "[2.5 2 10 0]"},
+		{"[2.5 0]", "[2.5 0 0 0]"},
+		{"'constant',[3]", "'constant',[3 0 0 0]"},
+		{"Name='depth'", "Enabled=1\nName='depth'"},
 	};
 	double want = eval_changed("[System]", "[System]");
 
