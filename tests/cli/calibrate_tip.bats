@@ -119,4 +119,42 @@ within() {
 	[[ "$output" != *warning* ]] || complain "$output"
 	run -0 --separate-stderr incise export a.rec --uncertainty total --rate 100 -o a.csv
 	[[ "$stderr" != *depth* && "$stderr" != *delay* ]] || complain "$stderr"
+	# typed, left out, ended by Ctrl-C, which writes nothing
+	incise calibrate tip --rig sim:clock=simulated,motion=1 --duration 20s --keep p.csv -c x.conf </dev/null
+	for answer in '0.2\n' '\n' '\x03' 'far\n'; do
+		rm -f x.conf
+		status=0
+		/usr/bin/python3 - "$answer" incise calibrate tip --from p.csv -c x.conf >out <<-'END' || status=$?
+			import os, pty, select, signal, sys
+			answer = sys.argv[1].encode().decode("unicode_escape").encode()
+			pid, fd = pty.fork()
+			if not pid:
+			    signal.signal(signal.SIGINT, signal.SIG_DFL)  # what runs in the background ignores it
+			    os.execvp(sys.argv[2], sys.argv[2:])
+			text, asked = b"", False
+			while True:
+			    # a Ctrl-C that comes before it waits for the answer is pressed again, as a person would
+			    if not select.select([fd], [], [], 1)[0]:
+			        if asked and answer == b"\x03":
+			            os.write(fd, answer)
+			        continue
+			    try:
+			        got = os.read(fd, 4096)
+			    except OSError:
+			        break
+			    if not got:
+			        break
+			    text += got
+			    if not asked and b"[not stated]" in text:
+			        asked = True
+			        os.write(fd, answer)
+			sys.stdout.buffer.write(text)
+			sys.exit(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) or not asked)
+		END
+		case $answer in
+		0.2*) [ $status = 0 ] && grep -q '^surface_u_mm = 0.2;' x.conf ;;
+		'\n') [ $status = 0 ] && grep -q '^tip_mm' x.conf && ! grep -q surface_u_mm x.conf ;;
+		*) [ $status != 0 ] && [ ! -e x.conf ] ;;
+		esac || complain "$answer: exit $status: $(cat out)"
+	done
 }

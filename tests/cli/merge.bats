@@ -223,6 +223,8 @@ train_killed_at() {
 		kill -CONT $!
 		! wait $! || complain "trained"
 		grep -q "l1.csv: has changed while it was read" err
+	else
+		skip "the training ended before it was stopped; unit/learn/corpus changes rows between readings"
 	fi
 	[ ! -e m.fis.progress ]
 }

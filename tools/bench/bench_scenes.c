@@ -113,7 +113,7 @@ static json_t *open_files(pid_t pid)
 }
 
 /* Look at a process while it is there; its libraries and files are gone before it. */
-static void look(struct loop_process *process)
+static void look_at_process(struct loop_process *process)
 {
 	json_t *libraries = mapped_libraries(process->pid);
 	json_t *files = open_files(process->pid);
@@ -186,7 +186,7 @@ static void loop_processes_watch(struct loop_process *const *processes, int n)
 
 			if (!process->pid)
 				continue;
-			look(process);
+			look_at_process(process);
 			if (child_ended(process->pid, &status))
 				ended(process, status);
 			else

@@ -90,8 +90,12 @@ void calibrate_stated(const struct calibrate_options *options,
 	if (isnan(given) && isnan(found) && !options->json && isatty(STDIN_FILENO) &&
 	    isatty(STDERR_FILENO)) {
 		fprintf(stderr, "%s, in %s [not stated] ", question, unit);
-		if (fgets(line, sizeof(line), stdin) && *line != '\n') {
-			given = strtod(line, &end);
+		*line = '\n';
+		/* The end of the input leaves it out, too. */
+		if (!fgets(line, sizeof(line), stdin) && cli_stop)
+			cli_fail("stopped; the previous calibration stays active");
+		if (*line != '\n') {
+			given = incise_decimal(line, &end);
 			if (end == line || *end != '\n' || !(given >= 0 && given <= 1000))
 				cli_fail("expected a number of %s from 0 to 1000; the "
 					 "previous calibration stays active",

@@ -117,7 +117,7 @@ static void take(struct lsl_force *f, double value, double stamp_s, int64_t now_
 		daq_feed_lose(&f->feed, 1);
 }
 
-/* What is wrong with most samples, which no loss would say; NULL: nothing. */
+/* The fault of most samples, which a count of losses does not show; NULL: none. */
 static const char *doubt(struct lsl_force *f, char text[200])
 {
 	if (f->timeless >= DOUBTS && !f->taken)

@@ -325,6 +325,7 @@ bool incise_recording_is_written(const char *folder)
 
 static char *find_name(const char *folder)
 {
+	static const char *const ends[] = {".part", ".rec"};
 	const char *slash = strrchr(folder, '/');
 	const char *last = slash && slash[1] ? slash + 1 : folder;
 	bool dots = !strcmp(last, ".") || !strcmp(last, "..");
@@ -334,7 +335,6 @@ static char *find_name(const char *folder)
 	name = strdup(last);
 	free(real);
 	for (int i = 0; i < 2 && name; i++) {
-		static const char *const ends[] = {".part", ".rec"};
 		size_t n = strlen(name), end = strlen(ends[i]);
 
 		if (n > end && !strcmp(name + n - end, ends[i]))

@@ -163,7 +163,7 @@ static void make_table(struct table *table, int number)
 						      .user = table};
 }
 
-/* Which different row it is, and its group. */
+/* Number of the different row, and its group. */
 static int number_of(const double *row)
 {
 	return (int)lround(row[1]);

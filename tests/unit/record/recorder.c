@@ -684,7 +684,7 @@ static int poses_for_a_while(struct incise_tracker_sample *samples, int n)
 	return kept;
 }
 
-/* What no later sample shows: a device that begins late, or is silent before the end. */
+/* Losses without a later sample: a device begins late, or is silent before the end. */
 TEST(silence_at_the_ends_is_lost, IN_FOLDER)
 {
 	uint64_t random = 20261128;
