@@ -242,7 +242,7 @@ static void check_device(struct doctor *doctor, const char *rig, const char *nam
 	incise_rig_close(open);
 }
 
-static int keep_stepper(void *context, const struct incise_rig_key *key)
+static int keep_stepper(void *context, const struct incise_key *key)
 {
 	struct doctor *doctor = context;
 	size_t used = strlen(doctor->steppers);

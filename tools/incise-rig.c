@@ -17,7 +17,7 @@ struct options {
 
 /* The keys of a rig, in the order of rig.conf(5). */
 struct keys {
-	struct incise_rig_key *key;
+	struct incise_key *key;
 	size_t n;
 };
 
@@ -39,61 +39,7 @@ static const struct cli_command command = {
 		"Exit codes: 0 success, 1 there is no rig.conf or it is wrong, 2 bad usage.",
 };
 
-/* Units of keys, by the ends of their names: the longest one counts. */
-static const struct {
-	const char *end, *unit;
-} units[] = {
-	{"_mm", "mm"},
-	{"_N", "N"},
-	{"_N_mm", "N/mm"},
-	{"_N_mm2", "N/mm²"},
-	{"_N_s_mm", "N s/mm"},
-	{"_mm_s", "mm/s"},
-	{"_mm_s2", "mm/s²"},
-	{"_mm_s3", "mm/s³"},
-	{"_s", "s"},
-	{"_ms", "ms"},
-	{"_us", "µs"},
-	{"_hz", "Hz"},
-	{"_V", "V"},
-	{"_mV", "mV"},
-	{"_mV_N", "mV/N"},
-	{"_K", "K"},
-	{"_kg", "kg"},
-	{"_deg", "°"},
-	{"_ppm", "ppm"},
-	{"_px", "px"},
-	{"_mm_px", "mm/px"},
-	{"_1_s", "1/s"},
-	{"_permille", "‰"},
-	{"_permille_mm", "‰/mm"},
-	{"_permille_s_mm", "‰ s/mm"},
-	{"_per_turn", "1/turn"},
-	{"_per_turn_s", "s/turn"},
-	{"_per_turn_s2", "s²/turn"},
-	{".bitrate", "bit/s"},
-	{"camera_setup.width", "px"},
-	{"camera_setup.height", "px"},
-	{"vision.roi", "px"},
-};
-
-static const char *unit_of(const char *name)
-{
-	const char *unit = "";
-	size_t longest = 0;
-
-	/* steps_per_turn is a number of steps. */
-	if (cli_ends_with(name, ".steps_per_turn"))
-		return "";
-	for (size_t i = 0; i < sizeof(units) / sizeof(*units); i++)
-		if (strlen(units[i].end) > longest && cli_ends_with(name, units[i].end)) {
-			longest = strlen(units[i].end);
-			unit = units[i].unit;
-		}
-	return unit;
-}
-
-static int keep(void *context, const struct incise_rig_key *key)
+static int keep(void *context, const struct incise_key *key)
 {
 	struct keys *keys = context;
 
@@ -103,7 +49,7 @@ static int keep(void *context, const struct incise_rig_key *key)
 }
 
 /* "rig.conf:7", "sim:" or "default" */
-static char *origin_of(const struct incise_rig_key *key, const char *rig)
+static char *origin_of(const struct incise_key *key, const char *rig)
 {
 	if (!key->given)
 		return cli_text("default");
@@ -134,8 +80,8 @@ static void print(const struct options *options, const char *rig, const struct k
 	if (options->show)
 		printf("\n%-*s %-24s %s\n", longest, "key", "value", "from");
 	for (size_t i = 0; i < keys->n; i++) {
-		const struct incise_rig_key *key = &keys->key[i];
-		const char *unit = unit_of(key->name);
+		const struct incise_key *key = &keys->key[i];
+		const char *unit = key->unit;
 		char *value = cli_text("%s%s%s", *key->value ? key->value : "-",
 				       *key->value && *unit ? " " : "",
 				       *key->value ? unit : "");
@@ -167,8 +113,8 @@ static void print_json(const struct options *options, const char *rig,
 		json_array_append_new(passed_over, json_text(reason));
 	json_object_set_new(object, "passed_over", passed_over);
 	for (size_t i = 0; i < keys->n; i++) {
-		const struct incise_rig_key *key = &keys->key[i];
-		const char *unit = unit_of(key->name);
+		const struct incise_key *key = &keys->key[i];
+		const char *unit = key->unit;
 		char *origin = origin_of(key, rig);
 
 		json_array_append_new(list,

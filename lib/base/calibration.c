@@ -21,51 +21,61 @@
 #include <incise/calibration.h>
 #include <incise/outfile.h>
 #include "c_locale.h"
-#include "conf.h"
 #include "crc32c.h"
+#include "settings.h"
 
-/* One number of struct incise_calibration. */
-struct known_key {
-	const char *name; /* in the history */
-	const char *unit;
-	double low, high;
-	size_t offset;	    /* in struct incise_calibration */
-	const char *vector; /* key at the top of the file, if it is an element of one */
-};
+#define SETTINGS_OF struct incise_calibration
+#define DELAY(key, initial, help) \
+	SETTING_NUMBER(key, key, "ms", -1000, 1000, initial, help)
+#define DELAY_SD(key)                                                                \
+	SETTING_NUMBER(key, key, "ms", 0, 1000, "(none)",                            \
+		       "standard uncertainty of that delay; without it a recording " \
+		       "reports the delay as not calibrated")
 
-#define NUMBER(key, unit, low, high)                                                  \
-	{                                                                             \
-#key, unit, low, high, offsetof(struct incise_calibration, key), NULL \
-	}
-#define TIP(axis, i)                                                             \
-	{                                                                        \
-		"tip_" axis "_mm", "mm", -1e6, 1e6,                              \
-			offsetof(struct incise_calibration, tip_mm[i]), "tip_mm" \
-	}
-
-static const struct known_key known_keys[] = {
-	NUMBER(force_mV_N, "mV/N", 1, 100000),
-	NUMBER(force_zero_mV, "mV", -10000, 10000),
-	NUMBER(depth_mm_px, "mm/px", 0.0001, 10),
-	TIP("x", 0),
-	TIP("y", 1),
-	TIP("z", 2),
-	NUMBER(surface_u_mm, "mm", 0, 1000),
+/* The numbers are all double. Without a default they are NAN. */
+static const struct incise_setting settings[] = {
+	SETTING_NUMBER(force_mV_N, force_mV_N, "mV/N", 1, 100000, "1240",
+		       "sensitivity of the force channel after its amplifier"),
+	SETTING_NUMBER(
+		force_zero_mV, force_zero_mV, "mV", -10000, 10000, "(measured)",
+		"reading of the force channel without load; else measured at the start of each "
+		"recording, while the scalpel is in the air"),
+	SETTING_NUMBER(
+		depth_mm_px, depth_mm_px, "mm/px", 0.0001, 10, "0.11875",
+		"scale of the camera in the plane of the scalpel; 47.5 mm over 400 pixels"),
+	SETTING_VECTOR(
+		tip_mm, tip_mm, "mm", "[0, 0, 0]",
+		"tip of the blade in the sensor's frame, relative to the tracked point: the sensor, "
+		"or the point set with offset_mm in rig.conf"),
+	SETTING_NUMBER(
+		surface_u_mm, surface_u_mm, "mm", 0, 1000, "(none)",
+		"standard uncertainty of the tissue surface of rig.conf along its normal, with that of "
+		"the tip that it was touched with; without it that of a depth is not stated"),
 	/* a camera may timestamp the end of an exposure: later than its middle, or not */
-	NUMBER(force_delay_ms, "ms", -1000, 1000),
-	NUMBER(force_delay_sd_ms, "ms", 0, 1000),
-	NUMBER(tracker_delay_ms, "ms", -1000, 1000),
-	NUMBER(tracker_delay_sd_ms, "ms", 0, 1000),
-	NUMBER(camera_delay_ms, "ms", -1000, 1000),
-	NUMBER(camera_delay_sd_ms, "ms", 0, 1000),
-	NUMBER(stepper_N_step, "N", -100, 100),
-	NUMBER(stepper_backlash_mm, "mm", 0, 100),
-	NUMBER(stepper_hysteresis_N, "N", 0, 1000),
-	NUMBER(stepper_stiction_N, "N", 0, 1000),
-	NUMBER(stepper_steps_s, "1/s", 0, 1e7),
+	DELAY(force_delay_ms, "(0)",
+	      "delay of the force from acquisition to the earliest arrival, or to the timestamp if the "
+	      "device sends one"),
+	DELAY_SD(force_delay_sd_ms),
+	DELAY(tracker_delay_ms, "(data sheet)", "the same of the poses"),
+	DELAY_SD(tracker_delay_sd_ms),
+	DELAY(camera_delay_ms, "(0)", "the same of the frames"),
+	DELAY_SD(camera_delay_sd_ms),
+	SETTING_NUMBER(
+		stepper_N_step, stepper_N_step, "N", -100, 100, "(none)",
+		"force per microstep of the actuator; the sign is that of the direction"),
+	SETTING_NUMBER(stepper_backlash_mm, stepper_backlash_mm, "mm", 0, 100, "(none)",
+		       "travel lost at a reversal of the actuator"),
+	SETTING_NUMBER(stepper_hysteresis_N, stepper_hysteresis_N, "N", 0, 1000, "(none)",
+		       "force difference between both directions"),
+	SETTING_NUMBER(stepper_stiction_N, stepper_stiction_N, "N", 0, 1000, "(none)",
+		       "force at which the actuator starts to move"),
+	SETTING_NUMBER(stepper_steps_s, stepper_steps_s, "1/s", 0, 1e7, "(none)",
+		       "largest rate without lost steps, microsteps per second"),
+	SETTING_OWN(history, "", "(none)", "list of all calibrations, oldest first"),
+	{0},
 };
 
-#define N_KEYS (sizeof(known_keys) / sizeof(*known_keys))
+#define N_KEYS ((int)(sizeof(settings) / sizeof(*settings)) - 2)
 
 struct file_content {
 	struct incise_calibration in_force;
@@ -74,53 +84,49 @@ struct file_content {
 	int n;
 };
 
+static double *number_at(struct incise_calibration *calibration,
+			 const struct incise_setting *row)
+{
+	return (double *)((char *)calibration + row->offset);
+}
+
 void incise_calibration_nominal(struct incise_calibration *calibration)
 {
-	*calibration = (struct incise_calibration){
-		.force_mV_N = 1240,
-		.force_zero_mV = NAN,
-		.depth_mm_px = 47.5 / 400,
-		.force_delay_ms = NAN,
-		.force_delay_sd_ms = NAN,
-		.tracker_delay_ms = NAN,
-		.tracker_delay_sd_ms = NAN,
-		.camera_delay_ms = NAN,
-		.camera_delay_sd_ms = NAN,
-		.surface_u_mm = NAN,
-		.stepper_N_step = NAN,
-		.stepper_backlash_mm = NAN,
-		.stepper_hysteresis_N = NAN,
-		.stepper_stiction_N = NAN,
-		.stepper_steps_s = NAN,
-	};
+	for (int i = 0; i < N_KEYS; i++)
+		*number_at(calibration, &settings[i]) = NAN;
+	incise_settings_init(settings, calibration);
 }
 
-static const struct known_key *find_key(const char *name)
+/* A key of the history; of the elements of tip_mm each has its own. */
+static const struct incise_setting *find_key(const char *name, int *element)
 {
-	for (size_t k = 0; k < N_KEYS; k++)
-		if (!strcmp(known_keys[k].name, name))
-			return &known_keys[k];
-	return NULL;
+	static const char *const tip[] = {"tip_x_mm", "tip_y_mm", "tip_z_mm"};
+
+	for (*element = 2; *element >= 0; --*element)
+		if (!strcmp(tip[*element], name))
+			return incise_setting_of(settings, "tip_mm");
+	*element = 0;
+	return !strcmp(name, "tip_mm") || !strcmp(name, "history")
+		       ? NULL
+		       : incise_setting_of(settings, name);
 }
 
-static double *number_at(struct incise_calibration *calibration,
-			 const struct known_key *key)
+bool incise_calibration_has_key(const char *key)
 {
-	return (double *)((char *)calibration + key->offset);
+	return incise_setting_of(settings, key);
 }
 
 double incise_calibration_get(const struct incise_calibration *calibration,
 			      const char *name)
 {
 	struct incise_calibration copy = *calibration;
-	const struct known_key *key = find_key(name);
+	int element;
+	const struct incise_setting *row = find_key(name, &element);
 
-	return key ? *number_at(&copy, key) : NAN;
+	return row ? number_at(&copy, row)[element] : NAN;
 }
 
 /* --- reading --- */
-
-enum { COVARIANCES = INCISE_CALIBRATION_VALUES * (INCISE_CALIBRATION_VALUES + 1) / 2 };
 
 /* 2026-11-21T14:48:16Z, and nothing behind it. */
 static bool is_date(const char *text)
@@ -140,11 +146,6 @@ static bool is_date(const char *text)
 static bool is_kind(const char *text)
 {
 	return *text && !text[strspn(text, "abcdefghijklmnopqrstuvwxyz")];
-}
-
-static bool in_range(const struct known_key *key, double value)
-{
-	return value >= key->low && value <= key->high;
 }
 
 static void make_printable(char *text)
@@ -170,13 +171,15 @@ static const char *fault(const struct incise_calibration_record *record)
 		return "values: expected 1 to 16 values";
 	for (int i = 0; i < n; i++) {
 		const struct incise_calibration_value *value = &record->values[i];
-		const struct known_key *key = find_key(value->key);
+		int element;
+		const struct incise_setting *row = find_key(value->key, &element);
 
-		if (!key)
+		if (!row)
 			return "values: key: expected a key of calibration.conf";
 		/* A failed calibration may be far out, and is kept to be read. */
 		if (!isfinite(value->left) ||
-		    (record->pass && !in_range(key, value->left)))
+		    (record->pass &&
+		     !(value->left >= row->min && value->left <= row->max)))
 			return "values: left: expected a number in the range of its key";
 		if (isinf(value->found))
 			return "values: found: expected a finite number";
@@ -194,143 +197,100 @@ static const char *fault(const struct incise_calibration_record *record)
 	return NULL;
 }
 
-/* libconfig gives a group in a list the line before it; its first key has the right one. */
-static int entry_error(const config_setting_t *entry, const char *path, const char *what,
+/* A calibration in the history, and each of its values. */
+#undef SETTINGS_OF
+#define SETTINGS_OF struct incise_calibration_value
+#define ANY 1e300
+static const struct incise_setting value_settings[] = {
+	SETTING_TEXT(key, key, SETTING_REQUIRED, ""),
+	SETTING_TEXT(unit, unit, "", ""),
+	SETTING_NUMBER(found, found, "", -ANY, ANY, "nan", ""),
+	SETTING_NUMBER(left, left, "", -ANY, ANY, SETTING_REQUIRED, ""),
+	SETTING_NUMBER(u, u, "", 0, ANY, SETTING_REQUIRED, ""),
+	{0},
+};
+
+static int read_values(void *to, const config_setting_t *list, const char *path,
 		       struct incise_error *err)
 {
-	const config_setting_t *first =
-		config_setting_is_group(entry) ? config_setting_get_elem(entry, 0) : NULL;
-
-	return incise_error_set(err, EINVAL, "%.100s:%d: history: %s; correct it", path,
-				config_setting_source_line(first ? first : entry), what);
-}
-
-static int read_value(const config_setting_t *group, const char *path,
-		      struct incise_calibration_value *value, struct incise_error *err)
-{
-	static const char *const keys[] = {"key", "unit", "found", "left", "u", NULL};
-	const double most = 1e300;
-	int rc;
-
-	*value = (struct incise_calibration_value){.found = NAN};
-	if (!config_setting_is_group(group))
-		return entry_error(group, path, "values: expected groups { key = …; }",
-				   err);
-	rc = incise_conf_known(group, path, keys, err);
-	if (!rc)
-		rc = incise_conf_need(group, path, "key", err);
-	if (!rc)
-		rc = incise_conf_need(group, path, "left", err);
-	if (!rc)
-		rc = incise_conf_need(group, path, "u", err);
-	if (!rc)
-		rc = incise_conf_text(group, path, "key", value->key, sizeof(value->key),
-				      err);
-	if (!rc)
-		rc = incise_conf_text(group, path, "unit", value->unit,
-				      sizeof(value->unit), err);
-	if (!rc)
-		rc = incise_conf_number(group, path, "found", -most, most, &value->found,
-					err);
-	if (!rc)
-		rc = incise_conf_number(group, path, "left", -most, most, &value->left,
-					err);
-	if (!rc)
-		rc = incise_conf_number(group, path, "u", 0, most, &value->u, err);
-	make_printable(value->unit);
-	return rc;
-}
-
-static int read_values(const config_setting_t *entry, const char *path,
-		       struct incise_calibration_record *record, struct incise_error *err)
-{
-	const config_setting_t *list = config_setting_get_member(entry, "values");
+	struct incise_calibration_record *record = to;
 	int rc = 0;
 
-	if (!list || !config_setting_is_list(list) || config_setting_length(list) < 1 ||
+	if (!config_setting_is_list(list) || config_setting_length(list) < 1 ||
 	    config_setting_length(list) > INCISE_CALIBRATION_VALUES)
-		return entry_error(list ? list : entry, path,
-				   "values: expected a list of 1 to 16 groups "
-				   "( { key = …; left = …; u = …; }, … )",
-				   err);
+		return incise_conf_error(
+			list, NULL, path, err,
+			"a list of 1 to 16 groups ( { key = …; left = …; "
+			"u = …; }, … )");
 	record->n = config_setting_length(list);
-	for (int i = 0; i < record->n && !rc; i++)
-		rc = read_value(config_setting_get_elem(list, i), path,
-				&record->values[i], err);
+	for (int i = 0; i < record->n && !rc; i++) {
+		incise_settings_init(value_settings, &record->values[i]);
+		rc = incise_settings_read(value_settings,
+					  config_setting_get_elem(list, i), path,
+					  &record->values[i], err);
+	}
 	return rc;
 }
 
 /* The CRC is text: libconfig's whole numbers end at 2^31 - 1. */
-static int read_crc(const config_setting_t *entry, const char *path, uint32_t *crc,
+static int read_crc(void *to, const config_setting_t *setting, const char *path,
 		    struct incise_error *err)
 {
-	char text[9] = "00000000";
-	int rc = incise_conf_text(entry, path, "raw_crc32c", text, sizeof(text), err);
+	const char *text = config_setting_get_string(setting);
 
-	if (rc)
-		return rc;
-	if (strlen(text) != 8 || text[strspn(text, "0123456789abcdef")])
-		return entry_error(config_setting_get_member(entry, "raw_crc32c"), path,
-				   "raw_crc32c: expected eight digits 0 to f in quotes",
-				   err);
-	*crc = strtoul(text, NULL, 16);
+	if (!text || strlen(text) != 8 || text[strspn(text, "0123456789abcdef")])
+		return incise_conf_error(setting, NULL, path, err,
+					 "eight digits 0 to f in quotes");
+	((struct incise_calibration_record *)to)->raw_crc = strtoul(text, NULL, 16);
 	return 0;
+}
+
+#undef SETTINGS_OF
+#define SETTINGS_OF struct incise_calibration_record
+static const struct incise_setting record_settings[] = {
+	SETTING_TEXT(kind, kind, "", ""),
+	SETTING_TEXT(date, date, "", ""),
+	SETTING_TEXT(device, device, "", ""),
+	SETTING_TEXT(method, method, "", ""),
+	SETTING_TEXT(raw, raw, "", ""),
+	SETTING_OWN(raw_crc32c, "", "", "", .read = read_crc),
+	SETTING_OWN(values, "", SETTING_REQUIRED, "", .read = read_values),
+	SETTING_NUMBER(covariance, covariance, "", -ANY, ANY, "(none)", "",
+		       .count = offsetof(struct incise_calibration_record, n_covariance)),
+	SETTING_NUMBER(low, low, "", -ANY, ANY, "nan", ""),
+	SETTING_NUMBER(high, high, "", -ANY, ANY, "nan", ""),
+	SETTING_TEXT(range_unit, range_unit, "", ""),
+	SETTING_TRUTH(pass, pass, SETTING_REQUIRED, ""),
+	SETTING_TEXT(verdict, verdict, "", ""),
+	{0},
+};
+
+static void make_all_printable(struct incise_calibration_record *record)
+{
+	make_printable(record->device);
+	make_printable(record->method);
+	make_printable(record->raw);
+	make_printable(record->range_unit);
+	make_printable(record->verdict);
+	for (int i = 0; i < record->n; i++)
+		make_printable(record->values[i].unit);
 }
 
 static int read_entry(const config_setting_t *entry, const char *path,
 		      struct incise_calibration_record *record, struct incise_error *err)
 {
-	static const char *const keys[] = {"kind",	 "date",       "pass",
-					   "verdict",	 "values",     "device",
-					   "method",	 "raw",	       "low",
-					   "high",	 "range_unit", "raw_crc32c",
-					   "covariance", NULL};
-	const struct {
-		const char *key;
-		char *to;
-		size_t size;
-	} texts[] = {
-		{"kind", record->kind, sizeof(record->kind)},
-		{"date", record->date, sizeof(record->date)},
-		{"device", record->device, sizeof(record->device)},
-		{"method", record->method, sizeof(record->method)},
-		{"raw", record->raw, sizeof(record->raw)},
-		{"range_unit", record->range_unit, sizeof(record->range_unit)},
-		{"verdict", record->verdict, sizeof(record->verdict)},
-	};
 	const char *wrong;
 	int rc;
 
-	*record = (struct incise_calibration_record){.low = NAN, .high = NAN};
-	if (!config_setting_is_group(entry))
-		return entry_error(entry, path, "expected groups { kind = …; … }", err);
-	rc = incise_conf_known(entry, path, keys, err);
-	for (size_t i = 0; i < sizeof(texts) / sizeof(*texts) && !rc; i++) {
-		rc = incise_conf_text(entry, path, texts[i].key, texts[i].to,
-				      texts[i].size, err);
-		make_printable(texts[i].to);
-	}
-	if (!rc)
-		rc = incise_conf_need(entry, path, "pass", err);
-	if (!rc)
-		rc = incise_conf_bool(entry, path, "pass", &record->pass, err);
-	if (!rc)
-		rc = incise_conf_number(entry, path, "low", -1e300, 1e300, &record->low,
-					err);
-	if (!rc)
-		rc = incise_conf_number(entry, path, "high", -1e300, 1e300, &record->high,
-					err);
-	if (!rc)
-		rc = read_crc(entry, path, &record->raw_crc, err);
-	if (!rc)
-		rc = read_values(entry, path, record, err);
-	if (!rc)
-		rc = incise_conf_numbers(entry, path, "covariance", record->covariance,
-					 COVARIANCES, &record->n_covariance, err);
+	incise_settings_init(record_settings, record);
+	rc = incise_settings_read(record_settings, entry, path, record, err);
 	if (rc)
 		return rc;
+	make_all_printable(record);
 	wrong = fault(record);
-	return wrong ? entry_error(entry, path, wrong, err) : 0;
+	return wrong ? incise_error_set(err, EINVAL, "%.100s:%d: history: %s; correct it",
+					path, incise_conf_line(entry), wrong)
+		     : 0;
 }
 
 /* Read the list `history` of a file, if it is there; on 0 the caller frees *records. */
@@ -346,7 +306,7 @@ static int read_history(const config_setting_t *root, const char *path,
 	if (!list)
 		return 0;
 	if (!config_setting_is_list(list))
-		return entry_error(list, path, "expected a list ( { … }, … )", err);
+		return incise_conf_error(list, NULL, path, err, "a list ( { … }, … )");
 	length = config_setting_length(list);
 	if (!length)
 		return 0;
@@ -374,30 +334,15 @@ static int read_config(struct file_content *file, const char *path,
 		       const struct incise_calibration *base, config_t *config,
 		       struct incise_error *err)
 {
-	const char *names[N_KEYS + 2] = {NULL};
-	const struct known_key *key;
 	const config_setting_t *root = config_root_setting(config);
-	int rc, n = 0;
+	int rc;
 
 	incise_calibration_nominal(&file->in_force);
 	if (base)
 		file->in_force = *base;
-	for (key = known_keys; key < known_keys + N_KEYS; key++) {
-		const char *name = key->vector ? key->vector : key->name;
-
-		file->present[key - known_keys] = config_setting_get_member(root, name);
-		if (!n || names[n - 1] != name)
-			names[n++] = name;
-	}
-	names[n] = "history";
-	rc = incise_conf_known(root, path, names, err);
-	for (key = known_keys; key < known_keys + N_KEYS && !rc; key++)
-		if (!key->vector)
-			rc = incise_conf_number(root, path, key->name, key->low,
-						key->high,
-						number_at(&file->in_force, key), err);
-	if (!rc)
-		rc = incise_conf_vector(root, path, "tip_mm", file->in_force.tip_mm, err);
+	for (int i = 0; i < N_KEYS; i++)
+		file->present[i] = config_setting_get_member(root, settings[i].key);
+	rc = incise_settings_read(settings, root, path, &file->in_force, err);
 	if (!rc)
 		rc = read_history(root, path, &file->records, &file->n, err);
 	config_destroy(config);
@@ -526,15 +471,15 @@ static void put_text(const char *key, const char *text, FILE *out)
 
 /* The last calibration that put a key's value in force; NULL: a person did. */
 static const struct incise_calibration_record *origin(const struct file_content *file,
-						      const struct known_key *key,
-						      double value, double *u)
+						      const char *key, double value,
+						      double *u)
 {
 	for (int i = file->n - 1; i >= 0; i--)
 		for (int j = 0; j < file->records[i].n && file->records[i].pass; j++) {
 			const struct incise_calibration_value *v =
 				&file->records[i].values[j];
 
-			if (strcmp(v->key, key->name))
+			if (strcmp(v->key, key))
 				continue;
 			*u = v->u;
 			return v->left == value ? &file->records[i] : NULL;
@@ -542,14 +487,24 @@ static const struct incise_calibration_record *origin(const struct file_content 
 	return NULL;
 }
 
-/* "# mV/N, U = 2.4 (k = 2), 2026-11-21": behind a key. Two signs: it is rewritten. */
-static void put_origin(const struct file_content *file, const struct known_key *key,
-		       double value, FILE *out)
+/*
+ * "force_mV_N = 1238.6; ## mV/N, U = 2.4 (k = 2), 2026-11-21": a key with its unit and where it is
+ * from. Two signs: it is rewritten.
+ */
+static void put_key(const struct file_content *file, const struct incise_setting *row,
+		    const double *value, FILE *out)
 {
+	const int n = (int)(row->size / sizeof(double));
 	double u = 0;
-	const struct incise_calibration_record *from = origin(file, key, value, &u);
+	const struct incise_calibration_record *from =
+		origin(file, n > 1 ? "tip_x_mm" : row->key, *value, &u);
 
-	fprintf(out, " ## %s", key->unit);
+	fprintf(out, "%s = ", row->key);
+	for (int i = 0; i < n; i++) {
+		fputs(n == 1 ? "" : i ? ", " : "[", out);
+		put_number(value[i], out);
+	}
+	fprintf(out, "%s; ## %s", n > 1 ? "]" : "", row->unit);
 	if (from)
 		fprintf(out, ", U = %.2g (k = 2), %s, %.10s", 2 * u, from->kind,
 			from->date);
@@ -558,29 +513,13 @@ static void put_origin(const struct file_content *file, const struct known_key *
 
 static void put_keys(const struct file_content *file, FILE *out)
 {
-	const struct known_key *key = known_keys;
 	struct incise_calibration in_force = file->in_force;
 
-	for (; key < known_keys + N_KEYS; key++) {
-		const double value = *number_at(&in_force, key);
+	for (int i = 0; i < N_KEYS; i++) {
+		const double *value = number_at(&in_force, &settings[i]);
 
-		if (!file->present[key - known_keys] || !isfinite(value))
-			continue;
-		if (!key->vector) {
-			fprintf(out, "%s = ", key->name);
-			put_number(value, out);
-			fputc(';', out);
-		} else if (key->offset == offsetof(struct incise_calibration, tip_mm)) {
-			fprintf(out, "%s = [", key->vector);
-			for (int i = 0; i < 3; i++) {
-				fputs(i ? ", " : "", out);
-				put_number(in_force.tip_mm[i], out);
-			}
-			fputs("];", out);
-		} else {
-			continue; /* written with the first of them */
-		}
-		put_origin(file, key, value, out);
+		if (file->present[i] && isfinite(*value))
+			put_key(file, &settings[i], value, out);
 	}
 }
 
@@ -734,10 +673,12 @@ static void put_in_force(struct file_content *file,
 			 const struct incise_calibration_record *record)
 {
 	for (int i = 0; i < record->n; i++) {
-		const struct known_key *key = find_key(record->values[i].key);
+		int element;
+		const struct incise_setting *row =
+			find_key(record->values[i].key, &element);
 
-		*number_at(&file->in_force, key) = record->values[i].left;
-		file->present[key - known_keys] = true;
+		number_at(&file->in_force, row)[element] = record->values[i].left;
+		file->present[row - settings] = true;
 	}
 }
 
@@ -769,13 +710,7 @@ static int add(struct file_content *file, const char *path,
 			"%.100s: nothing appended: the calibration has an "
 			"invalid field: %s",
 			path, wrong);
-	make_printable(last->device);
-	make_printable(last->method);
-	make_printable(last->raw);
-	make_printable(last->range_unit);
-	make_printable(last->verdict);
-	for (int i = 0; i < last->n; i++)
-		make_printable(last->values[i].unit);
+	make_all_printable(last);
 	if (last->pass)
 		put_in_force(file, last);
 	return 0;

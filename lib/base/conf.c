@@ -3,7 +3,6 @@
  * Strict reading of libconfig files; see conf.h.
  */
 #include <errno.h>
-#include <math.h>
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -12,7 +11,6 @@
 #include <incise/infile.h>
 #include "conf.h"
 #include "utf8.h"
-#include "vector.h"
 
 #define UNIT_LETTERS 3 /* of each part, as in mPa_s */
 
@@ -23,10 +21,15 @@ static void setting_name(const config_setting_t *setting, const char *key, char 
 	const char *own = setting ? config_setting_name(setting) : NULL;
 	size_t length = 0;
 
-	if (own) {
+	if (own || (setting && !config_setting_is_root(setting))) {
 		setting_name(config_setting_parent(setting), NULL, name, size);
 		length = strlen(name);
-		snprintf(name + length, size - length, "%s%s", length ? "." : "", own);
+		if (own)
+			snprintf(name + length, size - length, "%s%s", length ? "." : "",
+				 own);
+		else
+			snprintf(name + length, size - length, "[%d]",
+				 config_setting_index(setting) + 1);
 	} else {
 		name[0] = '\0';
 	}
@@ -38,43 +41,46 @@ static void setting_name(const config_setting_t *setting, const char *key, char 
 /* A setting's value as it was written, as far as one line can show it. */
 static void setting_value(const config_setting_t *setting, char *text, size_t size)
 {
+	int n = config_setting_length(setting);
+	size_t length;
+
 	switch (config_setting_type(setting)) {
 	case CONFIG_TYPE_INT:
 	case CONFIG_TYPE_INT64:
 		snprintf(text, size, "%lld", config_setting_get_int64(setting));
-		break;
+		return;
 	case CONFIG_TYPE_FLOAT:
 		snprintf(text, size, "%.10g", config_setting_get_float(setting));
-		break;
+		return;
 	case CONFIG_TYPE_STRING:
 		snprintf(text, size, "\"%.40s\"", config_setting_get_string(setting));
-		break;
+		return;
 	case CONFIG_TYPE_BOOL:
 		snprintf(text, size, "%s",
 			 config_setting_get_bool(setting) ? "true" : "false");
-		break;
+		return;
 	case CONFIG_TYPE_GROUP:
 		snprintf(text, size, "a group");
-		break;
-	default:
-		snprintf(text, size, "%d values", config_setting_length(setting));
-		break;
+		return;
 	}
-}
-
-static bool is_number(const config_setting_t *setting)
-{
-	int type = config_setting_type(setting);
-
-	return type == CONFIG_TYPE_INT || type == CONFIG_TYPE_INT64 ||
-	       type == CONFIG_TYPE_FLOAT;
-}
-
-static double number_of(const config_setting_t *setting)
-{
-	if (config_setting_type(setting) == CONFIG_TYPE_FLOAT)
-		return config_setting_get_float(setting);
-	return (double)config_setting_get_int64(setting);
+	if (n && config_setting_is_group(config_setting_get_elem(setting, 0))) {
+		snprintf(text, size, "a list of %d", n);
+		return;
+	}
+	length = snprintf(text, size, "[");
+	for (int i = 0; i < n && length < size - 1; i++) {
+		if (i == 4 && n > 5) {
+			snprintf(text + length, size - length, ", … %d values]", n);
+			return;
+		}
+		length += snprintf(text + length, size - length, "%s", i ? ", " : "");
+		if (length < size - 1)
+			setting_value(config_setting_get_elem(setting, i), text + length,
+				      size - length);
+		length = strlen(text);
+	}
+	if (length < size - 1)
+		strcpy(text + length, "]");
 }
 
 /* An included file is named instead of the one that includes it. */
@@ -85,23 +91,37 @@ static const char *file_of(const config_setting_t *setting, const char *path)
 	return file ? file : path;
 }
 
-static int INCISE_PRINTF(5, 6)
-	setting_error(const config_setting_t *setting, const char *path, int code,
+/* libconfig gives a group in a list the line before it; its first key has the right one. */
+int incise_conf_line(const config_setting_t *setting)
+{
+	const config_setting_t *around = config_setting_parent(setting);
+
+	if (around && config_setting_is_list(around) &&
+	    config_setting_is_group(setting) && config_setting_length(setting))
+		setting = config_setting_get_elem(setting, 0);
+	return (int)config_setting_source_line(setting);
+}
+
+int incise_conf_error(const config_setting_t *group, const char *key, const char *path,
 		      struct incise_error *err, const char *fmt, ...)
 {
-	char name[120], found[64], expected[200];
+	const config_setting_t *setting =
+		key ? config_setting_get_member(group, key) : group;
+	char name[120], found[100] = "its default", expected[400];
 	va_list args;
 
 	va_start(args, fmt);
 	vsnprintf(expected, sizeof(expected), fmt, args);
 	va_end(args);
-	setting_name(setting, NULL, name, sizeof(name));
-	setting_value(setting, found, sizeof(found));
-	return incise_error_set(err, code,
+	setting_name(group, key, name, sizeof(name));
+	if (setting)
+		setting_value(setting, found, sizeof(found));
+	else
+		setting = group;
+	return incise_error_set(err, EINVAL,
 				"%.100s:%d: %s: expected %s, found %s; correct it",
-				file_of(setting, path),
-				config_setting_source_line(setting), name, expected,
-				found);
+				file_of(setting, path), incise_conf_line(setting), name,
+				expected, found);
 }
 
 /*
@@ -243,8 +263,8 @@ int incise_conf_known(const config_setting_t *group, const char *path,
 		      const char *const *keys, struct incise_error *err)
 {
 	if (!config_setting_is_group(group))
-		return setting_error(group, path, EINVAL, err,
-				     "a group { KEY = VALUE; … }");
+		return incise_conf_error(group, NULL, path, err,
+					 "a group { KEY = VALUE; … }");
 	for (int i = 0; i < config_setting_length(group); i++) {
 		const config_setting_t *setting = config_setting_get_elem(group, i);
 		const char *const *key = keys;
@@ -257,177 +277,12 @@ int incise_conf_known(const config_setting_t *group, const char *path,
 	return 0;
 }
 
-int incise_conf_number(const config_setting_t *group, const char *path, const char *key,
-		       double min, double max, double *value, struct incise_error *err)
-{
-	const config_setting_t *setting = config_setting_get_member(group, key);
-	double number;
-
-	if (!setting)
-		return 0;
-	if (!is_number(setting))
-		return setting_error(setting, path, EINVAL, err,
-				     "a number from %.10g to %.10g", min, max);
-	number = number_of(setting);
-	if (!(number >= min && number <= max))
-		return setting_error(setting, path, EINVAL, err,
-				     "a number from %.10g to %.10g", min, max);
-	*value = number;
-	return 0;
-}
-
-int incise_conf_string(const config_setting_t *group, const char *path, const char *key,
-		       const char **value, struct incise_error *err)
-{
-	const config_setting_t *setting = config_setting_get_member(group, key);
-
-	if (!setting)
-		return 0;
-	if (config_setting_type(setting) != CONFIG_TYPE_STRING)
-		return setting_error(setting, path, EINVAL, err, "text in quotes");
-	*value = config_setting_get_string(setting);
-	return 0;
-}
-
-int incise_conf_text(const config_setting_t *group, const char *path, const char *key,
-		     char *value, size_t size, struct incise_error *err)
-{
-	const char *text = NULL;
-	int rc = incise_conf_string(group, path, key, &text, err);
-
-	if (rc || !text)
-		return rc;
-	if (strlen(text) >= size)
-		return setting_error(config_setting_get_member(group, key), path, EINVAL,
-				     err, "text of at most %zu bytes", size - 1);
-	strcpy(value, text);
-	return 0;
-}
-
-int incise_conf_integer(const config_setting_t *group, const char *path, const char *key,
-			int min, int max, int *value, struct incise_error *err)
-{
-	const config_setting_t *setting = config_setting_get_member(group, key);
-	double number;
-
-	if (!setting)
-		return 0;
-	number = is_number(setting) ? number_of(setting) : NAN;
-	if (!(number >= min && number <= max) || number != floor(number))
-		return setting_error(setting, path, EINVAL, err,
-				     "a whole number from %d to %d", min, max);
-	*value = (int)number;
-	return 0;
-}
-
-int incise_conf_bool(const config_setting_t *group, const char *path, const char *key,
-		     bool *value, struct incise_error *err)
-{
-	const config_setting_t *setting = config_setting_get_member(group, key);
-
-	if (!setting)
-		return 0;
-	if (config_setting_type(setting) != CONFIG_TYPE_BOOL)
-		return setting_error(setting, path, EINVAL, err, "true or false");
-	*value = config_setting_get_bool(setting);
-	return 0;
-}
-
-int incise_conf_need(const config_setting_t *group, const char *path, const char *key,
-		     struct incise_error *err)
+int incise_conf_missing(const config_setting_t *group, const char *path, const char *key,
+			struct incise_error *err)
 {
 	char name[120];
 
-	if (config_setting_get_member(group, key))
-		return 0;
 	setting_name(group, key, name, sizeof(name));
-	return incise_error_set(err, EINVAL, "%.100s:%d: %s is missing; add it",
-				file_of(group, path), config_setting_source_line(group),
-				name);
-}
-
-int incise_conf_vector(const config_setting_t *group, const char *path, const char *key,
-		       double value[3], struct incise_error *err)
-{
-	const config_setting_t *setting = config_setting_get_member(group, key);
-	double number[3];
-
-	if (!setting)
-		return 0;
-	if (!(config_setting_is_array(setting) || config_setting_is_list(setting)) ||
-	    config_setting_length(setting) != 3)
-		return setting_error(setting, path, EINVAL, err,
-				     "three numbers [x, y, z]");
-	for (int i = 0; i < 3; i++) {
-		const config_setting_t *element = config_setting_get_elem(setting, i);
-
-		if (!is_number(element) || !(fabs(number_of(element)) <= 1e6))
-			return setting_error(setting, path, EINVAL, err,
-					     "three numbers [x, y, z] of at most 1e6");
-		number[i] = number_of(element);
-	}
-	v3_copy(value, number);
-	return 0;
-}
-
-int incise_conf_numbers(const config_setting_t *group, const char *path, const char *key,
-			double *values, int max, int *n, struct incise_error *err)
-{
-	const config_setting_t *setting = config_setting_get_member(group, key);
-
-	*n = 0;
-	if (!setting)
-		return 0;
-	if (!(config_setting_is_array(setting) || config_setting_is_list(setting)) ||
-	    config_setting_length(setting) > max)
-		return setting_error(setting, path, EINVAL, err,
-				     "at most %d numbers [a, b, …]", max);
-	for (int i = 0; i < config_setting_length(setting); i++) {
-		const config_setting_t *element = config_setting_get_elem(setting, i);
-
-		if (!is_number(element) || !isfinite(number_of(element)))
-			return setting_error(setting, path, EINVAL, err,
-					     "finite numbers");
-		values[i] = number_of(element);
-	}
-	*n = config_setting_length(setting);
-	return 0;
-}
-
-int incise_conf_direction(const config_setting_t *group, const char *path,
-			  const char *key, double value[3], struct incise_error *err)
-{
-	double asked[3] = {value[0], value[1], value[2]};
-	int rc = incise_conf_vector(group, path, key, asked, err);
-
-	/* Shorter than this, its direction is more rounding than intent. */
-	if (!rc && config_setting_get_member(group, key) && !v3_unit(value, asked, 1e-6))
-		rc = setting_error(config_setting_get_member(group, key), path, EINVAL,
-				   err, "a direction [x, y, z] that is not 0");
-	return rc;
-}
-
-int incise_conf_surface(const config_setting_t *group, const char *path,
-			double point_mm[3], double normal[3], struct incise_error *err)
-{
-	static const char *const keys[] = {"point_mm", "normal", NULL};
-	const config_setting_t *surface = config_setting_get_member(group, "surface");
-	double point[3];
-	int rc;
-
-	if (!surface)
-		return 0;
-	if (!config_setting_is_group(surface))
-		return setting_error(
-			surface, path, EINVAL, err,
-			"a group { point_mm = [x, y, z]; normal = [x, y, z]; }");
-	v3_copy(point, point_mm);
-	rc = incise_conf_known(surface, path, keys, err);
-	if (!rc)
-		rc = incise_conf_vector(surface, path, "point_mm", point, err);
-	if (!rc)
-		rc = incise_conf_direction(surface, path, "normal", normal, err);
-	if (!rc)
-		v3_copy(point_mm, point);
-	return rc;
+	return incise_error_set(err, EINVAL, "%.100s:%d: %s: missing; add it",
+				file_of(group, path), incise_conf_line(group), name);
 }

@@ -9,8 +9,6 @@
 #include <string.h>
 #include <incise/infile.h>
 #include <incise/rig.h>
-#include "../base/c_locale.h"
-#include "../base/conf.h"
 #include "../sim/sim.h"
 #include "../sim/surgeon.h"
 #include "../base/vector.h"
@@ -18,371 +16,217 @@
 #include "axes.h"
 #include "rig_plan.h"
 
-/* --- groups tracker_setup, force_setup, camera_setup, vision and foot_switch --- */
+/* --- the keys ------------------------------------------------------------------------------ */
 
-const char *const incise_rig_root_keys[] = {
-	"clock",	"tracker", "force",	  "camera",	   "stepper",
-	"surface",	"sim",	   "actuator",	  "tracker_setup", "force_setup",
-	"camera_setup", "vision",  "foot_switch", "sign_key",	   NULL};
+#define SETTINGS_OF struct incise_rig_plan
 
-const struct incise_rig_group incise_rig_groups[INCISE_RIG_GROUPS] = {
-	{"tracker_setup",
-	 {"stations", "tube_station", "hemisphere", "sync", "offset_mm", "repeat_ms"}},
-	{"force_setup", {"rate_hz", "channel", "full_scale_V", "trigger"}},
-	{"camera_setup",
-	 {"width", "height", "rate_hz", "format", "exposure_ms", "gain",
-	  "white_balance_K", "focus"}},
-	{"vision", {"hue", "saturation", "value", "full_px", "roi"}},
-	{"foot_switch", {"device", "key"}},
-};
-
-/* *group is NULL where the file has none. */
-static int group_of(const config_setting_t *root, const char *name, const char *path,
-		    const config_setting_t **group, struct incise_error *err)
+static bool is_ascending(const double *number, int n, const char *text)
 {
-	const struct incise_rig_group *known = incise_rig_groups;
-
-	*group = config_setting_get_member(root, name);
-	if (!*group)
-		return 0;
-	if (!config_setting_is_group(*group))
-		return incise_error_set(
-			err, EINVAL,
-			"%.200s:%d: %s: expected a group { key = value; }; "
-			"correct it",
-			path, config_setting_source_line(*group), name);
-	while (strcmp(known->name, name))
-		known++;
-	return incise_conf_known(*group, path, known->keys, err);
+	(void)text;
+	for (int i = 1; i < n; i++)
+		if (number[i] <= number[i - 1])
+			return false;
+	return true;
 }
 
-/* sign_key = "/PATH": capture may run in any folder. */
-static int read_sign_key(struct incise_rig_plan *plan, const config_setting_t *root,
-			 const char *path, struct incise_error *err)
+static bool is_range(const double *number, int n, const char *text)
 {
-	const char *key = NULL;
-	int rc = incise_conf_string(root, path, "sign_key", &key, err);
+	(void)n;
+	(void)text;
+	return number[0] <= number[1];
+}
 
-	if (rc || !key)
-		return rc;
-	if (*key != '/' || strlen(key) >= sizeof(plan->sign_key))
-		return incise_error_set(
-			err, EINVAL,
-			"%.200s:%d: sign_key: expected the path of a private key of SSH, "
-			"such as \"/etc/incise/rig_ed25519\"; correct it",
-			path,
-			config_setting_source_line(
-				config_setting_get_member(root, "sign_key")));
-	strcpy(plan->sign_key, key);
+/* A smaller box shows no handle. */
+static bool is_box(const double *number, int n, const char *text)
+{
+	(void)n;
+	(void)text;
+	return number[2] >= 16 && number[3] >= 16;
+}
+
+static bool has_no_slash(const double *number, int n, const char *text)
+{
+	(void)number;
+	(void)n;
+	return !strchr(text, '/');
+}
+
+/* capture may run in any folder. */
+static bool is_path(const double *number, int n, const char *text)
+{
+	(void)number;
+	(void)n;
+	return *text == '/';
+}
+
+static int read_foot_key(void *to, const config_setting_t *setting, const char *path,
+			 struct incise_error *err)
+{
+	const char *name = config_setting_get_string(setting);
+	int code = name ? incise_foot_switch_key(name) : -EINVAL;
+
+	if (code < 0)
+		return incise_conf_error(
+			setting, NULL, path, err,
+			"the name of a key, such as \"b\", of those that "
+			"rig.conf(5) lists");
+	((struct incise_rig_plan *)to)->foot_switch.key = (uint16_t)code;
 	return 0;
 }
 
-/* *value is the index in @words; unchanged where the key is absent. */
-static int read_word(const config_setting_t *group, const char *path, const char *key,
-		     const char *const *words, int *value, struct incise_error *err)
-{
-	const char *word = NULL;
-	char known[100] = "";
-	int rc = incise_conf_string(group, path, key, &word, err);
+static int read_actuators(void *to, const config_setting_t *all, const char *path,
+			  struct incise_error *err);
+static int read_sim(void *to, const config_setting_t *group, const char *path,
+		    struct incise_error *err);
 
-	if (rc || !word)
-		return rc;
-	for (int i = 0; words[i]; i++) {
-		if (!strcmp(word, words[i])) {
-			*value = i;
-			return 0;
-		}
-		snprintf(known + strlen(known), sizeof(known) - strlen(known), "%s%s",
-			 i ? ", " : "", words[i]);
-	}
-	return incise_error_set(
-		err, EINVAL,
-		"%.200s:%d: %s.%s: expected one of %s, found \"%.40s\"; "
-		"correct it",
-		path, config_setting_source_line(config_setting_get_member(group, key)),
-		config_setting_name(group), key, known, word);
-}
+static const char *const clocks[] = {"real", "simulated", NULL};
+static const char *const syncs[] = {"internal", "external", "video", NULL};
+static const char *const formats[] = {"rgb", "grey", "yuyv", "mjpeg", NULL};
 
-/* stations = [1, 2]: of 1 … 4, ascending. */
-static int read_stations(struct incise_tracker_setup *setup,
-			 const config_setting_t *group, const char *path,
-			 struct incise_error *err)
-{
-	const config_setting_t *list = config_setting_get_member(group, "stations");
-	int n = list && config_setting_is_aggregate(list) &&
-				!config_setting_is_group(list)
-			? config_setting_length(list)
-			: 0;
-	bool good = n >= 1 && n <= 4;
+static const struct incise_setting surface_settings[] = {
+	SETTING_VECTOR(point_mm, point_mm, "mm", "[0, 0, 0]", "a point of the surface"),
+	SETTING_DIRECTION(normal, normal, "[0, 0, 1]", "out of the tissue"),
+	{0},
+};
 
-	if (!list)
-		return 0;
-	for (int i = 0; i < n && good; i++) {
-		const config_setting_t *one = config_setting_get_elem(list, i);
-		int station = config_setting_type(one) == CONFIG_TYPE_INT
-				      ? config_setting_get_int(one)
-				      : 0;
+static const struct incise_setting tracker_settings[] = {
+	SETTING_WHOLE(
+		stations, tracker.stations, "", 1, 4, "[1]",
+		"array of the sensors to read, ascending; the first is on the scalpel",
+		.count = offsetof(struct incise_rig_plan, tracker.n_stations),
+		.fits = is_ascending,
+		.expected = "numbers of 1 to 4, ascending, such as [1]"),
+	SETTING_WHOLE(
+		tube_station, tracker.tube_station, "", 1, 4, "(none)",
+		"sensor at the end of the tube; one of stations, but not the first"),
+	SETTING_DIRECTION(hemisphere, tracker.hemisphere, "[1, 0, 0]",
+			  "from the source to the half-space of the sensors"),
+	SETTING_WORD(sync, tracker.sync, syncs, "internal",
+		     "clock of the measurements, see below"),
+	SETTING_VECTOR(offset_mm, tracker.offset_mm, "mm", "[0, 0, 0]",
+		       "tracked point in the frame of the sensor"),
+	SETTING_NUMBER(repeat_ms, tracker.repeat_ms, "ms", 0, 60000, "100",
+		       "longest time without a change of the pose; 0: no limit"),
+	{0},
+};
 
-		good = station >= 1 && station <= 4 &&
-		       (!i || station > setup->stations[i - 1]);
-		setup->stations[i] = (uint8_t)station;
-	}
-	setup->n_stations = n;
-	if (good)
-		return 0;
-	return incise_error_set(
-		err, EINVAL,
-		"%.200s:%d: tracker_setup.stations: expected numbers of 1 to "
-		"4, ascending, such as [1]; correct it",
-		path, config_setting_source_line(list));
-}
+static const struct incise_setting force_settings[] = {
+	SETTING_NUMBER(rate_hz, force.rate_hz, "Hz", 1, 100000, "10000",
+		       "samples per second"),
+	SETTING_WHOLE(channel, force.channel, "", 0, 255, "0", "channel of the device"),
+	SETTING_NUMBER(full_scale_V, force.full_scale_V, "V", 1e-6, 1000,
+		       "(by the device)", "input range"),
+	SETTING_TEXT(trigger, force.trigger, "(see below)",
+		     "IIO: name of the trigger, at most 63 letters, without a slash",
+		     .fits = has_no_slash,
+		     .expected = "the name of a trigger of at most 63 letters, without a "
+				 "slash"),
+	{0},
+};
+
+static const struct incise_setting camera_settings[] = {
+	SETTING_WHOLE(width, camera.width, "px", 16, 16384, "(as set)",
+		      "width of a frame"),
+	SETTING_WHOLE(height, camera.height, "px", 16, 16384, "(as set)",
+		      "height of a frame"),
+	SETTING_NUMBER(rate_hz, camera.rate_hz, "Hz", 0.1, 1000, "(as set)",
+		       "frames per second"),
+	SETTING_WORD(format, camera.pixels, formats, "yuyv", "yuyv, grey, rgb or mjpeg"),
+	SETTING_NUMBER(exposure_ms, camera.exposure_ms, "ms", 0.001, 1000, "(as set)",
+		       "exposure time"),
+	SETTING_NUMBER(gain, camera.gain, "", 1, 1e6, "(as set)",
+		       "gain, in units of the driver"),
+	SETTING_NUMBER(white_balance_K, camera.white_balance_K, "K", 1000, 20000,
+		       "(as set)", "colour temperature"),
+	SETTING_NUMBER(focus, camera.focus, "", 1, 1e6, "(as set)",
+		       "focus, in units of the driver"),
+	{0},
+};
+
+static const struct incise_setting vision_settings[] = {
+	SETTING_WHOLE(hue, vision.hue, "", 0, 179, "[0, 179]",
+		      "[low, high], in degrees / 2; if low > high, the range includes 0 "
+		      "(red)"),
+	SETTING_WHOLE(saturation, vision.saturation, "", 0, 255, "[0, 255]",
+		      "[low, high]", .fits = is_range,
+		      .expected = "whole numbers [low, high] from 0 to 255"),
+	SETTING_WHOLE(value, vision.value, "", 0, 255, "[0, 60]",
+		      "[low, high]; the default is a black handle", .fits = is_range,
+		      .expected = "whole numbers [low, high] from 0 to 255"),
+	SETTING_NUMBER(
+		full_px, vision.full_px, "px", 16, 8192, "(none)",
+		"exposed length at depth 0, from the upper end of the black to the "
+		"tissue"),
+	SETTING_WHOLE(
+		roi, vision.roi, "px", 0, 8192, "(whole frame)",
+		"first search region [x, y, width, height]; width and height from 16",
+		.fits = is_box,
+		.expected = "whole numbers [x, y, width, height] from 0 to 8192, "
+			    "width and height from 16"),
+	{0},
+};
+
+/* Both must be there: no device is meant by default. */
+static const struct incise_setting foot_switch_settings[] = {
+	SETTING_TEXT(device, foot_switch.device, SETTING_REQUIRED,
+		     "path of the event device; paths in /dev/input/by-id and "
+		     "/dev/input/by-path are stable",
+		     .fits = is_path,
+		     .expected = "the path of an input device, such as "
+				 "\"/dev/input/by-id/…-event-kbd\""),
+	SETTING_OWN(key, "", SETTING_REQUIRED,
+		    "the key that it sends: a letter, a digit, f1 to f12, space, enter, "
+		    "tab, esc, left, right, up, down, pageup, pagedown, home, end, "
+		    "btn_left, btn_right or btn_middle",
+		    .read = read_foot_key),
+	{0},
+};
+
+const struct incise_setting incise_rig_settings[] = {
+	SETTING_WORD(
+		clock, simulated, clocks, "real",
+		"real: the computer's clock; simulated: time that runs as fast as the "
+		"program, from 1 s on"),
+	SETTING_OWN(tracker, "", "(none)", "tracker, as BACKEND:ARGUMENTS"),
+	SETTING_OWN(force, "", "(none)", "force channel, as BACKEND:ARGUMENTS"),
+	SETTING_OWN(camera, "", "(none)", "camera, as BACKEND:ARGUMENTS"),
+	SETTING_OWN(stepper, "", "(none)",
+		    "actuator, as BACKEND:ARGUMENTS, or an array of two or three"),
+	SETTING_GROUP(surface, surface_settings, "plane of the tissue surface"),
+	SETTING_OWN(actuator, "", "(none)",
+		    "mechanics of a real actuator, or a list of two or three groups",
+		    .read = read_actuators),
+	SETTING_GROUP(tracker_setup, tracker_settings, "settings of a real tracker"),
+	SETTING_GROUP(force_setup, force_settings, "settings of a real force channel"),
+	SETTING_GROUP(camera_setup, camera_settings, "settings of a real camera"),
+	SETTING_GROUP(vision, vision_settings, "look of the scalpel in camera frames"),
+	SETTING_GROUP(foot_switch, foot_switch_settings,
+		      "a foot switch for the haptic loop"),
+	SETTING_TEXT(
+		sign_key, sign_key, "(none)",
+		"path of the private key of SSH that signs each recording of this rig",
+		.fits = is_path,
+		.expected = "the path of a private key of SSH, such as "
+			    "\"/etc/incise/rig_ed25519\""),
+	SETTING_OWN(sim, "", "(none)", "settings of the simulated rig", .read = read_sim),
+	{0},
+};
 
 /* tube_station = 2: of the stations, but not the first, which is the scalpel's. */
-static int read_tube_station(struct incise_tracker_setup *setup,
-			     const config_setting_t *group, const char *path,
-			     struct incise_error *err)
-{
-	const config_setting_t *setting =
-		config_setting_get_member(group, "tube_station");
-	int station = 0;
-	int rc = incise_conf_integer(group, path, "tube_station", 1, 4, &station, err);
-
-	if (rc || !setting)
-		return rc;
-	setup->tube_station = (uint8_t)station;
-	for (int i = 1; i < setup->n_stations; i++)
-		if (setup->stations[i] == station)
-			return 0;
-	return incise_error_set(
-		err, EINVAL,
-		"%.200s:%d: tracker_setup.tube_station: expected one of "
-		"tracker_setup.stations except the first, which is the scalpel's, "
-		"found %d; correct it",
-		path, config_setting_source_line(setting), station);
-}
-
-static int read_tracker_setup(struct incise_tracker_setup *setup,
+static int check_tube_station(const struct incise_tracker_setup *tracker,
 			      const config_setting_t *root, const char *path,
 			      struct incise_error *err)
 {
-	static const char *const syncs[] = {"internal", "external", "video", NULL};
-	const config_setting_t *group;
-	int sync = INCISE_TRACKER_INTERNAL;
-	int rc = group_of(root, "tracker_setup", path, &group, err);
+	bool good = !tracker->tube_station;
 
-	*setup = (struct incise_tracker_setup){.n_stations = 1,
-					       .stations = {1},
-					       .hemisphere = {1, 0, 0},
-					       .repeat_ms = 100};
-	if (rc || !group)
-		return rc;
-	rc = read_stations(setup, group, path, err);
-	if (!rc)
-		rc = read_tube_station(setup, group, path, err);
-	if (!rc)
-		rc = incise_conf_direction(group, path, "hemisphere", setup->hemisphere,
-					   err);
-	if (!rc)
-		rc = read_word(group, path, "sync", syncs, &sync, err);
-	setup->sync = (enum incise_tracker_sync)sync;
-	if (!rc)
-		rc = incise_conf_vector(group, path, "offset_mm", setup->offset_mm, err);
-	return rc ? rc
-		  : incise_conf_number(group, path, "repeat_ms", 0, 60000,
-				       &setup->repeat_ms, err);
-}
-
-static int read_force_setup(struct incise_force_setup *setup,
-			    const config_setting_t *root, const char *path,
-			    struct incise_error *err)
-{
-	const config_setting_t *group;
-	const char *trigger = NULL;
-	int rc = group_of(root, "force_setup", path, &group, err);
-
-	*setup = (struct incise_force_setup){.rate_hz = 10000};
-	if (rc || !group)
-		return rc;
-	rc = incise_conf_number(group, path, "rate_hz", 1, 100000, &setup->rate_hz, err);
-	if (!rc)
-		rc = incise_conf_integer(group, path, "channel", 0, 255, &setup->channel,
-					 err);
-	if (!rc)
-		rc = incise_conf_number(group, path, "full_scale_V", 1e-6, 1000,
-					&setup->full_scale_V, err);
-	if (!rc)
-		rc = incise_conf_string(group, path, "trigger", &trigger, err);
-	if (rc || !trigger)
-		return rc;
-	if (strlen(trigger) >= sizeof(setup->trigger) || strchr(trigger, '/'))
-		return incise_error_set(
-			err, EINVAL,
-			"%.200s:%d: force_setup.trigger: expected the name of a trigger of "
-			"at most %zu letters, without a slash; correct it",
-			path,
-			config_setting_source_line(
-				config_setting_get_member(group, "trigger")),
-			sizeof(setup->trigger) - 1);
-	strcpy(setup->trigger, trigger);
-	return 0;
-}
-
-static int read_camera_setup(struct incise_camera_setup *setup,
-			     const config_setting_t *root, const char *path,
-			     struct incise_error *err)
-{
-	static const char *const formats[] = {"rgb", "grey", "yuyv", "mjpeg", NULL};
-	const config_setting_t *group;
-	int pixels = INCISE_PIXELS_YUYV;
-	int rc = group_of(root, "camera_setup", path, &group, err);
-
-	*setup = (struct incise_camera_setup){.pixels = INCISE_PIXELS_YUYV};
-	if (rc || !group)
-		return rc;
-	rc = incise_conf_integer(group, path, "width", 16, 16384, &setup->width, err);
-	if (!rc)
-		rc = incise_conf_integer(group, path, "height", 16, 16384, &setup->height,
-					 err);
-	if (!rc)
-		rc = incise_conf_number(group, path, "rate_hz", 0.1, 1000,
-					&setup->rate_hz, err);
-	if (!rc)
-		rc = read_word(group, path, "format", formats, &pixels, err);
-	if (!rc)
-		rc = incise_conf_number(group, path, "exposure_ms", 0.001, 1000,
-					&setup->exposure_ms, err);
-	if (!rc)
-		rc = incise_conf_number(group, path, "gain", 1, 1e6, &setup->gain, err);
-	if (!rc)
-		rc = incise_conf_number(group, path, "white_balance_K", 1000, 20000,
-					&setup->white_balance_K, err);
-	if (!rc)
-		rc = incise_conf_number(group, path, "focus", 1, 1e6, &setup->focus, err);
-	setup->pixels = (enum incise_pixels)pixels;
-	return rc;
-}
-
-/* @n whole numbers of 0 … @most; *values are unchanged where the key is absent. */
-static int read_numbers(const config_setting_t *group, const char *path, const char *key,
-			int n, int most, int *values, const char *form,
-			struct incise_error *err)
-{
-	const config_setting_t *list = config_setting_get_member(group, key);
-	bool good = list && config_setting_is_aggregate(list) &&
-		    !config_setting_is_group(list) && config_setting_length(list) == n;
-	int number[4] = {0};
-
-	if (!list)
-		return 0;
-	for (int i = 0; i < n && good; i++) {
-		const config_setting_t *one = config_setting_get_elem(list, i);
-
-		number[i] = config_setting_get_int(one);
-		good = config_setting_type(one) == CONFIG_TYPE_INT && number[i] >= 0 &&
-		       number[i] <= most;
-	}
-	if (good) {
-		memcpy(values, number, n * sizeof(*values));
-		return 0;
-	}
-	return incise_error_set(
-		err, EINVAL,
-		"%.200s:%d: vision.%s: expected %s of whole numbers from 0 to %d; "
-		"correct it",
-		path, config_setting_source_line(list), key, form, most);
-}
-
-/* [low, high], the lower one first unless it @wraps around. */
-static int read_range(const config_setting_t *group, const char *path, const char *key,
-		      int most, bool wraps, int range[2], struct incise_error *err)
-{
-	int rc = read_numbers(group, path, key, 2, most, range, "[low, high]", err);
-
-	if (rc || wraps || range[0] <= range[1])
-		return rc;
-	return incise_error_set(
-		err, EINVAL,
-		"%.200s:%d: vision.%s: expected the lower number first; correct it", path,
-		config_setting_source_line(config_setting_get_member(group, key)), key);
-}
-
-/* All of roi or nothing; a smaller box shows no handle. */
-static int read_roi(const config_setting_t *group, const char *path,
-		    struct incise_vision_box *roi, struct incise_error *err)
-{
-	int box[4] = {0};
-	int rc = read_numbers(group, path, "roi", 4, 8192, box, "[x, y, width, height]",
-			      err);
-
-	*roi = (struct incise_vision_box){box[0], box[1], box[2], box[3]};
-	if (rc || !config_setting_get_member(group, "roi") ||
-	    (roi->width >= 16 && roi->height >= 16))
-		return rc;
-	return incise_error_set(
-		err, EINVAL,
-		"%.200s:%d: vision.roi: expected a width and a height of 16 or more; "
-		"correct it",
-		path,
-		config_setting_source_line(config_setting_get_member(group, "roi")));
-}
-
-static int read_vision_setup(struct incise_vision_setup *setup, bool *given,
-			     const config_setting_t *root, const char *path,
-			     struct incise_error *err)
-{
-	const config_setting_t *group;
-	int rc = group_of(root, "vision", path, &group, err);
-
-	*given = group;
-	*setup = (struct incise_vision_setup){
-		.hue = {0, 179}, .saturation = {0, 255}, .value = {0, 60}};
-	if (rc || !group)
-		return rc;
-	rc = read_range(group, path, "hue", 179, true, setup->hue, err);
-	if (!rc)
-		rc = read_range(group, path, "saturation", 255, false, setup->saturation,
-				err);
-	if (!rc)
-		rc = read_range(group, path, "value", 255, false, setup->value, err);
-	if (!rc)
-		rc = incise_conf_number(group, path, "full_px", 16, 8192, &setup->full_px,
-					err);
-	return rc ? rc : read_roi(group, path, &setup->roi, err);
-}
-
-/* Both keys must be there: no device is meant by default. */
-static int read_foot_switch(struct incise_rig_plan *plan, const config_setting_t *root,
-			    const char *path, struct incise_error *err)
-{
-	struct incise_foot_switch_setup *setup = &plan->foot_switch;
-	const char *device = NULL, *key = NULL;
-	const config_setting_t *group;
-	int rc = group_of(root, "foot_switch", path, &group, err), code;
-
-	if (rc || !group)
-		return rc;
-	rc = incise_conf_string(group, path, "device", &device, err);
-	if (!rc)
-		rc = incise_conf_string(group, path, "key", &key, err);
-	if (rc)
-		return rc;
-	if (!device || *device != '/' || strlen(device) >= sizeof(setup->device))
-		return incise_error_set(
-			err, EINVAL,
-			"%.200s:%d: foot_switch.device: expected the path of an input "
-			"device, such as \"/dev/input/by-id/…-event-kbd\"; correct it",
-			path, config_setting_source_line(group));
-	code = key ? incise_foot_switch_key(key) : -EINVAL;
-	if (code < 0)
-		return incise_error_set(
-			err, EINVAL,
-			"%.200s:%d: foot_switch.key: expected the name of a key, such as "
-			"\"b\", found \"%.40s\"; rig.conf(5) lists them",
-			path, config_setting_source_line(group), key ? key : "");
-	strcpy(setup->device, device);
-	setup->key = (uint16_t)code;
-	plan->has_foot_switch = true;
-	return 0;
+	for (int i = 1; i < tracker->n_stations; i++)
+		good |= tracker->stations[i] == tracker->tube_station;
+	return good ? 0
+		    : incise_conf_error(
+			      config_setting_get_member(root, "tracker_setup"),
+			      "tube_station", path, err,
+			      "one of tracker_setup.stations except the first, which is "
+			      "the scalpel's");
 }
 
 #define SIM_BACKEND "sim"
@@ -454,55 +298,48 @@ static int plan_string(struct incise_rig_plan *plan, int slot, bool wanted, int 
 	return 0;
 }
 
-static int plan_device(struct incise_rig_plan *plan, int kind, bool wanted,
+static int plan_device(struct incise_rig_plan *plan, int kind,
 		       const config_setting_t *root, const char *path,
 		       struct incise_error *err)
 {
-	const char *name = incise_kind_name[kind], *device = NULL;
+	const char *name = incise_kind_name[kind];
 	const config_setting_t *setting = config_setting_get_member(root, name);
-	int rc = incise_conf_string(root, path, name, &device, err);
+	bool wanted = plan->devices & kind_bit(kind);
+	const char *device = setting ? config_setting_get_string(setting) : NULL;
 
-	if (rc)
-		return rc;
-	if (!device && wanted)
-		return incise_error_set(err, ENODEV,
-					"%.200s: %s: missing, but required; add `%s = "
-					"\"" SIM_BACKEND ":\";` or another backend",
-					path, name, name);
-	if (!device)
+	if (device)
+		return plan_string(plan, kind, wanted, incise_conf_line(setting), name,
+				   device, path, err);
+	if (setting)
+		return incise_conf_error(setting, NULL, path, err, "text in quotes");
+	if (!wanted)
 		return 0;
-	return plan_string(plan, kind, wanted, config_setting_source_line(setting), name,
-			   device, path, err);
+	return incise_error_set(
+		err, ENODEV,
+		"%.200s: %s: missing, but required; add `%s = \"" SIM_BACKEND
+		":\";` or another backend",
+		path, name, name);
 }
 
 /* --- one to three actuators: stepper = "…", or [ "…", "…" ], and as many groups --- */
 
-static int read_actuators(struct incise_rig_plan *plan, const config_setting_t *root,
-			  const char *path, struct incise_error *err)
+static int read_actuators(void *to, const config_setting_t *all, const char *path,
+			  struct incise_error *err)
 {
-	const config_setting_t *all = config_setting_get_member(root, "actuator");
-	int n = all && config_setting_is_list(all) ? config_setting_length(all) : !!all;
-	int rc = 0;
+	struct incise_rig_plan *plan = to;
+	bool list = config_setting_is_list(all);
+	int n = list ? config_setting_length(all) : 1, rc = 0;
 
-	if (all && (n < 1 || n > INCISE_RIG_AXES_MAX))
-		return incise_error_set(
-			err, EINVAL,
-			"%.200s:%d: actuator: expected a group { key = value; }, or 1 to %d "
-			"of them in ( ), one for each stepper, found %d; correct it",
-			path, config_setting_source_line(all), INCISE_RIG_AXES_MAX, n);
-	for (int i = 0; i < n && !rc; i++) {
-		const config_setting_t *one = config_setting_is_list(all)
-						      ? config_setting_get_elem(all, i)
-						      : all;
-
-		if (one != all && !config_setting_is_group(one))
-			return incise_error_set(
-				err, EINVAL,
-				"%.200s:%d: actuator: expected groups { key = value; } in "
-				"the list; correct it",
-				path, config_setting_source_line(one));
-		rc = incise_actuator_read(&plan->actuator[i], one, path, err);
-	}
+	if (n < 1 || n > INCISE_RIG_AXES_MAX)
+		return incise_conf_error(
+			all, NULL, path, err,
+			"a group { KEY = VALUE; … }, or 1 to %d of them in "
+			"( ), one for each stepper",
+			INCISE_RIG_AXES_MAX);
+	for (int i = 0; i < n && !rc; i++)
+		rc = incise_actuator_read(&plan->actuator[i],
+					  list ? config_setting_get_elem(all, i) : all,
+					  path, err);
 	plan->n_actuators = n;
 	return rc;
 }
@@ -619,7 +456,7 @@ static int plan_steppers(struct incise_rig_plan *plan, const config_setting_t *r
 
 	if (!setting || !config_setting_is_aggregate(setting) ||
 	    config_setting_is_group(setting))
-		rc = plan_device(plan, KIND_STEPPER, wanted, root, path, err);
+		rc = plan_device(plan, KIND_STEPPER, root, path, err);
 	else
 		rc = plan_list(plan, wanted, setting, path, err);
 	if (rc || !setting)
@@ -641,130 +478,24 @@ static int plan_steppers(struct incise_rig_plan *plan, const config_setting_t *r
 	return check_directions(plan, where, err);
 }
 
-/* A key of the group sim; a message of config.c gets file and line in front. */
-static int plan_sim_key(struct incise_sim_config *config, const char *where,
-			const char *key, double value, struct incise_error *err)
+static int read_sim(void *to, const config_setting_t *group, const char *path,
+		    struct incise_error *err)
 {
-	struct incise_error cause = {0};
-
-	if (!incise_sim_config_set(config, key, value, &cause))
-		return 0;
-	return incise_error_set(err, EINVAL, "%s: %s", where, cause.text);
-}
-
-static int plan_sim_word(struct incise_sim_config *config, const char *where,
-			 const char *key, const char *word, struct incise_error *err)
-{
-	struct incise_error cause = {0};
-
-	if (!incise_sim_config_set_word(config, key, word, &cause))
-		return 0;
-	return incise_error_set(err, EINVAL, "%s: %s", where, cause.text);
-}
-
-static int plan_sim_setting(struct incise_sim_config *config, const char *path,
-			    const config_setting_t *setting, struct incise_error *err)
-{
-	const char *name = config_setting_name(setting);
-	int length =
-		config_setting_is_aggregate(setting) ? config_setting_length(setting) : 1;
-	bool protocol = !strcmp(name, "depth_mm") || !strcmp(name, "times");
-	char where[240], key[64];
-
-	snprintf(where, sizeof(where), "%.200s:%d", path,
-		 config_setting_source_line(setting));
-	if (!incise_sim_config_has(name))
-		return plan_sim_key(config, where, name, 0, err);
-	if (incise_sim_config_has_words(name)) {
-		const char *word = NULL;
-		int rc = incise_conf_string(config_setting_parent(setting), path, name,
-					    &word, err);
-
-		return rc ? rc : plan_sim_word(config, where, name, word, err);
-	}
-	if (config_setting_is_group(setting) ||
-	    config_setting_is_aggregate(setting) != protocol ||
-	    length > INCISE_SIM_DEPTHS_MAX)
-		return incise_error_set(
-			err, EINVAL,
-			protocol ? "%s: sim.%.40s: expected an array of at most "
-				   "8 numbers such as [5, 10]; correct it"
-				 : "%s: sim.%.40s: expected a number; correct it",
-			where, name);
-	for (int i = 0; i < length; i++) {
-		const config_setting_t *element =
-			protocol ? config_setting_get_elem(setting, i) : setting;
-		double value;
-
-		switch (config_setting_type(element)) {
-		case CONFIG_TYPE_INT:
-		case CONFIG_TYPE_INT64:
-			value = (double)config_setting_get_int64(element);
-			break;
-		case CONFIG_TYPE_FLOAT:
-			value = config_setting_get_float(element);
-			break;
-		default:
-			return incise_error_set(
-				err, EINVAL,
-				"%s: sim.%.40s: expected a number; correct it", where,
-				name);
-		}
-		snprintf(key, sizeof(key), protocol ? "%.40s[%d]" : "%.40s", name, i);
-		if (plan_sim_key(config, where, key, value, err))
-			return -EINVAL;
-	}
-	return 0;
-}
-
-static int plan_sim(struct incise_rig_plan *plan, const config_setting_t *root,
-		    const char *path, struct incise_error *err)
-{
-	const config_setting_t *group = config_setting_get_member(root, "sim");
+	struct incise_sim_config *config = &((struct incise_rig_plan *)to)->config;
+	int rc = incise_settings_read(incise_sim_settings, group, path, config, err);
 	const config_setting_t *depths, *times;
-	int rc;
 
-	if (!group)
-		return 0;
-	if (!config_setting_is_group(group))
-		return incise_error_set(
-			err, EINVAL,
-			"%.200s:%d: sim: expected a group { key = value; }; "
-			"correct it",
-			path, config_setting_source_line(group));
+	if (rc)
+		return rc;
 	depths = config_setting_get_member(group, "depth_mm");
 	times = config_setting_get_member(group, "times");
-	if (!!depths != !!times ||
-	    (depths && (config_setting_length(depths) != config_setting_length(times) ||
-			!config_setting_length(depths))))
-		return incise_error_set(
-			err, EINVAL,
-			"%.200s:%d: sim: expected depth_mm and times with equally many "
-			"values, 1 to %d; correct them",
-			path, config_setting_source_line(depths ? depths : times),
-			INCISE_SIM_DEPTHS_MAX);
-	if (depths)
-		plan->config.n_depths = config_setting_length(depths);
-	for (int i = 0; i < config_setting_length(group); i++) {
-		rc = plan_sim_setting(&plan->config, path,
-				      config_setting_get_elem(group, i), err);
-		if (rc)
-			return rc;
-	}
-	return 0;
-}
-
-/* @where, the file and line or the shorthand, starts the message. */
-static int plan_clock(struct incise_rig_plan *plan, const char *where, const char *text,
-		      struct incise_error *err)
-{
-	plan->simulated = !strcmp(text, "simulated");
-	if (plan->simulated || !strcmp(text, "real"))
+	if (!depths && !times)
 		return 0;
-	return incise_error_set(err, EINVAL,
-				"%s: clock: expected real or simulated, found %.40s; "
-				"correct it",
-				where, text);
+	if (!depths || !times ||
+	    config_setting_length(depths) != config_setting_length(times))
+		return incise_conf_error(group, depths ? "depth_mm" : "times", path, err,
+					 "depth_mm and times with equally many values");
+	return 0;
 }
 
 /* Its frames are known, so the group vision is not needed. */
@@ -786,43 +517,17 @@ static bool virtual_camera(const config_setting_t *root)
 static int plan_root(struct incise_rig_plan *plan, const config_setting_t *root,
 		     const char *path, struct incise_error *err)
 {
-	const char *clock = NULL;
-	char where[240];
-	int rc;
+	int rc = incise_settings_read(incise_rig_settings, root, path, plan, err);
 
-	rc = incise_conf_known(root, path, incise_rig_root_keys, err);
-	if (!rc)
-		rc = incise_conf_string(root, path, "clock", &clock, err);
-	if (!rc && clock) {
-		snprintf(where, sizeof(where), "%.200s:%d", path,
-			 config_setting_source_line(
-				 config_setting_get_member(root, "clock")));
-		rc = plan_clock(plan, where, clock, err);
-	}
-	if (!rc)
-		rc = incise_conf_surface(root, path, plan->point_mm, plan->normal, err);
-	if (!rc)
-		rc = plan_sim(plan, root, path, err);
-	if (!rc)
-		rc = read_actuators(plan, root, path, err);
-	if (!rc)
-		rc = read_tracker_setup(&plan->tracker, root, path, err);
-	if (!rc)
-		rc = read_force_setup(&plan->force, root, path, err);
-	if (!rc)
-		rc = read_camera_setup(&plan->camera, root, path, err);
-	if (!rc)
-		rc = read_vision_setup(&plan->vision, &plan->has_vision, root, path, err);
-	if (!rc)
-		rc = read_foot_switch(plan, root, path, err);
-	if (!rc)
-		rc = read_sign_key(plan, root, path, err);
+	plan->has_vision = config_setting_get_member(root, "vision");
+	plan->has_foot_switch = config_setting_get_member(root, "foot_switch");
 	if (plan->devices & INCISE_RIG_IF_NAMED &&
 	    !config_setting_get_member(root, "camera"))
 		plan->devices &= ~INCISE_RIG_CAMERA;
+	if (!rc)
+		rc = check_tube_station(&plan->tracker, root, path, err);
 	for (int kind = 0; kind < KIND_STEPPER && !rc; kind++)
-		rc = plan_device(plan, kind, plan->devices & kind_bit(kind), root, path,
-				 err);
+		rc = plan_device(plan, kind, root, path, err);
 	if (!rc)
 		rc = plan_steppers(plan, root, path, err);
 	if (!rc && !plan->has_vision && virtual_camera(root))
@@ -847,16 +552,16 @@ static int plan_file(struct incise_rig_plan *plan, const char *path,
 static int plan_word(struct incise_rig_plan *plan, char *word, struct incise_error *err)
 {
 	static const char *const own[] = {"clock", "mouse", NULL};
+	char *value = strchr(word, '='), where[80];
+	struct incise_error why = {0};
 	const char *meant;
-	char *value = strchr(word, '=');
-	struct incise_c_locale locale;
-	char where[80], *end;
-	double number;
+	int rc;
 
 	snprintf(where, sizeof(where), "sim:%.60s", word);
-	if (!strcmp(word, "mouse"))
-		return plan_sim_key(&plan->config, where, "motion", INCISE_SURGEON_HAND,
-				    err);
+	if (!strcmp(word, "mouse")) {
+		plan->config.motion = INCISE_SURGEON_HAND;
+		return 0;
+	}
 	if (!value || value == word || !value[1])
 		return incise_error_set(err, EINVAL,
 					"%s: expected KEY=VALUE, for example "
@@ -864,25 +569,17 @@ static int plan_word(struct incise_rig_plan *plan, char *word, struct incise_err
 					where);
 	*value++ = '\0';
 	if (!strcmp(word, "clock"))
-		return plan_clock(plan, where, value, err);
-	if (incise_sim_config_has_words(word))
-		return plan_sim_word(&plan->config, where, word, value, err);
-	meant = incise_sim_config_has(word) ? NULL : incise_nearest_name(word, own);
+		rc = incise_settings_set(incise_rig_settings, "rig", word, value, plan,
+					 &why);
+	else
+		rc = incise_settings_set(incise_sim_settings, "sim", word, value,
+					 &plan->config, &why);
+	meant = rc == -ENOENT ? incise_nearest_name(word, own) : NULL;
 	if (meant)
 		return incise_error_set(err, EINVAL,
 					"%s: %s: unknown key; did you mean %s?", where,
 					word, meant);
-	if (!incise_sim_config_has(word))
-		return plan_sim_key(&plan->config, where, word, 0, err);
-	locale = incise_c_locale_begin();
-	number = incise_decimal(value, &end);
-	incise_c_locale_end(locale);
-	if (*end)
-		return incise_error_set(
-			err, EINVAL,
-			"%s: %.40s: expected a number, found %.40s; correct it", where,
-			word, value);
-	return plan_sim_key(&plan->config, where, word, number, err);
+	return rc ? incise_error_set(err, EINVAL, "%s: %s", where, why.text) : 0;
 }
 
 static int plan_shorthand(struct incise_rig_plan *plan, const char *spec,
@@ -912,11 +609,11 @@ int incise_rig_plan_read(struct incise_rig_plan *plan, const char *spec,
 			 unsigned int devices, struct incise_error *err)
 {
 	*plan = (struct incise_rig_plan){
-		.normal = {0, 0, 1},
 		.watch = devices & INCISE_RIG_WATCH,
 		.devices = devices,
 		.n_axes = 1,
 	};
+	incise_settings_init(incise_rig_settings, plan);
 	incise_sim_config_init(&plan->config);
 	if (!strncmp(spec, SIM_BACKEND ":", strlen(SIM_BACKEND ":")))
 		return plan_shorthand(plan, spec, err);

@@ -15,18 +15,14 @@
 #include <incise/sim.h>
 #include <incise/tracker.h>
 #include <incise/vision.h>
+#include "../base/settings.h"
 
 /* The kinds of devices; their order is that of the incise_rig_device bits. */
 enum { KIND_TRACKER, KIND_FORCE, KIND_CAMERA, KIND_STEPPER, N_KINDS };
 
-/* Keys of rig.conf, and those of its groups of settings; an array ends with NULL. */
-extern const char *const incise_rig_root_keys[];
-#define INCISE_RIG_GROUPS 5
-struct incise_rig_group {
-	const char *name;
-	const char *keys[10];
-};
-extern const struct incise_rig_group incise_rig_groups[INCISE_RIG_GROUPS];
+/* The keys of rig.conf and of its groups, in a struct incise_rig_plan; those of sim and actuator are
+ * in ../sim/sim.h and actuator.h. */
+extern const struct incise_setting incise_rig_settings[];
 
 /* A slot for each device: the actuators' are the last ones. */
 #define N_SLOTS (KIND_STEPPER + INCISE_RIG_AXES_MAX)

@@ -312,9 +312,15 @@ const struct incise_tissue_force incise_tissue_forces[] = {
 			.name = "reaction",
 			.phases = CUTTING,
 			.kind = INCISE_SPRING_NORMAL,
-			.number = {{"reaction_N_mm", 1000, 0, 0.14},
-				   {"unloading_N_mm", 1000, 0, 0},
-				   {"friction", 1, 0.1, 0.1}},
+			.number =
+				{{"reaction_N_mm", "N/mm", 1000, "0", 0.14,
+				  "Kn: force per depth along the normal; replaces a model"},
+				 {"unloading_N_mm", "N/mm", 1000, "0", 0,
+				  "stiffness with which the tissue of a model "
+				  "unloads; 0: automatic"},
+				 {"friction", "", 1, "0.1", 0.1,
+				  "share of the model's force that resists the "
+				  "blade in its open cut, in both directions"}},
 			.zero = "no model, and tissue.reaction_N_mm is 0",
 			.run = reaction,
 			.integer = incise_fixed_stage_reaction,
@@ -326,7 +332,9 @@ const struct incise_tissue_force incise_tissue_forces[] = {
 			.name = "plane",
 			.phases = CUTTING,
 			.kind = INCISE_SPRING_SIDE,
-			.number = {{"plane_N_mm", 1000, 0, 0.17}},
+			.number = {{"plane_N_mm", "N/mm", 1000, "0", 0.17,
+				    "Kx: holds the blade in the plane that it had "
+				    "when the cut began"}},
 			.zero = "tissue.plane_N_mm is 0",
 			.run = plane,
 			.integer = incise_fixed_stage_plane,
@@ -336,7 +344,9 @@ const struct incise_tissue_force incise_tissue_forces[] = {
 			.name = "damping",
 			.phases = CUTTING | INSERTION,
 			.kind = INCISE_DAMPER,
-			.number = {{"damping_N_s_mm", 1, 0, 0.0005}},
+			.number =
+				{{"damping_N_s_mm", "N s/mm", 1, "0", 0.0005,
+				  "Kd: opposes the velocity of the tool in the tissue"}},
 			.zero = "tissue.damping_N_s_mm is 0",
 			.run = damping,
 			.integer = incise_fixed_stage_damping,
@@ -346,8 +356,13 @@ const struct incise_tissue_force incise_tissue_forces[] = {
 			.name = "insertion",
 			.phases = INSERTION,
 			.kind = INCISE_SPRING_NORMAL,
-			.number = {{"insertion_N_mm", 1000, 0, 0.28},
-				   {"aligned", 1, 0.2, 0.2}},
+			.number = {{"insertion_N_mm", "N/mm", 1000, "0", 0.28,
+				    "Ky: force per depth against the handle or a "
+				    "tube, across a cut or outside of it"},
+				   {"aligned", "", 1, "0.2", 0.2,
+				    "share of insertion_N_mm for a handle with its "
+				    "flat side along the cut, or a tube in a wide "
+				    "enough cut"}},
 			.zero = "tissue.insertion_N_mm is 0",
 			.run = insertion,
 			.integer = incise_fixed_stage_insertion,
@@ -357,7 +372,9 @@ const struct incise_tissue_force incise_tissue_forces[] = {
 			.name = "spread",
 			.phases = INSERTION,
 			.kind = INCISE_SPRING_ACROSS,
-			.number = {{"spread_N_mm", 1000, 0, 0.22}},
+			.number = {{"spread_N_mm", "N/mm", 1000, "0", 0.22,
+				    "Kxz: pulls a handle or tube back to its point "
+				    "of entry, perpendicular to the normal"}},
 			.zero = "tissue.spread_N_mm is 0",
 			.run = spread,
 			.integer = incise_fixed_stage_spread,

@@ -41,11 +41,13 @@ enum incise_tissue_row {
 #define INCISE_REACTION_UNLOADING 1
 #define INCISE_REACTION_FRICTION 2
 
-/* A number of the group `tissue` of a scene: 0 … max. */
+/* A number of the group `tissue` of a scene, 0 … max; see ../base/settings.h. */
 struct incise_force_number {
-	const char *key;
-	double max, initial;
+	const char *key, *unit;
+	double max;
+	const char *initial;
 	double skin; /* of neck.scene: what tests and benchmarks take */
+	const char *help;
 };
 
 /*

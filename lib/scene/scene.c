@@ -9,7 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/infile.h>
-#include "../base/conf.h"
 #include "../base/crc32c.h"
 #include "../base/vector.h"
 #include "../control/pose_loop.h"
@@ -18,92 +17,261 @@
 
 #define PARALLEL_COS 0.985     /* cos 10 degrees */
 #define FILE_MOST (1ULL << 30) /* more than a mesh of 4 million triangles has */
-/* Of the largest group, tissue: seven keys and the numbers of all forces. */
-#define KEYS_MAX (7 + INCISE_FORCES_MAX * INCISE_FORCE_NUMBERS)
 
-/* A number of a group. */
-struct number {
-	const char *key;
-	double min, max;
-	size_t offset; /* into struct incise_scene */
-};
+/* --- the keys; incise-scene(5) gives the reasons of the defaults --------------------------- */
 
-/* The keys of a group: both lists end with an empty item. */
-#define FITS_KEYS(numbers, more)                                             \
-	_Static_assert(sizeof(numbers) / sizeof(*(numbers)) +                \
-				       sizeof(more) / sizeof(*(more)) - 2 <= \
-			       KEYS_MAX,                                     \
-		       "raise KEYS_MAX")
+#define SETTINGS_OF struct incise_scene
 
-#define NUMBER(group, name, min, max)                                      \
-	{                                                                  \
-#name, min, max, offsetof(struct incise_scene, group.name) \
-	}
+static const char *const arithmetics[] = {"double", "fixed", NULL};
+static const char *const withdrawals[] = {"paper", "dissipative", NULL};
+static const char *const orientations[] = {"eased", "paper", NULL};
+static const char *const skins[] = {"plain", "neck", "liver", NULL};
 
-static const struct number tool[] = {
-	NUMBER(tool, handle_mm, 1, 1000),
-	NUMBER(tool, handle_width_mm, 1, 100),
-	NUMBER(tool, handle_thickness_mm, 0.1, 100),
-	NUMBER(tool, tube_mm, 0.5, 100),
+/* The forces of the tissue bring theirs; see tissue_settings(). */
+static const struct incise_setting tissue[] = {
+	SETTING_NUMBER(gain, tissue.gain, "", 0, 10, "1",
+		       "factor of all tissue forces, including the model's"),
+	SETTING_WORD(withdrawal, tissue.dissipates, withdrawals, "dissipative",
+		     "dissipative or paper: force of a model when the blade withdraws"),
+	SETTING_WORD(orientation, tissue.printed_orientation, orientations, "eased",
+		     "eased or paper: effect of the handle's rotation"),
+	/* Of a tracker with ±0.05 mm of noise the poses shown have ±0.16 mm. */
+	SETTING_NUMBER(leave_mm, tissue.leave_mm, "mm", 0, 5, "0.2",
+		       "a contact begins at the surface and ends this far outside"),
+	/* More than that: a blade that rests on the skin cuts nothing. */
+	SETTING_NUMBER(cut_from_mm, tissue.cut_from_mm, "mm", 0, 50, "0.5",
+		       "a blade deeper than this leaves a cut"),
+	SETTING_NUMBER(stretch_mm, tissue.stretch_mm, "mm", 0, 50, "2",
+		       "elastic width of a cut"),
+	SETTING_WHOLE(cuts_most, tissue.cuts_most, "", 1, 1024, "64",
+		      "largest number of straight cuts in an incision, 1.2 KiB each"),
 	{0},
 };
 
-static const struct number device[] = {
-	NUMBER(device, mass_kg, 0.001, 10),
-	NUMBER(device, damping_N_s_mm, 0, 1),
-	NUMBER(device, coulomb_N, 0, 10),
-	NUMBER(device, encoder_mm, 0, 1),
+static const struct incise_setting effects[] = {
+	SETTING_WHOLE(average_ticks, effects.average_ticks, "", 1, 64, "1",
+		      "number of ticks over which the normal is averaged"),
 	{0},
 };
 
-static const struct number membrane[] = {
-	NUMBER(membrane, radius_mm, 0.1, 1000),
-	NUMBER(membrane, thickness_mm, 0.1, 100),
-	NUMBER(membrane, puncture_N, 0, 100),
-	NUMBER(membrane, back_wall_mm, 0.1, 1000),
+static const struct incise_setting tool[] = {
+	SETTING_DIRECTION(axis, tool.axis, "[0, 0, 1]",
+			  "from the tip of the blade to the end of the handle"),
+	SETTING_DIRECTION(side, tool.side, "[0, 1, 0]",
+			  "normal of the flat side of blade and handle; at least 10 "
+			  "degrees from the line of axis"),
+	SETTING_NUMBER(handle_mm, tool.handle_mm, "mm", 1, 1000, "120",
+		       "distance of the handle's end from the tip"),
+	SETTING_NUMBER(handle_width_mm, tool.handle_width_mm, "mm", 1, 100, "10",
+		       "width of the handle's flat end"),
+	SETTING_NUMBER(handle_thickness_mm, tool.handle_thickness_mm, "mm", 0.1, 100, "3",
+		       "thickness of the handle's flat end"),
+	SETTING_NUMBER(tube_mm, tool.tube_mm, "mm", 0.5, 100, "7",
+		       "diameter of the tube"),
 	{0},
 };
 
-static const struct number limits[] = {
-	NUMBER(limits, force_N, 0.01, 100),
-	NUMBER(limits, slew_N_s, 1, 1e5),
-	NUMBER(limits, pose_age_ms, 1, 1000),
-	NUMBER(limits, fade_ms, 1, 1000),
-	NUMBER(limits, ramp_ms, 1, 10000),
-	NUMBER(limits, start_N, 0, 100),
+static const struct incise_setting membrane[] = {
+	SETTING_VECTOR(point_mm, membrane.point_mm, "mm", SETTING_REQUIRED,
+		       "its centre, below the surface"),
+	SETTING_DIRECTION(normal, membrane.normal, "[0, 0, 1]", "out of the tissue"),
+	SETTING_NUMBER(radius_mm, membrane.radius_mm, "mm", 0.1, 1000, SETTING_REQUIRED,
+		       "its radius"),
+	SETTING_NUMBER(puncture_N, membrane.puncture_N, "N", 0, 100, SETTING_REQUIRED,
+		       "force at which it opens"),
+	SETTING_NUMBER(thickness_mm, membrane.thickness_mm, "mm", 0.1, 100,
+		       SETTING_REQUIRED,
+		       "depression at which it opens; the force rises linearly up to "
+		       "there"),
+	SETTING_NUMBER(back_wall_mm, membrane.back_wall_mm, "mm", 0.1, 1000,
+		       SETTING_REQUIRED,
+		       "distance of the opposite wall of the airway; more than "
+		       "thickness_mm"),
 	{0},
 };
-_Static_assert(sizeof(limits) / sizeof(*limits) - 1 <= KEYS_MAX, "raise KEYS_MAX");
 
-/*
- * Read the numbers of a group, if it is there. Its keys are these and the ones of @more, a
- * list that ends with NULL. Returns the group by *found.
- */
-static int read_group(struct incise_scene *scene, const config_setting_t *root,
-		      const char *name, const struct number *numbers,
-		      const char *const *more, const config_setting_t **found,
-		      struct incise_error *err)
+static const struct incise_setting device[] = {
+	SETTING_NUMBER(mass_kg, device.mass_kg, "kg", 0.001, 10, "0.05",
+		       "mass that moves with the hand"),
+	SETTING_NUMBER(damping_N_s_mm, device.damping_N_s_mm, "N s/mm", 0, 1, "0.01",
+		       "viscous damping"),
+	SETTING_NUMBER(coulomb_N, device.coulomb_N, "N", 0, 10, "0.01", "dry friction"),
+	SETTING_NUMBER(encoder_mm, device.encoder_mm, "mm", 0, 1, "0",
+		       "resolution of the position; 0: continuous"),
+	SETTING_WHOLE(delay_ticks, device.delay_ticks, "", 0, 64, "(see below)",
+		      "delay from a position to its force"),
+	SETTING_WHOLE(late_ticks, device.late_ticks, "", 0, INCISE_POSE_LOOP_LATE_MAX,
+		      "0", "delay of the actuator, in addition to the tracker's"),
+	{0},
+};
+
+static const struct incise_setting limits[] = {
+	SETTING_NUMBER(force_N, limits.force_N, "N", 0.01, 100, "4",
+		       "largest commanded force"),
+	SETTING_NUMBER(slew_N_s, limits.slew_N_s, "N/s", 1, 1e5, "400",
+		       "largest rate of change of the force"),
+	SETTING_NUMBER(pose_age_ms, limits.pose_age_ms, "ms", 1, 1000, "50",
+		       "the force ramps to zero when the last pose is older"),
+	SETTING_NUMBER(fade_ms, limits.fade_ms, "ms", 1, 1000, "20",
+		       "duration of that ramp"),
+	SETTING_NUMBER(start_N, limits.start_N, "N", 0, 100, "0.1",
+		       "at the start there is no force until the tissue force is at most "
+		       "this"),
+	SETTING_NUMBER(ramp_ms, limits.ramp_ms, "ms", 1, 10000, "200",
+		       "duration of the ramp from there to the full force"),
+	{0},
+};
+
+static bool is_range(const double *ends, int n, const char *text)
 {
-	const config_setting_t *group = config_setting_get_member(root, name);
-	const char *keys[KEYS_MAX + 1];
-	int n = 0, rc;
-
-	*found = group;
-	if (!group)
-		return 0;
-	for (const struct number *number = numbers; number && number->key; number++)
-		keys[n++] = number->key;
-	for (; more && *more; more++)
-		keys[n++] = *more;
-	keys[n] = NULL;
-	rc = incise_conf_known(group, scene->path, keys, err);
-	for (const struct number *number = numbers; number && number->key && !rc;
-	     number++)
-		rc = incise_conf_number(group, scene->path, number->key, number->min,
-					number->max,
-					(double *)((char *)scene + number->offset), err);
-	return rc;
+	(void)n;
+	(void)text;
+	return ends[0] <= ends[1];
 }
+
+/* [least, largest] */
+#define RANGE(row, key, most, help)                                \
+	[row] = {#key,                                             \
+		 SETTING_IS_NUMBER,                                \
+		 "mm",                                             \
+		 0,                                                \
+		 most,                                             \
+		 "(none)",                                         \
+		 help,                                             \
+		 offsetof(struct incise_scene, criteria[row].min), \
+		 2 * sizeof(double),                               \
+		 SETTING_STORES_DOUBLE,                            \
+		 .fits = is_range,                                 \
+		 .expected = "two numbers [least, largest] from 0 to " #most}
+#define MOST(row, key, unit, most, help) \
+	[row] = SETTING_NUMBER(key, criteria[row].max, unit, 0, most, "(none)", help)
+#define SWITCH(row, key, help) \
+	[row] = SETTING_TRUTH(key, criteria[row].max, "(none)", help)
+
+static const struct incise_setting criteria[INCISE_CRITERIA + 1] = {
+	RANGE(INCISE_CRITERION_CUT_LENGTH, cut_length_mm, 1000,
+	      "[least, largest] length of the incision"),
+	RANGE(INCISE_CRITERION_CUT_DEPTH, cut_depth_mm, 1000,
+	      "[least, largest] of the incision's largest depth"),
+	MOST(INCISE_CRITERION_OFF_TARGET, off_target_mm, "mm", 1000,
+	     "largest distance of the incision from the axis of the membrane"),
+	MOST(INCISE_CRITERION_INCISIONS, incisions_most, "", 1024,
+	     "largest number of incisions"),
+	SWITCH(INCISE_CRITERION_MEMBRANE, membrane,
+	       "whether a tool must pass the membrane"),
+	RANGE(INCISE_CRITERION_INSERTION, insertion_depth_mm, 1000,
+	      "[least, largest] depth of the tube's end below the skin at the end"),
+	SWITCH(INCISE_CRITERION_BACK_WALL, back_wall,
+	       "whether the wall behind the airway must be touched; false: must not be "
+	       "touched"),
+	MOST(INCISE_CRITERION_FORCE, force_most_N, "N", 1000, "largest commanded force"),
+	MOST(INCISE_CRITERION_TIME, time_most_s, "s", 86400,
+	     "longest time from the first contact until the tube's end last advanced by "
+	     "more than 0.5 mm, or without a tube until the last contact"),
+	{0},
+};
+
+static bool is_side(const double *texture_px, int n, const char *text)
+{
+	int side = (int)*texture_px;
+
+	(void)n;
+	(void)text;
+	return side >= 256 && side <= 4096 && !(side & (side - 1));
+}
+
+static const struct incise_setting picture[] = {
+	SETTING_TRUTH(wound, picture.wound, "false", "cuts are drawn"),
+	SETTING_TRUTH(bleeding, picture.bleeding, "false", "cuts bleed"),
+	SETTING_WORD(skin, picture.skin, skins, "plain", "plain, neck or liver"),
+	SETTING_TRUTH(larynx, picture.larynx, "false",
+		      "a larynx shows below the skin, up to 5 mm high at the centre of "
+		      "the texture"),
+	SETTING_WHOLE(texture_px, picture.texture_px, "px", 256, 4096, "2048",
+		      "side of the texture", .fits = is_side,
+		      .expected = "256, 512, 1024, 2048 or 4096"),
+	SETTING_DIRECTION(gravity, picture.gravity, "[0, 0, -1]",
+			  "direction in which blood flows"),
+	SETTING_NUMBER(blood_ul_s_mm2, picture.blood_ul_s_mm2, "µl/(s mm²)", 0, 100,
+		       "0.05",
+		       "flow of blood from a fresh cut, per mm of its length and mm of "
+		       "its depth"),
+	SETTING_NUMBER(viscosity_mPa_s, picture.viscosity_mPa_s, "mPa s", 0.5, 1000, "4",
+		       "viscosity of blood"),
+	SETTING_WHOLE(seed, picture.seed, "", 0, INT32_MAX, "1",
+		      "seed of the random details of skin and blood"),
+	{0},
+};
+
+static int read_tissue(void *to, const config_setting_t *group, const char *path,
+		       struct incise_error *err);
+static int read_surface(void *to, const config_setting_t *group, const char *path,
+			struct incise_error *err);
+
+static const struct incise_setting scene_settings[] = {
+	SETTING_NUMBER(rate_hz, rate_hz, "Hz", 100, 20000, "1000", "ticks per second"),
+	SETTING_OWN(model, "", "(none)",
+		    "model of the reaction force, .fis or .fx; or a group of models, see "
+		    "below"),
+	SETTING_WORD(
+		arithmetic, fixed, arithmetics, "fixed",
+		"fixed or double: evaluate reaction and plane constraint in integers "
+		"or in floating point"),
+	SETTING_OWN(surface, "", "(none)", "the tissue surface", .read = read_surface),
+	SETTING_OWN(tissue, "", "(none)", "forces of the tissue", .read = read_tissue),
+	SETTING_GROUP(effects, effects, "what smooths the forces"),
+	SETTING_GROUP(tool, tool, "the scalpel"),
+	SETTING_GROUP(membrane, membrane, "a membrane that a tool passes"),
+	SETTING_GROUP(device, device, "what a hand holds"),
+	SETTING_GROUP(limits, limits, "limits of the force"),
+	SETTING_GROUP(criteria, criteria, "what a session is assessed by"),
+	SETTING_GROUP(picture, picture, "the image"),
+	{0},
+};
+
+/* Of the group tissue: those above, and those of each force. */
+static void tissue_settings(struct incise_setting rows[SETTING_ROWS_MAX + 1])
+{
+	int n = 0;
+
+	memset(rows, 0, (SETTING_ROWS_MAX + 1) * sizeof(*rows));
+	for (; tissue[n].key; n++)
+		rows[n] = tissue[n];
+	for (int i = 0; i < incise_n_tissue_forces; i++)
+		for (int k = 0; k < INCISE_FORCE_NUMBERS; k++) {
+			const struct incise_force_number *from =
+				&incise_tissue_forces[i].number[k];
+
+			if (from->key)
+				rows[n++] = (struct incise_setting){
+					from->key,
+					SETTING_IS_NUMBER,
+					from->unit,
+					0,
+					from->max,
+					from->initial,
+					from->help,
+					offsetof(struct incise_scene, tissue.force) +
+						sizeof(double) *
+							(i * INCISE_FORCE_NUMBERS + k),
+					sizeof(double)};
+		}
+}
+_Static_assert(sizeof(tissue) / sizeof(*tissue) +
+			       INCISE_FORCES_MAX * INCISE_FORCE_NUMBERS <=
+		       SETTING_ROWS_MAX,
+	       "raise SETTING_ROWS_MAX");
+
+static int read_tissue(void *to, const config_setting_t *group, const char *path,
+		       struct incise_error *err)
+{
+	struct incise_setting rows[SETTING_ROWS_MAX + 1];
+
+	tissue_settings(rows);
+	return incise_settings_read(rows, group, path, to, err);
+}
+
+/* --- the surface --------------------------------------------------------------------------- */
 
 /* A name in a scene is relative to the scene's folder. To be freed; NULL: no memory. */
 static char *beside(const struct incise_scene *scene, const char *name)
@@ -119,249 +287,135 @@ static char *beside(const struct incise_scene *scene, const char *name)
 	return path;
 }
 
-/* A surface as the file has it. */
-struct named {
-	double point_mm[3], to_mm[3], normal[3], radius_mm;
-	const char *file;
-	bool cavity;
-};
-
-static struct incise_surface *plane(const struct named *n, struct incise_error *err)
+static struct incise_surface *plane(const struct incise_scene_surface *n,
+				    struct incise_error *err)
 {
 	return incise_surface_new_plane(n->point_mm, n->normal, err);
 }
 
-static struct incise_surface *sphere(const struct named *n, struct incise_error *err)
+static struct incise_surface *sphere(const struct incise_scene_surface *n,
+				     struct incise_error *err)
 {
 	return incise_surface_new_sphere(n->point_mm, n->radius_mm, err);
 }
 
-static struct incise_surface *capsule(const struct named *n, struct incise_error *err)
+static struct incise_surface *capsule(const struct incise_scene_surface *n,
+				      struct incise_error *err)
 {
 	return incise_surface_new_capsule(n->point_mm, n->to_mm, n->radius_mm, err);
 }
 
-static struct incise_surface *heights(const struct named *n, struct incise_error *err)
+static struct incise_surface *heights(const struct incise_scene_surface *n,
+				      struct incise_error *err)
 {
 	return incise_surface_load_heights(n->file, n->point_mm, err);
 }
 
-static struct incise_surface *mesh(const struct named *n, struct incise_error *err)
+static struct incise_surface *mesh(const struct incise_scene_surface *n,
+				   struct incise_error *err)
 {
 	return incise_surface_load_mesh(n->file, n->point_mm, n->cavity, err);
 }
 
-/* The keys of each kind; those without an @optional mark must be there. */
+#undef SETTINGS_OF
+#define SETTINGS_OF struct incise_scene_surface
+#define KIND SETTING_OWN(kind, "", "plane", "plane, sphere, capsule, heights or mesh")
+#define AT SETTING_VECTOR(at_mm, point_mm, "mm", "[0, 0, 0]", "position of its origin")
+#define RADIUS(help) \
+	SETTING_NUMBER(radius_mm, radius_mm, "mm", 0.1, 1e5, SETTING_REQUIRED, help)
+
+static const struct incise_setting plane_settings[] = {
+	KIND,
+	SETTING_VECTOR(point_mm, point_mm, "mm", "[0, 0, 0]", "a point of the plane"),
+	SETTING_DIRECTION(normal, normal, "[0, 0, 1]", "out of the tissue"),
+	{0},
+};
+
+static const struct incise_setting sphere_settings[] = {
+	KIND,
+	SETTING_VECTOR(centre_mm, point_mm, "mm", SETTING_REQUIRED, "its centre"),
+	RADIUS("its radius"),
+	{0},
+};
+
+static const struct incise_setting capsule_settings[] = {
+	KIND,
+	SETTING_VECTOR(from_mm, point_mm, "mm", SETTING_REQUIRED, "one end of the axis"),
+	SETTING_VECTOR(to_mm, to_mm, "mm", SETTING_REQUIRED, "the other end"),
+	RADIUS("distance of the surface from the axis"),
+	{0},
+};
+
+static const struct incise_setting heights_settings[] = {
+	KIND,
+	SETTING_TEXT(file, file, SETTING_REQUIRED, "ESRI ASCII grid of heights along z"),
+	AT,
+	{0},
+};
+
+static const struct incise_setting mesh_settings[] = {
+	KIND,
+	SETTING_TEXT(file, file, SETTING_REQUIRED,
+		     "Wavefront OBJ, or STL (text or binary), with faces "
+		     "counter-clockwise seen from outside, at most 4 million triangles"),
+	AT,
+	SETTING_TRUTH(cavity, cavity, "false",
+		      "the tissue may lie around closed parts of it; else one that is "
+		      "turned inside out is rejected"),
+	{0},
+};
+
 static const struct kind {
 	const char *name;
-	const char *point; /* the key of its point */
-	bool optional;	   /* the point is */
-	const char *keys[5];
-	struct incise_surface *(*make)(const struct named *named,
+	const struct incise_setting *settings;
+	struct incise_surface *(*make)(const struct incise_scene_surface *named,
 				       struct incise_error *err);
 } kinds[] = {
-	{"plane", "point_mm", true, {"kind", "point_mm", "normal"}, plane},
-	{"sphere", "centre_mm", false, {"kind", "centre_mm", "radius_mm"}, sphere},
-	{"capsule", "from_mm", false, {"kind", "from_mm", "to_mm", "radius_mm"}, capsule},
-	{"heights", "at_mm", true, {"kind", "file", "at_mm"}, heights},
-	{"mesh", "at_mm", true, {"kind", "file", "at_mm", "cavity"}, mesh},
+	{"plane", plane_settings, plane},	{"sphere", sphere_settings, sphere},
+	{"capsule", capsule_settings, capsule}, {"heights", heights_settings, heights},
+	{"mesh", mesh_settings, mesh},
 };
+
 #define KINDS (sizeof(kinds) / sizeof(*kinds))
 
-static const struct kind *kind_of(const char *name)
-{
-	for (size_t i = 0; i < KINDS; i++)
-		if (!strcmp(kinds[i].name, name))
-			return &kinds[i];
-	return NULL;
-}
-
-static bool has(const struct kind *kind, const char *key)
-{
-	for (int i = 0; kind->keys[i]; i++)
-		if (!strcmp(kind->keys[i], key))
-			return true;
-	return false;
-}
-
-static int read_named(struct named *named, const struct kind *kind,
-		      const config_setting_t *group, const char *path,
-		      struct incise_error *err)
-{
-	int rc = incise_conf_known(group, path, kind->keys, err);
-
-	if (!rc && !kind->optional)
-		rc = incise_conf_need(group, path, kind->point, err);
-	if (!rc)
-		rc = incise_conf_vector(group, path, kind->point, named->point_mm, err);
-	if (!rc && has(kind, "normal"))
-		rc = incise_conf_direction(group, path, "normal", named->normal, err);
-	if (!rc && has(kind, "to_mm"))
-		rc = incise_conf_need(group, path, "to_mm", err);
-	if (!rc && has(kind, "to_mm"))
-		rc = incise_conf_vector(group, path, "to_mm", named->to_mm, err);
-	if (!rc && has(kind, "radius_mm"))
-		rc = incise_conf_need(group, path, "radius_mm", err);
-	if (!rc && has(kind, "radius_mm"))
-		rc = incise_conf_number(group, path, "radius_mm", 0.1, 1e5,
-					&named->radius_mm, err);
-	if (!rc && has(kind, "file"))
-		rc = incise_conf_need(group, path, "file", err);
-	if (!rc && has(kind, "file"))
-		rc = incise_conf_string(group, path, "file", &named->file, err);
-	if (!rc && has(kind, "cavity"))
-		rc = incise_conf_bool(group, path, "cavity", &named->cavity, err);
-	return rc;
-}
-
-static int read_surface(struct incise_scene *scene, const config_setting_t *root,
+static int read_surface(void *to, const config_setting_t *group, const char *path,
 			struct incise_error *err)
 {
-	const config_setting_t *group = config_setting_get_member(root, "surface");
-	struct named named = {.normal = {0, 0, 1}};
-	struct incise_error why = {0};
+	struct incise_scene *scene = to;
+	struct incise_scene_surface *named = &scene->named;
 	const char *name = "plane";
-	const struct kind *kind;
+	struct incise_error why = {0};
+	const struct kind *kind = kinds;
 	int rc;
 
-	if (!group)
-		return 0;
-	if (!config_setting_is_group(group))
-		return incise_error_set(err, EINVAL,
-					"%s:%d: surface: expected a group "
-					"{ kind = \"plane\"; … }; correct it",
-					scene->path, config_setting_source_line(group));
-	rc = incise_conf_string(group, scene->path, "kind", &name, err);
+	if (config_setting_get_member(group, "kind") &&
+	    !config_setting_lookup_string(group, "kind", &name))
+		name = "";
+	while (kind < kinds + KINDS && strcmp(kind->name, name))
+		kind++;
+	if (kind == kinds + KINDS)
+		return incise_conf_error(group, "kind", path, err,
+					 "\"plane\", \"sphere\", \"capsule\", "
+					 "\"heights\" or \"mesh\"");
+	incise_settings_init(kind->settings, named);
+	rc = incise_settings_read(kind->settings, group, path, named, err);
 	if (rc)
 		return rc;
-	kind = kind_of(name);
-	if (!kind)
-		return incise_error_set(err, EINVAL,
-					"%s:%d: surface.kind: expected \"plane\", "
-					"\"sphere\", \"capsule\", \"heights\" or "
-					"\"mesh\", found \"%.40s\"; correct it",
-					scene->path,
-					config_setting_source_line(
-						config_setting_get_member(group, "kind")),
-					name);
-	rc = read_named(&named, kind, group, scene->path, err);
-	if (rc)
-		return rc;
-	if (named.file) {
-		scene->surface_path = beside(scene, named.file);
+	if (named->file) {
+		scene->surface_path = beside(scene, named->file);
 		if (!scene->surface_path)
-			return incise_error_set(err, ENOMEM, "%s: no memory",
-						scene->path);
-		named.file = scene->surface_path;
+			return incise_error_set(err, ENOMEM, "%s: no memory", path);
+		named->file = scene->surface_path;
 	}
-	scene->surface = kind->make(&named, &why);
+	scene->surface = kind->make(named, &why);
 	scene->surface_kind = kind->name;
 	if (!scene->surface)
-		return incise_error_set(err, why.code, "%s:%d: its surface: %s",
-					scene->path, config_setting_source_line(group),
-					why.text);
+		return incise_error_set(err, why.code, "%s:%d: its surface: %s", path,
+					incise_conf_line(group), why.text);
 	return 0;
 }
 
-static int refuse(const struct incise_scene *scene, const config_setting_t *group,
-		  const char *key, const char *expected, struct incise_error *err)
-{
-	const config_setting_t *at = config_setting_get_member(group, key);
-
-	return incise_error_set(err, EINVAL, "%s:%u: picture.%s: expected %s",
-				scene->path, config_setting_source_line(at), key,
-				expected);
-}
-
-static int read_skin(struct incise_scene *scene, const config_setting_t *group,
-		     struct incise_error *err)
-{
-	static const char *const names[] = {"plain", "neck", "liver"};
-	const char *name = NULL;
-	int rc = incise_conf_string(group, scene->path, "skin", &name, err);
-
-	if (rc || !name)
-		return rc;
-	for (int i = 0; i < 3; i++)
-		if (!strcmp(name, names[i])) {
-			scene->picture.skin = (enum incise_skin)i;
-			return 0;
-		}
-	return refuse(scene, group, "skin", "\"plain\", \"neck\" or \"liver\"", err);
-}
-
-static bool is_side(int texture_px)
-{
-	return texture_px >= 256 && texture_px <= 4096 &&
-	       !(texture_px & (texture_px - 1));
-}
-
-static int read_picture_switches(struct incise_scene *scene,
-				 const config_setting_t *group, struct incise_error *err)
-{
-	struct incise_scene_picture *to = &scene->picture;
-	int rc = incise_conf_bool(group, scene->path, "wound", &to->wound, err);
-
-	if (!rc)
-		rc = incise_conf_bool(group, scene->path, "bleeding", &to->bleeding, err);
-	if (!rc)
-		rc = incise_conf_bool(group, scene->path, "larynx", &to->larynx, err);
-	return rc ? rc : read_skin(scene, group, err);
-}
-
-static int read_picture_numbers(struct incise_scene *scene, const config_setting_t *group,
-				struct incise_error *err)
-{
-	struct incise_scene_picture *to = &scene->picture;
-	const char *path = scene->path;
-	int rc = incise_conf_number(group, path, "blood_ul_s_mm2", 0, 100,
-				    &to->blood_ul_s_mm2, err);
-
-	if (!rc)
-		rc = incise_conf_number(group, path, "viscosity_mPa_s", 0.5, 1000,
-					&to->viscosity_mPa_s, err);
-	if (!rc)
-		rc = incise_conf_direction(group, path, "gravity", to->gravity, err);
-	if (!rc)
-		rc = incise_conf_integer(group, path, "seed", 0, INT32_MAX, &to->seed,
-					 err);
-	if (!rc)
-		rc = incise_conf_integer(group, path, "texture_px", 256, 4096,
-					 &to->texture_px, err);
-	if (!rc && !is_side(to->texture_px))
-		rc = refuse(scene, group, "texture_px", "256, 512, 1024, 2048 or 4096",
-			    err);
-	return rc;
-}
-
-static void set_picture_defaults(struct incise_scene_picture *picture)
-{
-	*picture = (struct incise_scene_picture){
-		.texture_px = 2048,
-		.gravity = {0, 0, -1},
-		.blood_ul_s_mm2 = 0.05,
-		.viscosity_mPa_s = 4,
-		.seed = 1,
-	};
-}
-
-static int read_picture(struct incise_scene *scene, const config_setting_t *root,
-			struct incise_error *err)
-{
-	static const char *const keys[] = {"wound",   "bleeding",	"larynx",
-					   "skin",    "blood_ul_s_mm2", "viscosity_mPa_s",
-					   "gravity", "seed",		"texture_px",
-					   NULL};
-	const config_setting_t *group = config_setting_get_member(root, "picture");
-	int rc;
-
-	if (!group)
-		return 0;
-	rc = incise_conf_known(group, scene->path, keys, err);
-	if (!rc)
-		rc = read_picture_switches(scene, group, err);
-	return rc ? rc : read_picture_numbers(scene, group, err);
-}
+/* --- the model ----------------------------------------------------------------------------- */
 
 static bool ends_with(const char *text, const char *end)
 {
@@ -458,22 +512,22 @@ static int read_phases(struct incise_scene *scene, const config_setting_t *group
 {
 	int rc = incise_conf_known(group, scene->path, cutting_phases, err);
 
-	if (!rc)
-		rc = incise_conf_need(group, scene->path, "cut", err);
 	for (int i = 0; i < INCISE_CUTTING_PHASES && !rc; i++) {
 		const char *name = NULL;
 
-		rc = incise_conf_string(group, scene->path, cutting_phases[i], &name,
-					err);
-		if (!rc && name)
+		if (config_setting_lookup_string(group, cutting_phases[i], &name))
 			rc = load_model(scene, &scene->cut[i], beside(scene, name), err);
+		else if (config_setting_get_member(group, cutting_phases[i]))
+			rc = incise_conf_error(group, cutting_phases[i], scene->path, err,
+					       "text in quotes");
+		else if (i == INCISE_CUT)
+			rc = incise_conf_missing(group, scene->path, "cut", err);
 	}
 	if (!rc && scene->cut[INCISE_WITHDRAW].path && !scene->tissue.dissipates)
-		rc = incise_error_set(
-			err, EINVAL,
-			"%s:%u: model.withdraw: with tissue.withdrawal \"paper\" a blade "
-			"comes out with the force of its cut; remove one of them",
-			scene->path, config_setting_source_line(group));
+		rc = incise_conf_error(
+			group, "withdraw", scene->path, err,
+			"no model with tissue.withdrawal \"paper\", by which "
+			"a blade comes out with the force of its cut");
 	return rc;
 }
 
@@ -482,102 +536,34 @@ static int read_model(struct incise_scene *scene, const config_setting_t *root,
 {
 	const config_setting_t *setting = config_setting_get_member(root, "model");
 	const char *name = NULL;
-	int rc = 0;
 
 	if (override)
 		return load_model(scene, &scene->cut[INCISE_CUT], strdup(override), err);
-	if (setting && config_setting_is_group(setting))
+	if (!setting)
+		return 0;
+	if (config_setting_is_group(setting))
 		return read_phases(scene, setting, err);
-	rc = incise_conf_string(root, scene->path, "model", &name, err);
-	if (rc || !name)
-		return rc;
+	name = config_setting_get_string(setting);
+	if (!name)
+		return incise_conf_error(setting, NULL, scene->path, err,
+					 "text in quotes, or a group { cut = …; }");
 	return load_model(scene, &scene->cut[INCISE_CUT], beside(scene, name), err);
 }
 
-/* A key of tissue that is "paper", for the paper's own way, or @other. */
-static int read_way(const struct incise_scene *scene, const config_setting_t *group,
-		    const char *key, const char *other, bool *paper,
-		    struct incise_error *err)
-{
-	const char *name = NULL;
-	int rc = incise_conf_string(group, scene->path, key, &name, err);
+/* --- what keys are to each other ----------------------------------------------------------- */
 
-	if (rc || !name)
-		return rc;
-	*paper = !strcmp(name, "paper");
-	if (*paper || !strcmp(name, other))
+static int check_membrane(const struct incise_scene *scene, const config_setting_t *root,
+			  struct incise_error *err)
+{
+	const config_setting_t *group = config_setting_get_member(root, "membrane");
+
+	if (!group || scene->membrane.back_wall_mm > scene->membrane.thickness_mm)
 		return 0;
-	return incise_error_set(
-		err, EINVAL,
-		"%s:%u: tissue.%s: expected \"%s\" or \"paper\", found "
-		"\"%.40s\"; correct it",
-		scene->path,
-		config_setting_source_line(config_setting_get_member(group, key)), key,
-		other, name);
+	return incise_conf_error(group, "back_wall_mm", scene->path, err,
+				 "more than thickness_mm, %g, so that the back wall is "
+				 "behind the membrane",
+				 scene->membrane.thickness_mm);
 }
-
-static int read_tissue_rest(struct incise_scene *scene, const config_setting_t *group,
-			    struct incise_error *err)
-{
-	bool paper = !scene->tissue.dissipates;
-	int rc = read_way(scene, group, "withdrawal", "dissipative", &paper, err);
-
-	scene->tissue.dissipates = !paper;
-	if (!rc)
-		rc = read_way(scene, group, "orientation", "eased",
-			      &scene->tissue.printed_orientation, err);
-	if (!rc)
-		rc = incise_conf_integer(group, scene->path, "cuts_most", 1, 1024,
-					 &scene->tissue.cuts_most, err);
-	return rc;
-}
-
-static int read_membrane(struct incise_scene *scene, const config_setting_t *root,
-			 struct incise_error *err)
-{
-	static const char *const more[] = {"point_mm", "normal", NULL};
-	const config_setting_t *group;
-	int rc = read_group(scene, root, "membrane", membrane, more, &group, err);
-
-	if (rc || !group)
-		return rc;
-	scene->membrane.normal[2] = 1;
-	for (const struct number *number = membrane; number->key && !rc; number++)
-		rc = incise_conf_need(group, scene->path, number->key, err);
-	if (!rc)
-		rc = incise_conf_need(group, scene->path, "point_mm", err);
-	if (!rc)
-		rc = incise_conf_vector(group, scene->path, "point_mm",
-					scene->membrane.point_mm, err);
-	if (!rc)
-		rc = incise_conf_direction(group, scene->path, "normal",
-					   scene->membrane.normal, err);
-	if (rc || scene->membrane.back_wall_mm > scene->membrane.thickness_mm)
-		return rc;
-	return incise_error_set(
-		err, EINVAL,
-		"%s:%u: membrane.back_wall_mm: expected more than thickness_mm, %g, so "
-		"that the back wall is behind the membrane",
-		scene->path, config_setting_source_line(group),
-		scene->membrane.thickness_mm);
-}
-
-/* The keys of `criteria`: two numbers, a largest one, or true and false. */
-static const struct {
-	const char *key;
-	enum { RANGE, MOST, SWITCH } form;
-	double max;
-} criteria[INCISE_CRITERIA] = {
-	[INCISE_CRITERION_CUT_LENGTH] = {"cut_length_mm", RANGE, 1000},
-	[INCISE_CRITERION_CUT_DEPTH] = {"cut_depth_mm", RANGE, 1000},
-	[INCISE_CRITERION_OFF_TARGET] = {"off_target_mm", MOST, 1000},
-	[INCISE_CRITERION_INCISIONS] = {"incisions_most", MOST, 1024},
-	[INCISE_CRITERION_MEMBRANE] = {"membrane", SWITCH, 1},
-	[INCISE_CRITERION_INSERTION] = {"insertion_depth_mm", RANGE, 1000},
-	[INCISE_CRITERION_BACK_WALL] = {"back_wall", SWITCH, 1},
-	[INCISE_CRITERION_FORCE] = {"force_most_N", MOST, 1000},
-	[INCISE_CRITERION_TIME] = {"time_most_s", MOST, 86400},
-};
 
 const char *incise_criterion_name(int criterion)
 {
@@ -585,92 +571,17 @@ const char *incise_criterion_name(int criterion)
 							     : NULL;
 }
 
-static int read_range(const struct incise_scene *scene, const config_setting_t *group,
-		      int i, struct incise_scene_criterion *to, struct incise_error *err)
-{
-	double ends[2];
-	int n, rc = incise_conf_numbers(group, scene->path, criteria[i].key, ends, 2, &n,
-					err);
-
-	if (rc)
-		return rc;
-	if (n != 2 || !(ends[0] >= 0 && ends[0] <= ends[1] && ends[1] <= criteria[i].max))
-		return incise_error_set(
-			err, EINVAL,
-			"%s:%u: criteria.%s: expected two numbers [least, largest] from "
-			"0 to %g; correct it",
-			scene->path,
-			config_setting_source_line(
-				config_setting_get_member(group, criteria[i].key)),
-			criteria[i].key, criteria[i].max);
-	to->min = ends[0];
-	to->max = ends[1];
-	return 0;
-}
-
-static int read_criterion(struct incise_scene *scene, const config_setting_t *group,
-			  int i, struct incise_error *err)
-{
-	struct incise_scene_criterion *to = &scene->criteria[i];
-	const char *key = criteria[i].key;
-	bool on = false;
-	int rc;
-
-	to->asked = config_setting_get_member(group, key);
-	if (!to->asked)
-		return 0;
-	if (criteria[i].form == RANGE)
-		return read_range(scene, group, i, to, err);
-	if (criteria[i].form == MOST)
-		return incise_conf_number(group, scene->path, key, 0, criteria[i].max,
-					  &to->max, err);
-	rc = incise_conf_bool(group, scene->path, key, &on, err);
-	to->min = to->max = on;
-	return rc;
-}
-
-static int read_criteria(struct incise_scene *scene, const config_setting_t *root,
-			 struct incise_error *err)
+static void finish_criteria(struct incise_scene *scene, const config_setting_t *root)
 {
 	const config_setting_t *group = config_setting_get_member(root, "criteria");
-	const char *keys[INCISE_CRITERIA + 1] = {NULL};
-	int rc;
 
-	if (!group)
-		return 0;
-	for (int i = 0; i < INCISE_CRITERIA; i++)
-		keys[i] = criteria[i].key;
-	rc = incise_conf_known(group, scene->path, keys, err);
-	for (int i = 0; i < INCISE_CRITERIA && !rc; i++)
-		rc = read_criterion(scene, group, i, err);
-	return rc;
-}
+	for (int i = 0; i < INCISE_CRITERIA; i++) {
+		struct incise_scene_criterion *to = &scene->criteria[i];
 
-static int read_tissue(struct incise_scene *scene, const config_setting_t *root,
-		       struct incise_error *err)
-{
-	static const char *const tissue_keys[] = {"withdrawal", "orientation",
-						  "cuts_most", NULL};
-	struct number numbers[KEYS_MAX + 1] = {NUMBER(tissue, gain, 0, 10)};
-	const config_setting_t *group;
-	int n = 1, rc;
-
-	for (int i = 0; i < incise_n_tissue_forces; i++)
-		for (int k = 0; k < INCISE_FORCE_NUMBERS; k++) {
-			const struct incise_force_number *from =
-				&incise_tissue_forces[i].number[k];
-			double *to = &scene->tissue.force[i][k];
-
-			if (from->key)
-				numbers[n++] = (struct number){
-					from->key, 0, from->max,
-					(size_t)((char *)to - (char *)scene)};
-		}
-	numbers[n++] = (struct number)NUMBER(tissue, leave_mm, 0, 5);
-	numbers[n++] = (struct number)NUMBER(tissue, cut_from_mm, 0, 50);
-	numbers[n] = (struct number)NUMBER(tissue, stretch_mm, 0, 50);
-	rc = read_group(scene, root, "tissue", numbers, tissue_keys, &group, err);
-	return rc || !group ? rc : read_tissue_rest(scene, group, err);
+		to->asked = group && config_setting_get_member(group, criteria[i].key);
+		if (criteria[i].kind == SETTING_IS_TRUTH)
+			to->min = to->max;
+	}
 }
 
 /* One reaction, and any force at all. */
@@ -699,153 +610,42 @@ static int check_forces(const struct incise_scene *scene, struct incise_error *e
 }
 
 /* The blade lies along the axis: the normal of its side is across. */
-static int check_tool(const struct incise_scene *scene, const config_setting_t *tool,
+static int check_tool(const struct incise_scene *scene, const config_setting_t *root,
 		      struct incise_error *err)
 {
-	const char *key = config_setting_get_member(tool, "axis") ? "axis" : "side";
-	const config_setting_t *setting = config_setting_get_member(tool, key);
+	const config_setting_t *group = config_setting_get_member(root, "tool");
 
-	if (!setting || fabs(v3_dot(scene->tool.axis, scene->tool.side)) < PARALLEL_COS)
+	if (fabs(v3_dot(scene->tool.axis, scene->tool.side)) < PARALLEL_COS)
 		return 0;
-	return incise_error_set(
-		err, EINVAL,
-		"%.200s:%d: tool.%s: axis and side are within 10 degrees of one line, "
-		"but side is the normal of the blade, across axis; correct it",
-		scene->path, config_setting_source_line(setting), key);
-}
-
-/* A stage that older scenes have. */
-static int refuse_guard(const char *path, const config_setting_t *root,
-			struct incise_error *err)
-{
-	const config_setting_t *effects = config_setting_get_member(root, "effects");
-	const config_setting_t *guard =
-		effects ? config_setting_get_member(effects, "guard") : NULL;
-
-	if (!guard)
-		return 0;
-	return incise_error_set(
-		err, EINVAL,
-		"%.200s:%d: effects.guard was removed: scenes come to rest without it, "
-		"see incise bench stability; remove the key",
-		path, config_setting_source_line(guard));
-}
-
-static int read_switches(struct incise_scene *scene, const config_setting_t *root,
-			 struct incise_error *err)
-{
-	static const char *const effects_keys[] = {"average_ticks", NULL};
-	static const char *const tool_keys[] = {"side", "axis", NULL};
-	static const char *const device_keys[] = {"delay_ticks", "late_ticks", NULL};
-	FITS_KEYS(tool, tool_keys);
-	FITS_KEYS(device, device_keys);
-	const char *path = scene->path;
-	const config_setting_t *group;
-	int rc = refuse_guard(path, root, err);
-
-	if (!rc)
-		rc = read_group(scene, root, "effects", NULL, effects_keys, &group, err);
-
-	if (!rc && group)
-		rc = incise_conf_integer(group, path, "average_ticks", 1, 64,
-					 &scene->effects.average_ticks, err);
-	if (!rc)
-		rc = read_group(scene, root, "tool", tool, tool_keys, &group, err);
-	if (!rc && group)
-		rc = incise_conf_direction(group, path, "side", scene->tool.side, err);
-	if (!rc && group)
-		rc = incise_conf_direction(group, path, "axis", scene->tool.axis, err);
-	if (!rc && group)
-		rc = check_tool(scene, group, err);
-	if (!rc)
-		rc = read_group(scene, root, "device", device, device_keys, &group, err);
-	if (!rc && group)
-		rc = incise_conf_integer(group, path, "delay_ticks", 0, 64,
-					 &scene->device.delay_ticks, err);
-	if (!rc && group)
-		rc = incise_conf_integer(group, path, "late_ticks", 0,
-					 INCISE_POSE_LOOP_LATE_MAX,
-					 &scene->device.late_ticks, err);
-	return rc ? rc : read_picture(scene, root, err);
+	return incise_conf_error(
+		group, config_setting_get_member(group, "axis") ? "axis" : "side",
+		scene->path, err,
+		"axis and side more than 10 degrees from one line, as side is the normal "
+		"of the blade, across axis");
 }
 
 static int read_scene(struct incise_scene *scene, const config_setting_t *root,
 		      const char *model, struct incise_error *err)
 {
-	static const char *const keys[] = {"rate_hz", "model",	 "arithmetic", "surface",
-					   "tissue",  "effects", "tool",       "device",
-					   "limits",  "picture", "membrane",   "criteria",
-					   NULL};
-	const config_setting_t *group;
-	const char *arithmetic = NULL;
-	int rc = incise_conf_known(root, scene->path, keys, err);
+	int rc = incise_settings_read(scene_settings, root, scene->path, scene, err);
 
 	if (!rc)
-		rc = incise_conf_number(root, scene->path, "rate_hz", 100, 20000,
-					&scene->rate_hz, err);
+		rc = check_membrane(scene, root, err);
 	if (!rc)
-		rc = incise_conf_string(root, scene->path, "arithmetic", &arithmetic,
-					err);
-	if (!rc && arithmetic)
-		rc = incise_scene_set_arithmetic(scene, arithmetic, err);
-	if (!rc)
-		rc = read_tissue(scene, root, err);
-	if (!rc)
-		rc = read_group(scene, root, "limits", limits, NULL, &group, err);
-	if (!rc)
-		rc = read_membrane(scene, root, err);
-	if (!rc)
-		rc = read_criteria(scene, root, err);
-	if (!rc)
-		rc = read_switches(scene, root, err);
-	if (!rc)
-		rc = read_surface(scene, root, err);
-	if (!rc)
-		rc = read_model(scene, root, model, err);
+		rc = check_tool(scene, root, err);
+	if (rc)
+		return rc;
+	finish_criteria(scene, root);
+	rc = read_model(scene, root, model, err);
+	scene->named.file = scene->surface_path;
 	return rc ? rc : check_forces(scene, err);
-}
-
-/* Defaults; incise-scene(5) gives the reasons. */
-static void set_defaults(struct incise_scene *scene)
-{
-	scene->rate_hz = 1000;
-	scene->fixed = true;
-	scene->tissue.gain = 1;
-	scene->tissue.dissipates = true;
-	for (int i = 0; i < incise_n_tissue_forces; i++)
-		for (int k = 0; k < INCISE_FORCE_NUMBERS; k++)
-			scene->tissue.force[i][k] =
-				incise_tissue_forces[i].number[k].initial;
-	/* Of a tracker with ±0.05 mm of noise the poses shown have ±0.16 mm. */
-	scene->tissue.leave_mm = 0.2;
-	/* More than that: a blade that rests on the skin cuts nothing. */
-	scene->tissue.cut_from_mm = 0.5;
-	scene->tissue.stretch_mm = 2;
-	scene->tissue.cuts_most = 64;
-	scene->effects.average_ticks = 1;
-	scene->tool.side[1] = 1;
-	scene->tool.axis[2] = 1;
-	scene->tool.handle_mm = 120;
-	scene->tool.handle_width_mm = 10;
-	scene->tool.handle_thickness_mm = 3;
-	scene->tool.tube_mm = 7;
-	scene->device.mass_kg = 0.05;
-	scene->device.damping_N_s_mm = 0.01;
-	scene->device.coulomb_N = 0.01;
-	scene->device.delay_ticks = -1;
-	scene->limits.force_N = 4;
-	scene->limits.slew_N_s = 400;
-	scene->limits.pose_age_ms = 50;
-	scene->limits.fade_ms = 20;
-	scene->limits.ramp_ms = 200;
-	scene->limits.start_N = 0.1;
-	set_picture_defaults(&scene->picture);
 }
 
 struct incise_scene *incise_scene_load(const char *path, const char *model,
 				       struct incise_error *err)
 {
 	struct incise_scene *scene = calloc(1, sizeof(*scene));
+	struct incise_setting rows[SETTING_ROWS_MAX + 1];
 	config_t config;
 	int rc = -ENOMEM;
 
@@ -855,7 +655,10 @@ struct incise_scene *incise_scene_load(const char *path, const char *model,
 		incise_error_set(err, ENOMEM, "%s: no memory to read it", path);
 		goto out;
 	}
-	set_defaults(scene);
+	tissue_settings(rows);
+	incise_settings_init(rows, scene);
+	incise_settings_init(scene_settings, scene);
+	scene->device.delay_ticks = -1;
 	rc = incise_conf_read(&config, path, err);
 	if (rc)
 		goto out;
@@ -873,13 +676,8 @@ out:
 int incise_scene_set_arithmetic(struct incise_scene *scene, const char *name,
 				struct incise_error *err)
 {
-	if (strcmp(name, "fixed") && strcmp(name, "double"))
-		return incise_error_set(
-			err, EINVAL,
-			"%s: arithmetic '%s': expected \"fixed\" or \"double\"",
-			scene->path, name);
-	scene->fixed = !strcmp(name, "fixed");
-	return 0;
+	return incise_settings_set(scene_settings, scene->path, "arithmetic", name, scene,
+				   err);
 }
 
 void incise_scene_set_full(struct incise_scene *scene, bool full)
@@ -1000,8 +798,74 @@ void incise_scene_picture(const struct incise_scene *scene,
 
 int incise_scene_set_texture(struct incise_scene *scene, int texture_px)
 {
-	if (!is_side(texture_px))
+	if (!is_side(&(double){texture_px}, 1, NULL))
 		return -EINVAL;
 	scene->picture.texture_px = texture_px;
 	return 0;
+}
+
+bool incise_scene_has_key(const char *key)
+{
+	return incise_setting_of(scene_settings, key);
+}
+
+/* A group, or the models of phases: texts. */
+static void list_group(struct incise_settings_list *list,
+		       const struct incise_scene *scene, const struct incise_setting *row,
+		       const config_setting_t *group)
+{
+	struct incise_setting rows[SETTING_ROWS_MAX + 1];
+	const void *of = scene;
+
+	tissue_settings(rows);
+	if (row->kind == SETTING_IS_GROUP) {
+		incise_settings_list(list, row->rows, of, group, row->key);
+	} else if (!strcmp(row->key, "tissue")) {
+		incise_settings_list(list, rows, of, group, row->key);
+	} else if (!strcmp(row->key, "surface") && scene->surface_kind) {
+		const struct kind *kind = kinds;
+
+		while (strcmp(kind->name, scene->surface_kind))
+			kind++;
+		incise_settings_list(list, kind->settings, &scene->named, group,
+				     row->key);
+	}
+	for (int i = 0; !strcmp(row->key, "model") && i < INCISE_CUTTING_PHASES; i++) {
+		struct incise_setting phase = SETTING_OWN(model, "", "", row->help);
+
+		phase.key = cutting_phases[i];
+		incise_settings_list(list, (struct incise_setting[]){phase, {0}}, of,
+				     group, row->key);
+	}
+}
+
+int incise_scene_keys(const char *path, incise_key_found *found, void *context,
+		      struct incise_error *err)
+{
+	struct incise_settings_list list = {.found = found, .context = context};
+	struct incise_scene *scene = incise_scene_load(path, NULL, err);
+	const config_setting_t *root, *setting;
+	config_t config;
+	int rc;
+
+	if (!scene)
+		return -errno;
+	rc = incise_conf_read(&config, path, err);
+	if (rc) {
+		incise_scene_free(scene);
+		return rc;
+	}
+	root = config_root_setting(&config);
+	for (const struct incise_setting *row = scene_settings; row->key; row++) {
+		setting = config_setting_get_member(root, row->key);
+		if (row->kind == SETTING_IS_GROUP || row->read ||
+		    (setting && config_setting_is_group(setting)))
+			list_group(&list, scene, row, setting);
+		else
+			incise_settings_list(&list, (struct incise_setting[]){*row, {0}},
+					     scene, root, "");
+	}
+	config_destroy(&config);
+	incise_scene_free(scene);
+	return list.rc;
 }

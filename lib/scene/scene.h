@@ -10,6 +10,7 @@
 #include <incise/model.h>
 #include <incise/plan.h>
 #include <incise/scene.h>
+#include "../base/settings.h"
 #include "../control/model_input.h"
 #include "../surface/surface.h"
 #include "forces.h"
@@ -23,6 +24,13 @@ struct incise_scene_model {
 	enum incise_model_input input[INCISE_LOOP_INPUTS_MAX];
 };
 
+/* The group surface as the file has it. */
+struct incise_scene_surface {
+	double point_mm[3], to_mm[3], normal[3], radius_mm;
+	const char *file; /* the scene's surface_path */
+	bool cavity;
+};
+
 struct incise_scene {
 	char *path;
 	char *surface_path; /* or NULL */
@@ -32,6 +40,7 @@ struct incise_scene {
 	struct incise_scene_model cut[INCISE_CUTTING_PHASES];
 	struct incise_surface *surface; /* or NULL: the rig's plane */
 	const char *surface_kind;	/* as the file names it */
+	struct incise_scene_surface named;
 	struct {
 		double gain, leave_mm;
 		bool dissipates;	  /* withdrawal = "dissipative"; else "paper" */

@@ -18,7 +18,7 @@ struct incise_sim *incise_sim_new(const struct incise_sim_config *config,
 {
 	struct incise_sim *sim;
 
-	if (incise_sim_config_check(config, err))
+	if (incise_settings_check(incise_sim_settings, "sim", config, err))
 		return NULL;
 	sim = calloc(1, sizeof(*sim));
 	if (!sim) {

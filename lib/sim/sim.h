@@ -9,6 +9,7 @@
 #include <incise/sim.h>
 #include <incise/backend.h>
 #include <incise/vision.h>
+#include "../base/settings.h"
 
 /* The truth at one instant, without any device's errors. */
 struct incise_sim_truth {
@@ -47,35 +48,8 @@ struct incise_stepper *incise_sim_stepper_new(struct incise_sim *sim, int axis);
 int incise_sim_directions(const struct incise_sim_config *config, const double normal[3],
 			  double direction[][3]);
 
-/*
- * Set a key of the configuration from a number; arrays (depth_mm, times) take an index:
- * "depth_mm[2]". Without one the protocol becomes that single depth.
- * Returns 0, -ENOENT (no such key), -EINVAL (err says which range).
- */
-int incise_sim_config_set(struct incise_sim_config *config, const char *key, double value,
-			  struct incise_error *err);
-
-/* Whether there is such a key. */
-bool incise_sim_config_has(const char *key);
-
-/* Whether a key takes a word, as withdrawal does, and no number. */
-bool incise_sim_config_has_words(const char *key);
-
-/* Set such a key. Returns 0 or -EINVAL (err says which words). */
-int incise_sim_config_set_word(struct incise_sim_config *config, const char *key,
-			       const char *word, struct incise_error *err);
-
-/*
- * The name of key @i, in the order of rig.conf(5), with its values, or for a key that takes a
- * word with *word. Returns how many values, 0 from the first index that is not there.
- */
-int incise_sim_config_get(const struct incise_sim_config *config, int i,
-			  const char **name, double values[INCISE_SIM_DEPTHS_MAX],
-			  const char **word);
-
-/* Whether every value is within its range. Returns 0 or -EINVAL. */
-int incise_sim_config_check(const struct incise_sim_config *config,
-			    struct incise_error *err);
+/* The keys of the group sim of rig.conf, in a struct incise_sim_config. */
+extern const struct incise_setting incise_sim_settings[];
 
 /* Set-up of vision for the virtual camera's frames, with its scale. */
 void incise_sim_vision_setup(const struct incise_sim_config *config,

@@ -108,7 +108,7 @@ static void devices(const char *before, const char *pattern)
 	globfree(&found);
 }
 
-static int sim_key(void *context, const struct incise_rig_key *key)
+static int sim_key(void *context, const struct incise_key *key)
 {
 	bool own = !strncmp(key->name, "sim.", 4);
 	char *word = cli_text("%s=", key->name + (own ? 4 : 0)), *value;

@@ -11,6 +11,9 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <incise/calibration.h>
+#include <incise/rig.h>
+#include <incise/scene.h>
 #include "cli.h"
 #include "file_kind.h"
 
@@ -74,50 +77,16 @@ static const struct {
 	{FILE_PLAN, FILE_SCENE, "give the scene that it was compiled from"},
 };
 
-/* Keys of the three libconfig files that no other of them has at its top level. */
-static const struct {
-	enum file_kind kind;
-	const char *key;
-} keys[] = {
-	{FILE_RIG, "clock"},
-	{FILE_RIG, "tracker"},
-	{FILE_RIG, "force"},
-	{FILE_RIG, "camera"},
-	{FILE_RIG, "stepper"},
-	{FILE_RIG, "sim"},
-	{FILE_RIG, "actuator"},
-	{FILE_RIG, "tracker_setup"},
-	{FILE_RIG, "force_setup"},
-	{FILE_RIG, "camera_setup"},
-	{FILE_RIG, "vision"},
-	{FILE_RIG, "foot_switch"},
-	{FILE_SCENE, "rate_hz"},
-	{FILE_SCENE, "model"},
-	{FILE_SCENE, "arithmetic"},
-	{FILE_SCENE, "tissue"},
-	{FILE_SCENE, "effects"},
-	{FILE_SCENE, "tool"},
-	{FILE_SCENE, "device"},
-	{FILE_SCENE, "limits"},
-	{FILE_SCENE, "picture"},
-	{FILE_SCENE, "membrane"},
-	{FILE_SCENE, "criteria"},
-	{FILE_CALIBRATION, "force_mV_N"},
-	{FILE_CALIBRATION, "force_zero_mV"},
-	{FILE_CALIBRATION, "depth_mm_px"},
-	{FILE_CALIBRATION, "force_delay_ms"},
-	{FILE_CALIBRATION, "tracker_delay_ms"},
-	{FILE_CALIBRATION, "camera_delay_ms"},
-	{FILE_CALIBRATION, "tip_mm"},
-	{FILE_CALIBRATION, "history"},
-};
-
+/* The libconfig file that has this key at its top level, if only one kind has. */
 static enum file_kind kind_of_key(const char *key, size_t length)
 {
-	for (size_t i = 0; i < sizeof(keys) / sizeof(*keys); i++)
-		if (strlen(keys[i].key) == length && !strncmp(key, keys[i].key, length))
-			return keys[i].kind;
-	return FILE_UNKNOWN;
+	char *name = cli_text("%.*s", (int)length, key);
+	enum file_kind kind = (incise_rig_has_key(name) ? FILE_RIG : 0) |
+			      (incise_scene_has_key(name) ? FILE_SCENE : 0) |
+			      (incise_calibration_has_key(name) ? FILE_CALIBRATION : 0);
+
+	free(name);
+	return kind & (kind - 1) ? FILE_UNKNOWN : kind;
 }
 
 /* Behind a comment of libconfig at @c, or a string; @c itself where there is neither. */

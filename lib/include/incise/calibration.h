@@ -150,5 +150,8 @@ INCISE_API int incise_calibration_text(const char *text, const char *name,
 				       struct incise_calibration_record **records,
 				       struct incise_error *err);
 
+/** Whether calibration.conf may have this key at its top level. */
+INCISE_API bool incise_calibration_has_key(const char *key);
+
 INCISE_END_DECLS
 #endif

@@ -19,6 +19,7 @@
 #include <incise/camera.h>
 #include <incise/clock.h>
 #include <incise/error.h>
+#include <incise/settings.h>
 #include <incise/export.h>
 #include <incise/foot_switch.h>
 #include <incise/force.h>
@@ -131,24 +132,6 @@ INCISE_API int incise_rig_foot_switch(const struct incise_rig *rig,
  */
 INCISE_API const char *incise_rig_sign_key(const struct incise_rig *rig);
 
-/** A key of a rig and its value. */
-struct incise_rig_key {
-	char name[80]; /**< "sim.seed"; "actuator[2].lead_mm" of several, from 1 on */
-	/**
-	 * as in rig.conf and JSON: 2.5, true, "text", [0, 0, 1]; empty: none, or the device's
-	 * own
-	 */
-	char value[400];
-	bool given; /**< in the file; else the default */
-	int line;   /**< line in the file; 0: not in the file */
-};
-
-/**
- * Called for each key. @key is valid until the function returns.
- * @return 0; another value ends the list, and incise_rig_keys() returns it
- */
-typedef int incise_rig_key_found(void *context, const struct incise_rig_key *key);
-
 /**
  * List the keys of a rig: the given ones, and the defaults of the clock, the surface and each
  * named device. No device is opened.
@@ -156,8 +139,11 @@ typedef int incise_rig_key_found(void *context, const struct incise_rig_key *key
  * @param spec as for incise_rig_open()
  * @return 0; the value of @found; a negative errno of incise_rig_open() without devices
  */
-INCISE_API int incise_rig_keys(const char *spec, incise_rig_key_found *found,
-			       void *context, struct incise_error *err);
+INCISE_API int incise_rig_keys(const char *spec, incise_key_found *found, void *context,
+			       struct incise_error *err);
+
+/** Whether rig.conf may have this key at its top level. */
+INCISE_API bool incise_rig_has_key(const char *key);
 
 INCISE_END_DECLS
 #endif

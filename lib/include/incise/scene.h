@@ -20,6 +20,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <incise/error.h>
+#include <incise/settings.h>
 #include <incise/export.h>
 
 INCISE_BEGIN_DECLS
@@ -175,6 +176,18 @@ INCISE_API int incise_scene_checksum(const struct incise_scene *scene, uint32_t 
 /** Get the group `limits` of the scene, with defaults filled in. */
 INCISE_API void incise_scene_limits(const struct incise_scene *scene,
 				    struct incise_scene_limits *limits);
+
+/** Whether a scene may have this key at its top level. */
+INCISE_API bool incise_scene_has_key(const char *key);
+
+/**
+ * List the keys of a scene: the given ones, and the defaults of the others.
+ *
+ * @param path as for incise_scene_load()
+ * @return 0; the value of @found; a negative errno of incise_scene_load()
+ */
+INCISE_API int incise_scene_keys(const char *path, incise_key_found *found, void *context,
+				 struct incise_error *err);
 
 INCISE_END_DECLS
 #endif

@@ -299,32 +299,32 @@ TEST(wrong_files_are_named)
 	} row[] = {
 		{"history = 3;", ":1: history:"},
 		{"history = [1, 2];", ":1: history:"},
-		{"history = (\n1 );", ":2: history:"},
-		{ENTRY(""), ":2: history: values:"},
-		{ENTRY("values = ( );"), ":3: history: values:"},
-		{ENTRY("values = ( 1 );"), ":3: history: values:"},
-		{ENTRY("values = ( { key = \"force_mV_N\"; u = 1; } );"), ":3: left"},
+		{"history = (\n1 );", ":2: history[1]"},
+		{ENTRY(""), ":2: history[1].values:"},
+		{ENTRY("values = ( );"), ":3: history[1].values:"},
+		{ENTRY("values = ( 1 );"), ":3: history[1].values[1]:"},
+		{ENTRY("values = ( { key = \"force_mV_N\"; u = 1; } );"), ":3: history[1].values[1].left:"},
 		{ENTRY("values = ( { key = \"x\"; left = 1; u = 1; } );"),
 		 "history: values: key:"},
 		{ENTRY("values = ( { key = \"force_mV_N\"; left = 1e999; u = 1; } );"),
-		 ":3: left:"},
+		 ":3: history[1].values[1].left:"},
 		{ENTRY("values = ( { key = \"force_mV_N\"; left = nan; u = 1; } );"),
 		 ":3: syntax error"},
 		{ENTRY("values = ( { key = \"force_mV_N\"; left = 0; u = 1; } );"),
 		 "history: values: left:"},
 		{ENTRY("values = ( { key = \"force_mV_N\"; left = 9; u = -1; } );"),
-		 ":3: u:"},
+		 ":3: history[1].values[1].u:"},
 		{ENTRY("values = ( { key = \"force_mV_N_force_mV_N_force_mV_N\"; left = 1; "
 		       "u = 1; } );"),
-		 ":3: key:"},
+		 ":3: history[1].values[1].key:"},
 		{ENTRY(VALUE "covariance = [1.0, 2.0];"), ":2: history: covariance:"},
-		{ENTRY(VALUE "covariance = [1e999];"), ":3: covariance:"},
-		{ENTRY(VALUE "covariance = \"x\";"), ":3: covariance:"},
-		{ENTRY(VALUE "raw_crc32c = \"xyz\";"), ":3: history: raw_crc32c:"},
-		{ENTRY(VALUE "raw_crc32c = 3;"), ":3: raw_crc32c:"},
+		{ENTRY(VALUE "covariance = [1e999];"), ":3: history[1].covariance:"},
+		{ENTRY(VALUE "covariance = \"x\";"), ":3: history[1].covariance:"},
+		{ENTRY(VALUE "raw_crc32c = \"xyz\";"), ":3: history[1].raw_crc32c:"},
+		{ENTRY(VALUE "raw_crc32c = 3;"), ":3: history[1].raw_crc32c:"},
 		{ENTRY(VALUE "low = 2; high = 1;"), ":2: history: low:"},
-		{ENTRY(VALUE "verdict = 2;"), ":3: verdict:"},
-		{ENTRY(VALUE "sum = 2;"), ":3: sum:"},
+		{ENTRY(VALUE "verdict = 2;"), ":3: history[1].verdict:"},
+		{ENTRY(VALUE "sum = 2;"), ":3: history[1].sum:"},
 		{"history = ( {\nkind = \"force\";\n", "syntax error"},
 		{"tip_mm = [1, 2];", ":1: tip_mm:"},
 		{"stepper_backlash_mm = -1;", ":1: stepper_backlash_mm:"},
@@ -403,8 +403,9 @@ TEST(a_killed_writer_leaves_a_whole_file)
 
 static void say_present(struct file_content *file, const char *name)
 {
-	for (int i = 0; i < (int)N_KEYS; i++)
-		file->present[i] |= !strcmp(known_keys[i].name, name);
+	int element;
+
+	file->present[find_key(name, &element) - settings] = true;
 }
 
 static char *written(const struct file_content *file, const char *notes)

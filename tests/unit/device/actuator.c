@@ -83,7 +83,7 @@ TEST(what_does_not_fit_is_refused_with_its_line)
 		 "r:2: actuator.travel_mm:"},
 		{NEEDED "\nlines = 3;", "actuator.lines:"},
 		{NEEDED "\nlines = { step = 1; };", "actuator.lines.dir"},
-		{NEEDED "\nlines = { step = 1; dir = 1; };", "line 1"},
+		{NEEDED "\nlines = { step = 1; dir = 1; };", "r:3: actuator.lines.dir:"},
 		{NEEDED "\nlines = { step = 1; dir = -2; };", "r:3: actuator.lines.dir"},
 		{NEEDED "\nlines = { step = 1; dir = 2; stop = 3; };", "lines.stop:"},
 		{NEEDED "\nlines = { step = 1; dir = 2; active_low = [\"home\"]; };",

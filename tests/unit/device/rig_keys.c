@@ -8,6 +8,7 @@
 #include <incise/rig.h>
 #include "../../../lib/device/actuator.h"
 #include "../../../lib/device/rig_plan.h"
+#include "../../../lib/sim/sim.h"
 #include "../message.h"
 #include "../base/temp_file.h"
 
@@ -43,11 +44,11 @@ static const char everything[] =
 	"	{ spring_N_mm = 1; travel_mm = 10; lead_mm = 2; direction = [0, 1, 0]; } );\n";
 
 struct keys {
-	struct incise_rig_key key[300];
+	struct incise_key key[300];
 	int n;
 };
 
-static int keep(void *context, const struct incise_rig_key *key)
+static int keep(void *context, const struct incise_key *key)
 {
 	struct keys *keys = context;
 
@@ -64,7 +65,7 @@ static struct keys keys_of(const char *spec)
 	return keys;
 }
 
-static const struct incise_rig_key *find(const struct keys *keys, const char *name)
+static const struct incise_key *find(const struct keys *keys, const char *name)
 {
 	for (int i = 0; i < keys->n; i++)
 		if (!strcmp(keys->key[i].name, name))
@@ -113,7 +114,7 @@ static void close_group(struct writer *writer, const char *next)
 		put(writer, ";\n");
 }
 
-static void write_key(struct writer *writer, const struct incise_rig_key *key)
+static void write_key(struct writer *writer, const struct incise_key *key)
 {
 	char name[80], *part[5], *rest = name, line[500];
 	int n = 0, same = 0, element;
@@ -156,7 +157,7 @@ static void same_again(const char *spec)
 	again = keys_of(file.path);
 	/* a rig with the keys of groups that do not apply has more of them than its shorthand */
 	for (int i = 0; i < keys.n; i++) {
-		const struct incise_rig_key *key = find(&again, keys.key[i].name);
+		const struct incise_key *key = find(&again, keys.key[i].name);
 
 		assert_non_null(key);
 		assert_string_equal(key->value, keys.key[i].value);
@@ -215,23 +216,26 @@ static void has(const struct keys *keys, const char *group, const char *name)
 	fail_msg("%s.%s is not listed", group, name);
 }
 
+static void has_all(const struct keys *keys, const struct incise_setting *rows,
+		    const char *group)
+{
+	for (; rows->key; rows++) {
+		has(keys, group, rows->key);
+		if (rows->kind == SETTING_IS_GROUP && !*group)
+			has_all(keys, rows->rows, rows->key);
+	}
+}
+
 TEST(every_key_is_listed)
 {
 	struct temp_file file = temp_file_new("rig.conf", everything);
 	struct keys keys = keys_of(file.path);
 
-	for (int i = 0; incise_rig_root_keys[i]; i++)
-		has(&keys, "", incise_rig_root_keys[i]);
-	for (int i = 0; i < INCISE_RIG_GROUPS; i++)
-		for (int k = 0; incise_rig_groups[i].keys[k]; k++)
-			has(&keys, incise_rig_groups[i].name,
-			    incise_rig_groups[i].keys[k]);
-	for (int i = 0; incise_actuator_keys[i]; i++)
-		has(&keys, "actuator[1]", incise_actuator_keys[i]);
-	for (int i = 0; incise_actuator_can_keys[i]; i++)
-		has(&keys, "actuator[1].can", incise_actuator_can_keys[i]);
-	for (int i = 0; incise_actuator_line_keys[i]; i++)
-		has(&keys, "actuator[1].lines", incise_actuator_line_keys[i]);
+	has_all(&keys, incise_rig_settings, "");
+	has_all(&keys, incise_sim_settings, "sim");
+	has_all(&keys, incise_actuator_settings, "actuator[1]");
+	has_all(&keys, incise_actuator_can_settings, "actuator[1].can");
+	has_all(&keys, incise_actuator_line_settings, "actuator[1].lines");
 	/* no key is given without its value */
 	for (int i = 0; i < keys.n; i++)
 		assert_true(!keys.key[i].given || *keys.key[i].value);
@@ -275,7 +279,7 @@ TEST(values_are_those_of_the_file)
 	keys = keys_of(file.path);
 	setlocale(LC_NUMERIC, "C");
 	for (size_t i = 0; i < sizeof(row) / sizeof(*row); i++) {
-		const struct incise_rig_key *key = find(&keys, row[i].name);
+		const struct incise_key *key = find(&keys, row[i].name);
 
 		assert_non_null(key);
 		assert_string_equal(key->value, row[i].value);
@@ -300,7 +304,7 @@ TEST(the_shorthand_gives_its_words)
 		assert_int_equal(keys.key[i].line, 0);
 }
 
-static int stop_at_third(void *context, const struct incise_rig_key *key)
+static int stop_at_third(void *context, const struct incise_key *key)
 {
 	return ++*(int *)context == 3 ? 42 : 0;
 }

@@ -37,7 +37,10 @@ static struct incise_plan plan_with_forces(void)
 
 	for (int i = 0; i < incise_n_tissue_forces; i++) {
 		plan.acting[i].force = &incise_tissue_forces[i];
-		plan.acting[i].number[1] = incise_tissue_forces[i].number[1].initial;
+		plan.acting[i].number[1] =
+			incise_tissue_forces[i].number[1].key
+				? atof(incise_tissue_forces[i].number[1].initial)
+				: 0;
 	}
 	return plan;
 }

@@ -275,7 +275,6 @@ TEST(test_unknown_keys)
 		{"tissue", "Kn", "gain"},
 		{"effects", "average_ms", "average_ticks"},
 		{"effects", "guarded", "average_ticks"},
-		{"effects", "guard", "removed"},
 		{"tool", "handle_cm", "handle_mm"},
 		{"tool", "blade", "handle_mm"},
 		{"device", "mass_g", "mass_kg"},
@@ -475,7 +474,7 @@ TEST(test_set_arithmetic)
 	assert_int_equal(incise_scene_set_arithmetic(scene, "double", NULL), 0);
 	assert_false(scene->fixed);
 	assert_error(incise_scene_set_arithmetic(scene, "float", &err), EINVAL, &err,
-		     "'float'");
+		     "arithmetic", "float");
 	assert_false(scene->fixed);
 	assert_int_equal(incise_scene_set_arithmetic(scene, "fixed", NULL), 0);
 	assert_true(scene->fixed);

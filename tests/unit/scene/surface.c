@@ -200,7 +200,7 @@ TEST(test_refusals)
 		 {"a.scene:3", "surface.point_mm", "[x, y, z]"}},
 		{"surface = {\n point_mm = [0.0, 0.0, 2e6]; };",
 		 EINVAL,
-		 {"a.scene:3", "surface.point_mm", "1e6"}},
+		 {"a.scene:3", "surface.point_mm", "1000000"}},
 		{"surface = { kind = \"sphere\"; centre_mm = [0, 0, 0];\n radius_mm = 0.09; };",
 		 EINVAL,
 		 {"a.scene:3", "surface.radius_mm", "100000"}},

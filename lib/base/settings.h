@@ -1,0 +1,187 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * Settings: each key of rig.conf, of a scene, of calibration.conf and of a "sim:" string is one row of
+ * a table. Rows are read, printed, and made into the tables of the manual pages here, once.
+ *
+ *   #define SETTINGS_OF struct incise_scene
+ *   static const struct incise_setting limits[] = {
+ *           SETTING_NUMBER(force_N, limits.force_N, "N", 0.01, 100, "4", "largest commanded force"),
+ *           {0},
+ *   };
+ */
+#ifndef INCISE_SETTINGS_H
+#define INCISE_SETTINGS_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <incise/settings.h>
+#include "conf.h"
+
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+
+enum incise_setting_kind {
+	SETTING_IS_NUMBER, /* one, or as many as the member has */
+	SETTING_IS_WHOLE,
+	SETTING_IS_DIRECTION, /* made unit */
+	SETTING_IS_TRUTH,
+	SETTING_IS_WORD, /* the member is its index in .words */
+	SETTING_IS_TEXT,
+	SETTING_IS_GROUP, /* of .rows, whose members are in the same struct */
+	SETTING_IS_OWN,	  /* read by its owner; by .read if that is there */
+};
+
+enum incise_setting_store {
+	SETTING_STORES_DOUBLE,
+	SETTING_STORES_INT, /* and enums, and structs of int */
+	SETTING_STORES_U8,
+	SETTING_STORES_U32,
+	SETTING_STORES_U64,
+	SETTING_STORES_BOOL,
+	SETTING_STORES_CHARS,
+	SETTING_STORES_POINTER, /* to the text, which lives as long as the file's config_t */
+};
+
+struct incise_setting {
+	const char *key;
+	enum incise_setting_kind kind;
+	const char *unit; /* or "" */
+	double min, max;  /* of each number */
+	/*
+	 * As a file has it. In parentheses: it is none, in words for the page, or what the owner
+	 * makes of 0; SETTING_REQUIRED: the key must be there.
+	 */
+	const char *initial;
+	const char *help; /* for the page, in mdoc where it has letters beyond ASCII */
+	size_t offset, size;
+	enum incise_setting_store store;
+	double scale; /* the member in the unit of the key; 0: 1 */
+	size_t count; /* offset of the int that counts the numbers, or 0: all */
+	const char *const *words; /* ends with NULL */
+	const struct incise_setting *rows;
+	int (*read)(void *to, const config_setting_t *setting, const char *path,
+		    struct incise_error *err);
+	/* What else is asked of a value, and in words; the numbers, or the text. */
+	bool (*fits)(const double *number, int n, const char *text);
+	const char *expected;
+};
+
+#define SETTING_REQUIRED "(required)"
+/* Most numbers of a setting: a covariance of 16. */
+#define SETTING_NUMBERS_MAX 136
+/* Most rows of a table. */
+#define SETTING_ROWS_MAX 64
+/* Bytes of a value as text. */
+#define SETTING_TEXT_MAX 400
+
+#define SETTING_AT(member) \
+	.offset = offsetof(SETTINGS_OF, member),         \
+	.size = sizeof(((SETTINGS_OF *)0)->member),      \
+	.store = _Generic(((SETTINGS_OF *)0)->member,    \
+		double: SETTING_STORES_DOUBLE,           \
+		double *: SETTING_STORES_DOUBLE,         \
+		uint8_t: SETTING_STORES_U8,              \
+		uint8_t *: SETTING_STORES_U8,            \
+		uint32_t: SETTING_STORES_U32,            \
+		uint64_t: SETTING_STORES_U64,            \
+		bool: SETTING_STORES_BOOL,               \
+		char *: SETTING_STORES_CHARS,            \
+		const char *: SETTING_STORES_POINTER,    \
+		default: SETTING_STORES_INT)
+
+/* Rows; behind the help there may be more, such as .scale = 1e-3. */
+#define SETTING_NUMBER(key, member, unit, min, max, initial, help, ...) \
+	{                                                               \
+#key, SETTING_IS_NUMBER, unit, min, max, initial, help, \
+			SETTING_AT(member), __VA_ARGS__                 \
+	}
+#define SETTING_WHOLE(key, member, unit, min, max, initial, help, ...) \
+	{                                                              \
+#key, SETTING_IS_WHOLE, unit, min, max, initial, help, \
+			SETTING_AT(member), __VA_ARGS__                \
+	}
+#define SETTING_VECTOR(key, member, unit, initial, help) \
+	SETTING_NUMBER(key, member, unit, -1e6, 1e6, initial, help)
+#define SETTING_DIRECTION(key, member, initial, help)                     \
+	{                                                                 \
+#key, SETTING_IS_DIRECTION, "", -1e6, 1e6, initial, help, \
+			SETTING_AT(member)                                \
+	}
+#define SETTING_TRUTH(key, member, initial, help)                                   \
+	{                                                                           \
+#key, SETTING_IS_TRUTH, "", 0, 1, initial, help, SETTING_AT(member) \
+	}
+#define SETTING_WORD(key, member, of, initial, help)                                \
+	{                                                                           \
+#key, SETTING_IS_WORD, "", 0, 0, initial, help, SETTING_AT(member), \
+			.words = (of)                                               \
+	}
+#define SETTING_TEXT(key, member, initial, help, ...)                               \
+	{                                                                           \
+#key, SETTING_IS_TEXT, "", 0, 0, initial, help, SETTING_AT(member), \
+			__VA_ARGS__                                                 \
+	}
+#define SETTING_GROUP(key, of, help)                                     \
+	{                                                                \
+#key, SETTING_IS_GROUP, "", 0, 0, "", help, .rows = (of) \
+	}
+#define SETTING_OWN(key, unit, initial, help, ...)                           \
+	{                                                                    \
+#key, SETTING_IS_OWN, unit, 0, 0, initial, help, __VA_ARGS__ \
+	}
+
+/* Set the members of all rows that have a default, those of groups too. */
+void incise_settings_init(const struct incise_setting *rows, void *to);
+
+/*
+ * Read a group of a file, strictly: every key has a row, and every value its kind and range. NULL:
+ * nothing. Returns 0; -EINVAL, -ENOMEM or what a .read returns; then some members are set.
+ */
+int incise_settings_read(const struct incise_setting *rows, const config_setting_t *group,
+			 const char *path, void *to, struct incise_error *err);
+
+/*
+ * Set one key by text without quotes, "0.5", "paper", for messages "sim.KEY: …" where @group is "sim".
+ * KEY[2] is an element of numbers that are counted, and KEY the only one.
+ * Returns 0; -ENOENT (no such key), -EINVAL.
+ */
+int incise_settings_set(const struct incise_setting *rows, const char *group,
+			const char *key, const char *text, void *to,
+			struct incise_error *err);
+
+/* Whether all members are within what a file may set. Returns 0 or -EINVAL. */
+int incise_settings_check(const struct incise_setting *rows, const char *group,
+			  const void *of, struct incise_error *err);
+
+/* The row of a key, or NULL. */
+const struct incise_setting *incise_setting_of(const struct incise_setting *rows,
+					       const char *key);
+
+/* A list of keys with their values that is under way. */
+struct incise_settings_list {
+	incise_key_found *found;
+	void *context;
+	int rc; /* last return of @found; after another than 0 it is not called again */
+};
+
+/*
+ * List a table: for each row, but groups and rows of the owner without a value, the key as
+ * PREFIX.KEY, and its value in @of; it is given where @group, NULL for none, has it.
+ */
+void incise_settings_list(struct incise_settings_list *list,
+			  const struct incise_setting *rows, const void *of,
+			  const config_setting_t *group, const char *prefix);
+
+/* One key of it with the value @text; @row: of its unit and help; @setting: where it is given, or NULL. */
+void incise_settings_put(struct incise_settings_list *list,
+			 const struct incise_setting *row,
+			 const config_setting_t *setting, const char *prefix,
+			 const char *name, const char *text);
+
+/* The value as a file has it; "" where it is none. */
+void incise_setting_text(const struct incise_setting *row, const void *of, char *text,
+			 size_t size);
+
+/* A text in quotes, as a file has it. */
+void incise_setting_quoted(const char *from, char *text, size_t size);
+
+#endif
