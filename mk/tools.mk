@@ -87,6 +87,20 @@ $(O)/share/incise/scenes $(O)/share/incise/report:
 
 tools: $(programs) $(peer) | $(O)/share/incise/scenes $(O)/share/incise/report
 
+# Tables of settings in pages of section 5: the rows are read by the library alone.
+$(O)/obj/mk/settings: mk/settings.c $(call objects,incise)
+	@mkdir -p $(@D)
+	$(call step,LD)
+	$(Q)$(CC) $(cppflags) $(CPPFLAGS) $(cflags) $(CFLAGS) $(LDFLAGS) -o $@ $^ $(pc_libs_incise) $(libs_incise)
+
+$(O)/obj/mk/settings.tables: $(O)/obj/mk/settings
+	$(Q)$< >$@
+
+$(O)/man/%.5: man/%.5 mk/manual-tables $(O)/obj/mk/settings.tables
+	@mkdir -p $(@D)
+	$(call step,MAN)
+	$(Q)mk/manual-tables $(O)/obj/mk/settings.tables $< >$@
+
 DEMO ?= demo.out
 
 deps: ## install the packages that building, testing and the demo need

@@ -15,11 +15,14 @@
 #include <incise/model.h>
 #include <incise/recalibration.h>
 #include <incise/recording.h>
+#include <incise/rig.h>
 #include <incise/scan.h>
+#include <incise/scene.h>
 #include "cli/cli.h"
 #include "cli/file_kind.h"
 #include "cli/joined_report.h"
 #include "cli/json.h"
+#include "cli/keys.h"
 #include "cli/plan_report.h"
 #include "cli/plot.h"
 #include "cli/recording.h"
@@ -31,7 +34,7 @@
 #include "train/dataset.h"
 
 struct job {
-	bool json, damaged, dataset, all_rows;
+	bool json, all, damaged, dataset, all_rows;
 	const char *plot, *group, *target;
 	char *inputs[INCISE_MODEL_INPUTS_MAX];
 	int n_inputs;
@@ -46,6 +49,9 @@ static void parse_inputs(void *whole, char *text)
 
 static const struct cli_option options[] = {
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
+	{0, "all", NULL,
+	 "rig, scene: also the keys that the file leaves out, with their defaults",
+	 CLI_FLAG(struct job, all)},
 	RECORDING_DAMAGED(struct job, damaged),
 	{0, "dataset", NULL,
 	 "describe DATA.csv and NAME.rec as training data: rows,\n"
@@ -71,7 +77,8 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "info",
 	.synopsis =
-		"MODEL.fis|MODEL.fx|NAME.plan|NAME.fac|NAME.rec|stepper|/dev/incise-stepperN|can:IFACE|"
+		"MODEL.fis|MODEL.fx|NAME.plan|NAME.fac|NAME.rec|NAME.scene|rig.conf|rig|stepper|"
+		"/dev/incise-stepperN|can:IFACE|"
 		"slcan:TTY|devices|DATA.csv… [OPTIONS]",
 	.summary =
 		"Describe a model, a compiled model, a compiled scene, a factor or a recording; "
@@ -812,6 +819,26 @@ static void show_factor(const char *path, bool json)
 	incise_factor_free(factor);
 }
 
+/* The keys of a scene, or of a rig: "rig" is the one that is used here. */
+static void show_keys(const char *path, bool scene, const struct job *job)
+{
+	struct incise_error err = {0};
+	struct keys keys = {0};
+	const char *rig = !strcmp(path, "rig") ? cli_rig(NULL) : path;
+	int rc = scene ? incise_scene_keys(path, keys_add, &keys, &err)
+		       : incise_rig_keys(rig, keys_add, &keys, &err);
+
+	if (rc)
+		cli_fail_with(&err);
+	if (job->json)
+		json_print(json_pack("{ss so so}", "kind", scene ? "scene" : "rig",
+				     "file", json_text(rig), "keys",
+				     keys_json(&keys, rig, job->all)));
+	else
+		keys_print(&keys, rig, job->all);
+	free(keys.key);
+}
+
 static void show_dataset(struct job *job, char **paths, int n)
 {
 	const char *columns[INCISE_MODEL_INPUTS_MAX + 1];
@@ -837,7 +864,7 @@ int main(int argc, char **argv)
 			  .n_inputs = 2,
 			  .target = "force_N"};
 	enum file_kind kind;
-	bool compiled, plan;
+	bool compiled, plan, rig;
 	char *path;
 
 	cli_parse(&command, argc, argv, &job);
@@ -849,20 +876,26 @@ int main(int argc, char **argv)
 	if (job.group || job.all_rows)
 		cli_usage("--group and --all-rows go with --dataset");
 	path = cli_operand(argc, argv, "FILE", "recording, model or plan; or a device");
-	if (!stepper_module_is(path) && strcmp(path, "devices") && !is_bus(path))
-		file_expect(path, FILE_RECORDING | FILE_MODEL | FILE_COMPILED |
-					  FILE_PLAN | FILE_FACTOR);
 	kind = file_kind_of(path);
+	rig = kind == FILE_RIG || !strcmp(path, "rig") || !strncmp(path, "sim:", 4);
+	if (!rig && !stepper_module_is(path) && strcmp(path, "devices") && !is_bus(path))
+		file_expect(path, FILE_RECORDING | FILE_MODEL | FILE_COMPILED |
+					  FILE_PLAN | FILE_FACTOR | FILE_SCENE);
 	compiled = kind ? kind == FILE_COMPILED : cli_ends_with(path, ".fx");
 	plan = kind ? kind == FILE_PLAN : cli_ends_with(path, ".plan");
-	if (job.plot && (is_recording(path) || compiled || plan || kind == FILE_FACTOR ||
-			 stepper_module_is(path) || is_bus(path)))
+	if (job.all && !rig && kind != FILE_SCENE)
+		cli_usage("--all goes with a rig or a scene");
+	if (job.plot &&
+	    (rig || kind == FILE_SCENE || is_recording(path) || compiled || plan ||
+	     kind == FILE_FACTOR || stepper_module_is(path) || is_bus(path)))
 		cli_usage("--plot goes with a model (MODEL.fis); 'incise plot' draws "
 			  "other files");
 	if (stepper_module_is(path)) {
 		stepper_module_show(path, job.json);
 	} else if (!strcmp(path, "devices")) {
 		show_attached(job.json);
+	} else if (rig || kind == FILE_SCENE) {
+		show_keys(path, kind == FILE_SCENE, &job);
 	} else if (is_bus(path)) {
 		show_bus(path, job.json);
 	} else if (is_recording(path)) {

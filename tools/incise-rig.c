@@ -9,16 +9,11 @@
 #include <incise/rig.h>
 #include "cli/cli.h"
 #include "cli/json.h"
+#include "cli/keys.h"
 
 struct options {
 	const char *rig;
 	bool show, json;
-};
-
-/* The keys of a rig, in the order of rig.conf(5). */
-struct keys {
-	struct incise_key *key;
-	size_t n;
 };
 
 static const struct cli_option option_table[] = {
@@ -39,115 +34,38 @@ static const struct cli_command command = {
 		"Exit codes: 0 success, 1 there is no rig.conf or it is wrong, 2 bad usage.",
 };
 
-static int keep(void *context, const struct incise_key *key)
-{
-	struct keys *keys = context;
-
-	keys->key = cli_resize(keys->key, keys->n + 1, sizeof(*keys->key));
-	keys->key[keys->n++] = *key;
-	return 0;
-}
-
-/* "rig.conf:7", "sim:" or "default" */
-static char *origin_of(const struct incise_key *key, const char *rig)
-{
-	if (!key->given)
-		return cli_text("default");
-	return key->line ? cli_text("%s:%d", rig, key->line) : cli_text("sim:");
-}
-
-/* Columns that a UTF-8 text takes on a terminal. */
-static int width_of(const char *text)
-{
-	int width = 0;
-
-	for (; *text; text++)
-		width += (*text & 0xc0) != 0x80;
-	return width;
-}
-
-static void print(const struct options *options, const char *rig, const struct keys *keys)
-{
-	const char *reason;
-	int longest = 0;
-
-	printf("rig          %s\n", rig);
-	for (int i = 0; !options->rig && (reason = cli_rig_passed_over(i)); i++)
-		printf("passed over  %s\n", reason);
-	for (size_t i = 0; i < keys->n; i++)
-		if (width_of(keys->key[i].name) > longest)
-			longest = width_of(keys->key[i].name);
-	if (options->show)
-		printf("\n%-*s %-24s %s\n", longest, "key", "value", "from");
-	for (size_t i = 0; i < keys->n; i++) {
-		const struct incise_key *key = &keys->key[i];
-		const char *unit = key->unit;
-		char *value = cli_text("%s%s%s", *key->value ? key->value : "-",
-				       *key->value && *unit ? " " : "",
-				       *key->value ? unit : "");
-		char *origin = origin_of(key, rig);
-
-		printf("%-*s %s%*s %s\n", longest, key->name, value,
-		       width_of(value) < 24 ? 24 - width_of(value) : 0, "", origin);
-		free(value);
-		free(origin);
-	}
-}
-
-static json_t *value_of(const char *text)
-{
-	json_t *value = *text ? json_loads(text, JSON_DECODE_ANY, NULL) : json_null();
-
-	/* Text of the file that is no UTF-8. */
-	return value ? value : json_text(text);
-}
-
-static void print_json(const struct options *options, const char *rig,
-		       const struct keys *keys)
-{
-	json_t *object = json_pack("{s:o}", "rig", json_text(rig));
-	json_t *passed_over = json_array(), *list = json_array();
-	const char *reason;
-
-	for (int i = 0; !options->rig && (reason = cli_rig_passed_over(i)); i++)
-		json_array_append_new(passed_over, json_text(reason));
-	json_object_set_new(object, "passed_over", passed_over);
-	for (size_t i = 0; i < keys->n; i++) {
-		const struct incise_key *key = &keys->key[i];
-		const char *unit = key->unit;
-		char *origin = origin_of(key, rig);
-
-		json_array_append_new(list,
-				      json_pack("{s:s, s:o, s:o, s:o}", "key", key->name,
-						"value", value_of(key->value), "unit",
-						*unit ? json_string(unit) : json_null(),
-						"from", json_text(origin)));
-		free(origin);
-	}
-	if (options->show)
-		json_object_set(object, "keys", list);
-	json_decref(list);
-	json_print(object);
-}
-
 int main(int argc, char **argv)
 {
 	struct options options = {0};
 	struct incise_error err = {0};
 	struct keys keys = {0};
-	const char *rig;
+	json_t *passed_over = json_array(), *report;
+	const char *rig, *reason;
 
 	cli_parse(&command, argc, argv, &options);
 	cli_no_operands(argc, argv, "a rig is named with --rig");
 	rig = cli_rig(options.rig);
-	if (incise_rig_keys(rig, keep, &keys, &err))
+	if (incise_rig_keys(rig, keys_add, &keys, &err))
 		cli_fail_with(&err);
-	if (!options.show)
-		keys.n = 0;
+	if (!options.json)
+		printf("rig          %s\n", rig);
+	for (int i = 0; !options.rig && (reason = cli_rig_passed_over(i)); i++) {
+		if (!options.json)
+			printf("passed over  %s\n", reason);
+		json_array_append_new(passed_over, json_text(reason));
+	}
+	report = json_pack("{s:o, s:o}", "rig", json_text(rig), "passed_over",
+			   passed_over);
+	if (options.show && options.json) {
+		json_object_set_new(report, "keys", keys_json(&keys, rig, true));
+	} else if (options.show) {
+		puts("");
+		keys_print(&keys, rig, true);
+	}
 	if (options.json)
-		print_json(&options, rig, &keys);
+		json_print(report);
 	else
-		print(&options, rig, &keys);
+		json_decref(report);
 	free(keys.key);
 	cli_finish();
 	return 0;

@@ -33,7 +33,7 @@
 		       "reports the delay as not calibrated")
 
 /* The numbers are all double. Without a default they are NAN. */
-static const struct incise_setting settings[] = {
+const struct incise_setting incise_calibration_settings[] = {
 	SETTING_NUMBER(force_mV_N, force_mV_N, "mV/N", 1, 100000, "1240",
 		       "sensitivity of the force channel after its amplifier"),
 	SETTING_NUMBER(
@@ -75,7 +75,9 @@ static const struct incise_setting settings[] = {
 	{0},
 };
 
-#define N_KEYS ((int)(sizeof(settings) / sizeof(*settings)) - 2)
+static const struct incise_setting *const settings = incise_calibration_settings;
+
+#define N_KEYS ((int)(sizeof(incise_calibration_settings) / sizeof(*settings)) - 2)
 
 struct file_content {
 	struct incise_calibration in_force;

@@ -184,4 +184,7 @@ void incise_setting_text(const struct incise_setting *row, const void *of, char 
 /* A text in quotes, as a file has it. */
 void incise_setting_quoted(const char *from, char *text, size_t size);
 
+/* The keys of calibration.conf, in a struct incise_calibration. */
+extern const struct incise_setting incise_calibration_settings[];
+
 #endif

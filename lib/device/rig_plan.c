@@ -193,7 +193,7 @@ const struct incise_setting incise_rig_settings[] = {
 	SETTING_OWN(stepper, "", "(none)",
 		    "actuator, as BACKEND:ARGUMENTS, or an array of two or three"),
 	SETTING_GROUP(surface, surface_settings, "plane of the tissue surface"),
-	SETTING_OWN(actuator, "", "(none)",
+	SETTING_OWN(actuator, "group", "(none)",
 		    "mechanics of a real actuator, or a list of two or three groups",
 		    .read = read_actuators),
 	SETTING_GROUP(tracker_setup, tracker_settings, "settings of a real tracker"),
@@ -208,7 +208,8 @@ const struct incise_setting incise_rig_settings[] = {
 		.fits = is_path,
 		.expected = "the path of a private key of SSH, such as "
 			    "\"/etc/incise/rig_ed25519\""),
-	SETTING_OWN(sim, "", "(none)", "settings of the simulated rig", .read = read_sim),
+	SETTING_OWN(sim, "group", "(none)", "settings of the simulated rig",
+		    .read = read_sim),
 	{0},
 };
 

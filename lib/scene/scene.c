@@ -27,7 +27,7 @@ static const char *const withdrawals[] = {"paper", "dissipative", NULL};
 static const char *const orientations[] = {"eased", "paper", NULL};
 static const char *const skins[] = {"plain", "neck", "liver", NULL};
 
-/* The forces of the tissue bring theirs; see tissue_settings(). */
+/* The forces of the tissue bring theirs; see incise_scene_tissue_settings(). */
 static const struct incise_setting tissue[] = {
 	SETTING_NUMBER(gain, tissue.gain, "", 0, 10, "1",
 		       "factor of all tissue forces, including the model's"),
@@ -208,7 +208,7 @@ static int read_tissue(void *to, const config_setting_t *group, const char *path
 static int read_surface(void *to, const config_setting_t *group, const char *path,
 			struct incise_error *err);
 
-static const struct incise_setting scene_settings[] = {
+const struct incise_setting incise_scene_settings[] = {
 	SETTING_NUMBER(rate_hz, rate_hz, "Hz", 100, 20000, "1000", "ticks per second"),
 	SETTING_OWN(model, "", "(none)",
 		    "model of the reaction force, .fis or .fx; or a group of models, see "
@@ -217,8 +217,10 @@ static const struct incise_setting scene_settings[] = {
 		arithmetic, fixed, arithmetics, "fixed",
 		"fixed or double: evaluate reaction and plane constraint in integers "
 		"or in floating point"),
-	SETTING_OWN(surface, "", "(none)", "the tissue surface", .read = read_surface),
-	SETTING_OWN(tissue, "", "(none)", "forces of the tissue", .read = read_tissue),
+	SETTING_OWN(surface, "group", "(none)", "the tissue surface",
+		    .read = read_surface),
+	SETTING_OWN(tissue, "group", "(none)", "forces of the tissue",
+		    .read = read_tissue),
 	SETTING_GROUP(effects, effects, "what smooths the forces"),
 	SETTING_GROUP(tool, tool, "the scalpel"),
 	SETTING_GROUP(membrane, membrane, "a membrane that a tool passes"),
@@ -229,8 +231,7 @@ static const struct incise_setting scene_settings[] = {
 	{0},
 };
 
-/* Of the group tissue: those above, and those of each force. */
-static void tissue_settings(struct incise_setting rows[SETTING_ROWS_MAX + 1])
+void incise_scene_tissue_settings(struct incise_setting rows[SETTING_ROWS_MAX + 1])
 {
 	int n = 0;
 
@@ -267,7 +268,7 @@ static int read_tissue(void *to, const config_setting_t *group, const char *path
 {
 	struct incise_setting rows[SETTING_ROWS_MAX + 1];
 
-	tissue_settings(rows);
+	incise_scene_tissue_settings(rows);
 	return incise_settings_read(rows, group, path, to, err);
 }
 
@@ -378,6 +379,19 @@ static const struct kind {
 
 #define KINDS (sizeof(kinds) / sizeof(*kinds))
 
+static const struct kind *kind_of(const char *name)
+{
+	for (size_t i = 0; i < KINDS; i++)
+		if (!strcmp(kinds[i].name, name))
+			return &kinds[i];
+	return NULL;
+}
+
+const struct incise_setting *incise_scene_surface_settings(const char *kind)
+{
+	return kind_of(kind)->settings;
+}
+
 static int read_surface(void *to, const config_setting_t *group, const char *path,
 			struct incise_error *err)
 {
@@ -385,15 +399,14 @@ static int read_surface(void *to, const config_setting_t *group, const char *pat
 	struct incise_scene_surface *named = &scene->named;
 	const char *name = "plane";
 	struct incise_error why = {0};
-	const struct kind *kind = kinds;
+	const struct kind *kind;
 	int rc;
 
 	if (config_setting_get_member(group, "kind") &&
 	    !config_setting_lookup_string(group, "kind", &name))
 		name = "";
-	while (kind < kinds + KINDS && strcmp(kind->name, name))
-		kind++;
-	if (kind == kinds + KINDS)
+	kind = kind_of(name);
+	if (!kind)
 		return incise_conf_error(group, "kind", path, err,
 					 "\"plane\", \"sphere\", \"capsule\", "
 					 "\"heights\" or \"mesh\"");
@@ -503,6 +516,13 @@ static int load_model(const struct incise_scene *scene, struct incise_scene_mode
 					why.text);
 	return find_inputs(scene, cut, err);
 }
+
+static const struct incise_setting model_settings[] = {
+	SETTING_OWN(cut, "", "(required)", "model of a blade that cuts"),
+	SETTING_OWN(puncture, "", "(none)", "of one that opens the skin"),
+	SETTING_OWN(withdraw, "", "(none)", "of one that is drawn out"),
+	{0},
+};
 
 /* In the order of enum incise_cutting_phase. */
 static const char *const cutting_phases[] = {"cut", "puncture", "withdraw", NULL};
@@ -627,7 +647,8 @@ static int check_tool(const struct incise_scene *scene, const config_setting_t *
 static int read_scene(struct incise_scene *scene, const config_setting_t *root,
 		      const char *model, struct incise_error *err)
 {
-	int rc = incise_settings_read(scene_settings, root, scene->path, scene, err);
+	int rc = incise_settings_read(incise_scene_settings, root, scene->path, scene,
+				      err);
 
 	if (!rc)
 		rc = check_membrane(scene, root, err);
@@ -655,9 +676,9 @@ struct incise_scene *incise_scene_load(const char *path, const char *model,
 		incise_error_set(err, ENOMEM, "%s: no memory to read it", path);
 		goto out;
 	}
-	tissue_settings(rows);
+	incise_scene_tissue_settings(rows);
 	incise_settings_init(rows, scene);
-	incise_settings_init(scene_settings, scene);
+	incise_settings_init(incise_scene_settings, scene);
 	scene->device.delay_ticks = -1;
 	rc = incise_conf_read(&config, path, err);
 	if (rc)
@@ -676,8 +697,8 @@ out:
 int incise_scene_set_arithmetic(struct incise_scene *scene, const char *name,
 				struct incise_error *err)
 {
-	return incise_settings_set(scene_settings, scene->path, "arithmetic", name, scene,
-				   err);
+	return incise_settings_set(incise_scene_settings, scene->path, "arithmetic", name,
+				   scene, err);
 }
 
 void incise_scene_set_full(struct incise_scene *scene, bool full)
@@ -806,37 +827,33 @@ int incise_scene_set_texture(struct incise_scene *scene, int texture_px)
 
 bool incise_scene_has_key(const char *key)
 {
-	return incise_setting_of(scene_settings, key);
+	return incise_setting_of(incise_scene_settings, key);
 }
 
-/* A group, or the models of phases: texts. */
+/* A group; membrane and criteria are not there by default. */
 static void list_group(struct incise_settings_list *list,
 		       const struct incise_scene *scene, const struct incise_setting *row,
 		       const config_setting_t *group)
 {
-	struct incise_setting rows[SETTING_ROWS_MAX + 1];
-	const void *of = scene;
+	struct incise_setting tissue_rows[SETTING_ROWS_MAX + 1];
+	const struct incise_setting *rows = row->rows;
+	struct incise_scene shown = *scene;
+	const void *of = &shown;
 
-	tissue_settings(rows);
-	if (row->kind == SETTING_IS_GROUP) {
-		incise_settings_list(list, row->rows, of, group, row->key);
-	} else if (!strcmp(row->key, "tissue")) {
+	incise_scene_tissue_settings(tissue_rows);
+	for (int i = 0; i < INCISE_CRITERIA; i++)
+		if (!scene->criteria[i].asked)
+			shown.criteria[i].min = shown.criteria[i].max = NAN;
+	if (!strcmp(row->key, "tissue"))
+		rows = tissue_rows;
+	if (!strcmp(row->key, "model"))
+		rows = model_settings;
+	if (!strcmp(row->key, "surface") && scene->surface_kind) {
+		rows = incise_scene_surface_settings(scene->surface_kind);
+		of = &scene->named;
+	}
+	if (rows && (group || (rows != membrane && rows != criteria)))
 		incise_settings_list(list, rows, of, group, row->key);
-	} else if (!strcmp(row->key, "surface") && scene->surface_kind) {
-		const struct kind *kind = kinds;
-
-		while (strcmp(kind->name, scene->surface_kind))
-			kind++;
-		incise_settings_list(list, kind->settings, &scene->named, group,
-				     row->key);
-	}
-	for (int i = 0; !strcmp(row->key, "model") && i < INCISE_CUTTING_PHASES; i++) {
-		struct incise_setting phase = SETTING_OWN(model, "", "", row->help);
-
-		phase.key = cutting_phases[i];
-		incise_settings_list(list, (struct incise_setting[]){phase, {0}}, of,
-				     group, row->key);
-	}
 }
 
 int incise_scene_keys(const char *path, incise_key_found *found, void *context,
@@ -856,7 +873,7 @@ int incise_scene_keys(const char *path, incise_key_found *found, void *context,
 		return rc;
 	}
 	root = config_root_setting(&config);
-	for (const struct incise_setting *row = scene_settings; row->key; row++) {
+	for (const struct incise_setting *row = incise_scene_settings; row->key; row++) {
 		setting = config_setting_get_member(root, row->key);
 		if (row->kind == SETTING_IS_GROUP || row->read ||
 		    (setting && config_setting_is_group(setting)))

@@ -67,4 +67,12 @@ struct incise_scene {
 	struct incise_scene_picture picture;
 };
 
+/*
+ * The keys of a scene, in a struct incise_scene: of its groups; of the group tissue, those of the forces
+ * included; and of a surface of that kind, in a struct incise_scene_surface.
+ */
+extern const struct incise_setting incise_scene_settings[];
+void incise_scene_tissue_settings(struct incise_setting rows[SETTING_ROWS_MAX + 1]);
+const struct incise_setting *incise_scene_surface_settings(const char *kind);
+
 #endif

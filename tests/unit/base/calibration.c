@@ -405,7 +405,8 @@ static void say_present(struct file_content *file, const char *name)
 {
 	int element;
 
-	file->present[find_key(name, &element) - settings] = true;
+	file->present[find_key(name, &element) -
+		      incise_calibration_settings] = true;
 }
 
 static char *written(const struct file_content *file, const char *notes)
