@@ -17,6 +17,25 @@ setup() {
 	ln -s "$BATS_FILE_TMPDIR"/*.fis "$BATS_FILE_TMPDIR/a.rec" .
 }
 
+# bats test_tags=check
+@test "info of a scene and of a rig: the keys that are given, and with --all the defaults" {
+	printf 'tissue = {\n  reaction_N_mm = 0.1; };\n' >a.scene
+	run -0 --separate-stderr incise info a.scene
+	[ "${#lines[@]}" -eq 2 ]
+	[[ "${lines[1]}" =~ ^"tissue.reaction_N_mm "+"0.1 N/mm "+"a.scene:2"$ ]]
+	run -0 --separate-stderr incise info a.scene --all
+	[[ "$output" =~ $'\n'"limits.force_N "+"4 N "+"default" ]]
+	[[ "$output" != *membrane* ]]
+	printf 'sim = { seed = 3; };\n' >rig.conf
+	for rig in rig rig.conf sim:seed=3; do
+		incise info "$rig" --json >r.json
+		[ "$(key r.json kind)" = rig ]
+		incise info "$rig" | grep -Eq '^sim.seed +3 '
+	done
+	run -2 --separate-stderr incise info m.fis --all
+	[[ "$stderr" == *"--all goes with a rig or a scene"* ]]
+}
+
 @test "info of a model" {
 	run -0 --separate-stderr incise info m.fis
 	[ -z "$stderr" ]

@@ -30,6 +30,8 @@ models() {
 	report info.compiled info m.fx
 	report info.plan info liver.plan
 	report info.devices info devices
+	report info.scene info "$root/scenes/neck.scene" --all
+	report info.rig info sim:seed=3
 	report info.factor info m.fac
 	report info.dataset info --dataset pairs.csv --group cut
 }

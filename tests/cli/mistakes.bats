@@ -75,7 +75,6 @@ table() {
 		2|eval m.fis --grid 20|--grid:|'20'
 		2|eval m.fx --no-clamp|--no-clamp:
 		1|info pairs.csv|pairs.csv:
-		1|info rig.conf|rig.conf:|--rig
 		2|plan|SCENE
 		1|plan livr|livr:|liver
 		1|plan m.fis|m.fis:|.fis
