@@ -18,6 +18,7 @@
 #include "cli/cli.h"
 #include "cli/complete.h"
 #include "cli/features.h"
+#include "cli/help.h"
 
 #define LETTERS "abcdefghijklmnopqrstuvwxyz"
 
@@ -57,17 +58,26 @@ static const struct {
 
 #define COMMANDS (sizeof(commands) / sizeof(*commands))
 
-static void help(FILE *out)
+static void help(void)
 {
-	fprintf(out,
-		"Usage: incise COMMAND [ARGUMENTS]\n\n"
-		"A toolkit for haptic cutting: record, model and render how tissue resists a "
-		"scalpel.\n\nCommands:\n");
-	for (size_t i = 0; i < COMMANDS; i++)
-		fprintf(out, "  %-11s %s\n", commands[i].name, commands[i].does);
-	fprintf(out,
-		"\n'incise COMMAND --help' lists the options of a command, 'incise help "
-		"COMMAND' opens its\nmanual. New here? Start with 'incise demo'.\n");
+	help_print_text("Usage: incise COMMAND [ARGUMENTS]\n", 0, 0);
+	putchar('\n');
+	help_print_text(
+		"A toolkit for haptic cutting: record, model and render how tissue "
+		"resists a scalpel.",
+		0, 0);
+	printf("\nCommands:\n");
+	for (size_t i = 0; i < COMMANDS; i++) {
+		char *line = cli_text("  %-11s  %s", commands[i].name, commands[i].does);
+
+		help_print_text(line, 0, 0);
+		free(line);
+	}
+	putchar('\n');
+	help_print_text(
+		"'incise COMMAND --help' lists the options of a command, 'incise "
+		"help COMMAND' opens its manual. New here? Start with 'incise demo'.",
+		0, 0);
 }
 
 /* Whether PATH leads to a file of this name, runnable or not. */
@@ -262,11 +272,12 @@ int main(int argc, char **argv)
 	char folder[PATH_MAX], program[PATH_MAX + 80];
 
 	if (argc < 2) {
-		help(stderr);
+		dup2(STDERR_FILENO, STDOUT_FILENO);
+		help();
 		return 2;
 	}
 	if (!strcmp(command, "-h") || !strcmp(command, "--help")) {
-		help(stdout);
+		help();
 		return finish();
 	}
 	if (!strcmp(command, "-V") || !strcmp(command, "--version")) {
@@ -279,7 +290,7 @@ int main(int argc, char **argv)
 	if (!strcmp(command, "help")) {
 		if (argc > 2)
 			return manual(argv[2], argv[3]);
-		help(stdout);
+		help();
 		return finish();
 	}
 	if (strchr(command, '/') || *command == '-' || strlen(command) > 64)

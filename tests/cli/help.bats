@@ -4,7 +4,8 @@
 load cli
 
 setup() {
-	verbs=$(incise --help | awk '/^Commands:/ { on = 1; next } on && !NF { exit } on { print $1 }')
+	work_folder
+	verbs=$(incise --help | awk '/^Commands:/ { on = 1; next } on && !NF { exit } on && /^  [a-z]/ { print $1 }')
 	[ "$(wc -w <<<"$verbs")" -ge 8 ]
 	# "calibrate force": incise-calibrate-force
 	words=$(cd "$INCISE_BUILD/bin" && printf '%s\n' incise-*-* | sed 's/^incise-//; s/-/ /')
@@ -16,10 +17,8 @@ program() {
 	echo "incise${1:+-${1// /-}}"
 }
 
-# Options that lines of --help begin with, long and short.
 options_of_help() {
-	"$(program "$1")" --help | awk '/^  +-/ { sub(/  [^ -].*/, ""); print }' |
-		grep -oE -- '(^|[ ,])--?[A-Za-z][a-z-]*' | tr -d ' ,' | sort -u
+	"$(program "$1")" --table | awk -F'\t' '/^option/ { print "--" $3; if ($2) print "-" $2 }' | sort -u
 }
 
 # Options that items of the page's lists are headed by: ".It Fl o , Fl -output Ar FILE".
@@ -36,6 +35,29 @@ options_of_page() {
 		[ "$(options_of_help "$verb" | wc -l)" -ge 4 ]
 		diff <(options_of_help "$verb") <(options_of_page "$verb")
 	done
+}
+
+# bats test_tags=check
+@test "no line of a help is wider than the terminal" {
+	for columns in 80 60; do
+		for name in "" "${all[@]}"; do
+			COLUMNS=$columns "$(program "$name")" --help >out
+			# characters, not bytes
+			run ! grep -P "(*UTF)^.{$((columns + 1))}" out
+			[ "$(wc -l <out)" -ge 8 ] || complain "$name: $(cat out)"
+		done
+	done
+	# as wide as asked for, in characters: a line of this one has a dash of three bytes
+	[ "$(COLUMNS=80 incise-train --help | sed -n 1p)" = "Usage: incise train DATA.csv|NAME.rec… -o MODEL.fis [OPTIONS]" ]
+	[ "$(COLUMNS=61 incise-train --help | sed -n 1p)" = "Usage: incise train DATA.csv|NAME.rec… -o MODEL.fis [OPTIONS]" ]
+	[ "$(COLUMNS=60 incise-train --help | sed -n 2p)" = "        [OPTIONS]" ]
+	# of the terminal, where nobody says otherwise
+	run -0 script -qec 'unset COLUMNS; stty cols 50; incise-train --help' /dev/null </dev/null
+	[ "$(tr -d "\r" <<<"$output" | sed -n 2p)" = "        MODEL.fis [OPTIONS]" ]
+	# an example can be pasted
+	[ "$(COLUMNS=60 incise-train --help | sed -n '/pairs.csv/,/liver/p')" = \
+		"  incise train pairs.csv --group cut --check 0.3 \\
+      -o liver.fis" ]
 }
 
 # bats test_tags=check
