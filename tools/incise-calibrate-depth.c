@@ -60,8 +60,7 @@ static void parse_board(void *whole, char *text)
 }
 
 static const struct cli_option option_table[] = {
-	{'r', "rig", "RIG", "rig.conf, or sim:KEY=VALUE,… (default: ./rig.conf)",
-	 CLI_INPUT(struct options, common.rig)},
+	{CLI_RIG_OPTION(struct options, common.rig)},
 	{CALIBRATE_FILE_OPTION(struct options)},
 	{0, "from", "FILE",
 	 "images (more may follow), FILE.csv or NAME.rec instead of the rig's "

@@ -70,9 +70,7 @@ static void parse_weights(void *weights, char *text)
 static const struct cli_unit grams[] = {{"g", 1}, {"mg", 1e-3}, {"kg", 1e3}, {0}};
 
 static const struct cli_option option_table[] = {
-	{'r', "rig", "RIG",
-	 "rig.conf, or sim:KEY=VALUE,... (default: ./rig.conf, then /etc/incise)",
-	 CLI_INPUT(struct options, common.rig)},
+	{CLI_RIG_OPTION(struct options, common.rig)},
 	{CALIBRATE_FILE_OPTION(struct options)},
 	{0, "from", "FILE",
 	 "pairs instead of a rig: CSV with mass_g or force_N, reading_mV, and "

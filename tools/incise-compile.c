@@ -73,7 +73,7 @@ static const struct cli_option options[] = {
 	{0, "cells", "N", "at least N cells per input of tables, up to 4096",
 	 CLI_INTEGER(struct job, options.cells, 1, 4096)},
 	{0, "c-source", "FILE.c",
-	 "also write it as C for a microcontroller, with the function FILE_eval()",
+	 "also write it as C for a microcontroller, with a function FILE_eval",
 	 CLI_OUTPUT(struct job, c_source), .parse = check_c_source, .extensions = ".c"},
 	{0, "model", "FILE", "scene: use this model instead of its own",
 	 CLI_INPUT(struct job, scene.model)},

@@ -27,7 +27,7 @@ static const struct {
 } commands[] = {
 	{"calibrate", "measure the scale factors, delays and offsets of a rig"},
 	{"capture", "record the streams of a rig in sync"},
-	{"verify", "check that a recording is complete"},
+	{"verify", "check that a recording is complete and unaltered"},
 	{"sign", "sign and time-stamp a recording"},
 	{"recover", "copy an interrupted recording to one that is read like any other"},
 	{"join", "put recordings of several machines on one timeline"},
@@ -37,10 +37,12 @@ static const struct {
 	{"merge", "make one model of the factors of several laboratories or machines"},
 	{"compile", "convert a model or a scene to fixed point with a certified error"},
 	{"eval", "print the force of a model at given depth and velocity"},
-	{"info", "describe a recording, model, plan or stepper module"},
+	{"info",
+	 "describe a recording, model, plan, stepper module, CAN bus or attached device"},
 	{"plot", "draw a recording, dataset, model, session or calibration"},
 	{"provenance", "print the way from a figure or model back to its recordings"},
-	{"plan", "show the stages that a scene runs, and why it leaves out others"},
+	{"plan",
+	 "show the stages that a scene runs, their cost, and the stability of the scene"},
 	{"haptic", "run the real-time loop of a scene"},
 	{"feed", "load a scene into the kernel and send it the poses"},
 	{"serve", "send poses, forces and frames live to other programs"},
@@ -159,7 +161,7 @@ static char *page_of(const char *topic, const char *subcommand)
 	return NULL;
 }
 
-/* The page in the source tree if this runs in a build tree, else the installed one. */
+/* The page of the build tree if this runs in one, else the installed one. */
 static int manual(const char *topic, const char *subcommand)
 {
 	char *page = topic ? page_of(topic, subcommand) : strdup("incise.1");
@@ -183,7 +185,7 @@ static int manual(const char *topic, const char *subcommand)
 				  topic);
 		return 2;
 	}
-	if (asprintf(&path, "%s/../../man/%s", cli_folder(), page) < 0)
+	if (asprintf(&path, "%s/../man/%s", cli_folder(), page) < 0)
 		return 1;
 	if (!access(path, R_OK))
 		execlp("man", "man", path, (char *)NULL);
@@ -287,6 +289,11 @@ int main(int argc, char **argv)
 	}
 	if (!strcmp(command, "--complete"))
 		return complete(argc - 2, argv + 2);
+	if (!strcmp(command, "--table")) { /* for the manual page */
+		for (size_t i = 0; i < COMMANDS; i++)
+			printf("command\t%s\t%s\n", commands[i].name, commands[i].does);
+		return finish();
+	}
 	if (!strcmp(command, "help")) {
 		if (argc > 2)
 			return manual(argv[2], argv[3]);
