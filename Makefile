@@ -132,7 +132,7 @@ commands := $(filter-out $(if $(has_view),,view bench-view),$(patsubst tools/inc
 Q := $(if $(V),,@)
 step = $(if $(V),,@printf '  %-4s %s\n' $1 '$(patsubst $(O)/%,%,$@)')
 
-all: libs tools
+all: libs tools pages
 
 .DEFAULT_GOAL := all
 .DELETE_ON_ERROR:

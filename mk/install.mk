@@ -2,13 +2,13 @@
 # install, uninstall, dist.
 
 headers := $(wildcard lib/include/incise/*.h)
-man_pages := $(wildcard man/*.[1-8])
 scenes := $(wildcard scenes/*.scene scenes/*.fis)
 schemas := $(wildcard schema/*.json)
 report_files := $(addprefix tools/report/,report.py compare.py measure.py bench.j2 assess.j2 document.css)
 examples := $(wildcard doc/*.example)
 # All but the main page of the headers' reference, which is in that.
-documents := README.md CHANGELOG.md $(filter-out doc/reference.md,$(wildcard doc/*.md doc/*.svg doc/*.png))
+documents := README.md CHANGELOG.md $(O)/doc/options.md \
+	$(filter-out doc/reference.md,$(wildcard doc/*.md doc/*.svg doc/*.png))
 # Sources of examples, not what was built of them.
 example_files := $(addprefix examples/,README.md Makefile own_loop.c tracker_lines.c)
 example_scripts := examples/capture_to_figure.sh examples/learn.py
@@ -78,7 +78,7 @@ install: all ## install below $(DESTDIR)$(prefix)
 		-e 's|@requires@|$(needs_$(lib))|' \
 		mk/library.pc.in >"$(DESTDIR)$(libdir)/pkgconfig/$(lib).pc" &&) :
 	for page in $(man_pages); do \
-		$(INSTALL) -m 644 $$page "$(DESTDIR)$(mandir)/man$${page##*.}" || exit 1; \
+		$(INSTALL) -m 644 $(O)/$$page "$(DESTDIR)$(mandir)/man$${page##*.}" || exit 1; \
 	done
 	$(INSTALL) -m 644 $(scenes) "$(DESTDIR)$(datadir)/incise/scenes"
 	$(INSTALL) -m 644 $(schemas) "$(DESTDIR)$(datadir)/incise/schema"

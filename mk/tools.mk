@@ -100,6 +100,28 @@ $(O)/man/%.5: man/%.5 mk/manual-tables $(O)/obj/mk/settings.tables
 	@mkdir -p $(@D)
 	$(call step,MAN)
 	$(Q)mk/manual-tables $(O)/obj/mk/settings.tables $< >$@
+# Manual pages, and the list of all options: the tables that --help prints are stated in the programs
+# alone. Pages of what is not built are left out.
+man_pages := $(filter-out $(if $(has_view),,man/incise-view.1 man/incise-bench-view.1),$(wildcard man/*.[1-8]))
+tables := $(patsubst $(O)/bin/%,$(O)/obj/tools/%.table,$(programs))
+
+$(O)/obj/tools/%.table: $(O)/bin/%
+	$(Q)LD_LIBRARY_PATH=$(O)/lib $< --table >$@
+
+$(O)/man/%.1: man/%.1 mk/manual $(O)/obj/tools/%.table
+	@mkdir -p $(@D)
+	$(call step,MAN)
+	$(Q)mk/manual $(O)/obj/tools/$*.table $< >$@
+
+$(O)/man/%: man/%
+	@mkdir -p $(@D)
+	$(Q)cp $< $@
+
+$(O)/doc/options.md: mk/options $(tables)
+	@mkdir -p $(@D)
+	$(Q)$< $(filter-out %/incise.table,$(tables)) >$@
+
+pages: $(man_pages:%=$(O)/%) $(O)/doc/options.md
 
 DEMO ?= demo.out
 
@@ -120,4 +142,4 @@ bench: ## measure everything on this machine; one report in build/bench/
 readme-figures: ## put the summary of that report, and two of its figures, into doc/evidence.md
 	mk/readme-figures $(O)/bench
 
-.PHONY: tools deps demo bench readme-figures
+.PHONY: tools pages deps demo bench readme-figures

@@ -39,8 +39,7 @@ static const struct cli_option options[] = {
 	{0, "reference", "FILE", "session to compare with, for example of an expert",
 	 CLI_INPUT(struct job, reference_path)},
 	{'o', "output", "FILE.html",
-	 "write a page with figures of the path and the "
-	 "force",
+	 "write a page with figures of the path and the force",
 	 CLI_OUTPUT(struct job, page), .extensions = ".html"},
 	{0, "csv", "FILE", "write one row per session as CSV",
 	 CLI_OUTPUT(struct job, csv)},
@@ -51,14 +50,12 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "assess",
 	.synopsis = "NAME.session... [OPTIONS]",
-	.summary = "Evaluate sessions of incise haptic or incise view against the "
-		   "criteria of their scene.",
+	.summary =
+		"Evaluate sessions of incise haptic or incise view against the criteria "
+		"of their scene.",
 	.options = options,
-	.notes = "Example:\n"
-		 "  incise assess p07.session --reference expert.session -o p07.html\n"
-		 "\n"
-		 "Exit: 0 reported, with criteria met or not, 1 failed, 2 bad usage. "
-		 "See incise-assess(1).",
+	.examples = "incise assess p07.session --reference expert.session -o p07.html",
+	.success = "reported, with criteria met or not",
 };
 
 /* Values beside those of criteria. */

@@ -54,7 +54,8 @@ static const struct cli_option options[] = {
 	{0, "report", "DIR", "folder to write everything to",
 	 CLI_OUTPUTS(struct job, folder)},
 	{0, "from", "DIR",
-	 "measure nothing: write report.html and report.md of\nDIR/report.json again",
+	 "measure nothing: write report.html and report.md of DIR/report.json "
+	 "again",
 	 CLI_TEXT(struct job, from)},
 	{0, "against", "OLD.json",
 	 "report what changed beyond noise since that report.json",
@@ -70,12 +71,13 @@ static const struct cli_command command = {
 	.name = "bench all",
 	.synopsis = "--report DIR [OPTIONS]",
 	.summary =
-		"Run every benchmark and write one report: report.html to read, on a phone and on\n"
-		"paper, too; report.md, the same; report.json; plots; the JSON of each benchmark.",
+		"Run every benchmark and write one report: report.html to read, on a "
+		"phone and on paper, too; report.md, the same; report.json; plots; the "
+		"JSON of each benchmark.",
 	.options = options,
-	.notes =
-		"Exit: 0 done, 1 failed, or a benchmark failed, or metrics got worse: the report\n"
-		"says which and why; 2 bad usage. See incise-bench-all(1).",
+	.failure =
+		"failure, or a benchmark failed, or metrics got worse: the report lists "
+		"which and why",
 };
 
 /* --- the folder --- */

@@ -712,10 +712,11 @@ static const struct bench bench_view = {
 static const struct cli_option options[] = {
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct bench_run, json)},
 	{0, "against", "OLD.json",
-	 "report significant changes since an older report of\n--json",
+	 "report significant changes since an older report of --json",
 	 CLI_INPUT(struct bench_run, against)},
 	{0, "plot", "NAME",
-	 "plot error over run time as NAME.png and NAME.svg,\nand run times of frames as NAME-frames",
+	 "plot error over run time as NAME.png and NAME.svg, and run times of "
+	 "frames as NAME-frames",
 	 CLI_OUTPUTS(struct bench_run, plot)},
 	{0, "quick", NULL, "smoke test with fewer frames and runs",
 	 CLI_FLAG(struct bench_run, quick)},
@@ -726,12 +727,11 @@ static const struct cli_command command = {
 	.name = "bench view",
 	.synopsis = "[SCENE] [OPTIONS]",
 	.summary =
-		"Measure the image of a scene, rendered off-screen while a cut bleeds: run time of a\n"
-		"frame by sizes of texture and image; error against a finer texture. Without SCENE it\n"
-		"renders the neck of Bhasin et al. (2005).",
+		"Measure the image of a scene, rendered off-screen while a cut bleeds: "
+		"run time of a frame by sizes of texture and image; error against a finer "
+		"texture. Without SCENE it renders the neck of Bhasin et al. (2005).",
 	.options = options,
-	.notes = "Exit: 0 success; 1 failure or worse metrics; 2 bad usage.\n"
-		 "See incise-bench-view(1).",
+	.failure = "failure, or worse metrics",
 };
 
 int main(int argc, char **argv)

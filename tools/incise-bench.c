@@ -19,21 +19,22 @@ static void parse_profile(void *profile, char *text)
 static const struct cli_option options[] = {
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct bench_run, json)},
 	{0, "against", "OLD.json",
-	 "report significant changes since an older report of\n--json",
+	 "report significant changes since an older report of --json",
 	 CLI_INPUT(struct bench_run, against)},
 	{0, "plot", "NAME",
-	 "plot error over run time as NAME.png and NAME.svg;\n"
-	 "stability: NAME-map, -rest, -integrators;\n"
-	 "loop: NAME-wakeups",
+	 "plot error over run time as NAME.png and NAME.svg; stability: NAME-map, "
+	 "-rest, -integrators; loop: NAME-wakeups",
 	 CLI_OUTPUTS(struct bench_run, plot)},
 	{0, "duration", "TIME",
-	 "loop: of each measurement of wake-up latency\n(default: 5s)",
+	 "loop: of each measurement of wake-up latency (default: 5s)",
 	 CLI_DURATION(struct bench_run, seconds, 1, 86400)},
 	{0, "load", "NAME",
-	 "loop: wake-up latency under one load only: idle,\ncpu, memory, disk or view",
+	 "loop: wake-up latency under one load only: idle, cpu, memory, disk or "
+	 "view",
 	 CLI_TEXT(struct bench_run, load), .names = load_names},
 	{0, "profile", "STAGES",
-	 "scenes: run one test path of one scene for perf stat\nor callgrind, with its stages or with all: needed\nor full",
+	 "scenes: run one test path of one scene for perf stat or callgrind, with "
+	 "its stages or with all: needed or full",
 	 CLI_PARSED(struct bench_run, profile, parse_profile)},
 	{0, "quick", NULL, "smoke test with fewer points and repeats",
 	 CLI_FLAG(struct bench_run, quick)},
@@ -46,18 +47,13 @@ static const struct bench *const benches[] = {
 
 /* --- help --- */
 
-/* "  loop [SCENE]           ", and further lines below the summary. */
 static void add_summary(char *text, const char *name, const char *operands,
 			const char *summary)
 {
-	char title[40];
+	char *title = cli_text("%s%s%s", name, *operands ? " " : "", operands);
 
-	snprintf(title, sizeof(title), "%s%s%s", name, *operands ? " " : "", operands);
-	for (const char *line = summary; line; line = strchr(line, '\n')) {
-		line += *line == '\n';
-		sprintf(text + strlen(text), "  %-22s %.*s\n",
-			line == summary ? title : "", (int)strcspn(line, "\n"), line);
-	}
+	sprintf(text + strlen(text), "  %-21s  %s\n", title, summary);
+	free(title);
 }
 
 static const struct cli_command *help(void)
@@ -68,10 +64,8 @@ static const struct cli_command *help(void)
 		.synopsis = "BENCHMARK [OPERAND...] [OPTIONS]",
 		.summary = summary,
 		.options = options,
-		.notes =
-			"Exit: 0 success; 1 failure, disagreement with theory or between variants, or worse\n"
-			"metrics; 2 bad usage.\n"
-			"See incise-bench(1).",
+		.failure =
+			"failure, disagreement with theory or between variants, or worse metrics",
 		.operands = all,
 	};
 
@@ -85,14 +79,13 @@ static const struct cli_command *help(void)
 		sprintf(all + strlen(all), "%s %s | ", benches[i]->name, operands);
 	}
 	strcat(all, "view [SCENE] | all | compare OLD.json NEW.json");
-	add_summary(
-		summary, "view", "[SCENE]",
-		"run time and error of the image of a scene;\nsee 'incise bench view --help'");
+	add_summary(summary, "view", "[SCENE]",
+		    "run time and error of the image of a scene; see 'incise bench view "
+		    "--help'");
 	add_summary(summary, "all", "",
-		    "all of these, and one report;\nsee 'incise bench all --help'");
-	strcat(summary,
-	       "compare OLD.json NEW.json lists the significant changes between two reports\n"
-	       "of --json.");
+		    "all of these, and one report; see 'incise bench all --help'");
+	strcat(summary, "compare OLD.json NEW.json lists the significant changes between "
+			"two reports of --json.");
 	return &command;
 }
 

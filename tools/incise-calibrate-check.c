@@ -61,14 +61,14 @@ static const struct cli_unit ages[] = {
 
 static const struct cli_option option_table[] = {
 	{'c', "calibration", "FILE",
-	 "file to check (default: ./calibration.conf, else\n"
+	 "file to check (default: ./calibration.conf, else "
 	 "/etc/incise/calibration.conf)",
 	 CLI_INPUT(struct options, calibration)},
 	{0, "due", "AGE", "age at which a calibration expires (default: 365d)",
 	 CLI_QUANTITY(struct options, due_s, ages, 0, 1e10)},
 	{0, "only", "LIST",
-	 "calibrations that this rig needs, of\n"
-	 "force,depth,tip,delay,stepper (default: all)",
+	 "calibrations that this rig needs, of force,depth,tip,delay,stepper "
+	 "(default: all)",
 	 CLI_PARSED_BY(parse_only)},
 	{0, "recording", "NAME.rec",
 	 "check whether its tracker and camera agree about the depth",
@@ -79,13 +79,12 @@ static const struct cli_option option_table[] = {
 static const struct cli_command command = {
 	.name = "calibrate check",
 	.synopsis = "[-c FILE] [--due AGE] [--recording NAME.rec]",
-	.summary = "Show the active calibrations, their age, and any that have expired; "
-		   "and whether the\n"
-		   "tracker and the camera of a recording agree about the depth.",
+	.summary =
+		"Show the active calibrations, their age, and any that have expired; and "
+		"whether the tracker and the camera of a recording agree about the depth.",
 	.options = option_table,
-	.notes = "Exit codes: 0 all is well, 1 a calibration has expired or failed, or "
-		 "tracker and camera\n"
-		 "disagree, 2 bad usage.",
+	.success = "all is well",
+	.failure = "a calibration has expired or failed, or tracker and camera disagree",
 };
 
 /* The state of one kind. */

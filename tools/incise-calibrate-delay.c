@@ -44,12 +44,11 @@ static const struct cli_option option_table[] = {
 	{0, "duration", "TIME", "length of the recording (default: 15s)",
 	 CLI_DURATION(struct options, time_s, 8, 600)},
 	{0, "reference-stream", "STREAM",
-	 "stream whose delay is taken as known: force (default),\n"
-	 "tracker or camera",
+	 "stream whose delay is taken as known: force (default), tracker or camera",
 	 CLI_CHOICE(struct options, reference, stream_names)},
 	{0, "u-reference", "MS",
-	 "standard uncertainty of that stream's own delay, which is not\n"
-	 "measured: the others' is relative to it",
+	 "standard uncertainty of that stream's own delay, which is not measured: "
+	 "the others' is relative to it",
 	 CLI_NUMBER(struct options, u_reference_ms, 0, 1000)},
 	{0, "max-delay", "MS", "largest delay to look for, in ms (default: 150)",
 	 CLI_NUMBER(struct options, max_delay_ms, 10, 1000)},
@@ -71,16 +70,14 @@ static const struct cli_command command = {
 	.name = "calibrate delay",
 	.synopsis = "[--rig RIG | --from NAME.rec] [OPTIONS]",
 	.summary =
-		"Measure the delays of tracker, force channel and camera relative to "
-		"each other. Press\n"
-		"the tip of the blade on something springy that it does not cut, for "
-		"example foam or rubber,\n"
-		"and lift it off again, two or three times a second, at an uneven pace.",
+		"Measure the delays of tracker, force channel and camera relative to each "
+		"other. Press the tip of the blade on something springy that it does not "
+		"cut, for example foam or rubber, and lift it off again, two or three "
+		"times a second, at an uneven pace.",
 	.options = option_table,
-	.notes = "Example: incise calibrate delay --rig rig.conf --duration 15s "
-		 "--report delay\n"
-		 "Exit codes: 0 done, the calibration is active; 1 failed or refused; 2 "
-		 "bad usage.",
+	.examples = "incise calibrate delay --rig rig.conf --duration 15s --report delay",
+	.success = "the calibration is active",
+	.failure = "failed or refused",
 };
 
 struct stream {

@@ -60,19 +60,17 @@ static void parse_board(void *whole, char *text)
 }
 
 static const struct cli_option option_table[] = {
-	{'r', "rig", "RIG", "rig.conf, or sim:KEY=VALUE,… (default: ./rig.conf)",
-	 CLI_INPUT(struct options, common.rig)},
+	{CLI_RIG_OPTION(struct options, common.rig)},
 	{CALIBRATE_FILE_OPTION(struct options)},
 	{0, "from", "FILE",
-	 "images (more may follow), FILE.csv or NAME.rec instead of the\n"
-	 "rig's camera",
+	 "images (more may follow), FILE.csv or NAME.rec instead of the rig's "
+	 "camera",
 	 CLI_INPUT(struct options, common.from)},
 	{0, "keep", "FILE", "write the raw data to this file, for --from",
 	 CLI_OUTPUT(struct options, common.keep), .extensions = ".csv"},
 	{0, "report", "DIR",
-	 "write report.txt, report.json, fit.png and residuals.png "
-	 "into\n"
-	 "this folder",
+	 "write report.txt, report.json, fit.png and residuals.png into this "
+	 "folder",
 	 CLI_OUTPUTS(struct options, common.report)},
 	{0, "dry-run", NULL, "do everything except writing calibration.conf",
 	 CLI_FLAG(struct options, common.dry_run)},
@@ -90,20 +88,20 @@ static const struct cli_option option_table[] = {
 	{0, "pixels", "PX,...", "two-point: the length in pixels, one value or more",
 	 CLI_TEXT(struct options, pixels)},
 	{0, "pixels-u", "PX",
-	 "two-point: standard uncertainty common to all lengths\n"
-	 "(default: 0.7 for --pixels, 0.03 from images)",
+	 "two-point: standard uncertainty common to all lengths (default: 0.7 for "
+	 "--pixels, 0.03 from images)",
 	 CLI_NUMBER(struct options, u_px, 0, 1000)},
 	{0, "images", "N",
-	 "number of frames to take from the camera (default: 50 on a\n"
-	 "terminal, 8 of a board)",
+	 "number of frames to take from the camera (default: 50 on a terminal, 8 "
+	 "of a board)",
 	 CLI_INTEGER(struct options, source.pictures, 1, FILES_MAX)},
 	{0, "every", "TIME", "board: time between two frames, without a terminal",
 	 CLI_DURATION(struct options, source.every_s, 0.01, 3600)},
 	{0, "pick", "X,Y", "learn the colour of the handle from this pixel",
 	 CLI_TEXT(struct options, source.pick)},
 	{0, "gauge-u", "PERCENT",
-	 "line: standard uncertainty of the scale of the depth gauge\n"
-	 "(default: 0.05)",
+	 "line: standard uncertainty of the scale of the depth gauge (default: "
+	 "0.05)",
 	 CLI_NUMBER(struct options, u_gauge, 0, 100)},
 	{0, "zero-u", "LENGTH",
 	 "line: standard uncertainty of its zero (default: 0.02mm)",
@@ -116,16 +114,15 @@ static const struct cli_option option_table[] = {
 	 "board: standard uncertainty of the squares (default: 0.02)",
 	 CLI_NUMBER(struct options, u_square, 0, 100)},
 	{0, "plane-u", "LENGTH",
-	 "board: standard uncertainty of its distance from the "
-	 "cutting\n"
-	 "plane (default: 0.1mm)",
+	 "board: standard uncertainty of its distance from the cutting plane "
+	 "(default: 0.1mm)",
 	 CLI_QUANTITY(struct options, u_plane_mm, lengths, 0, 100)},
 	{0, "handle", "X,Y,X,Y",
-	 "board: ends of the handle in the image (default: upright in\n"
-	 "its middle)",
+	 "board: ends of the handle in the image (default: upright in its middle)",
 	 CLI_TEXT(struct options, axis)},
 	{0, "region", "X,Y,X,Y",
-	 "board: corners of the region of interest (default: 100 px\naround the axis)",
+	 "board: corners of the region of interest (default: 100 px around the "
+	 "axis)",
 	 CLI_TEXT(struct options, region)},
 	{0},
 };
@@ -133,20 +130,19 @@ static const struct cli_option option_table[] = {
 static const struct cli_command command = {
 	.name = "calibrate depth",
 	.synopsis = "two-point | line | board [OPTIONS]",
-	.summary = "Measure the scale of the camera's image in the plane of the scalpel, "
-		   "and write it to\n"
-		   "calibration.conf, by one of three methods.\n"
-		   "two-point: a known length and its length in pixels.\n"
-		   "line: many pairs of a depth, from a gauge or the tracker, and an "
-		   "exposed length.\n"
-		   "board: a chessboard in the cutting plane, and tilted.",
+	.summary =
+		"Measure the scale of the camera's image in the plane of the scalpel, "
+		"and write it to calibration.conf, by one of three methods.\n"
+		"  two-point  a known length and its length in pixels\n"
+		"  line       many pairs of a depth, from a gauge or the tracker, and an "
+		"exposed length\n"
+		"  board      a chessboard in the cutting plane, and tilted",
 	.options = option_table,
-	.notes = "Example: incise calibrate depth two-point --length 47.5mm --pixels "
-		 "400\n"
-		 "         incise calibrate depth board --from plane.png tilt*.png "
-		 "--square 5mm\n"
-		 "Exit codes: 0 done, the calibration is active; 1 failed or refused; 2 "
-		 "bad usage.",
+	.examples =
+		"incise calibrate depth two-point --length 47.5mm --pixels 400\n"
+		"incise calibrate depth board --from plane.png tilt*.png --square 5mm",
+	.success = "the calibration is active",
+	.failure = "failed or refused",
 };
 
 static void parse_files(struct options *options, int argc, char **argv)

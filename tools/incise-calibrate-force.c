@@ -70,13 +70,11 @@ static void parse_weights(void *weights, char *text)
 static const struct cli_unit grams[] = {{"g", 1}, {"mg", 1e-3}, {"kg", 1e3}, {0}};
 
 static const struct cli_option option_table[] = {
-	{'r', "rig", "RIG",
-	 "rig.conf, or sim:KEY=VALUE,... (default: ./rig.conf, then /etc/incise)",
-	 CLI_INPUT(struct options, common.rig)},
+	{CLI_RIG_OPTION(struct options, common.rig)},
 	{CALIBRATE_FILE_OPTION(struct options)},
 	{0, "from", "FILE",
-	 "pairs instead of a rig: CSV with mass_g or force_N, reading_mV,\n"
-	 "and optionally series and direction (up, down)",
+	 "pairs instead of a rig: CSV with mass_g or force_N, reading_mV, and "
+	 "optionally series and direction (up, down)",
 	 CLI_INPUT(struct options, common.from)},
 	{0, "keep", "FILE", "write the pairs to this file, for --from",
 	 CLI_OUTPUT(struct options, common.keep), .extensions = ".csv"},
@@ -89,42 +87,38 @@ static const struct cli_option option_table[] = {
 	 "loads, for example 0,50g,100g,0.2kg (default: ask for them)",
 	 CLI_PARSED(struct options, weights, parse_weights)},
 	{0, "series", "N",
-	 "series of all loads upwards; the last one also downwards\n"
-	 "(default: 3)",
+	 "series of all loads upwards; the last one also downwards (default: 3)",
 	 CLI_INTEGER(struct options, weights.series, 1, 100)},
 	{0, "duration", "TIME", "averaging time of each reading (default: 2s)",
 	 CLI_DURATION(struct options, weights.mean_s, 0.1, 600)},
 	{0, "timeout", "TIME",
-	 "longest wait for a load to be put on and be steady\n"
-	 "(default: 1min)",
+	 "longest wait for a load to be put on and be steady (default: 1min)",
 	 CLI_DURATION(struct options, weights.timeout_s, 2, 3600)},
 	{0, "gravity", "M_S2",
-	 "local gravity (default: 9.80665, with the uncertainty of an\n"
-	 "unknown place)",
+	 "local gravity (default: 9.80665, with the uncertainty of an unknown "
+	 "place)",
 	 CLI_PARSED_BY(parse_gravity)},
 	{0, "latitude", "DEG", "latitude, to compute gravity from",
 	 CLI_NUMBER(struct options, latitude_deg, -90, 90)},
 	{0, "altitude", "M",
-	 "altitude above the sea, to compute gravity from "
-	 "(default: 0)",
+	 "altitude above the sea, to compute gravity from (default: 0)",
 	 CLI_NUMBER(struct options, altitude_m, -1000, 10000)},
 	{0, "scale", "MASS",
-	 "resolution of the scale that weighed the loads\n"
-	 "(default: 0.5g)",
+	 "resolution of the scale that weighed the loads (default: 0.5g)",
 	 CLI_QUANTITY(struct options, setup.scale_g, grams, 0, 1e4)},
 	{0, "density", "KG_M3", "density of the weights (default: 7950)",
 	 CLI_PARSED_BY(parse_density)},
 	{0, "input-range", "LOW,HIGH",
-	 "range of the converter in mV (default: that of the rig; unknown\n"
-	 "with --from)",
+	 "range of the converter in mV (default: that of the rig; unknown with "
+	 "--from)",
 	 CLI_PARSED_BY(parse_range)},
 	{0, "nominal", "MV_N", "nominal sensitivity to compare with (default: 1240)",
 	 CLI_NUMBER(struct options, setup.nominal_mV_N, 1, 1e5)},
 	{0, "tolerance", "PERCENT", "largest deviation from it that passes (default: 5)",
 	 CLI_PARSED(struct options, setup.tolerance, parse_tolerance)},
 	{0, "zero", NULL,
-	 "also calibrate the zero (default: measured at the start of\n"
-	 "each recording)",
+	 "also calibrate the zero (default: measured at the start of each "
+	 "recording)",
 	 CLI_FLAG(struct options, zero)},
 	{0}};
 
@@ -132,12 +126,10 @@ static const struct cli_command command = {
 	.name = "calibrate force",
 	.synopsis = "[--weights LIST | --from FILE] [OPTIONS]",
 	.summary = "Measure the sensitivity of the force channel with weights (procedure "
-		   "after ISO 376)\n"
-		   "and write it to calibration.conf.",
+		   "after ISO 376) and write it to calibration.conf.",
 	.options = option_table,
-	.notes = "Exit codes: 0 the calibration is active (or would be, with "
-		 "--dry-run), 1 failed or refused,\n"
-		 "2 bad usage.",
+	.success = "the calibration is active (or would be, with --dry-run)",
+	.failure = "failed or refused",
 };
 
 static void parse(struct options *options, int argc, char **argv)

@@ -50,22 +50,21 @@ static const struct cli_option option_table[] = {
 	{0, "keep", "FILE", "write the points to this CSV file, for --from",
 	 CLI_OUTPUT(struct options, common.keep), .extensions = ".csv"},
 	{0, "report", "DIR",
-	 "write report.txt, report.json and plots of fit and "
-	 "residuals\n"
-	 "into this folder",
+	 "write report.txt, report.json and plots of fit and residuals into this "
+	 "folder",
 	 CLI_OUTPUTS(struct options, common.report)},
 	{0, "dry-run", NULL, "do everything except writing calibration.conf",
 	 CLI_FLAG(struct options, common.dry_run)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, common.json)},
 	{0, "range", "MM..MM",
-	 "range of the strokes, for example 0mm..1.5mm (default: from 0 to\n"
-	 "70 % of the force channel's range)",
+	 "range of the strokes, for example 0mm..1.5mm (default: from 0 to 70 % of "
+	 "the force channel's range)",
 	 CLI_PARSED_BY(parse_range)},
 	{0, "strokes", "N", "number of strokes up and down, 2 to 100 (default: 3)",
 	 CLI_INTEGER(struct options, strokes, 2, 100)},
 	{0, "max-force", "N",
-	 "stop and go back beyond this force (default: 80 % of the force\n"
-	 "channel's range)",
+	 "stop and go back beyond this force (default: 80 % of the force channel's "
+	 "range)",
 	 CLI_QUANTITY(struct options, max_N, forces, 0.001, 10000)},
 	{0, "no-rate", NULL, "do not look for the largest step rate",
 	 CLI_FLAG(struct options, no_rate)},
@@ -77,21 +76,16 @@ static const struct cli_option option_table[] = {
 static const struct cli_command command = {
 	.name = "calibrate stepper",
 	.synopsis = "[--from FILE.csv] [OPTIONS]",
-	.summary = "Drive the actuator up and down against the force sensor, and measure "
-		   "the force per\n"
-		   "microstep, backlash, hysteresis, stiction, and the largest step rate "
-		   "that loses no step.\n"
-		   "Let the handle press on the sensor, and do not hold it. Ctrl-C ends "
-		   "with the motor at\n"
-		   "rest and without power. Not a safety device: keep a hand on the "
-		   "emergency stop.",
+	.summary =
+		"Drive the actuator up and down against the force sensor, and measure the "
+		"force per microstep, backlash, hysteresis, stiction, and the largest "
+		"step rate that loses no step. Let the handle press on the sensor, and do "
+		"not hold it. Ctrl-C ends with the motor at rest and without power. Not a "
+		"safety device: keep a hand on the emergency stop.",
 	.options = option_table,
-	.notes = "Example:\n"
-		 "  incise calibrate stepper --range 0mm..1.5mm --report bench\n"
-		 "\n"
-		 "Exit: 0 done, the calibration is active; 1 failed, refused or "
-		 "stopped; 2 bad usage.\n"
-		 "See incise-calibrate-stepper(1).",
+	.examples = "incise calibrate stepper --range 0mm..1.5mm --report bench",
+	.success = "the calibration is active",
+	.failure = "failed, refused or stopped",
 };
 
 static void parse(struct options *options, int argc, char **argv)

@@ -37,23 +37,21 @@ static const struct cli_option option_table[] = {
 	{CLI_RIG_OPTION(struct options, common.rig)},
 	{CALIBRATE_FILE_OPTION(struct options)},
 	{0, "duration", "TIME",
-	 "longest recording (default: 20s); ends earlier when the tip is\n"
-	 "known well enough",
+	 "longest recording (default: 20s); ends earlier when the tip is known "
+	 "well enough",
 	 CLI_DURATION(struct options, time_s, 1, 600)},
 	{0, "u-surface", "MM",
-	 "standard uncertainty of the tissue surface of rig.conf along its\n"
-	 "normal, which is not measured: for the uncertainty of depths",
+	 "standard uncertainty of the tissue surface of rig.conf along its normal, "
+	 "which is not measured: for the uncertainty of depths",
 	 CLI_NUMBER(struct options, u_surface_mm, 0, 1000)},
 	{0, "from", "FILE",
-	 "take the poses from a CSV file or a recording instead of "
-	 "a rig",
+	 "take the poses from a CSV file or a recording instead of a rig",
 	 CLI_INPUT(struct options, common.from)},
 	{0, "keep", "FILE", "write the poses to this CSV file, for --from",
 	 CLI_OUTPUT(struct options, common.keep), .extensions = ".csv"},
 	{0, "report", "DIR",
-	 "write report.txt, report.json and plots of the residuals "
-	 "into\n"
-	 "this folder",
+	 "write report.txt, report.json and plots of the residuals into this "
+	 "folder",
 	 CLI_OUTPUTS(struct options, common.report)},
 	{0, "dry-run", NULL, "do everything except writing calibration.conf",
 	 CLI_FLAG(struct options, common.dry_run)},
@@ -66,15 +64,13 @@ static const struct cli_command command = {
 	.synopsis = "[--rig RIG | --from FILE] [OPTIONS]",
 	.summary =
 		"Measure the position of the blade's tip in the frame of the tracker's "
-		"sensor (pivot\n"
-		"calibration). Put the tip into a dimple that does not move, and "
-		"rotate the tool about it in\n"
-		"all directions, by at least 60 degrees from side to side.",
+		"sensor (pivot calibration). Put the tip into a dimple that does not "
+		"move, and rotate the tool about it in all directions, by at least 60 "
+		"degrees from side to side.",
 	.options = option_table,
-	.notes = "Example: incise calibrate tip --rig rig.conf --duration 20s --report "
-		 "tip\n"
-		 "Exit codes: 0 done, the calibration is active; 1 failed or refused; 2 "
-		 "bad usage.",
+	.examples = "incise calibrate tip --rig rig.conf --duration 20s --report tip",
+	.success = "the calibration is active",
+	.failure = "failed or refused",
 };
 
 /* --- poses -------------------------------------------------------------------------- */

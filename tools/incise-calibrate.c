@@ -10,21 +10,20 @@ static const struct cli_command command = {
 	.name = "calibrate",
 	.synopsis = "force | depth | tip | delay | stepper | check [OPTIONS]",
 	.summary =
-		"Measure scale factors, offsets and delays of the rig, and write them "
-		"to calibration.conf.\n"
-		"force: mV/N of the force channel, with weights.\n"
-		"depth: mm per pixel of the camera, from two points, a line of pairs "
-		"or a board.\n"
-		"tip: position of the tip in the tracker's sensor, by turning the tool "
-		"about its tip.\n"
-		"delay: delays of tracker, force and camera, from a motion.\n"
-		"stepper: force per microstep of the actuator, its backlash and its "
-		"limits.\n"
-		"check: active calibrations, their age, and any that have expired.",
+		"Measure scale factors, offsets and delays of the rig, and write them to "
+		"calibration.conf.\n"
+		"  force    mV/N of the force channel, with weights\n"
+		"  depth    mm per pixel of the camera, from two points, a line of pairs or "
+		"a board\n"
+		"  tip      position of the tip in the tracker's sensor, by turning the tool "
+		"about its tip\n"
+		"  delay    delays of tracker, force and camera, from a motion\n"
+		"  stepper  force per microstep of the actuator, its backlash and its limits\n"
+		"  check    active calibrations, their age, and any that have expired",
 	.options = options,
-	.notes = "'incise calibrate force --help' lists the options of force, and so "
-		 "on.\n"
-		 "Exit codes: 0 done, 1 failed or refused, 2 bad usage.",
+	.notes = "'incise calibrate force --help' lists the options of force, and so on.",
+	.success = "the calibration is active",
+	.failure = "failed or refused",
 };
 
 int main(int argc, char **argv)

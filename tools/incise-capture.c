@@ -88,38 +88,37 @@ static const char *const onlys[] = {"force,tracker", "force", "tracker", NULL};
 
 static const struct cli_option option_table[] = {
 	{'o', "output", "NAME.rec",
-	 "folder to record into; --overwrite replaces an existing one once\n"
-	 "the new one is complete, and removes the rest of an interrupted\n"
-	 "one, NAME.rec.part",
+	 "folder to record into; --overwrite replaces an existing one once the new "
+	 "one is complete, and removes the rest of an interrupted one, "
+	 "NAME.rec.part",
 	 CLI_OUTPUTS(struct options, output)},
 	{CLI_RIG_OPTION(struct options, rig)},
 	CALIBRATION_OPTION(struct options, calibration),
 	{0, "duration", "TIME",
-	 "end after this time, for example 10s, 500ms, 2min or 1h (default:\n"
-	 "at Ctrl-C; on the simulated rig at the end of its cuts)",
+	 "end after this time, for example 10s, 500ms, 2min or 1h (default: at "
+	 "Ctrl-C; on the simulated rig at the end of its cuts)",
 	 CLI_DURATION(struct options, duration_s, 0.01, 1e6)},
 	{0, "camera", "WHAT",
-	 "off; frames: record frames; depth: also find the scalpel in\n"
-	 "them; auto: as rig.conf has it (default; a rig sim:… then has\n"
-	 "no camera)",
+	 "off; frames: record frames; depth: also find the scalpel in them; auto: "
+	 "as rig.conf has it (default; a rig sim:… then has no camera)",
 	 CLI_CHOICE(struct options, camera, cameras)},
 	{0, "only", "LIST",
-	 "force or tracker: record this stream alone (and the camera);\n"
+	 "force or tracker: record this stream alone (and the camera); "
 	 "force,tracker: both (default)",
 	 CLI_CHOICE(struct options, only, onlys)},
 	{0, "trigger", "WHAT",
-	 "wait for the button of the stylus, for a force such as 0.2N, or for\n"
-	 "sync[:DEVICE], a pulse of the SYNC line of the stepper module; the\n"
+	 "wait for the button of the stylus, for a force such as 0.2N, or for "
+	 "sync[:DEVICE], a pulse of the SYNC line of the stepper module; the "
 	 "second before it is recorded too",
 	 CLI_PARSED_BY(parse_trigger), .names = triggers},
 	{0, "start-at", "TIME",
-	 "wait for a time, for example 2026-11-27T12:00:00Z (UTC), or with\n"
-	 "TAI in place of Z; the second before it is recorded too",
+	 "wait for a time, for example 2026-11-27T12:00:00Z (UTC), or with TAI in "
+	 "place of Z; the second before it is recorded too",
 	 CLI_PARSED_BY(parse_start_at)},
 	{0, "clock-source", "SOURCE",
-	 "where the wall time comes from: auto (default),\n"
-	 "ptp[:SOCKET[,DOMAIN]], chrony[:PORT], kernel or none; of a\n"
-	 "simulated clock none (default) or sim:TAI_S,PPM,BOUND_US",
+	 "where the wall time comes from: auto (default), ptp[:SOCKET[,DOMAIN]], "
+	 "chrony[:PORT], kernel or none; of a simulated clock none (default) or "
+	 "sim:TAI_S,PPM,BOUND_US",
 	 CLI_PARSED_BY(parse_clock_source)},
 	{0, "cuts", NULL, "mark the start and the end of each cut in the table events",
 	 CLI_FLAG(struct options, cuts)},
@@ -130,16 +129,17 @@ static const struct cli_option option_table[] = {
 static const struct cli_command command = {
 	.name = "capture",
 	.synopsis = "-o NAME.rec [--rig RIG] [OPTIONS]",
-	.summary = "Record tracker, force channel and camera of a rig in sync. Hold the "
-		   "tool clear of\n"
-		   "everything for the first half second: the zero of the force is "
-		   "measured then. On a\n"
-		   "terminal the keys m and 1 to 9 set markers, t triggers, q ends.",
+	.summary =
+		"Record tracker, force channel and camera of a rig in sync. Hold the tool "
+		"clear of everything for the first half second: the zero of the force is "
+		"measured then. On a terminal the keys m and 1 to 9 set markers, t "
+		"triggers, q ends.",
 	.options = option_table,
-	.notes = "Example: incise capture -o liver.rec --rig sim:clock=simulated\n"
-		 "Exit codes: 0 recorded without loss; 1 failed, samples were lost, a "
-		 "device failed, the\n"
-		 "disk was nearly full, or the key of the rig did not sign; 2 bad usage.",
+	.examples = "incise capture -o liver.rec --rig sim:clock=simulated",
+	.success = "recorded without loss",
+	.failure =
+		"failure, lost samples, a failed device, a disk that was nearly full, or "
+		"no signature by the key of the rig",
 };
 
 static void parse(struct options *options, int argc, char **argv)

@@ -60,28 +60,26 @@ static void check_c_source(void *c_source, char *path)
 
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
-	 "write the compiled model (.fx) or scene (.plan) to this file; - is\n"
+	 "write the compiled model (.fx) or scene (.plan) to this file; - is "
 	 "standard output",
 	 CLI_OUTPUT(struct job, output), .extensions = ".fx .plan"},
 	{0, "budget", "ERROR",
-	 "largest certified error, for example 0.1mN, 50uN or\n"
-	 "1e-4 in the output's unit (default: 0.1mN)",
+	 "largest certified error, for example 0.1mN, 50uN or 1e-4 in the output's "
+	 "unit (default: 0.1mN)",
 	 CLI_QUANTITY(struct job, options.budget, newtons, 1e-9, 1e9)},
 	{0, "method", "KIND",
-	 "direct, table or force (default: the cheapest within the\n"
-	 "budget)",
+	 "direct, table or force (default: the cheapest within the budget)",
 	 CLI_PARSED(struct job, options.arithmetic, parse_arithmetic)},
 	{0, "cells", "N", "at least N cells per input of tables, up to 4096",
 	 CLI_INTEGER(struct job, options.cells, 1, 4096)},
 	{0, "c-source", "FILE.c",
-	 "also write it as C for a microcontroller, with the function\n"
-	 "FILE_eval()",
+	 "also write it as C for a microcontroller, with a function FILE_eval",
 	 CLI_OUTPUT(struct job, c_source), .parse = check_c_source, .extensions = ".c"},
 	{0, "model", "FILE", "scene: use this model instead of its own",
 	 CLI_INPUT(struct job, scene.model)},
 	{'r', "rig", "RIG",
-	 "scene: rig.conf with the tracker and the actuators of the plan\n"
-	 "(default: a tracker of 120 Hz and no actuator, which no kernel loads)",
+	 "scene: rig.conf with the tracker and the actuators of the plan (default: "
+	 "a tracker of 120 Hz and no actuator, which no kernel loads)",
 	 CLI_INPUT(struct job, rig)},
 	CALIBRATION_OPTION(struct job, calibration),
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct job, json)},
@@ -93,18 +91,12 @@ static const struct cli_command command = {
 	.synopsis = "MODEL.fis|SCENE -o MODEL.fx|NAME.plan [OPTIONS]",
 	.summary =
 		"Compile a model, or a whole scene on a rig, to fixed point for the "
-		"haptic loop and for\n"
-		"kernels, with a certified bound of the error, over the whole training "
-		"range by interval\n"
-		"arithmetic.",
+		"haptic loop and for kernels, with a certified bound of the error, over "
+		"the whole training range by interval arithmetic.",
 	.options = options,
-	.notes = "--budget, --method, --cells and --c-source go with a model.\n"
-		 "\n"
-		 "Examples:\n"
-		 "  incise compile liver.fis --budget 0.1mN -o liver.fx\n"
-		 "  incise compile neck --rig rig.conf -o neck.plan\n"
-		 "\n"
-		 "Exit: 0 compiled, 1 failed, 2 bad usage. See incise-compile(1).",
+	.notes = "--budget, --method, --cells and --c-source go with a model.",
+	.examples = "incise compile liver.fis --budget 0.1mN -o liver.fx\n"
+		    "incise compile neck --rig rig.conf -o neck.plan",
 };
 
 static void write_c(const struct incise_fixed *fx, const char *path)

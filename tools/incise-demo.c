@@ -50,8 +50,8 @@ static const struct cli_option option_table[] = {
 	{0, "duration", "TIME", "length of the haptic loop (default: 10s)",
 	 CLI_PARSED(struct options, loop_time, parse_loop)},
 	{0, "scene", "SCENE",
-	 "write a film and a contact sheet of a procedure on this scene,\n"
-	 "for example neck (Bhasin et al., 2005), instead",
+	 "write a film and a contact sheet of a procedure on this scene, for "
+	 "example neck (Bhasin et al., 2005), instead",
 	 CLI_TEXT(struct options, scene)},
 	{0, "json", NULL, "print the summary as JSON, and nothing else",
 	 CLI_FLAG(struct options, demo.quiet)},
@@ -61,12 +61,11 @@ static const struct cli_option option_table[] = {
 static const struct cli_command command = {
 	.name = "demo",
 	.synopsis = "[OPTIONS]",
-	.summary = "Follow Song et al. (2006) on the simulated rig: cut, record, export, "
-		   "train, compile to\n"
-		   "fixed point, run the haptic loop; write data, model, plots and "
-		   "summary into a folder.",
+	.summary =
+		"Follow Song et al. (2006) on the simulated rig: cut, record, export, "
+		"train, compile to fixed point, run the haptic loop; write data, model, "
+		"plots and summary into a folder.",
 	.options = option_table,
-	.notes = "Exit: 0 done, 1 failed, 2 bad usage. See incise-demo(1).",
 };
 
 /* Make a folder, which may exist if @may_exist. */

@@ -56,7 +56,7 @@ struct doctor {
 static const struct cli_option option_table[] = {
 	{CLI_RIG_OPTION(struct doctor, rig)},
 	{'c', "calibration", "FILE",
-	 "calibration to check (default: ./calibration.conf, else\n"
+	 "calibration to check (default: ./calibration.conf, else "
 	 "/etc/incise/calibration.conf)",
 	 CLI_INPUT(struct doctor, calibration)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct doctor, json)},
@@ -70,8 +70,9 @@ static const struct cli_command command = {
 		"Check this machine and its rig, and print the command that mends each "
 		"finding.",
 	.options = option_table,
-	.notes = "Actuators are only watched: nothing moves.\n\n"
-		 "Exit codes: 0 no problem, 1 at least one problem, 2 bad usage.",
+	.notes = "Actuators are only watched: nothing moves.",
+	.success = "no problem",
+	.failure = "at least one problem",
 };
 
 /* @fix: NULL if nothing is to be done. */

@@ -26,12 +26,12 @@ static const struct cli_option options[] = {
 	{0, "no-clamp", NULL, "extrapolate outside the support (double only)",
 	 CLI_FLAG(struct job, no_clamp)},
 	{0, "grid", "NxM",
-	 "evaluate on a grid over the support instead of reading;\n"
-	 "prints inputs and output, an empty line after each row",
+	 "evaluate on a grid over the support instead of reading; prints inputs "
+	 "and output, an empty line after each row",
 	 CLI_TEXT(struct job, grid)},
 	{0, "sd", NULL,
-	 "also print the standard deviation of a new measurement,\n"
-	 "from MODEL.fis.sd, which incise train writes",
+	 "also print the standard deviation of a new measurement, from "
+	 "MODEL.fis.sd, which incise train writes",
 	 CLI_FLAG(struct job, sd)},
 	{0, "parts", NULL, "also print its parts: data, model and calibration; with --sd",
 	 CLI_FLAG(struct job, parts)},
@@ -45,13 +45,10 @@ static const struct cli_command command = {
 	.synopsis = "MODEL.fis|MODEL.fx [FILE] [OPTIONS]",
 	.summary =
 		"Evaluate a model: read lines of inputs (depth_mm velocity_mm_s) from "
-		"FILE or standard\n"
-		"input, and print one force for each. Inputs out of the training range "
-		"are clamped to it,\n"
-		"and counted in a warning.",
+		"FILE or standard input, and print one force for each. Inputs out of the "
+		"training range are clamped to it, and counted in a warning.",
 	.options = options,
-	.notes = "Example:\n  echo '5 20' | incise eval liver.fis\n\n"
-		 "Exit: 0 evaluated, 1 failed, 2 bad usage. See incise-eval(1).",
+	.examples = "echo '5 20' | incise eval liver.fis",
 };
 
 struct evaluator {

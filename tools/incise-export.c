@@ -56,22 +56,20 @@ static const char *const uncertainties[] = {"none", "total", "parts", NULL};
 
 static const struct cli_option options[] = {
 	{'o', "output", "FILE",
-	 "dataset to write: FILE.csv, FILE.h5 (HDF5) or FILE.mcap; - is CSV\n"
-	 "on standard output (default)",
+	 "dataset to write: FILE.csv, FILE.h5 (HDF5) or FILE.mcap; - is CSV on "
+	 "standard output (default)",
 	 CLI_OUTPUT(struct job, output), .extensions = ".csv .h5 .mcap"},
 	{0, "rate", "HZ",
-	 "rows per second, each the mean of its samples (default: all\nsamples)",
+	 "rows per second, each the mean of its samples (default: all samples)",
 	 CLI_NUMBER(struct job, how.rate_hz, 1e-3, 1e9)},
 	{0, "resample", NULL,
-	 "export the whole recording with the pose, at each force sample or\n"
-	 "at --rate, with uncertainty and flags",
+	 "export the whole recording with the pose, at each force sample or at "
+	 "--rate, with uncertainty and flags",
 	 CLI_FLAG(struct job, how.resample)},
 	{'a', "average", "DEPTHxVELOCITY",
 	 "average in bins of depth and velocity, for example 12x10",
 	 CLI_PARSED_BY(parse_bins)},
-	{0, "by-cut", NULL,
-	 "average each cut separately and name it in the column "
-	 "'cut'",
+	{0, "by-cut", NULL, "average each cut separately and name it in the column 'cut'",
 	 CLI_FLAG(struct job, how.by_cut)},
 	{0, "depth-max", "MM",
 	 "upper end of the bins (default: largest where the blade advances)",
@@ -82,18 +80,18 @@ static const struct cli_option options[] = {
 	{0, "min-count", "N", "leave out bins with fewer samples (default: 50)",
 	 CLI_INTEGER(struct job, min_count, 1, 1000000000)},
 	{'c', "calibration", "FILE",
-	 "use this calibration of force, camera and delays instead of that\n"
-	 "of the recordings; none: nominal values",
+	 "use this calibration of force, camera and delays instead of that of the "
+	 "recordings; none: nominal values",
 	 CLI_PARSED_BY(load_calibration)},
 	{0, "profile", "NAME",
-	 "messages of MCAP: plain (JSON, default) or ros2 (ROS 2, as rosbag2\n"
+	 "messages of MCAP: plain (JSON, default) or ros2 (ROS 2, as rosbag2 "
 	 "stores them; metres and UTC)",
 	 CLI_CHOICE(struct job, profile, profiles)},
 	{0, "tai", NULL,
 	 "also columns tai_ns and tai_u_ns: TAI and the bound of its error",
 	 CLI_FLAG(struct job, how.tai)},
 	{0, "uncertainty", "WHICH",
-	 "columns of standard uncertainties: none (default), total, or parts,\n"
+	 "columns of standard uncertainties: none (default), total, or parts, "
 	 "which are the total and what it is made of",
 	 CLI_CHOICE(struct job, uncertainty, uncertainties)},
 	{0, "lineage", NULL, "begin a CSV with comments on its provenance",
@@ -108,11 +106,9 @@ static const struct cli_command command = {
 	.name = "export",
 	.synopsis = "NAME.rec… [-o FILE] [OPTIONS]",
 	.summary = "Make a dataset from the cuts of recordings: every force sample with "
-		   "depth and velocity\n"
-		   "at its time, or their averages.",
+		   "depth and velocity at its time, or their averages.",
 	.options = options,
-	.notes = "Example: incise export liver.rec --average 12x10 -o liver.csv\n"
-		 "Exit codes: 0 success, 1 failure, 2 bad usage.",
+	.examples = "incise export liver.rec --average 12x10 -o liver.csv",
 };
 
 /* A list of what is not stated. */

@@ -20,8 +20,8 @@ static const struct cli_option options[] = {
 	{0, "no-rt", NULL, "run with normal scheduling: poses may be late",
 	 CLI_FLAG(struct haptic_job, no_rt)},
 	{0, "state", "FILE",
-	 "status file of the loop; its own is NAME.feed.state for NAME.state,\n"
-	 "none for no file (default: as of incise haptic)",
+	 "status file of the loop; its own is NAME.feed.state for NAME.state, none "
+	 "for no file (default: as of incise haptic)",
 	 CLI_TEXT(struct haptic_job, state)},
 	{0, "json", NULL, "report as JSON", CLI_FLAG(struct haptic_job, json)},
 	{'v', "verbose", NULL, "print events on stderr",
@@ -32,20 +32,16 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "feed",
 	.synopsis = "SCENE [OPTIONS]",
-	.summary = "Let the kernel module render the force of a scene, and send it the "
-		   "tracker's poses. The\n"
-		   "force continues while other programs stop, start or crash, and ramps "
-		   "to zero when this one\n"
-		   "ends. Not a safety device, not a medical device.",
+	.summary =
+		"Let the kernel module render the force of a scene, and send it the "
+		"tracker's poses. The force continues while other programs stop, start or "
+		"crash, and ramps to zero when this one ends. Not a safety device, not a "
+		"medical device.",
 	.options = options,
-	.notes = "SCENE is as for incise haptic. Needs steppers of the kernel module\n"
-		 "incise_stepper (incise info stepper).\n"
-		 "\n"
-		 "Example:\n"
-		 "  incise feed neck --rig rig.conf\n"
-		 "\n"
-		 "Exit: 0 ended as requested, 1 failed, 2 bad usage. See "
-		 "incise-feed(1).",
+	.notes = "SCENE is as for incise haptic. Needs steppers of the kernel module "
+		 "incise_stepper (incise info stepper).",
+	.examples = "incise feed neck --rig rig.conf",
+	.success = "ended as requested",
 };
 
 int main(int argc, char **argv)

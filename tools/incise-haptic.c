@@ -16,21 +16,17 @@ static const struct cli_option options[] = {
 	HAPTIC_TIP_OPTION,
 	SCENE_ARGUMENT_OPTIONS(struct haptic_job, haptic.argument),
 	{0, "tool", "KIND",
-	 "tool in the hand at the start: auto (blade or handle, by the scalpel's turn, "
-	 "or\n"
-	 "a tube with a station of its own), blade, handle or tube (default: auto); on "
-	 "a\n"
-	 "terminal the keys a, b, h, t change it",
+	 "tool in the hand at the start: auto (blade or handle, by the scalpel's "
+	 "turn, or a tube with a station of its own), blade, handle or tube "
+	 "(default: auto); on a terminal the keys a, b, h, t change it",
 	 CLI_CHOICE(struct haptic_job, haptic.tool, loop_tool_names)},
 	{0, "procedure", NULL,
 	 "on the simulated rig, in simulated time: a script cuts, enlarges the cut "
-	 "and\n"
-	 "inserts a tube",
+	 "and inserts a tube",
 	 CLI_FLAG(struct haptic_job, scripted)},
 	{0, "in-kernel", NULL,
 	 "let the kernel module render the force, and only watch it: the force "
-	 "outlives this\n"
-	 "program; starts incise feed, unless it runs",
+	 "outlives this program; starts incise feed, unless it runs",
 	 CLI_FLAG(struct haptic_job, in_kernel)},
 	HAPTIC_HOLD_OPTIONS,
 	{0, "policy", "POLICY", "fifo or deadline (default: fifo)",
@@ -47,9 +43,8 @@ static const struct cli_option options[] = {
 	 CLI_INTEGER(struct haptic_job, haptic.loop.overruns_most, 0, 1000000)},
 	{0, "state", "FILE",
 	 "status file that other programs read, none for no file (default: "
-	 "NAME.state,\n"
-	 "by the scene's name, in /run/incise, $XDG_RUNTIME_DIR/incise or "
-	 "/tmp/incise-UID)",
+	 "NAME.state, by the scene's name, in /run/incise, $XDG_RUNTIME_DIR/incise "
+	 "or /tmp/incise-UID)",
 	 CLI_TEXT(struct haptic_job, state)},
 	{0, "log", "FILE", "write every tick as CSV at the end; needs --duration",
 	 CLI_OUTPUT(struct haptic_job, log), .extensions = ".csv"},
@@ -65,19 +60,14 @@ static const struct cli_command command = {
 	.synopsis = "SCENE [OPTIONS]",
 	.summary =
 		"Run the haptic loop of a scene: read the pose, evaluate the force and "
-		"drive the\n"
-		"actuators, at the scene's rate. Not a safety device, not a medical "
-		"device.",
+		"drive the actuators, at the scene's rate. Not a safety device, not a "
+		"medical device.",
 	.options = options,
-	.notes = "SCENE is a file, or a name such as liver: ./liver.scene, else the one "
-		 "in\n"
-		 "/etc/incise/scenes, else the installed one.\n"
-		 "\n"
-		 "Example:\n"
-		 "  incise haptic scenes/liver.scene --rig sim: --duration 10s\n"
-		 "\n"
-		 "Exit: 0 ended as requested, 1 failed, 2 bad usage. See "
-		 "incise-haptic(1).",
+	.notes =
+		"SCENE is a file, or a name such as liver: ./liver.scene, else the one in "
+		"/etc/incise/scenes, else the installed one.",
+	.examples = "incise haptic scenes/liver.scene --rig sim: --duration 10s",
+	.success = "ended as requested",
 };
 
 /* All that is of the feeder, as it was given here. */

@@ -54,12 +54,12 @@ static const struct cli_option options[] = {
 	 CLI_FLAG(struct job, all)},
 	RECORDING_DAMAGED(struct job, damaged),
 	{0, "dataset", NULL,
-	 "describe DATA.csv and NAME.rec as training data: rows,\n"
-	 "ranges, and groups that differ from the others",
+	 "describe DATA.csv and NAME.rec as training data: rows, ranges, and "
+	 "groups that differ from the others",
 	 CLI_FLAG(struct job, dataset)},
 	{0, "group", "GROUP",
-	 "dataset: recording, rig, or a column that names the groups\n"
-	 "(default: cut, where all sources have it), or none",
+	 "dataset: recording, rig, or a column that names the groups (default: "
+	 "cut, where all sources have it), or none",
 	 CLI_TEXT(struct job, group)},
 	{0, "inputs", "A,B", "dataset: input columns (default: depth_mm,velocity_mm_s)",
 	 CLI_PARSED_BY(parse_inputs)},
@@ -68,8 +68,8 @@ static const struct cli_option options[] = {
 	{0, "all-rows", NULL, "dataset: also rows in which the blade did not advance",
 	 CLI_FLAG(struct job, all_rows)},
 	{0, "plot", "NAME",
-	 "model: draw the membership functions and the force\n"
-	 "surface as NAME.png and NAME.svg",
+	 "model: draw the membership functions and the force surface as NAME.png "
+	 "and NAME.svg",
 	 CLI_OUTPUTS(struct job, plot)},
 	{0},
 };
@@ -81,13 +81,11 @@ static const struct cli_command command = {
 		"/dev/incise-stepperN|can:IFACE|"
 		"slcan:TTY|devices|DATA.csv… [OPTIONS]",
 	.summary =
-		"Describe a model, a compiled model, a compiled scene, a factor or a recording; "
-		"the state and cost\n"
-		"of the kernel's stepper module; the drives on a CAN bus; or the "
-		"devices that are attached.",
+		"Describe a model, a compiled model, a compiled scene, a factor or a "
+		"recording; the state and cost of the kernel's stepper module; the drives "
+		"on a CAN bus; or the devices that are attached.",
 	.options = options,
-	.notes =
-		"Example:\n  incise info can:can0\n\nExit: 0 shown, 1 failed, 2 bad usage. See incise-info(1).",
+	.examples = "incise info can:can0",
 };
 
 /* --- models -------------------------------------------------------------------------- */

@@ -25,11 +25,11 @@ static const struct cli_option options[] = {
 	{'o', "output", "NAME.rec", "joined recording to write: a folder",
 	 CLI_OUTPUT(struct job, output), .extensions = ".rec"},
 	{0, "within", "TIME",
-	 "refuse times that are uncertain by more, for example 1ms (default:\n"
-	 "state the uncertainty)",
+	 "refuse times that are uncertain by more, for example 1ms (default: state "
+	 "the uncertainty)",
 	 CLI_QUANTITY(struct job, how.within_s, joined_times, 1e-9, 3600)},
 	{0, "align", "SIGNAL",
-	 "align by clocks (default), tap (knocks in force or motion) or sync\n"
+	 "align by clocks (default), tap (knocks in force or motion) or sync "
 	 "(events of the SYNC line), and compare with the clocks",
 	 CLI_CHOICE(struct job, how.align, aligns)},
 	RECORDING_DAMAGED(struct job, damaged),
@@ -40,13 +40,11 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "join",
 	.synopsis = "A.rec B.rec… -o JOINED.rec [OPTIONS]",
-	.summary =
-		"Put recordings of several machines on one timeline, the clock of the "
-		"first one, by their wall\n"
-		"time or by a signal that all recorded. The recordings stay as they are.",
+	.summary = "Put recordings of several machines on one timeline, the clock of the "
+		   "first one, by their wall time or by a signal that all recorded. The "
+		   "recordings stay as they are.",
 	.options = options,
-	.notes = "Example: incise join force.rec tracker.rec --within 1ms -o day.rec\n"
-		 "Exit codes: 0 success, 1 failure, 2 bad usage.",
+	.examples = "incise join force.rec tracker.rec --within 1ms -o day.rec",
 };
 
 static void print_note(void *context, const char *text)

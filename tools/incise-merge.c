@@ -22,7 +22,7 @@ struct options {
 
 static const struct cli_option option_table[] = {
 	{'o', "output", "FILE",
-	 "write the model (.fis) or the factor (.fac) of all; - is standard\n"
+	 "write the model (.fis) or the factor (.fac) of all; - is standard "
 	 "output, for a model",
 	 CLI_OUTPUT(struct options, output), .extensions = ".fis .fac"},
 	{0, "ridge", "R", "ridge on scaled data (default: by cross-validation)",
@@ -36,8 +36,7 @@ static const struct cli_command command = {
 	.synopsis = "FACTOR.fac… -o MODEL.fis|ALL.fac [OPTIONS]",
 	.summary = "Make the model that the pairs of all factors together give.",
 	.options = option_table,
-	.notes = "Example:\n  incise merge lyon.fac graz.fac -o liver.fis\n\n"
-		 "Exit: 0 written, 1 failed, 2 bad usage. See incise-merge(1).",
+	.examples = "incise merge lyon.fac graz.fac -o liver.fis",
 };
 
 static void parse(struct options *options, int argc, char **argv)

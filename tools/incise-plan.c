@@ -31,7 +31,7 @@ struct job {
 
 static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
-	 "file rig.conf, or sim:KEY=VALUE,…, whose stepper and tracker delay are\n"
+	 "file rig.conf, or sim:KEY=VALUE,…, whose stepper and tracker delay are "
 	 "used (default: no rig; a tracker of 120 Hz with a delay of 4.2 ms)",
 	 CLI_INPUT(struct job, rig)},
 	SCENE_ARGUMENT_OPTIONS(struct job, scene),
@@ -46,12 +46,10 @@ static const struct cli_command command = {
 	.synopsis = "SCENE [OPTIONS]",
 	.summary =
 		"Show which stages the haptic loop of a scene runs and which it leaves "
-		"out, the time of a\n"
-		"tick on this machine, and the stability of the scene.",
+		"out, the time of a tick on this machine, and the stability of the scene.",
 	.options = options,
-	.notes =
-		"Example:\n  incise plan scenes/neck.scene\n\n"
-		"Exit: 0 shown, 1 failed or not stable, 2 bad usage. See incise-plan(1).",
+	.examples = "incise plan scenes/neck.scene",
+	.failure = "failure, or the scene is not stable",
 };
 
 /* Places over the ranges of a model's inputs at which its evaluation is timed; rounds of them. */

@@ -46,8 +46,8 @@ static const struct cli_option options[] = {
 	 "the file to write: NAME.png, .svg or .pdf (default: a window)",
 	 CLI_OUTPUT(struct job, output), .extensions = ".png .svg .pdf"},
 	{0, "range", "TIME..TIME",
-	 "of a recording: the part to draw, such as 2s..4.5s, 90s..\n"
-	 "or ..1min; from its first force sample (default: all)",
+	 "of a recording: the part to draw, such as 2s..4.5s, 90s.. or ..1min; "
+	 "from its first force sample (default: all)",
 	 CLI_PARSED_BY(parse_range)},
 	{0, "data", "DATA.csv", "of a model: also draw the residuals of this dataset",
 	 CLI_INPUT(struct job, figure.data)},
@@ -57,12 +57,10 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "plot",
 	.synopsis = "FILE [-o NAME.png] [OPTIONS]",
-	.summary =
-		"Draw a recording, a dataset, a model (.fis, .fx), a session or a calibration.\n"
-		"The kind of the file is recognised by its content.",
+	.summary = "Draw a recording, a dataset, a model (.fis, .fx), a session or a "
+		   "calibration. The kind of the file is recognised by its content.",
 	.options = options,
-	.notes = "Example:\n  incise plot liver.fis --data pairs.csv -o liver.png\n\n"
-		 "Exit: 0 drawn, 1 failed, 2 bad usage. See incise-plot(1).",
+	.examples = "incise plot liver.fis --data pairs.csv -o liver.png",
 };
 
 /* --- kinds of files -------------------------------------------------------------------- */

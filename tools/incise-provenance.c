@@ -35,13 +35,12 @@ static const struct cli_command command = {
 	.name = "provenance",
 	.synopsis = "FILE [--recording NAME.rec] [OPTIONS]",
 	.summary = "Print what a figure, a model or an export was made of, back to the "
-		   "recordings, and compare\n"
-		   "it with the files of these names next to it.",
+		   "recordings, and compare it with the files of these names next to it.",
 	.options = options,
-	.notes = "Example: incise provenance liver.png\n"
-		 "Exit codes: 0 success, 1 FILE says nothing of its origin, or a file "
-		 "differs from the one\n"
-		 "it was made of, 2 bad usage. See incise-provenance(1).",
+	.examples = "incise provenance liver.png",
+	.failure =
+		"FILE says nothing of its origin, or a file differs from the one it was "
+		"made of",
 };
 
 enum state { SAME, OTHER, LATER, MISSING, STATES };

@@ -30,11 +30,10 @@ static const struct cli_command command = {
 	.synopsis = "NAME.rec -c FILE | --original [OPTIONS]",
 	.summary =
 		"Give a recording another calibration after the fact. What was recorded "
-		"stays as it is; export,\n"
-		"train, plot, replay, join and Python use the calibration that is active.",
+		"stays as it is; export, train, plot, replay, join and Python use the "
+		"calibration that is active.",
 	.options = options,
-	.notes = "Example: incise recalibrate liver.rec -c calibration.conf\n"
-		 "Exit codes: 0 success, 1 failure, 2 bad usage.",
+	.examples = "incise recalibrate liver.rec -c calibration.conf",
 };
 
 /* Values that a calibration can move; delays are of the streams. */

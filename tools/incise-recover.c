@@ -24,12 +24,11 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "recover",
 	.synopsis = "OLD.rec -o NEW.rec [OPTIONS]",
-	.summary = "Copy a recording whose recorder was interrupted to one that is read "
-		   "like any other, with all\n"
-		   "that was committed. The old one stays as it is.",
+	.summary =
+		"Copy a recording whose recorder was interrupted to one that is read like "
+		"any other, with all that was committed. The old one stays as it is.",
 	.options = options,
-	.notes = "Example: incise recover liver.rec -o saved.rec\n"
-		 "Exit codes: 0 success, 1 failure, 2 bad usage.",
+	.examples = "incise recover liver.rec -o saved.rec",
 };
 
 int main(int argc, char **argv)

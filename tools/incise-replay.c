@@ -30,20 +30,20 @@ static const char *const times[] = {"arrival", "acquisition", NULL};
 
 static const struct cli_option options[] = {
 	{0, "log", "FILE",
-	 "write predicted and measured force of every tick as CSV; - is\n"
-	 "standard output",
+	 "write predicted and measured force of every tick as CSV; - is standard "
+	 "output",
 	 CLI_OUTPUT(struct job, csv), .extensions = ".csv"},
 	{0, "plot", "NAME", "draw predicted and measured force as NAME.png and NAME.svg",
 	 CLI_OUTPUTS(struct job, plot)},
 	{0, "real-time", NULL, "wait for each tick (default: as fast as possible)",
 	 CLI_FLAG(struct job, how.real_time)},
 	{0, "poses", "WHEN",
-	 "give poses to the loop at their arrival, as live, or at their\n"
+	 "give poses to the loop at their arrival, as live, or at their "
 	 "acquisition (default: arrival)",
 	 CLI_CHOICE(struct job, how.at, times)},
 	{'c', "calibration", "FILE",
-	 "use this calibration of force instead of that of the recording;\n"
-	 "none: nominal values",
+	 "use this calibration of force instead of that of the recording; none: "
+	 "nominal values",
 	 CLI_INPUT(struct job, calibration)},
 	SCENE_ARGUMENT_OPTIONS(struct job, scene),
 	{0, "tool", "KIND",
@@ -57,11 +57,9 @@ static const struct cli_command command = {
 	.name = "replay",
 	.synopsis = "NAME.rec SCENE [OPTIONS]",
 	.summary = "Run the haptic loop of a scene on a recording, and compare the force "
-		   "that it renders\n"
-		   "with the measured one.",
+		   "that it renders with the measured one.",
 	.options = options,
-	.notes = "Example: incise replay liver.rec scenes/liver.scene --log liver.csv\n"
-		 "Exit codes: 0 success, 1 failure, 2 bad usage.",
+	.examples = "incise replay liver.rec scenes/liver.scene --log liver.csv",
 };
 
 static void parse(struct job *job, int argc, char **argv)

@@ -27,11 +27,11 @@ static const struct cli_option option_table[] = {
 static const struct cli_command command = {
 	.name = "rig",
 	.synopsis = "[--show] [--rig RIG] [--json]",
-	.summary = "Print which rig.conf is used here, and with --show what it resolves "
-		   "to. No device is\nopened.",
+	.summary =
+		"Print which rig.conf is used here, and with --show what it resolves to. "
+		"No device is opened.",
 	.options = option_table,
-	.notes =
-		"Exit codes: 0 success, 1 there is no rig.conf or it is wrong, 2 bad usage.",
+	.failure = "there is no rig.conf, or it is wrong",
 };
 
 int main(int argc, char **argv)

@@ -36,20 +36,20 @@ struct job {
 
 static const struct cli_option options[] = {
 	{'r', "rig", "RIG",
-	 "serve the devices of this rig: file rig.conf, or sim:KEY=VALUE,… for\n"
-	 "the simulated rig",
+	 "serve the devices of this rig: file rig.conf, or sim:KEY=VALUE,… for the "
+	 "simulated rig",
 	 CLI_INPUT(struct job, rig)},
 	CALIBRATION_OPTION(struct job, calibration),
 	{0, "igtl", "[ADDR:]PORT",
-	 "serve OpenIGTLink there (default: 127.0.0.1:18944); without ADDR\n"
-	 "to this machine only; there is no authentication",
+	 "serve OpenIGTLink there (default: 127.0.0.1:18944); without ADDR to this "
+	 "machine only; there is no authentication",
 	 CLI_TEXT(struct job, igtl.address)},
 	{0, "igtl-version", "VERSION",
-	 "header version: 1, 2, or auto, which is 1 until a client sends 2\n"
+	 "header version: 1, 2, or auto, which is 1 until a client sends 2 "
 	 "(default: auto)",
 	 CLI_CHOICE(struct job, igtl.version, versions)},
 	{0, "lsl", "PREFIX",
-	 "offer streams of the Lab Streaming Layer, too: PREFIX-pose,\n"
+	 "offer streams of the Lab Streaming Layer, too: PREFIX-pose, "
 	 "PREFIX-force, PREFIX-events; to the whole network",
 	 CLI_TEXT(struct job, lsl)},
 	{0, "rate", "HZ",
@@ -75,15 +75,11 @@ static const struct cli_command command = {
 	.synopsis = "[NAME|FILE|NAME.rec] [OPTIONS]",
 	.summary =
 		"Send poses, forces and frames live to other programs, for example 3D "
-		"Slicer: of the haptic\n"
-		"loop NAME, of a rig with --rig, or of a recording. The default is the "
-		"loop that runs.",
+		"Slicer: of the haptic loop NAME, of a rig with --rig, or of a recording. "
+		"The default is the loop that runs.",
 	.options = options,
-	.notes =
-		"Example: incise serve neck --igtl 18944\n"
-		"Exit codes: 0 ended as requested, or at the end of the recording; 1 failed; "
-		"2 bad usage.\n"
-		"See incise-serve(1).",
+	.examples = "incise serve neck --igtl 18944",
+	.success = "ended as requested, or at the end of the recording",
 };
 
 struct run {

@@ -22,11 +22,11 @@ struct job {
 
 static const struct cli_option options[] = {
 	{0, "key", "FILE",
-	 "sign with this private key of ssh-keygen, or with the agent if it\n"
-	 "is a public one, such as ~/.ssh/id_ed25519.pub",
+	 "sign with this private key of ssh-keygen, or with the agent if it is a "
+	 "public one, such as ~/.ssh/id_ed25519.pub",
 	 CLI_INPUT(struct job, key)},
 	{0, "timestamp", "WHERE",
-	 "have the time certified (RFC 3161): http://… asks this authority,\n"
+	 "have the time certified (RFC 3161): http://… asks this authority, "
 	 "FILE.tsq writes a query for one, FILE.tsr takes its reply",
 	 CLI_OUTPUTS(struct job, timestamp)},
 	{0, "json", NULL, "report as one JSON object", CLI_FLAG(struct job, json)},
@@ -37,13 +37,11 @@ static const struct cli_command command = {
 	.name = "sign",
 	.synopsis = "NAME.rec [--key FILE] [--timestamp WHERE] [OPTIONS]",
 	.summary =
-		"Verify a recording, and sign a statement of all that is in it, with a key "
-		"of SSH. The\n"
-		"signature is stored in the recording, in NAME.rec/seal/, and the data stay "
-		"as they are.",
+		"Verify a recording, and sign a statement of all that is in it, with a "
+		"key of SSH. The signature is stored in the recording, in NAME.rec/seal/, "
+		"and the data stay as they are.",
 	.options = options,
-	.notes = "Example: incise sign liver.rec --key ~/.ssh/id_ed25519\n"
-		 "Exit codes: 0 signed, 1 failure, 2 bad usage. See incise-sign(1).",
+	.examples = "incise sign liver.rec --key ~/.ssh/id_ed25519",
 };
 
 /* Commit of the statement; null: it is that of a join. */

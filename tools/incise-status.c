@@ -21,7 +21,7 @@ struct job {
 
 static const struct cli_option options[] = {
 	{'f', "follow", NULL,
-	 "keep reporting: a live view on a terminal, one line per second in a\n"
+	 "keep reporting: a live view on a terminal, one line per second in a "
 	 "pipe; ends with the loop, or at Ctrl-C",
 	 CLI_FLAG(struct job, follow)},
 	{0, "json", NULL, "report as one JSON object; with --follow one per second",
@@ -34,18 +34,15 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "status",
 	.synopsis = "[NAME|FILE] [OPTIONS]",
-	.summary = "Report what the haptic loops on this machine do, or did last: state "
-		   "and reason, rate,\n"
-		   "lateness of ticks, faults, force and energy. NAME is the name of a "
-		   "scene, FILE the status\n"
-		   "file of a loop; the default is all loops.",
+	.summary =
+		"Report what the haptic loops on this machine do, or did last: state and "
+		"reason, rate, lateness of ticks, faults, force and energy. NAME is the "
+		"name of a scene, FILE the status file of a loop; the default is all "
+		"loops.",
 	.options = options,
-	.notes = "Example:\n"
-		 "  incise status neck --follow\n"
-		 "\n"
-		 "Exit: 0 runs, or stopped as requested; 1 in fault, dead, stalled or "
-		 "missing;\n"
-		 "2 bad usage. See incise-status(1).",
+	.examples = "incise status neck --follow",
+	.success = "each loop runs, or stopped as requested",
+	.failure = "a loop is in fault, dead, stalled or missing",
 };
 
 /* --- live ---------------------------------------------------------------------------- */

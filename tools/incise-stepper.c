@@ -48,8 +48,8 @@ static const struct cli_option options[] = {
 	{0, "hold", NULL, "move, home: stay powered afterwards, until Ctrl-C",
 	 CLI_FLAG(struct job, hold)},
 	{0, "duration", "TIME",
-	 "status --follow, enable, jog, --hold: end after this time, for\n"
-	 "example 2s",
+	 "status --follow, enable, jog, --hold: end after this time, for example "
+	 "2s",
 	 CLI_DURATION(struct job, seconds, 0.001, 86400)},
 	{0, "repeat", "N", "home N times, and report the repeatability",
 	 CLI_INTEGER(struct job, repeat, 1, 1000)},
@@ -61,24 +61,21 @@ static const struct cli_command command = {
 	.name = "stepper",
 	.synopsis = "status | enable | disable | move MM | jog MM_S | home | clear "
 		    "[OPTIONS]",
-	.summary = "Show the state of a rig's actuator, and move it within its limits:\n"
-		   "  status   print state, position, inputs, faults and their remedies\n"
-		   "  enable   power it and hold its position, until Ctrl-C\n"
-		   "  disable  bring it to rest and switch power off\n"
-		   "  move MM  move to a position such as 10 or 10mm, then disable\n"
-		   "  jog MM_S move at a speed such as -2 or -2mm/s until Ctrl-C, then "
-		   "disable\n"
-		   "  home     find the zero position, then disable\n"
-		   "  clear    clear faults whose cause is gone\n"
-		   "Ctrl-C always ends with the motor at rest and without power. Not a "
-		   "safety\n"
-		   "device: keep a hand on the emergency stop.",
+	.summary =
+		"Show the state of a rig's actuator, and move it within its limits:\n"
+		"  status    print state, position, inputs, faults and their remedies\n"
+		"  enable    power it and hold its position, until Ctrl-C\n"
+		"  disable   bring it to rest and switch power off\n"
+		"  move MM   move to a position such as 10 or 10mm, then disable\n"
+		"  jog MM_S  move at a speed such as -2 or -2mm/s until Ctrl-C, then "
+		"disable\n"
+		"  home      find the zero position, then disable\n"
+		"  clear     clear faults whose cause is gone\n"
+		"Ctrl-C always ends with the motor at rest and without power. Not a "
+		"safety device: keep a hand on the emergency stop.",
 	.options = options,
-	.notes = "Example:\n"
-		 "  incise stepper move 2mm --by\n"
-		 "\n"
-		 "Exit: 0 done, 1 failed, in fault, or stopped early, 2 bad usage. See "
-		 "incise-stepper(1).",
+	.examples = "incise stepper move 2mm --by",
+	.failure = "failed, in fault, or stopped early",
 };
 
 /* --- status, disable, clear ------------------------------------------------------------ */

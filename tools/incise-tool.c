@@ -24,21 +24,17 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "tool",
 	.synopsis = "LOOP [blade|handle|tube|auto] [OPTIONS]",
-	.summary = "Set the tool in the hand of a running haptic loop, or print it. The "
-		   "force ramps to zero\n"
-		   "before a tool in the tissue changes, and ramps up afterwards.",
+	.summary =
+		"Set the tool in the hand of a running haptic loop, or print it. The "
+		"force ramps to zero before a tool in the tissue changes, and ramps up "
+		"afterwards.",
 	.options = options,
-	.notes = "LOOP is the name of a scene, or a status file, as for incise status. "
-		 "auto is blade or\n"
-		 "handle by the scalpel's turn, and a tube with a station of its own "
-		 "while it is nearer to\n"
-		 "the tissue.\n"
-		 "\n"
-		 "Example:\n"
-		 "  incise tool neck tube\n"
-		 "\n"
-		 "Exit: 0 the loop accepted it, 1 failed, 2 bad usage. See "
-		 "incise-tool(1).",
+	.notes =
+		"LOOP is the name of a scene, or a status file, as for incise status. "
+		"auto is blade or handle by the scalpel's turn, and a tube with a station "
+		"of its own while it is nearer to the tissue.",
+	.examples = "incise tool neck tube",
+	.success = "the loop accepted it",
 };
 
 static void check_tool(const char *name)

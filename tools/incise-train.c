@@ -105,79 +105,75 @@ static void parse_shard(void *shard, char *text)
 
 static const struct cli_option option_table[] = {
 	{'o', "output", "FILE",
-	 "write the model to this file (.fis); - is standard "
-	 "output",
+	 "write the model to this file (.fis); - is standard output",
 	 CLI_OUTPUT(struct options, model), .extensions = ".fis"},
 	{0, "premises", "FILE",
-	 "keep the membership functions and ranges of this model (.fis);\n"
-	 "only the consequents are learnt",
+	 "keep the membership functions and ranges of this model (.fis); only the "
+	 "consequents are learnt",
 	 CLI_INPUT(struct options, premises)},
 	{0, "factor", "FILE",
-	 "write the sums of these sources (.fac) for incise merge,\n"
-	 "instead of a model; needs --premises",
+	 "write the sums of these sources (.fac) for incise merge, instead of a "
+	 "model; needs --premises",
 	 CLI_OUTPUT(struct options, factor), .extensions = ".fac"},
 	{0, "inputs", "A,B", "input columns (default: depth_mm,velocity_mm_s)",
 	 CLI_PARSED_BY(parse_inputs)},
 	{0, "target", "COLUMN", "column to learn (default: force_N)",
 	 CLI_TEXT(struct options, target)},
 	{0, "group", "GROUP",
-	 "hold out whole groups: recording, rig, or a column that\n"
-	 "names them, such as cut (default: cut, where all sources\n"
-	 "have it), or none",
+	 "hold out whole groups: recording, rig, or a column that names them, such "
+	 "as cut (default: cut, where all sources have it), or none",
 	 CLI_TEXT(struct options, group)},
 	{0, "rate", "HZ",
-	 "rows per second of a recording, each the mean of its samples\n"
-	 "(default: all samples)",
+	 "rows per second of a recording, each the mean of its samples (default: "
+	 "all samples)",
 	 CLI_NUMBER(struct options, rate, 0.1, 1e6)},
 	RECORDING_DAMAGED(struct options, damaged),
 	{0, "all-rows", NULL,
 	 "also use rows in which the blade did not advance (advancing is 0)",
 	 CLI_FLAG(struct options, all_rows)},
 	{0, "uncertainty", "WHICH",
-	 "uncertainties of the columns, as incise export --uncertainty parts\n"
+	 "uncertainties of the columns, as incise export --uncertainty parts "
 	 "writes them: parts, or none (default: parts of files that have them)",
 	 CLI_PARSED(struct options, uncertainty, parse_uncertainty)},
 	{0, "check", "SHARE",
-	 "hold out this share of the data as a test set, for "
-	 "example 0.3",
+	 "hold out this share of the data as a test set, for example 0.3",
 	 CLI_NUMBER(struct options, check, 0.01, 0.99)},
 	{0, "seed", "N", "seed of every random choice (default: 1)",
 	 CLI_INTEGER(struct options, train.seed, 0, 1L << 53)},
 	{0, "mf", "N,M",
-	 "membership functions per input (default: 5,4 for two inputs,\n"
-	 "else 3 each), or auto: chosen by cross-validation",
+	 "membership functions per input (default: 5,4 for two inputs, else 3 "
+	 "each), or auto: chosen by cross-validation",
 	 CLI_PARSED_BY(parse_mfs)},
 	{0, "mf-type", "KIND", "gaussmf (default) or gbellmf",
 	 CLI_PARSED(struct options, type, parse_type)},
 	{0, "epochs", "N", "largest number of epochs (default: 80)",
 	 CLI_INTEGER(struct options, train.epochs, 1, 100000)},
 	{0, "step", "K",
-	 "initial step of the membership functions' parameters\n"
-	 "(default: 0.01); only with --classic",
+	 "initial step of the membership functions' parameters (default: 0.01); "
+	 "only with --classic",
 	 CLI_NUMBER(struct options, train.step, 1e-9, 10)},
 	{0, "ridge", "R",
-	 "one ridge on scaled data (default: an average of fits,\n"
-	 "weighted by cross-validation)",
+	 "one ridge on scaled data (default: an average of fits, weighted by "
+	 "cross-validation)",
 	 CLI_NUMBER(struct options, train.ridge, 0, 1e12)},
 	{0, "starts", "N",
-	 "number of starting points of the membership functions\n"
-	 "(default: 3)",
+	 "number of starting points of the membership functions (default: 3)",
 	 CLI_INTEGER(struct options, train.starts, 1, 100)},
 	{0, "sample", "N",
-	 "pairs that the search of the membership functions uses, at\n"
-	 "random; 0: all (default: 3000)",
+	 "pairs that the search of the membership functions uses, at random; 0: "
+	 "all (default: 3000)",
 	 CLI_INTEGER(struct options, sample, 0, 1000000000)},
 	{0, "classic", NULL,
-	 "train as MATLAB's anfis does: no scaling, a ridge of 1e-6;\n"
-	 "the held-out data choose the epoch",
+	 "train as MATLAB's anfis does: no scaling, a ridge of 1e-6; the held-out "
+	 "data choose the epoch",
 	 CLI_FLAG(struct options, train.classic)},
 	{0, "initial", "FILE", "also write the initial model, before training",
 	 CLI_OUTPUT(struct options, initial), .extensions = ".fis"},
 	{0, "history", "FILE", "write the RMSE of each epoch to this CSV file",
 	 CLI_OUTPUT(struct options, history), .extensions = ".csv"},
 	{0, "shard", "I/N",
-	 "use share I of N of the sources, from 1: for the tasks of a job\n"
-	 "array; needs --factor",
+	 "use share I of N of the sources, from 1: for the tasks of a job array; "
+	 "needs --factor",
 	 CLI_PARSED(struct options, shard, parse_shard)},
 	{0, "mpi", NULL, "share the sources among the processes of mpirun",
 	 CLI_FLAG(struct options, mpi)},
@@ -191,10 +187,8 @@ static const struct cli_command command = {
 	.summary =
 		"Learn a Takagi-Sugeno force model from recordings or CSV files (ANFIS).",
 	.options = option_table,
-	.notes =
-		"Examples:\n  incise train pairs.csv --group cut --check 0.3 -o liver.fis\n"
-		"  incise train day1.rec day2.rec --group recording -o liver.fis\n\n"
-		"Exit: 0 trained, 1 failed, 2 bad usage. See incise-train(1).",
+	.examples = "incise train pairs.csv --group cut --check 0.3 -o liver.fis\n"
+		    "incise train day1.rec day2.rec --group recording -o liver.fis",
 };
 
 /* MODEL.fis.sd, if the model is a regular file or will be one: free(3); else NULL. */

@@ -22,8 +22,8 @@ struct job {
 
 static const struct cli_option options[] = {
 	{0, "signers", "FILE",
-	 "check signatures and say who vouches for what; FILE lists who may\n"
-	 "sign, in the format ALLOWED SIGNERS of ssh-keygen(1)",
+	 "check signatures and say who vouches for what; FILE lists who may sign, "
+	 "in the format ALLOWED SIGNERS of ssh-keygen(1)",
 	 CLI_INPUT(struct job, trust.signers)},
 	{0, "revoked", "FILE",
 	 "keys that are not accepted: public keys, or a list of ssh-keygen -k",
@@ -37,16 +37,14 @@ static const struct cli_option options[] = {
 static const struct cli_command command = {
 	.name = "verify",
 	.synopsis = "NAME.rec [OPTIONS]",
-	.summary = "Check that a recording is complete and as it was written: recompute "
-		   "its ledger and\n"
-		   "seal, and check the pages of its database. Lists what is missing or "
-		   "altered, and where.",
+	.summary =
+		"Check that a recording is complete and as it was written: recompute its "
+		"ledger and seal, and check the pages of its database. Lists what is "
+		"missing or altered, and where.",
 	.options = options,
-	.notes =
-		"Example: incise verify liver.rec\n"
-		"Exit codes: 0 complete, and signed if --signers is given; 1 something is "
-		"missing,\n"
-		"altered or not signed; 2 bad usage.",
+	.examples = "incise verify liver.rec",
+	.success = "complete, and signed if --signers is given",
+	.failure = "something is missing, altered or not signed",
 };
 
 /* Findings are printed as lines, or kept in a list. */

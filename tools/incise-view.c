@@ -68,17 +68,14 @@ static const struct cli_option options[] = {
 	 "show a scripted procedure: cut, bleeding, enlarging, tube",
 	 CLI_FLAG(struct view_job, procedure)},
 	{0, "frames", "DIR",
-	 "no window: write a PNG file for each frame into this "
-	 "folder",
+	 "no window: write a PNG file for each frame into this folder",
 	 CLI_OUTPUTS(struct view_job, output.folder)},
 	{0, "video", "FILE.mkv", "no window: write a film (Matroska)",
 	 CLI_OUTPUT(struct view_job, output.film_path), .extensions = ".mkv"},
 	{0, "strip", "FILE.png", "no window: write a few frames side by side",
 	 CLI_OUTPUT(struct view_job, output.strip_path), .extensions = ".png"},
 	{0, "no-output", NULL,
-	 "no window and no files: draw in real time and report "
-	 "the frame\n"
-	 "rate",
+	 "no window and no files: draw in real time and report the frame rate",
 	 CLI_FLAG(struct view_job, no_output)},
 	{0, "at", "TIMES", "times of the frames of --strip, for example 2s,6s,12s,20s",
 	 CLI_PARSED_BY(parse_times)},
@@ -103,21 +100,15 @@ static const struct cli_command command = {
 	.name = "view",
 	.synopsis = "SCENE [OPTIONS]",
 	.summary =
-		"Show a scene: the tissue, its wound and blood, and the instrument; "
-		"next to it force, depth\n"
-		"and the state of the loop. The default is the loop of this scene that "
-		"runs on this machine.",
+		"Show a scene: the tissue, its wound and blood, and the instrument; next "
+		"to it force, depth and the state of the loop. The default is the loop of "
+		"this scene that runs on this machine.",
 	.options = options,
-	.notes = "Keys: h lists all; left button presses, right button turns the "
-		 "camera, the wheel zooms;\n"
-		 "b blade, n handle, t tube, + and - the depth of a press, s saves the "
-		 "image, q ends.\n"
-		 "\n"
-		 "Examples:\n"
-		 "  incise view neck --rig sim:mouse\n"
-		 "  incise view neck --procedure --video neck.mkv\n"
-		 "\n"
-		 "Exit: 0 done, 1 failed, 2 bad usage. See incise-view(1).",
+	.notes = "Keys: h lists all; left button presses, right button turns the camera, "
+		 "the wheel zooms; b blade, n handle, t tube, + and - the depth of a "
+		 "press, s saves the image, q ends.",
+	.examples = "incise view neck --rig sim:mouse\n"
+		    "incise view neck --procedure --video neck.mkv",
 };
 
 static void parse(struct view_job *job, int argc, char **argv)

@@ -18,6 +18,7 @@
 #include "cli/cli.h"
 #include "cli/complete.h"
 #include "cli/features.h"
+#include "cli/help.h"
 
 #define LETTERS "abcdefghijklmnopqrstuvwxyz"
 
@@ -26,7 +27,7 @@ static const struct {
 } commands[] = {
 	{"calibrate", "measure the scale factors, delays and offsets of a rig"},
 	{"capture", "record the streams of a rig in sync"},
-	{"verify", "check that a recording is complete"},
+	{"verify", "check that a recording is complete and unaltered"},
 	{"sign", "sign and time-stamp a recording"},
 	{"recover", "copy an interrupted recording to one that is read like any other"},
 	{"join", "put recordings of several machines on one timeline"},
@@ -36,10 +37,12 @@ static const struct {
 	{"merge", "make one model of the factors of several laboratories or machines"},
 	{"compile", "convert a model or a scene to fixed point with a certified error"},
 	{"eval", "print the force of a model at given depth and velocity"},
-	{"info", "describe a recording, model, plan or stepper module"},
+	{"info",
+	 "describe a recording, model, plan, stepper module, CAN bus or attached device"},
 	{"plot", "draw a recording, dataset, model, session or calibration"},
 	{"provenance", "print the way from a figure or model back to its recordings"},
-	{"plan", "show the stages that a scene runs, and why it leaves out others"},
+	{"plan",
+	 "show the stages that a scene runs, their cost, and the stability of the scene"},
 	{"haptic", "run the real-time loop of a scene"},
 	{"feed", "load a scene into the kernel and send it the poses"},
 	{"serve", "send poses, forces and frames live to other programs"},
@@ -57,17 +60,26 @@ static const struct {
 
 #define COMMANDS (sizeof(commands) / sizeof(*commands))
 
-static void help(FILE *out)
+static void help(void)
 {
-	fprintf(out,
-		"Usage: incise COMMAND [ARGUMENTS]\n\n"
-		"A toolkit for haptic cutting: record, model and render how tissue resists a "
-		"scalpel.\n\nCommands:\n");
-	for (size_t i = 0; i < COMMANDS; i++)
-		fprintf(out, "  %-11s %s\n", commands[i].name, commands[i].does);
-	fprintf(out,
-		"\n'incise COMMAND --help' lists the options of a command, 'incise help "
-		"COMMAND' opens its\nmanual. New here? Start with 'incise demo'.\n");
+	help_print_text("Usage: incise COMMAND [ARGUMENTS]\n", 0, 0);
+	putchar('\n');
+	help_print_text(
+		"A toolkit for haptic cutting: record, model and render how tissue "
+		"resists a scalpel.",
+		0, 0);
+	printf("\nCommands:\n");
+	for (size_t i = 0; i < COMMANDS; i++) {
+		char *line = cli_text("  %-11s  %s", commands[i].name, commands[i].does);
+
+		help_print_text(line, 0, 0);
+		free(line);
+	}
+	putchar('\n');
+	help_print_text(
+		"'incise COMMAND --help' lists the options of a command, 'incise "
+		"help COMMAND' opens its manual. New here? Start with 'incise demo'.",
+		0, 0);
 }
 
 /* Whether PATH leads to a file of this name, runnable or not. */
@@ -149,7 +161,7 @@ static char *page_of(const char *topic, const char *subcommand)
 	return NULL;
 }
 
-/* The page in the source tree if this runs in a build tree, else the installed one. */
+/* The page of the build tree if this runs in one, else the installed one. */
 static int manual(const char *topic, const char *subcommand)
 {
 	char *page = topic ? page_of(topic, subcommand) : strdup("incise.1");
@@ -173,7 +185,7 @@ static int manual(const char *topic, const char *subcommand)
 				  topic);
 		return 2;
 	}
-	if (asprintf(&path, "%s/../../man/%s", cli_folder(), page) < 0)
+	if (asprintf(&path, "%s/../man/%s", cli_folder(), page) < 0)
 		return 1;
 	if (!access(path, R_OK))
 		execlp("man", "man", path, (char *)NULL);
@@ -262,11 +274,12 @@ int main(int argc, char **argv)
 	char folder[PATH_MAX], program[PATH_MAX + 80];
 
 	if (argc < 2) {
-		help(stderr);
+		dup2(STDERR_FILENO, STDOUT_FILENO);
+		help();
 		return 2;
 	}
 	if (!strcmp(command, "-h") || !strcmp(command, "--help")) {
-		help(stdout);
+		help();
 		return finish();
 	}
 	if (!strcmp(command, "-V") || !strcmp(command, "--version")) {
@@ -276,10 +289,15 @@ int main(int argc, char **argv)
 	}
 	if (!strcmp(command, "--complete"))
 		return complete(argc - 2, argv + 2);
+	if (!strcmp(command, "--table")) { /* for the manual page */
+		for (size_t i = 0; i < COMMANDS; i++)
+			printf("command\t%s\t%s\n", commands[i].name, commands[i].does);
+		return finish();
+	}
 	if (!strcmp(command, "help")) {
 		if (argc > 2)
 			return manual(argv[2], argv[3]);
-		help(stdout);
+		help();
 		return finish();
 	}
 	if (strchr(command, '/') || *command == '-' || strlen(command) > 64)

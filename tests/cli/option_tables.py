@@ -5,6 +5,7 @@ option_tables.py VERSION PROGRAM...: prints each row of --help that is not kept,
 nothing and exits with 0 if all are. Of each program:
 
 * --help and -h print the same, exit 0, and fail with one line where nothing can be written;
+* an option has one letter in all commands, and a letter one option;
 * --version is that of the header, and completion offers the options of --help;
 * an unknown option and an unknown letter are bad usage, a misspelt one gets the nearest name;
 * a flag takes no argument, and an option that has one must be given it;
@@ -14,6 +15,7 @@ nothing and exits with 0 if all are. Of each program:
 The parser reads options in their order: that one is legal is seen by the complaint about the
 unknown option behind it. Bad usage is exit 2 with two lines, and nothing on standard output.
 """
+import collections
 import concurrent.futures
 import os
 import re
@@ -191,7 +193,7 @@ class Command:
     def __init__(self, program, values):
         self.program, self.values = program, values
         self.name = os.path.basename(program).split("-", 1)[1].replace("-", " ", 1)
-        self.wrong = []
+        self.wrong, self.letters = [], []
 
     def complain(self, *words):
         self.wrong.append(f"incise {self.name}: " + " ".join(words))
@@ -234,6 +236,7 @@ class Command:
 
     def check(self, version):
         rows = list(rows_of_help(self.help(version)))
+        self.letters = [(name, letter) for name, letter, _ in rows]
         self.refused(["--no-such-option"], "--no-such-option: no such option")
         self.refused(["-%"], "-%")
         names = [name for name, _, _ in rows]
@@ -278,6 +281,8 @@ def main(version, programs):
     commands = [Command(program, values) for program in programs]
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
         wrong = [line for lines in pool.map(lambda c: c.check(version), commands) for line in lines]
+    for words in zip(*{pair for command in commands for pair in command.letters}):
+        wrong += [f"{word}: stands for several" for word, n in collections.Counter(words).items() if word and n > 1]
     if wrong:
         print("\n".join(wrong))
     return 1 if wrong else 0

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
-# The options of all commands: each by itself, and one name and one meaning of each in all commands, which
-# is the dictionary doc/options.md.
+# The options of all commands: each by itself, and one letter of each in all commands.
 
 load cli
 
@@ -15,23 +14,6 @@ setup() {
 	run -0 python3 "$root/tests/cli/option_tables.py" "$version" "$INCISE_BUILD"/bin/incise-*
 	[ -z "$output" ]
 	[ "$(ls -A)" = a.fis ]
-}
-
-# bats test_tags=check
-@test "every option of every command is in the dictionary, and nothing else is" {
-	run -0 python3 "$root/tests/cli/options.py" "$root/doc/options.md" "$INCISE_BUILD"/bin/incise-*
-	[ -z "$output" ]
-}
-
-@test "a dictionary that differs from the commands is found" {
-	sed '/`--max-delay`/d; s/`-o, --output`/`-O, --output`/; s/^\(.*`--target`.*\)train/\1eval/' \
-		"$root/doc/options.md" >wrong.md
-	echo '| `--frob` | | does nothing | train |' >>wrong.md
-	run -1 python3 "$root/tests/cli/options.py" wrong.md "$INCISE_BUILD"/bin/incise-*
-	[[ "$output" == *"--max-delay: not in the dictionary (calibrate delay)"* ]]
-	[[ "$output" == *"--output: letters"* ]]
-	[[ "$output" == *"--target: differs in eval, train"* ]]
-	[[ "$output" == *"--frob: no command has it"* ]]
 }
 
 # bats test_tags=check

@@ -100,7 +100,7 @@ setup() {
 		"$document" --help >"help/${document##*/}.help"
 	done
 	for document in "$root"/{README,CONTRIBUTING,tests/can/README}.md "$root"/doc/*.md \
-		"$root"/man/*.[158] help/*.help; do
+		"$INCISE_BUILD"/man/*.[158] help/*.help; do
 		typed_in "$document" | sed "s|^|${document##*/}\t|"
 	done | grep -v '[…$]' | sort -u -t $'\t' -k 2 >typed
 	[ "$(wc -l <typed)" -ge 120 ] || complain "only $(wc -l <typed) are found"

@@ -131,7 +131,7 @@ struct bench_run;
 
 struct bench {
 	const char *name, *operands; /* "loop", "[SCENE]" */
-	const char *summary;	     /* in --help, one line or more */
+	const char *summary;	     /* in --help */
 	int n_operands;		     /* at most */
 	bool takes_duration, takes_load, takes_profile, takes_seed;
 	void (*run)(struct bench_run *run);

@@ -356,7 +356,7 @@ static void run(struct bench_run *run)
 const struct bench bench_loop = {
 	.name = "loop",
 	.operands = "[SCENE]",
-	.summary = "run time of a tick; wake-up latency, idle and under\n"
+	.summary = "run time of a tick; wake-up latency, idle and under "
 		   "load, compared with cyclictest",
 	.n_operands = 1,
 	.takes_duration = true,

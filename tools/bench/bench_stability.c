@@ -503,7 +503,7 @@ const struct bench bench_stability = {
 	.name = "stability",
 	.operands = "[MODEL.fis]",
 	.n_operands = 1,
-	.summary = "stability limits, simulated and computed; learned\n"
+	.summary = "stability limits, simulated and computed; learned "
 		   "models; forces; integrators",
 	.run = run,
 	.plots = {{.suffix = "map",

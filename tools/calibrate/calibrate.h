@@ -24,10 +24,10 @@ struct calibrate_options {
 };
 
 /* The option -c of a command, whose options begin with these as `common`. */
-#define CALIBRATE_FILE_OPTION(type)                                             \
-	'c', "calibration", "FILE",                                             \
-		"calibration to read and write (default: ./calibration.conf,\n" \
-		"else /etc/incise/calibration.conf where that is)",             \
+#define CALIBRATE_FILE_OPTION(type)                                            \
+	'c', "calibration", "FILE",                                            \
+		"calibration to read and write (default: ./calibration.conf, " \
+		"else /etc/incise/calibration.conf where that is)",            \
 		CLI_INPUT(type, common.calibration)
 
 /* Read the active calibration and its history; a missing file is the nominal one. */

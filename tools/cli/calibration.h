@@ -10,13 +10,12 @@
 #include "cli.h"
 
 /* Row of the table of options for -c. */
-#define CALIBRATION_OPTION(type, member)                                       \
-	{                                                                      \
-		'c', "calibration", "FILE",                                    \
-			"calibration of the rig, or none for nominal values\n" \
-			"(default: ./calibration.conf, else "                  \
-			"/etc/incise/calibration.conf)",                       \
-			CLI_INPUT(type, member)                                \
+#define CALIBRATION_OPTION(type, member)                                                \
+	{                                                                               \
+		'c', "calibration", "FILE",                                             \
+			"calibration of the rig, or none for nominal values (default: " \
+			"./calibration.conf, else /etc/incise/calibration.conf)",       \
+			CLI_INPUT(type, member)                                         \
 	}
 
 struct calibration_used {

@@ -24,51 +24,16 @@
 #include "control_character.h"
 #include "complete.h"
 #include "file_kind.h"
+#include "help.h"
 
 #define OPTIONS_MAX 40
-#define OVERWRITE 1 /* of getopt, no letter */
-#define LONG 256    /* first of the numbers of long options */
+#define LONG 256 /* first of the numbers of long options */
 
 static const struct cli_command *current;
 static bool status_line, verbose;
 static int status_above; /* lines above its last one */
 
 volatile sig_atomic_t cli_stop;
-
-static bool has_outputs(const struct cli_command *command)
-{
-	for (const struct cli_option *opt = command->options; opt->name; opt++)
-		if (opt->kind == CLI_KIND_OUTPUT || opt->kind == CLI_KIND_OUTPUTS)
-			return true;
-	return false;
-}
-
-static void print_help(const struct cli_command *command)
-{
-	printf("Usage: incise %s %s\n\n%s\n\nOptions:\n", command->name,
-	       command->synopsis, command->summary);
-	for (const struct cli_option *opt = command->options; opt->name; opt++) {
-		bool letter = opt->id;
-		const char *help = opt->help;
-		char left[64];
-
-		snprintf(left, sizeof(left), "  %c%c%s--%s%s%s", letter ? '-' : ' ',
-			 letter ? opt->id : ' ', letter ? ", " : "  ", opt->name,
-			 opt->arg ? " " : "", opt->arg ? opt->arg : "");
-		printf("%-30s", left);
-		if (strlen(left) >= 30)
-			printf("\n%-30s", "");
-		for (const char *c = help; *c; c++)
-			*c == '\n' ? printf("\n%-30s", "") : putchar(*c);
-		putchar('\n');
-	}
-	if (has_outputs(command))
-		printf("      --overwrite             replace files that exist\n");
-	printf("  -h, --help                  show this\n"
-	       "  -V, --version               show the version\n");
-	if (command->notes)
-		printf("\n%s\n", command->notes);
-}
 
 /*
  * If a standard stream is closed, the next open(2) takes its number, and a device would get
@@ -122,14 +87,14 @@ static void refuse_renamed(const struct cli_command *command, const char *option
 /* The name of what option @given, "-x" or "--name", takes. */
 static const char *argument_of(const struct cli_command *command, const char *given)
 {
-	for (const struct cli_option *opt = command->options; opt->name; opt++) {
-		char letter = given[strlen(given) - 1];
+	const struct cli_option *opt;
+	char letter = given[strlen(given) - 1];
 
+	for (int i = 0; (opt = help_option(command, i)); i++)
 		if (!strncmp(given, "--", 2)
 			    ? !strncmp(given + 2, opt->name, strlen(given + 2))
 			    : letter == opt->id)
 			return opt->arg ? opt->arg : "none";
-	}
 	return "see --help";
 }
 
@@ -146,12 +111,8 @@ _Noreturn static void refuse(const struct cli_command *command, const char *give
 	refuse_renamed(command, option);
 	if (*option != '-' || option[1] != '-')
 		cli_usage("%s: no such option", option);
-	for (const struct cli_option *opt = command->options; opt->name; opt++)
-		names[n++] = opt->name;
-	names[n++] = "help";
-	names[n++] = "version";
-	if (has_outputs(command))
-		names[n++] = "overwrite";
+	for (const struct cli_option *opt; (opt = help_option(command, n)); n++)
+		names[n] = opt->name;
 	for (int i = 0; i < n; i++) {
 		size_t length = strlen(option + 2);
 
@@ -175,10 +136,9 @@ static const struct cli_option *next(const struct cli_command *command, int argc
 				     char **argv)
 {
 	struct option longs[OPTIONS_MAX + 4] = {0};
-	char shorts[3 * OPTIONS_MAX + 8] = ":hV";
+	char shorts[3 * OPTIONS_MAX + 8] = ":";
 	char *s = shorts + strlen(shorts);
-	const struct cli_option *options = command->options;
-	int n = 0;
+	const struct cli_option *opt;
 	int id;
 
 	if (!current)
@@ -188,51 +148,30 @@ static const struct cli_option *next(const struct cli_command *command, int argc
 	for (int i = optind; i < argc && strcmp(argv[i], "--"); i++)
 		if (!strncmp(argv[i], "--", 2))
 			refuse_renamed(command, argv[i]);
-	for (const struct cli_option *opt = options; opt->name; opt++) {
+	for (int n = 0; (opt = help_option(command, n)); n++) {
 		if (n == OPTIONS_MAX)
 			abort();
 		/* Each has a number of its own, or getopt would complete "--m" to any. */
 		longs[n] = (struct option){opt->name,
 					   opt->arg ? required_argument : no_argument,
 					   NULL, LONG + n};
-		n++;
 		if (opt->id) {
 			*s++ = (char)opt->id;
 			if (opt->arg)
 				*s++ = ':';
 		}
 	}
-	if (has_outputs(command))
-		longs[n++] = (struct option){"overwrite", no_argument, NULL, OVERWRITE};
-	longs[n++] = (struct option){"help", no_argument, NULL, 'h'};
-	longs[n++] = (struct option){"version", no_argument, NULL, 'V'};
 	opterr = 0;
 	id = getopt_long(argc, argv, shorts, longs, NULL);
-	switch (id) {
-	case -1:
+	if (id == -1)
 		return NULL;
-	case OVERWRITE:
-		cli_allow_overwrite();
-		return next(command, argc, argv);
-	case 'h':
-		print_help(command);
-		cli_finish();
-		exit(0);
-	case 'V':
-		printf("incise %s\n", incise_version());
-		cli_finish();
-		exit(0);
-	case ':':
+	if (id == ':')
 		cli_usage("%s: missing argument %s", argv[optind - 1],
 			  argument_of(command, argv[optind - 1]));
-	case '?':
-		refuse(command, argv[optind - 1], optopt);
-	}
-	if (id >= LONG)
-		return &options[id - LONG];
-	while (options->id != id)
-		options++;
-	return options;
+	for (int n = 0; (opt = help_option(command, n)); n++)
+		if (id == LONG + n || id == opt->id)
+			return opt;
+	refuse(command, argv[optind - 1], optopt);
 }
 
 static void store_integer(const struct cli_option *opt, void *member)
@@ -281,6 +220,17 @@ static void store(const struct cli_option *opt, void *member)
 	case CLI_KIND_PARSED:
 		opt->parse(member, optarg);
 		break;
+	case CLI_KIND_OVERWRITE:
+		cli_allow_overwrite();
+		break;
+	case CLI_KIND_HELP:
+		help_print(current);
+		cli_finish();
+		exit(0);
+	case CLI_KIND_VERSION:
+		printf("incise %s\n", incise_version());
+		cli_finish();
+		exit(0);
 	}
 }
 
@@ -384,6 +334,11 @@ void cli_parse(const struct cli_command *command, int argc, char **argv, void *o
 
 	if (argc > 1 && !strcmp(argv[1], "--complete"))
 		complete(command, argc - 2, argv + 2, options);
+	if (argc > 1 && !strcmp(argv[1], "--table")) {
+		help_print_table(command);
+		cli_finish();
+		exit(0);
+	}
 	while ((opt = next(command, argc, argv)))
 		store(opt, (char *)options + opt->offset);
 	cli_input("-");

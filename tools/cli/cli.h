@@ -31,6 +31,10 @@ enum cli_kind {
 	CLI_KIND_QUANTITY,
 	CLI_KIND_CHOICE,
 	CLI_KIND_PARSED,
+	/* those of all commands */
+	CLI_KIND_OVERWRITE,
+	CLI_KIND_HELP,
+	CLI_KIND_VERSION,
 };
 
 #pragma GCC diagnostic ignored "-Wmissing-field-initializers"
@@ -40,7 +44,7 @@ struct cli_option {
 	int id;		  /* its letter, or 0 */
 	const char *name; /* long name */
 	const char *arg;  /* name of its argument, or NULL */
-	const char *help; /* one line; may hold newlines */
+	const char *help; /* a sentence without a full stop, which --help wraps */
 
 	/* For cli_parse(), by one of the macros below. */
 	enum cli_kind kind;
@@ -103,18 +107,21 @@ struct cli_option {
 #define CLI_PARSED_BY(function) .kind = CLI_KIND_PARSED, .parse = (function)
 
 /* The row of the rig to use, without its braces. */
-#define CLI_RIG_OPTION(type, member)                                          \
-	'r', "rig", "RIG",                                                    \
-		"file rig.conf, or sim:KEY=VALUE,… for the simulated rig\n" \
-		"(default: ./rig.conf, else /etc/incise/rig.conf)",           \
+#define CLI_RIG_OPTION(type, member)                                         \
+	'r', "rig", "RIG",                                                   \
+		"file rig.conf, or sim:KEY=VALUE,… for the simulated rig " \
+		"(default: ./rig.conf, else /etc/incise/rig.conf)",          \
 		CLI_INPUT(type, member)
 
 struct cli_command {
 	const char *name;     /* "train" */
 	const char *synopsis; /* "DATA.csv -o MODEL.fis" */
-	const char *summary;  /* one sentence for --help */
+	const char *summary;  /* for --help, as of help_print_text() */
 	const struct cli_option *options;
-	const char *notes; /* examples and exit codes, below the options; or NULL */
+	const char *notes;    /* the same, below the options; or NULL */
+	const char *examples; /* a command a line; or NULL */
+	/* Meaning of exit status 0 and 1; NULL: "success" and "failure". */
+	const char *success, *failure;
 	/* All operands as a synopsis, "move MM | home", if .synopsis does not have them; or NULL. */
 	const char *operands;
 };

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <incise/rig.h>
 #include "complete.h"
+#include "help.h"
 #include "scene_argument.h"
 #include "state_folder.h"
 
@@ -17,9 +18,7 @@ static const char *front = "";
 
 void complete_word(const char *word, const char *description)
 {
-	const char *text = description ? description : "";
-
-	printf("%s%s\t%.*s\n", front, word, (int)strcspn(text, "\n"), text);
+	printf("%s%s\t%s\n", front, word, description ? description : "");
 }
 
 static void files(const char *globs)
@@ -239,9 +238,9 @@ static void value(const struct cli_option *option, const char *text,
 
 static void options(const struct cli_command *command, bool letters)
 {
-	bool outputs = false;
+	const struct cli_option *opt;
 
-	for (const struct cli_option *opt = command->options; opt->name; opt++) {
+	for (int i = 0; (opt = help_option(command, i)); i++) {
 		char *word = cli_text("--%s", opt->name);
 
 		complete_word(word, opt->help);
@@ -250,12 +249,7 @@ static void options(const struct cli_command *command, bool letters)
 		if (letters && opt->id)
 			complete_word(word, opt->help);
 		free(word);
-		outputs |= opt->kind == CLI_KIND_OUTPUT || opt->kind == CLI_KIND_OUTPUTS;
 	}
-	if (outputs)
-		complete_word("--overwrite", "replace what is there already");
-	complete_word("--help", "show the help");
-	complete_word("--version", "show the version");
 }
 
 /* The option that a word is, "--name", "--name=…" or "-x"; NULL: none of this command. */

@@ -14,7 +14,7 @@
 
 #include "cli.h"
 
-/* Print a word; @description: its first line counts; may be NULL. */
+/* Print a word; @description may be NULL. */
 void complete_word(const char *word, const char *description);
 
 /*

@@ -16,19 +16,19 @@ struct session_options {
 };
 
 /* Rows of the table of options, without the outer braces. */
-#define SESSION_OPTIONS(type, member)                                                    \
-	{0,                                                                              \
-	 "session",                                                                      \
-	 "FILE",                                                                         \
-	 "write a session file at the end, for incise assess",                           \
-	 CLI_OUTPUT(type, member.path),                                                  \
-	 .parse = session_path_parse,                                                    \
-	 .extensions = ".session"},                                                      \
-	{                                                                                \
-		0, "code", "CODE",                                                       \
-			"of the session's subject, no name: up to 16 letters, digits,\n" \
-			"'-' and '_'",                                                   \
-			CLI_PARSED(type, member.code, session_code_parse)                \
+#define SESSION_OPTIONS(type, member)                                                   \
+	{0,                                                                             \
+	 "session",                                                                     \
+	 "FILE",                                                                        \
+	 "write a session file at the end, for incise assess",                          \
+	 CLI_OUTPUT(type, member.path),                                                 \
+	 .parse = session_path_parse,                                                   \
+	 .extensions = ".session"},                                                     \
+	{                                                                               \
+		0, "code", "CODE",                                                      \
+			"of the session's subject, no name: up to 16 letters, digits, " \
+			"'-' and '_'",                                                  \
+			CLI_PARSED(type, member.code, session_code_parse)               \
 	}
 
 /* Anything but a file and a code is bad usage. */
