@@ -203,6 +203,6 @@ commands() {
 }
 
 @test "the manual names every key of the schemas" {
-	schemas --manual "$root/schema" "$root"/man/*.[1-8]
+	schemas --manual "$root/schema" "$INCISE_BUILD"/man/*.[1-8]
 	[ "$status $output" = "0 " ] || complain "$output"
 }
