@@ -6,7 +6,7 @@
 # some. They build without what only tests need.
 extremes := $(O)/obj/tests/extremes.a
 $(O)/obj/tests/extremes/%.o: test_cflags =
-$(extremes): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tests/extremes/*.c $(addprefix tools/cli/,cli.c complete.c f*.c output.c scene_argument.c state_folder.c)) tools/bench/closed_loop.c)
+$(extremes): $(patsubst %.c,$(O)/obj/%.o,$(wildcard tests/extremes/*.c $(addprefix tools/cli/,cli.c complete.c f*.c help.c output.c scene_argument.c state_folder.c)) tools/bench/closed_loop.c)
 	@rm -f $@
 	$(call step,AR)
 	$(Q)$(AR) rcs $@ $^

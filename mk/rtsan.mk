@@ -52,7 +52,7 @@ $(O)/obj/again/%.o: tests/unit/%.c
 	$(Q)$(rtsan_cc) -c $(test_cflags) -o $@ $<
 
 $(O)/again/tests/unit/scene/extreme: $(patsubst %,$(O)/obj/tests/extremes/%.o,\
-	extremes fed_run ground numbers plan) $(addprefix $(O)/obj/tools/cli/,cli.o complete.o file.o file_kind.o folder.o folder_of_programs.o output.o \
+	extremes fed_run ground numbers plan) $(addprefix $(O)/obj/tools/cli/,cli.o complete.o file.o file_kind.o folder.o folder_of_programs.o help.o output.o \
 	scene_argument.o state_folder.o)
 $(O)/again/tests/unit/%: $(O)/obj/again/%.o $(O)/lib/libincise-rtsan.a
 	@mkdir -p $(@D)

@@ -195,10 +195,8 @@ rig() { # ARGUMENTS
 @test "info of a bus whose backend is not there, or cannot look" {
 	run --separate-stderr incise info nosuch:can0
 	failed_with 'nosuch:can0: no such backend "nosuch"; there are: sim, kernel, bench'
-	for bus in sim: kernel:/dev/incise-stepper0; do
-		run --separate-stderr incise info $bus
-		failed_with "$bus:"
-	done
+	run --separate-stderr incise info kernel:/dev/incise-stepper0
+	failed_with "kernel:/dev/incise-stepper0:"
 	run --separate-stderr incise info bench:bus0 --plot p
 	bad_usage "--plot"
 }
@@ -342,7 +340,7 @@ rig() { # ARGUMENTS
 	rig bus0
 	sed -i 's/lead_mm = 3.0;/&\ncan = { mode = "torque"; };/' rig.conf
 	run --separate-stderr incise stepper status
-	failed_with 'rig.conf:4: actuator.can.mode: expected "csp", "csv" or "cst", found "torque"'
+	failed_with 'rig.conf:4: actuator.can.mode: expected one of csp, csv, cst, found "torque"'
 }
 
 @test "info devices lists what is attached, of each kind that can look" {

@@ -303,7 +303,8 @@ TEST(wrong_files_are_named)
 		{ENTRY(""), ":2: history[1].values:"},
 		{ENTRY("values = ( );"), ":3: history[1].values:"},
 		{ENTRY("values = ( 1 );"), ":3: history[1].values[1]:"},
-		{ENTRY("values = ( { key = \"force_mV_N\"; u = 1; } );"), ":3: history[1].values[1].left:"},
+		{ENTRY("values = ( { key = \"force_mV_N\"; u = 1; } );"),
+		 ":3: history[1].values[1].left:"},
 		{ENTRY("values = ( { key = \"x\"; left = 1; u = 1; } );"),
 		 "history: values: key:"},
 		{ENTRY("values = ( { key = \"force_mV_N\"; left = 1e999; u = 1; } );"),
@@ -405,8 +406,7 @@ static void say_present(struct file_content *file, const char *name)
 {
 	int element;
 
-	file->present[find_key(name, &element) -
-		      incise_calibration_settings] = true;
+	file->present[find_key(name, &element) - incise_calibration_settings] = true;
 }
 
 static char *written(const struct file_content *file, const char *notes)
