@@ -3,7 +3,6 @@
 
 headers := $(wildcard lib/include/incise/*.h)
 scenes := $(wildcard scenes/*.scene scenes/*.fis)
-schemas := $(wildcard schema/*.json)
 report_files := $(addprefix tools/report/,report.py compare.py measure.py bench.j2 assess.j2 document.css)
 examples := $(wildcard doc/*.example)
 # All but the main page of the headers' reference, which is in that.

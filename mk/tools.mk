@@ -108,10 +108,12 @@ tables := $(patsubst $(O)/bin/%,$(O)/obj/tools/%.table,$(programs))
 $(O)/obj/tools/%.table: $(O)/bin/%
 	$(Q)LD_LIBRARY_PATH=$(O)/lib $< --table >$@
 
-$(O)/man/%.1: man/%.1 mk/manual $(O)/obj/tools/%.table
+$(O)/man/%.1: man/%.1 mk/manual mk/manual-output $(wildcard schema/*.rows) $(O)/obj/tools/%.table
 	@mkdir -p $(@D)
 	$(call step,MAN)
-	$(Q)mk/manual $(O)/obj/tools/$*.table $< >$@
+	$(Q)mk/manual $(O)/obj/tools/$*.table $< >$@.lists
+	$(Q)mk/manual-output <$@.lists >$@
+	@rm $@.lists
 
 $(O)/man/%: man/%
 	@mkdir -p $(@D)
@@ -121,7 +123,13 @@ $(O)/doc/options.md: mk/options $(tables)
 	@mkdir -p $(@D)
 	$(Q)$< $(filter-out %/incise.table,$(tables)) >$@
 
-pages: $(man_pages:%=$(O)/%) $(O)/doc/options.md
+# The keys of each report: its JSON Schema, and its list in the page.
+schemas := $(patsubst %.rows,$(O)/%.json,$(wildcard schema/*.rows))
+$(schemas): $(O)/%.json: %.rows mk/schema
+	@mkdir -p $(@D)
+	$(Q)mk/schema $< >$@
+
+pages: $(man_pages:%=$(O)/%) $(O)/doc/options.md $(schemas)
 
 DEMO ?= demo.out
 

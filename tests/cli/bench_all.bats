@@ -65,11 +65,11 @@ report_of() {
 	done
 	"$python" -c "import jsonschema" || skip "python3-jsonschema is not installed"
 	incise bench compare "$r/data/training.json" "$r/data/training.json" --json >compare.json
-	run "$python" "$BATS_TEST_DIRNAME/json_schema.py" "$root/schema" "$r/report.json" "$r"/data/*.json compare.json
+	run "$python" "$BATS_TEST_DIRNAME/json_schema.py" "$INCISE_BUILD/schema" "$r/report.json" "$r"/data/*.json compare.json
 	[ "$status $output" = "0 " ] || complain "$output"
 	# each benchmark that was measured is one of them
 	for benchmark in $benchmarks; do
-		[ -e "$root/schema/bench-$benchmark.json" ]
+		[ -e "$INCISE_BUILD/schema/bench-$benchmark.json" ]
 	done
 }
 

@@ -54,7 +54,7 @@ setup() {
 		cmp "$root/$document" "$dest/usr/share/doc/incise/${document##*/}"
 	done
 	cmp "$root/scenes/liver.scene" "$dest/usr/share/incise/scenes/liver.scene"
-	for schema in "$root"/schema/*.json; do
+	for schema in "$INCISE_BUILD"/schema/*.json; do
 		cmp "$schema" "$dest/usr/share/incise/schema/${schema##*/}"
 	done
 	cmp "$root/tools/incise.bash" "$dest/usr/share/bash-completion/completions/incise"

@@ -162,18 +162,18 @@ commands() {
 }
 
 @test "the schemas are valid, allow no unknown key, and say the unit of each number" {
-	schemas --check "$root/schema"
+	schemas --check "$INCISE_BUILD/schema"
 	[ "$status $output" = "0 " ] || complain "$output"
 }
 
 @test "every command that has --json has a schema, and every schema has such a command" {
 	# bench itself prints what its benchmarks do; a session is a file
 	diff <(commands | grep -vx bench | sort -u) \
-		<(cd "$root/schema" && printf '%s\n' *.json | sed 's/\.json$//' | grep -vx -e bench -e session)
+		<(cd "$INCISE_BUILD/schema" && printf '%s\n' *.json | sed 's/\.json$//' | grep -vx -e bench -e session)
 }
 
 @test "what every command prints agrees with its schema" {
-	schemas "$root/schema" "$out"/*.json
+	schemas "$INCISE_BUILD/schema" "$out"/*.json
 	[ "$status $output" = "0 " ] || complain "$output"
 	# none is left out, but what needs gnuplot or OpenGL
 	(cd "$out" && printf '%s\n' *.json | sed 's/\..*//' | sort -u) >have
@@ -189,20 +189,20 @@ commands() {
 @test "a key more and a key less are found, and so is another type" {
 	(cd "$out" && ls -- *.json | grep -v -e follow -e demo) >files
 	mapfile -t files < <(sed "s|^|$out/|" files)
-	schemas --mutate "$root/schema" "${files[@]}"
+	schemas --mutate "$INCISE_BUILD/schema" "${files[@]}"
 	[ "$status $output" = "0 " ] || complain "$output"
 	sed 's/"pairs": [0-9]*,/"pairs": "many",/' "$out/train.json" >wrong.json
-	schemas "$root/schema" wrong.json
+	schemas "$INCISE_BUILD/schema" wrong.json
 	[[ "$status $output" == "1 wrong.json: "*"'many' is not of type 'integer'"* ]]
 	sed 's|incise/train/1|incise/train/2|' "$out/train.json" >wrong.json
-	schemas "$root/schema" wrong.json
+	schemas "$INCISE_BUILD/schema" wrong.json
 	[ "$status $output" = "1 wrong.json: schema: 'incise/train/1' was expected" ]
 	sed '/"schema"/d' "$out/train.json" >wrong.json
-	schemas "$root/schema" wrong.json
+	schemas "$INCISE_BUILD/schema" wrong.json
 	[ "$status $output" = "1 wrong.json: no schema is named" ]
 }
 
 @test "the manual names every key of the schemas" {
-	schemas --manual "$root/schema" "$INCISE_BUILD"/man/*.[1-8]
+	schemas --manual "$INCISE_BUILD/schema" "$INCISE_BUILD"/man/*.[1-8]
 	[ "$status $output" = "0 " ] || complain "$output"
 }
