@@ -89,10 +89,10 @@ set_clock()
 }
 
 # Virtual time goes on while programs are read from the host for the first time.
-incise capture -o a.rec --duration 1s >/dev/null 2>&1
+incise capture -o a.rec -c none --duration 1s >/dev/null 2>&1
 rm -rf a.rec a.rec.part
 began=$(date +%s)
-incise capture -o a.rec --duration 5s --json >report.json 2>err &
+incise capture -o a.rec -c none --duration 5s --json >report.json 2>err &
 capture=$!
 until_rows force 1000
 set_clock 3600
@@ -139,7 +139,7 @@ check "their stamps are by the clock that is not set" holds "count(*) > 10 AND
 # --- the camera goes ------------------------------------------------------------------
 
 rm -r a.rec
-incise capture -o a.rec --duration 5s --json >report.json 2>err &
+incise capture -o a.rec -c none --duration 5s --json >report.json 2>err &
 capture=$!
 until_rows camera 10
 check "the camera is taken away" sh -c 'echo vivid.0 >/sys/bus/platform/drivers/vivid/unbind'
@@ -180,7 +180,7 @@ paused()
 	feed
 	sleep 0.5
 	rm -rf a.rec
-	incise capture -o a.rec --duration 9s --json >report.json 2>err &
+	incise capture -o a.rec -c none --duration 9s --json >report.json 2>err &
 	capture=$!
 	until_rows camera 10
 	kill -STOP $feeder
