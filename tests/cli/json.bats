@@ -44,7 +44,7 @@ recordings() {
 	report verify.findings verify b.rec
 	ssh-keygen -q -t ed25519 -N "" -f key
 	report sign sign a.rec --key key
-	incise export a.rec --rate 10 --lineage -o lineage.csv
+	incise export a.rec --rate 10 -o lineage.csv
 	report provenance provenance lineage.csv
 	report sign.query sign a.rec --timestamp q.tsq
 	report verify.signed verify a.rec --signers <(echo "kim@lab $(cat key.pub)")
