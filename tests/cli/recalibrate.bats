@@ -119,3 +119,21 @@ rows_of() {
 	incise recalibrate a.rec -c new.conf >/dev/null
 	[ -e a.rec/calibration/0003-*.conf ]
 }
+
+@test "those that recalibrate at once all get a number, and a link leads nowhere" {
+	ids=()
+	for i in 1 2 3 4 5 6; do
+		echo "force_mV_N = 120$i.0;" >$i.conf
+		incise recalibrate a.rec -c $i.conf >/dev/null 3>&- &
+		ids+=($!)
+	done
+	for id in "${ids[@]}"; do
+		wait $id
+	done
+	[ "$(ls a.rec/calibration | cut -c1-4 | paste -sd' ')" = "0001 0002 0003 0004 0005 0006" ]
+	mkdir other
+	ln -s ../other b.rec/calibration
+	run --separate-stderr incise recalibrate b.rec -c new.conf
+	failed_with "b.rec/calibration: a link"
+	[ -z "$(ls other)" ]
+}
