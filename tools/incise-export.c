@@ -245,7 +245,7 @@ int main(int argc, char **argv)
 	else if (strcmp(job.output, "-"))
 		printf("wrote %s: %llu rows from %d cut%s\n", job.output,
 		       (unsigned long long)report.rows, report.cuts,
-		       report.cuts == 1 ? "" : "s");
+		       cli_s(report.cuts));
 	cli_finish();
 	return 0;
 }

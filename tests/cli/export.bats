@@ -342,6 +342,8 @@ read_mcap() {
 	[ "$(tail -n +2 a.csv | cut -d, -f2 | sort -nu | tail -n 1)" -eq 14 ]
 	incise export --no-lineage liver.rec --resample -o b.csv
 	[ "$(wc -l <b.csv)" -eq 430001 ]
+	# a row without a pose has no tilt
+	awk -F, 'NR > 1 && $4 == "nan" { n++; if ($24 != "nan") bad = 1 } END { exit bad || !n }' b.csv
 	# at the same time the same pose, and a force that is less uncertain
 	join -t, <(tail -n +2 a.csv | cut -d, -f3-16 | sort) <(tail -n +2 b.csv |
 		cut -d, -f3-16 | sort) | awk -F, '

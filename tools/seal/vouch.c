@@ -444,8 +444,8 @@ void vouch_print(const struct vouch *vouch, const struct trust *trust)
 	if (vouch->n_lines && !trust->signers.path)
 		printf("%s: %d signature%s and %d time-stamp%s, not checked: give "
 		       "--signers FILE\n",
-		       vouch->recording, kinds[0], kinds[0] == 1 ? "" : "s", kinds[1],
-		       kinds[1] == 1 ? "" : "s");
+		       vouch->recording, kinds[0], cli_s(kinds[0]), kinds[1],
+		       cli_s(kinds[1]));
 }
 
 static json_t *text_or_null(const char *text)

@@ -94,12 +94,13 @@ static const char *name_of(const struct dataset *data, const struct row *row)
 
 static void show_text(const struct dataset *data)
 {
-	int outliers = 0;
+	int outliers = 0, n = incise_corpus_sources(data->corpus);
 
-	printf("%d sources, %llu rows", incise_corpus_sources(data->corpus),
+	printf("%d source%s, %llu rows", n, cli_s(n),
 	       (unsigned long long)incise_corpus_side(data->corpus, false)->rows);
 	if (data->options->group)
-		printf(", %d groups by %s", data->n, data->options->group);
+		printf(", %d group%s by %s", data->n, cli_s(data->n),
+		       data->options->group);
 	if (data->left_out)
 		printf("; the blade did not advance in %llu more",
 		       (unsigned long long)data->left_out);
@@ -107,7 +108,7 @@ static void show_text(const struct dataset *data)
 	for (int c = 0; c < data->options->n_columns; c++)
 		printf("%s: %g to %g\n", data->options->columns[c], data->min[c],
 		       data->max[c]);
-	for (int s = 0; s < incise_corpus_sources(data->corpus); s++) {
+	for (int s = 0; s < n; s++) {
 		const struct incise_corpus_survey *survey =
 			incise_corpus_source(data->corpus, s);
 
