@@ -831,6 +831,9 @@ static void join_job(struct options *options)
 		cli_fail_with(&err);
 	job = options->ranks;
 	atexit(leave_job);
+	if (job->size == 1)
+		cli_warn("--mpi: a single process; start several by 'mpirun -n N incise "
+			 "train …'");
 	if (job->rank &&
 	    (!freopen("/dev/null", "w", stdout) || !freopen("/dev/null", "w", stderr)))
 		cli_fail("no /dev/null");
