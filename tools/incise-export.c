@@ -244,8 +244,7 @@ int main(int argc, char **argv)
 		       (unsigned long long)report.rows);
 	else if (strcmp(job.output, "-"))
 		printf("wrote %s: %llu rows from %d cut%s\n", job.output,
-		       (unsigned long long)report.rows, report.cuts,
-		       cli_s(report.cuts));
+		       (unsigned long long)report.rows, report.cuts, cli_s(report.cuts));
 	cli_finish();
 	return 0;
 }

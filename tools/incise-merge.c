@@ -128,8 +128,8 @@ static void print_report(const struct options *options,
 		json_print(object);
 		return;
 	}
-	printf("%d factor%s: %llu pairs of %llu group%s from %d source%s\n",
-	       options->n, cli_s(options->n), (unsigned long long)info->rows,
+	printf("%d factor%s: %llu pairs of %llu group%s from %d source%s\n", options->n,
+	       cli_s(options->n), (unsigned long long)info->rows,
 	       (unsigned long long)info->groups, cli_s(info->groups), info->n_sources,
 	       cli_s(info->n_sources));
 	if (info->parts < INCISE_FACTOR_FOLDS)

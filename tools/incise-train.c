@@ -775,9 +775,9 @@ static void report_text(const struct result *result)
 	printf("\n%d rules, %d parameters, %d epoch%s (kept %d), ",
 	       incise_model_info(model)->n_rules, report->parameters, report->epochs,
 	       cli_s(report->epochs), report->best_epoch);
-	report->averaged ? printf("average of %d fit%s", report->averaged,
-				  cli_s(report->averaged))
-			 : printf("ridge %g", report->ridge);
+	report->averaged
+		? printf("average of %d fit%s", report->averaged, cli_s(report->averaged))
+		: printf("ridge %g", report->ridge);
 	printf(", condition %.2g\n", report->condition);
 	printf("  %-22s%12s%14s\n", "RMSE", "training", check ? unseen : "");
 	print_row("this model", report->train_rmse, report->check_rmse);

@@ -66,8 +66,10 @@ static int split_row(struct reader *in, char *c)
 		int rc;
 
 		if (in->n_fields == FIELDS_MAX)
-			return incise_lines_error(&in->lines, E2BIG,
-						  "more than %d columns, or lines that do not end in LF", FIELDS_MAX);
+			return incise_lines_error(
+				&in->lines, E2BIG,
+				"more than %d columns, or lines that do not end in LF",
+				FIELDS_MAX);
 		in->field[in->n_fields] = c;
 		rc = field_end(in, &c);
 		if (rc)

@@ -364,8 +364,9 @@ static int open_recording(struct source *source, struct incise_error *err)
 /* Its name, and the origins that the file carries, as many as fit. */
 static int name_file(struct source *source, struct incise_error *err)
 {
-	size_t at = (size_t)snprintf(source->text, sizeof(source->text), "%.300s",
-				     source->pipe.file ? "a pipe" : name_of(source->path));
+	size_t at =
+		(size_t)snprintf(source->text, sizeof(source->text), "%.300s",
+				 source->pipe.file ? "a pipe" : name_of(source->path));
 	struct origins origins = {0};
 	char text[INCISE_ORIGIN_TEXT];
 	int rc = origins_read(&origins, file_of(source), err);

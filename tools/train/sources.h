@@ -35,8 +35,8 @@ struct source {
 	char rig[256], calibration[512]; /* the latter: the same where it is the same */
 	uint64_t left_out;		 /* rows in the last reading */
 	char *state;			 /* before it was first read; NULL: not yet */
-	struct memory_file pipe; /* of a source that can be read once only */
-	incise_row_taker take;	 /* of the present reading, and the rows it took */
+	struct memory_file pipe;	 /* of a source that can be read once only */
+	incise_row_taker take; /* of the present reading, and the rows it took */
 	void *taker;
 	uint64_t taken;
 };

@@ -333,10 +333,8 @@ TEST(silent_camera, WITH_MODULES)
 		bool ended;
 		uint64_t lost;
 	} cases[] = {
-		{10, 28, 0, false, 18},
-		{10, 32, 2, false, 22},
-		{10, UINT64_MAX, 1, true, 0},
-		{0, UINT64_MAX, 1, true, 0},
+		{10, 28, 0, false, 18},	       {10, 32, 2, false, 22},
+		{10, UINT64_MAX, 1, true, 0},  {0, UINT64_MAX, 1, true, 0},
 		{40, UINT64_MAX, 0, false, 0}, /* 1 s before the end */
 		{0, 12, 0, false, 11},	       /* begins late */
 	};
