@@ -92,6 +92,16 @@ static const char *name_of(const struct dataset *data, const struct row *row)
 							 : row->source->text;
 }
 
+/* Without its origins, which incise provenance prints. */
+static void print_source(const char *text)
+{
+	const char *at = strstr(text, ", incise:"), *end = at ? at + 1 : text, *next;
+
+	while (at && !strncmp(end + 1, "incise:", 7) && (next = strchr(end, ';')))
+		end = next + 1;
+	printf("  %.*s%s\n", at ? (int)(at - text) : 0, text, end);
+}
+
 static void show_text(const struct dataset *data)
 {
 	int outliers = 0, n = incise_corpus_sources(data->corpus);
@@ -116,7 +126,7 @@ static void show_text(const struct dataset *data)
 		       (unsigned long long)survey->rows);
 		if (data->options->group)
 			printf(" %4d groups", survey->n_groups);
-		printf("  %s\n", survey->text);
+		print_source(survey->text);
 	}
 	for (int i = 0; i < data->n && data->options->group; i++) {
 		const struct row *row = &data->rows[i];
