@@ -3,7 +3,7 @@
 #
 #   O=DIR          build there instead of build/
 #   prefix, DESTDIR, bindir, libdir, includedir, mandir …   as usual
-#   CFLAGS, LDFLAGS, CPPFLAGS   yours; the project's own flags are kept apart
+#   CFLAGS, CXXFLAGS, LDFLAGS, CPPFLAGS   yours; the project's own flags are kept apart
 #   V=1            show whole commands
 #   DEPS=no        let `make demo` and `make check` install no packages
 
@@ -43,6 +43,7 @@ runpath = $(if $(filter-out no,$(rpath)),-Wl$(comma)-rpath$(comma)'$$ORIGIN$1')
 comma := ,
 
 CFLAGS ?= -O2 -g
+CXXFLAGS ?= $(CFLAGS)
 # Objects come from ccache where it is installed; CCACHE= turns it off.
 CCACHE ?= $(shell command -v ccache 2>/dev/null)
 PKG_CONFIG ?= pkg-config

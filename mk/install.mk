@@ -120,12 +120,15 @@ uninstall: ## remove what install recorded as installed
 
 dist: ## a tarball of the committed tree
 	@mkdir -p $(O)
+	@git rev-parse -q --verify HEAD >/dev/null 2>&1 || \
+		{ echo "make dist: packs what git has committed, and this is no clone of it" >&2; exit 1; }
 	git archive --prefix=incise-$(version)/ -o $(O)/incise-$(version).tar.gz HEAD
 	@echo $(O)/incise-$(version).tar.gz
 
 wheel: ## a wheel of incise for Python, in build/wheel; it loads the system's libraries
 	@mk/deps wheel
-	@rm -rf $(O)/wheel && mkdir -p $(O)/wheel && cp -r python $(O)/wheel/source
+	@rm -rf $(O)/wheel && mkdir -p $(O)/wheel && cp -r python $(O)/wheel/source && \
+		cp LICENSES/LGPL-2.1-or-later.txt $(O)/wheel/source/COPYING
 	cd $(O)/wheel/source && /usr/bin/python3 -m build --wheel --no-isolation -o .. >../log 2>&1 || \
 		{ tail -20 ../log; exit 1; }
 	@rm -r $(O)/wheel/source; echo $(O)/wheel/*.whl

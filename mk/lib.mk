@@ -13,7 +13,7 @@ $(O)/obj/%.o: %.c
 $(O)/obj/%.o: %.cc
 	@mkdir -p $(@D)
 	$(call step,CXX)
-	$(Q)$(CCACHE) $(CXX) $(cppflags) $(CPPFLAGS) $(cxxflags) $(pc_cflags) $(CFLAGS) -MMD -MP -c -o $@ $<
+	$(Q)$(CCACHE) $(CXX) $(cppflags) $(CPPFLAGS) $(cxxflags) $(pc_cflags) $(CXXFLAGS) -MMD -MP -c -o $@ $<
 
 # The integer core builds without any library and, where the compiler can be told so,
 # without floating-point registers: it will be linked into a kernel.

@@ -289,14 +289,14 @@ static struct cut_text cut_text(const struct session_cut *cut)
 
 static void print_lines(const struct assessed *a, const struct assessed *reference)
 {
-	printf("\n%-31s %8s %-3s %-12s %-4s", "", "value", "", "asked", "met");
-	printf(reference ? " %10s %10s\n" : "\n", "reference", "difference");
+	printf("\n%-34s %8s %-3s %-12s met", "", "value", "", "asked");
+	printf(reference ? "  %10s %10s\n" : "\n", "reference", "difference");
 	for (int i = 0; i < LINES; i++) {
 		struct line line = line_of(a, reference, i);
 
-		printf("%-31s %8s %-3s %-12s %-4s", line.label, line.value, line.unit,
+		printf("%-34s %8s %-3s %-12s %-3s", line.label, line.value, line.unit,
 		       line.asked, line.met);
-		printf(reference ? " %10s %10s\n" : "\n", line.reference,
+		printf(reference ? "  %10s %10s\n" : "\n", line.reference,
 		       line.difference);
 	}
 }

@@ -136,8 +136,7 @@ static const struct bench *bench_of(int argc, char **argv)
 			continue;
 		if (argc - 1 > bench->n_operands)
 			cli_usage("'%s' takes at most %d operand%s, got %d", bench->name,
-				  bench->n_operands, bench->n_operands == 1 ? "" : "s",
-				  argc - 1);
+				  bench->n_operands, cli_s(bench->n_operands), argc - 1);
 		return bench;
 	}
 	if (!strcmp(argv[0], "view") || !strcmp(argv[0], "all"))

@@ -162,7 +162,7 @@ static void check_module(struct doctor *doctor)
 		    "incise_stepper is not loaded; the rig has no stepper \"kernel:…\"");
 	else
 		add(doctor, "kernel", "module", WARNING,
-		    "sudo modprobe incise_stepper    # after 'make module_install'",
+		    "sudo modprobe incise_stepper    # of the package incise-dkms, or make module_install",
 		    "incise_stepper is not loaded (Linux %s); a rig needs it for a "
 		    "stepper \"kernel:…\"",
 		    kernel.release);

@@ -17,7 +17,7 @@
 
 struct job {
 	const char *output;
-	bool json, damaged;
+	bool json, damaged, no_lineage;
 	int min_count; /* 0: not given */
 	int percent;   /* of the bar */
 	enum { PLAIN, ROS2 } profile;
@@ -94,8 +94,8 @@ static const struct cli_option options[] = {
 	 "columns of standard uncertainties: none (default), total, or parts, "
 	 "which are the total and what it is made of",
 	 CLI_CHOICE(struct job, uncertainty, uncertainties)},
-	{0, "lineage", NULL, "begin a CSV with comments on its provenance",
-	 CLI_FLAG(struct job, how.provenance)},
+	{0, "no-lineage", NULL, "write a CSV without the comments on its provenance",
+	 CLI_FLAG(struct job, no_lineage)},
 	RECORDING_DAMAGED(struct job, damaged),
 	{0, "json", NULL, "report as one JSON object; needs -o FILE",
 	 CLI_FLAG(struct job, json)},
@@ -210,6 +210,7 @@ static void parse(struct job *job, int argc, char **argv)
 	if (job->profile == ROS2 && job->uncertainty)
 		cli_usage("--uncertainty does not go with --profile ros2, whose messages "
 			  "have no place for it");
+	how->provenance = !job->no_lineage;
 	how->ros2 = job->profile == ROS2;
 	how->uncertainty = (enum incise_export_uncertainty)job->uncertainty;
 	if (job->min_count)
@@ -239,8 +240,7 @@ int main(int argc, char **argv)
 		       (unsigned long long)report.rows);
 	else if (strcmp(job.output, "-"))
 		printf("wrote %s: %llu rows from %d cut%s\n", job.output,
-		       (unsigned long long)report.rows, report.cuts,
-		       report.cuts == 1 ? "" : "s");
+		       (unsigned long long)report.rows, report.cuts, cli_s(report.cuts));
 	cli_finish();
 	return 0;
 }

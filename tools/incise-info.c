@@ -687,7 +687,7 @@ static void devices_json(const char *kind, const char *bus, const struct found *
 
 static void devices_text(const char *what, const struct found *found)
 {
-	printf("%s: %d device%s\n", what, found->n, found->n == 1 ? "" : "s");
+	printf("%s: %d device%s\n", what, found->n, cli_s(found->n));
 	for (int i = 0; i < found->n; i++)
 		put_device(&found->answer[i]);
 }

@@ -194,6 +194,25 @@ static bool rest_force(const struct job *job, const struct incise_plan_stability
 	       model_force_at(job->loaded, s->worst.depth_mm, s->worst.along_mm_s, force);
 }
 
+static json_t *surface_json(const struct incise_plan *plan)
+{
+	const struct incise_surface *surface = incise_plan_surface(plan);
+	struct incise_surface_size s;
+	double mm[3];
+
+	if (!incise_surface_size(surface, &s))
+		return json_null();
+	for (int i = 0; i < 3; i++)
+		mm[i] = s.hi_mm[i] - s.lo_mm[i];
+	return json_pack("{sI so sI so so}", "triangles",
+			 (json_int_t)incise_surface_triangles(surface), "size_mm",
+			 json_numbers(mm, 3), "open_edges", (json_int_t)s.open_edges,
+			 "open_from_mm",
+			 s.open_edges ? json_numbers(s.open_lo_mm, 3) : json_null(),
+			 "open_to_mm",
+			 s.open_edges ? json_numbers(s.open_hi_mm, 3) : json_null());
+}
+
 static void report_json(const struct job *job, const struct incise_plan *plan,
 			struct incise_rig *rig, const struct tick_cost *cost)
 {
@@ -228,6 +247,7 @@ static void report_json(const struct job *job, const struct incise_plan *plan,
 		job->rig ? json_pack("[ss]", "force", "camera")
 			 : json_pack("[ssss]", "tracker", "stepper", "force", "camera"),
 		"libraries", mapped, "unmapped_libraries", unmapped_libraries(mapped));
+	json_object_set_new(object, "surface", surface_json(plan));
 	json_object_update_new(object, stability_json(&stability));
 	json_object_set_new(object, "rest",
 			    model_force_json(rest_force(job, &stability, &force) ? &force
@@ -344,10 +364,10 @@ static void print_axes(struct incise_rig *rig, const struct incise_plan_stabilit
 }
 
 static void report_text(const struct job *job, const struct incise_plan *plan,
-			struct incise_rig *rig, const struct tick_cost *cost)
+			struct incise_rig *rig, const struct tick_cost *cost,
+			const char *size)
 {
 	json_t *mapped = mapped_libraries(0), *absent = unmapped_libraries(mapped);
-	char *size = scene_argument_size(job->scene.path, incise_plan_surface(plan));
 	const char *name, *why;
 	double bound_N = incise_plan_bound(plan, REACH_MM);
 	struct incise_plan_stability stability;
@@ -372,12 +392,6 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 	putchar('\n');
 	if (*size)
 		printf("surface     %s\n", size);
-	if (strstr(size, "open edges"))
-		cli_warn(
-			"%s: its surface is open: a contact ends at the border, which is "
-			"not passive; close it, or keep cuts away from there",
-			job->scene.path);
-	free(size);
 	printf("devices     %s; not touched: %s\n",
 	       job->rig ? "tracker, stepper" : "none without --rig",
 	       job->rig ? "force, camera" : "tracker, stepper, force, camera");
@@ -419,6 +433,7 @@ int main(int argc, char **argv)
 	struct incise_plan *plan;
 	struct tick_cost cost;
 	struct job job = {0};
+	char *size;
 
 	cli_parse(&command, argc, argv, &job);
 	scene_argument_operand(&job.scene, argc, argv, optind);
@@ -433,10 +448,17 @@ int main(int argc, char **argv)
 	cli_progress("%s: timing %d s of ticks", job.scene.path, MEASURED_S);
 	tick_cost(scene, rig ? &tracker : NULL, 0, MEASURED_S, &cost);
 	cli_progress_end();
+	size = scene_argument_size(job.scene.path, incise_plan_surface(plan));
 	if (job.json)
 		report_json(&job, plan, rig, &cost);
 	else
-		report_text(&job, plan, rig, &cost);
+		report_text(&job, plan, rig, &cost, size);
+	if (strstr(size, "open edges"))
+		cli_warn(
+			"%s: its surface is open: a contact ends at the border, which is "
+			"not passive; close it, or keep cuts away from there",
+			job.scene.path);
+	free(size);
 	cli_finish();
 	incise_plan_free(plan);
 	incise_rig_close(rig);

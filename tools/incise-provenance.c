@@ -290,8 +290,8 @@ _Noreturn static void fail_without(const char *path)
 	case FILE_DEVIATION:
 		cli_fail("%s: a .sd file belongs to its model; give that", path);
 	case FILE_TABLE:
-		cli_fail("%s: says nothing of its origin; 'incise export --lineage' "
-			 "writes it into a CSV",
+		cli_fail("%s: says nothing of its origin; 'incise export' without "
+			 "--no-lineage writes it into a CSV",
 			 path);
 	default:
 		cli_fail("%s: says nothing of its origin: another program or an older "
@@ -346,8 +346,8 @@ int main(int argc, char **argv)
 		cli_fail("%s: a file here differs from the one that it was made of",
 			 path);
 	if (!recorded)
-		cli_fail("%s: its way back ends before a recording; 'incise export "
-			 "--lineage' writes the origin into a CSV",
+		cli_fail("%s: its way back ends before a recording; 'incise export' "
+			 "without --no-lineage writes the origin into a CSV",
 			 path);
 	return 0;
 }

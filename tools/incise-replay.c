@@ -240,9 +240,9 @@ static void report_text(const struct job *job, double rate_hz,
 			const struct incise_loop_stats *stats,
 			const struct incise_replay_report *r)
 {
-	printf("%s: %.1f s, %llu ticks at %g Hz, %llu poses, %d cuts\n", job->recording,
+	printf("%s: %.1f s, %llu ticks at %g Hz, %llu poses, %d cut%s\n", job->recording,
 	       r->seconds, (unsigned long long)stats->ticks, rate_hz,
-	       (unsigned long long)r->poses, r->cuts);
+	       (unsigned long long)r->poses, r->cuts, cli_s(r->cuts));
 	if (r->compared) {
 		printf("predicted  error %.4f N rms", r->rms_N);
 		if (!isnan(relative(r)))

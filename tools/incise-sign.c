@@ -211,11 +211,6 @@ int main(int argc, char **argv)
 	struct members members;
 
 	members_find(&members, path);
-	if (members.n > 1 && job.timestamp && !timestamp_is_server(job.timestamp))
-		cli_fail(
-			"%s: a joined recording, and a file is a time-stamp of one; give "
-			"a member, such as %s",
-			path, members.path[0]);
 	for (int i = 0; i < members.n; i++) {
 		struct seal seal;
 
@@ -223,7 +218,9 @@ int main(int argc, char **argv)
 			cli_fail_with(&err);
 		if (job.key)
 			sign(&job, &seal, i < members.n - 1);
-		if (job.timestamp)
+		/* A file is one time-stamp: of the join, whose statement names the members'. */
+		if (job.timestamp &&
+		    (i == members.n - 1 || timestamp_is_server(job.timestamp)))
 			stamp(&job, &seal);
 		seal_close(&seal);
 	}

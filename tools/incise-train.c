@@ -604,6 +604,11 @@ static json_t *warnings(const struct result *result)
 	double rounding = 1e-13 * fmax(fabs(out->min), fabs(out->max));
 	json_t *list = json_array();
 
+	if (options->given_group && result->fit->n_groups == 1 && !result->check)
+		warn(list,
+		     "--group %s: all pairs are of one group, so none is held out whole; "
+		     "give another column, or none",
+		     options->group);
 	if (result->repeated > REPEATED * (double)result->rows)
 		warn(list,
 		     "%llu of %llu rows repeat another row, and count once as pairs",
@@ -738,18 +743,21 @@ static void report_text(const struct result *result)
 	const struct incise_train_report *report = &result->report;
 	const struct incise_baselines *baselines = &result->baselines;
 	const struct interval *interval = &result->interval;
+	bool cuts = options->group && !strcmp(options->group, "cut");
+	const char *group = cuts ? "cut" : "group";
 	const char *unseen = options->train.classic ? "check"
-			     : options->group	    ? "unseen cuts"
+			     : cuts		    ? "unseen cuts"
+			     : options->group	    ? "unseen groups"
 						    : "unseen pairs";
 	char knn[40];
 
 	printf("%s: %llu pairs to train", options->data, (unsigned long long)fit->rows);
 	if (options->group)
-		printf(" (%d cuts)", fit->n_groups);
+		printf(" (%d %s%s)", fit->n_groups, group, cli_s(fit->n_groups));
 	if (check)
 		printf(", %llu to check", (unsigned long long)check->rows);
 	if (check && options->group)
-		printf(" (%d cuts)", check->n_groups);
+		printf(" (%d %s%s)", check->n_groups, group, cli_s(check->n_groups));
 	if (result->left_out)
 		printf("\nleft out %llu of %llu rows: the blade did not advance",
 		       (unsigned long long)result->left_out,
@@ -758,11 +766,12 @@ static void report_text(const struct result *result)
 	if (options->group && !options->given_group)
 		printf("\ngrouped by %s, as no --group is given (none: each pair by itself)",
 		       options->group);
-	printf("\n%d rules, %d parameters, %d epochs (kept %d), ",
+	printf("\n%d rules, %d parameters, %d epoch%s (kept %d), ",
 	       incise_model_info(model)->n_rules, report->parameters, report->epochs,
-	       report->best_epoch);
-	report->averaged ? printf("average of %d fits", report->averaged)
-			 : printf("ridge %g", report->ridge);
+	       cli_s(report->epochs), report->best_epoch);
+	report->averaged
+		? printf("average of %d fit%s", report->averaged, cli_s(report->averaged))
+		: printf("ridge %g", report->ridge);
 	printf(", condition %.2g\n", report->condition);
 	printf("  %-22s%12s%14s\n", "RMSE", "training", check ? unseen : "");
 	print_row("this model", report->train_rmse, report->check_rmse);
@@ -816,6 +825,9 @@ static void join_job(struct options *options)
 		cli_fail_with(&err);
 	job = options->ranks;
 	atexit(leave_job);
+	if (job->size == 1)
+		cli_warn("--mpi: a single process; start several by 'mpirun -n N incise "
+			 "train …'");
 	if (job->rank &&
 	    (!freopen("/dev/null", "w", stdout) || !freopen("/dev/null", "w", stderr)))
 		cli_fail("no /dev/null");

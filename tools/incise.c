@@ -101,6 +101,12 @@ static bool on_path(const char *name)
 	return found;
 }
 
+/* What other programs call it. */
+static const char *const synonyms[][2] = {
+	{"record", "capture"}, {"learn", "train"},    {"run", "haptic"},
+	{"show", "view"},      {"convert", "export"}, {"check", "verify"},
+};
+
 /* One line on stderr about a word that is no command, with the nearest one: 2. */
 static int unknown_command(const char *word)
 {
@@ -109,6 +115,9 @@ static int unknown_command(const char *word)
 	for (size_t i = 0; i < COMMANDS; i++)
 		names[i + 1] = commands[i].name;
 	nearest = incise_nearest_name(word, names);
+	for (size_t i = 0; i < sizeof(synonyms) / sizeof(*synonyms); i++)
+		if (!strcmp(word, synonyms[i][0]))
+			nearest = synonyms[i][1];
 	if (nearest)
 		cli_error("'%.64s': no such command; did you mean 'incise %s'?", word,
 			  nearest);

@@ -48,7 +48,7 @@ static int field_end(struct reader *in, char **c)
 	}
 	if (*from != '"')
 		return incise_lines_error(&in->lines, EINVAL,
-					  "field %d: a quote is not closed",
+					  "field %d: a quote is not closed in its line",
 					  in->n_fields + 1);
 	*to = 0;
 	*c = from + 1;
@@ -66,8 +66,10 @@ static int split_row(struct reader *in, char *c)
 		int rc;
 
 		if (in->n_fields == FIELDS_MAX)
-			return incise_lines_error(&in->lines, E2BIG,
-						  "more than %d columns", FIELDS_MAX);
+			return incise_lines_error(
+				&in->lines, E2BIG,
+				"more than %d columns, or lines that do not end in LF",
+				FIELDS_MAX);
 		in->field[in->n_fields] = c;
 		rc = field_end(in, &c);
 		if (rc)
@@ -122,6 +124,10 @@ static int find_column(struct reader *in, const char *name)
 	for (int i = 0; i < in->n_fields; i++)
 		names[i] = in->field[i];
 	nearest = incise_nearest_name(name, names);
+	/* "depth_mm [mm]" */
+	for (int i = 0; i < in->n_fields && !nearest; i++)
+		if (!strncmp(in->field[i], name, strlen(name)))
+			nearest = in->field[i];
 	for (int i = 0; i < in->n_fields && used < sizeof(list); i++)
 		used += snprintf(list + used, sizeof(list) - used, "%s%s", i ? ", " : "",
 				 in->field[i]);

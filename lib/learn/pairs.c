@@ -257,9 +257,9 @@ int incise_split_units(uint64_t *count, size_t n_units, double share, uint64_t s
 	if (n_units < 2)
 		return incise_error_set(
 			err, EINVAL,
-			"%zu %s: at least two are required to hold out some for "
-			"checking",
-			n_units, what);
+			"too few %s (%zu): at least two are required to hold out "
+			"some for checking",
+			what, n_units);
 	order = malloc(n_units * sizeof(*order));
 	if (!order)
 		return incise_error_set(err, ENOMEM, "no memory to split %zu %s", n_units,

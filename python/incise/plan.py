@@ -227,6 +227,9 @@ def _scene_folders() -> List[str]:
     source = os.path.join(here, "..", "..")
     if os.path.exists(os.path.join(source, "lib", "libincise.map")):
         folders.append(os.path.normpath(os.path.join(source, "scenes")))
+    if os.environ.get("INCISE_LIBDIR"):
+        beside = os.path.join(os.environ["INCISE_LIBDIR"], "..", "share", "incise", "scenes")
+        folders.append(os.path.normpath(beside))
     for prefix in ("/usr/local", "/usr"):
         folders.append(os.path.join(prefix, "share", "incise", "scenes"))
     try:

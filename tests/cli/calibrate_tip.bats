@@ -117,7 +117,7 @@ within() {
 	# after both, depth and time have theirs; nothing leads back to a calibration that is there
 	run -0 --separate-stderr incise capture -o a.rec --rig sim:clock=simulated --duration 25s
 	[[ "$output" != *warning* ]] || complain "$output"
-	run -0 --separate-stderr incise export a.rec --uncertainty total --rate 100 -o a.csv
+	run -0 --separate-stderr incise export --no-lineage a.rec --uncertainty total --rate 100 -o a.csv
 	[[ "$stderr" != *depth* && "$stderr" != *delay* ]] || complain "$stderr"
 	# typed, left out, ended by Ctrl-C, which writes nothing
 	incise calibrate tip --rig sim:clock=simulated,motion=1 --duration 20s --keep p.csv -c x.conf </dev/null

@@ -87,6 +87,8 @@ setup() {
 		[ "${#stderr_lines[@]}" -eq 1 ]
 		[[ "$stderr" == *"incise --help"* || "$stderr" == *"did you mean"* ]]
 	done
+	run -2 --separate-stderr incise record
+	[[ "$stderr" == *"did you mean 'incise capture'?" ]]
 }
 
 # bats test_tags=check

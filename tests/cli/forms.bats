@@ -52,8 +52,8 @@ setup() {
 	for form in 1 2 3 4; do
 		incise info --json $form.rec >info.json
 		[ "$(key info.json rows.force) $(key info.json rows.tracker)" = "180 54" ]
-		incise export $form.rec -o $form.csv
-		incise export $form.rec -o all.csv --resample --rate 50 --overwrite
+		incise export --no-lineage $form.rec -o $form.csv
+		incise export --no-lineage $form.rec -o all.csv --resample --rate 50 --overwrite
 		incise export $form.rec -o $form.mcap
 	done
 	# The virtual rig of form 1 was another one.

@@ -240,7 +240,7 @@ beside_the_model() {
 
 @test "haptic: a column of training is an input of the loop" {
 	incise capture -o d.rec --rig sim:clock=simulated,cut_s=2,pause_s=0.5
-	incise export d.rec --rate 100 -o d.csv
+	incise export --no-lineage d.rec --rate 100 -o d.csv
 	incise train d.csv --inputs depth_mm,velocity_mm_s,acceleration_mm_s2 --mf 3,2,1 -o d.fis
 	printf 'model = "d.fis"; arithmetic = "double"; tissue = { gain = 0.5; };\n' >d.scene
 	incise haptic d.scene --rig $quick --duration 3s --log l.csv --json >r.json

@@ -58,11 +58,11 @@ sum() {
 	# a folder that is moved as a whole
 	mkdir other && mv day.rec other/
 	ln -s day.rec "other/10:30.rec"
-	incise export other/10:30.rec:a --rate 10 -o named.csv
-	incise export other/day.rec:a --resample | cut -d, -f2- >by_session.csv
-	incise export a.rec --resample | cut -d, -f2- >alone.csv
+	incise export --no-lineage other/10:30.rec:a --rate 10 -o named.csv
+	incise export --no-lineage other/day.rec:a --resample | cut -d, -f2- >by_session.csv
+	incise export --no-lineage a.rec --resample | cut -d, -f2- >alone.csv
 	cmp by_session.csv alone.csv
-	incise export other/day.rec:force=a,tracker=b --resample --rate 100 -o mixed.csv
+	incise export --no-lineage other/day.rec:force=a,tracker=b --resample --rate 100 -o mixed.csv
 	# there is a pose where both machines recorded, 2 s of it
 	poses=$(tail -n +2 mixed.csv | grep -cv nan)
 	[ "$poses" -ge 195 ] && [ "$poses" -le 201 ]
@@ -77,7 +77,7 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 
 @test "provenance and events are those of the machines that are read" {
 	incise join a.rec b.rec -o day.rec >/dev/null
-	incise export day.rec:b --rate 10 --lineage | grep -qx '# rig: .*seed=2'
+	incise export day.rec:b --rate 10 | grep -qx '# rig: .*seed=2'
 	incise info day.rec:a --json >a.json
 	incise info day.rec:b --json >b.json
 	[[ "$(key a.json rig)" == *,seed=1 && "$(key b.json rig)" == *,seed=2 ]]
@@ -209,8 +209,8 @@ assert incise.open("other/day.rec:b").info.tracker == incise.open("b.rec").info.
 	# without an overlap no cut has a force, whatever the depth
 	run -1 --separate-stderr incise export day.rec:force=late,tracker=a -o none.csv
 	[[ "$stderr" == *": no cut: no force was recorded while the blade was deeper than 0.3 mm (deepest "* ]]
-	incise export day.rec:late --resample --rate 100 --tai -o joined.csv
-	incise export late.rec --resample --rate 100 --tai -o alone.csv
+	incise export --no-lineage day.rec:late --resample --rate 100 --tai -o joined.csv
+	incise export --no-lineage late.rec --resample --rate 100 --tai -o alone.csv
 	tai() { awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) if ($i == "tai_ns") c = i }
 		NR == 2 { print $c, $(c + 1) }' "$1"; }
 	read -r joined bound <<<"$(tai joined.csv)"
@@ -266,7 +266,7 @@ without_u() {
 	[[ "$stderr" == *"tracker.rec: has no force channel, "*"give --rate HZ"* ]]
 	run -1 --separate-stderr incise info --dataset force.rec
 	[[ "$stderr" == "incise info: force.rec: no cut: without a pose there is no depth; "* ]]
-	incise export tracker.rec --resample --rate 100 -o poses.csv
+	incise export --no-lineage tracker.rec --resample --rate 100 -o poses.csv
 	[ "$(tail -n +2 poses.csv | cut -d, -f17 | sort -u)" = nan ]
 	[ "$(tail -n +2 poses.csv | grep -vc ',nan,nan,nan,0,0,nan')" -gt 790 ]
 	for profile in ros2 plain; do
@@ -278,8 +278,8 @@ without_u() {
 	done
 	# the stream of each is that of the only machine that has it
 	incise join force.rec tracker.rec -o day.rec --within 0.1ms >/dev/null
-	incise export day.rec --resample --rate 100 -o day.csv
-	incise export both.rec --resample --rate 100 -o both.csv
+	incise export --no-lineage day.rec --resample --rate 100 -o day.csv
+	incise export --no-lineage both.rec --resample --rate 100 -o both.csv
 	cmp <(without_u day.csv) <(without_u both.csv)
 	[ "$(wc -l <day.csv)" -eq 801 ]
 	# and the loop runs on it: the same force to the bit on the clock of the tracker
@@ -291,8 +291,8 @@ without_u() {
 	diff alone joined
 	run -1 --separate-stderr incise replay force.rec liver.scene
 	[[ "$stderr" == "incise replay: force.rec: no pose to replay: it has no row of a tracker; join it "* ]]
-	incise export day.rec -a 6x5 -o pairs.csv
-	incise export both.rec -a 6x5 -o both_pairs.csv
+	incise export --no-lineage day.rec -a 6x5 -o pairs.csv
+	incise export --no-lineage both.rec -a 6x5 -o both_pairs.csv
 	cmp pairs.csv both_pairs.csv
 }
 

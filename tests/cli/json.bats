@@ -46,7 +46,7 @@ recordings() {
 	report verify.findings verify b.rec
 	ssh-keygen -q -t ed25519 -N "" -f key
 	report sign sign a.rec --key key
-	incise export a.rec --rate 10 --lineage -o lineage.csv
+	incise export a.rec --rate 10 -o lineage.csv
 	report provenance provenance lineage.csv
 	report sign.query sign a.rec --timestamp q.tsq
 	report verify.signed verify a.rec --signers <(echo "kim@lab $(cat key.pub)")
@@ -66,6 +66,9 @@ recordings() {
 
 loops() {
 	report plan plan liver.scene
+	printf 'v 0 0 0\nv 40 0 0\nv 0 40 0\nf 1 2 3\n' >open.obj
+	printf 'surface = { kind = "mesh"; file = "open.obj"; };\ntissue = { reaction_N_mm = 0.1; };\n' >open.scene
+	report plan.open plan open.scene
 	report plan.rig plan neck.scene --rig "$short"
 	report haptic haptic neck.scene --rig "$short" --duration 4s --session s.session
 	report haptic.real_time haptic liver.scene --rig sim: --no-rt --overruns 0 --duration 1s

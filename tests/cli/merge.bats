@@ -57,7 +57,7 @@ large_shares() {
 	failed_with same.csv "the same content as s1.csv"
 	[ ! -e m.fis ]
 	incise train s1.csv s2.csv s3.csv --group recording --check 0.3 -o m.fis >out
-	grep -q "(2 cuts), 1250 to check (1 cuts)" out
+	grep -q "(2 groups), 1250 to check (1 group)" out
 }
 
 # bats test_tags=check

@@ -327,7 +327,7 @@ full() {
 
 # bats test_tags=check
 @test "a full standard output fails each command with one line" {
-	incise export d.rec --rate 100 --lineage -o l.csv >/dev/null
+	incise export d.rec --rate 100 -o l.csv >/dev/null
 	while read -r command; do
 		# shellcheck disable=SC2086
 		run --separate-stderr timeout 60 bash -c 'incise "$@" >/dev/full' - $command </dev/null

@@ -148,7 +148,7 @@ train() {
 		  { key = "tip_z_mm"; left = -20.0; u = 0.04; } ); } );
 	END
 	incise capture -o r.rec -c c.conf --rig sim:clock=simulated,cut_s=2,pause_s=1,tip_x_mm=1,tip_z_mm=-20 --duration 14s >/dev/null
-	incise export r.rec --rate 25 --uncertainty parts -o r.csv >/dev/null
+	incise export --no-lineage r.rec --rate 25 --uncertainty parts -o r.csv >/dev/null
 	train r.rec --rate 25 --uncertainty parts -o rec.fis
 	train r.csv -o csv.fis
 	# the decimals of CSV: 5 of the force

@@ -6,7 +6,7 @@ load cli
 setup_file() {
 	cd "$BATS_FILE_TMPDIR"
 	"$INCISE_BUILD/bin/incise" capture -o "a b;.rec" --rig sim:clock=simulated,depth_mm=6,times=5,pause_s=0.5,cut_s=2 >/dev/null
-	"$INCISE_BUILD/bin/incise" export "a b;.rec" --average 6x6 --by-cut --min-count 5 --lineage -o p.csv >/dev/null
+	"$INCISE_BUILD/bin/incise" export "a b;.rec" --average 6x6 --by-cut --min-count 5 -o p.csv >/dev/null
 	"$INCISE_BUILD/bin/incise" train p.csv --mf 2,2 -o m.fis >/dev/null 2>&1
 }
 
@@ -50,8 +50,8 @@ setup() {
 	jq -e --arg head "$head" '.origins | length == 1 and .[0].sha256 == $head and .[0].state == "same"' <<<"$output"
 }
 
-@test "exports carry it: CSV with --lineage, HDF5, MCAP; and models of recordings, also merged ones" {
-	incise export "a b;.rec" --rate 100 --lineage -o e.csv
+@test "exports carry it: CSV, HDF5, MCAP; and models of recordings, also merged ones" {
+	incise export "a b;.rec" --rate 100 -o e.csv
 	incise export "a b;.rec" -o e.mcap
 	files="e.csv e.mcap"
 	if [ -e "$INCISE_BUILD/lib/incise/export_hdf5.so" ]; then
@@ -90,7 +90,7 @@ setup() {
 
 	run --separate-stderr incise provenance away
 	failed_with "away:"
-	printf 'depth_mm,velocity_mm_s,force_N\n1,2,3\n' >plain.csv
+	incise export "$made/a b;.rec" --average 6x6 --min-count 5 --no-lineage -o plain.csv >/dev/null
 	run --separate-stderr incise provenance plain.csv
 	failed_with "plain.csv:"
 	run --separate-stderr incise provenance m.fis.sd
@@ -107,13 +107,13 @@ setup() {
 # bats test_tags=check
 @test "a head that is the same does not hide rows that were changed, nor another calibration" {
 	cp -r "a b;.rec" here.rec
-	incise export here.rec --lineage -o then.csv >/dev/null
+	incise export here.rec -o then.csv >/dev/null
 	run -0 incise provenance then.csv
 	echo 'force_mV_N = 1111.0;' >c.conf
 	incise recalibrate here.rec -c c.conf >/dev/null
 	run -1 --separate-stderr incise provenance then.csv
 	[[ "$output" == *"here.rec: is read by another calibration now"* ]]
-	incise export here.rec --lineage -o now.csv >/dev/null
+	incise export here.rec -o now.csv >/dev/null
 	run -0 incise provenance now.csv
 	[[ "$output" == *"calibration 0001-"*".conf is this file"* ]]
 	incise recalibrate here.rec --original >/dev/null
@@ -121,7 +121,7 @@ setup() {
 	[ "$(jq -r '.origins[] | .state' <<<"$output" | paste -sd' ')" = "other same" ]
 	run -0 incise provenance then.csv
 	# one that was given for the export
-	incise export here.rec -c c.conf --lineage -o given.csv >/dev/null
+	incise export here.rec -c c.conf -o given.csv >/dev/null
 	run -0 incise provenance given.csv
 	[[ "$output" == *"calibration c.conf, SHA-256 "*": c.conf is this file"* ]]
 	echo 'force_mV_N = 1112.0;' >c.conf

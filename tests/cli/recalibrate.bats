@@ -29,7 +29,7 @@ setup() {
 
 # Rows without the name of the recording.
 rows_of() {
-	incise export "$1" --resample --rate 200 -o rows.csv --overwrite >/dev/null
+	incise export --no-lineage "$1" --resample --rate 200 -o rows.csv --overwrite >/dev/null
 	cut -d, -f2- rows.csv
 }
 
@@ -53,7 +53,7 @@ rows_of() {
 		END { exit bad || NR < 1000 }'
 	# another one, given for one export, is not mixed with the active one
 	sed 's/1200/1300/; /tip/d' new.conf >other.conf
-	incise export a.rec -c other.conf --rate 100 --lineage -o c.csv >/dev/null
+	incise export a.rec -c other.conf --rate 100 -o c.csv >/dev/null
 	grep -qx "# calibration: given for the export" c.csv
 	grep -qx "# force_mV_N: 1300" c.csv
 	# back, to the digit
@@ -86,7 +86,7 @@ rows_of() {
 	[ "$(key info.json 'calibrations[1].sha256')" = "$sha" ]
 	run -0 incise verify a.rec
 	[[ "$output" == *"a.rec: read by another calibration than that of the capture: calibration/0001-"* ]]
-	incise export a.rec --rate 50 --lineage -o a.csv >/dev/null
+	incise export a.rec --rate 50 -o a.csv >/dev/null
 	grep -q "^# calibration: recalibrated 20.* by calibration/0001-.*, SHA-256 $sha$" a.csv
 	incise train a.rec --rate 50 --mf 2,2 -o m.fis 2>/dev/null >&2
 	incise info m.fis | grep -q "1200 mV/N.* by calibration/0001-.*SHA-256 $sha"
@@ -113,9 +113,27 @@ rows_of() {
 	failed_with "a.rec/calibration/0001-" "force_mV_N" 'incise recalibrate a.rec --original'
 	incise verify a.rec >/dev/null # what was recorded is not damaged
 	incise recalibrate a.rec --original >/dev/null
-	incise export a.rec -o a.csv >/dev/null
+	incise export --no-lineage a.rec -o a.csv >/dev/null
 	# other names are no calibrations
 	touch a.rec/calibration/notes.txt a.rec/calibration/9999-today.conf
 	incise recalibrate a.rec -c new.conf >/dev/null
 	[ -e a.rec/calibration/0003-*.conf ]
+}
+
+@test "those that recalibrate at once all get a number, and a link leads nowhere" {
+	ids=()
+	for i in 1 2 3 4 5 6; do
+		echo "force_mV_N = 120$i.0;" >$i.conf
+		incise recalibrate a.rec -c $i.conf >/dev/null 3>&- &
+		ids+=($!)
+	done
+	for id in "${ids[@]}"; do
+		wait $id
+	done
+	[ "$(ls a.rec/calibration | cut -c1-4 | paste -sd' ')" = "0001 0002 0003 0004 0005 0006" ]
+	mkdir other
+	ln -s ../other b.rec/calibration
+	run --separate-stderr incise recalibrate b.rec -c new.conf
+	failed_with "b.rec/calibration: a link"
+	[ -z "$(ls other)" ]
 }

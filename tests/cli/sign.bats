@@ -389,6 +389,14 @@ join_signed() {
 	[[ "$output" == *"day.rec/a: signed by kim@lab "*"day.rec/b: signed by kim@lab "* ]]
 	[[ "$output" == *"day.rec: signed by kim@lab ("*"), the times of the join"* ]]
 	[[ "$(incise info day.rec)" == *"seal     a: commit "*", 1 signature, "*"seal     b: commit "*", 1 signature, "*"seal     the join, 1 signature, "* ]]
+	# a file is the time-stamp of the join
+	incise sign day.rec --timestamp q.tsq
+	stamp "$made/ca" q.tsq r.tsr
+	run -0 --separate-stderr incise sign day.rec --timestamp r.tsr
+	[[ "${lines[0]}" == "day.rec: time-stamped 20"* ]]
+	openssl ts -verify -in day.rec/seal/1.*Z.tsr -data day.rec/seal/1.statement -CAfile "$made/ca/ca.pem"
+	run -0 --separate-stderr incise verify day.rec --signers signers --ca "$made/ca/ca.pem"
+	[[ "$output" == *"day.rec: time-stamped 20"* ]]
 	# its members and its tables may not come from elsewhere, and it may have any name
 	mv day.rec moved.rec
 	incise verify moved.rec --signers signers

@@ -140,8 +140,8 @@ ask() {
 	[[ "$output" == *"$(ask "SELECT value FROM meta WHERE key = 'force_lost'") samples were lost during the capture; the rest is as it was written" ]]
 	# mV/N of an amplifier does not apply
 	echo "force_mV_N = 620.0; force_zero_mV = 99.0;" >calibration.conf
-	incise export a.rec --resample -o own.csv
-	incise export a.rec --resample --calibration calibration.conf -o other.csv
+	incise export --no-lineage a.rec --resample -o own.csv
+	incise export --no-lineage a.rec --resample --calibration calibration.conf -o other.csv
 	cmp <(grep -v '^#' own.csv) <(grep -v '^#' other.csv)
 	[[ "$(incise info a.rec)" == *"31 bits over 16384 N from -8192 N"* ]]
 	incise info a.rec --json >info.json

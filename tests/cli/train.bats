@@ -135,10 +135,13 @@ parameters() {
 	complain "no other seed gives another model"
 }
 
-@test "train reads standard input and writes standard output" {
-	incise train pairs.csv --group none --seed 2 -o a.fis 2>/dev/null
+@test "train reads standard input, grouped as the file is, and writes standard output" {
+	incise train pairs.csv --seed 2 -o a.fis 2>/dev/null
 	incise train - --seed 2 -o - <pairs.csv >b.fis 2>/dev/null
 	cmp <(parameters a.fis) <(parameters b.fis)
+	incise train <(cat pairs.csv) --mf 2,2 --starts 1 -o c.fis --overwrite | grep -q "^grouped by cut"
+	run --separate-stderr incise train - -o c.fis --overwrite < <(sed '5s/^/x,/' pairs.csv)
+	failed_with "standard input:5:"
 }
 
 @test "train writes the first model and the history" {
@@ -413,6 +416,10 @@ peak_kb() {
 	incise train pairs.csv --mf 2,2 --group cut -o n.fis >out 2>/dev/null
 	run ! grep -q "^grouped by" out
 	cmp m.fis n.fis
+	sed '1s/$/,day/; 2,$s/$/,1/' pairs.csv >day.csv
+	run -0 --separate-stderr incise train day.csv --mf 2,2 --group day -o n.fis --overwrite
+	[ "${lines[0]}" = "day.csv: 288 pairs to train (1 group)" ]
+	[[ "$stderr" == *"--group day: all pairs are of one group"* ]]
 	incise train pairs.csv --mf 2,2 --group none -o n.fis --overwrite --json >r.json 2>/dev/null
 	[ -z "$(key r.json group)" ] && [ "$(key r.json train_groups)" = 0 ]
 	run ! cmp -s m.fis n.fis

@@ -19,10 +19,10 @@ setup() {
 	run -0 --separate-stderr incise info a.rec --json
 	jq -e '.wall.start | (.tai_ns - 1800000000000000000 - .t_ns * 1.00005 | fabs) < 1000' <<<"$output"
 	jq -e '.wall | .sources == ["simulated"] and .restarts == [] and .held == 0' <<<"$output"
-	run -0 --separate-stderr incise export a.rec --resample --rate 10 --tai
+	run -0 --separate-stderr incise export --no-lineage a.rec --resample --rate 10 --tai
 	[[ "${lines[0]}" == *,tai_ns,tai_u_ns ]]
 	[[ "${lines[1]}" == *,18000000???????????,300? ]]
-	run -0 --separate-stderr incise export a.rec --rate 10 --tai --lineage
+	run -0 --separate-stderr incise export a.rec --rate 10 --tai
 	[[ "$output" == *"# wall_start_utc: 2027-01-15T07:59:23."* || "$output" == *"# wall_start_utc: 2027-01-15T07:59:24."* ]]
 	[[ "$output" == *"# wall_source: simulated, time of TAI"* ]]
 	incise verify a.rec

@@ -78,6 +78,23 @@ class Plans(Case):
             self.says(incise.Invalid, "t=", plan.step, t, None)
         plan.step(1.001, None)
 
+    def test_scenes_are_beside_the_libraries(self):
+        folder = self.path("opt/share/incise/scenes")
+        os.makedirs(folder)
+        with open(os.path.join(folder, "own.scene"), "w") as out:
+            out.write("surface = {};")
+        before = os.environ.get("INCISE_LIBDIR")
+        os.environ["INCISE_LIBDIR"] = self.path("opt/lib")
+        try:
+            self.assertEqual(
+                os.path.realpath(incise.plan.find_scene("own")),
+                os.path.realpath(os.path.join(folder, "own.scene")),
+            )
+        finally:
+            os.environ.pop("INCISE_LIBDIR")
+            if before is not None:
+                os.environ["INCISE_LIBDIR"] = before
+
     def test_errors(self):
         plan = incise.Plan("wall")
         self.says(incise.NotFound, "one of: liver, neck, wall", incise.Plan, "nek")

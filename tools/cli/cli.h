@@ -253,6 +253,9 @@ void *cli_alloc(size_t n, size_t size);
 void *cli_resize(void *memory, size_t n, size_t size);
 char *cli_text(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
+/* The end of a noun behind a number: "1 cut", "2 cuts". */
+#define cli_s(n) ((n) == 1 ? "" : "s")
+
 bool cli_ends_with(const char *text, const char *end);
 
 /* Columns and lines of the terminal at stderr; 80 and 24 where they are not known. */

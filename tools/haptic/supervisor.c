@@ -24,15 +24,113 @@
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/un.h>
+#include <termios.h>
 #include <time.h>
 #include <unistd.h>
 #include <incise/export.h>
 #include <incise/foot_switch.h>
+#include <incise/tool.h>
 #include "../cli/cli.h"
 #include "../cli/loop_report.h"
 #include "control.h"
 #include "haptic.h"
-#include "keys.h"
+
+/* --- keys on a terminal: b, h, t and a for blade, handle, tube and auto, without Enter ---- */
+
+#define ESCAPE 27
+
+/* Signals of a fault in the program. */
+static const int keys_faults[] = {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGSYS, 0};
+
+/* Others that end the program, and that incise haptic does not catch. */
+static const int ends[] = {SIGABRT, SIGQUIT, SIGTRAP, SIGALRM,
+			   SIGXCPU, SIGUSR1, SIGUSR2, 0};
+
+static struct termios before;
+static volatile sig_atomic_t changed;
+
+/* Whether this process is in the foreground: else reading would stop it, and the loop with it. */
+static bool keys_here(void)
+{
+	return tcgetpgrp(STDIN_FILENO) == getpgrp();
+}
+
+/* May be called again, and without keys_open(). */
+static void keys_close(void)
+{
+	if (!changed)
+		return;
+	changed = 0;
+	/* In the background the terminal is another program's. */
+	if (keys_here())
+		tcsetattr(STDIN_FILENO, TCSANOW, &before);
+}
+
+/* All that it calls is safe in a signal handler; POSIX.1-2008, 2.4.3. */
+static void die(int number)
+{
+	keys_close();
+	/* By the default action, which is in force again. */
+	raise(number);
+}
+
+static void catch (const int *signals)
+{
+	struct sigaction action = {.sa_handler = die,
+				   .sa_flags = SA_RESETHAND | SA_NODEFER};
+
+	for (; *signals; signals++)
+		sigaction(*signals, &action, NULL);
+}
+
+/*
+ * Read keys one by one, if standard input is the terminal of this process in the foreground: it is
+ * as before again after keys_close(), at exit(3), and after a signal that kills, but for SIGKILL.
+ */
+static bool keys_open(void)
+{
+	struct sigaction ignore = {.sa_handler = SIG_IGN};
+	struct termios now;
+
+	if (!isatty(STDIN_FILENO) || !keys_here() || tcgetattr(STDIN_FILENO, &before))
+		return false;
+	/* Put into the background between a look and a read, it gets an error. */
+	sigaction(SIGTTIN, &ignore, NULL);
+	sigaction(SIGTTOU, &ignore, NULL);
+	catch (keys_faults);
+	catch (ends);
+	atexit(keys_close);
+	now = before;
+	/* Ctrl-C and Ctrl-Z stay what they are. */
+	now.c_lflag &= ~(tcflag_t)(ICANON | ECHO);
+	now.c_cc[VMIN] = 1;
+	now.c_cc[VTIME] = 0;
+	changed = 1;
+	return !tcsetattr(STDIN_FILENO, TCSANOW, &now);
+}
+
+/* The tool of the key that was pressed, enum incise_tool; -1: it is none's. */
+static int keys_read(void)
+{
+	char key[32];
+	ssize_t n = read(STDIN_FILENO, key, sizeof(key));
+
+	/* An arrow or the like begins with it, and is sent at once. The last key counts. */
+	if (n <= 0 || key[0] == ESCAPE)
+		return -1;
+	switch (key[n - 1]) {
+	case 'a':
+		return INCISE_TOOL_AUTO;
+	case 'b':
+		return INCISE_TOOL_BLADE;
+	case 'h':
+		return INCISE_TOOL_HANDLE;
+	case 't':
+		return INCISE_TOOL_TUBE;
+	default:
+		return -1;
+	}
+}
 
 /*
  * --- the service manager ---------------------------------------------------------------

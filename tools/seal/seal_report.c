@@ -52,7 +52,7 @@ static void count(const json_t *at, const char *key, const char *what)
 	json_int_t n = json_integer_value(json_object_get(at, key));
 
 	if (n)
-		printf(", %d %s%s", (int)n, what, n == 1 ? "" : "s");
+		printf(", %d %s%s", (int)n, what, cli_s(n));
 }
 
 void seal_report_print(const json_t *list)

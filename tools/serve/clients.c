@@ -514,7 +514,7 @@ struct clients *clients_new(const struct clients_setup *setup)
 int clients_summary(const struct clients *clients, char *text, size_t size)
 {
 	return snprintf(text, size, "%d client%s, %llu sent, %llu lost", clients->n,
-			clients->n == 1 ? "" : "s", (unsigned long long)clients->sent,
+			cli_s(clients->n), (unsigned long long)clients->sent,
 			(unsigned long long)clients->lost);
 }
 

@@ -191,7 +191,7 @@ static void ticks(FILE *out, const struct state_look *look)
 		fprintf(out, ", %.2f Hz on average", mean_hz(now));
 	fprintf(out,
 		"\nticks      %" PRIu64 ", %" PRIu64 " missed in %" PRIu64 " overrun%s\n",
-		now->ticks, now->skipped, now->overruns, now->overruns == 1 ? "" : "s");
+		now->ticks, now->skipped, now->overruns, cli_s(now->overruns));
 	if (!now->ticks)
 		return;
 	times(out, "lateness", &now->lateness, now->lateness_max_ns);

@@ -348,7 +348,7 @@ static void put_text(const struct controller *controller)
 	const struct incise_stepper_controller *info = &controller->info;
 
 	printf("%s: %.*s, %u motor%s\n", controller->path, (int)sizeof(info->name),
-	       info->name, info->n_motors, info->n_motors == 1 ? "" : "s");
+	       info->name, info->n_motors, cli_s(info->n_motors));
 	printf("self-test  99 %% of timers at most %.3f us late, the latest %.3f us; an edge "
 	       "takes %.3f us\n           so at most %.1f kHz, pulses of at least %.3f us, ticks of "
 	       "at least %g us; timers of %u ns\n",

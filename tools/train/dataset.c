@@ -92,14 +92,25 @@ static const char *name_of(const struct dataset *data, const struct row *row)
 							 : row->source->text;
 }
 
+/* Without its origins, which incise provenance prints. */
+static void print_source(const char *text)
+{
+	const char *at = strstr(text, ", incise:"), *end = at ? at + 1 : text, *next;
+
+	while (at && !strncmp(end + 1, "incise:", 7) && (next = strchr(end, ';')))
+		end = next + 1;
+	printf("  %.*s%s\n", at ? (int)(at - text) : 0, text, end);
+}
+
 static void show_text(const struct dataset *data)
 {
-	int outliers = 0;
+	int outliers = 0, n = incise_corpus_sources(data->corpus);
 
-	printf("%d sources, %llu rows", incise_corpus_sources(data->corpus),
+	printf("%d source%s, %llu rows", n, cli_s(n),
 	       (unsigned long long)incise_corpus_side(data->corpus, false)->rows);
 	if (data->options->group)
-		printf(", %d groups by %s", data->n, data->options->group);
+		printf(", %d group%s by %s", data->n, cli_s(data->n),
+		       data->options->group);
 	if (data->left_out)
 		printf("; the blade did not advance in %llu more",
 		       (unsigned long long)data->left_out);
@@ -107,7 +118,7 @@ static void show_text(const struct dataset *data)
 	for (int c = 0; c < data->options->n_columns; c++)
 		printf("%s: %g to %g\n", data->options->columns[c], data->min[c],
 		       data->max[c]);
-	for (int s = 0; s < incise_corpus_sources(data->corpus); s++) {
+	for (int s = 0; s < n; s++) {
 		const struct incise_corpus_survey *survey =
 			incise_corpus_source(data->corpus, s);
 
@@ -115,7 +126,7 @@ static void show_text(const struct dataset *data)
 		       (unsigned long long)survey->rows);
 		if (data->options->group)
 			printf(" %4d groups", survey->n_groups);
-		printf("  %s\n", survey->text);
+		print_source(survey->text);
 	}
 	for (int i = 0; i < data->n && data->options->group; i++) {
 		const struct row *row = &data->rows[i];

@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include <incise/arrow.h>
+#include <incise/infile.h>
 #include <incise/recalibration.h>
 #include <incise/recording.h>
 #include "../cli/cli.h"
@@ -131,35 +132,37 @@ static int end(struct source *source, int rc, struct incise_error *err)
 	return rc ? rc : check_unchanged(source, err);
 }
 
+static const char *file_of(const struct source *source)
+{
+	return source->pipe.file ? source->pipe.path : source->path;
+}
+
+static int each_row(struct source *source, incise_row_taker take, void *taker,
+		    struct incise_error *err)
+{
+	int rc = incise_dataset_each(file_of(source), source->options->columns,
+				     source->options->n_columns, group_column(source),
+				     where(source), take, taker, &source->left_out, err);
+	struct incise_error own = {0};
+	size_t n = strlen(source->pipe.path);
+
+	if (rc && err)
+		own = *err;
+	return source->pipe.file && !strncmp(own.text, source->pipe.path, n)
+		       ? incise_error_set(err, own.code, "%s%s",
+					  strcmp(source->path, "-") ? source->path
+								    : "standard input",
+					  own.text + n)
+		       : rc;
+}
+
 static int read_file(void *user, incise_row_taker take, void *taker,
 		     struct incise_error *err)
 {
 	struct source *source = user;
 
 	begin(source, take, taker);
-	return end(source,
-		   incise_dataset_each(source->path, source->options->columns,
-				       source->options->n_columns, group_column(source),
-				       where(source), count_row, source,
-				       &source->left_out, err),
-		   err);
-}
-
-/* Rows of a pipe; its groups have numbers for names. */
-static int read_pipe(void *user, incise_row_taker take, void *taker,
-		     struct incise_error *err)
-{
-	const struct source *source = user;
-	int rc = 0;
-
-	for (size_t i = 0; i < incise_dataset_rows(source->pipe) && !rc; i++) {
-		char name[16];
-
-		snprintf(name, sizeof(name), "%d", incise_dataset_group(source->pipe, i));
-		rc = take(taker, incise_dataset_row(source->pipe, i),
-			  group_column(source) ? name : NULL, err);
-	}
-	return rc;
+	return end(source, each_row(source, count_row, source, err), err);
 }
 
 /* A message of the rows, with the recording in front. */
@@ -246,13 +249,33 @@ static int stop(void *user, const double *row, const char *group,
 	return 1;
 }
 
-/* A file has the column "cut". A pipe can be read once only. */
 static bool has_cuts(const struct source *source)
 {
-	return !is_pipe(source->path) &&
-	       incise_dataset_each(source->path, source->options->columns,
+	return incise_dataset_each(file_of(source), source->options->columns,
 				   source->options->n_columns, "cut", where(source), stop,
 				   NULL, NULL, NULL) == 0;
+}
+
+/* A pipe can be read once only: as a file in memory it is read like any other. */
+static void keep_pipe(struct source *source)
+{
+	static const struct incise_infile_kind kind = {
+		.name = "a CSV file",
+		.advice = "give a CSV file with a header row",
+	};
+	struct incise_error err = {0};
+	struct incise_infile *in =
+		cli_require(incise_infile_open(source->path, &kind, &err), &err);
+	char *line;
+	int rc;
+
+	source->pipe = memory_file_begin("pipe");
+	while ((rc = incise_infile_line(in, &line, &err)) > 0)
+		fprintf(source->pipe.file, "%s\n", line);
+	if (rc)
+		cli_fail_with(&err);
+	incise_infile_close(in);
+	memory_file_written(&source->pipe);
 }
 
 struct source *sources_new(char **paths, int n, struct source_options *options)
@@ -268,14 +291,14 @@ struct source *sources_new(char **paths, int n, struct source_options *options)
 		source->path = find(paths[i]);
 		source->recording = file_kind_of(source->path) == FILE_RECORDING;
 		source->options = options;
+		if (!source->recording && is_pipe(source->path))
+			keep_pipe(source);
 		all = all && (source->recording || has_cuts(source));
 		source->corpus = (struct incise_corpus_source){
 			.name = source->path,
 			.hash = source->hash,
 			.text = source->text,
-			.read = source->recording	? read_recording
-				: is_pipe(source->path) ? read_pipe
-							: read_file,
+			.read = source->recording ? read_recording : read_file,
 			.user = source,
 		};
 	}
@@ -341,11 +364,12 @@ static int open_recording(struct source *source, struct incise_error *err)
 /* Its name, and the origins that the file carries, as many as fit. */
 static int name_file(struct source *source, struct incise_error *err)
 {
-	size_t at = (size_t)snprintf(source->text, sizeof(source->text), "%.300s",
-				     name_of(source->path));
+	size_t at =
+		(size_t)snprintf(source->text, sizeof(source->text), "%.300s",
+				 source->pipe.file ? "a pipe" : name_of(source->path));
 	struct origins origins = {0};
 	char text[INCISE_ORIGIN_TEXT];
-	int rc = origins_read(&origins, source->path, err);
+	int rc = origins_read(&origins, file_of(source), err);
 
 	for (int i = 0; i < origins.n; i++) {
 		origins.all[i].depth++;
@@ -361,40 +385,23 @@ static int name_file(struct source *source, struct incise_error *err)
 
 int source_open(struct source *source, struct incise_error *err)
 {
-	size_t left_out;
 	int rc;
 
 	source->state = source_state(source);
 	if (source->recording)
 		return open_recording(source, err);
-	if (source->corpus.read == read_pipe) {
-		strcpy(source->text, "a pipe");
-		source->pipe =
-			incise_dataset_read_where(source->path, source->options->columns,
-						  source->options->n_columns,
-						  group_column(source), where(source),
-						  &left_out, err);
-		if (!source->pipe)
-			return -errno;
-		source->left_out = left_out;
-		rc = incise_dataset_sha256(source->pipe, source->hash);
-		return rc ? incise_error_set(err, -rc, "%s: %s", source->path,
-					     strerror(-rc))
-			  : 0;
-	}
 	/* A file of another kind is refused before all of it is hashed. */
-	rc = incise_dataset_each(source->path, source->options->columns,
-				 source->options->n_columns, group_column(source),
-				 where(source), stop, NULL, NULL, err);
+	rc = each_row(source, stop, NULL, err);
 	if (!rc)
-		rc = incise_file_sha256(source->path, source->hash, err);
+		rc = incise_file_sha256(file_of(source), source->hash, err);
 	return rc ? rc : name_file(source, err);
 }
 
 void sources_free(struct source *sources, int n)
 {
 	for (int i = 0; i < n; i++) {
-		incise_dataset_free(sources[i].pipe);
+		if (sources[i].pipe.file)
+			fclose(sources[i].pipe.file);
 		free(sources[i].state);
 	}
 	free(sources);

@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <incise/corpus.h>
 #include <incise/error.h>
+#include "../cli/file.h"
 
 /* The columns and rows that are read. */
 struct source_options {
@@ -34,8 +35,8 @@ struct source {
 	char rig[256], calibration[512]; /* the latter: the same where it is the same */
 	uint64_t left_out;		 /* rows in the last reading */
 	char *state;			 /* before it was first read; NULL: not yet */
-	struct incise_dataset *pipe; /* that can be read once only: its rows, or NULL */
-	incise_row_taker take;	     /* of the present reading, and the rows it took */
+	struct memory_file pipe;	 /* of a source that can be read once only */
+	incise_row_taker take; /* of the present reading, and the rows it took */
 	void *taker;
 	uint64_t taken;
 };

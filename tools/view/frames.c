@@ -151,11 +151,11 @@ void view_output_print(const struct view_output *output)
 	unsigned long long n = output->frames;
 
 	if (output->film_path)
-		printf("wrote %s: %llu frame%s, %.1f s\n", output->film_path, n,
-		       n == 1 ? "" : "s", (double)n / output->fps);
+		printf("wrote %s: %llu frame%s, %.1f s\n", output->film_path, n, cli_s(n),
+		       (double)n / output->fps);
 	if (output->strip_path)
 		printf("wrote %s: %d frame%s\n", output->strip_path, output->stripped,
-		       output->stripped == 1 ? "" : "s");
+		       cli_s(output->stripped));
 	if (output->folder && n)
 		printf("wrote %s/frame-000000.png to frame-%06llu.png\n", output->folder,
 		       n - 1);

@@ -920,11 +920,13 @@ int incise_blade_pose_at(struct incise_blade_pose *blade, int64_t t_ns, double t
 	value->acceleration_mm_s2 =
 		isnan(e) ? NAN : loop_acceleration(&blade->loop, t_ns);
 	/* A record without an orientation has none to take a part of. */
-	value->tilt_deg = incise_input_tilt_deg(!isnan(value->q[0]) ? value->q
-						: isnan(b->q[0])    ? a->q
-								    : b->q,
-						(const double[3])INCISE_SCALPEL_AXIS,
-						blade->progress.normal);
+	value->tilt_deg =
+		isnan(s) ? NAN
+			 : incise_input_tilt_deg(!isnan(value->q[0]) ? value->q
+						 : isnan(b->q[0])    ? a->q
+								     : b->q,
+						 (const double[3])INCISE_SCALPEL_AXIS,
+						 blade->progress.normal);
 	value->time_in_tissue_s = isnan(e) ? NAN : time_in_tissue(blade, t_ns);
 	value->position_u_mm = uncertainty(mix(c->noise_mm, d->noise_mm, e), s, time_s,
 					   blade->speed_mm_s);

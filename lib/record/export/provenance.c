@@ -505,16 +505,9 @@ int incise_provenance_of(struct incise_provenance *provenance,
 			 const struct incise_export_options *options, const char *table,
 			 struct incise_error *err)
 {
-	time_t now = time(NULL);
-	char date[32] = "";
-	struct tm utc;
-	int rc;
+	int rc = incise_provenance_add(provenance, "incise", "%s", incise_version());
 
-	if (gmtime_r(&now, &utc))
-		strftime(date, sizeof(date), "%Y-%m-%dT%H:%M:%SZ", &utc);
-	rc = incise_provenance_add(provenance, "incise", "%s", incise_version());
-	if (!rc)
-		rc = incise_provenance_add(provenance, "date", "%s", date);
+	/* The time of the export is left out: equal rows are equal bytes. */
 	if (!rc)
 		rc = add_sources(provenance, recordings, n);
 	if (!rc)

@@ -104,17 +104,18 @@ static void put_name(struct incise_table *table, int64_t number)
 	const char *name = table->names[number - 1];
 	bool quote = strpbrk(name, ",\" ;#") != NULL;
 
-	if (!quote) {
-		fputs_unlocked(name, table->out);
-		return;
-	}
-	fputc_unlocked('"', table->out);
+	if (quote)
+		fputc_unlocked('"', table->out);
+	/* A spreadsheet would compute it. */
+	if (*name && strchr("=+-@", *name))
+		fputc_unlocked('\'', table->out);
 	for (; *name; name++) {
 		if (*name == '"')
 			fputc_unlocked('"', table->out);
 		fputc_unlocked(*name, table->out);
 	}
-	fputc_unlocked('"', table->out);
+	if (quote)
+		fputc_unlocked('"', table->out);
 }
 
 static int check(struct incise_table *table, bool bad, struct incise_error *err)

@@ -5,12 +5,15 @@
  */
 #include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <time.h>
+#include <unistd.h>
 #include <incise/infile.h>
 #include <incise/outfile.h>
 #include "../../base/vector.h"
@@ -74,21 +77,35 @@ static int no_memory(const char *path, struct incise_error *err)
 	return incise_error_set(err, ENOMEM, "%s: out of memory", path);
 }
 
+/* A link would lead out of the recording. -ENOENT is no error. */
+static int open_folder(const char *folder, struct incise_error *err)
+{
+	char *path;
+	int fd;
+
+	if (asprintf(&path, "%s/" FOLDER, folder) < 0)
+		return no_memory(folder, err);
+	fd = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+	if (fd < 0 && errno != ENOENT)
+		incise_error_set(err, errno, "%s: %s", path,
+				 errno == ENOTDIR ? "a link or file, which no recorder "
+						    "makes; remove it"
+						  : strerror(errno));
+	free(path);
+	return fd < 0 ? -errno : fd;
+}
+
 /* The entries of the folder behind that of the capture, in order; returns how many there are. */
 static int read_folder(const char *folder, struct incise_recalibration **list,
 		       struct incise_error *err)
 {
+	int fd = open_folder(folder, err), n = fd < 0 && fd != -ENOENT ? fd : 1;
 	struct dirent *found;
-	char *path;
-	DIR *dir;
-	int n = 1;
+	DIR *dir = fd < 0 ? NULL : fdopendir(fd);
 
 	*list = calloc(1, sizeof(**list));
-	if (!*list || asprintf(&path, "%s/" FOLDER, folder) < 0)
-		return no_memory(folder, err);
-	dir = opendir(path);
-	if (!dir && errno != ENOENT)
-		n = incise_error_set(err, errno, "%s: %s", path, strerror(errno));
+	if (!*list || (fd >= 0 && !dir))
+		n = no_memory(folder, err);
 	while (dir && n > 0 && (found = readdir(dir))) {
 		struct incise_recalibration entry, *more;
 
@@ -104,7 +121,8 @@ static int read_folder(const char *folder, struct incise_recalibration **list,
 	}
 	if (dir)
 		closedir(dir);
-	free(path);
+	else if (fd >= 0)
+		close(fd);
 	if (n <= 0)
 		return n;
 	/* The name of the first one is empty. */
@@ -497,15 +515,7 @@ static int write_entry(const char *folder, const struct incise_recalibration *en
 {
 	struct incise_outfile *out;
 	char *path;
-	int rc = 0;
 
-	if (asprintf(&path, "%s/" FOLDER, folder) < 0)
-		return no_memory(folder, err);
-	if (mkdir(path, 0777) && errno != EEXIST)
-		rc = incise_error_set(err, errno, "%s: %s", path, strerror(errno));
-	free(path);
-	if (rc)
-		return rc;
 	if (asprintf(&path, "%s/%s", folder, entry->file) < 0)
 		return no_memory(folder, err);
 	out = incise_outfile_open(path, err);
@@ -517,29 +527,52 @@ static int write_entry(const char *folder, const struct incise_recalibration *en
 	return incise_outfile_commit(out, err);
 }
 
+/* Two that add at once would take one number; the lock ends with the file that is returned. */
+static int lock_folder(const char *folder, bool make, struct incise_error *err)
+{
+	char *path;
+	int fd;
+
+	if (asprintf(&path, "%s/" FOLDER, folder) < 0)
+		return no_memory(folder, err);
+	if (make && mkdir(path, 0777) && errno != EEXIST)
+		fd = incise_error_set(err, errno, "%s: %s", path, strerror(errno));
+	else
+		fd = open_folder(folder, err);
+	free(path);
+	if (fd >= 0)
+		flock(fd, LOCK_EX); /* some file systems have no locks */
+	return fd;
+}
+
 static int add(const char *folder, const char *calibration,
 	       struct incise_recalibration *made, struct incise_error *err)
 {
 	struct incise_recalibration *list = NULL;
-	int n = read_folder(folder, &list, err), rc = n < 0 ? n : 0;
-	char *text = NULL;
 	size_t size = 0;
+	char *text = calibration ? incise_infile_read(calibration, &file_kind, &size, err)
+				 : NULL;
+	int fd, n = 0, rc = calibration && !text ? -errno : 0;
 
+	if (rc)
+		return rc;
+	fd = lock_folder(folder, text, err);
+	if (fd >= 0 || fd == -ENOENT)
+		n = read_folder(folder, &list, err);
+	rc = n > 0 ? 0 : n < 0 ? n : fd;
 	if (!rc && !calibration && list[0].active)
 		rc = incise_error_set(err, EALREADY,
 				      "%s: the calibration of the capture is active "
 				      "already; give -c FILE for another",
 				      folder);
-	if (!rc && calibration) {
-		text = incise_infile_read(calibration, &file_kind, &size, err);
-		rc = text ? 0 : -errno;
-	}
 	if (!rc)
 		rc = next_name(folder, &list[n - 1], !calibration, made, err);
 	if (!rc && text && set_digest(made, text, size))
 		rc = no_memory(folder, err);
 	if (!rc)
 		rc = write_entry(folder, made, text ? text : "", size, err);
+	if (fd >= 0)
+		close(fd);
 	free(text);
 	free(list);
 	return rc;

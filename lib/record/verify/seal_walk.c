@@ -171,8 +171,8 @@ int incise_seal_walk_next(struct incise_seal_walk *walk, struct incise_error *er
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++) {
 		int64_t blocks = sqlite3_column_int64(stmt, 3 + i);
 
-		/* Two at most are of one commit: the last rows, and the end. */
-		walk->good &= blocks >= seal->blocks[i] && blocks <= seal->blocks[i] + 2;
+		/* Two at most are of one commit: the last rows, and the end; more of a forged one. */
+		walk->good &= (uint64_t)blocks - (uint64_t)seal->blocks[i] <= 2;
 		for (rc = 0; !rc && seal->blocks[i] < blocks && !walk->streams[i].ended;)
 			rc = take_block(walk, i, err);
 		if (rc)

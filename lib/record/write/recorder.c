@@ -79,6 +79,7 @@ static int start_camera(struct incise_recorder *rec, struct incise_error *err)
 	if (!rec->camera.writer)
 		return 0;
 	rec->camera.writer = NULL; /* the pump closes it */
+	rec->camera.began_ns = incise_clock_now(setup.clock);
 	rec->camera.pump = incise_frame_pump_new(&setup, err);
 	return rec->camera.pump ? 0 : -errno;
 }

@@ -95,6 +95,7 @@ struct incise_recorder_camera {
 	struct incise_frames_writer *writer; /* until the pump owns it */
 	struct incise_vision *vision;
 	struct incise_frame_pump *pump;
+	int64_t began_ns; /* frames of before are not kept */
 	/* Frames that were never shot leave no gap in the numbers, but in time. */
 	uint64_t seen;	   /* frames, at the last check */
 	int64_t looked_ns; /* time of that check */

@@ -156,32 +156,39 @@ int incise_recorder_find_silence(struct incise_recorder *rec, struct incise_erro
 		[INCISE_LEDGER_TRACKER] = tracker->external_sync && !tracker->network
 						  ? 0
 						  : tracker->rate_hz,
+		[INCISE_LEDGER_CAMERA] = rec->camera_info.rate_hz,
 	};
 	int rc = SQLITE_OK;
 
-	for (int i = INCISE_LEDGER_FORCE; i <= INCISE_LEDGER_TRACKER; i++) {
+	for (int i = INCISE_LEDGER_FORCE; i <= INCISE_LEDGER_CAMERA; i++) {
 		struct incise_recorder_stream *stream = &rec->streams[i];
+		bool camera = i == INCISE_LEDGER_CAMERA;
+		/* It keeps no frames of before the trigger; one that falls silent has ended. */
+		int64_t began_ns = camera ? rec->camera.began_ns : rec->began_ns;
 		uint64_t since = stream->gaps - stream->gaps_held, counted, late, early;
 
-		if (!stream->rows || *stream->ended || !rec->began_ns)
+		if (!stream->rows || *stream->ended || !began_ns)
 			continue;
-		/* Of those at the end the device may have counted some. */
+		/* Of those at an end the device may have counted some. */
 		counted = stream->device_lost > since ? stream->device_lost - since : 0;
-		late = missing_in(stream->first_row_ns - rec->began_ns, rates_hz[i]);
-		early = missing_in(rec->polled_ns - stream->ledger.last_ns, rates_hz[i]);
+		late = missing_in(stream->first_row_ns - began_ns, rates_hz[i]);
+		early = camera ? 0
+			       : missing_in(rec->polled_ns - stream->ledger.last_ns,
+					    rates_hz[i]);
 		if (late)
 			rc |= incise_recorder_note_at(
 				rec, stream->first_row_ns, "lost",
 				"%s: %llu samples: it began %.3f s after the recording",
 				stream->device, (unsigned long long)late,
-				(double)(stream->first_row_ns - rec->began_ns) * 1e-9);
+				(double)(stream->first_row_ns - began_ns) * 1e-9);
 		if (early)
 			rc |= incise_recorder_note(
 				rec, "lost",
 				"%s: %llu samples: it was silent for the last %.3f s",
 				stream->device, (unsigned long long)early,
 				(double)(rec->polled_ns - stream->ledger.last_ns) * 1e-9);
-		stream->silent = late + (early > counted ? early - counted : 0);
+		stream->silent = camera ? (late > counted ? late - counted : 0)
+					: late + (early > counted ? early - counted : 0);
 	}
 	return rc == SQLITE_OK ? 0 : incise_recorder_fail(rec, err);
 }

@@ -114,6 +114,10 @@ TEST(test_errors_say_where)
 		 {":1:", "two columns are called cut"}},
 		{"depth_mm,force_N\n1,\"1,002.0\"\n", NULL, EINVAL, {":2:", "thousands"}},
 		{"depth_mm,force_N\n1,2,\n", NULL, EINVAL, {":2:", "last field"}},
+		{"depth_mm [mm],force_N [N]\n1,2\n",
+		 NULL,
+		 EINVAL,
+		 {":1:", "did you mean 'force_N [N]'?"}},
 		{"depth_mm,force_N\n\"1\"2,3\n", NULL, EINVAL, {":2:", "quote"}},
 	};
 

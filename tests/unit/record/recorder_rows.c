@@ -331,10 +331,12 @@ TEST(silent_camera, WITH_MODULES)
 		uint64_t from, to;
 		int events;
 		bool ended;
+		uint64_t lost;
 	} cases[] = {
-		{10, 28, 0, false},	    {10, 32, 2, false},
-		{10, UINT64_MAX, 1, true},  {0, UINT64_MAX, 1, true},
-		{40, UINT64_MAX, 0, false}, /* 1 s before the end */
+		{10, 28, 0, false, 18},	       {10, 32, 2, false, 22},
+		{10, UINT64_MAX, 1, true, 0},  {0, UINT64_MAX, 1, true, 0},
+		{40, UINT64_MAX, 0, false, 0}, /* 1 s before the end */
+		{0, 12, 0, false, 11},	       /* begins late */
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -351,6 +353,7 @@ TEST(silent_camera, WITH_MODULES)
 				     "SELECT count(*) FROM events WHERE kind = 'silent'"),
 				 cases[i].events);
 		assert_int_equal(*streams[2].ended != 0, cases[i].ended);
+		assert_int_equal(streams[2].lost, cases[i].lost);
 		verified(!cases[i].ended && cases[i].to == UINT64_MAX);
 		assert_int_equal(system("rm -r a.rec"), 0);
 	}

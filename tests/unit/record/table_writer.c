@@ -106,12 +106,16 @@ TEST(names_are_quoted_and_provenance_is_comments)
 	add(&table, "say \"a,b\"", 1, 0);
 	add(&table, "say \"a,b\"", 1, 0);
 	assert_int_equal(table.n_names, 2);
+	add(&table, "=cmd()-01", 1, 0);
+	add(&table, "@a b", 1, 0);
 	end(&table, out);
 	assert_string_equal(text, "# source: a_b.rec\n"
 				  "name,fixed,micro,free,count,flag\n"
 				  "plain,1.0000,1.000000,1,0,0\n"
 				  "\"say \"\"a,b\"\"\",1.0000,1.000000,1,0,0\n"
-				  "\"say \"\"a,b\"\"\",1.0000,1.000000,1,0,0\n");
+				  "\"say \"\"a,b\"\"\",1.0000,1.000000,1,0,0\n"
+				  "'=cmd()-01,1.0000,1.000000,1,0,0\n"
+				  "\"'@a b\",1.0000,1.000000,1,0,0\n");
 	incise_provenance_free(&provenance);
 	free(text);
 }
