@@ -117,9 +117,9 @@ $(O)/man/%.1: man/%.1 mk/manual mk/manual-output $(wildcard schema/*.rows) $(O)/
 	$(Q)mk/manual-output <$@.lists >$@
 	@rm $@.lists
 
-$(O)/man/%: man/%
+$(O)/man/%: man/% mk/manual-output $(wildcard schema/*.rows)
 	@mkdir -p $(@D)
-	$(Q)cp $< $@
+	$(Q)mk/manual-output <$< >$@
 
 $(O)/doc/options.md: mk/options $(tables)
 	@mkdir -p $(@D)
