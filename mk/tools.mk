@@ -96,10 +96,12 @@ $(O)/obj/mk/settings: mk/settings.c $(call objects,incise)
 $(O)/obj/mk/settings.tables: $(O)/obj/mk/settings
 	$(Q)$< >$@
 
-$(O)/man/%.5: man/%.5 mk/manual-tables $(O)/obj/mk/settings.tables
+$(O)/man/%.5: man/%.5 mk/manual-tables mk/manual-output $(wildcard schema/*.rows) $(O)/obj/mk/settings.tables
 	@mkdir -p $(@D)
 	$(call step,MAN)
-	$(Q)mk/manual-tables $(O)/obj/mk/settings.tables $< >$@
+	$(Q)mk/manual-tables $(O)/obj/mk/settings.tables $< >$@.lists
+	$(Q)mk/manual-output <$@.lists >$@
+	@rm $@.lists
 # Manual pages, and the list of all options: the tables that --help prints are stated in the programs
 # alone. Pages of what is not built are left out.
 man_pages := $(filter-out $(if $(has_view),,man/incise-view.1 man/incise-bench-view.1),$(wildcard man/*.[1-8]))
@@ -115,9 +117,9 @@ $(O)/man/%.1: man/%.1 mk/manual mk/manual-output $(wildcard schema/*.rows) $(O)/
 	$(Q)mk/manual-output <$@.lists >$@
 	@rm $@.lists
 
-$(O)/man/%: man/%
+$(O)/man/%: man/% mk/manual-output $(wildcard schema/*.rows)
 	@mkdir -p $(@D)
-	$(Q)cp $< $@
+	$(Q)mk/manual-output <$< >$@
 
 $(O)/doc/options.md: mk/options $(tables)
 	@mkdir -p $(@D)
