@@ -284,8 +284,10 @@ static int check_signers(const struct check *check, struct signature *signature,
 			continue;
 		signature->verdict = SIGNATURE_GOOD;
 		*signature->why = 0;
-		copy(signature->signer, sizeof(signature->signer), signer,
-		     strlen(signer));
+		/* A list or a pattern of the file names no one person. */
+		snprintf(signature->signer, sizeof(signature->signer), "%s%s",
+			 signer[strcspn(signer, "*?!,")] ? "one of " : "", signer);
+		control_characters_hide(signature->signer);
 	}
 	keygen_end(&keygen);
 	return rc;

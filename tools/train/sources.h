@@ -7,8 +7,10 @@
 #define TRAIN_SOURCES_H
 
 #include <stdbool.h>
+#include <incise/budget.h>
 #include <incise/corpus.h>
 #include <incise/error.h>
+#include <incise/propagation.h>
 #include "../cli/file.h"
 
 /* The columns and rows that are read. */
@@ -46,6 +48,9 @@ struct source *sources_new(char **paths, int n, struct source_options *options);
 
 void sources_free(struct source *sources, int n);
 
+/* For incise info: counts, ranges, and the groups that differ from the others. Fails the program. */
+void dataset_show(char **paths, int n, struct source_options *options, bool json);
+
 /*
  * Path, size and time of all files of a source, and the content of the calibrations by which a
  * recording is read, also of its members: free(3).
@@ -57,5 +62,25 @@ char *source_state(const struct source *source);
  * negative errno.
  */
 int source_open(struct source *source, struct incise_error *err);
+
+/* Columns of uncertainties, behind those of a model. */
+struct uncertainties {
+	const char *columns[INCISE_BUDGET_PARTS];
+	struct incise_propagation_part parts[INCISE_BUDGET_PARTS];
+	int n;
+};
+
+enum uncertainties_wanted {
+	UNCERTAINTIES_FOUND, /* of files that have them */
+	UNCERTAINTIES_NONE,
+	UNCERTAINTIES_PARTS
+};
+
+/*
+ * Find those of n_inputs inputs and the output that all sources have, n 0 for none. Fails the
+ * program where some sources have others than the rest, or with UNCERTAINTIES_PARTS one has none.
+ */
+void uncertainties_find(struct uncertainties *found, enum uncertainties_wanted wanted,
+			const char *const *columns, int n_inputs, char **paths, int n);
 
 #endif
