@@ -279,14 +279,17 @@ static int check_signers(const struct check *check, struct signature *signature,
 	for (char *save,
 	     *signer = keygen.good ? strtok_r(keygen.out, "\r\n", &save) : NULL;
 	     signer && !good && !rc; signer = strtok_r(NULL, "\r\n", &save)) {
+		/* Those that a pattern leaves out are listed, too. */
+		if (*signer == '!')
+			continue;
 		rc = check_signer(check, signature, signer, revoked, &good, err);
 		if (!good)
 			continue;
 		signature->verdict = SIGNATURE_GOOD;
 		*signature->why = 0;
-		/* A list or a pattern of the file names no one person. */
+		/* A pattern names no one person. */
 		snprintf(signature->signer, sizeof(signature->signer), "%s%s",
-			 signer[strcspn(signer, "*?!,")] ? "one of " : "", signer);
+			 strpbrk(signer, "*?") ? "one of " : "", signer);
 		control_characters_hide(signature->signer);
 	}
 	keygen_end(&keygen);
