@@ -22,7 +22,6 @@
 #include "cli/file.h"
 #include "cli/json.h"
 #include "cli/recording.h"
-#include "train/progress.h"
 #include "train/sources.h"
 
 struct options {

@@ -311,15 +311,6 @@ static void found_in_seal(void *user, const struct incise_verify_finding *findin
 	control_characters_hide(s->differences[s->n_differences++]);
 }
 
-static int progress_of_seal(void *user, double share)
-{
-	const struct comparison *comparison = user;
-
-	if (comparison->watch)
-		return comparison->watch->progress(comparison->watch->user, share);
-	return cli_stop;
-}
-
 /* A finding of ours about a statement. */
 static void differs(const struct comparison *comparison, const char *fmt, ...)
 	INCISE_PRINTF(2, 3);
@@ -442,8 +433,7 @@ static bool compare_recording(struct vouch *vouch, const struct seal_file *file,
 {
 	struct vouch_statement *s = &vouch->statements[vouch->n_statements++];
 	struct comparison comparison = {watch, s};
-	const struct incise_verify_watch own = {found_in_seal, progress_of_seal,
-						&comparison};
+	const struct incise_verify_watch own = {found_in_seal, progress, &comparison};
 	struct incise_seal_statement *statement = cli_alloc(1, sizeof(*statement));
 	struct incise_verify_report unused;
 	struct incise_error err = {.text = ""};
