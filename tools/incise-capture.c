@@ -579,7 +579,7 @@ static void report(const struct options *options, const struct result *result,
 			(json_int_t)stats->force_clipped, "zero_mV",
 			json_number(stats->zero_mV), "poses", pose_json(&stats->poses),
 			"streams", stream_json(streams, n), "signed_by",
-			*signing->by ? json_text(signing->by) : json_null()));
+			json_text_or_null(signing->by)));
 		return;
 	}
 	printf("%s: %.1f s, %llu force samples (%llu clipped), %llu tracker samples, ",

@@ -31,7 +31,7 @@
 #include "plot/figure.h"
 #include "seal/seal_report.h"
 #include "stepper/module.h"
-#include "train/dataset.h"
+#include "train/sources.h"
 
 struct job {
 	bool json, all, damaged, dataset, all_rows;
@@ -417,11 +417,6 @@ static void recording_json(const struct incise_recording_info *info, bool intact
 		force && tracker ? json_number(info->force_max_N) : json_null()));
 }
 
-static json_t *text_or_null(const char *text)
-{
-	return *text ? json_text(text) : json_null();
-}
-
 /* Those of a recording, or of a member, to a list. */
 static void add_calibrations(json_t *to, const char *path, const char *member)
 {
@@ -438,10 +433,11 @@ static void add_calibrations(json_t *to, const char *path, const char *member)
 				      at->file);
 
 		json_array_append_new(
-			to, json_pack("{so so sb so sb}", "file", text_or_null(file),
-				      "date", text_or_null(at->date), "original",
-				      at->original || !i, "sha256",
-				      text_or_null(at->sha256), "active", at->active));
+			to,
+			json_pack("{so so sb so sb}", "file", json_text_or_null(file),
+				  "date", json_text_or_null(at->date), "original",
+				  at->original || !i, "sha256",
+				  json_text_or_null(at->sha256), "active", at->active));
 		free(file);
 	}
 	free(list);

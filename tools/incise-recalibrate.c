@@ -174,8 +174,8 @@ int main(int argc, char **argv)
 	if (job.json) {
 		json_print(json_pack("{so ss ss so so}", "path", json_text(path), "file",
 				     made.file, "date", made.date, "sha256",
-				     *made.sha256 ? json_text(made.sha256) : json_null(),
-				     "changes", changes_json(&before, &now, &was, &is)));
+				     json_text_or_null(made.sha256), "changes",
+				     changes_json(&before, &now, &was, &is)));
 	} else {
 		if (known)
 			print_changes(&before, &now, &was, &is);

@@ -141,9 +141,8 @@ static void take_reply(struct job *job, struct seal *seal, const struct der *rep
 			job->stamped,
 			json_pack("{so ss so so so}", "path", json_text(path), "utc",
 				  timestamp.utc, "authority",
-				  *timestamp.authority ? json_text(timestamp.authority)
-						       : json_null(),
-				  "recording", json_text(seal->recording), "commit",
+				  json_text_or_null(timestamp.authority), "recording",
+				  json_text(seal->recording), "commit",
 				  (json_int_t)seal->statement.last.commit));
 	else
 		printf("%s: time-stamped %s by %s, %s\n", seal->recording, timestamp.utc,

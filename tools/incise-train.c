@@ -22,9 +22,7 @@
 #include "cli/file.h"
 #include "cli/json.h"
 #include "cli/recording.h"
-#include "train/progress.h"
 #include "train/sources.h"
-#include "train/uncertainties.h"
 
 struct options {
 	char **paths;
@@ -825,9 +823,6 @@ static void join_job(struct options *options)
 		cli_fail_with(&err);
 	job = options->ranks;
 	atexit(leave_job);
-	if (job->size == 1)
-		cli_warn("--mpi: a single process; start several by 'mpirun -n N incise "
-			 "train …'");
 	if (job->rank &&
 	    (!freopen("/dev/null", "w", stdout) || !freopen("/dev/null", "w", stderr)))
 		cli_fail("no /dev/null");
@@ -1441,6 +1436,9 @@ int main(int argc, char **argv)
 		.progress = on_rows,
 		.user = &reading,
 	};
+	if (options.ranks && options.ranks->size == 1)
+		cli_warn("--mpi: a single process; start several by 'mpirun -n N incise "
+			 "train …'");
 	sources = sources_new(options.paths, options.n_paths, &how);
 	options.given_group = options.group;
 	options.group = how.group;

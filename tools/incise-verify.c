@@ -89,9 +89,8 @@ static json_t *as_json(const struct incise_verify_finding *finding)
 	bool blocks = finding->first_block >= 0;
 
 	return json_pack("{ss so so so so so so so sI so}", "kind", kinds[finding->kind],
-			 "stream",
-			 *finding->stream ? json_text(finding->stream) : json_null(),
-			 "first_block", known(finding->first_block, blocks), "last_block",
+			 "stream", json_text_or_null(finding->stream), "first_block",
+			 known(finding->first_block, blocks), "last_block",
 			 known(finding->last_block, blocks), "first_seq",
 			 known(finding->first_seq, numbers), "last_seq",
 			 known(finding->last_seq, numbers), "first_ns",
@@ -310,15 +309,6 @@ static void found_in_seal(void *user, const struct incise_verify_finding *findin
 	control_characters_hide(s->differences[s->n_differences++]);
 }
 
-static int progress_of_seal(void *user, double share)
-{
-	const struct comparison *comparison = user;
-
-	if (comparison->watch)
-		return comparison->watch->progress(comparison->watch->user, share);
-	return cli_stop;
-}
-
 /* A finding of ours about a statement. */
 static void differs(const struct comparison *comparison, const char *fmt, ...)
 	INCISE_PRINTF(2, 3);
@@ -441,8 +431,7 @@ static bool compare_recording(struct vouch *vouch, const struct seal_file *file,
 {
 	struct vouch_statement *s = &vouch->statements[vouch->n_statements++];
 	struct comparison comparison = {watch, s};
-	const struct incise_verify_watch own = {found_in_seal, progress_of_seal,
-						&comparison};
+	const struct incise_verify_watch own = {found_in_seal, progress, &comparison};
 	struct incise_seal_statement *statement = cli_alloc(1, sizeof(*statement));
 	struct incise_verify_report unused;
 	struct incise_error err = {.text = ""};
@@ -711,11 +700,6 @@ static void vouch_print(const struct vouch *vouch, const struct trust *trust)
 		       cli_s(kinds[1]));
 }
 
-static json_t *text_or_null(const char *text)
-{
-	return *text ? json_text(text) : json_null();
-}
-
 static json_t *vouch_json(const struct vouch *vouch)
 {
 	static const char *const verdicts[] = {[VOUCH_GOOD] = "good",
@@ -744,14 +728,14 @@ static json_t *vouch_json(const struct vouch *vouch)
 		json_t *object =
 			json_pack("{ss si ss so}", "file", line->file, "statement",
 				  line->number, "verdict", verdicts[line->verdict], "why",
-				  text_or_null(line->why));
+				  json_text_or_null(line->why));
 
 		json_object_set_new(object, stamp ? "utc" : "signer",
-				    text_or_null(stamp ? line->timestamp.utc
-						       : line->signature.signer));
+				    json_text_or_null(stamp ? line->timestamp.utc
+							    : line->signature.signer));
 		json_object_set_new(object, stamp ? "authority" : "key",
-				    text_or_null(stamp ? line->timestamp.authority
-						       : line->signature.key));
+				    json_text_or_null(stamp ? line->timestamp.authority
+							    : line->signature.key));
 		json_array_append_new(lines[stamp], object);
 	}
 	return json_pack("{so sb so so so}", "path", json_text(vouch->recording),

@@ -65,6 +65,9 @@ setup() {
 		run -0 --separate-stderr incise provenance $file
 		[ "${lines[1]}" = "  $found: a b;.rec has this head" ] || complain "$file: $output"
 	done
+	run -0 incise info --dataset e.csv
+	[[ "$output" != *incise:* ]]
+	[[ "$output" == *" groups  e.csv"* ]]
 }
 
 # bats test_tags=check

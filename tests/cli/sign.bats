@@ -57,6 +57,9 @@ not_vouched() {
 
 	run -0 --separate-stderr incise verify a.rec --signers signers
 	[[ "$output" =~ "a.rec: signed by kim@lab (ED25519 SHA256:"[^\ ]+"), all of it, statement of commit " ]]
+	sed 's/^kim@lab/!lee@lab,*@lab/' signers >wide
+	run -0 --separate-stderr incise verify a.rec --signers wide
+	[[ "$output" == *"a.rec: signed by one of *@lab (ED25519 "* ]]
 	run -0 --separate-stderr incise verify a.rec
 	[[ "$output" == *"a.rec: 1 signature and 0 time-stamps, not checked: give --signers FILE"* ]]
 	incise verify a.rec --signers signers --json | jq -e \

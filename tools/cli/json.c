@@ -71,6 +71,11 @@ json_t *json_text(const char *text)
 	return string;
 }
 
+json_t *json_text_or_null(const char *text)
+{
+	return *text ? json_text(text) : json_null();
+}
+
 json_t *json_with_schema(json_t *object, const char *command)
 {
 	char name[80];

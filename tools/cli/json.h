@@ -14,8 +14,9 @@
 json_t *json_number(double value);
 json_t *json_numbers(const double *values, int n);
 
-/* Text that may hold any bytes: those that are not UTF-8 become '?'. */
+/* Text that may hold any bytes: those that are not UTF-8 become '?'; and null for an empty one. */
 json_t *json_text(const char *text);
+json_t *json_text_or_null(const char *text);
 
 /* An array of the names of the bits that are set, from the lowest on. */
 json_t *json_bits(unsigned int bits, const char *const *names, size_t n);

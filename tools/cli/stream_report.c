@@ -122,7 +122,7 @@ json_t *stream_json(const struct incise_stream *streams, int n)
 				  json_number(s->jitter_max_ms), "offset_ms",
 				  json_number(s->offset_ms), "offset_sd_ms",
 				  json_number(s->offset_sd_ms), "ended",
-				  *s->ended ? json_text(s->ended) : json_null()));
+				  json_text_or_null(s->ended)));
 	}
 	return array;
 }

@@ -279,13 +279,18 @@ static int check_signers(const struct check *check, struct signature *signature,
 	for (char *save,
 	     *signer = keygen.good ? strtok_r(keygen.out, "\r\n", &save) : NULL;
 	     signer && !good && !rc; signer = strtok_r(NULL, "\r\n", &save)) {
+		/* Those that a pattern leaves out are listed, too. */
+		if (*signer == '!')
+			continue;
 		rc = check_signer(check, signature, signer, revoked, &good, err);
 		if (!good)
 			continue;
 		signature->verdict = SIGNATURE_GOOD;
 		*signature->why = 0;
-		copy(signature->signer, sizeof(signature->signer), signer,
-		     strlen(signer));
+		/* A pattern names no one person. */
+		snprintf(signature->signer, sizeof(signature->signer), "%s%s",
+			 strpbrk(signer, "*?") ? "one of " : "", signer);
+		control_characters_hide(signature->signer);
 	}
 	keygen_end(&keygen);
 	return rc;

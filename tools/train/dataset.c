@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Training data described; see dataset.h.
+ * Training data described.
  *
  * A group is an outlier where the mean of a column is further from the median of all groups than
  * LIMIT standard deviations, as estimated by the median distance from that median: neither moves
@@ -13,7 +13,7 @@
 #include "../../lib/base/ascending.h"
 #include "../cli/cli.h"
 #include "../cli/json.h"
-#include "dataset.h"
+#include "sources.h"
 
 #define LIMIT 3.5	 /* Iglewicz and Hoaglin (1993) */
 #define GROUPS_MIN 5	 /* of fewer, none stands out */

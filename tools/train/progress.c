@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Progress of a training; see progress.h. The file: a line with the kind, the number of bytes of the
+ * Progress of a training; see sources.h. The file: a line with the kind, the number of bytes of the
  * key and of each part, then these. The key has the version, the options, and path, size and time of
  * each source, of members of recordings too, with the content of the calibrations in use.
  */
@@ -14,7 +14,7 @@
 #include <incise/outfile.h>
 #include <incise/version.h>
 #include "../cli/cli.h"
-#include "progress.h"
+#include "sources.h"
 
 #define SHARE 10.0 /* of the time between two writings, at least, to that of one */
 

@@ -81,7 +81,8 @@ double incise_envelope_at(const struct incise_envelope *env, double x_ns)
 	return env->y_ns + env->slope * (x_ns - env->x_ns);
 }
 
-double incise_envelope_bend(double span_ns)
+/* Largest distance of a straight line from a clock whose rate changes. */
+static double envelope_bend(double span_ns)
 {
 	/* Change of rate of a crystal that warms up. */
 	const double per_s = 2e-7;
@@ -89,7 +90,8 @@ double incise_envelope_bend(double span_ns)
 	return per_s / 1e9 * span_ns * span_ns / 8;
 }
 
-double incise_envelope_sd(const struct incise_envelope *env, double x_ns)
+/* Standard deviation of line less gap at x. */
+static double envelope_sd(const struct incise_envelope *env, double x_ns)
 {
 	return hypot(env->gap_sd_ns, env->slope_sd * (x_ns - env->x_ns));
 }
@@ -327,7 +329,7 @@ static void draw(struct incise_envelope *env)
 	measure_gap(env, excess, n, span_ns);
 	if (env->grain_ns > 0)
 		measure_grain(env, span_ns);
-	env->gap_sd_ns = hypot(env->gap_sd_ns, incise_envelope_bend(span_ns));
+	env->gap_sd_ns = hypot(env->gap_sd_ns, envelope_bend(span_ns));
 	env->measured_sd = env->slope_sd;
 	env->slope_sd = fabs(slope) < SLOPE_MAX ? fmin(env->slope_sd, env->prior_slope_sd)
 						: SLOPE_SD_NONE;
@@ -407,9 +409,9 @@ static struct incise_timeline_knot knot_at(const struct incise_timeline *timelin
 	uint64_t count = (uint64_t)(x_ns / timeline->period_ns + 0.5);
 	double at_ns = (double)count * timeline->period_ns;
 	double delay_sd_ns = (double)timeline->setup.delay_sd_ns;
-	double sd_ns = incise_envelope_sd(env, at_ns);
+	double sd_ns = envelope_sd(env, at_ns);
 	/* on the way to the next knot */
-	double bend_ns = incise_envelope_bend(timeline->knot_step_ns);
+	double bend_ns = envelope_bend(timeline->knot_step_ns);
 
 	return (struct incise_timeline_knot){
 		.seq = timeline->base_seq + count,
@@ -770,6 +772,6 @@ void incise_timeline_report(const struct incise_timeline *timeline,
 
 		report->offset_ns += env->gap_ns;
 		report->offset_sd_ns = hypot((double)timeline->setup.delay_sd_ns,
-					     incise_envelope_sd(env, x_ns));
+					     envelope_sd(env, x_ns));
 	}
 }

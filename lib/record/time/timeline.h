@@ -71,12 +71,6 @@ bool incise_envelope_add(struct incise_envelope *env, double x_ns, double y_ns);
 /* The line's height at x, without the gap. */
 double incise_envelope_at(const struct incise_envelope *env, double x_ns);
 
-/* Standard deviation of line less gap at x. */
-double incise_envelope_sd(const struct incise_envelope *env, double x_ns);
-
-/* Largest distance of a straight line from a clock whose rate changes. */
-double incise_envelope_bend(double span_ns);
-
 /* All blocks have full length: the line in the middle gets no better. */
 bool incise_envelope_full(const struct incise_envelope *env);
 
