@@ -11,6 +11,7 @@ setup() {
 	incise compile m.fis -o m.fx >/dev/null
 	printf 'tracker = "sim:"; force = "sim:";\n' >rig.conf
 	printf 'tracker = "sim:";\ntracer_setup = { };\n' >typo.conf
+	printf 'tisue = { reaction_N_mm = 0.1; }; rate_hz = 1000;\n' >line.scene
 	printf 'model = "m.fis";\ntisue = { plane_N_mm = 0.1; };\n' >typo.scene
 	printf 'model = "m.fis";\nlimits = { force_mN = 4000; };\n' >unit.scene
 	printf 'depth_mm;velocity_mm_s;force_N\n1,5;20,1;0,3\n' >semicolon.csv
@@ -79,6 +80,7 @@ table() {
 		1|plan livr|livr:|liver
 		1|plan m.fis|m.fis:|.fis
 		1|plan typo.scene|typo.scene:2: tisue:|tissue
+		1|plan line.scene|line.scene:1: tisue:|tissue
 		1|plan unit.scene|unit.scene:2: limits.force_mN:|force_N
 		1|plan m.fx|m.fx:|.fx
 		1|plan stiff.scene|stiff.scene:|0.3997 N/mm|0.00756

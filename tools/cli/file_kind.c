@@ -156,6 +156,9 @@ static enum file_kind kind_of_table(const char *text)
 		text += strcspn(text, "\n");
 		text += *text == '\n';
 	}
+	/* KEY = VALUE; of libconfig, with a key that nobody knows. */
+	if (separators(text, '='))
+		return FILE_UNKNOWN;
 	second = strchr(text, '\n');
 	for (size_t i = 0; i < sizeof(known) / sizeof(*known); i++) {
 		int n = separators(text, known[i].separator);
