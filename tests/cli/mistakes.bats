@@ -94,6 +94,7 @@ table() {
 		1|capture -o x.rec --rig sim:seed=-1|sim:seed=-1:|-1
 		1|capture -o x.rec --rig typo.conf|typo.conf:2: tracer_setup:|tracker_setup
 		1|capture -o x.rec --rig rig.cnf|rig.cnf:|rig.conf
+		1|capture -o x.rec --rig sim|sim:|colon
 		1|capture -o x.rec --rig m.fis|m.fis:|.fis
 		2|capture -o x.rec --rig sim: --camera frmaes|--camera:|frames
 		2|capture -o x.rec --rig sim: --duration 5m|--duration:|'5m'
