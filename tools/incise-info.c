@@ -81,8 +81,8 @@ static const struct cli_command command = {
 		"/dev/incise-stepperN|can:IFACE|"
 		"slcan:TTY|devices|DATA.csv… [OPTIONS]",
 	.summary =
-		"Describe a model, a compiled model, a compiled scene, a factor or a "
-		"recording; the state and cost of the kernel's stepper module; the drives "
+		"Describe a model, a compiled model, a compiled scene, a factor, a "
+		"recording, a scene or a rig; the state and cost of the kernel's stepper module; the drives "
 		"on a CAN bus; or the devices that are attached.",
 	.options = options,
 	.examples = "incise info can:can0",
