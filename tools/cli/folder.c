@@ -14,7 +14,7 @@
 void folder_make(char *path, size_t size, const char *purpose)
 {
 	const char *where = getenv("TMPDIR");
-	int length = snprintf(path, size, "%s/incise-XXXXXX",
+	int length = snprintf(path, size, "%s/incise.XXXXXX",
 			      where && *where ? where : "/tmp");
 
 	if (length >= (int)size)
