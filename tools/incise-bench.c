@@ -135,8 +135,8 @@ static const struct bench *bench_of(int argc, char **argv)
 		if (strcmp(argv[0], bench->name))
 			continue;
 		if (argc - 1 > bench->n_operands)
-			cli_usage("'%s' takes at most %d operand%s, got %d", bench->name,
-				  bench->n_operands, cli_s(bench->n_operands), argc - 1);
+			cli_usage("'%s' takes at most %s, got %d", bench->name,
+				  cli_count(bench->n_operands, "operand"), argc - 1);
 		return bench;
 	}
 	if (!strcmp(argv[0], "view") || !strcmp(argv[0], "all"))

@@ -290,8 +290,8 @@ static void print_comparison(const char *path, const struct comparison *c)
 	char text[UNCERTAINTY_TEXT];
 
 	printf("\n"
-	       "%s: camera minus tracker, in %d frames\n",
-	       path, r->n);
+	       "%s: camera minus tracker, in %s\n",
+	       path, cli_count(r->n, "frame"));
 	printf("         bias     %s (k = 2)\n",
 	       uncertainty_text(r->bias_mm, 2 * r->bias_u_mm, "mm", text));
 	if (isfinite(r->trend))
@@ -367,7 +367,8 @@ int main(int argc, char **argv)
 						   : json_null());
 		json_print(root);
 	} else {
-		printf("%s: %d calibrations in its history\n", options.calibration, n);
+		printf("%s: %s in its history\n", options.calibration,
+		       cli_count(n, "calibration"));
 		for (int k = 0; k < KINDS; k++)
 			if (options.only[k])
 				print_status(&calibration, k, &status[k]);

@@ -298,10 +298,9 @@ static void print_metrics(const struct report *report, FILE *out)
 		fprintf(out, "\n");
 	else
 		fprintf(out, "; the converter ends at %.4g N\n", r->clips_N);
-	fprintf(out,
-		"%-15s %d of %d used, %d loads, %d series; %d saturated, %d outliers\n",
-		"pairs", r->used, r->pairs, r->loads, r->series, r->saturated,
-		r->outliers);
+	fprintf(out, "%-15s %d of %d used, %s, %d series; %d saturated, %s\n", "pairs",
+		r->used, r->pairs, cli_count(r->loads, "load"), r->series, r->saturated,
+		cli_count(r->outliers, "outlier"));
 	if (r->misfit > 1)
 		fprintf(out,
 			"%-15s loads deviate from a line by %.1f times their "

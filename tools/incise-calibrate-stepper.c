@@ -305,8 +305,8 @@ static void put_rate(const struct stepper_rate *rate, FILE *out)
 			"margin of 30 %%: %.0f /s\n",
 			rate->kept_1_s, rate->lost_1_s, rate->lost_mm,
 			0.7 * rate->kept_1_s);
-	fprintf(out, "  %d strokes; detection limit %.4f mm\n", rate->strokes,
-		rate->seen_mm);
+	fprintf(out, "  %s; detection limit %.4f mm\n",
+		cli_count(rate->strokes, "stroke"), rate->seen_mm);
 	if (rate->off_mm != 0)
 		fprintf(out,
 			"  the position count is off by %.4f mm now; run incise "
@@ -343,9 +343,10 @@ static void report_text(const struct report *report, FILE *out)
 	put_budget(fit, out);
 	fprintf(out,
 		"\n"
-		"%d points: %d used, %d saturated, %d outliers, %d excluded after "
+		"%s: %d used, %d saturated, %s, %d excluded after "
 		"reversals\n",
-		fit->points, fit->used, fit->saturated, fit->outliers,
+		cli_count(fit->points, "point"), fit->used, fit->saturated,
+		cli_count(fit->outliers, "outlier"),
 		fit->points - fit->used - fit->saturated - fit->outliers);
 	for (int i = 0; i < series->n && listed < LISTED; i++)
 		if (series->states[i] >= INCISE_CALIBRATE_STEPPER_SATURATED) {

@@ -402,12 +402,12 @@ static void write_report(const struct calibrate_options *common, const struct li
 	fprintf(out,
 		"\n"
 		"Budget           type  u         sensitivity\n"
-		"pose residuals   A     %.4f mm rms, in %d independent blocks of %d; "
+		"pose residuals   A     %.4f mm rms, in %s of %d; "
 		"the covariance is of these\n"
 		"distortion       -     not known; its part that varies with the pose "
 		"is in the residuals\n"
 		"\n",
-		fit->rms_mm, fit->blocks, fit->block);
+		fit->rms_mm, cli_count(fit->blocks, "independent block"), fit->block);
 	fprintf(out,
 		"%d poses, %d accepted; residuals %.4f mm rms, %.4f mm largest, %.4f "
 		"mm rms held out\n"
@@ -512,8 +512,8 @@ int main(int argc, char **argv)
 	if (incise_calibrate_tip(list.poses, list.n, inlier, &fit, &err))
 		cli_fail_with(&err);
 	if (list.doubtful)
-		cli_warn("%d samples were left out that the tracker marks as doubtful",
-			 list.doubtful);
+		cli_warn("left out %s that the tracker marks as doubtful",
+			 cli_count(list.doubtful, "sample"));
 	fill_record(&common->found, &fit, &record);
 	calibrate_stated(common, &record, options.u_surface_mm, "surface_u_mm", "mm",
 			 "Standard uncertainty of the tissue surface of rig.conf along "

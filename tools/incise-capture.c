@@ -582,12 +582,12 @@ static void report(const struct options *options, const struct result *result,
 			json_text_or_null(signing->by)));
 		return;
 	}
-	printf("%s: %.1f s, %llu force samples (%llu clipped), %llu tracker samples, ",
-	       path, result->seconds, (unsigned long long)stats->force,
+	printf("%s: %.1f s, %s (%llu clipped), %s, ", path, result->seconds,
+	       cli_count(stats->force, "force sample"),
 	       (unsigned long long)stats->force_clipped,
-	       (unsigned long long)stats->tracker);
+	       cli_count(stats->tracker, "tracker sample"));
 	if (n > 2)
-		printf("%llu frames, ", (unsigned long long)stats->frames);
+		printf("%s, ", cli_count(stats->frames, "frame"));
 	printf("%llu lost", (unsigned long long)lost);
 	/* A short recording has no zero before it is closed. */
 	if (!isnan(stats->zero_mV))
@@ -612,20 +612,21 @@ _Noreturn static void fail_of_losses(const char *path,
 		uint64_t n;
 		const char *what;
 	} lost[] = {
-		{stats->force_lost, "force samples"},
-		{stats->tracker_lost, "tracker samples"},
-		{stats->frames_lost, "frames"},
+		{stats->force_lost, "force sample"},
+		{stats->tracker_lost, "tracker sample"},
+		{stats->frames_lost, "frame"},
 	};
+	uint64_t sum = stats->force_lost + stats->tracker_lost + stats->frames_lost;
 	char text[200] = "";
 	size_t at = 0;
 
 	for (int i = 0; i < 3; i++)
 		if (lost[i].n)
-			at += (size_t)snprintf(text + at, sizeof(text) - at, "%s%llu %s",
+			at += (size_t)snprintf(text + at, sizeof(text) - at, "%s%s",
 					       at ? ", " : "",
-					       (unsigned long long)lost[i].n,
-					       lost[i].what);
-	cli_fail("%s: %s were lost; the table events lists when", path, text);
+					       cli_count(lost[i].n, lost[i].what));
+	cli_fail("%s: %s %s lost; the table events lists when", path, text,
+		 sum == 1 ? "was" : "were");
 }
 
 /* Warn of points that are not of the source that was named. */

@@ -547,8 +547,8 @@ static void print(const struct doctor *doctor)
 		if (check->state != OK && *check->fix)
 			printf("  %21s→ %s\n", "", check->fix);
 	}
-	printf("\n%d problems, %d warnings\n", count(doctor, PROBLEM),
-	       count(doctor, WARNING));
+	printf("\n%s, %s\n", cli_count(count(doctor, PROBLEM), "problem"),
+	       cli_count(count(doctor, WARNING), "warning"));
 }
 
 static void print_json(const struct doctor *doctor)

@@ -195,9 +195,9 @@ static void eval_grid(struct evaluator *e, const char *size)
 	int n, m, end = 0;
 
 	if (e->n_inputs != 2)
-		cli_fail("--grid: the model has %d inputs, expected 2; give points on "
+		cli_fail("--grid: the model has %s, expected 2; give points on "
 			 "standard input instead",
-			 e->n_inputs);
+			 cli_count(e->n_inputs, "input"));
 	if (sscanf(size, "%dx%d%n", &n, &m, &end) != 2 || size[end] || n < 2 || m < 2 ||
 	    n > 10000 || m > 10000)
 		cli_usage("--grid: expected NxM with 2 to 10000 each, for example "
@@ -325,7 +325,7 @@ static void warn_outside(const struct evaluator *e, bool no_clamp)
 		n += snprintf(support + n, sizeof(support) - (size_t)n,
 			      "%s%.40s %.4g to %.4g", i ? ", " : "", e->input[i].name,
 			      e->input[i].min, e->input[i].max);
-	cli_warn("%lu inputs were out of the training range (%s) and were %s", e->outside,
+	cli_warn("%s out of the training range (%s): %s", cli_count(e->outside, "input"),
 		 support, no_clamp ? "extrapolated" : "clamped to it");
 }
 
@@ -350,9 +350,8 @@ int main(int argc, char **argv)
 	if (e.outside)
 		warn_outside(&e, job.no_clamp);
 	if (e.unfired)
-		cli_warn("%lu inputs were where no rule of the model fires; the nearest "
-			 "rule was used",
-			 e.unfired);
+		cli_warn("%s where no rule of the model fires; the nearest rule was used",
+			 cli_count(e.unfired, "input"));
 	incise_uncertainty_free(e.uncertainty);
 	incise_model_free(e.model);
 	incise_fixed_free(e.fixed);

@@ -236,11 +236,10 @@ int main(int argc, char **argv)
 	if (job.json)
 		print_report(&report, job.output);
 	else if (strcmp(job.output, "-") && !report.cuts && !job.how.resample)
-		printf("wrote %s: %llu messages\n", job.output,
-		       (unsigned long long)report.rows);
+		printf("wrote %s: %s\n", job.output, cli_count(report.rows, "message"));
 	else if (strcmp(job.output, "-"))
-		printf("wrote %s: %llu rows from %d cut%s\n", job.output,
-		       (unsigned long long)report.rows, report.cuts, cli_s(report.cuts));
+		printf("wrote %s: %s from %s\n", job.output,
+		       cli_count(report.rows, "row"), cli_count(report.cuts, "cut"));
 	cli_finish();
 	return 0;
 }

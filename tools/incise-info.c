@@ -206,8 +206,9 @@ static void model_text(const struct incise_model *model, const struct incise_fix
 	const struct incise_variable *v = &info->output;
 	int n = info->n_inputs;
 
-	printf("model %s: %d rules, %d inputs, output %s (%g to %g in the data)\n",
-	       info->name, info->n_rules, n, v->name, v->min, v->max);
+	printf("model %s: %s, %s, output %s (%g to %g in the data)\n", info->name,
+	       cli_count(info->n_rules, "rule"), cli_count(n, "input"), v->name, v->min,
+	       v->max);
 	for (size_t k; *notes; notes += k + (notes[k] == '\n')) {
 		k = strcspn(notes, "\n");
 		printf("%.*s\n", (int)k, notes);
@@ -325,16 +326,18 @@ static void put_formats(const struct incise_fixed *fx)
 
 static void compiled_text(const struct incise_fixed *fx)
 {
-	printf("compiled model %s: %d rules, %d inputs, output %s\n", fx->name,
-	       fx->n_rules, fx->n_inputs, fx->output);
+	printf("compiled model %s: %s, %s, output %s\n", fx->name,
+	       cli_count(fx->n_rules, "rule"), cli_count(fx->n_inputs, "input"),
+	       fx->output);
 	for (int i = 0; i < fx->n_inputs; i++) {
 		const struct incise_fixed_input *in = &fx->input[i];
 
-		printf("input %s, support %.10g to %.10g, %d functions", in->name,
+		printf("input %s, support %.10g to %.10g, %s", in->name,
 		       in->min / (double)INCISE_FIXED_ONE,
-		       in->max / (double)INCISE_FIXED_ONE, in->n_mfs);
+		       in->max / (double)INCISE_FIXED_ONE,
+		       cli_count(in->n_mfs, "function"));
 		if (in->cells)
-			printf(", %d cells of %g", in->cells,
+			printf(", %s of %g", cli_count(in->cells, "cell"),
 			       (double)(1u << in->cell_shift) / INCISE_FIXED_ONE);
 		putchar('\n');
 	}
@@ -483,8 +486,8 @@ static void force_text(const struct incise_recording_info *info)
 {
 	char unit = info->newtons ? 'N' : 'V';
 
-	printf("force    %llu samples, %llu lost, %llu clipped; %d bits over %g %c",
-	       (unsigned long long)info->force, (unsigned long long)info->force_lost,
+	printf("force    %s, %llu lost, %llu clipped; %d bits over %g %c",
+	       cli_count(info->force, "sample"), (unsigned long long)info->force_lost,
 	       (unsigned long long)info->force_clipped, info->bits, info->full_scale_V,
 	       unit);
 	if (info->offset_V != 0)
@@ -683,7 +686,7 @@ static void devices_json(const char *kind, const char *bus, const struct found *
 
 static void devices_text(const char *what, const struct found *found)
 {
-	printf("%s: %d device%s\n", what, found->n, cli_s(found->n));
+	printf("%s: %s\n", what, cli_count(found->n, "device"));
 	for (int i = 0; i < found->n; i++)
 		put_device(&found->answer[i]);
 }
@@ -799,11 +802,11 @@ static void show_factor(const char *path, bool json)
 				     "version", json_text(info.version), "options",
 				     json_text(info.options), "sources", sources));
 	} else {
-		printf("factor of %llu pairs, groups %llu, %d rules, %d inputs\n"
+		printf("factor of %s, groups %llu, %s, %s\n"
 		       "premises   %s\nversion    %s\noptions    %s\n",
-		       (unsigned long long)info.rows, (unsigned long long)info.groups,
-		       info.n_rules, info.n_inputs, info.premises, info.version,
-		       info.options);
+		       cli_count(info.rows, "pair"), (unsigned long long)info.groups,
+		       cli_count(info.n_rules, "rule"), cli_count(info.n_inputs, "input"),
+		       info.premises, info.version, info.options);
 		for (int i = 0; i < info.n_sources; i++)
 			printf("source     %s  %llu pairs, %s\n", info.sources[i].hash,
 			       (unsigned long long)info.sources[i].rows,

@@ -127,10 +127,9 @@ static void print_report(const struct options *options,
 		json_print(object);
 		return;
 	}
-	printf("%d factor%s: %llu pairs of %llu group%s from %d source%s\n", options->n,
-	       cli_s(options->n), (unsigned long long)info->rows,
-	       (unsigned long long)info->groups, cli_s(info->groups), info->n_sources,
-	       cli_s(info->n_sources));
+	printf("%s: %s of %s from %s\n", cli_count(options->n, "factor"),
+	       cli_count(info->rows, "pair"), cli_count(info->groups, "group"),
+	       cli_count(info->n_sources, "source"));
 	if (info->parts < INCISE_FACTOR_FOLDS)
 		printf("%d of %d parts: the factors have small ones joined\n",
 		       info->parts, INCISE_FACTOR_FOLDS);

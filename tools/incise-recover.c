@@ -60,8 +60,9 @@ int main(int argc, char **argv)
 				     (json_int_t)info.tracker, "depth",
 				     (json_int_t)info.depth, "complete", info.complete));
 	else
-		printf("%s: %lld force samples, %lld tracker samples, %.1f s\n", path,
-		       (long long)info.force, (long long)info.tracker,
+		printf("%s: %s, %s, %.1f s\n", path,
+		       cli_count(info.force, "force sample"),
+		       cli_count(info.tracker, "tracker sample"),
 		       (double)(info.end_ns - info.start_ns) * 1e-9);
 	if (!job.json)
 		cli_written();

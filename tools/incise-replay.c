@@ -240,15 +240,15 @@ static void report_text(const struct job *job, double rate_hz,
 			const struct incise_loop_stats *stats,
 			const struct incise_replay_report *r)
 {
-	printf("%s: %.1f s, %llu ticks at %g Hz, %llu poses, %d cut%s\n", job->recording,
-	       r->seconds, (unsigned long long)stats->ticks, rate_hz,
-	       (unsigned long long)r->poses, r->cuts, cli_s(r->cuts));
+	printf("%s: %.1f s, %s at %g Hz, %s, %s\n", job->recording, r->seconds,
+	       cli_count(stats->ticks, "tick"), rate_hz, cli_count(r->poses, "pose"),
+	       cli_count(r->cuts, "cut"));
 	if (r->compared) {
 		printf("predicted  error %.4f N rms", r->rms_N);
 		if (!isnan(relative(r)))
 			printf(" (%.2f %% of the range)", 100 * relative(r));
-		printf(", at most %.4f N at %.3f s, in %llu ticks\n", r->max_N,
-		       r->max_t_s, (unsigned long long)r->compared);
+		printf(", at most %.4f N at %.3f s, in %s\n", r->max_N, r->max_t_s,
+		       cli_count(r->compared, "tick"));
 	} else {
 		printf("predicted  no cut in this recording: nothing to compare\n");
 	}

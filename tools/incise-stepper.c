@@ -430,8 +430,8 @@ static void put_home(const struct edges *edges, const struct stepper_drive *driv
 	long long spread = edges->highest - edges->lowest;
 
 	if (edges->n > 1 && !edges->unknown)
-		printf("%d times within %lld steps, %.4f mm\n", edges->n, spread,
-		       (double)spread * drive->info.step_mm);
+		printf("%d times within %s, %.4f mm\n", edges->n,
+		       cli_count(spread, "step"), (double)spread * drive->info.step_mm);
 	printf("homed, at %.4f mm\n", drive->status.position_mm);
 	fflush(stdout);
 	json_decref(edges->before_mm);

@@ -749,13 +749,13 @@ static void report_text(const struct result *result)
 						    : "unseen pairs";
 	char knn[40];
 
-	printf("%s: %llu pairs to train", options->data, (unsigned long long)fit->rows);
+	printf("%s: %s to train", options->data, cli_count(fit->rows, "pair"));
 	if (options->group)
-		printf(" (%d %s%s)", fit->n_groups, group, cli_s(fit->n_groups));
+		printf(" (%s)", cli_count(fit->n_groups, group));
 	if (check)
 		printf(", %llu to check", (unsigned long long)check->rows);
 	if (check && options->group)
-		printf(" (%d %s%s)", check->n_groups, group, cli_s(check->n_groups));
+		printf(" (%s)", cli_count(check->n_groups, group));
 	if (result->left_out)
 		printf("\nleft out %llu of %llu rows: the blade did not advance",
 		       (unsigned long long)result->left_out,
@@ -764,12 +764,12 @@ static void report_text(const struct result *result)
 	if (options->group && !options->given_group)
 		printf("\ngrouped by %s, as no --group is given (none: each pair by itself)",
 		       options->group);
-	printf("\n%d rules, %d parameters, %d epoch%s (kept %d), ",
-	       incise_model_info(model)->n_rules, report->parameters, report->epochs,
-	       cli_s(report->epochs), report->best_epoch);
-	report->averaged
-		? printf("average of %d fit%s", report->averaged, cli_s(report->averaged))
-		: printf("ridge %g", report->ridge);
+	printf("\n%s, %s, %s (kept %d), ",
+	       cli_count(incise_model_info(model)->n_rules, "rule"),
+	       cli_count(report->parameters, "parameter"),
+	       cli_count(report->epochs, "epoch"), report->best_epoch);
+	report->averaged ? printf("average of %s", cli_count(report->averaged, "fit"))
+			 : printf("ridge %g", report->ridge);
 	printf(", condition %.2g\n", report->condition);
 	printf("  %-22s%12s%14s\n", "RMSE", "training", check ? unseen : "");
 	print_row("this model", report->train_rmse, report->check_rmse);
@@ -1328,8 +1328,8 @@ static void save_factor(const struct options *options, struct incise_factor *fac
 	incise_factor_info(factor, &info);
 	if (!strcmp(options->factor, "-"))
 		return;
-	printf("%s: %llu pairs of %llu groups, premises %.12s\n", options->data,
-	       (unsigned long long)info.rows, (unsigned long long)info.groups,
+	printf("%s: %s of %s, premises %.12s\n", options->data,
+	       cli_count(info.rows, "pair"), cli_count(info.groups, "group"),
 	       info.premises);
 	if (info.parts < INCISE_FACTOR_FOLDS)
 		printf("%d of %d parts, as small ones would reveal their pairs: a merge "

@@ -189,26 +189,25 @@ static void print_table(const struct incise_verify_report *report, const char *p
 	for (int i = 0; i < report->n_streams; i++) {
 		const struct incise_verify_stream *stream = &report->streams[i];
 
-		printf("%-8s %llu expected, %llu present, %llu lost, in %llu blocks",
-		       stream->name, (unsigned long long)stream->expected,
+		printf("%-8s %llu expected, %llu present, %llu lost, in %s", stream->name,
+		       (unsigned long long)stream->expected,
 		       (unsigned long long)stream->present,
 		       (unsigned long long)stream->lost,
-		       (unsigned long long)stream->blocks);
+		       cli_count(stream->blocks, "block"));
 		if (stream->altered)
 			printf(", %llu of them altered",
 			       (unsigned long long)stream->altered);
 		printf("\n");
 	}
 	if (report->frames.checked)
-		printf("%-8s %llu frames as written, %llu missing, %llu altered, %llu "
-		       "without a row\n",
-		       "", (unsigned long long)report->frames.present,
+		printf("%-8s %s as written, %llu missing, %llu altered, %llu without a row\n",
+		       "", cli_count(report->frames.present, "frame"),
 		       (unsigned long long)report->frames.missing,
 		       (unsigned long long)report->frames.altered,
 		       (unsigned long long)report->frames.extra);
 	if (report->sealed)
-		printf("%-8s %llu commits, chained\n", "seal",
-		       (unsigned long long)report->commits);
+		printf("%-8s %s, chained\n", "seal",
+		       cli_count(report->commits, "commit"));
 	else if (!report->commits)
 		printf("%-8s none: made by an older incise\n", "seal");
 	if (recalibrated(path, &active))
@@ -694,10 +693,9 @@ static void vouch_print(const struct vouch *vouch, const struct trust *trust)
 			print_line(vouch, line);
 	}
 	if (vouch->n_lines && !trust->signers.path)
-		printf("%s: %d signature%s and %d time-stamp%s, not checked: give "
-		       "--signers FILE\n",
-		       vouch->recording, kinds[0], cli_s(kinds[0]), kinds[1],
-		       cli_s(kinds[1]));
+		printf("%s: %s and %s, not checked: give --signers FILE\n",
+		       vouch->recording, cli_count(kinds[0], "signature"),
+		       cli_count(kinds[1], "time-stamp"));
 }
 
 static json_t *vouch_json(const struct vouch *vouch)

@@ -30,10 +30,10 @@ finding() { # GROUP NAME
 	# expects them; the space may change by a minute's worth meanwhile
 	[[ "$(finding disk free)" =~ ok\ +free\ +([0-9.]+)\ GiB\ here:\ ([0-9]+)\ min ]]
 	holds "${BASH_REMATCH[1]} < 2 || (${BASH_REMATCH[2]} / (${BASH_REMATCH[1]} * 1073741824 / (10000 * 18 + 120 * 180) / 60) - 1) ^ 2 < 0.03 ^ 2"
-	[[ "${lines[-1]}" =~ ^[0-9]+\ problems,\ [0-9]+\ warnings$ ]]
+	[[ "${lines[-1]}" =~ ^[0-9]+\ problems?,\ [0-9]+\ warnings?$ ]]
 	# scheduling and memory are of this machine
 	problems=$(grep -c "^  problem " <<<"$output" || :)
-	[[ "${lines[-1]}" == "$problems problems, "* ]]
+	[[ "${lines[-1]}" == "$problems problem"* ]]
 	[ "$status" -eq $((problems > 0)) ]
 	[ "$problems" -eq "$(awk '/^[a-z]/ { group = $0 } /^  problem / && group == "real time"' <<<"$output" | wc -l)" ]
 }

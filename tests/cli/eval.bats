@@ -70,10 +70,10 @@ refuses() {
 	run -0 --separate-stderr incise eval gap.fis <<<$'1\n4.9\n5.1\n9'
 	[ "${lines[*]}" = "1 1 0 0" ]
 	[ "${#stderr_lines[@]}" -eq 1 ]
-	[[ "$stderr" == "incise eval: warning: 2 inputs were where no rule"* ]]
+	[[ "$stderr" == "incise eval: warning: 2 inputs where no rule"* ]]
 	run -0 --separate-stderr incise eval gap.fis --json <<<$'4.9\n11'
 	[ "${#stderr_lines[@]}" -eq 2 ]
-	[[ "${stderr_lines[0]}" == *"warning: 1 inputs were out of the training range"* ]]
+	[[ "${stderr_lines[0]}" == *"warning: 1 input out of the training range"* ]]
 	echo "$output" >r.json
 	[ "$(key r.json 'rows[0].extrapolated')" = 1 ]
 }
@@ -126,7 +126,7 @@ refuses() {
 @test "eval outside the support takes its nearest end and says so" {
 	run -0 --separate-stderr incise eval m.fis <<<$'-3 20\n25 20\n5 60\n5 20'
 	[ "${#stderr_lines[@]}" -eq 1 ]
-	[[ "$stderr" == "incise eval: warning: 3 inputs were out of the training range (depth_mm 0 to 20, velocity_mm_s 0 to 50) and were clamped to it" ]]
+	[[ "$stderr" == "incise eval: warning: 3 inputs out of the training range (depth_mm 0 to 20, velocity_mm_s 0 to 50): clamped to it" ]]
 	[ "${lines[0]}" = "$(echo '0 20' | incise eval m.fis)" ]
 	[ "${lines[1]}" = "$(echo '20 20' | incise eval m.fis)" ]
 	[ "${lines[2]}" = "$(echo '5 50' | incise eval m.fis)" ]

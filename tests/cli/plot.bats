@@ -103,7 +103,7 @@ shows() {
 @test "little data and a flat model are drawn too" {
 	printf 'depth_mm,force_N\n1,2\n' >one.csv
 	draws one.csv
-	shows "one.csv: 1 rows"
+	shows "one.csv: 1 row"
 	sed -E "s/^(MF[0-9]+='out1mf[0-9]+':'linear',).*/\1[0 0 0]/" m.fis >flat.fis
 	! cmp -s m.fis flat.fis
 	draws flat.fis --data pairs.csv

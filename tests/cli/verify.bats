@@ -77,7 +77,7 @@ tampered() {
 	tampered "DELETE FROM force WHERE seq = 12345" \
 		"a.rec: force: 1 missing, number 12345, before 1.2346 s" "force: block 12 is altered"
 	tampered "INSERT INTO force SELECT 30000, t_ns + 100000, code FROM force
-		WHERE seq = 29999" "force: 1 rows after the end of the ledger"
+		WHERE seq = 29999" "force: 1 row after the end of the ledger"
 	tampered "DELETE FROM force WHERE seq >= 29000;
 		DELETE FROM ledger WHERE stream = 'force' AND block >= 29" \
 		"the ledger has no end: its last blocks were removed" "1000 lost"

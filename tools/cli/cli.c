@@ -703,6 +703,17 @@ char *cli_text(const char *fmt, ...)
 	return text;
 }
 
+const char *cli_count(uint64_t n, const char *noun)
+{
+	static char texts[8][48];
+	static unsigned int calls;
+	char *text = texts[calls++ % 8];
+
+	snprintf(text, sizeof(texts[0]), "%llu %s%s", (unsigned long long)n, noun,
+		 n == 1 ? "" : "s");
+	return text;
+}
+
 bool cli_ends_with(const char *text, const char *end)
 {
 	size_t n = strlen(text), m = strlen(end);

@@ -253,8 +253,8 @@ void *cli_alloc(size_t n, size_t size);
 void *cli_resize(void *memory, size_t n, size_t size);
 char *cli_text(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
-/* The end of a noun behind a number: "1 cut", "2 cuts". */
-#define cli_s(n) ((n) == 1 ? "" : "s")
+/* "1 cut", "3 cuts"; it lasts for seven more calls. */
+const char *cli_count(uint64_t n, const char *noun);
 
 bool cli_ends_with(const char *text, const char *end);
 

@@ -20,7 +20,7 @@ static void print_times(const struct incise_session_info *member)
 	       member->uncertainty_ns * 1e-6, same ? "the same clock" : "by ",
 	       same ? "" : member->method);
 	if (member->matches)
-		printf(" (%d mark%s)", member->matches, cli_s(member->matches));
+		printf(" (%s)", cli_count(member->matches, "mark"));
 	printf("\n");
 	if (!isnan(member->agreement_ns))
 		printf("  signal less clocks: %.6g ms, within %.3g ms\n",

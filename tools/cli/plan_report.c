@@ -41,7 +41,7 @@ void plan_report_text(const struct incise_plan_file_info *info)
 	surface_text(info);
 	printf("tissue   %s", info->model ? "a model" : "a spring");
 	if (info->inserts)
-		printf("; handle and tube, up to %d cuts%s", info->cuts_most,
+		printf("; handle and tube, up to %s%s", cli_count(info->cuts_most, "cut"),
 		       info->tube ? ", the tube with a station of its own" : "");
 	putchar('\n');
 	axes_text(info);

@@ -153,16 +153,16 @@ char *scene_argument_size(const char *path, const struct incise_surface *surface
 		cli_warn("%s: its surface is %.2g mm wide; is it in metres? write its "
 			 "coordinates in mm",
 			 path, fmax(fmax(mm[0], mm[1]), mm[2]));
-	text = cli_text("%.4g x %.4g x %.4g mm, %zu triangles", mm[0], mm[1], mm[2],
-			incise_surface_triangles(surface));
+	text = cli_text("%.4g x %.4g x %.4g mm, %s", mm[0], mm[1], mm[2],
+			cli_count(incise_surface_triangles(surface), "triangle"));
 	if (s.open_edges) {
 		char *before = text;
 
-		text = cli_text("%s, %zu open edges from (%.4g, %.4g, %.4g) to (%.4g, "
+		text = cli_text("%s, %s from (%.4g, %.4g, %.4g) to (%.4g, "
 				"%.4g, %.4g)",
-				before, s.open_edges, s.open_lo_mm[0], s.open_lo_mm[1],
-				s.open_lo_mm[2], s.open_hi_mm[0], s.open_hi_mm[1],
-				s.open_hi_mm[2]);
+				before, cli_count(s.open_edges, "open edge"),
+				s.open_lo_mm[0], s.open_lo_mm[1], s.open_lo_mm[2],
+				s.open_hi_mm[0], s.open_hi_mm[1], s.open_hi_mm[2]);
 		free(before);
 	}
 	return text;

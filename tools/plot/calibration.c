@@ -210,10 +210,10 @@ FILE *figure_of_calibration(const struct figure *figure)
 	fputs("set multiplot title ", script);
 	plot_put_text(script, figure->path);
 	fprintf(script,
-		".': %d calibrations' noenhanced\n"
+		".': %s' noenhanced\n"
 		"set key outside top center horizontal\nset offsets 0, 0, graph 0.1, graph "
 		"0.1\nset size %g,%g\n",
-		history.n, 1.0 / COLUMNS, share);
+		cli_count(history.n, "calibration"), 1.0 / COLUMNS, share);
 	for (int i = 0; i < history.n_series; i++) {
 		char *name = cli_text("series-%d.dat", i);
 

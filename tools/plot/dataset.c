@@ -283,7 +283,7 @@ static void put_title(FILE *script, const struct table *table, const char *path)
 {
 	fputs("set multiplot title ", script);
 	plot_put_text(script, path);
-	fprintf(script, ".': %zu rows", table->n);
+	fprintf(script, ".': %s", cli_count(table->n, "row"));
 	if (table->left_out)
 		fprintf(script, " and %zu left out, %s", table->left_out,
 			!strcmp(table->where, "cut")

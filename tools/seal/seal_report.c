@@ -52,7 +52,7 @@ static void count(const json_t *at, const char *key, const char *what)
 	json_int_t n = json_integer_value(json_object_get(at, key));
 
 	if (n)
-		printf(", %d %s%s", (int)n, what, cli_s(n));
+		printf(", %s", cli_count((uint64_t)n, what));
 }
 
 void seal_report_print(const json_t *list)

@@ -513,8 +513,9 @@ struct clients *clients_new(const struct clients_setup *setup)
 
 int clients_summary(const struct clients *clients, char *text, size_t size)
 {
-	return snprintf(text, size, "%d client%s, %llu sent, %llu lost", clients->n,
-			cli_s(clients->n), (unsigned long long)clients->sent,
+	return snprintf(text, size, "%s, %llu sent, %llu lost",
+			cli_count(clients->n, "client"),
+			(unsigned long long)clients->sent,
 			(unsigned long long)clients->lost);
 }
 

@@ -189,18 +189,16 @@ static void ticks(FILE *out, const struct state_look *look)
 		fprintf(out, ", %.2f Hz now", look->measured_hz);
 	if (isfinite(mean_hz(now)))
 		fprintf(out, ", %.2f Hz on average", mean_hz(now));
-	fprintf(out,
-		"\nticks      %" PRIu64 ", %" PRIu64 " missed in %" PRIu64 " overrun%s\n",
-		now->ticks, now->skipped, now->overruns, cli_s(now->overruns));
+	fprintf(out, "\nticks      %" PRIu64 ", %" PRIu64 " missed in %s\n", now->ticks,
+		now->skipped, cli_count(now->overruns, "overrun"));
 	if (!now->ticks)
 		return;
 	times(out, "lateness", &now->lateness, now->lateness_max_ns);
 	times(out, "tick", &now->cost, now->cost_max_ns);
 	flags(out, now);
 	fprintf(out, "tool       %s\n", loop_tool_names[now->tick.tool]);
-	fprintf(out,
-		"force      %.3f N now, %.3f N at most, limited in %" PRIu64 " ticks\n",
-		now->force_N, now->force_max_N, now->limited);
+	fprintf(out, "force      %.3f N now, %.3f N at most, limited in %s\n",
+		now->force_N, now->force_max_N, cli_count(now->limited, "tick"));
 	if (look->model) {
 		fputs("model      ", out);
 		model_force_print(out, look->model);
@@ -236,10 +234,9 @@ void state_report_line(FILE *out, const struct state_look *look)
 	if (isfinite(look->measured_hz))
 		fprintf(out, ", %.1f Hz", look->measured_hz);
 	fprintf(out,
-		", %" PRIu64 " ticks, %" PRIu64
-		" skipped, late 99.9 %% %.3g max %.1f us, "
+		", %s, %" PRIu64 " skipped, late 99.9 %% %.3g max %.1f us, "
 		"%.3f N, %.2f mm, %s, %s",
-		now->ticks, now->skipped,
+		cli_count(now->ticks, "tick"), now->skipped,
 		quantile_us(&now->lateness, 0.999, now->lateness_max_ns),
 		(double)now->lateness_max_ns * 1e-3, now->force_N, now->tick.depth_mm,
 		loop_tool_names[now->tick.tool],

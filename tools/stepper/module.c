@@ -337,18 +337,17 @@ static void put_sync(const struct controller *controller)
 	else if (!sync->period_ns)
 		puts("sync       off");
 	else
-		printf("sync       every %g ms for %g us: %" PRIu64 " pulses, %" PRIu64
-		       " left out\n",
+		printf("sync       every %g ms for %g us: %s, %" PRIu64 " left out\n",
 		       (double)sync->period_ns * 1e-6, sync->width_ns * US,
-		       (uint64_t)sync->pulses, (uint64_t)sync->missed);
+		       cli_count(sync->pulses, "pulse"), (uint64_t)sync->missed);
 }
 
 static void put_text(const struct controller *controller)
 {
 	const struct incise_stepper_controller *info = &controller->info;
 
-	printf("%s: %.*s, %u motor%s\n", controller->path, (int)sizeof(info->name),
-	       info->name, info->n_motors, cli_s(info->n_motors));
+	printf("%s: %.*s, %s\n", controller->path, (int)sizeof(info->name), info->name,
+	       cli_count(info->n_motors, "motor"));
 	printf("self-test  99 %% of timers at most %.3f us late, the latest %.3f us; an edge "
 	       "takes %.3f us\n           so at most %.1f kHz, pulses of at least %.3f us, ticks of "
 	       "at least %g us; timers of %u ns\n",

@@ -106,11 +106,10 @@ static void show_text(const struct dataset *data)
 {
 	int outliers = 0, n = incise_corpus_sources(data->corpus);
 
-	printf("%d source%s, %llu rows", n, cli_s(n),
-	       (unsigned long long)incise_corpus_side(data->corpus, false)->rows);
+	printf("%s, %s", cli_count(n, "source"),
+	       cli_count(incise_corpus_side(data->corpus, false)->rows, "row"));
 	if (data->options->group)
-		printf(", %d group%s by %s", data->n, cli_s(data->n),
-		       data->options->group);
+		printf(", %s by %s", cli_count(data->n, "group"), data->options->group);
 	if (data->left_out)
 		printf("; the blade did not advance in %llu more",
 		       (unsigned long long)data->left_out);
@@ -122,10 +121,9 @@ static void show_text(const struct dataset *data)
 		const struct incise_corpus_survey *survey =
 			incise_corpus_source(data->corpus, s);
 
-		printf("%.12s  %10llu rows", survey->hash,
-		       (unsigned long long)survey->rows);
+		printf("%.12s  %15s", survey->hash, cli_count(survey->rows, "row"));
 		if (data->options->group)
-			printf(" %4d groups", survey->n_groups);
+			printf(" %11s", cli_count(survey->n_groups, "group"));
 		print_source(survey->text);
 	}
 	for (int i = 0; i < data->n && data->options->group; i++) {

@@ -151,11 +151,11 @@ void view_output_print(const struct view_output *output)
 	unsigned long long n = output->frames;
 
 	if (output->film_path)
-		printf("wrote %s: %llu frame%s, %.1f s\n", output->film_path, n, cli_s(n),
+		printf("wrote %s: %s, %.1f s\n", output->film_path, cli_count(n, "frame"),
 		       (double)n / output->fps);
 	if (output->strip_path)
-		printf("wrote %s: %d frame%s\n", output->strip_path, output->stripped,
-		       cli_s(output->stripped));
+		printf("wrote %s: %s\n", output->strip_path,
+		       cli_count(output->stripped, "frame"));
 	if (output->folder && n)
 		printf("wrote %s/frame-000000.png to frame-%06llu.png\n", output->folder,
 		       n - 1);

@@ -309,9 +309,10 @@ static int take_extra(struct walk *walk)
 	found.last_ns = walk->last_ns;
 	incise_verify_found(
 		walk->verify, &found,
-		"%s: %llu rows after the end of the ledger, numbers %lld to %lld",
+		"%s: %llu row%s after the end of the ledger, numbers %lld to %lld",
 		walk->form->stream, (unsigned long long)found.count,
-		(long long)found.first_seq, (long long)found.last_seq);
+		found.count == 1 ? "" : "s", (long long)found.first_seq,
+		(long long)found.last_seq);
 	return rc;
 }
 
