@@ -23,12 +23,12 @@ setup_file() {
 	rm -f bare.rec/recording.db-shm
 	python3 "$BATS_TEST_DIRNAME/hot_journal.py" closed.rec journal.rec
 	python3 "$BATS_TEST_DIRNAME/hot_journal.py" closed.rec hostile.rec "$PWD/victim"
+	echo precious >victim
 }
 
 setup() {
 	work_folder
 	cp -r "$BATS_FILE_TMPDIR"/*.rec .
-	echo precious >"$BATS_FILE_TMPDIR/victim"
 	cp "$root/scenes/liver.fis" m.fis
 	mkdir out tmp
 	export TMPDIR=$PWD/tmp
