@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # The shared objects.
 
-sources = $(sort $(foreach layer,$(layers_$1),$(wildcard lib/$(layer)/*.c lib/$(layer)/*.cc)))
+# The keys of rig.conf that a device brings are read where its module is not, too.
+sources = $(sort $(foreach layer,$(layers_$1),$(wildcard lib/$(layer)/*.c lib/$(layer)/*.cc lib/$(layer)/*/*_settings.c)))
 # also_LIB: objects of another library that does not export them; this one has its own copy.
 objects = $(addprefix $(O)/obj/,$(addsuffix .o,$(basename $(call sources,$1))) $(also_$1))
 

@@ -8,7 +8,10 @@
 #include <incise/backend.h>
 #include "../base/settings.h"
 
-/* The keys of the groups actuator, actuator.can and actuator.lines, in a struct incise_actuator. */
+/*
+ * The keys of the group actuator, and of its groups can and lines, which the folders of these devices
+ * bring: all in a struct incise_actuator.
+ */
 extern const struct incise_setting incise_actuator_settings[],
 	incise_actuator_can_settings[], incise_actuator_line_settings[];
 
@@ -18,5 +21,16 @@ int incise_actuator_read(struct incise_actuator *actuator, const config_setting_
 
 /* The largest accepted position_gain_1_s of csv: half of the stable one. */
 double incise_actuator_can_gain_1_s(double cycle_s);
+
+/*
+ * What the keys of lines, in @group, and of @can are to each other and to the others. 0 or -EINVAL; @err
+ * names file, line, key and what to do.
+ */
+int incise_actuator_lines_check(const struct incise_actuator *actuator,
+				const config_setting_t *group, const char *path,
+				struct incise_error *err);
+int incise_actuator_can_check(const struct incise_actuator *actuator,
+			      const config_setting_t *can, const char *path,
+			      struct incise_error *err);
 
 #endif
