@@ -543,8 +543,9 @@ static int plan_file(struct incise_rig_plan *plan, const char *path,
 	int rc = incise_conf_read(&config, path, err);
 
 	if (rc == -ENOENT && !strcmp(path, SIM_BACKEND))
-		return incise_error_set(err, ENOENT,
-					"sim: no such file; did you mean sim: with a colon?");
+		return incise_error_set(
+			err, ENOENT,
+			"sim: no such file; did you mean sim: with a colon?");
 	if (rc)
 		return rc;
 	rc = plan_root(plan, config_root_setting(&config), path, err);
