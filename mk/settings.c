@@ -5,6 +5,7 @@
  *   TABLE <tab> KEY <tab> UNIT <tab> RANGE <tab> DEFAULT <tab> MEANING
  */
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "../lib/device/actuator.h"
 #include "../lib/device/rig_plan.h"
@@ -43,12 +44,36 @@ static void print_kind(const struct incise_setting *row)
 		printf("%s", *row->unit ? row->unit : number);
 }
 
+/* 1e6, not 1000000 or 1e+06. */
+static void print_number(double value)
+{
+	char text[32], *exponent;
+	size_t length;
+	int zeros = 0;
+
+	snprintf(text, sizeof(text), "%.10g", value);
+	for (length = strlen(text); length > 1 && text[length - 1] == '0'; length--)
+		zeros++;
+	exponent = strchr(text, 'e');
+	if (zeros >= 6 && !exponent)
+		printf("%.*se%d", (int)length, text, zeros);
+	else if (exponent)
+		printf("%.*se%d", (int)(exponent - text), text, atoi(exponent + 1));
+	else
+		printf("%s", text);
+}
+
+/* That of coordinates, up to 1e6, stands once in the page. */
 static void print_range(const struct incise_setting *row)
 {
-	if (row->kind == SETTING_IS_DIRECTION)
+	if (row->kind == SETTING_IS_DIRECTION) {
 		printf("direction");
-	else if (row->kind < SETTING_IS_DIRECTION && row->max - row->min < 2e6)
-		printf("%.10g..%.10g", row->min, row->max);
+	} else if (row->kind < SETTING_IS_DIRECTION &&
+		   !(elements(row) == 3 && row->min == -1e6 && row->max == 1e6)) {
+		print_number(row->min);
+		printf("..");
+		print_number(row->max);
+	}
 }
 
 static void print_default(const struct incise_setting *row)

@@ -874,7 +874,8 @@ int main(int argc, char **argv)
 		cli_usage("--group and --all-rows go with --dataset");
 	path = cli_operand(argc, argv, "FILE", "recording, model or plan; or a device");
 	kind = file_kind_of(path);
-	rig = kind == FILE_RIG || !strcmp(path, "rig") || !strncmp(path, "sim:", 4);
+	rig = kind == FILE_RIG || !strcmp(path, "rig") || !strcmp(path, "sim") ||
+	      !strncmp(path, "sim:", 4);
 	if (!rig && !stepper_module_is(path) && strcmp(path, "devices") && !is_bus(path))
 		file_expect(path, FILE_RECORDING | FILE_MODEL | FILE_COMPILED |
 					  FILE_PLAN | FILE_FACTOR | FILE_SCENE);

@@ -170,19 +170,14 @@ static void value_of_setting(struct value *value, const config_setting_t *settin
 	}
 }
 
-/* "[a, b]": of a default. */
+/* "[a, b]": of a default; users write no arrays as text. */
 static void value_of_array(struct value *value, const char *text)
 {
-	char *end;
+	char *end = (char *)text;
 
-	value->array = true;
-	for (value->n = 0; *text == '[' || *text == ','; text = end) {
-		text += strspn(text, "[, ");
-		value->number[value->n++] = incise_decimal(text, &end);
-		if (end == text || value->n == SETTING_NUMBERS_MAX)
-			break;
-	}
-	value->form = NUMBERS;
+	*value = (struct value){.form = NUMBERS, .array = true};
+	for (; *end == '[' || *end == ','; value->n++)
+		value->number[value->n] = incise_decimal(end + 1, &end);
 }
 
 /* A text of the kind of @row. */
@@ -198,8 +193,6 @@ static void value_of_text(struct value *value, const struct incise_setting *row,
 		value->number[0] = !strcmp(text, "true");
 		if (*value->number || !strcmp(text, "false"))
 			value->form = TRUTH;
-	} else if (*text == '[') {
-		value_of_array(value, text);
 	} else {
 		value->number[0] = incise_decimal(text, &end);
 		if (end != text && !*end)
@@ -216,13 +209,22 @@ static int word_index(const struct incise_setting *row, const char *word)
 	return -1;
 }
 
+/* Whether an index, of a member, is one of a word. */
+static bool has_word(const struct incise_setting *row, double index)
+{
+	for (int i = 0; row->words[i]; i++)
+		if (i == index)
+			return true;
+	return false;
+}
+
 static bool numbers_fit(const struct incise_setting *row, const struct value *value)
 {
 	double unit[3];
 	int most = elements(row);
 
-	if (value->form != NUMBERS || value->array != is_array(row) || value->n < 1 ||
-	    value->n > most || (!row->count && value->n != most))
+	if (value->form != NUMBERS || value->array != is_array(row) || value->n > most ||
+	    (!row->count && value->n != most) || (value->n < 1 && *row->initial != '('))
 		return false;
 	for (int i = 0; i < value->n; i++)
 		if (!(value->number[i] >= row->min && value->number[i] <= row->max) ||
@@ -239,7 +241,8 @@ static bool fits(const struct incise_setting *row, const struct value *value)
 
 	switch (row->kind) {
 	case SETTING_IS_TRUTH:
-		good = value->form == TRUTH;
+		good = value->form == TRUTH &&
+		       (value->number[0] == 0 || value->number[0] == 1);
 		break;
 	case SETTING_IS_WORD:
 		good = value->form == TEXT && word_index(row, value->text) >= 0;
@@ -254,7 +257,7 @@ static bool fits(const struct incise_setting *row, const struct value *value)
 	return good && (!row->fits || row->fits(value->number, value->n, value->text));
 }
 
-/* Numbers, or true and false. */
+/* Numbers, true and false, or the index of a word. */
 static void value_of_member(struct value *value, const struct incise_setting *row,
 			    const void *of)
 {
@@ -337,7 +340,10 @@ static void init(const struct incise_setting *row, void *to)
 		for (row = row->rows; row->key; row++)
 			init(row, to);
 	} else if (row->kind != SETTING_IS_OWN && *row->initial != '(') {
-		value_of_text(&value, row, row->initial);
+		if (*row->initial == '[')
+			value_of_array(&value, row->initial);
+		else
+			value_of_text(&value, row, row->initial);
 		store(row, &value, to);
 	}
 }
@@ -469,10 +475,11 @@ int incise_settings_check(const struct incise_setting *rows, const char *group,
 	char expected[200], found[SETTING_TEXT_MAX];
 
 	for (; rows->key; rows++) {
-		if (rows->kind > SETTING_IS_TRUTH)
+		if (rows->kind > SETTING_IS_WORD)
 			continue;
 		value_of_member(&value, rows, of);
-		if (fits(rows, &value))
+		if (rows->kind == SETTING_IS_WORD ? has_word(rows, *value.number)
+						  : fits(rows, &value))
 			continue;
 		say_expected(rows, expected, sizeof(expected));
 		snprintf(found, sizeof(found), "%d numbers", value.n);
@@ -498,7 +505,8 @@ static void numbers_text(const struct incise_setting *row, const void *of, char 
 
 	for (int i = 0; i < n; i++) {
 		snprintf(one, sizeof(one), "%.15g", get_number(row, of, i));
-		whole &= !strpbrk(one, ".en");
+		whole &=
+			!strpbrk(one, ".en") && fabs(get_number(row, of, i)) <= INT32_MAX;
 	}
 	for (int i = 0; i < n && length < size; i++) {
 		snprintf(one, sizeof(one), "%.15g", get_number(row, of, i));
@@ -520,7 +528,7 @@ void incise_setting_quoted(const char *from, char *text, size_t size)
 	for (; *from && length + 4 < size; from++) {
 		if (*from == '"' || *from == '\\')
 			text[length++] = '\\';
-		text[length++] = (unsigned char)*from < ' ' ? '?' : *from;
+		text[length++] = (unsigned char)*from < ' ' || *from == 127 ? '?' : *from;
 	}
 	text[length++] = '"';
 	text[length] = '\0';
@@ -549,12 +557,12 @@ void incise_setting_text(const struct incise_setting *row, const void *of, char 
 		;
 	else if (row->kind == SETTING_IS_TEXT)
 		incise_setting_quoted(get_text(row, of), text, size);
-	else if (row->kind == SETTING_IS_WORD)
+	else if (row->kind == SETTING_IS_WORD && has_word(row, get_number(row, of, 0)))
 		incise_setting_quoted(row->words[(int)get_number(row, of, 0)], text,
 				      size);
 	else if (row->kind == SETTING_IS_TRUTH)
 		snprintf(text, size, "%s", get_number(row, of, 0) ? "true" : "false");
-	else if (row->kind <= SETTING_IS_DIRECTION)
+	else if (row->kind <= SETTING_IS_WORD)
 		numbers_text(row, of, text, size);
 	incise_c_locale_end(locale);
 }
@@ -576,8 +584,8 @@ static void as_written(const config_setting_t *setting, char *text, size_t size)
 				      text + length, size - length);
 		length = strlen(text);
 	}
-	if (n && length + 2 < size)
-		strcpy(text + length, "]");
+	if (setting && config_setting_is_aggregate(setting) && length + 3 < size)
+		strcpy(text + length, n ? "]" : "[]");
 }
 
 void incise_settings_put(struct incise_settings_list *list,
@@ -611,7 +619,11 @@ void incise_settings_list(struct incise_settings_list *list,
 		if (rows->kind == SETTING_IS_GROUP ||
 		    (setting && config_setting_is_group(setting)))
 			continue;
-		if (rows->kind == SETTING_IS_OWN)
+		if (rows->kind == SETTING_IS_OWN && !setting && *rows->initial &&
+		    *rows->initial != '(')
+			incise_setting_quoted(rows->initial, text, sizeof(text));
+		else if (rows->kind == SETTING_IS_OWN ||
+			 (setting && rows->kind == SETTING_IS_TEXT))
 			as_written(setting, text, sizeof(text));
 		else
 			incise_setting_text(rows, of, text, sizeof(text));

@@ -74,7 +74,7 @@ static void actuator(struct rig_list *rig, int axis)
 	struct incise_actuator shown = rig->plan->actuator[axis];
 	char prefix[40], inner[60];
 
-	if (axis < rig->plan->n_axes)
+	if (axis < rig->plan->n_axes && is_real(device))
 		memcpy(shown.direction, rig->plan->direction[axis],
 		       sizeof(shown.direction));
 	if (group && config_setting_is_list(group))
@@ -140,7 +140,8 @@ static bool in_shorthand(const char *spec, const char *key)
 
 	for (const char *word = spec + 3; word; word = strchr(word, ',')) {
 		word++;
-		if ((!strncmp(word, key, length) && word[length] == '=') ||
+		if ((!strncmp(word, key, length) &&
+		     (word[length] == '=' || word[length] == '[')) ||
 		    (!strcmp(key, "motion") && !strncmp(word, "mouse", 5) &&
 		     (!word[5] || word[5] == ',')))
 			return true;

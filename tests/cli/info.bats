@@ -26,6 +26,8 @@ setup() {
 	run -0 --separate-stderr incise info a.scene --all
 	[[ "$output" =~ $'\n'"limits.force_N "+"4 N "+"default" ]]
 	[[ "$output" != *membrane* ]]
+	echo 'criteria = { cut_length_mm = [1, 2]; };' >>a.scene
+	incise info a.scene --all | grep -Eq '^criteria.membrane +- +default$'
 	printf 'sim = { seed = 3; };\n' >rig.conf
 	for rig in rig rig.conf sim:seed=3; do
 		incise info "$rig" --json >r.json

@@ -103,7 +103,7 @@ TEST(refused_with_file_line_key_and_value)
 		{"normal = [0.0, 1e-7, 0.0];", {":1: normal:", "1e-07"}},
 		{"pair = [1];", {":1: pair:", "[1]"}},
 		{"pair = [1, 2, 3];", {":1: pair:", "[1, 2, 3]"}},
-		{"most = [];", {":1: most:", "[]"}},
+		{"pair = [];", {":1: pair:", "[]"}},
 		{"most = [1, 2, 3, 4, 5, 6];", {":1: most:", "[1, 2, 3, 4, … 6 values]"}},
 		{"most = [1, 10];", {":1: most:", "[1, 10]"}},
 		{"most = 1;", {":1: most:", "1"}},
@@ -240,6 +240,10 @@ TEST(check_finds_what_no_file_can_set)
 	c.n_most = 5;
 	assert_int_equal(incise_settings_check(rows, "sim", &c, NULL), -EINVAL);
 	c.n_most = 1;
+	c.word = 7;
+	assert_error(incise_settings_check(rows, "sim", &c, &err), EINVAL, &err,
+		     "sim.word:");
+	c.word = 1;
 	c.number = NAN;
 	assert_error(incise_settings_check(rows, "sim", &c, &err), EINVAL, &err,
 		     "sim.number:", "nan");
