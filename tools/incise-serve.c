@@ -130,7 +130,7 @@ static void open_source(struct run *run, struct job *job)
 	run->source = job->rig	  ? serve_rig_open(&job->source, &run->info)
 		      : recording ? serve_recording_open(&job->source, &run->info)
 				  : serve_loop_open(&job->source, &run->info);
-	/* What is wrong with the rig is said first. */
+	/* Faults of the rig are said first. */
 	if (job->rig && !calibration.path)
 		calibration_use(&calibration, job->calibration, job->rig);
 	run->stream = serve_stream_new(run->source, job->source.rate_hz);

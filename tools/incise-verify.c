@@ -549,7 +549,7 @@ static const struct seal_file *statement_of(const struct seal_files *files, int 
 }
 
 /* Statements are newest first. An older state that was signed, too, does not replace a newer one. */
-static void judge(struct vouch *vouch)
+static void judge_vouch(struct vouch *vouch)
 {
 	bool newest = true;
 
@@ -607,7 +607,7 @@ static void vouch_check(struct vouch *vouch, const char *recording, bool member,
 				check_line(vouch, &files.all[i],
 					   statement_of(&files, files.all[i].number),
 					   trust);
-	judge(vouch);
+	judge_vouch(vouch);
 	seal_files_free(&files);
 }
 

@@ -101,7 +101,7 @@ static bool on_path(const char *name)
 	return found;
 }
 
-/* What other programs call it. */
+/* Names of commands in other programs. */
 static const char *const synonyms[][2] = {
 	{"record", "capture"}, {"learn", "train"},    {"run", "haptic"},
 	{"show", "view"},      {"convert", "export"}, {"check", "verify"},

@@ -289,7 +289,7 @@ static void store(const struct incise_setting *row, const struct value *value, v
 	}
 }
 
-/* What a value should be, in words. */
+/* The condition of a value, in words. */
 static void say_expected(const struct incise_setting *row, char *text, size_t size)
 {
 	const char *whole = row->kind == SETTING_IS_WHOLE ? "whole " : "";
@@ -408,8 +408,8 @@ int incise_settings_read(const struct incise_setting *rows, const config_setting
 }
 
 /* @key may have an index. */
-static const struct incise_setting *find(const struct incise_setting *rows,
-					 const char *key, int *index)
+static const struct incise_setting *find_row(const struct incise_setting *rows,
+					     const char *key, int *index)
 {
 	const struct incise_setting *row;
 	char name[80];
@@ -439,7 +439,7 @@ int incise_settings_set(const struct incise_setting *rows, const char *group,
 	char expected[200];
 	int index;
 
-	row = find(rows, key, &index);
+	row = find_row(rows, key, &index);
 	if (!row) {
 		names_of(rows, names);
 		nearest = incise_nearest_name(key, names);

@@ -51,7 +51,7 @@ struct incise_setting {
 	 * makes of 0; SETTING_REQUIRED: the key must be there.
 	 */
 	const char *initial;
-	const char *help; /* for the page, in mdoc where it has letters beyond ASCII */
+	const char *help; /* for the page: one sentence, plain text in UTF-8 */
 	size_t offset, size;
 	enum incise_setting_store store;
 	double scale; /* the member in the unit of the key; 0: 1 */
@@ -60,7 +60,7 @@ struct incise_setting {
 	const struct incise_setting *rows;
 	int (*read)(void *to, const config_setting_t *setting, const char *path,
 		    struct incise_error *err);
-	/* What else is asked of a value, and in words; the numbers, or the text. */
+	/* A further condition of a value, given its numbers or its text; and the condition in words. */
 	bool (*fits)(const double *number, int n, const char *text);
 	const char *expected;
 };
@@ -89,37 +89,24 @@ struct incise_setting {
 		default: SETTING_STORES_INT)
 
 /* Rows; behind the help there may be more, such as .scale = 1e-3. */
-#define SETTING_NUMBER(key, member, unit, min, max, initial, help, ...) \
-	{                                                               \
-#key, SETTING_IS_NUMBER, unit, min, max, initial, help, \
-			SETTING_AT(member), __VA_ARGS__                 \
+#define SETTING_ROW(is, key, member, unit, min, max, initial, help, ...)                 \
+	{                                                                                \
+#key, is, unit, min, max, initial, help, SETTING_AT(member), __VA_ARGS__ \
 	}
-#define SETTING_WHOLE(key, member, unit, min, max, initial, help, ...) \
-	{                                                              \
-#key, SETTING_IS_WHOLE, unit, min, max, initial, help, \
-			SETTING_AT(member), __VA_ARGS__                \
-	}
-#define SETTING_VECTOR(key, member, unit, initial, help) \
-	SETTING_NUMBER(key, member, unit, -1e6, 1e6, initial, help)
-#define SETTING_DIRECTION(key, member, initial, help)                     \
-	{                                                                 \
-#key, SETTING_IS_DIRECTION, "", -1e6, 1e6, initial, help, \
-			SETTING_AT(member)                                \
-	}
-#define SETTING_TRUTH(key, member, initial, help)                                   \
-	{                                                                           \
-#key, SETTING_IS_TRUTH, "", 0, 1, initial, help, SETTING_AT(member) \
-	}
-#define SETTING_WORD(key, member, of, initial, help)                                \
-	{                                                                           \
-#key, SETTING_IS_WORD, "", 0, 0, initial, help, SETTING_AT(member), \
-			.words = (of)                                               \
-	}
-#define SETTING_TEXT(key, member, initial, help, ...)                               \
-	{                                                                           \
-#key, SETTING_IS_TEXT, "", 0, 0, initial, help, SETTING_AT(member), \
-			__VA_ARGS__                                                 \
-	}
+#define SETTING_NUMBER(key, member, ...) \
+	SETTING_ROW(SETTING_IS_NUMBER, key, member, __VA_ARGS__)
+#define SETTING_WHOLE(key, member, ...) \
+	SETTING_ROW(SETTING_IS_WHOLE, key, member, __VA_ARGS__)
+#define SETTING_VECTOR(key, member, unit, ...) \
+	SETTING_NUMBER(key, member, unit, -1e6, 1e6, __VA_ARGS__)
+#define SETTING_DIRECTION(key, member, ...) \
+	SETTING_ROW(SETTING_IS_DIRECTION, key, member, "", -1e6, 1e6, __VA_ARGS__)
+#define SETTING_TRUTH(key, member, ...) \
+	SETTING_ROW(SETTING_IS_TRUTH, key, member, "", 0, 1, __VA_ARGS__)
+#define SETTING_WORD(key, member, of, initial, help) \
+	SETTING_ROW(SETTING_IS_WORD, key, member, "", 0, 0, initial, help, .words = (of))
+#define SETTING_TEXT(key, member, ...) \
+	SETTING_ROW(SETTING_IS_TEXT, key, member, "", 0, 0, __VA_ARGS__)
 #define SETTING_GROUP(key, of, help)                                     \
 	{                                                                \
 #key, SETTING_IS_GROUP, "", 0, 0, "", help, .rows = (of) \
@@ -164,8 +151,8 @@ struct incise_settings_list {
 };
 
 /*
- * List a table: for each row, but groups and rows of the owner without a value, the key as
- * PREFIX.KEY, and its value in @of; it is given where @group, NULL for none, has it.
+ * List a table: for each row but groups, the key as PREFIX.KEY, and its value in @of, or of a row of the
+ * owner as @group has it; the key is given where @group, NULL for none, has it.
  */
 void incise_settings_list(struct incise_settings_list *list,
 			  const struct incise_setting *rows, const void *of,

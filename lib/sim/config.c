@@ -109,6 +109,9 @@ const struct incise_setting incise_sim_settings[] = {
 	REAL(stall_mm_s, "mm/s", 0, 10000, "0", "a faster nut loses its steps; 0: never"),
 	{0},
 };
+_Static_assert(sizeof(incise_sim_settings) / sizeof(*incise_sim_settings) <=
+		       SETTING_ROWS_MAX + 1,
+	       "raise SETTING_ROWS_MAX");
 
 void incise_sim_config_init(struct incise_sim_config *config)
 {

@@ -13,7 +13,7 @@ const struct cli_option *help_option(const struct cli_command *command, int i);
 void help_print(const struct cli_command *command);
 
 /*
- * What mk/manual makes pages of, a line each:
+ * Print the table from which mk/manual makes a page, a line each:
  *
  *     option<TAB>LETTER<TAB>NAME<TAB>ARGUMENT<TAB>HELP    LETTER and ARGUMENT may be empty
  *     exit<TAB>STATUS<TAB>MEANING

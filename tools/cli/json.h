@@ -28,7 +28,7 @@ void json_set_integer(json_t *object, const char *key, json_int_t value);
 /*
  * Put "schema": "incise/COMMAND/1" in front of the keys of an object that is a whole report, and
  * return it; NULL stays NULL. One that has its schema keeps it. @command: for example "bench loop", whose
- * blanks become slashes, or NULL for the command that runs. schema/COMMAND.json describes it.
+ * blanks become slashes, or NULL for the command that runs. schema/COMMAND.rows describes it.
  */
 json_t *json_with_schema(json_t *object, const char *command);
 
