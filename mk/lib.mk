@@ -2,7 +2,7 @@
 # The shared objects.
 
 # The keys of rig.conf that a device brings are read where its module is not, too.
-sources = $(sort $(foreach layer,$(layers_$1),$(wildcard lib/$(layer)/*.c lib/$(layer)/*.cc lib/$(layer)/*/*_settings.c)))
+sources = $(sort $(filter-out %.proto.c,$(foreach layer,$(layers_$1),$(wildcard lib/$(layer)/*.c lib/$(layer)/*.cc lib/$(layer)/*/*_settings.c))))
 # also_LIB: objects of another library that does not export them; this one has its own copy.
 objects = $(addprefix $(O)/obj/,$(addsuffix .o,$(basename $(call sources,$1))) $(also_$1))
 

@@ -7,9 +7,6 @@
 #include "../base/vector.h"
 #include "model_input.h"
 
-/* Below this speed the noise of a tracker hides the direction of the motion. */
-#define SLOW_MM_S 5.0
-
 const struct incise_model_input_kind incise_model_input_kinds[INCISE_MODEL_INPUT_KINDS] =
 	{
 		[INCISE_INPUT_DEPTH] = {INCISE_DEPTH_COLUMN},
@@ -27,22 +24,13 @@ int incise_model_input_find(const char *name)
 	return -1;
 }
 
-double incise_input_acceleration(const double velocity_mm_s[3],
-				 const double acceleration_mm_s2[3])
-{
-	return v3_dot(velocity_mm_s, acceleration_mm_s2) /
-	       fmax(v3_length(velocity_mm_s), SLOW_MM_S);
-}
-
 double incise_input_tilt_deg(const double quaternion[4], const double axis[3],
 			     const double normal[3])
 {
-	double turned[3], across[3];
+	double turned[3];
 
 	v3_rotate(turned, quaternion, axis);
-	v3_cross(across, turned, normal);
-	/* Exact at all angles, where an arc cosine is not near 0 and 180. */
-	return atan2(v3_length(across), v3_dot(turned, normal)) * (180 / M_PI);
+	return incise_double_input_tilt(turned, normal);
 }
 
 void incise_stay_add(struct incise_stay *stay, int64_t t_ns, double depth_mm)

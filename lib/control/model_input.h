@@ -21,9 +21,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <incise/export.h>
-
-/* More than this a model in the loop does not have. */
-#define INCISE_LOOP_INPUTS_MAX 4
+#include "../tissue/tick.h"
 
 /* Name, unit and meaning, as a column of an export has them. */
 #define INCISE_DEPTH_COLUMN "depth_mm", "mm", "of the tip below the surface"
@@ -54,13 +52,6 @@ extern const struct incise_model_input_kind
 
 /* An enum incise_model_input by its name, or -1. */
 int incise_model_input_find(const char *name);
-
-/*
- * The rate of change of the speed |v|, mm/s². Below 5 mm/s it goes to 0 with the speed, for a blade
- * at rest has no direction of motion: no more than |a|, and without a leap.
- */
-double incise_input_acceleration(const double velocity_mm_s[3],
-				 const double acceleration_mm_s2[3]) INCISE_REALTIME;
 
 /* The default of a scene's tool.axis, by which exports compute the tilt. */
 #define INCISE_SCALPEL_AXIS \

@@ -68,10 +68,10 @@ static int64_t to_ns(double t_s)
 static double *place(const struct loop *loop, struct run *run, int state, int axis)
 {
 	double *const own[OWN_STATES] = {
-		&run->plant[axis].position_mm, &run->plant[axis].velocity_mm_s,
-		&run->predict.x[axis],	       &run->predict.v[axis],
-		&run->predict.a[axis],	       &run->predict.x_shown[axis],
-		&run->predict.v_shown[axis],   &run->predict.a_shown[axis],
+		&run->plant[axis].position_mm,	 &run->plant[axis].velocity_mm_s,
+		&run->predict.now.x[axis],	 &run->predict.now.v[axis],
+		&run->predict.now.a[axis],	 &run->predict.now.x_shown[axis],
+		&run->predict.now.v_shown[axis], &run->predict.now.a_shown[axis],
 	};
 
 	if (state < loop->own_states)
@@ -248,12 +248,10 @@ static void set_predict(struct loop *loop)
 
 	p->gap_ns = llround((double)p->gap_ns * loop->pose_s / p->period_s);
 	p->period_s = loop->pose_s;
-	p->started = true;
-	p->arrival_ns = to_ns(-LEAD * loop->tick_s);
-	p->t_ns = p->arrival_ns - p->latency_ns;
-	for (int i = 0; i < 3; i++)
-		p->x[i] = p->v[i] = p->a[i] = p->x_shown[i] = p->v_shown[i] =
-			p->a_shown[i] = 0;
+	incise_double_predict_init(&p->now);
+	p->now.started = true;
+	p->now.arrival_ns = to_ns(-LEAD * loop->tick_s);
+	p->now.t_ns = p->now.arrival_ns - p->latency_ns;
 }
 
 static bool valid(const struct incise_pose_loop *of)

@@ -29,6 +29,7 @@
 #include <stdint.h>
 #include <incise/export.h>
 #include <incise/tracker.h>
+#include "../tissue/tick.h"
 
 /* At 60 Hz a hand that misses a pose by this is faster than 1 m/s. */
 #define INCISE_PREDICT_JUMP_MM 20.0
@@ -44,20 +45,12 @@ struct incise_predict {
 	double period_s;
 	int64_t latency_ns;
 	int64_t gap_ns; /* after a longer gap the filter restarts */
-	bool started;
-	/* Number of poses that no hand can have reached since the last one. */
-	unsigned int discontinuities;
-	int64_t t_ns; /* of acquisition of the last pose */
-	double x[3];  /* mm, at t_ns */
-	double v[3];  /* mm/s */
-	double a[3];  /* mm/s² */
-	double q[4];  /* attitude of the last pose that had one */
-	/* The prediction when the last pose arrived, to be blended out. */
-	int64_t arrival_ns;
-	double x_shown[3], v_shown[3]; /* less what the filter says then */
-	double a_shown[3];
-	double q_shown[4];
+	struct incise_double_predict now;
 };
+
+/* Its gains as a tick takes them. */
+void incise_predict_filter(const struct incise_predict *p,
+			   struct incise_double_filter *filter);
 
 /*
  * Start without a pose. A rate of @tracker outside 1 … 10000 Hz and a latency outside 0 … 1 s

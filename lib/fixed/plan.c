@@ -34,6 +34,28 @@ static bool are_zero(const int32_t *v, int n)
 	return all_in_range(v, n, 0);
 }
 
+bool incise_fixed_filter_good(const struct incise_fixed_filter *filter)
+{
+	return filter->alpha >= 0 && filter->alpha <= INCISE_FIXED_UNIT &&
+	       filter->beta >= 0 && filter->gamma >= 0 &&
+	       filter->period_ns >= INCISE_FIXED_PERIOD_MIN_NS &&
+	       filter->period_ns <= INCISE_FIXED_PERIOD_MAX_NS &&
+	       filter->latency_ns >= 0 && filter->latency_ns <= 1000000000 &&
+	       filter->gap_ns >= 0 && filter->gap_ns <= INCISE_FIXED_AHEAD_MAX_NS &&
+	       filter->ahead_ns >= 0 && filter->ahead_ns <= INCISE_FIXED_AHEAD_MAX_NS &&
+	       !filter->reserved;
+}
+
+bool incise_fixed_incision_good(const struct incise_fixed_incision_setup *setup)
+{
+	const int32_t *length = &setup->cut_from;
+
+	for (int i = 0; i < 5; i++)
+		if (length[i] < 0 || length[i] > INCISE_FIXED_DEPTH_MAX)
+			return false;
+	return setup->cuts_most >= 0 && setup->cuts_most <= INCISE_FIXED_CUTS_MAX;
+}
+
 static bool is_scalpel(const struct incise_fixed_numbers *numbers)
 {
 	return all_in_range(numbers->tip, 3, LENGTH_MAX) &&

@@ -28,12 +28,9 @@ struct incise_fixed_shape {
 	int32_t reserved;
 };
 
-/* The point of a surface that belongs to a place. */
-struct incise_fixed_touch {
-	int32_t point[3];
-	int32_t normal[3]; /* out of the tissue */
-	int32_t depth;	   /* > 0 inside */
-};
+#include "../number/fixed_kind.h"
+#include "../tissue/touch.proto.h"
+#include "../number/no_kind.h"
 
 /* Tell whether a shape's numbers are good; a grid's are checked by incise_fixed_grid_open(). */
 bool incise_fixed_shape_good(const struct incise_fixed_shape *shape);
@@ -50,16 +47,6 @@ bool incise_fixed_shape_nearest(const struct incise_fixed_shape *shape,
 				const struct incise_fixed_grid *grid, const int32_t p[3],
 				const int32_t last[3],
 				struct incise_fixed_touch *touch) INCISE_REALTIME;
-
-/* The proxy of a tool; see lib/surface/surface.h. Begins with {0}. */
-struct incise_fixed_proxy {
-	int32_t placed; /* has a tool's place */
-	int32_t touching;
-	int32_t began; /* with the last move */
-	int32_t tool[3];
-	struct incise_fixed_touch touch;
-	struct incise_fixed_touch first; /* where the contact began; depth 0 or more */
-};
 
 /*
  * Follow the tool to a new place: a contact begins where the way enters the tissue, or at the nearest

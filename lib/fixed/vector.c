@@ -111,3 +111,21 @@ void incise_fx_rotate(int32_t to[3], const int32_t q[4], const int32_t unit[3])
 		to[i] = (int32_t)incise_fx_hold(turned, INCISE_FIXED_UNIT + 64);
 	}
 }
+
+bool incise_fixed_attitude(int32_t to[4], const int32_t quaternion[4])
+{
+	/* 0.9 and 1.1, squared, in Q60. */
+	const int64_t least = ((int64_t)1 << 60) / 100 * 81,
+		      most = ((int64_t)1 << 60) / 100 * 121;
+	const int32_t largest = INCISE_FIXED_UNIT / 10 * 11;
+	int64_t length2 = 0, q[4];
+
+	for (int i = 0; i < 4; i++) {
+		/* 4 · (1.1 · 2^30)² < 2^62.3 */
+		if (quaternion[i] > largest || quaternion[i] < -largest)
+			return false;
+		length2 += (int64_t)quaternion[i] * quaternion[i];
+		q[i] = quaternion[i];
+	}
+	return length2 > least && length2 < most && incise_fx_unit(to, q, 4, 0);
+}

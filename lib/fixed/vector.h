@@ -85,4 +85,10 @@ bool incise_fx_is_unit(const int32_t *a, int n) INCISE_REALTIME;
 void incise_fx_rotate(int32_t to[3], const int32_t q[4],
 		      const int32_t unit[3]) INCISE_REALTIME;
 
+/*
+ * Make a pose's quaternion a unit one. Returns false, and leaves @to, where it is more than a tenth
+ * longer or shorter than that: devices round their numbers, but not by so much.
+ */
+bool incise_fixed_attitude(int32_t to[4], const int32_t quaternion[4]) INCISE_REALTIME;
+
 #endif

@@ -13,7 +13,6 @@
  */
 #include <math.h>
 #include "../base/vector.h"
-#include "../fixed/front.h"
 #include "../fixed/input.h"
 #include "plan.h"
 
@@ -123,7 +122,8 @@ static struct state_error shown(const struct incise_plan *plan)
 {
 	const struct incise_predict *p = &plan->predict;
 	/* Of attitude and arms 2^-27 each, and the rounding of the pose and of two sums. */
-	double arms_mm = v3_length(plan->tip_mm) + plan->instrument.handle_mm;
+	double arms_mm =
+		v3_length(plan->doubles.plan.numbers.tip) + plan->scene->tool.handle_mm;
 	double in_mm = 2 * LSB_MM + ldexp(arms_mm, -27);
 	struct state_error e = settled(p, in_mm);
 	double latency_s = (double)p->latency_ns * 1e-9;
@@ -160,6 +160,16 @@ static double inputs_N(const struct incise_plan *plan, const struct state_error 
 	       slope[INCISE_INPUT_TIME] * (1 / plan->scene->rate_hz + 2 * LSB_MM);
 }
 
+double incise_front_bound(double unloading_N_mm, double friction, double most_N,
+			  double cutting_bound_N)
+{
+	const double half = 0x1p-17;
+
+	return (1 + 4 * friction) * cutting_bound_N +
+	       half * (8 * unloading_N_mm + 12 + 2 * most_N +
+		       2 * most_N * (1 + friction) / unloading_N_mm);
+}
+
 /* Rounding of the model's table, of the cut's front, and of each stiffness over its reach. */
 static double tissue_N(const struct incise_plan *plan, const struct state_error *e,
 		       double reach_mm)
@@ -172,11 +182,11 @@ static double tissue_N(const struct incise_plan *plan, const struct state_error 
 
 	/* The force is below the unloading from the surface on. */
 	if (plan->fixed && plan->dissipates)
-		bound_N = incise_fixed_front_bound(
-			plan->unloading_N_mm,
-			plan->acting[INCISE_FORCE_REACTION]
-				.number[INCISE_REACTION_FRICTION],
-			plan->unloading_N_mm * reach_mm, bound_N + LSB_MM);
+		bound_N = incise_front_bound(plan->unloading_N_mm,
+					     plan->acting[INCISE_FORCE_REACTION]
+						     .number[INCISE_REACTION_FRICTION],
+					     plan->unloading_N_mm * reach_mm,
+					     bound_N + LSB_MM);
 	for (int i = 0; i < incise_n_tissue_forces; i++)
 		if (plan->acting[i].force && plan->acting[i].number[0] > 0)
 			bound_N += reach_mm * LSB_MM / 2;

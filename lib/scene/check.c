@@ -586,8 +586,8 @@ static int search(struct incise_plan *plan, const struct incise_tracker_info *tr
 		struct incise_rest here;
 
 		for (int i = 0; i < n; i++) {
-			plan->held[inputs[i]] = ends[i][corner >> i & 1];
-			plan->holds |= 1U << inputs[i];
+			plan->doubles.plan.held[inputs[i] + 1] = ends[i][corner >> i & 1];
+			plan->doubles.plan.holds |= 2U << inputs[i];
 		}
 		rc = incise_plan_rest(plan, tracker, trial, &here);
 		if (rc)
@@ -597,7 +597,7 @@ static int search(struct incise_plan *plan, const struct incise_tracker_info *tr
 			*rest = here;
 		rest->runs = here.runs;
 	}
-	plan->holds = 0;
+	plan->doubles.plan.holds = 0;
 	return rc;
 }
 

@@ -7,12 +7,6 @@
 #include <stddef.h>
 #include "plan.h"
 
-/* A stage can be done in several ways. */
-static incise_stage_fn *pose(const struct incise_plan *plan)
-{
-	return plan->tracker ? incise_stage_pose : incise_stage_fed;
-}
-
 /* Reasons why a stage is not needed, or NULL. */
 
 /* A constant may be 0 because of the gain, whatever the file says of it. */
@@ -51,30 +45,21 @@ static const char *no_membrane(const struct incise_plan *plan)
 
 static const struct {
 	const char *name;
-	bool always;
-	incise_stage_fn *run; /* or @how */
-	incise_stage_fn *(*how)(const struct incise_plan *plan);
+	struct incise_stage_pair numbers;
 	const char *(*why_not)(const struct incise_plan *plan); /* NULL: always needed */
 	bool forces;						/* come before it */
-	incise_fixed_stage_fn *integer;
 } all[] = {
-	{"pose", true, NULL, pose, NULL, false, NULL},
-	{"predict", true, incise_stage_predict, NULL, NULL, false,
-	 incise_fixed_stage_predict},
-	{"tool", true, incise_stage_tool, NULL, no_tool, false, incise_fixed_stage_tool},
-	{"contact", false, incise_stage_contact, NULL, NULL, false,
-	 incise_fixed_stage_contact},
-	{"normal", false, incise_stage_normal, NULL, no_normal, false,
-	 incise_fixed_stage_normal},
-	{"incision", true, incise_stage_incision, NULL, no_tool, false,
-	 incise_fixed_stage_incision},
-	{"membrane", false, incise_stage_membrane, NULL, no_membrane, false,
-	 incise_fixed_stage_membrane},
-	{"start", true, incise_stage_start, NULL, NULL, true, incise_fixed_stage_start},
-	{"limit", true, incise_stage_limit, NULL, NULL, false, incise_fixed_stage_limit},
+	{"predict", INCISE_STAGE(predict), NULL, false},
+	{"tool", INCISE_STAGE(tool), no_tool, false},
+	{"contact", INCISE_STAGE(contact), NULL, false},
+	{"normal", INCISE_STAGE(normal), no_normal, false},
+	{"incision", INCISE_STAGE(incision), no_tool, false},
+	{"membrane", INCISE_STAGE(membrane), no_membrane, false},
+	{"start", INCISE_STAGE(start), NULL, true},
+	{"limit", INCISE_STAGE(limit), NULL, false},
 };
-_Static_assert(sizeof(all) / sizeof(*all) + 1 == INCISE_PLAN_OTHER_STAGES,
-	       "with actuate these are INCISE_PLAN_OTHER_STAGES");
+_Static_assert(sizeof(all) / sizeof(*all) + 2 == INCISE_PLAN_OTHER_STAGES,
+	       "with pose and actuate these are INCISE_PLAN_OTHER_STAGES");
 
 static void leave_out(struct incise_plan *plan, const char *name, const char *why)
 {
@@ -87,14 +72,6 @@ static void keep(struct incise_plan *plan, struct incise_stage stage)
 	plan->stage[plan->n_stages++] = stage;
 }
 
-static incise_force_fn *way(const struct incise_plan *plan,
-			    const struct incise_tissue_force *force)
-{
-	if (force->model && (plan->model || plan->fixed))
-		return plan->dissipates ? force->front : force->model;
-	return force->run;
-}
-
 static void choose_forces(struct incise_plan *plan)
 {
 	for (int i = 0; i < incise_n_tissue_forces; i++) {
@@ -104,10 +81,8 @@ static void choose_forces(struct incise_plan *plan)
 		if (why && !plan->scene->full)
 			leave_out(plan, own->force->name, why);
 		else
-			keep(plan, (struct incise_stage){.name = own->force->name,
-							 .add = way(plan, own->force),
-							 .integer = own->force->integer,
-							 .own = own});
+			keep(plan, (struct incise_stage){own->force->name, NULL,
+							 own->force->stage});
 	}
 }
 
@@ -115,6 +90,9 @@ void incise_plan_choose(struct incise_plan *plan)
 {
 	const char *drawn = "incise view draws it, not the loop";
 
+	keep(plan, (struct incise_stage){.name = "pose",
+					 .run = plan->poses.tracker ? incise_stage_pose
+								    : incise_stage_fed});
 	for (size_t i = 0; i < sizeof(all) / sizeof(*all); i++) {
 		const char *why = all[i].why_not ? all[i].why_not(plan) : NULL;
 
@@ -124,21 +102,16 @@ void incise_plan_choose(struct incise_plan *plan)
 			leave_out(plan, all[i].name, why);
 		else
 			keep(plan,
-			     (struct incise_stage){.name = all[i].name,
-						   .always = all[i].always,
-						   .integer = all[i].integer,
-						   .run = all[i].how ? all[i].how(plan)
-								     : all[i].run});
+			     (struct incise_stage){all[i].name, NULL, all[i].numbers});
 	}
 	/* A device that is not there cannot be kept. */
 	if (plan->axes.n)
 		keep(plan, (struct incise_stage){.name = "actuate",
-						 .always = true,
 						 .run = incise_stage_actuate});
 	else
 		leave_out(plan, "actuate",
-			  plan->tracker ? "the rig has no stepper"
-					: "no rig, and so no stepper");
+			  plan->poses.tracker ? "the rig has no stepper"
+					      : "no rig, and so no stepper");
 	leave_out(plan, "wound",
 		  plan->scene->picture.wound ? drawn : "picture.wound is false");
 	leave_out(plan, "bleeding",

@@ -9,15 +9,11 @@
 #define INCISE_FORCES_H
 
 #include <incise/export.h>
-#include "../fixed/plan.h"
-#include "../tissue/front.h"
+#include "../tissue/tick.h"
 
 /* A plan keeps at most INCISE_PLAN_STAGES_MAX stages, forces among them. */
 #define INCISE_FORCES_MAX 6
 #define INCISE_FORCE_NUMBERS 3
-
-struct incise_plan;
-struct incise_tick;
 
 /* The meaning of a force's first number. Springs store energy: F²/2K at most. */
 enum incise_force_kind {
@@ -52,20 +48,26 @@ struct incise_force_number {
 
 /*
  * Over so much more depth the force goes from that of the puncture to that of the cut: a blade that is
- * pushed as it opens the skin loses the hold of it on that way, and not at once.
+ * pushed as it opens the skin loses the hold of it on that way, and not at once. OPENS_OVER of
+ * ../tissue/tick.proto.c.
  */
 #define INCISE_PUNCTURE_MM 0.5
+
+/* A stage of lib/tissue, for both kinds of numbers: one that lacks either does not build. */
+struct incise_stage_pair {
+	incise_double_stage_fn *in_double;
+	incise_fixed_stage_fn *in_integers;
+};
+#define INCISE_STAGE(name)                                            \
+	{                                                             \
+		incise_double_stage_##name, incise_fixed_stage_##name \
+	}
 
 /* A force as a plan runs it. */
 struct incise_acting_force {
 	const struct incise_tissue_force *force;
 	double number[INCISE_FORCE_NUMBERS]; /* of the scene; the first times the gain */
-	struct incise_front front;	     /* of the reaction; zeroed with the plan */
 };
-
-/* Adds to plan->force_N. Called in the phases of the force only. */
-typedef void incise_force_fn(struct incise_plan *plan, struct incise_tick *tick,
-			     struct incise_acting_force *own) INCISE_REALTIME;
 
 struct incise_tissue_force {
 	const char *name;    /* of its stage */
@@ -74,13 +76,8 @@ struct incise_tissue_force {
 	/* The stage is left out where the first number is 0, for the reason @zero. */
 	struct incise_force_number number[INCISE_FORCE_NUMBERS];
 	const char *zero;
-	incise_force_fn *run;
-	/* A model takes the place of the first number; NULL: it does not. */
-	incise_force_fn *model;
-	/* The same with a tissue that dissipates: tissue.withdrawal. */
-	incise_force_fn *front;
-	/* With arithmetic = "fixed". */
-	incise_fixed_stage_fn *integer;
+	bool model; /* one takes the place of the first number */
+	struct incise_stage_pair stage;
 };
 
 /* In the order in which they run. */

@@ -4,7 +4,10 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
+#include <string.h>
+#include "../base/monotonic.h"
 #include "../base/vector.h"
 #include "../fixed/vector.h"
 #include "integers.h"
@@ -53,11 +56,6 @@ static int32_t length(struct conversion *c, const char *name, double mm)
 	return to_integer(c, name, mm, ONE, 4096);
 }
 
-static int32_t period(struct conversion *c, const char *name, double s)
-{
-	return to_integer(c, name, s, 1e9, 2.1);
-}
-
 static void place(struct conversion *c, const char *name, int32_t to[3],
 		  const double mm[3])
 {
@@ -73,44 +71,6 @@ static void direction(int32_t to[3], const double unit[3])
 	for (int i = 0; i < 3; i++)
 		wide[i] = llrint(unit[i] * UNIT);
 	incise_fx_unit(to, wide, 3, 0);
-}
-
-static void set_filter(struct conversion *c, struct incise_fixed_filter *filter)
-{
-	const struct incise_predict *p = &c->plan->predict;
-	double per_s = 1 / p->period_s;
-	int64_t ahead_ns =
-		p->gap_ns > INCISE_PREDICT_AHEAD_NS ? p->gap_ns : INCISE_PREDICT_AHEAD_NS;
-
-	filter->alpha = to_integer(c, "the predictor's gain", p->alpha, UNIT, 1);
-	filter->beta = to_integer(c, "the predictor's gain", p->beta * per_s, ONE, 32767);
-	filter->gamma = to_integer(c, "the predictor's gain", p->gamma * per_s * per_s,
-				   4096, 524287);
-	filter->period_ns = (int32_t)lrint(p->period_s * 1e9);
-	filter->latency_ns = (int32_t)p->latency_ns;
-	if (!c->rc && filter->period_ns > INCISE_FIXED_PERIOD_MAX_NS)
-		c->rc = incise_error_set(
-			c->err, ERANGE,
-			"%s: the tracker has %g Hz: integers need at least 20 Hz; set "
-			"arithmetic to \"double\"",
-			c->plan->scene->path, 1 / p->period_s);
-	if (c->rc)
-		return;
-	filter->gap_ns = (int32_t)p->gap_ns;
-	filter->ahead_ns = (int32_t)ahead_ns;
-}
-
-static void set_scalpel(struct conversion *c, struct incise_fixed_numbers *numbers)
-{
-	const struct incise_plan *plan = c->plan;
-
-	for (int i = 0; i < 3; i++)
-		numbers->tip[i] = length(c, "the calibration's tip_mm", plan->tip_mm[i]);
-	direction(numbers->axis, plan->instrument.axis);
-	direction(numbers->side, plan->instrument.side);
-	numbers->handle = length(c, "tool.handle_mm", plan->instrument.handle_mm);
-	numbers->inserts = plan->inserts;
-	numbers->tube = plan->inserts && plan->tube_station;
 }
 
 static void set_shape(struct conversion *c, struct incise_fixed_shape *shape)
@@ -137,135 +97,152 @@ static void set_shape(struct conversion *c, struct incise_fixed_shape *shape)
 	}
 }
 
-_Static_assert(INCISE_FIXED_INPUT_DEPTH == INCISE_INPUT_DEPTH + 1 &&
-		       INCISE_FIXED_INPUT_SPEED == INCISE_INPUT_SPEED + 1 &&
-		       INCISE_FIXED_INPUT_ACCELERATION == INCISE_INPUT_ACCELERATION + 1 &&
-		       INCISE_FIXED_INPUT_TILT == INCISE_INPUT_TILT + 1 &&
-		       INCISE_FIXED_INPUT_TIME == INCISE_INPUT_TIME + 1,
-	       "the same, from 1");
+/* A number of a plan: where it stands in both kinds, its scale, and the most that integers hold. */
+struct quantity {
+	const char *name;
+	size_t from, to;
+	int n;
+	double one, most;
+};
+
+#define AT(member)                                      \
+	offsetof(struct incise_double_numbers, member), \
+		offsetof(struct incise_fixed_numbers, member)
+#define NUMBER(member, name)                    \
+	{                                       \
+		name, AT(member), 1, ONE, 32767 \
+	}
+#define LENGTH(member, name)                   \
+	{                                      \
+		name, AT(member), 1, ONE, 4096 \
+	}
+#define EXTENT(member, name)                   \
+	{                                      \
+		name, AT(member), 1, ONE, 1000 \
+	}
+
+static const struct quantity quantities[] = {
+	{"the predictor's gain", AT(filter.alpha), 1, UNIT, 1},
+	{"the predictor's gain", AT(filter.beta), 1, ONE, 32767},
+	{"the predictor's gain", AT(filter.gamma), 1, 4096, 524287},
+	{"the tracker's period", AT(filter.period_ns), 1, 1, LARGEST},
+	{"the tracker's latency", AT(filter.latency_ns), 1, 1, LARGEST},
+	{"the tracker's gap", AT(filter.gap_ns), 1, 1, LARGEST},
+	{"the tracker's gap", AT(filter.ahead_ns), 1, 1, LARGEST},
+	{"the calibration's tip_mm", AT(tip), 3, ONE, 4096},
+	LENGTH(handle, "tool.handle_mm"),
+	LENGTH(leave, "tissue.leave_mm"),
+	NUMBER(reaction, "tissue.reaction_N_mm"),
+	NUMBER(gain, "tissue.gain"),
+	NUMBER(support, "the model's depth"),
+	NUMBER(beyond, "the model's slope"),
+	NUMBER(unloading, "the unloading"),
+	NUMBER(friction, "tissue.friction"),
+	NUMBER(plane, "tissue.plane_N_mm"),
+	{"tissue.damping_N_s_mm", AT(damping), 1, DAMPING, 7.99},
+	NUMBER(insertion, "tissue.insertion_N_mm"),
+	NUMBER(aligned, "tissue.aligned"),
+	NUMBER(spread, "tissue.spread_N_mm"),
+	EXTENT(incision.cut_from, "tissue.cut_from_mm"),
+	EXTENT(incision.stretch, "tissue.stretch_mm"),
+	EXTENT(incision.handle_width, "tool.handle_width_mm"),
+	EXTENT(incision.handle_thickness, "tool.handle_thickness_mm"),
+	EXTENT(incision.tube, "tool.tube_mm"),
+	{"membrane.point_mm", AT(membrane.point), 3, ONE, 8191},
+	LENGTH(membrane.radius, "membrane.radius_mm"),
+	LENGTH(membrane.thickness, "membrane.thickness_mm"),
+	NUMBER(membrane.stiffness, "the membrane's stiffness"),
+	LENGTH(membrane.back_wall, "membrane.back_wall_mm"),
+	NUMBER(small, "limits.start_N"),
+	LENGTH(force, "limits.force_N"),
+	LENGTH(slew, "limits.slew_N_s"),
+};
+
+static void convert(struct conversion *c, const struct incise_double_numbers *from,
+		    struct incise_fixed_numbers *to)
+{
+	for (size_t i = 0; i < sizeof(quantities) / sizeof(*quantities); i++) {
+		const struct quantity *q = &quantities[i];
+
+		for (int k = 0; k < q->n; k++) {
+			double value;
+			int32_t whole;
+
+			memcpy(&value,
+			       (const char *)from + q->from + (size_t)k * sizeof(value),
+			       sizeof(value));
+			whole = to_integer(c, q->name, value, q->one, q->most);
+			memcpy((char *)to + q->to + (size_t)k * sizeof(whole), &whole,
+			       sizeof(whole));
+		}
+	}
+}
+
+/* Trackers from 20 Hz on. */
+static void check_tracker(struct conversion *c, const struct incise_fixed_filter *filter)
+{
+	if (!c->rc && filter->period_ns > INCISE_FIXED_PERIOD_MAX_NS)
+		c->rc = incise_error_set(
+			c->err, ERANGE,
+			"%s: the tracker has %g Hz: integers need at least 20 Hz; set "
+			"arithmetic to \"double\"",
+			c->plan->scene->path, 1 / c->plan->predict.period_s);
+}
 
 /* Depth, or depth and speed, are 0: so plans say it whose format is the first. */
-static int32_t inputs_of(const struct incise_scene *scene)
+static int32_t inputs_of(uint32_t inputs)
 {
-	const struct incise_scene_model *cut = &scene->cut[INCISE_CUT];
-	int32_t inputs = 0;
-
-	for (int i = 0; i < cut->n_inputs; i++)
-		inputs |= (int32_t)(cut->input[i] + 1) << 4 * i;
 	return inputs == INCISE_FIXED_INPUT_DEPTH ||
 			       inputs == (INCISE_FIXED_INPUT_DEPTH |
 					  INCISE_FIXED_INPUT_SPEED << 4)
 		       ? 0
-		       : inputs;
+		       : (int32_t)inputs;
 }
 
-static void set_tissue(struct conversion *c, struct incise_fixed_numbers *numbers)
+static void check_cuts(struct conversion *c, int cuts_most)
 {
-	const struct incise_plan *plan = c->plan;
-	const struct incise_acting_force *acting = plan->acting;
-	bool model = plan->model || plan->fixed;
-
-	numbers->leave = length(c, "tissue.leave_mm", plan->scene->tissue.leave_mm);
-	numbers->average_ticks = plan->average_ticks;
-	if (model) {
-		numbers->inputs = inputs_of(plan->scene);
-		numbers->gain = number(c, "tissue.gain", plan->gain);
-		numbers->support = number(c, "the model's depth", plan->support_mm);
-		numbers->beyond = number(c, "the model's slope", plan->beyond_N_mm);
-	} else {
-		numbers->reaction = number(c, "tissue.reaction_N_mm",
-					   acting[INCISE_FORCE_REACTION].number[0]);
-	}
-	if (model && plan->dissipates) {
-		numbers->unloading = number(c, "the unloading", plan->unloading_N_mm);
-		numbers->friction = number(
-			c, "tissue.friction",
-			acting[INCISE_FORCE_REACTION].number[INCISE_REACTION_FRICTION]);
-	}
-	numbers->plane =
-		number(c, "tissue.plane_N_mm", acting[INCISE_FORCE_PLANE].number[0]);
-	numbers->damping =
-		to_integer(c, "tissue.damping_N_s_mm",
-			   acting[INCISE_FORCE_DAMPING].number[0], DAMPING, 7.99);
-	numbers->insertion = number(c, "tissue.insertion_N_mm",
-				    acting[INCISE_FORCE_INSERTION].number[0]);
-	numbers->aligned =
-		number(c, "tissue.aligned", acting[INCISE_FORCE_INSERTION].number[1]);
-	numbers->printed = plan->printed_orientation;
-	numbers->spread =
-		number(c, "tissue.spread_N_mm", acting[INCISE_FORCE_SPREAD].number[0]);
-}
-
-static void set_incision(struct conversion *c, struct incise_fixed_incision_setup *setup)
-{
-	const struct incise_scene *scene = c->plan->scene;
-
-	setup->cuts_most = scene->tissue.cuts_most;
-	if (!c->rc && setup->cuts_most > INCISE_FIXED_CUTS_MAX)
+	if (!c->rc && cuts_most > INCISE_FIXED_CUTS_MAX)
 		c->rc = incise_error_set(
 			c->err, ERANGE,
 			"%s: tissue.cuts_most is %d: integers are limited to %d; "
 			"reduce it, or set arithmetic to \"double\"",
-			scene->path, setup->cuts_most, INCISE_FIXED_CUTS_MAX);
-	setup->cut_from =
-		to_integer(c, "tissue.cut_from_mm", scene->tissue.cut_from_mm, ONE, 1000);
-	setup->stretch =
-		to_integer(c, "tissue.stretch_mm", scene->tissue.stretch_mm, ONE, 1000);
-	setup->handle_width = to_integer(c, "tool.handle_width_mm",
-					 scene->tool.handle_width_mm, ONE, 1000);
-	setup->handle_thickness = to_integer(c, "tool.handle_thickness_mm",
-					     scene->tool.handle_thickness_mm, ONE, 1000);
-	setup->tube = to_integer(c, "tool.tube_mm", scene->tool.tube_mm, ONE, 1000);
-}
-
-static void set_membrane(struct conversion *c, struct incise_fixed_membrane *to)
-{
-	const struct incise_scene_membrane *membrane = &c->plan->scene->membrane;
-
-	if (!(membrane->thickness_mm > 0))
-		return;
-	place(c, "membrane.point_mm", to->point, membrane->point_mm);
-	direction(to->normal, membrane->normal);
-	to->radius = length(c, "membrane.radius_mm", membrane->radius_mm);
-	to->thickness = length(c, "membrane.thickness_mm", membrane->thickness_mm);
-	to->stiffness =
-		number(c, "the membrane's stiffness",
-		       c->plan->gain * membrane->puncture_N / membrane->thickness_mm);
-	to->back_wall = length(c, "membrane.back_wall_mm", membrane->back_wall_mm);
-}
-
-static void set_limits(struct conversion *c, struct incise_fixed_numbers *numbers)
-{
-	const struct incise_plan *plan = c->plan;
-
-	numbers->pose_age_ns = plan->pose_age_ns;
-	numbers->tick_ns = (int32_t)lrint(1e9 / plan->scene->rate_hz);
-	numbers->small = number(c, "limits.start_N", plan->start.small_N);
-	numbers->ramp_ns = period(c, "limits.ramp_ms", plan->start.ramp_s);
-	numbers->fade_ns = period(c, "limits.fade_ms", plan->start.fade_s);
-	/* Rounded down: never above. */
-	numbers->force = to_integer(c, "limits.force_N",
-				    floor(plan->limit.force_N * ONE) / ONE, ONE, 4096);
-	numbers->slew =
-		to_integer(c, "limits.slew_N_s",
-			   fmax(floor(plan->limit.slew_N * ONE), 1) / ONE, ONE, 4096);
+			c->plan->scene->path, cuts_most, INCISE_FIXED_CUTS_MAX);
 }
 
 int incise_integers_numbers(const struct incise_plan *plan,
 			    struct incise_fixed_numbers *numbers,
 			    struct incise_error *err)
 {
+	const double top[3] = {0, 0, 1};
+	struct incise_double_numbers from = plan->doubles.plan.numbers;
 	struct conversion c = {.plan = plan, .err = err};
 
-	*numbers = (struct incise_fixed_numbers){0};
-	set_filter(&c, &numbers->filter);
-	set_scalpel(&c, numbers);
+	/* Limits are rounded down: never above. */
+	from.force = floor(from.force * ONE) / ONE;
+	from.slew = fmax(floor(from.slew * ONE), 1) / ONE;
+	*numbers = (struct incise_fixed_numbers){
+		.pose_age_ns = from.pose_age_ns,
+		.tick_ns = from.tick_ns,
+		.inserts = from.inserts,
+		.tube = from.tube,
+		.average_ticks = from.average_ticks,
+		.printed = from.printed,
+		.incision.cuts_most = from.incision.cuts_most,
+		.inputs = inputs_of(plan->doubles.plan.inputs[INCISE_CUT]),
+		.ramp_ns = to_integer(&c, "limits.ramp_ms", (double)from.ramp_ns * 1e-9,
+				      1e9, 2.1),
+		.fade_ns = to_integer(&c, "limits.fade_ms", (double)from.fade_ns * 1e-9,
+				      1e9, 2.1),
+	};
+	convert(&c, &from, numbers);
+	check_tracker(&c, &numbers->filter);
+	check_cuts(&c, from.incision.cuts_most);
+	direction(numbers->axis, from.axis);
+	direction(numbers->side, from.side);
+	direction(numbers->up, from.up);
+	direction(numbers->membrane.normal,
+		  from.membrane.stiffness > 0 ? from.membrane.normal : top);
 	set_shape(&c, &numbers->shape);
-	direction(numbers->up, plan->up);
-	set_tissue(&c, numbers);
-	set_incision(&c, &numbers->incision);
-	set_membrane(&c, &numbers->membrane);
-	set_limits(&c, numbers);
 	if (!c.rc && !incise_fixed_numbers_good(numbers))
 		c.rc = incise_error_set(
 			err, ERANGE,
@@ -448,67 +425,6 @@ static INCISE_REALTIME void mesh_restart(void *context)
 			  integers->proxy.leave_mm);
 }
 
-/* --- cuts of another plan ---------------------------------------------------------------- */
-
-void incise_integers_take_over(struct incise_integers *integers,
-			       const struct incise_integers *before)
-{
-	struct incise_fixed_incision *to = &integers->state.incision;
-	int most = integers->plan.numbers.incision.cuts_most;
-
-	integers->state.membrane.punctured = before->state.membrane.punctured;
-	*to = before->state.incision;
-	to->n = to->n < most ? to->n : most;
-	incise_fixed_incision_leave(to);
-}
-
-_Static_assert(INCISE_CUT_PLACES == INCISE_FIXED_CUT_PLACES, "the same places");
-
-bool incise_integers_cut(const struct incise_integers *integers, int i,
-			 struct incise_cut *cut)
-{
-	const struct incise_fixed_incision *cuts = &integers->state.incision;
-	const struct incise_fixed_cut *from = &cuts->cut[i];
-
-	if (i < 0 || i >= cuts->n)
-		return false;
-	to_double(cut->at_mm, from->at, ONE);
-	to_double(cut->along, from->along, UNIT);
-	to_double(cut->side, from->side, UNIT);
-	to_double(cut->normal, from->normal, UNIT);
-	cut->from_mm = from->from / ONE;
-	cut->to_mm = from->to / ONE;
-	cut->incision = from->incision;
-	for (int k = 0; k < INCISE_CUT_PLACES; k++) {
-		cut->place[k].depth_mm = (float)(from->place[k].depth / ONE);
-		cut->place[k].open_mm = (float)(from->place[k].open / ONE);
-	}
-	return true;
-}
-
-bool incise_integers_add_cut(struct incise_integers *integers,
-			     const struct incise_cut *cut)
-{
-	struct incise_fixed_incision *cuts = &integers->state.incision;
-	struct incise_fixed_cut *to = &cuts->cut[cuts->n];
-
-	if (cuts->n >= integers->plan.numbers.incision.cuts_most)
-		return false;
-	cuts->n++;
-	to_integers(to->at, cut->at_mm);
-	direction(to->along, cut->along);
-	direction(to->side, cut->side);
-	direction(to->normal, cut->normal);
-	to->from = near_integer(cut->from_mm, ONE);
-	to->to = near_integer(cut->to_mm, ONE);
-	to->incision = cut->incision;
-	for (int k = 0; k < INCISE_CUT_PLACES; k++) {
-		to->place[k].depth = near_integer(cut->place[k].depth_mm, ONE);
-		to->place[k].open = near_integer(cut->place[k].open_mm, ONE);
-	}
-	return true;
-}
-
 /* --- running ----------------------------------------------------------------------------- */
 
 struct incise_integers *incise_integers_new(const struct incise_plan *plan,
@@ -543,78 +459,44 @@ struct incise_integers *incise_integers_new(const struct incise_plan *plan,
 	return integers;
 }
 
-void incise_integers_hold(struct incise_integers *integers, enum incise_tool tool,
-			  bool fading)
+#include "../number/fixed_kind.h"
+#define OWN(of) ((of)->integers)
+#define STAGE in_integers
+#define D_LEAST 1
+
+static int32_t n_from(double value)
 {
-	if (integers->plan.numbers.inserts)
-		integers->state.wanted = (int32_t)tool;
-	integers->state.fading = fading;
+	return near_integer(value, ONE);
 }
 
-int incise_integers_set_tip(struct incise_integers *integers, const double tip_mm[3])
+static int32_t d_from(double value)
+{
+	return near_integer(value, UNIT);
+}
+
+static double n_to(int32_t value)
+{
+	return value / ONE;
+}
+
+static double d_to(int32_t value)
+{
+	return value / UNIT;
+}
+
+#include "run.proto.c"
+
+static int set_tip(struct incise_plan *plan, const double tip_mm[3])
 {
 	for (int i = 0; i < 3; i++)
 		if (!(fabs(tip_mm[i]) <= 4096))
 			return -EINVAL;
-	to_integers(integers->plan.numbers.tip, tip_mm);
+	v3_copy(plan->doubles.plan.numbers.tip, tip_mm);
+	to_integers(plan->integers->plan.numbers.tip, tip_mm);
 	return 0;
 }
 
-void incise_integers_pose(struct incise_integers *integers, bool tube,
-			  const struct incise_tracker_sample *sample, int64_t now_ns)
-{
-	struct incise_fixed_pose pose = {
-		.t_ns = sample->t_ns,
-		.tool = (uint32_t)integers->state.wanted |
-			(tube ? INCISE_FIXED_POSE_TUBE : 0) |
-			(integers->state.fading ? INCISE_FIXED_POSE_FADE : 0),
-	};
-
-	if (!v3_finite(sample->position_mm))
-		return;
-	to_integers(pose.position, sample->position_mm);
-	/* One that is no quaternion leaves the attitude as it was; 0 would be no pose. */
-	for (int i = 0; i < 4; i++)
-		pose.quaternion[i] = isfinite(sample->quaternion[i])
-					     ? near_integer(sample->quaternion[i], UNIT)
-					     : 0;
-	pose.quaternion[0] += !pose.quaternion[0];
-	incise_fixed_plan_pose(&integers->plan, &integers->state, &pose, now_ns);
-}
-
-void incise_integers_begin(struct incise_integers *integers,
-			   const struct incise_tick *tick)
-{
-	integers->tick = (struct incise_fixed_tick){.t_ns = tick->t_ns};
-}
-
-void incise_integers_end(const struct incise_integers *integers, struct incise_tick *tick)
-{
-	const struct incise_fixed_tick *from = &integers->tick;
-
-	to_double(tick->position_mm, from->position, ONE);
-	for (int i = 0; i < 4; i++)
-		tick->quaternion[i] = from->attitude[i] / UNIT;
-	to_double(tick->tool_mm, from->tool, ONE);
-	to_double(tick->proxy_mm, from->proxy, ONE);
-	to_double(tick->normal, from->normal, UNIT);
-	to_double(tick->command_N, from->command, ONE);
-	tick->depth_mm = from->depth / ONE;
-	tick->velocity_mm_s = from->speed / ONE;
-	tick->flags |= from->flags;
-	tick->phase = (enum incise_phase)from->phase;
-	tick->tool = (enum incise_tool)from->held;
-}
-
-bool incise_integers_faded(const struct incise_integers *integers)
-{
-	const int32_t *last = integers->state.last;
-
-	return integers->state.gain <= 0 && !last[0] && !last[1] && !last[2];
-}
-
-void incise_integers_zero(struct incise_integers *integers)
-{
-	for (int i = 0; i < 3; i++)
-		integers->state.last[i] = 0;
-}
+const struct incise_plan_ops incise_fixed_ops = {
+	run,	 take_pose, hold,    faded,	 zero,
+	set_tip, punctured, get_cut, clear_cuts, add_cut,
+};

@@ -44,42 +44,4 @@ int incise_integers_file(const struct incise_plan *plan,
 struct incise_integers *incise_integers_new(const struct incise_plan *plan,
 					    struct incise_error *err);
 
-/* The tool in the hand, and whether the force is let go of, from now on. */
-void incise_integers_hold(struct incise_integers *integers, enum incise_tool tool,
-			  bool fading) INCISE_REALTIME;
-
-/* As incise_plan_set_tip(). Returns 0; -EINVAL (farther than integers hold). */
-int incise_integers_set_tip(struct incise_integers *integers, const double tip_mm[3]);
-
-/* Take a pose in, as incise_predict_add() of the scalpel or the tube. */
-void incise_integers_pose(struct incise_integers *integers, bool tube,
-			  const struct incise_tracker_sample *sample,
-			  int64_t now_ns) INCISE_REALTIME;
-
-/* As incise_plan_take_over(), of other integers. */
-void incise_integers_take_over(struct incise_integers *integers,
-			       const struct incise_integers *before) INCISE_REALTIME;
-
-/* Their cut of a number from 0 on, in double. Returns whether there is one. */
-bool incise_integers_cut(const struct incise_integers *integers, int i,
-			 struct incise_cut *cut) INCISE_REALTIME;
-
-/* Add a cut of a plan in double. Returns whether there was room. */
-bool incise_integers_add_cut(struct incise_integers *integers,
-			     const struct incise_cut *cut) INCISE_REALTIME;
-
-/* Before the first stage; @tick has its time. */
-void incise_integers_begin(struct incise_integers *integers,
-			   const struct incise_tick *tick) INCISE_REALTIME;
-
-/* Behind the last one: all that it found, in double. */
-void incise_integers_end(const struct incise_integers *integers,
-			 struct incise_tick *tick) INCISE_REALTIME;
-
-/* Whether no force is asked for or left. */
-bool incise_integers_faded(const struct incise_integers *integers) INCISE_REALTIME;
-
-/* No force from now on, at once. */
-void incise_integers_zero(struct incise_integers *integers) INCISE_REALTIME;
-
 #endif

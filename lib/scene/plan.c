@@ -8,7 +8,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../base/monotonic.h"
 #include "../base/vector.h"
 #include "../model/model.h"
 #include "plan.h"
@@ -84,13 +83,13 @@ static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
 		    struct incise_error *err)
 {
 	if (rig) {
-		plan->tracker = incise_rig_tracker(rig);
-		if (!plan->tracker)
+		plan->poses.tracker = incise_rig_tracker(rig);
+		if (!plan->poses.tracker)
 			return incise_error_set(
 				err, ENODEV,
 				"%s: the rig has no tracker; name one in rig.conf",
 				plan->scene->path);
-		incise_tracker_info(plan->tracker, tracker);
+		incise_tracker_info(plan->poses.tracker, tracker);
 		incise_rig_surface(rig, place.point_mm, place.normal);
 		incise_axes_take(&plan->axes, rig);
 	}
@@ -104,8 +103,8 @@ static int take_rig(struct incise_plan *plan, struct incise_rig *rig,
 /* From here on @tracker is that of one station: it has a part of the rate. */
 static void take_stations(struct incise_plan *plan, struct incise_tracker_info *tracker)
 {
-	plan->scalpel_station = tracker->scalpel_station;
-	plan->tube_station = tracker->tube_station;
+	plan->poses.scalpel_station = tracker->scalpel_station;
+	plan->poses.tube_station = tracker->tube_station;
 	tracker->rate_hz = incise_tracker_station_hz(tracker);
 	tracker->stations = 1;
 }
@@ -115,29 +114,12 @@ static void take_tissue(struct incise_plan *plan)
 	const struct incise_scene *scene = plan->scene;
 
 	plan->gain = scene->tissue.gain;
-	plan->printed_orientation = scene->tissue.printed_orientation;
 	for (int i = 0; i < incise_n_tissue_forces; i++) {
 		plan->acting[i].force = &incise_tissue_forces[i];
 		for (int k = 0; k < INCISE_FORCE_NUMBERS; k++)
 			plan->acting[i].number[k] =
 				(k ? 1 : plan->gain) * scene->tissue.force[i][k];
 	}
-}
-
-static void set_limits(struct incise_plan *plan)
-{
-	const struct incise_scene *scene = plan->scene;
-
-	plan->pose_age_ns = (int64_t)(scene->limits.pose_age_ms * 1e6);
-	plan->start = (struct incise_start){
-		.small_N = scene->limits.start_N,
-		.ramp_s = scene->limits.ramp_ms * 1e-3,
-		.fade_s = scene->limits.fade_ms * 1e-3,
-	};
-	plan->limit = (struct incise_limit){
-		.force_N = scene->limits.force_N,
-		.slew_N = scene->limits.slew_N_s / scene->rate_hz,
-	};
 }
 
 /* Whether anything resists insertion, and the reason why nothing is inserted. */
@@ -163,14 +145,10 @@ static void set_tool(struct incise_plan *plan)
 {
 	struct incise_touch top;
 
-	v3_copy(plan->instrument.axis, plan->scene->tool.axis);
-	v3_copy(plan->instrument.side, plan->scene->tool.side);
-	plan->instrument.handle_mm = plan->scene->tool.handle_mm;
-	plan->instrument.held = INCISE_TOOL_BLADE;
 	find_insertion(plan);
+	plan->held = INCISE_TOOL_BLADE;
 	/* Without insertion there is only the blade. */
-	if (!plan->inserts)
-		plan->instrument.wanted = INCISE_TOOL_BLADE;
+	plan->wanted = plan->inserts ? INCISE_TOOL_AUTO : INCISE_TOOL_BLADE;
 	incise_surface_top(plan->surface, &top);
 	v3_copy(plan->up, top.normal);
 	incise_proxy_init(&plan->proxy, plan->surface, plan->scene->tissue.leave_mm);
@@ -212,32 +190,18 @@ static bool keeps(const struct incise_plan *plan, const char *stage)
 }
 
 /* Allocate the parts that only some stages need, for those that are kept. */
-static int equip(struct incise_plan *plan, const struct incise_tracker_info *tracker,
-		 struct incise_error *err)
+static int equip(struct incise_plan *plan, struct incise_error *err)
 {
-	bool handle = keeps(plan, "tool"), average = keeps(plan, "normal");
-	bool cuts = keeps(plan, "incision"), tube = handle && plan->tube_station;
+	bool cuts = keeps(plan, "incision");
 
-	if (!plan->tracker)
-		plan->fed = calloc(INCISE_PLAN_POSES, sizeof(*plan->fed));
-	if (handle)
-		plan->handle = calloc(1, sizeof(*plan->handle));
-	if (tube)
-		plan->tube = calloc(1, sizeof(*plan->tube));
-	if (average)
-		plan->average = calloc(1, sizeof(*plan->average));
+	if (!plan->poses.tracker)
+		plan->poses.fed = calloc(INCISE_PLAN_POSES, sizeof(*plan->poses.fed));
 	if (cuts)
 		plan->incision = incise_incision_new(plan->scene, NULL);
-	if ((!plan->tracker && !plan->fed) || (handle && !plan->handle) ||
-	    (tube && !plan->tube) || (average && !plan->average) ||
-	    (cuts && !plan->incision))
+	if ((!plan->poses.tracker && !plan->poses.fed) || (cuts && !plan->incision))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
-	if (handle)
-		incise_predict_init(plan->handle, tracker, 0);
-	if (tube)
-		incise_predict_init(plan->tube, tracker, 0);
-	if (average)
-		incise_average_init(plan->average, plan->average_ticks);
+	if (cuts)
+		plan->doubles.state.incision = incise_incision_of(plan->incision);
 	return 0;
 }
 
@@ -286,14 +250,19 @@ static struct incise_plan *new_plan(const struct incise_scene *scene,
 	}
 	if (!rc) {
 		set_tool(plan);
-		set_limits(plan);
 		incise_plan_choose(plan);
-		rc = equip(plan, &tracker, err);
+		rc = equip(plan, err);
+	}
+	if (!rc) {
+		incise_plan_set_numbers(plan);
+		incise_double_plan_begin(&plan->doubles.plan, &plan->doubles.state);
+		plan->ops = incise_double_ops;
 	}
 	if (!rc)
 		rc = incise_plan_check_rest(plan, &tracker, err);
 	if (!rc && scene->fixed) {
 		plan->integers = incise_integers_new(plan, err);
+		plan->ops = incise_fixed_ops;
 		rc = plan->integers ? 0 : -errno;
 	}
 	if (rc) {
@@ -350,44 +319,25 @@ void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 {
 	*copy = *plan;
 	copy->integers = NULL;
-	for (int i = 0; i < copy->n_stages; i++)
-		if (copy->stage[i].own)
-			copy->stage[i].own =
-				&copy->acting[plan->stage[i].own - plan->acting];
+	copy->ops = incise_double_ops;
 	copy->gain *= gain;
 	copy->unloading_N_mm *= gain;
 	copy->beyond_N_mm *= gain;
 	for (int i = 0; i < incise_n_tissue_forces; i++)
 		copy->acting[i].number[0] *= gain;
+	incise_plan_set_numbers(copy);
 }
 
 void incise_plan_take_over(struct incise_plan *plan, const struct incise_plan *before)
 {
+	/* Its state is only read. */
+	struct incise_plan *from = (struct incise_plan *)(uintptr_t)before;
 	struct incise_cut cut;
 
-	if (plan->integers && before->integers) {
-		incise_integers_take_over(plan->integers, before->integers);
-		return;
-	}
-	plan->membrane.punctured = before->integers
-					   ? before->integers->state.membrane.punctured
-					   : before->membrane.punctured;
-	if (plan->integers)
-		plan->integers->state.membrane.punctured = plan->membrane.punctured;
-	if (!plan->incision || !before->incision)
-		return;
-	incise_incision_clear(plan->incision);
-	if (before->integers)
-		for (int i = 0; incise_integers_cut(before->integers, i, &cut); i++)
-			incise_incision_add(plan->incision, &cut);
-	for (int i = 0; !before->integers && i < incise_incision_cuts(before->incision);
-	     i++)
-		if (plan->integers)
-			incise_integers_add_cut(plan->integers,
-						incise_incision_cut(before->incision, i));
-		else
-			incise_incision_add(plan->incision,
-					    incise_incision_cut(before->incision, i));
+	*plan->ops.punctured(plan) = *before->ops.punctured(from);
+	plan->ops.clear_cuts(plan);
+	for (int i = 0; before->ops.cut(from, i, &cut); i++)
+		plan->ops.add_cut(plan, &cut);
 }
 
 void incise_plan_free(struct incise_plan *plan)
@@ -396,10 +346,7 @@ void incise_plan_free(struct incise_plan *plan)
 		return;
 	incise_fixed_free(plan->own_fixed);
 	incise_surface_free(plan->own_surface);
-	free(plan->fed);
-	free(plan->handle);
-	free(plan->tube);
-	free(plan->average);
+	free(plan->poses.fed);
 	incise_incision_free(plan->incision);
 	free(plan->integers);
 	free(plan);
@@ -410,10 +357,10 @@ int incise_plan_feed(struct incise_plan *plan,
 {
 	int taken = 0;
 
-	if (plan->tracker || n < 0)
+	if (plan->poses.tracker || n < 0)
 		return -EINVAL;
-	while (taken < n && plan->n_fed < INCISE_PLAN_POSES)
-		plan->fed[plan->n_fed++] = samples[taken++];
+	while (taken < n && plan->poses.n_fed < INCISE_PLAN_POSES)
+		plan->poses.fed[plan->poses.n_fed++] = samples[taken++];
 	return taken;
 }
 
@@ -421,8 +368,7 @@ int incise_plan_set_tip(struct incise_plan *plan, const double tip_mm[3])
 {
 	if (!v3_finite(tip_mm) || v3_length(tip_mm) > 1e6)
 		return -EINVAL;
-	v3_copy(plan->tip_mm, tip_mm);
-	return plan->integers ? incise_integers_set_tip(plan->integers, tip_mm) : 0;
+	return plan->ops.set_tip(plan, tip_mm);
 }
 
 int incise_plan_set_tool(struct incise_plan *plan, enum incise_tool tool)
@@ -430,41 +376,33 @@ int incise_plan_set_tool(struct incise_plan *plan, enum incise_tool tool)
 	if ((unsigned int)tool > INCISE_TOOL_TUBE)
 		return -EINVAL;
 	if (plan->inserts)
-		plan->instrument.wanted = tool;
-	if (plan->integers)
-		incise_integers_hold(plan->integers, tool, plan->fading);
+		plan->wanted = tool;
+	plan->ops.hold(plan);
 	return 0;
 }
 
 void incise_plan_fade(struct incise_plan *plan, bool fading)
 {
 	plan->fading = fading;
-	if (plan->integers)
-		incise_integers_hold(plan->integers, plan->instrument.wanted, fading);
+	plan->ops.hold(plan);
 }
 
 bool incise_plan_faded(const struct incise_plan *plan)
 {
-	if (plan->watched)
-		return incise_plan_kernel_faded(plan);
-	if (plan->integers)
-		return plan->fading && incise_integers_faded(plan->integers);
-	/* A gain of 0 asks for nothing; the slew may still be on its way there. */
-	return plan->fading && !(plan->start.gain > 0) &&
-	       v3_length(plan->limit.last_N) == 0;
+	return plan->fading && plan->ops.faded(plan);
 }
 
 int64_t incise_plan_fade_ns(const struct incise_plan *plan)
 {
 	double slew_s = plan->scene->limits.force_N / plan->scene->limits.slew_N_s;
 
-	return (int64_t)((plan->start.fade_s + slew_s) * INCISE_NS_PER_S);
+	return (int64_t)((plan->scene->limits.fade_ms * 1e-3 + slew_s) * INCISE_NS_PER_S);
 }
 
 int incise_plan_release(struct incise_plan *plan)
 {
 	/* The first error remains the cause. */
-	int rc = plan->watched && !plan->feeds
+	int rc = plan->kernel.runs && !plan->kernel.feeds
 			 ? 0
 			 : incise_axes_release(&plan->axes, plan->fault);
 
@@ -484,12 +422,12 @@ const char *incise_plan_fault(const struct incise_plan *plan)
 
 void incise_plan_poses(const struct incise_plan *plan, struct incise_pose_counts *counts)
 {
-	*counts = plan->poses;
+	*counts = plan->poses.counts;
 }
 
 char incise_plan_pose_flag(const struct incise_plan *plan)
 {
-	return plan->pose_flag;
+	return plan->poses.flag;
 }
 
 /* The tracker works, but what it measures is no pose. */
@@ -497,14 +435,15 @@ static int blind_cause(const struct incise_plan *plan, char *text, size_t size)
 {
 	struct incise_tracker_info info;
 
-	incise_tracker_info(plan->tracker, &info);
+	incise_tracker_info(plan->poses.tracker, &info);
 	return snprintf(
 		text, size,
 		"%s sent no usable pose for %.0f s, the last with the flag '%c' (%s); "
 		"see Tracker flags in rig.conf(5)",
 		info.name, (double)INCISE_PLAN_BLIND_NS / INCISE_NS_PER_S,
-		plan->pose_flag > ' ' && plan->pose_flag <= '~' ? plan->pose_flag : '?',
-		incise_pose_flag(plan->pose_flag));
+		plan->poses.flag > ' ' && plan->poses.flag <= '~' ? plan->poses.flag
+								  : '?',
+		incise_pose_flag(plan->poses.flag));
 }
 
 int incise_plan_cause(const struct incise_plan *plan, char *text, size_t size)
@@ -512,23 +451,21 @@ int incise_plan_cause(const struct incise_plan *plan, char *text, size_t size)
 	const char *fault = incise_plan_fault(plan);
 	int length = 0;
 
-	if (plan->fault && plan->blind)
+	if (plan->fault && plan->poses.blind)
 		return blind_cause(plan, text, size);
 	/* Only of an actuator that has one: else a tracker's failure would go under. */
 	if (plan->fault)
 		length = incise_axes_cause(&plan->axes, plan->fault, text, size);
-	if (plan->fault && length <= 0 && plan->tracker)
-		length = incise_tracker_cause(plan->tracker, text, size);
+	if (plan->fault && length <= 0 && plan->poses.tracker)
+		length = incise_tracker_cause(plan->poses.tracker, text, size);
 	return length > 0 ? length : snprintf(text, size, "%s", fault ? fault : "");
 }
 
-/* Take the force away, and keep why. */
-static int fail(struct incise_plan *plan, struct incise_tick *tick, int rc)
+int incise_plan_fail(struct incise_plan *plan, struct incise_tick *tick, int rc)
 {
 	plan->fault = rc;
-	incise_limit_zero(&plan->limit);
-	if (plan->integers)
-		incise_integers_zero(plan->integers);
+	v3_copy(plan->last_N, (const double[3]){0, 0, 0});
+	plan->ops.zero(plan);
 	memset(tick->command_N, 0, sizeof(tick->command_N));
 	memset(tick->actuated_N, 0, sizeof(tick->actuated_N));
 	tick->unfelt_N = 0;
@@ -537,60 +474,9 @@ static int fail(struct incise_plan *plan, struct incise_tick *tick, int rc)
 	return rc;
 }
 
-/* Only in the phases of the force, and while poses are fresh. */
-static inline void add_force(struct incise_plan *plan, struct incise_tick *tick,
-			     const struct incise_stage *stage)
-{
-	if (stage->own->force->phases >> tick->phase & 1 &&
-	    !(tick->flags & INCISE_TICK_STALE))
-		stage->add(plan, tick, stage->own);
-}
-
-static inline void run_integer(struct incise_plan *plan, const struct incise_stage *stage,
-			       struct incise_tick *tick)
-{
-	struct incise_integers *integers = plan->integers;
-
-	if (stage->integer == incise_fixed_stage_predict)
-		incise_integers_begin(integers, tick);
-	stage->integer(&integers->plan, &integers->state, &integers->tick);
-	if (stage->integer != incise_fixed_stage_limit)
-		return;
-	incise_integers_end(integers, tick);
-	v3_copy(plan->limit.last_N, tick->command_N);
-}
-
-/* Inlined into both, so that the one without times does not pay for them. */
-static inline __attribute__((always_inline)) int run_stages(struct incise_plan *plan,
-							    int64_t t_ns,
-							    struct incise_tick *tick,
-							    int64_t *stage_ns)
-{
-	*tick = (struct incise_tick){.t_ns = t_ns, .tool = plan->instrument.held};
-	if (plan->fault)
-		return fail(plan, tick, plan->fault);
-	for (int i = 0; i < plan->n_stages; i++) {
-		const struct incise_stage *stage = &plan->stage[i];
-		int64_t begin = stage_ns ? incise_monotonic_ns() : 0;
-		int rc = 0;
-
-		if (plan->integers && stage->integer)
-			run_integer(plan, stage, tick);
-		else if (stage->own)
-			add_force(plan, tick, stage);
-		else if (stage->always || !(tick->flags & INCISE_TICK_STALE))
-			rc = stage->run(plan, tick);
-		if (stage_ns)
-			stage_ns[i] = incise_monotonic_ns() - begin;
-		if (rc)
-			return fail(plan, tick, rc);
-	}
-	return 0;
-}
-
 int incise_plan_tick(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tick)
 {
-	return run_stages(plan, t_ns, tick, NULL);
+	return plan->ops.tick(plan, t_ns, tick, NULL);
 }
 
 int64_t incise_plan_run(struct incise_plan *plan,
@@ -600,7 +486,7 @@ int64_t incise_plan_run(struct incise_plan *plan,
 {
 	size_t next = 0;
 
-	if (plan->tracker || period_ns <= 0)
+	if (plan->poses.tracker || period_ns <= 0)
 		return -EINVAL;
 	for (size_t i = 1; i < n; i++)
 		if (poses[i].t_ns < poses[i - 1].t_ns)
@@ -625,7 +511,7 @@ int incise_plan_tick_timed(struct incise_plan *plan, int64_t t_ns,
 {
 	/* A stage that a fault kept from running took no time. */
 	memset(stage_ns, 0, INCISE_PLAN_STAGES_MAX * sizeof(*stage_ns));
-	return run_stages(plan, t_ns, tick, stage_ns);
+	return plan->ops.tick(plan, t_ns, tick, stage_ns);
 }
 
 const char *incise_plan_stage(const struct incise_plan *plan, int index)
@@ -647,10 +533,7 @@ size_t incise_plan_memory(const struct incise_plan *plan)
 {
 	size_t size = sizeof(*plan) + incise_surface_memory(plan->surface);
 
-	size += plan->fed ? INCISE_PLAN_POSES * sizeof(*plan->fed) : 0;
-	size += plan->handle ? sizeof(*plan->handle) : 0;
-	size += plan->tube ? sizeof(*plan->tube) : 0;
-	size += plan->average ? sizeof(*plan->average) : 0;
+	size += plan->poses.fed ? INCISE_PLAN_POSES * sizeof(*plan->poses.fed) : 0;
 	size += plan->incision ? incise_incision_memory(plan->incision) : 0;
 	size += plan->integers ? sizeof(*plan->integers) : 0;
 	if (plan->fixed)

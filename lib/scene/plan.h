@@ -9,13 +9,10 @@
 #include <incise/model.h>
 #include <incise/plan.h>
 #include <incise/stepper_plan.h>
-#include "../control/limit.h"
+#include "../control/model_input.h"
 #include "../control/predict.h"
-#include "../control/start.h"
-#include "../surface/average.h"
 #include "../surface/surface.h"
 #include "../tissue/incision.h"
-#include "../tissue/instrument.h"
 #include "actuate.h"
 #include "integers.h"
 #include "scene.h"
@@ -27,15 +24,44 @@
 typedef int incise_stage_fn(struct incise_plan *plan,
 			    struct incise_tick *tick) INCISE_REALTIME;
 
+/* A stage of a device, or one of numbers. */
 struct incise_stage {
 	const char *name;
-	/* Also runs while there is no fresh pose; the others stand still then. */
-	bool always;
-	incise_stage_fn *run; /* or a force: */
-	incise_force_fn *add;
-	struct incise_acting_force *own;
-	incise_fixed_stage_fn
-		*integer; /* takes their place in integers; NULL: none does */
+	incise_stage_fn *run; /* or: */
+	struct incise_stage_pair numbers;
+};
+
+/* How a plan runs: in double, in integers, or in the kernel. All are real-time safe. */
+struct incise_plan_ops {
+	/* All stages; @stage_ns: with the time of each, or NULL. 0 or a negative errno. */
+	int (*tick)(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tick,
+		    int64_t *stage_ns) INCISE_REALTIME;
+	void (*take_pose)(struct incise_plan *plan, bool tube,
+			  const struct incise_tracker_sample *sample,
+			  int64_t now_ns) INCISE_REALTIME;
+	/* Follow plan->wanted and plan->fading. */
+	void (*hold)(struct incise_plan *plan) INCISE_REALTIME;
+	/* Whether no force is asked for or left. */
+	bool (*faded)(const struct incise_plan *plan) INCISE_REALTIME;
+	/* No force from now on, at once. */
+	void (*zero)(struct incise_plan *plan) INCISE_REALTIME;
+	/* Returns 0; -EINVAL (farther than the numbers hold). */
+	int (*set_tip)(struct incise_plan *plan, const double tip_mm[3]) INCISE_REALTIME;
+	/* Whether the membrane is open, and the cuts: one of a number from 0 on; none; one more. */
+	int32_t *(*punctured)(struct incise_plan *plan)INCISE_REALTIME;
+	bool (*cut)(struct incise_plan *plan, int i,
+		    struct incise_cut *cut) INCISE_REALTIME;
+	void (*clear_cuts)(struct incise_plan *plan) INCISE_REALTIME;
+	bool (*add_cut)(struct incise_plan *plan,
+			const struct incise_cut *cut) INCISE_REALTIME;
+};
+extern const struct incise_plan_ops incise_double_ops, incise_fixed_ops;
+
+/* A plan's numbers, and its ticks in double. */
+struct incise_doubles {
+	struct incise_double_plan plan;
+	struct incise_double_state state;
+	struct incise_double_tick tick;
 };
 
 /* Stages besides forces; those that no loop has are always left out. */
@@ -47,13 +73,30 @@ _Static_assert(INCISE_PLAN_OTHER_STAGES + INCISE_FORCES_MAX <= INCISE_PLAN_STAGE
 /* A tracker that gives only unusable poses for so long has failed, as one that is unplugged. */
 #define INCISE_PLAN_BLIND_NS (10 * INCISE_NS_PER_S)
 
-/* The height of an end above the surface, when that was last searched for it. */
-struct incise_above {
-	bool known;
-	double end_mm[3], above_mm;
+/* The poses of a plan. */
+struct incise_plan_poses {
+	struct incise_tracker *tracker;	   /* or NULL: poses are fed */
+	struct incise_tracker_sample *fed; /* INCISE_PLAN_POSES, then */
+	int n_fed;
+	struct incise_pose_counts counts;
+	char flag; /* of the scalpel's newest pose; ' ' or 0: none */
+	uint8_t scalpel_station, tube_station; /* of the tracker; 0: any, none */
+	bool unusable, tube_unusable;	       /* the newest pose of that station is */
+	bool none_usable;    /* the newest pose of all is unusable … */
+	int64_t unusable_ns; /* … since the tick of the first of them … */
+	bool blind;	     /* … which was INCISE_PLAN_BLIND_NS ago */
 };
 
-enum { INCISE_PLAN_TIP, INCISE_PLAN_HANDLE, INCISE_PLAN_TUBE, INCISE_PLAN_ENDS };
+/* A plan that the kernel renders: with incise_plan_watch(), and with incise_plan_feed_kernel(). */
+struct incise_plan_kernel {
+	bool runs, feeds;
+	bool seen;
+	struct incise_stepper_rendered last_seen;
+	int64_t fed_ns;	 /* when a pose, or a sign of life, was given last; 0: none was */
+	int64_t life_ns; /* so often, at least */
+	bool follow;	 /* all actuators do */
+	bool fade_told;	 /* the last one said whether to fade as it is */
+};
 
 struct incise_plan {
 	const struct incise_scene *scene;
@@ -65,58 +108,24 @@ struct incise_plan {
 	int n_left_out;
 	struct incise_plan_stability stability;
 	int fault; /* negative errno of the device that failed, or 0 */
+	struct incise_plan_ops ops;
 
-	/* pose */
-	struct incise_tracker *tracker;	   /* or NULL: poses are fed */
-	struct incise_tracker_sample *fed; /* INCISE_PLAN_POSES, then */
-	int n_fed;
-	struct incise_predict predict;
-	int64_t pose_age_ns;
-	struct incise_pose_counts poses;
-	char pose_flag; /* of the scalpel's newest pose; ' ' or 0: none */
-	uint8_t scalpel_station, tube_station; /* of the tracker; 0: any, none */
-	bool unusable, tube_unusable;	       /* the newest pose of that station is */
-	bool none_usable;	 /* the newest pose of all is unusable … */
-	int64_t unusable_ns;	 /* … since the tick of the first of them … */
-	bool blind;		 /* … which was INCISE_PLAN_BLIND_NS ago */
-	double velocity_mm_s[3]; /* of the end of what is held */
-	double attitude[4];
-	double tip_mm[3]; /* of the blade in the frame of the tracker's poses */
-
-	/* tool, contact, normal */
-	struct incise_instrument instrument;
+	struct incise_plan_poses poses;
+	struct incise_predict predict; /* its gains */
+	enum incise_tool wanted;       /* INCISE_TOOL_AUTO: by the scalpel's turn */
+	enum incise_tool held;	       /* at the last tick; never AUTO */
 	bool inserts;		       /* handle and tube can be held */
 	char no_tool[128];	       /* the reason why not */
-	struct incise_predict *handle; /* its end's position; with stage tool */
-	struct incise_predict *tube;   /* the same, if it has a station */
-	struct incise_above above[INCISE_PLAN_ENDS]; /* with a tube's station */
+	bool fading;		       /* asked to let go of the force */
+
 	const struct incise_surface *surface;
 	struct incise_surface *own_surface; /* the rig's plane, when it is that */
 	double up[3];			    /* normal of the surface's top */
 	struct incise_proxy proxy;
-	double sn[3];	    /* the paper's Sn of this tick */
-	double normal[3];   /* the one that forces go along: Sn, or its average */
-	double depth_mm;    /* ≥ 0; of the tissue in front of a membrane */
-	double p0_mm[3];    /* where the contact began … */
-	int64_t touched_ns; /* … and when */
-	double deepest_mm;  /* of the blade since then */
-	bool skin_open;	    /* it came into a cut that was there */
-	double side[3];	    /* of the blade then: Sx(0) */
 	struct incise_incision *incision; /* with its stage */
-	struct incise_opening opening;	  /* that handle or tube went into … */
-	double tightness; /* … and how tight it was; incise_incision_tightness() */
-	bool printed_orientation; /* the scene's orientation = "paper" */
-	struct {
-		bool met;	 /* the tool is beyond the plane of the membrane … */
-		bool hit;	 /* … and came there through it */
-		double depth_mm; /* of the plane, below the skin */
-		bool punctured;
-	} membrane;
 	int average_ticks;
-	struct incise_average *average; /* with stage normal */
 
 	/* forces */
-	double force_N[3]; /* of this tick, before limits */
 	double gain;
 	bool dissipates;       /* a model's force unloads when the blade draws back … */
 	double unloading_N_mm; /* … with this stiffness */
@@ -127,59 +136,18 @@ struct incise_plan {
 	const struct incise_model *model; /* fuzzy: one of these */
 	const struct incise_fixed *fixed;
 	struct incise_fixed *own_fixed; /* compiled here */
-	/* Inputs that a search for swings holds: bits 1 << enum incise_model_input, and where. */
-	unsigned int holds;
-	double held[INCISE_MODEL_INPUT_KINDS];
 	struct incise_acting_force acting[INCISE_FORCES_MAX];
 
-	/* start, limit */
-	struct incise_start start;
-	bool fading;   /* asked to let go of the force */
-	bool changing; /* the same, for another tool */
-	struct incise_limit limit;
-	int64_t last_ns; /* of the last tick; 0: none */
-
-	struct incise_axes axes; /* none: nothing is rendered */
-
+	struct incise_doubles doubles;	  /* by all of the above */
 	struct incise_integers *integers; /* with arithmetic = "fixed"; else NULL */
-
-	/* The kernel renders: with incise_plan_watch(), and with incise_plan_feed_kernel(). */
-	bool watched, feeds;
-	bool seen;
-	struct incise_stepper_rendered last_seen;
-	int64_t fed_ns;	 /* when a pose, or a sign of life, was given last; 0: none was */
-	int64_t life_ns; /* so often, at least */
-	bool follow;	 /* all actuators do */
-	bool fade_told;	 /* the last one said whether to fade as it is */
+	double last_N[3];		  /* what was rendered */
+	struct incise_axes axes;	  /* none: nothing is rendered */
+	struct incise_plan_kernel kernel;
 };
 
-/* --- stages, but for the forces, which are in forces.h --- */
+/* --- stages of devices --- */
 
-/* From poses to the tool on the surface. */
-incise_stage_fn incise_stage_pose;
-incise_stage_fn incise_stage_fed;
-incise_stage_fn incise_stage_predict;
-incise_stage_fn incise_stage_tool;
-incise_stage_fn incise_stage_contact;
-incise_stage_fn incise_stage_normal;
-incise_stage_fn incise_stage_incision;
-incise_stage_fn incise_stage_membrane;
-
-/* From the tissue's force to the hand. */
-incise_stage_fn incise_stage_start;
-incise_stage_fn incise_stage_limit;
-incise_stage_fn incise_stage_actuate;
-
-/* In place of all but poses: what the kernel renders. */
-incise_stage_fn incise_stage_watched;
-
-/* incise_plan_faded() of a plan that the kernel renders. */
-bool incise_plan_kernel_faded(const struct incise_plan *plan) INCISE_REALTIME;
-
-/* Give the kernel a pose; NULL: a sign of life. 0 or a negative errno. */
-int incise_plan_give(struct incise_plan *plan, bool tube,
-		     const struct incise_tracker_sample *sample,
-		     int64_t now_ns) INCISE_REALTIME;
+incise_stage_fn incise_stage_pose, incise_stage_fed, incise_stage_actuate;
 
 /* --- plan --- */
 
@@ -193,6 +161,27 @@ void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 /* The lower end of the support of an input of a phase's model, and the upper one. */
 void incise_plan_input_range(const struct incise_plan *plan,
 			     enum incise_cutting_phase phase, int i, double ends[2]);
+
+/* Take a number's place in a tick: the plan in double, by all that was found of the scene. */
+void incise_plan_set_numbers(struct incise_plan *plan);
+
+/* Take the force away, and keep why. Returns @rc. */
+int incise_plan_fail(struct incise_plan *plan, struct incise_tick *tick,
+		     int rc) INCISE_REALTIME;
+
+/*
+ * Largest difference of the front's force in integers on the same motion, N, where each cutting force
+ * differs by no more than @cutting_bound_N and none is above @most_N, while no advance is short of work.
+ * A stop passes on the error of its bounds and of its input, and rest and cut are set by one division
+ * each, so that nothing adds up:
+ *
+ *   cutting force    its bound, and friction × it at each of upper, least, cut and rest
+ *   lengths          depth, rest, cut: 1/2 LSB and the division's, × K
+ *   forces           1/2 LSB per product; the friction's share is 1/2 LSB off
+ *   K                1/2 LSB × the elastic way, (1 + friction) × most_N / K
+ */
+double incise_front_bound(double unloading_N_mm, double friction, double most_N,
+			  double cutting_bound_N);
 
 /* Fill in the stages that the scene and the rig need, and why the others are left out. */
 void incise_plan_choose(struct incise_plan *plan);

@@ -50,18 +50,10 @@ static const struct {
 
 #define N(array) ((int)(sizeof(array) / sizeof(*(array))))
 
-/* Parts of a plan that a tick changes, apart from the plan itself. */
-struct parts {
-	struct incise_predict handle;
-	struct incise_average average;
-};
-
 struct search {
 	struct incise_plan plan; /* at work */
-	struct parts parts;
 	struct incise_tracker_sample fed[INCISE_PLAN_POSES];
 	struct incise_plan rested; /* as before a first tick */
-	struct parts rested_parts;
 	struct incise_touch top;
 	struct incise_surface *plane; /* in place of the surface: it has no end */
 	double along[3];	      /* in it */
@@ -96,21 +88,16 @@ static void set_plans(struct search *s, const struct incise_plan *plan,
 	incise_plan_copy(own, plan, trial->gain * (1 + RESERVE));
 	own->surface = s->plane;
 	incise_proxy_init(&own->proxy, s->plane, plan->proxy.leave_mm);
-	own->tracker = NULL;
+	own->poses.tracker = NULL;
+	own->poses.tube_station = 0;
 	own->axes.n = 0;
-	own->fed = s->fed;
-	own->n_fed = 0;
-	if (plan->handle)
-		s->parts.handle = *plan->handle;
-	if (plan->average)
-		s->parts.average = *plan->average;
-	own->handle = plan->handle ? &s->parts.handle : NULL;
-	own->tube = NULL;
-	own->average = plan->average ? &s->parts.average : NULL;
+	own->poses.fed = s->fed;
+	own->poses.n_fed = 0;
+	incise_plan_set_numbers(own);
 	for (int i = 0; i < own->n_stages; i++) {
 		/* Only handle and tube ask for the cuts. */
 		if (own->stage[i].run == incise_stage_actuate ||
-		    own->stage[i].run == incise_stage_incision)
+		    own->stage[i].numbers.in_double == incise_double_stage_incision)
 			continue;
 		own->stage[n] = own->stage[i];
 		if (own->stage[n].run == incise_stage_pose)
@@ -119,7 +106,6 @@ static void set_plans(struct search *s, const struct incise_plan *plan,
 	}
 	own->n_stages = n;
 	s->rested = s->plan;
-	s->rested_parts = s->parts;
 }
 
 static void set_loop(struct search *s, const struct incise_plan *plan,
@@ -154,9 +140,10 @@ static void set_loop(struct search *s, const struct incise_plan *plan,
 		s->latency_s = 0;
 		s->pose_s = s->tick_s;
 		incise_predict_init(
-			&s->rested.predict,
+			&s->plan.predict,
 			&(struct incise_tracker_info){.rate_hz = 1 / s->tick_s}, 0);
-		s->plan.predict = s->rested.predict;
+		incise_plan_set_numbers(&s->plan);
+		s->rested = s->plan;
 	}
 	s->device = (struct incise_plant){
 		.mass_kg = device->mass_kg,
@@ -223,13 +210,12 @@ static void tick(struct search *s, struct run *run)
 /* In the air, until the force may start. */
 static void start(struct search *s, struct run *run, double height_mm)
 {
-	double air_s = AIR_S + s->plan.start.ramp_s;
+	double air_s = AIR_S + s->plan.scene->limits.ramp_ms * 1e-3;
 	int ticks = (int)(air_s / s->tick_s);
 
 	*run = (struct run){.device = s->device, .along_mm_s = run->along_mm_s};
 	run->device.position_mm = height_mm;
 	s->plan = s->rested;
-	s->parts = s->rested_parts;
 	for (int k = 1; k <= ticks; k++) {
 		tick(s, run);
 		run->device.position_mm = height_mm;
@@ -315,18 +301,15 @@ static void search(struct search *s, double most_N, int way, struct incise_rest 
 	for (int w = 0; w < N(ways); w++) {
 		struct run air = {.along_mm_s = ways[w].along_mm_s}, run;
 		struct incise_plan plan;
-		struct parts parts;
 
 		if (way >= 0 && w != way)
 			continue;
 		start(s, &air, ways[w].start_mm);
 		plan = s->plan;
-		parts = s->parts;
 		for (int i = LEANS; i > 0; i -= ways[w].every) {
 			run = air;
 			run.lean_N = LEAN_MOST * i / LEANS * most_N;
 			s->plan = plan;
-			s->parts = parts;
 			if (!try(s, &run, w, rest))
 				return;
 		}

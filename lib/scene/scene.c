@@ -793,17 +793,16 @@ int incise_scene_checksum(const struct incise_scene *scene, uint32_t *crc32c,
 struct incise_incision *incise_incision_new(const struct incise_scene *scene,
 					    struct incise_error *err)
 {
-	struct incise_incision_setup setup = {
-		.cut_from_mm = scene->tissue.cut_from_mm,
-		.stretch_mm = scene->tissue.stretch_mm,
+	const struct incise_double_incision_setup setup = {
 		.cuts_most = scene->tissue.cuts_most,
-		.handle_width_mm = scene->tool.handle_width_mm,
-		.handle_thickness_mm = scene->tool.handle_thickness_mm,
-		.tube_mm = scene->tool.tube_mm,
+		.cut_from = scene->tissue.cut_from_mm,
+		.stretch = scene->tissue.stretch_mm,
+		.handle_width = scene->tool.handle_width_mm,
+		.handle_thickness = scene->tool.handle_thickness_mm,
+		.tube = scene->tool.tube_mm,
 	};
 
-	v3_copy(setup.side, scene->tool.side);
-	return incise_incision_make(&setup, err);
+	return incise_incision_make(&setup, scene->tool.side, err);
 }
 
 double incise_scene_rate_hz(const struct incise_scene *scene)

@@ -10,6 +10,7 @@
 #include <math.h>
 #include <incise/plan_file.h>
 #include <incise/stepper_plan.h>
+#include "../base/monotonic.h"
 #include "../base/vector.h"
 #include "plan.h"
 
@@ -33,8 +34,128 @@ static int take_axes(struct incise_plan *plan, struct incise_rig *rig,
 			first->info.name);
 	for (int i = 0; i < plan->axes.n; i++)
 		deadman_s = fmin(deadman_s, plan->axes.axis[i].info.deadman_s);
-	plan->life_ns = (int64_t)(deadman_s * INCISE_NS_PER_S / LIVES);
+	plan->kernel.life_ns = (int64_t)(deadman_s * INCISE_NS_PER_S / LIVES);
 	return 0;
+}
+
+static int give(struct incise_plan *plan, bool tube,
+		const struct incise_tracker_sample *sample, int64_t now_ns)
+{
+	const struct incise_stepper_pose_given given = {
+		.sample = sample,
+		.tool = plan->wanted,
+		.tube = tube,
+		.fade = plan->fading,
+	};
+	int rc = incise_stepper_pose(plan->axes.axis[0].stepper, &given);
+
+	if (!rc && !tube) {
+		plan->kernel.fed_ns = now_ns;
+		plan->kernel.fade_told = plan->fading;
+	}
+	return rc;
+}
+
+/* Without poses, and to fade at once. A fault is found by the look that follows. */
+static void live(struct incise_plan *plan, int64_t now_ns)
+{
+	if (!plan->kernel.follow) {
+		plan->kernel.follow = true;
+		for (int i = 1; i < plan->axes.n; i++)
+			plan->kernel.follow &=
+				!incise_stepper_follow_plan(plan->axes.axis[i].stepper);
+	}
+	if (!plan->kernel.fed_ns ||
+	    now_ns - plan->kernel.fed_ns >= plan->kernel.life_ns ||
+	    plan->kernel.fade_told != plan->fading)
+		give(plan, false, NULL, now_ns);
+}
+
+static bool kernel_faded(const struct incise_plan *plan)
+{
+	enum incise_stepper_plan_state state = plan->kernel.last_seen.state;
+
+	/* One that only watches leaves it to the feeder. */
+	return !plan->kernel.feeds ||
+	       (state != INCISE_STEPPER_PLAN_RISE && state != INCISE_STEPPER_PLAN_FELT &&
+		v3_length(plan->last_N) == 0);
+}
+
+/* The tip, from the end of what is held; that of a tube with its own station says nothing of it. */
+static void find_tip(const struct incise_plan *plan, struct incise_tick *tick)
+{
+	double axis[3];
+
+	v3_copy(tick->position_mm, tick->tool_mm);
+	if (tick->tool != INCISE_TOOL_HANDLE)
+		return;
+	v3_rotate(axis, tick->quaternion, plan->scene->tool.axis);
+	v3_add(tick->position_mm, tick->tool_mm, -plan->scene->tool.handle_mm, axis);
+}
+
+static void take(struct incise_plan *plan, const struct incise_stepper_rendered *from,
+		 struct incise_tick *tick)
+{
+	tick->flags |= from->flags;
+	tick->phase = from->phase;
+	tick->tool = plan->held = from->held;
+	for (int i = 0; i < 4; i++)
+		tick->quaternion[i] = from->quaternion[i];
+	v3_copy(tick->tool_mm, from->tool_mm);
+	v3_copy(tick->proxy_mm, from->proxy_mm);
+	v3_copy(tick->normal, from->normal);
+	v3_copy(tick->command_N, from->command_N);
+	tick->depth_mm = from->depth_mm;
+	tick->velocity_mm_s = from->speed_mm_s;
+	find_tip(plan, tick);
+}
+
+static int find_rendered(struct incise_plan *plan, struct incise_tick *tick)
+{
+	struct incise_stepper_rendered rendered;
+	int rc;
+
+	if (plan->kernel.feeds)
+		live(plan, tick->t_ns);
+	rc = incise_stepper_rendered(plan->axes.axis[0].stepper, &rendered);
+	/* While it is written: what was read last. */
+	if (rc == -EAGAIN)
+		rc = plan->kernel.seen ? 0 : -EIO;
+	else if (!rc)
+		plan->kernel.last_seen = rendered;
+	if (rc)
+		return rc;
+	plan->kernel.seen = true;
+	take(plan, &plan->kernel.last_seen, tick);
+	v3_copy(plan->last_N, tick->command_N);
+	for (int i = 0; i < plan->axes.n; i++)
+		tick->actuated_N[i] = plan->kernel.last_seen.along_N[i];
+	incise_axes_rest(&plan->axes, tick->command_N, tick);
+	return incise_axes_watch(&plan->axes, tick);
+}
+
+static int watch(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tick,
+		 int64_t *stage_ns)
+{
+	*tick = (struct incise_tick){.t_ns = t_ns, .tool = plan->held};
+	if (plan->fault)
+		return incise_plan_fail(plan, tick, plan->fault);
+	for (int i = 0; i < plan->n_stages; i++) {
+		int64_t begin = stage_ns ? incise_monotonic_ns() : 0;
+		int rc = plan->stage[i].run(plan, tick);
+
+		if (stage_ns)
+			stage_ns[i] = incise_monotonic_ns() - begin;
+		if (rc)
+			return incise_plan_fail(plan, tick, rc);
+	}
+	return 0;
+}
+
+static void take_pose(struct incise_plan *plan, bool tube,
+		      const struct incise_tracker_sample *sample, int64_t now_ns)
+{
+	give(plan, tube, sample, now_ns);
 }
 
 static void keep_stages(struct incise_plan *plan, bool feeds)
@@ -44,10 +165,13 @@ static void keep_stages(struct incise_plan *plan, bool feeds)
 	plan->n_stages = 0;
 	if (feeds)
 		plan->stage[plan->n_stages++] = pose;
-	plan->stage[plan->n_stages++] = (struct incise_stage){
-		.name = "kernel", .always = true, .run = incise_stage_watched};
-	plan->watched = true;
-	plan->feeds = feeds;
+	plan->stage[plan->n_stages++] =
+		(struct incise_stage){.name = "kernel", .run = find_rendered};
+	plan->ops.tick = watch;
+	plan->ops.take_pose = take_pose;
+	plan->ops.faded = kernel_faded;
+	plan->kernel.runs = true;
+	plan->kernel.feeds = feeds;
 }
 
 int incise_plan_watch(struct incise_plan *plan, struct incise_rig *rig,
@@ -84,103 +208,8 @@ int incise_plan_feed_kernel(struct incise_plan *plan, struct incise_rig *rig,
 	return rc;
 }
 
-int incise_plan_give(struct incise_plan *plan, bool tube,
-		     const struct incise_tracker_sample *sample, int64_t now_ns)
-{
-	const struct incise_stepper_pose_given given = {
-		.sample = sample,
-		.tool = plan->instrument.wanted,
-		.tube = tube,
-		.fade = plan->fading,
-	};
-	int rc = incise_stepper_pose(plan->axes.axis[0].stepper, &given);
-
-	if (!rc && !tube) {
-		plan->fed_ns = now_ns;
-		plan->fade_told = plan->fading;
-	}
-	return rc;
-}
-
-/* Without poses, and to fade at once. A fault is found by the look that follows. */
-static void live(struct incise_plan *plan, int64_t now_ns)
-{
-	if (!plan->follow) {
-		plan->follow = true;
-		for (int i = 1; i < plan->axes.n; i++)
-			plan->follow &=
-				!incise_stepper_follow_plan(plan->axes.axis[i].stepper);
-	}
-	if (!plan->fed_ns || now_ns - plan->fed_ns >= plan->life_ns ||
-	    plan->fade_told != plan->fading)
-		incise_plan_give(plan, false, NULL, now_ns);
-}
-
-bool incise_plan_kernel_faded(const struct incise_plan *plan)
-{
-	enum incise_stepper_plan_state state = plan->last_seen.state;
-
-	/* One that only watches leaves it to the feeder. */
-	return plan->fading && (!plan->feeds || (state != INCISE_STEPPER_PLAN_RISE &&
-						 state != INCISE_STEPPER_PLAN_FELT &&
-						 v3_length(plan->limit.last_N) == 0));
-}
-
-/* The tip, from the end of what is held; that of a tube with its own station says nothing of it. */
-static void find_tip(const struct incise_plan *plan, struct incise_tick *tick)
-{
-	double axis[3];
-
-	v3_copy(tick->position_mm, tick->tool_mm);
-	if (tick->tool != INCISE_TOOL_HANDLE)
-		return;
-	v3_rotate(axis, tick->quaternion, plan->instrument.axis);
-	v3_add(tick->position_mm, tick->tool_mm, -plan->instrument.handle_mm, axis);
-}
-
-static void take(struct incise_plan *plan, const struct incise_stepper_rendered *from,
-		 struct incise_tick *tick)
-{
-	tick->flags |= from->flags;
-	tick->phase = from->phase;
-	tick->tool = plan->instrument.held = from->held;
-	for (int i = 0; i < 4; i++)
-		tick->quaternion[i] = from->quaternion[i];
-	v3_copy(tick->tool_mm, from->tool_mm);
-	v3_copy(tick->proxy_mm, from->proxy_mm);
-	v3_copy(tick->normal, from->normal);
-	v3_copy(tick->command_N, from->command_N);
-	tick->depth_mm = from->depth_mm;
-	tick->velocity_mm_s = from->speed_mm_s;
-	find_tip(plan, tick);
-}
-
-int incise_stage_watched(struct incise_plan *plan, struct incise_tick *tick)
-{
-	struct incise_stepper_rendered rendered;
-	int rc;
-
-	if (plan->feeds)
-		live(plan, tick->t_ns);
-	rc = incise_stepper_rendered(plan->axes.axis[0].stepper, &rendered);
-	/* While it is written: what was read last. */
-	if (rc == -EAGAIN)
-		rc = plan->seen ? 0 : -EIO;
-	else if (!rc)
-		plan->last_seen = rendered;
-	if (rc)
-		return rc;
-	plan->seen = true;
-	take(plan, &plan->last_seen, tick);
-	v3_copy(plan->limit.last_N, tick->command_N);
-	for (int i = 0; i < plan->axes.n; i++)
-		tick->actuated_N[i] = plan->last_seen.along_N[i];
-	incise_axes_rest(&plan->axes, tick->command_N, tick);
-	return incise_axes_watch(&plan->axes, tick);
-}
-
 void incise_plan_rendered(const struct incise_plan *plan,
 			  struct incise_stepper_rendered *rendered)
 {
-	*rendered = plan->last_seen;
+	*rendered = plan->kernel.last_seen;
 }

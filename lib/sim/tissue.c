@@ -14,7 +14,7 @@
  * the slab, from the fixed, stiff end to the free one.
  *
  * Front: mean is the force of a blade that cuts. When it draws back, the tissue unloads with the
- * stiffness unloading_N_mm, and then there is friction, up to the front; see ../tissue/front.h.
+ * stiffness unloading_N_mm, and then there is friction, up to the front; see ../tissue/front.proto.c.
  * Each cut of the script is a new one; one that is made by hand stays open where it is. Teeth tear
  * only while the blade cuts. Closed motions take work; with teeth, which are no part of the front's
  * account, all but one in some hundreds of wild ones do.
@@ -103,8 +103,8 @@ static INCISE_REALTIME double front_force(struct incise_tissue *tissue,
 
 	if (!tissue->inside) {
 		if (blade->cut != tissue->cut)
-			tissue->front = (struct incise_front){0};
-		if (incise_front_enter(&tissue->front, at_mm, up, blade->side)) {
+			tissue->front = (struct incise_double_front){0};
+		if (incise_double_front_enter(&tissue->front, at_mm, up, blade->side)) {
 			tissue->work_N_mm = tissue->most_N_mm = 0;
 			tissue->factor = factor(tissue, blade, tissue->path_mm);
 		}
@@ -112,10 +112,10 @@ static INCISE_REALTIME double front_force(struct incise_tissue *tissue,
 		tissue->inside = true;
 		tissue->cut = blade->cut;
 	}
-	advance_mm = incise_front_advance(&tissue->front, at_mm, up, blade->side);
-	force_N =
-		incise_front_force(&tissue->front, config->unloading_N_mm,
-				   config->friction, blade->depth_mm, advance_mm, mean_N);
+	advance_mm = incise_double_front_advance(&tissue->front, at_mm, up, blade->side);
+	force_N = incise_double_front_force(&tissue->front, config->unloading_N_mm,
+					    config->friction, blade->depth_mm, advance_mm,
+					    mean_N);
 	*cuts = force_N >= mean_N;
 	return force_N;
 }
@@ -138,7 +138,7 @@ static INCISE_REALTIME double force_at(struct incise_tissue *tissue,
 		       factor(tissue, blade, path_mm);
 	if (config->motion == INCISE_SURGEON_PRESSES)
 		return pressing_force(config, blade) * bound_factor(tissue, blade);
-	from_mm = tissue->inside ? tissue->front.depth_mm : 0;
+	from_mm = tissue->inside ? tissue->front.depth : 0;
 	front_N = front_force(tissue, blade, cuts);
 	half_way_mm = (blade->depth_mm - from_mm) / 2;
 	if (*cuts)

@@ -17,7 +17,7 @@
 #include <stddef.h>
 #include <incise/sim.h>
 #include <incise/stepper.h>
-#include "../tissue/front.h"
+#include "../tissue/tick.h"
 #include "surgeon.h"
 
 /* --- the liver: the force on a blade that moves through it --------------------------- */
@@ -29,16 +29,16 @@
 struct incise_tissue {
 	const struct incise_sim_config *config;
 	uint64_t tooth_key, boundary_key;
-	struct incise_front front; /* of the cut; see tissue.c */
-	bool inside;		   /* the blade was in the tissue */
-	int cut;		   /* of the script, that the front is of */
-	double factor;		   /* tooth and bound, where the blade cut last */
-	double force_N;		   /* of the last advance */
-	double work_N_mm;	   /* put into the cut, less what came back */
-	double most_N_mm;	   /* of that, so far */
-	double path_mm;		   /* cut so far */
-	double fracture_mm;	   /* path at the last fracture */
-	double tooth_mm;	   /* path from there to the next */
+	struct incise_double_front front; /* of the cut; see tissue.c */
+	bool inside;			  /* the blade was in the tissue */
+	int cut;			  /* of the script, that the front is of */
+	double factor;			  /* tooth and bound, where the blade cut last */
+	double force_N;			  /* of the last advance */
+	double work_N_mm;		  /* put into the cut, less what came back */
+	double most_N_mm;		  /* of that, so far */
+	double path_mm;			  /* cut so far */
+	double fracture_mm;		  /* path at the last fracture */
+	double tooth_mm;		  /* path from there to the next */
 	uint64_t teeth;
 };
 

@@ -86,14 +86,6 @@ INCISE_API const char *incise_plan_left_out(const struct incise_plan *plan, int 
 /** Largest number of inputs of a model in a plan. */
 #define INCISE_PLAN_INPUTS_MAX 4
 
-/** Phases of a cut that can have a model each; incise-scene(5) says when each begins. */
-enum incise_cutting_phase {
-	INCISE_CUT,
-	INCISE_PUNCTURE,
-	INCISE_WITHDRAW,
-};
-#define INCISE_CUTTING_PHASES 3 /**< number of them */
-
 /** A model that gives a plan's reaction force. */
 struct incise_plan_model {
 	int n_inputs; /**< 0: the phase has no model; the rest is 0 */

@@ -29,4 +29,12 @@ enum incise_phase {
 	INCISE_PHASE_INSERTION,
 };
 
+/** Phases of a cut that can have a model each; incise-scene(5) says when each begins. */
+enum incise_cutting_phase {
+	INCISE_CUT,
+	INCISE_PUNCTURE,
+	INCISE_WITHDRAW,
+};
+#define INCISE_CUTTING_PHASES 3 /**< number of them */
+
 #endif

@@ -10,7 +10,7 @@
 #include <incise/tracker.h>
 #include <incise/uncertainty.h>
 #include "../../base/vector.h"
-#include "../../tissue/front.h"
+#include "../../tissue/tick.h"
 #include "../schema.h"
 #include "interpolators.h"
 
@@ -18,7 +18,7 @@
 
 /*
  * Velocity of the tip from the tracker's records before and after: the loop's filter
- * (lib/control/predict.h, a steady-state Kalman filter of constant acceleration) run forward,
+ * (lib/tissue/predict.proto.c, a steady-state Kalman filter of constant acceleration) run forward,
  * and its smoother backward.
  *
  *     forward   ─────────────────────────────►   x, v, a and the residual y - x of each record
@@ -189,8 +189,8 @@ static bool lost(const struct incise_predict *p, const struct incise_smooth_reco
 	double sum = 0;
 
 	for (int i = 0; i < 3; i++) {
-		double residual =
-			r->position_mm[i] - p->x[i] - (p->v[i] + p->a[i] * dt / 2) * dt;
+		double residual = r->position_mm[i] - p->now.x[i] -
+				  (p->now.v[i] + p->now.a[i] * dt / 2) * dt;
 
 		sum += residual * residual;
 	}
@@ -204,21 +204,22 @@ static void step_forward(struct incise_smooth *smooth, size_t i)
 	/* The filter needs positive times; rows' are within ±2^61. */
 	struct incise_tracker_sample sample = {.t_ns = r->t_ns + (1LL << 62),
 					       .quaternion = {1}};
-	double dt = (sample.t_ns - p->t_ns) * 1e-9;
+	double dt = (sample.t_ns - p->now.t_ns) * 1e-9;
 
 	memcpy(sample.position_mm, r->position_mm, sizeof(sample.position_mm));
-	r->starts = !p->started || sample.t_ns - p->t_ns > p->gap_ns || lost(p, r, dt);
+	r->starts = !p->now.started || sample.t_ns - p->now.t_ns > p->gap_ns ||
+		    lost(p, r, dt);
 	r->periods = dt / smooth->period_s;
 	next = r->starts ? smooth->fresh : *p;
 	incise_predict_add(&next, &sample);
-	r->skipped = next.t_ns != sample.t_ns;
+	r->skipped = next.now.t_ns != sample.t_ns;
 	if (!r->skipped)
 		*p = next;
 	if (!r->skipped && r->starts)
-		first_slope(smooth, i, p->v);
+		first_slope(smooth, i, p->now.v);
 	for (int k = 0; k < 3; k++) {
-		r->velocity_mm_s[k] = r->skipped ? NAN : p->v[k];
-		r->residual_mm[k] = r->position_mm[k] - p->x[k];
+		r->velocity_mm_s[k] = r->skipped ? NAN : p->now.v[k];
+		r->residual_mm[k] = r->position_mm[k] - p->now.x[k];
 	}
 }
 
@@ -739,7 +740,7 @@ static double loop_acceleration(struct incise_loop_motion *loop, int64_t t_ns)
 		arrive(loop);
 	incise_predict_at(&loop->predict, loop_ns(t_ns), x, v, attitude);
 	incise_predict_acceleration(&loop->predict, loop_ns(t_ns), a);
-	return incise_input_acceleration(v, a);
+	return incise_double_input_acceleration(v, a);
 }
 
 static int more_depth(struct incise_blade_pose *blade, struct incise_error *err)

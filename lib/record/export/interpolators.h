@@ -72,7 +72,7 @@ const struct incise_smooth_record *incise_smooth_take(struct incise_smooth *smoo
 
 /*
  * Whether the blade advances: it goes deeper than ever before in its cut, or along the skin into
- * new tissue; see ../../tissue/front.h. Its progress is the depth and the length of the cut in
+ * new tissue; see ../../tissue/front.proto.c. Its progress is the depth and the length of the cut in
  * the skin,
  *
  *     progress      ,-----.      ,----
@@ -215,7 +215,7 @@ struct incise_blade_pose {
 	struct incise_blade_depth deep[2];
 	double angle, sine, sign;     /* between the two poses */
 	double speed_mm_s, rate_mm_s; /* of position and of depth between the two */
-	struct incise_cut cut;
+	struct incise_cut_count cut;
 	struct incise_progress progress;
 	struct incise_stay stay;
 	struct incise_loop_motion loop;

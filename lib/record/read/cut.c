@@ -12,7 +12,7 @@
 #include "session.h"
 #include "../schema.h"
 
-bool incise_cut_step(struct incise_cut *cut, double depth_mm)
+bool incise_cut_step(struct incise_cut_count *cut, double depth_mm)
 {
 	if (!cut->inside && depth_mm > INCISE_CUT_START_MM) {
 		cut->inside = true;

@@ -20,13 +20,13 @@
 #include "rows.h"
 
 /* Hysteresis on depth. Set to {0} before use. */
-struct incise_cut {
+struct incise_cut_count {
 	bool inside;
 	int count; /* started so far; the number of the present one, from 1 */
 };
 
 /* Add the next depth. Returns whether the blade is in the tissue. */
-bool incise_cut_step(struct incise_cut *cut, double depth_mm);
+bool incise_cut_step(struct incise_cut_count *cut, double depth_mm);
 
 /* A force sample inside a cut. */
 struct incise_cut_sample {
@@ -46,7 +46,7 @@ struct incise_cuts {
 	struct incise_recording *recording;
 	sqlite3_stmt *force, *depth;
 	struct incise_row_times force_times, depth_times;
-	struct incise_cut cut;
+	struct incise_cut_count cut;
 	struct incise_cut_depth before, after; /* the force sample */
 	struct incise_recording_force scale;
 	int64_t first_ns, last_ns; /* force samples so far */

@@ -25,7 +25,7 @@ struct incise_replay_source {
 	struct incise_replay_stream tracker, force, depth;
 	struct incise_recording_force scale;
 	struct incise_cut_depth deep[2]; /* before and after */
-	struct incise_cut cut;
+	struct incise_cut_count cut;
 };
 
 /* Values of the recording around a time. */

@@ -141,7 +141,7 @@ struct incise_recorder {
 
 	struct incise_recorder_stream streams[INCISE_LEDGER_STREAMS];
 	struct incise_depth depth;
-	struct incise_cut cut;
+	struct incise_cut_count cut;
 	struct incise_recorder_zero zero;
 	struct incise_recorder_pace pace;
 	struct incise_recorder_pretrigger pretrigger;

@@ -23,14 +23,14 @@ TEST(acceleration_is_that_of_the_speed)
 
 	for (int k = -2000; k <= 2000; k++) {
 		double v[] = {0.005 * k, 0, 0}, a[] = {300, 50, 0};
-		double found = incise_input_acceleration(v, a);
+		double found = incise_double_input_acceleration(v, a);
 
 		if (k <= -1000 || k >= 1000)
 			assert_true(fabs(found - (k < 0 ? -300 : 300)) < 1e-9);
 		assert_true(k == -2000 || fabs(found - last) < 0.31);
 		last = found;
 	}
-	assert_true(incise_input_acceleration((double[]){3, 4, 0},
+	assert_true(incise_double_input_acceleration((double[]){3, 4, 0},
 					      (double[]){4, -3, 9}) == 0);
 }
 

@@ -33,9 +33,9 @@ TEST(acceleration_is_that_in_double)
 			a[i] = (double)hard[i] / ONE;
 		}
 		assert_true(fabs(incise_fixed_input_acceleration(velocity, hard) / ONE -
-				 incise_input_acceleration(v, a)) <=
+				 incise_double_input_acceleration(v, a)) <=
 			    ldexp(1, -INCISE_FIXED_INPUT_ACCELERATION_BITS) +
-				    ldexp(fabs(incise_input_acceleration(v, a)),
+				    ldexp(fabs(incise_double_input_acceleration(v, a)),
 					  -INCISE_FIXED_INPUT_ACCELERATION_SHARE_BITS));
 	}
 	/* Beyond what 32 bits hold. */

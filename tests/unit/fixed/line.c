@@ -65,18 +65,18 @@ TEST(test_new_tissue)
 	trial.seed = 1;
 	for (int run = 0; run < RUNS; run++) {
 		struct incise_fixed_line got = {0};
-		struct incise_front want = {0};
+		struct incise_double_front want = {0};
 		struct blade blade = {.depth = 5};
 
 		step(&blade, 1);
 		incise_fixed_line_begin(&got, blade.at, normal, blade.side);
-		incise_front_enter(&want, blade.at_mm, normal_d, blade.side_d);
+		incise_double_front_enter(&want, blade.at_mm, normal_d, blade.side_d);
 		for (int t = 0; t < TICKS; t++) {
 			double fresh;
 			int32_t advance;
 
 			step(&blade, 0.4);
-			fresh = incise_front_advance(&want, blade.at_mm, normal_d,
+			fresh = incise_double_front_advance(&want, blade.at_mm, normal_d,
 						     blade.side_d);
 			advance = incise_fixed_line_advance(&got, blade.at, normal,
 							    blade.side);

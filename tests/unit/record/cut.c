@@ -25,7 +25,7 @@ TEST(hysteresis)
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_cut cut = {0};
+		struct incise_cut_count cut = {0};
 
 		for (size_t k = 0; k < strlen(cases[i].inside); k++)
 			if (incise_cut_step(&cut, cases[i].depth[k]) !=

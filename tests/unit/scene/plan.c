@@ -9,7 +9,7 @@
 #include "../../../lib/base/vector.h"
 #include "../../../lib/fixed/spring.h"
 #include "../../extremes/fixed_spring.h"
-#include "../../../lib/tissue/front.h"
+#include "../../../lib/tissue/tick.h"
 #include <time.h>
 #include "../message.h"
 #include "fed.h"
@@ -86,7 +86,7 @@ TEST(test_a_refused_model_names_its_scene)
 }
 
 /* What the tissue of a tick should push with; the front goes on. */
-static double front_N(struct incise_front *front, const struct incise_plan_stability *s,
+static double front_N(struct incise_double_front *front, const struct incise_plan_stability *s,
 		      const struct incise_tick *t, bool began, double side[3],
 		      double cutting_N)
 {
@@ -94,11 +94,11 @@ static double front_N(struct incise_front *front, const struct incise_plan_stabi
 
 	if (began) {
 		v3_rotate(side, t->quaternion, (double[3]){0, 1, 0});
-		incise_front_enter(front, t->proxy_mm, t->normal, side);
+		incise_double_front_enter(front, t->proxy_mm, t->normal, side);
 	}
-	way_mm = incise_front_advance(front, t->proxy_mm, t->normal, side);
+	way_mm = incise_double_front_advance(front, t->proxy_mm, t->normal, side);
 	/* 0.1: the default of tissue.friction. */
-	return incise_front_force(front, s->unloading_N_mm, 0.1, t->depth_mm, way_mm,
+	return incise_double_front_force(front, s->unloading_N_mm, 0.1, t->depth_mm, way_mm,
 				  t->depth_mm > 0 ? cutting_N : 0);
 }
 
@@ -112,7 +112,7 @@ TEST(test_against_truth)
 		double depth = 0, render = 0, last_N = 0;
 		int contacts = 0, limited = 0, drawn_back = 0;
 		struct incise_plan_stability stability;
-		struct incise_front front = {0};
+		struct incise_double_front front = {0};
 		double side[3] = {0};
 		bool touched = false;
 

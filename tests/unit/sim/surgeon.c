@@ -10,7 +10,7 @@
 #include <incise/rig.h>
 #include "../../../lib/sim/sim.h"
 #include "../../../lib/sim/surgeon.h"
-#include "../../../lib/tissue/front.h"
+#include "../../../lib/tissue/tick.h"
 
 #define TREMOR_MM 0.035 /* a little over the amplitude in y and z */
 

@@ -22,14 +22,14 @@ static double law(double depth_mm, double speed_mm_s)
 }
 
 /* Go to a depth in small steps; the last force. */
-static double go(struct incise_front *front, double depth_mm, double friction)
+static double go(struct incise_double_front *front, double depth_mm, double friction)
 {
 	double from = front->depth_mm, force = 0;
 
 	for (int i = 1; i <= 1000; i++) {
 		double d = from + (depth_mm - from) * i / 1000;
 
-		force = incise_front_force(front, K, friction, d, 0, law(d, 0));
+		force = incise_double_front_force(front, K, friction, d, 0, law(d, 0));
 	}
 	return force;
 }
@@ -43,10 +43,10 @@ static void near(double is, double should)
 
 TEST(test_in_back_and_in_again)
 {
-	struct incise_front front = {0};
+	struct incise_double_front front = {0};
 	double c = law(15, 0);
 
-	incise_front_enter(&front, (double[3]){0}, up, side);
+	incise_double_front_enter(&front, (double[3]){0}, up, side);
 	near(go(&front, 7, FRICTION), law(7, 0));
 	near(go(&front, 15, FRICTION), c);
 	/* Unloading: a straight line to 0, and on to friction against the way out. */
@@ -64,9 +64,9 @@ TEST(test_in_back_and_in_again)
 
 TEST(test_without_friction)
 {
-	struct incise_front front = {0};
+	struct incise_double_front front = {0};
 
-	incise_front_enter(&front, (double[3]){0}, up, side);
+	incise_double_front_enter(&front, (double[3]){0}, up, side);
 	go(&front, 12, 0);
 	assert_true(go(&front, 2, 0) == 0);
 	assert_true(go(&front, front.cut_mm, 0) == 0);
@@ -86,14 +86,14 @@ TEST(test_place)
 		     {{11.5, 0, 0}, false}};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_front front = {0};
+		struct incise_double_front front = {0};
 
-		incise_front_enter(&front, (double[3]){0}, up, side);
-		near(incise_front_advance(&front, (double[3]){10, 0, 0}, up, side), 10);
-		near(incise_front_advance(&front, (double[3]){4, 0, 0}, up, side), 0);
+		incise_double_front_enter(&front, (double[3]){0}, up, side);
+		near(incise_double_front_advance(&front, (double[3]){10, 0, 0}, up, side), 10);
+		near(incise_double_front_advance(&front, (double[3]){4, 0, 0}, up, side), 0);
 		go(&front, 10, 0);
 		go(&front, 0, 0);
-		incise_front_enter(&front, cases[i].at, up, side);
+		incise_double_front_enter(&front, cases[i].at, up, side);
 		near(go(&front, 2, 0), cases[i].open ? 0 : law(2, 0));
 	}
 }
@@ -101,33 +101,33 @@ TEST(test_place)
 /* Sideways out of its line: new tissue, and a new line from there on. */
 TEST(test_sideways)
 {
-	struct incise_front front = {0};
+	struct incise_double_front front = {0};
 
-	incise_front_enter(&front, (double[3]){0}, up, side);
-	near(incise_front_advance(&front, (double[3]){0, 0.9, 0}, up, side), 0);
-	assert_true(incise_front_advance(&front, (double[3]){0, 1.2, 0}, up, side) > 0);
-	near(incise_front_advance(&front, (double[3]){5, 1.2, 0}, up, side), 5);
+	incise_double_front_enter(&front, (double[3]){0}, up, side);
+	near(incise_double_front_advance(&front, (double[3]){0, 0.9, 0}, up, side), 0);
+	assert_true(incise_double_front_advance(&front, (double[3]){0, 1.2, 0}, up, side) > 0);
+	near(incise_double_front_advance(&front, (double[3]){5, 1.2, 0}, up, side), 5);
 }
 
 /* New tissue along the skin: the model's force at once, at any speed, while work was put in. */
 TEST(test_along)
 {
-	struct incise_front front = {0};
+	struct incise_double_front front = {0};
 	double force;
 
-	incise_front_enter(&front, (double[3]){0}, up, side);
+	incise_double_front_enter(&front, (double[3]){0}, up, side);
 	go(&front, 10, FRICTION);
 	for (int i = 0; i < 1000; i++) {
 		double speed = 20 + 15 * sin(i * 0.01), d = 10 - 0.2 * sin(i * 0.003);
 
-		force = incise_front_force(&front, K, FRICTION, d, speed * 1e-3,
+		force = incise_double_front_force(&front, K, FRICTION, d, speed * 1e-3,
 					   law(d, speed));
 		/* From a standstill the force needs some mm to rise to that of the speed. */
 		if (i > 300)
 			near(force, law(d, speed));
 	}
 	/* It rests: no more than the force of standing. */
-	force = incise_front_force(&front, K, FRICTION, front.depth_mm, 0,
+	force = incise_double_front_force(&front, K, FRICTION, front.depth_mm, 0,
 				   law(front.depth_mm, 0));
 	near(force, law(front.depth_mm, 0));
 }
@@ -138,13 +138,13 @@ struct taken {
 	double work, held, deep;
 };
 
-static struct taken take(struct incise_front *front, uint64_t n)
+static struct taken take(struct incise_double_front *front, uint64_t n)
 {
 	const uint64_t key = incise_random_key(1, 99);
 	const int steps = 4000;
 	double work = 0, held = 0, force = 0, before = 0, x = 0, deep = 0;
 
-	incise_front_enter(front, (double[3]){0}, up, side);
+	incise_double_front_enter(front, (double[3]){0}, up, side);
 	for (int i = 1; i <= steps; i++) {
 		double t = 2 * M_PI * i / steps, u[6], d, dx, speed;
 
@@ -158,9 +158,9 @@ static struct taken take(struct incise_front *front, uint64_t n)
 		x += dx;
 		held += force * (d - before);
 		work += force / 2 * (d - before);
-		force = incise_front_force(
+		force = incise_double_front_force(
 			front, K, FRICTION * (n % 3) / 2, d,
-			incise_front_advance(front, (double[3]){x, 0, 0}, up, side),
+			incise_double_front_advance(front, (double[3]){x, 0, 0}, up, side),
 			law(d, speed));
 		work += force / 2 * (d - before);
 		before = d;
@@ -180,7 +180,7 @@ TEST(test_takes_work)
 	int worse = 0, again = 0;
 
 	for (uint64_t n = 0; n < 2000; n++) {
-		struct incise_front front = {0};
+		struct incise_double_front front = {0};
 		struct taken taken = take(&front, n);
 
 		worse += taken.work <= 0 || taken.held <= 0;
@@ -196,15 +196,15 @@ TEST(test_takes_work)
 /* Accumulated work is that of the held forces, and what is paid for is never more. */
 TEST(test_account)
 {
-	struct incise_front front = {0};
+	struct incise_double_front front = {0};
 	double work;
 
-	incise_front_enter(&front, (double[3]){0}, up, side);
+	incise_double_front_enter(&front, (double[3]){0}, up, side);
 	/* Shallow, then fast along the skin, then out: the force of speed cannot be got out. */
 	go(&front, 4, 0);
 	work = front.work_N_mm;
 	for (int i = 0; i < 3000; i++)
-		incise_front_force(&front, K, 0, 4, 0.1, law(4, 100));
+		incise_double_front_force(&front, K, 0, 4, 0.1, law(4, 100));
 	assert_true(front.force_N * front.force_N / (2 * K) <= work);
 	go(&front, 0, 0);
 	assert_true(front.work_N_mm > 0);
@@ -227,9 +227,9 @@ TEST(test_integers)
 		double friction = 0.5 * incise_random_uniform(key, 2 * n + 1);
 		double bound = incise_fixed_front_bound(stiff, friction, 4, wrong_N);
 		struct incise_fixed_front fixed = {0};
-		struct incise_front front = {0};
+		struct incise_double_front front = {0};
 
-		incise_front_enter(&front, (double[3]){0}, up, side);
+		incise_double_front_enter(&front, (double[3]){0}, up, side);
 		for (int i = 0; i < 3000; i++) {
 			uint64_t at = 10000 * n + (uint64_t)i;
 			/* From the air, so that no force comes without work. */
@@ -240,7 +240,7 @@ TEST(test_integers)
 			double off = 2 * incise_random_uniform(key + 1, at) - 1, a, b;
 
 			d = fmax(d, 0);
-			a = incise_front_force(&front, stiff, friction, d, 0, cutting);
+			a = incise_double_front_force(&front, stiff, friction, d, 0, cutting);
 			b = incise_fixed_front_force(
 				    &fixed, q16(stiff), q16(friction), q16(d), 0,
 				    q16(fmax(cutting + off * (wrong_N - 1 / ONE), 0))) /
@@ -258,16 +258,16 @@ TEST(test_integers_alone)
 {
 	double bound = incise_fixed_front_bound(K, FRICTION, 4, 0), worst = 0;
 	struct incise_fixed_front fixed = {0};
-	struct incise_front front = {0};
+	struct incise_double_front front = {0};
 
-	incise_front_enter(&front, (double[3]){0}, up, side);
+	incise_double_front_enter(&front, (double[3]){0}, up, side);
 	for (int i = 0; i < 100000; i++) {
 		double d = fmax(0, 7 + 6 * sin(i * 0.001) + 3 * sin(i * 0.0171));
 		double x = i < 50000 ? 0 : 0.01 * (1 + sin(i * 0.01));
 		double c = law(d, 40);
 
 		worst = fmax(worst,
-			     fabs(incise_front_force(&front, K, FRICTION, d, x, c) -
+			     fabs(incise_double_front_force(&front, K, FRICTION, d, x, c) -
 				  incise_fixed_front_force(&fixed, q16(K), q16(FRICTION),
 							   q16(d), q16(x), q16(c)) /
 					  ONE) /

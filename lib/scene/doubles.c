@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A plan in double: its numbers, by what was found of the scene and the rig, and its ticks.
+ */
+#include <errno.h>
+#include <math.h>
+#include "../base/monotonic.h"
+#include "../base/vector.h"
+#include "plan.h"
+
+static void set_reaction(const struct incise_plan *plan,
+			 struct incise_double_numbers *numbers)
+{
+	const double *reaction = plan->acting[INCISE_FORCE_REACTION].number;
+
+	if (!plan->model && !plan->fixed) {
+		numbers->reaction = reaction[0];
+		return;
+	}
+	numbers->gain = plan->gain;
+	numbers->support = plan->support_mm;
+	numbers->beyond = plan->beyond_N_mm;
+	if (!plan->dissipates)
+		return;
+	numbers->unloading = plan->unloading_N_mm;
+	numbers->friction = reaction[INCISE_REACTION_FRICTION];
+}
+
+static void set_membrane(const struct incise_plan *plan,
+			 struct incise_double_membrane *to)
+{
+	const struct incise_scene_membrane *membrane = &plan->scene->membrane;
+
+	if (!(membrane->thickness_mm > 0))
+		return;
+	v3_copy(to->point, membrane->point_mm);
+	v3_copy(to->normal, membrane->normal);
+	to->radius = membrane->radius_mm;
+	to->thickness = membrane->thickness_mm;
+	to->stiffness = plan->gain * membrane->puncture_N / membrane->thickness_mm;
+	to->back_wall = membrane->back_wall_mm;
+}
+
+_Static_assert(INCISE_FIXED_INPUT_DEPTH == INCISE_INPUT_DEPTH + 1 &&
+		       INCISE_FIXED_INPUT_SPEED == INCISE_INPUT_SPEED + 1 &&
+		       INCISE_FIXED_INPUT_ACCELERATION == INCISE_INPUT_ACCELERATION + 1 &&
+		       INCISE_FIXED_INPUT_TILT == INCISE_INPUT_TILT + 1 &&
+		       INCISE_FIXED_INPUT_TIME == INCISE_INPUT_TIME + 1,
+	       "the same, from 1");
+
+static void set_model(const struct incise_plan *plan, struct incise_double_plan *to)
+{
+	const struct incise_scene_model *cut = plan->scene->cut;
+
+	to->has_model = plan->model || plan->fixed;
+	to->compiled = plan->fixed;
+	for (int i = 0; i < INCISE_CUTTING_PHASES; i++) {
+		to->model[i] = i == INCISE_CUT ? plan->model : cut[i].model;
+		to->inputs[i] = 0;
+		for (int k = 0; k < cut[i].n_inputs; k++)
+			to->inputs[i] |= (uint32_t)(cut[i].input[k] + 1) << 4 * k;
+	}
+	if (cut[INCISE_PUNCTURE].model)
+		to->numbers.phases |= T_PUNCTURES;
+	if (cut[INCISE_WITHDRAW].model)
+		to->numbers.phases |= T_WITHDRAWS;
+}
+
+void incise_plan_set_numbers(struct incise_plan *plan)
+{
+	const struct incise_scene *scene = plan->scene;
+	const struct incise_acting_force *acting = plan->acting;
+	struct incise_double_plan *to = &plan->doubles.plan;
+	struct incise_double_numbers *numbers = &to->numbers;
+	const struct incise_double_numbers before = *numbers;
+
+	*numbers = (struct incise_double_numbers){
+		.pose_age_ns = (int64_t)(scene->limits.pose_age_ms * 1e6),
+		.tick_ns = (int32_t)lrint(1e9 / scene->rate_hz),
+		.handle = scene->tool.handle_mm,
+		.inserts = plan->inserts,
+		.tube = plan->inserts && plan->poses.tube_station,
+		.leave = scene->tissue.leave_mm,
+		.average_ticks = plan->average_ticks,
+		.plane = acting[INCISE_FORCE_PLANE].number[0],
+		.damping = acting[INCISE_FORCE_DAMPING].number[0],
+		.insertion = acting[INCISE_FORCE_INSERTION].number[0],
+		.aligned = acting[INCISE_FORCE_INSERTION].number[1],
+		.printed = scene->tissue.printed_orientation,
+		.spread = acting[INCISE_FORCE_SPREAD].number[0],
+		.incision =
+			{
+				.cuts_most = scene->tissue.cuts_most,
+				.cut_from = scene->tissue.cut_from_mm,
+				.stretch = scene->tissue.stretch_mm,
+				.handle_width = scene->tool.handle_width_mm,
+				.handle_thickness = scene->tool.handle_thickness_mm,
+				.tube = scene->tool.tube_mm,
+			},
+		.small = scene->limits.start_N,
+		.ramp_ns = llrint(scene->limits.ramp_ms * 1e6),
+		.fade_ns = llrint(scene->limits.fade_ms * 1e6),
+		.force = scene->limits.force_N,
+		.slew = scene->limits.slew_N_s / scene->rate_hz,
+	};
+	incise_predict_filter(&plan->predict, &numbers->filter);
+	v3_copy(numbers->tip, before.tip);
+	v3_copy(numbers->axis, scene->tool.axis);
+	v3_copy(numbers->side, scene->tool.side);
+	v3_copy(numbers->up, plan->up);
+	set_reaction(plan, numbers);
+	set_membrane(plan, &numbers->membrane);
+	set_model(plan, to);
+	to->proxy = &plan->proxy;
+}
+
+/* --- running ----------------------------------------------------------------------------- */
+
+#include "../number/double_kind.h"
+#define OWN(plan) (&(plan)->doubles)
+#define STAGE in_double
+#define D_LEAST 1e-300
+
+static double n_from(double mm)
+{
+	return mm;
+}
+
+#define d_from n_from
+#define n_to n_from
+#define d_to n_from
+
+#include "run.proto.c"
+
+static int set_tip(struct incise_plan *plan, const double tip_mm[3])
+{
+	v3_copy(plan->doubles.plan.numbers.tip, tip_mm);
+	return 0;
+}
+
+const struct incise_plan_ops incise_double_ops = {
+	run,	 take_pose, hold,    faded,	 zero,
+	set_tip, punctured, get_cut, clear_cuts, add_cut,
+};

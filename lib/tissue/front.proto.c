@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only
+/*
+ * The front of a cut: tissue that takes work and does not give more of it back. Cutting force laws such
+ * as Song et al.'s, F(depth, speed), describe a blade that advances. This adds the way back.
+ *
+ *   force                        c  the model's force: the blade cuts, the front moves with it
+ *     |          ____c           u  elastic: the tissue unloads with the stiffness K over
+ *     |     _,-'    /               (c + f)/K, and loads again along the same line
+ *     |  ,-'      u/         /   f  friction of the open cut, against the motion
+ *     | /         /        u/    e  elastic again, from the front on
+ *   0 |/________ /___f____,/___▶ depth
+ *     |         ´‾‾‾‾‾‾‾‾‾  f
+ *
+ * In the terms of plasticity it is a stop: force = K (depth - rest), held to -f … upper by moving
+ * `rest`; upper is the model's force c at the front, f in the open cut, and rises with K in between.
+ * Work is only lost where rest moves, so that any closed motion takes work. Fracture on the way in,
+ * small elastic unloading and friction on the way out: Mahvash and Hayward, Haptic rendering of
+ * cutting, Haptics-e 2(3), 2001; Okamura, Simone and O'Leary, Force modeling for needle insertion, IEEE
+ * Trans. Biomed. Eng. 51(10), 2004; Chanthasopeephan, Desai and Lau, Modeling soft-tissue deformation
+ * prior to cutting, IEEE Trans. Biomed. Eng. 54(3), 2007.
+ *
+ * A blade that moves along the skin meets new tissue at each mm, which the front has not reached: front
+ * and rest come up by as much, as long as the elastic energy stays below the work that was put in since
+ * the blade entered, a sixteenth of which is never given back. Back within its own cut it meets nothing
+ * new.
+ */
+
+/* Below this the blade lies flat on the surface, and its cut has no direction. */
+#define FLAT D_OF(1, 1000)
+
+/* A blade so far beside the line of its cut is in new tissue: half the width of a blade. */
+#define BESIDE N(1)
+
+/* --- line --- */
+
+void T(line_along)(dir along[3], const dir normal[3], const dir side[3])
+{
+	dir across[3], axis[3] = {0};
+	int least = 0;
+
+	d_cross(across, side, normal);
+	if (d_unit(along, across, FLAT))
+		return;
+	/* Any direction in the surface: across the axis that is least along the normal. */
+	for (int i = 1; i < 3; i++)
+		if (d_below(d_abs(normal[i]), d_abs(normal[least])))
+			least = i;
+	axis[least] = D_ONE;
+	d_cross(across, axis, normal);
+	for (int i = 0; i < 3; i++)
+		along[i] = i ? 0 : D_ONE;
+	d_unit(along, across, FLAT);
+}
+
+static void begin_line(struct T(line) * line, const num at[3], const dir normal[3],
+		       const dir side[3])
+{
+	*line = (struct T(line)){.there = true};
+	v_copy(line->at, at);
+	d_copy(line->side, side);
+	T(line_along)(line->along, normal, side);
+}
+
+static num place_along(const struct T(line) * line, const num at[3])
+{
+	num off[3];
+
+	v_sub(off, at, line->at);
+	return v_along(off, line->along);
+}
+
+/* Whether a point of the surface lies beside the line, or nearer. */
+static bool holds(const struct T(line) * line, const num at[3])
+{
+	num off[3], s;
+
+	if (!line->there)
+		return false;
+	s = n_within(place_along(line, at), line->from, line->to);
+	v_sub(off, at, line->at);
+	v_add(off, off, n_neg(s), line->along);
+	return v_is_short(off, BESIDE);
+}
+
+/* --- front --- */
+
+bool T(front_enter)(struct T(front) * front, const num at[3], const dir normal[3],
+		    const dir side[3])
+{
+	bool fresh = !holds(&front->line, at);
+
+	/* The work of an earlier visit pays for nothing now. */
+	*front = (struct T(front)){.cut = fresh ? 0 : front->cut, .line = front->line};
+	if (fresh)
+		begin_line(&front->line, at, normal, side);
+	return fresh;
+}
+
+num T(front_advance)(struct T(front) * front, const num at[3], const dir normal[3],
+		     const dir side[3])
+{
+	struct T(line) *line = &front->line;
+	num length = n_sub(line->to, line->from), s = place_along(line, at);
+
+	line->from = n_min(line->from, s);
+	line->to = n_max(line->to, s);
+	if (holds(line, at))
+		return n_sub(n_sub(line->to, line->from), length);
+	/* It left the line sideways; a curved skin does that too. The cut goes on from here. */
+	begin_line(line, at, normal, side);
+	return BESIDE;
+}
+
+num T(front_force)(struct T(front) * front, num unloading, num friction, num depth,
+		   num advance, num cutting)
+{
+	num K = n_max(unloading, LEAST), rubs, upper, elastic, trial, force, way;
+
+	depth = n_max(depth, 0);
+	advance = n_max(advance, 0);
+	cutting = n_max(cutting, 0);
+	rubs = n_times(n_within(friction, 0, N(1)), cutting);
+	way = n_sub(depth, front->depth);
+	front->cut = n_max(n_sub(front->cut, advance), 0);
+	elastic = n_times(K, n_sub(depth, front->rest));
+	front->rest = n_sub(front->rest, advance);
+	trial = force = n_times(K, n_sub(depth, front->rest));
+	if (n_below(0, advance)) {
+		wide work2 = w_work(front->work2, front->force, elastic, way);
+
+		/* Elastic energy is F²/2K. */
+		force = n_max(elastic, n_min(trial, w_paid(K, work2, front->most2)));
+	}
+	upper = n_max(rubs, n_times(K, n_sub(depth, front->cut)));
+	force = n_max(n_neg(rubs), n_min(force, n_min(upper, cutting)));
+	/* Else it stays to the bit, and no rounding adds up. */
+	if (n_below(force, trial) || n_below(trial, force))
+		front->rest = n_sub(depth, n_over(force, K));
+	/* The blade cuts where all of the model's force acts. */
+	if (!n_below(force, cutting))
+		front->cut = n_max(front->cut, n_sub(depth, n_over(cutting, K)));
+	front->work2 = w_work(front->work2, front->force, force, way);
+	front->most2 = front->work2 > front->most2 ? front->work2 : front->most2;
+	front->depth = depth;
+	front->force = force;
+	return force;
+}

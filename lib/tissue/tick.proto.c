@@ -1,0 +1,761 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only
+/*
+ * The stages of a tick; see tick.proto.h. The forces are those of Bhasin et al. (2005), and Song et al.'s
+ * model as the first of them. P is the tool's end, P0 where the contact began, n the outward normal (the
+ * paper's Sn, or Snavg), d the depth.
+ *
+ *   cutting     reaction    F += Kn d n                      §2.2, Fn
+ *               with a model F += F(d, |v|) n       Song et al. (2006), eq. (3), by the front
+ *                                                            of front.proto.c
+ *               plane       F -= Kx ((P-P0)·s) s             §2.2, Fx
+ *   insertion   insertion   F += Ky d n Fort                 §2.3, Fy
+ *               spread      F -= Kxz (I - n nᵀ)(P-P0)        §2.3, Fxz
+ *   both        damping     F -= Kd v                        §2.2, Fd
+ *
+ * Compared with the paper's print:
+ *
+ * - Fn and Fy print (P-P0)·Sn for the depth and call it the depth of penetration along Sn. On a plane the
+ *   two are one. On a curved surface they part: the blade that glides along a neck without pressing has
+ *   (P-P0)·Sn > 0, which would pull it in. Here d is the depth below the surface.
+ * - Fd prints +Kd v. It is to damp, so it opposes v.
+ * - Fxz prints a product of three distances along (Q0-P0), which is always zero when the contact starts on
+ *   the surface. Its sentence asks for a force proportional to the distance of the instrument from where
+ *   its contact began: that is what stands here.
+ */
+
+/*
+ * sin of the angle between the scalpel and the surface, to either side, within which it stays what it
+ * was: 12° are more than a hand's tremor.
+ */
+#define UNDECIDED D_OF(1, 5)
+
+/* From here on the tube counts as nearer; a tracker's noise and a tremor are far less. */
+#define NEARER N(5)
+
+/* Of the force, in one tick: ticks are to be at least ten in a ramp. */
+#define RISE_MOST (W_ONE / 10)
+
+/* Skin that was not cut before gives way over so much more depth: INCISE_PUNCTURE_MM. */
+#define OPENS_OVER N_OF(1, 2)
+
+/* --- poses ------------------------------------------------------------------------------ */
+
+static enum incise_fixed_pose_answer add_pose(struct T(predict) * p,
+					      const struct T(filter) * filter,
+					      const num position[3],
+					      const dir quaternion[4], int64_t t_ns)
+{
+	if (T(predict_add)(p, filter, position, quaternion, t_ns))
+		return INCISE_FIXED_POSE_TAKEN;
+	if (t_ns >= 0 && p->started && t_ns - (int64_t)filter->latency_ns <= p->t_ns)
+		return INCISE_FIXED_POSE_OLD;
+	return INCISE_FIXED_POSE_FAR;
+}
+
+static enum incise_fixed_pose_answer take_scalpel(const struct T(numbers) * numbers,
+						  struct T(state) * state,
+						  const struct T(pose) * pose,
+						  int64_t t_ns)
+{
+	enum incise_fixed_pose_answer answer;
+	num tip[3], end[3];
+	dir q[4], along[3];
+
+	/* One that is none leaves the attitude as it was. */
+	if (!d_attitude(q, pose->quaternion))
+		for (int i = 0; i < 4; i++)
+			q[i] = state->scalpel.q[i];
+	v_reach(tip, pose->position, q, numbers->tip);
+	answer = add_pose(&state->scalpel, &numbers->filter, tip, q, t_ns);
+	if (answer != INCISE_FIXED_POSE_TAKEN || !numbers->inserts)
+		return answer;
+	/*
+	 * The handle's end is predicted by itself. It cannot be found from the tip's prediction: the
+	 * attitude is not extrapolated, and on an arm of 120 mm its lag is more than 1 mm.
+	 */
+	d_turn(along, state->scalpel.q, numbers->axis);
+	v_add(end, tip, numbers->handle, along);
+	T(predict_add)(&state->handle, &numbers->filter, end, q, t_ns);
+	return answer;
+}
+
+enum incise_fixed_pose_answer T(plan_pose)(const struct T(plan) * plan,
+					   struct T(state) * state,
+					   const struct T(pose) * pose, int64_t now_ns)
+{
+	const struct T(numbers) *numbers = &plan->numbers;
+	/* A timestamp from the future would keep all later poses out. */
+	int64_t t_ns = pose->t_ns > now_ns ? now_ns : pose->t_ns;
+	uint32_t tool = pose->tool & INCISE_FIXED_POSE_TOOL;
+	bool none = true;
+
+	if (pose->tool & ~INCISE_FIXED_POSE_KNOWN || tool > INCISE_TOOL_TUBE)
+		return INCISE_FIXED_POSE_UNKNOWN;
+	if (pose->tool & INCISE_FIXED_POSE_TUBE && !numbers->tube)
+		return INCISE_FIXED_POSE_UNKNOWN;
+	state->fading = !!(pose->tool & INCISE_FIXED_POSE_FADE);
+	if (numbers->inserts)
+		state->wanted = (int32_t)tool;
+	for (int i = 0; i < 4; i++)
+		none = none && !d_below(0, d_abs(pose->quaternion[i]));
+	if (none)
+		return INCISE_FIXED_POSE_NONE;
+	if (!(pose->tool & INCISE_FIXED_POSE_TUBE))
+		return take_scalpel(numbers, state, pose, t_ns);
+	return add_pose(&state->tube, &numbers->filter, pose->position, pose->quaternion,
+			t_ns);
+}
+
+/* --- predict and tool ------------------------------------------------------------------- */
+
+static bool is_stale_tick(const struct T(tick) * tick)
+{
+	return tick->flags & INCISE_TICK_STALE;
+}
+
+static bool is_stale(const struct T(plan) * plan, const struct T(predict) * p,
+		     int64_t t_ns)
+{
+	return T(predict_age)(p, t_ns) > plan->numbers.pose_age_ns;
+}
+
+void T(stage_predict)(const struct T(plan) * plan, struct T(state) * state,
+		      struct T(tick) * tick)
+{
+	const struct T(numbers) *numbers = &plan->numbers;
+
+	tick->age_ns = T(predict_age)(&state->scalpel, tick->t_ns);
+	if (tick->age_ns > numbers->pose_age_ns)
+		tick->flags |= INCISE_TICK_STALE;
+	T(predict_at)
+	(&state->scalpel, &numbers->filter, tick->t_ns, tick->position, state->velocity);
+	T(predict_attitude)
+	(&state->scalpel, &numbers->filter, tick->t_ns, state->attitude);
+	for (int i = 0; i < 4; i++)
+		tick->attitude[i] = state->attitude[i];
+	d_turn(state->flat, state->attitude, numbers->side);
+	v_copy(tick->tool, tick->position);
+	tick->speed = v_length(state->velocity);
+	tick->held = state->held;
+}
+
+/* Whether another tool is wanted than the held one, without a look at the scalpel's turn. */
+static bool waits(const struct T(state) * state)
+{
+	if (state->wanted == INCISE_TOOL_AUTO)
+		return (state->held == INCISE_TOOL_TUBE) != !!state->tube_nearer;
+	return state->wanted != state->held;
+}
+
+/* Whether the tool that is held stays: in the tissue it does until the force has faded. */
+static bool keeps_tool(struct T(state) * state)
+{
+	bool faded = !(state->gain > 0) && v_is_zero(state->last);
+
+	state->changing = state->proxy.touching && waits(state);
+	return state->proxy.touching && !(state->changing && faded);
+}
+
+/* A height above the surface, between two numbers; its own scale. */
+struct height {
+	wide low, high;
+};
+
+/* Since the surface was searched a height changed by no more than the end went, and its rounding. */
+static struct height height_of(const struct T(above) * last, const num end[3])
+{
+	num way[3];
+	wide went = w_of(FAR_MOST), above = w_of(last->above);
+
+	v_sub(way, end, last->end);
+	if (last->known)
+		went = w_of(v_length(way)) + LEAST;
+	return (struct height){above - went, above + went};
+}
+
+/* The surface is only searched where what is known of the heights does not decide it. */
+static bool is_tube_nearer(const struct T(plan) * plan, struct T(state) * state,
+			   const struct T(tick) * tick)
+{
+	const struct T(filter) *filter = &plan->numbers.filter;
+	bool tube_held = state->held == INCISE_TOOL_TUBE, searched = false;
+	/* Of how much a tube that is nearer stays below the scalpel. */
+	wide nearer = w_of(tube_held ? n_neg(NEARER) : NEARER);
+	num end[T(ENDS)][3], velocity[3];
+
+	v_copy(end[T(TIP)], tick->position);
+	T(predict_at)(&state->handle, filter, tick->t_ns, end[T(HANDLE)], velocity);
+	T(predict_at)(&state->tube, filter, tick->t_ns, end[T(TUBE)], velocity);
+	for (;;) {
+		struct height h[T(ENDS)];
+		wide low, high;
+
+		for (int i = 0; i < T(ENDS); i++)
+			h[i] = height_of(&state->above[i], end[i]);
+		low = w_min(h[T(TIP)].low, h[T(HANDLE)].low);
+		high = w_min(h[T(TIP)].high, h[T(HANDLE)].high);
+		if (h[T(TUBE)].high + nearer < low)
+			return true;
+		if (h[T(TUBE)].low + nearer > high || searched)
+			return tube_held && searched && h[T(TUBE)].low + nearer <= high;
+		for (int i = 0; i < T(ENDS); i++) {
+			state->above[i].known = true;
+			state->above[i].above = T(surface_above)(plan, end[i]);
+			v_copy(state->above[i].end, end[i]);
+		}
+		searched = true;
+	}
+}
+
+/* One of the two stations that is silent is far away, also in the tissue. */
+static bool find_tube(const struct T(plan) * plan, struct T(state) * state,
+		      const struct T(tick) * tick)
+{
+	bool tube_stale = is_stale(plan, &state->tube, tick->t_ns);
+	bool stale = is_stale_tick(tick), keeps;
+
+	if (tube_stale)
+		state->tube_nearer = false;
+	else if (stale)
+		state->tube_nearer = true;
+	keeps = keeps_tool(state);
+	if (!keeps && state->wanted == INCISE_TOOL_AUTO && !tube_stale && !stale)
+		state->tube_nearer = is_tube_nearer(plan, state, tick);
+	return keeps;
+}
+
+static int32_t tool_by_place(const struct T(plan) * plan, const struct T(state) * state)
+{
+	dir axis[3], up;
+
+	if (state->tube_nearer)
+		return INCISE_TOOL_TUBE;
+	d_turn(axis, state->attitude, plan->numbers.axis);
+	up = d_dot(axis, plan->numbers.up);
+	if (d_below(UNDECIDED, up))
+		return INCISE_TOOL_BLADE;
+	if (d_below(up, -UNDECIDED))
+		return INCISE_TOOL_HANDLE;
+	return state->held == INCISE_TOOL_TUBE ? INCISE_TOOL_BLADE : state->held;
+}
+
+static void choose_tool(const struct T(plan) * plan, struct T(state) * state)
+{
+	int32_t before = state->held;
+
+	state->held = state->wanted == INCISE_TOOL_AUTO ? tool_by_place(plan, state)
+							: state->wanted;
+	if (state->held == before)
+		return;
+	/* The way from the end of one to that of the other is no motion. */
+	state->proxy = (struct T(proxy)){0};
+	T(surface_restart)(plan);
+	state->gain = 0;
+	state->changing = false;
+}
+
+void T(stage_tool)(const struct T(plan) * plan, struct T(state) * state,
+		   struct T(tick) * tick)
+{
+	const struct T(numbers) *numbers = &plan->numbers;
+
+	if (!numbers->inserts)
+		return;
+	if (!(numbers->tube ? find_tube(plan, state, tick) : keeps_tool(state)))
+		choose_tool(plan, state);
+	tick->held = state->held;
+	if (state->held == INCISE_TOOL_HANDLE)
+		T(predict_at)
+		(&state->handle, &numbers->filter, tick->t_ns, tick->tool,
+		 state->velocity);
+	if (state->held == INCISE_TOOL_TUBE && numbers->tube) {
+		/* The attitude stays the scalpel's. */
+		T(predict_at)
+		(&state->tube, &numbers->filter, tick->t_ns, tick->tool, state->velocity);
+		tick->age_ns = T(predict_age)(&state->tube, tick->t_ns);
+		tick->flags &= ~(uint32_t)INCISE_TICK_STALE;
+		if (tick->age_ns > numbers->pose_age_ns)
+			tick->flags |= INCISE_TICK_STALE;
+	}
+}
+
+/* --- contact ---------------------------------------------------------------------------- */
+
+static void begin_contact(struct T(state) * state, int64_t t_ns)
+{
+	state->touched_ns = t_ns;
+	state->deepest = 0;
+	state->skin_open = false;
+	v_copy(state->p0, state->proxy.first.point);
+	if (state->held == INCISE_TOOL_BLADE)
+		d_copy(state->side, state->flat);
+	state->average.n = state->average.at = 0;
+	for (int i = 0; i < 3; i++)
+		state->average.sum[i] = state->average.turn[i] = 0;
+}
+
+void T(stage_contact)(const struct T(plan) * plan, struct T(state) * state,
+		      struct T(tick) * tick)
+{
+	struct T(proxy) *proxy = &state->proxy;
+
+	/* The last force stays, and fades. */
+	if (is_stale_tick(tick))
+		return;
+	for (int i = 0; i < 3; i++)
+		state->force[i] = 0;
+	T(surface_move)(plan, proxy, tick->tool);
+	state->depth = 0;
+	if (!proxy->touching)
+		return;
+	if (proxy->began)
+		begin_contact(state, tick->t_ns);
+	d_copy(state->sn, proxy->touch.normal);
+	d_copy(state->normal, state->sn);
+	state->depth = n_max(proxy->touch.depth, 0);
+	tick->flags |= INCISE_TICK_CONTACT;
+	tick->phase = state->held == INCISE_TOOL_BLADE ? INCISE_PHASE_CUTTING
+						       : INCISE_PHASE_INSERTION;
+	tick->depth = state->depth;
+	v_copy(tick->proxy, proxy->touch.point);
+	d_copy(tick->normal, state->normal);
+}
+
+/*
+ * Bhasin et al.'s Snavg: ΣSn / |ΣSn| over the last ticks, so that a force does not jerk where the normal
+ * does. Rounding would pile up in a running sum of doubles, so after each turn of the ring it is replaced
+ * by the sum of that turn alone. Where normals are opposed and their sum vanishes, the last average
+ * counts on.
+ */
+void T(stage_normal)(const struct T(plan) * plan, struct T(state) * state,
+		     struct T(tick) * tick)
+{
+	int32_t n = plan->numbers.average_ticks, at = state->average.at;
+	dir *place = state->average.ring[at];
+	bool turned = at + 1 >= n;
+
+	if (n < 2 || tick->phase == INCISE_PHASE_FREE)
+		return;
+	for (int i = 0; i < 3; i++) {
+		if (state->average.n == n)
+			state->average.sum[i] -= place[i];
+		place[i] = state->sn[i];
+		state->average.sum[i] += place[i];
+		state->average.turn[i] += place[i];
+		if (turned) {
+			state->average.sum[i] = state->average.turn[i];
+			state->average.turn[i] = 0;
+		}
+	}
+	state->average.n += state->average.n < n;
+	state->average.at = turned ? 0 : at + 1;
+	d_mean(state->average.last, state->average.sum);
+	d_copy(state->normal, state->average.last);
+	d_copy(tick->normal, state->normal);
+}
+
+/* An instrument meets the opening as it was when it went in: it makes the way easier for the next. */
+void T(stage_incision)(const struct T(plan) * plan, struct T(state) * state,
+		       struct T(tick) * tick)
+{
+	const struct T(incision_setup) *setup = &plan->numbers.incision;
+	struct T(incision) *cuts = T_INCISION(state);
+	bool inserts = tick->phase == INCISE_PHASE_INSERTION;
+
+	if (!plan->numbers.inserts)
+		return;
+	if (tick->phase == INCISE_PHASE_FREE)
+		T(incision_leave)(cuts);
+	else if (inserts)
+		T(incision_open)
+		(cuts, setup, (enum incise_tool)state->held, tick->proxy, state->flat,
+		 state->depth);
+	else if (!T(incision_cut)(cuts, setup, tick->proxy, state->normal, state->flat,
+				  state->depth))
+		tick->flags |= INCISE_TICK_FULL;
+	if (inserts && (state->proxy.began || !state->opening.in)) {
+		state->opening = cuts->met;
+		state->tightness = T(incision_tightness)(setup, &state->opening,
+							 (enum incise_tool)state->held);
+	} else if (!inserts && !is_stale_tick(tick)) {
+		state->opening.in = false;
+	}
+	if (inserts && state->opening.in)
+		tick->flags |= INCISE_TICK_IN_CUT;
+}
+
+/* --- forces ----------------------------------------------------------------------------- */
+
+static void push(struct T(state) * state, num size, const dir unit[3])
+{
+	v_add(state->force, state->force, size, unit);
+}
+
+/* N against a tool so far beyond the plane of the membrane. */
+static num membrane_force(const struct T(membrane) * membrane, struct T(state) * state,
+			  struct T(tick) * tick, num beyond)
+{
+	if (!n_below(beyond, membrane->thickness))
+		state->membrane.punctured = true;
+	tick->flags |=
+		state->membrane.punctured ? INCISE_TICK_LUMEN : INCISE_TICK_MEMBRANE;
+	if (!state->membrane.punctured)
+		return n_times(membrane->stiffness, beyond);
+	if (!n_below(membrane->back_wall, beyond))
+		return 0;
+	tick->flags |= INCISE_TICK_BACK_WALL;
+	return n_times(membrane->stiffness, n_sub(beyond, membrane->back_wall));
+}
+
+/* Whether a tool meets the membrane here, and not uncut skin above it or tissue beside it. */
+static bool hits_membrane(const struct T(membrane) * membrane,
+			  const struct T(state) * state, const struct T(tick) * tick,
+			  const num off[3], num beyond)
+{
+	num across[3];
+
+	v_add(across, off, beyond, membrane->normal);
+	return v_is_short(across, membrane->radius) &&
+	       (tick->phase == INCISE_PHASE_CUTTING || state->opening.in);
+}
+
+/*
+ * A membrane over an airway. Tissue in front of it holds the tool up to the membrane's depth and no more
+ * beyond it; the membrane yields, and is open from then on.
+ */
+void T(stage_membrane)(const struct T(plan) * plan, struct T(state) * state,
+		       struct T(tick) * tick)
+{
+	const struct T(membrane) *membrane = &plan->numbers.membrane;
+	num off[3], beyond;
+
+	if (!n_below(0, membrane->stiffness) || is_stale_tick(tick))
+		return;
+	v_sub(off, tick->tool, membrane->point);
+	beyond = n_neg(v_along(off, membrane->normal));
+	/* Another tool did not come there the way that the last one did. */
+	if (state->proxy.began)
+		state->membrane.met = state->membrane.hit = false;
+	if (tick->phase == INCISE_PHASE_FREE || !n_below(0, beyond)) {
+		state->membrane.met = state->membrane.hit = false;
+		return;
+	}
+	if (!state->membrane.met) {
+		state->membrane.met = true;
+		state->membrane.hit = hits_membrane(membrane, state, tick, off, beyond);
+		state->membrane.depth = n_max(n_sub(state->depth, beyond), 0);
+	}
+	if (!state->membrane.hit)
+		return;
+	state->depth = n_min(state->depth, state->membrane.depth);
+	push(state, membrane_force(membrane, state, tick, beyond), membrane->normal);
+}
+
+static num find_input(const struct T(plan) * plan, const struct T(state) * state,
+		      const struct T(tick) * tick, uint32_t kind)
+{
+	dir axis[3];
+	wide hard[3];
+
+	switch (kind) {
+	case INCISE_FIXED_INPUT_SPEED:
+		return tick->speed;
+	case INCISE_FIXED_INPUT_ACCELERATION:
+		T(predict_acceleration)
+		(&state->scalpel, &plan->numbers.filter, tick->t_ns, hard);
+		return T(input_acceleration)(state->velocity, hard);
+	case INCISE_FIXED_INPUT_TILT:
+		d_turn(axis, state->attitude, plan->numbers.axis);
+		return T(input_tilt)(axis, state->normal);
+	case INCISE_FIXED_INPUT_TIME:
+		return T(input_time)(tick->t_ns, state->touched_ns);
+	default:
+		return state->depth;
+	}
+}
+
+/* The force of a phase's model, N. Only inputs that it has are computed. */
+static num phase_force(const struct T(plan) * plan, const struct T(state) * state,
+		       const struct T(tick) * tick, int32_t phase, bool *outside)
+{
+	num x[INCISE_FIXED_INPUTS_MAX] = {state->depth, tick->speed};
+	uint32_t kinds = T(model_inputs)(plan, phase);
+
+	for (int i = 0; kinds; i++, kinds >>= 4)
+		x[i] = find_input(plan, state, tick, kinds & 15);
+	return T(model_force)(plan, phase, x, outside);
+}
+
+/* Skin that was not cut before gives way from the depth of a cut on; the deepest depth only grows. */
+static num open_share(const struct T(numbers) * numbers, const struct T(state) * state)
+{
+	num beyond = n_sub(state->deepest, numbers->incision.cut_from);
+
+	return state->skin_open ? N(1) : n_within(n_over(beyond, OPENS_OVER), 0, N(1));
+}
+
+/* The model's force: of the puncture, of the cut, or between them. */
+static num model_force(const struct T(plan) * plan, struct T(state) * state,
+		       const struct T(tick) * tick, bool *outside)
+{
+	num share = N(1), cut = 0, skin;
+
+	state->deepest = n_max(state->deepest, state->depth);
+	if (plan->numbers.phases & T_PUNCTURES)
+		share = open_share(&plan->numbers, state);
+	if (n_below(0, share))
+		cut = phase_force(plan, state, tick, INCISE_CUT, outside);
+	if (!n_below(share, N(1)))
+		return cut;
+	skin = phase_force(plan, state, tick, INCISE_PUNCTURE, outside);
+	return n_add(n_times(share, cut), n_times(n_sub(N(1), share), skin));
+}
+
+/*
+ * Song et al. (2006), eq. (3), as the size of Bhasin et al.'s Fn; tissue does not pull. Beyond the depths
+ * that the model knows the force goes on with the slope that it has there.
+ */
+static num cutting_force(const struct T(plan) * plan, struct T(state) * state,
+			 struct T(tick) * tick)
+{
+	const struct T(numbers) *numbers = &plan->numbers;
+	num beyond = n_max(n_sub(state->depth, numbers->support), 0), size;
+	bool outside = false;
+
+	if (!n_below(0, state->depth))
+		return 0;
+	size = model_force(plan, state, tick, &outside);
+	/* With no gain the model is asked only to keep the stage, not for a force. */
+	if (outside && n_below(0, numbers->gain))
+		tick->flags |= INCISE_TICK_EXTRAPOLATED;
+	size = n_max(n_times(numbers->gain, size), 0);
+	return n_add(size, n_times(numbers->beyond, beyond));
+}
+
+/* New tissue that the blade meets at this tick. */
+static num advance(struct T(state) * state)
+{
+	if (state->proxy.began)
+		state->skin_open =
+			!T(front_enter)(&state->front, state->p0, state->sn, state->side);
+	/* Through a membrane it meets none. */
+	if (state->membrane.hit)
+		return 0;
+	return T(front_advance)(&state->front, state->proxy.touch.point, state->sn,
+				state->side);
+}
+
+/*
+ * Drag on a blade that comes out, as a part of the force of its cut: what the model of the withdrawal says
+ * where that pulls, else tissue.friction.
+ */
+static num front_friction(const struct T(plan) * plan, const struct T(state) * state,
+			  const struct T(tick) * tick, num most)
+{
+	const struct T(numbers) *numbers = &plan->numbers;
+	bool outside;
+	num drag;
+
+	if (!(numbers->phases & T_WITHDRAWS) || !n_below(0, state->depth))
+		return numbers->friction;
+	drag = n_neg(n_times(numbers->gain,
+			     phase_force(plan, state, tick, INCISE_WITHDRAW, &outside)));
+	/* It goes to 0 at the surface, as the force that unloads does. */
+	drag = n_min(drag, n_times(numbers->unloading, state->depth));
+	return n_below(0, most) ? n_within(n_over(drag, most), 0, N(1)) : 0;
+}
+
+void T(stage_reaction)(const struct T(plan) * plan, struct T(state) * state,
+		       struct T(tick) * tick)
+{
+	const struct T(numbers) *numbers = &plan->numbers;
+	num size, fresh;
+
+	if (tick->phase != INCISE_PHASE_CUTTING)
+		return;
+	if (!plan->has_model) {
+		size = n_times(numbers->reaction, state->depth);
+	} else if (!n_below(0, numbers->unloading)) {
+		size = cutting_force(plan, state, tick);
+	} else {
+		fresh = advance(state);
+		size = cutting_force(plan, state, tick);
+		size = T(front_force)(&state->front, numbers->unloading,
+				      front_friction(plan, state, tick, size),
+				      state->depth, fresh, size);
+	}
+	push(state, size, state->normal);
+}
+
+/* The blade stays in the plane of its cut: s is Sx(0), its side when the cut began. */
+void T(stage_plane)(const struct T(plan) * plan, struct T(state) * state,
+		    struct T(tick) * tick)
+{
+	num off[3];
+
+	if (tick->phase != INCISE_PHASE_CUTTING)
+		return;
+	v_sub(off, tick->tool, state->p0);
+	push(state, n_neg(n_times(plan->numbers.plane, v_along(off, state->side))),
+	     state->side);
+}
+
+void T(stage_damping)(const struct T(plan) * plan, struct T(state) * state,
+		      struct T(tick) * tick)
+{
+	for (int i = 0; i < 3 && tick->phase != INCISE_PHASE_FREE; i++)
+		state->force[i] = n_damp(state->force[i], plan->numbers.damping,
+					 state->velocity[i]);
+}
+
+/*
+ * Fort as Bhasin et al. (2005) print it, the scalar product of the directions of handle and cut: its flat
+ * side, which lies along the cut, resists most. A tube is round: the product is of the handle.
+ */
+static bool is_printed(const struct T(numbers) * numbers, const struct T(state) * state)
+{
+	return numbers->printed && state->held == INCISE_TOOL_HANDLE;
+}
+
+static num printed(const struct T(numbers) * numbers, const struct T(state) * state)
+{
+	dir flat[3], lies[3];
+
+	d_cross(flat, numbers->side, numbers->axis);
+	d_turn(lies, state->attitude, flat);
+	return n_share_of(d_dot(lies, state->opening.along));
+}
+
+/*
+ * Fort, aligned … 1: easily, but not freely. A flat instrument goes in easily when its flat lies along the
+ * cut: the flat's normal across the cut's direction then gives 0. A tube is round, it has no turn.
+ */
+static num eased(const struct T(numbers) * numbers, const struct T(state) * state)
+{
+	num across = N(1);
+
+	if (state->held != INCISE_TOOL_TUBE)
+		across = n_share_of(d_dot(state->flat, state->opening.along));
+	return n_add(numbers->aligned,
+		     n_times(n_times(n_sub(N(1), numbers->aligned), across),
+			     state->tightness));
+}
+
+/* Below the cut, and outside of it, tissue holds up like skin. */
+void T(stage_insertion)(const struct T(plan) * plan, struct T(state) * state,
+			struct T(tick) * tick)
+{
+	const struct T(numbers) *numbers = &plan->numbers;
+	const struct T(opening) *opening = &state->opening;
+	num cut = opening->in ? n_min(state->depth, opening->depth_mm) : 0;
+	num size = n_sub(state->depth, cut);
+
+	if (tick->phase != INCISE_PHASE_INSERTION)
+		return;
+	if (opening->in && is_printed(numbers, state))
+		size = n_times(printed(numbers, state), state->depth);
+	else if (opening->in)
+		size = n_add(size, n_times(eased(numbers, state), cut));
+	push(state, n_times(numbers->insertion, size), state->normal);
+}
+
+/* The tissue around an instrument gives way to a limited extent. */
+void T(stage_spread)(const struct T(plan) * plan, struct T(state) * state,
+		     struct T(tick) * tick)
+{
+	num off[3], across[3];
+
+	if (tick->phase != INCISE_PHASE_INSERTION)
+		return;
+	v_sub(off, tick->tool, state->p0);
+	v_add(across, off, n_neg(v_along(off, state->normal)), state->normal);
+	v_pull(state->force, state->force, plan->numbers.spread, across);
+}
+
+/* --- start and limit -------------------------------------------------------------------- */
+
+/*
+ * The share of a force that is let through. It waits for a small force, so that a scene that starts with
+ * the blade deep in the tissue pushes nobody; then it ramps up, and fades out when poses stop.
+ *
+ *   wanted   ----.            .-------------------
+ *                 '-. small  /
+ *   gain  1           '-'  .------.        .------
+ *         0   ____________/        \______/
+ *             waits    ramp     fade       ramp
+ *             poses ..............         ........
+ *
+ * However long a stall was, a tick brings back a tenth of the force at most; it may take all of it. After a
+ * fade the gain rises again without waiting for a small force: the hand has not left, and whoever holds the
+ * blade in the tissue would else feel nothing until it is out. The ramp is the protection.
+ */
+void T(stage_start)(const struct T(plan) * plan, struct T(state) * state,
+		    struct T(tick) * tick)
+{
+	const struct T(numbers) *numbers = &plan->numbers;
+	bool fresh = !is_stale_tick(tick) && !state->fading && !state->changing;
+	/* Unsigned: two times may be farther apart than an int64_t holds. */
+	uint64_t gone = (uint64_t)tick->t_ns - (uint64_t)state->last_ns;
+	int64_t dt_ns = 0;
+
+	if (state->last_ns && tick->t_ns > state->last_ns)
+		dt_ns = gone < DT_MOST ? (int64_t)gone : DT_MOST;
+	if (fresh && v_is_short(state->force, numbers->small))
+		state->released = true;
+	if (!state->released)
+		state->gain = 0;
+	else if (fresh && dt_ns > 0)
+		state->gain = w_min(state->gain + w_min(w_ramp(dt_ns, numbers->ramp_ns),
+							RISE_MOST),
+				    W_ONE);
+	else if (!fresh && dt_ns > 0)
+		state->gain =
+			w_within(state->gain - w_ramp(dt_ns, numbers->fade_ns), 0, W_ONE);
+	state->last_ns = tick->t_ns;
+	if (state->gain < W_ONE)
+		tick->flags |= INCISE_TICK_STARTING;
+	for (int i = 0; i < 3; i++)
+		tick->command[i] = w_scale(state->gain, state->force[i]);
+}
+
+/*
+ * The last word on a force: never larger than a limit, never changing faster than one, never anything but
+ * numbers. A force that is held keeps its direction, a change that is held keeps the direction of the change.
+ *
+ *        .---force---.
+ *      .'      o asked
+ *     /      .'
+ *    |     o' rendered      a step of slew towards it,
+ *    |    / last            inside the ball
+ *     '.     0     .'
+ *
+ * Where both limits cannot be kept, as when the largest force is made smaller, it is the force that is.
+ */
+void T(stage_limit)(const struct T(plan) * plan, struct T(state) * state,
+		    struct T(tick) * tick)
+{
+	const struct T(numbers) *numbers = &plan->numbers;
+	wide force[3], change[3];
+
+	/* One that is not finite asks for no force, and is gone at the rate of the slew. */
+	if (!v_is_number(tick->command)) {
+		tick->flags |= INCISE_TICK_NOT_FINITE;
+		for (int i = 0; i < 3; i++)
+			tick->command[i] = 0;
+	}
+	for (int i = 0; i < 3; i++)
+		force[i] = w_of(tick->command[i]);
+	if (v_shorten(force, numbers->force))
+		tick->flags |= INCISE_TICK_CLAMPED;
+	for (int i = 0; i < 3; i++)
+		change[i] = force[i] - state->last[i];
+	if (v_shorten(change, numbers->slew)) {
+		tick->flags |= INCISE_TICK_SLEWED;
+		for (int i = 0; i < 3; i++)
+			force[i] = state->last[i] + change[i];
+		/* Between two forces within the limit, but for rounding. */
+		v_shorten(force, numbers->force);
+	}
+	for (int i = 0; i < 3; i++)
+		tick->command[i] = state->last[i] = n_of(force[i]);
+}
