@@ -31,7 +31,7 @@ TEST(acceleration_is_that_of_the_speed)
 		last = found;
 	}
 	assert_true(incise_double_input_acceleration((double[]){3, 4, 0},
-					      (double[]){4, -3, 9}) == 0);
+						     (double[]){4, -3, 9}) == 0);
 }
 
 TEST(tilt_is_the_angle)
