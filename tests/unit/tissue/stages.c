@@ -182,7 +182,7 @@ TEST(test_contact_forgets_normals)
 	{
 		double averaged[3];
 
-		kind->set_average(64);
+		kind->set_average(16);
 		kind->touch(1, averaged);
 		assert_true(v3_length(averaged) == 0);
 		for (int round = 0; round < 2; round++) {
