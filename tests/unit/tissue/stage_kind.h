@@ -11,7 +11,7 @@ static struct {
 
 /* --- predict --- */
 
-static inline bool T(set_filter)(const struct incise_double_filter *from)
+static bool T(set_filter)(const struct incise_double_filter *from)
 {
 	struct T(filter) *filter = &T(tried).plan.numbers.filter;
 
@@ -26,7 +26,7 @@ static inline bool T(set_filter)(const struct incise_double_filter *from)
 	return FILTER_GOOD(filter);
 }
 
-static inline bool T(add_pose)(const struct incise_tracker_sample *sample)
+static bool T(add_pose)(const struct incise_tracker_sample *sample)
 {
 	num position[3];
 	dir quaternion[4];
@@ -37,7 +37,7 @@ static inline bool T(add_pose)(const struct incise_tracker_sample *sample)
 			      position, quaternion, sample->t_ns);
 }
 
-static inline struct shown T(show)(int64_t t_ns)
+static struct shown T(show)(int64_t t_ns)
 {
 	const struct T(predict) *p = &T(tried).state.scalpel;
 	const struct T(filter) *filter = &T(tried).plan.numbers.filter;
@@ -57,7 +57,7 @@ static inline struct shown T(show)(int64_t t_ns)
 	return shown;
 }
 
-static inline struct filtered T(filtered)(void)
+static struct filtered T(filtered)(void)
 {
 	const struct T(predict) *p = &T(tried).state.scalpel;
 	struct filtered now = {.t_ns = p->t_ns, .discontinuities = p->discontinuities};
@@ -68,7 +68,7 @@ static inline struct filtered T(filtered)(void)
 	return now;
 }
 
-static inline void T(turn_about)(double mm_s, double mm_s2, double shown_mm_s)
+static void T(turn_about)(double mm_s, double mm_s2, double shown_mm_s)
 {
 	struct T(predict) *p = &T(tried).state.scalpel;
 
@@ -81,14 +81,14 @@ static inline void T(turn_about)(double mm_s, double mm_s2, double shown_mm_s)
 /* --- normal --- */
 
 /* Average over so many ticks, on the plane z = 0. */
-static inline void T(set_average)(int ticks)
+static void T(set_average)(int ticks)
 {
 	memset(&T(tried), 0, sizeof(T(tried)));
 	T(tried).plan.numbers.average_ticks = ticks;
 	SET_PLANE(&T(tried).plan);
 }
 
-static inline void T(average)(const double normal[3], double averaged[3])
+static void T(average)(const double normal[3], double averaged[3])
 {
 	struct T(tick) *tick = &T(tried).tick;
 
@@ -100,7 +100,7 @@ static inline void T(average)(const double normal[3], double averaged[3])
 }
 
 /* A tick with the tool at a height; the normal after it. */
-static inline void T(touch)(double height_mm, double averaged[3])
+static void T(touch)(double height_mm, double averaged[3])
 {
 	struct T(tick) *tick = &T(tried).tick;
 
@@ -113,20 +113,21 @@ static inline void T(touch)(double height_mm, double averaged[3])
 
 /* --- start and limit --- */
 
-static inline void T(set_start)(const struct start *start)
+/* It begins at half the force, or before a small one. */
+static void T(set_start)(int64_t ramp_ns, int64_t fade_ns, bool half, int64_t last_ns)
 {
 	memset(&T(tried), 0, sizeof(T(tried)));
-	SET(T(tried).plan.numbers.small, start->small_N, 16);
-	T(tried).plan.numbers.ramp_ns = (period)start->ramp_ns;
-	T(tried).plan.numbers.fade_ns = (period)start->fade_ns;
-	SET(T(tried).state.gain, start->gain, 30);
-	T(tried).state.released = start->released;
-	T(tried).state.last_ns = start->last_ns;
+	SET(T(tried).plan.numbers.small, 0.1, 16);
+	T(tried).plan.numbers.ramp_ns = (period)ramp_ns;
+	T(tried).plan.numbers.fade_ns = (period)fade_ns;
+	SET(T(tried).state.gain, half ? 0.5 : 0, 30);
+	T(tried).state.released = half;
+	T(tried).state.last_ns = last_ns;
 }
 
 /* The gain; the force that is asked for is along y. */
-static inline double T(start)(double wanted_N, enum poses poses, int64_t t_ns,
-			      bool *released, double *command_N)
+static double T(start)(double wanted_N, enum poses poses, int64_t t_ns, bool *released,
+		       double *command_N)
 {
 	struct T(tick) *tick = &T(tried).tick;
 
@@ -143,7 +144,7 @@ static inline double T(start)(double wanted_N, enum poses poses, int64_t t_ns,
 	return GET(T(tried).state.gain, 30);
 }
 
-static inline void T(set_limit)(double force_N, double slew_N, const double last_N[3])
+static void T(set_limit)(double force_N, double slew_N, const double last_N[3])
 {
 	memset(&T(tried), 0, sizeof(T(tried)));
 	SET(T(tried).plan.numbers.force, force_N, 16);
@@ -153,7 +154,7 @@ static inline void T(set_limit)(double force_N, double slew_N, const double last
 }
 
 /* The force in place of the one asked for; returns flags. */
-static inline uint32_t T(limit)(double force_N[3])
+static uint32_t T(limit)(double force_N[3])
 {
 	struct T(tick) *tick = &T(tried).tick;
 
@@ -166,30 +167,10 @@ static inline uint32_t T(limit)(double force_N[3])
 	return tick->flags;
 }
 
-static inline double T(number)(double value)
+static double T(number)(double value)
 {
 	num n;
 
 	SET(n, value, 16);
 	return GET(n, 16);
 }
-
-static const struct stage_kind T(kind) = {
-	.tried = &T(tried),
-	.size = sizeof(T(tried)),
-	.is_double = sizeof(num) == sizeof(double),
-	.bit = sizeof(num) == sizeof(double) ? 0 : 0x1p-16,
-	.set_filter = T(set_filter),
-	.add_pose = T(add_pose),
-	.show = T(show),
-	.filtered = T(filtered),
-	.turn_about = T(turn_about),
-	.set_average = T(set_average),
-	.average = T(average),
-	.touch = T(touch),
-	.set_start = T(set_start),
-	.start = T(start),
-	.set_limit = T(set_limit),
-	.limit = T(limit),
-	.number = T(number),
-};

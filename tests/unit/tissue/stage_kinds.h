@@ -11,6 +11,7 @@
 #include "../../../lib/fixed/vector.h"
 #include "../../../lib/surface/surface.h"
 #include "../../../lib/tissue/tick.h"
+#include "kinds.h"
 
 /* All that a predictor says of one time, and what its filter has. */
 struct shown {
@@ -24,18 +25,10 @@ struct filtered {
 	uint32_t discontinuities;
 };
 
-struct start {
-	double small_N;
-	int64_t ramp_ns, fade_ns;
-	double gain;
-	bool released;
-	int64_t last_ns;
-};
-
 /* Why a force is let through, or fades. */
 enum poses { FRESH, STALE, FADING, CHANGING };
 
-struct stage_kind {
+struct kind {
 	void *tried; /* its plan, state and tick */
 	size_t size;
 	bool is_double;
@@ -52,7 +45,7 @@ struct stage_kind {
 	void (*average)(const double normal[3], double averaged[3]);
 	void (*touch)(double height_mm, double averaged[3]);
 
-	void (*set_start)(const struct start *start);
+	void (*set_start)(int64_t ramp_ns, int64_t fade_ns, bool half, int64_t last_ns);
 	double (*start)(double wanted_N, enum poses poses, int64_t t_ns, bool *released,
 			double *command_N);
 
@@ -111,11 +104,18 @@ static inline int64_t stage_integer(double x, int bits, int64_t most)
 #undef SET_PLANE
 #include "../../../lib/number/no_kind.h"
 
-static const struct stage_kind *const stage_kinds[] = {&incise_double_kind,
-						       &incise_fixed_kind};
-
-#define EACH_KIND(kind)                                                    \
-	for (const struct stage_kind *const *kind##_ = stage_kinds, *kind; \
-	     kind##_ < stage_kinds + 2 && (kind = *kind##_, true); kind##_++)
+#define KIND(kind, is_double, bit)                                                     \
+	{                                                                              \
+		&incise_##kind##_tried, sizeof(incise_##kind##_tried), is_double, bit, \
+			incise_##kind##_set_filter, incise_##kind##_add_pose,          \
+			incise_##kind##_show, incise_##kind##_filtered,                \
+			incise_##kind##_turn_about, incise_##kind##_set_average,       \
+			incise_##kind##_average, incise_##kind##_touch,                \
+			incise_##kind##_set_start, incise_##kind##_start,              \
+			incise_##kind##_set_limit, incise_##kind##_limit,              \
+			incise_##kind##_number                                         \
+	}
+static const struct kind kinds[] = {KIND(double, true, 0), KIND(fixed, false, 0x1p-16)};
+static const struct kind *kind;
 
 #endif

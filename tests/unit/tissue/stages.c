@@ -17,7 +17,7 @@
 /* --- normal --- */
 
 /* A root, a square, a quotient: an ulp or two; in Q30 as many. */
-static double unit_error(const struct stage_kind *kind)
+static double unit_error(void)
 {
 	return kind->is_double ? 4 * DBL_EPSILON : 0x1p-28;
 }
@@ -40,111 +40,96 @@ static void unit_at_random(uint64_t n, double normal[3])
 	assert_true(v3_unit(normal, v, 0));
 }
 
-TEST(test_normal_is_of_the_sum)
+TEST_KINDS(test_normal_is_of_the_sum)
 {
 	static const int ns[] = {2, 3, 10, 63, 64};
 
-	EACH_KIND(kind)
-	{
-		for (size_t k = 0; k < CASES(ns); k++) {
-			int n = ns[k], ticks = n == 10 ? 100000 : 1000;
+	for (size_t k = 0; k < CASES(ns); k++) {
+		int n = ns[k], ticks = n == 10 ? 100000 : 1000;
 
-			kind->set_average(n);
-			for (int i = 0; i < ticks; i++) {
-				double normal[3], averaged[3], sum[3] = {0}, wanted[3];
+		kind->set_average(n);
+		for (int i = 0; i < ticks; i++) {
+			double normal[3], averaged[3], sum[3] = {0}, wanted[3];
 
-				for (int j = i < n ? 0 : i - n + 1; j <= i; j++) {
-					unit_at_random(j, normal);
-					v3_add(sum, sum, 1, normal);
-				}
-				kind->average(normal, averaged);
-				v3_unit(wanted, sum, 0);
-				/*
-				 * No sum is above 64: each of the 3 · 64 additions since the
-				 * last turn rounds by 7e-15 at most, which a short sum makes
-				 * much of. In Q30 each normal is 1/2 LSB off.
-				 */
-				assert_near(averaged, wanted,
-					    unit_error(kind) + (kind->is_double
-									? 2e-12
-									: n * 0x1p-30) /
-								       v3_length(sum));
-				assert_true(fabs(v3_length(averaged) - 1) <
-					    unit_error(kind));
+			for (int j = i < n ? 0 : i - n + 1; j <= i; j++) {
+				unit_at_random(j, normal);
+				v3_add(sum, sum, 1, normal);
 			}
+			kind->average(normal, averaged);
+			v3_unit(wanted, sum, 0);
+			/*
+			 * No sum is above 64: each of the 3 · 64 additions since the
+			 * last turn rounds by 7e-15 at most, which a short sum makes
+			 * much of. In Q30 each normal is 1/2 LSB off.
+			 */
+			assert_near(averaged, wanted,
+				    unit_error() +
+					    (kind->is_double ? 2e-12 : n * 0x1p-30) /
+						    v3_length(sum));
+			assert_true(fabs(v3_length(averaged) - 1) < unit_error());
 		}
 	}
 }
 
 /* Rounding does not pile up: after a turn of equal normals nothing old is left, to the bit. */
-TEST(test_rounding_of_normals_is_forgotten)
+TEST_KINDS(test_rounding_of_normals_is_forgotten)
 {
 	static const double up[3] = {0, 0, 1};
+	double averaged[3];
 
-	EACH_KIND(kind)
-	{
-		double averaged[3];
+	kind->set_average(7);
+	for (int i = 0; i < 1000003; i++) {
+		double normal[3] = {sin(i), cos(i), 0};
 
-		kind->set_average(7);
-		for (int i = 0; i < 1000003; i++) {
-			double normal[3] = {sin(i), cos(i), 0};
+		kind->average(normal, averaged);
+	}
+	/* Two turns: one may have begun before. */
+	for (int i = 0; i < 14; i++)
+		kind->average(up, averaged);
+	assert_memory_equal(averaged, up, sizeof(up));
+}
 
-			kind->average(normal, averaged);
-		}
-		/* Two turns: one may have begun before. */
-		for (int i = 0; i < 14; i++)
-			kind->average(up, averaged);
-		assert_memory_equal(averaged, up, sizeof(up));
+TEST_KINDS(test_one_normal_is_itself)
+{
+	kind->set_average(1);
+	for (int i = 0; i < 1000; i++) {
+		double normal[3], averaged[3];
+
+		unit_at_random(i, normal);
+		kind->average(normal, averaged);
+		assert_near(averaged, normal, kind->is_double ? 0 : 0x1p-31);
 	}
 }
 
-TEST(test_one_normal_is_itself)
+TEST_KINDS(test_opposed_normals)
 {
-	EACH_KIND(kind)
-	{
-		kind->set_average(1);
-		for (int i = 0; i < 1000; i++) {
-			double normal[3], averaged[3];
+	double averaged[3], first[3], back[3];
 
-			unit_at_random(i, normal);
-			kind->average(normal, averaged);
-			assert_near(averaged, normal, kind->is_double ? 0 : 0x1p-31);
-		}
+	/* Of two that cancel none is left: the last average stays, tick after tick. */
+	kind->set_average(2);
+	unit_at_random(5, first);
+	for (int c = 0; c < 3; c++)
+		back[c] = -first[c];
+	for (int i = 0; i < 100; i++) {
+		kind->average(i % 2 ? back : first, averaged);
+		assert_near(averaged, first, unit_error());
 	}
-}
+	/* Three at 120° cancel but for rounding, which is no direction. */
+	kind->set_average(3);
+	for (int i = 0; i < 100; i++) {
+		double angle = 2 * M_PI * i / 3;
+		double normal[3] = {0, sin(angle), cos(angle)};
+		const double between[3] = {0, sin(M_PI / 3), cos(M_PI / 3)};
 
-TEST(test_opposed_normals)
-{
-	EACH_KIND(kind)
-	{
-		double averaged[3], first[3], back[3];
-
-		/* Of two that cancel none is left: the last average stays, tick after tick. */
-		kind->set_average(2);
-		unit_at_random(5, first);
-		for (int c = 0; c < 3; c++)
-			back[c] = -first[c];
-		for (int i = 0; i < 100; i++) {
-			kind->average(i % 2 ? back : first, averaged);
-			assert_near(averaged, first, unit_error(kind));
-		}
-		/* Three at 120° cancel but for rounding, which is no direction. */
-		kind->set_average(3);
-		for (int i = 0; i < 100; i++) {
-			double angle = 2 * M_PI * i / 3;
-			double normal[3] = {0, sin(angle), cos(angle)};
-			const double between[3] = {0, sin(M_PI / 3), cos(M_PI / 3)};
-
-			kind->average(normal, averaged);
-			/* The sum of the first two points between them, at 60°; then it stays. */
-			if (i > 0)
-				assert_near(averaged, between, 1e-12 + unit_error(kind));
-		}
+		kind->average(normal, averaged);
+		/* The sum of the first two points between them, at 60°; then it stays. */
+		if (i > 0)
+			assert_near(averaged, between, 1e-12 + unit_error());
 	}
 }
 
 /* What is no normal makes no number that is none, and is forgotten after two turns. */
-TEST(test_what_is_no_normal)
+TEST_KINDS(test_what_is_no_normal)
 {
 	static const double none[][3] = {
 		{0, 0, 0},	  {NAN, 0, 1},		{INFINITY, 0, 0},
@@ -153,47 +138,38 @@ TEST(test_what_is_no_normal)
 	};
 	static const double up[3] = {0, 0, 1}, across[3] = {1, 0, 0};
 	const double between[3] = {M_SQRT1_2, 0, M_SQRT1_2};
+	double averaged[3];
 
-	EACH_KIND(kind)
-	{
-		double averaged[3];
-
-		kind->set_average(4);
-		for (int round = 0; round < 2; round++) {
-			for (size_t i = 0; i < CASES(none); i++) {
-				kind->average(none[i], averaged);
-				assert_true(v3_length(averaged) == 0 ||
-					    fabs(v3_length(averaged) - 1) <
-						    unit_error(kind));
-			}
-			for (int i = 0; i < 8; i++)
-				kind->average(i % 2 ? up : across, averaged);
-			assert_near(averaged, between, unit_error(kind));
+	kind->set_average(4);
+	for (int round = 0; round < 2; round++) {
+		for (size_t i = 0; i < CASES(none); i++) {
+			kind->average(none[i], averaged);
+			assert_true(v3_length(averaged) == 0 ||
+				    fabs(v3_length(averaged) - 1) < unit_error());
 		}
+		for (int i = 0; i < 8; i++)
+			kind->average(i % 2 ? up : across, averaged);
+		assert_near(averaged, between, unit_error());
 	}
 }
 
 /* A new contact begins with its own normal; one that goes on does not. */
-TEST(test_contact_forgets_normals)
+TEST_KINDS(test_contact_forgets_normals)
 {
 	static const double up[3] = {0, 0, 1}, across[3] = {1, 0, 0};
+	double averaged[3];
 
-	EACH_KIND(kind)
-	{
-		double averaged[3];
-
-		kind->set_average(16);
+	kind->set_average(16);
+	kind->touch(1, averaged);
+	assert_true(v3_length(averaged) == 0);
+	for (int round = 0; round < 2; round++) {
+		kind->touch(-1, averaged);
+		assert_near(averaged, up, 0);
+		for (int i = 0; i < 50; i++)
+			kind->average(across, averaged);
+		kind->touch(-1, averaged);
+		assert_true(averaged[0] > 0.99);
 		kind->touch(1, averaged);
-		assert_true(v3_length(averaged) == 0);
-		for (int round = 0; round < 2; round++) {
-			kind->touch(-1, averaged);
-			assert_near(averaged, up, 0);
-			for (int i = 0; i < 50; i++)
-				kind->average(across, averaged);
-			kind->touch(-1, averaged);
-			assert_true(averaged[0] > 0.99);
-			kind->touch(1, averaged);
-		}
 	}
 }
 
@@ -202,7 +178,7 @@ TEST(test_contact_forgets_normals)
 #define MS INT64_C(1000000)
 
 /* Ticks in a row: what each lot of @ticks with the same input ends in. */
-TEST(test_course)
+TEST_KINDS(test_course)
 {
 	static const struct {
 		int ticks;
@@ -226,33 +202,27 @@ TEST(test_course)
 		{250, 3, FRESH, 0.5, true}, /* without waiting for a small force */
 		{5, 3, CHANGING, 0.4, true},   {300, NAN, FRESH, 1, true},
 	};
+	int64_t t_ns = 1;
 
-	EACH_KIND(kind)
-	{
-		struct start start = {0.1, 500 * MS, 50 * MS, 0, false, 1};
-		int64_t t_ns = 1;
+	kind->set_start(500 * MS, 50 * MS, false, 1);
+	for (size_t i = 0; i < CASES(lots); i++) {
+		double gain = -1, command_N, wanted_N = lots[i].wanted_N;
+		bool released = false;
 
-		kind->set_start(&start);
-		for (size_t i = 0; i < CASES(lots); i++) {
-			double gain = -1, command_N, wanted_N = lots[i].wanted_N;
-			bool released = false;
-
-			for (int k = 0; k < lots[i].ticks; k++)
-				gain = kind->start(wanted_N, lots[i].poses, t_ns += MS,
-						   &released, &command_N);
-			/* Some thousand additions of numbers up to 1; of Q30, less 1 LSB each. */
-			assert_true(fabs(gain - lots[i].gain) <
-				    (kind->is_double ? 1e-12 : 1e-6));
-			if (!isnan(wanted_N))
-				assert_true(fabs(command_N - gain * wanted_N) <=
-					    1e-15 + 2 * kind->bit);
-			assert_int_equal(released, lots[i].released);
-		}
+		for (int k = 0; k < lots[i].ticks; k++)
+			gain = kind->start(wanted_N, lots[i].poses, t_ns += MS, &released,
+					   &command_N);
+		/* Some thousand additions of numbers up to 1; of Q30, less 1 LSB each. */
+		assert_true(fabs(gain - lots[i].gain) < (kind->is_double ? 1e-12 : 1e-6));
+		if (!isnan(wanted_N))
+			assert_true(fabs(command_N - gain * wanted_N) <=
+				    1e-15 + 2 * kind->bit);
+		assert_int_equal(released, lots[i].released);
 	}
 }
 
 /* One tick from half way, with times and settings that make little sense. */
-TEST(test_times)
+TEST_KINDS(test_times)
 {
 	static const struct {
 		int64_t ramp_ns, fade_ns, last_ns, t_ns;
@@ -273,65 +243,54 @@ TEST(test_times)
 		{0, 0, 1, 2, 0.6, 0},
 	};
 
-	EACH_KIND(kind)
-	{
-		for (size_t i = 0; i < CASES(cases); i++) {
-			for (int poses = FRESH; poses <= CHANGING; poses++) {
-				struct start start = {
-					0.1,  cases[i].ramp_ns, cases[i].fade_ns, 0.5,
-					true, cases[i].last_ns};
-				double want =
-					poses == FRESH ? cases[i].risen : cases[i].faded;
-				double command_N, gain;
-				bool released;
+	for (size_t i = 0; i < CASES(cases); i++) {
+		for (int poses = FRESH; poses <= CHANGING; poses++) {
+			double want = poses == FRESH ? cases[i].risen : cases[i].faded;
+			double command_N, gain;
+			bool released;
 
-				kind->set_start(&start);
-				gain = kind->start(9, (enum poses)poses, cases[i].t_ns,
-						   &released, &command_N);
-				assert_true(fabs(gain - want) <
-					    (kind->is_double ? 1e-12 : 0x1p-29));
-			}
+			kind->set_start(cases[i].ramp_ns, cases[i].fade_ns, true,
+					cases[i].last_ns);
+			gain = kind->start(9, (enum poses)poses, cases[i].t_ns, &released,
+					   &command_N);
+			assert_true(fabs(gain - want) <
+				    (kind->is_double ? 1e-12 : 0x1p-29));
 		}
 	}
 }
 
 /* Any force at any time: the gain is from 0 to 1, rises by no more than a tenth, and waits once. */
-TEST(test_start_at_any_time)
+TEST_KINDS(test_start_at_any_time)
 {
-	EACH_KIND(kind)
-	{
-		struct start start = {0.1, 500 * MS, 50 * MS, 0, false, 0};
-		uint64_t seed = 1;
-		double last = 0;
-		bool started = false;
+	uint64_t seed = 1;
+	double last = 0;
+	bool started = false;
 
-		kind->set_start(&start);
-		for (int i = 0; i < 100000; i++) {
-			double wanted_N, gain, command_N;
-			bool released;
-			int64_t t_ns;
+	kind->set_start(500 * MS, 50 * MS, false, 0);
+	for (int i = 0; i < 100000; i++) {
+		double wanted_N, gain, command_N;
+		bool released;
+		int64_t t_ns;
 
-			incise_random_step(&seed);
-			memcpy(&wanted_N, &seed, sizeof(seed));
-			incise_random_step(&seed);
-			t_ns = (int64_t)seed;
-			incise_random_step(&seed);
-			/* No small force at first. */
-			if (i < 100)
-				wanted_N = 1;
-			gain = kind->start(wanted_N, (enum poses)(seed >> 62), t_ns,
-					   &released, &command_N);
-			assert_true(gain >= 0 && gain <= 1);
-			assert_true(gain <= last + 0.1 + 1e-15);
-			assert_true(released ? i >= 100 : gain == 0 && !started);
-			if (isfinite(wanted_N))
-				assert_true(fabs(command_N) <=
-					    fabs(kind->number(wanted_N)));
-			started = released;
-			last = gain;
-		}
-		assert_true(started);
+		incise_random_step(&seed);
+		memcpy(&wanted_N, &seed, sizeof(seed));
+		incise_random_step(&seed);
+		t_ns = (int64_t)seed;
+		incise_random_step(&seed);
+		/* No small force at first. */
+		if (i < 100)
+			wanted_N = 1;
+		gain = kind->start(wanted_N, (enum poses)(seed >> 62), t_ns, &released,
+				   &command_N);
+		assert_true(gain >= 0 && gain <= 1);
+		assert_true(gain <= last + 0.1 + 1e-15);
+		assert_true(released ? i >= 100 : gain == 0 && !started);
+		if (isfinite(wanted_N))
+			assert_true(fabs(command_N) <= fabs(kind->number(wanted_N)));
+		started = released;
+		last = gain;
 	}
+	assert_true(started);
 }
 
 /* --- limit --- */
@@ -341,13 +300,13 @@ TEST(test_start_at_any_time)
 #define NOT_FINITE INCISE_TICK_NOT_FINITE
 
 /* Forces of up to 2 N, each some roundings of 2e-16 or 2^-17 away from the one before. */
-static double limit_error(const struct stage_kind *kind)
+static double limit_error(void)
 {
 	return 1e-14 + 3 * kind->bit;
 }
 
 /* Whether a kind has such numbers. */
-static bool has(const struct stage_kind *kind, const double force_N[3])
+static bool has(const double force_N[3])
 {
 	for (int c = 0; c < 3; c++)
 		if (!kind->is_double && !(fabs(force_N[c]) < 32768))
@@ -356,7 +315,7 @@ static bool has(const struct stage_kind *kind, const double force_N[3])
 }
 
 /* A walk of ticks, each from where the one before ended: 2 N, and 0.7 N a tick. */
-TEST(test_walk)
+TEST_KINDS(test_walk)
 {
 	/* The share of a turn from (1.2 0 1.6) to (0 2 0), √8 N away, in one tick. */
 	const double k = 0.7 / sqrt(8);
@@ -377,23 +336,20 @@ TEST(test_walk)
 		 NOT_FINITE | SLEW},
 	};
 
-	EACH_KIND(kind)
-	{
-		kind->set_limit(2, 0.7, (double[]){0, 0, 0});
-		for (size_t i = 0; i < CASES(ticks); i++) {
-			double force[3];
+	kind->set_limit(2, 0.7, (double[]){0, 0, 0});
+	for (size_t i = 0; i < CASES(ticks); i++) {
+		double force[3];
 
-			if (!has(kind, ticks[i].asked))
-				continue;
-			v3_copy(force, ticks[i].asked);
-			assert_int_equal(kind->limit(force), ticks[i].flags);
-			assert_near(force, ticks[i].rendered, limit_error(kind));
-		}
+		if (!has(ticks[i].asked))
+			continue;
+		v3_copy(force, ticks[i].asked);
+		assert_int_equal(kind->limit(force), ticks[i].flags);
+		assert_near(force, ticks[i].rendered, limit_error());
 	}
 }
 
 /* One tick each, no slew to speak of: the limit alone, at the ends of what numbers hold. */
-TEST(test_size)
+TEST_KINDS(test_size)
 {
 	static const struct {
 		double asked[3], rendered[3];
@@ -416,46 +372,39 @@ TEST(test_size)
 		{{1, 1, NAN}, {0, 0, 0}, NOT_FINITE},
 	};
 
-	EACH_KIND(kind)
-	{
-		for (size_t i = 0; i < CASES(cases); i++) {
-			double force[3];
+	for (size_t i = 0; i < CASES(cases); i++) {
+		double force[3];
 
-			if (!has(kind, cases[i].asked))
-				continue;
-			kind->set_limit(2, 100, (double[]){0, 0, 0});
-			v3_copy(force, cases[i].asked);
-			assert_int_equal(kind->limit(force), cases[i].flags);
-			assert_near(force, cases[i].rendered, limit_error(kind));
-			/* What no limit holds is not touched. */
-			for (int c = 0; c < 3 && !cases[i].flags; c++)
-				assert_true(force[c] == kind->number(cases[i].asked[c]));
-		}
+		if (!has(cases[i].asked))
+			continue;
+		kind->set_limit(2, 100, (double[]){0, 0, 0});
+		v3_copy(force, cases[i].asked);
+		assert_int_equal(kind->limit(force), cases[i].flags);
+		assert_near(force, cases[i].rendered, limit_error());
+		/* What no limit holds is not touched. */
+		for (int c = 0; c < 3 && !cases[i].flags; c++)
+			assert_true(force[c] == kind->number(cases[i].asked[c]));
 	}
 }
 
-TEST(test_settings)
+TEST_KINDS(test_settings)
 {
-	EACH_KIND(kind)
-	{
-		double force[3] = {0.1, -0.2, 3};
+	double force[3] = {0.1, -0.2, 3};
 
-		/* No force at all, or none that changes. */
-		kind->set_limit(0, 1, (double[]){0, 0, 0});
-		assert_int_equal(kind->limit(force), FORCE);
-		assert_true(v3_length(force) == 0);
-		assert_int_equal(kind->limit(force), 0);
-		kind->set_limit(2, 0, (double[]){0, 0.5, 0});
-		v3_copy(force, (double[]){0.1, -0.2, 1});
-		assert_int_equal(kind->limit(force), SLEW);
-		assert_true(force[0] == 0 && force[1] == 0.5 && force[2] == 0);
-		/* A limit that was made smaller is kept at once. */
-		kind->set_limit(1, 0.1, (double[]){0, 3, 0});
-		v3_copy(force, (double[]){0, 3, 0});
-		assert_int_equal(kind->limit(force), FORCE | SLEW);
-		assert_true(fabs(force[1] - 1) < limit_error(kind) &&
-			    v3_length(force) <= 1);
-	}
+	/* No force at all, or none that changes. */
+	kind->set_limit(0, 1, (double[]){0, 0, 0});
+	assert_int_equal(kind->limit(force), FORCE);
+	assert_true(v3_length(force) == 0);
+	assert_int_equal(kind->limit(force), 0);
+	kind->set_limit(2, 0, (double[]){0, 0.5, 0});
+	v3_copy(force, (double[]){0.1, -0.2, 1});
+	assert_int_equal(kind->limit(force), SLEW);
+	assert_true(force[0] == 0 && force[1] == 0.5 && force[2] == 0);
+	/* A limit that was made smaller is kept at once. */
+	kind->set_limit(1, 0.1, (double[]){0, 3, 0});
+	v3_copy(force, (double[]){0, 3, 0});
+	assert_int_equal(kind->limit(force), FORCE | SLEW);
+	assert_true(fabs(force[1] - 1) < limit_error() && v3_length(force) <= 1);
 }
 
 static double any(uint64_t *seed)
@@ -485,8 +434,7 @@ static void assert_direction(const double asked[3], const double force[3], doubl
 	assert_true(v3_dot(along, force) > 0);
 }
 
-static void try_limit(const struct stage_kind *kind, uint64_t *seed, double force_N,
-		      double slew_N, int met[8])
+static void try_limit(uint64_t *seed, double force_N, double slew_N, int met[8])
 {
 	double last[3] = {0}, wanted[3], rounding_N = 8 * DBL_EPSILON * force_N;
 
@@ -514,22 +462,18 @@ static void try_limit(const struct stage_kind *kind, uint64_t *seed, double forc
 }
 
 /* Never above the limit, whatever is asked and whatever it is. */
-TEST(test_whatever_is_asked)
+TEST_KINDS(test_whatever_is_asked)
 {
-	EACH_KIND(kind)
-	{
-		int met[8] = {0};
-		uint64_t seed = 1;
+	int met[8] = {0};
+	uint64_t seed = 1;
 
-		for (int run = 0; run < 100; run++)
-			try_limit(kind, &seed, kind->number(0.3 + 0.0777 * run),
-				  kind->number(0.01 + 0.0123 * run), met);
-		/*
-		 * Each alone and together, but the size with what is not finite: that asks
-		 * for 0. Integers are finite.
-		 */
-		for (int i = 0; i < 8; i++)
-			assert_true((met[i] > 100) ==
-				    (i < 4 || (kind->is_double && !(i & 1))));
-	}
+	for (int run = 0; run < 100; run++)
+		try_limit(&seed, kind->number(0.3 + 0.0777 * run),
+			  kind->number(0.01 + 0.0123 * run), met);
+	/*
+	 * Each alone and together, but the size with what is not finite: that asks
+	 * for 0. Integers are finite.
+	 */
+	for (int i = 0; i < 8; i++)
+		assert_true((met[i] > 100) == (i < 4 || (kind->is_double && !(i & 1))));
 }
