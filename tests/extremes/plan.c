@@ -339,9 +339,9 @@ static int64_t any_time(const struct chaos *run)
 	case 2:
 		return INT64_MIN;
 	case 3:
-		return run->fed.plan->predict.t_ns; /* as long ago as the last was late */
+		return run->fed.plan->doubles.state.scalpel.t_ns; /* as long ago as the last was late */
 	case 4:
-		return run->fed.plan->predict.arrival_ns;
+		return run->fed.plan->doubles.state.scalpel.arrival_ns;
 	case 5:
 		return t_ns < INT64_MAX ? t_ns + 1 : INT64_MAX;
 	case 6:
@@ -435,7 +435,8 @@ static void any_pose(struct chaos *run, enum mode mode)
 /* To where the last pose is as old as may be. */
 static int64_t step_to_age(struct chaos *run)
 {
-	const struct incise_predict *predict = &run->fed.plan->predict;
+	const struct incise_double_predict *predict =
+		&run->fed.plan->doubles.state.scalpel;
 	int64_t at_ns = predict->t_ns;
 
 	at_ns += at_ns < INT64_MAX - YEAR_NS ? GROUND_AGE_NS - 1 + below(3) : 0;
