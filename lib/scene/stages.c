@@ -338,6 +338,9 @@ int incise_stage_incision(struct incise_plan *plan, struct incise_tick *tick)
 {
 	bool inserts = tick->phase == INCISE_PHASE_INSERTION;
 
+	/* No tool goes into its cuts: there are none to fill up. */
+	if (!plan->inserts)
+		return 0;
 	if (!incise_incision_tick(plan->incision, tick))
 		tick->flags |= INCISE_TICK_FULL;
 	if (inserts && (plan->proxy.began || !plan->opening.in)) {
