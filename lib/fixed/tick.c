@@ -98,8 +98,8 @@ void incise_fixed_plan_begin(const struct incise_fixed_plan *plan,
 	*state = (struct incise_fixed_state){.held = INCISE_TOOL_BLADE};
 	state->wanted = plan->numbers.inserts ? INCISE_TOOL_AUTO : INCISE_TOOL_BLADE;
 	incise_fixed_predict_init(&state->scalpel);
-	incise_fixed_predict_init(&state->handle);
-	incise_fixed_predict_init(&state->tube);
+	incise_fixed_predict_init(&state->ends.handle);
+	incise_fixed_predict_init(&state->ends.tube);
 	for (int i = 0; i < plan->numbers.n_axes; i++)
 		state->place[i] = plan->numbers.axes[i].rest;
 	incise_fixed_surface_restart(plan);

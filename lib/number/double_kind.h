@@ -16,5 +16,5 @@
 #define period int64_t
 #define CUTS
 #define OWNED *
-#define T_INCISION(state) ((state)->incision)
+#define T_PART(state, part) ((state)->part)
 #define T_OWN_SURFACE

@@ -17,7 +17,7 @@
 #define period int32_t /* ns of a ramp */
 #define CUTS INCISE_FIXED_CUTS_MAX
 #define OWNED /* a part of a state that is in it, and not elsewhere */
-#define T_INCISION(state) (&(state)->incision)
+#define T_PART(state, part) (&(state)->part)
 #define T_OWN_SURFACE                    \
 	struct incise_fixed_shape shape; \
 	struct incise_fixed_grid_frame grid;

@@ -15,5 +15,5 @@
 #undef period
 #undef CUTS
 #undef OWNED
-#undef T_INCISION
+#undef T_PART
 #undef T_OWN_SURFACE

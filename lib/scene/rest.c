@@ -50,10 +50,18 @@ static const struct {
 
 #define N(array) ((int)(sizeof(array) / sizeof(*(array))))
 
+/* Parts of a plan that a tick changes, apart from the plan itself. */
+struct parts {
+	struct incise_double_ends ends;
+	struct incise_double_average average;
+};
+
 struct search {
 	struct incise_plan plan; /* at work */
+	struct parts parts;
 	struct incise_tracker_sample fed[INCISE_PLAN_POSES];
 	struct incise_plan rested; /* as before a first tick */
+	struct parts rested_parts;
 	struct incise_touch top;
 	struct incise_surface *plane; /* in place of the surface: it has no end */
 	double along[3];	      /* in it */
@@ -83,6 +91,7 @@ static void set_plans(struct search *s, const struct incise_plan *plan,
 		      const struct incise_rest_trial *trial)
 {
 	struct incise_plan *own = &s->plan;
+	struct incise_double_state *state = &own->doubles.state;
 	int n = 0;
 
 	incise_plan_copy(own, plan, trial->gain * (1 + RESERVE));
@@ -94,6 +103,12 @@ static void set_plans(struct search *s, const struct incise_plan *plan,
 	own->poses.fed = s->fed;
 	own->poses.n_fed = 0;
 	incise_plan_set_numbers(own);
+	if (state->ends)
+		s->parts.ends = *state->ends;
+	if (state->average)
+		s->parts.average = *state->average;
+	state->ends = state->ends ? &s->parts.ends : NULL;
+	state->average = state->average ? &s->parts.average : NULL;
 	for (int i = 0; i < own->n_stages; i++) {
 		/* Only handle and tube ask for the cuts. */
 		if (own->stage[i].run == incise_stage_actuate ||
@@ -106,6 +121,7 @@ static void set_plans(struct search *s, const struct incise_plan *plan,
 	}
 	own->n_stages = n;
 	s->rested = s->plan;
+	s->rested_parts = s->parts;
 }
 
 static void set_loop(struct search *s, const struct incise_plan *plan,
@@ -216,6 +232,7 @@ static void start(struct search *s, struct run *run, double height_mm)
 	*run = (struct run){.device = s->device, .along_mm_s = run->along_mm_s};
 	run->device.position_mm = height_mm;
 	s->plan = s->rested;
+	s->parts = s->rested_parts;
 	for (int k = 1; k <= ticks; k++) {
 		tick(s, run);
 		run->device.position_mm = height_mm;
@@ -301,15 +318,18 @@ static void search(struct search *s, double most_N, int way, struct incise_rest 
 	for (int w = 0; w < N(ways); w++) {
 		struct run air = {.along_mm_s = ways[w].along_mm_s}, run;
 		struct incise_plan plan;
+		struct parts parts;
 
 		if (way >= 0 && w != way)
 			continue;
 		start(s, &air, ways[w].start_mm);
 		plan = s->plan;
+		parts = s->parts;
 		for (int i = LEANS; i > 0; i -= ways[w].every) {
 			run = air;
 			run.lean_N = LEAN_MOST * i / LEANS * most_N;
 			s->plan = plan;
+			s->parts = parts;
 			if (!try(s, &run, w, rest))
 				return;
 		}

@@ -124,7 +124,7 @@ static int32_t *punctured(struct incise_plan *plan)
 /* A plan in double without handle and tube has no cuts. */
 static struct T(incision) * cuts_of(struct incise_plan *plan)
 {
-	return T_INCISION(&OWN(plan)->state);
+	return T_PART(&OWN(plan)->state, incision);
 }
 
 static bool get_cut(struct incise_plan *plan, int i, struct incise_cut *cut)

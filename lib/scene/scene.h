@@ -37,6 +37,11 @@ struct incise_scene {
 	double rate_hz;
 	bool fixed;
 	bool full; /* see incise_scene_set_full() */
+	/*
+	 * For tests of stages alone, and set by them alone: a plan is not checked to be stable, and
+	 * tissue.unloading_N_mm is taken for the steepest slope of its models.
+	 */
+	bool unchecked;
 	struct incise_scene_model cut[INCISE_CUTTING_PHASES];
 	struct incise_surface *surface; /* or NULL: the rig's plane */
 	const char *surface_kind;	/* as the file names it */

@@ -98,12 +98,18 @@ double incise_double_model_force(const struct incise_double_plan *plan, int32_t 
 void incise_double_plan_begin(const struct incise_double_plan *plan,
 			      struct incise_double_state *state)
 {
-	struct incise_double_incision *incision = state->incision;
+	struct incise_double_ends *ends = state->ends;
 
-	*state = (struct incise_double_state){.held = INCISE_TOOL_BLADE,
-					      .incision = incision};
+	*state = (struct incise_double_state){
+		.held = INCISE_TOOL_BLADE,
+		.ends = ends,
+		.average = state->average,
+		.incision = state->incision,
+	};
 	state->wanted = plan->numbers.inserts ? INCISE_TOOL_AUTO : INCISE_TOOL_BLADE;
 	incise_double_predict_init(&state->scalpel);
-	incise_double_predict_init(&state->handle);
-	incise_double_predict_init(&state->tube);
+	if (!ends)
+		return;
+	incise_double_predict_init(&ends->handle);
+	incise_double_predict_init(&ends->tube);
 }

@@ -75,7 +75,7 @@ static enum incise_fixed_pose_answer take_scalpel(const struct T(numbers) * numb
 	 */
 	d_turn(along, state->scalpel.q, numbers->axis);
 	v_add(end, tip, numbers->handle, along);
-	T(predict_add)(&state->handle, &numbers->filter, end, q, t_ns);
+	T(predict_add)(&T_PART(state, ends)->handle, &numbers->filter, end, q, t_ns);
 	return answer;
 }
 
@@ -102,8 +102,8 @@ enum incise_fixed_pose_answer T(plan_pose)(const struct T(plan) * plan,
 		return INCISE_FIXED_POSE_NONE;
 	if (!(pose->tool & INCISE_FIXED_POSE_TUBE))
 		return take_scalpel(numbers, state, pose, t_ns);
-	return add_pose(&state->tube, &numbers->filter, pose->position, pose->quaternion,
-			t_ns);
+	return add_pose(&T_PART(state, ends)->tube, &numbers->filter, pose->position,
+			pose->quaternion, t_ns);
 }
 
 /* --- predict and tool ------------------------------------------------------------------- */
@@ -178,20 +178,23 @@ static bool is_tube_nearer(const struct T(plan) * plan, struct T(state) * state,
 			   const struct T(tick) * tick)
 {
 	const struct T(filter) *filter = &plan->numbers.filter;
+	struct T(ends) *ends = T_PART(state, ends);
 	bool tube_held = state->held == INCISE_TOOL_TUBE, searched = false;
 	/* Of how much a tube that is nearer stays below the scalpel. */
 	wide nearer = w_of(tube_held ? n_neg(NEARER) : NEARER);
 	num end[T(ENDS)][3], velocity[3];
 
 	v_copy(end[T(TIP)], tick->position);
-	T(predict_at)(&state->handle, filter, tick->t_ns, end[T(HANDLE)], velocity);
-	T(predict_at)(&state->tube, filter, tick->t_ns, end[T(TUBE)], velocity);
+	T(predict_at)
+	(&T_PART(state, ends)->handle, filter, tick->t_ns, end[T(HANDLE)], velocity);
+	T(predict_at)
+	(&T_PART(state, ends)->tube, filter, tick->t_ns, end[T(TUBE)], velocity);
 	for (;;) {
 		struct height h[T(ENDS)];
 		wide low, high;
 
 		for (int i = 0; i < T(ENDS); i++)
-			h[i] = height_of(&state->above[i], end[i]);
+			h[i] = height_of(&ends->above[i], end[i]);
 		low = w_min(h[T(TIP)].low, h[T(HANDLE)].low);
 		high = w_min(h[T(TIP)].high, h[T(HANDLE)].high);
 		if (h[T(TUBE)].high + nearer < low)
@@ -199,9 +202,9 @@ static bool is_tube_nearer(const struct T(plan) * plan, struct T(state) * state,
 		if (h[T(TUBE)].low + nearer > high || searched)
 			return tube_held && searched && h[T(TUBE)].low + nearer <= high;
 		for (int i = 0; i < T(ENDS); i++) {
-			state->above[i].known = true;
-			state->above[i].above = T(surface_above)(plan, end[i]);
-			v_copy(state->above[i].end, end[i]);
+			ends->above[i].known = true;
+			ends->above[i].above = T(surface_above)(plan, end[i]);
+			v_copy(ends->above[i].end, end[i]);
 		}
 		searched = true;
 	}
@@ -211,7 +214,7 @@ static bool is_tube_nearer(const struct T(plan) * plan, struct T(state) * state,
 static bool find_tube(const struct T(plan) * plan, struct T(state) * state,
 		      const struct T(tick) * tick)
 {
-	bool tube_stale = is_stale(plan, &state->tube, tick->t_ns);
+	bool tube_stale = is_stale(plan, &T_PART(state, ends)->tube, tick->t_ns);
 	bool stale = is_stale_tick(tick), keeps;
 
 	if (tube_stale)
@@ -266,13 +269,14 @@ void T(stage_tool)(const struct T(plan) * plan, struct T(state) * state,
 	tick->held = state->held;
 	if (state->held == INCISE_TOOL_HANDLE)
 		T(predict_at)
-		(&state->handle, &numbers->filter, tick->t_ns, tick->tool,
-		 state->velocity);
+	(&T_PART(state, ends)->handle, &numbers->filter, tick->t_ns, tick->tool,
+	 state->velocity);
 	if (state->held == INCISE_TOOL_TUBE && numbers->tube) {
 		/* The attitude stays the scalpel's. */
 		T(predict_at)
-		(&state->tube, &numbers->filter, tick->t_ns, tick->tool, state->velocity);
-		tick->age_ns = T(predict_age)(&state->tube, tick->t_ns);
+		(&T_PART(state, ends)->tube, &numbers->filter, tick->t_ns, tick->tool,
+		 state->velocity);
+		tick->age_ns = T(predict_age)(&T_PART(state, ends)->tube, tick->t_ns);
 		tick->flags &= ~(uint32_t)INCISE_TICK_STALE;
 		if (tick->age_ns > numbers->pose_age_ns)
 			tick->flags |= INCISE_TICK_STALE;
@@ -289,9 +293,7 @@ static void begin_contact(struct T(state) * state, int64_t t_ns)
 	v_copy(state->p0, state->proxy.first.point);
 	if (state->held == INCISE_TOOL_BLADE)
 		d_copy(state->side, state->flat);
-	state->average.n = state->average.at = 0;
-	for (int i = 0; i < 3; i++)
-		state->average.sum[i] = state->average.turn[i] = 0;
+	state->averaged = false;
 }
 
 void T(stage_contact)(const struct T(plan) * plan, struct T(state) * state,
@@ -330,27 +332,33 @@ void T(stage_contact)(const struct T(plan) * plan, struct T(state) * state,
 void T(stage_normal)(const struct T(plan) * plan, struct T(state) * state,
 		     struct T(tick) * tick)
 {
-	int32_t n = plan->numbers.average_ticks, at = state->average.at;
-	dir *place = state->average.ring[at];
-	bool turned = at + 1 >= n;
+	struct T(average) *average = T_PART(state, average);
+	int32_t n = plan->numbers.average_ticks;
+	dir *place;
+	bool turned;
 
 	if (n < 2 || tick->phase == INCISE_PHASE_FREE)
 		return;
+	if (!state->averaged)
+		*average = (struct T(average)){0};
+	state->averaged = true;
+	place = average->ring[average->at];
+	turned = average->at + 1 >= n;
 	for (int i = 0; i < 3; i++) {
-		if (state->average.n == n)
-			state->average.sum[i] -= place[i];
+		if (average->n == n)
+			average->sum[i] -= place[i];
 		place[i] = state->sn[i];
-		state->average.sum[i] += place[i];
-		state->average.turn[i] += place[i];
+		average->sum[i] += place[i];
+		average->turn[i] += place[i];
 		if (turned) {
-			state->average.sum[i] = state->average.turn[i];
-			state->average.turn[i] = 0;
+			average->sum[i] = average->turn[i];
+			average->turn[i] = 0;
 		}
 	}
-	state->average.n += state->average.n < n;
-	state->average.at = turned ? 0 : at + 1;
-	d_mean(state->average.last, state->average.sum);
-	d_copy(state->normal, state->average.last);
+	average->n += average->n < n;
+	average->at = turned ? 0 : average->at + 1;
+	d_mean(average->last, average->sum);
+	d_copy(state->normal, average->last);
 	d_copy(tick->normal, state->normal);
 }
 
@@ -359,7 +367,7 @@ void T(stage_incision)(const struct T(plan) * plan, struct T(state) * state,
 		       struct T(tick) * tick)
 {
 	const struct T(incision_setup) *setup = &plan->numbers.incision;
-	struct T(incision) *cuts = T_INCISION(state);
+	struct T(incision) *cuts = T_PART(state, incision);
 	bool inserts = tick->phase == INCISE_PHASE_INSERTION;
 
 	if (!plan->numbers.inserts)
@@ -368,11 +376,10 @@ void T(stage_incision)(const struct T(plan) * plan, struct T(state) * state,
 		T(incision_leave)(cuts);
 	else if (inserts)
 		T(incision_open)
-		(cuts, setup, (enum incise_tool)state->held, tick->proxy, state->flat,
-		 state->depth);
+	(cuts, setup, (enum incise_tool)state->held, tick->proxy, state->flat,
+	 state->depth);
 	else if (!T(incision_cut)(cuts, setup, tick->proxy, state->normal, state->flat,
-				  state->depth))
-		tick->flags |= INCISE_TICK_FULL;
+				  state->depth)) tick->flags |= INCISE_TICK_FULL;
 	if (inserts && (state->proxy.began || !state->opening.in)) {
 		state->opening = cuts->met;
 		state->tightness = T(incision_tightness)(setup, &state->opening,

@@ -276,12 +276,25 @@ struct T(above) {
 
 enum { T(TIP), T(HANDLE), T(TUBE), T(ENDS) };
 
+/* With stage tool: the other ends than the blade's tip. */
+struct T(ends) {
+	struct T(predict) handle, tube;
+	struct T(above) above[T(ENDS)]; /* with a tube's station */
+};
+
+/* With stage normal. */
+struct T(average) {
+	int32_t n, at;
+	dir ring[T_AVERAGE_MAX][3];
+	wide sum[3], turn[3]; /* turn: of those since at was 0 */
+	dir last[3];
+};
+
 /* The state of a plan between ticks. Set by T(plan_begin)(). */
 struct T(state) {
-	struct T(predict) scalpel, handle, tube;
-	struct T(above) above[T(ENDS)]; /* with a tube's station */
-	int64_t last_ns;		/* of the last tick; 0: none */
-	wide gain;			/* of start, Q30 */
+	struct T(predict) scalpel;
+	int64_t last_ns; /* of the last tick; 0: none */
+	wide gain;	 /* of start, Q30 */
 	int32_t released, fading, changing;
 	int32_t wanted, held, tube_nearer;
 	struct T(proxy) proxy;
@@ -296,12 +309,7 @@ struct T(state) {
 	int32_t skin_open;  /* it came into a cut that was there */
 	dir side[3];	    /* of the blade when its contact began: Sx(0) */
 	dir flat[3];	    /* of blade and handle now */
-	struct {
-		int32_t n, at;
-		dir ring[T_AVERAGE_MAX][3];
-		wide sum[3], turn[3]; /* turn: of those since at was 0 */
-		dir last[3];
-	} average;
+	int32_t averaged;   /* the average has begun in this contact */
 	struct T(front) front;
 	struct T(opening) opening; /* that handle or tube went into … */
 	num tightness;		   /* … and how tight it was */
@@ -314,6 +322,8 @@ struct T(state) {
 	num force[3];	       /* of the tissue, before limits */
 	num last[3];	       /* what was rendered */
 	num place[T_AXES_MAX]; /* of the handle along each axis, from its origin */
+	struct T(ends) OWNED ends;
+	struct T(average) OWNED average;
 	struct T(incision) OWNED incision;
 };
 

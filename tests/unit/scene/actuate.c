@@ -93,7 +93,7 @@ TEST(test_the_nut_goes_where_its_spring_gives_the_force)
 
 		reported.status.handle_mm = cases[i].handle_mm;
 		reported.status.force_N = 0.25;
-		memcpy(plan.limit.last_N, cases[i].force_N, sizeof(plan.limit.last_N));
+		memcpy(plan.last_N, cases[i].force_N, sizeof(plan.last_N));
 		assert_int_equal(incise_stage_actuate(&plan, &tick), 0);
 		/* Sums and quotients of small decimals: some ulp of 20. */
 		if (!(fabs(reported.target_mm - cases[i].target_mm) < 1e-14) ||
@@ -129,7 +129,7 @@ TEST(test_the_pose_says_where_the_handle_is)
 
 	plan.axes.axis[0].info.measures_handle = false;
 	plan.axes.axis[0].info.origin_mm = 10;
-	plan.limit.last_N[2] = 1;
+	plan.last_N[2] = 1;
 	reported.status.handle_mm = reported.status.force_N = NAN;
 	for (size_t i = 0; i < sizeof(ticks) / sizeof(*ticks); i++) {
 		struct incise_tick tick = {.flags = ticks[i].flags};
@@ -198,7 +198,7 @@ TEST(test_an_actuator_that_lies_or_fails)
 
 	/* Without a number the handle is where it was. */
 	plan.axes.axis[0].handle_mm = 7;
-	plan.limit.last_N[2] = 1;
+	plan.last_N[2] = 1;
 	reported.status.handle_mm = NAN;
 	reported.status.force_N = INFINITY;
 	assert_int_equal(incise_stage_actuate(&plan, &tick), 0);
@@ -326,7 +326,7 @@ TEST(test_forces_are_the_least_squares_solution)
 			force_N[i] = 4 * some(&seed) / sqrt(3);
 			v[i] = 100 * some(&seed);
 		}
-		v3_copy(plan.limit.last_N, force_N);
+		v3_copy(plan.last_N, force_N);
 		assert_int_equal(incise_stage_actuate(&plan, &tick), 0);
 		least_squares(n, direction, force_N, f);
 		for (int i = 0; i < n; i++) {
@@ -397,16 +397,17 @@ TEST(test_a_fault_of_one_is_the_end_of_all)
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
 		struct reported reported[2], *failing = &reported[cases[i].which];
-		struct incise_stage actuate = {
-			.name = "actuate", .always = true, .run = incise_stage_actuate};
+		struct incise_stage actuate = {.name = "actuate",
+					       .run = incise_stage_actuate};
 		struct incise_plan plan;
 		struct incise_tick tick;
 		int want = cases[i].status_rc + cases[i].set_rc;
 		char text[200];
 
 		put_axes(&plan, reported, 2, frame);
+		plan.ops = incise_double_ops;
 		plan.stage[plan.n_stages++] = actuate;
-		plan.limit.last_N[1] = plan.limit.last_N[2] = 2;
+		plan.last_N[1] = plan.last_N[2] = 2;
 		assert_int_equal(incise_plan_tick(&plan, 1, &tick), 0);
 		assert_true(reported[0].target_mm == 11 && reported[1].target_mm == 11);
 		reported[0].sets = reported[1].sets = 0;
