@@ -85,7 +85,7 @@ static void T(set_average)(int ticks)
 {
 	memset(&T(tried), 0, sizeof(T(tried)));
 	T(tried).plan.numbers.average_ticks = ticks;
-	SET_PLANE(&T(tried).plan);
+	SET_PLANE(&T(tried));
 }
 
 static void T(average)(const double normal[3], double averaged[3])

@@ -80,14 +80,16 @@ static inline int64_t stage_integer(double x, int bits, int64_t most)
 
 #include "../../../lib/number/double_kind.h"
 #define FILTER_GOOD(filter) ((void)(filter), true)
-#define SET_PLANE(plan)                                                           \
+#define SET_PLANE(tried)                                                          \
 	do {                                                                      \
 		static const struct incise_surface plane = {                      \
 			.kind = INCISE_SURFACE_PLANE, .plane = {{0}, {0, 0, 1}}}; \
+		static struct incise_double_average average;                      \
 		static struct incise_proxy proxy;                                 \
                                                                                   \
 		incise_proxy_init(&proxy, &plane, 0.2);                           \
-		(plan)->proxy = &proxy;                                           \
+		(tried)->plan.proxy = &proxy;                                     \
+		(tried)->state.average = &average;                                \
 	} while (0)
 #include "stage_kind.h"
 #undef FILTER_GOOD
@@ -96,9 +98,9 @@ static inline int64_t stage_integer(double x, int bits, int64_t most)
 
 #include "../../../lib/number/fixed_kind.h"
 #define FILTER_GOOD incise_fixed_filter_good
-#define SET_PLANE(plan)                                       \
-	((plan)->numbers.shape.normal[2] = INCISE_FIXED_UNIT, \
-	 (plan)->numbers.leave = 13107)
+#define SET_PLANE(tried)                                            \
+	((tried)->plan.numbers.shape.normal[2] = INCISE_FIXED_UNIT, \
+	 (tried)->plan.numbers.leave = 13107)
 #include "stage_kind.h"
 #undef FILTER_GOOD
 #undef SET_PLANE
