@@ -76,9 +76,9 @@ static bool is_surface(const struct incise_fixed_numbers *numbers)
 
 static bool is_membrane(const struct incise_fixed_membrane *membrane)
 {
-	if (!membrane->stiffness)
+	if (!membrane->thickness)
 		return true;
-	return membrane->stiffness > 0 && all_in_range(membrane->point, 3, PLACE_MAX) &&
+	return membrane->stiffness >= 0 && all_in_range(membrane->point, 3, PLACE_MAX) &&
 	       incise_fx_is_unit(membrane->normal, 3) &&
 	       in_range(membrane->radius, 0, LENGTH_MAX) &&
 	       in_range(membrane->thickness, 1, LENGTH_MAX) &&

@@ -258,9 +258,9 @@ static inline bool v_shorten(wide v[3], num most)
 
 #define W_ONE 1.0
 
-static inline wide w_ramp(int64_t dt_ns, int64_t whole_ns)
+static inline wide w_ramp(int64_t dt_ns, double whole_ns)
 {
-	return whole_ns ? (double)dt_ns / (double)whole_ns : W_ONE;
+	return whole_ns > 0 ? (double)dt_ns / whole_ns : W_ONE;
 }
 
 static inline num w_scale(wide share, num a)

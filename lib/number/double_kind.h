@@ -13,7 +13,7 @@
 #define wide double
 #define stored float
 #define span double
-#define period int64_t
+#define period double
 #define CUTS
 #define OWNED *
 #define T_PART(state, part) ((state)->part)

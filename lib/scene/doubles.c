@@ -98,8 +98,8 @@ void incise_plan_set_numbers(struct incise_plan *plan)
 				.tube = scene->tool.tube_mm,
 			},
 		.small = scene->limits.start_N,
-		.ramp_ns = llrint(scene->limits.ramp_ms * 1e6),
-		.fade_ns = llrint(scene->limits.fade_ms * 1e6),
+		.ramp_ns = scene->limits.ramp_ms * 1e6,
+		.fade_ns = scene->limits.fade_ms * 1e6,
 		.force = scene->limits.force_N,
 		.slew = scene->limits.slew_N_s / scene->rate_hz,
 	};

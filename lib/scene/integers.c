@@ -229,10 +229,10 @@ int incise_integers_numbers(const struct incise_plan *plan,
 		.printed = from.printed,
 		.incision.cuts_most = from.incision.cuts_most,
 		.inputs = inputs_of(plan->doubles.plan.inputs[INCISE_CUT]),
-		.ramp_ns = to_integer(&c, "limits.ramp_ms", (double)from.ramp_ns * 1e-9,
-				      1e9, 2.1),
-		.fade_ns = to_integer(&c, "limits.fade_ms", (double)from.fade_ns * 1e-9,
-				      1e9, 2.1),
+		.ramp_ns =
+			to_integer(&c, "limits.ramp_ms", from.ramp_ns * 1e-9, 1e9, 2.1),
+		.fade_ns =
+			to_integer(&c, "limits.fade_ms", from.fade_ns * 1e-9, 1e9, 2.1),
 	};
 	convert(&c, &from, numbers);
 	check_tracker(&c, &numbers->filter);
@@ -241,9 +241,10 @@ int incise_integers_numbers(const struct incise_plan *plan,
 	direction(numbers->side, from.side);
 	direction(numbers->up, from.up);
 	direction(numbers->membrane.normal,
-		  from.membrane.stiffness > 0 ? from.membrane.normal : top);
+		  from.membrane.thickness > 0 ? from.membrane.normal : top);
 	set_shape(&c, &numbers->shape);
-	if (!c.rc && !incise_fixed_numbers_good(numbers))
+	if (!c.rc && (!incise_fixed_numbers_good(numbers) ||
+		      (from.membrane.thickness > 0 && !numbers->membrane.thickness)))
 		c.rc = incise_error_set(
 			err, ERANGE,
 			"%s: the combination of its numbers exceeds integers; set "

@@ -436,7 +436,7 @@ void T(stage_membrane)(const struct T(plan) * plan, struct T(state) * state,
 	const struct T(membrane) *membrane = &plan->numbers.membrane;
 	num off[3], beyond;
 
-	if (!n_below(0, membrane->stiffness) || is_stale_tick(tick))
+	if (!n_below(0, membrane->thickness) || is_stale_tick(tick))
 		return;
 	v_sub(off, tick->tool, membrane->point);
 	beyond = n_neg(v_along(off, membrane->normal));

@@ -179,7 +179,7 @@ num T(incision_tightness)(const struct T(incision_setup) * setup,
 
 /* --- tick.proto.c ------------------------------------------------------------------------- */
 
-/* A membrane over an airway; stiffness 0: there is none. */
+/* A membrane over an airway; thickness 0: there is none. */
 struct T(membrane) {
 	num point[3];
 	dir normal[3];
