@@ -114,12 +114,12 @@ static void T(touch)(double height_mm, double averaged[3])
 /* --- start and limit --- */
 
 /* It begins at half the force, or before a small one. */
-static void T(set_start)(int64_t ramp_ns, int64_t fade_ns, bool half, int64_t last_ns)
+static void T(set_start)(double ramp_ns, double fade_ns, bool half, int64_t last_ns)
 {
 	memset(&T(tried), 0, sizeof(T(tried)));
 	SET(T(tried).plan.numbers.small, 0.1, 16);
-	T(tried).plan.numbers.ramp_ns = (period)ramp_ns;
-	T(tried).plan.numbers.fade_ns = (period)fade_ns;
+	SET(T(tried).plan.numbers.ramp_ns, ramp_ns, 0);
+	SET(T(tried).plan.numbers.fade_ns, fade_ns, 0);
 	SET(T(tried).state.gain, half ? 0.5 : 0, 30);
 	T(tried).state.released = half;
 	T(tried).state.last_ns = last_ns;

@@ -45,7 +45,7 @@ struct kind {
 	void (*average)(const double normal[3], double averaged[3]);
 	void (*touch)(double height_mm, double averaged[3]);
 
-	void (*set_start)(int64_t ramp_ns, int64_t fade_ns, bool half, int64_t last_ns);
+	void (*set_start)(double ramp_ns, double fade_ns, bool half, int64_t last_ns);
 	double (*start)(double wanted_N, enum poses poses, int64_t t_ns, bool *released,
 			double *command_N);
 

@@ -225,7 +225,8 @@ TEST_KINDS(test_course)
 TEST_KINDS(test_times)
 {
 	static const struct {
-		int64_t ramp_ns, fade_ns, last_ns, t_ns;
+		double ramp_ns, fade_ns;
+		int64_t last_ns, t_ns;
 		double risen, faded;
 	} cases[] = {
 		{500 * MS, 50 * MS, 1, 1 + MS, 0.502, 0.48},
@@ -241,9 +242,13 @@ TEST_KINDS(test_times)
 		 0.5 - 1e6 / INT32_MAX},
 		{INT32_MAX, INT32_MAX, INT64_MIN, INT64_MAX, 0.6, 0},
 		{0, 0, 1, 2, 0.6, 0},
+		/* Integers, which are checked, have none of these. */
+		{INFINITY, INFINITY, 1, 1 + MS, 0.5, 0.5},
+		{-1, -1, 1, 1 + MS, 0.6, 0},
+		{NAN, NAN, 1, 1 + MS, 0.6, 0},
 	};
 
-	for (size_t i = 0; i < CASES(cases); i++) {
+	for (size_t i = 0; i < CASES(cases) - (kind->is_double ? 0 : 3); i++) {
 		for (int poses = FRESH; poses <= CHANGING; poses++) {
 			double want = poses == FRESH ? cases[i].risen : cases[i].faded;
 			double command_N, gain;
