@@ -327,9 +327,27 @@ static void count(struct chaos *run, int64_t was_ns)
 		run->met[m] += is[m];
 }
 
+/* The scalpel's last pose: when it was acquired, and when it came. */
+struct last {
+	int64_t t_ns, arrival_ns;
+	bool started;
+};
+
+static struct last last_pose(const struct incise_plan *plan)
+{
+	const struct incise_double_predict *p = &plan->doubles.state.scalpel;
+	const struct incise_fixed_predict *f;
+
+	if (!plan->integers)
+		return (struct last){p->t_ns, p->arrival_ns, p->started};
+	f = &plan->integers->state.scalpel;
+	return (struct last){f->t_ns, f->arrival_ns, f->started};
+}
+
 static int64_t any_time(const struct chaos *run)
 {
 	int64_t t_ns = run->fed.t_ns;
+	struct last last = last_pose(run->fed.plan);
 
 	switch (below(40)) {
 	case 0:
@@ -339,9 +357,9 @@ static int64_t any_time(const struct chaos *run)
 	case 2:
 		return INT64_MIN;
 	case 3:
-		return run->fed.plan->doubles.state.scalpel.t_ns; /* as long ago as the last was late */
+		return last.t_ns; /* as long ago as the last was late */
 	case 4:
-		return run->fed.plan->doubles.state.scalpel.arrival_ns;
+		return last.arrival_ns;
 	case 5:
 		return t_ns < INT64_MAX ? t_ns + 1 : INT64_MAX;
 	case 6:
@@ -435,12 +453,11 @@ static void any_pose(struct chaos *run, enum mode mode)
 /* To where the last pose is as old as may be. */
 static int64_t step_to_age(struct chaos *run)
 {
-	const struct incise_double_predict *predict =
-		&run->fed.plan->doubles.state.scalpel;
-	int64_t at_ns = predict->t_ns;
+	struct last last = last_pose(run->fed.plan);
+	int64_t at_ns = last.t_ns;
 
 	at_ns += at_ns < INT64_MAX - YEAR_NS ? GROUND_AGE_NS - 1 + below(3) : 0;
-	if (!predict->started || at_ns <= run->fed.t_ns)
+	if (!last.started || at_ns <= run->fed.t_ns)
 		return 0;
 	run->met[MET_AT_AGE]++;
 	return at_ns - run->fed.t_ns;

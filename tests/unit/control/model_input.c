@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Inputs of a model: acceleration, tilt and time in tissue against what they are by definition.
+ * Inputs of a model: names, tilt by a quaternion, the stay in tissue, and the acceleration that the filter
+ * finds. Those of a tick are in ../tissue/input.c.
  */
 #include "../unit.h"
 #include <incise/clock.h>
@@ -14,24 +15,6 @@ TEST(names_are_found)
 			incise_model_input_find(incise_model_input_kinds[i].name), i);
 	assert_int_equal(incise_model_input_find("depth"), -1);
 	assert_int_equal(incise_model_input_find(""), -1);
-}
-
-/* d|v|/dt of a motion; below 5 mm/s less, without a leap. */
-TEST(acceleration_is_that_of_the_speed)
-{
-	double last = 0;
-
-	for (int k = -2000; k <= 2000; k++) {
-		double v[] = {0.005 * k, 0, 0}, a[] = {300, 50, 0};
-		double found = incise_double_input_acceleration(v, a);
-
-		if (k <= -1000 || k >= 1000)
-			assert_true(fabs(found - (k < 0 ? -300 : 300)) < 1e-9);
-		assert_true(k == -2000 || fabs(found - last) < 0.31);
-		last = found;
-	}
-	assert_true(incise_double_input_acceleration((double[]){3, 4, 0},
-					      (double[]){4, -3, 9}) == 0);
 }
 
 TEST(tilt_is_the_angle)

@@ -95,9 +95,10 @@ static void constant_velocity_add(struct constant_velocity *c, double t, double 
 /* The filter without the blend. */
 static double bare(const struct incise_predict *p, int64_t t_ns)
 {
-	double dt = (double)(t_ns - p->t_ns) * S;
+	const struct incise_double_predict *now = &p->now;
+	double dt = (double)(t_ns - now->t_ns) * S;
 
-	return p->x[0] + p->v[0] * dt + p->a[0] * dt * dt / 2;
+	return now->x[0] + now->v[0] * dt + now->a[0] * dt * dt / 2;
 }
 
 /* The result of a run at 1 kHz; errors rms, steps largest in one tick. */
@@ -161,8 +162,9 @@ static struct result run(int rate)
 					     fabs(without - last_bare - moved) / truth);
 			sum.step = fmax(sum.step,
 					fabs(pose.x[0] - last_shown - moved) / truth);
-			sum.blend_step = fmax(sum.blend_step, fabs(p.x_shown[0]) * 1e-3 /
-								      p.period_s / truth);
+			sum.blend_step =
+				fmax(sum.blend_step,
+				     fabs(p.now.x_shown[0]) * 1e-3 / p.period_s / truth);
 			count++;
 		}
 		last_shown = pose.x[0];
@@ -241,7 +243,7 @@ TEST(test_velocity_from_quantised_position)
 			incise_predict_add(&p, &s);
 			if (tick > 1000) {
 				/* Nothing is looked at later than the sample: no lag. */
-				filtered += pow(p.v[0] - v, 2);
+				filtered += pow(p.now.v[0] - v, 2);
 				difference +=
 					pow((s.position_mm[0] - last) / 1e-3 - v, 2);
 				speed += v * v;
