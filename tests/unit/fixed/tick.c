@@ -175,7 +175,7 @@ TEST(test_insertion, begin)
 		any_unit(tick_state.opening.along, along);
 		tick_state.held = k % 3 ? INCISE_TOOL_HANDLE : INCISE_TOOL_TUBE;
 		tick_state.opening.in = k & 1;
-		tick_state.opening.depth = fixed(any(0, 20));
+		tick_state.opening.depth_mm = fixed(any(0, 20));
 		tick_state.tightness = fixed(any(0, 1));
 		tick_state.depth = fixed(any(0, 30));
 		tight = tick_state.tightness / ONE;
@@ -184,7 +184,7 @@ TEST(test_insertion, begin)
 						   ? 1
 						   : fabs(dot(flat, along)));
 		depth = tick_state.depth / ONE;
-		cut = tick_state.opening.in ? fmin(depth, tick_state.opening.depth / ONE)
+		cut = tick_state.opening.in ? fmin(depth, tick_state.opening.depth_mm / ONE)
 					    : 0;
 		effect(got, &plan, incise_fixed_stage_insertion, &tick);
 		for (int i = 0; i < 3; i++)
