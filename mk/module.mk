@@ -23,7 +23,7 @@ module_headers:
 module: module_headers ## incise_stepper.ko for the running kernel, or for KDIR=DIR
 	@mkdir -p $(module_dir)/lib
 	@cp -rsf $(abspath driver) $(module_dir)/
-	@cp -rsf $(abspath lib/fixed) $(abspath lib/include) $(module_dir)/lib/
+	@cp -rsf $(abspath $(addprefix lib/,fixed include number tissue)) $(module_dir)/lib/
 	@find $(module_dir) -xtype l -delete
 	$(module_make) modules
 
@@ -49,7 +49,8 @@ srcdir ?= $(prefix)/src
 dkms_dir = $(srcdir)/incise-$(version)
 dkms_sources = $(addprefix driver/,Kbuild Makefile compat/probe) \
 	$(filter-out %.mod.c,$(wildcard $(addprefix driver/,*.[ch] uapi/*.h compat/*.c))) \
-	$(wildcard driver/source/*) $(wildcard lib/fixed/*.[ch]) \
+	$(wildcard driver/source/*) $(wildcard lib/fixed/*.[ch] lib/tissue/*.proto.[ch]) \
+	$(addprefix lib/number/,fixed.h fixed_kind.h no_kind.h) \
 	$(shell grep -l __KERNEL__ lib/include/incise/*.h) \
 	$(addprefix lib/include/incise/,export.h stepper_state.h tick_flags.h tool.h)
 dkms_folders = $(patsubst %/,%,$(sort $(dir $(dkms_sources))))

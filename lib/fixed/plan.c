@@ -94,7 +94,9 @@ static bool is_tissue(const struct incise_fixed_numbers *numbers)
 	       in_range(numbers->friction, 0, ONE) && numbers->plane >= 0 &&
 	       numbers->damping >= 0 && numbers->insertion >= 0 &&
 	       in_range(numbers->aligned, 0, ONE) && in_range(numbers->printed, 0, 1) &&
-	       numbers->spread >= 0 && incise_fixed_incision_good(&numbers->incision) &&
+	       numbers->spread >= 0 && numbers->skin >= 0 &&
+	       numbers->skin_friction >= 0 &&
+	       incise_fixed_incision_good(&numbers->incision) &&
 	       is_membrane(&numbers->membrane);
 }
 
@@ -139,7 +141,7 @@ bool incise_fixed_numbers_good(const struct incise_fixed_numbers *numbers)
 	    !in_range(numbers->n_axes, 0, INCISE_FIXED_AXES_MAX) ||
 	    !incise_fixed_filter_good(&numbers->filter) || !is_scalpel(numbers) ||
 	    !is_surface(numbers) || !is_tissue(numbers) || !are_limits(numbers) ||
-	    count_inputs(numbers->inputs) < 0 ||
+	    count_inputs(numbers->inputs) < 0 || numbers->phases ||
 	    !are_zero(numbers->reserved,
 		      sizeof(numbers->reserved) / sizeof(*numbers->reserved)))
 		return false;

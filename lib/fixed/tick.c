@@ -147,11 +147,10 @@ void incise_fixed_plan_tick(const struct incise_fixed_plan *plan,
 	incise_fixed_stage_normal(plan, state, tick);
 	incise_fixed_stage_incision(plan, state, tick);
 	incise_fixed_stage_membrane(plan, state, tick);
-	incise_fixed_stage_reaction(plan, state, tick);
-	incise_fixed_stage_plane(plan, state, tick);
-	incise_fixed_stage_damping(plan, state, tick);
-	incise_fixed_stage_insertion(plan, state, tick);
-	incise_fixed_stage_spread(plan, state, tick);
+#define FORCE(row, name, ...) incise_fixed_stage_##name(plan, state, tick);
+#define NUMBER(...)
+#define MORE(member)
+#include "../tissue/forces.def"
 	incise_fixed_stage_start(plan, state, tick);
 	incise_fixed_stage_limit(plan, state, tick);
 	for (int i = 0; i < plan->numbers.n_axes; i++)

@@ -195,17 +195,34 @@ static double tissue_N(const struct incise_plan *plan, const struct state_error 
 	return bound_N + ROUNDINGS * LSB_MM / 2;
 }
 
+/* Ticks of a contact in which the skin's anchor is rounded: an hour at 1 kHz. */
+#define ANCHOR_TICKS 3.6e6
+
+/* The skin drags by the force along the normal, and by where its anchor is. */
+static double skin_N(const struct incise_plan *plan, const struct state_error *e,
+		     double normal_N)
+{
+	const double *skin = plan->acting[INCISE_FORCE_SKIN].number;
+
+	if (!(skin[0] > 0))
+		return 0;
+	return skin[1] * normal_N +
+	       skin[0] * (4 * e->x + 8 * LSB_MM + ldexp(ANCHOR_TICKS, -33));
+}
+
 double incise_plan_bound(const struct incise_plan *plan, double reach_mm)
 {
 	const struct incise_plan_stability *s = &plan->stability;
-	double plane_N_mm = plan->acting[INCISE_FORCE_PLANE].number[0];
+	double plane_N_mm = plan->acting[INCISE_FORCE_PLANE].number[0], bound_N;
 	struct state_error e;
 
 	if (!plan->scene->fixed)
 		return 0;
 	e = shown(plan);
-	return tissue_N(plan, &e, reach_mm) +
-	       s->stiffness_N_mm * (PLACES * (e.x + 4 * LSB_MM) + ldexp(reach_mm, -26)) +
-	       plane_N_mm * e.x / ENTERS + s->damping_N_s_mm * e.v +
-	       ldexp(SPEED_MM_S, -29);
+	bound_N =
+		tissue_N(plan, &e, reach_mm) +
+		s->stiffness_N_mm * (PLACES * (e.x + 4 * LSB_MM) + ldexp(reach_mm, -26)) +
+		plane_N_mm * e.x / ENTERS + s->damping_N_s_mm * e.v +
+		ldexp(SPEED_MM_S, -29);
+	return bound_N + skin_N(plan, &e, bound_N);
 }

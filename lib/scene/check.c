@@ -485,11 +485,14 @@ static void add_up(struct incise_plan *plan, double model_N_mm)
 	bool both = K > 0 && is_aslant(plan);
 
 	for (int phase = 0; phase < 3; phase++) {
-		double sum[INCISE_FRICTION + 1] = {0};
+		double sum[INCISE_FORCE_KINDS] = {0};
 
 		for (int i = 0; i < incise_n_tissue_forces; i++) {
 			const struct incise_acting_force *own = &plan->acting[i];
-			bool model = own->force->model && (plan->model || plan->fixed);
+			bool model =
+				own->force ==
+					&incise_tissue_forces[INCISE_FORCE_REACTION] &&
+				(plan->model || plan->fixed);
 
 			if (own->force->phases >> phase & 1)
 				sum[own->force->kind] +=

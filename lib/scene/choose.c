@@ -32,7 +32,8 @@ static const char *no_normal(const struct incise_plan *plan)
 static const char *no_force(const struct incise_plan *plan,
 			    const struct incise_acting_force *own)
 {
-	if (own->force->model && (plan->model || plan->fixed))
+	if (own->force == &incise_tissue_forces[INCISE_FORCE_REACTION] &&
+	    (plan->model || plan->fixed))
 		return zero(plan, NULL);
 	return own->number[0] > 0 ? NULL : zero(plan, own->force->zero);
 }

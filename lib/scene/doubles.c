@@ -11,19 +11,17 @@
 static void set_reaction(const struct incise_plan *plan,
 			 struct incise_double_numbers *numbers)
 {
-	const double *reaction = plan->acting[INCISE_FORCE_REACTION].number;
+	bool model = plan->model || plan->fixed, front = model && plan->dissipates;
 
-	if (!plan->model && !plan->fixed) {
-		numbers->reaction = reaction[0];
+	numbers->unloading = front ? plan->unloading_N_mm : 0;
+	if (!front)
+		numbers->friction = 0;
+	if (!model)
 		return;
-	}
+	numbers->reaction = 0;
 	numbers->gain = plan->gain;
 	numbers->support = plan->support_mm;
 	numbers->beyond = plan->beyond_N_mm;
-	if (!plan->dissipates)
-		return;
-	numbers->unloading = plan->unloading_N_mm;
-	numbers->friction = reaction[INCISE_REACTION_FRICTION];
 }
 
 static void set_membrane(const struct incise_plan *plan,
@@ -69,7 +67,6 @@ static void set_model(const struct incise_plan *plan, struct incise_double_plan 
 void incise_plan_set_numbers(struct incise_plan *plan)
 {
 	const struct incise_scene *scene = plan->scene;
-	const struct incise_acting_force *acting = plan->acting;
 	struct incise_double_plan *to = &plan->doubles.plan;
 	struct incise_double_numbers *numbers = &to->numbers;
 	const struct incise_double_numbers before = *numbers;
@@ -82,12 +79,7 @@ void incise_plan_set_numbers(struct incise_plan *plan)
 		.tube = plan->inserts && plan->poses.tube_station,
 		.leave = scene->tissue.leave_mm,
 		.average_ticks = plan->average_ticks,
-		.plane = acting[INCISE_FORCE_PLANE].number[0],
-		.damping = acting[INCISE_FORCE_DAMPING].number[0],
-		.insertion = acting[INCISE_FORCE_INSERTION].number[0],
-		.aligned = acting[INCISE_FORCE_INSERTION].number[1],
 		.printed = scene->tissue.printed_orientation,
-		.spread = acting[INCISE_FORCE_SPREAD].number[0],
 		.incision =
 			{
 				.cuts_most = scene->tissue.cuts_most,
@@ -108,6 +100,11 @@ void incise_plan_set_numbers(struct incise_plan *plan)
 	v3_copy(numbers->axis, scene->tool.axis);
 	v3_copy(numbers->side, scene->tool.side);
 	v3_copy(numbers->up, plan->up);
+#define FORCE(...)
+#define NUMBER(row, i, member, ...) \
+	numbers->member = plan->acting[INCISE_FORCE_##row].number[i];
+#define MORE(member)
+#include "../tissue/forces.def"
 	set_reaction(plan, numbers);
 	set_membrane(plan, &numbers->membrane);
 	set_model(plan, to);

@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The forces of a scene's tissue, a row each. Reading a scene, choosing and running stages,
- * the gain, the stability check, and the fixed-point bound walk these
- * rows, so a new force is a row and its function in forces.c, its test, and its text in
- * incise-scene(5) and incise-haptic(1), which a test compares with the rows.
+ * The forces of a scene's tissue, a row each, of ../tissue/forces.def. Reading a scene, choosing and
+ * running stages, the gain, the stability check, the conversion to integers and the manual walk these rows.
  */
 #ifndef INCISE_FORCES_H
 #define INCISE_FORCES_H
@@ -21,16 +19,19 @@ enum incise_force_kind {
 	INCISE_SPRING_ACROSS, /* N/mm across the normal, every direction */
 	INCISE_SPRING_SIDE, /* N/mm along one direction, which may be either of the two */
 	INCISE_DAMPER,	    /* N s/mm against the velocity */
-	INCISE_FRICTION,    /* N against the motion */
+	INCISE_FORCE_KINDS
 };
 
 /* The rows, in the order in which they run. */
 enum incise_tissue_row {
-	INCISE_FORCE_REACTION,
-	INCISE_FORCE_PLANE,
-	INCISE_FORCE_DAMPING,
-	INCISE_FORCE_INSERTION,
-	INCISE_FORCE_SPREAD,
+#define FORCE(row, ...) INCISE_FORCE_##row,
+#define NUMBER(...)
+#define MORE(member)
+#include "../tissue/forces.def"
+#undef FORCE
+#undef NUMBER
+#undef MORE
+	INCISE_FORCES
 };
 
 /* Numbers of the reaction besides its stiffness: with a model. */
@@ -73,10 +74,10 @@ struct incise_tissue_force {
 	const char *name;    /* of its stage */
 	unsigned int phases; /* bits 1 << enum incise_phase */
 	enum incise_force_kind kind;
-	/* The stage is left out where the first number is 0, for the reason @zero. */
 	struct incise_force_number number[INCISE_FORCE_NUMBERS];
+	/* The stage is left out where this number is 0, for the reason @zero. */
+	int acts;
 	const char *zero;
-	bool model; /* one takes the place of the first number */
 	struct incise_stage_pair stage;
 };
 

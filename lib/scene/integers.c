@@ -13,9 +13,10 @@
 #include "integers.h"
 #include "plan.h"
 
-#define ONE 65536.0	     /* Q16.16 */
-#define UNIT 1073741824.0    /* Q2.30 */
-#define DAMPING 268435456.0  /* Q28 */
+#define ONE 65536.0 /* Q16.16 */
+#define Q16 ONE
+#define UNIT 1073741824.0 /* Q2.30 */
+#define Q28 268435456.0
 #define LARGEST 2147483647.0 /* of 32 bits */
 
 /* Below this depth the direction from tool to proxy is rounding: see stages.c. */
@@ -108,7 +109,7 @@ struct quantity {
 #define AT(member)                                      \
 	offsetof(struct incise_double_numbers, member), \
 		offsetof(struct incise_fixed_numbers, member)
-#define NUMBER(member, name)                    \
+#define PLAIN(member, name)                     \
 	{                                       \
 		name, AT(member), 1, ONE, 32767 \
 	}
@@ -132,28 +133,25 @@ static const struct quantity quantities[] = {
 	{"the calibration's tip_mm", AT(tip), 3, ONE, 4096},
 	LENGTH(handle, "tool.handle_mm"),
 	LENGTH(leave, "tissue.leave_mm"),
-	NUMBER(reaction, "tissue.reaction_N_mm"),
-	NUMBER(gain, "tissue.gain"),
-	NUMBER(support, "the model's depth"),
-	NUMBER(beyond, "the model's slope"),
-	NUMBER(unloading, "the unloading"),
-	NUMBER(friction, "tissue.friction"),
-	NUMBER(plane, "tissue.plane_N_mm"),
-	{"tissue.damping_N_s_mm", AT(damping), 1, DAMPING, 7.99},
-	NUMBER(insertion, "tissue.insertion_N_mm"),
-	NUMBER(aligned, "tissue.aligned"),
-	NUMBER(spread, "tissue.spread_N_mm"),
+	PLAIN(gain, "tissue.gain"),
+	PLAIN(support, "the model's depth"),
+	PLAIN(beyond, "the model's slope"),
 	EXTENT(incision.cut_from, "tissue.cut_from_mm"),
 	EXTENT(incision.stretch, "tissue.stretch_mm"),
 	EXTENT(incision.handle_width, "tool.handle_width_mm"),
 	EXTENT(incision.handle_thickness, "tool.handle_thickness_mm"),
 	EXTENT(incision.tube, "tool.tube_mm"),
+#define FORCE(...)
+#define NUMBER(row, i, member, scale, most, key, ...) \
+	{"tissue." key, AT(member), 1, scale, most},
+#define MORE(member)
+#include "../tissue/forces.def"
 	{"membrane.point_mm", AT(membrane.point), 3, ONE, 8191},
 	LENGTH(membrane.radius, "membrane.radius_mm"),
 	LENGTH(membrane.thickness, "membrane.thickness_mm"),
-	NUMBER(membrane.stiffness, "the membrane's stiffness"),
+	PLAIN(membrane.stiffness, "the membrane's stiffness"),
 	LENGTH(membrane.back_wall, "membrane.back_wall_mm"),
-	NUMBER(small, "limits.start_N"),
+	PLAIN(small, "limits.start_N"),
 	LENGTH(force, "limits.force_N"),
 	LENGTH(slew, "limits.slew_N_s"),
 };

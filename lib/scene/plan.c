@@ -115,10 +115,14 @@ static void take_tissue(struct incise_plan *plan)
 
 	plan->gain = scene->tissue.gain;
 	for (int i = 0; i < incise_n_tissue_forces; i++) {
-		plan->acting[i].force = &incise_tissue_forces[i];
+		struct incise_acting_force *own = &plan->acting[i];
+		const double *number = scene->tissue.force[i];
+
+		own->force = &incise_tissue_forces[i];
 		for (int k = 0; k < INCISE_FORCE_NUMBERS; k++)
-			plan->acting[i].number[k] =
-				(k ? 1 : plan->gain) * scene->tissue.force[i][k];
+			own->number[k] = (k ? 1 : plan->gain) * number[k];
+		if (!(number[own->force->acts] > 0))
+			own->number[0] = 0;
 	}
 }
 

@@ -122,7 +122,7 @@ static int32_t *punctured(struct incise_plan *plan)
 }
 
 /* A plan in double without handle and tube has no cuts. */
-static struct T(incision) * cuts_of(struct incise_plan *plan)
+static struct T(incision) *cuts_of(struct incise_plan *plan)
 {
 	return T_PART(&OWN(plan)->state, incision);
 }
@@ -130,7 +130,7 @@ static struct T(incision) * cuts_of(struct incise_plan *plan)
 static bool get_cut(struct incise_plan *plan, int i, struct incise_cut *cut)
 {
 	const struct T(incision) *cuts = cuts_of(plan);
-	const struct T(cut) * from;
+	const struct T(cut) *from;
 
 	if (!cuts || i < 0 || i >= cuts->n)
 		return false;
@@ -164,7 +164,7 @@ static void clear_cuts(struct incise_plan *plan)
 static bool add_cut(struct incise_plan *plan, const struct incise_cut *cut)
 {
 	struct T(incision) *cuts = cuts_of(plan);
-	struct T(cut) * to;
+	struct T(cut) *to;
 
 	if (!cuts || cuts->n >= OWN(plan)->plan.numbers.incision.cuts_most)
 		return false;

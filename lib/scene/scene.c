@@ -613,7 +613,7 @@ static int check_forces(const struct incise_scene *scene, struct incise_error *e
 		bool there = scene->tissue.force[i][0] > 0;
 
 		any |= there;
-		if (there && model && incise_tissue_forces[i].model)
+		if (there && model && i == INCISE_FORCE_REACTION)
 			return incise_error_set(
 				err, EINVAL,
 				"%s: a model and tissue.%s: a scene has only one "

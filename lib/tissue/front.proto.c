@@ -52,7 +52,7 @@ void T(line_along)(dir along[3], const dir normal[3], const dir side[3])
 	d_unit(along, across, FLAT);
 }
 
-static void begin_line(struct T(line) * line, const num at[3], const dir normal[3],
+static void begin_line(struct T(line) *line, const num at[3], const dir normal[3],
 		       const dir side[3])
 {
 	*line = (struct T(line)){.there = true};
@@ -61,7 +61,7 @@ static void begin_line(struct T(line) * line, const num at[3], const dir normal[
 	T(line_along)(line->along, normal, side);
 }
 
-static num place_along(const struct T(line) * line, const num at[3])
+static num place_along(const struct T(line) *line, const num at[3])
 {
 	num off[3];
 
@@ -70,7 +70,7 @@ static num place_along(const struct T(line) * line, const num at[3])
 }
 
 /* Whether a point of the surface lies beside the line, or nearer. */
-static bool holds(const struct T(line) * line, const num at[3])
+static bool holds(const struct T(line) *line, const num at[3])
 {
 	num off[3], s;
 
@@ -84,7 +84,7 @@ static bool holds(const struct T(line) * line, const num at[3])
 
 /* --- front --- */
 
-bool T(front_enter)(struct T(front) * front, const num at[3], const dir normal[3],
+bool T(front_enter)(struct T(front) *front, const num at[3], const dir normal[3],
 		    const dir side[3])
 {
 	bool fresh = !holds(&front->line, at);
@@ -96,7 +96,7 @@ bool T(front_enter)(struct T(front) * front, const num at[3], const dir normal[3
 	return fresh;
 }
 
-num T(front_advance)(struct T(front) * front, const num at[3], const dir normal[3],
+num T(front_advance)(struct T(front) *front, const num at[3], const dir normal[3],
 		     const dir side[3])
 {
 	struct T(line) *line = &front->line;
@@ -111,7 +111,7 @@ num T(front_advance)(struct T(front) * front, const num at[3], const dir normal[
 	return BESIDE;
 }
 
-num T(front_force)(struct T(front) * front, num unloading, num friction, num depth,
+num T(front_force)(struct T(front) *front, num unloading, num friction, num depth,
 		   num advance, num cutting)
 {
 	num K = n_max(unloading, LEAST), rubs, upper, elastic, trial, force, way;

@@ -43,7 +43,7 @@ static num middle_of(int place)
 	return n_sub(n_multiple(2 * place + 1, n_half(SPACING)), HALF);
 }
 
-static struct local localize(const struct T(cut) * cut, const num at[3])
+static struct local localize(const struct T(cut) *cut, const num at[3])
 {
 	num off[3];
 
@@ -52,7 +52,7 @@ static struct local localize(const struct T(cut) * cut, const num at[3])
 			      v_along(off, cut->normal)};
 }
 
-static num aside_of(const struct T(cut) * cut, const num at[3])
+static num aside_of(const struct T(cut) *cut, const num at[3])
 {
 	num off[3];
 
@@ -61,14 +61,14 @@ static num aside_of(const struct T(cut) * cut, const num at[3])
 }
 
 /* Whether a place is within @reach of the cut, as seen along its normal. */
-static bool reaches(const struct T(cut) * cut, const struct local *at, num reach)
+static bool reaches(const struct T(cut) *cut, const struct local *at, num reach)
 {
 	return !n_below(reach, n_abs(at->across)) && !n_below(ABOVE, n_abs(at->above)) &&
 	       !n_below(at->along, n_sub(cut->from_mm, reach)) &&
 	       !n_below(n_add(cut->to_mm, reach), at->along);
 }
 
-static void join(struct T(incision) * incision, int a, int b)
+static void join(struct T(incision) *incision, int a, int b)
 {
 	int32_t x = incision->cut[a].incision, y = incision->cut[b].incision;
 	int32_t low = x < y ? x : y, high = x < y ? y : x;
@@ -79,7 +79,7 @@ static void join(struct T(incision) * incision, int a, int b)
 }
 
 /* Whether the way between two places comes near the cut, or crosses it. */
-static bool meets(const struct T(cut) * cut, const num from[3], const num to[3])
+static bool meets(const struct T(cut) *cut, const num from[3], const num to[3])
 {
 	struct local a = localize(cut, from), b = localize(cut, to), at;
 	num part, whole;
@@ -97,7 +97,7 @@ static bool meets(const struct T(cut) * cut, const num from[3], const num to[3])
 }
 
 /* Join the cut that is being made with those that its newest part meets. */
-static void check_others(struct T(incision) * incision, const num to[3])
+static void check_others(struct T(incision) *incision, const num to[3])
 {
 	int own = incision->growing;
 
@@ -110,9 +110,8 @@ static void check_others(struct T(incision) * incision, const num to[3])
 }
 
 /* Start a cut along a direction in the surface. Returns whether there is one more. */
-static bool begin_cut(struct T(incision) * incision,
-		      const struct T(incision_setup) * setup, const num at[3],
-		      const dir along[3], const dir normal[3])
+static bool begin_cut(struct T(incision) *incision, const struct T(incision_setup) *setup,
+		      const num at[3], const dir along[3], const dir normal[3])
 {
 	struct T(cut) *cut = &incision->cut[incision->n];
 
@@ -130,16 +129,15 @@ static bool begin_cut(struct T(incision) * incision,
 	return true;
 }
 
-static bool faces(const struct T(cut) * cut, const struct local *here,
-		  const dir normal[3])
+static bool faces(const struct T(cut) *cut, const struct local *here, const dir normal[3])
 {
 	return n_below(n_abs(here->along), HALF) &&
 	       d_below(FACING, d_dot(normal, cut->normal));
 }
 
 /* The cut to which a blade of this direction (unit) returns; -1: none. */
-static int find_cut(const struct T(incision) * incision, const num at[3],
-		    const dir way[3], const dir normal[3])
+static int find_cut(const struct T(incision) *incision, const num at[3], const dir way[3],
+		    const dir normal[3])
 {
 	for (int i = 0; i < incision->n; i++) {
 		const struct T(cut) *cut = &incision->cut[i];
@@ -153,7 +151,7 @@ static int find_cut(const struct T(incision) * incision, const num at[3],
 }
 
 /* The blade is in the current cut: deepen and lengthen it from the last tick's place on. */
-static void deepen(struct T(incision) * incision, const num at[3], num depth)
+static void deepen(struct T(incision) *incision, const num at[3], num depth)
 {
 	struct T(cut) *cut = &incision->cut[incision->growing];
 	num from = localize(cut, incision->at).along, to = localize(cut, at).along;
@@ -173,7 +171,7 @@ static void deepen(struct T(incision) * incision, const num at[3], num depth)
 	cut->to_mm = n_max(cut->to_mm, n_min(high, HALF));
 }
 
-static bool is_on(const struct T(cut) * cut, const num at[3], const dir normal[3])
+static bool is_on(const struct T(cut) *cut, const num at[3], const dir normal[3])
 {
 	struct local here = localize(cut, at);
 
@@ -196,7 +194,7 @@ static void way_along(dir along[3], const num from[3], const num to[3],
 }
 
 /* The blade enters: the cut that it returns to, or a new one. */
-static bool enter(struct T(incision) * incision, const struct T(incision_setup) * setup,
+static bool enter(struct T(incision) *incision, const struct T(incision_setup) *setup,
 		  const num at[3], const dir side[3], const dir normal[3], num depth)
 {
 	dir along[3];
@@ -219,9 +217,8 @@ static bool enter(struct T(incision) * incision, const struct T(incision_setup) 
 }
 
 /* The blade left the line of its cut: another one goes on from the last place. */
-static bool turn_away(struct T(incision) * incision,
-		      const struct T(incision_setup) * setup, const num at[3],
-		      const dir normal[3])
+static bool turn_away(struct T(incision) *incision, const struct T(incision_setup) *setup,
+		      const num at[3], const dir normal[3])
 {
 	int before = incision->growing, there;
 	dir along[3];
@@ -243,7 +240,7 @@ static bool turn_away(struct T(incision) * incision,
  * Once for each place on the way: join cuts that are met. One that runs along the same line is gone on
  * with, so that no line is there twice.
  */
-static void check_at_places(struct T(incision) * incision, const num at[3],
+static void check_at_places(struct T(incision) *incision, const num at[3],
 			    const dir normal[3])
 {
 	int before = incision->growing, there;
@@ -260,9 +257,9 @@ static void check_at_places(struct T(incision) * incision, const num at[3],
 	}
 }
 
-bool T(incision_cut)(struct T(incision) * incision,
-		     const struct T(incision_setup) * setup, const num proxy[3],
-		     const dir normal[3], const dir side[3], num depth)
+bool T(incision_cut)(struct T(incision) *incision, const struct T(incision_setup) *setup,
+		     const num proxy[3], const dir normal[3], const dir side[3],
+		     num depth)
 {
 	num leap[3];
 
@@ -292,7 +289,7 @@ bool T(incision_cut)(struct T(incision) * incision,
 /* --- handle and tube ------------------------------------------------------------------- */
 
 /* Extent across a line. @turned: 1 where the handle's flat side lies across it. */
-static num extent_across(const struct T(incision_setup) * setup, enum incise_tool tool,
+static num extent_across(const struct T(incision_setup) *setup, enum incise_tool tool,
 			 num turned)
 {
 	if (tool == INCISE_TOOL_TUBE)
@@ -302,8 +299,8 @@ static num extent_across(const struct T(incision_setup) * setup, enum incise_too
 			     n_sub(setup->handle_width, setup->handle_thickness)));
 }
 
-num T(incision_tightness)(const struct T(incision_setup) * setup,
-			  const struct T(opening) * opening, enum incise_tool tool)
+num T(incision_tightness)(const struct T(incision_setup) *setup,
+			  const struct T(opening) *opening, enum incise_tool tool)
 {
 	num whole = extent_across(setup, tool, N(1));
 	num to_open = n_sub(whole, setup->stretch);
@@ -319,7 +316,7 @@ num T(incision_tightness)(const struct T(incision_setup) * setup,
  * Length that a cut needs for a tool: its two lips, stretched, go round it. A tube is round, a handle a
  * rectangle.
  */
-static num needed(const struct T(incision_setup) * setup, enum incise_tool tool)
+static num needed(const struct T(incision_setup) *setup, enum incise_tool tool)
 {
 	num round = n_add(setup->handle_width, setup->handle_thickness);
 
@@ -328,7 +325,7 @@ static num needed(const struct T(incision_setup) * setup, enum incise_tool tool)
 	return n_sub(round, setup->stretch);
 }
 
-static num length_of(const struct T(incision) * incision, int32_t number)
+static num length_of(const struct T(incision) *incision, int32_t number)
 {
 	num length = 0;
 
@@ -340,7 +337,7 @@ static num length_of(const struct T(incision) * incision, int32_t number)
 }
 
 /* Distance aside of the nearest cut within reach; above @reach: there is none. */
-static num nearest_aside(const struct T(incision) * incision, const num at[3], num reach)
+static num nearest_aside(const struct T(incision) *incision, const num at[3], num reach)
 {
 	num best = n_add(reach, N(1));
 
@@ -358,13 +355,13 @@ static num nearest_aside(const struct T(incision) * incision, const num at[3], n
 	return best;
 }
 
-static num along_of(const struct T(cut) * cut, const num at[3])
+static num along_of(const struct T(cut) *cut, const num at[3])
 {
 	return n_within(localize(cut, at).along, cut->from_mm, cut->to_mm);
 }
 
 /* Of those that are as near, within the width of a line: where cuts cross, a tool goes into it. */
-static int deepest_cut(const struct T(incision) * incision, const num at[3], num reach)
+static int deepest_cut(const struct T(incision) *incision, const num at[3], num reach)
 {
 	num most = nearest_aside(incision, at, reach), depth = -N(1);
 	int best = -1;
@@ -388,13 +385,13 @@ static int deepest_cut(const struct T(incision) * incision, const num at[3], num
 	return best;
 }
 
-void T(incision_find)(const struct T(incision) * incision,
-		      const struct T(incision_setup) * setup, enum incise_tool tool,
-		      const num at[3], struct T(opening) * opening)
+void T(incision_find)(const struct T(incision) *incision,
+		      const struct T(incision_setup) *setup, enum incise_tool tool,
+		      const num at[3], struct T(opening) *opening)
 {
 	num width = tool == INCISE_TOOL_TUBE ? setup->tube : setup->handle_width;
 	int in = deepest_cut(incision, at, n_half(width)), place;
-	const struct T(cut) * cut;
+	const struct T(cut) *cut;
 
 	*opening = (struct T(opening)){0};
 	if (in < 0)
@@ -412,13 +409,13 @@ void T(incision_find)(const struct T(incision) * incision,
 	d_copy(opening->along, cut->along);
 }
 
-void T(incision_open)(struct T(incision) * incision,
-		      const struct T(incision_setup) * setup, enum incise_tool tool,
-		      const num proxy[3], const dir flat[3], num depth)
+void T(incision_open)(struct T(incision) *incision, const struct T(incision_setup) *setup,
+		      enum incise_tool tool, const num proxy[3], const dir flat[3],
+		      num depth)
 {
 	struct T(opening) *met = &incision->met;
 	num turned, length, made;
-	struct T(cut) * cut;
+	struct T(cut) *cut;
 
 	incision->cutting = false;
 	met->in = false;
@@ -444,7 +441,7 @@ void T(incision_open)(struct T(incision) * incision,
 	}
 }
 
-void T(incision_leave)(struct T(incision) * incision)
+void T(incision_leave)(struct T(incision) *incision)
 {
 	incision->cutting = false;
 	incision->met.in = false;

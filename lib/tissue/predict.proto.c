@@ -25,7 +25,7 @@
 #define JUMP (20 * W_MISS_MM)
 #define SHOWN_MOST (4096 * W_MISS_MM)
 
-void T(predict_init)(struct T(predict) * p)
+void T(predict_init)(struct T(predict) *p)
 {
 	*p = (struct T(predict)){.q = {D_ONE}, .q_shown = {D_ONE}};
 }
@@ -41,7 +41,7 @@ static int64_t since(int64_t t_ns, int64_t from_ns)
 }
 
 /* The filter's state at @t_ns. Extrapolation ends early: an old pose must not run away. */
-static void extrapolate(const struct T(predict) * p, const struct T(filter) * filter,
+static void extrapolate(const struct T(predict) *p, const struct T(filter) *filter,
 			int64_t t_ns, wide x[3], wide v[3])
 {
 	int64_t ahead_ns = since(t_ns, p->t_ns), most_ns = (int64_t)filter->ahead_ns;
@@ -56,15 +56,14 @@ static void extrapolate(const struct T(predict) * p, const struct T(filter) * fi
 }
 
 /* Share left of the difference that was shown when the last pose arrived: 1 … 0. */
-static wide left(const struct T(predict) * p, const struct T(filter) * filter,
-		 int64_t t_ns)
+static wide left(const struct T(predict) *p, const struct T(filter) *filter, int64_t t_ns)
 {
 	return w_left(since(t_ns, p->arrival_ns), filter->period_ns);
 }
 
 /* As shown: the filter's, and what is left to blend out. */
-static void show(const struct T(predict) * p, const struct T(filter) * filter,
-		 int64_t t_ns, wide x[3], wide v[3])
+static void show(const struct T(predict) *p, const struct T(filter) *filter, int64_t t_ns,
+		 wide x[3], wide v[3])
 {
 	wide share = left(p, filter, t_ns);
 
@@ -75,7 +74,7 @@ static void show(const struct T(predict) * p, const struct T(filter) * filter,
 	}
 }
 
-void T(predict_at)(const struct T(predict) * p, const struct T(filter) * filter,
+void T(predict_at)(const struct T(predict) *p, const struct T(filter) *filter,
 		   int64_t t_ns, num position[3], num velocity[3])
 {
 	wide x[3], v[3];
@@ -87,7 +86,7 @@ void T(predict_at)(const struct T(predict) * p, const struct T(filter) * filter,
 	}
 }
 
-void T(predict_acceleration)(const struct T(predict) * p, const struct T(filter) * filter,
+void T(predict_acceleration)(const struct T(predict) *p, const struct T(filter) *filter,
 			     int64_t t_ns, wide acceleration[3])
 {
 	wide share = left(p, filter, t_ns);
@@ -97,7 +96,7 @@ void T(predict_acceleration)(const struct T(predict) * p, const struct T(filter)
 					   -HARD, HARD);
 }
 
-void T(predict_attitude)(const struct T(predict) * p, const struct T(filter) * filter,
+void T(predict_attitude)(const struct T(predict) *p, const struct T(filter) *filter,
 			 int64_t t_ns, dir attitude[4])
 {
 	wide share = left(p, filter, t_ns), q[4];
@@ -111,7 +110,7 @@ void T(predict_attitude)(const struct T(predict) * p, const struct T(filter) * f
 }
 
 /* Of the two quaternions of an attitude, the one on the shorter way from q_shown. */
-static void turn_to(struct T(predict) * p, const dir quaternion[4])
+static void turn_to(struct T(predict) *p, const dir quaternion[4])
 {
 	dir q[4];
 	wide same = 0;
@@ -125,7 +124,7 @@ static void turn_to(struct T(predict) * p, const dir quaternion[4])
 }
 
 /* Bring the state to @t_ns and correct it. Returns false when the pose is too far off. */
-static bool correct(struct T(predict) * p, const struct T(filter) * filter, int64_t t_ns,
+static bool correct(struct T(predict) *p, const struct T(filter) *filter, int64_t t_ns,
 		    const num position[3])
 {
 	wide x[3], v[3], miss[3];
@@ -150,7 +149,7 @@ static bool correct(struct T(predict) * p, const struct T(filter) * filter, int6
 }
 
 /* Start again at a place. Returns whether the way there from what was shown is no jump. */
-static bool restart(struct T(predict) * p, const num position[3], const wide shown[3])
+static bool restart(struct T(predict) *p, const num position[3], const wide shown[3])
 {
 	wide step[3];
 
@@ -170,7 +169,7 @@ static bool is_far(const num position[3])
 	return false;
 }
 
-bool T(predict_add)(struct T(predict) * p, const struct T(filter) * filter,
+bool T(predict_add)(struct T(predict) *p, const struct T(filter) *filter,
 		    const num position[3], const dir quaternion[4], int64_t t_ns)
 {
 	wide shown[3], speed[3], hard[3], x[3], v[3];
@@ -210,7 +209,7 @@ bool T(predict_add)(struct T(predict) * p, const struct T(filter) * filter,
 	return true;
 }
 
-int64_t T(predict_age)(const struct T(predict) * p, int64_t t_ns)
+int64_t T(predict_age)(const struct T(predict) *p, int64_t t_ns)
 {
 	return p->started ? since(t_ns, p->t_ns) : INT64_MAX;
 }

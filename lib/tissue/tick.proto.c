@@ -11,6 +11,7 @@
  *   insertion   insertion   F += Ky d n Fort                 §2.3, Fy
  *               spread      F -= Kxz (I - n nᵀ)(P-P0)        §2.3, Fxz
  *   both        damping     F -= Kd v                        §2.2, Fd
+ *               skin        F -= min(K |x|, μ N) x/|x|       friction along the skin; in no paper
  *
  * Compared with the paper's print:
  *
@@ -40,8 +41,8 @@
 
 /* --- poses ------------------------------------------------------------------------------ */
 
-static enum incise_fixed_pose_answer add_pose(struct T(predict) * p,
-					      const struct T(filter) * filter,
+static enum incise_fixed_pose_answer add_pose(struct T(predict) *p,
+					      const struct T(filter) *filter,
 					      const num position[3],
 					      const dir quaternion[4], int64_t t_ns)
 {
@@ -52,9 +53,9 @@ static enum incise_fixed_pose_answer add_pose(struct T(predict) * p,
 	return INCISE_FIXED_POSE_FAR;
 }
 
-static enum incise_fixed_pose_answer take_scalpel(const struct T(numbers) * numbers,
-						  struct T(state) * state,
-						  const struct T(pose) * pose,
+static enum incise_fixed_pose_answer take_scalpel(const struct T(numbers) *numbers,
+						  struct T(state) *state,
+						  const struct T(pose) *pose,
 						  int64_t t_ns)
 {
 	enum incise_fixed_pose_answer answer;
@@ -79,9 +80,9 @@ static enum incise_fixed_pose_answer take_scalpel(const struct T(numbers) * numb
 	return answer;
 }
 
-enum incise_fixed_pose_answer T(plan_pose)(const struct T(plan) * plan,
-					   struct T(state) * state,
-					   const struct T(pose) * pose, int64_t now_ns)
+enum incise_fixed_pose_answer T(plan_pose)(const struct T(plan) *plan,
+					   struct T(state) *state,
+					   const struct T(pose) *pose, int64_t now_ns)
 {
 	const struct T(numbers) *numbers = &plan->numbers;
 	/* A timestamp from the future would keep all later poses out. */
@@ -108,19 +109,18 @@ enum incise_fixed_pose_answer T(plan_pose)(const struct T(plan) * plan,
 
 /* --- predict and tool ------------------------------------------------------------------- */
 
-static bool is_stale_tick(const struct T(tick) * tick)
+static bool is_stale_tick(const struct T(tick) *tick)
 {
 	return tick->flags & INCISE_TICK_STALE;
 }
 
-static bool is_stale(const struct T(plan) * plan, const struct T(predict) * p,
-		     int64_t t_ns)
+static bool is_stale(const struct T(plan) *plan, const struct T(predict) *p, int64_t t_ns)
 {
 	return T(predict_age)(p, t_ns) > plan->numbers.pose_age_ns;
 }
 
-void T(stage_predict)(const struct T(plan) * plan, struct T(state) * state,
-		      struct T(tick) * tick)
+void T(stage_predict)(const struct T(plan) *plan, struct T(state) *state,
+		      struct T(tick) *tick)
 {
 	const struct T(numbers) *numbers = &plan->numbers;
 
@@ -140,7 +140,7 @@ void T(stage_predict)(const struct T(plan) * plan, struct T(state) * state,
 }
 
 /* Whether another tool is wanted than the held one, without a look at the scalpel's turn. */
-static bool waits(const struct T(state) * state)
+static bool waits(const struct T(state) *state)
 {
 	if (state->wanted == INCISE_TOOL_AUTO)
 		return (state->held == INCISE_TOOL_TUBE) != !!state->tube_nearer;
@@ -148,7 +148,7 @@ static bool waits(const struct T(state) * state)
 }
 
 /* Whether the tool that is held stays: in the tissue it does until the force has faded. */
-static bool keeps_tool(struct T(state) * state)
+static bool keeps_tool(struct T(state) *state)
 {
 	bool faded = !(state->gain > 0) && v_is_zero(state->last);
 
@@ -162,7 +162,7 @@ struct height {
 };
 
 /* Since the surface was searched a height changed by no more than the end went, and its rounding. */
-static struct height height_of(const struct T(above) * last, const num end[3])
+static struct height height_of(const struct T(above) *last, const num end[3])
 {
 	num way[3];
 	wide went = w_of(FAR_MOST), above = w_of(last->above);
@@ -174,8 +174,8 @@ static struct height height_of(const struct T(above) * last, const num end[3])
 }
 
 /* The surface is only searched where what is known of the heights does not decide it. */
-static bool is_tube_nearer(const struct T(plan) * plan, struct T(state) * state,
-			   const struct T(tick) * tick)
+static bool is_tube_nearer(const struct T(plan) *plan, struct T(state) *state,
+			   const struct T(tick) *tick)
 {
 	const struct T(filter) *filter = &plan->numbers.filter;
 	struct T(ends) *ends = T_PART(state, ends);
@@ -211,8 +211,8 @@ static bool is_tube_nearer(const struct T(plan) * plan, struct T(state) * state,
 }
 
 /* One of the two stations that is silent is far away, also in the tissue. */
-static bool find_tube(const struct T(plan) * plan, struct T(state) * state,
-		      const struct T(tick) * tick)
+static bool find_tube(const struct T(plan) *plan, struct T(state) *state,
+		      const struct T(tick) *tick)
 {
 	bool tube_stale = is_stale(plan, &T_PART(state, ends)->tube, tick->t_ns);
 	bool stale = is_stale_tick(tick), keeps;
@@ -227,7 +227,7 @@ static bool find_tube(const struct T(plan) * plan, struct T(state) * state,
 	return keeps;
 }
 
-static int32_t tool_by_place(const struct T(plan) * plan, const struct T(state) * state)
+static int32_t tool_by_place(const struct T(plan) *plan, const struct T(state) *state)
 {
 	dir axis[3], up;
 
@@ -242,7 +242,7 @@ static int32_t tool_by_place(const struct T(plan) * plan, const struct T(state) 
 	return state->held == INCISE_TOOL_TUBE ? INCISE_TOOL_BLADE : state->held;
 }
 
-static void choose_tool(const struct T(plan) * plan, struct T(state) * state)
+static void choose_tool(const struct T(plan) *plan, struct T(state) *state)
 {
 	int32_t before = state->held;
 
@@ -257,8 +257,8 @@ static void choose_tool(const struct T(plan) * plan, struct T(state) * state)
 	state->changing = false;
 }
 
-void T(stage_tool)(const struct T(plan) * plan, struct T(state) * state,
-		   struct T(tick) * tick)
+void T(stage_tool)(const struct T(plan) *plan, struct T(state) *state,
+		   struct T(tick) *tick)
 {
 	const struct T(numbers) *numbers = &plan->numbers;
 
@@ -285,7 +285,7 @@ void T(stage_tool)(const struct T(plan) * plan, struct T(state) * state,
 
 /* --- contact ---------------------------------------------------------------------------- */
 
-static void begin_contact(struct T(state) * state, int64_t t_ns)
+static void begin_contact(struct T(state) *state, int64_t t_ns)
 {
 	state->touched_ns = t_ns;
 	state->deepest = 0;
@@ -296,8 +296,8 @@ static void begin_contact(struct T(state) * state, int64_t t_ns)
 	state->averaged = false;
 }
 
-void T(stage_contact)(const struct T(plan) * plan, struct T(state) * state,
-		      struct T(tick) * tick)
+void T(stage_contact)(const struct T(plan) *plan, struct T(state) *state,
+		      struct T(tick) *tick)
 {
 	struct T(proxy) *proxy = &state->proxy;
 
@@ -329,8 +329,8 @@ void T(stage_contact)(const struct T(plan) * plan, struct T(state) * state,
  * by the sum of that turn alone. Where normals are opposed and their sum vanishes, the last average
  * counts on.
  */
-void T(stage_normal)(const struct T(plan) * plan, struct T(state) * state,
-		     struct T(tick) * tick)
+void T(stage_normal)(const struct T(plan) *plan, struct T(state) *state,
+		     struct T(tick) *tick)
 {
 	struct T(average) *average = T_PART(state, average);
 	int32_t n = plan->numbers.average_ticks;
@@ -363,8 +363,8 @@ void T(stage_normal)(const struct T(plan) * plan, struct T(state) * state,
 }
 
 /* An instrument meets the opening as it was when it went in: it makes the way easier for the next. */
-void T(stage_incision)(const struct T(plan) * plan, struct T(state) * state,
-		       struct T(tick) * tick)
+void T(stage_incision)(const struct T(plan) *plan, struct T(state) *state,
+		       struct T(tick) *tick)
 {
 	const struct T(incision_setup) *setup = &plan->numbers.incision;
 	struct T(incision) *cuts = T_PART(state, incision);
@@ -393,14 +393,14 @@ void T(stage_incision)(const struct T(plan) * plan, struct T(state) * state,
 
 /* --- forces ----------------------------------------------------------------------------- */
 
-static void push(struct T(state) * state, num size, const dir unit[3])
+static void push(struct T(state) *state, num size, const dir unit[3])
 {
 	v_add(state->force, state->force, size, unit);
 }
 
 /* N against a tool so far beyond the plane of the membrane. */
-static num membrane_force(const struct T(membrane) * membrane, struct T(state) * state,
-			  struct T(tick) * tick, num beyond)
+static num membrane_force(const struct T(membrane) *membrane, struct T(state) *state,
+			  struct T(tick) *tick, num beyond)
 {
 	if (!n_below(beyond, membrane->thickness))
 		state->membrane.punctured = true;
@@ -415,8 +415,8 @@ static num membrane_force(const struct T(membrane) * membrane, struct T(state) *
 }
 
 /* Whether a tool meets the membrane here, and not uncut skin above it or tissue beside it. */
-static bool hits_membrane(const struct T(membrane) * membrane,
-			  const struct T(state) * state, const struct T(tick) * tick,
+static bool hits_membrane(const struct T(membrane) *membrane,
+			  const struct T(state) *state, const struct T(tick) *tick,
 			  const num off[3], num beyond)
 {
 	num across[3];
@@ -430,8 +430,8 @@ static bool hits_membrane(const struct T(membrane) * membrane,
  * A membrane over an airway. Tissue in front of it holds the tool up to the membrane's depth and no more
  * beyond it; the membrane yields, and is open from then on.
  */
-void T(stage_membrane)(const struct T(plan) * plan, struct T(state) * state,
-		       struct T(tick) * tick)
+void T(stage_membrane)(const struct T(plan) *plan, struct T(state) *state,
+		       struct T(tick) *tick)
 {
 	const struct T(membrane) *membrane = &plan->numbers.membrane;
 	num off[3], beyond;
@@ -458,8 +458,8 @@ void T(stage_membrane)(const struct T(plan) * plan, struct T(state) * state,
 	push(state, membrane_force(membrane, state, tick, beyond), membrane->normal);
 }
 
-static num find_input(const struct T(plan) * plan, const struct T(state) * state,
-		      const struct T(tick) * tick, uint32_t kind)
+static num find_input(const struct T(plan) *plan, const struct T(state) *state,
+		      const struct T(tick) *tick, uint32_t kind)
 {
 	dir axis[3];
 	wide hard[3];
@@ -482,8 +482,8 @@ static num find_input(const struct T(plan) * plan, const struct T(state) * state
 }
 
 /* The force of a phase's model, N. Only inputs that it has are computed. */
-static num phase_force(const struct T(plan) * plan, const struct T(state) * state,
-		       const struct T(tick) * tick, int32_t phase, bool *outside)
+static num phase_force(const struct T(plan) *plan, const struct T(state) *state,
+		       const struct T(tick) *tick, int32_t phase, bool *outside)
 {
 	num x[INCISE_FIXED_INPUTS_MAX] = {state->depth, tick->speed};
 	uint32_t kinds = T(model_inputs)(plan, phase);
@@ -494,7 +494,7 @@ static num phase_force(const struct T(plan) * plan, const struct T(state) * stat
 }
 
 /* Skin that was not cut before gives way from the depth of a cut on; the deepest depth only grows. */
-static num open_share(const struct T(numbers) * numbers, const struct T(state) * state)
+static num open_share(const struct T(numbers) *numbers, const struct T(state) *state)
 {
 	num beyond = n_sub(state->deepest, numbers->incision.cut_from);
 
@@ -502,8 +502,8 @@ static num open_share(const struct T(numbers) * numbers, const struct T(state) *
 }
 
 /* The model's force: of the puncture, of the cut, or between them. */
-static num model_force(const struct T(plan) * plan, struct T(state) * state,
-		       const struct T(tick) * tick, bool *outside)
+static num model_force(const struct T(plan) *plan, struct T(state) *state,
+		       const struct T(tick) *tick, bool *outside)
 {
 	num share = N(1), cut = 0, skin;
 
@@ -522,8 +522,8 @@ static num model_force(const struct T(plan) * plan, struct T(state) * state,
  * Song et al. (2006), eq. (3), as the size of Bhasin et al.'s Fn; tissue does not pull. Beyond the depths
  * that the model knows the force goes on with the slope that it has there.
  */
-static num cutting_force(const struct T(plan) * plan, struct T(state) * state,
-			 struct T(tick) * tick)
+static num cutting_force(const struct T(plan) *plan, struct T(state) *state,
+			 struct T(tick) *tick)
 {
 	const struct T(numbers) *numbers = &plan->numbers;
 	num beyond = n_max(n_sub(state->depth, numbers->support), 0), size;
@@ -540,7 +540,7 @@ static num cutting_force(const struct T(plan) * plan, struct T(state) * state,
 }
 
 /* New tissue that the blade meets at this tick. */
-static num advance(struct T(state) * state)
+static num advance(struct T(state) *state)
 {
 	if (state->proxy.began)
 		state->skin_open =
@@ -556,8 +556,8 @@ static num advance(struct T(state) * state)
  * Drag on a blade that comes out, as a part of the force of its cut: what the model of the withdrawal says
  * where that pulls, else tissue.friction.
  */
-static num front_friction(const struct T(plan) * plan, const struct T(state) * state,
-			  const struct T(tick) * tick, num most)
+static num front_friction(const struct T(plan) *plan, const struct T(state) *state,
+			  const struct T(tick) *tick, num most)
 {
 	const struct T(numbers) *numbers = &plan->numbers;
 	bool outside;
@@ -572,8 +572,8 @@ static num front_friction(const struct T(plan) * plan, const struct T(state) * s
 	return n_below(0, most) ? n_within(n_over(drag, most), 0, N(1)) : 0;
 }
 
-void T(stage_reaction)(const struct T(plan) * plan, struct T(state) * state,
-		       struct T(tick) * tick)
+void T(stage_reaction)(const struct T(plan) *plan, struct T(state) *state,
+		       struct T(tick) *tick)
 {
 	const struct T(numbers) *numbers = &plan->numbers;
 	num size, fresh;
@@ -595,8 +595,8 @@ void T(stage_reaction)(const struct T(plan) * plan, struct T(state) * state,
 }
 
 /* The blade stays in the plane of its cut: s is Sx(0), its side when the cut began. */
-void T(stage_plane)(const struct T(plan) * plan, struct T(state) * state,
-		    struct T(tick) * tick)
+void T(stage_plane)(const struct T(plan) *plan, struct T(state) *state,
+		    struct T(tick) *tick)
 {
 	num off[3];
 
@@ -607,8 +607,8 @@ void T(stage_plane)(const struct T(plan) * plan, struct T(state) * state,
 	     state->side);
 }
 
-void T(stage_damping)(const struct T(plan) * plan, struct T(state) * state,
-		      struct T(tick) * tick)
+void T(stage_damping)(const struct T(plan) *plan, struct T(state) *state,
+		      struct T(tick) *tick)
 {
 	for (int i = 0; i < 3 && tick->phase != INCISE_PHASE_FREE; i++)
 		state->force[i] = n_damp(state->force[i], plan->numbers.damping,
@@ -619,12 +619,12 @@ void T(stage_damping)(const struct T(plan) * plan, struct T(state) * state,
  * Fort as Bhasin et al. (2005) print it, the scalar product of the directions of handle and cut: its flat
  * side, which lies along the cut, resists most. A tube is round: the product is of the handle.
  */
-static bool is_printed(const struct T(numbers) * numbers, const struct T(state) * state)
+static bool is_printed(const struct T(numbers) *numbers, const struct T(state) *state)
 {
 	return numbers->printed && state->held == INCISE_TOOL_HANDLE;
 }
 
-static num printed(const struct T(numbers) * numbers, const struct T(state) * state)
+static num printed(const struct T(numbers) *numbers, const struct T(state) *state)
 {
 	dir flat[3], lies[3];
 
@@ -637,7 +637,7 @@ static num printed(const struct T(numbers) * numbers, const struct T(state) * st
  * Fort, aligned … 1: easily, but not freely. A flat instrument goes in easily when its flat lies along the
  * cut: the flat's normal across the cut's direction then gives 0. A tube is round, it has no turn.
  */
-static num eased(const struct T(numbers) * numbers, const struct T(state) * state)
+static num eased(const struct T(numbers) *numbers, const struct T(state) *state)
 {
 	num across = N(1);
 
@@ -649,8 +649,8 @@ static num eased(const struct T(numbers) * numbers, const struct T(state) * stat
 }
 
 /* Below the cut, and outside of it, tissue holds up like skin. */
-void T(stage_insertion)(const struct T(plan) * plan, struct T(state) * state,
-			struct T(tick) * tick)
+void T(stage_insertion)(const struct T(plan) *plan, struct T(state) *state,
+			struct T(tick) *tick)
 {
 	const struct T(numbers) *numbers = &plan->numbers;
 	const struct T(opening) *opening = &state->opening;
@@ -667,8 +667,8 @@ void T(stage_insertion)(const struct T(plan) * plan, struct T(state) * state,
 }
 
 /* The tissue around an instrument gives way to a limited extent. */
-void T(stage_spread)(const struct T(plan) * plan, struct T(state) * state,
-		     struct T(tick) * tick)
+void T(stage_spread)(const struct T(plan) *plan, struct T(state) *state,
+		     struct T(tick) *tick)
 {
 	num off[3], across[3];
 
@@ -677,6 +677,55 @@ void T(stage_spread)(const struct T(plan) * plan, struct T(state) * state,
 	v_sub(off, tick->tool, state->p0);
 	v_add(across, off, n_neg(v_along(off, state->normal)), state->normal);
 	v_pull(state->force, state->force, plan->numbers.spread, across);
+}
+
+/*
+ * Coulomb's friction of a tool along the skin, as an anchor that is dragged: a spring from the place where the
+ * tool stuck, along the skin, that holds up to a share of the force along the normal; beyond it the anchor
+ * follows. So it holds a hand that rests, which the sign of a velocity would not, and gives no work back but
+ * what the spring took.
+ *
+ *            stretch            force = min(K stretch, μ N) towards the anchor
+ *   ────×─ ─ ─ ─ ─ ─○────       slips: the anchor moves by stretch - μ N / K
+ *     anchor      tool
+ *
+ * Errors of an anchor do not add up: along the way it is set from the tool's place anew, across it the next place
+ * is a mean of those of tool and anchor. Its own rounding does, which is why it has 32 bits behind the point.
+ */
+static void drag(struct T(state) *state, num way, const dir along[3])
+{
+	/* 2^31 · 2^30 in Q46 */
+	for (int i = 0; i < 3; i++)
+		state->anchor[i] += w_times(w_of(way), along[i], 14);
+}
+
+void T(stage_skin)(const struct T(plan) *plan, struct T(state) *state,
+		   struct T(tick) *tick)
+{
+	const struct T(numbers) *numbers = &plan->numbers;
+	num anchor[3], off[3], across[3], stretch, pull, most;
+	dir along[3];
+
+	if (tick->phase == INCISE_PHASE_FREE || !n_below(0, numbers->skin))
+		return;
+	for (int i = 0; i < 3; i++) {
+		if (state->proxy.began)
+			state->anchor[i] = w_place(state->p0[i]);
+		anchor[i] = n_place(state->anchor[i]);
+	}
+	v_sub(off, tick->tool, anchor);
+	v_add(across, off, n_neg(v_along(off, state->normal)), state->normal);
+	if (!v_direction(along, across))
+		return;
+	stretch = v_length(across);
+	pull = n_times(numbers->skin, stretch);
+	most = n_times(numbers->skin_friction,
+		       n_max(v_along(state->force, state->normal), 0));
+	if (n_below(most, pull)) {
+		drag(state, n_sub(stretch, n_over(most, numbers->skin)), along);
+		pull = most;
+	}
+	push(state, n_neg(pull), along);
 }
 
 /* --- start and limit -------------------------------------------------------------------- */
@@ -696,8 +745,8 @@ void T(stage_spread)(const struct T(plan) * plan, struct T(state) * state,
  * fade the gain rises again without waiting for a small force: the hand has not left, and whoever holds the
  * blade in the tissue would else feel nothing until it is out. The ramp is the protection.
  */
-void T(stage_start)(const struct T(plan) * plan, struct T(state) * state,
-		    struct T(tick) * tick)
+void T(stage_start)(const struct T(plan) *plan, struct T(state) *state,
+		    struct T(tick) *tick)
 {
 	const struct T(numbers) *numbers = &plan->numbers;
 	bool fresh = !is_stale_tick(tick) && !state->fading && !state->changing;
@@ -738,8 +787,8 @@ void T(stage_start)(const struct T(plan) * plan, struct T(state) * state,
  *
  * Where both limits cannot be kept, as when the largest force is made smaller, it is the force that is.
  */
-void T(stage_limit)(const struct T(plan) * plan, struct T(state) * state,
-		    struct T(tick) * tick)
+void T(stage_limit)(const struct T(plan) *plan, struct T(state) *state,
+		    struct T(tick) *tick)
 {
 	const struct T(numbers) *numbers = &plan->numbers;
 	wide force[3], change[3];

@@ -41,7 +41,7 @@ struct T(predict) {
 };
 
 /* Start without a pose. */
-void T(predict_init)(struct T(predict) * p);
+void T(predict_init)(struct T(predict) *p);
 
 /*
  * Take a pose in. Any numbers are safe. One of a position beyond 10 m, or not newer than the last, is
@@ -51,7 +51,7 @@ void T(predict_init)(struct T(predict) * p);
  * from where it should be: no hand did that, and it must not be dragged through the tissue, so there is
  * then no blend either; the force's limits do the rest.
  */
-bool T(predict_add)(struct T(predict) * p, const struct T(filter) * filter,
+bool T(predict_add)(struct T(predict) *p, const struct T(filter) *filter,
 		    const num position[3], const dir quaternion[4],
 		    int64_t t_ns) INCISE_REALTIME;
 
@@ -59,19 +59,19 @@ bool T(predict_add)(struct T(predict) * p, const struct T(filter) * filter,
  * Position and velocity at a time. Before the first pose all is 0. Velocity is the filter's, held to
  * ±10^4 mm/s, and not the derivative of the position, which holds the speed of the correction too.
  */
-void T(predict_at)(const struct T(predict) * p, const struct T(filter) * filter,
+void T(predict_at)(const struct T(predict) *p, const struct T(filter) *filter,
 		   int64_t t_ns, num position[3], num velocity[3]) INCISE_REALTIME;
 
 /* The acceleration then, Q16 mm/s², within ±10^5. */
-void T(predict_acceleration)(const struct T(predict) * p, const struct T(filter) * filter,
+void T(predict_acceleration)(const struct T(predict) *p, const struct T(filter) *filter,
 			     int64_t t_ns, wide acceleration[3]) INCISE_REALTIME;
 
 /* The attitude then, a unit quaternion, not extrapolated. Costs a root: only when asked. */
-void T(predict_attitude)(const struct T(predict) * p, const struct T(filter) * filter,
+void T(predict_attitude)(const struct T(predict) *p, const struct T(filter) *filter,
 			 int64_t t_ns, dir attitude[4]) INCISE_REALTIME;
 
 /* Age of the last pose, ≥ 0; INT64_MAX before the first. */
-int64_t T(predict_age)(const struct T(predict) * p, int64_t t_ns) INCISE_REALTIME;
+int64_t T(predict_age)(const struct T(predict) *p, int64_t t_ns) INCISE_REALTIME;
 
 /* --- front.proto.c ------------------------------------------------------------------------ */
 
@@ -108,11 +108,11 @@ struct T(front) {
  * The blade meets the skin at a place of it: in the cut that it left, which stays, or in a new one.
  * Returns whether the cut is new.
  */
-bool T(front_enter)(struct T(front) * front, const num at[3], const dir normal[3],
+bool T(front_enter)(struct T(front) *front, const num at[3], const dir normal[3],
 		    const dir side[3]) INCISE_REALTIME;
 
 /* Length of new tissue since the last call: the way of the blade beyond its own cut. */
-num T(front_advance)(struct T(front) * front, const num at[3], const dir normal[3],
+num T(front_advance)(struct T(front) *front, const num at[3], const dir normal[3],
 		     const dir side[3]) INCISE_REALTIME;
 
 /*
@@ -124,7 +124,7 @@ num T(front_advance)(struct T(front) * front, const num at[3], const dir normal[
  * @param advance    of T(front_advance)(), ≥ 0
  * @param cutting    the model's force at this depth and speed, ≥ 0
  */
-num T(front_force)(struct T(front) * front, num unloading, num friction, num depth,
+num T(front_force)(struct T(front) *front, num unloading, num friction, num depth,
 		   num advance, num cutting) INCISE_REALTIME;
 
 /* --- incision.proto.c --------------------------------------------------------------------- */
@@ -151,30 +151,30 @@ struct T(incision) {
 };
 
 /* The blade at this tick. Returns false where it would cut but leaves no cut: cuts_most are there. */
-bool T(incision_cut)(struct T(incision) * incision,
-		     const struct T(incision_setup) * setup, const num proxy[3],
-		     const dir normal[3], const dir side[3], num depth) INCISE_REALTIME;
+bool T(incision_cut)(struct T(incision) *incision, const struct T(incision_setup) *setup,
+		     const num proxy[3], const dir normal[3], const dir side[3],
+		     num depth) INCISE_REALTIME;
 
 /* Handle or tube at this tick: it opens the cut that it is in, met. @flat: its side, unit. */
-void T(incision_open)(struct T(incision) * incision,
-		      const struct T(incision_setup) * setup, enum incise_tool tool,
-		      const num proxy[3], const dir flat[3], num depth) INCISE_REALTIME;
+void T(incision_open)(struct T(incision) *incision, const struct T(incision_setup) *setup,
+		      enum incise_tool tool, const num proxy[3], const dir flat[3],
+		      num depth) INCISE_REALTIME;
 
 /* Neither is in the tissue. */
-void T(incision_leave)(struct T(incision) * incision) INCISE_REALTIME;
+void T(incision_leave)(struct T(incision) *incision) INCISE_REALTIME;
 
 /* The opening for a tool at a place of the surface. */
-void T(incision_find)(const struct T(incision) * incision,
-		      const struct T(incision_setup) * setup, enum incise_tool tool,
-		      const num at[3], struct T(opening) * opening) INCISE_REALTIME;
+void T(incision_find)(const struct T(incision) *incision,
+		      const struct T(incision_setup) *setup, enum incise_tool tool,
+		      const num at[3], struct T(opening) *opening) INCISE_REALTIME;
 
 /*
  * The share of a handle's width or a tube's diameter that an opening must still give, 0 … 1: of a
  * handle 1 where nothing has widened the cut, of a tube less, as the tissue stretches; 0 where it is as
  * wide as the tool less what the tissue stretches.
  */
-num T(incision_tightness)(const struct T(incision_setup) * setup,
-			  const struct T(opening) * opening,
+num T(incision_tightness)(const struct T(incision_setup) *setup,
+			  const struct T(opening) *opening,
 			  enum incise_tool tool) INCISE_REALTIME;
 
 /* --- tick.proto.c ------------------------------------------------------------------------- */
@@ -256,7 +256,18 @@ struct T(numbers) {
 	 */
 	int32_t inputs;
 	int32_t phases; /* models besides that of the cut: T_PUNCTURES, T_WITHDRAWS */
-	int32_t reserved[7];
+#define FORCE(...)
+#define NUMBER(...)
+#define MORE(member) num member;
+#include "forces.def"
+#undef MORE
+#define MORE(member) -1
+	int32_t reserved[7
+#include "forces.def"
+	];
+#undef MORE
+#undef NUMBER
+#undef FORCE
 };
 
 /* A pose of the tracker. */
@@ -319,6 +330,7 @@ struct T(state) {
 		num depth;   /* of the plane, below the skin */
 		int32_t punctured;
 	} membrane;
+	num anchor[3];	       /* of the skin that drags */
 	num force[3];	       /* of the tissue, before limits */
 	num last[3];	       /* what was rendered */
 	num place[T_AXES_MAX]; /* of the handle along each axis, from its origin */
@@ -348,20 +360,20 @@ struct T(plan);
 /* --- what a kind of plan has beside this: its surface and its model --- */
 
 /* Follow the tool: touching, began; with those the touch, and the first one. */
-void T(surface_move)(const struct T(plan) * plan, struct T(proxy) * proxy,
+void T(surface_move)(const struct T(plan) *plan, struct T(proxy) *proxy,
 		     const num tool[3]) INCISE_REALTIME;
 
 /* Height of a place above the surface. */
-num T(surface_above)(const struct T(plan) * plan, const num place[3]) INCISE_REALTIME;
+num T(surface_above)(const struct T(plan) *plan, const num place[3]) INCISE_REALTIME;
 
 /* The next place is the tool's first. */
-void T(surface_restart)(const struct T(plan) * plan) INCISE_REALTIME;
+void T(surface_restart)(const struct T(plan) *plan) INCISE_REALTIME;
 
 /* The inputs of a phase's model (enum incise_cutting_phase), as numbers.inputs has them. */
-uint32_t T(model_inputs)(const struct T(plan) * plan, int32_t phase) INCISE_REALTIME;
+uint32_t T(model_inputs)(const struct T(plan) *plan, int32_t phase) INCISE_REALTIME;
 
 /* Its force, N; sets @outside where an input is beyond its range. */
-num T(model_force)(const struct T(plan) * plan, int32_t phase, const num *x,
+num T(model_force)(const struct T(plan) *plan, int32_t phase, const num *x,
 		   bool *outside) INCISE_REALTIME;
 
 /*
@@ -377,20 +389,31 @@ num T(input_time)(int64_t t_ns, int64_t from_ns) INCISE_REALTIME;
 /* --- ticks --- */
 
 /* Start without a pose, a contact or a cut. */
-void T(plan_begin)(const struct T(plan) * plan, struct T(state) * state);
+void T(plan_begin)(const struct T(plan) *plan, struct T(state) *state);
 
 /*
  * Take a pose in, before the tick; one from the future counts as of now. Any numbers are safe.
  */
-enum incise_fixed_pose_answer T(plan_pose)(const struct T(plan) * plan,
-					   struct T(state) * state,
-					   const struct T(pose) * pose,
+enum incise_fixed_pose_answer T(plan_pose)(const struct T(plan) *plan,
+					   struct T(state) *state,
+					   const struct T(pose) *pose,
 					   int64_t now_ns) INCISE_REALTIME;
 
 /* The stages of a tick, in their order. */
-typedef void T(stage_fn)(const struct T(plan) * plan, struct T(state) * state,
-			 struct T(tick) * tick) INCISE_REALTIME;
-T(stage_fn)
-T(stage_predict), T(stage_tool), T(stage_contact), T(stage_normal), T(stage_incision),
-	T(stage_membrane), T(stage_reaction), T(stage_plane), T(stage_damping),
-	T(stage_insertion), T(stage_spread), T(stage_start), T(stage_limit);
+typedef void T(stage_fn)(const struct T(plan) *plan, struct T(state) *state,
+			 struct T(tick) *tick) INCISE_REALTIME;
+T(stage_fn) T(stage_predict);
+T(stage_fn) T(stage_tool);
+T(stage_fn) T(stage_contact);
+T(stage_fn) T(stage_normal);
+T(stage_fn) T(stage_incision);
+T(stage_fn) T(stage_membrane);
+#define FORCE(row, name, ...) T(stage_fn) T(stage_##name);
+#define NUMBER(...)
+#define MORE(member)
+#include "forces.def"
+#undef MORE
+#undef NUMBER
+#undef FORCE
+T(stage_fn) T(stage_start);
+T(stage_fn) T(stage_limit);

@@ -26,18 +26,14 @@ static double any(double least, double most)
 	       (most - least) * (incise_fx_trial_next(&trial.seed) >> 11) * 0x1p-53;
 }
 
-/* A place, and its double to the last bit. */
-static void any_place(int32_t p[3], double p_mm[3], double most)
+static void any_place(int32_t p[3], double most)
 {
-	for (int i = 0; i < 3; i++) {
+	for (int i = 0; i < 3; i++)
 		p[i] = fixed(any(-most, most));
-		p_mm[i] = p[i] / ONE;
-	}
 }
 
-static void any_unit(int32_t unit[3], double to[3])
+static void from_unit(double to[3], const int32_t unit[3])
 {
-	incise_fx_trial_unit(&trial, unit, 3);
 	for (int i = 0; i < 3; i++)
 		to[i] = unit[i] / UNIT;
 }
@@ -81,116 +77,97 @@ static struct incise_fixed_tick tick_in(enum incise_phase phase)
 	return (struct incise_fixed_tick){.phase = phase};
 }
 
-/* K depth n: the product and each part are rounded once. */
-TEST(test_reaction, begin)
+/* A state and a place of the tool as any may be. */
+static struct incise_fixed_tick any_state(enum incise_phase phase)
 {
-	for (int k = 0; k < CASES; k++) {
-		struct incise_fixed_plan plan = {.numbers.reaction = fixed(any(0, 5))};
-		struct incise_fixed_tick tick = tick_in(INCISE_PHASE_CUTTING);
-		double n[3], want[3], got[3];
+	struct incise_fixed_tick tick = tick_in(phase);
 
-		any_unit(tick_state.normal, n);
-		tick_state.depth = fixed(any(0, 50));
-		effect(got, &plan, incise_fixed_stage_reaction, &tick);
-		for (int i = 0; i < 3; i++)
-			want[i] = plan.numbers.reaction / ONE * (tick_state.depth / ONE) *
-				  n[i];
-		assert_force(got, want, LSB);
-	}
+	any_place(tick.tool, 20);
+	any_place(tick_state.p0, 20);
+	any_place(tick_state.velocity, 500);
+	incise_fx_trial_unit(&trial, tick_state.normal, 3);
+	incise_fx_trial_unit(&trial, tick_state.side, 3);
+	incise_fx_trial_unit(&trial, tick_state.flat, 3);
+	incise_fx_trial_unit(&trial, tick_state.opening.along, 3);
+	tick_state.held = any(0, 3) < 1 ? INCISE_TOOL_TUBE : INCISE_TOOL_HANDLE;
+	tick_state.opening.in = any(0, 2) < 1;
+	tick_state.opening.depth_mm = fixed(any(0, 20));
+	tick_state.tightness = fixed(any(0, 1));
+	tick_state.depth = fixed(any(0, 30));
+	return tick;
 }
 
-/* Against the spring in double, within the bound that is certified for it. */
-TEST(test_plane, begin)
+/* Depth of skin that holds up as much: beside the cut all, in it Fort of that as deep as the cut is. */
+static double held_up_mm(double aligned, const double flat[3], const double along[3])
 {
-	for (int k = 0; k < CASES; k++) {
-		double K = any(0, 5), p[3], p0[3], s[3], off[3], want[3], got[3];
-		struct incise_fixed_plan plan = {.numbers.plane = fixed(K)};
-		struct incise_fixed_tick tick = tick_in(INCISE_PHASE_CUTTING);
+	double depth = tick_state.depth / ONE, cut = 0, eased;
 
-		any_place(tick.tool, p, 20);
-		any_place(tick_state.p0, p0, 20);
-		any_unit(tick_state.side, s);
-		effect(got, &plan, incise_fixed_stage_plane, &tick);
-		for (int i = 0; i < 3; i++)
-			off[i] = p[i] - p0[i];
-		for (int i = 0; i < 3; i++)
-			want[i] = -K * dot(off, s) * s[i];
-		/* 40 mm along each axis. */
-		assert_force(got, want, incise_fixed_spring_bound(K, 40 * sqrt(3)));
-	}
+	if (tick_state.opening.in)
+		cut = fmin(depth, tick_state.opening.depth_mm / ONE);
+	eased = aligned + (1 - aligned) * (tick_state.tightness / ONE) *
+				  (tick_state.held == INCISE_TOOL_TUBE
+					   ? 1
+					   : fabs(dot(flat, along)));
+	return depth - cut + eased * cut;
 }
 
-TEST(test_damping, begin)
+/*
+ * Each force within its roundings: of a reaction its product and each part; of the plane as it is
+ * certified for a spring; of a spread the part along n, the vector across and the product; of an
+ * insertion 2 LSB of Fort times 20 mm and 2 N/mm, and the rest by one each.
+ */
+TEST(test_forces, begin)
 {
 	for (int k = 0; k < CASES; k++) {
+		double K = fixed(any(0, 2)) / ONE, aligned = fixed(any(0, 1)) / ONE;
+		double damping = lrint(any(0, 0.01) * 268435456) / 268435456.0;
+		double off[3], n[3], s[3], flat[3], along[3], depth, held, want[5][3];
+		struct incise_fixed_tick cutting = any_state(INCISE_PHASE_CUTTING),
+					 inserting = cutting;
 		struct incise_fixed_plan plan = {
-			.numbers.damping = (int32_t)lrint(any(0, 0.01) * 268435456)};
-		struct incise_fixed_tick tick =
-			tick_in(k & 1 ? INCISE_PHASE_CUTTING : INCISE_PHASE_INSERTION);
-		double v[3], want[3], got[3];
+			.numbers = {.reaction = fixed(K),
+				    .plane = fixed(K),
+				    .insertion = fixed(K),
+				    .aligned = fixed(aligned),
+				    .spread = fixed(K),
+				    .damping = (int32_t)lrint(damping * 268435456)}};
+		const struct {
+			incise_fixed_stage_fn *stage;
+			struct incise_fixed_tick *tick;
+			double most;
+		} forces[] = {
+			{incise_fixed_stage_reaction, &cutting, LSB},
+			/* 40 mm along each axis. */
+			{incise_fixed_stage_plane, &cutting,
+			 incise_fixed_spring_bound(K, 40 * sqrt(3))},
+			{incise_fixed_stage_damping, &cutting, LSB},
+			{incise_fixed_stage_insertion, &inserting,
+			 (2 * 20 * K + K + 1.5) * LSB},
+			{incise_fixed_stage_spread, &inserting, (K + 0.5) * LSB + 1e-9},
+		};
 
-		any_place(tick_state.velocity, v, 500);
-		effect(got, &plan, incise_fixed_stage_damping, &tick);
+		inserting.phase = INCISE_PHASE_INSERTION;
+		from_unit(n, tick_state.normal);
+		from_unit(s, tick_state.side);
+		from_unit(flat, tick_state.flat);
+		from_unit(along, tick_state.opening.along);
 		for (int i = 0; i < 3; i++)
-			want[i] = -plan.numbers.damping / 268435456.0 * v[i];
-		assert_force(got, want, LSB);
-	}
-}
-
-/* -K (off - (off·n) n): the part along n, the vector across and the product are rounded. */
-TEST(test_spread, begin)
-{
-	for (int k = 0; k < CASES; k++) {
-		struct incise_fixed_plan plan = {.numbers.spread = fixed(any(0, 2))};
-		struct incise_fixed_tick tick = tick_in(INCISE_PHASE_INSERTION);
-		double K = plan.numbers.spread / ONE, p[3], p0[3], n[3], off[3], want[3],
-		       got[3];
-
-		any_place(tick.tool, p, 20);
-		any_place(tick_state.p0, p0, 20);
-		any_unit(tick_state.normal, n);
-		effect(got, &plan, incise_fixed_stage_spread, &tick);
-		for (int i = 0; i < 3; i++)
-			off[i] = p[i] - p0[i];
-		for (int i = 0; i < 3; i++)
-			want[i] = -K * (off[i] - dot(off, n) * n[i]);
-		assert_force(got, want, (K + 0.5) * LSB + 1e-9);
-	}
-}
-
-/* Beside the cut K depth; in it only Fort of that as deep as the cut is; below it K again. */
-TEST(test_insertion, begin)
-{
-	for (int k = 0; k < CASES; k++) {
-		struct incise_fixed_plan plan = {
-			.numbers = {.insertion = fixed(any(0, 2)),
-				    .aligned = fixed(any(0, 1))}};
-		struct incise_fixed_tick tick = tick_in(INCISE_PHASE_INSERTION);
-		double K = plan.numbers.insertion / ONE,
-		       aligned = plan.numbers.aligned / ONE;
-		double n[3], flat[3], along[3], tight, eased, depth, cut, want[3], got[3];
-
-		any_unit(tick_state.normal, n);
-		any_unit(tick_state.flat, flat);
-		any_unit(tick_state.opening.along, along);
-		tick_state.held = k % 3 ? INCISE_TOOL_HANDLE : INCISE_TOOL_TUBE;
-		tick_state.opening.in = k & 1;
-		tick_state.opening.depth = fixed(any(0, 20));
-		tick_state.tightness = fixed(any(0, 1));
-		tick_state.depth = fixed(any(0, 30));
-		tight = tick_state.tightness / ONE;
-		eased = aligned + (1 - aligned) * tight *
-					  (tick_state.held == INCISE_TOOL_TUBE
-						   ? 1
-						   : fabs(dot(flat, along)));
+			off[i] = (cutting.tool[i] - tick_state.p0[i]) / ONE;
 		depth = tick_state.depth / ONE;
-		cut = tick_state.opening.in ? fmin(depth, tick_state.opening.depth / ONE)
-					    : 0;
-		effect(got, &plan, incise_fixed_stage_insertion, &tick);
-		for (int i = 0; i < 3; i++)
-			want[i] = K * (depth - cut + eased * cut) * n[i];
-		/* Fort is off by 2 LSB, times 20 mm and 2 N/mm; the rest by one each. */
-		assert_force(got, want, (2 * 20 * K + K + 1.5) * LSB);
+		held = held_up_mm(aligned, flat, along);
+		for (int i = 0; i < 3; i++) {
+			want[0][i] = K * depth * n[i];
+			want[1][i] = -K * dot(off, s) * s[i];
+			want[2][i] = -damping * tick_state.velocity[i] / ONE;
+			want[3][i] = K * held * n[i];
+			want[4][i] = -K * (off[i] - dot(off, n) * n[i]);
+		}
+		for (int f = 0; f < 5; f++) {
+			double got[3];
+
+			effect(got, &plan, forces[f].stage, forces[f].tick);
+			assert_force(got, want[f], forces[f].most);
+		}
 	}
 }
 
@@ -229,82 +206,6 @@ TEST(test_membrane, begin)
 		if (way[k].beyond > 0)
 			assert_int_equal(tick_state.depth, 10 << 16);
 	}
-}
-
-/* No force acts in a phase that is not its own. */
-TEST(test_phases, begin)
-{
-	static const struct {
-		incise_fixed_stage_fn *stage;
-		bool acts[3];
-	} stages[] = {
-		{incise_fixed_stage_reaction, {false, true, false}},
-		{incise_fixed_stage_plane, {false, true, false}},
-		{incise_fixed_stage_damping, {false, true, true}},
-		{incise_fixed_stage_insertion, {false, false, true}},
-		{incise_fixed_stage_spread, {false, false, true}},
-	};
-	struct incise_fixed_plan plan = {.numbers = {.reaction = 1 << 16,
-						     .plane = 1 << 16,
-						     .damping = 1 << 20,
-						     .insertion = 1 << 16,
-						     .aligned = 1 << 16,
-						     .spread = 1 << 16}};
-
-	for (size_t k = 0; k < sizeof(stages) / sizeof(*stages); k++)
-		for (int phase = 0; phase < 3; phase++) {
-			struct incise_fixed_tick tick = tick_in((enum incise_phase)phase);
-			double got[3];
-
-			tick_state.depth = 3 << 16;
-			tick_state.held = INCISE_TOOL_HANDLE;
-			for (int i = 0; i < 3; i++) {
-				tick_state.normal[i] = tick_state.side[i] =
-					i == 2 ? INCISE_FIXED_UNIT : 0;
-				tick_state.velocity[i] = tick.tool[i] = 5 << 16;
-			}
-			effect(got, &plan, stages[k].stage, &tick);
-			assert_int_equal(got[0] != 0 || got[1] != 0 || got[2] != 0,
-					 stages[k].acts[phase]);
-		}
-}
-
-/* A force waits for a small one, rises in a tenth each tick at most, and goes in fade_ns. */
-TEST(test_start, begin)
-{
-	struct incise_fixed_plan plan = {
-		.numbers = {.small = 1 << 12, .ramp_ns = 20000000, .fade_ns = 50000000}};
-	struct incise_fixed_tick tick;
-	int64_t t_ns = 1000000;
-	int ticks = 0;
-
-	tick_state.force[2] = 1 << 16;
-	for (int k = 0; k < 100; k++, t_ns += 1000000) {
-		tick = (struct incise_fixed_tick){.t_ns = t_ns};
-		incise_fixed_stage_start(&plan, &tick_state, &tick);
-		assert_int_equal(tick.command[2], 0);
-		assert_true(tick.flags & INCISE_TICK_STARTING);
-	}
-	tick_state.force[2] = 1 << 12;
-	do {
-		tick = (struct incise_fixed_tick){.t_ns = t_ns += 1000000};
-		incise_fixed_stage_start(&plan, &tick_state, &tick);
-		tick_state.force[2] = 1 << 16;
-		ticks++;
-	} while (tick.flags & INCISE_TICK_STARTING);
-	/* 20 ticks, and what rounding down of each leaves. */
-	assert_in_range(ticks, 20, 21);
-	assert_int_equal(tick.command[2], 1 << 16);
-	for (ticks = 0; tick.command[2]; ticks++) {
-		tick = (struct incise_fixed_tick){.t_ns = t_ns += 1000000,
-						  .flags = INCISE_TICK_STALE};
-		incise_fixed_stage_start(&plan, &tick_state, &tick);
-	}
-	assert_in_range(ticks, 50, 51);
-	/* A tick that comes late is no reason for a leap. */
-	tick = (struct incise_fixed_tick){.t_ns = t_ns += 1000000000};
-	incise_fixed_stage_start(&plan, &tick_state, &tick);
-	assert_in_range(tick.command[2], 1, (1 << 16) / 10 + 1);
 }
 
 static double length_of(const int32_t v[3])

@@ -57,7 +57,7 @@ struct lacking {
 
 static bool has(const struct lacking *w, const struct incise_tissue_force *force)
 {
-	if (force->model && w->model)
+	if (w->model && !strcmp(force->name, "reaction"))
 		return false;
 	if (!w->force)
 		return true;

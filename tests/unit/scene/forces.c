@@ -18,55 +18,64 @@ struct given {
 	double made[3], axis[3];
 	bool in, printed;
 	double cut, along[3], tightness;
-	double number[INCISE_FORCES_MAX], aligned;
+	double number[INCISE_FORCES_MAX][INCISE_FORCE_NUMBERS];
 };
 
+#define FORCE(...)
+#define MORE(member)
+#define Q16 65536.0
+#define Q28 268435456.0
+
+static void give_double(const struct given *g, struct incise_double_numbers *to)
+{
+#define NUMBER(row, i, member, ...) to->member = g->number[INCISE_FORCE_##row][i];
+#include "../../../lib/tissue/forces.def"
+#undef NUMBER
+}
+
+static void give_fixed(const struct given *g, struct incise_fixed_numbers *to)
+{
+#define NUMBER(row, i, member, scale, ...) \
+	to->member = (int32_t)lrint(scale * g->number[INCISE_FORCE_##row][i]);
+#include "../../../lib/tissue/forces.def"
+#undef NUMBER
+}
+
 /* Add a force to what is there: the same in both kinds of numbers. */
-#define ADD(kind, n, d, back)                                                           \
-	static void add_##kind(const struct given *g, int row, double force[3])         \
-	{                                                                               \
-		const double *number = g->number;                                       \
-		struct incise_##kind##_plan plan = {                                    \
-			.numbers = {                                                    \
-				.reaction = n(number[INCISE_FORCE_REACTION]),           \
-				.plane = n(number[INCISE_FORCE_PLANE]),                 \
-				.damping = damper_##kind(number[INCISE_FORCE_DAMPING]), \
-				.insertion = n(number[INCISE_FORCE_INSERTION]),         \
-				.spread = n(number[INCISE_FORCE_SPREAD]),               \
-				.aligned = n(g->aligned),                               \
-				.printed = g->printed,                                  \
-			}};                                                             \
-		static struct incise_##kind##_state state;                              \
-		struct incise_##kind##_tick tick = {.phase = (int32_t)g->phase};        \
-                                                                                        \
-		memset(&state, 0, sizeof(state));                                       \
-		state.held = (int32_t)g->held;                                          \
-		state.depth = n(g->depth);                                              \
-		state.opening.in = g->in;                                               \
-		state.opening.depth_mm = n(g->cut);                                     \
-		state.tightness = n(g->tightness);                                      \
-		for (int i = 0; i < 4; i++)                                             \
-			state.attitude[i] = d(g->attitude[i]);                          \
-		for (int i = 0; i < 3; i++) {                                           \
-			tick.tool[i] = n(g->p[i]);                                      \
-			state.p0[i] = n(g->p0[i]);                                      \
-			state.velocity[i] = n(g->v[i]);                                 \
-			state.normal[i] = d(g->normal[i]);                              \
-			state.side[i] = d(g->side[i]);                                  \
-			state.flat[i] = d(g->flat[i]);                                  \
-			state.opening.along[i] = d(g->along[i]);                        \
-			plan.numbers.axis[i] = d(g->axis[i]);                           \
-			plan.numbers.side[i] = d(g->made[i]);                           \
-			state.force[i] = n(force[i]);                                   \
-		}                                                                       \
-		incise_tissue_forces[row].stage.in_##kind(&plan, &state, &tick);        \
-		for (int i = 0; i < 3; i++)                                             \
-			force[i] = state.force[i] back;                                 \
+#define ADD(kind, n, d, back)                                                       \
+	static void add_##kind(const struct given *g, int row, double force[3])     \
+	{                                                                           \
+		struct incise_##kind##_plan plan = {.numbers.printed = g->printed}; \
+		static struct incise_##kind##_state state;                          \
+		struct incise_##kind##_tick tick = {.phase = (int32_t)g->phase};    \
+                                                                                    \
+		give_##kind(g, &plan.numbers);                                      \
+		memset(&state, 0, sizeof(state));                                   \
+		state.held = (int32_t)g->held;                                      \
+		state.depth = n(g->depth);                                          \
+		state.opening.in = g->in;                                           \
+		state.opening.depth_mm = n(g->cut);                                 \
+		state.tightness = n(g->tightness);                                  \
+		for (int i = 0; i < 4; i++)                                         \
+			state.attitude[i] = d(g->attitude[i]);                      \
+		for (int i = 0; i < 3; i++) {                                       \
+			tick.tool[i] = n(g->p[i]);                                  \
+			state.p0[i] = n(g->p0[i]);                                  \
+			state.velocity[i] = n(g->v[i]);                             \
+			state.normal[i] = d(g->normal[i]);                          \
+			state.side[i] = d(g->side[i]);                              \
+			state.flat[i] = d(g->flat[i]);                              \
+			state.opening.along[i] = d(g->along[i]);                    \
+			plan.numbers.axis[i] = d(g->axis[i]);                       \
+			plan.numbers.side[i] = d(g->made[i]);                       \
+			state.force[i] = n(force[i]);                               \
+		}                                                                   \
+		incise_tissue_forces[row].stage.in_##kind(&plan, &state, &tick);    \
+		for (int i = 0; i < 3; i++)                                         \
+			force[i] = state.force[i] back;                             \
 	}
 
 #define AS_IS(x) (x)
-#define damper_double AS_IS
-#define damper_fixed q28
 #define in_fixed in_integers
 
 static int32_t q16(double x)
@@ -77,11 +86,6 @@ static int32_t q16(double x)
 static int32_t q30(double x)
 {
 	return (int32_t)lrint(x * 1073741824);
-}
-
-static int32_t q28(double x)
-{
-	return (int32_t)lrint(x * 268435456);
 }
 
 /* clang-format off */
@@ -104,7 +108,7 @@ static void reaction(double force[3], double size_N, const double n[3])
 {
 	struct given g = {.phase = INCISE_PHASE_CUTTING,
 			  .depth = size_N,
-			  .number[INCISE_FORCE_REACTION] = 1};
+			  .number[INCISE_FORCE_REACTION][0] = 1};
 
 	v3_copy(g.normal, n);
 	kind->add(&g, INCISE_FORCE_REACTION, force);
@@ -114,7 +118,7 @@ static void plane(double force[3], double k_N_mm, const double p[3], const doubl
 		  const double side[3])
 {
 	struct given g = {.phase = INCISE_PHASE_CUTTING,
-			  .number[INCISE_FORCE_PLANE] = k_N_mm};
+			  .number[INCISE_FORCE_PLANE][0] = k_N_mm};
 
 	v3_copy(g.p, p);
 	v3_copy(g.p0, p0);
@@ -125,7 +129,7 @@ static void plane(double force[3], double k_N_mm, const double p[3], const doubl
 static void damping(double force[3], double k_N_s_mm, const double v[3])
 {
 	struct given g = {.phase = INCISE_PHASE_CUTTING,
-			  .number[INCISE_FORCE_DAMPING] = k_N_s_mm};
+			  .number[INCISE_FORCE_DAMPING][0] = k_N_s_mm};
 
 	v3_copy(g.v, v);
 	kind->add(&g, INCISE_FORCE_DAMPING, force);
@@ -135,7 +139,7 @@ static void spread(double force[3], double k_N_mm, const double p[3], const doub
 		   const double n[3])
 {
 	struct given g = {.phase = INCISE_PHASE_INSERTION,
-			  .number[INCISE_FORCE_SPREAD] = k_N_mm};
+			  .number[INCISE_FORCE_SPREAD][0] = k_N_mm};
 
 	v3_copy(g.p, p);
 	v3_copy(g.p0, p0);
@@ -153,8 +157,7 @@ static double orientation(const double flat[3], const double along[3], double al
 			  .in = true,
 			  .cut = 1,
 			  .tightness = 1,
-			  .aligned = aligned,
-			  .number[INCISE_FORCE_INSERTION] = 1};
+			  .number[INCISE_FORCE_INSERTION] = {1, aligned}};
 	double force[3] = {0};
 
 	v3_copy(g.flat, flat);
@@ -515,12 +518,12 @@ static struct given given_in_tissue(enum incise_phase phase)
 		.cut = 2,
 		.along = {1, 0, 0},
 		.tightness = 1,
-		.aligned = 0.2,
-		.number = {[INCISE_FORCE_REACTION] = 0.5,
-			   [INCISE_FORCE_PLANE] = 0.25,
-			   [INCISE_FORCE_DAMPING] = 0.01,
-			   [INCISE_FORCE_INSERTION] = 0.75,
-			   [INCISE_FORCE_SPREAD] = 0.125},
+		.number = {[INCISE_FORCE_REACTION] = {0.5},
+			   [INCISE_FORCE_PLANE] = {0.25},
+			   [INCISE_FORCE_DAMPING] = {0.01},
+			   [INCISE_FORCE_INSERTION] = {0.75, 0.2},
+			   [INCISE_FORCE_SPREAD] = {0.125},
+			   [INCISE_FORCE_SKIN] = {0.5, 0.1}},
 	};
 }
 
@@ -537,6 +540,10 @@ TEST(test_each_force_has_its_phases)
 		/* The flat side along the cut: aligned. */
 		{"insertion", {0}, {0, 0, 0.3}},
 		{"spread", {0}, {-0.125, -0.125, 0}},
+		/* It slips: a tenth of the 3 N that are there, against √2 mm of stretch. */
+		{"skin",
+		 {-0.3 * M_SQRT1_2, -0.3 * M_SQRT1_2, 0},
+		 {-0.3 * M_SQRT1_2, -0.3 * M_SQRT1_2, 0}},
 	};
 	assert_int_equal(sizeof(cases) / sizeof(*cases), incise_n_tissue_forces);
 	for (int i = 0; i < incise_n_tissue_forces; i++)

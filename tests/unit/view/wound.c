@@ -136,15 +136,14 @@ struct painted {
 
 static void painted_new(struct painted *p, const struct field *field)
 {
-	const struct incise_incision_setup setup = {.cut_from_mm = 0.5,
-						    .stretch_mm = STRETCH_MM,
-						    .cuts_most = 8,
-						    .side = {0, 1, 0},
-						    .handle_width_mm = 10,
-						    .handle_thickness_mm = 3,
-						    .tube_mm = 7};
+	const struct incise_double_incision_setup setup = {.cuts_most = 8,
+							   .cut_from = 0.5,
+							   .stretch = STRETCH_MM,
+							   .handle_width = 10,
+							   .handle_thickness = 3,
+							   .tube = 7};
 
-	p->incision = incise_incision_make(&setup, NULL);
+	p->incision = incise_incision_make(&setup, (const double[]){0, 1, 0}, NULL);
 	assert_non_null(p->incision);
 	p->base = calloc(SIDE * SIDE, 4);
 	p->canvas = incise_canvas_new(SIDE, p->base, NULL);

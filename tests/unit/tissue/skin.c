@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+/*
+ * Friction along the skin, in both kinds of numbers: never more than its share of the force along the normal, no
+ * work given back, no creep while a hand rests; and integers stay with double while a tool creeps along the skin
+ * by less than their last bit.
+ */
+#include "../unit.h"
+#include "../../../lib/tissue/tick.h"
+
+#define K_N_mm 0.3
+#define SHARE 0.4
+#define LSB 0x1p-16
+/* Of a contact: a stretch and a product to half a bit, a direction to 2^-30, the anchor to 2^-33 a tick. */
+#define ROUNDING_N (8 * LSB)
+
+struct both {
+	struct incise_double_plan plan;
+	struct incise_double_state state;
+	struct incise_fixed_plan fixed;
+	struct incise_fixed_state fixed_state;
+};
+
+static void begin(struct both *b)
+{
+	memset(b, 0, sizeof(*b));
+	b->plan.numbers.skin = lrint(K_N_mm / LSB) * LSB;
+	b->plan.numbers.skin_friction = lrint(SHARE / LSB) * LSB;
+	b->fixed.numbers.skin = (int32_t)lrint(K_N_mm / LSB);
+	b->fixed.numbers.skin_friction = (int32_t)lrint(SHARE / LSB);
+	b->state.normal[2] = 1;
+	b->fixed_state.normal[2] = 1 << 30;
+	b->state.proxy.began = b->fixed_state.proxy.began = true;
+}
+
+/* The drag of both with the tool at x, y, on a plane that pushes with @normal_N. */
+static void drag(struct both *b, const double at_mm[2], double normal_N, double force[2],
+		 double fixed[2])
+{
+	struct incise_double_tick tick = {.phase = INCISE_PHASE_CUTTING, .tool[2] = -1};
+	struct incise_fixed_tick fixed_tick = {.phase = INCISE_PHASE_CUTTING,
+					       .tool[2] = -65536};
+	double push = lrint(normal_N / LSB) * LSB;
+
+	for (int i = 0; i < 3; i++)
+		b->state.force[i] = b->fixed_state.force[i] = 0;
+	b->state.force[2] = push;
+	b->fixed_state.force[2] = (int32_t)lrint(push / LSB);
+	for (int i = 0; i < 2; i++) {
+		fixed_tick.tool[i] = (int32_t)lrint(at_mm[i] / LSB);
+		tick.tool[i] = fixed_tick.tool[i] * LSB;
+	}
+	incise_double_stage_skin(&b->plan, &b->state, &tick);
+	incise_fixed_stage_skin(&b->fixed, &b->fixed_state, &fixed_tick);
+	b->state.proxy.began = b->fixed_state.proxy.began = false;
+	for (int i = 0; i < 2; i++) {
+		force[i] = b->state.force[i];
+		fixed[i] = b->fixed_state.force[i] * LSB;
+	}
+	/* It acts along the skin only, and within its share. */
+	assert_true(b->state.force[2] == push);
+	assert_true(hypot(force[0], force[1]) <= SHARE * push + 2 * LSB);
+	assert_true(hypot(fixed[0], fixed[1]) <= SHARE * push + 4 * LSB);
+	for (int i = 0; i < 2; i++)
+		if (!(fabs(force[i] - fixed[i]) <= ROUNDING_N))
+			fail_msg("at %.6f, %.6f mm: %.9f N, in integers %.9f", at_mm[0],
+				 at_mm[1], force[i], fixed[i]);
+}
+
+static double any(double most)
+{
+	return most * (2.0 * rand() / RAND_MAX - 1);
+}
+
+/* Closed walks of random steps and stops, at a constant force: what is put in is at least what comes back. */
+TEST(test_takes_work_and_rests)
+{
+	srand(1);
+	for (int run = 0; run < 200; run++) {
+		double way[200][2] = {{0}}, force[2], last[2] = {0}, fixed[2];
+		double normal_N = fabs(any(5)), in_N_mm = 0, fixed_N_mm = 0,
+		       fixed_last[2] = {0};
+		struct both b;
+
+		begin(&b);
+		for (int k = 1; k < 199; k++)
+			for (int i = 0; i < 2; i++)
+				way[k][i] =
+					lrint((way[k - 1][i] + (k % 7 ? any(0.4) : 0)) /
+					      LSB) *
+					LSB;
+		for (int k = 0; k < 200; k++) {
+			drag(&b, way[k], normal_N, force, fixed);
+			for (int i = 0; i < 2 && k; i++) {
+				double step = way[k][i] - way[k - 1][i];
+
+				/* Trapezium: the force is linear while it sticks. */
+				in_N_mm -= (force[i] + last[i]) / 2 * step;
+				fixed_N_mm -= (fixed[i] + fixed_last[i]) / 2 * step;
+			}
+			if (k && way[k][0] == way[k - 1][0] &&
+			    way[k][1] == way[k - 1][1]) {
+				assert_true(force[0] == last[0] && force[1] == last[1]);
+				assert_true(fixed[0] == fixed_last[0] &&
+					    fixed[1] == fixed_last[1]);
+			}
+			memcpy(last, force, sizeof(last));
+			memcpy(fixed_last, fixed, sizeof(last));
+		}
+		/* The spring may hold its own energy still: F²/2K. */
+		assert_true(in_N_mm >= -1e-12);
+		assert_true(fixed_N_mm >= -200 * 0.8 * ROUNDING_N);
+	}
+}
+
+/* So slowly that each step is less than a bit; round, so that rounding would pull the anchor aside. */
+TEST(test_creeps_with_double)
+{
+	double force[2], fixed[2], at_mm[2];
+	struct both b;
+
+	begin(&b);
+	for (int k = 0; k < 300000; k++) {
+		at_mm[0] = 2 * cos(k * 3e-6);
+		at_mm[1] = 2 * sin(k * 3e-6);
+		drag(&b, at_mm, 1 + 0.5 * sin(k * 1e-4), force, fixed);
+	}
+	/* It slipped, and drags against the way. */
+	assert_true(hypot(force[0], force[1]) > 0.1);
+}
