@@ -14,6 +14,7 @@ static void take_pose(struct incise_plan *plan, bool tube,
 		.tool = (uint32_t)plan->wanted | (tube ? INCISE_FIXED_POSE_TUBE : 0) |
 			(plan->fading ? INCISE_FIXED_POSE_FADE : 0),
 	};
+	double size = 0;
 
 	if (!v3_finite(sample->position_mm))
 		return;
@@ -21,9 +22,9 @@ static void take_pose(struct incise_plan *plan, bool tube,
 		pose.position[i] = n_from(sample->position_mm[i]);
 	/* One that is no quaternion leaves the attitude as it was; 0 would be no pose. */
 	for (int i = 0; i < 4; i++)
-		pose.quaternion[i] = isfinite(sample->quaternion[i])
-					     ? d_from(sample->quaternion[i])
-					     : 0;
+		size += fabs(sample->quaternion[i]);
+	for (int i = 0; i < 4; i++)
+		pose.quaternion[i] = isfinite(size) ? d_from(sample->quaternion[i]) : 0;
 	if (!(pose.quaternion[0] > 0 || pose.quaternion[0] < 0))
 		pose.quaternion[0] = D_LEAST;
 	T(plan_pose)(&OWN(plan)->plan, &OWN(plan)->state, &pose, now_ns);

@@ -147,6 +147,32 @@ TEST(test_tip_of_the_calibration)
 	assert_true(fabs(got[2] - 23) < 1e-12);
 }
 
+/* Its other parts are none either. */
+TEST(test_quaternion_with_a_part_that_is_none)
+{
+	static const double none[][4] = {
+		{1, NAN}, {1, 0, 0, INFINITY}, {0, 1, -INFINITY}, {NAN, 0, 1}, {0}};
+	struct incise_tracker_sample sample = {.quaternion = {M_SQRT1_2, M_SQRT1_2}};
+	struct incise_plan plan = made_plan();
+	const struct incise_double_tick *got = &plan.doubles.tick;
+
+	plan.poses.fed = &sample;
+	assert_int_equal(incise_plan_set_tip(&plan, (double[]){10, 20, 0}), 0);
+	for (int i = -1; i < (int)(sizeof(none) / sizeof(*none)); i++) {
+		struct incise_tick tick = {.t_ns = 1100000000 + i * 10000000};
+
+		plan.poses.n_fed = 1;
+		sample.t_ns = tick.t_ns;
+		if (i >= 0)
+			memcpy(sample.quaternion, none[i], sizeof(sample.quaternion));
+		incise_stage_fed(&plan, &tick);
+		at(&plan, tick.t_ns, predict_only);
+		assert_int_equal(got->age_ns, info.latency_ns);
+		assert_true(fabs(got->attitude[1] - M_SQRT1_2) < 1e-12);
+		assert_true(fabs(got->position[2] - 20) < 1e-12);
+	}
+}
+
 static struct incise_surface *ground(void)
 {
 	static const double point[3] = {0}, up[3] = {0, 0, 1};
