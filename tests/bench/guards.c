@@ -20,6 +20,7 @@
  *
  * Up along the normal of the surface's top; N, mm, s.
  */
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 #include "../../lib/base/random.h"
@@ -155,6 +156,7 @@ static double guard_apply(struct guarded *g, double at_mm, double speed_mm_s,
 
 struct loop {
 	struct incise_plan plan; /* first: its stages find the rest by it */
+	struct incise_double_average average;
 	struct incise_tracker_sample fed[INCISE_PLAN_POSES];
 	struct incise_touch top;
 	struct incise_surface *plane; /* in place of the surface: it has no end */
@@ -169,38 +171,47 @@ struct loop {
 	double late_N[INCISE_POSE_LOOP_LATE_MAX + 1], sent_N;
 };
 
-/* The tool that meets the tissue hangs on a spring: where both forces are equal. */
-static int stage_coupling(struct incise_plan *plan, struct incise_tick *tick)
+/* The loop of the plan whose stages run. */
+static struct loop *loop_of(const struct incise_double_plan *plan)
 {
-	struct loop *l = (struct loop *)plan;
+	return (struct loop *)((uintptr_t)plan -
+			       offsetof(struct loop, plan.doubles.plan));
+}
+
+/* The tool that meets the tissue hangs on a spring: where both forces are equal. */
+static void stage_coupling(const struct incise_double_plan *plan,
+			   struct incise_double_state *state,
+			   struct incise_double_tick *tick)
+{
+	struct loop *l = loop_of(plan);
 	struct guarded *g = &l->guard;
 	double stiffness = g->coupling_N_mm + g->tissue_N_mm, way[3];
 
-	v3_sub(way, tick->tool_mm, l->at_mm);
-	v3_copy(l->at_mm, tick->tool_mm);
+	(void)state;
+	v3_sub(way, tick->tool, l->at_mm);
+	v3_copy(l->at_mm, tick->tool);
 	l->way_mm = v3_length(way);
-	l->tool_mm = v3_dot(tick->tool_mm, l->top.normal) -
+	l->tool_mm = v3_dot(tick->tool, l->top.normal) -
 		     v3_dot(l->top.point_mm, l->top.normal);
 	if (g->kind != COUPLING || !isfinite(stiffness))
-		return 0;
+		return;
 	g->tool_mm +=
 		(g->coupling_N_mm * (l->tool_mm - g->tool_mm) + g->tissue_N) / stiffness;
-	v3_add(tick->tool_mm, tick->tool_mm, g->tool_mm - l->tool_mm, l->top.normal);
-	return 0;
+	v3_add(tick->tool, tick->tool, g->tool_mm - l->tool_mm, l->top.normal);
 }
 
-static int stage_guard(struct incise_plan *plan, struct incise_tick *tick)
+static void stage_guard(const struct incise_double_plan *plan,
+			struct incise_double_state *state,
+			struct incise_double_tick *tick)
 {
-	struct loop *l = (struct loop *)plan;
-	double force_N = v3_dot(plan->force_N, l->top.normal);
+	struct loop *l = loop_of(plan);
+	double force_N = v3_dot(state->force, l->top.normal);
 	double guarded_N =
-		guard_apply(&l->guard, l->tool_mm,
-			    v3_dot(plan->velocity_mm_s, l->top.normal), l->way_mm,
-			    v3_dot(plan->limit.last_N, l->top.normal), force_N,
-			    tick->flags & INCISE_TICK_CONTACT, plan->proxy.began);
+		guard_apply(&l->guard, l->tool_mm, v3_dot(state->velocity, l->top.normal),
+			    l->way_mm, v3_dot(state->last, l->top.normal), force_N,
+			    tick->flags & INCISE_TICK_CONTACT, state->proxy.began);
 
-	v3_add(plan->force_N, plan->force_N, guarded_N - force_N, l->top.normal);
-	return 0;
+	v3_add(state->force, state->force, guarded_N - force_N, l->top.normal);
 }
 
 /* A copy with more gain, and with a guard's stages. They share the predictor of the handle's end,
@@ -213,18 +224,20 @@ static void copy_plan(struct loop *l, const struct incise_plan *plan, double gai
 	int n = plan->n_stages;
 
 	incise_plan_copy(own, plan, gain);
-	own->fed = l->fed;
+	own->poses.fed = l->fed;
+	if (own->doubles.state.average)
+		own->doubles.state.average = &l->average;
 	if (!stages)
 		return;
 	memcpy(stage, own->stage, sizeof(stage));
 	own->n_stages = 0;
 	for (int i = 0; i < n; i++) {
-		if (stage[i].run == incise_stage_contact)
+		if (stage[i].numbers.in_double == incise_double_stage_contact)
 			own->stage[own->n_stages++] = (struct incise_stage){
-				.name = "coupling", .run = stage_coupling};
-		if (stage[i].run == incise_stage_start)
+				.name = "coupling", .numbers.in_double = stage_coupling};
+		if (stage[i].numbers.in_double == incise_double_stage_start)
 			own->stage[own->n_stages++] = (struct incise_stage){
-				.name = "guard", .run = stage_guard};
+				.name = "guard", .numbers.in_double = stage_guard};
 		own->stage[own->n_stages++] = stage[i];
 	}
 }
