@@ -119,8 +119,11 @@ static const struct {
 	{AT(axes[0].steps_per_mm), 1, INT32_MAX, ANY},
 	{AT(axes[0].origin), -(1 << 29), 1 << 29, ANY},
 	{AT(axes[0].reserved), 0, 0, ANY},
+	{AT(phases), 0, 0, ANY},
+	{AT(skin), 0, INT32_MAX, ANY},
+	{AT(skin_friction), 0, INT32_MAX, ANY},
 	{AT(reserved[0]), 0, 0, ANY},
-	{AT(reserved[7]), 0, 0, ANY},
+	{AT(reserved[4]), 0, 0, ANY},
 };
 
 static bool has(const struct incise_fixed_numbers *numbers, int needs)
