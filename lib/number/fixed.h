@@ -20,6 +20,7 @@
 #define HALF_PI N_OF(1570796327, 1000000000)
 #define LEAST 1 /* the smallest number */
 #define FAR_MOST INT32_MAX
+#define CREEP (2 * LEAST) /* what rounds a length, mm */
 #define DT_MOST INT32_MAX /* of a ramp, ns */
 
 /* --- numbers --- */

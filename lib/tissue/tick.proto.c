@@ -722,7 +722,9 @@ void T(stage_skin)(const struct T(plan) *plan, struct T(state) *state,
 	most = n_times(numbers->skin_friction,
 		       n_max(v_along(state->force, state->normal), 0));
 	if (n_below(most, pull)) {
-		drag(state, n_sub(stretch, n_over(most, numbers->skin)), along);
+		/* So far that its rounding does not slip again while the tool rests. */
+		drag(state, n_add(n_sub(stretch, n_over(most, numbers->skin)), CREEP),
+		     along);
 		pull = most;
 	}
 	push(state, n_neg(pull), along);

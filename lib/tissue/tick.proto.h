@@ -330,7 +330,7 @@ struct T(state) {
 		num depth;   /* of the plane, below the skin */
 		int32_t punctured;
 	} membrane;
-	num anchor[3];	       /* of the skin that drags */
+	wide anchor[3];	       /* of the skin that drags; Q32 mm */
 	num force[3];	       /* of the tissue, before limits */
 	num last[3];	       /* what was rendered */
 	num place[T_AXES_MAX]; /* of the handle along each axis, from its origin */

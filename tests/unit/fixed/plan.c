@@ -108,7 +108,7 @@ static const struct {
 	{AT(incision.tube), 0, INCISE_FIXED_DEPTH_MAX, ANY},
 	{AT(membrane.point[2]), -(1 << 29), 1 << 29, MEMBRANE},
 	{AT(membrane.radius), 0, 1 << 28, MEMBRANE},
-	{AT(membrane.thickness), 1, 1 << 28, MEMBRANE},
+	{AT(membrane.thickness), 0, 1 << 28, MEMBRANE},
 	{AT(membrane.back_wall), 0, 1 << 28, MEMBRANE},
 	{AT(small), 0, INT32_MAX, ANY},
 	{AT(ramp_ns), 0, INT32_MAX, ANY},
@@ -119,8 +119,11 @@ static const struct {
 	{AT(axes[0].steps_per_mm), 1, INT32_MAX, ANY},
 	{AT(axes[0].origin), -(1 << 29), 1 << 29, ANY},
 	{AT(axes[0].reserved), 0, 0, ANY},
+	{AT(phases), 0, 0, ANY},
+	{AT(skin), 0, INT32_MAX, ANY},
+	{AT(skin_friction), 0, INT32_MAX, ANY},
 	{AT(reserved[0]), 0, 0, ANY},
-	{AT(reserved[7]), 0, 0, ANY},
+	{AT(reserved[4]), 0, 0, ANY},
 };
 
 static bool has(const struct incise_fixed_numbers *numbers, int needs)

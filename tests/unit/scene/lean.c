@@ -259,8 +259,9 @@ static void add_tissue(uint64_t *seed, bool model, bool dissipates, struct text 
 		bool is = i == sure || chance(seed, 0.5);
 
 		add_number(to, force->number[0].key,
-			   is && !(model && force->model)
-				   ? force->number[0].skin * sized(seed, 0.1, 50)
+			   is && !(model && i == INCISE_FORCE_REACTION)
+				   ? fmax(force->number[0].skin, 1e-4) *
+					     sized(seed, 0.1, 50)
 				   : 0);
 		add_other_numbers(force, seed, to);
 	}
