@@ -109,6 +109,7 @@ static const struct {
 	{AT(membrane.point[2]), -(1 << 29), 1 << 29, MEMBRANE},
 	{AT(membrane.radius), 0, 1 << 28, MEMBRANE},
 	{AT(membrane.thickness), 0, 1 << 28, MEMBRANE},
+	{AT(membrane.stiffness), 0, INT32_MAX, MEMBRANE},
 	{AT(membrane.back_wall), 0, 1 << 28, MEMBRANE},
 	{AT(small), 0, INT32_MAX, ANY},
 	{AT(ramp_ns), 0, INT32_MAX, ANY},

@@ -342,7 +342,7 @@ static inline void incise_fx_trial_numbers(struct incise_fx_trial *t,
 		incise_fx_trial_unit(t, membrane->normal, 3);
 		membrane->radius = incise_fx_trial_of(t, 5 * mm, 300 * mm, 0, 1 << 28);
 		membrane->thickness = incise_fx_trial_of(t, 1, 8 * mm, 1, 1 << 28);
-		membrane->stiffness = incise_fx_trial_of(t, mm / 8, mm, 1, INT32_MAX);
+		membrane->stiffness = incise_fx_trial_of(t, mm / 8, mm, 0, INT32_MAX);
 		membrane->back_wall = incise_fx_trial_of(t, mm, 20 * mm, 0, 1 << 28);
 	}
 }
