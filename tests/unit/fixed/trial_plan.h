@@ -201,6 +201,8 @@ static inline void incise_fx_trial_tissue(struct incise_fx_trial *t,
 	numbers->aligned = incise_fx_trial_of(t, 0, one, 0, one);
 	numbers->printed = incise_fx_trial_one_in(t, 4);
 	numbers->spread = incise_fx_trial_of(t, 0, one, 0, most);
+	numbers->skin = incise_fx_trial_of(t, 0, one, 0, most);
+	numbers->skin_friction = incise_fx_trial_of(t, 0, one, 0, most);
 	/* Without a model there is no front: the caller sets these back to 0. */
 	numbers->unloading = incise_fx_trial_in(t, 0, 1)
 				     ? incise_fx_trial_of(t, one / 8, 2 * one, 1, most)
