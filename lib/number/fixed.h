@@ -131,9 +131,10 @@ static inline bool d_below(dir a, dir b)
 	return a < b;
 }
 
+/* A pose's numbers are any. */
 static inline dir d_abs(dir a)
 {
-	return a < 0 ? -a : a;
+	return a < -INT32_MAX ? INT32_MAX : a < 0 ? -a : a;
 }
 
 static inline dir d_dot(const dir u[3], const dir v[3])

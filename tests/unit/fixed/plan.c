@@ -46,7 +46,7 @@ TEST(test_good_plans_are_accepted)
 			    plan.numbers.pose_age_ns);
 		kinds[plan.numbers.shape.kind]++;
 		models += plan.has_model;
-		membranes += plan.numbers.membrane.stiffness > 0;
+		membranes += plan.numbers.membrane.thickness > 0;
 		tubes += plan.numbers.tube;
 		axes[plan.numbers.n_axes]++;
 		free(bytes);
@@ -109,6 +109,7 @@ static const struct {
 	{AT(membrane.point[2]), -(1 << 29), 1 << 29, MEMBRANE},
 	{AT(membrane.radius), 0, 1 << 28, MEMBRANE},
 	{AT(membrane.thickness), 0, 1 << 28, MEMBRANE},
+	{AT(membrane.stiffness), 0, INT32_MAX, MEMBRANE},
 	{AT(membrane.back_wall), 0, 1 << 28, MEMBRANE},
 	{AT(small), 0, INT32_MAX, ANY},
 	{AT(ramp_ns), 0, INT32_MAX, ANY},
@@ -134,7 +135,7 @@ static bool has(const struct incise_fixed_numbers *numbers, int needs)
 	case GRID:
 		return numbers->shape.kind == INCISE_FIXED_GRID;
 	case MEMBRANE:
-		return numbers->membrane.stiffness > 0;
+		return numbers->membrane.thickness > 0;
 	case INSERTS:
 		return numbers->inserts && !numbers->tube;
 	}

@@ -171,43 +171,6 @@ TEST(test_forces, begin)
 	}
 }
 
-/* Until it yields a spring, then nothing down to the wall behind. */
-TEST(test_membrane, begin)
-{
-	struct incise_fixed_plan plan = {
-		.numbers.membrane = {.normal = {0, 0, INCISE_FIXED_UNIT},
-				     .radius = 5 << 16,
-				     .thickness = 4 << 16,
-				     .stiffness = 1 << 14,
-				     .back_wall = 14 << 16}};
-	static const struct {
-		double beyond, force;
-		uint32_t flag;
-	} way[] = {
-		{-1, 0, 0},
-		{1, 0.25, INCISE_TICK_MEMBRANE},
-		{3.5, 0.875, INCISE_TICK_MEMBRANE},
-		{4, 0, INCISE_TICK_LUMEN},
-		{2, 0, INCISE_TICK_LUMEN},
-		{14, 0, INCISE_TICK_LUMEN},
-		{16, 0.5, INCISE_TICK_LUMEN | INCISE_TICK_BACK_WALL},
-	};
-
-	for (size_t k = 0; k < sizeof(way) / sizeof(*way); k++) {
-		struct incise_fixed_tick tick = tick_in(INCISE_PHASE_CUTTING);
-		double got[3], want[3] = {0, 0, way[k].force};
-
-		tick_state.depth = fixed(10 + way[k].beyond);
-		tick.tool[2] = -fixed(way[k].beyond);
-		effect(got, &plan, incise_fixed_stage_membrane, &tick);
-		assert_force(got, want, 0);
-		assert_int_equal(tick.flags, way[k].flag);
-		/* The tissue above stays as deep as it was. */
-		if (way[k].beyond > 0)
-			assert_int_equal(tick_state.depth, 10 << 16);
-	}
-}
-
 static double length_of(const int32_t v[3])
 {
 	return sqrt((double)v[0] * v[0] + (double)v[1] * v[1] + (double)v[2] * v[2]);

@@ -201,6 +201,8 @@ static inline void incise_fx_trial_tissue(struct incise_fx_trial *t,
 	numbers->aligned = incise_fx_trial_of(t, 0, one, 0, one);
 	numbers->printed = incise_fx_trial_one_in(t, 4);
 	numbers->spread = incise_fx_trial_of(t, 0, one, 0, most);
+	numbers->skin = incise_fx_trial_of(t, 0, one, 0, most);
+	numbers->skin_friction = incise_fx_trial_of(t, 0, one, 0, most);
 	/* Without a model there is no front: the caller sets these back to 0. */
 	numbers->unloading = incise_fx_trial_in(t, 0, 1)
 				     ? incise_fx_trial_of(t, one / 8, 2 * one, 1, most)
@@ -342,7 +344,7 @@ static inline void incise_fx_trial_numbers(struct incise_fx_trial *t,
 		incise_fx_trial_unit(t, membrane->normal, 3);
 		membrane->radius = incise_fx_trial_of(t, 5 * mm, 300 * mm, 0, 1 << 28);
 		membrane->thickness = incise_fx_trial_of(t, 1, 8 * mm, 1, 1 << 28);
-		membrane->stiffness = incise_fx_trial_of(t, mm / 8, mm, 1, INT32_MAX);
+		membrane->stiffness = incise_fx_trial_of(t, mm / 8, mm, 0, INT32_MAX);
 		membrane->back_wall = incise_fx_trial_of(t, mm, 20 * mm, 0, 1 << 28);
 	}
 }
