@@ -3,12 +3,14 @@
  * Prints the tables of settings for mk/manual-tables, which puts them into the manual pages:
  *
  *   TABLE <tab> KEY <tab> UNIT <tab> RANGE <tab> DEFAULT <tab> MEANING
+ *   forces <tab> STAGE <tab> PHASES <tab> FORMULA <tab> <tab> WHAT IT DOES
  */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "../lib/device/actuator.h"
 #include "../lib/device/rig_plan.h"
+#include "../lib/scene/forces.h"
 #include "../lib/scene/scene.h"
 #include "../lib/sim/sim.h"
 
@@ -118,6 +120,17 @@ static int print_tables(const char *name, const struct incise_setting *rows)
 	return failed;
 }
 
+static void print_forces(void)
+{
+	static const char *const phases[] = {"",	  "", "cutting", "",
+					     "insertion", "", "both"};
+
+	for (int i = 0; i < incise_n_tissue_forces; i++)
+		printf("forces\t%s\t%s\t%s\t\t%s\n", incise_tissue_forces[i].name,
+		       phases[incise_tissue_forces[i].phases],
+		       incise_tissue_forces[i].formula, incise_tissue_forces[i].does);
+}
+
 int main(void)
 {
 	static const char *const kinds[] = {"plane", "sphere", "capsule", "heights",
@@ -129,6 +142,7 @@ int main(void)
 	failed |= print_tables("rig.sim", incise_sim_settings);
 	failed |= print_tables("calibration", incise_calibration_settings);
 	failed |= print_tables("scene", incise_scene_settings);
+	print_forces();
 	incise_scene_tissue_settings(tissue);
 	failed |= print_tables("scene.tissue", tissue);
 	for (size_t i = 0; i < sizeof(kinds) / sizeof(*kinds); i++) {

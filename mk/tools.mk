@@ -110,12 +110,14 @@ tables := $(patsubst $(O)/bin/%,$(O)/obj/tools/%.table,$(programs))
 $(O)/obj/tools/%.table: $(O)/bin/%
 	$(Q)LD_LIBRARY_PATH=$(O)/lib $< --table >$@
 
-$(O)/man/%.1: man/%.1 mk/manual mk/manual-output $(wildcard schema/*.rows) $(O)/obj/tools/%.table
+$(O)/man/%.1: man/%.1 mk/manual mk/manual-tables mk/manual-output $(wildcard schema/*.rows) \
+		$(O)/obj/tools/%.table $(O)/obj/mk/settings.tables
 	@mkdir -p $(@D)
 	$(call step,MAN)
 	$(Q)mk/manual $(O)/obj/tools/$*.table $< >$@.lists
-	$(Q)mk/manual-output <$@.lists >$@
-	@rm $@.lists
+	$(Q)mk/manual-tables $(O)/obj/mk/settings.tables $@.lists >$@.tables
+	$(Q)mk/manual-output <$@.tables >$@
+	@rm $@.lists $@.tables
 
 $(O)/man/%: man/% mk/manual-output $(wildcard schema/*.rows)
 	@mkdir -p $(@D)

@@ -7,10 +7,11 @@
 #define CUTTING (1U << INCISE_PHASE_CUTTING)
 #define INSERTION (1U << INCISE_PHASE_INSERTION)
 
-#define FORCE(row, stage_, phases_, kind_, acts_, zero_)                              \
-	[INCISE_FORCE_##row].name = #stage_, [INCISE_FORCE_##row].phases = (phases_), \
-	[INCISE_FORCE_##row].kind = (kind_), [INCISE_FORCE_##row].acts = (acts_),     \
-	[INCISE_FORCE_##row].zero = (zero_),                                          \
+#define FORCE(row, stage_, phases_, kind_, acts_, zero_, formula_, does_)               \
+	[INCISE_FORCE_##row].name = #stage_, [INCISE_FORCE_##row].phases = (phases_),   \
+	[INCISE_FORCE_##row].kind = (kind_), [INCISE_FORCE_##row].acts = (acts_),       \
+	[INCISE_FORCE_##row].zero = (zero_), [INCISE_FORCE_##row].formula = (formula_), \
+	[INCISE_FORCE_##row].does = (does_),                                            \
 	[INCISE_FORCE_##row].stage = INCISE_STAGE(stage_),
 #define NUMBER(row, i, member, scale, most, ...) \
 	[INCISE_FORCE_##row].number[i] = {__VA_ARGS__},

@@ -78,6 +78,7 @@ struct incise_tissue_force {
 	/* The stage is left out where this number is 0, for the reason @zero. */
 	int acts;
 	const char *zero;
+	const char *formula, *does; /* for the manual */
 	struct incise_stage_pair stage;
 };
 

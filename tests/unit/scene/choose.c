@@ -78,6 +78,13 @@ static struct incise_scene *scene_of(const struct lacking *w,
 		const struct incise_force_number *number = incise_tissue_forces[i].number;
 		size_t n = strlen(tissue);
 
+		int acts = incise_tissue_forces[i].acts;
+
+		if (acts) {
+			snprintf(tissue + n, sizeof(tissue) - n, "  %s = %#.17g;\n",
+				 number[acts].key, number[acts].skin);
+			n = strlen(tissue);
+		}
 		/* Twice as stiff as skin, so that limits are met; 0 is what is tested. */
 		snprintf(tissue + n, sizeof(tissue) - n, "  %s = %#.17g;\n", number->key,
 			 has(w, &incise_tissue_forces[i]) ? 2 * number->skin : 0.0);
@@ -407,7 +414,8 @@ static void one_effect(const char *stage, const char *const text[3], int way)
 TEST(test_one_force)
 {
 	for (int i = 0; i < incise_n_tissue_forces; i++) {
-		const struct incise_force_number *number = incise_tissue_forces[i].number;
+		const struct incise_force_number *number =
+			incise_tissue_forces[i].number + incise_tissue_forces[i].acts;
 		const char *other = i ? "reaction_N_mm = 0.3;" : "plane_N_mm = 0.4;";
 		char text[3][120];
 		const char *const texts[] = {text[0], text[1], text[2]};

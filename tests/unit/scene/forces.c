@@ -2,7 +2,7 @@
 /*
  * Each force of paper 2, in both kinds of numbers, compared with its formula, written out here by
  * components, and with what the paper's words ask for; where the print cannot be meant, its formula stands
- * here and shows why. Then the phases of each force, and the manual pages.
+ * here and shows why. Then the phases of each force.
  */
 #include "../unit.h"
 #include "../../../lib/base/vector.h"
@@ -650,38 +650,4 @@ TEST(test_tissue_does_not_pull_and_gain_counts)
 		}
 	}
 	incise_model_free(model);
-}
-
-static char *page(const char *name)
-{
-	char path[256], *text = calloc(1, 200000);
-	const char *root = getenv("INCISE_ROOT");
-	FILE *in;
-
-	snprintf(path, sizeof(path), "%s/man/%s", root ? root : ".", name);
-	in = fopen(path, "r");
-	if (!in)
-		fail_msg("%s: run from the top of the tree, or set INCISE_ROOT", path);
-	assert_true(fread(text, 1, 199999, in) > 0);
-	fclose(in);
-	return text;
-}
-
-/* The stage of each force is in incise-scene(5) and incise-haptic(1). */
-TEST(test_manual_has_each_force)
-{
-	char *scene = page("incise-scene.5"), *haptic = page("incise-haptic.1"), item[64];
-
-	for (int i = 0; i < incise_n_tissue_forces; i++) {
-		const struct incise_tissue_force *force = &incise_tissue_forces[i];
-
-		snprintf(item, sizeof(item), " %s ", force->name);
-		if (!strstr(strstr(scene, ".Sh FORCES"), item))
-			fail_msg("incise-scene(5), FORCES, has no%s", item);
-		snprintf(item, sizeof(item), "Op Li %s", force->name);
-		if (!strstr(haptic, item))
-			fail_msg("incise-haptic(1) has no %s", item);
-	}
-	free(scene);
-	free(haptic);
 }

@@ -244,7 +244,7 @@ static void add_other_numbers(const struct incise_tissue_force *force, uint64_t 
 /* Each force or none; at least one, or a model in place of the reaction. */
 static void add_tissue(uint64_t *seed, bool model, bool dissipates, struct text *to)
 {
-	int sure = below(seed, incise_n_tissue_forces);
+	int sure = below(seed, INCISE_FORCE_SKIN); /* none that acts by others alone */
 
 	add(to, "tissue = { withdrawal = \"%s\"; orientation = \"%s\";",
 	    dissipates ? "dissipative" : "paper", chance(seed, 0.5) ? "eased" : "paper");

@@ -86,9 +86,9 @@ TEST(test_a_refused_model_names_its_scene)
 }
 
 /* What the tissue of a tick should push with; the front goes on. */
-static double front_N(struct incise_double_front *front, const struct incise_plan_stability *s,
-		      const struct incise_tick *t, bool began, double side[3],
-		      double cutting_N)
+static double front_N(struct incise_double_front *front,
+		      const struct incise_plan_stability *s, const struct incise_tick *t,
+		      bool began, double side[3], double cutting_N)
 {
 	double way_mm;
 
@@ -98,8 +98,8 @@ static double front_N(struct incise_double_front *front, const struct incise_pla
 	}
 	way_mm = incise_double_front_advance(front, t->proxy_mm, t->normal, side);
 	/* 0.1: the default of tissue.friction. */
-	return incise_double_front_force(front, s->unloading_N_mm, 0.1, t->depth_mm, way_mm,
-				  t->depth_mm > 0 ? cutting_N : 0);
+	return incise_double_front_force(front, s->unloading_N_mm, 0.1, t->depth_mm,
+					 way_mm, t->depth_mm > 0 ? cutting_N : 0);
 }
 
 /* One whole cut of the virtual surgeon, in both evaluators. */

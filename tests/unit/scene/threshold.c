@@ -70,7 +70,8 @@ TEST(test_threshold_of_age)
 
 	for (int late = -1; late <= 1; late++) {
 		begin(&run);
-		fed_run_tick(&run, run.plan->doubles.state.scalpel.t_ns + GROUND_AGE_NS + late);
+		fed_run_tick(&run,
+			     run.plan->doubles.state.scalpel.t_ns + GROUND_AGE_NS + late);
 		assert_int_equal(!!(run.tick.flags & INCISE_TICK_STALE), late > 0);
 		end(&run);
 	}
