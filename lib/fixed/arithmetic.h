@@ -53,7 +53,7 @@ static inline int64_t incise_fx_quotient(int32_t a, int32_t b)
 	return a < 0 ? -size : size;
 }
 
-/* √v, rounded down. Real-time safe: six divisions at most. */
+/* √v, rounded down. Real-time safe: two divisions. */
 uint32_t incise_fx_root(uint64_t v) INCISE_REALTIME;
 
 #endif

@@ -41,7 +41,7 @@ bool incise_fx_is_short(const int32_t a[3], int32_t most)
 bool incise_fx_unit(int32_t *to, const int64_t *a, int n, int64_t least)
 {
 	int64_t largest = 0, scaled[4];
-	uint64_t sum = 0;
+	uint64_t sum = 0, per;
 	uint32_t length;
 	int shift;
 
@@ -63,13 +63,18 @@ bool incise_fx_unit(int32_t *to, const int64_t *a, int n, int64_t least)
 	if (shift > 0 ? (int64_t)length << shift <= least
 		      : (int64_t)length >> -shift <= least)
 		return false;
-	/* 2^30 · 2^30 = 2^60; the length is at least that of each component, but for 1. */
+	/* One division for all: the length is 2^29 … 2^31, so that this is 2^31 … 2^33. */
+	per = div_u64((uint64_t)1 << 62, length);
 	for (int i = 0; i < n; i++) {
-		int64_t size = scaled[i] < 0 ? -scaled[i] : scaled[i];
+		int64_t size = scaled[i] < 0 ? -scaled[i] : scaled[i], rest;
 
-		size = (int64_t)div_u64(((uint64_t)size << 30) + length / 2, length);
-		size = size > INCISE_FIXED_UNIT ? INCISE_FIXED_UNIT : size;
-		to[i] = (int32_t)(scaled[i] < 0 ? -size : size);
+		/* 2^30 · 2^33; a component is below the length, but for 1. */
+		to[i] = (int32_t)(((uint64_t)size * per) >> 32);
+		/* To the nearest of size · 2^30 / length: it is one below that at most. */
+		rest = (size << 30) + length / 2 - (int64_t)to[i] * length;
+		to[i] += rest >= length;
+		to[i] = to[i] > INCISE_FIXED_UNIT ? INCISE_FIXED_UNIT : to[i];
+		to[i] = scaled[i] < 0 ? -to[i] : to[i];
 	}
 	return true;
 }

@@ -133,7 +133,6 @@ void T(stage_predict)(const struct T(plan) *plan, struct T(state) *state,
 	(&state->scalpel, &numbers->filter, tick->t_ns, state->attitude);
 	for (int i = 0; i < 4; i++)
 		tick->attitude[i] = state->attitude[i];
-	d_turn(state->flat, state->attitude, numbers->side);
 	v_copy(tick->tool, tick->position);
 	tick->speed = v_length(state->velocity);
 	tick->held = state->held;
@@ -310,6 +309,9 @@ void T(stage_contact)(const struct T(plan) *plan, struct T(state) *state,
 	state->depth = 0;
 	if (!proxy->touching)
 		return;
+	/* A cut that is not opened asks for it where it begins only. */
+	if (proxy->began || plan->numbers.inserts)
+		d_turn(state->flat, state->attitude, plan->numbers.side);
 	if (proxy->began)
 		begin_contact(state, tick->t_ns);
 	d_copy(state->sn, proxy->touch.normal);
