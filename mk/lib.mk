@@ -22,6 +22,16 @@ fixed_cflags := -ffreestanding
 fixed_cflags += $(if $(filter x86_64-%,$(shell $(CC) -dumpmachine 2>/dev/null)),-mgeneral-regs-only)
 $(O)/obj/lib/fixed/%.o: cflags += $(fixed_cflags)
 
+# The physics as the compiler sees it, without the headers.
+tick.i: ## the stages of a tick for each kind of numbers, preprocessed, in build/tick.*.i
+	@mkdir -p $(O)
+	$(Q)for kind in double=tissue integers=fixed; do \
+		$(CC) -E -std=gnu11 $(cppflags) lib/$${kind#*=}/tick.c | \
+		awk '/^# [0-9]+ "/ { on = $$3 ~ /proto\.c"/; next } on' | cat -s >$(O)/tick.$${kind%=*}.i; \
+	done
+	@echo $(O)/tick.double.i $(O)/tick.integers.i
+.PHONY: tick.i
+
 define library
 pc_flags_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --cflags $$(pc_$1)))
 pc_libs_$1 = $$(if $$(pc_$1),$$(shell $$(PKG_CONFIG) --libs $$(pc_$1)))

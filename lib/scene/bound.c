@@ -21,7 +21,7 @@
 #define HARD_MM_S2 100000
 
 /* A hand's own acceleration across its motion, at most: errors of the direction count by it. Below this
- * speed the direction counts in proportion to the speed: see lib/control/model_input.c. */
+ * speed the direction counts in proportion to the speed: see lib/tissue/predict.c. */
 #define HAND_MM_S2 2000
 #define SLOW_MM_S 5
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * The choice of stages that a scene needs, in the order in which they run, with a reason for
- * each that is left out. The forces of forces.c come before the start. With everything kept
+ * each that is left out. The forces come before the start. With everything kept
  * (incise_scene_set_full()) the stages that are not needed are neutral.
  */
 #include <stddef.h>

@@ -19,7 +19,7 @@
 #define Q28 268435456.0
 #define LARGEST 2147483647.0 /* of 32 bits */
 
-/* Below this depth the direction from tool to proxy is rounding: see stages.c. */
+/* Below this depth the direction from tool to proxy is rounding: see ../tissue/tick.c. */
 #define SHALLOW_MM 1e-6
 
 /* A conversion at work: the first number that does not fit is named. */

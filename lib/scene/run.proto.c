@@ -72,6 +72,7 @@ static inline __attribute__((always_inline)) int run_stages(struct incise_plan *
 		int rc = 0;
 
 		if (!stage->run) {
+			finished = false;
 			stage->numbers.STAGE(&OWN(plan)->plan, &OWN(plan)->state,
 					     &OWN(plan)->tick);
 		} else {

@@ -611,7 +611,8 @@ static int check_forces(const struct incise_scene *scene, struct incise_error *e
 
 	for (int i = 0; i < incise_n_tissue_forces; i++) {
 		/* A share of the other forces is none alone. */
-		bool there = scene->tissue.force[i][0] > 0 && !incise_tissue_forces[i].acts;
+		bool there =
+			scene->tissue.force[i][0] > 0 && !incise_tissue_forces[i].acts;
 
 		any |= there;
 		if (there && model && i == INCISE_FORCE_REACTION)

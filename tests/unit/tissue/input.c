@@ -105,7 +105,7 @@ static void any_unit(double unit[3])
 	while (!v3_unit(unit, unit, 1e-3));
 }
 
-/* In double it is the angle: see ../control/model_input.c. */
+/* In double it is the angle: see lib/tissue/predict.c. */
 TEST(tilt_is_that_in_double)
 {
 	for (int k = 0; k < CASES; k++) {
