@@ -764,7 +764,7 @@ void T(stage_start)(const struct T(plan) *plan, struct T(state) *state,
 		state->released = true;
 	if (!state->released)
 		state->gain = 0;
-	else if (fresh && dt_ns > 0)
+	else if (fresh && dt_ns > 0 && state->gain < W_ONE)
 		state->gain = w_min(state->gain + w_min(w_ramp(dt_ns, numbers->ramp_ns),
 							RISE_MOST),
 				    W_ONE);
