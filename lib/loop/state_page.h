@@ -39,7 +39,8 @@
 #define STATE_MAGIC "INCSTATE"
 #define STATE_MAJOR 1
 #define STATE_MINOR 0
-#define STATE_FLAGS 16 /* counters of flags, some unused */
+#define STATE_FLAGS 16	/* counters of flags, some unused */
+#define STATE_STAGES 16 /* a plan with more has the first of them here */
 
 struct state_part {
 	uint64_t offset; /* from the beginning of the page, a multiple of 8 */
@@ -77,7 +78,7 @@ struct state_run {
 	int64_t since_ns;
 	char reason[304]; /* the last 4 are unused */
 	char scene[512];
-	char stage[INCISE_PLAN_STAGES_MAX][24];
+	char stage[STATE_STAGES][24];
 	uint64_t left_out, reloads, refused;
 	uint64_t minor_faults, major_faults, voluntary, involuntary;
 };

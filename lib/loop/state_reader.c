@@ -240,7 +240,7 @@ static void take_head(struct incise_state_now *now, const struct state_head *hea
 
 static int take_run(struct incise_state_now *now, const struct state_run *run)
 {
-	if (run->run >= INCISE_RUNS || run->n_stages > INCISE_PLAN_STAGES_MAX)
+	if (run->run >= INCISE_RUNS || run->n_stages > STATE_STAGES)
 		return -EIO;
 	now->run = (enum incise_run)run->run;
 	now->since_ns = run->since_ns;

@@ -538,8 +538,7 @@ void incise_state_scene(struct incise_state_writer *w, const char *path,
 		return;
 	put_path(w->run.scene, sizeof(w->run.scene), path);
 	memset(w->run.stage, 0, sizeof(w->run.stage));
-	while (plan && n < INCISE_PLAN_STAGES_MAX &&
-	       (name = incise_plan_stage(plan, n))) {
+	while (plan && n < STATE_STAGES && (name = incise_plan_stage(plan, n))) {
 		put_text(w->run.stage[n], sizeof(w->run.stage[n]), name);
 		n++;
 	}

@@ -21,5 +21,3 @@ const struct incise_tissue_force incise_tissue_forces[] = {
 #include "../tissue/forces.def"
 };
 const int incise_n_tissue_forces = INCISE_FORCES;
-_Static_assert(INCISE_FORCES <= INCISE_FORCES_MAX,
-	       "raise INCISE_FORCES_MAX, and INCISE_PLAN_STAGES_MAX with it");

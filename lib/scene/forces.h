@@ -9,8 +9,6 @@
 #include <incise/export.h>
 #include "../tissue/tick.h"
 
-/* A plan keeps at most INCISE_PLAN_STAGES_MAX stages, forces among them. */
-#define INCISE_FORCES_MAX 6
 #define INCISE_FORCE_NUMBERS 3
 
 /* The meaning of a force's first number. Springs store energy: F²/2K at most. */

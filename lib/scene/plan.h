@@ -67,7 +67,7 @@ struct incise_doubles {
 /* Stages besides forces; those that no loop has are always left out. */
 #define INCISE_PLAN_OTHER_STAGES 10
 #define INCISE_PLAN_NO_STAGES 2
-_Static_assert(INCISE_PLAN_OTHER_STAGES + INCISE_FORCES_MAX <= INCISE_PLAN_STAGES_MAX,
+_Static_assert(INCISE_PLAN_OTHER_STAGES + INCISE_FORCES <= INCISE_PLAN_STAGES_MAX,
 	       "raise INCISE_PLAN_STAGES_MAX");
 
 /* A tracker that gives only unusable poses for so long has failed, as one that is unplugged. */
@@ -136,7 +136,7 @@ struct incise_plan {
 	const struct incise_model *model; /* fuzzy: one of these */
 	const struct incise_fixed *fixed;
 	struct incise_fixed *own_fixed; /* compiled here */
-	struct incise_acting_force acting[INCISE_FORCES_MAX];
+	struct incise_acting_force acting[INCISE_FORCES];
 
 	struct incise_doubles doubles;	  /* by all of the above */
 	struct incise_integers *integers; /* with arithmetic = "fixed"; else NULL */

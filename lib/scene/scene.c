@@ -258,8 +258,7 @@ void incise_scene_tissue_settings(struct incise_setting rows[SETTING_ROWS_MAX + 
 					sizeof(double)};
 		}
 }
-_Static_assert(sizeof(tissue) / sizeof(*tissue) +
-			       INCISE_FORCES_MAX * INCISE_FORCE_NUMBERS <=
+_Static_assert(sizeof(tissue) / sizeof(*tissue) + INCISE_FORCES * INCISE_FORCE_NUMBERS <=
 		       SETTING_ROWS_MAX,
 	       "raise SETTING_ROWS_MAX");
 

@@ -52,7 +52,7 @@ struct incise_scene {
 		bool printed_orientation; /* orientation = "paper"; else "eased" */
 		double cut_from_mm, stretch_mm;
 		int cuts_most;
-		double force[INCISE_FORCES_MAX][INCISE_FORCE_NUMBERS];
+		double force[INCISE_FORCES][INCISE_FORCE_NUMBERS];
 	} tissue;
 	struct incise_scene_membrane membrane;
 	struct {

@@ -30,7 +30,7 @@
 INCISE_BEGIN_DECLS
 
 /** Largest number of stages of a plan. */
-#define INCISE_PLAN_STAGES_MAX 16
+#define INCISE_PLAN_STAGES_MAX 24
 
 struct incise_plan;
 

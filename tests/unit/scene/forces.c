@@ -18,7 +18,7 @@ struct given {
 	double made[3], axis[3];
 	bool in, printed;
 	double cut, along[3], tightness;
-	double number[INCISE_FORCES_MAX][INCISE_FORCE_NUMBERS];
+	double number[INCISE_FORCES][INCISE_FORCE_NUMBERS];
 };
 
 #define FORCE(...)
