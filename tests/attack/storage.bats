@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # Attacks on a recording while it is written, and on one that lies on a disk. What is left
-# must open, verify, and hold all that was committed. A few of each in `make check`, the same ones
+# must open, verify, and hold all that was committed. A few of each with ATTACK=few, the same ones
 # each time; ATTACK=full, as of `make check-attack`, has the full counts, with a seed that differs
 # from run to run and is printed. ATTACK_SEED=N repeats a run.
 
