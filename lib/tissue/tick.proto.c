@@ -562,7 +562,7 @@ static num front_friction(const struct T(plan) *plan, const struct T(state) *sta
 			  const struct T(tick) *tick, num most)
 {
 	const struct T(numbers) *numbers = &plan->numbers;
-	bool outside;
+	bool outside = false; /* of the cut only it is told */
 	num drag;
 
 	if (!(numbers->phases & T_WITHDRAWS) || !n_below(0, state->depth))
