@@ -112,8 +112,3 @@ void incise_predict_acceleration(const struct incise_predict *p, int64_t t_ns,
 	incise_predict_filter(p, &filter);
 	incise_double_predict_acceleration(&p->now, &filter, t_ns, acceleration_mm_s2);
 }
-
-int64_t incise_predict_age(const struct incise_predict *p, int64_t t_ns)
-{
-	return incise_double_predict_age(&p->now, t_ns);
-}

@@ -93,7 +93,4 @@ void incise_predict_at(const struct incise_predict *p, int64_t t_ns,
 void incise_predict_acceleration(const struct incise_predict *p, int64_t t_ns,
 				 double acceleration_mm_s2[3]) INCISE_REALTIME;
 
-/* Age of the last pose at t_ns, ≥ 0; INT64_MAX before the first. Real-time safe. */
-int64_t incise_predict_age(const struct incise_predict *p, int64_t t_ns) INCISE_REALTIME;
-
 #endif

@@ -7,7 +7,7 @@
  *   that / |v|       Q12
  *   ns · 2^16        2^45 · 2^16 = 2^61
  */
-#include "input.h"
+#include "plan.h"
 #include "vector.h"
 
 #define ONE (1 << 16)

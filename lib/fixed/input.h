@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
- * Inputs of a model in integers: what lib/control/model_input.h does in double, see there.
+ * Inputs of a model in integers: what lib/tissue/predict.c does in double, see there.
  *
  *   velocities Q16.16 mm/s     accelerations Q16 mm/s², in 64 bits     directions Q2.30
  *   inputs Q16.16 of their units, held to 32 bits
@@ -22,19 +22,8 @@ enum incise_fixed_input_kind {
 	INCISE_FIXED_INPUT_KINDS,
 };
 
-/* @velocity within ±10^4 mm/s, @acceleration within ±10^5 mm/s². */
-int32_t incise_fixed_input_acceleration(const int32_t velocity[3],
-					const int64_t acceleration[3]) INCISE_REALTIME;
-
-/* The angle between two unit vectors, degrees. */
-int32_t incise_fixed_input_tilt(const int32_t axis[3],
-				const int32_t normal[3]) INCISE_REALTIME;
-
-/* Seconds from one time to a later one. */
-int32_t incise_fixed_input_time(int64_t t_ns, int64_t from_ns) INCISE_REALTIME;
-
 /*
- * Rounding in the functions above, of exact operands: 2^-11 mm/s² and a share of 2^-19, that of the
+ * Rounding of incise_fixed_input_acceleration(), _tilt() and _time() (tick.proto.h), of exact operands: 2^-11 mm/s² and a share of 2^-19, that of the
  * speed; 10^-5 degrees; 2^-16 s. A unit vector that is off by 2^-27 turns the angle by as many radians.
  */
 #define INCISE_FIXED_INPUT_ACCELERATION_BITS 11

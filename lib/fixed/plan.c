@@ -85,19 +85,20 @@ static bool is_membrane(const struct incise_fixed_membrane *membrane)
 	       in_range(membrane->back_wall, 0, LENGTH_MAX);
 }
 
-/* No spring pulls a tool in, and no damper drives it. */
+/* No spring pulls a tool in, and no damper drives it: no number of a force is below 0. */
+#define FORCE(...)
+#define NUMBER(row, i, member, ...) &&numbers->member >= 0
+#define MORE(member)
+
 static bool is_tissue(const struct incise_fixed_numbers *numbers)
 {
-	return numbers->reaction >= 0 && numbers->gain >= 0 &&
-	       in_range(numbers->support, 0, INCISE_FX_AWAY_MAX) &&
-	       numbers->beyond >= 0 && numbers->unloading >= 0 &&
-	       in_range(numbers->friction, 0, ONE) && numbers->plane >= 0 &&
-	       numbers->damping >= 0 && numbers->insertion >= 0 &&
+	return numbers->gain >= 0 && in_range(numbers->support, 0, INCISE_FX_AWAY_MAX) &&
+	       numbers->beyond >= 0 && in_range(numbers->friction, 0, ONE) &&
 	       in_range(numbers->aligned, 0, ONE) && in_range(numbers->printed, 0, 1) &&
-	       numbers->spread >= 0 && numbers->skin >= 0 &&
-	       numbers->skin_friction >= 0 &&
 	       incise_fixed_incision_good(&numbers->incision) &&
-	       is_membrane(&numbers->membrane);
+	       is_membrane(&numbers->membrane)
+#include "../tissue/forces.def"
+		;
 }
 
 static bool are_limits(const struct incise_fixed_numbers *numbers)

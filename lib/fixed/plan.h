@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
  * A scene's plan in integers: all that a tick needs, from poses to the targets of the actuators. It is
- * the whole of arithmetic = "fixed" in a program, and runs unchanged in the kernel module. lib/scene
+ * the whole of arithmetic = "fixed" in a program, and runs unchanged in the kernel module. lib/tissue
  * has the same stages in double.
  *
  *   pose ─▶ predict ─▶ tool ─▶ contact ─▶ normal ─▶ incision ─▶ membrane ─▶ forces ─▶ start ─▶

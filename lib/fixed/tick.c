@@ -11,6 +11,8 @@
 #include "../tissue/incision.proto.c"
 #include "../tissue/tick.proto.c"
 
+_Static_assert(PLACES == INCISE_FIXED_CUT_PLACES, "as many as a cut has");
+
 bool incise_fixed_shorten(int64_t v[3], int32_t most)
 {
 	uint64_t sum = 0;

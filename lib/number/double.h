@@ -87,7 +87,10 @@ static inline num n_between(num a, num b, num part, num whole)
 
 static inline int64_t n_cell(num at, num size)
 {
-	return (int64_t)n_within(floor(at / size), -1, 1e9);
+	double cell = floor(at / size);
+
+	/* What is not a number is in none. */
+	return cell >= 0 ? (int64_t)fmin(cell, 1e9) : -1;
 }
 
 static inline num n_multiple(int64_t times, num size)

@@ -92,7 +92,7 @@ static inline num n_between(num a, num b, num part, num whole)
 /* Number of the cell in which a place lies; below 0 any that is. */
 static inline int64_t n_cell(num at, num size)
 {
-	return (int64_t)at / size - (at < 0);
+	return (int64_t)(at / size) - (at < 0);
 }
 
 /* times × size */

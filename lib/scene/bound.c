@@ -198,16 +198,26 @@ static double tissue_N(const struct incise_plan *plan, const struct state_error 
 /* Ticks of a contact in which the skin's anchor is rounded: an hour at 1 kHz. */
 #define ANCHOR_TICKS 3.6e6
 
-/* The skin drags by the force along the normal, and by where its anchor is. */
+/*
+ * The skin drags by the force along the normal, and by where its anchor is: it begins where the contact does,
+ * which is uncertain along the skin, and goes on with the errors of tool, slip and rounding. A hand that circles
+ * the anchor at the slip R = μ N / K draws it round on √(ρ² - R²): from ρ = R on an error δ of either makes up
+ * to √(2 R δ) of it.
+ */
 static double skin_N(const struct incise_plan *plan, const struct state_error *e,
-		     double normal_N)
+		     double normal_N, double reach_mm)
 {
 	const double *skin = plan->acting[INCISE_FORCE_SKIN].number;
+	double most_N = plan->stability.stiffness_N_mm * reach_mm, pull_N, slip_mm,
+	       off_mm;
 
 	if (!(skin[0] > 0))
 		return 0;
-	return skin[1] * normal_N +
-	       skin[0] * (4 * e->x + 8 * LSB_MM + ldexp(ANCHOR_TICKS, -33));
+	/* Its share is rounded, too. */
+	pull_N = skin[1] * normal_N + most_N * LSB_MM / 2;
+	slip_mm = skin[1] * most_N / skin[0];
+	off_mm = 4 * e->x + 8 * LSB_MM + ldexp(ANCHOR_TICKS, -33) + pull_N / skin[0];
+	return pull_N + skin[0] * (e->x / ENTERS + off_mm + sqrt(2 * slip_mm * off_mm));
 }
 
 double incise_plan_bound(const struct incise_plan *plan, double reach_mm)
@@ -224,5 +234,5 @@ double incise_plan_bound(const struct incise_plan *plan, double reach_mm)
 		s->stiffness_N_mm * (PLACES * (e.x + 4 * LSB_MM) + ldexp(reach_mm, -26)) +
 		plane_N_mm * e.x / ENTERS + s->damping_N_s_mm * e.v +
 		ldexp(SPEED_MM_S, -29);
-	return bound_N + skin_N(plan, &e, bound_N);
+	return bound_N + skin_N(plan, &e, bound_N, reach_mm);
 }

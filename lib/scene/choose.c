@@ -35,7 +35,12 @@ static const char *no_force(const struct incise_plan *plan,
 	if (own->force == &incise_tissue_forces[INCISE_FORCE_REACTION] &&
 	    (plan->model || plan->fixed))
 		return zero(plan, NULL);
-	return own->number[0] > 0 ? NULL : zero(plan, own->force->zero);
+	if (own->number[0] > 0)
+		return NULL;
+	/* What acts by a share is without a force where its stiffness is 0, too. */
+	return zero(plan, own->force->acts && own->number[own->force->acts] > 0
+				  ? own->force->number[0].zero
+				  : own->force->zero);
 }
 
 static const char *no_membrane(const struct incise_plan *plan)

@@ -13,8 +13,9 @@
 	[INCISE_FORCE_##row].zero = (zero_), [INCISE_FORCE_##row].formula = (formula_), \
 	[INCISE_FORCE_##row].does = (does_),                                            \
 	[INCISE_FORCE_##row].stage = INCISE_STAGE(stage_),
-#define NUMBER(row, i, member, scale, most, ...) \
-	[INCISE_FORCE_##row].number[i] = {__VA_ARGS__},
+#define NUMBER(row, i, member, scale, most, key, unit, max, initial, skin, help) \
+	[INCISE_FORCE_##row].number[i] = {                                       \
+		key, unit, max, initial, skin, help, "tissue." key " is 0"},
 #define MORE(member)
 
 const struct incise_tissue_force incise_tissue_forces[] = {

@@ -43,6 +43,7 @@ struct incise_force_number {
 	const char *initial;
 	double skin; /* of neck.scene: what tests and benchmarks take */
 	const char *help;
+	const char *zero; /* it is 0 */
 };
 
 /*

@@ -162,7 +162,7 @@ void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 void incise_plan_input_range(const struct incise_plan *plan,
 			     enum incise_cutting_phase phase, int i, double ends[2]);
 
-/* Take a number's place in a tick: the plan in double, by all that was found of the scene. */
+/* Fill in the plan in double, by all that was found of the scene. */
 void incise_plan_set_numbers(struct incise_plan *plan);
 
 /* Take the force away, and keep why. Returns @rc. */

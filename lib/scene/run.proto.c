@@ -123,10 +123,10 @@ static int32_t *punctured(struct incise_plan *plan)
 	return &OWN(plan)->state.membrane.punctured;
 }
 
-/* A plan in double without handle and tube has no cuts. */
+/* A plan without handle and tube has no cuts. */
 static struct T(incision) *cuts_of(struct incise_plan *plan)
 {
-	return T_PART(&OWN(plan)->state, incision);
+	return plan->inserts ? T_PART(&OWN(plan)->state, incision) : NULL;
 }
 
 static bool get_cut(struct incise_plan *plan, int i, struct incise_cut *cut)

@@ -45,20 +45,6 @@ void incise_incision_free(struct incise_incision *incision)
 	free(incision);
 }
 
-void incise_incision_clear(struct incise_incision *incision)
-{
-	incision->cuts->n = 0;
-	incise_double_incision_leave(incision->cuts);
-}
-
-bool incise_incision_add(struct incise_incision *incision, const struct incise_cut *cut)
-{
-	if (incision->cuts->n >= incision->setup.cuts_most)
-		return false;
-	incision->cuts->cut[incision->cuts->n++] = *cut;
-	return true;
-}
-
 size_t incise_incision_memory(const struct incise_incision *incision)
 {
 	return size_of(&incision->setup);

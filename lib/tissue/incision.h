@@ -18,11 +18,4 @@ size_t incise_incision_memory(const struct incise_incision *incision);
 /* Its cuts, for ticks. Valid until it is freed. */
 struct incise_double_incision *incise_incision_of(struct incise_incision *incision);
 
-/* Forget all cuts; no tool is in it. */
-void incise_incision_clear(struct incise_incision *incision) INCISE_REALTIME;
-
-/* Add a cut of another one. Returns whether there was room. */
-bool incise_incision_add(struct incise_incision *incision,
-			 const struct incise_cut *cut) INCISE_REALTIME;
-
 #endif

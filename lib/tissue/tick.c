@@ -11,6 +11,8 @@
 #include "incision.proto.c"
 #include "tick.proto.c"
 
+_Static_assert(PLACES == INCISE_CUT_PLACES, "as many as a cut has");
+
 /*
  * Below this depth the direction from tool to proxy is rounding: the surface's own normal takes its
  * place. Positions within 10 m are good to 2e-12 mm.

@@ -691,8 +691,10 @@ void T(stage_spread)(const struct T(plan) *plan, struct T(state) *state,
  *   ────×─ ─ ─ ─ ─ ─○────       slips: the anchor moves by stretch - μ N / K
  *     anchor      tool
  *
- * Errors of an anchor do not add up: along the way it is set from the tool's place anew, across it the next place
- * is a mean of those of tool and anchor. Its own rounding does, which is why it has 32 bits behind the point.
+ * The anchor has 32 bits behind the point, so that its rounding adds up to nothing in a contact. An error of the
+ * tool's place does not add up along the way, where the anchor is set anew, nor across it, where its next place
+ * is a mean of those of tool and anchor; but a hand that circles at little more than R = μ N / K magnifies it,
+ * up to √(2 R δ) for one of δ: see ../scene/bound.c.
  */
 static void drag(struct T(state) *state, num way, const dir along[3])
 {

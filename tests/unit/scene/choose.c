@@ -271,7 +271,7 @@ static struct lack lack_of(int i)
 	if (i >= incise_n_tissue_forces)
 		return lacks[i - incise_n_tissue_forces];
 	return (struct lack){.stage = force->name,
-			     .why = force->zero,
+			     .why = force->acts ? force->number[0].zero : force->zero,
 			     .lacking = {.force = force->name}};
 }
 

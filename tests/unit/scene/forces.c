@@ -546,8 +546,11 @@ TEST(test_each_force_has_its_phases)
 		 {-0.3 * M_SQRT1_2, -0.3 * M_SQRT1_2, 0}},
 	};
 	assert_int_equal(sizeof(cases) / sizeof(*cases), incise_n_tissue_forces);
-	for (int i = 0; i < incise_n_tissue_forces; i++)
+	for (int i = 0; i < incise_n_tissue_forces; i++) {
 		assert_string_equal(cases[i].name, incise_tissue_forces[i].name);
+		assert_non_null(incise_tissue_forces[i].number[0].key);
+		assert_non_null(incise_tissue_forces[i].does);
+	}
 	EACH_KIND
 	for (int k = 0; k < incise_n_tissue_forces * 3; k++) {
 		enum incise_phase phase = k % 3;

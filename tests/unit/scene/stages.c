@@ -197,7 +197,8 @@ static struct incise_plan plan_over(struct incise_surface *surface)
 {
 	struct incise_plan plan = made_plan();
 
-	plan.doubles.state.flat[0] = -1;
+	plan.doubles.plan.numbers.side[1] = 1;
+	plan.doubles.state.attitude[0] = plan.doubles.state.attitude[3] = M_SQRT1_2;
 	plan.doubles.state.force[0] = 1;
 	incise_proxy_init(&plan.proxy, surface, 0.5);
 	assert_int_equal(touch(&plan, 0, 1)->phase, INCISE_PHASE_FREE);
