@@ -200,6 +200,21 @@ static int open_parts(struct incise_fixed_plan *plan, const uint8_t *bytes,
 	return rc;
 }
 
+#undef NUMBER
+#undef MORE
+#define NUMBER(...)
+#define MORE(member) || numbers->member
+
+uint32_t incise_fixed_plan_version(const struct incise_fixed_numbers *numbers)
+{
+	if (false
+#include "../tissue/forces.def"
+	)
+		return INCISE_FIXED_PLAN_VERSION_MORE;
+	return numbers->inputs ? INCISE_FIXED_PLAN_VERSION_INPUTS
+			       : INCISE_FIXED_PLAN_VERSION;
+}
+
 int incise_fixed_plan_open(struct incise_fixed_plan *plan, const void *blob,
 			   uint32_t size)
 {
@@ -214,12 +229,11 @@ int incise_fixed_plan_open(struct incise_fixed_plan *plan, const void *blob,
 	for (int i = 0; i < 8; i++)
 		if (head->magic[i] != INCISE_FIXED_PLAN_MAGIC[i])
 			return BAD;
-	if (head->version != INCISE_FIXED_PLAN_VERSION &&
-	    head->version != INCISE_FIXED_PLAN_VERSION_INPUTS)
+	if (head->version < INCISE_FIXED_PLAN_VERSION ||
+	    head->version > INCISE_FIXED_PLAN_VERSION_MORE)
 		return UNSUPPORTED;
-	if ((head->version == INCISE_FIXED_PLAN_VERSION_INPUTS) != !!head->numbers.inputs)
-		return BAD;
-	if (head->size != size || head->reserved ||
+	if (head->version != incise_fixed_plan_version(&head->numbers) ||
+	    head->size != size || head->reserved ||
 	    head->crc != incise_fx_crc(bytes + INCISE_FIXED_PLAN_CRC_FROM,
 				       size - INCISE_FIXED_PLAN_CRC_FROM) ||
 	    !incise_fx_is_name(head->name, sizeof(head->name)) ||

@@ -32,6 +32,7 @@
 #define INCISE_FIXED_PLAN_MAGIC "INCISEPL"
 #define INCISE_FIXED_PLAN_VERSION 1
 #define INCISE_FIXED_PLAN_VERSION_INPUTS 2 /* of a plan with @inputs */
+#define INCISE_FIXED_PLAN_VERSION_MORE 3   /* of one with forces that came later */
 #define INCISE_FIXED_PLAN_SIZE_MAX (32 << 20)
 
 #define INCISE_FIXED_FORCE_MAX (1 << 28) /* of a plan's limit: 4096 N */
@@ -137,6 +138,9 @@ struct incise_fixed_plan {
  */
 int incise_fixed_plan_open(struct incise_fixed_plan *plan, const void *blob,
 			   uint32_t size);
+
+/* The version of a plan of these numbers. */
+uint32_t incise_fixed_plan_version(const struct incise_fixed_numbers *numbers);
 
 /* The same of numbers alone, without a model and a grid. @return whether they are good */
 bool incise_fixed_numbers_good(const struct incise_fixed_numbers *numbers);

@@ -61,8 +61,7 @@ struct incise_plan_file *incise_plan_file_new(const struct incise_plan *plan,
 					      struct incise_error *err)
 {
 	struct incise_plan_file *file = NULL;
-	struct incise_fixed_plan_header head = {.magic = INCISE_FIXED_PLAN_MAGIC,
-						.version = INCISE_FIXED_PLAN_VERSION};
+	struct incise_fixed_plan_header head = {.magic = INCISE_FIXED_PLAN_MAGIC};
 	struct incise_heights heights = {0};
 	const struct incise_fixed *model = plan->fixed;
 	int rc = check_axes(plan, err);
@@ -71,8 +70,7 @@ struct incise_plan_file *incise_plan_file_new(const struct incise_plan *plan,
 		rc = incise_integers_file(plan, &head.numbers, &heights, err);
 	if (rc)
 		goto out;
-	if (head.numbers.inputs)
-		head.version = INCISE_FIXED_PLAN_VERSION_INPUTS;
+	head.version = incise_fixed_plan_version(&head.numbers);
 	take_name(head.name, plan->scene->path);
 	strncpy(head.surface,
 		plan->scene->surface_kind ? plan->scene->surface_kind : "plane",

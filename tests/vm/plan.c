@@ -176,7 +176,7 @@ void *plan_make(const struct plan_recipe *recipe, uint32_t *size)
 		return NULL;
 	}
 	memcpy(head->magic, INCISE_FIXED_PLAN_MAGIC, sizeof(head->magic));
-	head->version = INCISE_FIXED_PLAN_VERSION;
+	head->version = INCISE_FIXED_PLAN_VERSION; /* no inputs but depth and speed */
 	head->size = *size;
 	snprintf(head->name, sizeof(head->name), "%s", recipe->name);
 	if (model) {

@@ -150,8 +150,10 @@ static int with(uint8_t *bytes, uint32_t size, size_t at, int64_t value)
 
 	memcpy(&was, place, sizeof(was));
 	memcpy(place, &number, sizeof(number));
+	head_of(bytes)->version = incise_fixed_plan_version(&head_of(bytes)->numbers);
 	rc = open_sealed(bytes, size);
 	memcpy(place, &was, sizeof(was));
+	head_of(bytes)->version = incise_fixed_plan_version(&head_of(bytes)->numbers);
 	return rc;
 }
 
@@ -318,9 +320,9 @@ TEST(test_bytes)
 		}
 		for (uint32_t n = 0; n < size; n += 1 + n / 64)
 			assert_int_not_equal(incise_fixed_plan_open(&plan, bytes, n), 0);
-		head->version += 2;
+		head->version += 8;
 		assert_int_equal(open_sealed(bytes, size), -ENOTSUP);
-		head->version -= 2;
+		head->version -= 8;
 		head->size--;
 		assert_int_equal(open_sealed(bytes, size), -EINVAL);
 		head->size++;
@@ -387,6 +389,14 @@ TEST(test_inputs)
 		struct incise_fixed_plan plan;
 		int n = 0;
 
+		/* Forces that came later have a version of their own, which no other takes. */
+		if (head->numbers.skin || head->numbers.skin_friction) {
+			assert_int_equal(head->version, INCISE_FIXED_PLAN_VERSION_MORE);
+			head->version = INCISE_FIXED_PLAN_VERSION;
+			assert_int_equal(open_sealed(bytes, size), -EINVAL);
+			head->numbers.skin = head->numbers.skin_friction = 0;
+		}
+		assert_int_equal(open_sealed(bytes, size), 0);
 		assert_int_equal(incise_fixed_plan_open(&plan, bytes, size), 0);
 		if (plan.has_model)
 			n = plan.model.n_inputs;

@@ -363,7 +363,6 @@ static inline uint32_t incise_fx_trial_plan(uint64_t seed, void *bytes)
 		incise_fx_trial_next(&t.seed);
 	t.wide = incise_fx_trial_one_in(&t, 4);
 	*head = (struct incise_fixed_plan_header){
-		.version = INCISE_FIXED_PLAN_VERSION,
 		.name = "trial.scene",
 		.surface = "trial",
 	};
@@ -389,6 +388,7 @@ static inline uint32_t incise_fx_trial_plan(uint64_t seed, void *bytes)
 		size += head->heights_size;
 	}
 	head->size = size;
+	head->version = incise_fixed_plan_version(&head->numbers);
 	incise_fx_trial_seal(bytes, size);
 	return size;
 }
