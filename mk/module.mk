@@ -50,7 +50,7 @@ dkms_dir = $(srcdir)/incise-$(version)
 dkms_sources = $(addprefix driver/,Kbuild Makefile compat/probe) \
 	$(filter-out %.mod.c,$(wildcard $(addprefix driver/,*.[ch] uapi/*.h compat/*.c))) \
 	$(wildcard driver/source/*) $(wildcard lib/fixed/*.[ch] lib/tissue/*.proto.[ch] lib/tissue/*.def) \
-	$(addprefix lib/number/,fixed.h fixed_kind.h no_kind.h) \
+	$(addprefix lib/number/,both.h fixed.h fixed_kind.h no_kind.h) \
 	$(shell grep -l __KERNEL__ lib/include/incise/*.h) \
 	$(addprefix lib/include/incise/,export.h stepper_state.h tick_flags.h tool.h)
 dkms_folders = $(patsubst %/,%,$(sort $(dir $(dkms_sources))))

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The operations of doubles for a .proto.c of lib/tissue; see fixed.h. What is not a number is neither
- * below nor above anything.
+ * The operations of doubles for a .proto.c of lib/tissue; see fixed.h.
  */
 #ifndef INCISE_NUMBER_DOUBLE_H
 #define INCISE_NUMBER_DOUBLE_H
@@ -12,6 +11,7 @@
 #include <incise/export.h>
 #include <stdint.h>
 #include "double_kind.h"
+#include "both.h"
 
 #define N(p) ((num)(p))
 #define N_OF(p, q) ((num)(p) / (q))
@@ -35,39 +35,9 @@ static inline num n_sub(num a, num b)
 	return a - b;
 }
 
-static inline num n_neg(num a)
-{
-	return -a;
-}
-
 static inline num n_abs(num a)
 {
 	return fabs(a);
-}
-
-static inline num n_half(num a)
-{
-	return a / 2;
-}
-
-static inline bool n_below(num a, num b)
-{
-	return a < b;
-}
-
-static inline num n_min(num a, num b)
-{
-	return a < b ? a : b;
-}
-
-static inline num n_max(num a, num b)
-{
-	return a > b ? a : b;
-}
-
-static inline num n_within(num v, num least, num most)
-{
-	return v > most ? most : v < least ? least : v;
 }
 
 static inline num n_times(num a, num b)
@@ -89,7 +59,7 @@ static inline int64_t n_cell(num at, num size)
 {
 	double cell = floor(at / size);
 
-	/* What is not a number is in none. */
+	/* NaN is in none. */
 	return cell >= 0 ? (int64_t)fmin(cell, 1e9) : -1;
 }
 
@@ -118,11 +88,6 @@ static inline num n_share_of(dir a)
 static inline void d_copy(dir to[3], const dir a[3])
 {
 	v3_copy(to, a);
-}
-
-static inline bool d_below(dir a, dir b)
-{
-	return a < b;
 }
 
 static inline dir d_abs(dir a)
@@ -272,16 +237,6 @@ static inline num w_scale(wide share, num a)
 	return share * a;
 }
 
-static inline wide w_of(num a)
-{
-	return a;
-}
-
-static inline num n_of(wide a)
-{
-	return a;
-}
-
 /* --- work of the front: twice the work, N mm --- */
 
 static inline wide w_work(wide work2, num a, num b, num way)
@@ -302,11 +257,6 @@ static inline num w_paid(num stiffness, wide work2, wide most2)
 #define W_MISS_MM 1.0
 #define W_SHARE 1.0
 
-static inline wide w_min(wide a, wide b)
-{
-	return a < b ? a : b;
-}
-
 static inline wide w_within(wide v, wide least, wide most)
 {
 	return n_within(v, least, most);
@@ -322,11 +272,6 @@ static inline wide w_shifted(wide a, int shift)
 {
 	(void)shift;
 	return a;
-}
-
-static inline wide w_half(wide a)
-{
-	return a / 2;
 }
 
 static inline wide w_seconds(int64_t ns)

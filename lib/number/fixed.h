@@ -11,6 +11,7 @@
 
 #include "../fixed/vector.h"
 #include "fixed_kind.h"
+#include "both.h"
 
 /* Constants: p / q, to the nearest. Real numbers have no place here. */
 #define N(p) ((num)(p)*65536)
@@ -35,39 +36,9 @@ static inline num n_sub(num a, num b)
 	return incise_fx_hold32((int64_t)a - b);
 }
 
-static inline num n_neg(num a)
-{
-	return -a;
-}
-
 static inline num n_abs(num a)
 {
 	return a < 0 ? -a : a;
-}
-
-static inline num n_half(num a)
-{
-	return a / 2;
-}
-
-static inline bool n_below(num a, num b)
-{
-	return a < b;
-}
-
-static inline num n_min(num a, num b)
-{
-	return a < b ? a : b;
-}
-
-static inline num n_max(num a, num b)
-{
-	return a > b ? a : b;
-}
-
-static inline num n_within(num v, num least, num most)
-{
-	return v > most ? most : v < least ? least : v;
 }
 
 static inline num n_times(num a, num b)
@@ -124,11 +95,6 @@ static inline num n_share_of(dir a)
 static inline void d_copy(dir to[3], const dir a[3])
 {
 	incise_fx_copy(to, a);
-}
-
-static inline bool d_below(dir a, dir b)
-{
-	return a < b;
 }
 
 /* A pose's numbers are any. */
@@ -269,16 +235,6 @@ static inline num w_scale(wide share, num a)
 	return (num)incise_fx_rounded(share * a, 30);
 }
 
-static inline wide w_of(num a)
-{
-	return a;
-}
-
-static inline num n_of(wide a)
-{
-	return (num)a;
-}
-
 /* --- work of the front: twice the work, Q32, held to ±2^62 --- */
 
 /* work2 + (a + b) × way: 2^32 · 2^30 */
@@ -309,11 +265,6 @@ static inline num w_paid(num stiffness, wide work2, wide most2)
 #define W_MISS_MM ((wide)1 << 24)
 #define W_SHARE ((wide)1 << 26)
 
-static inline wide w_min(wide a, wide b)
-{
-	return a < b ? a : b;
-}
-
 static inline wide w_within(wide v, wide least, wide most)
 {
 	return incise_fx_within(v, least, most);
@@ -329,11 +280,6 @@ static inline wide w_times(wide a, wide b, int shift)
 static inline wide w_shifted(wide a, int shift)
 {
 	return incise_fx_rounded(a, shift);
-}
-
-static inline wide w_half(wide a)
-{
-	return a / 2;
 }
 
 /* ns to s in Q30, to 2^28: 2^30 / 10^9 is 1.073741824, in Q32 below. */

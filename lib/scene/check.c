@@ -489,10 +489,7 @@ static void add_up(struct incise_plan *plan, double model_N_mm)
 
 		for (int i = 0; i < incise_n_tissue_forces; i++) {
 			const struct incise_acting_force *own = &plan->acting[i];
-			bool model =
-				own->force ==
-					&incise_tissue_forces[INCISE_FORCE_REACTION] &&
-				(plan->model || plan->fixed);
+			bool model = incise_plan_has_model(plan, own);
 
 			if (own->force->phases >> phase & 1)
 				sum[own->force->kind] +=

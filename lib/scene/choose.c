@@ -32,12 +32,11 @@ static const char *no_normal(const struct incise_plan *plan)
 static const char *no_force(const struct incise_plan *plan,
 			    const struct incise_acting_force *own)
 {
-	if (own->force == &incise_tissue_forces[INCISE_FORCE_REACTION] &&
-	    (plan->model || plan->fixed))
+	if (incise_plan_has_model(plan, own))
 		return zero(plan, NULL);
 	if (own->number[0] > 0)
 		return NULL;
-	/* What acts by a share is without a force where its stiffness is 0, too. */
+	/* A force by a share of others is none where its stiffness is 0, too. */
 	return zero(plan, own->force->acts && own->number[own->force->acts] > 0
 				  ? own->force->number[0].zero
 				  : own->force->zero);

@@ -80,15 +80,7 @@ void incise_plan_set_numbers(struct incise_plan *plan)
 		.leave = scene->tissue.leave_mm,
 		.average_ticks = plan->average_ticks,
 		.printed = scene->tissue.printed_orientation,
-		.incision =
-			{
-				.cuts_most = scene->tissue.cuts_most,
-				.cut_from = scene->tissue.cut_from_mm,
-				.stretch = scene->tissue.stretch_mm,
-				.handle_width = scene->tool.handle_width_mm,
-				.handle_thickness = scene->tool.handle_thickness_mm,
-				.tube = scene->tool.tube_mm,
-			},
+		.incision = incise_scene_cuts(scene),
 		.small = scene->limits.start_N,
 		.ramp_ns = scene->limits.ramp_ms * 1e6,
 		.fade_ns = scene->limits.fade_ms * 1e6,
@@ -136,6 +128,14 @@ static int set_tip(struct incise_plan *plan, const double tip_mm[3])
 }
 
 const struct incise_plan_ops incise_double_ops = {
-	run,	 take_pose, hold,    faded,	 zero,
-	set_tip, punctured, get_cut, clear_cuts, add_cut,
+	.tick = run_tick,
+	.take_pose = take_pose,
+	.hold = hold_tool,
+	.faded = has_faded,
+	.zero = zero_force,
+	.set_tip = set_tip,
+	.punctured = puncture_of,
+	.cut = get_cut,
+	.clear_cuts = clear_cuts,
+	.add_cut = add_cut,
 };

@@ -496,6 +496,14 @@ static int set_tip(struct incise_plan *plan, const double tip_mm[3])
 }
 
 const struct incise_plan_ops incise_fixed_ops = {
-	run,	 take_pose, hold,    faded,	 zero,
-	set_tip, punctured, get_cut, clear_cuts, add_cut,
+	.tick = run_tick,
+	.take_pose = take_pose,
+	.hold = hold_tool,
+	.faded = has_faded,
+	.zero = zero_force,
+	.set_tip = set_tip,
+	.punctured = puncture_of,
+	.cut = get_cut,
+	.clear_cuts = clear_cuts,
+	.add_cut = add_cut,
 };

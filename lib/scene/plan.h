@@ -31,7 +31,7 @@ struct incise_stage {
 	struct incise_stage_pair numbers;
 };
 
-/* How a plan runs: in double, in integers, or in the kernel. All are real-time safe. */
+/* The operations of a plan in double, in integers, or in the kernel. All are real-time safe. */
 struct incise_plan_ops {
 	/* All stages; @stage_ns: with the time of each, or NULL. 0 or a negative errno. */
 	int (*tick)(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tick,
@@ -144,6 +144,14 @@ struct incise_plan {
 	struct incise_axes axes;	  /* none: nothing is rendered */
 	struct incise_plan_kernel kernel;
 };
+
+/* Whether a model takes the place of a force's first number. */
+static inline bool incise_plan_has_model(const struct incise_plan *plan,
+					 const struct incise_acting_force *own)
+{
+	return own->force == &incise_tissue_forces[INCISE_FORCE_REACTION] &&
+	       (plan->model || plan->fixed);
+}
 
 /* --- stages of devices --- */
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * How a plan runs in a kind of numbers: included by doubles.c and integers.c, behind their
+ * The ticks of a plan in a kind of numbers: included by doubles.c and integers.c, behind their
  *
  *   OWN(plan)    plan, state and tick of this kind          STAGE    of a struct incise_stage_pair
  *   n_from(), d_from(), n_to(), d_to()                      conversions of numbers and directions
@@ -31,7 +31,7 @@ static void take_pose(struct incise_plan *plan, bool tube,
 }
 
 /* All that a tick found. */
-static void finish(struct incise_plan *plan, struct incise_tick *tick)
+static void finish_tick(struct incise_plan *plan, struct incise_tick *tick)
 {
 	const struct T(tick) *from = &OWN(plan)->tick;
 
@@ -60,7 +60,7 @@ static inline __attribute__((always_inline)) int run_stages(struct incise_plan *
 							    struct incise_tick *tick,
 							    int64_t *stage_ns)
 {
-	bool finished = false;
+	bool found = false; /* since the tick was filled in */
 
 	*tick = (struct incise_tick){.t_ns = t_ns, .tool = plan->held};
 	if (plan->fault)
@@ -72,13 +72,13 @@ static inline __attribute__((always_inline)) int run_stages(struct incise_plan *
 		int rc = 0;
 
 		if (!stage->run) {
-			finished = false;
+			found = true;
 			stage->numbers.STAGE(&OWN(plan)->plan, &OWN(plan)->state,
 					     &OWN(plan)->tick);
 		} else {
-			if (i && !finished)
-				finish(plan, tick);
-			finished = i;
+			if (found)
+				finish_tick(plan, tick);
+			found = false;
 			rc = stage->run(plan, tick);
 		}
 		if (stage_ns)
@@ -86,25 +86,25 @@ static inline __attribute__((always_inline)) int run_stages(struct incise_plan *
 		if (rc)
 			return incise_plan_fail(plan, tick, rc);
 	}
-	if (!finished)
-		finish(plan, tick);
+	if (found)
+		finish_tick(plan, tick);
 	return 0;
 }
 
-static int run(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tick,
-	       int64_t *stage_ns)
+static int run_tick(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tick,
+		    int64_t *stage_ns)
 {
 	return stage_ns ? run_stages(plan, t_ns, tick, stage_ns)
 			: run_stages(plan, t_ns, tick, NULL);
 }
 
-static void hold(struct incise_plan *plan)
+static void hold_tool(struct incise_plan *plan)
 {
 	OWN(plan)->state.wanted = (int32_t)plan->wanted;
 	OWN(plan)->state.fading = plan->fading;
 }
 
-static bool faded(const struct incise_plan *plan)
+static bool has_faded(const struct incise_plan *plan)
 {
 	const struct T(state) *state = &OWN(plan)->state;
 
@@ -112,13 +112,13 @@ static bool faded(const struct incise_plan *plan)
 	return !(state->gain > 0) && v3_length(plan->last_N) == 0;
 }
 
-static void zero(struct incise_plan *plan)
+static void zero_force(struct incise_plan *plan)
 {
 	for (int i = 0; i < 3; i++)
 		OWN(plan)->state.last[i] = 0;
 }
 
-static int32_t *punctured(struct incise_plan *plan)
+static int32_t *puncture_of(struct incise_plan *plan)
 {
 	return &OWN(plan)->state.membrane.punctured;
 }

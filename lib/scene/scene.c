@@ -791,10 +791,9 @@ int incise_scene_checksum(const struct incise_scene *scene, uint32_t *crc32c,
 	return 0;
 }
 
-struct incise_incision *incise_incision_new(const struct incise_scene *scene,
-					    struct incise_error *err)
+struct incise_double_incision_setup incise_scene_cuts(const struct incise_scene *scene)
 {
-	const struct incise_double_incision_setup setup = {
+	return (struct incise_double_incision_setup){
 		.cuts_most = scene->tissue.cuts_most,
 		.cut_from = scene->tissue.cut_from_mm,
 		.stretch = scene->tissue.stretch_mm,
@@ -802,6 +801,12 @@ struct incise_incision *incise_incision_new(const struct incise_scene *scene,
 		.handle_thickness = scene->tool.handle_thickness_mm,
 		.tube = scene->tool.tube_mm,
 	};
+}
+
+struct incise_incision *incise_incision_new(const struct incise_scene *scene,
+					    struct incise_error *err)
+{
+	const struct incise_double_incision_setup setup = incise_scene_cuts(scene);
 
 	return incise_incision_make(&setup, scene->tool.side, err);
 }

@@ -80,4 +80,7 @@ extern const struct incise_setting incise_scene_settings[];
 void incise_scene_tissue_settings(struct incise_setting rows[SETTING_ROWS_MAX + 1]);
 const struct incise_setting *incise_scene_surface_settings(const char *kind);
 
+/* Of its tissue and tools: what its cuts go by. */
+struct incise_double_incision_setup incise_scene_cuts(const struct incise_scene *scene);
+
 #endif

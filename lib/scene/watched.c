@@ -38,8 +38,8 @@ static int take_axes(struct incise_plan *plan, struct incise_rig *rig,
 	return 0;
 }
 
-static int give(struct incise_plan *plan, bool tube,
-		const struct incise_tracker_sample *sample, int64_t now_ns)
+static int give_pose(struct incise_plan *plan, bool tube,
+		     const struct incise_tracker_sample *sample, int64_t now_ns)
 {
 	const struct incise_stepper_pose_given given = {
 		.sample = sample,
@@ -57,7 +57,7 @@ static int give(struct incise_plan *plan, bool tube,
 }
 
 /* Without poses, and to fade at once. A fault is found by the look that follows. */
-static void live(struct incise_plan *plan, int64_t now_ns)
+static void send_life(struct incise_plan *plan, int64_t now_ns)
 {
 	if (!plan->kernel.follow) {
 		plan->kernel.follow = true;
@@ -68,10 +68,10 @@ static void live(struct incise_plan *plan, int64_t now_ns)
 	if (!plan->kernel.fed_ns ||
 	    now_ns - plan->kernel.fed_ns >= plan->kernel.life_ns ||
 	    plan->kernel.fade_told != plan->fading)
-		give(plan, false, NULL, now_ns);
+		give_pose(plan, false, NULL, now_ns);
 }
 
-static bool kernel_faded(const struct incise_plan *plan)
+static bool has_faded(const struct incise_plan *plan)
 {
 	enum incise_stepper_plan_state state = plan->kernel.last_seen.state;
 
@@ -116,7 +116,7 @@ static int find_rendered(struct incise_plan *plan, struct incise_tick *tick)
 	int rc;
 
 	if (plan->kernel.feeds)
-		live(plan, tick->t_ns);
+		send_life(plan, tick->t_ns);
 	rc = incise_stepper_rendered(plan->axes.axis[0].stepper, &rendered);
 	/* While it is written: what was read last. */
 	if (rc == -EAGAIN)
@@ -134,8 +134,8 @@ static int find_rendered(struct incise_plan *plan, struct incise_tick *tick)
 	return incise_axes_watch(&plan->axes, tick);
 }
 
-static int watch(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tick,
-		 int64_t *stage_ns)
+static int watch_tick(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tick,
+		      int64_t *stage_ns)
 {
 	*tick = (struct incise_tick){.t_ns = t_ns, .tool = plan->held};
 	if (plan->fault)
@@ -155,7 +155,7 @@ static int watch(struct incise_plan *plan, int64_t t_ns, struct incise_tick *tic
 static void take_pose(struct incise_plan *plan, bool tube,
 		      const struct incise_tracker_sample *sample, int64_t now_ns)
 {
-	give(plan, tube, sample, now_ns);
+	give_pose(plan, tube, sample, now_ns);
 }
 
 static void keep_stages(struct incise_plan *plan, bool feeds)
@@ -167,9 +167,9 @@ static void keep_stages(struct incise_plan *plan, bool feeds)
 		plan->stage[plan->n_stages++] = pose;
 	plan->stage[plan->n_stages++] =
 		(struct incise_stage){.name = "kernel", .run = find_rendered};
-	plan->ops.tick = watch;
+	plan->ops.tick = watch_tick;
 	plan->ops.take_pose = take_pose;
-	plan->ops.faded = kernel_faded;
+	plan->ops.faded = has_faded;
 	plan->kernel.runs = true;
 	plan->kernel.feeds = feeds;
 }

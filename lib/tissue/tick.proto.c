@@ -721,7 +721,7 @@ void T(stage_skin)(const struct T(plan) *plan, struct T(state) *state,
 	v_add(across, off, n_neg(v_along(off, state->normal)), state->normal);
 	if (!v_direction(along, across))
 		return;
-	stretch = v_length(across);
+	stretch = v_along(across, along);
 	pull = n_times(numbers->skin, stretch);
 	most = n_times(numbers->skin_friction,
 		       n_max(v_along(state->force, state->normal), 0));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only */
 /*
- * What a tick works on, and its stages, for a kind of numbers: included between ../number/NAME_kind.h
+ * The numbers, state and stages of a tick for a kind of numbers: included between ../number/NAME_kind.h
  * and no_kind.h, by ../fixed/plan.h for the integers of programs and the kernel, by tick.h for double.
  * The .proto.c beside this are the physics, once; they are compiled for each kind.
  *

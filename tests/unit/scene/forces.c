@@ -9,7 +9,7 @@
 #include "../../../lib/scene/plan.h"
 #include "felt.h"
 
-/* What a force goes by, in mm, N and s. */
+/* The numbers of a case, in mm, N and s. */
 struct given {
 	enum incise_phase phase;
 	enum incise_tool held;
@@ -96,6 +96,7 @@ ADD(fixed, q16, q30, / 65536.0)
 /*
  * Products of three numbers up to 50 and some sums: a dozen roundings of 1e5 · 2^-53; of integers half a
  * bit of a stiffness over 170 mm, and of a length for 4 N/mm.
+ * The second is for cases of small numbers: some ulp of 3, or three bits of 2^-16.
  */
 static const struct kind {
 	void (*add)(const struct given *g, int row, double force[3]);

@@ -365,7 +365,7 @@ static void draw(uint64_t seed, struct drawn *d)
 
 /* --- a hand ------------------------------------------------------------------------------- */
 
-/* What is moved: it goes towards a place above or below the skin, and turns. */
+/* A tool that is moved: it goes towards a place above or below the skin, and turns. */
 struct mover {
 	double at_mm[3], to_mm[3], share;
 	double tilt, turn, to_tilt, to_turn;
@@ -430,7 +430,7 @@ static void place_tip(const struct hand *h, struct incise_tracker_sample *pose)
 	v3_add(pose->position_mm, pose->position_mm, -1, arm_mm);
 }
 
-/* What no tracker should send. */
+/* A pose that no tracker should send. */
 static void spoil(uint64_t *seed, struct incise_tracker_sample *pose)
 {
 	static const double none[] = {NAN, INFINITY, -INFINITY, 1e300, -9999, 0};

@@ -159,7 +159,8 @@ TEST(test_creeps_with_double)
  */
 TEST(test_circles_within_the_bound)
 {
-	const double slip_mm = SHARE * 2 / K_N_mm, off_mm = 6 * LSB;
+	/* Of a place, a length and a slip of the integers half a bit each, of a direction two halves; twice that. */
+	const double slip_mm = SHARE * 2 / K_N_mm, off_mm = 5 * LSB;
 	const double most_N =
 		K_N_mm * (2 * off_mm + sqrt(2 * slip_mm * off_mm)) + ROUNDING_N;
 
