@@ -119,23 +119,10 @@ static double n_from(double mm)
 #define n_to n_from
 #define d_to n_from
 
-#include "run.proto.c"
-
 static int set_tip(struct incise_plan *plan, const double tip_mm[3])
 {
 	v3_copy(plan->doubles.plan.numbers.tip, tip_mm);
 	return 0;
 }
 
-const struct incise_plan_ops incise_double_ops = {
-	.tick = run_tick,
-	.take_pose = take_pose,
-	.hold = hold_tool,
-	.faded = has_faded,
-	.zero = zero_force,
-	.set_tip = set_tip,
-	.punctured = puncture_of,
-	.cut = get_cut,
-	.clear_cuts = clear_cuts,
-	.add_cut = add_cut,
-};
+#include "run.proto.c"

@@ -483,8 +483,6 @@ static double d_to(int32_t value)
 	return value / UNIT;
 }
 
-#include "run.proto.c"
-
 static int set_tip(struct incise_plan *plan, const double tip_mm[3])
 {
 	for (int i = 0; i < 3; i++)
@@ -495,15 +493,4 @@ static int set_tip(struct incise_plan *plan, const double tip_mm[3])
 	return 0;
 }
 
-const struct incise_plan_ops incise_fixed_ops = {
-	.tick = run_tick,
-	.take_pose = take_pose,
-	.hold = hold_tool,
-	.faded = has_faded,
-	.zero = zero_force,
-	.set_tip = set_tip,
-	.punctured = puncture_of,
-	.cut = get_cut,
-	.clear_cuts = clear_cuts,
-	.add_cut = add_cut,
-};
+#include "run.proto.c"

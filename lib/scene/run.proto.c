@@ -4,7 +4,7 @@
  *
  *   OWN(plan)    plan, state and tick of this kind          STAGE    of a struct incise_stage_pair
  *   n_from(), d_from(), n_to(), d_to()                      conversions of numbers and directions
- *   D_LEAST      the smallest part of a direction
+ *   D_LEAST      the smallest part of a direction          set_tip()  of struct incise_plan_ops
  */
 static void take_pose(struct incise_plan *plan, bool tube,
 		      const struct incise_tracker_sample *sample, int64_t now_ns)
@@ -186,3 +186,16 @@ static bool add_cut(struct incise_plan *plan, const struct incise_cut *cut)
 	}
 	return true;
 }
+
+const struct incise_plan_ops T(ops) = {
+	.tick = run_tick,
+	.take_pose = take_pose,
+	.hold = hold_tool,
+	.faded = has_faded,
+	.zero = zero_force,
+	.set_tip = set_tip,
+	.punctured = puncture_of,
+	.cut = get_cut,
+	.clear_cuts = clear_cuts,
+	.add_cut = add_cut,
+};
