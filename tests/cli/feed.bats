@@ -62,7 +62,7 @@ setup() {
 		plan[100] ^= 1
 		open('bit.plan', 'wb').write(plan)
 		open('short.plan', 'wb').write(plan[:-1])
-		plan[8] += 2
+		plan[8] += 8
 		open('other.plan', 'wb').write(plan)
 	END
 	echo hello >none.plan
