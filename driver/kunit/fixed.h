@@ -5,7 +5,6 @@
 
 #include "kunit.h"
 
-void fixed_springs(struct kunit *test);
 void fixed_bits(struct kunit *test);
 void fixed_damage(struct kunit *test);
 

@@ -220,12 +220,15 @@ static void parts_push_pull(struct kunit *test)
 	software_node_unregister(&chip);
 }
 
-static struct kunit_case parts_cases[] = {
-	KUNIT_CASE(parts_page),	      KUNIT_CASE(parts_config),
-	KUNIT_CASE(parts_events),     KUNIT_CASE(parts_histogram),
-	KUNIT_CASE(parts_properties), KUNIT_CASE(parts_push_pull),
-	KUNIT_CASE(fixed_springs),    KUNIT_CASE(fixed_bits),
-	KUNIT_CASE(fixed_damage),     {}};
+static struct kunit_case parts_cases[] = {KUNIT_CASE(parts_page),
+					  KUNIT_CASE(parts_config),
+					  KUNIT_CASE(parts_events),
+					  KUNIT_CASE(parts_histogram),
+					  KUNIT_CASE(parts_properties),
+					  KUNIT_CASE(parts_push_pull),
+					  KUNIT_CASE(fixed_bits),
+					  KUNIT_CASE(fixed_damage),
+					  {}};
 
 static struct kunit_suite parts_suite = {
 	.name = "incise_stepper",

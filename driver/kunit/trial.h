@@ -4,17 +4,22 @@
  * bits. Seed s, then for k = 0 … n-1 in this order:
  *
  *   x[0], x[1] …     of the evaluator, a quarter of the support beyond either end too
- *   spring, p        of the plane constraint: any numbers: all are safe, see spring.h
+ *   a cut            for the stages reaction and plane: any numbers, at which sums are held too
  */
 #ifndef INCISE_FX_TRIAL_H
 #define INCISE_FX_TRIAL_H
 
 #include <incise/fixed.h>
 
-#include "../../lib/fixed/spring.h"
+#include "../../lib/fixed/plan.h"
+#include "../../lib/fixed/vector.h"
 
-/* CRC-32C of 10 000 results of seed 1 without an evaluator: 0, force, stretch; 5 int32. */
-#define INCISE_FX_TRIAL_SPRINGS 0x35716354u
+/* Too large for a kernel's stack. Begins with {0}. */
+struct incise_fx_trial_cut {
+	struct incise_fixed_plan plan;
+	struct incise_fixed_state state;
+	struct incise_fixed_tick tick;
+};
 
 /* xorshift64 (G. Marsaglia, 'Xorshift RNGs', 2003); never 0. */
 static inline uint64_t incise_fx_trial_next(uint64_t *state)
@@ -49,19 +54,26 @@ static inline void incise_fx_trial_inputs(uint64_t *state, const struct incise_f
 	}
 }
 
-/* Half of them near enough to the anchor that nothing is held, half anywhere. */
-static inline void incise_fx_trial_spring(uint64_t *state,
-					  struct incise_fixed_spring *spring,
-					  int32_t p[3])
+/* The force of both stages. Half of the numbers are so small that nothing is held, half are any. */
+static inline void incise_fx_trial_force(uint64_t *state, struct incise_fx_trial_cut *cut,
+					 int32_t force[3])
 {
 	int shift = incise_fx_trial_next(state) >> 63 ? 10 : 0;
 
-	spring->stiffness = incise_fx_trial_number(state) >> shift;
+	cut->plan.numbers.reaction = (incise_fx_trial_number(state) & INT32_MAX) >> shift;
+	cut->plan.numbers.plane = (incise_fx_trial_number(state) & INT32_MAX) >> shift;
+	cut->state.depth = (incise_fx_trial_number(state) & INT32_MAX) >> shift;
 	for (int i = 0; i < 3; i++) {
-		spring->anchor[i] = incise_fx_trial_number(state) >> shift;
-		spring->direction[i] = incise_fx_trial_number(state) >> 1;
-		p[i] = incise_fx_trial_number(state) >> shift;
+		cut->state.p0[i] = incise_fx_trial_number(state) >> shift;
+		cut->state.normal[i] = incise_fx_trial_number(state) >> 1;
+		cut->state.side[i] = incise_fx_trial_number(state) >> 1;
+		cut->tick.tool[i] = incise_fx_trial_number(state) >> shift;
+		cut->state.force[i] = 0;
 	}
+	cut->tick.phase = INCISE_PHASE_CUTTING;
+	incise_fixed_stage_reaction(&cut->plan, &cut->state, &cut->tick);
+	incise_fixed_stage_plane(&cut->plan, &cut->state, &cut->tick);
+	incise_fx_copy(force, cut->state.force);
 }
 
 #endif

@@ -1,115 +1,16 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * The integers that kernels run: springs of the plane constraint and the reaction, and the
- * motion profile of the actuator.
+ * The integers that kernels run: reaction and plane constraint at any numbers, and the motion profile
+ * of the actuator.
  */
-#include <errno.h>
-#include <stdlib.h>
 #include <string.h>
+#include "../../lib/fixed/plan.h"
 #include "../../lib/fixed/profile.h"
 #include "../unit/fixed/profile_watch.h"
 #include "extremes.h"
-#include "fixed_spring.h"
 #include "numbers.h"
 
 #define TICKS 300
-
-static double number(double scale)
-{
-	return below(4) ? between(-scale, scale) : below(2) ? special() : any_bits();
-}
-
-/* |F^ - F|, F = -K [(p - anchor)·u] u, of a spring that pulls or, inside only, pushes. */
-static double force_error(const struct incise_fixed_spring *spring, bool pushes, double K,
-			  const double p[3], const double anchor[3], const double u[3])
-{
-	int32_t at[3], force[3] = {0};
-	double error = 0, way = 0;
-
-	for (int i = 0; i < 3; i++) {
-		at[i] = (int32_t)lrint(p[i] * 65536);
-		way += (p[i] - anchor[i]) * u[i];
-	}
-	(pushes ? incise_fixed_spring_push : incise_fixed_spring_pull)(spring, at, force);
-	for (int i = 0; i < 3; i++) {
-		double exact = pushes && way >= 0 ? 0 : -K * way * u[i];
-
-		error = hypot(error, force[i] * 0x1p-16 - exact);
-	}
-	return error;
-}
-
-/* A spring as it is meant: within its certified bound of the formula. */
-static void try_true_spring(struct extremes_row *row)
-{
-	double K = below(4) ? exp(between(-9, 10)) : number(100);
-	double anchor[3], u[3], p[3], size = 0, far = 0, error, bound;
-	struct incise_fixed_spring spring;
-	bool pushes = below(2);
-	int rc;
-
-	for (int i = 0; i < 3; i++) {
-		anchor[i] = number(below(8) ? 100 : 40000);
-		u[i] = between(-1, 1);
-		size += u[i] * u[i];
-	}
-	for (int i = 0; i < 3; i++)
-		u[i] /= sqrt(size);
-	rc = incise_fixed_spring_set(&spring, K, anchor, u);
-	if (rc == -EINVAL || rc == -ERANGE) {
-		extremes_refused_plainly(row);
-		return;
-	}
-	for (int i = 0; i < 3; i++) {
-		p[i] = fmax(-32767, fmin(32767, anchor[i] + between(-60, 60)));
-		far += (p[i] - anchor[i]) * (p[i] - anchor[i]);
-	}
-	error = force_error(&spring, pushes, K, p, anchor, u);
-	bound = incise_fixed_spring_bound(K, sqrt(far));
-	extremes_check(row, !rc && error <= bound * (1 + 1e-9) + 1e-9,
-		       "off by %a, bound %a: K %a, anchor " V3 ", u " V3 ", p " V3 ", %s",
-		       error, bound, K, V3_OF(anchor), V3_OF(u), V3_OF(p),
-		       pushes ? "push" : "pull");
-}
-
-static long double held(long double v, long double most)
-{
-	return fmaxl(-most, fminl(most, v));
-}
-
-/* As the header has it, in long double, whose 64 bits of mantissa hold all products. */
-static int32_t expected(const struct incise_fixed_spring *s, const int32_t p[3],
-			bool pushes, int32_t force[3])
-{
-	long double sum = 0, stretch, back;
-
-	for (int i = 0; i < 3; i++)
-		sum += held((long double)p[i] - s->anchor[i], 0x1p30L) * s->direction[i];
-	stretch = held(roundl(sum * 0x1p-30L), INT32_MAX);
-	back = fmaxl(0, s->stiffness) * stretch * 0x1p-16L;
-	back = held(roundl(back), INT32_MAX);
-	for (int i = 0; i < 3 && (stretch < 0 || !pushes); i++) {
-		long double part = roundl(back * s->direction[i] * 0x1p-30L);
-
-		force[i] = (int32_t)held(force[i] - part, INT32_MAX);
-	}
-	return (int32_t)stretch;
-}
-
-/* Mirrored at its anchor, a spring does the opposite, to the bit. */
-static bool same_on_both_sides(struct incise_fixed_spring s, const int32_t p[3])
-{
-	int32_t at[3], mirrored[3], force[3] = {0}, back[3] = {0};
-
-	for (int i = 0; i < 3; i++) {
-		s.anchor[i] /= 4;
-		at[i] = s.anchor[i] + p[i] / 4;
-		mirrored[i] = s.anchor[i] - p[i] / 4;
-	}
-	return incise_fixed_spring_pull(&s, at, force) ==
-		       -incise_fixed_spring_pull(&s, mirrored, back) &&
-	       force[0] == -back[0] && force[1] == -back[1] && force[2] == -back[2];
-}
 
 static int32_t any_corner(void)
 {
@@ -121,37 +22,52 @@ static int32_t any_corner(void)
 	return below(2) ? corners[below(11)] : (int32_t)any() >> below(31);
 }
 
-/* A spring of any integers, some force added to. */
-static void try_any_spring(struct extremes_row *row)
+static long double held(long double v, long double most)
 {
-	struct incise_fixed_spring s = {.stiffness = any_corner()};
-	int32_t p[3], force[3], right[3], stretch, right_stretch;
-	bool pushes = row->tried % 4;
-
-	for (int i = 0; i < 3; i++) {
-		s.anchor[i] = any_corner();
-		s.direction[i] = any_corner();
-		p[i] = any_corner();
-		force[i] = right[i] = s.anchor[i] ^ s.direction[i];
-	}
-	right_stretch = expected(&s, p, pushes, right);
-	stretch = (pushes ? incise_fixed_spring_push : incise_fixed_spring_pull)(&s, p,
-										 force);
-	extremes_check(row,
-		       stretch == right_stretch && !memcmp(force, right, sizeof(right)) &&
-			       same_on_both_sides(s, p),
-		       "K %d, anchor (%d, %d, %d), u (%d, %d, %d), p (%d, %d, %d), %s: "
-		       "stretch %d, not %d, force (%d, %d, %d), not (%d, %d, %d), or not "
-		       "the opposite on the other side",
-		       s.stiffness, V3_OF(s.anchor), V3_OF(s.direction), V3_OF(p),
-		       pushes ? "push" : "pull", stretch, right_stretch, V3_OF(force),
-		       V3_OF(right));
+	return roundl(fmaxl(-most, fminl(most, v)));
 }
 
-static void try_springs(struct extremes_row *row, const struct property *property)
+/* A spring's force in long double, whose 64 bits of mantissa hold all products. */
+static void pull(int32_t force[3], int32_t stiffness, int32_t stretch, const int32_t u[3])
 {
-	try_any_spring(row);
-	try_true_spring(row);
+	long double size = held((long double)stiffness * stretch * 0x1p-16L, INT32_MAX);
+
+	for (int i = 0; i < 3; i++)
+		force[i] = (int32_t)held(force[i] - roundl(size * u[i] * 0x1p-30L),
+					 INT32_MAX);
+}
+
+/* Reaction and plane of any integers, added to some force. */
+static void try_forces(struct extremes_row *row, const struct property *property)
+{
+	static struct incise_fixed_state s;
+	struct incise_fixed_tick tick = {.phase = INCISE_PHASE_CUTTING};
+	struct incise_fixed_plan plan = {.numbers = {.reaction = any_corner() & INT32_MAX,
+						     .plane = any_corner() & INT32_MAX}};
+	long double stretch = 0;
+	int32_t right[3];
+
+	s.depth = any_corner() & INT32_MAX;
+	for (int i = 0; i < 3; i++) {
+		s.p0[i] = any_corner();
+		s.normal[i] = any_corner();
+		s.side[i] = any_corner();
+		tick.tool[i] = any_corner();
+		s.force[i] = right[i] = s.p0[i] ^ s.side[i];
+		stretch += held((long double)tick.tool[i] - s.p0[i], 0x1p30L) * s.side[i];
+	}
+	pull(right, plan.numbers.reaction, -s.depth, s.normal);
+	pull(right, plan.numbers.plane, (int32_t)held(stretch * 0x1p-30L, INT32_MAX),
+	     s.side);
+	incise_fixed_stage_reaction(&plan, &s, &tick);
+	incise_fixed_stage_plane(&plan, &s, &tick);
+	extremes_check(
+		row, !memcmp(s.force, right, sizeof(right)),
+		"K %d and %d, depth %d, n (%d, %d, %d), P0 (%d, %d, %d), s (%d, %d, "
+		"%d), P (%d, %d, %d): force (%d, %d, %d), not (%d, %d, %d)",
+		plan.numbers.reaction, plan.numbers.plane, s.depth, V3_OF(s.normal),
+		V3_OF(s.p0), V3_OF(s.side), V3_OF(tick.tool), V3_OF(s.force),
+		V3_OF(right));
 }
 
 static struct incise_profile_limits any_limits(void)
@@ -210,10 +126,10 @@ static void try_profile(struct extremes_row *row, const struct property *propert
 }
 
 const struct property motion_properties[] = {
-	{"spring",
-	 "plane constraint and reaction in integers: within the certified bound of the "
-	 "formula; of any integers: against the way, and nothing wraps",
-	 500000, .each = try_springs},
+	{"reaction_plane",
+	 "reaction and plane constraint of any integers: the formula, rounded and held, "
+	 "to the bit",
+	 500000, .each = try_forces},
 	{"profile",
 	 "the actuator's motion, any limits, any targets at any time: "
 	 "velocity, acceleration, travel and steps within its limits",

@@ -4,7 +4,6 @@
  * start, limits and targets; then random plans at work, and numbers at their ends.
  */
 #include "../unit.h"
-#include "../../extremes/fixed_spring.h"
 #include "trial_plan.h"
 
 #define CASES 20000
@@ -112,8 +111,8 @@ static double held_up_mm(double aligned, const double flat[3], const double alon
 }
 
 /*
- * Each force within its roundings: of a reaction its product and each part; of the plane as it is
- * certified for a spring; of a spread the part along n, the vector across and the product; of an
+ * Each force within its roundings: of a reaction its product and each part; of the plane the stretch, the
+ * product and each part; of a spread the part along n, the vector across and the product; of an
  * insertion 2 LSB of Fort times 20 mm and 2 N/mm, and the rest by one each.
  */
 TEST(test_forces, begin)
@@ -137,9 +136,7 @@ TEST(test_forces, begin)
 			double most;
 		} forces[] = {
 			{incise_fixed_stage_reaction, &cutting, LSB},
-			/* 40 mm along each axis. */
-			{incise_fixed_stage_plane, &cutting,
-			 incise_fixed_spring_bound(K, 40 * sqrt(3))},
+			{incise_fixed_stage_plane, &cutting, (K / 2 + 1) * LSB},
 			{incise_fixed_stage_damping, &cutting, LSB},
 			{incise_fixed_stage_insertion, &inserting,
 			 (2 * 20 * K + K + 1.5) * LSB},

@@ -17,22 +17,21 @@
 #include "../../../lib/fixed/layout.h"
 #include "../../../driver/kunit/trial.h"
 
-/* As driver/kunit/fixed.c: output, force and stretch of each input. */
+/* As driver/kunit/fixed.c: output and force of each input. */
 static uint32_t digest(const struct incise_fixed *fx, uint32_t n, uint64_t state)
 {
-	int32_t(*result)[5] = calloc(n, sizeof(*result));
+	static struct incise_fx_trial_cut cut;
+	int32_t(*result)[4] = calloc(n, sizeof(*result));
 	uint32_t crc;
 
 	if (!result)
 		exit(1);
 	for (uint32_t i = 0; i < n; i++) {
-		struct incise_fixed_spring spring;
-		int32_t x[INCISE_FIXED_INPUTS_MAX], p[3];
+		int32_t x[INCISE_FIXED_INPUTS_MAX];
 
 		incise_fx_trial_inputs(&state, fx, x);
 		result[i][0] = incise_fixed_eval(fx, x);
-		incise_fx_trial_spring(&state, &spring, p);
-		result[i][4] = incise_fixed_spring_pull(&spring, p, &result[i][1]);
+		incise_fx_trial_force(&state, &cut, &result[i][1]);
 	}
 	crc = incise_fx_crc((const uint8_t *)result, n * (uint32_t)sizeof(*result));
 	free(result);
