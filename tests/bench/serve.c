@@ -188,22 +188,24 @@ struct server {
 	int port;
 };
 
-/* Its port is in the first line that it prints with --verbose. */
+/* Its port is in a line that it prints with --verbose, behind that of the calibration. */
 static int port_of(int fd)
 {
-	char text[TEXT_SIZE] = "";
+	static const char line[] = "incise serve: OpenIGTLink on ";
+	char text[TEXT_SIZE] = "", *at = NULL;
 	size_t n = 0;
 	ssize_t got;
 	int port;
 
-	while (n < sizeof(text) - 1 && !strchr(text, '\n')) {
+	while (n < sizeof(text) - 1 && !(at && strchr(at, '\n'))) {
 		got = read(fd, text + n, sizeof(text) - 1 - n);
 		if (got <= 0)
 			break;
 		n += (size_t)got;
 		text[n] = '\0';
+		at = strstr(text, line);
 	}
-	if (sscanf(text, "incise serve: OpenIGTLink on 127.0.0.1:%d", &port) != 1)
+	if (!at || sscanf(at + strlen(line), "127.0.0.1:%d", &port) != 1)
 		cli_fail("incise serve: %.200s", *text ? text : "it ended at once");
 	return port;
 }

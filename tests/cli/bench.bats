@@ -336,7 +336,7 @@ in_order() {
 	for i in 0 1 2 3 4 5; do
 		holds "$(key r.json "rows[$i].tick_ns.median") > 0"
 		holds "$(key r.json "rows[$i].tick_ns.median") <= $(key r.json "rows[$i].tick_ns.p999")"
-		holds "$(key r.json "rows[$i].ticks") > 3000" # of 4000, the stroke's in contact
+		holds "$(key r.json "rows[$i].ticks") > 2000" # of 4000, the stroke's in contact; in the valleys of a sheet's waves it is in the air
 	done
 	[ "$(key r.json "rows[3].triangles")" = 20000 ]
 	[ "$(key r.json "rows[4].triangles")" = 500000 ]

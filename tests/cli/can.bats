@@ -485,7 +485,7 @@ frozen() {
 	for watch in on off; do
 		rig --homed
 		drive_tell watch $watch
-		frozen haptic "$root/scenes/liver.scene" --no-rt --overruns 0 --rig rig.conf --duration 3s
+		frozen haptic "$root/scenes/liver.scene" -c none --no-rt --overruns 0 --rig rig.conf --duration 3s
 		ended "this program was stopped for"
 		drive_end
 	done
@@ -493,16 +493,16 @@ frozen() {
 
 @test "incise haptic renders through it; a fault ends that, kill -9 too" {
 	rig
-	run --separate-stderr incise haptic "$root/scenes/liver.scene" --no-rt --overruns 0 --rig rig.conf --duration 1s
+	run --separate-stderr incise haptic "$root/scenes/liver.scene" -c none --no-rt --overruns 0 --rig rig.conf --duration 1s
 	failed_with "not homed"
 	run -0 --separate-stderr incise haptic "$root/scenes/liver.scene" --no-rt --overruns 0 --rig rig.conf --home --duration 3s
 	drive_is "switch-on disabled"
-	begin haptic "$root/scenes/liver.scene" --overruns 0 --rig rig.conf --duration 1h
+	begin haptic "$root/scenes/liver.scene" -c none --overruns 0 --rig rig.conf --duration 1h
 	sleep 0.5
 	drive_tell fault 0x3210
 	ended 3210h
 	run -0 --separate-stderr incise stepper clear --rig rig.conf
-	begin haptic "$root/scenes/liver.scene" --overruns 0 --rig rig.conf --duration 1h
+	begin haptic "$root/scenes/liver.scene" -c none --overruns 0 --rig rig.conf --duration 1h
 	sleep 0.5
 	kill -9 "$pid"
 	wait "$pid" || :

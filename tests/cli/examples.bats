@@ -66,7 +66,7 @@ build_examples() {
 	[ "$(head -c 8 out/recording.png | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
 	[[ "$(head -c 200 out/force.svg)" == *"<svg"* ]]
 	incise info out/force.fis >/dev/null
-	[ "$(head -n 1 out/pairs.csv | tr , '\n' | grep -cx 'cut\|depth_mm\|velocity_mm_s\|force_N')" -eq 4 ]
+	[ "$(grep -v '^#' out/pairs.csv | head -n 1 | tr , '\n' | grep -cx 'cut\|depth_mm\|velocity_mm_s\|force_N')" -eq 4 ]
 	# another rig, named from where the script was called
 	echo 'clock = "simulated"; tracker = "sim:"; force = "sim:"; sim = { depth_mm = [8]; times = [4]; };' >my.conf
 	RIG=my.conf run -0 --separate-stderr ./capture_to_figure.sh other

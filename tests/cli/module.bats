@@ -47,7 +47,7 @@ setup() {
 @test "a module that is not named is not loaded" {
 	make_module stepper_mine mine INCISE_BACKEND_ABI
 	rig sim:
-	run -0 --separate-stderr incise haptic liver.scene --rig rig.conf --no-rt --duration 0.1s
+	run -0 --separate-stderr incise haptic liver.scene --rig rig.conf -c none --no-rt --duration 0.1s
 	[ -z "$stderr" ]
 }
 

@@ -83,7 +83,7 @@ until_records() {
 @test "a tracker that is pulled out and plugged in: the rest is there, the gap is counted" {
 	local code=0
 	plug_in
-	incise capture -o a.rec --duration 1h >out 2>err 3>&- 9>&- &
+	incise capture -o a.rec -c none --duration 1h >out 2>err 3>&- 9>&- &
 	capture=$!
 	until_records 120
 	echo unplug >&9
@@ -134,7 +134,7 @@ until_records() {
 @test "two sensors of a tracker make no recording of one" {
 	plug_in --stations 12
 	echo 'tracker_setup = { stations = [1, 2]; };' >>rig.conf
-	run --separate-stderr incise capture -o a.rec --duration 1s
+	run --separate-stderr incise capture -o a.rec -c none --duration 1s
 	failed_with "a.rec:" "tracker_setup.stations"
 	[ ! -e a.rec ]
 	[ ! -e a.rec.part ]
@@ -219,7 +219,7 @@ in_the_tissue() {
 	[ "$status" -le 1 ]
 	[[ "$stderr" == *"a.rec: "*" poses were not used: "*" '=' (the same pose for too long"* ]]
 	echo 'tracker_setup = { repeat_ms = 0; };' >>felt.conf
-	run -0 --separate-stderr incise haptic a.scene --rig felt.conf --no-rt --overruns 0 --duration 1s --json
+	run -0 --separate-stderr incise haptic a.scene --rig felt.conf -c none --no-rt --overruns 0 --duration 1s --json
 	echo "$output" >report.json
 	[ -z "$stderr" ]
 	[ "$(key report.json poses.unusable)" = 0 ]

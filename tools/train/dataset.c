@@ -92,10 +92,20 @@ static const char *name_of(const struct dataset *data, const struct row *row)
 							 : row->source->text;
 }
 
-/* Without its origins, which incise provenance prints. */
+/* A source's text goes on with its origins, which incise provenance prints. */
+#define ORIGINS ", incise:"
+#define SHOWN 60 /* bytes of a name */
+
+static int before_origins(const char *text)
+{
+	const char *at = strstr(text, ORIGINS);
+
+	return at && at - text < SHOWN ? (int)(at - text) : SHOWN;
+}
+
 static void print_source(const char *text)
 {
-	const char *at = strstr(text, ", incise:"), *end = at ? at + 1 : text, *next;
+	const char *at = strstr(text, ORIGINS), *end = at ? at + 1 : text, *next;
 
 	while (at && !strncmp(end + 1, "incise:", 7) && (next = strchr(end, ';')))
 		end = next + 1;
@@ -132,11 +142,13 @@ static void show_text(const struct dataset *data)
 		outliers += row->outlier;
 		for (int c = 0; c < data->options->n_columns && row->outlier; c++)
 			if (fabs(row->distance[c]) > LIMIT)
-				printf("outlier: group %.60s of %.60s: mean %s %g is %+.1f "
+				printf("outlier: group %.*s of %.*s: mean %s %g is %+.1f "
 				       "deviations from the median of the groups\n",
-				       name_of(data, row), row->source->text,
-				       data->options->columns[c], row->mean[c],
-				       row->distance[c]);
+				       before_origins(name_of(data, row)),
+				       name_of(data, row),
+				       before_origins(row->source->text),
+				       row->source->text, data->options->columns[c],
+				       row->mean[c], row->distance[c]);
 	}
 	if (data->options->group && data->n < GROUPS_MIN)
 		printf("outliers are sought from %d groups on\n", GROUPS_MIN);
