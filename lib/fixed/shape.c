@@ -5,8 +5,8 @@
 #include "shape.h"
 #include "vector.h"
 
-/* Looks for the place at which a way enters: each halves the error at least. */
-#define ENTRY_STEPS 4
+/* Looks for the place at which a way enters, within half an LSB of the surface or nearly so. */
+#define ENTRY_STEPS 12
 
 bool incise_fixed_shape_good(const struct incise_fixed_shape *shape)
 {
@@ -91,6 +91,7 @@ static void find_entry(struct incise_fixed_touch *entry,
 		       const struct incise_fixed_grid *grid, const int32_t from[3],
 		       const int32_t to[3], const struct incise_fixed_touch *inside)
 {
+	bool was_outer = false;
 	struct incise_fixed_touch at;
 	int32_t outer[3], inner[3], p[3];
 	int64_t above, below = inside->depth;
@@ -115,13 +116,17 @@ static void find_entry(struct incise_fixed_touch *entry,
 		if (!incise_fixed_shape_nearest(shape, grid, p, inside->normal, &at))
 			return;
 		*entry = at;
+		/* An end that stays counts by half next time, so that both come nearer. */
 		if (at.depth < 0) {
 			above = -(int64_t)at.depth;
+			below = was_outer ? (below + 1) / 2 : below;
 			incise_fx_copy(outer, p);
 		} else {
 			below = at.depth;
+			above = k && !was_outer ? (above + 1) / 2 : above;
 			incise_fx_copy(inner, p);
 		}
+		was_outer = at.depth < 0;
 		if (at.depth <= 1 && at.depth >= -1)
 			break;
 	}
