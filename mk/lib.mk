@@ -22,6 +22,9 @@ fixed_cflags := -ffreestanding
 fixed_cflags += $(if $(filter x86_64-%,$(shell $(CC) -dumpmachine 2>/dev/null)),-mgeneral-regs-only)
 $(O)/obj/lib/fixed/%.o: cflags += $(fixed_cflags)
 
+# C++ for its operators only: nothing of its runtime, which the haptic loop must not map.
+$(O)/obj/lib/scene/bound.o: cxxflags += -fno-exceptions
+
 # The physics as the compiler sees it, without the headers.
 tick.i: ## the stages of a tick for each kind of numbers, preprocessed, in build/tick.*.i
 	@mkdir -p $(O)

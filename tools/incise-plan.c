@@ -236,12 +236,12 @@ static void report_json(const struct job *job, const struct incise_plan *plan,
 				      json_pack("{ss ss}", "stage", name, "why", why));
 	incise_plan_stability(plan, &stability);
 	object = json_pack(
-		"{so so so so so so so sI sf so so so so}", "scene",
+		"{so so so so so so so sI so so so so so}", "scene",
 		json_text(job->scene.path), "kept", kept, "left_out", left, "stages",
 		stages, "tick_ns", json_number(cost->median), "tick_p99_ns",
 		json_number(cost->p99), "tick_p999_ns", json_number(cost->p999),
 		"memory_bytes", (json_int_t)incise_plan_memory(plan), "bound_N",
-		incise_plan_bound(plan, REACH_MM), "devices",
+		json_number(incise_plan_bound(plan, REACH_MM)), "devices",
 		job->rig ? json_pack("[ss]", "tracker", "stepper") : json_array(),
 		"untouched_devices",
 		job->rig ? json_pack("[ss]", "force", "camera")
@@ -403,8 +403,10 @@ static void report_text(const struct job *job, const struct incise_plan *plan,
 	json_decref(absent);
 	incise_plan_stability(plan, &stability);
 	printf("\narithmetic  %s", bound_N > 0 ? "fixed" : "double");
-	if (bound_N > 0)
-		printf(", reaction and plane within %.3g mN, %s", bound_N * 1e3,
+	if (isinf(bound_N))
+		printf(", not bounded");
+	else if (bound_N > 0)
+		printf(", within %.3g mN of double, %s", bound_N * 1e3,
 		       stability.certified ? "certified" : "by estimated slopes");
 	putchar('\n');
 	print_evaluation(plan);

@@ -17,4 +17,5 @@
 #define CUTS
 #define OWNED *
 #define T_PART(state, part) ((state)->part)
+#define T_JOINED(state, of) (of)
 #define T_OWN_SURFACE

@@ -174,6 +174,12 @@ static inline num v_along(const num a[3], const dir unit[3])
 	return incise_fx_along(a, unit);
 }
 
+/* a less its part along a direction */
+static inline void v_across(num to[3], const num a[3], const dir unit[3])
+{
+	v_add(to, a, n_neg(v_along(a, unit)), unit);
+}
+
 static inline num v_length(const num a[3])
 {
 	return incise_fx_hold32(incise_fx_length(a));

@@ -18,6 +18,7 @@
 #define CUTS INCISE_FIXED_CUTS_MAX
 #define OWNED /* a part of a state that is in it, and not elsewhere */
 #define T_PART(state, part) (&(state)->part)
+#define T_JOINED(state, of) (of)
 #define T_OWN_SURFACE                    \
 	struct incise_fixed_shape shape; \
 	struct incise_fixed_grid_frame grid;

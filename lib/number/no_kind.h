@@ -16,4 +16,5 @@
 #undef CUTS
 #undef OWNED
 #undef T_PART
+#undef T_JOINED
 #undef T_OWN_SURFACE

@@ -180,13 +180,7 @@ int incise_plan_fail(struct incise_plan *plan, struct incise_tick *tick,
 /*
  * Largest difference of the front's force in integers on the same motion, N, where each cutting force
  * differs by no more than @cutting_bound_N and none is above @most_N, while no advance is short of work.
- * A stop passes on the error of its bounds and of its input, and rest and cut are set by one division
- * each, so that nothing adds up:
- *
- *   cutting force    its bound, and friction × it at each of upper, least, cut and rest
- *   lengths          depth, rest, cut: 1/2 LSB and the division's, × K
- *   forces           1/2 LSB per product; the friction's share is 1/2 LSB off
- *   K                1/2 LSB × the elastic way, (1 + friction) × most_N / K
+ * Infinite: it is not bounded.
  */
 double incise_front_bound(double unloading_N_mm, double friction, double most_N,
 			  double cutting_bound_N);

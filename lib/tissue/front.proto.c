@@ -129,7 +129,7 @@ num T(front_force)(struct T(front) *front, num unloading, num friction, num dept
 		wide work2 = w_work(front->work2, front->force, elastic, way);
 
 		/* Elastic energy is F²/2K. */
-		force = n_max(elastic, n_min(trial, w_paid(K, work2, front->most2)));
+		force = n_min(trial, n_max(elastic, w_paid(K, work2, front->most2)));
 	}
 	upper = n_max(rubs, n_times(K, n_sub(depth, front->cut)));
 	force = n_max(n_neg(rubs), n_min(force, n_min(upper, cutting)));

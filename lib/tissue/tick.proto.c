@@ -578,20 +578,21 @@ void T(stage_reaction)(const struct T(plan) *plan, struct T(state) *state,
 		       struct T(tick) *tick)
 {
 	const struct T(numbers) *numbers = &plan->numbers;
-	num size, fresh;
+	num size, fresh, friction;
 
 	if (tick->phase != INCISE_PHASE_CUTTING)
 		return;
 	if (!plan->has_model) {
 		size = n_times(numbers->reaction, state->depth);
 	} else if (!n_below(0, numbers->unloading)) {
-		size = cutting_force(plan, state, tick);
+		size = T_JOINED(state, cutting_force(plan, state, tick));
 	} else {
-		fresh = advance(state);
-		size = cutting_force(plan, state, tick);
-		size = T(front_force)(&state->front, numbers->unloading,
-				      front_friction(plan, state, tick, size),
-				      state->depth, fresh, size);
+		fresh = T_JOINED(state, advance(state));
+		size = T_JOINED(state, cutting_force(plan, state, tick));
+		friction = front_friction(plan, state, tick, size);
+		size = T_JOINED(state,
+				T(front_force)(&state->front, numbers->unloading,
+					       friction, state->depth, fresh, size));
 	}
 	push(state, size, state->normal);
 }
@@ -677,7 +678,7 @@ void T(stage_spread)(const struct T(plan) *plan, struct T(state) *state,
 	if (tick->phase != INCISE_PHASE_INSERTION)
 		return;
 	v_sub(off, tick->tool, state->p0);
-	v_add(across, off, n_neg(v_along(off, state->normal)), state->normal);
+	v_across(across, off, state->normal);
 	v_pull(state->force, state->force, plan->numbers.spread, across);
 }
 
@@ -694,7 +695,7 @@ void T(stage_spread)(const struct T(plan) *plan, struct T(state) *state,
  * The anchor has 32 bits behind the point, so that its rounding adds up to nothing in a contact. An error of the
  * tool's place does not add up along the way, where the anchor is set anew, nor across it, where its next place
  * is a mean of those of tool and anchor; but a hand that circles at little more than R = μ N / K magnifies it,
- * up to √(2 R δ) for one of δ: see ../scene/bound.c.
+ * up to √(2 R δ) for one of δ: see ../scene/bound.cc.
  */
 static void drag(struct T(state) *state, num way, const dir along[3])
 {
@@ -718,7 +719,7 @@ void T(stage_skin)(const struct T(plan) *plan, struct T(state) *state,
 		anchor[i] = n_place(state->anchor[i]);
 	}
 	v_sub(off, tick->tool, anchor);
-	v_add(across, off, n_neg(v_along(off, state->normal)), state->normal);
+	v_across(across, off, state->normal);
 	if (!v_direction(along, across))
 		return;
 	stretch = v_along(across, along);

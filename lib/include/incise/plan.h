@@ -217,17 +217,26 @@ INCISE_API void incise_plan_rendered(const struct incise_plan *plan,
 
 /**
  * The certified error of a plan with arithmetic = "fixed": the largest difference of its force
- * from that of the same plan in double, on the same poses, before limits.
+ * from that of the same plan in double, on the same poses, before start and limits. It follows
+ * from the source of the tick, which runs on numbers that carry their errors (lib/number/bounded.h);
+ * what the slew's limit rounds comes on top, 61 uN for each tick in a row that it holds the force.
  *
- * It holds for poses one tracker period apart, of a hand up to 1 m/s, with up to 2 m/s² across
- * its motion; within @reach_mm of the start of the contact, at most half of the surface's
- * radius deep; for a blade that enters at 6 degrees to the surface or more; and while both
- * plans are in the same phase, with the same tool in the same cut (if one changes a tick
- * earlier, that is not an error of the force).
+ * It holds
+ *  - for poses one tracker period apart, of a hand up to 1 m/s and 2 m/s², each within 2 mm of where the filter expects it;
+ *  - within @reach_mm of the start of the contact, at most half of the surface's radius deep;
+ *  - for a tool that enters at 6 degrees to the surface or more, a blade that stands at 30 degrees
+ *    or more in it, and a cut that does not turn, of a bottom no steeper than 45 degrees, whose
+ *    advance is not short of work; for averaged normals within 60 degrees of their mean;
+ *  - while both plans decide alike: the same phase, the same tool in the same place (of 0.5 mm)
+ *    of the same cut, on the same side of an edge of a mesh, and did so since the contact or the
+ *    cut began. If one changes a tick earlier, that is no error of the force, nor is what it
+ *    keeps from that;
+ *  - for the tip that is set.
+ *
  * With a model of three or four inputs it rests on estimated slopes
- * (incise_plan_stability.certified) and is no proof. lib/scene/bound.c has its parts. `incise bench` measures the rest.
+ * (incise_plan_stability.certified) and is no proof. Takes up to some seconds.
  *
- * @return N; 0 in double
+ * @return N, at most twice limits.force_N; 0 in double; infinite: it is not bounded, or no memory
  */
 INCISE_API double incise_plan_bound(const struct incise_plan *plan, double reach_mm);
 
