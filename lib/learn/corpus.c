@@ -315,16 +315,17 @@ static int survey_row(void *user, const double *row, const char *name,
 		       : 0;
 }
 
-static int add_survey(struct incise_corpus *corpus, const char *hash, const char *text,
-		      struct incise_error *err)
+static int add_survey(struct incise_corpus *corpus, const char *name, const char *hash,
+		      const char *text, struct incise_error *err)
 {
 	for (int i = 0; i < corpus->n_surveys; i++)
 		if (!strcmp(corpus->surveys[i].hash, hash) ||
 		    incise_is_same_recording(corpus->surveys[i].text, text))
 			return incise_error_set(
 				err, EEXIST,
-				"%s: has the same content as %s; give each recording once",
-				text, corpus->surveys[i].text);
+				"%.199s: has the same content as %s; give each "
+				"recording once",
+				name, corpus->surveys[i].name);
 	if (corpus->n_surveys == corpus->survey_capacity) {
 		int capacity = corpus->survey_capacity ? 2 * corpus->survey_capacity : 16;
 		void *surveys =
@@ -336,6 +337,8 @@ static int add_survey(struct incise_corpus *corpus, const char *hash, const char
 		corpus->survey_capacity = capacity;
 	}
 	corpus->surveys[corpus->n_surveys] = (struct incise_corpus_survey){0};
+	snprintf(corpus->surveys[corpus->n_surveys].name, sizeof(corpus->surveys->name),
+		 "%s", name);
 	snprintf(corpus->surveys[corpus->n_surveys].hash, sizeof(corpus->surveys->hash),
 		 "%s", hash);
 	snprintf(corpus->surveys[corpus->n_surveys].text, sizeof(corpus->surveys->text),
@@ -350,7 +353,7 @@ int incise_corpus_survey(struct incise_corpus *corpus,
 	struct surveyor s = {.corpus = corpus,
 			     .source = source,
 			     .number = source_number(source->hash)};
-	int rc = add_survey(corpus, source->hash, source->text, err);
+	int rc = add_survey(corpus, source->name, source->hash, source->text, err);
 
 	if (rc)
 		return rc;
@@ -376,7 +379,7 @@ static size_t size_of_bins(const struct incise_corpus *corpus)
 
 void *incise_corpus_encode(struct incise_corpus *corpus, size_t *size)
 {
-	struct header header = {.magic = "survey2",
+	struct header header = {.magic = "survey3",
 				.columns = corpus->columns,
 				.n_surveys = corpus->n_surveys};
 	char *bytes, *at;
@@ -426,7 +429,7 @@ int incise_corpus_add(struct incise_corpus *corpus, const void *bytes, size_t si
 		return incise_error_set(err, EINVAL, "%s", damaged);
 	memcpy(&header, at, sizeof(header));
 	at += sizeof(header);
-	if (memcmp(header.magic, "survey2", 8) || header.columns != corpus->columns ||
+	if (memcmp(header.magic, "survey3", 8) || header.columns != corpus->columns ||
 	    header.size != size || header.n_surveys < 0 ||
 	    (size_t)(end - at) < size_of_bins(corpus) ||
 	    ((size_t)(end - at) - size_of_bins(corpus)) / sizeof(struct candidate) <
@@ -456,10 +459,11 @@ int incise_corpus_add(struct incise_corpus *corpus, const void *bytes, size_t si
 		memcpy(&survey, at, sizeof(survey));
 		at += sizeof(survey);
 		survey.hash[64] = survey.text[sizeof(survey.text) - 1] = 0;
+		survey.name[sizeof(survey.name) - 1] = 0;
 		n = (size_t)survey.n_groups * sizeof(*survey.groups);
 		if (survey.n_groups < 0 || (size_t)(end - at) < n)
 			return incise_error_set(err, EINVAL, "%s", damaged);
-		rc = add_survey(corpus, survey.hash, survey.text, err);
+		rc = add_survey(corpus, survey.name, survey.hash, survey.text, err);
 		if (rc)
 			return rc;
 		to = &corpus->surveys[corpus->n_surveys++];

@@ -300,6 +300,21 @@ bool incise_is_same_recording(const char *a, const char *b)
 	return false;
 }
 
+/* The name in a source's text, which goes on with its origins, or with the day of a recording. */
+static int name_length(const char *text)
+{
+	static const char *const next[] = {", incise:", ", recorded "};
+	size_t n = strlen(text);
+
+	for (int i = 0; i < 2; i++) {
+		const char *at = strstr(text, next[i]);
+
+		if (at && (size_t)(at - text) < n)
+			n = (size_t)(at - text);
+	}
+	return n < 200 ? (int)n : 200;
+}
+
 int incise_factor_start(struct incise_factor *factor, const char *hash, const char *text,
 			struct incise_error *err)
 {
@@ -307,9 +322,9 @@ int incise_factor_start(struct incise_factor *factor, const char *hash, const ch
 
 	if (find_source(factor, hash) >= 0)
 		return incise_error_set(err, EEXIST,
-					"%s: this recording is there already, under "
+					"%.*s: this recording is there already, under "
 					"another name or twice; give it once",
-					text);
+					name_length(text), text);
 	snprintf(source.hash, sizeof(source.hash), "%s", hash);
 	put_line(source.text, sizeof(source.text), text);
 	factor->at = insert_source(factor, &source);
@@ -566,9 +581,10 @@ int incise_factor_merge(struct incise_factor *factor, struct incise_factor *othe
 		if (has_recording(factor, &other->sources[i]))
 			return incise_error_set(
 				err, EEXIST,
-				"%s: the recording %.200s (SHA-256 %.12s) is in another "
+				"%s: the recording %.*s (SHA-256 %.12s) is in another "
 				"factor too; merge it once",
-				name, other->sources[i].text, other->sources[i].hash);
+				name, name_length(other->sources[i].text),
+				other->sources[i].text, other->sources[i].hash);
 	if (had + more > GRAM_ROWS_MAX)
 		return incise_error_set(err, EOVERFLOW,
 					"%s: more than 2^33 pairs together", name);

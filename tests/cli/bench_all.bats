@@ -230,7 +230,12 @@ report_of() {
 	[ "$(key r/report.json against.file)" = first.json ]
 	n=$(sqlite3 :memory: "SELECT json_array_length(readfile('r/report.json'), '\$.against.gone')
 		+ json_extract(readfile('r/report.json'), '\$.against.worse')")
-	[ "$n" = 0 ] && [ "$status" = 0 ] || failed_with "$n metric" "compared with first.json"
+	# not for tests/messages, which must not depend on how busy the machine is
+	if [ "$n" = 0 ]; then
+		[ "$status" = 0 ]
+	else
+		[ "$status" = 1 ] && [[ "$stderr" == "incise bench all: $n metric"*" compared with first.json; "* ]]
+	fi
 	# of an older one that was better, and had more
 	jq '.benchmarks.training.figures |= map(if .name == "classic error on unseen cuts" then .value = 1e-9 else . end) +
 		[{name: "other", kind: "exact", unit: "mm", value: 1}]' r/report.json >old.json

@@ -277,13 +277,18 @@ train_killed_soon() {
 	sqlite3 copy.rec/recording.db vacuum
 	run ! cmp -s 1.rec/recording.db copy.rec/recording.db
 	run --separate-stderr incise train 1.rec copy.rec 2.rec -o m.fis
-	failed_with copy.rec "the same content as 1.rec"
+	failed_with "copy.rec: " "the same content as 1.rec;"
+	mkdir -p other/copies
+	cp -r 1.rec other/copies/1.rec
+	run --separate-stderr incise train 1.rec other/copies/1.rec 2.rec -o m.fis
+	failed_with "other/copies/1.rec: " "the same content as 1.rec;"
+	rm -r other
 	incise train 2.rec --mf 2,2 -o start.fis >/dev/null 2>&1
 	for name in 1 copy; do
 		incise train $name.rec --premises start.fis --factor $name.fac >/dev/null
 	done
 	run --separate-stderr incise merge 1.fac copy.fac -o m.fis
-	failed_with copy.fac "the recording copy.rec"
+	failed_with copy.fac "the recording copy.rec (SHA-256 "
 	[ ! -e m.fis ]
 }
 

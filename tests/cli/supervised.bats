@@ -170,7 +170,9 @@ ended() {
 	run --separate-stderr incise haptic neck --rig sim:clock=simulated --duration 0.1s
 	failed_with neck.scene: syntax
 	run --separate-stderr incise haptic nothing --rig sim:clock=simulated --duration 0.1s
+	# each name once, though this folder has what came with the program too
 	failed_with "nothing:"
+	[ "$(grep -o "\bliver\b" <<<"$stderr" | wc -l)" = 1 ] || complain "$stderr"
 }
 
 # Rights that this test takes away; who has none to begin with needs not.

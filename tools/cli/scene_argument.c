@@ -67,6 +67,7 @@ void scene_argument_missing(const char *name)
 	const char *places[PLACES] = {".", OF_MACHINE, scene_argument_shipped()};
 	char *all = cli_text("%s", "");
 	const char *nearest, **names;
+	size_t n = 0;
 	glob_t found = {0};
 
 	for (int i = 0; i < PLACES; i++) {
@@ -77,8 +78,16 @@ void scene_argument_missing(const char *name)
 	}
 	names = cli_alloc(found.gl_pathc + 1, sizeof(*names));
 	for (size_t i = 0; i < found.gl_pathc; i++) {
-		names[i] = scene_argument_name(found.gl_pathv[i]);
-		all = cli_text("%s%s%s", all, i ? ", " : "", names[i]);
+		const char *one = scene_argument_name(found.gl_pathv[i]);
+		size_t known = 0;
+
+		/* A scene of this folder hides that of the same name elsewhere. */
+		while (known < n && strcmp(names[known], one))
+			known++;
+		if (known < n)
+			continue;
+		names[n++] = one;
+		all = cli_text("%s%s%s", all, n > 1 ? ", " : "", one);
 	}
 	/* Of "liver.scen" only "liver". */
 	nearest = incise_nearest_name(cli_text("%.*s", (int)strcspn(name, "."), name),

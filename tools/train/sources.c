@@ -295,7 +295,8 @@ struct source *sources_new(char **paths, int n, struct source_options *options)
 			keep_pipe(source);
 		all = all && (source->recording || has_cuts(source));
 		source->corpus = (struct incise_corpus_source){
-			.name = source->path,
+			.name = strcmp(source->path, "-") ? source->path
+							  : "standard input",
 			.hash = source->hash,
 			.text = source->text,
 			.read = source->recording ? read_recording : read_file,

@@ -62,6 +62,7 @@ struct incise_corpus_survey {
 	int n_groups;
 	struct incise_corpus_group *groups; /**< in order of appearance */
 	double min[INCISE_MODEL_INPUTS_MAX + 1], max[INCISE_MODEL_INPUTS_MAX + 1];
+	char name[200]; /**< for messages; cut to this length */
 };
 
 /**
