@@ -638,16 +638,25 @@ static inline void d_cross(dir to[3], const dir u[3], const dir v[3])
 	set_ball(to, product(ball_of(u), ball_of(v), 30));
 }
 
-/* 2 |q| Δq |u|; t, of which no more than its length counts, and two sums round. */
+/*
+ * u + 2 s v × u + 2 v × (v × u) of q = (s, v): by 2 (|Δs| |v| + |s| |Δv| + 2 |v| |Δv|) |u|, which is at most
+ * 2 √5 |Δq| |u|, as q may be no unit, and its squares; t, of which no more than its length counts, and two sums
+ * round.
+ */
+#define TURN 4.5
+#define TURN2 2.5
+
 static inline uint32_t turned(uint32_t q, uint32_t u, int bits)
 {
 	struct bounds by = at(q), of = at(u);
+	double most = most_of(of) + of.in;
 
 	if (!u)
 		return 0;
-	of.in += most_of(of) * (2 * by.in + by.in * by.in);
-	of.own += most_of(of) * (2 * by.own + by.own * (2 * by.in + by.own)) +
+	of.own += most * (TURN * by.own + TURN2 * by.own * (by.own + 2 * by.in)) +
+		  of.own * (TURN * off(by) + TURN2 * off(by) * off(by)) +
 		  3 * rounding(bits, true);
+	of.in += most * by.in * (TURN + TURN2 * by.in);
 	return ball(most_of(of), of.in, of.own, bits);
 }
 
