@@ -27,7 +27,6 @@
 #ifndef INCISE_NUMBER_BOUNDED_H
 #define INCISE_NUMBER_BOUNDED_H
 
-#include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -53,7 +52,7 @@ struct paths {
 	uint32_t n;
 	uint8_t chosen[CHOICES_MOST], ways[CHOICES_MOST];
 	int n_chosen, at;
-	/* What numbers were before this path narrowed them, in order. */
+	/* Numbers as they were before this path narrowed them, in order. */
 	struct {
 		uint32_t id;
 		struct bounds of;
@@ -61,13 +60,34 @@ struct paths {
 	uint32_t n_narrowed;
 	bool dead;	    /* no numbers go along this one */
 	const char *failed; /* why nothing is bounded, or NULL */
-	/* What stages cannot tell: a tick's time, and the error of an acceleration by poses. */
+	/* Beside the numbers, for stages: a tick's time, and the error of an acceleration by poses. */
 	double tick_s, hard_mm_s2;
 	long n_paths; /* gone along so far */
 };
 
 /* Those of the thread, while a bound is computed. */
 static __thread struct paths *paths;
+
+/* Room for one computation; end_paths() frees it. Returns false: no memory. */
+static inline bool begin_paths(void)
+{
+	paths = (struct paths *)calloc(1, sizeof(*paths));
+	if (!paths)
+		return false;
+	paths->of[0].bits = -1;
+	paths->n = 1;
+	return true;
+}
+
+/* Returns the bound, infinite where there is none. */
+static inline double end_paths(double bound)
+{
+	if (paths->failed || !(bound >= 0))
+		bound = INFINITY;
+	free(paths);
+	paths = NULL;
+	return bound;
+}
 
 /* Nothing is bounded. */
 static inline void fail(const char *why)
@@ -218,7 +238,26 @@ struct bounded_wide {
 	}
 };
 
-#include "bounded_kind.h"
+/* --- the kind; see fixed_kind.h --- */
+
+#define T(name) incise_bounded_##name
+
+#define num bounded<16>
+#define dir bounded<30>
+#define num12 bounded<12>
+#define num20 bounded<20>
+#define num24 bounded<24>
+#define num28 bounded<28>
+#define wide bounded_wide
+#define stored num
+#define span double
+#define period double
+#define CUTS 1
+#define OWNED
+#define T_PART(state, part) (&(state)->part)
+/* A number along all paths to it; what else the state becomes on them, its errors hold. */
+#define T_JOINED(state, of) joined(state, [&] { return of; })
+#define T_OWN_SURFACE
 
 static inline struct bounds &at(uint32_t id)
 {
@@ -370,7 +409,7 @@ static inline num worst_of(const struct worst &of)
 	return num::of(put({of.low, of.high, of.in, of.own, 16, false}));
 }
 
-/* What a part of a tick makes, along all of its paths; the state is as it was. */
+/* The number that a part of a tick makes, along all of its paths; the state is as it was. */
 template <typename state, typename part> static num joined(state *of, const part &run)
 {
 	const state from = *of;
@@ -730,7 +769,7 @@ static inline num v_along(const num a[3], const dir unit[3])
 	return num::of(along(ball_of(a), ball_of(unit), 16));
 }
 
-/* What is turned out of the way of a direction is not longer. */
+/* A vector without its part along a direction is not longer. */
 static inline void v_across(num to[3], const num a[3], const dir unit[3])
 {
 	struct bounds of = at(ball_of(a)), by = at(ball_of(unit));
@@ -807,7 +846,7 @@ static inline wide operator*(wide a, wide b)
 	return wide::of(product(a.id, b.id, at(a.id).bits + at(b.id).bits));
 }
 
-/* What the limit has; no bound asks for it. */
+/* The limit divides so; no bound asks for it. */
 static inline wide operator/(wide a, int)
 {
 	fail("unbounded");

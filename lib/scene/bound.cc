@@ -75,8 +75,8 @@ struct T(plan) {
 #define SPEED_MM_S 1000
 #define HARD_MM_S2 100000
 
-/* A hand's own acceleration across its motion, at most: errors of the direction count by it. Below this
- * speed the direction counts in proportion to the speed: see lib/tissue/predict.c. */
+/* A hand's own acceleration, at most: errors of its direction count by that. Below this speed the direction counts
+ * in proportion to the speed: see lib/tissue/predict.c. */
 #define HAND_MM_S2 2000
 #define SLOW_MM_S 5
 
@@ -356,7 +356,7 @@ static struct errors settle_filter(const struct incise_predict *p, const struct 
 	return {INFINITY, INFINITY, INFINITY};
 }
 
-/* What is shown of a state of this age, and of a share of what is left to blend out. */
+/* A state as it is shown at this age, with a share of the rest that is to blend out. */
 static struct errors shown_of(const struct errors &state, double age_s, double share,
 			      const struct errors &left)
 {
@@ -414,7 +414,7 @@ static void set_filter(struct T(predict) *p, const struct T(plan) *plan,
 	set_ball(p->a, ball(HARD_MM_S2, e.a, 0, 16));
 }
 
-/* What was shown when a pose arrived, less what the filter says then. */
+/* The rest to blend out: as shown when a pose arrived, less what the filter says then. */
 static void set_shown(wide to[3], const wide before[3], const wide now[3], double most,
 		      int bits)
 {
@@ -429,7 +429,7 @@ static struct errors errors_of(const struct T(predict) *p)
 	return {off(at(ball_of(p->x))), off(at(ball_of(p->v))), off(at(ball_of(p->a)))};
 }
 
-/* What a pose adds to a filter without errors, of the end that is the farthest from the tracker's sensor. */
+/* The errors that a pose adds to a filter without any, of the end that is the farthest from the tracker's sensor. */
 static struct errors add_pose_of(const struct T(plan) *plan, double rounded_mm)
 {
 	struct T(state) from = {}, to;
@@ -452,7 +452,7 @@ static struct errors add_pose_of(const struct T(plan) *plan, double rounded_mm)
 	return r;
 }
 
-/* What the filter itself rounds, of a pose that is not rounded. */
+/* The filter's own rounding, of a pose that is not rounded. */
 static struct errors add_exact(const struct T(plan) *plan)
 {
 	struct T(predict) p;
@@ -588,7 +588,7 @@ static void run_contact(const struct T(plan) *plan, struct T(state) *state,
 
 typedef void stage(const struct T(plan) *, struct T(state) *, struct T(tick) *);
 
-/* What a stage makes of the force, along all of its paths. What it keeps is in the state's errors before. */
+/* Run a stage along all of its paths, and join its forces. The state's errors hold what it keeps. */
 static void join_force(stage *run, const struct T(plan) *plan, struct T(state) *state,
 		       struct T(tick) *tick)
 {
@@ -660,7 +660,6 @@ static void settle_front(struct tick *t)
 	double rest = 0, cut = 0, reach = t->plan.reach_mm;
 	struct T(front) *front = &t->state.front;
 	double way = off(at(ball_of(t->state.p0))) + 4 * off(at(front->line.to.id));
-	struct T(line) line = front->line;
 	bool more = true;
 
 	for (int i = 0; i < 20 && more; i++) {
@@ -693,7 +692,6 @@ static void settle_front(struct tick *t)
 	}
 	front->rest = num::of(put({-reach, reach, rest + way, 0, 16, false}));
 	front->cut = num::of(put({0, reach, cut + way, 0, 16, false}));
-	front->line = line;
 	if (more)
 		fail("what it asks for is in no bound");
 }
@@ -763,9 +761,9 @@ static void farther(num v[3], double by)
 static double bound_of(struct tick *t, int32_t held)
 {
 	const struct incise_double_numbers *numbers = &t->plan.of->doubles.plan.numbers;
+	const struct T(state) from = t->state;
 	uint32_t begin = paths->n;
 	struct bounds tool;
-	double bound_N;
 
 	t->state.held = held;
 	t->tick = {};
@@ -794,36 +792,28 @@ static double bound_of(struct tick *t, int32_t held)
 		settle_skin(t);
 		run_paths(t);
 	}
-	bound_N = t->force.in + t->force.own;
+	/* Numbers of this tool are none of the next one's. */
+	t->state = from;
 	paths->n = begin;
-	return bound_N;
+	return t->force.in + t->force.own;
 }
 
-/* Room for one computation; freed by end_tick(). */
 static struct tick *begin_tick(double reach_mm)
 {
 	struct tick *t = (struct tick *)calloc(1, sizeof(*t));
 
-	paths = (struct paths *)calloc(1, sizeof(*paths));
-	if (!t || !paths) {
-		free(t);
-		free(paths);
-		return NULL;
+	if (t && begin_paths()) {
+		t->plan.reach_mm = reach_mm;
+		return t;
 	}
-	paths->of[0].bits = -1;
-	paths->n = 1;
-	t->plan.reach_mm = reach_mm;
-	return t;
+	free(t);
+	return NULL;
 }
 
 static double end_tick(struct tick *t, double bound_N)
 {
-	if (paths->failed || !(bound_N >= 0))
-		bound_N = INFINITY;
-	free(paths);
-	paths = NULL;
 	free(t);
-	return bound_N;
+	return end_paths(bound_N);
 }
 
 double incise_front_bound(double unloading_N_mm, double friction, double most_N,

@@ -3,18 +3,16 @@
  * the plan in integers, which the kernel runs, against the same plan in double: how far their
  * forces are from each other, next to the certified bound.
  *
- * Both walk along the same varied strokes (trajectory.h). Where one of them is in another phase, with
- * another tool, or on the other side of a flag than the other, as at the tick at which a contact
- * begins, the difference is no error of a force: such ticks are counted apart, and their largest
- * difference is shown.
+ * Both walk along the same varied strokes (trajectory.h). Ticks at which they are apart by a decision
+ * (../apart.h), as where a contact begins, are counted apart, and their largest difference is shown.
  */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <incise/plan.h>
-#include "../../lib/base/vector.h"
 #include "../../tools/cli/scene_argument.h"
 #include "program.h"
+#include "../apart.h"
 #include "../../tools/bench/trajectory.h"
 
 #define SCENES_MAX 16
@@ -72,47 +70,14 @@ static void open_row(struct row *row)
 	row->bound_mN = 1e3 * incise_plan_bound(row->plan[1], REACH_MM);
 }
 
-/* cos 60°: normals farther apart are of two sides of a tissue, as where it was gone through. */
-#define SAME_SIDE 0.5
-
-/* Whether both are on the same side of all that is decided at a tick. */
-static bool decide_alike(const struct incise_tick *a, const struct incise_tick *b)
-{
-	/* Limits follow from the force: they may be reached by one first. */
-	const unsigned int limits =
-		INCISE_TICK_CLAMPED | INCISE_TICK_SLEWED | INCISE_TICK_EXTRAPOLATED;
-
-	return a->phase == b->phase && a->tool == b->tool &&
-	       !((a->flags ^ b->flags) & ~limits) &&
-	       (a->phase == INCISE_PHASE_FREE ||
-		v3_dot(a->normal, b->normal) > SAME_SIDE);
-}
-
-/* Rest of a difference that a decision made, as part of the bound. */
-#define ALIKE 0.1
-
-/*
- * After a tick that was decided otherwise the force of one is late by a tick's slew: the two are
- * apart until they decide alike, with forces well within the bound, once more.
- */
-struct judge {
-	bool apart;
-};
-
-static void compare_tick(struct row *row, struct judge *judge,
+static void compare_tick(struct row *row, struct apart *apart,
 			 const struct incise_tick *a, const struct incise_tick *b)
 {
-	double off[3], mN;
+	double mN = 1e3 * apart_N(apart, a, b, 1e-3 * row->bound_mN);
 
-	v3_sub(off, a->command_N, b->command_N);
-	mN = 1e3 * v3_length(off);
 	row->ticks++;
 	row->contact += !!(a->flags & INCISE_TICK_CONTACT);
-	if (!decide_alike(a, b))
-		judge->apart = true;
-	else if (judge->apart && mN <= ALIKE * row->bound_mN)
-		judge->apart = false;
-	if (judge->apart) {
+	if (apart->is) {
 		row->apart++;
 		row->apart_most_mN = fmax(row->apart_most_mN, mN);
 		return;
@@ -126,7 +91,7 @@ static void compare(struct row *row, long ticks)
 	int strokes = (int)(ticks / incise_scene_rate_hz(row->scene[0])) + 1;
 	struct trajectory trajectory;
 	struct walk walk[2];
-	struct judge judge = {0};
+	struct apart apart = {0};
 
 	row->most_mN = row->apart_most_mN = 0;
 	trajectory_make(&trajectory, row->scene[0], row->plan[0], strokes,
@@ -138,7 +103,7 @@ static void compare(struct row *row, long ticks)
 
 		for (int i = 0; i < 2; i++)
 			incise_plan_tick(row->plan[i], walk_feed(&walk[i]), &tick[i]);
-		compare_tick(row, &judge, &tick[0], &tick[1]);
+		compare_tick(row, &apart, &tick[0], &tick[1]);
 	}
 	row->rms_mN = sqrt(row->sum2 / (double)(row->ticks - row->apart));
 	row->holds = row->most_mN <= row->bound_mN;

@@ -102,26 +102,20 @@ static void out_direction(double *to, dir of)
 
 static double bound(enum operation op, const struct operands *of)
 {
-	struct result most = {};
+	double most = 0;
 	struct fork fork;
 
-	paths = (struct paths *)calloc(1, sizeof(*paths));
-	if (!paths)
+	if (!begin_paths())
 		return 0;
-	paths->of[0].bits = -1;
-	paths->n = 1;
 	fork.begin();
 	do {
 		struct result now = {};
 
 		operate(op, of, &now);
 		if (!paths->dead)
-			most.part[0] = fmax(most.part[0], now.part[0]);
+			most = fmax(most, now.part[0]);
 	} while (fork.next());
-	if (paths->failed)
-		most.part[0] = INFINITY;
-	free(paths);
-	return most.part[0];
+	return end_paths(most);
 }
 } // namespace in_bounded
 

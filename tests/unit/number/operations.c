@@ -9,8 +9,8 @@
 #include "../../../lib/base/vector.h"
 #include "operands.h"
 
-#define CASES 40000
-#define CASES_LEAST 2000
+#define CASES 20000
+#define CASES_LEAST 1000
 
 static double size_of(uint64_t *seed)
 {

@@ -3,31 +3,26 @@
  * The certificate of a plan in integers, as a property: of random scenes and a hand without jumps, no force
  * in integers is farther from that in double, of the same poses, than incise_plan_bound() says.
  *
- *     seed ─▶ a scene ─▶ in double   ─┐ |difference| ≤ bound, where both decide alike: phase, tool, flags
- *                     └▶ in integers ─┘                         and side of the tissue
+ *     seed ─▶ a scene ─▶ in double   ─┐ |difference| ≤ bound, where both decide alike: see ../../apart.h
+ *                     └▶ in integers ─┘
  *
  * SEED=N begins with the scene of a seed that failed.
  */
 #include "../unit.h"
 #include "../cases.h"
+#include "../../apart.h"
 #include "../../../lib/base/ascending.h"
 #include "../../../lib/model/slope.h"
 #include "drawn.h"
 
-#define SCENES 5000
-#define SCENES_FEW 30
-#define TICKS 2000
-#define TICKS_FEW 800
+#define SCENES 500
+#define SCENES_FEW 20
+#define TICKS 20000
+#define TICKS_FEW 2000
 #define PRINTED 5
 
 /* As far as the hand goes from where a contact began, at most. */
 #define REACH_MM 40
-
-/* What a tick of the slew's limit rounds, before which the bound is. */
-#define SLEW_N (4 * 0x1p-16)
-
-/* A difference by a decision has ended when it is so small a part of the bound. */
-#define ENDED 0.1
 
 /* What all scenes met. */
 struct met {
@@ -71,51 +66,20 @@ static int in_double(const char *text, char to[TEXT_MOST])
 	return model ? model[-1] - '0' : -1;
 }
 
-/*
- * Whether both are on the same side of all that is decided at a tick; see tests/bench/integers.c. A force that
- * is slewed in one of them only began to change a tick earlier, as after a fade.
- */
-static bool decide_alike(const struct incise_tick *a, const struct incise_tick *b)
-{
-	const unsigned int limits = INCISE_TICK_CLAMPED | INCISE_TICK_EXTRAPOLATED;
-
-	return a->phase == b->phase && a->tool == b->tool &&
-	       !((a->flags ^ b->flags) & ~limits) &&
-	       (a->phase == INCISE_PHASE_FREE || v3_dot(a->normal, b->normal) > 0.5);
-}
-
 /* Two plans of a scene, and what differs. */
 struct pair {
 	struct incise_scene *scene[2];
 	struct incise_plan *plan[2];
-	double bound_N, off_N, most_N;
-	int slewed; /* ticks so far in a row */
-	bool apart;
+	double bound_N, most_N;
+	struct apart apart;
 };
-
-/* Returns whether the difference of a tick is within the bound, or by a decision. */
-static bool holds(struct pair *p, const struct incise_tick tick[2])
-{
-	double off[3];
-
-	v3_sub(off, tick[0].command_N, tick[1].command_N);
-	p->slewed =
-		(tick[0].flags | tick[1].flags) & INCISE_TICK_SLEWED ? p->slewed + 1 : 0;
-	p->off_N = fmax(v3_length(off) - p->slewed * SLEW_N, 0);
-	if (!decide_alike(&tick[0], &tick[1]))
-		p->apart = true;
-	else if (p->off_N <= ENDED * p->bound_N)
-		p->apart = false;
-	if (!p->apart)
-		p->most_N = fmax(p->most_N, p->off_N);
-	return p->apart || p->off_N <= p->bound_N;
-}
 
 static void walk(struct pair *p, uint64_t seed, const struct drawn *d, struct met *met)
 {
 	struct hand hand = hand_of(seed, d, p->scene[1], p->plan);
 	int ticks = cases_are_all() ? TICKS : TICKS_FEW;
 	struct incise_tick tick[2];
+	double off_N;
 
 	hand.calm = true;
 	for (int i = 0; i < ticks; i++) {
@@ -124,16 +88,22 @@ static void walk(struct pair *p, uint64_t seed, const struct drawn *d, struct me
 			assert_int_equal(
 				incise_plan_tick(p->plan[k], hand.t_ns, &tick[k]), 0);
 		met->ticks++;
-		if (!holds(p, tick)) {
-			if (met->broken++ < PRINTED)
-				printf("seed %" PRIu64 ", tick %d, phase %d, tool %d: "
-				       "off by more than %g N\n%s\n",
-				       seed, i, tick[0].phase, tick[0].tool, p->bound_N,
-				       d->text[1].all);
-			return;
+		off_N = apart_N(&p->apart, &tick[0], &tick[1], p->bound_N);
+		if (p->apart.is) {
+			met->apart++;
+			met->apart_beyond += off_N > p->bound_N;
+			continue;
 		}
-		met->apart += p->apart;
-		met->apart_beyond += p->off_N > p->bound_N;
+		p->most_N = fmax(p->most_N, off_N);
+		if (off_N <= p->bound_N)
+			continue;
+		if (met->broken++ < PRINTED)
+			printf("seed %" PRIu64
+			       ", tick %d, phase %d, tool %d: off by more "
+			       "than %g N\n%s\n",
+			       seed, i, tick[0].phase, tick[0].tool, p->bound_N,
+			       d->text[1].all);
+		return;
 	}
 }
 

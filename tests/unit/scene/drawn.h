@@ -399,7 +399,7 @@ static inline void go_elsewhere(struct hand *h, struct mover *m, double deep)
 	m->to_turn += between(seed, -1.5, 1.5);
 }
 
-/* As a mass on a damped spring goes: no more than 2 m/s² of 40 mm. */
+/* As a mass on a damped spring goes: at no more than 2 m/s² from 40 mm away. */
 static inline void approach(double *at, double *speed, double to, double per_s,
 			    double time_s)
 {
@@ -409,7 +409,7 @@ static inline void approach(double *at, double *speed, double to, double per_s,
 
 static inline void move_calmly(const struct hand *h, struct mover *m)
 {
-	double time_s = (double)h->period_ns * 1e-9, per_s = 4 + 12 * m->share;
+	double time_s = (double)h->period_ns * 1e-9, per_s = 4 + 9 * m->share;
 
 	for (int i = 0; i < 3; i++)
 		approach(&m->at_mm[i], &m->speed_mm_s[i], m->to_mm[i], per_s, time_s);
