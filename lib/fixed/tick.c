@@ -154,6 +154,7 @@ void incise_fixed_plan_tick(const struct incise_fixed_plan *plan,
 #define MORE(member)
 #include "../tissue/forces.def"
 	incise_fixed_stage_start(plan, state, tick);
+	incise_fixed_stage_work(plan, state, tick);
 	incise_fixed_stage_limit(plan, state, tick);
 	for (int i = 0; i < plan->numbers.n_axes; i++)
 		aim(&plan->numbers.axes[i], &state->place[i], tick, i);

@@ -48,6 +48,13 @@ static const char *no_membrane(const struct incise_plan *plan)
 						      : "the scene has no membrane";
 }
 
+static const char *no_work(const struct incise_plan *plan)
+{
+	return plan->accounts && plan->gain > 0
+		       ? NULL
+		       : zero(plan, "its forces give back no more than they take");
+}
+
 static const struct {
 	const char *name;
 	struct incise_stage_pair numbers;
@@ -61,6 +68,7 @@ static const struct {
 	{"incision", INCISE_STAGE(incision), no_tool, false},
 	{"membrane", INCISE_STAGE(membrane), no_membrane, false},
 	{"start", INCISE_STAGE(start), NULL, true},
+	{"work", INCISE_STAGE(work), no_work, false},
 	{"limit", INCISE_STAGE(limit), NULL, false},
 };
 _Static_assert(sizeof(all) / sizeof(*all) + 2 == INCISE_PLAN_OTHER_STAGES,

@@ -225,6 +225,7 @@ int incise_integers_numbers(const struct incise_plan *plan,
 		.tube = from.tube,
 		.average_ticks = from.average_ticks,
 		.printed = from.printed,
+		.accounts = from.accounts,
 		.incision.cuts_most = from.incision.cuts_most,
 		.inputs = inputs_of(plan->doubles.plan.inputs[INCISE_CUT]),
 		.ramp_ns =

@@ -145,6 +145,18 @@ static void find_insertion(struct incise_plan *plan)
 		snprintf(plan->no_tool + n, size - n, " are 0");
 }
 
+/* Whether a force of the scene may give back more than it took: see T(stage_work). */
+static bool gives_back(const struct incise_plan *plan)
+{
+	const struct incise_scene *scene = plan->scene;
+
+	return plan->inserts || plan->average_ticks > 1 || plan->surface->mesh ||
+	       scene->membrane.thickness_mm > 0 || scene->cut[INCISE_PUNCTURE].path ||
+	       scene->cut[INCISE_WITHDRAW].path ||
+	       (scene->cut[INCISE_CUT].path &&
+		(!scene->tissue.dissipates || scene->cut[INCISE_CUT].n_inputs > 2));
+}
+
 static void set_tool(struct incise_plan *plan)
 {
 	struct incise_touch top;
@@ -160,6 +172,7 @@ static void set_tool(struct incise_plan *plan)
 	plan->average_ticks = incise_surface_kind(plan->surface) == INCISE_SURFACE_PLANE
 				      ? 1
 				      : plan->scene->effects.average_ticks;
+	plan->accounts = gives_back(plan);
 }
 
 static int check_membrane(const struct incise_plan *plan, struct incise_error *err)

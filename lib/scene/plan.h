@@ -65,7 +65,7 @@ struct incise_doubles {
 };
 
 /* Stages besides forces; those that no loop has are always left out. */
-#define INCISE_PLAN_OTHER_STAGES 10
+#define INCISE_PLAN_OTHER_STAGES 11
 #define INCISE_PLAN_NO_STAGES 2
 _Static_assert(INCISE_PLAN_OTHER_STAGES + INCISE_FORCES <= INCISE_PLAN_STAGES_MAX,
 	       "raise INCISE_PLAN_STAGES_MAX");
@@ -115,6 +115,7 @@ struct incise_plan {
 	enum incise_tool wanted;       /* INCISE_TOOL_AUTO: by the scalpel's turn */
 	enum incise_tool held;	       /* at the last tick; never AUTO */
 	bool inserts;		       /* handle and tube can be held */
+	bool accounts;		       /* for the work of its forces */
 	char no_tool[128];	       /* the reason why not */
 	bool fading;		       /* asked to let go of the force */
 

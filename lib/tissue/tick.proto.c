@@ -735,7 +735,7 @@ void T(stage_skin)(const struct T(plan) *plan, struct T(state) *state,
 	push(state, n_neg(pull), along);
 }
 
-/* --- start and limit -------------------------------------------------------------------- */
+/* --- start, account and limit -------------------------------------------------------------------- */
 
 /*
  * The share of a force that is let through. It waits for a small force, so that a scene that starts with
@@ -779,6 +779,53 @@ void T(stage_start)(const struct T(plan) *plan, struct T(state) *state,
 		tick->flags |= INCISE_TICK_STARTING;
 	for (int i = 0; i < 3; i++)
 		tick->command[i] = w_scale(state->gain, state->force[i]);
+}
+
+/*
+ * The account of a contact's work: no more comes back than was put in. Forces that are a potential's, or only
+ * take, never come to its end. Others do: what a paper prints for an instrument in a curved skin, a membrane
+ * that is left where it was not met, a normal that is averaged, a border of a mesh, a
+ * force that comes back in the tissue after a fade. Of these the part of the
+ * force along the way that nothing has paid for is left out.
+ *
+ *   put in ▲     .-'-.
+ *          |   .'     \
+ *        0 |__'________\______▶ way      here the force only resists
+ *              in    back
+ *
+ * Hannaford and Ryu, Time-domain passivity control of haptic interfaces, IEEE Trans. Robotics and Automation
+ * 18(1), 2002, with the work between two ticks by the mean of their forces.
+ */
+void T(stage_work)(const struct T(plan) *plan, struct T(state) *state,
+		   struct T(tick) *tick)
+{
+	num way[3], length, before, along, unpaid;
+	dir unit[3];
+	wide work2;
+
+	if (!plan->numbers.accounts)
+		return;
+	if (state->proxy.began || tick->held != state->account.held)
+		state->account.work2 = 0;
+	state->account.held = tick->held;
+	v_sub(way, tick->tool, state->account.at);
+	v_copy(state->account.at, tick->tool);
+	if (v_direction(unit, way)) {
+		length = v_along(way, unit);
+		before = n_neg(v_along(state->account.force, unit));
+		along = v_along(tick->command, unit);
+		work2 = w_work(state->account.work2, before, n_neg(along), length);
+		if (work2 < 0 && n_below(0, along)) {
+			unpaid = n_min(along, n_over(n_place(-work2), length));
+			v_add(tick->command, tick->command, n_neg(unpaid), unit);
+			along = n_sub(along, unpaid);
+			work2 = w_work(state->account.work2, before, n_neg(along),
+				       length);
+			tick->flags |= INCISE_TICK_UNPAID;
+		}
+		state->account.work2 = work2;
+	}
+	v_copy(state->account.force, tick->command);
 }
 
 /*

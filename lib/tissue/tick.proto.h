@@ -255,14 +255,15 @@ struct T(numbers) {
 	 * incise_model_input, once each. 0: depth, or depth and speed.
 	 */
 	int32_t inputs;
-	int32_t phases; /* models besides that of the cut: T_PUNCTURES, T_WITHDRAWS */
+	int32_t phases;	  /* models besides that of the cut: T_PUNCTURES, T_WITHDRAWS */
+	int32_t accounts; /* for the work of its forces */
 #define FORCE(...)
 #define NUMBER(...)
 #define MORE(member) num member;
 #include "forces.def"
 #undef MORE
 #define MORE(member) -1
-	int32_t reserved[7
+	int32_t reserved[6
 #include "forces.def"
 	];
 #undef MORE
@@ -330,7 +331,12 @@ struct T(state) {
 		num depth;   /* of the plane, below the skin */
 		int32_t punctured;
 	} membrane;
-	wide anchor[3];	       /* of the skin that drags; Q32 mm */
+	wide anchor[3]; /* of the skin that drags; Q32 mm */
+	struct {
+		num at[3], force[3]; /* of the last tick */
+		wide work2;	     /* twice what was put in, less what came back */
+		int32_t held;
+	} account;
 	num force[3];	       /* of the tissue, before limits */
 	num last[3];	       /* what was rendered */
 	num place[T_AXES_MAX]; /* of the handle along each axis, from its origin */
@@ -416,4 +422,5 @@ T(stage_fn) T(stage_membrane);
 #undef NUMBER
 #undef FORCE
 T(stage_fn) T(stage_start);
+T(stage_fn) T(stage_work);
 T(stage_fn) T(stage_limit);

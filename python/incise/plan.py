@@ -26,6 +26,7 @@ FLAGS = {
     "fault": 16,
     "slewed": 32,
     "travel": 64,
+    "unpaid": 128,
     "starting": 256,
     "not_finite": 512,
     "unusable": 1024,

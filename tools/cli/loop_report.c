@@ -12,13 +12,13 @@ const char *const loop_tool_names[] = {"auto", "blade", "handle", "tube", NULL};
 
 const char *const loop_flag_names[INCISE_TICK_FLAGS] = {
 	"contact",  "extrapolated", "stale",	 "clamped",    "fault",	   "slewed",
-	"travel",   NULL,	    "starting",	 "not_finite", "unusable", "in_cut",
+	"travel",   "unpaid",	    "starting",	 "not_finite", "unusable", "in_cut",
 	"membrane", "lumen",	    "back_wall", "full",
 };
 
 const char *loop_flags_text(unsigned int flags, char *text)
 {
-	static const char letters[] = "cesofvt-rnuimlbx";
+	static const char letters[] = "cesofvtprnuimlbx";
 
 	_Static_assert(sizeof(letters) == INCISE_TICK_FLAGS + 1, "a letter for each");
 	for (int i = 0; letters[i]; i++)
@@ -32,9 +32,8 @@ json_t *loop_flags_json(const uint64_t counts[INCISE_TICK_FLAGS])
 	json_t *flags = json_object();
 
 	for (int i = 0; i < INCISE_TICK_FLAGS; i++)
-		if (loop_flag_names[i])
-			json_object_set_new(flags, loop_flag_names[i],
-					    json_integer((json_int_t)counts[i]));
+		json_object_set_new(flags, loop_flag_names[i],
+				    json_integer((json_int_t)counts[i]));
 	return flags;
 }
 

@@ -37,8 +37,8 @@ static void list_stages(void)
 {
 	static const char *const before[] = {"pose",   "predict",  "tool",    "contact",
 					     "normal", "incision", "membrane"};
-	static const char *const after[] = {"start", "limit", "actuate", "wound",
-					    "bleeding"};
+	static const char *const after[] = {"start",   "work",	"limit",
+					    "actuate", "wound", "bleeding"};
 
 	for (size_t i = 0; i < sizeof(before) / sizeof(*before); i++)
 		all[n_all++] = before[i];
