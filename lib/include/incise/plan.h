@@ -231,6 +231,7 @@ INCISE_API void incise_plan_rendered(const struct incise_plan *plan,
  *    of the same cut, on the same side of an edge of a mesh, and did so since the contact or the
  *    cut began. If one changes a tick earlier, that is no error of the force, nor is what it
  *    keeps from that;
+ *  - while no force goes unpaid (INCISE_TICK_UNPAID): at the end of an account roundings decide;
  *  - for the tip that is set.
  *
  * With a model of three or four inputs it rests on estimated slopes
