@@ -30,6 +30,9 @@ static inline bool apart_decide_alike(const struct incise_tick *a,
 {
 	const unsigned int limits = INCISE_TICK_CLAMPED | INCISE_TICK_EXTRAPOLATED;
 
+	/* At the end of an account roundings decide. */
+	if ((a->flags | b->flags) & INCISE_TICK_UNPAID)
+		return false;
 	return a->phase == b->phase && a->tool == b->tool &&
 	       !((a->flags ^ b->flags) & ~limits) &&
 	       (a->phase == INCISE_PHASE_FREE ||

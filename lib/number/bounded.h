@@ -975,6 +975,11 @@ static inline num w_paid(num, wide, wide)
 	return FAR_MOST;
 }
 
+static inline num w_stored(num, wide)
+{
+	return FAR_MOST;
+}
+
 /* A bound is of forces before start and limit. */
 static inline wide w_ramp(int64_t, double)
 {

@@ -255,6 +255,11 @@ static inline num w_paid(num stiffness, wide work2, wide most2)
 	return sqrt(stiffness * n_max(work2 - most2 / 16, 0));
 }
 
+static inline num w_stored(num stiffness, wide work2)
+{
+	return sqrt(stiffness * n_max(work2, 0));
+}
+
 /* --- the filter: mm, mm/s, mm/s², s --- */
 
 #define W_MM 1.0

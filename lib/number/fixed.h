@@ -263,6 +263,16 @@ static inline num w_paid(num stiffness, wide work2, wide most2)
 	return incise_fx_hold32(incise_fx_root((uint64_t)stiffness * (uint64_t)left2));
 }
 
+/* √(K work2): 2^31 · 2^32 in Q48, or 2^31 · 2^47 in Q32 */
+static inline num w_stored(num stiffness, wide work2)
+{
+	if (work2 <= 0)
+		return 0;
+	if (work2 >> 32)
+		return w_paid(stiffness, work2, 0);
+	return (num)(incise_fx_root((uint64_t)stiffness * (uint64_t)work2) >> 8);
+}
+
 /* --- the filter: x Q32 mm, v Q20 mm/s, a Q16 mm/s², a miss Q24 mm; dt Q30 s; shares Q26 --- */
 
 #define W_MM ((wide)1 << 32)

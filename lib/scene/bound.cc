@@ -778,6 +778,8 @@ static double bound_of(struct tick *t, int32_t held)
 	/* Where the contact began, if it did before. */
 	set_ball(t->state.p0, ball(0, tool.in / ENTERS,
 				   (tool.own + 4 * sqrt3() * lsb_mm()) / ENTERS, 16));
+	set_ball(t->state.entry,
+		 ball(1, t->plan.turned_in, t->plan.turned_own + 4 * lsb(30), 30));
 	d_turn(t->state.side, t->state.attitude, t->plan.numbers.side);
 	d_copy(t->state.flat, t->state.side);
 	set_line(&t->state, &t->tick, t->plan.reach_mm,

@@ -193,6 +193,7 @@ static int survey_model(struct incise_plan *plan, double *stiffness_N_mm)
 	/* The search for the slopes takes longer than the test of a scene's stages. */
 	if (plan->scene->unchecked) {
 		set_tissue(plan, plan->scene->tissue.force[0][INCISE_REACTION_UNLOADING]);
+		*stiffness_N_mm = fmax(plan->unloading_N_mm, 1);
 		return 0;
 	}
 	for (int i = 0; i < INCISE_CUTTING_PHASES; i++) {
@@ -483,6 +484,7 @@ static void add_up(struct incise_plan *plan, double model_N_mm)
 	struct incise_plan_stability *s = &plan->stability;
 	double K = membrane_N_mm(plan);
 	bool both = K > 0 && is_aslant(plan);
+	double all = 0;
 
 	for (int phase = 0; phase < 3; phase++) {
 		double sum[INCISE_FORCE_KINDS] = {0};
@@ -504,7 +506,11 @@ static void add_up(struct incise_plan *plan, double model_N_mm)
 			     fmax(sum[INCISE_SPRING_NORMAL], sum[INCISE_SPRING_ACROSS]) +
 				     sum[INCISE_SPRING_SIDE]);
 		s->damping_N_s_mm = fmax(s->damping_N_s_mm, sum[INCISE_DAMPER]);
+		all = fmax(all, sum[INCISE_SPRING_NORMAL] + sum[INCISE_SPRING_ACROSS] +
+					sum[INCISE_SPRING_SIDE]);
 	}
+	/* More, so that no rounding of a potential's work is taken for none. */
+	plan->account_N_mm = fmin(1.25 * (all + K) + LEAST_N_mm, 32767);
 }
 
 int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info *tracker,

@@ -80,7 +80,7 @@ void incise_plan_set_numbers(struct incise_plan *plan)
 		.leave = scene->tissue.leave_mm,
 		.average_ticks = plan->average_ticks,
 		.printed = scene->tissue.printed_orientation,
-		.accounts = plan->accounts,
+		.account = plan->account_N_mm,
 		.incision = incise_scene_cuts(scene),
 		.small = scene->limits.start_N,
 		.ramp_ns = scene->limits.ramp_ms * 1e6,

@@ -151,8 +151,8 @@ static bool gives_back(const struct incise_plan *plan)
 	const struct incise_scene *scene = plan->scene;
 
 	return plan->inserts || plan->average_ticks > 1 || plan->surface->mesh ||
-	       scene->membrane.thickness_mm > 0 || scene->cut[INCISE_PUNCTURE].path ||
-	       scene->cut[INCISE_WITHDRAW].path ||
+	       plan->stability.damping_N_s_mm > 0 || scene->membrane.thickness_mm > 0 ||
+	       scene->cut[INCISE_PUNCTURE].path || scene->cut[INCISE_WITHDRAW].path ||
 	       (scene->cut[INCISE_CUT].path &&
 		(!scene->tissue.dissipates || scene->cut[INCISE_CUT].n_inputs > 2));
 }
@@ -172,7 +172,8 @@ static void set_tool(struct incise_plan *plan)
 	plan->average_ticks = incise_surface_kind(plan->surface) == INCISE_SURFACE_PLANE
 				      ? 1
 				      : plan->scene->effects.average_ticks;
-	plan->accounts = gives_back(plan);
+	if (!gives_back(plan))
+		plan->account_N_mm = 0;
 }
 
 static int check_membrane(const struct incise_plan *plan, struct incise_error *err)
@@ -347,6 +348,7 @@ void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 	copy->gain *= gain;
 	copy->unloading_N_mm *= gain;
 	copy->beyond_N_mm *= gain;
+	copy->account_N_mm *= gain;
 	for (int i = 0; i < incise_n_tissue_forces; i++)
 		copy->acting[i].number[0] *= gain;
 	incise_plan_set_numbers(copy);

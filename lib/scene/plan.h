@@ -115,7 +115,6 @@ struct incise_plan {
 	enum incise_tool wanted;       /* INCISE_TOOL_AUTO: by the scalpel's turn */
 	enum incise_tool held;	       /* at the last tick; never AUTO */
 	bool inserts;		       /* handle and tube can be held */
-	bool accounts;		       /* for the work of its forces */
 	char no_tool[128];	       /* the reason why not */
 	bool fading;		       /* asked to let go of the force */
 
@@ -132,8 +131,9 @@ struct incise_plan {
 	double unloading_N_mm; /* … with this stiffness */
 	/* The model's steepest slope by each input, N per its unit, times the gain. */
 	double input_slope[INCISE_MODEL_INPUT_KINDS];
-	double support_mm;  /* the model's largest depth; beyond it the force … */
-	double beyond_N_mm; /* … goes on with this slope, ≥ 0 */
+	double support_mm;   /* the model's largest depth; beyond it the force … */
+	double beyond_N_mm;  /* … goes on with this slope, ≥ 0 */
+	double account_N_mm; /* all springs together where work is on account; else 0 */
 	const struct incise_model *model; /* fuzzy: one of these */
 	const struct incise_fixed *fixed;
 	struct incise_fixed *own_fixed; /* compiled here */

@@ -9,7 +9,7 @@
  *                                                            of front.proto.c
  *               plane       F -= Kx ((P-P0)·s) s             §2.2, Fx
  *   insertion   insertion   F += Ky d n Fort                 §2.3, Fy
- *               spread      F -= Kxz (I - n nᵀ)(P-P0)        §2.3, Fxz
+ *               spread      F -= Kxz (I - n0 n0ᵀ)(P-P0)      §2.3, Fxz
  *   both        damping     F -= Kd v                        §2.2, Fd
  *               skin        F -= min(K |x|, μ N) x/|x|       friction along the skin; in no paper
  *
@@ -290,6 +290,7 @@ static void begin_contact(struct T(state) *state, int64_t t_ns)
 	state->deepest = 0;
 	state->skin_open = false;
 	v_copy(state->p0, state->proxy.first.point);
+	d_copy(state->entry, state->proxy.touch.normal);
 	if (state->held == INCISE_TOOL_BLADE)
 		d_copy(state->side, state->flat);
 	state->averaged = false;
@@ -428,15 +429,18 @@ static bool hits_membrane(const struct T(membrane) *membrane,
 	       (tick->phase == INCISE_PHASE_CUTTING || state->opening.in);
 }
 
+/* No line to the membrane is longer than this share of its distance says. */
+#define STEEPEST N_OF(1, 5)
+
 /*
- * A membrane over an airway. Tissue in front of it holds the tool up to the membrane's depth and no more
- * beyond it; the membrane yields, and is open from then on.
+ * A membrane over an airway. Tissue in front of it holds the tool up to the depth that it has there, on the line
+ * along the skin's normal through the tool, and no more beyond it; the membrane yields, and is open from then on.
  */
 void T(stage_membrane)(const struct T(plan) *plan, struct T(state) *state,
 		       struct T(tick) *tick)
 {
 	const struct T(membrane) *membrane = &plan->numbers.membrane;
-	num off[3], beyond;
+	num off[3], beyond, slope;
 
 	if (!n_below(0, membrane->thickness) || is_stale_tick(tick))
 		return;
@@ -452,11 +456,11 @@ void T(stage_membrane)(const struct T(plan) *plan, struct T(state) *state,
 	if (!state->membrane.met) {
 		state->membrane.met = true;
 		state->membrane.hit = hits_membrane(membrane, state, tick, off, beyond);
-		state->membrane.depth = n_max(n_sub(state->depth, beyond), 0);
 	}
 	if (!state->membrane.hit)
 		return;
-	state->depth = n_min(state->depth, state->membrane.depth);
+	slope = n_max(n_share_of(d_dot(state->sn, membrane->normal)), STEEPEST);
+	state->depth = n_max(n_sub(state->depth, n_over(beyond, slope)), 0);
 	push(state, membrane_force(membrane, state, tick, beyond), membrane->normal);
 }
 
@@ -669,7 +673,10 @@ void T(stage_insertion)(const struct T(plan) *plan, struct T(state) *state,
 	push(state, n_times(numbers->insertion, size), state->normal);
 }
 
-/* The tissue around an instrument gives way to a limited extent. */
+/*
+ * The tissue around an instrument gives way to a limited extent: across the normal n0 of the place where it went in.
+ * Across the normal of now it would be no potential's on curved skin, and stiffer in the depth, by R / (R - d).
+ */
 void T(stage_spread)(const struct T(plan) *plan, struct T(state) *state,
 		     struct T(tick) *tick)
 {
@@ -678,7 +685,7 @@ void T(stage_spread)(const struct T(plan) *plan, struct T(state) *state,
 	if (tick->phase != INCISE_PHASE_INSERTION)
 		return;
 	v_sub(off, tick->tool, state->p0);
-	v_across(across, off, state->normal);
+	v_across(across, off, state->entry);
 	v_pull(state->force, state->force, plan->numbers.spread, across);
 }
 
@@ -735,7 +742,7 @@ void T(stage_skin)(const struct T(plan) *plan, struct T(state) *state,
 	push(state, n_neg(pull), along);
 }
 
-/* --- start, account and limit -------------------------------------------------------------------- */
+/* --- start, work and limit --------------------------------------------------------------- */
 
 /*
  * The share of a force that is let through. It waits for a small force, so that a scene that starts with
@@ -782,50 +789,48 @@ void T(stage_start)(const struct T(plan) *plan, struct T(state) *state,
 }
 
 /*
- * The account of a contact's work: no more comes back than was put in. Forces that are a potential's, or only
- * take, never come to its end. Others do: what a paper prints for an instrument in a curved skin, a membrane
- * that is left where it was not met, a normal that is averaged, a border of a mesh, a
- * force that comes back in the tissue after a fade. Of these the part of the
- * force along the way that nothing has paid for is left out.
+ * The account of a contact's work: no more comes back than was put in. Springs that hold the energy E, all together
+ * of the stiffness K, push with no more than √(2 K E): forces that are a potential's, or only take, are below that.
+ * Others come to it: a handle that is turned in its cut, another place beyond a membrane, a normal that is
+ * averaged, the border of a mesh, a force that comes back in the tissue after a fade. Of these the part of the
+ * force along the way that nothing has paid for is left out. Unlike a force that ends where E does, this one has no
+ * step there.
  *
- *   put in ▲     .-'-.
- *          |   .'     \
- *        0 |__'________\______▶ way      here the force only resists
- *              in    back
+ *     force ▲ ¦ .-·'' √(2 K E)
+ *           | ¦·  left out above
+ *           |·'
+ *         0 '────────▶ E: put in, less what came back
  *
- * Hannaford and Ryu, Time-domain passivity control of haptic interfaces, IEEE Trans. Robotics and Automation
- * 18(1), 2002, with the work between two ticks by the mean of their forces.
+ * After Hannaford and Ryu, Time-domain passivity control of haptic interfaces, IEEE Trans. Robotics and Automation
+ * 18(1), 2002; the work between two ticks is by the mean of their forces.
  */
 void T(stage_work)(const struct T(plan) *plan, struct T(state) *state,
 		   struct T(tick) *tick)
 {
-	num way[3], length, before, along, unpaid;
-	dir unit[3];
-	wide work2;
+	num stiffness = plan->numbers.account, way[3], along, paid;
 
-	if (!plan->numbers.accounts)
+	if (!n_below(0, stiffness))
 		return;
+	/* Of the last way both forces are known, as they were rendered. */
+	along = n_neg(v_along(state->last, state->account.unit));
+	state->account.work2 = w_work(state->account.work2, state->account.before, along,
+				      state->account.length);
 	if (state->proxy.began || tick->held != state->account.held)
 		state->account.work2 = 0;
 	state->account.held = tick->held;
 	v_sub(way, tick->tool, state->account.at);
 	v_copy(state->account.at, tick->tool);
-	if (v_direction(unit, way)) {
-		length = v_along(way, unit);
-		before = n_neg(v_along(state->account.force, unit));
-		along = v_along(tick->command, unit);
-		work2 = w_work(state->account.work2, before, n_neg(along), length);
-		if (work2 < 0 && n_below(0, along)) {
-			unpaid = n_min(along, n_over(n_place(-work2), length));
-			v_add(tick->command, tick->command, n_neg(unpaid), unit);
-			along = n_sub(along, unpaid);
-			work2 = w_work(state->account.work2, before, n_neg(along),
-				       length);
-			tick->flags |= INCISE_TICK_UNPAID;
-		}
-		state->account.work2 = work2;
-	}
-	v_copy(state->account.force, tick->command);
+	state->account.length = 0;
+	if (!v_direction(state->account.unit, way))
+		return;
+	state->account.length = v_along(way, state->account.unit);
+	state->account.before = n_neg(v_along(state->last, state->account.unit));
+	along = v_along(tick->command, state->account.unit);
+	paid = w_stored(stiffness, state->account.work2);
+	if (!n_below(paid, along))
+		return;
+	v_add(tick->command, tick->command, n_sub(paid, along), state->account.unit);
+	tick->flags |= INCISE_TICK_UNPAID;
 }
 
 /*

@@ -255,8 +255,8 @@ struct T(numbers) {
 	 * incise_model_input, once each. 0: depth, or depth and speed.
 	 */
 	int32_t inputs;
-	int32_t phases;	  /* models besides that of the cut: T_PUNCTURES, T_WITHDRAWS */
-	int32_t accounts; /* for the work of its forces */
+	int32_t phases; /* models besides that of the cut: T_PUNCTURES, T_WITHDRAWS */
+	num account; /* all springs together, in a plan whose work is on account; else 0 */
 #define FORCE(...)
 #define NUMBER(...)
 #define MORE(member) num member;
@@ -313,6 +313,7 @@ struct T(state) {
 	dir attitude[4];
 	num velocity[3];    /* of the end of what is held */
 	num p0[3];	    /* where the contact began */
+	dir entry[3];	    /* the normal there */
 	dir sn[3];	    /* the paper's Sn of this tick */
 	dir normal[3];	    /* the one that forces go along: Sn, or its average */
 	num depth;	    /* ≥ 0; of the tissue in front of a membrane */
@@ -328,13 +329,14 @@ struct T(state) {
 	struct {
 		int32_t met; /* the tool is beyond the plane of the membrane … */
 		int32_t hit; /* … and came there through it */
-		num depth;   /* of the plane, below the skin */
 		int32_t punctured;
 	} membrane;
 	wide anchor[3]; /* of the skin that drags; Q32 mm */
 	struct {
-		num at[3], force[3]; /* of the last tick */
-		wide work2;	     /* twice what was put in, less what came back */
+		num at[3];	    /* of the last tick … */
+		dir unit[3];	    /* … and the way to it, … */
+		num length, before; /* … the force that resisted where it began */
+		wide work2; /* twice what was put in until then, less what came back */
 		int32_t held;
 	} account;
 	num force[3];	       /* of the tissue, before limits */

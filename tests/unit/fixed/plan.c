@@ -124,7 +124,7 @@ static const struct {
 	{AT(skin), 0, INT32_MAX, ANY},
 	{AT(skin_friction), 0, INT32_MAX, ANY},
 	{AT(reserved[0]), 0, 0, ANY},
-	{AT(accounts), 0, 1, ANY},
+	{AT(account), 0, INT32_MAX, ANY},
 	{AT(reserved[3]), 0, 0, ANY},
 };
 

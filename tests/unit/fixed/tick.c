@@ -85,6 +85,7 @@ static struct incise_fixed_tick any_state(enum incise_phase phase)
 	any_place(tick_state.p0, 20);
 	any_place(tick_state.velocity, 500);
 	incise_fx_trial_unit(&trial, tick_state.normal, 3);
+	incise_fx_trial_unit(&trial, tick_state.entry, 3);
 	incise_fx_trial_unit(&trial, tick_state.side, 3);
 	incise_fx_trial_unit(&trial, tick_state.flat, 3);
 	incise_fx_trial_unit(&trial, tick_state.opening.along, 3);
@@ -112,7 +113,7 @@ static double held_up_mm(double aligned, const double flat[3], const double alon
 
 /*
  * Each force within its roundings: of a reaction its product and each part; of the plane the stretch, the
- * product and each part; of a spread the part along n, the vector across and the product; of an
+ * product and each part; of a spread the part along n0, the vector across and the product; of an
  * insertion 2 LSB of Fort times 20 mm and 2 N/mm, and the rest by one each.
  */
 TEST(test_forces, begin)
@@ -120,7 +121,8 @@ TEST(test_forces, begin)
 	for (int k = 0; k < CASES; k++) {
 		double K = fixed(any(0, 2)) / ONE, aligned = fixed(any(0, 1)) / ONE;
 		double damping = lrint(any(0, 0.01) * 268435456) / 268435456.0;
-		double off[3], n[3], s[3], flat[3], along[3], depth, held, want[5][3];
+		double off[3], n[3], e[3], s[3], flat[3], along[3], depth, held,
+			want[5][3];
 		struct incise_fixed_tick cutting = any_state(INCISE_PHASE_CUTTING),
 					 inserting = cutting;
 		struct incise_fixed_plan plan = {
@@ -145,6 +147,7 @@ TEST(test_forces, begin)
 
 		inserting.phase = INCISE_PHASE_INSERTION;
 		from_unit(n, tick_state.normal);
+		from_unit(e, tick_state.entry);
 		from_unit(s, tick_state.side);
 		from_unit(flat, tick_state.flat);
 		from_unit(along, tick_state.opening.along);
@@ -157,7 +160,7 @@ TEST(test_forces, begin)
 			want[1][i] = -K * dot(off, s) * s[i];
 			want[2][i] = -damping * tick_state.velocity[i] / ONE;
 			want[3][i] = K * held * n[i];
-			want[4][i] = -K * (off[i] - dot(off, n) * n[i]);
+			want[4][i] = -K * (off[i] - dot(off, e) * e[i]);
 		}
 		for (int f = 0; f < 5; f++) {
 			double got[3];

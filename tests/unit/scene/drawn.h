@@ -375,7 +375,8 @@ struct hand {
 	double tip_mm[3], axis[3], handle_mm;
 	int64_t t_ns, next_ns, period_ns, pose_ns;
 	bool fading;
-	bool calm; /* no jumps, no noise, no pose that is missing */
+	bool calm;  /* no jumps, no noise, no pose that is missing */
+	bool quiet; /* it asks for nothing */
 };
 
 static inline void go_elsewhere(struct hand *h, struct mover *m, double deep)
@@ -534,7 +535,8 @@ static inline void step(struct hand *h)
 		if (h->next_ns < h->t_ns - h->pose_ns)
 			h->next_ns = h->t_ns;
 	}
-	ask(h);
+	if (!h->quiet)
+		ask(h);
 }
 
 static inline struct hand hand_of(uint64_t seed, const struct drawn *d,

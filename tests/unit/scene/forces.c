@@ -62,7 +62,7 @@ static void give_fixed(const struct given *g, struct incise_fixed_numbers *to)
 			tick.tool[i] = n(g->p[i]);                                  \
 			state.p0[i] = n(g->p0[i]);                                  \
 			state.velocity[i] = n(g->v[i]);                             \
-			state.normal[i] = d(g->normal[i]);                          \
+			state.normal[i] = state.entry[i] = d(g->normal[i]);         \
 			state.side[i] = d(g->side[i]);                              \
 			state.flat[i] = d(g->flat[i]);                              \
 			state.opening.along[i] = d(g->along[i]);                    \

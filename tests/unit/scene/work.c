@@ -85,14 +85,14 @@ static void walk(uint64_t seed, const struct drawn *d, int k, bool account,
 	plan[0] = plan[1] = incise_plan_new_fed(scene, &d->tracker, &err);
 	succeeds(plan[0]);
 	if (!account)
-		plan[0]->doubles.plan.numbers.accounts = false;
+		plan[0]->doubles.plan.numbers.account = 0;
 	hand = hand_of(seed, d, scene, plan);
 	hand.calm = true;
 	for (int i = 0; i < TICKS; i++) {
 		step(&hand);
 		assert_int_equal(incise_plan_tick(plan[0], hand.t_ns, &tick), 0);
 		met->unpaid += !!(tick.flags & INCISE_TICK_UNPAID);
-		if (!follow(&contact, &tick, plan[0]->accounts))
+		if (!follow(&contact, &tick, plan[0]->account_N_mm > 0))
 			continue;
 		met->contacts++;
 		met->most_mJ = fmax(met->most_mJ, contact.put_mJ);
@@ -130,6 +130,98 @@ TEST(test_no_closed_motion_returns_more_than_it_takes)
 	}
 	assert_int_equal(without.unpaid, 0);
 	assert_true(without.returned > 0);
+}
+
+/* Springs on convex skin, and a tool that stays: one of a potential, as the account sees it. */
+static struct incise_scene *springs_of(const struct drawn *d, int k)
+{
+	struct incise_scene *scene;
+
+	if (d->is_mesh || strstr(d->text[k].all, "model ="))
+		return NULL;
+	scene = fed_scene(&folder, d->text[k].all, &err);
+	succeeds(scene);
+	scene->unchecked = true;
+	scene->membrane.thickness_mm = 0;
+	scene->effects.average_ticks = 1;
+	scene->tissue.printed_orientation = false;
+	scene->tissue.force[INCISE_FORCE_INSERTION][1] = 1;
+	/* By the filter's velocity, which is late. */
+	scene->tissue.force[INCISE_FORCE_DAMPING][0] = 0;
+	scene->limits.start_N = scene->limits.force_N = 1000;
+	scene->limits.slew_N_s = 1e6;
+	scene->limits.ramp_ms = 1;
+	return scene;
+}
+
+/* Roundings of a work in integers, and chords in place of arcs, add up to no more than this along the way. */
+#define WORK_N 0x1p-16
+
+/* Forces of both kinds are nearer to each other, of these scenes. */
+#define FORCE_N 0.01
+
+/*
+ * The same in double without an account, and in double or integers with one. Returns the ticks in the tissue.
+ */
+static int pay(uint64_t seed, const struct drawn *d, struct incise_scene *scene,
+	       struct incise_scene *other)
+{
+	struct incise_plan *plan[2];
+	struct incise_tick tick[2];
+	double path_mm = 0, at_mm[3] = {0}, off[3], most_N;
+	struct hand hand;
+	int in = 0;
+
+	plan[0] = incise_plan_new_fed(scene, &d->tracker, &err);
+	succeeds(plan[0]);
+	plan[1] = incise_plan_new_fed(other, &d->tracker, &err);
+	succeeds(plan[1]);
+	plan[0]->doubles.plan.numbers.account = 0;
+	for (int k = 0; k < 2; k++)
+		incise_plan_set_tool(plan[k], (enum incise_tool)(1 + seed % 3));
+	hand = hand_of(seed, d, scene, plan);
+	hand.calm = hand.quiet = true;
+	for (int i = 0; i < TICKS; i++) {
+		step(&hand);
+		for (int k = 0; k < 2; k++)
+			assert_int_equal(incise_plan_tick(plan[k], hand.t_ns, &tick[k]),
+					 0);
+		v3_sub(off, tick[0].tool_mm, at_mm);
+		v3_copy(at_mm, tick[0].tool_mm);
+		path_mm =
+			tick[0].phase == INCISE_PHASE_FREE ? 0 : path_mm + v3_length(off);
+		v3_sub(off, tick[1].command_N, tick[0].command_N);
+		most_N = FORCE_N + sqrt(2 * plan[1]->account_N_mm * WORK_N * path_mm);
+		in += tick[0].phase != INCISE_PHASE_FREE;
+		if (tick[1].flags & INCISE_TICK_UNPAID && !(v3_length(off) <= most_N))
+			fail_msg("seed %" PRIu64 ", tick %d: unpaid, %g N of %g\n%s",
+				 seed, i, v3_length(off), most_N, d->text[0].all);
+	}
+	for (int k = 0; k < 2; k++)
+		incise_plan_free(plan[k]);
+	return in;
+}
+
+TEST(test_the_account_leaves_a_potential_as_it_is)
+{
+	int scenes = cases_are_all() ? SCENES : SCENES_FEW, in = 0;
+	uint64_t first = cases_seed(1);
+	static struct drawn d;
+
+	for (int i = 0; i < scenes; i++) {
+		struct incise_scene *scene[2];
+		uint64_t seed = first + (uint64_t)i;
+
+		draw(seed, &d);
+		for (int k = 0; k < 2; k++)
+			scene[k] = springs_of(&d, k);
+		for (int k = 0; k < 2 && scene[0]; k++)
+			in += pay(seed, &d, scene[0], scene[k]);
+		for (int k = 0; k < 2; k++)
+			incise_scene_free(scene[k]);
+	}
+	printf("%d ticks are paid\n", in);
+	assert_true(in > 200 * scenes);
 }
 
 GROUP(drawn_set_up, drawn_tear_down);

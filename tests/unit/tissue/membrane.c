@@ -28,6 +28,7 @@
 		struct incise_##kind##_tick tick = {.phase = INCISE_PHASE_CUTTING,      \
 						    .tool = {n(aside), 0, n(-beyond)}}; \
                                                                                         \
+		state_##kind.sn[2] = d(1);                                              \
 		state_##kind.depth = n(10 + beyond);                                    \
 		state_##kind.force[2] = 0;                                              \
 		incise_##kind##_stage_membrane(&plan, &state_##kind, &tick);            \
