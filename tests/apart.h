@@ -28,11 +28,9 @@ struct apart {
 static inline bool apart_decide_alike(const struct incise_tick *a,
 				      const struct incise_tick *b)
 {
-	const unsigned int limits = INCISE_TICK_CLAMPED | INCISE_TICK_EXTRAPOLATED;
+	const unsigned int limits =
+		INCISE_TICK_CLAMPED | INCISE_TICK_EXTRAPOLATED | INCISE_TICK_UNPAID;
 
-	/* At the end of an account roundings decide. */
-	if ((a->flags | b->flags) & INCISE_TICK_UNPAID)
-		return false;
 	return a->phase == b->phase && a->tool == b->tool &&
 	       !((a->flags ^ b->flags) & ~limits) &&
 	       (a->phase == INCISE_PHASE_FREE ||
@@ -51,8 +49,12 @@ static inline double apart_N(struct apart *apart, const struct incise_tick *a,
 	off_N = fmax(v3_length(off) - apart->slewed * APART_SLEW_N, 0);
 	if (!apart_decide_alike(a, b))
 		apart->is = true;
-	else if (off_N <= APART_ENDED * bound_N)
+	/* What fades to nothing a tick later may return a tick later. */
+	else if (off_N <= APART_ENDED * bound_N && !(a->flags & INCISE_TICK_STARTING))
 		apart->is = false;
+	/* At the end of an account roundings decide, of nothing but this tick. */
+	if ((a->flags | b->flags) & INCISE_TICK_UNPAID)
+		return 0;
 	return off_N;
 }
 

@@ -95,7 +95,7 @@ static bool is_tissue(const struct incise_fixed_numbers *numbers)
 	return numbers->gain >= 0 && in_range(numbers->support, 0, INCISE_FX_AWAY_MAX) &&
 	       numbers->beyond >= 0 && in_range(numbers->friction, 0, ONE) &&
 	       in_range(numbers->aligned, 0, ONE) && in_range(numbers->printed, 0, 1) &&
-	       numbers->account >= 0 &&
+	       numbers->account >= 0 && in_range(numbers->upright, 0, ONE) &&
 	       incise_fixed_incision_good(&numbers->incision) &&
 	       is_membrane(&numbers->membrane)
 #include "../tissue/forces.def"
@@ -208,7 +208,7 @@ static int open_parts(struct incise_fixed_plan *plan, const uint8_t *bytes,
 
 uint32_t incise_fixed_plan_version(const struct incise_fixed_numbers *numbers)
 {
-	if (numbers->account
+	if (numbers->account || numbers->upright
 #include "../tissue/forces.def"
 	)
 		return INCISE_FIXED_PLAN_VERSION_MORE;

@@ -292,6 +292,7 @@ static void set_numbers(struct T(plan) *plan)
 #undef MORE
 	set_ball(to->membrane.point, ball(plan->reach_mm, 0, sqrt3() * lsb(17), 16));
 	set_unit(to->membrane.normal);
+	set(to->upright, from->upright);
 	set(to->membrane.radius, from->membrane.radius);
 	set(to->membrane.thickness, from->membrane.thickness);
 	set(to->membrane.stiffness, from->membrane.stiffness);

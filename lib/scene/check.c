@@ -455,10 +455,13 @@ static double membrane_N_mm(const struct incise_plan *plan)
  */
 #define ASLANT_MM 0.5
 
-static bool is_aslant(const struct incise_plan *plan)
+/* Beyond the membrane's disc a tool may come some way aside. */
+#define UPRIGHT_OF 0.95
+
+static bool is_aslant(struct incise_plan *plan)
 {
 	const struct incise_scene_membrane *membrane = &plan->scene->membrane;
-	double along[3], across[3], low_mm = INFINITY, high_mm = -INFINITY;
+	double along[3], across[3], low_mm = INFINITY, high_mm = -INFINITY, least = 1;
 
 	v3_any_across(along, membrane->normal);
 	v3_cross(across, membrane->normal, along);
@@ -471,7 +474,9 @@ static bool is_aslant(const struct incise_plan *plan)
 		incise_surface_nearest(plan->surface, at_mm, &touch);
 		low_mm = fmin(low_mm, touch.depth_mm);
 		high_mm = fmax(high_mm, touch.depth_mm);
+		least = fmin(least, v3_dot(touch.normal, membrane->normal));
 	}
+	plan->upright = UPRIGHT_OF * fmax(least, 0);
 	return high_mm - low_mm > ASLANT_MM;
 }
 
@@ -483,7 +488,8 @@ static void add_up(struct incise_plan *plan, double model_N_mm)
 {
 	struct incise_plan_stability *s = &plan->stability;
 	double K = membrane_N_mm(plan);
-	bool both = K > 0 && is_aslant(plan);
+	bool aslant = plan->scene->membrane.thickness_mm > 0 && is_aslant(plan);
+	bool both = K > 0 && aslant;
 	double all = 0;
 
 	for (int phase = 0; phase < 3; phase++) {
@@ -518,8 +524,7 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 {
 	struct incise_plan_stability *s = &plan->stability;
 	const struct incise_scene *scene = plan->scene;
-	double model_N_mm = 0, gain;
-	char delay[64], advice[64], mass[64] = "";
+	double model_N_mm = 0;
 
 	s->device = (struct incise_haptic_device){
 		.mass_kg = scene->device.mass_kg,
@@ -538,8 +543,6 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 	if (scene->unchecked)
 		return 0;
 	set_limits(plan);
-	if (stable(plan, 1))
-		return 0;
 	if (s->acceleration_slope_N_s2_mm > 0 && s->own_delay)
 		return incise_error_set(
 			err, EDOM,
@@ -547,34 +550,8 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 			"whose model has the input acceleration_mm_s2; remove "
 			"delay_ticks",
 			scene->path);
-	name_delay(s, tracker, delay);
-	if (s->acceleration_slope_N_s2_mm > 0)
-		snprintf(mass, sizeof(mass), " and acts as %.3g kg by acceleration",
-			 s->acceleration_slope_N_s2_mm / N_S2_PER_MM_KG);
-	gain = three_digits_down(largest_gain(plan));
-	if (gain > 0)
-		snprintf(advice, sizeof(advice), "set tissue.gain to at most %.3g", gain);
-	else
-		snprintf(advice, sizeof(advice),
-			 "no gain is small enough: the device needs damping");
-	return incise_error_set(
-		err, EDOM,
-		"%s: not stable: its tissue has %.4g N/mm and %.4g N s/mm%s, but a "
-		"device of %g kg and %g N s/mm %s is stable up to %.4g N/mm, of which "
-		"%g %% are kept in reserve; %s, or describe the device",
-		scene->path, s->stiffness_N_mm, s->damping_N_s_mm, mass,
-		s->device.mass_kg, s->device.damping_N_s_mm, delay, s->limit_N_mm,
-		100 * RESERVE, advice);
+	return 0;
 }
-
-/*
- * Halvings of what ends a swing, a gain or a damping, which are tried in the way that swung;
- * then all ways are, and it is made safer by SAFER until they rest.
- */
-#define HALVINGS 5
-#define SAFER 1.1
-#define SAFER_MOST 3
-#define DAMPING_MOST 16 /* times the device's own, or than 1 mN s/mm */
 
 /* Inputs that the search's hand does not move, or does not move far enough. */
 static const enum incise_model_input unmoved[] = {INCISE_INPUT_TILT, INCISE_INPUT_TIME};
@@ -614,51 +591,171 @@ static int search(struct incise_plan *plan, const struct incise_tracker_info *tr
 	return rc;
 }
 
-static bool rests(struct incise_plan *plan, const struct incise_tracker_info *tracker,
-		  double gain, double damping_N_s_mm, int way)
+/* Both checks, with all forces so many times as strong, on a device with this damping. Of the search only a way, or all: -1. */
+static bool holds_still(struct incise_plan *plan,
+			const struct incise_tracker_info *tracker, double share,
+			double damping_N_s_mm, int way)
 {
-	const struct incise_rest_trial trial = {gain, damping_N_s_mm, way};
+	const struct incise_rest_trial trial = {share, damping_N_s_mm, way};
+	struct incise_haptic_device *device = &plan->stability.device;
+	const double own_N_s_mm = device->damping_N_s_mm;
 	struct incise_rest rest;
+	bool still;
 
-	return !search(plan, tracker, &trial, &rest) && rest.rests;
+	device->damping_N_s_mm = damping_N_s_mm;
+	still = stable(plan, share) && !search(plan, tracker, &trial, &rest) &&
+		rest.rests;
+	device->damping_N_s_mm = own_N_s_mm;
+	return still;
 }
 
-/* The largest gain that rests, times the plan's; 0: none was found. */
-static double resting_gain(struct incise_plan *plan,
-			   const struct incise_tracker_info *tracker, int way)
+/*
+ * The advice is found by halvings of its logarithm between what was refused and what holds, which is looked for down
+ * to a 64th of the gain, and up to 16 times the damping.
+ */
+#define GAIN_LEAST (1.0 / 64)
+#define DAMPING_MOST 16 /* times the device's own, or than 1 mN s/mm */
+#define HALVINGS 4
+
+/* The largest gain, in three digits, that was tried and holds; 0: none was found. @way swung, or -1. */
+static double best_gain(struct incise_plan *plan,
+			const struct incise_tracker_info *tracker, int way)
 {
-	double low = 0, high = 1, damping = plan->stability.device.damping_N_s_mm;
+	double damping = plan->stability.device.damping_N_s_mm, low, high = 1;
 
-	for (int i = 0; i < HALVINGS; i++) {
-		double middle = (low + high) / 2;
-
-		*(rests(plan, tracker, middle, damping, way) ? &low : &high) = middle;
-	}
-	for (int i = 0; i < SAFER_MOST; i++, low /= SAFER)
-		if (rests(plan, tracker, low, damping, -1))
+	if (!stable(plan, 1)) {
+		high = fmin(largest_gain(plan) / plan->gain, 1);
+		low = three_digits_down(high * plan->gain);
+		if (holds_still(plan, tracker, low / plan->gain, damping, -1))
 			return low;
-	return 0;
-}
-
-/* The smallest damping of the device that rests; 0: none was found. */
-static double resting_damping(struct incise_plan *plan,
-			      const struct incise_tracker_info *tracker, int way)
-{
-	double low = plan->stability.device.damping_N_s_mm;
-	double high = DAMPING_MOST * fmax(low, 1e-3);
-
-	if (!rests(plan, tracker, 1, high, way))
+	}
+	/* Where the way that swung does not swing, the others are tried. */
+	for (low = high / 2; low > GAIN_LEAST; low /= 2)
+		if (holds_still(plan, tracker, low, damping, way) &&
+		    holds_still(plan, tracker, low, damping, -1))
+			break;
+	if (low <= GAIN_LEAST)
 		return 0;
-	low = fmax(low, high / DAMPING_MOST);
+	high = 2 * low;
 	for (int i = 0; i < HALVINGS; i++) {
 		double middle = sqrt(low * high);
+		double gain = three_digits_down(middle * plan->gain);
 
-		*(rests(plan, tracker, 1, middle, way) ? &high : &low) = middle;
+		middle = gain / plan->gain;
+		*(holds_still(plan, tracker, middle, damping, way) &&
+				  holds_still(plan, tracker, middle, damping, -1)
+			  ? &low
+			  : &high) = middle;
 	}
-	for (int i = 0; i < SAFER_MOST; i++, high *= SAFER)
-		if (rests(plan, tracker, 1, high, -1))
-			return high;
+	for (int i = 0; i < HALVINGS; i++, low *= 0.95) {
+		double gain = three_digits_down(low * plan->gain);
+
+		if (holds_still(plan, tracker, gain / plan->gain, damping, -1))
+			return gain;
+	}
 	return 0;
+}
+
+static double three_digits_up(double value)
+{
+	double unit = pow(10, floor(log10(value)) - 2);
+
+	return ceil(value / unit) * unit;
+}
+
+/* The smallest damping of the device that was tried and holds; 0: none was found. */
+static double best_damping(struct incise_plan *plan,
+			   const struct incise_tracker_info *tracker, int way)
+{
+	double low = fmax(plan->stability.device.damping_N_s_mm, 1e-3), high = low;
+
+	do {
+		low = high;
+		high = three_digits_up(2 * low);
+		if (high >
+		    DAMPING_MOST * fmax(plan->stability.device.damping_N_s_mm, 1e-3))
+			return 0;
+	} while (!holds_still(plan, tracker, 1, high, way) ||
+		 !holds_still(plan, tracker, 1, high, -1));
+	for (int i = 0; i < HALVINGS; i++) {
+		double middle = three_digits_up(sqrt(low * high));
+
+		*(holds_still(plan, tracker, 1, middle, way) &&
+				  holds_still(plan, tracker, 1, middle, -1)
+			  ? &high
+			  : &low) = middle;
+	}
+	return high;
+}
+
+/* What was tried, and holds. */
+static void advise(struct incise_plan *plan, const struct incise_tracker_info *tracker,
+		   int way, char advice[200])
+{
+	double gain = best_gain(plan, tracker, way);
+	double damping = best_damping(plan, tracker, way);
+
+	if (gain > 0 && damping > 0)
+		snprintf(advice, 200,
+			 "set tissue.gain to at most %.3g, or use a device with "
+			 "device.damping_N_s_mm of at least %.3g",
+			 gain, damping);
+	else if (gain > 0)
+		snprintf(advice, 200, "set tissue.gain to at most %.3g", gain);
+	else if (damping > 0)
+		snprintf(advice, 200,
+			 "use a device with device.damping_N_s_mm of at least %.3g",
+			 damping);
+	else
+		snprintf(advice, 200,
+			 "no gain down to %.3g holds, and no damping of the device up "
+			 "to %.3g N s/mm",
+			 plan->gain * GAIN_LEAST,
+			 DAMPING_MOST *
+				 fmax(plan->stability.device.damping_N_s_mm, 1e-3));
+}
+
+static int refuse_unstable(struct incise_plan *plan,
+			   const struct incise_tracker_info *tracker,
+			   struct incise_error *err)
+{
+	const struct incise_plan_stability *s = &plan->stability;
+	char delay[64], advice[200], mass[64] = "";
+
+	name_delay(s, tracker, delay);
+	if (s->acceleration_slope_N_s2_mm > 0)
+		snprintf(mass, sizeof(mass), " and acts as %.3g kg by acceleration",
+			 s->acceleration_slope_N_s2_mm / N_S2_PER_MM_KG);
+	advise(plan, tracker, -1, advice);
+	return incise_error_set(
+		err, EDOM,
+		"%s: not stable: its tissue has %.4g N/mm and %.4g N s/mm%s, but a "
+		"device of %g kg and %g N s/mm %s is stable up to %.4g N/mm, of which "
+		"%g %% are kept in reserve; %s, or describe the device",
+		plan->scene->path, s->stiffness_N_mm, s->damping_N_s_mm, mass,
+		s->device.mass_kg, s->device.damping_N_s_mm, delay, s->limit_N_mm,
+		100 * RESERVE, advice);
+}
+
+/* Of a run, for a message. */
+static void name_run(const struct incise_rest *rest, char name[160])
+{
+	static const char *const tools[] = {"tool", "blade", "handle", "tube"};
+
+	if (rest->guided)
+		snprintf(name, 160,
+			 "a hand that leans on it with %.2f N%s at %.1f mm depth",
+			 rest->lean_N,
+			 rest->along_mm_s > 0 ? " while it moves along the skin" : "",
+			 rest->depth_mm);
+	else
+		snprintf(
+			name, 160,
+			"%s that leans on it with %.2f N, %.0f %% of it along the skin, by "
+			"the %s at [%.1f, %.1f, %.1f]",
+			rest->hand < 0 ? "a weight" : "a hand", rest->lean_N,
+			100 * rest->askew, tools[rest->tool], rest->place_mm[0],
+			rest->place_mm[1], rest->place_mm[2]);
 }
 
 int incise_plan_check_rest(struct incise_plan *plan,
@@ -667,18 +764,23 @@ int incise_plan_check_rest(struct incise_plan *plan,
 {
 	struct incise_plan_stability *s = &plan->stability;
 	const struct incise_rest_trial as_is = {1, s->device.damping_N_s_mm, -1};
-	char advice[160] = "neither a smaller gain nor damping of the device prevents "
-			   "it";
+	char advice[200], run[160];
 	struct incise_rest rest;
-	double gain, damping;
 
-	if ((!plan->model && !plan->fixed) || plan->scene->unchecked)
+	if (plan->scene->unchecked)
 		return 0;
+	if (!stable(plan, 1))
+		return refuse_unstable(plan, tracker, err);
 	if (search(plan, tracker, &as_is, &rest))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
 	s->runs = rest.runs;
 	s->worst.lean_N = rest.lean_N;
 	s->worst.along_mm_s = rest.along_mm_s;
+	s->worst.askew = rest.askew;
+	s->worst.tool = rest.tool;
+	s->worst.in_hand = rest.hand >= 0;
+	s->worst.guided = rest.guided;
+	v3_copy(s->worst.place_mm, rest.place_mm);
 	s->worst.depth_mm = rest.depth_mm;
 	s->worst.swing_mm = rest.swing_mm;
 	s->worst.settle_s = rest.settle_s;
@@ -686,24 +788,11 @@ int incise_plan_check_rest(struct incise_plan *plan,
 	s->noise_N = rest.noise_N;
 	if (rest.rests)
 		return 0;
-	gain = three_digits_down(resting_gain(plan, tracker, rest.way) * plan->gain);
-	damping = resting_damping(plan, tracker, rest.way);
-	if (gain > 0 && damping > 0)
-		snprintf(advice, sizeof(advice),
-			 "set tissue.gain to at most %.3g, or use a device with "
-			 "device.damping_N_s_mm of at least %.3g",
-			 gain, damping);
-	else if (gain > 0)
-		snprintf(advice, sizeof(advice), "set tissue.gain to at most %.3g", gain);
-	else if (damping > 0)
-		snprintf(advice, sizeof(advice),
-			 "use a device with device.damping_N_s_mm of at least %.3g",
-			 damping);
-	return incise_error_set(
-		err, EDOM,
-		"%s: does not come to rest: a hand that leans on it with %.2f N%s at "
-		"%.1f mm depth oscillates by %.3f mm and %.2f N; %s",
-		plan->scene->path, rest.lean_N,
-		rest.along_mm_s > 0 ? " while it moves along the skin" : "",
-		rest.depth_mm, rest.swing_mm, rest.swing_N, advice);
+	name_run(&rest, run);
+	advise(plan, tracker, rest.way, advice);
+	return incise_error_set(err, EDOM,
+				"%s: does not come to rest: %s oscillates by %.3f mm and "
+				"%.2f N; %s",
+				plan->scene->path, run, rest.swing_mm, rest.swing_N,
+				advice);
 }

@@ -81,6 +81,7 @@ void incise_plan_set_numbers(struct incise_plan *plan)
 		.average_ticks = plan->average_ticks,
 		.printed = scene->tissue.printed_orientation,
 		.account = plan->account_N_mm,
+		.upright = plan->upright,
 		.incision = incise_scene_cuts(scene),
 		.small = scene->limits.start_N,
 		.ramp_ns = scene->limits.ramp_ms * 1e6,

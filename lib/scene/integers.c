@@ -137,6 +137,7 @@ static const struct quantity quantities[] = {
 	PLAIN(support, "the model's depth"),
 	PLAIN(beyond, "the model's slope"),
 	PLAIN(account, "the stiffness of all springs"),
+	PLAIN(upright, "the membrane's lean"),
 	EXTENT(incision.cut_from, "tissue.cut_from_mm"),
 	EXTENT(incision.stretch, "tissue.stretch_mm"),
 	EXTENT(incision.handle_width, "tool.handle_width_mm"),

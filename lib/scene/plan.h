@@ -131,8 +131,9 @@ struct incise_plan {
 	double unloading_N_mm; /* … with this stiffness */
 	/* The model's steepest slope by each input, N per its unit, times the gain. */
 	double input_slope[INCISE_MODEL_INPUT_KINDS];
-	double support_mm;   /* the model's largest depth; beyond it the force … */
-	double beyond_N_mm;  /* … goes on with this slope, ≥ 0 */
+	double support_mm;  /* the model's largest depth; beyond it the force … */
+	double beyond_N_mm; /* … goes on with this slope, ≥ 0 */
+	double upright; /* least cosine between the normals of skin and membrane, over its disc */
 	double account_N_mm; /* all springs together where work is on account; else 0 */
 	const struct incise_model *model; /* fuzzy: one of these */
 	const struct incise_fixed *fixed;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The search for swings that do not end; see rest.h. N, mm, s; positions along the normal of the
- * surface's top, 0 at the top, outwards.
+ * The search for swings that do not end; see rest.h. N, mm, s; positions from a place of the surface, along the
+ * axes in which the device moves.
  */
 #include <errno.h>
 #include <math.h>
@@ -13,13 +13,17 @@
 #include "rest.h"
 
 /*
- * A run: in the air until the force's ramp has ended, then the hand leans. It ends when nothing
- * moved for two windows, or after LONGEST_S, when the swing of the last quarter counts.
+ * A run: in the air until the force's ramp has ended, then the hand leans. It ends when nothing moved for two
+ * windows, or with a quarter whose swing is none. Where that of the last quarter is not less than before, it
+ * stays: the run ends, too, and swings; so it does after LONGEST quarters.
  */
 #define AIR_S 0.1 /* and the scene's ramp */
-#define LONGEST_S 6.0
 #define WINDOW_S 0.2
 #define STILL_MM 1e-4
+#define QUARTER_S 1.5
+#define QUARTERS 4 /* at least */
+#define LONGEST 16
+#define FALLS 0.9
 
 #define POSES_MOST 64 /* on their way */
 
@@ -30,9 +34,12 @@ const struct incise_hand_impedance incise_hands[INCISE_HANDS] = {
 };
 
 /*
- * Equal steps up to this share of the scene's largest force. Starts above the surface: a touch,
- * and a drop. Along the skin: standing, where |v| has its corner and a swing is found at some
- * leans only, so that there are the most of them; a slow and a fast cut.
+ * Ways to lean, with equal steps up to this share of the scene's largest force. Those of a model: guided along the
+ * normal of the top, from a touch and from a drop; along the skin it stands, where |v| has its corner and a swing is
+ * found at some leans only, so that there are the most of them, or makes a slow or a fast cut.
+ *
+ * Those of all scenes: at the top, in the deepest valley and on the sharpest crest, free in all directions, in no
+ * hand and in each, straight and askew.
  */
 #define LEANS 40
 #define LEAN_MOST 0.96
@@ -41,8 +48,18 @@ const struct incise_hand_impedance incise_hands[INCISE_HANDS] = {
 static const struct {
 	double start_mm, along_mm_s;
 	int every; /* of the leans */
-} ways[] = {{TOUCH_MM, 0, 1}, {DROP_MM, 0, 2},	 {TOUCH_MM, 10, 4},
-	    {DROP_MM, 10, 8}, {TOUCH_MM, 60, 4}, {DROP_MM, 60, 8}};
+} guided[] = {{TOUCH_MM, 0, 1}, {DROP_MM, 0, 2},   {TOUCH_MM, 10, 4},
+	      {DROP_MM, 10, 8}, {TOUCH_MM, 60, 4}, {DROP_MM, 60, 8}};
+
+#define FREE_EVERY 10
+#define PLACES 3
+static const double askew[] = {0.02, 0.25};
+static const int hands[] = {
+	-1, 1, 2}; /* none, and of incise_hands: the measured arm is between them */
+
+/* A tool that goes farther along the skin than this in a quarter slides on it: over hills that is no swing. */
+#define SLIDES_MM 1
+#define AWAY_MM 40 /* and so far it is where no search began */
 
 /* Between the leans that are tried there may be worse: forces count as so much larger, and the
  * device's damping as so much smaller. */
@@ -56,52 +73,74 @@ struct parts {
 	struct incise_double_average average;
 };
 
+/* A way to lean. */
+struct way {
+	const struct incise_touch *at;
+	const struct incise_surface *on;
+	enum incise_tool tool;
+	double start_mm;
+	bool guided;				  /* along the normal … */
+	double along_mm_s;			  /* … while it goes along the skin */
+	const struct incise_hand_impedance *hand; /* else in it, or in none … */
+	double askew;				  /* … with this share along the skin */
+	int every;				  /* of the leans */
+};
+
 struct search {
 	struct incise_plan plan; /* at work */
 	struct parts parts;
 	struct incise_tracker_sample fed[INCISE_PLAN_POSES];
 	struct incise_plan rested; /* as before a first tick */
 	struct parts rested_parts;
-	struct incise_touch top;
-	struct incise_surface *plane; /* in place of the surface: it has no end */
-	double along[3];	      /* in it */
-	double pose_s, latency_s, tick_s;
-	int late;
-	double slew_N; /* the actuator's, in a tick; infinite: none */
-	struct incise_plant device;
+	struct incise_plan air; /* … and before the hand leans */
+	struct parts air_parts;
+	struct incise_touch place[PLACES]; /* the first one is the top */
+	int n_places;
+	struct incise_surface *plane; /* at the top, without an end */
+	struct incise_device device;
+	struct way way;
+	double along[3]; /* in the skin */
+	double axis[3]
+		   [3]; /* in which the device moves: of a guided one the normal first */
 };
 
-/* A run at work. */
+/* A run at work: positions along the axes, from the place. */
 struct run {
-	double lean_N, along_mm_s;
-	struct incise_plant device;
+	double lean_N;
+	struct incise_plant device[3];
 	double t_s, next_pose_s, path_mm;
 	struct {
-		double arrival_s, height_mm, path_mm;
-	} way[POSES_MOST]; /* ring of poses on their way */
+		double arrival_s, at_mm[3];
+	} pose[POSES_MOST]; /* ring of those on their way */
 	unsigned int first, last;
-	double late_N[INCISE_STABILITY_DELAY_MAX + 1];
-	double sent_N;	 /* after the actuator's slew */
-	double noise_mm; /* of each pose, sd */
-	uint64_t random; /* its key */
+	double late_N[INCISE_STABILITY_DELAY_MAX + 1][3];
+	double sent_N[3]; /* after the actuator's slew, along the axes */
+	double noise_mm;  /* of each pose, sd */
+	uint64_t random;  /* its key */
 };
 
-/* Copies that run without a device, in memory of their own. */
-static void set_plans(struct search *s, const struct incise_plan *plan,
-		      const struct incise_rest_trial *trial)
+/* A copy that runs without a device, in memory of its own. */
+static void set_plan(struct search *s, const struct incise_plan *plan,
+		     const struct incise_rest_trial *trial)
 {
 	struct incise_plan *own = &s->plan;
 	struct incise_double_state *state = &own->doubles.state;
 	int n = 0;
 
 	incise_plan_copy(own, plan, trial->gain * (1 + RESERVE));
-	own->surface = s->plane;
-	incise_proxy_init(&own->proxy, s->plane, plan->proxy.leave_mm);
+	own->surface = s->way.on;
+	incise_proxy_init(&own->proxy, s->way.on, plan->proxy.leave_mm);
 	own->poses.tracker = NULL;
 	own->poses.tube_station = 0;
 	own->axes.n = 0;
 	own->poses.fed = s->fed;
 	own->poses.n_fed = 0;
+	/* The scene says how late all of the loop is, poses and all. */
+	if (plan->stability.own_delay)
+		incise_predict_init(
+			&own->predict,
+			&(struct incise_tracker_info){.rate_hz = 1 / s->device.period_s},
+			0);
 	incise_plan_set_numbers(own);
 	if (state->ends)
 		s->parts.ends = *state->ends;
@@ -110,7 +149,7 @@ static void set_plans(struct search *s, const struct incise_plan *plan,
 	state->ends = state->ends ? &s->parts.ends : NULL;
 	state->average = state->average ? &s->parts.average : NULL;
 	for (int i = 0; i < own->n_stages; i++) {
-		/* Only handle and tube ask for the cuts. */
+		/* Beside a cut tissue is the stiffest. */
 		if (own->stage[i].run == incise_stage_actuate ||
 		    own->stage[i].numbers.in_double == incise_double_stage_incision)
 			continue;
@@ -120,51 +159,78 @@ static void set_plans(struct search *s, const struct incise_plan *plan,
 		n++;
 	}
 	own->n_stages = n;
+	incise_plan_set_tool(own, s->way.tool);
 	s->rested = s->plan;
 	s->rested_parts = s->parts;
 }
 
-static void set_loop(struct search *s, const struct incise_plan *plan,
-		     const struct incise_tracker_info *tracker,
-		     const struct incise_rest_trial *trial)
+void incise_plan_device(const struct incise_plan *plan,
+			const struct incise_tracker_info *tracker,
+			struct incise_device *device)
 {
-	const struct incise_haptic_device *device = &plan->stability.device;
-	const double across[2][3] = {{1, 0, 0}, {0, 1, 0}};
+	const struct incise_haptic_device *of = &plan->stability.device;
 
-	for (int i = 0; i < 2 && v3_length(s->along) == 0; i++) {
-		v3_copy(s->along, across[i]);
-		v3_add(s->along, s->along, -v3_dot(across[i], s->top.normal),
-		       s->top.normal);
-		if (!v3_unit(s->along, s->along, 0.5))
-			v3_copy(s->along, (double[3]){0, 0, 0});
-	}
-	s->tick_s = device->period_s;
-	s->latency_s = (double)tracker->latency_ns / INCISE_NS_PER_S;
-	s->pose_s = fmax(1 / tracker->rate_hz, fmax(s->latency_s / (POSES_MOST - 2),
-						    s->tick_s / (INCISE_PLAN_POSES - 1)));
-	s->late = plan->stability.late_ticks;
-	s->slew_N = INFINITY;
+	*device = (struct incise_device){
+		.axis = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+		.mass_kg = {of->mass_kg, of->mass_kg, of->mass_kg},
+		.damping_N_s_mm = of->damping_N_s_mm,
+		.period_s = of->period_s,
+		.pose_s = 1 / tracker->rate_hz,
+		.latency_s = (double)tracker->latency_ns / INCISE_NS_PER_S,
+		.late_ticks = plan->stability.late_ticks,
+		.slew_N_s = INFINITY,
+		.force_N = plan->scene->limits.force_N,
+		.continuous_N = plan->scene->limits.force_N,
+	};
 	for (int i = 0; i < plan->axes.n; i++) {
 		const struct incise_stepper_info *info = &plan->axes.axis[i].info;
 
-		s->slew_N = fmin(s->slew_N,
-				 info->spring_N_mm * info->velocity_mm_s * s->tick_s);
+		device->slew_N_s =
+			fmin(device->slew_N_s, info->spring_N_mm * info->velocity_mm_s);
 	}
 	if (plan->stability.own_delay) {
-		/* The scene says how late all of the loop is, poses and all. */
-		s->late = plan->scene->device.delay_ticks;
-		s->latency_s = 0;
-		s->pose_s = s->tick_s;
-		incise_predict_init(
-			&s->plan.predict,
-			&(struct incise_tracker_info){.rate_hz = 1 / s->tick_s}, 0);
-		incise_plan_set_numbers(&s->plan);
-		s->rested = s->plan;
+		device->late_ticks = plan->scene->device.delay_ticks;
+		device->latency_s = 0;
+		device->pose_s = of->period_s;
 	}
-	s->device = (struct incise_plant){
-		.mass_kg = device->mass_kg,
-		.damping_N_s_mm = trial->damping_N_s_mm * (1 - RESERVE),
-	};
+}
+
+/* The device and its axes in a way. */
+static void set_way(struct search *s, const struct way *way)
+{
+	const double *n = way->at->normal;
+
+	s->way = *way;
+	v3_any_across(s->along, n);
+	memcpy(s->axis, s->device.axis, sizeof(s->axis));
+	if (!way->guided)
+		return;
+	v3_copy(s->axis[0], n);
+	v3_copy(s->axis[1], s->along);
+	v3_cross(s->axis[2], n, s->along);
+}
+
+static struct incise_plant plant(const struct search *s, int i)
+{
+	const struct incise_hand_impedance *hand = s->way.hand;
+	struct incise_plant to = {.mass_kg = s->device.mass_kg[i],
+				  .damping_N_s_mm = s->device.damping_N_s_mm};
+
+	if (s->way.guided) {
+		to.mass_kg = 0;
+		for (int k = 0; k < 3; k++) {
+			double share = v3_dot(s->device.axis[k], s->axis[i]);
+
+			to.mass_kg += share * share * s->device.mass_kg[k];
+		}
+	}
+	if (hand) {
+		to.mass_kg += hand->mass_kg;
+		to.damping_N_s_mm += hand->damping_N_s_mm;
+		to.wall_N_mm = hand->stiffness_N_mm;
+		to.tied = true;
+	}
+	return to;
 }
 
 /* Times of a clock that is far from 0. */
@@ -173,192 +239,382 @@ static int64_t to_ns(double t_s)
 	return 2 * INCISE_NS_PER_S + llround(t_s * INCISE_NS_PER_S);
 }
 
-static void go_to(struct run *run, double t_s)
+static void go_to(const struct search *s, struct run *run, double t_s)
 {
-	double way_s = fmax(t_s - run->t_s, 0);
+	const double *n = s->way.at->normal;
+	double way_s = fmax(t_s - run->t_s, 0), lean_N[3];
 
-	incise_plant_step(&run->device, run->sent_N - run->lean_N, way_s);
-	run->path_mm += run->along_mm_s * way_s;
+	for (int i = 0; i < 3; i++)
+		lean_N[i] = run->lean_N * (s->way.askew * s->along[i] - n[i]);
+	for (int i = 0; i < (s->way.guided ? 1 : 3); i++)
+		incise_plant_step(&run->device[i],
+				  run->sent_N[i] + v3_dot(lean_N, s->axis[i]), way_s);
+	if (s->way.guided)
+		run->device[1].position_mm += s->way.along_mm_s * way_s;
 	run->t_s = t_s;
 }
 
 static void feed(struct search *s, const struct run *run, unsigned int pose)
 {
 	struct incise_tracker_sample sample = {
-		.t_ns = to_ns(run->way[pose % POSES_MOST].arrival_s),
+		.t_ns = to_ns(run->pose[pose % POSES_MOST].arrival_s),
 		.status = ' ',
 		.quaternion = {1},
 	};
 
-	v3_copy(sample.position_mm, s->top.point_mm);
-	v3_add(sample.position_mm, sample.position_mm,
-	       run->way[pose % POSES_MOST].height_mm, s->top.normal);
-	v3_add(sample.position_mm, sample.position_mm,
-	       run->way[pose % POSES_MOST].path_mm, s->along);
+	v3_copy(sample.position_mm, s->way.at->point_mm);
+	for (int i = 0; i < 3; i++)
+		v3_add(sample.position_mm, sample.position_mm,
+		       run->pose[pose % POSES_MOST].at_mm[i], s->axis[i]);
 	incise_plan_feed(&s->plan, &sample, 1);
 }
 
 static void tick(struct search *s, struct run *run)
 {
+	double most_N = s->device.slew_N_s * s->device.period_s;
 	struct incise_tick out;
-	double force_N;
 
 	for (; run->first != run->last &&
-	       run->way[run->first % POSES_MOST].arrival_s <= run->t_s;
+	       run->pose[run->first % POSES_MOST].arrival_s <= run->t_s;
 	     run->first++)
 		feed(s, run, run->first);
 	incise_plan_tick(&s->plan, to_ns(run->t_s), &out);
-	run->late_N[s->late] = v3_dot(out.command_N, s->top.normal);
-	force_N = run->late_N[0] - run->sent_N;
-	run->sent_N += fmax(-s->slew_N, fmin(s->slew_N, force_N));
-	memmove(run->late_N, run->late_N + 1, (size_t)s->late * sizeof(*run->late_N));
-	while (run->next_pose_s < run->t_s + s->tick_s) {
-		go_to(run, run->next_pose_s);
-		run->way[run->last % POSES_MOST].arrival_s = run->t_s + s->latency_s;
-		run->way[run->last % POSES_MOST].height_mm =
-			run->device.position_mm +
-			run->noise_mm * incise_random_normal(run->random, run->last);
-		run->way[run->last++ % POSES_MOST].path_mm = run->path_mm;
-		run->next_pose_s += s->pose_s;
+	for (int i = 0; i < 3; i++) {
+		double change_N;
+
+		run->late_N[s->device.late_ticks][i] = v3_dot(out.command_N, s->axis[i]);
+		change_N = run->late_N[0][i] - run->sent_N[i];
+		run->sent_N[i] += fmax(-most_N, fmin(most_N, change_N));
+	}
+	memmove(run->late_N, run->late_N + 1,
+		(size_t)s->device.late_ticks * sizeof(*run->late_N));
+	while (run->next_pose_s < run->t_s + s->device.period_s) {
+		unsigned int pose = run->last++ % POSES_MOST;
+
+		go_to(s, run, run->next_pose_s);
+		run->pose[pose].arrival_s = run->t_s + s->device.latency_s;
+		for (int i = 0; i < 3; i++)
+			run->pose[pose].at_mm[i] = run->device[i].position_mm;
+		/* Of a guided one: along the normal. */
+		if (run->noise_mm > 0)
+			run->pose[pose].at_mm[0] +=
+				run->noise_mm *
+				incise_random_normal(run->random, run->last - 1);
+		run->next_pose_s += s->device.pose_s;
+	}
+}
+
+/* Where it starts; a guided one goes along the skin meanwhile. */
+static void hold(const struct search *s, struct run *run)
+{
+	for (int i = 0; i < (s->way.guided ? 1 : 3); i++) {
+		run->device[i].position_mm =
+			s->way.start_mm * v3_dot(s->way.at->normal, s->axis[i]);
+		run->device[i].velocity_mm_s = 0;
 	}
 }
 
 /* In the air, until the force may start. */
-static void start(struct search *s, struct run *run, double height_mm)
+static void start(struct search *s, struct run *run)
 {
 	double air_s = AIR_S + s->plan.scene->limits.ramp_ms * 1e-3;
-	int ticks = (int)(air_s / s->tick_s);
+	int ticks = (int)(air_s / s->device.period_s);
 
-	*run = (struct run){.device = s->device, .along_mm_s = run->along_mm_s};
-	run->device.position_mm = height_mm;
+	*run = (struct run){.lean_N = 0};
+	for (int i = 0; i < 3; i++)
+		run->device[i] = plant(s, i);
+	hold(s, run);
+	for (int i = 0; i < 3; i++)
+		run->device[i].wall_mm = run->device[i].position_mm;
 	s->plan = s->rested;
 	s->parts = s->rested_parts;
 	for (int k = 1; k <= ticks; k++) {
 		tick(s, run);
-		run->device.position_mm = height_mm;
-		run->device.velocity_mm_s = 0;
-		go_to(run, k * s->tick_s);
-		run->device.position_mm = height_mm;
-		run->device.velocity_mm_s = 0;
+		hold(s, run);
+		go_to(s, run, k * s->device.period_s);
+		hold(s, run);
 	}
 }
 
-/* Outward travel and range of force within a time. */
-struct window {
-	double low_mm, travel_mm, high_mm, low_N, high_N;
+/* A number as it rises from its lowest and falls from its highest: a swing does both, what sinks or creeps one. */
+struct range {
+	double low, high, rise, fall;
 };
 
-static const struct window empty = {INFINITY, 0, -INFINITY, INFINITY, -INFINITY};
+static const struct range none = {INFINITY, -INFINITY, 0, 0};
 
-static void see(struct window *window, const struct run *run)
+static void see(struct range *range, double at)
 {
-	double at = run->device.position_mm;
-
-	window->low_mm = fmin(window->low_mm, at);
-	window->high_mm = fmax(window->high_mm, at);
-	/* Outward travel only: a hand that sinks does not swing. */
-	window->travel_mm = fmax(window->travel_mm, at - window->low_mm);
-	window->low_N = fmin(window->low_N, run->sent_N);
-	window->high_N = fmax(window->high_N, run->sent_N);
+	range->low = fmin(range->low, at);
+	range->high = fmax(range->high, at);
+	range->rise = fmax(range->rise, at - range->low);
+	range->fall = fmax(range->fall, range->high - at);
 }
 
-/* Lean from the air on. Returns the time until it rested, or LONGEST_S. */
+struct window {
+	struct range at_mm[3], N[3];
+};
+
+static struct window empty(void)
+{
+	struct window window;
+
+	for (int i = 0; i < 3; i++)
+		window.at_mm[i] = window.N[i] = none;
+	return window;
+}
+
+static void see_run(struct window *window, const struct run *run)
+{
+	for (int i = 0; i < 3; i++) {
+		see(&window->at_mm[i], run->device[i].position_mm);
+		see(&window->N[i], run->sent_N[i]);
+	}
+}
+
+/* The largest of the axes that move by themselves. */
+static double swing_of(const struct search *s, const struct range range[3])
+{
+	double most = 0;
+
+	for (int i = 0; i < (s->way.guided ? 1 : 3); i++)
+		most = fmax(most, fmin(range[i].rise, range[i].fall));
+	return most;
+}
+
+static double moved_of(const struct search *s, const struct range range[3])
+{
+	double most = 0;
+
+	for (int i = 0; i < (s->way.guided ? 1 : 3); i++)
+		most = fmax(most, range[i].high - range[i].low);
+	return most;
+}
+
+/* Of the device; below 0 where it left the place, which decides nothing. */
+static double depth_of(const struct search *s, const struct window *last)
+{
+	double at_mm[3] = {0}, depth_mm, away2 = 0;
+
+	for (int i = 0; i < 3; i++) {
+		double middle = (last->at_mm[i].low + last->at_mm[i].high) / 2;
+
+		v3_add(at_mm, at_mm, middle, s->axis[i]);
+	}
+	depth_mm = -v3_dot(at_mm, s->way.at->normal);
+	if (s->way.guided)
+		return depth_mm;
+	v3_add(at_mm, at_mm, depth_mm, s->way.at->normal);
+	away2 = v3_dot(at_mm, at_mm);
+	return away2 > AWAY_MM * AWAY_MM || depth_mm > AWAY_MM ||
+			       moved_of(s, last->at_mm) >
+				       SLIDES_MM + 2 * swing_of(s, last->at_mm)
+		       ? -1
+		       : depth_mm;
+}
+
+/* Lean from the air on. Returns the time until it rested, or 0: it swings. */
 static double lean(struct search *s, struct run *run, struct window *last)
 {
-	int ticks = (int)(LONGEST_S / s->tick_s), quarter = ticks - ticks / 4;
-	int long_window = (int)fmax(WINDOW_S / s->tick_s, 1), still = 0;
-	struct window window = empty;
-	double begin_s = run->t_s;
+	int quarter = (int)fmax(QUARTER_S / s->device.period_s, 1), still = 0;
+	int long_window = (int)fmax(WINDOW_S / s->device.period_s, 1);
+	double begin_s = run->t_s, before_mm = INFINITY;
+	struct window window = empty();
 
-	*last = empty;
-	for (int k = 1; k <= ticks; k++) {
+	*last = empty();
+	for (int k = 1;; k++) {
+		double swing_mm;
+
 		tick(s, run);
-		go_to(run, begin_s + k * s->tick_s);
-		see(&window, run);
-		if (k > quarter)
-			see(last, run);
-		if (k % long_window)
-			continue;
-		still = window.high_mm - window.low_mm < STILL_MM ? still + 1 : 0;
-		if (still == 2) {
-			*last = window;
-			return k * s->tick_s;
+		go_to(s, run, begin_s + k * s->device.period_s);
+		see_run(&window, run);
+		see_run(last, run);
+		if (k % long_window == 0) {
+			still = moved_of(s, window.at_mm) < STILL_MM ? still + 1 : 0;
+			if (still == 2) {
+				*last = window;
+				return k * s->device.period_s;
+			}
+			window = empty();
 		}
-		window = empty;
+		if (k % quarter)
+			continue;
+		swing_mm = swing_of(s, last->at_mm);
+		/* After the first, in which it goes in. */
+		if (k > quarter && depth_of(s, last) < 0)
+			return k * s->device.period_s;
+		if (k >= QUARTERS * quarter) {
+			bool falls = swing_mm < FALLS * before_mm;
+
+			if (swing_mm <= INCISE_REST_SWING_MM &&
+			    (falls || swing_mm < INCISE_REST_SWING_MM / 10))
+				return k * s->device.period_s;
+			if (!falls || k >= LONGEST * quarter)
+				return 0;
+		}
+		before_mm = swing_mm;
+		*last = empty();
 	}
-	return LONGEST_S;
 }
 
 /* Returns whether it rests; notes the run when it is the worst so far. */
 static bool try(struct search *s, struct run *run, int way, struct incise_rest *rest)
 {
 	struct window last;
-	double settle_s = lean(s, run, &last);
-	bool rests = last.travel_mm <= INCISE_REST_SWING_MM;
+	double settle_s = lean(s, run, &last), depth_mm = depth_of(s, &last);
+	bool rests = settle_s > 0;
 
 	rest->runs++;
-	if (!rests || settle_s > rest->settle_s)
+	if (!rests || (depth_mm >= 0 && settle_s > rest->settle_s))
 		*rest = (struct incise_rest){
 			.rests = rests,
 			.runs = rest->runs,
 			.lean_N = run->lean_N,
-			.along_mm_s = run->along_mm_s,
-			.depth_mm = -(last.low_mm + last.high_mm) / 2,
-			.swing_mm = last.travel_mm,
-			.swing_N = last.high_N - last.low_N,
+			.along_mm_s = s->way.along_mm_s,
+			.askew = s->way.askew,
+			.tool = s->way.tool,
+			.hand = s->way.hand ? (int)(s->way.hand - incise_hands) : -1,
+			.guided = s->way.guided,
+			.depth_mm = depth_mm,
+			.swing_mm = swing_of(s, last.at_mm),
+			.swing_N = swing_of(s, last.N),
 			.settle_s = settle_s,
 			.way = way,
 		};
+	v3_copy(rest->place_mm, s->way.at->point_mm);
 	return rests;
 }
 
-static void search(struct search *s, double most_N, int way, struct incise_rest *rest)
+/* All leans of a way. Returns whether they rest. */
+static bool lean_all(struct search *s, const struct incise_plan *plan,
+		     const struct incise_rest_trial *trial, const struct way *way,
+		     int number, struct incise_rest *rest)
 {
-	*rest = (struct incise_rest){.rests = true};
-	for (int w = 0; w < N(ways); w++) {
-		struct run air = {.along_mm_s = ways[w].along_mm_s}, run;
-		struct incise_plan plan;
-		struct parts parts;
+	double most_N = fmin(s->device.force_N, s->device.continuous_N);
+	struct run air;
 
-		if (way >= 0 && w != way)
-			continue;
-		start(s, &air, ways[w].start_mm);
-		plan = s->plan;
-		parts = s->parts;
-		for (int i = LEANS; i > 0; i -= ways[w].every) {
-			run = air;
-			run.lean_N = LEAN_MOST * i / LEANS * most_N;
-			s->plan = plan;
-			s->parts = parts;
-			if (!try(s, &run, w, rest))
-				return;
-		}
+	if (trial->way >= 0 && number != trial->way)
+		return true;
+	set_way(s, way);
+	set_plan(s, plan, trial);
+	start(s, &air);
+	s->air = s->plan;
+	s->air_parts = s->parts;
+	for (int i = LEANS; i > 0; i -= way->every) {
+		struct run run = air;
+
+		run.lean_N = LEAN_MOST * i / LEANS * most_N;
+		s->plan = s->air;
+		s->parts = s->air_parts;
+		if (!try(s, &run, number, rest))
+			return false;
+	}
+	return true;
+}
+
+static void search(struct search *s, const struct incise_plan *plan,
+		   const struct incise_rest_trial *trial, struct incise_rest *rest)
+{
+	bool model = plan->model || plan->fixed;
+	int n_tools = plan->inserts ? 2 : 1, number = 0;
+
+	*rest = (struct incise_rest){.rests = true};
+	for (int i = 0; i < N(guided); i++, number++) {
+		const struct way way = {.at = s->place,
+					.on = s->plane,
+					.tool = INCISE_TOOL_BLADE,
+					.start_mm = guided[i].start_mm,
+					.guided = true,
+					.along_mm_s = guided[i].along_mm_s,
+					.every = guided[i].every};
+
+		if (model && !lean_all(s, plan, trial, &way, number, rest))
+			return;
+	}
+	for (int i = 0; i < s->n_places * n_tools * N(hands) * N(askew); i++, number++) {
+		int hand = hands[i / N(askew) % N(hands)];
+		int tool = i / N(askew) / N(hands) % n_tools;
+		const struct way way = {
+			.at = &s->place[i / N(askew) / N(hands) / n_tools],
+			.on = plan->surface,
+			.tool = tool ? INCISE_TOOL_TUBE : INCISE_TOOL_BLADE,
+			.start_mm = TOUCH_MM,
+			.hand = hand >= 0 ? &incise_hands[hand] : NULL,
+			.askew = askew[i % N(askew)],
+			.every = FREE_EVERY};
+
+		if (!lean_all(s, plan, trial, &way, number, rest))
+			return;
 	}
 }
 
 /* Seconds that a hand leans on it with noise: the second half counts. */
 #define NOISE_S 2.0
 
-static void shake(struct search *s, double most_N, struct incise_rest *rest)
+static void shake(struct search *s, const struct incise_plan *plan,
+		  const struct incise_rest_trial *trial, struct incise_rest *rest)
 {
-	int ticks = (int)(NOISE_S / s->tick_s);
-	struct window window = empty;
-	struct run run = {0};
+	const struct way way = {.at = s->place,
+				.on = s->plane,
+				.tool = INCISE_TOOL_BLADE,
+				.start_mm = TOUCH_MM,
+				.guided = true};
+	int ticks = (int)(NOISE_S / s->device.period_s);
+	struct window window = empty();
+	struct run run;
 
-	start(s, &run, TOUCH_MM);
-	run.lean_N = most_N / 2;
+	set_way(s, &way);
+	set_plan(s, plan, trial);
+	start(s, &run);
+	run.lean_N = plan->scene->limits.force_N / 2;
 	run.noise_mm = INCISE_REST_NOISE_MM;
 	run.random = incise_random_key(1, INCISE_RANDOM_TRACKER);
 	for (int k = 1; k <= ticks; k++) {
-		double t_s = run.t_s + s->tick_s;
+		double t_s = run.t_s + s->device.period_s;
 
 		tick(s, &run);
-		go_to(&run, t_s);
+		go_to(s, &run, t_s);
 		if (k > ticks / 2)
-			see(&window, &run);
+			see_run(&window, &run);
 	}
-	rest->noise_mm = window.high_mm - window.low_mm;
-	rest->noise_N = window.high_N - window.low_N;
+	rest->noise_mm = window.at_mm[0].high - window.at_mm[0].low;
+	rest->noise_N = window.N[0].high - window.N[0].low;
+}
+
+/*
+ * The top; of a mesh also the corner where it is the most concave along an edge, and the most convex: there normals
+ * turn the most, 1/mm.
+ */
+static void set_places(struct search *s, const struct incise_surface *surface)
+{
+	const struct mesh *mesh = surface->mesh;
+	uint32_t most[2] = {0, 0};
+	double bend[2] = {0, 0};
+
+	incise_surface_top(surface, &s->place[0]);
+	s->n_places = 1;
+	for (uint32_t i = 0; mesh && i < mesh->n_triangles; i++)
+		for (int k = 0; k < 3; k++) {
+			uint32_t a = mesh->corner[i][k], b = mesh->corner[i][(k + 1) % 3];
+			double edge[3], turn[3], per_mm;
+
+			if (mesh->neighbour[i][k] == MESH_NONE)
+				continue;
+			v3_sub(edge, mesh->vertex[b], mesh->vertex[a]);
+			v3_sub(turn, mesh->normal[b], mesh->normal[a]);
+			per_mm = v3_dot(turn, edge) / v3_dot(edge, edge);
+			for (int sign = 0; sign < 2; sign++)
+				if (!(bend[sign] >= (sign ? per_mm : -per_mm))) {
+					bend[sign] = sign ? per_mm : -per_mm;
+					most[sign] = a;
+				}
+		}
+	for (int sign = 0; mesh && sign < 2; sign++)
+		if (bend[sign] > 0)
+			incise_surface_nearest(surface, mesh->vertex[most[sign]],
+					       &s->place[s->n_places++]);
+	for (int i = 1; i < s->n_places; i++)
+		v3_copy(s->place[i].normal, mesh->normal[most[bend[0] > 0 ? i - 1 : i]]);
 }
 
 int incise_plan_rest(const struct incise_plan *plan,
@@ -369,17 +625,22 @@ int incise_plan_rest(const struct incise_plan *plan,
 
 	if (!s)
 		return -ENOMEM;
-	incise_surface_top(plan->surface, &s->top);
-	s->plane = incise_surface_new_plane(s->top.point_mm, s->top.normal, NULL);
+	set_places(s, plan->surface);
+	s->plane =
+		incise_surface_new_plane(s->place[0].point_mm, s->place[0].normal, NULL);
 	if (!s->plane) {
 		free(s);
 		return -ENOMEM;
 	}
-	set_plans(s, plan, trial);
-	set_loop(s, plan, tracker, trial);
-	search(s, plan->scene->limits.force_N, trial->way, rest);
+	incise_plan_device(plan, tracker, &s->device);
+	/* As much as the tables of poses hold. */
+	s->device.pose_s = fmax(s->device.pose_s,
+				fmax(s->device.latency_s / (POSES_MOST - 2),
+				     s->device.period_s / (INCISE_PLAN_POSES - 1)));
+	s->device.damping_N_s_mm = trial->damping_N_s_mm * (1 - RESERVE);
+	search(s, plan, trial, rest);
 	if (rest->rests)
-		shake(s, plan->scene->limits.force_N, rest);
+		shake(s, plan, trial, rest);
 	incise_surface_free(s->plane);
 	free(s);
 	return 0;

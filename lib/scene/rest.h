@@ -1,25 +1,32 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Whether a plan comes to rest: a search by closed loops in time, for what no linear view of a
- * point of rest shows. A model's force depends on |v|, which has a corner at rest, and a
- * tissue that unloads has memory: both can swing for ever where each slope alone is stable.
+ * Whether a plan comes to rest: a search by closed loops in time, for what no linear view of a point of rest
+ * shows. A model's force depends on |v|, which has a corner at rest; a tissue that unloads has memory; a normal that
+ * is averaged is late: all can swing for ever where each slope alone is stable.
  *
  *   hand leans ─▶ device ─▶ tracker ─▶ the plan's own stages ─▶ late ticks, slew ─┐
  *                   ▲                                                             │
  *                   └────────────────── held for a tick ◀─────────────────────────┘
  *
- * The device is bare and without dry friction, which is the worst of hands and devices: see
- * incise_hands. It starts in the air above the surface's top and leans along its normal with
- * a constant force up to the scene's limit, while it stands or goes along the skin, which is
- * taken as the plane that touches the top.
+ * The device is without dry friction, and bare or in a hand of incise_hands. It starts in the air and leans with a
+ * constant force up to the scene's limit:
+ *
+ *   - of all scenes, free in three dimensions, on the surface as it is: at its top and, of a mesh, where it is
+ *     the most concave and the most convex; with blade and tube, straight and askew;
+ *   - of a model besides, guided along the normal of the top, on the plane that touches it there, while it stands
+ *     or goes along the skin.
+ *
+ * A swing goes to and fro: a hand that sinks or creeps does not swing. Where the tool slides away, or sinks where
+ * the tissue does not carry the lean, a run decides nothing.
  */
 #ifndef INCISE_REST_H
 #define INCISE_REST_H
 
+#include "../control/device.h"
 #include "../control/pose_loop.h"
 #include "plan.h"
 
-/* Outward travel in the last quarter of a run that counts as a swing. */
+/* To and fro in a quarter of a run that counts as a swing. */
 #define INCISE_REST_SWING_MM 0.01
 
 /* Sd per axis of a magnetic tracker near its source, as predict.h assumes. */
@@ -37,6 +44,11 @@ struct incise_rest {
 	int runs;
 	/* The first run that swings, or the one that took longest to come to rest. */
 	double lean_N, along_mm_s;
+	double askew;	    /* share of the lean along the skin */
+	double place_mm[3]; /* of the surface */
+	enum incise_tool tool;
+	int hand;    /* of incise_hands; -1: none */
+	bool guided; /* along the normal */
 	double depth_mm, swing_mm, swing_N, settle_s;
 	int way; /* of the search */
 	/* Range of position and force, of a hand that leans with half of the scene's limit, by
@@ -44,8 +56,13 @@ struct incise_rest {
 	double noise_mm, noise_N;
 };
 
+/* The device of a plan, and the loop that it is in. */
+void incise_plan_device(const struct incise_plan *plan,
+			const struct incise_tracker_info *tracker,
+			struct incise_device *device);
+
 /*
- * @return 0 or -ENOMEM. Takes 0.1 s. The plan stays as it is; it must be ready to run.
+ * @return 0 or -ENOMEM. Takes 0.2 s. The plan stays as it is; it must be ready to run.
  */
 int incise_plan_rest(const struct incise_plan *plan,
 		     const struct incise_tracker_info *tracker,

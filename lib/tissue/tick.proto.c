@@ -429,7 +429,7 @@ static bool hits_membrane(const struct T(membrane) *membrane,
 	       (tick->phase == INCISE_PHASE_CUTTING || state->opening.in);
 }
 
-/* No line to the membrane is longer than this share of its distance says. */
+/* A membrane that leans more from the skin counts as if it leant by 78°. */
 #define STEEPEST N_OF(1, 5)
 
 /*
@@ -459,7 +459,8 @@ void T(stage_membrane)(const struct T(plan) *plan, struct T(state) *state,
 	}
 	if (!state->membrane.hit)
 		return;
-	slope = n_max(n_share_of(d_dot(state->sn, membrane->normal)), STEEPEST);
+	slope = n_max(n_share_of(d_dot(state->sn, membrane->normal)),
+		      n_max(plan->numbers.upright, STEEPEST));
 	state->depth = n_max(n_sub(state->depth, n_over(beyond, slope)), 0);
 	push(state, membrane_force(membrane, state, tick, beyond), membrane->normal);
 }

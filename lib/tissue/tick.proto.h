@@ -257,13 +257,14 @@ struct T(numbers) {
 	int32_t inputs;
 	int32_t phases; /* models besides that of the cut: T_PUNCTURES, T_WITHDRAWS */
 	num account; /* all springs together, in a plan whose work is on account; else 0 */
+	num upright; /* the membrane leans from the skin by no more: a cosine */
 #define FORCE(...)
 #define NUMBER(...)
 #define MORE(member) num member;
 #include "forces.def"
 #undef MORE
 #define MORE(member) -1
-	int32_t reserved[6
+	int32_t reserved[5
 #include "forces.def"
 	];
 #undef MORE

@@ -157,14 +157,18 @@ struct incise_plan_stability {
 	double support_mm;  /**< largest depth of the model's support; 0 without one */
 	double beyond_N_mm; /**< slope of the force beyond that depth */
 	/**
-	 * With a model: number of simulated closed loops, each with a hand that leans with a
-	 * constant force up to the scene's limit, and the loop that took longest to come to
-	 * rest.
+	 * Number of simulated closed loops, each with a hand that leans with a constant force up to
+	 * the scene's limit, and the loop that took longest to come to rest.
 	 */
 	int runs;
 	struct {
-		double lean_N;	   /**< the hand's force */
-		double along_mm_s; /**< its speed along the skin */
+		double lean_N;	    /**< the hand's force */
+		double along_mm_s;  /**< its speed along the skin */
+		double askew;	    /**< share of its force along the skin */
+		double place_mm[3]; /**< of the surface, where it leans */
+		enum incise_tool tool;
+		bool in_hand; /**< of a hand's mass, damping and stiffness */
+		bool guided;  /**< along the normal only */
 		double depth_mm, swing_mm, settle_s;
 	} worst;
 	/**

@@ -125,7 +125,8 @@ static const struct {
 	{AT(skin_friction), 0, INT32_MAX, ANY},
 	{AT(reserved[0]), 0, 0, ANY},
 	{AT(account), 0, INT32_MAX, ANY},
-	{AT(reserved[3]), 0, 0, ANY},
+	{AT(upright), 0, ONE, ANY},
+	{AT(reserved[2]), 0, 0, ANY},
 };
 
 static bool has(const struct incise_fixed_numbers *numbers, int needs)

@@ -27,8 +27,8 @@
 /* What all scenes met. */
 struct met {
 	int scenes, with_force, unbounded, broken;
-	long ticks, apart,
-		apart_beyond; /* apart by a decision; of these beyond the bound */
+	long ticks, apart, apart_beyond,
+		unpaid;	      /* apart by a decision; of these beyond the bound */
 	double ratio[SCENES]; /* bound ÷ largest difference */
 };
 
@@ -88,6 +88,7 @@ static void walk(struct pair *p, uint64_t seed, const struct drawn *d, struct me
 			assert_int_equal(
 				incise_plan_tick(p->plan[k], hand.t_ns, &tick[k]), 0);
 		met->ticks++;
+		met->unpaid += !!((tick[0].flags | tick[1].flags) & INCISE_TICK_UNPAID);
 		off_N = apart_N(&p->apart, &tick[0], &tick[1], p->bound_N);
 		if (p->apart.is) {
 			met->apart++;
@@ -151,10 +152,10 @@ TEST(test_no_force_is_off_by_more_than_certified)
 	assert_true(met.with_force > scenes / 3 && met.apart < met.ticks / 100);
 	middle = median(met.ratio, met.with_force);
 	printf("%d scenes, %d with a force, %ld ticks, %ld of them apart by a decision "
-	       "(%ld beyond the bound); "
+	       "(%ld beyond the bound), %ld unpaid; "
 	       "bound ÷ largest difference: %.2f, median %.3g\n",
 	       met.scenes, met.with_force, met.ticks, met.apart, met.apart_beyond,
-	       met.ratio[0], middle);
+	       met.unpaid, met.ratio[0], middle);
 	assert_int_equal(met.broken, 0);
 	assert_int_equal(met.unbounded, 0);
 }
