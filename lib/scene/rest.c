@@ -61,8 +61,10 @@ static const int hands[] = {
 #define SLIDES_MM 1
 #define AWAY_MM 40 /* and so far it is where no search began */
 
-/* Between the leans that are tried there may be worse: forces count as so much larger, and the
- * device's damping as so much smaller. */
+/*
+ * Between the leans on a model that are tried there may be worse: forces count as so much larger, and the device's
+ * damping as so much smaller. Of springs the linear check has such a reserve.
+ */
 #define RESERVE 0.05
 
 #define N(array) ((int)(sizeof(array) / sizeof(*(array))))
@@ -83,7 +85,8 @@ struct way {
 	double along_mm_s;			  /* … while it goes along the skin */
 	const struct incise_hand_impedance *hand; /* else in it, or in none … */
 	double askew;				  /* … with this share along the skin */
-	int every;				  /* of the leans */
+	double reserve;
+	int every; /* of the leans */
 };
 
 struct search {
@@ -127,7 +130,7 @@ static void set_plan(struct search *s, const struct incise_plan *plan,
 	struct incise_double_state *state = &own->doubles.state;
 	int n = 0;
 
-	incise_plan_copy(own, plan, trial->gain * (1 + RESERVE));
+	incise_plan_copy(own, plan, trial->gain * (1 + s->way.reserve));
 	own->surface = s->way.on;
 	incise_proxy_init(&own->proxy, s->way.on, plan->proxy.leave_mm);
 	own->poses.tracker = NULL;
@@ -196,12 +199,22 @@ void incise_plan_device(const struct incise_plan *plan,
 }
 
 /* The device and its axes in a way. */
-static void set_way(struct search *s, const struct way *way)
+static void set_way(struct search *s, const struct incise_scene *scene,
+		    const struct way *way)
 {
 	const double *n = way->at->normal;
+	double across[3];
 
 	s->way = *way;
-	v3_any_across(s->along, n);
+	/* A guided blade cuts, a free tool leans to both sides of that. */
+	v3_cross(s->along, scene->tool.side, n);
+	if (!v3_unit(s->along, s->along, 0.1))
+		v3_any_across(s->along, n);
+	if (!way->guided) {
+		v3_cross(across, n, s->along);
+		v3_add(s->along, s->along, 1, across);
+		v3_unit(s->along, s->along, 0);
+	}
 	memcpy(s->axis, s->device.axis, sizeof(s->axis));
 	if (!way->guided)
 		return;
@@ -214,7 +227,8 @@ static struct incise_plant plant(const struct search *s, int i)
 {
 	const struct incise_hand_impedance *hand = s->way.hand;
 	struct incise_plant to = {.mass_kg = s->device.mass_kg[i],
-				  .damping_N_s_mm = s->device.damping_N_s_mm};
+				  .damping_N_s_mm = s->device.damping_N_s_mm *
+						    (1 - s->way.reserve)};
 
 	if (s->way.guided) {
 		to.mass_kg = 0;
@@ -495,7 +509,7 @@ static bool lean_all(struct search *s, const struct incise_plan *plan,
 
 	if (trial->way >= 0 && number != trial->way)
 		return true;
-	set_way(s, way);
+	set_way(s, plan->scene, way);
 	set_plan(s, plan, trial);
 	start(s, &air);
 	s->air = s->plan;
@@ -526,6 +540,7 @@ static void search(struct search *s, const struct incise_plan *plan,
 					.start_mm = guided[i].start_mm,
 					.guided = true,
 					.along_mm_s = guided[i].along_mm_s,
+					.reserve = RESERVE,
 					.every = guided[i].every};
 
 		if (model && !lean_all(s, plan, trial, &way, number, rest))
@@ -558,12 +573,13 @@ static void shake(struct search *s, const struct incise_plan *plan,
 				.on = s->plane,
 				.tool = INCISE_TOOL_BLADE,
 				.start_mm = TOUCH_MM,
-				.guided = true};
+				.guided = true,
+				.reserve = RESERVE};
 	int ticks = (int)(NOISE_S / s->device.period_s);
 	struct window window = empty();
 	struct run run;
 
-	set_way(s, &way);
+	set_way(s, plan->scene, &way);
 	set_plan(s, plan, trial);
 	start(s, &run);
 	run.lean_N = plan->scene->limits.force_N / 2;
@@ -637,7 +653,7 @@ int incise_plan_rest(const struct incise_plan *plan,
 	s->device.pose_s = fmax(s->device.pose_s,
 				fmax(s->device.latency_s / (POSES_MOST - 2),
 				     s->device.period_s / (INCISE_PLAN_POSES - 1)));
-	s->device.damping_N_s_mm = trial->damping_N_s_mm * (1 - RESERVE);
+	s->device.damping_N_s_mm = trial->damping_N_s_mm;
 	search(s, plan, trial, rest);
 	if (rest->rests)
 		shake(s, plan, trial, rest);

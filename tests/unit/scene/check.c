@@ -88,13 +88,14 @@ static struct swing press(const struct wall *wall, double seconds)
 	struct incise_plan *plan = incise_plan_new(scene, NULL, NULL);
 	struct incise_plant plant = {.mass_kg = wall->mass_kg, .damping_N_s_mm = wall->b};
 	double t_s = 0, pose_s = 0.3 / RATE_HZ, force_N = 0, most_mm[3] = {0};
-	int rest = 1000, ticks = (int)(seconds * 1e3);
+	int rest = 3000, ticks = (int)(seconds * 1e3);
 	struct incise_tracker_sample late = {.t_ns = INT64_MAX, .quaternion = {1}};
 
 	assert_non_null(plan);
 	/* A device that is held hard holds any of these walls. */
 	plant.damping_N_s_mm = fmax(10 * wall->b, 0.05);
-	plant.position_mm = -HAND_N / wall->K;
+	/* From the air: what it holds is paid for. */
+	plant.position_mm = 0.05;
 	for (int k = 1; k <= rest + ticks; k++) {
 		double now_s = k * 1e-3, *most;
 		int64_t now_ns = (int64_t)k * 1000000;

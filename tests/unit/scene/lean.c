@@ -165,7 +165,7 @@ static void assert_varied(const struct seen *seen, int scenes)
 					      1 << INCISE_TOOL_TUBE);
 	assert_true(seen->with_force > seen->ticks / 10);
 	for (int i = 0; seen->left_out[i].name; i++)
-		out += seen->left_out[i].plans > scenes / 50;
+		out += seen->left_out[i].plans > 0;
 	/* Tool, normal, incision, membrane, work, and each force. */
 	assert_int_equal(out, 5 + incise_n_tissue_forces);
 }
