@@ -95,6 +95,12 @@ check-unit: $(locale) ## unit tests
 
 unit-programs: $(unit_programs)
 
+# Random scenes, and a judge whether those that are accepted come to rest: see tests/unit/scene/rest_3d.c.
+# It takes two seconds a scene; several runs of other seeds go side by side.
+SEEDS ?= 1..500
+rest: $(O)/tests/unit/scene/rest_3d ## SEEDS=1..500 [KEEP=FOLDER]: leans on random scenes that are accepted; each that swings in a line
+	@SEEDS=$(SEEDS) KEEP=$(KEEP) $<
+
 # Fuzz targets by our own changes of the inputs that are kept; see tests/fuzz/mutate.c.
 fuzz_targets := $(patsubst tests/fuzz/%.c,%,$(filter-out tests/fuzz/mutate.c $(if $(has_vision),,%/vision_frame.c),\
 	$(wildcard tests/fuzz/*.c)))
@@ -237,7 +243,7 @@ notebooks: all ## run doc/notebooks and write them with their figures to build/n
 
 check-doc: doc
 
-.PHONY: doc notebooks check-doc check-style check-layers check-unit unit-programs check-kept check-cli cli-needs \
+.PHONY: rest doc notebooks check-doc check-style check-layers check-unit unit-programs check-kept check-cli cli-needs \
 	peers check-attack check-python check-tsan can-drive mcap-reader python-peers stream-peers
 
 # Sums of very many pairs: time and memory, next to numpy.

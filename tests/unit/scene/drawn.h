@@ -356,6 +356,339 @@ static inline void draw(uint64_t seed, struct drawn *d)
 		    rest.all);
 }
 
+/* --- scenes to lean on -------------------------------------------------------------------- */
+
+/* Half the side of a relief; a lean begins within the second. */
+#define RELIEF_MM 40
+#define MIDDLE_MM 18
+
+enum relief { HILL, BOWL, GROOVE, RIDGE, EGGS, SADDLE, RELIEFS };
+static const char *const reliefs[] = {"hill",  "bowl", "groove",
+				      "ridge", "eggs", "saddle"};
+
+static inline double relief_mm(enum relief kind, double size, double u, double v)
+{
+	switch (kind) {
+	case HILL:
+		return size / 10 * (cos(u / 13) + cos(v / 13));
+	case BOWL:
+		return (u * u + v * v) / (4 * size);
+	case GROOVE:
+		return fabs(v) * tan(size * M_PI / 180);
+	case RIDGE:
+		return -fabs(v) * tan(size * M_PI / 180);
+	case EGGS:
+		return size / 10 * cos(u / 8) * cos(v / 8);
+	default:
+		return (u * u - v * v) / (8 * size);
+	}
+}
+
+/* A scene that is in reach of its device's limit, and where a hand can lean on it. */
+struct leaned {
+	struct text text;
+	struct incise_tracker_info tracker;
+	double core_mm[3],
+		wide_mm[3]; /* a way to within so much of here meets the skin … */
+	bool closed;	    /* … from all around; else along up */
+	bool faceted, model;
+	double deep_mm; /* half of its radius: a tool that is deeper is no lean on a skin */
+	double up[3], top_mm[3], membrane_mm[3];
+	bool membrane;
+	double mass_kg, damping_N_s_mm, force_N, near_N_mm;
+	int late_ticks;
+	char what[300];
+	size_t n_what;
+};
+
+static inline __attribute__((format(printf, 2, 3))) void say(struct leaned *l,
+							     const char *format, ...)
+{
+	va_list arguments;
+
+	va_start(arguments, format);
+	l->n_what += (size_t)vsnprintf(l->what + l->n_what, sizeof(l->what) - l->n_what,
+				       format, arguments);
+	va_end(arguments);
+	assert_true(l->n_what < sizeof(l->what));
+}
+
+static inline void shape_path(char path[80], const char *end)
+{
+	snprintf(path, 80, "%s/shape.%s", folder.dir, end);
+}
+
+/* As a mesh or as heights. */
+static inline void add_relief(struct leaned *l, uint64_t *seed, bool mesh)
+{
+	enum relief kind = (enum relief)below(seed, RELIEFS);
+	double size = between(seed, 10, 40);
+	double turn = chance(seed, 0.5) ? 0 : between(seed, 0, M_PI);
+	int n = 16 + 8 * below(seed, 4);
+	double cell_mm = 2.0 * RELIEF_MM / n;
+	char path[80];
+	FILE *out;
+
+	shape_path(path, mesh ? "obj" : "asc");
+	out = fopen(path, "w");
+	if (!mesh)
+		fprintf(out,
+			"ncols %d\nnrows %d\nxllcenter %d\nyllcenter %d\ncellsize %.9f\n",
+			n + 1, n + 1, -RELIEF_MM, -RELIEF_MM, cell_mm);
+	for (int j = 0; j <= n; j++)
+		for (int i = 0; i <= n; i++) {
+			double x = i * cell_mm - RELIEF_MM;
+			double y = (mesh ? j : n - j) * cell_mm - RELIEF_MM;
+			double z = relief_mm(kind, size, x * cos(turn) + y * sin(turn),
+					     y * cos(turn) - x * sin(turn));
+
+			if (mesh)
+				fprintf(out, "v %.9f %.9f %.9f\n", x, y, z);
+			else
+				fprintf(out, "%.9f%c", z, i == n ? '\n' : ' ');
+		}
+	for (int j = 0; mesh && j < n; j++)
+		for (int i = 1; i <= n; i++)
+			fprintf(out, "f %d %d %d %d\n", (n + 1) * j + i,
+				(n + 1) * j + i + 1, (n + 1) * (j + 1) + i + 1,
+				(n + 1) * (j + 1) + i);
+	fclose(out);
+	add(&l->text, " kind = \"%s\"; file = \"shape.%s\";", mesh ? "mesh" : "heights",
+	    mesh ? "obj" : "asc");
+	l->top_mm[2] += relief_mm(kind, size, 0, 0);
+	v3_copy(l->wide_mm, (const double[3]){MIDDLE_MM, MIDDLE_MM, 0});
+	l->core_mm[2] -= 150;
+	say(l, "%s-%s %.0f", mesh ? "mesh" : "heights", reliefs[kind], size);
+}
+
+static inline void add_box(struct leaned *l, uint64_t *seed)
+{
+	static const char faces[] =
+		"f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\n"
+		"f 2 4 8 6\n";
+	double half_mm[3];
+	char path[80];
+	FILE *out;
+
+	for (int i = 0; i < 3; i++)
+		half_mm[i] = between(seed, 15, 50);
+	shape_path(path, "obj");
+	out = fopen(path, "w");
+	for (int i = 0; i < 8; i++)
+		fprintf(out, "v %.9f %.9f %.9f\n", i & 1 ? half_mm[0] : -half_mm[0],
+			i & 2 ? half_mm[1] : -half_mm[1],
+			i & 4 ? half_mm[2] : -half_mm[2]);
+	fputs(faces, out);
+	fclose(out);
+	add(&l->text, " kind = \"mesh\"; file = \"shape.obj\";");
+	l->top_mm[2] += half_mm[2];
+	l->closed = true;
+	l->deep_mm = fmin(half_mm[0], fmin(half_mm[1], half_mm[2])) / 2;
+	v3_add(l->wide_mm, (const double[3]){0}, 0.5, half_mm);
+	say(l, "mesh-box %.0f", half_mm[2]);
+}
+
+static inline void add_skin(struct leaned *l, uint64_t *seed)
+{
+	static const enum {
+		PLANE,
+		SPHERE,
+		CAPSULE,
+		MESH,
+		HEIGHTS,
+		BOX
+	} kinds[] = {PLANE, SPHERE, SPHERE,  CAPSULE, MESH,
+		     MESH,  MESH,   HEIGHTS, HEIGHTS, BOX};
+	double radius_mm = sized(seed, 8, 150), at_mm[3] = {0}, ends_mm[2][3];
+	int kind = (int)kinds[below(seed, 10)];
+
+	v3_copy(l->up, (const double[3]){0, 0, 1});
+	if (chance(seed, 0.5))
+		any_vector(seed, 50, at_mm);
+	l->deep_mm = 60;
+	v3_copy(l->core_mm, at_mm);
+	v3_copy(l->top_mm, at_mm);
+	add(&l->text, "surface = {");
+	switch (kind) {
+	case PLANE:
+		if (chance(seed, 0.5))
+			any_vector(seed, 0.8, l->up);
+		l->up[2] += 1;
+		v3_unit(l->up, l->up, 0);
+		add(&l->text, " kind = \"plane\";");
+		add_vector(&l->text, "normal", l->up);
+		add_vector(&l->text, "point_mm", at_mm);
+		v3_add(l->core_mm, at_mm, -10, l->up);
+		say(l, "plane");
+		break;
+	case SPHERE:
+		add(&l->text, " kind = \"sphere\";");
+		add_vector(&l->text, "centre_mm", at_mm);
+		break;
+	case CAPSULE:
+		add(&l->text, " kind = \"capsule\";");
+		v3_copy(ends_mm[0], at_mm);
+		v3_copy(ends_mm[1], at_mm);
+		ends_mm[0][0] -= 60;
+		ends_mm[1][0] += 60;
+		add_vector(&l->text, "from_mm", ends_mm[0]);
+		add_vector(&l->text, "to_mm", ends_mm[1]);
+		l->wide_mm[0] = 60;
+		break;
+	case BOX:
+		add_box(l, seed);
+		break;
+	default:
+		add_relief(l, seed, kind == MESH);
+	}
+	if (kind == SPHERE || kind == CAPSULE) {
+		add_number(&l->text, "radius_mm", radius_mm);
+		l->closed = true;
+		l->deep_mm = radius_mm / 2;
+		l->top_mm[2] += radius_mm;
+		say(l, "%s R %.0f", kind == SPHERE ? "sphere" : "capsule", radius_mm);
+	} else if (kind != PLANE) {
+		l->faceted = true;
+		add_vector(&l->text, "at_mm", at_mm);
+	}
+	add(&l->text, " };\n");
+}
+
+/* A tracker and a device, with a guess at the stiffness that they bear. */
+static inline void add_device(struct leaned *l, uint64_t *seed)
+{
+	double late_s, rate_hz = sized(seed, 60, 1000),
+		       latency_s = between(seed, 0, 0.02);
+	static const double ticks_hz[] = {250, 1000, 1000, 1000, 1000, 4000};
+	double hz = ticks_hz[below(seed, 6)];
+
+	if (chance(seed, 0.3)) {
+		rate_hz = 120;
+		latency_s = 4.2e-3;
+	}
+	l->tracker = (struct incise_tracker_info){.name = "fed",
+						  .rate_hz = rate_hz,
+						  .latency_ns = llround(latency_s * 1e9),
+						  .stations = 1};
+	l->mass_kg = sized(seed, 0.02, 0.3);
+	l->damping_N_s_mm = sized(seed, 0.002, 0.1);
+	l->late_ticks = chance(seed, 0.6) ? 0 : 1 + below(seed, 5);
+	late_s = latency_s + 1 / rate_hz + (1 + l->late_ticks) / hz;
+	l->near_N_mm = 0.5 * l->damping_N_s_mm / late_s;
+	add(&l->text, "rate_hz = %.1f;\ndevice = { coulomb_N = 0.0; late_ticks = %d;", hz,
+	    l->late_ticks);
+	add_number(&l->text, "mass_kg", l->mass_kg);
+	add_number(&l->text, "damping_N_s_mm", l->damping_N_s_mm);
+	add(&l->text, " };\nlimits = {");
+	l->force_N = fmin(fmax(l->near_N_mm * sized(seed, 1, 12), 0.1), 30);
+	add_number(&l->text, "force_N", l->force_N);
+	add_number(&l->text, "slew_N_s", chance(seed, 0.6) ? 400 : sized(seed, 100, 1e5));
+	add_number(&l->text, "pose_age_ms", 30 + 3e3 * (latency_s + 1 / rate_hz));
+	add_number(&l->text, "ramp_ms", chance(seed, 0.5) ? 200 : sized(seed, 1, 300));
+	add(&l->text, " };\n");
+	say(l, ", %.2g kg %.2g N s/mm, %.0f Hz %.1f ms, tick %.0f Hz late %d", l->mass_kg,
+	    l->damping_N_s_mm, rate_hz, latency_s * 1e3, hz, l->late_ticks);
+}
+
+/* One of the models, or the shipped one; they have about 0.1 N/mm. */
+static inline void add_any_model(struct leaned *l, uint64_t *seed, bool fixed,
+				 bool dissipates)
+{
+	int n = l->faceted && fixed ? KINDS_LEVEL : KINDS, cut = below(seed, n);
+
+	if (chance(seed, 0.25)) {
+		add(&l->text, "model = \"liver.fis\";\n");
+		say(l, ", model liver");
+	} else if (fixed || chance(seed, 0.6)) {
+		add(&l->text, "model = \"k%d.%s\";\n", cut, fixed ? "fx" : "fis");
+		say(l, ", model k%d of %d", cut, kinds[cut].n);
+	} else {
+		add(&l->text, "model = { cut = \"k%d.fis\"; puncture = \"k%d.fis\";", cut,
+		    below(seed, n));
+		if (dissipates && chance(seed, 0.6))
+			add(&l->text, " withdraw = \"k%d.fis\";", below(seed, n));
+		add(&l->text, " };\n");
+		say(l, ", model k%d of phases", cut);
+	}
+}
+
+/* A spring of about what the device bears, or none. */
+static inline double any_spring(struct leaned *l, uint64_t *seed, double p, double gain,
+				const char *name, const char *key)
+{
+	double K = chance(seed, p) ? l->near_N_mm * sized(seed, 0.1, 1.1) : 0;
+
+	add_number(&l->text, key, fmin(K / gain, 999));
+	if (K > 0)
+		say(l, ", %s %.2g", name, K);
+	return K;
+}
+
+static inline void add_forces(struct leaned *l, uint64_t *seed)
+{
+	bool model = chance(seed, 0.2), fixed = chance(seed, 0.25);
+	bool dissipates = chance(seed, 0.75), inserts = !model || chance(seed, 0.3);
+	double gain = model ? fmin(l->near_N_mm * sized(seed, 0.5, 8), 10)
+			    : sized(seed, 0.3, 3);
+	int average = chance(seed, 0.35) ? 1 : (int)sized(seed, 2, 64.99);
+	struct text *to = &l->text;
+	double normal[3], K;
+
+	add(to, "arithmetic = \"%s\";\neffects = { average_ticks = %d; };\n",
+	    fixed ? "fixed" : "double", average);
+	say(l, ", %s, average %d", fixed ? "fixed" : "double", average);
+	l->model = model;
+	if (model)
+		add_any_model(l, seed, fixed, dissipates);
+	add(to, "tissue = { withdrawal = \"%s\"; orientation = \"%s\";",
+	    dissipates ? "dissipative" : "paper", chance(seed, 0.8) ? "eased" : "paper");
+	add_number(to, "gain", gain);
+	add_number(to, "leave_mm", chance(seed, 0.7) ? 0.2 : between(seed, 0, 2));
+	if (model)
+		say(l, " gain %.2g%s", gain, dissipates ? "" : " paper");
+	else
+		any_spring(l, seed, 0.8, gain, "reaction", "reaction_N_mm");
+	any_spring(l, seed, 0.4, gain, "plane", "plane_N_mm");
+	any_spring(l, seed, inserts ? 1 : 0, gain, "insertion", "insertion_N_mm");
+	any_spring(l, seed, inserts ? 0.6 : 0, gain, "spread", "spread_N_mm");
+	K = any_spring(l, seed, 0.3, gain, "skin", "skin_N_mm");
+	if (K > 0)
+		add_number(to, "skin_friction", sized(seed, 0.02, 1));
+	if (chance(seed, 0.4)) {
+		K = l->damping_N_s_mm * sized(seed, 0.01, 0.5);
+		add_number(to, "damping_N_s_mm", fmin(K / gain, 1));
+		say(l, ", damper %.2g", K);
+	}
+	add(to, " };\n");
+	l->membrane = chance(seed, 0.3);
+	if (!l->membrane)
+		return;
+	add(to, "membrane = {");
+	v3_add(l->membrane_mm, l->top_mm, -between(seed, 0.5, 6), l->up);
+	any_vector(seed, 0.5, normal);
+	v3_add(normal, normal, 1, l->up);
+	v3_unit(normal, normal, 0);
+	K = between(seed, 1, 6);
+	add_vector(to, "point_mm", l->membrane_mm);
+	add_vector(to, "normal", normal);
+	add_number(to, "radius_mm", sized(seed, 3, 30));
+	add_number(to, "thickness_mm", K);
+	add_number(to, "back_wall_mm", K + between(seed, 1, 15));
+	add_number(to, "puncture_N",
+		   fmin(K * l->near_N_mm * sized(seed, 0.1, 1.1) / gain, 99));
+	add(to, " };\n");
+	say(l, ", membrane");
+}
+
+static inline void draw_leaned(uint64_t seed, struct leaned *l)
+{
+	memset(l, 0, sizeof(*l));
+	add_skin(l, &seed);
+	add_device(l, &seed);
+	add_forces(l, &seed);
+	add_tool(&seed, &l->text);
+}
+
 /* --- a hand ------------------------------------------------------------------------------- */
 
 /* A tool that is moved: it goes towards a place above or below the skin, and turns. */
@@ -567,6 +900,8 @@ static inline struct hand hand_of(uint64_t seed, const struct drawn *d,
 /* As fed_folder_make(), but for its model, whose tables take long to compile. */
 static inline int drawn_set_up(void **state)
 {
+	char path[80], liver[4096];
+
 	strcpy(folder.dir, "/tmp/incise-drawn-XXXXXX");
 	if (!mkdtemp(folder.dir))
 		abort();
@@ -577,6 +912,9 @@ static inline int drawn_set_up(void **state)
 	fed_write_heights(folder.heights);
 	for (int i = 0; i < KINDS; i++)
 		write_model(i);
+	snprintf(path, sizeof(path), "%s/liver.fis", folder.dir);
+	assert_non_null(realpath("scenes/liver.fis", liver));
+	assert_int_equal(symlink(liver, path), 0);
 	return 0;
 }
 
@@ -590,6 +928,12 @@ static inline int drawn_tear_down(void **state)
 		model_path(path, i, "fx");
 		unlink(path);
 	}
+	shape_path(path, "obj");
+	unlink(path);
+	shape_path(path, "asc");
+	unlink(path);
+	snprintf(path, sizeof(path), "%s/liver.fis", folder.dir);
+	unlink(path);
 	fed_folder_remove(&folder);
 	return 0;
 }
