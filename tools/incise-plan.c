@@ -10,6 +10,7 @@
 #include <incise/plan.h>
 #include "cli/cli.h"
 #include "cli/json.h"
+#include "cli/loop_report.h"
 #include "cli/mapped_libraries.h"
 #include "cli/model_force.h"
 #include "cli/scene_argument.h"
@@ -144,7 +145,8 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 {
 	const struct incise_haptic_device *d = &s->device;
 
-	return json_pack("{so so so so so so so sf sf sf sf sf si s{sf sf sf sf sf} sf "
+	return json_pack("{so so so so so so so sf sf sf sf sf si "
+			 "s{ss sb sb so sf sf sf sf sf sf} sf "
 			 "sf si sb sb s{sf sf sf sf sf si}}",
 			 "stiffness_N_mm", json_number(s->stiffness_N_mm), "limit_N_mm",
 			 json_number(s->limit_N_mm), "margin", json_number(margin(s)),
@@ -154,7 +156,10 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 			 json_number(encoder_N_mm(s)), "acceleration_slope_N_s2_mm",
 			 s->acceleration_slope_N_s2_mm, "slope_N_mm", s->slope_N_mm,
 			 "unloading_N_mm", s->unloading_N_mm, "support_mm", s->support_mm,
-			 "beyond_N_mm", s->beyond_N_mm, "leans", s->runs, "worst",
+			 "beyond_N_mm", s->beyond_N_mm, "leans", s->runs, "worst", "tool",
+			 loop_tool_names[s->worst.tool], "in_hand", s->worst.in_hand,
+			 "guided", s->worst.guided, "place_mm",
+			 json_numbers(s->worst.place_mm, 3), "askew", s->worst.askew,
 			 "lean_N", s->worst.lean_N, "along_mm_s", s->worst.along_mm_s,
 			 "depth_mm", s->worst.depth_mm, "swing_mm", s->worst.swing_mm,
 			 "settle_s", s->worst.settle_s, "noise_mm", s->noise_mm,
@@ -259,7 +264,7 @@ static void report_json(const struct job *job, const struct incise_plan *plan,
 	json_print(object);
 }
 
-/* The tissue of a model, and what the search for swings found. */
+/* The tissue of a model. */
 static void print_model(const struct incise_plan_stability *s)
 {
 	printf("            the model: up to %.3g N/mm and %.3g N s/mm, to a depth of "
@@ -274,9 +279,23 @@ static void print_model(const struct incise_plan_stability *s)
 		       s->unloading_N_mm, 1 / s->unloading_N_mm);
 	else
 		printf("            withdrawal: the model's force in both directions\n");
+}
+
+/* What the search for swings found. */
+static void print_rest(const struct incise_plan_stability *s)
+{
+	const double *at = s->worst.place_mm;
+
 	printf("            comes to rest: %d leans up to the limit; the slowest takes "
-	       "%.2g s, of %.2f N at %.1f mm",
-	       s->runs, s->worst.settle_s, s->worst.lean_N, s->worst.depth_mm);
+	       "%.2g s, of %.2f N",
+	       s->runs, s->worst.settle_s, s->worst.lean_N);
+	if (s->worst.guided)
+		printf(" at %.1f mm", s->worst.depth_mm);
+	else
+		printf(", %.0f %% of it along the skin, by the %s at (%.4g, %.4g, %.4g), "
+		       "%s a hand",
+		       100 * s->worst.askew, loop_tool_names[s->worst.tool], at[0], at[1],
+		       at[2], s->worst.in_hand ? "in" : "without");
 	if (s->worst.along_mm_s > 0)
 		printf(", while it goes along the skin with %g mm/s",
 		       s->worst.along_mm_s);
@@ -312,6 +331,7 @@ static void print_stability(const struct job *job, const struct incise_plan *pla
 		       encoder_N_mm(&s));
 	if (s.support_mm > 0)
 		print_model(&s);
+	print_rest(&s);
 	if (rest_force(job, &s, &force)) {
 		fputs("            the model where that one rests: ", stdout);
 		model_force_print(stdout, &force);

@@ -117,6 +117,11 @@ class _Worst(ctypes.Structure):
     _fields_ = [
         ("lean_N", c_double),
         ("along_mm_s", c_double),
+        ("askew", c_double),
+        ("place_mm", c_double * 3),
+        ("tool", c_int),
+        ("in_hand", c_bool),
+        ("guided", c_bool),
         ("depth_mm", c_double),
         ("swing_mm", c_double),
         ("settle_s", c_double),
