@@ -286,6 +286,7 @@ static void feed(struct search *s, const struct run *run, unsigned int pose)
 static void tick(struct search *s, struct run *run)
 {
 	double most_N = s->device.slew_N_s * s->device.period_s;
+	double end_s = run->t_s + s->device.period_s;
 	struct incise_tick out;
 
 	for (; run->first != run->last &&
@@ -302,7 +303,7 @@ static void tick(struct search *s, struct run *run)
 	}
 	memmove(run->late_N, run->late_N + 1,
 		(size_t)s->device.late_ticks * sizeof(*run->late_N));
-	while (run->next_pose_s < run->t_s + s->device.period_s) {
+	while (run->next_pose_s < end_s) {
 		unsigned int pose = run->last++ % POSES_MOST;
 
 		go_to(s, run, run->next_pose_s);

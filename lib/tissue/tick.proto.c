@@ -305,7 +305,7 @@ void T(stage_contact)(const struct T(plan) *plan, struct T(state) *state,
 	if (is_stale_tick(tick))
 		return;
 	for (int i = 0; i < 3; i++)
-		state->force[i] = 0;
+		state->force[i] = state->late[i] = 0;
 	T(surface_move)(plan, proxy, tick->tool);
 	state->depth = 0;
 	if (!proxy->touching)
@@ -399,6 +399,16 @@ void T(stage_incision)(const struct T(plan) *plan, struct T(state) *state,
 static void push(struct T(state) *state, num size, const dir unit[3])
 {
 	v_add(state->force, state->force, size, unit);
+}
+
+/* Along the normal. Where that is an average it is late: so much of the force that it is not that of Sn. */
+static void push_out(const struct T(plan) *plan, struct T(state) *state, num size)
+{
+	push(state, size, state->normal);
+	if (plan->numbers.average_ticks < 2)
+		return;
+	v_add(state->late, state->late, size, state->normal);
+	v_add(state->late, state->late, n_neg(size), state->sn);
 }
 
 /* N against a tool so far beyond the plane of the membrane. */
@@ -599,7 +609,7 @@ void T(stage_reaction)(const struct T(plan) *plan, struct T(state) *state,
 				T(front_force)(&state->front, numbers->unloading,
 					       friction, state->depth, fresh, size));
 	}
-	push(state, size, state->normal);
+	push_out(plan, state, size);
 }
 
 /* The blade stays in the plane of its cut: s is Sx(0), its side when the cut began. */
@@ -618,9 +628,12 @@ void T(stage_plane)(const struct T(plan) *plan, struct T(state) *state,
 void T(stage_damping)(const struct T(plan) *plan, struct T(state) *state,
 		      struct T(tick) *tick)
 {
-	for (int i = 0; i < 3 && tick->phase != INCISE_PHASE_FREE; i++)
+	for (int i = 0; i < 3 && tick->phase != INCISE_PHASE_FREE; i++) {
 		state->force[i] = n_damp(state->force[i], plan->numbers.damping,
 					 state->velocity[i]);
+		state->late[i] =
+			n_damp(state->late[i], plan->numbers.damping, state->velocity[i]);
+	}
 }
 
 /*
@@ -671,7 +684,7 @@ void T(stage_insertion)(const struct T(plan) *plan, struct T(state) *state,
 		size = n_times(printed(numbers, state), state->depth);
 	else if (opening->in)
 		size = n_add(size, n_times(eased(numbers, state), cut));
-	push(state, n_times(numbers->insertion, size), state->normal);
+	push_out(plan, state, n_times(numbers->insertion, size));
 }
 
 /*
@@ -789,49 +802,75 @@ void T(stage_start)(const struct T(plan) *plan, struct T(state) *state,
 		tick->command[i] = w_scale(state->gain, state->force[i]);
 }
 
+/* Of the last way both forces are known, as they were rendered. */
+static void take_in(struct T(fund) *fund, const struct T(account) *account,
+		    const num last[3])
+{
+	fund->work2 = w_work(fund->work2, fund->before,
+			     n_neg(v_along(last, account->unit)), account->length);
+}
+
+/* Leave out what nothing has paid for of a force, as a part of the command. Returns whether there is any. */
+static bool leave_out(struct T(fund) *fund, const struct T(account) *account,
+		      num stiffness, const num last[3], num force[3], num command[3])
+{
+	num unpaid =
+		n_sub(v_along(force, account->unit), w_stored(stiffness, fund->work2));
+
+	fund->before = n_neg(v_along(last, account->unit));
+	if (!n_below(0, unpaid))
+		return false;
+	if (force != command)
+		v_add(force, force, n_neg(unpaid), account->unit);
+	v_add(command, command, n_neg(unpaid), account->unit);
+	return true;
+}
+
 /*
  * The account of a contact's work: no more comes back than was put in. Springs that hold the energy E, all together
  * of the stiffness K, push with no more than √(2 K E): forces that are a potential's, or only take, are below that.
- * Others come to it: a handle that is turned in its cut, another place beyond a membrane, a normal that is
- * averaged, the border of a mesh, a force that comes back in the tissue after a fade. Of these the part of the
- * force along the way that nothing has paid for is left out. Unlike a force that ends where E does, this one has no
- * step there.
+ * Others come to it: a handle that is turned in its cut, another place beyond a membrane, a force that is late, the
+ * border of a mesh, a force that comes back in the tissue after a fade. Of these the part of the force along the
+ * way that nothing has paid for is left out. Unlike a force that ends where E does, this one has no step there.
  *
  *     force ▲ ¦ .-·'' √(2 K E)
  *           | ¦·  left out above
  *           |·'
  *         0 '────────▶ E: put in, less what came back
  *
+ * What is late, a damper's force and that of a normal that is averaged, has a fund of its own: so it is no more than
+ * this that is left out where it gives work, and a tool at rest is held as by springs.
+ *
  * After Hannaford and Ryu, Time-domain passivity control of haptic interfaces, IEEE Trans. Robotics and Automation
- * 18(1), 2002; the work between two ticks is by the mean of their forces.
+ * 18(1), 2002; the work between two ticks is by the mean of their forces, as they were rendered.
  */
 void T(stage_work)(const struct T(plan) *plan, struct T(state) *state,
 		   struct T(tick) *tick)
 {
-	num stiffness = plan->numbers.account, way[3], along, paid;
+	struct T(account) *account = &state->account;
+	num stiffness = plan->numbers.account, way[3], late[3];
 
 	if (!n_below(0, stiffness))
 		return;
-	/* Of the last way both forces are known, as they were rendered. */
-	along = n_neg(v_along(state->last, state->account.unit));
-	state->account.work2 = w_work(state->account.work2, state->account.before, along,
-				      state->account.length);
-	if (state->proxy.began || tick->held != state->account.held)
-		state->account.work2 = 0;
-	state->account.held = tick->held;
-	v_sub(way, tick->tool, state->account.at);
-	v_copy(state->account.at, tick->tool);
-	state->account.length = 0;
-	if (!v_direction(state->account.unit, way))
-		return;
-	state->account.length = v_along(way, state->account.unit);
-	state->account.before = n_neg(v_along(state->last, state->account.unit));
-	along = v_along(tick->command, state->account.unit);
-	paid = w_stored(stiffness, state->account.work2);
-	if (!n_below(paid, along))
-		return;
-	v_add(tick->command, tick->command, n_sub(paid, along), state->account.unit);
-	tick->flags |= INCISE_TICK_UNPAID;
+	take_in(&account->all, account, state->last);
+	take_in(&account->late, account, account->last_late);
+	if (state->proxy.began || tick->held != account->held)
+		account->all.work2 = account->late.work2 = 0;
+	account->held = tick->held;
+	v_sub(way, tick->tool, account->at);
+	v_copy(account->at, tick->tool);
+	for (int i = 0; i < 3; i++)
+		late[i] = w_scale(state->gain, state->late[i]);
+	account->length = 0;
+	if (v_direction(account->unit, way)) {
+		account->length = v_along(way, account->unit);
+		if (leave_out(&account->late, account, stiffness, account->last_late,
+			      late, tick->command) |
+		    leave_out(&account->all, account, stiffness, state->last,
+			      tick->command, tick->command))
+			tick->flags |= INCISE_TICK_UNPAID;
+	}
+	v_copy(account->last_late, late);
 }
 
 /*

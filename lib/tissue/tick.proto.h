@@ -303,6 +303,22 @@ struct T(average) {
 	dir last[3];
 };
 
+/* Work, twice, that was put in until the last tick, less what came back; what resisted on the way since then. */
+struct T(fund) {
+	wide work2;
+	num before;
+};
+
+/* With stage work. */
+struct T(account) {
+	struct T(fund) all, late;
+	num at[3];   /* of the last tick … */
+	dir unit[3]; /* … and the way to it */
+	num length;
+	num last_late[3]; /* of the force, what was late */
+	int32_t held;
+};
+
 /* The state of a plan between ticks. Set by T(plan_begin)(). */
 struct T(state) {
 	struct T(predict) scalpel;
@@ -333,14 +349,9 @@ struct T(state) {
 		int32_t punctured;
 	} membrane;
 	wide anchor[3]; /* of the skin that drags; Q32 mm */
-	struct {
-		num at[3];	    /* of the last tick … */
-		dir unit[3];	    /* … and the way to it, … */
-		num length, before; /* … the force that resisted where it began */
-		wide work2; /* twice what was put in until then, less what came back */
-		int32_t held;
-	} account;
-	num force[3];	       /* of the tissue, before limits */
+	struct T(account) account;
+	num force[3];	       /* of the tissue, before limits … */
+	num late[3];	       /* … and what of it is late */
 	num last[3];	       /* what was rendered */
 	num place[T_AXES_MAX]; /* of the handle along each axis, from its origin */
 	struct T(ends) OWNED ends;
