@@ -570,6 +570,7 @@ static inline void add_device(struct leaned *l, uint64_t *seed)
 						  .rate_hz = rate_hz,
 						  .latency_ns = llround(latency_s * 1e9),
 						  .stations = 1};
+	add(&l->text, "# a tracker of %.9g Hz, %.9g ms late\n", rate_hz, latency_s * 1e3);
 	l->mass_kg = sized(seed, 0.02, 0.3);
 	l->damping_N_s_mm = sized(seed, 0.002, 0.1);
 	l->late_ticks = chance(seed, 0.6) ? 0 : 1 + below(seed, 5);

@@ -628,4 +628,59 @@ TEST(test_an_accepted_scene_rests)
 	assert_int_equal(sum.advised, sum.advice_accepted);
 }
 
+/*
+ * Of the judge: on a plane, a wall rests below the stiffness that theory gives, and swings above; see
+ * lib/control/pose_loop.h.
+ */
+TEST(test_a_wall_swings_above_its_limit)
+{
+	static const double devices[][4] = {
+		{0.05, 0.01, 120, 4.2}, {0.2, 0.03, 400, 12}, {0.03, 0.02, 60, 0}};
+	static const double around[] = {1, 0.98, 1.02};
+
+	for (int i = 0; i < 9; i++) {
+		const double *device = devices[i / 3];
+		static double limit_N_mm;
+		struct incise_plan_stability s;
+		struct leaned l = {.force_N = 100, .up = {0, 0, 1}};
+		struct lean lean = {.tool = INCISE_TOOL_BLADE,
+				    .above_mm = 0.1,
+				    .q = {1},
+				    .force_N = {0, 0, -1},
+				    .place = {.normal = {0, 0, 1}}};
+		struct incise_scene *scene;
+		struct incise_plan *plan;
+		int64_t from_ns = 2000000000;
+		struct end end;
+
+		l.mass_kg = device[0];
+		l.damping_N_s_mm = device[1];
+		l.tracker.rate_hz = device[2];
+		l.tracker.latency_ns = llround(device[3] * 1e6);
+		l.deep_mm = INFINITY;
+		add(&l.text, "tissue = {");
+		add_number(&l.text, "reaction_N_mm",
+			   i % 3 ? around[i % 3] * limit_N_mm : 1e-3);
+		add(&l.text, " }; device = {");
+		add_number(&l.text, "mass_kg", l.mass_kg);
+		add_number(&l.text, "damping_N_s_mm", l.damping_N_s_mm);
+		add(&l.text, " }; arithmetic = \"double\";\n"
+			     "limits = { force_N = 100.0; slew_N_s = 1.0e5; };\n");
+		scene = fed_scene(&folder, l.text.all, &err);
+		succeeds(scene);
+		scene->unchecked = i % 3;
+		plan = incise_plan_new_fed(scene, &l.tracker, &err);
+		succeeds(plan);
+		incise_plan_stability(plan, &s);
+		limit_N_mm = i % 3 ? limit_N_mm : s.limit_N_mm;
+		end = lean_on(plan, &l, &lean, &from_ns, 1);
+		if ((end.outcome == SWINGS) != (i % 3 == 2))
+			fail_msg("%g kg: %g of %g N/mm: %s, %g mm", l.mass_kg,
+				 around[i % 3] * limit_N_mm, limit_N_mm,
+				 outcomes[end.outcome], end.swing_mm);
+		incise_plan_free(plan);
+		incise_scene_free(scene);
+	}
+}
+
 GROUP(drawn_set_up, drawn_tear_down);
