@@ -50,7 +50,8 @@ static inline double apart_N(struct apart *apart, const struct incise_tick *a,
 	if (!apart_decide_alike(a, b))
 		apart->is = true;
 	/* What fades to nothing a tick later may return a tick later. */
-	else if (off_N <= APART_ENDED * bound_N && !(a->flags & INCISE_TICK_STARTING))
+	else if (off_N <= APART_ENDED * bound_N &&
+		 (a->phase == INCISE_PHASE_FREE || !(a->flags & INCISE_TICK_STARTING)))
 		apart->is = false;
 	/* At the end of an account roundings decide, of nothing but this tick. */
 	if ((a->flags | b->flags) & INCISE_TICK_UNPAID)
