@@ -505,7 +505,8 @@ struct tick {
 
 /*
  * The opening of a tool: where the blade once was, which is as uncertain along it as where it entered. A place's
- * depth and width are the largest of many ticks; the error of a maximum is not larger than theirs.
+ * depth and width are the largest of many ticks, a stretch's depth the least of its places'; the error of a maximum or
+ * minimum is not larger than theirs. Length only decides.
  */
 static void set_opening(const struct T(plan) *plan, struct T(state) *state,
 			const struct T(tick) *tick)

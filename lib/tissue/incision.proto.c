@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later OR GPL-2.0-only
 /*
  * The cuts of an incision; see incise/incision.h for its figure and its rules. A tick takes a bounded
- * time: it looks at each cut a few times, and at each place of one cut once.
+ * time: it looks at each cut a few times, and from each cut that is near at the places along PIECES cuts at most,
+ * which a tool of 11 mm makes some 22 places.
  */
 
 #define SPACING N_OF(1, 2) /* of places: INCISE_CUT_SPACING_MM */
@@ -19,6 +20,12 @@
 
 /* A blade farther than this from the line of a cut does not return to it. */
 #define BESIDE N(1)
+
+/* Where a cut ends another goes on along its line that turns by less: cos 45°. */
+#define GOES_ON D_OF(707106781, 1000000000)
+
+/* A line is followed over so many cuts: along a curve of 5 mm, 11 mm are four. */
+#define PIECES 8
 
 /* Two ticks farther apart are no motion of a blade: 10 m/s at 1 kHz. */
 #define LEAP N(10)
@@ -157,7 +164,9 @@ static void deepen(struct T(incision) *incision, const num at[3], num depth)
 	num from = localize(cut, incision->at).along, to = localize(cut, at).along;
 	num low = n_min(from, to), high = n_max(from, to), way = n_sub(high, low);
 
-	for (int i = place_of(low); i <= place_of(high); i++) {
+	/* One that comes back beside an end has cut as far as to it: half of the blade's width. */
+	for (int i = place_of(n_min(low, cut->to_mm));
+	     i <= place_of(n_max(high, cut->from_mm)); i++) {
 		num gone = n_within(n_sub(middle_of(i), low), 0, way), here = depth;
 
 		if (n_below(from, to))
@@ -325,62 +334,199 @@ static num needed(const struct T(incision_setup) *setup, enum incise_tool tool)
 	return n_sub(round, setup->stretch);
 }
 
-static num length_of(const struct T(incision) *incision, int32_t number)
-{
-	num length = 0;
+/*
+ * A stretch of a line of cuts, from the tool's place outward: places next to each other, the deeper neighbour
+ * first. It is as deep as the shallowest of them, so that of all stretches of its length round the tool none is deeper.
+ *
+ *          low ◀─┬──┬──┬──┬──┬──┬──┐            places of one cut
+ *      skin ─────┤  │  │  │  │  │  └──┬─▶ high  and, where it ends, of another
+ *                └──┤  │  │  │  │  ┌──┘
+ *                   └──┤  │  │  ├──┘            depth
+ *                      └──┴──┴──┘
+ *                         tool
+ */
+struct end {
+	const struct T(cut) *cut;
+	int place, step; /* the next one, and the side to which it goes: ±1 */
+	num at;		 /* it came so far along the cut */
+};
 
-	for (int i = 0; i < incision->n; i++)
-		if (incision->cut[i].incision == number)
-			length = n_add(length, n_sub(incision->cut[i].to_mm,
-						     incision->cut[i].from_mm));
-	return length;
+struct stretch {
+	struct end end[2];
+	int taken[PIECES], n;
+	num length, depth;
+};
+
+/* Where a place begins along its cut. */
+static num edge_of(int place)
+{
+	return n_sub(n_multiple(place, SPACING), HALF);
 }
 
-/* Distance aside of the nearest cut within reach; above @reach: there is none. */
-static num nearest_aside(const struct T(incision) *incision, const num at[3], num reach)
+static bool has_more(const struct end *end)
 {
-	num best = n_add(reach, N(1));
+	if (!end->cut)
+		return false;
+	return end->step < 0 ? end->place >= place_of(end->cut->from_mm)
+			     : end->place <= place_of(end->cut->to_mm);
+}
 
-	for (int i = 0; i < incision->n; i++) {
-		num aside = aside_of(&incision->cut[i], at);
-		struct local here;
+/* How far a line that goes along @way at a place goes on in a cut, in which it is at @along; @step: to this side. */
+static num left_in(const struct T(cut) *cut, const num at[3], const dir way[3],
+		   num *along, int *step)
+{
+	struct local here = localize(cut, at);
+	dir turn = d_dot(way, cut->along);
 
-		/* Most are far aside: the rest is not looked at. */
-		if (n_below(reach, aside) || !n_below(aside, best))
+	*along = n_within(here.along, cut->from_mm, cut->to_mm);
+	*step = d_below(turn, 0) ? -1 : 1;
+	if (!d_below(GOES_ON, d_abs(turn)) || !reaches(cut, &here, BESIDE))
+		return 0;
+	return *step < 0 ? n_sub(*along, cut->from_mm) : n_sub(cut->to_mm, *along);
+}
+
+static bool is_taken(const struct stretch *stretch, int cut)
+{
+	int i = 0;
+
+	while (i < stretch->n && stretch->taken[i] != cut)
+		i++;
+	return i < stretch->n;
+}
+
+/* Where a cut ends: into the deepest of those that go on along its line. A cut across lends no length. */
+static void go_on(const struct T(incision) *incision, struct stretch *stretch,
+		  struct end *end)
+{
+	const struct T(cut) *from = end->cut;
+	num at[3], deepest = -N(1);
+	dir way[3];
+
+	v_add(at, from->at_mm, end->at, from->along);
+	end->cut = NULL;
+	for (int i = 0; i < 3; i++)
+		way[i] = end->step < 0 ? -from->along[i] : from->along[i];
+	for (int i = 0; i < incision->n && stretch->n < PIECES; i++) {
+		const struct T(cut) *cut = &incision->cut[i];
+		num along, deep;
+		int step;
+
+		if (cut->incision != from->incision || is_taken(stretch, i) ||
+		    n_below(left_in(cut, at, way, &along, &step), SPACING))
 			continue;
-		here = localize(&incision->cut[i], at);
-		if (reaches(&incision->cut[i], &here, reach))
-			best = aside;
+		deep = cut->place[place_of(along)].depth_mm;
+		if (!n_below(deepest, deep))
+			continue;
+		deepest = deep;
+		*end = (struct end){cut, place_of(along), step, along};
 	}
-	return best;
+	if (end->cut)
+		stretch->taken[stretch->n++] = (int)(end->cut - incision->cut);
 }
 
-static num along_of(const struct T(cut) *cut, const num at[3])
+/* Depth of the next place; below 0: the line ends. */
+static num next_depth(const struct T(incision) *incision, struct stretch *stretch,
+		      struct end *end)
 {
-	return n_within(localize(cut, at).along, cut->from_mm, cut->to_mm);
+	if (end->cut && !has_more(end))
+		go_on(incision, stretch, end);
+	return has_more(end) ? (num)end->cut->place[end->place].depth_mm : -N(1);
 }
 
-/* Of those that are as near, within the width of a line: where cuts cross, a tool goes into it. */
-static int deepest_cut(const struct T(incision) *incision, const num at[3], num reach)
+/* Go on by a place as deep as @least; returns whether there is one. */
+static bool lengthen(const struct T(incision) *incision, struct stretch *stretch,
+		     num least)
 {
-	num most = nearest_aside(incision, at, reach), depth = -N(1);
+	num low = next_depth(incision, stretch, &stretch->end[0]);
+	num high = next_depth(incision, stretch, &stretch->end[1]), to;
+	struct end *end = &stretch->end[n_below(low, high)];
+
+	if (n_below(n_max(low, high), least))
+		return false;
+	to = n_within(edge_of(end->place + (end->step > 0)), end->cut->from_mm,
+		      end->cut->to_mm);
+	stretch->length = n_add(stretch->length, n_abs(n_sub(to, end->at)));
+	stretch->depth = n_min(stretch->depth, n_max(low, high));
+	end->at = to;
+	end->place += end->step;
+	return true;
+}
+
+/* The deepest stretch of a length round a place; whether there is one that is deeper than @least. */
+static bool find_stretch(const struct T(incision) *incision, int cut, num along,
+			 num length, num least, struct stretch *stretch)
+{
+	const struct T(cut) *at = &incision->cut[cut];
+	int place = place_of(along);
+	num low = n_max(edge_of(place), at->from_mm);
+	num high = n_min(edge_of(place + 1), at->to_mm);
+
+	*stretch = (struct stretch){
+		.end = {{at, place - 1, -1, low}, {at, place + 1, 1, high}},
+		.taken = {cut},
+		.n = 1,
+		.length = n_sub(high, low),
+		.depth = at->place[place].depth_mm,
+	};
+	while (n_below(least, stretch->depth) && n_below(stretch->length, length))
+		if (!lengthen(incision, stretch, 0))
+			return false;
+	return n_below(least, stretch->depth);
+}
+
+/* How far a place is from a cut, beside it or beyond an end. */
+static num away_from(const struct T(cut) *cut, const struct local *at)
+{
+	return n_max(n_abs(at->across),
+		     n_max(n_sub(cut->from_mm, at->along), n_sub(at->along, cut->to_mm)));
+}
+
+/*
+ * The stretch for a tool at a place in a cut that is no farther away than @reach; whether one is deeper than
+ * @least.
+ */
+static bool lets_in(const struct T(incision) *incision, int cut, const num at[3],
+		    num reach, num length, num least, struct stretch *stretch)
+{
+	const struct T(cut) *in = &incision->cut[cut];
+	struct local here;
+
+	/* Most are far aside: the rest is not looked at. */
+	if (n_below(reach, aside_of(in, at)))
+		return false;
+	here = localize(in, at);
+	return reaches(in, &here, reach) &&
+	       find_stretch(incision, cut, n_within(here.along, in->from_mm, in->to_mm),
+			    length, least, stretch);
+}
+
+/*
+ * The cut that lets a tool in the deepest, of those that are as near as the nearest that does, within the width of
+ * a line: where cuts cross, a tool goes into that. -1: none does.
+ */
+static int deepest_cut(const struct T(incision) *incision, const num at[3], num reach,
+		       num length, struct stretch *stretch)
+{
+	num nearest = reach;
 	int best = -1;
 
-	for (int i = 0; !n_below(reach, most) && i < incision->n; i++) {
-		const struct T(cut) *cut = &incision->cut[i];
+	for (int i = 0; i < incision->n; i++) {
 		struct local here;
-		num deep;
 
-		if (n_below(n_add(most, BESIDE), aside_of(cut, at)))
+		if (!lets_in(incision, i, at, nearest, length, 0, stretch))
 			continue;
-		here = localize(cut, at);
-		if (!reaches(cut, &here, reach))
+		here = localize(&incision->cut[i], at);
+		nearest = n_within(away_from(&incision->cut[i], &here), 0, nearest);
+	}
+	nearest = n_min(n_add(nearest, BESIDE), reach);
+	stretch->depth = 0;
+	for (int i = 0; i < incision->n; i++) {
+		struct stretch here;
+
+		if (!lets_in(incision, i, at, nearest, length, stretch->depth, &here))
 			continue;
-		deep = cut->place[place_of(along_of(cut, at))].depth_mm;
-		if (n_below(depth, deep)) {
-			best = i;
-			depth = deep;
-		}
+		best = i;
+		*stretch = here;
 	}
 	return best;
 }
@@ -390,22 +536,23 @@ void T(incision_find)(const struct T(incision) *incision,
 		      const num at[3], struct T(opening) *opening)
 {
 	num width = tool == INCISE_TOOL_TUBE ? setup->tube : setup->handle_width;
-	int in = deepest_cut(incision, at, n_half(width)), place;
+	struct stretch stretch;
 	const struct T(cut) *cut;
+	int in = deepest_cut(incision, at, n_half(width), needed(setup, tool), &stretch);
 
 	*opening = (struct T(opening)){0};
 	if (in < 0)
 		return;
+	/* As far as it is so deep. */
+	while (lengthen(incision, &stretch, stretch.depth))
+		;
 	cut = &incision->cut[in];
-	opening->length_mm = length_of(incision, cut->incision);
-	opening->in = !n_below(opening->length_mm, needed(setup, tool));
-	if (!opening->in)
-		return;
+	opening->in = true;
 	opening->cut = in;
-	opening->at_mm = along_of(cut, at);
-	place = place_of(opening->at_mm);
-	opening->depth_mm = cut->place[place].depth_mm;
-	opening->open_mm = cut->place[place].open_mm;
+	opening->at_mm = n_within(localize(cut, at).along, cut->from_mm, cut->to_mm);
+	opening->depth_mm = stretch.depth;
+	opening->open_mm = cut->place[place_of(opening->at_mm)].open_mm;
+	opening->length_mm = stretch.length;
 	d_copy(opening->along, cut->along);
 }
 

@@ -3,6 +3,7 @@
  * The cuts that ticks leave, in both kinds of numbers: what makes one, how they join, and what opens them.
  * Ticks are written out here, of a blade, handle or tube on the plane z = 0. Then integers next to double.
  */
+#include "../cases.h"
 #include "../unit.h"
 #include "../../../lib/base/random.h"
 #include "../../../lib/tissue/incision.h"
@@ -542,8 +543,8 @@ static void any_stroke(void)
 }
 
 /*
- * Random strokes of every tool: depth and opening never fall, a cut's ends only go apart, and the
- * same ticks give the same incision to the bit.
+ * Random strokes of every tool: depth and opening never fall, a cut's ends only go apart, between which
+ * it is nowhere uncut, and the same ticks give the same incision to the bit.
  */
 TEST_KINDS(test_grows_only, setup, teardown)
 {
@@ -562,6 +563,9 @@ TEST_KINDS(test_grows_only, setup, teardown)
 						    was[k].place[p].depth_mm &&
 					    c->place[p].open_mm >=
 						    was[k].place[p].open_mm);
+			for (int p = incise_cut_place(c->from_mm);
+			     p <= incise_cut_place(c->to_mm); p++)
+				assert_true(c->place[p].depth_mm > 0);
 			was[k] = *c;
 		}
 	}
@@ -703,4 +707,366 @@ TEST(test_same_cuts)
 	 */
 	if (apart * 100 > all)
 		fail_msg("%d of %d cuts are apart", apart, all);
+}
+
+/* --- which opening a tool is in, against an oracle ---------------------------------------------- */
+
+/*
+ * The review's case: a scratch of 30 mm, and a stab of no length beside it, 15 mm deep, with the blade across. The
+ * tube is stopped as without the stab, wherever it is; the handle along a deep cut meets that cut's direction.
+ */
+TEST_KINDS(test_a_stab_lends_nothing, setup, teardown)
+{
+	struct incise_opening without[41], now;
+
+	assert_true(cut(-15, 0, 15, 0, 1.2));
+	assert_true(cut(-15, 20, 15, 20, 12));
+	for (int i = 0; i <= 40; i++)
+		without[i] = opening(INCISE_TOOL_TUBE, 0.5 * i - 10, 0);
+	assert_true(kind->put(INCISE_TOOL_BLADE, 0, 0, 15, M_PI_2));
+	kind->lift();
+	/* And along it, which deepens the scratch itself. */
+	assert_true(kind->put(INCISE_TOOL_BLADE, 5, 0, 15, 0));
+	kind->lift();
+	assert_true(kind->put(INCISE_TOOL_BLADE, 0, 20, 15, M_PI_2));
+	kind->lift();
+	assert_int_equal(kind->cuts(), 4);
+	for (int i = 0; i <= 40; i++) {
+		now = opening(INCISE_TOOL_TUBE, 0.5 * i - 10, 0);
+		assert_true(now.in && now.depth_mm == without[i].depth_mm);
+		assert_int_equal(now.cut, without[i].cut);
+	}
+	for (int i = -8; i <= 8; i++) {
+		now = opening(INCISE_TOOL_HANDLE, 0.5 * i, 20);
+		assert_true(now.in && now.depth_mm == 12);
+		assert_true(fabs(now.along[0]) == 1 && now.along[1] == 0);
+		/* of the ends, by sums of steps */
+		assert_true(fabs(now.length_mm - 30) <= 2 * kind->rounding);
+	}
+}
+
+/* A cut that goes on round a curve lends its length, one round a corner none. */
+TEST_KINDS(test_goes_on_along_its_line, setup, teardown)
+{
+	static const struct {
+		double turn_deg;
+		bool in;
+	} cases[] = {{0, true}, {15, true}, {35, true}, {65, false}, {90, false}};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		double x = 40.0 * (double)i, turn = cases[i].turn_deg * M_PI / 180;
+
+		/* 7 mm each: a handle needs 11. */
+		for (int k = 0; k <= 140; k++) {
+			double to = 0.1 * k - 7, on = fmax(to, 0);
+
+			assert_true(kind->put(INCISE_TOOL_BLADE,
+					      x + fmin(to, 0) + on * cos(turn),
+					      on * sin(turn), 5, 0));
+		}
+		kind->lift();
+		assert_int_equal(opening(INCISE_TOOL_HANDLE, x - 4, 0).in, cases[i].in);
+		assert_int_equal(
+			opening(INCISE_TOOL_HANDLE, x + 5 * cos(turn), 5 * sin(turn)).in,
+			cases[i].in);
+	}
+}
+
+/* A way of the blade: one leg, or two with a little turn between them. */
+struct way {
+	double x, y, angle, length[2], turn;
+	int passes;
+	struct {
+		double from, to, depth;
+	} pass[3]; /* along the first leg, after the first pass along all */
+};
+
+#define WAYS 6
+
+static void place_on(const struct way *way, double s, double beside, double at[2])
+{
+	double on = fmax(s - way->length[0], 0), angle = way->angle;
+
+	s = fmin(s, way->length[0]);
+	at[0] = way->x + s * cos(angle) + on * cos(angle + way->turn);
+	at[1] = way->y + s * sin(angle) + on * sin(angle + way->turn);
+	angle += on > 0 ? way->turn : 0;
+	at[0] -= beside * sin(angle);
+	at[1] += beside * cos(angle);
+}
+
+static double whole(const struct way *way)
+{
+	return way->length[0] + way->length[1];
+}
+
+/* How deep the blade was there. */
+static double deep_on(const struct way *way, double s)
+{
+	double deep = 0;
+
+	for (int i = 0; i < way->passes; i++)
+		if (s >= way->pass[i].from && s <= way->pass[i].to)
+			deep = fmax(deep, way->pass[i].depth);
+	return deep;
+}
+
+/* What a surgeon would say, in steps of 0.05 mm along the ways: with this way the tool needs another length. */
+struct oracle {
+	double need, beside, shift, reach;
+	int way;
+	double need_of_way;
+};
+
+#define STEP_MM 0.05
+
+/* The deepest level at which a stretch of a way round @s is as long as the tool needs. */
+static double level_at(const struct way *way, double s, double need)
+{
+	double deepest = 0;
+
+	for (int i = 0; i < way->passes; i++) {
+		double level = way->pass[i].depth, low = s, high = s;
+
+		if (deep_on(way, s) < level)
+			continue;
+		while (low >= 0 && deep_on(way, low) >= level)
+			low -= STEP_MM;
+		while (high <= whole(way) && deep_on(way, high) >= level)
+			high += STEP_MM;
+		if (high - low >= need)
+			deepest = fmax(deepest, level);
+	}
+	return deepest;
+}
+
+/* Of one leg: how far away the tool is, and how deep it lets it in. @return whether it does */
+static bool ask_leg(const struct oracle *o, const struct way *ways, int which, int leg,
+		    const double at[2], double *away, double *depth)
+{
+	const struct way *way = &ways[which];
+	double angle = way->angle + (leg ? way->turn : 0), corner[2], s;
+	double begin = leg ? way->length[0] : 0;
+	double end = leg ? whole(way) : way->length[0];
+
+	if (leg && way->turn == 0)
+		return false;
+	place_on(way, begin, 0, corner);
+	s = begin + (at[0] - corner[0]) * cos(angle) + (at[1] - corner[1]) * sin(angle);
+	*away = fabs((at[1] - corner[1]) * cos(angle) - (at[0] - corner[0]) * sin(angle));
+	/* The next cut begins where the blade is 1 mm away from the line of the first, which goes so far. */
+	if (leg)
+		begin += INCISE_CUT_BESIDE_MM / fabs(sin(way->turn));
+	else if (way->turn != 0)
+		end += INCISE_CUT_BESIDE_MM / fabs(tan(way->turn));
+	*away = fmax(*away, fmax(begin - s, s - end));
+	s = fmin(fmax(fmin(fmax(s, begin), end) + o->shift, begin), end);
+	*depth = level_at(way, s, which == o->way ? o->need_of_way : o->need);
+	return *away <= o->reach && *depth > 0;
+}
+
+static double ask(const struct oracle *o, const struct way *ways, int n,
+		  const double at[2], int *which)
+{
+	double nearest = INFINITY, deepest = 0, away, depth;
+
+	*which = -1;
+	for (int i = 0; i < 2 * n; i++)
+		if (ask_leg(o, ways, i / 2, i % 2, at, &away, &depth))
+			nearest = fmin(nearest, away);
+	for (int i = 0; i < 2 * n; i++)
+		if (ask_leg(o, ways, i / 2, i % 2, at, &away, &depth) &&
+		    away <= nearest + o->beside && depth > deepest) {
+			deepest = depth;
+			*which = i / 2;
+		}
+	return deepest;
+}
+
+/* Whether two ways are apart, or cross at 58° or more. */
+static bool is_clear(const struct way *a, const struct way *b)
+{
+	for (double s = 0; s <= whole(a); s += 0.5)
+		for (double t = 0; t <= whole(b); t += 0.5) {
+			double p[2], q[2], between;
+
+			place_on(a, s, 0, p);
+			place_on(b, t, 0, q);
+			if (hypot(p[0] - q[0], p[1] - q[1]) > 3)
+				continue;
+			between = a->angle + (s > a->length[0] ? a->turn : 0) - b->angle -
+				  (t > b->length[0] ? b->turn : 0);
+			if (fabs(cos(between)) > cos(58 * M_PI / 180))
+				return false;
+		}
+	return true;
+}
+
+static void draw_way(struct way *way, double angle, const struct way *last)
+{
+	double at[2] = {any(-15, 15), any(-15, 15)};
+
+	/* Round the corner. */
+	if (last && any(0, 4) < 1)
+		place_on(last, whole(last), 0, at);
+	*way = (struct way){.x = at[0],
+			    .y = at[1],
+			    .angle = angle + (any(0, 2) < 1 ? M_PI_2 : 0) +
+				     any(-0.17, 0.17),
+			    .length = {any(0, 5) < 1 ? 0 : any(1, 26)},
+			    .passes = 1};
+	if (any(0, 2) < 1 && way->length[0] > 4) {
+		way->length[1] = any(4, 14);
+		way->turn = any(15, 35) * M_PI / 180 * (any(0, 2) < 1 ? 1 : -1);
+	}
+	way->pass[0].to = whole(way);
+	way->pass[0].depth = any(0.6, 15);
+	for (; way->length[0] > 4 && way->passes < 3 && any(0, 2) < 1; way->passes++) {
+		double from = any(0, way->length[0]), to = any(0, way->length[0]);
+
+		way->pass[way->passes].from = fmin(from, to);
+		way->pass[way->passes].to =
+			any(0, 3) < 1 ? fmin(from, to) : fmax(from, to);
+		way->pass[way->passes].depth = any(0.6, 15);
+	}
+}
+
+/* A procedure of up to WAYS ways that are to be cut. */
+static int draw_procedure(struct way *ways)
+{
+	int n = 1 + (int)any(0, WAYS), have = 0;
+	double angle = any(0, 2 * M_PI);
+
+	for (int tries = 0; have < n && tries < 50; tries++) {
+		bool clear = true;
+
+		draw_way(&ways[have], angle, have ? &ways[have - 1] : NULL);
+		for (int i = 0; i < have; i++)
+			clear = clear && is_clear(&ways[i], &ways[have]);
+		have += clear;
+	}
+	return have;
+}
+
+static void cut_way(const struct way *way)
+{
+	for (int i = 0; i < way->passes; i++) {
+		double gone = way->pass[i].to - way->pass[i].from, at[2];
+		int steps = (int)ceil(gone / 0.1);
+
+		for (int k = 0; k <= steps; k++) {
+			place_on(way, way->pass[i].from + (steps ? gone * k / steps : 0),
+				 0, at);
+			assert_true(kind->put(INCISE_TOOL_BLADE, at[0], at[1],
+					      way->pass[i].depth, way->angle));
+		}
+		kind->lift();
+	}
+}
+
+/*
+ * Whether a depth is one that the oracle says within tolerances: a stretch is longer than it was cut by a place at each end
+ * at most, so that a gap may close, and is seen by a place off; ends and lines are off by less than 0.2 mm, as a blade's steps are.
+ */
+static bool could_say(const struct oracle *o, const struct way *ways, int n,
+		      const double at[2], double depth)
+{
+	static const double off[] = {0, -1, 1};
+	struct way wide[WAYS];
+	double place = INCISE_CUT_SPACING_MM + STEP_MM, least = INFINITY, most = 0;
+
+	memcpy(wide, ways, (size_t)n * sizeof(*ways));
+	for (int i = 0; i < n; i++)
+		for (int k = 0; k < wide[i].passes; k++) {
+			wide[i].pass[k].from -= place;
+			wide[i].pass[k].to += place;
+		}
+	for (int i = 0; i < 486; i++)
+		for (int k = 0; k < n; k++) {
+			struct oracle other = {.need = o->need + 2 * place * off[i % 3],
+					       .need_of_way = o->need +
+							      2 * place * off[i / 3 % 3],
+					       .way = k,
+					       .beside = o->beside + 0.2 * off[i / 9 % 3],
+					       .shift = place * off[i / 27 % 3],
+					       .reach = o->reach + 0.2 * off[i / 81 % 3]};
+			int which;
+			double says = ask(&other, i < 243 ? ways : wide, n, at, &which);
+
+			least = fmin(least, says);
+			most = fmax(most, says);
+		}
+	return depth > least - 1e-4 && depth < most + 1e-4;
+}
+
+/* @return whether the opening is what the oracle says, without a tolerance */
+static bool compare_opening(const struct way *ways, int n, enum incise_tool tool,
+			    const double at[2], int procedure)
+{
+	bool tube = tool == INCISE_TOOL_TUBE;
+	struct oracle o = {.need = (tube ? M_PI_2 * 7 : 10 + 3) - STRETCH_MM,
+			   .reach = tube ? 3.5 : 5,
+			   .beside = INCISE_CUT_BESIDE_MM,
+			   .way = -1};
+	struct incise_opening got = opening(tool, at[0], at[1]);
+	int which;
+	double depth = ask(&o, ways, n, at, &which);
+	/* Rounding of a float or of an integer. */
+	bool same = fabs(depth - got.depth_mm) < 1e-4;
+
+	if (!same && !could_say(&o, ways, n, at, got.depth_mm))
+		fail_msg("procedure %d, tool %d at %.3f, %.3f: %.3f mm deep, not %.3f",
+			 procedure, tool, at[0], at[1], got.depth_mm, depth);
+	assert_int_equal(got.in, got.depth_mm > 0);
+	if (got.in)
+		assert_true(got.length_mm >= o.need);
+	if (same && got.in && ways[which].turn == 0)
+		assert_true(fabs(got.along[0] * cos(ways[which].angle) +
+				 got.along[1] * sin(ways[which].angle)) > 0.9999);
+	return same;
+}
+
+/*
+ * Random procedures: up to six ways of the blade, of any place, length, depth and direction, straight, bent or round a
+ * corner, deepened in parts, stabs of no length among them, many of which cross. The tools are at places on and beside them.
+ */
+#define PROCEDURES 1000
+#define PLACES_OF_EACH 10
+
+TEST_KINDS(test_openings_as_a_surgeon_expects)
+{
+	static const struct incise_double_incision_setup tissue = {.cuts_most = 32,
+								   .cut_from =
+									   CUT_FROM_MM,
+								   .stretch = STRETCH_MM,
+								   .handle_width = 10,
+								   .handle_thickness = 3,
+								   .tube = 7};
+	int n = cases_of(PROCEDURES, 100), same = 0, in = 0, all = 0;
+
+	drawn = cases_seed(1) << 32;
+	for (int p = 0; p < n; p++) {
+		struct way ways[WAYS];
+		int have = draw_procedure(ways);
+
+		assert_int_equal(make(&tissue), 0);
+		for (int i = 0; i < have; i++)
+			cut_way(&ways[i]);
+		for (int i = 0; i < PLACES_OF_EACH; i++) {
+			const struct way *way = &ways[(int)any(0, have)];
+			enum incise_tool tool =
+				i % 2 ? INCISE_TOOL_TUBE : INCISE_TOOL_HANDLE;
+			double at[2];
+
+			place_on(way, any(-2, whole(way) + 2), any(-4, 4), at);
+			same += compare_opening(ways, have, tool, at, p);
+			in += opening(tool, at[0], at[1]).in;
+			all++;
+		}
+		teardown(NULL);
+	}
+	printf("%d places, %d in an opening, %d to the oracle's depth\n", all, in, same);
+	assert_true(in > all / 3);
+	/* The rest is within its tolerances. */
+	assert_true(same > all * 0.98);
 }
