@@ -536,6 +536,19 @@ static void set_opening(const struct T(plan) *plan, struct T(state) *state,
 	});
 }
 
+/* The cut in which a blade is: of it only the depth counts, of a place as of an opening. */
+static void set_open(const struct T(plan) *plan, struct T(state) *state,
+		     const struct T(tick) *tick)
+{
+	struct bounds tool = at(ball_of(tick->tool)), depth = at(state->depth.id);
+
+	state->open = 0;
+	if (plan->numbers.inserts && !plan->has_model && choose(2))
+		state->open = num::of(
+			put({0, plan->reach_mm, depth.in + tool.in / ENTERS,
+			     depth.own + tool.own / ENTERS + lsb_mm(), 16, false}));
+}
+
 /* Where the tool meets the membrane, at this tick or before: it changes depth and force. */
 static void meet_membrane(const struct T(plan) *plan, struct T(state) *state,
 			  struct T(tick) *tick)
@@ -585,6 +598,8 @@ static void run_contact(const struct T(plan) *plan, struct T(state) *state,
 	T(stage_normal)(plan, state, tick);
 	if (state->held != INCISE_TOOL_BLADE)
 		set_opening(plan, state, tick);
+	else
+		set_open(plan, state, tick);
 	meet_membrane(plan, state, tick);
 }
 

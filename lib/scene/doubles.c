@@ -14,7 +14,8 @@ static void set_reaction(const struct incise_plan *plan,
 	bool model = plan->model || plan->fixed, front = model && plan->dissipates;
 
 	numbers->unloading = front ? plan->unloading_N_mm : 0;
-	if (!front)
+	/* Of a spring it is felt in a cut that was there, which scenes have that open one. */
+	if (!front && (model || !plan->inserts))
 		numbers->friction = 0;
 	if (!model)
 		return;

@@ -116,6 +116,16 @@ static void check_others(struct T(incision) *incision, const num to[3])
 	v_copy(incision->checked, to);
 }
 
+/* The blade is in this cut from now on: it opens by what was cut before. */
+static void come_into(struct T(incision) *incision, int cut)
+{
+	if (incision->entered && incision->growing == cut)
+		return;
+	incision->was = incision->cut[cut];
+	incision->growing = cut;
+	incision->entered = true;
+}
+
 /* Start a cut along a direction in the surface. Returns whether there is one more. */
 static bool begin_cut(struct T(incision) *incision, const struct T(incision_setup) *setup,
 		      const num at[3], const dir along[3], const dir normal[3])
@@ -129,7 +139,8 @@ static bool begin_cut(struct T(incision) *incision, const struct T(incision_setu
 	d_copy(cut->normal, normal);
 	d_copy(cut->along, along);
 	d_cross(cut->side, normal, cut->along);
-	incision->growing = incision->n++;
+	/* As many as there are now: it is no earlier one. */
+	come_into(incision, incision->n++);
 	v_copy(incision->at, at);
 	v_copy(incision->checked, at);
 	v_copy(incision->behind, at);
@@ -212,7 +223,7 @@ static bool enter(struct T(incision) *incision, const struct T(incision_setup) *
 	T(line_along)(along, normal, side);
 	there = find_cut(incision, at, along, normal);
 	if (there >= 0)
-		incision->growing = there;
+		come_into(incision, there);
 	else if (!begin_cut(incision, setup, at, along, normal))
 		return false;
 	v_copy(incision->at, at);
@@ -238,7 +249,7 @@ static bool turn_away(struct T(incision) *incision, const struct T(incision_setu
 	way_along(along, incision->behind, at, normal);
 	there = find_cut(incision, at, along, normal);
 	if (there >= 0)
-		incision->growing = there;
+		come_into(incision, there);
 	else if (!begin_cut(incision, setup, from, along, normal))
 		return false;
 	join(incision, incision->growing, before);
@@ -261,18 +272,47 @@ static void check_at_places(struct T(incision) *incision, const num at[3],
 	check_others(incision, at);
 	there = find_cut(incision, at, incision->cut[before].along, normal);
 	if (there >= 0 && there < before) {
-		incision->growing = there;
+		come_into(incision, there);
 		join(incision, there, before);
 	}
 }
 
-bool T(incision_cut)(struct T(incision) *incision, const struct T(incision_setup) *setup,
+/*
+ * Depth of the cut in which a blade is. Its own cutting does not count before the next contact, or the force of the
+ * blade that cuts would be gone.
+ */
+static num open_depth(const struct T(incision) *incision, const num at[3],
+		      const dir normal[3], const dir side[3])
+{
+	const struct T(cut) *cut;
+	struct local here;
+	dir along[3];
+	int there = incision->growing;
+
+	if (!incision->n)
+		return 0;
+	T(line_along)(along, normal, side);
+	if (!incision->cutting)
+		there = find_cut(incision, at, along, normal);
+	if (there < 0)
+		return 0;
+	cut = &incision->cut[there];
+	if (incision->entered && there == incision->growing)
+		cut = &incision->was;
+	here = localize(cut, at);
+	if (!reaches(cut, &here, BESIDE) ||
+	    !d_below(ALONG, d_abs(d_dot(along, cut->along))))
+		return 0;
+	return cut->place[place_of(n_within(here.along, cut->from_mm, cut->to_mm))]
+		.depth_mm;
+}
+
+static bool cut_here(struct T(incision) *incision, const struct T(incision_setup) *setup,
 		     const num proxy[3], const dir normal[3], const dir side[3],
 		     num depth)
 {
 	num leap[3];
 
-	incision->met.in = false;
 	if (!n_below(setup->cut_from, depth) || n_below(DEPTH_MOST, depth)) {
 		incision->cutting = false;
 		return true;
@@ -293,6 +333,17 @@ bool T(incision_cut)(struct T(incision) *incision, const struct T(incision_setup
 	v_copy(incision->at, proxy);
 	incision->depth = depth;
 	return true;
+}
+
+bool T(incision_cut)(struct T(incision) *incision, const struct T(incision_setup) *setup,
+		     const num proxy[3], const dir normal[3], const dir side[3],
+		     num depth)
+{
+	bool made = cut_here(incision, setup, proxy, normal, side, depth);
+
+	incision->met.in = false;
+	incision->open = open_depth(incision, proxy, normal, side);
+	return made;
 }
 
 /* --- handle and tube ------------------------------------------------------------------- */

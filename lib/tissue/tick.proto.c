@@ -4,7 +4,7 @@
  * model as the first of them. P is the tool's end, P0 where the contact began, n the outward normal (the
  * paper's Sn, or Snavg), d the depth.
  *
- *   cutting     reaction    F += Kn d n                      §2.2, Fn
+ *   cutting     reaction    F += Kn d n                      §2.2, Fn; less in an open cut
  *               with a model F += F(d, |v|) n       Song et al. (2006), eq. (3), by the front
  *                                                            of front.proto.c
  *               plane       F -= Kx ((P-P0)·s) s             §2.2, Fx
@@ -365,6 +365,18 @@ void T(stage_normal)(const struct T(plan) *plan, struct T(state) *state,
 	d_copy(tick->normal, state->normal);
 }
 
+/*
+ * How deep the blade meets friction only, D: F = K (u min(d, D) + max(d - D, 0)), which is a potential of d. Where
+ * the cut is deeper than D, D grows, and the tissue loses what it would give back; where it is not, D falls to d
+ * and no further, as the force does not change by that. So no motion, along the cut or out of it, returns work.
+ */
+static void open_blade(struct T(state) *state, num open)
+{
+	num before = state->proxy.began ? 0 : n_min(state->open, state->depth);
+
+	state->open = n_max(open, before);
+}
+
 /* An instrument meets the opening as it was when it went in: it makes the way easier for the next. */
 void T(stage_incision)(const struct T(plan) *plan, struct T(state) *state,
 		       struct T(tick) *tick)
@@ -375,6 +387,8 @@ void T(stage_incision)(const struct T(plan) *plan, struct T(state) *state,
 
 	if (!plan->numbers.inserts)
 		return;
+	if (state->proxy.began)
+		cuts->entered = false;
 	if (tick->phase == INCISE_PHASE_FREE)
 		T(incision_leave)(cuts);
 	else if (inserts)
@@ -390,6 +404,8 @@ void T(stage_incision)(const struct T(plan) *plan, struct T(state) *state,
 	} else if (!inserts && !is_stale_tick(tick)) {
 		state->opening.in = false;
 	}
+	if (tick->phase == INCISE_PHASE_CUTTING)
+		open_blade(state, cuts->open);
 	if (inserts && state->opening.in)
 		tick->flags |= INCISE_TICK_IN_CUT;
 }
@@ -593,12 +609,13 @@ void T(stage_reaction)(const struct T(plan) *plan, struct T(state) *state,
 		       struct T(tick) *tick)
 {
 	const struct T(numbers) *numbers = &plan->numbers;
-	num size, fresh, friction;
+	num size, fresh, friction, open = n_min(state->depth, state->open);
 
 	if (tick->phase != INCISE_PHASE_CUTTING)
 		return;
 	if (!plan->has_model) {
-		size = n_times(numbers->reaction, state->depth);
+		size = n_add(n_sub(state->depth, open), n_times(numbers->friction, open));
+		size = n_times(numbers->reaction, size);
 	} else if (!n_below(0, numbers->unloading)) {
 		size = T_JOINED(state, cutting_force(plan, state, tick));
 	} else {

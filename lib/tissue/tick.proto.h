@@ -146,6 +146,9 @@ struct T(incision) {
 	num checked[3];	  /* up to here, for other cuts that it meets */
 	num behind[3];	  /* the place before that: a way that is no noise */
 	struct T(opening) met; /* of handle or tube at this tick */
+	num open;	       /* depth of the cut in which the blade is, as it was … */
+	struct T(cut) was;     /* … when the blade came into it in this contact */
+	int32_t entered;       /* it did */
 	int32_t n;
 	struct T(cut) cut[CUTS];
 };
@@ -337,6 +340,7 @@ struct T(state) {
 	int64_t touched_ns; /* when the contact began */
 	num deepest;	    /* of the blade since then */
 	int32_t skin_open;  /* it came into a cut that was there */
+	num open;	    /* so deep a spring meets friction only */
 	dir side[3];	    /* of the blade when its contact began: Sx(0) */
 	dir flat[3];	    /* of blade and handle now */
 	int32_t averaged;   /* the average has begun in this contact */

@@ -17,7 +17,7 @@ struct given {
 	double attitude[4], flat[3]; /* of the handle: as it lies, and as it is made */
 	double made[3], axis[3];
 	bool in, printed;
-	double cut, along[3], tightness;
+	double cut, along[3], tightness, open;
 	double number[INCISE_FORCES][INCISE_FORCE_NUMBERS];
 };
 
@@ -56,6 +56,7 @@ static void give_fixed(const struct given *g, struct incise_fixed_numbers *to)
 		state.opening.in = g->in;                                           \
 		state.opening.depth_mm = n(g->cut);                                 \
 		state.tightness = n(g->tightness);                                  \
+		state.open = n(g->open);                                            \
 		for (int i = 0; i < 4; i++)                                         \
 			state.attitude[i] = d(g->attitude[i]);                      \
 		for (int i = 0; i < 3; i++) {                                       \
@@ -113,6 +114,27 @@ static void reaction(double force[3], double size_N, const double n[3])
 
 	v3_copy(g.normal, n);
 	kind->add(&g, INCISE_FORCE_REACTION, force);
+}
+
+/* In a cut that is so deep the blade meets a share of it. */
+TEST(test_a_blade_in_an_open_cut)
+{
+	static const struct {
+		double depth, open, want;
+	} cases[] = {{8, 0, 4}, {8, 3, 2.65}, {8, 8, 0.4}, {8, 20, 0.4}, {0, 3, 0}};
+
+	EACH_KIND
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct given g = {.phase = INCISE_PHASE_CUTTING,
+				  .depth = cases[i].depth,
+				  .open = cases[i].open,
+				  .normal = {0, 0, 1},
+				  .number[INCISE_FORCE_REACTION] = {0.5, 0, 0.1}};
+		double force[3] = {0};
+
+		kind->add(&g, INCISE_FORCE_REACTION, force);
+		assert_true(fabs(force[2] - cases[i].want) < kind->ulp);
+	}
 }
 
 static void plane(double force[3], double k_N_mm, const double p[3], const double p0[3],

@@ -709,6 +709,155 @@ TEST(test_same_cuts)
 		fail_msg("%d of %d cuts are apart", apart, all);
 }
 
+/* --- a blade in a cut that is there -------------------------------------------------------------- */
+
+#define KN 0.14
+#define SLIDES 0.1 /* friction */
+#define CONTACTS 400
+#define BLADE_TICKS 300
+
+/* Stages incision and reaction of a blade on the plane z = 0: the force along it. */
+#define BLADE(kind, num_of, dir_of, back, cuts)                                     \
+	static double force_##kind(bool began, double x, double depth, double turn) \
+	{                                                                           \
+		static struct incise_##kind##_plan plan;                            \
+		static struct incise_##kind##_state state;                          \
+		struct incise_##kind##_tick tick = {.phase = INCISE_PHASE_CUTTING}; \
+                                                                                    \
+		plan.numbers.inserts = true;                                        \
+		plan.numbers.incision = *setup_##kind();                            \
+		plan.numbers.reaction = num_of(KN);                                 \
+		plan.numbers.friction = num_of(SLIDES);                             \
+		state.held = INCISE_TOOL_BLADE;                                     \
+		state.proxy.began = began;                                          \
+		state.depth = num_of(depth);                                        \
+		state.normal[2] = dir_of(1);                                        \
+		state.flat[0] = dir_of(-sin(turn));                                 \
+		state.flat[1] = dir_of(cos(turn));                                  \
+		state.force[2] = 0;                                                 \
+		tick.proxy[0] = num_of(x);                                          \
+		cuts(&state);                                                       \
+		incise_##kind##_stage_incision(&plan, &state, &tick);               \
+		incise_##kind##_stage_reaction(&plan, &state, &tick);               \
+		cuts##_back(&state);                                                \
+		return state.force[2] back;                                         \
+	}
+
+static const struct incise_double_incision_setup *setup_double(void)
+{
+	static const struct incise_double_incision_setup tissue = {.cuts_most = CUTS_MOST,
+								   .cut_from =
+									   CUT_FROM_MM,
+								   .stretch = STRETCH_MM,
+								   .handle_width = 10,
+								   .handle_thickness = 3,
+								   .tube = 7};
+
+	return &tissue;
+}
+
+static const struct incise_fixed_incision_setup *setup_fixed(void)
+{
+	return &fixed_setup;
+}
+
+#define AS_IS(x) (x)
+#define point(state) ((state)->incision = incise_incision_of(in_double))
+#define point_back(state) ((void)(state))
+#define copy(state) ((state)->incision = in_integers)
+#define copy_back(state) (in_integers = (state)->incision)
+
+/* clang-format off */
+BLADE(double, AS_IS, AS_IS, , point)
+BLADE(fixed, q16, q30, / ONE, copy)
+/* clang-format on */
+
+static double force(bool began, double x, double depth, double turn)
+{
+	return (kind == kinds ? force_double : force_fixed)(began, x, depth, turn);
+}
+
+/* Numbers of 16 bits, and their products. */
+#define SAME_N (kind == kinds ? 1e-12 : 4 / ONE)
+
+static double force_in(double cut_mm, double depth_mm)
+{
+	double open_mm = fmin(cut_mm, depth_mm);
+
+	return KN * (SLIDES * open_mm + depth_mm - open_mm);
+}
+
+/* Friction down to the floor of a cut that was there, skin below; its own cutting counts from the next contact on. */
+TEST_KINDS(test_back_in_a_cut, setup, teardown)
+{
+	bool began = true;
+
+	for (double d = 0; d <= 8; d += 0.25, began = false)
+		assert_true(fabs(force(began, 0, d, 0) - KN * d) < SAME_N);
+	for (double d = 8; d >= 0; d -= 0.25)
+		assert_true(fabs(force(false, 0, d, 0) - KN * d) < SAME_N);
+	kind->lift();
+	/* In the next, and beside it; on the way out the same. */
+	for (int i = 0; i <= 96; i++) {
+		double d = 0.25 * fmin(i, 96 - i);
+
+		assert_true(fabs(force(i == 0, 0.5 * (i > 48), d, 0) - force_in(8, d)) <
+			    SAME_N);
+	}
+	kind->lift();
+	/* As deep as it was cut then. Turned by more than 30° it is new tissue, so is skin beyond its end. */
+	assert_true(fabs(force(true, 0, 11, 0.4) - force_in(12, 11)) < SAME_N);
+	kind->lift();
+	assert_true(fabs(force(true, 0, 0.4, 0.6) - KN * 0.4) < SAME_N);
+	kind->lift();
+	assert_true(fabs(force(true, 2, 0.4, 0) - KN * 0.4) < SAME_N);
+}
+
+/*
+ * Any way of the blade along a line that was cut to several depths, deeper and out again, by a place or a depth in each
+ * tick: it is continuous in depth, never pulls, and returns no more work than it took.
+ */
+TEST_KINDS(test_a_blade_in_cuts_returns_no_work, setup, teardown)
+{
+	double most = 0, least = INFINITY, before, now, step = 1.0 / 16;
+
+	drawn = cases_seed(1) << 32;
+	for (int c = 0; c < cases_of(CONTACTS, 40); c++) {
+		double x = any(-20, 20), d = 0, work = 0, put = 0;
+
+		before = force(true, x, 0, 0);
+		assert_true(before == 0);
+		for (int i = 0; i < BLADE_TICKS || d > 0; i++) {
+			bool aside = i < BLADE_TICKS && any(0, 3) < 1;
+			double way =
+				any(0, 1) < (i % 150 < 80 ? 0.85 : 0.2) ? step : -step;
+
+			way = d + way < 0 ? -d : d + way > 12 ? 0 : way;
+			way = i < BLADE_TICKS ? way : -fmin(d, step);
+			if (aside)
+				x += any(-0.4, 0.4);
+			else
+				d += way;
+			now = force(false, x, d, 0);
+			assert_true(now >= 0 && now <= KN * d + SAME_N);
+			/* Sideways it may fall, as tissue is cut there; it never rises. */
+			assert_true(aside ? now <= before + SAME_N
+					  : fabs(now - before) <= KN * step + SAME_N);
+			if (!aside)
+				work += (now + before) / 2 * way;
+			put += aside ? 0 : fmax(way, 0) * now;
+			before = now;
+		}
+		kind->lift();
+		/* Floors of cuts lie between two depths here: the trapezoid's error there. */
+		assert_true(work >= -(SAME_N * BLADE_TICKS + KN * step * step * 20));
+		most = fmax(most, work);
+		least = fmin(least, work / put);
+	}
+	assert_true(most > 0.1);
+	assert_true(least < 0.05);
+}
+
 /* --- which opening a tool is in, against an oracle ---------------------------------------------- */
 
 /*
