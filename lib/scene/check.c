@@ -591,70 +591,37 @@ static int search(struct incise_plan *plan, const struct incise_tracker_info *tr
 	return rc;
 }
 
-/* Both checks, with all forces so many times as strong, on a device with this damping. Of the search only a way, or all: -1. */
+/*
+ * Both checks, with all forces so many times as strong, on a device with this damping: of the search only the way
+ * *@way, or all where that is below 0, and then *@way becomes the one that swung.
+ */
 static bool holds_still(struct incise_plan *plan,
 			const struct incise_tracker_info *tracker, double share,
-			double damping_N_s_mm, int way)
+			double damping_N_s_mm, int *way)
 {
-	const struct incise_rest_trial trial = {share, damping_N_s_mm, way};
+	const struct incise_rest_trial trial = {share, damping_N_s_mm, *way};
 	struct incise_haptic_device *device = &plan->stability.device;
 	const double own_N_s_mm = device->damping_N_s_mm;
-	struct incise_rest rest;
+	struct incise_rest rest = {.way = -1};
 	bool still;
 
 	device->damping_N_s_mm = damping_N_s_mm;
 	still = stable(plan, share) && !search(plan, tracker, &trial, &rest) &&
 		rest.rests;
 	device->damping_N_s_mm = own_N_s_mm;
+	if (!still && *way < 0)
+		*way = rest.way;
 	return still;
 }
 
 /*
- * The advice is found by halvings of its logarithm between what was refused and what holds, which is looked for down
- * to a 64th of the gain, and up to 16 times the damping.
+ * The advice is looked for down to a 64th of the gain, and up to 16 times the damping: by the way that swung alone, by
+ * halvings of its logarithm, and then tried in all ways; if another one swings, by that one.
  */
 #define GAIN_LEAST (1.0 / 64)
 #define DAMPING_MOST 16 /* times the device's own, or than 1 mN s/mm */
 #define HALVINGS 4
-
-/* The largest gain, in three digits, that was tried and holds; 0: none was found. @way swung, or -1. */
-static double best_gain(struct incise_plan *plan,
-			const struct incise_tracker_info *tracker, int way)
-{
-	double damping = plan->stability.device.damping_N_s_mm, low, high = 1;
-
-	if (!stable(plan, 1)) {
-		high = fmin(largest_gain(plan) / plan->gain, 1);
-		low = three_digits_down(high * plan->gain);
-		if (holds_still(plan, tracker, low / plan->gain, damping, -1))
-			return low;
-	}
-	/* Where the way that swung does not swing, the others are tried. */
-	for (low = high / 2; low > GAIN_LEAST; low /= 2)
-		if (holds_still(plan, tracker, low, damping, way) &&
-		    holds_still(plan, tracker, low, damping, -1))
-			break;
-	if (low <= GAIN_LEAST)
-		return 0;
-	high = 2 * low;
-	for (int i = 0; i < HALVINGS; i++) {
-		double middle = sqrt(low * high);
-		double gain = three_digits_down(middle * plan->gain);
-
-		middle = gain / plan->gain;
-		*(holds_still(plan, tracker, middle, damping, way) &&
-				  holds_still(plan, tracker, middle, damping, -1)
-			  ? &low
-			  : &high) = middle;
-	}
-	for (int i = 0; i < HALVINGS; i++, low *= 0.95) {
-		double gain = three_digits_down(low * plan->gain);
-
-		if (holds_still(plan, tracker, gain / plan->gain, damping, -1))
-			return gain;
-	}
-	return 0;
-}
+#define ATTEMPTS 6
 
 static double three_digits_up(double value)
 {
@@ -663,29 +630,74 @@ static double three_digits_up(double value)
 	return ceil(value / unit) * unit;
 }
 
-/* The smallest damping of the device that was tried and holds; 0: none was found. */
+/* A gain as a share of the plan's, or a damping. */
+struct advice {
+	bool damps;
+	double most; /* so many times less, or more */
+};
+
+static bool helps(struct incise_plan *plan, const struct incise_tracker_info *tracker,
+		  const struct advice *advice, double value, int *way)
+{
+	return advice->damps ? holds_still(plan, tracker, 1, value, way)
+			     : holds_still(plan, tracker, value / plan->gain,
+					   plan->stability.device.damping_N_s_mm, way);
+}
+
+/* The nearest value to @from, in three digits, that was tried and holds; 0: none was found. @way swung, or -1. */
+static double find_advice(struct incise_plan *plan,
+			  const struct incise_tracker_info *tracker,
+			  const struct advice *advice, double from, int way)
+{
+	double (*round)(double) = advice->damps ? three_digits_up : three_digits_down;
+	double factor = advice->damps ? 2 : 0.5,
+	       end = from * pow(factor, log2(advice->most));
+
+	for (int i = 0; i < ATTEMPTS; i++) {
+		double good, bad = from;
+		int any = -1;
+
+		/* The plan as it is was tried. */
+		if (way < 0 || i) {
+			if (helps(plan, tracker, advice, round(from), &any))
+				return round(from);
+			way = any;
+		}
+		for (good = factor * from; !helps(plan, tracker, advice, good, &way);
+		     good *= factor) {
+			if (advice->damps ? good > end : good < end)
+				return 0;
+			bad = good;
+		}
+		for (int k = 0; k < HALVINGS; k++) {
+			double middle = sqrt(good * bad);
+
+			*(helps(plan, tracker, advice, middle, &way) ? &good : &bad) =
+				middle;
+		}
+		from = round(good);
+	}
+	return 0;
+}
+
+static double best_gain(struct incise_plan *plan,
+			const struct incise_tracker_info *tracker, int way)
+{
+	const struct advice advice = {false, 1 / GAIN_LEAST};
+	double from = plan->gain;
+
+	if (!stable(plan, 1))
+		from = fmin(largest_gain(plan), from);
+	return from > 0 ? find_advice(plan, tracker, &advice, from, way) : 0;
+}
+
 static double best_damping(struct incise_plan *plan,
 			   const struct incise_tracker_info *tracker, int way)
 {
-	double low = fmax(plan->stability.device.damping_N_s_mm, 1e-3), high = low;
+	const struct advice advice = {true, DAMPING_MOST};
 
-	do {
-		low = high;
-		high = three_digits_up(2 * low);
-		if (high >
-		    DAMPING_MOST * fmax(plan->stability.device.damping_N_s_mm, 1e-3))
-			return 0;
-	} while (!holds_still(plan, tracker, 1, high, way) ||
-		 !holds_still(plan, tracker, 1, high, -1));
-	for (int i = 0; i < HALVINGS; i++) {
-		double middle = three_digits_up(sqrt(low * high));
-
-		*(holds_still(plan, tracker, 1, middle, way) &&
-				  holds_still(plan, tracker, 1, middle, -1)
-			  ? &high
-			  : &low) = middle;
-	}
-	return high;
+	return find_advice(plan, tracker, &advice,
+			   fmax(plan->stability.device.damping_N_s_mm, 1e-3), way);
 }
 
 /* What was tried, and holds. */

@@ -125,7 +125,7 @@ static const struct {
 	{AT(skin_friction), 0, INT32_MAX, ANY},
 	{AT(reserved[0]), 0, 0, ANY},
 	{AT(account), 0, INT32_MAX, ANY},
-	{AT(upright), 0, ONE, ANY},
+	{AT(upright), 0, 1 << 16, ANY},
 	{AT(reserved[2]), 0, 0, ANY},
 };
 
