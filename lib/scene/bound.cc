@@ -43,6 +43,7 @@ struct T(opening) {
 #include "../tissue/touch.proto.h"
 #undef T_AXES_MAX
 #undef T_AVERAGE_MAX
+#undef T_FRONT_CUTS
 #undef T_PUNCTURES
 #undef T_WITHDRAWS
 #include "../tissue/tick.proto.h"
@@ -733,7 +734,8 @@ static void settle_skin(struct tick *t)
 }
 
 /*
- * The line of a cut began where the contact did; from there both ends are as uncertain as the tool. Its length
+ * A cut that is remembered was the front's own, so that its numbers are as far off as that one's; which of them holds
+ * the blade is a decision. The line of a cut began where the contact did; from there both ends are as uncertain as the tool. Its length
  * is what the front came up by in all ticks together: no more than that adds up.
  */
 static void set_line(struct T(state) *state, const struct T(tick) *tick, double reach,

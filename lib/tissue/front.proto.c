@@ -22,7 +22,7 @@
  * A blade that moves along the skin meets new tissue at each mm, which the front has not reached: front
  * and rest come up by as much, as long as the elastic energy stays below the work that was put in since
  * the blade entered, a sixteenth of which is never given back. Back within its own cut it meets nothing
- * new.
+ * new. The cuts that it left before stay as well: as deep as the front was when it left them.
  */
 
 /* Below this the blade lies flat on the surface, and its cut has no direction. */
@@ -69,31 +69,80 @@ static num place_along(const struct T(line) *line, const num at[3])
 	return v_along(off, line->along);
 }
 
+static void off_line(num off[3], const struct T(line) *line, const num at[3])
+{
+	num s = n_within(place_along(line, at), line->from, line->to);
+
+	v_sub(off, at, line->at);
+	v_add(off, off, n_neg(s), line->along);
+}
+
 /* Whether a point of the surface lies beside the line, or nearer. */
 static bool holds(const struct T(line) *line, const num at[3])
 {
-	num off[3], s;
+	num off[3];
 
 	if (!line->there)
 		return false;
-	s = n_within(place_along(line, at), line->from, line->to);
-	v_sub(off, at, line->at);
-	v_add(off, off, n_neg(s), line->along);
+	off_line(off, line, at);
 	return v_is_short(off, BESIDE);
+}
+
+static bool is_nearer(const struct T(line) *a, const struct T(line) *b, const num at[3])
+{
+	num from_a[3], from_b[3];
+
+	off_line(from_a, a, at);
+	off_line(from_b, b, at);
+	return n_below(v_length(from_a), v_length(from_b));
 }
 
 /* --- front --- */
 
+/* The cut that the front leaves stays as it is. */
+static void keep(struct T(front) *front)
+{
+	if (!front->line.there)
+		return;
+	front->n = front->n ? front->n : 1;
+	front->kept[front->in].line = front->line;
+	front->kept[front->in].cut = front->cut;
+}
+
+static void begin_cut_of(struct T(front) *front, const num at[3], const dir normal[3],
+			 const dir side[3])
+{
+	front->newest =
+		front->n < T_FRONT_CUTS ? front->n : (front->newest + 1) % T_FRONT_CUTS;
+	front->n = front->n < T_FRONT_CUTS ? front->n + 1 : front->n;
+	front->in = front->newest;
+	begin_line(&front->line, at, normal, side);
+}
+
 bool T(front_enter)(struct T(front) *front, const num at[3], const dir normal[3],
 		    const dir side[3])
 {
-	bool fresh = !holds(&front->line, at);
+	int there = -1;
 
+	keep(front);
+	for (int i = 0; i < front->n; i++) {
+		const struct T(line) *line = &front->kept[i].line;
+
+		if (holds(line, at) &&
+		    (there < 0 || is_nearer(line, &front->kept[there].line, at)))
+			there = i;
+	}
 	/* The work of an earlier visit pays for nothing now. */
-	*front = (struct T(front)){.cut = fresh ? 0 : front->cut, .line = front->line};
-	if (fresh)
-		begin_line(&front->line, at, normal, side);
-	return fresh;
+	front->depth = front->force = front->rest = front->cut = 0;
+	front->work2 = front->most2 = 0;
+	if (there < 0) {
+		begin_cut_of(front, at, normal, side);
+		return true;
+	}
+	front->in = there;
+	front->line = front->kept[there].line;
+	front->cut = front->kept[there].cut;
+	return false;
 }
 
 num T(front_advance)(struct T(front) *front, const num at[3], const dir normal[3],
@@ -107,7 +156,8 @@ num T(front_advance)(struct T(front) *front, const num at[3], const dir normal[3
 	if (holds(line, at))
 		return n_sub(n_sub(line->to, line->from), length);
 	/* It left the line sideways; a curved skin does that too. The cut goes on from here. */
-	begin_line(line, at, normal, side);
+	keep(front);
+	begin_cut_of(front, at, normal, side);
 	return BESIDE;
 }
 

@@ -94,7 +94,9 @@ struct T(line) {
 /* The direction of a blade in a surface; any there when it lies flat. side and normal are unit. */
 void T(line_along)(dir along[3], const dir normal[3], const dir side[3]) INCISE_REALTIME;
 
-/* The front of a cut; see front.proto.c. Begins with {0}. */
+#define T_FRONT_CUTS 8
+
+/* The front of a cut; see front.proto.c. Begins with {0}. It remembers this many cuts, with the one in which it is. */
 struct T(front) {
 	num depth, force; /* of the last call */
 	num rest;	  /* the elastic force is 0 here */
@@ -102,10 +104,16 @@ struct T(front) {
 	wide work2,
 		most2; /* twice the work put in, less what came back; the most so far */
 	struct T(line) line;
+	struct {
+		struct T(line) line;
+		num cut;
+	} kept[T_FRONT_CUTS]; /* as they were left; that in which it is, as it was entered */
+	int32_t n, in, newest; /* so many there are; it is in this one; this began last */
 };
 
 /*
- * The blade meets the skin at a place of it: in the cut that it left, which stays, or in a new one.
+ * The blade meets the skin at a place of it: in the nearest of the cuts that it left and that hold it, or in a new
+ * one, for which the cut that began first is forgotten.
  * Returns whether the cut is new.
  */
 bool T(front_enter)(struct T(front) *front, const num at[3], const dir normal[3],

@@ -288,6 +288,71 @@ TEST_KINDS(test_reach)
 	}
 }
 
+static bool enter_at(double x, double y)
+{
+	return kind->place(true, (const double[]){x, y, 0}, up, side);
+}
+
+/* A cut of 10 mm at @y, so deep; how deep it was left open. */
+static double cut_at(double y, double depth)
+{
+	double cut;
+
+	assert_true(enter_at(0, y));
+	kind->place(false, (const double[]){10, y, 0}, up, side);
+	go(depth, FRICTION);
+	cut = kind->seen().cut;
+	go(0, FRICTION);
+	return cut;
+}
+
+/* Back in any of the last cuts it is as it was left: friction, and new tissue beyond its floor. */
+TEST_KINDS(test_several_cuts)
+{
+	double cut[T_FRONT_CUTS + 1];
+
+	fresh();
+	for (int i = 0; i <= T_FRONT_CUTS; i++)
+		cut[i] = cut_at(3 * i, 5 + i);
+	for (int i = T_FRONT_CUTS; i > 0; i--) {
+		assert_false(enter_at(5, 3 * i));
+		assert_true(kind->seen().cut == cut[i] && cut[i] > 1);
+		near(go(1, FRICTION), FRICTION * law(1, 0));
+		/* Deeper, which is remembered too. */
+		go(15 + i, FRICTION);
+		cut[i] = kind->seen().cut;
+	}
+	for (int i = 1; i <= T_FRONT_CUTS; i++) {
+		assert_false(enter_at(5, 3 * i));
+		assert_true(kind->seen().cut == cut[i]);
+	}
+	/* The one that began first was forgotten for the last; so is the second for it now. */
+	assert_true(enter_at(5, 0));
+	assert_true(kind->seen().cut == 0);
+	assert_true(enter_at(5, 3));
+	for (int i = 3; i <= T_FRONT_CUTS; i++)
+		assert_false(enter_at(5, 3 * i));
+}
+
+/* Of two cuts that hold the blade it is in the nearer one; a cut that it left sideways stays, too. */
+TEST_KINDS(test_the_nearest_cut)
+{
+	double a, b;
+
+	fresh();
+	a = cut_at(0, 10);
+	b = cut_at(1.5, 4);
+	assert_true(a > b);
+	assert_false(enter_at(5, 0.7));
+	assert_true(kind->seen().cut == a);
+	assert_false(enter_at(5, 0.9));
+	assert_true(kind->seen().cut == b);
+	kind->place(false, (const double[]){5, 8, 0}, up, side);
+	assert_false(enter_at(9, 1.5));
+	assert_true(kind->seen().cut == b);
+	assert_false(enter_at(5, 8));
+}
+
 /* --- forces ----------------------------------------------------------------------------- */
 
 TEST_KINDS(test_in_back_and_in_again)
