@@ -157,11 +157,15 @@ static void bad_burst(struct run *run, enum bad bad)
 	}
 }
 
-/* 6 mm of at least 0.1 N/mm, less what dents of the surface take off; an open cut has less. */
+/*
+ * 6 mm of at least 0.1 N/mm, less what dents of the surface take off; an open cut has less: of a front any, of a
+ * spring a tenth, where cuts are kept.
+ */
 static bool pushes(const struct fed_run *fed, double push_N)
 {
 	return fed->tick.flags & INCISE_TICK_CONTACT &&
-	       (fed->plan->dissipates ? isfinite(push_N) : push_N > 0.1);
+	       (fed->plan->dissipates ? isfinite(push_N)
+				      : push_N > (fed->plan->inserts ? 0.01 : 0.1));
 }
 
 /* Nothing of what was before is left: no force in the air, and one in the tissue. */

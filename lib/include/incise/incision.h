@@ -71,9 +71,9 @@ struct incise_cut {
 struct incise_opening {
 	/** in a cut that is long enough for it; otherwise the rest is 0 */
 	bool in;
-	int cut;	  /**< number of the cut */
-	double at_mm;	  /**< position along the cut */
-	double depth_mm;  /**< a stretch of the cut here, long enough for the tool, is so deep */
+	int cut;      /**< number of the cut */
+	double at_mm; /**< position along the cut */
+	double depth_mm; /**< a stretch of the cut here, long enough for the tool, is so deep */
 	double open_mm;	  /**< remaining opening here */
 	double length_mm; /**< of the stretch; ≥ what the tool needs */
 	double along[3];  /**< direction of the cut */

@@ -329,15 +329,20 @@ TEST(test_silence, enter_plane, leave_room)
 /* A blade that goes silent in the tissue, with the tube at hand: the tube. */
 TEST(test_silence_in_the_tissue, enter_plane, leave_room)
 {
+	double cutting_N, back_N;
+
 	held_at(60, 100);
 	assert_int_equal(held_at(-5, 100), INCISE_TOOL_BLADE);
-	assert_true(size(room.tick.command_N) > 0.5);
+	cutting_N = size(room.tick.command_N);
+	assert_true(cutting_N > 0.5);
 	room.scalpel_silent = true;
 	assert_int_equal(held_at(-5, 100), INCISE_TOOL_TUBE);
 	assert_false(room.tick.flags & INCISE_TICK_STALE);
 	room.scalpel_silent = false;
 	assert_int_equal(held_at(-5, 100), INCISE_TOOL_BLADE);
-	assert_true(size(room.tick.command_N) > 0.5);
+	/* It is back in its cut: a tenth, and a hundredth for where the hand trembles to. */
+	back_N = size(room.tick.command_N);
+	assert_true(back_N > 0.09 * cutting_N && back_N < 0.2 * cutting_N);
 }
 
 /* --- continuity -------------------------------------------------------------------------- */
