@@ -14,12 +14,13 @@
 
 /*
  * A run: in the air until the force's ramp has ended, then the hand leans. It ends when nothing moved for two
- * windows, or with a quarter whose swing is none. Where that of the last quarter is not less than before, it
+ * windows, or little and ever less, or with a quarter whose swing is none. Where that of the last quarter is not less than before, it
  * stays: the run ends, too, and swings; so it does after LONGEST quarters.
  */
 #define AIR_S 0.1 /* and the scene's ramp */
 #define WINDOW_S 0.2
 #define STILL_MM 1e-4
+#define FADES_MM 2e-3 /* a fifth of a swing that counts, and less in each window */
 #define QUARTER_S 1.5
 #define QUARTERS 4 /* at least */
 #define LONGEST 16
@@ -55,7 +56,7 @@ static const struct {
 #define PLACES 3
 static const double askew[] = {0.02, 0.25};
 static const int hands[] = {
-	-1, 1, 2}; /* none, and of incise_hands: the measured arm is between them */
+	-1, 2}; /* none, and the firmest of incise_hands: the others are between */
 
 /* A tool that goes farther along the skin than this in a quarter slides on it: over hills that is no swing. */
 #define SLIDES_MM 1
@@ -351,15 +352,31 @@ static void start(struct search *s, struct run *run)
 	}
 }
 
-/* A number as it rises from its lowest and falls from its highest: a swing does both, what sinks or creeps one. */
+/*
+ * A number as it rises from its lowest and falls from its highest: a swing does both, and more than once. What sinks
+ * or creeps does one, and a tool that slides over an edge both once.
+ */
 struct range {
 	double low, high, rise, fall;
+	double turn; /* the farthest since it last turned */
+	int legs;    /* ways to or fro of more than a swing that counts */
 };
 
-static const struct range none = {INFINITY, -INFINITY, 0, 0};
+#define LEGS 3
+
+static const struct range none = {INFINITY, -INFINITY, 0, 0, 0, 0};
 
 static void see(struct range *range, double at)
 {
+	double sign = range->legs % 2 ? -1 : 1;
+
+	range->turn = range->high < range->low
+			      ? at
+			      : sign * fmax(sign * range->turn, sign * at);
+	if (sign * (range->turn - at) > INCISE_REST_SWING_MM) {
+		range->turn = at;
+		range->legs++;
+	}
 	range->low = fmin(range->low, at);
 	range->high = fmax(range->high, at);
 	range->rise = fmax(range->rise, at - range->low);
@@ -393,7 +410,8 @@ static double swing_of(const struct search *s, const struct range range[3])
 	double most = 0;
 
 	for (int i = 0; i < (s->way.guided ? 1 : 3); i++)
-		most = fmax(most, fmin(range[i].rise, range[i].fall));
+		if (range[i].legs >= LEGS)
+			most = fmax(most, fmin(range[i].rise, range[i].fall));
 	return most;
 }
 
@@ -433,7 +451,7 @@ static double lean(struct search *s, struct run *run, struct window *last)
 {
 	int quarter = (int)fmax(QUARTER_S / s->device.period_s, 1), still = 0;
 	int long_window = (int)fmax(WINDOW_S / s->device.period_s, 1);
-	double begin_s = run->t_s, before_mm = INFINITY;
+	double begin_s = run->t_s, before_mm = INFINITY, last_mm = 0;
 	struct window window = empty();
 
 	*last = empty();
@@ -445,7 +463,13 @@ static double lean(struct search *s, struct run *run, struct window *last)
 		see_run(&window, run);
 		see_run(last, run);
 		if (k % long_window == 0) {
-			still = moved_of(s, window.at_mm) < STILL_MM ? still + 1 : 0;
+			double moved_mm = moved_of(s, window.at_mm);
+
+			still = moved_mm < STILL_MM || (moved_mm < FADES_MM &&
+							moved_mm < last_mm)
+					? still + 1
+					: 0;
+			last_mm = moved_mm;
 			if (still == 2) {
 				*last = window;
 				return k * s->device.period_s;
@@ -492,7 +516,7 @@ static bool try(struct search *s, struct run *run, int way, struct incise_rest *
 			.guided = s->way.guided,
 			.depth_mm = depth_mm,
 			.swing_mm = swing_of(s, last.at_mm),
-			.swing_N = swing_of(s, last.N),
+			.swing_N = moved_of(s, last.N),
 			.settle_s = settle_s,
 			.way = way,
 		};
