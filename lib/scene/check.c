@@ -516,7 +516,7 @@ static void add_up(struct incise_plan *plan, double model_N_mm)
 					sum[INCISE_SPRING_SIDE]);
 	}
 	/* More, so that no rounding of a potential's work is taken for none. */
-	plan->account_N_mm = fmin(1.25 * (all + K) + LEAST_N_mm, 32767);
+	plan->account_N_mm = fmin(1.25 * (all + K), 32767);
 }
 
 int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info *tracker,

@@ -50,7 +50,7 @@ static const char *no_membrane(const struct incise_plan *plan)
 
 static const char *no_work(const struct incise_plan *plan)
 {
-	return plan->account_N_mm > 0
+	return plan->accounts && plan->gain > 0
 		       ? NULL
 		       : zero(plan, "its forces give back no more than they take");
 }

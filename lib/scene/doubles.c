@@ -81,7 +81,8 @@ void incise_plan_set_numbers(struct incise_plan *plan)
 		.leave = scene->tissue.leave_mm,
 		.average_ticks = plan->average_ticks,
 		.printed = scene->tissue.printed_orientation,
-		.account = plan->account_N_mm,
+		/* Not 0, where it is none of springs. */
+		.account = plan->accounts ? fmax(plan->account_N_mm, 1e-3) : 0,
 		.upright = plan->upright,
 		.incision = incise_scene_cuts(scene),
 		.small = scene->limits.start_N,

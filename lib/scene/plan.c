@@ -172,8 +172,7 @@ static void set_tool(struct incise_plan *plan)
 	plan->average_ticks = incise_surface_kind(plan->surface) == INCISE_SURFACE_PLANE
 				      ? 1
 				      : plan->scene->effects.average_ticks;
-	if (!gives_back(plan))
-		plan->account_N_mm = 0;
+	plan->accounts = gives_back(plan);
 }
 
 static int check_membrane(const struct incise_plan *plan, struct incise_error *err)

@@ -134,7 +134,8 @@ struct incise_plan {
 	double support_mm;  /* the model's largest depth; beyond it the force … */
 	double beyond_N_mm; /* … goes on with this slope, ≥ 0 */
 	double upright; /* least cosine between the normals of skin and membrane, over its disc */
-	double account_N_mm; /* all springs together where work is on account; else 0 */
+	double account_N_mm;		  /* all springs together */
+	bool accounts;			  /* for the work of its forces */
 	const struct incise_model *model; /* fuzzy: one of these */
 	const struct incise_fixed *fixed;
 	struct incise_fixed *own_fixed; /* compiled here */

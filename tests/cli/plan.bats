@@ -121,7 +121,7 @@ setup() {
 	holds "$(key r.json margin) >= 1.05 && $(key r.json margin) < 1.05 * 1.0101"
 	echo 'tissue = { reaction_N_mm = 0.1; }; device = { damping_N_s_mm = 0.0; };' >loose.scene
 	run --separate-stderr incise plan loose.scene
-	failed_with loose.scene "no gain is small enough" damping
+	failed_with loose.scene "of at least 0.001"
 }
 
 @test "poses that are always too old are refused before there is no force" {

@@ -92,7 +92,7 @@ static void walk(uint64_t seed, const struct drawn *d, int k, bool account,
 		step(&hand);
 		assert_int_equal(incise_plan_tick(plan[0], hand.t_ns, &tick), 0);
 		met->unpaid += !!(tick.flags & INCISE_TICK_UNPAID);
-		if (!follow(&contact, &tick, plan[0]->account_N_mm > 0))
+		if (!follow(&contact, &tick, plan[0]->accounts))
 			continue;
 		met->contacts++;
 		met->most_mJ = fmax(met->most_mJ, contact.put_mJ);
