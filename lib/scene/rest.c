@@ -19,6 +19,7 @@
  */
 #define AIR_S 0.1 /* and the scene's ramp */
 #define WINDOW_S 0.2
+#define LOOK_S 2e-3
 #define STILL_MM 1e-4
 #define FADES_MM 2e-3 /* a fifth of a swing that counts, and less in each window */
 #define QUARTER_S 1.5
@@ -108,11 +109,17 @@ struct search {
 		   [3]; /* in which the device moves: of a guided one the normal first */
 };
 
+/* What an axis does in a time: all of it is linear, place from where the hand holds it. */
+struct motion {
+	double way_s, xx, xv, xf, vx, vv, vf;
+};
+
 /* A run at work: positions along the axes, from the place. */
 struct run {
 	double lean_N;
 	struct incise_plant device[3];
-	double t_s, next_pose_s, path_mm;
+	struct motion tick[3]; /* what each does in one */
+	double t_s, next_pose_s;
 	struct {
 		double arrival_s, at_mm[3];
 	} pose[POSES_MOST]; /* ring of those on their way */
@@ -254,16 +261,57 @@ static int64_t to_ns(double t_s)
 	return 2 * INCISE_NS_PER_S + llround(t_s * INCISE_NS_PER_S);
 }
 
+/* Of an axis that is there, for a time. */
+static void set_motion(struct motion *to, const struct incise_plant *of, double way_s)
+{
+	struct incise_plant plant = *of;
+
+	plant.wall_mm = plant.velocity_mm_s = 0;
+	plant.position_mm = 1;
+	incise_plant_step(&plant, 0, way_s);
+	to->xx = plant.position_mm;
+	to->vx = plant.velocity_mm_s;
+	plant.position_mm = 0;
+	plant.velocity_mm_s = 1;
+	incise_plant_step(&plant, 0, way_s);
+	to->xv = plant.position_mm;
+	to->vv = plant.velocity_mm_s;
+	plant.position_mm = plant.velocity_mm_s = 0;
+	incise_plant_step(&plant, 1, way_s);
+	to->xf = plant.position_mm;
+	to->vf = plant.velocity_mm_s;
+	to->way_s = way_s;
+}
+
+/* Times of a tick are one time, but for rounding. */
+#define SAME_S 1e-12
+
+static void move_axis(struct incise_plant *plant, const struct motion *tick,
+		      double force_N, double way_s)
+{
+	double x = plant->position_mm - plant->wall_mm, v = plant->velocity_mm_s;
+
+	if (fabs(way_s - tick->way_s) > SAME_S) {
+		incise_plant_step(plant, force_N, way_s);
+		return;
+	}
+	plant->position_mm =
+		plant->wall_mm + tick->xx * x + tick->xv * v + tick->xf * force_N;
+	plant->velocity_mm_s = tick->vx * x + tick->vv * v + tick->vf * force_N;
+}
+
 static void go_to(const struct search *s, struct run *run, double t_s)
 {
 	const double *n = s->way.at->normal;
-	double way_s = fmax(t_s - run->t_s, 0), lean_N[3];
+	double way_s = t_s - run->t_s, lean_N[3];
 
+	if (!(way_s > 0))
+		return;
 	for (int i = 0; i < 3; i++)
 		lean_N[i] = run->lean_N * (s->way.askew * s->along[i] - n[i]);
 	for (int i = 0; i < (s->way.guided ? 1 : 3); i++)
-		incise_plant_step(&run->device[i],
-				  run->sent_N[i] + v3_dot(lean_N, s->axis[i]), way_s);
+		move_axis(&run->device[i], &run->tick[i],
+			  run->sent_N[i] + v3_dot(lean_N, s->axis[i]), way_s);
 	if (s->way.guided)
 		run->device[1].position_mm += s->way.along_mm_s * way_s;
 	run->t_s = t_s;
@@ -342,6 +390,8 @@ static void start(struct search *s, struct run *run)
 	hold(s, run);
 	for (int i = 0; i < 3; i++)
 		run->device[i].wall_mm = run->device[i].position_mm;
+	for (int i = 0; i < 3; i++)
+		set_motion(&run->tick[i], &run->device[i], s->device.period_s);
 	s->plan = s->rested;
 	s->parts = s->rested_parts;
 	for (int k = 1; k <= ticks; k++) {
@@ -451,6 +501,7 @@ static double lean(struct search *s, struct run *run, struct window *last)
 {
 	int quarter = (int)fmax(QUARTER_S / s->device.period_s, 1), still = 0;
 	int long_window = (int)fmax(WINDOW_S / s->device.period_s, 1);
+	int often = (int)fmax(LOOK_S / s->device.period_s, 1);
 	double begin_s = run->t_s, before_mm = INFINITY, last_mm = 0;
 	struct window window = empty();
 
@@ -460,8 +511,10 @@ static double lean(struct search *s, struct run *run, struct window *last)
 
 		tick(s, run);
 		go_to(s, run, begin_s + k * s->device.period_s);
-		see_run(&window, run);
-		see_run(last, run);
+		if (k % often == 0) {
+			see_run(&window, run);
+			see_run(last, run);
+		}
 		if (k % long_window == 0) {
 			double moved_mm = moved_of(s, window.at_mm);
 
