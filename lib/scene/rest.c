@@ -554,6 +554,7 @@ static bool try(struct search *s, struct run *run, int way, struct incise_rest *
 {
 	struct window last;
 	double settle_s = lean(s, run, &last), depth_mm = depth_of(s, &last);
+	const double *at_mm = s->way.at->point_mm;
 	bool rests = settle_s > 0;
 
 	rest->runs++;
@@ -564,6 +565,7 @@ static bool try(struct search *s, struct run *run, int way, struct incise_rest *
 			.lean_N = run->lean_N,
 			.along_mm_s = s->way.along_mm_s,
 			.askew = s->way.askew,
+			.place_mm = {at_mm[0], at_mm[1], at_mm[2]},
 			.tool = s->way.tool,
 			.hand = s->way.hand ? (int)(s->way.hand - incise_hands) : -1,
 			.guided = s->way.guided,
@@ -573,7 +575,6 @@ static bool try(struct search *s, struct run *run, int way, struct incise_rest *
 			.settle_s = settle_s,
 			.way = way,
 		};
-	v3_copy(rest->place_mm, s->way.at->point_mm);
 	return rests;
 }
 
