@@ -65,8 +65,9 @@ static const int hands[] = {
 
 /*
  * Between the leans on a model that are tried there may be worse: forces count as so much larger, and the device's
- * damping as so much smaller. Of springs the linear check has such a reserve.
+ * damping as so much smaller. Of springs the linear check has such a reserve: a part of it is left here.
  */
+#define FREE_RESERVE 0.02
 #define RESERVE 0.05
 
 #define N(array) ((int)(sizeof(array) / sizeof(*(array))))
@@ -632,9 +633,10 @@ static void search(struct search *s, const struct incise_plan *plan,
 			.at = &s->place[i / N(askew) / N(hands) / n_tools],
 			.on = plan->surface,
 			.tool = tool ? INCISE_TOOL_TUBE : INCISE_TOOL_BLADE,
-			.start_mm = TOUCH_MM,
+			.start_mm = i % N(askew) ? DROP_MM : TOUCH_MM,
 			.hand = hand >= 0 ? &incise_hands[hand] : NULL,
 			.askew = askew[i % N(askew)],
+			.reserve = FREE_RESERVE,
 			.every = FREE_EVERY};
 
 		if (!lean_all(s, plan, trial, &way, number, rest))

@@ -819,28 +819,29 @@ void T(stage_start)(const struct T(plan) *plan, struct T(state) *state,
 		tick->command[i] = w_scale(state->gain, state->force[i]);
 }
 
-/* Of the last way both forces are known, as they were rendered. */
-static void take_in(struct T(fund) *fund, const struct T(account) *account,
-		    const num last[3])
+/* Of the last way both forces are known. */
+static void take_in(struct T(fund) *fund, const struct T(account) *account)
 {
-	fund->work2 = w_work(fund->work2, fund->before,
-			     n_neg(v_along(last, account->unit)), account->length);
+	num after = n_neg(v_along(fund->last, account->unit));
+
+	fund->work2 = w_work(fund->work2, fund->before, after, account->length);
 }
 
-/* Leave out what nothing has paid for of a force, as a part of the command. Returns whether there is any. */
+/* Leave out what nothing has paid for of a force, and of the command that it is a part of. Returns whether there is any. */
 static bool leave_out(struct T(fund) *fund, const struct T(account) *account,
-		      num stiffness, const num last[3], num force[3], num command[3])
+		      num stiffness, num force[3], num command[3])
 {
 	num unpaid =
 		n_sub(v_along(force, account->unit), w_stored(stiffness, fund->work2));
+	bool any = n_below(0, unpaid);
 
-	fund->before = n_neg(v_along(last, account->unit));
-	if (!n_below(0, unpaid))
-		return false;
-	if (force != command)
+	fund->before = n_neg(v_along(fund->last, account->unit));
+	if (any)
+		v_add(command, command, n_neg(unpaid), account->unit);
+	if (any && force != command)
 		v_add(force, force, n_neg(unpaid), account->unit);
-	v_add(command, command, n_neg(unpaid), account->unit);
-	return true;
+	v_copy(fund->last, force);
+	return any;
 }
 
 /*
@@ -859,35 +860,52 @@ static bool leave_out(struct T(fund) *fund, const struct T(account) *account,
  * this that is left out where it gives work, and a tool at rest is held as by springs.
  *
  * After Hannaford and Ryu, Time-domain passivity control of haptic interfaces, IEEE Trans. Robotics and Automation
- * 18(1), 2002; the work between two ticks is by the mean of their forces, as they were rendered.
+ * 18(1), 2002; the work between two ticks is by the mean of their forces, before the limit of their change: a force
+ * that is slewed follows later, and what was stored would seem to be unpaid for ever.
  */
 void T(stage_work)(const struct T(plan) *plan, struct T(state) *state,
 		   struct T(tick) *tick)
 {
+	const struct T(numbers) *numbers = &plan->numbers;
 	struct T(account) *account = &state->account;
-	num stiffness = plan->numbers.account, way[3], late[3];
+	num way[3], late[3], force[3];
+	wide within[3];
+	bool unpaid = false;
 
-	if (!n_below(0, stiffness))
+	if (!n_below(0, numbers->account))
 		return;
-	take_in(&account->all, account, state->last);
-	take_in(&account->late, account, account->last_late);
+	take_in(&account->all, account);
+	take_in(&account->late, account);
 	if (state->proxy.began || tick->held != account->held)
 		account->all.work2 = account->late.work2 = 0;
 	account->held = tick->held;
 	v_sub(way, tick->tool, account->at);
 	v_copy(account->at, tick->tool);
-	for (int i = 0; i < 3; i++)
+	for (int i = 0; i < 3; i++) {
 		late[i] = w_scale(state->gain, state->late[i]);
-	account->length = 0;
-	if (v_direction(account->unit, way)) {
-		account->length = v_along(way, account->unit);
-		if (leave_out(&account->late, account, stiffness, account->last_late,
-			      late, tick->command) |
-		    leave_out(&account->all, account, stiffness, state->last,
-			      tick->command, tick->command))
-			tick->flags |= INCISE_TICK_UNPAID;
+		within[i] = w_of(tick->command[i]);
 	}
-	v_copy(account->last_late, late);
+	/* What is above the limit is not felt. */
+	v_shorten(within, numbers->force);
+	for (int i = 0; i < 3; i++)
+		force[i] = n_of(within[i]);
+	account->length = 0;
+	if (v_direction(account->unit, way))
+		account->length = v_along(way, account->unit);
+	if (n_below(0, account->length)) {
+		unpaid =
+			leave_out(&account->late, account, numbers->account, late, force);
+		unpaid = leave_out(&account->all, account, numbers->account, force,
+				   force) ||
+			 unpaid;
+	} else {
+		v_copy(account->late.last, late);
+		v_copy(account->all.last, force);
+	}
+	if (!unpaid)
+		return;
+	v_copy(tick->command, force);
+	tick->flags |= INCISE_TICK_UNPAID;
 }
 
 /*

@@ -314,10 +314,10 @@ struct T(average) {
 	dir last[3];
 };
 
-/* Work, twice, that was put in until the last tick, less what came back; what resisted on the way since then. */
+/* Work, twice, that was put in until the last tick, less what came back; the force then, and what resisted. */
 struct T(fund) {
 	wide work2;
-	num before;
+	num last[3], before;
 };
 
 /* With stage work. */
@@ -326,7 +326,6 @@ struct T(account) {
 	num at[3];   /* of the last tick … */
 	dir unit[3]; /* … and the way to it */
 	num length;
-	num last_late[3]; /* of the force, what was late */
 	int32_t held;
 };
 
