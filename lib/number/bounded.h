@@ -975,6 +975,11 @@ static inline num w_paid(num, wide, wide)
 	return FAR_MOST;
 }
 
+static inline wide w_taken(wide work2, const num *, const num *, const num *)
+{
+	return work2;
+}
+
 static inline num w_stored(num, wide)
 {
 	return FAR_MOST;

@@ -255,6 +255,11 @@ static inline num w_paid(num stiffness, wide work2, wide most2)
 	return sqrt(stiffness * n_max(work2 - most2 / 16, 0));
 }
 
+static inline wide w_taken(wide work2, const num a[3], const num b[3], const num way[3])
+{
+	return work2 - v3_dot(a, way) - v3_dot(b, way);
+}
+
 static inline num w_stored(num stiffness, wide work2)
 {
 	return sqrt(stiffness * n_max(work2, 0));

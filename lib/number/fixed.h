@@ -263,6 +263,16 @@ static inline num w_paid(num stiffness, wide work2, wide most2)
 	return incise_fx_hold32(incise_fx_root((uint64_t)stiffness * (uint64_t)left2));
 }
 
+/* work2 - (a + b) · way, which no rounding adds up in: 2^32 · 2^30 */
+static inline wide w_taken(wide work2, const num a[3], const num b[3], const num way[3])
+{
+	for (int i = 0; i < 3; i++)
+		work2 = incise_fx_hold(work2 - ((int64_t)a[i] + b[i]) *
+						       incise_fx_hold(way[i], 1 << 30),
+				       (int64_t)1 << 62);
+	return work2;
+}
+
 /* √(K work2): 2^31 · 2^32 in Q48, or 2^31 · 2^47 in Q32 */
 static inline num w_stored(num stiffness, wide work2)
 {

@@ -650,9 +650,11 @@ static void search(struct search *s, const struct incise_plan *plan,
 static void shake(struct search *s, const struct incise_plan *plan,
 		  const struct incise_rest_trial *trial, struct incise_rest *rest)
 {
+	const struct incise_acting_force *reaction = &plan->acting[INCISE_FORCE_REACTION];
+	bool cuts = incise_plan_has_model(plan, reaction) || reaction->number[0] > 0;
 	const struct way way = {.at = s->place,
 				.on = s->plane,
-				.tool = INCISE_TOOL_BLADE,
+				.tool = cuts ? INCISE_TOOL_BLADE : INCISE_TOOL_TUBE,
 				.start_mm = TOUCH_MM,
 				.guided = true,
 				.reserve = RESERVE};
@@ -674,8 +676,9 @@ static void shake(struct search *s, const struct incise_plan *plan,
 		if (k > ticks / 2)
 			see_run(&window, &run);
 	}
-	rest->noise_mm = window.at_mm[0].high - window.at_mm[0].low;
-	rest->noise_N = window.N[0].high - window.N[0].low;
+	/* To and fro: what sinks, as nothing holds it, is not moved by noise. */
+	rest->noise_mm = fmin(window.at_mm[0].rise, window.at_mm[0].fall);
+	rest->noise_N = fmin(window.N[0].rise, window.N[0].fall);
 }
 
 /*

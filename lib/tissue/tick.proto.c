@@ -822,26 +822,22 @@ void T(stage_start)(const struct T(plan) *plan, struct T(state) *state,
 /* Of the last way both forces are known. */
 static void take_in(struct T(fund) *fund, const struct T(account) *account)
 {
-	num after = n_neg(v_along(fund->last, account->unit));
-
-	fund->work2 = w_work(fund->work2, fund->before, after, account->length);
+	fund->work2 = w_taken(fund->work2, fund->before, fund->last, account->way);
+	v_copy(fund->before, fund->last);
 }
 
 /* Leave out what nothing has paid for of a force, and of the command that it is a part of. Returns whether there is any. */
-static bool leave_out(struct T(fund) *fund, const struct T(account) *account,
-		      num stiffness, num force[3], num command[3])
+static bool leave_out(const struct T(fund) *fund, num stiffness, const dir unit[3],
+		      num force[3], num command[3])
 {
-	num unpaid =
-		n_sub(v_along(force, account->unit), w_stored(stiffness, fund->work2));
-	bool any = n_below(0, unpaid);
+	num unpaid = n_sub(v_along(force, unit), w_stored(stiffness, fund->work2));
 
-	fund->before = n_neg(v_along(fund->last, account->unit));
-	if (any)
-		v_add(command, command, n_neg(unpaid), account->unit);
-	if (any && force != command)
-		v_add(force, force, n_neg(unpaid), account->unit);
-	v_copy(fund->last, force);
-	return any;
+	if (!n_below(0, unpaid))
+		return false;
+	v_add(command, command, n_neg(unpaid), unit);
+	if (force != command)
+		v_add(force, force, n_neg(unpaid), unit);
+	return true;
 }
 
 /*
@@ -868,7 +864,8 @@ void T(stage_work)(const struct T(plan) *plan, struct T(state) *state,
 {
 	const struct T(numbers) *numbers = &plan->numbers;
 	struct T(account) *account = &state->account;
-	num way[3], late[3], force[3];
+	num late[3], force[3];
+	dir unit[3];
 	wide within[3];
 	bool unpaid = false;
 
@@ -879,7 +876,7 @@ void T(stage_work)(const struct T(plan) *plan, struct T(state) *state,
 	if (state->proxy.began || tick->held != account->held)
 		account->all.work2 = account->late.work2 = 0;
 	account->held = tick->held;
-	v_sub(way, tick->tool, account->at);
+	v_sub(account->way, tick->tool, account->at);
 	v_copy(account->at, tick->tool);
 	for (int i = 0; i < 3; i++) {
 		late[i] = w_scale(state->gain, state->late[i]);
@@ -889,19 +886,13 @@ void T(stage_work)(const struct T(plan) *plan, struct T(state) *state,
 	v_shorten(within, numbers->force);
 	for (int i = 0; i < 3; i++)
 		force[i] = n_of(within[i]);
-	account->length = 0;
-	if (v_direction(account->unit, way))
-		account->length = v_along(way, account->unit);
-	if (n_below(0, account->length)) {
-		unpaid =
-			leave_out(&account->late, account, numbers->account, late, force);
-		unpaid = leave_out(&account->all, account, numbers->account, force,
-				   force) ||
+	if (v_direction(unit, account->way)) {
+		unpaid = leave_out(&account->late, numbers->account, unit, late, force);
+		unpaid = leave_out(&account->all, numbers->account, unit, force, force) ||
 			 unpaid;
-	} else {
-		v_copy(account->late.last, late);
-		v_copy(account->all.last, force);
 	}
+	v_copy(account->late.last, late);
+	v_copy(account->all.last, force);
 	if (!unpaid)
 		return;
 	v_copy(tick->command, force);

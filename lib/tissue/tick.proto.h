@@ -314,18 +314,16 @@ struct T(average) {
 	dir last[3];
 };
 
-/* Work, twice, that was put in until the last tick, less what came back; the force then, and what resisted. */
+/* Work, twice, that was put in until the last tick, less what came back; the force then, and before. */
 struct T(fund) {
 	wide work2;
-	num last[3], before;
+	num last[3], before[3];
 };
 
 /* With stage work. */
 struct T(account) {
 	struct T(fund) all, late;
-	num at[3];   /* of the last tick … */
-	dir unit[3]; /* … and the way to it */
-	num length;
+	num at[3], way[3]; /* of the last tick, and to it */
 	int32_t held;
 };
 

@@ -21,6 +21,9 @@
 #define SHARE 1e-6
 #define ROUNDING_N 1e-4
 
+/* An account knows the work up to the last tick, and not what this one's force will do. */
+#define TICKS_OPEN 2
+
 /* A leap is no motion. */
 #define LEAP_MM 5
 
@@ -40,8 +43,8 @@ struct met {
 
 static bool over(const struct contact *c)
 {
-	return c->back_mJ >
-	       c->put_mJ * (1 + SHARE) + ROUNDING_N * c->path_mm + c->left_mJ;
+	return c->back_mJ > c->put_mJ * (1 + SHARE) + ROUNDING_N * c->path_mm +
+				    TICKS_OPEN * c->left_mJ;
 }
 
 /* Returns whether a contact ended. */
@@ -146,6 +149,8 @@ static struct incise_scene *springs_of(const struct drawn *d, int k)
 	scene->effects.average_ticks = 1;
 	scene->tissue.printed_orientation = false;
 	scene->tissue.force[INCISE_FORCE_INSERTION][1] = 1;
+	/* Not less where the blade was before. */
+	scene->tissue.force[INCISE_FORCE_REACTION][INCISE_REACTION_FRICTION] = 1;
 	/* By the filter's velocity, which is late. */
 	scene->tissue.force[INCISE_FORCE_DAMPING][0] = 0;
 	scene->limits.start_N = scene->limits.force_N = 1000;
@@ -154,8 +159,11 @@ static struct incise_scene *springs_of(const struct drawn *d, int k)
 	return scene;
 }
 
-/* Roundings of a work in integers, and chords in place of arcs, add up to no more than this along the way. */
+/* Roundings of a work in integers add up to no more than this along the way. */
 #define WORK_N 0x1p-16
+
+/* Of skin: of a tick's work by the mean of two forces a share of K L³ / 12 R is left out, as of a chord. */
+#define RADIUS_LEAST_MM 15
 
 /* Forces of both kinds are nearer to each other, of these scenes. */
 #define FORCE_N 0.01
@@ -168,7 +176,7 @@ static int pay(uint64_t seed, const struct drawn *d, struct incise_scene *scene,
 {
 	struct incise_plan *plan[2];
 	struct incise_tick tick[2];
-	double path_mm = 0, at_mm[3] = {0}, off[3], most_N;
+	double rounded_mJ = 0, at_mm[3] = {0}, off[3], most_N, way_mm, K;
 	struct hand hand;
 	int in = 0;
 
@@ -177,6 +185,7 @@ static int pay(uint64_t seed, const struct drawn *d, struct incise_scene *scene,
 	plan[1] = incise_plan_new_fed(other, &d->tracker, &err);
 	succeeds(plan[1]);
 	plan[0]->doubles.plan.numbers.account = 0;
+	K = plan[1]->account_N_mm;
 	for (int k = 0; k < 2; k++)
 		incise_plan_set_tool(plan[k], (enum incise_tool)(1 + seed % 3));
 	hand = hand_of(seed, d, scene, plan);
@@ -188,10 +197,13 @@ static int pay(uint64_t seed, const struct drawn *d, struct incise_scene *scene,
 					 0);
 		v3_sub(off, tick[0].tool_mm, at_mm);
 		v3_copy(at_mm, tick[0].tool_mm);
-		path_mm =
-			tick[0].phase == INCISE_PHASE_FREE ? 0 : path_mm + v3_length(off);
+		way_mm = v3_length(off);
+		rounded_mJ +=
+			WORK_N * way_mm + K * pow(way_mm, 3) / (12 * RADIUS_LEAST_MM);
+		if (tick[0].phase == INCISE_PHASE_FREE)
+			rounded_mJ = 0;
 		v3_sub(off, tick[1].command_N, tick[0].command_N);
-		most_N = FORCE_N + sqrt(2 * plan[1]->account_N_mm * WORK_N * path_mm);
+		most_N = FORCE_N + sqrt(2 * K * rounded_mJ);
 		in += tick[0].phase != INCISE_PHASE_FREE;
 		if (tick[1].flags & INCISE_TICK_UNPAID && !(v3_length(off) <= most_N))
 			fail_msg("seed %" PRIu64 ", tick %d: unpaid, %g N of %g\n%s",
