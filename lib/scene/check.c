@@ -700,7 +700,7 @@ static double best_damping(struct incise_plan *plan,
 			   fmax(plan->stability.device.damping_N_s_mm, 1e-3), way);
 }
 
-/* What was tried, and holds. */
+/* Say the gain and the damping that were tried and hold. */
 static void advise(struct incise_plan *plan, const struct incise_tracker_info *tracker,
 		   int way, char advice[200])
 {

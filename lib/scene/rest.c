@@ -65,7 +65,8 @@ static const int hands[] = {
 
 /*
  * Between the leans on a model that are tried there may be worse: forces count as so much larger, and the device's
- * damping as so much smaller. Of springs the linear check has such a reserve: a part of it is left here.
+ * damping as so much smaller. Of springs the linear check has such a reserve: of a scene without a model a part of it is
+ * left here.
  */
 #define FREE_RESERVE 0.02
 #define RESERVE 0.05
@@ -110,7 +111,7 @@ struct search {
 		   [3]; /* in which the device moves: of a guided one the normal first */
 };
 
-/* What an axis does in a time: all of it is linear, place from where the hand holds it. */
+/* The motion of an axis in a time: all of it is linear, its place is from where the hand holds it. */
 struct motion {
 	double way_s, xx, xv, xf, vx, vv, vf;
 };
@@ -636,7 +637,7 @@ static void search(struct search *s, const struct incise_plan *plan,
 			.start_mm = i % N(askew) ? DROP_MM : TOUCH_MM,
 			.hand = hand >= 0 ? &incise_hands[hand] : NULL,
 			.askew = askew[i % N(askew)],
-			.reserve = FREE_RESERVE,
+			.reserve = model ? RESERVE : FREE_RESERVE,
 			.every = FREE_EVERY};
 
 		if (!lean_all(s, plan, trial, &way, number, rest))

@@ -22,7 +22,6 @@
 #ifndef INCISE_REST_H
 #define INCISE_REST_H
 
-#include "../control/device.h"
 #include "../control/pose_loop.h"
 #include "plan.h"
 
@@ -54,6 +53,24 @@ struct incise_rest {
 	/* Range of position and force, of a hand that leans with half of the scene's limit, by
 	 * the noise of a tracker: INCISE_REST_NOISE_MM. Of a plan that rests. */
 	double noise_mm, noise_N;
+};
+
+/*
+ * A haptic device in its loop: a later device fills it in, and is judged by that.
+ *
+ *   mass, damping ──pose, so often, so old──▶ plan ──force, so late, held for a tick──▶ mass
+ */
+struct incise_device {
+	double axis[3][3]; /* principal directions of its mass: unit, at right angles */
+	double mass_kg[3]; /* along each, > 0 */
+	double damping_N_s_mm; /* viscous, in all directions, ≥ 0 */
+	double period_s;       /* of ticks; a force is held so long */
+	double pose_s;	       /* from pose to pose … */
+	double latency_s;      /* … and how old one is when it comes */
+	int late_ticks;	       /* until a force acts */
+	double slew_N_s;       /* the fastest that its force changes; infinite: at once */
+	double force_N;	       /* the largest … */
+	double continuous_N;   /* … and one that it keeps for ever */
 };
 
 /* The device of a plan, and the loop that it is in. */

@@ -422,7 +422,7 @@ static bool has_more(const struct end *end)
 			     : end->place <= place_of(end->cut->to_mm);
 }
 
-/* How far a line that goes along @way at a place goes on in a cut, in which it is at @along; @step: to this side. */
+/* The length by which a line along @way goes on in a cut, in which it is at @along; @step: to this side. */
 static num left_in(const struct T(cut) *cut, const num at[3], const dir way[3],
 		   num *along, int *step)
 {
@@ -525,7 +525,7 @@ static bool find_stretch(const struct T(incision) *incision, int cut, num along,
 	return n_below(least, stretch->depth);
 }
 
-/* How far a place is from a cut, beside it or beyond an end. */
+/* The distance of a place from a cut, beside it or beyond an end. */
 static num away_from(const struct T(cut) *cut, const struct local *at)
 {
 	return n_max(n_abs(at->across),

@@ -366,7 +366,7 @@ void T(stage_normal)(const struct T(plan) *plan, struct T(state) *state,
 }
 
 /*
- * How deep the blade meets friction only, D: F = K (u min(d, D) + max(d - D, 0)), which is a potential of d. Where
+ * Set D, the depth down to which the blade meets friction only: F = K (u min(d, D) + max(d - D, 0)), which is a potential of d. Where
  * the cut is deeper than D, D grows, and the tissue loses what it would give back; where it is not, D falls to d
  * and no further, as the force does not change by that. So no motion, along the cut or out of it, returns work.
  */
@@ -852,8 +852,8 @@ static bool leave_out(const struct T(fund) *fund, num stiffness, const dir unit[
  *           |·'
  *         0 '────────▶ E: put in, less what came back
  *
- * What is late, a damper's force and that of a normal that is averaged, has a fund of its own: so it is no more than
- * this that is left out where it gives work, and a tool at rest is held as by springs.
+ * Forces that are late, a damper's and that of a normal that is averaged, have a fund of their own: only they are left
+ * out where they give work, and a tool at rest is held as by springs.
  *
  * After Hannaford and Ryu, Time-domain passivity control of haptic interfaces, IEEE Trans. Robotics and Automation
  * 18(1), 2002; the work between two ticks is by the mean of their forces, before the limit of their change: a force
@@ -882,7 +882,7 @@ void T(stage_work)(const struct T(plan) *plan, struct T(state) *state,
 		late[i] = w_scale(state->gain, state->late[i]);
 		within[i] = w_of(tick->command[i]);
 	}
-	/* What is above the limit is not felt. */
+	/* Nobody feels a force above the limit. */
 	v_shorten(within, numbers->force);
 	for (int i = 0; i < 3; i++)
 		force[i] = n_of(within[i]);

@@ -4,7 +4,7 @@
  * and no_kind.h, by ../fixed/plan.h for the integers of programs and the kernel, by tick.h for double.
  * The .proto.c beside this are the physics, once; they are compiled for each kind.
  *
- *   pose ─▶ predict ─▶ tool ─▶ contact ─▶ normal ─▶ incision ─▶ membrane ─▶ forces ─▶ start ─▶ limit
+ *   pose ─▶ predict ─▶ tool ─▶ contact ─▶ normal ─▶ incision ─▶ membrane ─▶ forces ─▶ start ─▶ work ─▶ limit
  *
  * A stage that its plan does not need does nothing, and may be left out. Lengths mm, forces N, springs
  * N/mm, speeds mm/s; times ns of CLOCK_MONOTONIC. All functions of a tick are real-time safe, and take

@@ -4,8 +4,8 @@
  * tick.
  *
  *     pose ─▶ predict ─▶ [tool] ─▶ contact ─▶ [normal] ─▶ [incision] ─▶ [membrane] ─▶
- *     [reaction] ─▶ [plane] ─▶ [damping] ─▶ [insertion] ─▶ [spread] ─▶ start ─▶ limit ─▶
- *     [actuate]
+ *     [reaction] ─▶ [plane] ─▶ [damping] ─▶ [insertion] ─▶ [spread] ─▶ [skin] ─▶
+ *     start ─▶ [work] ─▶ limit ─▶ [actuate]
  *
  * Stages in brackets exist only if the scene or the rig needs them. A plan belongs to one
  * thread at a time.
@@ -162,13 +162,13 @@ struct incise_plan_stability {
 	 */
 	int runs;
 	struct {
-		double lean_N;	    /**< the hand's force */
-		double along_mm_s;  /**< its speed along the skin */
-		double askew;	    /**< share of its force along the skin */
-		double place_mm[3]; /**< of the surface, where it leans */
-		enum incise_tool tool;
-		bool in_hand; /**< of a hand's mass, damping and stiffness */
-		bool guided;  /**< along the normal only */
+		double lean_N;	       /**< the hand's force */
+		double along_mm_s;     /**< its speed along the skin */
+		double askew;	       /**< share of its force along the skin */
+		double place_mm[3];    /**< of the surface, where it leans */
+		enum incise_tool tool; /**< that leans */
+		bool in_hand;	       /**< of a hand's mass, damping and stiffness */
+		bool guided;	       /**< along the normal only */
 		double depth_mm, swing_mm, settle_s;
 	} worst;
 	/**

@@ -16,7 +16,7 @@ enum incise_tick_flag {
 	INCISE_TICK_FAULT = 16,	 /**< a device failed: no force from now on */
 	INCISE_TICK_SLEWED = 32, /**< the change of force was limited to slew_N_s */
 	INCISE_TICK_TRAVEL = 64, /**< the actuator's target was clamped to its travel */
-	/** a part of the force that nothing had paid for was left out; in logs of before 2026 a guard's */
+	/** a part of the force that nothing had paid for was left out; in old logs a guard's */
 	INCISE_TICK_UNPAID = 128,
 	INCISE_TICK_STARTING = 256,   /**< waiting for a small force, or ramping */
 	INCISE_TICK_NOT_FINITE = 512, /**< the force was not finite: 0 was commanded */

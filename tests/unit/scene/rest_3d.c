@@ -248,7 +248,7 @@ static struct ripple ripple_of(const double *x, int first, int last, double mean
 	return ripple;
 }
 
-/* A swing goes to and fro: four legs and more. */
+/* A swing goes to and fro, four legs and more, and does in the last half, too. */
 static void judge(struct end *end, bool faceted)
 {
 	static const double means_s[] = {0.5, 2};
@@ -263,14 +263,15 @@ static void judge(struct end *end, bool faceted)
 			struct ripple all = ripple_of(seen.at[i], 0, seen.n, means_s[k]);
 			double first =
 				ripple_of(seen.at[i], 0, seen.n / 2, means_s[k]).size;
+			double last =
+				ripple_of(seen.at[i], seen.n / 2, seen.n, means_s[k])
+					.size;
 
-			if (all.legs < 4 || all.size <= end->swing_mm)
+			if (all.legs < 4 || last <= end->swing_mm)
 				continue;
-			end->swing_mm = all.size;
+			end->swing_mm = last;
 			end->hz = all.legs / (2 * (seen.n * seen.every_s - means_s[k]));
-			end->share = ripple_of(seen.at[i], seen.n / 2, seen.n, means_s[k])
-					     .size /
-				     first;
+			end->share = last / first;
 		}
 		end->swing_N = fmax(end->swing_N,
 				    ripple_of(seen.force_N[i], 0, seen.n, 0.5).size);
@@ -471,36 +472,55 @@ static bool any_lean(uint64_t *seed, const struct incise_plan *plan,
 
 /* --- scenes ------------------------------------------------------------------------------- */
 
-static void keep(uint64_t seed)
+/* The files of a scene and what its leans do, in a folder of its seed below KEEP. */
+static void keep(uint64_t seed, const struct leaned *l, double gain, const char *line)
 {
-	const char *to = getenv("KEEP");
+	const char *to = getenv("KEEP"), *key = strstr(l->text.all, " gain = ");
 	char command[400];
+	FILE *out;
 
 	if (!to || !*to)
 		return;
 	snprintf(command, sizeof(command),
-		 "mkdir -p '%s/%" PRIu64 "' && cp -L %s/* '%s/%" PRIu64 "'", to, seed,
+		 "mkdir -p '%s/%" PRIu64 "' && cp -nL %s/* '%s/%" PRIu64 "'", to, seed,
 		 folder.dir, to, seed);
 	if (system(command))
 		abort();
+	snprintf(command, sizeof(command), "%s/%" PRIu64 "/leans", to, seed);
+	out = fopen(command, "a");
+	fputs(line, out);
+	fclose(out);
+	snprintf(command, sizeof(command), "%s/%" PRIu64 "/a.scene", to, seed);
+	out = fopen(command, "w");
+	fprintf(out, "%.*s gain = %#.9g%s", (int)(key - l->text.all), l->text.all, gain,
+		strchr(key, ';'));
+	fclose(out);
 }
 
 static void tell(uint64_t seed, int i, const struct leaned *l, const struct lean *lean,
-		 const struct end *end, const struct incise_plan_stability *s,
-		 double gain)
+		 const struct end *end, const struct incise_plan *plan)
 {
 	static const char *const tools[] = {"auto", "blade", "handle", "tube"};
+	struct incise_plan_stability s;
+	char line[1000];
 
-	printf("%s: seed %" PRIu64
-	       " lean %d: %s | gain %.9g | %s, %.3g N, sideways %.2f, hand "
-	       "%.2g N/mm, at %.1f %.1f %.1f, depth %.1f | swings %.3g mm %.2g N %.1f Hz, share "
-	       "%.2f, flags %x | margin %.2f (%.3g of %.3g N/mm)\n",
-	       outcomes[end->outcome], seed, i, l->what, gain, tools[lean->tool],
-	       lean->size_N, lean->sideways, lean->hand_N_mm, lean->place.point_mm[0],
-	       lean->place.point_mm[1], lean->place.point_mm[2], end->depth_mm,
-	       end->swing_mm, end->swing_N, end->hz, end->share, end->flags,
-	       s->limit_N_mm / s->stiffness_N_mm, s->stiffness_N_mm, s->limit_N_mm);
+	incise_plan_stability(plan, &s);
+	snprintf(
+		line, sizeof(line),
+		"%s: seed %" PRIu64
+		" lean %d: %s | gain %.9g | %s, %.3g N, sideways %.2f, hand "
+		"%.2g N/mm, at %.1f %.1f %.1f, depth %.1f | swings %.3g mm %.2g N %.1f Hz, share "
+		"%.2f, flags %x | margin %.2f (%.3g of %.3g N/mm)\n",
+		outcomes[end->outcome], seed, i, l->what, plan->scene->tissue.gain,
+		tools[lean->tool], lean->size_N, lean->sideways, lean->hand_N_mm,
+		lean->place.point_mm[0], lean->place.point_mm[1], lean->place.point_mm[2],
+		end->depth_mm, end->swing_mm, end->swing_N, end->hz, end->share,
+		end->flags, s.limit_N_mm / s.stiffness_N_mm, s.stiffness_N_mm,
+		s.limit_N_mm);
+	fputs(line, stdout);
 	fflush(stdout);
+	if (end->outcome == SWINGS)
+		keep(seed, l, plan->scene->tissue.gain, line);
 }
 
 /* All leans on a plan. Returns how many swing; @counts: of an accepted one, else until the first does. */
@@ -509,10 +529,8 @@ static int lean_all(uint64_t seed, struct incise_plan *plan, const struct leaned
 {
 	uint64_t random = ~seed;
 	int64_t from_ns = 2000000000;
-	struct incise_plan_stability s;
 	int swings = 0;
 
-	incise_plan_stability(plan, &s);
 	for (int i = 0; i < LEANS && (counts || !swings); i++) {
 		struct lean lean;
 		struct end end;
@@ -526,12 +544,9 @@ static int lean_all(uint64_t seed, struct incise_plan *plan, const struct leaned
 		sum.leans++;
 		sum.by[end.outcome]++;
 		if (end.outcome >= DEEP)
-			tell(seed, i, l, &lean, &end, &s, plan->scene->tissue.gain);
+			tell(seed, i, l, &lean, &end, plan);
 	}
-	if (swings && counts) {
-		sum.failed_scenes++;
-		keep(seed);
-	}
+	sum.failed_scenes += counts && swings;
 	return swings;
 }
 

@@ -1184,15 +1184,10 @@ static bool compare_opening(const struct way *ways, int n, enum incise_tool tool
 
 TEST_KINDS(test_openings_as_a_surgeon_expects)
 {
-	static const struct incise_double_incision_setup tissue = {.cuts_most = 32,
-								   .cut_from =
-									   CUT_FROM_MM,
-								   .stretch = STRETCH_MM,
-								   .handle_width = 10,
-								   .handle_thickness = 3,
-								   .tube = 7};
+	struct incise_double_incision_setup tissue = *setup_double();
 	int n = cases_of(PROCEDURES, 100), same = 0, in = 0, all = 0;
 
+	tissue.cuts_most = 32;
 	drawn = cases_seed(1) << 32;
 	for (int p = 0; p < n; p++) {
 		struct way ways[WAYS];
