@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The loop of a wall and a tracker; see pose_loop.h.
+ * The loop of forces and a tracker; see pose_loop.h.
  *
  *   ticks      |     |     |     |     |     |     |     |
  *   arrivals  ·:·······················:·······················:     P apart, LEAD of a
@@ -8,12 +8,15 @@
  *              ├───────── P ───────────┤
  *              begin: a pose was just taken in
  */
+#include <float.h>
 #include <math.h>
 #include <stdbool.h>
+#include <stdlib.h>
 #include <string.h>
 #include <incise/clock.h>
-#include "plant.h"
 #include "../base/units.h"
+#include "../base/vector.h"
+#include "eigenvalues.h"
 #include "pose_loop.h"
 
 #define TICKS_MOST 64 /* in a P */
@@ -22,7 +25,8 @@
 /* On their way are those of the latency, and those that wait for their tick. */
 #define WAITING_MOST (LATE_MOST + POSES_MOST)
 #define OWN_STATES 8 /* of device and predictor; the last one counts with A only */
-#define STATES (OWN_STATES + WAITING_MOST + INCISE_POSE_LOOP_LATE_MAX)
+/* Of a mean over more ticks than one and these, each holds several. */
+#define CELLS_MOST 15
 
 /* Part of a tick that a pose waits before it is taken in: the mean. */
 #define LEAD 0.5
@@ -37,17 +41,20 @@
 #define BEGIN_NS (2 * INCISE_NS_PER_S)
 
 struct loop {
-	struct incise_plant plant; /* at rest */
+	struct incise_plant plant[3]; /* at rest */
 	struct incise_predict predict;
 	double tick_s, pose_s, latency_s;
-	int ticks, poses; /* in a period */
-	int waiting;	  /* poses on their way when a period starts */
-	int late;	  /* ticks until a force acts */
-	int own_states, states;
-	double K, B, A;
+	int ticks, poses;	/* in a period */
+	int waiting;		/* poses on their way when a period starts */
+	int late;		/* ticks until a force acts */
+	int cells;		/* of the mean … */
+	double cell_ticks;	/* … and so many ticks in each */
+	int own_states, states; /* of an axis */
+	bool alone;		/* axes do nothing to each other, and are all one */
+	struct incise_force_map map;
 };
 
-/* Three runs at once: the predictor has three axes. */
+/* Three axes at once: where they are alone, a state in each. */
 struct run {
 	struct incise_plant plant[3];
 	struct incise_predict predict;
@@ -55,7 +62,8 @@ struct run {
 	int n;
 	double force_N[3];
 	double late_N[INCISE_POSE_LOOP_LATE_MAX + 1]
-		     [3]; /* on their way, the oldest first */
+		     [3];		   /* on their way, the oldest first */
+	double cell_mm[CELLS_MOST + 1][3]; /* places before this tick, the oldest first */
 	double t_s;
 };
 
@@ -77,8 +85,25 @@ static double *place(const struct loop *loop, struct run *run, int state, int ax
 	if (state < loop->own_states)
 		return own[state];
 	state -= loop->own_states;
-	return state < loop->waiting ? &run->pose_mm[state][axis]
-				     : &run->late_N[state - loop->waiting][axis];
+	if (state < loop->waiting)
+		return &run->pose_mm[state][axis];
+	state -= loop->waiting;
+	return state < loop->late ? &run->late_N[state][axis]
+				  : &run->cell_mm[state - loop->late][axis];
+}
+
+/* So that all are of one size: of speeds and accelerations in a period, and forces of a stiffness. */
+static double unit(const struct loop *loop, int state)
+{
+	static const int order[OWN_STATES] = {0, 1, 0, 1, 2, 0, 1, 2};
+	double period_s = loop->ticks * loop->tick_s, most_N_mm = 0;
+	int late = state - loop->own_states - loop->waiting;
+
+	if (state < loop->own_states)
+		return pow(period_s, -order[state]);
+	for (int i = 0; i < 3; i++)
+		most_N_mm = fmax(most_N_mm, fabs(loop->map.now[i][i]));
+	return late >= 0 && late < loop->late && most_N_mm > 0 ? most_N_mm : 1;
 }
 
 static void go_to(struct run *run, double t_s)
@@ -102,16 +127,39 @@ static void take_pose(struct run *run, double arrival_s)
 		(size_t)--run->n * sizeof(run->pose_mm[0]));
 }
 
+/* The mean of the last places, with this one. Of cells with several ticks each moves on by its part. */
+static void set_mean(const struct loop *loop, struct run *run, const double x[3],
+		     double mean[3])
+{
+	double left = loop->map.mean_ticks - 1;
+
+	v3_copy(mean, x);
+	v3_copy(run->cell_mm[loop->cells], x);
+	for (int k = loop->cells - 1; k >= 0; k--, left -= loop->cell_ticks)
+		v3_add(mean, mean, fmin(left, loop->cell_ticks), run->cell_mm[k]);
+	for (int i = 0; i < 3; i++) {
+		mean[i] /= fmax(loop->map.mean_ticks, 1);
+		for (int k = 0; k < loop->cells; k++)
+			run->cell_mm[k][i] +=
+				(run->cell_mm[k + 1][i] - run->cell_mm[k][i]) /
+				loop->cell_ticks;
+	}
+}
+
 static void set_force(const struct loop *loop, struct run *run)
 {
-	double x[3], v[3], a[3] = {0}, attitude[4];
+	const struct incise_force_map *map = &loop->map;
+	double x[3], v[3], a[3] = {0}, mean[3] = {0}, attitude[4];
 
 	incise_predict_at(&run->predict, to_ns(run->t_s), x, v, attitude);
-	if (loop->A != 0)
+	if (loop->own_states == OWN_STATES)
 		incise_predict_acceleration(&run->predict, to_ns(run->t_s), a);
+	if (map->mean_ticks > 1)
+		set_mean(loop, run, x, mean);
 	for (int i = 0; i < 3; i++)
 		run->late_N[loop->late][i] =
-			-loop->K * x[i] - loop->B * v[i] - loop->A * a[i];
+			-v3_dot(map->now[i], x) - v3_dot(map->mean[i], mean) -
+			v3_dot(map->damping[i], v) - v3_dot(map->mass[i], a);
 	memcpy(run->force_N, run->late_N[0], sizeof(run->force_N));
 	memmove(run->late_N[0], run->late_N[1],
 		(size_t)loop->late * sizeof(run->late_N[0]));
@@ -142,86 +190,69 @@ static void run_period(const struct loop *loop, struct run *run)
 		take_pose(run, i * loop->pose_s - lead_s);
 }
 
-/* The effect of a period on each state, column by column. */
-static void measure(const struct loop *loop, double matrix[STATES][STATES])
+static int size_of(const struct loop *loop)
 {
-	for (int column = 0; column < loop->states; column += 3) {
+	return loop->states * (loop->alone ? 1 : 3);
+}
+
+/* The effect of a period on each state, column by column. */
+static void measure(const struct loop *loop, double *matrix)
+{
+	int n = size_of(loop), at_once = loop->alone ? 3 : 1, axes = loop->alone ? 1 : 3;
+
+	for (int column = 0; column < n; column += at_once) {
 		struct run run = {
-			.plant = {loop->plant, loop->plant, loop->plant},
+			.plant = {loop->plant[0], loop->plant[1], loop->plant[2]},
 			.predict = loop->predict,
 			.n = loop->waiting,
 		};
 
-		for (int i = 0; i < 3 && column + i < loop->states; i++)
-			*place(loop, &run, column + i, i) = SIZE_MM;
-		run_period(loop, &run);
-		for (int row = 0; row < loop->states; row++)
-			for (int i = 0; i < 3 && column + i < loop->states; i++)
-				matrix[row][column + i] =
-					*place(loop, &run, row, i) / SIZE_MM;
-	}
-}
+		for (int k = 0; k < at_once && column + k < n; k++) {
+			int state = (column + k) / axes;
 
-/* The largest sum of a row, by which the matrix is divided; 0 when that is no number. */
-static double normalise(double matrix[STATES][STATES], int n)
-{
-	double most = 0;
-
-	for (int i = 0; i < n; i++) {
-		double sum = 0;
-
-		for (int j = 0; j < n; j++)
-			sum += fabs(matrix[i][j]);
-		if (!isfinite(sum))
-			return 0;
-		most = fmax(most, sum);
-	}
-	for (int i = 0; i < n && most > 0; i++)
-		for (int j = 0; j < n; j++)
-			matrix[i][j] /= most;
-	return most;
-}
-
-/*
- * Whether no eigenvalue is above 1, by squaring: of the norms |M^n| the n-th root tends to
- * the largest, and one of them below 1 proves it. After 30 squarings e^100 is a growth of
- * 1e-7 per period, which is none: a predictor with a gain of 0 has a state that stays.
- */
-#define SQUARINGS 30
-#define STAYS 100
-
-static bool decays(double matrix[STATES][STATES], int n)
-{
-	double log_norm = 0;
-
-	for (int n_squared = 0; n_squared < SQUARINGS; n_squared++) {
-		double square[STATES][STATES], norm = normalise(matrix, n);
-
-		if (!(norm > 0))
-			return false;
-		log_norm = 2 * log_norm + log(norm);
-		if (log_norm < 0)
-			return true;
-		/* Only the states that there are: most of the array is not used. */
-		for (int i = 0; i < n; i++) {
-			memset(square[i], 0, (size_t)n * sizeof(**square));
-			for (int k = 0; k < n; k++)
-				for (int j = 0; j < n; j++)
-					square[i][j] += matrix[i][k] * matrix[k][j];
+			*place(loop, &run, state, loop->alone ? k : column % 3) =
+				SIZE_MM * unit(loop, state);
 		}
-		for (int i = 0; i < n; i++)
-			memcpy(matrix[i], square[i], (size_t)n * sizeof(**square));
+		run_period(loop, &run);
+		for (int row = 0; row < n; row++)
+			for (int k = 0; k < at_once && column + k < n; k++)
+				matrix[row * n + column + k] =
+					*place(loop, &run, row / axes,
+					       loop->alone ? k : row % 3) /
+					SIZE_MM / unit(loop, row / axes);
 	}
-	return log_norm < STAYS;
+}
+
+/* In a period; none: a predictor with a gain of 0 has a state that stays. */
+#define GROWS 1e-7
+
+/* Of the matrix, the eigenvalue that grows the fastest, and 0 without one; @swings: of those that swing. */
+static double complex fastest(double *matrix, int n, bool swings)
+{
+	double complex *all = malloc((size_t)n * sizeof(*all)), most = 0;
+
+	if (!all || !incise_eigenvalues(matrix, n, all)) {
+		free(all);
+		return DBL_MAX;
+	}
+	for (int i = 0; i < n; i++)
+		/* What is e times as large before it has turned by a radian only goes away. */
+		if (cabs(all[i]) > cabs(most) && cimag(all[i]) >= 0 &&
+		    (!swings || carg(all[i]) > log(cabs(all[i]))))
+			most = all[i];
+	free(all);
+	return most;
 }
 
 static bool stable(struct loop *loop, double stiffness_N_mm)
 {
-	double matrix[STATES][STATES];
+	double matrix[(OWN_STATES + WAITING_MOST + INCISE_POSE_LOOP_LATE_MAX) *
+		      (OWN_STATES + WAITING_MOST + INCISE_POSE_LOOP_LATE_MAX)];
 
-	loop->K = stiffness_N_mm;
+	for (int i = 0; i < 3; i++)
+		loop->map.now[i][i] = stiffness_N_mm;
 	measure(loop, matrix);
-	return decays(matrix, loop->states);
+	return cabs(fastest(matrix, loop->states, false)) <= 1 + GROWS;
 }
 
 /* Times that are multiples of each other, none shorter than it is. */
@@ -237,8 +268,7 @@ static void set_times(struct loop *loop, double tick_s)
 	loop->tick_s = loop->pose_s * loop->poses / loop->ticks;
 	loop->waiting =
 		(int)((loop->latency_s + LEAD * loop->tick_s) / loop->pose_s + 1e-9);
-	loop->own_states = loop->A != 0 ? OWN_STATES : OWN_STATES - 1;
-	loop->states = loop->own_states + loop->waiting + loop->late;
+	loop->states = loop->own_states + loop->waiting + loop->late + loop->cells;
 }
 
 /* The predictor as it is at the begin of a period, with all that it knows 0. */
@@ -264,27 +294,56 @@ static bool valid(const struct incise_pose_loop *of)
 	       of->late_ticks >= 0 && of->late_ticks <= INCISE_POSE_LOOP_LATE_MAX;
 }
 
-static void loop_init(struct loop *loop, const struct incise_pose_loop *of)
+static void loop_init(struct loop *loop, const struct incise_pose_loop *of,
+		      const struct incise_force_map *map)
 {
-	const struct incise_haptic_device *device = of->device;
-	const struct incise_hand_impedance *hand = of->hand;
+	bool mass = false;
 
 	*loop = (struct loop){
-		.plant = {.mass_kg = device->mass_kg,
-			  .damping_N_s_mm = device->damping_N_s_mm},
 		.predict = *of->predict,
 		.late = of->late_ticks,
-		.B = of->damping_N_s_mm,
-		.A = of->acceleration_N_s2_mm,
+		.map = *map,
 	};
-	if (hand) {
-		loop->plant.mass_kg += hand->mass_kg;
-		loop->plant.damping_N_s_mm += hand->damping_N_s_mm;
-		loop->plant.wall_N_mm = hand->stiffness_N_mm;
-		loop->plant.tied = true;
+	if (map->mean_ticks > 1) {
+		loop->cells = (int)fmin(map->mean_ticks - 1, CELLS_MOST);
+		loop->cell_ticks = (map->mean_ticks - 1.0) / loop->cells;
 	}
-	set_times(loop, device->period_s);
+	for (int i = 0; i < 9; i++)
+		mass = mass || map->mass[i / 3][i % 3] != 0;
+	loop->own_states = mass ? OWN_STATES : OWN_STATES - 1;
+	set_times(loop, of->device->period_s);
 	set_predict(loop);
+}
+
+static void wall_init(struct loop *loop, const struct incise_pose_loop *of)
+{
+	struct incise_plant plant = incise_pose_loop_plant(
+		of->device->mass_kg, of->device->damping_N_s_mm, of->hand);
+	struct incise_force_map map = {.mean_ticks = 1};
+
+	for (int i = 0; i < 3; i++) {
+		map.damping[i][i] = of->damping_N_s_mm;
+		map.mass[i][i] = of->acceleration_N_s2_mm;
+	}
+	loop_init(loop, of, &map);
+	loop->alone = true;
+	for (int i = 0; i < 3; i++)
+		loop->plant[i] = plant;
+}
+
+struct incise_plant incise_pose_loop_plant(double mass_kg, double damping_N_s_mm,
+					   const struct incise_hand_impedance *hand)
+{
+	struct incise_plant plant = {.mass_kg = mass_kg,
+				     .damping_N_s_mm = damping_N_s_mm};
+
+	if (!hand)
+		return plant;
+	plant.mass_kg += hand->mass_kg;
+	plant.damping_N_s_mm += hand->damping_N_s_mm;
+	plant.wall_N_mm = hand->stiffness_N_mm;
+	plant.tied = true;
+	return plant;
 }
 
 bool incise_pose_loop_holds(const struct incise_pose_loop *of, double stiffness_N_mm)
@@ -293,7 +352,7 @@ bool incise_pose_loop_holds(const struct incise_pose_loop *of, double stiffness_
 
 	if (!valid(of) || !isfinite(stiffness_N_mm))
 		return false;
-	loop_init(&loop, of);
+	wall_init(&loop, of);
 	return stable(&loop, stiffness_N_mm);
 }
 
@@ -302,6 +361,7 @@ bool incise_pose_loop_holds(const struct incise_pose_loop *of, double stiffness_
 #define FACTOR 1.05
 #define STEPS 400
 #define HALVINGS 40
+#define MARGIN_HALVINGS 12
 
 double incise_pose_loop_limit(const struct incise_pose_loop *of)
 {
@@ -310,11 +370,11 @@ double incise_pose_loop_limit(const struct incise_pose_loop *of)
 
 	if (!valid(of))
 		return 0;
-	loop_init(&loop, of);
+	wall_init(&loop, of);
 	late_s = loop.latency_s + loop.pose_s + loop.late * loop.tick_s;
-	high = loop.plant.mass_kg * N_S2_PER_MM_KG / late_s;
-	if (loop.plant.damping_N_s_mm > 0)
-		high = fmin(high, loop.plant.damping_N_s_mm);
+	high = loop.plant[0].mass_kg * N_S2_PER_MM_KG / late_s;
+	if (loop.plant[0].damping_N_s_mm > 0)
+		high = fmin(high, loop.plant[0].damping_N_s_mm);
 	high *= SOFTEST / late_s;
 	/* Upwards, for a wall may be stable again beyond one that is not. */
 	for (int i = 0; i < STEPS && stable(&loop, high); i++) {
@@ -326,5 +386,79 @@ double incise_pose_loop_limit(const struct incise_pose_loop *of)
 
 		*(stable(&loop, middle) ? &low : &high) = middle;
 	}
+	return low;
+}
+
+/* Which way the fastest swing goes: where the places of its plane are, or their speeds. */
+static void set_along(const struct loop *loop, const double *matrix,
+		      double complex eigenvalue, double *work, double along[3])
+{
+	double *x = malloc((size_t)size_of(loop) * sizeof(*x));
+
+	v3_copy(along, (double[3]){0});
+	if (!x)
+		return;
+	for (int i = 0; i < size_of(loop); i++)
+		x[i] = 1 + i % 7;
+	incise_eigenvector(matrix, size_of(loop), eigenvalue, work, x);
+	v3_copy(along, v3_length(x) * carg(eigenvalue) > v3_length(x + 3) ? x : x + 3);
+	v3_unit(along, along, 0);
+	free(x);
+}
+
+double incise_pose_loop_swing(const struct incise_pose_loop *of,
+			      const struct incise_plant axis[3],
+			      const struct incise_force_map *map, double share,
+			      struct incise_swing *swing)
+{
+	double *matrix, *work, period_s;
+	struct incise_force_map scaled = *map;
+	double complex eigenvalue;
+	struct loop loop;
+	int n;
+
+	for (int i = 0; i < 9; i++) {
+		scaled.now[i / 3][i % 3] *= share;
+		scaled.mean[i / 3][i % 3] *= share;
+		scaled.damping[i / 3][i % 3] *= share;
+		scaled.mass[i / 3][i % 3] *= share;
+	}
+	loop_init(&loop, of, &scaled);
+	memcpy(loop.plant, axis, sizeof(loop.plant));
+	n = size_of(&loop);
+	matrix = calloc(2 * (size_t)n * (size_t)n, sizeof(*matrix));
+	if (!matrix)
+		return INFINITY;
+	work = matrix + (size_t)n * (size_t)n;
+	measure(&loop, matrix);
+	memcpy(work, matrix, (size_t)n * (size_t)n * sizeof(*work));
+	eigenvalue = fastest(work, n, true);
+	period_s = loop.ticks * loop.tick_s;
+	if (swing) {
+		swing->hz = carg(eigenvalue) / (2 * M_PI * period_s);
+		set_along(&loop, matrix, eigenvalue, work, swing->along);
+	}
+	free(matrix);
+	return cabs(eigenvalue) > 1 + GROWS ? log(cabs(eigenvalue)) / period_s : 0;
+}
+
+double incise_pose_loop_margin(const struct incise_pose_loop *of,
+			       const struct incise_plant axis[3],
+			       const struct incise_force_map *map, double most,
+			       struct incise_swing *swing)
+{
+	double low = 0, high = most;
+
+	if (!(incise_pose_loop_swing(of, axis, map, most, NULL) > 0))
+		return most;
+	for (int i = 0; i < MARGIN_HALVINGS; i++) {
+		double middle = (low + high) / 2;
+
+		if (incise_pose_loop_swing(of, axis, map, middle, NULL) > 0)
+			high = middle;
+		else
+			low = middle;
+	}
+	incise_pose_loop_swing(of, axis, map, high, swing);
 	return low;
 }

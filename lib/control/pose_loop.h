@@ -30,6 +30,7 @@
 
 #include <stdbool.h>
 #include <incise/stability.h>
+#include "plant.h"
 #include "predict.h"
 
 #define INCISE_POSE_LOOP_LATE_MAX 16 /* ticks */
@@ -50,7 +51,7 @@ struct incise_pose_loop {
 	const struct incise_hand_impedance *hand; /* or NULL: none */
 };
 
-/* Whether a wall of this stiffness is stable in the loop. Some 0.1 ms; no allocation. */
+/* Whether a wall of this stiffness is stable in the loop. Some 0.1 ms. */
 bool incise_pose_loop_holds(const struct incise_pose_loop *loop, double stiffness_N_mm);
 
 /*
@@ -61,8 +62,53 @@ bool incise_pose_loop_holds(const struct incise_pose_loop *loop, double stiffnes
  * tick or 32 in the latency, tick or P are made longer too.
  *
  * Returns N/mm; 0 when even the softest wall is unstable, or of a device that cannot be.
- * Takes some milliseconds, more with many P in the latency; no allocation.
+ * Takes some milliseconds, more with many P in the latency.
  */
 double incise_pose_loop_limit(const struct incise_pose_loop *loop);
+
+/* A mass in a hand, or in none (NULL). */
+struct incise_plant incise_pose_loop_plant(double mass_kg, double damping_N_s_mm,
+					   const struct incise_hand_impedance *hand);
+
+/*
+ * Forces in three dimensions about a state of rest: linear, but each with all axes. Of a wall all are multiples of
+ * the unit matrix.
+ *
+ *   f = - now x - mean (mean of the last x) - damping v - mass a
+ */
+struct incise_force_map {
+	double now[3][3], mean[3][3]; /* N/mm */
+	double damping[3][3];	      /* N s/mm */
+	double mass[3][3];	      /* N s²/mm */
+	int mean_ticks;		      /* 1: no mean */
+};
+
+/* The fastest of the loop's swings. */
+struct incise_swing {
+	double hz;
+	double along[3]; /* unit, in the axes of the map */
+};
+
+/*
+ * How fast that swing grows, 1/s; 0: none grows. What grows by e before it has turned by a radian is no swing, but
+ * goes away, as a tool does that stands on a ball. The states of the loop above are those of three axes, each with a device of its own, and of
+ * the mean: of more than 16 ticks it is by 15 cells, which are late as it is but blur its ends.
+ *
+ * @param share  of all forces of the map
+ * @param axis   of the device: its plant at rest, and where it is tied
+ * @param swing  or NULL
+ * @return INFINITY: no memory. @of: its damping, acceleration and hand do not count. Some 0.5 ms, 5 ms with
+ * all states.
+ */
+double incise_pose_loop_swing(const struct incise_pose_loop *of,
+			      const struct incise_plant axis[3],
+			      const struct incise_force_map *map, double share,
+			      struct incise_swing *swing);
+
+/* The share up to which no swing grows, at most @most; then @swing stays as it is. */
+double incise_pose_loop_margin(const struct incise_pose_loop *of,
+			       const struct incise_plant axis[3],
+			       const struct incise_force_map *map, double most,
+			       struct incise_swing *swing);
 
 #endif

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Eigenvalues; see eigenvalues.h.
+ *
+ *        x x x x x x            x x x x x x      Hessenberg, whose diagonal falls apart into
+ *        x x x x x x            x x x x x x      blocks of one or two, from the end on
+ *   lo ──▶ 0 x x x x x     ──▶      . x x x x
+ *            x x x x              b b x x x      b: the bulge, which a step chases from lo to hi
+ *   hi ──▶     x x x              b b b x x
+ */
+#include <float.h>
+#include <math.h>
+#include "eigenvalues.h"
+
+#define AT(i, j) a[(i)*n + (j)]
+#define STEPS_MOST 60 /* for an eigenvalue */
+
+/* Of the largest element: where the diagonal is none, as of poses on their way, nothing else is small beside it. */
+#define LEAST 1e-3
+
+static void swap(double *x, double *y)
+{
+	double t = *x;
+
+	*x = *y;
+	*y = t;
+}
+
+/* By elimination, with the largest pivot. */
+static void make_hessenberg(double *a, int n)
+{
+	for (int m = 1; m < n - 1; m++) {
+		int pivot = m;
+
+		for (int i = m + 1; i < n; i++)
+			if (fabs(AT(i, m - 1)) > fabs(AT(pivot, m - 1)))
+				pivot = i;
+		for (int j = 0; j < n && pivot != m; j++)
+			swap(&AT(pivot, j), &AT(m, j));
+		for (int i = 0; i < n && pivot != m; i++)
+			swap(&AT(i, pivot), &AT(i, m));
+		for (int i = m + 1; i < n && AT(m, m - 1) != 0; i++) {
+			double part = AT(i, m - 1) / AT(m, m - 1);
+
+			if (part == 0)
+				continue;
+			for (int j = m - 1; j < n; j++)
+				AT(i, j) -= part * AT(m, j);
+			for (int k = 0; k < n; k++)
+				AT(k, m) += part * AT(k, i);
+			AT(i, m - 1) = 0;
+		}
+	}
+}
+
+/* Reflect rows, then columns, from @k on, of the block, so that (p, q, r) becomes (s, 0, 0). */
+static void reflect(double *a, int n, int lo, int hi, int k, const double v[3])
+{
+	int size = hi - k < 2 ? 2 : 3, from = k > lo ? k - 1 : lo;
+	double w[3] = {0}, length = 0, scale;
+
+	for (int i = 0; i < size; i++)
+		length = hypot(length, v[i]);
+	if (!(length > 0))
+		return;
+	for (int i = 0; i < size; i++)
+		w[i] = v[i] / length;
+	w[0] += w[0] < 0 ? -1 : 1;
+	scale = 1 / fabs(w[0]);
+	for (int j = from; j <= hi; j++) {
+		double sum = 0;
+
+		for (int i = 0; i < size; i++)
+			sum += w[i] * AT(k + i, j);
+		for (int i = 0; i < size; i++)
+			AT(k + i, j) -= scale * sum * w[i];
+	}
+	for (int j = lo; j <= hi && j <= k + 3; j++) {
+		double sum = 0;
+
+		for (int i = 0; i < size; i++)
+			sum += w[i] * AT(j, k + i);
+		for (int i = 0; i < size; i++)
+			AT(j, k + i) -= scale * sum * w[i];
+	}
+}
+
+/* A step of the block lo … hi, of three and more, with both shifts: their sum, their product. */
+static void step(double *a, int n, int lo, int hi, double sum, double product)
+{
+	double v[3] = {
+		AT(lo, lo) * AT(lo, lo) + AT(lo, lo + 1) * AT(lo + 1, lo) -
+			sum * AT(lo, lo) + product,
+		AT(lo + 1, lo) * (AT(lo, lo) + AT(lo + 1, lo + 1) - sum),
+		AT(lo + 1, lo) * AT(lo + 2, lo + 1),
+	};
+
+	for (int k = lo; k < hi; k++) {
+		reflect(a, n, lo, hi, k, v);
+		for (int i = 0; i < 3; i++)
+			v[i] = k + 1 + i <= hi ? AT(k + 1 + i, k) : 0;
+		/* Below the diagonal it is 0 but for rounding. */
+		for (int i = k + 1; i <= hi && i <= k + 2 && k > lo; i++)
+			AT(i, k - 1) = 0;
+	}
+}
+
+/* The row where the block that ends in @hi begins. */
+static int begin_of(double *a, int n, int hi, double least)
+{
+	for (int lo = hi; lo > 0; lo--) {
+		double size = fabs(AT(lo - 1, lo - 1)) + fabs(AT(lo, lo));
+
+		if (fabs(AT(lo, lo - 1)) <= DBL_EPSILON * fmax(size, least)) {
+			AT(lo, lo - 1) = 0;
+			return lo;
+		}
+	}
+	return 0;
+}
+
+static void solve_two(double sum, double product, double complex eigenvalue[2])
+{
+	double half = sum / 2, root2 = half * half - product, more;
+
+	if (root2 < 0) {
+		eigenvalue[0] = half + I * sqrt(-root2);
+		eigenvalue[1] = conj(eigenvalue[0]);
+		return;
+	}
+	more = half + copysign(sqrt(root2), half);
+	eigenvalue[0] = more;
+	eigenvalue[1] = more != 0 ? product / more : 0;
+}
+
+bool incise_eigenvalues(double *a, int n, double complex eigenvalue[])
+{
+	double most = 0;
+	int steps = 0;
+
+	for (int i = 0; i < n * n; i++) {
+		if (!isfinite(a[i]))
+			return false;
+		most = fmax(most, fabs(a[i]));
+	}
+	make_hessenberg(a, n);
+	for (int hi = n - 1; hi >= 0;) {
+		int lo = begin_of(a, n, hi, LEAST * most);
+		double complex two[2];
+		double sum, product;
+
+		if (lo == hi) {
+			eigenvalue[hi--] = AT(lo, lo);
+			steps = 0;
+			continue;
+		}
+		sum = AT(hi - 1, hi - 1) + AT(hi, hi);
+		product =
+			AT(hi - 1, hi - 1) * AT(hi, hi) - AT(hi - 1, hi) * AT(hi, hi - 1);
+		if (lo == hi - 1) {
+			solve_two(sum, product, &eigenvalue[lo]);
+			hi -= 2;
+			steps = 0;
+			continue;
+		}
+		if (++steps > STEPS_MOST)
+			return false;
+		solve_two(sum, product, two);
+		/* Of two that are real the nearer one twice, as LAPACK does: both may go round in a circle. */
+		if (cimag(two[0]) == 0) {
+			double last = AT(hi, hi), a0 = creal(two[0]), a1 = creal(two[1]);
+
+			sum = 2 * (fabs(a0 - last) < fabs(a1 - last) ? a0 : a1);
+			product = sum * sum / 4;
+		}
+		if (steps % 10 == 0) {
+			double off = fabs(AT(hi, hi - 1)) + fabs(AT(hi - 1, hi - 2));
+
+			sum = 1.5 * off;
+			product = off * off;
+		}
+		step(a, n, lo, hi, sum, product);
+	}
+	return true;
+}
+
+/* Solve a x = x, with the largest pivot of each column; one of 0 is as small as rounding. */
+static void solve(double *a, int n, double x[])
+{
+	for (int m = 0; m < n; m++) {
+		int pivot = m;
+
+		for (int i = m + 1; i < n; i++)
+			if (fabs(AT(i, m)) > fabs(AT(pivot, m)))
+				pivot = i;
+		for (int j = m; j < n && pivot != m; j++)
+			swap(&AT(pivot, j), &AT(m, j));
+		if (pivot != m)
+			swap(&x[pivot], &x[m]);
+		if (fabs(AT(m, m)) < DBL_EPSILON)
+			AT(m, m) = DBL_EPSILON;
+		for (int i = m + 1; i < n; i++) {
+			double part = AT(i, m) / AT(m, m);
+
+			for (int j = m; j < n && part != 0; j++)
+				AT(i, j) -= part * AT(m, j);
+			x[i] -= part * x[m];
+		}
+	}
+	for (int m = n - 1; m >= 0; m--) {
+		for (int j = m + 1; j < n; j++)
+			x[m] -= AT(m, j) * x[j];
+		x[m] /= AT(m, m);
+	}
+}
+
+/* (A - λ)(A - λ*) is real, and 0 on the plane of λ. */
+void incise_eigenvector(const double *matrix, int n, double complex eigenvalue, double *a,
+			double x[])
+{
+	double sum = 2 * creal(eigenvalue),
+	       product = creal(eigenvalue * conj(eigenvalue));
+
+	for (int round = 0; round < 3; round++) {
+		double length = 0;
+
+		for (int i = 0; i < n; i++)
+			for (int j = 0; j < n; j++) {
+				AT(i, j) =
+					(i == j ? product : 0) - sum * matrix[i * n + j];
+				for (int k = 0; k < n; k++)
+					AT(i, j) += matrix[i * n + k] * matrix[k * n + j];
+			}
+		solve(a, n, x);
+		for (int i = 0; i < n; i++)
+			length = hypot(length, x[i]);
+		for (int i = 0; i < n; i++)
+			x[i] /= length;
+	}
+}
