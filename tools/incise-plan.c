@@ -121,11 +121,6 @@ static void print_evaluation(const struct incise_plan *plan)
 	}
 }
 
-static double margin(const struct incise_plan_stability *s)
-{
-	return s->stiffness_N_mm > 0 ? s->limit_N_mm / s->stiffness_N_mm : INFINITY;
-}
-
 /* Passivity limit of a wall with this delay; none is known for extrapolated poses. */
 static double passive_N_mm(const struct incise_plan_stability *s)
 {
@@ -141,15 +136,22 @@ static double encoder_N_mm(const struct incise_plan_stability *s)
 		       : NAN;
 }
 
+static json_t *weakest_margin(const struct incise_plan_weakest *w)
+{
+	return json_number(w->margin < INCISE_PLAN_MARGIN_MOST ? w->margin : NAN);
+}
+
 static json_t *stability_json(const struct incise_plan_stability *s)
 {
 	const struct incise_haptic_device *d = &s->device;
+	const struct incise_plan_weakest *w = &s->weakest;
 
 	return json_pack("{so so so so so so so sf sf sf sf sf si "
-			 "s{ss sb sb so sf sf sf sf sf sf} sf "
+			 "s{ss sb sb sb so sf sf sf sf sf sf} "
+			 "s{so so sf sf sf so ss sb sb si si} sf "
 			 "sf si sb sb s{sf sf sf sf sf si}}",
 			 "stiffness_N_mm", json_number(s->stiffness_N_mm), "limit_N_mm",
-			 json_number(s->limit_N_mm), "margin", json_number(margin(s)),
+			 json_number(s->limit_N_mm), "margin", weakest_margin(w),
 			 "damping_N_s_mm", json_number(s->damping_N_s_mm),
 			 "speed_slope_N_s_mm", json_number(s->speed_slope_N_s_mm),
 			 "passive_N_mm", json_number(passive_N_mm(s)), "encoder_N_mm",
@@ -158,16 +160,21 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 			 "unloading_N_mm", s->unloading_N_mm, "support_mm", s->support_mm,
 			 "beyond_N_mm", s->beyond_N_mm, "leans", s->runs, "worst", "tool",
 			 loop_tool_names[s->worst.tool], "in_hand", s->worst.in_hand,
-			 "guided", s->worst.guided, "place_mm",
+			 "across", s->worst.across, "guided", s->worst.guided, "place_mm",
 			 json_numbers(s->worst.place_mm, 3), "askew", s->worst.askew,
 			 "lean_N", s->worst.lean_N, "along_mm_s", s->worst.along_mm_s,
 			 "depth_mm", s->worst.depth_mm, "swing_mm", s->worst.swing_mm,
-			 "settle_s", s->worst.settle_s, "noise_mm", s->noise_mm,
-			 "noise_N", s->noise_N, "late_ticks", s->late_ticks, "certified",
-			 s->certified, "own_delay", s->own_delay, "device", "mass_kg",
-			 d->mass_kg, "damping_N_s_mm", d->damping_N_s_mm, "coulomb_N",
-			 d->coulomb_N, "encoder_mm", d->encoder_mm, "period_s",
-			 d->period_s, "delay_ticks", d->delay_ticks);
+			 "settle_s", s->worst.settle_s, "weakest", "margin",
+			 weakest_margin(w), "along", json_numbers(w->along, 3), "hz",
+			 w->hz, "lean_N", w->lean_N, "depth_mm", w->depth_mm, "place_mm",
+			 json_numbers(w->place_mm, 3), "tool", loop_tool_names[w->tool],
+			 "in_hand", w->in_hand, "across", w->across, "states", w->states,
+			 "paid", w->paid, "noise_mm", s->noise_mm, "noise_N", s->noise_N,
+			 "late_ticks", s->late_ticks, "certified", s->certified,
+			 "own_delay", s->own_delay, "device", "mass_kg", d->mass_kg,
+			 "damping_N_s_mm", d->damping_N_s_mm, "coulomb_N", d->coulomb_N,
+			 "encoder_mm", d->encoder_mm, "period_s", d->period_s,
+			 "delay_ticks", d->delay_ticks);
 }
 
 /* The rig's actuators: direction, and stability of a wall along it. */
@@ -281,6 +288,29 @@ static void print_model(const struct incise_plan_stability *s)
 		printf("            withdrawal: the model's force in both directions\n");
 }
 
+static const char *hand_name(bool in_hand, bool across)
+{
+	return !in_hand ? "without a hand" : across ? "held across" : "in a hand";
+}
+
+/* The state about which the least more of its forces makes the loop swing. */
+static void print_weakest(const struct incise_plan_weakest *w)
+{
+	if (w->margin < INCISE_PLAN_MARGIN_MOST)
+		printf("margin %.3g: with so many times its forces it swings along (%.2f, %.2f, %.2f) with %.3g Hz\n"
+		       "            there %.3g N hold the %s %.3g mm deep at (%.4g, %.4g, %.4g), %s: the weakest of %d states of rest\n",
+		       w->margin, w->along[0] + 0.0, w->along[1] + 0.0, w->along[2] + 0.0,
+		       w->hz, w->lean_N, loop_tool_names[w->tool], w->depth_mm,
+		       w->place_mm[0], w->place_mm[1], w->place_mm[2],
+		       hand_name(w->in_hand, w->across), w->states);
+	else
+		printf("margin: none; in %d states of rest it swings not even with %d times its forces\n",
+		       w->states - w->paid, INCISE_PLAN_MARGIN_MOST);
+	if (w->paid)
+		printf("            in %d of them it would swing, but what gives work is not paid for\n",
+		       w->paid);
+}
+
 /* What the search for swings found. */
 static void print_rest(const struct incise_plan_stability *s)
 {
@@ -293,9 +323,9 @@ static void print_rest(const struct incise_plan_stability *s)
 		printf(" at %.1f mm", s->worst.depth_mm);
 	else
 		printf(", %.0f %% of it along the skin, by the %s at (%.4g, %.4g, %.4g), "
-		       "%s a hand",
+		       "%s",
 		       100 * s->worst.askew, loop_tool_names[s->worst.tool], at[0], at[1],
-		       at[2], s->worst.in_hand ? "in" : "without");
+		       at[2], hand_name(s->worst.in_hand, s->worst.across));
 	if (s->worst.along_mm_s > 0)
 		printf(", while it goes along the skin with %g mm/s",
 		       s->worst.along_mm_s);
@@ -310,18 +340,18 @@ static void print_stability(const struct job *job, const struct incise_plan *pla
 	struct model_force force;
 
 	incise_plan_stability(plan, &s);
-	printf("stability   %.4g N/mm of at most %.4g N/mm", s.stiffness_N_mm,
+	fputs("stability   ", stdout);
+	print_weakest(&s.weakest);
+	printf("            its stiffest has %.4g N/mm%s; a flat wall is stable up to %.4g N/mm\n",
+	       s.stiffness_N_mm, s.certified ? "" : " (the model's slope is an estimate)",
 	       s.limit_N_mm);
-	if (isfinite(margin(&s)))
-		printf(": margin %.3g", margin(&s));
-	printf("%s\n", s.certified ? "" : " (the model's slope is an estimate)");
 	printf("            on %g kg and %g N s/mm, with ", s.device.mass_kg,
 	       s.device.damping_N_s_mm);
 	if (s.own_delay)
 		printf("forces %d ticks late\n", s.device.delay_ticks);
 	else
 		printf("poses up to %d ticks old, extrapolated, and an actuator %d ticks "
-		       "late\n            the same in hands of 0.14 to 0.55 kg\n",
+		       "late\n",
 		       s.device.delay_ticks, s.late_ticks);
 	if (isfinite(passive_N_mm(&s)))
 		printf("            passive in any hand up to %.4g N/mm\n",
@@ -468,7 +498,7 @@ int main(int argc, char **argv)
 	}
 	plan = cli_require(incise_plan_new(scene, rig, &err), &err);
 	cli_progress("%s: timing %d s of ticks", job.scene.path, MEASURED_S);
-	tick_cost(scene, rig ? &tracker : NULL, 0, MEASURED_S, &cost);
+	tick_cost(scene, rig ? NULL : plan, rig ? &tracker : NULL, 0, MEASURED_S, &cost);
 	cli_progress_end();
 	size = scene_argument_size(job.scene.path, incise_plan_surface(plan));
 	if (job.json)

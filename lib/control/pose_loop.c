@@ -290,8 +290,8 @@ static bool valid(const struct incise_pose_loop *of)
 
 	return d->mass_kg > 0 && isfinite(d->mass_kg) && d->damping_N_s_mm >= 0 &&
 	       isfinite(d->damping_N_s_mm) && d->period_s > 0 && isfinite(d->period_s) &&
-	       isfinite(of->damping_N_s_mm) && isfinite(of->acceleration_N_s2_mm) &&
-	       of->late_ticks >= 0 && of->late_ticks <= INCISE_POSE_LOOP_LATE_MAX;
+	       isfinite(of->damping_N_s_mm) && of->late_ticks >= 0 &&
+	       of->late_ticks <= INCISE_POSE_LOOP_LATE_MAX;
 }
 
 static void loop_init(struct loop *loop, const struct incise_pose_loop *of,
@@ -317,18 +317,15 @@ static void loop_init(struct loop *loop, const struct incise_pose_loop *of,
 
 static void wall_init(struct loop *loop, const struct incise_pose_loop *of)
 {
-	struct incise_plant plant = incise_pose_loop_plant(
-		of->device->mass_kg, of->device->damping_N_s_mm, of->hand);
 	struct incise_force_map map = {.mean_ticks = 1};
 
-	for (int i = 0; i < 3; i++) {
+	for (int i = 0; i < 3; i++)
 		map.damping[i][i] = of->damping_N_s_mm;
-		map.mass[i][i] = of->acceleration_N_s2_mm;
-	}
 	loop_init(loop, of, &map);
 	loop->alone = true;
 	for (int i = 0; i < 3; i++)
-		loop->plant[i] = plant;
+		loop->plant[i] = incise_pose_loop_plant(of->device->mass_kg,
+							of->device->damping_N_s_mm, NULL);
 }
 
 struct incise_plant incise_pose_loop_plant(double mass_kg, double damping_N_s_mm,
@@ -424,7 +421,11 @@ double incise_pose_loop_swing(const struct incise_pose_loop *of,
 		scaled.mass[i / 3][i % 3] *= share;
 	}
 	loop_init(&loop, of, &scaled);
-	memcpy(loop.plant, axis, sizeof(loop.plant));
+	for (int i = 0; i < 3; i++) {
+		loop.plant[i] = axis[i];
+		loop.plant[i].position_mm = loop.plant[i].velocity_mm_s =
+			loop.plant[i].wall_mm = 0;
+	}
 	n = size_of(&loop);
 	matrix = calloc(2 * (size_t)n * (size_t)n, sizeof(*matrix));
 	if (!matrix)

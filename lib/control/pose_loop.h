@@ -3,7 +3,7 @@
  * Largest stable stiffness of a wall felt through a tracker: the loop of device, tracker,
  * predictor (with extrapolation and blending) and wall.
  *
- *   device ──pose, P apart──▶ latency ──▶ predict ──each tick T──▶ f = -Kx-Bv-Aa ───┐
+ *   device ──pose, P apart──▶ latency ──▶ predict ──each tick T──▶ f = -Kx-Bv ──────┐
  *      ▲                                                                            │
  *      └───────────────────────────── held for T ◀──────────────────────────────────┘
  *
@@ -45,10 +45,8 @@ struct incise_pose_loop {
 	const struct incise_haptic_device *device;
 	/* As initialised for the tracker: its gains, period and latency count. */
 	const struct incise_predict *predict;
-	double damping_N_s_mm;	     /* of the wall, B, by the predictor's velocity … */
-	double acceleration_N_s2_mm; /* … and A, by its acceleration; may be negative */
-	int late_ticks; /* until a force acts, 0 … INCISE_POSE_LOOP_LATE_MAX */
-	const struct incise_hand_impedance *hand; /* or NULL: none */
+	double damping_N_s_mm; /* of the wall, by the predictor's velocity */
+	int late_ticks;	       /* until a force acts, 0 … INCISE_POSE_LOOP_LATE_MAX */
 };
 
 /* Whether a wall of this stiffness is stable in the loop. Some 0.1 ms. */
@@ -95,10 +93,9 @@ struct incise_swing {
  * the mean: of more than 16 ticks it is by 15 cells, which are late as it is but blur its ends.
  *
  * @param share  of all forces of the map
- * @param axis   of the device: its plant at rest, and where it is tied
+ * @param axis   of the device, from where it is at rest
  * @param swing  or NULL
- * @return INFINITY: no memory. @of: its damping, acceleration and hand do not count. Some 0.5 ms, 5 ms with
- * all states.
+ * @return INFINITY: no memory. @of: its damping does not count. Some 0.5 ms, 5 ms with all states.
  */
 double incise_pose_loop_swing(const struct incise_pose_loop *of,
 			      const struct incise_plant axis[3],

@@ -237,25 +237,15 @@ static void set_delay(struct incise_plan *plan, const struct incise_tracker_info
 							: (int)fmin(ticks, INT_MAX);
 }
 
-static struct incise_pose_loop pose_loop(const struct incise_plan *plan, int late_ticks,
-					 double damping_N_s_mm,
-					 const struct incise_hand_impedance *hand)
+static double limit_N_mm(const struct incise_plan *plan, int late_ticks,
+			 double damping_N_s_mm)
 {
-	return (struct incise_pose_loop){
+	const struct incise_pose_loop loop = {
 		.device = &plan->stability.device,
 		.predict = &plan->predict,
 		.damping_N_s_mm = damping_N_s_mm,
 		.late_ticks = late_ticks,
-		.hand = hand,
 	};
-}
-
-/* Of the bare device, which is the worst. */
-static double limit_N_mm(const struct incise_plan *plan, int late_ticks,
-			 double damping_N_s_mm)
-{
-	const struct incise_pose_loop loop =
-		pose_loop(plan, late_ticks, damping_N_s_mm, NULL);
 
 	if (plan->stability.own_delay)
 		return incise_stability_limit(loop.device, damping_N_s_mm);
@@ -279,57 +269,6 @@ static bool holds(const struct incise_plan *plan, int late_ticks, double stiffne
 	return (1 + RESERVE) * stiffness_N_mm <= most;
 }
 
-/* In each hand that may hold the device, which is no part of a delay that the scene gives. */
-static bool hands_hold(const struct incise_plan *plan, int late_ticks, double share)
-{
-	const struct incise_plan_stability *s = &plan->stability;
-
-	for (int i = 0; i < INCISE_HANDS && !s->own_delay; i++) {
-		const struct incise_pose_loop loop = pose_loop(
-			plan, late_ticks, share * s->damping_N_s_mm, &incise_hands[i]);
-
-		if (!incise_pose_loop_holds(&loop,
-					    share * (1 + RESERVE) * s->stiffness_N_mm))
-			return false;
-	}
-	return true;
-}
-
-/*
- * A force by the acceleration of the motion acts along the normal like a mass, which counts as one to
- * add where the blade goes in and as one to take away where it comes out. With both, on skin that is
- * as stiff as it gets and on none, in each hand and in none.
- */
-static bool acceleration_holds(const struct incise_plan *plan, int late_ticks,
-			       double share)
-{
-	const struct incise_plan_stability *s = &plan->stability;
-	bool all = true;
-
-	for (int i = 0; i < 4 * (1 + INCISE_HANDS) && s->acceleration_slope_N_s2_mm > 0;
-	     i++) {
-		struct incise_pose_loop loop =
-			pose_loop(plan, late_ticks, share * s->damping_N_s_mm,
-				  i / 4 ? &incise_hands[i / 4 - 1] : NULL);
-		double K = i & 1 ? share * (1 + RESERVE) * s->stiffness_N_mm : 0;
-
-		loop.acceleration_N_s2_mm =
-			(i & 2 ? -share : share) * s->acceleration_slope_N_s2_mm;
-		all = all && !s->own_delay && incise_pose_loop_holds(&loop, K);
-	}
-	return all;
-}
-
-static bool stable_along(const struct incise_plan *plan, int late_ticks, double share)
-{
-	const struct incise_plan_stability *s = &plan->stability;
-
-	return holds(plan, late_ticks, share * s->stiffness_N_mm,
-		     share * s->damping_N_s_mm) &&
-	       hands_hold(plan, late_ticks, share) &&
-	       acceleration_holds(plan, late_ticks, share);
-}
-
 /*
  * Of the scene's forces, how much an actuator may have to push along its direction: all, and
  * more where it works against others that are not at right angles.
@@ -339,24 +278,16 @@ static double pushed(const struct incise_plan *plan, int i)
 	return plan->axes.n > 1 ? fmax(1, v3_length(plan->axes.axis[i].dual)) : 1;
 }
 
+/*
+ * With a delay that the scene gives the limit is exact, however large that is. All else is seen in space: so is what a
+ * linear view of the largest stiffness has no word for, and forces are taken for what they are where they act.
+ */
 static bool stable(const struct incise_plan *plan, double share)
 {
 	const struct incise_plan_stability *s = &plan->stability;
-	bool all = s->n_axes || stable_along(plan, s->late_ticks, share);
 
-	for (int i = 0; i < s->n_axes && all; i++)
-		all = stable_along(plan, s->axis[i].late_ticks, share * pushed(plan, i));
-	return all;
-}
-
-static bool all_hands_hold(const struct incise_plan *plan)
-{
-	const struct incise_plan_stability *s = &plan->stability;
-	bool all = s->n_axes || hands_hold(plan, s->late_ticks, 1);
-
-	for (int i = 0; i < s->n_axes && all; i++)
-		all = hands_hold(plan, s->axis[i].late_ticks, pushed(plan, i));
-	return all;
+	return !s->own_delay || holds(plan, s->late_ticks, share * s->stiffness_N_mm,
+				      share * s->damping_N_s_mm);
 }
 
 /* Lateness of each actuator: as the scene says, or as rig.conf does of this one. */
@@ -405,8 +336,7 @@ static double largest_gain(const struct incise_plan *plan)
 {
 	double low = 0, high = 1;
 
-	if (!(plan->stability.damping_N_s_mm > 0) &&
-	    !(plan->stability.acceleration_slope_N_s2_mm > 0) && all_hands_hold(plan))
+	if (!(plan->stability.damping_N_s_mm > 0))
 		return plan->gain * plan->stability.limit_N_mm / (1 + RESERVE) /
 		       plan->stability.stiffness_N_mm;
 	while (high - low > 1e-4) {
@@ -426,17 +356,6 @@ static double three_digits_down(double gain)
 		return 0;
 	unit = pow(10, floor(log10(gain)) - 2);
 	return floor(gain / unit) * unit;
-}
-
-/* Where the delay comes from, for a message. */
-static void name_delay(const struct incise_plan_stability *s,
-		       const struct incise_tracker_info *tracker, char name[64])
-{
-	if (s->own_delay)
-		snprintf(name, 64, "with a delay of %d ticks", s->device.delay_ticks);
-	else
-		snprintf(name, 64, "with a tracker of %g Hz and %g ms", tracker->rate_hz,
-			 (double)tracker->latency_ns * 1e-6);
 }
 
 static double membrane_N_mm(const struct incise_plan *plan)
@@ -562,12 +481,15 @@ static const enum incise_model_input unmoved[] = {INCISE_INPUT_TILT, INCISE_INPU
  * combinations, until one swings. Returns 0 or -ENOMEM.
  */
 static int search(struct incise_plan *plan, const struct incise_tracker_info *tracker,
-		  const struct incise_rest_trial *trial, struct incise_rest *rest)
+		  const struct incise_rest_trial *as_is, struct incise_rest *rest)
 {
+	struct incise_rest_trial own = *as_is, *const trial = &own;
 	enum incise_model_input inputs[UNMOVED];
 	double ends[UNMOVED][2];
 	int n = 0, rc;
 
+	for (int i = 0; i < plan->stability.n_axes; i++)
+		trial->gain = fmax(trial->gain, as_is->gain * pushed(plan, i));
 	for (int i = 0; i < UNMOVED; i++)
 		if (range_of(plan, unmoved[i], ends[n]))
 			inputs[n++] = unmoved[i];
@@ -583,8 +505,10 @@ static int search(struct incise_plan *plan, const struct incise_tracker_info *tr
 		if (rc)
 			break;
 		here.runs += rest->runs;
+		incise_rest_take_weakest(&here.weakest, &rest->weakest);
 		if (!here.rests || here.settle_s > rest->settle_s)
 			*rest = here;
+		rest->weakest = here.weakest;
 		rest->runs = here.runs;
 	}
 	plan->doubles.plan.holds = 0;
@@ -620,7 +544,7 @@ static bool holds_still(struct incise_plan *plan,
  */
 #define GAIN_LEAST (1.0 / 64)
 #define DAMPING_MOST 16 /* times the device's own, or than 1 mN s/mm */
-#define HALVINGS 4
+#define HALVINGS 7
 #define ATTEMPTS 6
 
 static double three_digits_up(double value)
@@ -732,21 +656,18 @@ static int refuse_unstable(struct incise_plan *plan,
 			   struct incise_error *err)
 {
 	const struct incise_plan_stability *s = &plan->stability;
-	char delay[64], advice[200], mass[64] = "";
+	char advice[200];
 
-	name_delay(s, tracker, delay);
-	if (s->acceleration_slope_N_s2_mm > 0)
-		snprintf(mass, sizeof(mass), " and acts as %.3g kg by acceleration",
-			 s->acceleration_slope_N_s2_mm / N_S2_PER_MM_KG);
 	advise(plan, tracker, -1, advice);
 	return incise_error_set(
 		err, EDOM,
-		"%s: not stable: its tissue has %.4g N/mm and %.4g N s/mm%s, but a "
-		"device of %g kg and %g N s/mm %s is stable up to %.4g N/mm, of which "
-		"%g %% are kept in reserve; %s, or describe the device",
-		plan->scene->path, s->stiffness_N_mm, s->damping_N_s_mm, mass,
-		s->device.mass_kg, s->device.damping_N_s_mm, delay, s->limit_N_mm,
-		100 * RESERVE, advice);
+		"%s: not stable: its tissue has %.4g N/mm and %.4g N s/mm, but a "
+		"device of %g kg and %g N s/mm with a delay of %d ticks is stable up to "
+		"%.4g N/mm, of which %g %% are kept in reserve; %s, or describe the "
+		"device",
+		plan->scene->path, s->stiffness_N_mm, s->damping_N_s_mm,
+		s->device.mass_kg, s->device.damping_N_s_mm, s->device.delay_ticks,
+		s->limit_N_mm, 100 * RESERVE, advice);
 }
 
 /* Of a run, for a message. */
@@ -765,9 +686,11 @@ static void name_run(const struct incise_rest *rest, char name[160])
 			name, 160,
 			"%s that leans on it with %.2f N, %.0f %% of it along the skin, by "
 			"the %s at [%.1f, %.1f, %.1f]",
-			rest->hand < 0 ? "a weight" : "a hand", rest->lean_N,
-			100 * rest->askew, tools[rest->tool], rest->place_mm[0],
-			rest->place_mm[1], rest->place_mm[2]);
+			rest->hand < 0 ? "a weight"
+			: rest->across ? "a hand across"
+				       : "a hand",
+			rest->lean_N, 100 * rest->askew, tools[rest->tool],
+			rest->place_mm[0], rest->place_mm[1], rest->place_mm[2]);
 }
 
 int incise_plan_check_rest(struct incise_plan *plan,
@@ -791,11 +714,13 @@ int incise_plan_check_rest(struct incise_plan *plan,
 	s->worst.askew = rest.askew;
 	s->worst.tool = rest.tool;
 	s->worst.in_hand = rest.hand >= 0;
+	s->worst.across = rest.across;
 	s->worst.guided = rest.guided;
 	v3_copy(s->worst.place_mm, rest.place_mm);
 	s->worst.depth_mm = rest.depth_mm;
 	s->worst.swing_mm = rest.swing_mm;
 	s->worst.settle_s = rest.settle_s;
+	s->weakest = rest.weakest;
 	s->noise_mm = rest.noise_mm;
 	s->noise_N = rest.noise_N;
 	if (rest.rests)

@@ -44,6 +44,7 @@ const struct incise_hand_impedance incise_hands[INCISE_HANDS] = {
  * hand and in each, straight and askew.
  */
 #define LEANS 40
+#define HALVES_MOST 6 /* of the least, where all of them sink or slide away */
 #define LEAN_MOST 0.96
 #define TOUCH_MM 0.1
 #define DROP_MM 3
@@ -56,11 +57,15 @@ static const struct {
 #define FREE_EVERY 10
 #define PLACES 3
 static const double askew[] = {0.02, 0.25};
-static const int hands[] = {
-	-1, 2}; /* none, and the firmest of incise_hands: the others are between */
+/* None; and the firmest of incise_hands: the others are between. One that holds across only leaves the device bare along the normal. */
+static const struct {
+	const struct incise_hand_impedance *hand;
+	bool across;
+} hands[] = {{&incise_hands[2], true}, {&incise_hands[2], false}, {NULL, false}};
 
 /* A tool that goes farther along the skin than this in a quarter slides on it: over hills that is no swing. */
 #define SLIDES_MM 1
+#define KICK_MM (5 * INCISE_REST_SWING_MM)
 #define AWAY_MM 40 /* and so far it is where no search began */
 
 /*
@@ -88,7 +93,8 @@ struct way {
 	bool guided;				  /* along the normal … */
 	double along_mm_s;			  /* … while it goes along the skin */
 	const struct incise_hand_impedance *hand; /* else in it, or in none … */
-	double askew;				  /* … with this share along the skin */
+	bool across;  /* … which holds it across the normal only … */
+	double askew; /* … with this share along the skin */
 	double reserve;
 	int every; /* of the leans */
 };
@@ -106,6 +112,7 @@ struct search {
 	struct incise_surface *plane; /* at the top, without an end */
 	struct incise_device device;
 	struct way way;
+	bool decides;	 /* a run of the way did */
 	double along[3]; /* in the skin */
 	double axis[3]
 		   [3]; /* in which the device moves: of a guided one the normal first */
@@ -226,7 +233,7 @@ static void set_way(struct search *s, const struct incise_scene *scene,
 		v3_unit(s->along, s->along, 0);
 	}
 	memcpy(s->axis, s->device.axis, sizeof(s->axis));
-	if (!way->guided)
+	if (!way->guided && !way->across)
 		return;
 	v3_copy(s->axis[0], n);
 	v3_copy(s->axis[1], s->along);
@@ -235,26 +242,16 @@ static void set_way(struct search *s, const struct incise_scene *scene,
 
 static struct incise_plant plant(const struct search *s, int i)
 {
-	const struct incise_hand_impedance *hand = s->way.hand;
-	struct incise_plant to = {.mass_kg = s->device.mass_kg[i],
-				  .damping_N_s_mm = s->device.damping_N_s_mm *
-						    (1 - s->way.reserve)};
+	double mass_kg = 0;
 
-	if (s->way.guided) {
-		to.mass_kg = 0;
-		for (int k = 0; k < 3; k++) {
-			double share = v3_dot(s->device.axis[k], s->axis[i]);
+	for (int k = 0; k < 3; k++) {
+		double share = v3_dot(s->device.axis[k], s->axis[i]);
 
-			to.mass_kg += share * share * s->device.mass_kg[k];
-		}
+		mass_kg += share * share * s->device.mass_kg[k];
 	}
-	if (hand) {
-		to.mass_kg += hand->mass_kg;
-		to.damping_N_s_mm += hand->damping_N_s_mm;
-		to.wall_N_mm = hand->stiffness_N_mm;
-		to.tied = true;
-	}
-	return to;
+	return incise_pose_loop_plant(mass_kg,
+				      s->device.damping_N_s_mm * (1 - s->way.reserve),
+				      s->way.across && !i ? NULL : s->way.hand);
 }
 
 /* Times of a clock that is far from 0. */
@@ -486,10 +483,11 @@ static double depth_of(const struct search *s, const struct window *last)
 
 		v3_add(at_mm, at_mm, middle, s->axis[i]);
 	}
-	depth_mm = -v3_dot(at_mm, s->way.at->normal);
+	/* What jumps may be above it. */
+	depth_mm = fmax(-v3_dot(at_mm, s->way.at->normal), 0);
 	if (s->way.guided)
 		return depth_mm;
-	v3_add(at_mm, at_mm, depth_mm, s->way.at->normal);
+	v3_add(at_mm, at_mm, -v3_dot(at_mm, s->way.at->normal), s->way.at->normal);
 	away2 = v3_dot(at_mm, at_mm);
 	return away2 > AWAY_MM * AWAY_MM || depth_mm > AWAY_MM ||
 			       moved_of(s, last->at_mm) >
@@ -551,33 +549,118 @@ static double lean(struct search *s, struct run *run, struct window *last)
 	}
 }
 
-/* Returns whether it rests; notes the run when it is the worst so far. */
+/* Notes the run when it is the worst so far. */
+static void note(const struct search *s, const struct run *run, const struct window *last,
+		 double settle_s, int way, struct incise_rest *rest)
+{
+	const double *at_mm = s->way.at->point_mm;
+	double depth_mm = depth_of(s, last);
+	struct incise_rest before = *rest;
+
+	if (settle_s > 0 && !(depth_mm >= 0 && settle_s > rest->settle_s))
+		return;
+	*rest = (struct incise_rest){
+		.rests = settle_s > 0,
+		.runs = before.runs,
+		.lean_N = run->lean_N,
+		.along_mm_s = s->way.along_mm_s,
+		.askew = s->way.askew,
+		.place_mm = {at_mm[0], at_mm[1], at_mm[2]},
+		.tool = s->way.tool,
+		.hand = s->way.hand ? (int)(s->way.hand - incise_hands) : -1,
+		.across = s->way.across,
+		.guided = s->way.guided,
+		.depth_mm = depth_mm,
+		.swing_mm = swing_of(s, last->at_mm),
+		.swing_N = moved_of(s, last->N),
+		.settle_s = settle_s,
+		.way = way,
+		.weakest = before.weakest,
+	};
+}
+
+/*
+ * Where a run came to rest, the loop as a linear one. If it swings, it is kicked that way, and must come to rest again:
+ * the account of work, which the linear loop has not, may end it. Returns false if it does not.
+ */
+static bool look(struct search *s, const struct run *run, double depth_mm, int way,
+		 struct incise_rest *rest)
+{
+	const struct incise_haptic_device device = {.period_s = s->device.period_s};
+	const struct incise_pose_loop loop = {
+		.device = &device,
+		.predict = &s->plan.predict,
+		.late_ticks = s->device.late_ticks,
+	};
+	const double *at_mm = s->way.at->point_mm;
+
+	if (s->device.late_ticks > INCISE_POSE_LOOP_LATE_MAX)
+		return true;
+	for (int side = 0; side < 2; side++) {
+		struct incise_plan_weakest here = {
+			.lean_N = run->lean_N,
+			.depth_mm = depth_mm,
+			.place_mm = {at_mm[0], at_mm[1], at_mm[2]},
+			.tool = s->way.tool,
+			.in_hand = s->way.hand,
+			.across = s->way.across,
+			.states = 1,
+		};
+		double most = rest->weakest.margin / (1 + s->way.reserve), settle_s;
+		struct incise_force_map map;
+		struct incise_swing swing = {0};
+		struct run kicked = *run;
+		struct window last;
+
+		incise_plan_force_map(&s->plan, to_ns(run->t_s), s->axis, side, &map);
+		here.margin =
+			incise_pose_loop_margin(&loop, run->device, &map, most, &swing);
+		here.paid = here.margin < 1;
+		for (int i = 0; i < 3; i++) {
+			kicked.device[i].position_mm += KICK_MM * swing.along[i];
+			v3_add(here.along, here.along, swing.along[i], s->axis[i]);
+		}
+		here.hz = swing.hz;
+		if (here.paid) {
+			settle_s = lean(s, &kicked, &last);
+			rest->runs++;
+			note(s, &kicked, &last, settle_s, way, rest);
+			here.margin = INCISE_PLAN_MARGIN_MOST;
+		} else {
+			here.margin *= 1 + s->way.reserve;
+		}
+		incise_rest_take_weakest(&rest->weakest, &here);
+		/* After a kick the other side is that of another state. */
+		if (here.paid)
+			return settle_s > 0;
+	}
+	return true;
+}
+
+void incise_rest_take_weakest(struct incise_plan_weakest *to,
+			      const struct incise_plan_weakest *other)
+{
+	int states = to->states + other->states, paid = to->paid + other->paid;
+
+	if (other->margin < to->margin)
+		*to = *other;
+	to->states = states;
+	to->paid = paid;
+}
+
+/* Returns whether it rests. */
 static bool try(struct search *s, struct run *run, int way, struct incise_rest *rest)
 {
 	struct window last;
 	double settle_s = lean(s, run, &last), depth_mm = depth_of(s, &last);
-	const double *at_mm = s->way.at->point_mm;
-	bool rests = settle_s > 0;
 
 	rest->runs++;
-	if (!rests || (depth_mm >= 0 && settle_s > rest->settle_s))
-		*rest = (struct incise_rest){
-			.rests = rests,
-			.runs = rest->runs,
-			.lean_N = run->lean_N,
-			.along_mm_s = s->way.along_mm_s,
-			.askew = s->way.askew,
-			.place_mm = {at_mm[0], at_mm[1], at_mm[2]},
-			.tool = s->way.tool,
-			.hand = s->way.hand ? (int)(s->way.hand - incise_hands) : -1,
-			.guided = s->way.guided,
-			.depth_mm = depth_mm,
-			.swing_mm = swing_of(s, last.at_mm),
-			.swing_N = moved_of(s, last.N),
-			.settle_s = settle_s,
-			.way = way,
-		};
-	return rests;
+	note(s, run, &last, settle_s, way, rest);
+	s->decides |= depth_mm >= 0;
+	if (!(settle_s > 0))
+		return false;
+	return s->way.along_mm_s > 0 || !(depth_mm > 0) ||
+	       look(s, run, depth_mm, way, rest);
 }
 
 /* All leans of a way. Returns whether they rest. */
@@ -595,10 +678,15 @@ static bool lean_all(struct search *s, const struct incise_plan *plan,
 	start(s, &air);
 	s->air = s->plan;
 	s->air_parts = s->parts;
-	for (int i = LEANS; i > 0; i -= way->every) {
+	s->decides = false;
+	for (int i = LEANS, halves = 0; i > 0 || (!s->decides && halves < HALVES_MOST);
+	     i -= way->every) {
 		struct run run = air;
 
-		run.lean_N = LEAN_MOST * i / LEANS * most_N;
+		halves += i <= 0;
+		run.lean_N =
+			i > 0 ? LEAN_MOST * i / LEANS * most_N
+			      : ldexp(LEAN_MOST * way->every / LEANS * most_N, -halves);
 		s->plan = s->air;
 		s->parts = s->air_parts;
 		if (!try(s, &run, number, rest))
@@ -613,7 +701,8 @@ static void search(struct search *s, const struct incise_plan *plan,
 	bool model = plan->model || plan->fixed;
 	int n_tools = plan->inserts ? 2 : 1, number = 0;
 
-	*rest = (struct incise_rest){.rests = true};
+	*rest = (struct incise_rest){.rests = true,
+				     .weakest.margin = INCISE_PLAN_MARGIN_MOST};
 	for (int i = 0; i < N(guided); i++, number++) {
 		const struct way way = {.at = s->place,
 					.on = s->plane,
@@ -628,14 +717,15 @@ static void search(struct search *s, const struct incise_plan *plan,
 			return;
 	}
 	for (int i = 0; i < s->n_places * n_tools * N(hands) * N(askew); i++, number++) {
-		int hand = hands[i / N(askew) % N(hands)];
+		int hand = i / N(askew) % N(hands);
 		int tool = i / N(askew) / N(hands) % n_tools;
 		const struct way way = {
 			.at = &s->place[i / N(askew) / N(hands) / n_tools],
 			.on = plan->surface,
 			.tool = tool ? INCISE_TOOL_TUBE : INCISE_TOOL_BLADE,
 			.start_mm = i % N(askew) ? DROP_MM : TOUCH_MM,
-			.hand = hand >= 0 ? &incise_hands[hand] : NULL,
+			.hand = hands[hand].hand,
+			.across = hands[hand].across,
 			.askew = askew[i % N(askew)],
 			.reserve = model ? RESERVE : FREE_RESERVE,
 			.every = FREE_EVERY};

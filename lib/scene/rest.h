@@ -46,10 +46,12 @@ struct incise_rest {
 	double askew;	    /* share of the lean along the skin */
 	double place_mm[3]; /* of the surface */
 	enum incise_tool tool;
-	int hand;    /* of incise_hands; -1: none */
+	int hand;    /* of incise_hands; -1: none … */
+	bool across; /* … and across only */
 	bool guided; /* along the normal */
 	double depth_mm, swing_mm, swing_N, settle_s;
 	int way; /* of the search */
+	struct incise_plan_weakest weakest;
 	/* Range of position and force, of a hand that leans with half of the scene's limit, by
 	 * the noise of a tracker: INCISE_REST_NOISE_MM. Of a plan that rests. */
 	double noise_mm, noise_N;
@@ -77,6 +79,18 @@ struct incise_device {
 void incise_plan_device(const struct incise_plan *plan,
 			const struct incise_tracker_info *tracker,
 			struct incise_device *device);
+
+/* Take the other one where it is weaker, and count its states. */
+void incise_rest_take_weakest(struct incise_plan_weakest *to,
+			      const struct incise_plan_weakest *other);
+
+/*
+ * The forces about a state of contact, along three axes, by the plan's own tick in double: as places go along an axis, or
+ * against it, as tissue that is cut loads and unloads with other slopes. The plan stays as it is.
+ */
+void incise_plan_force_map(struct incise_plan *plan, int64_t t_ns,
+			   const double axis[3][3], bool against,
+			   struct incise_force_map *map);
 
 /*
  * @return 0 or -ENOMEM. Takes 0.2 s. The plan stays as it is; it must be ready to run.

@@ -121,10 +121,29 @@ class _Worst(ctypes.Structure):
         ("place_mm", c_double * 3),
         ("tool", c_int),
         ("in_hand", c_bool),
+        ("across", c_bool),
         ("guided", c_bool),
         ("depth_mm", c_double),
         ("swing_mm", c_double),
         ("settle_s", c_double),
+    ]
+
+
+class _Weakest(ctypes.Structure):
+    """struct incise_plan_weakest"""
+
+    _fields_ = [
+        ("margin", c_double),
+        ("along", c_double * 3),
+        ("hz", c_double),
+        ("lean_N", c_double),
+        ("depth_mm", c_double),
+        ("place_mm", c_double * 3),
+        ("tool", c_int),
+        ("in_hand", c_bool),
+        ("across", c_bool),
+        ("states", c_int),
+        ("paid", c_int),
     ]
 
 
@@ -147,6 +166,7 @@ class StabilityStruct(ctypes.Structure):
         ("beyond_N_mm", c_double),
         ("runs", c_int),
         ("worst", _Worst),
+        ("weakest", _Weakest),
         ("noise_mm", c_double),
         ("noise_N", c_double),
         ("certified", c_bool),

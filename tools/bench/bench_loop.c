@@ -86,14 +86,14 @@ static void time_ticks(struct tick_row *rows, int n, bool quick)
 
 	for (int i = 0; i < n; i++) {
 		cli_progress("%s", rows[i].name);
-		tick_cost(rows[i].scene, NULL, rows[i].cuts,
+		tick_cost(rows[i].scene, NULL, NULL, rows[i].cuts,
 			  quick ? QUICK_MEASURED_S : MEASURED_S, &rows[i].cost);
 		if (!rows[i].cost.ticks)
 			cli_fail(
 				"%s: a stroke over its top met no tissue: nothing to time",
 				rows[i].name);
-		rows[i].timed = tick_stroke_new(rows[i].scene, NULL, rows[i].cost.tool,
-						rows[i].cuts);
+		rows[i].timed = tick_stroke_new(rows[i].scene, NULL, NULL,
+						rows[i].cost.tool, rows[i].cuts);
 		variants[i] = (struct harness_variant){
 			.ns = turn_ns, .context = &rows[i], .time = &rows[i].time};
 	}

@@ -17,7 +17,7 @@ static const struct incise_tracker_info usual_tracker = {
 };
 
 struct tick_stroke {
-	struct incise_plan *plan;
+	struct incise_plan *plan, *given; /* or NULL: its own */
 	const struct incise_tracker_info *tracker;
 	struct stroke stroke;
 	struct incise_tracker_sample sample; /* the next one */
@@ -74,6 +74,7 @@ static void make_cuts(struct tick_stroke *timed, int cuts)
 }
 
 struct tick_stroke *tick_stroke_new(const struct incise_scene *scene,
+				    struct incise_plan *plan,
 				    const struct incise_tracker_info *tracker,
 				    enum incise_tool tool, int cuts)
 {
@@ -85,7 +86,8 @@ struct tick_stroke *tick_stroke_new(const struct incise_scene *scene,
 	timed->tracker = tracker ? tracker : &usual_tracker;
 	timed->period_ns = llrint(1e9 / incise_scene_rate_hz(scene));
 	timed->clock_ns = stopwatch_own_ns();
-	timed->plan = incise_plan_new_fed(scene, timed->tracker, &err);
+	timed->given = plan;
+	timed->plan = plan ? plan : incise_plan_new_fed(scene, timed->tracker, &err);
 	if (!timed->plan)
 		cli_fail_with(&err);
 	stroke_begin(&timed->stroke, timed->plan, timed->tracker);
@@ -100,7 +102,8 @@ struct tick_stroke *tick_stroke_new(const struct incise_scene *scene,
 
 void tick_stroke_free(struct tick_stroke *timed)
 {
-	incise_plan_free(timed->plan);
+	if (!timed->given)
+		incise_plan_free(timed->plan);
 	free(timed);
 }
 
@@ -160,11 +163,11 @@ static bool has_insertion(const struct incise_plan *plan)
 }
 
 /* The cost with one tool. Returns whether there is another one. */
-static bool cost_with(const struct incise_scene *scene,
+static bool cost_with(const struct incise_scene *scene, struct incise_plan *plan,
 		      const struct incise_tracker_info *tracker, enum incise_tool tool,
 		      int cuts, int ticks, double *times, struct tick_cost *cost)
 {
-	struct tick_stroke *timed = tick_stroke_new(scene, tracker, tool, cuts);
+	struct tick_stroke *timed = tick_stroke_new(scene, plan, tracker, tool, cuts);
 	bool insertion = has_insertion(timed->plan);
 	double own = timed->clock_ns;
 	int n;
@@ -195,7 +198,7 @@ static bool cost_with(const struct incise_scene *scene,
 	return insertion;
 }
 
-void tick_cost(const struct incise_scene *scene,
+void tick_cost(const struct incise_scene *scene, struct incise_plan *plan,
 	       const struct incise_tracker_info *tracker, int cuts, double seconds,
 	       struct tick_cost *cost)
 {
@@ -206,10 +209,12 @@ void tick_cost(const struct incise_scene *scene,
 	if (!times)
 		cli_fail("out of memory for the times of %d ticks", ticks);
 	*cost = (struct tick_cost){0};
-	if (cost_with(scene, tracker, INCISE_TOOL_BLADE, cuts, ticks, times, cost)) {
+	if (cost_with(scene, plan, tracker, INCISE_TOOL_BLADE, cuts, ticks, times,
+		      cost)) {
 		struct tick_cost blade = *cost;
 
-		cost_with(scene, tracker, INCISE_TOOL_TUBE, cuts, ticks, times, &tube);
+		cost_with(scene, NULL, tracker, INCISE_TOOL_TUBE, cuts, ticks, times,
+			  &tube);
 		if (tube.median > blade.median)
 			*cost = tube;
 		for (int k = 0; k < INCISE_PLAN_STAGES_MAX; k++)

@@ -123,6 +123,25 @@ INCISE_API void incise_plan_top(const struct incise_plan *plan,
 INCISE_API const struct incise_surface *incise_plan_surface(
 	const struct incise_plan *plan);
 
+/**
+ * Of all states of rest that a search came to, the one about which the loop, with its forces as they are there for small
+ * motions, swings with the least more of them: by its eigenvalues in three dimensions.
+ */
+struct incise_plan_weakest {
+	double margin; /**< with so many times the forces; INCISE_PLAN_MARGIN_MOST: with no fewer */
+	double along[3]; /**< direction of that swing, unit; 0: none was found */
+	double hz;	 /**< of that swing */
+	double lean_N, depth_mm;
+	double place_mm[3];    /**< of the surface */
+	enum incise_tool tool; /**< that leans */
+	bool in_hand,
+		across; /**< in a hand, or in one that holds it across the normal only */
+	int states;	/**< looked at */
+	/** Of them, those with a margin below 1 that rest all the same: the account of work ends their swings. */
+	int paid;
+};
+#define INCISE_PLAN_MARGIN_MOST 16
+
 /** A plan's stability, computed before its first tick. */
 struct incise_plan_stability {
 	/** Its delay may be above INCISE_STABILITY_DELAY_MAX if it is the tracker's. */
@@ -167,10 +186,12 @@ struct incise_plan_stability {
 		double askew;	       /**< share of its force along the skin */
 		double place_mm[3];    /**< of the surface, where it leans */
 		enum incise_tool tool; /**< that leans */
-		bool in_hand;	       /**< of a hand's mass, damping and stiffness */
+		bool in_hand;	       /**< of a hand's mass, damping and stiffness … */
+		bool across;	       /**< … which holds it across the normal only */
 		bool guided;	       /**< along the normal only */
 		double depth_mm, swing_mm, settle_s;
 	} worst;
+	struct incise_plan_weakest weakest; /**< of the same search */
 	/**
 	 * Range at rest due to the noise of a tracker, sd 0.02 mm, in a hand that leans with
 	 * half of the scene's limit.
