@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * Whether a scene is stable on its device, before its first tick: the largest stiffness
- * of the scene against the limit of the loop with the tracker's poses, or, where the scene
- * says how late its device answers, against the exact limit of a wall so late. A scene with a
- * model is then searched for swings that do not end; see rest.h.
+ * Whether a scene is stable on its device, before its first tick: a search for swings that do not end, see rest.h.
+ * For people besides: the scene's largest stiffness, and that of the stiffest wall that is stable in the loop with the tracker's
+ * poses, or, where the scene says how late its device answers, the exact limit of a wall so late.
  */
 #include <errno.h>
 #include <limits.h>
@@ -253,41 +252,12 @@ static double limit_N_mm(const struct incise_plan *plan, int late_ticks,
 }
 
 /*
- * At the limit itself a wall swings for ever; so much below it a swing of a bare device fades to a
- * hundredth within some seconds.
- */
-#define RESERVE 0.05
-
-static bool holds(const struct incise_plan *plan, int late_ticks, double stiffness_N_mm,
-		  double damping_N_s_mm)
-{
-	double most = limit_N_mm(plan, late_ticks, damping_N_s_mm);
-
-	/* A limit of 0 is that of a loop which its damper alone makes unstable. */
-	if (!(most > 0) && damping_N_s_mm > 0)
-		return false;
-	return (1 + RESERVE) * stiffness_N_mm <= most;
-}
-
-/*
  * Of the scene's forces, how much an actuator may have to push along its direction: all, and
  * more where it works against others that are not at right angles.
  */
 static double pushed(const struct incise_plan *plan, int i)
 {
 	return plan->axes.n > 1 ? fmax(1, v3_length(plan->axes.axis[i].dual)) : 1;
-}
-
-/*
- * With a delay that the scene gives the limit is exact, however large that is. All else is seen in space: so is what a
- * linear view of the largest stiffness has no word for, and forces are taken for what they are where they act.
- */
-static bool stable(const struct incise_plan *plan, double share)
-{
-	const struct incise_plan_stability *s = &plan->stability;
-
-	return !s->own_delay || holds(plan, s->late_ticks, share * s->stiffness_N_mm,
-				      share * s->damping_N_s_mm);
 }
 
 /* Lateness of each actuator: as the scene says, or as rig.conf does of this one. */
@@ -329,22 +299,6 @@ static void set_limits(struct incise_plan *plan)
 						   share * s->damping_N_s_mm);
 		s->limit_N_mm = fmin(s->limit_N_mm, s->axis[i].limit_N_mm / share);
 	}
-}
-
-/* The largest gain that is stable; damping goes with it, so that the limit moves. */
-static double largest_gain(const struct incise_plan *plan)
-{
-	double low = 0, high = 1;
-
-	if (!(plan->stability.damping_N_s_mm > 0))
-		return plan->gain * plan->stability.limit_N_mm / (1 + RESERVE) /
-		       plan->stability.stiffness_N_mm;
-	while (high - low > 1e-4) {
-		double middle = (low + high) / 2;
-
-		*(stable(plan, middle) ? &low : &high) = middle;
-	}
-	return low * plan->gain;
 }
 
 /* For a message: downwards, as what is named must be safe. */
@@ -516,23 +470,16 @@ static int search(struct incise_plan *plan, const struct incise_tracker_info *tr
 }
 
 /*
- * Both checks, with all forces so many times as strong, on a device with this damping: of the search only the way
- * *@way, or all where that is below 0, and then *@way becomes the one that swung.
+ * The search, with all forces so many times as strong, on a device with this damping: only the way *@way, or all where that is below 0, and then *@way becomes the one that swung.
  */
 static bool holds_still(struct incise_plan *plan,
 			const struct incise_tracker_info *tracker, double share,
 			double damping_N_s_mm, int *way)
 {
 	const struct incise_rest_trial trial = {share, damping_N_s_mm, *way};
-	struct incise_haptic_device *device = &plan->stability.device;
-	const double own_N_s_mm = device->damping_N_s_mm;
 	struct incise_rest rest = {.way = -1};
-	bool still;
+	bool still = !search(plan, tracker, &trial, &rest) && rest.rests;
 
-	device->damping_N_s_mm = damping_N_s_mm;
-	still = stable(plan, share) && !search(plan, tracker, &trial, &rest) &&
-		rest.rests;
-	device->damping_N_s_mm = own_N_s_mm;
 	if (!still && *way < 0)
 		*way = rest.way;
 	return still;
@@ -568,7 +515,7 @@ static bool helps(struct incise_plan *plan, const struct incise_tracker_info *tr
 					   plan->stability.device.damping_N_s_mm, way);
 }
 
-/* The nearest value to @from, in three digits, that was tried and holds; 0: none was found. @way swung, or -1. */
+/* The nearest value to @from, in three digits, that was tried and holds; 0: none was found. @way swung. */
 static double find_advice(struct incise_plan *plan,
 			  const struct incise_tracker_info *tracker,
 			  const struct advice *advice, double from, int way)
@@ -582,7 +529,7 @@ static double find_advice(struct incise_plan *plan,
 		int any = -1;
 
 		/* The plan as it is was tried. */
-		if (way < 0 || i) {
+		if (i) {
 			if (helps(plan, tracker, advice, round(from), &any))
 				return round(from);
 			way = any;
@@ -608,11 +555,8 @@ static double best_gain(struct incise_plan *plan,
 			const struct incise_tracker_info *tracker, int way)
 {
 	const struct advice advice = {false, 1 / GAIN_LEAST};
-	double from = plan->gain;
 
-	if (!stable(plan, 1))
-		from = fmin(largest_gain(plan), from);
-	return from > 0 ? find_advice(plan, tracker, &advice, from, way) : 0;
+	return find_advice(plan, tracker, &advice, plan->gain, way);
 }
 
 static double best_damping(struct incise_plan *plan,
@@ -651,46 +595,27 @@ static void advise(struct incise_plan *plan, const struct incise_tracker_info *t
 				 fmax(plan->stability.device.damping_N_s_mm, 1e-3));
 }
 
-static int refuse_unstable(struct incise_plan *plan,
-			   const struct incise_tracker_info *tracker,
-			   struct incise_error *err)
-{
-	const struct incise_plan_stability *s = &plan->stability;
-	char advice[200];
-
-	advise(plan, tracker, -1, advice);
-	return incise_error_set(
-		err, EDOM,
-		"%s: not stable: its tissue has %.4g N/mm and %.4g N s/mm, but a "
-		"device of %g kg and %g N s/mm with a delay of %d ticks is stable up to "
-		"%.4g N/mm, of which %g %% are kept in reserve; %s, or describe the "
-		"device",
-		plan->scene->path, s->stiffness_N_mm, s->damping_N_s_mm,
-		s->device.mass_kg, s->device.damping_N_s_mm, s->device.delay_ticks,
-		s->limit_N_mm, 100 * RESERVE, advice);
-}
-
 /* Of a run, for a message. */
 static void name_run(const struct incise_rest *rest, char name[160])
 {
 	static const char *const tools[] = {"tool", "blade", "handle", "tube"};
+	const double *at = rest->place_mm, *N = rest->force_N;
 
 	if (rest->guided)
-		snprintf(name, 160,
-			 "a hand that leans on it with %.2f N%s at %.1f mm depth",
-			 rest->lean_N,
-			 rest->along_mm_s > 0 ? " while it moves along the skin" : "",
-			 rest->depth_mm);
+		snprintf(
+			name, 160,
+			"a hand that leans on it with %.2f N while it moves along the skin at "
+			"%.0f mm/s, %.1f mm deep",
+			rest->lean_N, rest->along_mm_s, rest->depth_mm);
 	else
 		snprintf(
 			name, 160,
-			"%s that leans on it with %.2f N, %.0f %% of it along the skin, by "
-			"the %s at [%.1f, %.1f, %.1f]",
+			"%s that leans on it with [%.3g, %.3g, %.3g] N by the %s at [%.2f, "
+			"%.2f, %.2f]",
 			rest->hand < 0 ? "a weight"
 			: rest->across ? "a hand across"
 				       : "a hand",
-			rest->lean_N, 100 * rest->askew, tools[rest->tool],
-			rest->place_mm[0], rest->place_mm[1], rest->place_mm[2]);
+			N[0], N[1], N[2], tools[rest->tool], at[0], at[1], at[2]);
 }
 
 int incise_plan_check_rest(struct incise_plan *plan,
@@ -704,8 +629,6 @@ int incise_plan_check_rest(struct incise_plan *plan,
 
 	if (plan->scene->unchecked)
 		return 0;
-	if (!stable(plan, 1))
-		return refuse_unstable(plan, tracker, err);
 	if (search(plan, tracker, &as_is, &rest))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
 	s->runs = rest.runs;

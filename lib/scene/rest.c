@@ -36,25 +36,26 @@ const struct incise_hand_impedance incise_hands[INCISE_HANDS] = {
 };
 
 /*
- * Ways to lean, with equal steps up to this share of the scene's largest force. Those of a model: guided along the
- * normal of the top, from a touch and from a drop; along the skin it stands, where |v| has its corner and a swing is
- * found at some leans only, so that there are the most of them, or makes a slow or a fast cut.
+ * Ways to lean, with equal steps up to this share of the scene's largest force.
  *
  * Those of all scenes: at the top, in the deepest valley and on the sharpest crest, free in all directions, in no
- * hand and in each, straight and askew.
+ * hand and in each, straight from a touch, and askew from a drop. Where a model stands |v| has its corner, and a swing is found
+ * at some leans only: held across there are the most of them.
+ *
+ * Those of a model besides: guided along the normal of the top, while it makes a slow or a fast cut.
  */
 #define LEANS 40
-#define HALVES_MOST 6 /* of the least, where all of them sink or slide away */
+#define HALVES_MOST 6 /* of the least, where all of them sink away */
 #define LEAN_MOST 0.96
 #define TOUCH_MM 0.1
 #define DROP_MM 3
 static const struct {
 	double start_mm, along_mm_s;
 	int every; /* of the leans */
-} guided[] = {{TOUCH_MM, 0, 1}, {DROP_MM, 0, 2},   {TOUCH_MM, 10, 4},
-	      {DROP_MM, 10, 8}, {TOUCH_MM, 60, 4}, {DROP_MM, 60, 8}};
+} guided[] = {{TOUCH_MM, 10, 4}, {DROP_MM, 10, 8}, {TOUCH_MM, 60, 4}, {DROP_MM, 60, 8}};
 
 #define FREE_EVERY 10
+#define LOOK_EVERY 5
 #define PLACES 3
 static const double askew[] = {0.02, 0.25};
 /* None; and the firmest of incise_hands: the others are between. One that holds across only leaves the device bare along the normal. */
@@ -299,15 +300,20 @@ static void move_axis(struct incise_plant *plant, const struct motion *tick,
 	plant->velocity_mm_s = tick->vx * x + tick->vv * v + tick->vf * force_N;
 }
 
+static void set_lean(const struct search *s, const struct run *run, double lean_N[3])
+{
+	for (int i = 0; i < 3; i++)
+		lean_N[i] =
+			run->lean_N * (s->way.askew * s->along[i] - s->way.at->normal[i]);
+}
+
 static void go_to(const struct search *s, struct run *run, double t_s)
 {
-	const double *n = s->way.at->normal;
 	double way_s = t_s - run->t_s, lean_N[3];
 
 	if (!(way_s > 0))
 		return;
-	for (int i = 0; i < 3; i++)
-		lean_N[i] = run->lean_N * (s->way.askew * s->along[i] - n[i]);
+	set_lean(s, run, lean_N);
 	for (int i = 0; i < (s->way.guided ? 1 : 3); i++)
 		move_axis(&run->device[i], &run->tick[i],
 			  run->sent_N[i] + v3_dot(lean_N, s->axis[i]), way_s);
@@ -554,17 +560,19 @@ static void note(const struct search *s, const struct run *run, const struct win
 		 double settle_s, int way, struct incise_rest *rest)
 {
 	const double *at_mm = s->way.at->point_mm;
-	double depth_mm = depth_of(s, last);
+	double depth_mm = depth_of(s, last), lean_N[3];
 	struct incise_rest before = *rest;
 
 	if (settle_s > 0 && !(depth_mm >= 0 && settle_s > rest->settle_s))
 		return;
+	set_lean(s, run, lean_N);
 	*rest = (struct incise_rest){
 		.rests = settle_s > 0,
 		.runs = before.runs,
 		.lean_N = run->lean_N,
 		.along_mm_s = s->way.along_mm_s,
 		.askew = s->way.askew,
+		.force_N = {lean_N[0], lean_N[1], lean_N[2]},
 		.place_mm = {at_mm[0], at_mm[1], at_mm[2]},
 		.tool = s->way.tool,
 		.hand = s->way.hand ? (int)(s->way.hand - incise_hands) : -1,
@@ -649,7 +657,8 @@ void incise_rest_take_weakest(struct incise_plan_weakest *to,
 }
 
 /* Returns whether it rests. */
-static bool try(struct search *s, struct run *run, int way, struct incise_rest *rest)
+static bool try(struct search *s, struct run *run, int lean_of, int way,
+		struct incise_rest *rest)
 {
 	struct window last;
 	double settle_s = lean(s, run, &last), depth_mm = depth_of(s, &last);
@@ -659,7 +668,9 @@ static bool try(struct search *s, struct run *run, int way, struct incise_rest *
 	s->decides |= depth_mm >= 0;
 	if (!(settle_s > 0))
 		return false;
-	return s->way.along_mm_s > 0 || !(depth_mm > 0) ||
+	/* Of near leans the loops are near, too. */
+	return s->way.guided || !(depth_mm > 0) ||
+	       (s->way.every < FREE_EVERY && lean_of % LOOK_EVERY) ||
 	       look(s, run, depth_mm, way, rest);
 }
 
@@ -679,7 +690,8 @@ static bool lean_all(struct search *s, const struct incise_plan *plan,
 	s->air = s->plan;
 	s->air_parts = s->parts;
 	s->decides = false;
-	for (int i = LEANS, halves = 0; i > 0 || (!s->decides && halves < HALVES_MOST);
+	for (int i = LEANS, halves = 0;
+	     i > 0 || (way->across && !s->decides && halves < HALVES_MOST);
 	     i -= way->every) {
 		struct run run = air;
 
@@ -689,7 +701,7 @@ static bool lean_all(struct search *s, const struct incise_plan *plan,
 			      : ldexp(LEAN_MOST * way->every / LEANS * most_N, -halves);
 		s->plan = s->air;
 		s->parts = s->air_parts;
-		if (!try(s, &run, number, rest))
+		if (!try(s, &run, i, number, rest))
 			return false;
 	}
 	return true;
@@ -728,7 +740,8 @@ static void search(struct search *s, const struct incise_plan *plan,
 			.across = hands[hand].across,
 			.askew = askew[i % N(askew)],
 			.reserve = model ? RESERVE : FREE_RESERVE,
-			.every = FREE_EVERY};
+			.every = model && hands[hand].across && !tool ? 1 + i % N(askew)
+								      : FREE_EVERY};
 
 		if (!lean_all(s, plan, trial, &way, number, rest))
 			return;

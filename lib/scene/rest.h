@@ -44,6 +44,7 @@ struct incise_rest {
 	/* The first run that swings, or the one that took longest to come to rest. */
 	double lean_N, along_mm_s;
 	double askew;	    /* share of the lean along the skin */
+	double force_N[3];  /* the lean */
 	double place_mm[3]; /* of the surface */
 	enum incise_tool tool;
 	int hand;    /* of incise_hands; -1: none … */

@@ -195,13 +195,10 @@ TEST(test_refusal_names_a_gain)
 			scene = scene_of(&wall);
 			errno = 0;
 			plan = incise_plan_new(scene, NULL, &err);
-			if (!plan != (more != 0)) fail_msg("wall %zu gain %g more %d: %s", i, wall.gain, more, plan ? "accepted" : err.text);
+			assert_int_equal(!plan, more != 0);
 			if (!plan) {
 				assert_int_equal(errno, EDOM);
-				assert_says(err.text,
-					    wall.delay_ticks < 0 ? "come to rest"
-								 : "20 ticks",
-					    most);
+				assert_says(err.text, "come to rest", most);
 			}
 			if (more < 0)
 				gain = atof(strstr(err.text, most) + strlen(most));

@@ -554,54 +554,41 @@ static int lean_all(uint64_t seed, struct incise_plan *plan, const struct leaned
 }
 
 /*
- * The lean that a refusal names: "… a weight that leans on it with 0.91 N, 2 % of it along the skin, by the tube at
- * [-20.8, 33.3, 28.9] …"; its hand is the firmest of those of the manual. Guided ones are leans on the top, held where they are.
+ * The lean that a refusal names: "… a weight that leans on it with [0.1, 0, -0.91] N by the tube at
+ * [-20.81, 33.32, 28.95] …"; its hand is the firmest one of the manual. None: it moves along a plane.
  */
 static bool named_lean(const char *why, const struct incise_plan *plan, struct lean *lean)
 {
-	const char *at = strstr(why, "does not come to rest: "), *by;
-	double percent = 0, size_N, place_mm[3], along[3], across[3];
-	struct incise_scene_scalpel scalpel;
-	char tool[20] = "blade";
+	const char *at = strstr(why, "does not come to rest: ");
+	double place_mm[3], *N = lean->force_N;
+	char who[20] = "", across[20] = "", tool[20];
 
-	if (!at || !strstr(at, "leans on it with"))
+	*lean = (struct lean){.tool = INCISE_TOOL_BLADE, .q = {1}, .all_round = true};
+	if (!at)
 		return false;
-	*lean = (struct lean){.tool = INCISE_TOOL_BLADE, .all_round = true};
-	by = strstr(at, "leans on it with");
-	assert_int_equal(sscanf(by, "leans on it with %lf N", &size_N), 1);
-	if (sscanf(by,
-		   "leans on it with %lf N, %lf %% of it along the skin, by the %19s at [%lf, %lf, %lf]",
-		   &size_N, &percent, tool, &place_mm[0], &place_mm[1],
-		   &place_mm[2]) == 6) {
-		incise_surface_nearest(incise_plan_surface(plan), place_mm, &lean->place);
-	} else {
-		incise_surface_top(incise_plan_surface(plan), &lean->place);
-		lean->hand_N_mm = 5;
-		lean->hand_kg = 1;
-		lean->hand_N_s_mm = 0.1;
+	if (sscanf(at,
+		   "does not come to rest: a %19s %19s that leans on it with [%lf, %lf, %lf] N by "
+		   "the %19s at [%lf, %lf, %lf]",
+		   who, across, &N[0], &N[1], &N[2], tool, &place_mm[0], &place_mm[1],
+		   &place_mm[2]) == 9)
 		lean->all_round = false;
-	}
+	else if (
+		sscanf(at,
+		       "does not come to rest: a %19s that leans on it with [%lf, %lf, %lf] N by the "
+		       "%19s at [%lf, %lf, %lf]",
+		       who, &N[0], &N[1], &N[2], tool, &place_mm[0], &place_mm[1],
+		       &place_mm[2]) != 8)
+		return false;
+	incise_surface_nearest(incise_plan_surface(plan), place_mm, &lean->place);
 	if (!strcmp(tool, "tube"))
 		lean->tool = INCISE_TOOL_TUBE;
-	if (strstr(at, "a hand") && strstr(at, "a hand") < by && lean->all_round) {
+	if (!strcmp(who, "hand")) {
 		lean->hand_N_mm = 0.54;
 		lean->hand_kg = 0.554;
 		lean->hand_N_s_mm = 0.0258;
-		lean->all_round = !strstr(at, "across");
 	}
-	incise_scene_scalpel(plan->scene, &scalpel);
-	v3_cross(along, plan->scene->tool.side, lean->place.normal);
-	if (!v3_unit(along, along, 0.1))
-		v3_any_across(along, lean->place.normal);
-	v3_cross(across, lean->place.normal, along);
-	v3_add(along, along, 1, across);
-	v3_unit(along, along, 0);
-	lean->q[0] = 1;
-	lean->size_N = size_N;
-	lean->sideways = percent / 100;
-	lean->above_mm = percent > 10 ? 3 : 0.1;
-	v3_add(lean->force_N, lean->force_N, -size_N, lean->place.normal);
-	v3_add(lean->force_N, lean->force_N, size_N * lean->sideways, along);
+	lean->size_N = v3_length(N);
+	lean->above_mm = -v3_dot(N, lean->place.normal) < 0.99 * lean->size_N ? 3 : 0.1;
 	return true;
 }
 
@@ -616,7 +603,6 @@ static void try_twice(uint64_t seed, struct incise_scene *scene, const struct le
 	int64_t from_ns = 2000000000;
 	struct incise_plan *plan;
 	struct lean lean;
-	bool swings = false, named;
 
 	/* Not checked, its model has no slope; see scene.h. */
 	scene->unchecked = true;
@@ -624,16 +610,16 @@ static void try_twice(uint64_t seed, struct incise_scene *scene, const struct le
 	scene->tissue.force[0][INCISE_REACTION_UNLOADING] = 2 * unloading;
 	plan = incise_plan_new_fed(scene, &l->tracker, &err);
 	succeeds(plan);
-	sum.doubled++;
-	named = named_lean(why, plan, &lean);
-	if (named)
-		swings = lean_on(plan, l, &lean, &from_ns, seed).outcome >= DEEP;
-	else
-		swings = lean_all(seed, plan, l, false) > 0;
-	sum.doubled_swing += swings;
-	if (!swings)
-		printf("rests: seed %" PRIu64 " at twice the gain, %s: %s | %s\n", seed,
-		       named ? "with the lean that is named" : "with any", l->what, why);
+	if (named_lean(why, plan, &lean)) {
+		struct end end = lean_on(plan, l, &lean, &from_ns, seed);
+
+		sum.doubled++;
+		sum.doubled_swing += end.outcome >= DEEP;
+		if (end.outcome < DEEP)
+			printf("twice: seed %" PRIu64
+			       ": %s %.3g mm at twice the gain, as it is named: %s | %s\n",
+			       seed, outcomes[end.outcome], end.swing_mm, l->what, why);
+	}
 	incise_plan_free(plan);
 }
 
