@@ -15,9 +15,6 @@
 #define AT(i, j) a[(i)*n + (j)]
 #define STEPS_MOST 60 /* for an eigenvalue */
 
-/* Of the largest element: where the diagonal is none, as of poses on their way, nothing else is small beside it. */
-#define LEAST 1e-3
-
 static void swap(double *x, double *y)
 {
 	double t = *x;
@@ -105,7 +102,8 @@ static void step(double *a, int n, int lo, int hi, double sum, double product)
 	}
 }
 
-/* The row where the block that ends in @hi begins. */
+/* The row where the block that ends in @hi begins: below the diagonal nothing counts that is small beside it, or beside
+ * @least, as of poses on their way, whose diagonal is none. */
 static int begin_of(double *a, int n, int hi, double least)
 {
 	for (int lo = hi; lo > 0; lo--) {
@@ -117,6 +115,29 @@ static int begin_of(double *a, int n, int hi, double least)
 		}
 	}
 	return 0;
+}
+
+/*
+ * Rows and columns of a block of one size: one whose eigenvalues are near 0, but not what is above them, takes no end of
+ * steps else. After Parlett and Reinsch, Balancing a matrix for calculation of eigenvalues and eigenvectors, 1969.
+ */
+static void balance(double *a, int n, int lo, int hi)
+{
+	for (int i = lo; i <= hi; i++) {
+		double row = 0, column = 0, part;
+
+		for (int j = lo; j <= hi; j++) {
+			row += j == i ? 0 : fabs(AT(i, j));
+			column += j == i ? 0 : fabs(AT(j, i));
+		}
+		if (!(row > 0) || !(column > 0))
+			continue;
+		part = ldexp(1, (int)lrint(log2(row / column) / 2));
+		for (int j = lo; j <= hi; j++) {
+			AT(j, i) *= part;
+			AT(i, j) /= part;
+		}
+	}
 }
 
 static void solve_two(double sum, double product, double complex eigenvalue[2])
@@ -135,7 +156,7 @@ static void solve_two(double sum, double product, double complex eigenvalue[2])
 
 bool incise_eigenvalues(double *a, int n, double complex eigenvalue[])
 {
-	double most = 0;
+	double most = 0; /* more of it, for what takes long */
 	int steps = 0;
 
 	for (int i = 0; i < n * n; i++) {
@@ -145,7 +166,7 @@ bool incise_eigenvalues(double *a, int n, double complex eigenvalue[])
 	}
 	make_hessenberg(a, n);
 	for (int hi = n - 1; hi >= 0;) {
-		int lo = begin_of(a, n, hi, LEAST * most);
+		int lo = begin_of(a, n, hi, ldexp(most, steps / 4));
 		double complex two[2];
 		double sum, product;
 
@@ -174,6 +195,7 @@ bool incise_eigenvalues(double *a, int n, double complex eigenvalue[])
 			product = sum * sum / 4;
 		}
 		if (steps % 10 == 0) {
+			balance(a, n, lo, hi);
 			double off = fabs(AT(hi, hi - 1)) + fabs(AT(hi - 1, hi - 2));
 
 			sum = 1.5 * off;

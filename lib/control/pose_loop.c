@@ -26,7 +26,7 @@
 #define WAITING_MOST (LATE_MOST + POSES_MOST)
 #define OWN_STATES 8 /* of device and predictor; the last one counts with A only */
 /* Of a mean over more ticks than one and these, each holds several. */
-#define CELLS_MOST 15
+#define CELLS_MOST 31
 
 /* Part of a tick that a pose waits before it is taken in: the mean. */
 #define LEAD 0.5
@@ -127,22 +127,21 @@ static void take_pose(struct run *run, double arrival_s)
 		(size_t)--run->n * sizeof(run->pose_mm[0]));
 }
 
-/* The mean of the last places, with this one. Of cells with several ticks each moves on by its part. */
+/* The mean of the last places, with this one. A cell with several ticks follows the next one by a part in each. */
 static void set_mean(const struct loop *loop, struct run *run, const double x[3],
 		     double mean[3])
 {
-	double left = loop->map.mean_ticks - 1;
+	double left = loop->map.mean_ticks - 1, c = loop->cell_ticks;
 
 	v3_copy(mean, x);
 	v3_copy(run->cell_mm[loop->cells], x);
-	for (int k = loop->cells - 1; k >= 0; k--, left -= loop->cell_ticks)
-		v3_add(mean, mean, fmin(left, loop->cell_ticks), run->cell_mm[k]);
+	for (int k = loop->cells - 1; k >= 0; k--, left -= c)
+		v3_add(mean, mean, fmin(left, c), run->cell_mm[k]);
 	for (int i = 0; i < 3; i++) {
-		mean[i] /= fmax(loop->map.mean_ticks, 1);
+		mean[i] /= loop->map.mean_ticks;
 		for (int k = 0; k < loop->cells; k++)
 			run->cell_mm[k][i] +=
-				(run->cell_mm[k + 1][i] - run->cell_mm[k][i]) /
-				loop->cell_ticks;
+				(run->cell_mm[k + 1][i] - run->cell_mm[k][i]) / c;
 	}
 }
 

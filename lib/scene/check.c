@@ -486,11 +486,11 @@ static bool holds_still(struct incise_plan *plan,
 }
 
 /*
- * The advice is looked for down to a 64th of the gain, and up to 16 times the damping: by the way that swung alone, by
+ * The advice is looked for down to a 4096th of the gain, and up to 64 times the damping: by the way that swung alone, by
  * halvings of its logarithm, and then tried in all ways; if another one swings, by that one.
  */
-#define GAIN_LEAST (1.0 / 64)
-#define DAMPING_MOST 16 /* times the device's own, or than 1 mN s/mm */
+#define GAIN_LEAST (1.0 / 4096)
+#define DAMPING_MOST 64 /* times the device's own, or than 1 mN s/mm */
 #define HALVINGS 7
 #define ATTEMPTS 6
 
@@ -624,7 +624,7 @@ int incise_plan_check_rest(struct incise_plan *plan,
 {
 	struct incise_plan_stability *s = &plan->stability;
 	const struct incise_rest_trial as_is = {1, s->device.damping_N_s_mm, -1};
-	char advice[200], run[160];
+	char advice[200], run[160], delay[64];
 	struct incise_rest rest;
 
 	if (plan->scene->unchecked)
@@ -650,9 +650,17 @@ int incise_plan_check_rest(struct incise_plan *plan,
 		return 0;
 	name_run(&rest, run);
 	advise(plan, tracker, rest.way, advice);
-	return incise_error_set(err, EDOM,
-				"%s: does not come to rest: %s oscillates by %.3f mm and "
-				"%.2f N; %s",
-				plan->scene->path, run, rest.swing_mm, rest.swing_N,
-				advice);
+	if (s->own_delay)
+		snprintf(delay, sizeof(delay), "a delay of %d ticks",
+			 s->device.delay_ticks);
+	else
+		snprintf(delay, sizeof(delay), "a tracker of %g Hz and %g ms",
+			 tracker->rate_hz, (double)tracker->latency_ns * 1e-6);
+	return incise_error_set(
+		err, EDOM,
+		"%s: not stable: %s oscillates by %.3f mm and %.2f N, on a "
+		"device of %g kg and %g N s/mm with %s; %s, or describe "
+		"the device",
+		plan->scene->path, run, rest.swing_mm, rest.swing_N, s->device.mass_kg,
+		s->device.damping_N_s_mm, delay, advice);
 }

@@ -43,6 +43,7 @@ static double limit_of(const struct incise_haptic_device *device,
 struct wall {
 	struct incise_haptic_device device;
 	double rate_hz, latency_s, K, B;
+	int mean_ticks; /* of places, which K is by; 0: it is by the last one */
 };
 
 /* A kick, and whether what follows is larger in the last third than in the middle one. */
@@ -59,7 +60,8 @@ static bool grows(const struct wall *wall, double seconds)
 	double way_s[64], way_mm[64];
 	unsigned int first = 0, last = 0;
 	struct incise_predict predict;
-	int ticks = (int)(seconds / TICK_S);
+	int ticks = (int)(seconds / TICK_S), mean = (int)fmax(wall->mean_ticks, 1);
+	double ring[64] = {0};
 
 	set_predict(&predict, wall->rate_hz, wall->latency_s);
 	for (int k = 1; k <= ticks; k++) {
@@ -85,7 +87,10 @@ static bool grows(const struct wall *wall, double seconds)
 			incise_predict_add(&predict, &sample);
 		}
 		incise_predict_at(&predict, now_ns, x, v, attitude);
-		force_N = -wall->K * x[0] - wall->B * v[0];
+		ring[k % mean] = x[0];
+		force_N = -wall->B * v[0];
+		for (int i = 0; i < mean; i++)
+			force_N -= wall->K * ring[i] / mean;
 		*most = fmax(*most, pow(plant.position_mm, 2) +
 					    pow(plant.velocity_mm_s, 2) / omega2);
 		/* Far beyond the kick, and before the predictor's own limits. */
@@ -190,6 +195,83 @@ TEST(test_units)
 	set_predict(&predict, 120, 4.2e-3);
 	assert_true(fabs(limit_of(&b, &predict, 0) / limit_of(&a, &predict, 0) - 100) <
 		    1e-4);
+}
+
+static double margin_of(const struct incise_haptic_device *device,
+			const struct incise_predict *predict,
+			const struct incise_force_map *map, struct incise_swing *swing)
+{
+	struct incise_pose_loop loop = {.device = device, .predict = predict};
+	struct incise_plant plant =
+		incise_pose_loop_plant(device->mass_kg, device->damping_N_s_mm, NULL);
+
+	return incise_pose_loop_margin(
+		&loop, (struct incise_plant[]){plant, plant, plant}, map, 4, swing);
+}
+
+/* A wall that is felt by the mean of the last places, as by a normal that is averaged. */
+TEST(test_mean_against_time)
+{
+	static const int means[] = {2, 8, 32, 40, 64};
+
+	for (size_t i = 0; i < N(means); i++) {
+		struct wall wall = {.device = device_of(0.05, 0.2),
+				    .rate_hz = 120,
+				    .latency_s = 4.2e-3,
+				    .mean_ticks = means[i]};
+		struct incise_force_map map = {.mean_ticks = means[i], .mean = {{0.4}}};
+		struct incise_predict predict;
+		struct incise_swing swing;
+		double limit, within;
+
+		set_predict(&predict, wall.rate_hz, wall.latency_s);
+		limit = 0.4 * margin_of(&wall.device, &predict, &map, &swing);
+if (!(fabs(swing.along[0]) > 0.999 && swing.hz > 1)) fail_msg("%d %g %g %g", means[i], limit, swing.hz, swing.along[0]);
+		/* Exact up to 32. */
+		within = means[i] > 32 ? 0.05 : 0.03;
+		wall.K = (1 - within) * limit;
+		assert_false(grows(&wall, 6));
+		wall.K = (1 + within) * limit;
+		assert_true(grows(&wall, 6));
+	}
+}
+
+/* In space a wall that faces anywhere is one, and a force that turns with the place gives work. */
+TEST(test_in_space)
+{
+	static const double n[3] = {0.48, 0.6, 0.64};
+	struct incise_haptic_device device = device_of(0.05, 0.2);
+	struct incise_predict predict;
+	struct incise_swing swing;
+	double limit;
+
+	set_predict(&predict, 120, 4.2e-3);
+	limit = limit_of(&device, &predict, 0);
+	for (int turns = 0; turns < 2; turns++) {
+		struct incise_force_map map = {.mean_ticks = 1};
+		double margin, along = 0;
+
+		for (int i = 0; i < 9; i++)
+			map.now[i / 3][i % 3] = limit / 2 * n[i / 3] * n[i % 3];
+		for (int i = 0; i < 3 && turns; i++) {
+			map.now[i][i] = limit / 2;
+			map.now[i][(i + 1) % 3] = limit / 4;
+			map.now[i][(i + 2) % 3] = -limit / 4;
+		}
+		margin = margin_of(&device, &predict, &map, &swing);
+		for (int i = 0; i < 3; i++)
+			along += swing.along[i] * n[i];
+		if (!turns)
+			assert_true(fabs(margin - 2) < 2e-3 && fabs(along) > 0.999);
+		else
+			assert_true(margin < 1.8);
+	}
+	/* On a ball it falls to a side, and does not swing. */
+	assert_true(margin_of(&device, &predict,
+			      &(struct incise_force_map){
+				      .mean_ticks = 1,
+				      .now = {{0}, {0, -0.05}, {0, 0, -0.05}}},
+			      &swing) == 4);
 }
 
 TEST(test_nothing_holds)

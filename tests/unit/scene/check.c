@@ -198,7 +198,7 @@ TEST(test_refusal_names_a_gain)
 			assert_int_equal(!plan, more != 0);
 			if (!plan) {
 				assert_int_equal(errno, EDOM);
-				assert_says(err.text, "come to rest", most);
+				assert_says(err.text, "not stable", most);
 			}
 			if (more < 0)
 				gain = atof(strstr(err.text, most) + strlen(most));

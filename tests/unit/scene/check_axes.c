@@ -104,7 +104,7 @@ TEST(the_worst_actuator_decides)
 	assert_int_equal(plan_wall(one, wall_N_mm, 0, 0, &s, &err), 0);
 	assert_int_equal(plan_wall(two, wall_N_mm, 0, 0, &s, &err), 0);
 	assert_error(plan_wall(two, wall_N_mm, 0, 0.008, &s, &err), EDOM, &err,
-		     "come to rest");
+		     "not stable");
 	/* Beyond what the theory covers. */
 	assert_error(plan_wall(two, SOFT_N_mm, 0, 0.0161, &s, &err), EDOM, &err,
 		     "actuator.late_ms", "17");

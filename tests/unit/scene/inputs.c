@@ -245,7 +245,7 @@ static void acceleration_is_a_mass(void **state)
 	write_model(inputs, 2, 0.4);
 	refused("model = \"m.fis\"; arithmetic = \"double\"; tissue = { withdrawal = "
 		"\"paper\"; };",
-		EDOM, "come to rest");
+		EDOM, "not stable");
 	refused("model = \"m.fis\"; arithmetic = \"double\"; device = { delay_ticks = 2; "
 		"};",
 		EDOM, "device.delay_ticks");

@@ -559,7 +559,7 @@ static int lean_all(uint64_t seed, struct incise_plan *plan, const struct leaned
  */
 static bool named_lean(const char *why, const struct incise_plan *plan, struct lean *lean)
 {
-	const char *at = strstr(why, "does not come to rest: ");
+	const char *at = strstr(why, "not stable: ");
 	double place_mm[3], *N = lean->force_N;
 	char who[20] = "", across[20] = "", tool[20];
 
@@ -567,14 +567,14 @@ static bool named_lean(const char *why, const struct incise_plan *plan, struct l
 	if (!at)
 		return false;
 	if (sscanf(at,
-		   "does not come to rest: a %19s %19s that leans on it with [%lf, %lf, %lf] N by "
+		   "not stable: a %19s %19s that leans on it with [%lf, %lf, %lf] N by "
 		   "the %19s at [%lf, %lf, %lf]",
 		   who, across, &N[0], &N[1], &N[2], tool, &place_mm[0], &place_mm[1],
 		   &place_mm[2]) == 9)
 		lean->all_round = false;
 	else if (
 		sscanf(at,
-		       "does not come to rest: a %19s that leans on it with [%lf, %lf, %lf] N by the "
+		       "not stable: a %19s that leans on it with [%lf, %lf, %lf] N by the "
 		       "%19s at [%lf, %lf, %lf]",
 		       who, &N[0], &N[1], &N[2], tool, &place_mm[0], &place_mm[1],
 		       &place_mm[2]) != 8)
