@@ -143,18 +143,13 @@ static double opening_slope(const struct incise_plan *plan)
 	return rise_N / INCISE_PUNCTURE_MM;
 }
 
-/* The model's support, its slope there, and the stiffness with which its tissue unloads. */
-static void set_tissue(struct incise_plan *plan, double steepest_N_mm)
+/* The stiffness with which a model's tissue unloads, and its slope beyond its support. */
+static void set_tissue(struct incise_plan *plan)
 {
 	double own = plan->scene->tissue.force[0][INCISE_REACTION_UNLOADING];
-	double x[INCISE_LOOP_INPUTS_MAX] = {0}, ends[2];
+	double steepest_N_mm = plan->gain * plan->steepest_N_mm;
 
-	incise_plan_input_range(plan, INCISE_CUT,
-				input_of(plan, INCISE_CUT, INCISE_INPUT_DEPTH), ends);
-	plan->support_mm = ends[1];
-	plan->beyond_N_mm =
-		fmin(fmax(plan->gain * edge_slope(plan, 0, x), 0), steepest_N_mm);
-	plan->dissipates = plan->scene->tissue.dissipates;
+	plan->beyond_N_mm = fmin(fmax(plan->gain * plan->edge_N_mm, 0), steepest_N_mm);
 	/* Softer than the model, it could not follow it. */
 	plan->unloading_N_mm = fmax(
 		own > 0 ? fmax(own, steepest_N_mm) : STEEPER * steepest_N_mm, LEAST_N_mm);
@@ -175,24 +170,30 @@ static void take_slopes(struct incise_plan *plan, enum incise_cutting_phase phas
 		*to = fmax(*to, plan->gain * either);
 		/* A force that pulls the blade back may rise either way. */
 		if (cut->input[i] == INCISE_INPUT_DEPTH)
-			s->slope_N_mm =
-				fmax(s->slope_N_mm,
-				     plan->gain * (phase == INCISE_WITHDRAW
+			plan->steepest_N_mm = fmax(plan->steepest_N_mm,
+						   phase == INCISE_WITHDRAW
 							   ? either
-							   : fmax(slopes[i].highest, 0)));
+							   : fmax(slopes[i].highest, 0));
 	}
 }
 
-/* The largest slopes of the models, by depth, by speed and by acceleration. */
-static int survey_model(struct incise_plan *plan, double *stiffness_N_mm)
+/* The largest slopes of the models, by depth, by speed and by acceleration; its support, and the slope there. */
+static int survey_model(struct incise_plan *plan)
 {
 	struct incise_plan_stability *s = &plan->stability;
 	struct incise_slope slope[INCISE_LOOP_INPUTS_MAX];
+	double x[INCISE_LOOP_INPUTS_MAX] = {0}, ends[2];
 
+	incise_plan_input_range(plan, INCISE_CUT,
+				input_of(plan, INCISE_CUT, INCISE_INPUT_DEPTH), ends);
+	plan->support_mm = ends[1];
+	plan->dissipates = plan->scene->tissue.dissipates;
+	plan->edge_N_mm = edge_slope(plan, 0, x);
 	/* The search for the slopes takes longer than the test of a scene's stages. */
 	if (plan->scene->unchecked) {
-		set_tissue(plan, plan->scene->tissue.force[0][INCISE_REACTION_UNLOADING]);
-		*stiffness_N_mm = fmax(plan->unloading_N_mm, 1);
+		plan->steepest_N_mm =
+			plan->scene->tissue.force[0][INCISE_REACTION_UNLOADING] /
+			plan->gain;
 		return 0;
 	}
 	for (int i = 0; i < INCISE_CUTTING_PHASES; i++) {
@@ -208,15 +209,11 @@ static int survey_model(struct incise_plan *plan, double *stiffness_N_mm)
 	}
 	s->speed_slope_N_s_mm = plan->input_slope[INCISE_INPUT_SPEED];
 	s->acceleration_slope_N_s2_mm = plan->input_slope[INCISE_INPUT_ACCELERATION];
-	s->slope_N_mm += plan->gain * opening_slope(plan);
+	plan->steepest_N_mm += opening_slope(plan);
+	s->slope_N_mm = plan->gain * plan->steepest_N_mm;
 	/* That was looked at in places. */
 	if (plan->scene->cut[INCISE_PUNCTURE].model)
 		s->certified = false;
-	set_tissue(plan, s->slope_N_mm);
-	s->support_mm = plan->support_mm;
-	s->beyond_N_mm = plan->beyond_N_mm;
-	s->unloading_N_mm = plan->dissipates ? plan->unloading_N_mm : 0;
-	*stiffness_N_mm = plan->dissipates ? plan->unloading_N_mm : s->slope_N_mm;
 	return 0;
 }
 
@@ -365,6 +362,7 @@ static void add_up(struct incise_plan *plan, double model_N_mm)
 	bool both = K > 0 && aslant;
 	double all = 0;
 
+	s->stiffness_N_mm = s->damping_N_s_mm = 0;
 	for (int phase = 0; phase < 3; phase++) {
 		double sum[INCISE_FORCE_KINDS] = {0};
 
@@ -392,12 +390,31 @@ static void add_up(struct incise_plan *plan, double model_N_mm)
 	plan->account_N_mm = fmin(1.25 * (all + K), 32767);
 }
 
+void incise_plan_set_gain(struct incise_plan *plan, double gain)
+{
+	double model_N_mm = 0;
+
+	plan->gain = gain;
+	for (int i = 0; i < incise_n_tissue_forces; i++)
+		if (plan->acting[i].number[0] != 0)
+			plan->acting[i].number[0] =
+				gain * plan->scene->tissue.force[i][0];
+	if (plan->model || plan->fixed) {
+		set_tissue(plan);
+		model_N_mm = plan->dissipates ? plan->unloading_N_mm
+					      : gain * plan->steepest_N_mm;
+		/* Not checked, it may be stiffer. */
+		if (plan->scene->unchecked)
+			model_N_mm = fmax(plan->unloading_N_mm, 1);
+	}
+	add_up(plan, model_N_mm);
+}
+
 int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info *tracker,
 		      struct incise_error *err)
 {
 	struct incise_plan_stability *s = &plan->stability;
 	const struct incise_scene *scene = plan->scene;
-	double model_N_mm = 0;
 
 	s->device = (struct incise_haptic_device){
 		.mass_kg = scene->device.mass_kg,
@@ -410,9 +427,12 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 	s->certified = true;
 	if (set_lateness(plan, err))
 		return -EDOM;
-	if ((plan->model || plan->fixed) && survey_model(plan, &model_N_mm))
+	if ((plan->model || plan->fixed) && survey_model(plan))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
-	add_up(plan, model_N_mm);
+	incise_plan_set_gain(plan, plan->gain);
+	s->support_mm = plan->support_mm;
+	s->beyond_N_mm = plan->beyond_N_mm;
+	s->unloading_N_mm = plan->dissipates ? plan->unloading_N_mm : 0;
 	if (scene->unchecked)
 		return 0;
 	set_limits(plan);
@@ -470,13 +490,13 @@ static int search(struct incise_plan *plan, const struct incise_tracker_info *tr
 }
 
 /*
- * The search, with all forces so many times as strong, on a device with this damping: only the way *@way, or all where that is below 0, and then *@way becomes the one that swung.
+ * The search, with this gain of all forces, on a device with this damping: only the way *@way, or all where that is below 0, and then *@way becomes the one that swung.
  */
 static bool holds_still(struct incise_plan *plan,
-			const struct incise_tracker_info *tracker, double share,
+			const struct incise_tracker_info *tracker, double gain,
 			double damping_N_s_mm, int *way)
 {
-	const struct incise_rest_trial trial = {share, damping_N_s_mm, *way};
+	const struct incise_rest_trial trial = {gain, damping_N_s_mm, *way};
 	struct incise_rest rest = {.way = -1};
 	bool still = !search(plan, tracker, &trial, &rest) && rest.rests;
 
@@ -501,7 +521,7 @@ static double three_digits_up(double value)
 	return ceil(value / unit) * unit;
 }
 
-/* A gain as a share of the plan's, or a damping. */
+/* A gain, or a damping. */
 struct advice {
 	bool damps;
 	double most; /* so many times less, or more */
@@ -510,8 +530,8 @@ struct advice {
 static bool helps(struct incise_plan *plan, const struct incise_tracker_info *tracker,
 		  const struct advice *advice, double value, int *way)
 {
-	return advice->damps ? holds_still(plan, tracker, 1, value, way)
-			     : holds_still(plan, tracker, value / plan->gain,
+	return advice->damps ? holds_still(plan, tracker, plan->gain, value, way)
+			     : holds_still(plan, tracker, value,
 					   plan->stability.device.damping_N_s_mm, way);
 }
 
@@ -623,7 +643,7 @@ int incise_plan_check_rest(struct incise_plan *plan,
 			   struct incise_error *err)
 {
 	struct incise_plan_stability *s = &plan->stability;
-	const struct incise_rest_trial as_is = {1, s->device.damping_N_s_mm, -1};
+	const struct incise_rest_trial as_is = {plan->gain, s->device.damping_N_s_mm, -1};
 	char advice[200], run[160], delay[64];
 	struct incise_rest rest;
 

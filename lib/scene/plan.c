@@ -344,12 +344,7 @@ void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 	*copy = *plan;
 	copy->integers = NULL;
 	copy->ops = incise_double_ops;
-	copy->gain *= gain;
-	copy->unloading_N_mm *= gain;
-	copy->beyond_N_mm *= gain;
-	copy->account_N_mm *= gain;
-	for (int i = 0; i < incise_n_tissue_forces; i++)
-		copy->acting[i].number[0] *= gain;
+	incise_plan_set_gain(copy, gain);
 	incise_plan_set_numbers(copy);
 }
 

@@ -131,8 +131,10 @@ struct incise_plan {
 	double unloading_N_mm; /* … with this stiffness */
 	/* The model's steepest slope by each input, N per its unit, times the gain. */
 	double input_slope[INCISE_MODEL_INPUT_KINDS];
-	double support_mm;  /* the model's largest depth; beyond it the force … */
-	double beyond_N_mm; /* … goes on with this slope, ≥ 0 */
+	double support_mm;    /* the model's largest depth; beyond it the force … */
+	double beyond_N_mm;   /* … goes on with this slope, ≥ 0 */
+	double edge_N_mm;     /* slope there without the gain … */
+	double steepest_N_mm; /* … and the largest of all, without it */
 	double upright; /* least cosine between the normals of skin and membrane, over its disc */
 	double account_N_mm;		  /* all springs together */
 	bool accounts;			  /* for the work of its forces */
@@ -163,8 +165,8 @@ incise_stage_fn incise_stage_pose, incise_stage_fed, incise_stage_actuate;
 /* --- plan --- */
 
 /*
- * A copy that can tick beside the plan, with all forces so many times as strong. It shares what the
- * plan has allocated, and keeps the plan's stability.
+ * A copy that can tick beside the plan, with another gain: as the plan of a scene with that. It shares what the
+ * plan has allocated.
  */
 void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 		      double gain);
@@ -172,6 +174,9 @@ void incise_plan_copy(struct incise_plan *copy, const struct incise_plan *plan,
 /* The lower end of the support of an input of a phase's model, and the upper one. */
 void incise_plan_input_range(const struct incise_plan *plan,
 			     enum incise_cutting_phase phase, int i, double ends[2]);
+
+/* Of a plan that was checked: scale all that goes with the gain. incise_plan_set_numbers() takes it over. */
+void incise_plan_set_gain(struct incise_plan *plan, double gain);
 
 /* Fill in the plan in double, by all that was found of the scene. */
 void incise_plan_set_numbers(struct incise_plan *plan);

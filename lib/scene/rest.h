@@ -33,7 +33,7 @@
 
 /* Changes to the plan in a search. */
 struct incise_rest_trial {
-	double gain;	       /* of all forces, times the plan's; 1: as it is */
+	double gain;	       /* in place of the plan's */
 	double damping_N_s_mm; /* of the device */
 	int way;	       /* of the search, the only one to try; -1: all */
 };

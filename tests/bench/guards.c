@@ -223,7 +223,7 @@ static void copy_plan(struct loop *l, const struct incise_plan *plan, double gai
 	struct incise_stage stage[INCISE_PLAN_STAGES_MAX];
 	int n = plan->n_stages;
 
-	incise_plan_copy(own, plan, gain);
+	incise_plan_copy(own, plan, gain * plan->gain);
 	own->poses.fed = l->fed;
 	if (own->doubles.state.average)
 		own->doubles.state.average = &l->average;
