@@ -136,6 +136,12 @@ static double encoder_N_mm(const struct incise_plan_stability *s)
 		       : NAN;
 }
 
+static const char *const held_names[] = {
+	[INCISE_HELD_FREE] = "free",
+	[INCISE_HELD_ACROSS] = "held across",
+	[INCISE_HELD_IN_HAND] = "in a hand",
+};
+
 static json_t *weakest_margin(const struct incise_plan_weakest *w)
 {
 	return json_number(w->margin < INCISE_PLAN_MARGIN_MOST ? w->margin : NAN);
@@ -147,8 +153,8 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 	const struct incise_plan_weakest *w = &s->weakest;
 
 	return json_pack("{so so so so so so so sf sf sf sf sf si "
-			 "s{ss sb sb sb so sf sf sf sf sf sf} "
-			 "s{so so sf sf sf so ss sb sb si si} sf "
+			 "s{ss ss sb so sf sf sf sf sf sf} "
+			 "s{so so sf sf sf so ss ss si si} sf "
 			 "sf si sb sb s{sf sf sf sf sf si}}",
 			 "stiffness_N_mm", json_number(s->stiffness_N_mm), "limit_N_mm",
 			 json_number(s->limit_N_mm), "margin", weakest_margin(w),
@@ -159,8 +165,8 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 			 s->acceleration_slope_N_s2_mm, "slope_N_mm", s->slope_N_mm,
 			 "unloading_N_mm", s->unloading_N_mm, "support_mm", s->support_mm,
 			 "beyond_N_mm", s->beyond_N_mm, "leans", s->runs, "worst", "tool",
-			 loop_tool_names[s->worst.tool], "in_hand", s->worst.in_hand,
-			 "across", s->worst.across, "guided", s->worst.guided, "place_mm",
+			 loop_tool_names[s->worst.tool], "held",
+			 held_names[s->worst.held], "guided", s->worst.guided, "place_mm",
 			 json_numbers(s->worst.place_mm, 3), "askew", s->worst.askew,
 			 "lean_N", s->worst.lean_N, "along_mm_s", s->worst.along_mm_s,
 			 "depth_mm", s->worst.depth_mm, "swing_mm", s->worst.swing_mm,
@@ -168,8 +174,8 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 			 weakest_margin(w), "along", json_numbers(w->along, 3), "hz",
 			 w->hz, "lean_N", w->lean_N, "depth_mm", w->depth_mm, "place_mm",
 			 json_numbers(w->place_mm, 3), "tool", loop_tool_names[w->tool],
-			 "in_hand", w->in_hand, "across", w->across, "states", w->states,
-			 "paid", w->paid, "noise_mm", s->noise_mm, "noise_N", s->noise_N,
+			 "held", held_names[w->held], "states", w->states, "paid",
+			 w->paid, "noise_mm", s->noise_mm, "noise_N", s->noise_N,
 			 "late_ticks", s->late_ticks, "certified", s->certified,
 			 "own_delay", s->own_delay, "device", "mass_kg", d->mass_kg,
 			 "damping_N_s_mm", d->damping_N_s_mm, "coulomb_N", d->coulomb_N,
@@ -288,11 +294,6 @@ static void print_model(const struct incise_plan_stability *s)
 		printf("            withdrawal: the model's force in both directions\n");
 }
 
-static const char *hand_name(bool in_hand, bool across)
-{
-	return !in_hand ? "without a hand" : across ? "held across" : "in a hand";
-}
-
 /* The state about which the least more of its forces makes the loop swing. */
 static void print_weakest(const struct incise_plan_weakest *w)
 {
@@ -302,7 +303,7 @@ static void print_weakest(const struct incise_plan_weakest *w)
 		       w->margin, w->along[0] + 0.0, w->along[1] + 0.0, w->along[2] + 0.0,
 		       w->hz, w->lean_N, loop_tool_names[w->tool], w->depth_mm,
 		       w->place_mm[0], w->place_mm[1], w->place_mm[2],
-		       hand_name(w->in_hand, w->across), w->states);
+		       held_names[w->held], w->states);
 	else
 		printf("margin: none; in %d states of rest it swings not even with %d times its forces\n",
 		       w->states - w->paid, INCISE_PLAN_MARGIN_MOST);
@@ -325,7 +326,7 @@ static void print_rest(const struct incise_plan_stability *s)
 		printf(", %.0f %% of it along the skin, by the %s at (%.4g, %.4g, %.4g), "
 		       "%s",
 		       100 * s->worst.askew, loop_tool_names[s->worst.tool], at[0], at[1],
-		       at[2], hand_name(s->worst.in_hand, s->worst.across));
+		       at[2], held_names[s->worst.held]);
 	if (s->worst.along_mm_s > 0)
 		printf(", while it goes along the skin with %g mm/s",
 		       s->worst.along_mm_s);

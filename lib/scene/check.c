@@ -619,23 +619,19 @@ static void advise(struct incise_plan *plan, const struct incise_tracker_info *t
 static void name_run(const struct incise_rest *rest, char name[160])
 {
 	static const char *const tools[] = {"tool", "blade", "handle", "tube"};
+	static const char *const held[] = {"free", "held across", "in a hand"};
 	const double *at = rest->place_mm, *N = rest->force_N;
 
 	if (rest->guided)
 		snprintf(
 			name, 160,
-			"a hand that leans on it with %.2f N while it moves along the skin at "
-			"%.0f mm/s, %.1f mm deep",
-			rest->lean_N, rest->along_mm_s, rest->depth_mm);
+			"the blade, along the skin at %.0f mm/s, under %.3g N, %.1f mm deep,",
+			rest->along_mm_s, rest->lean_N, rest->depth_mm);
 	else
-		snprintf(
-			name, 160,
-			"%s that leans on it with [%.3g, %.3g, %.3g] N by the %s at [%.2f, "
-			"%.2f, %.2f]",
-			rest->hand < 0 ? "a weight"
-			: rest->across ? "a hand across"
-				       : "a hand",
-			N[0], N[1], N[2], tools[rest->tool], at[0], at[1], at[2]);
+		snprintf(name, 160,
+			 "the %s, %s, under [%.3g, %.3g, %.3g] N at [%.2f, %.2f, %.2f],",
+			 tools[rest->tool], held[rest->held], N[0], N[1], N[2], at[0],
+			 at[1], at[2]);
 }
 
 int incise_plan_check_rest(struct incise_plan *plan,
@@ -656,8 +652,7 @@ int incise_plan_check_rest(struct incise_plan *plan,
 	s->worst.along_mm_s = rest.along_mm_s;
 	s->worst.askew = rest.askew;
 	s->worst.tool = rest.tool;
-	s->worst.in_hand = rest.hand >= 0;
-	s->worst.across = rest.across;
+	s->worst.held = rest.held;
 	s->worst.guided = rest.guided;
 	v3_copy(s->worst.place_mm, rest.place_mm);
 	s->worst.depth_mm = rest.depth_mm;

@@ -29,10 +29,15 @@
 
 #define POSES_MOST 64 /* on their way */
 
-const struct incise_hand_impedance incise_hands[INCISE_HANDS] = {
-	{0.554, 0.00645, 0.135},
-	{0.1385, 0.0016125, 0.03375},
-	{0.554, 0.0258, 0.54},
+/*
+ * What holds it: nothing; a spring across the normal, so that it does not slide away and is bare else; a firm hand. Its mass,
+ * damping and stiffness are those of the arm that van Beek, Bergmann Tiest, Mugge and Kappers measured in a typical trial
+ * (Haptic perception of force magnitude and its relation to postural arm dynamics in 3D, Scientific Reports 5, 18004,
+ * 2015, fig. 3: 0.554 kg, 6.45 N s/m, 135 N/m), with four times its damping and stiffness.
+ */
+static const struct incise_hand_impedance holds[] = {
+	[INCISE_HELD_ACROSS] = {0, 0, 0.54},
+	[INCISE_HELD_IN_HAND] = {0.554, 0.0258, 0.54},
 };
 
 /*
@@ -58,11 +63,9 @@ static const struct {
 #define LOOK_EVERY 5
 #define PLACES 3
 static const double askew[] = {0.02, 0.25};
-/* None; and the firmest of incise_hands: the others are between. One that holds across only leaves the device bare along the normal. */
-static const struct {
-	const struct incise_hand_impedance *hand;
-	bool across;
-} hands[] = {{&incise_hands[2], true}, {&incise_hands[2], false}, {NULL, false}};
+/* The first one that swings is named: one that does not slide away, if there is any. */
+static const enum incise_held held[] = {INCISE_HELD_ACROSS, INCISE_HELD_IN_HAND,
+					INCISE_HELD_FREE};
 
 /* A tool that goes farther along the skin than this in a quarter slides on it: over hills that is no swing. */
 #define SLIDES_MM 1
@@ -91,11 +94,10 @@ struct way {
 	const struct incise_surface *on;
 	enum incise_tool tool;
 	double start_mm;
-	bool guided;				  /* along the normal … */
-	double along_mm_s;			  /* … while it goes along the skin */
-	const struct incise_hand_impedance *hand; /* else in it, or in none … */
-	bool across;  /* … which holds it across the normal only … */
-	double askew; /* … with this share along the skin */
+	bool guided;	       /* along the normal … */
+	double along_mm_s;     /* … while it goes along the skin */
+	enum incise_held held; /* else so … */
+	double askew;	       /* … with this share along the skin */
 	double reserve;
 	int every; /* of the leans */
 };
@@ -234,7 +236,7 @@ static void set_way(struct search *s, const struct incise_scene *scene,
 		v3_unit(s->along, s->along, 0);
 	}
 	memcpy(s->axis, s->device.axis, sizeof(s->axis));
-	if (!way->guided && !way->across)
+	if (!way->guided && way->held != INCISE_HELD_ACROSS)
 		return;
 	v3_copy(s->axis[0], n);
 	v3_copy(s->axis[1], s->along);
@@ -243,6 +245,8 @@ static void set_way(struct search *s, const struct incise_scene *scene,
 
 static struct incise_plant plant(const struct search *s, int i)
 {
+	bool loose = s->way.held == INCISE_HELD_FREE ||
+		     (s->way.held == INCISE_HELD_ACROSS && !i);
 	double mass_kg = 0;
 
 	for (int k = 0; k < 3; k++) {
@@ -252,7 +256,7 @@ static struct incise_plant plant(const struct search *s, int i)
 	}
 	return incise_pose_loop_plant(mass_kg,
 				      s->device.damping_N_s_mm * (1 - s->way.reserve),
-				      s->way.across && !i ? NULL : s->way.hand);
+				      loose ? NULL : &holds[s->way.held]);
 }
 
 /* Times of a clock that is far from 0. */
@@ -575,8 +579,7 @@ static void note(const struct search *s, const struct run *run, const struct win
 		.force_N = {lean_N[0], lean_N[1], lean_N[2]},
 		.place_mm = {at_mm[0], at_mm[1], at_mm[2]},
 		.tool = s->way.tool,
-		.hand = s->way.hand ? (int)(s->way.hand - incise_hands) : -1,
-		.across = s->way.across,
+		.held = s->way.held,
 		.guided = s->way.guided,
 		.depth_mm = depth_mm,
 		.swing_mm = swing_of(s, last->at_mm),
@@ -610,8 +613,7 @@ static bool look(struct search *s, const struct run *run, double depth_mm, int w
 			.depth_mm = depth_mm,
 			.place_mm = {at_mm[0], at_mm[1], at_mm[2]},
 			.tool = s->way.tool,
-			.in_hand = s->way.hand,
-			.across = s->way.across,
+			.held = s->way.held,
 			.states = 1,
 		};
 		double most = rest->weakest.margin / (1 + s->way.reserve), settle_s;
@@ -690,8 +692,8 @@ static bool lean_all(struct search *s, const struct incise_plan *plan,
 	s->air = s->plan;
 	s->air_parts = s->parts;
 	s->decides = false;
-	for (int i = LEANS, halves = 0;
-	     i > 0 || (way->across && !s->decides && halves < HALVES_MOST);
+	for (int i = LEANS, halves = 0; i > 0 || (way->held == INCISE_HELD_ACROSS &&
+						  !s->decides && halves < HALVES_MOST);
 	     i -= way->every) {
 		struct run run = air;
 
@@ -728,20 +730,20 @@ static void search(struct search *s, const struct incise_plan *plan,
 		if (model && !lean_all(s, plan, trial, &way, number, rest))
 			return;
 	}
-	for (int i = 0; i < s->n_places * n_tools * N(hands) * N(askew); i++, number++) {
-		int hand = i / N(askew) % N(hands);
-		int tool = i / N(askew) / N(hands) % n_tools;
+	for (int i = 0; i < s->n_places * n_tools * N(held) * N(askew); i++, number++) {
+		enum incise_held by = held[i / N(askew) % N(held)];
+		int tool = i / N(askew) / N(held) % n_tools;
 		const struct way way = {
-			.at = &s->place[i / N(askew) / N(hands) / n_tools],
+			.at = &s->place[i / N(askew) / N(held) / n_tools],
 			.on = plan->surface,
 			.tool = tool ? INCISE_TOOL_TUBE : INCISE_TOOL_BLADE,
 			.start_mm = i % N(askew) ? DROP_MM : TOUCH_MM,
-			.hand = hands[hand].hand,
-			.across = hands[hand].across,
+			.held = by,
 			.askew = askew[i % N(askew)],
 			.reserve = model ? RESERVE : FREE_RESERVE,
-			.every = model && hands[hand].across && !tool ? 1 + i % N(askew)
-								      : FREE_EVERY};
+			.every = model && by == INCISE_HELD_ACROSS && !tool
+					 ? 1 + i % N(askew)
+					 : FREE_EVERY};
 
 		if (!lean_all(s, plan, trial, &way, number, rest))
 			return;

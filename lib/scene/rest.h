@@ -8,13 +8,15 @@
  *                   ▲                                                             │
  *                   └────────────────── held for a tick ◀─────────────────────────┘
  *
- * The device is without dry friction, and bare or in a hand of incise_hands. It starts in the air and leans with a
+ * The device is without dry friction, and bare, held across, or in a hand. It starts in the air and leans with a
  * constant force up to the scene's limit:
  *
  *   - of all scenes, free in three dimensions, on the surface as it is: at its top and, of a mesh, where it is
  *     the most concave and the most convex; with blade and tube, straight and askew;
- *   - of a model besides, guided along the normal of the top, on the plane that touches it there, while it stands
- *     or goes along the skin.
+ *   - of a model besides, guided along the normal of the top, on the plane that touches it there, while it goes
+ *     along the skin.
+ *
+ * Where it comes to rest, the loop is judged as a linear one, too: by the forces that a small motion meets there.
  *
  * A swing goes to and fro: a hand that sinks or creeps does not swing. Where the tool slides away, or sinks where
  * the tissue does not carry the lean, a run decides nothing.
@@ -47,8 +49,7 @@ struct incise_rest {
 	double force_N[3];  /* the lean */
 	double place_mm[3]; /* of the surface */
 	enum incise_tool tool;
-	int hand;    /* of incise_hands; -1: none … */
-	bool across; /* … and across only */
+	enum incise_held held;
 	bool guided; /* along the normal */
 	double depth_mm, swing_mm, swing_N, settle_s;
 	int way; /* of the search */
@@ -99,15 +100,5 @@ void incise_plan_force_map(struct incise_plan *plan, int64_t t_ns,
 int incise_plan_rest(const struct incise_plan *plan,
 		     const struct incise_tracker_info *tracker,
 		     const struct incise_rest_trial *trial, struct incise_rest *rest);
-
-/*
- * A hand on a stylus, lighter and firmer: mass, damping and stiffness of the arm that van
- * Beek, Bergmann Tiest, Mugge and Kappers measured in a typical trial (Haptic perception of
- * force magnitude and its relation to postural arm dynamics in 3D, Scientific Reports 5, 18004,
- * 2015, fig. 3: 0.554 kg, 6.45 N s/m, 135 N/m), as it is, a quarter of it, and with four times
- * its damping and stiffness. With each of them a wall may be stiffer than without a hand.
- */
-#define INCISE_HANDS 3
-extern const struct incise_hand_impedance incise_hands[INCISE_HANDS];
 
 #endif

@@ -268,7 +268,7 @@ at_terminal() {
 	rig=sim:clock=simulated,depth_mm=5,times=3
 	# Two stations share the rate: the shipped scene is too stiff for that, and is refused.
 	run -1 --separate-stderr incise plan neck.scene --rig $rig,tube_s=10
-	[[ "$stderr" == *"with a tracker of 60 Hz and 4.2 ms is stable up to "* ]]
+	[[ "$stderr" == *"with a tracker of 60 Hz and 4.2 ms; "* ]]
 	incise plan neck.scene --rig $rig >/dev/null
 	phases() {
 		incise haptic soft.scene --duration 40s --log - "$@" |

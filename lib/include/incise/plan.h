@@ -123,6 +123,13 @@ INCISE_API void incise_plan_top(const struct incise_plan *plan,
 INCISE_API const struct incise_surface *incise_plan_surface(
 	const struct incise_plan *plan);
 
+/** What holds a device in a search, besides the force that leans. */
+enum incise_held {
+	INCISE_HELD_FREE,   /**< nothing */
+	INCISE_HELD_ACROSS, /**< across the normal, a spring of 0.54 N/mm without a mass */
+	INCISE_HELD_IN_HAND, /**< a firm hand: 0.554 kg, 0.0258 N s/mm, 0.54 N/mm */
+};
+
 /**
  * Of all states of rest that a search came to, the one about which the loop, with its forces as they are there for small
  * motions, swings with the least more of them: by its eigenvalues in three dimensions.
@@ -134,9 +141,8 @@ struct incise_plan_weakest {
 	double lean_N, depth_mm;
 	double place_mm[3];    /**< of the surface */
 	enum incise_tool tool; /**< that leans */
-	bool in_hand,
-		across; /**< in a hand, or in one that holds it across the normal only */
-	int states;	/**< looked at */
+	enum incise_held held;
+	int states; /**< looked at */
 	/** Of them, those with a margin below 1 that rest all the same: the account of work ends their swings. */
 	int paid;
 };
@@ -186,9 +192,8 @@ struct incise_plan_stability {
 		double askew;	       /**< share of its force along the skin */
 		double place_mm[3];    /**< of the surface, where it leans */
 		enum incise_tool tool; /**< that leans */
-		bool in_hand;	       /**< of a hand's mass, damping and stiffness … */
-		bool across;	       /**< … which holds it across the normal only */
-		bool guided;	       /**< along the normal only */
+		enum incise_held held;
+		bool guided; /**< along the normal only */
 		double depth_mm, swing_mm, settle_s;
 	} worst;
 	struct incise_plan_weakest weakest; /**< of the same search */

@@ -554,39 +554,29 @@ static int lean_all(uint64_t seed, struct incise_plan *plan, const struct leaned
 }
 
 /*
- * The lean that a refusal names: "… a weight that leans on it with [0.1, 0, -0.91] N by the tube at
- * [-20.81, 33.32, 28.95] …"; its hand is the firmest one of the manual. None: it moves along a plane.
+ * What a refusal names: "… the tube, held across, under [0.1, 0, -0.91] N at [-20.81, 33.32, 28.95], oscillates …"; what
+ * holds it as in <incise/plan.h>. None: it moves along a plane.
  */
 static bool named_lean(const char *why, const struct incise_plan *plan, struct lean *lean)
 {
 	const char *at = strstr(why, "not stable: ");
 	double place_mm[3], *N = lean->force_N;
-	char who[20] = "", across[20] = "", tool[20];
+	char tool[20], held[20];
 
-	*lean = (struct lean){.tool = INCISE_TOOL_BLADE, .q = {1}, .all_round = true};
-	if (!at)
-		return false;
-	if (sscanf(at,
-		   "not stable: a %19s %19s that leans on it with [%lf, %lf, %lf] N by "
-		   "the %19s at [%lf, %lf, %lf]",
-		   who, across, &N[0], &N[1], &N[2], tool, &place_mm[0], &place_mm[1],
-		   &place_mm[2]) == 9)
-		lean->all_round = false;
-	else if (
-		sscanf(at,
-		       "not stable: a %19s that leans on it with [%lf, %lf, %lf] N by the "
-		       "%19s at [%lf, %lf, %lf]",
-		       who, &N[0], &N[1], &N[2], tool, &place_mm[0], &place_mm[1],
-		       &place_mm[2]) != 8)
+	*lean = (struct lean){.tool = INCISE_TOOL_BLADE, .q = {1}};
+	if (!at ||
+	    sscanf(at,
+		   "not stable: the %19[^,], %19[^,], under [%lf, %lf, %lf] N at [%lf, %lf, %lf]",
+		   tool, held, &N[0], &N[1], &N[2], &place_mm[0], &place_mm[1],
+		   &place_mm[2]) != 8)
 		return false;
 	incise_surface_nearest(incise_plan_surface(plan), place_mm, &lean->place);
 	if (!strcmp(tool, "tube"))
 		lean->tool = INCISE_TOOL_TUBE;
-	if (!strcmp(who, "hand")) {
-		lean->hand_N_mm = 0.54;
-		lean->hand_kg = 0.554;
-		lean->hand_N_s_mm = 0.0258;
-	}
+	lean->all_round = !strcmp(held, "in a hand");
+	lean->hand_N_mm = strcmp(held, "free") ? 0.54 : 0;
+	lean->hand_kg = lean->all_round ? 0.554 : 0;
+	lean->hand_N_s_mm = lean->all_round ? 0.0258 : 0;
 	lean->size_N = v3_length(N);
 	lean->above_mm = -v3_dot(N, lean->place.normal) < 0.99 * lean->size_N ? 3 : 0.1;
 	return true;
