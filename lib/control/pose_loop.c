@@ -50,11 +50,10 @@ struct loop {
 	int cells;		/* of the mean … */
 	double cell_ticks;	/* … and so many ticks in each */
 	int own_states, states; /* of an axis */
-	bool alone;		/* axes do nothing to each other, and are all one */
+	int axes;		/* 3, or of a wall the first one */
 	struct incise_force_map map;
 };
 
-/* Three axes at once: where they are alone, a state in each. */
 struct run {
 	struct incise_plant plant[3];
 	struct incise_predict predict;
@@ -191,34 +190,28 @@ static void run_period(const struct loop *loop, struct run *run)
 
 static int size_of(const struct loop *loop)
 {
-	return loop->states * (loop->alone ? 1 : 3);
+	return loop->states * loop->axes;
 }
 
 /* The effect of a period on each state, column by column. */
 static void measure(const struct loop *loop, double *matrix)
 {
-	int n = size_of(loop), at_once = loop->alone ? 3 : 1, axes = loop->alone ? 1 : 3;
+	int n = size_of(loop), axes = loop->axes;
 
-	for (int column = 0; column < n; column += at_once) {
+	for (int column = 0; column < n; column++) {
 		struct run run = {
 			.plant = {loop->plant[0], loop->plant[1], loop->plant[2]},
 			.predict = loop->predict,
 			.n = loop->waiting,
 		};
 
-		for (int k = 0; k < at_once && column + k < n; k++) {
-			int state = (column + k) / axes;
-
-			*place(loop, &run, state, loop->alone ? k : column % 3) =
-				SIZE_MM * unit(loop, state);
-		}
+		*place(loop, &run, column / axes, column % axes) =
+			SIZE_MM * unit(loop, column / axes);
 		run_period(loop, &run);
 		for (int row = 0; row < n; row++)
-			for (int k = 0; k < at_once && column + k < n; k++)
-				matrix[row * n + column + k] =
-					*place(loop, &run, row / axes,
-					       loop->alone ? k : row % 3) /
-					SIZE_MM / unit(loop, row / axes);
+			matrix[row * n + column] =
+				*place(loop, &run, row / axes, row % axes) /
+				(SIZE_MM * unit(loop, row / axes));
 	}
 }
 
@@ -248,8 +241,7 @@ static bool stable(struct loop *loop, double stiffness_N_mm)
 	double matrix[(OWN_STATES + WAITING_MOST + INCISE_POSE_LOOP_LATE_MAX) *
 		      (OWN_STATES + WAITING_MOST + INCISE_POSE_LOOP_LATE_MAX)];
 
-	for (int i = 0; i < 3; i++)
-		loop->map.now[i][i] = stiffness_N_mm;
+	loop->map.now[0][0] = stiffness_N_mm;
 	measure(loop, matrix);
 	return cabs(fastest(matrix, loop->states, false)) <= 1 + GROWS;
 }
@@ -302,6 +294,7 @@ static void loop_init(struct loop *loop, const struct incise_pose_loop *of,
 		.predict = *of->predict,
 		.late = of->late_ticks,
 		.map = *map,
+		.axes = 3,
 	};
 	if (map->mean_ticks > 1) {
 		loop->cells = (int)fmin(map->mean_ticks - 1, CELLS_MOST);
@@ -318,10 +311,9 @@ static void wall_init(struct loop *loop, const struct incise_pose_loop *of)
 {
 	struct incise_force_map map = {.mean_ticks = 1};
 
-	for (int i = 0; i < 3; i++)
-		map.damping[i][i] = of->damping_N_s_mm;
+	map.damping[0][0] = of->damping_N_s_mm;
 	loop_init(loop, of, &map);
-	loop->alone = true;
+	loop->axes = 1;
 	for (int i = 0; i < 3; i++)
 		loop->plant[i] = incise_pose_loop_plant(of->device->mass_kg,
 							of->device->damping_N_s_mm, NULL);

@@ -453,7 +453,7 @@ in_order() {
 		5 * $(of rest 'max(swing_mm)' "verdict = 'accepted'")"
 	# the paper's law both ways is refused, with a reason, and does swing then
 	holds "$(of rest 'count(*)' "verdict = 'refused' AND withdrawal = 'paper'") > 0"
-	[[ "$(of rest 'min(why)' "verdict = 'refused'")" == "does not come to rest"* ]]
+	[[ "$(of rest 'min(why)' "verdict = 'refused'")" == "not stable"* ]]
 	# no path of a file in memory, which differs from run to run
 	[ "$(of rest 'count(*)' "why LIKE '%/proc/%'")" = 0 ]
 	holds "$(of rest 'max(swing_mm)' "verdict = 'refused'") > 0.1"

@@ -688,6 +688,56 @@ TEST(test_an_accepted_scene_rests)
 	assert_int_equal(sum.advised, sum.advice_accepted);
 }
 
+/* With a ninth more than the largest gain that is accepted a shipped scene swings, as the refusal says. */
+TEST(test_no_more_gain_rests)
+{
+	static const char *const names[] = {"liver", "neck", "wall"};
+	static const char words[] = "set tissue.gain to at most ";
+
+	for (int i = 0; i < 3; i++) {
+		struct leaned l = {.up = {0, 0, 1}, .deep_mm = INFINITY};
+		int64_t from_ns = 2000000000;
+		struct incise_error why = {0};
+		struct incise_scene *scene;
+		struct incise_plan *plan;
+		struct lean lean;
+		struct end end;
+		char path[64];
+		double gain, unloading;
+
+		l.tracker = (struct incise_tracker_info){.rate_hz = 120,
+							 .latency_ns = 4200000};
+		snprintf(path, sizeof(path), "scenes/%s.scene", names[i]);
+		scene = incise_scene_load(path, NULL, &err);
+		succeeds(scene);
+		l.mass_kg = scene->device.mass_kg;
+		l.damping_N_s_mm = scene->device.damping_N_s_mm;
+		l.late_ticks = scene->device.late_ticks;
+		scene->tissue.gain = 8;
+		assert_null(incise_plan_new_fed(scene, &l.tracker, &why));
+		gain = atof(strstr(why.text, words) + strlen(words));
+		scene->tissue.gain = gain;
+		plan = incise_plan_new_fed(scene, &l.tracker, &err);
+		succeeds(plan);
+		unloading = plan->unloading_N_mm;
+		incise_plan_free(plan);
+		scene->tissue.gain = gain / 0.9;
+		assert_null(incise_plan_new_fed(scene, &l.tracker, &why));
+		/* Not checked, its model has no slope; see scene.h. */
+		scene->unchecked = true;
+		scene->tissue.force[0][INCISE_REACTION_UNLOADING] = unloading / 0.9;
+		plan = incise_plan_new_fed(scene, &l.tracker, &err);
+		succeeds(plan);
+		assert_true(named_lean(why.text, plan, &lean));
+		end = lean_on(plan, &l, &lean, &from_ns, 1);
+		if (end.outcome != SWINGS)
+			fail_msg("%s, gain %g: %s | %s", names[i], gain / 0.9,
+				 outcomes[end.outcome], why.text);
+		incise_plan_free(plan);
+		incise_scene_free(scene);
+	}
+}
+
 /*
  * Of the judge: on a plane, a wall rests below the stiffness that theory gives, and swings above; see
  * lib/control/pose_loop.h.
