@@ -312,7 +312,7 @@ static void add_made(struct scenes *s)
 
 		file[0] = memory_file_begin(made[i].name);
 		if (strchr(made[i].text, '%'))
-			file[1] = sheet_of_waves(100);
+			file[1] = sheet_of_waves(100, false);
 		fprintf(file[0].file, made[i].text, file[1].path);
 		if (made[i].all)
 			fputs(FORCES EFFECTS, file[0].file);
