@@ -63,9 +63,8 @@ $(O)/lib/incise/peer_%.py: tools/bench/references/%.py
 	@mkdir -p $(@D)
 	$(Q)cp $< $@
 
-# The benchmarks also measure parts that the library does not export: they have a copy of it.
-$(O)/bin/incise-bench: $(call objects,incise) $(O)/obj/lib/learn/gram.o $(O)/obj/lib/learn/lsq.o
-$(O)/bin/incise-bench: tool_more_libs += $(pc_libs_incise) $(libs_incise) -pthread
+# The benchmarks simulate a device exactly, which the library itself has no use for.
+$(O)/bin/incise-bench: $(O)/obj/lib/control/plant.o
 tool_libs := $(patsubst %,-l%,$(libraries))
 tool_more_libs := $(if $(has_png),-lpng) $(if $(has_jpeg),-ljpeg) -lm
 

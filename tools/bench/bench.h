@@ -129,10 +129,9 @@ struct bench_plot {
 };
 
 extern const char text_loop_wakeups_gp[], text_precision_gp[],
-	text_precision_settings_gp[], text_precision_squares_gp[], text_scenes_gp[],
-	text_stability_integrators_gp[], text_stability_map_gp[],
-	text_stability_rest_gp[], text_training_gp[], text_view_gp[],
-	text_view_frames_gp[];
+	text_precision_average_gp[], text_scenes_gp[], text_stability_integrators_gp[],
+	text_stability_map_gp[], text_stability_rest_gp[], text_training_gp[],
+	text_view_gp[], text_view_frames_gp[];
 
 struct bench_run;
 
@@ -147,6 +146,10 @@ struct bench {
 
 extern const struct bench bench_loop, bench_precision, bench_scenes, bench_stability,
 	bench_training;
+
+/* A part of bench_precision. */
+void precision_forces(struct bench_run *run);
+extern const struct bench_table precision_force_table;
 
 /* --- a run --- */
 

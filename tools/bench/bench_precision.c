@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * incise bench precision: error against run time of the evaluators of one model, the plainest
- * and another project's among them, over the same points; then of forces and of what has a setting.
+ * and another project's among them, over the same points; then of forces.
  */
 #include <dlfcn.h>
 #include <stdio.h>
@@ -13,7 +13,6 @@
 #include "bench.h"
 #include "../cli/json.h"
 #include "noise.h"
-#include "precision.h"
 #include "reference.h"
 
 /* Points for the errors. Times are of the first of them, so few that inputs and outputs
@@ -488,7 +487,6 @@ static void run(struct bench_run *run)
 	bench_table(run, &rows_table, all->row, all->n);
 	bench_text(run, "\n");
 	precision_forces(run);
-	precision_settings(run);
 }
 
 const struct bench bench_precision = {
@@ -502,15 +500,9 @@ const struct bench bench_precision = {
 		   .height = 720,
 		   .data = {&rows_table, "kind", "failed="},
 		   .more = {&rows_table, "name,failed", "failed!=,peer=1"}},
-		  {.suffix = "settings",
-		   .script = text_precision_settings_gp,
-		   .width = 1000,
-		   .height = 560,
-		   .data = {&precision_force_table, "triangles", "triangles=2208"},
-		   .more = {&precision_grid_table, "name"}},
-		  {.suffix = "squares",
-		   .script = text_precision_squares_gp,
+		  {.suffix = "average",
+		   .script = text_precision_average_gp,
 		   .width = 900,
 		   .height = 560,
-		   .data = {&precision_square_table, "name", "failed="}}},
+		   .data = {&precision_force_table, "triangles", "triangles=2208"}}},
 };

@@ -10,16 +10,12 @@
  *
  *   lag       the time by which directions e that are off are late of what turns: e = -lag dn/dt
  *   ripple    of e, from tick to tick
- *
- * Then grids of heights of one mesh, with larger and smaller cells, next to the mesh.
  */
 #include <stdio.h>
 #include <incise/plan.h>
 #include "../../lib/base/vector.h"
-#include "../../lib/scene/heights.h"
-#include "../../lib/surface/surface.h"
 #include "../cli/file.h"
-#include "precision.h"
+#include "bench.h"
 
 #define RADIUS_MM 55.0 /* a neck's */
 #define KN_N_mm 0.14
@@ -35,7 +31,6 @@ struct error_row {
 	int cells; /* of the mesh, round the sphere; 0: a sphere */
 	const char *arithmetic;
 	int average_ticks;
-	bool cap; /* its upper part only */
 
 	int triangles;
 	double rms_N, largest_N, contact; /* over ticks in contact */
@@ -81,14 +76,14 @@ const struct bench_table precision_force_table = {
 			   "ripple of {average_ticks} ticks", "triangles=2208")},
 };
 
-/* A sphere below the origin, of cells by degrees of latitude and longitude, or its upper quarter. */
-static struct memory_file sphere_of(int cells, bool whole, int *triangles)
+/* A sphere below the origin, of cells by degrees of latitude and longitude. */
+static struct memory_file sphere_of(int cells, int *triangles)
 {
 	struct memory_file file = memory_file_begin("sphere");
-	int rings = cells / 2, most = whole ? rings - 1 : rings / 4;
+	int rings = cells / 2;
 
 	fprintf(file.file, "v 0 0 0\n");
-	for (int r = 1; r <= most; r++)
+	for (int r = 1; r < rings; r++)
 		for (int c = 0; c < cells; c++) {
 			double a = M_PI * r / rings, b = 2 * M_PI * c / cells;
 
@@ -101,16 +96,15 @@ static struct memory_file sphere_of(int cells, bool whole, int *triangles)
 		int next = (c + 1) % cells, last = (rings - 2) * cells + 2;
 
 		fprintf(file.file, "f 1 %d %d\n", c + 2, next + 2);
-		for (int r = 0; r < most - 1; r++)
+		for (int r = 0; r < rings - 2; r++)
 			fprintf(file.file, "f %d %d %d\nf %d %d %d\n", r * cells + 2 + c,
 				(r + 1) * cells + 2 + c, (r + 1) * cells + 2 + next,
 				r * cells + 2 + c, (r + 1) * cells + 2 + next,
 				r * cells + 2 + next);
-		if (whole)
-			fprintf(file.file, "f %d %d %d\n", last + next, last + c,
-				(rings - 1) * cells + 2);
+		fprintf(file.file, "f %d %d %d\n", last + next, last + c,
+			(rings - 1) * cells + 2);
 	}
-	*triangles = cells * (2 * most - !whole);
+	*triangles = 2 * cells * (rings - 1);
 	memory_file_written(&file);
 	return file;
 }
@@ -237,7 +231,7 @@ static void prepare(struct error_row *row)
 
 	fprintf(scene.file, "arithmetic = \"%s\";\n", row->arithmetic);
 	if (row->cells) {
-		mesh = sphere_of(row->cells, !row->cap, &row->triangles);
+		mesh = sphere_of(row->cells, &row->triangles);
 		fprintf(scene.file, "surface = { kind = \"mesh\"; file = \"%s\"; };\n",
 			mesh.path);
 	} else {
@@ -260,146 +254,6 @@ static void prepare(struct error_row *row)
 		fclose(mesh.file);
 }
 
-/* --- heights of a mesh ---------------------------------------------------------------------- */
-
-#define HEIGHTS_CELLS 192
-#define LEAVE_MM 0.2
-#define REACH_MM 4
-
-static struct grid_row {
-	const char *name;
-	double wanted_mm; /* bound of the depth; 0: the mesh itself */
-
-	double cell_mm, bound_mm, reach_mm, depth_mm, normal_rad, force_N, kB;
-	struct harness_time time; /* of a place */
-	char failed[200];
-	const struct incise_surface *mesh;
-	struct incise_heights heights;
-	struct incise_fixed_grid grid;
-} grids[] = {{"mesh", 0},    {"grid", 0.3},  {"grid", 0.1},  {"grid", 0.05},
-	     {"grid", 0.03}, {"grid", 0.01}, {"grid", 0.007}};
-
-const struct bench_table precision_grid_table = {
-	.key = "heights",
-	.row_bytes = sizeof(struct grid_row),
-	.failed_after = 3,
-	.columns = {COLUMN(grid_row, "name", name, "%14s", "surface"),
-		    COLUMN(grid_row, "wanted_mm", wanted_mm, "%9g", "asked, mm",
-			   .optional = true),
-		    COLUMN(grid_row, "cell_mm", cell_mm, "%8.3g", "cell, mm",
-			   .optional = true),
-		    COLUMN(grid_row, "bound_mm", bound_mm, "%9.2g", "bound, mm",
-			   .optional = true),
-		    COLUMN(grid_row, "reach_mm", reach_mm, "%8.2g", "to, mm"),
-		    COLUMN(grid_row, "depth_error_mm", depth_mm, "%9.2g", "depth, mm"),
-		    COLUMN(grid_row, "normal_error_rad", normal_rad, "%11.2g",
-			   "normal, rad"),
-		    COLUMN(grid_row, "force_error_N", force_N, "%9.2g", "force, N"),
-		    COLUMN(grid_row, "size_kB", kB, "%8.1f", "kB", .optional = true),
-		    QUANTILES(grid_row, "ns", time, "%8.1f"),
-		    COLUMN(grid_row, "failed", failed)},
-	.metrics = {METRIC(TIME, grid_row, time, "ns", "{name} of heights, {wanted_mm}"),
-		    METRIC(EXACT, grid_row, force_N, "N",
-			   "error of heights, {name} {wanted_mm}")},
-};
-
-/* Depth and normal at all places of the way; errors where it is in the tissue and in reach. */
-static void go_over(struct grid_row *row, bool errors)
-{
-	struct incise_proxy proxy;
-
-	incise_proxy_init(&proxy, row->mesh, LEAVE_MM);
-	for (int k = 0; k < TICKS; k++) {
-		struct incise_fixed_spot spot = {.depth = 0};
-		double p[3], n[3], out[3], force[3], depth_mm, off_mm;
-		int32_t at[3];
-
-		place(k / RATE_HZ, p);
-		for (int i = 0; i < 3; i++)
-			at[i] = (int32_t)lrint(ldexp(p[i], 16));
-		if (row->wanted_mm > 0)
-			incise_fixed_grid_nearest(&row->grid, at, &spot);
-		else
-			incise_proxy_move(&proxy, p);
-		if (!errors)
-			continue;
-		v3_add(out, p, RADIUS_MM, (const double[3]){0, 0, 1});
-		off_mm = RADIUS_MM - v3_length(out);
-		if (off_mm < DEEP_MM || off_mm > row->reach_mm)
-			continue;
-		v3_unit(out, out, 0);
-		v3_copy(n, proxy.touch.normal);
-		depth_mm = proxy.touch.depth_mm;
-		if (row->wanted_mm > 0) {
-			depth_mm = ldexp(spot.depth, -16);
-			for (int i = 0; i < 3; i++)
-				n[i] = ldexp(spot.normal[i], -30);
-		}
-		for (int i = 0; i < 3; i++)
-			force[i] = KN_N_mm * (depth_mm * n[i] - off_mm * out[i]);
-		v3_sub(out, n, out);
-		row->depth_mm = fmax(row->depth_mm, fabs(depth_mm - off_mm));
-		row->normal_rad = fmax(row->normal_rad, v3_length(out));
-		row->force_N = fmax(row->force_N, v3_length(force));
-	}
-}
-
-static void run_places(void *context)
-{
-	go_over(context, false);
-}
-
-static void prepare_grid(struct grid_row *row, const struct incise_surface *mesh)
-{
-	struct incise_heights *h = &row->heights;
-	struct incise_error err = {0};
-	uint32_t bytes;
-
-	row->mesh = mesh;
-	row->reach_mm = REACH_MM;
-	if (row->wanted_mm > 0) {
-		if (incise_heights_make(mesh, (const double[3]){0, 0, 1}, LEAVE_MM,
-					REACH_MM, row->wanted_mm, h, &err))
-			cli_fail_with(&err);
-		bytes = 4 * (uint32_t)h->frame.columns * (uint32_t)h->frame.rows;
-		row->kB = bytes * 1e-3;
-		row->cell_mm = ldexp(1, h->frame.cell_shift - 16);
-		row->bound_mm = h->depth_bound_mm;
-		row->reach_mm = ldexp(h->frame.reach, -16);
-		if (incise_fixed_grid_open(&row->grid, &h->frame, h->height, bytes))
-			cli_fail("heights: a grid is not valid");
-		if (row->bound_mm > row->wanted_mm)
-			snprintf(
-				row->failed, sizeof(row->failed),
-				"no cell is within it: the bound is %.2g mm, of cells of "
-				"%.2g mm",
-				row->bound_mm, row->cell_mm);
-	}
-	go_over(row, true);
-}
-
-static void measure_heights(struct bench_run *run)
-{
-	struct error_row of = {"mesh", HEIGHTS_CELLS, "double", 1, .cap = true};
-	int n = run->quick ? N(grids) - 2 : N(grids);
-
-	prepare(&of);
-	for (int i = 0; i < n; i++)
-		prepare_grid(&grids[i], incise_plan_surface(of.plan));
-	bench_times(&precision_grid_table, grids, n, run_places, TICKS, REPEATS(run));
-	bench_text(
-		run,
-		"a mesh of that sphere, %d triangles, and its grids of heights: cells by the "
-		"bound that is asked for; largest errors, and run time of a place\n",
-		of.triangles);
-	bench_table(run, &precision_grid_table, grids, n);
-	bench_text(run, "\n");
-	for (int i = 0; i < n; i++)
-		incise_heights_free(&grids[i].heights);
-	incise_plan_free(of.plan);
-	incise_scene_free(of.scene);
-}
-
 void precision_forces(struct bench_run *run)
 {
 	int n = run->quick ? N(rows) - 2 : N(rows);
@@ -420,5 +274,4 @@ void precision_forces(struct bench_run *run)
 		incise_plan_free(rows[i].plan);
 		incise_scene_free(rows[i].scene);
 	}
-	measure_heights(run);
 }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench precision: error against run time of what has a setting.
+ * Error against run time of what has a setting.
  *
+ *   heights    a mesh, and grids of its heights by the size of a cell, compared with the sphere that both
+ *              stand for
  *   trackers   the predictor's error, and the stiffest wall, by rate, latency and damping
  *   squares    least squares of training by QR and by an exact Gram matrix, on rules that overlap more
  *              and more
@@ -13,15 +15,210 @@
 #include <string.h>
 #include <incise/plan.h>
 #include "../../lib/base/random.h"
+#include "../../lib/base/vector.h"
 #include "../../lib/control/pose_loop.h"
 #include "../../lib/learn/gram.h"
+#include "../../lib/scene/heights.h"
 #include "../../lib/scene/rest.h"
-#include "../cli/stopwatch.h"
-#include "noise.h"
-#include "precision.h"
-#include "stability.h"
+#include "../../lib/surface/surface.h"
+#include "../../tools/bench/noise.h"
+#include "../../tools/bench/stability.h"
+#include "../../tools/cli/file.h"
+#include "../../tools/cli/stopwatch.h"
+#include "program.h"
 
 #define REPEATS(run) ((run)->quick ? 5 : 31)
+
+/* --- heights of a mesh ---------------------------------------------------------------------- */
+
+#define RADIUS_MM 55.0
+#define HALF_MM 30.0
+#define CELLS 33 /* of the mesh, along each side */
+#define PLACES 4000
+#define K_N_mm 0.14
+#define LEAVE_MM 0.2
+#define REACH_MM 4
+#define DEEP_MM 0.5
+
+static struct grid_row {
+	const char *name;
+	double wanted_mm; /* bound of the depth; 0: the mesh itself */
+
+	double cell_mm, bound_mm, reach_mm, depth_mm, normal_rad, force_N, kB;
+	struct harness_time time; /* of a place */
+	char failed[200];
+	const struct incise_surface *mesh;
+	struct incise_heights heights;
+	struct incise_fixed_grid grid;
+} grids[] = {{"mesh", 0},    {"grid", 0.3},  {"grid", 0.1},  {"grid", 0.05},
+	     {"grid", 0.03}, {"grid", 0.01}, {"grid", 0.007}};
+
+static const struct bench_table grid_table = {
+	.key = "heights",
+	.row_bytes = sizeof(struct grid_row),
+	.failed_after = 3,
+	.columns = {COLUMN(grid_row, "name", name, "%14s", "surface"),
+		    COLUMN(grid_row, "wanted_mm", wanted_mm, "%9g", "asked, mm",
+			   .optional = true),
+		    COLUMN(grid_row, "cell_mm", cell_mm, "%8.3g", "cell, mm",
+			   .optional = true),
+		    COLUMN(grid_row, "bound_mm", bound_mm, "%9.2g", "bound, mm",
+			   .optional = true),
+		    COLUMN(grid_row, "reach_mm", reach_mm, "%8.2g", "to, mm"),
+		    COLUMN(grid_row, "depth_error_mm", depth_mm, "%9.2g", "depth, mm"),
+		    COLUMN(grid_row, "normal_error_rad", normal_rad, "%11.2g",
+			   "normal, rad"),
+		    COLUMN(grid_row, "force_error_N", force_N, "%9.2g", "force, N"),
+		    COLUMN(grid_row, "size_kB", kB, "%8.1f", "kB", .optional = true),
+		    QUANTILES(grid_row, "ns", time, "%8.1f"),
+		    COLUMN(grid_row, "failed", failed)},
+	.metrics = {METRIC(TIME, grid_row, time, "ns", "{name} of heights, {wanted_mm}"),
+		    METRIC(EXACT, grid_row, force_N, "N",
+			   "error of heights, {name} {wanted_mm}")},
+};
+
+/* The top of the sphere, as a sheet. */
+static struct memory_file cap(void)
+{
+	struct memory_file file = memory_file_begin("cap");
+	const int side = CELLS + 1;
+
+	for (int k = 0; k < side * side; k++) {
+		double x = HALF_MM * (2.0 * (k % side) / CELLS - 1);
+		double y = HALF_MM * (2.0 * (k / side) / CELLS - 1);
+
+		fprintf(file.file, "v %.9f %.9f %.9f\n", x, y,
+			sqrt(RADIUS_MM * RADIUS_MM - x * x - y * y) - RADIUS_MM);
+	}
+	for (int k = 0; k < CELLS * CELLS; k++) {
+		int a = k / CELLS * side + k % CELLS + 1;
+
+		fprintf(file.file, "f %d %d %d\nf %d %d %d\n", a, a + 1, a + side + 1, a,
+			a + side + 1, a + side);
+	}
+	memory_file_written(&file);
+	return file;
+}
+
+/* In off the top, and round: 3 mm deep, 24 mm to and fro. */
+static void place(double t_s, double p[3])
+{
+	double n[3] = {0.2 * sin(2 * M_PI * 0.9 * t_s) + 0.05,
+		       0.04 * sin(2 * M_PI * 1.7 * t_s), 1};
+	double out_mm = 1 - 4 * pow(sin(M_PI * 0.5 * t_s), 2);
+
+	v3_copy(p, (double[3]){0, 0, -RADIUS_MM});
+	v3_add(p, p, (RADIUS_MM + out_mm) / v3_length(n), n);
+}
+
+/* Depth and normal at all places of the way; errors where it is in the tissue and in reach. */
+static void go_over(struct grid_row *row, bool errors)
+{
+	struct incise_proxy proxy;
+
+	incise_proxy_init(&proxy, row->mesh, LEAVE_MM);
+	for (int k = 0; k < PLACES; k++) {
+		struct incise_fixed_spot spot = {.depth = 0};
+		double p[3], n[3], out[3], force[3], depth_mm, off_mm;
+		int32_t at[3];
+
+		place(k * PERIOD_S, p);
+		for (int i = 0; i < 3; i++)
+			at[i] = (int32_t)lrint(ldexp(p[i], 16));
+		if (row->wanted_mm > 0)
+			incise_fixed_grid_nearest(&row->grid, at, &spot);
+		else
+			incise_proxy_move(&proxy, p);
+		if (!errors)
+			continue;
+		v3_add(out, p, RADIUS_MM, (const double[3]){0, 0, 1});
+		off_mm = RADIUS_MM - v3_length(out);
+		if (off_mm < DEEP_MM || off_mm > row->reach_mm)
+			continue;
+		v3_unit(out, out, 0);
+		v3_copy(n, proxy.touch.normal);
+		depth_mm = proxy.touch.depth_mm;
+		if (row->wanted_mm > 0) {
+			depth_mm = ldexp(spot.depth, -16);
+			for (int i = 0; i < 3; i++)
+				n[i] = ldexp(spot.normal[i], -30);
+		}
+		for (int i = 0; i < 3; i++)
+			force[i] = K_N_mm * (depth_mm * n[i] - off_mm * out[i]);
+		v3_sub(out, n, out);
+		row->depth_mm = fmax(row->depth_mm, fabs(depth_mm - off_mm));
+		row->normal_rad = fmax(row->normal_rad, v3_length(out));
+		row->force_N = fmax(row->force_N, v3_length(force));
+	}
+}
+
+static void run_places(void *context)
+{
+	go_over(context, false);
+}
+
+static void prepare_grid(struct grid_row *row, const struct incise_surface *mesh)
+{
+	struct incise_heights *h = &row->heights;
+	struct incise_error err = {0};
+	uint32_t bytes;
+
+	row->mesh = mesh;
+	row->reach_mm = REACH_MM;
+	if (row->wanted_mm > 0) {
+		if (incise_heights_make(mesh, (const double[3]){0, 0, 1}, LEAVE_MM,
+					REACH_MM, row->wanted_mm, h, &err))
+			cli_fail_with(&err);
+		bytes = 4 * (uint32_t)h->frame.columns * (uint32_t)h->frame.rows;
+		row->kB = bytes * 1e-3;
+		row->cell_mm = ldexp(1, h->frame.cell_shift - 16);
+		row->bound_mm = h->depth_bound_mm;
+		row->reach_mm = ldexp(h->frame.reach, -16);
+		if (incise_fixed_grid_open(&row->grid, &h->frame, h->height, bytes))
+			cli_fail("heights: a grid is not valid");
+		if (row->bound_mm > row->wanted_mm)
+			snprintf(
+				row->failed, sizeof(row->failed),
+				"no cell is within it: the bound is %.2g mm, of cells of "
+				"%.2g mm",
+				row->bound_mm, row->cell_mm);
+	}
+	go_over(row, true);
+}
+
+static void measure_heights(struct bench_run *run)
+{
+	const struct incise_tracker_info tracker = {.rate_hz = 1000};
+	struct memory_file mesh = cap(), file = memory_file_begin("cap.scene");
+	struct incise_error err = {0};
+	struct incise_scene *scene;
+	struct incise_plan *plan;
+	int n = run->quick ? N(grids) - 2 : N(grids);
+
+	fprintf(file.file,
+		"surface = { kind = \"mesh\"; file = \"%s\"; };\n"
+		"tissue = { reaction_N_mm = 0.001; };\narithmetic = \"double\";\n",
+		mesh.path);
+	memory_file_written(&file);
+	scene = cli_require(incise_scene_load(file.path, NULL, &err), &err);
+	plan = cli_require(incise_plan_new_fed(scene, &tracker, &err), &err);
+	for (int i = 0; i < n; i++)
+		prepare_grid(&grids[i], incise_plan_surface(plan));
+	bench_times(&grid_table, grids, n, run_places, PLACES, REPEATS(run));
+	bench_text(
+		run,
+		"a mesh of a sphere of %g mm, %d triangles, and its grids of heights: cells "
+		"by the bound that is asked for; largest errors, and run time of a place\n",
+		RADIUS_MM, 2 * CELLS * CELLS);
+	bench_table(run, &grid_table, grids, n);
+	bench_text(run, "\n");
+	for (int i = 0; i < n; i++)
+		incise_heights_free(&grids[i].heights);
+	incise_plan_free(plan);
+	incise_scene_free(scene);
+	fclose(mesh.file);
+	fclose(file.file);
+}
 
 /* --- trackers ----------------------------------------------------------------------------- */
 
@@ -168,7 +365,7 @@ struct square_row {
 	double a[PAIRS][UNKNOWNS], t[PAIRS];
 };
 
-const struct bench_table precision_square_table = {
+static const struct bench_table square_table = {
 	.key = "squares",
 	.row_bytes = sizeof(struct square_row),
 	.failed_after = 3,
@@ -272,13 +469,13 @@ static void measure_squares(struct bench_run *run)
 		rows[i].width = widths[i / 2];
 		measure_square(&rows[i]);
 	}
-	bench_times(&precision_square_table, rows, N(rows), run_squares, 1, REPEATS(run));
+	bench_times(&square_table, rows, N(rows), run_squares, 1, REPEATS(run));
 	bench_text(
 		run,
 		"least squares of training, %d pairs and %d rules: membership functions of a "
 		"width, of the range; error of the unknowns, relative, and of the force\n",
 		PAIRS, MFS);
-	bench_table(run, &precision_square_table, rows, N(rows));
+	bench_table(run, &square_table, rows, N(rows));
 	bench_text(run, "\n");
 }
 
@@ -455,9 +652,19 @@ static void measure_leans(struct bench_run *run)
 	bench_table(run, &lean_table, leans, N(leans));
 }
 
-void precision_settings(struct bench_run *run)
+static void run_settings(struct bench_run *run)
 {
+	run->tabs = false; /* its tables have headings */
+	measure_heights(run);
 	measure_trackers(run);
 	measure_squares(run);
 	measure_leans(run);
 }
+
+const struct bench bench_program = {
+	.name = "settings",
+	.summary =
+		"error against run time of what has a setting: heights of meshes, trackers, "
+		"least squares, leans of the search for swings",
+	.run = run_settings,
+};
