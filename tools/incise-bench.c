@@ -22,8 +22,8 @@ static const struct cli_option options[] = {
 	 "report significant changes since an older report of --json",
 	 CLI_INPUT(struct bench_run, against)},
 	{0, "plot", "NAME",
-	 "plot error over run time as NAME.png and NAME.svg; stability: NAME-map, "
-	 "-rest, -integrators; loop: NAME-wakeups",
+	 "plot error over run time as NAME.png and NAME.svg; precision: NAME-average, "
+	 "too; stability: NAME-map, -rest, -integrators; loop: NAME-wakeups",
 	 CLI_OUTPUTS(struct bench_run, plot)},
 	{0, "duration", "TIME",
 	 "loop: of each measurement of wake-up latency (default: 5s)",

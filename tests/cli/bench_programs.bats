@@ -50,6 +50,38 @@ quick_program() {
 }
 
 # bats test_tags=slow
+@test "settings: error and run time of grids of heights, trackers, least squares and leans" {
+	quick_program settings
+	holds "$(of heights 'count(*)' "name = 'grid' AND failed IS NULL") >= 4"
+	# within the sagitta of the mesh and the certified bound, which is the one that was asked for
+	mesh=$(of heights depth_error_mm "name = 'mesh'")
+	[ "$(of heights 'max(depth_error_mm > bound_mm + 1.01 * '$mesh' OR bound_mm > wanted_mm)' "name = 'grid'")" = 0 ]
+	# bilinear: half a cell has a quarter of the error, here of the force of a normal and a depth
+	holds "$(of heights depth_error_mm 'cell_mm = 4') > 2.5 * $(of heights depth_error_mm 'cell_mm = 2')"
+	holds "$(of heights size_kB 'cell_mm = 2') > 3 * $(of heights size_kB 'cell_mm = 4')"
+	holds "$(of heights 'min(ns)') > 0"
+	# a prediction is better than none; later poses are worse, for the wall too
+	holds "$(of trackers 'max(rms_error_mm / held_rms_mm)') < 0.2"
+	khz="rate_hz = 1000 AND latency_ms"
+	for key in limit_5_N_mm limit_20_N_mm limit_100_N_mm; do
+		holds "$(of trackers $key "$khz = 20") < $(of trackers $key "$khz = 4.2") / 2"
+	done
+	holds "$(of trackers 'max(limit_5_N_mm / limit_20_N_mm)') < 0.5"
+	# both lose the digits of the condition, until nothing is left
+	holds "$(of squares 'max(unknowns_error / condition)' "name = 'QR'") < 1e-15"
+	holds "$(of squares 'max(unknowns_error / condition)' "name = 'Gram, exact'") < 1e-14"
+	holds "$(of squares 'max(unknowns_error)') > 0.01"
+	holds "$(of squares 'max(max_error_N)') < 1e-13"
+	[ "$(of squares 'count(*)' "(us IS NULL) <> (failed LIKE 'singular%')")" = 0 ]
+	[ "$(of squares failed "name <> 'QR' AND width = 2")" = "singular to its roundings" ]
+	# a part of the ways finds a part
+	holds "$(of leans missed "name = 'all'") <= $(of leans 'min(missed)')"
+	holds "$(of leans refused "name = 'all'") >= $(of leans 'max(refused)')"
+	holds "$(of leans leans "name = 'all'") > $(of leans leans "name = 'first way'")"
+	holds "$(of leans ms "name = 'all'") > 0"
+}
+
+# bats test_tags=slow
 @test "integers: the shipped scenes are within what is certified" {
 	quick_program integers
 	[ "$(of rows 'group_concat(name)')" = liver,neck,wall ]

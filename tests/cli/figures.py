@@ -32,7 +32,7 @@ DESCENDS = set("gjpqy,;()[]{}|_Q/µ@$")
 # its ink at either end; gnuplot rounds positions to 0.01 px.
 TOLERANCE_PX = 0.5
 
-UNITS = (r"1|µm|mm|px|s|ms|µs|ns|N|mN|mV|Hz|kHz|%|texel|SD|\(mm/s\)|\(N/m\)|\(N/mm\)|\(mV/N\)|"
+UNITS = (r"1|µm|mm|px|mrad|s|ms|µs|ns|N|mN|mV|Hz|kHz|%|texel|SD|\(mm/s\)|\(N/m\)|\(N/mm\)|\(mV/N\)|"
          r"\(mm/s²\)|\(mN s/mm\)|\(N s/mm\)|\(mm/px\)|°")
 LABEL = re.compile(r".*[^ ] / (%s)" % UNITS)
 NUMBER = re.compile(r"[−-]?[\d.]+")

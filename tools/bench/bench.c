@@ -100,9 +100,13 @@ static const struct bench_column *column_of(const struct bench_table *table,
 	cli_fail("%.*s: no such column", (int)length, key);
 }
 
+/* NULL of a table in which no row fails. */
 static const char *failed_of(const struct bench_table *table, const void *row)
 {
-	return text_of(column_of(table, "failed", strlen("failed")), row);
+	for (const struct bench_column *c = table->columns; c->key || c->heading; c++)
+		if (c->key && !strcmp(c->key, "failed"))
+			return text_of(c, row);
+	return NULL;
 }
 
 /* "KEY=TEXT,KEY!=TEXT|TEXT" */
@@ -248,19 +252,22 @@ static void expand(const struct bench_table *table, const void *row, const char 
 	text[n] = 0;
 }
 
-void bench_failures(const struct bench_run *run, const struct bench_table *table,
-		    const void *rows, int n, const char *template)
+void bench_times(const struct bench_table *table, void *rows, int n,
+		 void (*run)(void *row), double units, int turns)
 {
-	char text[TEXT_BYTES];
+	struct harness_variant *variants = cli_alloc(n, sizeof(*variants));
 
-	for (int i = 0; i < n && prints_text(run); i++) {
-		const void *row = row_at(table, rows, i);
+	for (int i = 0; i < n; i++) {
+		char *row = (char *)rows + (size_t)i * table->row_bytes;
 
-		if (!failed_of(table, row))
-			continue;
-		expand(table, row, template, text, sizeof(text));
-		printf("%s: %s\n", text, failed_of(table, row));
+		variants[i] = (struct harness_variant){
+			.run = run,
+			.context = row,
+			.units = failed_of(table, row) ? 0 : units,
+			.time = (void *)(row + table->metrics[0].offset)};
 	}
+	harness_times(variants, n, turns);
+	free(variants);
 }
 
 /* --- JSON and metrics --- */

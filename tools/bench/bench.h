@@ -66,6 +66,12 @@ struct bench_column {
 		.key = key_, BENCH_MEMBER(row, member), __VA_ARGS__ \
 	}
 
+/* QUANTILES(row, "ns", time, "%8.1f"): the median, and the 5th and 95th percentile, of a harness_time. */
+#define QUANTILES(row, key_, member, format_, ...)                                  \
+	COLUMN(row, key_, member.ns.median, format_, key_, __VA_ARGS__),            \
+		COLUMN(row, key_ "_p5", member.ns.p5, format_, "5 %", __VA_ARGS__), \
+		COLUMN(row, key_ "_p95", member.ns.p95, format_, "95 %", __VA_ARGS__)
+
 /* A metric of each row. Its name is a template of keys, "{name}, {drift_ppm:%+g} ppm". */
 struct bench_metric {
 	enum metric_kind kind;
@@ -122,10 +128,10 @@ struct bench_plot {
 	struct bench_data data, more;
 };
 
-extern const char text_loop_wakeups_gp[], text_precision_gp[], text_scenes_gp[],
-	text_stability_integrators_gp[], text_stability_map_gp[],
-	text_stability_rest_gp[], text_training_gp[], text_view_gp[],
-	text_view_frames_gp[];
+extern const char text_loop_wakeups_gp[], text_precision_gp[],
+	text_precision_average_gp[], text_scenes_gp[], text_stability_integrators_gp[],
+	text_stability_map_gp[], text_stability_rest_gp[], text_training_gp[],
+	text_view_gp[], text_view_frames_gp[];
 
 struct bench_run;
 
@@ -140,6 +146,10 @@ struct bench {
 
 extern const struct bench bench_loop, bench_precision, bench_scenes, bench_stability,
 	bench_training;
+
+/* A part of bench_precision. */
+void precision_forces(struct bench_run *run);
+extern const struct bench_table precision_force_table;
 
 /* --- a run --- */
 
@@ -195,9 +205,10 @@ void bench_rows(struct bench_run *run, const struct bench_table *table, const vo
 void bench_lines(const struct bench_run *run, const struct bench_table *table,
 		 const void *rows, int n);
 
-/* A line of text for each row that failed: a template as of a metric's name, and the reason. */
-void bench_failures(const struct bench_run *run, const struct bench_table *table,
-		    const void *rows, int n, const char *template);
+/* Time rows in turns: run() does so many units. The time is that of the table's first metric; rows
+ * that failed are left out. */
+void bench_times(const struct bench_table *table, void *rows, int n,
+		 void (*run)(void *row), double units, int turns);
 
 /* After the report fail the program with this line; the first one counts. */
 void bench_fail(struct bench_run *run, const char *fmt, ...) INCISE_PRINTF(2, 3);

@@ -127,7 +127,7 @@ static void load_own(const struct own *own, struct tick_row *row)
 
 	cli_progress("%s", own->name);
 	if (own->cells)
-		sheet = sheet_of_waves(own->cells);
+		sheet = sheet_of_waves(own->cells, false);
 	scene = write_scene(own, sheet.path, 1000);
 	row->name = own->name;
 	row->triangles = 2 * (size_t)own->cells * own->cells;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * incise bench precision: error against run time of the evaluators of one model, the plainest
- * and another project's among them, over the same points.
+ * and another project's among them, over the same points; then of forces.
  */
 #include <dlfcn.h>
 #include <stdio.h>
@@ -403,29 +403,6 @@ static void run_timed(void *context)
 	row->run(row, row->timed);
 }
 
-static void measure_times(struct evaluators *all, const struct points *points,
-			  int repeats)
-{
-	struct harness_variant variants[ROWS_MAX] = {{0}};
-	struct points timed = *points;
-
-	timed.n = TIMED_POINTS;
-	for (int i = 0; i < all->n; i++) {
-		all->row[i].timed = &timed;
-		variants[i] = (struct harness_variant){
-			.run = run_timed,
-			.context = &all->row[i],
-			.units = isnan(all->row[i].max_error) ? 0 : TIMED_POINTS,
-			.time = &all->row[i].time,
-		};
-	}
-	harness_times(variants, all->n, repeats);
-	/* The reference is the last one. */
-	for (struct row *row = all->row; row < all->row + all->n; row++)
-		row->times_reference =
-			all->row[all->n - 1].time.ns.median / row->time.ns.median;
-}
-
 /* Paper 1's shape with a force surface of its kind. */
 static struct incise_model *own_model(struct incise_error *err)
 {
@@ -450,11 +427,10 @@ static struct incise_model *own_model(struct incise_error *err)
 
 static const struct bench_table rows_table = {
 	.key = "rows",
+	.failed_after = 1,
 	.row_bytes = sizeof(struct row),
 	.columns = {COLUMN(row, "name", name, "%-18s", "evaluator"),
-		    COLUMN(row, "ns", time.ns.median, "%9.1f", "median ns"),
-		    COLUMN(row, "ns_p5", time.ns.p5, "%8.1f", "5 %"),
-		    COLUMN(row, "ns_p95", time.ns.p95, "%8.1f", "95 %"),
+		    QUANTILES(row, "ns", time, "%8.1f"),
 		    COLUMN(row, "max_error_N", max_error, "%11.3g", "largest / N"),
 		    COLUMN(row, "rms_error_N", rms_error, "%11.3g", "rms / N"),
 		    COLUMN(row, "bound_N", bound, "%11.3g", "bound / N"),
@@ -479,13 +455,21 @@ static void run(struct bench_run *run)
 			    &err);
 	int repeats = run->quick ? QUICK_REPEATS : REPEATS;
 	struct plain *plain = plain_new(model);
-	struct points points;
+	struct points points, timed;
 
 	add_all(all, model, plain);
 	points_init(&points, model, plain, run->quick ? TIMED_POINTS : POINTS);
 	for (int i = 0; i < all->n; i++)
 		measure_error(&all->row[i], &points);
-	measure_times(all, &points, repeats);
+	timed = points;
+	timed.n = TIMED_POINTS;
+	for (int i = 0; i < all->n; i++)
+		all->row[i].timed = &timed;
+	bench_times(&rows_table, all->row, all->n, run_timed, TIMED_POINTS, repeats);
+	/* The reference is the last one. */
+	for (struct row *row = all->row; row < all->row + all->n; row++)
+		row->times_reference =
+			all->row[all->n - 1].time.ns.median / row->time.ns.median;
 
 	bench_values(run, "{so si si si ss?}", "model",
 		     json_text(incise_model_info(model)->name), "rules",
@@ -502,7 +486,7 @@ static void run(struct bench_run *run)
 		   all->reference_version ? all->reference_version : "");
 	bench_table(run, &rows_table, all->row, all->n);
 	bench_text(run, "\n");
-	bench_failures(run, &rows_table, all->row, all->n, "{name}");
+	precision_forces(run);
 }
 
 const struct bench bench_precision = {
@@ -514,5 +498,11 @@ const struct bench bench_precision = {
 	.plots = {{.script = text_precision_gp,
 		   .width = 1000,
 		   .height = 720,
-		   .data = {&rows_table, "kind", "failed="}}},
+		   .data = {&rows_table, "kind", "failed="},
+		   .more = {&rows_table, "name,failed", "failed!=,peer=1"}},
+		  {.suffix = "average",
+		   .script = text_precision_average_gp,
+		   .width = 900,
+		   .height = 560,
+		   .data = {&precision_force_table, "triangles", "triangles=2208"}}},
 };

@@ -275,9 +275,9 @@ static void add_shipped(struct scenes *s)
 	"radius_mm = 50.0; };\n"
 #define DOUBLE "arithmetic = \"double\";\n"
 #define REACTION "tissue = { reaction_N_mm = 0.14; };\n"
-#define FORCES                                                                  \
-	"tissue = { reaction_N_mm = 0.14; friction = 0.1; plane_N_mm = 0.17;\n" \
-	"  damping_N_s_mm = 0.0005; insertion_N_mm = 0.28; aligned = 0.2;\n"    \
+#define FORCES                                                                              \
+	"tissue = { gain = 0.5; reaction_N_mm = 0.14; friction = 0.1; plane_N_mm = 0.17;\n" \
+	"  damping_N_s_mm = 0.0005; insertion_N_mm = 0.28; aligned = 0.2;\n"                \
 	"  spread_N_mm = 0.22; skin_friction = 0.1; };\n"
 /*
  * All that is no force: the membrane lies below the sphere's top and the sheet's waves, and is so small
@@ -312,7 +312,7 @@ static void add_made(struct scenes *s)
 
 		file[0] = memory_file_begin(made[i].name);
 		if (strchr(made[i].text, '%'))
-			file[1] = sheet_of_waves(100);
+			file[1] = sheet_of_waves(100, false);
 		fprintf(file[0].file, made[i].text, file[1].path);
 		if (made[i].all)
 			fputs(FORCES EFFECTS, file[0].file);

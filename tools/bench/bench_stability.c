@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
  * incise bench stability: how stiff a virtual wall may be, simulated in time next to what
- * theory says; learned models under a leaning hand; error against run time of forces and of
- * integrators of a stiff spring. The device is light, in a loop of 1 kHz.
+ * theory says; scenes under a leaning hand; error against run time of integrators of
+ * a stiff spring. The device is light, in a loop of 1 kHz.
  */
 #include <stdio.h>
 #include <string.h>
@@ -495,7 +495,6 @@ static void run(struct bench_run *run)
 	report_ratios(run);
 	add_curves(run);
 	stability_rest(run);
-	stability_error(run);
 	stability_integrators(run);
 }
 
@@ -503,8 +502,8 @@ const struct bench bench_stability = {
 	.name = "stability",
 	.operands = "[MODEL.fis]",
 	.n_operands = 1,
-	.summary = "stability limits, simulated and computed; learned "
-		   "models; forces; integrators",
+	.summary = "stability limits, simulated and computed; scenes at rest; "
+		   "integrators",
 	.run = run,
 	.plots = {{.suffix = "map",
 		   .script = text_stability_map_gp,
@@ -517,7 +516,7 @@ const struct bench bench_stability = {
 		   .script = text_stability_rest_gp,
 		   .width = 900,
 		   .height = 560,
-		   .data = {&stability_rest_table, "verdict"}},
+		   .data = {&stability_rest_table, "force"}},
 		  {.suffix = "integrators",
 		   .script = text_stability_integrators_gp,
 		   .width = 1000,

@@ -321,21 +321,12 @@ static void run_timed(void *context)
 
 static void measure(struct training *t)
 {
-	struct harness_variant variants[ROWS_MAX];
-
 	for (int i = 0; i < t->n; i++) {
 		cli_progress("training: %s", t->row[i].name);
 		for (int s = 0; s < t->seeds; s++)
 			measure_error(t, &t->row[i], s);
 		t->row[i].timed = &t->data[0];
-		variants[i] = (struct harness_variant){
-			.run = run_timed,
-			.context = &t->row[i],
-			.units = 1,
-			.time = &t->row[i].time,
-		};
 	}
-	harness_times(variants, t->n, t->repeats);
 }
 
 /* --- scikit-learn on the same data, in a process of its own; it is not installed --- */
@@ -482,6 +473,7 @@ static void run(struct bench_run *run)
 	make_unseen(t->unseen);
 	add_all(t, run->quick);
 	measure(t);
+	bench_times(&rows_table, t->row, t->n, run_timed, 1, t->repeats);
 	add_references(t);
 	for (int i = 0; i < t->n; i++) {
 		struct row *row = &t->row[i];

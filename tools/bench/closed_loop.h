@@ -8,7 +8,7 @@
  *                   ▲                                                    │
  *                   └──────────────── held for a tick ◀──────────────────┘
  *
- * Tissue is the plane z = 0; ticks are of 1 kHz.
+ * Guided along z on the plane z = 0, or free in three dimensions on any surface; ticks are of 1 kHz.
  */
 #ifndef INCISE_CLOSED_LOOP_H
 #define INCISE_CLOSED_LOOP_H
@@ -19,13 +19,22 @@
 /* Way of the device to and fro over the last quarter of a run that counts as a swing. */
 #define CLOSED_LOOP_SWING_MM 0.01
 
+/* Along the skin, of a free device: its mass, damping, and the spring to where it began. */
+struct closed_loop_hand {
+	double mass_kg, damping_N_s_mm, stiffness_N_mm;
+};
+
 struct closed_loop {
 	double mass_kg, damping_N_s_mm; /* of the device, which has no dry friction */
 	double tracker_hz, latency_s;
 	double noise_mm; /* sd of a pose's height, for the first 3/8 of a run; then none */
 	int late_ticks;	 /* of the actuator, 0 … 16 */
-	double lean_N, along_mm_s;
+	double lean_N, along_mm_s; /* along the skin: of a guided one */
 	double run_s;
+	/* Free: it leans on a place against the normal there, with this share along the skin. */
+	bool free;
+	double place_mm[3], normal[3], askew;
+	struct closed_loop_hand hand;
 };
 
 struct closed_loop_end {
@@ -36,6 +45,7 @@ struct closed_loop_end {
 	double largest_mm, largest_N; /* of all, to either side */
 	double shaken_mm; /* to and fro in the last eighth before the noise ends */
 	double depth_mm, force_N; /* at the end */
+	bool left; /* of a free one: it is far from where it leaned, as one that slid off a ball */
 };
 
 /* As the plan is to be told of it. */

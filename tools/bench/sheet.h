@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * A sheet of 2 mm waves as an OBJ file in memory, which is read as a user's would be.
+ * A sheet of 2 mm waves as an OBJ file, or a grid of heights, in memory, which is read as a user's would be.
  *
  *        _       _       _
  *      _/ \_   _/ \_   _/ \_    2 mm high, 8 mm long, along x and along y
@@ -9,9 +9,10 @@
 #ifndef INCISE_SHEET_H
 #define INCISE_SHEET_H
 
+#include <stdbool.h>
 #include "../cli/file.h"
 
 /* With so many cells of two triangles along each side. */
-struct memory_file sheet_of_waves(int cells);
+struct memory_file sheet_of_waves(int cells, bool grid);
 
 #endif

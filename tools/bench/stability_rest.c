@@ -1,365 +1,333 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench stability: does a scene with a learned model come to rest? Each case is a model, a
- * device, a tracker and an actuator: the plan accepts or refuses it, and a closed loop in time,
- * which knows nothing of the plan's own search, leans on it with and without noise.
+ * incise bench stability: does a scene come to rest? Each case is a surface, a force, a device, a
+ * tracker and an actuator, with a gain far too large: the plan refuses it and names one that it
+ * accepts. A closed loop in time, which knows nothing of the plan's own search, leans on both.
  *
- *              ┌─ accepted ──▶ leans: rests or swings            asked: none swings
- *   case ─▶ plan
- *              └─ refused ───▶ the same, as it is and twice as strong
- *                                                        asked: few would rest then
+ *                                 ┌─ that gain ──▶ accepted?  leans: rests or swings    asked: none swings
+ *   case ─▶ plan refuses, names ──┤
+ *                                 └─ twice that ─▶ leans: swings or rests               asked: few would rest
  *
- * A refused case runs on a plan made for a device that is damped well enough: a plan's ticks do not
+ * What is refused runs on a plan made for a device that is damped well enough: a plan's ticks do not
  * depend on the device.
  */
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include <incise/plan.h>
-#include "closed_loop.h"
-#include "../cli/child.h"
-#include "../cli/file.h"
-#include "../cli/folder.h"
+#include "../../lib/base/vector.h"
 #include "../cli/scene_argument.h"
+#include "../cli/stopwatch.h"
+#include "sheet.h"
 #include "stability.h"
-
-/* --- models --- */
-
-#define MODELS_MAX 6
-#define SEEDS 3 /* of other virtual livers */
-
-struct model {
-	char name[24];
-	char path[256]; /* compiled, so that a plan is made in little time */
-};
-
-static struct model models[MODELS_MAX];
-static int n_models;
-static char folder[200];
-
-static void run_program(const char *name, char *const argv[])
-{
-	char *program = cli_text("%s/incise-%s", cli_folder(), name),
-	     *all[24] = {program};
-	int n = 1;
-
-	while (argv[n - 1] && n < N(all) - 1) {
-		all[n] = argv[n - 1];
-		n++;
-	}
-	if (child_end(child_start(all, -1, STDERR_FILENO), 120))
-		cli_fail("incise %s, which makes a model for the bench, failed", name);
-	free(program);
-}
-
-#define RUN(name, ...) run_program(name, (char *const[]){__VA_ARGS__, NULL})
-
-static void add_model(const char *name, char *fis)
-{
-	struct model *model = &models[n_models++];
-
-	snprintf(model->name, sizeof(model->name), "%s", name);
-	snprintf(model->path, sizeof(model->path), "%s/%s.fx", folder, name);
-	/* Stiffer ones have a larger bound. */
-	RUN("compile", fis, "-o", model->path, "--budget", "10mN");
-	free(fis);
-}
-
-/* As in incise demo: cuts recorded, averaged and trained, of another seed. */
-static void train_model(int seed)
-{
-	char *rig = cli_text("sim:seed=%d,clock=simulated", seed), name[24];
-	char *rec = cli_text("%s/%d.rec", folder, seed);
-	char *pairs = cli_text("%s/%d.csv", folder, seed);
-	char *fis = cli_text("%s/%d.fis", folder, seed);
-
-	cli_progress("models: liver of seed %d", seed);
-	RUN("capture", "-o", rec, "--rig", rig, "--camera", "off", "--json");
-	RUN("export", rec, "-o", pairs, "--average", "12x10", "--by-cut", "--json");
-	RUN("train", pairs, "-o", fis, "--group", "cut", "--json");
-	snprintf(name, sizeof(name), "seed %d", seed);
-	add_model(name, fis);
-	free(rig), free(rec), free(pairs);
-}
-
-/* By hand: 0.1 N/mm at the skin and 0.3 N/mm at 12 mm, half as much again in a fast cut. */
-static void write_model(void)
-{
-	char *path = cli_text("%s/hand.fis", folder);
-	FILE *out = fopen(path, "we");
-
-	if (!out)
-		cli_fail("%s: cannot be written", path);
-	fputs("[System]\nName='hand'\nType='sugeno'\nVersion=2.0\nNumInputs=2\nNumOutputs=1\n"
-	      "NumRules=4\nAndMethod='prod'\nOrMethod='probor'\nImpMethod='prod'\n"
-	      "AggMethod='sum'\nDefuzzMethod='wtaver'\n\n"
-	      "[Input1]\nName='depth_mm'\nRange=[0 12]\nNumMFs=2\n"
-	      "MF1='shallow':'gaussmf',[5 0]\nMF2='deep':'gaussmf',[5 12]\n\n"
-	      "[Input2]\nName='velocity_mm_s'\nRange=[0 60]\nNumMFs=2\n"
-	      "MF1='slow':'gaussmf',[25 0]\nMF2='fast':'gaussmf',[25 60]\n\n"
-	      "[Output1]\nName='force_N'\nRange=[0 4]\nNumMFs=4\n"
-	      "MF1='a':'linear',[0.10 0 0]\nMF2='b':'linear',[0.15 0 0]\n"
-	      "MF3='c':'linear',[0.20 0 -0.4]\nMF4='d':'linear',[0.30 0 -0.6]\n\n"
-	      "[Rules]\n1 1, 1 (1) : 1\n1 2, 2 (1) : 1\n2 1, 3 (1) : 1\n2 2, 4 (1) : 1\n",
-	      out);
-	if (fclose(out))
-		cli_fail("%s: cannot be written", path);
-	add_model("by hand", path);
-}
-
-static void make_models(const struct bench_run *run)
-{
-	folder_make(folder, sizeof(folder), "for models");
-	add_model("shipped", cli_text("%s/liver.fis", scene_argument_shipped()));
-	if (run->n_operands)
-		add_model("given", cli_text("%s", run->operands[0]));
-	if (run->quick)
-		return;
-	write_model();
-	for (int i = 0; i < SEEDS; i++)
-		train_model(2 + i);
-}
 
 /* --- cases --- */
 
-#define LEANS 11
+#define CELLS 50
 #define RUN_S 8.0
-#define NOISE_MM 0.02 /* of a tracker, as predict.h has it */
-#define LATENCY_S 4.2e-3
+#define LONG_S 40.0	/* of one that swings in a run: it may only be slow to fade */
+#define NOISE_MM 0.02	/* of a tracker, as predict.h has it */
 #define DAMPED_N_s_mm 1 /* a device on which no gain of these cases is refused */
+#define MUCH 10.0	/* a gain that no device of these bears */
 #define TWICE 2
+#define FORCE_N 4.0 /* the scene's limit */
 
-/* N, and mm/s along the skin; the scene's limit is 4 N. */
-static const double leans[LEANS][2] = {{0.2, 0},  {0.6, 0},  {1.2, 0}, {1.9, 0},
-				       {2.1, 0},  {2.4, 0},  {3.0, 0}, {3.8, 0},
-				       {0.5, 15}, {2.1, 15}, {3.8, 15}};
-
-static const char *const withdrawals[] = {"dissipative", "paper"};
-
-struct rest_row {
-	const char *model, *path, *withdrawal;
-	double mass_kg, damping_N_s_mm, tracker_hz;
-	int late_ticks;
-	double noise_mm;
-
-	const char *verdict; /* "accepted", "refused" */
-	char why[500];	     /* refused */
-	double margin;	     /* accepted: of the loop's limit to the stiffness */
-	/* The widest swing of all leans, as it is and with twice the forces; NaN: not run. */
-	double swing_mm, swing_N, lean_N, along_mm_s, twice_mm;
-	double shaken_mm; /* by the noise */
-	bool rests, rests_twice;
+/* Of the whole group, or of its file's name. */
+static const char *const shapes[LEAN_SHAPES][2] = {
+	{"plane", ""},
+	{"sphere", "surface = { kind = \"sphere\"; centre_mm = [0.0, 0.0, -40.0]; "
+		   "radius_mm = 40.0; };\n"},
+	{"capsule", "surface = { kind = \"capsule\"; from_mm = [-60.0, 0.0, -55.0]; "
+		    "to_mm = [60.0, 0.0, -55.0]; radius_mm = 55.0; };\n"},
+	{"mesh", NULL},
+	{"heights", NULL},
 };
 
-#define CASES_MAX 3000
-static struct rest_row cases[CASES_MAX];
-static int n_cases;
-
-const struct bench_table stability_rest_table = {
-	.key = "rest",
-	.row_bytes = sizeof(struct rest_row),
-	.columns = {COLUMN(rest_row, "model", model),
-		    COLUMN(rest_row, "withdrawal", withdrawal),
-		    COLUMN(rest_row, "mass_kg", mass_kg),
-		    COLUMN(rest_row, "damping_N_s_mm", damping_N_s_mm),
-		    COLUMN(rest_row, "tracker_hz", tracker_hz),
-		    COLUMN(rest_row, "late_ticks", late_ticks),
-		    COLUMN(rest_row, "noise_mm", noise_mm),
-		    COLUMN(rest_row, "verdict", verdict), COLUMN(rest_row, "why", why),
-		    COLUMN(rest_row, "margin", margin), COLUMN(rest_row, "rests", rests),
-		    COLUMN(rest_row, "swing_mm", swing_mm),
-		    COLUMN(rest_row, "swing_N", swing_N),
-		    COLUMN(rest_row, "lean_N", lean_N),
-		    COLUMN(rest_row, "along_mm_s", along_mm_s),
-		    COLUMN(rest_row, "twice_mm", twice_mm),
-		    COLUMN(rest_row, "rests_twice", rests_twice),
-		    COLUMN(rest_row, "shaken_mm", shaken_mm)},
+/* Of about 1 N/mm, or of the model's file. */
+static const struct force {
+	const char *name, *tissue, *rest;
+	bool inserts, model;
+} forces[LEAN_FORCES + 1] = {
+	{"wall", "reaction_N_mm = 1.0;", ""},
+	{"averaged", "reaction_N_mm = 1.0;", "effects = { average_ticks = 16; };\n"},
+	{"damper", "reaction_N_mm = 1.0; damping_N_s_mm = 0.01;", ""},
+	{"skin", "reaction_N_mm = 1.0; skin_N_mm = 0.5; skin_friction = 0.5;", ""},
+	{"insertion", "insertion_N_mm = 1.0;", "", true},
+	{"spread", "insertion_N_mm = 0.5; spread_N_mm = 0.5;", "", true},
+	{"membrane", "reaction_N_mm = 0.3;",
+	 "membrane = { point_mm = [0.0, 0.0, -2.0]; radius_mm = 8.0; thickness_mm = 2.0; "
+	 "puncture_N = 2.0; back_wall_mm = 4.0; };\n"},
+	{"model", "withdrawal = \"dissipative\";", "", .model = true},
+	{"model, paper", "withdrawal = \"paper\";", "", .model = true},
+	{"model given", "withdrawal = \"dissipative\";", "", .model = true},
 };
 
-static struct closed_loop loop_of(const struct rest_row *row)
+static char *liver, *given; /* files of models */
+static struct memory_file files[N(shapes)];
+
+void lean_files(void)
 {
-	return (struct closed_loop){
-		.mass_kg = row->mass_kg,
-		.damping_N_s_mm = row->damping_N_s_mm,
-		.tracker_hz = row->tracker_hz,
-		.latency_s = LATENCY_S,
-		.late_ticks = row->late_ticks,
-		.run_s = RUN_S,
-	};
+	liver = cli_text("%s/liver.fis", scene_argument_shipped());
+	for (int i = 0; i < N(shapes); i++)
+		if (!shapes[i][1])
+			files[i] =
+				sheet_of_waves(CELLS, !strcmp(shapes[i][0], "heights"));
 }
 
-/* The path of a file in memory differs from run to run: an error's text goes on without it. */
-static void drop_path(struct incise_error *err, const char *path)
+struct incise_plan *lean_plan(const struct lean_case *lean, double gain,
+			      double damping_N_s_mm, struct incise_scene **scene,
+			      struct incise_error *err)
 {
-	size_t n = strlen(path);
-
-	if (strncmp(err->text, path, n) || strncmp(err->text + n, ": ", 2))
-		return;
-	n += strlen(": ");
-	memmove(err->text, err->text + n, strlen(err->text + n) + 1);
-}
-
-/* The plan of a case, with its forces times @gain, on a device of that damping. */
-static struct incise_plan *plan_of(const struct rest_row *row, double gain,
-				   double damping_N_s_mm, struct incise_scene **scene,
-				   struct incise_error *err)
-{
+	const struct force *force = &forces[lean->force];
+	struct closed_loop loop = lean->loop;
 	struct memory_file file = memory_file_begin("case.scene");
-	struct closed_loop loop = loop_of(row);
 	struct incise_tracker_info tracker = closed_loop_tracker(&loop);
 	struct incise_plan *plan = NULL;
+	size_t n = strlen(file.path);
 
+	if (shapes[lean->shape][1])
+		fputs(shapes[lean->shape][1], file.file);
+	else
+		fprintf(file.file, "surface = { kind = \"%s\"; file = \"%s\"; };\n",
+			shapes[lean->shape][0], files[lean->shape].path);
+	if (force->model)
+		fprintf(file.file, "model = \"%s\";\n",
+			lean->force == N(forces) - 1 ? given : liver);
 	fprintf(file.file,
-		"model = \"%s\"; tissue = { gain = %.1f; withdrawal = \"%s\"; };\n"
-		"device = { mass_kg = %.4f; damping_N_s_mm = %.4f; late_ticks = %d; };\n",
-		row->path, gain, row->withdrawal, row->mass_kg, damping_N_s_mm,
-		row->late_ticks);
+		"arithmetic = \"double\";\ntissue = { %s gain = %.9f; };\n%s"
+		"device = { mass_kg = %.4f; damping_N_s_mm = %.4f; late_ticks = %d; };\n"
+		"limits = { force_N = %.1f; pose_age_ms = 100.0; };\n",
+		force->tissue, gain, force->rest, loop.mass_kg, damping_N_s_mm,
+		loop.late_ticks, FORCE_N);
 	memory_file_written(&file);
 	*scene = incise_scene_load(file.path, NULL, err);
 	if (*scene)
 		plan = incise_plan_new_fed(*scene, &tracker, err);
-	if (!plan)
-		drop_path(err, file.path);
+	/* The path of a file in memory differs from run to run. */
+	if (!plan && !strncmp(err->text, file.path, n))
+		memmove(err->text, err->text + n + 2, strlen(err->text + n + 1));
 	fclose(file.file);
 	return plan;
 }
 
-/* The widest swing of all leans, mm; NaN where the plan does not take a pose or tick. */
-static double lean_all(struct incise_plan *plan, const struct rest_row *row,
-		       double noise_mm, struct rest_row *note)
-{
-	struct closed_loop loop = loop_of(row);
-	struct closed_loop_end end;
-	double widest_mm = -1;
+/* Ways to lean: where, and how. The guided ones are of a plane. */
+static const struct {
+	bool free, beside, held;
+	double askew, along_mm_s;
+} ways[LEAN_WAYS] = {{.along_mm_s = 0},
+		     {.along_mm_s = 15},
+		     {.free = true},
+		     {.free = true, .held = true, .askew = 0.25},
+		     {.free = true, .held = true, .beside = true}};
 
-	loop.noise_mm = noise_mm;
-	for (int i = 0; i < LEANS; i++) {
-		loop.lean_N = leans[i][0];
-		loop.along_mm_s = leans[i][1];
-		/* A plan's time goes on: those with noise come second. */
-		if (!closed_loop_run(plan, &loop, noise_mm > 0 ? LEANS + i : i, &end))
-			return NAN;
-		if (end.swing_mm > widest_mm && note) {
-			note->swing_N = end.swing_N;
-			note->lean_N = loop.lean_N;
-			note->along_mm_s = loop.along_mm_s;
-			note->shaken_mm = noise_mm > 0 ? end.shaken_mm : NAN;
-		}
-		widest_mm = fmax(widest_mm, end.swing_mm);
+/* A light hand, along the skin. */
+static const struct closed_loop_hand hand = {0.14, 0.0016, 0.034};
+
+void lean_all(struct incise_plan *plan, const struct lean_case *lean, int sizes,
+	      bool first, struct lean_end *most)
+{
+	struct incise_touch place[2];
+	struct closed_loop_end end;
+	double from_mm[3], shaken_mm;
+	int run = 0;
+
+	*most = (struct lean_end){.swing_mm = NAN};
+	incise_plan_top(plan, &place[0]);
+	v3_copy(from_mm, place[0].point_mm);
+	v3_add(from_mm, from_mm, 4, (const double[3]){1, 1, -0.5});
+	incise_surface_nearest(incise_plan_surface(plan), from_mm, &place[1]);
+	if (forces[lean->force].inserts)
+		incise_plan_set_tool(plan, INCISE_TOOL_TUBE);
+	for (int i = 0; i < N(ways) * sizes; i++) {
+		const struct incise_touch *at = &place[ways[i % N(ways)].beside];
+		struct closed_loop loop = lean->loop;
+
+		if (!ways[i % N(ways)].free && lean->shape)
+			continue;
+		loop.run_s = RUN_S;
+		loop.lean_N = 0.95 * FORCE_N * (i / N(ways) + 1) / sizes;
+		loop.noise_mm = i / N(ways) % 2 ? NOISE_MM : 0;
+		loop.along_mm_s = ways[i % N(ways)].along_mm_s;
+		loop.free = ways[i % N(ways)].free;
+		loop.askew = ways[i % N(ways)].askew;
+		if (ways[i % N(ways)].held)
+			loop.hand = hand;
+		v3_copy(loop.normal, at->normal);
+		if (loop.free)
+			v3_copy(loop.place_mm, at->point_mm);
+		if (!closed_loop_run(plan, &loop, run++, &end))
+			cli_fail("a plan does not take a tick");
+		shaken_mm = end.shaken_mm;
+		loop.run_s = LONG_S;
+		if (!end.left && end.swing_mm > CLOSED_LOOP_SWING_MM)
+			closed_loop_run(plan, &loop, run++, &end);
+		if (end.left)
+			continue;
+		if (loop.noise_mm > 0)
+			most->shaken_mm = fmax(most->shaken_mm, shaken_mm);
+		/* Of none yet, too. */
+		if (end.swing_mm <= most->swing_mm)
+			continue;
+		most->swing_mm = end.swing_mm;
+		most->loop = loop;
+		if (first && end.swing_mm > CLOSED_LOOP_SWING_MM)
+			return;
 	}
-	return widest_mm;
 }
 
-/* As if it were accepted, with a gain. */
-static double lean_forced(struct rest_row *row, double gain, struct rest_row *note)
+struct rest_row {
+	struct lean_case is;
+	const char *surface, *force;
+	double latency_ms;
+
+	const char *
+		verdict; /* "accepted": with the gain that the refusal names; "refused" */
+	char why[500];	 /* of the refusal */
+	double gain, margin, plan_s;
+	struct lean_end end; /* of the widest swing; NaN: not run */
+	double twice_mm;
+	bool rests, rests_twice;
+};
+
+#define CASES_MAX 1000
+static struct rest_row cases[CASES_MAX];
+static int n_cases, sizes;
+
+const struct bench_table stability_rest_table = {
+	.key = "rest",
+	.row_bytes = sizeof(struct rest_row),
+	.columns = {COLUMN(rest_row, "surface", surface, "%8s", "surface"),
+		    COLUMN(rest_row, "force", force, "%13s", "force"),
+		    COLUMN(rest_row, "mass_kg", is.loop.mass_kg, "%5g", "kg"),
+		    COLUMN(rest_row, "damping_N_s_mm", is.loop.damping_N_s_mm, "%6g",
+			   "N s/mm"),
+		    COLUMN(rest_row, "tracker_hz", is.loop.tracker_hz, "%5g", "Hz"),
+		    COLUMN(rest_row, "latency_ms", latency_ms, "%4g", "ms"),
+		    COLUMN(rest_row, "late_ticks", is.loop.late_ticks, "%4.0f", "late"),
+		    COLUMN(rest_row, "verdict", verdict, "%8s", "verdict"),
+		    COLUMN(rest_row, "why", why),
+		    COLUMN(rest_row, "gain", gain, "%6.3g", "gain"),
+		    COLUMN(rest_row, "margin", margin),
+		    COLUMN(rest_row, "plan_s", plan_s),
+		    COLUMN(rest_row, "rests", rests),
+		    COLUMN(rest_row, "swing_mm", end.swing_mm, "%9.2g", "swing, mm"),
+		    COLUMN(rest_row, "lean_N", end.loop.lean_N, "%6.3g", "N"),
+		    COLUMN(rest_row, "along_mm_s", end.loop.along_mm_s),
+		    COLUMN(rest_row, "free", end.loop.free),
+		    COLUMN(rest_row, "askew", end.loop.askew),
+		    COLUMN(rest_row, "twice_mm", twice_mm, "%9.2g", "twice, mm"),
+		    COLUMN(rest_row, "rests_twice", rests_twice),
+		    COLUMN(rest_row, "shaken_mm", end.shaken_mm)},
+};
+
+/* Swing with a gain, as if it were accepted. */
+static double lean_forced(struct rest_row *row, double gain)
 {
 	struct incise_error err = {0};
+	struct lean_end end = {.swing_mm = NAN};
 	struct incise_scene *scene;
-	struct incise_plan *plan = plan_of(row, gain, DAMPED_N_s_mm, &scene, &err);
-	double swing_mm = plan ? lean_all(plan, row, 0, note) : NAN;
+	struct incise_plan *plan = lean_plan(&row->is, gain, DAMPED_N_s_mm, &scene, &err);
 
+	if (plan)
+		lean_all(plan, &row->is, sizes, true, &end);
 	incise_plan_free(plan);
 	incise_scene_free(scene);
-	return swing_mm;
+	return end.swing_mm;
 }
 
-/* Cases of a plan: without noise, and with it. */
-static void try_plan(struct rest_row row[2])
+static void try_case(struct rest_row *row)
 {
+	static const char words[] = "set tissue.gain to at most ";
+	double damping_N_s_mm = row->is.loop.damping_N_s_mm, begin = stopwatch_ns();
 	struct incise_error err = {0};
-	struct incise_scene *scene;
-	struct incise_plan *plan = plan_of(row, 1, row->damping_N_s_mm, &scene, &err);
 	struct incise_plan_stability s;
+	struct incise_scene *scene;
+	struct incise_plan *plan =
+		lean_plan(&row->is, MUCH, damping_N_s_mm, &scene, &err);
+	const char *advice = strstr(err.text, words);
 
-	for (int i = 0; i < 2; i++) {
-		row[i].verdict = plan ? "accepted" : "refused";
-		row[i].margin = row[i].swing_mm = row[i].twice_mm = NAN;
-		row[i].swing_N = row[i].lean_N = row[i].along_mm_s = row[i].shaken_mm =
-			NAN;
-		snprintf(row[i].why, sizeof(row[i].why), "%s", err.text);
-		if (plan) {
-			incise_plan_stability(plan, &s);
-			row[i].margin = s.limit_N_mm / s.stiffness_N_mm;
-			row[i].swing_mm = lean_all(plan, row, row[i].noise_mm, &row[i]);
-		} else if (i == 0) {
-			row->swing_mm = lean_forced(row, 1, row);
-			row->twice_mm = lean_forced(row, TWICE, NULL);
-		}
-		/* Not a number is no rest. */
-		row[i].rests = row[i].swing_mm <= CLOSED_LOOP_SWING_MM;
-		row[i].rests_twice = row[i].twice_mm <= CLOSED_LOOP_SWING_MM;
+	row->gain = MUCH;
+	row->margin = row->twice_mm = row->end.swing_mm = NAN;
+	row->plan_s = (stopwatch_ns() - begin) * 1e-9;
+	snprintf(row->why, sizeof(row->why), "%s", err.text);
+	if (advice) {
+		incise_scene_free(scene);
+		row->gain = atof(advice + strlen(words));
+		plan = lean_plan(&row->is, row->gain, damping_N_s_mm, &scene, &err);
 	}
+	row->verdict = plan ? "accepted" : "refused";
+	if (plan) {
+		incise_plan_stability(plan, &s);
+		row->margin = s.limit_N_mm / s.stiffness_N_mm;
+		lean_all(plan, &row->is, sizes, false, &row->end);
+	}
+	if (advice)
+		row->twice_mm = lean_forced(row, TWICE * row->gain);
+	row->rests = !(row->end.swing_mm > CLOSED_LOOP_SWING_MM);
+	row->rests_twice = row->twice_mm <= CLOSED_LOOP_SWING_MM;
 	incise_plan_free(plan);
 	incise_scene_free(scene);
 }
 
 static atomic_int next_case, tried;
 
-static void *try_plans(void *nothing)
+static void *try_cases(void *nothing)
 {
 	int i;
 
-	while (i = atomic_fetch_add(&next_case, 2), i < n_cases && !cli_stop) {
-		try_plan(&cases[i]);
-		atomic_fetch_add(&tried, 2);
+	while (i = atomic_fetch_add(&next_case, 1), i < n_cases && !cli_stop) {
+		try_case(&cases[i]);
+		atomic_fetch_add(&tried, 1);
 	}
 	return nothing;
 }
 
-struct grid {
-	double mass_kg[3], damping_N_s_mm[4], tracker_hz[3];
-	int late_ticks[3];
-	int n_masses, n_dampings, n_rates, n_lates;
+/* kg, N s/mm, Hz, s, ticks. */
+static const struct closed_loop devices[] = {
+	{0.05, 0.01, 120, 4.2e-3, .late_ticks = 0},
+	{0.05, 0.05, 1000, 20e-3, .late_ticks = 0},
+	{0.03, 0.005, 240, 4.2e-3, .late_ticks = 2},
+	{0.1, 0.02, 60, 4.2e-3, .late_ticks = 5},
+	{0.2, 0.05, 500, 1e-3, .late_ticks = 1},
+	{0.1, 0.01, 1000, 1e-3, .late_ticks = 0},
 };
 
-static void add_cases(const struct grid *g)
+/* Quick: each force once, on one surface of all in turn. */
+static void add_cases(const struct bench_run *run)
 {
-	for (int i = 0; i < n_models * N(withdrawals) * g->n_masses * g->n_dampings *
-				    g->n_rates * g->n_lates;
-	     i++) {
-		int k = i;
+	lean_files();
+	given = run->n_operands ? run->operands[0] : NULL;
+	sizes = run->quick ? 4 : 10;
+	for (int i = 0; i < N(shapes); i++)
+		if (!shapes[i][1])
+			files[i] =
+				sheet_of_waves(CELLS, !strcmp(shapes[i][0], "heights"));
+	for (int f = 0; f < N(forces) - !given; f++)
+		for (int s = 0; s < N(shapes); s++)
+			for (int d = 0; d < (run->quick ? 1 : N(devices)); d++) {
+				struct rest_row *row = &cases[n_cases];
 
-		if (n_cases + 2 > CASES_MAX)
-			cli_fail("rest: more than %d cases", CASES_MAX);
-		cases[n_cases].late_ticks = g->late_ticks[k % g->n_lates];
-		k /= g->n_lates;
-		cases[n_cases].tracker_hz = g->tracker_hz[k % g->n_rates];
-		k /= g->n_rates;
-		cases[n_cases].damping_N_s_mm = g->damping_N_s_mm[k % g->n_dampings];
-		k /= g->n_dampings;
-		cases[n_cases].mass_kg = g->mass_kg[k % g->n_masses];
-		k /= g->n_masses;
-		cases[n_cases].withdrawal = withdrawals[k % N(withdrawals)];
-		k /= N(withdrawals);
-		cases[n_cases].model = models[k].name;
-		cases[n_cases].path = models[k].path;
-		cases[n_cases + 1] = cases[n_cases];
-		cases[n_cases + 1].noise_mm = NOISE_MM;
-		n_cases += 2;
-	}
+				if (run->quick && 2 * f % N(shapes) != s)
+					continue;
+				n_cases++;
+				row->is = (struct lean_case){s, f, devices[d]};
+				row->surface = shapes[s][0];
+				row->force = forces[f].name;
+				row->latency_ms = 1e3 * devices[d].latency_s;
+			}
 }
 
 static void measure(const struct bench_run *run)
 {
-	static const struct grid full = {{0.03, 0.05, 0.1},
-					 {0.005, 0.01, 0.02, 0.05},
-					 {60, 120, 240},
-					 {0, 2, 5},
-					 3,
-					 4,
-					 3,
-					 3},
-				 few = {{0.05}, {0.01, 0.05}, {120}, {0, 5}, 1, 2, 1, 2};
 	pthread_t thread[64];
 	long n = sysconf(_SC_NPROCESSORS_ONLN);
 
-	make_models(run);
-	add_cases(run->quick ? &few : &full);
+	add_cases(run);
 	n = n < 1 ? 1 : n > N(thread) ? N(thread) : n;
 	for (int i = 0; i < n; i++)
-		if (pthread_create(&thread[i], NULL, try_plans, NULL))
+		if (pthread_create(&thread[i], NULL, try_cases, NULL))
 			cli_fail("no thread for the cases");
 	while (atomic_load(&tried) < n_cases && !cli_stop) {
 		cli_progress("rest: %d of %d", atomic_load(&tried), n_cases);
@@ -367,120 +335,113 @@ static void measure(const struct bench_run *run)
 	}
 	for (int i = 0; i < n; i++)
 		pthread_join(thread[i], NULL);
-	folder_remove(folder);
 	if (cli_stop)
 		cli_fail("interrupted");
 }
 
 /* --- report --- */
 
-/* Cases of a model and a way out of the tissue. */
+/* Cases of a kind: of a surface and a force. */
 struct sum {
-	const char *model, *withdrawal;
-	double cases, accepted, swing, plans_refused, rest_as_is, rest_twice;
-	double widest_mm; /* of the accepted */
+	const char *surface, *force;
+	int cases, accepted, swing, twice, rest_twice, failures;
+	double widest_mm, plan_s; /* of the accepted; the longest */
 };
 
 static const struct bench_table sum_table = {
 	.key = "rest_sums",
 	.row_bytes = sizeof(struct sum),
-	.columns = {COLUMN(sum, "model", model, "%10s", "model"),
-		    COLUMN(sum, "withdrawal", withdrawal, "%13s", "withdrawal"),
-		    COLUMN(sum, "cases", cases, "%7.0f", "cases", .whole = true),
-		    COLUMN(sum, "accepted", accepted, "%10.0f", "accepted",
-			   .whole = true),
-		    COLUMN(sum, "swing", swing, "%10.0f", "oscillate", .whole = true),
+	.columns = {COLUMN(sum, "surface", surface, "%8s", "surface"),
+		    COLUMN(sum, "force", force, "%13s", "force"),
+		    COLUMN(sum, "cases", cases, "%6.0f", "cases"),
+		    COLUMN(sum, "accepted", accepted, "%10.0f", "accepted"),
+		    COLUMN(sum, "swing", swing, "%10.0f", "oscillate"),
 		    COLUMN(sum, "widest_mm", widest_mm, "%12.2g", "largest, mm"),
-		    COLUMN(sum, "plans_refused", plans_refused, "%15.0f", "plans refused",
-			   .whole = true),
-		    COLUMN(sum, "rest_as_is", rest_as_is, "%19.0f", "stable as it is",
-			   .whole = true),
-		    COLUMN(sum, "rest_twice", rest_twice, "%22.0f", "at twice the force",
-			   .whole = true)},
+		    COLUMN(sum, "twice", twice, "%14.0f", "at twice it"),
+		    COLUMN(sum, "rest_twice", rest_twice, "%10.0f", "are stable"),
+		    COLUMN(sum, "plan_s", plan_s, "%10.2f", "plan, s")},
 };
 
-static struct sum sum_of(const char *model, const char *withdrawal)
+/* The worst first. */
+static int failure(const struct rest_row *row)
 {
-	struct sum sum = {model, withdrawal, .widest_mm = NAN};
-
-	for (const struct rest_row *r = cases; r < cases + n_cases; r++) {
-		bool accepted = r->verdict[0] == 'a', plan = r->noise_mm == 0;
-
-		if ((model && strcmp(model, r->model)) ||
-		    (withdrawal && strcmp(withdrawal, r->withdrawal)))
-			continue;
-		sum.cases++;
-		sum.accepted += accepted;
-		sum.swing += accepted && !r->rests;
-		if (accepted)
-			sum.widest_mm = fmax(sum.widest_mm, r->swing_mm);
-		sum.plans_refused += !accepted && plan;
-		sum.rest_as_is += !accepted && plan && r->rests;
-		sum.rest_twice += !accepted && plan && r->rests_twice;
-	}
-	return sum;
+	return row->verdict[0] != 'a' || !row->rests ? 2 : row->rests_twice;
 }
 
-static void list(struct bench_run *run, const char *title, bool accepted)
+static int by_failure(const void *a, const void *b)
 {
-	bool any = false;
+	return failure(b) - failure(a);
+}
 
-	for (const struct rest_row *r = cases; r < cases + n_cases; r++) {
-		if (accepted ? r->verdict[0] != 'a' || r->rests : !r->rests_twice)
-			continue;
-		if (!any)
-			bench_text(run, "%s\n", title);
-		any = true;
-		bench_text(
-			run,
-			"  %s, %s, %g kg, %g N s/mm, %g Hz, %d ticks late, noise %g mm: "
-			"%.3g mm\n",
-			r->model, r->withdrawal, r->mass_kg, r->damping_N_s_mm,
-			r->tracker_hz, r->late_ticks, r->noise_mm,
-			accepted ? r->swing_mm : r->twice_mm);
-	}
+static void add_to(struct sum *sum, const struct rest_row *row)
+{
+	bool accepted = row->verdict[0] == 'a';
+
+	sum->surface = row->surface;
+	sum->force = row->force;
+	sum->cases++;
+	sum->accepted += accepted;
+	sum->swing += accepted && !row->rests;
+	if (accepted)
+		sum->widest_mm = fmax(sum->widest_mm, row->end.swing_mm);
+	sum->twice += !isnan(row->twice_mm);
+	sum->rest_twice += row->rests_twice;
+	sum->plan_s = fmax(sum->plan_s, row->plan_s);
+	sum->failures =
+		1000 * (sum->swing + sum->cases - sum->accepted) + sum->rest_twice;
+}
+
+static int by_failures(const void *a, const void *b)
+{
+	return ((const struct sum *)b)->failures - ((const struct sum *)a)->failures;
 }
 
 void stability_rest(struct bench_run *run)
 {
-	static struct sum sums[MODELS_MAX * N(withdrawals)];
-	struct sum all;
-	double early;
+	static struct sum sums[N(shapes) * N(forces)];
+	struct sum all = {.widest_mm = NAN};
+	double swing, accepted, early;
 	int n = 0;
 
 	measure(run);
 	cli_progress_end();
-	for (int m = 0; m < n_models; m++)
-		for (int w = 0; w < N(withdrawals); w++)
-			sums[n++] = sum_of(models[m].name, withdrawals[w]);
-	all = sum_of(NULL, NULL);
+	for (int i = 0; i < n_cases; i++) {
+		if (!i || cases[i].surface != cases[i - 1].surface ||
+		    cases[i].force != cases[i - 1].force)
+			sums[n++].widest_mm = NAN;
+		add_to(&sums[n - 1], &cases[i]);
+		add_to(&all, &cases[i]);
+	}
+	qsort(sums, (size_t)n, sizeof(*sums), by_failures);
 	bench_text(
 		run,
-		"learned models on devices of %g to %g kg: accepted or refused by the plan, "
-		"and at rest under %d hand forces; an oscillation is more than %g mm in the "
-		"last quarter of %g s\n",
-		cases[0].mass_kg, cases[n_cases - 1].mass_kg, LEANS, CLOSED_LOOP_SWING_MM,
-		RUN_S);
+		"scenes by surface and force, failures first, with the gain that a plan "
+		"names when it refuses %g: accepted, and at rest under %d leans of a hand; "
+		"an oscillation is more than %g mm in the last quarter of %g s\n",
+		MUCH, (int)N(ways) * sizes, CLOSED_LOOP_SWING_MM, RUN_S);
 	bench_table(run, &sum_table, sums, n);
 	bench_text(
 		run,
-		"%.0f cases: %.0f accepted, of which %.0f oscillate; %.0f plans refused, "
-		"of which %.0f are stable at twice the force\n",
-		all.cases, all.accepted, all.swing, all.plans_refused, all.rest_twice);
-	list(run, "accepted, but oscillates", true);
-	list(run, "refused, but stable at twice the force", false);
+		"%d cases: %d accepted, of which %d oscillate; %d at twice the gain, of "
+		"which %d are stable\n",
+		all.cases, all.accepted, all.swing, all.twice, all.rest_twice);
+	qsort(cases, (size_t)n_cases, sizeof(*cases), by_failure);
+	for (n = 0; n < n_cases && failure(&cases[n]); n++)
+		;
+	if (n)
+		bench_lines(run, &stability_rest_table, cases, n);
 	bench_text(run, "\n");
 	bench_rows(run, &stability_rest_table, cases, n_cases);
-	early = all.plans_refused > 0 ? all.rest_twice / all.plans_refused : 0;
-	metrics_add(run->metrics, METRIC_EXACT, &all.swing, "1",
-		    "accepted cases that swing");
+	swing = all.swing;
+	accepted = all.accepted;
+	early = all.twice ? (double)all.rest_twice / all.twice : 0;
+	metrics_add(run->metrics, METRIC_EXACT, &swing, "1", "accepted cases that swing");
 	metrics_add(run->metrics, METRIC_EXACT, &early, "1",
 		    "refused plans that would rest twice as strong");
-	metrics_more_is_better(metrics_add(run->metrics, METRIC_EXACT, &all.accepted, "1",
-					   "accepted cases of learned models"));
+	metrics_more_is_better(metrics_add(run->metrics, METRIC_EXACT, &accepted, "1",
+					   "cases accepted with the gain that is named"));
 	if (all.swing > 0)
-		bench_fail(
-			run,
-			"rest: %.0f of %.0f accepted cases oscillate: please report it",
-			all.swing, all.accepted);
+		bench_fail(run,
+			   "rest: %d of %d accepted cases oscillate: please report it",
+			   all.swing, all.accepted);
 }

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 # Largest error over the time of an evaluation, a colour and marker for each kind of evaluator.
-set title sprintf("Largest error of an evaluator over its run time, model of %d rules\n\
-bars: 5 to 95 %% of the runs; upward: to the certified bound\n%s, %s", rules, cpu, kernel)
+# What could not be measured is said: another project's evaluator that is not there.
+absent = words(more_name) ? sprintf("; no %s: %s", word(more_name, 1), word(more_failed, 1)) : ''
+set title sprintf("Largest error of an evaluator over its run time, model of %d rules%s\n\
+bars: 5 to 95 %% of the runs; upward: to the certified bound\n%s, %s", rules, absent, cpu, kernel)
 set xlabel 'median time per evaluation / ns'
 set ylabel 'largest error / N'
 set logscale xy

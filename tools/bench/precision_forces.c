@@ -1,25 +1,30 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * incise bench stability: error against run time of paper 2's forces, in integers and in floating
- * point, with an averaged normal, and by the proxy of meshes that are finer and finer. Truth is the
- * paper's formula on the sphere that all of them stand for, in long double.
+ * incise bench precision: error against run time of paper 2's forces, in integers and in floating
+ * point, by the proxy of meshes that are finer and finer, and with normals averaged over more and more
+ * ticks. Truth is the paper's formula on the sphere that all of them stand for, in long double.
  *
  *   F = Kn d n - Kx ((P - P0)·s) s        P0: where the tool went in, s: the blade's side
+ *
+ * A mean of normals is late, and smooths what the facets of a mesh do to the force's direction:
+ *
+ *   lag       the time by which directions e that are off are late of what turns: e = -lag dn/dt
+ *   ripple    of e, from tick to tick
  */
 #include <stdio.h>
 #include <incise/plan.h>
 #include "../../lib/base/vector.h"
 #include "../cli/file.h"
-#include "stability.h"
+#include "bench.h"
 
 #define RADIUS_MM 55.0 /* a neck's */
 #define KN_N_mm 0.14
 #define KX_N_mm 0.17
+#define DEEP_MM 0.5 /* a mesh is in contact, too */
 #define TICKS 4000
 #define AIR_TICKS 500 /* until the force may start */
 #define RATE_HZ 1000.0
-#define REPEATS 31
-#define QUICK_REPEATS 5
+#define REPEATS(run) ((run)->quick ? 5 : 31)
 
 struct error_row {
 	const char *name;
@@ -29,6 +34,7 @@ struct error_row {
 
 	int triangles;
 	double rms_N, largest_N, contact; /* over ticks in contact */
+	double lag_ms, ripple_mrad;	  /* of the normal */
 	struct harness_time time;	  /* of a tick */
 	struct incise_scene *scene;
 	struct incise_plan *plan;
@@ -36,34 +42,38 @@ struct error_row {
 };
 
 static struct error_row rows[] = {
-	{.name = "sphere, double", .arithmetic = "double", .average_ticks = 1},
-	{.name = "sphere, fixed", .arithmetic = "fixed", .average_ticks = 1},
-	{.name = "normal of 8 ticks", .arithmetic = "double", .average_ticks = 8},
-	{"mesh", 24, "double", 1},
-	{"mesh", 48, "double", 1},
-	{"mesh", 96, "double", 1},
-	{"mesh", 192, "double", 1},
+	{"sphere, double", 0, "double", 1}, {"sphere, fixed", 0, "fixed", 1},
+	{"mesh", 24, "double", 1},	    {"mesh", 48, "double", 1},
+	{"mesh", 48, "double", 2},	    {"mesh", 48, "double", 4},
+	{"mesh", 48, "double", 8},	    {"mesh", 48, "double", 16},
+	{"mesh", 48, "double", 32},	    {"mesh", 48, "double", 64},
+	{"mesh", 96, "double", 1},	    {"mesh", 192, "double", 1},
 	{"mesh", 384, "double", 1},
 };
 
-const struct bench_table stability_error_table = {
+const struct bench_table precision_force_table = {
 	.key = "forces",
 	.row_bytes = sizeof(struct error_row),
-	.columns = {COLUMN(error_row, "name", name, "%20s", "forces"),
+	.columns = {COLUMN(error_row, "name", name, "%14s", "forces"),
 		    COLUMN(error_row, "arithmetic", arithmetic),
-		    COLUMN(error_row, "average_ticks", average_ticks),
-		    COLUMN(error_row, "triangles", triangles, "%10.0f", "triangles",
+		    COLUMN(error_row, "triangles", triangles, "%9.0f", "triangles",
 			   .optional = true),
-		    COLUMN(error_row, "rms_error_N", rms_N, "%10.2g", "rms, N"),
-		    COLUMN(error_row, "max_error_N", largest_N, "%12.2g", "largest, N"),
-		    COLUMN(error_row, "contact", contact, "%9.0f", "ticks"),
-		    COLUMN(error_row, "ns", time.ns.median, "%8.1f", "ns"),
-		    COLUMN(error_row, "ns_p5", time.ns.p5, "%8.1f", "5 %"),
-		    COLUMN(error_row, "ns_p95", time.ns.p95, "%8.1f", "95 %")},
+		    COLUMN(error_row, "average_ticks", average_ticks, "%7.0f", "average"),
+		    COLUMN(error_row, "rms_error_N", rms_N, "%9.2g", "rms, N"),
+		    COLUMN(error_row, "max_error_N", largest_N, "%10.2g", "largest, N"),
+		    COLUMN(error_row, "lag_ms", lag_ms, "%8.3g", "lag, ms"),
+		    COLUMN(error_row, "ripple_mrad", ripple_mrad, "%12.3g",
+			   "ripple, mrad"),
+		    COLUMN(error_row, "contact", contact),
+		    QUANTILES(error_row, "ns", time, "%8.1f")},
 	.metrics = {METRIC(TIME, error_row, time, "ns",
-			   "tick of forces, {name} {triangles}"),
+			   "tick of forces, {name} {triangles} {average_ticks}"),
 		    METRIC(EXACT, error_row, rms_N, "N",
-			   "error of forces, {name} {triangles}")},
+			   "error of forces, {name} {triangles} {average_ticks}"),
+		    METRIC(EXACT, error_row, lag_ms, "ms", "lag of {average_ticks} ticks",
+			   "triangles=2208"),
+		    METRIC(EXACT, error_row, ripple_mrad, "mrad",
+			   "ripple of {average_ticks} ticks", "triangles=2208")},
 };
 
 /* A sphere below the origin, of cells by degrees of latitude and longitude. */
@@ -144,9 +154,10 @@ static void measure_error(struct error_row *row)
 {
 	const double side[3] = {0, 1, 0};
 	double far[3] = {0, 0, 50}, was[3], sum = 0;
+	double n_was[3], off_was[3], along = 0, turned = 0, ripple = 0;
 	long double p0[3] = {0};
 	struct incise_tick tick;
-	bool inside = false;
+	bool inside = false, before, deep = false;
 
 	for (int k = 0; k < AIR_TICKS; k++)
 		tick_at(row, k / RATE_HZ, far, &tick);
@@ -156,6 +167,7 @@ static void measure_error(struct error_row *row)
 		long double r = 0, off = 0, error = 0, q[3];
 		double p[3];
 
+		before = deep;
 		place(k / RATE_HZ, p);
 		tick_at(row, k / RATE_HZ, p, &tick);
 		for (int i = 0; i < 3; i++) {
@@ -166,6 +178,7 @@ static void measure_error(struct error_row *row)
 		if (r < RADIUS_MM && !inside)
 			enters(was, tick.tool_mm, p0);
 		inside = r < RADIUS_MM;
+		deep = r < RADIUS_MM - DEEP_MM;
 		v3_copy(was, tick.tool_mm);
 		if (!inside)
 			continue;
@@ -176,7 +189,16 @@ static void measure_error(struct error_row *row)
 					    KX_N_mm * off * side[i];
 			long double e = tick.command_N[i] - truth;
 
+			double n = (double)(q[i] / r), n_off = tick.normal[i] - n;
+
 			error += e * e;
+			if (before && deep) {
+				along -= n_off * (n - n_was[i]);
+				turned += (n - n_was[i]) * (n - n_was[i]);
+				ripple += (n_off - off_was[i]) * (n_off - off_was[i]);
+			}
+			n_was[i] = n;
+			off_was[i] = n_off;
 		}
 		row->contact++;
 		sum += (double)error;
@@ -184,6 +206,8 @@ static void measure_error(struct error_row *row)
 	}
 	row->begin_s += TICKS / RATE_HZ;
 	row->rms_N = sqrt(sum / row->contact);
+	row->lag_ms = 1e3 * along / turned / RATE_HZ;
+	row->ripple_mrad = 1e3 * sqrt(ripple / row->contact);
 }
 
 static void run_timed(void *context)
@@ -230,27 +254,21 @@ static void prepare(struct error_row *row)
 		fclose(mesh.file);
 }
 
-void stability_error(struct bench_run *run)
+void precision_forces(struct bench_run *run)
 {
-	struct harness_variant variants[N(rows)];
 	int n = run->quick ? N(rows) - 2 : N(rows);
 
 	for (int i = 0; i < n; i++) {
 		cli_progress("forces: %d of %d", i + 1, n);
 		prepare(&rows[i]);
 		measure_error(&rows[i]);
-		variants[i] = (struct harness_variant){.run = run_timed,
-						       .context = &rows[i],
-						       .units = TICKS,
-						       .time = &rows[i].time};
 	}
-	harness_times(variants, n, run->quick ? QUICK_REPEATS : REPEATS);
-	cli_progress_end();
+	bench_times(&precision_force_table, rows, n, run_timed, TICKS, REPEATS(run));
 	bench_text(run,
 		   "force laws of Bhasin et al. (2005) on a sphere of %g mm: error, and "
 		   "run time of a tick with its pose\n",
 		   RADIUS_MM);
-	bench_table(run, &stability_error_table, rows, n);
+	bench_table(run, &precision_force_table, rows, n);
 	bench_text(run, "\n");
 	for (int i = 0; i < n; i++) {
 		incise_plan_free(rows[i].plan);
