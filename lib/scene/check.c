@@ -480,7 +480,7 @@ static int search(struct incise_plan *plan, const struct incise_tracker_info *tr
 			break;
 		here.runs += rest->runs;
 		incise_rest_take_weakest(&here.weakest, &rest->weakest);
-		if (!here.rests || here.settle_s > rest->settle_s)
+		if (!here.rests || here.worst.settle_s > rest->worst.settle_s)
 			*rest = here;
 		rest->weakest = here.weakest;
 		rest->runs = here.runs;
@@ -620,17 +620,18 @@ static void name_run(const struct incise_rest *rest, char name[160])
 {
 	static const char *const tools[] = {"tool", "blade", "handle", "tube"};
 	static const char *const held[] = {"free", "held across", "in a hand"};
-	const double *at = rest->place_mm, *N = rest->force_N;
+	const struct incise_plan_lean *worst = &rest->worst;
+	const double *at = worst->place_mm, *N = rest->force_N;
 
-	if (rest->guided)
+	if (worst->guided)
 		snprintf(
 			name, 160,
 			"the blade, along the skin at %.0f mm/s, under %.3g N, %.1f mm deep,",
-			rest->along_mm_s, rest->lean_N, rest->depth_mm);
+			worst->along_mm_s, worst->lean_N, worst->depth_mm);
 	else
 		snprintf(name, 160,
 			 "the %s, %s, under [%.3g, %.3g, %.3g] N at [%.2f, %.2f, %.2f],",
-			 tools[rest->tool], held[rest->held], N[0], N[1], N[2], at[0],
+			 tools[worst->tool], held[worst->held], N[0], N[1], N[2], at[0],
 			 at[1], at[2]);
 }
 
@@ -648,16 +649,7 @@ int incise_plan_check_rest(struct incise_plan *plan,
 	if (search(plan, tracker, &as_is, &rest))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
 	s->runs = rest.runs;
-	s->worst.lean_N = rest.lean_N;
-	s->worst.along_mm_s = rest.along_mm_s;
-	s->worst.askew = rest.askew;
-	s->worst.tool = rest.tool;
-	s->worst.held = rest.held;
-	s->worst.guided = rest.guided;
-	v3_copy(s->worst.place_mm, rest.place_mm);
-	s->worst.depth_mm = rest.depth_mm;
-	s->worst.swing_mm = rest.swing_mm;
-	s->worst.settle_s = rest.settle_s;
+	s->worst = rest.worst;
 	s->weakest = rest.weakest;
 	s->noise_mm = rest.noise_mm;
 	s->noise_N = rest.noise_N;
@@ -676,6 +668,6 @@ int incise_plan_check_rest(struct incise_plan *plan,
 		"%s: not stable: %s oscillates by %.3f mm and %.2f N, on a "
 		"device of %g kg and %g N s/mm with %s; %s, or describe "
 		"the device",
-		plan->scene->path, run, rest.swing_mm, rest.swing_N, s->device.mass_kg,
-		s->device.damping_N_s_mm, delay, advice);
+		plan->scene->path, run, rest.worst.swing_mm, rest.swing_N,
+		s->device.mass_kg, s->device.damping_N_s_mm, delay, advice);
 }

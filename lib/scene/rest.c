@@ -567,24 +567,24 @@ static void note(const struct search *s, const struct run *run, const struct win
 	double depth_mm = depth_of(s, last), lean_N[3];
 	struct incise_rest before = *rest;
 
-	if (settle_s > 0 && !(depth_mm >= 0 && settle_s > rest->settle_s))
+	if (settle_s > 0 && !(depth_mm >= 0 && settle_s > rest->worst.settle_s))
 		return;
 	set_lean(s, run, lean_N);
 	*rest = (struct incise_rest){
 		.rests = settle_s > 0,
 		.runs = before.runs,
-		.lean_N = run->lean_N,
-		.along_mm_s = s->way.along_mm_s,
-		.askew = s->way.askew,
+		.worst = {.lean_N = run->lean_N,
+			  .along_mm_s = s->way.along_mm_s,
+			  .askew = s->way.askew,
+			  .place_mm = {at_mm[0], at_mm[1], at_mm[2]},
+			  .tool = s->way.tool,
+			  .held = s->way.held,
+			  .guided = s->way.guided,
+			  .depth_mm = depth_mm,
+			  .swing_mm = swing_of(s, last->at_mm),
+			  .settle_s = settle_s},
 		.force_N = {lean_N[0], lean_N[1], lean_N[2]},
-		.place_mm = {at_mm[0], at_mm[1], at_mm[2]},
-		.tool = s->way.tool,
-		.held = s->way.held,
-		.guided = s->way.guided,
-		.depth_mm = depth_mm,
-		.swing_mm = swing_of(s, last->at_mm),
 		.swing_N = moved_of(s, last->N),
-		.settle_s = settle_s,
 		.way = way,
 		.weakest = before.weakest,
 	};

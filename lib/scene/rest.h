@@ -44,14 +44,9 @@ struct incise_rest {
 	bool rests;
 	int runs;
 	/* The first run that swings, or the one that took longest to come to rest. */
-	double lean_N, along_mm_s;
-	double askew;	    /* share of the lean along the skin */
-	double force_N[3];  /* the lean */
-	double place_mm[3]; /* of the surface */
-	enum incise_tool tool;
-	enum incise_held held;
-	bool guided; /* along the normal */
-	double depth_mm, swing_mm, swing_N, settle_s;
+	struct incise_plan_lean worst;
+	double force_N[3]; /* its lean */
+	double swing_N;
 	int way; /* of the search */
 	struct incise_plan_weakest weakest;
 	/* Range of position and force, of a hand that leans with half of the scene's limit, by

@@ -130,6 +130,18 @@ enum incise_held {
 	INCISE_HELD_IN_HAND, /**< a firm hand: 0.554 kg, 0.0258 N s/mm, 0.54 N/mm */
 };
 
+/** A simulated loop. */
+struct incise_plan_lean {
+	double lean_N;	       /**< force that leans */
+	double along_mm_s;     /**< its speed along the skin */
+	double askew;	       /**< share of it along the skin */
+	double place_mm[3];    /**< of the surface, where it leans */
+	enum incise_tool tool; /**< that leans */
+	enum incise_held held;
+	bool guided; /**< along the normal only */
+	double depth_mm, swing_mm, settle_s;
+};
+
 /**
  * Of all states of rest that a search came to, the one about which the loop, with its forces as they are there for small
  * motions, swings with the least more of them: by its eigenvalues in three dimensions.
@@ -186,16 +198,7 @@ struct incise_plan_stability {
 	 * the scene's limit, and the loop that took longest to come to rest.
 	 */
 	int runs;
-	struct {
-		double lean_N;	       /**< the hand's force */
-		double along_mm_s;     /**< its speed along the skin */
-		double askew;	       /**< share of its force along the skin */
-		double place_mm[3];    /**< of the surface, where it leans */
-		enum incise_tool tool; /**< that leans */
-		enum incise_held held;
-		bool guided; /**< along the normal only */
-		double depth_mm, swing_mm, settle_s;
-	} worst;
+	struct incise_plan_lean worst;
 	struct incise_plan_weakest weakest; /**< of the same search */
 	/**
 	 * Range at rest due to the noise of a tracker, sd 0.02 mm, in a hand that leans with
