@@ -641,7 +641,7 @@ int incise_plan_check_rest(struct incise_plan *plan,
 {
 	struct incise_plan_stability *s = &plan->stability;
 	const struct incise_rest_trial as_is = {plan->gain, s->device.damping_N_s_mm, -1};
-	char advice[200], run[160], delay[64];
+	char advice[200], run[160], delay[64], how[64];
 	struct incise_rest rest;
 
 	if (plan->scene->unchecked)
@@ -663,11 +663,16 @@ int incise_plan_check_rest(struct incise_plan *plan,
 	else
 		snprintf(delay, sizeof(delay), "a tracker of %g Hz and %g ms",
 			 tracker->rate_hz, (double)tracker->latency_ns * 1e-6);
+	if (rest.worst.swing_mm > INCISE_REST_SWING_MM)
+		snprintf(how, sizeof(how), "by %.3f mm and %.2f N", rest.worst.swing_mm,
+			 rest.swing_N);
+	else
+		snprintf(how, sizeof(how), "with %.3g Hz, more and more",
+			 rest.weakest.hz);
 	return incise_error_set(
 		err, EDOM,
-		"%s: not stable: %s oscillates by %.3f mm and %.2f N, on a "
-		"device of %g kg and %g N s/mm with %s; %s, or describe "
-		"the device",
-		plan->scene->path, run, rest.worst.swing_mm, rest.swing_N,
-		s->device.mass_kg, s->device.damping_N_s_mm, delay, advice);
+		"%s: not stable: %s oscillates %s, on a device of %g kg and "
+		"%g N s/mm with %s; %s, or describe the device",
+		plan->scene->path, run, how, s->device.mass_kg, s->device.damping_N_s_mm,
+		delay, advice);
 }

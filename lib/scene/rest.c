@@ -590,9 +590,22 @@ static void note(const struct search *s, const struct run *run, const struct win
 	};
 }
 
+/* What of a plan's forces is not late: the account of work lets the rest give none. */
+static struct incise_force_map paid_for(const struct incise_force_map *map)
+{
+	struct incise_force_map springs = {.mean_ticks = 1};
+
+	for (int i = 0; i < 9; i++) {
+		springs.now[i / 3][i % 3] =
+			map->now[i / 3][i % 3] + map->mean[i / 3][i % 3];
+		springs.mass[i / 3][i % 3] = map->mass[i / 3][i % 3];
+	}
+	return springs;
+}
+
 /*
- * Where a run came to rest, the loop as a linear one. If it swings, it is kicked that way, and must come to rest again:
- * the account of work, which the linear loop has not, may end it. Returns false if it does not.
+ * Where a run came to rest, the loop as a linear one. It must not swing; where only what is late makes it, and the
+ * account of work may end it, it is kicked that way, and must come to rest again. Returns whether it does.
  */
 static bool look(struct search *s, const struct run *run, double depth_mm, int way,
 		 struct incise_rest *rest)
@@ -616,7 +629,7 @@ static bool look(struct search *s, const struct run *run, double depth_mm, int w
 			.held = s->way.held,
 			.states = 1,
 		};
-		double most = rest->weakest.margin / (1 + s->way.reserve), settle_s;
+		double most = rest->weakest.margin / (1 + s->way.reserve), settle_s = -1;
 		struct incise_force_map map;
 		struct incise_swing swing = {0};
 		struct run kicked = *run;
@@ -625,23 +638,27 @@ static bool look(struct search *s, const struct run *run, double depth_mm, int w
 		incise_plan_force_map(&s->plan, to_ns(run->t_s), s->axis, side, &map);
 		here.margin =
 			incise_pose_loop_margin(&loop, run->device, &map, most, &swing);
-		here.paid = here.margin < 1;
 		for (int i = 0; i < 3; i++) {
 			kicked.device[i].position_mm += KICK_MM * swing.along[i];
 			v3_add(here.along, here.along, swing.along[i], s->axis[i]);
 		}
 		here.hz = swing.hz;
-		if (here.paid) {
+		if (here.margin < 1) {
+			const struct incise_force_map springs = paid_for(&map);
+
 			settle_s = lean(s, &kicked, &last);
+			here.paid = s->plan.accounts &&
+				    incise_pose_loop_margin(&loop, run->device, &springs,
+							    1, NULL) >= 1;
+			settle_s = here.paid ? settle_s : 0;
 			rest->runs++;
 			note(s, &kicked, &last, settle_s, way, rest);
-			here.margin = INCISE_PLAN_MARGIN_MOST;
-		} else {
-			here.margin *= 1 + s->way.reserve;
 		}
+		here.margin = here.paid ? INCISE_PLAN_MARGIN_MOST
+					: here.margin * (1 + s->way.reserve);
 		incise_rest_take_weakest(&rest->weakest, &here);
 		/* After a kick the other side is that of another state. */
-		if (here.paid)
+		if (settle_s >= 0)
 			return settle_s > 0;
 	}
 	return true;
