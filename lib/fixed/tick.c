@@ -9,6 +9,7 @@
 #include "../tissue/predict.proto.c"
 #include "../tissue/front.proto.c"
 #include "../tissue/incision.proto.c"
+#include "../tissue/tear.proto.c"
 #include "../tissue/tick.proto.c"
 
 _Static_assert(PLACES == INCISE_FIXED_CUT_PLACES, "as many as a cut has");

@@ -216,6 +216,21 @@ num T(input_time)(int64_t, int64_t)
 	return num::of(put({0, 32767, paths->tick_s, 2 * lsb_mm(), 16, false}));
 }
 
+/* The tip is as far off as settle_tear() says; at this tick it is no farther away than the tissue gives way. */
+void T(stage_fracture)(const struct T(plan) *plan, struct T(state) *state,
+		       struct T(tick) *tick)
+{
+	const struct T(line) *line = &state->front.line;
+	struct bounds stretch =
+		at(n_sub(place_along(line, tick->tool), state->tears.tip).id);
+
+	if (tick->phase != INCISE_PHASE_CUTTING)
+		return;
+	stretch.high = most_of(at(n_times(plan->numbers.gives, state->depth).id));
+	stretch.low = -stretch.high;
+	push(state, n_times(plan->numbers.fracture, num::of(put(stretch))), line->along);
+}
+
 uint32_t T(model_inputs)(const struct T(plan) *plan, int32_t phase)
 {
 	return plan->of->doubles.plan.inputs[phase];
@@ -734,6 +749,22 @@ static void settle_skin(struct tick *t)
 }
 
 /*
+ * The tip of a tear stays, to the bit, or is set by blade and depth of this tick, and by depths of its places, which are
+ * maxima over ticks before; a place ends at the same bit of both lines, which are as far apart as where they began.
+ */
+static void settle_tear(struct tick *t)
+{
+	num s = place_along(&t->state.front.line, t->tick.tool);
+	double off_mm = 2 * off(at(s.id)) +
+			2 * most_of(at(t->plan.numbers.gives.id)) * t->depth.both +
+			off(at(t->plan.numbers.gives.id)) * t->plan.reach_mm +
+			off(at(ball_of(t->state.p0))) + 8 * lsb_mm();
+
+	t->state.tears.tip =
+		num::of(put({-t->plan.reach_mm, t->plan.reach_mm, off_mm, 0, 16, false}));
+}
+
+/*
  * A cut that is remembered was the front's own, so that its numbers are as far off as that one's; which of them holds
  * the blade is a decision. The line of a cut began where the contact did; from there both ends are as uncertain as the tool. Its length
  * is what the front came up by in all ticks together: no more than that adds up.
@@ -804,9 +835,15 @@ static double bound_of(struct tick *t, int32_t held)
 	set_line(&t->state, &t->tick, t->plan.reach_mm,
 		 t->plan.turned_in + t->plan.turned_own);
 	set_ball(t->state.anchor, ball(t->plan.reach_mm, 0, 0, 32));
+	t->state.tears.tip =
+		num::of(put({-t->plan.reach_mm, t->plan.reach_mm, 0, 0, 16, false}));
 	run_paths(t);
 	if (t->cutting.high > 0) {
 		settle_front(t);
+		run_paths(t);
+	}
+	if (numbers->fracture > 0) {
+		settle_tear(t);
 		run_paths(t);
 	}
 	if (numbers->skin > 0 && numbers->skin_friction > 0) {

@@ -102,6 +102,9 @@ void incise_plan_set_numbers(struct incise_plan *plan)
 #define MORE(member)
 #include "../tissue/forces.def"
 	set_reaction(plan, numbers);
+	/* Both numbers go with the gain: so far the tissue gives way before it tears, by depth; 1 J/m² is 1e-3 N/mm. */
+	if (numbers->fracture > 0)
+		numbers->gives *= 1e-3 / scene->tissue.force[INCISE_FORCE_FRACTURE][0];
 	set_membrane(plan, &numbers->membrane);
 	set_model(plan, to);
 	to->proxy = &plan->proxy;

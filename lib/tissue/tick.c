@@ -9,6 +9,7 @@
 
 #include "front.proto.c"
 #include "incision.proto.c"
+#include "tear.proto.c"
 #include "tick.proto.c"
 
 _Static_assert(PLACES == INCISE_CUT_PLACES, "as many as a cut has");

@@ -8,6 +8,7 @@
  *               with a model F += F(d, |v|) n       Song et al. (2006), eq. (3), by the front
  *                                                            of front.proto.c
  *               plane       F -= Kx ((P-P0)·s) s             §2.2, Fx
+ *               fracture    F -= min(K |z|, J (d-D)) c z/|z| along the cut; in no paper, see tear.proto.c
  *   insertion   insertion   F += Ky d n Fort                 §2.3, Fy
  *               spread      F -= Kxz (I - n0 n0ᵀ)(P-P0)      §2.3, Fxz
  *   both        damping     F -= Kd v                        §2.2, Fd

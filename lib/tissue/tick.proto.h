@@ -135,6 +135,18 @@ num T(front_advance)(struct T(front) *front, const num at[3], const dir normal[3
 num T(front_force)(struct T(front) *front, num unloading, num friction, num depth,
 		   num advance, num cutting) INCISE_REALTIME;
 
+/* Lines along which a blade tore tissue, and how deep each place is torn; see tear.proto.c. Begins with {0}. */
+struct T(tears) {
+	num tip;     /* the tissue holds the edge here on its line … */
+	num torn[2]; /* … and is torn so far in that place, backwards and on … */
+	num depth;   /* … and so deep */
+	int32_t n, in, newest;
+	struct T(tear) {
+		struct T(line) line;
+		stored depth[INCISE_FIXED_CUT_PLACES];
+	} kept[T_FRONT_CUTS];
+};
+
 /* --- incision.proto.c --------------------------------------------------------------------- */
 
 /* Of a scene; lengths 0 … 1000. */
@@ -358,6 +370,7 @@ struct T(state) {
 		int32_t punctured;
 	} membrane;
 	wide anchor[3]; /* of the skin that drags; Q32 mm */
+	struct T(tears) tears;
 	struct T(account) account;
 	num force[3];	       /* of the tissue, before limits … */
 	num late[3];	       /* … and what of it is late */

@@ -41,7 +41,10 @@ build_examples() {
 
 @test "own_loop renders a scene: no force in the air, and that of the scene in the tissue" {
 	build_examples own_loop
-	run -0 --separate-stderr ./own_loop "$dest/usr/share/incise/scenes/liver.scene"
+	# but for the force along the cut
+	sed 's/fracture_J_m2 = .*;/fracture_J_m2 = 0.0;/' "$dest/usr/share/incise/scenes/liver.scene" >liver.scene
+	cp "$dest/usr/share/incise/scenes/liver.fis" .
+	run -0 --separate-stderr ./own_loop liver.scene
 	[ "${#lines[@]}" -eq 17 ]
 	[[ "${lines[-1]}" =~ ^4000\ ticks,\ [0-9]+\ late\;\ up\ to\ ([0-9.]+)\ mm\ and\ ([0-9.]+)\ N$ ]]
 	# The script goes 8 mm deep; predicted poses overshoot by less than a tenth of a mm there.

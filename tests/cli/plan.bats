@@ -22,7 +22,7 @@ setup() {
 # bats test_tags=check
 @test "plan reports as JSON: every stage is kept or left out" {
 	incise plan liver.scene --json >r.json
-	[ "$(key r.json kept)" = '["pose","predict","contact","reaction","start","limit"]' ]
+	[ "$(key r.json kept)" = '["pose","predict","contact","reaction","fracture","start","limit"]' ]
 	holds "$(key r.json stiffness_N_mm) < $(key r.json limit_N_mm)"
 	holds "$(key r.json margin) > 1 && $(key r.json margin) == $(key r.json weakest.margin)"
 	holds "$(key r.json weakest.states) > 20 && $(key r.json weakest.hz) > 5"

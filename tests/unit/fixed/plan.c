@@ -123,10 +123,11 @@ static const struct {
 	{AT(phases), 0, 0, ANY},
 	{AT(skin), 0, INT32_MAX, ANY},
 	{AT(skin_friction), 0, INT32_MAX, ANY},
+	{AT(fracture), 0, INT32_MAX, ANY},
+	{AT(gives), 0, INT32_MAX, ANY},
 	{AT(reserved[0]), 0, 0, ANY},
 	{AT(account), 0, INT32_MAX, ANY},
 	{AT(upright), 0, 1 << 16, ANY},
-	{AT(reserved[2]), 0, 0, ANY},
 };
 
 static bool has(const struct incise_fixed_numbers *numbers, int needs)
@@ -392,11 +393,13 @@ TEST(test_inputs)
 		int n = 0;
 
 		/* Forces that came later have a version of their own, which no other takes. */
-		if (head->numbers.skin || head->numbers.skin_friction) {
+		if (head->numbers.skin || head->numbers.skin_friction ||
+		    head->numbers.fracture || head->numbers.gives) {
 			assert_int_equal(head->version, INCISE_FIXED_PLAN_VERSION_MORE);
 			head->version = INCISE_FIXED_PLAN_VERSION;
 			assert_int_equal(open_sealed(bytes, size), -EINVAL);
 			head->numbers.skin = head->numbers.skin_friction = 0;
+			head->numbers.fracture = head->numbers.gives = 0;
 		}
 		assert_int_equal(open_sealed(bytes, size), 0);
 		assert_int_equal(incise_fixed_plan_open(&plan, bytes, size), 0);

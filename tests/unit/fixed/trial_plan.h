@@ -203,6 +203,8 @@ static inline void incise_fx_trial_tissue(struct incise_fx_trial *t,
 	numbers->spread = incise_fx_trial_of(t, 0, one, 0, most);
 	numbers->skin = incise_fx_trial_of(t, 0, one, 0, most);
 	numbers->skin_friction = incise_fx_trial_of(t, 0, one, 0, most);
+	numbers->fracture = incise_fx_trial_of(t, 0, one, 0, most);
+	numbers->gives = incise_fx_trial_of(t, 0, 2 * one, 0, most);
 	/* Without a model there is no front: the caller sets these back to 0. */
 	numbers->unloading = incise_fx_trial_in(t, 0, 1)
 				     ? incise_fx_trial_of(t, one / 8, 2 * one, 1, most)

@@ -229,7 +229,9 @@ static inline void add_other_numbers(const struct incise_tissue_force *force,
 			add_number(to, number->key,
 				   chance(seed, 0.3)
 					   ? 0
-					   : between(seed, 0, fmin(number->max, 3)));
+					   : between(seed, 0,
+						     fmin(number->max,
+							  fmax(3, 3 * number->skin))));
 	}
 }
 
@@ -237,7 +239,8 @@ static inline void add_other_numbers(const struct incise_tissue_force *force,
 static inline void add_tissue(uint64_t *seed, bool model, bool dissipates,
 			      struct text *to)
 {
-	int sure = below(seed, INCISE_FORCE_SKIN); /* none that acts by others alone */
+	int sure =
+		below(seed, INCISE_FORCE_FRACTURE); /* none that acts by others alone */
 
 	add(to, "tissue = { withdrawal = \"%s\"; orientation = \"%s\";",
 	    dissipates ? "dissipative" : "paper", chance(seed, 0.5) ? "eased" : "paper");
@@ -249,14 +252,16 @@ static inline void add_tissue(uint64_t *seed, bool model, bool dissipates,
 	    chance(seed, 0.5) ? 1 + below(seed, 4) : 1 + below(seed, 64));
 	for (int i = 0; i < incise_n_tissue_forces; i++) {
 		const struct incise_tissue_force *force = &incise_tissue_forces[i];
-		bool is = i == sure || chance(seed, 0.5);
+		/* One that came later leaves the scenes else as they were. */
+		uint64_t own = ~*seed, *from = i == INCISE_FORCE_FRACTURE ? &own : seed;
+		bool is = i == sure || chance(from, 0.5);
 
 		add_number(to, force->number[0].key,
 			   is && !(model && i == INCISE_FORCE_REACTION)
 				   ? fmax(force->number[0].skin, 1e-4) *
-					     sized(seed, 0.1, 50)
+					     sized(from, 0.1, 50)
 				   : 0);
-		add_other_numbers(force, seed, to);
+		add_other_numbers(force, from, to);
 	}
 	add(to, " };\n");
 }
@@ -634,6 +639,7 @@ static inline void add_forces(struct leaned *l, uint64_t *seed)
 	int average = chance(seed, 0.35) ? 1 : (int)sized(seed, 2, 64.99);
 	struct text *to = &l->text;
 	double normal[3], K;
+	uint64_t own;
 
 	add(to, "arithmetic = \"%s\";\neffects = { average_ticks = %d; };\n",
 	    fixed ? "fixed" : "double", average);
@@ -655,6 +661,11 @@ static inline void add_forces(struct leaned *l, uint64_t *seed)
 	K = any_spring(l, seed, 0.3, gain, "skin", "skin_N_mm");
 	if (K > 0)
 		add_number(to, "skin_friction", sized(seed, 0.02, 1));
+	/* It came later, and leaves the scenes else as they were. */
+	own = ~*seed;
+	K = any_spring(l, &own, 0.3, gain, "fracture", "fracture_N_mm");
+	if (K > 0)
+		add_number(to, "fracture_J_m2", 1e3 * K / gain * sized(&own, 0.02, 2));
 	if (chance(seed, 0.4)) {
 		K = l->damping_N_s_mm * sized(seed, 0.01, 0.5);
 		add_number(to, "damping_N_s_mm", fmin(K / gain, 1));

@@ -67,6 +67,7 @@ static void give_fixed(const struct given *g, struct incise_fixed_numbers *to)
 			state.side[i] = d(g->side[i]);                              \
 			state.flat[i] = d(g->flat[i]);                              \
 			state.opening.along[i] = d(g->along[i]);                    \
+			state.tears.kept[0].line.along[i] = d(g->along[i]);         \
 			plan.numbers.axis[i] = d(g->axis[i]);                       \
 			plan.numbers.side[i] = d(g->made[i]);                       \
 			state.force[i] = n(force[i]);                               \
@@ -546,6 +547,7 @@ static struct given given_in_tissue(enum incise_phase phase)
 			   [INCISE_FORCE_DAMPING] = {0.01},
 			   [INCISE_FORCE_INSERTION] = {0.75, 0.2},
 			   [INCISE_FORCE_SPREAD] = {0.125},
+			   [INCISE_FORCE_FRACTURE] = {0.375, 1},
 			   [INCISE_FORCE_SKIN] = {0.5, 0.1}},
 	};
 }
@@ -563,6 +565,8 @@ TEST(test_each_force_has_its_phases)
 		/* The flat side along the cut: aligned. */
 		{"insertion", {0}, {0, 0, 0.3}},
 		{"spread", {0}, {-0.125, -0.125, 0}},
+		/* 1 mm beyond its tip, of 2 mm for 2 mm of depth. */
+		{"fracture", {-0.375, 0, 0}, {0}},
 		/* It slips: a tenth of the 3 N that are there, against √2 mm of stretch. */
 		{"skin",
 		 {-0.3 * M_SQRT1_2, -0.3 * M_SQRT1_2, 0},
