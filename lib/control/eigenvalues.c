@@ -82,14 +82,22 @@ static void reflect(double *a, int n, int lo, int hi, int k, const double v[3])
 	}
 }
 
-/* A step of the block lo … hi, of three and more, with both shifts: their sum, their product. */
-static void step(double *a, int n, int lo, int hi, double sum, double product)
+/*
+ * Two shifts at once: @middle ± √@root2. What is near a shift is taken from it first, so that blocks whose eigenvalues
+ * are all one go on, too.
+ */
+struct shifts {
+	double middle, root2;
+};
+
+/* A step of the block lo … hi, of three and more. */
+static void step(double *a, int n, int lo, int hi, struct shifts by)
 {
+	double first = AT(lo, lo) - by.middle, second = AT(lo + 1, lo + 1) - by.middle;
 	double v[3] = {
-		AT(lo, lo) * AT(lo, lo) + AT(lo, lo + 1) * AT(lo + 1, lo) -
-			sum * AT(lo, lo) + product,
-		AT(lo + 1, lo) * (AT(lo, lo) + AT(lo + 1, lo + 1) - sum),
-		AT(lo + 1, lo) * AT(lo + 2, lo + 1),
+		(first * first - by.root2) / AT(lo + 1, lo) + AT(lo, lo + 1),
+		first + second,
+		AT(lo + 2, lo + 1),
 	};
 
 	for (int k = lo; k < hi; k++) {
@@ -140,18 +148,13 @@ static void balance(double *a, int n, int lo, int hi)
 	}
 }
 
-static void solve_two(double sum, double product, double complex eigenvalue[2])
+/* The eigenvalues of the last two rows. */
+static struct shifts last_two(const double *a, int n, int hi)
 {
-	double half = sum / 2, root2 = half * half - product, more;
+	double half = (AT(hi - 1, hi - 1) - AT(hi, hi)) / 2;
 
-	if (root2 < 0) {
-		eigenvalue[0] = half + I * sqrt(-root2);
-		eigenvalue[1] = conj(eigenvalue[0]);
-		return;
-	}
-	more = half + copysign(sqrt(root2), half);
-	eigenvalue[0] = more;
-	eigenvalue[1] = more != 0 ? product / more : 0;
+	return (struct shifts){AT(hi, hi) + half,
+			       half * half + AT(hi - 1, hi) * AT(hi, hi - 1)};
 }
 
 bool incise_eigenvalues(double *a, int n, double complex eigenvalue[])
@@ -167,41 +170,38 @@ bool incise_eigenvalues(double *a, int n, double complex eigenvalue[])
 	make_hessenberg(a, n);
 	for (int hi = n - 1; hi >= 0;) {
 		int lo = begin_of(a, n, hi, ldexp(most, steps / 4));
-		double complex two[2];
-		double sum, product;
+		struct shifts by;
+		double complex root;
 
 		if (lo == hi) {
 			eigenvalue[hi--] = AT(lo, lo);
 			steps = 0;
 			continue;
 		}
-		sum = AT(hi - 1, hi - 1) + AT(hi, hi);
-		product =
-			AT(hi - 1, hi - 1) * AT(hi, hi) - AT(hi - 1, hi) * AT(hi, hi - 1);
+		by = last_two(a, n, hi);
+		root = csqrt(by.root2);
 		if (lo == hi - 1) {
-			solve_two(sum, product, &eigenvalue[lo]);
+			eigenvalue[lo] = by.middle + root;
+			eigenvalue[hi] = by.middle - root;
 			hi -= 2;
 			steps = 0;
 			continue;
 		}
 		if (++steps > STEPS_MOST)
 			return false;
-		solve_two(sum, product, two);
 		/* Of two that are real the nearer one twice, as LAPACK does: both may go round in a circle. */
-		if (cimag(two[0]) == 0) {
-			double last = AT(hi, hi), a0 = creal(two[0]), a1 = creal(two[1]);
-
-			sum = 2 * (fabs(a0 - last) < fabs(a1 - last) ? a0 : a1);
-			product = sum * sum / 4;
-		}
+		if (by.root2 >= 0)
+			by = (struct shifts){by.middle + copysign(creal(root),
+								  AT(hi, hi) - by.middle),
+					     0};
+		/* Out of a circle of steps. */
 		if (steps % 10 == 0) {
-			balance(a, n, lo, hi);
 			double off = fabs(AT(hi, hi - 1)) + fabs(AT(hi - 1, hi - 2));
 
-			sum = 1.5 * off;
-			product = off * off;
+			balance(a, n, lo, hi);
+			by = (struct shifts){0.75 * off, -0.4375 * off * off};
 		}
-		step(a, n, lo, hi, sum, product);
+		step(a, n, lo, hi, by);
 	}
 	return true;
 }

@@ -647,9 +647,11 @@ static bool look(struct search *s, const struct run *run, double depth_mm, int w
 			const struct incise_force_map springs = paid_for(&map);
 
 			settle_s = lean(s, &kicked, &last);
-			here.paid = s->plan.accounts &&
-				    incise_pose_loop_margin(&loop, run->device, &springs,
-							    1, NULL) >= 1;
+			/* Without a frequency there were no eigenvalues: then the run decides. */
+			here.paid = !(swing.hz > 0) ||
+				    (s->plan.accounts &&
+				     incise_pose_loop_margin(&loop, run->device, &springs,
+							     1, NULL) >= 1);
 			settle_s = here.paid ? settle_s : 0;
 			rest->runs++;
 			note(s, &kicked, &last, settle_s, way, rest);
@@ -734,19 +736,6 @@ static void search(struct search *s, const struct incise_plan *plan,
 
 	*rest = (struct incise_rest){.rests = true,
 				     .weakest.margin = INCISE_PLAN_MARGIN_MOST};
-	for (int i = 0; i < N(guided); i++, number++) {
-		const struct way way = {.at = s->place,
-					.on = s->plane,
-					.tool = INCISE_TOOL_BLADE,
-					.start_mm = guided[i].start_mm,
-					.guided = true,
-					.along_mm_s = guided[i].along_mm_s,
-					.reserve = RESERVE,
-					.every = guided[i].every};
-
-		if (model && !lean_all(s, plan, trial, &way, number, rest))
-			return;
-	}
 	for (int i = 0; i < s->n_places * n_tools * N(held) * N(askew); i++, number++) {
 		enum incise_held by = held[i / N(askew) % N(held)];
 		int tool = i / N(askew) / N(held) % n_tools;
@@ -763,6 +752,19 @@ static void search(struct search *s, const struct incise_plan *plan,
 					 : FREE_EVERY};
 
 		if (!lean_all(s, plan, trial, &way, number, rest))
+			return;
+	}
+	for (int i = 0; i < N(guided); i++, number++) {
+		const struct way way = {.at = s->place,
+					.on = s->plane,
+					.tool = INCISE_TOOL_BLADE,
+					.start_mm = guided[i].start_mm,
+					.guided = true,
+					.along_mm_s = guided[i].along_mm_s,
+					.reserve = RESERVE,
+					.every = guided[i].every};
+
+		if (model && !lean_all(s, plan, trial, &way, number, rest))
 			return;
 	}
 }
