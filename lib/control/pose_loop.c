@@ -349,7 +349,8 @@ bool incise_pose_loop_holds(const struct incise_pose_loop *of, double stiffness_
 #define FACTOR 1.05
 #define STEPS 400
 #define HALVINGS 40
-#define MARGIN_HALVINGS 12
+#define MARGIN_LEAST (1.0 / 1024) /* of the most; below it there is none */
+#define MARGIN_HALVINGS 11 /* of its logarithm: within 3 thousandths */
 
 double incise_pose_loop_limit(const struct incise_pose_loop *of)
 {
@@ -439,12 +440,12 @@ double incise_pose_loop_margin(const struct incise_pose_loop *of,
 			       const struct incise_force_map *map, double most,
 			       struct incise_swing *swing)
 {
-	double low = 0, high = most;
+	double low = most * MARGIN_LEAST, high = most;
 
 	if (!(incise_pose_loop_swing(of, axis, map, most, NULL) > 0))
 		return most;
 	for (int i = 0; i < MARGIN_HALVINGS; i++) {
-		double middle = (low + high) / 2;
+		double middle = sqrt(low * high);
 
 		if (incise_pose_loop_swing(of, axis, map, middle, NULL) > 0)
 			high = middle;

@@ -60,7 +60,7 @@ static const struct {
 } guided[] = {{TOUCH_MM, 10, 4}, {DROP_MM, 10, 8}, {TOUCH_MM, 60, 4}, {DROP_MM, 60, 8}};
 
 #define FREE_EVERY 10
-#define LOOK_EVERY 5
+#define LOOK_EVERY 20
 #define PLACES 3
 static const double askew[] = {0.02, 0.25};
 /* The first one that swings is named: one that does not slide away, if there is any. */
@@ -603,6 +603,19 @@ static struct incise_force_map paid_for(const struct incise_force_map *map)
 	return springs;
 }
 
+/* Without a switch forces are the same on both sides, but for what bends. */
+static bool is_same(const struct incise_force_map *a, const struct incise_force_map *b)
+{
+	const double *x = (const double *)a, *y = (const double *)b;
+	double most = 0, off = 0;
+
+	for (int i = 0; i < 4 * 9; i++) { /* all its matrices */
+		most = fmax(most, fabs(x[i]));
+		off = fmax(off, fabs(x[i] - y[i]));
+	}
+	return off <= 1e-4 * most;
+}
+
 /*
  * Where a run came to rest, the loop as a linear one. It must not swing; where only what is late makes it, and the
  * account of work may end it, it is kicked that way, and must come to rest again. Returns whether it does.
@@ -617,6 +630,7 @@ static bool look(struct search *s, const struct run *run, double depth_mm, int w
 		.late_ticks = s->device.late_ticks,
 	};
 	const double *at_mm = s->way.at->point_mm;
+	struct incise_force_map map, before;
 
 	if (s->device.late_ticks > INCISE_POSE_LOOP_LATE_MAX)
 		return true;
@@ -630,12 +644,14 @@ static bool look(struct search *s, const struct run *run, double depth_mm, int w
 			.states = 1,
 		};
 		double most = rest->weakest.margin / (1 + s->way.reserve), settle_s = -1;
-		struct incise_force_map map;
 		struct incise_swing swing = {0};
 		struct run kicked = *run;
 		struct window last;
 
 		incise_plan_force_map(&s->plan, to_ns(run->t_s), s->axis, side, &map);
+		if (side && is_same(&map, &before))
+			break;
+		before = map;
 		here.margin =
 			incise_pose_loop_margin(&loop, run->device, &map, most, &swing);
 		for (int i = 0; i < 3; i++) {
@@ -689,10 +705,9 @@ static bool try(struct search *s, struct run *run, int lean_of, int way,
 	s->decides |= depth_mm >= 0;
 	if (!(settle_s > 0))
 		return false;
-	/* Of near leans the loops are near, too. */
-	return s->way.guided || !(depth_mm > 0) ||
-	       (s->way.every < FREE_EVERY && lean_of % LOOK_EVERY) ||
-	       look(s, run, depth_mm, way, rest);
+	/* A lean askew comes to rest nearly where a straight one does; of near leans the loops are near, too. */
+	return s->way.guided || !(depth_mm > 0) || s->way.start_mm > TOUCH_MM ||
+	       lean_of % LOOK_EVERY || look(s, run, depth_mm, way, rest);
 }
 
 /* All leans of a way. Returns whether they rest. */

@@ -6,6 +6,7 @@
 #include <string.h>
 #include "all_forces.h"
 #include "../../tools/cli/cli.h"
+#include "../../lib/scene/scene.h"
 #include "../../tools/cli/file.h"
 #include "ground.h"
 
@@ -119,7 +120,8 @@ struct incise_scene *ground_scene(const struct ground *ground, bool fixed, bool 
 	char tissue[1000], more[60];
 	struct incise_scene *made;
 
-	snprintf(more, sizeof(more), "leave_mm = %.17g;", GROUND_LEAVE_MM);
+	snprintf(more, sizeof(more), "leave_mm = %.17g;%s", GROUND_LEAVE_MM,
+		 model ? " unloading_N_mm = 1.0;" : "");
 	if (ground->write)
 		ground->write(surface.file);
 	ground_write_model(force.file);
@@ -149,6 +151,8 @@ struct incise_scene *ground_scene(const struct ground *ground, bool fixed, bool 
 	made = incise_scene_load(scene.path, model ? force.path : NULL, &err);
 	if (!made)
 		cli_fail_with(&err);
+	/* Whether it is stable is not asked here, and the search takes longer than all else; see scene.h. */
+	made->unchecked = true;
 	fclose(scene.file);
 	fclose(surface.file);
 	fclose(force.file);
