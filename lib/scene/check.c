@@ -506,12 +506,12 @@ static bool holds_still(struct incise_plan *plan,
 }
 
 /*
- * The advice is looked for down to a 4096th of the gain, and up to 64 times the damping: by the way that swung alone, by
+ * The advice is looked for down to a 4096th of the gain, and up to 16 times the damping: by the way that swung alone, by
  * halvings of its logarithm, and then tried in all ways; if another one swings, by that one.
  */
 #define GAIN_LEAST (1.0 / 4096)
-#define DAMPING_MOST 64 /* times the device's own, or than 1 mN s/mm */
-#define HALVINGS 7
+#define DAMPING_MOST 16 /* times the device's own, or than 1 mN s/mm */
+#define HALVINGS 5
 #define ATTEMPTS 6
 
 static double three_digits_up(double value)
@@ -535,7 +535,7 @@ static bool helps(struct incise_plan *plan, const struct incise_tracker_info *tr
 					   plan->stability.device.damping_N_s_mm, way);
 }
 
-/* The nearest value to @from, in three digits, that was tried and holds; 0: none was found. @way swung. */
+/* The nearest value to @from, in three digits, that was tried and holds; 0: none was found. @way swung, or -1. */
 static double find_advice(struct incise_plan *plan,
 			  const struct incise_tracker_info *tracker,
 			  const struct advice *advice, double from, int way)
@@ -549,7 +549,7 @@ static double find_advice(struct incise_plan *plan,
 		int any = -1;
 
 		/* The plan as it is was tried. */
-		if (i) {
+		if (way < 0 || i) {
 			if (helps(plan, tracker, advice, round(from), &any))
 				return round(from);
 			way = any;
@@ -571,19 +571,31 @@ static double find_advice(struct incise_plan *plan,
 	return 0;
 }
 
+/* So far above the limit of a flat wall nothing holds, and what is just below that limit is tried first. */
+#define FAR_ABOVE 4
+
 static double best_gain(struct incise_plan *plan,
 			const struct incise_tracker_info *tracker, int way)
 {
+	const struct incise_plan_stability *s = &plan->stability;
 	const struct advice advice = {false, 1 / GAIN_LEAST};
 
+	if (s->limit_N_mm > 0 && s->stiffness_N_mm > FAR_ABOVE * s->limit_N_mm)
+		return find_advice(plan, tracker, &advice,
+				   plan->gain * s->limit_N_mm / s->stiffness_N_mm / 1.05,
+				   -1);
 	return find_advice(plan, tracker, &advice, plan->gain, way);
 }
 
 static double best_damping(struct incise_plan *plan,
 			   const struct incise_tracker_info *tracker, int way)
 {
+	const struct incise_plan_stability *s = &plan->stability;
 	const struct advice advice = {true, DAMPING_MOST};
 
+	if (s->limit_N_mm > 0 &&
+	    s->stiffness_N_mm > FAR_ABOVE * DAMPING_MOST * s->limit_N_mm)
+		return 0;
 	return find_advice(plan, tracker, &advice,
 			   fmax(plan->stability.device.damping_N_s_mm, 1e-3), way);
 }

@@ -117,7 +117,7 @@ struct incise_scene *ground_scene(const struct ground *ground, bool fixed, bool 
 			   surface = memory_file_begin("ground"),
 			   force = memory_file_begin("model");
 	struct incise_error err = {0};
-	char tissue[1000], more[60];
+	char tissue[1000], more[100];
 	struct incise_scene *made;
 
 	snprintf(more, sizeof(more), "leave_mm = %.17g;%s", GROUND_LEAVE_MM,

@@ -123,7 +123,7 @@ const struct property wall_properties[] = {
 	 "generated scenes: walls of 1e-3 to 1e9 N/mm, devices of 1 g to 10 kg, rates of "
 	 "1 Hz to 64 kHz, any limits of force and slew: refused as no scene or as not "
 	 "stable, or within their limits",
-	 6000, .each = try_wall},
+	 2000, .each = try_wall},
 	{"scenes", "the scenes that ship, with good and bad poses: as above", 60000,
 	 .all = try_shipped},
 	{0},
