@@ -350,7 +350,7 @@ bool incise_pose_loop_holds(const struct incise_pose_loop *of, double stiffness_
 #define STEPS 400
 #define HALVINGS 40
 #define MARGIN_LEAST (1.0 / 1024) /* of the most; below it there is none */
-#define MARGIN_HALVINGS 11 /* of its logarithm: within 3 thousandths */
+#define MARGIN_HALVINGS 11	  /* of its logarithm: within 3 thousandths */
 
 double incise_pose_loop_limit(const struct incise_pose_loop *of)
 {

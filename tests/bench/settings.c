@@ -599,8 +599,8 @@ static bool search_scene(const struct lean_case *is, double gain, int sizes,
 		if (trial.way == WAYS)
 			none_ns = ns;
 		else
-			to->way[trial.way] = (typeof(*to->way)){rest.worst.guided, !rest.rests,
-								rest.runs, ns};
+			to->way[trial.way] = (typeof(*to->way)){
+				rest.worst.guided, !rest.rests, rest.runs, ns};
 	}
 	lean_all(plan, is, sizes, true, &end);
 	to->swings = end.swing_mm > CLOSED_LOOP_SWING_MM;
