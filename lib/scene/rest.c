@@ -590,15 +590,15 @@ static void note(const struct search *s, const struct run *run, const struct win
 	};
 }
 
-/* What of a plan's forces is not late: the account of work lets the rest give none. */
+/* As if its normal were not averaged: the account of work lets what is late by that give none. */
 static struct incise_force_map paid_for(const struct incise_force_map *map)
 {
-	struct incise_force_map springs = {.mean_ticks = 1};
+	struct incise_force_map springs = *map;
 
+	springs.mean_ticks = 1;
 	for (int i = 0; i < 9; i++) {
-		springs.now[i / 3][i % 3] =
-			map->now[i / 3][i % 3] + map->mean[i / 3][i % 3];
-		springs.mass[i / 3][i % 3] = map->mass[i / 3][i % 3];
+		springs.now[i / 3][i % 3] += map->mean[i / 3][i % 3];
+		springs.mean[i / 3][i % 3] = 0;
 	}
 	return springs;
 }
@@ -617,8 +617,8 @@ static bool is_same(const struct incise_force_map *a, const struct incise_force_
 }
 
 /*
- * Where a run came to rest, the loop as a linear one. It must not swing; where only what is late makes it, and the
- * account of work may end it, it is kicked that way, and must come to rest again. Returns whether it does.
+ * Where a run came to rest, the loop as a linear one. It must not swing; where only the averaged normal makes it,
+ * and the account of work may end it, it is kicked that way, and must come to rest again. Returns whether it does.
  */
 static bool look(struct search *s, const struct run *run, double depth_mm, int way,
 		 struct incise_rest *rest)
