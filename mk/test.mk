@@ -8,7 +8,9 @@ unit_sources := $(filter-out $(if $(has_libmnl),,tests/unit/can/socketcan%) \
 	$(if $(has_vision),,tests/unit/vision/%) $(if $(has_frames),,tests/unit/mkv/% tests/unit/film/%) \
 	$(if $(has_hdf5),,tests/unit/hdf5/%) $(if $(has_view),,tests/unit/view/%),\
 	$(wildcard tests/unit/*/*.c))
-unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(unit_sources))
+# The longest ones first: one that begins last runs alone.
+unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(filter %/extremes.c %/rest_3d.c,$(unit_sources)) \
+	$(filter-out %/extremes.c %/rest_3d.c,$(unit_sources)))
 
 # A tracker that is not there: some tests, and a program of its own.
 emulator := $(O)/obj/tests/polhemus/emulator.o

@@ -194,7 +194,7 @@ static int size_of(const struct loop *loop)
 }
 
 /* The effect of a period on each state, column by column. */
-static void measure(const struct loop *loop, double *matrix)
+static void measure_period(const struct loop *loop, double *matrix)
 {
 	int n = size_of(loop), axes = loop->axes;
 
@@ -228,7 +228,7 @@ static double complex fastest(double *matrix, int n, bool swings)
 		return DBL_MAX;
 	}
 	for (int i = 0; i < n; i++)
-		/* What is e times as large before it has turned by a radian only goes away. */
+		/* A motion that grows by e before it turns by a radian only goes away. */
 		if (cabs(all[i]) > cabs(most) && cimag(all[i]) >= 0 &&
 		    (!swings || carg(all[i]) > log(cabs(all[i]))))
 			most = all[i];
@@ -242,7 +242,7 @@ static bool stable(struct loop *loop, double stiffness_N_mm)
 		      (OWN_STATES + WAITING_MOST + INCISE_POSE_LOOP_LATE_MAX)];
 
 	loop->map.now[0][0] = stiffness_N_mm;
-	measure(loop, matrix);
+	measure_period(loop, matrix);
 	return cabs(fastest(matrix, loop->states, false)) <= 1 + GROWS;
 }
 
@@ -378,7 +378,7 @@ double incise_pose_loop_limit(const struct incise_pose_loop *of)
 	return low;
 }
 
-/* Which way the fastest swing goes: where the places of its plane are, or their speeds. */
+/* Direction of the fastest swing: that of its places, or of their speeds. */
 static void set_along(const struct loop *loop, const double *matrix,
 		      double complex eigenvalue, double *work, double along[3])
 {
@@ -423,7 +423,7 @@ double incise_pose_loop_swing(const struct incise_pose_loop *of,
 	if (!matrix)
 		return INFINITY;
 	work = matrix + (size_t)n * (size_t)n;
-	measure(&loop, matrix);
+	measure_period(&loop, matrix);
 	memcpy(work, matrix, (size_t)n * (size_t)n * sizeof(*work));
 	eigenvalue = fastest(work, n, true);
 	period_s = loop.ticks * loop.tick_s;

@@ -88,8 +88,8 @@ struct incise_swing {
 };
 
 /*
- * How fast that swing grows, 1/s; 0: none grows. What grows by e before it has turned by a radian is no swing, but
- * goes away, as a tool does that stands on a ball. The states are those of the loop above for each axis, and the places
+ * Growth of that swing, 1/s; 0: none grows. A motion that grows by e before it turns by a radian is no swing: it goes
+ * away, as a tool does that stands on a ball. The states are those of the loop above for each axis, and the places
  * of the mean: exact up to 32 ticks, within some hundredths up to 64.
  *
  * @param share  of all forces of the map

@@ -83,9 +83,9 @@ static void force_after(struct incise_plan *plan, const struct state *from, int6
 }
 
 /* A column: what a change of this size in @part makes of the force. */
-static void measure(struct incise_plan *plan, const struct state *from, int64_t t_ns,
-		    int ticks, struct change *change, double part[3],
-		    const double along[3], double size, double column[3])
+static void measure_column(struct incise_plan *plan, const struct state *from,
+			   int64_t t_ns, int ticks, struct change *change, double part[3],
+			   const double along[3], double size, double column[3])
 {
 	double with_N[3], without_N[3];
 
@@ -99,14 +99,14 @@ static void measure(struct incise_plan *plan, const struct state *from, int64_t 
 }
 
 /* Speeds and accelerations to both sides: what has a corner at rest, as |v| has, is the search's. */
-static void measure_middle(struct incise_plan *plan, const struct state *from,
-			   int64_t t_ns, struct change *change, double part[3],
-			   const double along[3], double size, double column[3])
+static void measure_mean_column(struct incise_plan *plan, const struct state *from,
+				int64_t t_ns, struct change *change, double part[3],
+				const double along[3], double size, double column[3])
 {
 	double other[3];
 
-	measure(plan, from, t_ns, 1, change, part, along, size, column);
-	measure(plan, from, t_ns, 1, change, part, along, -size, other);
+	measure_column(plan, from, t_ns, 1, change, part, along, size, column);
+	measure_column(plan, from, t_ns, 1, change, part, along, -size, other);
 	for (int i = 0; i < 3; i++)
 		column[i] = (column[i] + other[i]) / 2;
 }
@@ -146,16 +146,17 @@ void incise_plan_force_map(struct incise_plan *plan, int64_t t_ns,
 	for (int j = 0; j < 3; j++) {
 		double first[3], all_of_it[3], damping[3], mass[3] = {0};
 
-		measure(plan, &from, t_ns, 1, &change, change.x, axis[j], size, first);
+		measure_column(plan, &from, t_ns, 1, &change, change.x, axis[j], size,
+			       first);
 		v3_copy(all_of_it, first);
 		if (n > 1)
-			measure(plan, &from, t_ns, n + 1, &change, change.x, axis[j],
-				size, all_of_it);
-		measure_middle(plan, &from, t_ns, &change, change.v, axis[j], STEP_MM_S,
-			       damping);
+			measure_column(plan, &from, t_ns, n + 1, &change, change.x,
+				       axis[j], size, all_of_it);
+		measure_mean_column(plan, &from, t_ns, &change, change.v, axis[j],
+				    STEP_MM_S, damping);
 		if (plan->input_slope[INCISE_INPUT_ACCELERATION] > 0)
-			measure_middle(plan, &from, t_ns, &change, change.a, axis[j],
-				       STEP_MM_S2, mass);
+			measure_mean_column(plan, &from, t_ns, &change, change.a, axis[j],
+					    STEP_MM_S2, mass);
 		for (int i = 0; i < 3; i++) {
 			double at_once = v3_dot(axis[i], first);
 			double later = v3_dot(axis[i], all_of_it) - at_once;

@@ -30,7 +30,7 @@
 #define POSES_MOST 64 /* on their way */
 
 /*
- * What holds it: nothing; a spring across the normal, so that it does not slide away and is bare else; a firm hand. Its mass,
+ * The supports: nothing; a spring across the normal, which leaves the device bare but keeps it in its place; a firm hand. Its mass,
  * damping and stiffness are those of the arm that van Beek, Bergmann Tiest, Mugge and Kappers measured in a typical trial
  * (Haptic perception of force magnitude and its relation to postural arm dynamics in 3D, Scientific Reports 5, 18004,
  * 2015, fig. 3: 0.554 kg, 6.45 N s/m, 135 N/m), with four times its damping and stiffness.
@@ -493,7 +493,7 @@ static double depth_of(const struct search *s, const struct window *last)
 
 		v3_add(at_mm, at_mm, middle, s->axis[i]);
 	}
-	/* What jumps may be above it. */
+	/* A tool that jumps may be above it. */
 	depth_mm = fmax(-v3_dot(at_mm, s->way.at->normal), 0);
 	if (s->way.guided)
 		return depth_mm;
@@ -620,8 +620,8 @@ static bool is_same(const struct incise_force_map *a, const struct incise_force_
  * Where a run came to rest, the loop as a linear one. It must not swing; where only the averaged normal makes it,
  * and the account of work may end it, it is kicked that way, and must come to rest again. Returns whether it does.
  */
-static bool look(struct search *s, const struct run *run, double depth_mm, int way,
-		 struct incise_rest *rest)
+static bool judge_linear(struct search *s, const struct run *run, double depth_mm,
+			 int way, struct incise_rest *rest)
 {
 	const struct incise_haptic_device device = {.period_s = s->device.period_s};
 	const struct incise_pose_loop loop = {
@@ -707,7 +707,7 @@ static bool try(struct search *s, struct run *run, int lean_of, int way,
 		return false;
 	/* A lean askew comes to rest nearly where a straight one does; of near leans the loops are near, too. */
 	return s->way.guided || !(depth_mm > 0) || s->way.start_mm > TOUCH_MM ||
-	       lean_of % LOOK_EVERY || look(s, run, depth_mm, way, rest);
+	       lean_of % LOOK_EVERY || judge_linear(s, run, depth_mm, way, rest);
 }
 
 /* All leans of a way. Returns whether they rest. */

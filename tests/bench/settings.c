@@ -498,7 +498,7 @@ struct searched {
 	} way[WAYS];
 };
 
-/* What a part of the ways makes of all scenes. */
+/* All scenes, judged by a part of the ways. */
 static struct lean_row {
 	const char *name;
 	int first;

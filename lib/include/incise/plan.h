@@ -123,11 +123,11 @@ INCISE_API void incise_plan_top(const struct incise_plan *plan,
 INCISE_API const struct incise_surface *incise_plan_surface(
 	const struct incise_plan *plan);
 
-/** What holds a device in a search, besides the force that leans. */
+/** Support of a device in a search, besides the force that leans; incise-scene(5) has its figures. */
 enum incise_held {
-	INCISE_HELD_FREE,   /**< nothing */
-	INCISE_HELD_ACROSS, /**< across the normal, a spring of 0.54 N/mm without a mass */
-	INCISE_HELD_IN_HAND, /**< a firm hand: 0.554 kg, 0.0258 N s/mm, 0.54 N/mm */
+	INCISE_HELD_FREE,    /**< nothing */
+	INCISE_HELD_ACROSS,  /**< a spring across the normal, without a mass */
+	INCISE_HELD_IN_HAND, /**< mass, damping and stiffness of a firm hand */
 };
 
 /** A simulated loop. */

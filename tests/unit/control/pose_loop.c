@@ -264,6 +264,7 @@ TEST(test_in_space)
 		for (int i = 0; i < 3; i++)
 			along += swing.along[i] * n[i];
 		if (!turns)
+			/* The margin is found within 3 thousandths. */
 			assert_true(fabs(margin - 2) < 1e-2 && fabs(along) > 0.999);
 		else
 			assert_true(margin < 1.8);
