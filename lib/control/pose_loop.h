@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * Largest stable stiffness of a wall felt through a tracker: the loop of device, tracker,
- * predictor (with extrapolation and blending) and wall.
+ * predictor (with extrapolation and blending) and wall. The same in space, of any forces that are linear about a state of
+ * rest: incise_pose_loop_swing().
  *
  *   device ──pose, P apart──▶ latency ──▶ predict ──each tick T──▶ f = -Kx-Bv ──────┐
  *      ▲                                                                            │
