@@ -489,20 +489,38 @@ static int search(struct incise_plan *plan, const struct incise_tracker_info *tr
 	return rc;
 }
 
-/*
- * The search, with this gain of all forces, on a device with this damping: only the way *@way, or all where that is below 0, and then *@way becomes the one that swung.
- */
-static bool holds_still(struct incise_plan *plan,
-			const struct incise_tracker_info *tracker, double gain,
-			double damping_N_s_mm, int *way)
-{
-	const struct incise_rest_trial trial = {gain, damping_N_s_mm, *way};
-	struct incise_rest rest = {.way = -1};
-	bool still = !search(plan, tracker, &trial, &rest) && rest.rests;
+/* A gain, or a damping, that is looked for. */
+struct advice {
+	bool damps;
+	double most;		  /* so many times less, or more */
+	struct incise_rest swung; /* a run with the least gain that swung … */
+	double gain;		  /* … and that */
+};
 
-	if (!still && *way < 0)
+/*
+ * The search, with this gain or damping: only the way *@way, or all where that is below 0, and then *@way becomes the
+ * one that swung.
+ */
+static bool helps(struct incise_plan *plan, const struct incise_tracker_info *tracker,
+		  struct advice *advice, double value, int *way)
+{
+	const struct incise_rest_trial trial = {
+		.gain = advice->damps ? plan->gain : value,
+		.damping_N_s_mm =
+			advice->damps ? value : plan->stability.device.damping_N_s_mm,
+		.way = *way,
+	};
+	struct incise_rest rest = {.way = -1};
+
+	if (!search(plan, tracker, &trial, &rest) && rest.rests)
+		return true;
+	if (*way < 0)
 		*way = rest.way;
-	return still;
+	if (rest.way >= 0 && trial.gain < advice->gain) {
+		advice->swung = rest;
+		advice->gain = trial.gain;
+	}
+	return false;
 }
 
 /*
@@ -521,24 +539,10 @@ static double three_digits_up(double value)
 	return ceil(value / unit) * unit;
 }
 
-/* A gain, or a damping. */
-struct advice {
-	bool damps;
-	double most; /* so many times less, or more */
-};
-
-static bool helps(struct incise_plan *plan, const struct incise_tracker_info *tracker,
-		  const struct advice *advice, double value, int *way)
-{
-	return advice->damps ? holds_still(plan, tracker, plan->gain, value, way)
-			     : holds_still(plan, tracker, value,
-					   plan->stability.device.damping_N_s_mm, way);
-}
-
 /* The nearest value to @from, in three digits, that was tried and holds; 0: none was found. @way swung, or -1. */
 static double find_advice(struct incise_plan *plan,
 			  const struct incise_tracker_info *tracker,
-			  const struct advice *advice, double from, int way)
+			  struct advice *advice, double from, int way)
 {
 	double (*round)(double) = advice->damps ? three_digits_up : three_digits_down;
 	double factor = advice->damps ? 2 : 0.5,
@@ -575,51 +579,55 @@ static double find_advice(struct incise_plan *plan,
 #define FAR_ABOVE 4
 
 static double best_gain(struct incise_plan *plan,
-			const struct incise_tracker_info *tracker, int way)
+			const struct incise_tracker_info *tracker, struct advice *advice)
 {
 	const struct incise_plan_stability *s = &plan->stability;
-	const struct advice advice = {false, 1 / GAIN_LEAST};
 
+	advice->damps = false;
+	advice->most = 1 / GAIN_LEAST;
 	if (s->limit_N_mm > 0 && s->stiffness_N_mm > FAR_ABOVE * s->limit_N_mm)
-		return find_advice(plan, tracker, &advice,
+		return find_advice(plan, tracker, advice,
 				   plan->gain * s->limit_N_mm / s->stiffness_N_mm / 1.05,
 				   -1);
-	return find_advice(plan, tracker, &advice, plan->gain, way);
+	return find_advice(plan, tracker, advice, plan->gain, advice->swung.way);
 }
 
 static double best_damping(struct incise_plan *plan,
-			   const struct incise_tracker_info *tracker, int way)
+			   const struct incise_tracker_info *tracker, int way,
+			   struct advice *advice)
 {
 	const struct incise_plan_stability *s = &plan->stability;
-	const struct advice advice = {true, DAMPING_MOST};
 
+	advice->damps = true;
+	advice->most = DAMPING_MOST;
 	if (s->limit_N_mm > 0 &&
 	    s->stiffness_N_mm > FAR_ABOVE * DAMPING_MOST * s->limit_N_mm)
 		return 0;
-	return find_advice(plan, tracker, &advice,
+	return find_advice(plan, tracker, advice,
 			   fmax(plan->stability.device.damping_N_s_mm, 1e-3), way);
 }
 
 /* Say the gain and the damping that were tried and hold. */
 static void advise(struct incise_plan *plan, const struct incise_tracker_info *tracker,
-		   int way, char advice[200])
+		   struct advice *advice, char text[200])
 {
-	double gain = best_gain(plan, tracker, way);
-	double damping = best_damping(plan, tracker, way);
+	int way = advice->swung.way;
+	double gain = best_gain(plan, tracker, advice);
+	double damping = best_damping(plan, tracker, way, advice);
 
 	if (gain > 0 && damping > 0)
-		snprintf(advice, 200,
+		snprintf(text, 200,
 			 "set tissue.gain to at most %.3g, or use a device with "
 			 "device.damping_N_s_mm of at least %.3g",
 			 gain, damping);
 	else if (gain > 0)
-		snprintf(advice, 200, "set tissue.gain to at most %.3g", gain);
+		snprintf(text, 200, "set tissue.gain to at most %.3g", gain);
 	else if (damping > 0)
-		snprintf(advice, 200,
+		snprintf(text, 200,
 			 "use a device with device.damping_N_s_mm of at least %.3g",
 			 damping);
 	else
-		snprintf(advice, 200,
+		snprintf(text, 200,
 			 "no gain down to %.3g holds, and no damping of the device up "
 			 "to %.3g N s/mm",
 			 plan->gain * GAIN_LEAST,
@@ -653,38 +661,42 @@ int incise_plan_check_rest(struct incise_plan *plan,
 {
 	struct incise_plan_stability *s = &plan->stability;
 	const struct incise_rest_trial as_is = {plan->gain, s->device.damping_N_s_mm, -1};
-	char advice[200], run[160], delay[64], how[64];
-	struct incise_rest rest;
+	char text[200], run[160], delay[64], how[64], with[64] = "";
+	struct advice advice = {.gain = plan->gain};
+	struct incise_rest *rest = &advice.swung;
 
 	if (plan->scene->unchecked)
 		return 0;
-	if (search(plan, tracker, &as_is, &rest))
+	if (search(plan, tracker, &as_is, rest))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
-	s->runs = rest.runs;
-	s->worst = rest.worst;
-	s->weakest = rest.weakest;
-	s->noise_mm = rest.noise_mm;
-	s->noise_N = rest.noise_N;
-	if (rest.rests)
+	s->runs = rest->runs;
+	s->worst = rest->worst;
+	s->weakest = rest->weakest;
+	s->noise_mm = rest->noise_mm;
+	s->noise_N = rest->noise_N;
+	if (rest->rests)
 		return 0;
-	name_run(&rest, run);
-	advise(plan, tracker, rest.way, advice);
+	/* Names the run that limits the gain. */
+	advise(plan, tracker, &advice, text);
+	name_run(rest, run);
 	if (s->own_delay)
 		snprintf(delay, sizeof(delay), "a delay of %d ticks",
 			 s->device.delay_ticks);
 	else
 		snprintf(delay, sizeof(delay), "a tracker of %g Hz and %g ms",
 			 tracker->rate_hz, (double)tracker->latency_ns * 1e-6);
-	if (rest.worst.swing_mm > INCISE_REST_SWING_MM)
-		snprintf(how, sizeof(how), "by %.3f mm and %.2f N", rest.worst.swing_mm,
-			 rest.swing_N);
+	if (rest->worst.swing_mm > INCISE_REST_SWING_MM)
+		snprintf(how, sizeof(how), "by %.3f mm and %.2f N", rest->worst.swing_mm,
+			 rest->swing_N);
 	else
 		snprintf(how, sizeof(how), "with %.3g Hz, more and more",
-			 rest.weakest.hz);
+			 rest->weakest.hz);
+	if (advice.gain < plan->gain)
+		snprintf(with, sizeof(with), " already with a gain of %.3g", advice.gain);
 	return incise_error_set(
 		err, EDOM,
-		"%s: not stable: %s oscillates %s, on a device of %g kg and "
+		"%s: not stable: %s oscillates %s%s, on a device of %g kg and "
 		"%g N s/mm with %s; %s, or describe the device",
-		plan->scene->path, run, how, s->device.mass_kg, s->device.damping_N_s_mm,
-		delay, advice);
+		plan->scene->path, run, how, with, s->device.mass_kg,
+		s->device.damping_N_s_mm, delay, text);
 }

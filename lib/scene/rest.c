@@ -70,7 +70,8 @@ static const enum incise_held held[] = {INCISE_HELD_ACROSS, INCISE_HELD_IN_HAND,
 /* A tool that goes farther along the skin than this in a quarter slides on it: over hills that is no swing. */
 #define SLIDES_MM 1
 #define KICK_MM (5 * INCISE_REST_SWING_MM)
-#define AWAY_MM 40 /* and so far it is where no search began */
+#define AWAY_MM 40 /* so far aside it is where no search began … */
+#define DEEP_MM 80 /* … and so deep it has sunk */
 
 /*
  * Between the leans on a model that are tried there may be worse: forces count as so much larger, and the device's
@@ -444,11 +445,13 @@ static void see(struct range *range, double at)
 
 struct window {
 	struct range at_mm[3], N[3];
+	double from_mm[3], to_mm[3];
+	bool seen;
 };
 
 static struct window empty(void)
 {
-	struct window window;
+	struct window window = {.seen = false};
 
 	for (int i = 0; i < 3; i++)
 		window.at_mm[i] = window.N[i] = none;
@@ -460,7 +463,11 @@ static void see_run(struct window *window, const struct run *run)
 	for (int i = 0; i < 3; i++) {
 		see(&window->at_mm[i], run->device[i].position_mm);
 		see(&window->N[i], run->sent_N[i]);
+		window->to_mm[i] = run->device[i].position_mm;
+		if (!window->seen)
+			window->from_mm[i] = window->to_mm[i];
 	}
+	window->seen = true;
 }
 
 /* The largest of the axes that move by themselves. */
@@ -483,27 +490,49 @@ static double moved_of(const struct search *s, const struct range range[3])
 	return most;
 }
 
-/* Of the device; below 0 where it left the place, which decides nothing. */
+/* Whether it slides, or sinks: goes on by more than it swings. */
+static bool goes_on(const struct search *s, const struct window *last)
+{
+	return moved_of(s, last->at_mm) > SLIDES_MM + 2 * swing_of(s, last->at_mm);
+}
+
+/* Along the skin, and into it, of a way along the axes. */
+static double split(const struct search *s, const double way[3], double *into)
+{
+	double at[3] = {0};
+
+	for (int i = 0; i < 3; i++)
+		v3_add(at, at, way[i], s->axis[i]);
+	*into = -v3_dot(at, s->way.at->normal);
+	v3_add(at, at, *into, s->way.at->normal);
+	return v3_length(at);
+}
+
+/* Whether it slides, or is where no search began. */
+static bool has_left(const struct search *s, const struct window *last)
+{
+	double way_mm[3], into_mm;
+
+	if (s->way.guided)
+		return false;
+	v3_sub(way_mm, last->to_mm, last->from_mm);
+	if (goes_on(s, last) && split(s, way_mm, &into_mm) > SLIDES_MM)
+		return true;
+	return split(s, last->to_mm, &into_mm) > AWAY_MM || into_mm > DEEP_MM;
+}
+
+/* Of the device; below 0 where it left the place, or goes on: that decides nothing. */
 static double depth_of(const struct search *s, const struct window *last)
 {
-	double at_mm[3] = {0}, depth_mm, away2 = 0;
+	double middle_mm[3], into_mm;
 
-	for (int i = 0; i < 3; i++) {
-		double middle = (last->at_mm[i].low + last->at_mm[i].high) / 2;
-
-		v3_add(at_mm, at_mm, middle, s->axis[i]);
-	}
+	for (int i = 0; i < 3; i++)
+		middle_mm[i] = (last->at_mm[i].low + last->at_mm[i].high) / 2;
+	split(s, middle_mm, &into_mm);
 	/* A tool that jumps may be above it. */
-	depth_mm = fmax(-v3_dot(at_mm, s->way.at->normal), 0);
-	if (s->way.guided)
-		return depth_mm;
-	v3_add(at_mm, at_mm, -v3_dot(at_mm, s->way.at->normal), s->way.at->normal);
-	away2 = v3_dot(at_mm, at_mm);
-	return away2 > AWAY_MM * AWAY_MM || depth_mm > AWAY_MM ||
-			       moved_of(s, last->at_mm) >
-				       SLIDES_MM + 2 * swing_of(s, last->at_mm)
+	return !s->way.guided && (has_left(s, last) || goes_on(s, last))
 		       ? -1
-		       : depth_mm;
+		       : fmax(into_mm, 0);
 }
 
 /* Lean from the air on. Returns the time until it rested, or 0: it swings. */
@@ -518,6 +547,7 @@ static double lean(struct search *s, struct run *run, struct window *last)
 	*last = empty();
 	for (int k = 1;; k++) {
 		double swing_mm;
+		bool sinks;
 
 		tick(s, run);
 		go_to(s, run, begin_s + k * s->device.period_s);
@@ -542,10 +572,12 @@ static double lean(struct search *s, struct run *run, struct window *last)
 		if (k % quarter)
 			continue;
 		swing_mm = swing_of(s, last->at_mm);
-		/* After the first, in which it goes in. */
-		if (k > quarter && depth_of(s, last) < 0)
+		sinks = !s->way.guided && goes_on(s, last);
+		/* After the first, in which it goes in. What sinks may swing when it is deeper. */
+		if ((k > quarter && has_left(s, last)) ||
+		    (sinks && k >= LONGEST * quarter))
 			return k * s->device.period_s;
-		if (k >= QUARTERS * quarter) {
+		if (k >= QUARTERS * quarter && !sinks) {
 			bool falls = swing_mm < FALLS * before_mm;
 
 			if (swing_mm <= INCISE_REST_SWING_MM &&

@@ -26,6 +26,7 @@
 #define RUN_S 40
 #define AIR_S 0.1 /* and the ramp: no force before */
 #define AWAY_MM 60
+#define ASIDE_MM 20
 #define STILL_S 2.0
 #define STILL_MM 1e-4
 #define STILL_MM_S 1e-3
@@ -317,11 +318,12 @@ static void look(struct still *still, const struct body *body, double t_s)
 	}
 }
 
-/* Whether it slid off, or through. */
+/* Whether it slid off, or through; one that jumps comes back. */
 static bool has_left(const struct loop *loop, struct end *end)
 {
 	const struct leaned *l = loop->l;
-	double at_mm[3], way_mm[3];
+	const double *lean_N = loop->lean->force_N;
+	double at_mm[3], way_mm[3], across_mm[3];
 	struct incise_touch touch;
 
 	place_of(&loop->body, at_mm);
@@ -332,7 +334,10 @@ static bool has_left(const struct loop *loop, struct end *end)
 	    fmax(fabs(way_mm[0]), fabs(way_mm[1])) > RELIEF_MM - 2)
 		return true;
 	v3_sub(way_mm, at_mm, loop->body.from_mm);
-	return touch.depth_mm < -5 || v3_length(way_mm) > 2000 || touch.depth_mm > 300;
+	v3_add(across_mm, way_mm, -v3_dot(way_mm, lean_N) / v3_dot(lean_N, lean_N),
+	       lean_N);
+	return (touch.depth_mm < -5 && v3_length(across_mm) > ASIDE_MM) ||
+	       v3_length(way_mm) > 2000 || touch.depth_mm > 300;
 }
 
 /* @from_ns: of the plan's clock, which goes on. */
@@ -382,11 +387,14 @@ static struct end lean_on(struct incise_plan *plan, const struct leaned *l,
 		}
 		if (loop.t_s - still.since_s[1] < STILL_S)
 			continue;
-		/* What stands may fall: once. */
+		/* What stands may fall: once, and then it has as long again to come to rest. */
 		if (!kicked) {
 			for (int k = 0; k < 3; k++)
 				loop.body.v[k] += between(&seed, -20, 20);
 			kicked = true;
+			ticks += i;
+			quarter += i;
+			seen.n = 0;
 			continue;
 		}
 		end.outcome = loop.t_s - still.since_s[0] < STILL_S ? STEADY : RESTS;
