@@ -5,6 +5,7 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 #include <incise/plan.h>
@@ -152,7 +153,7 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 	const struct incise_haptic_device *d = &s->device;
 	const struct incise_plan_weakest *w = &s->weakest;
 
-	return json_pack("{so so so so so so so sf sf sf sf sf si "
+	return json_pack("{so so so so so so so sf sf sf sf sf si sI "
 			 "s{ss ss sb so sf sf sf sf sf sf} "
 			 "s{so so sf sf sf so ss ss si si} sf "
 			 "sf si sb sb s{sf sf sf sf sf si}}",
@@ -164,7 +165,8 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 			 json_number(encoder_N_mm(s)), "acceleration_slope_N_s2_mm",
 			 s->acceleration_slope_N_s2_mm, "slope_N_mm", s->slope_N_mm,
 			 "unloading_N_mm", s->unloading_N_mm, "support_mm", s->support_mm,
-			 "beyond_N_mm", s->beyond_N_mm, "leans", s->runs, "worst", "tool",
+			 "beyond_N_mm", s->beyond_N_mm, "leans", s->runs, "ticks",
+			 (json_int_t)s->ticks, "worst", "tool",
 			 loop_tool_names[s->worst.tool], "held",
 			 held_names[s->worst.held], "guided", s->worst.guided, "place_mm",
 			 json_numbers(s->worst.place_mm, 3), "askew", s->worst.askew,
@@ -317,9 +319,10 @@ static void print_rest(const struct incise_plan_stability *s)
 {
 	const double *at = s->worst.place_mm;
 
-	printf("            comes to rest: %d leans up to the limit; the slowest takes "
+	printf("            comes to rest: %d leans up to the limit, %" PRId64
+	       " ticks; the slowest takes "
 	       "%.2g s, of %.2f N",
-	       s->runs, s->worst.settle_s, s->worst.lean_N);
+	       s->runs, s->ticks, s->worst.settle_s, s->worst.lean_N);
 	if (s->worst.guided)
 		printf(" at %.1f mm", s->worst.depth_mm);
 	else

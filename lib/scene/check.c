@@ -479,11 +479,13 @@ static int search(struct incise_plan *plan, const struct incise_tracker_info *tr
 		if (rc)
 			break;
 		here.runs += rest->runs;
+		here.ticks += rest->ticks;
 		incise_rest_take_weakest(&here.weakest, &rest->weakest);
 		if (!here.rests || here.worst.settle_s > rest->worst.settle_s)
 			*rest = here;
 		rest->weakest = here.weakest;
 		rest->runs = here.runs;
+		rest->ticks = here.ticks;
 	}
 	plan->doubles.plan.holds = 0;
 	return rc;
@@ -670,6 +672,7 @@ int incise_plan_check_rest(struct incise_plan *plan,
 	if (search(plan, tracker, &as_is, rest))
 		return incise_error_set(err, ENOMEM, "no memory for a plan");
 	s->runs = rest->runs;
+	s->ticks = rest->ticks;
 	s->worst = rest->worst;
 	s->weakest = rest->weakest;
 	s->noise_mm = rest->noise_mm;

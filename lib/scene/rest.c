@@ -116,7 +116,8 @@ struct search {
 	struct incise_surface *plane; /* at the top, without an end */
 	struct incise_device device;
 	struct way way;
-	bool decides;	 /* a run of the way did */
+	bool decides; /* a run of the way did */
+	int64_t ticks;
 	double along[3]; /* in the skin */
 	double axis[3]
 		   [3]; /* in which the device moves: of a guided one the normal first */
@@ -353,6 +354,7 @@ static void tick(struct search *s, struct run *run)
 	     run->first++)
 		feed(s, run, run->first);
 	incise_plan_tick(&s->plan, to_ns(run->t_s), &out);
+	s->ticks++;
 	for (int i = 0; i < 3; i++) {
 		double change_N;
 
@@ -913,6 +915,7 @@ int incise_plan_rest(const struct incise_plan *plan,
 	search(s, plan, trial, rest);
 	if (rest->rests)
 		shake(s, plan, trial, rest);
+	rest->ticks = s->ticks;
 	incise_surface_free(s->plane);
 	free(s);
 	return 0;

@@ -19,7 +19,7 @@
  * Where it comes to rest, the loop is judged as a linear one, too: by the forces that a small motion meets there.
  *
  * A swing goes to and fro: a hand that sinks or creeps does not swing. Where the tool slides away, or sinks where
- * the tissue does not carry the lean, a run decides nothing.
+ * the tissue does not carry the lean, a run decides nothing; what sinks is followed until it rests deeper.
  */
 #ifndef INCISE_REST_H
 #define INCISE_REST_H
@@ -43,6 +43,7 @@ struct incise_rest_trial {
 struct incise_rest {
 	bool rests;
 	int runs;
+	int64_t ticks; /* of all runs */
 	/* The first run that swings, or the one that took longest to come to rest. */
 	struct incise_plan_lean worst;
 	double force_N[3]; /* its lean */

@@ -163,6 +163,7 @@ class StabilityStruct(ctypes.Structure):
         ("support_mm", c_double),
         ("beyond_N_mm", c_double),
         ("runs", c_int),
+        ("ticks", c_int64),
         ("worst", _Worst),
         ("weakest", _Weakest),
         ("noise_mm", c_double),

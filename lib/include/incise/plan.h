@@ -198,6 +198,7 @@ struct incise_plan_stability {
 	 * the scene's limit, and the loop that took longest to come to rest.
 	 */
 	int runs;
+	int64_t ticks; /**< of all of them: the same at each check of a scene */
 	struct incise_plan_lean worst;
 	struct incise_plan_weakest weakest; /**< of the same search */
 	/**
