@@ -26,7 +26,6 @@
 #define RUN_S 40
 #define AIR_S 0.1 /* and the ramp: no force before */
 #define AWAY_MM 60
-#define ASIDE_MM 20
 #define STILL_S 2.0
 #define STILL_MM 1e-4
 #define STILL_MM_S 1e-3
@@ -318,12 +317,11 @@ static void look(struct still *still, const struct body *body, double t_s)
 	}
 }
 
-/* Whether it slid off, or through; one that jumps comes back. */
+/* Whether it slid off, or through; one that jumps goes against the lean, and comes back. */
 static bool has_left(const struct loop *loop, struct end *end)
 {
 	const struct leaned *l = loop->l;
-	const double *lean_N = loop->lean->force_N;
-	double at_mm[3], way_mm[3], across_mm[3];
+	double at_mm[3], way_mm[3];
 	struct incise_touch touch;
 
 	place_of(&loop->body, at_mm);
@@ -334,9 +332,7 @@ static bool has_left(const struct loop *loop, struct end *end)
 	    fmax(fabs(way_mm[0]), fabs(way_mm[1])) > RELIEF_MM - 2)
 		return true;
 	v3_sub(way_mm, at_mm, loop->body.from_mm);
-	v3_add(across_mm, way_mm, -v3_dot(way_mm, lean_N) / v3_dot(lean_N, lean_N),
-	       lean_N);
-	return (touch.depth_mm < -5 && v3_length(across_mm) > ASIDE_MM) ||
+	return (touch.depth_mm < -5 && v3_dot(way_mm, loop->lean->force_N) > 0) ||
 	       v3_length(way_mm) > 2000 || touch.depth_mm > 300;
 }
 
