@@ -154,8 +154,8 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 	const struct incise_plan_weakest *w = &s->weakest;
 
 	return json_pack("{so so so so so so so sf sf sf sf sf si sI "
-			 "s{ss ss sb so sf sf sf sf sf sf} "
-			 "s{so so sf sf sf so ss ss si si} sf "
+			 "s{ss ss sb sb so sf sf sf sf sf sf} "
+			 "s{so so sf sf sf so ss ss sb si si} sf "
 			 "sf si sb sb s{sf sf sf sf sf si}}",
 			 "stiffness_N_mm", json_number(s->stiffness_N_mm), "limit_N_mm",
 			 json_number(s->limit_N_mm), "margin", weakest_margin(w),
@@ -168,21 +168,21 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 			 "beyond_N_mm", s->beyond_N_mm, "leans", s->runs, "ticks",
 			 (json_int_t)s->ticks, "worst", "tool",
 			 loop_tool_names[s->worst.tool], "held",
-			 held_names[s->worst.held], "guided", s->worst.guided, "place_mm",
-			 json_numbers(s->worst.place_mm, 3), "askew", s->worst.askew,
-			 "lean_N", s->worst.lean_N, "along_mm_s", s->worst.along_mm_s,
-			 "depth_mm", s->worst.depth_mm, "swing_mm", s->worst.swing_mm,
-			 "settle_s", s->worst.settle_s, "weakest", "margin",
-			 weakest_margin(w), "along", json_numbers(w->along, 3), "hz",
-			 w->hz, "lean_N", w->lean_N, "depth_mm", w->depth_mm, "place_mm",
-			 json_numbers(w->place_mm, 3), "tool", loop_tool_names[w->tool],
-			 "held", held_names[w->held], "states", w->states, "paid",
-			 w->paid, "noise_mm", s->noise_mm, "noise_N", s->noise_N,
-			 "late_ticks", s->late_ticks, "certified", s->certified,
-			 "own_delay", s->own_delay, "device", "mass_kg", d->mass_kg,
-			 "damping_N_s_mm", d->damping_N_s_mm, "coulomb_N", d->coulomb_N,
-			 "encoder_mm", d->encoder_mm, "period_s", d->period_s,
-			 "delay_ticks", d->delay_ticks);
+			 held_names[s->worst.held], "guided", s->worst.guided, "tilted",
+			 s->worst.tilted, "place_mm", json_numbers(s->worst.place_mm, 3),
+			 "askew", s->worst.askew, "lean_N", s->worst.lean_N, "along_mm_s",
+			 s->worst.along_mm_s, "depth_mm", s->worst.depth_mm, "swing_mm",
+			 s->worst.swing_mm, "settle_s", s->worst.settle_s, "weakest",
+			 "margin", weakest_margin(w), "along", json_numbers(w->along, 3),
+			 "hz", w->hz, "lean_N", w->lean_N, "depth_mm", w->depth_mm,
+			 "place_mm", json_numbers(w->place_mm, 3), "tool",
+			 loop_tool_names[w->tool], "held", held_names[w->held], "tilted",
+			 w->tilted, "states", w->states, "paid", w->paid, "noise_mm",
+			 s->noise_mm, "noise_N", s->noise_N, "late_ticks", s->late_ticks,
+			 "certified", s->certified, "own_delay", s->own_delay, "device",
+			 "mass_kg", d->mass_kg, "damping_N_s_mm", d->damping_N_s_mm,
+			 "coulomb_N", d->coulomb_N, "encoder_mm", d->encoder_mm,
+			 "period_s", d->period_s, "delay_ticks", d->delay_ticks);
 }
 
 /* The rig's actuators: direction, and stability of a wall along it. */
@@ -301,11 +301,11 @@ static void print_weakest(const struct incise_plan_weakest *w)
 {
 	if (w->margin < INCISE_PLAN_MARGIN_MOST)
 		printf("margin %.3g: with so many times its forces it swings along (%.2f, %.2f, %.2f) with %.3g Hz\n"
-		       "            there %.3g N hold the %s %.3g mm deep at (%.4g, %.4g, %.4g), %s: the weakest of %d states of rest\n",
+		       "            there %.3g N hold the %s%s %.3g mm deep at (%.4g, %.4g, %.4g), %s: the weakest of %d states of rest\n",
 		       w->margin, w->along[0] + 0.0, w->along[1] + 0.0, w->along[2] + 0.0,
-		       w->hz, w->lean_N, loop_tool_names[w->tool], w->depth_mm,
-		       w->place_mm[0], w->place_mm[1], w->place_mm[2],
-		       held_names[w->held], w->states);
+		       w->hz, w->lean_N, w->tilted ? "tilted " : "",
+		       loop_tool_names[w->tool], w->depth_mm, w->place_mm[0],
+		       w->place_mm[1], w->place_mm[2], held_names[w->held], w->states);
 	else
 		printf("margin: none; in %d states of rest it swings not even with %d times its forces\n",
 		       w->states - w->paid, INCISE_PLAN_MARGIN_MOST);
@@ -326,10 +326,11 @@ static void print_rest(const struct incise_plan_stability *s)
 	if (s->worst.guided)
 		printf(" at %.1f mm", s->worst.depth_mm);
 	else
-		printf(", %.0f %% of it along the skin, by the %s at (%.4g, %.4g, %.4g), "
+		printf(", %.0f %% of it along the skin, by the %s%s at (%.4g, %.4g, %.4g), "
 		       "%s",
-		       100 * s->worst.askew, loop_tool_names[s->worst.tool], at[0], at[1],
-		       at[2], held_names[s->worst.held]);
+		       100 * s->worst.askew, s->worst.tilted ? "tilted " : "",
+		       loop_tool_names[s->worst.tool], at[0], at[1], at[2],
+		       held_names[s->worst.held]);
 	if (s->worst.along_mm_s > 0)
 		printf(", while it goes along the skin with %g mm/s",
 		       s->worst.along_mm_s);

@@ -651,10 +651,11 @@ static void name_run(const struct incise_rest *rest, char name[160])
 			"the blade, along the skin at %.0f mm/s, under %.3g N, %.1f mm deep,",
 			worst->along_mm_s, worst->lean_N, worst->depth_mm);
 	else
-		snprintf(name, 160,
-			 "the %s, %s, under [%.3g, %.3g, %.3g] N at [%.2f, %.2f, %.2f],",
-			 tools[worst->tool], held[worst->held], N[0], N[1], N[2], at[0],
-			 at[1], at[2]);
+		snprintf(
+			name, 160,
+			"the %s%s, %s, under [%.3g, %.3g, %.3g] N at [%.2f, %.2f, %.2f],",
+			worst->tilted ? "tilted " : "", tools[worst->tool],
+			held[worst->held], N[0], N[1], N[2], at[0], at[1], at[2]);
 }
 
 int incise_plan_check_rest(struct incise_plan *plan,

@@ -54,6 +54,7 @@ static const struct incise_hand_impedance holds[] = {
 #define LEAN_MOST 0.96
 #define TOUCH_MM 0.1
 #define DROP_MM 3
+#define TILT (40 * M_PI / 180)
 static const struct {
 	double start_mm, along_mm_s;
 	int every; /* of the leans */
@@ -71,7 +72,7 @@ static const enum incise_held held[] = {INCISE_HELD_ACROSS, INCISE_HELD_IN_HAND,
 #define SLIDES_MM 1
 #define KICK_MM (5 * INCISE_REST_SWING_MM)
 #define AWAY_MM 40 /* so far aside it is where no search began … */
-#define DEEP_MM 80 /* … and so deep it has sunk */
+#define DEEP_MM 80 /* … and so deep, or nearly as deep as there is tissue, it has sunk */
 
 /*
  * Between the leans on a model that are tried there may be worse: forces count as so much larger, and the device's
@@ -99,6 +100,7 @@ struct way {
 	double along_mm_s;     /* … while it goes along the skin */
 	enum incise_held held; /* else so … */
 	double askew;	       /* … with this share along the skin */
+	bool tilted;	       /* TILT about the way that it would cut, else upright */
 	double reserve;
 	int every; /* of the leans */
 };
@@ -119,6 +121,8 @@ struct search {
 	bool decides; /* a run of the way did */
 	int64_t ticks;
 	double along[3]; /* in the skin */
+	double turn[4];	 /* of the tool */
+	double deep_mm;	 /* what is deeper has sunk: it nears another side */
 	double axis[3]
 		   [3]; /* in which the device moves: of a guided one the normal first */
 };
@@ -220,6 +224,45 @@ void incise_plan_device(const struct incise_plan *plan,
 	}
 }
 
+/* The least turn of a unit vector to another, w first. */
+static void set_turn(double turn[4], const double from[3], const double to[3])
+{
+	double axis[3], middle[3];
+
+	v3_add(middle, from, 1, to);
+	if (!v3_unit(middle, middle, 1e-6))
+		v3_any_across(middle, from);
+	v3_cross(axis, from, middle);
+	turn[0] = v3_dot(from, middle);
+	v3_copy(turn + 1, axis);
+}
+
+/* Tilt what is turned about a unit vector. */
+static void tilt(double turn[4], const double about[3], double angle)
+{
+	double c = cos(angle / 2), s = sin(angle / 2), *v = turn + 1, cross[3];
+	double w = c * turn[0] - s * v3_dot(about, v);
+
+	v3_cross(cross, about, v);
+	for (int i = 0; i < 3; i++)
+		v[i] = c * v[i] + s * (turn[0] * about[i] + cross[i]);
+	turn[0] = w;
+}
+
+/* Twice as deep it is still nearer to here than to another side. */
+static double deep_of(const struct way *way)
+{
+	double deep_mm = DEEP_MM, at_mm[3];
+	struct incise_touch touch;
+
+	for (;; deep_mm *= 0.8) {
+		v3_add(at_mm, way->at->point_mm, -2 * deep_mm, way->at->normal);
+		incise_surface_nearest(way->on, at_mm, &touch);
+		if (touch.depth_mm >= deep_mm || deep_mm < DEEP_MM * 1e-3)
+			return deep_mm;
+	}
+}
+
 /* The device and its axes in a way. */
 static void set_way(struct search *s, const struct incise_scene *scene,
 		    const struct way *way)
@@ -228,10 +271,15 @@ static void set_way(struct search *s, const struct incise_scene *scene,
 	double across[3];
 
 	s->way = *way;
+	s->deep_mm = deep_of(way);
+	set_turn(s->turn, scene->tool.axis, n);
 	/* A guided blade cuts, a free tool leans to both sides of that. */
-	v3_cross(s->along, scene->tool.side, n);
+	v3_rotate(across, s->turn, scene->tool.side);
+	v3_cross(s->along, across, n);
 	if (!v3_unit(s->along, s->along, 0.1))
 		v3_any_across(s->along, n);
+	if (way->tilted)
+		tilt(s->turn, s->along, TILT);
 	if (!way->guided) {
 		v3_cross(across, n, s->along);
 		v3_add(s->along, s->along, 1, across);
@@ -333,9 +381,9 @@ static void feed(struct search *s, const struct run *run, unsigned int pose)
 	struct incise_tracker_sample sample = {
 		.t_ns = to_ns(run->pose[pose % POSES_MOST].arrival_s),
 		.status = ' ',
-		.quaternion = {1},
 	};
 
+	memcpy(sample.quaternion, s->turn, sizeof(s->turn));
 	v3_copy(sample.position_mm, s->way.at->point_mm);
 	for (int i = 0; i < 3; i++)
 		v3_add(sample.position_mm, sample.position_mm,
@@ -520,7 +568,7 @@ static bool has_left(const struct search *s, const struct window *last)
 	v3_sub(way_mm, last->to_mm, last->from_mm);
 	if (goes_on(s, last) && split(s, way_mm, &into_mm) > SLIDES_MM)
 		return true;
-	return split(s, last->to_mm, &into_mm) > AWAY_MM || into_mm > DEEP_MM;
+	return split(s, last->to_mm, &into_mm) > AWAY_MM || into_mm > s->deep_mm;
 }
 
 /* Of the device; below 0 where it left the place, or goes on: that decides nothing. */
@@ -614,6 +662,7 @@ static void note(const struct search *s, const struct run *run, const struct win
 			  .tool = s->way.tool,
 			  .held = s->way.held,
 			  .guided = s->way.guided,
+			  .tilted = s->way.tilted,
 			  .depth_mm = depth_mm,
 			  .swing_mm = swing_of(s, last->at_mm),
 			  .settle_s = settle_s},
@@ -675,6 +724,7 @@ static bool judge_linear(struct search *s, const struct run *run, double depth_m
 			.place_mm = {at_mm[0], at_mm[1], at_mm[2]},
 			.tool = s->way.tool,
 			.held = s->way.held,
+			.tilted = s->way.tilted,
 			.states = 1,
 		};
 		double most = rest->weakest.margin / (1 + s->way.reserve), settle_s = -1;
@@ -739,9 +789,9 @@ static bool try(struct search *s, struct run *run, int lean_of, int way,
 	s->decides |= depth_mm >= 0;
 	if (!(settle_s > 0))
 		return false;
-	/* A lean askew comes to rest nearly where a straight one does; of near leans the loops are near, too. */
-	return s->way.guided || !(depth_mm > 0) || s->way.start_mm > TOUCH_MM ||
-	       lean_of % LOOK_EVERY || judge_linear(s, run, depth_mm, way, rest);
+	/* Of near leans the loops are near, too. */
+	return s->way.guided || !(depth_mm > 0) || lean_of % LOOK_EVERY ||
+	       judge_linear(s, run, depth_mm, way, rest);
 }
 
 /* All leans of a way. Returns whether they rest. */
@@ -795,6 +845,7 @@ static void search(struct search *s, const struct incise_plan *plan,
 			.start_mm = i % N(askew) ? DROP_MM : TOUCH_MM,
 			.held = by,
 			.askew = askew[i % N(askew)],
+			.tilted = i % N(askew),
 			.reserve = model ? RESERVE : FREE_RESERVE,
 			.every = model && by == INCISE_HELD_ACROSS && !tool
 					 ? 1 + i % N(askew)

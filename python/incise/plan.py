@@ -122,6 +122,7 @@ class _Worst(ctypes.Structure):
         ("tool", c_int),
         ("held", c_int),
         ("guided", c_bool),
+        ("tilted", c_bool),
         ("depth_mm", c_double),
         ("swing_mm", c_double),
         ("settle_s", c_double),
@@ -140,6 +141,7 @@ class _Weakest(ctypes.Structure):
         ("place_mm", c_double * 3),
         ("tool", c_int),
         ("held", c_int),
+        ("tilted", c_bool),
         ("states", c_int),
         ("paid", c_int),
     ]

@@ -139,6 +139,7 @@ struct incise_plan_lean {
 	enum incise_tool tool; /**< that leans */
 	enum incise_held held;
 	bool guided; /**< along the normal only */
+	bool tilted; /**< the tool: by 40 degrees about the way that it would cut; else it is upright on the skin */
 	double depth_mm, swing_mm, settle_s;
 };
 
@@ -154,7 +155,8 @@ struct incise_plan_weakest {
 	double place_mm[3];    /**< of the surface */
 	enum incise_tool tool; /**< that leans */
 	enum incise_held held;
-	int states; /**< looked at */
+	bool tilted; /**< as above */
+	int states;  /**< looked at */
 	/** Of them, those with a margin below 1 that rest all the same: the account of work ends their swings. */
 	int paid;
 };

@@ -557,8 +557,41 @@ static int lean_all(uint64_t seed, struct incise_plan *plan, const struct leaned
 	return swings;
 }
 
+/* Turn by an angle about a unit vector, after @q. */
+static void turn(double q[4], const double about[3], double angle)
+{
+	double c = cos(angle / 2), s = sin(angle / 2), w = q[0], v[3], cross[3];
+
+	v3_copy(v, q + 1);
+	v3_cross(cross, about, v);
+	q[0] = c * w - s * v3_dot(about, v);
+	for (int i = 0; i < 3; i++)
+		q[1 + i] = c * v[i] + s * (w * about[i] + cross[i]);
+}
+
+/* Upright on the skin, or tilted by 40 degrees about the way that the blade would cut. */
+static void set_attitude(const struct incise_plan *plan, bool tilted, struct lean *lean)
+{
+	const double *n = lean->place.normal;
+	struct incise_scene_scalpel scalpel;
+	double about[3], side[3];
+
+	incise_scene_scalpel(plan->scene, &scalpel);
+	lean->q[0] = 1;
+	v3_cross(about, scalpel.axis, n);
+	if (!v3_unit(about, about, 1e-6))
+		v3_any_across(about, n);
+	turn(lean->q, about, acos(fmax(-1, fmin(1, v3_dot(scalpel.axis, n)))));
+	v3_rotate(side, lean->q, scalpel.side);
+	v3_cross(about, side, n);
+	if (!v3_unit(about, about, 0.1))
+		v3_any_across(about, n);
+	if (tilted)
+		turn(lean->q, about, 40 * M_PI / 180);
+}
+
 /*
- * What a refusal names: "… the tube, held across, under [0.1, 0, -0.91] N at [-20.81, 33.32, 28.95], oscillates …"; what
+ * What a refusal names: "… the tilted tube, held across, under [0.1, 0, -0.91] N at [-20.81, 33.32, 28.95], oscillates …"; what
  * holds it as in <incise/plan.h>. None: it moves along a plane.
  */
 static bool named_lean(const char *why, const struct incise_plan *plan, struct lean *lean)
@@ -567,7 +600,7 @@ static bool named_lean(const char *why, const struct incise_plan *plan, struct l
 	double place_mm[3], *N = lean->force_N;
 	char tool[20], held[20];
 
-	*lean = (struct lean){.tool = INCISE_TOOL_BLADE, .q = {1}};
+	*lean = (struct lean){.tool = INCISE_TOOL_BLADE};
 	if (!at ||
 	    sscanf(at,
 		   "not stable: the %19[^,], %19[^,], under [%lf, %lf, %lf] N at [%lf, %lf, %lf]",
@@ -575,7 +608,8 @@ static bool named_lean(const char *why, const struct incise_plan *plan, struct l
 		   &place_mm[2]) != 8)
 		return false;
 	incise_surface_nearest(incise_plan_surface(plan), place_mm, &lean->place);
-	if (!strcmp(tool, "tube"))
+	set_attitude(plan, !strncmp(tool, "tilted ", 7), lean);
+	if (strstr(tool, "tube"))
 		lean->tool = INCISE_TOOL_TUBE;
 	lean->all_round = !strcmp(held, "in a hand");
 	lean->hand_N_mm = strcmp(held, "free") ? 0.54 : 0;
