@@ -12,7 +12,7 @@
  * constant force up to the scene's limit:
  *
  *   - of all scenes, free in three dimensions, on the surface as it is: at its top and, of a mesh, where it is
- *     the most concave and the most convex; with blade and tube, straight and askew;
+ *     the most concave and the most convex; with blade and tube, upright and straight, tilted and askew;
  *   - of a model besides, guided along the normal of the top, on the plane that touches it there, while it goes
  *     along the skin.
  *
