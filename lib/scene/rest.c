@@ -906,40 +906,94 @@ static void shake(struct search *s, const struct incise_plan *plan,
 	rest->noise_N = fmin(window.N[0].rise, window.N[0].fall);
 }
 
+/* Whether the skin goes on around a place: at a border a contact ends. */
+#define AROUND_MM 5
+static bool is_inside(const struct incise_surface *surface, const double at_mm[3],
+		      const double normal[3])
+{
+	double along[3], across[3];
+
+	v3_any_across(along, normal);
+	v3_cross(across, normal, along);
+	for (int i = 0; i < 8; i++) {
+		double turn = M_PI / 4 * i, to_mm[3], way[3];
+		struct incise_touch touch;
+
+		v3_add(to_mm, at_mm, AROUND_MM * cos(turn), along);
+		v3_add(to_mm, to_mm, AROUND_MM * sin(turn), across);
+		incise_surface_nearest(surface, to_mm, &touch);
+		v3_sub(way, touch.point_mm, at_mm);
+		if (v3_length(way) < AROUND_MM / 2.0)
+			return false;
+	}
+	return true;
+}
+
+/* The top, or, where that is at a border, a place on the way to the middle. */
+#define STEPS_IN 16
+static void set_top(struct search *s, const struct incise_surface *surface)
+{
+	struct incise_touch top;
+	double middle_mm[3] = {0};
+
+	incise_surface_top(surface, &top);
+	s->place[s->n_places++] = top;
+	for (uint32_t i = 0; surface->mesh && i < surface->mesh->n_vertices; i++)
+		v3_add(middle_mm, middle_mm, 1.0 / surface->mesh->n_vertices,
+		       surface->mesh->vertex[i]);
+	for (int i = 1; surface->mesh && i < STEPS_IN; i++) {
+		double at_mm[3];
+
+		if (is_inside(surface, top.point_mm, top.normal)) {
+			s->place[0] = top;
+			return;
+		}
+		v3_sub(at_mm, middle_mm, s->place[0].point_mm);
+		v3_add(at_mm, s->place[0].point_mm, (double)i / STEPS_IN, at_mm);
+		incise_surface_nearest(surface, at_mm, &top);
+	}
+}
+
 /*
- * The top; of a mesh also the corner where it is the most concave along an edge, and the most convex: there normals
+ * Besides the top, of a mesh the corners where it is the most concave along an edge, and the most convex: there normals
  * turn the most, 1/mm.
  */
+#define LOOKS_MOST 1000
 static void set_places(struct search *s, const struct incise_surface *surface)
 {
 	const struct mesh *mesh = surface->mesh;
 	uint32_t most[2] = {0, 0};
 	double bend[2] = {0, 0};
+	int looks = 0;
 
-	incise_surface_top(surface, &s->place[0]);
-	s->n_places = 1;
+	set_top(s, surface);
 	for (uint32_t i = 0; mesh && i < mesh->n_triangles; i++)
 		for (int k = 0; k < 3; k++) {
 			uint32_t a = mesh->corner[i][k], b = mesh->corner[i][(k + 1) % 3];
 			double edge[3], turn[3], per_mm;
+			int sign;
 
 			if (mesh->neighbour[i][k] == MESH_NONE)
 				continue;
 			v3_sub(edge, mesh->vertex[b], mesh->vertex[a]);
 			v3_sub(turn, mesh->normal[b], mesh->normal[a]);
 			per_mm = v3_dot(turn, edge) / v3_dot(edge, edge);
-			for (int sign = 0; sign < 2; sign++)
-				if (!(bend[sign] >= (sign ? per_mm : -per_mm))) {
-					bend[sign] = sign ? per_mm : -per_mm;
-					most[sign] = a;
-				}
+			sign = per_mm > 0;
+			if (fabs(per_mm) > bend[sign] && looks++ < LOOKS_MOST &&
+			    is_inside(surface, mesh->vertex[a], mesh->normal[a])) {
+				bend[sign] = fabs(per_mm);
+				most[sign] = a;
+			}
 		}
-	for (int sign = 0; mesh && sign < 2; sign++)
-		if (bend[sign] > 0)
-			incise_surface_nearest(surface, mesh->vertex[most[sign]],
-					       &s->place[s->n_places++]);
-	for (int i = 1; i < s->n_places; i++)
-		v3_copy(s->place[i].normal, mesh->normal[most[bend[0] > 0 ? i - 1 : i]]);
+	for (int sign = 0; sign < 2; sign++) {
+		struct incise_touch *place = &s->place[s->n_places];
+
+		if (!(bend[sign] > 0))
+			continue;
+		incise_surface_nearest(surface, mesh->vertex[most[sign]], place);
+		v3_copy(place->normal, mesh->normal[most[sign]]);
+		s->n_places++;
+	}
 }
 
 int incise_plan_rest(const struct incise_plan *plan,
