@@ -62,7 +62,7 @@ static const struct {
 
 #define FREE_EVERY 10
 #define LOOK_EVERY 20
-#define PLACES 3
+#define PLACES 5
 static const double askew[] = {0.02, 0.25};
 /* The first one that swings is named: one that does not slide away, if there is any. */
 static const enum incise_held held[] = {INCISE_HELD_ACROSS, INCISE_HELD_IN_HAND,
@@ -79,7 +79,7 @@ static const enum incise_held held[] = {INCISE_HELD_ACROSS, INCISE_HELD_IN_HAND,
  * damping as so much smaller. Of springs the linear check has such a reserve: of a scene without a model a part of it is
  * left here.
  */
-#define FREE_RESERVE 0.02
+#define FREE_RESERVE 0.04
 #define RESERVE 0.05
 
 #define N(array) ((int)(sizeof(array) / sizeof(*(array))))
@@ -954,23 +954,76 @@ static void set_top(struct search *s, const struct incise_surface *surface)
 	}
 }
 
+/* Besides the others, if it is none of them. */
+#define APART_MM 2
+static void add_place(struct search *s, const struct incise_touch *place)
+{
+	for (int i = 0; i < s->n_places; i++) {
+		double way[3];
+
+		v3_sub(way, place->point_mm, s->place[i].point_mm);
+		if (v3_length(way) < APART_MM)
+			return;
+	}
+	s->place[s->n_places++] = *place;
+}
+
+/* Above the membrane. */
+#define ABOVE_MM 400
+static void add_membrane(struct search *s, const struct incise_surface *surface,
+			 const struct incise_scene_membrane *membrane)
+{
+	struct incise_touch skin;
+	double from_mm[3];
+
+	v3_add(from_mm, membrane->point_mm, ABOVE_MM, membrane->normal);
+	if (membrane->thickness_mm > 0 &&
+	    incise_surface_enters(surface, from_mm, membrane->point_mm, &skin))
+		add_place(s, &skin);
+}
+
+/* On the skin beside an edge, where another face of it is near, too. */
+#define BESIDE_MM 8
+static void add_beside(struct search *s, const struct incise_surface *surface,
+		       const double at_mm[3], const double normal[3],
+		       const double edge[3])
+{
+	double way[3], to_mm[3];
+
+	v3_cross(way, edge, normal);
+	if (!v3_unit(way, way, 0))
+		return;
+	for (int sign = -1; sign <= 1; sign += 2) {
+		struct incise_touch place;
+
+		v3_add(to_mm, at_mm, sign * BESIDE_MM, way);
+		incise_surface_nearest(surface, to_mm, &place);
+		if (is_inside(surface, place.point_mm, place.normal)) {
+			add_place(s, &place);
+			return;
+		}
+	}
+}
+
 /*
- * Besides the top, of a mesh the corners where it is the most concave along an edge, and the most convex: there normals
- * turn the most, 1/mm.
+ * The top, above the membrane, and of a mesh the corners where it is the most concave along an edge, and the most
+ * convex: there normals turn the most, 1/mm.
  */
 #define LOOKS_MOST 1000
-static void set_places(struct search *s, const struct incise_surface *surface)
+static void set_places(struct search *s, const struct incise_plan *plan)
 {
+	const struct incise_surface *surface = plan->surface;
 	const struct mesh *mesh = surface->mesh;
-	uint32_t most[2] = {0, 0};
-	double bend[2] = {0, 0};
+	uint32_t most[2] = {0, 0}, end[2] = {0, 0};
+	double bend[2] = {0, 0}, edge[3], turn[3];
 	int looks = 0;
 
 	set_top(s, surface);
+	add_membrane(s, surface, &plan->scene->membrane);
 	for (uint32_t i = 0; mesh && i < mesh->n_triangles; i++)
 		for (int k = 0; k < 3; k++) {
 			uint32_t a = mesh->corner[i][k], b = mesh->corner[i][(k + 1) % 3];
-			double edge[3], turn[3], per_mm;
+			double per_mm;
 			int sign;
 
 			if (mesh->neighbour[i][k] == MESH_NONE)
@@ -983,16 +1036,24 @@ static void set_places(struct search *s, const struct incise_surface *surface)
 			    is_inside(surface, mesh->vertex[a], mesh->normal[a])) {
 				bend[sign] = fabs(per_mm);
 				most[sign] = a;
+				end[sign] = b;
 			}
 		}
 	for (int sign = 0; sign < 2; sign++) {
-		struct incise_touch *place = &s->place[s->n_places];
+		const double *at_mm = bend[sign] > 0 ? mesh->vertex[most[sign]] : NULL;
+		struct incise_touch place;
 
-		if (!(bend[sign] > 0))
+		if (!at_mm)
 			continue;
-		incise_surface_nearest(surface, mesh->vertex[most[sign]], place);
-		v3_copy(place->normal, mesh->normal[most[sign]]);
-		s->n_places++;
+		incise_surface_nearest(surface, at_mm, &place);
+		v3_copy(place.normal, mesh->normal[most[sign]]);
+		add_place(s, &place);
+		v3_sub(edge, mesh->vertex[end[sign]], at_mm);
+		/* It turns along the edge of two corners: beside it is on that way. */
+		if (sign) {
+			v3_cross(turn, edge, place.normal);
+			add_beside(s, surface, at_mm, place.normal, turn);
+		}
 	}
 }
 
@@ -1004,7 +1065,7 @@ int incise_plan_rest(const struct incise_plan *plan,
 
 	if (!s)
 		return -ENOMEM;
-	set_places(s, plan->surface);
+	set_places(s, plan);
 	s->plane =
 		incise_surface_new_plane(s->place[0].point_mm, s->place[0].normal, NULL);
 	if (!s->plane) {
