@@ -286,8 +286,8 @@ static void judge(struct end *end, bool faceted)
 	}
 	if (end->swing_mm > SWING_MM)
 		end->outcome = SWINGS;
-	/* Over facets the way itself goes up and down. */
-	if (faceted && sqrt(way_mm) > fmax(0.5, end->swing_mm))
+	/* Over facets the way itself goes up and down, and what falls off goes faster and faster. */
+	if (sqrt(way_mm) > fmax(0.5, end->swing_mm * (faceted ? 1 : 50)))
 		end->outcome = SLIDES;
 }
 
@@ -400,7 +400,8 @@ static struct end lean_on(struct incise_plan *plan, const struct leaned *l,
 	*from_ns = at_ns(&loop, loop.t_s + 10);
 	if (end.outcome == QUIET)
 		judge(&end, l->faceted);
-	if (end.outcome == SWINGS && end.depth_mm > l->deep_mm)
+	/* By its way, too: another side may have become the nearest. */
+	if (end.outcome == SWINGS && fmax(end.depth_mm, -loop.body.at[0]) > l->deep_mm)
 		end.outcome = DEEP;
 	return end;
 }
