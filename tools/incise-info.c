@@ -393,15 +393,26 @@ static json_t *adc_json(const struct incise_recording_info *info)
 			 info->newtons);
 }
 
-static void recording_json(const struct incise_recording_info *info, bool intact,
-			   const struct incise_wall *wall, json_t *members,
+/* The codec of its frames; "": it has none, or they cannot be read. */
+static const char *camera_codec(struct incise_recording *recording)
+{
+	struct incise_frame_reader *reader = incise_frame_reader_new(recording, NULL);
+	const char *codec = reader ? incise_frame_reader_codec(reader) : NULL;
+
+	incise_frame_reader_free(reader);
+	return codec ? codec : "";
+}
+
+static void recording_json(const struct incise_recording_info *info, const char *codec,
+			   bool intact, const struct incise_wall *wall, json_t *members,
 			   json_t *calibrations, json_t *seals)
 {
 	bool force = has_stream(info, "force"), tracker = has_stream(info, "tracker");
 
 	json_print(json_pack(
-		"{so so so so sb so ss sb sf so so s{sI sI sI} s{sI sI} sI so s{so so so} so so so}",
-		"seals", seals, "calibrations", calibrations, "wall",
+		"{so so so so so sb so ss sb sf so so s{sI sI sI} s{sI sI} sI so s{so so so} so so so}",
+		"camera_codec", json_text_or_null(codec), "seals", seals, "calibrations",
+		calibrations, "wall",
 		wall ? wall_json(wall, info->start_ns, info->end_ns) : json_null(),
 		"members", members, "intact", intact, "streams",
 		stream_json(info->streams, info->n_streams), "kind", "recording",
@@ -496,8 +507,8 @@ static void force_text(const struct incise_recording_info *info)
 }
 
 static void recording_text(const char *path, const struct incise_recording_info *info,
-			   const struct incise_wall *wall, json_t *calibrations,
-			   json_t *seals)
+			   const char *codec, const struct incise_wall *wall,
+			   json_t *calibrations, json_t *seals)
 {
 	bool tracker = has_stream(info, "tracker");
 
@@ -517,6 +528,9 @@ static void recording_text(const char *path, const struct incise_recording_info 
 			printf("; largest force %.3f N", info->force_max_N);
 		putchar('\n');
 	}
+	if (*codec)
+		printf("camera   frames in %s%s\n", codec,
+		       strcmp(codec, "mjpeg") ? ", lossless" : ", of the camera");
 	fputs("calibration  ", stdout);
 	if (has_stream(info, "force"))
 		printf("%g mV/N, zero %.1f mV, ", info->force_mV_N, info->zero_mV);
@@ -542,6 +556,7 @@ static void show_recording(const char *path, bool json, bool damaged)
 	/* A joined recording is described without a choice of its machines too. */
 	struct incise_recording *recording = incise_recording_open(any, NULL);
 	struct incise_wall *wall;
+	const char *codec;
 	bool intact;
 	int n;
 
@@ -556,14 +571,16 @@ static void show_recording(const char *path, bool json, bool damaged)
 	if (!wall && err.code != ENODATA)
 		cli_fail_with(&err);
 	err = (struct incise_error){0};
+	codec = camera_codec(recording);
 	intact = recording_intact(path, damaged, &err);
 	if (json)
-		recording_json(&info, intact, wall,
+		recording_json(&info, codec, intact, wall,
 			       n ? joined_json(members, n) : json_null(),
 			       calibrations_json(path, members, n),
 			       seal_report_json(path));
 	else
-		recording_text(path, &info, wall, calibrations_json(path, members, n),
+		recording_text(path, &info, codec, wall,
+			       calibrations_json(path, members, n),
 			       seal_report_json(path));
 	if (!json)
 		joined_print(members, n);

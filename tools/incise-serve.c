@@ -169,6 +169,9 @@ static void wait_until(struct run *run, int64_t t_ns)
 	uint64_t expired;
 	int n;
 
+	for (int i = 0; i < run->sinks; i++)
+		if (run->sink[i]->ops->flush)
+			run->sink[i]->ops->flush(run->sink[i]);
 	timerfd_settime(run->timer, TFD_TIMER_ABSTIME, &at, NULL);
 	n = epoll_wait(run->epoll, events, SERVE_SINKS + 1, -1);
 	for (int i = 0; i < n; i++) {

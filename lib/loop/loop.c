@@ -10,6 +10,7 @@
 #include <errno.h>
 #include <math.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <incise/loop.h>
 #include "../scene/plan.h"
 #include "loop_control.h"
@@ -258,7 +259,7 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 	struct incise_pose_counts poses;
 	struct run run = {
 		.plan = plan, .clock = clock, .options = options, .stats = stats};
-	int rc, released, ended = 0;
+	int rc, released, slack_ns, ended = 0;
 
 	memset(stats, 0, sizeof(*stats));
 	if (options->duration_ns < 0)
@@ -267,10 +268,15 @@ int incise_loop_run(struct incise_plan *plan, struct incise_clock *clock,
 		return incise_error_set(err, EINVAL,
 					"the loop's rate is %g Hz: expected 1 to 20000",
 					options->rate_hz);
+	/* Without a real-time policy the kernel wakes a thread up to 50 us late by default. */
+	slack_ns = prctl(PR_GET_TIMERSLACK);
+	prctl(PR_SET_TIMERSLACK, 1);
 	run.period_ns = llrint(INCISE_NS_PER_S / options->rate_hz);
 	run.due_ns = incise_clock_now(clock) + run.period_ns;
 	run.end_ns = options->duration_ns ? run.due_ns + options->duration_ns : INT64_MAX;
 	rc = run_ticks(&run, &ended);
+	if (slack_ns > 0)
+		prctl(PR_SET_TIMERSLACK, slack_ns);
 	incise_plan_poses(run.plan, &poses);
 	incise_pose_counts_add(&stats->poses, &poses);
 	released = incise_plan_release(run.plan);

@@ -55,6 +55,8 @@ END
 	[ "$(ask b.rec "SELECT count(*) FROM frames WHERE bytes > 0 AND length_px IS NULL")" = \
 		"$(ask b.rec "SELECT value FROM meta WHERE key = 'frames_rows'")" ]
 	incise verify b.rec
+	incise info b.rec | grep -q '^camera   frames in magicyuv, lossless'
+	[ "$(incise info --json b.rec | jq -r .camera_codec) $(incise info --json a.rec | jq -r .camera_codec)" = "magicyuv null" ]
 }
 
 @test "pictures are looked at, and agree with the tracker" {

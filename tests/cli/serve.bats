@@ -163,6 +163,17 @@ sys.exit(not (os.stat("log").st_ctime - 60 < min(t) and max(t) <= time.time()))'
 	stop_server
 }
 
+# bats test_tags=check
+@test "a client too many is told that the server is busy" {
+	start_server --rig sim:
+	client full "$port" 32 >found.json
+	stop_server
+	holds found.json '(j["type"], j["name"], j["code"], j["error"]) == ("STATUS", "Status", 6, "busy")'
+	holds found.json '"32 clients" in j["text"]'
+	holds report.json '(j["igtl"]["accepted"], j["igtl"]["refused"]) == (32, 1)'
+	grep -q 'refused: 32 clients are connected' log
+}
+
 @test "clients that hang, die and send nonsense slow no other, and memory is bounded" {
 	start_server --rig sim:camera_hz=10 --camera frames --idle 1s
 	client crowd "$port" 500 >found.json

@@ -4,6 +4,8 @@
 igtl_client.py receive PORT COUNT [VERSION] [REQUEST[:NAME]]...
     Send the requests, then receive COUNT messages and print each as a line of JSON. If the last request
     is GET_CAPABIL, COUNT messages behind its answer: what is in front may have left before.
+igtl_client.py full PORT COUNT
+    Connect COUNT clients, which stay, and one more. Prints its messages as lines of JSON, until it is closed.
 igtl_client.py crowd PORT COUNT
     Receive COUNT poses in five clients, while others hang, die, and send nonsense. Prints a line of
     JSON: for each of the five the number of poses, and whether their times are in order.
@@ -99,6 +101,18 @@ def receive_all(port, count, version="1", *requests):
         answered = answered or message["type"] == "CAPABILITY"
 
 
+def full(port, count):
+    socks = [connect(int(port)) for _ in range(int(count))]
+    for sock in socks:
+        receive(sock)
+    late = connect(int(port))
+    try:
+        while True:
+            print(json.dumps(receive(late)), flush=True)
+    except EOFError:
+        pass
+
+
 # --- a crowd ------------------------------------------------------------------------------
 
 def good(port, count, result):
@@ -184,4 +198,4 @@ def crowd(port, count):
     print(json.dumps(result))
 
 
-{"receive": receive_all, "crowd": crowd}[sys.argv[1]](*sys.argv[2:])
+{"receive": receive_all, "full": full, "crowd": crowd}[sys.argv[1]](*sys.argv[2:])

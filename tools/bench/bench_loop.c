@@ -141,7 +141,7 @@ static void load_own(const struct own *own, struct tick_row *row)
 static const struct bench_table tick_table = {
 	.key = "rows",
 	.row_bytes = sizeof(struct tick_row),
-	.columns = {COLUMN(tick_row, "name", name, "%-16s", "ns a tick"),
+	.columns = {COLUMN(tick_row, "name", name, "%-16s", "ns a tick, hot"),
 		    COLUMN(tick_row, "triangles", triangles),
 		    COLUMN(tick_row, "cuts", cuts), COLUMN(tick_row, "ticks", cost.ticks),
 		    COLUMN(tick_row, "tick_ns.median", cost.median, "%9.0f", "median"),
@@ -174,6 +174,7 @@ static const struct bench_table wakeup_table = {
 		    COLUMN(wakeup, "skipped", skipped),
 		    COLUMN(wakeup, "skipped_by_machine", machine, .whole = true),
 		    COLUMN(wakeup, "ratio_p999", ratio),
+		    COLUMN(wakeup, "tick_cold_us", tick_us),
 		    COLUMN(wakeup, "tick_max_us", tick_max_us),
 		    COLUMN(wakeup, "frames_hz", frames_hz),
 		    COLUMN(wakeup, "late_median_us", loop.median),
@@ -193,7 +194,7 @@ static const struct bench_table wakeup_table = {
 struct line {
 	const char *rate, *load, *program, *failed;
 	struct lateness late;
-	double skipped, machine, ratio;
+	double skipped, machine, ratio, tick_us;
 };
 
 static const struct bench_table line_table = {
@@ -211,6 +212,7 @@ static const struct bench_table line_table = {
 		    COLUMN(line, NULL, skipped, "%8.0f", "skipped"),
 		    COLUMN(line, NULL, machine, "%8.0f", "machine"),
 		    COLUMN(line, NULL, ratio, "%6.2f", "ratio"),
+		    COLUMN(line, NULL, tick_us, "%6.1f", "tick"),
 		    COLUMN(line, "failed", failed)},
 };
 
@@ -231,11 +233,12 @@ static void print_wakeups(struct bench_run *run, const struct wakeups *wakeups)
 					   row->loop,
 					   (double)row->skipped,
 					   row->machine,
-					   row->ratio};
+					   row->ratio,
+					   row->tick_us};
 		if (row->cyclictest.bins)
 			lines[n++] = (struct line){
 				" ", " ", "cyclictest", NULL, row->cyclictest,
-				NAN, NAN, NAN};
+				NAN, NAN, NAN,		NAN};
 		frames_hz = fmax(frames_hz, row->frames_hz);
 		if (!row->no_load && row->no_cyclictest)
 			no_cyclictest = row->no_cyclictest;
@@ -246,6 +249,9 @@ static void print_wakeups(struct bench_run *run, const struct wakeups *wakeups)
 				     : "SCHED_OTHER, without real-time permission",
 		   wakeups->cpu);
 	bench_lines(run, &line_table, lines, n);
+	bench_text(run,
+		   "tick: median after each sleep, with cold caches and the rig; the "
+		   "first table is of ticks in a row, with hot caches\n");
 	if (frames_hz > 0)
 		bench_text(run, "view: %.1f frames per second\n", frames_hz);
 	if (no_cyclictest)

@@ -516,6 +516,7 @@ static void run_both(struct run *run, const char *scene, struct wakeup *row)
 		lateness_of(run->stats.lateness_us, run->stats.lateness_max_ns * 1e-3);
 	row->median = quantile_of(&row->loop, 0.5);
 	row->p999 = quantile_of(&row->loop, 0.999);
+	row->tick_us = incise_loop_quantile(run->stats.tick_100ns, 0.5) / 10;
 	row->tick_max_us = run->stats.tick_max_ns * 1e-3;
 	row->skipped = run->stats.skipped;
 	if (!row->no_cyclictest) {
@@ -616,6 +617,7 @@ void wakeups_measure(const char *scene, struct memory_file (*own)(double rate_hz
 				.p999 = {.median = NAN},
 				.ratio = NAN,
 				.machine = NAN,
+				.tick_us = NAN,
 				.tick_max_us = NAN,
 				.frames_hz = NAN,
 			};

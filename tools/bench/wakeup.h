@@ -36,6 +36,7 @@ struct wakeup {
 	double ratio;	  /* of the 99.9 %, the loop's by cyclictest's */
 	uint64_t skipped; /* ticks of the loop */
 	double machine; /* of these, while cyclictest was held up as well; NaN: unknown */
+	double tick_us; /* median after each sleep, with cold caches */
 	double tick_max_us;
 	double frames_hz; /* drawn meanwhile by the view, or NaN */
 	char title[64];	  /* of a plot: the 99.9 % */

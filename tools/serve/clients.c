@@ -11,6 +11,7 @@
 #include <string.h>
 #include <sys/epoll.h>
 #include <sys/socket.h>
+#include <sys/uio.h>
 #include <unistd.h>
 #include "../cli/cli.h"
 #include "../cli/json.h"
@@ -21,6 +22,7 @@
 #define EVENTS 64
 #define LISTENERS 4 /* addresses of one name */
 #define PAST 64	    /* closed clients in the report */
+#define GATHER 16   /* messages in one system call */
 
 struct message {
 	int refs, kind;
@@ -127,10 +129,19 @@ static void doom(struct client *client, const char *why)
 static void flush(struct client *client)
 {
 	while (client->waiting && !*client->why) {
-		struct message *message = *place(client, 0);
-		ssize_t n = send(client->fd, message->bytes + client->begun,
-				 message->n - client->begun, MSG_NOSIGNAL | MSG_DONTWAIT);
+		struct iovec parts[GATHER];
+		struct msghdr gathered = {.msg_iov = parts};
+		struct message *message;
+		ssize_t n;
 
+		for (int i = 0; i < client->waiting && i < GATHER; i++) {
+			message = *place(client, i);
+			parts[gathered.msg_iovlen++] =
+				(struct iovec){message->bytes, message->n};
+		}
+		parts[0].iov_base = (uint8_t *)parts[0].iov_base + client->begun;
+		parts[0].iov_len -= client->begun;
+		n = sendmsg(client->fd, &gathered, MSG_NOSIGNAL | MSG_DONTWAIT);
 		if (n < 0 && errno == EINTR)
 			continue;
 		if (n < 0 && errno == EAGAIN)
@@ -141,14 +152,15 @@ static void flush(struct client *client)
 		}
 		client->moved_ns = cli_now_ns();
 		client->begun += (size_t)n;
-		if (client->begun < message->n)
-			continue;
-		client->begun = 0;
-		client->first = (client->first + 1) % CLIENT_QUEUE;
-		client->waiting--;
-		client->sent++;
-		client->clients->sent++;
-		message_drop(message);
+		while (client->waiting &&
+		       client->begun >= (message = *place(client, 0))->n) {
+			client->begun -= message->n;
+			client->first = (client->first + 1) % CLIENT_QUEUE;
+			client->waiting--;
+			client->sent++;
+			client->clients->sent++;
+			message_drop(message);
+		}
 	}
 	set_events(client);
 }
@@ -188,8 +200,17 @@ void clients_send(struct client *client, struct message *message)
 	make_place(client, message);
 	message->refs++;
 	*place(client, client->waiting++) = message;
-	if (client->waiting == 1 || !(client->events & EPOLLOUT))
+	/* Nothing is lost for want of a flush. */
+	if ((message->large || client->waiting >= GATHER) && !(client->events & EPOLLOUT))
 		flush(client);
+}
+
+void clients_flush(struct clients *clients)
+{
+	for (int i = 0; i < clients->n; i++)
+		if (clients->client[i]->waiting &&
+		    !(clients->client[i]->events & EPOLLOUT))
+			flush(clients->client[i]);
 }
 
 static void receive(struct client *client)
@@ -275,6 +296,20 @@ static void set_option(int fd, int level, int name, int value)
 	setsockopt(fd, level, name, &value, sizeof(value));
 }
 
+/* Bytes that came and are not read would make close() a reset, which takes the answer with it. */
+static void refuse(struct clients *clients, int fd)
+{
+	uint8_t bytes[1024];
+	size_t n;
+
+	recv(fd, bytes, sizeof(bytes), MSG_DONTWAIT);
+	n = clients->setup.full(clients->setup.context, bytes, sizeof(bytes));
+	if (send(fd, bytes, n, MSG_NOSIGNAL | MSG_DONTWAIT) != (ssize_t)n)
+		cli_note("the reason could not be sent to it");
+	close(fd);
+	clients->refused++;
+}
+
 static void accept_one(struct clients *clients, int listener)
 {
 	struct sockaddr_storage from;
@@ -291,8 +326,7 @@ static void accept_one(struct clients *clients, int listener)
 
 		address_text((struct sockaddr *)&from, n, address, sizeof(address));
 		cli_note("%s: refused: %d clients are connected", address, CLIENTS_MOST);
-		clients->refused++;
-		close(fd);
+		refuse(clients, fd);
 		return;
 	}
 	set_option(fd, IPPROTO_TCP, TCP_NODELAY, 1);
@@ -349,6 +383,7 @@ void clients_work(struct clients *clients)
 		else if (events[i].events & (EPOLLERR | EPOLLHUP))
 			doom(client, "the connection broke");
 	}
+	clients_flush(clients);
 	close_doomed(clients);
 }
 

@@ -48,6 +48,8 @@ struct clients_setup {
 	/* Whether it is in the middle of a message that it sends. */
 	bool (*inside)(void *user);
 	void (*closed)(void *user);
+	/* CLIENTS_MOST are connected: the answer to one more. Returns its size. */
+	size_t (*full)(void *context, uint8_t *bytes, size_t capacity);
 	void *context;
 };
 
@@ -62,8 +64,10 @@ void clients_tick(struct clients *clients, int64_t now_ns);
 void clients_each(struct clients *clients,
 		  void (*each)(void *context, struct client *client, void *user),
 		  void *context);
-/* Send, or wait in its queue, or lose the oldest of that kind there. */
+/* Put it in the client's queue, where the oldest of that kind may be lost for it. */
 void clients_send(struct client *client, struct message *message);
+/* Send what waits, of each client in one system call. clients_work() does so, too. */
+void clients_flush(struct clients *clients);
 bool clients_are_empty(const struct clients *clients);
 int clients_summary(const struct clients *clients, char *text, size_t size);
 json_t *clients_report(const struct clients *clients);

@@ -315,6 +315,26 @@ static void igtl_closed(void *user)
 	free(peer);
 }
 
+static size_t igtl_full(void *context, uint8_t *bytes, size_t capacity)
+{
+	const struct igtl *igtl = context;
+	const struct incise_igtl_label label = {.version =
+							igtl->version ? igtl->version : 1,
+						.name = outputs[STATUS].name,
+						.utc_ns = serve_utc_of(cli_now_ns())};
+	struct incise_igtl_status status = {
+		.code = INCISE_IGTL_BUSY, .sub_code = CLIENTS_MOST, .error = "busy"};
+	char text[100];
+	ssize_t n;
+
+	snprintf(text, sizeof(text),
+		 "%d clients are connected, and no more are served; end one of them",
+		 CLIENTS_MOST);
+	status.text = text;
+	n = incise_igtl_pack_status(bytes, capacity, &label, &status);
+	return n > 0 ? (size_t)n : 0;
+}
+
 static bool igtl_inside(void *user)
 {
 	return incise_igtl_stream_inside(((const struct peer *)user)->stream);
@@ -408,6 +428,11 @@ static int igtl_fd(const struct serve_sink *sink)
 	return clients_fd(((const struct igtl *)sink)->clients);
 }
 
+static void igtl_flush(struct serve_sink *sink)
+{
+	clients_flush(((struct igtl *)sink)->clients);
+}
+
 static void igtl_work(struct serve_sink *sink)
 {
 	clients_work(((struct igtl *)sink)->clients);
@@ -462,6 +487,7 @@ static void igtl_free(struct serve_sink *sink)
 
 static const struct serve_sink_ops igtl_ops = {
 	.send = igtl_send,
+	.flush = igtl_flush,
 	.fd = igtl_fd,
 	.work = igtl_work,
 	.tick = igtl_tick,
@@ -484,6 +510,7 @@ struct serve_sink *serve_igtl_new(const struct serve_igtl_options *options,
 		.received = igtl_received,
 		.inside = igtl_inside,
 		.closed = igtl_closed,
+		.full = igtl_full,
 		.context = igtl,
 	};
 

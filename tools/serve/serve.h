@@ -72,6 +72,8 @@ struct serve_sink {
 struct serve_sink_ops {
 	/* Send an item to all who want it; never waits. */
 	void (*send)(struct serve_sink *sink, const struct serve_item *item);
+	/* The end of a round of items: what was kept to leave together leaves. NULL: nothing. */
+	void (*flush)(struct serve_sink *sink);
 	/*
 	 * A descriptor that polls as readable when the sink has work, and the work; NULL: none.
 	 * Bounded by itself, whatever clients do.

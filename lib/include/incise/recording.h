@@ -178,6 +178,10 @@ INCISE_API struct incise_frame_reader *incise_frame_reader_new(
 /** NULL is accepted. */
 INCISE_API void incise_frame_reader_free(struct incise_frame_reader *reader);
 
+/** The codec of the file: "magicyuv" or "ffv1", lossless; "mjpeg"; NULL: no frame was written. */
+INCISE_API const char *incise_frame_reader_codec(
+	const struct incise_frame_reader *reader);
+
 /**
  * Get the frame of the row of table frames whose t_ns is nearest. Frames before the last one that
  * was read make it start at the file's beginning; later ones are quick.

@@ -2,9 +2,9 @@
 /*
  * Writing and reading camera.mkv, a module on libavformat; ../frames.h describes the file.
  *
- *     frame ─► planes ─► FFV1 ┐
- *                             ├─► note ─► one cluster ─► write(2) ─► good_size
- *     MJPEG ──────────────────┘
+ *     frame ─► planes ─► MagicYUV ┐
+ *                                 ├─► note ─► one cluster ─► write(2) ─► good_size
+ *     MJPEG ──────────────────────┘
  *
  * The muxer gets no way to seek and "live": it keeps no index, which would grow without limit,
  * and patches nothing. It ends its cluster behind each frame: it would keep the frames of an
@@ -26,12 +26,10 @@
 #include <libavutil/crc.h>
 #include <libavutil/frame.h>
 #include <libavutil/intreadwrite.h>
-#include <libavutil/opt.h>
 #include <openssl/evp.h>
 #include "../frames.h"
 
 #define BUFFER_BYTES (1 << 20) /* one write(2) for most frames */
-#define SLICES 4
 #define NS_PER_MS 1000000
 #define BLOCK_ADD_ID 1
 #define NOTE_BYTES 24
@@ -77,10 +75,11 @@ static bool digest_of(const AVPacket *packet, struct incise_frames_stored *store
 }
 
 /*
- * --- planes: pixels of a camera to those of FFV1 and back, without loss ------------------
+ * --- planes: pixels of a camera to those of the codec and back, without loss -------------
  *
  *     YUYV  Y0 U Y1 V …  ◄──►  yuv422p  Y0 Y1 …, U …, V …
- *     RGB   R G B …      ◄──►  bgr0     B G R 0 …
+ *     RGB   R G B …      ◄──►  gbrp     G …, B …, R …
+ *                        ◄───  bgr0     B G R 0 …, of FFV1
  *     grey                     gray8
  */
 
@@ -88,7 +87,7 @@ static enum AVPixelFormat planes_format(enum incise_pixels pixels)
 {
 	switch (pixels) {
 	case INCISE_PIXELS_RGB:
-		return AV_PIX_FMT_BGR0;
+		return AV_PIX_FMT_GBRP;
 	case INCISE_PIXELS_GREY:
 		return AV_PIX_FMT_GRAY8;
 	case INCISE_PIXELS_YUYV:
@@ -131,24 +130,29 @@ static void yuyv_to(const AVFrame *planes, int y, uint8_t *restrict to)
 
 static void rgb_from(const AVFrame *planes, int y, const uint8_t *restrict from)
 {
-	uint8_t *restrict bgr = row_of(planes, 0, y);
+	uint8_t *restrict green = row_of(planes, 0, y);
+	uint8_t *restrict blue = row_of(planes, 1, y);
+	uint8_t *restrict red = row_of(planes, 2, y);
 
 	for (int x = 0; x < planes->width; x++) {
-		bgr[4 * x] = from[3 * x + 2];
-		bgr[4 * x + 1] = from[3 * x + 1];
-		bgr[4 * x + 2] = from[3 * x];
-		bgr[4 * x + 3] = 0;
+		red[x] = from[3 * x];
+		green[x] = from[3 * x + 1];
+		blue[x] = from[3 * x + 2];
 	}
 }
 
 static void rgb_to(const AVFrame *planes, int y, uint8_t *restrict to)
 {
-	const uint8_t *bgr = row_of(planes, 0, y);
+	bool packed = planes->format == AV_PIX_FMT_BGR0;
+	const uint8_t *first = row_of(planes, 0, y);
+	const uint8_t *green = packed ? first + 1 : first;
+	const uint8_t *blue = packed ? first : row_of(planes, 1, y);
+	const uint8_t *red = packed ? first + 2 : row_of(planes, 2, y);
 
-	for (int x = 0; x < planes->width; x++) {
-		to[3 * x] = bgr[4 * x + 2];
-		to[3 * x + 1] = bgr[4 * x + 1];
-		to[3 * x + 2] = bgr[4 * x];
+	for (int x = 0, at = 0; x < planes->width; x++, at += packed ? 4 : 1) {
+		to[3 * x] = red[at];
+		to[3 * x + 1] = green[at];
+		to[3 * x + 2] = blue[at];
 	}
 }
 
@@ -424,15 +428,15 @@ static int writer_close(struct incise_frames_writer *writer, struct incise_error
 	return rc;
 }
 
-static int open_encoder(struct writer *w, int threads)
+static int open_encoder(struct writer *w)
 {
-	const AVCodec *ffv1 = avcodec_find_encoder(AV_CODEC_ID_FFV1);
+	const AVCodec *codec = avcodec_find_encoder(AV_CODEC_ID_MAGICYUV);
 	AVCodecContext *c;
 	int rc;
 
-	if (!ffv1)
+	if (!codec)
 		return AVERROR(ENOSYS);
-	c = w->codec = avcodec_alloc_context3(ffv1);
+	c = w->codec = avcodec_alloc_context3(codec);
 	w->planes = av_frame_alloc();
 	if (!c || !w->planes)
 		return AVERROR(ENOMEM);
@@ -441,20 +445,14 @@ static int open_encoder(struct writer *w, int threads)
 	c->pix_fmt = planes_format(w->shape.pixels);
 	w->planes->format = c->pix_fmt;
 	c->time_base = (AVRational){1, 1000};
-	c->level = 3;
-	c->gop_size = 1;
-	c->slices = SLICES;
-	c->thread_count = threads > 1 ? threads < SLICES ? threads : SLICES : 1;
-	c->thread_type = FF_THREAD_SLICE;
-	av_opt_set_int(c->priv_data, "slicecrc", 1, 0);
-	/* Golomb-Rice: 60 % of the range coder's CPU, and frames no larger. */
-	av_opt_set_int(c->priv_data, "coder", 0, 0);
-	rc = avcodec_open2(c, ffv1, NULL);
+	/* One that works ahead would keep frames. */
+	c->thread_count = 1;
+	rc = avcodec_open2(c, codec, NULL);
 	return rc ? rc : av_frame_get_buffer(w->planes, 0);
 }
 
 /* Write the header, up to the first cluster. */
-static int write_header(struct writer *w, int threads)
+static int write_header(struct writer *w)
 {
 	AVDictionary *options = NULL;
 	uint8_t *buffer;
@@ -476,7 +474,7 @@ static int write_header(struct writer *w, int threads)
 	w->format->flags |= AVFMT_FLAG_CUSTOM_IO | AVFMT_FLAG_FLUSH_PACKETS;
 	stream->time_base = (AVRational){1, 1000};
 	if (w->shape.pixels != INCISE_PIXELS_MJPEG) {
-		rc = open_encoder(w, threads);
+		rc = open_encoder(w);
 		if (!rc)
 			rc = avcodec_parameters_from_context(stream->codecpar, w->codec);
 		if (rc < 0)
@@ -546,7 +544,7 @@ static struct incise_frames_writer *writer_new(
 				 strerror(errno));
 		rc = -errno;
 	} else {
-		rc = write_header(w, options ? options->threads : 1);
+		rc = write_header(w);
 		if (!rc)
 			return &w->writer;
 		rc = fail(w, rc, "cannot be started", err);
@@ -606,6 +604,8 @@ static int bad(struct reader *r, const struct note *note, const char *why,
 
 static bool pixels_of(int format, enum incise_pixels *pixels)
 {
+	if (format == AV_PIX_FMT_BGR0)
+		format = AV_PIX_FMT_GBRP;
 	for (int i = INCISE_PIXELS_RGB; i < INCISE_PIXELS_MJPEG; i++)
 		if ((int)planes_format((enum incise_pixels)i) == format) {
 			*pixels = (enum incise_pixels)i;
@@ -620,7 +620,7 @@ static bool is_size(int width, int height)
 	       height >= INCISE_FRAMES_SIDE_MIN && height <= INCISE_FRAMES_SIDE_MAX;
 }
 
-/* FFV1 to the camera's pixels. 0, -EBADMSG, -ENOMEM; sets no error text. */
+/* The codec's pixels to the camera's pixels. 0, -EBADMSG, -ENOMEM; sets no error text. */
 static int decode(struct reader *r, struct incise_camera_frame *frame)
 {
 	size_t row, size;
@@ -696,7 +696,7 @@ static int reader_next(struct incise_frames_reader *reader,
 	/* A truncated cluster ends the file like its end. */
 	if (rc < 0)
 		return 0;
-	/* Before ffmpeg 7, FFV1 is in Matroska as in AVI, with times as dts. */
+	/* MagicYUV, and FFV1 before ffmpeg 7, are in Matroska as in AVI, with times as dts. */
 	if (r->packet->pts == AV_NOPTS_VALUE)
 		r->packet->pts = r->packet->dts;
 	noted = read_note(r, &note);
@@ -793,10 +793,14 @@ static int open_file(struct reader *r)
 	if (codec->codec_type != AVMEDIA_TYPE_VIDEO ||
 	    !is_size(codec->width, codec->height))
 		return AVERROR_INVALIDDATA;
+	r->reader.codec = avcodec_get_name(codec->codec_id);
 	if (codec->codec_id == AV_CODEC_ID_MJPEG)
 		return 0;
-	return codec->codec_id == AV_CODEC_ID_FFV1 ? open_decoder(r, codec)
-						   : AVERROR_INVALIDDATA;
+	/* FFV1: before, frames were written so. */
+	return codec->codec_id == AV_CODEC_ID_MAGICYUV ||
+			       codec->codec_id == AV_CODEC_ID_FFV1
+		       ? open_decoder(r, codec)
+		       : AVERROR_INVALIDDATA;
 }
 
 static struct incise_frames_reader *reader_new(const char *path, struct incise_error *err)

@@ -70,6 +70,11 @@ void incise_frame_reader_free(struct incise_frame_reader *reader)
 	free(reader);
 }
 
+const char *incise_frame_reader_codec(const struct incise_frame_reader *reader)
+{
+	return reader->file->codec;
+}
+
 /* The row nearest to a time: its own seq, time and number from 0. Rows before are counted once. */
 static int find_row(struct incise_recording *recording, int64_t t_ns, uint64_t *seq,
 		    int64_t *row_ns, uint64_t *number, struct incise_error *err)

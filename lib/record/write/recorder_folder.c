@@ -29,7 +29,7 @@
 #define TRACKER_BYTES 180.0 /* with its row in table depth */
 #define FRAME_BYTES 145.0
 /* Size of a frame in camera.mkv, an upper estimate. */
-#define FFV1_SHARE 0.75
+#define LOSSLESS_SHARE 0.85
 #define JPEG_BYTES_PIXEL 0.35
 
 static const char *const files[] = {INCISE_SCHEMA_DB, INCISE_SCHEMA_DB "-wal",
@@ -173,7 +173,7 @@ static double rate_of(const struct incise_tracker_info *tracker,
 	if (camera)
 		bytes_s += camera->rate_hz *
 			   (FRAME_BYTES +
-			    (row > 0 ? row * FFV1_SHARE
+			    (row > 0 ? row * LOSSLESS_SHARE
 				     : (double)camera->width * JPEG_BYTES_PIXEL) *
 				    camera->height);
 	return isfinite(bytes_s) && bytes_s > 0 ? bytes_s : 0;

@@ -4,6 +4,7 @@
  * real one only order is asserted: times belong to benches.
  */
 #include "../unit.h"
+#include <sys/prctl.h>
 #include <time.h>
 #include "../../../lib/loop/loop_control.h"
 #include <incise/loop.h>
@@ -619,4 +620,24 @@ TEST(test_too_many_overruns, begin, end)
 	assert_int_equal(stats.overruns, 5);
 	assert_int_equal(stats.ticks, 14);
 	assert_says(err.text, "5 ticks");
+}
+
+static int keep_slack(void *context, const struct incise_tick *tick)
+{
+	*(int *)context = prctl(PR_GET_TIMERSLACK);
+	return 0;
+}
+
+/* A real-time policy has none, and newer kernels keep it so. */
+TEST(test_timer_slack, begin, end)
+{
+	int before_ns, inside_ns = -1;
+
+	assert_int_equal(prctl(PR_SET_TIMERSLACK, 40000), 0);
+	before_ns = prctl(PR_GET_TIMERSLACK);
+	options.ticked = keep_slack;
+	options.context = &inside_ns;
+	assert_int_equal(run(INCISE_NS_PER_S / 100), 0);
+	assert_in_range(inside_ns, 0, 1);
+	assert_int_equal(prctl(PR_GET_TIMERSLACK), before_ns);
 }

@@ -228,6 +228,9 @@ TEST(comes_back_to_the_byte)
 		assert_int_equal(after.st_size, before.st_size);
 		reader = incise_frames.open(path, &err);
 		succeeds(reader);
+		assert_string_equal(reader->codec, shape->pixels == INCISE_PIXELS_MJPEG
+							   ? "mjpeg"
+							   : "magicyuv");
 		for (int n = 0; n < frames; n++) {
 			reader->digests = n % 2;
 			assert_int_equal(reader->ops->next(reader, &frame, &stored, &err),
@@ -246,6 +249,23 @@ TEST(comes_back_to_the_byte)
 		assert_int_equal(reader->ops->next(reader, &frame, &stored, &err), 0);
 		reader->ops->close(reader);
 		film_remove(path);
+	}
+}
+
+/* Of a writer before MagicYUV: shapes 4 to 6. */
+TEST(files_of_ffv1_stay_readable)
+{
+	static const char *const files[] = {"rgb", "grey", "yuyv"};
+
+	for (int i = 0; i < 3; i++) {
+		char path[64];
+
+		snprintf(path, sizeof(path), "tests/unit/mkv/ffv1/%s.mkv", files[i]);
+		reader = incise_frames.open(path, &err);
+		succeeds(reader);
+		assert_string_equal(reader->codec, "ffv1");
+		reader->ops->close(reader);
+		assert_int_equal(count(path, &shapes[4 + i]), 2);
 	}
 }
 

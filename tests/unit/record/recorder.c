@@ -1087,7 +1087,7 @@ TEST(capacity_is_that_of_a_recorder, start, stop)
 	assert_true(reserved > 0 && reserved < 100e6);
 	assert_true(incise_recorder_capacity_s(reserved, &tracker, &force, NULL) < 1e-3);
 	assert_true(incise_recorder_capacity_s(0, &tracker, &force, NULL) == 0);
-	/* frames take more: 75 % of 2 bytes per pixel at most, 10 MB/s at least */
+	/* frames take more: 85 % of 2 bytes per pixel at most, 10 MB/s at least */
 	assert_true(1e12 / incise_recorder_capacity_s(1e12, NULL, NULL, &camera) > 10e6);
 	assert_true(1e12 / incise_recorder_capacity_s(1e12, NULL, NULL, &camera) <
 		    50.0 * 640 * 480 * 2);
