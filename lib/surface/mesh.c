@@ -593,11 +593,11 @@ bool mesh_enters(const struct mesh *mesh, const double from[3], const double to[
  */
 
 /*
- * Work is finite: no new step after this many faces (a fan is always looked through). On
- * a mesh of 0.2 mm triangles it is a way of some 100 mm in one tick. The proxy then stays
+ * Work is finite: no new step after this many faces (a fan is always looked through), some 60 µs. On
+ * a mesh of 0.2 mm triangles it is a way of some 10 mm in one tick. The proxy then stays
  * on the surface where it got to, and goes on with the next move.
  */
-#define FACES_MAX 1024
+#define FACES_MAX 96
 
 /* So many steps in a row without getting nearer can be nothing but rounding: a tie. */
 #define IDLE_MAX 8
@@ -742,12 +742,13 @@ static bool go(const double start[3], double reach, struct mesh_spot *spot,
 }
 
 bool mesh_glide(const struct mesh *mesh, const double p[3], double reach,
-		struct mesh_spot *spot)
+		struct mesh_spot *spot, bool *tired)
 {
 	struct mesh_spot next = {.face = spot->face}, edge, after;
 	double start[3], least = INFINITY;
 	int faces = 1, idle = 0;
 
+	*tired = false;
 	v3_copy(start, spot->point);
 	next.part = mesh_on_face(mesh, next.face, p, next.point);
 	for (;;) {
@@ -759,7 +760,8 @@ bool mesh_glide(const struct mesh *mesh, const double p[3], double reach,
 			if (!go(start, reach, spot, &edge))
 				return false;
 			next = after;
-			if (++faces >= FACES_MAX)
+			*tired = ++faces >= FACES_MAX;
+			if (*tired)
 				return false;
 			continue;
 		}
@@ -770,7 +772,8 @@ bool mesh_glide(const struct mesh *mesh, const double p[3], double reach,
 		d = v3_distance2(spot->point, p);
 		idle = d < least ? 0 : idle + 1;
 		least = fmin(least, d);
-		if (idle > IDLE_MAX || faces >= FACES_MAX)
+		*tired = faces >= FACES_MAX;
+		if (idle > IDLE_MAX || *tired)
 			return false;
 		if (spot->part < TRIANGLE_CORNER) {
 			faces++;

@@ -251,10 +251,11 @@ bool mesh_enters(const struct mesh *mesh, const double from[3], const double to[
 
 /*
  * Glide over the surface from a spot towards where p is nearest, at most @reach mm from
- * where it was. Returns whether it has got to the nearest place around.
+ * where it was. Returns whether it has got to the nearest place around; @tired: it ended because it is work enough
+ * for a move.
  */
 bool mesh_glide(const struct mesh *mesh, const double p[3], double reach,
-		struct mesh_spot *spot) INCISE_REALTIME;
+		struct mesh_spot *spot, bool *tired) INCISE_REALTIME;
 
 static inline int mesh_on_face(const struct mesh *mesh, uint32_t face, const double p[3],
 			       double x[3])

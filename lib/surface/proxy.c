@@ -16,12 +16,19 @@
  * over a wave is longer than the tool's way below it, and the proxy would fall behind for
  * ever. With 2 it keeps up on slopes to 60°, and where it does fall behind (a tool that
  * passes deep below a crest draws the proxy over it at once) it catches up as fast as the
- * tool moves. It waits on the surface, and not at the nearest place, meanwhile.
+ * tool moves. It waits on the surface, and not at the nearest place, meanwhile. What a move
+ * did not go because it is work enough, as after a wrong pose, the next one may go, too.
  */
 #include <string.h>
 #include "surface.h"
 
 #define BUDGET 2
+
+/*
+ * A nearest place may be farther by a hundredth: gliding mends it. In the middle of a ball, where all the mesh is
+ * nearly as near, nothing else ends a search.
+ */
+#define NEARLY 0.99
 
 /*
  * A tool this near is on the mesh, on whichever side rounding shows it; a contact ends
@@ -123,7 +130,7 @@ static bool is_dent(const struct incise_proxy *proxy, const struct mesh_spot *sp
 
 	if (mesh_enters(mesh, spot->point, tool, 0, 0, &other))
 		return true;
-	mesh_nearest(mesh, tool, spot->face, 1, &other);
+	mesh_nearest(mesh, tool, spot->face, NEARLY, &other);
 	mesh_touch(mesh, &other, tool, &touch);
 	return touch.depth_mm >= 0 && !mesh_beyond_border(mesh, &other, tool, &next);
 }
@@ -138,17 +145,21 @@ static void follow(struct incise_proxy *proxy, const double tool[3], double reac
 	double leave = fmax(proxy->leave_mm, OFF_MM);
 	struct mesh_spot spot = spot_of(proxy), entry;
 
+	proxy->left_mm = 0;
 	for (int part = 0; part < PARTS_MAX; part++) {
 		double way[3], above, last[3];
-		bool beyond;
+		bool beyond, tired;
 
 		v3_copy(last, spot.point);
-		proxy->settled = mesh_glide(mesh, tool, reach, &spot);
+		proxy->settled = mesh_glide(mesh, tool, reach, &spot, &tired);
 		proxy->at_face = spot.face;
 		mesh_touch(mesh, &spot, tool, &proxy->touch);
 		v3_sub(way, tool, spot.point);
 		above = v3_dot(way, proxy->touch.normal);
 		if (!proxy->settled) {
+			if (tired)
+				proxy->left_mm = fmax(
+					reach - sqrt(v3_distance2(spot.point, last)), 0);
 			if (!(above > 0))
 				return;
 			if (is_dent(proxy, &spot, tool))
@@ -225,7 +236,7 @@ static void place(struct incise_proxy *proxy, const double tool[3])
 	struct incise_touch touch;
 	struct mesh_spot spot, next;
 
-	proxy->clear_mm = mesh_nearest(mesh, tool, 0, 1, &spot);
+	proxy->clear_mm = mesh_nearest(mesh, tool, 0, NEARLY, &spot);
 	v3_copy(proxy->clear_at_mm, tool);
 	proxy->at_face = spot.face;
 	mesh_touch(mesh, &spot, tool, &touch);
@@ -252,7 +263,7 @@ void incise_proxy_move(struct incise_proxy *proxy, const double tool_mm[3])
 		if (!proxy->touching)
 			look(proxy, tool);
 		else if (v3_dot(way, way) > 0)
-			follow(proxy, tool, BUDGET * v3_length(way));
+			follow(proxy, tool, proxy->left_mm + BUDGET * v3_length(way));
 	}
 	v3_copy(proxy->tool_mm, tool);
 	proxy->placed = true;
