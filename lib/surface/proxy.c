@@ -25,10 +25,10 @@
 #define BUDGET 2
 
 /*
- * A nearest place may be farther by a hundredth: gliding mends it. In the middle of a ball, where all the mesh is
+ * A nearest place may be farther by a tenth: gliding mends it. In the middle of a ball, where all the mesh is
  * nearly as near, nothing else ends a search.
  */
-#define NEARLY 0.99
+#define NEARLY 0.9
 
 /*
  * A tool this near is on the mesh, on whichever side rounding shows it; a contact ends
