@@ -34,7 +34,7 @@ static const struct cut_series {
 } cut_series[] = {
 	{"wall", "tracker", 0.33, 10, false},
 	{"wall", "exact", 0.33, 10, true},
-	{"stiff", "exact", 1.5, 2, true},
+	{"stiff", "exact", 1.3, 2, true},
 };
 
 /* Of a force against the exact one, over a cut. */
