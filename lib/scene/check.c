@@ -266,17 +266,6 @@ static int set_lateness(struct incise_plan *plan, struct incise_error *err)
 	return 0;
 }
 
-/* For a message: downwards, as what is named must be safe. */
-static double three_digits_down(double gain)
-{
-	double unit;
-
-	if (!(gain > 0))
-		return 0;
-	unit = pow(10, floor(log10(gain)) - 2);
-	return floor(gain / unit) * unit;
-}
-
 static double membrane_N_mm(const struct incise_plan *plan)
 {
 	const struct incise_scene_membrane *membrane = &plan->scene->membrane;
@@ -500,11 +489,12 @@ static bool helps(struct incise_plan *plan, const struct incise_tracker_info *tr
 #define HALVINGS 5
 #define ATTEMPTS 6
 
-static double three_digits_up(double value)
+/* For a message. */
+static double three_digits(double value, double (*round)(double))
 {
 	double unit = pow(10, floor(log10(value)) - 2);
 
-	return ceil(value / unit) * unit;
+	return round(value / unit) * unit;
 }
 
 /* The device's own damping, or as much as any has. */
@@ -518,7 +508,7 @@ static double find_advice(struct incise_plan *plan,
 			  const struct incise_tracker_info *tracker, bool damps, int way,
 			  struct advice *advice)
 {
-	double (*round)(double) = damps ? three_digits_up : three_digits_down;
+	double (*safe)(double) = damps ? ceil : floor;
 	double from = damps ? least_damping(plan) : plan->gain;
 	double end = from * (damps ? DAMPING_MOST : GAIN_LEAST), factor = damps ? 2 : 0.5;
 
@@ -529,8 +519,8 @@ static double find_advice(struct incise_plan *plan,
 
 		/* The plan as it is was tried. */
 		if (i) {
-			if (helps(plan, tracker, advice, round(from), &any))
-				return round(from);
+			if (helps(plan, tracker, advice, from, &any))
+				return from;
 			way = any;
 		}
 		for (good = factor * from; !helps(plan, tracker, advice, good, &way);
@@ -545,7 +535,7 @@ static double find_advice(struct incise_plan *plan,
 			*(helps(plan, tracker, advice, middle, &way) ? &good : &bad) =
 				middle;
 		}
-		from = round(good);
+		from = three_digits(good, safe);
 	}
 	return 0;
 }

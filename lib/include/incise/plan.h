@@ -160,7 +160,7 @@ struct incise_plan_weakest {
 	/** Of them, those with a margin below 1 that rest all the same: the account of work ends their swings. */
 	int paid;
 };
-#define INCISE_PLAN_MARGIN_MOST 16
+#define INCISE_PLAN_MARGIN_MOST 16 /**< a larger margin is not looked for */
 
 /** A plan's stability, computed before its first tick. */
 struct incise_plan_stability {
