@@ -122,21 +122,6 @@ static void print_evaluation(const struct incise_plan *plan)
 	}
 }
 
-/* Passivity limit of a wall with this delay; none is known for extrapolated poses. */
-static double passive_N_mm(const struct incise_plan_stability *s)
-{
-	return s->own_delay ? incise_stability_colgate(&s->device, s->damping_N_s_mm)
-			    : NAN;
-}
-
-/* Limit by the encoder, of a wall without delay. */
-static double encoder_N_mm(const struct incise_plan_stability *s)
-{
-	return s->own_delay && !s->device.delay_ticks && s->device.encoder_mm > 0
-		       ? incise_stability_quantisation(&s->device)
-		       : NAN;
-}
-
 static const char *const held_names[] = {
 	[INCISE_HELD_FREE] = "free",
 	[INCISE_HELD_ACROSS] = "held across",
@@ -153,39 +138,35 @@ static json_t *stability_json(const struct incise_plan_stability *s)
 	const struct incise_haptic_device *d = &s->device;
 	const struct incise_plan_weakest *w = &s->weakest;
 
-	return json_pack("{so so so so so so so sf sf sf sf sf si sI "
-			 "s{ss ss sb sb so sf sf sf sf sf sf} "
-			 "s{so so sf sf sf so ss ss sb si si} sf "
-			 "sf si sb sb s{sf sf sf sf sf si}}",
-			 "stiffness_N_mm", json_number(s->stiffness_N_mm), "limit_N_mm",
-			 json_number(s->limit_N_mm), "margin", weakest_margin(w),
-			 "damping_N_s_mm", json_number(s->damping_N_s_mm),
-			 "speed_slope_N_s_mm", json_number(s->speed_slope_N_s_mm),
-			 "passive_N_mm", json_number(passive_N_mm(s)), "encoder_N_mm",
-			 json_number(encoder_N_mm(s)), "acceleration_slope_N_s2_mm",
-			 s->acceleration_slope_N_s2_mm, "slope_N_mm", s->slope_N_mm,
-			 "unloading_N_mm", s->unloading_N_mm, "support_mm", s->support_mm,
-			 "beyond_N_mm", s->beyond_N_mm, "leans", s->runs, "ticks",
-			 (json_int_t)s->ticks, "worst", "tool",
-			 loop_tool_names[s->worst.tool], "held",
-			 held_names[s->worst.held], "guided", s->worst.guided, "tilted",
-			 s->worst.tilted, "place_mm", json_numbers(s->worst.place_mm, 3),
-			 "askew", s->worst.askew, "lean_N", s->worst.lean_N, "along_mm_s",
-			 s->worst.along_mm_s, "depth_mm", s->worst.depth_mm, "swing_mm",
-			 s->worst.swing_mm, "settle_s", s->worst.settle_s, "weakest",
-			 "margin", weakest_margin(w), "along", json_numbers(w->along, 3),
-			 "hz", w->hz, "lean_N", w->lean_N, "depth_mm", w->depth_mm,
-			 "place_mm", json_numbers(w->place_mm, 3), "tool",
-			 loop_tool_names[w->tool], "held", held_names[w->held], "tilted",
-			 w->tilted, "states", w->states, "paid", w->paid, "noise_mm",
-			 s->noise_mm, "noise_N", s->noise_N, "late_ticks", s->late_ticks,
-			 "certified", s->certified, "own_delay", s->own_delay, "device",
-			 "mass_kg", d->mass_kg, "damping_N_s_mm", d->damping_N_s_mm,
-			 "coulomb_N", d->coulomb_N, "encoder_mm", d->encoder_mm,
-			 "period_s", d->period_s, "delay_ticks", d->delay_ticks);
+	return json_pack(
+		"{so so so so sf sf sf sf sf si sI "
+		"s{ss ss sb sb so sf sf sf sf sf sf} "
+		"s{so so sf sf sf so ss ss sb si si} sf "
+		"sf si sb sb s{sf sf sf sf sf si}}",
+		"stiffness_N_mm", json_number(s->stiffness_N_mm), "margin",
+		weakest_margin(w), "damping_N_s_mm", json_number(s->damping_N_s_mm),
+		"speed_slope_N_s_mm", json_number(s->speed_slope_N_s_mm),
+		"acceleration_slope_N_s2_mm", s->acceleration_slope_N_s2_mm, "slope_N_mm",
+		s->slope_N_mm, "unloading_N_mm", s->unloading_N_mm, "support_mm",
+		s->support_mm, "beyond_N_mm", s->beyond_N_mm, "leans", s->runs, "ticks",
+		(json_int_t)s->ticks, "worst", "tool", loop_tool_names[s->worst.tool],
+		"held", held_names[s->worst.held], "guided", s->worst.guided, "tilted",
+		s->worst.tilted, "place_mm", json_numbers(s->worst.place_mm, 3), "askew",
+		s->worst.askew, "lean_N", s->worst.lean_N, "along_mm_s",
+		s->worst.along_mm_s, "depth_mm", s->worst.depth_mm, "swing_mm",
+		s->worst.swing_mm, "settle_s", s->worst.settle_s, "weakest", "margin",
+		weakest_margin(w), "along", json_numbers(w->along, 3), "hz", w->hz,
+		"lean_N", w->lean_N, "depth_mm", w->depth_mm, "place_mm",
+		json_numbers(w->place_mm, 3), "tool", loop_tool_names[w->tool], "held",
+		held_names[w->held], "tilted", w->tilted, "states", w->states, "paid",
+		w->paid, "noise_mm", s->noise_mm, "noise_N", s->noise_N, "late_ticks",
+		s->late_ticks, "certified", s->certified, "own_delay", s->own_delay,
+		"device", "mass_kg", d->mass_kg, "damping_N_s_mm", d->damping_N_s_mm,
+		"coulomb_N", d->coulomb_N, "encoder_mm", d->encoder_mm, "period_s",
+		d->period_s, "delay_ticks", d->delay_ticks);
 }
 
-/* The rig's actuators: direction, and stability of a wall along it. */
+/* The rig's actuators. */
 static json_t *axes_json(struct incise_rig *rig, const struct incise_plan_stability *s)
 {
 	struct incise_stepper *stepper;
@@ -195,13 +176,10 @@ static json_t *axes_json(struct incise_rig *rig, const struct incise_plan_stabil
 
 	for (int i = 0; rig && (stepper = incise_rig_axis(rig, i, direction)); i++) {
 		incise_stepper_info(stepper, &info);
-		json_array_append_new(
-			axes,
-			json_pack("{ss so so so si}", "name", info.name, "direction",
-				  json_numbers(direction, 3), "stiffness_N_mm",
-				  json_number(s->axis[i].stiffness_N_mm), "limit_N_mm",
-				  json_number(s->axis[i].limit_N_mm), "late_ticks",
-				  s->axis[i].late_ticks));
+		json_array_append_new(axes,
+				      json_pack("{ss so si}", "name", info.name,
+						"direction", json_numbers(direction, 3),
+						"late_ticks", s->axis_late_ticks[i]));
 	}
 	return axes;
 }
@@ -347,23 +325,15 @@ static void print_stability(const struct job *job, const struct incise_plan *pla
 	incise_plan_stability(plan, &s);
 	fputs("stability   ", stdout);
 	print_weakest(&s.weakest);
-	printf("            its stiffest has %.4g N/mm%s; a flat wall is stable up to %.4g N/mm\n",
+	printf("            its stiffest has %.4g N/mm%s\n            on %g kg and %g N s/mm, with ",
 	       s.stiffness_N_mm, s.certified ? "" : " (the model's slope is an estimate)",
-	       s.limit_N_mm);
-	printf("            on %g kg and %g N s/mm, with ", s.device.mass_kg,
-	       s.device.damping_N_s_mm);
+	       s.device.mass_kg, s.device.damping_N_s_mm);
 	if (s.own_delay)
 		printf("forces %d ticks late\n", s.device.delay_ticks);
 	else
 		printf("poses up to %d ticks old, extrapolated, and an actuator %d ticks "
 		       "late\n",
 		       s.device.delay_ticks, s.late_ticks);
-	if (isfinite(passive_N_mm(&s)))
-		printf("            passive in any hand up to %.4g N/mm\n",
-		       passive_N_mm(&s));
-	if (isfinite(encoder_N_mm(&s)))
-		printf("            the steps of its encoder die out up to %.4g N/mm\n",
-		       encoder_N_mm(&s));
 	if (s.support_mm > 0)
 		print_model(&s);
 	print_rest(&s);
@@ -390,7 +360,7 @@ static void print_direction(const char *before, const double d[3])
 	printf("%s(%.4g, %.4g, %.4g)", before, d[0], d[1], d[2]);
 }
 
-/* Directions of force that can be felt on the rig, and how stable a wall along each is. */
+/* Directions of force that can be felt on the rig. */
 static void print_axes(struct incise_rig *rig, const struct incise_plan_stability *s)
 {
 	double direction[INCISE_RIG_AXES_MAX][3], other[3];
@@ -404,9 +374,7 @@ static void print_axes(struct incise_rig *rig, const struct incise_plan_stabilit
 		incise_stepper_info(stepper, &info);
 		print_direction(n ? "            along " : "felt        along ",
 				direction[n]);
-		printf(": %s, %.4g N/mm of at most %.4g N/mm, %d ticks late\n", info.name,
-		       s->axis[n].stiffness_N_mm, s->axis[n].limit_N_mm,
-		       s->axis[n].late_ticks);
+		printf(": %s, %d ticks late\n", info.name, s->axis_late_ticks[n]);
 	}
 	if (n == 1)
 		printf("            not felt: forces across it\n");

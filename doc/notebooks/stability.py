@@ -6,10 +6,10 @@
 # ---
 
 # %% [markdown]
-# # Which stiffness does a device hold?
+# # Which forces does a device hold?
 #
-# A scene whose tissue is stiffer than its device can hold is refused, with the largest safe gain. Here the
-# limit over the tracker's rate and lateness, and the force of a stroke by trackers of two rates.
+# A scene whose forces are larger than its device can hold is refused, with the largest safe gain. Here the
+# margin over the tracker's rate and lateness, and the force of a stroke by trackers of two rates.
 
 # %%
 import matplotlib
@@ -21,12 +21,13 @@ matplotlib.rcParams.update({"figure.figsize": (7, 4), "svg.hashsalt": "incise"})
 import matplotlib.pyplot as plt
 
 wall = incise.Plan("wall")
-print(f"wall: {wall.stability.stiffness_N_mm:.3f} N/mm of {wall.stability.limit_N_mm:.3f} N/mm")
+print(f"wall: {wall.stability.stiffness_N_mm:.3f} N/mm, margin {wall.stability.margin:.2f}")
 print("left out:", ", ".join(wall.left_out))
 
 # %% [markdown]
-# ## The limit
-# A tracker that is slower or later leaves less stiffness. A plan that would be unstable raises
+# ## The margin
+# With so many times its forces the scene would swing. A tracker that is slower or later leaves less. A plan that
+# would be unstable raises
 # `incise.Invalid`, whose line has the largest gain.
 
 # %%
@@ -34,17 +35,16 @@ rates = (120, 240, 480)
 latencies = np.linspace(1, 20, 20)
 figure, axis = plt.subplots(layout="constrained")
 for rate in rates:
-    limits = []
+    margins = []
     for latency in latencies:
         try:
-            limits.append(incise.Plan("wall", tracker_hz=rate, latency_ms=latency).stability.limit_N_mm)
+            margins.append(incise.Plan("wall", tracker_hz=rate, latency_ms=latency).stability.margin)
         except incise.Invalid as refused:
-            limits.append(np.nan)
+            margins.append(np.nan)
             last = str(refused)
-    axis.plot(latencies, limits, label=f"{rate} Hz")
-axis.axhline(wall.stability.stiffness_N_mm, color="0.5", linestyle="--")
-axis.set(title="Stiffness that the device holds", xlabel="lateness of the tracker / ms",
-         ylabel="stiffness / (N/mm)")
+    axis.plot(latencies, margins, label=f"{rate} Hz")
+axis.axhline(1, color="0.5", linestyle="--")
+axis.set(title="Margin of wall.scene", xlabel="lateness of the tracker / ms", ylabel="margin")
 axis.legend(title="tracker")
 print("beyond a curve's end:", last.split(": ", 1)[-1])
 

@@ -50,7 +50,6 @@ struct loop {
 	int cells;		/* of the mean … */
 	double cell_ticks;	/* … and so many ticks in each */
 	int own_states, states; /* of an axis */
-	int axes;		/* 3, or of a wall the first one */
 	struct incise_force_map map;
 };
 
@@ -190,13 +189,13 @@ static void run_period(const struct loop *loop, struct run *run)
 
 static int size_of(const struct loop *loop)
 {
-	return loop->states * loop->axes;
+	return 3 * loop->states;
 }
 
 /* The effect of a period on each state, column by column. */
 static void measure_period(const struct loop *loop, double *matrix)
 {
-	int n = size_of(loop), axes = loop->axes;
+	int n = size_of(loop);
 
 	for (int column = 0; column < n; column++) {
 		struct run run = {
@@ -205,21 +204,20 @@ static void measure_period(const struct loop *loop, double *matrix)
 			.n = loop->waiting,
 		};
 
-		*place(loop, &run, column / axes, column % axes) =
-			SIZE_MM * unit(loop, column / axes);
+		*place(loop, &run, column / 3, column % 3) =
+			SIZE_MM * unit(loop, column / 3);
 		run_period(loop, &run);
 		for (int row = 0; row < n; row++)
-			matrix[row * n + column] =
-				*place(loop, &run, row / axes, row % axes) /
-				(SIZE_MM * unit(loop, row / axes));
+			matrix[row * n + column] = *place(loop, &run, row / 3, row % 3) /
+						   (SIZE_MM * unit(loop, row / 3));
 	}
 }
 
 /* In a period; none: a predictor with a gain of 0 has a state that stays. */
 #define GROWS 1e-7
 
-/* Of the matrix, the eigenvalue that grows the fastest, and 0 without one; @swings: of those that swing. */
-static double complex fastest(double *matrix, int n, bool swings)
+/* Of the matrix, the eigenvalue of the swing that grows the fastest, and 0 without one. */
+static double complex fastest(double *matrix, int n)
 {
 	double complex *all = malloc((size_t)n * sizeof(*all)), most = 0;
 
@@ -230,20 +228,10 @@ static double complex fastest(double *matrix, int n, bool swings)
 	for (int i = 0; i < n; i++)
 		/* A motion that grows by e before it turns by a radian only goes away. */
 		if (cabs(all[i]) > cabs(most) && cimag(all[i]) >= 0 &&
-		    (!swings || carg(all[i]) > log(cabs(all[i]))))
+		    carg(all[i]) > log(cabs(all[i])))
 			most = all[i];
 	free(all);
 	return most;
-}
-
-static bool stable(struct loop *loop, double stiffness_N_mm)
-{
-	double matrix[(OWN_STATES + WAITING_MOST + INCISE_POSE_LOOP_LATE_MAX) *
-		      (OWN_STATES + WAITING_MOST + INCISE_POSE_LOOP_LATE_MAX)];
-
-	loop->map.now[0][0] = stiffness_N_mm;
-	measure_period(loop, matrix);
-	return cabs(fastest(matrix, loop->states, false)) <= 1 + GROWS;
 }
 
 /* Times that are multiples of each other, none shorter than it is. */
@@ -275,16 +263,6 @@ static void set_predict(struct loop *loop)
 	p->now.t_ns = p->now.arrival_ns - p->latency_ns;
 }
 
-static bool valid(const struct incise_pose_loop *of)
-{
-	const struct incise_haptic_device *d = of->device;
-
-	return d->mass_kg > 0 && isfinite(d->mass_kg) && d->damping_N_s_mm >= 0 &&
-	       isfinite(d->damping_N_s_mm) && d->period_s > 0 && isfinite(d->period_s) &&
-	       isfinite(of->damping_N_s_mm) && of->late_ticks >= 0 &&
-	       of->late_ticks <= INCISE_POSE_LOOP_LATE_MAX;
-}
-
 static void loop_init(struct loop *loop, const struct incise_pose_loop *of,
 		      const struct incise_force_map *map)
 {
@@ -294,7 +272,6 @@ static void loop_init(struct loop *loop, const struct incise_pose_loop *of,
 		.predict = *of->predict,
 		.late = of->late_ticks,
 		.map = *map,
-		.axes = 3,
 	};
 	if (map->mean_ticks > 1) {
 		loop->cells = (int)fmin(map->mean_ticks - 1, CELLS_MOST);
@@ -303,20 +280,8 @@ static void loop_init(struct loop *loop, const struct incise_pose_loop *of,
 	for (int i = 0; i < 9; i++)
 		mass = mass || map->mass[i / 3][i % 3] != 0;
 	loop->own_states = mass ? OWN_STATES : OWN_STATES - 1;
-	set_times(loop, of->device->period_s);
+	set_times(loop, of->period_s);
 	set_predict(loop);
-}
-
-static void wall_init(struct loop *loop, const struct incise_pose_loop *of)
-{
-	struct incise_force_map map = {.mean_ticks = 1};
-
-	map.damping[0][0] = of->damping_N_s_mm;
-	loop_init(loop, of, &map);
-	loop->axes = 1;
-	for (int i = 0; i < 3; i++)
-		loop->plant[i] = incise_pose_loop_plant(of->device->mass_kg,
-							of->device->damping_N_s_mm, NULL);
 }
 
 struct incise_plant incise_pose_loop_plant(double mass_kg, double damping_N_s_mm,
@@ -332,50 +297,6 @@ struct incise_plant incise_pose_loop_plant(double mass_kg, double damping_N_s_mm
 	plant.wall_N_mm = hand->stiffness_N_mm;
 	plant.tied = true;
 	return plant;
-}
-
-bool incise_pose_loop_holds(const struct incise_pose_loop *of, double stiffness_N_mm)
-{
-	struct loop loop;
-
-	if (!valid(of) || !isfinite(stiffness_N_mm))
-		return false;
-	wall_init(&loop, of);
-	return stable(&loop, stiffness_N_mm);
-}
-
-/* The scan: softest wall, as a part of what a delay holds; factor; how many. */
-#define SOFTEST 1e-4
-#define FACTOR 1.05
-#define STEPS 400
-#define HALVINGS 40
-#define MARGIN_LEAST (1.0 / 1024) /* of the most; below it there is none */
-#define MARGIN_HALVINGS 11	  /* of its logarithm: within 3 thousandths */
-
-double incise_pose_loop_limit(const struct incise_pose_loop *of)
-{
-	double late_s, low = 0, high;
-	struct loop loop;
-
-	if (!valid(of))
-		return 0;
-	wall_init(&loop, of);
-	late_s = loop.latency_s + loop.pose_s + loop.late * loop.tick_s;
-	high = loop.plant[0].mass_kg * N_S2_PER_MM_KG / late_s;
-	if (loop.plant[0].damping_N_s_mm > 0)
-		high = fmin(high, loop.plant[0].damping_N_s_mm);
-	high *= SOFTEST / late_s;
-	/* Upwards, for a wall may be stable again beyond one that is not. */
-	for (int i = 0; i < STEPS && stable(&loop, high); i++) {
-		low = high;
-		high *= FACTOR;
-	}
-	for (int i = 0; i < HALVINGS && low > 0; i++) {
-		double middle = (low + high) / 2;
-
-		*(stable(&loop, middle) ? &low : &high) = middle;
-	}
-	return low;
 }
 
 /* Direction of the fastest swing: that of its places, or of their speeds. */
@@ -425,7 +346,7 @@ double incise_pose_loop_swing(const struct incise_pose_loop *of,
 	work = matrix + (size_t)n * (size_t)n;
 	measure_period(&loop, matrix);
 	memcpy(work, matrix, (size_t)n * (size_t)n * sizeof(*work));
-	eigenvalue = fastest(work, n, true);
+	eigenvalue = fastest(work, n);
 	period_s = loop.ticks * loop.tick_s;
 	if (swing) {
 		swing->hz = carg(eigenvalue) / (2 * M_PI * period_s);
@@ -434,6 +355,9 @@ double incise_pose_loop_swing(const struct incise_pose_loop *of,
 	free(matrix);
 	return cabs(eigenvalue) > 1 + GROWS ? log(cabs(eigenvalue)) / period_s : 0;
 }
+
+#define MARGIN_LEAST (1.0 / 1024) /* of the most; below it there is none */
+#define MARGIN_HALVINGS 11	  /* of its logarithm: within 3 thousandths */
 
 double incise_pose_loop_margin(const struct incise_pose_loop *of,
 			       const struct incise_plant axis[3],

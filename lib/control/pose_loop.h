@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Largest stable stiffness of a wall felt through a tracker: the loop of device, tracker,
- * predictor (with extrapolation and blending) and wall. The same in space, of any forces that are linear about a state of
- * rest: incise_pose_loop_swing().
+ * Whether the loop of forces and a tracker swings, in three dimensions: device, tracker, predictor (with extrapolation
+ * and blending), and any forces that are linear about a state of rest.
  *
  *   device ──pose, P apart──▶ latency ──▶ predict ──each tick T──▶ f = -Kx-Bv ──────┐
  *      ▲                                                                            │
@@ -11,26 +10,28 @@
  * This is not the loop with a delay of latency + P and no predictor, nor is that on the
  * safe side. The predictor leads, which helps where the motion is slow, as a hand's is;
  * and it shows faster motion larger than it is, as that of a wall that hums. On a device
- * of 50 g and 0.01 N s/mm, with 120 Hz and 4.2 ms, the loop holds 0.40 N/mm where the
- * delay would hold 0.94. With a twentieth of the damping the loop holds three times more
+ * of 50 g and 0.01 N s/mm, with 120 Hz and 4.2 ms, the loop holds a wall of 0.40 N/mm where
+ * the delay would hold 0.94. With a twentieth of the damping the loop holds three times more
  * than the delay. Damping by the predictor's velocity makes it less, not more.
  *
- * In contact all of it is linear, and periodic when P is a whole number of ticks. The map
- * of the state over one P is therefore a matrix, and the wall is stable when that has no
+ * About a state of rest all of it is linear, and periodic when P is a whole number of ticks. The map
+ * of the state over one P is therefore a matrix, and the loop is stable when that has no
  * eigenvalue of modulus above 1. The matrix is not derived but measured: the columns are
  * what device (incise/plant.h) and predictor (predict.h) make of each unit state in one P.
  * So it is that of the real predictor, whatever that becomes.
  *
- *   state: device x v | predictor x v a, shown x v (and a, with A) | poses on their way | forces on
+ *   state, of each axis: device x v | predictor x v a, shown x v (and a, with A) | poses on their way | forces on
  *   theirs
+ *
+ * Times that are no multiples of each other are made so by the longer tick, or by the
+ * slower tracker when that is the faster of the two. Beyond 64 ticks in a P, or 16 P in a
+ * tick or 32 in the latency, tick or P are made longer too.
  *
  * N, mm, s.
  */
 #ifndef INCISE_POSE_LOOP_H
 #define INCISE_POSE_LOOP_H
 
-#include <stdbool.h>
-#include <incise/stability.h>
 #include "plant.h"
 #include "predict.h"
 
@@ -41,29 +42,13 @@ struct incise_hand_impedance {
 	double mass_kg, damping_N_s_mm, stiffness_N_mm;
 };
 
+/* Coulomb friction, encoder and noise are left out. */
 struct incise_pose_loop {
-	/* Coulomb friction, encoder and delay_ticks are left out; so is noise. */
-	const struct incise_haptic_device *device;
+	double period_s; /* of a tick */
 	/* As initialised for the tracker: its gains, period and latency count. */
 	const struct incise_predict *predict;
-	double damping_N_s_mm; /* of the wall, by the predictor's velocity */
-	int late_ticks;	       /* until a force acts, 0 … INCISE_POSE_LOOP_LATE_MAX */
+	int late_ticks; /* until a force acts, 0 … INCISE_POSE_LOOP_LATE_MAX */
 };
-
-/* Whether a wall of this stiffness is stable in the loop. Some 0.1 ms. */
-bool incise_pose_loop_holds(const struct incise_pose_loop *loop, double stiffness_N_mm);
-
-/*
- * Stiffness up to which the wall is stable in the loop.
- *
- * Times that are no multiples of each other are made so by the longer tick, or by the
- * slower tracker when that is the faster of the two. Beyond 64 ticks in a P, or 16 P in a
- * tick or 32 in the latency, tick or P are made longer too.
- *
- * Returns N/mm; 0 when even the softest wall is unstable, or of a device that cannot be.
- * Takes some milliseconds, more with many P in the latency.
- */
-double incise_pose_loop_limit(const struct incise_pose_loop *loop);
 
 /* A mass in a hand, or in none (NULL). */
 struct incise_plant incise_pose_loop_plant(double mass_kg, double damping_N_s_mm,
@@ -96,7 +81,7 @@ struct incise_swing {
  * @param share  of all forces of the map
  * @param axis   of the device, from where it is at rest
  * @param swing  or NULL
- * @return INFINITY: no memory. @of: its damping does not count. Some 0.5 ms; 5 ms with a mean of 32 ticks.
+ * @return INFINITY: no memory. Some 0.5 ms; 5 ms with a mean of 32 ticks.
  */
 double incise_pose_loop_swing(const struct incise_pose_loop *of,
 			      const struct incise_plant axis[3],

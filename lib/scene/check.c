@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * Whether a scene is stable on its device, before its first tick: a search for swings that do not end, see rest.h.
- * For people besides: the scene's largest stiffness, and that of the stiffest wall that is stable in the loop with the tracker's
- * poses, or, where the scene says how late its device answers, the exact limit of a wall so late.
+ * For people besides, and for the account of work: the scene's largest stiffness.
  */
 #include <errno.h>
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 #include "../base/units.h"
 #include "../base/vector.h"
 #include "../control/pose_loop.h"
@@ -233,21 +233,6 @@ static void set_delay(struct incise_plan *plan, const struct incise_tracker_info
 							: (int)fmin(ticks, INT_MAX);
 }
 
-static double limit_N_mm(const struct incise_plan *plan, int late_ticks,
-			 double damping_N_s_mm)
-{
-	const struct incise_pose_loop loop = {
-		.device = &plan->stability.device,
-		.predict = &plan->predict,
-		.damping_N_s_mm = damping_N_s_mm,
-		.late_ticks = late_ticks,
-	};
-
-	if (plan->stability.own_delay)
-		return incise_stability_limit(loop.device, damping_N_s_mm);
-	return incise_pose_loop_limit(&loop);
-}
-
 /*
  * Of the scene's forces, how much an actuator may have to push along its direction: all, and
  * more where it works against others that are not at right angles.
@@ -275,38 +260,10 @@ static int set_lateness(struct incise_plan *plan, struct incise_error *err)
 				"ticks: stability can be checked up to %d; correct it",
 				plan->scene->path, info->name, info->late_s * 1e3, ticks,
 				INCISE_POSE_LOOP_LATE_MAX);
-		s->axis[i].late_ticks = (int)fmax(plan->scene->device.late_ticks, ticks);
-		s->late_ticks = (int)fmax(s->late_ticks, s->axis[i].late_ticks);
+		s->axis_late_ticks[i] = (int)fmax(plan->scene->device.late_ticks, ticks);
+		s->late_ticks = (int)fmax(s->late_ticks, s->axis_late_ticks[i]);
 	}
 	return 0;
-}
-
-/* The limit of each actuator; the scene's is that of the worst, for its own stiffness. */
-static void set_limits(struct incise_plan *plan)
-{
-	struct incise_plan_stability *s = &plan->stability;
-
-	s->limit_N_mm =
-		s->n_axes ? INFINITY : limit_N_mm(plan, s->late_ticks, s->damping_N_s_mm);
-	for (int i = 0; i < s->n_axes; i++) {
-		double share = pushed(plan, i);
-
-		s->axis[i].stiffness_N_mm = share * s->stiffness_N_mm;
-		s->axis[i].limit_N_mm = limit_N_mm(plan, s->axis[i].late_ticks,
-						   share * s->damping_N_s_mm);
-		s->limit_N_mm = fmin(s->limit_N_mm, s->axis[i].limit_N_mm / share);
-	}
-}
-
-/* For a message: downwards, as what is named must be safe. */
-static double three_digits_down(double gain)
-{
-	double unit;
-
-	if (!(gain > 0))
-		return 0;
-	unit = pow(10, floor(log10(gain)) - 2);
-	return floor(gain / unit) * unit;
 }
 
 static double membrane_N_mm(const struct incise_plan *plan)
@@ -435,7 +392,6 @@ int incise_plan_check(struct incise_plan *plan, const struct incise_tracker_info
 	s->unloading_N_mm = plan->dissipates ? plan->unloading_N_mm : 0;
 	if (scene->unchecked)
 		return 0;
-	set_limits(plan);
 	if (s->acceleration_slope_N_s2_mm > 0 && s->own_delay)
 		return incise_error_set(
 			err, EDOM,
@@ -494,7 +450,6 @@ static int search(struct incise_plan *plan, const struct incise_tracker_info *tr
 /* A gain, or a damping, that is looked for. */
 struct advice {
 	bool damps;
-	double most;		  /* so many times less, or more */
 	struct incise_rest swung; /* a run with the least gain that swung … */
 	double gain;		  /* … and that */
 };
@@ -526,43 +481,51 @@ static bool helps(struct incise_plan *plan, const struct incise_tracker_info *tr
 }
 
 /*
- * The advice is looked for down to a 4096th of the gain, and up to 16 times the damping: by the way that swung alone, by
+ * The advice is looked for down to a millionth of the gain, and up to 16 times the damping: by the way that swung alone, by
  * halvings of its logarithm, and then tried in all ways; if another one swings, by that one.
  */
-#define GAIN_LEAST (1.0 / 4096)
+#define GAIN_LEAST (1.0 / 1048576)
 #define DAMPING_MOST 16 /* times the device's own, or than 1 mN s/mm */
 #define HALVINGS 5
 #define ATTEMPTS 6
 
-static double three_digits_up(double value)
+/* For a message. */
+static double three_digits(double value, double (*round)(double))
 {
 	double unit = pow(10, floor(log10(value)) - 2);
 
-	return ceil(value / unit) * unit;
+	return round(value / unit) * unit;
 }
 
-/* The nearest value to @from, in three digits, that was tried and holds; 0: none was found. @way swung, or -1. */
-static double find_advice(struct incise_plan *plan,
-			  const struct incise_tracker_info *tracker,
-			  struct advice *advice, double from, int way)
+/* The device's own damping, or as much as any has. */
+static double least_damping(const struct incise_plan *plan)
 {
-	double (*round)(double) = advice->damps ? three_digits_up : three_digits_down;
-	double factor = advice->damps ? 2 : 0.5,
-	       end = from * pow(factor, log2(advice->most));
+	return fmax(plan->stability.device.damping_N_s_mm, 1e-3);
+}
 
+/* The nearest value to the plan's own, in three digits, that was tried and holds; 0: none was found. @way swung. */
+static double find_advice(struct incise_plan *plan,
+			  const struct incise_tracker_info *tracker, bool damps, int way,
+			  struct advice *advice)
+{
+	double (*safe)(double) = damps ? ceil : floor;
+	double from = damps ? least_damping(plan) : plan->gain;
+	double end = from * (damps ? DAMPING_MOST : GAIN_LEAST), factor = damps ? 2 : 0.5;
+
+	advice->damps = damps;
 	for (int i = 0; i < ATTEMPTS; i++) {
 		double good, bad = from;
 		int any = -1;
 
 		/* The plan as it is was tried. */
-		if (way < 0 || i) {
-			if (helps(plan, tracker, advice, round(from), &any))
-				return round(from);
+		if (i) {
+			if (helps(plan, tracker, advice, from, &any))
+				return from;
 			way = any;
 		}
 		for (good = factor * from; !helps(plan, tracker, advice, good, &way);
 		     good *= factor) {
-			if (advice->damps ? good > end : good < end)
+			if (damps ? good > end : good < end)
 				return 0;
 			bad = good;
 		}
@@ -572,41 +535,9 @@ static double find_advice(struct incise_plan *plan,
 			*(helps(plan, tracker, advice, middle, &way) ? &good : &bad) =
 				middle;
 		}
-		from = round(good);
+		from = three_digits(good, safe);
 	}
 	return 0;
-}
-
-/* So far above the limit of a flat wall nothing holds, and what is just below that limit is tried first. */
-#define FAR_ABOVE 4
-
-static double best_gain(struct incise_plan *plan,
-			const struct incise_tracker_info *tracker, struct advice *advice)
-{
-	const struct incise_plan_stability *s = &plan->stability;
-
-	advice->damps = false;
-	advice->most = 1 / GAIN_LEAST;
-	if (s->limit_N_mm > 0 && s->stiffness_N_mm > FAR_ABOVE * s->limit_N_mm)
-		return find_advice(plan, tracker, advice,
-				   plan->gain * s->limit_N_mm / s->stiffness_N_mm / 1.05,
-				   -1);
-	return find_advice(plan, tracker, advice, plan->gain, advice->swung.way);
-}
-
-static double best_damping(struct incise_plan *plan,
-			   const struct incise_tracker_info *tracker, int way,
-			   struct advice *advice)
-{
-	const struct incise_plan_stability *s = &plan->stability;
-
-	advice->damps = true;
-	advice->most = DAMPING_MOST;
-	if (s->limit_N_mm > 0 &&
-	    s->stiffness_N_mm > FAR_ABOVE * DAMPING_MOST * s->limit_N_mm)
-		return 0;
-	return find_advice(plan, tracker, advice,
-			   fmax(plan->stability.device.damping_N_s_mm, 1e-3), way);
 }
 
 /* Say the gain and the damping that were tried and hold. */
@@ -614,27 +545,22 @@ static void advise(struct incise_plan *plan, const struct incise_tracker_info *t
 		   struct advice *advice, char text[200])
 {
 	int way = advice->swung.way;
-	double gain = best_gain(plan, tracker, advice);
-	double damping = best_damping(plan, tracker, way, advice);
+	double gain = find_advice(plan, tracker, false, way, advice);
+	double damping = find_advice(plan, tracker, true, way, advice);
 
-	if (gain > 0 && damping > 0)
-		snprintf(text, 200,
-			 "set tissue.gain to at most %.3g, or use a device with "
-			 "device.damping_N_s_mm of at least %.3g",
-			 gain, damping);
-	else if (gain > 0)
-		snprintf(text, 200, "set tissue.gain to at most %.3g", gain);
-	else if (damping > 0)
-		snprintf(text, 200,
+	*text = '\0';
+	if (gain > 0)
+		snprintf(text, 200, "set tissue.gain to at most %.3g%s", gain,
+			 damping > 0 ? ", or " : "");
+	if (damping > 0)
+		snprintf(text + strlen(text), 200 - strlen(text),
 			 "use a device with device.damping_N_s_mm of at least %.3g",
 			 damping);
-	else
+	if (!*text)
 		snprintf(text, 200,
 			 "no gain down to %.3g holds, and no damping of the device up "
 			 "to %.3g N s/mm",
-			 plan->gain * GAIN_LEAST,
-			 DAMPING_MOST *
-				 fmax(plan->stability.device.damping_N_s_mm, 1e-3));
+			 plan->gain * GAIN_LEAST, DAMPING_MOST * least_damping(plan));
 }
 
 /* Of a run, for a message. */

@@ -706,9 +706,8 @@ static bool is_same(const struct incise_force_map *a, const struct incise_force_
 static bool judge_linear(struct search *s, const struct run *run, double depth_mm,
 			 int way, struct incise_rest *rest)
 {
-	const struct incise_haptic_device device = {.period_s = s->device.period_s};
 	const struct incise_pose_loop loop = {
-		.device = &device,
+		.period_s = s->device.period_s,
 		.predict = &s->plan.predict,
 		.late_ticks = s->device.late_ticks,
 	};

@@ -109,10 +109,6 @@ class DeviceStruct(ctypes.Structure):
     c_name = "struct incise_haptic_device"
 
 
-class _Axis(ctypes.Structure):
-    _fields_ = [("stiffness_N_mm", c_double), ("limit_N_mm", c_double), ("late_ticks", c_int)]
-
-
 class _Worst(ctypes.Structure):
     _fields_ = [
         ("lean_N", c_double),
@@ -155,10 +151,9 @@ class StabilityStruct(ctypes.Structure):
         ("own_delay", c_bool),
         ("stiffness_N_mm", c_double),
         ("damping_N_s_mm", c_double),
-        ("limit_N_mm", c_double),
         ("late_ticks", c_int),
         ("n_axes", c_int),
-        ("axis", _Axis * AXES_MAX),
+        ("axis_late_ticks", c_int * AXES_MAX),
         ("speed_slope_N_s_mm", c_double),
         ("slope_N_mm", c_double),
         ("unloading_N_mm", c_double),
@@ -239,7 +234,7 @@ class Stability(NamedTuple):
 
     stiffness_N_mm: float  #: largest of the scene
     damping_N_s_mm: float
-    limit_N_mm: float  #: stiffness that the device holds
+    margin: float  #: with so many times its forces it would swing; 16: with no fewer
     slope_N_mm: float  #: largest of the model's force by the depth
     unloading_N_mm: float
     support_mm: float  #: largest depth that the model knows
@@ -415,13 +410,13 @@ class Plan:
 
     @property
     def stability(self) -> Stability:
-        """Stiffness of the plan, and what its device holds."""
+        """Stiffness of the plan, and its margin on its device."""
         s = StabilityStruct()
         function("incise_plan_stability")(self._plan, ctypes.byref(s))
         return Stability(
             s.stiffness_N_mm,
             s.damping_N_s_mm,
-            s.limit_N_mm,
+            s.weakest.margin,
             s.slope_N_mm,
             s.unloading_N_mm,
             s.support_mm,

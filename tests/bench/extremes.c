@@ -15,6 +15,7 @@
 #include "../../tools/cli/file.h"
 #include "../../tools/cli/scene_argument.h"
 #include "../../tools/bench/closed_loop.h"
+#include "../wall_limit.h"
 #include "program.h"
 
 /* --- properties --- */
@@ -157,19 +158,17 @@ static struct incise_plan *make_plan(const struct wall *wall, const char *device
 	return plan;
 }
 
-/* The limit is that of the device, whatever the wall is. */
-static double plan_limit(void)
+/* By the loop's eigenvalues. */
+static double theory_limit(void)
 {
-	const struct wall soft = {.K_N_mm = 0.01};
-	struct incise_plan_stability stability;
-	struct incise_error err = {0};
-	struct incise_scene *scene;
-	struct incise_plan *plan = cli_require(make_plan(&soft, "", &scene, &err), &err);
+	const struct incise_haptic_device device = {.mass_kg = loop.mass_kg,
+						    .damping_N_s_mm = loop.damping_N_s_mm,
+						    .period_s = 1e-3};
+	const struct incise_tracker_info tracker = closed_loop_tracker(&loop);
+	struct incise_predict predict;
 
-	incise_plan_stability(plan, &stability);
-	incise_plan_free(plan);
-	incise_scene_free(scene);
-	return stability.limit_N_mm;
+	incise_predict_init(&predict, &tracker, 0);
+	return wall_limit(&device, &predict, 0, 0);
 }
 
 static void press(struct wall *wall)
@@ -180,7 +179,7 @@ static void press(struct wall *wall)
 	struct closed_loop_end end;
 	const char *text;
 
-	wall->limit_N_mm = plan_limit();
+	wall->limit_N_mm = theory_limit();
 	wall->accepted = plan;
 	if (!plan) {
 		incise_scene_free(scene);

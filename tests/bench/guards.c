@@ -26,10 +26,10 @@
 #include "../../lib/base/random.h"
 #include "../../lib/base/vector.h"
 #include "../../lib/control/plant.h"
-#include "../../lib/control/pose_loop.h"
 #include "../../lib/scene/rest.h"
 #include "../../tools/cli/scene_argument.h"
 #include "../../tools/bench/stability.h"
+#include "../wall_limit.h"
 #include "program.h"
 
 enum guard { NONE, PASSIVITY, DELAYED, ENERGY_BOUNDING, COUPLING, GUARDS };
@@ -385,15 +385,14 @@ static void set_guard(struct loop *l, const struct setup *s, enum guard kind, do
 	int late = s->scene->device.late_ticks, age = st->device.delay_ticks + late;
 	/* Damping that acts so late is itself stable below this. */
 	double cap = 0.5 * unit * fmin(1, 2 * sin(M_PI / (4.0 * age + 2)));
-	const struct incise_pose_loop loop = {
-		.device = &st->device, .predict = &s->plan->predict, .late_ticks = late};
 
 	for (double high = 2 * cap; kind == PASSIVITY && high - low > cap / 64;) {
-		struct incise_pose_loop more = loop;
 		double middle = (low + high) / 2;
 
-		more.damping_N_s_mm = gain * st->damping_N_s_mm + middle;
-		*(incise_pose_loop_holds(&more, stiffness) ? &low : &high) = middle;
+		*(wall_rests(&st->device, &s->plan->predict, stiffness,
+			     gain * st->damping_N_s_mm + middle, late)
+			  ? &low
+			  : &high) = middle;
 	}
 	l->guard = (struct guarded){
 		.kind = kind,

@@ -34,7 +34,7 @@ static const struct cut_series {
 } cut_series[] = {
 	{"wall", "tracker", 0.33, 10, false},
 	{"wall", "exact", 0.33, 10, true},
-	{"stiff", "exact", 1.5, 2, true},
+	{"stiff", "exact", 1.3, 2, true},
 };
 
 /* Of a force against the exact one, over a cut. */
@@ -46,7 +46,7 @@ struct rate_error {
 struct rate_row {
 	const char *wall, *poses;
 	double rate_hz;
-	double stiffness_N_mm, limit_N_mm; /* limit: NaN where it is not known */
+	double stiffness_N_mm, margin; /* margin: NaN where it is not known */
 	struct rate_error command, rendered;
 	double hold_N;	  /* rms of an ideal sample and hold */
 	char failed[512]; /* why it was not measured; else empty */
@@ -171,7 +171,7 @@ static void run_plan(struct incise_scene *scene, struct incise_rig *rig, int poi
 		return;
 	}
 	incise_plan_stability(plan, &stability);
-	row->limit_N_mm = stability.limit_N_mm;
+	row->margin = stability.weakest.margin;
 	rc = cut(plan, rig, point_hz, row);
 	if (rc)
 		snprintf(row->failed, sizeof(row->failed), "a tick failed: %s",
@@ -237,7 +237,7 @@ static void measure_rates(bool quick)
 					     .poses = s->poses,
 					     .rate_hz = rates_hz[i % N(rates_hz)],
 					     .stiffness_N_mm = s->stiffness_N_mm,
-					     .limit_N_mm = NAN,
+					     .margin = NAN,
 					     .hold_N = NAN};
 		cli_progress("%s, %s poses, %g Hz", s->wall, s->poses, rates[i].rate_hz);
 		measure_rate(s, quick, &rates[i]);
@@ -251,7 +251,7 @@ static const struct bench_table rates_table = {
 	.columns = {COLUMN(rate_row, "wall", wall), COLUMN(rate_row, "poses", poses),
 		    COLUMN(rate_row, "rate_hz", rate_hz),
 		    COLUMN(rate_row, "stiffness_N_mm", stiffness_N_mm),
-		    COLUMN(rate_row, "limit_N_mm", limit_N_mm),
+		    COLUMN(rate_row, "margin", margin),
 		    COLUMN(rate_row, "command.rms_error_N", command.rms_N),
 		    COLUMN(rate_row, "command.max_error_N", command.max_N),
 		    COLUMN(rate_row, "command.relative", command.relative),

@@ -16,7 +16,6 @@
 #include <incise/plan.h>
 #include "../../lib/base/random.h"
 #include "../../lib/base/vector.h"
-#include "../../lib/control/pose_loop.h"
 #include "../../lib/learn/gram.h"
 #include "../../lib/scene/heights.h"
 #include "../../lib/scene/rest.h"
@@ -25,6 +24,7 @@
 #include "../../tools/bench/stability.h"
 #include "../../tools/cli/file.h"
 #include "../../tools/cli/stopwatch.h"
+#include "../wall_limit.h"
 #include "program.h"
 
 #define REPEATS(run) ((run)->quick ? 5 : 31)
@@ -323,10 +323,8 @@ static void measure_tracker(struct tracker_row *row)
 							    .damping_N_s_mm =
 								    dampings[i][0],
 							    .period_s = PERIOD_S};
-		const struct incise_pose_loop loop = {&device, &predict,
-						      .damping_N_s_mm = dampings[i][1]};
 
-		row->limit[i] = incise_pose_loop_limit(&loop);
+		row->limit[i] = wall_limit(&device, &predict, dampings[i][1], 0);
 	}
 }
 
@@ -553,7 +551,7 @@ static struct incise_plan *plan_of(const struct lean_case *is, double gain,
 	return cli_require(lean_plan(is, gain, damping_N_s_mm, scene, &err), &err);
 }
 
-/* A gain below that which the linear check refuses: what swings then is the search's to find. */
+/* A gain below that with which a flat wall swings: what swings then is the search's to find. */
 static double near_gain(const struct lean_case *is, uint64_t *seed)
 {
 	const struct incise_tracker_info tracker = closed_loop_tracker(&is->loop);
@@ -567,14 +565,10 @@ static double near_gain(const struct lean_case *is, uint64_t *seed)
 	incise_plan_free(plan);
 	incise_scene_free(scene);
 	incise_predict_init(&predict, &tracker, 0);
-	most = s.limit_N_mm / s.stiffness_N_mm;
-	for (bool holds = false; !holds; most *= 0.9) {
-		const struct incise_pose_loop loop = {
-			&s.device, &predict, .damping_N_s_mm = most * s.damping_N_s_mm,
-			.late_ticks = is->loop.late_ticks};
-
-		holds = incise_pose_loop_holds(&loop, most * s.stiffness_N_mm);
-	}
+	most = wall_limit(&s.device, &predict, 0, is->loop.late_ticks) / s.stiffness_N_mm;
+	while (!wall_rests(&s.device, &predict, most * s.stiffness_N_mm,
+			   most * s.damping_N_s_mm, is->loop.late_ticks))
+		most *= 0.9;
 	return gain * LITTLE * most;
 }
 

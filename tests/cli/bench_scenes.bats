@@ -32,7 +32,7 @@ in_plan() {
 	[ "$(row r.json plane_constraint stages)" = \
 		"$(row r.json plane_reaction stages | sed 's/reaction, /reaction, plane, /')" ]
 	# the model and the mesh are in memory
-	holds "$(row r.json mesh_reaction plan_memory_KiB) > 100 * $(row r.json plane_reaction plan_memory_KiB)"
+	holds "$(row r.json mesh_reaction plan_memory_KiB) > 50 * $(row r.json plane_reaction plan_memory_KiB)"
 	holds "$(row r.json mesh_reaction process_own_KiB) > $(row r.json mesh_reaction plan_memory_KiB)"
 	# a loop cannot keep what its scene does not need
 	[ -z "$(row r.json plane_kept process_memory_KiB)" ]

@@ -23,7 +23,6 @@ setup() {
 @test "plan reports as JSON: every stage is kept or left out" {
 	incise plan liver.scene --json >r.json
 	[ "$(key r.json kept)" = '["pose","predict","contact","reaction","fracture","start","limit"]' ]
-	holds "$(key r.json stiffness_N_mm) < $(key r.json limit_N_mm)"
 	holds "$(key r.json margin) > 1 && $(key r.json margin) == $(key r.json weakest.margin)"
 	holds "$(key r.json weakest.states) >= 3 && $(key r.json weakest.hz) > 5"
 	holds "$(key r.json tick_ns) > 0"
@@ -64,7 +63,6 @@ setup() {
 	# 2 ms and a period of 4.17 ms, in whole ticks
 	[ "$(key r.json device.delay_ticks)" = 7 ]
 	[ "$(key r.json own_delay)" = 0 ]
-	[ -z "$(key r.json passive_N_mm)" ]
 }
 
 @test "a rig whose tracker is faster holds more than the one that is taken without a rig" {
@@ -72,21 +70,18 @@ setup() {
 	run --separate-stderr incise plan fast.scene
 	failed_with fast.scene "not stable" "120 Hz"
 	incise plan fast.scene --rig sim:tracker_hz=240,tracker_latency_ms=2 --json >r.json
-	holds "$(key r.json limit_N_mm) > 0.6"
+	holds "$(key r.json margin) > 1"
 	holds "$(key r.json tick_ns) > 0"
 }
 
-@test "a device with an encoder says how late it is, and holds much more" {
-	cat >encoder.scene <<-'EOF'
-		tissue = { reaction_N_mm = 2.0; };
-		device = { delay_ticks = 0; encoder_mm = 0.005; };
-	EOF
-	incise plan encoder.scene --json >r.json
+@test "a device that says how late it is holds what the tracker's lateness would not" {
+	echo 'tissue = { reaction_N_mm = 1.4; };' >late.scene
+	run --separate-stderr incise plan late.scene
+	failed_with late.scene "not stable" "120 Hz"
+	echo 'device = { delay_ticks = 0; };' >>late.scene
+	incise plan late.scene --json >r.json
 	[ "$(key r.json own_delay)" = 1 ]
-	# b = 0.01, c = 0.01, T = 0.001: 2b/T = 20 N/mm, 2c/D = 4 N/mm
-	holds "($(key r.json passive_N_mm) - 20)^2 < 1e-20"
-	holds "($(key r.json encoder_N_mm) - 4)^2 < 1e-20"
-	holds "$(key r.json limit_N_mm) > 20 && $(key r.json limit_N_mm) < 22"
+	holds "$(key r.json margin) > 1"
 }
 
 @test "a full plan keeps every stage" {
@@ -175,7 +170,7 @@ setup() {
 }
 
 # bats test_tags=check
-@test "plan says which directions are felt on a rig, and how stable each is" {
+@test "plan says which directions are felt on a rig, and how late each is" {
 	rig=sim:clock=simulated
 	for n in 1 2 3; do
 		incise plan wall.scene --rig $rig,axes=$n >$n.txt
@@ -188,8 +183,7 @@ setup() {
 	[ "$(key two.json axes[0].direction)" = "[0.0,0.0,1.0]" ]
 	[ "$(key two.json axes[#-1].direction)" = "[0.0,1.0,0.0]" ]
 	for i in 0 1; do
-		[ "$(key two.json axes[$i].limit_N_mm)" = "$(key two.json limit_N_mm)" ]
-		[ "$(key two.json axes[$i].stiffness_N_mm)" = "$(key two.json stiffness_N_mm)" ]
+		[ "$(key two.json axes[$i].late_ticks)" = "$(key two.json late_ticks)" ]
 	done
 	incise plan wall.scene --json >none.json
 	[ "$(key none.json axes)" = '[]' ]

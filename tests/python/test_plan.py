@@ -26,7 +26,7 @@ class Plans(Case):
         self.assertEqual(plan.stages, [s for s in told["kept"] if s in plan.stages])
         self.assertGreater(len(plan.stages), 10)
         self.assertIn("actuate", plan.left_out)
-        self.assertAlmostEqual(plan.stability.limit_N_mm, told["limit_N_mm"], places=6)
+        self.assertAlmostEqual(plan.stability.margin, told["margin"], places=6)
         self.assertAlmostEqual(plan.stability.stiffness_N_mm, told["stiffness_N_mm"], places=6)
 
     def test_step(self):

@@ -26,8 +26,8 @@
 static const char all_forces[] =
 	"rate_hz = %.1f;\narithmetic = \"%s\";\n"
 	"surface = { %s };\n"
-	"tissue = { reaction_N_mm = 0.14; plane_N_mm = 0.17; damping_N_s_mm = 0.0005;\n"
-	"  insertion_N_mm = 0.28; spread_N_mm = 0.22; };\n"
+	"tissue = { gain = 0.5; reaction_N_mm = 0.14; plane_N_mm = 0.17;\n"
+	"  damping_N_s_mm = 0.0005; insertion_N_mm = 0.28; spread_N_mm = 0.22; };\n"
 	"effects = { average_ticks = 8; };\n";
 
 static const struct own {

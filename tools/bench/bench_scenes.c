@@ -278,7 +278,7 @@ static void add_shipped(struct scenes *s)
 #define FORCES                                                                              \
 	"tissue = { gain = 0.5; reaction_N_mm = 0.14; friction = 0.1; plane_N_mm = 0.17;\n" \
 	"  damping_N_s_mm = 0.0005; insertion_N_mm = 0.28; aligned = 0.2;\n"                \
-	"  spread_N_mm = 0.22; skin_friction = 0.1; };\n"
+	"  spread_N_mm = 0.22; skin_friction = 0.1; fracture_J_m2 = 100.0; };\n"
 /*
  * All that is no force: the membrane lies below the sphere's top and the sheet's waves, and is so small
  * that the depth below these hardly changes round it, as for one that lies aslant the limit is lower.

@@ -260,7 +260,7 @@ static void try_case(struct rest_row *row)
 	row->verdict = plan ? "accepted" : "refused";
 	if (plan) {
 		incise_plan_stability(plan, &s);
-		row->margin = s.limit_N_mm / s.stiffness_N_mm;
+		row->margin = s.weakest.margin;
 		lean_all(plan, &row->is, sizes, false, &row->end);
 	}
 	if (advice)

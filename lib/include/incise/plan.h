@@ -160,7 +160,7 @@ struct incise_plan_weakest {
 	/** Of them, those with a margin below 1 that rest all the same: the account of work ends their swings. */
 	int paid;
 };
-#define INCISE_PLAN_MARGIN_MOST 16
+#define INCISE_PLAN_MARGIN_MOST 16 /**< a larger margin is not looked for */
 
 /** A plan's stability, computed before its first tick. */
 struct incise_plan_stability {
@@ -169,23 +169,10 @@ struct incise_plan_stability {
 	bool own_delay;	       /**< the scene gives the delay; else it is the tracker's */
 	double stiffness_N_mm; /**< largest stiffness of the scene, in any phase */
 	double damping_N_s_mm; /**< damping of the scene */
-	/**
-	 * Largest stable stiffness on the device: with own_delay incise_stability_limit();
-	 * else that of the loop with the tracker's rate and latency and with the predictor.
-	 */
-	double limit_N_mm;
-	int late_ticks; /**< of the slowest actuator, in addition to the tracker */
-	int n_axes;	/**< number of actuators of the rig; may be 0 */
-	/** For each actuator: the wall along it. */
-	struct {
-		/**
-		 * The scene's largest stiffness in any direction; more if the directions are
-		 * not at right angles, because actuators then push against each other.
-		 */
-		double stiffness_N_mm;
-		double limit_N_mm; /**< largest stable one with this actuator's delay */
-		int late_ticks;	   /**< the larger of the scene's and the actuator's */
-	} axis[INCISE_RIG_AXES_MAX];
+	int late_ticks;	       /**< of the slowest actuator, in addition to the tracker */
+	int n_axes;	       /**< number of actuators of the rig; may be 0 */
+	/** of each actuator: the larger of the scene's and its own */
+	int axis_late_ticks[INCISE_RIG_AXES_MAX];
 	/**
 	 * Largest slope of the model's force over speed, absolute value; 0 without a model.
 	 */
@@ -216,7 +203,7 @@ struct incise_plan_stability {
 	double acceleration_slope_N_s2_mm;
 };
 
-/** Get stiffness and damping of the plan, and the limits of its device. */
+/** Get stiffness, damping and margin of the plan, and its device. */
 INCISE_API void incise_plan_stability(const struct incise_plan *plan,
 				      struct incise_plan_stability *stability);
 

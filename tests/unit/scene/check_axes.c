@@ -10,7 +10,7 @@
 #include "../base/temp_file.h"
 
 #define DEVICES (INCISE_RIG_TRACKER | INCISE_RIG_STEPPER)
-#define SOFT_N_mm 0.01
+#define SOFT_N_mm 0.1
 
 /* The second actuator, as rig.conf would describe it. */
 static double late_s;
@@ -73,34 +73,30 @@ TEST(each_actuator_has_its_own_limit)
 	assert_int_equal(plan_wall(two, SOFT_N_mm, 0, 0.008, &s, &err), 0);
 	assert_int_equal(s.n_axes, 2);
 	/* 8 ms at 1 kHz. */
-	assert_int_equal(s.axis[0].late_ticks, 0);
-	assert_int_equal(s.axis[1].late_ticks, 8);
+	assert_int_equal(s.axis_late_ticks[0], 0);
+	assert_int_equal(s.axis_late_ticks[1], 8);
 	assert_int_equal(s.late_ticks, 8);
-	/* As of a scene that says so of its only actuator. */
-	assert_int_equal(plan_wall(one, SOFT_N_mm, 0, 0, &alone, &err), 0);
-	assert_true(s.axis[0].limit_N_mm == alone.limit_N_mm);
-	assert_true(alone.n_axes == 1 && alone.axis[0].limit_N_mm == alone.limit_N_mm);
+	/* As of a scene that says so of its only actuator: the worst counts. */
 	assert_int_equal(plan_wall(one, SOFT_N_mm, 8, 0, &alone, &err), 0);
-	assert_true(s.axis[1].limit_N_mm == alone.limit_N_mm);
-	/* The scene's is the worst. */
-	assert_true(s.limit_N_mm == fmin(s.axis[0].limit_N_mm, s.axis[1].limit_N_mm));
-	assert_true(s.axis[0].limit_N_mm != s.axis[1].limit_N_mm);
-	assert_true(s.axis[0].stiffness_N_mm == s.stiffness_N_mm);
+	assert_true(alone.n_axes == 1 && s.weakest.margin == alone.weakest.margin);
+	assert_int_equal(plan_wall(one, SOFT_N_mm, 0, 0, &alone, &err), 0);
+	assert_true(s.weakest.margin < 0.9 * alone.weakest.margin);
 	/* The scene's lateness is the least of each. */
 	assert_int_equal(plan_wall(two, SOFT_N_mm, 3, 0.002, &s, &err), 0);
-	assert_true(s.axis[0].late_ticks == 3 && s.axis[1].late_ticks == 3);
+	assert_true(s.axis_late_ticks[0] == 3 && s.axis_late_ticks[1] == 3);
 }
 
 /* A wall that the first actuator holds, and the second does not. */
 TEST(the_worst_actuator_decides)
 {
-	struct incise_plan_stability s;
+	struct incise_plan_stability s, alone;
 	double wall_N_mm;
 
+	assert_int_equal(plan_wall(one, SOFT_N_mm, 0, 0, &alone, &err), 0);
 	assert_int_equal(plan_wall(two, SOFT_N_mm, 0, 0.008, &s, &err), 0);
-	wall_N_mm = (s.axis[0].limit_N_mm + s.axis[1].limit_N_mm) / 2;
+	wall_N_mm = SOFT_N_mm * (alone.weakest.margin + s.weakest.margin) / 2;
 	/* Of which 5 % are kept in reserve. */
-	assert_true(1.06 * wall_N_mm < s.axis[0].limit_N_mm);
+	assert_true(1.06 * wall_N_mm < SOFT_N_mm * alone.weakest.margin);
 	assert_int_equal(plan_wall(one, wall_N_mm, 0, 0, &s, &err), 0);
 	assert_int_equal(plan_wall(two, wall_N_mm, 0, 0, &s, &err), 0);
 	assert_error(plan_wall(two, wall_N_mm, 0, 0.008, &s, &err), EDOM, &err,
@@ -122,11 +118,10 @@ TEST(actuators_that_push_against_each_other)
 
 	assert_int_equal(plan_wall(one, SOFT_N_mm, 0, 0, &alone, &err), 0);
 	assert_int_equal(plan_wall(text, SOFT_N_mm, 0, 0, &s, &err), 0);
-	for (int i = 0; i < 2; i++)
-		assert_true(fabs(s.axis[i].stiffness_N_mm / s.stiffness_N_mm - more) <
-			    1e-12);
+	/* A margin is found within 4 thousandths. */
+	assert_true(fabs(alone.weakest.margin / s.weakest.margin - more) < 0.01);
 	/* A wall that one actuator holds alone is refused, and its share is not. */
-	wall_N_mm = 0.9 * alone.limit_N_mm;
+	wall_N_mm = 0.9 * SOFT_N_mm * alone.weakest.margin;
 	assert_int_equal(plan_wall(one, wall_N_mm, 0, 0, &s, &err), 0);
 	assert_int_equal(plan_wall(text, wall_N_mm, 0, 0, &s, &err), -EDOM);
 	assert_int_equal(plan_wall(text, wall_N_mm / more, 0, 0, &s, &err), 0);

@@ -563,7 +563,7 @@ TEST(test_getters)
 	incise_plan_stability(fixed.plan, &s);
 	assert_true(s.stiffness_N_mm == 0.8 / 5 + 0.17 && s.certified);
 	assert_true(s.damping_N_s_mm == 0.0005 && s.speed_slope_N_s_mm == 0);
-	assert_true(s.limit_N_mm >= s.stiffness_N_mm && !s.own_delay);
+	assert_true(s.weakest.margin >= 1 && !s.own_delay);
 	/* 4.2 ms and a period of 8.33. */
 	assert_int_equal(s.device.delay_ticks, 13);
 
@@ -618,7 +618,7 @@ TEST(test_fed_tracker)
 	incise_plan_stability(usual.plan, &by_usual);
 	incise_plan_stability(plan, &by_fast);
 	assert_int_equal(by_fast.device.delay_ticks, 7);
-	assert_true(by_fast.limit_N_mm > 1.5 * by_usual.limit_N_mm);
+	assert_true(by_fast.weakest.margin > 1.5 * by_usual.weakest.margin);
 	incise_plan_free(plan);
 	/* 50 ms and a period of 10, in ticks of 50 us: more than an exact limit takes. */
 	assert_non_null(slow);

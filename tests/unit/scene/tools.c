@@ -142,7 +142,7 @@ TEST(test_stations_share_the_rate, enter_plane, leave_room)
 	room.plan = incise_plan_new_fed(room.scene, &one, NULL);
 	incise_plan_stability(room.plan, &b);
 	assert_int_equal(a.device.delay_ticks, b.device.delay_ticks);
-	assert_true(a.limit_N_mm == b.limit_N_mm);
+	assert_true(a.weakest.margin == b.weakest.margin);
 	/* 4.2 + 16.7 ms is too old, 4.2 + 8.3 ms is not. */
 	scene = fed_scene(&room.folder,
 			  "tissue = { reaction_N_mm = 0.1; }; "
