@@ -83,7 +83,7 @@ table() {
 		1|plan line.scene|line.scene:1: tisue:|tissue
 		1|plan unit.scene|unit.scene:2: limits.force_mN:|force_N
 		1|plan m.fx|m.fx:|.fx
-		1|plan stiff.scene|stiff.scene:|not stable|0.00761
+		1|plan stiff.scene|stiff.scene:|not stable|tissue.gain to at most 0.007
 		1|plan rig.conf|rig.conf:|--rig
 		1|haptic typo.scene --rig sim:|typo.scene:2: tisue:|tissue
 		2|capture|-o NAME.rec
