@@ -144,7 +144,7 @@ struct incise_proxy {
 	 * moves. Always so on kinds other than a mesh.
 	 */
 	bool settled;
-	double left_mm; /* of its way, if that took more work than a move may */
+	double left_mm;	 /* of its way, if that took more work than a move may */
 	double clear_mm; /* no surface is nearer than this to clear_at_mm */
 	double clear_at_mm[3];
 	unsigned at_face; /* of a mesh, in its own order */
