@@ -284,6 +284,8 @@ static void print_weakest(const struct incise_plan_weakest *w)
 		       w->hz, w->lean_N, w->tilted ? "tilted " : "",
 		       loop_tool_names[w->tool], w->depth_mm, w->place_mm[0],
 		       w->place_mm[1], w->place_mm[2], held_names[w->held], w->states);
+	else if (!w->states)
+		puts("margin: not known; no state of rest was looked at");
 	else
 		printf("margin: none; in %d states of rest it swings not even with %d times its forces\n",
 		       w->states - w->paid, INCISE_PLAN_MARGIN_MOST);

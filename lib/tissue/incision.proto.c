@@ -159,8 +159,12 @@ static int find_cut(const struct T(incision) *incision, const num at[3], const d
 {
 	for (int i = 0; i < incision->n; i++) {
 		const struct T(cut) *cut = &incision->cut[i];
-		struct local here = localize(cut, at);
+		struct local here;
 
+		/* Most are far aside: the rest is not looked at. */
+		if (n_below(BESIDE, aside_of(cut, at)))
+			continue;
+		here = localize(cut, at);
 		if (reaches(cut, &here, BESIDE) && faces(cut, &here, normal) &&
 		    d_below(ALONG, d_abs(d_dot(way, cut->along))))
 			return i;
@@ -542,7 +546,6 @@ static bool lets_in(const struct T(incision) *incision, int cut, const num at[3]
 	const struct T(cut) *in = &incision->cut[cut];
 	struct local here;
 
-	/* Most are far aside: the rest is not looked at. */
 	if (n_below(reach, aside_of(in, at)))
 		return false;
 	here = localize(in, at);

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <incise/plan.h>
 #include "../../lib/base/vector.h"
+#include "../../lib/scene/scene.h"
 #include "../../tools/cli/cli.h"
 #include "../../tools/cli/file.h"
 #include "extremes.h"
@@ -61,12 +62,15 @@ static void feel(struct extremes_row *row, const struct incise_scene *scene,
 
 /* Refused, or felt. */
 static void try_scene(struct extremes_row *row, const char *path, const char *text,
-		      int ticks)
+		      int ticks, bool checked)
 {
 	struct incise_error err = {0};
 	struct incise_scene *scene = incise_scene_load(path, NULL, &err);
-	struct incise_plan *plan = scene ? incise_plan_new(scene, NULL, &err) : NULL;
+	struct incise_plan *plan;
 
+	if (scene)
+		scene->unchecked = !checked;
+	plan = scene ? incise_plan_new(scene, NULL, &err) : NULL;
 	if (plan)
 		feel(row, scene, plan, text, ticks);
 	else
@@ -97,7 +101,8 @@ static void try_wall(struct extremes_row *row, const struct property *property)
 		 decade(0, 5));
 	fputs(text, file.file);
 	memory_file_written(&file);
-	try_scene(row, file.path, text, TICKS);
+	/* What would be refused keeps its limits, too; a check takes a thousand times as long. */
+	try_scene(row, file.path, text, TICKS, !below(16));
 	fclose(file.file);
 }
 
@@ -111,7 +116,8 @@ static void try_shipped(struct extremes_row *row, const struct property *propert
 
 		if (asprintf(&path, "%s/%s.scene", row->setup->scenes, names[i]) < 0)
 			cli_fail("no memory");
-		try_scene(row, path, names[i], (int)extremes_cases(row, property->cases));
+		try_scene(row, path, names[i], (int)extremes_cases(row, property->cases),
+			  true);
 		if (row->refused > refused)
 			cli_fail("%s is refused", path);
 		free(path);
@@ -121,9 +127,9 @@ static void try_shipped(struct extremes_row *row, const struct property *propert
 const struct property wall_properties[] = {
 	{"wall",
 	 "generated scenes: walls of 1e-3 to 1e9 N/mm, devices of 1 g to 10 kg, rates of "
-	 "1 Hz to 64 kHz, any limits of force and slew: refused as no scene or as not "
+	 "1 Hz to 64 kHz, any limits of force and slew: refused as no scene or, one in 16, as not "
 	 "stable, or within their limits",
-	 2000, .each = try_wall},
+	 6000, .each = try_wall},
 	{"scenes", "the scenes that ship, with good and bad poses: as above", 60000,
 	 .all = try_shipped},
 	{0},
