@@ -623,7 +623,7 @@ static double lean(struct search *s, struct run *run, struct window *last)
 			continue;
 		swing_mm = swing_of(s, last->at_mm);
 		sinks = !s->way.guided && goes_on(s, last);
-		/* After the first, in which it goes in. What sinks may swing when it is deeper. */
+		/* After the first, in which it goes in. A tool that sinks may swing when it is deeper. */
 		if ((k > quarter && has_left(s, last)) ||
 		    (sinks && k >= LONGEST * quarter))
 			return k * s->device.period_s;

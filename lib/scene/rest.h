@@ -19,7 +19,7 @@
  * Where it comes to rest, the loop is judged as a linear one, too: by the forces that a small motion meets there.
  *
  * A swing goes to and fro: a hand that sinks or creeps does not swing. Where the tool slides away, or sinks where
- * the tissue does not carry the lean, a run decides nothing; what sinks is followed until it rests deeper.
+ * the tissue does not carry the lean, a run decides nothing; a tool that sinks is followed until it rests deeper.
  */
 #ifndef INCISE_REST_H
 #define INCISE_REST_H

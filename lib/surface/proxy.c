@@ -16,18 +16,15 @@
  * over a wave is longer than the tool's way below it, and the proxy would fall behind for
  * ever. With 2 it keeps up on slopes to 60°, and where it does fall behind (a tool that
  * passes deep below a crest draws the proxy over it at once) it catches up as fast as the
- * tool moves. It waits on the surface, and not at the nearest place, meanwhile. What a move
- * did not go because it is work enough, as after a wrong pose, the next one may go, too.
+ * tool moves. It waits on the surface, and not at the nearest place, meanwhile. A move
+ * ends after so many faces, as after a wrong pose; the next one may go the rest, too.
  */
 #include <string.h>
 #include "surface.h"
 
 #define BUDGET 2
 
-/*
- * A nearest place may be farther by a tenth: gliding mends it. In the middle of a ball, where all the mesh is
- * nearly as near, nothing else ends a search.
- */
+/* A nearest place that may be farther by a tenth. */
 #define NEARLY 0.9
 
 /*
@@ -115,6 +112,32 @@ static void end(struct incise_proxy *proxy)
 }
 
 /*
+ * The place that is nearest to a tool, or farther by a tenth: in the middle of a ball, where all the mesh is nearly as
+ * near, nothing else ends a search. Another side of thin tissue may be nearly as near, too, and it would take the
+ * air for inside: where the straight way does not say the same as the place does, the nearest one decides.
+ *
+ * @return no surface is nearer than this
+ */
+static double find_near(const struct mesh *mesh, const double tool[3], uint32_t hint,
+			struct mesh_spot *spot, struct incise_touch *touch)
+{
+	double clear_mm = mesh_nearest(mesh, tool, hint, mesh->open ? 1 : NEARLY, spot);
+	struct mesh_spot first;
+	bool tired;
+
+	/* Only around where it is the nearest do normals say on which side a tool is. */
+	if (!mesh->open)
+		mesh_glide(mesh, tool, INFINITY, spot, &tired);
+	mesh_touch(mesh, spot, tool, touch);
+	if (!mesh->open && mesh_enters(mesh, tool, spot->point, 0, 0, &first) ==
+				   (touch->depth_mm >= 0)) {
+		clear_mm = mesh_nearest(mesh, tool, spot->face, 1, spot);
+		mesh_touch(mesh, spot, tool, touch);
+	}
+	return clear_mm;
+}
+
+/*
  * A proxy that is still on its way has the tool in front of its face: because the tool
  * has gone out, or because there is a dent between the two. Where the straight way to the
  * tool enters it is a dent, the tool is inside, and the proxy goes on gliding. A way that
@@ -130,8 +153,7 @@ static bool is_dent(const struct incise_proxy *proxy, const struct mesh_spot *sp
 
 	if (mesh_enters(mesh, spot->point, tool, 0, 0, &other))
 		return true;
-	mesh_nearest(mesh, tool, spot->face, NEARLY, &other);
-	mesh_touch(mesh, &other, tool, &touch);
+	find_near(mesh, tool, spot->face, &other, &touch);
 	return touch.depth_mm >= 0 && !mesh_beyond_border(mesh, &other, tool, &next);
 }
 
@@ -229,17 +251,16 @@ static void look(struct incise_proxy *proxy, const double tool[3])
 	}
 }
 
-/* The first place of all: inside is in contact, at the nearest point. */
+/* The first place of all: inside is in contact, at the nearest point around. */
 static void place(struct incise_proxy *proxy, const double tool[3])
 {
 	const struct mesh *mesh = proxy->surface->mesh;
 	struct incise_touch touch;
 	struct mesh_spot spot, next;
 
-	proxy->clear_mm = mesh_nearest(mesh, tool, 0, NEARLY, &spot);
+	proxy->clear_mm = find_near(mesh, tool, 0, &spot, &touch);
 	v3_copy(proxy->clear_at_mm, tool);
 	proxy->at_face = spot.face;
-	mesh_touch(mesh, &spot, tool, &touch);
 	if (touch.depth_mm < -ON_MM || mesh_beyond_border(mesh, &spot, tool, &next))
 		return;
 	proxy->settled = true;

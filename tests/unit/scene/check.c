@@ -289,7 +289,7 @@ TEST(test_own_delay)
 
 		wall.K = 0.85 * limit;
 		margin = 0.85 * margin_of(&wall);
-		/* What is kept in reserve, and what the predictor gives or takes, is some hundredths. */
+		/* The reserve, and the effect of the predictor, are some hundredths. */
 		if (!(fabs(margin - 1) < 0.05))
 			fail_msg("%d ticks late: %g of %g N/mm", delays[i],
 				 margin * limit, limit);

@@ -384,7 +384,7 @@ static struct end lean_on(struct incise_plan *plan, const struct leaned *l,
 		}
 		if (loop.t_s - still.since_s[1] < STILL_S)
 			continue;
-		/* What stands may fall: once, and then it has as long again to come to rest. */
+		/* A tool that stands may fall: it is pushed once, and has as long again to come to rest. */
 		if (!kicked) {
 			for (int k = 0; k < 3; k++)
 				loop.body.v[k] += between(&seed, -20, 20);
@@ -592,7 +592,7 @@ static void set_attitude(const struct incise_plan *plan, bool tilted, struct lea
 }
 
 /*
- * What a refusal names: "… the tilted tube, held across, under [0.1, 0, -0.91] N at [-20.81, 33.32, 28.95], oscillates …"; what
+ * The lean that a refusal names: "… the tilted tube, held across, under [0.1, 0, -0.91] N at [-20.81, 33.32, 28.95], oscillates …"; what
  * holds it as in <incise/plan.h>. None: it moves along a plane.
  */
 static bool named_lean(const char *why, const struct incise_plan *plan, struct lean *lean)

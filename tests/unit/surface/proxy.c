@@ -343,6 +343,40 @@ TEST(test_open_border)
 	free(s);
 }
 
+/* A first place is in contact if it is inside, however near the other side of a plate is; its depth may be a tenth more. */
+TEST(test_first_places_of_plates)
+{
+	uint64_t random = 88172645463325252u;
+
+	for (int i = 0; i < 200; i++) {
+		double half[3] = {10, 10, pow(10, 2 * solid_random(&random) - 2)};
+		struct solid *s = solid_cube();
+
+		for (uint32_t k = 0; k < s->n_points; k++)
+			for (int j = 0; j < 3; j++)
+				s->point[k][j] *= half[j];
+		surface = solid_surface(s);
+		for (int k = 0; k < 200; k++) {
+			double at[3], out = -INFINITY;
+
+			for (int j = 0; j < 3; j++) {
+				at[j] = (2 * solid_random(&random) - 1) *
+					(half[j] + (j == 2 ? 5 : 2));
+				out = fmax(out, fabs(at[j]) - half[j]);
+			}
+			incise_proxy_init(&proxy, surface, 0.02);
+			move(&proxy, at[0], at[1], at[2]);
+			if (proxy.touching != (out < 0) ||
+			    (out < 0 && !(proxy.touch.depth_mm < -out / 0.9 + 1e-9)))
+				fail_msg("plate of %g mm, at %g %g %g: %d, %g mm deep",
+					 2 * half[2], at[0], at[1], at[2], proxy.touching,
+					 proxy.touch.depth_mm);
+		}
+		incise_surface_free(surface);
+		free(s);
+	}
+}
+
 /* Strips 20 mm long and 20 nm wide: over, along and across them. */
 TEST(test_slivers)
 {
