@@ -981,21 +981,19 @@ static void add_membrane(struct search *s, const struct incise_surface *surface,
 		add_place(s, &skin);
 }
 
-/* On the skin beside an edge, where another face of it is near, too. */
+/* On the skin beside a crest, where another face of it is near, too. @way: one on which its normal turns. */
 #define BESIDE_MM 8
 static void add_beside(struct search *s, const struct incise_surface *surface,
-		       const double at_mm[3], const double normal[3],
-		       const double edge[3])
+		       const double at_mm[3], const double way[3])
 {
-	double way[3], to_mm[3];
+	double along[3], to_mm[3];
 
-	v3_cross(way, edge, normal);
-	if (!v3_unit(way, way, 0))
+	if (!v3_unit(along, way, 0))
 		return;
 	for (int sign = -1; sign <= 1; sign += 2) {
 		struct incise_touch place;
 
-		v3_add(to_mm, at_mm, sign * BESIDE_MM, way);
+		v3_add(to_mm, at_mm, sign * BESIDE_MM, along);
 		incise_surface_nearest(surface, to_mm, &place);
 		if (is_inside(surface, place.point_mm, place.normal)) {
 			add_place(s, &place);
@@ -1048,11 +1046,8 @@ static void set_places(struct search *s, const struct incise_plan *plan)
 		v3_copy(place.normal, mesh->normal[most[sign]]);
 		add_place(s, &place);
 		v3_sub(edge, mesh->vertex[end[sign]], at_mm);
-		/* It turns along the edge of two corners: beside it is on that way. */
-		if (sign) {
-			v3_cross(turn, edge, place.normal);
-			add_beside(s, surface, at_mm, place.normal, turn);
-		}
+		if (sign)
+			add_beside(s, surface, at_mm, edge);
 	}
 }
 

@@ -11,8 +11,8 @@
  * The device is without dry friction, and bare, held across, or in a hand. It starts in the air and leans with a
  * constant force up to the scene's limit:
  *
- *   - of all scenes, free in three dimensions, on the surface as it is: at its top and, of a mesh, where it is
- *     the most concave and the most convex; with blade and tube, upright and straight, tilted and askew;
+ *   - of all scenes, free in three dimensions, on the surface as it is: at its top, above the membrane and, of a mesh,
+ *     where it is the most concave, the most convex, and beside that, but not at a border; with blade and tube, upright and straight, tilted and askew;
  *   - of a model besides, guided along the normal of the top, on the plane that touches it there, while it goes
  *     along the skin.
  *

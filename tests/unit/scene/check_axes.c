@@ -95,7 +95,7 @@ TEST(the_worst_actuator_decides)
 	assert_int_equal(plan_wall(one, SOFT_N_mm, 0, 0, &alone, &err), 0);
 	assert_int_equal(plan_wall(two, SOFT_N_mm, 0, 0.008, &s, &err), 0);
 	wall_N_mm = SOFT_N_mm * (alone.weakest.margin + s.weakest.margin) / 2;
-	/* Of which 5 % are kept in reserve. */
+	/* Of which 4 % are kept in reserve. */
 	assert_true(1.06 * wall_N_mm < SOFT_N_mm * alone.weakest.margin);
 	assert_int_equal(plan_wall(one, wall_N_mm, 0, 0, &s, &err), 0);
 	assert_int_equal(plan_wall(two, wall_N_mm, 0, 0, &s, &err), 0);
