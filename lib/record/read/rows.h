@@ -14,10 +14,9 @@
 
 #include <stdbool.h>
 #include <stdint.h>
-#include <sqlite3.h>
 #include <incise/calibration.h>
 #include <incise/error.h>
-#include "recording.h"
+#include "source.h"
 
 /* --- times ------------------------------------------------------------------------- */
 
@@ -60,34 +59,45 @@ double incise_row_share(int64_t a_ns, int64_t b_ns, int64_t t_ns);
 
 /* --- rows -------------------------------------------------------------------------- */
 
+#define INCISE_ROWS_COLUMNS 14
+
 struct incise_rows {
 	struct incise_recording *recording;
-	const char *table, *types;
-	const char *other;  /* joined table, or NULL */
-	sqlite3_stmt *stmt; /* at the row */
+	const char *table;
+	struct incise_source source; /* of a stream */
+	size_t at;		     /* of its batch */
+	int column[INCISE_ROWS_COLUMNS]; /* of the batch, in the order that was asked for */
+	sqlite3_stmt *stmt;		 /* of events: at the row */
 	uint64_t n, expected;
-	int64_t t_ns; /* best time of the row; column 1 is its own */
+	int64_t t_ns; /* best time of the row; its own is in column t_ns */
 	struct incise_row_times times;
 	bool live; /* there is a row */
 };
 
 /*
- * Open a table for columns of SQL, the second of which is t_ns, and their types, a letter
- * each: i integer, r finite real, n the same or NULL, t text. Times increase; those of events
- * may repeat. @expected UINT64_MAX: the table's size is not known. Returns 0 or -errno.
+ * Open a table for columns, by their names with ", " between them. Times increase; those of events,
+ * which have columns rowid, t_ns, kind and text, may repeat. Table depth has the columns x_mm to qz of
+ * the tracker's record too. @expected UINT64_MAX: the table's size is not known. Returns 0 or -errno.
  */
 int incise_rows_open(struct incise_rows *rows, struct incise_recording *recording,
-		     const char *table, const char *columns, const char *types,
-		     uint64_t expected, struct incise_error *err);
-
-/* The same, joined with the row of the same number of another table, which must exist. */
-int incise_rows_open_joined(struct incise_rows *rows, struct incise_recording *recording,
-			    const char *table, const char *other, const char *columns,
-			    const char *types, uint64_t expected,
-			    struct incise_error *err);
+		     const char *table, const char *columns, uint64_t expected,
+		     struct incise_error *err);
 
 /* Go to the next row: 1, 0 at the end, -EINVAL (an impossible or missing row), -EIO. */
 int incise_rows_next(struct incise_rows *rows, struct incise_error *err);
+
+/*
+ * Values of the row, by the place of the column in the list that was asked for: an integer; a real, NAN
+ * where the table has none; the tracker's status; a text of events, with its length in bytes unless @n
+ * is NULL, until the next row.
+ */
+int64_t incise_rows_int(const struct incise_rows *rows, int column);
+double incise_rows_real(const struct incise_rows *rows, int column);
+char incise_rows_char(const struct incise_rows *rows, int column);
+const char *incise_rows_text(const struct incise_rows *rows, int column, size_t *n);
+
+/* The row's number, for messages; of events their rowid. */
+int64_t incise_rows_seq(const struct incise_rows *rows);
 
 void incise_rows_close(struct incise_rows *rows);
 

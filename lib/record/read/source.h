@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: LGPL-2.1-or-later */
+/*
+ * A stream of one recording as batches, in order: the only place that knows how its file keeps it.
+ *
+ *     form 5       table blocks ─► decode ─┐
+ *     forms 1 to 4 a row a sample ─────────┼─► batch ─► rows.h, Arrow
+ *     depth        tracker ─► tip, speed ──┘
+ *
+ * The file is untrusted: what is impossible in a batch is an error that names where; reading may go on
+ * behind it.
+ */
+#ifndef INCISE_SOURCE_H
+#define INCISE_SOURCE_H
+
+#include <sqlite3.h>
+#include <incise/error.h>
+#include "../batch.h"
+#include "depth.h"
+#include "recording.h"
+
+/* Behind the streams of the ledger: the tip below the surface, with its pose. */
+#define INCISE_SOURCE_DEPTH INCISE_LEDGER_FORMS
+
+/* INCISE_LEDGER_* or INCISE_SOURCE_DEPTH by the name of its table; -1: none. */
+int incise_source_find(const char *table);
+
+/* The columns of a stream's batches, of all forms of recordings. */
+const struct incise_ledger_form *incise_source_form(int stream);
+
+struct incise_source_depth;
+
+struct incise_source {
+	struct incise_recording *recording; /* a member of a session */
+	int stream;
+	sqlite3_stmt *stmt;
+	struct incise_batch batch;
+	/* Of form 5: the block of the batch, and the CRC before the next one. */
+	struct incise_ledger_block block;
+	uint32_t crc;
+	bool chained; /* the CRC before is known */
+	/* Of older forms: the row behind the batch is impossible, or SQLite's code. */
+	bool bad_row;
+	int code;
+	struct incise_source_depth *depth;
+	double scale; /* of depths by vision, of another calibration */
+};
+
+/* Returns 0 or -errno; ENOTSUP: an older form has no such stream. Close it in any case. */
+int incise_source_open(struct incise_source *source, struct incise_recording *recording,
+		       int stream, struct incise_error *err);
+
+/* The next batch, of at least one row: 1, 0 at the end, -EINVAL, -EIO, -ENOMEM. */
+int incise_source_next(struct incise_source *source, struct incise_error *err);
+
+void incise_source_close(struct incise_source *source);
+
+/*
+ * The first or the last sample of a table, as it was recorded: 1, 0: there is none, or as next(). Of
+ * depth those of the tracker. @arrival_ns is 0 where there is none, and may be NULL.
+ */
+int incise_source_end(struct incise_recording *recording, const char *table, bool last,
+		      int64_t *seq, int64_t *t_ns, int64_t *arrival_ns,
+		      struct incise_error *err);
+
+#endif
