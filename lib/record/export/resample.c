@@ -319,7 +319,7 @@ static int on_poses(struct resample *r, struct incise_recording *recording)
 			"%s: has no force channel, whose samples would be the rows; give "
 			"--rate HZ, for example 120",
 			recording->path);
-	rc = incise_rows_open(&rows, recording, "tracker", "seq, t_ns", "ii",
+	rc = incise_rows_open(&rows, recording, "tracker", "seq, t_ns",
 			      recording->meta.tracker, r->err);
 	if (!rc && given)
 		incise_row_times_calibrate(&rows.times, given);
