@@ -170,10 +170,9 @@ static void put_column(struct rows_source *source, int column, int to)
 	else if (column == 1)
 		incise_arrow_put_int(batch, to, rows->t_ns);
 	else if (!strcmp(field->name, "arrival_ns"))
-		incise_arrow_put_int(
-			batch, to,
-			incise_session_time(rows->times.map,
-					    incise_rows_int(rows, column)));
+		incise_arrow_put_int(batch, to,
+				     incise_session_time(rows->times.map,
+							 incise_rows_int(rows, column)));
 	else
 		incise_arrow_put_int(batch, to, incise_rows_int(rows, column));
 }

@@ -1049,8 +1049,7 @@ int incise_camera_interpolator_open(struct incise_camera_interpolator *camera,
 	if (rc <= 0)
 		return rc;
 	rc = incise_rows_open(&camera->rows, recording, "frames",
-			      "seq, t_ns, depth_mm, sd_px, quality", UINT64_MAX,
-			      err);
+			      "seq, t_ns, depth_mm, sd_px, quality", UINT64_MAX, err);
 	if (!rc && given)
 		incise_row_times_calibrate(&camera->rows.times, given);
 	for (int i = 0; i < 2 && rc >= 0; i++)

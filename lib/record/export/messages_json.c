@@ -159,8 +159,7 @@ static const struct incise_message_stream streams[] = {
 	{"depth", "seq, t_ns, depth_mm, velocity_mm_s", depth_message, "/depth",
 	 "incise.Depth",
 	 OBJECT("\"depth_mm\":" NUMBER("mm") ",\"velocity_mm_s\":" NUMBER("mm/s"))},
-	{"events", "rowid, t_ns, kind, text", event_message, "/events",
-	 "incise.Event",
+	{"events", "rowid, t_ns, kind, text", event_message, "/events", "incise.Event",
 	 OBJECT("\"kind\":{\"type\":\"string\"},\"text\":{\"type\":\"string\"}")},
 };
 

@@ -262,8 +262,7 @@ static const struct incise_message_stream streams[] = {
 	{"frames", "seq, t_ns", frame_message, "/camera/image/compressed",
 	 "sensor_msgs/msg/CompressedImage",
 	 "std_msgs/Header header\nstring format\nuint8[] data\n" HEADER},
-	{"frames", "seq, t_ns", frame_message, "/camera/image",
-	 "sensor_msgs/msg/Image",
+	{"frames", "seq, t_ns", frame_message, "/camera/image", "sensor_msgs/msg/Image",
 	 "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\n"
 	 "uint8 is_bigendian\nuint32 step\nuint8[] data\n" HEADER},
 };

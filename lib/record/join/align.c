@@ -181,8 +181,8 @@ static int find_marks(struct incise_recording *recording, const struct walk *wal
 	limit = fmax(NOISES * noise, SHARE * largest);
 	if (rc || !(largest > 0) || largest < limit)
 		return rc;
-	rc = incise_rows_open(&rows, recording, walk->table, walk->columns,
-			      UINT64_MAX, err);
+	rc = incise_rows_open(&rows, recording, walk->table, walk->columns, UINT64_MAX,
+			      err);
 	memset(walk->state, 0, walk->size);
 	while (!rc && (rc = incise_rows_next(&rows, err)) > 0) {
 		rc = 0;
@@ -236,10 +236,10 @@ int incise_align_marks(struct incise_recording *recording,
 	struct bend bend;
 	const struct walk force = {"force", "seq, t_ns, code", force_sudden,
 				   &rise,   sizeof(rise),      false};
-	const struct walk tracker = {"tracker", "seq, t_ns, x_mm, y_mm, z_mm, status",
-				     tracker_sudden,
-				     &bend,	sizeof(bend),
-				     true};
+	const struct walk tracker = {
+		"tracker",	"seq, t_ns, x_mm, y_mm, z_mm, status",
+		tracker_sudden, &bend,
+		sizeof(bend),	true};
 	int n;
 
 	if (align == INCISE_ALIGN_EVENTS)

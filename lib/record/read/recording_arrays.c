@@ -29,11 +29,11 @@ struct array {
 
 /* Open a table, as rows.h, for elements of that size. To be ended in any case. */
 static int array_open(struct array *array, struct incise_recording *recording,
-		      const char *table, const char *columns, size_t size, struct incise_error *err)
+		      const char *table, const char *columns, size_t size,
+		      struct incise_error *err)
 {
 	*array = (struct array){.size = size};
-	return incise_rows_open(&array->rows, recording, table, columns,
-				UINT64_MAX, err);
+	return incise_rows_open(&array->rows, recording, table, columns, UINT64_MAX, err);
 }
 
 /*
@@ -247,8 +247,8 @@ int incise_recording_lengths(struct incise_recording *recording,
 		return incise_error_set(err, EINVAL,
 					"%s: has an older format, without frames",
 					recording->path);
-	rc = array_open(&l.frames, recording, "frames",
-			"seq, t_ns, length_px, quality", sizeof(**lengths), err);
+	rc = array_open(&l.frames, recording, "frames", "seq, t_ns, length_px, quality",
+			sizeof(**lengths), err);
 	if (!rc)
 		rc = incise_rows_open(&l.depth, recording, "depth",
 				      "seq, t_ns, depth_mm, velocity_mm_s",
@@ -373,8 +373,8 @@ int incise_depth_pairs(struct incise_recording *recording,
 	incise_depth_init(&p.depth, info.surface_point_mm, info.surface_normal);
 	find_axes(&p);
 	rc = incise_rows_open(&p.tracker, recording, "tracker",
-			      "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz",
-			      info.tracker, err);
+			      "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz", info.tracker,
+			      err);
 	if (!rc)
 		rc = array_open(&p.frames, recording, "frames",
 				"seq, t_ns, depth_mm, quality", sizeof(**pairs), err);

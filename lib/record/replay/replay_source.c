@@ -171,9 +171,9 @@ static int find_last(struct incise_replay_source *source,
 
 	if (rc <= 0)
 		return rc;
-	t_ns = on_clock(s, arrival ? arrival_ns
-				   : incise_recording_time(&s->rows.times.line, seq,
-							   t_ns));
+	t_ns = on_clock(s,
+			arrival ? arrival_ns
+				: incise_recording_time(&s->rows.times.line, seq, t_ns));
 	if (t_ns > source->last_ns)
 		source->last_ns = t_ns;
 	return 0;
