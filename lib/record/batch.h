@@ -33,12 +33,28 @@ struct incise_batch {
 	union incise_column column[INCISE_BATCH_COLUMNS];
 };
 
-/* Bytes of a value in memory, by the letter of its column. */
-size_t incise_batch_size(char type);
+/* Rows of a block; more are impossible. */
+#define INCISE_BATCH_ROWS_MAX (1 << 20)
 
 /* Room for @n rows in all columns of batch->form. False: no memory; the rows are as before. */
 bool incise_batch_reserve(struct incise_batch *batch, size_t n);
 
 void incise_batch_free(struct incise_batch *batch);
+
+/* --- a block of form 5: incise-recording(5) has its bytes ------------------------------- */
+
+/* Bytes that a batch takes at most. */
+size_t incise_batch_bound(const struct incise_batch *batch);
+
+/* Write a batch of at least one row to @data of so many bytes; returns how many were used. */
+size_t incise_batch_encode(const struct incise_batch *batch, uint8_t *data);
+
+/*
+ * Read a block of batch->form with all that makes it whole: its length, its numbers, which increase, and
+ * first and last of numbers and times. NULL, or what is wrong, for a message.
+ */
+const char *incise_batch_decode(struct incise_batch *batch,
+				const struct incise_ledger_block *block,
+				const uint8_t *data, size_t size);
 
 #endif

@@ -4,6 +4,7 @@
  */
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -204,33 +205,42 @@ void incise_ledger_init(struct incise_ledger *ledger)
 	*ledger = (struct incise_ledger){.last_seq = -1};
 }
 
-void incise_ledger_add(struct incise_ledger *ledger, const struct incise_ledger_row *row)
+void incise_ledger_count(struct incise_ledger *ledger, int64_t seq, int64_t t_ns)
 {
 	struct incise_ledger_block *open = &ledger->open;
 
 	if (!open->count) {
-		open->first_seq = row->seq;
-		open->first_ns = row->t_ns;
+		open->first_seq = seq;
+		open->first_ns = t_ns;
 		open->lost = 0;
 	}
 	/* Unsigned: the difference is defined for any damaged row. */
 	if (ledger->started)
-		open->lost += (uint64_t)row->seq - (uint64_t)ledger->last_seq - 1;
+		open->lost += (uint64_t)seq - (uint64_t)ledger->last_seq - 1;
 	open->count++;
-	open->crc = incise_crc32c(open->crc, row->bytes, row->n);
 	ledger->started = true;
-	ledger->last_seq = row->seq;
-	ledger->last_ns = row->t_ns;
+	ledger->last_seq = seq;
+	ledger->last_ns = t_ns;
 }
 
-int incise_ledger_select(sqlite3 *db, const char *stream, sqlite3_stmt **stmt)
+void incise_ledger_add(struct incise_ledger *ledger, const struct incise_ledger_row *row)
 {
-	int rc = sqlite3_prepare_v2(
-		db,
-		"SELECT block, first_seq, last_seq, first_ns, last_ns, count, lost, crc "
-		"FROM ledger WHERE stream = ? ORDER BY block",
-		-1, stmt, NULL);
+	incise_ledger_count(ledger, row->seq, row->t_ns);
+	ledger->open.crc = incise_crc32c(ledger->open.crc, row->bytes, row->n);
+}
 
+int incise_ledger_select(sqlite3 *db, int form, const char *stream, const char *order,
+			 sqlite3_stmt **stmt)
+{
+	const bool blocks = form >= 5 && !strchr(stream, ':');
+	char sql[200];
+	int rc;
+
+	snprintf(sql, sizeof(sql),
+		 "SELECT block, first_seq, last_seq, first_ns, last_ns, count, lost, "
+		 "crc%s WHERE stream = ? ORDER BY block %s",
+		 blocks ? ", sha256, data FROM blocks" : " FROM ledger", order);
+	rc = sqlite3_prepare_v2(db, sql, -1, stmt, NULL);
 	if (rc == SQLITE_OK)
 		sqlite3_bind_text(*stmt, 1, stream, -1, SQLITE_STATIC);
 	return rc;
@@ -251,6 +261,25 @@ bool incise_ledger_block_read(struct incise_ledger_block *block, sqlite3_stmt *s
 	}
 	block->crc = crc;
 	return good;
+}
+
+bool incise_ledger_data(sqlite3_stmt *stmt, const struct incise_ledger_block *block,
+			const void **data, size_t *size)
+{
+	struct incise_ledger_block made = *block;
+
+	*data = sqlite3_column_blob(stmt, 9);
+	*size = sqlite3_column_bytes(stmt, 9);
+	incise_ledger_crc(&made, *data, *size);
+	return made.crc == block->crc && sqlite3_column_type(stmt, 9) == SQLITE_BLOB;
+}
+
+const uint8_t *incise_ledger_digest(sqlite3_stmt *stmt)
+{
+	return sqlite3_column_type(stmt, 8) == SQLITE_BLOB &&
+			       sqlite3_column_bytes(stmt, 8) == INCISE_LEDGER_DIGEST
+		       ? sqlite3_column_blob(stmt, 8)
+		       : NULL;
 }
 
 bool incise_ledger_same(const struct incise_ledger_block *a,
@@ -275,6 +304,12 @@ static void seal_block(struct incise_ledger_block *block)
 	to = put(to, block->count);
 	put(to, block->lost);
 	block->crc = incise_crc32c(block->crc, bytes, sizeof(bytes));
+}
+
+void incise_ledger_crc(struct incise_ledger_block *block, const void *data, size_t size)
+{
+	block->crc = incise_crc32c(0, data, size);
+	seal_block(block);
 }
 
 /* End the open block; the next one goes on from its CRC. */

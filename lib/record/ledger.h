@@ -50,6 +50,7 @@ extern const struct incise_ledger_form incise_ledger_forms[INCISE_LEDGER_FORMS];
 const struct incise_ledger_form *incise_ledger_form(int stream, int form);
 
 #define INCISE_LEDGER_TEXT 23
+#define INCISE_LEDGER_DIGEST 32 /* bytes of SHA-256 */
 
 /*
  * One row, encoded: integers and reals (IEEE 754) as 8 bytes, little-endian, a character as
@@ -103,15 +104,30 @@ void incise_ledger_add(struct incise_ledger *ledger, const struct incise_ledger_
 /* End the block. Returns false, and does nothing, when it has no rows. */
 bool incise_ledger_end(struct incise_ledger *ledger, struct incise_ledger_block *block);
 
+/* Of form 5 rows are counted only, and a block's CRC is that of its data and then of its fields. */
+void incise_ledger_count(struct incise_ledger *ledger, int64_t seq, int64_t t_ns);
+void incise_ledger_crc(struct incise_ledger_block *block, const void *data, size_t size);
+
 /* End the ledger after the last block; @lost: losses that no gap shows. */
 void incise_ledger_close(struct incise_ledger *ledger, uint64_t lost,
 			 struct incise_ledger_block *block);
 
-/* Select the entries of a stream, in order. Returns an SQLite code. */
-int incise_ledger_select(sqlite3 *db, const char *stream, sqlite3_stmt **stmt);
+/*
+ * Select the entries of a stream, in this order ("" or "DESC"); of form 5 they are table blocks. Returns an
+ * SQLite code.
+ */
+int incise_ledger_select(sqlite3 *db, int form, const char *stream, const char *order,
+			 sqlite3_stmt **stmt);
 
 /* Read the entry of a row of that. False: a value is impossible in any entry. */
 bool incise_ledger_block_read(struct incise_ledger_block *block, sqlite3_stmt *stmt);
+
+/* Of form 5: the data of that block, until the next step. False: they do not agree with its CRC. */
+bool incise_ledger_data(sqlite3_stmt *stmt, const struct incise_ledger_block *block,
+			const void **data, size_t *size);
+
+/* And the digest of its data that was written, or NULL. */
+const uint8_t *incise_ledger_digest(sqlite3_stmt *stmt);
 
 bool incise_ledger_same(const struct incise_ledger_block *a,
 			const struct incise_ledger_block *b);

@@ -281,6 +281,7 @@ static int load(struct incise_recording *rec, struct incise_recalibrated *to,
 		to->calibration.force_mV_N = rec->meta.force_mV_N;
 		to->calibration.force_zero_mV = rec->meta.zero_mV;
 	}
+	/* Depth is a difference of two lengths in pixels: linear in the scale. */
 	to->depth_scale = to->calibration.depth_mm_px / rec->meta.depth_mm_px;
 	if (!isfinite(to->depth_scale))
 		to->depth_scale = 1;

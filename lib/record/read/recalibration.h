@@ -19,7 +19,7 @@
 struct incise_recalibrated {
 	struct incise_recalibration entry;
 	struct incise_calibration calibration; /* delays NAN: those of the capture */
-	double depth_scale; /* of frames' depths, which are differences of lengths in pixels */
+	double depth_scale; /* of depths by vision; 1: as they were captured */
 };
 
 /*

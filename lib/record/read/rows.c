@@ -141,106 +141,152 @@ double incise_row_share(int64_t a_ns, int64_t b_ns, int64_t t_ns)
 
 /* --- rows -------------------------------------------------------------------------- */
 
-int incise_rows_open_joined(struct incise_rows *rows, struct incise_recording *recording,
-			    const char *table, const char *other, const char *columns,
-			    const char *types, uint64_t expected,
-			    struct incise_error *err)
+#define EVENTS "rowid, t_ns, kind, text"
+
+/* The place of a name in a list with ", " between. */
+static int place_of(const char *list, const char *name, size_t length)
 {
-	char sql[300];
+	int i = 0;
+
+	while (strncmp(list, name, length) || (list[length] != ',' && list[length])) {
+		list = strchr(list, ' ') + 1;
+		i++;
+	}
+	return i;
+}
+
+int incise_rows_open(struct incise_rows *rows, struct incise_recording *recording,
+		     const char *table, const char *columns, uint64_t expected,
+		     struct incise_error *err)
+{
+	const int stream = incise_source_find(table);
+	const char *all = stream < 0 ? EVENTS : incise_source_form(stream)->columns;
+	int rc, n = 0;
 
 	recording = incise_recording_member(recording, table);
 	*rows = (struct incise_rows){
 		.recording = recording,
 		.table = table,
-		.types = types,
-		.other = other,
-		.expected = expected,
+		/* An interrupted recording has counted fewer depths than its poses give. */
+		.expected = stream == INCISE_SOURCE_DEPTH ? UINT64_MAX : expected,
 		.t_ns = INCISE_TIME_NONE,
 	};
-	/* CROSS: SQLite keeps this order, and looks up the other table's rows by number. */
-	if (other)
-		snprintf(sql, sizeof(sql),
-			 "SELECT %s FROM %s CROSS JOIN %s USING (seq) ORDER BY %s.seq",
-			 columns, table, other, table);
-	else
-		snprintf(sql, sizeof(sql), "SELECT %s FROM %s ORDER BY %s", columns,
-			 table, strcmp(table, "events") ? "seq" : "t_ns, rowid");
-	if (sqlite3_prepare_v2(recording->db, sql, -1, &rows->stmt, NULL) != SQLITE_OK)
-		return incise_schema_fail(recording->db, recording->path, err);
-	return incise_row_times_open(&rows->times, recording, table, err);
-}
+	for (const char *name = columns; *name && n < INCISE_ROWS_COLUMNS;) {
+		size_t length = strcspn(name, ",");
 
-int incise_rows_open(struct incise_rows *rows, struct incise_recording *recording,
-		     const char *table, const char *columns, const char *types,
-		     uint64_t expected, struct incise_error *err)
-{
-	return incise_rows_open_joined(rows, recording, table, NULL, columns, types,
-				       expected, err);
-}
-
-static bool fits(sqlite3_stmt *stmt, int column, char type)
-{
-	int found = sqlite3_column_type(stmt, column);
-
-	switch (type) {
-	case 'i':
-		return found == SQLITE_INTEGER;
-	case 't':
-		return found == SQLITE_TEXT;
-	case 'n':
-		if (found == SQLITE_NULL)
-			return true;
-		/* fall through */
-	default:
-		return found == SQLITE_FLOAT &&
-		       isfinite(sqlite3_column_double(stmt, column));
+		rows->column[n++] = place_of(all, name, length);
+		name += length + strspn(name + length, ", ");
 	}
+	if (stream >= 0)
+		rc = incise_source_open(&rows->source, recording, stream, err);
+	else
+		rc = sqlite3_prepare_v2(recording->db,
+					"SELECT " EVENTS
+					" FROM events ORDER BY t_ns, rowid",
+					-1, &rows->stmt, NULL) == SQLITE_OK
+			     ? 0
+			     : incise_schema_fail(recording->db, recording->path, err);
+	return rc ? rc : incise_row_times_open(&rows->times, recording, table, err);
 }
 
-/* Check the row and find its time. */
+/* To the next row of the batch, of the next batch, or of events: 1, 0, -errno. */
+static int step(struct incise_rows *rows, struct incise_error *err)
+{
+	int rc;
+
+	if (!rows->stmt) {
+		if (rows->live && ++rows->at < rows->source.batch.n)
+			return 1;
+		rows->at = 0;
+		return incise_source_next(&rows->source, err);
+	}
+	rc = rows->ended ? SQLITE_DONE : sqlite3_step(rows->stmt);
+	rows->ended = rc == SQLITE_DONE; /* another step would begin anew */
+	if (rc != SQLITE_ROW && rc != SQLITE_DONE)
+		return incise_schema_fail(rows->recording->db, rows->recording->path,
+					  err);
+	return rc == SQLITE_ROW;
+}
+
+/* Of events no other than these types; of a stream the batch has checked them. */
 static bool take(struct incise_rows *rows)
 {
-	for (int i = 0; rows->types[i]; i++)
-		if (!fits(rows->stmt, i, rows->types[i]))
-			return false;
-	return incise_row_times_next(&rows->times, sqlite3_column_int64(rows->stmt, 0),
-				     sqlite3_column_int64(rows->stmt, 1), &rows->t_ns);
+	const int64_t *t_ns = rows->stmt ? NULL : rows->source.batch.column[1].i;
+
+	if (rows->stmt && (sqlite3_column_type(rows->stmt, 1) != SQLITE_INTEGER ||
+			   sqlite3_column_type(rows->stmt, 2) != SQLITE_TEXT ||
+			   sqlite3_column_type(rows->stmt, 3) != SQLITE_TEXT))
+		return false;
+	return incise_row_times_next(
+		&rows->times, incise_rows_seq(rows),
+		t_ns ? t_ns[rows->at] : sqlite3_column_int64(rows->stmt, 1), &rows->t_ns);
 }
 
 int incise_rows_next(struct incise_rows *rows, struct incise_error *err)
 {
 	const char *path = rows->recording->path;
-	int rc = sqlite3_step(rows->stmt);
+	int rc = step(rows, err);
 
 	rows->live = false;
-	if (rc == SQLITE_DONE) {
+	if (rc < 0)
+		return rc;
+	if (!rc) {
 		if (rows->expected == UINT64_MAX || rows->n == rows->expected)
 			return 0;
-		return incise_error_set(
-			err, EINVAL, "%s: damaged: table %s has %llu rows of %llu%s%s%s",
-			path, rows->table, (unsigned long long)rows->n,
-			(unsigned long long)rows->expected,
-			rows->other ? " that table " : "", rows->other ? rows->other : "",
-			rows->other ? " has too" : "");
+		return incise_error_set(err, EINVAL,
+					"%s: damaged: table %s has %llu rows of %llu",
+					path, rows->table, (unsigned long long)rows->n,
+					(unsigned long long)rows->expected);
 	}
-	if (rc != SQLITE_ROW)
-		return incise_schema_fail(rows->recording->db, path, err);
-	if (!take(rows))
+	/* A row that cannot be is passed, as a block is. */
+	rows->live = true;
+	if (!take(rows)) {
 		return incise_error_set(
 			err, EINVAL,
-			"%s: damaged: table %s%s%s, row %lld is invalid; `sqlite3 "
-			"%s/%s` shows it",
-			path, rows->table, rows->other ? " or " : "",
-			rows->other ? rows->other : "",
-			(long long)sqlite3_column_int64(rows->stmt, 0), path,
-			INCISE_SCHEMA_DB);
-	rows->live = true;
+			"%s: damaged: table %s, row %lld: its time is "
+			"impossible; `incise verify %s` lists what is damaged",
+			path, rows->table, (long long)incise_rows_seq(rows), path);
+	}
 	rows->n++;
 	return 1;
 }
 
+int64_t incise_rows_int(const struct incise_rows *rows, int column)
+{
+	const int at = rows->column[column];
+
+	return rows->stmt ? sqlite3_column_int64(rows->stmt, at)
+			  : rows->source.batch.column[at].i[rows->at];
+}
+
+double incise_rows_real(const struct incise_rows *rows, int column)
+{
+	return rows->source.batch.column[rows->column[column]].r[rows->at];
+}
+
+char incise_rows_char(const struct incise_rows *rows, int column)
+{
+	return rows->source.batch.column[rows->column[column]].c[rows->at];
+}
+
+const char *incise_rows_text(const struct incise_rows *rows, int column, size_t *n)
+{
+	const int at = rows->column[column];
+
+	if (n)
+		*n = sqlite3_column_bytes(rows->stmt, at);
+	return (const char *)sqlite3_column_text(rows->stmt, at);
+}
+
+int64_t incise_rows_seq(const struct incise_rows *rows)
+{
+	return rows->stmt ? sqlite3_column_int64(rows->stmt, 0)
+			  : rows->source.batch.column[0].i[rows->at];
+}
+
 void incise_rows_close(struct incise_rows *rows)
 {
+	incise_source_close(&rows->source);
 	sqlite3_finalize(rows->stmt);
 	rows->stmt = NULL;
 }

@@ -66,12 +66,14 @@ struct incise_rows {
 	const char *table;
 	struct incise_source source; /* of a stream */
 	size_t at;		     /* of its batch */
-	int column[INCISE_ROWS_COLUMNS]; /* of the batch, in the order that was asked for */
-	sqlite3_stmt *stmt;		 /* of events: at the row */
+	int column
+		[INCISE_ROWS_COLUMNS]; /* of the batch, in the order that was asked for */
+	sqlite3_stmt *stmt;	       /* of events: at the row */
 	uint64_t n, expected;
 	int64_t t_ns; /* best time of the row; its own is in column t_ns */
 	struct incise_row_times times;
-	bool live; /* there is a row */
+	bool live;  /* there is a row */
+	bool ended; /* events are over */
 };
 
 /*

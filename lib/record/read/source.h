@@ -34,22 +34,21 @@ struct incise_source {
 	int stream;
 	sqlite3_stmt *stmt;
 	struct incise_batch batch;
-	/* Of form 5: the block of the batch, and the CRC before the next one. */
-	struct incise_ledger_block block;
-	uint32_t crc;
-	bool chained; /* the CRC before is known */
-	/* Of older forms: the row behind the batch is impossible, or SQLite's code. */
-	bool bad_row;
-	int code;
-	struct incise_source_depth *depth;
+	size_t rows_max; /* of a batch, where the file has no blocks */
+	bool ended;	 /* another step would begin anew */
+	bool held;	 /* the statement is at a row that did not fit */
+	struct incise_source_depth *depth; /* what it is made of */
 	double scale; /* of depths by vision, of another calibration */
 };
 
-/* Returns 0 or -errno; ENOTSUP: an older form has no such stream. Close it in any case. */
+/* Returns 0 or -errno; ENODATA: an older form has no such stream. Close it in any case. */
 int incise_source_open(struct incise_source *source, struct incise_recording *recording,
 		       int stream, struct incise_error *err);
 
-/* The next batch, of at least one row: 1, 0 at the end, -EINVAL, -EIO, -ENOMEM. */
+/*
+ * The next batch, of at least one row: 1, 0 at the end, -EINVAL, -EIO, -ENOMEM. Behind an impossible
+ * block or row, -EINVAL, the next call goes on.
+ */
 int incise_source_next(struct incise_source *source, struct incise_error *err);
 
 void incise_source_close(struct incise_source *source);

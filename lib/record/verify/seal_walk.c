@@ -68,8 +68,8 @@ int incise_seal_walk_open(struct incise_seal_walk *walk,
 		snprintf(sql, sizeof(sql), "SELECT %s FROM %s ORDER BY seq",
 			 stream->form->columns, stream->form->table);
 		if (sqlite3_prepare_v2(db, sql, -1, &stream->rows, NULL) != SQLITE_OK ||
-		    incise_ledger_select(db, stream->form->stream, &stream->blocks) !=
-			    SQLITE_OK)
+		    incise_ledger_select(db, recording->form, stream->form->stream, "",
+					 &stream->blocks) != SQLITE_OK)
 			return fail(walk, err);
 		rc = known ? 0 : next_row(walk, stream, err);
 		if (rc)
@@ -128,8 +128,8 @@ static int64_t length_of(struct incise_seal_walk *walk)
 	struct incise_ledger_block block = {0};
 	sqlite3_stmt *stmt = NULL;
 
-	if (incise_ledger_select(walk->recording->db, INCISE_LEDGER_FILE, &stmt) ==
-		    SQLITE_OK &&
+	if (incise_ledger_select(walk->recording->db, walk->recording->form,
+				 INCISE_LEDGER_FILE, "", &stmt) == SQLITE_OK &&
 	    sqlite3_step(stmt) == SQLITE_ROW)
 		incise_ledger_block_read(&block, stmt);
 	sqlite3_finalize(stmt);

@@ -186,7 +186,8 @@ static int read_entry(struct incise_verification *verify, const char *stream,
 	int n = 0, rc;
 
 	*entry = (struct incise_ledger_block){0};
-	if (incise_ledger_select(verify->recording->db, stream, &stmt) != SQLITE_OK)
+	if (incise_ledger_select(verify->recording->db, verify->recording->form, stream,
+				 "", &stmt) != SQLITE_OK)
 		return -1;
 	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW && n++ == 0)
 		if (!incise_ledger_block_read(entry, stmt))

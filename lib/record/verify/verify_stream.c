@@ -417,7 +417,8 @@ int incise_verify_stream(struct incise_verification *verify, int stream, uint64_
 	snprintf(sql, sizeof(sql), "SELECT %s FROM %s ORDER BY seq", form->columns,
 		 form->table);
 	if (sqlite3_prepare_v2(db, sql, -1, &walk.rows, NULL) != SQLITE_OK ||
-	    incise_ledger_select(db, form->stream, &walk.blocks) != SQLITE_OK) {
+	    incise_ledger_select(db, verify->recording->form, form->stream, "",
+				 &walk.blocks) != SQLITE_OK) {
 		incise_verify_unreadable(verify, form->stream, form->table);
 		rc = -EIO;
 	}

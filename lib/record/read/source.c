@@ -1,0 +1,366 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A stream of a recording as batches; see source.h. The file is untrusted.
+ */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../../base/vector.h"
+#include "../schema.h"
+#include "recalibration.h"
+#include "source.h"
+
+#define ROWS_MAX 1024 /* of a batch, where the file has no blocks */
+
+static const struct incise_ledger_form depth_form = {
+	"depth", "depth",
+	"seq, t_ns, depth_mm, velocity_mm_s, x_mm, y_mm, z_mm, qw, qx, qy, qz",
+	"iirrrrrrrrr"};
+
+int incise_source_find(const char *table)
+{
+	for (int i = 0; i <= INCISE_SOURCE_DEPTH; i++)
+		if (!strcmp(incise_source_form(i)->table, table))
+			return i;
+	return -1;
+}
+
+const struct incise_ledger_form *incise_source_form(int stream)
+{
+	return stream == INCISE_SOURCE_DEPTH ? &depth_form : &incise_ledger_forms[stream];
+}
+
+static int fail(struct incise_source *source, struct incise_error *err)
+{
+	return incise_schema_fail(source->recording->db, source->recording->path, err);
+}
+
+static int no_memory(struct incise_source *source, struct incise_error *err)
+{
+	return incise_error_set(err, ENOMEM, "%s: out of memory",
+				source->recording->path);
+}
+
+static int step(struct incise_source *source)
+{
+	int rc = source->ended ? SQLITE_DONE : sqlite3_step(source->stmt);
+
+	source->ended = rc == SQLITE_DONE;
+	return rc;
+}
+
+/* --- a row a sample: forms 1 to 4 ------------------------------------------------------ */
+
+/* Columns that a form has not: station 1, no button, no digest. */
+static const char *columns_of(int stream, int form)
+{
+	if (stream == INCISE_LEDGER_TRACKER && form < 2)
+		return "seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status, "
+		       "1, 0";
+	if (stream == INCISE_LEDGER_CAMERA && form < 4)
+		return "seq, t_ns, arrival_ns, pts, bytes, crc, length_px, sd_px, "
+		       "depth_mm, quality, zeroblob(32)";
+	return incise_ledger_forms[stream].columns;
+}
+
+/* A value of the row at hand, into a column. False: its type is not that of the column. */
+static bool take_value(sqlite3_stmt *stmt, int at, char type, union incise_column *column,
+		       size_t row)
+{
+	const int found = sqlite3_column_type(stmt, at);
+	const int bytes = found == SQLITE_TEXT || found == SQLITE_BLOB
+				  ? sqlite3_column_bytes(stmt, at)
+				  : 0;
+
+	switch (type) {
+	case 'i':
+		column->i[row] = sqlite3_column_int64(stmt, at);
+		return found == SQLITE_INTEGER;
+	case 'c':
+		column->c[row] = bytes ? *(const char *)sqlite3_column_text(stmt, at) : 0;
+		return found == SQLITE_TEXT;
+	case 's':
+		memset(column->s[row], 0, sizeof(*column->s));
+		if (found != SQLITE_TEXT || bytes > INCISE_LEDGER_TEXT)
+			return false;
+		memcpy(column->s[row], sqlite3_column_text(stmt, at), bytes);
+		return true;
+	case 'h':
+		if (found != SQLITE_BLOB || bytes != sizeof(*column->h))
+			return false;
+		memcpy(column->h[row], sqlite3_column_blob(stmt, at), bytes);
+		return true;
+	default:
+		column->r[row] =
+			found == SQLITE_NULL ? NAN : sqlite3_column_double(stmt, at);
+		return (found == SQLITE_FLOAT && isfinite(column->r[row])) ||
+		       (found == SQLITE_NULL && type == 'n');
+	}
+}
+
+static bool take_row(struct incise_source *source)
+{
+	struct incise_batch *batch = &source->batch;
+	bool good = true;
+
+	for (int i = 0; batch->form->types[i]; i++)
+		good &= take_value(source->stmt, i, batch->form->types[i],
+				   &batch->column[i], batch->n);
+	return good;
+}
+
+/* An impossible row ends a batch, and is reported by the next call. */
+static int next_rows(struct incise_source *source, struct incise_error *err)
+{
+	struct incise_batch *batch = &source->batch;
+	int rc = SQLITE_ROW;
+
+	batch->n = 0;
+	if (!incise_batch_reserve(batch, source->rows_max))
+		return no_memory(source, err);
+	while (batch->n < source->rows_max &&
+	       (source->held || (rc = step(source)) == SQLITE_ROW)) {
+		source->held = false;
+		if (take_row(source)) {
+			batch->n++;
+			continue;
+		}
+		source->held = batch->n > 0;
+		if (source->held)
+			return 1;
+		return incise_error_set(err, EINVAL,
+					"%s: damaged: table %s, row %lld is invalid; "
+					"`sqlite3 %s/%s` shows it",
+					source->recording->path, batch->form->table,
+					(long long)sqlite3_column_int64(source->stmt, 0),
+					source->recording->path, INCISE_SCHEMA_DB);
+	}
+	if (rc != SQLITE_ROW && rc != SQLITE_DONE)
+		return fail(source, err);
+	return batch->n > 0;
+}
+
+/* --- blocks: form 5 -------------------------------------------------------------------- */
+
+static int next_block(struct incise_source *source, struct incise_error *err)
+{
+	struct incise_ledger_block block;
+	const void *data;
+	const char *why;
+	size_t size;
+	int rc;
+
+	/* The end of a stream is a block without rows. */
+	do {
+		rc = step(source);
+		if (rc == SQLITE_DONE)
+			return 0;
+		if (rc != SQLITE_ROW)
+			return fail(source, err);
+		if (!incise_ledger_block_read(&block, source->stmt))
+			why = "a field has another type";
+		else if (!incise_ledger_data(source->stmt, &block, &data, &size))
+			why = "its checksum differs";
+		else
+			why = block.count ? incise_batch_decode(&source->batch, &block,
+								data, size)
+					  : NULL;
+	} while (!why && !block.count);
+	if (!why)
+		return 1;
+	return incise_error_set(
+		err, EINVAL,
+		"%s: damaged: stream %s, block %lld: %s; `incise verify %s` lists all "
+		"that is",
+		source->recording->path, source->batch.form->stream,
+		(long long)block.block, why, source->recording->path);
+}
+
+/* --- depth, as the recorder finds it --------------------------------------------------- */
+
+struct incise_source_depth {
+	struct incise_source tracker;
+	struct incise_depth window;
+	/* Poses of the records in the window that have no row yet. */
+	double pose[INCISE_DEPTH_WINDOW][7];
+	int n;
+};
+
+static void put_depth(struct incise_source *source, const struct incise_depth_row *row)
+{
+	struct incise_source_depth *depth = source->depth;
+	struct incise_batch *batch = &source->batch;
+	const size_t at = batch->n++;
+
+	batch->column[0].i[at] = row->seq;
+	batch->column[1].i[at] = row->t_ns;
+	batch->column[2].r[at] = row->depth_mm;
+	batch->column[3].r[at] = row->velocity_mm_s;
+	for (int i = 0; i < 7; i++)
+		batch->column[4 + i].r[at] = depth->pose[0][i];
+	memmove(depth->pose, depth->pose + 1, --depth->n * sizeof(*depth->pose));
+}
+
+/* A record that is no pose gives no depth. */
+static void push_record(struct incise_source *source, size_t at)
+{
+	struct incise_source_depth *depth = source->depth;
+	const union incise_column *column = depth->tracker.batch.column;
+	double *pose = depth->pose[depth->n], tip_mm[3], arm_mm[3];
+	struct incise_depth_row row;
+
+	if (!incise_pose_usable(column[10].c[at]))
+		return;
+	for (int i = 0; i < 7; i++)
+		pose[i] = column[3 + i].r[at];
+	depth->n++;
+	v3_rotate(arm_mm, pose + 3, source->recording->meta.tip_mm);
+	v3_add(tip_mm, pose, 1, arm_mm);
+	if (incise_depth_push(&depth->window, column[0].i[at], column[1].i[at], tip_mm,
+			      &row))
+		put_depth(source, &row);
+}
+
+static int next_depth(struct incise_source *source, struct incise_error *err)
+{
+	struct incise_source_depth *depth = source->depth;
+	struct incise_batch *batch = &source->batch;
+	struct incise_depth_row row;
+	int rc = 1;
+
+	for (batch->n = 0; !batch->n && rc > 0;) {
+		rc = incise_source_next(&depth->tracker, err);
+		if (rc < 0)
+			return rc;
+		if (!incise_batch_reserve(batch,
+					  depth->tracker.batch.n + INCISE_DEPTH_WINDOW))
+			return no_memory(source, err);
+		for (size_t k = 0; rc && k < depth->tracker.batch.n; k++)
+			push_record(source, k);
+		while (!rc && incise_depth_flush(&depth->window, &row))
+			put_depth(source, &row);
+	}
+	return batch->n > 0;
+}
+
+static int open_depth(struct incise_source *source, struct incise_error *err)
+{
+	const struct incise_recording_info *meta = &source->recording->meta;
+
+	source->depth = calloc(1, sizeof(*source->depth));
+	if (!source->depth)
+		return no_memory(source, err);
+	incise_depth_init(&source->depth->window, meta->surface_point_mm,
+			  meta->surface_normal);
+	return incise_source_open(&source->depth->tracker, source->recording,
+				  INCISE_LEDGER_TRACKER, err);
+}
+
+/* --- any ------------------------------------------------------------------------------- */
+
+/* @from_end: the last rows first. */
+static int open_table(struct incise_source *source, bool from_end,
+		      struct incise_error *err)
+{
+	const struct incise_ledger_form *form = source->batch.form;
+	struct incise_recording *recording = source->recording;
+	const char *order = from_end ? "DESC" : "";
+	char sql[300];
+	int rc;
+
+	if (recording->form >= 5) {
+		rc = incise_ledger_select(recording->db, recording->form, form->stream,
+					  order, &source->stmt);
+	} else {
+		if (recording->form < (source->stream == INCISE_LEDGER_WALL	? 3
+				       : source->stream == INCISE_LEDGER_CAMERA ? 2
+										: 1))
+			return incise_error_set(err, ENODATA,
+						"%s: has an older format, without %s",
+						recording->path, form->table);
+		snprintf(sql, sizeof(sql), "SELECT %s FROM %s ORDER BY seq %s",
+			 columns_of(source->stream, recording->form), form->table, order);
+		rc = sqlite3_prepare_v2(recording->db, sql, -1, &source->stmt, NULL);
+	}
+	return rc == SQLITE_OK ? 0 : fail(source, err);
+}
+
+int incise_source_open(struct incise_source *source, struct incise_recording *recording,
+		       int stream, struct incise_error *err)
+{
+	const struct incise_ledger_form *form = incise_source_form(stream);
+
+	recording = incise_recording_member(recording, form->table);
+	*source = (struct incise_source){
+		.recording = recording,
+		.stream = stream,
+		.batch.form = form,
+		.rows_max = ROWS_MAX,
+		.scale = recording->recalibrated ? recording->recalibrated->depth_scale
+						 : 1,
+	};
+	return stream == INCISE_SOURCE_DEPTH ? open_depth(source, err)
+					     : open_table(source, false, err);
+}
+
+int incise_source_next(struct incise_source *source, struct incise_error *err)
+{
+	int rc;
+
+	if (source->depth)
+		return next_depth(source, err);
+	rc = source->recording->form >= 5 ? next_block(source, err)
+					  : next_rows(source, err);
+	if (rc > 0 && source->stream == INCISE_LEDGER_CAMERA && source->scale != 1)
+		for (size_t k = 0; k < source->batch.n; k++)
+			source->batch.column[8].r[k] *= source->scale;
+	return rc;
+}
+
+void incise_source_close(struct incise_source *source)
+{
+	if (source->depth)
+		incise_source_close(&source->depth->tracker);
+	free(source->depth);
+	source->depth = NULL;
+	sqlite3_finalize(source->stmt);
+	source->stmt = NULL;
+	incise_batch_free(&source->batch);
+}
+
+int incise_source_end(struct incise_recording *recording, const char *table, bool last,
+		      int64_t *seq, int64_t *t_ns, int64_t *arrival_ns,
+		      struct incise_error *err)
+{
+	int stream = incise_source_find(table), rc;
+	struct incise_source source;
+	size_t at;
+
+	if (stream == INCISE_SOURCE_DEPTH)
+		stream = INCISE_LEDGER_TRACKER;
+	source = (struct incise_source){
+		.recording = incise_recording_member(recording, table),
+		.stream = stream,
+		.batch.form = incise_source_form(stream),
+		.rows_max = 1,
+		.scale = 1,
+	};
+	rc = open_table(&source, last, err);
+	if (!rc)
+		rc = incise_source_next(&source, err);
+	if (rc > 0) {
+		/* Rows come from the end, but blocks are as they were written. */
+		at = last ? source.batch.n - 1 : 0;
+		*seq = source.batch.column[0].i[at];
+		*t_ns = source.batch.column[1].i[at];
+		if (arrival_ns)
+			*arrival_ns = stream == INCISE_LEDGER_TRACKER ||
+						      stream == INCISE_LEDGER_CAMERA
+					      ? source.batch.column[2].i[at]
+					      : 0;
+	}
+	incise_source_close(&source);
+	return rc;
+}
