@@ -205,9 +205,9 @@ static int each_cut_sample(struct pass *pass, struct incise_cuts *cuts,
 		pass->first_ns = cuts->first_ns;
 		rc = visitor->sample(pass, &sample,
 				     (sample.t_ns - cuts->first_ns) * 1e-9);
-		if (!rc && (cuts->force_rows & 0xfff) == 0)
+		if (!rc && (cuts->force.n & 0xfff) == 0)
 			rc = incise_export_progress(
-				pass->options, (double)(pass->samples + cuts->force_rows),
+				pass->options, (double)(pass->samples + cuts->force.n),
 				(double)pass->samples_all, pass->err);
 		if (rc)
 			return rc;
@@ -235,7 +235,7 @@ static int each_sample(struct pass *pass, struct incise_recording *recording,
 			rc = each_cut_sample(pass, &cuts, &blade, visitor);
 		incise_blade_pose_close(&blade);
 	}
-	pass->samples += cuts.force_rows;
+	pass->samples += cuts.force.n;
 	pass->depth_deepest_mm = fmax(pass->depth_deepest_mm, cuts.depth_max_mm);
 	incise_cuts_close(&cuts);
 	return rc;
