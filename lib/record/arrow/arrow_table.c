@@ -96,7 +96,7 @@ static int hand_over(struct table_source *source, const struct ArrowArray *block
 static int describe_field(struct table_source *source, const struct incise_table *table,
 			  int i)
 {
-	const struct incise_column *column = &table->columns[i];
+	const struct incise_table_column *column = &table->columns[i];
 	char *names = incise_column_uncertainties(table->columns, table->n_columns, i);
 	struct incise_provenance *to = &source->uncertainties[i];
 	int rc = 0;

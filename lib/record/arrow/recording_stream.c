@@ -127,7 +127,6 @@ struct rows_source {
 	const struct table *table;
 	struct incise_recording *recording;
 	struct incise_rows rows;
-	bool ended; /* stepping on would start again */
 	struct incise_arrow_batch batch;
 	struct incise_recording_force scale;
 	double depth_scale; /* of another calibration, of depths by vision */
@@ -139,42 +138,43 @@ static void put_force(struct rows_source *source)
 {
 	struct incise_arrow_batch *batch = &source->batch;
 	const struct incise_recording_force *scale = &source->scale;
-	int64_t code = sqlite3_column_int64(source->rows.stmt, 2);
+	int64_t code = incise_rows_int(&source->rows, 2);
 
-	incise_arrow_put_int(batch, 0, sqlite3_column_int64(source->rows.stmt, 0));
+	incise_arrow_put_int(batch, 0, incise_rows_int(&source->rows, 0));
 	incise_arrow_put_int(batch, 1, source->rows.t_ns);
 	incise_arrow_put_int(batch, 2, code);
 	incise_arrow_put_real(batch, 3, code * scale->n_per_code - scale->zero_N);
 	incise_arrow_put_int(batch, 4, code <= 0 || code >= scale->top);
 }
 
-/* Column @column of SQL as column @to. */
+/* Column @column of the rows as column @to. */
 static void put_column(struct rows_source *source, int column, int to)
 {
 	struct incise_arrow_batch *batch = &source->batch;
 	const struct incise_arrow_field *field = &source->fields[to];
-	sqlite3_stmt *stmt = source->rows.stmt;
+	const struct incise_rows *rows = &source->rows;
 
-	if (field->nullable && sqlite3_column_type(stmt, column) == SQLITE_NULL)
+	if (field->nullable && isnan(incise_rows_real(rows, column)))
 		incise_arrow_put_missing(batch, to);
-	else if (field->type == INCISE_ARROW_TEXT)
+	else if (!strcmp(field->name, "status"))
 		incise_arrow_put_text(batch, to,
-				      (const char *)sqlite3_column_text(stmt, column));
+				      (const char[]){incise_rows_char(rows, column), 0});
+	else if (field->type == INCISE_ARROW_TEXT)
+		incise_arrow_put_text(batch, to, incise_rows_text(rows, column, NULL));
 	else if (field->type == INCISE_ARROW_REAL)
 		incise_arrow_put_real(batch, to,
-				      sqlite3_column_double(stmt, column) *
+				      incise_rows_real(rows, column) *
 					      (field->nullable && field->calibration
 						       ? source->depth_scale
 						       : 1));
 	else if (column == 1)
-		incise_arrow_put_int(batch, to, source->rows.t_ns);
+		incise_arrow_put_int(batch, to, rows->t_ns);
 	else if (!strcmp(field->name, "arrival_ns"))
-		incise_arrow_put_int(
-			batch, to,
-			incise_session_time(source->rows.times.map,
-					    sqlite3_column_int64(stmt, column)));
+		incise_arrow_put_int(batch, to,
+				     incise_session_time(rows->times.map,
+							 incise_rows_int(rows, column)));
 	else
-		incise_arrow_put_int(batch, to, sqlite3_column_int64(stmt, column));
+		incise_arrow_put_int(batch, to, incise_rows_int(rows, column));
 }
 
 static void put_columns(struct rows_source *source)
@@ -190,17 +190,15 @@ static void put_event(struct rows_source *source)
 		put_column(source, i + 1, i);
 }
 
-/* A table; sql: its columns, those of form 1 where they differ; types: as of rows.h. */
+/* A table, and its columns, as of rows.h. */
 static const struct table {
-	const char *name, *sql, *sql_form1, *types;
+	const char *name, *columns;
 	void (*put)(struct rows_source *source); /* the present row into the batch */
 	struct incise_arrow_field fields[COLUMNS_MAX + 1];
 	const char *calibrated; /* column whose calibration is known, or NULL */
 } tables[] = {
 	{"force",
 	 "seq, t_ns, code",
-	 NULL,
-	 "iii",
 	 put_force,
 	 {SEQ, TIME, FIELD("code", "1", "code of the converter", INT32),
 	  FIELD("force_N", "N", "on the blade", REAL),
@@ -209,8 +207,6 @@ static const struct table {
 	{"tracker",
 	 "seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status, station, "
 	 "button",
-	 "seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status, 1, 0",
-	 "iiirrrrrrrtii",
 	 put_columns,
 	 {SEQ, TIME, ARRIVAL, FIELD("x_mm", "mm", POSITION, REAL),
 	  FIELD("y_mm", "mm", POSITION, REAL), FIELD("z_mm", "mm", POSITION, REAL),
@@ -222,16 +218,12 @@ static const struct table {
 	 NULL},
 	{"depth",
 	 "seq, t_ns, depth_mm, velocity_mm_s",
-	 NULL,
-	 "iirr",
 	 put_columns,
 	 {SEQ, TIME, FIELD("depth_mm", "mm", "of the tip below the surface", REAL),
 	  FIELD("velocity_mm_s", "mm/s", "speed of the tip", REAL)},
 	 "depth_mm"},
 	{"frames",
 	 "seq, t_ns, arrival_ns, pts, bytes, length_px, sd_px, depth_mm, quality",
-	 NULL,
-	 "iiiiinnnn",
 	 put_columns,
 	 {SEQ, TIME, ARRIVAL, FIELD("pts", "ms", "timestamp in camera.mkv", INT64),
 	  FIELD("bytes", "byte", "size of the coded frame", INT64),
@@ -241,9 +233,7 @@ static const struct table {
 	  SEEN("quality", "1", "quality of the measurement, 0 to 1")},
 	 "depth_mm"},
 	{"events",
-	 "0, t_ns, kind, text",
-	 NULL,
-	 "iitt",
+	 "rowid, t_ns, kind, text",
 	 put_event,
 	 {FIELD("t_ns", "ns", "CLOCK_MONOTONIC", INT64),
 	  FIELD("kind", "1", "kind of the event", TEXT),
@@ -258,15 +248,13 @@ static int rows_next(struct incise_arrow_source *base, struct ArrowArray *array,
 	struct incise_arrow_batch *batch = &source->batch;
 	int rc = incise_arrow_batch_start(batch);
 
-	while (!rc && !source->ended && batch->rows < BATCH_ROWS) {
+	while (!rc && batch->rows < BATCH_ROWS) {
 		int more = incise_rows_next(&source->rows, err);
 
 		if (more < 0)
 			return more;
-		if (!more) {
-			source->ended = true;
+		if (!more)
 			break;
-		}
 		source->table->put(source);
 		batch->rows++;
 	}
@@ -432,10 +420,8 @@ static int rows_open(struct rows_source *source,
 	const struct table *table = source->table;
 	int rc;
 
-	rc = incise_rows_open(&source->rows, recording, table->name,
-			      recording->form < 2 && table->sql_form1 ? table->sql_form1
-								      : table->sql,
-			      table->types, rows_expected(source), err);
+	rc = incise_rows_open(&source->rows, recording, table->name, table->columns,
+			      rows_expected(source), err);
 	if (rc)
 		return rc;
 	if (given)

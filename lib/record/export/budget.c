@@ -153,6 +153,7 @@ const struct incise_budget_value *incise_budget_values(void)
 struct use {
 	struct incise_recording *force, *tracker; /* of a session two members */
 	const struct incise_calibration *given;
+	bool rows; /* values of rows are asked for, and not those of the calibrations alone */
 	struct history {
 		struct incise_calibration calibration;
 		struct incise_calibration_record *records;
@@ -256,22 +257,17 @@ static void miss(struct incise_budget *budget, enum incise_budget_quantity quant
 #define ZERO_ROWS_MAX 100000
 #define BLOCKS 64
 #define BLOCK 256 /* samples */
+#define CODE 2	  /* column of the force */
 
 /*
- * Number of samples in a row that count as one: 1 + 2 Σ ρ of the recording's first @n samples, as long
+ * Number of samples in a row that count as one: 1 + 2 Σ ρ of the recording's first @m samples, as long
  * as the correlation is more than chance; ended as Sokal does, at 5 times the sum so far. They
  * were at rest if their standard deviation is that of the zero; else 1.
  */
-static double correlation_length(sqlite3_stmt *stmt, int n, double sd_codes)
+static double correlation_length(double *x, int m, double sd_codes)
 {
-	double *x = malloc((size_t)n * sizeof(*x)), mean = 0, power = 0, sum = 1;
-	int m = 0;
+	double mean = 0, power = 0, sum = 1;
 
-	if (!x)
-		return 1;
-	sqlite3_bind_int(stmt, 1, n);
-	while (m < n && sqlite3_step(stmt) == SQLITE_ROW)
-		x[m++] = sqlite3_column_double(stmt, 0);
 	for (int i = 0; i < m; i++)
 		mean += x[i] / m;
 	for (int i = 0; i < m; i++) {
@@ -288,8 +284,45 @@ static double correlation_length(sqlite3_stmt *stmt, int n, double sd_codes)
 				break;
 			sum += 2 * product / power;
 		}
-	free(x);
 	return sum;
+}
+
+/* The first @n codes. Returns how many there are, or -errno. */
+static int first_codes(struct incise_recording *force, double *x, int n,
+		       struct incise_error *err)
+{
+	struct incise_source source;
+	int rc = incise_source_open(&source, force, INCISE_LEDGER_FORCE, err), m = 0;
+
+	rc = rc ? rc : 1;
+	while (m < n && rc > 0 && (rc = incise_source_next(&source, err)) > 0)
+		for (size_t i = 0; i < source.batch.n && m < n; i++)
+			x[m++] = (double)source.batch.column[CODE].i[i];
+	incise_source_close(&source);
+	return rc < 0 ? rc : m;
+}
+
+/* Second differences of a block's codes and times. */
+struct differences {
+	double x[2][3], sum[2];
+	int64_t first_ns;
+	int n; /* samples */
+};
+
+static void add_sample(struct differences *block, int64_t code, int64_t t_ns)
+{
+	if (!block->n)
+		block->first_ns = t_ns;
+	for (int k = 0; k < 2; k++) {
+		double *x = block->x[k];
+
+		x[0] = x[1];
+		x[1] = x[2];
+		x[2] = k ? (double)t_ns - (double)block->first_ns : (double)code;
+		if (block->n >= 2)
+			block->sum[k] += pow(x[0] - 2 * x[1] + x[2], 2) / 6;
+	}
+	block->n++;
 }
 
 /*
@@ -299,47 +332,46 @@ static double correlation_length(sqlite3_stmt *stmt, int n, double sd_codes)
 static int variances_of_blocks(struct incise_recording *force, double *codes,
 			       double *times_ns2, struct incise_error *err)
 {
-	uint64_t rows = force->meta.force;
+	const uint64_t rows = force->meta.force;
+	struct differences blocks[BLOCKS] = {0};
 	double variance[2][BLOCKS];
-	sqlite3_stmt *stmt;
-	int n = 0;
+	struct incise_source source;
+	int n = 0, begun = 0, done = 0, all = 0, rc;
+	int64_t first = 0;
 
-	if (sqlite3_prepare_v2(force->db,
-			       "SELECT code, t_ns FROM force WHERE seq >= (SELECT "
-			       "min(seq) FROM force) + ? ORDER BY seq",
-			       -1, &stmt, NULL) != SQLITE_OK)
-		return incise_schema_fail(force->db, force->path, err);
-	for (int b = 0; b < BLOCKS && (uint64_t)b * BLOCK < rows; b++) {
-		double x[2][3] = {{0}}, sum[2] = {0};
-		sqlite3_int64 first_ns = 0;
-		int m = 0;
+	while (all < BLOCKS && (uint64_t)all * BLOCK < rows)
+		all++;
+	rc = incise_source_open(&source, force, INCISE_LEDGER_FORCE, err);
+	rc = rc ? rc : 1;
+	while (done < all && rc > 0 && (rc = incise_source_next(&source, err)) > 0) {
+		const union incise_column *column = source.batch.column;
 
-		sqlite3_reset(stmt);
-		sqlite3_bind_int64(stmt, 1, (sqlite3_int64)(rows / BLOCKS * (uint64_t)b));
-		for (; m < BLOCK && sqlite3_step(stmt) == SQLITE_ROW; m++) {
-			sqlite3_int64 t_ns = sqlite3_column_int64(stmt, 1);
+		for (size_t i = 0; i < source.batch.n; i++) {
+			int64_t seq = column[0].i[i];
 
-			if (!m)
-				first_ns = t_ns;
-			for (int k = 0; k < 2; k++) {
-				x[k][0] = x[k][1];
-				x[k][1] = x[k][2];
-				x[k][2] = k ? (double)t_ns - (double)first_ns
-					    : sqlite3_column_double(stmt, 0);
-				if (m >= 2)
-					sum[k] +=
-						pow(x[k][0] - 2 * x[k][1] + x[k][2], 2) /
-						6;
-			}
+			if (!begun)
+				first = seq;
+			/* Blocks of a short recording overlap. */
+			while (begun < all && (uint64_t)seq - (uint64_t)first >=
+						      rows / BLOCKS * (uint64_t)begun)
+				begun++;
+			for (int b = done; b < begun; b++)
+				add_sample(&blocks[b], column[CODE].i[i], column[1].i[i]);
+			while (done < begun && blocks[done].n == BLOCK)
+				done++;
 		}
+	}
+	incise_source_close(&source);
+	for (int b = 0; b < all; b++) {
+		int m = blocks[b].n;
+
 		for (int k = 0; k < 2 && m > 2; k++)
-			variance[k][n] = sum[k] / (m - 2);
+			variance[k][n] = blocks[b].sum[k] / (m - 2);
 		n += m > 2;
 	}
-	sqlite3_finalize(stmt);
 	*codes = n ? median(variance[0], n) : NAN;
 	*times_ns2 = n ? median(variance[1], n) : NAN;
-	return 0;
+	return rc < 0 ? rc : 0;
 }
 
 /* The zero that the recording has measured, and how many of its samples count as one. */
@@ -347,15 +379,17 @@ static int measure_zero(struct incise_budget *budget, struct incise_recording *f
 			double sd_mV, double samples, double step_mV, bool used,
 			struct incise_error *err)
 {
-	sqlite3_stmt *stmt;
-	double u_mV;
+	int n = (int)fmin(samples, ZERO_ROWS_MAX);
+	double *codes = malloc((size_t)n * sizeof(*codes)), u_mV;
 
-	if (sqlite3_prepare_v2(force->db, "SELECT code FROM force ORDER BY seq LIMIT ?",
-			       -1, &stmt, NULL) != SQLITE_OK)
-		return incise_schema_fail(force->db, force->path, err);
-	budget->samples = correlation_length(stmt, (int)fmin(samples, ZERO_ROWS_MAX),
-					     sd_mV / step_mV);
-	sqlite3_finalize(stmt);
+	if (!codes)
+		return incise_error_set(err, ENOMEM, "out of memory");
+	n = first_codes(force, codes, n, err);
+	if (n >= 0)
+		budget->samples = correlation_length(codes, n, sd_mV / step_mV);
+	free(codes);
+	if (n < 0)
+		return n;
 	u_mV = sd_mV * sqrt(budget->samples / samples);
 	/* Noise of half a code and more makes means finer than a code. */
 	if (sd_mV < step_mV / 2)
@@ -366,9 +400,10 @@ static int measure_zero(struct incise_budget *budget, struct incise_recording *f
 }
 
 /* Noise of the force and of its timestamps, and the zero if the recording measured it. */
-static int measure_force(struct incise_budget *budget, struct incise_recording *force,
+static int measure_force(struct incise_budget *budget, const struct use *use,
 			 bool measured, struct incise_error *err)
 {
+	struct incise_recording *force = use->force;
 	const struct incise_recording_info *meta = &force->meta;
 	double step_mV = meta->full_scale_V * 1e3 / (double)(1LL << meta->bits);
 	double sd_mV, samples, variance = NAN, times_ns2 = NAN;
@@ -376,7 +411,7 @@ static int measure_force(struct incise_budget *budget, struct incise_recording *
 
 	if (!rc)
 		rc = incise_recording_number(force, "force_zero_samples", &samples, err);
-	if (!rc)
+	if (!rc && use->rows)
 		rc = variances_of_blocks(force, &variance, &times_ns2, err);
 	if (!rc && !isnan(sd_mV) && samples >= 1)
 		rc = measure_zero(budget, force, sd_mV, samples, step_mV, measured, err);
@@ -407,7 +442,7 @@ static int find_force(struct incise_budget *budget, const struct use *use,
 				    budget->mV_N, &at_gain);
 	if (!isnan(zero_mV) && !meta->newtons)
 		zero = find(of_zero, "force_zero_mV", zero_mV, &at_zero);
-	rc = measure_force(budget, use->force, isnan(zero_mV) || meta->newtons, err);
+	rc = measure_force(budget, use, isnan(zero_mV) || meta->newtons, err);
 	if (gain)
 		set(budget, INCISE_BUDGET_GAIN, sqrt(covariance(gain, at_gain, at_gain)));
 	if (zero)
@@ -648,17 +683,17 @@ static int read_tracker(struct tracker_sums *sums, struct incise_rows *rows,
 
 	while ((rc = incise_rows_next(rows, err)) > 0) {
 		struct incise_smooth_record record = {
-			.seq = sqlite3_column_int64(rows->stmt, 0),
+			.seq = incise_rows_seq(rows),
 			.t_ns = rows->t_ns,
-			.depth_mm = sqlite3_column_double(rows->stmt, 2),
-			.line_mm_s = sqlite3_column_double(rows->stmt, 3),
+			.depth_mm = incise_rows_real(rows, 2),
+			.line_mm_s = incise_rows_real(rows, 3),
 		};
 		double q[4], sd_s = incise_row_times_sd(&rows->times, record.seq);
 
 		for (int i = 0; i < 3; i++)
-			record.position_mm[i] = sqlite3_column_double(rows->stmt, 4 + i);
+			record.position_mm[i] = incise_rows_real(rows, 4 + i);
 		for (int i = 0; i < 4; i++)
-			q[i] = sqlite3_column_double(rows->stmt, 7 + i);
+			q[i] = incise_rows_real(rows, 7 + i);
 		incise_go_to_tip(tip_mm, q, record.position_mm);
 		sums->line_s2 += fmax(0, sd_s * sd_s - delay_sd_s * delay_sd_s);
 		sums->lines++;
@@ -674,19 +709,13 @@ static int read_tracker(struct tracker_sums *sums, struct incise_rows *rows,
 /* In a session: of the clock of the force's member, s; that of the tracker's is in its rows. */
 static double force_clock_s(struct incise_recording *force)
 {
-	sqlite3_stmt *stmt = NULL;
-	double bound_ns = 0;
+	int64_t seq, t_ns;
 
-	if (!force->map)
+	if (!force->map ||
+	    incise_source_end(force, "force", false, &seq, &t_ns, NULL, NULL) <= 0)
 		return 0;
-	if (sqlite3_prepare_v2(force->db, "SELECT t_ns FROM force ORDER BY seq LIMIT 1",
-			       -1, &stmt, NULL) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW)
-		bound_ns =
-			incise_session_bound(force->map, sqlite3_column_int64(stmt, 0));
-	sqlite3_finalize(stmt);
 	/* Of a bounded error that is as likely anywhere within. */
-	return bound_ns / sqrt(3) * 1e-9;
+	return incise_session_bound(force->map, t_ns) / sqrt(3) * 1e-9;
 }
 
 static void keep_tracker(struct incise_budget *budget, const struct tracker_sums *sums,
@@ -725,11 +754,10 @@ static int measure_tracker(struct incise_budget *budget, const struct use *use,
 		return rc;
 	if (incise_smooth_init(&sums.smooth, rate_hz > 0 ? rate_hz : 120))
 		return incise_error_set(err, ENOMEM, "out of memory");
-	rc = incise_rows_open_joined(
-		&rows, recording, "depth", "tracker",
-		"depth.seq, depth.t_ns, depth_mm, velocity_mm_s, x_mm, y_mm, z_mm, qw, "
-		"qx, qy, qz",
-		"iirrrrrrrrr", recording->meta.depth, err);
+	rc = incise_rows_open(&rows, recording, "depth",
+			      "seq, t_ns, depth_mm, velocity_mm_s, x_mm, y_mm, z_mm, qw, "
+			      "qx, qy, qz",
+			      recording->meta.depth, err);
 	if (!rc && use->given)
 		incise_row_times_calibrate(&rows.times, use->given);
 	/* Of the calibration in use: another one has added the difference. */
@@ -748,8 +776,7 @@ static int measure_tracker(struct incise_budget *budget, const struct use *use,
 /* --- the budget ---------------------------------------------------------------------- */
 
 static int find_all(struct incise_budget *budget, const struct use *use,
-		    struct incise_recording *recording, bool rows,
-		    struct incise_error *err)
+		    struct incise_recording *recording, struct incise_error *err)
 {
 	double surface_u_mm = use->of_tracker.calibration.surface_u_mm;
 	int rc = 0;
@@ -764,7 +791,7 @@ static int find_all(struct incise_budget *budget, const struct use *use,
 		     "the surface has no uncertainty (surface_u_mm in calibration.conf)");
 	if (!rc)
 		rc = find_times(budget, use, recording, err);
-	return rc || !rows ? rc : measure_tracker(budget, use, recording, err);
+	return rc || !use->rows ? rc : measure_tracker(budget, use, recording, err);
 }
 
 struct incise_budget *incise_budget_open(struct incise_recording *recording,
@@ -778,6 +805,7 @@ struct incise_budget *incise_budget_open(struct incise_recording *recording,
 		.force = incise_recording_member(recording, "force"),
 		.tracker = incise_recording_member(recording, "tracker"),
 		.given = given,
+		.rows = rows,
 	};
 	int rc;
 
@@ -806,7 +834,7 @@ struct incise_budget *incise_budget_open(struct incise_recording *recording,
 	}
 	rc = rc < 0 ? rc : 0;
 	if (!rc)
-		rc = find_all(budget, &use, recording, rows, err);
+		rc = find_all(budget, &use, recording, err);
 	free(use.of_given.records);
 	free(use.of_force.records);
 	free(use.of_tracker.records);

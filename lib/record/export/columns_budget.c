@@ -45,7 +45,7 @@ static int put(struct incise_budget_columns *to, const struct incise_budget_valu
 
 	if (at < 0)
 		at = to->n++;
-	to->columns[at] = (struct incise_column){
+	to->columns[at] = (struct incise_table_column){
 		name,
 		value->unit,
 		about,
@@ -58,7 +58,7 @@ static int put(struct incise_budget_columns *to, const struct incise_budget_valu
 }
 
 int incise_budget_columns(struct incise_budget_columns *to,
-			  const struct incise_column *columns, int n,
+			  const struct incise_table_column *columns, int n,
 			  enum incise_export_uncertainty uncertainty)
 {
 	const struct incise_budget_value *values = incise_budget_values();

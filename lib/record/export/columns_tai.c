@@ -8,16 +8,18 @@
 #include <string.h>
 #include "writers.h"
 
-static const struct incise_column tai_columns[INCISE_TAI_COLUMNS] = {
+static const struct incise_table_column tai_columns[INCISE_TAI_COLUMNS] = {
 	{"tai_ns", "ns", "TAI since 1970-01-01 00:00:00 TAI", INCISE_COLUMN_INTEGER, 0,
 	 NULL, NULL},
 	{"tai_u_ns", "ns", "bound of the error of tai_ns; not a number: unknown",
 	 INCISE_COLUMN_REAL, 0, NULL, NULL},
 };
 
-struct incise_column *incise_tai_columns(const struct incise_column *columns, int n)
+struct incise_table_column *incise_tai_columns(const struct incise_table_column *columns,
+					       int n)
 {
-	struct incise_column *all = calloc((size_t)n + INCISE_TAI_COLUMNS, sizeof(*all));
+	struct incise_table_column *all =
+		calloc((size_t)n + INCISE_TAI_COLUMNS, sizeof(*all));
 
 	if (!all)
 		return NULL;

@@ -205,9 +205,9 @@ static int each_cut_sample(struct pass *pass, struct incise_cuts *cuts,
 		pass->first_ns = cuts->first_ns;
 		rc = visitor->sample(pass, &sample,
 				     (sample.t_ns - cuts->first_ns) * 1e-9);
-		if (!rc && (cuts->force_rows & 0xfff) == 0)
+		if (!rc && (cuts->force.n & 0xfff) == 0)
 			rc = incise_export_progress(
-				pass->options, (double)(pass->samples + cuts->force_rows),
+				pass->options, (double)(pass->samples + cuts->force.n),
 				(double)pass->samples_all, pass->err);
 		if (rc)
 			return rc;
@@ -235,7 +235,7 @@ static int each_sample(struct pass *pass, struct incise_recording *recording,
 			rc = each_cut_sample(pass, &cuts, &blade, visitor);
 		incise_blade_pose_close(&blade);
 	}
-	pass->samples += cuts.force_rows;
+	pass->samples += cuts.force.n;
 	pass->depth_deepest_mm = fmax(pass->depth_deepest_mm, cuts.depth_max_mm);
 	incise_cuts_close(&cuts);
 	return rc;
@@ -279,7 +279,7 @@ static int each_cut(struct pass *pass, struct incise_recording *const *recording
 			NULL, NULL                                                    \
 	}
 
-static const struct incise_column raw_columns[] = {
+static const struct incise_table_column raw_columns[] = {
 	CUT,
 	{"t_s", "s", "since the recording's first force sample", INCISE_COLUMN_REAL, 6,
 	 NULL, NULL},
@@ -368,7 +368,7 @@ static int write_raw(struct pass *pass, struct incise_recording *const *recordin
 
 /* --- means over bins of depth and velocity (Song et al. 2006, §4.1) --- */
 
-static const struct incise_column bin_columns[] = {
+static const struct incise_table_column bin_columns[] = {
 	CUT,
 	{"depth_mm", "mm", "mean depth in the bin", INCISE_COLUMN_REAL, -1, NULL, NULL},
 	{"velocity_mm_s", "mm/s", "mean speed in the bin", INCISE_COLUMN_REAL, -1, NULL,
@@ -689,10 +689,10 @@ static int open_budgets(struct pass *pass, struct incise_recording *const *recor
 /* Write the rows of a table of these columns; those of TAI come last. */
 static int write_table(struct pass *pass, struct incise_recording *const *recordings,
 		       int n, const struct incise_table_format *format, FILE *out,
-		       const struct incise_column *columns,
+		       const struct incise_table_column *columns,
 		       const struct incise_provenance *provenance)
 {
-	struct incise_column *with_tai = NULL;
+	struct incise_table_column *with_tai = NULL;
 	struct incise_table table;
 	int rc, width = pass->width;
 
@@ -723,7 +723,7 @@ int incise_export_table(struct incise_recording *const *recordings, int n,
 	struct pass pass = {
 		.options = options, .err = err, .depth_deepest_mm = -INFINITY};
 	bool bins = options->depth_bins > 0, whole = !bins || options->by_cut;
-	const struct incise_column *columns =
+	const struct incise_table_column *columns =
 		options->resample ? incise_resample_columns
 				  : (bins ? bin_columns : raw_columns) + !whole;
 	struct incise_budget_columns with_budget = {0};

@@ -38,7 +38,7 @@ int64_t incise_message_force(struct incise_messages *messages,
 			     bool *clipped)
 {
 	const struct incise_recording_force *scale = &messages->scale;
-	int64_t code = sqlite3_column_int64(rows->stmt, 2);
+	int64_t code = incise_rows_int(rows, 2);
 
 	if (code < 0 || code > scale->top)
 		return -EINVAL;
@@ -65,7 +65,7 @@ static int find_start(struct incise_recording *recording, int64_t *start_ns,
 		      struct incise_error *err)
 {
 	struct incise_rows rows;
-	int rc = incise_rows_open(&rows, recording, "events", "rowid, t_ns, kind", "iit",
+	int rc = incise_rows_open(&rows, recording, "events", "rowid, t_ns, kind",
 				  UINT64_MAX, err);
 
 	if (!rc)
@@ -222,7 +222,7 @@ static int write_row(struct export *export, int i, struct incise_error *err)
 	struct incise_messages *messages = &export->messages;
 	const struct incise_rows *rows = &export->rows[i];
 	int64_t length = stream->encode(messages, rows);
-	long long row = sqlite3_column_int64(rows->stmt, 0);
+	long long row = incise_rows_seq(rows);
 	int rc;
 
 	if (!length)
@@ -308,7 +308,7 @@ static int open_streams(struct export *export, struct incise_error *err)
 		if (!(export->selected & 1 << i))
 			continue;
 		rc = incise_rows_open(&export->rows[i], recording, stream->table,
-				      stream->columns, stream->types,
+				      stream->columns,
 				      expected(&recording->meta, stream->table), err);
 		if (!rc && given)
 			incise_row_times_calibrate(&export->rows[i].times, given);

@@ -430,22 +430,16 @@ int incise_rows_last(const struct incise_rows *rows, int64_t *last_ns,
 {
 	struct incise_recording *recording = rows->recording;
 	struct incise_row_times times = rows->times; /* as before the first row */
-	sqlite3_stmt *stmt = NULL;
-	char sql[100];
-	bool found;
+	int64_t seq, t_ns;
+	int rc = incise_source_end(recording, rows->table, true, &seq, &t_ns, NULL, err);
 
-	snprintf(sql, sizeof(sql), "SELECT seq, t_ns FROM %s ORDER BY seq DESC LIMIT 1",
-		 rows->table);
-	found = sqlite3_prepare_v2(recording->db, sql, -1, &stmt, NULL) == SQLITE_OK &&
-		sqlite3_step(stmt) == SQLITE_ROW;
-	if (found && !incise_row_times_next(&times, sqlite3_column_int64(stmt, 0),
-					    sqlite3_column_int64(stmt, 1), last_ns))
-		*last_ns = INCISE_TIME_NONE; /* reading the rows reports the damage */
-	sqlite3_finalize(stmt);
-	return found ? 0
-		     : incise_error_set(err, ENODATA,
+	if (!rc)
+		return incise_error_set(err, ENODATA,
 					"%s: has no %s sample; leave it out",
 					recording->path, rows->table);
+	if (rc > 0 && !incise_row_times_next(&times, seq, t_ns, last_ns))
+		*last_ns = INCISE_TIME_NONE; /* reading the rows reports the damage */
+	return rc < 0 ? rc : 0;
 }
 
 int incise_force_interpolator_open(struct incise_force_interpolator *force,
@@ -465,7 +459,7 @@ int incise_force_interpolator_open(struct incise_force_interpolator *force,
 		return incise_error_set(err, ENOMEM, "out of memory");
 	for (int i = 0; i < STEPS + 2; i++)
 		force->weights[i] = incise_force_weight((double)i / CELLS);
-	rc = incise_rows_open(&force->rows, recording, "force", "seq, t_ns, code", "iii",
+	rc = incise_rows_open(&force->rows, recording, "force", "seq, t_ns, code",
 			      recording->meta.force, err);
 	if (!rc && given)
 		incise_row_times_calibrate(&force->rows.times, given);
@@ -501,14 +495,13 @@ int incise_force_interpolator_more(struct incise_force_interpolator *force,
 		force->samples = samples;
 		force->capacity = capacity;
 	}
-	code = sqlite3_column_int64(force->rows.stmt, 2);
+	code = incise_rows_int(&force->rows, 2);
 	if (code < 0 || code > force->scale.top)
 		return incise_error_set(err, EINVAL,
 					"%s: damaged: table force, row %lld: code is "
 					"out of the converter's range",
 					force->rows.recording->path,
-					(long long)sqlite3_column_int64(force->rows.stmt,
-									0));
+					(long long)incise_rows_seq(&force->rows));
 	force->samples[force->n++] = (struct incise_force_code){force->rows.t_ns, code};
 	return 1;
 }
@@ -645,30 +638,29 @@ static void between(struct incise_blade_pose *blade)
 
 static int more_pose(struct incise_blade_pose *blade, struct incise_error *err)
 {
-	sqlite3_stmt *stmt = blade->tracker.stmt;
+	const struct incise_rows *rows = &blade->tracker;
 	int rc = incise_rows_next(&blade->tracker, err);
 	struct incise_blade_record *pose = &blade->pose[1];
-	const char *status;
 	double norm;
 
 	blade->pose[0] = *pose;
 	pose->t_ns = INCISE_TIME_NONE;
 	if (rc <= 0)
 		return rc;
-	pose->seq = sqlite3_column_int64(stmt, 0);
-	pose->t_ns = blade->tracker.t_ns;
+	pose->seq = incise_rows_seq(rows);
+	pose->t_ns = rows->t_ns;
 	for (int i = 0; i < 3; i++)
-		pose->position_mm[i] = sqlite3_column_double(stmt, 2 + i);
+		pose->position_mm[i] = incise_rows_real(rows, 2 + i);
 	for (int i = 0; i < 4; i++)
-		pose->q[i] = sqlite3_column_double(stmt, 5 + i);
+		pose->q[i] = incise_rows_real(rows, 5 + i);
 	norm = sqrt(dot4(pose->q, pose->q));
 	for (int i = 0; i < 4; i++)
 		pose->q[i] = norm > 0 ? pose->q[i] / norm : NAN;
 	incise_go_to_tip(blade->tip_mm, pose->q, pose->position_mm);
-	status = (const char *)sqlite3_column_text(stmt, 9);
-	pose->error = !incise_pose_usable(*status);
-	pose->station = sqlite3_column_int(stmt, 10);
-	pose->button = sqlite3_column_int(stmt, 11) != 0;
+	pose->error = !incise_pose_usable(incise_rows_char(rows, 9));
+	/* Form 1 has no stations. */
+	pose->station = rows->recording->form < 2 ? 0 : (int)incise_rows_int(rows, 10);
+	pose->button = incise_rows_int(rows, 11) != 0;
 	if (blade->pose[0].t_ns != INCISE_TIME_NONE)
 		between(blade);
 	return 1;
@@ -677,7 +669,7 @@ static int more_pose(struct incise_blade_pose *blade, struct incise_error *err)
 /* Add a row to the smoother; 0 at the end. */
 static int feed(struct incise_blade_pose *blade, struct incise_error *err)
 {
-	sqlite3_stmt *stmt = blade->depth.stmt;
+	const struct incise_rows *rows = &blade->depth;
 	int rc = incise_rows_next(&blade->depth, err);
 	struct incise_smooth_record record;
 	double q[4];
@@ -689,16 +681,16 @@ static int feed(struct incise_blade_pose *blade, struct incise_error *err)
 		return 0;
 	}
 	record = (struct incise_smooth_record){
-		.seq = sqlite3_column_int64(stmt, 0),
-		.t_ns = blade->depth.t_ns,
-		.depth_mm = sqlite3_column_double(stmt, 2),
+		.seq = incise_rows_seq(rows),
+		.t_ns = rows->t_ns,
+		.depth_mm = incise_rows_real(rows, 2),
 	};
 	for (int i = 0; i < 3; i++)
-		record.position_mm[i] = sqlite3_column_double(stmt, 3 + i);
+		record.position_mm[i] = incise_rows_real(rows, 3 + i);
 	for (int i = 0; i < 4; i++)
-		q[i] = sqlite3_column_double(stmt, 6 + i);
+		q[i] = incise_rows_real(rows, 6 + i);
 	incise_go_to_tip(blade->tip_mm, q, record.position_mm);
-	record.t_sd_s = incise_row_times_sd(&blade->depth.times, record.seq);
+	record.t_sd_s = incise_row_times_sd(&rows->times, record.seq);
 	incise_smooth_push(&blade->smooth, &record);
 	return 1;
 }
@@ -809,18 +801,15 @@ int incise_blade_pose_open(struct incise_blade_pose *blade,
 	if (incise_smooth_init(&blade->smooth, tracker.rate_hz))
 		return incise_error_set(err, ENOMEM, "out of memory");
 	rc = incise_rows_open(&blade->tracker, recording, "tracker",
-			      recording->form < 2
-				      ? "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, "
-					"status, 0, 0"
-				      : "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, "
-					"status, station, button",
-			      "iirrrrrrrtii", recording->meta.tracker, err);
+			      "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status, "
+			      "station, button",
+			      recording->meta.tracker, err);
 	/* Without the table's velocity, which is from few records: the smoother uses positions. */
 	if (!rc)
-		rc = incise_rows_open_joined(
-			&blade->depth, recording, "depth", "tracker",
-			"depth.seq, depth.t_ns, depth_mm, x_mm, y_mm, z_mm, qw, qx, qy, qz",
-			"iirrrrrrrr", recording->meta.depth, err);
+		rc = incise_rows_open(
+			&blade->depth, recording, "depth",
+			"seq, t_ns, depth_mm, x_mm, y_mm, z_mm, qw, qx, qy, qz",
+			recording->meta.depth, err);
 	if (!rc && given) {
 		incise_row_times_calibrate(&blade->tracker.times, given);
 		incise_row_times_calibrate(&blade->depth.times, given);
@@ -992,29 +981,12 @@ void incise_blade_pose_budget(const struct incise_blade_pose *blade, int64_t t_n
 int incise_camera_interpolator_any(struct incise_recording *recording,
 				   struct incise_error *err)
 {
-	sqlite3_stmt *stmt = NULL;
-	int rc;
+	int64_t seq, t_ns;
 
 	recording = incise_recording_member(recording, "frames");
-	if (recording->form < 2)
-		return 0;
-	if (sqlite3_prepare_v2(recording->db, "SELECT 1 FROM frames LIMIT 1", -1, &stmt,
-			       NULL) != SQLITE_OK)
-		return incise_schema_fail(recording->db, recording->path, err);
-	rc = sqlite3_step(stmt);
-	if (rc != SQLITE_ROW && rc != SQLITE_DONE)
-		rc = incise_schema_fail(recording->db, recording->path, err);
-	else
-		rc = rc == SQLITE_ROW;
-	sqlite3_finalize(stmt);
-	return rc;
-}
-
-static double column(sqlite3_stmt *stmt, int i)
-{
-	return sqlite3_column_type(stmt, i) == SQLITE_NULL
-		       ? NAN
-		       : sqlite3_column_double(stmt, i);
+	return recording->form < 2 ? 0
+				   : incise_source_end(recording, "frames", false, &seq,
+						       &t_ns, NULL, err);
 }
 
 /* Second derivative of the depth at a frame by its neighbours, mm/s²; NAN: not known. */
@@ -1031,8 +1003,8 @@ static double bend_at(const struct incise_camera_depth *frame)
 
 static int more(struct incise_camera_interpolator *camera, struct incise_error *err)
 {
-	sqlite3_stmt *stmt = camera->rows.stmt;
-	int rc = camera->ended ? 0 : incise_rows_next(&camera->rows, err);
+	const struct incise_rows *rows = &camera->rows;
+	int rc = incise_rows_next(&camera->rows, err);
 	double bend;
 
 	memmove(camera->frame, camera->frame + 1, 3 * sizeof(*camera->frame));
@@ -1040,15 +1012,14 @@ static int more(struct incise_camera_interpolator *camera, struct incise_error *
 		.t_ns = INCISE_TIME_NONE,
 		.depth_mm = NAN,
 	};
-	camera->ended = rc <= 0;
 	if (rc <= 0)
 		return rc;
 	camera->frame[3] = (struct incise_camera_depth){
-		camera->rows.t_ns,
-		column(stmt, 2) * camera->scale,
-		column(stmt, 3) * camera->mm_px,
-		column(stmt, 4),
-		incise_row_times_sd(&camera->rows.times, sqlite3_column_int64(stmt, 0)),
+		rows->t_ns,
+		incise_rows_real(rows, 2) * camera->scale,
+		incise_rows_real(rows, 3) * camera->mm_px,
+		incise_rows_real(rows, 4),
+		incise_row_times_sd(&rows->times, incise_rows_seq(rows)),
 	};
 	bend = bend_at(&camera->frame[2]);
 	if (!isnan(bend))
@@ -1078,8 +1049,7 @@ int incise_camera_interpolator_open(struct incise_camera_interpolator *camera,
 	if (rc <= 0)
 		return rc;
 	rc = incise_rows_open(&camera->rows, recording, "frames",
-			      "seq, t_ns, depth_mm, sd_px, quality", "iinnn", UINT64_MAX,
-			      err);
+			      "seq, t_ns, depth_mm, sd_px, quality", UINT64_MAX, err);
 	if (!rc && given)
 		incise_row_times_calibrate(&camera->rows.times, given);
 	for (int i = 0; i < 2 && rc >= 0; i++)

@@ -264,7 +264,6 @@ struct incise_camera_interpolator {
 		double depth_mm, sd_mm, quality, t_sd_s;
 	} frame[4];   /* two before and two after the row */
 	double bend2; /* mean square of second derivatives of late, (mm/s²)² */
-	bool ended;   /* no frame is left to be read */
 };
 
 /* NAN: not seen. */

@@ -41,7 +41,7 @@ struct incise_messages {
 
 /* A table as a topic. */
 struct incise_message_stream {
-	const char *table, *columns, *types; /* as of incise_rows_open() */
+	const char *table, *columns; /* as of incise_rows_open() */
 	/*
 	 * Make the message of a row in text. Returns its length; 0: the row has none; -EINVAL: the
 	 * row is impossible; -ENOMEM, -EIO.

@@ -97,16 +97,13 @@ static int64_t tracker_message(struct incise_messages *messages,
 					     ",\"x\":",
 					     ",\"y\":",
 					     ",\"z\":"};
-	int rc = incise_messages_reserve(messages, sqlite3_column_bytes(rows->stmt, 9));
+	const char status[] = {incise_rows_char(rows, 9), 0};
 	char *to = messages->text;
 
-	if (rc)
-		return rc;
 	for (int i = 0; i < 7; i++)
-		to = add_real(to, before[i], sqlite3_column_double(rows->stmt, 2 + i),
+		to = add_real(to, before[i], incise_rows_real(rows, 2 + i),
 			      i < 3 ? 4 : 6);
-	to = add_text(to,
-		      "},\"status\":", (const char *)sqlite3_column_text(rows->stmt, 9));
+	to = add_text(to, "},\"status\":", status);
 	return add(to, "}") - messages->text;
 }
 
@@ -115,8 +112,8 @@ static int64_t depth_message(struct incise_messages *messages,
 {
 	char *to = messages->text;
 
-	to = add_real(to, "{\"depth_mm\":", sqlite3_column_double(rows->stmt, 2), 4);
-	to = add_real(to, ",\"velocity_mm_s\":", sqlite3_column_double(rows->stmt, 3), 3);
+	to = add_real(to, "{\"depth_mm\":", incise_rows_real(rows, 2), 4);
+	to = add_real(to, ",\"velocity_mm_s\":", incise_rows_real(rows, 3), 3);
 	if (messages->budget) {
 		struct incise_budget_row row = {.tracker_time = true};
 		struct incise_blade_pose_value value;
@@ -137,32 +134,32 @@ static int64_t depth_message(struct incise_messages *messages,
 static int64_t event_message(struct incise_messages *messages,
 			     const struct incise_rows *rows)
 {
-	int rc = incise_messages_reserve(messages,
-					 sqlite3_column_bytes(rows->stmt, 2) +
-						 sqlite3_column_bytes(rows->stmt, 3));
+	size_t kind_bytes, text_bytes;
+	const char *kind = incise_rows_text(rows, 2, &kind_bytes);
+	const char *text = incise_rows_text(rows, 3, &text_bytes);
+	int rc = incise_messages_reserve(messages, kind_bytes + text_bytes);
 	char *to = messages->text;
 
 	if (rc)
 		return rc;
-	to = add_text(to, "{\"kind\":", (const char *)sqlite3_column_text(rows->stmt, 2));
-	to = add_text(to, ",\"text\":", (const char *)sqlite3_column_text(rows->stmt, 3));
+	to = add_text(to, "{\"kind\":", kind);
+	to = add_text(to, ",\"text\":", text);
 	return add(to, "}") - messages->text;
 }
 
 static const struct incise_message_stream streams[] = {
-	{"force", "seq, t_ns, code", "iii", force_message, "/force", "incise.Force",
+	{"force", "seq, t_ns, code", force_message, "/force", "incise.Force",
 	 OBJECT("\"force_N\":" NUMBER("N") ",\"code\":{\"type\":\"integer\"},"
 					   "\"clipped\":{\"type\":\"boolean\"}")},
-	{"tracker", "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status", "iirrrrrrrt",
+	{"tracker", "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status",
 	 tracker_message, "/tracker", "incise.Pose",
 	 OBJECT("\"position_mm\":" OBJECT("\"x\":" NUMBER("mm") ",\"y\":" NUMBER("mm") ",\"z\":" NUMBER("mm")) ",\"orientation\":" OBJECT(
 		 "\"w\":" NUMBER("unit quaternion") ",\"x\":" NUMBER("unit quaternion") ",\"y\":" NUMBER(
 			 "unit quaternion") ",\"z\":" NUMBER("unit quaternion")) ",\"status\":{\"type\":\"string\"}")},
-	{"depth", "seq, t_ns, depth_mm, velocity_mm_s", "iirr", depth_message, "/depth",
+	{"depth", "seq, t_ns, depth_mm, velocity_mm_s", depth_message, "/depth",
 	 "incise.Depth",
 	 OBJECT("\"depth_mm\":" NUMBER("mm") ",\"velocity_mm_s\":" NUMBER("mm/s"))},
-	{"events", "rowid, t_ns, kind, text", "iitt", event_message, "/events",
-	 "incise.Event",
+	{"events", "rowid, t_ns, kind, text", event_message, "/events", "incise.Event",
 	 OBJECT("\"kind\":{\"type\":\"string\"},\"text\":{\"type\":\"string\"}")},
 };
 

@@ -136,15 +136,14 @@ static int64_t tracker_message(struct incise_messages *messages,
 			       const struct incise_rows *rows)
 {
 	struct cdr cdr = header_begin(messages, rows, FRAME_TRACKER);
-	const char *status = (const char *)sqlite3_column_text(rows->stmt, 9);
 	double position_mm[3], q[4], arm_mm[3];
 
-	if (!incise_pose_usable(*status))
+	if (!incise_pose_usable(incise_rows_char(rows, 9)))
 		return 0;
 	for (int i = 0; i < 3; i++)
-		position_mm[i] = sqlite3_column_double(rows->stmt, 2 + i);
+		position_mm[i] = incise_rows_real(rows, 2 + i);
 	for (int i = 0; i < 4; i++)
-		q[i] = sqlite3_column_double(rows->stmt, 5 + i);
+		q[i] = incise_rows_real(rows, 5 + i);
 	v3_rotate(arm_mm, q, messages->recording->meta.tip_mm);
 	for (int i = 0; i < 3; i++)
 		put_f64(&cdr, (position_mm[i] + arm_mm[i]) * M_PER_MM);
@@ -156,9 +155,10 @@ static int64_t tracker_message(struct incise_messages *messages,
 static int64_t event_message(struct incise_messages *messages,
 			     const struct incise_rows *rows)
 {
-	int rc = incise_messages_reserve(messages,
-					 (size_t)sqlite3_column_bytes(rows->stmt, 2) +
-						 sqlite3_column_bytes(rows->stmt, 3));
+	size_t kind_bytes, text_bytes;
+	const char *kind = incise_rows_text(rows, 2, &kind_bytes);
+	const char *text = incise_rows_text(rows, 3, &text_bytes);
+	int rc = incise_messages_reserve(messages, kind_bytes + text_bytes);
 	struct cdr cdr;
 
 	if (rc)
@@ -166,8 +166,8 @@ static int64_t event_message(struct incise_messages *messages,
 	cdr = cdr_begin(messages);
 	put_time(&cdr, incise_message_ns(messages, rows->t_ns));
 	put_u8(&cdr, 20); /* INFO */
-	put_text(&cdr, (const char *)sqlite3_column_text(rows->stmt, 2));
-	put_text(&cdr, (const char *)sqlite3_column_text(rows->stmt, 3));
+	put_text(&cdr, kind);
+	put_text(&cdr, text);
 	put_text(&cdr, "");
 	put_text(&cdr, "");
 	put_u32(&cdr, 0);
@@ -210,7 +210,7 @@ static int64_t frame_message(struct incise_messages *messages,
 			     const struct incise_rows *rows)
 {
 	const struct incise_camera_frame *frame = &messages->frame;
-	int rc = find_frame(messages, (uint64_t)sqlite3_column_int64(rows->stmt, 0));
+	int rc = find_frame(messages, (uint64_t)incise_rows_seq(rows));
 	struct cdr cdr;
 
 	if (rc <= 0)
@@ -244,26 +244,25 @@ static int64_t frame_message(struct incise_messages *messages,
 #define TIME MSG("builtin_interfaces/Time") "int32 sec\nuint32 nanosec\n"
 
 static const struct incise_message_stream streams[] = {
-	{"force", "seq, t_ns, code", "iii", force_message, "/force",
+	{"force", "seq, t_ns, code", force_message, "/force",
 	 "geometry_msgs/msg/WrenchStamped",
 	 "std_msgs/Header header\nWrench wrench\n" /**/
 	 MSG("geometry_msgs/Wrench") "Vector3 force\nVector3 torque\n" MSG(
 		 "geometry_msgs/Vector3") "float64 x\nfloat64 y\nfloat64 z\n" HEADER},
-	{"tracker", "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status", "iirrrrrrrt",
+	{"tracker", "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status",
 	 tracker_message, "/tip", "geometry_msgs/msg/PoseStamped",
 	 "std_msgs/Header header\nPose pose\n" /**/
 	 MSG("geometry_msgs/Pose") "Point position\nQuaternion orientation\n" MSG("geometry_msgs/Point") "float64 x\nfloat64 y\nfloat64 z\n" MSG(
 		 "geometry_msgs/Quaternion") "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n" HEADER},
-	{"events", "rowid, t_ns, kind, text", "iitt", event_message, "/events",
+	{"events", "rowid, t_ns, kind, text", event_message, "/events",
 	 "rcl_interfaces/msg/Log",
 	 "byte DEBUG=10\nbyte INFO=20\nbyte WARN=30\nbyte ERROR=40\nbyte FATAL=50\n"
 	 "builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring msg\n"
 	 "string file\nstring function\nuint32 line\n" TIME},
-	{"frames", "seq, t_ns", "ii", frame_message, "/camera/image/compressed",
+	{"frames", "seq, t_ns", frame_message, "/camera/image/compressed",
 	 "sensor_msgs/msg/CompressedImage",
 	 "std_msgs/Header header\nstring format\nuint8[] data\n" HEADER},
-	{"frames", "seq, t_ns", "ii", frame_message, "/camera/image",
-	 "sensor_msgs/msg/Image",
+	{"frames", "seq, t_ns", frame_message, "/camera/image", "sensor_msgs/msg/Image",
 	 "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\n"
 	 "uint8 is_bigendian\nuint32 step\nuint8[] data\n" HEADER},
 };

@@ -22,44 +22,45 @@
 #define POSITION "position of the tip"
 #define ORIENTATION "orientation, unit quaternion"
 
-const struct incise_column incise_resample_columns[INCISE_RESAMPLE_COLUMNS +
-						   INCISE_RESAMPLE_CAMERA_COLUMNS] = {
-	{"recording", "1", "its name", INCISE_COLUMN_NAME, 0, NULL, NULL},
-	{"cut", "1", "number of the cut, 0 outside", INCISE_COLUMN_INTEGER, 0, NULL,
-	 NULL},
-	{"t_s", "s", "since the recording's first force sample", INCISE_COLUMN_REAL, 6,
-	 NULL, NULL},
-	SINGLE("x_mm", "mm", POSITION, 4),
-	SINGLE("y_mm", "mm", POSITION, 4),
-	SINGLE("z_mm", "mm", POSITION, 4),
-	SINGLE("position_u_mm", "mm",
-	       "standard uncertainty of x, y and z from noise and time", 4),
-	SINGLE("qw", "1", ORIENTATION, 6),
-	SINGLE("qx", "1", ORIENTATION, 6),
-	SINGLE("qy", "1", ORIENTATION, 6),
-	SINGLE("qz", "1", ORIENTATION, 6),
-	{"station", "1", "sensor of the tracker, 0: unknown", INCISE_COLUMN_INTEGER, 0,
-	 NULL, NULL},
-	FLAG("button", "1: the button of the stylus was pressed"),
-	SINGLE("depth_mm", "mm", "of the tip below the surface", 4),
-	SINGLE("depth_u_mm", "mm", "standard uncertainty from noise and time", 4),
-	SINGLE("velocity_mm_s", "mm/s", "speed of the tip, smoothed", 3),
-	SINGLE("force_N", "N", "on the blade", 5),
-	SINGLE("force_u_N", "N", "standard uncertainty of force_N from noise", 6),
-	FLAG("clipped", "1: the converter was at an end"),
-	FLAG("interpolated", "1: a tracker record is missing here"),
-	FLAG("tracker_error", "1: the tracker reported an error"),
-	INCISE_ADVANCING_COLUMN,
-	{INCISE_ACCELERATION_COLUMN, INCISE_COLUMN_SINGLE, 1, NULL, NULL},
-	{INCISE_TILT_COLUMN, INCISE_COLUMN_SINGLE, 2, NULL, NULL},
-	{INCISE_TIME_COLUMN, INCISE_COLUMN_SINGLE, 4, NULL, NULL},
-	SINGLE("camera_depth_mm", "mm", "depth from the frames", 4),
-	SINGLE("camera_depth_sd_mm", "mm", "standard deviation of the edge in the frames",
-	       4),
-	SINGLE("camera_depth_u_mm", "mm", "standard uncertainty from the edge and time",
-	       4),
-	SINGLE("quality", "1", "quality of the frames, 0 to 1", 3),
-	FLAG("low_quality", "1: below 0.5 in a frame, or not detected"),
+const struct incise_table_column incise_resample_columns[INCISE_RESAMPLE_COLUMNS +
+							 INCISE_RESAMPLE_CAMERA_COLUMNS] =
+	{
+		{"recording", "1", "its name", INCISE_COLUMN_NAME, 0, NULL, NULL},
+		{"cut", "1", "number of the cut, 0 outside", INCISE_COLUMN_INTEGER, 0,
+		 NULL, NULL},
+		{"t_s", "s", "since the recording's first force sample",
+		 INCISE_COLUMN_REAL, 6, NULL, NULL},
+		SINGLE("x_mm", "mm", POSITION, 4),
+		SINGLE("y_mm", "mm", POSITION, 4),
+		SINGLE("z_mm", "mm", POSITION, 4),
+		SINGLE("position_u_mm", "mm",
+		       "standard uncertainty of x, y and z from noise and time", 4),
+		SINGLE("qw", "1", ORIENTATION, 6),
+		SINGLE("qx", "1", ORIENTATION, 6),
+		SINGLE("qy", "1", ORIENTATION, 6),
+		SINGLE("qz", "1", ORIENTATION, 6),
+		{"station", "1", "sensor of the tracker, 0: unknown",
+		 INCISE_COLUMN_INTEGER, 0, NULL, NULL},
+		FLAG("button", "1: the button of the stylus was pressed"),
+		SINGLE("depth_mm", "mm", "of the tip below the surface", 4),
+		SINGLE("depth_u_mm", "mm", "standard uncertainty from noise and time", 4),
+		SINGLE("velocity_mm_s", "mm/s", "speed of the tip, smoothed", 3),
+		SINGLE("force_N", "N", "on the blade", 5),
+		SINGLE("force_u_N", "N", "standard uncertainty of force_N from noise", 6),
+		FLAG("clipped", "1: the converter was at an end"),
+		FLAG("interpolated", "1: a tracker record is missing here"),
+		FLAG("tracker_error", "1: the tracker reported an error"),
+		INCISE_ADVANCING_COLUMN,
+		{INCISE_ACCELERATION_COLUMN, INCISE_COLUMN_SINGLE, 1, NULL, NULL},
+		{INCISE_TILT_COLUMN, INCISE_COLUMN_SINGLE, 2, NULL, NULL},
+		{INCISE_TIME_COLUMN, INCISE_COLUMN_SINGLE, 4, NULL, NULL},
+		SINGLE("camera_depth_mm", "mm", "depth from the frames", 4),
+		SINGLE("camera_depth_sd_mm", "mm",
+		       "standard deviation of the edge in the frames", 4),
+		SINGLE("camera_depth_u_mm", "mm",
+		       "standard uncertainty from the edge and time", 4),
+		SINGLE("quality", "1", "quality of the frames, 0 to 1", 3),
+		FLAG("low_quality", "1: below 0.5 in a frame, or not detected"),
 };
 
 /* A hundred days: longer than any session; a grid over forged times would not end. */
@@ -319,7 +320,7 @@ static int on_poses(struct resample *r, struct incise_recording *recording)
 			"%s: has no force channel, whose samples would be the rows; give "
 			"--rate HZ, for example 120",
 			recording->path);
-	rc = incise_rows_open(&rows, recording, "tracker", "seq, t_ns", "ii",
+	rc = incise_rows_open(&rows, recording, "tracker", "seq, t_ns",
 			      recording->meta.tracker, r->err);
 	if (!rc && given)
 		incise_row_times_calibrate(&rows.times, given);

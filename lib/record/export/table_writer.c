@@ -15,7 +15,7 @@
 
 int incise_table_open(struct incise_table *table,
 		      const struct incise_table_format *format, FILE *out,
-		      const struct incise_column *columns, int n_columns,
+		      const struct incise_table_column *columns, int n_columns,
 		      const struct incise_provenance *provenance,
 		      struct incise_error *err)
 {
@@ -157,7 +157,7 @@ static int csv_rows(struct incise_table *table, struct incise_error *err)
 		put_header(table);
 	for (size_t row = 0; row < table->filled; row++) {
 		for (int i = 0; i < table->n_columns; i++) {
-			const struct incise_column *column = &table->columns[i];
+			const struct incise_table_column *column = &table->columns[i];
 			const union incise_cell *cell =
 				&table->block[(size_t)i * INCISE_TABLE_BLOCK + row];
 			char *to = text;

@@ -29,7 +29,7 @@ enum incise_column_type {
 	INCISE_COLUMN_NAME, /* integer, from incise_table_name(); in one column only */
 };
 
-struct incise_column {
+struct incise_table_column {
 	const char *name, *unit, *about; /* unit "1": none */
 	enum incise_column_type type;
 	int decimals; /* of a real in text; -1: nine digits in all */
@@ -38,7 +38,7 @@ struct incise_column {
 };
 
 /* Names of the uncertainties of a column, with spaces between them, to be freed; NULL: none. */
-static inline char *incise_column_uncertainties(const struct incise_column *columns,
+static inline char *incise_column_uncertainties(const struct incise_table_column *columns,
 						int n, int of)
 {
 	size_t size = 0, used = 0;
@@ -76,7 +76,7 @@ struct incise_table_format {
 
 struct incise_table {
 	const struct incise_table_format *format;
-	const struct incise_column *columns;
+	const struct incise_table_column *columns;
 	int n_columns;
 	const struct incise_provenance *provenance; /* or NULL */
 	union incise_cell *block; /* column by column, INCISE_TABLE_BLOCK each */
@@ -99,7 +99,7 @@ const struct incise_table_format *incise_table_hdf5(struct incise_error *err);
  */
 int incise_table_open(struct incise_table *table,
 		      const struct incise_table_format *format, FILE *out,
-		      const struct incise_column *columns, int n_columns,
+		      const struct incise_table_column *columns, int n_columns,
 		      const struct incise_provenance *provenance,
 		      struct incise_error *err);
 

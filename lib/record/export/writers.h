@@ -38,7 +38,8 @@ static inline int incise_export_progress(const struct incise_export_options *opt
 #define INCISE_TAI_COLUMNS 2
 
 /* A copy of columns, to be freed, with those of TAI behind them. NULL: no memory. */
-struct incise_column *incise_tai_columns(const struct incise_column *columns, int n);
+struct incise_table_column *incise_tai_columns(const struct incise_table_column *columns,
+					       int n);
 
 /* Their cells at a time of CLOCK_MONOTONIC; the mapping must reach to it. Returns 0 or -ENODATA. */
 int incise_tai_cells(const struct incise_wall *wall, int64_t t_ns,
@@ -86,14 +87,14 @@ void incise_budget_mean_parts(const struct incise_budget_mean *mean,
 
 /* Columns of a table with those of uncertainties, which replace columns of their names. */
 struct incise_budget_columns {
-	struct incise_column *columns; /* to be freed */
+	struct incise_table_column *columns; /* to be freed */
 	int n;
 	int at[INCISE_BUDGET_COLUMNS]; /* totals, then parts; -1: not there */
 };
 
 /* Of quantities that have a column. Returns 0 or -ENOMEM. */
 int incise_budget_columns(struct incise_budget_columns *to,
-			  const struct incise_column *columns, int n,
+			  const struct incise_table_column *columns, int n,
 			  enum incise_export_uncertainty uncertainty);
 
 void incise_budget_cells(const struct incise_budget_columns *columns,
@@ -136,7 +137,7 @@ void incise_report_unstated(struct incise_export_report *report,
 #define INCISE_RESAMPLE_COLUMNS 25
 #define INCISE_RESAMPLE_CAMERA_COLUMNS 5
 
-extern const struct incise_column
+extern const struct incise_table_column
 	incise_resample_columns[INCISE_RESAMPLE_COLUMNS + INCISE_RESAMPLE_CAMERA_COLUMNS];
 
 /* Number of columns for these recordings: 25 or 30, or -errno. */

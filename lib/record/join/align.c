@@ -45,7 +45,7 @@ struct rise {
 static bool force_sudden(void *state, const struct incise_rows *rows, struct sudden *to)
 {
 	struct rise *rise = state;
-	int64_t code = sqlite3_column_int64(rows->stmt, 2);
+	int64_t code = incise_rows_int(rows, 2);
 	int from = 0;
 
 	if (rise->n == RISE_ROWS)
@@ -84,10 +84,9 @@ struct bend {
 static bool tracker_sudden(void *state, const struct incise_rows *rows, struct sudden *to)
 {
 	struct bend *bend = state;
-	const char *status = (const char *)sqlite3_column_text(rows->stmt, 5);
 	double before_s, after_s, sum = 0;
 
-	if (!incise_pose_usable(*status)) {
+	if (!incise_pose_usable(incise_rows_char(rows, 5))) {
 		bend->n = 0;
 		return false;
 	}
@@ -99,7 +98,7 @@ static bool tracker_sudden(void *state, const struct incise_rows *rows, struct s
 	}
 	bend->t_ns[bend->n] = rows->t_ns;
 	for (int i = 0; i < 3; i++)
-		bend->position_mm[bend->n][i] = sqlite3_column_double(rows->stmt, 2 + i);
+		bend->position_mm[bend->n][i] = incise_rows_real(rows, 2 + i);
 	if (++bend->n < 3)
 		return false;
 	before_s = (double)(bend->t_ns[1] - bend->t_ns[0]) * 1e-9;
@@ -120,7 +119,7 @@ static bool tracker_sudden(void *state, const struct incise_rows *rows, struct s
 }
 
 struct walk {
-	const char *table, *columns, *types;
+	const char *table, *columns;
 	sudden_at at;
 	void *state;
 	size_t size;   /* of it */
@@ -135,7 +134,7 @@ static int find_scale(struct incise_recording *recording, const struct walk *wal
 	struct sudden sudden;
 	double sum = 0, n = 0;
 	int rc = incise_rows_open(&rows, recording, walk->table, walk->columns,
-				  walk->types, UINT64_MAX, err);
+				  UINT64_MAX, err);
 
 	memset(walk->state, 0, walk->size);
 	*largest = 0;
@@ -182,8 +181,8 @@ static int find_marks(struct incise_recording *recording, const struct walk *wal
 	limit = fmax(NOISES * noise, SHARE * largest);
 	if (rc || !(largest > 0) || largest < limit)
 		return rc;
-	rc = incise_rows_open(&rows, recording, walk->table, walk->columns, walk->types,
-			      UINT64_MAX, err);
+	rc = incise_rows_open(&rows, recording, walk->table, walk->columns, UINT64_MAX,
+			      err);
 	memset(walk->state, 0, walk->size);
 	while (!rc && (rc = incise_rows_next(&rows, err)) > 0) {
 		rc = 0;
@@ -214,13 +213,13 @@ static int find_events(struct incise_recording *recording,
 		       struct incise_error *err)
 {
 	struct incise_rows rows;
-	int rc = incise_rows_open(&rows, recording, "events", "rowid, t_ns, kind", "iit",
+	int rc = incise_rows_open(&rows, recording, "events", "rowid, t_ns, kind",
 				  UINT64_MAX, err),
 	    n = 0;
 
 	while (!rc && (rc = incise_rows_next(&rows, err)) > 0) {
 		rc = 0;
-		if (!strcmp((const char *)sqlite3_column_text(rows.stmt, 2), "sync") &&
+		if (!strcmp(incise_rows_text(&rows, 2, NULL), "sync") &&
 		    n < INCISE_MARKS_MAX)
 			marks[n++] = (struct incise_mark){rows.t_ns, SYNC_SD_NS};
 	}
@@ -235,12 +234,12 @@ int incise_align_marks(struct incise_recording *recording,
 {
 	struct rise rise;
 	struct bend bend;
-	const struct walk force = {"force", "seq, t_ns, code", "iii", force_sudden,
+	const struct walk force = {"force", "seq, t_ns, code", force_sudden,
 				   &rise,   sizeof(rise),      false};
-	const struct walk tracker = {"tracker", "seq, t_ns, x_mm, y_mm, z_mm, status",
-				     "iirrrt",	tracker_sudden,
-				     &bend,	sizeof(bend),
-				     true};
+	const struct walk tracker = {
+		"tracker",	"seq, t_ns, x_mm, y_mm, z_mm, status",
+		tracker_sudden, &bend,
+		sizeof(bend),	true};
 	int n;
 
 	if (align == INCISE_ALIGN_EVENTS)

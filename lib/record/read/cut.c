@@ -23,58 +23,32 @@ bool incise_cut_step(struct incise_cut_count *cut, double depth_mm)
 	return cut->inside;
 }
 
-static int bad_row(const struct incise_cuts *cuts, const char *table, sqlite3_stmt *stmt,
-		   const char *what, struct incise_error *err)
+static int bad_row(const struct incise_rows *rows, const char *what,
+		   struct incise_error *err)
 {
-	return incise_error_set(
-		err, EINVAL,
-		"%s: damaged: table %s, row %lld: %s; `sqlite3 %s/%s` shows it",
-		cuts->recording->path, table, (long long)sqlite3_column_int64(stmt, 0),
-		what, cuts->recording->path, INCISE_SCHEMA_DB);
-}
+	const char *path = rows->recording->path;
 
-/* Step to a row and find its best time. Returns 1, 0 at the end, -errno. */
-static int step(struct incise_cuts *cuts, sqlite3_stmt *stmt, const char *table,
-		struct incise_row_times *times, int64_t *t_ns, struct incise_error *err)
-{
-	int rc = sqlite3_step(stmt);
-
-	if (rc == SQLITE_DONE)
-		return 0;
-	if (rc != SQLITE_ROW)
-		return incise_schema_fail(sqlite3_db_handle(stmt), cuts->recording->path,
-					  err);
-	if (sqlite3_column_type(stmt, 1) != SQLITE_INTEGER ||
-	    sqlite3_column_int64(stmt, 1) < 0)
-		return bad_row(cuts, table, stmt, "t_ns is not a time", err);
-	if (!incise_row_times_next(times, sqlite3_column_int64(stmt, 0),
-				   sqlite3_column_int64(stmt, 1), t_ns))
-		return bad_row(cuts, table, stmt, "t_ns does not increase", err);
-	return 1;
+	return incise_error_set(err, EINVAL,
+				"%s: damaged: table %s, row %lld: %s; `incise verify %s` "
+				"lists what is damaged",
+				path, rows->table, (long long)incise_rows_seq(rows), what,
+				path);
 }
 
 static int step_force(struct incise_cuts *cuts, int64_t *t_ns, int32_t *code,
 		      struct incise_error *err)
 {
-	sqlite3_stmt *stmt = cuts->force;
-	int rc = step(cuts, stmt, "force", &cuts->force_times, t_ns, err);
-	sqlite3_int64 value;
+	int rc = incise_rows_next(&cuts->force, err);
+	int64_t value;
 
-	if (rc == 0 && cuts->force_rows != cuts->recording->meta.force)
-		return incise_error_set(err, EINVAL,
-					"%s: damaged: table force has %llu rows of %llu",
-					cuts->recording->path,
-					(unsigned long long)cuts->force_rows,
-					(unsigned long long)cuts->recording->meta.force);
 	if (rc <= 0)
 		return rc;
-	value = sqlite3_column_int64(stmt, 2);
-	if (sqlite3_column_type(stmt, 2) != SQLITE_INTEGER || value < 0 ||
-	    value > cuts->scale.top)
-		return bad_row(cuts, "force", stmt,
-			       "code is out of the converter's range", err);
+	value = incise_rows_int(&cuts->force, 2);
+	if (value < 0 || value > cuts->scale.top)
+		return bad_row(&cuts->force, "code is out of the converter's range", err);
 	*code = value;
-	if (!cuts->force_rows++)
+	*t_ns = cuts->force.t_ns;
+	if (cuts->force.n == 1)
 		cuts->first_ns = *t_ns;
 	cuts->last_ns = *t_ns;
 	return 1;
@@ -83,30 +57,24 @@ static int step_force(struct incise_cuts *cuts, int64_t *t_ns, int32_t *code,
 /* Move on to the next depth row, if there is one. */
 static int step_depth(struct incise_cuts *cuts, struct incise_error *err)
 {
-	sqlite3_stmt *stmt = cuts->depth;
 	struct incise_cut_depth next;
-	int rc = step(cuts, stmt, "depth", &cuts->depth_times, &next.t_ns, err);
+	int rc = incise_rows_next(&cuts->depth, err);
 
 	cuts->before = cuts->after;
 	cuts->after.t_ns = INCISE_TIME_NONE;
-	if (rc == 0 && cuts->depth_rows != cuts->recording->meta.depth)
-		return incise_error_set(err, EINVAL,
-					"%s: damaged: table depth has %llu rows of %llu",
-					cuts->recording->path,
-					(unsigned long long)cuts->depth_rows,
-					(unsigned long long)cuts->recording->meta.depth);
 	if (rc <= 0)
 		return rc;
-	next.depth_mm = sqlite3_column_double(stmt, 2);
-	next.velocity_mm_s = sqlite3_column_double(stmt, 3);
+	next = (struct incise_cut_depth){
+		.t_ns = cuts->depth.t_ns,
+		.depth_mm = incise_rows_real(&cuts->depth, 2),
+		.velocity_mm_s = incise_rows_real(&cuts->depth, 3),
+	};
 	/* A rig is some metres wide; light is slow enough for the other bound. */
-	if (sqlite3_column_type(stmt, 2) != SQLITE_FLOAT || !(fabs(next.depth_mm) < 1e6))
-		return bad_row(cuts, "depth", stmt, "depth_mm is not a depth", err);
-	if (sqlite3_column_type(stmt, 3) != SQLITE_FLOAT ||
-	    !(next.velocity_mm_s >= 0 && next.velocity_mm_s < 1e12))
-		return bad_row(cuts, "depth", stmt, "velocity_mm_s is not a speed", err);
+	if (!(fabs(next.depth_mm) < 1e6))
+		return bad_row(&cuts->depth, "depth_mm is not a depth", err);
+	if (!(next.velocity_mm_s >= 0 && next.velocity_mm_s < 1e12))
+		return bad_row(&cuts->depth, "velocity_mm_s is not a speed", err);
 	cuts->after = next;
-	cuts->depth_rows++;
 	cuts->depth_max_mm = fmax(cuts->depth_max_mm, next.depth_mm);
 	return 1;
 }
@@ -115,15 +83,13 @@ void incise_cuts_calibrate(struct incise_cuts *cuts,
 			   const struct incise_calibration *calibration)
 {
 	incise_recording_force(cuts->recording, calibration, &cuts->scale);
-	incise_row_times_calibrate(&cuts->force_times, calibration);
-	incise_row_times_calibrate(&cuts->depth_times, calibration);
+	incise_row_times_calibrate(&cuts->force.times, calibration);
+	incise_row_times_calibrate(&cuts->depth.times, calibration);
 }
 
 int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recording,
 		     struct incise_error *err)
 {
-	sqlite3 *force = incise_recording_member(recording, "force")->db;
-	sqlite3 *depth = incise_recording_member(recording, "depth")->db;
 	int rc;
 
 	*cuts = (struct incise_cuts){
@@ -133,20 +99,12 @@ int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recordin
 		.depth_max_mm = -INFINITY,
 	};
 	incise_recording_force(recording, NULL, &cuts->scale);
-	if (sqlite3_prepare_v2(force, "SELECT seq, t_ns, code FROM force ORDER BY seq",
-			       -1, &cuts->force, NULL) != SQLITE_OK ||
-	    sqlite3_prepare_v2(
-		    depth,
-		    "SELECT seq, t_ns, depth_mm, velocity_mm_s FROM depth ORDER BY seq",
-		    -1, &cuts->depth, NULL) != SQLITE_OK) {
-		rc = incise_schema_fail(cuts->force ? depth : force, recording->path,
-					err);
-		incise_cuts_close(cuts);
-		return rc;
-	}
-	rc = incise_row_times_open(&cuts->force_times, recording, "force", err);
+	rc = incise_rows_open(&cuts->force, recording, "force", "seq, t_ns, code",
+			      recording->meta.force, err);
 	if (!rc)
-		rc = incise_row_times_open(&cuts->depth_times, recording, "depth", err);
+		rc = incise_rows_open(&cuts->depth, recording, "depth",
+				      "seq, t_ns, depth_mm, velocity_mm_s",
+				      recording->meta.depth, err);
 	if (rc)
 		incise_cuts_close(cuts);
 	return rc;
@@ -154,9 +112,8 @@ int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recordin
 
 void incise_cuts_close(struct incise_cuts *cuts)
 {
-	sqlite3_finalize(cuts->force);
-	sqlite3_finalize(cuts->depth);
-	cuts->force = cuts->depth = NULL;
+	incise_rows_close(&cuts->force);
+	incise_rows_close(&cuts->depth);
 }
 
 /* Depth and velocity at the time of a force sample; false if no row is near. */
@@ -180,7 +137,7 @@ int incise_cuts_next(struct incise_cuts *cuts, struct incise_cut_sample *sample,
 	int rc;
 
 	while ((rc = step_force(cuts, &sample->t_ns, &code, err)) > 0) {
-		while ((cuts->after.t_ns != INCISE_TIME_NONE || !cuts->depth_rows) &&
+		while ((cuts->after.t_ns != INCISE_TIME_NONE || !cuts->depth.n) &&
 		       cuts->after.t_ns <= sample->t_ns) {
 			rc = step_depth(cuts, err);
 			if (rc < 0)
@@ -207,48 +164,14 @@ int incise_cuts_next(struct incise_cuts *cuts, struct incise_cut_sample *sample,
 /* The rows of the tracker are checked here, because they are not exported. */
 static int check_tracker(struct incise_recording *rec, struct incise_error *err)
 {
-	sqlite3_stmt *stmt;
-	uint64_t rows = 0;
-	int64_t last_ns = -1;
-	int rc;
+	struct incise_rows rows;
+	int rc = incise_rows_open(&rows, rec, "tracker", "seq, t_ns", rec->meta.tracker,
+				  err);
 
-	rec = incise_recording_member(rec, "tracker");
-	if (sqlite3_prepare_v2(
-		    rec->db,
-		    "SELECT seq, t_ns, arrival_ns, status, x_mm, y_mm, z_mm, qw, qx, "
-		    "qy, qz FROM tracker ORDER BY seq",
-		    -1, &stmt, NULL) != SQLITE_OK)
-		return incise_schema_fail(rec->db, rec->path, err);
-	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW) {
-		bool good = sqlite3_column_type(stmt, 1) == SQLITE_INTEGER &&
-			    sqlite3_column_int64(stmt, 1) > last_ns &&
-			    sqlite3_column_type(stmt, 2) == SQLITE_INTEGER &&
-			    sqlite3_column_type(stmt, 3) == SQLITE_TEXT;
-
-		for (int i = 4; i < 11; i++)
-			good = good && sqlite3_column_type(stmt, i) == SQLITE_FLOAT &&
-			       isfinite(sqlite3_column_double(stmt, i));
-		if (!good) {
-			rc = incise_error_set(
-				err, EINVAL,
-				"%s: damaged: table tracker, row %lld is invalid",
-				rec->path, (long long)sqlite3_column_int64(stmt, 0));
-			goto out;
-		}
-		last_ns = sqlite3_column_int64(stmt, 1);
-		rows++;
-	}
-	if (rc != SQLITE_DONE)
-		rc = incise_schema_fail(rec->db, rec->path, err);
-	else if (rows != rec->meta.tracker)
-		rc = incise_error_set(err, EINVAL,
-				      "%s: damaged: table tracker has %llu rows of %llu",
-				      rec->path, (unsigned long long)rows,
-				      (unsigned long long)rec->meta.tracker);
-	else
-		rc = 0;
-out:
-	sqlite3_finalize(stmt);
+	rc = rc ? rc : 1;
+	while (rc > 0)
+		rc = incise_rows_next(&rows, err);
+	incise_rows_close(&rows);
 	return rc;
 }
 

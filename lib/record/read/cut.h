@@ -14,7 +14,6 @@
 
 #include <stdbool.h>
 #include <stdint.h>
-#include <sqlite3.h>
 #include <incise/calibration.h>
 #include "recording.h"
 #include "rows.h"
@@ -44,13 +43,11 @@ struct incise_cut_depth {
 
 struct incise_cuts {
 	struct incise_recording *recording;
-	sqlite3_stmt *force, *depth;
-	struct incise_row_times force_times, depth_times;
+	struct incise_rows force, depth;
 	struct incise_cut_count cut;
 	struct incise_cut_depth before, after; /* the force sample */
 	struct incise_recording_force scale;
 	int64_t first_ns, last_ns; /* force samples so far */
-	uint64_t force_rows, depth_rows;
 	double depth_max_mm; /* of all depth rows so far; -INFINITY before the first */
 };
 

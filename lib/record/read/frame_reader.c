@@ -10,9 +10,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include "../frames.h"
-#include "../schema.h"
 #include "recording.h"
 #include "session.h"
+#include "source.h"
 
 struct incise_frame_reader {
 	struct incise_recording *opened;
@@ -75,31 +75,35 @@ const char *incise_frame_reader_codec(const struct incise_frame_reader *reader)
 	return reader->file->codec;
 }
 
-/* The row nearest to a time: its own seq, time and number from 0. Rows before are counted once. */
+/* The row nearest to a time, the first of two: its own seq, time and number from 0. */
 static int find_row(struct incise_recording *recording, int64_t t_ns, uint64_t *seq,
 		    int64_t *row_ns, uint64_t *number, struct incise_error *err)
 {
-	sqlite3_stmt *stmt = NULL;
-	int rc;
+	struct incise_source source;
+	const struct incise_batch *batch = &source.batch;
+	uint64_t n = 0, least = 0;
+	int rc = incise_source_open(&source, recording, INCISE_LEDGER_CAMERA, err);
 
-	if (sqlite3_prepare_v2(recording->db,
-			       "SELECT seq, t_ns, (SELECT count(*) FROM frames "
-			       "WHERE frames.seq < near.seq) FROM (SELECT seq, t_ns "
-			       "FROM frames ORDER BY abs(t_ns - ?), seq LIMIT 1) AS near",
-			       -1, &stmt, NULL) != SQLITE_OK)
-		return incise_schema_fail(recording->db, recording->path, err);
-	sqlite3_bind_int64(stmt, 1, t_ns);
-	rc = sqlite3_step(stmt);
-	*seq = (uint64_t)sqlite3_column_int64(stmt, 0);
-	*row_ns = sqlite3_column_int64(stmt, 1);
-	*number = (uint64_t)sqlite3_column_int64(stmt, 2);
-	if (rc == SQLITE_ROW)
+	while (!rc && (rc = incise_source_next(&source, err)) > 0) {
+		for (size_t i = 0; i < batch->n; i++, n++) {
+			int64_t own_ns = batch->column[1].i[i];
+			uint64_t apart = own_ns > t_ns
+						 ? (uint64_t)own_ns - (uint64_t)t_ns
+						 : (uint64_t)t_ns - (uint64_t)own_ns;
+
+			if (n && apart >= least)
+				continue;
+			least = apart;
+			*seq = (uint64_t)batch->column[0].i[i];
+			*row_ns = own_ns;
+			*number = n;
+		}
 		rc = 0;
-	else if (rc == SQLITE_DONE)
-		rc = incise_error_set(err, ENODATA, "%s: has no frames", recording->path);
-	else
-		rc = incise_schema_fail(recording->db, recording->path, err);
-	sqlite3_finalize(stmt);
+	}
+	incise_source_close(&source);
+	if (!rc && !n)
+		return incise_error_set(err, ENODATA, "%s: has no frames",
+					recording->path);
 	return rc;
 }
 

@@ -16,10 +16,8 @@
 #include <unistd.h>
 #include <incise/infile.h>
 #include <incise/outfile.h>
-#include "../../base/vector.h"
 #include "../../learn/sha256.h"
 #include "../schema.h"
-#include "depth.h"
 #include "recalibration.h"
 #include "session.h"
 
@@ -190,75 +188,6 @@ int incise_recalibrations(const char *path, struct incise_recalibration **list,
 
 /* --- reading by the active one -------------------------------------------------------- */
 
-/* The tip of each pose in table depth, which has the usable ones. */
-#define POSES                                                             \
-	"SELECT depth.seq, depth.t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz " \
-	"FROM main.depth AS depth CROSS JOIN main.tracker AS tracker "    \
-	"USING (seq) ORDER BY depth.seq"
-
-static bool put_depth(sqlite3_stmt *insert, const struct incise_depth_row *row)
-{
-	sqlite3_bind_int64(insert, 1, row->seq);
-	sqlite3_bind_int64(insert, 2, row->t_ns);
-	sqlite3_bind_double(insert, 3, row->depth_mm);
-	sqlite3_bind_double(insert, 4, row->velocity_mm_s);
-	return sqlite3_step(insert) == SQLITE_DONE && sqlite3_reset(insert) == SQLITE_OK;
-}
-
-/* As the recorder did it: see write_tracker() there. Returns an SQLite code. */
-static int compute_depth(sqlite3_stmt *poses, sqlite3_stmt *insert,
-			 const struct incise_recording_info *meta, const double tip_mm[3])
-{
-	struct incise_depth depth;
-	struct incise_depth_row row;
-	int rc;
-
-	incise_depth_init(&depth, meta->surface_point_mm, meta->surface_normal);
-	while ((rc = sqlite3_step(poses)) == SQLITE_ROW) {
-		double position_mm[3], q[4], arm_mm[3];
-
-		for (int i = 0; i < 3; i++)
-			position_mm[i] = sqlite3_column_double(poses, 2 + i);
-		for (int i = 0; i < 4; i++)
-			q[i] = sqlite3_column_double(poses, 5 + i);
-		v3_rotate(arm_mm, q, tip_mm);
-		v3_add(position_mm, position_mm, 1, arm_mm);
-		if (incise_depth_push(&depth, sqlite3_column_int64(poses, 0),
-				      sqlite3_column_int64(poses, 1), position_mm,
-				      &row) &&
-		    !put_depth(insert, &row))
-			return SQLITE_ERROR;
-	}
-	while (rc == SQLITE_DONE && incise_depth_flush(&depth, &row))
-		if (!put_depth(insert, &row))
-			return SQLITE_ERROR;
-	return rc;
-}
-
-/* Returns 0 or -errno. */
-static int move_depth(struct incise_recording *rec, const double tip_mm[3],
-		      struct incise_error *err)
-{
-	sqlite3_stmt *poses = NULL, *insert = NULL;
-	int rc;
-
-	if (sqlite3_exec(rec->db,
-			 "CREATE TEMP TABLE depth(seq INTEGER PRIMARY KEY, "
-			 "t_ns INTEGER NOT NULL, depth_mm REAL NOT NULL, "
-			 "velocity_mm_s REAL NOT NULL)",
-			 NULL, NULL, NULL) != SQLITE_OK ||
-	    sqlite3_prepare_v2(rec->db, POSES, -1, &poses, NULL) != SQLITE_OK ||
-	    sqlite3_prepare_v2(rec->db, "INSERT INTO temp.depth VALUES(?, ?, ?, ?)", -1,
-			       &insert, NULL) != SQLITE_OK ||
-	    compute_depth(poses, insert, &rec->meta, tip_mm) != SQLITE_DONE)
-		rc = incise_schema_fail(rec->db, rec->path, err);
-	else
-		rc = 0;
-	sqlite3_finalize(poses);
-	sqlite3_finalize(insert);
-	return rc;
-}
-
 /* Returns 0 or -errno. */
 static int run(struct incise_recording *rec, char *sql, struct incise_error *err)
 {
@@ -284,6 +213,7 @@ static int put_number(struct incise_recording *rec, const char *key, double valu
 		   err);
 }
 
+/* Make table meta of this connection, which comes before that of recording.db. */
 static int put_meta(struct incise_recording *rec,
 		    const struct incise_calibration *calibration, const char *text,
 		    struct incise_error *err)
@@ -311,29 +241,6 @@ static int put_meta(struct incise_recording *rec,
 
 	for (size_t i = 0; i < sizeof(numbers) / sizeof(*numbers) && !rc; i++)
 		rc = put_number(rec, numbers[i].key, numbers[i].value, err);
-	return rc;
-}
-
-/* Make tables of this connection, which come before those of recording.db. */
-static int put_tables(struct incise_recording *rec,
-		      const struct incise_calibration *calibration, const char *text,
-		      struct incise_error *err)
-{
-	const struct incise_recording_info *own = &rec->meta;
-	double scale = calibration->depth_mm_px / own->depth_mm_px;
-	int rc = put_meta(rec, calibration, text, err);
-
-	/* Depth is a difference of two lengths in pixels: linear in the scale. */
-	if (!rc && rec->form >= 2 && isfinite(scale) && scale != 1)
-		rc = run(rec,
-			 sqlite3_mprintf("CREATE TEMP VIEW frames AS SELECT seq, t_ns, "
-					 "arrival_ns, pts, bytes, crc, length_px, sd_px, "
-					 "depth_mm * %!.17g AS depth_mm, quality FROM "
-					 "main.frames",
-					 scale),
-			 err);
-	if (!rc && memcmp(calibration->tip_mm, own->tip_mm, sizeof(own->tip_mm)))
-		rc = move_depth(rec, calibration->tip_mm, err);
 	return rc;
 }
 
@@ -374,6 +281,10 @@ static int load(struct incise_recording *rec, struct incise_recalibrated *to,
 		to->calibration.force_mV_N = rec->meta.force_mV_N;
 		to->calibration.force_zero_mV = rec->meta.zero_mV;
 	}
+	/* Depth is a difference of two lengths in pixels: linear in the scale. */
+	to->depth_scale = to->calibration.depth_mm_px / rec->meta.depth_mm_px;
+	if (!isfinite(to->depth_scale))
+		to->depth_scale = 1;
 	return 0;
 }
 
@@ -394,7 +305,7 @@ int incise_recalibration_apply(struct incise_recording *rec, struct incise_error
 	text = read_text(rec->path, &rec->recalibrated->entry, err);
 	rc = text ? load(rec, rec->recalibrated, err) : -errno;
 	if (!rc)
-		rc = put_tables(rec, &rec->recalibrated->calibration, text, err);
+		rc = put_meta(rec, &rec->recalibrated->calibration, text, err);
 out:
 	free(text);
 	free(list);

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * The active calibration of a recording, applied to its tables; for lib/record only. Tables in
- * memory or in temporary files take the place of those of recording.db for this connection, so
- * that all readers agree:
+ * The active calibration of a recording, applied to what is read of it; for lib/record only, so that
+ * all readers agree:
  *
- *     meta      keys of the calibration           depth    from the poses, if the tip differs
- *     frames    depth in another scale
- *
- * Delays are no matter of tables: see incise_row_times_open().
+ *     meta      a temporary table of this connection, with the calibration's keys
+ *     depth     from the poses and the calibrated tip  ╮
+ *     frames    depth in another scale                 ╰ see source.h
+ *     times     less the delays: see incise_row_times_open()
  */
 #ifndef INCISE_RECALIBRATION_PRIVATE_H
 #define INCISE_RECALIBRATION_PRIVATE_H
@@ -24,7 +23,7 @@ struct incise_recalibrated {
 };
 
 /*
- * Find the active calibration, and apply it to the tables; rec->meta is that of the capture, and
+ * Find the active calibration, and apply it; rec->meta is that of the capture, and
  * is to be read again if rec->recalibrated is set. Returns 0 or -errno.
  */
 int incise_recalibration_apply(struct incise_recording *rec, struct incise_error *err);

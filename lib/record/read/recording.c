@@ -17,7 +17,7 @@
 #include "recalibration.h"
 #include "recording.h"
 #include "session.h"
-#include "../ledger.h"
+#include "source.h"
 #include "../schema.h"
 
 #define COUNT_MAX (1LL << 53)
@@ -576,29 +576,35 @@ static bool take_knot(sqlite3_stmt *stmt, const struct incise_timeline_knot *las
  * Numbers and arrivals of the tracker, up to a row that cannot be: its reader reports that.
  * *@rows is to be freed. Returns 0 or -ENOMEM.
  */
-static int read_arrivals(sqlite3_stmt *stmt, struct incise_fit_row **rows, size_t *n)
+static int read_arrivals(struct incise_source *source, struct incise_fit_row **rows,
+			 size_t *n)
 {
+	const struct incise_batch *batch = &source->batch;
 	size_t capacity = 0;
+	int rc;
 
-	while (sqlite3_step(stmt) == SQLITE_ROW) {
-		int64_t seq = sqlite3_column_int64(stmt, 0);
-		int64_t arrival_ns = sqlite3_column_int64(stmt, 1);
-
-		if (seq < 0 || arrival_ns < 0 || arrival_ns > TIME_MAX ||
-		    (*n && arrival_ns < (*rows)[*n - 1].arrival_ns))
-			return 0;
-		if (*n == capacity) {
+	while ((rc = incise_source_next(source, NULL)) > 0) {
+		if (*n + batch->n > capacity) {
 			struct incise_fit_row *more;
 
-			capacity = capacity ? 2 * capacity : 4096;
+			capacity = 2 * capacity + batch->n;
 			more = realloc(*rows, capacity * sizeof(**rows));
 			if (!more)
 				return -ENOMEM;
 			*rows = more;
 		}
-		(*rows)[(*n)++] = (struct incise_fit_row){(uint64_t)seq, arrival_ns};
+		for (size_t i = 0; i < batch->n; i++) {
+			int64_t seq = batch->column[0].i[i];
+			int64_t arrival_ns = batch->column[2].i[i];
+
+			if (seq < 0 || arrival_ns < 0 || arrival_ns > TIME_MAX ||
+			    (*n && arrival_ns < (*rows)[*n - 1].arrival_ns))
+				return 0;
+			(*rows)[(*n)++] =
+				(struct incise_fit_row){(uint64_t)seq, arrival_ns};
+		}
 	}
-	return 0;
+	return rc == -ENOMEM ? rc : 0;
 }
 
 /* Of the tracker's arrivals; 0: none, or not known. */
@@ -629,16 +635,16 @@ static int fit(struct incise_recording *rec, const struct incise_recording_line 
 		.grain_ns = grain_ns,
 	};
 	struct incise_fit_row *rows = NULL;
-	sqlite3_stmt *stmt;
+	struct incise_source source;
 	int64_t found;
 	size_t n = 0;
+	int rc;
 
-	if (sqlite3_prepare_v2(rec->db,
-			       "SELECT seq, arrival_ns FROM tracker ORDER BY seq", -1,
-			       &stmt, NULL) != SQLITE_OK)
-		return incise_schema_fail(rec->db, rec->path, err);
-	found = read_arrivals(stmt, &rows, &n);
-	sqlite3_finalize(stmt);
+	rc = incise_source_open(&source, rec, INCISE_LEDGER_TRACKER, err);
+	found = rc ? rc : read_arrivals(&source, &rows, &n);
+	incise_source_close(&source);
+	if (rc)
+		return rc;
 	if (!found)
 		found = incise_fit(&setup, rows, n, &rec->fit);
 	free(rows);

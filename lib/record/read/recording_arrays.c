@@ -29,12 +29,11 @@ struct array {
 
 /* Open a table, as rows.h, for elements of that size. To be ended in any case. */
 static int array_open(struct array *array, struct incise_recording *recording,
-		      const char *table, const char *columns, const char *types,
-		      size_t size, struct incise_error *err)
+		      const char *table, const char *columns, size_t size,
+		      struct incise_error *err)
 {
 	*array = (struct array){.size = size};
-	return incise_rows_open(&array->rows, recording, table, columns, types,
-				UINT64_MAX, err);
+	return incise_rows_open(&array->rows, recording, table, columns, UINT64_MAX, err);
 }
 
 /*
@@ -82,11 +81,11 @@ static int array_end(struct array *array, int rc)
 /* --- values and poses ---------------------------------------------------------------- */
 
 static const struct source {
-	const char *name, *table, *columns, *types;
+	const char *name, *table, *columns;
 } sources[] = {
-	{"force", "force", "seq, t_ns, code", "iii"},
-	{"depth", "depth", "seq, t_ns, depth_mm", "iir"},
-	{"camera", "frames", "seq, t_ns, depth_mm", "iin"},
+	{"force", "force", "seq, t_ns, code"},
+	{"depth", "depth", "seq, t_ns, depth_mm"},
+	{"camera", "frames", "seq, t_ns, depth_mm"},
 };
 
 static double force_of(const struct incise_recording_info *meta, int64_t code)
@@ -119,16 +118,14 @@ int incise_recording_values(struct incise_recording *recording, const char *name
 					name);
 	if (source == &sources[2] && recording->form < 2)
 		return 0;
-	rc = array_open(&array, recording, source->table, source->columns, source->types,
-			sizeof(*to), err);
+	rc = array_open(&array, recording, source->table, source->columns, sizeof(*to),
+			err);
 	while (!rc && (to = array_next(&array, &rc, err))) {
-		sqlite3_stmt *stmt = array.rows.stmt;
-
 		to->t_ns = array.rows.t_ns;
 		to->value = source == sources ? force_of(&recording->meta,
-							 sqlite3_column_int64(stmt, 2))
-					      : sqlite3_column_double(stmt, 2);
-		array.n += sqlite3_column_type(stmt, 2) != SQLITE_NULL;
+							 incise_rows_int(&array.rows, 2))
+					      : incise_rows_real(&array.rows, 2);
+		array.n += source == sources || !isnan(to->value);
 	}
 	rc = array_end(&array, rc);
 	*values = array.list;
@@ -142,21 +139,21 @@ int incise_recording_poses(struct incise_recording *recording,
 	struct incise_tracker_sample *to;
 	int rc = array_open(&array, recording, "tracker",
 			    "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status",
-			    "iirrrrrrrt", sizeof(*to), err);
+			    sizeof(*to), err);
 
 	while (!rc && (to = array_next(&array, &rc, err))) {
-		sqlite3_stmt *stmt = array.rows.stmt;
+		const struct incise_rows *rows = &array.rows;
 
 		*to = (struct incise_tracker_sample){
-			.t_ns = array.rows.t_ns,
-			.seq = (uint64_t)sqlite3_column_int64(stmt, 0),
-			.status = *(const char *)sqlite3_column_text(stmt, 9),
+			.t_ns = rows->t_ns,
+			.seq = (uint64_t)incise_rows_seq(rows),
+			.status = incise_rows_char(rows, 9),
 			.station = 1,
 		};
 		for (int i = 0; i < 3; i++)
-			to->position_mm[i] = sqlite3_column_double(stmt, 2 + i);
+			to->position_mm[i] = incise_rows_real(rows, 2 + i);
 		for (int i = 0; i < 4; i++)
-			to->quaternion[i] = sqlite3_column_double(stmt, 5 + i);
+			to->quaternion[i] = incise_rows_real(rows, 5 + i);
 		array.n++;
 	}
 	rc = array_end(&array, rc);
@@ -196,8 +193,8 @@ static int next_depth(struct lengths *l, struct incise_error *err)
 	l->deep[0] = l->deep[1];
 	l->deep[1] = (struct deep){
 		l->depth.t_ns,
-		sqlite3_column_double(l->depth.stmt, 2),
-		sqlite3_column_double(l->depth.stmt, 3),
+		incise_rows_real(&l->depth, 2),
+		incise_rows_real(&l->depth, 3),
 	};
 	l->n_deep += l->n_deep < 2;
 	return 1;
@@ -209,14 +206,14 @@ static int read_lengths(struct lengths *l, struct incise_error *err)
 	int rc, more = 1;
 
 	while ((row = array_next(&l->frames, &rc, err))) {
-		sqlite3_stmt *stmt = l->frames.rows.stmt;
+		const struct incise_rows *rows = &l->frames.rows;
 		const struct deep *deep = l->deep;
-		double part;
+		double quality = incise_rows_real(rows, 3), part;
 
 		*row = (struct incise_recording_length){
-			.t_ns = l->frames.rows.t_ns,
-			.length_px = sqlite3_column_double(stmt, 2),
-			.quality = sqlite3_column_double(stmt, 3),
+			.t_ns = rows->t_ns,
+			.length_px = incise_rows_real(rows, 2),
+			.quality = isnan(quality) ? 0 : quality,
 		};
 		while (more > 0 && (l->n_deep < 2 || deep[1].t_ns < row->t_ns))
 			more = next_depth(l, err);
@@ -250,12 +247,11 @@ int incise_recording_lengths(struct incise_recording *recording,
 		return incise_error_set(err, EINVAL,
 					"%s: has an older format, without frames",
 					recording->path);
-	rc = array_open(&l.frames, recording, "frames",
-			"seq, t_ns, ifnull(length_px, 0.0), ifnull(quality, 0.0)", "iirr",
+	rc = array_open(&l.frames, recording, "frames", "seq, t_ns, length_px, quality",
 			sizeof(**lengths), err);
 	if (!rc)
 		rc = incise_rows_open(&l.depth, recording, "depth",
-				      "seq, t_ns, depth_mm, velocity_mm_s", "iirr",
+				      "seq, t_ns, depth_mm, velocity_mm_s",
 				      recording->meta.depth, err);
 	if (!rc)
 		rc = read_lengths(&l, err);
@@ -301,7 +297,6 @@ static void find_axes(struct pairs *p)
 static int seek(struct pairs *p, int64_t t_ns, struct incise_error *err)
 {
 	while (p->after.t_ns < t_ns) {
-		sqlite3_stmt *stmt = p->tracker.stmt;
 		double q[4], arm_mm[3];
 		int rc = incise_rows_next(&p->tracker, err);
 
@@ -310,9 +305,9 @@ static int seek(struct pairs *p, int64_t t_ns, struct incise_error *err)
 		p->before = p->after;
 		p->after.t_ns = p->tracker.t_ns;
 		for (int i = 0; i < 3; i++)
-			p->after.position_mm[i] = sqlite3_column_double(stmt, 2 + i);
+			p->after.position_mm[i] = incise_rows_real(&p->tracker, 2 + i);
 		for (int i = 0; i < 4; i++)
-			q[i] = sqlite3_column_double(stmt, 5 + i);
+			q[i] = incise_rows_real(&p->tracker, 5 + i);
 		v3_rotate(arm_mm, q, p->recording->meta.tip_mm);
 		v3_add(p->after.position_mm, p->after.position_mm, 1, arm_mm);
 	}
@@ -348,14 +343,14 @@ static int read_pairs(struct pairs *p, struct incise_error *err)
 	int rc;
 
 	while ((pair = array_next(&p->frames, &rc, err))) {
-		sqlite3_stmt *stmt = p->frames.rows.stmt;
+		const struct incise_rows *rows = &p->frames.rows;
 
 		*pair = (struct incise_depth_pair){
-			.t_ns = p->frames.rows.t_ns,
-			.camera_mm = sqlite3_column_double(stmt, 2),
+			.t_ns = rows->t_ns,
+			.camera_mm = incise_rows_real(rows, 2),
 		};
-		if (pair->camera_mm < PAIR_DEPTH_MM ||
-		    sqlite3_column_double(stmt, 3) < PAIR_QUALITY)
+		if (!(pair->camera_mm >= PAIR_DEPTH_MM) ||
+		    !(incise_rows_real(rows, 3) >= PAIR_QUALITY))
 			continue;
 		rc = seek(p, pair->t_ns, err);
 		if (rc <= 0)
@@ -378,12 +373,11 @@ int incise_depth_pairs(struct incise_recording *recording,
 	incise_depth_init(&p.depth, info.surface_point_mm, info.surface_normal);
 	find_axes(&p);
 	rc = incise_rows_open(&p.tracker, recording, "tracker",
-			      "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz", "iirrrrrrr",
-			      info.tracker, err);
+			      "seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz", info.tracker,
+			      err);
 	if (!rc)
 		rc = array_open(&p.frames, recording, "frames",
-				"seq, t_ns, ifnull(depth_mm, 0.0), ifnull(quality, 0.0)",
-				"iirr", sizeof(**pairs), err);
+				"seq, t_ns, depth_mm, quality", sizeof(**pairs), err);
 	if (!rc)
 		rc = read_pairs(&p, err);
 	incise_rows_close(&p.tracker);

@@ -381,22 +381,12 @@ static int read_map(struct incise_session *session, int member, sqlite3 *db,
 bool incise_session_span(struct incise_recording *member, const char *table,
 			 int64_t *first_ns, int64_t *last_ns)
 {
-	sqlite3_stmt *stmt = NULL;
-	char sql[120];
-	bool any;
+	int64_t seq;
 
-	snprintf(
-		sql, sizeof(sql),
-		"SELECT (SELECT t_ns FROM %s ORDER BY seq LIMIT 1), (SELECT t_ns FROM %s "
-		"ORDER BY seq DESC LIMIT 1)",
-		table, table);
-	any = sqlite3_prepare_v2(member->db, sql, -1, &stmt, NULL) == SQLITE_OK &&
-	      sqlite3_step(stmt) == SQLITE_ROW &&
-	      sqlite3_column_type(stmt, 0) == SQLITE_INTEGER;
-	*first_ns = sqlite3_column_int64(stmt, 0);
-	*last_ns = sqlite3_column_int64(stmt, 1);
-	sqlite3_finalize(stmt);
-	return any && *first_ns >= 0 && *last_ns >= *first_ns && *last_ns <= TIME_MAX;
+	*first_ns = *last_ns = 0;
+	return incise_source_end(member, table, false, &seq, first_ns, NULL, NULL) > 0 &&
+	       incise_source_end(member, table, true, &seq, last_ns, NULL, NULL) > 0 &&
+	       *first_ns >= 0 && *last_ns >= *first_ns && *last_ns <= TIME_MAX;
 }
 
 /* Describe a member; the ones before it are described. */
@@ -658,21 +648,23 @@ static int copy_events(struct incise_session *session, int at, sqlite3_stmt *ins
 	struct incise_recording *member = session->members[at];
 	struct incise_rows rows;
 	int rc = incise_rows_open(&rows, member, "events", "rowid, t_ns, kind, text",
-				  "iitt", UINT64_MAX, err);
+				  UINT64_MAX, err);
 
 	while (!rc && (rc = incise_rows_next(&rows, err)) > 0) {
+		size_t n;
+		const char *kind = incise_rows_text(&rows, 2, &n);
 		char *text;
 
 		rc = 0;
 		if (asprintf(&text, "%s: %s", session->info[at].name,
-			     (const char *)sqlite3_column_text(rows.stmt, 3)) < 0) {
+			     incise_rows_text(&rows, 3, NULL)) < 0) {
 			rc = incise_error_set(err, ENOMEM, "%s: out of memory",
 					      member->path);
 			break;
 		}
 		sqlite3_reset(insert);
 		sqlite3_bind_int64(insert, 1, rows.t_ns); /* mapped */
-		sqlite3_bind_value(insert, 2, sqlite3_column_value(rows.stmt, 2));
+		sqlite3_bind_text(insert, 2, kind, (int)n, SQLITE_TRANSIENT);
 		sqlite3_bind_text(insert, 3, text, -1, SQLITE_TRANSIENT);
 		if (sqlite3_step(insert) != SQLITE_DONE)
 			rc = incise_error_set(err, ENOMEM, "%s: out of memory",

@@ -8,7 +8,6 @@
 #include <string.h>
 #include "../read/session.h"
 #include "replay_source.h"
-#include "../schema.h"
 
 /* Longer than any recording; a replay in real time would wait for a forged time. */
 #define SPAN_MAX_NS 1000000000000000LL
@@ -26,11 +25,11 @@ static int damaged(const struct incise_replay_stream *s, const char *what,
 		   struct incise_error *err)
 {
 	return incise_error_set(err, EINVAL,
-				"%s: damaged: table %s, row %lld: %s; `sqlite3 %s/%s` "
-				"shows it",
+				"%s: damaged: table %s, row %lld: %s; `incise verify "
+				"%s` lists what is damaged",
 				s->rows.recording->path, s->rows.table,
-				(long long)sqlite3_column_int64(s->rows.stmt, 0), what,
-				s->rows.recording->path, INCISE_SCHEMA_DB);
+				(long long)incise_rows_seq(&s->rows), what,
+				s->rows.recording->path);
 }
 
 /* Go to the next row: 1, 0 at the end, -errno. */
@@ -41,7 +40,7 @@ static int step(struct incise_replay_stream *s, struct incise_error *err)
 
 	if (rc <= 0)
 		return rc;
-	seq = sqlite3_column_int64(s->rows.stmt, 0);
+	seq = incise_rows_seq(&s->rows);
 	if (seq < 0 || seq > COUNT_MAX)
 		return damaged(s, "seq is not a count", err);
 	s->t_ns = s->rows.t_ns;
@@ -56,7 +55,7 @@ static int step_force(struct incise_replay_source *source, struct incise_error *
 
 	if (rc <= 0)
 		return rc;
-	code = sqlite3_column_int64(s->rows.stmt, 2);
+	code = incise_rows_int(&s->rows, 2);
 	if (code < 0 || code > source->scale.top)
 		return damaged(s, "code is out of the converter's range", err);
 	return 1;
@@ -84,7 +83,7 @@ static int step_pose(struct incise_replay_source *source, struct incise_error *e
 		return rc;
 	if (source->at == INCISE_REPLAY_ACQUISITION)
 		return 1;
-	s->t_ns = on_clock(s, sqlite3_column_int64(s->rows.stmt, ARRIVAL));
+	s->t_ns = on_clock(s, incise_rows_int(&s->rows, ARRIVAL));
 	/* The clock does not run back; a pose from far ahead would delay all behind it. */
 	if (s->t_ns < before_ns)
 		return damaged(s, "arrival_ns decreases", err);
@@ -101,7 +100,7 @@ static int step_depth(struct incise_replay_source *source, struct incise_error *
 	if (rc > 0)
 		source->deep[1] = (struct incise_cut_depth){
 			.t_ns = s->t_ns,
-			.depth_mm = sqlite3_column_double(s->rows.stmt, 2),
+			.depth_mm = incise_rows_real(&s->rows, 2),
 		};
 	return rc;
 }
@@ -146,58 +145,42 @@ static int read_info(struct incise_replay_source *source, struct incise_error *e
 static int open_streams(struct incise_replay_source *source, struct incise_error *err)
 {
 	struct incise_recording *recording = source->recording;
-	/* Form 1 has no stations. */
-	const char *poses = recording->form > 1
-				    ? "seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, "
-				      "qy, qz, status, station, button"
-				    : "seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, "
-				      "qy, qz, status, 1, 0";
-	int rc = incise_rows_open(&source->tracker.rows, recording, "tracker", poses,
-				  "iiirrrrrrrtii", recording->meta.tracker, err);
+	int rc = incise_rows_open(&source->tracker.rows, recording, "tracker",
+				  "seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, qy, "
+				  "qz, status, station, button",
+				  recording->meta.tracker, err);
 
 	if (!rc)
 		rc = incise_rows_open(&source->force.rows, recording, "force",
-				      "seq, t_ns, code", "iii", recording->meta.force,
-				      err);
+				      "seq, t_ns, code", recording->meta.force, err);
 	if (!rc)
 		rc = incise_rows_open(&source->depth.rows, recording, "depth",
-				      "seq, t_ns, depth_mm, velocity_mm_s", "iirr",
+				      "seq, t_ns, depth_mm, velocity_mm_s",
 				      recording->meta.depth, err);
 	return rc;
 }
 
 /* Time of the last row, if there is one; the row is checked when it is read. */
-static int find_last(struct incise_replay_source *source, const char *table,
-		     const struct incise_replay_stream *s, const char *column,
+static int find_last(struct incise_replay_source *source,
+		     const struct incise_replay_stream *s, bool arrival,
 		     struct incise_error *err)
 {
-	struct incise_recording *recording =
-		incise_recording_member(source->recording, table);
-	bool best = strcmp(column, "arrival_ns") != 0;
-	sqlite3_stmt *stmt;
-	char sql[100];
-	int64_t t_ns;
+	int64_t seq, t_ns, arrival_ns;
+	int rc = incise_source_end(s->rows.recording, s->rows.table, true, &seq, &t_ns,
+				   &arrival_ns, err);
 
-	snprintf(sql, sizeof(sql), "SELECT seq, %s FROM %s ORDER BY seq DESC LIMIT 1",
-		 column, table);
-	if (sqlite3_prepare_v2(recording->db, sql, -1, &stmt, NULL) != SQLITE_OK)
-		return incise_schema_fail(recording->db, recording->path, err);
-	if (sqlite3_step(stmt) == SQLITE_ROW) {
-		t_ns = sqlite3_column_int64(stmt, 1);
-		if (best)
-			t_ns = incise_recording_time(&s->rows.times.line,
-						     sqlite3_column_int64(stmt, 0), t_ns);
-		t_ns = on_clock(s, t_ns);
-		if (t_ns > source->last_ns)
-			source->last_ns = t_ns;
-	}
-	sqlite3_finalize(stmt);
+	if (rc <= 0)
+		return rc;
+	t_ns = on_clock(s,
+			arrival ? arrival_ns
+				: incise_recording_time(&s->rows.times.line, seq, t_ns));
+	if (t_ns > source->last_ns)
+		source->last_ns = t_ns;
 	return 0;
 }
 
 static int find_span(struct incise_replay_source *source, struct incise_error *err)
 {
-	bool arrival = source->at == INCISE_REPLAY_ARRIVAL;
 	const char *path = source->recording->path;
 	int rc;
 
@@ -210,10 +193,10 @@ static int find_span(struct incise_replay_source *source, struct incise_error *e
 	source->first_ns = source->tracker.t_ns < source->origin_ns ? source->tracker.t_ns
 								    : source->origin_ns;
 	source->last_ns = source->first_ns;
-	rc = find_last(source, "tracker", &source->tracker,
-		       arrival ? "arrival_ns" : "t_ns", err);
+	rc = find_last(source, &source->tracker, source->at == INCISE_REPLAY_ARRIVAL,
+		       err);
 	if (!rc)
-		rc = find_last(source, "force", &source->force, "t_ns", err);
+		rc = find_last(source, &source->force, false, err);
 	if (rc)
 		return rc;
 	/* The difference of the two could be too large for its type. */
@@ -274,19 +257,19 @@ void incise_replay_source_close(struct incise_replay_source *source)
 static void take_pose(const struct incise_replay_stream *s,
 		      struct incise_tracker_sample *pose)
 {
-	sqlite3_stmt *stmt = s->rows.stmt;
+	const struct incise_rows *rows = &s->rows;
 
 	*pose = (struct incise_tracker_sample){
 		.t_ns = s->t_ns,
-		.seq = sqlite3_column_int64(stmt, 0),
-		.status = *(const char *)sqlite3_column_text(stmt, STATUS),
-		.station = sqlite3_column_int(stmt, STATION),
-		.button = sqlite3_column_int(stmt, BUTTON),
+		.seq = incise_rows_seq(rows),
+		.status = incise_rows_char(rows, STATUS),
+		.station = incise_rows_int(rows, STATION),
+		.button = incise_rows_int(rows, BUTTON),
 	};
 	for (int i = 0; i < 3; i++)
-		pose->position_mm[i] = sqlite3_column_double(stmt, POSITION + i);
+		pose->position_mm[i] = incise_rows_real(rows, POSITION + i);
 	for (int i = 0; i < 4; i++)
-		pose->quaternion[i] = sqlite3_column_double(stmt, QUATERNION + i);
+		pose->quaternion[i] = incise_rows_real(rows, QUATERNION + i);
 }
 
 int incise_replay_source_poses(struct incise_replay_source *source, int64_t t_ns,
@@ -315,7 +298,7 @@ static int average(struct incise_replay_source *source, int64_t t_ns, int64_t pe
 	int n = 0, rc = 0;
 
 	while (rc >= 0 && s->rows.live && s->t_ns < end_ns) {
-		int32_t code = sqlite3_column_int(s->rows.stmt, 2);
+		int32_t code = incise_rows_int(&s->rows, 2);
 
 		if (s->t_ns >= from_ns) {
 			sum += code;

@@ -11,7 +11,7 @@
 #include <incise/outfile.h>
 #include "../../../lib/record/export/table_writer.h"
 
-static const struct incise_column columns[] = {
+static const struct incise_table_column columns[] = {
 	{"cut", "1", "a name", INCISE_COLUMN_NAME, 0, NULL, NULL},
 	{"t_s", "s", "a time", INCISE_COLUMN_REAL, 6, NULL, NULL},
 	{"force_N", "N", "a force", INCISE_COLUMN_SINGLE, 5, NULL, NULL},

@@ -7,7 +7,7 @@
 #include "../../../lib/base/random.h"
 #include "../../../lib/record/export/table_writer.h"
 
-static const struct incise_column columns[] = {
+static const struct incise_table_column columns[] = {
 	{"name", "1", "a name", INCISE_COLUMN_NAME, 0, NULL, NULL},
 	{"fixed", "mm", "a real", INCISE_COLUMN_REAL, 4, NULL, NULL},
 	{"micro", "s", "a real", INCISE_COLUMN_SINGLE, 6, NULL, NULL},

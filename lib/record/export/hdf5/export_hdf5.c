@@ -87,7 +87,7 @@ static hid_t stored_type(enum incise_column_type type)
 /* Uncertainties in the style of the CF conventions. */
 static int put_uncertainties(hid_t set, const struct incise_table *table, int i)
 {
-	const struct incise_column *column = &table->columns[i];
+	const struct incise_table_column *column = &table->columns[i];
 	char *names = incise_column_uncertainties(table->columns, table->n_columns, i);
 	int rc = 0;
 
@@ -105,7 +105,7 @@ static int put_uncertainties(hid_t set, const struct incise_table *table, int i)
 
 static hid_t make_column(hid_t file, const struct incise_table *table, int i)
 {
-	const struct incise_column *column = &table->columns[i];
+	const struct incise_table_column *column = &table->columns[i];
 	hsize_t none = 0, most = H5S_UNLIMITED, chunk = INCISE_TABLE_BLOCK;
 	hid_t space = H5Screate_simple(1, &none, &most);
 	hid_t how = H5Pcreate(H5P_DATASET_CREATE);
@@ -297,7 +297,7 @@ static int hdf5_rows(struct incise_table *table, struct incise_error *err)
 }
 
 /* Write the texts of a column of names. */
-static int put_names(struct incise_table *table, const struct incise_column *column)
+static int put_names(struct incise_table *table, const struct incise_table_column *column)
 {
 	struct hdf5 *hdf5 = table->state;
 	hsize_t n = table->n_names;
