@@ -13,6 +13,7 @@
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include "../batch.h"
 #include "verify.h"
 
@@ -29,7 +30,8 @@ struct walk {
 
 	struct incise_ledger_row row; /* next, where has_row */
 	bool has_row, good_row;
-	bool known; /* last_seq and last_ns: of a row, or of the ledger's start */
+	bool known;   /* last_seq and last_ns: of a row, or of the ledger's start */
+	bool follows; /* the block before was as it was written */
 	int64_t last_seq, last_ns;
 
 	struct incise_ledger
@@ -443,37 +445,54 @@ static uint64_t take_numbers(struct walk *walk, const struct incise_batch *batch
 	return missing;
 }
 
+/* The data of a block are those of its CRC, and of its digest, which the seal takes as it is. */
+static bool has_data(struct walk *walk, const struct incise_ledger_block *block,
+		     const void **data, size_t *size)
+{
+	struct incise_verification *verify = walk->verify;
+	const uint8_t *named = incise_ledger_digest(walk->blocks);
+	uint8_t digest[INCISE_SEAL_BYTES];
+
+	if (!incise_ledger_data(walk->blocks, block, data, size) || !named)
+		return false;
+	if (!verify->hashed)
+		return true;
+	incise_seal_data(&verify->rows_seal, walk->stream, block, *data, *size, digest);
+	return !memcmp(named, digest, sizeof(digest));
+}
+
 /* Compare a block with its fields, and with the one before. Returns 0 or -ECANCELED. */
 static int take_data(struct walk *walk, struct incise_batch *batch,
 		     const struct incise_ledger_block *block, bool good)
 {
-	const bool follows = block->block == walk->next && !walk->out->altered;
-	const uint64_t rows = walk->verify->rows_done / REPORT_ROWS;
-	uint64_t missing = 0;
+	struct incise_verification *verify = walk->verify;
+	const uint64_t rows = verify->rows_done / REPORT_ROWS;
+	/* Behind one that is missing or altered the number before is not known. */
+	const bool follows = block->block == walk->next && walk->follows;
 	const void *data;
 	size_t size;
 
 	batch->n = 0;
-	good &= incise_ledger_data(walk->blocks, block, &data, &size);
+	good &= has_data(walk, block, &data, &size);
 	if (block->count) {
-		good = !incise_batch_decode(batch, block, data, size) && good;
-		/* Behind a block that is missing or altered the number before is not known. */
-		missing = take_numbers(walk, batch);
-		good &= !follows || missing == (uint64_t)block->lost;
-		/* Its rows are altered, not lost. */
-		walk->known &= batch->n > 0;
-		if (!batch->n)
-			walk->last_seq = block->last_seq;
+		good &= !incise_batch_decode(batch, block, data, size);
+		good &= take_numbers(walk, batch) == (uint64_t)block->lost || !follows;
+	}
+	/* Rows that cannot be read are altered, not lost. */
+	if (block->count && !batch->n) {
+		walk->known = false;
+		walk->last_seq = block->last_seq;
 	}
 	walk->next = block->block + 1;
+	walk->follows = good;
 	if (good)
 		flush_altered(walk);
 	else
 		add_altered(walk, block, batch->n);
-	walk->verify->rows_done += batch->n;
-	return walk->verify->rows_done / REPORT_ROWS == rows
+	verify->rows_done += batch->n;
+	return verify->rows_done / REPORT_ROWS == rows
 		       ? 0
-		       : incise_verify_progress(walk->verify, false);
+		       : incise_verify_progress(verify, false);
 }
 
 static int walk_through_blocks(struct walk *walk)
@@ -483,6 +502,8 @@ static int walk_through_blocks(struct walk *walk)
 	int64_t end_seq = INT64_MIN;
 	bool ended = false;
 	int rc = 0, step = 0;
+
+	walk->follows = true;
 
 	while (!rc && (step = step_block(walk)) > 0) {
 		bool good = read_block(walk, &block);
