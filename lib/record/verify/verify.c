@@ -414,8 +414,8 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 		goto out;
 	}
 	report->interrupted = !verify.recording->meta.complete;
-	verify.hashed =
-		verify.recording->form == 4 && !incise_seal_init(&verify.rows_seal, 4);
+	verify.hashed = verify.recording->form >= 4 &&
+			!incise_seal_init(&verify.rows_seal, verify.recording->form);
 	verify.origin_ns =
 		ask(&verify, 0,
 		    "SELECT min(first_ns) FROM %s WHERE count > 0 AND stream IN (" RIG
