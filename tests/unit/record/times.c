@@ -249,15 +249,14 @@ static void measure(struct errors *out)
 	*out = (struct errors){0};
 	succeeds(recording &&
 		 !incise_rows_open(&rows, recording, "tracker", "seq, t_ns, x_mm, y_mm",
-				   "iirr", recording->meta.tracker, &err));
+				   recording->meta.tracker, &err));
 	while ((rc = incise_rows_next(&rows, &err)) > 0) {
-		double position_mm[3] = {sqlite3_column_double(rows.stmt, 2),
-					 sqlite3_column_double(rows.stmt, 3)};
+		double position_mm[3] = {incise_rows_real(&rows, 2),
+					 incise_rows_real(&rows, 3)};
 		int i = number_of(position_mm);
 		double error_ms = fabs((double)(rows.t_ns - device.truth_ns[i])) * 1e-6;
 		double sd_ms =
-			1e3 * incise_row_times_sd(&rows.times,
-						  sqlite3_column_int64(rows.stmt, 0));
+			1e3 * incise_row_times_sd(&rows.times, incise_rows_seq(&rows));
 
 		assert_true(i >= 0 && i < device.n && !device.lost[i]);
 		out->rows++;
