@@ -217,6 +217,19 @@ static void rows_store_block(sqlite3 *db, const struct incise_batch *batch,
 	free(data);
 }
 
+/* A stream without rows gets a block for those that are new, before its end if it has one. */
+static void rows_add_block(sqlite3 *db, const struct incise_ledger_form *form)
+{
+	char sql[400];
+
+	snprintf(sql, sizeof(sql),
+		 "UPDATE blocks SET block = block + 1 WHERE stream = '%s'; "
+		 "INSERT INTO blocks SELECT '%s', 0, 0, 0, 0, 0, 1, 0, 0, zeroblob(32), "
+		 "zeroblob(0) WHERE EXISTS(SELECT 1 FROM temp.%s)",
+		 form->stream, form->stream, form->table);
+	sqlite3_exec(db, sql, NULL, NULL, NULL);
+}
+
 /* Each block takes the rows up to its last number; the last one those behind it too. */
 static void rows_store(sqlite3 *db, const struct incise_ledger_form *form)
 {
@@ -227,9 +240,11 @@ static void rows_store(sqlite3 *db, const struct incise_ledger_form *form)
 	int64_t last = 0;
 
 	snprintf(sql, sizeof(sql),
-		 "SELECT max(block) FROM blocks WHERE stream = '%s' "
+		 "SELECT coalesce(max(block), -1) FROM blocks WHERE stream = '%s' "
 		 "AND count > 0",
 		 form->stream);
+	if (rows_number(db, sql) < 0)
+		rows_add_block(db, form);
 	last = rows_number(db, sql);
 	snprintf(sql, sizeof(sql), "SELECT %s FROM temp.%s ORDER BY seq", form->columns,
 		 form->table);
