@@ -229,8 +229,8 @@ void incise_ledger_add(struct incise_ledger *ledger, const struct incise_ledger_
 	ledger->open.crc = incise_crc32c(ledger->open.crc, row->bytes, row->n);
 }
 
-int incise_ledger_select(sqlite3 *db, int form, const char *stream, const char *order,
-			 sqlite3_stmt **stmt)
+int incise_ledger_select(sqlite3 *db, int form, const char *stream, int64_t from_seq,
+			 bool from_end, sqlite3_stmt **stmt)
 {
 	const bool blocks = form >= 5 && !strchr(stream, ':');
 	char sql[200];
@@ -238,12 +238,14 @@ int incise_ledger_select(sqlite3 *db, int form, const char *stream, const char *
 
 	snprintf(sql, sizeof(sql),
 		 "SELECT block, first_seq, last_seq, first_ns, last_ns, count, lost, "
-		 "crc%s WHERE stream = ? ORDER BY block %s",
-		 blocks ? ", sha256, data FROM blocks" : " FROM ledger", order);
+		 "crc%s WHERE stream = ? AND last_seq >= ? ORDER BY block%s",
+		 blocks ? ", sha256, data FROM blocks" : " FROM ledger",
+		 from_end ? " DESC" : "");
 	rc = sqlite3_prepare_v2(db, sql, -1, stmt, NULL);
-	if (rc == SQLITE_OK)
-		sqlite3_bind_text(*stmt, 1, stream, -1, SQLITE_STATIC);
-	return rc;
+	if (rc != SQLITE_OK)
+		return rc;
+	sqlite3_bind_text(*stmt, 1, stream, -1, SQLITE_STATIC);
+	return sqlite3_bind_int64(*stmt, 2, from_seq);
 }
 
 bool incise_ledger_block_read(struct incise_ledger_block *block, sqlite3_stmt *stmt)

@@ -113,11 +113,11 @@ void incise_ledger_close(struct incise_ledger *ledger, uint64_t lost,
 			 struct incise_ledger_block *block);
 
 /*
- * Select the entries of a stream, in this order ("" or "DESC"); of form 5 they are table blocks. Returns an
- * SQLite code.
+ * Select the entries of a stream that end at @from_seq or later, INT64_MIN: all, in order, or the last one
+ * first; of form 5 they are table blocks. Returns an SQLite code.
  */
-int incise_ledger_select(sqlite3 *db, int form, const char *stream, const char *order,
-			 sqlite3_stmt **stmt);
+int incise_ledger_select(sqlite3 *db, int form, const char *stream, int64_t from_seq,
+			 bool from_end, sqlite3_stmt **stmt);
 
 /* Read the entry of a row of that. False: a value is impossible in any entry. */
 bool incise_ledger_block_read(struct incise_ledger_block *block, sqlite3_stmt *stmt);

@@ -22,7 +22,7 @@ static const struct {
 	int first, last; /* forms that have it so */
 	const char *sql;
 } tables[] = {
-	{"meta", 1, 4, "CREATE TABLE meta(key TEXT PRIMARY KEY NOT NULL, value)"},
+	{"meta", 1, 5, "CREATE TABLE meta(key TEXT PRIMARY KEY NOT NULL, value)"},
 	{"force", 1, 4,
 	 "CREATE TABLE force(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
 	 "code INTEGER NOT NULL)"},
@@ -40,35 +40,41 @@ static const struct {
 	{"depth", 1, 4,
 	 "CREATE TABLE depth(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
 	 "depth_mm REAL NOT NULL, velocity_mm_s REAL NOT NULL)"},
-	{"events", 1, 4,
+	{"events", 1, 5,
 	 "CREATE TABLE events(t_ns INTEGER NOT NULL, kind TEXT NOT NULL, "
 	 "text TEXT NOT NULL)"},
 	{"frames", 2, 3, FRAMES ")"},
 	{"frames", 4, 4, FRAMES ", sha256 BLOB NOT NULL)"},
-	{"streams", 2, 4,
+	{"streams", 2, 5,
 	 "CREATE TABLE streams(name TEXT PRIMARY KEY NOT NULL, device TEXT NOT NULL, "
 	 "stamped INTEGER NOT NULL, nominal_hz REAL, delay_ns INTEGER NOT NULL, "
 	 "delay_sd_ns INTEGER, grain_ns INTEGER NOT NULL, rows INTEGER NOT NULL, "
 	 "lost INTEGER NOT NULL, late INTEGER NOT NULL, rate_hz REAL, drift_ppm REAL, "
 	 "drift_sd_ppm REAL, jitter_ns REAL, jitter_max_ns REAL, offset_ns REAL, "
 	 "offset_sd_ns REAL, ended TEXT)"},
-	{"knots", 2, 4,
+	{"knots", 2, 5,
 	 "CREATE TABLE knots(stream TEXT NOT NULL, knot INTEGER NOT NULL, "
 	 "seq INTEGER NOT NULL, t_ns INTEGER NOT NULL, sd_ns REAL NOT NULL, "
 	 "begins INTEGER NOT NULL, PRIMARY KEY(stream, knot)) WITHOUT ROWID"},
-	{"ledger", 2, 4,
+	{"ledger", 2, 5,
 	 "CREATE TABLE ledger(stream TEXT NOT NULL, block INTEGER NOT NULL, "
 	 "first_seq INTEGER NOT NULL, last_seq INTEGER NOT NULL, "
 	 "first_ns INTEGER NOT NULL, last_ns INTEGER NOT NULL, "
 	 "count INTEGER NOT NULL, lost INTEGER NOT NULL, crc INTEGER NOT NULL, "
 	 "PRIMARY KEY(stream, block)) WITHOUT ROWID"},
+	{"blocks", 5, 5,
+	 "CREATE TABLE blocks(stream TEXT NOT NULL, block INTEGER NOT NULL, "
+	 "first_seq INTEGER NOT NULL, last_seq INTEGER NOT NULL, "
+	 "first_ns INTEGER NOT NULL, last_ns INTEGER NOT NULL, "
+	 "count INTEGER NOT NULL, lost INTEGER NOT NULL, crc INTEGER NOT NULL, "
+	 "sha256 BLOB NOT NULL, data BLOB NOT NULL, PRIMARY KEY(stream, block))"},
 	{"wall", 3, 4,
 	 "CREATE TABLE wall(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
 	 "tai_ns INTEGER NOT NULL, uncertainty_ns REAL, rate_ppb REAL NOT NULL, "
 	 "rate_uncertainty_ppb REAL NOT NULL, utc_offset_s INTEGER NOT NULL, "
 	 "held INTEGER NOT NULL, source TEXT NOT NULL, reference TEXT NOT NULL, "
 	 "leap TEXT NOT NULL, restart TEXT NOT NULL)"},
-	{"seal", 4, 4,
+	{"seal", 4, 5,
 	 "CREATE TABLE seal(number INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "
 	 "force INTEGER NOT NULL, tracker INTEGER NOT NULL, camera INTEGER NOT NULL, "
 	 "wall INTEGER NOT NULL, head BLOB NOT NULL)"},

@@ -11,7 +11,7 @@
 
 #define INCISE_SCHEMA_DB "recording.db"	     /* inside the folder NAME.rec */
 #define INCISE_SCHEMA_APPLICATION 0x494e4349 /* "INCI", SQLite's application_id */
-#define INCISE_SCHEMA_VERSION 4		     /* SQLite's user_version */
+#define INCISE_SCHEMA_VERSION 5		     /* SQLite's user_version */
 
 /* Make the tables in an empty database. Returns an SQLite code. */
 int incise_schema_create(sqlite3 *db);
@@ -20,7 +20,7 @@ int incise_schema_create(sqlite3 *db);
  * Check that an opened database is a recording of this or an older version with the tables of
  * this library, and find its form. Form 1 has no ledger, streams and frames, and no station and
  * button of the tracker; forms 1 and 2 have no wall time; forms 1 to 3 have no seal, and no digest
- * of a frame. Returns 0, -EINVAL, or as incise_schema_fail().
+ * of a frame; forms 1 to 4 have a row a sample, form 5 blocks of them, and no depth. Returns 0, -EINVAL, or as incise_schema_fail().
  */
 int incise_schema_check(sqlite3 *db, const char *path, int *form,
 			struct incise_error *err);

@@ -8,7 +8,10 @@
 #include "seal_chain.h"
 #include "statement.h"
 
-#define GENESIS "incise seal 1\n"
+/* Of rows, and from form 5 on of blocks. */
+#define GENESIS(form) ((form) < 5 ? "incise seal 1\n" : "incise seal 2\n")
+/* From form 5 on there is no table depth. */
+#define NO_ROWS "SELECT 1 WHERE 0"
 
 /*
  * Table meta in four parts: the keys of START and CALIBRATION, those that are rewritten, and all
@@ -86,7 +89,9 @@ int incise_seal_table(const struct incise_seal *seal, sqlite3 *db,
 		      uint8_t digest[INCISE_SEAL_BYTES])
 {
 	const char *sql = meta_sql[part] ? meta_sql[part]
-					 : incise_ledger_sql(incise_seal_parts[part]);
+			  : part == INCISE_SEAL_DEPTH && seal->form >= 5
+				  ? NO_ROWS
+				  : incise_ledger_sql(incise_seal_parts[part]);
 	struct sink sink = {.digest = EVP_MD_CTX_new()};
 	int rc = SQLITE_NOMEM;
 
@@ -124,9 +129,9 @@ int incise_seal_file(const struct incise_seal *seal, int fd, int64_t length,
 
 /* --- the chain ------------------------------------------------------------------------ */
 
-int incise_seal_init(struct incise_seal *seal)
+int incise_seal_init(struct incise_seal *seal, int form)
 {
-	*seal = (struct incise_seal){0};
+	*seal = (struct incise_seal){.form = form};
 	seal->sha256 = EVP_MD_fetch(NULL, "SHA256", NULL);
 	if (!seal->sha256)
 		return -ENOTSUP;
@@ -164,7 +169,8 @@ int incise_seal_start(struct incise_seal *seal, sqlite3 *db)
 	int rc = SQLITE_OK;
 
 	start(seal, &seal->failed, seal->commit);
-	add(&seal->failed, seal->commit, GENESIS, strlen(GENESIS));
+	add(&seal->failed, seal->commit, GENESIS(seal->form),
+	    strlen(GENESIS(seal->form)));
 	for (int i = INCISE_SEAL_START; i < INCISE_SEAL_STREAM && rc == SQLITE_OK; i++) {
 		rc = incise_seal_table(seal, db, i, &rows, part);
 		add(&seal->failed, seal->commit, part, sizeof(part));
@@ -218,6 +224,16 @@ void incise_seal_rows_block(struct incise_seal *seal, int stream,
 	end(failed, rows, seal->chain[stream]);
 	start(seal, failed, rows);
 	seal->blocks[stream]++;
+}
+
+void incise_seal_data(struct incise_seal *seal, int stream,
+		      const struct incise_ledger_block *block, const void *data,
+		      size_t size, uint8_t digest[INCISE_SEAL_BYTES])
+{
+	add(&seal->failed, seal->rows[stream], data, size);
+	seal->n_rows[stream] += block->count;
+	incise_seal_rows(seal, stream, digest);
+	incise_seal_rows_block(seal, stream, block, digest);
 }
 
 int incise_seal_tables(struct incise_seal *seal, sqlite3 *db, int fd, int64_t length)

@@ -38,6 +38,7 @@ enum incise_seal_number {
 };
 
 struct incise_seal {
+	int form; /* of the recording's tables */
 	EVP_MD *sha256;
 	EVP_MD_CTX *rows[INCISE_LEDGER_FORMS]; /* of the open blocks */
 	EVP_MD_CTX *commit;		       /* of the open commit */
@@ -50,7 +51,7 @@ struct incise_seal {
 };
 
 /* Returns 0, -ENOMEM, or -ENOTSUP: a libcrypto without SHA-256. Free it in any case. */
-int incise_seal_init(struct incise_seal *seal);
+int incise_seal_init(struct incise_seal *seal, int form);
 void incise_seal_free(struct incise_seal *seal);
 
 /* The genesis: start the chain over the parts of table meta that are never rewritten. */
@@ -71,6 +72,11 @@ void incise_seal_rows(struct incise_seal *seal, int stream,
 void incise_seal_rows_block(struct incise_seal *seal, int stream,
 			    const struct incise_ledger_block *block,
 			    const uint8_t digest[INCISE_SEAL_BYTES]);
+
+/* A block of form 5, whose digest is that of its data. */
+void incise_seal_data(struct incise_seal *seal, int stream,
+		      const struct incise_ledger_block *block, const void *data,
+		      size_t size, uint8_t digest[INCISE_SEAL_BYTES]);
 
 /* The tables without blocks and camera.mkv (-1: none), before the last commit. SQLite's code. */
 int incise_seal_tables(struct incise_seal *seal, sqlite3 *db, int fd, int64_t length);

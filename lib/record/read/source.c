@@ -260,19 +260,18 @@ static int open_depth(struct incise_source *source, struct incise_error *err)
 
 /* --- any ------------------------------------------------------------------------------- */
 
-/* @from_end: the last rows first. */
-static int open_table(struct incise_source *source, bool from_end,
+/* From a number on, or @from_end: the last rows first. */
+static int open_table(struct incise_source *source, int64_t from_seq, bool from_end,
 		      struct incise_error *err)
 {
 	const struct incise_ledger_form *form = source->batch.form;
 	struct incise_recording *recording = source->recording;
-	const char *order = from_end ? "DESC" : "";
 	char sql[300];
 	int rc;
 
 	if (recording->form >= 5) {
 		rc = incise_ledger_select(recording->db, recording->form, form->stream,
-					  order, &source->stmt);
+					  from_seq, from_end, &source->stmt);
 	} else {
 		if (recording->form < (source->stream == INCISE_LEDGER_WALL	? 3
 				       : source->stream == INCISE_LEDGER_CAMERA ? 2
@@ -280,15 +279,26 @@ static int open_table(struct incise_source *source, bool from_end,
 			return incise_error_set(err, ENODATA,
 						"%s: has an older format, without %s",
 						recording->path, form->table);
-		snprintf(sql, sizeof(sql), "SELECT %s FROM %s ORDER BY seq %s",
-			 columns_of(source->stream, recording->form), form->table, order);
+		snprintf(sql, sizeof(sql),
+			 "SELECT %s FROM %s WHERE seq >= ? ORDER BY seq%s",
+			 columns_of(source->stream, recording->form), form->table,
+			 from_end ? " DESC" : "");
 		rc = sqlite3_prepare_v2(recording->db, sql, -1, &source->stmt, NULL);
+		if (rc == SQLITE_OK)
+			rc = sqlite3_bind_int64(source->stmt, 1, from_seq);
 	}
 	return rc == SQLITE_OK ? 0 : fail(source, err);
 }
 
 int incise_source_open(struct incise_source *source, struct incise_recording *recording,
 		       int stream, struct incise_error *err)
+{
+	return incise_source_open_at(source, recording, stream, INT64_MIN, err);
+}
+
+int incise_source_open_at(struct incise_source *source,
+			  struct incise_recording *recording, int stream,
+			  int64_t from_seq, struct incise_error *err)
 {
 	const struct incise_ledger_form *form = incise_source_form(stream);
 
@@ -302,7 +312,7 @@ int incise_source_open(struct incise_source *source, struct incise_recording *re
 						 : 1,
 	};
 	return stream == INCISE_SOURCE_DEPTH ? open_depth(source, err)
-					     : open_table(source, false, err);
+					     : open_table(source, from_seq, false, err);
 }
 
 int incise_source_next(struct incise_source *source, struct incise_error *err)
@@ -347,7 +357,7 @@ int incise_source_end(struct incise_recording *recording, const char *table, boo
 		.rows_max = 1,
 		.scale = 1,
 	};
-	rc = open_table(&source, last, err);
+	rc = open_table(&source, INT64_MIN, last, err);
 	if (!rc)
 		rc = incise_source_next(&source, err);
 	if (rc > 0) {

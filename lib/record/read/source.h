@@ -45,6 +45,11 @@ struct incise_source {
 int incise_source_open(struct incise_source *source, struct incise_recording *recording,
 		       int stream, struct incise_error *err);
 
+/* The same, from the batch on that has this number or a later one; of depth from the first. */
+int incise_source_open_at(struct incise_source *source,
+			  struct incise_recording *recording, int stream,
+			  int64_t from_seq, struct incise_error *err);
+
 /*
  * The next batch, of at least one row: 1, 0 at the end, -EINVAL, -EIO, -ENOMEM. Behind an impossible
  * block or row, -EINVAL, the next call goes on.

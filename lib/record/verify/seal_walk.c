@@ -38,7 +38,7 @@ int incise_seal_walk_open(struct incise_seal_walk *walk,
 
 	*walk = (struct incise_seal_walk){
 		.recording = recording, .known = known, .last = -1};
-	rc = incise_seal_init(&walk->seal);
+	rc = incise_seal_init(&walk->seal, recording->form);
 	if (rc)
 		return incise_error_set(err, -rc, "%s: libcrypto gives no SHA-256",
 					recording->path);
@@ -65,11 +65,15 @@ int incise_seal_walk_open(struct incise_seal_walk *walk,
 		char sql[300];
 
 		stream->form = incise_ledger_form(i, recording->form);
+		rc = incise_ledger_select(db, recording->form, stream->form->stream,
+					  INT64_MIN, false, &stream->blocks);
+		if (rc != SQLITE_OK)
+			return fail(walk, err);
+		if (recording->form >= 5)
+			continue;
 		snprintf(sql, sizeof(sql), "SELECT %s FROM %s ORDER BY seq",
 			 stream->form->columns, stream->form->table);
-		if (sqlite3_prepare_v2(db, sql, -1, &stream->rows, NULL) != SQLITE_OK ||
-		    incise_ledger_select(db, recording->form, stream->form->stream, "",
-					 &stream->blocks) != SQLITE_OK)
+		if (sqlite3_prepare_v2(db, sql, -1, &stream->rows, NULL) != SQLITE_OK)
 			return fail(walk, err);
 		rc = known ? 0 : next_row(walk, stream, err);
 		if (rc)
@@ -88,6 +92,26 @@ void incise_seal_walk_close(struct incise_seal_walk *walk)
 	incise_seal_free(&walk->seal);
 }
 
+/* A block of form 5: its data have the digest that it names, which a verification has seen. */
+static void take_data(struct incise_seal_walk *walk, int i,
+		      const struct incise_ledger_block *block)
+{
+	sqlite3_stmt *stmt = walk->streams[i].blocks;
+	const uint8_t *named = incise_ledger_digest(stmt);
+	uint8_t digest[INCISE_SEAL_BYTES];
+	const void *data;
+	size_t size;
+
+	if (walk->known && named) {
+		incise_seal_rows_block(&walk->seal, i, block, named);
+		walk->seal.n_rows[i] += block->count;
+		return;
+	}
+	walk->good &= incise_ledger_data(stmt, block, &data, &size);
+	incise_seal_data(&walk->seal, i, block, data, size, digest);
+	walk->good &= named && !memcmp(named, digest, sizeof(digest));
+}
+
 /* The next block of a stream, with its rows. */
 static int take_block(struct incise_seal_walk *walk, int i, struct incise_error *err)
 {
@@ -102,6 +126,10 @@ static int take_block(struct incise_seal_walk *walk, int i, struct incise_error 
 	if (rc != SQLITE_ROW)
 		return fail(walk, err);
 	walk->good &= incise_ledger_block_read(&block, stream->blocks);
+	if (walk->recording->form >= 5) {
+		take_data(walk, i, &block);
+		return 0;
+	}
 	if (walk->known) {
 		const struct incise_seal_digests *known = &walk->known[i];
 		const uint8_t none[INCISE_SEAL_BYTES] = {0};
@@ -129,7 +157,8 @@ static int64_t length_of(struct incise_seal_walk *walk)
 	sqlite3_stmt *stmt = NULL;
 
 	if (incise_ledger_select(walk->recording->db, walk->recording->form,
-				 INCISE_LEDGER_FILE, "", &stmt) == SQLITE_OK &&
+				 INCISE_LEDGER_FILE, INT64_MIN, false,
+				 &stmt) == SQLITE_OK &&
 	    sqlite3_step(stmt) == SQLITE_ROW)
 		incise_ledger_block_read(&block, stmt);
 	sqlite3_finalize(stmt);
@@ -210,7 +239,7 @@ uint64_t incise_seal_walk_behind(struct incise_seal_walk *walk, bool *blocks)
 
 		while (sqlite3_step(stream->blocks) == SQLITE_ROW) {
 			*blocks = true;
-			if (walk->known &&
+			if ((walk->known || walk->recording->form >= 5) &&
 			    incise_ledger_block_read(&block, stream->blocks))
 				rows += block.count;
 		}

@@ -4,6 +4,7 @@
  */
 #include <errno.h>
 #include <fcntl.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,12 +15,29 @@
 #include "../read/session.h"
 #include "verify.h"
 
+/* The table of the streams' entries. */
+static const char *entries(const struct incise_verification *verify)
+{
+	return verify->recording->form >= 5 ? "blocks" : "ledger";
+}
+
 /* One integer by SQL; @otherwise if it is NULL or cannot be read. */
-static int64_t ask(struct incise_verification *verify, const char *sql, int64_t otherwise)
+INCISE_PRINTF(3, 4)
+static int64_t ask(struct incise_verification *verify, int64_t otherwise,
+		   const char *format, ...)
 {
 	sqlite3_stmt *stmt;
+	va_list args;
+	char *sql;
+	int rc;
 
-	if (sqlite3_prepare_v2(verify->recording->db, sql, -1, &stmt, NULL) != SQLITE_OK)
+	va_start(args, format);
+	sql = sqlite3_vmprintf(format, args);
+	va_end(args);
+	rc = sql ? sqlite3_prepare_v2(verify->recording->db, sql, -1, &stmt, NULL)
+		 : SQLITE_NOMEM;
+	sqlite3_free(sql);
+	if (rc != SQLITE_OK)
 		return otherwise;
 	if (sqlite3_step(stmt) == SQLITE_ROW &&
 	    sqlite3_column_type(stmt, 0) == SQLITE_INTEGER)
@@ -75,7 +93,7 @@ static void check_length(struct incise_verification *verify)
 {
 	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_DAMAGED);
 	int64_t bytes =
-		ask(verify, "PRAGMA page_size", 0) * ask(verify, "PRAGMA page_count", 0);
+		ask(verify, 0, "PRAGMA page_size") * ask(verify, 0, "PRAGMA page_count");
 	struct stat st;
 
 	/* With a log, pages may be in it alone; a copy of a locked one has no name. */
@@ -92,7 +110,7 @@ static void check_length(struct incise_verification *verify)
 static void check_depth(struct incise_verification *verify)
 {
 	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_COUNT);
-	uint64_t rows = ask(verify, "SELECT count(*) FROM depth", -1);
+	uint64_t rows = ask(verify, -1, "SELECT count(*) FROM depth");
 
 	found.count = verify->recording->meta.depth;
 	if (rows != found.count)
@@ -101,36 +119,42 @@ static void check_depth(struct incise_verification *verify)
 }
 
 /* An entry with an unknown name would pass as verified. */
-#define STREAMS "'force', 'tracker', 'camera'"
-#define WALL ", 'wall'"
-#define SEALS                                                                           \
-	"'table:depth', 'table:events', 'table:knots', 'table:meta', 'table:streams', " \
+#define RIG "'force', 'tracker', 'camera'"
+#define STREAMS RIG ", 'wall'"
+#define SEALS                                                                             \
+	", 'table:depth', 'table:events', 'table:knots', 'table:meta', 'table:streams', " \
 	"'file:camera.mkv'"
 static void check_names(struct incise_verification *verify)
 {
 	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_LEDGER);
 
-	if (ask(verify,
-		verify->report->interrupted
-			? "SELECT count(*) FROM ledger WHERE stream NOT IN (" STREAMS WALL
-			  ")"
-			: "SELECT count(*) FROM ledger WHERE stream NOT IN (" STREAMS WALL
-			  ", " SEALS ")",
-		-1))
+	const char *seals = verify->report->interrupted ? "" : SEALS;
+	const char *unknown = verify->recording->form >= 5
+				      ? "SELECT (SELECT count(*) FROM blocks WHERE "
+					"stream NOT IN (" STREAMS ")) + (SELECT count(*) "
+					"FROM ledger WHERE stream NOT IN (''%s))"
+				      : "SELECT count(*) FROM ledger WHERE stream NOT IN "
+					"(" STREAMS "%s)";
+
+	if (ask(verify, -1, unknown, seals))
 		incise_verify_found(verify, &found,
 				    "the ledger has entries of unknown streams");
 }
+
+#define ENDED(table)                                                       \
+	"SELECT name, ended, (SELECT max(last_ns) FROM " table             \
+	" WHERE stream = name AND count > 0) FROM streams WHERE ended IS " \
+	"NOT NULL"
 
 /* The number of samples that a dead device would still have sent is not known. */
 static void report_ends(struct incise_verification *verify)
 {
 	sqlite3_stmt *stmt;
 
-	if (sqlite3_prepare_v2(
-		    verify->recording->db,
-		    "SELECT name, ended, (SELECT max(last_ns) FROM ledger WHERE "
-		    "stream = name AND count > 0) FROM streams WHERE ended IS NOT NULL",
-		    -1, &stmt, NULL) != SQLITE_OK)
+	if (sqlite3_prepare_v2(verify->recording->db,
+			       verify->recording->form >= 5 ? ENDED("blocks")
+							    : ENDED("ledger"),
+			       -1, &stmt, NULL) != SQLITE_OK)
 		return; /* reported with the pages and seals */
 	while (sqlite3_step(stmt) == SQLITE_ROW) {
 		struct incise_verify_finding found =
@@ -162,8 +186,8 @@ static void report_interruption(struct incise_verification *verify)
 	if (!verify->report->interrupted)
 		return;
 	found.last_ns =
-		ask(verify,
-		    "SELECT max(last_ns) FROM ledger WHERE stream IN (" STREAMS ")", -1);
+		ask(verify, -1, "SELECT max(last_ns) FROM %s WHERE stream IN (" RIG ")",
+		    entries(verify));
 	if (found.last_ns < 0)
 		incise_verify_found(verify, &found,
 				    "interrupted, or being written: no row yet");
@@ -187,7 +211,7 @@ static int read_entry(struct incise_verification *verify, const char *stream,
 
 	*entry = (struct incise_ledger_block){0};
 	if (incise_ledger_select(verify->recording->db, verify->recording->form, stream,
-				 "", &stmt) != SQLITE_OK)
+				 INT64_MIN, false, &stmt) != SQLITE_OK)
 		return -1;
 	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW && n++ == 0)
 		if (!incise_ledger_block_read(entry, stmt))
@@ -272,7 +296,8 @@ static int check_seals(struct incise_verification *verify)
 {
 	int rc = 0;
 
-	for (int i = 0; incise_ledger_sealed[i] && !rc; i++) {
+	/* From form 5 on there is no table depth, the first of them. */
+	for (int i = verify->recording->form >= 5; incise_ledger_sealed[i] && !rc; i++) {
 		const char *table = incise_ledger_sealed[i];
 		struct incise_ledger_block made;
 		char stream[40], what[40];
@@ -292,31 +317,25 @@ static int check_seals(struct incise_verification *verify)
 
 /* --- the recording ---------------------------------------------------------------------- */
 
-/* Any trace of a camera counts, because others may have been removed. */
-static bool has_camera(struct incise_verification *verify)
-{
-	return ask(
-		verify,
-		"SELECT EXISTS(SELECT 1 FROM ledger WHERE stream = 'camera') OR "
-		"EXISTS(SELECT 1 FROM streams WHERE name = 'camera') OR "
-		"EXISTS(SELECT 1 FROM meta WHERE key = 'frames_rows' AND value > 0) OR "
-		"EXISTS(SELECT 1 FROM frames)",
-		1);
-}
-
-/* Whether a stream was recorded, though it may have no row. */
-static bool recorded(struct incise_verification *verify, int stream)
+/* Whether there is any trace of a stream, which may have no row: others may have been removed. */
+static bool recorded(struct incise_verification *verify, int stream, const char *key)
 {
 	const struct incise_ledger_form *form =
 		incise_ledger_form(stream, verify->recording->form);
-	char sql[300];
 
-	snprintf(
-		sql, sizeof(sql),
-		"SELECT EXISTS(SELECT 1 FROM ledger WHERE stream = '%s') OR EXISTS(SELECT 1 "
-		"FROM streams WHERE name = '%s') OR EXISTS(SELECT 1 FROM %s)",
-		form->stream, form->stream, form->table);
-	return ask(verify, sql, 1);
+	return ask(verify, 1,
+		   "SELECT EXISTS(SELECT 1 FROM %s WHERE stream = '%s') OR "
+		   "EXISTS(SELECT 1 FROM streams WHERE name = '%s') OR EXISTS(SELECT 1 "
+		   "FROM meta WHERE key = '%s' AND value > 0)",
+		   entries(verify), form->stream, form->stream, key) ||
+	       (verify->recording->form < 5 &&
+		ask(verify, 1, "SELECT EXISTS(SELECT 1 FROM %s)", form->table));
+}
+
+/* A number of table meta. */
+static int64_t count_of(struct incise_verification *verify, const char *key)
+{
+	return ask(verify, 0, "SELECT value FROM meta WHERE key = '%s'", key);
 }
 
 /* Wall time is no stream of the report: its findings are all there is to tell. */
@@ -324,18 +343,11 @@ static int check_wall(struct incise_verification *verify)
 {
 	struct incise_verify_stream rows = {0};
 
-	/* Any trace counts, because others may have been removed. */
 	if (verify->recording->form < 3 ||
-	    !ask(verify,
-		 "SELECT EXISTS(SELECT 1 FROM ledger WHERE stream = 'wall') OR "
-		 "EXISTS(SELECT 1 FROM meta WHERE key = 'wall_rows' AND value > 0) OR "
-		 "EXISTS(SELECT 1 FROM wall)",
-		 1))
+	    !recorded(verify, INCISE_LEDGER_WALL, "wall_rows"))
 		return 0;
-	return incise_verify_stream(
-		verify, INCISE_LEDGER_WALL,
-		ask(verify, "SELECT value FROM meta WHERE key = 'wall_rows'", 0), 0,
-		&rows);
+	return incise_verify_stream(verify, INCISE_LEDGER_WALL,
+				    count_of(verify, "wall_rows"), 0, &rows);
 }
 
 /* Streams one after the other. Returns 0 or -ECANCELED. */
@@ -348,22 +360,24 @@ static int check_streams(struct incise_verification *verify)
 	} counted[INCISE_LEDGER_STREAMS] = {
 		[INCISE_LEDGER_FORCE] = {meta->force, meta->force_lost},
 		[INCISE_LEDGER_TRACKER] = {meta->tracker, meta->tracker_lost},
-		[INCISE_LEDGER_CAMERA] = {
-			ask(verify, "SELECT value FROM meta WHERE key = 'frames_rows'",
-			    0),
-			ask(verify, "SELECT value FROM meta WHERE key = 'frames_lost'",
-			    0)}};
+		[INCISE_LEDGER_CAMERA] = {count_of(verify, "frames_rows"),
+					  count_of(verify, "frames_lost")}};
 	int rc = 0;
 
-	verify->camera = has_camera(verify);
+	verify->camera = recorded(verify, INCISE_LEDGER_CAMERA, "frames_rows");
 	verify->rows = meta->force + meta->tracker;
 	if (verify->camera) {
-		verify->frames = ask(verify, "SELECT count(*) FROM frames", 0);
+		verify->frames = ask(verify, 0,
+				     verify->recording->form >= 5
+					     ? "SELECT sum(count) FROM blocks WHERE "
+					       "stream = 'camera'"
+					     : "SELECT count(*) FROM frames");
 		verify->rows += verify->frames * INCISE_VERIFY_FRAME_ROWS;
 	}
 	for (int i = 0; i < INCISE_LEDGER_STREAMS && !rc; i++) {
-		if (i == INCISE_LEDGER_CAMERA ? !verify->camera
-					      : !counted[i].rows && !recorded(verify, i))
+		if (i == INCISE_LEDGER_CAMERA
+			    ? !verify->camera
+			    : !counted[i].rows && !recorded(verify, i, ""))
 			continue;
 		rc = incise_verify_stream(verify, i, counted[i].rows, counted[i].lost,
 					  &report->streams[report->n_streams++]);
@@ -400,16 +414,16 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 		goto out;
 	}
 	report->interrupted = !verify.recording->meta.complete;
-	verify.hashed =
-		verify.recording->form >= 4 && !incise_seal_init(&verify.rows_seal);
-	verify.origin_ns = ask(
-		&verify,
-		"SELECT min(first_ns) FROM ledger WHERE count > 0 AND stream IN (" STREAMS
-		")",
-		0);
+	verify.hashed = verify.recording->form >= 4 &&
+			!incise_seal_init(&verify.rows_seal, verify.recording->form);
+	verify.origin_ns =
+		ask(&verify, 0,
+		    "SELECT min(first_ns) FROM %s WHERE count > 0 AND stream IN (" RIG
+		    ")",
+		    entries(&verify));
 	rc = check_streams(&verify);
 	if (!rc) {
-		if (report->interrupted)
+		if (report->interrupted && verify.recording->form < 5)
 			check_depth(&verify);
 		check_names(&verify);
 		altered = verify.altered;

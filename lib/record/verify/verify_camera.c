@@ -17,11 +17,12 @@
 #include <string.h>
 #include <unistd.h>
 #include "../frames.h"
+#include "../read/source.h"
 #include "verify.h"
 
 struct row {
 	int64_t seq, t_ns, pts_ms, bytes, crc;
-	uint8_t sha256[INCISE_FRAMES_DIGEST]; /* zeros where it has none */
+	const uint8_t *sha256; /* zeros where it has none */
 };
 
 /* Consecutive frames that are wrong in the same way. */
@@ -36,8 +37,9 @@ struct run {
 struct walk {
 	struct incise_verification *verify;
 	struct incise_verify_frames *out;
-	sqlite3_stmt *rows, *by_seq;
-	struct row row; /* next, where has_row */
+	struct incise_source rows;
+	size_t at;	/* next row of the batch */
+	struct row row; /* the same, where has_row */
 	bool has_row;
 	int64_t last_ns;  /* of the row before */
 	bool timestamped; /* rows have the frames' times, less the delay */
@@ -110,26 +112,31 @@ static void add_to_run(struct walk *walk, enum fault what, const char *why, int6
 
 /* --- rows ------------------------------------------------------------------------- */
 
-static void read_row(sqlite3_stmt *stmt, struct row *row)
+static struct row row_of(const struct incise_batch *batch, size_t at)
 {
-	*row = (struct row){
-		sqlite3_column_int64(stmt, 0), sqlite3_column_int64(stmt, 1),
-		sqlite3_column_int64(stmt, 2), sqlite3_column_int64(stmt, 3),
-		sqlite3_column_int64(stmt, 4), {0},
-	};
-	if (sqlite3_column_bytes(stmt, 5) == sizeof(row->sha256))
-		memcpy(row->sha256, sqlite3_column_blob(stmt, 5), sizeof(row->sha256));
+	const union incise_column *column = batch->column;
+
+	return (struct row){column[0].i[at], column[1].i[at], column[3].i[at],
+			    column[4].i[at], column[5].i[at], column[10].h[at]};
 }
 
-/* Returns 0 or -EIO, which verify_stream.c has reported. */
+/* Returns 0 or -EIO, which verify_stream.c has reported; a block that it has reported is passed. */
 static int next_row(struct walk *walk)
 {
-	int rc = sqlite3_step(walk->rows);
+	int rc = 1;
 
-	walk->has_row = rc == SQLITE_ROW;
+	if (walk->has_row && walk->at + 1 < walk->rows.batch.n) {
+		walk->at++;
+	} else {
+		walk->at = 0;
+		do
+			rc = incise_source_next(&walk->rows, NULL);
+		while (rc == -EINVAL);
+	}
+	walk->has_row = rc > 0;
 	if (walk->has_row)
-		read_row(walk->rows, &walk->row);
-	return walk->has_row || rc == SQLITE_DONE ? 0 : -EIO;
+		walk->row = row_of(&walk->rows.batch, walk->at);
+	return rc < 0 ? -EIO : 0;
 }
 
 static int skip_row(struct walk *walk)
@@ -157,17 +164,21 @@ static bool is_like(const struct row *row, const struct frame *frame)
 /* Whether a later row is this frame's: the rows between have no frame. */
 static bool is_further_on(struct walk *walk, const struct frame *frame)
 {
-	struct row row;
+	const int64_t seq = (int64_t)frame->head.seq;
+	struct incise_source source;
 	bool is = false;
 
-	if (frame->head.seq > INT64_MAX || (int64_t)frame->head.seq <= walk->row.seq)
+	if (frame->head.seq > INT64_MAX || seq <= walk->row.seq)
 		return false;
-	sqlite3_bind_int64(walk->by_seq, 1, frame->head.seq);
-	if (sqlite3_step(walk->by_seq) == SQLITE_ROW) {
-		read_row(walk->by_seq, &row);
-		is = is_like(&row, frame);
-	}
-	sqlite3_reset(walk->by_seq);
+	if (!incise_source_open_at(&source, walk->verify->recording, INCISE_LEDGER_CAMERA,
+				   seq, NULL) &&
+	    incise_source_next(&source, NULL) > 0)
+		for (size_t k = 0; k < source.batch.n && !is; k++) {
+			struct row row = row_of(&source.batch, k);
+
+			is = row.seq == seq && is_like(&row, frame);
+		}
+	incise_source_close(&source);
 	return is;
 }
 
@@ -192,7 +203,7 @@ static const char *difference(const struct walk *walk, const struct frame *frame
 	if (row->bytes != frame->stored.bytes)
 		return "its size is";
 	if (row->crc != frame->stored.crc ||
-	    memcmp(row->sha256, frame->stored.sha256, sizeof(row->sha256)) != 0)
+	    memcmp(row->sha256, frame->stored.sha256, INCISE_FRAMES_DIGEST) != 0)
 		return "its bytes are";
 	if (row->seq < 0 || (uint64_t)row->seq != frame->head.seq)
 		return "its number is";
@@ -302,33 +313,23 @@ static void report_unopened(struct incise_verification *verify, const char *path
 
 static int prepare(struct walk *walk)
 {
-	const char *sql = walk->verify->recording->form < 4
-				  ? "SELECT seq, t_ns, pts, bytes, crc, NULL FROM frames "
-				  : "SELECT seq, t_ns, pts, bytes, crc, sha256 FROM "
-				    "frames ";
-	sqlite3 *db = walk->verify->recording->db;
+	struct incise_recording *recording = walk->verify->recording;
 	sqlite3_stmt *stmt = NULL;
-	char text[120];
-	int rc;
 
-	snprintf(text, sizeof(text), "%sORDER BY seq", sql);
-	rc = sqlite3_prepare_v2(db, text, -1, &walk->rows, NULL);
-	snprintf(text, sizeof(text), "%sWHERE seq = ?", sql);
-	if (rc == SQLITE_OK)
-		rc = sqlite3_prepare_v2(db, text, -1, &walk->by_seq, NULL);
-	if (rc == SQLITE_OK)
-		rc = sqlite3_prepare_v2(
-			db,
-			"SELECT stamped, delay_ns, ended IS NOT NULL FROM streams WHERE "
-			"name = 'camera'",
-			-1, &stmt, NULL);
-	if (rc == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW) {
+	if (incise_source_open(&walk->rows, recording, INCISE_LEDGER_CAMERA, NULL) ||
+	    sqlite3_prepare_v2(
+		    recording->db,
+		    "SELECT stamped, delay_ns, ended IS NOT NULL FROM streams WHERE "
+		    "name = 'camera'",
+		    -1, &stmt, NULL) != SQLITE_OK)
+		return -EIO;
+	if (sqlite3_step(stmt) == SQLITE_ROW) {
 		walk->timestamped = sqlite3_column_int(stmt, 0);
 		walk->delay_ns = sqlite3_column_int64(stmt, 1);
 		walk->ended = sqlite3_column_int(stmt, 2);
 	}
 	sqlite3_finalize(stmt);
-	return rc == SQLITE_OK ? 0 : -EIO;
+	return 0;
 }
 
 int incise_verify_camera(struct incise_verification *verify)
@@ -358,8 +359,7 @@ int incise_verify_camera(struct incise_verification *verify)
 	rc = prepare(&walk);
 	if (!rc)
 		rc = walk_through(&walk, reader);
-	sqlite3_finalize(walk.rows);
-	sqlite3_finalize(walk.by_seq);
+	incise_source_close(&walk.rows);
 	incise_frames_reader_close(reader);
 out:
 	free(path);

@@ -13,6 +13,8 @@
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include "../batch.h"
 #include "verify.h"
 
 #define REPORT_ROWS 4096
@@ -28,7 +30,8 @@ struct walk {
 
 	struct incise_ledger_row row; /* next, where has_row */
 	bool has_row, good_row;
-	bool known; /* last_seq and last_ns: of a row, or of the ledger's start */
+	bool known;   /* last_seq and last_ns: of a row, or of the ledger's start */
+	bool follows; /* the block before was as it was written */
 	int64_t last_seq, last_ns;
 
 	struct incise_ledger
@@ -350,6 +353,27 @@ static void check_counts(struct walk *walk, uint64_t rows, uint64_t lost_rows)
 	}
 }
 
+static void count_block(struct walk *walk, const struct incise_ledger_block *block)
+{
+	walk->out->blocks++;
+	if (walk->counted < COUNT_MAX && walk->out->lost_at_capture < COUNT_MAX) {
+		walk->counted += block->count;
+		walk->out->lost_at_capture += block->lost;
+	}
+}
+
+static void report_no_end(struct walk *walk)
+{
+	struct incise_verify_finding found = finding(walk, INCISE_VERIFY_LEDGER);
+
+	if (walk->verify->report->interrupted)
+		return;
+	found.first_block = found.last_block = walk->next;
+	incise_verify_found(walk->verify, &found,
+			    "%s: the ledger has no end: its last blocks were removed",
+			    walk->form->stream);
+}
+
 static int walk_through(struct walk *walk)
 {
 	struct incise_ledger_block block;
@@ -370,11 +394,7 @@ static int walk_through(struct walk *walk)
 			rc = skip_blocks(walk, &block);
 		if (!rc)
 			rc = take_block(walk, &block, good);
-		walk->out->blocks++;
-		if (walk->counted < COUNT_MAX && walk->out->lost_at_capture < COUNT_MAX) {
-			walk->counted += block.count;
-			walk->out->lost_at_capture += block.lost;
-		}
+		count_block(walk, &block);
 		ended = !block.count;
 		end_seq = good ? block.last_seq : end_seq;
 	}
@@ -384,15 +404,124 @@ static int walk_through(struct walk *walk)
 		lost(walk, walk->last_seq + 1, end_seq, -1);
 	if (!rc)
 		rc = take_extra(walk);
-	if (!rc && !ended && !walk->verify->report->interrupted) {
-		struct incise_verify_finding found = finding(walk, INCISE_VERIFY_LEDGER);
+	if (!rc && !ended)
+		report_no_end(walk);
+	return rc;
+}
 
-		found.first_block = found.last_block = walk->next;
-		incise_verify_found(
-			walk->verify, &found,
-			"%s: the ledger has no end: its last blocks were removed",
-			walk->form->stream);
+/* Blocks from walk->next to @block are missing, and their rows with them. */
+static void report_missing(struct walk *walk, const struct incise_ledger_block *block)
+{
+	struct incise_verify_finding found = finding(walk, INCISE_VERIFY_LEDGER);
+
+	flush_altered(walk);
+	found.first_block = walk->next;
+	found.last_block = block->block - 1;
+	found.count = block->block - walk->next;
+	walk->out->altered += found.count;
+	incise_verify_found(walk->verify, &found, "%s: block %lld%s%.0lld is missing",
+			    walk->form->stream, (long long)found.first_block,
+			    found.count > 1 ? " to " : "",
+			    found.count > 1 ? (long long)found.last_block : 0);
+}
+
+/* The rows of a block of form 5, and the samples that are missing before and within. */
+static uint64_t take_numbers(struct walk *walk, const struct incise_batch *batch)
+{
+	uint64_t missing = 0;
+
+	for (size_t k = 0; k < batch->n; k++) {
+		const int64_t seq = batch->column[0].i[k], t_ns = batch->column[1].i[k];
+
+		if (walk->known && seq > walk->last_seq + 1) {
+			missing += (uint64_t)(seq - walk->last_seq - 1);
+			lost(walk, walk->last_seq + 1, seq - 1, t_ns);
+		}
+		walk->known = true;
+		walk->last_seq = seq;
+		walk->last_ns = t_ns;
 	}
+	walk->out->present += batch->n;
+	return missing;
+}
+
+/* The data of a block are those of its CRC, and of its digest, which the seal takes as it is. */
+static bool has_data(struct walk *walk, const struct incise_ledger_block *block,
+		     const void **data, size_t *size)
+{
+	struct incise_verification *verify = walk->verify;
+	const uint8_t *named = incise_ledger_digest(walk->blocks);
+	uint8_t digest[INCISE_SEAL_BYTES];
+
+	if (!incise_ledger_data(walk->blocks, block, data, size) || !named)
+		return false;
+	if (!verify->hashed)
+		return true;
+	incise_seal_data(&verify->rows_seal, walk->stream, block, *data, *size, digest);
+	return !memcmp(named, digest, sizeof(digest));
+}
+
+/* Compare a block with its fields, and with the one before. Returns 0 or -ECANCELED. */
+static int take_data(struct walk *walk, struct incise_batch *batch,
+		     const struct incise_ledger_block *block, bool good)
+{
+	struct incise_verification *verify = walk->verify;
+	const uint64_t rows = verify->rows_done / REPORT_ROWS;
+	/* Behind one that is missing or altered the number before is not known. */
+	const bool follows = block->block == walk->next && walk->follows;
+	const void *data;
+	size_t size;
+
+	batch->n = 0;
+	good &= has_data(walk, block, &data, &size);
+	if (block->count) {
+		good &= !incise_batch_decode(batch, block, data, size);
+		good &= take_numbers(walk, batch) == (uint64_t)block->lost || !follows;
+	}
+	/* Rows that cannot be read are altered, not lost. */
+	if (block->count && !batch->n) {
+		walk->known = false;
+		walk->last_seq = block->last_seq;
+	}
+	walk->next = block->block + 1;
+	walk->follows = good;
+	if (good)
+		flush_altered(walk);
+	else
+		add_altered(walk, block, batch->n);
+	verify->rows_done += batch->n;
+	return verify->rows_done / REPORT_ROWS == rows
+		       ? 0
+		       : incise_verify_progress(verify, false);
+}
+
+static int walk_through_blocks(struct walk *walk)
+{
+	struct incise_batch batch = {.form = walk->form};
+	struct incise_ledger_block block;
+	int64_t end_seq = INT64_MIN;
+	bool ended = false;
+	int rc = 0, step = 0;
+
+	walk->follows = true;
+
+	while (!rc && (step = step_block(walk)) > 0) {
+		bool good = read_block(walk, &block);
+
+		if (block.block > walk->next)
+			report_missing(walk, &block);
+		rc = take_data(walk, &batch, &block, good);
+		count_block(walk, &block);
+		ended = !block.count;
+		end_seq = good ? block.last_seq : end_seq;
+	}
+	incise_batch_free(&batch);
+	flush_altered(walk);
+	rc = rc ? rc : step;
+	if (!rc && end_seq > walk->last_seq)
+		lost(walk, walk->last_seq + 1, end_seq, -1);
+	if (!rc && !ended)
+		report_no_end(walk);
 	return rc;
 }
 
@@ -407,6 +536,7 @@ int incise_verify_stream(struct incise_verification *verify, int stream, uint64_
 			    .stream = stream,
 			    .out = out,
 			    .last_seq = -1};
+	const bool blocks = verify->recording->form >= 5;
 	char sql[300];
 	int rc = 0;
 
@@ -416,14 +546,14 @@ int incise_verify_stream(struct incise_verification *verify, int stream, uint64_
 	walk.altered = finding(&walk, INCISE_VERIFY_ALTERED);
 	snprintf(sql, sizeof(sql), "SELECT %s FROM %s ORDER BY seq", form->columns,
 		 form->table);
-	if (sqlite3_prepare_v2(db, sql, -1, &walk.rows, NULL) != SQLITE_OK ||
-	    incise_ledger_select(db, verify->recording->form, form->stream, "",
-				 &walk.blocks) != SQLITE_OK) {
+	if ((!blocks && sqlite3_prepare_v2(db, sql, -1, &walk.rows, NULL) != SQLITE_OK) ||
+	    incise_ledger_select(db, verify->recording->form, form->stream, INT64_MIN,
+				 false, &walk.blocks) != SQLITE_OK) {
 		incise_verify_unreadable(verify, form->stream, form->table);
 		rc = -EIO;
 	}
 	if (!rc)
-		rc = walk_through(&walk);
+		rc = blocks ? walk_through_blocks(&walk) : walk_through(&walk);
 	if (!rc)
 		check_counts(&walk, rows, lost_rows);
 	sqlite3_finalize(walk.rows);

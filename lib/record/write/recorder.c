@@ -15,6 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include "../schema.h"
 #include "recorder.h"
 
 /* Largest loss after a kill, and the shortest time between commits, whatever they take. */
@@ -306,6 +307,9 @@ static void recorder_free(struct incise_recorder *rec)
 	incise_recorder_close_database(rec);
 	incise_seal_free(&rec->seal);
 	incise_recorder_disarm(rec);
+	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
+		incise_batch_free(&rec->batches[i]);
+	free(rec->data.bytes);
 	if (rec->folder >= 0)
 		close(rec->folder);
 	if (rec->parent >= 0)
@@ -363,7 +367,7 @@ static int start(struct incise_recorder *rec, const struct incise_recorder_setup
 	int rc = incise_recorder_check_space(rec, setup->planned_s, err);
 
 	rec->worthless = true;
-	if (!rc && incise_seal_init(&rec->seal))
+	if (!rc && incise_seal_init(&rec->seal, INCISE_SCHEMA_VERSION))
 		rc = incise_error_set(err, ENOMEM,
 				      "%s: libcrypto gives no SHA-256; check its "
 				      "openssl.cnf",
@@ -654,14 +658,15 @@ int incise_recorder_end(struct incise_recorder *rec, struct incise_error *err)
 static int check_rows(struct incise_recorder *rec, struct incise_error *err)
 {
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++) {
-		const char *table = incise_ledger_forms[i].table;
+		const char *name = incise_ledger_forms[i].stream;
 		uint64_t written =
 			i == INCISE_LEDGER_WALL ? rec->wall.rows : rec->streams[i].rows;
 		sqlite3_stmt *stmt = NULL;
 		uint64_t rows = 0;
-		char text[60];
+		char text[80];
 
-		snprintf(text, sizeof(text), "SELECT count(*) FROM %s", table);
+		snprintf(text, sizeof(text),
+			 "SELECT sum(count) FROM blocks WHERE stream = '%s'", name);
 		if (sqlite3_prepare_v2(rec->db, text, -1, &stmt, NULL) == SQLITE_OK &&
 		    sqlite3_step(stmt) == SQLITE_ROW)
 			rows = (uint64_t)sqlite3_column_int64(stmt, 0);
@@ -671,9 +676,9 @@ static int check_rows(struct incise_recorder *rec, struct incise_error *err)
 			return incise_error_set(
 				err, EIO,
 				"%s: another program changed its files during the "
-				"recording: table %s has %llu rows of %llu; `incise "
+				"recording: stream %s has %llu rows of %llu; `incise "
 				"verify %s` lists the remaining data",
-				rec->part, table, (unsigned long long)rows,
+				rec->part, name, (unsigned long long)rows,
 				(unsigned long long)written, rec->part);
 	}
 	return 0;

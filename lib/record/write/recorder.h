@@ -3,7 +3,7 @@
  * Inside a recorder; for lib/record/write/recorder*.c only. Each file calls only those below it.
  *
  *     recorder.c            start, poll, commits and end; the camera
- *     recorder_rows.c       streams: from samples to rows and their ledger; zero; pretrigger
+ *     recorder_rows.c       streams: from samples to blocks; zero; pretrigger
  *     recorder_database.c   the database and its tables meta and events
  *     recorder_folder.c     NAME.rec.part, its lock and its name; free space
  */
@@ -16,7 +16,7 @@
 #include <sqlite3.h>
 #include <incise/recorder.h>
 #include "../../base/ring.h"
-#include "../ledger.h"
+#include "../batch.h"
 #include "../read/cut.h"
 #include "../read/depth.h"
 #include "../seal_chain.h"
@@ -26,17 +26,13 @@
 
 /* Statements, prepared once; see recorder_database.c. */
 enum {
-	INSERT_FORCE,
-	INSERT_TRACKER,
-	INSERT_DEPTH,
-	INSERT_FRAME,
+	INSERT_BLOCK,
 	INSERT_EVENT,
 	INSERT_LEDGER,
 	SET_META,
 	SET_STREAM,
 	DROP_KNOTS,
 	INSERT_KNOT,
-	INSERT_WALL,
 	INSERT_SEAL,
 	STATEMENTS
 };
@@ -140,6 +136,11 @@ struct incise_recorder {
 	struct incise_camera_info camera_info;
 
 	struct incise_recorder_stream streams[INCISE_LEDGER_STREAMS];
+	struct incise_batch batches[INCISE_LEDGER_FORMS]; /* since the last commit */
+	struct {
+		uint8_t *bytes;
+		size_t size;
+	} data; /* of a block that is written */
 	struct incise_depth depth;
 	struct incise_cut_count cut;
 	struct incise_recorder_zero zero;
@@ -210,7 +211,7 @@ int incise_recorder_put_frame(struct incise_recorder *rec,
 /* Write the points of wall time since the last call. Returns 0 or a disk error. */
 int incise_recorder_put_wall(struct incise_recorder *rec, struct incise_error *err);
 
-/* Write the depth rows whose windows are still open. Returns 0 or a disk error. */
+/* Count the depths whose windows are still open. Returns 0 or a disk error. */
 int incise_recorder_flush_depth(struct incise_recorder *rec, struct incise_error *err);
 
 /* Start armed. Returns 0 or -ENOMEM. */

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * From samples to rows: the time of acquisition, the place in the ledger; see recorder.h.
+ * From samples to blocks: the time of acquisition, the columns of a commit; see recorder.h.
  *
- *     force ────► timeline ─┬─────────────────► table force
- *       └► zero: 0.5 s      ├─► CRC, chained ─► table ledger
- *                           ├─► SHA-256 ──────► table seal
- *     tracker ──► timeline ─┼─────────────────► table tracker
- *       └► depth, speed ────┼─────────────────► table depth
- *     camera ───► timeline ─┴─────────────────► table frames
+ *     force ────► timeline ─┐
+ *       └► zero: 0.5 s      │
+ *     tracker ──► timeline ─┼─► batch of the commit ─┬─► table blocks, with CRC and SHA-256
+ *       └► depth: cuts      │                        └─► table seal
+ *     camera ───► timeline ─┘
  *
  * Before the trigger, rows go into the pretrigger rings instead.
  */
@@ -364,60 +363,59 @@ static int take_number(struct incise_recorder_stream *stream, uint64_t seq,
 	return 0;
 }
 
-/* Add a row to the ledger; samples missing before it are an event. */
-static int enter(struct incise_recorder *rec, struct incise_recorder_stream *stream,
-		 const struct incise_ledger_row *row, struct incise_error *err)
+/*
+ * A row of a stream's open block, for number and time and the columns that the caller fills; samples
+ * missing before it are an event. Returns its place, or -errno.
+ */
+static ssize_t enter(struct incise_recorder *rec, int i, int64_t seq, int64_t t_ns,
+		     struct incise_error *err)
 {
-	struct incise_ledger *ledger = &stream->ledger;
-	uint64_t missing =
-		stream->rows ? (uint64_t)row->seq - (uint64_t)ledger->last_seq - 1 : 0;
+	struct incise_recorder_stream *stream = &rec->streams[i];
+	struct incise_ledger *ledger =
+		i == INCISE_LEDGER_WALL ? &rec->wall.ledger : &stream->ledger;
+	struct incise_batch *batch = &rec->batches[i];
+	const ssize_t at = (ssize_t)batch->n;
+	uint64_t missing = ledger->started ? (uint64_t)(seq - ledger->last_seq - 1) : 0;
 
-	if (!stream->rows)
-		stream->first_row_ns = row->t_ns;
-	incise_ledger_add(ledger, row);
-	incise_seal_row(&rec->seal, (int)(stream - rec->streams), row);
-	stream->rows++;
-	if (!missing)
-		return 0;
+	batch->form = &incise_ledger_forms[i];
+	if (at == INCISE_BATCH_ROWS_MAX || !incise_batch_reserve(batch, batch->n + 1))
+		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+	batch->column[0].i[at] = seq;
+	batch->column[1].i[at] = t_ns;
+	batch->n++;
+	incise_ledger_count(ledger, seq, t_ns);
+	if (i == INCISE_LEDGER_WALL)
+		return at;
+	if (!stream->rows++)
+		stream->first_row_ns = t_ns;
 	stream->gaps += missing;
-	return incise_recorder_check(
-		rec,
-		incise_recorder_note_at(rec, row->t_ns, "lost",
-					"%s: %llu samples before number %llu",
-					stream->device, (unsigned long long)missing,
-					(unsigned long long)row->seq),
-		err);
+	if (missing && incise_recorder_note_at(
+			       rec, t_ns, "lost", "%s: %llu samples before number %llu",
+			       stream->device, (unsigned long long)missing,
+			       (unsigned long long)seq) != SQLITE_OK)
+		return incise_recorder_fail(rec, err);
+	return at;
 }
 
 static int write_force(struct incise_recorder *rec, const struct force_row *row,
 		       struct incise_error *err)
 {
-	sqlite3_stmt *stmt = rec->stmt[INSERT_FORCE];
+	const ssize_t at = enter(rec, INCISE_LEDGER_FORCE, row->seq, row->t_ns, err);
 	int64_t top = (1LL << rec->force_info.bits) - 1;
-	struct incise_ledger_row entry;
 
-	sqlite3_bind_int64(stmt, 1, row->seq);
-	sqlite3_bind_int64(stmt, 2, row->t_ns);
-	sqlite3_bind_int(stmt, 3, row->code);
-	if (incise_recorder_run(stmt) != SQLITE_OK)
-		return incise_recorder_fail(rec, err);
+	if (at < 0)
+		return (int)at;
+	rec->batches[INCISE_LEDGER_FORCE].column[2].i[at] = row->code;
 	rec->stats.force_clipped += row->code == 0 || row->code == top;
-	incise_ledger_row_force(&entry, row->seq, row->t_ns, row->code);
-	return enter(rec, &rec->streams[INCISE_LEDGER_FORCE], &entry, err);
+	return 0;
 }
 
-static int write_depth(struct incise_recorder *rec, const struct incise_depth_row *row,
+/* Readers find depths again from the poses: they are counted, and cuts are events. */
+static int count_depth(struct incise_recorder *rec, const struct incise_depth_row *row,
 		       struct incise_error *err)
 {
-	sqlite3_stmt *stmt = rec->stmt[INSERT_DEPTH];
 	bool before = rec->cut.inside;
 
-	sqlite3_bind_int64(stmt, 1, row->seq);
-	sqlite3_bind_int64(stmt, 2, row->t_ns);
-	sqlite3_bind_double(stmt, 3, row->depth_mm);
-	sqlite3_bind_double(stmt, 4, row->velocity_mm_s);
-	if (incise_recorder_run(stmt) != SQLITE_OK)
-		return incise_recorder_fail(rec, err);
 	rec->stats.depth++;
 	if (incise_cut_step(&rec->cut, row->depth_mm) == before || !rec->cuts)
 		return 0;
@@ -433,7 +431,7 @@ int incise_recorder_flush_depth(struct incise_recorder *rec, struct incise_error
 	int rc = 0;
 
 	while (!rc && incise_depth_flush(&rec->depth, &row))
-		rc = write_depth(rec, &row, err);
+		rc = count_depth(rec, &row, err);
 	return rc;
 }
 
@@ -451,32 +449,29 @@ static int write_tracker(struct incise_recorder *rec, const struct tracker_row *
 			 struct incise_error *err)
 {
 	const struct incise_tracker_sample *sample = &row->sample;
-	sqlite3_stmt *stmt = rec->stmt[INSERT_TRACKER];
-	struct incise_ledger_row entry;
+	const ssize_t at =
+		enter(rec, INCISE_LEDGER_TRACKER, (int64_t)sample->seq, row->t_ns, err);
+	union incise_column *column = rec->batches[INCISE_LEDGER_TRACKER].column;
 	struct incise_depth_row depth;
 	double tip_mm[3];
-	int rc;
 
-	tip_of(rec, sample, tip_mm);
-	sqlite3_bind_int64(stmt, 1, sample->seq);
-	sqlite3_bind_int64(stmt, 2, row->t_ns);
-	sqlite3_bind_int64(stmt, 3, sample->t_ns + sample->after_ns);
+	if (at < 0)
+		return (int)at;
+	column[2].i[at] = sample->t_ns + sample->after_ns;
 	for (int i = 0; i < 3; i++)
-		sqlite3_bind_double(stmt, 4 + i, sample->position_mm[i]);
+		column[3 + i].r[at] = sample->position_mm[i];
 	for (int i = 0; i < 4; i++)
-		sqlite3_bind_double(stmt, 7 + i, sample->quaternion[i]);
-	sqlite3_bind_text(stmt, 11, &sample->status, 1, SQLITE_TRANSIENT);
-	sqlite3_bind_int(stmt, 12, sample->station);
-	sqlite3_bind_int(stmt, 13, sample->button);
-	if (incise_recorder_run(stmt) != SQLITE_OK)
-		return incise_recorder_fail(rec, err);
-	incise_ledger_row_tracker(&entry, row->t_ns, sample);
-	rc = enter(rec, &rec->streams[INCISE_LEDGER_TRACKER], &entry, err);
+		column[6 + i].r[at] = sample->quaternion[i];
+	column[10].c[at] = sample->status;
+	column[11].i[at] = sample->station;
+	column[12].i[at] = sample->button;
+	tip_of(rec, sample, tip_mm);
 	/* A record that is no pose is kept, but gives no depth. */
-	if (!rc && incise_pose_count(&rec->stats.poses, sample->status) &&
-	    incise_depth_push(&rec->depth, sample->seq, row->t_ns, tip_mm, &depth))
-		rc = write_depth(rec, &depth, err);
-	return rc;
+	if (incise_pose_count(&rec->stats.poses, sample->status) &&
+	    incise_depth_push(&rec->depth, (int64_t)sample->seq, row->t_ns, tip_mm,
+			      &depth))
+		return count_depth(rec, &depth, err);
+	return 0;
 }
 
 /* --- wall time ------------------------------------------------------------------------ */
@@ -484,29 +479,26 @@ static int write_tracker(struct incise_recorder *rec, const struct tracker_row *
 static int write_wall(struct incise_recorder *rec, const struct incise_wall_point *point,
 		      struct incise_error *err)
 {
-	sqlite3_stmt *stmt = rec->stmt[INSERT_WALL];
 	const char *const texts[] = {point->source, point->reference, point->leap,
 				     point->restart};
-	struct incise_ledger_row entry;
+	const ssize_t at =
+		enter(rec, INCISE_LEDGER_WALL, (int64_t)rec->wall.rows, point->t_ns, err);
+	union incise_column *column = rec->batches[INCISE_LEDGER_WALL].column;
 
-	sqlite3_bind_int64(stmt, 1, (sqlite3_int64)rec->wall.rows);
-	sqlite3_bind_int64(stmt, 2, point->t_ns);
-	sqlite3_bind_int64(stmt, 3, point->tai_ns);
-	if (isfinite(point->uncertainty_ns))
-		sqlite3_bind_double(stmt, 4, point->uncertainty_ns);
-	else
-		sqlite3_bind_null(stmt, 4);
-	sqlite3_bind_double(stmt, 5, point->rate_ppb);
-	sqlite3_bind_double(stmt, 6, point->rate_uncertainty_ppb);
-	sqlite3_bind_int(stmt, 7, point->utc_offset_s);
-	sqlite3_bind_int(stmt, 8, point->held);
-	for (int i = 0; i < 4; i++)
-		sqlite3_bind_text(stmt, 9 + i, texts[i], -1, SQLITE_TRANSIENT);
-	if (incise_recorder_run(stmt) != SQLITE_OK)
-		return incise_recorder_fail(rec, err);
-	incise_ledger_row_wall(&entry, rec->wall.rows++, point);
-	incise_ledger_add(&rec->wall.ledger, &entry);
-	incise_seal_row(&rec->seal, INCISE_LEDGER_WALL, &entry);
+	if (at < 0)
+		return (int)at;
+	rec->wall.rows++;
+	column[2].i[at] = point->tai_ns;
+	column[3].r[at] = isfinite(point->uncertainty_ns) ? point->uncertainty_ns : NAN;
+	column[4].r[at] = point->rate_ppb;
+	column[5].r[at] = point->rate_uncertainty_ppb;
+	column[6].i[at] = point->utc_offset_s;
+	column[7].i[at] = point->held;
+	for (int i = 0; i < 4; i++) {
+		memset(column[8 + i].s[at], 0, sizeof(*column->s));
+		memcpy(column[8 + i].s[at], texts[i],
+		       strnlen(texts[i], sizeof(*column->s) - 1));
+	}
 	return 0;
 }
 
@@ -844,35 +836,33 @@ int incise_recorder_put_tracker(struct incise_recorder *rec,
 	return rc;
 }
 
-/* SQLite keeps NaN as NULL: not known. */
 int incise_recorder_put_frame(struct incise_recorder *rec,
 			      const struct incise_frame_record *frame,
 			      struct incise_error *err)
 {
 	struct incise_recorder_stream *stream = &rec->streams[INCISE_LEDGER_CAMERA];
-	sqlite3_stmt *stmt = rec->stmt[INSERT_FRAME];
-	struct incise_frame_record row = *frame;
-	struct incise_ledger_row entry;
-	const double seen[] = {row.length_px, row.sd_px, row.depth_mm, row.quality};
+	union incise_column *column = rec->batches[INCISE_LEDGER_CAMERA].column;
+	const double seen[] = {frame->length_px, frame->sd_px, frame->depth_mm,
+			       frame->quality};
 	struct incise_error why = {0};
+	int64_t t_ns;
+	ssize_t at;
 
-	if (take_number(stream, frame->seq, frame->t_ns, &row.t_ns, &why))
+	if (take_number(stream, frame->seq, frame->t_ns, &t_ns, &why))
 		return incise_recorder_end_stream(rec, INCISE_LEDGER_CAMERA, why.text,
 						  err);
-	sqlite3_bind_int64(stmt, 1, row.seq);
-	sqlite3_bind_int64(stmt, 2, row.t_ns);
-	sqlite3_bind_int64(stmt, 3, row.arrival_ns);
-	sqlite3_bind_int64(stmt, 4, row.pts_ms);
-	sqlite3_bind_int64(stmt, 5, row.bytes);
-	sqlite3_bind_int64(stmt, 6, row.crc);
+	at = enter(rec, INCISE_LEDGER_CAMERA, (int64_t)frame->seq, t_ns, err);
+	if (at < 0)
+		return (int)at;
+	column[2].i[at] = frame->arrival_ns;
+	column[3].i[at] = frame->pts_ms;
+	column[4].i[at] = (int64_t)frame->bytes;
+	column[5].i[at] = frame->crc;
 	for (int i = 0; i < 4; i++)
-		sqlite3_bind_double(stmt, 7 + i, seen[i]);
-	sqlite3_bind_blob(stmt, 11, row.sha256, sizeof(row.sha256), SQLITE_TRANSIENT);
-	if (incise_recorder_run(stmt) != SQLITE_OK)
-		return incise_recorder_fail(rec, err);
-	rec->stats.camera_depth_mm = row.depth_mm;
-	incise_ledger_row_frame(&entry, &row);
-	return enter(rec, stream, &entry, err);
+		column[6 + i].r[at] = isfinite(seen[i]) ? seen[i] : NAN;
+	memcpy(column[10].h[at], frame->sha256, sizeof(*column->h));
+	rec->stats.camera_depth_mm = frame->depth_mm;
+	return 0;
 }
 
 /* --- tables streams, knots and ledger ------------------------------------------------ */
@@ -949,10 +939,9 @@ int incise_recorder_write_streams(struct incise_recorder *rec, bool knots)
 	return rc;
 }
 
-static int put_block(struct incise_recorder *rec, const char *stream,
-		     const struct incise_ledger_block *block)
+static void bind_block(sqlite3_stmt *stmt, const char *stream,
+		       const struct incise_ledger_block *block)
 {
-	sqlite3_stmt *stmt = rec->stmt[INSERT_LEDGER];
 	const int64_t values[] = {block->block,	   block->first_seq, block->last_seq,
 				  block->first_ns, block->last_ns,   block->count,
 				  block->lost,	   block->crc};
@@ -960,15 +949,42 @@ static int put_block(struct incise_recorder *rec, const char *stream,
 	sqlite3_bind_text(stmt, 1, stream, -1, SQLITE_TRANSIENT);
 	for (int i = 0; i < 8; i++)
 		sqlite3_bind_int64(stmt, 2 + i, values[i]);
-	return incise_recorder_run(stmt);
 }
 
-/* A stream's block, into the ledger and the seal. */
-static int put_stream_block(struct incise_recorder *rec, int i,
-			    const struct incise_ledger_block *block)
+/* An entry of table ledger: a sealed table, or camera.mkv. */
+static int put_block(struct incise_recorder *rec, const char *stream,
+		     const struct incise_ledger_block *block)
 {
-	incise_seal_block(&rec->seal, i, block);
-	return put_block(rec, incise_ledger_forms[i].stream, block);
+	bind_block(rec->stmt[INSERT_LEDGER], stream, block);
+	return incise_recorder_run(rec->stmt[INSERT_LEDGER]);
+}
+
+/* A stream's block, with the rows of its batch, which is empty at the end. */
+static int put_stream_block(struct incise_recorder *rec, int i,
+			    struct incise_ledger_block *block)
+{
+	sqlite3_stmt *stmt = rec->stmt[INSERT_BLOCK];
+	struct incise_batch *batch = &rec->batches[i];
+	size_t bound = batch->n ? incise_batch_bound(batch) : 0, size = 0;
+	uint8_t digest[INCISE_SEAL_BYTES];
+
+	if (bound > rec->data.size || !rec->data.bytes) {
+		uint8_t *more = realloc(rec->data.bytes, 2 * bound + 1);
+
+		if (!more)
+			return SQLITE_NOMEM;
+		rec->data.bytes = more;
+		rec->data.size = 2 * bound;
+	}
+	if (batch->n)
+		size = incise_batch_encode(batch, rec->data.bytes);
+	batch->n = 0;
+	incise_ledger_crc(block, rec->data.bytes, size);
+	incise_seal_data(&rec->seal, i, block, rec->data.bytes, size, digest);
+	bind_block(stmt, incise_ledger_forms[i].stream, block);
+	sqlite3_bind_blob(stmt, 10, digest, sizeof(digest), SQLITE_TRANSIENT);
+	sqlite3_bind_blob64(stmt, 11, rec->data.bytes, size, SQLITE_STATIC);
+	return incise_recorder_run(stmt);
 }
 
 /* The head of a commit. */
@@ -1044,7 +1060,7 @@ int incise_recorder_seal(struct incise_recorder *rec, int64_t t_ns)
 {
 	int rc = SQLITE_OK;
 
-	for (int i = 0; incise_ledger_sealed[i] && rc == SQLITE_OK; i++) {
+	for (int i = 1; incise_ledger_sealed[i] && rc == SQLITE_OK; i++) {
 		struct incise_ledger_block block;
 		char stream[40];
 

@@ -12,6 +12,7 @@
 #include <incise/recording.h>
 #include <incise/rig.h>
 #include <incise/sim.h>
+#include "../../rows_sql.h"
 #include "../message.h"
 #include "../unit.h"
 
@@ -27,25 +28,54 @@ __attribute__((unused)) static int remove_entry(const char *path, const struct s
 	return remove(path);
 }
 
-/* Makes a recording of form 1, from before the ledger, of one of today. */
-#define TO_FORM_1                                                                        \
-	"CREATE TABLE old AS SELECT * FROM tracker; DROP TABLE tracker; "                \
-	"CREATE TABLE tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "          \
-	"arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, "          \
-	"z_mm REAL NOT NULL, qw REAL NOT NULL, qx REAL NOT NULL, "                       \
-	"qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL); "                    \
-	"INSERT INTO tracker SELECT seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, "   \
-	"qy, qz, status FROM old; DROP TABLE old; DROP TABLE frames; "                   \
-	"DROP TABLE streams; DROP TABLE knots; DROP TABLE ledger; DROP TABLE IF EXISTS " \
-	"wall; DROP TABLE IF EXISTS seal; PRAGMA user_version=1"
+#define FRAMES_4                                                                      \
+	"CREATE TABLE main.frames(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "   \
+	"arrival_ns INTEGER NOT NULL, pts INTEGER NOT NULL, bytes INTEGER NOT NULL, " \
+	"crc INTEGER NOT NULL, length_px REAL, sd_px REAL, depth_mm REAL, quality REAL"
+
+/* Makes a recording of form 4, with a row a sample, of one of today; the ledger has no CRCs of rows. */
+#define TO_FORM_4                                                                    \
+	"CREATE TABLE main.force(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "   \
+	"code INTEGER NOT NULL); INSERT INTO main.force SELECT * FROM temp.force; "  \
+	"CREATE TABLE main.tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, " \
+	"arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, "      \
+	"z_mm REAL NOT NULL, qw REAL NOT NULL, qx REAL NOT NULL, "                   \
+	"qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL, "                 \
+	"station INTEGER NOT NULL, button INTEGER NOT NULL); "                       \
+	"INSERT INTO main.tracker SELECT * FROM temp.tracker; "                      \
+	"CREATE TABLE main.depth(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "   \
+	"depth_mm REAL NOT NULL, velocity_mm_s REAL NOT NULL); "                     \
+	"INSERT INTO main.depth SELECT seq, t_ns, depth_mm, velocity_mm_s FROM "     \
+	"temp.depth; " FRAMES_4 ", sha256 BLOB NOT NULL); "                          \
+	"INSERT INTO main.frames SELECT * FROM temp.frames; "                        \
+	"CREATE TABLE main.wall(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "    \
+	"tai_ns INTEGER NOT NULL, uncertainty_ns REAL, rate_ppb REAL NOT NULL, "     \
+	"rate_uncertainty_ppb REAL NOT NULL, utc_offset_s INTEGER NOT NULL, "        \
+	"held INTEGER NOT NULL, source TEXT NOT NULL, reference TEXT NOT NULL, "     \
+	"leap TEXT NOT NULL, restart TEXT NOT NULL); "                               \
+	"INSERT INTO main.wall SELECT * FROM temp.wall; "                            \
+	"INSERT INTO ledger SELECT stream, block, first_seq, last_seq, first_ns, "   \
+	"last_ns, count, lost, crc FROM blocks; DROP TABLE blocks; PRAGMA user_version=4"
 
 /* Makes one of form 3, from before the seal. */
-#define TO_FORM_3                                                  \
-	"DROP TABLE seal; ALTER TABLE frames DROP COLUMN sha256; " \
-	"PRAGMA user_version=3"
+#define TO_FORM_3                                                                   \
+	TO_FORM_4 "; DROP TABLE seal; ALTER TABLE main.frames DROP COLUMN sha256; " \
+		  "PRAGMA user_version=3"
 
 /* Makes one of form 2, from before there was wall time. */
-#define TO_FORM_2 TO_FORM_3 "; DROP TABLE wall; PRAGMA user_version=2"
+#define TO_FORM_2 TO_FORM_3 "; DROP TABLE main.wall; PRAGMA user_version=2"
+
+/* Makes one of form 1, from before the ledger. */
+#define TO_FORM_1                                                                               \
+	TO_FORM_2                                                                               \
+		"; DROP TABLE main.tracker; "                                                   \
+		"CREATE TABLE main.tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "    \
+		"arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, "         \
+		"z_mm REAL NOT NULL, qw REAL NOT NULL, qx REAL NOT NULL, "                      \
+		"qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL); "                   \
+		"INSERT INTO main.tracker SELECT seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, " \
+		"qx, qy, qz, status FROM temp.tracker; DROP TABLE main.frames; "                \
+		"DROP TABLE streams; DROP TABLE knots; DROP TABLE ledger; PRAGMA user_version=1"
 
 /* For setup and teardown: a folder as the working folder, so that paths are short. */
 __attribute__((unused)) static int enter_folder(void **state)
@@ -183,13 +213,10 @@ __attribute__((unused)) static char *text_of(const char *path)
 /* Run SQL on a database, as a stranger would. */
 __attribute__((unused)) static void change(const char *file, const char *sql)
 {
-	char *text = NULL;
-	sqlite3 *db;
+	char *text;
 
-	assert_int_equal(sqlite3_open(file, &db), SQLITE_OK);
-	if (sqlite3_exec(db, sql, NULL, NULL, &text) != SQLITE_OK)
+	if (rows_sql(file, false, sql, NULL, NULL, &text))
 		fail_msg("%s: %s", sql, text);
-	sqlite3_close(db);
 }
 
 /* The same, with a format. */
@@ -207,21 +234,22 @@ __attribute__((unused, format(printf, 2, 3))) static void change_by(const char *
 	free(sql);
 }
 
+static void take_number(void *user, sqlite3_stmt *stmt)
+{
+	double *value = user;
+
+	if (isnan(*value))
+		*value = sqlite3_column_double(stmt, 0);
+}
+
 /* One number by SQL. */
 __attribute__((unused)) static double ask(const char *file, const char *sql)
 {
-	sqlite3_stmt *stmt;
-	sqlite3 *db;
-	double value;
+	double value = NAN;
+	char *text;
 
-	assert_int_equal(sqlite3_open_v2(file, &db, SQLITE_OPEN_READONLY, NULL),
-			 SQLITE_OK);
-	if (sqlite3_prepare_v2(db, sql, -1, &stmt, NULL) != SQLITE_OK ||
-	    sqlite3_step(stmt) != SQLITE_ROW)
-		fail_msg("%s: %s", sql, sqlite3_errmsg(db));
-	value = sqlite3_column_double(stmt, 0);
-	sqlite3_finalize(stmt);
-	sqlite3_close(db);
+	if (rows_sql(file, true, sql, take_number, &value, &text) || isnan(value))
+		fail_msg("%s: %s", sql, text ? text : "no row");
 	return value;
 }
 

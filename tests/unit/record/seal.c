@@ -265,7 +265,7 @@ TEST(every_key_of_meta_is_in_one_part, IN_FOLDER)
 	record("a.rec", SIM, 500 * MS);
 	change(DB, "INSERT INTO meta VALUES('tomorrow', 1)");
 	assert_int_equal(sqlite3_open(DB, &db), SQLITE_OK);
-	assert_int_equal(incise_seal_init(&seal), 0);
+	assert_int_equal(incise_seal_init(&seal, 5), 0);
 	for (int i = 0; i < INCISE_SEAL_PARTS; i++)
 		if (i < INCISE_SEAL_STREAM || i == INCISE_SEAL_META) {
 			assert_int_equal(incise_seal_table(&seal, db, i, &rows, digest),
