@@ -173,7 +173,7 @@ static void export(char **paths, int n, const struct job *job,
 	for (int i = 0; i < n; i++) {
 		paths[i] = (char *)file_operand(paths[i], FILE_RECORDING);
 		recordings[i] = recording_open(paths[i]);
-		recording_intact(paths[i], job->damaged, &err);
+		recording_intact(paths[i], true, job->damaged, &err);
 		if (err.code)
 			cli_fail_with(&err);
 	}

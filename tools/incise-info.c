@@ -410,11 +410,11 @@ static void recording_json(const struct incise_recording_info *info, const char 
 	bool force = has_stream(info, "force"), tracker = has_stream(info, "tracker");
 
 	json_print(json_pack(
-		"{so so so so so sb so ss sb sf so so s{sI sI sI} s{sI sI} sI so s{so so so} so so so}",
+		"{so so so so so sb sb so ss sb sf so so s{sI sI sI} s{sI sI} sI so s{so so so} so so so}",
 		"camera_codec", json_text_or_null(codec), "seals", seals, "calibrations",
 		calibrations, "wall",
 		wall ? wall_json(wall, info->start_ns, info->end_ns) : json_null(),
-		"members", members, "intact", intact, "streams",
+		"members", members, "intact", intact, "summary", info->summary, "streams",
 		stream_json(info->streams, info->n_streams), "kind", "recording",
 		"complete", info->complete, "seconds",
 		(info->end_ns - info->start_ns) * 1e-9, "started",
@@ -544,6 +544,8 @@ static void recording_text(const char *path, const struct incise_recording_info 
 		puts("wall time  none");
 	seal_report_print(seals);
 	json_decref(seals);
+	if (info->summary)
+		printf("samples  not read: 'incise verify %s' proves them\n", path);
 	stream_table(info->streams, info->n_streams);
 }
 
@@ -572,7 +574,7 @@ static void show_recording(const char *path, bool json, bool damaged)
 		cli_fail_with(&err);
 	err = (struct incise_error){0};
 	codec = camera_codec(recording);
-	intact = recording_intact(path, damaged, &err);
+	intact = recording_intact(path, false, damaged, &err);
 	if (json)
 		recording_json(&info, codec, intact, wall,
 			       n ? joined_json(members, n) : json_null(),

@@ -80,7 +80,7 @@ int main(int argc, char **argv)
 		cli_usage("missing -o JOINED.rec");
 	for (int i = optind; i < argc; i++) {
 		argv[i] = (char *)file_operand(argv[i], FILE_RECORDING);
-		recording_intact(argv[i], job.damaged, &err);
+		recording_intact(argv[i], true, job.damaged, &err);
 		if (err.code)
 			cli_fail_with(&err);
 	}

@@ -105,7 +105,7 @@ static void compare_rows(struct step *step, const struct step *next)
 	    next->origin->depth == step->origin->depth + 1)
 		then = next->origin->sha256;
 	find_active(step->found, active);
-	if (recording_altered(step->found, &err))
+	if (recording_altered(step->found, true, &err))
 		step->why = cli_text("%s", err.text);
 	else if (strcmp(active, then))
 		step->why =

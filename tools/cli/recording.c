@@ -52,12 +52,13 @@ static void find_first(void *user, const struct incise_verify_finding *finding)
 	}
 }
 
-int recording_altered(const char *path, struct incise_error *err)
+int recording_altered(const char *path, bool samples, struct incise_error *err)
 {
 	struct first first = {0};
 	const struct incise_verify_watch watch = {.found = find_first, .user = &first};
 	struct incise_verify_report report;
-	int rc = incise_verify_rows(path, &watch, &report, err);
+	int rc = (samples ? incise_verify_rows : incise_verify_tables)(path, &watch,
+								       &report, err);
 
 	if (rc == -ENODATA) {
 		*err = (struct incise_error){0};
@@ -69,10 +70,11 @@ int recording_altered(const char *path, struct incise_error *err)
 	return rc ? rc : first.found;
 }
 
-bool recording_intact(const char *path, bool damaged, struct incise_error *err)
+bool recording_intact(const char *path, bool samples, bool damaged,
+		      struct incise_error *err)
 {
 	struct incise_error found = {0};
-	int altered = recording_altered(path, &found);
+	int altered = recording_altered(path, samples, &found);
 
 	if (!altered)
 		return true;

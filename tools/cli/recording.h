@@ -21,17 +21,18 @@ struct incise_recording *recording_open(const char *path);
 	}
 
 /*
- * Compare the rows of a recording with its ledger. Returns 0, also for one from before there was a
- * ledger; 1 and the first difference; -errno and the reason.
+ * Compare a recording with its ledger: all @samples, or the tables alone where its summary is enough. Returns
+ * 0, also for one from before there was a ledger; 1 and the first difference; -errno and the reason.
  */
-int recording_altered(const char *path, struct incise_error *err);
+int recording_altered(const char *path, bool samples, struct incise_error *err);
 
 /*
  * Whether the rows of a recording are those that were recorded, by its ledger. If not, says what
  * is wrong first: as a warning with @damaged, else as an error in @err, for a caller that fails
  * the program with it. A recording from before there was a ledger is taken as it is.
  */
-bool recording_intact(const char *path, bool damaged, struct incise_error *err);
+bool recording_intact(const char *path, bool samples, bool damaged,
+		      struct incise_error *err);
 
 /* Remove a recording; a folder with anything else in it stays. */
 void recording_remove(const char *path);

@@ -78,6 +78,8 @@ struct incise_recording_info {
 	bool newtons; /**< the force channel measures N: read full_scale_V, offset_V as N */
 	/** UTC of start_ns, ns since 1970, by the wall clock to one second; 0: not known */
 	int64_t start_utc_ns;
+	/** cuts and largest values are those that the recorder found, which are sealed; no sample was read */
+	bool summary;
 };
 
 /**
@@ -106,7 +108,10 @@ INCISE_API int incise_recording_recover(const char *path, const char *output,
 /** Its name, which cuts and origins have: that of its folder without .rec. It belongs to the recording. */
 INCISE_API const char *incise_recording_name(const struct incise_recording *recording);
 
-/** Get the contents. @return 0, -EINVAL (an invalid row), -EIO. */
+/**
+ * Get the contents: of a complete recording that has not been recalibrated, from format 5 on, from its summary,
+ * else of all samples. @return 0, -EINVAL (an invalid row), -EIO.
+ */
 INCISE_API int incise_recording_info(struct incise_recording *recording,
 				     struct incise_recording_info *info,
 				     struct incise_error *err);

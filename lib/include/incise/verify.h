@@ -120,5 +120,15 @@ INCISE_API int incise_verify_rows(const char *path,
 				  struct incise_verify_report *report,
 				  struct incise_error *err);
 
+/**
+ * Verify the tables that are sealed, of which incise_recording_info() takes the summary, without a sample: its
+ * time does not grow with the recording. Recordings that have no summary are verified as by
+ * incise_verify_rows().
+ */
+INCISE_API int incise_verify_tables(const char *path,
+				    const struct incise_verify_watch *watch,
+				    struct incise_verify_report *report,
+				    struct incise_error *err);
+
 INCISE_END_DECLS
 #endif

@@ -60,8 +60,8 @@ static int step_depth(struct incise_cuts *cuts, struct incise_error *err)
 	struct incise_cut_depth next;
 	int rc = incise_rows_next(&cuts->depth, err);
 
-	cuts->before = cuts->after;
-	cuts->after.t_ns = INCISE_TIME_NONE;
+	cuts->follow.before = cuts->follow.after;
+	cuts->follow.after.t_ns = INCISE_TIME_NONE;
 	if (rc <= 0)
 		return rc;
 	next = (struct incise_cut_depth){
@@ -74,7 +74,7 @@ static int step_depth(struct incise_cuts *cuts, struct incise_error *err)
 		return bad_row(&cuts->depth, "depth_mm is not a depth", err);
 	if (!(next.velocity_mm_s >= 0 && next.velocity_mm_s < 1e12))
 		return bad_row(&cuts->depth, "velocity_mm_s is not a speed", err);
-	cuts->after = next;
+	cuts->follow.after = next;
 	cuts->depth_max_mm = fmax(cuts->depth_max_mm, next.depth_mm);
 	return 1;
 }
@@ -94,8 +94,8 @@ int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recordin
 
 	*cuts = (struct incise_cuts){
 		.recording = recording,
-		.before.t_ns = INCISE_TIME_NONE,
-		.after.t_ns = INCISE_TIME_NONE,
+		.follow.before.t_ns = INCISE_TIME_NONE,
+		.follow.after.t_ns = INCISE_TIME_NONE,
 		.depth_max_mm = -INFINITY,
 	};
 	incise_recording_force(recording, NULL, &cuts->scale);
@@ -116,10 +116,10 @@ void incise_cuts_close(struct incise_cuts *cuts)
 	incise_rows_close(&cuts->depth);
 }
 
-/* Depth and velocity at the time of a force sample; false if no row is near. */
-static bool interpolate(const struct incise_cuts *cuts, struct incise_cut_sample *sample)
+bool incise_cut_between(struct incise_cut_follow *follow,
+			struct incise_cut_sample *sample)
 {
-	const struct incise_cut_depth *a = &cuts->before, *b = &cuts->after;
+	const struct incise_cut_depth *a = &follow->before, *b = &follow->after;
 	double share = incise_row_share(a->t_ns, b->t_ns, sample->t_ns);
 
 	if (isnan(share))
@@ -127,6 +127,9 @@ static bool interpolate(const struct incise_cuts *cuts, struct incise_cut_sample
 	sample->depth_mm = a->depth_mm + share * (b->depth_mm - a->depth_mm);
 	sample->velocity_mm_s =
 		a->velocity_mm_s + share * (b->velocity_mm_s - a->velocity_mm_s);
+	if (!incise_cut_step(&follow->cut, sample->depth_mm))
+		return false;
+	sample->cut = follow->cut.count;
 	return true;
 }
 
@@ -137,24 +140,22 @@ int incise_cuts_next(struct incise_cuts *cuts, struct incise_cut_sample *sample,
 	int rc;
 
 	while ((rc = step_force(cuts, &sample->t_ns, &code, err)) > 0) {
-		while ((cuts->after.t_ns != INCISE_TIME_NONE || !cuts->depth.n) &&
-		       cuts->after.t_ns <= sample->t_ns) {
+		while ((cuts->follow.after.t_ns != INCISE_TIME_NONE || !cuts->depth.n) &&
+		       cuts->follow.after.t_ns <= sample->t_ns) {
 			rc = step_depth(cuts, err);
 			if (rc < 0)
 				return rc;
 			if (!rc)
 				break;
 		}
-		if (!interpolate(cuts, sample) ||
-		    !incise_cut_step(&cuts->cut, sample->depth_mm))
+		if (!incise_cut_between(&cuts->follow, sample))
 			continue;
-		sample->cut = cuts->cut.count;
 		sample->force_N = code * cuts->scale.n_per_code - cuts->scale.zero_N;
 		sample->clipped = code == 0 || code == cuts->scale.top;
 		return 1;
 	}
 	/* Rows behind the last force sample are checked too. */
-	while (!rc && cuts->after.t_ns != INCISE_TIME_NONE)
+	while (!rc && cuts->follow.after.t_ns != INCISE_TIME_NONE)
 		rc = step_depth(cuts, err) < 0 ? -errno : 0;
 	return rc;
 }
@@ -226,21 +227,83 @@ static int follow_depth(struct incise_cuts *cuts, double *depth_max_mm,
 	int rc;
 
 	while ((rc = step_depth(cuts, err)) > 0)
-		if (incise_cut_step(&cuts->cut, cuts->after.depth_mm))
-			*depth_max_mm = fmax(*depth_max_mm, cuts->after.depth_mm);
+		if (incise_cut_step(&cuts->follow.cut, cuts->follow.after.depth_mm))
+			*depth_max_mm = fmax(*depth_max_mm, cuts->follow.after.depth_mm);
 	return rc;
 }
 
-int incise_recording_info(struct incise_recording *rec,
-			  struct incise_recording_info *info, struct incise_error *err)
+/* By all rows. Returns 0 or -errno. */
+static int read_cuts(struct incise_recording *rec, struct incise_recording_info *info,
+		     struct incise_error *err)
 {
 	struct incise_cut_sample sample;
 	struct incise_cuts cuts;
 	int rc = check_tracker(rec, err);
 
-	*info = rec->meta;
+	if (!rc)
+		rc = incise_cuts_open(&cuts, rec, err);
 	if (rc)
 		return rc;
+	while ((rc = incise_cuts_next(&cuts, &sample, err)) > 0) {
+		info->depth_max_mm = fmax(info->depth_max_mm, sample.depth_mm);
+		info->force_max_N =
+			fmax(info->force_max_N, sample.force_N); /* NaN: no zero */
+	}
+	/* Without force samples, by the rows of the depth themselves. */
+	if (!rc && !info->force)
+		rc = follow_depth(&cuts, &info->depth_max_mm, err);
+	info->cuts = cuts.follow.cut.count;
+	info->start_ns = cuts.first_ns;
+	info->end_ns = cuts.last_ns;
+	incise_cuts_close(&cuts);
+	return rc;
+}
+
+/*
+ * By what the recorder has found: of a recording as it was made, from format 5 on. 1, 0: there is no
+ * summary; -errno.
+ */
+static int take_summary(struct incise_recording *rec, struct incise_recording_info *info,
+			struct incise_error *err)
+{
+	struct incise_row_times times;
+	int64_t seq[2], t_ns[2];
+	double cuts, depth_mm, force_N;
+	int rc;
+
+	if (rec->session || rec->form < 5 || !rec->meta.complete || rec->recalibrated)
+		return 0;
+	if (incise_recording_number(rec, "cuts", &cuts, err) ||
+	    incise_recording_number(rec, "depth_max_mm", &depth_mm, err) ||
+	    incise_recording_number(rec, "force_max_N", &force_N, err))
+		return -errno;
+	if (!(cuts >= 0 && cuts < 1e9) || isnan(depth_mm) || isnan(force_N))
+		return 0;
+	for (int i = 0; i < 2 && info->force; i++) {
+		rc = incise_source_end(rec, "force", i, &seq[i], &t_ns[i], NULL, err);
+		if (rc <= 0)
+			return rc;
+	}
+	rc = info->force ? incise_row_times_open(&times, rec, "force", err) : 0;
+	if (rc)
+		return rc;
+	if (info->force &&
+	    (!incise_row_times_next(&times, seq[0], t_ns[0], &info->start_ns) ||
+	     !incise_row_times_next(&times, seq[1], t_ns[1], &info->end_ns)))
+		return 0;
+	info->cuts = (int)cuts;
+	info->depth_max_mm = depth_mm;
+	info->force_max_N = force_N;
+	info->summary = true;
+	return 1;
+}
+
+int incise_recording_info(struct incise_recording *rec,
+			  struct incise_recording_info *info, struct incise_error *err)
+{
+	int rc;
+
+	*info = rec->meta;
 	rc = incise_recording_streams(rec, info->streams, err);
 	if (rc < 0)
 		return rc;
@@ -252,22 +315,13 @@ int incise_recording_info(struct incise_recording *rec,
 							? "frames"
 							: info->streams[i].name),
 			&info->streams[i]);
-	rc = incise_cuts_open(&cuts, rec, err);
-	if (rc)
-		return rc;
 	info->depth_max_mm = 0;
 	info->force_max_N = 0;
-	while ((rc = incise_cuts_next(&cuts, &sample, err)) > 0) {
-		info->depth_max_mm = fmax(info->depth_max_mm, sample.depth_mm);
-		info->force_max_N =
-			fmax(info->force_max_N, sample.force_N); /* NaN: no zero */
-	}
-	/* Without force samples, by the rows of the depth themselves. */
-	if (!rc && !info->force)
-		rc = follow_depth(&cuts, &info->depth_max_mm, err);
-	info->cuts = cuts.cut.count;
-	info->start_ns = cuts.first_ns;
-	info->end_ns = cuts.last_ns;
+	rc = take_summary(rec, info, err);
+	if (!rc)
+		rc = read_cuts(rec, info, err);
+	if (rc < 0)
+		return rc;
 	/* Without a force channel, the tracker's. */
 	if (!info->force &&
 	    incise_session_span(incise_recording_member(rec, "tracker"), "tracker",
@@ -278,6 +332,5 @@ int incise_recording_info(struct incise_recording *rec,
 		info->start_ns = incise_session_time(map, info->start_ns);
 		info->end_ns = incise_session_time(map, info->end_ns);
 	}
-	incise_cuts_close(&cuts);
-	return rc ? rc : find_started(rec, info, err);
+	return find_started(rec, info, err);
 }

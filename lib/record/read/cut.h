@@ -41,11 +41,20 @@ struct incise_cut_depth {
 	double depth_mm, velocity_mm_s;
 };
 
+/* The depths around a force sample, and the cuts by it. */
+struct incise_cut_follow {
+	struct incise_cut_count cut;
+	struct incise_cut_depth before, after;
+};
+
+/* Depth and velocity at sample->t_ns, to the sample. False: no depth is near, or not in a cut. */
+bool incise_cut_between(struct incise_cut_follow *follow,
+			struct incise_cut_sample *sample);
+
 struct incise_cuts {
 	struct incise_recording *recording;
 	struct incise_rows force, depth;
-	struct incise_cut_count cut;
-	struct incise_cut_depth before, after; /* the force sample */
+	struct incise_cut_follow follow;
 	struct incise_recording_force scale;
 	int64_t first_ns, last_ns; /* force samples so far */
 	double depth_max_mm; /* of all depth rows so far; -INFINITY before the first */

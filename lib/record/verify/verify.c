@@ -310,7 +310,7 @@ static int check_seals(struct incise_verification *verify)
 			compare(verify, stream, what, "rows", &made);
 		rc = incise_verify_progress(verify, false);
 	}
-	if (!rc && verify->camera && !verify->rows_only)
+	if (!rc && verify->camera && verify->level == INCISE_VERIFY_ALL)
 		check_file(verify);
 	return rc;
 }
@@ -385,19 +385,18 @@ static int check_streams(struct incise_verification *verify)
 	if (!rc)
 		rc = check_wall(verify);
 	verify->rows_altered = verify->altered;
-	if (!rc && verify->camera && !verify->rows_only)
+	if (!rc && verify->camera && verify->level == INCISE_VERIFY_ALL)
 		rc = incise_verify_camera(verify);
 	return rc;
 }
 
 static int verify_one(const char *path, const struct incise_verify_watch *watch,
-		      bool rows_only, const struct incise_seal_statement *statement,
+		      enum incise_verify_level level,
+		      const struct incise_seal_statement *statement,
 		      struct incise_verify_report *report, struct incise_error *err)
 {
-	struct incise_verification verify = {.watch = watch,
-					     .report = report,
-					     .rows_only = rows_only,
-					     .statement = statement};
+	struct incise_verification verify = {
+		.watch = watch, .report = report, .level = level, .statement = statement};
 	bool altered;
 	int rc;
 
@@ -416,12 +415,17 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 	report->interrupted = !verify.recording->meta.complete;
 	verify.hashed = verify.recording->form >= 4 &&
 			!incise_seal_init(&verify.rows_seal, verify.recording->form);
-	verify.origin_ns =
-		ask(&verify, 0,
-		    "SELECT min(first_ns) FROM %s WHERE count > 0 AND stream IN (" RIG
-		    ")",
-		    entries(&verify));
-	rc = check_streams(&verify);
+	if (level != INCISE_VERIFY_TABLES || report->interrupted)
+		verify.origin_ns = ask(
+			&verify, 0,
+			"SELECT min(first_ns) FROM %s WHERE count > 0 AND stream IN (" RIG
+			")",
+			entries(&verify));
+	/* Where no sample is read the recorder's summary has to be enough. */
+	if (verify.recording->form < 5 || report->interrupted)
+		level = verify.level =
+			level == INCISE_VERIFY_TABLES ? INCISE_VERIFY_ROWS : level;
+	rc = level == INCISE_VERIFY_TABLES ? 0 : check_streams(&verify);
 	if (!rc) {
 		if (report->interrupted && verify.recording->form < 5)
 			check_depth(&verify);
@@ -433,9 +437,9 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 		verify.tables_altered = verify.altered;
 		verify.altered |= altered;
 	}
-	if (!rc && verify.recording->form >= 4)
+	if (!rc && verify.recording->form >= 4 && level != INCISE_VERIFY_TABLES)
 		rc = incise_verify_seal(&verify);
-	if (!rc && !rows_only) {
+	if (!rc && level == INCISE_VERIFY_ALL) {
 		rc = check_pages(&verify);
 		check_length(&verify);
 	}
@@ -444,7 +448,7 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 		goto out;
 	}
 	/* Of altered rows nothing follows. */
-	if (!verify.altered)
+	if (!verify.altered && level != INCISE_VERIFY_TABLES)
 		incise_verify_times(&verify);
 	report_ends(&verify);
 	report_interruption(&verify);
@@ -529,7 +533,8 @@ static void add_report(struct incise_verify_report *to,
 
 /* Each member by itself; the session's own tables were checked when it was opened. */
 static int verify_members(const struct incise_session *session,
-			  const struct incise_verify_watch *watch, bool rows_only,
+			  const struct incise_verify_watch *watch,
+			  enum incise_verify_level level,
 			  struct incise_verify_report *report, struct incise_error *err)
 {
 	int rc = 0;
@@ -543,8 +548,8 @@ static int verify_members(const struct incise_session *session,
 							  &member};
 		struct incise_verify_report found;
 
-		rc = verify_one(session->members[i]->path, &named, rows_only, NULL,
-				&found, err);
+		rc = verify_one(session->members[i]->path, &named, level, NULL, &found,
+				err);
 		if (!rc)
 			add_report(report, &found);
 	}
@@ -552,7 +557,7 @@ static int verify_members(const struct incise_session *session,
 }
 
 static int verify_it(const char *path, const struct incise_verify_watch *watch,
-		     bool rows_only, struct incise_verify_report *report,
+		     enum incise_verify_level level, struct incise_verify_report *report,
 		     struct incise_error *err)
 {
 	struct incise_recording *recording = incise_recording_open_original(path, err);
@@ -562,26 +567,32 @@ static int verify_it(const char *path, const struct incise_verify_watch *watch,
 	if (!recording)
 		return -errno;
 	rc = recording->session
-		     ? verify_members(recording->session, watch, rows_only, report, err)
+		     ? verify_members(recording->session, watch, level, report, err)
 		     : 0;
 	if (recording->session) {
 		incise_recording_close(recording);
 		return rc;
 	}
 	incise_recording_close(recording);
-	return verify_one(path, watch, rows_only, NULL, report, err);
+	return verify_one(path, watch, level, NULL, report, err);
 }
 
 int incise_verify(const char *path, const struct incise_verify_watch *watch,
 		  struct incise_verify_report *report, struct incise_error *err)
 {
-	return verify_it(path, watch, false, report, err);
+	return verify_it(path, watch, INCISE_VERIFY_ALL, report, err);
 }
 
 int incise_verify_rows(const char *path, const struct incise_verify_watch *watch,
 		       struct incise_verify_report *report, struct incise_error *err)
 {
-	return verify_it(path, watch, true, report, err);
+	return verify_it(path, watch, INCISE_VERIFY_ROWS, report, err);
+}
+
+int incise_verify_tables(const char *path, const struct incise_verify_watch *watch,
+			 struct incise_verify_report *report, struct incise_error *err)
+{
+	return verify_it(path, watch, INCISE_VERIFY_TABLES, report, err);
 }
 
 int incise_seal_compare(const char *path, const char *text, size_t length,
@@ -606,5 +617,6 @@ int incise_seal_compare(const char *path, const char *text, size_t length,
 	incise_recording_close(recording);
 	if (!rc)
 		rc = incise_seal_read(&statement, text, length, err);
-	return rc ? rc : verify_one(path, watch, false, &statement, report, err);
+	return rc ? rc
+		  : verify_one(path, watch, INCISE_VERIFY_ALL, &statement, report, err);
 }

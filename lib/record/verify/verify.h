@@ -28,7 +28,11 @@ struct incise_verification {
 	int64_t origin_ns;	  /* time 0 of the texts: the first row */
 	int64_t reported_ns;	  /* last report of progress */
 	uint64_t rows, rows_done; /* a frame counts as some rows */
-	bool rows_only;		  /* not camera.mkv, nor all pages */
+	enum incise_verify_level {
+		INCISE_VERIFY_ALL,
+		INCISE_VERIFY_ROWS,   /* not camera.mkv, nor all pages */
+		INCISE_VERIFY_TABLES, /* nor samples */
+	} level;
 	bool camera;
 	uint64_t frames; /* rows of table frames */
 	bool altered;	 /* a finding other than losses and an interruption */

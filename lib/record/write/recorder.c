@@ -310,6 +310,7 @@ static void recorder_free(struct incise_recorder *rec)
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
 		incise_batch_free(&rec->batches[i]);
 	free(rec->data.bytes);
+	free(rec->summary.waiting);
 	if (rec->folder >= 0)
 		close(rec->folder);
 	if (rec->parent >= 0)
@@ -432,6 +433,7 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	incise_rig_surface(rig, point_mm, normal);
 	incise_depth_init(&rec->depth, point_mm, normal);
 	incise_recorder_start_streams(rec);
+	incise_recorder_start_summary(&rec->summary);
 	incise_ledger_init(&rec->wall.ledger);
 	rc = incise_recorder_split_path(rec, path, err);
 	if (!rc)
@@ -694,7 +696,8 @@ static int complete(struct incise_recorder *rec, struct incise_error *err)
 	if (!rc)
 		rc = commit(rec, rec->commit_ns, true, err);
 	/* The seals are over all rows, those of this commit included. */
-	if (!rc && (incise_recorder_set_integer(rec, "complete", 1) != SQLITE_OK ||
+	if (!rc && (incise_recorder_write_summary(rec) != SQLITE_OK ||
+		    incise_recorder_set_integer(rec, "complete", 1) != SQLITE_OK ||
 		    incise_recorder_seal(rec, rec->commit_ns) != SQLITE_OK))
 		rc = incise_recorder_fail(rec, err);
 	if (!rc)

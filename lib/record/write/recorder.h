@@ -4,6 +4,7 @@
  *
  *     recorder.c            start, poll, commits and end; the camera
  *     recorder_rows.c       streams: from samples to blocks; zero; pretrigger
+ *     recorder_summary.c    cuts, largest depth and force
  *     recorder_database.c   the database and its tables meta and events
  *     recorder_folder.c     NAME.rec.part, its lock and its name; free space
  */
@@ -79,6 +80,18 @@ struct incise_recorder_zero {
 	int64_t tracker_ns; /* last record */
 };
 
+/* What info says of all samples: force waits for the depths around it. */
+struct incise_recorder_summary {
+	struct incise_cut_follow follow;
+	struct incise_recorder_force {
+		int64_t t_ns;
+		int32_t code;
+	} * waiting;
+	size_t n, capacity;
+	double depth_max_mm;	       /* in a cut */
+	int32_t code_least, code_most; /* in cuts; least above most: none */
+};
+
 /* Rows of the last second before the trigger. */
 struct incise_recorder_pretrigger {
 	struct incise_ring force, tracker;
@@ -143,6 +156,7 @@ struct incise_recorder {
 	} data; /* of a block that is written */
 	struct incise_depth depth;
 	struct incise_cut_count cut;
+	struct incise_recorder_summary summary;
 	struct incise_recorder_zero zero;
 	struct incise_recorder_pace pace;
 	struct incise_recorder_pretrigger pretrigger;
@@ -243,6 +257,19 @@ int incise_recorder_write_ledger(struct incise_recorder *rec, int64_t t_ns, bool
  * complete. Returns an SQLite code.
  */
 int incise_recorder_seal(struct incise_recorder *rec, int64_t t_ns);
+
+/* --- recorder_summary.c ------------------------------------------------------------- */
+
+void incise_recorder_start_summary(struct incise_recorder_summary *summary);
+
+/* A sample of force, and a depth, by their times as they are recorded. */
+void incise_recorder_follow_force(struct incise_recorder *rec, int64_t t_ns,
+				  int32_t code);
+void incise_recorder_follow_depth(struct incise_recorder *rec,
+				  const struct incise_depth_row *row);
+
+/* Write it to table meta, at the end. Returns an SQLite code. */
+int incise_recorder_write_summary(struct incise_recorder *rec);
 
 /* --- recorder_database.c ----------------------------------------------------------- */
 

@@ -406,6 +406,7 @@ static int write_force(struct incise_recorder *rec, const struct force_row *row,
 	if (at < 0)
 		return (int)at;
 	rec->batches[INCISE_LEDGER_FORCE].column[2].i[at] = row->code;
+	incise_recorder_follow_force(rec, row->t_ns, row->code);
 	rec->stats.force_clipped += row->code == 0 || row->code == top;
 	return 0;
 }
@@ -417,6 +418,7 @@ static int count_depth(struct incise_recorder *rec, const struct incise_depth_ro
 	bool before = rec->cut.inside;
 
 	rec->stats.depth++;
+	incise_recorder_follow_depth(rec, row);
 	if (incise_cut_step(&rec->cut, row->depth_mm) == before || !rec->cuts)
 		return 0;
 	return incise_recorder_note_at(rec, row->t_ns, "cut", "cut %d %s", rec->cut.count,

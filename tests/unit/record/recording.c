@@ -263,6 +263,44 @@ TEST(half_a_page_beside_a_log, IN_FOLDER)
 	}
 }
 
+/* The recorder's summary is what readers find of all samples, but for the times of the capture. */
+TEST(a_summary_is_that_of_the_samples, IN_FOLDER)
+{
+	static const struct {
+		const char *spec;
+		int64_t duration_ns;
+	} cases[] = {
+		{SHORT_SCRIPT, 0},
+		{SHORT_SCRIPT ",seed=2,tracker_hz=60,tracker_jitter_ms=5", 0},
+		{SHORT_SCRIPT ",seed=3,force_hz=500,tracker_hz=240,depth_mm=5", 0},
+		{SHORT_SCRIPT ",seed=4", 4000 * MS},
+		{SHORT_SCRIPT ",seed=5",
+		 300 * MS}, /* no cut, and a zero of what there is */
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
+		struct incise_recording_info summary, all;
+
+		record("a.rec", cases[i].spec, cases[i].duration_ns);
+		succeeds(!read_all("a.rec", &summary, &err));
+		assert_true(summary.summary);
+		change(DB, TO_FORM_4);
+		succeeds(!read_all("a.rec", &all, &err));
+		assert_false(all.summary);
+		assert_int_equal(summary.cuts, all.cuts);
+		assert_int_equal(summary.start_ns, all.start_ns);
+		assert_int_equal(summary.end_ns, all.end_ns);
+		assert_int_equal(summary.depth, all.depth);
+		assert_string_equal(summary.started, all.started);
+		if (fabs(summary.depth_max_mm - all.depth_max_mm) > 0.05 ||
+		    fabs(summary.force_max_N - all.force_max_N) > 0.01 * all.force_max_N)
+			fail_msg("%s: %g mm, %g N; %g mm, %g N", cases[i].spec,
+				 summary.depth_max_mm, summary.force_max_N,
+				 all.depth_max_mm, all.force_max_N);
+		assert_int_equal(system("rm -r a.rec"), 0);
+	}
+}
+
 /* Each change alone, on a fresh copy of a good recording. */
 TEST(damage_is_found, IN_FOLDER)
 {
