@@ -276,6 +276,19 @@ static void rows_store(sqlite3 *db, const struct incise_ledger_form *form)
 	incise_batch_free(&batch);
 }
 
+/* Whether SQL changes rows of a table. */
+static int rows_authorize(void *changed, int action, const char *table, const char *a,
+			  const char *b, const char *c)
+{
+	const int stream = table ? incise_source_find(table) : -1;
+
+	(void)a, (void)b, (void)c;
+	if (stream >= 0 && (action == SQLITE_INSERT || action == SQLITE_UPDATE ||
+			    action == SQLITE_DELETE))
+		((bool *)changed)[stream] = true;
+	return SQLITE_OK;
+}
+
 /*
  * Run SQL on a file, of a recording or not; @row is called with each row. Returns an SQLite code, and a
  * message to be freed with sqlite3_free().
@@ -286,6 +299,7 @@ __attribute__((unused)) static int rows_sql(const char *file, bool readonly,
 					    void *user, char **message)
 {
 	bool loaded[INCISE_SOURCE_DEPTH + 1] = {false};
+	bool changed[INCISE_SOURCE_DEPTH + 1] = {false};
 	sqlite3_stmt *stmt;
 	sqlite3 *db;
 	int rc = sqlite3_open_v2(file, &db,
@@ -312,6 +326,7 @@ __attribute__((unused)) static int rows_sql(const char *file, bool readonly,
 		}
 		sqlite3_exec(db, "COMMIT", NULL, NULL, NULL);
 	}
+	sqlite3_set_authorizer(db, rows_authorize, changed);
 	while (rc == SQLITE_OK && *sql) {
 		rc = sqlite3_prepare_v2(db, sql, -1, &stmt, &sql);
 		while (rc == SQLITE_OK && stmt && sqlite3_step(stmt) == SQLITE_ROW)
@@ -322,10 +337,11 @@ __attribute__((unused)) static int rows_sql(const char *file, bool readonly,
 	}
 	if (rc != SQLITE_OK)
 		*message = sqlite3_mprintf("%s", sqlite3_errmsg(db));
+	sqlite3_set_authorizer(db, NULL, NULL);
 	if (rc == SQLITE_OK)
 		sqlite3_exec(db, "BEGIN", NULL, NULL, NULL);
 	for (int i = 0; i < INCISE_SOURCE_DEPTH && rc == SQLITE_OK && !readonly; i++)
-		if (loaded[i])
+		if (loaded[i] && changed[i])
 			rows_store(db, incise_source_form(i));
 	if (rc == SQLITE_OK)
 		sqlite3_exec(db, "COMMIT", NULL, NULL, NULL);

@@ -170,7 +170,7 @@ teardown() {
 	failed_with none.scene
 	run --separate-stderr incise replay liver.rec liver.scene --log no/folder/t.csv
 	failed_with no/folder
-	sqlite3 liver.rec/recording.db "UPDATE tracker SET x_mm = 'far' WHERE seq = 100"
+	sqlite3 liver.rec/recording.db "UPDATE tracker SET x_mm = 9e999 WHERE seq = 100"
 	run --separate-stderr incise replay liver.rec liver.scene --log t.csv
 	failed_with liver.rec "damaged" "row 100"
 	[ ! -e t.csv ]
