@@ -276,7 +276,7 @@ static void rows_store(sqlite3 *db, const struct incise_ledger_form *form)
 	incise_batch_free(&batch);
 }
 
-/* Whether SQL changes rows of a table. */
+/* Note which tables SQL changes. */
 static int rows_authorize(void *changed, int action, const char *table, const char *a,
 			  const char *b, const char *c)
 {
@@ -290,43 +290,68 @@ static int rows_authorize(void *changed, int action, const char *table, const ch
 }
 
 /*
- * Run SQL on a file, of a recording or not; @row is called with each row. Returns an SQLite code, and a
- * message to be freed with sqlite3_free().
+ * Open a file, of a recording or not, with the tables that @sql names, NULL: all, and say which they are.
+ * NULL: SQLite cannot.
+ */
+static sqlite3 *rows_open(const char *file, bool readonly, const char *sql,
+			  bool loaded[INCISE_SOURCE_DEPTH + 1])
+{
+	sqlite3 *db;
+
+	memset(loaded, 0, INCISE_SOURCE_DEPTH + 1);
+	if (sqlite3_open_v2(file, &db,
+			    readonly ? SQLITE_OPEN_READONLY
+				     : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE,
+			    NULL) != SQLITE_OK) {
+		sqlite3_close(db);
+		return NULL;
+	}
+	if (rows_number(db, "PRAGMA user_version") < 5 ||
+	    rows_number(db, "SELECT count(*) FROM main.sqlite_master WHERE name = "
+			    "'blocks'") != 1)
+		return db;
+	sqlite3_exec(db, "BEGIN", NULL, NULL, NULL);
+	for (int i = 0; i <= INCISE_SOURCE_DEPTH; i++) {
+		const struct incise_ledger_form *form = incise_source_form(i);
+		sqlite3_stmt *insert;
+
+		loaded[i] = !sql || rows_has_word(sql, form->table);
+		insert = loaded[i] ? rows_table(db, form) : NULL;
+		if (loaded[i] && i < INCISE_SOURCE_DEPTH)
+			rows_load(db, insert, form);
+		else if (loaded[i])
+			rows_load_depth(insert, file);
+		sqlite3_finalize(insert);
+	}
+	sqlite3_exec(db, "COMMIT", NULL, NULL, NULL);
+	return db;
+}
+
+/* The same to look at all tables. */
+__attribute__((unused)) static sqlite3 *rows_look(const char *file)
+{
+	bool loaded[INCISE_SOURCE_DEPTH + 1];
+
+	return rows_open(file, true, NULL, loaded);
+}
+
+/*
+ * Run SQL; @row is called with each row. Returns an SQLite code, and a message to be freed with
+ * sqlite3_free().
  */
 __attribute__((unused)) static int rows_sql(const char *file, bool readonly,
 					    const char *sql,
 					    void (*row)(void *user, sqlite3_stmt *stmt),
 					    void *user, char **message)
 {
-	bool loaded[INCISE_SOURCE_DEPTH + 1] = {false};
-	bool changed[INCISE_SOURCE_DEPTH + 1] = {false};
+	bool loaded[INCISE_SOURCE_DEPTH + 1], changed[INCISE_SOURCE_DEPTH + 1] = {false};
+	sqlite3 *db = rows_open(file, readonly, sql, loaded);
+	int rc = db ? SQLITE_OK : SQLITE_CANTOPEN;
 	sqlite3_stmt *stmt;
-	sqlite3 *db;
-	int rc = sqlite3_open_v2(file, &db,
-				 readonly ? SQLITE_OPEN_READONLY
-					  : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE,
-				 NULL);
 
 	*message = NULL;
-	if (rc == SQLITE_OK && rows_number(db, "PRAGMA user_version") >= 5 &&
-	    rows_number(db, "SELECT count(*) FROM main.sqlite_master WHERE name = "
-			    "'blocks'") == 1) {
-		sqlite3_exec(db, "BEGIN", NULL, NULL, NULL);
-		for (int i = 0; i <= INCISE_SOURCE_DEPTH; i++) {
-			const struct incise_ledger_form *form = incise_source_form(i);
-			sqlite3_stmt *insert;
-
-			loaded[i] = rows_has_word(sql, form->table);
-			insert = loaded[i] ? rows_table(db, form) : NULL;
-			if (loaded[i] && i < INCISE_SOURCE_DEPTH)
-				rows_load(db, insert, form);
-			else if (loaded[i])
-				rows_load_depth(insert, file);
-			sqlite3_finalize(insert);
-		}
-		sqlite3_exec(db, "COMMIT", NULL, NULL, NULL);
-	}
-	sqlite3_set_authorizer(db, rows_authorize, changed);
+	if (db)
+		sqlite3_set_authorizer(db, rows_authorize, changed);
 	while (rc == SQLITE_OK && *sql) {
 		rc = sqlite3_prepare_v2(db, sql, -1, &stmt, &sql);
 		while (rc == SQLITE_OK && stmt && sqlite3_step(stmt) == SQLITE_ROW)
@@ -336,9 +361,9 @@ __attribute__((unused)) static int rows_sql(const char *file, bool readonly,
 			rc = sqlite3_finalize(stmt);
 	}
 	if (rc != SQLITE_OK)
-		*message = sqlite3_mprintf("%s", sqlite3_errmsg(db));
-	sqlite3_set_authorizer(db, NULL, NULL);
-	if (rc == SQLITE_OK)
+		*message =
+			sqlite3_mprintf("%s", db ? sqlite3_errmsg(db) : "no such file");
+	else
 		sqlite3_exec(db, "BEGIN", NULL, NULL, NULL);
 	for (int i = 0; i < INCISE_SOURCE_DEPTH && rc == SQLITE_OK && !readonly; i++)
 		if (loaded[i] && changed[i])

@@ -303,7 +303,7 @@ keep_data() {
 	draws a.rec.part
 	sqlite3 a.rec.part/recording.db "UPDATE tracker SET z_mm = 9e999 WHERE seq = 7"
 	run --separate-stderr incise plot a.rec -o b.png
-	failed_with "table tracker, row 7"
+	failed_with "stream tracker, block 0"
 	[ ! -e b.png ]
 }
 

@@ -160,7 +160,7 @@ tampered() {
 }
 
 @test "verify of a page that went bad" {
-	dd if=/dev/urandom of=a.rec/recording.db bs=4096 seek=40 count=1 conv=notrunc 2>/dev/null
+	dd if=/dev/urandom of=a.rec/recording.db bs=4096 seek=20 count=1 conv=notrunc 2>/dev/null
 	run --separate-stderr incise verify a.rec
 	failed_with "a.rec:"
 	[[ "$output" == *"recording.db is damaged"* ]]

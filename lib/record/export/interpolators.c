@@ -4,14 +4,12 @@
  */
 #include <errno.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <incise/tracker.h>
 #include <incise/uncertainty.h>
 #include "../../base/vector.h"
 #include "../../tissue/tick.h"
-#include "../schema.h"
 #include "interpolators.h"
 
 /* --- velocity of the tip ------------------------------------------------------------- */

@@ -186,6 +186,7 @@ struct incise_source_depth {
 	/* Poses of the records in the window that have no row yet. */
 	double pose[INCISE_DEPTH_WINDOW][7];
 	int n;
+	uint64_t rows; /* of the tracker, so far */
 };
 
 static void put_depth(struct incise_source *source, const struct incise_depth_row *row)
@@ -234,6 +235,13 @@ static int next_depth(struct incise_source *source, struct incise_error *err)
 		rc = incise_source_next(&depth->tracker, err);
 		if (rc < 0)
 			return rc;
+		if (!rc && depth->rows != source->recording->meta.tracker)
+			return incise_error_set(
+				err, EINVAL,
+				"%s: damaged: table tracker has %llu rows of %llu",
+				source->recording->path, (unsigned long long)depth->rows,
+				(unsigned long long)source->recording->meta.tracker);
+		depth->rows += rc ? depth->tracker.batch.n : 0;
 		if (!incise_batch_reserve(batch,
 					  depth->tracker.batch.n + INCISE_DEPTH_WINDOW))
 			return no_memory(source, err);

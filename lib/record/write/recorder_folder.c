@@ -24,9 +24,10 @@
 /* Files grow in steps: their rate is measured over this time at least. */
 #define RATE_NS 2000000000LL
 
-/* Bytes of a row in the file, with its part of the pages; tests/unit/record/recorder.c. */
-#define FORCE_BYTES 18.0
-#define TRACKER_BYTES 180.0 /* with its row in table depth */
+/* Bytes of a row in the file, and of the blocks of a stream each second; tests/unit/record/recorder.c. */
+#define FORCE_BYTES 2.0
+#define TRACKER_BYTES 84.0
+#define BLOCKS_BYTES 3000.0
 #define FRAME_BYTES 145.0
 /* Size of a frame in camera.mkv, an upper estimate. */
 #define LOSSLESS_SHARE 0.85
@@ -165,8 +166,8 @@ static double rate_of(const struct incise_tracker_info *tracker,
 		      const struct incise_force_info *force,
 		      const struct incise_camera_info *camera)
 {
-	double bytes_s = (force ? force->rate_hz * FORCE_BYTES : 0) +
-			 (tracker ? tracker->rate_hz * TRACKER_BYTES : 0);
+	double bytes_s = (force ? force->rate_hz * FORCE_BYTES + BLOCKS_BYTES : 0) +
+			 (tracker ? tracker->rate_hz * TRACKER_BYTES + BLOCKS_BYTES : 0);
 	double row =
 		camera ? (double)incise_frames_row(camera->pixels, camera->width) : 0;
 

@@ -56,30 +56,41 @@ static int stream(struct incise_cut_sample *samples, int max)
 TEST(samples_are_interpolated, IN_FOLDER)
 {
 	struct incise_cut_sample s[20];
+	double mm_s[4];
 	int n;
 
 	/*
-	 * ms     0   1   2 … 9  10 … 19  20    100 … 
-	 * depth      1 ─────────► 2 ───── ►3 ─ gap ─ 4
+	 * ms     1       11      21        56          120
+	 * depth  1 ─────► 2 ─────► 3 ────► 3.5 ─ gap ─ 4
 	 */
 	record("cut.rec", "sim:clock=simulated", 100 * MS);
-	change(DB, "DELETE FROM knots; DELETE FROM force; DELETE FROM depth;"
-		   "INSERT INTO depth VALUES(0,1000000,1.0,10.0),(1,11000000,2.0,30.0),"
-		   "(2,21000000,3.0,30.0),(3,100000000,4.0,30.0);"
-		   "INSERT INTO force VALUES(0,0,0),(1,1000000,1024),(2,3500000,2048),"
-		   "(5,11000000,4095),(6,20999999,0),(7,21000000,7),(8,60000000,8),"
-		   "(9,200000000,9);"
-		   "UPDATE meta SET value=8 WHERE key='force_rows';"
-		   "UPDATE meta SET value=4 WHERE key='depth_rows';"
-		   "UPDATE meta SET value=100.0 WHERE key='force_zero_mV';");
+	change(DB,
+	       "DELETE FROM knots; DELETE FROM force; DELETE FROM tracker;"
+	       "INSERT INTO tracker SELECT column1, column2, column2, 0, 0, -column3, 1, "
+	       "0, 0, 0, ' ', 1, 0 FROM (VALUES(0,1000000,1.0),(1,11000000,2.0),"
+	       "(2,21000000,3.0),(3,56000000,3.5),(4,120000000,4.0));"
+	       "INSERT INTO force VALUES(0,0,0),(1,1000000,1024),(2,3500000,2048),"
+	       "(5,11000000,4095),(6,20999999,0),(7,56000000,7),(8,60000000,8),"
+	       "(9,200000000,9);"
+	       "UPDATE meta SET value=8 WHERE key='force_rows';"
+	       "UPDATE meta SET value=5 WHERE key IN ('depth_rows', 'tracker_rows');"
+	       "UPDATE meta SET value=100.0 WHERE key='force_zero_mV';");
+	for (int i = 0; i < 4; i++) {
+		char sql[80];
+
+		snprintf(sql, sizeof(sql),
+			 "SELECT velocity_mm_s FROM depth WHERE seq = %d", i);
+		mm_s[i] = ask(DB, sql);
+	}
+	assert_true(mm_s[0] > mm_s[1] && mm_s[1] > 30 && mm_s[0] < 101);
 	n = stream(s, 20);
 	assert_int_equal(n,
 			 4); /* not: before the first row, in the gap, after the last */
 	assert_int_equal(s[0].t_ns, 1000000);
-	assert_true(s[0].depth_mm == 1 && s[0].velocity_mm_s == 10);
+	assert_true(s[0].depth_mm == 1 && s[0].velocity_mm_s == mm_s[0]);
 	assert_true(fabs(s[1].depth_mm - 1.25) < 1e-15 &&
-		    fabs(s[1].velocity_mm_s - 15) < 1e-14);
-	assert_true(s[2].depth_mm == 2 && s[2].velocity_mm_s == 30);
+		    fabs(s[1].velocity_mm_s - (0.75 * mm_s[0] + 0.25 * mm_s[1])) < 1e-12);
+	assert_true(s[2].depth_mm == 2 && s[2].velocity_mm_s == mm_s[1]);
 	assert_true(fabs(s[3].depth_mm - 3) < 1e-6 && s[3].depth_mm < 3);
 	/* 1024 of 4096 codes over 5 V are 1250 mV */
 	assert_true(fabs(s[0].force_N - (1250 - 100) / 1240.0) < 1e-15);

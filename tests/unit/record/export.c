@@ -38,7 +38,7 @@ static struct row *table(const char *file, const char *sql, int *n)
 	sqlite3 *db;
 
 	*n = 0;
-	assert_int_equal(sqlite3_open(file, &db), SQLITE_OK);
+	db = rows_look(file);
 	assert_int_equal(sqlite3_prepare_v2(db, sql, -1, &stmt, NULL), SQLITE_OK);
 	while (sqlite3_step(stmt) == SQLITE_ROW) {
 		if ((*n & (*n - 1)) ==
@@ -527,10 +527,10 @@ TEST(damage_stops_the_export)
 
 	assert_int_equal(system("cp -r liver.rec hurt.rec"), 0);
 	change("hurt.rec/recording.db",
-	       "UPDATE depth SET depth_mm = 'NaN' WHERE seq = 4000");
+	       "UPDATE tracker SET z_mm = 9e999 WHERE seq = 4000");
 	incise_export_options_init(&how);
-	assert_error(export(&path, 1, &how, NULL, &err), EINVAL, &err, "table depth",
-		     "row 4000");
+	assert_error(export(&path, 1, &how, NULL, &err), EINVAL, &err, "stream tracker",
+		     "block");
 }
 
 TEST(options_out_of_range)

@@ -67,7 +67,7 @@ TEST(rows_are_the_samples, IN_FOLDER)
 	assert_true(n_force >= 10000 &&
 		    n_tracker >= 118); /* 10 kHz, 120 Hz less latency */
 
-	assert_int_equal(sqlite3_open(DB, &db), SQLITE_OK);
+	db = rows_look(DB);
 	sqlite3_prepare_v2(db, "SELECT * FROM force", -1, &stmt, NULL);
 	for (; sqlite3_step(stmt) == SQLITE_ROW; n++) {
 		assert_int_equal(sqlite3_column_int64(stmt, 0), force[n].seq);
@@ -128,20 +128,20 @@ TEST(ledger_counts_the_rows, IN_FOLDER)
 		assert_true(rows >= (i ? 118 : 10000));
 		/* each row in one block, and the blocks one after the other */
 		snprintf(sql, sizeof(sql),
-			 "SELECT count(*) FROM %s r JOIN ledger l ON l.stream='%s' AND "
+			 "SELECT count(*) FROM %s r JOIN blocks l ON l.stream='%s' AND "
 			 "r.seq BETWEEN l.first_seq AND l.last_seq AND r.t_ns BETWEEN "
 			 "l.first_ns AND l.last_ns",
 			 stream, stream);
 		assert_int_equal((int)ask(DB, sql), rows);
 		snprintf(sql, sizeof(sql),
-			 "SELECT sum(count) + 1000000 * sum(lost) FROM ledger WHERE "
+			 "SELECT sum(count) + 1000000 * sum(lost) FROM blocks WHERE "
 			 "stream='%s'",
 			 stream);
 		assert_int_equal((int)ask(DB, sql), rows);
 		/* a block per commit, and the end */
 		snprintf(
 			sql, sizeof(sql),
-			"SELECT count(*) FROM ledger WHERE stream='%s' AND (count > 0) = "
+			"SELECT count(*) FROM blocks WHERE stream='%s' AND (count > 0) = "
 			"(block < 10)",
 			stream);
 		assert_int_equal((int)ask(DB, sql), 11);
@@ -724,7 +724,7 @@ TEST(silence_at_the_ends_is_lost, IN_FOLDER)
 		assert_int_equal((int)ask(DB, "SELECT value FROM meta WHERE key = "
 					      "'force_lost'"),
 				 (int)stats.force_lost);
-		assert_int_equal((int)ask(DB, "SELECT sum(lost) FROM ledger WHERE stream "
+		assert_int_equal((int)ask(DB, "SELECT sum(lost) FROM blocks WHERE stream "
 					      "= 'force'"),
 				 (int)stats.force_lost);
 		assert_int_equal(system("rm -r a.rec"), 0);

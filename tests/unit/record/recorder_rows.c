@@ -55,7 +55,7 @@ static void measure(double hz, double drift_ppm, double jitter_ms, double latenc
 	int64_t duration_ns = (int64_t)(seconds * 1e9), *t_ns;
 	char spec[300], still[300];
 	double sum2 = 0;
-	sqlite3_stmt *stmt;
+	struct incise_source source;
 	int n, rows = 0, covered = 0;
 
 	for (int i = 0; i < 2; i++)
@@ -70,22 +70,21 @@ static void measure(double hz, double drift_ppm, double jitter_ms, double latenc
 	succeeds(recording && !incise_recording_line(recording, "tracker", &line, &err) &&
 		 incise_recording_streams(recording, streams, &err) == 2);
 	*out = (struct errors){.force = streams[0], .tracker = streams[1]};
-	assert_int_equal(sqlite3_prepare_v2(recording->db,
-					    "SELECT seq, t_ns FROM tracker ORDER BY seq",
-					    -1, &stmt, NULL),
-			 SQLITE_OK);
-	while (sqlite3_step(stmt) == SQLITE_ROW && rows < n) {
-		uint64_t seq = sqlite3_column_int64(stmt, 0);
-		double error_ns =
-			incise_recording_time(&line, seq, sqlite3_column_int64(stmt, 1)) -
-			t_ns[seq];
+	succeeds(!incise_source_open(&source, recording, INCISE_LEDGER_TRACKER, &err));
+	while (incise_source_next(&source, &err) > 0)
+		for (size_t k = 0; k < source.batch.n && rows < n; k++, rows++) {
+			uint64_t seq = source.batch.column[0].i[k];
+			double error_ns =
+				incise_recording_time(&line, seq,
+						      source.batch.column[1].i[k]) -
+				t_ns[seq];
 
-		sum2 += error_ns * error_ns;
-		out->worst_ms = fmax(out->worst_ms, fabs(error_ns) * 1e-6);
-		covered += fabs(error_ns) <= 1.96 * incise_recording_time_sd(&line, seq);
-		rows++;
-	}
-	sqlite3_finalize(stmt);
+			sum2 += error_ns * error_ns;
+			out->worst_ms = fmax(out->worst_ms, fabs(error_ns) * 1e-6);
+			covered += fabs(error_ns) <=
+				   1.96 * incise_recording_time_sd(&line, seq);
+		}
+	incise_source_close(&source);
 	incise_recording_close(recording);
 	free(t_ns);
 	assert_int_equal(system("rm -r a.rec"), 0);

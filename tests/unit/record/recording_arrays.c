@@ -78,13 +78,12 @@ TEST(a_row_that_cannot_be_is_named, IN_FOLDER)
 	struct incise_recording *recording;
 
 	record("a.rec", SHORT_SCRIPT, 1000 * MS);
-	change(DB, "UPDATE tracker SET qx = 'none' WHERE seq = 7; "
-		   "UPDATE depth SET depth_mm = 9e999 WHERE seq = 7");
+	change(DB, "UPDATE tracker SET qx = 9e999 WHERE seq = 7");
 	recording = open_recording("a.rec");
 	assert_error(incise_recording_poses(recording, &poses, &err), EINVAL, &err,
-		     "table tracker, row 7");
+		     "stream tracker, block 0");
 	assert_error(incise_recording_values(recording, "depth", &values, &err), EINVAL,
-		     &err, "table depth, row 7");
+		     &err, "stream tracker, block 0");
 	incise_recording_close(recording);
 }
 
@@ -139,8 +138,11 @@ TEST(elements_are_rows, IN_FOLDER)
 
 	record("a.rec", "sim:clock=simulated", 600 * MS);
 	/* more than the first capacity, and than twice of it */
-	change(DB, "DELETE FROM knots; DELETE FROM depth; " NUMBERS
-		   "INSERT INTO depth SELECT n, 1000 * n, n + 1.0, 0.0 FROM i");
+	change(DB,
+	       "DELETE FROM knots; DELETE FROM tracker; UPDATE meta SET value = 10000 "
+	       "WHERE key = 'tracker_rows'; " NUMBERS
+	       "INSERT INTO tracker SELECT n, 1000 * n, 1000 * n, 0, 0, -n - 1.0, 1, 0, "
+	       "0, 0, ' ', 1, 0 FROM i");
 	assert_int_equal(values_of("depth", &values, &err), 10000);
 	for (int i = 0; i < 10000; i++)
 		assert_true(values[i].value == i + 1);
@@ -163,7 +165,7 @@ TEST(after_a_failure_there_is_none, IN_FOLDER)
 	struct incise_recording_value *values;
 
 	record("a.rec", "sim:clock=simulated", 600 * MS);
-	change(DB, "UPDATE force SET code = 'x' WHERE seq = 5000");
+	change(DB, "UPDATE force SET t_ns = 7 WHERE seq = 5000");
 	assert_int_equal(values_of("force", &values, &err), -EINVAL);
 	assert_null(values);
 	assert_says(err.text, "table force, row 5000");
@@ -171,14 +173,14 @@ TEST(after_a_failure_there_is_none, IN_FOLDER)
 
 /* --- lengths --------------------------------------------------------------- */
 
-/* Depths each 10 ms: 1 mm and 5 mm/s more each time, from 1 s on, of a tracker at rest. */
+/* Depths each 10 ms: 1 mm more each time, from 1 s on. */
 static void put_frames(const char *frames)
 {
 	assert_int_equal(system("rm -rf a.rec"), 0);
 	record("a.rec", "sim:clock=simulated", 700 * MS);
 	change(DB, "DELETE FROM knots; DELETE FROM frames; "
-		   "UPDATE depth SET t_ns = 1000000000 + 10000000 * seq, "
-		   "depth_mm = 1.0 * seq - 10, velocity_mm_s = 5.0 * seq");
+		   "UPDATE tracker SET t_ns = 1000000000 + 10000000 * seq, x_mm = 0, "
+		   "y_mm = 0, z_mm = 10.0 - seq, qw = 1, qx = 0, qy = 0, qz = 0");
 	change(DB, frames);
 }
 
@@ -210,7 +212,7 @@ TEST(depths_are_interpolated, IN_FOLDER)
 	assert_true(rows[0].length_px == 310 && rows[0].quality == 0.8);
 	/* sums of few binary digits */
 	assert_true(fabs(rows[0].depth_mm + 7.5) < 1e-12);
-	assert_true(fabs(rows[0].velocity_mm_s - 12.5) < 1e-12);
+	assert_true(fabs(rows[0].velocity_mm_s - 100) < 1e-9);
 	assert_true(fabs(rows[1].depth_mm + 5) < 1e-12);
 	assert_true(fabs(rows[2].depth_mm + 4.75) < 1e-12);
 	free(rows);
@@ -221,7 +223,7 @@ TEST(gaps_are_left_out, IN_FOLDER)
 {
 	struct incise_recording_length *rows;
 
-	put_frames("UPDATE depth SET t_ns = t_ns + 200000000 WHERE seq > 5; " FRAME(
+	put_frames("UPDATE tracker SET t_ns = t_ns + 200000000 WHERE seq > 5; " FRAME(
 		0, 1055000000, 300.0, 0.9) FRAME(1, 1150000000, 300.0, 0.9)
 			   FRAME(2, 1275000000, 301.0, 0.9));
 	assert_int_equal(lengths_of(&rows, &err), 1);
@@ -232,12 +234,11 @@ TEST(gaps_are_left_out, IN_FOLDER)
 TEST(impossible_lengths_are_refused, IN_FOLDER)
 {
 	static const char *const cases[] = {
-		FRAME(0, 1025000000, 'long', 0.9),
 		FRAME(0, 1025000000, 9e999, 0.9),
-		FRAME(0, 1025000000, 300.0, 'good'),
-		FRAME(0, 'now', 300.0, 0.9),
-		FRAME(0, 1025000000, 300.0, 0.9) "UPDATE depth SET depth_mm = 9e999",
-		FRAME(0, 1925000000, 300.0, 0.9) "DELETE FROM depth WHERE seq = 3",
+		FRAME(0, 1025000000, 300.0, 9e999),
+		FRAME(0, -1, 300.0, 0.9),
+		FRAME(0, 1025000000, 300.0, 0.9) "UPDATE tracker SET z_mm = 9e999",
+		FRAME(0, 1925000000, 300.0, 0.9) "DELETE FROM tracker WHERE seq = 3",
 	};
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
@@ -323,7 +324,6 @@ TEST(what_is_no_depth_is_left_out, IN_FOLDER)
 		{"UPDATE frames SET depth_mm = 0.5", 0},
 		{"UPDATE frames SET t_ns = t_ns + 100000000000", 0},
 		{"UPDATE frames SET depth_mm = 9e999", -EINVAL},
-		{"UPDATE frames SET depth_mm = 'deep'", -EINVAL},
 		{"UPDATE tracker SET z_mm = 9e999 WHERE seq = 200", -EINVAL},
 		{"DELETE FROM tracker WHERE seq = 200", -EINVAL},
 		{TO_FORM_1, 0},

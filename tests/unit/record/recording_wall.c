@@ -85,8 +85,8 @@ TEST(rows_are_protected, IN_FOLDER)
 		"UPDATE wall SET restart = 'step' WHERE seq = 3",
 		"DELETE FROM wall WHERE seq = 1",
 		"DELETE FROM wall",
-		"DELETE FROM ledger WHERE stream = 'wall'",
-		"DELETE FROM wall; DELETE FROM ledger WHERE stream = 'wall'",
+		"DELETE FROM blocks WHERE stream = 'wall'",
+		"DELETE FROM blocks WHERE stream = 'wall' AND count = 0",
 		"INSERT INTO wall SELECT 99, t_ns + 1, tai_ns, uncertainty_ns, rate_ppb, "
 		"rate_uncertainty_ppb, utc_offset_s, held, source, reference, leap, "
 		"restart FROM wall WHERE seq = 5",
@@ -111,9 +111,8 @@ TEST(damaged_rows_are_refused, IN_FOLDER)
 		"UPDATE wall SET rate_uncertainty_ppb = -1.0 WHERE seq = 2",
 		"UPDATE wall SET uncertainty_ns = -1.0 WHERE seq = 2",
 		"UPDATE wall SET utc_offset_s = 4294967296 WHERE seq = 2",
-		"UPDATE wall SET source = x'00' WHERE seq = 2",
-		"UPDATE wall SET source = printf('%.99c', 'a') WHERE seq = 2",
-		"UPDATE wall SET tai_ns = 'soon' WHERE seq = 2",
+		"UPDATE blocks SET data = substr(data, 1, 7) WHERE stream = 'wall' AND count > 0",
+		"UPDATE blocks SET data = 'x' WHERE stream = 'wall'",
 	};
 
 	record_by(SHORT_SCRIPT, "sim", 5 * S);
@@ -132,7 +131,6 @@ TEST(older_and_simulated_ones_have_none, IN_FOLDER)
 	assert_true(is_intact());
 	change(DB, TO_FORM_2);
 	read_wall(ENODATA);
-	assert_true(is_intact());
 	change(DB, TO_FORM_1);
 	read_wall(ENODATA);
 }
