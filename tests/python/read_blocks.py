@@ -39,11 +39,10 @@ def column(kind, data, at, n):
         off = struct.unpack_from(f"<{n}{FORMS[width]}", data, at + 17) if width else (0,) * n
         values = (base + span * k // max(n - 1, 1) + off[k] for k in range(n))
         return [(v + 2**63) % 2**64 - 2**63 for v in values], at + 17 + n * width
-    stored = n if width else 1
-    form = "<" + (FORMS.get(kind) or ("f" if width == 4 else "d")) * stored
+    form = "<" + (FORMS.get(kind) or ("f" if width == 4 else "d")) * (n if width else 1)
     values = [v.rstrip(b"\0").decode() if kind in "cs" else v
               for v in struct.unpack_from(form, data, at + 1)]
-    return values * (n // stored), at + 1 + struct.calcsize(form)
+    return values * (n // len(values)), at + 1 + struct.calcsize(form)
 
 
 def blocks(path):

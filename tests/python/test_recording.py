@@ -2,8 +2,10 @@
 """Recordings in Python: values, metadata, damage, closed and moved files, threads, fork."""
 
 import gc
+import hashlib
 import math
 import os
+import sqlite3
 import struct
 import subprocess
 import sys
@@ -385,37 +387,69 @@ class Recordings(Case):
 
 
 class Blocks(Case):
-    def test_another_reader(self):
-        """Each column is what incise reads, bit by bit, and a byte that changed is found."""
-        path = self.path("all.rec")
-        run("incise", "capture", "-o", path, "--rig", SHORT, "--duration", "5s", "--camera", "frames",
-            "--clock-source", "sim:1.8e9,50,3", stderr=subprocess.DEVNULL)
-        read = list(read_blocks.blocks(path))
+    """Another reader of the format, read_blocks."""
+
+    def setUp(self):
+        super().setUp()
+        self.rec = self.path("all.rec")
+        run("incise", "capture", "-o", self.rec, "--rig", SHORT, "--duration", "5s", "--camera",
+            "frames", "--clock-source", "sim:1.8e9,50,3", stderr=subprocess.DEVNULL)
+
+    def change(self, sql, *values):
+        """SQL on what is stored, without rows of samples."""
+        with sqlite3.connect(os.path.join(self.rec, "recording.db")) as database:
+            found = database.execute(sql, values).fetchall()
+        database.close()
+        return found
+
+    def same(self):
+        """Each column is what incise reads, bit by bit."""
+        read = list(read_blocks.blocks(self.rec))
         for stream, (names, kinds) in read_blocks.COLUMNS.items():
             table = "frames" if stream == "camera" else stream
-            quoted = [f"quote({name})" if kind in "rnh" else name for name, kind in zip(names.split(), kinds)]
-            expected = self.sql(path, f"SELECT {', '.join(quoted)} FROM {table}")
+            quoted = [f"quote({name})" if kind in "rnh" else name
+                      for name, kind in zip(names.split(), kinds)]
+            expected = self.sql(self.rec, f"SELECT {', '.join(quoted)} FROM {table} ORDER BY seq")
             found = [row for s, _, columns in read if s == stream for row in zip(*columns.values())]
             self.assertEqual(len(found), len(expected))
             self.assertTrue(found or stream == "camera")  # without a module that writes frames
             for row, texts in zip(found, expected):
                 for value, text, kind in zip(row, texts, kinds):
                     if kind in "rn":
-                        other = math.nan if text == "NULL" else float(text)
-                        self.assertEqual(struct.pack("<d", value), struct.pack("<d", other))
+                        real = math.nan if text == "NULL" else float(text)
+                        self.assertEqual(struct.pack("<d", value), struct.pack("<d", real))
                     else:
-                        self.assertEqual(f"X'{value.hex().upper()}'" if kind == "h" else str(value), text)
-        for stream in {stream for stream, _, _ in read}:
-            with self.subTest(stream):
-                at = f"stream = '{stream}' AND block = 1"
-                data, = self.sql(path, f"SELECT hex(data) FROM blocks WHERE {at}")[0]
-                flipped = bytearray.fromhex(data)
-                flipped[len(flipped) // 2] ^= 16
-                self.sql(path, f"UPDATE blocks SET data = x'{flipped.hex()}' WHERE {at}")
-                self.says(ValueError, f"{stream}, block 1 is not", list, read_blocks.blocks(path))
-                self.assertFalse(incise.verify(path).intact)
-                self.sql(path, f"UPDATE blocks SET data = x'{data}' WHERE {at}")
-        self.assertTrue(incise.verify(path).intact)
+                        wanted = f"X'{value.hex().upper()}'" if kind == "h" else str(value)
+                        self.assertEqual(wanted, text)
+
+    def test_all_columns(self):
+        self.same()
+        # and of each width, to the ends of what a column can hold
+        self.sql(self.rec, """
+            UPDATE force SET code = CASE seq % 3 WHEN 0 THEN -9223372036854775807 - 1
+                WHEN 1 THEN 9223372036854775807 ELSE seq END WHERE seq BETWEEN 2000 AND 2999;
+            UPDATE force SET code = seq * 1000003 WHERE seq BETWEEN 4000 AND 4999;
+            UPDATE force SET code = 7 WHERE seq BETWEEN 6000 AND 6999;
+            UPDATE tracker SET x_mm = seq / 4.0, y_mm = 1e300 / (seq + 1), z_mm = -0.1,
+                qw = 5e-324, status = char(65 + seq % 7), arrival_ns = -arrival_ns;
+            UPDATE wall SET tai_ns = -9223372036854775807 - 1, source = 'a' || seq,
+                uncertainty_ns = CASE seq % 2 WHEN 0 THEN seq / 8.0 END""")
+        for stream, block, data in self.change("SELECT stream, block, data FROM blocks"):
+            self.change("UPDATE blocks SET sha256 = ? WHERE stream = ? AND block = ?",
+                        hashlib.sha256(data).digest(), stream, block)
+        self.same()
+
+    def test_a_byte_that_changed(self):
+        at = "WHERE stream = ? AND block = 1"
+        for stream, in self.change("SELECT DISTINCT stream FROM blocks"):
+            (data,), = self.change(f"SELECT data FROM blocks {at}", stream)
+            flipped = bytearray(data)
+            flipped[len(data) // 2] ^= 16
+            self.change(f"UPDATE blocks SET data = ? {at}", bytes(flipped), stream)
+            self.says(ValueError, f"{stream}, block 1 is not", list, read_blocks.blocks(self.rec))
+            self.assertFalse(incise.verify(self.rec).intact)
+            self.change(f"UPDATE blocks SET data = ? {at}", data, stream)
+        self.assertTrue(incise.verify(self.rec).intact)
 
 
 class WallTime(Case):
