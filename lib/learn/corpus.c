@@ -204,6 +204,12 @@ static int offer(struct incise_corpus *corpus, const struct candidate *c)
 
 /* --- surveys ------------------------------------------------------------------------- */
 
+/* The group of the row before: most rows are of the same. */
+struct same_group {
+	char name[64];
+	uint64_t key;
+};
+
 /* Groups of a source by key: open addressing, twice as many places as groups at least. */
 struct surveyor {
 	struct incise_corpus *corpus;
@@ -212,14 +218,22 @@ struct surveyor {
 	uint64_t number; /* of the source */
 	int capacity, last;
 	int *place; /* 2 × capacity; group + 1, or 0 */
+	struct same_group same;
 };
 
-static uint64_t key_of(const struct incise_corpus_source *source, const char *group)
+static uint64_t key_of(const struct incise_corpus_source *source, const char *group,
+		       struct same_group *same)
 {
 	if (source->group)
-		return incise_group_key("", source->group);
-	return group ? incise_group_key(source->own_groups ? source->hash : "", group)
-		     : 0;
+		group = source->group;
+	if (!group)
+		return 0;
+	if (!same->key || strcmp(same->name, group)) {
+		same->key = incise_group_key(
+			source->own_groups && !source->group ? source->hash : "", group);
+		snprintf(same->name, sizeof(same->name), "%s", group);
+	}
+	return same->key;
 }
 
 static int rehash(struct surveyor *s)
@@ -280,7 +294,7 @@ static int survey_row(void *user, const double *row, const char *name,
 	struct incise_corpus_survey *survey = s->survey;
 	struct candidate c = {.source = s->number,
 			      .row = survey->rows,
-			      .group = key_of(s->source, name),
+			      .group = key_of(s->source, name, &s->same),
 			      .hash = hash_row(corpus, row)};
 	struct incise_corpus_group *group =
 		find_survey_group(s, c.group,
@@ -762,13 +776,14 @@ struct folder {
 	const struct incise_corpus_source *source;
 	struct incise_factor *fit, *check;
 	uint64_t row, digest, left_out;
+	struct same_group same;
 };
 
 static int fold_row(void *user, const double *row, const char *name,
 		    struct incise_error *err)
 {
 	struct folder *f = user;
-	uint64_t group = key_of(f->source, name), at = f->row++;
+	uint64_t group = key_of(f->source, name, &f->same), at = f->row++;
 	uint64_t hash = hash_row(f->corpus, row);
 	struct incise_error own;
 	int rc;

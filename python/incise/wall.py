@@ -65,7 +65,7 @@ _library.declare(
 
 
 class WallPoint(NamedTuple):
-    """A reading of the clocks while recording; see table wall of incise-recording(5)."""
+    """A reading of the clocks while recording; see Wall time in incise-recording(5)."""
 
     t_ns: int  #: CLOCK_MONOTONIC
     tai_ns: int  #: ns since 1970-01-01 00:00:00 TAI

@@ -145,7 +145,7 @@ struct incise_budget_row {
 	/** 0 … 1, way from one record of the tracker to the next; 0: at a record */
 	double share;
 	double force_share; /**< noise of the force, of that of one sample; 1: one sample */
-	bool smoothed;	    /**< velocity of resampled rows; else of the table depth */
+	bool smoothed;	    /**< velocity of resampled rows; else that of each pose */
 	bool tracker_time; /**< the time is that of a tracker record, else of the force */
 };
 

@@ -183,7 +183,7 @@ INCISE_API const char *incise_frame_reader_codec(
 	const struct incise_frame_reader *reader);
 
 /**
- * Get the frame of the row of table frames whose t_ns is nearest. Frames before the last one that
+ * Get the frame whose t_ns is nearest. Frames before the last one that
  * was read make it start at the file's beginning; later ones are quick.
  *
  * @param frame t_ns is that of the row, CLOCK_MONOTONIC; data as the camera sent it (MJPEG) or

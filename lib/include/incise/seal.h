@@ -75,7 +75,7 @@ struct incise_seal_statement {
 
 /**
  * Make the statement of a recording, also of one that was interrupted, from its rows. Memory does
- * not grow with the recording. camera.mkv is not read: table frames has the digest of each frame;
+ * not grow with the recording. camera.mkv is not read: its rows have the digest of each frame;
  * incise_verify() compares them. The same recording gives the same text.
  *
  * @param path as for incise_recording_open()

@@ -49,6 +49,9 @@ struct pass {
 	uint64_t samples, samples_all; /* of force, read and to be read */
 	int cut;		       /* the present one of all recordings, from 1 */
 	int number;		       /* of the same cut in its recording */
+	struct {
+		int cut, number;	      /* in the table */
+	} named;			      /* the last one with a name there */
 	struct incise_blade_pose_value blade; /* at the present sample */
 	struct incise_wall *wall; /* of the present recording; NULL: without TAI */
 	int64_t first_ns;	  /* its time 0, CLOCK_MONOTONIC */
@@ -97,12 +100,16 @@ static int cut_name(struct pass *pass)
 	char *text;
 	int rc;
 
+	if (pass->named.cut && pass->named.cut == pass->cut)
+		return pass->named.number;
 	if (asprintf(&text, "%s-%02d", pass->name, pass->number) < 0)
 		return incise_error_set(pass->err, ENOMEM, "out of memory");
 	rc = incise_table_name(pass->table, text);
 	free(text);
 	if (rc < 0)
 		return incise_error_set(pass->err, -rc, "out of memory");
+	pass->named.cut = pass->cut;
+	pass->named.number = rc;
 	return rc;
 }
 

@@ -11,6 +11,7 @@
 #include "../ledger.h"
 #include "../schema.h"
 #include "rows.h"
+#include <incise/seal.h>
 #include "session.h"
 
 #define TIME_MAX (INT64_MAX / 4) /* of rows.c */
@@ -88,10 +89,26 @@ double incise_session_bound(const struct incise_session_map *map, int64_t t_ns)
 
 /* --- identity ------------------------------------------------------------------------ */
 
+/* From form 5 on it is the last head of the seal, which follows from all. */
+static char *identity_by_seal(struct incise_recording *recording)
+{
+	struct incise_seal_head head;
+	char identity[33], *text;
+
+	if (incise_seal_head(recording, identity, &head, NULL) ||
+	    asprintf(&text, "%s:%lld:%s", identity, (long long)head.commit, head.head) <
+		    0)
+		return NULL;
+	return text;
+}
+
 char *incise_session_identity(struct incise_recording *recording)
 {
 	sqlite3_stmt *stmt = NULL;
 	char *text = NULL, *more;
+
+	if (recording->form >= 5)
+		return identity_by_seal(recording);
 
 	if (sqlite3_prepare_v2(recording->db,
 			       "SELECT stream, block, count, crc FROM ledger AS a WHERE "

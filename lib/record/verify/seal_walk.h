@@ -44,7 +44,7 @@ struct incise_seal_walk {
 
 /*
  * @known: the digests of all blocks of each stream, which agree with the ledger, or NULL. Returns
- * 0, -EINVAL, -EIO, -ENOMEM; for a recording of form 4. Close it in any case.
+ * 0, -EINVAL, -EIO, -ENOMEM; for a recording of form 4 or later. Close it in any case.
  */
 int incise_seal_walk_open(struct incise_seal_walk *walk,
 			  struct incise_recording *recording,

@@ -596,7 +596,7 @@ int incise_seal_compare(const char *path, const char *text, size_t length,
 	if (!recording)
 		return -errno;
 	rc = incise_seal_possible(recording, err);
-	/* Only form 4 has statements: another form is a forgery, or a mistake. */
+	/* Forms before 4 have no statements: another form is a forgery, or a mistake. */
 	if (rc == -ENODATA)
 		rc = incise_error_set(err, ENODATA,
 				      "%s: has format %d, which has no seal: it is not "

@@ -69,7 +69,10 @@ static void lost(struct walk *walk, int64_t first, int64_t last, int64_t after_n
 	else
 		snprintf(number, sizeof(number), "numbers %lld to %lld", (long long)first,
 			 (long long)last);
-	if (after_ns < 0)
+	if (after_ns < 0 && !walk->known)
+		incise_verify_found(walk->verify, &found, "%s: %llu missing, %s: all",
+				    walk->form->stream, (unsigned long long)count, number);
+	else if (after_ns < 0)
 		incise_verify_found(walk->verify, &found,
 				    "%s: %llu missing at the end, %s, after %.4f s",
 				    walk->form->stream, (unsigned long long)count, number,
@@ -419,10 +422,14 @@ static void report_missing(struct walk *walk, const struct incise_ledger_block *
 	found.last_block = block->block - 1;
 	found.count = block->block - walk->next;
 	walk->out->altered += found.count;
-	incise_verify_found(walk->verify, &found, "%s: block %lld%s%.0lld is missing",
-			    walk->form->stream, (long long)found.first_block,
-			    found.count > 1 ? " to " : "",
-			    found.count > 1 ? (long long)found.last_block : 0);
+	if (found.count == 1)
+		incise_verify_found(walk->verify, &found, "%s: block %lld is missing",
+				    walk->form->stream, (long long)found.first_block);
+	else
+		incise_verify_found(walk->verify, &found,
+				    "%s: blocks %lld to %lld are missing",
+				    walk->form->stream, (long long)found.first_block,
+				    (long long)found.last_block);
 }
 
 /* The rows of a block of form 5, and the samples that are missing before and within. */

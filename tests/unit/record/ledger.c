@@ -281,7 +281,6 @@ TEST(any_change_shows)
 	static const char rows[] =
 		"INSERT INTO meta VALUES('a', 1), ('b', 'text');"
 		"INSERT INTO events VALUES(5, 'start', 'x'), (6, 'end', 'y');"
-		"INSERT INTO depth VALUES(1, 10, 0.5, 3.0), (2, 20, 1.5, 3.0);"
 		"INSERT INTO knots VALUES('tracker', 0, 0, 10, 5.0, 1), "
 		"('tracker', 1, 9, 90, 5.0, 0);"
 		"INSERT INTO streams(name, device, stamped, delay_ns, grain_ns, rows, lost, "
@@ -308,12 +307,6 @@ TEST(any_change_shows)
 		{"events", "DELETE FROM events WHERE kind = 'start'", false},
 		/* the order of rows is what readers see, not their numbers */
 		{"events", "UPDATE events SET rowid = 9 WHERE rowid = 2", true},
-		{"depth", "UPDATE depth SET velocity_mm_s = 3.0000000001 WHERE seq = 1",
-		 false},
-		{"depth", "UPDATE depth SET depth_mm = 0.25 WHERE seq = 2", false},
-		{"depth", "UPDATE depth SET t_ns = 11 WHERE seq = 1", false},
-		{"depth", "UPDATE depth SET seq = 3 WHERE seq = 2", false},
-		{"depth", "UPDATE depth SET seq = seq", true},
 		{"knots", "UPDATE knots SET begins = 1 WHERE knot = 1", false},
 		{"knots", "UPDATE knots SET sd_ns = 6 WHERE knot = 1", false},
 		{"knots", "UPDATE knots SET stream = 'camera' WHERE knot = 1", false},
@@ -346,7 +339,7 @@ TEST(any_change_shows)
 /* Every column of the tables that are sealed is in the seal. */
 TEST(no_column_is_left_out)
 {
-	for (int i = 0; incise_ledger_sealed[i]; i++) {
+	for (int i = 1; incise_ledger_sealed[i]; i++) { /* depth is of older forms */
 		const char *table = incise_ledger_sealed[i];
 		char sql[200];
 		sqlite3 *db = make("");
@@ -359,7 +352,7 @@ TEST(no_column_is_left_out)
 		sqlite3_exec(
 			db,
 			"INSERT INTO meta VALUES(1, 1); INSERT INTO events VALUES(1, 1, 1); "
-			"INSERT INTO depth VALUES(1, 1, 1, 1); INSERT INTO knots "
+			"INSERT INTO knots "
 			"VALUES(1, 1, 1, 1, 1, 1); INSERT INTO streams VALUES(1, 1, 1, 1, "
 			"1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1)",
 			NULL, NULL, NULL);

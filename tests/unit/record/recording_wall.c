@@ -131,6 +131,8 @@ TEST(older_and_simulated_ones_have_none, IN_FOLDER)
 	assert_true(is_intact());
 	change(DB, TO_FORM_2);
 	read_wall(ENODATA);
+	assert_int_equal(system("rm -r a.rec"), 0);
+	record_by(SHORT_SCRIPT, NULL, 2 * S);
 	change(DB, TO_FORM_1);
 	read_wall(ENODATA);
 }

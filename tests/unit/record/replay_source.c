@@ -15,15 +15,15 @@
 #define SAMPLES 9500
 
 /* Rows with known values: force by its number, a blade that goes down evenly. */
-#define ROWS                                                                                \
-	"DELETE FROM knots; DELETE FROM force WHERE seq >= 9500;"                           \
-	"DELETE FROM tracker WHERE seq >= 120;"         \
-	"UPDATE meta SET value = 9500 WHERE key = 'force_rows';"                            \
-	"UPDATE meta SET value = 120 WHERE key IN ('tracker_rows', 'depth_rows');"          \
-	"UPDATE force SET t_ns = 10000000000 + seq * 100000, code = 1000 + seq % 977;"      \
-	"UPDATE tracker SET t_ns = 10000000000 + seq * 8000000, "                           \
-	"arrival_ns = 10004000000 + seq * 8000000 + (seq * 7919 % 3000) * 1000, "           \
-	"x_mm = seq * 0.5, y_mm = 1.5, z_mm = 2.0 - seq * 0.1, qw = 1.0, qx = 0.0, "        \
+#define ROWS                                                                           \
+	"DELETE FROM knots; DELETE FROM force WHERE seq >= 9500;"                      \
+	"DELETE FROM tracker WHERE seq >= 120;"                                        \
+	"UPDATE meta SET value = 9500 WHERE key = 'force_rows';"                       \
+	"UPDATE meta SET value = 120 WHERE key IN ('tracker_rows', 'depth_rows');"     \
+	"UPDATE force SET t_ns = 10000000000 + seq * 100000, code = 1000 + seq % 977;" \
+	"UPDATE tracker SET t_ns = 10000000000 + seq * 8000000, "                      \
+	"arrival_ns = 10004000000 + seq * 8000000 + (seq * 7919 % 3000) * 1000, "      \
+	"x_mm = seq * 0.5, y_mm = 1.5, z_mm = 2.0 - seq * 0.1, qw = 1.0, qx = 0.0, "   \
 	"qy = 0.0, qz = 0.0;"
 
 static int record_once(void **state)
@@ -268,7 +268,8 @@ TEST(no_damaged_row_is_believed)
 		 NULL, EINVAL},
 		{"UPDATE tracker SET arrival_ns = 2000000000000000 WHERE seq = 119", NULL,
 		 EINVAL},
-		{"UPDATE tracker SET x_mm = 9e999 WHERE seq = 3", "stream tracker", EINVAL},
+		{"UPDATE tracker SET x_mm = 9e999 WHERE seq = 3", "stream tracker",
+		 EINVAL},
 		{"UPDATE tracker SET seq = -5 WHERE seq = 0", NULL, EINVAL},
 		{"UPDATE tracker SET t_ns = 1 WHERE seq = 9", "row 9", EINVAL},
 		{"DELETE FROM tracker WHERE seq = 119", "119 rows of 120", EINVAL},
