@@ -43,7 +43,7 @@ def integers(*values):
     return b"".join(struct.pack("<q", v) for v in values)
 
 
-DATA = {}  # as they were written, of the rows of each block that was read
+DATA = {}  # of the rows of each block that was read, as it was written
 
 
 def decode_rows(stream, count, data):
@@ -59,8 +59,11 @@ def decode_rows(stream, count, data):
 
 def encode_rows(stream, rows):
     """The data of a block, each value on its own where they are not those that were read."""
-    data = DATA.get(str((stream, rows)), b"")
-    for kind, values in () if data or not rows else zip(COLUMNS[stream][1], zip(*rows)):
+    known = DATA.get(str((stream, rows)))
+    if known is not None:
+        return known
+    data = b""
+    for kind, values in zip(COLUMNS[stream][1], zip(*rows)):
         if kind == "i":
             data += b"\x08" + bytes(16) + integers(*values)
         elif kind in "rn":
