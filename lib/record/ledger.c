@@ -229,7 +229,7 @@ void incise_ledger_add(struct incise_ledger *ledger, const struct incise_ledger_
 	ledger->open.crc = incise_crc32c(ledger->open.crc, row->bytes, row->n);
 }
 
-int incise_ledger_select(sqlite3 *db, int form, const char *stream, int64_t from_seq,
+int incise_ledger_select(sqlite3 *db, int form, const char *stream, int64_t from_block,
 			 bool from_end, sqlite3_stmt **stmt)
 {
 	const bool blocks = form >= 5 && !strchr(stream, ':');
@@ -238,14 +238,40 @@ int incise_ledger_select(sqlite3 *db, int form, const char *stream, int64_t from
 
 	snprintf(sql, sizeof(sql),
 		 "SELECT block, first_seq, last_seq, first_ns, last_ns, count, lost, "
-		 "crc%s WHERE stream = ? AND last_seq >= ? ORDER BY block%s",
+		 "crc%s WHERE stream = ? AND block >= ? ORDER BY block%s",
 		 blocks ? ", sha256, data FROM blocks" : " FROM ledger",
 		 from_end ? " DESC" : "");
 	rc = sqlite3_prepare_v2(db, sql, -1, stmt, NULL);
 	if (rc != SQLITE_OK)
 		return rc;
 	sqlite3_bind_text(*stmt, 1, stream, -1, SQLITE_STATIC);
-	return sqlite3_bind_int64(*stmt, 2, from_seq);
+	return sqlite3_bind_int64(*stmt, 2, from_block);
+}
+
+int64_t incise_ledger_find(sqlite3 *db, const char *stream, int64_t seq)
+{
+	int64_t low = 0, high = INT64_MAX; /* it is from low to high */
+	sqlite3_stmt *stmt = NULL;
+
+	if (sqlite3_prepare_v2(db,
+			       "SELECT block, last_seq FROM blocks WHERE stream = ? AND "
+			       "block >= ? ORDER BY block LIMIT 1",
+			       -1, &stmt, NULL) != SQLITE_OK)
+		return INT64_MIN;
+	sqlite3_bind_text(stmt, 1, stream, -1, SQLITE_STATIC);
+	while (low < high) {
+		const int64_t middle = low + (high - low) / 2;
+
+		sqlite3_bind_int64(stmt, 2, middle);
+		if (sqlite3_step(stmt) == SQLITE_ROW &&
+		    sqlite3_column_int64(stmt, 1) < seq)
+			low = sqlite3_column_int64(stmt, 0) + 1;
+		else
+			high = middle;
+		sqlite3_reset(stmt);
+	}
+	sqlite3_finalize(stmt);
+	return low;
 }
 
 bool incise_ledger_block_read(struct incise_ledger_block *block, sqlite3_stmt *stmt)

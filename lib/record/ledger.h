@@ -113,11 +113,14 @@ void incise_ledger_close(struct incise_ledger *ledger, uint64_t lost,
 			 struct incise_ledger_block *block);
 
 /*
- * Select the entries of a stream that end at @from_seq or later, INT64_MIN: all, in order, or the last one
- * first; of form 5 they are table blocks. Returns an SQLite code.
+ * Select the entries of a stream from a block on, INT64_MIN: all, in order, or the last one first; of form 5
+ * they are table blocks. Returns an SQLite code.
  */
-int incise_ledger_select(sqlite3 *db, int form, const char *stream, int64_t from_seq,
+int incise_ledger_select(sqlite3 *db, int form, const char *stream, int64_t from_block,
 			 bool from_end, sqlite3_stmt **stmt);
+
+/* Of form 5: the first block that ends with this number or a later one, found by bisection. */
+int64_t incise_ledger_find(sqlite3 *db, const char *stream, int64_t seq);
 
 /* Read the entry of a row of that. False: a value is impossible in any entry. */
 bool incise_ledger_block_read(struct incise_ledger_block *block, sqlite3_stmt *stmt);

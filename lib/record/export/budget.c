@@ -302,29 +302,6 @@ static int first_codes(struct incise_recording *force, double *x, int n,
 	return rc < 0 ? rc : m;
 }
 
-/* Second differences of a block's codes and times. */
-struct differences {
-	double x[2][3], sum[2];
-	int64_t first_ns;
-	int n; /* samples */
-};
-
-static void add_sample(struct differences *block, int64_t code, int64_t t_ns)
-{
-	if (!block->n)
-		block->first_ns = t_ns;
-	for (int k = 0; k < 2; k++) {
-		double *x = block->x[k];
-
-		x[0] = x[1];
-		x[1] = x[2];
-		x[2] = k ? (double)t_ns - (double)block->first_ns : (double)code;
-		if (block->n >= 2)
-			block->sum[k] += pow(x[0] - 2 * x[1] + x[2], 2) / 6;
-	}
-	block->n++;
-}
-
 /*
  * Variances of codes and of times, ns², from second differences: the median of blocks, as a
  * contact is no noise, and a lost sample no scatter of timestamps.
@@ -333,41 +310,47 @@ static int variances_of_blocks(struct incise_recording *force, double *codes,
 			       double *times_ns2, struct incise_error *err)
 {
 	const uint64_t rows = force->meta.force;
-	struct differences blocks[BLOCKS] = {0};
 	double variance[2][BLOCKS];
-	struct incise_source source;
-	int n = 0, begun = 0, done = 0, all = 0, rc;
-	int64_t first = 0;
+	int64_t first = 0, first_ns;
+	int n = 0,
+	    rc = incise_source_end(force, "force", false, &first, &first_ns, NULL, err);
 
-	while (all < BLOCKS && (uint64_t)all * BLOCK < rows)
-		all++;
-	rc = incise_source_open(&source, force, INCISE_LEDGER_FORCE, err);
-	rc = rc ? rc : 1;
-	while (done < all && rc > 0 && (rc = incise_source_next(&source, err)) > 0) {
-		const union incise_column *column = source.batch.column;
+	for (int b = 0; b < BLOCKS && (uint64_t)b * BLOCK < rows && rc > 0; b++) {
+		const int64_t from = first + (int64_t)(rows / BLOCKS * (uint64_t)b);
+		double x[2][3] = {{0}}, sum[2] = {0};
+		struct incise_source source;
+		int m = 0;
 
-		for (size_t i = 0; i < source.batch.n; i++) {
-			int64_t seq = column[0].i[i];
+		rc = incise_source_open_at(&source, force, INCISE_LEDGER_FORCE, from,
+					   err);
+		rc = rc ? rc : 1;
+		while (m < BLOCK && rc > 0 && (rc = incise_source_next(&source, err)) > 0)
+			for (size_t i = 0; i < source.batch.n && m < BLOCK; i++) {
+				const union incise_column *column = source.batch.column;
 
-			if (!begun)
-				first = seq;
-			/* Blocks of a short recording overlap. */
-			while (begun < all && (uint64_t)seq - (uint64_t)first >=
-						      rows / BLOCKS * (uint64_t)begun)
-				begun++;
-			for (int b = done; b < begun; b++)
-				add_sample(&blocks[b], column[CODE].i[i], column[1].i[i]);
-			while (done < begun && blocks[done].n == BLOCK)
-				done++;
-		}
-	}
-	incise_source_close(&source);
-	for (int b = 0; b < all; b++) {
-		int m = blocks[b].n;
-
+				if (column[0].i[i] < from)
+					continue;
+				if (!m)
+					first_ns = column[1].i[i];
+				for (int k = 0; k < 2; k++) {
+					x[k][0] = x[k][1];
+					x[k][1] = x[k][2];
+					x[k][2] = k ? (double)column[1].i[i] -
+								  (double)first_ns
+						    : (double)column[CODE].i[i];
+					if (m >= 2)
+						sum[k] += pow(x[k][0] - 2 * x[k][1] +
+								      x[k][2],
+							      2) /
+							  6;
+				}
+				m++;
+			}
+		incise_source_close(&source);
 		for (int k = 0; k < 2 && m > 2; k++)
-			variance[k][n] = blocks[b].sum[k] / (m - 2);
+			variance[k][n] = sum[k] / (m - 2);
 		n += m > 2;
+		rc = rc < 0 ? rc : 1; /* its last block may be short */
 	}
 	*codes = n ? median(variance[0], n) : NAN;
 	*times_ns2 = n ? median(variance[1], n) : NAN;

@@ -17,7 +17,7 @@
 #include "recalibration.h"
 #include "recording.h"
 #include "session.h"
-#include "source.h"
+#include "../ledger.h"
 #include "../schema.h"
 
 #define COUNT_MAX (1LL << 53)
@@ -471,7 +471,6 @@ void incise_recording_close(struct incise_recording *rec)
 	incise_session_close(rec->session);
 	sqlite3_close(rec->db);
 	free(rec->recalibrated);
-	free(rec->fit);
 	free(rec->path);
 	free(rec->name);
 	free(rec);
@@ -572,41 +571,6 @@ static bool take_knot(sqlite3_stmt *stmt, const struct incise_timeline_knot *las
 	       (!last || (knot->seq > last->seq && knot->t_ns > last->t_ns));
 }
 
-/*
- * Numbers and arrivals of the tracker, up to a row that cannot be: its reader reports that.
- * *@rows is to be freed. Returns 0 or -ENOMEM.
- */
-static int read_arrivals(struct incise_source *source, struct incise_fit_row **rows,
-			 size_t *n)
-{
-	const struct incise_batch *batch = &source->batch;
-	size_t capacity = 0;
-	int rc;
-
-	while ((rc = incise_source_next(source, NULL)) > 0) {
-		if (*n + batch->n > capacity) {
-			struct incise_fit_row *more;
-
-			capacity = 2 * capacity + batch->n;
-			more = realloc(*rows, capacity * sizeof(**rows));
-			if (!more)
-				return -ENOMEM;
-			*rows = more;
-		}
-		for (size_t i = 0; i < batch->n; i++) {
-			int64_t seq = batch->column[0].i[i];
-			int64_t arrival_ns = batch->column[2].i[i];
-
-			if (seq < 0 || arrival_ns < 0 || arrival_ns > TIME_MAX ||
-			    (*n && arrival_ns < (*rows)[*n - 1].arrival_ns))
-				return 0;
-			(*rows)[(*n)++] =
-				(struct incise_fit_row){(uint64_t)seq, arrival_ns};
-		}
-	}
-	return rc == -ENOMEM ? rc : 0;
-}
-
 /* Of the tracker's arrivals; 0: none, or not known. */
 static double read_grain(struct incise_recording *rec)
 {
@@ -622,8 +586,8 @@ static double read_grain(struct incise_recording *rec)
 	return grain_ns > 0 && grain_ns < DELAY_MAX_MS * 1e6 ? grain_ns : 0;
 }
 
-static int fit(struct incise_recording *rec, const struct incise_recording_line *line,
-	       const struct incise_stream *stream, double period_ns, double grain_ns,
+static int fit(struct incise_recording *rec, struct incise_recording_line *line,
+	       const struct incise_stream *stream, double period_ns,
 	       struct incise_error *err)
 {
 	const struct incise_fit_setup setup = {
@@ -632,26 +596,13 @@ static int fit(struct incise_recording *rec, const struct incise_recording_line 
 		.period_ns = period_ns,
 		.delay_ns = llrint(stream->delay_ms * 1e6),
 		.delay_sd_ns = isnan(stream->delay_sd_ms) ? 0 : stream->delay_sd_ms * 1e6,
-		.grain_ns = grain_ns,
+		.grain_ns = read_grain(rec),
 	};
-	struct incise_fit_row *rows = NULL;
-	struct incise_source source;
-	int64_t found;
-	size_t n = 0;
-	int rc;
 
-	rc = incise_source_open(&source, rec, INCISE_LEDGER_TRACKER, err);
-	found = rc ? rc : read_arrivals(&source, &rows, &n);
-	incise_source_close(&source);
-	if (rc)
-		return rc;
-	if (!found)
-		found = incise_fit(&setup, rows, n, &rec->fit);
-	free(rows);
-	if (found < 0)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
-	rec->n_fit = (size_t)found;
-	return 0;
+	line->others = incise_others_new(rec, &setup);
+	return line->others
+		       ? 0
+		       : incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
 }
 
 /* The rows of the tracker that are not on the line. */
@@ -662,17 +613,20 @@ static int find_others(struct incise_recording *rec, struct incise_recording_lin
 	int n = incise_recording_streams(rec, streams, err), rc = 0;
 	double hz = NAN;
 
-	if (n > 0 && !rec->fitted)
+	if (n > 0)
 		rc = incise_recording_number(rec, "tracker_hz", &hz, err);
 	for (int i = 0; i < n && !rc && hz >= RATE_MIN && hz <= RATE_MAX; i++)
 		if (!strcmp(streams[i].name, "tracker") && !streams[i].timestamped &&
 		    fabs(streams[i].delay_ms) < DELAY_MAX_MS &&
 		    (line->n || !(streams[i].nominal_hz > 0)))
-			rc = fit(rec, line, &streams[i], 1e9 / hz, read_grain(rec), err);
-	rec->fitted = rc == 0;
-	line->others = rec->fit;
-	line->n_others = rec->n_fit;
+			rc = fit(rec, line, &streams[i], 1e9 / hz, err);
 	return n < 0 ? n : rc;
+}
+
+void incise_recording_line_free(struct incise_recording_line *line)
+{
+	incise_others_free(line->others);
+	line->others = NULL;
 }
 
 int incise_recording_line(struct incise_recording *rec, const char *stream,
@@ -684,7 +638,6 @@ int incise_recording_line(struct incise_recording *rec, const char *stream,
 	rec = incise_recording_member(rec, !strcmp(stream, "camera") ? "frames" : stream);
 	line->n = 0;
 	line->others = NULL;
-	line->n_others = 0;
 	if (rec->form < 2)
 		return 0;
 	if (sqlite3_prepare_v2(rec->db,
@@ -718,18 +671,7 @@ int incise_recording_line(struct incise_recording *rec, const char *stream,
 static const struct incise_fit_time *find_other(const struct incise_recording_line *line,
 						uint64_t seq)
 {
-	size_t low = 0, high = line->n_others;
-
-	while (low < high) {
-		size_t middle = low + (high - low) / 2;
-
-		if (line->others[middle].seq < seq)
-			low = middle + 1;
-		else
-			high = middle;
-	}
-	return low < line->n_others && line->others[low].seq == seq ? &line->others[low]
-								    : NULL;
+	return line->others ? incise_others_find(line->others, seq) : NULL;
 }
 
 int64_t incise_recording_time(const struct incise_recording_line *line, uint64_t seq,

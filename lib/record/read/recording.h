@@ -7,7 +7,7 @@
 
 #include <sqlite3.h>
 #include <incise/recording.h>
-#include "../time/fit.h"
+#include "others.h"
 #include "../time/timeline.h"
 
 struct incise_recalibrated;
@@ -22,10 +22,6 @@ struct incise_recording {
 	struct incise_recording_info meta; /* the part that is in table meta */
 	/* The calibration that it is read by, if not that of its capture; see recalibration.h. */
 	struct incise_recalibrated *recalibrated;
-	/* Rows of the tracker that are not on its line, found at the first need. */
-	bool fitted;
-	struct incise_fit_time *fit;
-	size_t n_fit;
 	/* Of a session: its members; then db has the events only, and path the choice too. */
 	struct incise_session *session;
 	/* Of a member: from its clock to the session's; it belongs to the session. Or NULL. */
@@ -79,9 +75,7 @@ int incise_recording_need_zero(const struct incise_recording *recording,
 /* The line of a stream's times; n 0: the times of the rows are the best, but for the others. */
 struct incise_recording_line {
 	int n;
-	/* Rows that are timed otherwise; of the recording. */
-	const struct incise_fit_time *others;
-	size_t n_others;
+	struct incise_others *others; /* rows that are timed otherwise, or NULL */
 	struct incise_timeline_knot knots[INCISE_TIMELINE_KNOTS_MAX];
 };
 
@@ -90,9 +84,14 @@ int incise_recording_streams(struct incise_recording *recording,
 			     struct incise_stream streams[INCISE_STREAMS_MAX],
 			     struct incise_error *err);
 
-/* Table knots of one stream. Returns 0, -EINVAL (an impossible row), -EIO. */
+/*
+ * Table knots of one stream. Returns 0, -EINVAL (an impossible row), -EIO. To be freed; copies share what is
+ * freed.
+ */
 int incise_recording_line(struct incise_recording *recording, const char *stream,
 			  struct incise_recording_line *line, struct incise_error *err);
+
+void incise_recording_line_free(struct incise_recording_line *line);
 
 /* The best time of a row, ns of CLOCK_MONOTONIC: on the line, or without a line its own. */
 int64_t incise_recording_time(const struct incise_recording_line *line, uint64_t seq,

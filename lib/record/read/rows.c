@@ -287,6 +287,7 @@ int64_t incise_rows_seq(const struct incise_rows *rows)
 void incise_rows_close(struct incise_rows *rows)
 {
 	incise_source_close(&rows->source);
+	incise_recording_line_free(&rows->times.line);
 	sqlite3_finalize(rows->stmt);
 	rows->stmt = NULL;
 }

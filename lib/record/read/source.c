@@ -279,7 +279,12 @@ static int open_table(struct incise_source *source, int64_t from_seq, bool from_
 
 	if (recording->form >= 5) {
 		rc = incise_ledger_select(recording->db, recording->form, form->stream,
-					  from_seq, from_end, &source->stmt);
+					  from_seq == INT64_MIN
+						  ? from_seq
+						  : incise_ledger_find(recording->db,
+								       form->stream,
+								       from_seq),
+					  from_end, &source->stmt);
 	} else {
 		if (recording->form < (source->stream == INCISE_LEDGER_WALL	? 3
 				       : source->stream == INCISE_LEDGER_CAMERA ? 2

@@ -71,7 +71,8 @@ static void lost(struct walk *walk, int64_t first, int64_t last, int64_t after_n
 			 (long long)last);
 	if (after_ns < 0 && !walk->known)
 		incise_verify_found(walk->verify, &found, "%s: %llu missing, %s: all",
-				    walk->form->stream, (unsigned long long)count, number);
+				    walk->form->stream, (unsigned long long)count,
+				    number);
 	else if (after_ns < 0)
 		incise_verify_found(walk->verify, &found,
 				    "%s: %llu missing at the end, %s, after %.4f s",

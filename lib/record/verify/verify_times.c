@@ -41,34 +41,35 @@ static void report(struct incise_verification *verify,
 
 void incise_verify_times(struct incise_verification *verify)
 {
-	const struct incise_fit_time *first = NULL, *last = NULL;
+	const struct incise_fit_time *other = NULL;
+	struct incise_fit_time first, last;
 	struct incise_recording_line line;
 	struct incise_error err = {0};
 	uint64_t count = 0;
 	double sd_ns = 0;
 
-	/* Without a line all rows are timed by arrival, as their t_ns is. */
-	if (incise_recording_line(verify->recording, "tracker", &line, &err) || !line.n)
+	if (incise_recording_line(verify->recording, "tracker", &line, &err))
 		return;
-	for (size_t i = 0; i < line.n_others; i++) {
-		const struct incise_fit_time *other = &line.others[i];
-
+	/* Without a line all rows are timed by arrival, as their t_ns is. */
+	if (line.n && line.others)
+		other = incise_others_next(line.others, 0);
+	for (; other; other = incise_others_next(line.others, other->seq + 1)) {
 		/* On the line, with an uncertainty that covers the doubt. */
 		if (other->kind == INCISE_FIT_WIDER)
 			continue;
-		if (first && !belongs(last, other)) {
-			report(verify, first, last, count, sd_ns);
-			first = NULL;
-		}
-		if (!first) {
-			first = other;
+		if (count && !belongs(&last, other)) {
+			report(verify, &first, &last, count, sd_ns);
 			count = 0;
+		}
+		if (!count) {
+			first = *other;
 			sd_ns = 0;
 		}
-		last = other;
+		last = *other;
 		count++;
 		sd_ns = fmax(sd_ns, other->sd_ns);
 	}
-	if (first)
-		report(verify, first, last, count, sd_ns);
+	if (count)
+		report(verify, &first, &last, count, sd_ns);
+	incise_recording_line_free(&line);
 }

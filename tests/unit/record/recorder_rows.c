@@ -85,6 +85,7 @@ static void measure(double hz, double drift_ppm, double jitter_ms, double latenc
 				   1.96 * incise_recording_time_sd(&line, seq);
 		}
 	incise_source_close(&source);
+	incise_recording_line_free(&line);
 	incise_recording_close(recording);
 	free(t_ns);
 	assert_int_equal(system("rm -r a.rec"), 0);

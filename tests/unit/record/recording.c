@@ -466,6 +466,7 @@ TEST(line_is_read_and_used, IN_FOLDER)
 			 9000); /* beyond the last */
 	assert_true(incise_recording_time_sd(&line, 15) == 7);
 	assert_true(incise_recording_time_sd(&line, 29) == 7);
+	incise_recording_line_free(&line);
 	/* what has no line has its own times */
 	assert_int_equal(incise_recording_line(recording, "force", &line, &err), 0);
 	assert_int_equal(line.n, 0);

@@ -36,14 +36,21 @@ static void set_knots(const char *values)
 	change(DB, sql);
 }
 
+static struct incise_recording *opened;
+
 static struct incise_row_times open_times(const char *table)
 {
-	struct incise_recording *recording = incise_recording_open("times.rec", &err);
 	struct incise_row_times times;
 
-	succeeds(recording && !incise_row_times_open(&times, recording, table, &err));
-	incise_recording_close(recording);
+	opened = incise_recording_open("times.rec", &err);
+	succeeds(opened && !incise_row_times_open(&times, opened, table, &err));
 	return times;
+}
+
+static void close_times(struct incise_row_times *times)
+{
+	incise_recording_line_free(&times->line);
+	incise_recording_close(opened);
 }
 
 TEST(a_row_is_on_its_line)
@@ -73,6 +80,7 @@ TEST(a_row_is_on_its_line)
 		assert_int_equal(incise_row_times_next(&times, 26, 203 * MS, &t_ns),
 				 !strcmp(cases[i].table, "events"));
 		assert_false(incise_row_times_next(&times, 27, INT64_MAX, &t_ns));
+		close_times(&times);
 	}
 }
 
@@ -107,6 +115,7 @@ TEST(another_delay_shifts)
 		assert_true(incise_row_times_next(&times, 25, 203 * MS, &t_ns));
 		assert_int_equal(t_ns, cases[i].expected);
 		assert_true(fabs(incise_row_times_sd(&times, 25) - cases[i].sd_s) < 1e-8);
+		close_times(&times);
 	}
 }
 
@@ -139,6 +148,7 @@ TEST(times_increase_whatever_knots_say)
 			assert_true(t_ns > last_ns);
 			assert_true(incise_row_times_sd(&times, seq) >= 0);
 		}
+		close_times(&times);
 	}
 }
 
