@@ -46,6 +46,8 @@ fuzz_igtl_poses := $(addprefix lib/base/,error.c igtl.c ring.c) \
 fuzz_wall_packets := $(addprefix lib/record/write/wall_,packets.c kernel.c)
 
 fuzz_statement := lib/base/error.c lib/record/statement.c
+fuzz_block := lib/record/batch.c lib/record/ledger.c lib/base/crc32c.c
+fuzz_libs_block = $(shell $(PKG_CONFIG) --libs sqlite3)
 fuzz_origin := lib/record/export/origin.c
 fuzz_timestamp_reply := lib/base/error.c lib/base/infile.c tools/seal/timestamp.c
 fuzz_libs_timestamp_reply = $(shell $(PKG_CONFIG) --libs libcrypto)

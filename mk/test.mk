@@ -197,11 +197,11 @@ bats_jobs = --jobs $(shell expr $$(nproc) + 1) --no-parallelize-within-files
 check-cli: cli-needs peers ## command-line tests of the real programs
 	$(Q)$(bats) $(bats_jobs) tests/cli
 
-check-attack: all $(attack_programs) ## attacks on recordings: 100 kills, thousands of faults; ATTACK=few for a few
+check-attack: all $(O)/tests/sql $(attack_programs) ## attacks on recordings: 100 kills, thousands of faults; ATTACK=few for a few
 	ATTACK=$(or $(ATTACK),full) $(bats) tests/attack
 
 # Python's own memory is not of interest: its objects of the end of the program count as leaks.
-check-python: all ## tests of incise for Python on libraries under AddressSanitizer and UBSan
+check-python: all $(O)/tests/sql ## tests of incise for Python on libraries under AddressSanitizer and UBSan
 	+@$(MAKE) --no-print-directory O=$(O)/check $(sanitized) libs
 	cd tests/python && INCISE_BUILD=$(abspath $(O)) INCISE_LIBDIR=$(abspath $(O))/check/lib \
 		LD_PRELOAD=$$($(CC) -print-file-name=libasan.so) ASAN_OPTIONS=detect_leaks=0 \

@@ -37,7 +37,7 @@ $(system_programs): $(O)/tests/vm/%: tests/vm/system/%.c tests/vm/simulator.c \
 	$(call step,LD)
 	$(Q)$(CC) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< tests/vm/simulator.c
 
-check-vm: all $(guest_programs) $(guest_model) $(system_programs) $(O)/tests/polhemus/fastrak ## tests of the kernel modules, on Debian's kernels in QEMU
+check-vm: all $(O)/tests/sql $(guest_programs) $(guest_model) $(system_programs) $(O)/tests/polhemus/fastrak ## tests of the kernel modules, on Debian's kernels in QEMU
 	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check --bed $(vm_boots)
 
 check-service: all $(system_programs) $(O)/tests/polhemus/fastrak ## of check-vm the boot of systemd, with our packages and the service
@@ -50,7 +50,7 @@ check-clocks: all ## two guests with clocks of their own, joined by PTP
 
 # In real time only: with every access checked its timers are late by up to a millisecond,
 # in virtual time too, so that nothing about time can be asserted.
-check-vm-debug: all $(guest_programs) $(guest_model) $(O)/tests/polhemus/fastrak ## the same on a kernel with KASAN, lockdep, kmemleak; built once
+check-vm-debug: all $(O)/tests/sql $(guest_programs) $(guest_model) $(O)/tests/polhemus/fastrak ## the same on a kernel with KASAN, lockdep, kmemleak; built once
 	@mk/deps vm vm-debug
 	+@tests/vm/debug-kernel >/dev/null
 	+@INCISE_BUILD=$(abspath $(O)) MAKE="$(MAKE)" tests/vm/check --bed debug:smp

@@ -276,6 +276,19 @@ static void rows_store(sqlite3 *db, const struct incise_ledger_form *form)
 	incise_batch_free(&batch);
 }
 
+/* Note which tables SQL changes. */
+static int rows_authorize(void *changed, int action, const char *table, const char *a,
+			  const char *b, const char *c)
+{
+	const int stream = table ? incise_source_find(table) : -1;
+
+	(void)a, (void)b, (void)c;
+	if (stream >= 0 && (action == SQLITE_INSERT || action == SQLITE_UPDATE ||
+			    action == SQLITE_DELETE))
+		((bool *)changed)[stream] = true;
+	return SQLITE_OK;
+}
+
 /*
  * Open a file, of a recording or not, with the tables that @sql names, NULL: all, and say which they are.
  * NULL: SQLite cannot.
@@ -331,12 +344,14 @@ __attribute__((unused)) static int rows_sql(const char *file, bool readonly,
 					    void (*row)(void *user, sqlite3_stmt *stmt),
 					    void *user, char **message)
 {
-	bool loaded[INCISE_SOURCE_DEPTH + 1];
+	bool loaded[INCISE_SOURCE_DEPTH + 1], changed[INCISE_SOURCE_DEPTH + 1] = {false};
 	sqlite3 *db = rows_open(file, readonly, sql, loaded);
 	int rc = db ? SQLITE_OK : SQLITE_CANTOPEN;
 	sqlite3_stmt *stmt;
 
 	*message = NULL;
+	if (db)
+		sqlite3_set_authorizer(db, rows_authorize, changed);
 	while (rc == SQLITE_OK && *sql) {
 		rc = sqlite3_prepare_v2(db, sql, -1, &stmt, &sql);
 		while (rc == SQLITE_OK && stmt && sqlite3_step(stmt) == SQLITE_ROW)
@@ -351,7 +366,7 @@ __attribute__((unused)) static int rows_sql(const char *file, bool readonly,
 	else
 		sqlite3_exec(db, "BEGIN", NULL, NULL, NULL);
 	for (int i = 0; i < INCISE_SOURCE_DEPTH && rc == SQLITE_OK && !readonly; i++)
-		if (loaded[i])
+		if (loaded[i] && changed[i])
 			rows_store(db, incise_source_form(i));
 	if (rc == SQLITE_OK)
 		sqlite3_exec(db, "COMMIT", NULL, NULL, NULL);

@@ -57,18 +57,13 @@ static bool read_rows(const char *folder, uint32_t *crc)
 		"PRAGMA user_version",
 		"SELECT type, name, tbl_name, sql FROM sqlite_master",
 		"SELECT key, typeof(value), quote(value) FROM meta ORDER BY key",
-		"SELECT * FROM force ORDER BY seq",
-		"SELECT seq, t_ns, arrival_ns, quote(x_mm), quote(y_mm), quote(z_mm), "
-		"quote(qw), quote(qx), quote(qy), quote(qz), status, station, button FROM "
-		"tracker ORDER BY seq",
-		"SELECT seq, t_ns, quote(depth_mm), quote(velocity_mm_s) FROM depth ORDER "
-		"BY seq",
+		"SELECT stream, block, first_seq, last_seq, first_ns, last_ns, count, lost, crc, "
+		"hex(sha256), hex(data) FROM blocks ORDER BY stream, block",
 		"SELECT * FROM events ORDER BY rowid",
-		"SELECT * FROM frames ORDER BY seq",
 		"SELECT * FROM streams ORDER BY rowid",
 		"SELECT * FROM knots ORDER BY stream, knot",
 		"SELECT * FROM ledger ORDER BY stream, block",
-		"SELECT * FROM seal ORDER BY number",
+		"SELECT number, t_ns, force, tracker, camera, wall, hex(head) FROM seal ORDER BY number",
 	};
 	char file[200];
 	sqlite3 *db;

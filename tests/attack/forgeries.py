@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-2.0-or-later
 """
 Forgeries of a recording by someone who knows incise-recording(5) and recomputes every checksum,
-and a second implementation of its ledger, seal and statement: with SQLite, hashlib and zlib only.
+and a second implementation of its blocks, seal and statement: with SQLite, hashlib and zlib only.
 
     forgeries.py STATEMENT_PROGRAM NAME.rec OTHER.rec COUNT SEED
 
@@ -11,6 +11,7 @@ part that was forged. STATEMENT_PROGRAM is tests/attack/statement.
 """
 import collections
 import hashlib
+import math
 import os
 import random
 import shutil
@@ -20,15 +21,16 @@ import subprocess
 import sys
 import zlib
 
+sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), "../python"))
+from read_blocks import COLUMNS, column, crc32c
+
 STREAMS = ("force", "tracker", "camera", "wall")
-TABLES = {"force": "force", "tracker": "tracker", "camera": "frames", "wall": "wall"}
 START = {"boot", "host", "identity", "incise", "kernel", "started"}
 CALIBRATION = {"calibration_conf", "depth_mm_px", "force_mV_N", "tip_x_mm", "tip_y_mm", "tip_z_mm"}
 REWRITTEN = {"complete", "depth_rows", "force_clipped", "force_lost", "force_rows", "force_zero_mV",
              "force_zero_samples", "force_zero_sd_mV", "frames_lost", "frames_rows",
              "frames_unlooked", "tracker_lost", "tracker_rows", "wall_rows"}
-ORDER = {"depth": "seq", "events": "rowid", "knots": "stream, knot", "streams": "rowid",
-         "meta": "key"}
+ORDER = {"events": "rowid", "knots": "stream, knot", "streams": "rowid", "meta": "key"}
 
 
 # --- the format, a second time --------------------------------------------------------------
@@ -41,35 +43,37 @@ def integers(*values):
     return b"".join(struct.pack("<q", v) for v in values)
 
 
-CRC_TABLE = []
-for _i in range(256):
-    for _ in range(8):
-        _i = _i >> 1 ^ (0x82f63b78 if _i & 1 else 0)
-    CRC_TABLE.append(_i)
+DATA = {}  # of the rows of each block that was read, as it was written
 
 
-def crc32c(crc, data):
-    crc ^= 0xffffffff
-    for byte in data:
-        crc = CRC_TABLE[(crc ^ byte) & 255] ^ crc >> 8
-    return crc ^ 0xffffffff
+def decode_rows(stream, count, data):
+    """The rows of a block; None stands for NaN."""
+    columns, at = [], 0
+    for kind in COLUMNS[stream][1] if count else ():
+        values, at = column(kind, data, at, count)
+        columns.append([None if value != value else value for value in values])
+    rows = [list(row) for row in zip(*columns)]
+    DATA[str((stream, rows))] = data
+    return rows
 
 
-def real(value):
-    return struct.pack("<Q", 0x7ff8000000000000) if value is None else struct.pack("<d", value + 0.0)
-
-
-def encode_row(stream, row):
-    """A row of a stream as the ledger has it."""
-    if stream == "force":
-        return integers(*row)
-    if stream == "tracker":
-        return (integers(*row[:3]) + b"".join(map(real, row[3:10])) + row[10].encode() +
-                integers(*row[11:]))
-    if stream == "camera":
-        return integers(*row[:6]) + b"".join(map(real, row[6:10])) + row[10]
-    return (integers(*row[:3]) + b"".join(map(real, row[3:6])) + integers(*row[6:8]) +
-            b"".join(text.encode().ljust(24, b"\0") for text in row[8:]))
+def encode_rows(stream, rows):
+    """The data of a block, each value on its own where they are not those that were read."""
+    known = DATA.get(str((stream, rows)))
+    if known is not None:
+        return known
+    data = b""
+    for kind, values in zip(COLUMNS[stream][1], zip(*rows)):
+        if kind == "i":
+            data += b"\x08" + bytes(16) + integers(*values)
+        elif kind in "rn":
+            data += b"\x08" + b"".join(
+                struct.pack("<d", math.nan if value is None else value) for value in values)
+        else:
+            size = {"c": 1, "s": 24, "h": 32}[kind]
+            data += bytes((size,)) + b"".join(
+                (value if kind == "h" else value.encode()).ljust(size, b"\0") for value in values)
+    return data
 
 
 def encode_value(value):
@@ -90,13 +94,13 @@ class Recording:
     def __init__(self, path):
         self.path = path
         db = sqlite3.connect(path + "/recording.db")
-        self.rows = {stream: [list(row) for row in db.execute(
-            f"SELECT * FROM {TABLES[stream]} ORDER BY seq")] for stream in STREAMS}
         self.tables = {table: [list(row) for row in db.execute(
             f"SELECT * FROM {table} ORDER BY {order}")] for table, order in ORDER.items()}
-        self.ledger = {}
-        for stream, *block in db.execute("SELECT * FROM ledger ORDER BY stream, block"):
+        self.ledger = {name: [block] for name, *block in db.execute("SELECT * FROM ledger")}
+        self.rows = {stream: [] for stream in STREAMS}
+        for stream, *block, data in db.execute("SELECT * FROM blocks ORDER BY stream, block"):
             self.ledger.setdefault(stream, []).append(block)
+            self.rows[stream] += decode_rows(stream, block[5], data)
         self.seal = [list(row) for row in db.execute("SELECT * FROM seal ORDER BY number")]
         db.close()
         self.head = self.length = None
@@ -119,14 +123,16 @@ class Recording:
             if row[0] == key:
                 row[1] = value
 
-    # The ledger: block, first_seq, last_seq, first_ns, last_ns, count, lost, crc.
+    # The ledger: block, first_seq, last_seq, first_ns, last_ns, count, lost, crc; of streams sha256 too.
 
     def rows_of(self, stream):
-        """The rows of each block, by the numbers in the ledger."""
+        """The rows of each block, by the numbers in the ledger; those behind the last are its."""
         rows, at = self.rows[stream], 0
-        for block in self.ledger.get(stream, []):
+        blocks = self.ledger.get(stream, [])
+        last = max((block[0] for block in blocks if block[5]), default=-1)
+        for block in blocks:
             first = at
-            while block[5] and at < len(rows) and rows[at][0] <= block[2]:
+            while block[5] and at < len(rows) and (rows[at][0] <= block[2] or block[0] == last):
                 at += 1
             yield block, rows[first:at]
 
@@ -142,16 +148,11 @@ class Recording:
         for number, block in enumerate(self.ledger.get(stream, [])):
             block[0] = number
 
-    def make_ledger(self):
+    def make_ledger(self, digests):
         for stream in STREAMS:
             self.drop_empty_blocks(stream)
-            crc, last_seq, last_ns, lost = 0, -1, 0, 0
-            split = list(self.rows_of(stream))
-            if split and split[-1][0][5] == 0 and len(split) > 1:
-                # rows behind the last block belong to it
-                n = sum(len(rows) for _, rows in split)
-                split[-2][1].extend(self.rows[stream][n:])
-            for block, rows in split:
+            last_seq, last_ns, lost = -1, 0, 0
+            for block, rows in list(self.rows_of(stream)):
                 if rows:
                     numbers = [row[0] for row in rows]
                     block[1:7] = [numbers[0], numbers[-1], rows[0][1], rows[-1][1], len(rows),
@@ -162,9 +163,9 @@ class Recording:
                 elif block[5] == 0:
                     block[1:5] = [last_seq + 1, last_seq + block[6], last_ns, last_ns]
                 lost += block[6]
-                for row in rows:
-                    crc = crc32c(crc, encode_row(stream, row))
-                crc = block[7] = crc32c(crc, integers(*block[:7]))
+                data = encode_rows(stream, rows)
+                block[7] = crc32c(crc32c(0, data), integers(*block[:7]))
+                block[8] = sha(data) if digests else block[8]
             if stream in ("force", "tracker", "camera") and stream in self.ledger:
                 name = "frames" if stream == "camera" else stream
                 self.set_meta(name + "_rows", len(self.rows[stream]))
@@ -174,7 +175,6 @@ class Recording:
                         row[7], row[8] = len(self.rows[stream]), lost
             elif stream == "wall":
                 self.set_meta("wall_rows", len(self.rows[stream]))
-        self.set_meta("depth_rows", len(self.tables["depth"]))
         if self.meta("complete"):
             for table in ORDER:
                 self.ledger["table:" + table] = [self.seal_of(
@@ -202,8 +202,9 @@ class Recording:
             "configuration": self.keys(lambda key: key not in START | CALIBRATION | REWRITTEN),
             "calibration": self.keys(lambda key: key in CALIBRATION),
             "meta": self.keys(lambda key: key in REWRITTEN),
+            "depth": sha(),
         }
-        for table in ("depth", "events", "knots", "streams"):
+        for table in ("events", "knots", "streams"):
             digests[table] = sha(*(encode_value(v) for row in self.tables[table] for v in row))
         if self.head is not None:
             length = self.ledger["file:camera.mkv"][0][2] if self.meta("complete") else 0
@@ -211,9 +212,9 @@ class Recording:
         return digests
 
     def chain(self):
-        """The heads, and the digests of the streams, from all rows."""
+        """The heads, and the digests of the streams, from all data."""
         parts = self.parts()
-        head = sha(b"incise seal 1\n", parts["start"], parts["configuration"],
+        head = sha(b"incise seal 2\n", parts["start"], parts["configuration"],
                    parts["calibration"])
         digests = {stream: bytes(32) for stream in STREAMS}
         left = {stream: list(self.rows_of(stream)) for stream in STREAMS}
@@ -223,9 +224,9 @@ class Recording:
             for index, stream in enumerate(STREAMS):
                 done = len(self.ledger.get(stream, [])) - len(left[stream])
                 for block, rows in left[stream][:counts[index] - done]:
-                    rows_digest = sha(*(encode_row(stream, row) for row in rows))
-                    blocks += integers(index, *block) + rows_digest
-                    digests[stream] = sha(digests[stream], integers(*block), rows_digest)
+                    fields, digest = integers(*block[:8]), sha(encode_rows(stream, rows))
+                    blocks += integers(index) + fields + digest
+                    digests[stream] = sha(digests[stream], fields, digest)
                 del left[stream][:counts[index] - done]
             if self.meta("complete") and number == self.seal[-1][0]:
                 for table in ("depth", "events", "knots", "streams", "meta"):
@@ -249,6 +250,7 @@ class Recording:
             sum(which(key) for key, _ in self.tables["meta"]) for which in (
                 lambda key: key in START, lambda key: key not in START | CALIBRATION | REWRITTEN,
                 lambda key: key in CALIBRATION, lambda key: key in REWRITTEN))))
+        rows["depth"] = 0
         rows["camera.mkv"] = self.length if self.head is not None and self.meta("complete") else 0
         lines = ["incise statement 1", "identity " + self.meta("identity"), "name " + name,
                  "software " + self.meta("incise"), "host " + self.meta("host"),
@@ -276,10 +278,11 @@ class Recording:
 
     def save(self):
         db = sqlite3.connect(self.path + "/recording.db")
-        contents = {TABLES[stream]: rows for stream, rows in self.rows.items()}
-        contents.update(self.tables)
-        contents["ledger"] = [[stream] + block for stream, blocks in self.ledger.items()
-                              for block in blocks]
+        contents = dict(self.tables)
+        contents["ledger"] = [[name] + block for name, blocks in self.ledger.items()
+                              for block in blocks if name not in STREAMS]
+        contents["blocks"] = [[stream] + block + [encode_rows(stream, rows)] for stream in STREAMS
+                              for block, rows in self.rows_of(stream)]
         contents["seal"] = self.seal
         for table, rows in contents.items():
             db.execute(f"DELETE FROM {table}")
@@ -396,6 +399,13 @@ def remove_row(stream):
         del rows[at]
         return {stream}, commit
     return forge
+
+
+def remove_block(recording, chance):
+    block, rows = chance.choice(list(recording.rows_of("force"))[1:-2])
+    commit = recording.commit_of("force", block[1])
+    recording.rows["force"] = [row for row in recording.rows["force"] if row not in rows]
+    return {"force"}, commit
 
 
 def add_row(recording, chance):
@@ -515,8 +525,6 @@ def truncate(complete):
             recording.ledger[stream] = blocks
             end = blocks[-1][2] if blocks else -1
             recording.rows[stream] = [row for row in recording.rows[stream] if row[0] <= end]
-        end = max((row[0] for row in recording.rows["tracker"]), default=-1)
-        recording.tables["depth"] = [row for row in recording.tables["depth"] if row[0] <= end]
         if not complete:
             recording.set_meta("complete", 0)
             for name in [name for name in recording.ledger if ":" in name]:
@@ -584,8 +592,15 @@ def remove_seal(recording, chance):
 
 def downgrade(recording, chance):
     """Made to look like a recording of format 3, which has no seal."""
+    with open(os.path.join(os.path.dirname(__file__), "../forms/3.sql"), encoding="utf-8") as file:
+        made = [line for line in file if line.startswith("CREATE TABLE ") and
+                line[13:].split("(")[0] in ("force", "tracker", "depth", "frames", "wall")]
     db = sqlite3.connect(recording.path + "/recording.db")
-    db.executescript("DROP TABLE seal; ALTER TABLE frames DROP COLUMN sha256; PRAGMA user_version=3")
+    db.executescript("DROP TABLE seal; DROP TABLE blocks; PRAGMA user_version=3;" + "".join(made))
+    for stream, rows in recording.rows.items():
+        table, n = ("frames", 10) if stream == "camera" else (stream, len(rows[0]))
+        db.executemany(f"INSERT INTO {table} VALUES({','.join('?' * n)})", [row[:n] for row in rows])
+    db.commit()
     db.close()
     return {"seal"}, None
 
@@ -601,6 +616,7 @@ FORGERIES = {
     "force time": one_row("force", 1, later),
     "force order": swap_values("force", 2),
     "force row removed": remove_row("force"),
+    "force block removed": remove_block,
     "force row added": add_row,
     "force of another": other_stream,
     "tracker position": one_row("tracker", 3, moved),
@@ -622,8 +638,6 @@ FORGERIES = {
     "wall uncertainty": one_row("wall", 3, lambda value, chance: value / 2),
     "wall source": one_row("wall", 8, lambda value, chance: "ptp"),
     "wall row removed": remove_row("wall"),
-    "depth value": table_value("depth", 2, moved),
-    "depth speed": table_value("depth", 3, moved),
     "event text": table_value("events", 2, some_text),
     "event time": table_value("events", 0, later),
     "event removed": remove_event,
@@ -683,7 +697,7 @@ def main():
     if status:
         sys.exit(f"an untouched recording differs: {text}")
 
-    # Checksums that are recomputed: none, those of the ledger, and the seal too.
+    # Checksums that are recomputed: none, those of the ledger (with the digests or without), and the seal too.
     names, found = list(FORGERIES), collections.Counter()
     for i in range(int(count)):
         kind, level = names[i % len(names)], 2 - i // len(names) % 3
@@ -692,7 +706,7 @@ def main():
         recording = Recording("forged.rec")
         parts, commit = FORGERIES[kind](recording, chance)
         if level > 0:
-            recording.make_ledger()
+            recording.make_ledger(level > 1 or chance.random() < 0.5)
         if level > 1 and kind not in KEEP_SEAL:
             recording.make_seal()
         if kind != "format 3":

@@ -84,7 +84,8 @@ static void attack(struct round *round, int count)
 			continue;
 		}
 		check_recording(round, false);
-		last_ns = ask(round, "SELECT max(t_ns) FROM force");
+		last_ns = ask(round,
+			      "SELECT max(last_ns) FROM blocks WHERE stream = 'force'");
 		with_rows += last_ns >= 0;
 		if (last_ns < 0)
 			last_ns = ask(round, "SELECT max(t_ns) FROM events");

@@ -144,11 +144,6 @@ int64_t ask(const struct round *round, const char *sql)
 
 void check_recording(struct round *round, bool whole)
 {
-	static const char *const max[WATCH_TABLES] = {
-		[WATCH_FORCE] = "SELECT max(seq) FROM force",
-		[WATCH_TRACKER] = "SELECT max(seq) FROM tracker",
-		[WATCH_FRAMES] = "SELECT max(seq) FROM frames",
-	};
 	const char *file = recording();
 	bool has_name = !strncmp(file, "a.rec/", 6);
 	struct incise_verify_report report;
@@ -172,11 +167,12 @@ void check_recording(struct round *round, bool whole)
 		     report.intact, report.sealed, report.interrupted, report.complete,
 		     findings.text, text_of("err"));
 	for (int i = 0; i < WATCH_TABLES; i++) {
-		int64_t there = ask(round, max[i]);
+		int64_t there = ask(round, watch_greatest[i]);
 
 		if (there < round->page->seq[i])
-			fail(round, "%s is %lld, and %lld was committed", max[i],
-			     (long long)there, (long long)round->page->seq[i]);
+			fail(round, "%s is %lld, and %lld was committed",
+			     watch_greatest[i], (long long)there,
+			     (long long)round->page->seq[i]);
 	}
 }
 

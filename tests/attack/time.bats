@@ -103,7 +103,7 @@ agreed() {
 	agreed
 	straight 120
 	# it has stood still: so long nothing was committed
-	holds "$(ask a.rec "SELECT max(last_ns - first_ns) FROM ledger WHERE
+	holds "$(ask a.rec "SELECT max(last_ns - first_ns) FROM blocks WHERE
 		stream = 'force'") > 1.3e9"
 }
 

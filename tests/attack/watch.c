@@ -94,11 +94,6 @@ __attribute__((visibility("default"))) int sqlite3_exec(sqlite3 *db, const char 
 								   char **),
 							void *user, char **text)
 {
-	static const char *const max[WATCH_TABLES] = {
-		[WATCH_FORCE] = "SELECT max(seq) FROM force",
-		[WATCH_TRACKER] = "SELECT max(seq) FROM tracker",
-		[WATCH_FRAMES] = "SELECT max(seq) FROM frames",
-	};
 	int (*exec)(sqlite3 *, const char *, int (*)(void *, int, char **, char **),
 		    void *, char **) = dlsym(RTLD_NEXT, "sqlite3_exec");
 	int64_t seq[WATCH_TABLES], began_ns = now_ns();
@@ -107,7 +102,7 @@ __attribute__((visibility("default"))) int sqlite3_exec(sqlite3 *db, const char 
 	if (!attack.page || strncmp(sql, "COMMIT", 6))
 		return exec(db, sql, row, user, text);
 	for (int i = 0; i < WATCH_TABLES; i++)
-		seq[i] = greatest(db, max[i]);
+		seq[i] = greatest(db, watch_greatest[i]);
 	attack.page->began_ns = began_ns;
 	rc = exec(db, sql, row, user, text);
 	attack.page->began_ns = 0;

@@ -11,6 +11,15 @@
 
 enum { WATCH_FORCE, WATCH_TRACKER, WATCH_FRAMES, WATCH_TABLES };
 
+#define WATCH_GREATEST(stream) \
+	"SELECT max(last_seq) FROM blocks WHERE count > 0 AND stream = '" stream "'"
+/* Of each: its greatest number. */
+static const char *const watch_greatest[WATCH_TABLES] = {
+	[WATCH_FORCE] = WATCH_GREATEST("force"),
+	[WATCH_TRACKER] = WATCH_GREATEST("tracker"),
+	[WATCH_FRAMES] = WATCH_GREATEST("camera"),
+};
+
 struct watch_page {
 	_Atomic int64_t commits;
 	_Atomic int64_t began_ns; /* a COMMIT that is under way; 0: none is */

@@ -206,6 +206,15 @@ key() {
 	sqlite3 :memory: "SELECT json_extract(readfile('$1'), '\$.$2')"
 }
 
+# sqlite3, with a row a sample in the tables of a recording; see tests/rows/sql.c.
+sqlite3() {
+	local argument program=(command sqlite3)
+	for argument; do
+		[[ "$argument" != */recording.db ]] || program=("$INCISE_BUILD/tests/sql")
+	done
+	"${program[@]}" "$@"
+}
+
 # What the database of a recording answers: ask RECORDING SQL.
 ask() {
 	sqlite3 "$1/recording.db" "$2"

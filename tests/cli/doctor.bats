@@ -26,10 +26,10 @@ finding() { # GROUP NAME
 	[[ "$(finding devices camera)" == "  ok "*"names none" ]]
 	[[ "$(finding display window)" == *warning*"no window"*"--video"* ]]
 	[[ "$(finding calibration file)" == *warning*"calibration.conf: No such file"*"incise help calibrate" ]]
-	# the disk's space over the bytes of a row (18 of force, 180 of tracker), as incise capture
+	# the disk's space over the bytes of a row (2 of force, 84 of tracker) and of blocks (3000 of each), as capture
 	# expects them; the space may change by a minute's worth meanwhile
 	[[ "$(finding disk free)" =~ ok\ +free\ +([0-9.]+)\ GiB\ here:\ ([0-9]+)\ min ]]
-	holds "${BASH_REMATCH[1]} < 2 || (${BASH_REMATCH[2]} / (${BASH_REMATCH[1]} * 1073741824 / (10000 * 18 + 120 * 180) / 60) - 1) ^ 2 < 0.03 ^ 2"
+	holds "${BASH_REMATCH[1]} < 2 || (${BASH_REMATCH[2]} / (${BASH_REMATCH[1]} * 1073741824 / (10000 * 2 + 120 * 84 + 2 * 3000) / 60) - 1) ^ 2 < 0.03 ^ 2"
 	[[ "${lines[-1]}" =~ ^[0-9]+\ problems?,\ [0-9]+\ warnings?$ ]]
 	# scheduling and memory are of this machine
 	problems=$(grep -c "^  problem " <<<"$output" || :)

@@ -20,7 +20,7 @@ database = sqlite3.connect(new + ".work/recording.db", isolation_level=None)
 database.execute("PRAGMA cache_size = 5")
 page_bytes = database.execute("PRAGMA page_size").fetchone()[0]
 database.execute("BEGIN IMMEDIATE")
-database.execute("UPDATE force SET code = code + 1")
+database.execute("UPDATE blocks SET data = zeroblob(length(data))")
 shutil.copytree(new + ".work", new)
 database.execute("ROLLBACK")
 database.close()

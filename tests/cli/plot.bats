@@ -198,13 +198,11 @@ made_recording() {
 		DELETE FROM force WHERE seq BETWEEN 20000 AND 24999;
 		DELETE FROM force WHERE seq = 40000;
 		DELETE FROM tracker WHERE seq BETWEEN 360 AND 419;
-		DELETE FROM depth WHERE seq BETWEEN 360 AND 419;
 		DELETE FROM frames WHERE seq BETWEEN 50 AND 60;
 		UPDATE force SET code = 4095 WHERE seq BETWEEN 50000 AND 50002;
 		INSERT INTO events SELECT t_ns, 'marker', 'the \"skin\"' FROM force WHERE seq = 10000;
 		UPDATE meta SET value = (SELECT count(*) FROM force) WHERE key = 'force_rows';
 		UPDATE meta SET value = (SELECT count(*) FROM tracker) WHERE key = 'tracker_rows';
-		UPDATE meta SET value = (SELECT count(*) FROM depth) WHERE key = 'depth_rows';
 		UPDATE meta SET value = (SELECT count(*) FROM frames) WHERE key = 'frames_rows'"
 }
 
@@ -303,9 +301,9 @@ keep_data() {
 	draws a.rec
 	grep -q "interrupted$" texts
 	draws a.rec.part
-	sqlite3 a.rec.part/recording.db "UPDATE depth SET depth_mm = 9e999 WHERE seq = 7"
+	sqlite3 a.rec.part/recording.db "UPDATE tracker SET z_mm = 9e999 WHERE seq = 7"
 	run --separate-stderr incise plot a.rec -o b.png
-	failed_with "table depth, row 7"
+	failed_with "stream tracker, block 0"
 	[ ! -e b.png ]
 }
 

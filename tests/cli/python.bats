@@ -37,7 +37,7 @@ python_tests() {
 	run /usr/bin/python3 -S -c 'import numpy'
 	[ "$status" = 1 ]
 	python_tests /usr/bin/python3 -S -m unittest -v test_plan test_recording.Import \
-		test_recording.Recordings.test_streams_are_the_tables \
+		test_recording.Recordings.test_streams_are_the_blocks \
 		test_recording.Recordings.test_pairs_are_those_of_the_tool \
 		test_model.Models.test_forms_of_inputs test_model.Models.test_wrong_inputs
 }

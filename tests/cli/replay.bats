@@ -170,9 +170,9 @@ teardown() {
 	failed_with none.scene
 	run --separate-stderr incise replay liver.rec liver.scene --log no/folder/t.csv
 	failed_with no/folder
-	sqlite3 liver.rec/recording.db "UPDATE tracker SET x_mm = 'far' WHERE seq = 100"
+	sqlite3 liver.rec/recording.db "UPDATE tracker SET x_mm = 9e999 WHERE seq = 100"
 	run --separate-stderr incise replay liver.rec liver.scene --log t.csv
-	failed_with liver.rec "damaged" "row 100"
+	failed_with liver.rec "damaged" "stream tracker, block 8"
 	[ ! -e t.csv ]
 	sqlite3 liver.rec/recording.db "DELETE FROM tracker;
 		UPDATE meta SET value = 0 WHERE key = 'tracker_rows'"

@@ -114,11 +114,12 @@ ask() {
 	grep -q "force samples were lost" err
 	# Exact in steps of 2^-17 N; times to the sender's clock within the uncertainty that LSL states,
 	# and a tenth of the period.
+	ask "SELECT seq, t_ns, code FROM force ORDER BY seq" >rows
 	python3 - "$(tail -n 1 began)" <<-'END'
 		import sqlite3, sys
 		start = int(sys.argv[1])
 		db = sqlite3.connect("a.rec/recording.db")
-		rows = db.execute("SELECT seq, t_ns, code FROM force ORDER BY seq").fetchall()
+		rows = [tuple(map(int, line.split("|"))) for line in open("rows")]
 		sd, = db.execute("SELECT delay_sd_ns FROM streams WHERE name = 'force'").fetchone()
 		assert sd > 0, sd
 		sent = []
@@ -227,10 +228,11 @@ ask() {
 	# some are lost
 	ends_with 1
 	# The second one is found again by its source id.
+	ask "SELECT seq, t_ns FROM force ORDER BY seq" >rows
 	python3 - "$(cat began)" <<-'END'
-		import sqlite3, sys
+		import sys
 		second = int(sys.argv[1])
-		rows = sqlite3.connect("a.rec/recording.db").execute("SELECT seq, t_ns FROM force ORDER BY seq").fetchall()
+		rows = [tuple(map(int, line.split("|"))) for line in open("rows")]
 		hole = max(range(1, len(rows)), key=lambda i: rows[i][1] - rows[i - 1][1])
 		(before, a), (after, b) = rows[hole - 1], rows[hole]
 		assert a < second < b + 1e6, (second, a, b)
@@ -263,10 +265,10 @@ poses() {
 	[ "$(ask "SELECT value FROM meta WHERE key='tracker_name'")" = "OpenIGTLink Stylus at 127.0.0.1" ]
 	# Poses are those of the sender in their order, turned by 90 degrees about z; of a busy
 	# machine pyigtl leaves some out. Singles, and rounding.
+	ask "SELECT seq, t_ns, quote(x_mm), quote(y_mm), quote(z_mm), quote(qw), quote(qx), quote(qy),
+		quote(qz) FROM tracker ORDER BY seq" >rows
 	python3 - <<-'END'
-		import sqlite3
-		db = sqlite3.connect("a.rec/recording.db")
-		rows = db.execute("SELECT seq, t_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz FROM tracker").fetchall()
+		rows = [tuple(map(float, line.split("|"))) for line in open("rows")]
 		for a, b in zip(rows, rows[1:]):
 		    assert b[0] == a[0] + 1 and b[1] > a[1], (a, b)
 		    assert (b[2] - a[2]) * 64 % 1000 > 0 and b[3:5] == (2, 10), (a, b)
@@ -389,9 +391,11 @@ poses() {
 	sender=
 	[ "$(key report.json lsl.prefix)" = "$name" ]
 	[ "$(key report.json lsl.poses)" -gt 200 ]
-	python3 - "$name" $cut <<-'END'
-		import json, sqlite3, sys
-		name, cut = sys.argv[1:]
+	sqlite3 $cut/recording.db "SELECT t_ns, quote(x_mm), quote(y_mm), quote(z_mm) FROM tracker
+		ORDER BY seq" >rows
+	python3 - "$name" <<-'END'
+		import json, sys
+		name = sys.argv[1]
 		read = json.load(open("read.json"))
 		pose, force = read[name + "-pose"], read[name + "-force"]
 		assert pose["type"] == "MoCap" and pose["rate"] == 0, pose
@@ -401,8 +405,7 @@ poses() {
 		assert force["type"] == "Force" and force["rate"] == 200, force
 		assert force["channels"][2] == ["Fz", "ForceZ", "N"], force["channels"]
 		assert pose["source"].startswith(name + "-pose@"), pose["source"]
-		db = sqlite3.connect(cut + "/recording.db")
-		rows = db.execute("SELECT t_ns, x_mm, y_mm, z_mm FROM tracker ORDER BY seq").fetchall()
+		rows = [tuple(map(float, line.split("|"))) for line in open("rows")]
 		at = {row[1:]: row[0] for row in rows}
 		samples, times = pose["samples"], pose["times"]
 		# The samples are in the recording to the last bit, and apart by as much; the clock of the

@@ -77,11 +77,12 @@ tampered() {
 	tampered "DELETE FROM force WHERE seq = 12345" \
 		"a.rec: force: 1 missing, number 12345, before 1.2346 s" "force: block 12 is altered"
 	tampered "INSERT INTO force SELECT 30000, t_ns + 100000, code FROM force
-		WHERE seq = 29999" "force: 1 row after the end of the ledger"
-	tampered "DELETE FROM force WHERE seq >= 29000;
-		DELETE FROM ledger WHERE stream = 'force' AND block >= 29" \
+		WHERE seq = 29999" "force: block 29 is altered" "30000 rows were written, and the ledger has 30001"
+	tampered "DELETE FROM blocks WHERE stream = 'force' AND block = 12" "force: block 12 is missing"
+	tampered "DELETE FROM blocks WHERE stream = 'force' AND block >= 29" \
 		"the ledger has no end: its last blocks were removed" "1000 lost"
-	tampered "DELETE FROM ledger" "rows after the end of the ledger" "has no end"
+	tampered "DELETE FROM blocks" "has no end"
+	tampered "DELETE FROM ledger" "table meta"
 	tampered "UPDATE meta SET value = 100.0 WHERE key = 'force_mV_N'" \
 		"a.rec: table meta is altered: its rows or its seal differ from those written"
 }
@@ -159,7 +160,7 @@ tampered() {
 }
 
 @test "verify of a page that went bad" {
-	dd if=/dev/urandom of=a.rec/recording.db bs=4096 seek=40 count=1 conv=notrunc 2>/dev/null
+	dd if=/dev/urandom of=a.rec/recording.db bs=4096 seek=20 count=1 conv=notrunc 2>/dev/null
 	run --separate-stderr incise verify a.rec
 	failed_with "a.rec:"
 	[[ "$output" == *"recording.db is damaged"* ]]
@@ -167,7 +168,7 @@ tampered() {
 
 # bats test_tags=check
 @test "a recording of a form that is not known yet is told from a damaged one" {
-	ask a.rec "PRAGMA user_version=5"
+	ask a.rec "PRAGMA user_version=6"
 	for verb in verify info export; do
 		run --separate-stderr incise $verb a.rec
 		failed_with "a.rec:"

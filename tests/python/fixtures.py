@@ -7,7 +7,6 @@ INCISE_BUILD is the build folder; by default the one beside the sources.
 import functools
 import os
 import shutil
-import sqlite3
 import subprocess
 import tempfile
 import unittest
@@ -47,10 +46,11 @@ class Case(unittest.TestCase):
         """A recording that a test may change."""
         return shutil.copytree(os.path.join(self.shared, name), self.path(name))
 
-    def change(self, recording, sql):
-        with sqlite3.connect(os.path.join(recording, "recording.db")) as database:
-            database.executescript(sql)
-        database.close()
+    def sql(self, recording, sql):
+        """SQL on a recording that has a row a sample in its tables; the rows of its answer, as texts."""
+        program = os.path.join(BUILD, "tests/sql")
+        answer = run(program, "-separator", "\t", os.path.join(recording, "recording.db"), sql)
+        return [line.split("\t") for line in answer.splitlines()]
 
     def says(self, kind, text, call, *arguments, **options):
         """A call raises that exception with a line that has this text."""

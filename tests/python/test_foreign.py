@@ -134,11 +134,11 @@ class Foreign(Case):
 
     def test_damage_is_their_exception(self):
         path = self.copy()
-        self.change(path, "UPDATE force SET t_ns = -1 WHERE seq = 70000")
+        self.sql(path, "UPDATE force SET t_ns = -1 WHERE seq = 70000")
         table = incise.open(path, damaged=True).force
         with self.assertRaises(Exception) as caught:
             pyarrow.table(table)
-        self.assertIn("row 70000 is invalid", str(caught.exception))
+        self.assertIn("table force, row 70000: ", str(caught.exception))
         with self.assertRaises(incise.Invalid):
             pyarrow.table(incise.open(path).force)
 

@@ -2,15 +2,18 @@
 """Recordings in Python: values, metadata, damage, closed and moved files, threads, fork."""
 
 import gc
+import hashlib
 import math
 import os
 import sqlite3
+import struct
 import subprocess
 import sys
 import threading
 import unittest
 
 import incise
+import read_blocks
 from fixtures import SANITIZED, SHORT, SOURCE, Case, has, run
 
 STREAMS = ("force", "tracker", "depth", "frames", "events")
@@ -37,46 +40,41 @@ class Recordings(Case):
         self.rec = incise.open(os.path.join(self.shared, "short.rec"))
         self.addCleanup(self.rec.close)
 
-    def sql(self, query):
-        path = os.path.join(self.rec.path, "recording.db")
-        database = sqlite3.connect(f"file:{path}?mode=ro", uri=True)
-        self.addCleanup(database.close)
-        return database.execute(query).fetchall()
-
     def test_info_is_that_of_the_tool(self):
         info = self.rec.info
         self.assertTrue(info.complete)
         self.assertEqual(info.cuts, 14)
-        self.assertEqual(info.force, self.sql("SELECT count(*) FROM force")[0][0])
+        self.assertEqual([[str(info.force)]], self.sql(self.rec.path, "SELECT count(*) FROM force"))
         self.assertEqual(info.force_mV_N, 1240)
         self.assertIs(info.newtons, False)
         self.assertEqual([s.name for s in info.streams], ["force", "tracker"])
         self.assertEqual(info.streams[1].lost, 0)
         self.assertEqual(info.surface_normal, (0, 0, 1))
 
-    def test_streams_are_the_tables(self):
-        force = rows(self.rec.force)
-        stored = self.sql("SELECT seq, code FROM force")
-        self.assertEqual(force["seq"], [row[0] for row in stored])
-        self.assertEqual(force["code"], [row[1] for row in stored])
+    def test_streams_are_the_blocks(self):
+        stored = {}
+        for stream, _, columns in read_blocks.blocks(self.rec.path):
+            for name, values in columns.items():
+                stored.setdefault(stream, {}).setdefault(name, []).extend(values)
+        force, codes = rows(self.rec.force), stored["force"]["code"]
+        self.assertEqual(force["seq"], stored["force"]["seq"])
+        self.assertEqual(force["code"], codes)
         info = self.rec.info
         scale = info.full_scale_V * 1e3 / 2**info.bits / info.force_mV_N
         zero = (info.zero_mV - info.offset_V * 1e3) / info.force_mV_N
-        self.assertEqual(force["force_N"], [code * scale - zero for _, code in stored])
+        self.assertEqual(force["force_N"], [code * scale - zero for code in codes])
         self.assertFalse(any(force["clipped"]))
         self.assertTrue(all(b > a for a, b in zip(force["t_ns"], force["t_ns"][1:])))
         tracker = rows(self.rec.tracker)
-        names = ["x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz", "status", "station"]
-        stored = self.sql(f"SELECT {', '.join(names)} FROM tracker")
-        for i, name in enumerate(names):
-            self.assertEqual(tracker[name], [row[i] for row in stored], name)
+        for name in ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz", "status", "station"):
+            self.assertEqual(tracker[name], stored["tracker"][name], name)
+        # the surface is z = 0, and the tip is the sensor
         depth = rows(self.rec.depth)
-        stored = self.sql("SELECT depth_mm, velocity_mm_s FROM depth")
-        self.assertEqual(depth["depth_mm"], [row[0] for row in stored])
+        self.assertEqual(depth["depth_mm"], [-z for z in tracker["z_mm"]])
         self.assertEqual(depth["t_ns"], tracker["t_ns"])
         self.assertEqual(rows(self.rec.frames)["seq"], [])
-        self.assertEqual(rows(self.rec.events)["kind"], [r[0] for r in self.sql(
-            "SELECT kind FROM events ORDER BY t_ns, rowid")])
+        self.assertEqual([[kind] for kind in rows(self.rec.events)["kind"]], self.sql(
+            self.rec.path, "SELECT kind FROM events ORDER BY t_ns, rowid"))
 
     def test_pairs_are_those_of_the_tool(self):
         """CSV has nine digits of a mean; 5e-9 of the value is half a unit of the last."""
@@ -146,16 +144,16 @@ class Recordings(Case):
 
     def test_damaged(self):
         path = self.copy()
-        self.change(path, "UPDATE force SET code = code + 1 WHERE seq = 5000")
+        self.sql(path, "UPDATE force SET code = code + 1 WHERE seq = 5000")
         self.says(incise.Invalid, "is not what was recorded", rows, incise.open(path).force)
         self.assertEqual(len(rows(incise.open(path, damaged=True).force)["seq"]),
                          len(rows(self.rec.force)["seq"]))
         report = incise.verify(path)
         self.assertFalse(report.intact)
         self.assertEqual(report.findings[0].kind, "altered")
-        self.change(path, "UPDATE force SET t_ns = -1 WHERE seq = 70000")
+        self.sql(path, "UPDATE force SET t_ns = -1 WHERE seq = 70000")
         table = incise.open(path, damaged=True).force
-        self.says(incise.Invalid, "row 70000 is invalid", rows, table)
+        self.says(incise.Invalid, "table force, row 70000: ", rows, table)
         with open(os.path.join(path, "recording.db"), "r+b") as file:
             file.truncate(100000)
         self.says(incise.Error, "damaged", lambda: rows(incise.open(path, damaged=True).force))
@@ -232,14 +230,16 @@ class Recordings(Case):
     def test_memory_is_bounded(self):
         """10 times the rows take no more: batches are 65536 rows, 25 bytes each, and SQLite's cache
         is 2 MB. 20 MB is ten times both."""
-        path = self.copy()
-        self.change(path, "INSERT INTO force SELECT seq + 1000000, t_ns + 1000000000000, code "
-                          "FROM force; UPDATE meta SET value = value * 2 WHERE key = 'force_rows'")
+        path = self.path("long.rec")
+        run("incise", "capture", "-o", path, "--rig", SHORT.replace("cut_s=2", "cut_s=5"))
+        with incise.open(path) as rec:
+            self.assertGreater(rec.info.force, 1.9 * self.rec.info.force)
+            stored = rec.info.force
         script = (
             "import incise, sys\n"
             "def peak(): return [int(l.split()[1]) for l in open('/proc/self/status') "
             "if l.startswith('VmHWM')][0]\n"
-            "rec = incise.open(sys.argv[1], damaged=True)\n"
+            "rec = incise.open(sys.argv[1])\n"
             "next(rec.force.batches())\n"
             "before = peak()\n"
             "n = sum(len(batch) for _ in range(5) for batch in rec.force.batches())\n"
@@ -249,7 +249,7 @@ class Recordings(Case):
             [sys.executable, "-c", script, path], check=True, capture_output=True, text=True
         ).stdout
         n, grown = map(int, out.split())
-        self.assertEqual(n, 10 * self.rec.info.force)
+        self.assertEqual(n, 5 * stored)
         self.assertLess(grown, 20000)
 
     def test_a_recording_that_is_being_written(self):
@@ -384,6 +384,72 @@ class Recordings(Case):
         lists = rows(self.rec.pairs(12, 10, by_cut=True))
         for name in frame.columns:
             self.assertEqual(frame[name].tolist(), lists[name])
+
+
+class Blocks(Case):
+    """Another reader of the format, read_blocks."""
+
+    def setUp(self):
+        super().setUp()
+        self.rec = self.path("all.rec")
+        run("incise", "capture", "-o", self.rec, "--rig", SHORT, "--duration", "5s", "--camera",
+            "frames", "--clock-source", "sim:1.8e9,50,3", stderr=subprocess.DEVNULL)
+
+    def change(self, sql, *values):
+        """SQL on what is stored, without rows of samples."""
+        with sqlite3.connect(os.path.join(self.rec, "recording.db")) as database:
+            found = database.execute(sql, values).fetchall()
+        database.close()
+        return found
+
+    def same(self):
+        """Each column is what incise reads, bit by bit."""
+        read = list(read_blocks.blocks(self.rec))
+        for stream, (names, kinds) in read_blocks.COLUMNS.items():
+            table = "frames" if stream == "camera" else stream
+            quoted = [f"quote({name})" if kind in "rnh" else name
+                      for name, kind in zip(names.split(), kinds)]
+            expected = self.sql(self.rec, f"SELECT {', '.join(quoted)} FROM {table} ORDER BY seq")
+            found = [row for s, _, columns in read if s == stream for row in zip(*columns.values())]
+            self.assertEqual(len(found), len(expected))
+            self.assertTrue(found or stream == "camera")  # without a module that writes frames
+            for row, texts in zip(found, expected):
+                for value, text, kind in zip(row, texts, kinds):
+                    if kind in "rn":
+                        real = math.nan if text == "NULL" else float(text)
+                        self.assertEqual(struct.pack("<d", value), struct.pack("<d", real))
+                    else:
+                        wanted = f"X'{value.hex().upper()}'" if kind == "h" else str(value)
+                        self.assertEqual(wanted, text)
+
+    def test_all_columns(self):
+        self.same()
+        # and of each width, to the ends of what a column can hold
+        self.sql(self.rec, """
+            UPDATE force SET code = CASE seq % 3 WHEN 0 THEN -9223372036854775807 - 1
+                WHEN 1 THEN 9223372036854775807 ELSE seq END WHERE seq BETWEEN 2000 AND 2999;
+            UPDATE force SET code = seq * 1000003 WHERE seq BETWEEN 4000 AND 4999;
+            UPDATE force SET code = 7 WHERE seq BETWEEN 6000 AND 6999;
+            UPDATE tracker SET x_mm = seq / 4.0, y_mm = 1e300 / (seq + 1), z_mm = -0.1,
+                qw = 5e-324, status = char(65 + seq % 7), arrival_ns = -arrival_ns;
+            UPDATE wall SET tai_ns = -9223372036854775807 - 1, source = 'a' || seq,
+                uncertainty_ns = CASE seq % 2 WHEN 0 THEN seq / 8.0 END""")
+        for stream, block, data in self.change("SELECT stream, block, data FROM blocks"):
+            self.change("UPDATE blocks SET sha256 = ? WHERE stream = ? AND block = ?",
+                        hashlib.sha256(data).digest(), stream, block)
+        self.same()
+
+    def test_a_byte_that_changed(self):
+        at = "WHERE stream = ? AND block = 1"
+        for stream, in self.change("SELECT DISTINCT stream FROM blocks"):
+            (data,), = self.change(f"SELECT data FROM blocks {at}", stream)
+            flipped = bytearray(data)
+            flipped[len(data) // 2] ^= 16
+            self.change(f"UPDATE blocks SET data = ? {at}", bytes(flipped), stream)
+            self.says(ValueError, f"{stream}, block 1 is not", list, read_blocks.blocks(self.rec))
+            self.assertFalse(incise.verify(self.rec).intact)
+            self.change(f"UPDATE blocks SET data = ? {at}", data, stream)
+        self.assertTrue(incise.verify(self.rec).intact)
 
 
 class WallTime(Case):

@@ -29,7 +29,7 @@ END_OF_RIG
 # ask SQL: one value of the last recording
 ask()
 {
-	sqlite3 -readonly a.rec/recording.db "$1"
+	"$INCISE_BUILD/tests/sql" -readonly a.rec/recording.db "$1"
 }
 
 # holds SQL: what is asked is true
@@ -75,7 +75,7 @@ verified()
 {
 	code=0
 	incise verify --json a.rec >verify.json || code=$?
-	[ $code = "$1" ] && [ "$(ask "SELECT sum(lost) FROM streams")" = "$(ask "SELECT
+	[ $code = "$1" ] && [ "$(ask "SELECT sum(lost) FROM streams")" = "$(sqlite3 :memory: "SELECT
 		sum(json_extract(value, '$.lost')) FROM
 		json_each(readfile('verify.json'), '$.streams')")" ]
 }
