@@ -574,7 +574,7 @@ static void show_recording(const char *path, bool json, bool damaged)
 		cli_fail_with(&err);
 	err = (struct incise_error){0};
 	codec = camera_codec(recording);
-	intact = recording_intact(path, false, damaged, &err);
+	intact = recording_intact(path, !info.summary, damaged, &err);
 	if (json)
 		recording_json(&info, codec, intact, wall,
 			       n ? joined_json(members, n) : json_null(),

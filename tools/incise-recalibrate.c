@@ -54,7 +54,7 @@ static bool read_values(const char *path, struct values *values,
 			struct incise_recording_info *info, struct incise_error *err)
 {
 	struct incise_recording *recording = incise_recording_open(path, err);
-	int rc = recording ? incise_recording_info(recording, info, err) : -err->code;
+	int rc = recording ? incise_recording_measure(recording, info, err) : -err->code;
 
 	incise_recording_close(recording);
 	if (!rc)

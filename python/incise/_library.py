@@ -265,6 +265,7 @@ class RecordingInfo(ctypes.Structure):
         ("n_streams", c_int),
         ("newtons", c_bool),
         ("start_utc_ns", c_int64),
+        ("summary", c_bool),
     ]
     c_name = "struct incise_recording_info"
 

@@ -276,7 +276,7 @@ class Recording:
 
     @property
     def info(self) -> Info:
-        """Rows, losses, calibration, and streams with their times. Reads all rows once."""
+        """Rows, losses, calibration, and streams with their times; of a complete recording from its summary."""
         failure, struct = Failure(), RecordingInfo()
         with self._lock:
             failure.check(

@@ -171,7 +171,20 @@ setup() {
 # bats test_tags=check
 @test "info of a recording that was altered shows it, and fails by its name" {
 	cp -r a.rec/ b.rec
+	# of a complete recording no sample is read, which it says
 	sqlite3 b.rec/recording.db "UPDATE tracker SET z_mm = z_mm + 1 WHERE seq = 100"
+	run -0 --separate-stderr incise info b.rec
+	[[ "$output" == *"samples  not read: 'incise verify b.rec' proves them"* ]]
+	run -1 incise verify b.rec
+	incise info b.rec --json >r.json
+	[ "$(key r.json summary)" = 1 ]
+	# by another calibration all are
+	printf 'force_mV_N = 1200\n' >c.conf
+	cp -r b.rec c.rec
+	incise recalibrate c.rec -c c.conf >/dev/null 2>&1
+	run --separate-stderr incise info c.rec
+	failed_with "c.rec: not as it was recorded: tracker: block"
+	sqlite3 b.rec/recording.db "UPDATE events SET text = 'x' WHERE kind = 'zero'"
 	run --separate-stderr incise info b.rec
 	failed_with "b.rec:"
 	[[ "${lines[0]}" == "recording b.rec: "* ]]
@@ -179,7 +192,7 @@ setup() {
 	echo "$output" >r.json
 	[ "$(key r.json intact)" = 0 ]
 	run -0 --separate-stderr incise info b.rec --damaged
-	[[ "$stderr" == "incise info: warning: b.rec: not as it was recorded: tracker: "* ]]
+	[[ "$stderr" == "incise info: warning: b.rec: not as it was recorded: table events is altered"* ]]
 	incise info a.rec --json >r.json
 	[ "$(key r.json intact)" = 1 ]
 }

@@ -116,6 +116,11 @@ INCISE_API int incise_recording_info(struct incise_recording *recording,
 				     struct incise_recording_info *info,
 				     struct incise_error *err);
 
+/** The same, of all samples in any case, which are checked. */
+INCISE_API int incise_recording_measure(struct incise_recording *recording,
+					struct incise_recording_info *info,
+					struct incise_error *err);
+
 /** A value of a stream. */
 struct incise_recording_value {
 	int64_t t_ns; /**< best time of its acquisition, CLOCK_MONOTONIC */

@@ -298,8 +298,8 @@ static int take_summary(struct incise_recording *rec, struct incise_recording_in
 	return 1;
 }
 
-int incise_recording_info(struct incise_recording *rec,
-			  struct incise_recording_info *info, struct incise_error *err)
+static int find_info(struct incise_recording *rec, bool samples,
+		     struct incise_recording_info *info, struct incise_error *err)
 {
 	int rc;
 
@@ -317,7 +317,7 @@ int incise_recording_info(struct incise_recording *rec,
 			&info->streams[i]);
 	info->depth_max_mm = 0;
 	info->force_max_N = 0;
-	rc = take_summary(rec, info, err);
+	rc = samples ? 0 : take_summary(rec, info, err);
 	if (!rc)
 		rc = read_cuts(rec, info, err);
 	if (rc < 0)
@@ -333,4 +333,16 @@ int incise_recording_info(struct incise_recording *rec,
 		info->end_ns = incise_session_time(map, info->end_ns);
 	}
 	return find_started(rec, info, err);
+}
+
+int incise_recording_info(struct incise_recording *rec,
+			  struct incise_recording_info *info, struct incise_error *err)
+{
+	return find_info(rec, false, info, err);
+}
+
+int incise_recording_measure(struct incise_recording *rec,
+			     struct incise_recording_info *info, struct incise_error *err)
+{
+	return find_info(rec, true, info, err);
 }

@@ -365,7 +365,7 @@ int incise_depth_pairs(struct incise_recording *recording,
 {
 	struct pairs p = {.recording = recording, .before.t_ns = -1, .after.t_ns = -1};
 	struct incise_recording_info info;
-	int rc = incise_recording_info(recording, &info, err);
+	int rc = incise_recording_measure(recording, &info, err);
 
 	*pairs = NULL;
 	if (rc || recording->form < 2)

@@ -513,7 +513,7 @@ TEST(force_is_that_of_the_voltage, IN_FOLDER)
 			change("b.rec/recording.db",
 			       "DELETE FROM meta WHERE key = 'force_offset_V'");
 		recording = incise_recording_open(path, &err);
-		succeeds(recording && !incise_recording_info(recording, info, &err));
+		succeeds(recording && !incise_recording_measure(recording, info, &err));
 		incise_recording_close(recording);
 	}
 	assert_true(at_0.force_max_N > 0.1);
