@@ -66,6 +66,12 @@ static const struct cli_option options[] = {
 	 "export the whole recording with the pose, at each force sample or at "
 	 "--rate, with uncertainty and flags",
 	 CLI_FLAG(struct job, how.resample)},
+	{0, "from", "TIME", "begin so long after the first sample, for example 90s",
+	 CLI_DURATION(struct job, how.from_s, 0, 1e9)},
+	{0, "to", "TIME", "end so long after the first sample",
+	 CLI_DURATION(struct job, how.to_s, 0, 1e9)},
+	{0, "cut", "N", "only this cut, from 1",
+	 CLI_INTEGER(struct job, how.cut, 1, 1000000000)},
 	{'a', "average", "DEPTHxVELOCITY",
 	 "average in bins of depth and velocity, for example 12x10",
 	 CLI_PARSED_BY(parse_bins)},
@@ -164,6 +170,11 @@ static int progress(void *context, double share)
 	return 0;
 }
 
+static bool is_part(const struct job *job)
+{
+	return job->how.from_s > 0 || job->how.to_s > 0 || job->how.cut;
+}
+
 static void export(char **paths, int n, const struct job *job,
 		   struct incise_export_report *report)
 {
@@ -173,7 +184,8 @@ static void export(char **paths, int n, const struct job *job,
 	for (int i = 0; i < n; i++) {
 		paths[i] = (char *)file_operand(paths[i], FILE_RECORDING);
 		recordings[i] = recording_open(paths[i]);
-		recording_intact(paths[i], true, job->damaged, &err);
+		/* Of a part the blocks that are read are compared with their checksums. */
+		recording_intact(paths[i], !is_part(job), job->damaged, &err);
 		if (err.code)
 			cli_fail_with(&err);
 	}
@@ -197,6 +209,11 @@ static void parse(struct job *job, int argc, char **argv)
 	if (how->resample && (how->depth_bins || (how->rate_hz > 0 && how->rate_hz < 1)))
 		cli_usage("--resample needs a --rate of 1 or more, and excludes "
 			  "--average");
+	if (how->to_s > 0 && how->to_s <= how->from_s)
+		cli_usage("--to %g s is not behind --from %g s", how->to_s, how->from_s);
+	if (how->cut && (how->resample || cli_ends_with(job->output, ".mcap")))
+		cli_usage("--cut is of cuts; give --from and --to with --resample and "
+			  "MCAP");
 	if (how->rate_hz > 0 && how->depth_bins)
 		cli_usage("--rate and --average exclude each other; give one of them");
 	if (!how->depth_bins && (how->by_cut || job->min_count || how->depth_max_mm > 0 ||

@@ -248,14 +248,16 @@ int incise_ledger_select(sqlite3 *db, int form, const char *stream, int64_t from
 	return sqlite3_bind_int64(*stmt, 2, from_block);
 }
 
-int64_t incise_ledger_find(sqlite3 *db, const char *stream, int64_t seq)
+#define FROM_BLOCK " FROM blocks WHERE stream = ? AND block >= ? ORDER BY block LIMIT 1"
+
+int64_t incise_ledger_find(sqlite3 *db, const char *stream, bool by_time, int64_t value)
 {
 	int64_t low = 0, high = INT64_MAX; /* it is from low to high */
 	sqlite3_stmt *stmt = NULL;
 
 	if (sqlite3_prepare_v2(db,
-			       "SELECT block, last_seq FROM blocks WHERE stream = ? AND "
-			       "block >= ? ORDER BY block LIMIT 1",
+			       by_time ? "SELECT block, last_ns" FROM_BLOCK
+				       : "SELECT block, last_seq" FROM_BLOCK,
 			       -1, &stmt, NULL) != SQLITE_OK)
 		return INT64_MIN;
 	sqlite3_bind_text(stmt, 1, stream, -1, SQLITE_STATIC);
@@ -264,7 +266,7 @@ int64_t incise_ledger_find(sqlite3 *db, const char *stream, int64_t seq)
 
 		sqlite3_bind_int64(stmt, 2, middle);
 		if (sqlite3_step(stmt) == SQLITE_ROW &&
-		    sqlite3_column_int64(stmt, 1) < seq)
+		    sqlite3_column_int64(stmt, 1) < value)
 			low = sqlite3_column_int64(stmt, 0) + 1;
 		else
 			high = middle;

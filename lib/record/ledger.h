@@ -119,8 +119,8 @@ void incise_ledger_close(struct incise_ledger *ledger, uint64_t lost,
 int incise_ledger_select(sqlite3 *db, int form, const char *stream, int64_t from_block,
 			 bool from_end, sqlite3_stmt **stmt);
 
-/* Of form 5: the first block that ends with this number or a later one, found by bisection. */
-int64_t incise_ledger_find(sqlite3 *db, const char *stream, int64_t seq);
+/* Of form 5: the first block that ends with this number, or @by_time at this time, or later; by bisection. */
+int64_t incise_ledger_find(sqlite3 *db, const char *stream, bool by_time, int64_t value);
 
 /* Read the entry of a row of that. False: a value is impossible in any entry. */
 bool incise_ledger_block_read(struct incise_ledger_block *block, sqlite3_stmt *stmt);

@@ -399,6 +399,9 @@ class Recording:
         velocity_max_mm_s: float = 0,
         tai: bool = False,
         uncertainty: str = "none",
+        from_s: float = 0,
+        to_s: float = 0,
+        cut: int = 0,
     ) -> Table:
         """Force with depth and velocity inside the cuts, as `incise export` gives them.
 
@@ -409,6 +412,8 @@ class Recording:
         With tai, rows without bins end with tai_ns and tai_u_ns, the bound of its error.
         With uncertainty "total" or "parts" there are columns of standard uncertainties, see
         incise-export(1); which are of force_N, table.fields says in uncertainty_variables.
+        With from_s, to_s (seconds from the first sample; 0: to the end) or a cut's number, from 1, only that part
+        is read.
         """
         return self._table(
             "table",
@@ -422,15 +427,24 @@ class Recording:
             velocity_max_mm_s=velocity_max_mm_s,
             tai=tai,
             uncertainty=_uncertainty(uncertainty),
+            from_s=from_s,
+            to_s=to_s,
+            cut=cut,
         )
 
     def resample(
-        self, rate_hz: float = 0, tai: bool = False, uncertainty: str = "none"
+        self,
+        rate_hz: float = 0,
+        tai: bool = False,
+        uncertainty: str = "none",
+        from_s: float = 0,
+        to_s: float = 0,
     ) -> Table:
         """All of the recording on one grid of rate_hz, or at each force sample: force, pose, depth,
         velocity and camera, with standard uncertainties; with tai also tai_ns and tai_u_ns.
 
         Without uncertainty "total" or "parts", those are of noise and time alone.
+        With from_s and to_s, seconds from the first sample, only that part is read.
         """
         return self._table(
             "table",
@@ -439,6 +453,8 @@ class Recording:
             resample=True,
             tai=tai,
             uncertainty=_uncertainty(uncertainty),
+            from_s=from_s,
+            to_s=to_s,
         )
 
 

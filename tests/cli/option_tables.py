@@ -93,6 +93,7 @@ VALUES = """
 --mf-type | gaussmf gbellmf | trimf gauss {}
 --min-count | 1 50 | 0 few {}
 --model | any.fis |
+--from | 0s 90s 1.5min | -1s 5kg {}
 --nominal calibrate depth | 0.1 10 | 0 11 wide {}
 --nominal calibrate force | 1 1e5 | 0 1e6 high {}
 --only bench all | precision,loop |
@@ -151,6 +152,7 @@ VALUES = """
 --timeout | 2s 1h | 0 never {}
 --timestamp | http://a/tsr a.tsq a.tsr | reply.der
 --tolerance | 0.1 5 | -1 x {}
+--to | 1s 2min | -1s far {}
 --tool | auto blade handle tube | spoon blad {}
 --trigger | button 0.2N 500mN sync sync:/dev/x | 0N knob -1N {}
 --u-reference | 0 0.01 1000 | -1 1001 long {}

@@ -327,7 +327,8 @@ static int open_recording(struct source *source, struct incise_error *err)
 	int rc;
 
 	/* Says itself what is wrong, as a warning, where damaged ones are used. */
-	if (!recording_intact(source->path, true, source->options->damaged, err) && err->code)
+	if (!recording_intact(source->path, true, source->options->damaged, err) &&
+	    err->code)
 		return -err->code;
 	recording = incise_recording_open(source->path, err);
 	if (!recording)

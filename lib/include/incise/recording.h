@@ -239,6 +239,12 @@ struct incise_export_options {
 	bool tai;
 	/** Not with messages of ROS 2, which have no place for them. */
 	enum incise_export_uncertainty uncertainty;
+	/**
+	 * Part of a recording: seconds from its first sample, 0: to its end; and the number of a cut, from 1, or
+	 * 0. Rows are those of the whole export; what lies before and behind is not read, but the poses before.
+	 */
+	double from_s, to_s;
+	int cut;
 	/** File of @ref calibration, whose history states uncertainties; NULL: none is stated. */
 	const char *calibration_path;
 

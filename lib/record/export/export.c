@@ -201,6 +201,9 @@ static int each_cut_sample(struct pass *pass, struct incise_cuts *cuts,
 		rc = incise_blade_pose_at(blade, sample.t_ns, 0, &pass->blade, pass->err);
 		if (rc)
 			return rc;
+		if (!incise_range_has(&cuts->recording->range,
+				      sample.t_ns - cuts->first_ns, sample.cut))
+			continue;
 		find_row(pass, blade, &sample);
 		if (sample.cut != pass->number) {
 			rc = end_cut(pass, visitor);
@@ -541,6 +544,12 @@ int incise_export_check(const struct incise_export_options *o, struct incise_err
 		return incise_error_set(err, EINVAL,
 					"rate of export %g Hz: expected 0 to 1e9",
 					o->rate_hz);
+	if (!(o->from_s >= 0 && o->to_s >= 0) || (o->to_s > 0 && o->to_s <= o->from_s) ||
+	    o->cut < 0)
+		return incise_error_set(err, EINVAL,
+					"part from %g s to %g s, cut %d: the end is not "
+					"behind the beginning, or there is none",
+					o->from_s, o->to_s, o->cut);
 	if (o->depth_bins < 0 || o->depth_bins > BINS_MAX || o->velocity_bins < 0 ||
 	    o->velocity_bins > BINS_MAX || !o->depth_bins != !o->velocity_bins)
 		return incise_error_set(err, EINVAL,
@@ -575,7 +584,15 @@ int incise_export_check(const struct incise_export_options *o, struct incise_err
 static int no_cut(struct pass *pass, struct incise_recording *const *recordings, int n)
 {
 	const char *path = recordings[0]->path, *others = n > 1 ? " and the others" : "";
+	const struct incise_export_options *o = pass->options;
 
+	if (o->from_s > 0 || o->to_s > 0)
+		return incise_error_set(
+			pass->err, ENODATA,
+			"%s%s: no cut in the part from %g s; give another "
+			"--from and --to, or the rows of all of it "
+			"(--resample)",
+			path, others, o->from_s);
 	if (isinf(pass->depth_deepest_mm))
 		return incise_error_set(
 			pass->err, ENODATA,
@@ -753,8 +770,13 @@ int incise_export_table(struct incise_recording *const *recordings, int n,
 		pass.columns = &with_budget;
 		pass.width = with_budget.n;
 	}
+	/* Behind the budgets, which are of all rows. */
+	for (int i = 0; i < n && !rc; i++)
+		rc = incise_recording_limit(recordings[i], options, err);
 	if (!rc)
 		rc = write_table(&pass, recordings, n, format, out, columns, provenance);
+	for (int i = 0; i < n; i++)
+		recordings[i]->range = (struct incise_recording_range){0};
 	close_budgets(&pass, n);
 	free(with_budget.columns);
 	incise_wall_free(pass.wall);

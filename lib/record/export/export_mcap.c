@@ -203,7 +203,8 @@ struct export
 	struct incise_mcap mcap;
 	struct incise_rows rows[STREAMS];
 	int channels[STREAMS];
-	int selected; /* a bit for each */
+	int selected;	  /* a bit for each */
+	int64_t first_ns; /* of the range */
 };
 
 static int fail_write(int rc, struct incise_error *err)
@@ -261,7 +262,10 @@ static int64_t each_row(struct export *export, uint64_t all, struct incise_error
 				next = i;
 		if (next < 0)
 			return n;
-		rc = write_row(export, next, err);
+		rc = incise_range_has(&export->messages.recording->range,
+				      rows[next].t_ns - export->first_ns, 0)
+			     ? write_row(export, next, err)
+			     : 0;
 		if (!rc && (++n & 0xffff) == 0)
 			rc = incise_export_progress(export->options, (double)n,
 						    (double)all, err);
@@ -285,6 +289,21 @@ static bool exists(const struct incise_recording *recording, const char *table)
 {
 	return strcmp(table, "force") ? expected(&recording->meta, table) > 0
 				      : incise_recording_has_force(recording);
+}
+
+/* To a part, whose times count from the first sample. */
+static int limit(struct export *export, struct incise_error *err)
+{
+	struct incise_recording *recording = export->messages.recording;
+	int64_t seq;
+	int rc = incise_recording_limit(recording, export->options, err);
+
+	if (rc || !recording->range.limited)
+		return rc;
+	rc = incise_source_end(
+		recording, incise_recording_has_force(recording) ? "force" : "tracker",
+		false, &seq, &export->first_ns, NULL, err);
+	return rc < 0 ? rc : 0;
 }
 
 /* Open the tables, and announce their topics. Returns 0 or -errno. */
@@ -354,6 +373,8 @@ static int64_t write_messages(struct export *export,
 						      export->options->calibration, err)
 			     : -errno;
 	}
+	if (!rc)
+		rc = limit(export, err);
 	if (!rc)
 		rc = open_streams(export, err);
 	if (rc)

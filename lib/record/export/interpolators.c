@@ -462,6 +462,8 @@ int incise_force_interpolator_open(struct incise_force_interpolator *force,
 	if (!rc && given)
 		incise_row_times_calibrate(&force->rows.times, given);
 	if (!rc)
+		rc = incise_rows_first(&force->rows, &force->first_ns, err);
+	if (!rc)
 		rc = incise_rows_last(&force->rows, &force->last_ns, err);
 	if (!rc)
 		rc = incise_force_interpolator_more(force, err);
@@ -782,7 +784,7 @@ int incise_blade_pose_open(struct incise_blade_pose *blade,
 	double rate_hz, latency_ns = 0;
 	int rc = incise_recording_number(recording, "tracker_hz", &rate_hz, err);
 
-	*blade = (struct incise_blade_pose){0};
+	*blade = (struct incise_blade_pose){.cut.count = recording->range.cuts};
 	memcpy(blade->tip_mm, recording->meta.tip_mm, sizeof(blade->tip_mm));
 	v3_unit(blade->progress.normal, recording->meta.surface_normal, 0);
 	for (int i = 0; i < 2; i++)

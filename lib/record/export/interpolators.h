@@ -120,7 +120,7 @@ struct incise_force_code {
 struct incise_force_interpolator {
 	struct incise_rows rows;
 	struct incise_recording_force scale;
-	int64_t last_ns; /* of the table's last row */
+	int64_t first_ns, last_ns; /* of the table's first and last row */
 	struct incise_force_code *samples;
 	size_t n, capacity;
 	double *weights; /* of |rows|, in small steps */

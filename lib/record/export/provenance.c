@@ -482,11 +482,30 @@ static int add_budget(struct incise_provenance *provenance,
 	return rc;
 }
 
+/* Seconds from the first sample; no end: to that of the recording. */
+static int add_part(struct incise_provenance *provenance,
+		    const struct incise_export_options *o)
+{
+	char end[40] = "", cut[40] = "";
+
+	if (!(o->from_s > 0) && !(o->to_s > 0) && !o->cut)
+		return 0;
+	if (o->to_s > 0)
+		snprintf(end, sizeof(end), " to %.9g s", o->to_s);
+	if (o->cut)
+		snprintf(cut, sizeof(cut), ", cut %d", o->cut);
+	return incise_provenance_add(provenance, "part", "from %.9g s%s%s", o->from_s,
+				     end, cut);
+}
+
 static int add_options(struct incise_provenance *provenance,
 		       const struct incise_export_options *o)
 {
 	const char *rows = o->resample ? "resampled" : "raw";
+	int rc = add_part(provenance, o);
 
+	if (rc)
+		return rc;
 	if (o->depth_bins)
 		return incise_provenance_add(provenance, "options",
 					     "averaged in %dx%d bins, at least %d "

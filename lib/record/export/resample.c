@@ -85,6 +85,7 @@ struct resample {
 	const struct incise_budget_columns *columns;
 	bool has_force;
 	int64_t name, first_ns;
+	int64_t from_ns, to_ns; /* of rows, from the first sample */
 	uint64_t samples, all;
 	struct {
 		double n, depth, camera, depth2, both, least_mm, most_mm;
@@ -228,6 +229,12 @@ static int put_row(struct resample *r, int64_t t_ns,
 	return rc;
 }
 
+/* The number of the first row of a grid in the range. */
+static int64_t first_row(const struct resample *r, double row_ns)
+{
+	return (int64_t)ceil((double)r->from_ns / row_ns);
+}
+
 /* A row for each force sample, with the noise of 8 samples to each side. */
 static int on_force(struct resample *r)
 {
@@ -237,6 +244,8 @@ static int on_force(struct resample *r)
 	int rc = 1, bad = 0;
 
 	for (; !bad; at++) {
+		int64_t since_ns;
+
 		while (rc > 0 && force->n < at + INCISE_FORCE_HALF + 1)
 			rc = incise_force_interpolator_more(force, r->err);
 		if (rc < 0 || at >= force->n)
@@ -244,6 +253,11 @@ static int on_force(struct resample *r)
 		if (at > INCISE_FORCE_HALF)
 			at -= incise_force_interpolator_forget(force,
 							       at - INCISE_FORCE_HALF);
+		since_ns = force->samples[at].t_ns - r->first_ns;
+		if (since_ns < r->from_ns)
+			continue;
+		if (since_ns >= r->to_ns)
+			return 0;
 		incise_force_interpolator_sample(force, at, &value);
 		bad = put_row(r, force->samples[at].t_ns, &value);
 	}
@@ -262,13 +276,15 @@ static int on_grid(struct resample *r, double force_hz)
 
 	if (!drops)
 		reach_ns = fmax(reach_ns, 2e9 / force_hz);
-	for (int64_t k = 0;; k++) {
+	for (int64_t k = first_row(r, row_ns);; k++) {
 		int64_t t_ns = r->first_ns + llround(k * row_ns);
 		struct incise_force_value value;
 		size_t old = 0;
 
 		if (t_ns > force->last_ns)
 			break;
+		if (t_ns - r->first_ns >= r->to_ns)
+			return 0;
 		while (rc > 0 && force->samples[force->n - 1].t_ns < t_ns + reach_ns)
 			rc = incise_force_interpolator_more(force, r->err);
 		if (rc < 0)
@@ -327,15 +343,16 @@ static int on_poses(struct resample *r, struct incise_recording *recording)
 	if (!rc)
 		rc = incise_rows_last(&rows, &last_ns, r->err);
 	if (!rc)
+		rc = incise_rows_first(&rows, &r->first_ns, r->err);
+	if (!rc)
 		rc = incise_rows_next(&rows, r->err);
-	r->first_ns = rows.t_ns;
 	incise_rows_close(&rows);
 	if (rc > 0)
 		rc = check_span(r, recording, "tracker", last_ns);
-	for (int64_t k = 0; rc >= 0; k++) {
+	for (int64_t k = first_row(r, 1e9 / r->options->rate_hz); rc >= 0; k++) {
 		int64_t t_ns = r->first_ns + llround(k * 1e9 / r->options->rate_hz);
 
-		if (t_ns > last_ns)
+		if (t_ns > last_ns || t_ns - r->first_ns >= r->to_ns)
 			break;
 		rc = put_row(r, t_ns, &none);
 	}
@@ -348,7 +365,7 @@ static int on_samples(struct resample *r, struct incise_recording *recording)
 	double span_ns = (double)(r->force.last_ns - r->force.samples[0].t_ns);
 	int rc;
 
-	r->first_ns = r->force.samples[0].t_ns;
+	r->first_ns = r->force.first_ns;
 	r->t_sd_s = incise_row_times_sd(&r->force.rows.times, 0);
 	rc = check_span(r, recording, "force", r->force.last_ns);
 	if (rc)
@@ -384,6 +401,11 @@ int incise_resample(struct incise_recording *recording, const char *name,
 	int rc = 0;
 
 	r.has_force = has_force;
+	r.to_ns = INT64_MAX;
+	if (recording->range.limited) {
+		r.from_ns = recording->range.from_ns;
+		r.to_ns = recording->range.to_ns;
+	}
 	for (int i = 0; i < r.width; i++)
 		if (!strcmp(table->columns[i].name, "camera_depth_mm"))
 			r.camera_columns = true;
@@ -399,7 +421,7 @@ int incise_resample(struct incise_recording *recording, const char *name,
 		rc = on_poses(&r, recording);
 	else if (!rc && r.force.n)
 		rc = on_samples(&r, recording);
-	report->cuts += r.blade.cut.count;
+	report->cuts += r.blade.cut.count - recording->range.cuts;
 	report_camera(&r);
 	incise_force_interpolator_close(&r.force);
 	incise_blade_pose_close(&r.blade);

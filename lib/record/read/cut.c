@@ -38,9 +38,12 @@ static int bad_row(const struct incise_rows *rows, const char *what,
 static int step_force(struct incise_cuts *cuts, int64_t *t_ns, int32_t *code,
 		      struct incise_error *err)
 {
-	int rc = incise_rows_next(&cuts->force, err);
+	int rc =
+		cuts->force.n ? 0 : incise_rows_first(&cuts->force, &cuts->first_ns, err);
 	int64_t value;
 
+	if (!rc)
+		rc = incise_rows_next(&cuts->force, err);
 	if (rc <= 0)
 		return rc;
 	value = incise_rows_int(&cuts->force, 2);
@@ -48,8 +51,6 @@ static int step_force(struct incise_cuts *cuts, int64_t *t_ns, int32_t *code,
 		return bad_row(&cuts->force, "code is out of the converter's range", err);
 	*code = value;
 	*t_ns = cuts->force.t_ns;
-	if (cuts->force.n == 1)
-		cuts->first_ns = *t_ns;
 	cuts->last_ns = *t_ns;
 	return 1;
 }
@@ -96,6 +97,7 @@ int incise_cuts_open(struct incise_cuts *cuts, struct incise_recording *recordin
 		.recording = recording,
 		.follow.before.t_ns = INCISE_TIME_NONE,
 		.follow.after.t_ns = INCISE_TIME_NONE,
+		.follow.cut.count = recording->range.cuts,
 		.depth_max_mm = -INFINITY,
 	};
 	incise_recording_force(recording, NULL, &cuts->scale);

@@ -8,6 +8,7 @@
 #include <sqlite3.h>
 #include <incise/recording.h>
 #include "others.h"
+#include "range.h"
 #include "../time/timeline.h"
 
 struct incise_recalibrated;
@@ -22,6 +23,7 @@ struct incise_recording {
 	struct incise_recording_info meta; /* the part that is in table meta */
 	/* The calibration that it is read by, if not that of its capture; see recalibration.h. */
 	struct incise_recalibrated *recalibrated;
+	struct incise_recording_range range; /* of rows that are opened */
 	/* Of a session: its members; then db has the events only, and path the choice too. */
 	struct incise_session *session;
 	/* Of a member: from its clock to the session's; it belongs to the session. Or NULL. */

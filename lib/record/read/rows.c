@@ -168,7 +168,12 @@ int incise_rows_open(struct incise_rows *rows, struct incise_recording *recordin
 		.recording = recording,
 		.table = table,
 		/* An interrupted recording has counted fewer depths than its poses give. */
-		.expected = stream == INCISE_SOURCE_DEPTH ? UINT64_MAX : expected,
+		.expected = stream == INCISE_SOURCE_DEPTH || recording->range.limited
+				    ? UINT64_MAX
+				    : expected,
+		.begin_ns =
+			recording->range.limited ? recording->range.begin_ns : INT64_MIN,
+		.end_ns = recording->range.limited ? recording->range.end_ns : INT64_MAX,
 		.t_ns = INCISE_TIME_NONE,
 	};
 	for (const char *name = columns; *name && n < INCISE_ROWS_COLUMNS;) {
@@ -178,7 +183,13 @@ int incise_rows_open(struct incise_rows *rows, struct incise_recording *recordin
 		name += length + strspn(name + length, ", ");
 	}
 	if (stream >= 0)
-		rc = incise_source_open(&rows->source, recording, stream, err);
+		rc = incise_source_open_at(
+			&rows->source, recording, stream,
+			recording->range.limited
+				? incise_source_seek(recording, table,
+						     recording->range.begin_ns)
+				: INT64_MIN,
+			err);
 	else
 		rc = sqlite3_prepare_v2(recording->db,
 					"SELECT " EVENTS
@@ -208,25 +219,46 @@ static int step(struct incise_rows *rows, struct incise_error *err)
 	return rc == SQLITE_ROW;
 }
 
+static int64_t own_ns(const struct incise_rows *rows)
+{
+	return rows->stmt ? sqlite3_column_int64(rows->stmt, 1)
+			  : rows->source.batch.column[1].i[rows->at];
+}
+
+int incise_rows_first(const struct incise_rows *rows, int64_t *first_ns,
+		      struct incise_error *err)
+{
+	struct incise_row_times times = rows->times; /* as before the first row */
+	int64_t seq = 0, t_ns = 0;
+	int rc = incise_source_end(rows->recording, rows->table, false, &seq, &t_ns, NULL,
+				   err);
+
+	if (rc > 0 && !incise_row_times_next(&times, seq, t_ns, first_ns))
+		*first_ns = t_ns; /* reading the row reports the damage */
+	return rc < 0 ? rc : 0;
+}
+
 /* Of events no other than these types; of a stream the batch has checked them. */
 static bool take(struct incise_rows *rows)
 {
-	const int64_t *t_ns = rows->stmt ? NULL : rows->source.batch.column[1].i;
-
 	if (rows->stmt && (sqlite3_column_type(rows->stmt, 1) != SQLITE_INTEGER ||
 			   sqlite3_column_type(rows->stmt, 2) != SQLITE_TEXT ||
 			   sqlite3_column_type(rows->stmt, 3) != SQLITE_TEXT))
 		return false;
-	return incise_row_times_next(
-		&rows->times, incise_rows_seq(rows),
-		t_ns ? t_ns[rows->at] : sqlite3_column_int64(rows->stmt, 1), &rows->t_ns);
+	return incise_row_times_next(&rows->times, incise_rows_seq(rows), own_ns(rows),
+				     &rows->t_ns);
 }
 
 int incise_rows_next(struct incise_rows *rows, struct incise_error *err)
 {
 	const char *path = rows->recording->path;
-	int rc = step(rows, err);
+	int rc = rows->live && own_ns(rows) > rows->end_ns ? 0 : step(rows, err);
 
+	/* Of the first block, or of what a filter needs. */
+	while (rc > 0 && own_ns(rows) < rows->begin_ns) {
+		rows->live = true;
+		rc = step(rows, err);
+	}
 	rows->live = false;
 	if (rc < 0)
 		return rc;

@@ -70,7 +70,8 @@ struct incise_rows {
 		[INCISE_ROWS_COLUMNS]; /* of the batch, in the order that was asked for */
 	sqlite3_stmt *stmt;	       /* of events: at the row */
 	uint64_t n, expected;
-	int64_t t_ns; /* best time of the row; its own is in column t_ns */
+	int64_t begin_ns, end_ns; /* own times of rows; one behind is read */
+	int64_t t_ns;		  /* best time of the row; its own is in column t_ns */
 	struct incise_row_times times;
 	bool live;  /* there is a row */
 	bool ended; /* events are over */
@@ -84,6 +85,10 @@ struct incise_rows {
 int incise_rows_open(struct incise_rows *rows, struct incise_recording *recording,
 		     const char *table, const char *columns, uint64_t expected,
 		     struct incise_error *err);
+
+/* Time of the first sample of the table, whatever the range; before the first row. 0, or -errno. */
+int incise_rows_first(const struct incise_rows *rows, int64_t *first_ns,
+		      struct incise_error *err);
 
 /* Go to the next row: 1, 0 at the end, -EINVAL (an impossible or missing row), -EIO. */
 int incise_rows_next(struct incise_rows *rows, struct incise_error *err);

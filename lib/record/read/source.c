@@ -172,8 +172,8 @@ static int next_block(struct incise_source *source, struct incise_error *err)
 		return 1;
 	return incise_error_set(
 		err, EINVAL,
-		"%s: damaged: stream %s, block %lld: %s; `incise verify %s` lists all "
-		"that is",
+		"%s: damaged: stream %s, block %lld: %s; `incise verify %s` lists "
+		"what is damaged",
 		source->recording->path, source->batch.form->stream,
 		(long long)block.block, why, source->recording->path);
 }
@@ -187,6 +187,7 @@ struct incise_source_depth {
 	double pose[INCISE_DEPTH_WINDOW][7];
 	int n;
 	uint64_t rows; /* of the tracker, so far */
+	bool part;     /* not from the first on */
 };
 
 static void put_depth(struct incise_source *source, const struct incise_depth_row *row)
@@ -235,7 +236,7 @@ static int next_depth(struct incise_source *source, struct incise_error *err)
 		rc = incise_source_next(&depth->tracker, err);
 		if (rc < 0)
 			return rc;
-		if (!rc && depth->rows != source->recording->meta.tracker)
+		if (!rc && !depth->part && depth->rows != source->recording->meta.tracker)
 			return incise_error_set(
 				err, EINVAL,
 				"%s: damaged: table tracker has %llu rows of %llu",
@@ -253,7 +254,8 @@ static int next_depth(struct incise_source *source, struct incise_error *err)
 	return batch->n > 0;
 }
 
-static int open_depth(struct incise_source *source, struct incise_error *err)
+static int open_depth(struct incise_source *source, int64_t from_seq,
+		      struct incise_error *err)
 {
 	const struct incise_recording_info *meta = &source->recording->meta;
 
@@ -262,8 +264,9 @@ static int open_depth(struct incise_source *source, struct incise_error *err)
 		return no_memory(source, err);
 	incise_depth_init(&source->depth->window, meta->surface_point_mm,
 			  meta->surface_normal);
-	return incise_source_open(&source->depth->tracker, source->recording,
-				  INCISE_LEDGER_TRACKER, err);
+	source->depth->part = from_seq != INT64_MIN;
+	return incise_source_open_at(&source->depth->tracker, source->recording,
+				     INCISE_LEDGER_TRACKER, from_seq, err);
 }
 
 /* --- any ------------------------------------------------------------------------------- */
@@ -283,7 +286,7 @@ static int open_table(struct incise_source *source, int64_t from_seq, bool from_
 						  ? from_seq
 						  : incise_ledger_find(recording->db,
 								       form->stream,
-								       from_seq),
+								       false, from_seq),
 					  from_end, &source->stmt);
 	} else {
 		if (recording->form < (source->stream == INCISE_LEDGER_WALL	? 3
@@ -324,7 +327,7 @@ int incise_source_open_at(struct incise_source *source,
 		.scale = recording->recalibrated ? recording->recalibrated->depth_scale
 						 : 1,
 	};
-	return stream == INCISE_SOURCE_DEPTH ? open_depth(source, err)
+	return stream == INCISE_SOURCE_DEPTH ? open_depth(source, from_seq, err)
 					     : open_table(source, from_seq, false, err);
 }
 
@@ -386,4 +389,36 @@ int incise_source_end(struct incise_recording *recording, const char *table, boo
 	}
 	incise_source_close(&source);
 	return rc;
+}
+
+int64_t incise_source_seek(struct incise_recording *recording, const char *table,
+			   int64_t t_ns)
+{
+	const struct incise_ledger_form *form = incise_source_form(
+		incise_source_find(strcmp(table, "depth") ? table : "tracker"));
+	sqlite3_stmt *stmt = NULL;
+	int64_t seq = INT64_MIN;
+	char sql[120];
+
+	if (t_ns == INT64_MIN)
+		return seq;
+	if (recording->form >= 5)
+		snprintf(sql, sizeof(sql),
+			 "SELECT first_seq FROM blocks WHERE stream = '%s' AND block = ?",
+			 form->stream);
+	else
+		snprintf(sql, sizeof(sql), "SELECT min(seq) FROM %s WHERE t_ns >= ?",
+			 form->table);
+	if (sqlite3_prepare_v2(recording->db, sql, -1, &stmt, NULL) != SQLITE_OK)
+		return seq;
+	sqlite3_bind_int64(stmt, 1,
+			   recording->form >= 5
+				   ? incise_ledger_find(recording->db, form->stream, true,
+							t_ns)
+				   : t_ns);
+	if (sqlite3_step(stmt) == SQLITE_ROW &&
+	    sqlite3_column_type(stmt, 0) == SQLITE_INTEGER)
+		seq = sqlite3_column_int64(stmt, 0);
+	sqlite3_finalize(stmt);
+	return seq;
 }

@@ -45,7 +45,7 @@ struct incise_source {
 int incise_source_open(struct incise_source *source, struct incise_recording *recording,
 		       int stream, struct incise_error *err);
 
-/* The same, from the batch on that has this number or a later one; of depth from the first. */
+/* The same, from the batch on that has this number or a later one; of depth that of the tracker's. */
 int incise_source_open_at(struct incise_source *source,
 			  struct incise_recording *recording, int stream,
 			  int64_t from_seq, struct incise_error *err);
@@ -57,6 +57,13 @@ int incise_source_open_at(struct incise_source *source,
 int incise_source_next(struct incise_source *source, struct incise_error *err);
 
 void incise_source_close(struct incise_source *source);
+
+/*
+ * The number of a row of a table that is not behind the first one at this time, and near it; INT64_MIN: from the
+ * first on.
+ */
+int64_t incise_source_seek(struct incise_recording *recording, const char *table,
+			   int64_t t_ns);
 
 /*
  * The first or the last sample of a table, as it was recorded: 1, 0: there is none, or as next(). Of

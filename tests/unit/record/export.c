@@ -325,6 +325,54 @@ TEST(averages_are_those_of_brute_force)
 	}
 }
 
+/* The rows of a part are those of the whole, to the last digit, with the numbers of their cuts. */
+TEST(a_part_is_that_of_the_whole)
+{
+	const char *path = "liver.rec";
+	struct incise_export_options how;
+	char *whole;
+
+	incise_export_options_init(&how);
+	whole = export(&path, 1, &how, NULL, &err);
+	assert_non_null(whole);
+	for (int i = 0; i < 40; i++) {
+		const double from = 1.1 * i, to = from + (i % 3 ? 0.9 : 7.3);
+		char *text, *part, *rest, *line, *copy;
+		struct incise_error none = {0};
+		int rows = 0;
+
+		/* the last one is behind all 14 */
+		how.cut = i >= 34 ? 3 * (i - 34) + 1 : 0;
+		how.from_s = how.cut ? 0 : from;
+		how.to_s = how.cut ? 0 : to;
+		text = part = export(&path, 1, &how, NULL, &none);
+		copy = rest = strdup(whole);
+		line = strsep(&rest, "\n");
+		if (text)
+			assert_string_equal(strsep(&part, "\n"), line);
+		while ((line = strsep(&rest, "\n")) && *line) {
+			double t_s = atof(strchr(line, ',') + 1);
+			int cut = atoi(strchr(line, '-') + 1);
+
+			if (how.cut ? cut != how.cut
+				    : t_s < from - 1e-7 || t_s >= to - 1e-7)
+				continue;
+			assert_non_null(text);
+			assert_string_equal(line, strsep(&part, "\n"));
+			rows++;
+		}
+		if (text)
+			assert_string_equal(part, "");
+		else
+			assert_int_equal(none.code, ENODATA);
+		if (!text != !rows)
+			fail_msg("part %d: %d rows", i, rows);
+		free(text);
+		free(copy);
+	}
+	free(whole);
+}
+
 TEST(averages_by_cut)
 {
 	struct incise_export_options how = {.depth_bins = DEPTH_BINS,

@@ -66,16 +66,16 @@ __attribute__((unused)) static int remove_entry(const char *path, const struct s
 #define TO_FORM_2 TO_FORM_3 "; DROP TABLE main.wall; PRAGMA user_version=2"
 
 /* Makes one of form 1, from before the ledger. */
-#define TO_FORM_1                                                                               \
-	TO_FORM_2                                                                               \
-		"; DROP TABLE main.tracker; "                                                   \
-		"CREATE TABLE main.tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "    \
-		"arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, "         \
-		"z_mm REAL NOT NULL, qw REAL NOT NULL, qx REAL NOT NULL, "                      \
-		"qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL); "                   \
-		"INSERT INTO main.tracker SELECT seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, " \
-		"qx, qy, qz, status FROM temp.tracker; DROP TABLE main.frames; "                \
-		"DROP TABLE streams; DROP TABLE knots; DROP TABLE ledger; PRAGMA user_version=1"
+#define TO_FORM_1                                                                       \
+	TO_FORM_2                                                                       \
+	"; DROP TABLE main.tracker; "                                                   \
+	"CREATE TABLE main.tracker(seq INTEGER PRIMARY KEY, t_ns INTEGER NOT NULL, "    \
+	"arrival_ns INTEGER NOT NULL, x_mm REAL NOT NULL, y_mm REAL NOT NULL, "         \
+	"z_mm REAL NOT NULL, qw REAL NOT NULL, qx REAL NOT NULL, "                      \
+	"qy REAL NOT NULL, qz REAL NOT NULL, status TEXT NOT NULL); "                   \
+	"INSERT INTO main.tracker SELECT seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, " \
+	"qx, qy, qz, status FROM temp.tracker; DROP TABLE main.frames; "                \
+	"DROP TABLE streams; DROP TABLE knots; DROP TABLE ledger; PRAGMA user_version=1"
 
 /* For setup and teardown: a folder as the working folder, so that paths are short. */
 __attribute__((unused)) static int enter_folder(void **state)

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * A part of a recording; see range.h.
+ */
+#include <errno.h>
+#include <math.h>
+#include <incise/clock.h>
+#include "cut.h"
+#include "range.h"
+#include "source.h"
+
+/* Until filters have settled; the smoother needs 40 to 72 records. */
+#define SETTLED_NS 2000000000LL
+#define SETTLED_RECORDS 100
+/* Places outside of tissue, of which the newest that is old enough counts. */
+#define PLACES 16
+/* Behind the end, for filters that look ahead. */
+#define BEHIND_NS 1000000000LL
+
+struct walk {
+	int64_t settled_ns;
+	struct place {
+		int64_t t_ns;
+		int cuts;
+	} place[PLACES], begin;
+	int n;
+	struct incise_cut_count cut;
+};
+
+/* Note a place outside; in a cut the one before it stays. */
+static void note(struct walk *walk, int64_t t_ns)
+{
+	const int64_t apart_ns = walk->settled_ns / (PLACES / 4);
+
+	for (int i = 0; i < walk->n && walk->place[i].t_ns <= t_ns - walk->settled_ns;
+	     i++)
+		walk->begin = walk->place[i];
+	if (walk->cut.inside ||
+	    (walk->n && t_ns - walk->place[walk->n - 1].t_ns < apart_ns))
+		return;
+	if (walk->n == PLACES) {
+		for (int i = 1; i < PLACES; i++)
+			walk->place[i - 1] = walk->place[i];
+		walk->n--;
+	}
+	walk->place[walk->n++] = (struct place){t_ns, walk->cut.count};
+}
+
+/* Follow the depths to where the range begins, or to the end of the cut that is asked for. */
+static int follow(struct incise_recording *recording,
+		  struct incise_recording_range *range, int64_t from_ns,
+		  struct incise_error *err)
+{
+	struct walk walk = {.settled_ns = SETTLED_NS, .begin.t_ns = INT64_MIN};
+	struct incise_source source;
+	bool found = false;
+	double hz;
+	int rc = incise_recording_number(recording, "tracker_hz", &hz, err);
+
+	if (!rc && hz > 0 && SETTLED_RECORDS / hz * 1e9 > SETTLED_NS)
+		walk.settled_ns = (int64_t)fmin(SETTLED_RECORDS / hz * 1e9, 1e12);
+	if (!rc)
+		rc = incise_source_open(&source, recording, INCISE_SOURCE_DEPTH, err);
+	if (rc)
+		return rc;
+	while (!found && (rc = incise_source_next(&source, err)) > 0)
+		for (size_t k = 0; k < source.batch.n && !found; k++) {
+			const int64_t t_ns = source.batch.column[1].i[k];
+			const bool inside = walk.cut.inside;
+
+			incise_cut_step(&walk.cut, source.batch.column[2].r[k]);
+			if (!inside)
+				note(&walk, t_ns);
+			if (range->cut) {
+				found = inside && !walk.cut.inside &&
+					walk.cut.count == range->cut;
+				range->end_ns = t_ns + BEHIND_NS;
+			} else {
+				found = t_ns >= from_ns;
+			}
+		}
+	incise_source_close(&source);
+	if (rc < 0)
+		return rc;
+	/* A cut may go on to the end of the recording. */
+	if (range->cut > walk.cut.count)
+		return incise_error_set(err, ENODATA,
+					"%s: has no cut %d, but %d; `incise info` counts "
+					"them",
+					recording->path, range->cut, walk.cut.count);
+	range->begin_ns = walk.begin.t_ns;
+	range->cuts = walk.begin.cuts;
+	return 0;
+}
+
+static int64_t after(double s)
+{
+	return s > 9e9 ? INT64_MAX / 4 : (int64_t)(s * 1e9);
+}
+
+int incise_recording_limit(struct incise_recording *recording,
+			   const struct incise_export_options *options,
+			   struct incise_error *err)
+{
+	struct incise_recording_range range = {
+		.limited = options->from_s > 0 || options->to_s > 0 || options->cut > 0,
+		.begin_ns = INT64_MIN,
+		.end_ns = INT64_MAX,
+		.from_ns = after(options->from_s),
+		.to_ns = options->to_s > 0 ? after(options->to_s) : after(INFINITY),
+		.cut = options->cut,
+	};
+	const char *table = incise_recording_has_force(recording) ? "force" : "tracker";
+	int64_t seq, first_ns;
+	int rc;
+
+	recording->range = (struct incise_recording_range){0};
+	if (!range.limited)
+		return 0;
+	rc = recording->session ? 0
+				: incise_source_end(recording, table, false, &seq,
+						    &first_ns, NULL, err);
+	if (rc < 0)
+		return rc;
+	if (rc) {
+		rc = follow(recording, &range, first_ns + range.from_ns, err);
+		if (!range.cut)
+			range.end_ns = first_ns + range.to_ns + BEHIND_NS;
+		/* Cuts count by the force: where some is missing, by all of it. */
+		if (recording->meta.force_lost || options->calibration)
+			range.begin_ns = INT64_MIN;
+		if (range.begin_ns == INT64_MIN)
+			range.cuts = 0;
+	}
+	if (!rc)
+		recording->range = range;
+	return rc;
+}
+
+bool incise_range_has(const struct incise_recording_range *range, int64_t since_ns,
+		      int cut)
+{
+	return !range->limited ||
+	       (since_ns >= range->from_ns && since_ns < range->to_ns &&
+		(!range->cut || cut == range->cut));
+}
