@@ -211,8 +211,7 @@ static int step(struct incise_rows *rows, struct incise_error *err)
 		rows->at = 0;
 		return incise_source_next(&rows->source, err);
 	}
-	rc = rows->ended ? SQLITE_DONE : sqlite3_step(rows->stmt);
-	rows->ended = rc == SQLITE_DONE; /* another step would begin anew */
+	rc = sqlite3_step(rows->stmt);
 	if (rc != SQLITE_ROW && rc != SQLITE_DONE)
 		return incise_schema_fail(rows->recording->db, rows->recording->path,
 					  err);
@@ -252,7 +251,12 @@ static bool take(struct incise_rows *rows)
 int incise_rows_next(struct incise_rows *rows, struct incise_error *err)
 {
 	const char *path = rows->recording->path;
-	int rc = rows->live && own_ns(rows) > rows->end_ns ? 0 : step(rows, err);
+	int rc = 0;
+
+	/* Behind the end another step would begin anew, or go on behind a range. */
+	rows->ended |= rows->live && own_ns(rows) > rows->end_ns;
+	if (!rows->ended)
+		rc = step(rows, err);
 
 	/* Of the first block, or of what a filter needs. */
 	while (rc > 0 && own_ns(rows) < rows->begin_ns) {
@@ -260,6 +264,7 @@ int incise_rows_next(struct incise_rows *rows, struct incise_error *err)
 		rc = step(rows, err);
 	}
 	rows->live = false;
+	rows->ended |= !rc;
 	if (rc < 0)
 		return rc;
 	if (!rc) {
@@ -272,13 +277,12 @@ int incise_rows_next(struct incise_rows *rows, struct incise_error *err)
 	}
 	/* A row that cannot be is passed, as a block is. */
 	rows->live = true;
-	if (!take(rows)) {
+	if (!take(rows))
 		return incise_error_set(
 			err, EINVAL,
 			"%s: damaged: table %s, row %lld: its time is "
 			"impossible; `incise verify %s` lists what is damaged",
 			path, rows->table, (long long)incise_rows_seq(rows), path);
-	}
 	rows->n++;
 	return 1;
 }

@@ -73,8 +73,8 @@ struct incise_rows {
 	int64_t begin_ns, end_ns; /* own times of rows; one behind is read */
 	int64_t t_ns;		  /* best time of the row; its own is in column t_ns */
 	struct incise_row_times times;
-	bool live;  /* there is a row */
-	bool ended; /* events are over */
+	bool live; /* there is a row */
+	bool ended;
 };
 
 /*
