@@ -63,6 +63,36 @@ well_formed() {
 	[ "$(wc -l <all.csv)" -gt 140000 ]
 }
 
+# bats test_tags=check
+@test "export of a part: its rows are those of the whole, and its lineage says which" {
+	incise export --no-lineage liver.rec -o whole.csv
+	run -0 incise export --no-lineage --from 10s --to 12.5s liver.rec -o part.csv
+	awk -F, 'NR == 1 || ($2 >= 10 && $2 < 12.5)' whole.csv | cmp - part.csv
+	incise export --cut 3 liver.rec -o cut.csv
+	grep -qx "# part: from 0 s, cut 3" cut.csv
+	cmp <(awk -F, 'NR == 1 || $1 == "liver-03"' whole.csv) <(grep -v "^#" cut.csv)
+	incise export --no-lineage --resample --rate 100 liver.rec -o whole.csv --overwrite
+	incise export --no-lineage --resample --rate 100 --from 10s --to 12.5s liver.rec -o part.csv --overwrite
+	# but the noise that was read
+	cmp <(awk -F, 'NR == 1 || ($3 >= 10 && $3 < 12.5)' whole.csv | cut -d, -f1-17,19-) \
+		<(cut -d, -f1-17,19- part.csv)
+	incise export --from 10s --to 12.5s liver.rec -o part.mcap
+	[ "$(stat -c %s part.mcap)" -lt 4000000 ]
+	run --separate-stderr incise export --cut 99 liver.rec
+	failed_with "liver.rec:" "no cut 99"
+	run --separate-stderr incise export --from 12s --to 10s liver.rec
+	bad_usage "--to 10 s is not behind --from 12 s"
+	run --separate-stderr incise export --cut 1 --resample liver.rec
+	bad_usage "--cut"
+	# what is not asked for is not read
+	cp -r liver.rec/ damaged.rec
+	sqlite3 damaged.rec/recording.db "UPDATE blocks SET data = x'00' WHERE stream = 'force' AND block = 30"
+	run -0 incise export --from 10s --to 12.5s damaged.rec -o /dev/null
+	run --separate-stderr incise export --from 2s --to 4s damaged.rec -o other.csv
+	failed_with "damaged.rec: damaged: stream force, block 30"
+	[ ! -e other.csv ]
+}
+
 @test "export averaged" {
 	run -0 --separate-stderr incise export --no-lineage liver.rec --average 12x10 -o a.csv
 	[[ "$output" == "wrote a.csv: "*" rows from 14 cuts" ]]
