@@ -584,7 +584,7 @@ static void vouch_check(struct vouch *vouch, const char *recording, bool member,
 
 	*vouch = (struct vouch){.recording = seal_recording(recording), .member = member};
 	vouch->join = seal_join(vouch->recording);
-	if (seal_files_read(&files, vouch->recording, &err))
+	if (seal_files_read(&files, vouch->recording, "seal", &err))
 		cli_fail_with(&err);
 	vouch->statements = cli_alloc((size_t)files.n + 1, sizeof(*vouch->statements));
 	vouch->lines = cli_alloc((size_t)files.n + 1, sizeof(*vouch->lines));
