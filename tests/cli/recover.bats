@@ -158,6 +158,18 @@ chunks() {
 	[ ! -e new/4.rec/seal ] && [ -e new/4.rec/seal-before ]
 }
 
+@test "what was made of a recording before its conversion finds it" {
+	incise export old/4.rec -o old/a.csv >/dev/null
+	mv old/4.rec before.rec
+	incise recover before.rec -o old/4.rec >/dev/null
+	run -0 --separate-stderr incise provenance old/a.csv
+	[[ "${lines[1]}" == *": "*"4.rec was converted since, and had this head" ]]
+	# that is said of its samples as they are
+	"$INCISE_BUILD/tests/sql" old/4.rec/recording.db "UPDATE force SET code = code + 1 WHERE seq = 90"
+	run -1 --separate-stderr incise provenance old/a.csv
+	[[ "${lines[1]}" == *"not as it was recorded"* ]]
+}
+
 @test "a conversion that fails leaves nothing" {
 	mkdir new/there.rec
 	run --separate-stderr incise recover old/4.rec -o new/there.rec

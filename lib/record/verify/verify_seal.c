@@ -173,24 +173,6 @@ static int compare_parts(struct incise_verification *verify,
 	return n;
 }
 
-/* Whether the statement is of the recording before its conversion to this format. */
-static bool is_of_before(const struct incise_verification *verify,
-			 const struct incise_seal_statement *was)
-{
-	sqlite3_stmt *stmt = NULL;
-	bool is = false;
-
-	if (sqlite3_prepare_v2(verify->recording->db,
-			       "SELECT instr(value, ?) FROM meta WHERE key = "
-			       "'converted_from'",
-			       -1, &stmt, NULL) == SQLITE_OK &&
-	    sqlite3_bind_text(stmt, 1, was->last.head, -1, SQLITE_STATIC) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW)
-		is = sqlite3_column_int(stmt, 0) > 0;
-	sqlite3_finalize(stmt);
-	return is;
-}
-
 static void compare_statement(struct walk *walk, const struct incise_seal_statement *was,
 			      const struct incise_seal_statement *is)
 {
@@ -211,7 +193,7 @@ static void compare_statement(struct walk *walk, const struct incise_seal_statem
 				    was->identity, is->identity);
 		return;
 	}
-	if (is_of_before(verify, was)) {
+	if (incise_seal_before(verify->recording, was->last.head)) {
 		incise_verify_found(verify, &found,
 				    "the statement is of this recording before its "
 				    "conversion from an older format: keep it in "
