@@ -94,6 +94,32 @@ TEST(blocks_and_commits_come_back_bit_by_bit, IN_FOLDER)
 			 3);
 }
 
+#define FIELDS "stream, block, first_seq, last_seq, first_ns, last_ns, count, lost"
+
+/* In gaps, and those of the end that no gap shows. */
+TEST(losses_are_those_of_the_ledger, IN_FOLDER)
+{
+	record("a.rec", "sim:clock=simulated", 1000 * MS);
+	change("a.rec/recording.db", TO_FORM_4);
+	change("a.rec/recording.db",
+	       "DELETE FROM tracker WHERE seq IN (SELECT first_seq + 3 FROM ledger WHERE "
+	       "stream = 'tracker' AND count > 5); UPDATE ledger SET count = count - 1, "
+	       "lost = 1 WHERE stream = 'tracker' AND count > 5; UPDATE ledger SET lost "
+	       "= 4, last_seq = last_seq + 4 WHERE stream = 'tracker' AND count = 0; "
+	       "UPDATE meta SET value = (SELECT sum(lost) FROM ledger) WHERE key = "
+	       "'tracker_lost'; UPDATE meta SET value = (SELECT count(*) FROM tracker) "
+	       "WHERE key = 'tracker_rows'");
+	convert("a.rec", "b.rec");
+	assert_int_equal((int)ask("b.rec/recording.db", "SELECT sum(lost) FROM blocks"),
+			 14);
+	assert_int_equal(
+		(int)ask("b.rec/recording.db",
+			 "ATTACH 'a.rec/recording.db' AS old; SELECT count(*) FROM "
+			 "(SELECT " FIELDS " FROM main.blocks EXCEPT SELECT " FIELDS
+			 " FROM old.ledger)"),
+		0);
+}
+
 TEST(rows_are_kept_however_the_ledger_is_cut, IN_FOLDER)
 {
 	record("a.rec", "sim:clock=simulated,cut_s=0.5,pause_s=0.3", 1000 * MS);
