@@ -5,6 +5,7 @@
  *     recorder.c            start, poll, commits and end; the camera
  *     recorder_rows.c       streams: from samples to blocks; zero; pretrigger
  *     recorder_summary.c    cuts, largest depth and force
+ *     block_writer.c        blocks and seals, see block_writer.h
  *     recorder_database.c   the database and its tables meta and events
  *     recorder_folder.c     NAME.rec.part, its lock and its name; free space
  */
