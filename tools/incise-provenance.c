@@ -54,6 +54,7 @@ struct step {
 	char *why; /* of a recording with this head that is not what it was; NULL: none */
 	char *found;	/* path; NULL: none */
 	int64_t commit; /* of the recording that was found */
+	bool converted; /* it had this head in an older format */
 };
 
 /* --- comparison --------------------------------------------------------------------------- */
@@ -67,14 +68,15 @@ static bool compare_recording(struct step *step, const char *path)
 	char identity[33];
 	bool known = recording && !incise_seal_head(recording, identity, &head, NULL);
 
+	step->converted = known && incise_seal_before(recording, origin->sha256);
 	incise_recording_close(recording);
 	if (!known)
 		return false;
 	step->commit = head.commit;
 	if (strcmp(identity, origin->identity))
 		step->state = OTHER;
-	else if (!strcmp(head.head, origin->sha256) &&
-		 (uint64_t)head.commit == origin->commit)
+	else if (step->converted || (!strcmp(head.head, origin->sha256) &&
+				     (uint64_t)head.commit == origin->commit))
 		step->state = SAME;
 	else
 		step->state = (uint64_t)head.commit > origin->commit ? LATER : OTHER;
@@ -214,7 +216,10 @@ static void print_step(const struct step *step)
 		printf("SHA-256 %.16s…: ", origin->sha256);
 	switch (step->state) {
 	case SAME:
-		printf(recording ? "%s has this head\n" : "%s is this file\n", found);
+		printf(step->converted ? "%s was converted since, and had this head\n"
+		       : recording     ? "%s has this head\n"
+				       : "%s is this file\n",
+		       found);
 		break;
 	case OTHER:
 		if (step->why) {

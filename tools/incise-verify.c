@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include <incise/recalibration.h>
 #include <incise/recording.h>
 #include <incise/verify.h>
@@ -584,7 +585,7 @@ static void vouch_check(struct vouch *vouch, const char *recording, bool member,
 
 	*vouch = (struct vouch){.recording = seal_recording(recording), .member = member};
 	vouch->join = seal_join(vouch->recording);
-	if (seal_files_read(&files, vouch->recording, &err))
+	if (seal_files_read(&files, vouch->recording, "seal", &err))
 		cli_fail_with(&err);
 	vouch->statements = cli_alloc((size_t)files.n + 1, sizeof(*vouch->statements));
 	vouch->lines = cli_alloc((size_t)files.n + 1, sizeof(*vouch->lines));
@@ -756,10 +757,14 @@ _Noreturn static void vouch_fail(const struct vouch *vouch, const struct trust *
 			 "time-stamps or statements: %d",
 			 vouch->recording, vouch->bad);
 	if (!vouch->n_lines)
-		cli_fail("%s: not signed: %s", vouch->recording,
+		cli_fail("%s: not signed: %s%s", vouch->recording,
 			 seal_head(vouch->recording, identity, &head, why)
 				 ? "'incise sign' signs it"
-				 : why);
+				 : why,
+			 access(cli_text("%s/seal-before", vouch->recording), F_OK)
+				 ? ""
+				 : "; seal-before/ has signatures of it before its "
+				   "conversion");
 	cli_fail("%s: nobody in %s signed what it is now", vouch->recording,
 		 trust->signers.path);
 }

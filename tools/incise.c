@@ -29,7 +29,7 @@ static const struct {
 	{"capture", "record the streams of a rig in sync"},
 	{"verify", "check that a recording is complete and unaltered"},
 	{"sign", "sign and time-stamp a recording"},
-	{"recover", "copy an interrupted recording to one that is read like any other"},
+	{"recover", "make a whole recording of an interrupted or an older one"},
 	{"join", "put recordings of several machines on one timeline"},
 	{"recalibrate", "give a recording another calibration after the fact"},
 	{"export", "make a dataset from recordings, raw or averaged"},

@@ -122,13 +122,13 @@ static void remove_calibrations(int folder, const char *path)
 }
 
 /* Signatures and time-stamps; a folder with anything else in it stays. */
-static void remove_seal(const char *path)
+static void remove_seal(const char *path, const char *name)
 {
-	char *folder = cli_text("%s/seal", path);
+	char *folder = cli_text("%s/%s", path, name);
 	struct incise_error err = {0};
 	struct seal_files files;
 
-	if (seal_files_read(&files, path, &err))
+	if (seal_files_read(&files, path, name, &err))
 		cli_fail_with(&err);
 	for (int i = 0; i < files.n; i++) {
 		char *file = cli_text("%s/%s", folder, files.all[i].name);
@@ -160,7 +160,8 @@ void recording_remove(const char *path)
 			 path);
 	remove_members(path);
 	remove_calibrations(folder, path);
-	remove_seal(path);
+	remove_seal(path, "seal");
+	remove_seal(path, "seal-before");
 	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++)
 		if (unlinkat(folder, files[i], 0) && errno != ENOENT)
 			cli_fail("%s/%s: cannot be removed: %s", path, files[i],

@@ -120,10 +120,10 @@ static int in_order(const void *a, const void *b)
 				  : strcmp(x->name, y->name);
 }
 
-int seal_files_read(struct seal_files *files, const char *recording,
+int seal_files_read(struct seal_files *files, const char *recording, const char *name,
 		    struct incise_error *err)
 {
-	char *path = cli_text("%s/seal", recording);
+	char *path = cli_text("%s/%s", recording, name);
 	int fd = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC), rc = 0;
 	DIR *folder = fd < 0 ? NULL : fdopendir(fd);
 	struct seal_file file;
@@ -288,7 +288,7 @@ static int check_all(const struct seal *seal, struct incise_error *err)
 static int find_stored(struct seal *seal, struct incise_error *err)
 {
 	struct seal_files files;
-	int rc = seal_files_read(&files, seal->recording, err);
+	int rc = seal_files_read(&files, seal->recording, "seal", err);
 
 	seal->number = 1;
 	for (int i = 0; i < files.n && !rc && !seal->stored; i++) {

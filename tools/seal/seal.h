@@ -40,11 +40,11 @@ struct seal_files {
 char *seal_recording(const char *path);
 
 /*
- * Read the files in the folder seal/ of a recording. Those of other names are passed over; links,
+ * Read the files in the folder seal/ of a recording, or another of its folders. Those of other names are passed over; links,
  * devices and too large ones are listed, but not read. Returns 0, also if there is no such folder,
  * or -errno; seal_files_free() in both cases.
  */
-int seal_files_read(struct seal_files *files, const char *recording,
+int seal_files_read(struct seal_files *files, const char *recording, const char *name,
 		    struct incise_error *err);
 
 void seal_files_free(struct seal_files *files);

@@ -22,7 +22,7 @@ static json_t *one(const char *path)
 
 	free(join);
 
-	if (seal_files_read(&files, path, &err))
+	if (seal_files_read(&files, path, "seal", &err))
 		cli_fail_with(&err);
 	for (int i = 0; i < files.n; i++)
 		n[files.all[i].kind]++;

@@ -94,15 +94,28 @@ INCISE_API struct incise_recording *incise_recording_open(const char *path,
 /** NULL is accepted. */
 INCISE_API void incise_recording_close(struct incise_recording *recording);
 
+/** What incise_recording_recover() did. */
+struct incise_recovered {
+	int form; /**< format of the recording */
+	bool converted;
+	/** In seal-before/: of the recording before its conversion. */
+	int signatures, timestamps;
+	char altered[400]; /**< first finding, if it was converted as it is; else "" */
+};
+
 /**
  * Copy an interrupted recording to a folder that does not exist: its database with what its log has, or
  * without what its journal takes back, and all else bit for bit. It is as incomplete as it was; reading
- * it needs no private copy. The recording that is read stays as it is.
+ * it needs no private copy. One of an older format, interrupted or complete, becomes one of today's,
+ * after a check by its ledger. The recording that is read stays as it is.
  *
+ * @param damaged convert one that is not as it was recorded, too
  * @return 0; -EEXIST (@p output), -EBUSY (it is being written), -EINVAL (no recording, damaged, or one with
- *         files that none has), those of mkdir(2) and write(2).
+ *         files that none has), -EBADMSG (of an older format, and not as it was recorded), those of mkdir(2)
+ *         and write(2).
  */
 INCISE_API int incise_recording_recover(const char *path, const char *output,
+					bool damaged, struct incise_recovered *made,
 					struct incise_error *err);
 
 /** Its name, which cuts and origins have: that of its folder without .rec. It belongs to the recording. */

@@ -119,5 +119,11 @@ INCISE_API int incise_seal_compare(const char *path, const char *text, size_t le
 INCISE_API int incise_seal_head(struct incise_recording *recording, char identity[33],
 				struct incise_seal_head *head, struct incise_error *err);
 
+/**
+ * Whether an opened recording was converted from one of an older format with this last head, 64
+ * hexadecimal digits: what was made of that, or signed, was of the same samples.
+ */
+INCISE_API bool incise_seal_before(struct incise_recording *recording, const char *head);
+
 INCISE_END_DECLS
 #endif

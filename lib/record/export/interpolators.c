@@ -658,8 +658,7 @@ static int more_pose(struct incise_blade_pose *blade, struct incise_error *err)
 		pose->q[i] = norm > 0 ? pose->q[i] / norm : NAN;
 	incise_go_to_tip(blade->tip_mm, pose->q, pose->position_mm);
 	pose->error = !incise_pose_usable(incise_rows_char(rows, 9));
-	/* Form 1 has no stations. */
-	pose->station = rows->recording->form < 2 ? 0 : (int)incise_rows_int(rows, 10);
+	pose->station = (int)incise_rows_int(rows, 10);
 	pose->button = incise_rows_int(rows, 11) != 0;
 	if (blade->pose[0].t_ns != INCISE_TIME_NONE)
 		between(blade);

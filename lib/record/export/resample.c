@@ -86,6 +86,7 @@ struct resample {
 	bool has_force;
 	int64_t name, first_ns;
 	int64_t from_ns, to_ns; /* of rows, from the first sample */
+	int64_t begin_ns;	/* of what is read */
 	uint64_t samples, all;
 	struct {
 		double n, depth, camera, depth2, both, least_mm, most_mm;
@@ -175,7 +176,8 @@ static int put_row(struct resample *r, int64_t t_ns,
 						   r->err);
 	else
 		camera = (struct incise_camera_value){0};
-	if (rc)
+	/* Rows before the range count its cuts. */
+	if (rc || t_ns - r->first_ns < r->from_ns)
 		return rc;
 	if (r->camera_columns)
 		compare_depths(r, blade.depth_mm, camera.depth_mm);
@@ -229,10 +231,12 @@ static int put_row(struct resample *r, int64_t t_ns,
 	return rc;
 }
 
-/* The number of the first row of a grid in the range. */
+/* The number of the first row of a grid behind the beginning of what is read. */
 static int64_t first_row(const struct resample *r, double row_ns)
 {
-	return (int64_t)ceil((double)r->from_ns / row_ns);
+	return r->begin_ns > r->first_ns
+		       ? (int64_t)ceil((double)(r->begin_ns - r->first_ns) / row_ns)
+		       : 0;
 }
 
 /* A row for each force sample, with the noise of 8 samples to each side. */
@@ -254,8 +258,6 @@ static int on_force(struct resample *r)
 			at -= incise_force_interpolator_forget(force,
 							       at - INCISE_FORCE_HALF);
 		since_ns = force->samples[at].t_ns - r->first_ns;
-		if (since_ns < r->from_ns)
-			continue;
 		if (since_ns >= r->to_ns)
 			return 0;
 		incise_force_interpolator_sample(force, at, &value);
@@ -403,6 +405,7 @@ int incise_resample(struct incise_recording *recording, const char *name,
 	r.has_force = has_force;
 	r.to_ns = INT64_MAX;
 	if (recording->range.limited) {
+		r.begin_ns = recording->range.begin_ns;
 		r.from_ns = recording->range.from_ns;
 		r.to_ns = recording->range.to_ns;
 	}

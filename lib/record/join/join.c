@@ -678,6 +678,8 @@ static int bring_member(struct join *join, const struct member *member,
 		rc = bring_folder(member, own, "calibration");
 	if (!rc)
 		rc = bring_folder(member, own, "seal");
+	if (!rc)
+		rc = bring_folder(member, own, "seal-before");
 	if (rc)
 		rc = incise_error_set(join->err, -rc, "%s: cannot be written: %s", own,
 				      strerror(-rc));

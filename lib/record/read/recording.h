@@ -38,6 +38,13 @@ struct incise_recording *incise_recording_open_any(const char *path,
 struct incise_recording *incise_recording_open_original(const char *path,
 							struct incise_error *err);
 
+/*
+ * Convert the recording in a folder, which is a copy, to today's format, if it has an older one; @path is that
+ * which was copied. Returns as incise_recording_recover().
+ */
+int incise_recording_convert(const char *folder, const char *path, bool damaged,
+			     struct incise_recovered *made, struct incise_error *err);
+
 /* The folder of a recording, path or path.part; to be freed; NULL with ENOENT, ENOMEM. */
 char *incise_recording_folder(const char *path, struct incise_error *err);
 

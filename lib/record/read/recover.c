@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
  * A copy of an interrupted recording that is read like any other: its database without log and journal, and
- * all else that is in its folder, bit for bit; see incise/recording.h.
+ * all else that is in its folder, bit for bit; see incise/recording.h. One of an older format is then
+ * converted in place, see ../write/convert.c.
  *
  *     OLD.rec.part/                                NEW.rec/
  *       recording.db, -wal or -journal   ──▶        recording.db
@@ -110,7 +111,8 @@ static int try_it(const char *path, struct incise_error *err)
 	return 0;
 }
 
-static int recover_to(const char *from, const char *to, struct incise_error *err)
+static int recover_to(const char *from, const char *to, bool damaged,
+		      struct incise_recovered *made, struct incise_error *err)
 {
 	char *file;
 	int rc;
@@ -121,15 +123,18 @@ static int recover_to(const char *from, const char *to, struct incise_error *err
 	free(file);
 	if (!rc)
 		rc = bring_folder(from, to, true, err);
+	if (!rc)
+		rc = incise_recording_convert(to, from, damaged, made, err);
 	return rc ? rc : try_it(to, err);
 }
 
-int incise_recording_recover(const char *path, const char *output,
-			     struct incise_error *err)
+int incise_recording_recover(const char *path, const char *output, bool damaged,
+			     struct incise_recovered *made, struct incise_error *err)
 {
 	char *folder, *part;
 	int rc = 0;
 
+	*made = (struct incise_recovered){0};
 	if (!access(output, F_OK))
 		return incise_error_set(err, EEXIST, "%s: exists; give another name",
 					output);
@@ -145,7 +150,7 @@ int incise_recording_recover(const char *path, const char *output,
 				      "%s: cannot be made: %s; give another name", part,
 				      strerror(errno));
 	if (!rc) {
-		rc = recover_to(folder, part, err);
+		rc = recover_to(folder, part, damaged, made, err);
 		if (!rc && rename(part, output))
 			rc = incise_error_set(err, errno, "%s: %s", output,
 					      strerror(errno));

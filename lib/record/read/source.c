@@ -53,12 +53,12 @@ static int step(struct incise_source *source)
 
 /* --- a row a sample: forms 1 to 4 ------------------------------------------------------ */
 
-/* Columns that a form has not: station 1, no button, no digest. */
+/* Columns that a form has not: station 0, which is unknown, no button, no digest. */
 static const char *columns_of(int stream, int form)
 {
 	if (stream == INCISE_LEDGER_TRACKER && form < 2)
 		return "seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, qy, qz, status, "
-		       "1, 0";
+		       "0, 0";
 	if (stream == INCISE_LEDGER_CAMERA && form < 4)
 		return "seq, t_ns, arrival_ns, pts, bytes, crc, length_px, sd_px, "
 		       "depth_mm, quality, zeroblob(32)";

@@ -178,6 +178,23 @@ static void report_ends(struct incise_verification *verify)
 	sqlite3_finalize(stmt);
 }
 
+/* One that was converted as it was does not become good by that. */
+static void report_conversion(struct incise_verification *verify)
+{
+	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_ALTERED);
+	sqlite3_stmt *stmt = NULL;
+
+	if (sqlite3_prepare_v2(verify->recording->db,
+			       "SELECT substr(value, at + 10) FROM (SELECT value, "
+			       "instr(value, 'recorded: ') AS at FROM meta WHERE key = "
+			       "'converted_from') WHERE at",
+			       -1, &stmt, NULL) == SQLITE_OK &&
+	    sqlite3_step(stmt) == SQLITE_ROW)
+		incise_verify_found(verify, &found, "it was converted with a finding: %s",
+				    (const char *)sqlite3_column_text(stmt, 0));
+	sqlite3_finalize(stmt);
+}
+
 static void report_interruption(struct incise_verification *verify)
 {
 	struct incise_verify_finding found =
@@ -451,6 +468,7 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 	if (!verify.altered && level != INCISE_VERIFY_TABLES)
 		incise_verify_times(&verify);
 	report_ends(&verify);
+	report_conversion(&verify);
 	report_interruption(&verify);
 	report->complete = !report->findings;
 	report->intact = !verify.altered;

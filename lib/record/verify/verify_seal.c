@@ -193,6 +193,13 @@ static void compare_statement(struct walk *walk, const struct incise_seal_statem
 				    was->identity, is->identity);
 		return;
 	}
+	if (incise_seal_before(verify->recording, was->last.head)) {
+		incise_verify_found(verify, &found,
+				    "the statement is of this recording before its "
+				    "conversion from an older format: keep it in "
+				    "seal-before/, and sign the recording as it is now");
+		return;
+	}
 	differs = find_difference(was, is, &from, &to);
 	if (fewer) {
 		found.first_block = walk->last + 1;

@@ -305,11 +305,9 @@ static void recorder_free(struct incise_recorder *rec)
 	close_camera(rec);
 	incise_wall_sampler_free(rec->wall.sampler);
 	incise_recorder_close_database(rec);
-	incise_seal_free(&rec->seal);
 	incise_recorder_disarm(rec);
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
 		incise_batch_free(&rec->batches[i]);
-	free(rec->data.bytes);
 	free(rec->summary.waiting);
 	if (rec->folder >= 0)
 		close(rec->folder);
@@ -368,7 +366,7 @@ static int start(struct incise_recorder *rec, const struct incise_recorder_setup
 	int rc = incise_recorder_check_space(rec, setup->planned_s, err);
 
 	rec->worthless = true;
-	if (!rc && incise_seal_init(&rec->seal, INCISE_SCHEMA_VERSION))
+	if (!rc && incise_seal_init(&rec->blocks.seal, INCISE_SCHEMA_VERSION))
 		rc = incise_error_set(err, ENOMEM,
 				      "%s: libcrypto gives no SHA-256; check its "
 				      "openssl.cnf",
@@ -696,9 +694,12 @@ static int complete(struct incise_recorder *rec, struct incise_error *err)
 	if (!rc)
 		rc = commit(rec, rec->commit_ns, true, err);
 	/* The seals are over all rows, those of this commit included. */
-	if (!rc && (incise_recorder_write_summary(rec) != SQLITE_OK ||
-		    incise_recorder_set_integer(rec, "complete", 1) != SQLITE_OK ||
-		    incise_recorder_seal(rec, rec->commit_ns) != SQLITE_OK))
+	if (!rc &&
+	    (incise_recorder_write_summary(rec) != SQLITE_OK ||
+	     incise_recorder_set_integer(rec, "complete", 1) != SQLITE_OK ||
+	     /* A disk that hangs may yet write what its writer was left with. */
+	     incise_block_writer_seal(&rec->blocks, rec->folder, !rec->camera.given_up,
+				      rec->commit_ns) != SQLITE_OK))
 		rc = incise_recorder_fail(rec, err);
 	if (!rc)
 		rc = commit_files(rec, err);

@@ -5,6 +5,7 @@
  *     recorder.c            start, poll, commits and end; the camera
  *     recorder_rows.c       streams: from samples to blocks; zero; pretrigger
  *     recorder_summary.c    cuts, largest depth and force
+ *     block_writer.c        blocks and seals, see block_writer.h
  *     recorder_database.c   the database and its tables meta and events
  *     recorder_folder.c     NAME.rec.part, its lock and its name; free space
  */
@@ -17,26 +18,15 @@
 #include <sqlite3.h>
 #include <incise/recorder.h>
 #include "../../base/ring.h"
-#include "../batch.h"
 #include "../read/cut.h"
 #include "../read/depth.h"
-#include "../seal_chain.h"
 #include "../time/timeline.h"
+#include "block_writer.h"
 #include "frame_pump.h"
 #include "wall_sampler.h"
 
 /* Statements, prepared once; see recorder_database.c. */
-enum {
-	INSERT_BLOCK,
-	INSERT_EVENT,
-	INSERT_LEDGER,
-	SET_META,
-	SET_STREAM,
-	DROP_KNOTS,
-	INSERT_KNOT,
-	INSERT_SEAL,
-	STATEMENTS
-};
+enum { INSERT_EVENT, SET_META, SET_STREAM, DROP_KNOTS, INSERT_KNOT, STATEMENTS };
 
 /* One stream's numbers and times. */
 struct incise_recorder_stream {
@@ -150,10 +140,7 @@ struct incise_recorder {
 
 	struct incise_recorder_stream streams[INCISE_LEDGER_STREAMS];
 	struct incise_batch batches[INCISE_LEDGER_FORMS]; /* since the last commit */
-	struct {
-		uint8_t *bytes;
-		size_t size;
-	} data; /* of a block that is written */
+	struct incise_block_writer blocks;
 	struct incise_depth depth;
 	struct incise_cut_count cut;
 	struct incise_recorder_summary summary;
@@ -162,7 +149,6 @@ struct incise_recorder {
 	struct incise_recorder_pretrigger pretrigger;
 	struct incise_recorder_camera camera;
 	struct incise_recorder_wall wall;
-	struct incise_seal seal;
 	struct incise_recorder_disk disk;
 	struct incise_recorder_stats stats;
 	struct {
@@ -251,12 +237,6 @@ int incise_recorder_write_streams(struct incise_recorder *rec, bool knots);
  * head of the seal at this commit, whose time is @t_ns. Returns an SQLite code.
  */
 int incise_recorder_write_ledger(struct incise_recorder *rec, int64_t t_ns, bool last);
-
-/*
- * Seal the tables without blocks; the last write, in the transaction that marks the recording
- * complete. Returns an SQLite code.
- */
-int incise_recorder_seal(struct incise_recorder *rec, int64_t t_ns);
 
 /* --- recorder_summary.c ------------------------------------------------------------- */
 

@@ -22,15 +22,12 @@
 #define BUSY_MS 1000
 
 static const char *const sql[STATEMENTS] = {
-	[INSERT_BLOCK] = "INSERT INTO blocks VALUES(?,?,?,?,?,?,?,?,?,?,?)",
 	[INSERT_EVENT] = "INSERT INTO events VALUES(?,?,?)",
-	[INSERT_LEDGER] = "INSERT INTO ledger VALUES(?,?,?,?,?,?,?,?,?)",
 	[SET_META] = "INSERT OR REPLACE INTO meta VALUES(?,?)",
 	[SET_STREAM] = "INSERT OR REPLACE INTO streams "
 		       "VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)",
 	[DROP_KNOTS] = "DELETE FROM knots WHERE stream = ?",
 	[INSERT_KNOT] = "INSERT INTO knots VALUES(?,?,?,?,?,?)",
-	[INSERT_SEAL] = "INSERT INTO seal VALUES(?,?,?,?,?,?,?)",
 };
 
 int incise_recorder_fail(struct incise_recorder *rec, struct incise_error *err)
@@ -328,12 +325,13 @@ int incise_recorder_open_database(struct incise_recorder *rec,
 	if (rc == SQLITE_OK)
 		rc = write_meta(rec, calibration_path);
 	if (rc == SQLITE_OK)
-		rc = incise_seal_start(&rec->seal, rec->db);
+		rc = incise_block_writer_start(&rec->blocks, rec->db);
 	return incise_recorder_check(rec, rc, err);
 }
 
 void incise_recorder_close_database(struct incise_recorder *rec)
 {
+	incise_block_writer_free(&rec->blocks);
 	for (int i = 0; i < STATEMENTS; i++) {
 		sqlite3_finalize(rec->stmt[i]);
 		rec->stmt[i] = NULL;

@@ -11,12 +11,9 @@
  * Before the trigger, rows go into the pretrigger rings instead.
  */
 #include <errno.h>
-#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include "../../base/vector.h"
 #include "../frames.h"
 #include "../ledger.h"
@@ -941,71 +938,6 @@ int incise_recorder_write_streams(struct incise_recorder *rec, bool knots)
 	return rc;
 }
 
-static void bind_block(sqlite3_stmt *stmt, const char *stream,
-		       const struct incise_ledger_block *block)
-{
-	const int64_t values[] = {block->block,	   block->first_seq, block->last_seq,
-				  block->first_ns, block->last_ns,   block->count,
-				  block->lost,	   block->crc};
-
-	sqlite3_bind_text(stmt, 1, stream, -1, SQLITE_TRANSIENT);
-	for (int i = 0; i < 8; i++)
-		sqlite3_bind_int64(stmt, 2 + i, values[i]);
-}
-
-/* An entry of table ledger: a sealed table, or camera.mkv. */
-static int put_block(struct incise_recorder *rec, const char *stream,
-		     const struct incise_ledger_block *block)
-{
-	bind_block(rec->stmt[INSERT_LEDGER], stream, block);
-	return incise_recorder_run(rec->stmt[INSERT_LEDGER]);
-}
-
-/* A stream's block, with the rows of its batch, which is empty at the end. */
-static int put_stream_block(struct incise_recorder *rec, int i,
-			    struct incise_ledger_block *block)
-{
-	sqlite3_stmt *stmt = rec->stmt[INSERT_BLOCK];
-	struct incise_batch *batch = &rec->batches[i];
-	size_t bound = batch->n ? incise_batch_bound(batch) : 0, size = 0;
-	uint8_t digest[INCISE_SEAL_BYTES];
-
-	if (bound > rec->data.size || !rec->data.bytes) {
-		uint8_t *more = realloc(rec->data.bytes, 2 * bound + 1);
-
-		if (!more)
-			return SQLITE_NOMEM;
-		rec->data.bytes = more;
-		rec->data.size = 2 * bound;
-	}
-	if (batch->n)
-		size = incise_batch_encode(batch, rec->data.bytes);
-	batch->n = 0;
-	incise_ledger_crc(block, rec->data.bytes, size);
-	incise_seal_data(&rec->seal, i, block, rec->data.bytes, size, digest);
-	bind_block(stmt, incise_ledger_forms[i].stream, block);
-	sqlite3_bind_blob(stmt, 10, digest, sizeof(digest), SQLITE_TRANSIENT);
-	sqlite3_bind_blob64(stmt, 11, rec->data.bytes, size, SQLITE_STATIC);
-	return incise_recorder_run(stmt);
-}
-
-/* The head of a commit. */
-static int put_seal(struct incise_recorder *rec, int64_t t_ns)
-{
-	const struct incise_seal *seal = &rec->seal;
-	sqlite3_stmt *stmt = rec->stmt[INSERT_SEAL];
-
-	sqlite3_bind_int64(stmt, 1, seal->next);
-	sqlite3_bind_int64(stmt, 2, t_ns);
-	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
-		sqlite3_bind_int64(stmt, 3 + i, seal->blocks[i]);
-	if (!incise_seal_commit(&rec->seal, t_ns))
-		return SQLITE_NOMEM;
-	sqlite3_bind_blob(stmt, 3 + INCISE_LEDGER_FORMS, seal->head, sizeof(seal->head),
-			  SQLITE_TRANSIENT);
-	return incise_recorder_run(stmt);
-}
-
 int incise_recorder_write_ledger(struct incise_recorder *rec, int64_t t_ns, bool last)
 {
 	int rc = SQLITE_OK;
@@ -1020,57 +952,14 @@ int incise_recorder_write_ledger(struct incise_recorder *rec, int64_t t_ns, bool
 		uint64_t lost = wall ? 0 : incise_recorder_lost(rec, i);
 
 		if (incise_ledger_end(ledger, &block))
-			rc = put_stream_block(rec, i, &block);
+			rc = incise_block_writer_put(&rec->blocks, i, &rec->batches[i],
+						     &block);
 		if (!last || !exists || rc != SQLITE_OK)
 			continue;
 		/* Losses that no gap in the numbers shows. */
 		incise_ledger_close(ledger, lost > ledger->lost ? lost - ledger->lost : 0,
 				    &block);
-		rc = put_stream_block(rec, i, &block);
+		rc = incise_block_writer_put(&rec->blocks, i, &rec->batches[i], &block);
 	}
-	return rc == SQLITE_OK ? put_seal(rec, t_ns) : rc;
-}
-
-/* Seal camera.mkv, if there is one; then the tables, in the chain. */
-static int seal_chain(struct incise_recorder *rec, int64_t t_ns)
-{
-	struct incise_ledger_block block;
-	int fd = openat(rec->folder, INCISE_FRAMES_FILE, O_RDONLY | O_CLOEXEC);
-	int64_t length = 0;
-	struct stat st;
-	int rc = SQLITE_OK, code;
-
-	if (fd < 0 && errno != ENOENT)
-		return SQLITE_IOERR;
-	if (fd >= 0) {
-		code = fstat(fd, &st) ? -errno : 0;
-		/* A disk that hangs may yet write what its writer was left with. */
-		if (!rec->camera.given_up)
-			length = st.st_size;
-		if (!code)
-			code = incise_ledger_seal_file(fd, length, &block);
-		rc = code ? SQLITE_IOERR : put_block(rec, INCISE_LEDGER_FILE, &block);
-	}
-	if (rc == SQLITE_OK)
-		rc = incise_seal_tables(&rec->seal, rec->db, fd, length);
-	if (fd >= 0)
-		close(fd);
-	return rc == SQLITE_OK ? put_seal(rec, t_ns) : rc;
-}
-
-int incise_recorder_seal(struct incise_recorder *rec, int64_t t_ns)
-{
-	int rc = SQLITE_OK;
-
-	for (int i = 1; incise_ledger_sealed[i] && rc == SQLITE_OK; i++) {
-		struct incise_ledger_block block;
-		char stream[40];
-
-		snprintf(stream, sizeof(stream), INCISE_LEDGER_TABLE "%s",
-			 incise_ledger_sealed[i]);
-		rc = incise_ledger_seal(rec->db, incise_ledger_sealed[i], &block);
-		if (rc == SQLITE_OK)
-			rc = put_block(rec, stream, &block);
-	}
-	return rc == SQLITE_OK ? seal_chain(rec, t_ns) : rc;
+	return rc == SQLITE_OK ? incise_block_writer_commit(&rec->blocks, t_ns) : rc;
 }

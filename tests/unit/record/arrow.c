@@ -374,7 +374,7 @@ TEST(an_older_form_has_its_streams, IN_FOLDER)
 	change(DB, TO_FORM_1);
 	stream = open_stream("tracker", NULL);
 	batch = next(&stream);
-	assert_int_equal(((const int32_t *)data(&batch, 11))[3], 1); /* the station */
+	assert_int_equal(((const int32_t *)data(&batch, 11))[3], 0); /* no station */
 	assert_false(flag(&batch, 12, 3));
 	batch.release(&batch);
 	stream.release(&stream);

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: GPL-2.0-or-later
+# incise recover of recordings of older forms, those of tests/forms: it makes one of today's, which says the
+# same in all that is read of it. Of interrupted ones see readers.bats.
+
+load cli
+
+setup() {
+	work_folder
+	mkdir old new
+	for form in 1 2 3 4; do
+		mkdir old/$form.rec
+		sqlite3 old/$form.rec/recording.db <"$root/tests/forms/$form.sql"
+	done
+}
+
+# rows FOLDER FORM: the samples, in FOLDER/FORM.*
+rows() {
+	(
+		cd "$1"
+		incise export $2.rec -o $2.csv
+		incise export $2.rec -o $2.u.csv --uncertainty parts 2>/dev/null
+		incise export $2.rec -o $2.r.csv --resample --rate 50
+		incise export $2.rec -o $2.mcap
+		incise info $2.rec | grep -v "^seal  \|^samples  " >$2.info
+		incise info --json $2.rec | jq 'del(.seal, .seals, .summary)' >$2.json
+		"$INCISE_BUILD/tests/sql" $2.rec/recording.db "SELECT seq, t_ns, arrival_ns, x_mm, y_mm, z_mm, qw, qx, qy,
+			qz, status FROM tracker; SELECT * FROM force" >$2.rows
+		sqlite3 $2.rec/recording.db "SELECT * FROM events ORDER BY rowid; SELECT * FROM meta WHERE key NOT IN
+			('converted_from', 'cuts', 'depth_max_mm', 'force_max_N', 'identity') ORDER BY key" >$2.tables
+	) >/dev/null
+}
+
+# Chunks of MCAP, whose messages are the samples: without what the file says of its origin.
+chunks() {
+	python3 - "$1" <<-'END'
+		import struct, sys
+		data = open(sys.argv[1], "rb").read()
+		at = 8
+		while at < len(data) - 8:
+		    kind, size = data[at], struct.unpack_from("<Q", data, at + 1)[0]
+		    if kind in (3, 4, 5, 6):
+		        print(kind, data[at + 9:at + 9 + size].hex())
+		    at += 9 + size
+	END
+}
+
+# bats test_tags=check
+@test "recordings of forms 1 to 4 become one of form 5 that gives the same" {
+	for form in 1 2 3 4; do
+		before=$(sha256sum old/$form.rec/*)
+		run -0 --separate-stderr incise recover old/$form.rec -o new/$form.rec
+		[ "${lines[0]}" = "old/$form.rec: 180 force samples, 54 tracker samples, 1.8 s" ]
+		[[ "${lines[1]}" == "old/$form.rec: converted from format $form"* ]]
+		[ "${lines[2]}" = "wrote new/$form.rec" ]
+		[ "$(sha256sum old/$form.rec/*)" = "$before" ]
+		[ "$(ls new/$form.rec)" = recording.db ]
+		[ "$(sqlite3 new/$form.rec/recording.db "PRAGMA user_version")" = 5 ]
+		run -0 --separate-stderr incise verify new/$form.rec
+		[[ "$output" == *"new/$form.rec: complete, and as it was written" ]]
+		[[ "$output" == *" commits, chained"* ]]
+		rows old $form
+		rows new $form
+		for kind in csv u.csv r.csv; do
+			diff <(grep -v '^# origin' old/$form.$kind) <(grep -v '^# origin' new/$form.$kind)
+		done
+		for kind in info json rows tables; do
+			diff old/$form.$kind new/$form.$kind
+		done
+		chunks old/$form.mcap >messages
+		[ "$(wc -l <messages)" -gt 3 ]
+		chunks new/$form.mcap | cmp messages -
+		for table in streams knots; do
+			[ $form = 1 ] || cmp <(sqlite3 {old,new}/$form.rec/recording.db "SELECT * FROM $table")
+		done
+	done
+	from() { sqlite3 new/$1.rec/recording.db "SELECT value FROM meta WHERE key = 'converted_from'"; }
+	[[ "$(incise recover old/1.rec -o new/again.rec)" == *"has no ledger: its rows could not be checked"* ]]
+	[ "$(from 1)" = "format 1" ]
+	[[ "$(from 3)" == "format 3, ledger force e09369c4, table:depth 6202938c, "*", wall d5"* ]]
+	[ "$(from 4)" = "format 4, head 13547397f629411a96ca057db292646ea5a6dba42a7262d0530a839653844c9d" ]
+	# blocks and commits of form 4 are those of before
+	for sql in "SELECT number, t_ns, force, tracker, camera, wall FROM seal" \
+		"SELECT value FROM meta WHERE key = 'identity'"; do
+		[ "$(sqlite3 new/4.rec/recording.db "$sql")" = "$(sqlite3 old/4.rec/recording.db "$sql")" ]
+	done
+	fields="stream, block, first_seq, last_seq, first_ns, last_ns, count, lost"
+	for form in 2 3 4; do
+		[ "$(sqlite3 new/$form.rec/recording.db "SELECT $fields FROM blocks ORDER BY stream, block")" = \
+			"$(sqlite3 old/$form.rec/recording.db \
+				"SELECT $fields FROM ledger WHERE stream NOT LIKE '%:%' ORDER BY stream, block")" ]
+	done
+}
+
+@test "an interrupted recording of an older form stays interrupted" {
+	for form in 2 3 4; do
+		# as of a recorder that was killed before it closed it; no head of form 4 is that of its end
+		sqlite3 old/$form.rec/recording.db "UPDATE meta SET value = 0 WHERE key = 'complete'; DELETE FROM ledger
+			WHERE stream LIKE 'table:%' OR count = 0;
+			PRAGMA journal_mode=WAL" >/dev/null
+		[ $form != 4 ] || sqlite3 old/4.rec/recording.db "DELETE FROM seal WHERE number > 18;
+			UPDATE seal SET force = 18, tracker = 18, wall = 3 WHERE number = 18"
+		incise verify old/$form.rec >before || [ $? = 1 ]
+		run -0 --separate-stderr incise recover old/$form.rec -o new/$form.rec $([ $form != 4 ] || echo --damaged)
+		run -1 --separate-stderr incise verify new/$form.rec
+		[[ "$output" == *"interrupted, or being written"* ]]
+		cmp <(grep "^force \|^tracker " before) <(grep "^force \|^tracker " <<<"$output")
+	done
+}
+
+@test "an altered recording of an older form is refused, and converted with --damaged, which is not forgotten" {
+	for form in 2 3 4; do
+		sqlite3 old/$form.rec/recording.db "UPDATE force SET code = code + 1 WHERE seq = 90"
+		run --separate-stderr incise recover old/$form.rec -o new/$form.rec
+		failed_with old/$form.rec "not as it was recorded: force: block 9 " "--damaged converts it as it is"
+		[ -z "$(ls new)" ]
+		run -0 --separate-stderr incise recover old/$form.rec -o new/$form.rec --damaged
+		[[ "$stderr" == *"warning: old/$form.rec: not as it was recorded: force: block 9 "* ]]
+		run -1 --separate-stderr incise verify new/$form.rec
+		[[ "$output" == *"it was converted with a finding: force: block 9 "* ]]
+		run --separate-stderr incise export new/$form.rec -o a.csv
+		failed_with new/$form.rec "not as it was recorded"
+		rm -r new/$form.rec
+	done
+	# a forged one, whose ledger agrees, and whose seal does not
+	sqlite3 old/4.rec/recording.db "UPDATE force SET code = code - 1 WHERE seq = 90;
+		UPDATE seal SET t_ns = t_ns + 1 WHERE number = 5"
+	run --separate-stderr incise recover old/4.rec -o new/4.rec
+	failed_with old/4.rec "not as it was recorded: seal: commit 5 differs"
+	run -0 --separate-stderr incise recover old/3.rec -o new/3.rec --damaged --json
+	[ "$(jq -c '[.converted_from, .seals_before, .altered[:15]]' <<<"$output")" = '[3,0,"force: block 9 "]' ]
+}
+
+@test "signatures of before are kept beside the new one, and do not count as its own" {
+	ssh-keygen -q -t ed25519 -N "" -C kim@lab -f kim
+	echo "kim@lab $(cat kim.pub)" >signers
+	incise sign old/4.rec --key kim >/dev/null
+	mkdir old/4.rec/calibration
+	echo "force_mV_N = 1200.0;" >old/4.rec/calibration/0001-20261127T054012Z.conf
+	run -0 --separate-stderr incise recover old/4.rec -o new/4.rec
+	[ "${lines[2]}" = "1 signature and 0 time-stamps of format 4 are kept in new/4.rec/seal-before, not of the new one" ]
+	[ ! -e new/4.rec/seal ]
+	diff -r old/4.rec/seal new/4.rec/seal-before
+	diff -r {old,new}/4.rec/calibration
+	run --separate-stderr incise verify new/4.rec --signers signers
+	failed_with new/4.rec "not signed" "seal-before/ has signatures of it before its conversion"
+	# who puts them back is told what they are
+	cp -r new/4.rec/seal-before new/4.rec/seal
+	run -1 --separate-stderr incise verify new/4.rec --signers signers
+	[[ "$output" == *"the statement is of this recording before its conversion from an older format"* ]]
+	[[ "$output" != *"altered"* ]]
+	# and it can be signed anew, recovered and replaced
+	rm -r new/4.rec/seal
+	incise sign new/4.rec --key kim >/dev/null
+	incise verify new/4.rec --signers signers >/dev/null
+	incise recover new/4.rec -o new/again.rec >/dev/null
+	diff -r new/4.rec new/again.rec
+	incise recover old/4.rec -o new/4.rec --overwrite >/dev/null
+	[ ! -e new/4.rec/seal ] && [ -e new/4.rec/seal-before ]
+}
+
+@test "what was made of a recording before its conversion finds it" {
+	incise export old/4.rec -o old/a.csv >/dev/null
+	mv old/4.rec before.rec
+	incise recover before.rec -o old/4.rec >/dev/null
+	run -0 --separate-stderr incise provenance old/a.csv
+	[[ "${lines[1]}" == *": "*"4.rec was converted since, and had this head" ]]
+	# that is said of its samples as they are
+	"$INCISE_BUILD/tests/sql" old/4.rec/recording.db "UPDATE force SET code = code + 1 WHERE seq = 90"
+	run -1 --separate-stderr incise provenance old/a.csv
+	[[ "${lines[1]}" == *"not as it was recorded"* ]]
+}
+
+@test "a conversion that fails leaves nothing" {
+	mkdir new/there.rec
+	run --separate-stderr incise recover old/4.rec -o new/there.rec
+	failed_with new/there.rec "exists"
+	sqlite3 old/4.rec/recording.db "UPDATE tracker SET x_mm = 'here' WHERE seq = 20"
+	run --separate-stderr incise recover old/4.rec -o new/4.rec --damaged
+	failed_with old/4.rec "table tracker, row 20 is invalid"
+	run --separate-stderr bash -c "ulimit -f 8; trap '' XFSZ; exec incise recover old/3.rec -o new/3.rec"
+	[ "$status" = 1 ]
+	[ "$(ls new)" = there.rec ]
+	[ -z "$(ls new/there.rec)" ]
+}
