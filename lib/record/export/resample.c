@@ -87,6 +87,7 @@ struct resample {
 	int64_t name, first_ns;
 	int64_t from_ns, to_ns; /* of rows, from the first sample */
 	int64_t begin_ns;	/* of what is read */
+	int cut;		/* of the last row in one */
 	uint64_t samples, all;
 	struct {
 		double n, depth, camera, depth2, both, least_mm, most_mm;
@@ -181,6 +182,8 @@ static int put_row(struct resample *r, int64_t t_ns,
 		return rc;
 	if (r->camera_columns)
 		compare_depths(r, blade.depth_mm, camera.depth_mm);
+	report->cuts += blade.cut && blade.cut != r->cut;
+	r->cut = blade.cut ? blade.cut : r->cut;
 	report->clipped += force->clipped;
 	report->depth_max_mm = least(report->depth_max_mm, blade.depth_mm);
 	report->velocity_max_mm_s = least(report->velocity_max_mm_s, blade.velocity_mm_s);
@@ -424,7 +427,6 @@ int incise_resample(struct incise_recording *recording, const char *name,
 		rc = on_poses(&r, recording);
 	else if (!rc && r.force.n)
 		rc = on_samples(&r, recording);
-	report->cuts += r.blade.cut.count - recording->range.cuts;
 	report_camera(&r);
 	incise_force_interpolator_close(&r.force);
 	incise_blade_pose_close(&r.blade);
