@@ -181,7 +181,8 @@ static void rows_load(sqlite3 *db, sqlite3_stmt *insert,
 
 /* A block of the rows that are left of it; without any it is as it was, but empty. */
 static void rows_store_block(sqlite3 *db, const struct incise_batch *batch,
-			     struct incise_ledger_block *block, sqlite3_stmt *old)
+			     struct incise_ledger_block *block, int64_t *before,
+			     sqlite3_stmt *old)
 {
 	uint8_t *data = malloc(incise_batch_bound(batch) + 1);
 	size_t n = batch->n ? incise_batch_encode(batch, data) : 0;
@@ -194,14 +195,21 @@ static void rows_store_block(sqlite3 *db, const struct incise_batch *batch,
 		block->last_ns = batch->column[1].i[batch->n - 1];
 	}
 	block->count = (int64_t)batch->n;
+	if (batch->n) {
+		block->lost = block->last_seq - block->first_seq + 1 - block->count;
+		block->lost += *before >= 0 ? block->first_seq - *before - 1 : 0;
+		*before = block->last_seq;
+	}
 	incise_ledger_crc(block, data, n);
-	if (n != (size_t)sqlite3_column_bytes(old, 9) ||
+	if (block->lost != sqlite3_column_int64(old, 6) ||
+	    n != (size_t)sqlite3_column_bytes(old, 9) ||
 	    memcmp(data, sqlite3_column_blob(old, 9), n) != 0) {
-		sqlite3_prepare_v2(db,
-				   "UPDATE blocks SET first_seq = ?3, last_seq = ?4, "
-				   "first_ns = ?5, last_ns = ?6, count = ?7, crc = ?8, "
-				   "data = ?9 WHERE stream = ?1 AND block = ?2",
-				   -1, &stmt, NULL);
+		sqlite3_prepare_v2(
+			db,
+			"UPDATE blocks SET first_seq = ?3, last_seq = ?4, "
+			"first_ns = ?5, last_ns = ?6, count = ?7, crc = ?8, "
+			"data = ?9, lost = ?10 WHERE stream = ?1 AND block = ?2",
+			-1, &stmt, NULL);
 		sqlite3_bind_text(stmt, 1, batch->form->stream, -1, SQLITE_STATIC);
 		sqlite3_bind_int64(stmt, 2, block->block);
 		sqlite3_bind_int64(stmt, 3, block->first_seq);
@@ -211,6 +219,7 @@ static void rows_store_block(sqlite3 *db, const struct incise_batch *batch,
 		sqlite3_bind_int64(stmt, 7, block->count);
 		sqlite3_bind_int64(stmt, 8, block->crc);
 		sqlite3_bind_blob(stmt, 9, data, (int)n, SQLITE_STATIC);
+		sqlite3_bind_int64(stmt, 10, block->lost);
 		sqlite3_step(stmt);
 		sqlite3_finalize(stmt);
 	}
@@ -237,7 +246,7 @@ static void rows_store(sqlite3 *db, const struct incise_ledger_form *form)
 	struct incise_ledger_block block;
 	sqlite3_stmt *blocks = NULL, *rows = NULL;
 	char sql[300];
-	int64_t last = 0;
+	int64_t last = 0, before = -1;
 
 	snprintf(sql, sizeof(sql),
 		 "SELECT coalesce(max(block), -1) FROM blocks WHERE stream = '%s' "
@@ -269,7 +278,7 @@ static void rows_store(sqlite3 *db, const struct incise_ledger_form *form)
 				rows = NULL;
 			}
 		}
-		rows_store_block(db, &batch, &block, blocks);
+		rows_store_block(db, &batch, &block, &before, blocks);
 	}
 	sqlite3_finalize(rows);
 	sqlite3_finalize(blocks);

@@ -69,7 +69,7 @@ static const struct cli_option options[] = {
 	{0, "from", "TIME", "begin so long after the first sample, for example 90s",
 	 CLI_DURATION(struct job, how.from_s, 0, 1e9)},
 	{0, "to", "TIME", "end so long after the first sample",
-	 CLI_DURATION(struct job, how.to_s, 0, 1e9)},
+	 CLI_DURATION(struct job, how.to_s, 1e-3, 1e9)},
 	{0, "cut", "N", "only this cut, from 1",
 	 CLI_INTEGER(struct job, how.cut, 1, 1000000000)},
 	{'a', "average", "DEPTHxVELOCITY",

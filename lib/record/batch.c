@@ -10,6 +10,8 @@
 #include <string.h>
 #include "batch.h"
 
+#define TIME_MAX (INT64_MAX / 4) /* 73 years; sums and differences do not overflow */
+
 static size_t size_of(char type)
 {
 	switch (type) {
@@ -341,6 +343,9 @@ const char *incise_batch_decode(struct incise_batch *batch,
 	for (size_t k = 1; k < n; k++)
 		if (seq[k] <= seq[k - 1])
 			return "its numbers do not increase";
+	for (size_t k = 0; k < n; k++)
+		if (t_ns[k] < -TIME_MAX || t_ns[k] > TIME_MAX)
+			return "a time is impossible";
 	if (seq[0] < 0 || seq[0] != block->first_seq || seq[n - 1] != block->last_seq)
 		return "its first or last number differs";
 	if (t_ns[0] != block->first_ns || t_ns[n - 1] != block->last_ns)

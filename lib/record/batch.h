@@ -34,7 +34,7 @@ struct incise_batch {
 };
 
 /* Rows of a block; more are impossible. */
-#define INCISE_BATCH_ROWS_MAX (1 << 18)
+#define INCISE_BATCH_ROWS_MAX (1 << 16)
 
 /* Room for @n rows in all columns of batch->form. False: no memory; the rows are as before. */
 bool incise_batch_reserve(struct incise_batch *batch, size_t n);

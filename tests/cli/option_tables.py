@@ -152,7 +152,7 @@ VALUES = """
 --timeout | 2s 1h | 0 never {}
 --timestamp | http://a/tsr a.tsq a.tsr | reply.der
 --tolerance | 0.1 5 | -1 x {}
---to | 1s 2min | -1s far {}
+--to | 1s 2min | 0s -1s far {}
 --tool | auto blade handle tube | spoon blad {}
 --trigger | button 0.2N 500mN sync sync:/dev/x | 0N knob -1N {}
 --u-reference | 0 0.01 1000 | -1 1001 long {}

@@ -189,6 +189,16 @@ static void find_row(struct pass *pass, const struct incise_blade_pose *blade,
 	pass->record_ns[1] = blade->deep[1].t_ns;
 }
 
+/* Means are of whole slots: all samples of one are in a range in which it begins. */
+static int64_t since_ns(const struct pass *pass, int64_t t_ns)
+{
+	const double rate = pass->options->rate_hz;
+
+	return rate > 0 ? llround(floor(((double)t_ns * 1e-9 + 0.5e-9) * rate) / rate *
+				  1e9)
+			: t_ns;
+}
+
 /* Pass over the cuts of one recording; the blade is that of the same one. */
 static int each_cut_sample(struct pass *pass, struct incise_cuts *cuts,
 			   struct incise_blade_pose *blade, const struct visitor *visitor)
@@ -202,7 +212,8 @@ static int each_cut_sample(struct pass *pass, struct incise_cuts *cuts,
 		if (rc)
 			return rc;
 		if (!incise_range_has(&cuts->recording->range,
-				      sample.t_ns - cuts->first_ns, sample.cut))
+				      since_ns(pass, sample.t_ns - cuts->first_ns),
+				      sample.cut))
 			continue;
 		find_row(pass, blade, &sample);
 		if (sample.cut != pass->number) {
@@ -659,6 +670,11 @@ static int write_resampled(struct pass *pass, struct incise_recording *const *re
 		pass->samples += recordings[i]->meta.force;
 		free(name);
 	}
+	if (!rc && !pass->report.rows && n && recordings[0]->range.limited)
+		rc = incise_error_set(pass->err, ENODATA,
+				      "%s: has nothing in this part; give another --from "
+				      "and --to",
+				      recordings[0]->path);
 	return rc ? rc : incise_table_finish(pass->table, pass->err);
 }
 

@@ -262,10 +262,12 @@ static int64_t each_row(struct export *export, uint64_t all, struct incise_error
 				next = i;
 		if (next < 0)
 			return n;
-		rc = incise_range_has(&export->messages.recording->range,
-				      rows[next].t_ns - export->first_ns, 0)
-			     ? write_row(export, next, err)
-			     : 0;
+		rc = 0;
+		if (incise_range_has(&export->messages.recording->range,
+				     rows[next].t_ns - export->first_ns, 0))
+			rc = write_row(export, next, err);
+		else
+			export->messages.omitted++;
 		if (!rc && (++n & 0xffff) == 0)
 			rc = incise_export_progress(export->options, (double)n,
 						    (double)all, err);
@@ -291,19 +293,25 @@ static bool exists(const struct incise_recording *recording, const char *table)
 				      : incise_recording_has_force(recording);
 }
 
-/* To a part, whose times count from the first sample. */
+/* To a part, whose times count from the first sample, by the calibration in use. */
 static int limit(struct export *export, struct incise_error *err)
 {
+	const struct incise_calibration *given = export->options->calibration;
 	struct incise_recording *recording = export->messages.recording;
-	int64_t seq;
+	struct incise_rows rows;
 	int rc = incise_recording_limit(recording, export->options, err);
 
 	if (rc || !recording->range.limited)
 		return rc;
-	rc = incise_source_end(
-		recording, incise_recording_has_force(recording) ? "force" : "tracker",
-		false, &seq, &export->first_ns, NULL, err);
-	return rc < 0 ? rc : 0;
+	rc = incise_rows_open(&rows, recording,
+			      incise_recording_has_force(recording) ? "force" : "tracker",
+			      "seq, t_ns", UINT64_MAX, err);
+	if (!rc && given)
+		incise_row_times_calibrate(&rows.times, given);
+	if (!rc)
+		rc = incise_rows_first(&rows, &export->first_ns, err);
+	incise_rows_close(&rows);
+	return rc;
 }
 
 /* Open the tables, and announce their topics. Returns 0 or -errno. */
@@ -393,7 +401,14 @@ static int64_t write_messages(struct export *export,
 		rc = profile->finish(profile, &export->mcap);
 	if (!rc)
 		rc = incise_mcap_finish(&export->mcap);
-	return rc ? fail_write(rc, err) : n - (int64_t)messages->omitted;
+	n -= (int64_t)messages->omitted;
+	if (!rc && !n && recording->range.limited)
+		return incise_error_set(
+			err, ENODATA,
+			"%s: has nothing in this part; give another --from "
+			"and --to",
+			recording->path);
+	return rc ? fail_write(rc, err) : n;
 }
 
 int incise_export_mcap(struct incise_recording *recording,

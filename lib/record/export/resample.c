@@ -367,7 +367,7 @@ static int on_poses(struct resample *r, struct incise_recording *recording)
 /* Rows at the times of the force, or on a grid over it. */
 static int on_samples(struct resample *r, struct incise_recording *recording)
 {
-	double span_ns = (double)(r->force.last_ns - r->force.samples[0].t_ns);
+	double span_ns = (double)(r->force.last_ns - r->force.first_ns);
 	int rc;
 
 	r->first_ns = r->force.first_ns;

@@ -14,6 +14,11 @@
 #define SETTLED_RECORDS 100
 /* Places outside of tissue, of which the newest that is old enough counts. */
 #define PLACES 16
+/* Clear of the tissue. */
+#define CLEAR_MM -0.5
+#define CLEAR_NS 300000000LL
+/* Force as slow as this, in rates of the tracker, may miss a cut of the poses. */
+#define FORCE_LEAST 4.0
 /* Behind the end, for filters that look ahead. */
 #define BEHIND_NS 1000000000LL
 
@@ -25,17 +30,23 @@ struct walk {
 	} place[PLACES], begin;
 	int n;
 	struct incise_cut_count cut;
+	int64_t clear_ns; /* last time that it was not clear */
 };
 
-/* Note a place outside; in a cut the one before it stays. */
-static void note(struct walk *walk, int64_t t_ns)
+/*
+ * Note a place outside, where the blade has been clear of the tissue for a while, so that its smoothed depth is,
+ * too; in a cut the one before it stays.
+ */
+static void note(struct walk *walk, int64_t t_ns, double depth_mm)
 {
 	const int64_t apart_ns = walk->settled_ns / (PLACES / 4);
 
 	for (int i = 0; i < walk->n && walk->place[i].t_ns <= t_ns - walk->settled_ns;
 	     i++)
 		walk->begin = walk->place[i];
-	if (walk->cut.inside ||
+	if (depth_mm > CLEAR_MM)
+		walk->clear_ns = t_ns;
+	if (walk->cut.inside || t_ns - walk->clear_ns < CLEAR_NS ||
 	    (walk->n && t_ns - walk->place[walk->n - 1].t_ns < apart_ns))
 		return;
 	if (walk->n == PLACES) {
@@ -70,7 +81,9 @@ static int follow(struct incise_recording *recording,
 
 			incise_cut_step(&walk.cut, source.batch.column[2].r[k]);
 			if (!inside)
-				note(&walk, t_ns);
+				note(&walk, t_ns, source.batch.column[2].r[k]);
+			else
+				walk.clear_ns = t_ns;
 			if (range->cut) {
 				found = inside && !walk.cut.inside &&
 					walk.cut.count == range->cut;
@@ -91,6 +104,20 @@ static int follow(struct incise_recording *recording,
 	range->begin_ns = walk.begin.t_ns;
 	range->cuts = walk.begin.cuts;
 	return 0;
+}
+
+static bool is_read_whole(struct incise_recording *recording,
+			  const struct incise_export_options *options)
+{
+	double force_hz = NAN, tracker_hz = NAN;
+
+	if (incise_recording_number(recording, "force_hz", &force_hz, NULL) ||
+	    incise_recording_number(recording, "tracker_hz", &tracker_hz, NULL))
+		return true;
+	return recording->meta.force_lost || options->calibration ||
+	       recording->recalibrated ||
+	       (incise_recording_has_force(recording) &&
+		!(force_hz >= FORCE_LEAST * tracker_hz));
 }
 
 static int64_t after(double s)
@@ -126,9 +153,11 @@ int incise_recording_limit(struct incise_recording *recording,
 		rc = follow(recording, &range, first_ns + range.from_ns, err);
 		if (!range.cut)
 			range.end_ns = first_ns + range.to_ns + BEHIND_NS;
-		/* Cuts count by the force: where some is missing, by all of it. */
-		if (recording->meta.force_lost || options->calibration)
+		/* Cuts count by the force, and delays move its rows: then all are read. */
+		if (!rc && is_read_whole(recording, options)) {
 			range.begin_ns = INT64_MIN;
+			range.end_ns = INT64_MAX;
+		}
 		if (range.begin_ns == INT64_MIN)
 			range.cuts = 0;
 	}

@@ -144,6 +144,37 @@ static int next_rows(struct incise_source *source, struct incise_error *err)
 
 /* --- blocks: form 5 -------------------------------------------------------------------- */
 
+/* Whether a block goes on from the one before: NULL, or what is wrong. */
+static const char *does_not_follow(struct incise_source *source,
+				   const struct incise_ledger_block *block)
+{
+	const struct incise_batch *batch = &source->batch;
+	const int64_t *seq = batch->column[0].i;
+	/* Numbers are not negative, and increase within a batch. */
+	uint64_t lost = (uint64_t)seq[batch->n - 1] - (uint64_t)seq[0] + 1 - batch->n;
+
+	if (source->last_seq >= seq[0])
+		return "its numbers are not behind those of the block before";
+	if (source->last_seq >= 0)
+		lost += (uint64_t)(seq[0] - source->last_seq - 1);
+	return source->next < 0 || lost == (uint64_t)block->lost
+		       ? NULL
+		       : "it has not lost as many samples as it says";
+}
+
+static const char *take_block(struct incise_source *source,
+			      const struct incise_ledger_block *block, const void *data,
+			      size_t size)
+{
+	const char *why = incise_batch_decode(&source->batch, block, data, size);
+
+	if (!why)
+		why = does_not_follow(source, block);
+	source->next = why || block->block == INT64_MAX ? -1 : block->block + 1;
+	source->last_seq = why ? -1 : block->last_seq;
+	return why;
+}
+
 static int next_block(struct incise_source *source, struct incise_error *err)
 {
 	struct incise_ledger_block block;
@@ -154,26 +185,38 @@ static int next_block(struct incise_source *source, struct incise_error *err)
 
 	/* The end of a stream is a block without rows. */
 	do {
-		rc = step(source);
+		rc = source->held ? SQLITE_ROW : step(source);
+		source->held = false;
 		if (rc == SQLITE_DONE)
 			return 0;
 		if (rc != SQLITE_ROW)
 			return fail(source, err);
+		why = NULL;
 		if (!incise_ledger_block_read(&block, source->stmt))
 			why = "a field has another type";
 		else if (!incise_ledger_data(source->stmt, &block, &data, &size))
 			why = "its checksum differs";
-		else
-			why = block.count ? incise_batch_decode(&source->batch, &block,
-								data, size)
-					  : NULL;
+		else if (source->next >= 0 && block.block > source->next)
+			why = "blocks before it are missing";
+		if (why) {
+			/* The block itself comes with the next call. */
+			source->held = *why == 'b';
+			source->next = source->last_seq = -1;
+		} else if (block.count) {
+			if (block.count > 0 && block.count <= INCISE_BATCH_ROWS_MAX &&
+			    !incise_batch_reserve(&source->batch, (size_t)block.count))
+				return no_memory(source, err);
+			why = take_block(source, &block, data, size);
+		} else if (block.block == source->next) {
+			source->next++;
+		}
 	} while (!why && !block.count);
 	if (!why)
 		return 1;
 	return incise_error_set(
 		err, EINVAL,
-		"%s: damaged: stream %s, block %lld: %s; `incise verify %s` lists "
-		"what is damaged",
+		"%s: damaged: stream %s, block %lld: %s; `incise verify %s` "
+		"lists what is damaged",
 		source->recording->path, source->batch.form->stream,
 		(long long)block.block, why, source->recording->path);
 }
@@ -324,6 +367,8 @@ int incise_source_open_at(struct incise_source *source,
 		.stream = stream,
 		.batch.form = form,
 		.rows_max = ROWS_MAX,
+		.next = from_seq == INT64_MIN ? 0 : -1,
+		.last_seq = -1,
 		.scale = recording->recalibrated ? recording->recalibrated->depth_scale
 						 : 1,
 	};
@@ -371,6 +416,8 @@ int incise_source_end(struct incise_recording *recording, const char *table, boo
 		.stream = stream,
 		.batch.form = incise_source_form(stream),
 		.rows_max = 1,
+		.next = -1,
+		.last_seq = -1,
 		.scale = 1,
 	};
 	rc = open_table(&source, INT64_MIN, last, err);

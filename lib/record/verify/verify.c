@@ -432,16 +432,16 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 	report->interrupted = !verify.recording->meta.complete;
 	verify.hashed = verify.recording->form >= 4 &&
 			!incise_seal_init(&verify.rows_seal, verify.recording->form);
-	if (level != INCISE_VERIFY_TABLES || report->interrupted)
+	/* Where no sample is read the recorder's summary has to be enough. */
+	if (verify.recording->form < 5 || report->interrupted)
+		level = verify.level =
+			level == INCISE_VERIFY_TABLES ? INCISE_VERIFY_ROWS : level;
+	if (level != INCISE_VERIFY_TABLES)
 		verify.origin_ns = ask(
 			&verify, 0,
 			"SELECT min(first_ns) FROM %s WHERE count > 0 AND stream IN (" RIG
 			")",
 			entries(&verify));
-	/* Where no sample is read the recorder's summary has to be enough. */
-	if (verify.recording->form < 5 || report->interrupted)
-		level = verify.level =
-			level == INCISE_VERIFY_TABLES ? INCISE_VERIFY_ROWS : level;
 	rc = level == INCISE_VERIFY_TABLES ? 0 : check_streams(&verify);
 	if (!rc) {
 		if (report->interrupted && verify.recording->form < 5)

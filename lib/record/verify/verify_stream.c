@@ -433,15 +433,17 @@ static void report_missing(struct walk *walk, const struct incise_ledger_block *
 				    (long long)found.last_block);
 }
 
-/* The rows of a block of form 5, and the samples that are missing before and within. */
-static uint64_t take_numbers(struct walk *walk, const struct incise_batch *batch)
+/* The rows of a block of form 5, whose numbers and times go on, and the samples missing before and within. */
+static uint64_t take_numbers(struct walk *walk, const struct incise_batch *batch,
+			     bool *good)
 {
 	uint64_t missing = 0;
 
 	for (size_t k = 0; k < batch->n; k++) {
 		const int64_t seq = batch->column[0].i[k], t_ns = batch->column[1].i[k];
 
-		if (walk->known && seq > walk->last_seq + 1) {
+		*good &= !walk->known || (seq > walk->last_seq && t_ns >= walk->last_ns);
+		if (walk->known && seq > walk->last_seq && seq - walk->last_seq > 1) {
 			missing += (uint64_t)(seq - walk->last_seq - 1);
 			lost(walk, walk->last_seq + 1, seq - 1, t_ns);
 		}
@@ -484,7 +486,14 @@ static int take_data(struct walk *walk, struct incise_batch *batch,
 	good &= has_data(walk, block, &data, &size);
 	if (block->count) {
 		good &= !incise_batch_decode(batch, block, data, size);
-		good &= take_numbers(walk, batch) == (uint64_t)block->lost || !follows;
+		good &= take_numbers(walk, batch, &good) == (uint64_t)block->lost ||
+			!follows;
+	} else {
+		good &= !size && block->first_ns == block->last_ns &&
+			(!follows ||
+			 (block->first_seq == walk->last_seq + 1 &&
+			  block->last_seq == walk->last_seq + block->lost &&
+			  block->last_ns == (walk->known ? walk->last_ns : 0)));
 	}
 	/* Rows that cannot be read are altered, not lost. */
 	if (block->count && !batch->n) {

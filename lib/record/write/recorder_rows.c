@@ -371,12 +371,19 @@ static ssize_t enter(struct incise_recorder *rec, int i, int64_t seq, int64_t t_
 	struct incise_ledger *ledger =
 		i == INCISE_LEDGER_WALL ? &rec->wall.ledger : &stream->ledger;
 	struct incise_batch *batch = &rec->batches[i];
-	const ssize_t at = (ssize_t)batch->n;
 	uint64_t missing = ledger->started ? (uint64_t)(seq - ledger->last_seq - 1) : 0;
 
+	struct incise_ledger_block block;
+	ssize_t at;
+
 	batch->form = &incise_ledger_forms[i];
-	if (at == INCISE_BATCH_ROWS_MAX || !incise_batch_reserve(batch, batch->n + 1))
+	/* After a stall: a commit may have several blocks of a stream. */
+	if (batch->n == INCISE_BATCH_ROWS_MAX && incise_ledger_end(ledger, &block) &&
+	    incise_block_writer_put(&rec->blocks, i, batch, &block) != SQLITE_OK)
+		return incise_recorder_fail(rec, err);
+	if (!incise_batch_reserve(batch, batch->n + 1))
 		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+	at = (ssize_t)batch->n;
 	batch->column[0].i[at] = seq;
 	batch->column[1].i[at] = t_ns;
 	batch->n++;

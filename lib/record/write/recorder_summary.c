@@ -75,8 +75,9 @@ void incise_recorder_follow_depth(struct incise_recorder *rec,
 	while (k < summary->n && summary->waiting[k].t_ns < row->t_ns)
 		take(summary, &summary->waiting[k++]);
 	summary->n -= k;
-	memmove(summary->waiting, summary->waiting + k,
-		summary->n * sizeof(*summary->waiting));
+	if (k)
+		memmove(summary->waiting, summary->waiting + k,
+			summary->n * sizeof(*summary->waiting));
 }
 
 int incise_recorder_write_summary(struct incise_recorder *rec)

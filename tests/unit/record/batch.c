@@ -98,6 +98,9 @@ static void fill(struct incise_batch *batch, size_t n)
 			}
 		}
 	}
+	/* Times are of 73 years. */
+	for (size_t k = 0; k < n; k++)
+		batch->column[1].i[k] /= 5;
 	for (size_t k = 0; k < n; k++, seq += gaps && draw() % 9 == 0 ? 5 : 1)
 		batch->column[0].i[k] = seq;
 }

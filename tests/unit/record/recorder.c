@@ -1038,6 +1038,27 @@ TEST(closing_nothing)
 
 /* --- free space ---------------------------------------------------------------------- */
 
+/* A recorder that was stopped for a second has more of a commit than a block takes. */
+TEST(a_stall_is_several_blocks, IN_FOLDER)
+{
+	struct incise_rig *rig = open_rig("sim:clock=simulated,force_hz=200000");
+	struct incise_recorder *rec = start_recorder("a.rec", rig);
+	struct incise_clock *clock = incise_rig_clock(rig);
+	struct incise_verify_report report;
+
+	assert_int_equal(poll_for(rec, rig, 100 * MS, &err), 0);
+	incise_clock_wait_until(clock, incise_clock_now(clock) + 700 * MS);
+	end_recorder(rec, rig, 200 * MS);
+	assert_int_equal((int)ask(DB, "SELECT max(count) FROM blocks"), 65536);
+	assert_int_equal((int)ask(DB,
+				  "SELECT max(b) FROM (SELECT force - lag(force) OVER "
+				  "(ORDER BY number) AS b FROM seal)"),
+			 3);
+	succeeds(!incise_verify("a.rec", NULL, &report, &err));
+	assert_true(report.complete && report.intact && report.sealed);
+	assert_int_equal(report.streams[0].present, 200000);
+}
+
 /* Not too little, so that the disk is not full before the end; not twice too much. */
 TEST(expects_what_it_takes, IN_FOLDER)
 {
