@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <math.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <string.h>
 #include "../../base/ascending.h"
 #include "fit.h"
@@ -41,12 +42,45 @@ struct fit {
 	double noise;	/* median lateness above the level */
 };
 
+/* Rounds of a selection, of which each leaves half of the values by luck; then they are sorted. */
+#define ROUNDS 40
+
+/* The value that sorting would put at @k; Hoare's FIND. */
+static double at_place(double *values, ptrdiff_t n, ptrdiff_t k)
+{
+	ptrdiff_t low = 0, high = n - 1;
+
+	for (int round = 0; low < high; round++) {
+		const double pivot = values[k];
+		ptrdiff_t i = low, j = high;
+
+		if (round == ROUNDS) {
+			qsort(values + low, (size_t)(high - low + 1), sizeof(*values),
+			      ascending);
+			break;
+		}
+		while (i <= j) {
+			while (values[i] < pivot)
+				i++;
+			while (pivot < values[j])
+				j--;
+			if (i <= j) {
+				const double swapped = values[i];
+
+				values[i++] = values[j];
+				values[j--] = swapped;
+			}
+		}
+		low = j < k ? i : low;
+		high = k < i ? j : high;
+	}
+	return values[k];
+}
+
 static double quantile(double *values, size_t n, double share)
 {
-	if (!n)
-		return 0;
-	qsort(values, n, sizeof(*values), ascending);
-	return values[(size_t)(share * (double)(n - 1))];
+	return n ? at_place(values, (ptrdiff_t)n, (ptrdiff_t)(share * (double)(n - 1)))
+		 : 0;
 }
 
 static double interval(const struct fit *fit, size_t i)
@@ -178,8 +212,12 @@ static double least(const struct fit *fit, size_t k, size_t last)
 {
 	double found = INFINITY;
 
-	for (; k <= last; k++)
-		found = fmin(found, fit->late[fit->fresh[k]]);
+	/* fmin() is a call, for the sake of NaN, which no lateness is. */
+	for (; k <= last; k++) {
+		const double late = fit->late[fit->fresh[k]];
+
+		found = late < found ? late : found;
+	}
 	return found;
 }
 

@@ -129,12 +129,15 @@ static void check_names(struct incise_verification *verify)
 	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_LEDGER);
 
 	const char *seals = verify->report->interrupted ? "" : SEALS;
-	const char *unknown = verify->recording->form >= 5
-				      ? "SELECT (SELECT count(*) FROM blocks WHERE "
-					"stream NOT IN (" STREAMS ")) + (SELECT count(*) "
-					"FROM ledger WHERE stream NOT IN (''%s))"
-				      : "SELECT count(*) FROM ledger WHERE stream NOT IN "
-					"(" STREAMS "%s)";
+	const char *unknown =
+		verify->recording->form < 5
+			? "SELECT count(*) FROM ledger WHERE stream NOT IN (" STREAMS
+			  "%s)"
+		: verify->level == INCISE_VERIFY_TABLES
+			? "SELECT count(*) FROM ledger WHERE stream NOT IN (''%s)"
+			: "SELECT (SELECT count(*) FROM blocks WHERE stream NOT IN "
+			  "(" STREAMS ")) + (SELECT count(*) FROM ledger WHERE stream "
+			  "NOT IN (''%s))";
 
 	if (ask(verify, -1, unknown, seals))
 		incise_verify_found(verify, &found,
@@ -212,7 +215,7 @@ static void report_interruption(struct incise_verification *verify)
 		incise_verify_found(
 			verify, &found,
 			"interrupted, or being written: it ends with its last commit, "
-			"at %.4f s; tables depth, events, knots, meta and streams have "
+			"at %.4f s; tables events, knots, meta and streams have "
 			"no seal before the end and are not verified",
 			incise_verify_s(verify, found.last_ns));
 }
