@@ -52,6 +52,7 @@ VALUES = """
 --code | P07 a-b_c ABCDEFGHIJKLMNOP | A,B ABCDEFGHIJKLMNOPQ é {}
 --cpu | 0 1023 | -1 1024 x {}
 --csv | a.csv - |
+--cut | 1 1000 | 0 -1 1.5 first {}
 --data | any.csv |
 --density | 7950 | 0 -1 heavy {}
 --depth-max | 0.1 1e6 | -1 0 deep {}
@@ -65,6 +66,7 @@ VALUES = """
 --fps | 1 240 | 0 241 fast {}
 --frames | folder |
 --from | any |
+--from export | 0s 90s 1.5min | -1s 5kg {}
 --gauge-u | 0 100 | -1 101 fine {}
 --gravity | 9.81 | 0 -9.81 strong {}
 --grid | 2x2 20x15 | 20 3x 1x5 x 3x3x3 99999x2 -2x3 {}
@@ -93,7 +95,6 @@ VALUES = """
 --mf-type | gaussmf gbellmf | trimf gauss {}
 --min-count | 1 50 | 0 few {}
 --model | any.fis |
---from | 0s 90s 1.5min | -1s 5kg {}
 --nominal calibrate depth | 0.1 10 | 0 11 wide {}
 --nominal calibrate force | 1 1e5 | 0 1e6 high {}
 --only bench all | precision,loop |
