@@ -162,8 +162,8 @@ $(O)/tests/attack/%: tests/attack/%.c $(O)/lib/libincise-tests.a
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) -MMD -MP -MF $@.d \
 		$(LDFLAGS) -o $@ $(filter %.c,$^) $(O)/lib/libincise-tests.a $(test_libs)
 
-# sqlite3 for recordings, whose samples it shows as rows.
-$(O)/tests/sql: tests/rows/sql.c tests/rows_sql.h $(O)/lib/libincise-tests.a
+# sqlite3 for recordings, whose samples it shows as rows; a short recording made long.
+$(O)/tests/sql $(O)/tests/longer: $(O)/tests/%: tests/rows/%.c tests/rows_sql.h $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(call step,LD)
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
@@ -188,7 +188,7 @@ $(O)/tests/state/loop: tests/state/loop.c $(O)/lib/libincise-tests.a
 bats = BATS_TEST_TIMEOUT=$(LIMIT_S) ASAN_OPTIONS=detect_leaks=0 LOCPATH=$(abspath $(O)/locale) INCISE_BUILD=$(abspath $(O)) CC="$(CC)" CXX="$(CXX)" \
 	bats --print-output-on-failure
 # What the command-line tests call beside the programs. Those of other projects come by pip.
-cli-needs: all $(locale) $(O)/tests/polhemus/fastrak $(O)/tests/state/loop $(O)/tests/day $(O)/tests/sql \
+cli-needs: all $(locale) $(O)/tests/polhemus/fastrak $(O)/tests/state/loop $(O)/tests/day $(O)/tests/sql $(O)/tests/longer \
 	$(attack_programs)
 peers: can-drive mcap-reader python-peers stream-peers
 
