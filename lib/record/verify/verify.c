@@ -119,8 +119,9 @@ static void check_depth(struct incise_verification *verify)
 }
 
 /* An entry with an unknown name would pass as verified. */
-#define RIG "'force', 'tracker', 'camera'"
-#define STREAMS RIG ", 'wall'"
+#define RIG_NAMES \
+	"SELECT 'force' AS name UNION ALL SELECT 'tracker' UNION ALL SELECT 'camera'"
+#define STREAMS "'force', 'tracker', 'camera', 'wall'"
 #define SEALS                                                                             \
 	", 'table:depth', 'table:events', 'table:knots', 'table:meta', 'table:streams', " \
 	"'file:camera.mkv'"
@@ -144,10 +145,13 @@ static void check_names(struct incise_verification *verify)
 				    "the ledger has entries of unknown streams");
 }
 
-#define ENDED(table)                                                       \
-	"SELECT name, ended, (SELECT max(last_ns) FROM " table             \
-	" WHERE stream = name AND count > 0) FROM streams WHERE ended IS " \
-	"NOT NULL"
+/* Of a stream's first or last entry with rows: entries follow one another, and all would be long to read. */
+#define END(field, table, order)                                              \
+	"(SELECT " field " FROM " table " WHERE stream = name AND count > 0 " \
+	"ORDER BY block " order " LIMIT 1)"
+#define ENDED(table)                                 \
+	"SELECT name, ended, " END("last_ns", table, \
+				   "DESC") " FROM streams WHERE ended IS NOT NULL"
 
 /* The number of samples that a dead device would still have sent is not known. */
 static void report_ends(struct incise_verification *verify)
@@ -206,7 +210,8 @@ static void report_interruption(struct incise_verification *verify)
 	if (!verify->report->interrupted)
 		return;
 	found.last_ns =
-		ask(verify, -1, "SELECT max(last_ns) FROM %s WHERE stream IN (" RIG ")",
+		ask(verify, -1,
+		    "SELECT max(" END("last_ns", "%s", "DESC") ") FROM (" RIG_NAMES ")",
 		    entries(verify));
 	if (found.last_ns < 0)
 		incise_verify_found(verify, &found,
@@ -440,11 +445,10 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 		level = verify.level =
 			level == INCISE_VERIFY_TABLES ? INCISE_VERIFY_ROWS : level;
 	if (level != INCISE_VERIFY_TABLES)
-		verify.origin_ns = ask(
-			&verify, 0,
-			"SELECT min(first_ns) FROM %s WHERE count > 0 AND stream IN (" RIG
-			")",
-			entries(&verify));
+		verify.origin_ns = ask(&verify, 0,
+				       "SELECT min(" END("first_ns", "%s",
+							 "ASC") ") FROM (" RIG_NAMES ")",
+				       entries(&verify));
 	rc = level == INCISE_VERIFY_TABLES ? 0 : check_streams(&verify);
 	if (!rc) {
 		if (report->interrupted && verify.recording->form < 5)
