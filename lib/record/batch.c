@@ -56,13 +56,13 @@ void incise_batch_free(struct incise_batch *batch)
 /* --- bytes ----------------------------------------------------------------------------- */
 
 /* Little-endian on any machine; compilers make one store of it, and one load. */
-static void put(uint8_t *to, uint64_t value, int width)
+static void put_word(uint8_t *to, uint64_t value, int width)
 {
 	for (int i = 0; i < width; i++)
 		to[i] = value >> 8 * i;
 }
 
-static uint64_t get(const uint8_t *from, int width)
+static uint64_t get_word(const uint8_t *from, int width)
 {
 	uint64_t value = 0;
 
@@ -102,7 +102,7 @@ static int width_of(uint64_t range)
 				     : 8;
 }
 
-/* How far values are from a line; all differences are modulo 2^64. */
+/* The range of the differences from a line, modulo 2^64. */
 static uint64_t range_of(const int64_t *values, size_t n, uint64_t span, int64_t *least)
 {
 	struct line line = line_to(span, n);
@@ -140,12 +140,12 @@ static uint8_t *put_integers(uint8_t *to, const int64_t *values, size_t n)
 	}
 	width = width_of(range);
 	*to = width;
-	put(to + 1, base, 8);
-	put(to + 9, span, 8);
+	put_word(to + 1, base, 8);
+	put_word(to + 9, span, 8);
 	to += INTEGER_HEAD;
 	line = line_to(span, n);
 	for (size_t k = 0; k < n && width; k++, line_next(&line), to += width)
-		put(to, (uint64_t)values[k] - (uint64_t)base - line.value, width);
+		put_word(to, (uint64_t)values[k] - (uint64_t)base - line.value, width);
 	return to;
 }
 
@@ -174,8 +174,8 @@ static uint8_t *put_reals(uint8_t *to, const double *values, size_t n)
 
 		if (!isnan(value))
 			memcpy(&bits, &value, sizeof(bits));
-		put(to, same || !single ? bits_of(values[k]) : bits,
-		    same || !single ? 8 : 4);
+		put_word(to, same || !single ? bits_of(values[k]) : bits,
+			 same || !single ? 8 : 4);
 		to += same || !single ? 8 : 4;
 	}
 	return to;
@@ -226,7 +226,7 @@ struct input {
 };
 
 /* The next bytes, or NULL: there are fewer. */
-static const uint8_t *take(struct input *input, size_t n)
+static const uint8_t *take_bytes(struct input *input, size_t n)
 {
 	const uint8_t *at = input->at;
 
@@ -239,21 +239,22 @@ static const uint8_t *take(struct input *input, size_t n)
 
 static bool get_integers(struct input *input, int64_t *values, size_t n)
 {
-	const uint8_t *head = take(input, INTEGER_HEAD), *from;
+	const uint8_t *head = take_bytes(input, INTEGER_HEAD), *from;
 	struct line line;
 	uint64_t base;
 
 	if (!head || (*head != 0 && *head != 1 && *head != 2 && *head != 4 && *head != 8))
 		return false;
-	from = take(input, n * *head);
+	from = take_bytes(input, n * *head);
 	if (!from)
 		return false;
-	base = get(head + 1, 8);
-	line = line_to(get(head + 9, 8), n);
-#define EACH(width)                                                                  \
-	case width:                                                                  \
-		for (size_t k = 0; k < n; k++, line_next(&line), from += width)      \
-			values[k] = (int64_t)(base + line.value + get(from, width)); \
+	base = get_word(head + 1, 8);
+	line = line_to(get_word(head + 9, 8), n);
+#define EACH(width)                                                                   \
+	case width:                                                                   \
+		for (size_t k = 0; k < n; k++, line_next(&line), from += width)       \
+			values[k] =                                                   \
+				(int64_t)(base + line.value + get_word(from, width)); \
 		break
 	switch (*head) {
 		EACH(0);
@@ -268,12 +269,12 @@ static bool get_integers(struct input *input, int64_t *values, size_t n)
 
 static bool get_reals(struct input *input, double *values, size_t n, bool missing)
 {
-	const uint8_t *width = take(input, 1), *from;
+	const uint8_t *width = take_bytes(input, 1), *from;
 	bool good = true;
 
 	if (!width || (*width != 0 && *width != 4 && *width != 8))
 		return false;
-	from = take(input, *width ? n * *width : 8);
+	from = take_bytes(input, *width ? n * *width : 8);
 	if (!from)
 		return false;
 	for (size_t k = 0; k < n; k++) {
@@ -282,11 +283,11 @@ static bool get_reals(struct input *input, double *values, size_t n, bool missin
 		float single;
 
 		if (*width == 4) {
-			low = get(from + 4 * k, 4);
+			low = get_word(from + 4 * k, 4);
 			memcpy(&single, &low, sizeof(single));
 			values[k] = single;
 		} else {
-			bits = get(from + *width * k, 8);
+			bits = get_word(from + *width * k, 8);
 			memcpy(&values[k], &bits, sizeof(bits));
 		}
 		good &= isfinite(values[k]) || (missing && isnan(values[k]));
@@ -297,11 +298,11 @@ static bool get_reals(struct input *input, double *values, size_t n, bool missin
 static bool get_bytes(struct input *input, uint8_t *values, size_t n, size_t size,
 		      bool text)
 {
-	const uint8_t *width = take(input, 1), *from;
+	const uint8_t *width = take_bytes(input, 1), *from;
 
 	if (!width || (*width && *width != size))
 		return false;
-	from = take(input, *width ? n * size : size);
+	from = take_bytes(input, *width ? n * size : size);
 	if (!from)
 		return false;
 	for (size_t k = 0; k < n; k++) {

@@ -94,7 +94,7 @@ INCISE_API struct incise_recording *incise_recording_open(const char *path,
 /** NULL is accepted. */
 INCISE_API void incise_recording_close(struct incise_recording *recording);
 
-/** What incise_recording_recover() did. */
+/** The work of incise_recording_recover(). */
 struct incise_recovered {
 	int form; /**< format of the recording */
 	bool converted;

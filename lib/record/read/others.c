@@ -102,8 +102,8 @@ static void load(struct incise_others *others, uint64_t part)
 }
 
 /* The first of a part from a number on; those beside it are of other parts. */
-static const struct incise_fit_time *find(const struct incise_others *others,
-					  uint64_t seq)
+static const struct incise_fit_time *find_from(const struct incise_others *others,
+					       uint64_t seq)
 {
 	const uint64_t end = others->first + (others->part + 1) * PART;
 	size_t low = 0, high = others->n;
@@ -129,7 +129,7 @@ const struct incise_fit_time *incise_others_find(struct incise_others *others,
 		return NULL;
 	if ((seq - others->first) / PART != others->part)
 		load(others, (seq - others->first) / PART);
-	found = find(others, seq);
+	found = find_from(others, seq);
 	return found && found->seq == seq ? found : NULL;
 }
 
@@ -159,7 +159,7 @@ const struct incise_fit_time *incise_others_next(struct incise_others *others,
 
 		if (part != others->part)
 			load(others, part);
-		found = find(others, seq);
+		found = find_from(others, seq);
 		if (found)
 			return found;
 		/* Numbers may be far apart. */

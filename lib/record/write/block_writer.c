@@ -40,7 +40,7 @@ void incise_block_writer_free(struct incise_block_writer *writer)
 	*writer = (struct incise_block_writer){0};
 }
 
-static int run(sqlite3_stmt *stmt)
+static int run_statement(sqlite3_stmt *stmt)
 {
 	sqlite3_step(stmt);
 	return sqlite3_reset(stmt);
@@ -80,7 +80,7 @@ int incise_block_writer_put(struct incise_block_writer *writer, int stream,
 	bind_block(writer->block, incise_ledger_forms[stream].stream, block);
 	sqlite3_bind_blob(writer->block, 10, digest, sizeof(digest), SQLITE_TRANSIENT);
 	sqlite3_bind_blob64(writer->block, 11, writer->data, size, SQLITE_STATIC);
-	return run(writer->block);
+	return run_statement(writer->block);
 }
 
 int incise_block_writer_commit(struct incise_block_writer *writer, int64_t t_ns)
@@ -96,7 +96,7 @@ int incise_block_writer_commit(struct incise_block_writer *writer, int64_t t_ns)
 		return SQLITE_NOMEM;
 	sqlite3_bind_blob(stmt, 3 + INCISE_LEDGER_FORMS, seal->head, sizeof(seal->head),
 			  SQLITE_TRANSIENT);
-	return run(stmt);
+	return run_statement(stmt);
 }
 
 /* An entry of table ledger: a sealed table, or camera.mkv. */
@@ -104,7 +104,7 @@ static int put_entry(struct incise_block_writer *writer, const char *stream,
 		     const struct incise_ledger_block *block)
 {
 	bind_block(writer->entry, stream, block);
-	return run(writer->entry);
+	return run_statement(writer->entry);
 }
 
 int incise_block_writer_seal(struct incise_block_writer *writer, int folder, bool whole,

@@ -86,8 +86,8 @@ static void add_digests(struct conversion *c, struct incise_batch *batch)
 	}
 }
 
-static int put(struct conversion *c, int stream, struct incise_ledger_block *block,
-	       struct incise_error *err)
+static int put_block(struct conversion *c, int stream, struct incise_ledger_block *block,
+		     struct incise_error *err)
 {
 	struct stream *s = &c->streams[stream];
 
@@ -165,7 +165,7 @@ static int advance(struct conversion *c, int stream, struct incise_error *err)
 			incise_ledger_count(&s->ledger, batch->column[0].i[k],
 					    batch->column[1].i[k]);
 		incise_ledger_end(&s->ledger, &block);
-		return put(c, stream, &block, err);
+		return put_block(c, stream, &block, err);
 	}
 	if (!s->last && s->entries)
 		return 1; /* its rows are not there */
@@ -175,7 +175,7 @@ static int advance(struct conversion *c, int stream, struct incise_error *err)
 	if (!s->has_end)
 		return 0;
 	incise_ledger_close(&s->ledger, (uint64_t)s->lost, &block);
-	return put(c, stream, &block, err);
+	return put_block(c, stream, &block, err);
 }
 
 static int open_stream(struct conversion *c, int stream, struct incise_error *err)
@@ -256,7 +256,7 @@ static int write_rest(struct conversion *c, struct incise_error *err)
 
 /* --- tables ---------------------------------------------------------------------------- */
 
-/* What the old recording is known by. */
+/* The identity of the old recording. */
 static const char *const head_sql[] = {
 	[1] = "''",
 	[2] = "(SELECT ', ledger ' || group_concat(stream || ' ' || printf('%08x', "
@@ -299,7 +299,7 @@ static int write_origin(struct conversion *c)
 	return run_bound(c, sql, text);
 }
 
-/* What a recorder finds while it records, of the samples. */
+/* The recorder's summary, of the samples. */
 static int write_summary(struct conversion *c, struct incise_error *err)
 {
 	struct incise_recording_info info;
@@ -532,7 +532,7 @@ int incise_recording_convert(const char *folder, const char *path, bool damaged,
 	if (!rc)
 		rc = keep_seal(&c, err);
 	incise_recording_close(c.old);
-	/* What was good is good: nothing else gets the final name. */
+	/* A good recording stays good: nothing else gets the final name. */
 	if (!rc)
 		rc = check(folder, &now, err);
 	if (!rc && *now.altered && !damaged)

@@ -70,7 +70,7 @@ struct incise_recorder_zero {
 	int64_t tracker_ns; /* last record */
 };
 
-/* What info says of all samples: force waits for the depths around it. */
+/* The summary of all samples, for info: force waits for the depths around it. */
 struct incise_recorder_summary {
 	struct incise_cut_follow follow;
 	struct incise_recorder_force {

@@ -44,8 +44,8 @@ void incise_recorder_follow_force(struct incise_recorder *rec, int64_t t_ns, int
 			(struct incise_recorder_force){t_ns, code};
 }
 
-static void take(struct incise_recorder_summary *summary,
-		 const struct incise_recorder_force *force)
+static void take_force(struct incise_recorder_summary *summary,
+		       const struct incise_recorder_force *force)
 {
 	struct incise_cut_sample sample = {.t_ns = force->t_ns};
 
@@ -73,7 +73,7 @@ void incise_recorder_follow_depth(struct incise_recorder *rec,
 	    incise_cut_step(&follow->cut, row->depth_mm))
 		summary->depth_max_mm = fmax(summary->depth_max_mm, row->depth_mm);
 	while (k < summary->n && summary->waiting[k].t_ns < row->t_ns)
-		take(summary, &summary->waiting[k++]);
+		take_force(summary, &summary->waiting[k++]);
 	summary->n -= k;
 	if (k)
 		memmove(summary->waiting, summary->waiting + k,

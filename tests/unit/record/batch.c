@@ -205,7 +205,7 @@ TEST(random_batches_come_back)
 	}
 }
 
-/* What is read of forged bytes keeps what readers rely on. */
+/* A batch of forged bytes keeps the promises that readers rely on. */
 TEST(forged_bytes_give_nothing_impossible)
 {
 	const int cases = cases_of(200000, 10000);
