@@ -309,6 +309,7 @@ static void recorder_free(struct incise_recorder *rec)
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
 		incise_batch_free(&rec->batches[i]);
 	free(rec->summary.waiting);
+	free(rec->summary.ends_ns);
 	if (rec->folder >= 0)
 		close(rec->folder);
 	if (rec->parent >= 0)

@@ -79,6 +79,11 @@ struct incise_recorder_summary {
 	} * waiting;
 	size_t n, capacity;
 	double depth_max_mm;	       /* in a cut */
+	/* Cuts by the depths alone, and when each ended, for readers of a part. */
+	struct incise_cut_count by_depth;
+	int64_t *ends_ns;
+	size_t n_ends, ends_capacity;
+	bool no_ends; /* out of memory: readers look for them */
 	int32_t code_least, code_most; /* in cuts; least above most: none */
 };
 
@@ -271,6 +276,8 @@ int incise_recorder_run(sqlite3_stmt *stmt);
 int incise_recorder_set_integer(struct incise_recorder *rec, const char *key,
 				int64_t value);
 int incise_recorder_set_real(struct incise_recorder *rec, const char *key, double value);
+int incise_recorder_set_bytes(struct incise_recorder *rec, const char *key,
+			      const void *bytes, size_t n);
 
 /* Add a row to table events, at a time or now. Returns an SQLite code. */
 int incise_recorder_note_at(struct incise_recorder *rec, int64_t t_ns, const char *kind,

@@ -94,6 +94,16 @@ int incise_recorder_set_integer(struct incise_recorder *rec, const char *key,
 	return incise_recorder_run(stmt);
 }
 
+int incise_recorder_set_bytes(struct incise_recorder *rec, const char *key,
+			      const void *bytes, size_t n)
+{
+	sqlite3_stmt *stmt = rec->stmt[SET_META];
+
+	sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC);
+	sqlite3_bind_blob64(stmt, 2, n ? bytes : "", n, SQLITE_TRANSIENT);
+	return incise_recorder_run(stmt);
+}
+
 /* SQLite keeps NaN as NULL: not known. */
 int incise_recorder_set_real(struct incise_recorder *rec, const char *key, double value)
 {

@@ -9,7 +9,7 @@
 #include <fcntl.h>
 #include <limits.h>
 #include <stdlib.h>
-#include "../../../lib/record/read/recording.h"
+#include "../../../lib/record/read/cut.h"
 
 #define DB "a.rec/recording.db"
 
@@ -263,6 +263,39 @@ TEST(half_a_page_beside_a_log, IN_FOLDER)
 	}
 }
 
+/* Those that the recorder noted; as many as it found, or one is not over. */
+static void cut_ends_are_those_of_the_depths(struct incise_recording *recording)
+{
+	struct incise_cut_count cut = {0};
+	struct incise_source source;
+	sqlite3_stmt *stmt;
+	const char *noted; /* int64_t, unaligned */
+	int n = 0;
+
+	assert_int_equal(sqlite3_prepare_v2(recording->db,
+					    "SELECT value FROM meta WHERE key = "
+					    "'cut_ends_ns'",
+					    -1, &stmt, NULL),
+			 SQLITE_OK);
+	assert_int_equal(sqlite3_step(stmt), SQLITE_ROW);
+	noted = sqlite3_column_blob(stmt, 0);
+	succeeds(!incise_source_open(&source, recording, INCISE_SOURCE_DEPTH, &err));
+	while (incise_source_next(&source, &err) > 0)
+		for (size_t k = 0; k < source.batch.n; k++) {
+			const bool inside = cut.inside;
+
+			if (incise_cut_step(&cut, source.batch.column[2].r[k]) || !inside)
+				continue;
+			assert_memory_equal(noted + 8 * n, &source.batch.column[1].i[k],
+					    8);
+			n++;
+		}
+	incise_source_close(&source);
+	assert_int_equal(sqlite3_column_bytes(stmt, 0), 8 * n);
+	assert_int_equal(n, cut.count - cut.inside);
+	sqlite3_finalize(stmt);
+}
+
 /* The recorder's summary is what readers find of all samples, but for the times of the capture. */
 TEST(a_summary_is_that_of_the_samples, IN_FOLDER)
 {
@@ -287,6 +320,7 @@ TEST(a_summary_is_that_of_the_samples, IN_FOLDER)
 		recording = open_recording("a.rec");
 		succeeds(!incise_recording_info(recording, &summary, &err) &&
 			 !incise_recording_measure(recording, &all, &err));
+		cut_ends_are_those_of_the_depths(recording);
 		incise_recording_close(recording);
 		assert_true(summary.summary);
 		assert_false(all.summary);
