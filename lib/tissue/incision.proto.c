@@ -59,12 +59,12 @@ static struct local localize(const struct T(cut) *cut, const num at[3])
 			      v_along(off, cut->normal)};
 }
 
-static num aside_of(const struct T(cut) *cut, const num at[3])
+static num across_of(const struct T(cut) *cut, const num at[3])
 {
 	num off[3];
 
 	v_sub(off, at, cut->at_mm);
-	return n_abs(v_along(off, cut->side));
+	return v_along(off, cut->side);
 }
 
 /* Whether a place is within @reach of the cut, as seen along its normal. */
@@ -88,9 +88,15 @@ static void join(struct T(incision) *incision, int a, int b)
 /* Whether the way between two places comes near the cut, or crosses it. */
 static bool meets(const struct T(cut) *cut, const num from[3], const num to[3])
 {
-	struct local a = localize(cut, from), b = localize(cut, to), at;
-	num part, whole;
+	num a_across = across_of(cut, from), b_across = across_of(cut, to), part, whole;
+	struct local a, b, at;
 
+	/* Most are far to one side: the rest is not looked at. */
+	if ((n_below(BESIDE, a_across) && n_below(BESIDE, b_across)) ||
+	    (n_below(a_across, -BESIDE) && n_below(b_across, -BESIDE)))
+		return false;
+	a = localize(cut, from);
+	b = localize(cut, to);
 	if (reaches(cut, &a, BESIDE) || reaches(cut, &b, BESIDE))
 		return true;
 	if ((!n_below(a.across, 0) && !n_below(b.across, 0)) ||
@@ -162,7 +168,7 @@ static int find_cut(const struct T(incision) *incision, const num at[3], const d
 		struct local here;
 
 		/* Most are far aside: the rest is not looked at. */
-		if (n_below(BESIDE, aside_of(cut, at)))
+		if (n_below(BESIDE, n_abs(across_of(cut, at))))
 			continue;
 		here = localize(cut, at);
 		if (reaches(cut, &here, BESIDE) && faces(cut, &here, normal) &&
@@ -546,7 +552,7 @@ static bool lets_in(const struct T(incision) *incision, int cut, const num at[3]
 	const struct T(cut) *in = &incision->cut[cut];
 	struct local here;
 
-	if (n_below(reach, aside_of(in, at)))
+	if (n_below(reach, n_abs(across_of(in, at))))
 		return false;
 	here = localize(in, at);
 	return reaches(in, &here, reach) &&
