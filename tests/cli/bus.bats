@@ -197,8 +197,6 @@ rig() { # ARGUMENTS
 	failed_with 'nosuch:can0: no such backend "nosuch"; there are: sim, kernel, bench'
 	run --separate-stderr incise info kernel:/dev/incise-stepper0
 	failed_with "kernel:/dev/incise-stepper0:"
-	run --separate-stderr incise info bench:bus0 --plot p
-	bad_usage "--plot"
 }
 
 @test "a file with a colon in its name is a file by its ending, or by its path" {

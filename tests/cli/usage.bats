@@ -76,14 +76,12 @@ table() {
 		info|missing FILE (
 		info m.fis a.rec|; give one FILE at a time
 		info a.csv --group cut|--dataset
-		info stepper --plot p|--plot
 		plan a b|b
 		replay a.rec|missing SCENE (
 		replay a.rec liver more|; give one SCENE at a time
 		replay a.rec liver --log - --json|standard output
 		serve --rig sim: --speed 2|--speed: only for a recording
 		serve --rig sim: a.rec|--rig: 'a.rec' is a source, too
-		rig rig.conf|--rig
 		sign a.rec|--key
 		status a b|; give one NAME or FILE at a time
 		status --prometheus --follow|--prometheus cannot be combined with --follow or --json
