@@ -566,8 +566,8 @@ static void report_text(const struct haptic *haptic)
 	       (unsigned long long)s->limited);
 	if (incise_pose_counts_text(&s->poses, flags, sizeof(flags)))
 		printf("poses      %s\n", flags);
-	printf("saturated  %llu at the largest force, %llu at the largest slew, %llu "
-	       "at the end of the travel, %llu in a ramp\n",
+	printf("limited    %llu ticks by force, %llu by slew rate, %llu by travel, %llu in "
+	       "the start ramp\n",
 	       (unsigned long long)ticks_with(s, INCISE_TICK_CLAMPED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_SLEWED),
 	       (unsigned long long)ticks_with(s, INCISE_TICK_TRAVEL),
