@@ -125,10 +125,6 @@ needs_incise-learn := incise
 needs_incise-record := incise
 needs_incise-view := incise
 
-# One program per command.
-commands := $(filter-out $(if $(has_view),,view bench-view),$(patsubst tools/incise-%.c,%,\
-	$(wildcard tools/incise-*.c)))
-
 # A short line for each step of the build; V=1 shows the whole commands.
 Q := $(if $(V),,@)
 step = $(if $(V),,@printf '  %-4s %s\n' $1 '$(patsubst $(O)/%,%,$@)')

@@ -14,7 +14,7 @@ example_scripts := examples/capture_to_figure.sh examples/learn.py
 udev_rules := $(wildcard udev/*.rules)
 sysusers := $(wildcard udev/*.sysusers)
 tmpfiles := $(wildcard udev/*.tmpfiles)
-units := $(wildcard udev/*.service udev/*.service.in)
+units := $(filter-out $(left_out_commands:%=udev/incise-%.service.in),$(wildcard udev/*.service udev/*.service.in))
 
 python_files := $(wildcard python/incise/*.py) python/incise/py.typed
 # The libraries of this installation, unless they are where the system looks.

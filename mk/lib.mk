@@ -118,11 +118,13 @@ pc_tracker_tty :=
 objects_tracker_tty := $(polhemus_core) $(O)/obj/lib/device/tty.o \
 	$(O)/obj/lib/device/polhemus/polhemus_tty.o
 
-# A tracker of an OpenIGTLink server.
-device_modules += tracker_igtl
+# A tracker of an OpenIGTLink server. libopenigtlink has no file of pkg-config.
+has_igtl := $(shell $(CC) -E -x c -include openigtlink/igtl_header.h /dev/null >/dev/null 2>&1 && echo yes)
+device_modules += $(if $(has_igtl),tracker_igtl)
 pc_tracker_igtl :=
 objects_tracker_igtl := $(addprefix $(O)/obj/lib/,base/ring.o $(addprefix device/,\
-	pace.o thread.o tracker_feed.o igtl/igtl_poses.o igtl/igtl_tracker.o))
+	pace.o thread.o tracker_feed.o igtl/igtl_message.o igtl/igtl_poses.o igtl/igtl_tracker.o))
+libs_tracker_igtl := -lOpenIGTLink
 
 # Detection of the scalpel in frames, in C++.
 device_modules += $(if $(has_vision),vision_opencv)
@@ -186,7 +188,7 @@ test_objects := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/device/v4l2/*.c)) \
 	$(O)/obj/lib/device/daq/daq_feed.o $(if $(has_libiio),$(daq_iio)) \
 	$(if $(has_comedilib),$(daq_comedi)) \
 	$(filter $(O)/obj/lib/device/lsl/%,$(objects_force_lsl)) \
-	$(filter $(O)/obj/lib/device/igtl/%,$(objects_tracker_igtl)) \
+	$(if $(has_igtl),$(filter $(O)/obj/lib/device/igtl/%,$(objects_tracker_igtl))) \
 	$(filter $(O)/obj/lib/device/polhemus/%,$(objects_tracker_tty)) \
 	$(if $(has_vision),$(filter-out %/vision_opencv.o,$(objects_vision_opencv))) \
 	$(if $(has_frames),$(objects_frames_mkv) $(objects_film_mkv)) \

@@ -6,7 +6,7 @@ unit_sources := $(filter-out $(if $(has_libmnl),,tests/unit/can/socketcan%) \
 	$(if $(has_libiio),,tests/unit/daq/iio_%) $(if $(has_comedilib),,tests/unit/daq/comedi_%) \
 	$(if $(has_libusb),,%/polhemus_usb.c) \
 	$(if $(has_vision),,tests/unit/vision/%) $(if $(has_frames),,tests/unit/mkv/% tests/unit/film/%) \
-	$(if $(has_hdf5),,tests/unit/hdf5/%) $(if $(has_view),,tests/unit/view/%),\
+	$(if $(has_igtl),,tests/unit/igtl/%) $(if $(has_hdf5),,tests/unit/hdf5/%) $(if $(has_view),,tests/unit/view/%),\
 	$(wildcard tests/unit/*/*.c))
 # The longest ones first: one that begins last runs alone.
 unit_programs := $(patsubst tests/%.c,$(O)/tests/%,$(filter %/extremes.c %/rest_3d.c,$(unit_sources)) \
@@ -21,11 +21,9 @@ test_packages := cmocka jansson lapacke lapack blas $(if $(has_libmnl),libmnl) $
 	$(if $(has_frames),$(pc_frames_mkv)) $(if $(has_hdf5),$(pc_export_hdf5)) \
 	$(foreach lib,$(libraries),$(pc_$(lib)))
 test_cflags = $(eval test_cflags := $(shell $(PKG_CONFIG) --cflags $(test_packages)))$(test_cflags)
-# The reference for messages of OpenIGTLink; it has no file of pkg-config.
-has_igtl := $(wildcard /usr/include/openigtlink/igtl_header.h)
 # A test maps only what it uses of these.
 test_libs = $(eval test_libs := -Wl,--as-needed $(shell $(PKG_CONFIG) --libs $(test_packages)) \
-	$(if $(has_vision),$(libs_vision_opencv)) $(if $(has_igtl),-lOpenIGTLink) -lm -ldl -pthread)$(test_libs)
+	$(if $(has_vision),$(libs_vision_opencv)) $(if $(has_igtl),$(libs_tracker_igtl)) -lm -ldl -pthread)$(test_libs)
 
 $(O)/obj/tests/%.o: tests/%.c
 	@mkdir -p $(@D)
@@ -104,7 +102,8 @@ rest: $(O)/tests/unit/scene/rest_3d ## SEEDS=1..500 [KEEP=FOLDER]: leans on rand
 	@SEEDS=$(SEEDS) KEEP=$(KEEP) $<
 
 # Fuzz targets by our own changes of the inputs that are kept; see tests/fuzz/mutate.c.
-fuzz_targets := $(patsubst tests/fuzz/%.c,%,$(filter-out tests/fuzz/mutate.c $(if $(has_vision),,%/vision_frame.c),\
+fuzz_targets := $(patsubst tests/fuzz/%.c,%,$(filter-out tests/fuzz/mutate.c $(if $(has_vision),,%/vision_frame.c) \
+	$(if $(has_igtl),,tests/fuzz/igtl_%),\
 	$(wildcard tests/fuzz/*.c)))
 kept_programs := $(fuzz_targets:%=$(O)/tests/kept/%)
 kept_objects := $(fuzz_targets:%=$(O)/obj/tests/fuzz/%.o)
