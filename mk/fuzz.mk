@@ -25,7 +25,7 @@ $(O)/obj/fuzz/%.o: %.c
 $(O)/obj/fuzz/%.o: %.cc
 	@mkdir -p $(@D)
 	$(call step,CC)
-	$(Q)$(CCACHE) $(CLANG) $(cppflags) $(CPPFLAGS) $(cxxflags) $(opencv_cflags) \
+	$(Q)$(CCACHE) $(CLANG) $(cppflags) $(CPPFLAGS) $(cxxflags) $(flags_vision_opencv) \
 		$(fuzz_flags) -fsanitize=fuzzer-no-link -MMD -MP -c -o $@ $<
 
 # Further sources of a target.

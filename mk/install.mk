@@ -24,7 +24,7 @@ python_installed := $(if $(filter-out no,$(rpath)),_installed.py)
 installed = $(addprefix $(bindir)/,$(notdir $(programs))) \
 	$(foreach lib,$(libraries),$(addprefix $(libdir)/lib$(lib).so,.$(version) .$(soversion)) \
 		$(libdir)/lib$(lib).so) \
-	$(addprefix $(libdir)/incise/,$(addsuffix .so,$(device_modules))) \
+	$(addprefix $(libdir)/incise/,$(addsuffix .so,$(add_ons))) \
 	$(addprefix $(includedir)/incise/,$(notdir $(headers))) \
 	$(foreach lib,$(libraries),$(libdir)/pkgconfig/$(lib).pc) \
 	$(foreach page,$(notdir $(man_pages)),$(mandir)/man$(subst .,,$(suffix $(page)))/$(page)) \
@@ -67,7 +67,7 @@ install: all ## install below $(DESTDIR)$(prefix)
 		ln -sf lib$$lib.so.$(version) "$(DESTDIR)$(libdir)/lib$$lib.so.$(soversion)" && \
 		ln -sf lib$$lib.so.$(soversion) "$(DESTDIR)$(libdir)/lib$$lib.so" || exit 1; \
 	done
-	for module in $(device_modules); do \
+	for module in $(add_ons); do \
 		$(INSTALL) -m 644 $(O)/lib/incise/$$module.so "$(DESTDIR)$(libdir)/incise" || exit 1; \
 	done
 	$(INSTALL) -m 644 $(headers) "$(DESTDIR)$(includedir)/incise"

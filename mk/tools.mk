@@ -3,7 +3,7 @@
 # the build tree as after installation.
 
 # Commands whose libraries are missing are left out, with their pages.
-left_out_commands := $(if $(has_view),,view bench-view) $(if $(has_igtl),,serve)
+left_out_commands := $(foreach name,$(left_out),$(commands_$(name)))
 commands := $(filter-out $(left_out_commands),$(patsubst tools/incise-%.c,%,$(wildcard tools/incise-*.c)))
 programs := $(O)/bin/incise $(addprefix $(O)/bin/incise-,$(commands))
 
@@ -28,11 +28,15 @@ $(O)/obj/tools/serve/pixels.o: cppflags += $(if $(has_jpeg),-DHAVE_JPEG)
 has_png := $(shell $(CC) -E -x c -include png.h /dev/null >/dev/null 2>&1 && echo yes)
 $(O)/obj/tools/cli/image.o: cppflags += $(if $(has_png),-DHAVE_PNG)
 
+tools: $(if $(has_jpeg),,left-out-JPEG) $(if $(has_png),,left-out-PNG)
+lacks_JPEG := jpeglib.h
+lacks_PNG := png.h
+
 # The parts of all programs. The linker takes of them, and of the libraries, what a program
 # uses: a new part, command or benchmark is found by its place.
 tool_parts := $(O)/obj/tools/parts.a
 tool_texts := $(wildcard tools/cli/*.gp tools/bench/plots/*.gp)
-$(tool_parts): $(patsubst %.c,$(O)/obj/%.o,$(filter-out $(if $(has_igtl),,tools/serve/%),$(wildcard tools/*/*.c))) $(tool_texts:%=$(O)/obj/%.o)
+$(tool_parts): $(patsubst %.c,$(O)/obj/%.o,$(filter-out $(if $(filter serve,$(commands)),,tools/serve/igtl.c),$(wildcard tools/*/*.c))) $(tool_texts:%=$(O)/obj/%.o)
 	@rm -f $@
 	$(call step,AR)
 	$(Q)$(AR) rcs $@ $^
@@ -103,6 +107,7 @@ $(O)/obj/mk/settings: mk/settings.c $(call objects,incise)
 $(O)/obj/mk/settings.tables: $(O)/obj/mk/settings
 	$(Q)$< >$@
 
+$(O)/man/rig.conf.5: $(wildcard lib/*/*/rig.conf.5)
 $(O)/man/%.5: man/%.5 mk/manual-tables mk/manual-output $(wildcard schema/*.rows) $(O)/obj/mk/settings.tables
 	@mkdir -p $(@D)
 	$(call step,MAN)
