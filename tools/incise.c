@@ -138,7 +138,11 @@ static int unknown_command(const char *word)
 	for (size_t i = 0; i < sizeof(synonyms) / sizeof(*synonyms); i++)
 		if (!strcmp(word, synonyms[i][0]))
 			nearest = synonyms[i][1];
-	if (nearest)
+	if (nearest && !strcmp(nearest, word))
+		cli_error("'%s': this incise was built without it; 'make' prints what it "
+			  "needs",
+			  word);
+	else if (nearest)
 		cli_error("'%.64s': no such command; did you mean 'incise %s'?", word,
 			  nearest);
 	else

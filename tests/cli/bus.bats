@@ -325,7 +325,7 @@ rig() { # ARGUMENTS
 		sed 's|^stepper = "[^"]*"|stepper = "bench:bus0"|' "$example" >rig.conf
 		incise stepper status
 	done
-	example_in "$root/man/rig.conf.5" can:can0 | sed 's|"can:can0:0x10"|"bench:bus0"|' >rig.conf
+	example_in "$INCISE_BUILD/man/rig.conf.5" can:can0 | sed 's|"can:can0:0x10"|"bench:bus0"|' >rig.conf
 	grep -q 'can = {' rig.conf
 	incise stepper status
 	grep '^actuator = .*can = ' "$root/doc/can.md" >rig.conf

@@ -194,3 +194,10 @@ setup() {
 	[ "$(cat code)" = 1 ]
 	[ ! -s err ] || complain "$(cat err)"
 }
+
+@test "a command that was left out of the build is said" {
+	mkdir bin
+	cp "$INCISE_BUILD/bin/incise" bin
+	PATH=/usr/bin:/bin LD_LIBRARY_PATH=$INCISE_BUILD/lib run -2 --separate-stderr bin/incise serve
+	[ "$stderr" = "incise: 'serve': this incise was built without it; 'make' prints what it needs" ] || complain "$stderr"
+}

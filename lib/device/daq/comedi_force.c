@@ -21,8 +21,8 @@
 #include <comedilib.h>
 #include "../../base/monotonic.h"
 #include "../backends.h"
+#include "../daq_feed.h"
 #include "../stable_path.h"
-#include "daq_feed.h"
 
 /* --- card: subdevice, channel, range, and the command that samples them --- */
 

@@ -17,7 +17,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../backends.h"
-#include "../daq/daq_feed.h"
+#include "../daq_feed.h"
 #include "../pace.h"
 #include "liblsl.h"
 

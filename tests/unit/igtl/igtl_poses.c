@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * lib/device/igtl/igtl_poses.h: samples from messages that incise/igtl.h packs, with times of
- * the test's own.
+ * lib/device/igtl/igtl_poses.h: samples from messages whose bodies libopenigtlink orders, with times
+ * of the test's own.
  */
+#include <endian.h>
+#include <openigtlink/igtl_position.h>
+#include <openigtlink/igtl_tdata.h>
+#include <openigtlink/igtl_transform.h>
 #include "../unit.h"
 #include "../../../lib/device/igtl/igtl_poses.h"
 
@@ -46,13 +50,34 @@ static void turn(double angle, double matrix[3][4], double q[4])
 	}
 }
 
+/* The body of a TRANSFORM. */
+static void order(igtl_float32 column[12], const double matrix[3][4])
+{
+	for (int i = 0; i < 12; i++)
+		column[i] = (float)matrix[i % 3][i / 3];
+	igtl_transform_convert_byte_order(column);
+}
+
+static void put_body(const struct incise_igtl_label *label, const void *body, size_t n,
+		     int64_t t_ns)
+{
+	uint8_t bytes[300];
+	ssize_t size = incise_igtl_pack(bytes, sizeof(bytes), label, body, n, NULL, 0);
+
+	assert_true(size > 0 && !igtl_poses_put(&poses, bytes, (size_t)size, t_ns));
+}
+
 static int put(const char *name, const double matrix[3][4], int64_t utc_ns, int64_t t_ns,
 	       bool damage)
 {
-	struct incise_igtl_label label = {.version = 1, .name = name, .utc_ns = utc_ns};
+	struct incise_igtl_label label = {
+		.version = 1, .type = "TRANSFORM", .name = name, .utc_ns = utc_ns};
+	igtl_float32 body[12];
 	uint8_t bytes[200];
-	ssize_t n = incise_igtl_pack_transform(bytes, sizeof(bytes), &label, matrix);
+	ssize_t n;
 
+	order(body, matrix);
+	n = incise_igtl_pack(bytes, sizeof(bytes), &label, body, sizeof(body), NULL, 0);
 	assert_true(n > 0);
 	bytes[n - 1] ^= damage;
 	/* In two parts, as a network may cut it. */
@@ -88,6 +113,52 @@ TEST(a_rotation_becomes_its_quaternion, begin, end)
 		assert_int_equal(s.t_ns, (i + 1) * SECOND);
 	}
 	assert_int_equal(poses.n_names, 2);
+}
+
+/* A quarter of a turn about z, as elements of TDATA and as a POSITION of each size. */
+TEST(trackers_of_other_messages_are_read, begin, end)
+{
+	static const double turned[3][4] = {{0, -1, 0, 1}, {1, 0, 0, 2}, {0, 0, 1, 3}};
+	struct incise_igtl_label label = {
+		.version = 1, .type = "TDATA", .name = "Tracker"};
+	igtl_tdata_element element[2] = {{.name = "Probe", .type = IGTL_TDATA_TYPE_6D},
+					 {.name = "Tip", .type = IGTL_TDATA_TYPE_6D}};
+	struct incise_tracker_sample s;
+	igtl_float32 column[12];
+
+	order(column, turned);
+	igtl_transform_convert_byte_order(column);
+	memcpy(element[1].transform, column, sizeof(column));
+	igtl_tdata_convert_byte_order(element, 2);
+	put_body(&label, element, sizeof(element), SECOND);
+	assert_int_equal(poses.n_names, 2);
+	/* Half an element is none. */
+	put_body(&label, element, sizeof(element) - 35, SECOND);
+	label.type = "POSITION";
+	label.name = "Tip";
+	for (size_t n = 0; n <= 28; n += 4) {
+		/* The length of a quaternion is free, but for one of three numbers. */
+		float length = n == 28 ? 2 : 1;
+		igtl_position position = {.position = {1, 2, 3},
+					  .quaternion = {0, 0, length * (float)M_SQRT1_2,
+							 length * (float)M_SQRT1_2}};
+
+		igtl_position_convert_byte_order(&position);
+		put_body(&label, &position, n, SECOND + (int64_t)n);
+	}
+	for (int i = 0; i < 4; i++) {
+		s = taken();
+		assert_int_equal(s.status, ' ');
+		for (int k = 0; k < 3; k++)
+			assert_true(s.position_mm[k] == k + 1);
+		/* Singles on the wire. */
+		assert_true(fabs(s.quaternion[0] - (i == 1 ? 1 : M_SQRT1_2)) < 1e-6);
+		assert_true(fabs(s.quaternion[3] - (i == 1 ? 0 : M_SQRT1_2)) < 1e-6);
+	}
+	/* A quaternion of zeros. */
+	put_body(&label, (const uint8_t[28]){0}, 28, 2 * SECOND);
+	assert_int_equal(taken().status, '~');
+	assert_int_equal(incise_ring_take(&poses.ring, &s, 1), 0);
 }
 
 TEST(what_is_no_pose_is_flagged)
@@ -230,14 +301,14 @@ TEST(losses_are_counted, begin, end)
 
 TEST(what_is_unseen_or_stuck_is_flagged, begin, end)
 {
-	static const struct incise_igtl_pair gone = {"ToolStatus", "OUT_OF_VIEW", 10, 3,
-						     11};
-	struct incise_igtl_label label = {
-		.version = 2, .name = "Tip", .metadata = &gone, .n_metadata = 1};
-	struct incise_igtl_status status = {.code = INCISE_IGTL_NOT_PRESENT, .text = ""};
-	float body[12] = {0};
+	static const char *const gone[][2] = {{"ToolStatus", "OUT_OF_VIEW"}};
+	struct incise_igtl_label label = {.version = 2,
+					  .type = "STATUS",
+					  .name = "Tip",
+					  .metadata = gone,
+					  .n_metadata = 1};
+	struct incise_igtl_status status = {.code = htobe16(INCISE_IGTL_NOT_PRESENT)};
 	uint8_t bytes[300];
-	ssize_t n;
 
 	turn(1, m, q);
 	for (int i = 1; i <= 20; i++) {
@@ -246,19 +317,20 @@ TEST(what_is_unseen_or_stuck_is_flagged, begin, end)
 		assert_int_equal(taken().status, i > 6 ? '=' : ' ');
 	}
 	turn(2, m, q);
-	n = incise_igtl_pack_status(bytes, sizeof(bytes), &label, &status);
-	assert_true(n > 0 && !igtl_poses_put(&poses, bytes, (size_t)n, SECOND));
+	put_body(&label, &status, sizeof(status), SECOND);
 	assert_int_equal(put("Tip", m, 0, SECOND, false), 0);
 	assert_int_equal(taken().status, '!');
-	status.code = INCISE_IGTL_OK;
-	n = incise_igtl_pack_status(bytes, sizeof(bytes), &label, &status);
-	assert_true(n > 0 && !igtl_poses_put(&poses, bytes, (size_t)n, SECOND));
+	/* One that is too short says nothing. */
+	put_body(&label, &(uint16_t){htobe16(INCISE_IGTL_OK)}, 2, SECOND);
+	assert_int_equal(put("Tip", m, 0, SECOND, false), 0);
+	assert_int_equal(taken().status, '!');
+	status.code = htobe16(INCISE_IGTL_OK);
+	put_body(&label, &status, sizeof(status), SECOND);
 	assert_int_equal(put("Tip", m, 0, SECOND + 1, false), 0);
 	assert_int_equal(taken().status, ' ');
 	/* As metadata, with a pose of zeros behind it. */
-	n = incise_igtl_pack(bytes, sizeof(bytes), &label, "TRANSFORM", body,
-			     sizeof(body));
-	assert_true(n > 0 && !igtl_poses_put(&poses, bytes, (size_t)n, 2 * SECOND));
+	label.type = "TRANSFORM";
+	put_body(&label, (const uint8_t[48]){0}, 48, 2 * SECOND);
 	assert_int_equal(taken().status, '!');
 	/* Bytes that are not OpenIGTLink end it, until there is another connection. */
 	memset(bytes, 0xff, sizeof(bytes));

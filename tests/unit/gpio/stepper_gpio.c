@@ -12,6 +12,8 @@
 #include "../../../lib/device/gpio/gpio_lines.h"
 #include "../message.h"
 
+extern const struct incise_backend incise_stepper_gpio;
+
 /* A chip; levels, not what they mean. */
 struct gpio_lines {
 	int line[INCISE_LINES];

@@ -13,7 +13,7 @@
 #include <pthread.h>
 #include <stdatomic.h>
 #include <incise/backend.h>
-#include "../../base/ring.h"
+#include "../base/ring.h"
 
 /* Capacity of the ring: the longest pause of a reader without loss, s. */
 #define DAQ_FEED_CAPACITY_S 4

@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
-#include "../thread.h"
+#include "thread.h"
 #include "daq_feed.h"
 
 #define RATE_MOST_HZ 100000
