@@ -323,7 +323,7 @@ static int join(struct incise_propagation *p)
 			       (size_t)p->n * sizeof(double));
 		return 0;
 	}
-	lsq = incise_lsq_new(p->n);
+	lsq = incise_lsq_new(p->n, NULL);
 	if (!lsq)
 		return -ENOMEM;
 	for (int i = 0; i < p->n_origins; i++) {

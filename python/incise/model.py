@@ -59,8 +59,7 @@ class SideStruct(ctypes.Structure):
     c_name = "struct incise_train_side"
 
 
-_Progress = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_double, c_double)
-all_sums = ctypes.CFUNCTYPE(c_void_p, c_void_p, c_void_p)
+_Progress = ctypes.CFUNCTYPE(c_int, c_void_p, c_void_p)
 
 
 class TrainOptionsStruct(ctypes.Structure):
@@ -77,13 +76,21 @@ class TrainOptionsStruct(ctypes.Structure):
         ("user", c_void_p),
         ("starts", c_int),
         ("tuned", ctypes.c_size_t),
-        ("stop", ctypes.POINTER(c_int)),
         ("uncertainty", ctypes.POINTER(c_void_p)),
         ("ranges", ctypes.POINTER(VariableStruct)),
-        ("all", all_sums),
-        ("weighted", c_bool),
     ]
     c_name = "struct incise_train_options"
+
+
+class Stop:
+    """The progress of a training, by which another thread ends it."""
+
+    def __init__(self, options: TrainOptionsStruct):
+        self.set = False
+        options.progress = _Progress(lambda _user, _step: self.set)
+
+    def cancel(self) -> None:
+        self.set = True
 
 
 class TrainReportStruct(ctypes.Structure):
@@ -792,7 +799,7 @@ def start(
     )
 
 
-def baselines(fit: SideStruct, check: SideStruct) -> Dict[str, float]:
+def baselines(fit: SideStruct, check: SideStruct) -> BaselinesStruct:
     """Errors of simpler predictors on the pairs kept back."""
     failure, result = Failure(), BaselinesStruct()
     failure.check(
@@ -804,7 +811,7 @@ def baselines(fit: SideStruct, check: SideStruct) -> Dict[str, float]:
             failure.ref,
         )
     )
-    return {"mean": result.mean, "linear": result.linear, "knn": result.knn}
+    return result
 
 
 def report_of(
@@ -812,7 +819,7 @@ def report_of(
     pairs: int,
     check_pairs: int,
     left_out: int,
-    others: Dict[str, float],
+    others: Optional[BaselinesStruct],
 ) -> TrainReport:
     return TrainReport(
         pairs,
@@ -828,7 +835,7 @@ def report_of(
         report.rules_unfired,
         report.train_r2,
         report.check_r2,
-        others,
+        {"mean": others.mean, "linear": others.linear, "knn": others.knn} if others else {},
     )
 
 
@@ -838,10 +845,9 @@ class _Training:
     def __init__(self, dataset: int, share: float, options: TrainOptionsStruct):
         self.dataset, self.options = dataset, options
         self.fit, self.check = SideStruct(), SideStruct()
-        self.stop = c_int(0)
+        self.stop = Stop(options)
         self.failure = Failure()
         self.has_check = share != 0
-        options.stop = ctypes.pointer(self.stop)
         self.failure.check(
             function("incise_train_split")(
                 dataset,
@@ -978,15 +984,12 @@ def train(
             training.fit.pairs.n,
             training.check.pairs.n,
             left_out,
-            baselines(training.fit, training.check) if training.has_check else {},
+            baselines(training.fit, training.check) if training.has_check else None,
         )
         return model
 
-    def cancel() -> None:
-        training.stop.value = 1
-
     try:
-        return _library.call_interruptible(learn, cancel)
+        return _library.call_interruptible(learn, training.stop.cancel)
     finally:
         training.close()
 

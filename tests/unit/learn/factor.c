@@ -302,7 +302,7 @@ TEST(test_solution)
 	struct incise_factor_ridge ridge = {1e-3, 1, NAN};
 	struct incise_ridge same_ridge = {1e-3, 1, 60, 20};
 	struct incise_train_report report;
-	struct incise_lsq *qr = incise_lsq_new(60);
+	struct incise_lsq *qr = incise_lsq_new(60, NULL);
 	struct incise_design design;
 	double sum = 0, squares = 0, mean, sd, x[60], error = 0, w[20];
 
