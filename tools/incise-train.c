@@ -354,9 +354,6 @@ static void join_job(void)
 	if (job->rank &&
 	    (!freopen("/dev/null", "w", stdout) || !freopen("/dev/null", "w", stderr)))
 		cli_fail("no /dev/null");
-	if (job->size == 1)
-		cli_warn("--mpi: a single process; start several by 'mpirun -n N incise "
-			 "train …'");
 }
 
 /* --- columns and files --------------------------------------------------------------- */
@@ -848,6 +845,9 @@ int main(int argc, char **argv)
 		options.how.premises = premises = load_premises(options.premises);
 	choose_columns(&options, columns);
 	choose_uncertainties(&options, &uncertainties);
+	if (job && job->size == 1)
+		cli_warn("--mpi: a single process; start several by 'mpirun -n N incise "
+			 "train …'");
 	sources = sources_new(options.paths, options.n_paths, &options.rows);
 	data = cli_text("%d sources", options.n_paths);
 	options.data = options.n_paths > 1	 ? data

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include "lsq.h"
-#include "train.h"
+#include "watch.h"
 #include "../base/random.h"
 
 static const int ks[] = {1, 3, 5, 10, 20, 50};
@@ -205,14 +205,15 @@ static int knn_rmse(struct pool *pool, const struct incise_pairs *on,
 	return 0;
 }
 
-int incise_baselines_watched(const struct incise_pairs *train, const int *groups,
-			     const struct incise_pairs *on,
-			     struct incise_baselines *result, struct incise_watch *watch,
-			     struct incise_error *err)
+int incise_baselines(const struct incise_pairs *train, const int *groups,
+		     const struct incise_pairs *on, incise_train_progress progress,
+		     void *user, struct incise_baselines *result,
+		     struct incise_error *err)
 {
 	struct column columns[INCISE_MODEL_INPUTS_MAX + 1];
+	struct incise_watch watch = {progress, user, .step.phase = INCISE_TRAIN_SOLVE};
 	struct pool pool = {
-		.train = train, .groups = groups, .columns = columns, .watch = watch};
+		.train = train, .groups = groups, .columns = columns, .watch = &watch};
 	int d = train->n_inputs, rc;
 	double mean = 0;
 
@@ -225,7 +226,7 @@ int incise_baselines_watched(const struct incise_pairs *train, const int *groups
 	if (!rc)
 		rc = knn_rmse(&pool, on, result);
 	free(pool.pairs);
-	if (watch && watch->stopped)
+	if (watch.stopped)
 		return incise_error_set(err, ECANCELED, "training was stopped");
 	if (rc)
 		return incise_error_set(err, -rc,
@@ -240,11 +241,4 @@ int incise_baselines_watched(const struct incise_pairs *train, const int *groups
 	}
 	result->mean = sqrt(mean) * columns[d].sd;
 	return 0;
-}
-
-int incise_baselines(const struct incise_pairs *train, const int *groups,
-		     const struct incise_pairs *on, struct incise_baselines *result,
-		     struct incise_error *err)
-{
-	return incise_baselines_watched(train, groups, on, result, NULL, err);
 }

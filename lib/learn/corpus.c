@@ -14,7 +14,6 @@
 #include <string.h>
 #include "../base/random.h"
 #include "corpus.h"
-#include "design.h"
 #include "pairs.h"
 
 #define COLUMNS_MAX (INCISE_MODEL_INPUTS_MAX + 1)
@@ -781,7 +780,7 @@ static int fold_row(void *user, const double *row, const char *name,
 	f->digest = incise_random_bits(f->digest ^ group, hash);
 	/* Without groups each row is in a part of cross-validation by itself, with its equals. */
 	if (is_check(f->corpus, hash, group)) {
-		rc = incise_factor_add(f->check, row, group, &own);
+		rc = incise_factor_add(f->check, row, group, 1, &own);
 		rc = rc == -ERANGE ? 0 : rc;
 	} else {
 		double weight =
@@ -789,7 +788,7 @@ static int fold_row(void *user, const double *row, const char *name,
 				? incise_propagation_add(f->corpus->propagation, row)
 				: 1;
 
-		rc = incise_factor_add_weighted(
+		rc = incise_factor_add(
 			f->fit, row,
 			f->corpus->grouped ? group : row_key(f->corpus, FOR_SAMPLE, hash),
 			weight, &own);

@@ -7,7 +7,9 @@
 #define INCISE_LEARN_CORPUS_H
 
 #include <incise/corpus.h>
-#include <incise/dataset.h>
+#include "factor.h"
+#include "pairs.h"
+#include "propagation.h"
 
 /* A source as it is read. */
 struct incise_corpus_source {

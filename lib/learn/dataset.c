@@ -10,10 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/arrow.h>
-#include <incise/dataset.h>
 #include "../base/lines.h"
 #include "pairs.h"
-#include "sha256.h"
 
 #define FIELDS_MAX 256
 
@@ -742,18 +740,6 @@ size_t incise_dataset_rows(const struct incise_dataset *data)
 const double *incise_dataset_row(const struct incise_dataset *data, size_t row)
 {
 	return data->values + row * data->columns;
-}
-
-int incise_dataset_sha256(const struct incise_dataset *data, char hex[65])
-{
-	struct incise_sha256 sha;
-
-	incise_sha256_start(&sha);
-	incise_sha256_add(&sha, data->values,
-			  data->rows * data->columns * sizeof(*data->values));
-	if (data->group)
-		incise_sha256_add(&sha, data->group, data->rows * sizeof(*data->group));
-	return incise_sha256_end(&sha, hex);
 }
 
 int incise_dataset_group(const struct incise_dataset *data, size_t row)

@@ -18,8 +18,8 @@
 #include "../base/crc32c.h"
 #include "../base/random.h"
 #include "design.h"
+#include "factor.h"
 #include "sha256.h"
-#include "train.h"
 #include "tune.h"
 
 #define FORM 2 /* of the file */
@@ -328,13 +328,7 @@ static int part_of(const struct incise_factor *factor, uint64_t group)
 }
 
 int incise_factor_add(struct incise_factor *factor, const double *row, uint64_t group,
-		      struct incise_error *err)
-{
-	return incise_factor_add_weighted(factor, row, group, 1, err);
-}
-
-int incise_factor_add_weighted(struct incise_factor *factor, const double *row,
-			       uint64_t group, double weight, struct incise_error *err)
+		      double weight, struct incise_error *err)
 {
 	const struct incise_model_info *info = incise_model_info(factor->model);
 	const struct incise_scaling *scaling = &factor->design.scaling;
@@ -1228,12 +1222,12 @@ static int solve(struct solver *s, const struct incise_factor_ridge *wanted,
 	return rc;
 }
 
-struct incise_model *incise_factor_solve_watched(struct incise_factor *factor,
-						 const struct incise_factor_ridge *ridge,
-						 struct incise_train_report *report,
-						 struct incise_uncertainty **uncertainty,
-						 struct incise_watch *watch,
-						 struct incise_error *err)
+struct incise_model *incise_factor_solve(struct incise_factor *factor,
+					 const struct incise_factor_ridge *ridge,
+					 struct incise_train_report *report,
+					 struct incise_uncertainty **uncertainty,
+					 struct incise_watch *watch,
+					 struct incise_error *err)
 {
 	const struct incise_basis *basis = &factor->design.basis;
 	struct solver s = {.factor = factor, .n = basis->n_rules * (basis->n_inputs + 1)};
@@ -1272,15 +1266,6 @@ struct incise_model *incise_factor_solve_watched(struct incise_factor *factor,
 					   "extreme; scale them or give fewer membership "
 					   "functions");
 	return NULL;
-}
-
-struct incise_model *incise_factor_solve(struct incise_factor *factor,
-					 const struct incise_factor_ridge *ridge,
-					 struct incise_train_report *report,
-					 struct incise_uncertainty **uncertainty,
-					 struct incise_error *err)
-{
-	return incise_factor_solve_watched(factor, ridge, report, uncertainty, NULL, err);
 }
 
 double incise_factor_rmse(struct incise_factor *factor, const struct incise_model *model,

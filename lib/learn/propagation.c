@@ -12,8 +12,8 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/propagation.h>
 #include "lsq.h"
+#include "propagation.h"
 
 /* The smallest share of the noise that is left to the scatter. */
 #define SCATTER_LEAST 0.2

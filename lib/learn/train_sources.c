@@ -486,8 +486,8 @@ static int fold_pass(struct training *t, struct incise_model **model, double *sc
 		rc = fold(t, *model);
 	if (rc)
 		return rc;
-	next = incise_factor_solve_watched(t->trained->factor, &ridge, NULL, &uncertainty,
-					   &t->watch, &t->err);
+	next = incise_factor_solve(t->trained->factor, &ridge, NULL, &uncertainty,
+				   &t->watch, &t->err);
 	rc = next ? incise_propagation_end(t->propagation, next, uncertainty,
 					   incise_factor_rmse(t->trained->factor, next,
 							      NULL),
@@ -576,9 +576,8 @@ static int solve(struct training *t)
 	if (rc || t->options->end == INCISE_TRAIN_TO_FACTOR)
 		return rc;
 	begin_phase(t, INCISE_TRAIN_SOLVE, 0, 0);
-	trained->model =
-		incise_factor_solve_watched(trained->factor, &ridge, &trained->report,
-					    &trained->uncertainty, &t->watch, &t->err);
+	trained->model = incise_factor_solve(trained->factor, &ridge, &trained->report,
+					     &trained->uncertainty, &t->watch, &t->err);
 	return trained->model ? 0 : name_training(t, -errno);
 }
 
@@ -665,9 +664,12 @@ static int judge(struct training *t)
 	}
 	trained->noise = incise_uncertainty_noise(trained->uncertainty);
 	find_coverage(t);
-	if (incise_baselines_watched(&fit->sample.pairs, fit->sample.groups,
-				     &(check->sample.pairs.n ? check : fit)->sample.pairs,
-				     &trained->baselines, &t->watch, &t->err))
+	if (t->watch.stopped)
+		return -ECANCELED;
+	if (incise_baselines(&fit->sample.pairs, fit->sample.groups,
+			     &(check->sample.pairs.n ? check : fit)->sample.pairs,
+			     t->watch.progress, t->watch.user, &trained->baselines,
+			     &t->err))
 		return name_error(t, -t->err.code);
 	trained->notes = make_notes(t);
 	return trained->notes ? 0 : no_memory(t);
@@ -758,7 +760,7 @@ int incise_train_factors(const char *const *paths, int n, double ridge,
 	if (rc || end == INCISE_TRAIN_TO_FACTOR)
 		return rc;
 	trained->model = incise_factor_solve(trained->factor, &wanted, &trained->report,
-					     &trained->uncertainty, err);
+					     &trained->uncertainty, NULL, err);
 	if (!trained->model)
 		return -errno;
 	trained->notes = incise_factor_notes(trained->factor);

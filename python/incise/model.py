@@ -283,6 +283,8 @@ _library.declare(
             ctypes.POINTER(PairsStruct),
             ctypes.POINTER(c_int),
             ctypes.POINTER(PairsStruct),
+            _Progress,
+            c_void_p,
             ctypes.POINTER(BaselinesStruct),
             c_void_p,
         ),
@@ -799,7 +801,7 @@ def start(
     )
 
 
-def baselines(fit: SideStruct, check: SideStruct) -> BaselinesStruct:
+def baselines(fit: SideStruct, check: SideStruct, progress: Any) -> BaselinesStruct:
     """Errors of simpler predictors on the pairs kept back."""
     failure, result = Failure(), BaselinesStruct()
     failure.check(
@@ -807,6 +809,8 @@ def baselines(fit: SideStruct, check: SideStruct) -> BaselinesStruct:
             ctypes.byref(fit.pairs),
             fit.groups,
             ctypes.byref(check.pairs),
+            progress,
+            None,
             ctypes.byref(result),
             failure.ref,
         )
@@ -984,7 +988,7 @@ def train(
             training.fit.pairs.n,
             training.check.pairs.n,
             left_out,
-            baselines(training.fit, training.check) if training.has_check else None,
+            baselines(training.fit, training.check, options.progress) if training.has_check else None,
         )
         return model
 

@@ -104,7 +104,7 @@ int main(int argc, char **argv)
 	t[3] = now();
 	if (stream.copy)
 		fclose(stream.copy);
-	model = incise_factor_solve(factor, &none, &report, NULL, &err);
+	model = incise_factor_solve(factor, &none, &report, NULL, NULL, &err);
 	if (!model || (argc > 3 && incise_model_save(model, argv[3], &err)))
 		goto failed;
 	t[4] = now();

@@ -16,9 +16,9 @@
 #include <incise/error.h>
 #include <incise/export.h>
 #include <incise/factor.h>
-#include <incise/propagation.h>
 #include <incise/ranks.h>
 #include <incise/train.h>
+#include <incise/uncertainty.h>
 
 INCISE_BEGIN_DECLS
 
@@ -53,6 +53,27 @@ struct incise_train_source {
 	 */
 	char *(*state)(const struct incise_train_source *source);
 	void *user;
+};
+
+/** Largest number of columns of uncertainties. */
+#define INCISE_PROPAGATION_PARTS 64
+
+/** A column of standard uncertainties. */
+struct incise_propagation_part {
+	int of; /**< column of the pair that it is of: 0 … n_inputs - 1; n_inputs: the output */
+	/** Common source, 0 … INCISE_UNCERTAINTY_SOURCES - 1; below 0: the row's own. */
+	int source;
+	/** Common to all rows of one calibration; else to all of one recording. */
+	bool calibration;
+};
+
+/** Uncertainties of a model of weighted pairs. */
+struct incise_propagation_report {
+	double own; /**< root mean square of the own parts, in the unit of the output */
+	/** The same of the common parts' effect on the model, and of those of a rig on an output. */
+	double calibration, rig;
+	double weight;		      /**< smallest weight */
+	int recordings, calibrations; /**< number of different ones */
 };
 
 /** The last result of incise_train_sources(); each needs those before it. */

@@ -179,11 +179,13 @@ struct incise_baselines {
  * Compute baselines that a useful model must beat. The nearest-neighbour baseline uses random
  * subsets of very many pairs: 20000 neighbours and 5000 queries.
  *
- * @param groups group of each training pair, or NULL
- * @return 0, -EINVAL, -ENOMEM, -EDOM.
+ * @param groups   group of each training pair, or NULL
+ * @param progress as of incise_train_options, or NULL
+ * @return 0, -EINVAL, -ENOMEM, -EDOM, -ECANCELED.
  */
 INCISE_API int incise_baselines(const struct incise_pairs *train, const int *groups,
 				const struct incise_pairs *on,
+				incise_train_progress progress, void *user,
 				struct incise_baselines *result,
 				struct incise_error *err);
 

@@ -110,7 +110,7 @@ TEST(test_best_epoch_is_kept)
 	struct incise_pairs pairs = {rows, PAIRS, 2};
 	struct incise_model *model = paper_model(INCISE_MF_GAUSS, 1, 1);
 	int epochs = 0;
-	struct incise_watch watch = {count_epoch, &epochs};
+	struct incise_watch watch = {.progress = count_epoch, .user = &epochs};
 	struct incise_anfis anfis = {
 		.train = &pairs, .ridge = 1e-6, .step = 3, .epochs = 20, .watch = &watch};
 

@@ -6,7 +6,7 @@
  */
 #include "../unit.h"
 #include <unistd.h>
-#include <incise/factor.h>
+#include "../../../lib/learn/factor.h"
 #include "../../../lib/base/random.h"
 #include "../../../lib/learn/design.h"
 #include "../cases.h"
@@ -47,8 +47,8 @@ static void add(struct incise_factor *factor, const char *hash, int from, int to
 		double row[3];
 
 		pair(i, row);
-		assert_int_equal(incise_factor_add(factor, row, (uint64_t)i / 100, NULL),
-				 0);
+		assert_int_equal(
+			incise_factor_add(factor, row, (uint64_t)i / 100, 1, NULL), 0);
 	}
 	for (int g = from / 100; g < to / 100; g++)
 		incise_factor_count(factor, (uint64_t)g, 1, 100);
@@ -115,7 +115,7 @@ static void add_groups(struct incise_factor *factor, uint64_t fold, int groups, 
 			double row[3];
 
 			pair(1000 * g + i, row);
-			assert_int_equal(incise_factor_add(factor, row, key, NULL), 0);
+			assert_int_equal(incise_factor_add(factor, row, key, 1, NULL), 0);
 		}
 		incise_factor_count(factor, key, 1, (uint64_t)different);
 	}
@@ -327,7 +327,7 @@ TEST(test_solution)
 		incise_lsq_add(qr, (row[2] - mean) / sd);
 	}
 	assert_int_equal(incise_lsq_solve(qr, &same_ridge, x), 0);
-	solved = incise_factor_solve(factor, &ridge, &report, NULL, NULL);
+	solved = incise_factor_solve(factor, &ridge, &report, NULL, NULL, NULL);
 	assert_non_null(solved);
 	for (int i = 0; i < ROWS; i++) {
 		double row[3], scaled[3], f[20], y;

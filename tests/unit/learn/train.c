@@ -423,7 +423,9 @@ TEST(test_default_holds_on_unseen_cut)
 	incise_train_options_init(&options);
 	options.groups = groups;
 	assert_int_equal(incise_train(model, &train, &check, &options, &report, NULL), 0);
-	assert_int_equal(incise_baselines(&train, groups, &check, &baselines, NULL), 0);
+	assert_int_equal(incise_baselines(&train, groups, &check, NULL, NULL, &baselines,
+					  NULL),
+			 0);
 	assert_true(report.check_rmse < 0.5 * baselines.mean);
 	/* The law is a product with a line: no more than a fifth over the best line. */
 	assert_true(report.check_rmse < 1.2 * baselines.linear);
