@@ -252,11 +252,11 @@ check-doc: doc
 	peers check-attack check-python check-tsan can-drive mcap-reader python-peers stream-peers
 
 # Sums of very many pairs: time and memory, next to numpy.
-$(O)/tests/corpus: tests/bench/corpus.c $(O)/lib/libincise-learn.so
+$(O)/tests/corpus: tests/bench/corpus.c $(O)/lib/libincise-tests.a
 	@mkdir -p $(@D)
 	$(call step,LD)
 	$(Q)$(CC) $(cppflags) $(CPPFLAGS) -std=gnu11 $(warnings) $(CFLAGS) $(LDFLAGS) -o $@ $< \
-		-L$(O)/lib -Wl,-rpath,'$$ORIGIN/../lib' -lincise-learn -lincise -lm
+		$(O)/lib/libincise-tests.a $(test_libs)
 
 # All 2^32 pairs of 16-bit inputs: the proof of the bound by trying everything.
 $(O)/tests/exhaustive: tests/bench/exhaustive.c $(O)/lib/libincise.so

@@ -863,20 +863,24 @@ static void show_keys(const char *path, bool scene, const struct job *job)
 static void show_dataset(struct job *job, char **paths, int n)
 {
 	const char *columns[INCISE_MODEL_INPUTS_MAX + 1];
-	struct source_options how = {
+	struct recording_rows rows = {.damaged = job->damaged};
+	struct incise_sources_options how = {
 		.columns = columns,
-		.n_columns = job->n_inputs + 1,
+		.n_inputs = job->n_inputs,
 		.group = job->group,
 		.all_rows = job->all_rows,
-		.damaged = job->damaged,
 	};
+	struct incise_train_source *sources;
 
 	if (!n)
 		cli_usage("missing DATA.csv or NAME.rec (training data)");
 	for (int i = 0; i < job->n_inputs; i++)
 		columns[i] = job->inputs[i];
 	columns[job->n_inputs] = job->target;
-	dataset_show(paths, n, &how, job->json);
+	incise_train_options_init(&how.train);
+	sources = sources_new(paths, n, &rows);
+	dataset_show(sources, n, &how, job->json);
+	sources_free(sources, n);
 }
 
 int main(int argc, char **argv)

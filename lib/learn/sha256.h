@@ -5,6 +5,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <incise/factor.h>
 
 struct incise_sha256 {
 	void *digest; /* EVP_MD_CTX of libcrypto */
@@ -17,5 +18,11 @@ void incise_sha256_add(struct incise_sha256 *sha, const void *bytes, size_t n);
 
 /* 64 lower-case hexadecimal digits and a 0; the state is freed. 0; or -ENOMEM and no digits. */
 int incise_sha256_end(struct incise_sha256 *sha, char hex[65]);
+
+struct incise_watch;
+
+/* As incise_file_sha256(), of a part where the watch ends the training. */
+int incise_file_sha256_watched(const char *path, char hex[65], struct incise_watch *watch,
+			       struct incise_error *err);
 
 #endif

@@ -227,7 +227,7 @@ static int fit_k(const struct data *data)
 	struct incise_baselines found;
 	struct incise_error err = {0};
 
-	if (incise_baselines(&pairs, data->group, &pairs, &found, &err))
+	if (incise_baselines(&pairs, data->group, &pairs, NULL, NULL, &found, &err))
 		cli_fail_with(&err);
 	return found.k;
 }
