@@ -20,31 +20,32 @@
 #include "../read/recording.h"
 #include "../read/session.h"
 
-int incise_provenance_add(struct incise_provenance *provenance, const char *key,
-			  const char *fmt, ...)
+void incise_provenance_add(struct incise_provenance *provenance, const char *key,
+			   const char *fmt, ...)
 {
 	struct incise_provenance_item *item = &provenance->items[provenance->n];
 	va_list args;
 	int length;
 
-	if (provenance->n == INCISE_PROVENANCE_MAX)
-		return -E2BIG;
+	if (!provenance->rc && provenance->n == INCISE_PROVENANCE_MAX)
+		provenance->rc = -E2BIG;
+	if (provenance->rc)
+		return;
 	va_start(args, fmt);
 	length = vasprintf(&item->value, fmt, args);
 	va_end(args);
 	if (length < 0)
-		return -ENOMEM;
-	if (!length) {
+		provenance->rc = -ENOMEM;
+	if (!length)
 		free(item->value);
-		return 0;
-	}
+	if (length <= 0)
+		return;
 	/* A single line in CSV, whatever characters a recording's name has. */
 	for (char *c = item->value; *c; c++)
 		if ((unsigned char)*c < ' ' || *c == 0x7f)
 			*c = '_';
 	item->key = key;
 	provenance->n++;
-	return 0;
 }
 
 /* "a, b, c" of one text per recording; to be freed. */
@@ -90,8 +91,18 @@ static const char *rig_of(const struct incise_recording *recording)
 	return recording->meta.rig;
 }
 
-static int add_sources(struct incise_provenance *provenance,
-		       struct incise_recording *const *recordings, int n)
+/* Add a text, which is freed; NULL: no memory. */
+static void add_text(struct incise_provenance *provenance, const char *key, char *text)
+{
+	if (text)
+		incise_provenance_add(provenance, key, "%s", text);
+	else
+		provenance->rc = -ENOMEM;
+	free(text);
+}
+
+static void add_sources(struct incise_provenance *provenance,
+			struct incise_recording *const *recordings, int n)
 {
 	const struct {
 		const char *key;
@@ -100,16 +111,9 @@ static int add_sources(struct incise_provenance *provenance,
 		     {"recorded", start_of},
 		     {"rig", rig_of},
 		     {"state", state_of}};
-	int rc = 0;
 
-	for (size_t i = 0; i < sizeof(items) / sizeof(*items) && !rc; i++) {
-		char *text = join(recordings, n, items[i].text);
-
-		rc = text ? incise_provenance_add(provenance, items[i].key, "%s", text)
-			  : -ENOMEM;
-		free(text);
-	}
-	return rc;
+	for (size_t i = 0; i < sizeof(items) / sizeof(*items); i++)
+		add_text(provenance, items[i].key, join(recordings, n, items[i].text));
 }
 
 /* Append an origin; nothing if it does not fit. */
@@ -191,33 +195,29 @@ static size_t put_given(const char *path, char *text, size_t size, size_t at)
 }
 
 /* The origins of an export. */
-static int add_origins(struct incise_provenance *provenance,
-		       struct incise_recording *const *recordings, int n,
-		       const char *calibration_path)
+static void add_origins(struct incise_provenance *provenance,
+			struct incise_recording *const *recordings, int n,
+			const char *calibration_path)
 {
 	const size_t most = INCISE_SESSION_MEMBERS_MAX * INCISE_ORIGIN_TEXT;
 	char *all = malloc((size_t)n * most + INCISE_ORIGIN_TEXT), *to = all;
-	int rc;
 
-	if (!all)
-		return -ENOMEM;
-	*all = 0;
-	for (int i = 0; i < n; i++) {
+	if (all)
+		*all = 0;
+	for (int i = 0; i < n && all; i++) {
 		if (to > all)
 			*to++ = ' ';
 		to += incise_recording_origins(recordings[i], to, most);
 	}
-	if (calibration_path)
+	if (all && calibration_path)
 		put_given(calibration_path, all, (size_t)n * most + INCISE_ORIGIN_TEXT,
 			  (size_t)(to - all));
-	rc = incise_provenance_add(provenance, "origin", "%s", all);
-	free(all);
-	return rc;
+	add_text(provenance, "origin", all);
 }
 
 /* The mapping to TAI of one recording: its first and last point, which have all that is constant. */
-static int add_wall(struct incise_provenance *provenance,
-		    struct incise_recording *recording)
+static void add_wall(struct incise_provenance *provenance,
+		     struct incise_recording *recording)
 {
 	static const char *const keys[][4] = {{"wall_start_t_ns", "wall_start_tai_ns",
 					       "wall_start_u_ns", "wall_start_utc"},
@@ -227,38 +227,32 @@ static int add_wall(struct incise_provenance *provenance,
 	struct incise_wall *wall = incise_recording_wall(recording, &none);
 	const struct incise_wall_point *points;
 	size_t n;
-	int rc = 0;
 
 	/* A damaged table stops the export only where its times are asked for. */
+	if (!wall && errno == ENOMEM)
+		provenance->rc = -ENOMEM;
 	if (!wall)
-		return errno == ENOMEM ? -ENOMEM : 0;
+		return;
 	n = incise_wall_points(wall, &points);
-	for (int i = 0; i < 2 && !rc; i++) {
+	for (int i = 0; i < 2; i++) {
 		const struct incise_wall_point *p = &points[i ? n - 1 : 0];
 		char utc[INCISE_WALL_TEXT];
 		int64_t tai_ns, u_ns;
 
 		incise_wall_tai(wall, p->t_ns, &tai_ns, &u_ns);
 		incise_wall_utc_text(tai_ns, p->utc_offset_s, utc);
-		rc = incise_provenance_add(provenance, keys[i][0], "%lld",
-					   (long long)p->t_ns);
-		if (!rc)
-			rc = incise_provenance_add(provenance, keys[i][1], "%lld",
-						   (long long)tai_ns);
-		if (!rc)
-			rc = u_ns == INCISE_WALL_UNKNOWN
-				     ? incise_provenance_add(provenance, keys[i][2],
-							     "unknown")
-				     : incise_provenance_add(provenance, keys[i][2],
-							     "%lld", (long long)u_ns);
-		if (!rc)
-			rc = incise_provenance_add(provenance, keys[i][3], "%s", utc);
+		incise_provenance_add(provenance, keys[i][0], "%lld", (long long)p->t_ns);
+		incise_provenance_add(provenance, keys[i][1], "%lld", (long long)tai_ns);
+		if (u_ns == INCISE_WALL_UNKNOWN)
+			incise_provenance_add(provenance, keys[i][2], "unknown");
+		else
+			incise_provenance_add(provenance, keys[i][2], "%lld",
+					      (long long)u_ns);
+		incise_provenance_add(provenance, keys[i][3], "%s", utc);
 	}
-	if (!rc)
-		rc = incise_provenance_add(provenance, "wall_source", "%s, time of %s",
-					   points->source, points->reference);
+	incise_provenance_add(provenance, "wall_source", "%s, time of %s", points->source,
+			      points->reference);
 	incise_wall_free(wall);
-	return rc;
 }
 
 /* Add which calibration of a recording is active; of a joined one, of each member. */
@@ -320,9 +314,9 @@ static char *calibration_text(struct incise_recording *const *recordings, int n,
 }
 
 /* Add the camera's scale, and delays of a given calibration, or of an active one. */
-static int add_lengths(struct incise_provenance *provenance,
-		       struct incise_recording *const *recordings, int n,
-		       const struct incise_calibration *given)
+static void add_lengths(struct incise_provenance *provenance,
+			struct incise_recording *const *recordings, int n,
+			const struct incise_calibration *given)
 {
 	double mm_px = given ? given->depth_mm_px : recordings[0]->meta.depth_mm_px;
 	const struct incise_calibration *of =
@@ -337,52 +331,44 @@ static int add_lengths(struct incise_provenance *provenance,
 		{"tracker_delay_ms", of ? of->tracker_delay_ms : NAN},
 		{"camera_delay_ms", of ? of->camera_delay_ms : NAN},
 	};
-	int rc;
 
 	for (int i = 1; i < n && !given; i++)
 		if (recordings[i]->meta.depth_mm_px != mm_px)
-			return 0;
-	rc = incise_provenance_add(provenance, "depth_mm_px", "%.9g", mm_px);
-	for (size_t i = 0; i < sizeof(delays) / sizeof(*delays) && !rc; i++)
+			return;
+	incise_provenance_add(provenance, "depth_mm_px", "%.9g", mm_px);
+	for (size_t i = 0; i < sizeof(delays) / sizeof(*delays); i++)
 		if (!isnan(delays[i].ms))
-			rc = incise_provenance_add(provenance, delays[i].key, "%.9g",
-						   delays[i].ms);
-	return rc;
+			incise_provenance_add(provenance, delays[i].key, "%.9g",
+					      delays[i].ms);
 }
 
 /* Add the given calibration, or the recordings' own if all have the same. */
-static int add_calibration(struct incise_provenance *provenance,
-			   struct incise_recording *const *recordings, int n,
-			   const struct incise_calibration *given)
+static void add_calibration(struct incise_provenance *provenance,
+			    struct incise_recording *const *recordings, int n,
+			    const struct incise_calibration *given)
 {
 	/* A device in newtons was not calibrated in mV/N. */
 	bool volts = given && !recordings[0]->meta.newtons;
 	double mV_N = volts ? given->force_mV_N : recordings[0]->meta.force_mV_N;
 	double zero_mV = recordings[0]->meta.zero_mV;
 	bool own = !volts || isnan(given->force_zero_mV);
-	char *text = calibration_text(recordings, n, given);
-	int rc;
 
 	if (!own)
 		zero_mV = given->force_zero_mV;
-
-	rc = text ? incise_provenance_add(provenance, "calibration", "%s", text)
-		  : -ENOMEM;
-	free(text);
+	add_text(provenance, "calibration", calibration_text(recordings, n, given));
 	for (int i = 1; i < n && own; i++) {
 		if (!given && recordings[i]->meta.force_mV_N != mV_N)
-			return rc;
+			return;
 		if (recordings[i]->meta.zero_mV != zero_mV)
 			zero_mV = NAN;
 	}
-	if (!rc)
-		rc = incise_provenance_add(provenance, "force_mV_N", "%.17g", mV_N);
-	if (!rc)
-		rc = isnan(zero_mV) ? incise_provenance_add(provenance, "force_zero_mV",
-							    "each recording's own")
-				    : incise_provenance_add(provenance, "force_zero_mV",
-							    "%.17g", zero_mV);
-	return rc ? rc : add_lengths(provenance, recordings, n, given);
+	incise_provenance_add(provenance, "force_mV_N", "%.17g", mV_N);
+	if (isnan(zero_mV))
+		incise_provenance_add(provenance, "force_zero_mV",
+				      "each recording's own");
+	else
+		incise_provenance_add(provenance, "force_zero_mV", "%.17g", zero_mV);
+	add_lengths(provenance, recordings, n, given);
 }
 
 static const struct {
@@ -465,16 +451,15 @@ static int add_budget(struct incise_provenance *provenance,
 			u[1] = covariance[1] = NULL;
 		}
 	}
+	incise_provenance_add(provenance, "uncertainty",
+			      "%s: standard uncertainties, 2 u holds 95 %%",
+			      words[options->uncertainty]);
 	if (!rc)
-		rc = incise_provenance_add(provenance, "uncertainty",
-					   "%s: standard uncertainties, 2 u holds 95 %%",
-					   words[options->uncertainty]);
-	if (!rc)
-		rc = incise_provenance_add(provenance, "calibration_u", "%s",
-					   same ? u[0] : "each recording's own");
+		incise_provenance_add(provenance, "calibration_u", "%s",
+				      same ? u[0] : "each recording's own");
 	if (!rc && same)
-		rc = incise_provenance_add(provenance, "calibration_covariance", "%s",
-					   covariance[0]);
+		incise_provenance_add(provenance, "calibration_covariance", "%s",
+				      covariance[0]);
 	for (int i = 0; i < 2; i++) {
 		free(u[i]);
 		free(covariance[i]);
@@ -483,40 +468,37 @@ static int add_budget(struct incise_provenance *provenance,
 }
 
 /* Seconds from the first sample; no end: to that of the recording. */
-static int add_part(struct incise_provenance *provenance,
-		    const struct incise_export_options *o)
+static void add_part(struct incise_provenance *provenance,
+		     const struct incise_export_options *o)
 {
 	char end[40] = "", cut[40] = "";
 
 	if (!(o->from_s > 0) && !(o->to_s > 0) && !o->cut)
-		return 0;
+		return;
 	if (o->to_s > 0)
 		snprintf(end, sizeof(end), " to %.9g s", o->to_s);
 	if (o->cut)
 		snprintf(cut, sizeof(cut), ", cut %d", o->cut);
-	return incise_provenance_add(provenance, "part", "from %.9g s%s%s", o->from_s,
-				     end, cut);
+	incise_provenance_add(provenance, "part", "from %.9g s%s%s", o->from_s, end, cut);
 }
 
-static int add_options(struct incise_provenance *provenance,
-		       const struct incise_export_options *o)
+static void add_options(struct incise_provenance *provenance,
+			const struct incise_export_options *o)
 {
 	const char *rows = o->resample ? "resampled" : "raw";
-	int rc = add_part(provenance, o);
 
-	if (rc)
-		return rc;
+	add_part(provenance, o);
 	if (o->depth_bins)
-		return incise_provenance_add(provenance, "options",
-					     "averaged in %dx%d bins, at least %d "
-					     "samples%s",
-					     o->depth_bins, o->velocity_bins,
-					     o->min_count, o->by_cut ? ", by cut" : "");
-	if (o->rate_hz > 0)
-		return incise_provenance_add(provenance, "options", "%s at %.9g Hz", rows,
-					     o->rate_hz);
-	return incise_provenance_add(provenance, "options", "%s, every force sample",
-				     rows);
+		incise_provenance_add(provenance, "options",
+				      "averaged in %dx%d bins, at least %d samples%s",
+				      o->depth_bins, o->velocity_bins, o->min_count,
+				      o->by_cut ? ", by cut" : "");
+	else if (o->rate_hz > 0)
+		incise_provenance_add(provenance, "options", "%s at %.9g Hz", rows,
+				      o->rate_hz);
+	else
+		incise_provenance_add(provenance, "options", "%s, every force sample",
+				      rows);
 }
 
 int incise_provenance_of(struct incise_provenance *provenance,
@@ -524,24 +506,22 @@ int incise_provenance_of(struct incise_provenance *provenance,
 			 const struct incise_export_options *options, const char *table,
 			 struct incise_error *err)
 {
-	int rc = incise_provenance_add(provenance, "incise", "%s", incise_version());
+	int rc = 0;
 
 	/* The time of the export is left out: equal rows are equal bytes. */
-	if (!rc)
-		rc = add_sources(provenance, recordings, n);
-	if (!rc)
-		rc = add_origins(provenance, recordings, n,
-				 table ? NULL : options->calibration_path);
-	if (!rc)
-		rc = table ? incise_provenance_add(provenance, "options",
-						   "rows of table %s", table)
-			   : add_options(provenance, options);
-	if (!rc)
-		rc = add_calibration(provenance, recordings, n, options->calibration);
-	if (!rc && !table)
+	incise_provenance_add(provenance, "incise", "%s", incise_version());
+	add_sources(provenance, recordings, n);
+	add_origins(provenance, recordings, n, table ? NULL : options->calibration_path);
+	if (table)
+		incise_provenance_add(provenance, "options", "rows of table %s", table);
+	else
+		add_options(provenance, options);
+	add_calibration(provenance, recordings, n, options->calibration);
+	if (!table)
 		rc = add_budget(provenance, recordings, n, options, err);
-	if (!rc && n == 1)
-		rc = add_wall(provenance, recordings[0]);
+	if (n == 1)
+		add_wall(provenance, recordings[0]);
+	rc = rc ? rc : provenance->rc;
 	return rc ? incise_error_set(err, -rc, "lineage: %s", strerror(-rc)) : 0;
 }
 
