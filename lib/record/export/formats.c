@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * An export to a file, whose extension chooses the format; see incise/recording.h and formats.def.
+ * An export to a file, whose extension chooses the format; see incise/recording.h and formats.h.
  *
  *     recordings ──► export.c, resample.c: rows ──────► CSV, HDF5
  *     recording  ──► streams.c: rows of its streams ──► MCAP
@@ -16,25 +16,21 @@
 
 #define BINS_MAX 1000 /* in one direction; all of them are held in memory */
 
-enum holds { ROWS, MESSAGES };
-enum lineage { CHOICE, ALWAYS };
-
 static const struct format {
 	const char *name, *extensions;
-	enum holds holds;
-	enum lineage lineage;
+	enum { CHOICE, ALWAYS } lineage;
 	const struct incise_table_format *built_in; /* NULL: of a module */
 	const char *id, *package;
 } formats[] = {
-#define FORMAT(id, name, extensions, magic, holds, lineage) \
-	{name, extensions, holds, lineage, &incise_table_##id, #id, NULL},
-#define MODULE(id, name, extensions, magic, holds, lineage, package) \
-	{name, extensions, holds, lineage, NULL, #id, package},
-#include "formats.def"
-#undef FORMAT
-#undef MODULE
-};
+#define FORMAT(id, name, extensions, magic, lineage) \
+	{name, extensions, lineage, &incise_table_##id, #id, NULL},
+#define MODULE(id, name, extensions, magic, lineage, package) \
+	{name, extensions, lineage, NULL, #id, package},
+	INCISE_FORMATS(FORMAT, MODULE)};
 
+/* How many of them, the first ones, hold rows. */
+#define ONE(...) +1
+#define ROWS (0 INCISE_FORMATS_OF_ROWS(ONE, ONE))
 #define FORMATS (sizeof(formats) / sizeof(*formats))
 
 /* By the extension, in either case. */
@@ -52,17 +48,6 @@ static const struct format *find_format(const char *path)
 			at += n + strspn(at + n, " ");
 		}
 	return formats;
-}
-
-/* The extensions of all formats that hold this, after a space each, for a message. */
-static const char *list_extensions(enum holds holds, char text[100])
-{
-	*text = 0;
-	for (size_t i = 0; i < FORMATS; i++)
-		if (formats[i].holds == holds)
-			snprintf(text + strlen(text), 100 - strlen(text), " %s",
-				 formats[i].extensions);
-	return text;
 }
 
 /*
@@ -141,31 +126,30 @@ int incise_export_check(const struct incise_export_options *o, struct incise_err
 	return 0;
 }
 
-/* Refuse what a format of messages does not hold. */
-static int check_messages(const struct format *format,
-			  const struct incise_export_options *o, const char *path, int n,
-			  struct incise_error *err)
+/* Refuse what a format of rows, or of messages, does not hold. */
+static int check_format(const struct format *format, bool messages,
+			const struct incise_export_options *o, const char *path, int n,
+			struct incise_error *err)
 {
-	char others[100];
-
-	if (format->holds == ROWS)
-		return !o->ros2 ? 0
-				: incise_error_set(err, EINVAL,
-						   "%s: messages of ROS 2 are written as "
-						   "MCAP; give -o FILE.mcap",
-						   path);
-	if (n > 1)
+	if (o->ros2 && !messages)
+		return incise_error_set(err, EINVAL,
+					"%s: messages of ROS 2 need one of these "
+					"extensions:" INCISE_MESSAGE_EXTENSIONS,
+					path);
+	if (messages && n > 1)
 		return incise_error_set(
 			err, EINVAL,
 			"%s: %s holds one recording, and %d are given; export each to a "
-			"file of its own, or give one of these extensions:%s",
-			path, format->name, n, list_extensions(ROWS, others));
-	if (o->rate_hz > 0 || o->depth_bins || o->resample)
+			"file of its own, or give one of these "
+			"extensions:" INCISE_ROW_EXTENSIONS,
+			path, format->name, n);
+	if (messages && (o->rate_hz > 0 || o->depth_bins || o->resample))
 		return incise_error_set(
 			err, EINVAL,
 			"%s: %s has every row as it was recorded; for a rate, averages "
-			"or resampled rows give one of these extensions:%s",
-			path, format->name, list_extensions(ROWS, others));
+			"or resampled rows give one of these "
+			"extensions:" INCISE_ROW_EXTENSIONS,
+			path, format->name);
 	return 0;
 }
 
@@ -177,6 +161,7 @@ int incise_export(struct incise_recording *const *recordings, int n,
 	const struct incise_table_format *sink;
 	struct incise_provenance provenance = {0};
 	struct incise_export_pass pass = {recordings, n, options, .err = err};
+	bool messages = format >= formats + ROWS;
 	bool lineage = format->lineage == ALWAYS || options->provenance;
 	struct incise_outfile *file;
 	int rc = incise_export_check(options, err);
@@ -185,7 +170,7 @@ int incise_export(struct incise_recording *const *recordings, int n,
 		return rc;
 	if (n < 1)
 		return incise_error_set(err, EINVAL, "no recording to export");
-	rc = check_messages(format, options, path, n, err);
+	rc = check_format(format, messages, options, path, n, err);
 	if (rc)
 		return rc;
 	sink = load_format(format, err);
@@ -194,11 +179,9 @@ int incise_export(struct incise_recording *const *recordings, int n,
 		return -errno;
 	rc = incise_provenance_of(&provenance, recordings, n, options, NULL, err);
 	if (!rc)
-		rc = (format->holds == MESSAGES
-			      ? incise_export_messages
-			      : incise_export_rows)(&pass, sink,
-						    incise_outfile_stream(file),
-						    lineage ? &provenance : NULL);
+		rc = (messages ? incise_export_messages : incise_export_rows)(
+			&pass, sink, incise_outfile_stream(file),
+			lineage ? &provenance : NULL);
 	incise_provenance_free(&provenance);
 	if (!rc && report)
 		*report = pass.report;

@@ -18,6 +18,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/error.h>
+#include "formats.h"
 #include "provenance.h"
 
 #define INCISE_TABLE_BLOCK 16384 /* rows; of HDF5 a chunk, 128 KiB of doubles */
@@ -109,11 +110,10 @@ struct incise_table {
 };
 
 /* The formats that are built in. */
-#define FORMAT(id, ...) extern const struct incise_table_format incise_table_##id;
-#define MODULE(...)
-#include "formats.def"
-#undef FORMAT
-#undef MODULE
+#define INCISE_TABLE_BUILT_IN(id, ...) \
+	extern const struct incise_table_format incise_table_##id;
+#define INCISE_TABLE_LOADED(...)
+INCISE_FORMATS(INCISE_TABLE_BUILT_IN, INCISE_TABLE_LOADED)
 
 /* Returns 0 or -errno; then there is nothing to close. */
 int incise_table_open(struct incise_table *table, struct incise_error *err);
