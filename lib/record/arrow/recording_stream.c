@@ -165,19 +165,6 @@ static int make_schema(struct ArrowSchema *schema,
 
 /* --- arrays -------------------------------------------------------------------------- */
 
-struct column_buffers {
-	const void *buffers
-		[3]; /* bits of the values that are there; values, or offsets and bytes of texts */
-};
-
-static void column_release(struct ArrowArray *array)
-{
-	for (int64_t i = 0; i < array->n_buffers; i++)
-		free((void *)array->buffers[i]);
-	free(array->private_data);
-	array->release = NULL;
-}
-
 static void array_release(struct ArrowArray *array)
 {
 	for (int64_t i = 0; i < array->n_children; i++) {
@@ -185,9 +172,24 @@ static void array_release(struct ArrowArray *array)
 			array->children[i]->release(array->children[i]);
 		free(array->children[i]);
 	}
+	for (int64_t i = 0; i < array->n_buffers; i++)
+		free((void *)array->buffers[i]);
 	free(array->children);
 	free(array->buffers);
 	array->release = NULL;
+}
+
+/* An array of the block's rows, or of a column of them. False: no memory; it has to be released all the same. */
+static bool open_array(struct ArrowArray *array, const struct incise_table *table,
+		       int n_buffers)
+{
+	*array = (struct ArrowArray){
+		.length = (int64_t)table->filled,
+		.buffers = calloc((size_t)n_buffers, sizeof(*array->buffers)),
+		.release = array_release,
+	};
+	array->n_buffers = array->buffers ? n_buffers : 0;
+	return array->buffers;
 }
 
 static void set_bit(uint8_t *bits, size_t at, bool value)
@@ -238,22 +240,6 @@ static bool mark_missing(struct ArrowArray *child, double *values, uint8_t **bit
 	return !child->null_count || *bits;
 }
 
-/* Control characters and bytes that are not UTF-8 become '?'. Returns the bytes, as many. */
-static size_t copy_text(char *to, const char *text)
-{
-	const char *from = text;
-
-	while (*text) {
-		int length = utf8_printable(text);
-
-		*to++ = length ? *text : '?';
-		text++;
-		for (int i = 1; i < length; i++)
-			*to++ = *text++;
-	}
-	return (size_t)(text - from);
-}
-
 static const char *text_of(const struct incise_table *table, enum incise_column_type type,
 			   const union incise_cell *cell)
 {
@@ -276,8 +262,10 @@ static bool copy_texts(const struct incise_table *table, enum incise_column_type
 	buffers[1] = to;
 	for (size_t i = 0; offsets && to && i < table->filled; i++)
 		offsets[i + 1] =
-			offsets[i] + (int32_t)copy_text(to + offsets[i],
-							text_of(table, type, &cells[i]));
+			(int32_t)(utf8_copy_printable(to + offsets[i],
+						      text_of(table, type, &cells[i]),
+						      "") -
+				  to);
 	return offsets && to;
 }
 
@@ -286,47 +274,30 @@ static bool copy_column(const struct incise_table *table, int i, struct ArrowArr
 {
 	const union incise_cell *cells = &table->block[(size_t)i * INCISE_TABLE_STRIDE];
 	enum incise_column_type type = table->columns[i].type;
-	struct column_buffers *own = calloc(1, sizeof(*own));
 	char format = format_of(type);
 	void *values;
 
-	*child = (struct ArrowArray){
-		.length = (int64_t)table->filled,
-		.n_buffers = !own	     ? 0
-			     : format == 'u' ? 3
-					     : 2,
-		.buffers = own ? own->buffers : NULL,
-		.release = column_release,
-		.private_data = own,
-	};
-	if (!own)
+	if (!open_array(child, table, format == 'u' ? 3 : 2))
 		return false;
 	if (format == 'u')
-		return copy_texts(table, type, cells, own->buffers + 1);
-	own->buffers[1] = values = copy_numbers(cells, table->filled, format);
+		return copy_texts(table, type, cells, child->buffers + 1);
+	child->buffers[1] = values = copy_numbers(cells, table->filled, format);
 	return values && (type != INCISE_COLUMN_SEEN ||
-			  mark_missing(child, values, (uint8_t **)&own->buffers[0]));
+			  mark_missing(child, values, (uint8_t **)&child->buffers[0]));
 }
 
 /* The rows of the block. Returns 0 or -ENOMEM. */
 static int make_array(struct ArrowArray *array, const struct incise_table *table)
 {
-	bool made;
+	bool made = open_array(array, table, 1); /* no row is missing */
 
-	*array = (struct ArrowArray){
-		.length = (int64_t)table->filled,
-		.n_buffers = 1,
-		.buffers = calloc(1, sizeof(*array->buffers)), /* no value is missing */
-		.children = calloc((size_t)table->n_columns, sizeof(*array->children)),
-		.release = array_release,
-	};
-	made = array->buffers && array->children;
+	array->children = calloc((size_t)table->n_columns, sizeof(*array->children));
+	made = made && array->children;
 	for (int i = 0; i < table->n_columns && made; i++) {
 		struct ArrowArray *child = calloc(1, sizeof(*child));
 
-		made = child;
-		if (child)
-			array->children[array->n_children++] = child;
+		array->children[i] = child;
+		array->n_children += child != NULL;
 		made = child && copy_column(table, i, child);
 	}
 	if (made)
@@ -341,7 +312,7 @@ struct stream {
 	struct incise_table_format format; /* table->format is this one */
 	const char *what;
 	struct incise_recording *recording;
-	struct incise_export_options options, given;
+	struct incise_export_options options, given; /* for the thread; as given */
 	struct incise_calibration calibration;
 	char *calibration_path;
 	struct incise_provenance provenance, time,

@@ -40,6 +40,11 @@ struct row {
 	struct incise_row_extra extra;
 };
 
+/* The largest values of samples that are not clipped. */
+struct extent {
+	double depth_mm, velocity_mm_s;
+};
+
 /* A pass over the cuts of some recordings, which are streamed, into the rows of a table. */
 struct pass {
 	struct incise_export_pass *all;
@@ -54,8 +59,9 @@ struct pass {
 		int cut, number;	      /* in the table */
 	} named;			      /* the last one with a name there */
 	struct incise_blade_pose_value blade; /* at the present sample */
-	int64_t first_ns;	 /* time 0 of its recording, CLOCK_MONOTONIC */
-	double depth_deepest_mm; /* of any row, for the error without a cut */
+	struct extent any, advancing; /* of all samples so far; of an advancing blade */
+	int64_t first_ns;	      /* time 0 of its recording, CLOCK_MONOTONIC */
+	double depth_deepest_mm;      /* of any row, for the error without a cut */
 
 	/* Uncertainties, if they are asked for. */
 	struct incise_budget_row budget_row; /* of the present sample … */
@@ -162,19 +168,23 @@ static void bin_add(struct bin *bin, size_t at, const struct pass *pass,
 				       &pass->budget_row);
 }
 
-/* Extend the bins without a given end to the largest sample that is not clipped. */
-static void extend(struct pass *pass, const struct incise_cut_sample *sample)
+static void extend(struct extent *extent, const struct incise_cut_sample *sample)
 {
-	const struct incise_export_options *o = pass->options;
-	struct incise_export_report *report = pass->report;
-
 	if (sample->clipped)
 		return;
-	if (!(o->depth_max_mm > 0))
-		report->depth_max_mm = fmax(report->depth_max_mm, sample->depth_mm);
-	if (!(o->velocity_max_mm_s > 0))
-		report->velocity_max_mm_s =
-			fmax(report->velocity_max_mm_s, sample->velocity_mm_s);
+	extent->depth_mm = fmax(extent->depth_mm, sample->depth_mm);
+	extent->velocity_mm_s = fmax(extent->velocity_mm_s, sample->velocity_mm_s);
+}
+
+/* Report the largest values, unless they are given. */
+static void report_extent(const struct pass *pass, const struct extent *extent)
+{
+	const struct incise_export_options *o = pass->options;
+
+	pass->report->depth_max_mm =
+		o->depth_max_mm > 0 ? o->depth_max_mm : extent->depth_mm;
+	pass->report->velocity_max_mm_s =
+		o->velocity_max_mm_s > 0 ? o->velocity_max_mm_s : extent->velocity_mm_s;
 }
 
 static int end_cut(struct pass *pass)
@@ -319,7 +329,7 @@ static int add_to_row(struct pass *pass, const struct incise_cut_sample *sample,
 	int64_t slot = rate > 0 ? (int64_t)floor((t_s + 0.5e-9) * rate) : raw->slot + 1;
 	int rc;
 
-	extend(pass, sample);
+	extend(&pass->any, sample);
 	pass->report->clipped += sample->clipped;
 	rc = slot != raw->slot ? put_row(pass) : 0;
 
@@ -333,10 +343,13 @@ static int write_raw(struct pass *pass)
 	static const struct visitor rows = {add_to_row, put_row};
 	struct incise_budget_mean mean = {0};
 	struct raw raw = {0};
+	int rc;
 
 	pass->state = &raw;
 	pass->means = &mean;
-	return each_cut(pass, &rows);
+	rc = each_cut(pass, &rows);
+	report_extent(pass, &pass->any);
+	return rc;
 }
 
 /* --- means over bins of depth and velocity (Song et al. 2006, §4.1) --- */
@@ -415,29 +428,24 @@ static int find_extent(struct pass *pass, const struct incise_cut_sample *sample
 		       double t_s)
 {
 	(void)t_s;
+	extend(&pass->any, sample);
 	if (pass->blade.advancing)
-		extend(pass, sample);
+		extend(&pass->advancing, sample);
 	return 0;
 }
 
-static int find_any_extent(struct pass *pass, const struct incise_cut_sample *sample,
-			   double t_s)
-{
-	(void)t_s;
-	extend(pass, sample);
-	return 0;
-}
-
-/* The bins' upper ends: those of where the blade advances, else of all. */
+/* Find the bins' upper ends: those of where the blade advances, else of all. Each sample is read once more. */
 static int find_ends(struct pass *pass)
 {
-	static const struct visitor advancing = {find_extent, NULL};
-	static const struct visitor any = {find_any_extent, NULL};
+	static const struct visitor visitor = {find_extent, NULL};
 	const struct incise_export_report *report = pass->report;
-	int rc = each_cut(pass, &advancing);
+	int rc;
 
-	if (!rc && !(report->depth_max_mm > 0 && report->velocity_max_mm_s > 0))
-		rc = each_cut(pass, &any);
+	pass->all->samples_all *= 2;
+	rc = each_cut(pass, &visitor);
+	report_extent(pass, &pass->advancing);
+	if (!(report->depth_max_mm > 0 && report->velocity_max_mm_s > 0))
+		report_extent(pass, &pass->any);
 	return rc;
 }
 
@@ -454,10 +462,9 @@ static int write_bins(struct pass *pass)
 	if (!pass->state || (pass->all->budgets && !pass->means))
 		rc = incise_error_set(pass->err, ENOMEM, "%d × %d bins: out of memory",
 				      o->depth_bins, o->velocity_bins);
-	if (!rc && !(o->depth_max_mm > 0 && o->velocity_max_mm_s > 0)) {
-		pass->all->samples_all *= 2; /* each is read twice */
+	report_extent(pass, &pass->any);
+	if (!rc && !(o->depth_max_mm > 0 && o->velocity_max_mm_s > 0))
 		rc = find_ends(pass);
-	}
 	if (!rc)
 		rc = each_cut(pass, &rows);
 	if (!rc && !o->by_cut)
@@ -518,8 +525,6 @@ static int write_cuts(struct incise_export_pass *all)
 	int rc;
 
 	all->state = &pass;
-	all->report.depth_max_mm = o->depth_max_mm;
-	all->report.velocity_max_mm_s = o->velocity_max_mm_s;
 	rc = o->depth_bins ? write_bins(&pass) : write_raw(&pass);
 	if (rc)
 		return rc;

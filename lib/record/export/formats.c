@@ -8,7 +8,6 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
-#include <incise/backend.h>
 #include <incise/outfile.h>
 #include "../../device/module.h"
 #include "streams.h"
@@ -58,22 +57,18 @@ static const struct incise_table_format *load_format(const struct format *format
 						     struct incise_error *err)
 {
 	const struct incise_table_format *loaded = format->built_in;
-	const struct incise_backend *backend;
 	struct incise_module module;
-	char file[40], package[40];
+	char file[40], symbol[40], package[40];
 
 	if (loaded)
 		return loaded;
 	snprintf(file, sizeof(file), "export_%s.so", format->id);
+	snprintf(symbol, sizeof(symbol), "incise_table_%s", format->id);
 	snprintf(package, sizeof(package), "%s is", format->package);
-	if (incise_module_find(&module, file, "incise_backend", format->name, package,
-			       err))
+	if (incise_module_find(&module, file, symbol, format->name, package, err))
 		return NULL;
-	backend = module.symbol;
-	if (backend->abi == INCISE_BACKEND_ABI && backend->open &&
-	    !strcmp(backend->kind, "export") && !strcmp(backend->name, format->id))
-		loaded = backend->open(NULL, err);
-	if (loaded && loaded->abi == INCISE_TABLE_ABI)
+	loaded = module.symbol;
+	if (loaded->abi == INCISE_TABLE_ABI)
 		return loaded;
 	errno = -incise_module_refuse(&module, file, format->name, err);
 	return NULL;

@@ -22,24 +22,6 @@ static char *add(char *to, const char *text)
 	return stpcpy(to, text);
 }
 
-/* A text in JSON's quotes; bytes that are not UTF-8 become '?'. */
-static char *add_text(char *to, const char *text)
-{
-	*to++ = '"';
-	while (*text) {
-		int length = utf8_printable(text);
-
-		if (*text == '"' || *text == '\\')
-			*to++ = '\\';
-		*to++ = length ? *text : '?';
-		text++;
-		for (int i = 1; i < length; i++)
-			*to++ = *text++;
-	}
-	*to++ = '"';
-	return to;
-}
-
 /* A value as its column says. */
 static char *add_value(char *to, const struct incise_table_column *column,
 		       const union incise_cell *cell)
@@ -50,7 +32,7 @@ static char *add_value(char *to, const struct incise_table_column *column,
 	case INCISE_COLUMN_FLAG:
 		return add(to, cell->flag ? "true" : "false");
 	case INCISE_COLUMN_TEXT:
-		return add_text(to, cell->text);
+		return add(utf8_copy_printable(add(to, "\""), cell->text, "\"\\"), "\"");
 	default:
 		return incise_decimal_integer(to, cell->integer);
 	}

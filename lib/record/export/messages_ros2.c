@@ -79,18 +79,10 @@ static void put_data(struct cdr *cdr, const void *data, size_t n)
 	cdr->at += n;
 }
 
-/* Bytes that are not UTF-8, and control characters, become '?'. */
 static void put_text(struct cdr *cdr, const char *text)
 {
 	put_u32(cdr, (uint32_t)strlen(text) + 1);
-	while (*text) {
-		int length = utf8_printable(text);
-
-		*cdr->at++ = length ? *text : '?';
-		text++;
-		for (int i = 1; i < length; i++)
-			*cdr->at++ = *text++;
-	}
+	cdr->at = utf8_copy_printable(cdr->at, text, "");
 	*cdr->at++ = 0;
 }
 

@@ -51,9 +51,6 @@ int incise_stream_rows_open(struct incise_stream_rows *stream,
 			    const struct incise_export_options *options,
 			    struct incise_error *err);
 
-/* Go to the next row: 1, 0 at the end, -errno. */
-int incise_stream_rows_next(struct incise_stream_rows *stream, struct incise_error *err);
-
 void incise_stream_rows_close(struct incise_stream_rows *stream);
 
 /* Write the rows of a stream in this format. Returns 0 or -errno. */

@@ -109,11 +109,10 @@ struct incise_table {
 	void *state; /* of the format */
 };
 
-/* The formats that are built in. */
-#define INCISE_TABLE_BUILT_IN(id, ...) \
-	extern const struct incise_table_format incise_table_##id;
-#define INCISE_TABLE_LOADED(...)
-INCISE_FORMATS(INCISE_TABLE_BUILT_IN, INCISE_TABLE_LOADED)
+/* The formats; that of a module is its symbol. */
+#define INCISE_TABLE_FORMAT(id, ...) \
+	INCISE_API extern const struct incise_table_format incise_table_##id;
+INCISE_FORMATS(INCISE_TABLE_FORMAT, INCISE_TABLE_FORMAT)
 
 /* Returns 0 or -errno; then there is nothing to close. */
 int incise_table_open(struct incise_table *table, struct incise_error *err);

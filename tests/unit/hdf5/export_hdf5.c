@@ -7,7 +7,6 @@
 #include <sys/resource.h>
 #include <signal.h>
 #include <hdf5.h>
-#include <incise/backend.h>
 #include <incise/outfile.h>
 #include "../../../lib/record/export/table_writer.h"
 
@@ -69,7 +68,7 @@ static int write_rows(int64_t n, const struct incise_provenance *provenance,
 {
 	struct incise_outfile *file = incise_outfile_open(FILE_NAME, err);
 	struct incise_table table = {
-		.format = incise_backend.open(NULL, err),
+		.format = &incise_table_hdf5,
 		.columns = columns,
 		.n_columns = 5,
 		.provenance = provenance,

@@ -22,7 +22,6 @@
 #include <unistd.h>
 #include <hdf5.h>
 #include <zlib.h>
-#include <incise/backend.h>
 #include "../table_writer.h"
 
 #define LEVEL 1 /* noted in the file; readers ignore it */
@@ -338,26 +337,10 @@ static int hdf5_end(struct incise_table *table, struct incise_error *err)
 	return bad ? fail(hdf5, "the file cannot be closed", err) : 0;
 }
 
-static const struct incise_table_format format = {
+const struct incise_table_format incise_table_hdf5 = {
 	.abi = INCISE_TABLE_ABI,
 	.open = hdf5_open,
 	.put = hdf5_put,
 	.end = hdf5_end,
 	.close = hdf5_close,
-};
-
-static void *get_format(const struct incise_backend_request *request,
-			struct incise_error *err)
-{
-	(void)request;
-	(void)err;
-	return (void *)&format;
-}
-
-/* Found like the module of a device; open() returns a format. */
-const struct incise_backend incise_backend = {
-	.abi = INCISE_BACKEND_ABI,
-	.kind = "export",
-	.name = "hdf5",
-	.open = get_format,
 };
