@@ -395,7 +395,7 @@ static int stream_put(struct incise_table *table, struct incise_error *err)
 	return hand_over(stream, &block);
 }
 
-static int progress(void *context, double share)
+static int report_progress(void *context, double share)
 {
 	struct stream *stream = context;
 	bool stop;
@@ -528,7 +528,7 @@ static int export_stream(struct stream *stream)
 	return rc;
 }
 
-static void *run(void *argument)
+static void *run_export(void *argument)
 {
 	struct stream *stream = argument;
 	struct incise_export_pass pass = {&stream->recording, 1, &stream->options,
@@ -658,7 +658,7 @@ static int start_export(struct stream *stream,
 	if (rc)
 		return rc;
 	stream->given = stream->options = *options;
-	stream->options.progress = progress;
+	stream->options.progress = report_progress;
 	stream->options.context = stream;
 	if (options->calibration) {
 		stream->calibration = *options->calibration;
@@ -670,7 +670,7 @@ static int start_export(struct stream *stream,
 		if (!stream->calibration_path)
 			return fail_memory(stream, err);
 	}
-	rc = incise_thread_start(&stream->thread, run, stream, NULL);
+	rc = incise_thread_start(&stream->thread, run_export, stream, NULL);
 	if (rc)
 		return incise_error_set(err, -rc, "%s: no thread to read it: %s",
 					stream->recording->path, strerror(-rc));

@@ -168,7 +168,7 @@ static void bin_add(struct bin *bin, size_t at, const struct pass *pass,
 				       &pass->budget_row);
 }
 
-static void extend(struct extent *extent, const struct incise_cut_sample *sample)
+static void extend_to(struct extent *extent, const struct incise_cut_sample *sample)
 {
 	if (sample->clipped)
 		return;
@@ -329,7 +329,7 @@ static int add_to_row(struct pass *pass, const struct incise_cut_sample *sample,
 	int64_t slot = rate > 0 ? (int64_t)floor((t_s + 0.5e-9) * rate) : raw->slot + 1;
 	int rc;
 
-	extend(&pass->any, sample);
+	extend_to(&pass->any, sample);
 	pass->report->clipped += sample->clipped;
 	rc = slot != raw->slot ? put_row(pass) : 0;
 
@@ -428,9 +428,9 @@ static int find_extent(struct pass *pass, const struct incise_cut_sample *sample
 		       double t_s)
 {
 	(void)t_s;
-	extend(&pass->any, sample);
+	extend_to(&pass->any, sample);
 	if (pass->blade.advancing)
-		extend(&pass->advancing, sample);
+		extend_to(&pass->advancing, sample);
 	return 0;
 }
 

@@ -231,7 +231,7 @@ static int open_streams(struct incise_messages *messages, struct incise_error *e
 }
 
 /* Read what the messages depend on. Returns 0 or -errno. */
-static int prepare(struct incise_messages *messages, struct incise_error *err)
+static int prepare_messages(struct incise_messages *messages, struct incise_error *err)
 {
 	struct incise_recording *recording = messages->recording;
 	const struct incise_calibration *given = messages->pass->options->calibration;
@@ -266,7 +266,7 @@ static int mcap_open(struct incise_table *table, struct incise_error *err)
 	messages->profile = table->pass->options->ros2 ? &incise_messages_ros2
 						       : &incise_messages_json;
 	incise_mcap_begin(&messages->mcap, table->out, messages->profile->name);
-	rc = prepare(messages, err);
+	rc = prepare_messages(messages, err);
 	if (!rc)
 		rc = open_streams(messages, err);
 	if (rc)

@@ -84,8 +84,8 @@ static int find_parts(struct incise_messages *messages,
 	return 0;
 }
 
-static int64_t encode(struct incise_messages *messages,
-		      const struct incise_stream_rows *stream)
+static int64_t encode_members(struct incise_messages *messages,
+			      const struct incise_stream_rows *stream)
 {
 	const struct incise_message_stream *kind =
 		messages->kinds[stream - messages->streams];
@@ -141,16 +141,16 @@ static const struct incise_json_member events[] = {
 };
 
 static const struct incise_message_stream streams[] = {
-	{"force", encode, force, "/force", "incise.Force",
+	{"force", encode_members, force, "/force", "incise.Force",
 	 OBJECT("\"force_N\":" NUMBER("N") ",\"code\":{\"type\":\"integer\"},"
 					   "\"clipped\":{\"type\":\"boolean\"}")},
-	{"tracker", encode, tracker, "/tracker", "incise.Pose",
+	{"tracker", encode_members, tracker, "/tracker", "incise.Pose",
 	 OBJECT("\"position_mm\":" OBJECT("\"x\":" NUMBER("mm") ",\"y\":" NUMBER("mm") ",\"z\":" NUMBER("mm")) ",\"orientation\":" OBJECT(
 		 "\"w\":" NUMBER("unit quaternion") ",\"x\":" NUMBER("unit quaternion") ",\"y\":" NUMBER(
 			 "unit quaternion") ",\"z\":" NUMBER("unit quaternion")) ",\"status\":{\"type\":\"string\"}")},
-	{"depth", encode, depth, "/depth", "incise.Depth",
+	{"depth", encode_members, depth, "/depth", "incise.Depth",
 	 OBJECT("\"depth_mm\":" NUMBER("mm") ",\"velocity_mm_s\":" NUMBER("mm/s"))},
-	{"events", encode, events, "/events", "incise.Event",
+	{"events", encode_members, events, "/events", "incise.Event",
 	 OBJECT("\"kind\":{\"type\":\"string\"},\"text\":{\"type\":\"string\"}")},
 };
 

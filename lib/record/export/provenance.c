@@ -48,22 +48,28 @@ void incise_provenance_add(struct incise_provenance *provenance, const char *key
 	provenance->n++;
 }
 
-/* "a, b, c" of one text per recording; to be freed. */
-static char *join(struct incise_recording *const *recordings, int n,
-		  const char *(*text)(const struct incise_recording *recording))
+/* Add to the value of the last pair, with ", " between, if that has this key; else a pair. */
+INCISE_PRINTF(3, 4)
+static void append_value(struct incise_provenance *to, const char *key, const char *fmt,
+			 ...)
 {
-	size_t size = 1;
-	char *all, *to;
+	char *before = NULL, *text;
+	va_list args;
+	int length;
 
-	for (int i = 0; i < n; i++)
-		size += strlen(text(recordings[i])) + 2;
-	all = to = malloc(size);
-	if (!all)
-		return NULL;
-	*to = 0;
-	for (int i = 0; i < n; i++)
-		to += sprintf(to, "%s%s", i ? ", " : "", text(recordings[i]));
-	return all;
+	va_start(args, fmt);
+	length = vasprintf(&text, fmt, args);
+	va_end(args);
+	if (length < 0)
+		to->rc = -ENOMEM;
+	if (to->rc)
+		return;
+	if (to->n && !strcmp(to->items[to->n - 1].key, key))
+		before = to->items[--to->n].value;
+	incise_provenance_add(to, key, "%s%s%s", before ? before : "", before ? ", " : "",
+			      text);
+	free(before);
+	free(text);
 }
 
 static const char *path_of(const struct incise_recording *recording)
@@ -91,20 +97,10 @@ static const char *rig_of(const struct incise_recording *recording)
 	return recording->meta.rig;
 }
 
-/* Add a text, which is freed; NULL: no memory. */
-static void add_text(struct incise_provenance *provenance, const char *key, char *text)
-{
-	if (text)
-		incise_provenance_add(provenance, key, "%s", text);
-	else
-		provenance->rc = -ENOMEM;
-	free(text);
-}
-
 static void add_sources(struct incise_provenance *provenance,
 			struct incise_recording *const *recordings, int n)
 {
-	const struct {
+	static const struct {
 		const char *key;
 		const char *(*text)(const struct incise_recording *recording);
 	} items[] = {{"source", path_of},
@@ -113,7 +109,9 @@ static void add_sources(struct incise_provenance *provenance,
 		     {"state", state_of}};
 
 	for (size_t i = 0; i < sizeof(items) / sizeof(*items); i++)
-		add_text(provenance, items[i].key, join(recordings, n, items[i].text));
+		for (int k = 0; k < n; k++)
+			append_value(provenance, items[i].key, "%s",
+				     items[i].text(recordings[k]));
 }
 
 /* Append an origin; nothing if it does not fit. */
@@ -202,17 +200,21 @@ static void add_origins(struct incise_provenance *provenance,
 	const size_t most = INCISE_SESSION_MEMBERS_MAX * INCISE_ORIGIN_TEXT;
 	char *all = malloc((size_t)n * most + INCISE_ORIGIN_TEXT), *to = all;
 
-	if (all)
-		*all = 0;
-	for (int i = 0; i < n && all; i++) {
+	if (!all) {
+		provenance->rc = -ENOMEM;
+		return;
+	}
+	*all = 0;
+	for (int i = 0; i < n; i++) {
 		if (to > all)
 			*to++ = ' ';
 		to += incise_recording_origins(recordings[i], to, most);
 	}
-	if (all && calibration_path)
+	if (calibration_path)
 		put_given(calibration_path, all, (size_t)n * most + INCISE_ORIGIN_TEXT,
 			  (size_t)(to - all));
-	add_text(provenance, "origin", all);
+	incise_provenance_add(provenance, "origin", "%s", all);
+	free(all);
 }
 
 /* The mapping to TAI of one recording: its first and last point, which have all that is constant. */
@@ -255,24 +257,30 @@ static void add_wall(struct incise_provenance *provenance,
 	incise_wall_free(wall);
 }
 
-/* Add which calibration of a recording is active; of a joined one, of each member. */
-static int describe_active(const struct incise_recording *recording, FILE *out)
+/* Say which calibration of each recording is active; of a joined one, of each member. */
+static void add_active(struct incise_provenance *provenance,
+		       struct incise_recording *const *recordings, int n)
 {
-	const struct incise_session *session = recording->session;
-	int n = session ? session->n : 1;
-
 	for (int i = 0; i < n; i++) {
-		const struct incise_recording *member =
-			session ? session->members[i] : recording;
-		char *text = incise_recalibration_text(member);
+		const struct incise_session *session = recordings[i]->session;
+		int members = session ? session->n : 1;
 
-		if (!text)
-			return -ENOMEM;
-		fprintf(out, "%s%s%s%s", i ? ", " : "", n > 1 ? member->name : "",
-			n > 1 ? ": " : "", text);
-		free(text);
+		for (int k = 0; k < members; k++) {
+			const struct incise_recording *member =
+				session ? session->members[k] : recordings[i];
+			char *text = incise_recalibration_text(member);
+
+			if (!text)
+				provenance->rc = -ENOMEM;
+			else
+				append_value(provenance, "calibration", "%s%s%s%s%s",
+					     n > 1 && !k ? recordings[i]->name : "",
+					     n > 1 && !k ? ": " : "",
+					     members > 1 ? member->name : "",
+					     members > 1 ? ": " : "", text);
+			free(text);
+		}
 	}
-	return 0;
 }
 
 static bool is_recalibrated(const struct incise_recording *recording)
@@ -285,32 +293,21 @@ static bool is_recalibrated(const struct incise_recording *recording)
 	return is;
 }
 
-/* The calibration in use, in words: to be freed, NULL: no memory. */
-static char *calibration_text(struct incise_recording *const *recordings, int n,
-			      const struct incise_calibration *given)
+/* Say which calibration is in use. */
+static void add_choice(struct incise_provenance *provenance,
+		       struct incise_recording *const *recordings, int n,
+		       const struct incise_calibration *given)
 {
 	bool any = false;
-	char *text = NULL;
-	size_t size = 0;
-	FILE *out;
-	int rc = 0;
 
 	for (int i = 0; i < n; i++)
 		any |= is_recalibrated(recordings[i]);
-	if (given || !any)
-		return strdup(given ? "given for the export" : "of the recording");
-	out = open_memstream(&text, &size);
-	for (int i = 0; i < n && out && !rc; i++) {
-		if (i)
-			fputs(", ", out);
-		if (n > 1)
-			fprintf(out, "%s: ", recordings[i]->name);
-		rc = describe_active(recordings[i], out);
-	}
-	if (out && !fclose(out) && !rc)
-		return text;
-	free(text);
-	return NULL;
+	if (any && !given)
+		add_active(provenance, recordings, n);
+	else
+		incise_provenance_add(provenance, "calibration", "%s",
+				      given ? "given for the export"
+					    : "of the recording");
 }
 
 /* Add the camera's scale, and delays of a given calibration, or of an active one. */
@@ -355,7 +352,7 @@ static void add_calibration(struct incise_provenance *provenance,
 
 	if (!own)
 		zero_mV = given->force_zero_mV;
-	add_text(provenance, "calibration", calibration_text(recordings, n, given));
+	add_choice(provenance, recordings, n, given);
 	for (int i = 1; i < n && own; i++) {
 		if (!given && recordings[i]->meta.force_mV_N != mV_N)
 			return;
@@ -384,40 +381,37 @@ static const struct {
 	[INCISE_BUDGET_DELAY] = {"delay_s", "s"},
 };
 
-/* Standard uncertainties and covariances of the common sources, as two texts to be freed. */
-static int describe_budget(const struct incise_budget *budget, char **u,
-			   char **covariance)
+/* Add standard uncertainties and covariances of the common sources. */
+static void describe_budget(struct incise_provenance *to,
+			    const struct incise_budget *budget)
 {
-	size_t size[2];
-	FILE *text[2] = {open_memstream(u, &size[0]),
-			 open_memstream(covariance, &size[1])};
-	bool failed = !text[0] || !text[1];
+	for (int i = 0; i < INCISE_BUDGET_SOURCES; i++) {
+		double u = incise_budget_u(budget, i);
 
-	for (int i = 0; i < INCISE_BUDGET_SOURCES && !failed; i++) {
-		double value = incise_budget_u(budget, (enum incise_budget_source)i);
-
-		if (!sources[i].name)
-			continue;
-		if (isnan(value))
-			fprintf(text[0], "%s%s not stated", i ? ", " : "",
-				sources[i].name);
-		else
-			fprintf(text[0], "%s%s %.9g %s", i ? ", " : "", sources[i].name,
-				value, sources[i].unit);
-		for (int k = 0; k < i; k++) {
-			value = incise_budget_covariance(budget,
-							 (enum incise_budget_source)k,
-							 (enum incise_budget_source)i);
-			if (sources[k].name && !isnan(value) && value != 0)
-				fprintf(text[1], "%s%s %s %.9g",
-					ftell(text[1]) > 0 ? ", " : "", sources[k].name,
-					sources[i].name, value);
-		}
+		if (sources[i].name && isnan(u))
+			append_value(to, "calibration_u", "%s not stated",
+				     sources[i].name);
+		else if (sources[i].name)
+			append_value(to, "calibration_u", "%s %.9g %s", sources[i].name,
+				     u, sources[i].unit);
 	}
-	for (int i = 0; i < 2; i++)
-		if (text[i] && fclose(text[i]))
-			failed = true;
-	return failed ? -ENOMEM : 0;
+	for (int i = 0; i < INCISE_BUDGET_SOURCES; i++)
+		for (int k = 0; k < i && sources[i].name; k++) {
+			double value = incise_budget_covariance(budget, k, i);
+
+			if (sources[k].name && !isnan(value) && value != 0)
+				append_value(to, "calibration_covariance", "%s %s %.9g",
+					     sources[k].name, sources[i].name, value);
+		}
+}
+
+static bool are_same(const struct incise_provenance *a, const struct incise_provenance *b)
+{
+	bool same = a->n == b->n;
+
+	for (int i = 0; i < a->n && same; i++)
+		same = !strcmp(a->items[i].value, b->items[i].value);
+	return same;
 }
 
 /* The uncertainties that the calibrations state, with their covariances; of several recordings
@@ -428,7 +422,7 @@ static int add_budget(struct incise_provenance *provenance,
 		      struct incise_error *err)
 {
 	static const char *const words[] = {"none", "total", "parts"};
-	char *u[2] = {NULL}, *covariance[2] = {NULL};
+	struct incise_provenance first = {0}, other = {0};
 	bool same = true;
 	int rc = 0;
 
@@ -438,32 +432,24 @@ static int add_budget(struct incise_provenance *provenance,
 		struct incise_budget *budget =
 			incise_budget_open(recordings[i], options, false, err);
 
-		if (!budget)
-			rc = -errno;
-		else
-			rc = describe_budget(budget, &u[i > 0], &covariance[i > 0]);
+		rc = budget ? 0 : -errno;
+		if (budget)
+			describe_budget(i ? &other : &first, budget);
+		same = !i || are_same(&first, &other);
 		incise_budget_free(budget);
-		if (i && !rc) {
-			same = !strcmp(u[0], u[1]) &&
-			       !strcmp(covariance[0], covariance[1]);
-			free(u[1]);
-			free(covariance[1]);
-			u[1] = covariance[1] = NULL;
-		}
+		incise_provenance_free(&other);
 	}
 	incise_provenance_add(provenance, "uncertainty",
 			      "%s: standard uncertainties, 2 u holds 95 %%",
 			      words[options->uncertainty]);
-	if (!rc)
-		incise_provenance_add(provenance, "calibration_u", "%s",
-				      same ? u[0] : "each recording's own");
-	if (!rc && same)
-		incise_provenance_add(provenance, "calibration_covariance", "%s",
-				      covariance[0]);
-	for (int i = 0; i < 2; i++) {
-		free(u[i]);
-		free(covariance[i]);
-	}
+	if (!same)
+		incise_provenance_add(provenance, "calibration_u",
+				      "each recording's own");
+	for (int i = 0; i < first.n && same; i++)
+		incise_provenance_add(provenance, first.items[i].key, "%s",
+				      first.items[i].value);
+	rc = rc ? rc : first.rc;
+	incise_provenance_free(&first);
 	return rc;
 }
 

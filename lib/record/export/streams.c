@@ -45,8 +45,8 @@ static void scale_depth(struct incise_stream_rows *stream)
 static const struct incise_stream_kind {
 	const char *name, *columns;
 	int from, n;
-	void (*finish)(struct incise_stream_rows
-			       *stream); /* the cells that were read; or NULL */
+	/* Compute the cells that the table does not have; or NULL. */
+	void (*finish)(struct incise_stream_rows *stream);
 	struct incise_table_column fields[INCISE_STREAM_COLUMNS + 1];
 } kinds[] = {
 	{"force",
@@ -135,7 +135,6 @@ int incise_stream_rows_open(struct incise_stream_rows *stream,
 
 	*stream = (struct incise_stream_rows){
 		.kind = kind,
-		.recording = recording,
 		.depth_scale =
 			given ? given->depth_mm_px / recording->meta.depth_mm_px : 1,
 	};

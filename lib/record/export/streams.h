@@ -18,7 +18,6 @@
 
 struct incise_stream_rows {
 	const struct incise_stream_kind *kind;
-	struct incise_recording *recording;
 	struct incise_rows rows;
 	struct incise_recording_force scale;
 	double depth_scale; /* of another calibration, of depths by vision */
