@@ -61,6 +61,7 @@ struct pass {
 	struct incise_blade_pose_value blade; /* at the present sample */
 	struct extent any, advancing; /* of all samples so far; of an advancing blade */
 	int64_t first_ns;	      /* time 0 of its recording, CLOCK_MONOTONIC */
+	double t_s;		      /* of the present sample, from there */
 	double depth_deepest_mm;      /* of any row, for the error without a cut */
 
 	/* Uncertainties, if they are asked for. */
@@ -72,8 +73,7 @@ struct pass {
 
 /* Functions for each sample and cut; each returns 0 or -errno. */
 struct visitor {
-	int (*sample)(struct pass *pass, const struct incise_cut_sample *sample,
-		      double t_s);
+	int (*sample)(struct pass *pass, const struct incise_cut_sample *sample);
 	int (*end_cut)(struct pass *pass); /* or NULL */
 };
 
@@ -139,13 +139,13 @@ static int add_row(struct pass *pass, struct row *row, size_t at)
 
 /* Add a sample to bin number @at. Welford's way: one pass, no cancellation. */
 static void bin_add(struct bin *bin, size_t at, const struct pass *pass,
-		    const struct incise_cut_sample *sample, double t_s)
+		    const struct incise_cut_sample *sample)
 {
 	int cut = pass->cut;
 	double share = 1.0 / ++bin->n;
 	double delta = sample->force_N - bin->force_N;
 
-	bin->t_s += share * (t_s - bin->t_s);
+	bin->t_s += share * (pass->t_s - bin->t_s);
 	bin->depth_mm += share * (sample->depth_mm - bin->depth_mm);
 	bin->velocity_mm_s += share * (sample->velocity_mm_s - bin->velocity_mm_s);
 	bin->acceleration_mm_s2 +=
@@ -242,8 +242,8 @@ static int each_cut_sample(struct pass *pass, struct incise_cuts *cuts,
 			pass->cut++;
 		}
 		pass->first_ns = cuts->first_ns;
-		rc = pass->visitor->sample(pass, &sample,
-					   (sample.t_ns - cuts->first_ns) * 1e-9);
+		pass->t_s = (sample.t_ns - cuts->first_ns) * 1e-9;
+		rc = pass->visitor->sample(pass, &sample);
 		if (!rc && (cuts->force.n & 0xfff) == 0)
 			rc = incise_export_progress(
 				pass->options,
@@ -320,13 +320,13 @@ static int put_row(struct pass *pass)
 	return row.bin.n ? add_row(pass, &row, 0) : 0;
 }
 
-static int add_to_row(struct pass *pass, const struct incise_cut_sample *sample,
-		      double t_s)
+static int add_to_row(struct pass *pass, const struct incise_cut_sample *sample)
 {
 	struct raw *raw = pass->state;
 	double rate = pass->options->rate_hz;
 	/* Half a ns keeps a sample on the edge in its own slot; times are whole ns. */
-	int64_t slot = rate > 0 ? (int64_t)floor((t_s + 0.5e-9) * rate) : raw->slot + 1;
+	int64_t slot =
+		rate > 0 ? (int64_t)floor((pass->t_s + 0.5e-9) * rate) : raw->slot + 1;
 	int rc;
 
 	extend_to(&pass->any, sample);
@@ -334,7 +334,7 @@ static int add_to_row(struct pass *pass, const struct incise_cut_sample *sample,
 	rc = slot != raw->slot ? put_row(pass) : 0;
 
 	raw->slot = slot;
-	bin_add(&raw->bin, 0, pass, sample, t_s);
+	bin_add(&raw->bin, 0, pass, sample);
 	return rc;
 }
 
@@ -377,14 +377,12 @@ static int bin_of(double value, double max, int bins)
 	return value < max ? (int)fmin(value / max * bins, bins - 1) : bins - 1;
 }
 
-static int add_to_bin(struct pass *pass, const struct incise_cut_sample *sample,
-		      double t_s)
+static int add_to_bin(struct pass *pass, const struct incise_cut_sample *sample)
 {
 	struct bin *bins = pass->state;
 	const struct incise_export_options *o = pass->options;
 	int i, k;
 
-	(void)t_s; /* visitors share one form */
 	if (sample->clipped) {
 		pass->report->clipped++;
 		return 0;
@@ -397,7 +395,7 @@ static int add_to_bin(struct pass *pass, const struct incise_cut_sample *sample,
 		size_t at =
 			(size_t)2 * (i * o->velocity_bins + k) + pass->blade.advancing;
 
-		bin_add(&bins[at], at, pass, sample, 0);
+		bin_add(&bins[at], at, pass, sample);
 	}
 	return 0;
 }
@@ -424,10 +422,8 @@ static int put_bins(struct pass *pass)
 	return rc;
 }
 
-static int find_extent(struct pass *pass, const struct incise_cut_sample *sample,
-		       double t_s)
+static int find_extent(struct pass *pass, const struct incise_cut_sample *sample)
 {
-	(void)t_s;
 	extend_to(&pass->any, sample);
 	if (pass->blade.advancing)
 		extend_to(&pass->advancing, sample);

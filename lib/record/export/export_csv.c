@@ -60,6 +60,7 @@ static void put_cell(struct incise_table *table, const struct incise_table_colum
 		put_name(table, cell->integer);
 		break;
 	case INCISE_COLUMN_INTEGER:
+	case INCISE_COLUMN_SHORT:
 	case INCISE_COLUMN_FLAG:
 		end = incise_decimal_integer(text, cell->integer);
 		break;

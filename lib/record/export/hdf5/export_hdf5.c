@@ -71,6 +71,7 @@ static hid_t stored_type(enum incise_column_type type)
 {
 	switch (type) {
 	case INCISE_COLUMN_REAL:
+	case INCISE_COLUMN_SEEN:
 		return H5T_NATIVE_DOUBLE;
 	case INCISE_COLUMN_SINGLE:
 	case INCISE_COLUMN_COARSE:
