@@ -245,10 +245,9 @@ static int each_cut_sample(struct pass *pass, struct incise_cuts *cuts,
 		pass->t_s = (sample.t_ns - cuts->first_ns) * 1e-9;
 		rc = pass->visitor->sample(pass, &sample);
 		if (!rc && (cuts->force.n & 0xfff) == 0)
-			rc = incise_export_progress(
-				pass->options,
-				(double)(pass->all->samples + cuts->force.n),
-				(double)pass->all->samples_all, pass->err);
+			rc = incise_export_progress(pass->all,
+						    pass->all->samples + cuts->force.n,
+						    pass->all->samples_all);
 		if (rc)
 			return rc;
 	}
@@ -601,6 +600,17 @@ static int open_recording(struct incise_export_pass *pass, int i)
 	if (pass->options->tai)
 		pass->wall = incise_recording_wall(pass->recordings[i], pass->err);
 	return pass->options->tai && !pass->wall ? -errno : 0;
+}
+
+int incise_export_progress(const struct incise_export_pass *pass, uint64_t done,
+			   uint64_t all)
+{
+	const struct incise_export_options *o = pass->options;
+	double share = fmin(1, (double)done / fmax(1, (double)all));
+
+	if (o->progress && o->progress(o->context, share))
+		return incise_error_set(pass->err, EINTR, "interrupted");
+	return 0;
 }
 
 int incise_export_check_part(const struct incise_export_pass *pass)

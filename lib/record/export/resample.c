@@ -187,9 +187,8 @@ static int put_row(struct resample *r, int64_t t_ns,
 		rc = incise_table_add(pass->table, &row, r->err);
 	report_row(r, &row);
 	if (!rc && (pass->report.rows & 0xfff) == 0)
-		rc = incise_export_progress(pass->options,
-					    (double)(pass->samples + r->force.rows.n),
-					    (double)pass->samples_all, r->err);
+		rc = incise_export_progress(pass, pass->samples + r->force.rows.n,
+					    pass->samples_all);
 	return rc;
 }
 

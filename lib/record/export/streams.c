@@ -262,7 +262,6 @@ static int write_messages(struct incise_export_pass *pass, struct incise_table *
 {
 	const struct incise_recording *recording = pass->recordings[0];
 	const struct incise_recording_info *meta = &recording->meta;
-	double all = (double)(meta->force + meta->tracker + meta->depth);
 	uint64_t n = 0;
 	int rc = 1;
 
@@ -274,8 +273,8 @@ static int write_messages(struct incise_export_pass *pass, struct incise_table *
 			     ? table->format->put(table, pass->err)
 			     : 0;
 		if (!rc && (++n & 0xffff) == 0)
-			rc = incise_export_progress(pass->options, (double)n, all,
-						    pass->err);
+			rc = incise_export_progress(
+				pass, n, meta->force + meta->tracker + meta->depth);
 		if (!rc)
 			rc = next_row(table->stream, pass->err);
 	}

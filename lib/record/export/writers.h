@@ -29,22 +29,10 @@ struct incise_export_pass {
 	uint64_t samples, samples_all; /* of force, read and to be read */
 	struct incise_wall *wall;      /* of the present recording; NULL: without TAI */
 	bool camera;		       /* resampled rows have the columns of the camera */
-	struct incise_budget *
-		*budgets; /* of each recording; NULL: without uncertainties */
-	void *state;	  /* of the kind of rows */
+	struct incise_budget **budgets; /* of each recording, or NULL */
+	void *state;			/* of the kind of rows */
 	int64_t first_ns; /* of messages: of the first sample, if a part is asked for */
 };
-
-/* Report progress, @done of @all. 0, or -EINTR if the callback stops the export. */
-static inline int incise_export_progress(const struct incise_export_options *options,
-					 double done, double all,
-					 struct incise_error *err)
-{
-	if (options->progress &&
-	    options->progress(options->context, fmin(1, done / fmax(1, all))))
-		return incise_error_set(err, EINTR, "interrupted");
-	return 0;
-}
 
 /* --- columns.c ---------------------------------------------------------------------- */
 
@@ -144,6 +132,10 @@ int incise_export_rows(struct incise_export_pass *pass,
 int incise_export_each(struct incise_export_pass *pass,
 		       int (*visit)(struct incise_export_pass *pass,
 				    struct incise_recording *recording));
+
+/* Report progress, @done of @all. 0, or -EINTR if the callback stops the export. */
+int incise_export_progress(const struct incise_export_pass *pass, uint64_t done,
+			   uint64_t all);
 
 /*
  * Open the budgets of all recordings, if uncertainties are asked for, and report which are not stated. Returns 0
