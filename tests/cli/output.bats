@@ -371,8 +371,8 @@ full() {
 		bad_usage "$said"
 		[ ! -e out ] && [ ! -e out.odd ]
 	done <<-'END'
-		export d.rec -o out.odd|--output: out.odd: unknown extension .odd; give .csv, .h5 or .mcap
-		export d.rec -o out.CSV|--output: out.CSV: unknown extension .CSV; give .csv, .h5 or .mcap
+		export d.rec -o out.odd|--output: out.odd: unknown extension .odd; give .csv, .h5, .hdf5 or .mcap
+		export d.rec -o out.CSV|--output: out.CSV: unknown extension .CSV; give .csv, .h5, .hdf5 or .mcap
 		train pairs.csv -o out.odd|--output: out.odd: unknown extension .odd; give .fis
 		train pairs.csv -o out.fis --initial out.odd|--initial: out.odd: unknown extension .odd; give .fis
 		train pairs.csv -o out.fis --history out.odd|--history: out.odd: unknown extension .odd; give .csv

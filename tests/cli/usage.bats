@@ -62,9 +62,9 @@ table() {
 		export a.rec --resample --rate 0.5|--rate
 		export a.rec --average 3x3 --tai|--tai
 		export a.rec --uncertainty parts --profile ros2 -o a.mcap|--uncertainty
-		export a.rec --profile ros2 -o a.csv|--profile needs -o FILE.mcap
-		export a.rec --profile ros2 -o a.h5|--profile needs -o FILE.mcap
-		export a.rec --profile ros2 -o -|--profile needs -o FILE.mcap
+		export a.rec --profile ros2 -o a.csv|--profile needs -o FILE with .mcap
+		export a.rec --profile ros2 -o a.h5|--profile needs -o FILE with .mcap
+		export a.rec --profile ros2 -o -|--profile needs -o FILE with .mcap
 		haptic|missing SCENE (
 		haptic neck more.scene|; give one SCENE at a time
 		haptic neck --rig $rig --log l.csv|--duration

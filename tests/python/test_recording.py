@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 import unittest
+import unittest.mock
 
 import incise
 import read_blocks
@@ -50,6 +51,12 @@ class Recordings(Case):
         self.assertEqual([s.name for s in info.streams], ["force", "tracker"])
         self.assertEqual(info.streams[1].lost, 0)
         self.assertEqual(info.surface_normal, (0, 0, 1))
+
+    def test_parquet_needs_pyarrow(self):
+        with unittest.mock.patch.dict(sys.modules, {"pyarrow": None}):
+            path = self.path("force.parquet")
+            self.says(ImportError, "pip install pyarrow", self.rec.force.parquet, path)
+        self.assertEqual(os.listdir(self.folder), [])
 
     def test_streams_are_the_blocks(self):
         stored = {}

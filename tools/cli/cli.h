@@ -164,9 +164,12 @@ void cli_written(void);
 
 /*
  * Bad usage if the name of a file to write ends with an extension that is not in the list, for
- * example ".csv .h5 .mcap". "-", a name without a dot, pipes and devices have none.
+ * example ".png .svg .pdf". "-", a name without a dot, pipes and devices have none.
  */
 void cli_extension(const char *option, const char *path, const char *list);
+
+/* Whether it ends with an extension of the list. */
+bool cli_extension_in(const char *path, const char *list);
 
 /* Whether --overwrite was given; and the same as if it was. */
 bool cli_overwrite(void);

@@ -88,7 +88,7 @@ struct incise_recording;
  * "description", those that a calibration enters its values too, with the uncertainties that it
  * states and their covariances; those of a table with uncertainties "uncertainty_variables",
  * "uncertainty_of" and "correlation". The table has the provenance of
- * an export. Memory is that of a few batches of at most 65536 rows, whatever the length.
+ * an export. Memory is that of a few batches of at most 16384 rows, whatever the length.
  *
  * The stream reads by a connection of its own: the recording may be closed before, and several
  * streams of one recording may be read by turns or from several threads, each by one thread at a

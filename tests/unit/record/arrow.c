@@ -84,7 +84,7 @@ TEST(force_is_that_of_the_table, IN_FOLDER)
 		}
 	assert_int_equal(row, n);
 	assert_int_equal(clipped, 2);
-	assert_int_equal(batches, 2);	    /* of 65536 rows at most */
+	assert_int_equal(batches, 5);	    /* of 16384 rows at most */
 	assert_null(next(&stream).release); /* the end stays the end */
 	stream.release(&stream);
 	assert_null(stream.release);
