@@ -90,7 +90,8 @@ static void parse_shard(void *shard, char *text)
 
 static const struct cli_option option_table[] = {
 	{'o', "output", "FILE",
-	 "write the model to this file (.fis); - is standard output",
+	 "write the model to this file (.fis); - is standard output (default: NAME.fis "
+	 "of one source NAME.rec or NAME.csv)",
 	 CLI_OUTPUT(struct options, model), .extensions = ".fis"},
 	{0, "premises", "FILE",
 	 "keep the membership functions and ranges of this model (.fis); only the "
@@ -112,6 +113,13 @@ static const struct cli_option option_table[] = {
 	 "rows per second of a recording, each the mean of its samples (default: "
 	 "all samples)",
 	 CLI_NUMBER(struct options, rows.rate_hz, 0.1, 1e6)},
+	{0, "from", "TIME",
+	 "of each recording: begin so long after its first sample, for example 90s",
+	 CLI_DURATION(struct options, rows.from_s, 0, 1e9)},
+	{0, "to", "TIME", "of each recording: end so long after its first sample",
+	 CLI_DURATION(struct options, rows.to_s, 1e-3, 1e9)},
+	{0, "cut", "N", "of each recording: only this cut, from 1",
+	 CLI_INTEGER(struct options, rows.cut, 1, 1000000000)},
 	RECORDING_DAMAGED(struct options, rows.damaged),
 	{0, "all-rows", NULL,
 	 "also use rows in which the blade did not advance (advancing is 0)",
@@ -168,7 +176,7 @@ static const struct cli_option option_table[] = {
 
 static const struct cli_command command = {
 	.name = "train",
-	.synopsis = "DATA.csv|NAME.rec… -o MODEL.fis [OPTIONS]",
+	.synopsis = "DATA.csv|NAME.rec… [-o MODEL.fis] [OPTIONS]",
 	.summary =
 		"Learn a Takagi-Sugeno force model from recordings or CSV files (ANFIS).",
 	.options = option_table,
@@ -184,6 +192,21 @@ static char *path_beside(const char *output, const char *end)
 	if (!strcmp(output, "-") || (!stat(output, &st) && !S_ISREG(st.st_mode)))
 		return NULL;
 	return cli_text("%s%s", output, end);
+}
+
+/* Of one source NAME.rec, NAME.fis in this folder; NULL: none. */
+static const char *default_model(const struct options *options)
+{
+	const char *name = strrchr(options->paths[0], '/'), *end;
+	char *path;
+
+	name = name ? name + 1 : options->paths[0];
+	end = strrchr(name, '.');
+	if (options->n_paths > 1 || !end || end == name)
+		return NULL;
+	path = cli_text("%.*s.fis", (int)(end - name), name);
+	cli_output_once(path);
+	return path;
 }
 
 static void parse(struct options *options, int argc, char **argv)
@@ -244,6 +267,8 @@ static void parse(struct options *options, int argc, char **argv)
 		options->how.end = INCISE_TRAIN_TO_FACTOR;
 		return;
 	}
+	if (!options->model)
+		options->model = default_model(options);
 	if (!options->model || !*options->model)
 		cli_usage("missing -o MODEL.fis (output model)");
 	/* Neither a file nor a folder is there, nor is one meant: a column, of the old --output. */

@@ -75,7 +75,9 @@ static char *recording_state(const struct incise_train_source *source)
 
 	if (!out)
 		cli_fail("no memory");
-	fprintf(out, "rate %.17g; damaged %d\n", own->rows->rate_hz, own->rows->damaged);
+	fprintf(out, "rate %.17g; damaged %d; from %.17g to %.17g; cut %d\n",
+		own->rows->rate_hz, own->rows->damaged, own->rows->from_s,
+		own->rows->to_s, own->rows->cut);
 	print_recording(out, whole);
 	free(whole);
 	fclose(out);
@@ -94,11 +96,19 @@ static int stream_recording(struct incise_train_source *source,
 		return -errno;
 	incise_export_options_init(&options);
 	options.rate_hz = own->rows->rate_hz;
+	options.from_s = own->rows->from_s;
+	options.to_s = own->rows->to_s;
+	options.cut = own->rows->cut;
 	options.uncertainty =
 		own->rows->uncertainty ? INCISE_EXPORT_PARTS : INCISE_EXPORT_NONE;
 	rc = incise_recording_stream(recording, "table", &options, stream, err);
 	incise_recording_close(recording);
 	return rc;
+}
+
+static bool is_part(const struct recording_rows *rows)
+{
+	return rows->from_s > 0 || rows->to_s > 0 || rows->cut;
 }
 
 static const char *name_of(const char *path)
@@ -122,7 +132,9 @@ static int open_recording(struct incise_train_source *source, struct incise_erro
 	int rc;
 
 	/* It prints a warning where damaged recordings are used. */
-	if (!recording_intact(source->name, true, own->rows->damaged, err) && err->code)
+	if (!recording_intact(source->name, !is_part(own->rows), own->rows->damaged,
+			      err) &&
+	    err->code)
 		return -err->code;
 	recording = incise_recording_open(source->name, err);
 	if (!recording)

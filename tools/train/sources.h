@@ -15,6 +15,9 @@ struct recording_rows {
 	bool uncertainty; /* with columns of parts */
 	bool damaged;	  /* also of recordings that failed verification */
 	double rate_hz;	  /* 0: every force sample */
+	/* A part, as of struct incise_export_options; of that only what is read is checked. */
+	double from_s, to_s;
+	int cut;
 };
 
 /* Make sources of paths, which outlive them, as the rows do; sources_free(). */
