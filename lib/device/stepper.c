@@ -305,7 +305,7 @@ static int find(struct home *h)
 	return rc;
 }
 
-/* After an error nothing may move; the message stays that of the first error. */
+/* After an error nothing may move; the message of the first error stays. */
 static void halt(struct home *h)
 {
 	h->err = NULL;

@@ -10,10 +10,10 @@
  *              own           how far rounding at this tick does
  *              bits          behind the point of the integer
  *   a vector   one `ball` for all of its parts: high is the bound of its length, in and own of the length
- *              of its error. Frames do not count: what is turned has the same length.
+ *              of its error. Frames do not count: a turned vector keeps its length.
  *
  * A branch which is not decided is taken both ways, one after the other: a tick is run again and again, along
- * all paths. A path narrows what it knows by what it decided. In a copy of a number all of that is known, too,
+ * all paths. A path narrows its numbers by its decisions. In a copy of a number all of that is known, too,
  * as a number is only a place in a table.
  *
  *              ┌─ a < b ──┬─ c < 0 ── path 1      a force that is continuous where the integer goes
@@ -21,7 +21,7 @@
  *              └─ else ────────────── path 3      the largest `in` of all paths and the largest `own`
  *
  * For on the straight way from the double's state to that of the integers each piece of the way lies on
- * some path, and adds at most its share of that path's `in`. What is not continuous is not in the bound: see
+ * some path, and adds at most its share of that path's `in`. The bound does not cover discontinuities: see
  * incise_plan_bound().
  */
 #ifndef INCISE_NUMBER_BOUNDED_H
@@ -65,7 +65,7 @@ struct paths {
 	long n_paths; /* gone along so far */
 };
 
-/* Those of the thread, while a bound is computed. */
+/* Paths of the thread, while a bound is computed. */
 static __thread struct paths *paths;
 
 /* Room for one computation; end_paths() frees it. Returns false: no memory. */
@@ -79,7 +79,7 @@ static inline bool begin_paths(void)
 	return true;
 }
 
-/* Returns the bound, infinite where there is none. */
+/* Returns the bound, infinite without one. */
 static inline double end_paths(double bound)
 {
 	if (paths->failed || !(bound >= 0))
@@ -133,8 +133,8 @@ static inline int choose(int ways)
 }
 
 /*
- * The paths from here on. Those of a part of a tick are joined at its end, so that their number adds to that
- * of the others, and does not multiply it.
+ * The paths from here on. The paths of a part of a tick are joined at its end, so that their number adds to the
+ * number of the others, and does not multiply it.
  *
  *   fork.begin(); do { ... } while (fork.next());
  */

@@ -59,7 +59,7 @@ static inline int64_t n_cell(num at, num size)
 {
 	double cell = floor(at / size);
 
-	/* NaN is in none. */
+	/* NaN is in no range. */
 	return cell >= 0 ? (int64_t)fmin(cell, 1e9) : -1;
 }
 

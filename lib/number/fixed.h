@@ -132,7 +132,7 @@ static inline bool d_unit4(dir to[4], const wide q[4])
 	return incise_fx_unit(to, q, 4, 0);
 }
 
-/* Of a sum of directions, exact; one as short as this is nothing but rounding. */
+/* The length of a sum of directions, exact; a sum as short as this is only rounding. */
 static inline bool d_mean(dir to[3], const wide sum[3])
 {
 	return incise_fx_unit(to, sum, 3, 64);

@@ -255,7 +255,7 @@ int incise_integers_numbers(const struct incise_plan *plan,
 
 /* --- as a file ---------------------------------------------------------------------------- */
 
-/* Of the places where a contact began, mm: what the bound is certified for. */
+/* The places where a contact begins are certified up to here, mm. */
 #define REACH_MM 20
 
 /* Heights are off by no more than the first of these that lets a tool go deep enough, mm. */

@@ -480,7 +480,7 @@ static void take_record(struct polhemus_stream *stream,
 		return;
 	}
 	late_ns = late_if_held_up(stream, record, &seq);
-	/* Nobody may have looked in between. */
+	/* Maybe no call looked in between. */
 	if (wait->n && late_ns >= wait->least_late_ns - round_of(gaps) / 2) {
 		polhemus_stream_quiet(stream, record->t_ns);
 		late_ns = late_if_held_up(stream, record, &seq);

@@ -100,7 +100,7 @@ INCISE_API int incise_factor_add(struct incise_factor *factor, const double *row
 				 uint64_t group, struct incise_error *err);
 
 /**
- * Count what is in the part of a group: a factor that is to be saved has all its groups counted.
+ * Count the pairs in the part of a group: a factor needs all its groups counted before it is saved.
  *
  * @param group     as in incise_factor_add()
  * @param groups    number of groups
@@ -112,7 +112,7 @@ INCISE_API void incise_factor_count(struct incise_factor *factor, uint64_t group
 /** A group's number, from its name; @source: a source's hash, for a name of its own, or "". */
 INCISE_API uint64_t incise_group_key(const char *source, const char *name);
 
-/** Get what it is made of; valid until the factor changes. */
+/** Get the contents of a factor; valid until the factor changes. */
 INCISE_API void incise_factor_info(const struct incise_factor *factor,
 				   struct incise_factor_info *info);
 

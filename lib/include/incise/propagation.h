@@ -12,7 +12,7 @@
  *                    b = (ΦᵀWΦ + ridge)⁻¹ Φᵀ W g, so each adds b bᵀ to their covariance. With one
  *                    recording it does not average out; with n rigs its square falls as 1/n.
  *
- * The slopes are those of a model before, so pairs are passed over two or three times:
+ * An earlier model gives the slopes, so pairs are passed over two or three times:
  *
  *     start ─► origin ─► add … ─► origin ─► add … ─► end ─┐   model of the weighted pairs
  *       ▲─────────────────────────────────────────────────┘
@@ -105,7 +105,7 @@ INCISE_API int incise_propagation_end(struct incise_propagation *propagation,
 /** Results of the last pass. */
 struct incise_propagation_report {
 	double own; /**< root mean square of the own parts, in the unit of the output */
-	/** The same of the common parts' effect on the model, and of those of a rig on an output. */
+	/** The same for the common parts' effect on the model, and a rig's on an output. */
 	double calibration, rig;
 	double weight;		      /**< smallest weight */
 	int recordings, calibrations; /**< number of different ones */
@@ -113,8 +113,8 @@ struct incise_propagation_report {
 
 /**
  * Put the effect of the common parts into the standard deviation of the final model, after the end
- * of a pass with it. Its noise, found from pairs of these rigs, is reduced by what their
- * calibrations had in it.
+ * of a pass with it. Its noise, found from pairs of these rigs, is reduced by the share of their
+ * calibrations.
  *
  * @param report or NULL
  * @return 0; -EINVAL, -ENOMEM

@@ -76,9 +76,9 @@ struct incise_train_options {
 	 */
 	struct incise_uncertainty **uncertainty;
 	/**
-	 * Ranges of inputs and output over all pairs, where those given are a sample of them
-	 * (n_inputs + 1; only min and max are used), for incise_train_start(); NULL: those of the
-	 * pairs.
+	 * Ranges of inputs and output over all pairs, where the given pairs are a sample of them
+	 * (n_inputs + 1; only min and max are used), for incise_train_start(); NULL: ranges of the
+	 * given pairs.
 	 */
 	const struct incise_variable *ranges;
 	/**
@@ -144,8 +144,8 @@ INCISE_API void incise_train_options_init(struct incise_train_options *options);
  * select the epoch with @options->classic (as in MATLAB's anfis). In the default mode the
  * check error is therefore an error on unseen data.
  *
- * @param model   initial premises, Gaussians or bells; its ranges should be those of the
- *                training pairs
+ * @param model   initial premises, Gaussians or bells; its ranges should be the ranges of the
+ * training pairs
  * @param check   or NULL
  * @param report  or NULL
  * @return 0; -EINVAL (no pairs, a value that is not finite, wrong n_inputs, a constant input),
