@@ -57,7 +57,7 @@
 #define INCISE_STEPPER_SLOT_TUBE INCISE_STEPPER_MOTORS_MAX
 
 /* incise_stepper_pose.tool */
-#define INCISE_STEPPER_POSE_TOOL 0xffU	   /* enum incise_tool: what the hand holds */
+#define INCISE_STEPPER_POSE_TOOL 0xffU	   /* enum incise_tool: the tool in the hand */
 #define INCISE_STEPPER_POSE_FADE (1U << 9) /* let go of the force, while it is set */
 
 /**
@@ -68,9 +68,9 @@
  * @tool: INCISE_STEPPER_POSE_… bits; others are the fault SETPOINT. 0 in the tube's slot
  * @reserved: zero
  *
- * Its time is t_ns of the set-point, of CLOCK_MONOTONIC. One from the future counts as of the tick
- * that takes it; one that is not newer than the last, or beyond 10000 mm, is left out and counted.
- * One that is taken is a sign of life, and so is one that is no pose.
+ * Its time is t_ns of the set-point, of CLOCK_MONOTONIC. A pose from the future counts as of the
+ * tick that takes it; a pose that is not newer than the last, or beyond 10000 mm, is left out and
+ * counted. A pose that is taken is a sign of life, and so is one that is no pose.
  */
 struct incise_stepper_pose {
 	__s32 position[3];
@@ -121,7 +121,7 @@ struct incise_stepper_setpoint {
 };
 
 /* incise_stepper_motor_status.flags */
-/* Position is that of the machine; a stop at once while moving takes it away. */
+/* Position is the machine's; a stop at once while moving takes it away. */
 #define INCISE_STEPPER_FLAG_HOMED (1U << 0)
 #define INCISE_STEPPER_FLAG_HELD (1U << 1)	/* the last set-point was clamped */
 #define INCISE_STEPPER_FLAG_HOME_SEEN (1U << 2) /* home_position is of this enable */
@@ -372,7 +372,7 @@ struct incise_stepper_config {
 /**
  * struct incise_stepper_origin - names the position at which a motor stands
  * @motor: 0 …
- * @homed: 1: from now on it is that of the machine; 0: it is just a number
+ * @homed: 1: from now on it is the machine's; 0: it is just a number
  * @position: steps, within the motor's position_min … position_max
  *
  * EBUSY while the motor moves. A powered motor at rest takes it as its new target too.
