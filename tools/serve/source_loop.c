@@ -110,7 +110,7 @@ static void loop_free(struct serve_source *source)
 static const struct serve_source_ops loop_ops = {
 	.read = loop_read, .utc = loop_utc, .free = loop_free};
 
-/* The page that was named, or that of the only loop that runs. */
+/* The named page, or the page of the only loop that runs. */
 static struct state_page_file *choose(struct state_pages *pages, bool named)
 {
 	struct state_page_file *one = named && pages->n == 1 ? pages->page : NULL;
