@@ -119,7 +119,7 @@ static int stepper_plan_open(struct stepper_plan *plan)
 /**
  * stepper_plan_make() - copy a user's plan, and check it
  * @stepper:	the controller
- * @load:	what LOAD_PLAN said; size 0: the plan is to go, and @made is NULL
+ * @load:	argument of LOAD_PLAN; size 0: the plan goes, and @made is NULL
  * @made:	to be handed to stepper_plan_install(), then to stepper_plan_free()
  *
  * Without a lock, because it touches a user's memory. Sleeps.

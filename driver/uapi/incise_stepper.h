@@ -53,7 +53,7 @@
 #define INCISE_STEPPER_MODE_VELOCITY 1 /* target in steps/s */
 #define INCISE_STEPPER_MODE_POSE 2     /* target by the plan; 0 here */
 
-/* Of page 0: the slot of the tube's poses, behind those of the motors. */
+/* In page 0: the slot of the tube's poses, behind the slots of the motors. */
 #define INCISE_STEPPER_SLOT_TUBE INCISE_STEPPER_MOTORS_MAX
 
 /* incise_stepper_pose.tool */
@@ -168,7 +168,7 @@ struct incise_stepper_motor_status {
 	__u64 reserved[3];
 };
 
-/* Of page 1: the slot of the plan's status, in 128 bytes; it is longer. */
+/* In page 1: the slot of the plan's status, in 128 bytes; it is longer. */
 #define INCISE_STEPPER_SLOT_PLAN INCISE_STEPPER_MOTORS_MAX
 
 /* incise_stepper_plan_status.state and .reasons: enum incise_stepper_plan_state and
@@ -396,7 +396,7 @@ struct incise_stepper_origin {
  *
  * It has no deadman, as nothing moves by it: it goes on when its owner closes the file, until
  * period_ns is set to 0, the machine reboots or the device is unbound. While the machine
- * sleeps there are no pulses; it goes on in its beat then, and those of meanwhile are missed.
+ * sleeps there are no pulses; it goes on in its beat then, without the pulses of meanwhile.
  */
 struct incise_stepper_sync {
 	__u64 period_ns;
@@ -430,9 +430,9 @@ struct incise_stepper_sync {
  * A controller has one plan. The file is checked in full; after that, a tick takes a bounded time,
  * and no pose makes it overflow. With a source, of an encoder in the IIO subsystem
  * (incise_source.ko, which is to be loaded), poses are made in the kernel: the page's slot of the
- * first motor is set to mode POSE once, and its deadman is kept off by the source. Of the pose in
- * the page only INCISE_STEPPER_POSE_FADE counts then. A tick takes the newest sample; position =
- * origin + direction × scale × sample, samples held to ±2^30, scale within ±1 mm.
+ * first motor is set to mode POSE once, and its deadman is kept off by the source. Only
+ * INCISE_STEPPER_POSE_FADE of the pose in the page counts then. A tick takes the newest sample;
+ * position = origin + direction × scale × sample, samples held to ±2^30, scale within ±1 mm.
  *
  * EBUSY: a motor of the plan, or of the one before, has power, or still comes to rest. EINVAL: the
  * file or a field is not good; EOPNOTSUPP: its version is not known here, or there is no source.
@@ -467,8 +467,8 @@ struct incise_stepper_plan {
 #define INCISE_STEPPER_SET_CONFIG \
 	_IOW(INCISE_STEPPER_IOC, 2, struct incise_stepper_config)
 /*
- * A mask of motors, not 0: all get power or none does, and those that had it keep it. EPERM:
- * a fault is latched; EBUSY: an input forbids it, e-stop say, or it is still coming to rest;
+ * A mask of motors, not 0: all get power or no motor does, and motors that had power keep it.
+ * EPERM: a fault is latched; EBUSY: an input forbids it, e-stop say, or it is still coming to rest;
  * ERANGE: it stands outside of its position limits; ESHUTDOWN: the machine goes down.
  */
 #define INCISE_STEPPER_ENABLE _IOW(INCISE_STEPPER_IOC, 3, __u32)

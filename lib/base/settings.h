@@ -152,7 +152,7 @@ struct incise_settings_list {
 
 /*
  * List a table: for each row but groups, the key as PREFIX.KEY, and its value in @of, or of a row of the
- * owner as @group has it; the key is given where @group, NULL for none, has it.
+ * owner as @group has it; the key is given if @group (or NULL) has it.
  */
 void incise_settings_list(struct incise_settings_list *list,
 			  const struct incise_setting *rows, const void *of,
@@ -164,7 +164,7 @@ void incise_settings_put(struct incise_settings_list *list,
 			 const config_setting_t *setting, const char *prefix,
 			 const char *name, const char *text);
 
-/* The value as a file has it; "" where it is none. */
+/* The value as a file has it; "" without a value. */
 void incise_setting_text(const struct incise_setting *row, const void *of, char *text,
 			 size_t size);
 

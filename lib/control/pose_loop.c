@@ -216,7 +216,7 @@ static void measure_period(const struct loop *loop, double *matrix)
 /* In a period; less is no growth: a predictor with a gain of 0 has a state that stays. */
 #define GROWS 1e-7
 
-/* Of the matrix, the eigenvalue of the swing that grows the fastest, and 0 without one. */
+/* The eigenvalue of the matrix's fastest growing swing, and 0 without a swing. */
 static double complex fastest(double *matrix, int n)
 {
 	double complex *all = malloc((size_t)n * sizeof(*all)), most = 0;

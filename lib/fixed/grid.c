@@ -132,7 +132,7 @@ static bool look(const struct incise_fixed_grid *grid, int32_t at[3], int32_t no
 		u += weight * rise(knot, i + (k & 1), frame->columns, 1);
 		v += weight * rise(knot, j + (k >> 1), frame->rows, frame->columns);
 	}
-	/* Of two cells, to Q24. */
+	/* Slopes over two cells, to Q24. */
 	up[0] = -incise_fx_rounded(u, 3 * shift + 1 - SLOPE_BITS);
 	up[1] = -incise_fx_rounded(v, 3 * shift + 1 - SLOPE_BITS);
 	up[2] = (int64_t)1 << SLOPE_BITS;

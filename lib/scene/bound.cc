@@ -485,7 +485,7 @@ static struct errors add_exact(const struct T(plan) *plan)
 
 /*
  * The errors of the filter by its own rounding, and the effect of the rounding of poses on its output.
- * An attitude comes from the last poses; none of its errors adds up.
+ * An attitude comes from the last poses; its errors do not add up.
  */
 static void set_poses(struct T(plan) *plan, struct T(state) *state)
 {

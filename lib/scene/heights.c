@@ -580,7 +580,7 @@ static double product_norm(double a[2][2], double b[2][2])
 
 /*
  * κ and κ₃ of a cell. ñ's horizontal part is -γ/w: it changes with γ by 1/w across the slope and by
- * 1/w³ along it, all of ñ by 1/w and 1/w². None of these changes by more than 2 for each unit of γ.
+ * 1/w³ along it, all of ñ by 1/w and 1/w². These change by at most 2 for each unit of γ.
  * γ changes with the place by Γ, of which each column is on a line between two.
  */
 static void add_curvature(struct heights *h, const struct cell *c)

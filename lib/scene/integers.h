@@ -31,7 +31,7 @@ int incise_integers_numbers(const struct incise_plan *plan,
 
 /*
  * The same of a plan as a file: with its actuators and its certified error, and with heights in
- * place of a mesh, else none. *heights is freed by the caller, also after an error.
+ * place of a mesh. *heights is freed by the caller, also after an error.
  */
 int incise_integers_file(const struct incise_plan *plan,
 			 struct incise_fixed_numbers *numbers,

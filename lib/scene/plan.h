@@ -47,7 +47,7 @@ struct incise_plan_ops {
 	void (*zero)(struct incise_plan *plan) INCISE_REALTIME;
 	/* Returns 0; -EINVAL (farther than the numbers hold). */
 	int (*set_tip)(struct incise_plan *plan, const double tip_mm[3]) INCISE_REALTIME;
-	/* Whether the membrane is open, and the cuts: one of a number from 0 on; none; one more. */
+	/* Whether the membrane is open; and the cuts: get cut i from 0 on, drop all, add one. */
 	int32_t *(*punctured)(struct incise_plan *plan)INCISE_REALTIME;
 	bool (*cut)(struct incise_plan *plan, int i,
 		    struct incise_cut *cut) INCISE_REALTIME;
@@ -145,7 +145,7 @@ struct incise_plan {
 
 	struct incise_doubles doubles;	  /* by all of the above */
 	struct incise_integers *integers; /* with arithmetic = "fixed"; else NULL */
-	double last_N[3];		  /* what was rendered */
+	double last_N[3];		  /* rendered last */
 	struct incise_axes axes;	  /* without axes nothing is rendered */
 	struct incise_plan_kernel kernel;
 };
@@ -209,7 +209,7 @@ void incise_plan_fade(struct incise_plan *plan, bool fading) INCISE_REALTIME;
 /* Whether a force that fades has reached zero. Real-time safe. */
 bool incise_plan_faded(const struct incise_plan *plan) INCISE_REALTIME;
 
-/* The flag of the scalpel's newest pose; ' ' or 0: none. Real-time safe. */
+/* The flag of the scalpel's newest pose; ' ' or 0: no flag. Real-time safe. */
 char incise_plan_pose_flag(const struct incise_plan *plan) INCISE_REALTIME;
 
 /* The reason of a fault in a few words, without the device's own; NULL: no fault. */

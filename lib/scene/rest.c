@@ -316,7 +316,7 @@ static int64_t to_ns(double t_s)
 	return 2 * INCISE_NS_PER_S + llround(t_s * INCISE_NS_PER_S);
 }
 
-/* Of an axis that is there, for a time. */
+/* Set the motion of an axis over a time. */
 static void set_motion(struct motion *to, const struct incise_plant *of, double way_s)
 {
 	struct incise_plant plant = *of;

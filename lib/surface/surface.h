@@ -54,8 +54,8 @@ bool plane_enters(const struct plane *plane, const double from[3], const double 
 		  struct incise_touch *touch) INCISE_REALTIME;
 
 /*
- * On the axis all directions across it are as near: the one that @last points to is
- * taken, as far as it points across.
+ * On the axis all directions across it are as near: the direction of @last is taken, as far as it points
+ * across.
  */
 void capsule_nearest(const struct capsule *capsule, const double p[3],
 		     const double last[3], struct incise_touch *touch) INCISE_REALTIME;

@@ -109,7 +109,7 @@ void T(predict_attitude)(const struct T(predict) *p, const struct T(filter) *fil
 			attitude[i] = p->q[i];
 }
 
-/* Of the two quaternions of an attitude, the one on the shorter way from q_shown. */
+/* The quaternion of an attitude that is on the shorter way from q_shown. */
 static void turn_to(struct T(predict) *p, const dir quaternion[4])
 {
 	dir q[4];

@@ -34,7 +34,7 @@
 /* From here on the tube counts as nearer; a tracker's noise and a tremor are far less. */
 #define NEARER N(5)
 
-/* Of the force, in one tick: ticks are to be at least ten in a ramp. */
+/* Share of the force in one tick: a ramp has at least ten ticks. */
 #define RISE_MOST (W_ONE / 10)
 
 /* Skin that was not cut before gives way over so much more depth: INCISE_PUNCTURE_MM. */
@@ -180,7 +180,7 @@ static bool is_tube_nearer(const struct T(plan) *plan, struct T(state) *state,
 	const struct T(filter) *filter = &plan->numbers.filter;
 	struct T(ends) *ends = T_PART(state, ends);
 	bool tube_held = state->held == INCISE_TOOL_TUBE, searched = false;
-	/* Of how much a tube that is nearer stays below the scalpel. */
+	/* A nearer tube stays below the scalpel by so much. */
 	wide nearer = w_of(tube_held ? n_neg(NEARER) : NEARER);
 	num end[T(ENDS)][3], velocity[3];
 

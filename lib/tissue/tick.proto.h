@@ -102,7 +102,7 @@ struct T(front) {
 	num rest;	  /* the elastic force is 0 here */
 	num cut;	  /* depth of the unloaded cut; ≥ 0 */
 	wide work2,
-		most2; /* twice the work put in, less what came back; the most so far */
+		most2; /* twice the work put in, less the work that came back; the most so far */
 	struct T(line) line;
 	struct {
 		struct T(line) line;
@@ -149,7 +149,7 @@ struct T(tears) {
 
 /* --- incision.proto.c --------------------------------------------------------------------- */
 
-/* Of a scene; lengths 0 … 1000. */
+/* Numbers of a scene; lengths 0 … 1000. */
 struct T(incision_setup) {
 	int32_t cuts_most; /* 0: the blade leaves no cut */
 	num cut_from;	   /* the blade cuts where it is deeper */
@@ -192,9 +192,9 @@ void T(incision_find)(const struct T(incision) *incision,
 		      const num at[3], struct T(opening) *opening) INCISE_REALTIME;
 
 /*
- * The share of a handle's width or a tube's diameter that an opening must still give, 0 … 1: of a
- * handle 1 where nothing has widened the cut, of a tube less, as the tissue stretches; 0 where it is as
- * wide as the tool less what the tissue stretches.
+ * The share of a handle's width or a tube's diameter that an opening must still give, 0 … 1: for a handle 1 where
+ * no tool has widened the cut, for a tube less, as the tissue stretches; 0 where it is as wide as the tool less
+ * the stretch of the tissue.
  */
 num T(incision_tightness)(const struct T(incision_setup) *setup,
 			  const struct T(opening) *opening,
@@ -352,7 +352,7 @@ struct T(state) {
 	num p0[3];	    /* where the contact began */
 	dir entry[3];	    /* the normal there */
 	dir sn[3];	    /* the paper's Sn of this tick */
-	dir normal[3];	    /* the one that forces go along: Sn, or its average */
+	dir normal[3];	    /* direction of forces: Sn, or its average */
 	num depth;	    /* ≥ 0; of the tissue in front of a membrane */
 	int64_t touched_ns; /* when the contact began */
 	num deepest;	    /* of the blade since then */
@@ -373,8 +373,8 @@ struct T(state) {
 	struct T(tears) tears;
 	struct T(account) account;
 	num force[3];	       /* of the tissue, before limits … */
-	num late[3];	       /* … and what of it is late */
-	num last[3];	       /* what was rendered */
+	num late[3];	       /* … and its late part */
+	num last[3];	       /* rendered last */
 	num place[T_AXES_MAX]; /* of the handle along each axis, from its origin */
 	struct T(ends) OWNED ends;
 	struct T(average) OWNED average;

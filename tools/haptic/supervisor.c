@@ -101,7 +101,7 @@ static bool keys_open(void)
 	catch (ends);
 	atexit(keys_close);
 	now = before;
-	/* Ctrl-C and Ctrl-Z stay what they are. */
+	/* Ctrl-C and Ctrl-Z keep their effect. */
 	now.c_lflag &= ~(tcflag_t)(ICANON | ECHO);
 	now.c_cc[VMIN] = 1;
 	now.c_cc[VTIME] = 0;

@@ -457,7 +457,7 @@ static void find_span(struct recorded *r)
 		r->span.to_s = r->span.from_s + 1e-3;
 }
 
-/* --- what lies beside the lines -------------------------------------------------------------- */
+/* --- parts beside the lines ------------------------------------------------------------------ */
 
 /* Rows "from to" of the columns that are set, joined where they touch. Returns how many. */
 static int write_bins(const struct recorded *r, const bool set[BINS], const char *name)

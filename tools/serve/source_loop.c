@@ -143,7 +143,7 @@ struct serve_source *serve_loop_open(const struct serve_source_options *options,
 			 "recording");
 	state_pages_open(&loop->pages, options->operand);
 	page = choose(&loop->pages, options->operand);
-	/* The chosen one first, so that closing the pages closes what follows it, too. */
+	/* The chosen one first, so that closing the pages closes the rest, too. */
 	first = *loop->pages.page;
 	*loop->pages.page = *page;
 	*page = first;

@@ -43,7 +43,7 @@ void daq_feed_free(struct daq_feed *feed);
 
 /* Start the thread; it gets @feed's card. 0 or -errno. */
 int daq_feed_start(struct daq_feed *feed, void *(*run)(void *), void *card);
-/* Ends it, within what run() does between two daq_feed_wait(). */
+/* Ends it, once run() calls daq_feed_wait() again. */
 void daq_feed_stop(struct daq_feed *feed);
 
 /* The thread's. */

@@ -377,7 +377,7 @@ static void number(struct polhemus_stream *stream, const struct polhemus_record 
 	}
 }
 
-/* Lateness of one more record, if none is missing before those that wait and it. */
+/* Lateness of one more record, if no record is missing before it and the waiting ones. */
 static int64_t late_if_held_up(const struct polhemus_stream *stream,
 			       const struct polhemus_record *record, uint64_t *seq)
 {

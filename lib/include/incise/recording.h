@@ -283,9 +283,9 @@ struct incise_export_report {
 	 */
 	char unstated[1000];
 	/**
-	 * Resampled, with a camera: its depth over that of the tracker, a ratio, and by how much that
-	 * makes them differ over the depths there are; NAN: not both measured depths of 3 mm and more;
-	 * 0 where rows are not resampled.
+	 * Resampled, with a camera: its depth over the tracker's, a ratio, and the difference that this makes
+	 * over the measured depths; NAN: not both measured depths of 3 mm and more; 0 where rows are not
+	 * resampled.
 	 */
 	double camera_ratio, camera_off_mm;
 };

@@ -101,7 +101,7 @@ struct incise_train_report {
 	double ridge; /**< ridge of the search, and of the consequents unless averaged */
 	double train_rmse,
 		check_rmse; /**< of the kept parameters; check NaN without data */
-	/** Of the scaled least-squares problem, without ridge; infinite: not all is determined. */
+	/** Condition of the scaled least squares, without ridge; infinite: not all is determined. */
 	double condition;
 	int parameters;	   /**< linear + premise */
 	int rules_unfired; /**< rules whose firing strength never exceeds 0.05 in the data */
