@@ -333,7 +333,7 @@ static inline uint32_t product(uint32_t ia, uint32_t ib, int bits)
 	return put(to);
 }
 
-/* Of another scale. */
+/* The number at another scale. */
 static inline uint32_t scaled(uint32_t ia, int bits)
 {
 	struct bounds to = at(ia);

@@ -420,7 +420,7 @@ static void tick(struct search *s, struct run *run)
 		run->pose[pose].arrival_s = run->t_s + s->device.latency_s;
 		for (int i = 0; i < 3; i++)
 			run->pose[pose].at_mm[i] = run->device[i].position_mm;
-		/* Of a guided device: along the normal. */
+		/* A guided device has its noise along the normal. */
 		if (run->noise_mm > 0)
 			run->pose[pose].at_mm[0] +=
 				run->noise_mm *

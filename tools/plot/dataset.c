@@ -264,7 +264,7 @@ static void put_panel(FILE *script, const struct table *table, int over, const c
 	fputc('\n', script);
 }
 
-/* One of the upper panels, with its data. */
+/* An upper panel, with its data. */
 static void put_upper(FILE *script, const struct table *table, int over,
 		      const struct figure *figure)
 {

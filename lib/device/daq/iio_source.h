@@ -73,7 +73,7 @@ void iio_source_stop(struct iio_source *source);
 
 /* Number of scans read, or -errno: -EAGAIN (no scan), -ENODEV. */
 int iio_source_read(struct iio_source *source);
-/* Of scan @i that was read. */
+/* The code and the timestamp of scan @i that was read. */
 int32_t iio_source_code(const struct iio_source *source, int i);
 int64_t iio_source_timestamp(const struct iio_source *source, int i);
 
