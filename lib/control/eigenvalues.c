@@ -112,7 +112,7 @@ static void step(double *a, int n, int lo, int hi, struct shifts by)
 
 /*
  * The row where the block that ends in @hi begins. A number below the diagonal counts as 0 if it is small beside
- * that, or beside @least: the diagonal of poses on their way is 0.
+ * that, or @least: that of poses on their way is 0.
  */
 static int begin_of(double *a, int n, int hi, double least)
 {

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Losses of a source that does not count its samples, found by the times of the samples that
- * come.
+ * Losses of a source that does not count its samples, found by the times of the others.
  *
  *   lateness |            o  one held up               two lost   o--o--o--o
  *            |                                                    |

@@ -24,8 +24,8 @@ enum incise_fixed_input_kind {
 
 /*
  * Rounding of incise_fixed_input_acceleration(), _tilt() and _time() (tick.proto.h), of exact operands: 2^-11 mm/s²
- * and a share of 2^-19, by the speed; 10^-5 degrees; 2^-16 s. A unit vector that is off by 2^-27 turns the angle by
- * as many radians.
+ * and 2^-19 of it, by the speed; 10^-5 degrees; 2^-16 s. A unit vector off by 2^-27 turns the angle by as many
+ * radians.
  */
 #define INCISE_FIXED_INPUT_ACCELERATION_BITS 11
 #define INCISE_FIXED_INPUT_ACCELERATION_SHARE_BITS 19

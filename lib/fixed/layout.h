@@ -4,7 +4,7 @@
  *
  *   0    struct incise_fx_header
  *   288  data, by arithmetic; at 416 in version 2, which has room for four inputs in its
- *   header, for models of three and four
+ *        header, for models of three and four
  *
  *   direct  per input, at its offset: n_mfs × struct incise_fx_mf
  *           at data: n_rules × (n_inputs + 1) consequents, int64 in Q(shift_a), the

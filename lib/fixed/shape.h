@@ -41,8 +41,7 @@ bool incise_fixed_shape_good(const struct incise_fixed_shape *shape);
  * @param grid of a shape of that kind
  * @param last a unit vector: the normal where all directions are as near, on a capsule's axis
  *
- * Returns whether there is a point: beyond a grid's edge there is no point, and @touch is left as it
- * is.
+ * Returns whether there is a point: not beyond a grid's edge, where @touch is left as it is.
  */
 bool incise_fixed_shape_nearest(const struct incise_fixed_shape *shape,
 				const struct incise_fixed_grid *grid, const int32_t p[3],

@@ -30,11 +30,10 @@
 #define POSES_MOST 64 /* on their way */
 
 /*
- * The supports: nothing; a spring across the normal, which leaves the device bare but keeps it in its place; a firm
- * hand. It has the mass, damping and stiffness of the arm that van Beek, Bergmann Tiest, Mugge and Kappers measured
- * in a typical trial (Haptic perception of force magnitude and its relation to postural arm dynamics in 3D,
- * Scientific Reports 5, 18004, 2015, fig. 3: 0.554 kg, 6.45 N s/m, 135 N/m), with four times its damping and
- * stiffness.
+ * The supports: nothing; a spring across the normal, which keeps the bare device in its place; a firm hand. It has
+ * the mass, damping and stiffness of the arm that van Beek, Bergmann Tiest, Mugge and Kappers measured in a typical
+ * trial (Haptic perception of force magnitude and its relation to postural arm dynamics in 3D, Scientific Reports 5,
+ * 18004, 2015, fig. 3: 0.554 kg, 6.45 N s/m, 135 N/m), with four times its damping and stiffness.
  */
 static const struct incise_hand_impedance holds[] = {
 	[INCISE_HELD_ACROSS] = {0, 0, 0.54},

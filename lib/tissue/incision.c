@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The incision for programs that only see ticks; see incise/incision.h. All memory is allocated at the
+ * The incision for readers of ticks; see incise/incision.h. All memory is allocated at the
  * start.
  */
 #include <errno.h>

@@ -661,8 +661,7 @@ static bool lift(struct wound *wound, struct wound_stroke *stroke)
 	return added;
 }
 
-/* Skin is under tension: a cut gapes, the deeper the wider, as far as skin is loose from the
- * tissue below. */
+/* Skin is under tension: a cut gapes, the deeper the wider, as far as skin is loose below. */
 #define GAPES_TO_MM 6.0
 
 static float half_mm(double depth_mm)

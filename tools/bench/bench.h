@@ -179,8 +179,7 @@ struct bench_run {
  * bench_fail() was given. */
 void bench_measure(struct bench_run *run);
 
-/* A fact of machine and build: "cpu", "kernel", "compiler", "vectors"; "cpu; kernel;
- * compiler" for NULL. */
+/* Machine and build: "cpu", "kernel", "compiler", "vectors"; "cpu; kernel; compiler" for NULL. */
 const char *bench_machine(const struct bench_run *run, const char *key);
 
 /* Members of the JSON, an object of json_pack(). */

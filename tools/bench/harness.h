@@ -58,8 +58,8 @@ void harness_time_of(const double *ns, int n, struct harness_time *time);
 
 /* Statistics of n values in the order in which they came; NaN without values. The interval is by
  * ranks. From 24 values on it comes from the medians of 12 stretches of them, so that a slow
- * minute, which makes neighbours alike, does not make it narrow. Below 6 values it is the smallest
- * and the largest. */
+ * minute, which makes neighbours alike, does not narrow it. Below 6 values: the smallest, the
+ * largest. */
 void harness_spread(const double *values, int n, struct harness_spread *spread);
 
 /* The processor that variants are timed on: the last one, as interrupts are more often the

@@ -18,8 +18,7 @@
 #include <cpuid.h>
 #endif
 
-/* The first line of a small file that begins with @key, without it; unchanged without
- * such a line. */
+/* The first line of a small file that begins with @key, without it; else unchanged. */
 static void read_line(const char *path, const char *key, char *line, int size)
 {
 	FILE *in = fopen(path, "re");

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * The machine that a bench ran on, and the build, without which its figures are worth
- * nothing.
+ * The machine and the build of a bench, without which its figures are worth nothing.
  */
 #ifndef INCISE_MACHINE_H
 #define INCISE_MACHINE_H

@@ -88,8 +88,7 @@ struct serve_sink_ops {
 	int (*summary)(const struct serve_sink *sink, char *text, size_t size);
 	/* The end: say goodbye to all. */
 	void (*close)(struct serve_sink *sink);
-	/* The report after that, an object whose key is added to the program's report; and as
-	 * lines. */
+	/* The report after that, an object whose key is added to the program's; and as lines. */
 	json_t *(*report)(const struct serve_sink *sink);
 	void (*print)(const struct serve_sink *sink);
 	void (*free)(struct serve_sink *sink);

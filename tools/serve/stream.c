@@ -4,8 +4,7 @@
  *
  *     samples   | | | | | | | | | | | | | | |        a value is due on a grid of 1/rate, and the
  *     due       ^       ^       ^       ^            first sample that is not more than half a step
- *     sent      ●       ●       ●       ●            of the source early is it; for
- *     forces the mean
+ *     sent      ●       ●       ●       ●            of the source early is it; of forces the mean
  */
 #include <math.h>
 #include <stdlib.h>

@@ -115,8 +115,7 @@ static void close_gaps(struct session *s)
 	s->n_phases = n;
 }
 
-/* Close longer gaps until there are fewer phases; false: tools that take turns leave no such
- * gaps. */
+/* Close longer gaps until there are fewer phases; false: no gap between one tool's phases. */
 static bool make_place(struct session *s)
 {
 	double apart_s = s->phases_apart_s;

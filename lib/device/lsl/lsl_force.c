@@ -88,8 +88,7 @@ static void take(struct lsl_force *f, double value, double stamp_s, int64_t now_
 	uint64_t missing;
 	int64_t t_ns;
 
-	/* No time that a sample in the queue can have: it is lost, and so is a force that is no
-	 * number. */
+	/* No sample in the queue can have this time: it is lost, like a force that is no number. */
 	if (!(t_s >= 0 && t_s > now_s - OLD_S && t_s < now_s + AHEAD_S)) {
 		f->timeless++;
 		f->off_s = t_s - now_s;
@@ -570,8 +569,7 @@ static int force_scan(const char *arguments, incise_scan_found *found, void *con
 	for (int i = 0; i < n && i < STREAMS_MAX; i++) {
 		if (!rc) {
 			show(&lsl, all[i], &device);
-			/* Poses and markers are no force channels, but a stream that the user
-			 * names is shown. */
+			/* Poses and markers are no force channels, but a named stream is shown. */
 			if (device.usable || *arguments)
 				rc = found(context, &device);
 		}

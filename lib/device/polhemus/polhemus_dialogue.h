@@ -81,8 +81,7 @@ struct polhemus_dialogue {
 int polhemus_say(struct polhemus_dialogue *d, const char *command);
 
 /*
- * Drop bytes until no byte comes. -EBUSY, without a message: they come for more than 0.5
- * s.
+ * Drop bytes until they end. -EBUSY, without a message: they come for more than 0.5 s.
  */
 int polhemus_drain(struct polhemus_dialogue *d);
 

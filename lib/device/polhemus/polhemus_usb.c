@@ -309,9 +309,8 @@ static int choose(libusb_device **list, const struct usb_name *wanted, const cha
 }
 
 /*
- * The device named @wanted, which the caller unrefs; messages call it @name. If there are
- * several, it is the one at @was, unless that is "". -ENODEV, -EINVAL (several), -EACCES,
- * -ENOMEM.
+ * The device named @wanted, which the caller unrefs; messages call it @name. Of several the
+ * one at @was is taken, unless that is "". -ENODEV, -EINVAL (several), -EACCES, -ENOMEM.
  */
 static int find_device(libusb_context *context, const struct usb_name *wanted,
 		       const char *was, const char *name, libusb_device **device,

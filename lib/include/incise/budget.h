@@ -10,9 +10,8 @@
  *     u = √(Σ part²)          value ± 2 u holds 95 %
  *
  * Parts are standard uncertainties, and independent of each other: where a calibration has a
- * covariance of two values, the part of the first value has the common error. So, of the
- * quantities p and q of two rows i and j, the covariance is the sum over the common sources s
- * that both have
+ * covariance of two values, the first part has the common error. So, of the quantities p and q of
+ * two rows i and j, the covariance is the sum over the common sources s that both have
  *
  *     cov(p_i, q_j) = Σ part_p,s(i) · part_q,s(j)
  *

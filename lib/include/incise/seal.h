@@ -86,8 +86,7 @@ struct incise_seal_statement {
 INCISE_API char *incise_seal_statement(const char *path, struct incise_error *err);
 
 /**
- * Read a statement. Accepts exactly the text that incise_seal_statement() writes, and nothing
- * else.
+ * Read a statement. Accepts exactly the form that incise_seal_statement() writes.
  *
  * @param text need not end with a NUL
  * @return 0; -EINVAL, and @p err has the line. Thread-safe.
@@ -121,9 +120,8 @@ INCISE_API int incise_seal_head(struct incise_recording *recording, char identit
 				struct incise_seal_head *head, struct incise_error *err);
 
 /**
- * Whether an opened recording was converted from a recording of an older format with this last
- * head, 64 hexadecimal digits: files made of that one, and its signatures, cover the same
- * samples.
+ * Whether an opened recording was converted from one of an older format with this last head, 64
+ * hexadecimal digits: files made of that, and its signatures, cover the same samples.
  */
 INCISE_API bool incise_seal_before(struct incise_recording *recording, const char *head);
 
