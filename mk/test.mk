@@ -218,7 +218,7 @@ check-tsan: $(tsan_programs) ## what threads share without a lock, under ThreadS
 	@tests/unit/run $(tsan_programs)
 
 style_sources := $(shell find lib tools tests driver examples -name '*.[ch]' -o -path 'lib/*.cc' 2>/dev/null)
-check-style: ## the house's form: clang-format, an SPDX line in every file
+check-style: ## the house's form: clang-format, an SPDX line in every file, plain words
 	@tests/style $(style_sources)
 
 check-layers: libs ## no layer of lib/ uses a higher one

@@ -158,7 +158,7 @@ static void make_printable(char *text)
 }
 
 /*
- * The fault of a record, as words behind the name of its key; NULL: none. For records of a
+ * The fault of a record, as words behind the name of its key; NULL: no fault. For records of a
  * file and for one to be appended.
  */
 static const char *fault(const struct incise_calibration_record *record)
@@ -178,7 +178,7 @@ static const char *fault(const struct incise_calibration_record *record)
 
 		if (!row)
 			return "values: key: expected a key of calibration.conf";
-		/* A failed calibration may be far out, and is kept to be read. */
+		/* A failed calibration may be far out; the file keeps it for readers. */
 		if (!isfinite(value->left) ||
 		    (record->pass &&
 		     !(value->left >= row->min && value->left <= row->max)))
@@ -644,7 +644,7 @@ int incise_calibration_raw(struct incise_calibration_record *record, const char 
 
 /*
  * The lines of comment that a person wrote above the history; ours begin with "##". NULL:
- * no memory. A file that vanishes meanwhile has none.
+ * no memory. A file that vanishes meanwhile has no lines.
  */
 static char *read_notes(const char *path)
 {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 /*
- * The way of force samples from a card's thread to whoever reads them; see daq_feed.h.
+ * The way of force samples from a card's thread to their reader; see daq_feed.h.
  */
 #include <errno.h>
 #include <poll.h>
@@ -130,7 +130,7 @@ void daq_feed_end(struct daq_feed *feed, int error, const char *what)
 int daq_feed_read(struct incise_force *force, struct incise_force_sample *samples, int n)
 {
 	struct daq_feed *feed = (struct daq_feed *)force;
-	/* Before the ring: what was put in ahead of the end is read first. */
+	/* Before the ring: samples put in ahead of the end are read first. */
 	int error = atomic_load_explicit(&feed->error, memory_order_acquire);
 	int taken = incise_ring_take(&feed->ring, samples, n);
 

@@ -19,8 +19,8 @@
 #define DAQ_FEED_CAPACITY_S 4
 
 struct daq_feed {
-	struct incise_force force;     /* first: what the caller holds */
-	struct incise_force_info info; /* what stays as it was at opening */
+	struct incise_force force;     /* first: the caller's handle */
+	struct incise_force_info info; /* constant after opening */
 	struct incise_ring ring;
 	_Atomic uint64_t clipped, lost, overflows;
 	atomic_int error; /* 0, or -errno once the card is gone: then cause is there */
@@ -43,7 +43,7 @@ void daq_feed_free(struct daq_feed *feed);
 
 /* Start the thread; it gets @feed's card. 0 or -errno. */
 int daq_feed_start(struct daq_feed *feed, void *(*run)(void *), void *card);
-/* Ends it, within what run() does between two daq_feed_wait(). */
+/* Ends it, once run() calls daq_feed_wait() again. */
 void daq_feed_stop(struct daq_feed *feed);
 
 /* The thread's. */
@@ -53,7 +53,7 @@ enum daq_wait { DAQ_STOP, DAQ_READY, DAQ_QUIET };
 /* Until @fd has data, it is to stop, or @ms are over. */
 enum daq_wait daq_feed_wait(struct daq_feed *feed, int fd, int ms);
 void daq_feed_put(struct daq_feed *feed, int64_t t_ns, int32_t code);
-/* @n samples are missing before the next; counted as one overflow. 0: none. */
+/* @n samples are missing before the next; counted as one overflow, unless @n is 0. */
 void daq_feed_lose(struct daq_feed *feed, uint64_t n);
 /*
  * The last word: 0 (it was to stop), -ENODEV, or -EIO because of @what; reported to readers once

@@ -391,7 +391,7 @@ static json_t *ask_all(const struct training *t, char *why, size_t size)
 	memory_file_written(&question);
 	for (int i = 0; i < N(pythons) && !answer; i++)
 		answer = ask(pythons[i], script, question.path, why, size);
-	/* One that could not is no failure where another one could. */
+	/* A Python that failed is no failure if another one answered. */
 	if (answer)
 		*why = 0;
 	json_decref(all);

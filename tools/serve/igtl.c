@@ -46,7 +46,7 @@ struct igtl {
 	struct message *newest[OUTPUTS][2]; /* for GET_, by version */
 	struct pixels pixels;
 	uint32_t id;
-	uint64_t requests, ignored; /* what clients asked */
+	uint64_t requests, ignored; /* requests of clients */
 	bool warned;
 };
 
@@ -117,8 +117,8 @@ static void send_one(void *context, struct client *client, void *user)
 }
 
 /*
- * Send to all, and keep it for those who ask. Nothing older is kept: a client that comes later
- * gets a value that is true, or waits for the next one.
+ * Send to all, and keep it for clients that ask. Nothing older is kept: a client that comes
+ * later gets a value that is true, or waits for the next one.
  */
 static void send_all(struct sending *sending)
 {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Rates, means and times of what is sent; see serve.h.
+ * Rates, means and times of sent items; see serve.h.
  *
  *     samples   | | | | | | | | | | | | | | |        a value is due on a grid of 1/rate, and the
  *     due       ^       ^       ^       ^            first sample that is not more than half a step
@@ -38,7 +38,7 @@ struct serve_stream {
 	char name[32], text[300];
 	int64_t status_ns; /* when it was sent; 0: never */
 
-	/* Of a recording: t_ns is played at here_ns; speed 0: live. */
+	/* For a recording: t_ns is played at here_ns; speed 0: live. */
 	int64_t t_ns, here_ns;
 	double speed;
 };

@@ -32,7 +32,7 @@ struct session_digest {
 	/* The handle in its cut: the angle now, the way that it turns, and the ends since. */
 	bool turning;
 	double line[3]; /* of the cut that it went into */
-	int way;	/* 1, -1; 0: none yet */
+	int way;	/* 1, -1; 0: not yet */
 	double angle_deg, low_deg, high_deg;
 	bool met, hit; /* beyond the plane of the membrane, and through it */
 	bool at_wall;
@@ -115,7 +115,7 @@ static void close_gaps(struct session *s)
 	s->n_phases = n;
 }
 
-/* Close longer gaps until there are fewer phases; false: tools that take turns leave none. */
+/* Close longer gaps until there are fewer phases; false: no gap between one tool's phases. */
 static bool make_place(struct session *s)
 {
 	double apart_s = s->phases_apart_s;

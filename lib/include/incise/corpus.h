@@ -208,7 +208,7 @@ INCISE_API const struct incise_corpus_survey *incise_corpus_source(
 
 /** Rows, groups and ranges of a side. */
 struct incise_corpus_side {
-	/** Of its rows, equal ones of a group once; owned by the corpus. */
+	/** A sample of its rows, equal rows of a group once; owned by the corpus. */
 	struct incise_train_side sample;
 	uint64_t rows;
 	/** Rows, equal ones of a group counted once; an estimate beyond the size of the sample. */

@@ -74,7 +74,7 @@ INCISE_API struct incise_factor *incise_factor_new(const struct incise_model *pr
 /** NULL is accepted. */
 INCISE_API void incise_factor_free(struct incise_factor *factor);
 
-/** Get what it is made of; valid until the factor changes. */
+/** Get the contents of a factor; valid until the factor changes. */
 INCISE_API void incise_factor_info(const struct incise_factor *factor,
 				   struct incise_factor_info *info);
 

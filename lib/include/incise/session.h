@@ -25,7 +25,7 @@ INCISE_BEGIN_DECLS
 
 /** Signals that align clocks. */
 enum incise_session_align {
-	INCISE_ALIGN_CLOCKS, /**< none: wall time alone */
+	INCISE_ALIGN_CLOCKS, /**< no signal: wall time alone */
 	INCISE_ALIGN_TAP,    /**< knocks that force or tracker of each member show */
 	/** events of the kind "sync", of a common line, or steps that it makes in the force */
 	INCISE_ALIGN_EVENTS,
@@ -61,8 +61,8 @@ struct incise_session_options {
 /**
  * Join recordings into a session. Their files are cloned, linked or copied; not a bit changes.
  *
- * @param paths  n recordings, 2 to INCISE_SESSION_MEMBERS_MAX, the first one's clock is that of
- *               the session
+ * @param paths  n recordings, 2 to INCISE_SESSION_MEMBERS_MAX, the first one's clock is the
+ *               session's
  * @param output a new folder; while it is written, it is output.part
  * @return 0; -EINVAL (a session, the same recording twice, a recording of format 1), -ENODATA (no
  *         wall time, or an unknown uncertainty, and no signal that aligns), -EDOM (a signal that

@@ -93,9 +93,9 @@ struct incise_train_options {
 	 */
 	struct incise_uncertainty **uncertainty;
 	/**
-	 * Ranges of inputs and output over all pairs, where those given are a sample of them
-	 * (n_inputs + 1; only min and max are used), for incise_train_start(); NULL: those of the
-	 * pairs.
+	 * Ranges of inputs and output over all pairs, where the given pairs are a sample of them
+	 * (n_inputs + 1; only min and max are used), for incise_train_start(); NULL: ranges of the
+	 * given pairs.
 	 */
 	const struct incise_variable *ranges;
 };
@@ -107,7 +107,7 @@ struct incise_train_report {
 	double ridge; /**< ridge of the search, and of the consequents unless averaged */
 	double train_rmse,
 		check_rmse; /**< of the kept parameters; check NaN without data */
-	/** Of the scaled least-squares problem, without ridge; infinite: not all is determined. */
+	/** Condition of the scaled least squares, without ridge; infinite: not all is determined. */
 	double condition;
 	int parameters;	   /**< linear + premise */
 	int rules_unfired; /**< rules whose firing strength never exceeds 0.05 in the data */
@@ -150,8 +150,8 @@ INCISE_API void incise_train_options_init(struct incise_train_options *options);
  * select the epoch with @options->classic (as in MATLAB's anfis). In the default mode the
  * check error is therefore an error on unseen data.
  *
- * @param model   initial premises, Gaussians or bells; its ranges should be those of the
- *                training pairs
+ * @param model   initial premises, Gaussians or bells; its ranges should be the ranges of the
+ * training pairs
  * @param check   or NULL
  * @param report  or NULL
  * @return 0; -EINVAL (no pairs, a value that is not finite, wrong n_inputs, a constant input),

@@ -78,12 +78,12 @@ struct incise_recorder_summary {
 		int32_t code;
 	} * waiting;
 	size_t n, capacity;
-	double depth_max_mm;	       /* in a cut */
+	double depth_max_mm; /* in a cut */
 	/* Cuts by the depths alone, and when each ended, for readers of a part. */
 	struct incise_cut_count by_depth;
 	int64_t *ends_ns;
 	size_t n_ends, ends_capacity;
-	bool no_ends; /* out of memory: readers look for them */
+	bool no_ends;		       /* out of memory: readers look for them */
 	int32_t code_least, code_most; /* in cuts; least above most: none */
 };
 
