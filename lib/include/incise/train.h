@@ -27,7 +27,7 @@ struct incise_pairs {
 	int n_inputs;
 };
 
-/** What a training does. */
+/** A phase of a training. */
 enum incise_train_phase {
 	INCISE_TRAIN_SURVEY, /**< first reading of the sources (incise/corpus.h) */
 	INCISE_TRAIN_SEARCH, /**< search of the membership functions */
