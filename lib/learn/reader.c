@@ -206,15 +206,9 @@ void incise_reader_resume(struct incise_reader *source,
 	memcpy(source->group, survey->group, sizeof(source->group));
 }
 
-static bool has_cuts(const struct incise_reader *source)
+static bool has_cuts(const struct incise_train_source *given)
 {
-	const struct incise_reading *reading = source->reading;
-
-	return source->given->path
-		       ? incise_dataset_each(source->given->path, reading->columns,
-					     reading->n_columns, "cut", reading->where,
-					     stop, NULL, NULL, NULL) == 0
-		       : source->given->cuts;
+	return given->path ? incise_dataset_has(given->path, "cut", NULL) : given->cuts;
 }
 
 struct incise_reader *incise_readers_new(struct incise_train_source *given, int n,
@@ -239,7 +233,7 @@ struct incise_reader *incise_readers_new(struct incise_train_source *given, int 
 			.read = read_rows,
 			.user = source,
 		};
-		all = all && !group && has_cuts(source);
+		all = all && !group && has_cuts(&given[i]);
 	}
 	reading->group = all ? "cut" : group && strcmp(group, "none") ? group : NULL;
 	/* Cuts are numbered in each recording; other names mean the same everywhere. */

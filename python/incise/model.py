@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import csv
 import ctypes
 import errno
 import math
@@ -247,6 +246,7 @@ _library.declare(
             ctypes.POINTER(ctypes.c_size_t),
             c_void_p,
         ),
+        "incise_dataset_has": (c_bool, _path, ctypes.c_char_p, c_void_p),
         "incise_dataset_free": (None, c_void_p),
         "incise_dataset_rows": (ctypes.c_size_t, c_void_p),
         "incise_train_options_init": (None, ctypes.POINTER(TrainOptionsStruct)),
@@ -754,11 +754,8 @@ def has_cuts(data: Any) -> bool:
     if not is_path(data):
         names = getattr(data, "column_names", getattr(data, "columns", data))
         return isinstance(names, Iterable) and "cut" in list(names)
-    if not os.path.isfile(data):
-        return False
-    with open(data, newline="", encoding="utf-8-sig", errors="replace") as lines:
-        rows = (line for line in lines if line.strip() and not line.startswith("#"))
-        return "cut" in (field.strip() for field in next(csv.reader(rows), []))
+    path = _library.path_bytes(data)
+    return os.path.isfile(path) and function("incise_dataset_has")(path, b"cut", None)
 
 
 def _read_dataset(

@@ -9,6 +9,7 @@
 #include <unistd.h>
 #include <errno.h>
 #include <incise/arrow.h>
+#include <incise/dataset.h>
 #include <incise/infile.h>
 #include <incise/recalibration.h>
 #include <incise/recording.h>
@@ -299,66 +300,6 @@ static void list_parts(struct uncertainties *all, const char *const *columns,
 		}
 }
 
-/* The next field of a line of CSV, without quotes; NULL: there is none. */
-static char *next_field(char **at)
-{
-	char *field = *at, *end;
-
-	if (!field)
-		return NULL;
-	end = strchr(field, ',');
-	*at = end ? end + 1 : NULL;
-	if (end)
-		*end = '\0';
-	field += strspn(field, " \t\"");
-	field[strcspn(field, "\"\r\n")] = '\0';
-	return field;
-}
-
-/* The next line that is no comment: 1, 0 at the end or on an error, which reading finds again. */
-static int next_line(struct incise_infile *in, char **line)
-{
-	int rc;
-
-	do
-		rc = incise_infile_line(in, line, NULL);
-	while (rc > 0 && (**line == '#' || !(*line)[strspn(*line, " \t\r")]));
-	return rc > 0;
-}
-
-/* The columns that a file has; *stated: its first row has numbers there. */
-static void look_for_parts(const char *path, const struct uncertainties *all, bool *has,
-			   bool *stated)
-{
-	static const struct incise_infile_kind kind = {.name = "a table",
-						       .advice = "give a CSV file"};
-	struct incise_infile *in = incise_infile_open(path, &kind, NULL);
-	int column[INCISE_BUDGET_PARTS], n = 0;
-	char *line, *field, *end;
-
-	memset(has, 0, INCISE_BUDGET_PARTS * sizeof(*has));
-	*stated = true;
-	if (!in)
-		return; /* its reader says why */
-	if (next_line(in, &line))
-		for (int at = 0; (field = next_field(&line)); at++)
-			for (int i = 0; i < all->n; i++)
-				if (!strcmp(field, all->columns[i])) {
-					has[i] = true;
-					column[i] = at;
-					n++;
-				}
-	if (n && next_line(in, &line))
-		for (int at = 0; (field = next_field(&line)); at++)
-			for (int i = 0; i < all->n; i++)
-				if (has[i] && column[i] == at) {
-					double value = strtod(field, &end);
-
-					*stated &= end > field && value - value == 0;
-				}
-	incise_infile_close(in);
-}
-
 /* Fail unless a recording states the uncertainties of all columns that have parts. */
 static void need_stated(const char *path, const char *const *columns, int n_inputs)
 {
@@ -413,7 +354,9 @@ void uncertainties_find(struct uncertainties *found, enum uncertainties_wanted w
 			for (int i = 0; i < all.n; i++)
 				has[i] = wanted == UNCERTAINTIES_PARTS;
 		} else if (strcmp(path, "-") && file_kind_of(path) == FILE_TABLE) {
-			look_for_parts(path, &all, has, &stated);
+			for (int i = 0; i < all.n; i++)
+				has[i] =
+					incise_dataset_has(path, all.columns[i], &stated);
 		}
 		if (!stated && wanted == UNCERTAINTIES_PARTS)
 			cli_fail("%s: an uncertainty is not stated (nan); calibrate what "

@@ -7,6 +7,7 @@
 #ifndef INCISE_DATASET_H
 #define INCISE_DATASET_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <incise/error.h>
@@ -45,6 +46,13 @@ INCISE_API struct incise_dataset *incise_dataset_read(const char *path,
 INCISE_API struct incise_dataset *incise_dataset_read_where(
 	const char *path, const char *const *columns, int n, const char *group,
 	const char *where, size_t *left_out, struct incise_error *err);
+
+/**
+ * Whether a CSV file has a column; a file that cannot be read has none.
+ *
+ * @param stated set to false where its first row has no finite number there; or NULL
+ */
+INCISE_API bool incise_dataset_has(const char *path, const char *column, bool *stated);
 
 struct ArrowArrayStream;
 
