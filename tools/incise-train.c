@@ -266,13 +266,6 @@ static void parse(struct options *options, int argc, char **argv)
 		options->how.n_mfs[i] = options->how.n_inputs == 2 ? 5 - i : 3;
 }
 
-struct result {
-	const struct options *options;
-	const struct incise_trained *trained;
-	const struct incise_corpus_side *fit;
-	const struct incise_corpus_side *check; /* NULL: no pairs were kept back */
-};
-
 /* --- progress ------------------------------------------------------------------------ */
 
 #define REDRAWN_NS 100000000
@@ -282,6 +275,7 @@ struct show {
 	FILE *history; /* or NULL */
 	enum incise_train_phase phase;
 	int64_t start_ns, drawn_ns; /* of the phase, and the last time */
+	bool resumed;
 };
 
 static void show_reading(const struct show *show, const struct incise_train_step *step)
@@ -314,13 +308,14 @@ static int show_step(void *user, const struct incise_train_step *step)
 	struct show *show = user;
 	int64_t now = cli_now_ns();
 
-	if (step->resumed && !step->rows)
+	if (step->resumed && !show->resumed)
 		cli_error("goes on from an interrupted training: %d of %d sources are "
 			  "surveyed",
 			  step->resumed, step->sources);
 	if (step->phase != show->phase || !show->start_ns)
 		show->start_ns = now;
 	show->phase = step->phase;
+	show->resumed |= step->resumed;
 	if (step->epoch)
 		show_epoch(show, step);
 	else if (step->sources && now - show->drawn_ns > REDRAWN_NS) {
@@ -454,6 +449,17 @@ static const char *unit_of(const char *column)
 	return score ? score + 1 : "";
 }
 
+/* A number in the unit of the target, which ends its key. */
+static void set_in_unit(json_t *object, const char *name, const struct options *options,
+			double value)
+{
+	const char *unit = unit_of(options->target);
+	char key[80];
+
+	snprintf(key, sizeof(key), "%s%s%.50s", name, *unit ? "_" : "", unit);
+	json_set_number(object, key, value);
+}
+
 static json_t *error_object(const struct options *options, double rmse, double r2,
 			    uint64_t pairs)
 {
@@ -461,11 +467,9 @@ static json_t *error_object(const struct options *options, double rmse, double r
 	json_t *object = json_object();
 	char key[80];
 
-	snprintf(key, sizeof(key), "rms_error%s%s", *unit ? "_" : "", unit);
-	json_set_number(object, key, rmse);
+	set_in_unit(object, "rms_error", options, rmse);
 	/* The name up to 0.1, on which scripts lean. */
-	snprintf(key, sizeof(key), "rmse%s%s", *unit ? "_" : "", unit);
-	json_set_number(object, key, rmse);
+	set_in_unit(object, "rmse", options, rmse);
 	if (!pairs)
 		return object;
 	snprintf(key, sizeof(key), "mse%s%s%s", *unit ? "_" : "", unit, *unit ? "2" : "");
@@ -490,16 +494,16 @@ static void warn(json_t *list, const char *fmt, ...)
 }
 
 /* Warn on stderr; the same as a list for JSON. */
-static json_t *warnings(const struct result *result)
+static json_t *warnings(const struct options *options,
+			const struct incise_trained *trained)
 {
-	const struct incise_trained *trained = result->trained;
-	const struct options *options = result->options;
+	const struct incise_corpus_side *fit = incise_corpus_side(trained->corpus, false);
 	const struct incise_model *model = trained->model;
 	const struct incise_train_report *report = &trained->report;
 	const struct incise_baselines *baselines = &trained->baselines;
 	const uint64_t rows = trained->pairs + trained->check_pairs;
-	const uint64_t pairs = result->fit->different;
-	const double rmse = result->check ? report->check_rmse : report->train_rmse;
+	const uint64_t pairs = fit->different;
+	const double rmse = options->how.check ? report->check_rmse : report->train_rmse;
 	const struct {
 		const char *name;
 		double rmse;
@@ -517,7 +521,7 @@ static json_t *warnings(const struct result *result)
 	double rounding = 1e-13 * fmax(fabs(out->min), fabs(out->max));
 	json_t *list = json_array();
 
-	if (options->how.group && result->fit->n_groups == 1 && !result->check)
+	if (options->how.group && fit->n_groups == 1 && !options->how.check)
 		warn(list,
 		     "--group %s: all pairs are of one group, so none is held out whole; "
 		     "give another column, or none",
@@ -552,41 +556,28 @@ static json_t *warnings(const struct result *result)
 	return list;
 }
 
-static json_t *propagated_json(const struct result *result)
+static json_t *propagated_json(const struct options *options,
+			       const struct incise_propagation_report *r)
 {
-	const struct incise_trained *trained = result->trained;
-	const struct incise_propagation_report *r = &trained->propagated;
-	const char *unit = unit_of(result->options->target);
-	const struct {
-		const char *name;
-		double value;
-	} parts[] = {{"own", r->own}, {"calibration", r->calibration}, {"rig", r->rig}};
 	json_t *object;
-	char key[80];
 
-	if (!result->options->how.n_parts)
+	if (!options->how.n_parts)
 		return json_null();
 	object = json_pack("{sf si si}", "least_weight", r->weight, "recordings",
 			   r->recordings, "calibrations", r->calibrations);
-	for (size_t i = 0; i < sizeof(parts) / sizeof(*parts); i++) {
-		snprintf(key, sizeof(key), "%s%s%.60s", parts[i].name, *unit ? "_" : "",
-			 unit);
-		json_set_number(object, key, parts[i].value);
-	}
+	set_in_unit(object, "own", options, r->own);
+	set_in_unit(object, "calibration", options, r->calibration);
+	set_in_unit(object, "rig", options, r->rig);
 	return object;
 }
 
-static void report_json(const struct result *result, json_t *warned)
+static void report_json(const struct options *options,
+			const struct incise_trained *trained, json_t *warned)
 {
-	const struct incise_trained *trained = result->trained;
-	const struct options *options = result->options;
 	const struct incise_model *model = trained->model;
-	const struct incise_corpus_side *fit = result->fit, *check = result->check;
 	const struct incise_train_report *report = &trained->report;
 	const struct incise_baselines *baselines = &trained->baselines;
 	json_t *object = json_object(), *unfired = json_array(), *mfs = json_array();
-	const char *unit = unit_of(options->target);
-	char key[80];
 
 	json_set_integer(object, "pairs", trained->pairs + trained->check_pairs);
 	json_set_integer(object, "left_out", trained->left_out);
@@ -597,9 +588,10 @@ static void report_json(const struct result *result, json_t *warned)
 			    error_object(options, report->train_rmse, report->train_r2,
 					 trained->pairs));
 	json_object_set_new(object, "check",
-			    check ? error_object(options, report->check_rmse,
-						 report->check_r2, trained->check_pairs)
-				  : json_null());
+			    options->how.check
+				    ? error_object(options, report->check_rmse,
+						   report->check_r2, trained->check_pairs)
+				    : json_null());
 	json_object_set_new(
 		object, "baselines",
 		json_pack("{sososo}", "mean",
@@ -607,8 +599,10 @@ static void report_json(const struct result *result, json_t *warned)
 			  error_object(options, baselines->linear, 0, 0), "knn",
 			  error_object(options, baselines->knn, 0, 0)));
 	json_set_integer(object, "knn_k", baselines->k);
-	json_set_integer(object, "train_groups", fit->n_groups);
-	json_set_integer(object, "check_groups", check ? check->n_groups : 0);
+	json_set_integer(object, "train_groups",
+			 incise_corpus_side(trained->corpus, false)->n_groups);
+	json_set_integer(object, "check_groups",
+			 incise_corpus_side(trained->corpus, true)->n_groups);
 	json_set_integer(object, "rules", incise_model_info(model)->n_rules);
 	json_set_integer(object, "parameters", report->parameters);
 	json_set_integer(object, "epochs", report->epochs);
@@ -630,12 +624,11 @@ static void report_json(const struct result *result, json_t *warned)
 	json_object_set_new(object, "mf", mfs);
 	json_set_integer(object, "start", report->start);
 	json_set_integer(object, "pairs_tuned", report->pairs_tuned);
-	snprintf(key, sizeof(key), "crossval_rms_error%s%s", *unit ? "_" : "", unit);
-	json_set_number(object, key, report->crossval_rmse);
-	snprintf(key, sizeof(key), "noise%s%s", *unit ? "_" : "", unit);
-	json_set_number(object, key, trained->noise);
+	set_in_unit(object, "crossval_rms_error", options, report->crossval_rmse);
+	set_in_unit(object, "noise", options, trained->noise);
 	json_set_number(object, "interval95_coverage", trained->coverage);
-	json_object_set_new(object, "uncertainty", propagated_json(result));
+	json_object_set_new(object, "uncertainty",
+			    propagated_json(options, &trained->propagated));
 	json_object_set_new(object, "warnings", warned);
 	json_object_set_new(object, "model", json_string(options->model));
 	json_print(object);
@@ -648,14 +641,15 @@ static void print_row(const char *name, double train, double check)
 	isnan(check) ? printf("\n") : printf("%14.5g\n", check);
 }
 
-static void report_text(const struct result *result)
+static void report_text(const struct options *options,
+			const struct incise_trained *trained)
 {
-	const struct incise_trained *trained = result->trained;
-	const struct options *options = result->options;
 	const struct incise_model *model = trained->model;
-	const struct incise_corpus_side *fit = result->fit, *check = result->check;
+	const struct incise_corpus_side *fit = incise_corpus_side(trained->corpus, false);
+	const struct incise_corpus_side *held = incise_corpus_side(trained->corpus, true);
 	const struct incise_train_report *report = &trained->report;
 	const struct incise_baselines *baselines = &trained->baselines;
+	bool check = options->how.check > 0;
 	bool cuts = trained->group && !strcmp(trained->group, "cut");
 	const char *group = cuts ? "cut" : "group";
 	const char *unseen = options->how.train.classic ? "check"
@@ -670,7 +664,7 @@ static void report_text(const struct result *result)
 	if (check)
 		printf(", %llu to check", (unsigned long long)trained->check_pairs);
 	if (check && trained->group)
-		printf(" (%s)", cli_count(check->n_groups, group));
+		printf(" (%s)", cli_count(held->n_groups, group));
 	if (trained->left_out)
 		printf("\nleft out %llu of %llu rows: the blade did not advance",
 		       (unsigned long long)trained->left_out,
@@ -703,7 +697,7 @@ static void report_text(const struct result *result)
 	if (check)
 		printf(", holds %.1f %% of the %s", 100 * trained->coverage, unseen);
 	printf("\n");
-	if (result->options->how.n_parts)
+	if (options->how.n_parts)
 		printf("  uncertainties: own parts %.3g %s; calibrations %.3g %s on the "
 		       "model, %.3g %s of another rig\n",
 		       trained->propagated.own, unit_of(options->target),
@@ -803,20 +797,12 @@ static void save_model(const struct options *options,
 
 static void report(const struct options *options, const struct incise_trained *trained)
 {
-	const struct result result = {
-		.options = options,
-		.trained = trained,
-		.fit = incise_corpus_side(trained->corpus, false),
-		.check = options->how.check > 0
-				 ? incise_corpus_side(trained->corpus, true)
-				 : NULL,
-	};
-	json_t *warned = warnings(&result);
+	json_t *warned = warnings(options, trained);
 
 	if (options->json)
-		report_json(&result, warned);
+		report_json(options, trained, warned);
 	else if (strcmp(options->model, "-"))
-		report_text(&result);
+		report_text(options, trained);
 	if (!options->json)
 		json_decref(warned);
 }
