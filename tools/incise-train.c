@@ -368,7 +368,7 @@ static void check_writable(const char *path)
 	incise_outfile_abort(file);
 }
 
-/* A model whose sums can be found. */
+/* Load a model, and fail unless sums can be found at its premises. */
 static struct incise_model *load_premises(const char *path)
 {
 	struct incise_error err = {0};
@@ -381,7 +381,7 @@ static struct incise_model *load_premises(const char *path)
 	return model;
 }
 
-/* Those of the options, or of the premises if these are given. */
+/* Take the columns of the options, or of the premises if these are given. */
 static void choose_columns(struct options *options, const char **columns)
 {
 	const struct incise_model_info *info =
@@ -724,8 +724,8 @@ static void hold_signals(int how)
 	sigprocmask(how, &set, NULL);
 }
 
-static void train(struct options *options, struct incise_train_source *sources,
-		  struct incise_trained *trained, struct incise_outfile **history)
+static void run_training(struct options *options, struct incise_train_source *sources,
+			 struct incise_trained *trained, struct incise_outfile **history)
 {
 	const char *output = options->factor ? options->factor : options->model;
 	struct show show = {.options = options};
@@ -795,7 +795,8 @@ static void save_model(const struct options *options,
 	free(sd);
 }
 
-static void report(const struct options *options, const struct incise_trained *trained)
+static void report_model(const struct options *options,
+			 const struct incise_trained *trained)
 {
 	json_t *warned = warnings(options, trained);
 
@@ -839,12 +840,12 @@ int main(int argc, char **argv)
 	options.data = options.n_paths > 1	 ? data
 		       : source_is_pipe(sources) ? options.paths[0]
 						 : sources[0].name;
-	train(&options, sources, &trained, &history);
+	run_training(&options, sources, &trained, &history);
 	if (options.factor && trained.factor && (!job || !job->rank)) {
 		save_factor(&options, trained.factor);
 	} else if (trained.model) {
 		save_model(&options, &trained, history);
-		report(&options, &trained);
+		report_model(&options, &trained);
 	}
 	cli_finish();
 	incise_trained_free(&trained);

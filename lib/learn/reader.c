@@ -126,8 +126,8 @@ static int read_rows(void *user, incise_row_taker take, void *taker,
 	return name_error(source, rc, err);
 }
 
-static int stop(void *user, const double *row, const char *group,
-		struct incise_error *err)
+static int stop_reading(void *user, const double *row, const char *group,
+			struct incise_error *err)
 {
 	(void)user;
 	(void)row;
@@ -182,7 +182,7 @@ int incise_reader_open(struct incise_reader *source, struct incise_error *err)
 	source->state = incise_reader_state(source);
 	/* A file of another kind is refused before all of it is hashed. */
 	if (given->path)
-		rc = each_row(source, stop, NULL, err);
+		rc = each_row(source, stop_reading, NULL, err);
 	if (!rc && given->open)
 		rc = given->open(given, err);
 	if (!rc)

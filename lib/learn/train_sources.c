@@ -56,7 +56,7 @@ static int name_error(struct training *t, int rc)
 		       : incise_error_set(&t->err, -rc, "%d sources: %s", t->n, own.text);
 }
 
-/* The same; few different rows may be why. */
+/* The same, with the rows that repeat others, which may be the cause. */
 static int name_training(struct training *t, int rc)
 {
 	struct incise_error own;
@@ -120,7 +120,7 @@ static bool is_first(const struct training *t)
 }
 
 /* Fail if any rank has failed, with the error of the lowest one. */
-static int agree(struct training *t, int rc)
+static int agree_on_error(struct training *t, int rc)
 {
 	struct incise_error none = {0}, *all;
 	size_t *sizes;
@@ -344,7 +344,7 @@ static int survey_source(struct training *t, int i)
 }
 
 /* Rows, ranges, groups, and the sample of all sources. */
-static int survey(struct training *t)
+static int survey_sources(struct training *t)
 {
 	const struct incise_sources_options *options = t->options;
 	size_t sample = options->train.classic ? SIZE_MAX : options->train.tuned;
@@ -367,7 +367,7 @@ static int survey(struct training *t)
 	for (int i = first; i < t->n && !rc && !t->watch.stopped; i++)
 		if (is_mine(t, i))
 			rc = survey_source(t, i);
-	rc = agree(t, rc);
+	rc = agree_on_error(t, rc);
 	if (!rc && t->ranks)
 		rc = share_surveys(t);
 	if (rc)
@@ -428,7 +428,7 @@ static int fold_source(struct training *t, int i)
 }
 
 /* Premises are those of rank 0, and the sums are complete there. */
-static int fold(struct training *t, const struct incise_model *premises)
+static int fold_sources(struct training *t, const struct incise_model *premises)
 {
 	struct incise_trained *trained = t->trained;
 	struct incise_factor_info info;
@@ -447,7 +447,7 @@ static int fold(struct training *t, const struct incise_model *premises)
 	for (int i = 0; i < t->n && !rc && !t->watch.stopped; i++)
 		if (is_mine(t, i))
 			rc = fold_source(t, i);
-	rc = agree(t, rc);
+	rc = agree_on_error(t, rc);
 	if (!rc && t->ranks)
 		rc = add_ranks(t, trained->factor);
 	if (!rc && t->ranks && t->check)
@@ -483,7 +483,7 @@ static int fold_pass(struct training *t, struct incise_model **model, double *sc
 	int rc = incise_propagation_start(t->propagation, *model, *scatter, &t->err);
 
 	if (!rc)
-		rc = fold(t, *model);
+		rc = fold_sources(t, *model);
 	if (rc)
 		return rc;
 	next = incise_factor_solve(t->trained->factor, &ridge, NULL, &uncertainty,
@@ -500,14 +500,14 @@ static int fold_pass(struct training *t, struct incise_model **model, double *sc
 }
 
 /* The sums of all pairs, of which those with weights are passed over several times. */
-static int fold_all(struct training *t, const struct incise_model *premises)
+static int fold_passes(struct training *t, const struct incise_model *premises)
 {
 	struct incise_model *model;
 	double scatter;
 	int rc;
 
 	if (!t->propagation)
-		return fold(t, premises);
+		return fold_sources(t, premises);
 	model = incise_model_copy(premises);
 	rc = model ? 0 : no_memory(t);
 	scatter = find_scatter(
@@ -524,7 +524,7 @@ static int find_sums(void *user, const struct incise_model *premises,
 		     struct incise_factor **sums)
 {
 	struct training *t = user;
-	int rc = fold_all(t, premises);
+	int rc = fold_passes(t, premises);
 
 	*sums = t->trained->factor;
 	t->named = rc;
@@ -532,7 +532,7 @@ static int find_sums(void *user, const struct incise_model *premises,
 }
 
 /* From an even grid over the ranges of all training pairs. */
-static int search(struct training *t)
+static int search_premises(struct training *t)
 {
 	const struct incise_corpus *corpus = t->trained->corpus;
 	const struct incise_corpus_side *fit = incise_corpus_side(corpus, false);
@@ -567,11 +567,11 @@ static int search(struct training *t)
 }
 
 /* The consequents of all pairs at given premises. */
-static int solve(struct training *t)
+static int solve_premises(struct training *t)
 {
 	const struct incise_factor_ridge ridge = {t->options->train.ridge, 1, NAN};
 	struct incise_trained *trained = t->trained;
-	int rc = fold_all(t, t->options->premises);
+	int rc = fold_passes(t, t->options->premises);
 
 	if (rc || t->options->end == INCISE_TRAIN_TO_FACTOR)
 		return rc;
@@ -643,8 +643,8 @@ static char *make_notes(const struct training *t)
 	return fclose(out) ? NULL : text;
 }
 
-/* What is said of a model. */
-static int judge(struct training *t)
+/* Find what a report says about the model. */
+static int judge_model(struct training *t)
 {
 	struct incise_trained *trained = t->trained;
 	const struct incise_corpus_side *fit = incise_corpus_side(trained->corpus, false);
@@ -677,7 +677,7 @@ static int judge(struct training *t)
 
 /* --- all of it ----------------------------------------------------------------------- */
 
-static int train(struct training *t)
+static int train_all(struct training *t)
 {
 	const struct incise_sources_options *options = t->options;
 	int rc;
@@ -686,7 +686,7 @@ static int train(struct training *t)
 		return incise_error_set(
 			&t->err, EINVAL,
 			"weights and classic trainings are of one process");
-	rc = survey(t);
+	rc = survey_sources(t);
 	if (rc || options->end == INCISE_TRAIN_TO_CORPUS)
 		return rc;
 	if (options->n_parts) {
@@ -697,10 +697,10 @@ static int train(struct training *t)
 		incise_corpus_weigh(t->trained->corpus, t->propagation);
 	}
 	if (!is_first(t))
-		return fold(t, NULL);
-	rc = options->premises ? solve(t) : search(t);
+		return fold_sources(t, NULL);
+	rc = options->premises ? solve_premises(t) : search_premises(t);
 	if (!rc && options->end == INCISE_TRAIN_TO_MODEL)
-		rc = judge(t);
+		rc = judge_model(t);
 	return rc;
 }
 
@@ -729,7 +729,7 @@ int incise_train_sources(struct incise_train_source *sources, int n,
 	if (!rc)
 		t.progress = open_progress(&t);
 	if (!rc)
-		rc = train(&t);
+		rc = train_all(&t);
 	/* A search counts for itself. */
 	if (t.watch.stopped || rc == -ECANCELED)
 		rc = incise_error_set(&t.err, ECANCELED, "training was stopped");

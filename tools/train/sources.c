@@ -22,7 +22,7 @@
 
 #define ORIGINS_TEXT 480 /* bytes of a recording's origins in its text */
 
-/* What a source points to. */
+/* The part of a source that is its own, user of incise_train_source. */
 struct own {
 	const struct recording_rows *rows;
 	char text[INCISE_FACTOR_TEXT_MAX], rig[256], calibration[512];
@@ -65,7 +65,7 @@ static void print_recording(FILE *out, const char *path)
 	free(pattern);
 }
 
-/* Of all files, and how they are read. */
+/* Describe all files of a recording, and the rows that are read. */
 static char *recording_state(const struct incise_train_source *source)
 {
 	const struct own *own = source->user;
@@ -121,7 +121,7 @@ static int open_recording(struct incise_train_source *source, struct incise_erro
 	char *text, origins[ORIGINS_TEXT];
 	int rc;
 
-	/* Says itself what is wrong, as a warning, where damaged ones are used. */
+	/* It prints a warning where damaged recordings are used. */
 	if (!recording_intact(source->name, true, own->rows->damaged, err) && err->code)
 		return -err->code;
 	recording = incise_recording_open(source->name, err);
@@ -207,7 +207,7 @@ bool source_is_pipe(const struct incise_train_source *source)
 }
 
 /* A recording may be named without its extension. */
-static const char *find(const char *path)
+static const char *find_path(const char *path)
 {
 	enum file_kind kind = file_kind_of(path);
 	char *whole = cli_text("%s.rec", path);
@@ -245,7 +245,7 @@ struct incise_train_source *sources_new(char **paths, int n,
 		own[i].rows = rows;
 		source->user = &own[i];
 		source->text = own[i].text;
-		source->name = find(paths[i]);
+		source->name = find_path(paths[i]);
 		if (file_kind_of(source->name) == FILE_RECORDING) {
 			name_recording(source);
 			continue;

@@ -17,7 +17,7 @@ struct recording_rows {
 	double rate_hz;	  /* 0: every force sample */
 };
 
-/* Of @paths; they and @rows outlive them. */
+/* Make sources of paths, which outlive them, as the rows do; sources_free(). */
 struct incise_train_source *sources_new(char **paths, int n,
 					const struct recording_rows *rows);
 void sources_free(struct incise_train_source *sources, int n);
@@ -25,7 +25,7 @@ void sources_free(struct incise_train_source *sources, int n);
 /* Whether a source can be read once only, and is kept in memory. */
 bool source_is_pipe(const struct incise_train_source *source);
 
-/* For incise info: counts, ranges, and the groups that differ from the others. */
+/* Print counts, ranges, and the groups that differ from the others, for incise info. */
 void dataset_show(struct incise_train_source *sources, int n,
 		  struct incise_sources_options *options, bool json);
 
