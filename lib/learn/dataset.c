@@ -331,8 +331,9 @@ bool incise_dataset_has(const char *path, const char *column, bool *stated)
 		return false;
 	if (next_row(&in) > 0)
 		at = look_for_column(&in, column);
-	if (at >= 0 && stated && next_row(&in) > 0)
-		*stated = at < in.n_fields && !number(&in, at, column, &value);
+	if (at >= 0 && stated && next_row(&in) > 0 &&
+	    (at >= in.n_fields || number(&in, at, column, &value)))
+		*stated = false;
 	incise_lines_close(&in.lines);
 	return at >= 0;
 }
