@@ -110,31 +110,22 @@ static double age_of(const char *date)
 	return difftime(time(NULL), timegm(&utc));
 }
 
-/* A key's value by the last calibration that passed and has it, or the nominal one. */
-static double calibrated(const char *key, const struct incise_calibration_record *records,
-			 int n)
-{
-	struct incise_calibration nominal;
-
-	while (n--)
-		for (int i = 0; records[n].pass && i < records[n].n; i++)
-			if (!strcmp(records[n].values[i].key, key))
-				return records[n].values[i].left;
-	incise_calibration_nominal(&nominal);
-	return incise_calibration_get(&nominal, key);
-}
-
 /* "KEY = VALUE, …" of a kind's keys that a person has written; "" if there are none. */
 static void by_hand(const struct incise_calibration *c, int kind,
 		    const struct incise_calibration_record *records, int n, char *text,
 		    size_t size)
 {
+	struct incise_calibration nominal;
 	size_t used = 0;
 
 	*text = '\0';
+	incise_calibration_nominal(&nominal);
 	for (const char *const *key = kinds[kind].keys; *key; key++) {
+		const struct incise_calibration_value *last =
+			incise_calibration_last(records, n, *key, NULL);
 		const double now = incise_calibration_get(c, *key);
-		const double was = calibrated(*key, records, n);
+		const double was =
+			last ? last->left : incise_calibration_get(&nominal, *key);
 
 		/* Both are NAN where nothing is known. */
 		if (now == was || (isnan(now) && isnan(was)) || used >= size)

@@ -2,67 +2,40 @@
 /*
  * incise calibrate delay: the delays between tracker, force channel and camera, from a motion
  * that all of them measure.
- *
- *     force   F = f(depth(t + a))    a: the tracker is later than the force
- *     camera  depth(t + b)           b: the tracker is later than the camera
  */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include <incise/calibrate_delay.h>
 #include <incise/recorder.h>
 #include <incise/rig.h>
-#include "calibrate/calibrate.h"
+#include "calibrate/delay.h"
 #include "cli/folder.h"
-#include "cli/json.h"
-#include "cli/plot.h"
 #include "cli/recording.h"
-#include "cli/uncertainty.h"
-
-/* A drift that is this many times its uncertainty is real. */
-#define DRIFT_SIGMAS 4
-#define DRIFT_MAX_MS 0.3
 
 #define POLL_NS 10000000LL
 
-enum { FORCE, TRACKER, CAMERA, STREAMS };
-static const char *const stream_names[] = {"force", "tracker", "camera", NULL};
-
-struct options {
-	struct calibrate_options common;
-	double time_s, max_delay_ms; /* time_s 0: not given */
-	double u_reference_ms;	     /* NAN: not given */
-	int reference;
-	bool camera;
-};
-
 static const struct cli_option option_table[] = {
-	{CLI_RIG_OPTION(struct options, common.rig)},
-	{CALIBRATE_FILE_OPTION(struct options)},
+	CALIBRATE_RIG_OPTIONS(struct delay),
 	{0, "duration", "TIME", "length of the recording (default: 15s)",
-	 CLI_DURATION(struct options, time_s, 8, 600)},
+	 CLI_DURATION(struct delay, time_s, 8, 600)},
 	{0, "reference-stream", "STREAM",
 	 "stream whose delay is taken as known: force (default), tracker or camera",
-	 CLI_CHOICE(struct options, reference, stream_names)},
+	 CLI_CHOICE(struct delay, reference, delay_names)},
 	{0, "u-reference", "MS",
 	 "standard uncertainty of that stream's own delay, which is not measured: "
 	 "the others' is relative to it",
-	 CLI_NUMBER(struct options, u_reference_ms, 0, 1000)},
+	 CLI_NUMBER(struct delay, u_reference_ms, 0, 1000)},
 	{0, "max-delay", "MS", "largest delay to look for, in ms (default: 150)",
-	 CLI_NUMBER(struct options, max_delay_ms, 10, 1000)},
+	 CLI_NUMBER(struct delay, max_delay_ms, 10, 1000)},
 	{0, "with-camera", NULL, "on the simulated rig, record its camera too",
-	 CLI_FLAG(struct options, camera)},
+	 CLI_FLAG(struct delay, camera)},
 	{0, "from", "NAME.rec", "use this recording instead of a rig",
-	 CLI_INPUT(struct options, common.from)},
+	 CLI_INPUT(struct delay, common.from)},
 	{0, "keep", "NAME.rec", "keep the recording here, for --from",
-	 CLI_OUTPUTS(struct options, common.keep)},
-	{0, "report", "DIR", "write report.txt, report.json and plots into this folder",
-	 CLI_OUTPUTS(struct options, common.report)},
-	{0, "dry-run", NULL, "do everything except writing calibration.conf",
-	 CLI_FLAG(struct options, common.dry_run)},
-	{0, "json", NULL, "report as JSON", CLI_FLAG(struct options, common.json)},
+	 CLI_OUTPUTS(struct delay, common.keep)},
+	CALIBRATE_REPORT_OPTIONS(struct delay),
 	{0},
 };
 
@@ -80,27 +53,15 @@ static const struct cli_command command = {
 	.failure = "failed or refused",
 };
 
-struct stream {
-	struct incise_delay_point *points; /* force N, others depth mm */
-	int n;				   /* 0: there is none */
-	struct incise_stream about;
-};
-
-/* One stream against the tracker's depth. */
-struct pair {
-	bool known;
-	struct incise_delay_fit fit;
-};
-
-static void parse(struct options *options, int argc, char **argv)
+static void parse_options(struct delay *delay, int argc, char **argv)
 {
-	struct calibrate_options *common = &options->common;
+	const struct calibrate *common = &delay->common;
 
-	cli_parse(&command, argc, argv, options);
+	cli_parse(&command, argc, argv, delay);
 	cli_no_operands(argc, argv, "--from");
-	if (common->from && options->time_s > 0)
+	if (common->from && delay->time_s > 0)
 		cli_usage("--duration does not go with --from: a recording has its own");
-	if (!common->from && !(options->time_s > 0) && !isatty(STDIN_FILENO))
+	if (!common->from && !(delay->time_s > 0) && !isatty(STDIN_FILENO))
 		cli_usage("missing --duration or --from (needed without a terminal)");
 	if (common->keep &&
 	    (strlen(common->keep) < 5 || !cli_ends_with(common->keep, ".rec")))
@@ -108,12 +69,13 @@ static void parse(struct options *options, int argc, char **argv)
 			  common->keep);
 	if (common->keep)
 		cli_output(common->keep);
-	calibrate_begin(common);
+	calibrate_check_source(common);
+	cli_catch_signals();
 }
 
 /* --- streams ------------------------------------------------------------------------- */
 
-static void read_stream(struct stream *stream, struct incise_recording *recording,
+static void read_stream(struct delay_stream *stream, struct incise_recording *recording,
 			const char *values_of)
 {
 	struct incise_recording_value *values;
@@ -130,9 +92,10 @@ static void read_stream(struct stream *stream, struct incise_recording *recordin
 	free(values);
 }
 
-static void read_streams(struct stream streams[STREAMS], const char *path)
+static void read_streams(void *run, const char *path)
 {
 	static const char *const values[] = {"force", "depth", "camera"};
+	struct delay *delay = run;
 	struct incise_recording_info info;
 	struct incise_error err = {0};
 	struct incise_recording *recording = recording_open(path);
@@ -144,11 +107,10 @@ static void read_streams(struct stream streams[STREAMS], const char *path)
 			 "times; record again",
 			 path);
 	for (int i = 0; i < STREAMS; i++) {
-		streams[i] = (struct stream){0};
 		for (int k = 0; k < info.n_streams; k++)
-			if (!strcmp(info.streams[k].name, stream_names[i]))
-				streams[i].about = info.streams[k];
-		read_stream(&streams[i], recording, values[i]);
+			if (!strcmp(info.streams[k].name, delay_names[i]))
+				delay->streams[i].about = info.streams[k];
+		read_stream(&delay->streams[i], recording, values[i]);
 	}
 	incise_recording_close(recording);
 }
@@ -180,15 +142,15 @@ static int poll_for(struct incise_recorder *recorder, struct incise_clock *clock
  * Record the rig for @time_s into @path, which ends in .rec, with its camera if rig.conf names
  * one or --with-camera is given. 0, or -1 with *err: then a part of it may be left there.
  */
-static int record(const struct options *options, double time_s, const char *path,
+static int record(const struct delay *delay, double time_s, const char *path,
 		  struct incise_error *err)
 {
 	unsigned int devices = INCISE_RIG_TRACKER | INCISE_RIG_FORCE | INCISE_RIG_CAMERA |
-			       (options->camera ? 0 : INCISE_RIG_IF_NAMED);
-	struct incise_recorder_setup setup = {.calibration = &options->common.found,
+			       (delay->camera ? 0 : INCISE_RIG_IF_NAMED);
+	struct incise_recorder_setup setup = {.calibration = &delay->common.found,
 					      .planned_s = time_s};
 	struct incise_rig *rig =
-		incise_rig_open(cli_rig(options->common.rig), devices, err);
+		incise_rig_open(cli_rig(delay->common.rig), devices, err);
 	struct incise_error second = {0};
 	struct incise_recorder *recorder;
 	struct incise_vision_setup vision;
@@ -212,11 +174,12 @@ static int record(const struct options *options, double time_s, const char *path
 	return rc ? -1 : 0;
 }
 
-static void record_now(const struct options *options, struct stream *streams)
+static void record_streams(void *run)
 {
-	const char *keep = options->common.keep, *base = getenv("TMPDIR");
-	char *folder, *path;
-	double time_s = options->time_s > 0 ? options->time_s : 15;
+	struct delay *delay = run;
+	const char *keep = delay->common.keep;
+	double time_s = delay->time_s > 0 ? delay->time_s : 15;
+	char folder[300], *path;
 	struct incise_error err = {0};
 	int rc;
 
@@ -225,60 +188,56 @@ static void record_now(const struct options *options, struct stream *streams)
 			"Hold the tool clear of everything and press Enter. After a "
 			"second, press on something\n"
 			"springy and lift off again, quickly and at an uneven pace. ");
-		while (getchar() != '\n' && !feof(stdin) && !cli_stop)
-			;
+		calibrate_await_enter();
 	}
 	if (keep) {
 		path = recording_target(keep);
-		if (record(options, time_s, path, &err))
+		if (record(delay, time_s, path, &err))
 			cli_fail_with(&err);
 		recording_replace(path, keep);
 		free(path);
-		read_streams(streams, keep);
+		read_streams(delay, keep);
 		return;
 	}
-	folder = cli_text("%s/incise-XXXXXX", base && *base ? base : "/tmp");
-	if (!mkdtemp(folder))
-		cli_fail("%s: %s", folder, strerror(errno));
+	folder_make(folder, sizeof(folder), "for the recording");
 	path = cli_text("%s/delay.rec", folder);
-	rc = record(options, time_s, path, &err);
+	rc = record(delay, time_s, path, &err);
 	if (!rc)
-		read_streams(streams, path);
+		read_streams(delay, path);
 	folder_remove(folder);
 	free(path);
-	free(folder);
 	if (rc)
 		cli_fail_with(&err);
 }
 
-/* --- fits ---------------------------------------------------------------------------- */
+/* --- the fit ------------------------------------------------------------------------- */
 
-static void fit_pair(const struct options *options, const struct stream *streams,
-		     int other, struct pair *pair)
+static void fit_stream(struct delay *delay, int other)
 {
-	const struct stream *depth = &streams[TRACKER];
-	const struct incise_delay_fit *fit = &pair->fit;
+	const struct delay_stream *depth = &delay->streams[TRACKER];
+	struct delay_stream *s = &delay->streams[other];
+	const struct incise_delay_fit *fit = &s->fit;
 	struct incise_error err = {0};
 
-	if (!streams[other].n)
+	if (!s->n)
 		return;
-	if (incise_calibrate_delay(
-		    depth->points, depth->n, streams[other].points, streams[other].n,
-		    other == FORCE ? INCISE_DELAY_FORCE : INCISE_DELAY_ALIKE,
-		    options->max_delay_ms, &pair->fit, &err))
-		cli_fail("tracker and %s: %s", stream_names[other], err.text);
-	pair->known = true;
+	if (incise_calibrate_delay(depth->points, depth->n, s->points, s->n,
+				   other == FORCE ? INCISE_DELAY_FORCE
+						  : INCISE_DELAY_ALIKE,
+				   delay->max_delay_ms, &s->fit, &err))
+		cli_fail("tracker and %s: %s", delay_names[other], err.text);
+	s->is_fitted = true;
 	if (fabs(fit->drift_ms) > DRIFT_MAX_MS &&
 	    fabs(fit->drift_ms) > DRIFT_SIGMAS * fit->drift_sd_ms)
 		cli_fail("tracker and %s: the delay drifts by %.2f ms in %.0f s (u "
 			 "%.2f ms): the clock of one of them is wrong; see 'incise "
 			 "info' on the recording",
-			 stream_names[other], fit->drift_ms, fit->span_s,
+			 delay_names[other], fit->drift_ms, fit->span_s,
 			 fit->drift_sd_ms);
 }
 
 /* Uncertainty of a stream's times by the line through its arrivals, ms. */
-static double line_u(const struct stream *stream)
+static double line_u(const struct delay_stream *stream)
 {
 	double all = stream->about.offset_sd_ms, delay = stream->about.delay_sd_ms;
 
@@ -287,242 +246,120 @@ static double line_u(const struct stream *stream)
 	return isnan(delay) ? all : sqrt(fmax(0, all * all - delay * delay));
 }
 
-/* The delay of a stream after the reference, and its budget. */
-struct lateness {
-	double ms, fits_u, lines_u;
-};
-
-static struct lateness lateness_of(const struct stream *streams, const struct pair *pairs,
-				   int stream, int reference)
+static void find_lateness(struct delay *delay, int stream)
 {
-	struct lateness late = {0};
-	int ends[] = {stream, reference};
+	struct delay_stream *s = &delay->streams[stream];
+	int ends[] = {stream, delay->reference};
 
 	for (int e = 0; e < 2; e++) {
-		double u = line_u(&streams[ends[e]]);
+		const struct delay_stream *end = &delay->streams[ends[e]];
 
-		late.lines_u = hypot(late.lines_u, u);
+		s->lines_u_ms = hypot(s->lines_u_ms, line_u(end));
 		/* the tracker is the other side of each pair */
 		if (ends[e] == TRACKER)
 			continue;
-		late.ms += (e ? 1 : -1) * pairs[ends[e]].fit.delay_ms;
-		late.fits_u = hypot(late.fits_u, pairs[ends[e]].fit.sd_ms);
+		s->late_ms += (e ? 1 : -1) * end->fit.delay_ms;
+		s->fits_u_ms = hypot(s->fits_u_ms, end->fit.sd_ms);
 	}
-	return late;
+	s->has_result = true;
 }
 
-/* --- the report ---------------------------------------------------------------------- */
-
-static json_t *pair_json(const struct pair *pair)
+static void add_values(struct delay *delay)
 {
-	const struct incise_delay_fit *fit = &pair->fit;
-
-	if (!pair->known)
-		return json_null();
-	return json_pack("{so so so so so so so so so so si}", "tracker_later_ms",
-			 json_number(fit->delay_ms), "u_ms", json_number(fit->sd_ms),
-			 "low_ms", json_number(fit->low_ms), "high_ms",
-			 json_number(fit->high_ms), "drift_ms",
-			 json_number(fit->drift_ms), "drift_sd_ms",
-			 json_number(fit->drift_sd_ms), "correlation",
-			 json_number(fit->correlation), "second_peak",
-			 json_number(fit->second), "contact_mm",
-			 json_number(fit->contact_mm), "span_s", json_number(fit->span_s),
-			 "blocks", fit->blocks);
-}
-
-static void report_pair(FILE *out, const char *name, const struct pair *pair)
-{
-	const struct incise_delay_fit *fit = &pair->fit;
-
-	if (!pair->known)
-		return;
-	fprintf(out,
-		"tracker later than %s by %.3f ms, u = %.3f ms, 95 %% interval %.3f to "
-		"%.3f ms\n"
-		"  correlation %.4f, second peak %.2f of it, over %.1f s in %d blocks\n"
-		"  drift from beginning to end %.3f ms (u %.3f ms, %.1f ppm)\n",
-		name, fit->delay_ms, fit->sd_ms, fit->low_ms, fit->high_ms,
-		fit->correlation, fit->second, fit->span_s, fit->blocks, fit->drift_ms,
-		fit->drift_sd_ms, 1e3 * fit->drift_ms / fit->span_s);
-	if (!isnan(fit->contact_mm))
-		fprintf(out, "  contact begins at a depth of %.2f mm\n", fit->contact_mm);
-}
-
-/* All streams, the tracker's depth shifted by its delay. */
-static void draw(const char *folder, const struct stream *streams,
-		 const struct pair *pairs)
-{
-	FILE *script;
-	int n = 0;
-
-	if (!calibrate_can_plot(folder))
-		return;
 	for (int i = 0; i < STREAMS; i++) {
-		int stride = 1 + streams[i].n / 4000;
-		FILE *data;
-		char file[40];
+		struct delay_stream *s = &delay->streams[i];
+		char key[32];
+		double u;
 
-		snprintf(file, sizeof(file), "%s.dat", stream_names[i]);
-		data = plot_data(folder, file);
-		for (int k = 0; k < streams[i].n; k += stride)
-			fprintf(data, "%.5f %.5f\n",
-				(streams[i].points[k].t_ns -
-				 streams[TRACKER].points[0].t_ns) *
-					1e-9,
-				streams[i].points[k].value);
-		plot_data_end(data, folder);
+		if (i == delay->reference || (i != TRACKER && !s->is_fitted))
+			continue;
+		find_lateness(delay, i);
+		u = hypot(s->fits_u_ms, s->lines_u_ms);
+		calibrate_words(key, "%s_delay_ms", delay_names[i]);
+		calibrate_value(&delay->common, key, "ms", s->about.delay_ms + s->late_ms,
+				u);
+		calibrate_words(key, "%s_delay_sd_ms", delay_names[i]);
+		calibrate_value(&delay->common, key, "ms", u, 0);
 	}
-	script = plot_begin(folder, "fit", 1000, 520);
-	fputs("set title 'Streams of the rig, each moved by its measured delay'\n"
-	      "set xlabel 'time / s'\nset ylabel 'depth / mm'\nset autoscale xfix\n"
-	      "eval key_below\n",
-	      script);
-	if (streams[FORCE].n)
-		fputs("set border 11\nset y2label 'force / N'\nset y2tics\n", script);
-	plot_add(
-		script, &n,
-		"'tracker.dat' using ($1-%g):2 with lines lt 1 title 'depth by the tracker'",
-		pairs[FORCE].known ? pairs[FORCE].fit.delay_ms * 1e-3 : 0);
-	if (streams[FORCE].n)
-		plot_add(script, &n,
-			 "'force.dat' using 1:2 axes x1y2 with lines lt 2 title 'force'");
-	if (pairs[CAMERA].known)
-		plot_add(script, &n,
-			 "'camera.dat' using ($1+%g):2 with points lt 3 ps 0.5 "
-			 "title 'depth by the camera'",
-			 (pairs[CAMERA].fit.delay_ms - pairs[FORCE].fit.delay_ms) * 1e-3);
-	putc('\n', script);
-	if (!plot_draw(script, folder, "fit"))
-		cli_warn("fit.png: could not be drawn; see whether gnuplot works");
 }
 
-/* The verdicts of fit_pair() and the library, with the limits. */
-static void fill_verdict(const struct pair *pairs,
-			 struct incise_calibration_record *record)
+static void state_reference(struct delay *delay)
 {
+	const char *name = delay_names[delay->reference];
+	char key[32], question[120];
+
+	calibrate_words(key, "%s_delay_sd_ms", name);
+	calibrate_words(
+		question,
+		"Standard uncertainty of the own delay of the %s (a converter that "
+		"timestamps: 0.01)",
+		name);
+	calibrate_stated(&delay->common, delay->u_reference_ms, key, "ms", question);
+}
+
+/* The verdicts of fit_stream() and the library, with the limits. */
+static void set_verdict(struct delay *delay)
+{
+	char *verdict = delay->common.record.verdict;
+	const size_t size = sizeof(delay->common.record.verdict);
 	int used = 0;
 
 	for (int i = 0; i < STREAMS; i++)
-		if (pairs[i].known)
+		if (delay->streams[i].is_fitted)
 			used += snprintf(
-				record->verdict + used, sizeof(record->verdict) - used,
+				verdict + used, size - used,
 				"%stracker and %s: correlation %.3f, drift %.3f ms",
-				used ? "; " : "", stream_names[i],
-				pairs[i].fit.correlation, pairs[i].fit.drift_ms);
-	snprintf(record->verdict + used, sizeof(record->verdict) - used,
+				used ? "; " : "", delay_names[i],
+				delay->streams[i].fit.correlation,
+				delay->streams[i].fit.drift_ms);
+	snprintf(verdict + used, size - used,
 		 "; limits: correlation %g, drift %g ms or %d u",
 		 INCISE_DELAY_CORRELATION_MIN, DRIFT_MAX_MS, DRIFT_SIGMAS);
 }
 
-static void state_reference(const struct options *options,
-			    struct incise_calibration_record *record)
+static int fit_streams(void *run, struct incise_error *err)
 {
-	const char *name = stream_names[options->reference];
-	char key[32], question[120];
+	struct delay *delay = run;
+	const struct delay_stream *streams = delay->streams;
+	struct incise_calibration_record *record = &delay->common.record;
 
-	snprintf(key, sizeof(key), "%s_delay_sd_ms", name);
-	snprintf(question, sizeof(question),
-		 "Standard uncertainty of the own delay of the %s (a converter that "
-		 "timestamps: 0.01)",
-		 name);
-	calibrate_stated(&options->common, record, options->u_reference_ms, key, "ms",
-			 question);
-}
-
-static void fill_record(const struct options *options, const struct stream *streams,
-			const struct pair *pairs,
-			struct incise_calibration_record *record)
-{
-	const struct incise_calibration *c = &options->common.found;
-	const double found[][2] = {{c->force_delay_ms, c->force_delay_sd_ms},
-				   {c->tracker_delay_ms, c->tracker_delay_sd_ms},
-				   {c->camera_delay_ms, c->camera_delay_sd_ms}};
-	struct incise_outfile *file;
-	FILE *out = calibrate_report_text(options->common.report, &file);
-
-	fill_verdict(pairs, record);
-	if (out) {
-		fprintf(out, "Delays against the %s\n\n",
-			stream_names[options->reference]);
-		report_pair(out, "force", &pairs[FORCE]);
-		report_pair(out, "camera", &pairs[CAMERA]);
-	}
-	for (int i = 0; i < STREAMS; i++) {
-		struct lateness late;
-		double u, delay = streams[i].about.delay_ms;
-		char key[32], text[UNCERTAINTY_TEXT];
-
-		if (i == options->reference || (i != TRACKER && !pairs[i].known))
-			continue;
-		late = lateness_of(streams, pairs, i, options->reference);
-		u = hypot(late.fits_u, late.lines_u);
-		snprintf(key, sizeof(key), "%s_delay_ms", stream_names[i]);
-		calibrate_value(record, key, "ms", found[i][0], delay + late.ms, u);
-		snprintf(key, sizeof(key), "%s_delay_sd_ms", stream_names[i]);
-		calibrate_value(record, key, "ms", found[i][1], u, 0);
-		if (out)
-			fprintf(out,
-				"\n%s_delay_ms = %s (k = 2): %.3f ms of the recording and "
-				"%.3f ms measured; u = %.2g ms\n"
-				"  budget            type  u, ms   sensitivity\n"
-				"  fit of the motion A     %.4f  1\n"
-				"  lines of arrivals B     %.4f  1\n",
-				stream_names[i],
-				uncertainty_text(delay + late.ms, 2 * u, "ms", text),
-				delay, late.ms, u, late.fits_u, late.lines_u);
-	}
-	state_reference(options, record);
-	if (out)
-		calibrate_result_text(&options->common, record, out);
-	whole_file_end(file);
-	if (out)
-		draw(options->common.report, streams, pairs);
+	if (delay->reference == CAMERA && !streams[CAMERA].n)
+		return incise_error_set(
+			err, EINVAL,
+			"--reference-stream camera: the recording has no depth from a "
+			"camera; choose force or tracker");
+	fit_stream(delay, FORCE);
+	fit_stream(delay, CAMERA);
+	if (!streams[FORCE].is_fitted && !streams[CAMERA].is_fitted)
+		return incise_error_set(
+			err, ENODATA,
+			"the recording has neither force nor camera depth to compare "
+			"with the tracker; record one of them");
+	calibrate_words(record->device, "%s", streams[TRACKER].about.device);
+	calibrate_words(record->method,
+			"least squares of one motion of %.0f s, against the %s",
+			streams[streams[FORCE].is_fitted ? FORCE : CAMERA].fit.span_s,
+			delay_names[delay->reference]);
+	set_verdict(delay);
+	add_values(delay);
+	state_reference(delay);
+	return 0;
 }
 
 int main(int argc, char **argv)
 {
-	struct incise_calibration_record record = {
-		.kind = "delay", .low = NAN, .high = NAN, .pass = true};
-	struct stream streams[STREAMS];
-	struct pair pairs[STREAMS] = {0};
-	struct options options = {
-		.max_delay_ms = 150,
-		.reference = FORCE,
-		.u_reference_ms = NAN,
+	static const struct calibrate_kind kind = {
+		.name = "delay",
+		.read = read_streams,
+		.measure = record_streams,
+		.fit = fit_streams,
+		.text = delay_text,
+		.json = delay_json,
+		.draw = delay_draw,
 	};
-	const char *raw;
+	static struct delay delay = {
+		.max_delay_ms = 150, .reference = FORCE, .u_reference_ms = NAN};
 
-	parse(&options, argc, argv);
-	cli_catch_signals();
-	if (options.common.from)
-		read_streams(streams, options.common.from);
-	else
-		record_now(&options, streams);
-	if (options.reference == CAMERA && !streams[CAMERA].n)
-		cli_fail("--reference-stream camera: the recording has no depth from a "
-			 "camera; choose force or tracker");
-	fit_pair(&options, streams, FORCE, &pairs[FORCE]);
-	fit_pair(&options, streams, CAMERA, &pairs[CAMERA]);
-	if (!pairs[FORCE].known && !pairs[CAMERA].known)
-		cli_fail("the recording has neither force nor camera depth to compare "
-			 "with the tracker; record one of them");
-	raw = options.common.keep ? options.common.keep : options.common.from;
-	if (raw)
-		snprintf(record.raw, sizeof(record.raw), "%s", raw);
-	snprintf(record.device, sizeof(record.device), "%s",
-		 streams[TRACKER].about.device);
-	snprintf(record.method, sizeof(record.method),
-		 "least squares of one motion of %.0f s, against the %s",
-		 pairs[FORCE].known ? pairs[FORCE].fit.span_s : pairs[CAMERA].fit.span_s,
-		 stream_names[options.reference]);
-	fill_record(&options, streams, pairs, &record);
-	calibrate_end(&options.common, &record,
-		      json_pack("{ss so so}", "reference",
-				stream_names[options.reference], "force",
-				pair_json(&pairs[FORCE]), "camera",
-				pair_json(&pairs[CAMERA])));
-	for (int i = 0; i < STREAMS; i++)
-		free(streams[i].points);
-	return 0;
+	parse_options(&delay, argc, argv);
+	return calibrate_run(&kind, &delay);
 }

@@ -1,28 +1,19 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * Pairs of loads and readings for incise calibrate force: measured with weights on a rig, or
- * as CSV, which --from reads and --keep writes.
+ * incise calibrate force: its data, result and report. The data are pairs of loads and readings,
+ * measured with weights on a rig, or as CSV, which --from reads and --keep writes:
  *
  *     mass_g,reading_mV,series,direction
  *     100,1395.2,1,up
  *
- * force_N may replace mass_g; series and direction (up, down) are optional, other columns and
- * lines that begin with '#' are ignored. Every failure ends the program.
+ * force_N may replace mass_g; series and direction (up, down) are optional.
  */
 #ifndef INCISE_CALIBRATE_FORCE_TOOL_H
 #define INCISE_CALIBRATE_FORCE_TOOL_H
 
 #include <incise/calibrate_force.h>
 #include <incise/rig.h>
-
-struct pairs {
-	struct incise_calibrate_force_pair *pair;
-	int n;
-};
-
-/* Read a CSV file; an error names the line. */
-void pairs_read(struct pairs *pairs, const char *path);
-void pairs_write(const struct pairs *pairs, const char *path);
+#include "calibrate.h"
 
 #define WEIGHTS_MAX 100
 
@@ -35,22 +26,37 @@ void pairs_write(const struct pairs *pairs, const char *path);
  *        _|     |_  …       _|       |_    comes down by the same loads
  */
 struct weights {
-	struct incise_rig *rig; /* with INCISE_RIG_FORCE */
 	double mass_g[WEIGHTS_MAX];
 	int n;
 	int series;
-	double mean_s;				    /* of a steady reading */
-	double timeout_s;			    /* until it is steady */
-	struct incise_calibrate_force_setup *setup; /* dithered is set */
+	double mean_s;	  /* of a steady reading */
+	double timeout_s; /* until it is steady */
 };
 
-/* "0,50g,0.1kg" into @weights, by rising mass, with the empty pan; else bad usage. */
-void weights_parse(struct weights *weights, char *list);
+struct force {
+	struct calibrate common;
+	bool zero, ranged;
+	double latitude_deg, altitude_m; /* latitude_deg NAN: not given */
+	const char *gravity;		 /* its source, for the report; NULL: not given */
+	struct weights weights;
+	struct incise_rig *rig;
+	struct incise_calibrate_force_setup setup;
+	struct incise_calibrate_force_pair *pairs;
+	enum incise_calibrate_force_state *states; /* of pairs */
+	int n;					   /* pairs */
+	struct incise_calibrate_force result;
+};
 
-/* Ask for them on a terminal. */
-void weights_ask(struct weights *weights);
+/* "0,50g,0.1kg", by rising mass, with the empty pan; else bad usage. */
+void weights_parse(void *weights, char *list);
 
-/* Measure all of them; fails at a signal, and if a reading does not become steady. */
-void weights_measure(const struct weights *weights, struct pairs *pairs);
+/* As struct calibrate_kind has them. */
+void force_read(void *run, const char *path);
+void force_measure(void *run);
+void force_write(const void *run, FILE *out);
+void force_text(const void *run, FILE *out);
+void force_summary(const void *run, FILE *out);
+json_t *force_json(const void *run);
+void force_draw(const void *run, const char *folder);
 
 #endif

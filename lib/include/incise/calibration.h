@@ -137,6 +137,16 @@ INCISE_API int incise_calibration_history(const char *path,
 					  struct incise_error *err);
 
 /**
+ * The last value that a calibration which passed gave to a key. Thread-safe; not real-time safe.
+ *
+ * @param record set to its calibration; or NULL
+ * @return a part of @records; NULL: none
+ */
+INCISE_API const struct incise_calibration_value *incise_calibration_last(
+	const struct incise_calibration_record *records, int n, const char *key,
+	const struct incise_calibration_record **record);
+
+/**
  * Read the text of a calibration.conf, for example that of a recording: its values as
  * incise_calibration_load(), and its history as incise_calibration_history().
  *

@@ -10,148 +10,95 @@
 #include <unistd.h>
 #include <incise/sim.h>
 #include "../../lib/base/ascending.h"
-#include "../cli/cli.h"
-#include "../cli/file.h"
-#include "calibrate.h"
 #include "force.h"
+#include "table.h"
 
 /* --- CSV ----------------------------------------------------------------------------- */
 
 #define PAIRS_MAX 10000
-#define COLUMNS_MAX 32
 
-enum { MASS, FORCE, READING, SERIES, DIRECTION, COLUMNS };
-static const char *const names[COLUMNS] = {"mass_g", "force_N", "reading_mV", "series",
-					   "direction"};
+enum { MASS, FORCE, READING, SERIES, DIRECTION };
 
-struct table {
-	const char *path;
-	int line;
-	int column[COLUMNS]; /* index of each; -1: none */
-};
-
-static void add_pair(struct pairs *pairs, const struct incise_calibrate_force_pair *pair)
+static void add_pair(struct force *force, const struct incise_calibrate_force_pair *pair)
 {
-	if (pairs->n == PAIRS_MAX)
+	if (force->n == PAIRS_MAX)
 		cli_fail("more than %d pairs; give one average for each load", PAIRS_MAX);
-	/* grown in steps: 64, 128, … */
-	if (!(pairs->n & (pairs->n - 1)) && (pairs->n >= 64 || !pairs->n))
-		pairs->pair = cli_resize(pairs->pair, pairs->n ? 2 * pairs->n : 64,
-					 sizeof(*pairs->pair));
-	pairs->pair[pairs->n++] = *pair;
+	force->pairs = cli_grow(force->pairs, force->n, sizeof(*force->pairs));
+	force->pairs[force->n++] = *pair;
 }
 
-static void read_header(struct table *table, char **fields, int n)
+static double parse_series(const struct table *table, const char *name, const char *text)
 {
-	for (int c = 0; c < COLUMNS; c++) {
-		table->column[c] =
-			calibrate_column(table->path, table->line, fields, n, names[c]);
-	}
-	if (table->column[READING] < 0 ||
-	    (table->column[MASS] < 0) == (table->column[FORCE] < 0))
-		cli_fail(
-			"%s:%d: expected a line of column names: reading_mV, and mass_g or "
-			"force_N; series and direction (up, down) are optional",
-			table->path, table->line);
+	double series = table_number(table, name, text);
+
+	if (series != floor(series) || fabs(series) > 1e6)
+		cli_fail("%s:%d: series: expected a whole number from -1000000 to "
+			 "1000000; correct it",
+			 table->path, table->line);
+	return series;
 }
 
-static double number_of(const struct table *table, int column, char **fields)
+/* 1: down. */
+static double parse_direction(const struct table *table, const char *name,
+			      const char *text)
 {
-	const char *text = fields[table->column[column]];
-	char *end;
-	double value = incise_decimal(text, &end);
+	bool down = !strcmp(text, "down") || !strcmp(text, "descending");
 
-	if (end == text || *end || !isfinite(value))
-		cli_fail("%s:%d: %s: expected a number, found '%s'; correct it",
-			 table->path, table->line, names[column], text);
-	return value;
+	if (!down && strcmp(text, "up") && strcmp(text, "ascending"))
+		cli_fail("%s:%d: %s: expected up or down, found '%s'; correct it",
+			 table->path, table->line, name, text);
+	return down;
 }
 
-static bool descends(const struct table *table, char **fields)
+static bool has_pair(const struct table *table)
 {
-	const char *text = fields[table->column[DIRECTION]];
-
-	if (!strcmp(text, "down") || !strcmp(text, "descending"))
-		return true;
-	if (!strcmp(text, "up") || !strcmp(text, "ascending"))
-		return false;
-	cli_fail("%s:%d: direction: expected up or down, found '%s'; correct it",
-		 table->path, table->line, text);
+	return table->at[READING] >= 0 && (table->at[MASS] < 0) != (table->at[FORCE] < 0);
 }
 
-static struct incise_calibrate_force_pair read_pair(const struct table *table,
-						    char **fields)
+static void add_row(void *run, const struct table *table, const double *row)
 {
-	struct incise_calibrate_force_pair pair = {.mass_g = NAN};
-	double series;
+	const struct incise_calibrate_force_pair pair = {
+		.mass_g = row[MASS],
+		.force_N = row[FORCE],
+		.reading_mV = row[READING],
+		.series = table->at[SERIES] < 0 ? 0 : (int)row[SERIES],
+		.descending = row[DIRECTION] > 0,
+	};
 
-	if (table->column[MASS] >= 0)
-		pair.mass_g = number_of(table, MASS, fields);
-	else
-		pair.force_N = number_of(table, FORCE, fields);
-	pair.reading_mV = number_of(table, READING, fields);
-	if (table->column[SERIES] >= 0) {
-		series = number_of(table, SERIES, fields);
-		if (series != floor(series) || fabs(series) > 1e6)
-			cli_fail("%s:%d: series: expected a whole number from -1000000 "
-				 "to 1000000; correct it",
-				 table->path, table->line);
-		pair.series = (int)series;
-	}
-	if (table->column[DIRECTION] >= 0)
-		pair.descending = descends(table, fields);
-	return pair;
+	add_pair(run, &pair);
 }
 
-void pairs_read(struct pairs *pairs, const char *path)
+void force_read(void *run, const char *path)
 {
-	struct table table = {.path = path};
-	char *line, *fields[COLUMNS_MAX];
-	struct incise_infile *in = calibrate_open(path);
-	int columns = 0;
+	static const struct table_form form = {
+		"pairs",
+		"reading_mV, and mass_g or force_N",
+		"series and direction (up, down) are",
+		{{"mass_g"},
+		 {"force_N"},
+		 {"reading_mV"},
+		 {"series", parse_series},
+		 {"direction", parse_direction}},
+		has_pair,
+	};
 
-	*pairs = (struct pairs){0};
-	while (calibrate_line(in, &line)) {
-		struct incise_calibrate_force_pair pair;
-		int n;
-
-		table.line++;
-		n = calibrate_cut(path, table.line, line, fields, COLUMNS_MAX, " \t\"",
-				  " \t\"");
-		if (fields[0][0] == '#' || (n == 1 && !*fields[0]))
-			continue;
-		if (!columns) {
-			read_header(&table, fields, n);
-			columns = n;
-			continue;
-		}
-		calibrate_width(path, table.line, n, columns);
-		pair = read_pair(&table, fields);
-		add_pair(pairs, &pair);
-	}
-	incise_infile_close(in);
-	if (!pairs->n)
-		cli_fail("%s: no pairs; expected a line of column names (reading_mV, and "
-			 "mass_g or force_N) and lines of numbers",
-			 path);
+	table_read(path, &form, add_row, run);
 }
 
-void pairs_write(const struct pairs *pairs, const char *path)
+void force_write(const void *run, FILE *out)
 {
-	struct incise_outfile *file;
-	FILE *out = whole_file_begin(path, &file);
+	const struct force *force = run;
 	bool masses = false;
 
-	for (int i = 0; i < pairs->n; i++)
-		masses |= !isnan(pairs->pair[i].mass_g);
-	fprintf(out, "%s,reading_mV,series,direction\n", names[masses ? MASS : FORCE]);
-	for (int i = 0; i < pairs->n; i++) {
-		const struct incise_calibrate_force_pair *pair = &pairs->pair[i];
+	for (int i = 0; i < force->n; i++)
+		masses |= !isnan(force->pairs[i].mass_g);
+	fprintf(out, "%s,reading_mV,series,direction\n", masses ? "mass_g" : "force_N");
+	for (int i = 0; i < force->n; i++) {
+		const struct incise_calibrate_force_pair *pair = &force->pairs[i];
 
 		fprintf(out, "%.10g,%.6f,%d,%s\n", masses ? pair->mass_g : pair->force_N,
 			pair->reading_mV, pair->series, pair->descending ? "down" : "up");
 	}
-	whole_file_end(file);
 }
 
 /* --- weights -------------------------------------------------------------------------- */
@@ -171,8 +118,9 @@ struct mean {
 	long n, clipped;
 };
 
-void weights_parse(struct weights *weights, char *list)
+void weights_parse(void *to, char *list)
 {
+	struct weights *weights = to;
 	char *items[WEIGHTS_MAX];
 	int n = cli_list("weights", list, items, WEIGHTS_MAX - 1);
 
@@ -198,7 +146,7 @@ void weights_parse(struct weights *weights, char *list)
 			  "example 0,50g,100g; 5 are recommended");
 }
 
-void weights_ask(struct weights *weights)
+static void ask_weights(struct weights *weights)
 {
 	char *line = NULL;
 	size_t size = 0;
@@ -260,8 +208,7 @@ static struct mean read_for(struct incise_rig *rig, double s)
 				 incise_rig_spec(rig), *cause ? cause : strerror(-n));
 		}
 	}
-	if (cli_stop)
-		cli_fail("stopped; the previous calibration stays active");
+	calibrate_check_stop();
 	if (mean.n < 10)
 		cli_fail(
 			"%s: the force channel gave %ld samples in %g s; nothing has changed",
@@ -287,17 +234,17 @@ static bool is_terminal(void)
  * Wait until a load is there and steady. @before_mV: the reading before it, or NAN; without a
  * terminal the load is there once the reading differs by half of @change_mV.
  */
-static void wait_steady(const struct weights *weights, double mass_g, double before_mV,
+static void wait_steady(struct force *force, double mass_g, double before_mV,
 			double change_mV)
 {
-	const double step_mV = weights->setup->step_mV;
+	const double step_mV = force->setup.step_mV;
 	double waited_s = 0;
-	struct mean last = read_for(weights->rig, STEADY_S / 2.0), now;
+	struct mean last = read_for(force->rig, STEADY_S / 2.0), now;
 
 	for (;;) {
 		bool there;
 
-		now = read_for(weights->rig, STEADY_S / 2.0);
+		now = read_for(force->rig, STEADY_S / 2.0);
 		waited_s += STEADY_S / 2.0;
 		there = is_terminal() || isnan(before_mV) || now.clipped ||
 			fabs(now.mV - before_mV) >= fabs(change_mV) / 2;
@@ -305,25 +252,25 @@ static void wait_steady(const struct weights *weights, double mass_g, double bef
 			     is_steady(&last, &now, step_mV) ? "" : "(not steady)");
 		if (there && is_steady(&last, &now, step_mV))
 			break;
-		if (waited_s >= weights->timeout_s)
+		if (waited_s >= force->weights.timeout_s)
 			cli_fail("%g g: %s within %g s: %.1f mV, sd %.1f mV; nothing has "
 				 "changed",
 				 mass_g,
 				 there ? "the reading did not become steady"
 				       : "the load was not put on",
-				 weights->timeout_s, now.mV, sd_of(&now));
+				 force->weights.timeout_s, now.mV, sd_of(&now));
 		last = now;
 	}
 }
 
 /* Ask for a load; on the virtual rig apply it. */
-static void request_load(const struct weights *weights, double mass_g)
+static void request_load(struct force *force, double mass_g)
 {
-	struct incise_sim *sim = incise_rig_sim(weights->rig);
+	struct incise_sim *sim = incise_rig_sim(force->rig);
 	struct incise_calibrate_force_pair load = {.mass_g = mass_g};
 
 	if (sim) {
-		incise_sim_load(sim, incise_calibrate_force_of(&load, weights->setup));
+		incise_sim_load(sim, incise_calibrate_force_of(&load, &force->setup));
 		return;
 	}
 	cli_progress_end();
@@ -336,65 +283,87 @@ static void request_load(const struct weights *weights, double mass_g)
 		return;
 	}
 	fprintf(stderr, ", and press Enter: ");
-	for (int c = 0; c != '\n' && c != EOF && !cli_stop;)
-		c = getchar();
-	if (cli_stop || feof(stdin))
-		cli_fail("stopped; the previous calibration stays active");
+	calibrate_await_enter();
 }
 
 /* Whether the reading is within the converter's range. */
-static bool within(const struct weights *weights,
-		   const struct incise_calibrate_force_pair *pair)
+static bool within(struct force *force, const struct incise_calibrate_force_pair *pair)
 {
-	return pair && pair->reading_mV > weights->setup->low_mV &&
-	       pair->reading_mV < weights->setup->high_mV;
+	return pair && pair->reading_mV > force->setup.low_mV &&
+	       pair->reading_mV < force->setup.high_mV;
 }
 
-static void read_load(const struct weights *weights, struct pairs *pairs, int series,
-		      bool descending, int k)
+static void read_load(struct force *force, int series, bool descending, int k)
 {
-	const double mass_g = weights->mass_g[k];
+	const double mass_g = force->weights.mass_g[k];
 	const struct incise_calibrate_force_pair *last =
-		pairs->n ? &pairs->pair[pairs->n - 1] : NULL;
+		force->n ? &force->pairs[force->n - 1] : NULL;
 	struct incise_calibrate_force_pair pair = {
 		.mass_g = mass_g, .series = series, .descending = descending};
 	double change_N = 0;
 	struct mean mean;
 
 	if (!last || last->mass_g != mass_g)
-		request_load(weights, mass_g);
+		request_load(force, mass_g);
 	if (last)
-		change_N = incise_calibrate_force_of(&pair, weights->setup) -
-			   incise_calibrate_force_of(last, weights->setup);
-	wait_steady(weights, mass_g, last ? last->reading_mV : NAN,
-		    within(weights, last) ? change_N * weights->setup->nominal_mV_N
-					  : weights->setup->step_mV);
-	mean = read_for(weights->rig, weights->mean_s);
+		change_N = incise_calibrate_force_of(&pair, &force->setup) -
+			   incise_calibrate_force_of(last, &force->setup);
+	wait_steady(force, mass_g, last ? last->reading_mV : NAN,
+		    within(force, last) ? change_N * force->setup.nominal_mV_N
+					: force->setup.step_mV);
+	mean = read_for(force->rig, force->weights.mean_s);
 	pair.reading_mV = mean.mV;
-	weights->setup->dithered &= sd_of(&mean) >= weights->setup->step_mV / 2;
+	force->setup.dithered &= sd_of(&mean) >= force->setup.step_mV / 2;
 	/* Clipped noise shifts the mean: the reading counts as saturated, and is left out. */
 	if (mean.clipped > mean.n / 1000)
 		pair.reading_mV =
-			mean.mV < (weights->setup->low_mV + weights->setup->high_mV) / 2
-				? weights->setup->low_mV
-				: weights->setup->high_mV;
-	add_pair(pairs, &pair);
+			mean.mV < (force->setup.low_mV + force->setup.high_mV) / 2
+				? force->setup.low_mV
+				: force->setup.high_mV;
+	add_pair(force, &pair);
 	cli_progress_end();
 	fprintf(stderr, "%d%s %8g g %10.2f mV  sd %.2f mV\n", series,
 		descending ? " down" : "   up", mass_g, mean.mV, sd_of(&mean));
 }
 
-void weights_measure(const struct weights *weights, struct pairs *pairs)
+static void measure_series(struct force *force)
 {
-	const int top = weights->n - 1;
+	const int top = force->weights.n - 1, last = force->weights.series;
 
-	*pairs = (struct pairs){0};
-	weights->setup->dithered = true;
-	for (int series = 1; series <= weights->series; series++) {
+	force->setup.dithered = true;
+	for (int series = 1; series <= last; series++) {
 		for (int k = 0; k <= top; k++)
-			read_load(weights, pairs, series, false, k);
+			read_load(force, series, false, k);
 		/* The last comes down by all loads, the others at once. */
-		for (int k = series == weights->series ? top - 1 : 0; k >= 0; k--)
-			read_load(weights, pairs, series, true, k);
+		for (int k = series == last ? top - 1 : 0; k >= 0; k--)
+			read_load(force, series, true, k);
 	}
+}
+
+void force_measure(void *run)
+{
+	struct force *force = run;
+	struct incise_force_info info;
+
+	if (!force->weights.n) {
+		if (!isatty(STDIN_FILENO))
+			cli_usage("missing --weights or --from (needed without a "
+				  "terminal to ask for weights)");
+		ask_weights(&force->weights);
+	}
+	force->rig = cli_open_rig(force->common.rig, INCISE_RIG_FORCE);
+	incise_force_info(incise_rig_force(force->rig), &info);
+	if (info.newtons)
+		cli_fail(
+			"%s measures newtons itself: no mV/N applies to it; calibrate it "
+			"with its own program",
+			info.name);
+	if (!force->ranged) {
+		force->setup.low_mV = 1e3 * info.offset_V;
+		force->setup.high_mV = 1e3 * (info.offset_V + info.full_scale_V);
+	}
+	force->setup.step_mV = 1e3 * info.full_scale_V / (double)(1LL << info.bits);
+	calibrate_words(force->common.record.device, "%s", info.name);
+	measure_series(force);
+	incise_rig_close(force->rig);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Strokes of an actuator against the force sensor; see stepper.h. It is driven as by incise
- * stepper: targets are repeated, and whatever ends it brings the motor to rest.
+ * Points of an actuator against the force sensor, from a CSV or from strokes; see stepper.h. It is
+ * driven as by incise stepper: targets are repeated, and whatever ends it brings the motor to rest.
  *
  *   position   /|\        each stroke: to a point, settle, read; points are four times as
  *             / | \       dense in its first quarter, where the turn shows
@@ -12,8 +12,8 @@
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
-#include "../cli/cli.h"
 #include "stepper.h"
+#include "table.h"
 
 #define POINTS 70     /* of a stroke */
 #define SETTLE_S 0.05 /* until the force is that of the position */
@@ -24,7 +24,127 @@
 #define SHARE_FORCE 0.8	  /* of what the channel reads, that strokes go up to */
 #define SHARE_RANGE 0.7	  /* and that is expected at the end of the range */
 
-void stepper_live_open(struct stepper_live *live, const char *rig)
+/* Relative uncertainty of the force channel's sensitivity, from the history. */
+static void find_sensor_u(struct stepper *stepper)
+{
+	const struct calibrate *common = &stepper->common;
+	const struct incise_calibration_value *v = incise_calibration_last(
+		common->history, common->n_history, "force_mV_N", NULL);
+
+	if (v && v->left == common->found.force_mV_N)
+		stepper->setup.sensor_u = fmin(0.9, v->u / fabs(v->left));
+	else
+		cli_warn("%s has no uncertainty of force_mV_N, so 5 %% is assumed; run "
+			 "incise calibrate force",
+			 common->calibration);
+}
+
+/*
+ * --- points as CSV: --keep writes, --from reads ----------------------------------------
+ *
+ *     t_s,steps,position_mm,force_N
+ */
+
+#define POINTS_MAX 1000000
+
+enum { TIME, STEPS, POSITION, FORCE };
+
+static void add_point(struct stepper *stepper, double t_s, double position_mm,
+		      double force_N)
+{
+	const size_t n = stepper->n++;
+
+	stepper->points = cli_grow(stepper->points, n, sizeof(*stepper->points));
+	stepper->t_s = cli_grow(stepper->t_s, n, sizeof(*stepper->t_s));
+	stepper->t_s[n] = t_s;
+	stepper->points[n] =
+		(struct incise_calibrate_stepper_point){position_mm, force_N};
+}
+
+static bool has_point(const struct table *table)
+{
+	return table->at[FORCE] >= 0 &&
+	       (table->at[POSITION] >= 0 || table->at[STEPS] >= 0);
+}
+
+struct reader {
+	struct stepper *stepper;
+	bool has_steps, has_both;
+	double mm, counted; /* largest travel in both columns */
+	double first_mm, first_steps;
+};
+
+static void add_row(void *context, const struct table *table, const double *row)
+{
+	struct reader *r = context;
+	double mm = row[POSITION], steps = row[STEPS];
+
+	if (!r->stepper->n) {
+		r->first_mm = mm;
+		r->first_steps = steps;
+	}
+	r->has_steps = table->at[STEPS] >= 0;
+	r->has_both = r->has_steps && table->at[POSITION] >= 0;
+	if (fabs(steps - r->first_steps) > r->counted) {
+		r->counted = fabs(steps - r->first_steps);
+		r->mm = fabs(mm - r->first_mm);
+	}
+	if (fabs(steps - round(steps)) > 1e-3)
+		cli_fail("%s:%d: steps: expected a whole number, found %.6g; see whether "
+			 "columns are swapped",
+			 table->path, table->line, steps);
+	/* From the second position on the ratio of both columns is fixed. */
+	if (r->counted > 0 && r->mm > 0 && r->has_both &&
+	    fabs(fabs(mm - r->first_mm) -
+		 fabs(steps - r->first_steps) * r->mm / r->counted) >
+		    1.5 * r->mm / r->counted + 0.01 * r->mm)
+		cli_fail(
+			"%s:%d: position_mm and steps disagree about the travel of a step; "
+			"see whether columns are swapped",
+			table->path, table->line);
+	if (r->stepper->n == POINTS_MAX)
+		cli_fail("%s:%d: more than %d points; keep every tenth", table->path,
+			 table->line, POINTS_MAX);
+	/* Steps are exact; a position in mm has been rounded. */
+	add_point(r->stepper, row[TIME], r->has_steps ? steps : mm, row[FORCE]);
+}
+
+void stepper_read(void *run, const char *path)
+{
+	static const struct table_form form = {
+		"points",  "force_N, and position_mm or steps",
+		"t_s is",  {{"t_s"}, {"steps"}, {"position_mm"}, {"force_N"}},
+		has_point,
+	};
+	struct stepper *stepper = run;
+	struct reader r = {.stepper = stepper};
+
+	find_sensor_u(stepper);
+	table_read(path, &form, add_row, &r);
+	if (isnan(stepper->step_mm) && r.counted > 0 && r.has_both)
+		stepper->step_mm = r.mm / r.counted;
+	if (!(stepper->step_mm > 0))
+		cli_fail("%s: the travel of a microstep is not in it; give --step-mm, or "
+			 "both columns, steps and position_mm",
+			 path);
+	for (int i = 0; i < stepper->n && r.has_steps; i++)
+		stepper->points[i].position_mm *= stepper->step_mm;
+}
+
+void stepper_write(const void *run, FILE *out)
+{
+	const struct stepper *stepper = run;
+
+	fprintf(out, "t_s,steps,position_mm,force_N\n");
+	for (int i = 0; i < stepper->n; i++)
+		fprintf(out, "%.4f,%lld,%.9g,%.6f\n", stepper->t_s[i],
+			llround(stepper->points[i].position_mm / stepper->step_mm),
+			stepper->points[i].position_mm, stepper->points[i].force_N);
+}
+
+/* --- strokes -------------------------------------------------------------------------- */
+
+static void open_drive(struct stepper_live *live, const char *rig)
 {
 	const struct incise_stepper_info *info = &live->drive.info;
 
@@ -81,7 +201,7 @@ static void read_force(struct stepper_live *live)
 	live->retreating = true;
 	cli_progress_end();
 	cli_warn("%.2f N is more than %.2f N: going back", sum / all, live->max_N);
-	stepper_live_creep(live, live->low_mm);
+	stepper_creep(live, live->low_mm);
 	stepper_drive_rest(&live->drive);
 	stepper_drive_fail(&live->drive,
 			   "the force exceeded %.2f N; give a smaller --range, or a "
@@ -89,7 +209,7 @@ static void read_force(struct stepper_live *live)
 			   live->max_N);
 }
 
-static void watch(struct stepper_live *live)
+static void watch_force(struct stepper_live *live)
 {
 	if (cli_stop) {
 		stepper_drive_rest(&live->drive);
@@ -101,7 +221,7 @@ static void watch(struct stepper_live *live)
 	read_force(live);
 }
 
-void stepper_live_creep(struct stepper_live *live, double to_mm)
+void stepper_creep(struct stepper_live *live, double to_mm)
 {
 	struct stepper_drive *drive = &live->drive;
 	const double pass_s = (double)drive->period_ns / INCISE_NS_PER_S;
@@ -121,7 +241,7 @@ void stepper_live_creep(struct stepper_live *live, double to_mm)
 
 		at_mm += copysign(fmin(fabs(left), each_mm), left);
 		stepper_drive_to(drive, at_mm);
-		watch(live);
+		watch_force(live);
 		if (at_mm != to_mm)
 			continue;
 		if (stepper_drive_rests(drive) &&
@@ -149,7 +269,7 @@ static double mean_force(struct stepper_live *live, double seconds)
 			   INCISE_NS_PER_S;
 
 		if (!settled && s >= SETTLE_S + drive->info.settle_s) {
-			watch(live);
+			watch_force(live);
 			live->sum_N = live->samples = 0;
 			begin = incise_clock_now(drive->clock);
 			settled = true;
@@ -161,11 +281,11 @@ static double mean_force(struct stepper_live *live, double seconds)
 					   "cable",
 					   live->channel.name);
 		stepper_drive_to(drive, here_mm);
-		watch(live);
+		watch_force(live);
 	}
 }
 
-void stepper_live_plan(struct stepper_live *live)
+static void plan_strokes(struct stepper_live *live)
 {
 	const struct incise_stepper_info *info = &live->drive.info;
 	const double top = (1 << live->channel.bits) - 1;
@@ -236,7 +356,7 @@ static void confirm(struct stepper_live *live)
 					   "not confirmed; nothing was moved");
 }
 
-void stepper_live_start(struct stepper_live *live)
+static void start_strokes(struct stepper_live *live)
 {
 	struct stepper_drive *drive = &live->drive;
 	struct incise_error err = {0};
@@ -250,33 +370,15 @@ void stepper_live_start(struct stepper_live *live)
 		stepper_drive_look(drive);
 	}
 	live->begin_ns = incise_clock_now(drive->clock);
-	stepper_live_creep(live, live->low_mm);
+	stepper_creep(live, live->low_mm);
 }
 
-void stepper_series_add(struct stepper_series *series, double t_s, double position_mm,
-			double force_N)
+static void drive_strokes(struct stepper *stepper)
 {
-	if (series->n == series->capacity) {
-		series->capacity = series->capacity ? 2 * series->capacity : 512;
-		series->points = cli_resize(series->points, series->capacity,
-					    sizeof(*series->points));
-		series->t_s =
-			cli_resize(series->t_s, series->capacity, sizeof(*series->t_s));
-		series->states = cli_resize(series->states, series->capacity,
-					    sizeof(*series->states));
-	}
-	series->t_s[series->n] = t_s;
-	series->states[series->n] = INCISE_CALIBRATE_STEPPER_USED;
-	series->points[series->n++] =
-		(struct incise_calibrate_stepper_point){position_mm, force_N};
-}
-
-void stepper_live_strokes(struct stepper_live *live, struct stepper_series *series)
-{
+	struct stepper_live *live = &stepper->live;
 	const double step_mm = live->drive.info.step_mm;
 	const double range_mm = live->high_mm - live->low_mm;
 
-	series->step_mm = step_mm;
 	for (int k = 0; k < 2 * live->strokes; k++)
 		for (int i = k > 0; i < POINTS; i++) {
 			double share = (double)i / (POINTS - 1) * 7 / 4, mm, N;
@@ -284,13 +386,13 @@ void stepper_live_strokes(struct stepper_live *live, struct stepper_series *seri
 			share = share < 1 ? share / 4 : 0.25 + (share - 1);
 			mm = k % 2 ? live->high_mm - share * range_mm
 				   : live->low_mm + share * range_mm;
-			stepper_live_creep(live, round(mm / step_mm) * step_mm);
+			stepper_creep(live, round(mm / step_mm) * step_mm);
 			N = mean_force(live, READ_S);
-			stepper_series_add(series,
-					   (double)(incise_clock_now(live->drive.clock) -
-						    live->begin_ns) /
-						   INCISE_NS_PER_S,
-					   live->drive.status.position_mm, N);
+			add_point(stepper,
+				  (double)(incise_clock_now(live->drive.clock) -
+					   live->begin_ns) /
+					  INCISE_NS_PER_S,
+				  live->drive.status.position_mm, N);
 			if (incise_clock_is_real(live->drive.clock))
 				cli_progress("stroke %d of %d, %s: %9.4f mm %8.4f N, "
 					     "Ctrl-C stops",
@@ -299,6 +401,24 @@ void stepper_live_strokes(struct stepper_live *live, struct stepper_series *seri
 					     live->drive.status.position_mm, N);
 		}
 	cli_progress_end();
+}
+
+void stepper_measure(void *run)
+{
+	struct stepper *stepper = run;
+	struct stepper_live *live = &stepper->live;
+
+	find_sensor_u(stepper);
+	live->calibration = stepper->common.found;
+	open_drive(live, stepper->common.rig);
+	plan_strokes(live);
+	stepper->step_mm = live->drive.info.step_mm;
+	stepper->setup.spring_N_mm = live->drive.info.spring_N_mm;
+	stepper->setup.low_N = live->low_N;
+	stepper->setup.high_N = live->high_N;
+	calibrate_words(stepper->common.record.device, "%s", live->drive.info.name);
+	start_strokes(live);
+	drive_strokes(stepper);
 }
 
 #define LOOK_S 0.1
@@ -320,10 +440,10 @@ void stepper_live_strokes(struct stepper_live *live, struct stepper_series *seri
 #define RUN 0.6 /* of a stroke for speeding up and slowing down */
 
 /* The force at the middle, approached from below. */
-static double look(struct stepper_live *live)
+static double read_middle(struct stepper_live *live)
 {
-	stepper_live_creep(live, live->low_mm);
-	stepper_live_creep(live, (live->low_mm + live->high_mm) / 2);
+	stepper_creep(live, live->low_mm);
+	stepper_creep(live, (live->low_mm + live->high_mm) / 2);
 	return mean_force(live, LOOK_S);
 }
 
@@ -340,7 +460,7 @@ static double stroke(struct stepper_live *live, int way, double mm_s)
 	double fastest = 0, left_mm;
 	int64_t begin;
 
-	stepper_live_creep(live, way > 0 ? live->low_mm : live->high_mm);
+	stepper_creep(live, way > 0 ? live->low_mm : live->high_mm);
 	begin = incise_clock_now(drive->clock);
 	for (;;) {
 		left_mm = way * (to_mm - drive->status.position_mm);
@@ -349,7 +469,7 @@ static double stroke(struct stepper_live *live, int way, double mm_s)
 			break;
 		stepper_drive_at(drive, way * mm_s);
 		fastest = fmax(fastest, fabs(drive->status.velocity_mm_s));
-		watch(live);
+		watch_force(live);
 		if ((double)(incise_clock_now(drive->clock) - begin) >
 		    most_s * INCISE_NS_PER_S)
 			stepper_drive_fail(
@@ -361,7 +481,7 @@ static double stroke(struct stepper_live *live, int way, double mm_s)
 	do {
 		stepper_drive_at(drive, 0);
 		fastest = fmax(fastest, fabs(drive->status.velocity_mm_s));
-		watch(live);
+		watch_force(live);
 	} while (!stepper_drive_rests(drive) &&
 		 (double)(incise_clock_now(drive->clock) - begin) <
 			 most_s * INCISE_NS_PER_S);
@@ -395,11 +515,11 @@ static double lost(struct stepper_live *live, int way, double was_N,
 
 	if (far)
 		correct_count(live, far_mm);
-	near_mm = (was_N - look(live)) / fit->N_mm;
+	near_mm = (was_N - read_middle(live)) / fit->N_mm;
 	if (fabs(near_mm) > seen_mm) {
 		correct_count(live, near_mm);
 		/* The correction may have been smaller than the dead travel. */
-		near_mm += (was_N - look(live)) / fit->N_mm;
+		near_mm += (was_N - read_middle(live)) / fit->N_mm;
 	}
 	if (far)
 		return far_mm;
@@ -434,16 +554,16 @@ static bool loses(struct stepper_live *live, double *mm_s, double was_N,
 	return false;
 }
 
-void stepper_live_rate(struct stepper_live *live,
-		       const struct incise_calibrate_stepper *fit,
-		       struct stepper_rate *rate)
+void stepper_find_rate(struct stepper *stepper)
 {
+	const struct incise_calibrate_stepper *fit = &stepper->fit;
+	struct stepper_live *live = &stepper->live;
+	struct stepper_rate *rate = &stepper->rate;
 	const struct incise_stepper_info *info = &live->drive.info;
 	const double range_mm = live->high_mm - live->low_mm;
 	/* Not slower than it creeps, as then the creeping loses steps as well. */
 	double most, at, kept = live->creep_mm_s, loss = NAN, was_N, lost_mm;
 
-	*rate = (struct stepper_rate){.lost_1_s = NAN};
 	if (incise_stepper_jog(live->drive.stepper, 0) == -EOPNOTSUPP) {
 		rate->why = "it takes positions only, no speeds";
 		return;
@@ -453,7 +573,7 @@ void stepper_live_rate(struct stepper_live *live,
 		fmax(4 * info->step_mm, 5 * M_SQRT2 * fit->residual_sd_N / fit->N_mm);
 	most = fmin(info->velocity_mm_s, sqrt(RUN * range_mm * info->acceleration_mm_s2));
 	rate->limit_1_s = most / info->step_mm;
-	was_N = look(live);
+	was_N = read_middle(live);
 	at = fmin(most, 2 * live->creep_mm_s);
 	while (rate->strokes < STROKES_MAX) {
 		double mm_s = at;
@@ -479,5 +599,5 @@ void stepper_live_rate(struct stepper_live *live,
 	}
 	cli_progress_end();
 	rate->off_mm = live->off_mm;
-	stepper_live_creep(live, live->low_mm);
+	stepper_creep(live, live->low_mm);
 }
