@@ -352,11 +352,13 @@ static void append_record(const struct calibrate *c)
 		cli_fail_with(&err);
 }
 
-int calibrate_run(const struct calibrate_kind *kind, void *run)
+int calibrate_run(const struct calibrate_kind *kind, int argc, char **argv, void *run)
 {
 	struct incise_error err = {0};
 	struct calibrate *c = run;
 
+	cli_parse(kind->command, argc, argv, run);
+	kind->check(run, argc, argv);
 	find_calibration(c);
 	gather_data(kind, c);
 	begin_record(kind, c);

@@ -48,6 +48,9 @@ struct calibrate {
 /* What is a calibration's own; @run is the command's struct. */
 struct calibrate_kind {
 	const char *name; /* of the record */
+	const struct cli_command *command;
+	/* Options that do not go together, and operands, are bad usage. */
+	void (*check)(void *run, int argc, char **argv);
 	/* Data from --from, or without it from a rig; and as a file for --keep, or NULL. */
 	void (*read)(void *run, const char *path);
 	void (*measure)(void *run);
@@ -63,11 +66,18 @@ struct calibrate_kind {
 	void (*draw)(const void *run, const char *folder);
 };
 
+/* The commands. */
+int calibrate_force(int argc, char **argv);
+int calibrate_depth(int argc, char **argv);
+int calibrate_tip(int argc, char **argv);
+int calibrate_delay(int argc, char **argv);
+int calibrate_stepper(int argc, char **argv);
+
 /* Reject --from with --rig or --keep. */
 void calibrate_check_source(const struct calibrate *calibrate);
 
-/* All of it, once the options are parsed. Returns 0: it passed. */
-int calibrate_run(const struct calibrate_kind *kind, void *run);
+/* All of it; @run has the defaults of the options. Returns 0: it passed. */
+int calibrate_run(const struct calibrate_kind *kind, int argc, char **argv, void *run);
 
 /* Add a coefficient to the record, by its key; its previous value is the active one. */
 void calibrate_value(struct calibrate *calibrate, const char *key, const char *unit,

@@ -55,8 +55,6 @@ struct depth {
 	struct incise_board_fit board;
 };
 
-extern const char *const depth_methods[]; /* their names, ended by NULL */
-
 /* Whether --from is one CSV file, one recording. */
 bool depth_is_csv(const char *path);
 bool depth_is_recording(const char *path);
@@ -65,9 +63,5 @@ bool depth_is_recording(const char *path);
 void depth_read(void *run, const char *path);
 void depth_measure(void *run);
 void depth_write(const void *run, FILE *out);
-int depth_fit(void *run, struct incise_error *err);
-void depth_text(const void *run, FILE *out);
-json_t *depth_json(const void *run);
-void depth_draw(const void *run, const char *folder);
 
 #endif

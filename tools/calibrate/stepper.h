@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: GPL-2.0-or-later */
 /*
- * incise calibrate stepper: strokes of an actuator against the force sensor, their result and
- * report. Failure, a signal and too much force bring the motor to rest and end the program.
+ * Strokes of an actuator against the force sensor, for incise calibrate stepper. Failure, a
+ * signal and too much force bring the motor to rest and end the program.
  */
 #ifndef INCISE_CALIBRATE_STEPPER_TOOL_H
 #define INCISE_CALIBRATE_STEPPER_TOOL_H
@@ -40,33 +40,20 @@ struct stepper_live {
 	int64_t begin_ns;
 };
 
-struct stepper {
-	struct calibrate common;
-	bool no_rate;
-	double step_mm; /* NAN: not given */
-	struct stepper_live live;
-	/* The points, in order of time. */
-	struct incise_calibrate_stepper_point *points;
-	enum incise_calibrate_stepper_state *states;
-	double *t_s; /* NAN: not known */
-	int n;
-	struct incise_calibrate_stepper_setup setup;
-	struct incise_calibrate_stepper fit;
-	struct stepper_rate rate;
-};
+/* Open it, check the strokes, ask on a terminal, power it, find its home, go to low_mm. */
+void stepper_begin(struct stepper_live *live, const struct calibrate *calibrate);
+
+/* A point of a stroke. */
+typedef void stepper_take(void *context, double t_s, double position_mm, double force_N);
+
+void stepper_strokes(struct stepper_live *live, stepper_take *take, void *context);
 
 /* Search the largest step rate that loses no step. */
-void stepper_find_rate(struct stepper *stepper);
+void stepper_find_rate(struct stepper_live *live,
+		       const struct incise_calibrate_stepper *fit,
+		       struct stepper_rate *rate);
 
 /* Move slowly to a position. */
 void stepper_creep(struct stepper_live *live, double to_mm);
-
-/* As struct calibrate_kind has them. After stepper_measure() the motor still has power. */
-void stepper_read(void *run, const char *path);
-void stepper_measure(void *run);
-void stepper_write(const void *run, FILE *out);
-void stepper_text(const void *run, FILE *out);
-json_t *stepper_json(const void *run);
-void stepper_draw(const void *run, const char *folder);
 
 #endif

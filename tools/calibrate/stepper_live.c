@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 /*
- * Points of an actuator against the force sensor, from a CSV or from strokes; see stepper.h. It is
- * driven as by incise stepper: targets are repeated, and whatever ends it brings the motor to rest.
+ * Strokes of an actuator against the force sensor; see stepper.h. It is driven as by incise
+ * stepper: targets are repeated, and whatever ends it brings the motor to rest.
  *
  *   position   /|\        each stroke: to a point, settle, read; points are four times as
  *             / | \       dense in its first quarter, where the turn shows
@@ -13,7 +13,6 @@
 #include <string.h>
 #include <unistd.h>
 #include "stepper.h"
-#include "table.h"
 
 #define POINTS 70     /* of a stroke */
 #define SETTLE_S 0.05 /* until the force is that of the position */
@@ -23,126 +22,6 @@
 #define ARRIVE_S 5.0	  /* for the last bit of a creep */
 #define SHARE_FORCE 0.8	  /* of what the channel reads, that strokes go up to */
 #define SHARE_RANGE 0.7	  /* and that is expected at the end of the range */
-
-/* Relative uncertainty of the force channel's sensitivity, from the history. */
-static void find_sensor_u(struct stepper *stepper)
-{
-	const struct calibrate *common = &stepper->common;
-	const struct incise_calibration_value *v = incise_calibration_last(
-		common->history, common->n_history, "force_mV_N", NULL);
-
-	if (v && v->left == common->found.force_mV_N)
-		stepper->setup.sensor_u = fmin(0.9, v->u / fabs(v->left));
-	else
-		cli_warn("%s has no uncertainty of force_mV_N, so 5 %% is assumed; run "
-			 "incise calibrate force",
-			 common->calibration);
-}
-
-/*
- * --- points as CSV: --keep writes, --from reads ----------------------------------------
- *
- *     t_s,steps,position_mm,force_N
- */
-
-#define POINTS_MAX 1000000
-
-enum { TIME, STEPS, POSITION, FORCE };
-
-static void add_point(struct stepper *stepper, double t_s, double position_mm,
-		      double force_N)
-{
-	const size_t n = stepper->n++;
-
-	stepper->points = cli_grow(stepper->points, n, sizeof(*stepper->points));
-	stepper->t_s = cli_grow(stepper->t_s, n, sizeof(*stepper->t_s));
-	stepper->t_s[n] = t_s;
-	stepper->points[n] =
-		(struct incise_calibrate_stepper_point){position_mm, force_N};
-}
-
-static bool has_point(const struct table *table)
-{
-	return table->at[FORCE] >= 0 &&
-	       (table->at[POSITION] >= 0 || table->at[STEPS] >= 0);
-}
-
-struct reader {
-	struct stepper *stepper;
-	bool has_steps, has_both;
-	double mm, counted; /* largest travel in both columns */
-	double first_mm, first_steps;
-};
-
-static void add_row(void *context, const struct table *table, const double *row)
-{
-	struct reader *r = context;
-	double mm = row[POSITION], steps = row[STEPS];
-
-	if (!r->stepper->n) {
-		r->first_mm = mm;
-		r->first_steps = steps;
-	}
-	r->has_steps = table->at[STEPS] >= 0;
-	r->has_both = r->has_steps && table->at[POSITION] >= 0;
-	if (fabs(steps - r->first_steps) > r->counted) {
-		r->counted = fabs(steps - r->first_steps);
-		r->mm = fabs(mm - r->first_mm);
-	}
-	if (fabs(steps - round(steps)) > 1e-3)
-		cli_fail("%s:%d: steps: expected a whole number, found %.6g; see whether "
-			 "columns are swapped",
-			 table->path, table->line, steps);
-	/* From the second position on the ratio of both columns is fixed. */
-	if (r->counted > 0 && r->mm > 0 && r->has_both &&
-	    fabs(fabs(mm - r->first_mm) -
-		 fabs(steps - r->first_steps) * r->mm / r->counted) >
-		    1.5 * r->mm / r->counted + 0.01 * r->mm)
-		cli_fail(
-			"%s:%d: position_mm and steps disagree about the travel of a step; "
-			"see whether columns are swapped",
-			table->path, table->line);
-	if (r->stepper->n == POINTS_MAX)
-		cli_fail("%s:%d: more than %d points; keep every tenth", table->path,
-			 table->line, POINTS_MAX);
-	/* Steps are exact; a position in mm has been rounded. */
-	add_point(r->stepper, row[TIME], r->has_steps ? steps : mm, row[FORCE]);
-}
-
-void stepper_read(void *run, const char *path)
-{
-	static const struct table_form form = {
-		"points",  "force_N, and position_mm or steps",
-		"t_s is",  {{"t_s"}, {"steps"}, {"position_mm"}, {"force_N"}},
-		has_point,
-	};
-	struct stepper *stepper = run;
-	struct reader r = {.stepper = stepper};
-
-	find_sensor_u(stepper);
-	table_read(path, &form, add_row, &r);
-	if (isnan(stepper->step_mm) && r.counted > 0 && r.has_both)
-		stepper->step_mm = r.mm / r.counted;
-	if (!(stepper->step_mm > 0))
-		cli_fail("%s: the travel of a microstep is not in it; give --step-mm, or "
-			 "both columns, steps and position_mm",
-			 path);
-	for (int i = 0; i < stepper->n && r.has_steps; i++)
-		stepper->points[i].position_mm *= stepper->step_mm;
-}
-
-void stepper_write(const void *run, FILE *out)
-{
-	const struct stepper *stepper = run;
-
-	fprintf(out, "t_s,steps,position_mm,force_N\n");
-	for (int i = 0; i < stepper->n; i++)
-		fprintf(out, "%.4f,%lld,%.9g,%.6f\n", stepper->t_s[i],
-			llround(stepper->points[i].position_mm / stepper->step_mm),
-			stepper->points[i].position_mm, stepper->points[i].force_N);
-}
-
-/* --- strokes -------------------------------------------------------------------------- */
 
 static void open_drive(struct stepper_live *live, const char *rig)
 {
@@ -373,9 +252,16 @@ static void start_strokes(struct stepper_live *live)
 	stepper_creep(live, live->low_mm);
 }
 
-static void drive_strokes(struct stepper *stepper)
+void stepper_begin(struct stepper_live *live, const struct calibrate *calibrate)
 {
-	struct stepper_live *live = &stepper->live;
+	live->calibration = calibrate->found;
+	open_drive(live, calibrate->rig);
+	plan_strokes(live);
+	start_strokes(live);
+}
+
+void stepper_strokes(struct stepper_live *live, stepper_take *take, void *context)
+{
 	const double step_mm = live->drive.info.step_mm;
 	const double range_mm = live->high_mm - live->low_mm;
 
@@ -388,11 +274,11 @@ static void drive_strokes(struct stepper *stepper)
 				   : live->low_mm + share * range_mm;
 			stepper_creep(live, round(mm / step_mm) * step_mm);
 			N = mean_force(live, READ_S);
-			add_point(stepper,
-				  (double)(incise_clock_now(live->drive.clock) -
-					   live->begin_ns) /
-					  INCISE_NS_PER_S,
-				  live->drive.status.position_mm, N);
+			take(context,
+			     (double)(incise_clock_now(live->drive.clock) -
+				      live->begin_ns) /
+				     INCISE_NS_PER_S,
+			     live->drive.status.position_mm, N);
 			if (incise_clock_is_real(live->drive.clock))
 				cli_progress("stroke %d of %d, %s: %9.4f mm %8.4f N, "
 					     "Ctrl-C stops",
@@ -401,24 +287,6 @@ static void drive_strokes(struct stepper *stepper)
 					     live->drive.status.position_mm, N);
 		}
 	cli_progress_end();
-}
-
-void stepper_measure(void *run)
-{
-	struct stepper *stepper = run;
-	struct stepper_live *live = &stepper->live;
-
-	find_sensor_u(stepper);
-	live->calibration = stepper->common.found;
-	open_drive(live, stepper->common.rig);
-	plan_strokes(live);
-	stepper->step_mm = live->drive.info.step_mm;
-	stepper->setup.spring_N_mm = live->drive.info.spring_N_mm;
-	stepper->setup.low_N = live->low_N;
-	stepper->setup.high_N = live->high_N;
-	calibrate_words(stepper->common.record.device, "%s", live->drive.info.name);
-	start_strokes(live);
-	drive_strokes(stepper);
 }
 
 #define LOOK_S 0.1
@@ -554,11 +422,10 @@ static bool loses(struct stepper_live *live, double *mm_s, double was_N,
 	return false;
 }
 
-void stepper_find_rate(struct stepper *stepper)
+void stepper_find_rate(struct stepper_live *live,
+		       const struct incise_calibrate_stepper *fit,
+		       struct stepper_rate *rate)
 {
-	const struct incise_calibrate_stepper *fit = &stepper->fit;
-	struct stepper_live *live = &stepper->live;
-	struct stepper_rate *rate = &stepper->rate;
 	const struct incise_stepper_info *info = &live->drive.info;
 	const double range_mm = live->high_mm - live->low_mm;
 	/* Not slower than it creeps, as then the creeping loses steps as well. */
