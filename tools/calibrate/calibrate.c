@@ -275,8 +275,7 @@ void calibrate_await_enter(void)
 			cli_fail("stopped; the previous calibration stays active");
 }
 
-/* Read the active calibration and its history; a missing file is the nominal one. */
-static void find_calibration(struct calibrate *c)
+void calibrate_find(struct calibrate *c, bool required)
 {
 	struct incise_error err = {0};
 	int rc;
@@ -293,7 +292,7 @@ static void find_calibration(struct calibrate *c)
 	if (c->report)
 		reserve_report(c->report);
 	rc = incise_calibration_load(c->calibration, &c->found, &err);
-	if (rc == -ENOENT)
+	if (rc == -ENOENT && !required)
 		incise_calibration_nominal(&c->found);
 	else if (rc)
 		cli_fail_with(&err);
@@ -359,7 +358,7 @@ int calibrate_run(const struct calibrate_kind *kind, int argc, char **argv, void
 
 	cli_parse(kind->command, argc, argv, run);
 	kind->check(run, argc, argv);
-	find_calibration(c);
+	calibrate_find(c, false);
 	gather_data(kind, c);
 	begin_record(kind, c);
 	if (kind->fit(run, &err)) {

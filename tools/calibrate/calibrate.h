@@ -72,6 +72,13 @@ int calibrate_depth(int argc, char **argv);
 int calibrate_tip(int argc, char **argv);
 int calibrate_delay(int argc, char **argv);
 int calibrate_stepper(int argc, char **argv);
+int calibrate_check(int argc, char **argv);
+
+/*
+ * Read the active calibration and its history; a missing file is the nominal one, if it need not
+ * be there.
+ */
+void calibrate_find(struct calibrate *calibrate, bool required);
 
 /* Reject --from with --rig or --keep. */
 void calibrate_check_source(const struct calibrate *calibrate);
