@@ -151,14 +151,8 @@ static double common_mV(const struct work *w, const struct load *load, double sl
 static void add_part(struct incise_calibrate_force *result, const char *source, char type,
 		     double u, const char *unit, double u_mV_N)
 {
-	struct incise_calibrate_force_part *part = &result->part[result->parts++];
-
-	snprintf(part->source, sizeof(part->source), "%s", source);
-	snprintf(part->unit, sizeof(part->unit), "%s", unit);
-	part->type = type;
-	part->u = u;
-	part->u_mV_N = u_mV_N;
-	part->sensitivity = u > 0 ? u_mV_N / u : 0;
+	result->budget.part[result->budget.n++] = (struct incise_calibration_part){
+		source, type, u, unit, u > 0 ? u_mV_N / u : 0, u_mV_N};
 }
 
 /* Sources that turn all loads alike. */
@@ -251,8 +245,9 @@ static void fit_line(struct work *w, struct incise_calibrate_force *result)
 		add_part(result, "resolution of the converter", 'B', code_u_mV, "mV",
 			 sqrt(code2));
 	add_common(w, result);
-	for (int i = 0; i < result->parts; i++)
-		u2 += result->part[i].u_mV_N * result->part[i].u_mV_N;
+	for (int i = 0; i < result->budget.n; i++)
+		u2 += result->budget.part[i].contribution *
+		      result->budget.part[i].contribution;
 	result->sensitivity_u_mV_N = sqrt(u2);
 	/* The line alone counts: an error common to all loads does not move the zero. */
 	double line2 = scatter2 + scale2 + code2;

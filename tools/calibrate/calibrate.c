@@ -170,6 +170,25 @@ static void print_written(const struct calibrate *c)
 	cli_written();
 }
 
+json_t *calibrate_budget(const struct incise_calibration_budget *budget,
+			 bool sensitivities, const char *contribution)
+{
+	json_t *list = json_array();
+
+	for (int i = 0; i < budget->n; i++) {
+		const struct incise_calibration_part *part = &budget->part[i];
+		json_t *line = json_pack("{ss ss# so ss}", "source", part->source, "type",
+					 &part->type, 1, "u", json_number(part->u),
+					 "unit", part->unit);
+
+		if (sensitivities)
+			json_set_number(line, "sensitivity", part->sensitivity);
+		json_set_number(line, contribution, part->contribution);
+		json_array_append_new(list, line);
+	}
+	return list;
+}
+
 json_t *calibrate_json(const struct calibrate *c, json_t *details)
 {
 	json_t *list = json_array();

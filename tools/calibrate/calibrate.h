@@ -100,6 +100,10 @@ void calibrate_stated(struct calibrate *calibrate, double given, const char *key
 /* Set words of the record. */
 #define calibrate_words(field, ...) snprintf(field, sizeof(field), __VA_ARGS__)
 
+/* A budget as JSON, with its sensitivities or without, its contributions under a key of their own. */
+json_t *calibrate_budget(const struct incise_calibration_budget *budget,
+			 bool sensitivities, const char *contribution);
+
 /* The whole report as JSON, with @details, of a calibration that has no other keys. */
 json_t *calibrate_json(const struct calibrate *calibrate, json_t *details);
 

@@ -332,10 +332,9 @@ static int fit_depth(void *run, struct incise_error *err)
 
 #define OUTLIERS_SHOWN 20
 
-static const struct incise_depth_part *find_budget(const struct depth *r, int *n)
+static const struct incise_calibration_budget *budget_of(const struct depth *r)
 {
-	*n = r->method == DEPTH_BOARD ? r->board.n_parts : r->fit.n_parts;
-	return r->method == DEPTH_BOARD ? r->board.part : r->fit.part;
+	return r->method == DEPTH_BOARD ? &r->board.budget : &r->fit.budget;
 }
 
 static double residual_mm(const struct depth *r, int i)
@@ -350,18 +349,17 @@ static double residual_mm(const struct depth *r, int i)
 static void budget_text(const struct depth *r, FILE *out)
 {
 	double value = r->common.record.values[0].left, u = r->common.record.values[0].u;
-	int n;
-	const struct incise_depth_part *part = find_budget(r, &n);
+	const struct incise_calibration_budget *budget = budget_of(r);
 
 	fprintf(out, "\n%-36s type  %-18s %-14s contribution\n", "budget of depth_mm_px",
 		"u", "sensitivity");
-	for (int i = 0; i < n; i++) {
+	for (int i = 0; i < budget->n; i++) {
+		const struct incise_calibration_part *part = &budget->part[i];
 		char text[40];
 
-		snprintf(text, sizeof(text), "%.3g %s", part[i].u, part[i].unit);
-		fprintf(out, "%-36s %c     %-18s %-14.4g %.3g mm/px\n", part[i].name,
-			part[i].type, text, part[i].sensitivity,
-			fabs(part[i].u * part[i].sensitivity));
+		snprintf(text, sizeof(text), "%.3g %s", part->u, part->unit);
+		fprintf(out, "%-36s %c     %-18s %-14.4g %.3g mm/px\n", part->source,
+			part->type, text, part->sensitivity, fabs(part->contribution));
 	}
 	fprintf(out, "%-36s       %-18s %-14s %.3g mm/px (%.3f %%)\n", "together", "", "",
 		u, 100 * u / value);
@@ -537,9 +535,8 @@ static json_t *make_json(const void *run)
 {
 	const struct depth *r = run;
 	const struct incise_calibration_value *value = &r->common.record.values[0];
-	json_t *object = json_object(), *budget = json_array();
-	int n;
-	const struct incise_depth_part *part = find_budget(r, &n);
+	json_t *object = json_object(), *list = json_array();
+	const struct incise_calibration_budget *budget = budget_of(r);
 
 	json_object_set_new(object, "way", json_string(methods[r->method]));
 	json_object_set_new(object, "pass", json_boolean(r->common.record.pass));
@@ -550,16 +547,16 @@ static json_t *make_json(const void *run)
 	json_set_number(object, "u_mm_px", value->u);
 	json_set_number(object, "U_mm_px", 2 * value->u);
 	json_set_number(object, "found_mm_px", value->found);
-	for (int i = 0; i < n; i++) {
-		char kind[2] = {part[i].type, 0};
+	for (int i = 0; i < budget->n; i++) {
+		const struct incise_calibration_part *part = &budget->part[i];
 
-		json_array_append_new(budget,
-				      json_pack("{ssssssso so}", "name", part[i].name,
-						"type", kind, "unit", part[i].unit, "u",
-						json_number(part[i].u), "sensitivity",
-						json_number(part[i].sensitivity)));
+		json_array_append_new(list, json_pack("{ss ss# ss so so}", "name",
+						      part->source, "type", &part->type,
+						      1, "unit", part->unit, "u",
+						      json_number(part->u), "sensitivity",
+						      json_number(part->sensitivity)));
 	}
-	json_object_set_new(object, "budget", budget);
+	json_object_set_new(object, "budget", list);
 	if (r->method == DEPTH_BOARD)
 		board_json(r, object);
 	else

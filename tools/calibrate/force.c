@@ -646,14 +646,14 @@ static void print_budget(const struct force *force, FILE *out)
 		"\n"
 		"%-28s %-4s %-18s %-20s %s\n",
 		"source", "type", "u", "sensitivity", "u, mV/N");
-	for (int i = 0; i < r->parts; i++) {
-		const struct incise_calibrate_force_part *part = &r->part[i];
+	for (int i = 0; i < r->budget.n; i++) {
+		const struct incise_calibration_part *part = &r->budget.part[i];
 		char u[24], c[32];
 
 		snprintf(u, sizeof(u), "%.3g %s", part->u, part->unit);
 		snprintf(c, sizeof(c), "%.3g mV/N per %s", part->sensitivity, part->unit);
 		fprintf(out, "%-28s %-4c %-18s %-20s %.4f\n", part->source, part->type, u,
-			c, part->u_mV_N);
+			c, part->contribution);
 	}
 	fprintf(out, "%-28s %-4s %-18s %-20s %.4f\n\n", "root sum of squares", "", "", "",
 		r->sensitivity_u_mV_N);
@@ -713,24 +713,6 @@ static void print_report(const void *run, FILE *out)
 	}
 	fputc('\n', out);
 	print_pairs(force, true, out);
-}
-
-static json_t *json_budget(const struct incise_calibrate_force *r)
-{
-	json_t *list = json_array();
-
-	for (int i = 0; i < r->parts; i++) {
-		const struct incise_calibrate_force_part *part = &r->part[i];
-		const char type[2] = {part->type};
-
-		json_array_append_new(
-			list, json_pack("{s:o, s:s, s:o, s:s, s:o, s:o}", "source",
-					json_text(part->source), "type", type, "u",
-					json_number(part->u), "unit", part->unit,
-					"sensitivity", json_number(part->sensitivity),
-					"u_mV_N", json_number(part->u_mV_N)));
-	}
-	return list;
 }
 
 static json_t *json_pairs(const struct force *force)
@@ -795,7 +777,7 @@ static json_t *make_json(const void *run)
 	json_set_number(root, "sensitivity_u_mV_N", r->sensitivity_u_mV_N);
 	json_set_number(root, "sensitivity_U_mV_N", 2 * r->sensitivity_u_mV_N);
 	json_set_fields(root, fields, r);
-	json_object_set_new(root, "budget", json_budget(r));
+	json_object_set_new(root, "budget", calibrate_budget(&r->budget, true, "u_mV_N"));
 	json_set_fields(root, metrics, r);
 	json_object_set_new(root, "verdict", json_text(record->verdict));
 	return root;

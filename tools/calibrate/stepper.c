@@ -346,11 +346,11 @@ static void put_budget(const struct incise_calibrate_stepper *fit, FILE *out)
 		"\nUncertainty of N per microstep (k = 1)\n"
 		"  %-28s %-4s %-12s %s\n",
 		"source", "type", "u", "adds, N/step");
-	for (int i = 0; i < fit->parts; i++) {
-		const struct incise_calibrate_stepper_part *part = &fit->part[i];
+	for (int i = 0; i < fit->budget.n; i++) {
+		const struct incise_calibration_part *part = &fit->budget.part[i];
 
 		fprintf(out, "  %-28s %-4c %-9.3g %-2s %.3g\n", part->source, part->type,
-			part->u, part->unit, part->u_N_step);
+			part->u, part->unit, part->contribution);
 	}
 	fprintf(out, "  %-28s %-17s %.3g   U = %.3g (k = 2), %.2f %%\n", "all", "",
 		fit->N_step_u, 2 * fit->N_step_u, 200 * fit->N_step_u / fit->N_step);
@@ -430,22 +430,6 @@ static void print_report(const void *run, FILE *out)
 		}
 }
 
-static json_t *budget_json(const struct incise_calibrate_stepper *fit)
-{
-	json_t *list = json_array();
-
-	for (int i = 0; i < fit->parts; i++) {
-		const struct incise_calibrate_stepper_part *part = &fit->part[i];
-
-		json_array_append_new(list,
-				      json_pack("{ss ss# so ss so}", "source",
-						part->source, "type", &part->type, 1, "u",
-						json_number(part->u), "unit", part->unit,
-						"u_N_step", json_number(part->u_N_step)));
-	}
-	return list;
-}
-
 static json_t *rate_json(const struct stepper_rate *rate)
 {
 	if (!rate->tried)
@@ -497,7 +481,8 @@ static json_t *make_json(const void *run)
 	json_set_fields(object, counts, fit);
 	json_set_number(object, "step_mm", stepper->setup.step_mm);
 	json_set_fields(object, losses, fit);
-	json_object_set_new(object, "budget", budget_json(fit));
+	json_object_set_new(object, "budget",
+			    calibrate_budget(&fit->budget, false, "u_N_step"));
 	json_object_set_new(object, "rate", rate_json(&stepper->rate));
 	return object;
 }

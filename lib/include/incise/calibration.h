@@ -80,6 +80,25 @@ struct incise_calibration_value {
 	double u;      /**< standard uncertainty; U is twice that (k = 2) */
 };
 
+/** A line of the uncertainty budget of a calibration's result. */
+struct incise_calibration_part {
+	const char *source;  /**< static */
+	char type;	     /**< 'A': from the statistics of readings; 'B': other */
+	double u;	     /**< standard uncertainty of the source, in @unit */
+	const char *unit;    /**< static */
+	double sensitivity;  /**< change of the result per unit */
+	double contribution; /**< u times that: part of the result's u, added in squares */
+};
+
+/** Largest number of lines of a budget. */
+#define INCISE_CALIBRATION_PARTS 6
+
+/** The uncertainty budget of a calibration's result. */
+struct incise_calibration_budget {
+	int n;
+	struct incise_calibration_part part[INCISE_CALIBRATION_PARTS];
+};
+
 /** Largest number of values of a calibration. */
 #define INCISE_CALIBRATION_VALUES 16
 
