@@ -427,28 +427,29 @@ static void print_report(const void *run, FILE *out)
 	}
 }
 
+#define FIELD(key, member) JSON_FIELD_AS(key, struct incise_delay_fit, member)
+
+static const struct json_field fit_fields[] = {FIELD("tracker_later_ms", delay_ms),
+					       FIELD("u_ms", sd_ms),
+					       FIELD("low_ms", low_ms),
+					       FIELD("high_ms", high_ms),
+					       FIELD("drift_ms", drift_ms),
+					       FIELD("drift_sd_ms", drift_sd_ms),
+					       FIELD("correlation", correlation),
+					       FIELD("second_peak", second),
+					       FIELD("contact_mm", contact_mm),
+					       FIELD("span_s", span_s),
+					       FIELD("blocks", blocks),
+					       {0}};
+
 static json_t *fit_json(const struct delay_stream *stream)
 {
-#define FIELD(member) JSON_FIELD(struct incise_delay_fit, member)
-#define FIELD_AS(key, member) JSON_FIELD_AS(key, struct incise_delay_fit, member)
-	static const struct json_field fields[] = {FIELD_AS("tracker_later_ms", delay_ms),
-						   FIELD_AS("u_ms", sd_ms),
-						   FIELD(low_ms),
-						   FIELD(high_ms),
-						   FIELD(drift_ms),
-						   FIELD(drift_sd_ms),
-						   FIELD(correlation),
-						   FIELD_AS("second_peak", second),
-						   FIELD(contact_mm),
-						   FIELD(span_s),
-						   FIELD(blocks),
-						   {0}};
 	json_t *object;
 
 	if (!stream->is_fitted)
 		return json_null();
 	object = json_object();
-	json_set_fields(object, fields, &stream->fit);
+	json_set_fields(object, fit_fields, &stream->fit);
 	return object;
 }
 

@@ -3,6 +3,7 @@
  * incise calibrate depth: the scale of the camera's frame in the plane of the scalpel, from
  * two points, a line of pairs, or a board.
  */
+#include <complex.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -566,50 +567,42 @@ static json_t *make_json(const void *run)
 
 /* --- folder -------------------------------------------------------------------------- */
 
-static void lengths_data(const struct depth *r, FILE *data)
+static void put_lengths(const struct depth *r, FILE *data)
 {
 	for (int i = 0; i < r->fit.n; i++)
 		fprintf(data, "%d %.5f %.6f %.6f %d\n", i + 1, r->lengths.px[i],
 			r->lengths.mm[i], residual_mm(r, i), r->inlier[i]);
 }
 
-static void board_data(const struct depth *r, FILE *data)
+/* Corners and their residuals, without the rotation and translation of the board's own frame. */
+static void put_corners(const struct depth *r, FILE *data)
 {
 	const struct incise_board_views *v = &r->views;
-	int corners = v->columns * v->rows;
-	double sx = 0, sy = 0, at[2], c = 0, s = 0, angle, mean[2] = {0};
+	const int corners = v->columns * v->rows;
+	const double *px = v->corners + (size_t)2 * corners * v->plane;
+	double complex board[INCISE_BOARD_CORNERS], seen[INCISE_BOARD_CORNERS];
+	double complex middle = 0, mean = 0, turn = 0;
 
-	/* The rotation and translation of the board's own frame onto the plane. */
 	for (int i = 0; i < corners; i++) {
-		const double *px = v->corners + 2 * ((size_t)corners * v->plane + i);
+		double at[2];
 
-		incise_board_plane(&r->board, px[0], px[1], at);
-		mean[0] += at[0] / corners;
-		mean[1] += at[1] / corners;
-		sx += (double)(i % v->columns) / corners;
-		sy += (double)(i / v->columns) / corners;
+		incise_board_plane(&r->board, px[2 * i], px[2 * i + 1], at);
+		seen[i] = at[0] + at[1] * I;
+		board[i] = i % v->columns + i / v->columns * I;
+		mean += seen[i] / corners;
+		middle += board[i] / corners;
 	}
 	for (int i = 0; i < corners; i++) {
-		const double *px = v->corners + 2 * ((size_t)corners * v->plane + i);
-		double x = (i % v->columns - sx) * v->square_mm;
-		double y = (i / v->columns - sy) * v->square_mm;
-
-		incise_board_plane(&r->board, px[0], px[1], at);
-		c += x * (at[0] - mean[0]) + y * (at[1] - mean[1]);
-		s += x * (at[1] - mean[1]) - y * (at[0] - mean[0]);
+		seen[i] -= mean;
+		board[i] = (board[i] - middle) * v->square_mm;
+		turn += conj(seen[i]) * board[i];
 	}
-	angle = atan2(s, c);
+	turn /= cabs(turn);
 	for (int i = 0; i < corners; i++) {
-		const double *px = v->corners + 2 * ((size_t)corners * v->plane + i);
-		double x = (i % v->columns - sx) * v->square_mm;
-		double y = (i / v->columns - sy) * v->square_mm, dx, dy;
+		double complex off = seen[i] * turn - board[i];
 
-		incise_board_plane(&r->board, px[0], px[1], at);
-		dx = at[0] - mean[0];
-		dy = at[1] - mean[1];
-		fprintf(data, "%.3f %.3f %.5f %.5f %.5f %.5f\n", px[0], px[1], x, y,
-			dx * cos(angle) + dy * sin(angle) - x,
-			dy * cos(angle) - dx * sin(angle) - y);
+		fprintf(data, "%.3f %.3f %.5f %.5f %.5f %.5f\n", px[2 * i], px[2 * i + 1],
+			creal(board[i]), cimag(board[i]), creal(off), cimag(off));
 	}
 }
 
@@ -655,9 +648,9 @@ static void draw_plots(const void *run, const char *folder)
 	bool outliers = false;
 
 	if (board)
-		board_data(r, data);
+		put_corners(r, data);
 	else
-		lengths_data(r, data);
+		put_lengths(r, data);
 	plot_data_end(data, folder);
 	for (int i = 0; !board && i < r->fit.n; i++)
 		outliers |= !r->inlier[i];

@@ -349,21 +349,27 @@ static void print_report(const void *run, FILE *out)
 		fputc('\n', out);
 }
 
+#define FIELD(key, member) JSON_FIELD_AS(key, struct incise_tip_fit, member)
+
+static const struct json_field fit_fields[] = {FIELD("poses", n),
+					       FIELD("inliers", inliers),
+					       FIELD("blocks", blocks),
+					       FIELD("rms_error_mm", rms_mm),
+					       FIELD("largest_mm", largest_mm),
+					       FIELD("held_out_mm", held_out_mm),
+					       FIELD("cone_deg", cone_deg),
+					       FIELD("least_deg", least_deg),
+					       FIELD("condition", condition),
+					       FIELD("moved_mm", moved_mm),
+					       FIELD("moved_sd_mm", moved_sd_mm),
+					       {0}};
+
 static json_t *make_json(const void *run)
 {
-#define FIELD(member) JSON_FIELD(struct incise_tip_fit, member)
-#define FIELD_AS(key, member) JSON_FIELD_AS(key, struct incise_tip_fit, member)
-	static const struct json_field fields[] = {
-		FIELD_AS("poses", n), FIELD(inliers),
-		FIELD(blocks),	      FIELD_AS("rms_error_mm", rms_mm),
-		FIELD(largest_mm),    FIELD(held_out_mm),
-		FIELD(cone_deg),      FIELD(least_deg),
-		FIELD(condition),     FIELD(moved_mm),
-		FIELD(moved_sd_mm),   {0}};
 	const struct tip *tip = run;
 	json_t *details = json_object(), *outliers = json_array();
 
-	json_set_fields(details, fields, &tip->fit);
+	json_set_fields(details, fit_fields, &tip->fit);
 	json_object_set_new(details, "covariance_mm2",
 			    json_numbers(tip->fit.covariance, 9));
 	for (int i = 0; i < tip->n; i++)
