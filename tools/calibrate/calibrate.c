@@ -270,8 +270,12 @@ static void write_report(const struct calibrate_kind *kind, const struct calibra
 
 /* --- the whole ----------------------------------------------------------------------- */
 
-void calibrate_check_source(const struct calibrate *c)
+void calibrate_check_source(const struct calibrate *c, double time_s, const char *source)
 {
+	if (c->from && time_s > 0)
+		cli_usage("--duration does not go with --from: %s has its own", source);
+	if (!c->from && !(time_s > 0) && !isatty(STDIN_FILENO))
+		cli_usage("missing --duration or --from (needed without a terminal)");
 	if (c->from && c->rig)
 		cli_usage("--from and --rig exclude each other; give one of them");
 	if (c->from && c->keep)

@@ -19,8 +19,8 @@
 struct calibrate {
 	const char *rig, *calibration, *from, *keep, *report;
 	bool dry_run, json;
-	const char *raw; /* file of the data, for the record; NULL: none */
-	char *refused;	 /* reason why there is no result; NULL: there is one */
+	const char *raw;     /* file of the data, for the record; NULL: none */
+	const char *refused; /* reason why there is no result; NULL: there is one */
 	struct incise_calibration found; /* active before */
 	struct incise_calibration_record *history;
 	int n_history;
@@ -80,8 +80,12 @@ int calibrate_check(int argc, char **argv);
  */
 void calibrate_find(struct calibrate *calibrate, bool required);
 
-/* Reject --from with --rig or --keep. */
-void calibrate_check_source(const struct calibrate *calibrate);
+/*
+ * Reject --from with --rig, --keep or --duration, of which @source ("the file") has its own; and
+ * neither of --from and --duration (0: not given) without a terminal.
+ */
+void calibrate_check_source(const struct calibrate *calibrate, double time_s,
+			    const char *source);
 
 /* All of it; @run has the defaults of the options. Returns 0: it passed. */
 int calibrate_run(const struct calibrate_kind *kind, int argc, char **argv, void *run);

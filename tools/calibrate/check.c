@@ -101,7 +101,7 @@ static const struct cli_command command = {
 };
 
 /* Seconds since a date of the history; negative: in the future. */
-static double age_of(const char *date)
+static double measure_age(const char *date)
 {
 	struct tm utc = {0};
 
@@ -149,7 +149,7 @@ static void judge_kind(struct check *check, int kind)
 	}
 	s->failed = s->last && !s->last->pass;
 	if (s->passed)
-		s->age_s = age_of(s->passed->date);
+		s->age_s = measure_age(s->passed->date);
 	s->due = true;
 	list_by_hand(&check->common, kind, hand, sizeof(hand));
 	if (*hand)

@@ -94,17 +94,13 @@ static void check_options(void *run, int argc, char **argv)
 	const struct calibrate *common = &delay->common;
 
 	cli_no_operands(argc, argv, "--from");
-	if (common->from && delay->time_s > 0)
-		cli_usage("--duration does not go with --from: a recording has its own");
-	if (!common->from && !(delay->time_s > 0) && !isatty(STDIN_FILENO))
-		cli_usage("missing --duration or --from (needed without a terminal)");
+	calibrate_check_source(common, delay->time_s, "a recording");
 	if (common->keep &&
 	    (strlen(common->keep) < 5 || !cli_ends_with(common->keep, ".rec")))
 		cli_usage("--keep: expected a name that ends in .rec, found '%s'",
 			  common->keep);
 	if (common->keep)
 		cli_output(common->keep);
-	calibrate_check_source(common);
 	cli_catch_signals();
 }
 
@@ -427,21 +423,6 @@ static void print_report(const void *run, FILE *out)
 	}
 }
 
-#define FIELD(key, member) JSON_FIELD_AS(key, struct incise_delay_fit, member)
-
-static const struct json_field fit_fields[] = {FIELD("tracker_later_ms", delay_ms),
-					       FIELD("u_ms", sd_ms),
-					       FIELD("low_ms", low_ms),
-					       FIELD("high_ms", high_ms),
-					       FIELD("drift_ms", drift_ms),
-					       FIELD("drift_sd_ms", drift_sd_ms),
-					       FIELD("correlation", correlation),
-					       FIELD("second_peak", second),
-					       FIELD("contact_mm", contact_mm),
-					       FIELD("span_s", span_s),
-					       FIELD("blocks", blocks),
-					       {0}};
-
 static json_t *fit_json(const struct delay_stream *stream)
 {
 	json_t *object;
@@ -449,7 +430,17 @@ static json_t *fit_json(const struct delay_stream *stream)
 	if (!stream->is_fitted)
 		return json_null();
 	object = json_object();
-	json_set_fields(object, fit_fields, &stream->fit);
+	json_set_number(object, "tracker_later_ms", stream->fit.delay_ms);
+	json_set_number(object, "u_ms", stream->fit.sd_ms);
+	json_set_number(object, "low_ms", stream->fit.low_ms);
+	json_set_number(object, "high_ms", stream->fit.high_ms);
+	json_set_number(object, "drift_ms", stream->fit.drift_ms);
+	json_set_number(object, "drift_sd_ms", stream->fit.drift_sd_ms);
+	json_set_number(object, "correlation", stream->fit.correlation);
+	json_set_number(object, "second_peak", stream->fit.second);
+	json_set_number(object, "contact_mm", stream->fit.contact_mm);
+	json_set_number(object, "span_s", stream->fit.span_s);
+	json_set_integer(object, "blocks", stream->fit.blocks);
 	return object;
 }
 

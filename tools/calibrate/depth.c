@@ -172,7 +172,8 @@ static void parse_corners(const char *option, const char *text, double to[2][2],
 }
 
 /* Print the reason and the first outliers. Nothing is changed. */
-_Noreturn static void refuse(const struct incise_error *err, const struct depth *depth)
+_Noreturn static void fail_with_outliers(const struct incise_error *err,
+					 const struct depth *depth)
 {
 	const struct depth_lengths *l = &depth->lengths;
 	char names[200] = "";
@@ -207,7 +208,7 @@ static void fit_lengths(struct depth *depth)
 	if (line ? incise_calibrate_depth_line(&pairs, depth->inlier, &depth->fit, &err)
 		 : incise_calibrate_depth_points(&points, depth->inlier, &depth->fit,
 						 &err))
-		refuse(&err, depth);
+		fail_with_outliers(&err, depth);
 	calibrate_value(&depth->common, "depth_mm_px", "mm/px", fit->mm_px, fit->u_mm_px);
 	record->low = line ? (fit->full_px - fit->high_px) * fit->mm_px : NAN;
 	record->high = line ? (fit->full_px - fit->low_px) * fit->mm_px : NAN;
@@ -347,7 +348,7 @@ static double residual_mm(const struct depth *r, int i)
 	return (r->lengths.px[i] - fit->full_px) * fit->mm_px;
 }
 
-static void budget_text(const struct depth *r, FILE *out)
+static void print_budget(const struct depth *r, FILE *out)
 {
 	double value = r->common.record.values[0].left, u = r->common.record.values[0].u;
 	const struct incise_calibration_budget *budget = budget_of(r);
@@ -366,7 +367,7 @@ static void budget_text(const struct depth *r, FILE *out)
 		u, 100 * u / value);
 }
 
-static void lengths_text(const struct depth *r, FILE *out)
+static void print_lengths(const struct depth *r, FILE *out)
 {
 	const struct incise_depth_fit *fit = &r->fit;
 	int shown = 0;
@@ -395,7 +396,7 @@ static void lengths_text(const struct depth *r, FILE *out)
 		fprintf(out, "outliers       %d more\n", shown - OUTLIERS_SHOWN);
 }
 
-static void board_text(const struct depth *r, FILE *out)
+static void print_board(const struct depth *r, FILE *out)
 {
 	const struct incise_board_fit *b = &r->board;
 	const struct incise_board_lens *l = &b->lens, *u = &b->u_lens;
@@ -432,7 +433,7 @@ static void board_text(const struct depth *r, FILE *out)
 				r->corners.name[v], b->view_rms_px[v]);
 }
 
-static void vision_text(const struct depth *r, FILE *out)
+static void print_vision(const struct depth *r, FILE *out)
 {
 	const struct incise_vision_setup *s = &r->setup;
 
@@ -451,34 +452,29 @@ static void print_report(const void *run, FILE *out)
 
 	fprintf(out, "method         %s\n", r->common.record.method);
 	if (r->method == DEPTH_BOARD)
-		board_text(r, out);
+		print_board(r, out);
 	else
-		lengths_text(r, out);
-	budget_text(r, out);
-	vision_text(r, out);
+		print_lengths(r, out);
+	print_budget(r, out);
+	print_vision(r, out);
 }
 
 /* --- JSON ---------------------------------------------------------------------------- */
 
-#define FIELD(key, member) JSON_FIELD_AS(key, struct incise_depth_fit, member)
-
-static const struct json_field length_fields[] = {FIELD("full_px", full_px),
-						  FIELD("full_u_px", u_full_px),
-						  FIELD("readings", n),
-						  FIELD("inliers", inliers),
-						  FIELD("effective", effective),
-						  FIELD("residual_sd_mm", sd_mm),
-						  FIELD("residual_max_mm", largest_mm),
-						  FIELD("bend_mm", bend_mm),
-						  FIELD("bend_u_mm", bend_sd_mm),
-						  {0}};
-
-static void lengths_json(const struct depth *r, json_t *object)
+static void add_lengths_json(const struct depth *r, json_t *object)
 {
 	const struct incise_depth_fit *fit = &r->fit;
 	json_t *outliers = json_array();
 
-	json_set_fields(object, length_fields, fit);
+	json_set_number(object, "full_px", fit->full_px);
+	json_set_number(object, "full_u_px", fit->u_full_px);
+	json_set_integer(object, "readings", fit->n);
+	json_set_integer(object, "inliers", fit->inliers);
+	json_set_integer(object, "effective", fit->effective);
+	json_set_number(object, "residual_sd_mm", fit->sd_mm);
+	json_set_number(object, "residual_max_mm", fit->largest_mm);
+	json_set_number(object, "bend_mm", fit->bend_mm);
+	json_set_number(object, "bend_u_mm", fit->bend_sd_mm);
 	for (int i = 0; i < fit->n; i++)
 		if (!r->inlier[i])
 			json_array_append_new(outliers, json_text(r->lengths.name[i]));
@@ -494,38 +490,33 @@ static void lengths_json(const struct depth *r, json_t *object)
 	}
 }
 
-#define LENS(key, member) JSON_FIELD_AS(key, struct incise_board_lens, member)
-#define BOARD(key, member) JSON_FIELD_AS(key, struct incise_board_fit, member)
-
-static const struct json_field lens_fields[] = {
-	LENS("fx_px", fx), LENS("fy_px", fy), LENS("cx_px", cx),
-	LENS("cy_px", cy), LENS("k1", k1),    LENS("k2", k2),
-	LENS("p1", p1),	   LENS("p2", p2),    {0}};
-
-static const struct json_field fit_fields[] = {BOARD("views", n),
-					       BOARD("inliers", views),
-					       BOARD("rms_error_px", rms_px),
-					       BOARD("plane_rms_error_mm", plane_rms_mm),
-					       BOARD("plane_max_mm", plane_largest_mm),
-					       BOARD("tilt_deg", tilt_deg),
-					       {0}};
-
-static const struct json_field plane_fields[] = {
-	BOARD("distance_mm", distance_mm), BOARD("spread_deg", spread_deg),
-	BOARD("low_mm_px", low_mm_px),	   BOARD("high_mm_px", high_mm_px),
-	BOARD("bend_mm", bend_mm),	   {0}};
-
-static void board_json(const struct depth *r, json_t *object)
+static void add_board_json(const struct depth *r, json_t *object)
 {
 	const struct incise_board_fit *b = &r->board;
 	json_t *lens = json_object(), *outliers = json_array();
 
-	json_set_fields(lens, lens_fields, &b->lens);
+	json_set_number(lens, "fx_px", b->lens.fx);
+	json_set_number(lens, "fy_px", b->lens.fy);
+	json_set_number(lens, "cx_px", b->lens.cx);
+	json_set_number(lens, "cy_px", b->lens.cy);
+	json_set_number(lens, "k1", b->lens.k1);
+	json_set_number(lens, "k2", b->lens.k2);
+	json_set_number(lens, "p1", b->lens.p1);
+	json_set_number(lens, "p2", b->lens.p2);
 	json_object_set_new(object, "lens", lens);
 	json_object_set_new(object, "homography", json_numbers(b->homography, 9));
-	json_set_fields(object, fit_fields, b);
+	json_set_integer(object, "views", b->n);
+	json_set_integer(object, "inliers", b->views);
+	json_set_number(object, "rms_error_px", b->rms_px);
+	json_set_number(object, "plane_rms_error_mm", b->plane_rms_mm);
+	json_set_number(object, "plane_max_mm", b->plane_largest_mm);
+	json_set_number(object, "tilt_deg", b->tilt_deg);
 	json_set_number(object, "tilt_bound_deg", b->tilt_deg + 2 * b->u_tilt_deg);
-	json_set_fields(object, plane_fields, b);
+	json_set_number(object, "distance_mm", b->distance_mm);
+	json_set_number(object, "spread_deg", b->spread_deg);
+	json_set_number(object, "low_mm_px", b->low_mm_px);
+	json_set_number(object, "high_mm_px", b->high_mm_px);
+	json_set_number(object, "bend_mm", b->bend_mm);
 	for (int v = 0; v < b->n; v++)
 		if (!b->believed[v])
 			json_array_append_new(outliers, json_text(r->corners.name[v]));
@@ -559,9 +550,9 @@ static json_t *make_json(const void *run)
 	}
 	json_object_set_new(object, "budget", list);
 	if (r->method == DEPTH_BOARD)
-		board_json(r, object);
+		add_board_json(r, object);
 	else
-		lengths_json(r, object);
+		add_lengths_json(r, object);
 	return object;
 }
 

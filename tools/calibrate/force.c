@@ -335,7 +335,7 @@ static void ask_weights(struct weights *weights)
 	free(line);
 }
 
-static void add(struct mean *mean, double mV)
+static void add_reading(struct mean *mean, double mV)
 {
 	double off = mV - mean->mV;
 
@@ -350,7 +350,7 @@ static double sd_of(const struct mean *mean)
 }
 
 /* The samples of the next @s seconds. */
-static struct mean read_for(struct incise_rig *rig, double s)
+static struct mean read_mean(struct incise_rig *rig, double s)
 {
 	struct incise_force *force = incise_rig_force(rig);
 	struct incise_clock *clock = incise_rig_clock(rig);
@@ -370,10 +370,11 @@ static struct mean read_for(struct incise_rig *rig, double s)
 		incise_clock_wait_until(clock, incise_clock_now(clock) + POLL_NS);
 		while ((n = incise_force_read(force, samples, BLOCK)) > 0)
 			for (int i = 0; i < n; i++) {
-				add(&mean,
-				    1e3 * (info.offset_V +
-					   samples[i].code / (double)(1LL << info.bits) *
-						   info.full_scale_V));
+				add_reading(&mean,
+					    1e3 * (info.offset_V +
+						   samples[i].code /
+							   (double)(1LL << info.bits) *
+							   info.full_scale_V));
 				mean.clipped += samples[i].code <= 0 ||
 						samples[i].code >= (1LL << info.bits) - 1;
 			}
@@ -414,12 +415,12 @@ static void wait_steady(struct force *force, double mass_g, double before_mV,
 {
 	const double step_mV = force->setup.step_mV;
 	double waited_s = 0;
-	struct mean last = read_for(force->rig, STEADY_S / 2.0), now;
+	struct mean last = read_mean(force->rig, STEADY_S / 2.0), now;
 
 	for (;;) {
 		bool there;
 
-		now = read_for(force->rig, STEADY_S / 2.0);
+		now = read_mean(force->rig, STEADY_S / 2.0);
 		waited_s += STEADY_S / 2.0;
 		there = is_terminal() || isnan(before_mV) || now.clipped ||
 			fabs(now.mV - before_mV) >= fabs(change_mV) / 2;
@@ -462,7 +463,8 @@ static void request_load(struct force *force, double mass_g)
 }
 
 /* Whether the reading is within the converter's range. */
-static bool within(struct force *force, const struct incise_calibrate_force_pair *pair)
+static bool is_in_range(struct force *force,
+			const struct incise_calibrate_force_pair *pair)
 {
 	return pair && pair->reading_mV > force->setup.low_mV &&
 	       pair->reading_mV < force->setup.high_mV;
@@ -484,9 +486,9 @@ static void read_load(struct force *force, int series, bool descending, int k)
 		change_N = incise_calibrate_force_of(&pair, &force->setup) -
 			   incise_calibrate_force_of(last, &force->setup);
 	wait_steady(force, mass_g, last ? last->reading_mV : NAN,
-		    within(force, last) ? change_N * force->setup.nominal_mV_N
-					: force->setup.step_mV);
-	mean = read_for(force->rig, force->weights.mean_s);
+		    is_in_range(force, last) ? change_N * force->setup.nominal_mV_N
+					     : force->setup.step_mV);
+	mean = read_mean(force->rig, force->weights.mean_s);
 	pair.reading_mV = mean.mV;
 	force->setup.dithered &= sd_of(&mean) >= force->setup.step_mV / 2;
 	/* Clipped noise shifts the mean: the reading counts as saturated, and is left out. */
@@ -733,30 +735,6 @@ static json_t *json_pairs(const struct force *force)
 	return list;
 }
 
-#define FIELD(member) JSON_FIELD(struct incise_calibrate_force, member)
-#define FIELD_AS(key, member) JSON_FIELD_AS(key, struct incise_calibrate_force, member)
-
-static const struct json_field fields[] = {FIELD(zero_mV),	  FIELD(zero_u_mV),
-					   FIELD(residual_sd_mV), FIELD(scatter_sd_mV),
-					   FIELD(misfit),	  {0}};
-
-static const struct json_field metrics[] = {FIELD_AS("linearity_percent", linearity),
-					    FIELD_AS("hysteresis_percent", hysteresis),
-					    FIELD_AS("repeatability_percent",
-						     repeatability),
-					    FIELD_AS("zero_return_percent", zero_return),
-					    FIELD(resolution_N),
-					    FIELD(low_N),
-					    FIELD(high_N),
-					    FIELD(clips_N),
-					    FIELD(used),
-					    FIELD(saturated),
-					    FIELD(outliers),
-					    FIELD(loads),
-					    FIELD(series),
-					    FIELD(pass),
-					    {0}};
-
 static json_t *make_json(const void *run)
 {
 	const struct force *force = run;
@@ -776,9 +754,26 @@ static json_t *make_json(const void *run)
 	json_set_number(root, "sensitivity_mV_N", r->sensitivity_mV_N);
 	json_set_number(root, "sensitivity_u_mV_N", r->sensitivity_u_mV_N);
 	json_set_number(root, "sensitivity_U_mV_N", 2 * r->sensitivity_u_mV_N);
-	json_set_fields(root, fields, r);
+	json_set_number(root, "zero_mV", r->zero_mV);
+	json_set_number(root, "zero_u_mV", r->zero_u_mV);
+	json_set_number(root, "residual_sd_mV", r->residual_sd_mV);
+	json_set_number(root, "scatter_sd_mV", r->scatter_sd_mV);
+	json_set_number(root, "misfit", r->misfit);
 	json_object_set_new(root, "budget", calibrate_budget(&r->budget, true, "u_mV_N"));
-	json_set_fields(root, metrics, r);
+	json_set_number(root, "linearity_percent", r->linearity);
+	json_set_number(root, "hysteresis_percent", r->hysteresis);
+	json_set_number(root, "repeatability_percent", r->repeatability);
+	json_set_number(root, "zero_return_percent", r->zero_return);
+	json_set_number(root, "resolution_N", r->resolution_N);
+	json_set_number(root, "low_N", r->low_N);
+	json_set_number(root, "high_N", r->high_N);
+	json_set_number(root, "clips_N", r->clips_N);
+	json_set_integer(root, "used", r->used);
+	json_set_integer(root, "saturated", r->saturated);
+	json_set_integer(root, "outliers", r->outliers);
+	json_set_integer(root, "loads", r->loads);
+	json_set_integer(root, "series", r->series);
+	json_object_set_new(root, "pass", json_boolean(r->pass));
 	json_object_set_new(root, "verdict", json_text(record->verdict));
 	return root;
 }

@@ -340,7 +340,7 @@ static const char *source_of(const struct stepper *stepper)
 				    : stepper->common.record.device;
 }
 
-static void put_budget(const struct incise_calibrate_stepper *fit, FILE *out)
+static void print_budget(const struct incise_calibrate_stepper *fit, FILE *out)
 {
 	fprintf(out,
 		"\nUncertainty of N per microstep (k = 1)\n"
@@ -356,7 +356,7 @@ static void put_budget(const struct incise_calibrate_stepper *fit, FILE *out)
 		fit->N_step_u, 2 * fit->N_step_u, 200 * fit->N_step_u / fit->N_step);
 }
 
-static void put_rate(const struct stepper_rate *rate, FILE *out)
+static void print_rate(const struct stepper_rate *rate, FILE *out)
 {
 	if (rate->why)
 		fprintf(out, "largest step rate  not measured: %s\n", rate->why);
@@ -408,12 +408,12 @@ static void print_report(const void *run, FILE *out)
 		fit->rest_N == 0  ? "below detection limit"
 		: fit->rest_N > 0 ? "loss between the two directions"
 				  : "force lags after reversals");
-	put_rate(&stepper->rate, out);
+	print_rate(&stepper->rate, out);
 	fprintf(out,
 		"linearity          %.2f %% of full scale; points lie %.2g N off their lines; "
 		"strokes %.2g N apart\n",
 		fit->linearity, fit->residual_sd_N, fit->drift_N);
-	put_budget(fit, out);
+	print_budget(fit, out);
 	fprintf(out,
 		"\n"
 		"%s: %d used, %d saturated, %s, %d excluded after "
@@ -443,33 +443,6 @@ static json_t *rate_json(const struct stepper_rate *rate)
 			 json_number(rate->off_mm));
 }
 
-#define FIELD(member) JSON_FIELD(struct incise_calibrate_stepper, member)
-
-static const struct json_field counts[] = {
-	FIELD(points), FIELD(used),	FIELD(saturated), FIELD(outliers), FIELD(strokes),
-	FIELD(N_step), FIELD(N_step_u), FIELD(N_mm),	  FIELD(N_mm_u),   {0}};
-
-static const struct json_field losses[] = {
-	FIELD(backlash_mm),
-	FIELD(backlash_u_mm),
-	FIELD(hysteresis_N),
-	FIELD(hysteresis_u_N),
-	FIELD(stiction_N),
-	FIELD(stiction_u_N),
-	FIELD(dead_mm),
-	FIELD(rest_N),
-	FIELD(rest_mm),
-	FIELD(branches_mm),
-	JSON_FIELD_AS("linearity_percent", struct incise_calibrate_stepper, linearity),
-	FIELD(low_mm),
-	FIELD(high_mm),
-	FIELD(low_N),
-	FIELD(high_N),
-	FIELD(residual_sd_N),
-	FIELD(misfit),
-	FIELD(drift_N),
-	{0}};
-
 static json_t *make_json(const void *run)
 {
 	const struct stepper *stepper = run;
@@ -478,9 +451,34 @@ static json_t *make_json(const void *run)
 				   "pass", fit->pass, "verdict",
 				   json_text(stepper->common.record.verdict));
 
-	json_set_fields(object, counts, fit);
+	json_set_integer(object, "points", fit->points);
+	json_set_integer(object, "used", fit->used);
+	json_set_integer(object, "saturated", fit->saturated);
+	json_set_integer(object, "outliers", fit->outliers);
+	json_set_integer(object, "strokes", fit->strokes);
+	json_set_number(object, "N_step", fit->N_step);
+	json_set_number(object, "N_step_u", fit->N_step_u);
+	json_set_number(object, "N_mm", fit->N_mm);
+	json_set_number(object, "N_mm_u", fit->N_mm_u);
 	json_set_number(object, "step_mm", stepper->setup.step_mm);
-	json_set_fields(object, losses, fit);
+	json_set_number(object, "backlash_mm", fit->backlash_mm);
+	json_set_number(object, "backlash_u_mm", fit->backlash_u_mm);
+	json_set_number(object, "hysteresis_N", fit->hysteresis_N);
+	json_set_number(object, "hysteresis_u_N", fit->hysteresis_u_N);
+	json_set_number(object, "stiction_N", fit->stiction_N);
+	json_set_number(object, "stiction_u_N", fit->stiction_u_N);
+	json_set_number(object, "dead_mm", fit->dead_mm);
+	json_set_number(object, "rest_N", fit->rest_N);
+	json_set_number(object, "rest_mm", fit->rest_mm);
+	json_set_number(object, "branches_mm", fit->branches_mm);
+	json_set_number(object, "linearity_percent", fit->linearity);
+	json_set_number(object, "low_mm", fit->low_mm);
+	json_set_number(object, "high_mm", fit->high_mm);
+	json_set_number(object, "low_N", fit->low_N);
+	json_set_number(object, "high_N", fit->high_N);
+	json_set_number(object, "residual_sd_N", fit->residual_sd_N);
+	json_set_number(object, "misfit", fit->misfit);
+	json_set_number(object, "drift_N", fit->drift_N);
 	json_object_set_new(object, "budget",
 			    calibrate_budget(&fit->budget, false, "u_N_step"));
 	json_object_set_new(object, "rate", rate_json(&stepper->rate));

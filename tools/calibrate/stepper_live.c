@@ -136,7 +136,7 @@ void stepper_creep(struct stepper_live *live, double to_mm)
 		drive->info.name, drive->status.position_mm, to_mm);
 }
 
-static double mean_force(struct stepper_live *live, double seconds)
+static double read_mean_force(struct stepper_live *live, double seconds)
 {
 	struct stepper_drive *drive = &live->drive;
 	const double here_mm = drive->status.position_mm;
@@ -214,7 +214,7 @@ static void plan_strokes(struct stepper_live *live)
 }
 
 /* On a terminal a person must confirm that nothing is in the way. */
-static void confirm(struct stepper_live *live)
+static void confirm_strokes(struct stepper_live *live)
 {
 	int c;
 
@@ -240,7 +240,7 @@ static void start_strokes(struct stepper_live *live)
 	struct stepper_drive *drive = &live->drive;
 	struct incise_error err = {0};
 
-	confirm(live);
+	confirm_strokes(live);
 	stepper_drive_power(drive);
 	if (drive->info.can_home) {
 		cli_progress("home: Ctrl-C stops");
@@ -273,7 +273,7 @@ void stepper_strokes(struct stepper_live *live, stepper_take *take, void *contex
 			mm = k % 2 ? live->high_mm - share * range_mm
 				   : live->low_mm + share * range_mm;
 			stepper_creep(live, round(mm / step_mm) * step_mm);
-			N = mean_force(live, READ_S);
+			N = read_mean_force(live, READ_S);
 			take(context,
 			     (double)(incise_clock_now(live->drive.clock) -
 				      live->begin_ns) /
@@ -312,11 +312,11 @@ static double read_middle(struct stepper_live *live)
 {
 	stepper_creep(live, live->low_mm);
 	stepper_creep(live, (live->low_mm + live->high_mm) / 2);
-	return mean_force(live, LOOK_S);
+	return read_mean_force(live, LOOK_S);
 }
 
 /* One way at a speed; returns the largest speed. */
-static double stroke(struct stepper_live *live, int way, double mm_s)
+static double drive_stroke(struct stepper_live *live, int way, double mm_s)
 {
 	struct stepper_drive *drive = &live->drive;
 	const double a = drive->info.acceleration_mm_s2;
@@ -372,12 +372,12 @@ static void correct_count(struct stepper_live *live, double lost_mm)
 }
 
 /* Loss since the last time, after a stroke this way, mm. */
-static double lost(struct stepper_live *live, int way, double was_N,
-		   const struct incise_calibrate_stepper *fit, double seen_mm)
+static double find_loss(struct stepper_live *live, int way, double was_N,
+			const struct incise_calibrate_stepper *fit, double seen_mm)
 {
 	double at_mm = live->drive.status.position_mm - live->off_mm;
 	double line_N = (way > 0 ? fit->up_N : fit->down_N) + fit->N_mm * at_mm;
-	double far_mm = (line_N - mean_force(live, LOOK_S)) / fit->N_mm, near_mm;
+	double far_mm = (line_N - read_mean_force(live, LOOK_S)) / fit->N_mm, near_mm;
 	bool far = fabs(far_mm) >
 		   fit->dead_mm + fit->rest_mm + seen_mm + 2 * fit->drift_N / fit->N_mm;
 
@@ -395,9 +395,9 @@ static double lost(struct stepper_live *live, int way, double was_N,
 }
 
 /* Whether a speed loses steps; sets *mm_s to the speed reached. */
-static bool loses(struct stepper_live *live, double *mm_s, double was_N,
-		  const struct incise_calibrate_stepper *fit, struct stepper_rate *rate,
-		  double *lost_mm)
+static bool try_speed(struct stepper_live *live, double *mm_s, double was_N,
+		       const struct incise_calibrate_stepper *fit,
+		       struct stepper_rate *rate, double *lost_mm)
 {
 	double fastest = 0;
 
@@ -405,9 +405,9 @@ static bool loses(struct stepper_live *live, double *mm_s, double was_N,
 		for (int way = 1; way >= -1; way -= 2) {
 			double off;
 
-			fastest = fmax(fastest, stroke(live, way, *mm_s));
+			fastest = fmax(fastest, drive_stroke(live, way, *mm_s));
 			rate->strokes++;
-			off = lost(live, way, was_N, fit, rate->seen_mm);
+			off = find_loss(live, way, was_N, fit, rate->seen_mm);
 			if (incise_clock_is_real(live->drive.clock))
 				cli_progress("%.0f steps/s: %s, Ctrl-C stops",
 					     fastest / live->drive.info.step_mm,
@@ -444,7 +444,7 @@ void stepper_find_rate(struct stepper_live *live,
 	at = fmin(most, 2 * live->creep_mm_s);
 	while (rate->strokes < STROKES_MAX) {
 		double mm_s = at;
-		bool loses_steps = loses(live, &mm_s, was_N, fit, rate, &lost_mm);
+		bool loses_steps = try_speed(live, &mm_s, was_N, fit, rate, &lost_mm);
 
 		if (loses_steps) {
 			loss = at;

@@ -74,14 +74,9 @@ static const struct cli_command command = {
 static void check_options(void *run, int argc, char **argv)
 {
 	struct tip *tip = run;
-	bool timed = tip->time_s > 0;
 
 	cli_no_operands(argc, argv, "--from");
-	if (tip->common.from && timed)
-		cli_usage("--duration does not go with --from: the file has its own");
-	if (!tip->common.from && !timed && !isatty(STDIN_FILENO))
-		cli_usage("missing --duration or --from (needed without a terminal)");
-	calibrate_check_source(&tip->common);
+	calibrate_check_source(&tip->common, tip->time_s, "the file");
 	cli_catch_signals();
 }
 
@@ -349,27 +344,22 @@ static void print_report(const void *run, FILE *out)
 		fputc('\n', out);
 }
 
-#define FIELD(key, member) JSON_FIELD_AS(key, struct incise_tip_fit, member)
-
-static const struct json_field fit_fields[] = {FIELD("poses", n),
-					       FIELD("inliers", inliers),
-					       FIELD("blocks", blocks),
-					       FIELD("rms_error_mm", rms_mm),
-					       FIELD("largest_mm", largest_mm),
-					       FIELD("held_out_mm", held_out_mm),
-					       FIELD("cone_deg", cone_deg),
-					       FIELD("least_deg", least_deg),
-					       FIELD("condition", condition),
-					       FIELD("moved_mm", moved_mm),
-					       FIELD("moved_sd_mm", moved_sd_mm),
-					       {0}};
-
 static json_t *make_json(const void *run)
 {
 	const struct tip *tip = run;
 	json_t *details = json_object(), *outliers = json_array();
 
-	json_set_fields(details, fit_fields, &tip->fit);
+	json_set_integer(details, "poses", tip->fit.n);
+	json_set_integer(details, "inliers", tip->fit.inliers);
+	json_set_integer(details, "blocks", tip->fit.blocks);
+	json_set_number(details, "rms_error_mm", tip->fit.rms_mm);
+	json_set_number(details, "largest_mm", tip->fit.largest_mm);
+	json_set_number(details, "held_out_mm", tip->fit.held_out_mm);
+	json_set_number(details, "cone_deg", tip->fit.cone_deg);
+	json_set_number(details, "least_deg", tip->fit.least_deg);
+	json_set_number(details, "condition", tip->fit.condition);
+	json_set_number(details, "moved_mm", tip->fit.moved_mm);
+	json_set_number(details, "moved_sd_mm", tip->fit.moved_sd_mm);
 	json_object_set_new(details, "covariance_mm2",
 			    json_numbers(tip->fit.covariance, 9));
 	for (int i = 0; i < tip->n; i++)

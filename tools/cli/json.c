@@ -55,21 +55,6 @@ void json_set_integer(json_t *object, const char *key, json_int_t value)
 	json_object_set_new(object, key, json_integer(value));
 }
 
-void json_set_fields(json_t *object, const struct json_field *fields, const void *values)
-{
-	for (; fields->key; fields++) {
-		const void *value = (const char *)values + fields->offset;
-
-		if (fields->kind == JSON_FIELD_DOUBLE)
-			json_set_number(object, fields->key, *(const double *)value);
-		else if (fields->kind == JSON_FIELD_INT)
-			json_set_integer(object, fields->key, *(const int *)value);
-		else
-			json_object_set_new(object, fields->key,
-					    json_boolean(*(const bool *)value));
-	}
-}
-
 json_t *json_text(const char *text)
 {
 	json_t *string = json_string(text);

@@ -7,8 +7,6 @@
 #define INCISE_JSON_H
 
 #include <jansson.h>
-#include <stdbool.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <incise/error.h>
 
@@ -26,26 +24,6 @@ json_t *json_bits(unsigned int bits, const char *const *names, size_t n);
 /* Set a key of an object to a number, by json_number(), or to an integer. */
 void json_set_number(json_t *object, const char *key, double value);
 void json_set_integer(json_t *object, const char *key, json_int_t value);
-
-/*
- * Set keys to the members of a struct: a row for each, ended by {0}. FIELD_AS where the key is not
- * the name of the member.
- */
-struct json_field {
-	const char *key;
-	size_t offset;
-	enum json_field_kind { JSON_FIELD_DOUBLE, JSON_FIELD_INT, JSON_FIELD_BOOL } kind;
-};
-#define JSON_FIELD_AS(key, type, member)                     \
-	{                                                    \
-		key, offsetof(type, member),                 \
-			_Generic(((type *)0)->member, double \
-				 : JSON_FIELD_DOUBLE, int    \
-				 : JSON_FIELD_INT, bool      \
-				 : JSON_FIELD_BOOL)          \
-	}
-#define JSON_FIELD(type, member) JSON_FIELD_AS(#member, type, member)
-void json_set_fields(json_t *object, const struct json_field *fields, const void *values);
 
 /*
  * Put "schema": "incise/COMMAND/1" in front of the keys of an object that is a whole report, and
