@@ -396,8 +396,8 @@ static double find_loss(struct stepper_live *live, int way, double was_N,
 
 /* Whether a speed loses steps; sets *mm_s to the speed reached. */
 static bool try_speed(struct stepper_live *live, double *mm_s, double was_N,
-		       const struct incise_calibrate_stepper *fit,
-		       struct stepper_rate *rate, double *lost_mm)
+		      const struct incise_calibrate_stepper *fit,
+		      struct stepper_rate *rate, double *lost_mm)
 {
 	double fastest = 0;
 
