@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <incise/plan.h>
+#include "bench/tick_cost.h"
 #include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/loop_report.h"
@@ -16,7 +17,6 @@
 #include "cli/model_force.h"
 #include "cli/scene_argument.h"
 #include "cli/stopwatch.h"
-#include "cli/tick_cost.h"
 
 /* Seconds of the stroke in which ticks are timed. */
 #define MEASURED_S 20

@@ -10,8 +10,8 @@
 #include "../cli/file.h"
 #include "../cli/json.h"
 #include "../cli/stopwatch.h"
-#include "../cli/tick_cost.h"
 #include "sheet.h"
+#include "tick_cost.h"
 #include "wakeup.h"
 
 /* --- the cost of a tick: scenes with every force and limits, or the user's --- */

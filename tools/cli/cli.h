@@ -254,6 +254,9 @@ const char *cli_folder(void);
 /* Memory that is zeroed, memory that grows, formatted text: free(3), or fail the program. */
 void *cli_alloc(size_t n, size_t size);
 void *cli_resize(void *memory, size_t n, size_t size);
+
+/* An array of n elements, which has grown by this alone, with capacity for one more. */
+void *cli_grow(void *memory, size_t n, size_t size);
 char *cli_text(const char *fmt, ...) INCISE_PRINTF(1, 2);
 
 /* "1 cut", "3 cuts"; it lasts for seven more calls. */

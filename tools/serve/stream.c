@@ -10,8 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include "../../lib/base/vector.h"
 #include "../cli/cli.h"
-#include "../cli/quaternion.h"
 #include "stream.h"
 
 #define NS 1000000000LL
@@ -157,7 +157,7 @@ void serve_pose(struct serve_stream *stream, int64_t t_ns, const double position
 	set_due(stream, SERVE_POSE, t_ns);
 	for (int i = 0; i < 4; i++)
 		unit[i] = q[i] / norm;
-	quaternion_turn(turned, unit, tip_mm);
+	v3_rotate(turned, unit, tip_mm);
 	for (int i = 0; i < 3; i++)
 		item.pose.position_mm[i] = position_mm[i] + turned[i];
 	memcpy(item.pose.quaternion, unit, sizeof(unit));

@@ -12,7 +12,6 @@
 #include <incise/version.h>
 #include "../../lib/base/ascending.h"
 #include "../../lib/base/vector.h"
-#include "../cli/quaternion.h"
 #include "session.h"
 
 #define TRACE_S 0.02	 /* 50 Hz */
@@ -228,7 +227,7 @@ static void see_handle(struct session_digest *digest, const struct incise_tick *
 	/* Where cuts cross, it may be in either from one tick to the next. */
 	if (!digest->turning)
 		memcpy(digest->line, opening.along, sizeof(digest->line));
-	quaternion_turn(flat, tick->quaternion, digest->scalpel.side);
+	v3_rotate(flat, tick->quaternion, digest->scalpel.side);
 	v3_cross(across, tick->normal, digest->line);
 	along_part = v3_dot(flat, digest->line);
 	across_part = v3_dot(flat, across);

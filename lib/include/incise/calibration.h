@@ -80,6 +80,25 @@ struct incise_calibration_value {
 	double u;      /**< standard uncertainty; U is twice that (k = 2) */
 };
 
+/** A line of the uncertainty budget of a calibration's result. */
+struct incise_calibration_part {
+	const char *source;  /**< static */
+	char type;	     /**< 'A': from the statistics of readings; 'B': other */
+	double u;	     /**< standard uncertainty of the source, in @unit */
+	const char *unit;    /**< static */
+	double sensitivity;  /**< change of the result per unit */
+	double contribution; /**< u times that: part of the result's u, added in squares */
+};
+
+/** Largest number of lines of a budget. */
+#define INCISE_CALIBRATION_PARTS 6
+
+/** The uncertainty budget of a calibration's result. */
+struct incise_calibration_budget {
+	int n;
+	struct incise_calibration_part part[INCISE_CALIBRATION_PARTS];
+};
+
 /** Largest number of values of a calibration. */
 #define INCISE_CALIBRATION_VALUES 16
 
@@ -137,7 +156,17 @@ INCISE_API int incise_calibration_history(const char *path,
 					  struct incise_error *err);
 
 /**
- * Read the text of a calibration.conf, for example a recording's: its values as
+ * The last value that a calibration which passed gave to a key. Thread-safe; not real-time safe.
+ *
+ * @param record set to its calibration; or NULL
+ * @return a part of @records; NULL: none
+ */
+INCISE_API const struct incise_calibration_value *incise_calibration_last(
+	const struct incise_calibration_record *records, int n, const char *key,
+	const struct incise_calibration_record **record);
+
+/**
+ * Read the text of a calibration.conf, for example of a recording: its values as
  * incise_calibration_load(), and its history as incise_calibration_history().
  *
  * @param name    of the text, for errors

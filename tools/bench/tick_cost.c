@@ -5,8 +5,8 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "cli.h"
-#include "stopwatch.h"
+#include "../cli/cli.h"
+#include "../cli/stopwatch.h"
 #include "stroke.h"
 #include "tick_cost.h"
 
