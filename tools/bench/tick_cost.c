@@ -25,7 +25,7 @@ struct tick_stroke {
 	double clock_ns;
 };
 
-/* Of each cut: above its place, down, along, up. */
+/* The way of each cut: above its place, down, along, up. */
 #define CUT_S 0.8
 #define CUT_MM 10.0
 #define CUT_DEPTH_MM 2.0
