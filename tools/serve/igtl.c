@@ -100,10 +100,11 @@ static struct message *packed(struct sending *sending, int version)
 		.n_metadata = 2,
 	};
 
+	if (*message)
+		return *message;
 	snprintf(t_ns, sizeof(t_ns), "%lld", (long long)item->t_ns);
 	snprintf(lost, sizeof(lost), "%llu", (unsigned long long)item->lost);
-	if (!*message)
-		*message = pack_message(sending, &label);
+	*message = pack_message(sending, &label);
 	return *message;
 }
 
