@@ -51,9 +51,9 @@ static void put_header(struct incise_table *table)
 }
 
 static void put_cell(struct incise_table *table, const struct incise_table_column *column,
-		     const union incise_cell *cell)
+		     const union incise_cell *cell, char behind)
 {
-	char text[INCISE_DECIMAL_MAX], *end = text;
+	char text[INCISE_DECIMAL_MAX + 1], *end = text;
 
 	switch (column->type) {
 	case INCISE_COLUMN_NAME:
@@ -67,6 +67,7 @@ static void put_cell(struct incise_table *table, const struct incise_table_colum
 	default:
 		end = incise_decimal_real(text, cell->real, column->decimals);
 	}
+	*end++ = behind;
 	fwrite_unlocked(text, 1, end - text, table->out);
 }
 
@@ -78,11 +79,10 @@ static int csv_put(struct incise_table *table, struct incise_error *err)
 	if (!table->rows)
 		put_header(table);
 	for (size_t row = 0; row < table->filled; row++)
-		for (int i = 0; i < table->n_columns; i++) {
+		for (int i = 0; i < table->n_columns; i++)
 			put_cell(table, &table->columns[i],
-				 &table->block[(size_t)i * INCISE_TABLE_STRIDE + row]);
-			fputc_unlocked(i + 1 < table->n_columns ? ',' : '\n', table->out);
-		}
+				 &table->block[(size_t)i * INCISE_TABLE_STRIDE + row],
+				 i + 1 < table->n_columns ? ',' : '\n');
 	incise_c_locale_end(locale);
 	return check_written(table, false, err);
 }
