@@ -170,6 +170,14 @@ static int pragma(sqlite3 *db, const char *sql, sqlite3_int64 *value)
 	return sqlite3_finalize(stmt); /* reports a failed step too */
 }
 
+bool incise_schema_is_joined(sqlite3 *db)
+{
+	sqlite3_int64 application;
+
+	return pragma(db, "PRAGMA application_id", &application) == SQLITE_OK &&
+	       application == INCISE_SCHEMA_JOINED;
+}
+
 static int check_tables(sqlite3 *db, const char *path, int form, struct incise_error *err)
 {
 	sqlite3_stmt *stmt;

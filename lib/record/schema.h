@@ -6,12 +6,14 @@
 #ifndef INCISE_SCHEMA_H
 #define INCISE_SCHEMA_H
 
+#include <stdbool.h>
 #include <sqlite3.h>
 #include <incise/error.h>
 
 #define INCISE_SCHEMA_DB "recording.db"	     /* inside the folder NAME.rec */
 #define INCISE_SCHEMA_APPLICATION 0x494e4349 /* "INCI", SQLite's application_id */
 #define INCISE_SCHEMA_VERSION 5		     /* SQLite's user_version */
+#define INCISE_SCHEMA_JOINED 0x494e4353	     /* "INCS", of a joined recording */
 
 /* Make the tables in an empty database. Returns an SQLite code. */
 int incise_schema_create(sqlite3 *db);
@@ -24,6 +26,9 @@ int incise_schema_create(sqlite3 *db);
  */
 int incise_schema_check(sqlite3 *db, const char *path, int *form,
 			struct incise_error *err);
+
+/* Whether an opened database is that of a joined recording; see read/session.h. */
+bool incise_schema_is_joined(sqlite3 *db);
 
 /* The errno of the last SQLite error: EINVAL for a damaged file. */
 int incise_schema_errno(sqlite3 *db);

@@ -367,11 +367,13 @@ static int describe_times(struct rows_source *source)
 	const struct incise_row_times *times = &source->rows.times;
 	int rc = 0;
 
-	if (times->stream)
+	if (times->source)
 		rc = add_known(&source->time, "delay_ms",
-			       (times->delay_ns - (double)times->shift_ns) * 1e-6);
-	if (!rc && times->stream)
-		rc = add_known(&source->time, "offset_sd_ms", times->offset_sd_ns * 1e-6);
+			       (times->source->delay_ns - (double)times->shift_ns) *
+				       1e-6);
+	if (!rc && times->source)
+		rc = add_known(&source->time, "offset_sd_ms",
+			       times->source->offset_sd_ns * 1e-6);
 	return rc;
 }
 

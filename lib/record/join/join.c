@@ -23,7 +23,9 @@
 #include <incise/wall.h>
 #include "../frames.h"
 #include "../ledger.h"
+#include "../read/database.h"
 #include "../read/session.h"
+#include "../read/source.h"
 #include "../schema.h"
 #include "align.h"
 
@@ -123,8 +125,8 @@ static int read_span(struct join *join, struct member *member)
 	for (int i = 0; i < INCISE_LEDGER_STREAMS; i++) {
 		int64_t first, last;
 
-		if (!incise_session_span(member->recording, incise_ledger_forms[i].table,
-					 &first, &last))
+		if (!incise_source_span(member->recording, incise_ledger_forms[i].table,
+					&first, &last))
 			continue;
 		member->first_ns = first < member->first_ns ? first : member->first_ns;
 		member->last_ns = last > member->last_ns ? last : member->last_ns;
@@ -737,7 +739,7 @@ static int write_tables(struct join *join, sqlite3 *db)
 	uint32_t crc;
 	int rc = sqlite3_exec(
 		db,
-		"PRAGMA application_id=" TEXT_OF(INCISE_SESSION_APPLICATION) ";PRAGMA user_version=" TEXT_OF(
+		"PRAGMA application_id=" TEXT_OF(INCISE_SCHEMA_JOINED) ";PRAGMA user_version=" TEXT_OF(
 			INCISE_SESSION_VERSION) ";BEGIN",
 		NULL, NULL, NULL);
 

@@ -10,11 +10,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 #include "database.h"
-#include "recording.h"
 #include "../frames.h"
 #include "../schema.h"
 
@@ -329,6 +329,43 @@ static int open_copy(const struct found *found, bool written, sqlite3 **db, int 
 }
 
 /* --- opening --- */
+
+/* Without trailing slashes. */
+char *incise_recording_folder(const char *path, struct incise_error *err)
+{
+	size_t length = strlen(path);
+	char *folder;
+	struct stat st;
+
+	while (length > 1 && path[length - 1] == '/')
+		length--;
+	if (asprintf(&folder, "%.*s.part", (int)length, path) < 0) {
+		incise_error_set(err, ENOMEM, "%s: out of memory", path);
+		return NULL;
+	}
+	folder[length] = 0;
+	if (stat(folder, &st) && errno == ENOENT) {
+		folder[length] = '.';
+		if (stat(folder, &st) && errno == ENOENT) {
+			incise_error_set(err, ENOENT,
+					 "%s: no such recording; check name and folder",
+					 path);
+			free(folder);
+			return NULL;
+		}
+	}
+	return folder;
+}
+
+bool incise_recording_is_written(const char *folder)
+{
+	int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+	bool is = fd >= 0 && flock(fd, LOCK_SH | LOCK_NB) && errno == EWOULDBLOCK;
+
+	if (fd >= 0)
+		close(fd);
+	return is;
+}
 
 /* A line for a database that cannot be copied. */
 static int say_why(const char *path, bool written, int why, struct incise_error *err)

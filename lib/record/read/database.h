@@ -12,11 +12,18 @@
 #ifndef INCISE_RECORDING_DATABASE_H
 #define INCISE_RECORDING_DATABASE_H
 
+#include <stdbool.h>
 #include <sqlite3.h>
 #include <incise/error.h>
 
 /* Bytes of an interrupted recording's database that are copied for reading. */
 #define INCISE_DATABASE_COPY_MAX (1LL << 30)
+
+/* The folder of a recording, path or path.part; to be freed; NULL with ENOENT, ENOMEM. */
+char *incise_recording_folder(const char *path, struct incise_error *err);
+
+/* Whether a recorder holds the lock of the folder. */
+bool incise_recording_is_written(const char *folder);
 
 /*
  * The database in the folder @path. 0; -errno with a line: EINVAL (no recording, or one with files that

@@ -11,12 +11,13 @@
 #include <stdlib.h>
 #include "../frames.h"
 #include "recording.h"
-#include "session.h"
+#include "session_map.h"
 #include "source.h"
 
 struct incise_frame_reader {
 	struct incise_recording *opened;
 	struct incise_recording *recording; /* with the frames: that one, or its member */
+	const struct incise_session_map *map;
 	struct incise_frames_reader *file;
 	uint64_t passed; /* frames of the file */
 };
@@ -49,9 +50,13 @@ struct incise_frame_reader *incise_frame_reader_new(struct incise_recording *rec
 				      recording->path);
 	if (!rc) {
 		reader->opened = incise_recording_open(recording->path, err);
-		if (reader->opened)
-			reader->recording =
-				incise_recording_member(reader->opened, "frames");
+		if (reader->opened) {
+			const struct incise_stream_source *camera =
+				reader->opened->streams[INCISE_LEDGER_CAMERA];
+
+			reader->recording = camera->file;
+			reader->map = camera->map;
+		}
 		rc = reader->recording ? open_file(reader, err) : -errno;
 	}
 	if (!rc)
@@ -117,9 +122,8 @@ int incise_frame_reader_at(struct incise_frame_reader *reader, int64_t t_ns,
 	int64_t t = t_ns > INT64_MAX / 4    ? INT64_MAX / 4
 		    : t_ns < -INT64_MAX / 4 ? -INT64_MAX / 4
 					    : t_ns;
-	const struct incise_session_map *map = reader->recording->map;
-	int rc = find_row(reader->recording, incise_session_member_time(map, t), &seq,
-			  &row_ns, &number, err);
+	int rc = find_row(reader->recording, incise_session_member_time(reader->map, t),
+			  &seq, &row_ns, &number, err);
 
 	if (!rc && number < reader->passed)
 		rc = open_file(reader, err);
@@ -139,6 +143,6 @@ int incise_frame_reader_at(struct incise_frame_reader *reader, int64_t t_ns,
 			"has all findings",
 			reader->recording->path, (unsigned long long)seq,
 			INCISE_FRAMES_FILE, reader->recording->path);
-	frame->t_ns = incise_session_time(map, row_ns);
+	frame->t_ns = incise_session_time(reader->map, row_ns);
 	return 0;
 }

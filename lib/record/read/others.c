@@ -2,8 +2,8 @@
 /*
  * Rows of the tracker that are not on its line; see others.h. The file is untrusted.
  */
+#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include "others.h"
 #include "source.h"
 
@@ -14,7 +14,6 @@
 
 struct incise_others {
 	struct incise_recording *recording;
-	struct incise_timeline_knot knots[INCISE_TIMELINE_KNOTS_MAX];
 	struct incise_fit_setup setup;
 	uint64_t first, last; /* numbers of the stream */
 	uint64_t part;	      /* that the times are of; UINT64_MAX: none yet */
@@ -23,9 +22,9 @@ struct incise_others {
 	size_t n;
 };
 
-struct incise_others *incise_others_new(struct incise_recording *recording,
-					const struct incise_fit_setup *setup)
+struct incise_others *incise_others_new(const struct incise_stream_source *source)
 {
+	struct incise_recording *recording = source->file;
 	struct incise_others *others = calloc(1, sizeof(*others));
 	int64_t seq = 0, t_ns;
 
@@ -33,11 +32,14 @@ struct incise_others *incise_others_new(struct incise_recording *recording,
 		return NULL;
 	others->rows = malloc((PART + 2 * BESIDE) * sizeof(*others->rows));
 	others->recording = recording;
-	others->setup = *setup;
-	others->setup.knots = others->knots;
-	if (setup->n_knots)
-		memcpy(others->knots, setup->knots,
-		       (size_t)setup->n_knots * sizeof(*others->knots));
+	others->setup = (struct incise_fit_setup){
+		.knots = source->knots,
+		.n_knots = source->n_knots,
+		.period_ns = source->period_ns,
+		.delay_ns = llrint(source->delay_ns),
+		.delay_sd_ns = isnan(source->delay_sd_ns) ? 0 : source->delay_sd_ns,
+		.grain_ns = source->grain_ns,
+	};
 	others->part = UINT64_MAX;
 	if (incise_source_end(recording, "tracker", false, &seq, &t_ns, NULL, NULL) > 0)
 		others->first = (uint64_t)(seq > 0 ? seq : 0);

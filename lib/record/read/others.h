@@ -12,12 +12,11 @@
 #include <incise/error.h>
 #include "../time/fit.h"
 
-struct incise_recording;
+struct incise_stream_source;
 struct incise_others;
 
-/* The setup's knots are copied. NULL: no memory; errors of the rows are their reader's. */
-struct incise_others *incise_others_new(struct incise_recording *recording,
-					const struct incise_fit_setup *setup);
+/* Of a source that may have some. NULL: no memory; errors of the rows are their reader's. */
+struct incise_others *incise_others_new(const struct incise_stream_source *source);
 
 /* The row of this number among them, or NULL. In order it is read once. */
 const struct incise_fit_time *incise_others_find(struct incise_others *others,

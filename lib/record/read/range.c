@@ -65,13 +65,12 @@ static int follow(struct incise_recording *recording,
 	struct walk walk = {.settled_ns = SETTLED_NS, .begin.t_ns = INT64_MIN};
 	struct incise_source source;
 	bool found = false;
-	double hz;
-	int rc = incise_recording_number(recording, "tracker_hz", &hz, err);
+	const double hz = recording->numbers.tracker_hz;
+	int rc;
 
-	if (!rc && hz > 0 && SETTLED_RECORDS / hz * 1e9 > SETTLED_NS)
+	if (hz > 0 && SETTLED_RECORDS / hz * 1e9 > SETTLED_NS)
 		walk.settled_ns = (int64_t)fmin(SETTLED_RECORDS / hz * 1e9, 1e12);
-	if (!rc)
-		rc = incise_source_open(&source, recording, INCISE_SOURCE_DEPTH, err);
+	rc = incise_source_open(&source, recording, INCISE_SOURCE_DEPTH, err);
 	if (rc)
 		return rc;
 	while (!found && (rc = incise_source_next(&source, err)) > 0)
@@ -109,15 +108,12 @@ static int follow(struct incise_recording *recording,
 static bool is_read_whole(struct incise_recording *recording,
 			  const struct incise_export_options *options)
 {
-	double force_hz = NAN, tracker_hz = NAN;
+	const struct incise_recording_numbers *numbers = &recording->numbers;
 
-	if (incise_recording_number(recording, "force_hz", &force_hz, NULL) ||
-	    incise_recording_number(recording, "tracker_hz", &tracker_hz, NULL))
-		return true;
 	return recording->meta.force_lost || options->calibration ||
 	       recording->recalibrated ||
 	       (incise_recording_has_force(recording) &&
-		!(force_hz >= FORCE_LEAST * tracker_hz));
+		!(numbers->force_hz >= FORCE_LEAST * numbers->tracker_hz));
 }
 
 static int64_t after(double s)

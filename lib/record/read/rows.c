@@ -9,95 +9,89 @@
 #include "depth.h"
 #include "recalibration.h"
 #include "rows.h"
-#include "session.h"
+#include "session_map.h"
 #include "../schema.h"
 
 /* --- times ------------------------------------------------------------------------- */
 
 #define TIME_MAX (INT64_MAX / 4) /* 73 years; sums and differences do not overflow */
-#define DELAY_MAX_NS 1e12	 /* a quarter of an hour; shifts do not overflow */
-
-static const struct {
-	const char *table, *stream;
-} streams[] = {
-	{"force", "force"},
-	{"tracker", "tracker"},
-	{"depth", "tracker"}, /* rows have the number of the tracker's record */
-	{"frames", "camera"},
-};
 
 int incise_row_times_open(struct incise_row_times *times,
 			  struct incise_recording *recording, const char *table,
 			  struct incise_error *err)
 {
-	struct incise_stream known[INCISE_STREAMS_MAX];
-	int rc = 0, n;
+	const int stream = incise_source_find(table);
+	struct incise_stream_source *source;
+	int rc;
 
-	recording = incise_recording_member(recording, table);
 	*times = (struct incise_row_times){
 		.may_repeat = true,
-		.delay_ns = NAN,
 		.own_ns = -TIME_MAX - 1,
 		.last_ns = INCISE_TIME_NONE,
-		.map = recording->map,
+		.map = recording->own->map,
 		/* Events of a session are on its clock already. */
 		.least_ns = recording->session ? -TIME_MAX : 0,
 	};
-	for (size_t i = 0; i < sizeof(streams) / sizeof(*streams); i++)
-		if (!strcmp(streams[i].table, table))
-			times->stream = streams[i].stream;
-	if (!times->stream)
-		return 0; /* events */
+	if (stream < 0)
+		return 0;
+	source = incise_source_stream(recording, stream);
 	times->may_repeat = false;
-	/* For recordings without a table of streams. */
-	if (!strcmp(times->stream, "tracker"))
-		rc = incise_recording_number(recording, "tracker_latency_ns",
-					     &times->delay_ns, err);
+	times->map = source->map;
+	times->least_ns = 0;
+	rc = incise_stream_resolve(source, err);
 	if (rc)
 		return rc;
-	n = incise_recording_streams(recording, known, err);
-	for (int i = 0; i < n; i++)
-		if (!strcmp(known[i].name, times->stream)) {
-			times->delay_ns = known[i].delay_ms * 1e6;
-			times->delay_sd_ns = known[i].delay_sd_ms * 1e6;
-			times->offset_sd_ns = known[i].offset_sd_ms * 1e6;
-		}
-	if (n < 0)
-		return n;
-	if (recording->recalibrated)
-		incise_row_times_calibrate(times, &recording->recalibrated->calibration);
-	return incise_recording_line(recording, times->stream, &times->line, err);
+	times->source = source;
+	times->shift_ns = source->shift_ns;
+	times->variance_ns2 = source->variance_ns2;
+	if (source->period_ns > 0)
+		times->others = incise_others_new(source);
+	return source->period_ns > 0 && !times->others
+		       ? incise_error_set(err, ENOMEM, "%s: out of memory",
+					  recording->path)
+		       : 0;
 }
 
-static double known(double value, double otherwise)
+void incise_row_times_close(struct incise_row_times *times)
 {
-	return isnan(value) ? otherwise : value;
+	incise_others_free(times->others);
+	times->others = NULL;
 }
 
 void incise_row_times_calibrate(struct incise_row_times *times,
 				const struct incise_calibration *calibration)
 {
-	double ms = NAN, sd_ms = NAN, old_ns = known(times->delay_ns, 0);
-	double old_sd_ns = known(times->delay_sd_ns, 0);
+	if (times->source)
+		incise_recalibration_shift(calibration, times->source, &times->shift_ns,
+					   &times->variance_ns2);
+}
 
-	if (!times->stream)
-		return;
-	if (!strcmp(times->stream, "force")) {
-		ms = calibration->force_delay_ms;
-		sd_ms = calibration->force_delay_sd_ms;
-	} else if (!strcmp(times->stream, "tracker")) {
-		ms = calibration->tracker_delay_ms;
-		sd_ms = calibration->tracker_delay_sd_ms;
-	} else {
-		ms = calibration->camera_delay_ms;
-		sd_ms = calibration->camera_delay_sd_ms;
-	}
-	if (isnan(ms))
-		return;
-	times->shift_ns =
-		(int64_t)fmax(fmin(old_ns - ms * 1e6, DELAY_MAX_NS), -DELAY_MAX_NS);
-	if (!isnan(sd_ms))
-		times->variance_ns2 = sd_ms * 1e6 * sd_ms * 1e6 - old_sd_ns * old_sd_ns;
+/* The row among the others, or NULL. */
+static const struct incise_fit_time *find_other(const struct incise_row_times *times,
+						uint64_t seq)
+{
+	return times->others ? incise_others_find(times->others, seq) : NULL;
+}
+
+int64_t incise_row_times_line(const struct incise_row_times *times, uint64_t seq,
+			      int64_t t_ns)
+{
+	const struct incise_fit_time *other = find_other(times, seq);
+	const int n = times->source ? times->source->n_knots : 0;
+
+	if (other)
+		return n ? other->t_ns : t_ns - llrint(other->held_ns);
+	return n ? incise_timeline_at(times->source->knots, n, seq) : t_ns;
+}
+
+double incise_row_times_line_sd(const struct incise_row_times *times, uint64_t seq)
+{
+	const struct incise_fit_time *other = find_other(times, seq);
+	const int n = times->source ? times->source->n_knots : 0;
+
+	if (other)
+		return other->sd_ns;
+	return n ? incise_timeline_sd(times->source->knots, n, seq) : NAN;
 }
 
 bool incise_row_times_next(struct incise_row_times *times, int64_t seq, int64_t t_ns,
@@ -109,7 +103,7 @@ bool incise_row_times_next(struct incise_row_times *times, int64_t seq, int64_t 
 	    (t_ns == times->own_ns && !times->may_repeat))
 		return false;
 	times->own_ns = t_ns;
-	best = incise_recording_time(&times->line, seq, t_ns) + times->shift_ns;
+	best = incise_row_times_line(times, seq, t_ns) + times->shift_ns;
 	best = incise_session_time(times->map, best);
 	best = best > TIME_MAX ? TIME_MAX : best < -TIME_MAX ? -TIME_MAX : best;
 	if (times->last_ns != INCISE_TIME_NONE &&
@@ -119,11 +113,19 @@ bool incise_row_times_next(struct incise_row_times *times, int64_t seq, int64_t 
 	return true;
 }
 
+static double known(double value, double otherwise)
+{
+	return isnan(value) ? otherwise : value;
+}
+
 double incise_row_times_sd(const struct incise_row_times *times, int64_t seq)
 {
-	double on_line_ns = incise_recording_time_sd(&times->line, seq);
-	double sd_ns = times->line.n ? on_line_ns
-				     : known(times->offset_sd_ns, known(on_line_ns, 0));
+	const struct incise_stream_source *source = times->source;
+	double on_line_ns = incise_row_times_line_sd(times, seq);
+	double sd_ns =
+		source && source->n_knots
+			? on_line_ns
+			: known(source ? source->offset_sd_ns : 0, known(on_line_ns, 0));
 	/* Of a bounded error that is as likely anywhere within. */
 	double map_ns = times->map ? incise_session_bound(times->map, times->own_ns) : 0;
 	double variance = sd_ns * sd_ns + times->variance_ns2 + map_ns * map_ns / 3;
@@ -163,7 +165,8 @@ int incise_rows_open(struct incise_rows *rows, struct incise_recording *recordin
 	const char *all = stream < 0 ? EVENTS : incise_source_form(stream)->columns;
 	int rc, n = 0;
 
-	recording = incise_recording_member(recording, table);
+	if (stream >= 0)
+		recording = incise_source_stream(recording, stream)->file;
 	*rows = (struct incise_rows){
 		.recording = recording,
 		.table = table,
@@ -323,7 +326,7 @@ int64_t incise_rows_seq(const struct incise_rows *rows)
 void incise_rows_close(struct incise_rows *rows)
 {
 	incise_source_close(&rows->source);
-	incise_recording_line_free(&rows->times.line);
+	incise_row_times_close(&rows->times);
 	sqlite3_finalize(rows->stmt);
 	rows->stmt = NULL;
 }

@@ -12,7 +12,8 @@
 #include "recalibration.h"
 #include "source.h"
 
-#define ROWS_MAX 1024 /* of a batch, where the file has no blocks */
+#define TIME_MAX (INT64_MAX / 4) /* of rows.c */
+#define ROWS_MAX 1024		 /* of a batch, where the file has no blocks */
 
 static const struct incise_ledger_form depth_form = {
 	"depth", "depth",
@@ -30,6 +31,13 @@ int incise_source_find(const char *table)
 const struct incise_ledger_form *incise_source_form(int stream)
 {
 	return stream == INCISE_SOURCE_DEPTH ? &depth_form : &incise_ledger_forms[stream];
+}
+
+struct incise_stream_source *incise_source_stream(
+	const struct incise_recording *recording, int stream)
+{
+	return recording
+		->streams[stream == INCISE_SOURCE_DEPTH ? INCISE_LEDGER_TRACKER : stream];
 }
 
 static int fail(struct incise_source *source, struct incise_error *err)
@@ -361,7 +369,7 @@ int incise_source_open_at(struct incise_source *source,
 {
 	const struct incise_ledger_form *form = incise_source_form(stream);
 
-	recording = incise_recording_member(recording, form->table);
+	recording = incise_source_stream(recording, stream)->file;
 	*source = (struct incise_source){
 		.recording = recording,
 		.stream = stream,
@@ -412,7 +420,7 @@ int incise_source_end(struct incise_recording *recording, const char *table, boo
 	if (stream == INCISE_SOURCE_DEPTH)
 		stream = INCISE_LEDGER_TRACKER;
 	source = (struct incise_source){
-		.recording = incise_recording_member(recording, table),
+		.recording = incise_source_stream(recording, stream)->file,
 		.stream = stream,
 		.batch.form = incise_source_form(stream),
 		.rows_max = 1,
@@ -468,4 +476,16 @@ int64_t incise_source_seek(struct incise_recording *recording, const char *table
 		seq = sqlite3_column_int64(stmt, 0);
 	sqlite3_finalize(stmt);
 	return seq;
+}
+
+bool incise_source_span(struct incise_recording *recording, const char *table,
+			int64_t *first_ns, int64_t *last_ns)
+{
+	int64_t seq;
+
+	*first_ns = *last_ns = 0;
+	return incise_source_end(recording, table, false, &seq, first_ns, NULL, NULL) >
+		       0 &&
+	       incise_source_end(recording, table, true, &seq, last_ns, NULL, NULL) > 0 &&
+	       *first_ns >= 0 && *last_ns >= *first_ns && *last_ns <= TIME_MAX;
 }

@@ -27,6 +27,10 @@ int incise_source_find(const char *table);
 /* The columns of a stream's batches, of all forms of recordings. */
 const struct incise_ledger_form *incise_source_form(int stream);
 
+/* That of a recording with the rows; those of depth are the tracker's. */
+struct incise_stream_source *incise_source_stream(
+	const struct incise_recording *recording, int stream);
+
 struct incise_source_depth;
 
 struct incise_source {
@@ -74,5 +78,9 @@ int64_t incise_source_seek(struct incise_recording *recording, const char *table
 int incise_source_end(struct incise_recording *recording, const char *table, bool last,
 		      int64_t *seq, int64_t *t_ns, int64_t *arrival_ns,
 		      struct incise_error *err);
+
+/* First and last t_ns of a table, on its own clock. Returns whether it has rows. */
+bool incise_source_span(struct incise_recording *recording, const char *table,
+			int64_t *first_ns, int64_t *last_ns);
 
 #endif

@@ -4,7 +4,6 @@
  */
 #include <errno.h>
 #include <fcntl.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,70 +14,6 @@
 #include "seal_walk.h"
 
 /* --- making --------------------------------------------------------------------------- */
-
-/* A text for one line. */
-static void set_line(char *to, size_t size, const char *text)
-{
-	snprintf(to, size, "%s", text);
-	for (char *c = to; *c; c++)
-		if ((unsigned char)*c < ' ' || *c == 0x7f)
-			*c = '?';
-}
-
-/* Text of a key of table meta, "" if it has none. Returns 0 or -errno. */
-static int read_key(struct incise_recording *recording, const char *key, char *to,
-		    size_t size, struct incise_error *err)
-{
-	sqlite3_stmt *stmt;
-	const char *text;
-
-	*to = 0;
-	if (sqlite3_prepare_v2(recording->db, "SELECT value FROM meta WHERE key = ?", -1,
-			       &stmt, NULL) != SQLITE_OK)
-		return incise_schema_fail(recording->db, recording->path, err);
-	sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC);
-	if (sqlite3_step(stmt) == SQLITE_ROW &&
-	    sqlite3_column_type(stmt, 0) == SQLITE_TEXT) {
-		text = (const char *)sqlite3_column_text(stmt, 0);
-		set_line(to, size, text ? text : "");
-	}
-	return sqlite3_finalize(stmt) == SQLITE_OK
-		       ? 0
-		       : incise_schema_fail(recording->db, recording->path, err);
-}
-
-static int read_identity(struct incise_recording *recording, char identity[33],
-			 struct incise_error *err)
-{
-	int rc = read_key(recording, "identity", identity, 33, err);
-
-	/* A text of any other form is none, and so are all zeros. */
-	if (!rc && !incise_statement_hex(identity, 32))
-		memset(identity, '0', 32);
-	identity[32] = 0;
-	return rc;
-}
-
-int incise_seal_possible(const struct incise_recording *recording,
-			 struct incise_error *err)
-{
-	/* The path of a session ends with the choice of its streams. */
-	const char *choice = strrchr(recording->path, ':');
-	const int n = (int)(choice ? choice - recording->path
-				   : (ptrdiff_t)strlen(recording->path));
-
-	if (recording->session)
-		return incise_error_set(err, ENOTSUP,
-					"%.*s: is a joined recording; each of its "
-					"members has its own seal: give one, %.*s/NAME",
-					n, recording->path, n, recording->path);
-	if (recording->form < 4)
-		return incise_error_set(
-			err, ENODATA,
-			"%s: made by an older incise (format %d), it has no seal",
-			recording->path, recording->form);
-	return 0;
-}
 
 /* Head and length of camera.mkv. */
 static int make_file_part(struct incise_recording *recording,
@@ -167,17 +102,17 @@ int incise_statement_make(struct incise_seal_statement *statement,
 		rc = incise_error_set(err, ENODATA, "%s: its seal has no commit",
 				      recording->path);
 	if (!rc)
-		rc = read_identity(recording, statement->identity, err);
+		rc = incise_seal_identity(recording, statement->identity, err);
 	if (!rc)
-		rc = read_key(recording, "incise", statement->software,
-			      sizeof(statement->software), err);
+		rc = incise_seal_key(recording, "incise", statement->software,
+				     sizeof(statement->software), err);
 	if (!rc)
-		rc = read_key(recording, "host", statement->host, sizeof(statement->host),
-			      err);
+		rc = incise_seal_key(recording, "host", statement->host,
+				     sizeof(statement->host), err);
 	if (!rc)
-		rc = read_key(recording, "started", statement->started,
-			      sizeof(statement->started), err);
-	set_line(statement->name, sizeof(statement->name), recording->name);
+		rc = incise_seal_key(recording, "started", statement->started,
+				     sizeof(statement->started), err);
+	incise_seal_line(statement->name, sizeof(statement->name), recording->name);
 	statement->n_earlier =
 		upto < INCISE_STATEMENT_EARLIER ? upto : INCISE_STATEMENT_EARLIER;
 	for (int i = 0; i < statement->n_earlier; i++)
@@ -258,50 +193,4 @@ char *incise_seal_statement(const char *path, struct incise_error *err)
 	if (n && !copy)
 		incise_error_set(err, ENOMEM, "%s: out of memory", path);
 	return copy;
-}
-
-int incise_seal_head(struct incise_recording *recording, char identity[33],
-		     struct incise_seal_head *head, struct incise_error *err)
-{
-	sqlite3_stmt *stmt = NULL;
-	int rc = incise_seal_possible(recording, err);
-	bool has = false;
-
-	if (!rc)
-		rc = read_identity(recording, identity, err);
-	if (rc)
-		return rc;
-	if (sqlite3_prepare_v2(recording->db,
-			       "SELECT number, t_ns, head FROM seal "
-			       "ORDER BY number DESC LIMIT 1",
-			       -1, &stmt, NULL) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW) {
-		head->commit = sqlite3_column_int64(stmt, 0);
-		head->t_ns = sqlite3_column_int64(stmt, 1);
-		has = sqlite3_column_type(stmt, 2) == SQLITE_BLOB &&
-		      sqlite3_column_bytes(stmt, 2) == INCISE_SEAL_BYTES;
-		if (has)
-			incise_seal_hex(sqlite3_column_blob(stmt, 2), head->head);
-	}
-	if (sqlite3_finalize(stmt) != SQLITE_OK)
-		return incise_schema_fail(recording->db, recording->path, err);
-	return has ? 0
-		   : incise_error_set(err, ENODATA, "%s: has no sealed commit",
-				      recording->path);
-}
-
-bool incise_seal_before(struct incise_recording *recording, const char *head)
-{
-	sqlite3_stmt *stmt = NULL;
-	bool is = false;
-
-	if (sqlite3_prepare_v2(recording->db,
-			       "SELECT instr(value, ', head ' || ?) FROM meta WHERE key "
-			       "= 'converted_from'",
-			       -1, &stmt, NULL) == SQLITE_OK &&
-	    sqlite3_bind_text(stmt, 1, head, -1, SQLITE_STATIC) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW)
-		is = sqlite3_column_int(stmt, 0) > 0;
-	sqlite3_finalize(stmt);
-	return is;
 }

@@ -70,6 +70,16 @@ int incise_statement_make(struct incise_seal_statement *statement,
 			  int (*step)(void *user, struct incise_seal_walk *walk),
 			  void *user, struct incise_error *err);
 
+/* A text for one line. */
+void incise_seal_line(char *to, size_t size, const char *text);
+
+/* Text of a key of table meta, "" if it has none. Returns 0 or -errno. */
+int incise_seal_key(struct incise_recording *recording, const char *key, char *to,
+		    size_t size, struct incise_error *err);
+
+int incise_seal_identity(struct incise_recording *recording, char identity[33],
+			 struct incise_error *err);
+
 /* Whether a recording can have a seal: 0; -ENODATA, -ENOTSUP. */
 int incise_seal_possible(const struct incise_recording *recording,
 			 struct incise_error *err);

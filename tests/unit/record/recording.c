@@ -9,7 +9,7 @@
 #include <fcntl.h>
 #include <limits.h>
 #include <stdlib.h>
-#include "../../../lib/record/read/recording.h"
+#include "../../../lib/record/read/rows.h"
 
 #define DB "a.rec/recording.db"
 
@@ -489,7 +489,7 @@ TEST(closing_nothing)
 
 TEST(line_is_read_and_used, IN_FOLDER)
 {
-	struct incise_recording_line line;
+	struct incise_row_times times;
 	struct incise_recording *recording;
 
 	record("a.rec", "sim:clock=simulated", 700 * MS);
@@ -499,20 +499,20 @@ TEST(line_is_read_and_used, IN_FOLDER)
 		   "('tracker', 1, 20, 3000, 7.0, 0), ('tracker', 2, 30, 6000, 6.0, 0)");
 	recording = incise_recording_open("a.rec", &err);
 	assert_non_null(recording);
-	assert_int_equal(incise_recording_line(recording, "tracker", &line, &err), 0);
-	assert_int_equal(line.n, 3);
-	assert_int_equal(incise_recording_time(&line, 15, 77), 2000);
-	assert_int_equal(incise_recording_time(&line, 25, 77), 4500);
-	assert_int_equal(incise_recording_time(&line, 40, 77),
+	assert_int_equal(incise_row_times_open(&times, recording, "tracker", &err), 0);
+	assert_int_equal(times.source->n_knots, 3);
+	assert_int_equal(incise_row_times_line(&times, 15, 77), 2000);
+	assert_int_equal(incise_row_times_line(&times, 25, 77), 4500);
+	assert_int_equal(incise_row_times_line(&times, 40, 77),
 			 9000); /* beyond the last */
-	assert_true(incise_recording_time_sd(&line, 15) == 7);
-	assert_true(incise_recording_time_sd(&line, 29) == 7);
-	incise_recording_line_free(&line);
+	assert_true(incise_row_times_line_sd(&times, 15) == 7);
+	assert_true(incise_row_times_line_sd(&times, 29) == 7);
+	incise_row_times_close(&times);
 	/* what has no line has its own times */
-	assert_int_equal(incise_recording_line(recording, "force", &line, &err), 0);
-	assert_int_equal(line.n, 0);
-	assert_int_equal(incise_recording_time(&line, 15, 77), 77);
-	assert_true(isnan(incise_recording_time_sd(&line, 15)));
+	assert_int_equal(incise_row_times_open(&times, recording, "force", &err), 0);
+	assert_int_equal(times.source->n_knots, 0);
+	assert_int_equal(incise_row_times_line(&times, 15, 77), 77);
+	assert_true(isnan(incise_row_times_line_sd(&times, 15)));
 	incise_recording_close(recording);
 }
 
@@ -549,7 +549,7 @@ TEST(impossible_streams_are_refused, IN_FOLDER)
 
 	record("good.rec", "sim:clock=simulated", 2000 * MS);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_recording_line line;
+		struct incise_row_times times;
 		struct incise_stream streams[INCISE_STREAMS_MAX];
 		struct incise_recording *recording;
 
@@ -568,18 +568,19 @@ TEST(impossible_streams_are_refused, IN_FOLDER)
 		recording = incise_recording_open("a.rec", &err);
 		if (!recording)
 			fail_msg("%s: %s", cases[i].sql, err.text);
-		assert_error(
-			cases[i].knots
-				? incise_recording_line(recording, "tracker", &line, &err)
-				: incise_recording_streams(recording, streams, &err),
-			EINVAL, &err, "a.rec:", cases[i].knots ? "knots" : "streams");
+		assert_error(cases[i].knots
+				     ? incise_row_times_open(&times, recording, "tracker",
+							     &err)
+				     : incise_recording_streams(recording, streams, &err),
+			     EINVAL, &err,
+			     "a.rec:", cases[i].knots ? "knots" : "streams");
 		incise_recording_close(recording);
 	}
 }
 
 TEST(old_recordings_have_none, IN_FOLDER)
 {
-	struct incise_recording_line line;
+	struct incise_row_times times;
 	struct incise_stream streams[INCISE_STREAMS_MAX];
 	struct incise_recording *recording;
 
@@ -588,7 +589,7 @@ TEST(old_recordings_have_none, IN_FOLDER)
 	recording = incise_recording_open("a.rec", &err);
 	succeeds(recording);
 	assert_int_equal(incise_recording_streams(recording, streams, &err), 0);
-	assert_int_equal(incise_recording_line(recording, "tracker", &line, &err), 0);
-	assert_int_equal(line.n, 0);
+	assert_int_equal(incise_row_times_open(&times, recording, "tracker", &err), 0);
+	assert_int_equal(times.source->n_knots, 0);
 	incise_recording_close(recording);
 }
