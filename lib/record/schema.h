@@ -18,13 +18,20 @@
 /* Make the tables in an empty database. Returns an SQLite code. */
 int incise_schema_create(sqlite3 *db);
 
-/*
- * Check that an opened database is a recording of this or an older version with the tables of
- * this library, and find its form. Form 1 has no ledger, streams and frames, and no station and
- * button of the tracker; forms 1 and 2 have no wall time; forms 1 to 3 have no seal, and no digest
- * of a frame; forms 1 to 4 have a row a sample, form 5 blocks of them, and no depth. Returns 0, -EINVAL, or as incise_schema_fail().
- */
-int incise_schema_check(sqlite3 *db, const char *path, int *form,
+/* Find the format of an opened database, 1 to INCISE_SCHEMA_VERSION. Returns 0, -EINVAL, or as incise_schema_fail(). */
+int incise_schema_form(sqlite3 *db, const char *path, int *form,
+		       struct incise_error *err);
+
+struct incise_schema_table {
+	const char *name, *sql;
+};
+
+/* Of today's format; the last has no name. */
+extern const struct incise_schema_table incise_schema_tables[];
+
+/* Check that it has these tables. Returns as incise_schema_form(). */
+int incise_schema_check(sqlite3 *db, const char *path,
+			const struct incise_schema_table *tables,
 			struct incise_error *err);
 
 /* Whether an opened database is that of a joined recording; see read/session.h. */

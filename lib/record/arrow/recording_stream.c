@@ -491,10 +491,6 @@ int incise_recording_stream(struct incise_recording *recording, const char *what
 			"no stream '%s' in a recording; there are: force, tracker, "
 			"depth, frames, events, table",
 			what);
-	if (table && !strcmp(what, "frames") && recording->form < 2)
-		return incise_error_set(err, ENOTSUP,
-					"%s: has an older format, without frames",
-					recording->path);
 	incise_export_options_init(&defaults);
 	made = calloc(1, sizeof(*made));
 	if (!made)

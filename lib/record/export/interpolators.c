@@ -978,10 +978,7 @@ int incise_camera_interpolator_any(struct incise_recording *recording,
 {
 	int64_t seq, t_ns;
 
-	recording = recording->streams[INCISE_LEDGER_CAMERA]->file;
-	return recording->form < 2 ? 0
-				   : incise_source_end(recording, "frames", false, &seq,
-						       &t_ns, NULL, err);
+	return incise_source_end(recording, "frames", false, &seq, &t_ns, NULL, err);
 }
 
 /* Second derivative of the depth at a frame by its neighbours, mm/s²; NAN: not known. */

@@ -158,12 +158,6 @@ static int open_member(struct join *join, const char *path)
 			"%s: is a joined recording; give those in it, for "
 			"example %s",
 			path, recording->session->members[0]->path);
-	if (recording->form < 2)
-		return incise_error_set(
-			join->err, EINVAL,
-			"%s: made by an older incise (format 1), which had "
-			"no ledger and no wall time; it cannot be joined",
-			recording->path);
 	if (!recording->meta.complete && incise_recording_is_written(recording->path))
 		return incise_error_set(join->err, EBUSY,
 					"%s: is being recorded; wait for its end",

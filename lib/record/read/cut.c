@@ -274,7 +274,7 @@ static int take_summary(struct incise_recording *rec, struct incise_recording_in
 	int64_t seq[2], t_ns[2];
 	int rc;
 
-	if (rec->session || rec->form < 5 || !rec->meta.complete || rec->recalibrated)
+	if (rec->session || rec->old || !rec->meta.complete || rec->recalibrated)
 		return 0;
 	if (!(numbers->cuts >= 0 && numbers->cuts < 1e9) ||
 	    isnan(numbers->depth_max_mm) || isnan(numbers->force_max_N))

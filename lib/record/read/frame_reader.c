@@ -44,10 +44,6 @@ struct incise_frame_reader *incise_frame_reader_new(struct incise_recording *rec
 
 	if (!reader)
 		rc = incise_error_set(err, ENOMEM, "%s: out of memory", recording->path);
-	else if (recording->form < 2)
-		rc = incise_error_set(err, ENOTSUP,
-				      "%s: is of an older form, which has no frames",
-				      recording->path);
 	if (!rc) {
 		reader->opened = incise_recording_open(recording->path, err);
 		if (reader->opened) {

@@ -54,7 +54,8 @@ static int open_session(struct incise_recording *rec, const char *choice,
 	return 0;
 }
 
-static struct incise_recording *open_path(const char *path, bool any, bool original,
+static struct incise_recording *open_path(const char *path, bool any,
+					  enum incise_recording_how how,
 					  struct incise_error *err)
 {
 	const char *choice;
@@ -66,7 +67,7 @@ static struct incise_recording *open_path(const char *path, bool any, bool origi
 		incise_error_set(err, ENOMEM, "%s: out of memory", path);
 	if (!rec)
 		return NULL;
-	rc = incise_recording_read(rec, original, err);
+	rc = incise_recording_read(rec, how, err);
 	if (rc == 1)
 		rc = open_session(rec, choice || !any ? choice : "*", err);
 	else if (!rc && choice)
@@ -83,19 +84,25 @@ static struct incise_recording *open_path(const char *path, bool any, bool origi
 
 struct incise_recording *incise_recording_open(const char *path, struct incise_error *err)
 {
-	return open_path(path, false, false, err);
+	return open_path(path, false, INCISE_RECORDING_ACTIVE, err);
 }
 
 struct incise_recording *incise_recording_open_any(const char *path,
 						   struct incise_error *err)
 {
-	return open_path(path, true, false, err);
+	return open_path(path, true, INCISE_RECORDING_ACTIVE, err);
 }
 
 struct incise_recording *incise_recording_open_original(const char *path,
 							struct incise_error *err)
 {
-	return open_path(path, true, true, err);
+	return open_path(path, true, INCISE_RECORDING_ORIGINAL, err);
+}
+
+struct incise_recording *incise_recording_open_older(const char *path,
+						     struct incise_error *err)
+{
+	return open_path(path, true, INCISE_RECORDING_OLDER, err);
 }
 
 const char *incise_recording_name(const struct incise_recording *rec)

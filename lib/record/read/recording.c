@@ -11,6 +11,7 @@
 #include "database.h"
 #include "recalibration.h"
 #include "recording.h"
+#include "../old/old.h"
 #include "../schema.h"
 
 #define COUNT_MAX (1LL << 53)
@@ -286,8 +287,6 @@ static int read_table(struct incise_recording *rec, struct incise_error *err)
 	sqlite3_stmt *stmt;
 	int n = 0, rc;
 
-	if (rec->form < 2)
-		return 0;
 	if (sqlite3_prepare_v2(
 		    rec->db,
 		    "SELECT name, device, stamped, nominal_hz, delay_ns, delay_sd_ns, "
@@ -410,7 +409,7 @@ int incise_stream_resolve(struct incise_stream_source *source, struct incise_err
 {
 	struct incise_recording *rec = source->file;
 	const char *name = incise_ledger_forms[source->stream].stream;
-	int rc = 0;
+	int rc;
 
 	if (source->known)
 		return 0;
@@ -418,9 +417,8 @@ int incise_stream_resolve(struct incise_stream_source *source, struct incise_err
 		rec->n_table = read_table(rec, err);
 	if (rec->n_table < 0)
 		return rec->n_table;
-	if (rec->form >= 2)
-		rc = read_knots(source, name, err);
-	/* For recordings without a table of streams. */
+	rc = read_knots(source, name, err);
+	/* For a stream that is not in the table. */
 	source->delay_ns = source->stream == INCISE_LEDGER_TRACKER
 				   ? rec->numbers.tracker_latency_ns
 				   : NAN;
@@ -487,7 +485,7 @@ struct incise_recording *incise_recording_new(char *folder)
 	return rec;
 }
 
-int incise_recording_read(struct incise_recording *rec, bool original,
+int incise_recording_read(struct incise_recording *rec, enum incise_recording_how how,
 			  struct incise_error *err)
 {
 	int rc = incise_database_open(rec->path, &rec->db, err);
@@ -499,10 +497,15 @@ int incise_recording_read(struct incise_recording *rec, bool original,
 	if (!rc && incise_schema_is_joined(rec->db))
 		return 1;
 	if (!rc)
-		rc = incise_schema_check(rec->db, rec->path, &rec->form, err);
+		rc = incise_schema_form(rec->db, rec->path, &rec->form, err);
+	if (!rc)
+		rc = rec->form == INCISE_SCHEMA_VERSION
+			     ? incise_schema_check(rec->db, rec->path,
+						   incise_schema_tables, err)
+			     : incise_old_adopt(rec, how == INCISE_RECORDING_OLDER, err);
 	if (!rc)
 		rc = read_meta(rec, err);
-	if (!rc && !original)
+	if (!rc && how == INCISE_RECORDING_ACTIVE)
 		rc = incise_recalibration_apply(rec, err);
 	if (!rc && rec->recalibrated)
 		rc = read_meta(rec, err);

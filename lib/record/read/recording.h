@@ -4,8 +4,9 @@
  *
  *     database.c        the file of SQLite; of one that is being written, a copy
  *     recalibration.c   the active calibration
- *     recording.c       one recording, and its streams, found once
  *     source.c          batches of a stream
+ *     ../old/           those of an older format
+ *     recording.c       one recording, and its streams, found once
  *     others.c          rows of the tracker that are not on its line
  *     rows.c            rows, and their best times
  *     session.c         recordings of several machines as one
@@ -20,6 +21,7 @@
 #include "../ledger.h"
 #include "../time/timeline.h"
 
+struct incise_old;
 struct incise_recalibrated;
 struct incise_session;
 struct incise_session_map;
@@ -50,11 +52,18 @@ struct incise_recording_numbers {
 	double cuts, depth_max_mm, force_max_N; /* the recorder's summary */
 };
 
+enum incise_recording_how {
+	INCISE_RECORDING_ACTIVE,   /* by the active calibration */
+	INCISE_RECORDING_ORIGINAL, /* by that of its capture */
+	INCISE_RECORDING_OLDER,	   /* the same, of a format too that is only converted */
+};
+
 struct incise_recording {
 	sqlite3 *db; /* read-only, in one transaction: a snapshot, even of a live one */
 	char *path;  /* of the folder that was opened */
 	char *name;  /* "liver" of dir/liver.rec and of dir/liver.rec.part */
-	int form;    /* of its tables, see schema.h */
+	int form;    /* of its tables; lib/record/old/ alone tells older ones apart */
+	const struct incise_old *old;	   /* of an older format; NULL: of today's */
 	struct incise_recording_info meta; /* the part that is in table meta */
 	struct incise_recording_numbers numbers;
 	/* Its own streams; those of a joined recording are of its members. */
@@ -75,12 +84,9 @@ struct incise_recording {
 /* One whose folder this is, without anything read; NULL: no memory. */
 struct incise_recording *incise_recording_new(char *folder);
 
-/*
- * Read it; @original: by the calibration of its capture. Returns 0; 1: its database is that of a joined one, and
- * open; -errno.
- */
-int incise_recording_read(struct incise_recording *recording, bool original,
-			  struct incise_error *err);
+/* Read it. Returns 0; 1: its database is that of a joined one, and open; -errno. */
+int incise_recording_read(struct incise_recording *recording,
+			  enum incise_recording_how how, struct incise_error *err);
 
 /* NULL is accepted. */
 void incise_recording_free(struct incise_recording *recording);
@@ -91,7 +97,7 @@ void incise_recording_free(struct incise_recording *recording);
  */
 int incise_stream_resolve(struct incise_stream_source *source, struct incise_error *err);
 
-/* Table streams, by the active calibration; form 1 has none. Returns their number, -EINVAL (an impossible row). */
+/* Table streams, by the active calibration. Returns their number, -EINVAL (an impossible row). */
 int incise_recording_streams(struct incise_recording *recording,
 			     struct incise_stream streams[INCISE_STREAMS_MAX],
 			     struct incise_error *err);
@@ -124,6 +130,10 @@ struct incise_recording *incise_recording_open_any(const char *path,
 /* The same, as it was recorded: by the calibration of its capture. Members of a session are not. */
 struct incise_recording *incise_recording_open_original(const char *path,
 							struct incise_error *err);
+
+/* The same, of any format. */
+struct incise_recording *incise_recording_open_older(const char *path,
+						     struct incise_error *err);
 
 /*
  * Convert the recording in a folder, which is a copy, to today's format, if it has an older one; @path is that

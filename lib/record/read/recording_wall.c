@@ -84,20 +84,17 @@ struct incise_wall *incise_recording_wall(struct incise_recording *rec,
 {
 	struct incise_wall_point *points = NULL;
 	struct incise_wall *wall = NULL;
-	struct incise_recording *file;
-	size_t n = 0;
-	int rc = 0;
-
 	/* A session's clock is that of its first member. */
-	file = rec->streams[INCISE_LEDGER_WALL]->file;
-	if (file->form >= 3)
-		rc = read_points(file, &points, &n, err);
+	struct incise_recording *file = rec->streams[INCISE_LEDGER_WALL]->file;
+	size_t n = 0;
+	int rc = read_points(file, &points, &n, err);
+
 	if (!rc && !n)
 		rc = incise_error_set(
-			err, ENODATA, "%s: has no wall time: %s", file->path,
-			file->form < 3 ? "it was made by an older incise"
-				       : "its clock was simulated, or it was recorded "
-					 "without a clock source");
+			err, ENODATA,
+			"%s: has no wall time: its clock was simulated, or it was "
+			"recorded without a clock source",
+			file->path);
 	if (!rc) {
 		wall = incise_wall_new(points, n);
 		if (!wall)

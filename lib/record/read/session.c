@@ -10,6 +10,7 @@
 #include <incise/seal.h>
 #include "../../base/crc32c.h"
 #include "../ledger.h"
+#include "../old/old.h"
 #include "../schema.h"
 #include "database.h"
 #include "rows.h"
@@ -32,45 +33,17 @@ const char *const incise_session_tables[] = {
 
 /* --- identity ------------------------------------------------------------------------ */
 
-/* From form 5 on it is the last head of the seal, which follows from all. */
-static char *identity_by_seal(struct incise_recording *recording)
+char *incise_session_identity(struct incise_recording *recording)
 {
 	struct incise_seal_head head;
 	char identity[33], *text;
 
+	if (recording->old)
+		return recording->old->identity(recording);
 	if (incise_seal_head(recording, identity, &head, NULL) ||
 	    asprintf(&text, "%s:%lld:%s", identity, (long long)head.commit, head.head) <
 		    0)
 		return NULL;
-	return text;
-}
-
-char *incise_session_identity(struct incise_recording *recording)
-{
-	sqlite3_stmt *stmt = NULL;
-	char *text = NULL, *more;
-
-	if (recording->form >= 5)
-		return identity_by_seal(recording);
-
-	if (sqlite3_prepare_v2(recording->db,
-			       "SELECT stream, block, count, crc FROM ledger AS a WHERE "
-			       "block = (SELECT max(block) FROM ledger AS b WHERE "
-			       "b.stream = a.stream) ORDER BY stream",
-			       -1, &stmt, NULL) != SQLITE_OK)
-		return NULL;
-	while (sqlite3_step(stmt) == SQLITE_ROW) {
-		if (asprintf(&more, "%s%s%.40s:%lld:%lld:%08llx", text ? text : "",
-			     text ? " " : "", (const char *)sqlite3_column_text(stmt, 0),
-			     sqlite3_column_int64(stmt, 1), sqlite3_column_int64(stmt, 2),
-			     (unsigned long long)sqlite3_column_int64(stmt, 3)) < 0)
-			more = NULL;
-		free(text);
-		text = more;
-		if (!text || strlen(text) > 4000)
-			break;
-	}
-	sqlite3_finalize(stmt);
 	return text;
 }
 
@@ -213,11 +186,10 @@ static int open_member(struct incise_session *session, const char *folder,
 						folder, name)
 			     : incise_error_set(err, ENOMEM, "%s: out of memory", folder);
 	if (!rc)
-		rc = incise_recording_read(session->members[at], false, err);
+		rc = incise_recording_read(session->members[at], INCISE_RECORDING_ACTIVE,
+					   err);
 	if (rc == 1)
 		rc = damaged(folder, "a member is a joined recording itself", err);
-	if (!rc && session->members[at]->form < 2)
-		rc = damaged(folder, "a member has no ledger", err);
 	if (!rc) {
 		identity = incise_session_identity(session->members[at]);
 		if (!identity || strcmp(identity, ledger))
@@ -663,7 +635,6 @@ int incise_session_open(struct incise_recording *rec, const char *folder,
 		rc = merge_events(rec, strchr(choice, '*') != NULL, err);
 	if (rc)
 		return rc;
-	rec->form = session->members[0]->form;
 	for (int i = 0; i < INCISE_STREAMS_MAX; i++)
 		rec->streams[i] = &session->members[session->of[i]]->own[i];
 	rec->streams[INCISE_LEDGER_WALL] = &session->members[0]->own[INCISE_LEDGER_WALL];

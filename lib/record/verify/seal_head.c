@@ -63,11 +63,6 @@ int incise_seal_possible(const struct incise_recording *recording,
 					"%.*s: is a joined recording; each of its "
 					"members has its own seal: give one, %.*s/NAME",
 					n, recording->path, n, recording->path);
-	if (recording->form < 4)
-		return incise_error_set(
-			err, ENODATA,
-			"%s: made by an older incise (format %d), it has no seal",
-			recording->path, recording->form);
 	return 0;
 }
 

@@ -85,8 +85,7 @@ static void take_commit(struct incise_seal_statement *statement,
 }
 
 int incise_statement_make(struct incise_seal_statement *statement,
-			  struct incise_recording *recording,
-			  const struct incise_seal_digests *known, int64_t upto,
+			  struct incise_recording *recording, bool known, int64_t upto,
 			  int (*step)(void *user, struct incise_seal_walk *walk),
 			  void *user, struct incise_error *err)
 {
@@ -159,7 +158,7 @@ static size_t make_text(struct incise_recording *recording,
 	size_t n = 0;
 
 	if (!rc)
-		rc = incise_statement_make(&statement, recording, NULL, -1, check_step,
+		rc = incise_statement_make(&statement, recording, false, -1, check_step,
 					   &good, err);
 	if (!rc && !good)
 		rc = incise_error_set(err, EBADMSG,

@@ -18,21 +18,8 @@ static int fail(struct incise_seal_walk *walk, struct incise_error *err)
 	return incise_schema_fail(walk->recording->db, walk->recording->path, err);
 }
 
-static int next_row(struct incise_seal_walk *walk, struct incise_seal_walk_stream *stream,
-		    struct incise_error *err)
-{
-	int rc = sqlite3_step(stream->rows);
-
-	stream->has_row = rc == SQLITE_ROW;
-	if (stream->has_row)
-		stream->good_row =
-			incise_ledger_row_read(&stream->row, stream->form, stream->rows);
-	return stream->has_row || rc == SQLITE_DONE ? 0 : fail(walk, err);
-}
-
 int incise_seal_walk_open(struct incise_seal_walk *walk,
-			  struct incise_recording *recording,
-			  const struct incise_seal_digests *known,
+			  struct incise_recording *recording, bool known,
 			  struct incise_error *err)
 {
 	sqlite3 *db = recording->db;
@@ -40,7 +27,8 @@ int incise_seal_walk_open(struct incise_seal_walk *walk,
 
 	*walk = (struct incise_seal_walk){
 		.recording = recording, .known = known, .last = -1};
-	rc = incise_seal_init(&walk->seal, recording->form);
+	rc = incise_seal_init(&walk->seal);
+	walk->seal.old = recording->old;
 	if (rc)
 		return incise_error_set(err, -rc, "%s: libcrypto gives no SHA-256",
 					recording->path);
@@ -64,22 +52,15 @@ int incise_seal_walk_open(struct incise_seal_walk *walk,
 		return fail(walk, err);
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++) {
 		struct incise_seal_walk_stream *stream = &walk->streams[i];
-		char sql[300];
 
-		stream->form = incise_ledger_form(i, recording->form);
-		rc = incise_ledger_select(db, recording->form, stream->form->stream,
-					  INT64_MIN, false, &stream->blocks);
+		rc = incise_ledger_select(db, incise_ledger_forms[i].stream, INT64_MIN,
+					  false, &stream->blocks);
+		if (rc == SQLITE_OK && recording->old)
+			rc = incise_old_rows_open(&stream->rows, recording, i);
+		if (rc == SQLITE_OK && recording->old)
+			rc = incise_old_rows_next(&stream->rows);
 		if (rc != SQLITE_OK)
 			return fail(walk, err);
-		if (recording->form >= 5)
-			continue;
-		snprintf(sql, sizeof(sql), "SELECT %s FROM %s ORDER BY seq",
-			 stream->form->columns, stream->form->table);
-		if (sqlite3_prepare_v2(db, sql, -1, &stream->rows, NULL) != SQLITE_OK)
-			return fail(walk, err);
-		rc = known ? 0 : next_row(walk, stream, err);
-		if (rc)
-			return rc;
 	}
 	return 0;
 }
@@ -87,14 +68,14 @@ int incise_seal_walk_open(struct incise_seal_walk *walk,
 void incise_seal_walk_close(struct incise_seal_walk *walk)
 {
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++) {
-		sqlite3_finalize(walk->streams[i].rows);
+		incise_old_rows_close(&walk->streams[i].rows);
 		sqlite3_finalize(walk->streams[i].blocks);
 	}
 	sqlite3_finalize(walk->commits);
 	incise_seal_free(&walk->seal);
 }
 
-/* A block of form 5: its data have the digest that it names, which a verification has seen. */
+/* A block of today's format: its data have the digest that it names, which a verification has seen. */
 static void take_data(struct incise_seal_walk *walk, int i,
 		      const struct incise_ledger_block *block)
 {
@@ -119,6 +100,7 @@ static int take_block(struct incise_seal_walk *walk, int i, struct incise_error 
 {
 	struct incise_seal_walk_stream *stream = &walk->streams[i];
 	struct incise_ledger_block block;
+	uint8_t digest[INCISE_SEAL_BYTES];
 	int64_t rows = 0;
 	int rc = sqlite3_step(stream->blocks);
 
@@ -128,28 +110,19 @@ static int take_block(struct incise_seal_walk *walk, int i, struct incise_error 
 	if (rc != SQLITE_ROW)
 		return fail(walk, err);
 	walk->good &= incise_ledger_block_read(&block, stream->blocks);
-	if (walk->recording->form >= 5) {
+	if (!walk->recording->old) {
 		take_data(walk, i, &block);
 		return 0;
 	}
-	if (walk->known) {
-		const struct incise_seal_digests *known = &walk->known[i];
-		const uint8_t none[INCISE_SEAL_BYTES] = {0};
-		size_t at = walk->seal.blocks[i];
-
-		incise_seal_rows_block(&walk->seal, i, &block,
-				       at < known->n ? known->digests[at] : none);
-		walk->seal.n_rows[i] += block.count;
-		return 0;
-	}
-	for (rc = 0; !rc && stream->has_row && stream->row.seq <= block.last_seq;
-	     rc = next_row(walk, stream, err), rows++) {
-		walk->good &= stream->good_row;
-		incise_seal_row(&walk->seal, i, &stream->row);
+	for (rc = SQLITE_OK; rc == SQLITE_OK && stream->rows.has_row &&
+			     stream->rows.seq <= block.last_seq;
+	     rc = incise_old_rows_next(&stream->rows), rows++) {
+		walk->good &= stream->rows.good;
+		incise_seal_row(&walk->seal, i, stream->rows.bytes, stream->rows.n);
 	}
 	walk->good &= rows == block.count;
-	incise_seal_block(&walk->seal, i, &block);
-	return rc;
+	incise_seal_block(&walk->seal, i, &block, digest);
+	return rc == SQLITE_OK ? 0 : fail(walk, err);
 }
 
 /* The length of camera.mkv as the ledger has it. */
@@ -158,9 +131,8 @@ static int64_t length_of(struct incise_seal_walk *walk)
 	struct incise_ledger_block block = {0};
 	sqlite3_stmt *stmt = NULL;
 
-	if (incise_ledger_select(walk->recording->db, walk->recording->form,
-				 INCISE_LEDGER_FILE, INT64_MIN, false,
-				 &stmt) == SQLITE_OK &&
+	if (incise_ledger_select(walk->recording->db, INCISE_LEDGER_FILE, INT64_MIN,
+				 false, &stmt) == SQLITE_OK &&
 	    sqlite3_step(stmt) == SQLITE_ROW)
 		incise_ledger_block_read(&block, stmt);
 	sqlite3_finalize(stmt);
@@ -239,13 +211,14 @@ uint64_t incise_seal_walk_behind(struct incise_seal_walk *walk, bool *blocks)
 		struct incise_seal_walk_stream *stream = &walk->streams[i];
 		struct incise_ledger_block block;
 
-		while (sqlite3_step(stream->blocks) == SQLITE_ROW) {
+		while (!stream->ended && sqlite3_step(stream->blocks) == SQLITE_ROW) {
 			*blocks = true;
-			if ((walk->known || walk->recording->form >= 5) &&
+			if (!walk->recording->old &&
 			    incise_ledger_block_read(&block, stream->blocks))
 				rows += block.count;
 		}
-		while (stream->has_row && !next_row(walk, stream, NULL))
+		while (stream->rows.has_row &&
+		       incise_old_rows_next(&stream->rows) == SQLITE_OK)
 			rows++;
 	}
 	return rows;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
  * The seal of a recording recomputed from its rows, commit by commit; or from the digests of its
- * blocks, where another has read all rows. Memory does not grow with the recording, but for 32
- * bytes of such a digest, and a commit that does not agree does not affect those after it.
+ * blocks, where another has read all rows. Memory does not grow with the recording, and a commit that does
+ * not agree does not affect those after it.
  *
  *     rows of 4 streams ─┐
  *     their ledgers ─────┼─► a commit ─► head, compared with that of table seal
@@ -12,22 +12,14 @@
 #define INCISE_SEAL_WALK_H
 
 #include <incise/seal.h>
-#include "../read/recording.h"
+#include "../old/old.h"
 #include "../seal_chain.h"
 #include "../statement.h"
 
-/* Of the blocks of one stream, in order. */
-struct incise_seal_digests {
-	size_t n, capacity;
-	uint8_t (*digests)[INCISE_SEAL_BYTES];
-};
-
 struct incise_seal_walk_stream {
-	sqlite3_stmt *rows, *blocks;
-	const struct incise_ledger_form *form;
-	struct incise_ledger_row row; /* next, where has_row */
-	bool has_row, good_row;
-	bool ended; /* no block is left */
+	sqlite3_stmt *blocks;
+	struct incise_old_rows rows; /* of format 4: at the next one */
+	bool ended;		     /* no block is left */
 };
 
 struct incise_seal_walk {
@@ -35,7 +27,7 @@ struct incise_seal_walk {
 	struct incise_seal seal; /* after the commit */
 	sqlite3_stmt *commits;
 	struct incise_seal_walk_stream streams[INCISE_LEDGER_FORMS];
-	const struct incise_seal_digests *known; /* of each stream; NULL: read the rows */
+	bool known;   /* blocks have the digests that they name */
 	int64_t last; /* number of the last commit; -1: there is none */
 	/* The commit. */
 	int64_t number, t_ns;
@@ -43,12 +35,11 @@ struct incise_seal_walk {
 };
 
 /*
- * @known: the digests of all blocks of each stream, which agree with the ledger, or NULL. Returns
- * 0, -EINVAL, -EIO, -ENOMEM; for a recording of form 4 or later. Close it in any case.
+ * @known: a verification has seen that blocks have the digests that they name. Returns 0, -EINVAL, -EIO, -ENOMEM.
+ * Close it in any case.
  */
 int incise_seal_walk_open(struct incise_seal_walk *walk,
-			  struct incise_recording *recording,
-			  const struct incise_seal_digests *known,
+			  struct incise_recording *recording, bool known,
 			  struct incise_error *err);
 
 /* Go to the next commit: 1; 0 at the end; as incise_seal_walk_open(). */
@@ -65,8 +56,7 @@ void incise_seal_walk_close(struct incise_seal_walk *walk);
  * before @upto has fewer heads: those behind have an empty text.
  */
 int incise_statement_make(struct incise_seal_statement *statement,
-			  struct incise_recording *recording,
-			  const struct incise_seal_digests *known, int64_t upto,
+			  struct incise_recording *recording, bool known, int64_t upto,
 			  int (*step)(void *user, struct incise_seal_walk *walk),
 			  void *user, struct incise_error *err);
 
@@ -80,7 +70,7 @@ int incise_seal_key(struct incise_recording *recording, const char *key, char *t
 int incise_seal_identity(struct incise_recording *recording, char identity[33],
 			 struct incise_error *err);
 
-/* Whether a recording can have a seal: 0; -ENODATA, -ENOTSUP. */
+/* Whether a recording can have a seal: 0; -ENOTSUP. */
 int incise_seal_possible(const struct incise_recording *recording,
 			 struct incise_error *err);
 

@@ -12,14 +12,10 @@
 #include <unistd.h>
 #include "../frames.h"
 #include "../schema.h"
+#include "../old/old.h"
 #include "../read/session.h"
+#include "seal_walk.h"
 #include "verify.h"
-
-/* The table of the streams' entries. */
-static const char *entries(const struct incise_verification *verify)
-{
-	return verify->recording->form >= 5 ? "blocks" : "ledger";
-}
 
 /* One integer by SQL; @otherwise if it is NULL or cannot be read. */
 INCISE_PRINTF(3, 4)
@@ -106,18 +102,6 @@ static void check_length(struct incise_verification *verify)
 				    (long long)bytes);
 }
 
-/* Table depth of an interrupted recording; a closed one has a seal of it. */
-static void check_depth(struct incise_verification *verify)
-{
-	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_COUNT);
-	uint64_t rows = ask(verify, -1, "SELECT count(*) FROM depth");
-
-	found.count = verify->recording->meta.depth;
-	if (rows != found.count)
-		incise_verify_found(verify, &found, "table depth has %lld rows of %llu",
-				    (long long)rows, (unsigned long long)found.count);
-}
-
 /* An entry with an unknown name would pass as verified. */
 #define RIG_NAMES \
 	"SELECT 'force' AS name UNION ALL SELECT 'tracker' UNION ALL SELECT 'camera'"
@@ -131,10 +115,7 @@ static void check_names(struct incise_verification *verify)
 
 	const char *seals = verify->report->interrupted ? "" : SEALS;
 	const char *unknown =
-		verify->recording->form < 5
-			? "SELECT count(*) FROM ledger WHERE stream NOT IN (" STREAMS
-			  "%s)"
-		: verify->level == INCISE_VERIFY_TABLES
+		verify->level == INCISE_VERIFY_TABLES
 			? "SELECT count(*) FROM ledger WHERE stream NOT IN (''%s)"
 			: "SELECT (SELECT count(*) FROM blocks WHERE stream NOT IN "
 			  "(" STREAMS ")) + (SELECT count(*) FROM ledger WHERE stream "
@@ -146,22 +127,21 @@ static void check_names(struct incise_verification *verify)
 }
 
 /* Of a stream's first or last entry with rows: entries follow one another, and all would be long to read. */
-#define END(field, table, order)                                              \
-	"(SELECT " field " FROM " table " WHERE stream = name AND count > 0 " \
+#define END(field, order)                                                  \
+	"(SELECT " field " FROM blocks WHERE stream = name AND count > 0 " \
 	"ORDER BY block " order " LIMIT 1)"
-#define ENDED(table)                                 \
-	"SELECT name, ended, " END("last_ns", table, \
-				   "DESC") " FROM streams WHERE ended IS NOT NULL"
 
 /* The number of samples that a dead device would still have sent is not known. */
 static void report_ends(struct incise_verification *verify)
 {
 	sqlite3_stmt *stmt;
 
-	if (sqlite3_prepare_v2(verify->recording->db,
-			       verify->recording->form >= 5 ? ENDED("blocks")
-							    : ENDED("ledger"),
-			       -1, &stmt, NULL) != SQLITE_OK)
+	if (sqlite3_prepare_v2(
+		    verify->recording->db,
+		    "SELECT name, ended, " END("last_ns",
+					       "DESC") " FROM "
+						       "streams WHERE ended IS NOT NULL",
+		    -1, &stmt, NULL) != SQLITE_OK)
 		return; /* reported with the pages and seals */
 	while (sqlite3_step(stmt) == SQLITE_ROW) {
 		struct incise_verify_finding found =
@@ -211,8 +191,7 @@ static void report_interruption(struct incise_verification *verify)
 		return;
 	found.last_ns =
 		ask(verify, -1,
-		    "SELECT max(" END("last_ns", "%s", "DESC") ") FROM (" RIG_NAMES ")",
-		    entries(verify));
+		    "SELECT max(" END("last_ns", "DESC") ") FROM (" RIG_NAMES ")");
 	if (found.last_ns < 0)
 		incise_verify_found(verify, &found,
 				    "interrupted, or being written: no row yet");
@@ -235,8 +214,8 @@ static int read_entry(struct incise_verification *verify, const char *stream,
 	int n = 0, rc;
 
 	*entry = (struct incise_ledger_block){0};
-	if (incise_ledger_select(verify->recording->db, verify->recording->form, stream,
-				 INT64_MIN, false, &stmt) != SQLITE_OK)
+	if (incise_ledger_select(verify->recording->db, stream, INT64_MIN, false,
+				 &stmt) != SQLITE_OK)
 		return -1;
 	while ((rc = sqlite3_step(stmt)) == SQLITE_ROW && n++ == 0)
 		if (!incise_ledger_block_read(entry, stmt))
@@ -321,8 +300,8 @@ static int check_seals(struct incise_verification *verify)
 {
 	int rc = 0;
 
-	/* From form 5 on there is no table depth, the first of them. */
-	for (int i = verify->recording->form >= 5; incise_ledger_sealed[i] && !rc; i++) {
+	/* Today's format has no table depth, the first of them. */
+	for (int i = !verify->recording->old; incise_ledger_sealed[i] && !rc; i++) {
 		const char *table = incise_ledger_sealed[i];
 		struct incise_ledger_block made;
 		char stream[40], what[40];
@@ -345,15 +324,14 @@ static int check_seals(struct incise_verification *verify)
 /* Whether there is any trace of a stream, which may have no row: others may have been removed. */
 static bool recorded(struct incise_verification *verify, int stream, const char *key)
 {
-	const struct incise_ledger_form *form =
-		incise_ledger_form(stream, verify->recording->form);
+	const struct incise_ledger_form *form = &incise_ledger_forms[stream];
 
 	return ask(verify, 1,
-		   "SELECT EXISTS(SELECT 1 FROM %s WHERE stream = '%s') OR "
+		   "SELECT EXISTS(SELECT 1 FROM blocks WHERE stream = '%s') OR "
 		   "EXISTS(SELECT 1 FROM streams WHERE name = '%s') OR EXISTS(SELECT 1 "
 		   "FROM meta WHERE key = '%s' AND value > 0)",
-		   entries(verify), form->stream, form->stream, key) ||
-	       (verify->recording->form < 5 &&
+		   form->stream, form->stream, key) ||
+	       (verify->recording->old &&
 		ask(verify, 1, "SELECT EXISTS(SELECT 1 FROM %s)", form->table));
 }
 
@@ -368,8 +346,7 @@ static int check_wall(struct incise_verification *verify)
 {
 	struct incise_verify_stream rows = {0};
 
-	if (verify->recording->form < 3 ||
-	    !recorded(verify, INCISE_LEDGER_WALL, "wall_rows"))
+	if (!recorded(verify, INCISE_LEDGER_WALL, "wall_rows"))
 		return 0;
 	return incise_verify_stream(verify, INCISE_LEDGER_WALL,
 				    count_of(verify, "wall_rows"), 0, &rows);
@@ -393,10 +370,8 @@ static int check_streams(struct incise_verification *verify)
 	verify->rows = meta->force + meta->tracker;
 	if (verify->camera) {
 		verify->frames = ask(verify, 0,
-				     verify->recording->form >= 5
-					     ? "SELECT sum(count) FROM blocks WHERE "
-					       "stream = 'camera'"
-					     : "SELECT count(*) FROM frames");
+				     "SELECT sum(count) FROM blocks WHERE stream = "
+				     "'camera'");
 		verify->rows += verify->frames * INCISE_VERIFY_FRAME_ROWS;
 	}
 	for (int i = 0; i < INCISE_LEDGER_STREAMS && !rc; i++) {
@@ -415,44 +390,36 @@ static int check_streams(struct incise_verification *verify)
 	return rc;
 }
 
-static int verify_one(const char *path, const struct incise_verify_watch *watch,
-		      enum incise_verify_level level,
-		      const struct incise_seal_statement *statement,
-		      struct incise_verify_report *report, struct incise_error *err)
+int incise_verify_recording(struct incise_recording *recording,
+			    const struct incise_verify_watch *watch,
+			    enum incise_verify_level level,
+			    const struct incise_seal_statement *statement,
+			    struct incise_verify_report *report, struct incise_error *err)
 {
-	struct incise_verification verify = {
-		.watch = watch, .report = report, .level = level, .statement = statement};
+	struct incise_verification verify = {.recording = recording,
+					     .watch = watch,
+					     .report = report,
+					     .level = level,
+					     .statement = statement};
+	const bool old = recording->old, sealed = !old || incise_old_is_sealed(recording);
 	bool altered;
-	int rc;
+	int rc = 0;
 
-	*report = (struct incise_verify_report){0};
-	verify.recording = incise_recording_open_original(path, err);
-	if (!verify.recording)
-		return -errno;
-	if (verify.recording->form < 2) {
-		rc = incise_error_set(
-			err, ENODATA,
-			"%s: made by an older incise (format %d) without a ledger, so "
-			"it cannot be verified; `incise info` reads it",
-			path, verify.recording->form);
-		goto out;
-	}
-	report->interrupted = !verify.recording->meta.complete;
-	verify.hashed = verify.recording->form >= 4 &&
-			!incise_seal_init(&verify.rows_seal, verify.recording->form);
+	*report = (struct incise_verify_report){.interrupted = !recording->meta.complete};
+	verify.hashed = !old && !incise_seal_init(&verify.rows_seal);
 	/* Where no sample is read the recorder's summary has to be enough. */
-	if (verify.recording->form < 5 || report->interrupted)
-		level = verify.level =
-			level == INCISE_VERIFY_TABLES ? INCISE_VERIFY_ROWS : level;
-	if (level != INCISE_VERIFY_TABLES)
-		verify.origin_ns = ask(&verify, 0,
-				       "SELECT min(" END("first_ns", "%s",
-							 "ASC") ") FROM (" RIG_NAMES ")",
-				       entries(&verify));
-	rc = level == INCISE_VERIFY_TABLES ? 0 : check_streams(&verify);
+	if ((old || report->interrupted) && level == INCISE_VERIFY_TABLES)
+		level = verify.level = INCISE_VERIFY_ROWS;
+	if (level != INCISE_VERIFY_TABLES) {
+		verify.origin_ns =
+			ask(&verify, 0,
+			    "SELECT min(" END("first_ns", "ASC") ") FROM "
+								 "(" RIG_NAMES ")");
+		rc = check_streams(&verify);
+	}
 	if (!rc) {
-		if (report->interrupted && verify.recording->form < 5)
-			check_depth(&verify);
+		if (old && report->interrupted)
+			incise_old_verify_depth(&verify);
 		check_names(&verify);
 		altered = verify.altered;
 		verify.altered = false;
@@ -461,16 +428,16 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 		verify.tables_altered = verify.altered;
 		verify.altered |= altered;
 	}
-	if (!rc && verify.recording->form >= 4 && level != INCISE_VERIFY_TABLES)
+	if (!rc && sealed && level != INCISE_VERIFY_TABLES)
 		rc = incise_verify_seal(&verify);
 	if (!rc && level == INCISE_VERIFY_ALL) {
 		rc = check_pages(&verify);
 		check_length(&verify);
 	}
-	if (rc) {
-		rc = incise_error_set(err, ECANCELED, "%s: stopped; not verified", path);
-		goto out;
-	}
+	incise_seal_free(&verify.rows_seal);
+	if (rc)
+		return incise_error_set(err, ECANCELED, "%s: stopped; not verified",
+					recording->path);
 	/* Of altered rows nothing follows. */
 	if (!verify.altered && level != INCISE_VERIFY_TABLES)
 		incise_verify_times(&verify);
@@ -479,11 +446,21 @@ static int verify_one(const char *path, const struct incise_verify_watch *watch,
 	report_interruption(&verify);
 	report->complete = !report->findings;
 	report->intact = !verify.altered;
-out:
-	for (int i = 0; i < INCISE_LEDGER_FORMS; i++)
-		free(verify.digests[i].digests);
-	incise_seal_free(&verify.rows_seal);
-	incise_recording_close(verify.recording);
+	return 0;
+}
+
+static int verify_one(const char *path, const struct incise_verify_watch *watch,
+		      enum incise_verify_level level,
+		      const struct incise_seal_statement *statement,
+		      struct incise_verify_report *report, struct incise_error *err)
+{
+	struct incise_recording *recording = incise_recording_open_original(path, err);
+	int rc;
+
+	if (!recording)
+		return -errno;
+	rc = incise_verify_recording(recording, watch, level, statement, report, err);
+	incise_recording_close(recording);
 	return rc;
 }
 
@@ -593,13 +570,10 @@ static int verify_it(const char *path, const struct incise_verify_watch *watch,
 		return -errno;
 	rc = recording->session
 		     ? verify_members(recording->session, watch, level, report, err)
-		     : 0;
-	if (recording->session) {
-		incise_recording_close(recording);
-		return rc;
-	}
+		     : incise_verify_recording(recording, watch, level, NULL, report,
+					       err);
 	incise_recording_close(recording);
-	return verify_one(path, watch, level, NULL, report, err);
+	return rc;
 }
 
 int incise_verify(const char *path, const struct incise_verify_watch *watch,
@@ -632,13 +606,6 @@ int incise_seal_compare(const char *path, const char *text, size_t length,
 	if (!recording)
 		return -errno;
 	rc = incise_seal_possible(recording, err);
-	/* Forms before 4 have no statements: another form is a forgery, or a mistake. */
-	if (rc == -ENODATA)
-		rc = incise_error_set(err, ENODATA,
-				      "%s: has format %d, which has no seal: it is not "
-				      "the recording of the statement, or its seal was "
-				      "removed",
-				      recording->path, recording->form);
 	incise_recording_close(recording);
 	if (!rc)
 		rc = incise_seal_read(&statement, text, length, err);

@@ -3,10 +3,11 @@
  * Inside a verification; for lib/record/verify/ only. Each file calls only those below it.
  *
  *     verify.c          the recording as a whole: seals, pages, counts, the report
- *     verify_stream.c   one stream: its rows compared with its ledger
+ *     verify_stream.c   one stream: its data compared with its blocks
  *     verify_camera.c   the camera's file compared with its rows
  *     verify_seal.c     the chain of its commits, and a statement
  *     verify_times.c    the tracker's times compared with its arrivals
+ *     verify_walk.c     findings of a stream
  *     verify_finding.c  findings and progress
  */
 #ifndef INCISE_VERIFY_PRIVATE_H
@@ -16,10 +17,16 @@
 #include <incise/verify.h>
 #include "../ledger.h"
 #include "../read/recording.h"
-#include "seal_walk.h"
+#include "../seal_chain.h"
 
 /* Work for a frame, in rows: for the share that is done. */
 #define INCISE_VERIFY_FRAME_ROWS 100
+
+enum incise_verify_level {
+	INCISE_VERIFY_ALL,
+	INCISE_VERIFY_ROWS,   /* not camera.mkv, nor all pages */
+	INCISE_VERIFY_TABLES, /* nor samples */
+};
 
 struct incise_verification {
 	struct incise_recording *recording;
@@ -28,20 +35,15 @@ struct incise_verification {
 	int64_t origin_ns;	  /* time 0 of the texts: the first row */
 	int64_t reported_ns;	  /* last report of progress */
 	uint64_t rows, rows_done; /* a frame counts as some rows */
-	enum incise_verify_level {
-		INCISE_VERIFY_ALL,
-		INCISE_VERIFY_ROWS,   /* not camera.mkv, nor all pages */
-		INCISE_VERIFY_TABLES, /* nor samples */
-	} level;
+	enum incise_verify_level level;
 	bool camera;
 	uint64_t frames; /* rows of table frames */
 	bool altered;	 /* a finding other than losses and an interruption */
 	bool rows_altered, tables_altered;	       /* by the ledger */
 	const struct incise_seal_statement *statement; /* to compare with; NULL: none */
-	/* Digests of the blocks, which the streams give to the seal: rows are read once. */
+	/* The digests that blocks name are those of their data, which the seal takes then. */
 	bool hashed;
 	struct incise_seal rows_seal;
-	struct incise_seal_digests digests[INCISE_LEDGER_FORMS];
 };
 
 /*
@@ -50,6 +52,17 @@ struct incise_verification {
  */
 int incise_verify_stream(struct incise_verification *verify, int stream, uint64_t rows,
 			 uint64_t lost, struct incise_verify_stream *out);
+
+/*
+ * Verify a recording that was opened as it was recorded, but for a joined one; @statement: to compare with, or NULL. As
+ * incise_verify().
+ */
+int incise_verify_recording(struct incise_recording *recording,
+			    const struct incise_verify_watch *watch,
+			    enum incise_verify_level level,
+			    const struct incise_seal_statement *statement,
+			    struct incise_verify_report *report,
+			    struct incise_error *err);
 
 /* Verify the frames; fills report->frames. Returns as incise_verify_stream(). */
 int incise_verify_camera(struct incise_verification *verify);

@@ -8,8 +8,8 @@
  *                  └ missing └ extra     ahead of the table
  *
  * A damaged frame may have any number, so a frame is identified by its number and by other
- * columns of its row: the timestamp in the file, or size and CRC. From form 4 on a row has a
- * digest of its frame, which nobody can forge.
+ * columns of its row: the timestamp in the file, or size and CRC. A row has a digest of its frame,
+ * which nobody can forge.
  */
 #include <errno.h>
 #include <stdio.h>
@@ -22,7 +22,7 @@
 
 struct row {
 	int64_t seq, t_ns, pts_ms, bytes, crc;
-	const uint8_t *sha256; /* zeros where it has none */
+	const uint8_t *sha256;
 };
 
 /* Consecutive frames that are wrong in the same way. */
@@ -355,7 +355,7 @@ int incise_verify_camera(struct incise_verification *verify)
 		report_unopened(verify, path ? path : "", &err);
 		goto out;
 	}
-	reader->digests = verify->recording->form >= 4;
+	reader->digests = true;
 	rc = prepare(&walk);
 	if (!rc)
 		rc = walk_through(&walk, reader);

@@ -251,8 +251,7 @@ int incise_verify_seal(struct incise_verification *verify)
 	struct incise_error err = {0};
 	/* With rows that the ledger does not have, blocks are not those of the digests. */
 	const bool known = verify->hashed && !verify->rows_altered;
-	int rc = incise_statement_make(&is, verify->recording,
-				       known ? verify->digests : NULL,
+	int rc = incise_statement_make(&is, verify->recording, known,
 				       was ? was->last.commit : -1, step, &walk, &err);
 
 	if (rc == -ECANCELED)

@@ -366,7 +366,7 @@ static int start(struct incise_recorder *rec, const struct incise_recorder_setup
 	int rc = incise_recorder_check_space(rec, setup->planned_s, err);
 
 	rec->worthless = true;
-	if (!rc && incise_seal_init(&rec->blocks.seal, INCISE_SCHEMA_VERSION))
+	if (!rc && incise_seal_init(&rec->blocks.seal))
 		rc = incise_error_set(err, ENOMEM,
 				      "%s: libcrypto gives no SHA-256; check its "
 				      "openssl.cnf",

@@ -55,19 +55,6 @@ TEST(info_tells_what_the_tables_hold, IN_FOLDER)
 	assert_true(info.force_max_N > 1); /* 2.6 N by the model at 20 mm and 25 mm/s */
 }
 
-TEST(form_1_is_read, IN_FOLDER)
-{
-	struct incise_recording_info now, before;
-
-	record("a.rec", SHORT_SCRIPT, 8000 * MS); /* two cuts */
-	assert_int_equal(read_all("a.rec", &now, &err), 0);
-	change(DB, TO_FORM_1);
-	succeeds(!read_all("a.rec", &before, &err));
-	assert_true(before.cuts > 0 && before.cuts == now.cuts);
-	assert_true(before.tracker == now.tracker &&
-		    before.force_max_N == now.force_max_N);
-}
-
 TEST(paths_that_lead_to_a_recording, IN_FOLDER)
 {
 	struct incise_recording_info info;
@@ -576,20 +563,4 @@ TEST(impossible_streams_are_refused, IN_FOLDER)
 			     "a.rec:", cases[i].knots ? "knots" : "streams");
 		incise_recording_close(recording);
 	}
-}
-
-TEST(old_recordings_have_none, IN_FOLDER)
-{
-	struct incise_row_times times;
-	struct incise_stream streams[INCISE_STREAMS_MAX];
-	struct incise_recording *recording;
-
-	record("a.rec", "sim:clock=simulated", 700 * MS);
-	change(DB, TO_FORM_1);
-	recording = incise_recording_open("a.rec", &err);
-	succeeds(recording);
-	assert_int_equal(incise_recording_streams(recording, streams, &err), 0);
-	assert_int_equal(incise_row_times_open(&times, recording, "tracker", &err), 0);
-	assert_int_equal(times.source->n_knots, 0);
-	incise_recording_close(recording);
 }
