@@ -3,7 +3,7 @@
  * The form of recording.db; see schema.h.
  */
 #include <errno.h>
-#include <stdbool.h>
+#include <stdarg.h>
 #include <string.h>
 #include "schema.h"
 
@@ -125,12 +125,33 @@ static int pragma(sqlite3 *db, const char *sql, sqlite3_int64 *value)
 	return sqlite3_finalize(stmt); /* reports a failed step too */
 }
 
+int incise_schema_run(sqlite3_stmt *stmt)
+{
+	sqlite3_step(stmt);
+	return sqlite3_reset(stmt);
+}
+
+int64_t incise_schema_ask(sqlite3 *db, int64_t otherwise, const char *format, ...)
+{
+	sqlite3_stmt *stmt = NULL;
+	va_list args;
+	char *sql;
+
+	va_start(args, format);
+	sql = sqlite3_vmprintf(format, args);
+	va_end(args);
+	if (sql && sqlite3_prepare_v2(db, sql, -1, &stmt, NULL) == SQLITE_OK &&
+	    sqlite3_step(stmt) == SQLITE_ROW &&
+	    sqlite3_column_type(stmt, 0) == SQLITE_INTEGER)
+		otherwise = sqlite3_column_int64(stmt, 0);
+	sqlite3_finalize(stmt);
+	sqlite3_free(sql);
+	return otherwise;
+}
+
 bool incise_schema_is_joined(sqlite3 *db)
 {
-	sqlite3_int64 application;
-
-	return pragma(db, "PRAGMA application_id", &application) == SQLITE_OK &&
-	       application == INCISE_SCHEMA_JOINED;
+	return incise_schema_ask(db, 0, "PRAGMA application_id") == INCISE_SCHEMA_JOINED;
 }
 
 int incise_schema_check(sqlite3 *db, const char *path,

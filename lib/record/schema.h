@@ -7,6 +7,7 @@
 #define INCISE_SCHEMA_H
 
 #include <stdbool.h>
+#include <stdint.h>
 #include <sqlite3.h>
 #include <incise/error.h>
 
@@ -36,6 +37,12 @@ int incise_schema_check(sqlite3 *db, const char *path,
 
 /* Whether an opened database is that of a joined recording; see read/session.h. */
 bool incise_schema_is_joined(sqlite3 *db);
+
+/* Run a bound statement, to be bound anew. Returns an SQLite code. */
+int incise_schema_run(sqlite3_stmt *stmt);
+
+/* One integer by SQL, as of sqlite3_mprintf(); @otherwise if it is none, or cannot be read. */
+int64_t incise_schema_ask(sqlite3 *db, int64_t otherwise, const char *format, ...);
 
 /* The errno of the last SQLite error: EINVAL for a damaged file. */
 int incise_schema_errno(sqlite3 *db);

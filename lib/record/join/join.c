@@ -8,7 +8,6 @@
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
-#include <ftw.h>
 #include <limits.h>
 #include <linux/fs.h>
 #include <math.h>
@@ -550,28 +549,6 @@ static int map_clock(struct join *join, int at)
 
 /* --- writing ------------------------------------------------------------------------- */
 
-/* The rest of a file. Returns 0 or -errno. */
-static int copy(int in, int out)
-{
-	char bytes[1 << 16];
-	ssize_t n;
-
-	while ((n = copy_file_range(in, NULL, out, NULL, 1 << 30, 0)) > 0)
-		;
-	if (!n)
-		return 0;
-	/* From one kind of file system to another the kernel does not copy. */
-	if (errno != EXDEV && errno != EINVAL && errno != ENOSYS && errno != EOPNOTSUPP)
-		return -errno;
-	while ((n = read(in, bytes, sizeof(bytes))) > 0)
-		for (ssize_t done = 0, part; done < n; done += part) {
-			part = write(out, bytes + done, (size_t)(n - done));
-			if (part < 0)
-				return -errno;
-		}
-	return n < 0 ? -errno : 0;
-}
-
 /*
  * Clone, link or copy a file that exists; bit for bit. A link is the same file, which nothing changes
  * once it is complete; of a symbolic link it is one to its target. Returns 0 or -errno.
@@ -591,7 +568,7 @@ static int bring(const char *from, const char *to, bool complete)
 		rc = -errno;
 	} else {
 		if (ioctl(out, FICLONE, in))
-			rc = copy(in, out);
+			rc = incise_database_copy(in, out);
 		if (!rc && fsync(out))
 			rc = -errno;
 		if (close(out) && !rc)
@@ -603,12 +580,6 @@ static int bring(const char *from, const char *to, bool complete)
 
 static const char *const files[] = {INCISE_SCHEMA_DB, INCISE_SCHEMA_DB "-wal",
 				    INCISE_FRAMES_FILE};
-
-static int remove_one(const char *path, const struct stat *st, int type, struct FTW *at)
-{
-	(void)st, (void)type, (void)at;
-	return remove(path) && errno != ENOENT;
-}
 
 /* A file of a member. Returns 0, also if there is none, or -errno. */
 static int bring_file(const struct member *member, const char *own, const char *name,
@@ -683,12 +654,6 @@ static int bring_member(struct join *join, const struct member *member,
 	return rc;
 }
 
-static int step_and_reset(sqlite3_stmt *stmt)
-{
-	sqlite3_step(stmt);
-	return sqlite3_reset(stmt);
-}
-
 static int bind_known(sqlite3_stmt *stmt, int at, double value)
 {
 	return isnan(value) ? sqlite3_bind_null(stmt, at)
@@ -709,7 +674,7 @@ static int put_member(const struct member *member, int at, sqlite3_stmt *members
 	sqlite3_bind_int(members, 6, member->fit.matches);
 	bind_known(members, 7, member->agreement_ns);
 	bind_known(members, 8, member->agreement_bound_ns);
-	rc = step_and_reset(members);
+	rc = incise_schema_run(members);
 	for (size_t i = 0; i < member->map.n && rc == SQLITE_OK; i++) {
 		const struct incise_session_knot *knot = &member->map.knots[i];
 
@@ -718,7 +683,7 @@ static int put_member(const struct member *member, int at, sqlite3_stmt *members
 		sqlite3_bind_int64(maps, 3, knot->t_ns);
 		sqlite3_bind_int64(maps, 4, knot->to_ns);
 		sqlite3_bind_double(maps, 5, knot->bound_ns);
-		rc = step_and_reset(maps);
+		rc = incise_schema_run(maps);
 	}
 	return rc;
 }
@@ -754,14 +719,14 @@ static int write_tables(struct join *join, sqlite3 *db)
 	if (rc == SQLITE_OK) {
 		sqlite3_bind_text(pairs, 1, "incise", -1, SQLITE_STATIC);
 		sqlite3_bind_text(pairs, 2, incise_version(), -1, SQLITE_STATIC);
-		rc = step_and_reset(pairs);
+		rc = incise_schema_run(pairs);
 	}
 	if (rc == SQLITE_OK)
 		rc = incise_session_seal(db, &crc);
 	if (rc == SQLITE_OK) {
 		sqlite3_bind_text(pairs, 1, "seal", -1, SQLITE_STATIC);
 		sqlite3_bind_int64(pairs, 2, crc);
-		rc = step_and_reset(pairs);
+		rc = incise_schema_run(pairs);
 	}
 	sqlite3_finalize(members);
 	sqlite3_finalize(maps);
@@ -831,7 +796,7 @@ static int write_session(struct join *join, const char *output)
 		rc = incise_error_set(join->err, errno, "%s: %s", output,
 				      strerror(errno));
 	if (rc && made)
-		nftw(part, remove_one, 16, FTW_DEPTH | FTW_PHYS);
+		incise_database_remove(part);
 	free(part);
 	return rc;
 }

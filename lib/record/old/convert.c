@@ -287,8 +287,7 @@ static int run_bound(struct conversion *c, const char *sql, const char *text)
 	if (rc == SQLITE_OK && text)
 		rc = sqlite3_bind_text(stmt, 1, text, -1, SQLITE_STATIC);
 	if (rc == SQLITE_OK)
-		sqlite3_step(stmt);
-	rc = rc == SQLITE_OK ? sqlite3_reset(stmt) : rc;
+		rc = incise_schema_run(stmt);
 	sqlite3_finalize(stmt);
 	return rc;
 }

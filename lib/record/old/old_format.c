@@ -213,19 +213,9 @@ static int open_rows(struct incise_source *source, int64_t from_seq, bool from_e
 
 static int64_t seek_row(struct incise_recording *recording, int stream, int64_t t_ns)
 {
-	sqlite3_stmt *stmt = NULL;
-	int64_t seq = INT64_MIN;
-	char sql[120];
-
-	snprintf(sql, sizeof(sql), "SELECT min(seq) FROM %s WHERE t_ns >= ?",
-		 incise_ledger_forms[stream].table);
-	if (sqlite3_prepare_v2(recording->db, sql, -1, &stmt, NULL) == SQLITE_OK &&
-	    sqlite3_bind_int64(stmt, 1, t_ns) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW &&
-	    sqlite3_column_type(stmt, 0) == SQLITE_INTEGER)
-		seq = sqlite3_column_int64(stmt, 0);
-	sqlite3_finalize(stmt);
-	return seq;
+	return incise_schema_ask(recording->db, INT64_MIN,
+				 "SELECT min(seq) FROM %s WHERE t_ns >= %lld",
+				 incise_ledger_forms[stream].table, (long long)t_ns);
 }
 
 /* The last checksums of its ledger, which sum up everything. */

@@ -11,6 +11,7 @@
  * reported, and not all that follow.
  */
 #include <errno.h>
+#include "../schema.h"
 #include "../verify/verify_walk.h"
 #include "old.h"
 
@@ -92,7 +93,7 @@ static int skip_blocks(struct walk *walk, const struct incise_ledger_block *bloc
 	found.count = block->block - w->next;
 	w->out->altered += found.count;
 	incise_verify_found(
-		w->verify, &found,
+		w->verify, found,
 		"%s: the ledger has no entry of block %lld%s%.0lld; %llu rows are in "
 		"its place",
 		w->form->stream, (long long)found.first_block,
@@ -170,7 +171,7 @@ static int take_extra(struct walk *walk)
 	found.last_seq = w->last_seq;
 	found.last_ns = w->last_ns;
 	incise_verify_found(
-		w->verify, &found,
+		w->verify, found,
 		"%s: %llu row%s after the end of the ledger, numbers %lld to %lld",
 		w->form->stream, (unsigned long long)found.count,
 		found.count == 1 ? "" : "s", (long long)found.first_seq,
@@ -234,16 +235,11 @@ int incise_old_verify_stream(struct incise_verify_walk *of)
 void incise_old_verify_depth(struct incise_verification *verify)
 {
 	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_COUNT);
-	sqlite3_stmt *stmt = NULL;
-	int64_t rows = -1;
+	int64_t rows = incise_schema_ask(verify->recording->db, -1,
+					 "SELECT count(*) FROM depth");
 
-	if (sqlite3_prepare_v2(verify->recording->db, "SELECT count(*) FROM depth", -1,
-			       &stmt, NULL) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW)
-		rows = sqlite3_column_int64(stmt, 0);
-	sqlite3_finalize(stmt);
 	found.count = verify->recording->meta.depth;
 	if (rows < 0 || (uint64_t)rows != found.count)
-		incise_verify_found(verify, &found, "table depth has %lld rows of %llu",
+		incise_verify_found(verify, found, "table depth has %lld rows of %llu",
 				    (long long)rows, (unsigned long long)found.count);
 }

@@ -4,6 +4,7 @@
  */
 #include <errno.h>
 #include <fcntl.h>
+#include <ftw.h>
 #include <limits.h>
 #include <pthread.h>
 #include <signal.h>
@@ -123,21 +124,27 @@ static int find_files(struct found *found, const char *path, struct incise_error
 
 /* --- copies --- */
 
-/* Returns 0 or -errno. */
-static int copy_bytes(int from, int to)
+int incise_database_copy(int in, int out)
 {
-	char bytes[65536];
+	char bytes[1 << 16];
 	ssize_t n;
 
-	while ((n = read(from, bytes, sizeof(bytes))) != 0) {
+	while ((n = copy_file_range(in, NULL, out, NULL, 1 << 30, 0)) > 0)
+		;
+	if (!n)
+		return 0;
+	/* From one kind of file system to another the kernel does not copy. */
+	if (errno != EXDEV && errno != EINVAL && errno != ENOSYS && errno != EOPNOTSUPP &&
+	    errno != EINTR)
+		return -errno;
+	while ((n = read(in, bytes, sizeof(bytes))) != 0) {
 		if (n < 0 && errno != EINTR)
 			return -errno;
 		for (ssize_t done = 0, put; done < n; done += put) {
-			put = write(to, bytes + done, (size_t)(n - done));
+			put = write(out, bytes + done, (size_t)(n - done));
 			if (put < 0 && errno != EINTR)
 				return -errno;
-			if (put < 0)
-				put = 0;
+			put = put < 0 ? 0 : put;
 		}
 	}
 	return 0;
@@ -151,7 +158,7 @@ static int copy_file(int in, const char *to, mode_t mode)
 	if (in < 0)
 		return in;
 	out = open(to, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, mode);
-	rc = out < 0 ? -errno : copy_bytes(in, out);
+	rc = out < 0 ? -errno : incise_database_copy(in, out);
 	if (out >= 0 && close(out) && !rc)
 		rc = -errno;
 	close(in);
@@ -457,4 +464,15 @@ int incise_database_recover(const char *path, const char *file, struct incise_er
 	       : rc	    ? incise_error_set(err, -rc, "%s: %s", file, strerror(-rc))
 			    : incise_error_set(err, EINVAL, "%s: damaged: %s", path,
 					       sqlite3_errstr(code));
+}
+
+static int remove_one(const char *path, const struct stat *st, int type, struct FTW *at)
+{
+	(void)st, (void)type, (void)at;
+	return remove(path) && errno != ENOENT;
+}
+
+void incise_database_remove(const char *folder)
+{
+	nftw(folder, remove_one, 16, FTW_DEPTH | FTW_PHYS);
 }

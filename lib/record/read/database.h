@@ -38,6 +38,12 @@ int incise_database_open(const char *path, sqlite3 **db, struct incise_error *er
  */
 int incise_database_recover(const char *path, const char *file, struct incise_error *err);
 
+/* Copy the rest of a file. 0 or -errno. */
+int incise_database_copy(int in, int out);
+
+/* Remove a folder that failed, with all that is in it. */
+void incise_database_remove(const char *folder);
+
 /* Copy a regular file, not by a link, to @to. 0 or -errno; EINVAL: it is none. */
 int incise_database_bring(const char *from, const char *to);
 

@@ -24,27 +24,6 @@ static bool is_hidden(const char *name)
 	return !strcmp(name, ".") || !strcmp(name, "..");
 }
 
-/* Remove a copy that failed, with all that is in it. */
-static void remove_folder(const char *path)
-{
-	DIR *folder = opendir(path);
-	struct dirent *entry;
-
-	while (folder && (entry = readdir(folder))) {
-		char *name;
-
-		if (is_hidden(entry->d_name) ||
-		    asprintf(&name, "%s/%s", path, entry->d_name) < 0)
-			continue;
-		if (unlink(name) && (errno == EISDIR || errno == EPERM))
-			remove_folder(name);
-		free(name);
-	}
-	if (folder)
-		closedir(folder);
-	rmdir(path);
-}
-
 static int bring_folder(const char *from, const char *to, bool top,
 			struct incise_error *err);
 
@@ -155,7 +134,7 @@ int incise_recording_recover(const char *path, const char *output, bool damaged,
 			rc = incise_error_set(err, errno, "%s: %s", output,
 					      strerror(errno));
 		if (rc)
-			remove_folder(part);
+			incise_database_remove(part);
 	}
 	free(part);
 	free(folder);

@@ -121,45 +121,25 @@ static double real_or_nan(sqlite3_stmt *stmt, int column)
 /* Version, tables and checksum. */
 static int check(sqlite3 *db, const char *folder, struct incise_error *err)
 {
-	sqlite3_stmt *stmt = NULL;
-	sqlite3_int64 version = 0, seal = -1;
+	const int64_t version = incise_schema_ask(db, 0, "PRAGMA user_version");
 	uint32_t crc = 0;
-	int found = 0;
 
-	if (sqlite3_prepare_v2(db, "PRAGMA user_version", -1, &stmt, NULL) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW)
-		version = sqlite3_column_int64(stmt, 0);
-	sqlite3_finalize(stmt);
 	if (version > INCISE_SESSION_VERSION)
 		return incise_error_set(
 			err, EINVAL,
 			"%s: made by a newer incise (joined recording of version "
 			"%lld, this one reads up to %d); use that version",
 			folder, (long long)version, INCISE_SESSION_VERSION);
-	for (; incise_session_tables[found]; found++) {
-		sqlite3_stmt *known = NULL;
-		bool same;
-
-		if (sqlite3_prepare_v2(db,
+	for (int i = 0; incise_session_tables[i]; i++)
+		if (!incise_schema_ask(db, 0,
 				       "SELECT 1 FROM sqlite_master WHERE type = 'table' "
-				       "AND sql = ?",
-				       -1, &known, NULL) != SQLITE_OK)
-			return incise_schema_fail(db, folder, err);
-		sqlite3_bind_text(known, 1, incise_session_tables[found], -1,
-				  SQLITE_STATIC);
-		same = sqlite3_step(known) == SQLITE_ROW;
-		sqlite3_finalize(known);
-		if (!same)
+				       "AND sql = %Q",
+				       incise_session_tables[i]))
 			return damaged(folder, "a table is missing or altered", err);
-	}
 	if (incise_session_seal(db, &crc) != SQLITE_OK)
 		return incise_schema_fail(db, folder, err);
-	if (sqlite3_prepare_v2(db, "SELECT value FROM session WHERE key = 'seal'", -1,
-			       &stmt, NULL) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW)
-		seal = sqlite3_column_int64(stmt, 0);
-	sqlite3_finalize(stmt);
-	return seal == (sqlite3_int64)crc
+	return incise_schema_ask(db, -1,
+				 "SELECT value FROM session WHERE key = 'seal'") == crc
 		       ? 0
 		       : damaged(folder, "its tables are not as they were written", err);
 }

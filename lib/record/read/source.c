@@ -345,20 +345,17 @@ int64_t incise_source_seek(struct incise_recording *recording, const char *table
 {
 	const int stream = incise_source_find(strcmp(table, "depth") ? table : "tracker");
 	const char *name = incise_ledger_forms[stream].stream;
-	sqlite3_stmt *stmt = NULL;
-	int64_t seq = INT64_MIN, block;
 
 	if (t_ns == INT64_MIN)
-		return seq;
-	if (recording->old)
-		return recording->old->seek(recording, stream, t_ns);
-	block = incise_ledger_find(recording->db, name, true, t_ns);
-	if (incise_ledger_select(recording->db, name, block, false, &stmt) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW && sqlite3_column_int64(stmt, 0) == block &&
-	    sqlite3_column_type(stmt, 1) == SQLITE_INTEGER)
-		seq = sqlite3_column_int64(stmt, 1);
-	sqlite3_finalize(stmt);
-	return seq;
+		return t_ns;
+	return recording->old ? recording->old->seek(recording, stream, t_ns)
+			      : incise_schema_ask(
+					recording->db, INT64_MIN,
+					"SELECT first_seq FROM blocks WHERE stream = %Q "
+					"AND block = %lld",
+					name,
+					(long long)incise_ledger_find(recording->db, name,
+								      true, t_ns));
 }
 
 bool incise_source_span(struct incise_recording *recording, const char *table,

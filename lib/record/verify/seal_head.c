@@ -98,16 +98,9 @@ int incise_seal_head(struct incise_recording *recording, char identity[33],
 
 bool incise_seal_before(struct incise_recording *recording, const char *head)
 {
-	sqlite3_stmt *stmt = NULL;
-	bool is = false;
-
-	if (sqlite3_prepare_v2(recording->db,
-			       "SELECT instr(value, ', head ' || ?) FROM meta WHERE key "
-			       "= 'converted_from'",
-			       -1, &stmt, NULL) == SQLITE_OK &&
-	    sqlite3_bind_text(stmt, 1, head, -1, SQLITE_STATIC) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW)
-		is = sqlite3_column_int(stmt, 0) > 0;
-	sqlite3_finalize(stmt);
-	return is;
+	return incise_schema_ask(
+		       recording->db, 0,
+		       "SELECT instr(value, ', head ' || %Q) FROM meta WHERE key "
+		       "= 'converted_from'",
+		       head) > 0;
 }

@@ -34,24 +34,12 @@ struct incise_seal_walk {
 	bool good; /* it is what its rows give */
 };
 
-/*
- * @known: a verification has seen that blocks have the digests that they name. Returns 0, -EINVAL, -EIO, -ENOMEM.
- * Close it in any case.
- */
-int incise_seal_walk_open(struct incise_seal_walk *walk,
-			  struct incise_recording *recording, bool known,
-			  struct incise_error *err);
-
-/* Go to the next commit: 1; 0 at the end; as incise_seal_walk_open(). */
-int incise_seal_walk_next(struct incise_seal_walk *walk, struct incise_error *err);
-
 /* Behind the last commit: the number of rows, and whether the ledger has blocks. */
 uint64_t incise_seal_walk_behind(struct incise_seal_walk *walk, bool *blocks);
 
-void incise_seal_walk_close(struct incise_seal_walk *walk);
-
 /*
- * Fill a statement from a recording up to commit @upto, -1: the last one. @step is called after
+ * Fill a statement from a recording up to commit @upto, -1: the last one. @known: a verification has seen that
+ * blocks have the digests that they name. @step is called after
  * each commit of the whole recording, and may stop it with its result. A recording that ends
  * before @upto has fewer heads: those behind have an empty text.
  */

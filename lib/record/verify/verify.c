@@ -4,7 +4,6 @@
  */
 #include <errno.h>
 #include <fcntl.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,31 +15,6 @@
 #include "../read/session.h"
 #include "seal_walk.h"
 #include "verify.h"
-
-/* One integer by SQL; @otherwise if it is NULL or cannot be read. */
-INCISE_PRINTF(3, 4)
-static int64_t ask(struct incise_verification *verify, int64_t otherwise,
-		   const char *format, ...)
-{
-	sqlite3_stmt *stmt;
-	va_list args;
-	char *sql;
-	int rc;
-
-	va_start(args, format);
-	sql = sqlite3_vmprintf(format, args);
-	va_end(args);
-	rc = sql ? sqlite3_prepare_v2(verify->recording->db, sql, -1, &stmt, NULL)
-		 : SQLITE_NOMEM;
-	sqlite3_free(sql);
-	if (rc != SQLITE_OK)
-		return otherwise;
-	if (sqlite3_step(stmt) == SQLITE_ROW &&
-	    sqlite3_column_type(stmt, 0) == SQLITE_INTEGER)
-		otherwise = sqlite3_column_int64(stmt, 0);
-	sqlite3_finalize(stmt);
-	return otherwise;
-}
 
 /* --- pages, counts and names ---------------------------------------------------------- */
 
@@ -62,24 +36,18 @@ static int check_pages(struct incise_verification *verify)
 	while (rc == SQLITE_OK && (rc = sqlite3_step(stmt)) == SQLITE_ROW) {
 		const char *text = (const char *)sqlite3_column_text(stmt, 0);
 
-		if (!text || strcmp(text, "ok")) {
-			struct incise_verify_finding found =
-				incise_verify_finding(INCISE_VERIFY_DAMAGED);
-
-			incise_verify_found(verify, &found, "%s is damaged: %s",
-					    INCISE_SCHEMA_DB,
+		if (!text || strcmp(text, "ok"))
+			incise_verify_found(verify,
+					    incise_verify_finding(INCISE_VERIFY_DAMAGED),
+					    "%s is damaged: %s", INCISE_SCHEMA_DB,
 					    text ? text : "out of memory");
-		}
 		rc = SQLITE_OK;
 	}
 	sqlite3_progress_handler(db, 0, NULL, NULL);
-	if (rc != SQLITE_DONE && rc != SQLITE_INTERRUPT) {
-		struct incise_verify_finding found =
-			incise_verify_finding(INCISE_VERIFY_DAMAGED);
-
-		incise_verify_found(verify, &found, "%s is damaged: %s", INCISE_SCHEMA_DB,
+	if (rc != SQLITE_DONE && rc != SQLITE_INTERRUPT)
+		incise_verify_found(verify, incise_verify_finding(INCISE_VERIFY_DAMAGED),
+				    "%s is damaged: %s", INCISE_SCHEMA_DB,
 				    sqlite3_errmsg(db));
-	}
 	sqlite3_finalize(stmt);
 	return rc == SQLITE_INTERRUPT ? -ECANCELED : 0;
 }
@@ -87,9 +55,8 @@ static int check_pages(struct incise_verification *verify)
 /* SQLite leaves alone what lies behind the pages that its header counts. */
 static void check_length(struct incise_verification *verify)
 {
-	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_DAMAGED);
-	int64_t bytes =
-		ask(verify, 0, "PRAGMA page_size") * ask(verify, 0, "PRAGMA page_count");
+	int64_t bytes = incise_schema_ask(verify->recording->db, 0, "PRAGMA page_size") *
+			incise_schema_ask(verify->recording->db, 0, "PRAGMA page_count");
 	struct stat st;
 
 	/* With a log, pages may be in it alone; a copy of a locked one has no name. */
@@ -97,9 +64,9 @@ static void check_length(struct incise_verification *verify)
 	    stat(sqlite3_db_filename(verify->recording->db, "main"), &st))
 		return;
 	if (st.st_size > bytes)
-		incise_verify_found(verify, &found, "%s has %lld bytes of %lld",
-				    INCISE_SCHEMA_DB, (long long)st.st_size,
-				    (long long)bytes);
+		incise_verify_found(verify, incise_verify_finding(INCISE_VERIFY_DAMAGED),
+				    "%s has %lld bytes of %lld", INCISE_SCHEMA_DB,
+				    (long long)st.st_size, (long long)bytes);
 }
 
 /* An entry with an unknown name would pass as verified. */
@@ -111,8 +78,6 @@ static void check_length(struct incise_verification *verify)
 	"'file:camera.mkv'"
 static void check_names(struct incise_verification *verify)
 {
-	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_LEDGER);
-
 	const char *seals = verify->report->interrupted ? "" : SEALS;
 	const char *unknown =
 		verify->level == INCISE_VERIFY_TABLES
@@ -121,8 +86,8 @@ static void check_names(struct incise_verification *verify)
 			  "(" STREAMS ")) + (SELECT count(*) FROM ledger WHERE stream "
 			  "NOT IN (''%s))";
 
-	if (ask(verify, -1, unknown, seals))
-		incise_verify_found(verify, &found,
+	if (incise_schema_ask(verify->recording->db, -1, unknown, seals))
+		incise_verify_found(verify, incise_verify_finding(INCISE_VERIFY_LEDGER),
 				    "the ledger has entries of unknown streams");
 }
 
@@ -153,11 +118,11 @@ static void report_ends(struct incise_verification *verify)
 		if (sqlite3_column_type(stmt, 2) == SQLITE_INTEGER)
 			found.last_ns = sqlite3_column_int64(stmt, 2);
 		if (found.last_ns < 0)
-			incise_verify_found(verify, &found, "%s: gave nothing: %s",
+			incise_verify_found(verify, found, "%s: gave nothing: %s",
 					    found.stream, why ? why : "");
 		else
 			incise_verify_found(
-				verify, &found,
+				verify, found,
 				"%s: ended at %.4f s, before the recording did: %s",
 				found.stream, incise_verify_s(verify, found.last_ns),
 				why ? why : "");
@@ -168,7 +133,6 @@ static void report_ends(struct incise_verification *verify)
 /* One that was converted as it was does not become good by that. */
 static void report_conversion(struct incise_verification *verify)
 {
-	struct incise_verify_finding found = incise_verify_finding(INCISE_VERIFY_ALTERED);
 	sqlite3_stmt *stmt = NULL;
 
 	if (sqlite3_prepare_v2(verify->recording->db,
@@ -177,7 +141,8 @@ static void report_conversion(struct incise_verification *verify)
 			       "'converted_from') WHERE at",
 			       -1, &stmt, NULL) == SQLITE_OK &&
 	    sqlite3_step(stmt) == SQLITE_ROW)
-		incise_verify_found(verify, &found, "it was converted with a finding: %s",
+		incise_verify_found(verify, incise_verify_finding(INCISE_VERIFY_ALTERED),
+				    "it was converted with a finding: %s",
 				    (const char *)sqlite3_column_text(stmt, 0));
 	sqlite3_finalize(stmt);
 }
@@ -189,15 +154,15 @@ static void report_interruption(struct incise_verification *verify)
 
 	if (!verify->report->interrupted)
 		return;
-	found.last_ns =
-		ask(verify, -1,
-		    "SELECT max(" END("last_ns", "DESC") ") FROM (" RIG_NAMES ")");
+	found.last_ns = incise_schema_ask(
+		verify->recording->db, -1,
+		"SELECT max(" END("last_ns", "DESC") ") FROM (" RIG_NAMES ")");
 	if (found.last_ns < 0)
-		incise_verify_found(verify, &found,
+		incise_verify_found(verify, found,
 				    "interrupted, or being written: no row yet");
 	else
 		incise_verify_found(
-			verify, &found,
+			verify, found,
 			"interrupted, or being written: it ends with its last commit, "
 			"at %.4f s; tables events, knots, meta and streams have "
 			"no seal before the end and are not verified",
@@ -239,18 +204,18 @@ static void compare(struct incise_verification *verify, const char *stream,
 	}
 	if (!n) {
 		found.kind = INCISE_VERIFY_LEDGER;
-		incise_verify_found(verify, &found, "%s has no seal in the ledger", what);
+		incise_verify_found(verify, found, "%s has no seal in the ledger", what);
 		return;
 	}
 	found.count = entry.count;
 	if (n == 1 && incise_ledger_same(made, &entry))
 		return;
 	if (n == 1 && made->count != entry.count)
-		incise_verify_found(verify, &found, "%s has %lld %s of %lld", what,
+		incise_verify_found(verify, found, "%s has %lld %s of %lld", what,
 				    (long long)made->count, units,
 				    (long long)entry.count);
 	else
-		incise_verify_found(verify, &found,
+		incise_verify_found(verify, found,
 				    "%s is altered: its %s or its seal differ from "
 				    "those written",
 				    what, units);
@@ -271,7 +236,7 @@ static void check_file(struct incise_verification *verify)
 	if (fd < 0) {
 		/* With frames, verify_camera.c reports that it is missing. */
 		if (read_entry(verify, INCISE_LEDGER_FILE, &entry) && !verify->frames)
-			incise_verify_found(verify, &found,
+			incise_verify_found(verify, found,
 					    "camera: " INCISE_FRAMES_FILE " is missing");
 		return;
 	}
@@ -281,7 +246,7 @@ static void check_file(struct incise_verification *verify)
 		rc = incise_ledger_seal_file(fd, n == 1 ? entry.last_seq : 0, &made);
 	close(fd);
 	if (rc) {
-		incise_verify_found(verify, &found,
+		incise_verify_found(verify, found,
 				    INCISE_FRAMES_FILE " cannot be read: %s",
 				    strerror(-rc));
 		return;
@@ -290,7 +255,7 @@ static void check_file(struct incise_verification *verify)
 		&made);
 	/* 0: made before the length was noted, or on a disk that hung. */
 	if (n == 1 && entry.last_seq && entry.last_seq != st.st_size)
-		incise_verify_found(verify, &found,
+		incise_verify_found(verify, found,
 				    INCISE_FRAMES_FILE " has %lld bytes of %lld",
 				    (long long)st.st_size, (long long)entry.last_seq);
 }
@@ -326,19 +291,22 @@ static bool recorded(struct incise_verification *verify, int stream, const char 
 {
 	const struct incise_ledger_form *form = &incise_ledger_forms[stream];
 
-	return ask(verify, 1,
-		   "SELECT EXISTS(SELECT 1 FROM blocks WHERE stream = '%s') OR "
-		   "EXISTS(SELECT 1 FROM streams WHERE name = '%s') OR EXISTS(SELECT 1 "
-		   "FROM meta WHERE key = '%s' AND value > 0)",
-		   form->stream, form->stream, key) ||
+	return incise_schema_ask(
+		       verify->recording->db, 1,
+		       "SELECT EXISTS(SELECT 1 FROM blocks WHERE stream = '%s') OR "
+		       "EXISTS(SELECT 1 FROM streams WHERE name = '%s') OR EXISTS(SELECT 1 "
+		       "FROM meta WHERE key = '%s' AND value > 0)",
+		       form->stream, form->stream, key) ||
 	       (verify->recording->old &&
-		ask(verify, 1, "SELECT EXISTS(SELECT 1 FROM %s)", form->table));
+		incise_schema_ask(verify->recording->db, 1,
+				  "SELECT EXISTS(SELECT 1 FROM %s)", form->table));
 }
 
 /* A number of table meta. */
 static int64_t count_of(struct incise_verification *verify, const char *key)
 {
-	return ask(verify, 0, "SELECT value FROM meta WHERE key = '%s'", key);
+	return incise_schema_ask(verify->recording->db, 0,
+				 "SELECT value FROM meta WHERE key = '%s'", key);
 }
 
 /* Wall time is no stream of the report: its findings are all there is to tell. */
@@ -369,9 +337,10 @@ static int check_streams(struct incise_verification *verify)
 	verify->camera = recorded(verify, INCISE_LEDGER_CAMERA, "frames_rows");
 	verify->rows = meta->force + meta->tracker;
 	if (verify->camera) {
-		verify->frames = ask(verify, 0,
-				     "SELECT sum(count) FROM blocks WHERE stream = "
-				     "'camera'");
+		verify->frames =
+			incise_schema_ask(verify->recording->db, 0,
+					  "SELECT sum(count) FROM blocks WHERE stream = "
+					  "'camera'");
 		verify->rows += verify->frames * INCISE_VERIFY_FRAME_ROWS;
 	}
 	for (int i = 0; i < INCISE_LEDGER_STREAMS && !rc; i++) {
@@ -411,10 +380,10 @@ int incise_verify_recording(struct incise_recording *recording,
 	if ((old || report->interrupted) && level == INCISE_VERIFY_TABLES)
 		level = verify.level = INCISE_VERIFY_ROWS;
 	if (level != INCISE_VERIFY_TABLES) {
-		verify.origin_ns =
-			ask(&verify, 0,
-			    "SELECT min(" END("first_ns", "ASC") ") FROM "
-								 "(" RIG_NAMES ")");
+		verify.origin_ns = incise_schema_ask(
+			recording->db, 0,
+			"SELECT min(" END("first_ns", "ASC") ") FROM "
+							     "(" RIG_NAMES ")");
 		rc = check_streams(&verify);
 	}
 	if (!rc) {

@@ -81,7 +81,7 @@ struct incise_verify_finding incise_verify_finding(enum incise_verify_kind kind)
 
 /* Report a finding with this text. */
 void incise_verify_found(struct incise_verification *verify,
-			 struct incise_verify_finding *finding, const char *fmt, ...)
+			 struct incise_verify_finding finding, const char *fmt, ...)
 	INCISE_PRINTF(3, 4);
 
 /* Report that SQLite failed on a table. */

@@ -81,13 +81,13 @@ static void flush_run(struct walk *walk)
 			 incise_verify_s(walk->verify, run->first_ns),
 			 incise_verify_s(walk->verify, run->last_ns));
 	if (run->what == ALTERED)
-		incise_verify_found(walk->verify, &found,
+		incise_verify_found(walk->verify, found,
 				    "camera: %llu altered in " INCISE_FRAMES_FILE
 				    ", %s: %s not as written",
 				    (unsigned long long)run->count, where, run->why);
 	else
 		incise_verify_found(
-			walk->verify, &found,
+			walk->verify, found,
 			run->what == MISSING
 				? "camera: %llu missing in " INCISE_FRAMES_FILE ", %s"
 				: "camera: %llu in " INCISE_FRAMES_FILE
@@ -275,12 +275,11 @@ static int walk_through(struct walk *walk, struct incise_frames_reader *reader)
 			rc = incise_verify_progress(verify, false);
 	}
 	if (!rc && got < 0) {
-		struct incise_verify_finding found =
-			finding(got == -ENOMEM ? INCISE_VERIFY_UNVERIFIED
-					       : INCISE_VERIFY_DAMAGED);
-
 		flush_run(walk);
-		incise_verify_found(verify, &found, "%s", err.text);
+		incise_verify_found(verify,
+				    finding(got == -ENOMEM ? INCISE_VERIFY_UNVERIFIED
+							   : INCISE_VERIFY_DAMAGED),
+				    "%s", err.text);
 		return 0;
 	}
 	while (!rc && walk->has_row)
@@ -298,7 +297,7 @@ static void report_unopened(struct incise_verification *verify, const char *path
 
 	if (access(path, F_OK) && errno == ENOENT) {
 		found.count = verify->report->frames.missing = verify->frames;
-		incise_verify_found(verify, &found,
+		incise_verify_found(verify, found,
 				    "camera: " INCISE_FRAMES_FILE
 				    " is missing, and %llu frames with it",
 				    (unsigned long long)verify->frames);
@@ -307,7 +306,7 @@ static void report_unopened(struct incise_verification *verify, const char *path
 	found.kind =
 		err->code == EINVAL ? INCISE_VERIFY_DAMAGED : INCISE_VERIFY_UNVERIFIED;
 	found.count = verify->frames;
-	incise_verify_found(verify, &found, "camera: the frames are not verified: %s",
+	incise_verify_found(verify, found, "camera: the frames are not verified: %s",
 			    err->text);
 }
 

@@ -29,7 +29,7 @@ struct incise_verify_finding incise_verify_finding(enum incise_verify_kind kind)
 }
 
 void incise_verify_found(struct incise_verification *verify,
-			 struct incise_verify_finding *finding, const char *fmt, ...)
+			 struct incise_verify_finding finding, const char *fmt, ...)
 {
 	char line[400];
 	va_list args;
@@ -42,18 +42,14 @@ void incise_verify_found(struct incise_verification *verify,
 		if ((unsigned char)*c < ' ' || *c == 0x7f)
 			*c = '?';
 	verify->report->findings++;
-	verify->report->unverified |= finding->kind == INCISE_VERIFY_UNVERIFIED;
-	verify->altered |= finding->kind != INCISE_VERIFY_LOST &&
-			   finding->kind != INCISE_VERIFY_INTERRUPTED &&
-			   finding->kind != INCISE_VERIFY_ENDED &&
-			   finding->kind != INCISE_VERIFY_TIMES;
-	if (verify->watch && verify->watch->found) {
-		/* The line is valid during the call: the caller's finding does not keep it. */
-		struct incise_verify_finding reported = *finding;
-
-		reported.text = line;
-		verify->watch->found(verify->watch->user, &reported);
-	}
+	verify->report->unverified |= finding.kind == INCISE_VERIFY_UNVERIFIED;
+	verify->altered |= finding.kind != INCISE_VERIFY_LOST &&
+			   finding.kind != INCISE_VERIFY_INTERRUPTED &&
+			   finding.kind != INCISE_VERIFY_ENDED &&
+			   finding.kind != INCISE_VERIFY_TIMES;
+	finding.text = line;
+	if (verify->watch && verify->watch->found)
+		verify->watch->found(verify->watch->user, &finding);
 }
 
 void incise_verify_unreadable(struct incise_verification *verify, const char *stream,
@@ -63,7 +59,7 @@ void incise_verify_unreadable(struct incise_verification *verify, const char *st
 		incise_verify_finding(INCISE_VERIFY_DAMAGED);
 
 	finding.stream = stream;
-	incise_verify_found(verify, &finding, "table %s cannot be read: %s", table,
+	incise_verify_found(verify, finding, "table %s cannot be read: %s", table,
 			    sqlite3_errmsg(verify->recording->db));
 }
 

@@ -25,10 +25,10 @@ static void report_missing(struct incise_verify_walk *walk,
 	found.count = block->block - walk->next;
 	walk->out->altered += found.count;
 	if (found.count == 1)
-		incise_verify_found(walk->verify, &found, "%s: block %lld is missing",
+		incise_verify_found(walk->verify, found, "%s: block %lld is missing",
 				    walk->form->stream, (long long)found.first_block);
 	else
-		incise_verify_found(walk->verify, &found,
+		incise_verify_found(walk->verify, found,
 				    "%s: blocks %lld to %lld are missing",
 				    walk->form->stream, (long long)found.first_block,
 				    (long long)found.last_block);
@@ -144,6 +144,32 @@ static int walk_through_blocks(struct incise_verify_walk *walk)
 	return rc;
 }
 
+/* Compare the recorder's counts in table meta with the blocks. */
+static void check_counts(struct incise_verify_walk *walk, uint64_t rows,
+			 uint64_t lost_rows)
+{
+	const struct incise_verify_stream *out = walk->out;
+	struct incise_verify_finding found =
+		incise_verify_walk_finding(walk, INCISE_VERIFY_COUNT);
+
+	if (rows != walk->counted) {
+		found.count = rows;
+		incise_verify_found(walk->verify, found,
+				    "%s: %llu rows were written, and the ledger has %llu",
+				    walk->form->stream, (unsigned long long)rows,
+				    (unsigned long long)walk->counted);
+	}
+	/* Before the end a device may count losses that no gap shows yet. */
+	if (!walk->verify->report->interrupted && lost_rows != out->lost_at_capture) {
+		found.count = lost_rows;
+		incise_verify_found(
+			walk->verify, found,
+			"%s: %llu were lost during the capture, and the ledger has %llu",
+			walk->form->stream, (unsigned long long)lost_rows,
+			(unsigned long long)out->lost_at_capture);
+	}
+}
+
 int incise_verify_stream(struct incise_verification *verify, int stream, uint64_t rows,
 			 uint64_t lost_rows, struct incise_verify_stream *out)
 {
@@ -166,7 +192,7 @@ int incise_verify_stream(struct incise_verification *verify, int stream, uint64_
 		rc = verify->recording->old ? incise_old_verify_stream(&walk)
 					    : walk_through_blocks(&walk);
 	if (!rc)
-		incise_verify_counts(&walk, rows, lost_rows);
+		check_counts(&walk, rows, lost_rows);
 	sqlite3_finalize(walk.blocks);
 	out->expected = walk.counted + out->lost_at_capture;
 	if (out->expected < rows + lost_rows)

@@ -30,7 +30,7 @@ static void report(struct incise_verification *verify,
 	found.last_ns = last->t_ns;
 	found.count = count;
 	incise_verify_found(
-		verify, &found,
+		verify, found,
 		"tracker: numbers %lld to %lld, %.4f to %.4f s: %llu rows %s; their "
 		"t_ns is wrong; readers use the arrival, with a standard uncertainty "
 		"of up to %.3g ms",

@@ -37,16 +37,16 @@ void incise_verify_lost(struct incise_verify_walk *walk, int64_t first, int64_t 
 		snprintf(number, sizeof(number), "numbers %lld to %lld", (long long)first,
 			 (long long)last);
 	if (after_ns < 0 && !walk->known)
-		incise_verify_found(walk->verify, &found, "%s: %llu missing, %s: all",
+		incise_verify_found(walk->verify, found, "%s: %llu missing, %s: all",
 				    walk->form->stream, (unsigned long long)count,
 				    number);
 	else if (after_ns < 0)
-		incise_verify_found(walk->verify, &found,
+		incise_verify_found(walk->verify, found,
 				    "%s: %llu missing at the end, %s, after %.4f s",
 				    walk->form->stream, (unsigned long long)count, number,
 				    incise_verify_s(walk->verify, walk->last_ns));
 	else
-		incise_verify_found(walk->verify, &found,
+		incise_verify_found(walk->verify, found,
 				    "%s: %llu missing, %s, before %.4f s",
 				    walk->form->stream, (unsigned long long)count, number,
 				    incise_verify_s(walk->verify, after_ns));
@@ -71,7 +71,7 @@ void incise_verify_flush(struct incise_verify_walk *walk)
 		snprintf(what, sizeof(what), "%llu rows, and %llu were written",
 			 (unsigned long long)walk->altered_rows,
 			 (unsigned long long)found->count);
-	incise_verify_found(walk->verify, found,
+	incise_verify_found(walk->verify, *found,
 			    "%s: %s altered, numbers %lld to %lld, %.4f to %.4f s: %s",
 			    walk->form->stream, blocks, (long long)found->first_seq,
 			    (long long)found->last_seq,
@@ -126,31 +126,6 @@ int incise_verify_step_block(struct incise_verify_walk *walk)
 	return -EIO;
 }
 
-void incise_verify_counts(struct incise_verify_walk *walk, uint64_t rows,
-			  uint64_t lost_rows)
-{
-	const struct incise_verify_stream *out = walk->out;
-	struct incise_verify_finding found =
-		incise_verify_walk_finding(walk, INCISE_VERIFY_COUNT);
-
-	if (rows != walk->counted) {
-		found.count = rows;
-		incise_verify_found(walk->verify, &found,
-				    "%s: %llu rows were written, and the ledger has %llu",
-				    walk->form->stream, (unsigned long long)rows,
-				    (unsigned long long)walk->counted);
-	}
-	/* Before the end a device may count losses that no gap shows yet. */
-	if (!walk->verify->report->interrupted && lost_rows != out->lost_at_capture) {
-		found.count = lost_rows;
-		incise_verify_found(
-			walk->verify, &found,
-			"%s: %llu were lost during the capture, and the ledger has %llu",
-			walk->form->stream, (unsigned long long)lost_rows,
-			(unsigned long long)out->lost_at_capture);
-	}
-}
-
 void incise_verify_count_block(struct incise_verify_walk *walk,
 			       const struct incise_ledger_block *block)
 {
@@ -169,7 +144,7 @@ void incise_verify_no_end(struct incise_verify_walk *walk)
 	if (walk->verify->report->interrupted)
 		return;
 	found.first_block = found.last_block = walk->next;
-	incise_verify_found(walk->verify, &found,
+	incise_verify_found(walk->verify, found,
 			    "%s: the ledger has no end: its last blocks were removed",
 			    walk->form->stream);
 }

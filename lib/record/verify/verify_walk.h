@@ -46,8 +46,4 @@ void incise_verify_lost(struct incise_verify_walk *walk, int64_t first, int64_t 
 
 void incise_verify_no_end(struct incise_verify_walk *walk);
 
-/* Compare the recorder's counts in table meta with the blocks. */
-void incise_verify_counts(struct incise_verify_walk *walk, uint64_t rows,
-			  uint64_t lost_rows);
-
 #endif
