@@ -113,6 +113,11 @@ int incise_schema_fail(sqlite3 *db, const char *path, struct incise_error *err)
 				db ? sqlite3_errmsg(db) : strerror(ENOMEM));
 }
 
+int incise_schema_no_memory(const char *path, struct incise_error *err)
+{
+	return incise_error_set(err, ENOMEM, "%s: out of memory", path);
+}
+
 /* The number that a statement returns. */
 static int pragma(sqlite3 *db, const char *sql, sqlite3_int64 *value)
 {

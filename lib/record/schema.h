@@ -50,4 +50,7 @@ int incise_schema_errno(sqlite3 *db);
 /* Report a failed read of a recording; @path names it. Returns -errno. */
 int incise_schema_fail(sqlite3 *db, const char *path, struct incise_error *err);
 
+/* Returns -ENOMEM. */
+int incise_schema_no_memory(const char *path, struct incise_error *err);
+
 #endif

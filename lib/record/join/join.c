@@ -26,6 +26,7 @@
 #include "../read/session.h"
 #include "../read/source.h"
 #include "../schema.h"
+#include "../verify/seal_walk.h"
 #include "align.h"
 
 #define NS_PER_S 1000000000LL
@@ -55,11 +56,6 @@ struct join {
 	int n;
 	struct incise_error *err;
 };
-
-static int no_memory(struct join *join, const char *path)
-{
-	return incise_error_set(join->err, ENOMEM, "%s: out of memory", path);
-}
 
 static void note(struct join *join, const char *fmt, ...) INCISE_PRINTF(2, 3);
 static void note(struct join *join, const char *fmt, ...)
@@ -100,19 +96,9 @@ static void name_member(struct join *join, int at)
 static void read_text(const struct member *member, const char *key, char *text,
 		      size_t size)
 {
-	sqlite3_stmt *stmt = NULL;
-
-	text[0] = '\0';
-	if (sqlite3_prepare_v2(member->recording->db,
-			       "SELECT value FROM meta WHERE key = ?", -1, &stmt,
-			       NULL) == SQLITE_OK &&
-	    sqlite3_bind_text(stmt, 1, key, -1, SQLITE_STATIC) == SQLITE_OK &&
-	    sqlite3_step(stmt) == SQLITE_ROW && sqlite3_column_text(stmt, 0))
-		snprintf(text, size, "%s", (const char *)sqlite3_column_text(stmt, 0));
-	sqlite3_finalize(stmt);
+	incise_seal_key(member->recording, key, text, size, NULL);
 	for (char *c = text; *c; c++)
-		if ((unsigned char)*c < ' ' || *c == 0x7f ||
-		    ((unsigned char)*c == 0xc2 && (c[1] & 0xe0) == 0x80))
+		if ((unsigned char)*c == 0xc2 && (c[1] & 0xe0) == 0x80)
 			*c = '?';
 }
 
@@ -143,7 +129,8 @@ static int read_span(struct join *join, struct member *member)
 static int open_member(struct join *join, const char *path)
 {
 	struct member *member = &join->members[join->n];
-	struct incise_recording *recording = incise_recording_open_any(path, join->err);
+	struct incise_recording *recording =
+		incise_recording_open_as(path, INCISE_RECORDING_ACTIVE, join->err);
 	int rc;
 
 	if (!recording)
@@ -255,7 +242,8 @@ static int add_time(struct join *join, int64_t **times, size_t *n, int64_t t_ns)
 	int64_t *more = realloc(*times, (*n + 1) * sizeof(**times));
 
 	if (!more)
-		return no_memory(join, join->members[0].recording->path);
+		return incise_schema_no_memory(join->members[0].recording->path,
+					       join->err);
 	*times = more;
 	more[(*n)++] = t_ns;
 	return 0;
@@ -315,7 +303,7 @@ static int add_knot(struct join *join, struct member *member, int64_t t_ns, int6
 		realloc(map->knots, (map->n + 1) * sizeof(*knots));
 
 	if (!knots)
-		return no_memory(join, member->recording->path);
+		return incise_schema_no_memory(member->recording->path, join->err);
 	map->knots = knots;
 	if (map->n && to_ns <= knots[map->n - 1].to_ns)
 		return incise_error_set(
@@ -636,7 +624,7 @@ static int bring_member(struct join *join, const struct member *member,
 	int rc = 0;
 
 	if (asprintf(&own, "%s/%s", folder, member->name) < 0)
-		return no_memory(join, folder);
+		return incise_schema_no_memory(folder, join->err);
 	if (mkdir(own, 0777))
 		rc = -errno;
 	for (size_t i = 0; i < sizeof(files) / sizeof(*files) && !rc; i++)
@@ -741,7 +729,7 @@ static int write_database(struct join *join, const char *folder)
 	int rc;
 
 	if (asprintf(&path, "%s/%s", folder, INCISE_SCHEMA_DB) < 0)
-		return no_memory(join, folder);
+		return incise_schema_no_memory(folder, join->err);
 	rc = sqlite3_open_v2(
 		path, &db,
 		SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, NULL);
@@ -756,17 +744,6 @@ static int write_database(struct join *join, const char *folder)
 	return rc;
 }
 
-/* Nothing that cannot be read gets the final name. */
-static int try_session(struct join *join, const char *folder)
-{
-	struct incise_recording *recording = incise_recording_open_any(folder, join->err);
-
-	if (!recording)
-		return -errno;
-	incise_recording_close(recording);
-	return 0;
-}
-
 static int write_session(struct join *join, const char *output)
 {
 	char *part;
@@ -777,7 +754,7 @@ static int write_session(struct join *join, const char *output)
 		return incise_error_set(join->err, EEXIST,
 					"%s: exists; give another name", output);
 	if (asprintf(&part, "%s.part", output) < 0)
-		return no_memory(join, output);
+		return incise_schema_no_memory(output, join->err);
 	if (mkdir(part, 0777))
 		rc = incise_error_set(
 			join->err, errno, "%s: cannot be made: %s; %s",
@@ -791,7 +768,7 @@ static int write_session(struct join *join, const char *output)
 	if (!rc)
 		rc = write_database(join, part);
 	if (!rc)
-		rc = try_session(join, part);
+		rc = incise_recording_try(part, join->err);
 	if (!rc && rename(part, output))
 		rc = incise_error_set(join->err, errno, "%s: %s", output,
 				      strerror(errno));
@@ -814,7 +791,7 @@ int incise_session_join(const char *const *paths, int n,
 					INCISE_SESSION_MEMBERS_MAX);
 	join.members = calloc((size_t)n, sizeof(*join.members));
 	if (!join.members)
-		return no_memory(&join, output);
+		return incise_schema_no_memory(output, err);
 	for (int i = 0; i < n && !rc; i++)
 		rc = open_member(&join, paths[i]);
 	for (int i = 0; i < n && !rc; i++)

@@ -269,16 +269,6 @@ static int write_rest(struct conversion *c, struct incise_error *err)
 
 /* --- tables ---------------------------------------------------------------------------- */
 
-/* The identity of the old recording. */
-static const char *const head_sql[] = {
-	[1] = "''",
-	[2] = "(SELECT ', ledger ' || group_concat(stream || ' ' || printf('%08x', "
-	      "crc), ', ') FROM (SELECT stream, crc, max(block) FROM old.ledger GROUP "
-	      "BY stream ORDER BY stream))",
-	[3] = "(SELECT ', head ' || lower(hex(head)) FROM old.seal ORDER BY number DESC "
-	      "LIMIT 1)",
-};
-
 static int run_bound(struct conversion *c, const char *sql, const char *text)
 {
 	sqlite3_stmt *stmt = NULL;
@@ -292,7 +282,7 @@ static int run_bound(struct conversion *c, const char *sql, const char *text)
 	return rc;
 }
 
-/* The key converted_from. */
+/* The key converted_from: the identity of the old recording. */
 static int write_origin(struct conversion *c)
 {
 	const int form = c->old->form;
@@ -301,13 +291,18 @@ static int write_origin(struct conversion *c)
 	if (*c->made->altered)
 		snprintf(text, sizeof(text), "; not as it was recorded: %s",
 			 c->made->altered);
-	snprintf(sql, sizeof(sql),
-		 "INSERT OR REPLACE INTO meta VALUES('converted_from', 'format %d' || "
-		 "coalesce(%s, '') || ?)",
-		 form,
-		 head_sql[form < 2   ? 1
-			  : form < 4 ? 2
-				     : 3]);
+	snprintf(
+		sql, sizeof(sql),
+		"INSERT OR REPLACE INTO meta VALUES('converted_from', 'format %d' || "
+		"coalesce(%s, '') || ?)",
+		form,
+		form < 2 ? "''"
+		: incise_old_is_sealed(c->old)
+			? "(SELECT ', head ' || lower(hex(head)) FROM old.seal ORDER BY "
+			  "number DESC LIMIT 1)"
+			: "(SELECT ', ledger ' || group_concat(stream || ' ' || "
+			  "printf('%08x', crc), ', ') FROM (SELECT stream, crc, "
+			  "max(block) FROM old.ledger GROUP BY stream ORDER BY stream))");
 	return run_bound(c, sql, text);
 }
 
@@ -361,7 +356,7 @@ static int open_frames(struct conversion *c, struct incise_error *err)
 	if (c->old->form < 2 || c->old->form > 3)
 		return 0;
 	if (asprintf(&path, "%s/" INCISE_FRAMES_FILE, c->folder) < 0)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", c->folder);
+		return incise_schema_no_memory(c->folder, err);
 	if (!access(path, F_OK)) {
 		c->frames = incise_frames_reader_new(path, &found);
 		if (c->frames)
@@ -389,7 +384,7 @@ static int keep_seal(struct conversion *c, struct incise_error *err)
 	if (from && asprintf(&to, "%s-before", from) < 0)
 		to = NULL;
 	if (!to)
-		rc = incise_error_set(err, ENOMEM, "%s: out of memory", c->folder);
+		rc = incise_schema_no_memory(c->folder, err);
 	else if (rename(from, to) && errno != ENOENT)
 		rc = incise_error_set(err, errno,
 				      "%s: its folder seal cannot become "
@@ -476,7 +471,7 @@ static int write_database(struct conversion *c, struct incise_error *err)
 	if (old && asprintf(&new, "%s.new", old) < 0)
 		new = NULL;
 	rc = new ? open_database(c, new, old, err)
-		 : incise_error_set(err, ENOMEM, "%s: out of memory", c->folder);
+		 : incise_schema_no_memory(c->folder, err);
 	if (!rc)
 		rc = write_all(c, err);
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++) {
@@ -524,7 +519,8 @@ static int check(struct incise_recording *recording, struct incise_recovered *ma
 static int check_new(const char *folder, struct incise_recovered *made,
 		     struct incise_error *err)
 {
-	struct incise_recording *recording = incise_recording_open_original(folder, err);
+	struct incise_recording *recording =
+		incise_recording_open_as(folder, INCISE_RECORDING_ORIGINAL, err);
 	int rc = recording ? check(recording, made, err) : -errno;
 
 	incise_recording_close(recording);
@@ -538,7 +534,7 @@ int incise_recording_convert(const char *folder, const char *path, bool damaged,
 	struct incise_recovered now = {0};
 	int rc;
 
-	c.old = incise_recording_open_older(folder, err);
+	c.old = incise_recording_open_as(folder, INCISE_RECORDING_OLDER, err);
 	if (!c.old)
 		return -errno;
 	made->converted = c.old->old;
@@ -552,7 +548,7 @@ int incise_recording_convert(const char *folder, const char *path, bool damaged,
 	free(c.old->path);
 	c.old->path = strdup(path);
 	if (!c.old->path)
-		rc = incise_error_set(err, ENOMEM, "%s: out of memory", path);
+		rc = incise_schema_no_memory(path, err);
 	if (!rc && *made->altered && !damaged)
 		rc = incise_error_set(err, EBADMSG, "%s: not as it was recorded: %s",
 				      path, made->altered);

@@ -174,8 +174,7 @@ static int next_rows(struct incise_source *source, struct incise_error *err)
 
 	batch->n = 0;
 	if (!incise_batch_reserve(batch, source->rows_max))
-		return incise_error_set(err, ENOMEM, "%s: out of memory",
-					source->recording->path);
+		return incise_schema_no_memory(source->recording->path, err);
 	while (batch->n < source->rows_max &&
 	       (source->held || (rc = incise_source_step(source)) == SQLITE_ROW)) {
 		source->held = false;

@@ -12,7 +12,7 @@
  */
 #include <errno.h>
 #include "../schema.h"
-#include "../verify/verify_walk.h"
+#include "../verify/verify.h"
 #include "old.h"
 
 #define REPORT_ROWS 4096

@@ -9,7 +9,6 @@
 #include <incise/clock.h>
 #include "cut.h"
 #include "recalibration.h"
-#include "session_map.h"
 #include "../schema.h"
 
 bool incise_cut_step(struct incise_cut_count *cut, double depth_mm)
@@ -180,47 +179,32 @@ static int check_tracker(struct incise_recording *rec, struct incise_error *err)
 
 /*
  * The wall clock was read at the event "start", when the recorder started: samples come later,
- * after a trigger by any time. 0 or -errno.
+ * after a trigger by any time.
  */
-static int find_started(struct incise_recording *rec, struct incise_recording_info *info,
-			struct incise_error *err)
+static void find_started(struct incise_recording *rec, struct incise_recording_info *info)
 {
 	const struct incise_stream_source *source =
 		rec->streams[info->force ? INCISE_LEDGER_FORCE : INCISE_LEDGER_TRACKER];
-	const struct incise_recording *member = source->file;
 	struct tm utc = {0};
-	const char *end = strptime(member->meta.started, "%Y-%m-%dT%H:%M:%SZ", &utc);
-	int64_t read_s = end && !*end ? (int64_t)timegm(&utc) : 0, after_ns;
-	sqlite3_stmt *stmt = NULL;
+	const char *end =
+		strptime(source->file->meta.started, "%Y-%m-%dT%H:%M:%SZ", &utc);
+	int64_t read_s = end && !*end ? (int64_t)timegm(&utc) : 0, start_ns, after_ns;
 	time_t started;
-	int rc = 0;
 
-	if (read_s <= 0 || read_s > UINT32_MAX)
-		return 0;
-	if (sqlite3_prepare_v2(member->db,
-			       "SELECT t_ns FROM events WHERE kind = 'start' "
-			       "ORDER BY rowid LIMIT 1",
-			       -1, &stmt, NULL) != SQLITE_OK)
-		return incise_schema_fail(member->db, member->path, err);
-	rc = sqlite3_step(stmt);
+	start_ns = incise_schema_ask(source->file->db, -1,
+				     "SELECT t_ns FROM events WHERE kind = 'start' "
+				     "ORDER BY rowid LIMIT 1");
 	/* A time that is damaged, or later than the samples, leaves the text as it is. */
-	if (rc == SQLITE_ROW &&
-	    !__builtin_sub_overflow(info->start_ns,
-				    incise_session_time(source->map,
-							sqlite3_column_int64(stmt, 0)),
-				    &after_ns) &&
-	    after_ns >= 0 && after_ns < INT64_MAX / 4) {
-		info->start_utc_ns = read_s * INCISE_NS_PER_S + after_ns;
-		started = (time_t)(info->start_utc_ns / INCISE_NS_PER_S);
-		strftime(info->started, sizeof(info->started), "%Y-%m-%dT%H:%M:%SZ",
-			 gmtime_r(&started, &utc));
-	}
-	if (rc == SQLITE_ROW || rc == SQLITE_DONE)
-		rc = 0;
-	else
-		rc = incise_schema_fail(member->db, member->path, err);
-	sqlite3_finalize(stmt);
-	return rc;
+	if (read_s <= 0 || read_s > UINT32_MAX || start_ns < 0 ||
+	    __builtin_sub_overflow(info->start_ns,
+				   incise_session_time(source->map, start_ns),
+				   &after_ns) ||
+	    after_ns < 0 || after_ns >= INT64_MAX / 4)
+		return;
+	info->start_utc_ns = read_s * INCISE_NS_PER_S + after_ns;
+	started = (time_t)(info->start_utc_ns / INCISE_NS_PER_S);
+	strftime(info->started, sizeof(info->started), "%Y-%m-%dT%H:%M:%SZ",
+		 gmtime_r(&started, &utc));
 }
 
 /* Count the cuts by the rows of the depth alone, and find the largest depth in them. */
@@ -324,7 +308,8 @@ static int find_info(struct incise_recording *rec, bool samples,
 		info->start_ns = incise_session_time(map, info->start_ns);
 		info->end_ns = incise_session_time(map, info->end_ns);
 	}
-	return find_started(rec, info, err);
+	find_started(rec, info);
+	return 0;
 }
 
 int incise_recording_info(struct incise_recording *rec,

@@ -347,7 +347,7 @@ char *incise_recording_folder(const char *path, struct incise_error *err)
 	while (length > 1 && path[length - 1] == '/')
 		length--;
 	if (asprintf(&folder, "%.*s.part", (int)length, path) < 0) {
-		incise_error_set(err, ENOMEM, "%s: out of memory", path);
+		incise_schema_no_memory(path, err);
 		return NULL;
 	}
 	folder[length] = 0;

@@ -10,8 +10,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include "../frames.h"
+#include "../schema.h"
 #include "recording.h"
-#include "session_map.h"
+#include "rows.h"
 #include "source.h"
 
 struct incise_frame_reader {
@@ -27,8 +28,7 @@ static int open_file(struct incise_frame_reader *reader, struct incise_error *er
 	char *path;
 
 	if (asprintf(&path, "%s/%s", reader->recording->path, INCISE_FRAMES_FILE) < 0)
-		return incise_error_set(err, ENOMEM, "%s: out of memory",
-					reader->recording->path);
+		return incise_schema_no_memory(reader->recording->path, err);
 	incise_frames_reader_close(reader->file);
 	reader->file = incise_frames_reader_new(path, err);
 	reader->passed = 0;
@@ -43,7 +43,7 @@ struct incise_frame_reader *incise_frame_reader_new(struct incise_recording *rec
 	int rc = 0;
 
 	if (!reader)
-		rc = incise_error_set(err, ENOMEM, "%s: out of memory", recording->path);
+		rc = incise_schema_no_memory(recording->path, err);
 	if (!rc) {
 		reader->opened = incise_recording_open(recording->path, err);
 		if (reader->opened) {

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../schema.h"
 #include "database.h"
 #include "recording.h"
 #include "session.h"
@@ -48,7 +49,7 @@ static int open_session(struct incise_recording *rec, const char *choice,
 	if (rc || !choice)
 		return rc;
 	if (asprintf(&path, "%s:%s", rec->path, choice) < 0)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+		return incise_schema_no_memory(rec->path, err);
 	free(rec->path);
 	rec->path = path;
 	return 0;
@@ -64,7 +65,7 @@ static struct incise_recording *open_path(const char *path, bool any,
 	int rc;
 
 	if (folder && !rec)
-		incise_error_set(err, ENOMEM, "%s: out of memory", path);
+		incise_schema_no_memory(path, err);
 	if (!rec)
 		return NULL;
 	rc = incise_recording_read(rec, how, err);
@@ -87,22 +88,22 @@ struct incise_recording *incise_recording_open(const char *path, struct incise_e
 	return open_path(path, false, INCISE_RECORDING_ACTIVE, err);
 }
 
-struct incise_recording *incise_recording_open_any(const char *path,
-						   struct incise_error *err)
+struct incise_recording *incise_recording_open_as(const char *path,
+						  enum incise_recording_how how,
+						  struct incise_error *err)
 {
-	return open_path(path, true, INCISE_RECORDING_ACTIVE, err);
+	return open_path(path, true, how, err);
 }
 
-struct incise_recording *incise_recording_open_original(const char *path,
-							struct incise_error *err)
+int incise_recording_try(const char *path, struct incise_error *err)
 {
-	return open_path(path, true, INCISE_RECORDING_ORIGINAL, err);
-}
+	struct incise_recording *rec =
+		open_path(path, true, INCISE_RECORDING_ACTIVE, err);
 
-struct incise_recording *incise_recording_open_older(const char *path,
-						     struct incise_error *err)
-{
-	return open_path(path, true, INCISE_RECORDING_OLDER, err);
+	if (!rec)
+		return -errno;
+	incise_recording_close(rec);
+	return 0;
 }
 
 const char *incise_recording_name(const struct incise_recording *rec)

@@ -60,11 +60,6 @@ static int compare(const void *a, const void *b)
 
 /* --- the folder ---------------------------------------------------------------------- */
 
-static int no_memory(const char *path, struct incise_error *err)
-{
-	return incise_error_set(err, ENOMEM, "%s: out of memory", path);
-}
-
 /* A link would lead out of the recording. */
 int incise_recalibration_folder(const char *folder, struct incise_error *err)
 {
@@ -72,7 +67,7 @@ int incise_recalibration_folder(const char *folder, struct incise_error *err)
 	int fd;
 
 	if (asprintf(&path, "%s/" INCISE_RECALIBRATION_FOLDER, folder) < 0)
-		return no_memory(folder, err);
+		return incise_schema_no_memory(folder, err);
 	fd = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
 	if (fd < 0 && errno != ENOENT)
 		incise_error_set(err, errno, "%s: %s", path,
@@ -93,7 +88,7 @@ int incise_recalibration_list(const char *folder, struct incise_recalibration **
 
 	*list = calloc(1, sizeof(**list));
 	if (!*list || (fd >= 0 && !dir))
-		n = no_memory(folder, err);
+		n = incise_schema_no_memory(folder, err);
 	while (dir && n > 0 && (found = readdir(dir))) {
 		struct incise_recalibration entry, *more;
 
@@ -101,7 +96,7 @@ int incise_recalibration_list(const char *folder, struct incise_recalibration **
 			continue;
 		more = realloc(*list, (size_t)(n + 1) * sizeof(*more));
 		if (!more) {
-			n = no_memory(folder, err);
+			n = incise_schema_no_memory(folder, err);
 			break;
 		}
 		*list = more;
@@ -137,14 +132,14 @@ static char *read_text(const char *folder, struct incise_recalibration *entry,
 	size_t size;
 
 	if (asprintf(&path, "%s/%s", folder, entry->file) < 0) {
-		no_memory(folder, err);
+		incise_schema_no_memory(folder, err);
 		return NULL;
 	}
 	text = incise_infile_read(path, &incise_recalibration_kind, &size, err);
 	free(path);
 	if (text && incise_recalibration_digest(entry, text, size)) {
 		free(text);
-		no_memory(folder, err);
+		incise_schema_no_memory(folder, err);
 		return NULL;
 	}
 	return text;
@@ -190,7 +185,7 @@ static int run(struct incise_recording *rec, char *sql, struct incise_error *err
 	if (rc == SQLITE_OK)
 		return 0;
 	return sql ? incise_schema_fail(rec->db, rec->path, err)
-		   : no_memory(rec->path, err);
+		   : incise_schema_no_memory(rec->path, err);
 }
 
 static int put_number(struct incise_recording *rec, const char *key, double value,
@@ -258,7 +253,7 @@ static int load(struct incise_recording *rec, struct incise_recalibrated *to,
 
 	to->calibration = own_calibration(&rec->meta);
 	if (asprintf(&path, "%s/%s", rec->path, to->entry.file) < 0)
-		return no_memory(rec->path, err);
+		return incise_schema_no_memory(rec->path, err);
 	rc = incise_calibration_update(path, &to->calibration, &why);
 	free(path);
 	if (rc)
@@ -289,7 +284,7 @@ int incise_recalibration_apply(struct incise_recording *rec, struct incise_error
 		goto out;
 	rec->recalibrated = calloc(1, sizeof(*rec->recalibrated));
 	if (!rec->recalibrated) {
-		rc = no_memory(rec->path, err);
+		rc = incise_schema_no_memory(rec->path, err);
 		goto out;
 	}
 	rec->recalibrated->entry = list[n - 1];

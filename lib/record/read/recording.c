@@ -372,7 +372,7 @@ static int read_knots(struct incise_stream_source *to, const char *stream,
 	if (!to->knots)
 		to->knots = calloc(INCISE_TIMELINE_KNOTS_MAX, sizeof(*to->knots));
 	if (!to->knots)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+		return incise_schema_no_memory(rec->path, err);
 	if (sqlite3_prepare_v2(rec->db,
 			       "SELECT seq, t_ns, sd_ns, begins FROM knots WHERE stream "
 			       "= ? ORDER BY knot",

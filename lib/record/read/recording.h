@@ -7,7 +7,6 @@
  *     source.c          batches of a stream
  *     ../old/           those of an older format
  *     recording.c       one recording, and its streams, found once
- *     others.c          rows of the tracker that are not on its line
  *     rows.c            rows, and their best times
  *     session.c         recordings of several machines as one
  *     open.c            either, by its path
@@ -123,17 +122,16 @@ int incise_recording_need_zero(const struct incise_recording *recording,
 
 /* --- open.c -------------------------------------------------------------------------- */
 
-/* The same as incise_recording_open(), and a session without a choice: of any of its members. */
-struct incise_recording *incise_recording_open_any(const char *path,
-						   struct incise_error *err);
+/*
+ * The same as incise_recording_open(), and a session without a choice: of any of its members. These are always read by
+ * their active calibration.
+ */
+struct incise_recording *incise_recording_open_as(const char *path,
+						  enum incise_recording_how how,
+						  struct incise_error *err);
 
-/* The same, as it was recorded: by the calibration of its capture. Members of a session are not. */
-struct incise_recording *incise_recording_open_original(const char *path,
-							struct incise_error *err);
-
-/* The same, of any format. */
-struct incise_recording *incise_recording_open_older(const char *path,
-						     struct incise_error *err);
+/* Whether it can be opened: 0 or -errno. Nothing else gets a final name. */
+int incise_recording_try(const char *path, struct incise_error *err);
 
 /*
  * Convert the recording in a folder, which is a copy, to today's format, if it has an older one; @path is that

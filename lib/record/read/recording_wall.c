@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <incise/wall.h>
+#include "../schema.h"
 #include "recording.h"
 #include "session.h"
 #include "source.h"
@@ -65,8 +66,7 @@ static int read_points(struct incise_recording *rec, struct incise_wall_point **
 				       ? realloc(*points, capacity * sizeof(*more))
 				       : NULL;
 			if (!more) {
-				rc = incise_error_set(err, ENOMEM, "%s: out of memory",
-						      rec->path);
+				rc = incise_schema_no_memory(rec->path, err);
 				break;
 			}
 			*points = more;

@@ -16,8 +16,31 @@
 #include <stdint.h>
 #include <incise/calibration.h>
 #include <incise/error.h>
-#include "others.h"
+#include "../time/fit.h"
 #include "source.h"
+
+/* --- the clock of a session -------------------------------------------------------------- */
+
+/*
+ */
+struct incise_session_knot {
+	int64_t t_ns, to_ns; /* both increase */
+	double bound_ns;     /* of the error, with the first member's */
+};
+
+struct incise_session_map {
+	struct incise_session_knot *knots;
+	size_t n; /* 2 or more */
+};
+
+/* A time of a member's clock on the session's, ns; without a map the same. */
+int64_t incise_session_time(const struct incise_session_map *map, int64_t t_ns);
+
+/* And back. */
+int64_t incise_session_member_time(const struct incise_session_map *map, int64_t t_ns);
+
+/* Bound of its error, ns. */
+double incise_session_bound(const struct incise_session_map *map, int64_t t_ns);
 
 /* --- times ------------------------------------------------------------------------- */
 
@@ -57,6 +80,10 @@ bool incise_row_times_next(struct incise_row_times *times, int64_t seq, int64_t 
 int64_t incise_row_times_line(const struct incise_row_times *times, uint64_t seq,
 			      int64_t t_ns);
 double incise_row_times_line_sd(const struct incise_row_times *times, uint64_t seq);
+
+/* The first row from a number on that is not on the line of the tracker, or NULL. */
+const struct incise_fit_time *incise_row_times_other(const struct incise_row_times *times,
+						     uint64_t seq);
 
 /* Its standard uncertainty, s; 0 if it is not known. */
 double incise_row_times_sd(const struct incise_row_times *times, int64_t seq);

@@ -154,7 +154,7 @@ static int open_member(struct incise_session *session, const char *folder,
 	int rc = 0;
 
 	if (asprintf(&path, "%s/%s", folder, name) < 0)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", folder);
+		return incise_schema_no_memory(folder, err);
 	own = incise_recording_folder(path, NULL);
 	session->members[at] = own ? incise_recording_new(own) : NULL;
 	session->n += session->members[at] != NULL;
@@ -164,7 +164,7 @@ static int open_member(struct incise_session *session, const char *folder,
 						"%s: member %s is missing in its folder; "
 						"join again",
 						folder, name)
-			     : incise_error_set(err, ENOMEM, "%s: out of memory", folder);
+			     : incise_schema_no_memory(folder, err);
 	if (!rc)
 		rc = incise_recording_read(session->members[at], INCISE_RECORDING_ACTIVE,
 					   err);
@@ -257,8 +257,7 @@ static int read_map(struct incise_session *session, int member, sqlite3 *db,
 			capacity = capacity ? 2 * capacity : 16;
 			knots = realloc(map->knots, capacity * sizeof(*knots));
 			if (!knots) {
-				rc = incise_error_set(err, ENOMEM, "%s: out of memory",
-						      folder);
+				rc = incise_schema_no_memory(folder, err);
 				break;
 			}
 			map->knots = knots;
@@ -540,8 +539,7 @@ static int copy_events(struct incise_session *session, int at, sqlite3_stmt *ins
 		rc = 0;
 		if (asprintf(&text, "%s: %s", session->info[at].name,
 			     incise_rows_text(&rows, 3, NULL)) < 0) {
-			rc = incise_error_set(err, ENOMEM, "%s: out of memory",
-					      member->path);
+			rc = incise_schema_no_memory(member->path, err);
 			break;
 		}
 		sqlite3_reset(insert);
@@ -549,8 +547,7 @@ static int copy_events(struct incise_session *session, int at, sqlite3_stmt *ins
 		sqlite3_bind_text(insert, 2, kind, (int)n, SQLITE_TRANSIENT);
 		sqlite3_bind_text(insert, 3, text, -1, SQLITE_TRANSIENT);
 		if (sqlite3_step(insert) != SQLITE_DONE)
-			rc = incise_error_set(err, ENOMEM, "%s: out of memory",
-					      member->path);
+			rc = incise_schema_no_memory(member->path, err);
 		free(text);
 	}
 	incise_rows_close(&rows);
@@ -577,7 +574,7 @@ static int merge_events(struct incise_recording *rec, bool all, struct incise_er
 			 NULL, NULL, NULL) != SQLITE_OK ||
 	    sqlite3_prepare_v2(rec->db, "INSERT INTO events VALUES(?, ?, ?)", -1, &insert,
 			       NULL) != SQLITE_OK)
-		rc = incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+		rc = incise_schema_no_memory(rec->path, err);
 	for (int i = 0; i < rec->session->n && !rc; i++)
 		if (all || is_chosen(rec->session, i))
 			rc = copy_events(rec->session, i, insert, err);
@@ -601,7 +598,7 @@ int incise_session_open(struct incise_recording *rec, const char *folder,
 			calloc(INCISE_SESSION_MEMBERS_MAX, sizeof(*session->maps));
 	}
 	if (!session || !session->info || !session->members || !session->maps)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", folder);
+		return incise_schema_no_memory(folder, err);
 	if (!rc)
 		rc = read_members(session, rec->db, folder, err);
 	for (int i = 0; i < session->n && !rc; i++) {

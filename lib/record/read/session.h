@@ -15,8 +15,7 @@
 #include <stdint.h>
 #include <incise/session.h>
 #include <incise/wall.h>
-#include "recording.h"
-#include "session_map.h"
+#include "rows.h"
 
 #define INCISE_SESSION_VERSION 1 /* SQLite's user_version */
 #define INCISE_SESSION_KNOTS_MAX 1000000

@@ -48,8 +48,7 @@ static int fail(struct incise_source *source, struct incise_error *err)
 
 static int no_memory(struct incise_source *source, struct incise_error *err)
 {
-	return incise_error_set(err, ENOMEM, "%s: out of memory",
-				source->recording->path);
+	return incise_schema_no_memory(source->recording->path, err);
 }
 
 int incise_source_step(struct incise_source *source)

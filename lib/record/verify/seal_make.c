@@ -185,8 +185,7 @@ static int next_commit(struct incise_seal_walk *walk, struct incise_error *err)
 			return fail(walk, err);
 	}
 	if (!incise_seal_commit(seal, walk->t_ns))
-		return incise_error_set(err, ENOMEM, "%s: out of memory",
-					walk->recording->path);
+		return incise_schema_no_memory(walk->recording->path, err);
 	walk->good &= !memcmp(head, seal->head, sizeof(head));
 	/* The next commits go on from what is written: only the wrong ones are reported. */
 	if (!walk->good)
@@ -230,8 +229,7 @@ static int make_file_part(struct incise_recording *recording,
 	*bytes = 0;
 	memset(digest, 0, INCISE_SEAL_BYTES);
 	if (fd < 0 && errno == ENOMEM)
-		return incise_error_set(err, ENOMEM, "%s: out of memory",
-					recording->path);
+		return incise_schema_no_memory(recording->path, err);
 	if (fd < 0)
 		return 0; /* without a camera */
 	rc = fstat(fd, &st) ? -errno : 0;
@@ -378,7 +376,8 @@ static size_t make_text(struct incise_recording *recording,
 
 char *incise_seal_statement(const char *path, struct incise_error *err)
 {
-	struct incise_recording *recording = incise_recording_open_original(path, err);
+	struct incise_recording *recording =
+		incise_recording_open_as(path, INCISE_RECORDING_ORIGINAL, err);
 	char text[INCISE_STATEMENT_MAX], *copy;
 	size_t n;
 	int code;
@@ -391,6 +390,6 @@ char *incise_seal_statement(const char *path, struct incise_error *err)
 	errno = code;
 	copy = n ? strndup(text, n) : NULL;
 	if (n && !copy)
-		incise_error_set(err, ENOMEM, "%s: out of memory", path);
+		incise_schema_no_memory(path, err);
 	return copy;
 }

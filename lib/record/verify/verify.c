@@ -99,35 +99,30 @@ static void check_names(struct incise_verification *verify)
 /* The number of samples that a dead device would still have sent is not known. */
 static void report_ends(struct incise_verification *verify)
 {
-	sqlite3_stmt *stmt;
+	struct incise_recording *recording = verify->recording;
 
-	if (sqlite3_prepare_v2(
-		    verify->recording->db,
-		    "SELECT name, ended, " END("last_ns",
-					       "DESC") " FROM "
-						       "streams WHERE ended IS NOT NULL",
-		    -1, &stmt, NULL) != SQLITE_OK)
-		return; /* reported with the pages and seals */
-	while (sqlite3_step(stmt) == SQLITE_ROW) {
+	for (int i = 0; i < recording->n_table; i++) {
+		const struct incise_stream *stream = &recording->table[i];
 		struct incise_verify_finding found =
 			incise_verify_finding(INCISE_VERIFY_ENDED);
-		const char *name = (const char *)sqlite3_column_text(stmt, 0);
-		const char *why = (const char *)sqlite3_column_text(stmt, 1);
 
-		found.stream = name ? name : "";
-		if (sqlite3_column_type(stmt, 2) == SQLITE_INTEGER)
-			found.last_ns = sqlite3_column_int64(stmt, 2);
+		if (!*stream->ended)
+			continue;
+		found.stream = stream->name;
+		found.last_ns = incise_schema_ask(
+			recording->db, -1,
+			"SELECT " END("last_ns", "DESC") " FROM (SELECT %Q AS name)",
+			stream->name);
 		if (found.last_ns < 0)
 			incise_verify_found(verify, found, "%s: gave nothing: %s",
-					    found.stream, why ? why : "");
+					    stream->name, stream->ended);
 		else
 			incise_verify_found(
 				verify, found,
 				"%s: ended at %.4f s, before the recording did: %s",
-				found.stream, incise_verify_s(verify, found.last_ns),
-				why ? why : "");
+				stream->name, incise_verify_s(verify, found.last_ns),
+				stream->ended);
 	}
-	sqlite3_finalize(stmt);
 }
 
 /* One that was converted as it was does not become good by that. */
@@ -418,21 +413,6 @@ int incise_verify_recording(struct incise_recording *recording,
 	return 0;
 }
 
-static int verify_one(const char *path, const struct incise_verify_watch *watch,
-		      enum incise_verify_level level,
-		      const struct incise_seal_statement *statement,
-		      struct incise_verify_report *report, struct incise_error *err)
-{
-	struct incise_recording *recording = incise_recording_open_original(path, err);
-	int rc;
-
-	if (!recording)
-		return -errno;
-	rc = incise_verify_recording(recording, watch, level, statement, report, err);
-	incise_recording_close(recording);
-	return rc;
-}
-
 /* --- joined recordings --------------------------------------------------------------- */
 
 /* A member of a session under verification; findings get its name. */
@@ -517,10 +497,15 @@ static int verify_members(const struct incise_session *session,
 					      session->n};
 		const struct incise_verify_watch named = {member_found, member_progress,
 							  &member};
+		struct incise_recording *recording;
 		struct incise_verify_report found;
 
-		rc = verify_one(session->members[i]->path, &named, level, NULL, &found,
-				err);
+		recording = incise_recording_open_as(session->members[i]->path,
+						     INCISE_RECORDING_ORIGINAL, err);
+		rc = recording ? incise_verify_recording(recording, &named, level, NULL,
+							 &found, err)
+			       : -errno;
+		incise_recording_close(recording);
 		if (!rc)
 			add_report(report, &found);
 	}
@@ -531,7 +516,8 @@ static int verify_it(const char *path, const struct incise_verify_watch *watch,
 		     enum incise_verify_level level, struct incise_verify_report *report,
 		     struct incise_error *err)
 {
-	struct incise_recording *recording = incise_recording_open_original(path, err);
+	struct incise_recording *recording =
+		incise_recording_open_as(path, INCISE_RECORDING_ORIGINAL, err);
 	int rc;
 
 	*report = (struct incise_verify_report){0};
@@ -567,7 +553,8 @@ int incise_seal_compare(const char *path, const char *text, size_t length,
 			const struct incise_verify_watch *watch,
 			struct incise_verify_report *report, struct incise_error *err)
 {
-	struct incise_recording *recording = incise_recording_open_any(path, err);
+	struct incise_recording *recording =
+		incise_recording_open_as(path, INCISE_RECORDING_ORIGINAL, err);
 	struct incise_seal_statement statement;
 	int rc;
 
@@ -575,9 +562,11 @@ int incise_seal_compare(const char *path, const char *text, size_t length,
 	if (!recording)
 		return -errno;
 	rc = incise_seal_possible(recording, err);
-	incise_recording_close(recording);
 	if (!rc)
 		rc = incise_seal_read(&statement, text, length, err);
-	return rc ? rc
-		  : verify_one(path, watch, INCISE_VERIFY_ALL, &statement, report, err);
+	if (!rc)
+		rc = incise_verify_recording(recording, watch, INCISE_VERIFY_ALL,
+					     &statement, report, err);
+	incise_recording_close(recording);
+	return rc;
 }

@@ -12,6 +12,7 @@
  * which nobody can forge.
  */
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -313,22 +314,17 @@ static void report_unopened(struct incise_verification *verify, const char *path
 static int prepare(struct walk *walk)
 {
 	struct incise_recording *recording = walk->verify->recording;
-	sqlite3_stmt *stmt = NULL;
 
-	if (incise_source_open(&walk->rows, recording, INCISE_LEDGER_CAMERA, NULL) ||
-	    sqlite3_prepare_v2(
-		    recording->db,
-		    "SELECT stamped, delay_ns, ended IS NOT NULL FROM streams WHERE "
-		    "name = 'camera'",
-		    -1, &stmt, NULL) != SQLITE_OK)
-		return -EIO;
-	if (sqlite3_step(stmt) == SQLITE_ROW) {
-		walk->timestamped = sqlite3_column_int(stmt, 0);
-		walk->delay_ns = sqlite3_column_int64(stmt, 1);
-		walk->ended = sqlite3_column_int(stmt, 2);
+	for (int i = 0; i < recording->n_table; i++) {
+		const struct incise_stream *stream = &recording->table[i];
+
+		if (strcmp(stream->name, "camera"))
+			continue;
+		walk->timestamped = stream->timestamped;
+		walk->delay_ns = llrint(stream->delay_ms * 1e6);
+		walk->ended = *stream->ended;
 	}
-	sqlite3_finalize(stmt);
-	return 0;
+	return incise_source_open(&walk->rows, recording, INCISE_LEDGER_CAMERA, NULL);
 }
 
 int incise_verify_camera(struct incise_verification *verify)

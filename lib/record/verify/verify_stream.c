@@ -8,7 +8,7 @@
 #include <string.h>
 #include "../batch.h"
 #include "../old/old.h"
-#include "verify_walk.h"
+#include "verify.h"
 
 #define REPORT_ROWS 4096
 

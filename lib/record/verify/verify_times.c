@@ -52,9 +52,9 @@ void incise_verify_times(struct incise_verification *verify)
 	if (incise_row_times_open(&times, verify->recording, "tracker", &err))
 		return;
 	/* Without a line all rows are timed by arrival, as their t_ns is. */
-	if (times.source->n_knots && times.others)
-		other = incise_others_next(times.others, 0);
-	for (; other; other = incise_others_next(times.others, other->seq + 1)) {
+	if (times.source->n_knots)
+		other = incise_row_times_other(&times, 0);
+	for (; other; other = incise_row_times_other(&times, other->seq + 1)) {
 		/* On the line, with an uncertainty that covers the doubt. */
 		if (other->kind == INCISE_FIT_WIDER)
 			continue;

@@ -16,13 +16,9 @@
 #include "../read/database.h"
 #include "../read/recalibration.h"
 #include "../read/session.h"
+#include "../schema.h"
 
 #define NUMBER_MAX 9999
-
-static int no_memory(const char *path, struct incise_error *err)
-{
-	return incise_error_set(err, ENOMEM, "%s: out of memory", path);
-}
 
 static int number_of(const struct incise_recalibration *entry)
 {
@@ -33,7 +29,8 @@ static int number_of(const struct incise_recalibration *entry)
 /* A recording that can be recalibrated. Returns 0 or -errno. */
 static int check(const char *path, struct incise_error *err)
 {
-	struct incise_recording *rec = incise_recording_open_original(path, err);
+	struct incise_recording *rec =
+		incise_recording_open_as(path, INCISE_RECORDING_ORIGINAL, err);
 	int rc = 0;
 
 	if (!rec)
@@ -83,7 +80,7 @@ static int write_entry(const char *folder, const struct incise_recalibration *en
 	char *path;
 
 	if (asprintf(&path, "%s/%s", folder, entry->file) < 0)
-		return no_memory(folder, err);
+		return incise_schema_no_memory(folder, err);
 	out = incise_outfile_open(path, err);
 	free(path);
 	if (!out)
@@ -100,7 +97,7 @@ static int lock_folder(const char *folder, bool make, struct incise_error *err)
 	int fd;
 
 	if (asprintf(&path, "%s/" INCISE_RECALIBRATION_FOLDER, folder) < 0)
-		return no_memory(folder, err);
+		return incise_schema_no_memory(folder, err);
 	if (make && mkdir(path, 0777) && errno != EEXIST)
 		fd = incise_error_set(err, errno, "%s: %s", path, strerror(errno));
 	else
@@ -136,7 +133,7 @@ static int add(const char *folder, const char *calibration,
 	if (!rc)
 		rc = next_name(folder, &list[n - 1], !calibration, made, err);
 	if (!rc && text && incise_recalibration_digest(made, text, size))
-		rc = no_memory(folder, err);
+		rc = incise_schema_no_memory(folder, err);
 	if (!rc)
 		rc = write_entry(folder, made, text ? text : "", size, err);
 	if (fd >= 0)

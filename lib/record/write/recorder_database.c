@@ -285,7 +285,7 @@ int incise_recorder_open_database(struct incise_recorder *rec,
 	int rc;
 
 	if (asprintf(&file, "%s/%s", rec->part, INCISE_SCHEMA_DB) < 0)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+		return incise_schema_no_memory(rec->path, err);
 	rc = sqlite3_open_v2(
 		file, &rec->db,
 		SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, NULL);

@@ -383,7 +383,7 @@ static ssize_t enter(struct incise_recorder *rec, int i, int64_t seq, int64_t t_
 	    incise_block_writer_put(&rec->blocks, i, batch, &block) != SQLITE_OK)
 		return incise_recorder_fail(rec, err);
 	if (!incise_batch_reserve(batch, batch->n + 1))
-		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+		return incise_schema_no_memory(rec->path, err);
 	at = (ssize_t)batch->n;
 	batch->column[0].i[at] = seq;
 	batch->column[1].i[at] = t_ns;

@@ -504,7 +504,8 @@ static void seal(bool whole)
 /* The CRCs of rows that the ledger of an older format has. */
 static void seal_rows(void)
 {
-	struct incise_recording *recording = incise_recording_open_older("a.rec", &err);
+	struct incise_recording *recording =
+		incise_recording_open_as("a.rec", INCISE_RECORDING_OLDER, &err);
 	size_t size;
 	char *sql;
 	FILE *out = open_memstream(&sql, &size);
