@@ -27,10 +27,9 @@ struct incise_session_map;
 
 /* A stream with all that its readers need. */
 struct incise_stream_source {
-	int stream;		       /* INCISE_LEDGER_* */
-	struct incise_recording *file; /* with the rows */
-	const struct incise_session_map
-		*map; /* from its clock to the session's, or NULL */
+	int stream;			      /* INCISE_LEDGER_* */
+	struct incise_recording *file;	      /* with the rows */
+	const struct incise_session_map *map; /* to the clock of a session, or NULL */
 	bool known; /* the rest; else a table is damaged: incise_stream_resolve() says which */
 	/* Subtracted while recording, NAN: not known; and of times without a line. */
 	double delay_ns, delay_sd_ns, offset_sd_ns;

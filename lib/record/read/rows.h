@@ -22,6 +22,10 @@
 /* --- the clock of a session -------------------------------------------------------------- */
 
 /*
+ *     session's clock              ╱─ knots, straight lines between them; beyond the ends the
+ *     (the first member's)   ╱───╱    line goes on
+ *                        ───╱
+ *                     member's CLOCK_MONOTONIC
  */
 struct incise_session_knot {
 	int64_t t_ns, to_ns; /* both increase */
