@@ -221,7 +221,7 @@ style_sources := $(shell find lib tools tests driver examples -name '*.[ch]' -o 
 check-style: ## the house's form: clang-format, an SPDX line in every file, plain words
 	@tests/style $(style_sources)
 
-check-layers: libs ## no layer of lib/ uses a higher one
+check-layers: libs ## no layer of lib/ uses a higher one, no files of one are a circle
 	@tests/layers $(O)
 
 doc: ## reference of the public headers in build/doc/html; fails where a comment is missing

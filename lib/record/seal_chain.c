@@ -8,9 +8,9 @@
 #include "seal_chain.h"
 #include "statement.h"
 
-/* Of rows, and from form 5 on of blocks. */
-#define GENESIS(form) ((form) < 5 ? "incise seal 1\n" : "incise seal 2\n")
-/* From form 5 on there is no table depth. */
+/* Of rows, or of blocks. */
+#define GENESIS(old) ((old) ? "incise seal 1\n" : "incise seal 2\n")
+/* Of table depth, which today's format has not. */
 #define NO_ROWS "SELECT 1 WHERE 0"
 
 /*
@@ -90,7 +90,7 @@ int incise_seal_table(const struct incise_seal *seal, sqlite3 *db,
 		      uint8_t digest[INCISE_SEAL_BYTES])
 {
 	const char *sql = meta_sql[part] ? meta_sql[part]
-			  : part == INCISE_SEAL_DEPTH && seal->form >= 5
+			  : part == INCISE_SEAL_DEPTH && !seal->old
 				  ? NO_ROWS
 				  : incise_ledger_sql(incise_seal_parts[part]);
 	struct sink sink = {.digest = EVP_MD_CTX_new()};
@@ -130,9 +130,9 @@ int incise_seal_file(const struct incise_seal *seal, int fd, int64_t length,
 
 /* --- the chain ------------------------------------------------------------------------ */
 
-int incise_seal_init(struct incise_seal *seal, int form)
+int incise_seal_init(struct incise_seal *seal)
 {
-	*seal = (struct incise_seal){.form = form};
+	*seal = (struct incise_seal){0};
 	seal->sha256 = EVP_MD_fetch(NULL, "SHA256", NULL);
 	if (!seal->sha256)
 		return -ENOTSUP;
@@ -170,8 +170,7 @@ int incise_seal_start(struct incise_seal *seal, sqlite3 *db)
 	int rc = SQLITE_OK;
 
 	start(seal, &seal->failed, seal->commit);
-	add(&seal->failed, seal->commit, GENESIS(seal->form),
-	    strlen(GENESIS(seal->form)));
+	add(&seal->failed, seal->commit, GENESIS(seal->old), strlen(GENESIS(seal->old)));
 	for (int i = INCISE_SEAL_START; i < INCISE_SEAL_STREAM && rc == SQLITE_OK; i++) {
 		rc = incise_seal_table(seal, db, i, &rows, part);
 		add(&seal->failed, seal->commit, part, sizeof(part));
@@ -181,27 +180,10 @@ int incise_seal_start(struct incise_seal *seal, sqlite3 *db)
 	return rc == SQLITE_OK && seal->failed ? SQLITE_NOMEM : rc;
 }
 
-void incise_seal_row(struct incise_seal *seal, int stream,
-		     const struct incise_ledger_row *row)
+void incise_seal_row(struct incise_seal *seal, int stream, const void *bytes, size_t n)
 {
-	add(&seal->failed, seal->rows[stream], row->bytes, row->n);
+	add(&seal->failed, seal->rows[stream], bytes, n);
 	seal->n_rows[stream]++;
-}
-
-void incise_seal_rows(struct incise_seal *seal, int stream,
-		      uint8_t digest[INCISE_SEAL_BYTES])
-{
-	end(&seal->failed, seal->rows[stream], digest);
-	start(seal, &seal->failed, seal->rows[stream]);
-}
-
-void incise_seal_block(struct incise_seal *seal, int stream,
-		       const struct incise_ledger_block *block)
-{
-	uint8_t digest[INCISE_SEAL_BYTES];
-
-	incise_seal_rows(seal, stream, digest);
-	incise_seal_rows_block(seal, stream, block, digest);
 }
 
 void incise_seal_rows_block(struct incise_seal *seal, int stream,
@@ -227,14 +209,22 @@ void incise_seal_rows_block(struct incise_seal *seal, int stream,
 	seal->blocks[stream]++;
 }
 
+void incise_seal_block(struct incise_seal *seal, int stream,
+		       const struct incise_ledger_block *block,
+		       uint8_t digest[INCISE_SEAL_BYTES])
+{
+	end(&seal->failed, seal->rows[stream], digest);
+	start(seal, &seal->failed, seal->rows[stream]);
+	incise_seal_rows_block(seal, stream, block, digest);
+}
+
 void incise_seal_data(struct incise_seal *seal, int stream,
 		      const struct incise_ledger_block *block, const void *data,
 		      size_t size, uint8_t digest[INCISE_SEAL_BYTES])
 {
 	add(&seal->failed, seal->rows[stream], data, size);
 	seal->n_rows[stream] += block->count;
-	incise_seal_rows(seal, stream, digest);
-	incise_seal_rows_block(seal, stream, block, digest);
+	incise_seal_block(seal, stream, block, digest);
 }
 
 int incise_seal_tables(struct incise_seal *seal, sqlite3 *db, int fd, int64_t length)

@@ -209,12 +209,7 @@ def verify(path: Union[str, "os.PathLike[str]"]) -> Report:
 def check_rows(path: Union[str, "os.PathLike[str]"]) -> None:
     """Raise :class:`incise.Invalid` unless the rows are those that were recorded."""
     first: Optional[Finding] = None
-    try:
-        report = _run("incise_verify_rows", path)
-    except Invalid as failure:
-        if failure.errno == errno.ENODATA:  # from before the ledger
-            return
-        raise
+    report = _run("incise_verify_rows", path)
     for finding in report.findings:
         if finding.kind in _NOT_RECORDED and first is None:
             first = finding

@@ -195,7 +195,7 @@ int main(int argc, char **argv)
 	repeat_cut_ends(times, span_ns);
 	run("UPDATE events SET t_ns = t_ns + (?1 - 1) * ?2 WHERE kind = 'end'", times,
 	    span_ns, 0);
-	need(!incise_seal_init(&writer.seal, INCISE_SCHEMA_VERSION), "SHA-256");
+	need(!incise_seal_init(&writer.seal), "SHA-256");
 	need(incise_block_writer_start(&writer, db) == SQLITE_OK, "start");
 	for (int64_t k = 0; k < times; k++)
 		for (size_t i = 0; i < streams[0].n_blocks || i < streams[1].n_blocks;

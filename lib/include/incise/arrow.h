@@ -100,8 +100,7 @@ struct incise_recording;
  *                only, from a thread of the stream; copied. NULL: the defaults
  * @param stream  result; the caller calls its release. Its get_next() returns EINVAL (an
  *                impossible row), EIO, ENODATA (no cut), EINTR (stopped by progress), ENOMEM
- * @return 0; -EINVAL (no such stream, impossible options, a damaged recording), -ENOTSUP (an
- *         older recording without this stream), -EIO, -ENOMEM, -EAGAIN (no thread).
+ * @return 0; -EINVAL (no such stream, impossible options, a damaged recording), -EIO, -ENOMEM, -EAGAIN (no thread).
  */
 INCISE_API int incise_recording_stream(struct incise_recording *recording,
 				       const char *what,

@@ -71,7 +71,7 @@ struct incise_recording_info {
 	double tip_mm[3]; /**< calibrated tip; applied to depth, not to poses */
 	int cuts;	  /**< periods with the blade in the tissue */
 	double depth_max_mm, force_max_N;
-	struct incise_stream streams[INCISE_STREAMS_MAX]; /**< in format 2 */
+	struct incise_stream streams[INCISE_STREAMS_MAX]; /**< none if it had format 1 */
 	int n_streams;
 	bool newtons; /**< the force channel measures N: read full_scale_V, offset_V as N */
 	/** UTC of start_ns, ns since 1970, by the wall clock to one second; 0: not known */
@@ -85,7 +85,8 @@ struct incise_recording_info {
  * crash or a full disk, open that.
  *
  * @return recording, to be closed with incise_recording_close(); NULL with errno ENOENT,
- *         EINVAL (not a recording, damaged, or of a newer version), EIO, ENOMEM.
+ *         EINVAL (not a recording, damaged, or of a newer version), ENOTSUP (of format 1 to 3: it is converted
+ *         by incise_recording_recover()), EIO, ENOMEM.
  */
 INCISE_API struct incise_recording *incise_recording_open(const char *path,
 							  struct incise_error *err);
@@ -176,7 +177,7 @@ struct incise_recording_length {
  * tracker records around each. Frames without a record within 50 ms on both sides are omitted.
  *
  * @param lengths to be freed with free(3); NULL for none
- * @return number of frames; -EINVAL (an invalid row; a recording of format 1 has no frames),
+ * @return number of frames; -EINVAL (an invalid row),
  *         -EIO, -ENOMEM
  */
 INCISE_API int incise_recording_lengths(struct incise_recording *recording,
@@ -190,7 +191,7 @@ struct incise_frame_reader;
  * Read the frames of a recording's camera.mkv, by their times.
  *
  * @return reader, to be freed with incise_frame_reader_free(); it reads by connections of its own.
- *         NULL with errno ENOTSUP (a recording of form 1), ENODATA (without frames), EINVAL, EIO,
+ *         NULL with errno ENODATA (without frames), EINVAL, EIO,
  *         ENOMEM; ENOENT, ENOEXEC (the file, or the module that reads it).
  */
 INCISE_API struct incise_frame_reader *incise_frame_reader_new(

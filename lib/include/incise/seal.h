@@ -79,8 +79,8 @@ struct incise_seal_statement {
  * incise_verify() compares them. The same recording gives the same text.
  *
  * @param path as for incise_recording_open()
- * @return text, to be freed with free(3); NULL with errno ENODATA (of an older format, which has
- *         no seal), ENOTSUP (a joined recording: each of its members has its own statement),
+ * @return text, to be freed with free(3); NULL with errno ENODATA (it has no sealed
+ *         commit), ENOTSUP (a joined recording: each of its members has its own statement),
  *         EBADMSG (its rows differ from its seal), or as of incise_recording_open(). Thread-safe.
  */
 INCISE_API char *incise_seal_statement(const char *path, struct incise_error *err);
@@ -114,7 +114,7 @@ INCISE_API int incise_seal_compare(const char *path, const char *text, size_t le
  * recomputing them: to write them into files that are made of it.
  *
  * @param identity 32 hexadecimal digits and a NUL
- * @return 0; -ENODATA (of an older format; no commit), -ENOTSUP (joined), -EINVAL, -EIO.
+ * @return 0; -ENODATA (no commit), -ENOTSUP (joined), -EINVAL, -EIO.
  */
 INCISE_API int incise_seal_head(struct incise_recording *recording, char identity[33],
 				struct incise_seal_head *head, struct incise_error *err);

@@ -64,7 +64,7 @@ struct incise_session_options {
  * @param paths  n recordings, 2 to INCISE_SESSION_MEMBERS_MAX, the first one's clock is the
  *               session's
  * @param output a new folder; while it is written, it is output.part
- * @return 0; -EINVAL (a session, the same recording twice, a recording of format 1), -ENODATA (no
+ * @return 0; -EINVAL (a session, the same recording twice), -ENODATA (no
  *         wall time, or an unknown uncertainty, and no signal that aligns), -EDOM (a signal that
  *         matches at several offsets, or may match by chance), -ERANGE (an uncertainty
  *         above within_s, clocks and signal that disagree, a clock that went back), -EEXIST, -EBUSY (it is being
@@ -102,7 +102,7 @@ INCISE_API int incise_session_members(const struct incise_recording *recording,
  * with numbers as "%.17g" writes them.
  *
  * @return text, to be freed with free(3); the same recording gives the same. NULL with errno EINVAL
- *         (not joined), ENODATA (a member of an older format, which has no seal), EIO, ENOMEM.
+ *         (not joined), ENODATA (a member without a sealed commit), EIO, ENOMEM.
  */
 INCISE_API char *incise_session_statement(const struct incise_recording *recording,
 					  struct incise_error *err);

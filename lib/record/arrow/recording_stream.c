@@ -497,10 +497,11 @@ static int describe_stream(struct stream *stream, struct incise_stream_rows *row
 			? "depth_mm"
 			: "";
 
-	if (times->stream) {
+	if (times->source) {
 		add_known(&stream->time, "delay_ms",
-			  (times->delay_ns - (double)times->shift_ns) * 1e-6);
-		add_known(&stream->time, "offset_sd_ms", times->offset_sd_ns * 1e-6);
+			  (times->source->delay_ns - (double)times->shift_ns) * 1e-6);
+		add_known(&stream->time, "offset_sd_ms",
+			  times->source->offset_sd_ns * 1e-6);
 	}
 	if (*calibrated) {
 		describe_values(stream);
@@ -721,10 +722,6 @@ int incise_recording_stream(struct incise_recording *recording, const char *what
 			"no stream '%s' in a recording; there are: force, tracker, "
 			"depth, frames, events, table",
 			what);
-	if (!strcmp(what, "frames") && recording->form < 2)
-		return incise_error_set(err, ENOTSUP,
-					"%s: has an older format, without frames",
-					recording->path);
 	incise_export_options_init(&defaults);
 	made = make_stream(recording->path, name ? name : "table", err);
 	if (!made)

@@ -72,7 +72,7 @@ static int find_wall(struct incise_messages *messages, struct incise_error *err)
 {
 	/* Of a joined recording that of its clock, whatever is read of it. */
 	struct incise_recording *recording =
-		incise_recording_member(messages->recording, "wall");
+		messages->recording->streams[INCISE_LEDGER_WALL]->file;
 	struct incise_error none = {0};
 	int64_t start_ns;
 	const char *end;

@@ -250,7 +250,8 @@ enum { ALWAYS = 0x7, COMPRESSED = 1 << 3, RAW = 1 << 4 };
 /* The camera's topic is that of its first undamaged frame. */
 static int select_streams(struct incise_messages *messages, struct incise_error *err)
 {
-	const char *folder = incise_recording_member(messages->recording, "frames")->path;
+	const char *folder =
+		messages->recording->streams[INCISE_LEDGER_CAMERA]->file->path;
 	int rc = incise_camera_interpolator_any(messages->recording, err);
 	char *path;
 

@@ -140,15 +140,14 @@ static int find_begin(struct incise_recording *recording,
 	struct walk walk;
 	int64_t *ends_ns;
 	size_t n = read_cut_ends(recording, &ends_ns), at = 0;
-	double hz;
-	int rc = incise_recording_number(recording, "tracker_hz", &hz, err);
+	int rc = 0;
 
 	while (at < n &&
 	       (range->cut ? at + 1 < (size_t)range->cut : ends_ns[at] < from_ns))
 		at++;
 	for (size_t back = 1; !rc; back *= 8) {
 		at = at > back ? at - back : 0;
-		init_walk(&walk, hz);
+		init_walk(&walk, recording->numbers.tracker_hz);
 		walk.cut.count = (int)at;
 		walk.clear_ns = at ? ends_ns[at - 1] : 0;
 		rc = follow(recording, &walk, at ? ends_ns[at - 1] : INT64_MIN, range,
@@ -173,15 +172,12 @@ static int find_begin(struct incise_recording *recording,
 static bool is_read_whole(struct incise_recording *recording,
 			  const struct incise_export_options *options)
 {
-	double force_hz = NAN, tracker_hz = NAN;
+	const struct incise_recording_numbers *numbers = &recording->numbers;
 
-	if (incise_recording_number(recording, "force_hz", &force_hz, NULL) ||
-	    incise_recording_number(recording, "tracker_hz", &tracker_hz, NULL))
-		return true;
 	return recording->meta.force_lost || options->calibration ||
 	       recording->recalibrated ||
 	       (incise_recording_has_force(recording) &&
-		!(force_hz >= FORCE_LEAST * tracker_hz));
+		!(numbers->force_hz >= FORCE_LEAST * numbers->tracker_hz));
 }
 
 static int64_t after(double s)

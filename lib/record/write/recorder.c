@@ -61,7 +61,7 @@ static int open_camera(struct incise_recorder *rec,
 			return -errno;
 	}
 	if (asprintf(&file, "%s/%s", rec->part, INCISE_FRAMES_FILE) < 0)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+		return incise_schema_no_memory(rec->path, err);
 	rec->camera.writer = incise_frames_writer_new(file, &shape, &options, err);
 	free(file);
 	return rec->camera.writer ? 0 : -errno;
@@ -367,7 +367,7 @@ static int start(struct incise_recorder *rec, const struct incise_recorder_setup
 	int rc = incise_recorder_check_space(rec, setup->planned_s, err);
 
 	rec->worthless = true;
-	if (!rc && incise_seal_init(&rec->blocks.seal, INCISE_SCHEMA_VERSION))
+	if (!rc && incise_seal_init(&rec->blocks.seal))
 		rc = incise_error_set(err, ENOMEM,
 				      "%s: libcrypto gives no SHA-256; check its "
 				      "openssl.cnf",
@@ -384,7 +384,7 @@ static int start(struct incise_recorder *rec, const struct incise_recorder_setup
 			&rec->wall.sampler, setup->clock_source,
 			incise_clock_is_real(incise_rig_clock(rec->rig)), err);
 	if (!rc && setup->armed && incise_recorder_arm(rec))
-		rc = incise_error_set(err, ENOMEM, "%s: out of memory", rec->path);
+		rc = incise_schema_no_memory(rec->path, err);
 	if (!rc && !setup->armed)
 		rc = start_camera(rec, err);
 	if (!rc)
@@ -410,7 +410,7 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 		return NULL;
 	rec = calloc(1, sizeof(*rec));
 	if (!rec) {
-		incise_error_set(err, ENOMEM, "%s: out of memory", path);
+		incise_schema_no_memory(path, err);
 		return NULL;
 	}
 	rec->parent = rec->folder = -1;

@@ -269,9 +269,6 @@ int incise_recorder_open_database(struct incise_recorder *rec,
 				  const char *calibration_path, struct incise_error *err);
 void incise_recorder_close_database(struct incise_recorder *rec);
 
-/* Run a bound statement. Returns an SQLite code. */
-int incise_recorder_run(sqlite3_stmt *stmt);
-
 /* Set a value in table meta; NaN becomes NULL: not known. Returns an SQLite code. */
 int incise_recorder_set_integer(struct incise_recorder *rec, const char *key,
 				int64_t value);

@@ -55,19 +55,6 @@ TEST(info_tells_what_the_tables_hold, IN_FOLDER)
 	assert_true(info.force_max_N > 1); /* 2.6 N by the model at 20 mm and 25 mm/s */
 }
 
-TEST(form_1_is_read, IN_FOLDER)
-{
-	struct incise_recording_info now, before;
-
-	record("a.rec", SHORT_SCRIPT, 8000 * MS); /* two cuts */
-	assert_int_equal(read_all("a.rec", &now, &err), 0);
-	change(DB, TO_FORM_1);
-	succeeds(!read_all("a.rec", &before, &err));
-	assert_true(before.cuts > 0 && before.cuts == now.cuts);
-	assert_true(before.tracker == now.tracker &&
-		    before.force_max_N == now.force_max_N);
-}
-
 TEST(paths_that_lead_to_a_recording, IN_FOLDER)
 {
 	struct incise_recording_info info;
@@ -523,7 +510,7 @@ TEST(closing_nothing)
 
 TEST(line_is_read_and_used, IN_FOLDER)
 {
-	struct incise_recording_line line;
+	struct incise_row_times times;
 	struct incise_recording *recording;
 
 	record("a.rec", "sim:clock=simulated", 700 * MS);
@@ -533,20 +520,20 @@ TEST(line_is_read_and_used, IN_FOLDER)
 		   "('tracker', 1, 20, 3000, 7.0, 0), ('tracker', 2, 30, 6000, 6.0, 0)");
 	recording = incise_recording_open("a.rec", &err);
 	assert_non_null(recording);
-	assert_int_equal(incise_recording_line(recording, "tracker", &line, &err), 0);
-	assert_int_equal(line.n, 3);
-	assert_int_equal(incise_recording_time(&line, 15, 77), 2000);
-	assert_int_equal(incise_recording_time(&line, 25, 77), 4500);
-	assert_int_equal(incise_recording_time(&line, 40, 77),
+	assert_int_equal(incise_row_times_open(&times, recording, "tracker", &err), 0);
+	assert_int_equal(times.source->n_knots, 3);
+	assert_int_equal(incise_row_times_line(&times, 15, 77), 2000);
+	assert_int_equal(incise_row_times_line(&times, 25, 77), 4500);
+	assert_int_equal(incise_row_times_line(&times, 40, 77),
 			 9000); /* beyond the last */
-	assert_true(incise_recording_time_sd(&line, 15) == 7);
-	assert_true(incise_recording_time_sd(&line, 29) == 7);
-	incise_recording_line_free(&line);
+	assert_true(incise_row_times_line_sd(&times, 15) == 7);
+	assert_true(incise_row_times_line_sd(&times, 29) == 7);
+	incise_row_times_close(&times);
 	/* what has no line has its own times */
-	assert_int_equal(incise_recording_line(recording, "force", &line, &err), 0);
-	assert_int_equal(line.n, 0);
-	assert_int_equal(incise_recording_time(&line, 15, 77), 77);
-	assert_true(isnan(incise_recording_time_sd(&line, 15)));
+	assert_int_equal(incise_row_times_open(&times, recording, "force", &err), 0);
+	assert_int_equal(times.source->n_knots, 0);
+	assert_int_equal(incise_row_times_line(&times, 15, 77), 77);
+	assert_true(isnan(incise_row_times_line_sd(&times, 15)));
 	incise_recording_close(recording);
 }
 
@@ -583,7 +570,7 @@ TEST(impossible_streams_are_refused, IN_FOLDER)
 
 	record("good.rec", "sim:clock=simulated", 2000 * MS);
 	for (size_t i = 0; i < sizeof(cases) / sizeof(*cases); i++) {
-		struct incise_recording_line line;
+		struct incise_row_times times;
 		struct incise_stream streams[INCISE_STREAMS_MAX];
 		struct incise_recording *recording;
 
@@ -602,27 +589,12 @@ TEST(impossible_streams_are_refused, IN_FOLDER)
 		recording = incise_recording_open("a.rec", &err);
 		if (!recording)
 			fail_msg("%s: %s", cases[i].sql, err.text);
-		assert_error(
-			cases[i].knots
-				? incise_recording_line(recording, "tracker", &line, &err)
-				: incise_recording_streams(recording, streams, &err),
-			EINVAL, &err, "a.rec:", cases[i].knots ? "knots" : "streams");
+		assert_error(cases[i].knots
+				     ? incise_row_times_open(&times, recording, "tracker",
+							     &err)
+				     : incise_recording_streams(recording, streams, &err),
+			     EINVAL, &err,
+			     "a.rec:", cases[i].knots ? "knots" : "streams");
 		incise_recording_close(recording);
 	}
-}
-
-TEST(old_recordings_have_none, IN_FOLDER)
-{
-	struct incise_recording_line line;
-	struct incise_stream streams[INCISE_STREAMS_MAX];
-	struct incise_recording *recording;
-
-	record("a.rec", "sim:clock=simulated", 700 * MS);
-	change(DB, TO_FORM_1);
-	recording = incise_recording_open("a.rec", &err);
-	succeeds(recording);
-	assert_int_equal(incise_recording_streams(recording, streams, &err), 0);
-	assert_int_equal(incise_recording_line(recording, "tracker", &line, &err), 0);
-	assert_int_equal(line.n, 0);
-	incise_recording_close(recording);
 }

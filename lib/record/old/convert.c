@@ -15,10 +15,10 @@
 #include <unistd.h>
 #include <incise/verify.h>
 #include "../frames.h"
-#include "../read/recording.h"
-#include "../read/source.h"
 #include "../schema.h"
-#include "block_writer.h"
+#include "../verify/verify.h"
+#include "../write/block_writer.h"
+#include "old.h"
 
 #define ROWS 1000 /* of a block, where there is no ledger */
 
@@ -41,11 +41,12 @@ struct conversion {
 	struct incise_block_writer writer;
 	struct stream streams[INCISE_LEDGER_FORMS];
 	struct incise_frames_reader *frames; /* NULL: rows have a digest, or no file */
-	struct incise_camera_frame frame;    /* the last one that was read */
+	struct incise_camera_frame frame;    /* at hand, where has_frame */
 	struct incise_frames_stored stored;
 	bool has_frame;
-	int64_t t_ns; /* of the next commit */
-	bool wrote;   /* blocks, for it */
+	uint64_t last_frame; /* number of the last row */
+	int64_t t_ns;	     /* of the next commit */
+	bool wrote;	     /* blocks, for it */
 };
 
 static int fail(struct conversion *c, struct incise_error *err)
@@ -65,22 +66,36 @@ static int fail(struct conversion *c, struct incise_error *err)
 
 /* --- rows ------------------------------------------------------------------------------ */
 
-/* Before form 4 rows have no digest of their frame: that of the frame in the file with their CRC. */
+/* The frame at hand, or the next one: of a damaged one the bytes may be whole. */
+static bool find_frame(struct conversion *c)
+{
+	int got;
+
+	if (!c->has_frame) {
+		got = incise_frames_next(c->frames, &c->frame, &c->stored, NULL);
+		c->has_frame = got == 1 || got == -EBADMSG;
+	}
+	return c->has_frame;
+}
+
+/*
+ * Before format 4 rows have no digest of their frame: that of the frame in the file with their CRC. One that is no
+ * row's is passed, by its number.
+ */
 static void add_digests(struct conversion *c, struct incise_batch *batch)
 {
 	for (size_t k = 0; k < batch->n; k++) {
 		const uint64_t seq = batch->column[0].i[k];
-		int got = 1;
+		bool is = false;
 
-		while (got && (!c->has_frame || c->frame.seq < seq)) {
-			got = incise_frames_next(c->frames, &c->frame, &c->stored, NULL);
-			if (got < 0 && got != -EBADMSG)
-				return;
-			c->has_frame = got == 1;
+		while (!is && find_frame(c)) {
+			is = c->stored.bytes == batch->column[4].i[k] &&
+			     c->stored.crc == batch->column[5].i[k];
+			if (!is && c->frame.seq > seq && c->frame.seq <= c->last_frame)
+				break;
+			c->has_frame = false;
 		}
-		if (c->has_frame && c->frame.seq == seq &&
-		    c->stored.bytes == batch->column[4].i[k] &&
-		    c->stored.crc == batch->column[5].i[k])
+		if (is)
 			memcpy(batch->column[10].h[k], c->stored.sha256,
 			       INCISE_FRAMES_DIGEST);
 	}
@@ -170,7 +185,7 @@ static int advance(struct conversion *c, int stream, struct incise_error *err)
 	if (!s->last && s->entries)
 		return 1; /* its rows are not there */
 	s->done = true;
-	if (!s->entries)
+	if (!s->entries && stream <= INCISE_LEDGER_TRACKER)
 		find_end(c, stream);
 	if (!s->has_end)
 		return 0;
@@ -180,16 +195,14 @@ static int advance(struct conversion *c, int stream, struct incise_error *err)
 
 static int open_stream(struct conversion *c, int stream, struct incise_error *err)
 {
-	const int form = c->old->form;
 	struct stream *s = &c->streams[stream];
 	int rc = incise_source_open(&s->source, c->old, stream, err);
 
 	incise_ledger_init(&s->ledger);
-	s->done = rc == -ENODATA; /* the form has no such stream */
-	if (s->done || (!rc && form < 2))
-		return 0;
-	if (!rc && incise_ledger_select(c->old->db, form, s->source.batch.form->stream,
-					INT64_MIN, false, &s->entries) != SQLITE_OK)
+	if (rc || c->old->form < 2)
+		return rc;
+	if (incise_ledger_select(c->old->db, s->source.batch.form->stream, INT64_MIN,
+				 false, &s->entries) != SQLITE_OK)
 		rc = incise_schema_fail(c->old->db, c->old->path, err);
 	return rc;
 }
@@ -236,7 +249,7 @@ static int write_sealed(struct conversion *c, struct incise_error *err)
 	return rc < 0 ? rc : 0;
 }
 
-/* And what is left: of forms without a seal block k of each stream in commit k. */
+/* And what is left: of formats without a seal block k of each stream in commit k. */
 static int write_rest(struct conversion *c, struct incise_error *err)
 {
 	bool more = true;
@@ -256,16 +269,6 @@ static int write_rest(struct conversion *c, struct incise_error *err)
 
 /* --- tables ---------------------------------------------------------------------------- */
 
-/* The identity of the old recording. */
-static const char *const head_sql[] = {
-	[1] = "''",
-	[2] = "(SELECT ', ledger ' || group_concat(stream || ' ' || printf('%08x', "
-	      "crc), ', ') FROM (SELECT stream, crc, max(block) FROM old.ledger GROUP "
-	      "BY stream ORDER BY stream))",
-	[3] = "(SELECT ', head ' || lower(hex(head)) FROM old.seal ORDER BY number DESC "
-	      "LIMIT 1)",
-};
-
 static int run_bound(struct conversion *c, const char *sql, const char *text)
 {
 	sqlite3_stmt *stmt = NULL;
@@ -274,13 +277,12 @@ static int run_bound(struct conversion *c, const char *sql, const char *text)
 	if (rc == SQLITE_OK && text)
 		rc = sqlite3_bind_text(stmt, 1, text, -1, SQLITE_STATIC);
 	if (rc == SQLITE_OK)
-		sqlite3_step(stmt);
-	rc = rc == SQLITE_OK ? sqlite3_reset(stmt) : rc;
+		rc = incise_schema_run(stmt);
 	sqlite3_finalize(stmt);
 	return rc;
 }
 
-/* The key converted_from. */
+/* The key converted_from: the identity of the old recording. */
 static int write_origin(struct conversion *c)
 {
 	const int form = c->old->form;
@@ -289,13 +291,18 @@ static int write_origin(struct conversion *c)
 	if (*c->made->altered)
 		snprintf(text, sizeof(text), "; not as it was recorded: %s",
 			 c->made->altered);
-	snprintf(sql, sizeof(sql),
-		 "INSERT OR REPLACE INTO meta VALUES('converted_from', 'format %d' || "
-		 "coalesce(%s, '') || ?)",
-		 form,
-		 head_sql[form < 2   ? 1
-			  : form < 4 ? 2
-				     : 3]);
+	snprintf(
+		sql, sizeof(sql),
+		"INSERT OR REPLACE INTO meta VALUES('converted_from', 'format %d' || "
+		"coalesce(%s, '') || ?)",
+		form,
+		form < 2 ? "''"
+		: incise_old_is_sealed(c->old)
+			? "(SELECT ', head ' || lower(hex(head)) FROM old.seal ORDER BY "
+			  "number DESC LIMIT 1)"
+			: "(SELECT ', ledger ' || group_concat(stream || ' ' || "
+			  "printf('%08x', crc), ', ') FROM (SELECT stream, crc, "
+			  "max(block) FROM old.ledger GROUP BY stream ORDER BY stream))");
 	return run_bound(c, sql, text);
 }
 
@@ -317,7 +324,7 @@ static int write_summary(struct conversion *c, struct incise_error *err)
 	return run_bound(c, sql, NULL) == SQLITE_OK ? 0 : fail(c, err);
 }
 
-/* Before form 4 a recording has no identity, which a seal needs. */
+/* Before format 4 a recording has no identity, which a seal needs. */
 static int copy_tables(struct conversion *c)
 {
 	int rc = incise_schema_create(c->writer.db);
@@ -343,16 +350,19 @@ static int copy_tables(struct conversion *c)
 static int open_frames(struct conversion *c, struct incise_error *err)
 {
 	struct incise_error found = {0};
+	int64_t last = 0, t_ns;
 	char *path;
 
 	if (c->old->form < 2 || c->old->form > 3)
 		return 0;
 	if (asprintf(&path, "%s/" INCISE_FRAMES_FILE, c->folder) < 0)
-		return incise_error_set(err, ENOMEM, "%s: out of memory", c->folder);
+		return incise_schema_no_memory(c->folder, err);
 	if (!access(path, F_OK)) {
 		c->frames = incise_frames_reader_new(path, &found);
 		if (c->frames)
 			c->frames->digests = c->frames->undecoded = true;
+		incise_source_end(c->old, "frames", true, &last, &t_ns, NULL, NULL);
+		c->last_frame = (uint64_t)last;
 	}
 	free(path);
 	/* A file that is none has no frames, as incise verify says. */
@@ -374,7 +384,7 @@ static int keep_seal(struct conversion *c, struct incise_error *err)
 	if (from && asprintf(&to, "%s-before", from) < 0)
 		to = NULL;
 	if (!to)
-		rc = incise_error_set(err, ENOMEM, "%s: out of memory", c->folder);
+		rc = incise_schema_no_memory(c->folder, err);
 	else if (rename(from, to) && errno != ENOENT)
 		rc = incise_error_set(err, errno,
 				      "%s: its folder seal cannot become "
@@ -422,7 +432,7 @@ static int write_all(struct conversion *c, struct incise_error *err)
 
 	if (!rc)
 		rc = write_summary(c, err);
-	if (!rc && incise_seal_init(&c->writer.seal, INCISE_SCHEMA_VERSION))
+	if (!rc && incise_seal_init(&c->writer.seal))
 		rc = incise_error_set(err, ENOMEM,
 				      "%s: libcrypto gives no SHA-256; check its "
 				      "openssl.cnf",
@@ -433,7 +443,7 @@ static int write_all(struct conversion *c, struct incise_error *err)
 		rc = open_frames(c, err);
 	for (int i = 0; i < INCISE_LEDGER_FORMS && !rc; i++)
 		rc = open_stream(c, i, err);
-	if (!rc && c->old->form >= 4)
+	if (!rc && incise_old_is_sealed(c->old))
 		rc = write_sealed(c, err);
 	if (!rc)
 		rc = write_rest(c, err);
@@ -461,7 +471,7 @@ static int write_database(struct conversion *c, struct incise_error *err)
 	if (old && asprintf(&new, "%s.new", old) < 0)
 		new = NULL;
 	rc = new ? open_database(c, new, old, err)
-		 : incise_error_set(err, ENOMEM, "%s: out of memory", c->folder);
+		 : incise_schema_no_memory(c->folder, err);
 	if (!rc)
 		rc = write_all(c, err);
 	for (int i = 0; i < INCISE_LEDGER_FORMS; i++) {
@@ -493,37 +503,52 @@ static void keep_first(void *user, const struct incise_verify_finding *finding)
 		snprintf(made->altered, sizeof(made->altered), "%s", finding->text);
 }
 
-/* By its ledger, and its seal. Of form 1 there is none. */
-static int check(const char *folder, struct incise_recovered *made,
+/* By its ledger, and its seal. Of format 1 there is none. */
+static int check(struct incise_recording *recording, struct incise_recovered *made,
 		 struct incise_error *err)
 {
 	const struct incise_verify_watch watch = {.found = keep_first, .user = made};
 	struct incise_verify_report report;
 
-	return made->form < 2 ? 0 : incise_verify_rows(folder, &watch, &report, err);
+	return recording->form < 2
+		       ? 0
+		       : incise_verify_recording(recording, &watch, INCISE_VERIFY_ROWS,
+						 NULL, &report, err);
+}
+
+static int check_new(const char *folder, struct incise_recovered *made,
+		     struct incise_error *err)
+{
+	struct incise_recording *recording =
+		incise_recording_open_as(folder, INCISE_RECORDING_ORIGINAL, err);
+	int rc = recording ? check(recording, made, err) : -errno;
+
+	incise_recording_close(recording);
+	return rc;
 }
 
 int incise_recording_convert(const char *folder, const char *path, bool damaged,
 			     struct incise_recovered *made, struct incise_error *err)
 {
 	struct conversion c = {.folder = folder, .made = made};
-	struct incise_recovered now = {.form = INCISE_SCHEMA_VERSION};
+	struct incise_recovered now = {0};
 	int rc;
 
-	c.old = incise_recording_open_original(folder, err);
+	c.old = incise_recording_open_as(folder, INCISE_RECORDING_OLDER, err);
 	if (!c.old)
 		return -errno;
-	made->form = c.old->session ? INCISE_SCHEMA_VERSION : c.old->form;
-	if (made->form == INCISE_SCHEMA_VERSION) {
+	made->converted = c.old->old;
+	made->form = made->converted ? c.old->form : INCISE_SCHEMA_VERSION;
+	if (!made->converted) {
 		incise_recording_close(c.old);
 		return 0;
 	}
-	made->converted = true;
+	rc = check(c.old, made, err);
 	/* Messages name the recording that was given. */
 	free(c.old->path);
 	c.old->path = strdup(path);
-	rc = c.old->path ? check(folder, made, err)
-			 : incise_error_set(err, ENOMEM, "%s: out of memory", path);
+	if (!c.old->path)
+		rc = incise_schema_no_memory(path, err);
 	if (!rc && *made->altered && !damaged)
 		rc = incise_error_set(err, EBADMSG, "%s: not as it was recorded: %s",
 				      path, made->altered);
@@ -534,7 +559,7 @@ int incise_recording_convert(const char *folder, const char *path, bool damaged,
 	incise_recording_close(c.old);
 	/* A good recording stays good: nothing else gets the final name. */
 	if (!rc)
-		rc = check(folder, &now, err);
+		rc = check_new(folder, &now, err);
 	if (!rc && *now.altered && !damaged)
 		rc = incise_error_set(err, EIO,
 				      "%s: its counts do not agree with its rows: %s; "
