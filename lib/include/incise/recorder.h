@@ -60,6 +60,7 @@ struct incise_recorder_stats {
 	double depth_mm;	  /**< last depth, from the tracker */
 	double camera_depth_mm;	  /**< last depth, from vision; NAN: none */
 	double force_N;		  /**< last force; 0 until the zero is known */
+	double full_scale_N;	  /**< largest force of the channel */
 	double zero_mV;		  /**< NAN until known */
 	bool button;		  /**< button of the stylus */
 	bool armed;		  /**< waits for a trigger */

@@ -423,6 +423,8 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	if (incise_rig_force(rig))
 		incise_force_info(incise_rig_force(rig), &rec->force_info);
 	incise_force_calibration(&rec->force_info, &rec->calibration);
+	rec->stats.full_scale_N =
+		rec->force_info.full_scale_V * 1e3 / rec->calibration.force_mV_N;
 	rec->stats.zero_mV = rec->calibration.force_zero_mV;
 	if (incise_rig_tracker(rig))
 		incise_tracker_info(incise_rig_tracker(rig), &rec->tracker_info);
@@ -740,4 +742,13 @@ int incise_recorder_close(struct incise_recorder *rec, struct incise_error *err)
 	if (rc)
 		errno = -rc;
 	return rc;
+}
+
+void incise_recorder_discard(struct incise_recorder *rec)
+{
+	if (!rec->failed) {
+		rec->failed = -ECANCELED;
+		rec->worthless = true;
+	}
+	incise_recorder_close(rec, NULL);
 }
