@@ -81,10 +81,11 @@ INCISE_API int incise_capture_start_at(struct incise_capture_options *options,
  * @param result its wall time must be freed, also after a failure
  * @return 0: @path is a complete recording, maybe of samples that incise_capture_judge() rejects;
  *         -ECANCELED (it was never triggered), -EINVAL (the start is in the past, or the clock has no
- *         wall time): nothing was recorded; errno of open(2) for @sync, -ENOTTY (it is no controller of
- *         the stepper module, or without a SYNC line), -ENODEV (it is gone); errno of
- *         incise_recorder_new(), _poll() and _close(); the return value of options->step. What was
- *         committed before a failure stays in NAME.rec.part. Not for real-time threads.
+ *         wall time), negative errno of result->early: nothing was recorded; errno of open(2) for @sync,
+ *         -ENOTTY (it is no controller of the stepper module, or without a SYNC line), -ENODEV (it is
+ *         gone); errno of incise_recorder_new(), _poll(), _mark_at(), _end() and _close(), after which the
+ *         committed data remain readable in NAME.rec.part; the return value of options->step, after
+ *         which @path is complete. Not for real-time threads.
  */
 INCISE_API int incise_capture_run(const char *path, struct incise_rig *rig,
 				  const struct incise_capture_options *options,
