@@ -121,24 +121,6 @@ INCISE_API void incise_recorder_trigger(struct incise_recorder *recorder);
 INCISE_API int incise_recorder_mark(struct incise_recorder *recorder, const char *kind,
 				    const char *text, struct incise_error *err);
 
-/**
- * Add a row to the table of events at a time of CLOCK_MONOTONIC, of kind "sync" for a pulse of a
- * line that several rigs see.
- *
- * @return as incise_recorder_mark()
- */
-INCISE_API int incise_recorder_mark_at(struct incise_recorder *recorder, int64_t t_ns,
-				       const char *kind, const char *text,
-				       struct incise_error *err);
-
-/**
- * Get the newest point of the wall time, which is about a second old at most.
- *
- * @return 0; -ENODATA: none yet, or a recording without wall time
- */
-INCISE_API int incise_recorder_wall(const struct incise_recorder *recorder,
-				    struct incise_wall_point *point);
-
 /** Get the state of the recording. */
 INCISE_API void incise_recorder_stats(const struct incise_recorder *recorder,
 				      struct incise_recorder_stats *stats);

@@ -102,15 +102,15 @@ int incise_capture_start_at(struct incise_capture_options *options, const char *
 static int64_t find_time_left(const struct capture *capture, int64_t now_ns)
 {
 	const struct incise_capture_options *options = capture->options;
-	struct incise_wall_point point;
+	const struct incise_recorder_wall *wall = &capture->state.recorder->wall;
 	int64_t start_ns = options->start_ns;
 
-	if (incise_recorder_wall(capture->state.recorder, &point))
+	if (!wall->known)
 		return INT64_MAX;
 	if (!options->start_tai)
-		start_ns += point.utc_offset_s * INCISE_NS_PER_S;
+		start_ns += wall->newest.utc_offset_s * INCISE_NS_PER_S;
 	/* The rate within a second changes less than a poll takes. */
-	return start_ns - (point.tai_ns + (now_ns - point.t_ns));
+	return start_ns - (wall->newest.tai_ns + (now_ns - wall->newest.t_ns));
 }
 
 /* The time triggers, before the poll that starts to write. Returns 0 or -EINVAL. */
@@ -184,17 +184,17 @@ static int follow_sync(struct capture *capture, struct incise_error *err)
 {
 	struct incise_recorder *recorder = capture->state.recorder;
 	struct incise_stepper_event event;
-	char text[40];
 	int rc = 0;
 
 	while (capture->sync >= 0 && (rc = next_pulse(capture->sync, &event)) > 0) {
 		if (!capture->state.armed &&
 		    event.t_ns - capture->sync_ns < SYNC_EVERY_NS)
 			continue;
-		snprintf(text, sizeof(text), "pulse %lld", (long long)event.position);
-		rc = incise_recorder_mark_at(recorder, event.t_ns, "sync", text, err);
-		if (rc)
-			return rc;
+		rc = incise_recorder_note_at(recorder, event.t_ns, "sync", "pulse %lld",
+					     (long long)event.position);
+		recorder->failed = incise_recorder_check(recorder, rc, err);
+		if (recorder->failed)
+			return recorder->failed;
 		capture->sync_ns = event.t_ns;
 		if (!capture->state.armed)
 			continue;
@@ -224,12 +224,12 @@ static bool is_of_another(const char *named, const struct incise_wall_point *poi
 static void check_clock(struct capture *capture)
 {
 	const char *named = capture->options->recorder.clock_source;
-	struct incise_wall_point point;
+	const struct incise_recorder_wall *wall = &capture->state.recorder->wall;
 
-	if (capture->clocked || incise_recorder_wall(capture->state.recorder, &point))
+	if (capture->clocked || !wall->known)
 		return;
 	capture->clocked = true;
-	if (is_of_another(named, &point))
+	if (is_of_another(named, &wall->newest))
 		put_warning(
 			capture->options,
 			"--clock-source %s: not synchronised: the error of the wall time is "
@@ -254,16 +254,15 @@ static bool poses_are_doubtful(const struct incise_pose_counts *poses)
 /* Warn once, when it can still be mended. */
 static void check_poses(struct capture *capture, int64_t now_ns)
 {
-	struct incise_recorder_stats stats;
+	const struct incise_pose_counts *poses = &capture->state.recorder->stats.poses;
 	char text[1000];
 
 	if (capture->warned || now_ns - capture->poses_ns < POSES_EVERY_NS)
 		return;
 	capture->poses_ns = now_ns;
-	incise_recorder_stats(capture->state.recorder, &stats);
-	if (stats.poses.poses < POSES_LEAST || !poses_are_doubtful(&stats.poses))
+	if (poses->poses < POSES_LEAST || !poses_are_doubtful(poses))
 		return;
-	incise_pose_counts_text(&stats.poses, text, sizeof(text));
+	incise_pose_counts_text(poses, text, sizeof(text));
 	put_warning(capture->options, "%s", text);
 	capture->warned = true;
 }
@@ -320,7 +319,6 @@ static void begin_capture(struct capture *capture, int64_t now_ns)
 static int poll_once(struct capture *capture, int64_t now_ns, struct incise_error *err)
 {
 	const struct incise_capture_options *options = capture->options;
-	struct incise_recorder_stats stats;
 	int rc = follow_time(capture, now_ns, err);
 
 	if (!rc)
@@ -331,11 +329,8 @@ static int poll_once(struct capture *capture, int64_t now_ns, struct incise_erro
 		rc = follow_sync(capture, err);
 	if (rc)
 		return rc;
-	if (capture->state.armed) {
-		incise_recorder_stats(capture->state.recorder, &stats);
-		if (!stats.armed)
-			start_recording(capture, now_ns);
-	}
+	if (capture->state.armed && !capture->state.recorder->stats.armed)
+		start_recording(capture, now_ns);
 	check_clock(capture);
 	check_poses(capture, now_ns);
 	capture->state.seconds =

@@ -608,24 +608,6 @@ int incise_recorder_mark(struct incise_recorder *rec, const char *kind, const ch
 	return rec->failed;
 }
 
-int incise_recorder_mark_at(struct incise_recorder *rec, int64_t t_ns, const char *kind,
-			    const char *text, struct incise_error *err)
-{
-	if (!rec->failed &&
-	    incise_recorder_note_at(rec, t_ns, kind, "%s", text) != SQLITE_OK)
-		rec->failed = incise_recorder_fail(rec, err);
-	return rec->failed;
-}
-
-int incise_recorder_wall(const struct incise_recorder *rec,
-			 struct incise_wall_point *point)
-{
-	if (!rec->wall.known)
-		return -ENODATA;
-	*point = rec->wall.newest;
-	return 0;
-}
-
 /* --- end -------------------------------------------------------------------------- */
 
 int incise_recorder_end(struct incise_recorder *rec, struct incise_error *err)
