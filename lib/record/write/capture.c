@@ -359,7 +359,9 @@ static int record_samples(struct capture *capture, struct incise_error *err)
 		now = incise_clock_now(clock);
 		rc = poll_once(capture, now, err);
 	}
-	result->seconds = (double)(now - result->start_ns) / (double)INCISE_NS_PER_S;
+	if (!capture->state.armed)
+		result->seconds =
+			(double)(now - result->start_ns) / (double)INCISE_NS_PER_S;
 	return rc;
 }
 
