@@ -380,13 +380,14 @@ static int end_capture(struct capture *capture, const char *path, int rc,
 	if (result->stats.armed) {
 		incise_recorder_discard(recorder);
 		if (!rc && result->early.code)
-			return incise_error_set(err, result->early.code, "%s",
-						result->early.text);
-		return rc ? rc
-			  : incise_error_set(err, ECANCELED,
-					     "%s: it was never triggered; nothing was "
-					     "recorded",
-					     path);
+			rc = incise_error_set(err, result->early.code, "%s",
+					      result->early.text);
+		else if (!rc)
+			rc = incise_error_set(err, ECANCELED,
+					      "%s: it was never triggered; nothing was "
+					      "recorded",
+					      path);
+		return rc;
 	}
 	closed = incise_recorder_close(recorder, rc ? NULL : err);
 	if (rc || closed)
