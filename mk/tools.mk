@@ -14,7 +14,7 @@ $(O)/obj/tools/incise.o $(O)/obj/tools/cli/features.o: cppflags += -DVIEW_LIBRAR
 	-DRECORD_LIBRARY='"libincise-record.so.$(soversion)"'
 
 # The kernel module's own interface, for incise info, which looks past the library.
-$(O)/obj/tools/stepper/%.o $(O)/obj/tools/capture/%.o: cppflags += -Idriver
+$(O)/obj/tools/stepper/%.o: cppflags += -Idriver
 
 # Printed in the head of each bench's report; without the build's own folder.
 $(O)/obj/tools/bench/machine.o: cppflags += -DBUILD_FLAGS='"$(subst ',,$(subst ",,$(filter-out \

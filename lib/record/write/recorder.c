@@ -424,6 +424,8 @@ struct incise_recorder *incise_recorder_new(const char *path, struct incise_rig 
 	if (incise_rig_force(rig))
 		incise_force_info(incise_rig_force(rig), &rec->force_info);
 	incise_force_calibration(&rec->force_info, &rec->calibration);
+	rec->stats.full_scale_N =
+		rec->force_info.full_scale_V * 1e3 / rec->calibration.force_mV_N;
 	rec->stats.zero_mV = rec->calibration.force_zero_mV;
 	if (incise_rig_tracker(rig))
 		incise_tracker_info(incise_rig_tracker(rig), &rec->tracker_info);
@@ -607,24 +609,6 @@ int incise_recorder_mark(struct incise_recorder *rec, const char *kind, const ch
 	return rec->failed;
 }
 
-int incise_recorder_mark_at(struct incise_recorder *rec, int64_t t_ns, const char *kind,
-			    const char *text, struct incise_error *err)
-{
-	if (!rec->failed &&
-	    incise_recorder_note_at(rec, t_ns, kind, "%s", text) != SQLITE_OK)
-		rec->failed = incise_recorder_fail(rec, err);
-	return rec->failed;
-}
-
-int incise_recorder_wall(const struct incise_recorder *rec,
-			 struct incise_wall_point *point)
-{
-	if (!rec->wall.known)
-		return -ENODATA;
-	*point = rec->wall.newest;
-	return 0;
-}
-
 /* --- end -------------------------------------------------------------------------- */
 
 int incise_recorder_end(struct incise_recorder *rec, struct incise_error *err)
@@ -741,4 +725,13 @@ int incise_recorder_close(struct incise_recorder *rec, struct incise_error *err)
 	if (rc)
 		errno = -rc;
 	return rc;
+}
+
+void incise_recorder_discard(struct incise_recorder *rec)
+{
+	if (!rec->failed) {
+		rec->failed = -ECANCELED;
+		rec->worthless = true;
+	}
+	incise_recorder_close(rec, NULL);
 }

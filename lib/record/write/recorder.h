@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: LGPL-2.1-or-later */
 /*
- * Inside a recorder; for lib/record/write/recorder*.c only. Each file calls only those below it.
+ * Inside a recorder; for capture.c and recorder*.c of this folder only. Each file calls only those
+ * below it.
  *
+ *     capture.c             a whole capture
  *     recorder.c            start, poll, commits and end; the camera
  *     recorder_rows.c       streams: from samples to blocks; zero; pretrigger
  *     recorder_summary.c    cuts, largest depth and force
@@ -173,6 +175,11 @@ struct incise_recorder {
 	int failed;	     /* negative errno of the failure that ended it, or 0 */
 	bool worthless;	     /* failed before there was anything to keep */
 };
+
+/* --- recorder.c -------------------------------------------------------------------- */
+
+/* Free a recorder; unless it failed, remove what it wrote. */
+void incise_recorder_discard(struct incise_recorder *rec);
 
 /* --- recorder_rows.c --------------------------------------------------------------- */
 
