@@ -118,15 +118,7 @@ void incise_budget_mean_parts(const struct incise_budget_mean *mean,
 int incise_export_check(const struct incise_export_options *options,
 			struct incise_error *err);
 
-/* --- export.c ---------------------------------------------------------------------- */
-
-/*
- * Write the rows of what incise_export() does in this format; the options were checked. @provenance
- * may be NULL. Returns 0 or -errno.
- */
-int incise_export_rows(struct incise_export_pass *pass,
-		       const struct incise_table_format *format, FILE *out,
-		       const struct incise_provenance *provenance);
+/* --- pass.c ------------------------------------------------------------------------ */
 
 /* Go through the recordings, in order, with the name of each and its wall time. Returns 0 or -errno. */
 int incise_export_each(struct incise_export_pass *pass,
@@ -148,6 +140,16 @@ int incise_export_check_part(const struct incise_export_pass *pass);
 
 /* Free what the pass holds, and read the recordings to their ends again. */
 void incise_export_close(struct incise_export_pass *pass);
+
+/* --- export.c ---------------------------------------------------------------------- */
+
+/*
+ * Write the rows of what incise_export() does in this format; the options were checked. @provenance
+ * may be NULL. Returns 0 or -errno.
+ */
+int incise_export_rows(struct incise_export_pass *pass,
+		       const struct incise_table_format *format, FILE *out,
+		       const struct incise_provenance *provenance);
 
 /* A kind of rows. */
 struct incise_row_kind {
