@@ -63,8 +63,8 @@ Last." ]
 		done
 	done
 	# as wide as asked for, in characters: a line of this one has a dash of three bytes
-	[ "$(COLUMNS=80 incise-train --help | sed -n 1p)" = "Usage: incise train DATA.csv|NAME.rec… -o MODEL.fis [OPTIONS]" ]
-	[ "$(COLUMNS=61 incise-train --help | sed -n 1p)" = "Usage: incise train DATA.csv|NAME.rec… -o MODEL.fis [OPTIONS]" ]
+	[ "$(COLUMNS=80 incise-train --help | sed -n 1p)" = "Usage: incise train DATA.csv|NAME.rec… [-o MODEL.fis] [OPTIONS]" ]
+	[ "$(COLUMNS=61 incise-train --help | sed -n 1p)" = "Usage: incise train DATA.csv|NAME.rec… [-o MODEL.fis] [OPTIONS]" ]
 	[ "$(COLUMNS=60 incise-train --help | sed -n 2p)" = "        [OPTIONS]" ]
 	# of the terminal, where nobody says otherwise
 	run -0 script -qec 'unset COLUMNS; stty cols 50; incise-train --help' /dev/null </dev/null
