@@ -68,7 +68,7 @@ Last." ]
 	[ "$(COLUMNS=62 incise-train --help | sed -n 2p)" = "        [OPTIONS]" ]
 	# of the terminal, where nobody says otherwise
 	run -0 script -qec 'unset COLUMNS; stty cols 50; incise-train --help' /dev/null </dev/null
-	[ "$(tr -d "\r" <<<"$output" | sed -n 2p)" = "        MODEL.fis [OPTIONS]" ]
+	[ "$(tr -d "\r" <<<"$output" | sed -n 2p)" = "        MODEL.fis] [OPTIONS]" ]
 	# an example can be pasted
 	[ "$(COLUMNS=62 incise-train --help | sed -n '/pairs.csv/,/liver/p')" = \
 		"  incise train pairs.csv --group cut --check 0.3 \\
