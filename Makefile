@@ -112,10 +112,10 @@ libs_incise := -lm -ldl
 libs_incise-learn := -lm
 libs_incise-record := -lm -ldl -pthread
 libs_incise-view := -lm
-also_incise-learn := lib/base/lines.o lib/base/crc32c.o
+also_incise-learn := lib/base/lines.o lib/base/crc32c.o lib/base/crypto/sha256.o
 also_incise-view := lib/device/module.o
 also_incise-record := lib/base/crc32c.o lib/base/ring.o lib/device/module.o lib/device/thread.o \
-	lib/control/model_input.o lib/control/predict.o lib/tissue/predict.o lib/learn/sha256.o
+	lib/control/model_input.o lib/control/predict.o lib/tissue/predict.o lib/base/crypto/sha256.o
 about_incise := haptic cutting: fuzzy force models, virtual rig, scenes and real-time loop
 about_incise-learn := haptic cutting: learning models from data
 about_incise-record := haptic cutting: recordings and what is exported of them

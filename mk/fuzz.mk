@@ -66,7 +66,7 @@ fuzz_libs_sd_file = $(fuzz_libs_scene_file)
 fuzz_session_file := $(fuzz_scene_file) $(addprefix tools/session/,digest.c judge.c \
 	session_file.c) tools/cli/json.c tools/cli/loop_report.c tools/cli/stopwatch.c
 fuzz_libs_session_file = $(fuzz_libs_scene_file) $(shell $(PKG_CONFIG) --libs jansson)
-fuzz_factor_file := $(fuzz_scene_file) $(wildcard lib/learn/*.c)
+fuzz_factor_file := $(fuzz_scene_file) lib/base/crypto/sha256.c $(wildcard lib/learn/*.c)
 fuzz_libs_factor_file = $(fuzz_libs_scene_file) $(shell $(PKG_CONFIG) --libs $(pc_incise-learn))
 
 fuzz_core := $(patsubst %.c,$(O)/obj/fuzz/%.o,$(wildcard lib/fixed/*.c))

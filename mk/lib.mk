@@ -144,7 +144,7 @@ $(O)/obj/lib/vision/board/board_opencv.o: pc_cflags = $(opencv_cflags)
 has_frames := $(shell $(PKG_CONFIG) --exists libavformat libavcodec libavutil && echo yes)
 device_modules += $(if $(has_frames),frames_mkv)
 pc_frames_mkv := libavformat libavcodec libavutil libcrypto
-objects_frames_mkv := $(patsubst %.c,$(O)/obj/%.o,$(wildcard lib/record/mkv/*.c))
+objects_frames_mkv := $(patsubst %.c,$(O)/obj/%.o,lib/base/crypto/sha256.c $(wildcard lib/record/mkv/*.c))
 $(objects_frames_mkv): pc_cflags = $(shell $(PKG_CONFIG) --cflags $(pc_frames_mkv))
 
 # Films of pictures; lib/view loads it.

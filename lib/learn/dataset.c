@@ -11,9 +11,9 @@
 #include <string.h>
 #include <incise/arrow.h>
 #include <incise/dataset.h>
+#include "../base/crypto/sha256.h"
 #include "../base/lines.h"
 #include "pairs.h"
-#include "sha256.h"
 
 #define FIELDS_MAX 256
 
@@ -746,7 +746,7 @@ const double *incise_dataset_row(const struct incise_dataset *data, size_t row)
 
 int incise_dataset_sha256(const struct incise_dataset *data, char hex[65])
 {
-	struct incise_sha256 sha;
+	struct incise_sha256 sha = {0};
 
 	incise_sha256_start(&sha);
 	incise_sha256_add(&sha, data->values,

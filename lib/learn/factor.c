@@ -17,9 +17,9 @@
 #include <incise/version.h>
 #include "../base/c_locale.h"
 #include "../base/crc32c.h"
+#include "../base/crypto/sha256.h"
 #include "../base/random.h"
 #include "design.h"
-#include "sha256.h"
 #include "tune.h"
 
 #define FORM 2 /* of the file */
@@ -49,26 +49,6 @@ struct incise_factor {
 };
 
 /* --- hashes -------------------------------------------------------------------------- */
-
-int incise_file_sha256(const char *path, char hex[65], struct incise_error *err)
-{
-	int fd = open(path, O_RDONLY | O_CLOEXEC), code;
-	struct incise_sha256 sha;
-	char bytes[1 << 16];
-	ssize_t n = -1;
-
-	incise_sha256_start(&sha);
-	while (fd >= 0 && (n = read(fd, bytes, sizeof(bytes))) > 0)
-		incise_sha256_add(&sha, bytes, (size_t)n);
-	code = errno;
-	if (fd >= 0)
-		close(fd);
-	if (incise_sha256_end(&sha, hex) && n >= 0) {
-		n = -1;
-		code = ENOMEM;
-	}
-	return n < 0 ? incise_error_set(err, code, "%s: %s", path, strerror(code)) : 0;
-}
 
 uint64_t incise_group_key(const char *source, const char *name)
 {
@@ -159,7 +139,6 @@ struct incise_factor *incise_factor_new(const struct incise_model *premises,
 {
 	const struct incise_variable *out = &incise_model_info(premises)->output;
 	struct incise_factor *factor = calloc(1, sizeof(*factor));
-	struct incise_sha256 sha;
 	int rc = factor ? 0 : -ENOMEM;
 
 	if (factor) {
@@ -189,11 +168,9 @@ struct incise_factor *incise_factor_new(const struct incise_model *premises,
 		if (!factor->fold[f])
 			rc = -ENOMEM;
 	}
-	if (!rc) {
-		incise_sha256_start(&sha);
-		incise_sha256_add(&sha, factor->premises, strlen(factor->premises));
-		rc = incise_sha256_end(&sha, factor->hash);
-	}
+	if (!rc)
+		rc = incise_sha256_text(factor->premises, strlen(factor->premises),
+					factor->hash);
 	if (rc)
 		incise_error_set(
 			err, -rc,

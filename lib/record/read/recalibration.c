@@ -16,7 +16,7 @@
 #include <unistd.h>
 #include <incise/infile.h>
 #include <incise/outfile.h>
-#include "../../learn/sha256.h"
+#include "../../base/crypto/sha256.h"
 #include "../schema.h"
 #include "recalibration.h"
 #include "session.h"
@@ -129,15 +129,6 @@ static int read_folder(const char *folder, struct incise_recalibration **list,
 	return n;
 }
 
-static int set_digest(struct incise_recalibration *entry, const char *text, size_t size)
-{
-	struct incise_sha256 sha;
-
-	incise_sha256_start(&sha);
-	incise_sha256_add(&sha, text, size);
-	return incise_sha256_end(&sha, entry->sha256);
-}
-
 /* The text of a calibration in a recording, with its digest; to be freed; NULL with errno. */
 static char *read_text(const char *folder, struct incise_recalibration *entry,
 		       struct incise_error *err)
@@ -151,7 +142,7 @@ static char *read_text(const char *folder, struct incise_recalibration *entry,
 	}
 	text = incise_infile_read(path, &file_kind, &size, err);
 	free(path);
-	if (text && set_digest(entry, text, size)) {
+	if (text && incise_sha256_text(text, size, entry->sha256)) {
 		free(text);
 		no_memory(folder, err);
 		return NULL;
@@ -478,7 +469,7 @@ static int add(const char *folder, const char *calibration,
 				      folder);
 	if (!rc)
 		rc = next_name(folder, &list[n - 1], !calibration, made, err);
-	if (!rc && text && set_digest(made, text, size))
+	if (!rc && text && incise_sha256_text(text, size, made->sha256))
 		rc = no_memory(folder, err);
 	if (!rc)
 		rc = write_entry(folder, made, text ? text : "", size, err);
