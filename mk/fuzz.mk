@@ -49,7 +49,7 @@ fuzz_statement := lib/base/error.c lib/record/statement.c
 fuzz_block := lib/record/batch.c lib/record/ledger.c lib/base/crc32c.c
 fuzz_libs_block = $(shell $(PKG_CONFIG) --libs sqlite3)
 fuzz_origin := lib/record/export/origin.c
-fuzz_timestamp_reply := lib/base/error.c lib/base/infile.c tools/seal/timestamp.c
+fuzz_timestamp_reply := lib/base/error.c lib/base/infile.c lib/base/crypto/sha256.c lib/record/prove/timestamp.c
 fuzz_libs_timestamp_reply = $(shell $(PKG_CONFIG) --libs libcrypto)
 
 fuzz_state_page := lib/base/error.c $(addprefix lib/loop/state_,file.c page.c reader.c)

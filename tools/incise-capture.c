@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <incise/prove.h>
 #include <incise/recorder.h>
 #include <incise/rig.h>
 #include <incise/sim.h>
@@ -20,7 +21,6 @@
 #include "cli/recording.h"
 #include "cli/stream_report.h"
 #include "cli/wall_report.h"
-#include "seal/seal.h"
 
 #define POLL_NS 10000000LL
 /* The first point of wall time comes at once, unless its source hangs. */
@@ -518,23 +518,15 @@ struct signing {
 /* The recording stays as it is if it cannot be signed. */
 static void sign(const char *path, struct signing *signing)
 {
-	struct signature signature;
-	char *bytes, *file;
-	struct seal seal;
+	const struct incise_prove_options options = {.key = signing->key,
+						     .recorded = true};
+	struct incise_proof proof;
 
 	if (!signing->key)
 		return;
-	/* The recorder has just written the rows, and the statement compares them with the seal. */
-	if (!seal_open(&seal, path, false, &signing->err)) {
-		bytes = seal_sign(&seal, signing->key, &signature, &signing->err);
-		file = bytes ? seal_signature_path(&seal, &signature) : NULL;
-		if (bytes &&
-		    !seal_write(&seal, file, bytes, strlen(bytes), &signing->err))
-			strcpy(signing->by, signature.key);
-		free(bytes);
-		free(file);
-	}
-	seal_close(&seal);
+	if (!incise_prove(path, &options, &proof, &signing->err))
+		strcpy(signing->by, proof.seals->vouchers->key);
+	incise_proof_free(&proof);
 }
 
 /* --- report ---------------------------------------------------------------------------- */

@@ -12,7 +12,7 @@
 #include <incise/recording.h>
 #include <incise/seal.h>
 #include "cli/cli.h"
-#include "cli/control_character.h"
+#include "../lib/base/control_character.h"
 #include "cli/file_kind.h"
 #include "cli/json.h"
 #include "cli/recording.h"

@@ -14,7 +14,7 @@
 #include <incise/infile.h>
 #include "child.h"
 #include "cli.h"
-#include "control_character.h"
+#include "../../lib/base/control_character.h"
 #include "file.h"
 #include "folder.h"
 #include "plot.h"

@@ -12,9 +12,9 @@
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <incise/prove.h>
 #include <incise/recalibration.h>
 #include <incise/verify.h>
-#include "../seal/seal.h"
 #include "cli.h"
 #include "file_kind.h"
 #include "recording.h"
@@ -121,34 +121,13 @@ static void remove_calibrations(int folder, const char *path)
 		cli_fail("%s/calibration: cannot be removed: %s", path, strerror(errno));
 }
 
-/* Signatures and time-stamps; a folder with anything else in it stays. */
-static void remove_seal(const char *path, const char *name)
-{
-	char *folder = cli_text("%s/%s", path, name);
-	struct incise_error err = {0};
-	struct seal_files files;
-
-	if (seal_files_read(&files, path, name, &err))
-		cli_fail_with(&err);
-	for (int i = 0; i < files.n; i++) {
-		char *file = cli_text("%s/%s", folder, files.all[i].name);
-
-		if (unlink(file))
-			cli_fail("%s: cannot be removed: %s", file, strerror(errno));
-		free(file);
-	}
-	if (rmdir(folder) && errno != ENOENT)
-		cli_fail("%s: cannot be removed: %s", folder, strerror(errno));
-	seal_files_free(&files);
-	free(folder);
-}
-
 void recording_remove(const char *path)
 {
 	static const char *const files[] = {"recording.db", "recording.db-wal",
 					    "recording.db-shm", "recording.db-journal",
 					    "camera.mkv"};
 	int folder = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+	struct incise_error err = {0};
 
 	if (folder < 0 && errno == ENOENT)
 		return;
@@ -160,8 +139,8 @@ void recording_remove(const char *path)
 			 path);
 	remove_members(path);
 	remove_calibrations(folder, path);
-	remove_seal(path, "seal");
-	remove_seal(path, "seal-before");
+	if (incise_proof_remove(path, &err))
+		cli_fail_with(&err);
 	for (size_t i = 0; i < sizeof(files) / sizeof(*files); i++)
 		if (unlinkat(folder, files[i], 0) && errno != ENOENT)
 			cli_fail("%s/%s: cannot be removed: %s", path, files[i],

@@ -1,0 +1,567 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+/*
+ * Proof of a recording; see incise/prove.h.
+ */
+#include <ctype.h>
+#include <errno.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <incise/recalibration.h>
+#include "../../base/control_character.h"
+#include "../read/session.h"
+#include "prove.h"
+
+struct prove {
+	const char *path; /* as it was given */
+	const struct incise_prove_options *options;
+	struct incise_proof *proof;
+	char *join; /* the statement of the join as it is now; NULL: it is a plain recording */
+	bool verified;
+	struct incise_signers signers;
+	struct x509_store_st *authorities; /* NULL: none */
+	struct incise_error *err;
+};
+
+static int fail_memory(const struct prove *prove)
+{
+	return incise_error_set(prove->err, ENOMEM, "out of memory for a proof");
+}
+
+/* --- statements ------------------------------------------------------------------------- */
+
+struct comparison {
+	struct incise_proof_statement *statement;
+	const struct incise_verify_watch *watch; /* of the caller, or NULL */
+	bool seen;				 /* the caller has all findings already */
+};
+
+static void keep_difference(struct incise_proof_statement *s, const char *text)
+{
+	char *copy = s->n_differences < INCISE_PROOF_DIFFERENCES ? strdup(text) : NULL;
+
+	if (!copy)
+		return;
+	control_characters_hide(copy);
+	s->differences[s->n_differences++] = copy;
+}
+
+static void take_finding(void *user, const struct incise_verify_finding *finding)
+{
+	const struct comparison *comparison = user;
+	const struct incise_verify_watch *watch = comparison->watch;
+
+	if (watch && watch->found && !comparison->seen)
+		watch->found(watch->user, finding);
+	if (finding->kind == INCISE_VERIFY_SEAL)
+		keep_difference(comparison->statement, finding->text);
+}
+
+/* A finding of ours about a statement. */
+static void report_difference(struct comparison *comparison, const char *fmt, ...)
+	INCISE_PRINTF(2, 3);
+static void report_difference(struct comparison *comparison, const char *fmt, ...)
+{
+	char text[600];
+	struct incise_verify_finding finding = {
+		.kind = INCISE_VERIFY_SEAL,
+		.stream = "",
+		.first_block = -1,
+		.last_block = -1,
+		.last_seq = -1,
+		.first_ns = -1,
+		.last_ns = -1,
+		.count = 1,
+		.text = text,
+	};
+	va_list args;
+
+	va_start(args, fmt);
+	vsnprintf(text, sizeof(text), fmt, args);
+	va_end(args);
+	take_finding(comparison, &finding);
+}
+
+size_t incise_proof_statement_length(const struct incise_bytes *text)
+{
+	const char *end = memmem(text->bytes, text->n, "\nend\n", 5);
+
+	return end ? (size_t)(end + 5 - text->bytes) : 0;
+}
+
+char *incise_proof_calibrations(const char *recording, struct incise_error *err)
+{
+	struct incise_recalibration *list = NULL;
+	int n = incise_recalibrations(recording, &list, err);
+	char *text = NULL;
+	size_t size;
+	FILE *out = n < 0 ? NULL : open_memstream(&text, &size);
+
+	for (int i = 1; i < n && out; i++)
+		fprintf(out, "calibration %s %s\n", list[i].file,
+			*list[i].sha256 ? list[i].sha256 : "-");
+	free(list);
+	if (out && !fclose(out))
+		return text;
+	if (n < 0)
+		errno = -n;
+	else
+		incise_error_set(err, ENOMEM, "%s: out of memory", recording);
+	return NULL;
+}
+
+/* SHA-256 of the last calibration of a list, which is the active one; "": that of the capture. */
+static void find_active(const char *list, char sha256[65])
+{
+	*sha256 = 0;
+	for (const char *line = list; *line; line = strchr(line, '\n') + 1)
+		if (sscanf(line, "calibration %*s %64[0-9a-f]", sha256) != 1)
+			*sha256 = 0;
+}
+
+/* Whether the recording is read by the calibration of the statement; it is a finding if not. */
+static bool compare_calibration(const char *now, const char *then,
+				struct comparison *comparison)
+{
+	bool kept = !strncmp(now, then, strlen(then)), known;
+	char read_by[65], signed_as[65], name[200] = "";
+
+	for (const char *line = now; *line; line = strchr(line, '\n') + 1)
+		sscanf(line, "calibration %199s", name);
+	find_active(now, read_by);
+	find_active(then, signed_as);
+	known = kept && !strcmp(read_by, signed_as);
+	if (!kept)
+		report_difference(comparison,
+				  "calibrations that are in the statement were removed "
+				  "or changed");
+	else if (!known)
+		report_difference(comparison,
+				  "%s, by which it is read, is not in the statement",
+				  name);
+	return known;
+}
+
+/* The name is that of the cuts in what is exported. A member's is in the statement of the join. */
+static bool compare_name(const char *now, const char *name, bool member,
+			 struct comparison *comparison)
+{
+	const char *then = name;
+	bool same;
+
+	/* A statement has '?' for characters that are not printed. */
+	for (; *now && (*now == *then || (*then == '?' && iscntrl((unsigned char)*now)));
+	     now++)
+		then++;
+	same = member || *now == *then;
+	if (!same)
+		report_difference(
+			comparison,
+			"it was signed under the name %s; give it that name again, or "
+			"sign it under this one",
+			name);
+	return same;
+}
+
+/* The text says all: the first line that differs does where. */
+static void compare_join(const struct prove *prove, const struct incise_seal_file *file,
+			 struct incise_proof_statement *s)
+{
+	static const char first[] = "incise statement 1 of a join\n";
+	struct comparison comparison = {.statement = s};
+	const char *then = file->content.bytes, *now = prove->join, *member = "";
+	size_t n = strlen(first);
+
+	if (!then || strncmp(then, first, n)) {
+		report_difference(&comparison, "seal/%s: %s", file->name,
+				  then ? "no statement of a join" : file->why);
+		return;
+	}
+	s->commit = 0;
+	s->complete = true;
+	s->agrees = s->calibrated = s->recorded =
+		file->content.n == strlen(now) && !memcmp(then, now, file->content.n);
+	if (s->agrees)
+		return;
+	for (; *now && !strncmp(now, then, n); n = strcspn(now, "\n") + 1) {
+		now += n;
+		then += n;
+		if (!strncmp(now, "member ", 7))
+			member = now;
+	}
+	report_difference(&comparison, "%.*s: '%.*s' was signed, and is '%.*s' now",
+			  (int)strcspn(member, "\n"), member, (int)strcspn(then, "\n"),
+			  then, (int)strcspn(now, "\n"), now);
+}
+
+static int pass_progress(void *user, double share)
+{
+	const struct incise_verify_watch *watch =
+		((const struct comparison *)user)->watch;
+
+	return watch && watch->progress ? watch->progress(watch->user, share) : 0;
+}
+
+/* Calibration and name, which are no rows. Returns 0 or -errno. */
+static int compare_rest(const struct incise_proof_seal *seal, const char *name,
+			bool member, const char *calibrations,
+			struct comparison *comparison, struct incise_error *err)
+{
+	struct incise_proof_statement *s = comparison->statement;
+	char *now = incise_proof_calibrations(seal->path, err);
+	struct incise_recording *recording =
+		now ? incise_recording_open(seal->path, err) : NULL;
+	int rc = recording ? 0 : -errno;
+
+	if (!rc) {
+		s->calibrated = compare_calibration(now, calibrations, comparison);
+		s->agrees = compare_name(incise_recording_name(recording), name, member,
+					 comparison) &&
+			    s->calibrated && s->recorded;
+	}
+	incise_recording_close(recording);
+	free(now);
+	return rc;
+}
+
+/* The first one is compared while the recording is verified. Returns 0 or -errno. */
+static int compare_recording(struct prove *prove, const struct incise_proof_seal *seal,
+			     const struct incise_seal_file *file, bool member,
+			     struct incise_proof_statement *s)
+{
+	struct comparison comparison = {s, prove->options->watch, prove->verified};
+	const struct incise_verify_watch own = {take_finding, pass_progress, &comparison};
+	const char *text = file->content.bytes;
+	size_t n = text ? incise_proof_statement_length(&file->content) : 0;
+	struct incise_seal_statement statement;
+	struct incise_verify_report report;
+	struct incise_error err = {.text = ""};
+	char why[700];
+	int rc;
+
+	if (!text || incise_seal_read(&statement, text, n, &err)) {
+		snprintf(why, sizeof(why), "seal/%s: %s", file->name,
+			 text ? err.text : file->why);
+		keep_difference(s, why);
+		return 0;
+	}
+	s->commit = statement.last.commit;
+	s->complete = statement.complete;
+	rc = incise_seal_compare(seal->path, text, n, &own, &report, prove->err);
+	if (rc)
+		return rc;
+	if (!prove->verified)
+		prove->proof->report = report;
+	s->recorded = report.sealed;
+	s->reported = comparison.watch && !prove->verified;
+	prove->verified = true;
+	return compare_rest(seal, statement.name, member, text + n, &comparison,
+			    prove->err);
+}
+
+/* The last one is that of the present: the recording is verified with it. Returns 0 or -errno. */
+static int compare_statements(struct prove *prove, struct incise_proof_seal *seal,
+			      const struct incise_seal_files *files, bool member)
+{
+	int rc = 0;
+
+	for (int i = files->n - 1; i >= 0 && !rc; i--) {
+		const struct incise_seal_file *file = &files->all[i];
+		struct incise_proof_statement *s = &seal->statements[seal->n_statements];
+
+		if (file->kind != INCISE_PROOF_STATEMENT)
+			continue;
+		*s = (struct incise_proof_statement){.number = file->number,
+						     .commit = -1};
+		seal->n_statements++;
+		if (seal->join)
+			compare_join(prove, file, s);
+		else
+			rc = compare_recording(prove, seal, file, member, s);
+	}
+	return rc;
+}
+
+/* --- signatures and time-stamps --------------------------------------------------------- */
+
+static int check_timestamp(const struct prove *prove,
+			   struct incise_proof_voucher *voucher,
+			   const struct incise_seal_file *file,
+			   const struct incise_bytes *statement)
+{
+	uint8_t digest[INCISE_SHA256_BYTES];
+	struct incise_error err = {0};
+
+	if (incise_sha256_of(statement->bytes, statement->n, digest))
+		return fail_memory(prove);
+	if (incise_timestamp_read(&file->content, "not valid", digest, NULL,
+				  prove->authorities, voucher, &err))
+		snprintf(voucher->why, sizeof(voucher->why), "%s", err.text);
+	return 0;
+}
+
+/* The earliest time at which a trusted authority saw the statement; -1: none. */
+static int64_t find_time(const struct incise_proof_seal *seal, int number)
+{
+	int64_t t_s = -1;
+
+	for (int i = 0; i < seal->n_vouchers; i++) {
+		const struct incise_proof_voucher *v = &seal->vouchers[i];
+
+		if (v->statement == number && v->kind == INCISE_PROOF_TIMESTAMP &&
+		    v->verdict == INCISE_PROOF_GOOD && (t_s < 0 || v->t_s < t_s))
+			t_s = v->t_s;
+	}
+	return t_s;
+}
+
+static const struct incise_seal_file *find_statement(
+	const struct incise_seal_files *files, int number)
+{
+	for (int i = 0; i < files->n; i++)
+		if (files->all[i].kind == INCISE_PROOF_STATEMENT &&
+		    files->all[i].number == number)
+			return &files->all[i];
+	return NULL;
+}
+
+/* Returns 0 or -errno. */
+static int check_voucher(const struct prove *prove, struct incise_proof_seal *seal,
+			 const struct incise_seal_files *files,
+			 const struct incise_seal_file *file)
+{
+	struct incise_proof_voucher *voucher = &seal->vouchers[seal->n_vouchers];
+	const struct incise_seal_file *statement = find_statement(files, file->number);
+	int rc = 0;
+
+	*voucher = (struct incise_proof_voucher){.kind = file->kind,
+						 .statement = file->number,
+						 .verdict = INCISE_PROOF_BAD};
+	strcpy(voucher->file, file->name);
+	if (!file->content.bytes)
+		strcpy(voucher->why, file->why);
+	else if (!statement || !statement->content.bytes)
+		strcpy(voucher->why, "its statement is missing");
+	else if (file->kind == INCISE_PROOF_TIMESTAMP)
+		rc = check_timestamp(prove, voucher, file, &statement->content);
+	else if (prove->options->signers)
+		rc = incise_signature_check(voucher, &statement->content, &file->content,
+					    &prove->signers,
+					    find_time(seal, file->number), prove->err);
+	else
+		voucher->verdict = INCISE_PROOF_UNCHECKED;
+	seal->n_vouchers++;
+	seal->bad += voucher->verdict == INCISE_PROOF_BAD;
+	return rc;
+}
+
+/* Time-stamps first: they say when a key had to be valid. Returns 0 or -errno. */
+static int check_vouchers(const struct prove *prove, struct incise_proof_seal *seal,
+			  const struct incise_seal_files *files)
+{
+	int rc = 0;
+
+	for (int kind = INCISE_PROOF_TIMESTAMP; kind >= INCISE_PROOF_SIGNATURE; kind--)
+		for (int i = 0; i < files->n && !rc; i++)
+			if ((int)files->all[i].kind == kind)
+				rc = check_voucher(prove, seal, files, &files->all[i]);
+	return rc;
+}
+
+/* Statements are newest first. An older state that was signed, too, does not replace a newer one. */
+static void judge_seal(struct incise_proof_seal *seal)
+{
+	bool newest = true;
+
+	for (int i = 0; i < seal->n_statements; i++) {
+		struct incise_proof_statement *s = &seal->statements[i];
+
+		for (int k = 0; k < seal->n_vouchers; k++)
+			s->vouched |= seal->vouchers[k].statement == s->number &&
+				      seal->vouchers[k].kind == INCISE_PROOF_SIGNATURE &&
+				      seal->vouchers[k].verdict == INCISE_PROOF_GOOD;
+		seal->vouched |= newest && s->agrees && s->vouched;
+		newest &= !s->vouched;
+		seal->bad += s->commit < 0;
+	}
+}
+
+/* --- the recording ---------------------------------------------------------------------- */
+
+/* Identity and last head, as its tables have them, or the reason without its name. 0 or -errno. */
+static int read_head(struct incise_proof_seal *seal, struct incise_error *err)
+{
+	struct incise_recording *recording = incise_recording_open(seal->path, err);
+	size_t name = strlen(seal->path);
+	int rc = recording ? incise_seal_head(recording, seal->identity, &seal->head, err)
+			   : -errno;
+
+	incise_recording_close(recording);
+	if (!rc)
+		return 0;
+	*seal->identity = 0;
+	snprintf(seal->why, sizeof(seal->why), "%.199s",
+		 !strncmp(err->text, seal->path, name) &&
+				 !strncmp(err->text + name, ": ", 2)
+			 ? err->text + name + 2
+			 : err->text);
+	return rc == -ENODATA ? 0 : rc;
+}
+
+static int check_seal(struct prove *prove, struct incise_proof_seal *seal,
+		      const struct incise_seal_files *files, bool member)
+{
+	const struct incise_prove_options *options = prove->options;
+	struct incise_error err = {.text = ""};
+	int rc = seal->join ? 0 : read_head(seal, &err);
+
+	/* One that cannot be read is a finding of its verification. */
+	if (rc && !options->verify) {
+		*prove->err = err;
+		return rc;
+	}
+	rc = options->signers ? compare_statements(prove, seal, files, member) : 0;
+	if (!rc && options->verify && !prove->verified)
+		rc = incise_verify(prove->path, options->watch, &prove->proof->report,
+				   prove->err);
+	prove->verified = true;
+	if (!rc)
+		rc = check_vouchers(prove, seal, files);
+	judge_seal(seal);
+	return rc;
+}
+
+static int prove_seal(struct prove *prove, struct incise_proof_seal *seal, bool member)
+{
+	const struct incise_prove_options *options = prove->options;
+	struct incise_seal_files files;
+	int rc = incise_seal_files_read(&files, seal->path, "seal", prove->err);
+
+	/* A statement, a signature and a time-stamp may be made. */
+	seal->statements = calloc((size_t)files.n + 1, sizeof(*seal->statements));
+	seal->vouchers = calloc((size_t)files.n + 2, sizeof(*seal->vouchers));
+	for (int i = 0; i < files.n; i++) {
+		seal->signatures += files.all[i].kind == INCISE_PROOF_SIGNATURE;
+		seal->timestamps += files.all[i].kind == INCISE_PROOF_TIMESTAMP;
+	}
+	if (!rc && (!seal->statements || !seal->vouchers))
+		rc = fail_memory(prove);
+	if (!rc)
+		rc = options->key || options->timestamp
+			     ? incise_proof_sign(seal, &files,
+						 seal->join ? prove->join : NULL, member,
+						 options, prove->err)
+			     : check_seal(prove, seal, &files, member);
+	incise_seal_files_free(&files);
+	return rc;
+}
+
+/* The folder of a recording, without its choice; NULL and the reason. */
+static char *find_folder(const char *path, struct incise_error *err)
+{
+	const char *slash = strrchr(path, '/'),
+		   *colon = strrchr(slash ? slash : path, ':');
+	char *folder = incise_recording_folder(path, colon ? NULL : err), *whole;
+
+	if (folder || !colon)
+		return folder;
+	whole = strndup(path, (size_t)(colon - path));
+	folder = whole ? incise_recording_folder(whole, err) : NULL;
+	free(whole);
+	return folder;
+}
+
+/* A seal for each member, and the last one for the recording. Returns 0 or -errno. */
+static int find_seals(struct prove *prove)
+{
+	struct incise_proof *proof = prove->proof;
+	char *folder = find_folder(prove->path, prove->err);
+	/* One that does not open is plain, and says why later. */
+	struct incise_recording *recording =
+		folder ? incise_recording_open_any(folder, NULL) : NULL;
+	const struct incise_session *session = recording ? recording->session : NULL;
+	const int n = session ? session->n : 0;
+	int rc = folder ? 0 : -errno;
+
+	if (folder && strlen(folder) > PATH_MAX - 200)
+		rc = incise_error_set(prove->err, ENAMETOOLONG, "%.100s…: %s", folder,
+				      strerror(ENAMETOOLONG));
+	proof->seals = calloc((size_t)n + 1, sizeof(*proof->seals));
+	if (!rc && !proof->seals)
+		rc = fail_memory(prove);
+	for (int i = 0; i < n && !rc; i++, proof->n++)
+		if (asprintf(&proof->seals[i].path, "%s/%s", folder,
+			     session->info[i].name) < 0)
+			rc = fail_memory(prove);
+	if (!rc) {
+		proof->seals[proof->n++] = (struct incise_proof_seal){
+			.path = folder, .join = session != NULL};
+		folder = NULL;
+	}
+	if (!rc && session) {
+		prove->join = incise_session_statement(recording, prove->err);
+		rc = prove->join ? 0 : -errno;
+	}
+	incise_recording_close(recording);
+	free(folder);
+	return rc;
+}
+
+/* Returns 0 or -errno. */
+static int read_trust(struct prove *prove)
+{
+	const struct incise_prove_options *options = prove->options;
+	int rc = options->signers ? incise_signers_read(&prove->signers, options->signers,
+							options->revoked, prove->err)
+				  : 0;
+
+	if (!rc && options->authorities) {
+		prove->authorities =
+			incise_authorities_read(options->authorities, prove->err);
+		rc = prove->authorities ? 0 : -errno;
+	}
+	return rc;
+}
+
+int incise_prove(const char *path, const struct incise_prove_options *options,
+		 struct incise_proof *proof, struct incise_error *err)
+{
+	struct incise_error none = {0};
+	struct prove prove = {.path = path,
+			      .options = options,
+			      .proof = proof,
+			      .err = err ? err : &none};
+	int rc;
+
+	*proof = (struct incise_proof){.n = 0};
+	rc = read_trust(&prove);
+	if (!rc)
+		rc = find_seals(&prove);
+	if (!rc && prove.join && options->verify) {
+		rc = incise_verify(path, options->watch, &proof->report, err);
+		prove.verified = true;
+	}
+	for (int i = 0; i < proof->n && !rc; i++)
+		rc = prove_seal(&prove, &proof->seals[i], i < proof->n - 1);
+	incise_signers_free(&prove.signers);
+	incise_authorities_free(prove.authorities);
+	free(prove.join);
+	return rc;
+}
+
+void incise_proof_free(struct incise_proof *proof)
+{
+	for (int i = 0; i < proof->n; i++) {
+		struct incise_proof_seal *seal = &proof->seals[i];
+
+		for (int k = 0; k < seal->n_statements; k++)
+			for (int d = 0; d < seal->statements[k].n_differences; d++)
+				free(seal->statements[k].differences[d]);
+		free(seal->statements);
+		free(seal->vouchers);
+		free(seal->path);
+	}
+	free(proof->seals);
+	*proof = (struct incise_proof){.n = 0};
+}
