@@ -50,6 +50,11 @@ struct incise_factor {
 
 /* --- hashes -------------------------------------------------------------------------- */
 
+int incise_file_sha256(const char *path, char hex[65], struct incise_error *err)
+{
+	return incise_sha256_file(path, hex, err);
+}
+
 uint64_t incise_group_key(const char *source, const char *name)
 {
 	uint64_t key = 0;

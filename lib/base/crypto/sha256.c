@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <string.h>
 #include <unistd.h>
-#include <incise/factor.h>
 #include <openssl/evp.h>
 #include "sha256.h"
 
@@ -77,7 +76,8 @@ int incise_sha256_text(const void *bytes, size_t n, char hex[INCISE_SHA256_TEXT]
 	return incise_sha256_end(&sha, hex);
 }
 
-int incise_file_sha256(const char *path, char hex[65], struct incise_error *err)
+int incise_sha256_file(const char *path, char hex[INCISE_SHA256_TEXT],
+		       struct incise_error *err)
 {
 	int fd = open(path, O_RDONLY | O_CLOEXEC), code;
 	struct incise_sha256 sha = {0};

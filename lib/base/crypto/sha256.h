@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <incise/error.h>
 
 #define INCISE_SHA256_BYTES 32
 #define INCISE_SHA256_TEXT (2 * INCISE_SHA256_BYTES + 1)
@@ -30,6 +31,10 @@ int incise_sha256_end(struct incise_sha256 *sha, char hex[INCISE_SHA256_TEXT]);
 /* The digest of some bytes, and as text. Returns 0 or -ENOMEM. */
 int incise_sha256_of(const void *bytes, size_t n, uint8_t digest[INCISE_SHA256_BYTES]);
 int incise_sha256_text(const void *bytes, size_t n, char hex[INCISE_SHA256_TEXT]);
+
+/* That of a file. Returns 0, or the negative errno of open(2) or read(2). */
+int incise_sha256_file(const char *path, char hex[INCISE_SHA256_TEXT],
+		       struct incise_error *err);
 
 /* 64 lower-case hexadecimal digits and a NUL. */
 void incise_sha256_hex(const uint8_t bytes[INCISE_SHA256_BYTES],

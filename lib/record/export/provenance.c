@@ -10,12 +10,12 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <time.h>
-#include <incise/factor.h>
 #include <incise/origin.h>
 #include <incise/seal.h>
 #include <incise/version.h>
 #include <incise/wall.h>
 #include "writers.h"
+#include "../../base/crypto/sha256.h"
 #include "../read/recalibration.h"
 #include "../read/recording.h"
 #include "../read/session.h"
@@ -175,7 +175,7 @@ static size_t put_given(const char *path, char *text, size_t size, size_t at)
 	struct stat st;
 
 	if (stat(path, &st) || !S_ISREG(st.st_mode) ||
-	    incise_file_sha256(path, origin.sha256, NULL))
+	    incise_sha256_file(path, origin.sha256, NULL))
 		return at;
 	snprintf(origin.name, sizeof(origin.name), "%s", basename(path));
 	return put_token(&origin, text, size, at);
