@@ -550,7 +550,7 @@ static void recording_text(const char *path, const struct incise_recording_info 
 
 static void show_recording(const char *path, bool json, bool damaged)
 {
-	const struct incise_prove_options listed = {.verify = false};
+	const struct incise_prove_options listed = {.level = INCISE_PROVE_SEALS};
 	struct incise_recording_info info;
 	struct incise_proof proof;
 	struct incise_error err = {0};

@@ -275,7 +275,7 @@ int main(int argc, char **argv)
 {
 	struct sink sink = {0};
 	struct incise_verify_watch watch = {found, progress, &sink};
-	struct job job = {.prove = {.verify = true, .watch = &watch}};
+	struct job job = {.prove = {.level = INCISE_PROVE_ALL, .watch = &watch}};
 	struct incise_error err = {0};
 	struct incise_proof proof;
 

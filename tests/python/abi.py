@@ -17,7 +17,7 @@ import incise
 from incise import _corpus, _library, arrow, calibrate, model, plan, recording, verify, wall
 
 HEADERS = (
-    "arrow camera calibrate_depth calibrate_force calibrate_tip calibration corpus fixed model plan recording "
+    "arrow camera calibrate_depth calibrate_force calibrate_tip calibration corpus fixed model plan prove recording "
     "stability tracker train uncertainty verify wall"
 ).split()
 

@@ -14,7 +14,6 @@
 #include <unistd.h>
 #include <incise/prove.h>
 #include <incise/recalibration.h>
-#include <incise/verify.h>
 #include "cli.h"
 #include "file_kind.h"
 #include "recording.h"
@@ -27,47 +26,24 @@ struct incise_recording *recording_open(const char *path)
 	return cli_require(incise_recording_open(path, &err), &err);
 }
 
-struct first {
-	bool found;
-	char text[300];
-};
-
-/* Keep the first finding that is no loss, which was counted when it was recorded. */
-static void find_first(void *user, const struct incise_verify_finding *finding)
-{
-	struct first *first = user;
-
-	switch (finding->kind) {
-	case INCISE_VERIFY_ALTERED:
-	case INCISE_VERIFY_LEDGER:
-	case INCISE_VERIFY_EXTRA:
-	case INCISE_VERIFY_COUNT:
-	case INCISE_VERIFY_DAMAGED:
-		if (!first->found)
-			snprintf(first->text, sizeof(first->text), "%s", finding->text);
-		first->found = true;
-		break;
-	default:
-		break;
-	}
-}
-
 int recording_altered(const char *path, bool samples, struct incise_error *err)
 {
-	struct first first = {0};
-	const struct incise_verify_watch watch = {.found = find_first, .user = &first};
-	struct incise_verify_report report;
-	int rc = (samples ? incise_verify_rows : incise_verify_tables)(path, &watch,
-								       &report, err);
+	const struct incise_prove_options options = {
+		.level = samples ? INCISE_PROVE_ROWS : INCISE_PROVE_TABLES};
+	struct incise_proof proof;
+	int rc = incise_prove(path, &options, &proof, err);
 
+	if (!rc && *proof.altered) {
+		incise_error_set(err, EINVAL, "%s: not as it was recorded: %s", path,
+				 proof.altered);
+		rc = 1;
+	}
 	if (rc == -ENODATA) {
 		*err = (struct incise_error){0};
-		return 0;
+		rc = 0;
 	}
-	if (!rc && first.found)
-		incise_error_set(err, EINVAL, "%s: not as it was recorded: %s", path,
-				 first.text);
-	return rc ? rc : first.found;
+	incise_proof_free(&proof);
+	return rc;
 }
 
 bool recording_intact(const char *path, bool samples, bool damaged,

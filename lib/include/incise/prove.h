@@ -27,9 +27,21 @@
 
 INCISE_BEGIN_DECLS
 
+/** What is verified. Tables and rows are those that a program is about to read: no seal is read. */
+enum incise_prove_level {
+	INCISE_PROVE_SEALS, /**< nothing: what is in seal/ is listed */
+	/**
+	 * The sealed tables, of which incise_recording_info() takes the summary, without a sample: its
+	 * time does not grow with the recording. Of one without a summary it is INCISE_PROVE_ROWS.
+	 */
+	INCISE_PROVE_TABLES,
+	INCISE_PROVE_ROWS, /**< rows, ledger and tables, neither camera.mkv nor all pages */
+	INCISE_PROVE_ALL, /**< as incise_verify() */
+};
+
 /** What is wanted; {0}: list what is in seal/. */
 struct incise_prove_options {
-	bool verify; /**< verify the recording, as incise_verify() */
+	enum incise_prove_level level;
 	/** Signers that are trusted, ALLOWED SIGNERS of ssh-keygen(1): compare statements and check. */
 	const char *signers;
 	const char *revoked; /**< keys that are not accepted, ssh-keygen -k; or NULL */
@@ -109,6 +121,8 @@ struct incise_proof_seal {
 
 struct incise_proof {
 	struct incise_verify_report report; /**< of the verification */
+	/** The first finding by which rows or tables are not what was recorded; "": none. */
+	char altered[400];
 	int n;
 	struct incise_proof_seal
 		*seals; /**< of the members, then of the join; or the only one */

@@ -3,22 +3,33 @@
  * Proof of a recording; see incise/prove.h.
  */
 #include <ctype.h>
+#include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <incise/recalibration.h>
 #include "../../base/control_character.h"
 #include "../read/session.h"
+#include "../verify/verify.h"
 #include "prove.h"
+
+#define FILES_MAX 1000
+#define WORD_CHARACTERS "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-"
 
 struct prove {
 	const char *path; /* as it was given */
 	const struct incise_prove_options *options;
 	struct incise_proof *proof;
 	char *join; /* the statement of the join as it is now; NULL: it is a plain recording */
-	bool verified;
+	struct incise_verify_watch
+		watch; /* ours, which passes on to that of the options */
+	bool verified; /* all findings are known */
+	struct incise_proof_statement *statement; /* that is compared; NULL: none */
 	struct incise_signers signers;
 	struct x509_store_st *authorities; /* NULL: none */
 	struct incise_error *err;
@@ -29,13 +40,184 @@ static int fail_memory(const struct prove *prove)
 	return incise_error_set(prove->err, ENOMEM, "out of memory for a proof");
 }
 
-/* --- statements ------------------------------------------------------------------------- */
+/* --- the folder seal/: names are only taken if they have the form of ours ------------------ */
 
-struct comparison {
-	struct incise_proof_statement *statement;
-	const struct incise_verify_watch *watch; /* of the caller, or NULL */
-	bool seen;				 /* the caller has all findings already */
+static const struct {
+	const char *extension;
+	size_t size_max;
+} kinds[] = {
+	[INCISE_PROOF_STATEMENT] = {".statement", INCISE_SEAL_STATEMENT_MAX},
+	[INCISE_PROOF_SIGNATURE] = {".sig", INCISE_SIGNATURE_MAX},
+	[INCISE_PROOF_TIMESTAMP] = {".tsr", INCISE_TIMESTAMP_MAX},
 };
+
+/* "12.WORD.sig" or "12.statement". */
+static bool parse_name(const char *name, struct incise_seal_file *file)
+{
+	const char *rest = name + strspn(name, "0123456789");
+	size_t word;
+
+	file->number = rest > name && rest - name <= 4 && *name != '0' ? atoi(name) : 0;
+	if (!file->number || *rest != '.' || strlen(name) >= sizeof(file->name))
+		return false;
+	strcpy(file->name, name);
+	file->kind = INCISE_PROOF_STATEMENT;
+	if (!strcmp(rest, kinds[INCISE_PROOF_STATEMENT].extension))
+		return true;
+	word = strspn(rest + 1, WORD_CHARACTERS);
+	rest += 1 + word;
+	for (int k = INCISE_PROOF_SIGNATURE; k <= INCISE_PROOF_TIMESTAMP && word; k++)
+		if (!strcmp(rest, kinds[k].extension)) {
+			file->kind = (enum incise_proof_kind)k;
+			return true;
+		}
+	return false;
+}
+
+/* Read it, or say why not. Returns 0 or -ENOMEM. */
+static int read_file(int folder, struct incise_seal_file *file)
+{
+	size_t most = kinds[file->kind].size_max;
+	/* A pipe that nobody writes is not waited for. */
+	int fd = openat(folder, file->name,
+			O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+	char *bytes = calloc(most + 2, 1);
+	const char *why = NULL;
+	struct stat st;
+	ssize_t n = 0;
+
+	if (fd < 0)
+		why = errno == ELOOP ? "a link, which is not followed" : strerror(errno);
+	else if (fstat(fd, &st) || !S_ISREG(st.st_mode))
+		why = "not a regular file";
+	else if ((uint64_t)st.st_size > most)
+		why = "too large";
+	else if (bytes)
+		n = read(fd, bytes, most + 1);
+	if (n < 0 || (size_t)n > most)
+		why = n < 0 ? strerror(errno) : "too large";
+	if (fd >= 0)
+		close(fd);
+	if (bytes && !why) {
+		bytes[n] = 0;
+		file->content = (struct incise_bytes){bytes, (size_t)n};
+		return 0;
+	}
+	free(bytes);
+	snprintf(file->why, sizeof(file->why), "%s", why ? why : "");
+	return why ? 0 : -ENOMEM;
+}
+
+static int compare_files(const void *a, const void *b)
+{
+	const struct incise_seal_file *x = a, *y = b;
+
+	if (x->number != y->number)
+		return x->number < y->number ? -1 : 1;
+	return x->kind != y->kind ? (int)x->kind - (int)y->kind
+				  : strcmp(x->name, y->name);
+}
+
+/* Returns 0 or -errno. */
+static int add_file(struct incise_seal_files *files, int folder, const char *name,
+		    const char *path, struct incise_error *err)
+{
+	struct incise_seal_file file = {.number = 0};
+
+	if (!parse_name(name, &file))
+		return 0;
+	if (files->n == FILES_MAX)
+		return incise_error_set(err, E2BIG,
+					"%s: more than %d files; keep those of "
+					"signers that count",
+					path, FILES_MAX);
+	if (read_file(folder, &file))
+		return incise_error_set(err, ENOMEM, "%s: out of memory", path);
+	files->all[files->n++] = file;
+	return 0;
+}
+
+/*
+ * Read the files in a folder of a recording. Those of other names are passed over; links, devices and
+ * too large ones are listed, but not read. Returns 0, also if there is no such folder, or -errno;
+ * free_files() in both cases.
+ */
+static int read_files(struct incise_seal_files *files, const char *recording,
+		      const char *name, struct incise_error *err)
+{
+	char path[PATH_MAX];
+	struct dirent *entry;
+	struct stat st;
+	DIR *folder;
+	int fd, rc = 0;
+
+	*files = (struct incise_seal_files){0};
+	snprintf(path, sizeof(path), "%s/%s", recording, name);
+	fd = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+	folder = fd < 0 ? NULL : fdopendir(fd);
+	if (!folder && errno == ENOENT)
+		return 0;
+	if (!folder && errno == ENOTDIR && !stat(recording, &st) && !S_ISDIR(st.st_mode))
+		return incise_error_set(
+			err, ENOTDIR,
+			"%s: not a recording, which is a folder; unpack it "
+			"if it is an archive of one",
+			recording);
+	if (!folder)
+		return incise_error_set(err, errno, "%s: %s", path,
+					errno == ELOOP || errno == ENOTDIR
+						? "not a folder; remove it"
+						: strerror(errno));
+	files->all = calloc(FILES_MAX, sizeof(*files->all));
+	if (!files->all)
+		rc = incise_error_set(err, ENOMEM, "%s: out of memory", path);
+	while (!rc && (entry = readdir(folder)))
+		rc = add_file(files, fd, entry->d_name, path, err);
+	if (files->n)
+		qsort(files->all, (size_t)files->n, sizeof(*files->all), compare_files);
+	closedir(folder);
+	return rc;
+}
+
+static void free_files(struct incise_seal_files *files)
+{
+	for (int i = 0; i < files->n; i++)
+		free(files->all[i].content.bytes);
+	free(files->all);
+	*files = (struct incise_seal_files){0};
+}
+
+/* A folder with anything else in it stays. */
+static int remove_folder(const char *recording, const char *name,
+			 struct incise_error *err)
+{
+	struct incise_seal_files files;
+	char path[PATH_MAX];
+	int rc = read_files(&files, recording, name, err);
+
+	for (int i = 0; i < files.n && !rc; i++) {
+		snprintf(path, sizeof(path), "%s/%s/%s", recording, name,
+			 files.all[i].name);
+		if (unlink(path))
+			rc = incise_error_set(err, errno, "%s: cannot be removed: %s",
+					      path, strerror(errno));
+	}
+	free_files(&files);
+	snprintf(path, sizeof(path), "%s/%s", recording, name);
+	if (!rc && rmdir(path) && errno != ENOENT)
+		rc = incise_error_set(err, errno, "%s: cannot be removed: %s", path,
+				      strerror(errno));
+	return rc;
+}
+
+int incise_proof_remove(const char *recording, struct incise_error *err)
+{
+	int rc = remove_folder(recording, "seal", err);
+
+	return rc ? rc : remove_folder(recording, "seal-before", err);
+}
+
+/* --- statements ------------------------------------------------------------------------- */
 
 static void keep_difference(struct incise_proof_statement *s, const char *text)
 {
@@ -47,21 +229,37 @@ static void keep_difference(struct incise_proof_statement *s, const char *text)
 	s->differences[s->n_differences++] = copy;
 }
 
+/* Keep what differs from a statement, and the first finding that is no loss, which was counted. */
 static void take_finding(void *user, const struct incise_verify_finding *finding)
 {
-	const struct comparison *comparison = user;
-	const struct incise_verify_watch *watch = comparison->watch;
+	const struct prove *prove = user;
+	const struct incise_verify_watch *watch = prove->options->watch;
+	char *altered = prove->proof->altered;
 
-	if (watch && watch->found && !comparison->seen)
+	if (watch && watch->found && !prove->verified)
 		watch->found(watch->user, finding);
-	if (finding->kind == INCISE_VERIFY_SEAL)
-		keep_difference(comparison->statement, finding->text);
+	if (prove->statement && finding->kind == INCISE_VERIFY_SEAL)
+		keep_difference(prove->statement, finding->text);
+	if (!*altered && (finding->kind == INCISE_VERIFY_ALTERED ||
+			  finding->kind == INCISE_VERIFY_LEDGER ||
+			  finding->kind == INCISE_VERIFY_EXTRA ||
+			  finding->kind == INCISE_VERIFY_COUNT ||
+			  finding->kind == INCISE_VERIFY_DAMAGED))
+		snprintf(altered, sizeof(prove->proof->altered), "%s", finding->text);
+}
+
+static int pass_progress(void *user, double share)
+{
+	const struct incise_verify_watch *watch =
+		((const struct prove *)user)->options->watch;
+
+	return watch && watch->progress ? watch->progress(watch->user, share) : 0;
 }
 
 /* A finding of ours about a statement. */
-static void report_difference(struct comparison *comparison, const char *fmt, ...)
+static void report_difference(struct prove *prove, const char *fmt, ...)
 	INCISE_PRINTF(2, 3);
-static void report_difference(struct comparison *comparison, const char *fmt, ...)
+static void report_difference(struct prove *prove, const char *fmt, ...)
 {
 	char text[600];
 	struct incise_verify_finding finding = {
@@ -80,7 +278,7 @@ static void report_difference(struct comparison *comparison, const char *fmt, ..
 	va_start(args, fmt);
 	vsnprintf(text, sizeof(text), fmt, args);
 	va_end(args);
-	take_finding(comparison, &finding);
+	take_finding(prove, &finding);
 }
 
 size_t incise_proof_statement_length(const struct incise_bytes *text)
@@ -121,8 +319,7 @@ static void find_active(const char *list, char sha256[65])
 }
 
 /* Whether the recording is read by the calibration of the statement; it is a finding if not. */
-static bool compare_calibration(const char *now, const char *then,
-				struct comparison *comparison)
+static bool compare_calibration(const char *now, const char *then, struct prove *prove)
 {
 	bool kept = !strncmp(now, then, strlen(then)), known;
 	char read_by[65], signed_as[65], name[200] = "";
@@ -133,19 +330,18 @@ static bool compare_calibration(const char *now, const char *then,
 	find_active(then, signed_as);
 	known = kept && !strcmp(read_by, signed_as);
 	if (!kept)
-		report_difference(comparison,
+		report_difference(prove,
 				  "calibrations that are in the statement were removed "
 				  "or changed");
 	else if (!known)
-		report_difference(comparison,
-				  "%s, by which it is read, is not in the statement",
-				  name);
+		report_difference(
+			prove, "%s, by which it is read, is not in the statement", name);
 	return known;
 }
 
 /* The name is that of the cuts in what is exported. A member's is in the statement of the join. */
 static bool compare_name(const char *now, const char *name, bool member,
-			 struct comparison *comparison)
+			 struct prove *prove)
 {
 	const char *then = name;
 	bool same;
@@ -157,7 +353,7 @@ static bool compare_name(const char *now, const char *name, bool member,
 	same = member || *now == *then;
 	if (!same)
 		report_difference(
-			comparison,
+			prove,
 			"it was signed under the name %s; give it that name again, or "
 			"sign it under this one",
 			name);
@@ -165,16 +361,15 @@ static bool compare_name(const char *now, const char *name, bool member,
 }
 
 /* The text says all: the first line that differs does where. */
-static void compare_join(const struct prove *prove, const struct incise_seal_file *file,
-			 struct incise_proof_statement *s)
+static void compare_join(struct prove *prove, const struct incise_seal_file *file)
 {
+	struct incise_proof_statement *s = prove->statement;
 	static const char first[] = "incise statement 1 of a join\n";
-	struct comparison comparison = {.statement = s};
 	const char *then = file->content.bytes, *now = prove->join, *member = "";
 	size_t n = strlen(first);
 
 	if (!then || strncmp(then, first, n)) {
-		report_difference(&comparison, "seal/%s: %s", file->name,
+		report_difference(prove, "seal/%s: %s", file->name,
 				  then ? "no statement of a join" : file->why);
 		return;
 	}
@@ -190,34 +385,25 @@ static void compare_join(const struct prove *prove, const struct incise_seal_fil
 		if (!strncmp(now, "member ", 7))
 			member = now;
 	}
-	report_difference(&comparison, "%.*s: '%.*s' was signed, and is '%.*s' now",
+	report_difference(prove, "%.*s: '%.*s' was signed, and is '%.*s' now",
 			  (int)strcspn(member, "\n"), member, (int)strcspn(then, "\n"),
 			  then, (int)strcspn(now, "\n"), now);
 }
 
-static int pass_progress(void *user, double share)
-{
-	const struct incise_verify_watch *watch =
-		((const struct comparison *)user)->watch;
-
-	return watch && watch->progress ? watch->progress(watch->user, share) : 0;
-}
-
 /* Calibration and name, which are no rows. Returns 0 or -errno. */
-static int compare_rest(const struct incise_proof_seal *seal, const char *name,
-			bool member, const char *calibrations,
-			struct comparison *comparison, struct incise_error *err)
+static int compare_rest(struct prove *prove, const char *path, const char *name,
+			bool member, const char *calibrations)
 {
-	struct incise_proof_statement *s = comparison->statement;
-	char *now = incise_proof_calibrations(seal->path, err);
+	struct incise_proof_statement *s = prove->statement;
+	char *now = incise_proof_calibrations(path, prove->err);
 	struct incise_recording *recording =
-		now ? incise_recording_open(seal->path, err) : NULL;
+		now ? incise_recording_open(path, prove->err) : NULL;
 	int rc = recording ? 0 : -errno;
 
 	if (!rc) {
-		s->calibrated = compare_calibration(now, calibrations, comparison);
+		s->calibrated = compare_calibration(now, calibrations, prove);
 		s->agrees = compare_name(incise_recording_name(recording), name, member,
-					 comparison) &&
+					 prove) &&
 			    s->calibrated && s->recorded;
 	}
 	incise_recording_close(recording);
@@ -226,12 +412,10 @@ static int compare_rest(const struct incise_proof_seal *seal, const char *name,
 }
 
 /* The first one is compared while the recording is verified. Returns 0 or -errno. */
-static int compare_recording(struct prove *prove, const struct incise_proof_seal *seal,
-			     const struct incise_seal_file *file, bool member,
-			     struct incise_proof_statement *s)
+static int compare_recording(struct prove *prove, const char *path,
+			     const struct incise_seal_file *file, bool member)
 {
-	struct comparison comparison = {s, prove->options->watch, prove->verified};
-	const struct incise_verify_watch own = {take_finding, pass_progress, &comparison};
+	struct incise_proof_statement *s = prove->statement;
 	const char *text = file->content.bytes;
 	size_t n = text ? incise_proof_statement_length(&file->content) : 0;
 	struct incise_seal_statement statement;
@@ -248,16 +432,17 @@ static int compare_recording(struct prove *prove, const struct incise_proof_seal
 	}
 	s->commit = statement.last.commit;
 	s->complete = statement.complete;
-	rc = incise_seal_compare(seal->path, text, n, &own, &report, prove->err);
+	rc = incise_seal_compare(path, text, n, &prove->watch, &report, prove->err);
 	if (rc)
 		return rc;
-	if (!prove->verified)
-		prove->proof->report = report;
 	s->recorded = report.sealed;
-	s->reported = comparison.watch && !prove->verified;
+	rc = compare_rest(prove, path, statement.name, member, text + n);
+	if (!prove->verified) {
+		prove->proof->report = report;
+		s->reported = prove->options->watch != NULL;
+	}
 	prove->verified = true;
-	return compare_rest(seal, statement.name, member, text + n, &comparison,
-			    prove->err);
+	return rc;
 }
 
 /* The last one is that of the present: the recording is verified with it. Returns 0 or -errno. */
@@ -275,11 +460,13 @@ static int compare_statements(struct prove *prove, struct incise_proof_seal *sea
 		*s = (struct incise_proof_statement){.number = file->number,
 						     .commit = -1};
 		seal->n_statements++;
+		prove->statement = s;
 		if (seal->join)
-			compare_join(prove, file, s);
+			compare_join(prove, file);
 		else
-			rc = compare_recording(prove, seal, file, member, s);
+			rc = compare_recording(prove, seal->path, file, member);
 	}
+	prove->statement = NULL;
 	return rc;
 }
 
@@ -417,13 +604,13 @@ static int check_seal(struct prove *prove, struct incise_proof_seal *seal,
 	int rc = seal->join ? 0 : read_head(seal, &err);
 
 	/* One that cannot be read is a finding of its verification. */
-	if (rc && !options->verify) {
+	if (rc && options->level == INCISE_PROVE_SEALS) {
 		*prove->err = err;
 		return rc;
 	}
 	rc = options->signers ? compare_statements(prove, seal, files, member) : 0;
-	if (!rc && options->verify && !prove->verified)
-		rc = incise_verify(prove->path, options->watch, &prove->proof->report,
+	if (!rc && options->level == INCISE_PROVE_ALL && !prove->verified)
+		rc = incise_verify(prove->path, &prove->watch, &prove->proof->report,
 				   prove->err);
 	prove->verified = true;
 	if (!rc)
@@ -436,7 +623,7 @@ static int prove_seal(struct prove *prove, struct incise_proof_seal *seal, bool 
 {
 	const struct incise_prove_options *options = prove->options;
 	struct incise_seal_files files;
-	int rc = incise_seal_files_read(&files, seal->path, "seal", prove->err);
+	int rc = read_files(&files, seal->path, "seal", prove->err);
 
 	/* A statement, a signature and a time-stamp may be made. */
 	seal->statements = calloc((size_t)files.n + 1, sizeof(*seal->statements));
@@ -453,7 +640,7 @@ static int prove_seal(struct prove *prove, struct incise_proof_seal *seal, bool 
 						 seal->join ? prove->join : NULL, member,
 						 options, prove->err)
 			     : check_seal(prove, seal, &files, member);
-	incise_seal_files_free(&files);
+	free_files(&files);
 	return rc;
 }
 
@@ -531,17 +718,21 @@ int incise_prove(const char *path, const struct incise_prove_options *options,
 	struct prove prove = {.path = path,
 			      .options = options,
 			      .proof = proof,
+			      .watch = {take_finding, pass_progress, &prove},
 			      .err = err ? err : &none};
 	int rc;
 
 	*proof = (struct incise_proof){.n = 0};
+	if (options->level == INCISE_PROVE_TABLES)
+		return incise_verify_tables(path, &prove.watch, &proof->report, err);
+	if (options->level == INCISE_PROVE_ROWS)
+		return incise_verify_rows(path, &prove.watch, &proof->report, err);
 	rc = read_trust(&prove);
 	if (!rc)
 		rc = find_seals(&prove);
-	if (!rc && prove.join && options->verify) {
-		rc = incise_verify(path, options->watch, &proof->report, err);
-		prove.verified = true;
-	}
+	if (!rc && prove.join && options->level == INCISE_PROVE_ALL)
+		rc = incise_verify(path, &prove.watch, &proof->report, err);
+	prove.verified = prove.join;
 	for (int i = 0; i < proof->n && !rc; i++)
 		rc = prove_seal(&prove, &proof->seals[i], i < proof->n - 1);
 	incise_signers_free(&prove.signers);

@@ -4,7 +4,6 @@
  *
  *     prove.c        the recording, its statements, and who vouches for them
  *     sign.c         a statement, a signature and a time-stamp of the recording as it is
- *     seal_folder.c  the files in seal/
  *     signature.c    ssh-keygen
  *     timestamp.c    RFC 3161, by libcrypto
  */
@@ -41,7 +40,7 @@ char *incise_proof_calibrations(const char *recording, struct incise_error *err)
 /* The bytes of a statement before these lines; 0: it has no end. */
 size_t incise_proof_statement_length(const struct incise_bytes *text);
 
-/* --- seal_folder.c ---------------------------------------------------------------------- */
+/* --- sign.c ----------------------------------------------------------------------------- */
 
 struct incise_seal_file {
 	char name[100]; /* letters, digits, '.', '_' and '-' */
@@ -58,18 +57,13 @@ struct incise_seal_files {
 };
 
 /*
- * Read the files in the folder seal/ of a recording. Those of other names are passed over; links,
- * devices and too large ones are listed, but not read. Returns 0, also if there is no such folder,
- * or -errno; incise_seal_files_free() in both cases.
+ * Sign and time-stamp a recording, a member of a joined one, or a join, whose statement is @join. Adds
+ * to seal->statements and seal->vouchers, which have room, what it made. Returns 0 or -errno.
  */
-int incise_seal_files_read(struct incise_seal_files *files, const char *recording,
-			   const char *name, struct incise_error *err);
-
-void incise_seal_files_free(struct incise_seal_files *files);
-
-/* Write a file into seal/, which is made if it is not there. Links are not followed. 0 or -errno. */
-int incise_seal_file_write(const char *recording, const char *name,
-			   const struct incise_bytes *content, struct incise_error *err);
+int incise_proof_sign(struct incise_proof_seal *seal,
+		      const struct incise_seal_files *files, const char *join,
+		      bool member, const struct incise_prove_options *options,
+		      struct incise_error *err);
 
 /* --- signature.c ------------------------------------------------------------------------ */
 
@@ -133,16 +127,5 @@ int incise_timestamp_read(const struct incise_bytes *reply, const char *name,
 			  const uint8_t digest[INCISE_SHA256_BYTES], const uint8_t *query,
 			  struct x509_store_st *authorities,
 			  struct incise_proof_voucher *voucher, struct incise_error *err);
-
-/* --- sign.c ----------------------------------------------------------------------------- */
-
-/*
- * Sign and time-stamp a recording, a member of a joined one, or a join, whose statement is @join. Adds
- * to seal->statements and seal->vouchers, which have room, what it made. Returns 0 or -errno.
- */
-int incise_proof_sign(struct incise_proof_seal *seal,
-		      const struct incise_seal_files *files, const char *join,
-		      bool member, const struct incise_prove_options *options,
-		      struct incise_error *err);
 
 #endif

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <incise/infile.h>
 #include <incise/outfile.h>
@@ -148,6 +149,31 @@ static int make_statement(struct signing *s, const struct incise_seal_files *fil
 
 /* --- writing ---------------------------------------------------------------------------- */
 
+/* Write a file into seal/, which is made if it is not there. Links are not followed. 0 or -errno. */
+static int write_file(const char *recording, const char *name,
+		      const struct incise_bytes *content, struct incise_error *err)
+{
+	char folder[PATH_MAX], path[PATH_MAX + 100];
+	struct incise_outfile *file;
+	struct stat st;
+
+	snprintf(folder, sizeof(folder), "%s/seal", recording);
+	snprintf(path, sizeof(path), "%s/%s", folder, name);
+	if (mkdir(folder, 0777) && errno != EEXIST)
+		return incise_error_set(err, errno, "%s: %s", folder, strerror(errno));
+	if (lstat(folder, &st) || !S_ISDIR(st.st_mode))
+		return incise_error_set(err, ENOTDIR, "%s: not a folder; remove it",
+					folder);
+	if (!lstat(path, &st) && !S_ISREG(st.st_mode))
+		return incise_error_set(err, EEXIST, "%s: not a regular file; remove it",
+					path);
+	file = incise_outfile_open(path, err);
+	if (!file)
+		return -errno;
+	fwrite(content->bytes, 1, content->n, incise_outfile_stream(file));
+	return incise_outfile_commit(file, err);
+}
+
 /* Returns 0, or -ECANCELED: the caller does not want this file. */
 static int announce(const struct signing *s, const char *name)
 {
@@ -171,11 +197,11 @@ static int store(struct signing *s, const char *name, const struct incise_bytes 
 	if (!rc && name)
 		rc = announce(s, name);
 	if (!rc && !s->stored)
-		rc = incise_seal_file_write(path, statement, &s->text, s->err);
+		rc = write_file(path, statement, &s->text, s->err);
 	if (rc)
 		return rc;
 	s->stored = true;
-	return name ? incise_seal_file_write(path, name, content, s->err) : 0;
+	return name ? write_file(path, name, content, s->err) : 0;
 }
 
 /* The next voucher; it counts once it is good. */

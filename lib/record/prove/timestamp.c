@@ -74,24 +74,18 @@ int incise_timestamp_query(const uint8_t digest[INCISE_SHA256_BYTES],
 
 /* --- server ---------------------------------------------------------------------------- */
 
-/* All of a stream of libcrypto, up to INCISE_TIMESTAMP_MAX. Returns 0 or -errno. */
-static int read_all(BIO *bio, struct incise_bytes *to)
+/* The reply, which libcrypto has read into memory. Returns 0 or -errno. */
+static int copy_reply(BIO *bio, struct incise_bytes *to)
 {
-	size_t n = 0;
+	char *bytes;
+	long n = BIO_get_mem_data(bio, &bytes);
 
-	to->bytes = malloc(INCISE_TIMESTAMP_MAX + 1);
+	to->bytes = n > 0 ? malloc((size_t)n) : NULL;
 	if (!to->bytes)
-		return -ENOMEM;
-	for (int got; n <= INCISE_TIMESTAMP_MAX &&
-		      (got = BIO_read(bio, to->bytes + n,
-				      (int)(INCISE_TIMESTAMP_MAX + 1 - n))) > 0;)
-		n += (size_t)got;
-	to->n = n;
-	if (n <= INCISE_TIMESTAMP_MAX)
-		return 0;
-	free(to->bytes);
-	*to = (struct incise_bytes){0};
-	return -EFBIG;
+		return n > 0 ? -ENOMEM : -EIO;
+	memcpy(to->bytes, bytes, (size_t)n);
+	to->n = (size_t)n;
+	return 0;
 }
 
 /*
@@ -153,7 +147,7 @@ int incise_timestamp_ask(const char *server, const uint8_t query[INCISE_TIMESTAM
 						 "application/timestamp-query", in,
 						 "application/timestamp-reply", 1,
 						 INCISE_TIMESTAMP_MAX, WAIT_S, 0);
-		rc = out ? read_all(out, reply) : -EIO;
+		rc = out ? copy_reply(out, reply) : -EIO;
 		if (rc)
 			incise_error_set(err, -rc,
 					 "%s: no time-stamp: %s; try again, or another "

@@ -13,11 +13,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include <incise/verify.h>
 #include "../frames.h"
 #include "../read/recording.h"
 #include "../read/source.h"
 #include "../schema.h"
+#include "../verify/verify.h"
 #include "block_writer.h"
 
 #define ROWS 1000 /* of a block, where there is no ledger */
