@@ -121,7 +121,7 @@ struct incise_proof_seal {
 
 struct incise_proof {
 	struct incise_verify_report report; /**< of the verification */
-	/** The first finding by which rows or tables are not what was recorded; "": none. */
+	/** The first finding by which it is not what was recorded; "": none. */
 	char altered[400];
 	int n;
 	struct incise_proof_seal

@@ -235,16 +235,20 @@ static void take_finding(void *user, const struct incise_verify_finding *finding
 	const struct prove *prove = user;
 	const struct incise_verify_watch *watch = prove->options->watch;
 	char *altered = prove->proof->altered;
+	/* Programs read rows that agree with their ledger; a statement may be of another state. */
+	bool seal_counts = !prove->statement &&
+			   prove->options->level != INCISE_PROVE_TABLES &&
+			   prove->options->level != INCISE_PROVE_ROWS;
 
 	if (watch && watch->found && !prove->verified)
 		watch->found(watch->user, finding);
 	if (prove->statement && finding->kind == INCISE_VERIFY_SEAL)
 		keep_difference(prove->statement, finding->text);
-	if (!*altered && (finding->kind == INCISE_VERIFY_ALTERED ||
-			  finding->kind == INCISE_VERIFY_LEDGER ||
-			  finding->kind == INCISE_VERIFY_EXTRA ||
-			  finding->kind == INCISE_VERIFY_COUNT ||
-			  finding->kind == INCISE_VERIFY_DAMAGED))
+	if (!*altered && finding->kind != INCISE_VERIFY_LOST &&
+	    finding->kind != INCISE_VERIFY_INTERRUPTED &&
+	    finding->kind != INCISE_VERIFY_ENDED &&
+	    finding->kind != INCISE_VERIFY_TIMES &&
+	    (seal_counts || finding->kind != INCISE_VERIFY_SEAL))
 		snprintf(altered, sizeof(prove->proof->altered), "%s", finding->text);
 }
 
@@ -309,11 +313,18 @@ char *incise_proof_calibrations(const char *recording, struct incise_error *err)
 	return NULL;
 }
 
+/* The line behind this one; "" behind the last, which may end without a newline in a forgery. */
+static const char *next_line(const char *line)
+{
+	line = strchrnul(line, '\n');
+	return line + (*line != 0);
+}
+
 /* SHA-256 of the last calibration of a list, which is the active one; "": that of the capture. */
 static void find_active(const char *list, char sha256[65])
 {
 	*sha256 = 0;
-	for (const char *line = list; *line; line = strchr(line, '\n') + 1)
+	for (const char *line = list; *line; line = next_line(line))
 		if (sscanf(line, "calibration %*s %64[0-9a-f]", sha256) != 1)
 			*sha256 = 0;
 }
@@ -324,7 +335,7 @@ static bool compare_calibration(const char *now, const char *then, struct prove 
 	bool kept = !strncmp(now, then, strlen(then)), known;
 	char read_by[65], signed_as[65], name[200] = "";
 
-	for (const char *line = now; *line; line = strchr(line, '\n') + 1)
+	for (const char *line = now; *line; line = next_line(line))
 		sscanf(line, "calibration %199s", name);
 	find_active(now, read_by);
 	find_active(then, signed_as);
@@ -638,7 +649,8 @@ static int prove_seal(struct prove *prove, struct incise_proof_seal *seal, bool 
 		rc = options->key || options->timestamp
 			     ? incise_proof_sign(seal, &files,
 						 seal->join ? prove->join : NULL, member,
-						 options, prove->err)
+						 options, &prove->watch,
+						 prove->proof->altered, prove->err)
 			     : check_seal(prove, seal, &files, member);
 	free_files(&files);
 	return rc;

@@ -59,10 +59,13 @@ struct incise_seal_files {
 /*
  * Sign and time-stamp a recording, a member of a joined one, or a join, whose statement is @join. Adds
  * to seal->statements and seal->vouchers, which have room, what it made. Returns 0 or -errno.
+ *
+ * @watch: of the verification before; sets @altered to its first finding that is no loss
  */
 int incise_proof_sign(struct incise_proof_seal *seal,
 		      const struct incise_seal_files *files, const char *join,
 		      bool member, const struct incise_prove_options *options,
+		      const struct incise_verify_watch *watch, const char *altered,
 		      struct incise_error *err);
 
 /* --- signature.c ------------------------------------------------------------------------ */

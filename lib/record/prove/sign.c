@@ -20,6 +20,8 @@
 struct signing {
 	struct incise_proof_seal *seal;
 	const struct incise_prove_options *options;
+	const struct incise_verify_watch *watch; /* which sets altered */
+	const char *altered;
 	struct incise_bytes text; /* of the statement */
 	bool stored;		  /* it is in seal/ already */
 	struct incise_error *err;
@@ -27,39 +29,19 @@ struct signing {
 
 /* --- the statement ---------------------------------------------------------------------- */
 
-struct first {
-	bool found;
-	char text[300];
-};
-
-/* Keep the first finding that is no loss, which the recorder counted. */
-static void find_first(void *user, const struct incise_verify_finding *finding)
-{
-	struct first *first = user;
-
-	if (first->found || finding->kind == INCISE_VERIFY_LOST ||
-	    finding->kind == INCISE_VERIFY_INTERRUPTED ||
-	    finding->kind == INCISE_VERIFY_ENDED || finding->kind == INCISE_VERIFY_TIMES)
-		return;
-	first->found = true;
-	snprintf(first->text, sizeof(first->text), "%s", finding->text);
-}
-
 static int check_rows(const struct signing *s)
 {
 	const char *path = s->seal->path;
-	struct first first = {.text = "see incise verify"};
-	struct incise_verify_watch watch = {.found = find_first, .user = &first};
 	struct incise_verify_report report;
 	int rc = incise_seal_compare(path, s->text.bytes,
-				     incise_proof_statement_length(&s->text), &watch,
+				     incise_proof_statement_length(&s->text), s->watch,
 				     &report, s->err);
 
 	if (rc || (report.intact && report.sealed))
 		return rc;
 	return incise_error_set(s->err, EBADMSG,
 				"%s: not as it was recorded: %s; it is not signed", path,
-				first.text);
+				*s->altered ? s->altered : "see incise verify");
 }
 
 /* Statement and calibrations of a recording. Returns 0 or -errno. */
@@ -345,9 +327,14 @@ static int stamp(struct signing *s)
 int incise_proof_sign(struct incise_proof_seal *seal,
 		      const struct incise_seal_files *files, const char *join,
 		      bool member, const struct incise_prove_options *options,
+		      const struct incise_verify_watch *watch, const char *altered,
 		      struct incise_error *err)
 {
-	struct signing s = {.seal = seal, .options = options, .err = err};
+	struct signing s = {.seal = seal,
+			    .options = options,
+			    .watch = watch,
+			    .altered = altered,
+			    .err = err};
 	int rc = make_statement(&s, files, join);
 
 	if (!rc && options->key)
