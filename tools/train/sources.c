@@ -12,11 +12,11 @@
 #include <incise/arrow.h>
 #include <incise/infile.h>
 #include <incise/recalibration.h>
+#include <incise/origin.h>
 #include <incise/recording.h>
 #include "../cli/cli.h"
 #include "../cli/file_kind.h"
 #include "../cli/recording.h"
-#include "../origin/origins.h"
 #include "sources.h"
 
 #define ORIGINS_TEXT 480 /* bytes of a recording's origins in its text */
@@ -369,9 +369,10 @@ static int name_file(struct source *source, struct incise_error *err)
 	size_t at =
 		(size_t)snprintf(source->text, sizeof(source->text), "%.300s",
 				 source->pipe.file ? "a pipe" : name_of(source->path));
-	struct origins origins = {0};
+	struct incise_origins origins = {0};
 	char text[INCISE_ORIGIN_TEXT];
-	int rc = origins_read(&origins, file_of(source), err);
+	int rc = incise_origins_read(&origins, file_of(source),
+				     file_kind_of(file_of(source)) == FILE_MODEL, err);
 
 	for (int i = 0; i < origins.n; i++) {
 		origins.all[i].depth++;
@@ -381,7 +382,7 @@ static int name_file(struct source *source, struct incise_error *err)
 			break;
 		at += (size_t)sprintf(source->text + at, "%s%s", i ? " " : ", ", text);
 	}
-	origins_end(&origins);
+	incise_origins_free(&origins);
 	return rc;
 }
 

@@ -266,22 +266,14 @@ static void report_difference(struct prove *prove, const char *fmt, ...)
 static void report_difference(struct prove *prove, const char *fmt, ...)
 {
 	char text[600];
-	struct incise_verify_finding finding = {
-		.kind = INCISE_VERIFY_SEAL,
-		.stream = "",
-		.first_block = -1,
-		.last_block = -1,
-		.last_seq = -1,
-		.first_ns = -1,
-		.last_ns = -1,
-		.count = 1,
-		.text = text,
-	};
+	struct incise_verify_finding finding = incise_verify_finding(INCISE_VERIFY_SEAL);
 	va_list args;
 
 	va_start(args, fmt);
 	vsnprintf(text, sizeof(text), fmt, args);
 	va_end(args);
+	finding.count = 1;
+	finding.text = text;
 	take_finding(prove, &finding);
 }
 
@@ -656,8 +648,7 @@ static int prove_seal(struct prove *prove, struct incise_proof_seal *seal, bool 
 	return rc;
 }
 
-/* The folder of a recording, without its choice; NULL and the reason. */
-static char *find_folder(const char *path, struct incise_error *err)
+char *incise_proof_folder(const char *path, struct incise_error *err)
 {
 	const char *slash = strrchr(path, '/'),
 		   *colon = strrchr(slash ? slash : path, ':');
@@ -675,7 +666,7 @@ static char *find_folder(const char *path, struct incise_error *err)
 static int find_seals(struct prove *prove)
 {
 	struct incise_proof *proof = prove->proof;
-	char *folder = find_folder(prove->path, prove->err);
+	char *folder = incise_proof_folder(prove->path, prove->err);
 	/* One that does not open is plain, and says why later. */
 	struct incise_recording *recording =
 		folder ? incise_recording_open_any(folder, NULL) : NULL;

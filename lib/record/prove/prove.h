@@ -6,6 +6,7 @@
  *     sign.c         a statement, a signature and a time-stamp of the recording as it is
  *     signature.c    ssh-keygen
  *     timestamp.c    RFC 3161, by libcrypto
+ *     lineage.c      the files that a file was made of
  */
 #ifndef INCISE_PROVE_PRIVATE_H
 #define INCISE_PROVE_PRIVATE_H
@@ -26,6 +27,9 @@ struct incise_bytes {
 };
 
 /* --- prove.c ---------------------------------------------------------------------------- */
+
+/* The folder of a recording, without its choice: free(3). NULL and the reason. */
+char *incise_proof_folder(const char *path, struct incise_error *err);
 
 /*
  * A line for each calibration after the fact of a recording (incise/recalibration.h), which stand
