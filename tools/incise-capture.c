@@ -516,7 +516,7 @@ struct signing {
 };
 
 /* The recording stays as it is if it cannot be signed. */
-static void sign(const char *path, struct signing *signing)
+static void sign_recording(const char *path, struct signing *signing)
 {
 	const struct incise_prove_options options = {.key = signing->key,
 						     .recorded = true};
@@ -739,7 +739,7 @@ int main(int argc, char **argv)
 	recording_replace(target, options.output);
 	free(target);
 	wall = read_wall(options.output);
-	sign(options.output, &signing);
+	sign_recording(options.output, &signing);
 	report(&options, &run.result, &calibration, wall, &signing);
 	judge_wall(&options, wall);
 	incise_wall_free(wall);

@@ -657,6 +657,8 @@ char *incise_proof_folder(const char *path, struct incise_error *err)
 	if (folder || !colon)
 		return folder;
 	whole = strndup(path, (size_t)(colon - path));
+	if (!whole)
+		incise_error_set(err, ENOMEM, "%s: out of memory", path);
 	folder = whole ? incise_recording_folder(whole, err) : NULL;
 	free(whole);
 	return folder;

@@ -157,7 +157,7 @@ static int write_file(const char *recording, const char *name,
 }
 
 /* Returns 0, or -ECANCELED: the caller does not want this file. */
-static int announce(const struct signing *s, const char *name)
+static int announce_file(const struct signing *s, const char *name)
 {
 	char path[PATH_MAX];
 
@@ -168,16 +168,17 @@ static int announce(const struct signing *s, const char *name)
 }
 
 /* Write the statement if it is not stored, and then a file of it; @name NULL: the statement alone. */
-static int store(struct signing *s, const char *name, const struct incise_bytes *content)
+static int store_file(struct signing *s, const char *name,
+		      const struct incise_bytes *content)
 {
 	const char *path = s->seal->path;
 	char statement[40];
 	int rc;
 
 	sprintf(statement, "%d.statement", s->seal->statements->number);
-	rc = s->stored ? 0 : announce(s, statement);
+	rc = s->stored ? 0 : announce_file(s, statement);
 	if (!rc && name)
-		rc = announce(s, name);
+		rc = announce_file(s, name);
 	if (!rc && !s->stored)
 		rc = write_file(path, statement, &s->text, s->err);
 	if (rc)
@@ -213,7 +214,7 @@ static void name_signature(struct incise_proof_voucher *voucher)
 }
 
 /* @member: of a joined recording; one that the same key has signed keeps that signature. */
-static int sign(struct signing *s, bool member)
+static int sign_statement(struct signing *s, bool member)
 {
 	struct incise_proof_voucher *voucher = start_voucher(s, INCISE_PROOF_SIGNATURE);
 	const char *key = s->options->key;
@@ -232,7 +233,7 @@ static int sign(struct signing *s, bool member)
 		name_signature(voucher);
 		snprintf(path, sizeof(path), "%s/seal/%s", s->seal->path, voucher->file);
 		if (!member || s->options->renew || access(path, F_OK))
-			rc = store(s, voucher->file, &bytes);
+			rc = store_file(s, voucher->file, &bytes);
 	}
 	s->seal->n_vouchers += !rc;
 	free(bytes.bytes);
@@ -256,7 +257,7 @@ static bool is_server(const char *text)
 static int write_query(struct signing *s, const uint8_t query[INCISE_TIMESTAMP_QUERY])
 {
 	struct incise_outfile *file;
-	int rc = store(s, NULL, NULL);
+	int rc = store_file(s, NULL, NULL);
 
 	if (rc)
 		return rc;
@@ -295,7 +296,7 @@ static int get_reply(const struct signing *s, const uint8_t *query,
 	return reply->bytes ? 0 : -errno;
 }
 
-static int stamp(struct signing *s)
+static int stamp_statement(struct signing *s)
 {
 	struct incise_proof_voucher *voucher = start_voucher(s, INCISE_PROOF_TIMESTAMP);
 	const char *at = s->options->timestamp;
@@ -317,7 +318,7 @@ static int stamp(struct signing *s)
 					   voucher, s->err);
 	if (!rc) {
 		name_timestamp(voucher);
-		rc = store(s, voucher->file, &reply);
+		rc = store_file(s, voucher->file, &reply);
 	}
 	s->seal->n_vouchers += !rc;
 	free(reply.bytes);
@@ -338,10 +339,10 @@ int incise_proof_sign(struct incise_proof_seal *seal,
 	int rc = make_statement(&s, files, join);
 
 	if (!rc && options->key)
-		rc = sign(&s, member);
+		rc = sign_statement(&s, member);
 	/* A file is one time-stamp: of the join, whose statement names the members'. */
 	if (!rc && options->timestamp && (!member || is_server(options->timestamp)))
-		rc = stamp(&s);
+		rc = stamp_statement(&s);
 	free(s.text.bytes);
 	return rc;
 }

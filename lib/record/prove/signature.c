@@ -69,7 +69,7 @@ static void free_keygen(struct keygen *keygen)
 }
 
 /* Its status as of waitpid(2); -1 with errno. The descriptors are in ascending order. */
-static int spawn(char *const argv[], const int fd[3], const struct check *check)
+static int spawn_keygen(char *const argv[], const int fd[3], const struct check *check)
 {
 	posix_spawn_file_actions_t actions;
 	int status, code = posix_spawn_file_actions_init(&actions);
@@ -100,7 +100,7 @@ static int run_keygen(struct keygen *keygen, char *const argv[],
 	bool asks = !check && isatty(STDERR_FILENO),
 	     made = fd[0] >= 0 && fd[1] >= 0 && fd[2] >= 0;
 	int all[] = {fd[0], fd[1], asks ? STDERR_FILENO : fd[2]};
-	int status = made ? spawn(argv, all, check) : -1, code = errno;
+	int status = made ? spawn_keygen(argv, all, check) : -1, code = errno;
 
 	if (fd[0] >= 0)
 		close(fd[0]);

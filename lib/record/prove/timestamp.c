@@ -265,7 +265,8 @@ static void copy_refusal(const TS_RESP *response, char *text, size_t size)
 			 (const char *)ASN1_STRING_get0_data(line));
 }
 
-static bool is_for(const TS_TST_INFO *info, const uint8_t digest[INCISE_SHA256_BYTES])
+static bool is_for_digest(const TS_TST_INFO *info,
+			  const uint8_t digest[INCISE_SHA256_BYTES])
 {
 	TS_MSG_IMPRINT *imprint = TS_TST_INFO_get_msg_imprint((TS_TST_INFO *)info);
 	const ASN1_OBJECT *algorithm = NULL;
@@ -278,7 +279,7 @@ static bool is_for(const TS_TST_INFO *info, const uint8_t digest[INCISE_SHA256_B
 	       !memcmp(ASN1_STRING_get0_data(message), digest, INCISE_SHA256_BYTES);
 }
 
-static bool answers(const TS_TST_INFO *info, const uint8_t *query)
+static bool answers_query(const TS_TST_INFO *info, const uint8_t *query)
 {
 	const ASN1_INTEGER *nonce = TS_TST_INFO_get_nonce(info);
 
@@ -345,12 +346,12 @@ int incise_timestamp_read(const struct incise_bytes *reply, const char *name,
 				      why);
 	} else if (!info || !copy_time(info, voucher)) {
 		rc = incise_error_set(err, EPROTO, "%s: a reply without a time", name);
-	} else if (!is_for(info, digest)) {
+	} else if (!is_for_digest(info, digest)) {
 		rc = incise_error_set(err, EBADMSG,
 				      "%s: a time-stamp for something else, not for this "
 				      "statement",
 				      name);
-	} else if (query && !answers(info, query)) {
+	} else if (query && !answers_query(info, query)) {
 		rc = incise_error_set(
 			err, EBADMSG,
 			"%s: the reply to another query: its nonce differs; "
